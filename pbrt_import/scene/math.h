@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cmath>
+
+#include <glm/glm.hpp>
+
+namespace packtrace {
+
+using Vec2 = glm::vec2;
+using Vec3 = glm::vec3;
+using DVec3 = glm::dvec3;
+using Triangle = glm::uvec3; ///< three vertex indices
+
+/// Affine maps, GLM's column-major 4 columns x 3 rows: columns 0..2 are the linear part, column 3 the translation.
+/// Named `to_from_from`: world_from_object. All spaces are pbrt's left-handed ones (camera: +x right, +y up, +z forward).
+using Affine = glm::mat4x3;
+using DAffine = glm::dmat4x3;
+
+inline Vec3 transform_point(const Affine& to_from, Vec3 p) { return to_from * glm::vec4(p, 1.0f); }
+inline DVec3 transform_point(const DAffine& to_from, DVec3 p) { return to_from * glm::dvec4(p, 1.0); }
+inline Vec3 transform_vector(const Affine& to_from, Vec3 v) { return glm::mat3(to_from) * v; }
+inline DVec3 transform_vector(const DAffine& to_from, DVec3 v) { return glm::dmat3(to_from) * v; }
+
+/// The matrix that takes normals along with an affine map: the cofactor matrix of the linear part times the sign of
+/// its determinant. It equals |det| times the inverse transpose, so it needs no division and works for flattening maps;
+/// results are not unit length.
+inline glm::dmat3 normal_matrix(const DAffine& to_from) {
+  const DVec3 x = to_from[0], y = to_from[1], z = to_from[2];
+  const glm::dmat3 cofactor(glm::cross(y, z), glm::cross(z, x), glm::cross(x, y));
+  return glm::dot(x, cofactor[0]) < 0.0 ? -cofactor : cofactor;
+}
+
+/// True where the map mirrors: the determinant of its linear part is negative.
+inline bool swaps_handedness(const DAffine& to_from) { return glm::determinant(glm::dmat3(to_from)) < 0.0; }
+
+/// a after b: x -> a (b x).
+inline DAffine compose(const DAffine& a, const DAffine& b) {
+  const glm::dmat3 linear = glm::dmat3(a) * glm::dmat3(b);
+  return DAffine(linear[0], linear[1], linear[2], transform_point(a, b[3]));
+}
+
+inline DAffine inverse(const DAffine& to_from) {
+  const glm::dmat3 linear = glm::inverse(glm::dmat3(to_from));
+  return DAffine(linear[0], linear[1], linear[2], -(linear * to_from[3]));
+}
+
+inline bool is_finite(Vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+inline bool is_finite(DVec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+} // namespace packtrace

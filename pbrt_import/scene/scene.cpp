@@ -1,0 +1,44 @@
+#include "pbrt_import/scene/scene.h"
+
+namespace packtrace {
+namespace {
+
+uint64_t triangle_count(const Scene& scene, const std::vector<Shape>& shapes) {
+  uint64_t total = 0;
+  for (const Shape& shape : shapes) total += scene.meshes[shape.mesh].triangles.size();
+  return total;
+}
+
+} // namespace
+
+uint64_t unique_triangle_count(const Scene& scene) {
+  uint64_t total = triangle_count(scene, scene.shapes);
+  for (const Object& object : scene.objects) total += triangle_count(scene, object.shapes);
+  return total;
+}
+
+uint64_t placed_triangle_count(const Scene& scene) {
+  std::vector<uint64_t> per_object;
+  for (const Object& object : scene.objects) per_object.push_back(triangle_count(scene, object.shapes));
+  uint64_t total = triangle_count(scene, scene.shapes);
+  for (const Instance& instance : scene.instances) total += per_object[instance.object];
+  return total;
+}
+
+Bounds world_bounds(const Scene& scene) {
+  std::vector<Bounds> mesh_bounds;
+  for (const Mesh& mesh : scene.meshes) mesh_bounds.push_back(bounds_of(mesh.positions));
+  const auto shapes_bounds = [&](const std::vector<Shape>& shapes) {
+    Bounds result;
+    for (const Shape& shape : shapes) result.extend(transform_bounds(shape.parent_from_mesh, mesh_bounds[shape.mesh]));
+    return result;
+  };
+  Bounds result = shapes_bounds(scene.shapes);
+  std::vector<Bounds> object_bounds;
+  for (const Object& object : scene.objects) object_bounds.push_back(shapes_bounds(object.shapes));
+  for (const Instance& instance : scene.instances)
+    result.extend(transform_bounds(DAffine(instance.world_from_object), object_bounds[instance.object]));
+  return result;
+}
+
+} // namespace packtrace

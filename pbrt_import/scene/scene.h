@@ -1,0 +1,93 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pbrt_import/scene/alpha_mask.h"
+#include "pbrt_import/scene/bounds.h"
+#include "pbrt_import/scene/material_flags.h"
+#include "pbrt_import/scene/math.h"
+
+namespace packtrace {
+
+/// Triangles in the space of the shape that made them. Every index is in range, every position finite, no triangle
+/// repeats an index; normals and uvs are empty or one per vertex.
+/// The geometric normal is cross(p1 - p0, p2 - p0) in this space; it travels to other spaces with normal_matrix(), so
+/// mirroring transforms do not turn it over (pbrt-v3, Triangle::Intersect).
+struct Mesh {
+  std::string name; ///< for people: file name or shape kind with its line
+  std::vector<Vec3> positions;
+  std::vector<Vec3> normals; ///< unit length, or empty: flat
+  std::vector<Vec2> uvs;
+  std::vector<Triangle> triangles;
+};
+
+inline constexpr uint32_t kNoMask = ~0u;
+
+/// What ambient occlusion and simple shading need of a pbrt material together with its shape's alpha and light.
+struct Material {
+  std::string name;
+  MaterialFlags flags = 0;
+  Vec3 albedo{0.5f};                    ///< linear sRGB, [0,1]
+  uint32_t alpha_mask = kNoMask;        ///< into Scene::masks, for all rays
+  uint32_t shadow_alpha_mask = kNoMask; ///< into Scene::masks, for occlusion rays only
+};
+
+/// One pbrt Shape: a mesh placed in its parent's space (the world, or the object it belongs to).
+struct Shape {
+  uint32_t mesh = 0;     ///< into Scene::meshes; several shapes may share one
+  uint32_t material = 0; ///< into Scene::materials
+  bool reverse_orientation = false; ///< the geometric normal is the negated one
+  DAffine parent_from_mesh{1.0};    ///< may mirror; never singular
+};
+
+/// ObjectBegin ... ObjectEnd.
+struct Object {
+  std::string name;
+  std::vector<Shape> shapes;
+};
+
+/// ObjectInstance.
+struct Instance {
+  uint32_t object = 0; ///< into Scene::objects
+  Affine world_from_object{1.0f};
+};
+
+enum class Projection : uint32_t { kPerspective = 0, kOrthographic = 1, kEnvironment = 2 };
+
+/// A pbrt camera with its film. Camera space: +x right, +y up, +z forward (left-handed).
+struct Camera {
+  Projection projection = Projection::kPerspective;
+  DAffine world_from_camera{1.0}; ///< may scale or mirror: pbrt scenes do
+  double fov_degrees = 90.0;      ///< perspective: full angle across the shorter image axis
+  /// Film rectangle on the plane z = 1 in units of tan(fov/2) (perspective) or camera units (orthographic):
+  /// x0, x1, y0, y1; x1 is the right edge, y1 the top edge.
+  std::optional<glm::dvec4> screen_window; ///< none: [-a,a] x [-1,1] for aspect a >= 1, [-1,1] x [-1/a,1/a] below
+  uint32_t width_px = 1280;
+  uint32_t height_px = 720;
+  std::string film_name; ///< pbrt's output file name, for people
+};
+
+/// An imported scene: floats, no packing.
+struct Scene {
+  std::vector<Mesh> meshes;
+  std::vector<Material> materials;
+  std::vector<AlphaMask> masks;
+  std::vector<Shape> shapes; ///< those outside objects, parent = world
+  std::vector<Object> objects;
+  std::vector<Instance> instances;
+  std::vector<Camera> cameras; ///< empty where the file has none
+
+  uint64_t dropped_triangles = 0; ///< degenerate, out-of-range or not finite; each is in the diagnostics
+};
+
+/// Triangles stored once: each shape's mesh, objects counted once however often instanced.
+uint64_t unique_triangle_count(const Scene& scene);
+/// Triangles as placed: every instance counted.
+uint64_t placed_triangle_count(const Scene& scene);
+/// World box of everything placed, from instance boxes (so not always tight for rotated instances).
+Bounds world_bounds(const Scene& scene);
+
+} // namespace packtrace

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "pbrt_import/scene/math.h"
+
+namespace packtrace {
+
+struct ImageSize {
+  uint32_t width = 0;  ///< pixels
+  uint32_t height = 0; ///< pixels
+  size_t pixels() const { return static_cast<size_t>(width) * height; }
+  bool operator==(const ImageSize&) const = default;
+};
+
+inline constexpr uint32_t kNoInstance = ~0u;
+
+/// The one representation of "no ambient occlusion here" (camera ray missed, or not traced this frame). Never NaN.
+inline constexpr float kInvalidAo = -1.0f;
+
+/// Primary visibility of one frame, rows top to bottom, one entry per pixel in every array.
+/// At pixels that miss: view_z 0, instance kNoInstance, everything else 0.
+struct GBuffer {
+  ImageSize size;
+  std::vector<float> view_z;          ///< camera-space z in world units (distance for environment cameras); 0 = miss
+  std::vector<Vec3> position;         ///< world space, on the traced (decoded) surface
+  std::vector<Vec3> geometric_normal; ///< world space, unit, facing the camera
+  std::vector<Vec3> normal;           ///< shading normal: world space, unit, in the geometric normal's hemisphere
+  std::vector<Vec3> albedo;           ///< linear sRGB
+  std::vector<uint32_t> instance;     ///< SceneSource::instances() index
+  std::vector<uint32_t> material;     ///< SceneSource::materials() index
+  std::vector<float> offset;          ///< ray-origin offset along the geometric normal, world units (docs/accuracy.md)
+  /// Pixels to subtract from this pixel's centre to find the same surface point in the previous frame (x right, y down).
+  std::vector<Vec2> motion_px;
+
+  void resize(ImageSize new_size) {
+    size = new_size;
+    const size_t n = new_size.pixels();
+    view_z.assign(n, 0.0f), position.assign(n, Vec3(0)), geometric_normal.assign(n, Vec3(0));
+    normal.assign(n, Vec3(0)), albedo.assign(n, Vec3(0)), instance.assign(n, kNoInstance);
+    material.assign(n, 0), offset.assign(n, 0.0f), motion_px.assign(n, Vec2(0));
+  }
+};
+
+/// Ambient occlusion of one frame before denoising.
+struct AoFrame {
+  ImageSize size;
+  std::vector<float> ao;           ///< 1 = open, 0 = fully occluded, kInvalidAo = none
+  std::vector<float> hit_distance; ///< mean distance of the samples' hits, misses counting as the AO radius; world units
+
+  void resize(ImageSize new_size) {
+    size = new_size;
+    ao.assign(new_size.pixels(), kInvalidAo);
+    hit_distance.assign(new_size.pixels(), 0.0f);
+  }
+};
+
+} // namespace packtrace

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+
+#include "pbrt_import/scene/scene.h"
+
+namespace packtrace {
+
+/// One placement of a geometry. Index in SceneSource::instances() is the instance id of images.
+struct PlacedGeometry {
+  uint32_t geometry = 0;
+  Affine world_from_object{1.0f};
+};
+
+struct GeometryCounts {
+  uint32_t vertices = 0;
+  uint32_t triangles = 0;
+};
+
+/// What tracing and shading need of a scene, whether it lies in a baked file (PackedSource) or in floats
+/// (FloatSource). Triangle numbers of a geometry are the order in which decode() lists them. All functions are const and may be
+/// called from several threads; per-hit functions do not allocate.
+/// Both sources number instances alike: the scene's shapes outside objects in file order, then its object instances.
+class SceneSource {
+public:
+  virtual ~SceneSource() = default;
+
+  virtual uint32_t geometry_count() const = 0;
+  virtual GeometryCounts counts(uint32_t geometry) const = 0;
+
+  /// Object-space vertices and triangles; the spans have exactly the sizes of counts().
+  virtual void decode(uint32_t geometry, std::span<Vec3> positions, std::span<Triangle> triangles) const = 0;
+
+  /// Into materials().
+  virtual uint32_t material_of(uint32_t geometry, uint32_t triangle) const = 0;
+
+  /// Interpolated vertex normal in object space, unit length; none where the surface is flat.
+  /// @param barycentrics weights of the triangle's second and third vertex
+  virtual std::optional<Vec3> shading_normal(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const = 0;
+
+  /// Interpolated texture coordinates; (0,0) where the geometry has none.
+  virtual Vec2 uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const = 0;
+
+  /// Bound of |decoded - source| per axis in object units; 0 for floats. Ray offsets add to it (docs/accuracy.md).
+  virtual float position_error(uint32_t geometry) const = 0;
+
+  virtual std::span<const PlacedGeometry> instances() const = 0;
+  virtual std::span<const Material> materials() const = 0;
+  virtual AlphaMaskView mask(uint32_t index) const = 0;
+  virtual std::span<const Camera> cameras() const = 0;
+  virtual Bounds world_bounds() const = 0;
+
+  /// Bytes that stay resident for geometry besides what the tracing backend builds.
+  virtual uint64_t resident_bytes() const = 0;
+};
+
+} // namespace packtrace
