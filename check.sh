@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# Sets everything up and runs every test and regression limit.
+# Usage: ./check.sh [PRESET ...]           (default: release, then the sanitizer build's unit tests)
+set -euo pipefail
+cd "$(dirname "$0")"
+started=$SECONDS
+presets=("$@")
+[ ${#presets[@]} -gt 0 ] || presets=(release asan)
+
+if [ -z "${PACKTRACE_SCENES:-}" ] && [ -d ../shared/scenes ]; then
+  PACKTRACE_SCENES=$(cd ../shared/scenes && pwd)
+  export PACKTRACE_SCENES
+fi
+echo "== Debian packages"
+bash .ci/install_packages.sh
+export CTEST_PARALLEL_LEVEL=${CTEST_PARALLEL_LEVEL:-$(nproc)}
+for preset in "${presets[@]}"; do
+  echo "== Build ($preset)"
+  cmake --preset "$preset" -DPACKTRACE_WERROR=ON >/dev/null
+  cmake --build --preset "$preset"
+  echo "== Test ($preset)"
+  ctest --preset "$preset" --output-on-failure --progress
+done
+echo "All checks passed in $((SECONDS - started)) s."
