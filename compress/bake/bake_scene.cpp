@@ -1,1 +1,274 @@
-// placeholder while the module is being written
+#include "compress/bake/bake_scene.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include "compress/bake/baked_writer.h"
+#include "compress/bake/file_sections.h"
+#include "compress/bake/geometry_encoder.h"
+#include "compress/bake/geometry_measure.h"
+#include "compress/bake/geometry_plan.h"
+#include "compress/format/baked_image.h"
+#include "compress/format/bit_stream.h"
+#include "pbrt_import/scene/error.h"
+
+namespace packtrace {
+namespace {
+
+/// A short decimal form for messages; std::to_string shows 1e-9 as 0.
+std::string brief(double value) {
+  std::array<char, 32> text{};
+  const auto [end, code] = std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 3);
+  return code == std::errc{} ? std::string(text.data(), end) : "?";
+}
+
+double mean_normal_error(const QuantizeStats& stats) {
+  return stats.normal_count > 0 ? stats.normal_error_sum / static_cast<double>(stats.normal_count) : 0.0;
+}
+
+class Baker {
+public:
+  Baker(const Scene& scene, const BakeConfig& config, Diagnostics& diagnostics, Progress& progress)
+      : scene_(scene), config_(config), diagnostics_(diagnostics), progress_(progress), plan_(plan_scene(scene)),
+        measures_(plan_.geometries.size()), grids_(plan_.geometries.size()), packed_(plan_.geometries.size()) {}
+
+  BakedScene run() {
+    measure();
+    choose_grids();
+    pack();
+    progress_.begin("assembling the file", 0);
+    FileSections sections(scene_);
+    for (size_t i = 0; i < packed_.size(); ++i) {
+      sections.add_geometry(packed_[i].record, packed_[i].encoded, plan_.geometries[i].name);
+      packed_[i].encoded = {};
+    }
+    sections.set_instances(plan_.instances);
+    add_up();
+    BakedScene result;
+    result.bytes = sections.assemble(summary(sections));
+    // Reading back what was written is part of the bake: nothing leaves it that a reader would refuse.
+    report_.file = summarize(BakedFile::from_bytes(result.bytes, "bake result"));
+    result.report = std::move(report_);
+    return result;
+  }
+
+private:
+  struct Packed {
+    baked::GeometryRecord record{};
+    EncodedGeometry encoded;
+    QuantizeStats stats;
+    uint64_t unneeded_uv_bytes = 0;
+  };
+
+  void measure() {
+    progress_.begin("measuring geometry", plan_.geometries.size());
+    struct Scratch {
+      LengthHistogram world, local;
+    };
+    tbb::enumerable_thread_specific<Scratch> scratch;
+    tbb::parallel_for(size_t{0}, plan_.geometries.size(), [&](size_t i) {
+      const GeometryPlan& plan = plan_.geometries[i];
+      Scratch& mine = scratch.local();
+      if (plan.world_space) {
+        measures_[i].bounds = measure_geometry(scene_, plan, mine.world);
+      } else {
+        mine.local.clear();
+        measures_[i].bounds = measure_geometry(scene_, plan, mine.local);
+        measures_[i].median_edge = mine.local.median();
+      }
+      progress_.advance();
+    });
+    LengthHistogram edges;
+    for (const Scratch& one : scratch) edges.add(one.world);
+    world_.median_edge = edges.median();
+    for (size_t i = 0; i < measures_.size(); ++i)
+      if (plan_.geometries[i].world_space) {
+        world_.bounds.extend(measures_[i].bounds);
+        measures_[i].median_edge = world_.median_edge;
+      }
+  }
+
+  void choose_grids() {
+    const bool any_world = !world_.bounds.empty();
+    if (any_world) {
+      world_grid_ = choose_grid(config_, world_, 1.0);
+      report_.world_step = world_grid_.step();
+      report_.world_median_edge = world_.median_edge;
+    }
+    uint64_t coarse = 0, far = 0;
+    for (size_t i = 0; i < grids_.size(); ++i) {
+      const GeometryPlan& plan = plan_.geometries[i];
+      if (measures_[i].bounds.empty()) continue; // nothing to quantise: the default grid
+      grids_[i] = plan.world_space ? world_grid_ : choose_grid(config_, measures_[i], plan.max_stretch);
+      const double step = grids_[i].step();
+      coarse += measures_[i].median_edge > 0.0 && step > measures_[i].median_edge / 8.0;
+      far += measures_[i].max_abs() * 0x1p-23 > step;
+    }
+    if (coarse > 0)
+      warn(std::to_string(coarse) + " of " + std::to_string(grids_.size()) +
+           " geometries have a step above an eighth of their median edge; surfaces will look rough");
+    if (far > 0)
+      warn(std::to_string(far) + " of " + std::to_string(grids_.size()) +
+           " geometries lie so far from the origin that float positions are coarser than the step of their grid");
+    const auto local = static_cast<size_t>(std::count_if(plan_.geometries.begin(), plan_.geometries.end(),
+                                                         [](const GeometryPlan& p) { return !p.world_space; }));
+    if (local > 0 && plan_.geometries.size() > 1)
+      warn(std::to_string(local) + " instanced geometries have grids of their own: where they touch other geometry, "
+                                   "edges agree only within the position error");
+  }
+
+  void pack() {
+    uint64_t triangles = 0;
+    for (const GeometryPlan& plan : plan_.geometries)
+      for (const GeometryPart& part : plan.parts) triangles += scene_.meshes[part.mesh].triangles.size();
+    progress_.begin("packing geometry", triangles);
+    tbb::parallel_for(size_t{0}, packed_.size(), [&](size_t i) {
+      progress_.check_cancelled();
+      packed_[i] = pack_one(i);
+      progress_.advance(packed_[i].encoded.triangle_count);
+    });
+  }
+
+  Packed pack_one(size_t index) const {
+    const GeometryPlan& plan = plan_.geometries[index];
+    const GeometryMeasure& measure = measures_[index];
+    const GeometryNeeds needs = analyse_requirements(scene_, plan);
+    const QuantizedGeometry q =
+        quantize_geometry(scene_, plan, needs, grids_[index], measure.max_abs(), measure.bounds.lo, measure.bounds.hi);
+    return {record_of(plan, q, position_error_bound(q.grid.step(), measure.max_abs())), encode_geometry(scene_, q),
+            q.stats, unneeded_uv_bytes(scene_, plan, needs)};
+  }
+
+  static baked::GeometryRecord record_of(const GeometryPlan& plan, const QuantizedGeometry& q, double error_bound) {
+    baked::GeometryRecord record{};
+    record.origin = q.origin;
+    record.max_position_error = q.stats.max_position_error;
+    record.position_error_bound = error_bound;
+    record.step_mantissa = q.grid.mantissa;
+    record.step_exponent = q.grid.exponent;
+    record.anchor_shift = q.anchor_shift;
+    record.uv_exponent = q.uv_exponent;
+    record.max_normal_error_degrees = static_cast<float>(q.stats.max_normal_error_degrees);
+    record.mean_normal_error_degrees = static_cast<float>(mean_normal_error(q.stats));
+    record.max_uv_error = static_cast<float>(q.stats.max_uv_error);
+    record.flags = plan.world_space ? baked::kWorldSpace : 0;
+    return record;
+  }
+
+  /// Box of all instances, from the boxes of their geometries.
+  Bounds placed_bounds(const FileSections& sections) const {
+    Bounds bounds;
+    for (const baked::InstanceRecord& instance : plan_.instances) {
+      const baked::GeometryRecord& g = sections.geometries()[instance.geometry];
+      if (g.cluster_count == 0) continue;
+      Bounds box;
+      box.lo = DVec3(g.bounds_lo[0], g.bounds_lo[1], g.bounds_lo[2]);
+      box.hi = DVec3(g.bounds_hi[0], g.bounds_hi[1], g.bounds_hi[2]);
+      const auto& m = instance.world_from_object;
+      bounds.extend(
+          transform_bounds(DAffine(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]), box));
+    }
+    return bounds;
+  }
+
+  /// Everything the report says of the scene as a whole.
+  void add_up() {
+    QuantizeStats all;
+    uint64_t uv_bytes = 0;
+    for (const Packed& p : packed_) {
+      const QuantizeStats& s = p.stats;
+      report_.source_vertices += s.source_vertices;
+      report_.merged_vertices += s.source_vertices - std::min(s.distinct_vertices, s.source_vertices);
+      report_.collapsed_triangles += s.collapsed_triangles;
+      report_.max_position_error = std::max(report_.max_position_error, s.max_position_error);
+      report_.max_normal_error_degrees = std::max(report_.max_normal_error_degrees, s.max_normal_error_degrees);
+      report_.max_uv_error = std::max(report_.max_uv_error, s.max_uv_error);
+      all.normal_error_sum += s.normal_error_sum;
+      all.normal_count += s.normal_count;
+      all.flat_triangles += s.flat_triangles;
+      all.repaired_normals += s.repaired_normals;
+      all.replaced_uvs += s.replaced_uvs;
+      uv_bytes += p.unneeded_uv_bytes;
+    }
+    report_.mean_normal_error_degrees = mean_normal_error(all);
+    report_.source_triangles = unique_triangle_count(scene_);
+    report_.shared_shapes = plan_.shared_shapes;
+    report_.shared_objects = plan_.shared_objects;
+    report_.unused_objects = plan_.unused_objects;
+    report_.unused_triangles = plan_.unused_triangles;
+    if (uv_bytes > 0) report_.dropped.push_back({"texture coordinates", "no alpha mask looks them up", uv_bytes});
+    if (all.flat_triangles > 0)
+      report_.dropped.push_back({"normals", "they equal the face normal within " + brief(kFlatDegrees) + " degrees",
+                                 all.flat_triangles * 3 * sizeof(Vec3)});
+    if (all.repaired_normals > 0)
+      warn(std::to_string(all.repaired_normals) + " normals have no direction; face normals took their place");
+    if (all.replaced_uvs > 0)
+      warn(std::to_string(all.replaced_uvs) + " texture coordinates are not finite; (0, 0) took their place");
+    if (report_.collapsed_triangles > 0)
+      warn(std::to_string(report_.collapsed_triangles) +
+           " triangles are smaller than the grid's step and have no area");
+    if (plan_.unused_objects > 0)
+      warn(std::to_string(plan_.unused_objects) + " objects with " + std::to_string(plan_.unused_triangles) +
+           " triangles are never instanced and not stored");
+  }
+
+  baked::SummaryRecord summary(const FileSections& sections) const {
+    baked::SummaryRecord s{};
+    s.source_triangles = report_.source_triangles;
+    s.dropped_triangles = scene_.dropped_triangles;
+    s.unused_triangles = report_.unused_triangles;
+    s.source_vertices = report_.source_vertices;
+    s.merged_vertices = report_.merged_vertices;
+    s.collapsed_triangles = report_.collapsed_triangles;
+    const Bounds bounds = placed_bounds(sections);
+    s.bounds_lo = {bounds.lo.x, bounds.lo.y, bounds.lo.z};
+    s.bounds_hi = {bounds.hi.x, bounds.hi.y, bounds.hi.z};
+    s.precision_kind = static_cast<uint32_t>(config_.precision_kind);
+    s.precision_value = config_.precision;
+    if (report_.world_step > 0.0)
+      s.world_step_mantissa = world_grid_.mantissa, s.world_step_exponent = world_grid_.exponent;
+    const ClusterView::StreamBits& bits = sections.stream_bits();
+    s.stream_bits = {bits.indices, bits.positions, bits.normals, bits.uvs};
+    return s;
+  }
+
+  void warn(std::string message) {
+    diagnostics_.report(Severity::kWarning, {}, message);
+    report_.warnings.push_back(std::move(message));
+  }
+
+  const Scene& scene_;
+  const BakeConfig& config_;
+  Diagnostics& diagnostics_;
+  Progress& progress_;
+  ScenePlan plan_;
+  std::vector<GeometryMeasure> measures_;
+  GeometryMeasure world_;
+  PositionGrid world_grid_;
+  std::vector<PositionGrid> grids_;
+  std::vector<Packed> packed_;
+  BakeReport report_;
+};
+
+} // namespace
+
+BakedScene bake_to_bytes(const Scene& scene, const BakeConfig& config, Diagnostics& diagnostics, Progress& progress) {
+  config.validate();
+  return Baker(scene, config, diagnostics, progress).run();
+}
+
+BakeReport bake_scene(const Scene& scene, const BakeConfig& config, const std::filesystem::path& output, bool force,
+                      Diagnostics& diagnostics, Progress& progress) {
+  config.validate();
+  check_output(output, force);
+  BakedScene baked = bake_to_bytes(scene, config, diagnostics, progress);
+  progress.begin("writing the file", 0);
+  write_file_atomically(output, baked.bytes, force);
+  return std::move(baked.report);
+}
+
+} // namespace packtrace

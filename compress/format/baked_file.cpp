@@ -1,1 +1,100 @@
-// placeholder while the module is being written
+#include "compress/format/baked_file.h"
+
+#include <algorithm>
+#include <cassert>
+
+#include "compress/format/mapped_file.h"
+
+namespace packtrace {
+
+BakedFile::BakedFile(std::unique_ptr<MappedFile> map, std::vector<std::byte> owned, const std::string& name)
+    : map_(std::move(map)), owned_(std::move(owned)), bytes_(map_ ? map_->bytes() : std::span<const std::byte>(owned_)),
+      sections_(validate_baked_file(bytes_, name)) {}
+
+BakedFile::BakedFile(BakedFile&&) noexcept = default;
+BakedFile& BakedFile::operator=(BakedFile&&) noexcept = default;
+BakedFile::~BakedFile() = default;
+
+BakedFile BakedFile::open(const std::filesystem::path& path) {
+  return BakedFile(std::make_unique<MappedFile>(path), {}, path.string());
+}
+
+BakedFile BakedFile::from_bytes(std::span<const std::byte> bytes, const std::string& name) {
+  return BakedFile(nullptr, std::vector<std::byte>(bytes.begin(), bytes.end()), name);
+}
+
+std::span<const baked::ClusterRecord> BakedFile::clusters(uint32_t geometry) const {
+  const baked::GeometryRecord& record = sections_.geometries[geometry];
+  return sections_.clusters.subspan(static_cast<size_t>(record.first_cluster), record.cluster_count);
+}
+
+ClusterView BakedFile::cluster(uint32_t geometry, uint32_t cluster) const {
+  const baked::GeometryRecord& record = sections_.geometries[geometry];
+  assert(cluster < record.cluster_count);
+  return {record, sections_.clusters[static_cast<size_t>(record.first_cluster) + cluster],
+          sections_.payload.data() + record.payload_offset};
+}
+
+uint32_t BakedFile::cluster_of_triangle(uint32_t geometry, uint32_t triangle) const {
+  const auto records = clusters(geometry);
+  assert(triangle < sections_.geometries[geometry].triangle_count);
+  const auto after = std::upper_bound(
+      records.begin(), records.end(), triangle,
+      [](uint32_t number, const baked::ClusterRecord& record) { return number < record.first_triangle; });
+  return static_cast<uint32_t>(after - records.begin()) - 1;
+}
+
+Affine BakedFile::world_from_object(uint32_t instance) const {
+  const auto& m = sections_.instances[instance].world_from_object;
+  return Affine(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]);
+}
+
+AlphaMaskView BakedFile::mask(uint32_t index) const {
+  const baked::MaskRecord& record = sections_.masks[index];
+  const size_t words = size_t{AlphaMask::row_words(record.width)} * record.height;
+  return {record.width,
+          record.height,
+          static_cast<WrapMode>(record.wrap),
+          Vec2(record.uv_scale[0], record.uv_scale[1]),
+          Vec2(record.uv_offset[0], record.uv_offset[1]),
+          sections_.mask_words.subspan(static_cast<size_t>(record.first_word), words)};
+}
+
+std::vector<Material> BakedFile::materials() const {
+  std::vector<Material> result;
+  result.reserve(sections_.materials.size());
+  for (const baked::MaterialRecord& record : sections_.materials)
+    result.push_back({std::string(text(record.name)), record.flags,
+                      Vec3(record.albedo[0], record.albedo[1], record.albedo[2]), record.alpha_mask,
+                      record.shadow_alpha_mask});
+  return result;
+}
+
+std::vector<Camera> BakedFile::cameras() const {
+  std::vector<Camera> result;
+  for (const baked::CameraRecord& record : sections_.cameras) {
+    Camera camera;
+    camera.projection = static_cast<Projection>(record.projection);
+    for (int column = 0; column < 4; ++column)
+      for (int row = 0; row < 3; ++row)
+        camera.world_from_camera[column][row] = record.world_from_camera[static_cast<size_t>(3 * column + row)];
+    camera.fov_degrees = record.fov_degrees;
+    if (const auto& w = record.screen_window; record.has_screen_window != 0)
+      camera.screen_window = glm::dvec4(w[0], w[1], w[2], w[3]);
+    camera.width_px = record.width_px;
+    camera.height_px = record.height_px;
+    camera.film_name = text(record.film_name);
+    result.push_back(std::move(camera));
+  }
+  return result;
+}
+
+Bounds BakedFile::world_bounds() const {
+  const baked::SummaryRecord& s = summary();
+  Bounds bounds;
+  bounds.lo = DVec3(s.bounds_lo[0], s.bounds_lo[1], s.bounds_lo[2]);
+  bounds.hi = DVec3(s.bounds_hi[0], s.bounds_hi[1], s.bounds_hi[2]);
+  return bounds;
+}
+
+} // namespace packtrace

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "assets/generator/model.h"
+#include "assets/generator/random.h"
+
+namespace packtrace {
+
+enum class RoofKind : uint32_t { kGable, kGableToFront, kHip, kTerrace };
+
+/// One house style. Sizes in metres.
+struct HouseConfig {
+  double width = 6.0; ///< along the street
+  double depth = 6.0;
+  uint32_t floors = 2;
+  uint32_t columns = 3; ///< of windows
+  RoofKind roof = RoofKind::kGable;
+  bool balcony = false; ///< on the top floor
+  bool arcade = false;  ///< arches on the ground floor
+  bool shutters = true;
+};
+
+inline constexpr double kFloorHeight = 2.9;
+inline constexpr double kPlinthDepth = 2.0; ///< how far foundations reach below y = 0
+
+/// A house with its door towards -z, centred on x = 0, from z = 0 back to z = depth. Materials of add_facade() and
+/// add_tiles(), "wood" and "pot".
+struct House {
+  Model model;
+  std::vector<DVec3> sills; ///< middles of the street-side window sills above the ground floor, for flower boxes
+};
+House make_house(const HouseConfig& config, Random& random);
+
+Model make_church(Random& random);     ///< nave and bell tower, about 24 m tall, 11 m x 20 m
+Model make_lighthouse(Random& random); ///< about 17 m
+Model make_windmill(Random& random);   ///< about 10 m, sails towards -z
+
+} // namespace packtrace

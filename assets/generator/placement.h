@@ -1,0 +1,39 @@
+#pragma once
+
+#include "assets/generator/random.h"
+#include "pbrt_import/scene/math.h"
+
+namespace packtrace {
+
+inline constexpr double kPi = 3.14159265358979323846;
+constexpr double radians(double degrees) { return degrees * (kPi / 180.0); }
+
+struct SinCos {
+  double sin = 0.0;
+  double cos = 1.0;
+};
+
+/// Sine and cosine to about 1e-15 for |angle| < 1e6, from additions and multiplications only: the C library's differ in
+/// the last bit between machines, and generated files must not.
+SinCos sin_cos(double angle_rad);
+
+/// Smooth 0..1 step between the edges; flat outside.
+double smooth_step(double edge0, double edge1, double x);
+double mix(double a, double b, double t);
+
+DAffine translation(DVec3 offset);
+DAffine scaling(DVec3 factors);
+DAffine rotation_x(double angle_rad);
+DAffine rotation_y(double angle_rad); ///< takes +z to (sin, 0, cos)
+DAffine rotation_z(double angle_rad);
+
+/// Stands an object at a place, turned about +y, uniformly scaled.
+DAffine stand_at(DVec3 place, double turn_rad, double scale = 1.0);
+
+/// A frame whose y axis runs along a direction (not necessarily unit length), with some x and z beside it.
+DAffine along(DVec3 origin, DVec3 direction);
+
+/// Uniform on the unit sphere.
+DVec3 random_direction(Random& random);
+
+} // namespace packtrace

@@ -1,0 +1,98 @@
+#include "assets/generator/scene_writer.h"
+
+#include <cassert>
+
+#include <fmt/format.h>
+
+#include "assets/generator/ply_output.h"
+
+namespace packtrace {
+
+SceneWriter::SceneWriter(const OutputConfig& config, std::string name, std::string_view comment, const ViewConfig& view)
+    : config_(config), name_(std::move(name)), main_(config.folder / (name_ + ".pbrt"), config.overwrite),
+      objects_(config.folder / (name_ + "_objects.pbrt"), config.overwrite),
+      instances_(config.folder / (name_ + "_instances.pbrt"), config.overwrite) {
+  main_.write(comment);
+  main_.write(fmt::format("LookAt {} {} {}  {} {} {}  0 1 0\n", view.eye.x, view.eye.y, view.eye.z, view.target.x,
+                          view.target.y, view.target.z));
+  main_.write(fmt::format("Camera \"perspective\" \"float fov\" [ {} ]\n", view.fov_degrees));
+  main_.write(fmt::format("Film \"image\" \"integer xresolution\" [ {} ] \"integer yresolution\" [ {} ] "
+                          "\"string filename\" [ \"{}.exr\" ]\n",
+                          view.width_px, view.height_px, name_));
+  main_.write("Sampler \"halton\" \"integer pixelsamples\" [ 64 ]\n"
+              "Integrator \"ao\" \"integer nsamples\" [ 4 ]\n\nWorldBegin\n"
+              "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ]\n\n");
+}
+
+void SceneWriter::material(std::string_view name, Vec3 albedo) {
+  main_.write(fmt::format("MakeNamedMaterial \"{}\" \"string type\" \"matte\" \"rgb Kd\" [ {} {} {} ]\n", name,
+                          albedo.x, albedo.y, albedo.z));
+}
+
+void SceneWriter::model(std::string_view model_name, const Model& model) {
+  StoredModel stored;
+  for (const ModelPart& part : model.parts()) {
+    if (part.mesh.triangles.empty()) continue;
+    const std::string file_name = fmt::format("geometry/{}_{}.ply", model_name, stored.parts.size());
+    OutputFile file(config_.folder / file_name, config_.overwrite);
+    write_ply(file, part.mesh);
+    file.close();
+    stored.parts.push_back({file_name, part.material});
+    stored.triangle_count += part.mesh.triangles.size();
+  }
+  totals_.unique_triangles += stored.triangle_count;
+  models_.insert_or_assign(std::string(model_name), std::move(stored));
+}
+
+void SceneWriter::shapes(OutputFile& file, const StoredModel& model, const MaterialChoice& choice,
+                         std::string_view parameters) {
+  for (const StoredPart& part : model.parts) {
+    const auto chosen = choice.find(part.material);
+    file.write(fmt::format("NamedMaterial \"{}\" Shape \"plymesh\" \"string filename\" \"{}\"{}{}\n",
+                           chosen == choice.end() ? part.material : chosen->second, part.file,
+                           parameters.empty() ? "" : " ", parameters));
+  }
+}
+
+void SceneWriter::object(std::string_view object_name, std::string_view model_name, const MaterialChoice& choice) {
+  const auto stored = models_.find(model_name);
+  assert(stored != models_.end());
+  objects_.write(fmt::format("ObjectBegin \"{}\"\n", object_name));
+  shapes(objects_, stored->second, choice, {});
+  objects_.write("ObjectEnd\n");
+  object_triangles_.insert_or_assign(std::string(object_name), stored->second.triangle_count);
+}
+
+void SceneWriter::object(std::string_view object_name, const Model& new_model) {
+  model(object_name, new_model);
+  object(object_name, object_name);
+}
+
+void SceneWriter::instance(std::string_view object_name, const DAffine& m) {
+  const auto triangles = object_triangles_.find(object_name);
+  assert(triangles != object_triangles_.end());
+  // Four significant digits move the far end of a 20 m object by a millimetre; places need more.
+  instances_.write(fmt::format("Transform [{:.4g} {:.4g} {:.4g} 0 {:.4g} {:.4g} {:.4g} 0 {:.4g} {:.4g} {:.4g} 0 "
+                               "{:.6g} {:.6g} {:.6g} 1]ObjectInstance \"{}\"\n",
+                               m[0].x, m[0].y, m[0].z, m[1].x, m[1].y, m[1].z, m[2].x, m[2].y, m[2].z, m[3].x, m[3].y,
+                               m[3].z, object_name));
+  ++totals_.instances;
+  totals_.placed_triangles += triangles->second;
+}
+
+void SceneWriter::world_shape(std::string_view model_name, std::string_view parameters) {
+  const auto stored = models_.find(model_name);
+  assert(stored != models_.end());
+  shapes(objects_, stored->second, {}, parameters);
+  totals_.placed_triangles += stored->second.triangle_count;
+}
+
+SceneTotals SceneWriter::finish() {
+  main_.write(fmt::format("\nInclude \"{0}_objects.pbrt\"\nInclude \"{0}_instances.pbrt\"\n\nWorldEnd\n", name_));
+  objects_.close();
+  instances_.close();
+  main_.close();
+  return totals_;
+}
+
+} // namespace packtrace

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "assets/generator/model.h"
+#include "assets/generator/output_file.h"
+
+namespace packtrace {
+
+/// Where a generator writes.
+struct OutputConfig {
+  std::filesystem::path folder;
+  bool overwrite = false;
+};
+
+/// A view of the scene: pbrt LookAt, perspective camera and film.
+struct ViewConfig {
+  DVec3 eye{0, 2, -10};
+  DVec3 target{0, 0, 0};
+  double fov_degrees = 40.0; ///< across the shorter image axis
+  uint32_t width_px = 1280;
+  uint32_t height_px = 720;
+};
+
+/// Which material takes the place of which: {"wall", "wall_rose"}.
+using MaterialChoice = std::map<std::string, std::string, std::less<>>;
+
+/// Counts of what went to disk.
+struct SceneTotals {
+  uint64_t instances = 0;
+  uint64_t unique_triangles = 0; ///< those in PLY files
+  uint64_t placed_triangles = 0; ///< instances and world shapes
+};
+
+/// Writes a pbrt-v3 scene: FOLDER/NAME.pbrt, which includes NAME_objects.pbrt and NAME_instances.pbrt, and binary PLY files
+/// under FOLDER/geometry. Instances stream to disk. Every function throws Error(kIo) if the disk refuses.
+class SceneWriter {
+public:
+  /// @param comment '#' lines for the head of the scene file: what is to be seen
+  SceneWriter(const OutputConfig& config, std::string name, std::string_view comment, const ViewConfig& view);
+
+  /// Diffuse, linear sRGB in [0,1].
+  void material(std::string_view name, Vec3 albedo);
+  /// Opens for look-ups what Material lines follow.
+  void main_text(std::string_view text) { main_.write(text); }
+
+  /// Stores a finished model's meshes and remembers them under a name.
+  void model(std::string_view model_name, const Model& model);
+  /// ObjectBegin ... ObjectEnd over a stored model, under its own name or with other materials.
+  void object(std::string_view object_name, std::string_view model_name, const MaterialChoice& choice = {});
+  /// model() and object() in one.
+  void object(std::string_view object_name, const Model& model);
+  void instance(std::string_view object_name, const DAffine& world_from_object);
+  /// A stored model placed once, in the world, as it is. @param parameters appended to each Shape
+  void world_shape(std::string_view model_name, std::string_view parameters = {});
+
+  /// Ends and names all files.
+  SceneTotals finish();
+
+private:
+  struct StoredPart {
+    std::string file, material;
+  };
+  struct StoredModel {
+    std::vector<StoredPart> parts;
+    uint64_t triangle_count = 0;
+  };
+  void shapes(OutputFile& file, const StoredModel& model, const MaterialChoice& choice, std::string_view parameters);
+
+  OutputConfig config_;
+  std::string name_;
+  OutputFile main_, objects_, instances_;
+  std::map<std::string, StoredModel, std::less<>> models_;
+  std::map<std::string, uint64_t, std::less<>> object_triangles_;
+  SceneTotals totals_;
+};
+
+} // namespace packtrace

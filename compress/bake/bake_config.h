@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+
+namespace packtrace {
+
+/// How BakeConfig::precision is meant. World-space geometry has one step for the whole scene, instanced geometry a step
+/// of its own; "the geometry" below is all world-space geometry together, or the one instanced geometry.
+enum class PrecisionKind : uint32_t {
+  kEdgeFraction = 0,     ///< step <= precision x the geometry's median edge length; 0 < precision <= 1
+  kDiagonalFraction = 1, ///< step <= precision x the diagonal of the geometry's box; 1e-12 <= precision <= 0.1
+  kAbsolute = 2,         ///< world error per axis <= precision / 2, in world units; any positive float
+  kPositionBits = 3,     ///< step <= the box's longest side / (2^precision - 1); whole numbers 1..40
+};
+
+/// Everything a user can choose about a bake.
+struct BakeConfig {
+  PrecisionKind precision_kind = PrecisionKind::kEdgeFraction;
+  /// 1/128 of the median edge: positions move by at most 1/256 of a typical edge per axis, face normals of typical
+  /// triangles by less than half a degree.
+  double precision = 1.0 / 128.0;
+
+  /// Throws Error(kUsage) if a value is out of its range. Nothing is ever clamped.
+  void validate() const;
+};
+
+} // namespace packtrace

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "compress/bake/bake_config.h"
+#include "compress/bake/requirements.h"
+#include "compress/format/file_summary.h"
+#include "pbrt_import/scene/diagnostics.h"
+#include "pbrt_import/scene/progress.h"
+#include "pbrt_import/scene/scene.h"
+
+namespace packtrace {
+
+/// What a bake did. `file` is what summarize() says of the written file.
+struct BakeReport {
+  FileSummary file;
+  uint64_t source_triangles = 0;    ///< of the scene, unused objects included
+  uint64_t source_vertices = 0;     ///< of what is stored
+  uint64_t merged_vertices = 0;     ///< equal after quantisation to another one of their geometry
+  uint64_t collapsed_triangles = 0; ///< kept, though two of their corners fell on one lattice point
+  uint64_t shared_shapes = 0;       ///< shapes outside objects that use another's geometry
+  uint64_t shared_objects = 0;      ///< objects that use another's geometry
+  uint64_t unused_objects = 0;      ///< never instanced; not stored
+  uint64_t unused_triangles = 0;
+  double world_step = 0.0; ///< 0: no world-space geometry
+  double world_median_edge = 0.0;
+  double max_position_error = 0.0; ///< measured against the source, largest axis, object units
+  double max_normal_error_degrees = 0.0, mean_normal_error_degrees = 0.0;
+  double max_uv_error = 0.0;
+  std::vector<DroppedStream> dropped;
+  std::vector<std::string> warnings; ///< also in the diagnostics
+};
+
+struct BakedScene {
+  std::vector<std::byte> bytes; ///< the file
+  BakeReport report;
+};
+
+/// Packs a scene. The bytes depend on scene and config only, not on thread count or time.
+/// Throws Error(kUsage) for a config out of range, Error(kInput) for scenes that break the rules of scene.h,
+/// Error(kLimitExceeded) where a limit of the format or the promised accuracy cannot be met, Error(kCancelled).
+BakedScene bake_to_bytes(const Scene& scene, const BakeConfig& config, Diagnostics& diagnostics, Progress& progress);
+
+/// bake_to_bytes() into a file, which appears complete or not at all.
+/// Throws also Error(kIo): the output exists and force is not set, or cannot be written (asked before the work starts).
+BakeReport bake_scene(const Scene& scene, const BakeConfig& config, const std::filesystem::path& output, bool force,
+                      Diagnostics& diagnostics, Progress& progress);
+
+} // namespace packtrace

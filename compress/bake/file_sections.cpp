@@ -1,0 +1,107 @@
+#include "compress/bake/file_sections.h"
+
+#include <limits>
+
+#include "compress/format/baked_image.h"
+#include "compress/format/bit_stream.h"
+#include "pbrt_import/scene/error.h"
+
+namespace packtrace {
+
+FileSections::FileSections(const Scene& scene) {
+  add_materials(scene);
+  add_masks(scene);
+  add_cameras(scene);
+}
+
+baked::StringRef FileSections::add_string(std::string_view text) {
+  if (text.size() > std::numeric_limits<uint32_t>::max() - strings_.size())
+    throw Error(ErrorKind::kLimitExceeded, "names take more than 4 GiB");
+  const baked::StringRef ref{static_cast<uint32_t>(strings_.size()), static_cast<uint32_t>(text.size())};
+  strings_ += text;
+  return ref;
+}
+
+void FileSections::add_materials(const Scene& scene) {
+  for (const Material& material : scene.materials) {
+    baked::MaterialRecord record{};
+    record.flags = material.flags;
+    record.albedo = {material.albedo.x, material.albedo.y, material.albedo.z};
+    record.alpha_mask = material.alpha_mask;
+    record.shadow_alpha_mask = material.shadow_alpha_mask;
+    record.name = add_string(material.name);
+    materials_.push_back(record);
+  }
+}
+
+void FileSections::add_masks(const Scene& scene) {
+  for (const AlphaMask& mask : scene.masks) {
+    if (mask.words.size() != size_t{AlphaMask::row_words(mask.width)} * mask.height)
+      throw Error(ErrorKind::kInput, "invalid scene: an alpha mask's bits and size disagree");
+    baked::MaskRecord record{};
+    record.first_word = mask_words_.size();
+    record.width = mask.width;
+    record.height = mask.height;
+    record.wrap = static_cast<uint32_t>(mask.wrap);
+    record.uv_scale = {mask.uv_scale.x, mask.uv_scale.y};
+    record.uv_offset = {mask.uv_offset.x, mask.uv_offset.y};
+    mask_words_.insert(mask_words_.end(), mask.words.begin(), mask.words.end());
+    masks_.push_back(record);
+  }
+}
+
+void FileSections::add_cameras(const Scene& scene) {
+  for (const Camera& camera : scene.cameras) {
+    baked::CameraRecord record{};
+    for (int column = 0; column < 4; ++column)
+      for (int row = 0; row < 3; ++row)
+        record.world_from_camera[static_cast<size_t>(3 * column + row)] = camera.world_from_camera[column][row];
+    record.fov_degrees = camera.fov_degrees;
+    if (camera.screen_window) {
+      const glm::dvec4& w = *camera.screen_window;
+      record.screen_window = {w.x, w.y, w.z, w.w};
+      record.has_screen_window = 1;
+    }
+    record.projection = static_cast<uint32_t>(camera.projection);
+    record.width_px = camera.width_px;
+    record.height_px = camera.height_px;
+    record.film_name = add_string(camera.film_name);
+    cameras_.push_back(record);
+  }
+}
+
+void FileSections::add_geometry(baked::GeometryRecord record, const EncodedGeometry& encoded, std::string_view name) {
+  record.first_cluster = clusters_.size();
+  record.payload_offset = payload_.size();
+  record.payload_bytes = encoded.payload.size();
+  record.cluster_count = static_cast<uint32_t>(encoded.clusters.size());
+  record.triangle_count = encoded.triangle_count;
+  record.vertex_count = encoded.vertex_count;
+  record.bounds_lo = {encoded.bounds_lo.x, encoded.bounds_lo.y, encoded.bounds_lo.z};
+  record.bounds_hi = {encoded.bounds_hi.x, encoded.bounds_hi.y, encoded.bounds_hi.z};
+  record.class_clusters = encoded.class_clusters;
+  record.name = add_string(name);
+  geometries_.push_back(record);
+  clusters_.insert(clusters_.end(), encoded.clusters.begin(), encoded.clusters.end());
+  payload_.insert(payload_.end(), encoded.payload.begin(), encoded.payload.end());
+  stream_bits_.indices += encoded.stream_bits.indices;
+  stream_bits_.positions += encoded.stream_bits.positions;
+  stream_bits_.normals += encoded.stream_bits.normals;
+  stream_bits_.uvs += encoded.stream_bits.uvs;
+}
+
+std::vector<std::byte> FileSections::assemble(const baked::SummaryRecord& summary) {
+  payload_.resize(payload_.size() + kReadSlackBytes);
+  return assemble_baked_file({geometries_,
+                              clusters_,
+                              payload_,
+                              materials_,
+                              instances_,
+                              masks_,
+                              mask_words_,
+                              cameras_,
+                              strings_,
+                              {&summary, 1}});
+}
+
+} // namespace packtrace

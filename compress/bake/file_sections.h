@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "compress/bake/geometry_encoder.h"
+#include "compress/format/baked_format.h"
+#include "pbrt_import/scene/scene.h"
+
+namespace packtrace {
+
+/// Gathers the records of a file.
+class FileSections {
+public:
+  /// Takes materials, masks and cameras. Throws Error(kInput) where they break the rules of scene.h.
+  explicit FileSections(const Scene& scene);
+
+  /// Completes the record with ranges, counts, bounds and name, and appends it with its clusters and payload.
+  void add_geometry(baked::GeometryRecord record, const EncodedGeometry& encoded, std::string_view name);
+
+  void set_instances(std::vector<baked::InstanceRecord> instances) { instances_ = std::move(instances); }
+
+  const std::vector<baked::GeometryRecord>& geometries() const { return geometries_; }
+  const ClusterView::StreamBits& stream_bits() const { return stream_bits_; }
+
+  /// The file's bytes. Nothing may be added afterwards.
+  std::vector<std::byte> assemble(const baked::SummaryRecord& summary);
+
+private:
+  baked::StringRef add_string(std::string_view text);
+  void add_materials(const Scene& scene);
+  void add_masks(const Scene& scene);
+  void add_cameras(const Scene& scene);
+
+  std::vector<baked::GeometryRecord> geometries_;
+  std::vector<baked::ClusterRecord> clusters_;
+  std::vector<uint8_t> payload_;
+  std::vector<baked::MaterialRecord> materials_;
+  std::vector<baked::InstanceRecord> instances_;
+  std::vector<baked::MaskRecord> masks_;
+  std::vector<uint32_t> mask_words_;
+  std::vector<baked::CameraRecord> cameras_;
+  std::string strings_;
+  ClusterView::StreamBits stream_bits_;
+};
+
+} // namespace packtrace

@@ -1,0 +1,306 @@
+#include "compress/bake/quantized_geometry.h"
+
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
+#include "compress/bake/weld_table.h"
+#include "compress/format/normal_codec.h"
+#include "pbrt_import/scene/error.h"
+
+namespace packtrace {
+namespace {
+
+constexpr size_t kGrain = 4096; // fixed, so that sums are grouped alike for any thread count
+
+/// A maximum and a sum over many items.
+struct ErrorStats {
+  double max = 0.0, sum = 0.0;
+  uint64_t count = 0;
+  void add(double error) { max = std::max(max, error), sum += error, ++count; }
+  static ErrorStats join(ErrorStats a, const ErrorStats& b) {
+    return {std::max(a.max, b.max), a.sum + b.sum, a.count + b.count};
+  }
+};
+
+/// Sum of per_item(i, stats) over [0, count); bitwise the same for any thread count.
+template <typename PerItem>
+ErrorStats accumulate_errors(size_t count, const PerItem& per_item) {
+  return tbb::parallel_deterministic_reduce(
+      tbb::blocked_range<size_t>(0, count, kGrain), ErrorStats{},
+      [&](const tbb::blocked_range<size_t>& range, ErrorStats stats) {
+        for (size_t i = range.begin(); i < range.end(); ++i) per_item(i, stats);
+        return stats;
+      },
+      ErrorStats::join);
+}
+
+template <typename PerItem>
+void for_each(size_t count, const PerItem& per_item) {
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, count, kGrain), [&](const tbb::blocked_range<size_t>& range) {
+    for (size_t i = range.begin(); i < range.end(); ++i) per_item(i);
+  });
+}
+
+/// Between two unit vectors.
+double angle_degrees(DVec3 a, DVec3 b) {
+  constexpr double kDegreesPerRadian = 57.295779513082320877;
+  return 2.0 * std::asin(std::min(0.5 * glm::length(a - b), 1.0)) * kDegreesPerRadian;
+}
+
+/// Zero stays zero.
+DVec3 safe_normalize(DVec3 v) {
+  const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+  if (!(largest > 0.0)) return DVec3(0.0);
+  v /= largest;
+  return v / glm::length(v);
+}
+
+class Quantizer {
+public:
+  Quantizer(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs, const PositionGrid& grid)
+      : scene_(scene), plan_(plan), needs_(needs), step_(grid.step()), position_table_(count_vertices()),
+        vertex_table_(2 * count_vertices()) {
+    out_.grid = grid;
+    out_.uv_exponent = needs.uv_exponent;
+  }
+
+  QuantizedGeometry run(double max_abs, DVec3 lowest, DVec3 highest) {
+    check_limits(max_abs);
+    for (int axis = 0; axis < 3 && lowest[axis] <= highest[axis]; ++axis) {
+      // Quantisation is monotone, so the box's corners become the smallest and largest coordinates.
+      const int64_t lo = to_lattice(lowest[axis], step_), hi = to_lattice(highest[axis], step_);
+      out_.origin[static_cast<size_t>(axis)] = lo;
+      const auto bits = static_cast<uint32_t>(std::bit_width(static_cast<uint64_t>(hi - lo)));
+      out_.anchor_shift = std::max(out_.anchor_shift, bits > 31 ? bits - 31 : 0u);
+    }
+    for (size_t i = 0; i < plan_.parts.size(); ++i) add_part(plan_.parts[i], needs_.parts[i]);
+    if (const double bound = position_error_bound(step_, max_abs); out_.stats.max_position_error > bound)
+      throw Error(ErrorKind::kLimitExceeded, plan_.name + ": measured position error " +
+                                                 std::to_string(out_.stats.max_position_error) + " exceeds its bound " +
+                                                 std::to_string(bound));
+    out_.stats.distinct_vertices = out_.vertices.size();
+    return std::move(out_);
+  }
+
+private:
+  size_t count_vertices() const {
+    size_t vertices = 0, triangles = 0;
+    for (const GeometryPart& part : plan_.parts) {
+      vertices += scene_.meshes[part.mesh].positions.size();
+      triangles += scene_.meshes[part.mesh].triangles.size();
+    }
+    // Vertex numbers of a file count each cluster's vertices: up to three per triangle.
+    constexpr size_t kMax = std::numeric_limits<uint32_t>::max() / 4;
+    if (vertices > kMax || triangles > kMax)
+      throw Error(ErrorKind::kLimitExceeded,
+                  plan_.name + ": more than " + std::to_string(kMax) + " vertices or triangles in one geometry");
+    return vertices;
+  }
+
+  void check_limits(double max_abs) const {
+    if (max_abs / step_ < static_cast<double>(kMaxLattice) - 1.0) return;
+    throw Error(ErrorKind::kLimitExceeded, plan_.name + ": coordinates up to " + std::to_string(max_abs) +
+                                               " at a step of " + std::to_string(step_) +
+                                               " exceed the lattice limit of 2^" + std::to_string(kMaxLatticeBits) +
+                                               " steps; choose a coarser precision");
+  }
+
+  /// Everything about the part that is in hand, by source vertex or triangle.
+  struct Work {
+    std::vector<LatticePoint> lattice;
+    std::vector<DVec3> normals; ///< unit or empty
+    std::vector<uint32_t> codes;
+    std::vector<UvLattice> uvs;
+    std::vector<Triangle> triangles; ///< winding as in the file
+    std::vector<uint8_t> flat;
+  };
+
+  void add_part(const GeometryPart& part, const PartNeeds& needs) {
+    const Mesh& mesh = scene_.meshes[part.mesh];
+    Work work;
+    quantize_positions(part, mesh, work);
+    work.triangles = mesh.triangles;
+    if (part.flip)
+      for (Triangle& t : work.triangles) std::swap(t.y, t.z);
+    work.flat.assign(work.triangles.size(), 1);
+    if (needs.normals) quantize_normals(part, mesh, work);
+    if (needs.uvs) quantize_uvs(mesh, work);
+    weld(part, needs, work);
+    out_.stats.source_vertices += mesh.positions.size();
+  }
+
+  void quantize_positions(const GeometryPart& part, const Mesh& mesh, Work& work) {
+    work.lattice.resize(mesh.positions.size());
+    const ErrorStats errors = accumulate_errors(mesh.positions.size(), [&](size_t i, ErrorStats& stats) {
+      const DVec3 p = transform_point(part.geometry_from_mesh, DVec3(mesh.positions[i]));
+      for (int axis = 0; axis < 3; ++axis) {
+        const int64_t q = to_lattice(p[axis], step_);
+        work.lattice[i][static_cast<size_t>(axis)] = q;
+        stats.add(std::abs(static_cast<double>(from_lattice(q, step_)) - p[axis]));
+      }
+    });
+    out_.stats.max_position_error = std::max(out_.stats.max_position_error, errors.max);
+  }
+
+  /// Unit normal of the decoded triangle; zero where it collapsed.
+  static DVec3 face_normal(const Work& work, const Triangle& t) {
+    const LatticePoint &a = work.lattice[t.x], &b = work.lattice[t.y], &c = work.lattice[t.z];
+    DVec3 ab, ac;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto i = static_cast<size_t>(axis);
+      ab[axis] = static_cast<double>(b[i] - a[i]);
+      ac[axis] = static_cast<double>(c[i] - a[i]);
+    }
+    return safe_normalize(glm::cross(ab, ac));
+  }
+
+  void quantize_normals(const GeometryPart& part, const Mesh& mesh, Work& work) {
+    if (mesh.normals.size() != mesh.positions.size())
+      throw Error(ErrorKind::kInput, mesh.name + ": normals and positions differ in number");
+    const glm::dmat3 matrix = normal_matrix(part.geometry_from_mesh);
+    work.normals.resize(mesh.normals.size());
+    std::atomic<uint64_t> zeros{0};
+    std::atomic<bool> finite{true};
+    for_each(mesh.normals.size(), [&](size_t i) {
+      if (!is_finite(mesh.normals[i])) finite.store(false, std::memory_order_relaxed);
+      work.normals[i] = safe_normalize(matrix * DVec3(mesh.normals[i]));
+      if (work.normals[i] == DVec3(0.0)) zeros.fetch_add(1, std::memory_order_relaxed);
+    });
+    if (!finite) throw Error(ErrorKind::kInput, mesh.name + ": a normal is not finite");
+    if (zeros > 0) repair_normals(work);
+    out_.stats.repaired_normals += zeros;
+
+    const double flat_cosine = std::cos(kFlatDegrees / 57.295779513082320877);
+    const auto flat_sign = [&](const Triangle& t, DVec3 n) { // tracing turns normals to the side that is seen
+      const double x = glm::dot(work.normals[t.x], n), y = glm::dot(work.normals[t.y], n),
+                   z = glm::dot(work.normals[t.z], n);
+      if (std::min({x, y, z}) >= flat_cosine) return 1.0;
+      return std::max({x, y, z}) <= -flat_cosine ? -1.0 : 0.0;
+    };
+    std::vector<uint8_t> used(work.normals.size());
+    const ErrorStats flat_errors = accumulate_errors(work.triangles.size(), [&](size_t i, ErrorStats& stats) {
+      const Triangle& t = work.triangles[i];
+      const DVec3 n = face_normal(work, t);
+      const double sign = flat_sign(t, n);
+      work.flat[i] = sign != 0.0;
+      for (int corner = 0; corner < 3 && sign != 0.0; ++corner)
+        stats.add(angle_degrees(work.normals[t[corner]], sign * n));
+    });
+    for (size_t i = 0; i < work.triangles.size(); ++i)
+      for (int corner = 0; corner < 3 && work.flat[i] == 0; ++corner) used[work.triangles[i][corner]] = 1;
+    work.codes.assign(work.normals.size(), 0);
+    const ErrorStats code_errors = accumulate_errors(work.normals.size(), [&](size_t i, ErrorStats& stats) {
+      if (used[i] == 0) return;
+      work.codes[i] = encode_zsign32(work.normals[i]);
+      stats.add(angle_degrees(work.normals[i], glm::normalize(DVec3(decode_zsign32(work.codes[i])))));
+    });
+    const ErrorStats errors = ErrorStats::join(flat_errors, code_errors);
+    out_.stats.max_normal_error_degrees = std::max(out_.stats.max_normal_error_degrees, errors.max);
+    out_.stats.normal_error_sum += errors.sum;
+    out_.stats.normal_count += errors.count;
+    out_.stats.flat_triangles += flat_errors.count / 3;
+  }
+
+  /// Gives vertices without a direction that of a triangle they belong to.
+  static void repair_normals(Work& work) {
+    for (const Triangle& t : work.triangles)
+      for (int corner = 0; corner < 3; ++corner)
+        if (DVec3& n = work.normals[t[corner]]; n == DVec3(0.0)) n = face_normal(work, t);
+    for (DVec3& n : work.normals)
+      if (n == DVec3(0.0)) n = DVec3(0.0, 0.0, 1.0);
+  }
+
+  void quantize_uvs(const Mesh& mesh, Work& work) {
+    if (mesh.uvs.empty()) return; // (0,0) everywhere
+    if (mesh.uvs.size() != mesh.positions.size())
+      throw Error(ErrorKind::kInput, mesh.name + ": texture coordinates and positions differ in number");
+    work.uvs.resize(mesh.uvs.size());
+    for (size_t i = 0; i < work.uvs.size(); ++i) {
+      const bool finite = std::isfinite(mesh.uvs[i].x) && std::isfinite(mesh.uvs[i].y);
+      out_.stats.replaced_uvs += !finite;
+      for (int axis = 0; axis < 2 && finite; ++axis) {
+        const int32_t exponent = out_.uv_exponent[static_cast<size_t>(axis)];
+        const int32_t q = to_uv_lattice(mesh.uvs[i][axis], exponent);
+        work.uvs[i][static_cast<size_t>(axis)] = q;
+        const double decoded = from_uv_lattice(q, std::ldexp(1.0f, exponent));
+        out_.stats.max_uv_error =
+            std::max(out_.stats.max_uv_error, std::abs(decoded - static_cast<double>(mesh.uvs[i][axis])));
+      }
+    }
+  }
+
+  uint32_t weld_position(const LatticePoint& p) {
+    const uint64_t hash =
+        mix_words(static_cast<uint64_t>(p[0]), static_cast<uint64_t>(p[1]), static_cast<uint64_t>(p[2]));
+    const auto next = static_cast<uint32_t>(out_.positions.size());
+    const uint32_t number =
+        position_table_.find_or_add(hash, next, [&](uint32_t other) { return out_.positions[other] == p; });
+    if (number == next) out_.positions.push_back(p);
+    return number;
+  }
+
+  uint32_t weld_vertex(const QuantizedVertex& v) {
+    const uint64_t uv = static_cast<uint32_t>(v.uv[0]) | (uint64_t{static_cast<uint32_t>(v.uv[1])} << 32);
+    const auto next = static_cast<uint32_t>(out_.vertices.size());
+    const uint32_t number = vertex_table_.find_or_add(mix_words(v.position, v.normal_code, uv), next,
+                                                      [&](uint32_t other) { return out_.vertices[other] == v; });
+    if (number == next) out_.vertices.push_back(v);
+    return number;
+  }
+
+  uint32_t kind_number(const TriangleKind& kind) {
+    const auto found = std::find(out_.kinds.begin(), out_.kinds.end(), kind);
+    if (found == out_.kinds.end()) out_.kinds.push_back(kind);
+    return static_cast<uint32_t>(std::find(out_.kinds.begin(), out_.kinds.end(), kind) - out_.kinds.begin());
+  }
+
+  void weld(const GeometryPart& part, const PartNeeds& needs, const Work& work) {
+    constexpr uint32_t kUnset = ~0u;
+    std::vector<uint32_t> position_of(work.lattice.size(), kUnset);
+    std::array<std::vector<uint32_t>, 2> vertex_of; // smooth, flat
+    for (auto& numbers : vertex_of) numbers.assign(work.lattice.size(), kUnset);
+    std::array<uint32_t, 2> kinds{kUnset, kUnset};
+    for (size_t i = 0; i < work.triangles.size(); ++i) {
+      const uint8_t flat = work.flat[i];
+      if (kinds[flat] == kUnset) kinds[flat] = kind_number({part.material, flat != 0, needs.uvs});
+      Triangle t{};
+      for (int corner = 0; corner < 3; ++corner) {
+        const uint32_t source = work.triangles[i][corner];
+        uint32_t& number = vertex_of[flat][source];
+        if (number == kUnset) {
+          if (position_of[source] == kUnset) position_of[source] = weld_position(work.lattice[source]);
+          number = weld_vertex({position_of[source], flat != 0 ? 0u : work.codes[source],
+                                work.uvs.empty() ? UvLattice{} : work.uvs[source]});
+        }
+        t[corner] = number;
+      }
+      const uint32_t a = out_.vertices[t.x].position, b = out_.vertices[t.y].position, c = out_.vertices[t.z].position;
+      out_.stats.collapsed_triangles += a == b || b == c || c == a;
+      out_.triangles.push_back(t);
+      out_.kind_of.push_back(kinds[flat]);
+    }
+  }
+
+  const Scene& scene_;
+  const GeometryPlan& plan_;
+  const GeometryNeeds& needs_;
+  double step_;
+  WeldTable position_table_, vertex_table_;
+  QuantizedGeometry out_;
+};
+
+} // namespace
+
+QuantizedGeometry quantize_geometry(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs,
+                                    const PositionGrid& grid, double max_abs, DVec3 lowest, DVec3 highest) {
+  return Quantizer(scene, plan, needs, grid).run(max_abs, lowest, highest);
+}
+
+} // namespace packtrace

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "compress/bake/geometry_plan.h"
+#include "compress/bake/requirements.h"
+#include "compress/format/position_grid.h"
+#include "compress/format/uv_codec.h"
+
+namespace packtrace {
+
+/// A vertex after quantisation; vertices are distinct.
+struct QuantizedVertex {
+  uint32_t position = 0;    ///< into QuantizedGeometry::positions
+  uint32_t normal_code = 0; ///< zsign32; 0 at corners of flat triangles
+  UvLattice uv{};           ///< 0 where the material needs none
+  bool operator==(const QuantizedVertex&) const = default;
+};
+
+/// Triangles that share a material and the streams they need.
+struct TriangleKind {
+  uint32_t material = 0;
+  bool flat = false; ///< all normals are the face normal: none are stored
+  bool uvs = false;
+  bool operator==(const TriangleKind&) const = default;
+};
+
+/// What quantising did to a geometry.
+struct QuantizeStats {
+  uint64_t source_vertices = 0;
+  uint64_t distinct_vertices = 0;
+  uint64_t collapsed_triangles = 0; ///< two corners fell on one lattice point
+  uint64_t flat_triangles = 0;      ///< whose meshes have normals that need not be stored
+  uint64_t repaired_normals = 0;    ///< were zero, or became so under a flattening transform
+  uint64_t replaced_uvs = 0;        ///< were not finite
+  double max_position_error = 0.0;  ///< largest axis
+  double max_normal_error_degrees = 0.0;
+  double normal_error_sum = 0.0; ///< degrees
+  uint64_t normal_count = 0;     ///< in normal_error_sum
+  double max_uv_error = 0.0;
+};
+
+/// One geometry on its lattice: welded, wound for the file, in the order of its parts.
+struct QuantizedGeometry {
+  PositionGrid grid;
+  std::array<int32_t, 2> uv_exponent{};
+  LatticePoint origin{};     ///< smallest coordinates
+  uint32_t anchor_shift = 0; ///< so that extents >> anchor_shift fit int32_t
+  std::vector<LatticePoint> positions;
+  std::vector<QuantizedVertex> vertices;
+  std::vector<Triangle> triangles; ///< into vertices
+  std::vector<TriangleKind> kinds; ///< distinct
+  std::vector<uint32_t> kind_of;   ///< per triangle, into kinds
+
+  QuantizeStats stats;
+};
+
+/// Normals this close to the decoded face normal are not stored.
+inline constexpr double kFlatDegrees = 0.1;
+
+/// Throws Error(kLimitExceeded) where the lattice is too large for its limit, or a measured position error exceeds
+/// position_error_bound(); Error(kInput) for normals that are not finite.
+QuantizedGeometry quantize_geometry(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs,
+                                    const PositionGrid& grid, double max_abs, DVec3 lowest, DVec3 highest);
+
+} // namespace packtrace

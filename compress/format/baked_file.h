@@ -1,0 +1,82 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "compress/format/baked_format.h"
+#include "compress/format/cluster_codec.h"
+#include "pbrt_import/scene/alpha_mask.h"
+#include "pbrt_import/scene/scene.h"
+
+namespace packtrace {
+
+class MappedFile;
+
+/// Typed spans over the sections of a baked file.
+struct BakedSections {
+  std::span<const baked::GeometryRecord> geometries;
+  std::span<const baked::ClusterRecord> clusters;
+  std::span<const uint8_t> payload;
+  std::span<const baked::MaterialRecord> materials;
+  std::span<const baked::InstanceRecord> instances;
+  std::span<const baked::MaskRecord> masks;
+  std::span<const uint32_t> mask_words;
+  std::span<const baked::CameraRecord> cameras;
+  std::span<const char> strings;
+  std::span<const baked::SummaryRecord> summary; ///< exactly one
+
+  std::string_view text(baked::StringRef ref) const { return {strings.data() + ref.offset, ref.bytes}; }
+};
+
+/// A baked file that was validated as a whole when opened: nothing read through it can leave its bytes. Spans and views
+/// live as long as the BakedFile (moving it keeps them). All functions are const and may run on several threads.
+class BakedFile {
+public:
+  /// Maps the file and validates it.
+  /// Throws Error(kInput) saying what is wrong and where; Error(kUnsupported) for other format versions; Error(kIo).
+  static BakedFile open(const std::filesystem::path& path);
+
+  /// The same for bytes in memory, which are copied.
+  /// @param name stands for the path in errors
+  static BakedFile from_bytes(std::span<const std::byte> bytes, const std::string& name = "memory");
+
+  BakedFile(BakedFile&&) noexcept;
+  BakedFile& operator=(BakedFile&&) noexcept;
+  ~BakedFile();
+
+  std::span<const baked::GeometryRecord> geometries() const { return sections_.geometries; }
+  std::span<const baked::InstanceRecord> instances() const { return sections_.instances; }
+  const baked::SummaryRecord& summary() const { return sections_.summary.front(); }
+  const BakedSections& sections() const { return sections_; }
+  uint64_t file_bytes() const { return bytes_.size(); }
+  std::string_view text(baked::StringRef ref) const { return sections_.text(ref); }
+
+  std::span<const baked::ClusterRecord> clusters(uint32_t geometry) const;
+  ClusterView cluster(uint32_t geometry, uint32_t cluster) const;
+  /// Of the geometry's cluster that holds a triangle; triangle < triangle_count. Takes O(log clusters).
+  uint32_t cluster_of_triangle(uint32_t geometry, uint32_t triangle) const;
+
+  Affine world_from_object(uint32_t instance) const;
+  AlphaMaskView mask(uint32_t index) const;
+  std::vector<Material> materials() const;
+  std::vector<Camera> cameras() const;
+  Bounds world_bounds() const;
+
+private:
+  BakedFile(std::unique_ptr<MappedFile> map, std::vector<std::byte> owned, const std::string& name);
+
+  std::unique_ptr<MappedFile> map_;
+  std::vector<std::byte> owned_; // where there is no map
+  std::span<const std::byte> bytes_;
+  BakedSections sections_;
+};
+
+/// Validates a whole file image and returns its sections; what BakedFile does when it opens.
+/// @param bytes 8-byte aligned
+BakedSections validate_baked_file(std::span<const std::byte> bytes, const std::string& name);
+
+} // namespace packtrace

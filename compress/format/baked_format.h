@@ -1,0 +1,195 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+
+#include "pbrt_import/scene/material_flags.h"
+
+/// What lies in a .ptk file, version 1; docs/baked_format.md says it in words. Little-endian; every section starts at a
+/// multiple of 64 bytes; bytes that no field or section owns are zero.
+namespace packtrace::baked {
+
+inline constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'K', 0x89, '\r', '\n', 0x1a, 0};
+inline constexpr uint32_t kVersion = 1;
+inline constexpr size_t kSectionAlignment = 64;
+inline constexpr uint32_t kNone = ~0u;
+
+/// Section numbers are places in FileHeader::sections.
+enum Section : uint32_t {
+  kGeometries,
+  kClusters,
+  kPayload, ///< bytes: bit streams, then 8 zero bytes
+  kMaterials,
+  kInstances,
+  kMasks,
+  kMaskWords, ///< uint32_t, rows of all masks
+  kCameras,
+  kStrings, ///< UTF-8 bytes, not terminated
+  kSummary, ///< one record
+  kSectionCount
+};
+
+struct SectionRecord {
+  uint64_t offset; ///< bytes from the start of the file, multiple of 64
+  uint64_t bytes;  ///< multiple of record_bytes
+  uint32_t record_bytes;
+  uint32_t reserved;
+};
+
+struct FileHeader {
+  std::array<uint8_t, 8> magic;
+  uint32_t version;
+  uint32_t header_bytes;
+  uint64_t file_bytes;
+  std::array<uint64_t, 2> content_hash; ///< XXH3-128, low half first, of [header_bytes, file_bytes)
+  uint32_t section_count;
+  uint32_t reserved;
+  std::array<SectionRecord, kSectionCount> sections;
+  std::array<uint64_t, 11> padding;
+  uint64_t header_hash; ///< XXH3-64 of the header before this field
+};
+
+struct StringRef {
+  uint32_t offset; ///< bytes into the string section
+  uint32_t bytes;
+};
+
+// GeometryRecord::flags
+inline constexpr uint32_t kWorldSpace = 1u << 0; ///< on the scene's grid; its instances' transforms are the identity
+inline constexpr uint32_t kGeometryFlags = kWorldSpace;
+
+/// Clusters of one geometry, ordered by material_class().
+struct GeometryRecord {
+  uint64_t first_cluster;
+  uint64_t payload_offset;       ///< bytes into the payload section, multiple of 4
+  uint64_t payload_bytes;        ///< multiple of 4
+  std::array<int64_t, 3> origin; ///< lattice
+  double max_position_error;     ///< measured, largest axis, object units
+  double position_error_bound;   ///< what the step and the float result allow, >= max_position_error
+  uint32_t cluster_count;
+  uint32_t triangle_count;
+  uint32_t vertex_count; ///< sum over clusters
+  uint32_t step_mantissa;
+  int32_t step_exponent;
+  uint32_t anchor_shift; ///< cluster anchors count 2^anchor_shift steps
+  std::array<int32_t, 2> uv_exponent;
+  std::array<float, 3> bounds_lo; ///< of the decoded vertices; lo > hi where there are none
+  std::array<float, 3> bounds_hi;
+  float max_normal_error_degrees;
+  float mean_normal_error_degrees;
+  float max_uv_error;
+  uint32_t flags;
+  std::array<uint32_t, 8> class_clusters; ///< clusters of each material class; sums to cluster_count
+  StringRef name;
+};
+
+// ClusterRecord::flags
+inline constexpr uint8_t kClusterHasNormals = 1u << 0;
+inline constexpr uint8_t kClusterHasUvs = 1u << 1;
+inline constexpr uint8_t kClusterMixedSigns = 1u << 2; ///< normals carry their sign bit
+inline constexpr uint8_t kClusterFlags = kClusterHasNormals | kClusterHasUvs | kClusterMixedSigns;
+
+/// Up to 128 triangles of one material. Payload, bit by bit without gaps: strips (index_codec.h); per vertex the
+/// lattice coordinates x, y, z less the anchor; normals; texture coordinates.
+struct ClusterRecord {
+  uint32_t payload_offset; ///< in 4-byte words from the geometry's payload
+  uint32_t first_triangle; ///< within the geometry
+  uint32_t first_vertex;   ///< within the geometry
+  uint32_t material;
+  std::array<int32_t, 3> anchor;        ///< lattice, less the geometry's origin, in 2^anchor_shift steps
+  uint32_t normal_base;                 ///< zsign32 code with the smallest x and y of the cluster
+  uint16_t vertex_count;                ///< 1..256
+  uint16_t normal_palette;              ///< distinct normals, or 0: one per vertex in order
+  uint8_t triangle_count;               ///< 1..128
+  uint8_t restart_count;                ///< strips, 1..triangle_count
+  std::array<uint8_t, 3> position_bits; ///< 0..57 per axis
+  std::array<uint8_t, 2> normal_bits;   ///< above the base: x 0..15, y 0..16
+  uint8_t flags;
+};
+
+struct MaterialRecord {
+  uint32_t flags; ///< pbrt_import/scene/material_flags.h
+  std::array<float, 3> albedo;
+  uint32_t alpha_mask;        ///< or kNone
+  uint32_t shadow_alpha_mask; ///< or kNone
+  StringRef name;
+};
+
+struct InstanceRecord {
+  std::array<float, 12> world_from_object; ///< four columns of three
+  uint32_t geometry;
+};
+
+struct MaskRecord {
+  uint64_t first_word; ///< into the mask words
+  uint32_t width;
+  uint32_t height;
+  uint32_t wrap; ///< 0 repeat, 1 black, 2 clamp
+  uint32_t reserved;
+  std::array<float, 2> uv_scale;
+  std::array<float, 2> uv_offset;
+};
+
+struct CameraRecord {
+  std::array<double, 12> world_from_camera; ///< four columns of three
+  double fov_degrees;
+  std::array<double, 4> screen_window; ///< zero unless has_screen_window
+  uint32_t projection;                 ///< 0 perspective, 1 orthographic, 2 environment
+  uint32_t has_screen_window;          ///< 0 or 1
+  uint32_t width_px;
+  uint32_t height_px;
+  StringRef film_name;
+};
+
+/// What the bake did: figures for people, nothing that decoding needs.
+struct SummaryRecord {
+  uint64_t source_triangles;  ///< of all shapes and objects of the scene
+  uint64_t dropped_triangles; ///< by the importer
+  uint64_t unused_triangles;  ///< of objects that are never instanced; not stored
+  uint64_t source_vertices;
+  uint64_t merged_vertices;
+  uint64_t collapsed_triangles;    ///< two corners fell on one lattice point; kept
+  std::array<double, 3> bounds_lo; ///< world, of the decoded instances
+  std::array<double, 3> bounds_hi;
+  double precision_value;
+  uint32_t precision_kind;      ///< 0 edge fraction, 1 diagonal fraction, 2 absolute, 3 bits
+  uint32_t world_step_mantissa; ///< 0: no world-space geometry
+  int32_t world_step_exponent;
+  uint32_t reserved;
+  std::array<uint64_t, 4> stream_bits; ///< payload: indices, positions, normals, uvs
+};
+
+template <typename T>
+inline constexpr bool kIsPod = std::is_trivially_copyable_v<T>&& std::is_standard_layout_v<T>;
+
+static_assert(kIsPod<FileHeader> && sizeof(SectionRecord) == 24 && sizeof(FileHeader) == 384);
+static_assert(offsetof(FileHeader, content_hash) == 24 && offsetof(FileHeader, sections) == 48 &&
+              offsetof(FileHeader, padding) == 288 && offsetof(FileHeader, header_hash) == 376);
+static_assert(kIsPod<GeometryRecord> && sizeof(GeometryRecord) == 176 && alignof(GeometryRecord) == 8);
+static_assert(offsetof(GeometryRecord, origin) == 24 && offsetof(GeometryRecord, cluster_count) == 64 &&
+              offsetof(GeometryRecord, bounds_lo) == 96 && offsetof(GeometryRecord, flags) == 132 &&
+              offsetof(GeometryRecord, class_clusters) == 136 && offsetof(GeometryRecord, name) == 168);
+static_assert(kIsPod<ClusterRecord> && sizeof(ClusterRecord) == 44 && alignof(ClusterRecord) == 4);
+static_assert(offsetof(ClusterRecord, anchor) == 16 && offsetof(ClusterRecord, vertex_count) == 32 &&
+              offsetof(ClusterRecord, triangle_count) == 36 && offsetof(ClusterRecord, flags) == 43);
+static_assert(kIsPod<MaterialRecord> && sizeof(MaterialRecord) == 32 && offsetof(MaterialRecord, alpha_mask) == 16);
+static_assert(kIsPod<InstanceRecord> && sizeof(InstanceRecord) == 52 && offsetof(InstanceRecord, geometry) == 48);
+static_assert(kIsPod<MaskRecord> && sizeof(MaskRecord) == 40 && offsetof(MaskRecord, uv_scale) == 24);
+static_assert(kIsPod<CameraRecord> && sizeof(CameraRecord) == 160 && offsetof(CameraRecord, projection) == 136);
+static_assert(kIsPod<SummaryRecord> && sizeof(SummaryRecord) == 152 && offsetof(SummaryRecord, stream_bits) == 120);
+
+/// sizeof the records of each section.
+inline constexpr std::array<uint32_t, kSectionCount> kRecordBytes = {
+    sizeof(GeometryRecord), sizeof(ClusterRecord),  1,
+    sizeof(MaterialRecord), sizeof(InstanceRecord), sizeof(MaskRecord),
+    sizeof(uint32_t),       sizeof(CameraRecord),   1,
+    sizeof(SummaryRecord)};
+
+/// Order of clusters within a geometry, 0..7: solid and seen by everything first, masked ones last.
+constexpr uint32_t material_class(MaterialFlags flags) {
+  return (camera_visible(flags) ? 0u : 1u) | (occludes(flags) ? 0u : 2u) | (needs_mask(flags) ? 4u : 0u);
+}
+
+} // namespace packtrace::baked

@@ -1,0 +1,243 @@
+#include <cmath>
+#include <cstring>
+
+#include <xxhash.h>
+
+#include "compress/format/baked_file.h"
+#include "compress/format/bit_stream.h"
+#include "pbrt_import/scene/error.h"
+
+namespace packtrace {
+namespace {
+
+static_assert(baked::kNone == kNoMask);
+
+/// Checks one file image. Every failure names the file, the section and the record.
+class Validator {
+public:
+  Validator(std::span<const std::byte> bytes, const std::string& name) : bytes_(bytes), name_(name) {}
+
+  BakedSections run() {
+    check_header();
+    check_section_table();
+    if (!zero_between_sections()) fail("nonzero bytes between sections");
+    check_materials_and_masks();
+    check_geometries();
+    check_instances();
+    check_cameras();
+    check_summary();
+    return sections_;
+  }
+
+private:
+  [[noreturn]] void fail(const std::string& what) const {
+    throw Error(ErrorKind::kInput, name_ + ": damaged baked file: " + what);
+  }
+  [[noreturn]] void fail(const char* section, uint64_t record, std::string_view what) const {
+    fail(std::string(section) + " " + std::to_string(record) + ": " + std::string(what));
+  }
+
+  void check_header() {
+    if (bytes_.size() < sizeof(baked::FileHeader)) {
+      if (bytes_.size() < baked::kMagic.size() ||
+          std::memcmp(bytes_.data(), baked::kMagic.data(), baked::kMagic.size()) != 0)
+        throw Error(ErrorKind::kInput, name_ + ": not a packtrace baked file");
+      fail("truncated header");
+    }
+    std::memcpy(&header_, bytes_.data(), sizeof header_);
+    if (header_.magic != baked::kMagic) throw Error(ErrorKind::kInput, name_ + ": not a packtrace baked file");
+    if (header_.version != baked::kVersion)
+      throw Error(ErrorKind::kUnsupported, name_ + ": baked file version " + std::to_string(header_.version) +
+                                               ", this program reads version " + std::to_string(baked::kVersion));
+    if (header_.header_hash != XXH3_64bits(bytes_.data(), offsetof(baked::FileHeader, header_hash)))
+      fail("header hash does not match");
+    if (header_.header_bytes != sizeof header_) fail("header size");
+    if (header_.file_bytes != bytes_.size())
+      fail("it has " + std::to_string(bytes_.size()) + " bytes, its header says " + std::to_string(header_.file_bytes));
+    if (header_.section_count != baked::kSectionCount) fail("section count");
+    if (header_.reserved != 0 || header_.padding != decltype(header_.padding){}) fail("reserved header fields");
+    const XXH128_hash_t hash = XXH3_128bits(bytes_.data() + sizeof header_, bytes_.size() - sizeof header_);
+    if (hash.low64 != header_.content_hash[0] || hash.high64 != header_.content_hash[1])
+      fail("content hash does not match");
+  }
+
+  template <typename T>
+  std::span<const T> section(baked::Section number) const {
+    const baked::SectionRecord& record = header_.sections[number];
+    return {reinterpret_cast<const T*>(bytes_.data() + record.offset), static_cast<size_t>(record.bytes / sizeof(T))};
+  }
+
+  void check_section_table() {
+    uint64_t end = sizeof header_;
+    for (uint32_t i = 0; i < baked::kSectionCount; ++i) {
+      const baked::SectionRecord& record = header_.sections[i];
+      if (record.record_bytes != baked::kRecordBytes[i] || record.reserved != 0) fail("section", i, "record size");
+      if (record.offset % baked::kSectionAlignment != 0) fail("section", i, "alignment");
+      if (record.offset < end || record.offset > bytes_.size() || record.bytes > bytes_.size() - record.offset)
+        fail("section", i, "extent");
+      if (record.bytes % record.record_bytes != 0) fail("section", i, "partial record");
+      end = record.offset + record.bytes;
+    }
+    sections_ = {section<baked::GeometryRecord>(baked::kGeometries),
+                 section<baked::ClusterRecord>(baked::kClusters),
+                 section<uint8_t>(baked::kPayload),
+                 section<baked::MaterialRecord>(baked::kMaterials),
+                 section<baked::InstanceRecord>(baked::kInstances),
+                 section<baked::MaskRecord>(baked::kMasks),
+                 section<uint32_t>(baked::kMaskWords),
+                 section<baked::CameraRecord>(baked::kCameras),
+                 section<char>(baked::kStrings),
+                 section<baked::SummaryRecord>(baked::kSummary)};
+    if (sections_.payload.size() < kReadSlackBytes) fail("payload section without its final zero bytes");
+    if (sections_.summary.size() != 1) fail("summary section must hold one record");
+    if (sections_.geometries.size() >= baked::kNone || sections_.instances.size() >= baked::kNone ||
+        sections_.materials.size() >= baked::kNone || sections_.masks.size() >= baked::kNone)
+      fail("too many records");
+  }
+
+  bool zero_between_sections() const {
+    uint64_t end = sizeof header_;
+    const auto zero = [&](uint64_t begin, uint64_t stop) {
+      for (uint64_t i = begin; i < stop; ++i)
+        if (bytes_[static_cast<size_t>(i)] != std::byte{0}) return false;
+      return true;
+    };
+    for (const baked::SectionRecord& record : header_.sections) {
+      if (!zero(end, record.offset)) return false;
+      end = record.offset + record.bytes;
+    }
+    return zero(end, bytes_.size());
+  }
+
+  bool text_ok(baked::StringRef ref) const {
+    return ref.offset <= sections_.strings.size() && ref.bytes <= sections_.strings.size() - ref.offset;
+  }
+
+  void check_materials_and_masks() {
+    for (size_t i = 0; i < sections_.materials.size(); ++i) {
+      const baked::MaterialRecord& m = sections_.materials[i];
+      if ((m.flags & ~kAllMaterialFlags) != 0) fail("material", i, "flags");
+      for (const float a : m.albedo)
+        if (!(a >= 0.0f && a <= 1.0f)) fail("material", i, "albedo");
+      const auto mask_ok = [&](bool wanted, uint32_t mask) {
+        return wanted ? mask < sections_.masks.size() : mask == baked::kNone;
+      };
+      if (!mask_ok((m.flags & kAlphaMask) != 0, m.alpha_mask) ||
+          !mask_ok((m.flags & kShadowAlphaMask) != 0, m.shadow_alpha_mask))
+        fail("material", i, "alpha mask");
+      if (!text_ok(m.name)) fail("material", i, "name");
+    }
+    for (size_t i = 0; i < sections_.masks.size(); ++i) {
+      const baked::MaskRecord& m = sections_.masks[i];
+      if (m.width == 0 || m.height == 0 || m.wrap > 2 || m.reserved != 0) fail("mask", i, "size or wrap mode");
+      const uint64_t words = uint64_t{AlphaMask::row_words(m.width)} * m.height; // < 2^59
+      if (m.first_word > sections_.mask_words.size() || words > sections_.mask_words.size() - m.first_word)
+        fail("mask", i, "extent");
+      for (const float f : {m.uv_scale[0], m.uv_scale[1], m.uv_offset[0], m.uv_offset[1]})
+        if (!std::isfinite(f)) fail("mask", i, "texture transform");
+    }
+  }
+
+  void check_geometries() {
+    uint64_t next_cluster = 0, next_payload = 0;
+    for (size_t i = 0; i < sections_.geometries.size(); ++i) {
+      const baked::GeometryRecord& g = sections_.geometries[i];
+      if (g.first_cluster != next_cluster || g.cluster_count > sections_.clusters.size() - next_cluster)
+        fail("geometry", i, "cluster range");
+      if (g.payload_offset != next_payload || g.payload_bytes % 4 != 0 ||
+          g.payload_bytes > sections_.payload.size() - kReadSlackBytes - next_payload)
+        fail("geometry", i, "payload range");
+      if (g.step_mantissa < kMinStepMantissa || g.step_mantissa > kMaxStepMantissa ||
+          g.step_exponent < kMinStepExponent || g.step_exponent > kMaxStepExponent)
+        fail("geometry", i, "step");
+      if (g.anchor_shift > 26) fail("geometry", i, "anchor shift");
+      for (const int64_t o : g.origin)
+        if (o < -kMaxLattice || o > kMaxLattice) fail("geometry", i, "origin");
+      for (const int32_t e : g.uv_exponent)
+        if (e < kMinUvExponent || e > kMaxUvExponent) fail("geometry", i, "texture coordinate step");
+      if (!(g.max_position_error >= 0.0 && g.max_position_error <= g.position_error_bound &&
+            std::isfinite(g.position_error_bound)))
+        fail("geometry", i, "position error");
+      if ((g.flags & ~baked::kGeometryFlags) != 0) fail("geometry", i, "flags");
+      if (!text_ok(g.name)) fail("geometry", i, "name");
+      check_clusters(i, g);
+      next_cluster += g.cluster_count;
+      next_payload += g.payload_bytes;
+    }
+    if (next_cluster != sections_.clusters.size()) fail("clusters that belong to no geometry");
+    if (next_payload != sections_.payload.size() - kReadSlackBytes) fail("payload that belongs to no geometry");
+  }
+
+  void check_clusters(size_t geometry, const baked::GeometryRecord& g) {
+    uint64_t triangles = 0, vertices = 0, of_class = 0;
+    uint32_t material_class = 0;
+    const uint8_t* payload = sections_.payload.data() + g.payload_offset;
+    for (uint32_t i = 0; i < g.cluster_count; ++i) {
+      const uint64_t number = g.first_cluster + i;
+      const baked::ClusterRecord& c = sections_.clusters[static_cast<size_t>(number)];
+      if (c.material >= sections_.materials.size()) fail("cluster", number, "material");
+      for (; material_class < 8 && of_class == g.class_clusters[material_class]; of_class = 0) ++material_class;
+      const MaterialFlags flags = sections_.materials[c.material].flags;
+      if (baked::material_class(flags) != material_class) fail("cluster", number, "material class order");
+      ++of_class;
+      if (c.first_triangle != triangles || c.first_vertex != vertices)
+        fail("cluster", number, "first triangle or vertex");
+      if (const auto fault = find_cluster_fault(g, c, payload, g.payload_bytes)) fail("cluster", number, *fault);
+      if (needs_mask(flags) && (c.flags & baked::kClusterHasUvs) == 0)
+        fail("cluster", number, "masked material without texture coordinates");
+      triangles += c.triangle_count;
+      vertices += c.vertex_count;
+    }
+    if (triangles != g.triangle_count || vertices != g.vertex_count) fail("geometry", geometry, "totals");
+    uint64_t classes = 0;
+    for (const uint32_t count : g.class_clusters) classes += count;
+    if (classes != g.cluster_count) fail("geometry", geometry, "material class counts");
+    for (size_t axis = 0; axis < 3; ++axis)
+      if (g.cluster_count > 0 && !(std::isfinite(g.bounds_lo[axis]) && std::isfinite(g.bounds_hi[axis]) &&
+                                   g.bounds_lo[axis] <= g.bounds_hi[axis]))
+        fail("geometry", geometry, "bounds");
+  }
+
+  void check_instances() {
+    for (size_t i = 0; i < sections_.instances.size(); ++i) {
+      const baked::InstanceRecord& instance = sections_.instances[i];
+      if (instance.geometry >= sections_.geometries.size()) fail("instance", i, "geometry");
+      for (const float f : instance.world_from_object)
+        if (!std::isfinite(f)) fail("instance", i, "transform");
+    }
+  }
+
+  void check_cameras() {
+    for (size_t i = 0; i < sections_.cameras.size(); ++i) {
+      const baked::CameraRecord& c = sections_.cameras[i];
+      for (const double d : c.world_from_camera)
+        if (!std::isfinite(d)) fail("camera", i, "transform");
+      for (const double d : c.screen_window)
+        if (!std::isfinite(d)) fail("camera", i, "screen window");
+      if (!std::isfinite(c.fov_degrees) || c.projection > 2 || c.has_screen_window > 1 || c.width_px == 0 ||
+          c.height_px == 0)
+        fail("camera", i, "projection or film");
+      if (!text_ok(c.film_name)) fail("camera", i, "film name");
+    }
+  }
+
+  void check_summary() {
+    const baked::SummaryRecord& s = sections_.summary.front();
+    if (s.reserved != 0 || s.precision_kind > 3 || s.world_step_mantissa > kMaxStepMantissa ||
+        s.world_step_exponent < kMinStepExponent || s.world_step_exponent > kMaxStepExponent)
+      fail("summary");
+  }
+
+  std::span<const std::byte> bytes_;
+  const std::string& name_;
+  baked::FileHeader header_{};
+  BakedSections sections_;
+};
+
+} // namespace
+
+BakedSections validate_baked_file(std::span<const std::byte> bytes, const std::string& name) {
+  return Validator(bytes, name).run();
+}
+
+} // namespace packtrace

@@ -1,0 +1,210 @@
+#include "compress/format/cluster_codec.h"
+
+#include <cassert>
+#include <numeric>
+
+#include "compress/format/bit_stream.h"
+#include "compress/format/normal_codec.h"
+
+namespace packtrace {
+namespace {
+
+constexpr uint32_t kUvAnchorBits = 32, kUvWidthBits = 5;
+constexpr uint32_t kUvHeaderBits = 2 * (kUvAnchorBits + kUvWidthBits);
+constexpr uint32_t kMaxUvBits = 26; // -2^24 .. 2^24
+
+uint32_t uv_width(const uint8_t* bits, uint32_t uv_bit, uint32_t axis) {
+  return static_cast<uint32_t>(read_bits(bits, uv_bit + 2 * kUvAnchorBits + axis * kUvWidthBits, kUvWidthBits));
+}
+
+int32_t uv_anchor(const uint8_t* bits, uint32_t uv_bit, uint32_t axis) {
+  return static_cast<int32_t>(static_cast<uint32_t>(read_bits(bits, uv_bit + axis * kUvAnchorBits, kUvAnchorBits)));
+}
+
+uint32_t position_stride(const baked::ClusterRecord& record) {
+  return std::accumulate(record.position_bits.begin(), record.position_bits.end(), 0u);
+}
+
+uint32_t normal_stream_bits(const baked::ClusterRecord& record) {
+  if ((record.flags & baked::kClusterHasNormals) == 0) return 0;
+  const uint32_t code_bits = uint32_t{record.normal_bits[0]} + record.normal_bits[1] +
+                             ((record.flags & baked::kClusterMixedSigns) != 0 ? 1u : 0u);
+  if (record.normal_palette == 0) return record.vertex_count * code_bits;
+  return record.normal_palette * code_bits + record.vertex_count * bits_for_count(record.normal_palette);
+}
+
+} // namespace
+
+ClusterView::ClusterView(const baked::GeometryRecord& geometry, const baked::ClusterRecord& cluster,
+                         const uint8_t* payload)
+    : record_(&cluster),
+      bits_(payload + uint64_t{4} * cluster.payload_offset), layout_{cluster.triangle_count, cluster.vertex_count,
+                                                                     cluster.restart_count},
+      step_(PositionGrid{geometry.step_mantissa, geometry.step_exponent}.step()),
+      uv_step_(std::ldexp(1.0f, geometry.uv_exponent[0]), std::ldexp(1.0f, geometry.uv_exponent[1])),
+      position_stride_(position_stride(cluster)) {
+  for (size_t axis = 0; axis < 3; ++axis)
+    base_[axis] = geometry.origin[axis] + int64_t{cluster.anchor[axis]} * (int64_t{1} << geometry.anchor_shift);
+  position_bit_ = layout_.total_bits();
+  normal_bit_ = position_bit_ + layout_.vertex_count * position_stride_;
+  uv_bit_ = normal_bit_ + normal_stream_bits(cluster);
+}
+
+LatticePoint ClusterView::lattice(uint32_t vertex) const {
+  uint64_t bit = position_bit_ + uint64_t{vertex} * position_stride_;
+  LatticePoint point = base_;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    point[axis] += static_cast<int64_t>(read_bits(bits_, bit, record_->position_bits[axis]));
+    bit += record_->position_bits[axis];
+  }
+  return point;
+}
+
+Vec3 ClusterView::position(uint32_t vertex) const {
+  const LatticePoint q = lattice(vertex);
+  return {from_lattice(q[0], step_), from_lattice(q[1], step_), from_lattice(q[2], step_)};
+}
+
+uint32_t ClusterView::normal_code_bits() const {
+  return uint32_t{record_->normal_bits[0]} + record_->normal_bits[1] +
+         ((record_->flags & baked::kClusterMixedSigns) != 0 ? 1u : 0u);
+}
+
+uint32_t ClusterView::normal_code_at(uint64_t bit) const {
+  const uint32_t x_bits = record_->normal_bits[0], y_bits = record_->normal_bits[1];
+  const auto field = static_cast<uint32_t>(read_bits(bits_, bit, normal_code_bits()));
+  const uint32_t y = field & ((1u << y_bits) - 1), x = (field >> y_bits) & ((1u << x_bits) - 1);
+  const uint32_t sign = (record_->flags & baked::kClusterMixedSigns) != 0 ? (field >> (x_bits + y_bits)) << 31 : 0u;
+  return record_->normal_base + (x << 16) + y + sign;
+}
+
+uint32_t ClusterView::normal_code(uint32_t vertex) const {
+  assert(has_normals());
+  const uint32_t palette = record_->normal_palette;
+  uint32_t entry = vertex;
+  if (palette != 0) {
+    const uint32_t width = bits_for_count(palette);
+    entry = static_cast<uint32_t>(
+        read_bits(bits_, normal_bit_ + palette * normal_code_bits() + uint64_t{vertex} * width, width));
+  }
+  return normal_code_at(normal_bit_ + uint64_t{entry} * normal_code_bits());
+}
+
+Vec3 ClusterView::normal(uint32_t vertex) const { return decode_zsign32(normal_code(vertex)); }
+
+Vec2 ClusterView::uv(uint32_t vertex) const {
+  assert(has_uvs());
+  const uint32_t u_bits = uv_width(bits_, uv_bit_, 0), v_bits = uv_width(bits_, uv_bit_, 1);
+  const uint64_t bit = uv_bit_ + kUvHeaderBits + uint64_t{vertex} * (u_bits + v_bits);
+  const int32_t u = uv_anchor(bits_, uv_bit_, 0) + static_cast<int32_t>(read_bits(bits_, bit, u_bits));
+  const int32_t v = uv_anchor(bits_, uv_bit_, 1) + static_cast<int32_t>(read_bits(bits_, bit + u_bits, v_bits));
+  return {from_uv_lattice(u, uv_step_.x), from_uv_lattice(v, uv_step_.y)};
+}
+
+void ClusterView::bounds(Vec3& lo, Vec3& hi) const {
+  for (int axis = 0; axis < 3; ++axis) {
+    const int64_t base = base_[static_cast<size_t>(axis)];
+    const uint32_t bits = record_->position_bits[static_cast<size_t>(axis)];
+    lo[axis] = from_lattice(base, step_);
+    hi[axis] = from_lattice(base + ((int64_t{1} << bits) - 1), step_);
+  }
+}
+
+ClusterView::StreamBits ClusterView::stream_bits() const {
+  StreamBits bits{layout_.total_bits(), uint64_t{layout_.vertex_count} * position_stride_, normal_stream_bits(*record_),
+                  0};
+  if (has_uvs())
+    bits.uvs =
+        kUvHeaderBits + uint64_t{layout_.vertex_count} * (uv_width(bits_, uv_bit_, 0) + uv_width(bits_, uv_bit_, 1));
+  return bits;
+}
+
+void decode_positions(const ClusterView& cluster, std::span<Vec3> out) {
+  const uint32_t count = cluster.vertex_count();
+  assert(out.size() >= count);
+  const auto [x_bits, y_bits, z_bits] = cluster.record_->position_bits;
+  const uint32_t stride = cluster.position_stride_;
+  const LatticePoint base = cluster.base_;
+  const double step = cluster.step_;
+  uint64_t bit = cluster.position_bit_;
+  if (stride <= kMaxFieldBits) { // the usual case: a vertex in one load
+    const uint64_t x_mask = (uint64_t{1} << x_bits) - 1, y_mask = (uint64_t{1} << y_bits) - 1;
+    for (uint32_t v = 0; v < count; ++v, bit += stride) {
+      const uint64_t field = read_bits(cluster.bits_, bit, stride);
+      out[v] = {from_lattice(base[0] + static_cast<int64_t>(field & x_mask), step),
+                from_lattice(base[1] + static_cast<int64_t>((field >> x_bits) & y_mask), step),
+                from_lattice(base[2] + static_cast<int64_t>(field >> (x_bits + y_bits)), step)};
+    }
+    return;
+  }
+  for (uint32_t v = 0; v < count; ++v) out[v] = cluster.position(v);
+}
+
+void decode_indices(const ClusterView& cluster, uint32_t base, std::span<Triangle> out) {
+  decode_triangles(cluster.bits(), cluster.layout(), base, out);
+}
+
+void decode_normals(const ClusterView& cluster, std::span<Vec3> out) {
+  assert(cluster.has_normals() && out.size() >= cluster.vertex_count());
+  for (uint32_t v = 0; v < cluster.vertex_count(); ++v) out[v] = cluster.normal(v);
+}
+
+void decode_uvs(const ClusterView& cluster, std::span<Vec2> out) {
+  assert(cluster.has_uvs() && out.size() >= cluster.vertex_count());
+  for (uint32_t v = 0; v < cluster.vertex_count(); ++v) out[v] = cluster.uv(v);
+}
+
+std::optional<std::string_view> find_cluster_fault(const baked::GeometryRecord& geometry,
+                                                   const baked::ClusterRecord& cluster, const uint8_t* payload,
+                                                   uint64_t payload_bytes) {
+  const IndexLayout layout{cluster.triangle_count, cluster.vertex_count, cluster.restart_count};
+  if (layout.triangle_count < 1 || layout.triangle_count > kMaxClusterTriangles) return "triangle count";
+  if (layout.vertex_count < 1 || layout.vertex_count > kMaxClusterVertices) return "vertex count";
+  if (layout.restart_count < 1 || layout.restart_count > layout.triangle_count) return "strip count";
+  if (layout.vertex_count > layout.corner_count()) return "more vertices than corners";
+  for (size_t axis = 0; axis < 3; ++axis) {
+    if (cluster.position_bits[axis] > kMaxFieldBits) return "position bits";
+    const int64_t low = geometry.origin[axis] + int64_t{cluster.anchor[axis]} * (int64_t{1} << geometry.anchor_shift);
+    const int64_t high = low + ((int64_t{1} << cluster.position_bits[axis]) - 1);
+    // A field's top value may lie past the last vertex, so the limit is loose; it keeps all sums inside int64.
+    if (low < -2 * kMaxLattice || high > 8 * kMaxLattice) return "position anchor";
+  }
+  if ((cluster.flags & ~baked::kClusterFlags) != 0) return "flags";
+  const bool has_normals = (cluster.flags & baked::kClusterHasNormals) != 0;
+  if (has_normals) {
+    if (cluster.normal_bits[0] > kNormalXBits || cluster.normal_bits[1] > kNormalYBits) return "normal bits";
+    if (cluster.normal_palette > cluster.vertex_count) return "normal palette";
+  } else if (cluster.normal_base != 0 || cluster.normal_palette != 0 || cluster.normal_bits[0] != 0 ||
+             cluster.normal_bits[1] != 0 || (cluster.flags & baked::kClusterMixedSigns) != 0) {
+    return "normals without their flag";
+  }
+
+  const uint64_t begin = uint64_t{4} * cluster.payload_offset;
+  const auto fits = [&](uint64_t bits) { return begin <= payload_bytes && (bits + 7) / 8 <= payload_bytes - begin; };
+  const uint8_t* bits = payload + begin;
+  if (!fits(layout.total_bits())) return "payload extent";
+  if (!strips_are_valid(bits, layout)) return "triangle strips";
+  const ClusterView view(geometry, cluster, payload);
+  const bool has_uvs = view.has_uvs();
+  const uint64_t uv_bit =
+      uint64_t{layout.total_bits()} + layout.vertex_count * position_stride(cluster) + normal_stream_bits(cluster);
+  if (!fits(uv_bit + (has_uvs ? kUvHeaderBits : 0))) return "payload extent";
+  if (cluster.normal_palette != 0)
+    for (uint32_t v = 0, width = bits_for_count(cluster.normal_palette); v < layout.vertex_count; ++v)
+      if (read_bits(bits, uv_bit - uint64_t{layout.vertex_count - v} * width, width) >= cluster.normal_palette)
+        return "normal palette index";
+  for (uint32_t axis = 0; has_uvs && axis < 2; ++axis) {
+    const auto at = static_cast<uint32_t>(uv_bit);
+    if (uv_width(bits, at, axis) > kMaxUvBits) return "texture coordinate bits";
+    if (std::abs(int64_t{uv_anchor(bits, at, axis)}) > kMaxUvLattice) return "texture coordinate anchor";
+  }
+  if (!fits(view.stream_bits().total())) return "payload extent";
+  Vec3 lo, hi;
+  view.bounds(lo, hi);
+  // The box may reach past the largest float where the vertices do not.
+  for (uint32_t v = 0; !(is_finite(lo) && is_finite(hi)) && v < layout.vertex_count; ++v)
+    if (!is_finite(view.position(v))) return "position beyond the float range";
+  return std::nullopt;
+}
+
+} // namespace packtrace

@@ -1,0 +1,107 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "compress/format/baked_format.h"
+#include "compress/format/index_codec.h"
+#include "compress/format/position_grid.h"
+#include "compress/format/uv_codec.h"
+#include "pbrt_import/scene/math.h"
+
+namespace packtrace {
+
+/// One cluster, ready to be read at any place. Cheap to make (no decoding), valid as long as the bytes it came from,
+/// which must have been validated (BakedFile does). Nothing allocates. Vertex and triangle numbers are local: 0-based
+/// within the cluster; triangles wind as their geometric normal demands.
+class ClusterView {
+public:
+  /// @param payload the geometry's payload; 8 readable bytes follow it
+  ClusterView(const baked::GeometryRecord& geometry, const baked::ClusterRecord& cluster, const uint8_t* payload);
+
+  uint32_t triangle_count() const { return layout_.triangle_count; }
+  uint32_t vertex_count() const { return layout_.vertex_count; }
+  uint32_t material() const { return record_->material; }
+  bool has_normals() const { return (record_->flags & baked::kClusterHasNormals) != 0; }
+  bool has_uvs() const { return (record_->flags & baked::kClusterHasUvs) != 0; }
+
+  /// Three local vertex numbers.
+  Triangle triangle(uint32_t index) const { return decode_triangle(bits_, layout_, index); }
+  /// Object space.
+  Vec3 position(uint32_t vertex) const;
+  /// Steps from the lattice's zero.
+  LatticePoint lattice(uint32_t vertex) const;
+  /// Unit length, object space. Needs has_normals().
+  Vec3 normal(uint32_t vertex) const;
+  /// The zsign32 code itself. Needs has_normals().
+  uint32_t normal_code(uint32_t vertex) const;
+  /// Needs has_uvs().
+  Vec2 uv(uint32_t vertex) const;
+
+  /// A box in object space that holds every vertex, from the record alone: at most a power of two larger per axis.
+  void bounds(Vec3& lo, Vec3& hi) const;
+
+  /// Bits of the payload by stream.
+  struct StreamBits {
+    uint64_t indices = 0, positions = 0, normals = 0, uvs = 0;
+    uint64_t total() const { return indices + positions + normals + uvs; }
+  };
+  StreamBits stream_bits() const;
+
+  const baked::ClusterRecord& record() const { return *record_; }
+  const uint8_t* bits() const { return bits_; }
+  const IndexLayout& layout() const { return layout_; }
+
+private:
+  friend void decode_positions(const ClusterView&, std::span<Vec3>);
+  friend void decode_normals(const ClusterView&, std::span<Vec3>);
+  friend void decode_uvs(const ClusterView&, std::span<Vec2>);
+
+  uint32_t normal_code_bits() const;
+  uint32_t normal_code_at(uint64_t bit) const;
+
+  const baked::ClusterRecord* record_;
+  const uint8_t* bits_;
+  IndexLayout layout_;
+  LatticePoint base_; ///< of the smallest coordinates
+  double step_;
+  Vec2 uv_step_;
+  uint32_t position_stride_; ///< bits per vertex
+  uint32_t position_bit_, normal_bit_, uv_bit_;
+};
+
+/// Object-space positions of all vertices; out.size() >= vertex_count().
+void decode_positions(const ClusterView& cluster, std::span<Vec3> out);
+/// All triangles, each index plus `base`; out.size() >= triangle_count().
+void decode_indices(const ClusterView& cluster, uint32_t base, std::span<Triangle> out);
+/// Unit normals of all vertices; needs has_normals().
+void decode_normals(const ClusterView& cluster, std::span<Vec3> out);
+/// Texture coordinates of all vertices; needs has_uvs().
+void decode_uvs(const ClusterView& cluster, std::span<Vec2> out);
+
+/// What is wrong with a record or its payload, or nothing. Checks everything that reading a ClusterView relies on, and
+/// that all coordinates stay within the lattice.
+/// @param payload_bytes of the geometry; the 8 bytes behind them are readable
+std::optional<std::string_view> find_cluster_fault(const baked::GeometryRecord& geometry,
+                                                   const baked::ClusterRecord& cluster, const uint8_t* payload,
+                                                   uint64_t payload_bytes);
+
+/// One cluster to be written. Vertices are in the order of strips.vertex_order.
+struct ClusterInput {
+  const Strips* strips = nullptr;
+  std::span<const LatticePoint> positions;
+  std::span<const uint32_t> normal_codes; ///< empty: none
+  std::span<const UvLattice> uvs;         ///< empty: none
+  uint32_t material = 0;
+  LatticePoint origin{};     ///< of the geometry
+  uint32_t anchor_shift = 0; ///< of the geometry
+};
+
+/// Appends the payload, padded to 4 bytes, and returns the record. payload_offset, first_triangle and first_vertex are
+/// left 0 for the caller. |coordinate| <= kMaxLattice, and (coordinate - origin) >> anchor_shift fits int32_t.
+baked::ClusterRecord encode_cluster(const ClusterInput& input, BitWriter& writer);
+
+} // namespace packtrace

@@ -1,0 +1,105 @@
+#include <algorithm>
+#include <bit>
+#include <cassert>
+#include <limits>
+
+#include "compress/format/bit_stream.h"
+#include "compress/format/cluster_codec.h"
+#include "compress/format/normal_codec.h"
+
+namespace packtrace {
+namespace {
+
+void write_positions(const ClusterInput& input, baked::ClusterRecord& record, BitWriter& writer) {
+  LatticePoint base{};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    int64_t lo = std::numeric_limits<int64_t>::max(), hi = std::numeric_limits<int64_t>::min();
+    for (const LatticePoint& p : input.positions) lo = std::min(lo, p[axis]), hi = std::max(hi, p[axis]);
+    const int64_t anchor = (lo - input.origin[axis]) >> input.anchor_shift; // floor
+    assert(anchor >= std::numeric_limits<int32_t>::min() && anchor <= std::numeric_limits<int32_t>::max());
+    base[axis] = input.origin[axis] + anchor * (int64_t{1} << input.anchor_shift);
+    record.anchor[axis] = static_cast<int32_t>(anchor);
+    record.position_bits[axis] = static_cast<uint8_t>(std::bit_width(static_cast<uint64_t>(hi - base[axis])));
+  }
+  for (const LatticePoint& p : input.positions)
+    for (size_t axis = 0; axis < 3; ++axis)
+      writer.put(static_cast<uint64_t>(p[axis] - base[axis]), record.position_bits[axis]);
+}
+
+uint32_t code_x(uint32_t code) { return (code >> 16) & 0x7fffu; }
+uint32_t code_y(uint32_t code) { return code & 0xffffu; }
+
+void write_normals(std::span<const uint32_t> codes, baked::ClusterRecord& record, BitWriter& writer) {
+  if (codes.empty()) return;
+  std::vector<uint32_t> palette(codes.begin(), codes.end());
+  std::sort(palette.begin(), palette.end());
+  palette.erase(std::unique(palette.begin(), palette.end()), palette.end());
+
+  uint32_t x_lo = ~0u, x_hi = 0, y_lo = ~0u, y_hi = 0;
+  for (const uint32_t code : palette) {
+    x_lo = std::min(x_lo, code_x(code)), x_hi = std::max(x_hi, code_x(code));
+    y_lo = std::min(y_lo, code_y(code)), y_hi = std::max(y_hi, code_y(code));
+  }
+  const bool mixed_signs = (palette.front() >> 31) != (palette.back() >> 31);
+  record.flags = static_cast<uint8_t>(baked::kClusterHasNormals | (mixed_signs ? baked::kClusterMixedSigns : 0));
+  record.normal_base = (palette.front() & 0x80000000u) | (x_lo << 16) | y_lo;
+  const auto x_bits = static_cast<uint32_t>(std::bit_width(x_hi - x_lo));
+  const auto y_bits = static_cast<uint32_t>(std::bit_width(y_hi - y_lo));
+  record.normal_bits = {static_cast<uint8_t>(x_bits), static_cast<uint8_t>(y_bits)};
+  const uint32_t code_bits = x_bits + y_bits + (mixed_signs ? 1 : 0);
+  const auto put_code = [&](uint32_t code) {
+    const uint64_t sign = mixed_signs ? code >> 31 : 0;
+    writer.put((code_y(code) - y_lo) | (uint64_t{code_x(code) - x_lo} << y_bits) | (sign << (x_bits + y_bits)),
+               code_bits);
+  };
+
+  const uint32_t entry_bits = bits_for_count(palette.size());
+  if (palette.size() * code_bits + codes.size() * entry_bits < codes.size() * code_bits) {
+    record.normal_palette = static_cast<uint16_t>(palette.size());
+    for (const uint32_t code : palette) put_code(code);
+    for (const uint32_t code : codes)
+      writer.put(static_cast<uint64_t>(std::lower_bound(palette.begin(), palette.end(), code) - palette.begin()),
+                 entry_bits);
+  } else {
+    for (const uint32_t code : codes) put_code(code);
+  }
+}
+
+void write_uvs(std::span<const UvLattice> uvs, baked::ClusterRecord& record, BitWriter& writer) {
+  if (uvs.empty()) return;
+  record.flags |= baked::kClusterHasUvs;
+  UvLattice lo{kMaxUvLattice, kMaxUvLattice}, hi{-kMaxUvLattice, -kMaxUvLattice};
+  for (const UvLattice& uv : uvs)
+    for (size_t axis = 0; axis < 2; ++axis)
+      lo[axis] = std::min(lo[axis], uv[axis]), hi[axis] = std::max(hi[axis], uv[axis]);
+  std::array<uint32_t, 2> width{};
+  for (size_t axis = 0; axis < 2; ++axis) {
+    width[axis] = static_cast<uint32_t>(std::bit_width(static_cast<uint32_t>(hi[axis] - lo[axis])));
+    writer.put(static_cast<uint32_t>(lo[axis]), 32);
+  }
+  for (const uint32_t bits : width) writer.put(bits, 5);
+  for (const UvLattice& uv : uvs)
+    for (size_t axis = 0; axis < 2; ++axis) writer.put(static_cast<uint32_t>(uv[axis] - lo[axis]), width[axis]);
+}
+
+} // namespace
+
+baked::ClusterRecord encode_cluster(const ClusterInput& input, BitWriter& writer) {
+  const IndexLayout& layout = input.strips->layout;
+  assert(input.positions.size() == layout.vertex_count);
+  assert(input.normal_codes.empty() || input.normal_codes.size() == layout.vertex_count);
+  assert(input.uvs.empty() || input.uvs.size() == layout.vertex_count);
+  baked::ClusterRecord record{};
+  record.material = input.material;
+  record.triangle_count = static_cast<uint8_t>(layout.triangle_count);
+  record.vertex_count = static_cast<uint16_t>(layout.vertex_count);
+  record.restart_count = static_cast<uint8_t>(layout.restart_count);
+  write_strips(*input.strips, writer);
+  write_positions(input, record, writer);
+  write_normals(input.normal_codes, record, writer);
+  write_uvs(input.uvs, record, writer);
+  writer.align(4);
+  return record;
+}
+
+} // namespace packtrace

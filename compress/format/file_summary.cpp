@@ -1,0 +1,87 @@
+#include "compress/format/file_summary.h"
+
+#include <algorithm>
+#include <tuple>
+
+namespace packtrace {
+namespace {
+
+StreamBytes stream_bytes(const BakedFile& file) {
+  const BakedSections& s = file.sections();
+  const auto whole = [](uint64_t bits) { return (bits + 7) / 8; };
+  const auto& bits = s.summary.front().stream_bits;
+  StreamBytes bytes;
+  bytes.indices = whole(bits[0]), bytes.positions = whole(bits[1]);
+  bytes.normals = whole(bits[2]), bytes.uvs = whole(bits[3]);
+  const uint64_t streams = bytes.indices + bytes.positions + bytes.normals + bytes.uvs;
+  bytes.payload_padding = s.payload.size() - std::min<uint64_t>(streams, s.payload.size());
+  bytes.cluster_records = s.clusters.size_bytes();
+  bytes.geometry_records = s.geometries.size_bytes();
+  bytes.instance_records = s.instances.size_bytes();
+  bytes.material_records = s.materials.size_bytes();
+  bytes.masks = s.masks.size_bytes() + s.mask_words.size_bytes();
+  bytes.cameras = s.cameras.size_bytes();
+  bytes.strings = s.strings.size();
+  bytes.total = file.file_bytes();
+  bytes.header_and_alignment = bytes.total - s.payload.size() - bytes.cluster_records - bytes.geometry_records -
+                               bytes.instance_records - bytes.material_records - bytes.masks - bytes.cameras -
+                               bytes.strings;
+  return bytes;
+}
+
+void add_grid(std::vector<GridUse>& grids, const baked::GeometryRecord& g) {
+  const PositionGrid grid{g.step_mantissa, g.step_exponent};
+  const bool world = (g.flags & baked::kWorldSpace) != 0;
+  const auto same = [&](const GridUse& use) { return use.grid == grid && use.world_space == world; };
+  const auto found = std::find_if(grids.begin(), grids.end(), same);
+  if (found != grids.end())
+    ++found->geometries;
+  else
+    grids.push_back({grid, world, 1});
+}
+
+} // namespace
+
+FileSummary summarize(const BakedFile& file) {
+  const BakedSections& s = file.sections();
+  FileSummary summary;
+  std::vector<uint32_t> uses(s.geometries.size());
+  for (const baked::InstanceRecord& instance : s.instances) {
+    ++uses[instance.geometry];
+    summary.placed_triangles += s.geometries[instance.geometry].triangle_count;
+    summary.placed_vertices += s.geometries[instance.geometry].vertex_count;
+  }
+  for (size_t i = 0; i < s.geometries.size(); ++i) {
+    const baked::GeometryRecord& g = s.geometries[i];
+    summary.triangles += g.triangle_count;
+    summary.vertices += g.vertex_count;
+    summary.shared_geometries += uses[i] > 1;
+    summary.max_position_error = std::max(summary.max_position_error, g.max_position_error);
+    summary.max_position_error_bound = std::max(summary.max_position_error_bound, g.position_error_bound);
+    summary.max_normal_error_degrees = std::max(summary.max_normal_error_degrees, g.max_normal_error_degrees);
+    summary.max_uv_error = std::max(summary.max_uv_error, g.max_uv_error);
+    if (g.cluster_count > 0) add_grid(summary.grids, g);
+  }
+  std::sort(summary.grids.begin(), summary.grids.end(), [](const GridUse& a, const GridUse& b) {
+    return std::tuple(!a.world_space, a.grid.step()) < std::tuple(!b.world_space, b.grid.step());
+  });
+  summary.clusters = s.clusters.size();
+  summary.geometries = s.geometries.size();
+  summary.instances = s.instances.size();
+  summary.materials = s.materials.size();
+  summary.masks = s.masks.size();
+  summary.cameras = s.cameras.size();
+  summary.bytes = stream_bytes(file);
+  const auto per = [&](uint64_t count) {
+    return count > 0 ? static_cast<double>(summary.bytes.total) / static_cast<double>(count) : 0.0;
+  };
+  summary.bytes_per_triangle = per(summary.triangles);
+  summary.bytes_per_placed_triangle = per(summary.placed_triangles);
+  if (summary.clusters > 0)
+    summary.triangles_per_cluster = static_cast<double>(summary.triangles) / static_cast<double>(summary.clusters);
+  summary.bounds = file.world_bounds();
+  summary.bake = s.summary.front();
+  return summary;
+}
+
+} // namespace packtrace

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "compress/format/baked_file.h"
+
+namespace packtrace {
+
+/// Where the bytes of a file go. The payload's streams share bytes; each is rounded to whole bytes for the total.
+struct StreamBytes {
+  uint64_t indices = 0, positions = 0, normals = 0, uvs = 0;
+  uint64_t payload_padding = 0;
+  uint64_t cluster_records = 0, geometry_records = 0, instance_records = 0, material_records = 0;
+  uint64_t masks = 0, cameras = 0, strings = 0;
+  uint64_t header_and_alignment = 0; ///< with the summary record
+  uint64_t total = 0;                ///< of the file
+};
+
+/// One position grid in use.
+struct GridUse {
+  PositionGrid grid;
+  bool world_space = false;
+  uint32_t geometries = 0;
+};
+
+/// What `info` shows of a baked file.
+struct FileSummary {
+  uint64_t triangles = 0, placed_triangles = 0, vertices = 0, placed_vertices = 0, clusters = 0;
+  uint64_t geometries = 0, shared_geometries = 0, instances = 0, materials = 0, masks = 0, cameras = 0;
+  StreamBytes bytes;
+  double bytes_per_triangle = 0.0; ///< whole file over stored triangles; 0 without triangles
+  double bytes_per_placed_triangle = 0.0;
+  double triangles_per_cluster = 0.0;
+  std::vector<GridUse> grids;      ///< world space first, then by step, finest first
+  double max_position_error = 0.0; ///< measured, largest axis, object units, over all geometries
+  double max_position_error_bound = 0.0;
+  float max_normal_error_degrees = 0.0f;
+  float max_uv_error = 0.0f;
+  Bounds bounds;               ///< world
+  baked::SummaryRecord bake{}; ///< settings and counts of the bake
+};
+
+FileSummary summarize(const BakedFile& file);
+
+} // namespace packtrace

@@ -1,0 +1,141 @@
+#include "compress/format/index_codec.h"
+
+#include <bit>
+#include <cassert>
+
+#include "compress/format/bit_stream.h"
+
+namespace packtrace {
+namespace {
+
+/// The 128 bits from `first`, least significant first; bits at and beyond `count` are zero.
+struct Mask128 {
+  std::array<uint64_t, 2> word{};
+
+  Mask128(const uint8_t* bits, uint32_t first, uint32_t count) {
+    word[0] = read_bits64(bits, first, count < 64 ? count : 64);
+    if (count > 64) word[1] = read_bits64(bits, first + 64, count - 64);
+  }
+  bool test(uint32_t bit) const { return (word[bit >> 6] >> (bit & 63u)) & 1u; }
+  uint32_t count() const { return static_cast<uint32_t>(std::popcount(word[0]) + std::popcount(word[1])); }
+
+  /// Bits 0..bit of this.
+  Mask128 up_to(uint32_t bit) const {
+    Mask128 result = *this;
+    const uint64_t last = ~uint64_t{0} >> (63u - (bit & 63u));
+    if (bit < 64)
+      result.word = {word[0] & last, 0};
+    else
+      result.word[1] &= last;
+    return result;
+  }
+  /// Number of the highest set bit, or -1.
+  int32_t highest() const {
+    if (word[1] != 0) return 127 - std::countl_zero(word[1]);
+    return 63 - std::countl_zero(word[0]);
+  }
+};
+
+/// Fresh corners before corner `end`.
+uint32_t fresh_before(const uint8_t* bits, uint32_t fresh_bit, uint32_t end) {
+  uint32_t count = 0, at = 0;
+  for (; at + 57 <= end; at += 57) count += static_cast<uint32_t>(std::popcount(read_bits(bits, fresh_bit + at, 57)));
+  return count + static_cast<uint32_t>(std::popcount(read_bits(bits, fresh_bit + at, end - at)));
+}
+
+uint32_t corner_vertex(const uint8_t* bits, const IndexLayout& layout, uint32_t corner) {
+  const uint32_t rank = fresh_before(bits, layout.fresh_bit(), corner);
+  if (read_bits(bits, layout.fresh_bit() + corner, 1) != 0) return rank;
+  const uint32_t width = layout.index_bits();
+  return static_cast<uint32_t>(read_bits(bits, layout.explicit_bit() + (corner - rank) * width, width));
+}
+
+} // namespace
+
+uint32_t IndexLayout::index_bits() const { return bits_for_count(vertex_count); }
+
+void write_strips(const Strips& strips, BitWriter& writer) {
+  for (const uint8_t bit : strips.restart) writer.put(bit, 1);
+  for (const uint8_t bit : strips.left) writer.put(bit, 1);
+  uint32_t used = 0;
+  for (const uint32_t vertex : strips.corners) {
+    writer.put(vertex == used ? 1 : 0, 1);
+    used += vertex == used;
+  }
+  assert(used == strips.layout.vertex_count);
+  used = 0;
+  const uint32_t width = strips.layout.index_bits();
+  for (const uint32_t vertex : strips.corners) {
+    if (vertex == used)
+      ++used;
+    else
+      writer.put(vertex, width);
+  }
+}
+
+void decode_triangles(const uint8_t* bits, const IndexLayout& layout, uint32_t base, std::span<Triangle> triangles) {
+  assert(triangles.size() >= layout.triangle_count);
+  const Mask128 restart(bits, 0, layout.triangle_count), left(bits, layout.triangle_count, layout.triangle_count);
+  const uint32_t width = layout.index_bits();
+  uint64_t fresh_at = layout.fresh_bit(), explicit_at = layout.explicit_bit();
+  uint32_t used = base;
+  const auto next_corner = [&] {
+    if (read_bits(bits, fresh_at++, 1) != 0) return used++;
+    const auto vertex = static_cast<uint32_t>(read_bits(bits, explicit_at, width));
+    explicit_at += width;
+    return base + vertex;
+  };
+  Triangle t{};
+  for (uint32_t i = 0; i < layout.triangle_count; ++i) {
+    if (restart.test(i)) {
+      t.x = next_corner();
+      t.y = next_corner();
+      t.z = next_corner();
+    } else {
+      t = left.test(i) ? Triangle(t.x, t.z, 0) : Triangle(t.z, t.y, 0);
+      t.z = next_corner();
+    }
+    triangles[i] = t;
+  }
+}
+
+Triangle decode_triangle(const uint8_t* bits, const IndexLayout& layout, uint32_t index) {
+  const Mask128 restarts = Mask128(bits, 0, layout.triangle_count).up_to(index);
+  const uint32_t corner = index + 2 * restarts.count(); // of the triangle's newest vertex
+  const auto first = static_cast<uint32_t>(restarts.highest());
+  const auto vertex = [&](uint32_t at) { return corner_vertex(bits, layout, at); };
+  if (first == index) return {vertex(corner - 2), vertex(corner - 1), vertex(corner)};
+
+  // One of a, b is the corner before. The other was last replaced by the last turn the other way in this strip, by the
+  // corner before that turn's; without such a turn it is still the strip's own.
+  Mask128 other(bits, layout.triangle_count, layout.triangle_count);
+  const bool is_left = other.test(index);
+  if (is_left) other.word = {~other.word[0], ~other.word[1]};
+  const int32_t turn = other.up_to(index).highest();
+  const uint32_t first_corner = corner - (index - first); // of the strip's first triangle's newest vertex
+  const uint32_t kept = turn > static_cast<int32_t>(first) ? vertex(corner - (index - static_cast<uint32_t>(turn)) - 1)
+                                                           : vertex(is_left ? first_corner - 2 : first_corner - 1);
+  const uint32_t previous = vertex(corner - 1), newest = vertex(corner);
+  return is_left ? Triangle(kept, previous, newest) : Triangle(previous, kept, newest);
+}
+
+bool strips_are_valid(const uint8_t* bits, const IndexLayout& layout) {
+  const uint32_t n = layout.triangle_count;
+  const Mask128 restart(bits, 0, n), left(bits, n, n);
+  if (!restart.test(0) || restart.count() != layout.restart_count) return false;
+  if ((restart.word[0] & left.word[0]) != 0 || (restart.word[1] & left.word[1]) != 0) return false;
+  const uint32_t width = layout.index_bits();
+  if (fresh_before(bits, layout.fresh_bit(), layout.corner_count()) != layout.vertex_count) return false;
+  uint64_t explicit_at = layout.explicit_bit();
+  for (uint32_t corner = 0, used = 0; corner < layout.corner_count(); ++corner) {
+    if (read_bits(bits, layout.fresh_bit() + corner, 1) != 0) {
+      ++used;
+      continue;
+    }
+    if (read_bits(bits, explicit_at, width) >= used) return false;
+    explicit_at += width;
+  }
+  return true;
+}
+
+} // namespace packtrace

@@ -1,0 +1,144 @@
+#include "compress/format/index_codec.h"
+
+#include <algorithm>
+#include <cassert>
+
+namespace packtrace {
+namespace {
+
+constexpr uint16_t kNone = 0xffff;
+constexpr uint32_t kTableSize = 1024; // power of two, above twice the directed edges of a full cluster
+
+/// Which triangle lies across each edge. Edge e of a triangle runs from its corner e to corner e + 1; its number is
+/// 3 triangle + e. An edge has at most one partner, the first unpaired one that runs the other way.
+class EdgePartners {
+public:
+  explicit EdgePartners(std::span<const Triangle> triangles) {
+    partner_.fill(kNone);
+    table_.fill(kNone);
+    for (uint32_t t = 0; t < triangles.size(); ++t)
+      for (uint32_t e = 0; e < 3; ++e) {
+        const auto edge = static_cast<uint16_t>(3 * t + e);
+        const uint32_t from = triangles[t][static_cast<int>(e)], to = triangles[t][static_cast<int>((e + 1) % 3)];
+        ends_[edge] = {from, to};
+        if (from == to) continue;
+        if (const uint16_t match = find_unpaired(to, from, t); match != kNone) {
+          partner_[match] = edge;
+          partner_[edge] = match;
+        } else {
+          uint32_t slot = hash(from, to);
+          while (table_[slot] != kNone) slot = (slot + 1) % kTableSize;
+          table_[slot] = edge;
+        }
+      }
+  }
+  uint16_t operator[](uint32_t edge) const { return partner_[edge]; }
+
+private:
+  static uint32_t hash(uint32_t from, uint32_t to) { return ((from * 0x9e3779b1u) ^ (to * 0x85ebca6bu)) >> 22; }
+
+  uint16_t find_unpaired(uint32_t from, uint32_t to, uint32_t other_than) const {
+    for (uint32_t slot = hash(from, to); table_[slot] != kNone; slot = (slot + 1) % kTableSize) {
+      const uint16_t edge = table_[slot];
+      if (ends_[edge][0] == from && ends_[edge][1] == to && partner_[edge] == kNone && edge / 3u != other_than)
+        return edge;
+    }
+    return kNone;
+  }
+
+  std::array<uint16_t, kMaxClusterCorners> partner_;
+  std::array<std::array<uint32_t, 2>, kMaxClusterCorners> ends_;
+  std::array<uint16_t, kTableSize> table_;
+};
+
+/// Walks strips greedily, always towards the triangle with the fewest ways out, so that few are left stranded.
+class StripWalk {
+public:
+  StripWalk(std::span<const Triangle> triangles, uint32_t vertex_count)
+      : triangles_(triangles), partners_(triangles), number_(vertex_count, ~0u) {
+    for (uint32_t t = 0; t < triangles.size(); ++t)
+      for (uint32_t e = 0; e < 3; ++e) exits_[t] += partners_[3 * t + e] != kNone;
+  }
+
+  Strips run() {
+    while (strips_.triangle_order.size() < triangles_.size()) walk_from(pick_start());
+    strips_.layout = {static_cast<uint32_t>(triangles_.size()), static_cast<uint32_t>(strips_.vertex_order.size()),
+                      restart_count_};
+    return std::move(strips_);
+  }
+
+private:
+  uint32_t pick_start() const {
+    uint32_t best = ~0u;
+    for (uint32_t t = 0; t < triangles_.size(); ++t)
+      if (!visited_[t] && (best == ~0u || exits_[t] < exits_[best])) best = t;
+    return best;
+  }
+
+  /// The unvisited triangle across an edge, as its edge number, or kNone.
+  uint16_t across(uint32_t edge) const {
+    const uint16_t partner = partners_[edge];
+    return partner != kNone && !visited_[partner / 3u] ? partner : kNone;
+  }
+
+  void visit(uint32_t triangle, bool restart, bool left) {
+    visited_[triangle] = true;
+    for (uint32_t e = 0; e < 3; ++e)
+      if (const uint16_t partner = partners_[3 * triangle + e]; partner != kNone) --exits_[partner / 3u];
+    strips_.triangle_order.push_back(triangle);
+    strips_.restart.push_back(restart);
+    strips_.left.push_back(left);
+    restart_count_ += restart;
+  }
+
+  void add_corner(uint32_t triangle, uint32_t corner) {
+    const uint32_t vertex = triangles_[triangle][static_cast<int>(corner % 3)];
+    if (number_[vertex] == ~0u) {
+      number_[vertex] = static_cast<uint32_t>(strips_.vertex_order.size());
+      strips_.vertex_order.push_back(vertex);
+    }
+    strips_.corners.push_back(number_[vertex]);
+  }
+
+  void walk_from(uint32_t triangle) {
+    visit(triangle, true, false);
+    // Start so that the best way out is a right turn: across the edge into the newest corner.
+    uint32_t exit = 0;
+    for (uint32_t e = 1; e < 3; ++e)
+      if (better(across(3 * triangle + e), across(3 * triangle + exit))) exit = e;
+    uint32_t newest = (exit + 1) % 3;
+    for (uint32_t i = 1; i <= 3; ++i) add_corner(triangle, newest + i);
+    for (;;) {
+      const uint16_t right = across(3 * triangle + (newest + 2) % 3), left = across(3 * triangle + newest);
+      if (right == kNone && left == kNone) return;
+      const bool go_left = better(left, right);
+      const uint32_t entry = go_left ? left : right;
+      triangle = entry / 3;
+      newest = (entry + 2) % 3; // 3 t + e + 2 = e + 2 (mod 3)
+      visit(triangle, false, go_left);
+      add_corner(triangle, newest);
+    }
+  }
+
+  bool better(uint16_t a, uint16_t b) const {
+    if (a == kNone || b == kNone) return b == kNone && a != kNone;
+    return exits_[a / 3u] < exits_[b / 3u];
+  }
+
+  std::span<const Triangle> triangles_;
+  EdgePartners partners_;
+  std::vector<uint32_t> number_;                      // old vertex -> new, ~0 while unused
+  std::array<uint8_t, kMaxClusterTriangles> exits_{}; // unvisited neighbours
+  std::array<bool, kMaxClusterTriangles> visited_{};
+  uint32_t restart_count_ = 0;
+  Strips strips_;
+};
+
+} // namespace
+
+Strips find_strips(std::span<const Triangle> triangles, uint32_t vertex_count) {
+  assert(!triangles.empty() && triangles.size() <= kMaxClusterTriangles);
+  return StripWalk(triangles, vertex_count).run();
+}
+
+} // namespace packtrace

@@ -1,0 +1,56 @@
+#include "pbrt_import/file_names.h"
+
+#include <algorithm>
+#include <system_error>
+
+#include "pbrt_import/reporter.h"
+#include "pbrt_import/tokenizer.h"
+
+namespace packtrace {
+namespace {
+
+bool file_exists(const std::filesystem::path& path) {
+  std::error_code error;
+  return std::filesystem::exists(path, error) && !error;
+}
+
+} // namespace
+
+FileNames::FileNames(std::filesystem::path folder, bool allow_outside)
+    : folder_(std::move(folder)), allow_outside_(allow_outside) {}
+
+std::filesystem::path FileNames::resolve(std::string_view raw, const Place& place, Reporter& reporter) const {
+  bool unknown_escape = false;
+  const std::string name = unescape(raw, unknown_escape);
+  if (name.empty()) {
+    reporter.error(place, "empty file name");
+    return {};
+  }
+  std::filesystem::path path = (folder_ / name).lexically_normal();
+  if (raw.find('\\') != std::string_view::npos && !file_exists(path)) {
+    // Back-slashes were meant as they stand: "textures\brick.png" has no backspace in it.
+    std::string slashes;
+    for (const char c : raw)
+      if (c != '\\')
+        slashes += c;
+      else if (slashes.empty() || slashes.back() != '/')
+        slashes += '/';
+    if (const std::filesystem::path candidate = (folder_ / slashes).lexically_normal();
+        file_exists(candidate) || unknown_escape) {
+      path = candidate;
+      reporter.warning(place, "file names have back-slashes, " + in_quotes(raw) + "; read as slashes");
+    }
+  }
+  if (!allow_outside_) {
+    std::error_code error;
+    const auto real_folder = std::filesystem::weakly_canonical(folder_.empty() ? "." : folder_, error);
+    const auto relative = std::filesystem::weakly_canonical(path, error).lexically_relative(real_folder);
+    if (error || relative.empty() || *relative.begin() == "..") {
+      reporter.error(place, "file name " + in_quotes(raw) + " leads out of the scene's folder");
+      return {};
+    }
+  }
+  return path;
+}
+
+} // namespace packtrace

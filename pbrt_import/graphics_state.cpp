@@ -1,0 +1,88 @@
+#include "pbrt_import/graphics_state.h"
+
+#include <algorithm>
+#include <cassert>
+
+namespace packtrace {
+
+void ScopedNames::define(std::string_view name, uint32_t value) {
+  auto it = values_.find(name);
+  if (it == values_.end()) it = values_.emplace(std::string(name), std::nullopt).first;
+  undo_.push_back({&it->first, it->second});
+  it->second = value;
+}
+
+std::optional<uint32_t> ScopedNames::find(std::string_view name) const {
+  const auto it = values_.find(name);
+  return it == values_.end() ? std::nullopt : it->second;
+}
+
+std::string ScopedNames::closest(std::string_view name) const {
+  constexpr size_t kMostNames = 10'000; // a hint is not worth more comparisons than that
+  if (values_.size() > kMostNames) return {};
+  std::vector<std::string_view> names;
+  for (const auto& [key, value] : values_)
+    if (value) names.push_back(key);
+  std::sort(names.begin(), names.end());
+  return std::string(closest_name(name, names));
+}
+
+void ScopedNames::restore(size_t mark) {
+  while (undo_.size() > mark) {
+    values_.find(*undo_.back().name)->second = undo_.back().previous;
+    undo_.pop_back();
+  }
+}
+
+std::string_view begin_keyword(BlockKind kind) {
+  constexpr std::string_view kKeywords[] = {"AttributeBegin", "TransformBegin", "ObjectBegin"};
+  return kKeywords[static_cast<size_t>(kind)];
+}
+
+std::string_view end_keyword(BlockKind kind) {
+  constexpr std::string_view kKeywords[] = {"AttributeEnd", "TransformEnd", "ObjectEnd"};
+  return kKeywords[static_cast<size_t>(kind)];
+}
+
+void GraphicsState::concatenate(const DAffine& map) {
+  if (active_ == 3 && !animated_) {
+    transform_.start = compose(transform_.start, map);
+    transform_.end = transform_.start;
+    return;
+  }
+  if (active_ & 1) transform_.start = compose(transform_.start, map);
+  if (active_ & 2) transform_.end = compose(transform_.end, map);
+}
+
+void GraphicsState::set_transform(const DAffine& map) {
+  if (active_ & 1) transform_.start = map;
+  if (active_ & 2) transform_.end = map;
+}
+
+void GraphicsState::set_transform(const TransformPair& pair) { transform_ = pair; }
+
+void GraphicsState::reset_transform() {
+  transform_ = {};
+  active_ = 3;
+}
+
+void GraphicsState::open_block(BlockKind kind, const Place& place) {
+  blocks_.push_back({kind, active_, place, attributes, transform_, named_materials.mark(), float_textures.mark(),
+                     spectrum_textures.mark()});
+}
+
+void GraphicsState::close_block() {
+  assert(!blocks_.empty());
+  const Block& block = blocks_.back();
+  transform_ = block.transform;
+  active_ = block.active;
+  if (block.kind != BlockKind::kTransform) {
+    attributes = block.attributes;
+    named_materials.restore(block.named_materials);
+    float_textures.restore(block.float_textures);
+    spectrum_textures.restore(block.spectrum_textures);
+  }
+  blocks_.pop_back();
+}
+
+} // namespace packtrace

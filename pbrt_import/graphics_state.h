@@ -1,0 +1,103 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "pbrt_import/parameters.h"
+#include "pbrt_import/scene/math.h"
+
+namespace packtrace {
+
+/// Names that stand for numbers, where blocks give back what was visible before them. Opening a block costs nothing
+/// however many names there are; closing one costs the definitions made inside it.
+class ScopedNames {
+public:
+  void define(std::string_view name, uint32_t value);
+  std::optional<uint32_t> find(std::string_view name) const;
+  /// The visible name that name is most likely a misspelling of; the one first in the alphabet of several.
+  std::string closest(std::string_view name) const;
+
+  size_t mark() const { return undo_.size(); }
+  void restore(size_t mark);
+
+private:
+  struct Hash {
+    using is_transparent = void;
+    size_t operator()(std::string_view text) const { return std::hash<std::string_view>{}(text); }
+  };
+  struct Undo {
+    const std::string* name; ///< key of values_, which never moves
+    std::optional<uint32_t> previous;
+  };
+  std::unordered_map<std::string, std::optional<uint32_t>, Hash, std::equal_to<>> values_;
+  std::vector<Undo> undo_;
+};
+
+/// The transform at the start and at the end of the shutter.
+struct TransformPair {
+  DAffine start{1.0};
+  DAffine end{1.0};
+};
+
+inline constexpr uint32_t kNone = ~0u;
+
+/// What AttributeBegin saves, names apart.
+struct Attributes {
+  uint32_t material = kNone;   ///< MaterialLibrary's number; kNone: pbrt's default, grey matte
+  uint32_t area_light = kNone; ///< 1: emits from both sides, 0: from the front
+  bool reverse_orientation = false;
+};
+
+enum class BlockKind : uint8_t { kAttribute, kTransform, kObject };
+std::string_view begin_keyword(BlockKind kind);
+std::string_view end_keyword(BlockKind kind);
+
+/// One open Begin.
+struct Block {
+  BlockKind kind = BlockKind::kAttribute;
+  uint8_t active = 3;
+  Place place;
+  Attributes attributes;
+  TransformPair transform;
+  size_t named_materials = 0;
+  size_t float_textures = 0;
+  size_t spectrum_textures = 0;
+};
+
+/// pbrt-v3's graphics state with its stack of blocks, which lives on the heap.
+class GraphicsState {
+public:
+  Attributes attributes;
+  ScopedNames named_materials;   ///< to MaterialLibrary numbers
+  ScopedNames float_textures;    ///< to TextureGraph numbers
+  ScopedNames spectrum_textures; ///< to TextureGraph numbers
+
+  const TransformPair& transform() const { return transform_; }
+  bool animated() const { return animated_ && transform_.start != transform_.end; }
+
+  /// Applies a map, before all earlier ones in the order points see it, to the active transforms.
+  void concatenate(const DAffine& map);
+  void set_transform(const DAffine& map);
+  void set_transform(const TransformPair& pair);
+  void reset_transform();
+  /// Bit 0: start, bit 1: end.
+  void set_active(uint8_t bits) { active_ = bits, animated_ = true; }
+
+  void open_block(BlockKind kind, const Place& place);
+  /// Closes the innermost block. There must be one.
+  void close_block();
+  const std::vector<Block>& blocks() const { return blocks_; }
+
+private:
+  TransformPair transform_;
+  uint8_t active_ = 3;
+  bool animated_ = false; ///< ActiveTransform was ever used
+  std::vector<Block> blocks_;
+};
+
+} // namespace packtrace

@@ -1,0 +1,227 @@
+#include "pbrt_import/image_file.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <string>
+
+#include <OpenEXR/ImfArray.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfIO.h>
+#include <OpenEXR/ImfRgbaFile.h>
+#include <stb/stb_image.h>
+
+#include "pbrt_import/number.h"
+#include "pbrt_import/scene/alpha_mask.h"
+#include "pbrt_import/scene/error.h"
+
+namespace packtrace {
+namespace {
+
+[[noreturn]] void fail(const std::string& why) { throw Error(ErrorKind::kInput, why); }
+
+/// Takes pixels one after the other, rows from the top.
+class Summarizer {
+public:
+  Summarizer(uint32_t width, uint32_t height, bool want_mask) : width_(width), want_mask_(want_mask) {
+    summary_.width = width;
+    summary_.height = height;
+    if (want_mask) summary_.nonzero.assign(static_cast<size_t>(AlphaMask::row_words(width)) * height, 0);
+  }
+
+  void add(uint32_t x, uint32_t y, Vec3 pixel) {
+    if (!is_finite(pixel)) return;
+    row_ += DVec3(pixel);
+    if (want_mask_ && (pixel.x != 0.0f || pixel.y != 0.0f || pixel.z != 0.0f))
+      summary_.nonzero[static_cast<size_t>(y) * AlphaMask::row_words(width_) + x / 32] |= 1u << (x % 32);
+  }
+
+  /// Sums by rows keep long sums exact enough.
+  void end_row() {
+    total_ += row_;
+    row_ = DVec3(0.0);
+  }
+
+  ImageSummary finish() {
+    summary_.average = Vec3(total_ / (static_cast<double>(summary_.width) * summary_.height));
+    return std::move(summary_);
+  }
+
+private:
+  ImageSummary summary_;
+  uint32_t width_;
+  bool want_mask_;
+  DVec3 row_{0.0}, total_{0.0};
+};
+
+void check_size(uint64_t width, uint64_t height, uint64_t bytes_per_pixel, uint64_t max_bytes) {
+  if (width == 0 || height == 0) fail("the image has no pixels");
+  constexpr uint64_t kMaxSide = 1u << 24;
+  if (width > kMaxSide || height > kMaxSide || width * height > max_bytes / bytes_per_pixel)
+    throw Error(ErrorKind::kLimitExceeded,
+                "decoding its " + std::to_string(width) + " x " + std::to_string(height) + " pixels needs too much memory");
+}
+
+/// Source: IEC 61966-2-1.
+float linear_from_srgb(float v) {
+  return v <= 0.04045f ? v / 12.92f : static_cast<float>(std::pow((v + 0.055) / 1.055, 2.4));
+}
+
+struct StbFree {
+  void operator()(void* p) const { stbi_image_free(p); }
+};
+
+template <class T, class ToLinear>
+ImageSummary summarize(const T* pixels, int width, int height, bool want_mask, ToLinear to_linear) {
+  const auto w = static_cast<uint32_t>(width), h = static_cast<uint32_t>(height);
+  Summarizer summarizer(w, h, want_mask);
+  for (uint32_t y = 0; y < h; ++y) {
+    for (uint32_t x = 0; x < w; ++x, pixels += 3)
+      summarizer.add(x, y, {to_linear(pixels[0]), to_linear(pixels[1]), to_linear(pixels[2])});
+    summarizer.end_row();
+  }
+  return summarizer.finish();
+}
+
+ImageSummary read_stb(std::span<const std::byte> bytes, bool decode_srgb, bool want_mask, uint64_t max_bytes) {
+  if (bytes.size() > static_cast<size_t>(INT32_MAX)) fail("the image file exceeds 2 GiB");
+  const auto* const data = reinterpret_cast<const stbi_uc*>(bytes.data());
+  const int size = static_cast<int>(bytes.size());
+  int width = 0, height = 0, channels = 0;
+  if (!stbi_info_from_memory(data, size, &width, &height, &channels))
+    fail("not an image in a known format (PNG, TGA, EXR, PFM, HDR, JPEG, BMP)");
+  const bool is_float = stbi_is_hdr_from_memory(data, size) != 0;
+  const bool is_wide = stbi_is_16_bit_from_memory(data, size) != 0;
+  // stb_image holds up to two copies, of four channels at most.
+  check_size(static_cast<uint64_t>(width), static_cast<uint64_t>(height), is_float ? 32 : is_wide ? 16 : 8, max_bytes);
+  const auto load = [&](auto* pixels) {
+    std::unique_ptr<std::remove_pointer_t<decltype(pixels)>, StbFree> owner(pixels);
+    if (!owner) fail(std::string("damaged image: ") + stbi_failure_reason());
+    return owner;
+  };
+  if (is_float) {
+    const auto pixels = load(stbi_loadf_from_memory(data, size, &width, &height, &channels, 3));
+    return summarize(pixels.get(), width, height, want_mask, [](float v) { return v; });
+  }
+  if (is_wide) {
+    const auto pixels = load(stbi_load_16_from_memory(data, size, &width, &height, &channels, 3));
+    return summarize(pixels.get(), width, height, want_mask, [&](stbi_us v) {
+      return decode_srgb ? linear_from_srgb(static_cast<float>(v) / 65535.0f) : static_cast<float>(v) / 65535.0f;
+    });
+  }
+  const auto pixels = load(stbi_load_from_memory(data, size, &width, &height, &channels, 3));
+  std::array<float, 256> linear{};
+  for (size_t i = 0; i < linear.size(); ++i) {
+    const float v = static_cast<float>(i) / 255.0f;
+    linear[i] = decode_srgb ? linear_from_srgb(v) : v;
+  }
+  return summarize(pixels.get(), width, height, want_mask, [&](stbi_uc v) { return linear[v]; });
+}
+
+/// OpenEXR's view of bytes in memory.
+class MemoryStream : public Imf::IStream {
+public:
+  explicit MemoryStream(std::span<const std::byte> bytes) : Imf::IStream("image"), bytes_(bytes) {}
+
+  bool read(char c[], int n) override {
+    const auto count = static_cast<size_t>(std::max(n, 0));
+    if (count > bytes_.size() - position_) throw Error(ErrorKind::kInput, "the file ends early");
+    std::memcpy(c, bytes_.data() + position_, count);
+    position_ += count;
+    return position_ < bytes_.size();
+  }
+  uint64_t tellg() override { return position_; }
+  void seekg(uint64_t position) override {
+    if (position > bytes_.size()) throw Error(ErrorKind::kInput, "the file ends early");
+    position_ = static_cast<size_t>(position);
+  }
+
+private:
+  std::span<const std::byte> bytes_;
+  size_t position_ = 0;
+};
+
+ImageSummary read_exr(std::span<const std::byte> bytes, bool want_mask, uint64_t max_bytes) {
+  try {
+    MemoryStream stream(bytes);
+    Imf::RgbaInputFile file(stream, 1);
+    const Imath::Box2i box = file.dataWindow();
+    const int64_t width = int64_t{box.max.x} - box.min.x + 1, height = int64_t{box.max.y} - box.min.y + 1;
+    check_size(static_cast<uint64_t>(std::max<int64_t>(width, 0)), static_cast<uint64_t>(std::max<int64_t>(height, 0)),
+               sizeof(Imf::Rgba), max_bytes);
+    const auto w = static_cast<uint32_t>(width);
+    Summarizer summarizer(w, static_cast<uint32_t>(height), want_mask);
+    constexpr int kRows = 64; // whole blocks of every compression but the rarest
+    std::vector<Imf::Rgba> rows(static_cast<size_t>(w) * kRows);
+    for (int first = box.min.y; first <= box.max.y; first += kRows) {
+      const int last = std::min(first + kRows - 1, box.max.y);
+      // The library addresses pixel (x, y) as base + x + y * stride.
+      Imf::Rgba* const base = rows.data() - box.min.x - static_cast<int64_t>(first) * width;
+      file.setFrameBuffer(base, 1, w);
+      file.readPixels(first, last);
+      const Imf::Rgba* pixel = rows.data();
+      for (int y = first; y <= last; ++y) {
+        for (uint32_t x = 0; x < w; ++x, ++pixel)
+          summarizer.add(x, static_cast<uint32_t>(y - box.min.y), {pixel->r, pixel->g, pixel->b});
+        summarizer.end_row();
+      }
+    }
+    return summarizer.finish();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& error) {
+    fail(std::string("damaged EXR image: ") + error.what());
+  }
+}
+
+/// Portable float map: "PF" or "Pf", width, height, scale (negative: little-endian), then rows from the bottom.
+ImageSummary read_pfm(std::span<const std::byte> bytes, bool want_mask, uint64_t max_bytes) {
+  std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const size_t channels = text[1] == 'F' ? 3 : 1;
+  text.remove_prefix(2);
+  double header[3];
+  for (double& value : header) {
+    while (!text.empty() && is_space(text[0])) text.remove_prefix(1);
+    const NumberText<double> number = parse_number<double>(text.substr(0, 32));
+    if (number.used == 0 || number.used >= text.size()) fail("damaged PFM header");
+    value = number.value;
+    text.remove_prefix(number.used);
+  }
+  text.remove_prefix(1); // the one white-space character before the pixels
+  if (!(header[0] >= 1 && header[0] <= 1 << 24 && header[1] >= 1 && header[1] <= 1 << 24 && header[2] != 0.0))
+    fail("damaged PFM header");
+  const auto width = static_cast<uint32_t>(header[0]), height = static_cast<uint32_t>(header[1]);
+  check_size(width, height, 12, max_bytes);
+  const size_t row_bytes = static_cast<size_t>(width) * channels * 4;
+  if (text.size() / row_bytes < height) fail("truncated PFM image");
+  const bool swap = header[2] > 0.0;
+  Summarizer summarizer(width, height, want_mask);
+  for (uint32_t y = 0; y < height; ++y) {
+    const char* row = text.data() + (height - 1 - y) * row_bytes;
+    for (uint32_t x = 0; x < width; ++x) {
+      Vec3 pixel;
+      for (size_t c = 0; c < 3; ++c) {
+        uint32_t word;
+        std::memcpy(&word, row + (x * channels + (channels == 3 ? c : 0)) * 4, 4);
+        pixel[static_cast<int>(c)] = std::bit_cast<float>(swap ? __builtin_bswap32(word) : word);
+      }
+      summarizer.add(x, y, pixel);
+    }
+    summarizer.end_row();
+  }
+  return summarizer.finish();
+}
+
+} // namespace
+
+ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, bool want_mask, uint64_t max_bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (text.starts_with("\x76\x2f\x31\x01")) return read_exr(bytes, want_mask, max_bytes);
+  if (text.starts_with("PF") || text.starts_with("Pf")) return read_pfm(bytes, want_mask, max_bytes);
+  return read_stb(bytes, decode_srgb, want_mask, max_bytes);
+}
+
+} // namespace packtrace

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "pbrt_import/scene/math.h"
+
+namespace packtrace {
+
+/// What the importer keeps of a texture image.
+struct ImageSummary {
+  uint32_t width = 0;         ///< pixels
+  uint32_t height = 0;        ///< pixels
+  Vec3 average{0.0f};         ///< linear RGB; pixels that are not finite count as 0
+  std::vector<uint32_t> nonzero; ///< AlphaMask's layout: bit set where luminance is not 0
+};
+
+/// Reads PNG, TGA, JPEG, BMP and HDR (stb_image), OpenEXR, and PFM; alpha channels are ignored, as pbrt does.
+/// @param bytes the whole file
+/// @param decode_srgb whether integer formats are sRGB-encoded
+/// @param want_mask whether to fill ImageSummary::nonzero
+/// @param max_bytes for the decoded pixels
+/// Throws Error(kInput), message without a file name, if it is none of these or damaged, Error(kLimitExceeded) if
+/// decoding would take more than max_bytes.
+ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, bool want_mask, uint64_t max_bytes);
+
+} // namespace packtrace

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+
+#include "pbrt_import/scene/diagnostics.h"
+#include "pbrt_import/scene/progress.h"
+#include "pbrt_import/scene/scene.h"
+
+namespace packtrace {
+
+struct ImportOptions {
+  bool strict = false;                          ///< any warning or error fails the import, once all are reported
+  uint64_t memory_budget_bytes = 16ull << 30;   ///< for one file's content, and for all meshes together
+  uint32_t max_include_depth = 64;              ///< files open at once
+  uint64_t max_included_files = 1'000'000;      ///< opened in all
+  uint32_t max_nesting = 1u << 16;              ///< open Attribute, Transform and Object blocks
+  double tessellation_tolerance = 1e-3;         ///< relative to the curved shape's radius, within [1e-6, 0.5]
+  bool allow_files_outside_scene_folder = true; ///< exporters write "../textures/x.png"
+};
+
+/// What an import read, for reports.
+struct ImportStatistics {
+  uint64_t directives = 0;
+  uint64_t files_read = 0;                ///< scene text, PLY and image files, each once
+  uint64_t bytes_read = 0;                ///< their content, inflated
+  std::map<std::string, uint64_t> shapes; ///< Shape directives by kind, whether or not they could be used
+  uint64_t shapes_skipped = 0;            ///< not in the scene because of an error in them
+  uint64_t shapes_absent = 0;             ///< not in the scene because their alpha is 0 everywhere
+  uint64_t light_sources = 0;             ///< LightSource directives; ambient occlusion has no use for them
+  uint64_t area_lights = 0;               ///< shapes that emit
+  uint64_t textures_found = 0;            ///< image files that textures name, each once
+  uint64_t textures_missing = 0;
+  uint64_t triangles = 0; ///< stored, unique_triangle_count()
+};
+
+struct ImportResult {
+  Scene scene;
+  ImportStatistics statistics;
+};
+
+/// Reads a pbrt-v3 scene with everything it includes. Problems are reported to diagnostics, each with its place, and
+/// the rest of the scene is kept; a scene without a single shape is returned as such. Animated transforms are taken at
+/// their start. The same files give the same result and diagnostics for any thread count.
+///
+/// Scene::cameras[0] is the camera pbrt renders with, the file's last one; earlier ones follow in file order. Objects
+/// that are never instanced, and materials, masks and meshes that nothing uses, are left out.
+///
+/// Throws Error(kUsage) if an option is out of range, Error(kInput) if the main file cannot be read at all,
+/// Error(kInput) if options.strict and a warning or an error was reported, Error(kCancelled) on cancellation.
+ImportResult import_scene(const std::filesystem::path& main_file, const ImportOptions& options,
+                          Diagnostics& diagnostics, Progress& progress);
+
+} // namespace packtrace

@@ -1,0 +1,172 @@
+#include "pbrt_import/input_file.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <limits>
+#include <string>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include "pbrt_import/scene/error.h"
+
+namespace packtrace {
+namespace {
+
+[[noreturn]] void fail(const std::string& what) { throw Error(ErrorKind::kInput, what); }
+
+/// Owns a file descriptor.
+class Descriptor {
+public:
+  explicit Descriptor(int value) : value_(value) {}
+  ~Descriptor() {
+    if (value_ >= 0) ::close(value_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int get() const { return value_; }
+
+private:
+  int value_;
+};
+
+/// Owns a zlib inflate stream.
+class Inflater {
+public:
+  Inflater() {
+    constexpr int kGzipWindow = 15 + 16; // largest window, gzip wrapper only
+    if (inflateInit2(&stream_, kGzipWindow) != Z_OK) fail("cannot start inflating");
+  }
+  ~Inflater() { inflateEnd(&stream_); }
+  Inflater(const Inflater&) = delete;
+  Inflater& operator=(const Inflater&) = delete;
+  z_stream& stream() { return stream_; }
+
+private:
+  z_stream stream_{};
+};
+
+constexpr size_t kCompressedChunk = 64 * 1024;
+
+} // namespace
+
+struct InputFile::State {
+  explicit State(int descriptor) : file(descriptor) {}
+  Descriptor file;
+  dev_t device = 0;
+  ino_t inode = 0;
+  uint64_t stored_bytes = 0;
+  uint64_t max_bytes = 0;
+  uint64_t delivered_bytes = 0;
+  std::unique_ptr<Inflater> inflater; ///< null: plain file
+  std::vector<unsigned char> compressed;
+  bool member_open = false; ///< inside a gzip member: the end of the file here means truncation
+
+  size_t read_plain(char* to, size_t size) {
+    size_t got = 0;
+    while (got < size) {
+      const ssize_t n = ::read(file.get(), to + got, std::min<size_t>(size - got, 1u << 30));
+      if (n < 0 && errno == EINTR) continue;
+      if (n < 0) fail(std::string("reading failed: ") + std::strerror(errno));
+      if (n == 0) break;
+      got += static_cast<size_t>(n);
+    }
+    return got;
+  }
+
+  /// True if there is compressed input to work on.
+  bool refill() {
+    z_stream& z = inflater->stream();
+    if (z.avail_in > 0) return true;
+    const size_t n = read_plain(reinterpret_cast<char*>(compressed.data()), compressed.size());
+    z.next_in = compressed.data();
+    z.avail_in = static_cast<uInt>(n);
+    return n > 0;
+  }
+
+  size_t read_inflated(char* to, size_t size) {
+    z_stream& z = inflater->stream();
+    size_t got = 0;
+    while (got < size && refill()) {
+      if (!member_open) { // gzip files may be several members in a row
+        if (inflateReset(&z) != Z_OK) fail("cannot start inflating");
+        member_open = true;
+      }
+      const auto room = static_cast<uInt>(std::min<size_t>(size - got, 1u << 30));
+      z.next_out = reinterpret_cast<Bytef*>(to + got);
+      z.avail_out = room;
+      const int status = inflate(&z, Z_NO_FLUSH);
+      got += room - z.avail_out;
+      if (status == Z_STREAM_END) member_open = false;
+      if (status != Z_OK && status != Z_STREAM_END && status != Z_BUF_ERROR) fail("damaged gzip data");
+    }
+    if (got < size && member_open) fail("truncated gzip data");
+    return got;
+  }
+};
+
+InputFile::InputFile(const std::filesystem::path& path, uint64_t max_bytes) {
+  // Non-blocking, so that opening a FIFO without a writer cannot hang.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (descriptor < 0) fail(errno == ENOENT ? "no such file" : std::string("cannot open: ") + std::strerror(errno));
+  state_ = std::make_unique<State>(descriptor);
+  struct stat info {};
+  if (::fstat(descriptor, &info) != 0) fail(std::string("cannot examine: ") + std::strerror(errno));
+  if (S_ISDIR(info.st_mode)) fail("is a directory, not a file");
+  if (!S_ISREG(info.st_mode)) fail("is not a regular file");
+  state_->device = info.st_dev;
+  state_->inode = info.st_ino;
+  state_->stored_bytes = static_cast<uint64_t>(info.st_size);
+  state_->max_bytes = max_bytes;
+  unsigned char magic[2] = {};
+  const ssize_t n = ::pread(descriptor, magic, sizeof magic, 0);
+  if (n == 2 && magic[0] == 0x1f && magic[1] == 0x8b) {
+    state_->inflater = std::make_unique<Inflater>();
+    state_->compressed.resize(kCompressedChunk);
+  }
+}
+
+InputFile::~InputFile() = default;
+InputFile::InputFile(InputFile&&) noexcept = default;
+InputFile& InputFile::operator=(InputFile&&) noexcept = default;
+
+size_t InputFile::read(std::span<char> buffer) {
+  const size_t got = state_->inflater ? state_->read_inflated(buffer.data(), buffer.size())
+                                      : state_->read_plain(buffer.data(), buffer.size());
+  state_->delivered_bytes += got;
+  if (state_->delivered_bytes > state_->max_bytes)
+    throw Error(ErrorKind::kLimitExceeded,
+                "content exceeds the limit of " + std::to_string(state_->max_bytes) + " bytes for this file");
+  return got;
+}
+
+uint64_t InputFile::stored_bytes() const { return state_->stored_bytes; }
+bool InputFile::compressed() const { return state_->inflater != nullptr; }
+bool InputFile::same_file(const InputFile& other) const {
+  return state_->device == other.state_->device && state_->inode == other.state_->inode;
+}
+
+std::vector<std::byte> read_whole_file(const std::filesystem::path& path, uint64_t max_bytes) {
+  InputFile file(path, max_bytes);
+  if (file.stored_bytes() > max_bytes)
+    throw Error(ErrorKind::kLimitExceeded, "file of " + std::to_string(file.stored_bytes()) +
+                                               " bytes exceeds the limit of " + std::to_string(max_bytes) + " bytes");
+  std::vector<std::byte> content;
+  // One byte more than expected, so that the end of an unchanged plain file shows in a single read.
+  size_t room = static_cast<size_t>(file.stored_bytes()) + 1;
+  size_t size = 0;
+  while (true) {
+    content.resize(size + room);
+    const size_t got = file.read({reinterpret_cast<char*>(content.data()) + size, room});
+    size += got;
+    if (got < room) break;
+    room = std::max<size_t>(size, kCompressedChunk);
+  }
+  content.resize(size);
+  return content;
+}
+
+} // namespace packtrace

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace packtrace {
+
+/// Sequential reader of one regular file; files that start with gzip's magic bytes are inflated on the way.
+class InputFile {
+public:
+  /// Opens path. Throws Error(kInput), message without the path, if it is missing, unreadable or not a regular file.
+  /// @param max_bytes of content, after inflating
+  InputFile(const std::filesystem::path& path, uint64_t max_bytes);
+  ~InputFile();
+  InputFile(InputFile&&) noexcept;
+  InputFile& operator=(InputFile&&) noexcept;
+
+  /// Fills buffer from the start; fewer bytes than asked for only at the end of the file.
+  /// Throws Error(kInput) if reading fails or gzip data is damaged, Error(kLimitExceeded) past max_bytes.
+  size_t read(std::span<char> buffer);
+
+  /// Bytes on disk.
+  uint64_t stored_bytes() const;
+  bool compressed() const;
+
+  /// True where both are the same file on disk, whatever their names.
+  bool same_file(const InputFile& other) const;
+
+private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// The whole content, inflated if need be. Throws like InputFile.
+std::vector<std::byte> read_whole_file(const std::filesystem::path& path, uint64_t max_bytes);
+
+} // namespace packtrace

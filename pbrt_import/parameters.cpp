@@ -1,0 +1,172 @@
+#include "pbrt_import/parameters.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "pbrt_import/tokenizer.h"
+
+namespace packtrace {
+namespace {
+
+constexpr std::pair<std::string_view, ParameterType> kTypeNames[] = {
+    {"integer", ParameterType::kInteger},
+    {"float", ParameterType::kFloat},
+    {"bool", ParameterType::kBool},
+    {"string", ParameterType::kString},
+    {"texture", ParameterType::kTexture},
+    {"point2", ParameterType::kPoint2},
+    {"vector2", ParameterType::kVector2},
+    {"point", ParameterType::kPoint3},
+    {"vector", ParameterType::kVector3},
+    {"normal", ParameterType::kNormal},
+    {"rgb", ParameterType::kRgb},
+    {"xyz", ParameterType::kXyz},
+    {"blackbody", ParameterType::kBlackbody},
+    {"spectrum", ParameterType::kSpectrum},
+    {"point3", ParameterType::kPoint3},
+    {"vector3", ParameterType::kVector3},
+    {"color", ParameterType::kRgb},
+    {"normal3", ParameterType::kNormal},
+};
+
+char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; }
+
+/// Twice the edit distance, letters that differ in case only counting 1; stops caring above the names' own lengths.
+size_t doubled_distance(std::string_view a, std::string_view b) {
+  std::vector<size_t> row(b.size() + 1);
+  for (size_t j = 0; j <= b.size(); ++j) row[j] = 2 * j;
+  for (size_t i = 1; i <= a.size(); ++i) {
+    size_t diagonal = row[0];
+    row[0] = 2 * i;
+    for (size_t j = 1; j <= b.size(); ++j) {
+      const size_t change = a[i - 1] == b[j - 1] ? 0 : lower(a[i - 1]) == lower(b[j - 1]) ? 1 : 2;
+      const size_t best = std::min({row[j] + 2, row[j - 1] + 2, diagonal + change});
+      diagonal = row[j];
+      row[j] = best;
+    }
+  }
+  return row[b.size()];
+}
+
+const Parameter* single_value(const ParameterList& list, std::string_view name, ParameterType type, size_t values) {
+  const Parameter* const parameter = list.find(name, {type});
+  if (!parameter) return nullptr;
+  const size_t count = parameter->floats.size() + parameter->integers.size() + parameter->strings.size();
+  if (count == values) return parameter;
+  parameter->used = false; // reported as unused, as pbrt does
+  return nullptr;
+}
+
+} // namespace
+
+std::optional<ParameterType> parameter_type(std::string_view name) {
+  for (const auto& [text, type] : kTypeNames)
+    if (text == name) return type;
+  return std::nullopt;
+}
+
+std::string_view to_string(ParameterType type) {
+  for (const auto& [text, candidate] : kTypeNames)
+    if (candidate == type) return text;
+  return "unknown";
+}
+
+std::string describe(const Parameter& parameter) {
+  return in_quotes(std::string(to_string(parameter.type)) + ' ' + parameter.name);
+}
+
+void ParameterList::add(Parameter parameter) {
+  constexpr size_t kLinearSearch = 32; // longer lists are hostile or wrong: last wins through find() going backwards
+  if (parameters_.size() <= kLinearSearch)
+    for (Parameter& existing : parameters_)
+      if (existing.type == parameter.type && existing.name == parameter.name) {
+        existing = std::move(parameter);
+        return;
+      }
+  parameters_.push_back(std::move(parameter));
+}
+
+const Parameter* ParameterList::find(std::string_view name, std::initializer_list<ParameterType> types) const {
+  if (!was_asked(name)) asked_.push_back(name);
+  for (auto it = parameters_.rbegin(); it != parameters_.rend(); ++it)
+    if (it->name == name && std::find(types.begin(), types.end(), it->type) != types.end()) {
+      it->used = true;
+      return &*it;
+    }
+  return nullptr;
+}
+
+float ParameterList::get_float(std::string_view name, float fallback) const {
+  const Parameter* const found = single_value(*this, name, ParameterType::kFloat, 1);
+  return found ? found->floats[0] : fallback;
+}
+
+int32_t ParameterList::get_integer(std::string_view name, int32_t fallback) const {
+  const Parameter* const found = single_value(*this, name, ParameterType::kInteger, 1);
+  return found ? found->integers[0] : fallback;
+}
+
+bool ParameterList::get_bool(std::string_view name, bool fallback) const {
+  const Parameter* const found = single_value(*this, name, ParameterType::kBool, 1);
+  return found ? found->integers[0] != 0 : fallback;
+}
+
+std::string ParameterList::get_string(std::string_view name, std::string_view fallback) const {
+  const Parameter* const found = single_value(*this, name, ParameterType::kString, 1);
+  bool unknown_escape = false;
+  return found ? unescape(found->strings[0], unknown_escape) : std::string(fallback);
+}
+
+Vec3 ParameterList::get_point(std::string_view name, Vec3 fallback) const {
+  const Parameter* const found = single_value(*this, name, ParameterType::kPoint3, 3);
+  return found ? Vec3(found->floats[0], found->floats[1], found->floats[2]) : fallback;
+}
+
+Vec3 ParameterList::get_vector(std::string_view name, Vec3 fallback) const {
+  const Parameter* const found = single_value(*this, name, ParameterType::kVector3, 3);
+  return found ? Vec3(found->floats[0], found->floats[1], found->floats[2]) : fallback;
+}
+
+std::span<const float> ParameterList::floats(std::string_view name, ParameterType type) const {
+  const Parameter* const found = find(name, {type});
+  return found ? std::span<const float>(found->floats) : std::span<const float>();
+}
+
+std::span<const int32_t> ParameterList::integers(std::string_view name) const {
+  const Parameter* const found = find(name, {ParameterType::kInteger});
+  return found ? std::span<const int32_t>(found->integers) : std::span<const int32_t>();
+}
+
+void ParameterList::mark_used(std::span<const std::string_view> names) const {
+  for (const std::string_view name : names)
+    if (!was_asked(name)) asked_.push_back(name);
+  for (const Parameter& parameter : parameters_)
+    if (std::find(names.begin(), names.end(), parameter.name) != names.end()) parameter.used = true;
+}
+
+bool ParameterList::was_asked(std::string_view name) const {
+  return std::find(asked_.begin(), asked_.end(), name) != asked_.end();
+}
+
+std::string_view ParameterList::suggestion(std::string_view name) const { return closest_name(name, asked_); }
+
+std::string_view closest_name(std::string_view name, std::span<const std::string_view> candidates) {
+  constexpr size_t kLongestName = 64;
+  if (name.empty() || name.size() > kLongestName) return {};
+  std::string_view best;
+  // Two edits, but no more than a third of the name: "fov" is no misspelling of "lod".
+  size_t best_distance = std::min<size_t>(4, 2 * ((name.size() + 1) / 3)) + 1;
+  for (const std::string_view candidate : candidates) {
+    if (candidate == name || candidate.size() > name.size() + 2 || name.size() > candidate.size() + 2) continue;
+    if (const size_t distance = doubled_distance(name, candidate); distance < best_distance)
+      best = candidate, best_distance = distance;
+  }
+  return best;
+}
+
+std::string did_you_mean(std::string_view suggestion) {
+  return suggestion.empty() ? std::string() : "; did you mean " + in_quotes(suggestion) + "?";
+}
+
+} // namespace packtrace

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pbrt_import/scene/math.h"
+
+namespace packtrace {
+
+/// A place in one of the files of an import; SourceFiles turns it into a SourceLocation.
+struct Place {
+  uint32_t file = 0;
+  uint32_t line = 0;
+  uint32_t column = 0;
+  bool operator==(const Place&) const = default;
+};
+
+/// pbrt-v3's parameter types with synonyms folded: point is point3, vector is vector3, color is rgb.
+enum class ParameterType : uint8_t {
+  kInteger,
+  kFloat,
+  kBool,
+  kString,
+  kTexture,
+  kPoint2,
+  kVector2,
+  kPoint3,
+  kVector3,
+  kNormal,
+  kRgb,
+  kXyz,
+  kBlackbody,
+  kSpectrum,
+};
+
+std::optional<ParameterType> parameter_type(std::string_view name);
+std::string_view to_string(ParameterType type);
+
+/// One `"type name" [ values ]`. Values are in the one vector that fits the type.
+struct Parameter {
+  ParameterType type = ParameterType::kFloat;
+  std::string name;
+  Place place;
+  std::vector<float> floats;        ///< all kinds of points, vectors, spectra: components one after the other
+  std::vector<int32_t> integers;    ///< integer, and bool as 0 or 1
+  std::vector<std::string> strings; ///< string, texture, spectrum files: escapes not replaced yet
+  mutable bool used = false;        ///< somebody asked for it with its type
+};
+
+/// `"type name"` for messages.
+std::string describe(const Parameter& parameter);
+
+/// The parameters of one directive. Where a name and type occur twice the last one wins. Looking a parameter up marks
+/// it as used; what stays unused is a mistake in the scene worth reporting.
+class ParameterList {
+public:
+  void add(Parameter parameter);
+  void clear() { parameters_.clear(), asked_.clear(); }
+  bool empty() const { return parameters_.empty(); }
+  std::span<const Parameter> all() const { return parameters_; }
+
+  /// The parameter of that name with one of those types; null if there is none.
+  const Parameter* find(std::string_view name, std::initializer_list<ParameterType> types) const;
+
+  /// First value of a parameter with exactly one value, else the fallback.
+  float get_float(std::string_view name, float fallback) const;
+  int32_t get_integer(std::string_view name, int32_t fallback) const;
+  bool get_bool(std::string_view name, bool fallback) const;
+  std::string get_string(std::string_view name, std::string_view fallback) const;
+  Vec3 get_point(std::string_view name, Vec3 fallback) const;
+  Vec3 get_vector(std::string_view name, Vec3 fallback) const;
+
+  /// All values; empty if there are none.
+  std::span<const float> floats(std::string_view name, ParameterType type) const;
+  std::span<const int32_t> integers(std::string_view name) const;
+
+  /// Declares names as known without needing their values.
+  void mark_used(std::span<const std::string_view> names) const;
+
+  /// Among the names looked up so far, the one that name is most likely a misspelling of; empty: none is close.
+  std::string_view suggestion(std::string_view name) const;
+  bool was_asked(std::string_view name) const;
+
+private:
+  std::vector<Parameter> parameters_;
+  mutable std::vector<std::string_view> asked_; ///< literals
+};
+
+/// The candidate within two edits of name that needs fewest; empty if none. Case differences count half an edit.
+std::string_view closest_name(std::string_view name, std::span<const std::string_view> candidates);
+
+/// `; did you mean "x"?` or nothing.
+std::string did_you_mean(std::string_view suggestion);
+
+} // namespace packtrace

@@ -1,0 +1,107 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pbrt_import/file_names.h"
+#include "pbrt_import/parameters.h"
+#include "pbrt_import/source_stack.h"
+
+namespace packtrace {
+
+enum class DirectiveKind : uint8_t {
+  kAccelerator,
+  kActiveTransform,
+  kAreaLightSource,
+  kAttributeBegin,
+  kAttributeEnd,
+  kCamera,
+  kConcatTransform,
+  kCoordSysTransform,
+  kCoordinateSystem,
+  kFilm,
+  kIdentity,
+  kInclude, ///< never leaves the parser
+  kIntegrator,
+  kLightSource,
+  kLookAt,
+  kMakeNamedMaterial,
+  kMakeNamedMedium,
+  kMaterial,
+  kMediumInterface,
+  kNamedMaterial,
+  kObjectBegin,
+  kObjectEnd,
+  kObjectInstance,
+  kPixelFilter,
+  kReverseOrientation,
+  kRotate,
+  kSampler,
+  kScale,
+  kShape,
+  kTexture,
+  kTransform,
+  kTransformBegin,
+  kTransformEnd,
+  kTransformTimes,
+  kTranslate,
+  kWorldBegin,
+  kWorldEnd,
+};
+
+/// One directive with all that belongs to it. Numbers and names are as many as the kind takes (MediumInterface: one or
+/// two names; ActiveTransform: its word is names[0]).
+struct Directive {
+  DirectiveKind kind = DirectiveKind::kIdentity;
+  std::string_view keyword;
+  Place place;
+  std::array<double, 16> numbers{};
+  std::array<std::string, 3> names; ///< escapes replaced
+  uint32_t name_count = 0;
+  ParameterList parameters;
+  bool damaged = false; ///< a parameter was left out because of an error already reported
+};
+
+struct DirectiveInfo; ///< what a keyword takes
+
+/// Reads directives one after the other and follows Include. What is malformed is reported and skipped, up to the next
+/// directive at worst.
+class Parser {
+public:
+  Parser(SourceStack& source, const FileNames& file_names, Reporter& reporter)
+      : source_(source), file_names_(file_names), reporter_(reporter) {}
+
+  /// False at the end of the main file. directive is reused: spans into its parameters end here.
+  bool next(Directive& directive);
+
+private:
+  bool read_arguments(const DirectiveInfo& info, Directive& directive);
+  bool read_directive_numbers(const DirectiveInfo& info, Directive& directive);
+  bool read_directive_names(const DirectiveInfo& info, Directive& directive);
+  void read_parameters(Directive& directive);
+  bool read_declaration(std::string_view text, Parameter& parameter);
+  bool read_values(Parameter& parameter);
+  bool read_array(Parameter& parameter);
+  bool read_single(Parameter& parameter);
+  bool take_string(Parameter& parameter);
+  bool take_bool(Parameter& parameter);
+  void cut_excess(Parameter& parameter);
+  template <class T>
+  void read_number_run(std::vector<T>& values);
+  template <class T>
+  bool take_number(std::vector<T>& values);
+  void skip_value();
+  void skip_to_directive();
+  void report_unexpected(const std::string& expected);
+
+  SourceStack& source_;
+  const FileNames& file_names_;
+  Reporter& reporter_;
+  std::vector<double> numbers_; ///< scratch
+  std::string include_name_;    ///< escapes untouched
+};
+
+} // namespace packtrace

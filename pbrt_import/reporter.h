@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <unordered_set>
+#include <vector>
+
+#include "pbrt_import/parameters.h"
+#include "pbrt_import/scene/diagnostics.h"
+
+namespace packtrace {
+
+/// All files opened by one import, in order of opening.
+class SourceFiles {
+public:
+  /// Adds a file; its number is what Place::file holds.
+  uint32_t add(std::string path, SourceLocation included_from);
+  SourceLocation locate(const Place& place) const;
+  size_t size() const { return files_.size(); }
+
+private:
+  std::vector<std::shared_ptr<const SourceFile>> files_;
+};
+
+/// Reports problems in the order of the source text, to one thread's Diagnostics. A file that holds nothing but
+/// mistakes cannot fill the memory with messages: beyond kMaxDistinct they are only counted.
+class Reporter {
+public:
+  static constexpr size_t kMaxDistinct = 10'000;
+
+  Reporter(const SourceFiles& files, Diagnostics& diagnostics) : files_(files), diagnostics_(diagnostics) {}
+
+  /// Later reports belong to the next directive.
+  void next_directive() { ++sequence_; }
+  uint64_t sequence() const { return sequence_; }
+  /// For problems found after parsing in what an earlier directive asked for.
+  void set_sequence(uint64_t sequence) { sequence_ = sequence; }
+
+  void report(Severity severity, const Place& place, std::string message);
+  void report(Severity severity, SourceLocation location, std::string message);
+  void error(const Place& place, std::string message) { report(Severity::kError, place, std::move(message)); }
+  void warning(const Place& place, std::string message) { report(Severity::kWarning, place, std::move(message)); }
+  void note(const Place& place, std::string message) { report(Severity::kNote, place, std::move(message)); }
+
+  /// Reports how many problems were not listed, if any.
+  void finish();
+
+  SourceLocation locate(const Place& place) const { return files_.locate(place); }
+
+private:
+  const SourceFiles& files_;
+  Diagnostics& diagnostics_;
+  std::unordered_set<uint64_t> seen_; ///< hashes of (severity, path, message)
+  uint64_t sequence_ = 0;
+  uint64_t unlisted_ = 0;
+  Severity worst_unlisted_ = Severity::kNote;
+};
+
+/// Reports what nobody asked for, with the name it might have been meant to be.
+void report_unused(const ParameterList& parameters, Reporter& reporter);
+
+} // namespace packtrace

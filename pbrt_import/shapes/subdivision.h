@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "pbrt_import/scene/scene.h"
+#include "pbrt_import/shapes/report.h"
+
+namespace packtrace {
+
+/// Most triangles subdivide_loop gives: beyond it, Error(kLimitExceeded).
+inline constexpr uint64_t kMaxSubdividedTriangles = uint64_t{1} << 26;
+
+/// pbrt-v3's loopsubdiv: `levels` Loop subdivisions, then vertices pushed to the limit surface, with unit limit normals
+/// on the side of cross(p1 - p0, p2 - p0); no uvs. Inner vertices and normals are exact, so they do not depend on
+/// `levels`; at the boundary pbrt's masks are used, (a + 3p + b) / 5 for positions, which only approach the limit.
+/// The result has 4^levels triangles per good input triangle, in the input's order, and the input's orientation;
+/// triangles that repeat an index, leave the range or touch a point that is not finite are dropped and reported.
+/// Where more than two triangles meet at an edge, or several fans at a point, or neighbours disagree in orientation,
+/// the surface is cut there as if it had a boundary (reported); no triangle is lost.
+/// @param points control points; @param triangles indices into them
+/// Throws Error(kLimitExceeded), before allocating, if the result would exceed kMaxSubdividedTriangles.
+/// Source: Charles Loop, Smooth Subdivision Surfaces Based on Triangles, 1987; weights as in Physically Based
+/// Rendering, 3rd edition, 2016, section 3.8.
+Mesh subdivide_loop(std::span<const Vec3> points, std::span<const Triangle> triangles, uint32_t levels,
+                    const ReportFn& report);
+
+} // namespace packtrace

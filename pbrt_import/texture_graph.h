@@ -1,0 +1,88 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "pbrt_import/image_file.h"
+#include "pbrt_import/parameters.h"
+#include "pbrt_import/scene/alpha_mask.h"
+
+namespace packtrace {
+
+/// st = uv * scale + offset, or something else (spherical, planar ...) of which only averages can be told.
+struct TextureMapping {
+  Vec2 scale{1.0f};
+  Vec2 offset{0.0f};
+  bool is_uv = true;
+};
+
+/// An image file that textures name. One per file and colour encoding.
+struct ImageRequest {
+  std::filesystem::path path;
+  bool decode_srgb = false;
+  Place place;           ///< of the first texture that names it
+  uint64_t sequence = 0; ///< of that texture's directive
+  bool needed = false;   ///< something visible depends on it
+  bool want_mask = false;
+  bool missing = false; ///< no such file, or unreadable: counts as 1 everywhere, as in pbrt
+  ImageSummary summary; ///< filled in by whoever reads the files
+};
+
+/// All textures of a scene as expressions over constants and images. A node only refers to nodes made before it. Values
+/// are known once the images that require() asks for have been read.
+class TextureGraph {
+public:
+  using Node = uint32_t;
+
+  Node constant(Vec3 value);
+  Node image(uint32_t image, Vec3 scale, WrapMode wrap, const TextureMapping& mapping);
+  Node product(Node a, Node b);
+  Node mix(Node a, Node b, Node amount); ///< (1 - amount) a + amount b
+  Node checkerboard(Node a, Node b, const TextureMapping& mapping);
+
+  /// Number for image(): the request with this path and encoding, made if there is none.
+  uint32_t request_image(const std::filesystem::path& path, bool decode_srgb, const Place& place, uint64_t sequence);
+  std::vector<ImageRequest>& images() { return images_; }
+
+  /// The value, where it is the same everywhere and no image has to be read for it.
+  const Vec3* constant_value(Node node) const;
+
+  /// Marks the images behind node as needed.
+  void require(Node node, bool want_mask);
+
+  /// Mean over the texture's domain; of a product the product of means.
+  Vec3 average(Node node);
+
+  /// Where the texture is exactly 0, as pbrt's alpha test asks.
+  enum class MaskKind { kOpaque, kAbsent, kMask };
+  struct MaskResult {
+    MaskKind kind = MaskKind::kOpaque;
+    AlphaMask mask;     ///< for kMask
+    bool exact = true;  ///< false: sampled, or holes ignored because they cannot be told from uv
+  };
+  MaskResult alpha_mask(Node node) const;
+
+private:
+  enum class Kind : uint8_t { kConstant, kImage, kProduct, kMix, kCheckerboard };
+  struct NodeData {
+    Kind kind = Kind::kConstant;
+    WrapMode wrap = WrapMode::kRepeat;
+    uint32_t a = 0, b = 0, c = 0; ///< operands; kImage: a is the image
+    Vec3 value{0.0f};             ///< kConstant: the value; kImage: the scale
+    TextureMapping mapping;
+  };
+  Node add(const NodeData& data);
+  std::vector<Node> reachable(Node node) const;
+  bool nonzero(const NodeData& data, Vec2 uv, std::span<const uint8_t> operands) const;
+
+  std::vector<NodeData> nodes_;
+  std::vector<Vec3> averages_; ///< of the first nodes; grows on demand
+  std::vector<ImageRequest> images_;
+  std::map<std::pair<std::filesystem::path, bool>, uint32_t> image_numbers_;
+};
+
+} // namespace packtrace

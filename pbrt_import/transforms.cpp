@@ -1,0 +1,70 @@
+#include "pbrt_import/transforms.h"
+
+#include <cmath>
+#include <numbers>
+
+namespace packtrace {
+
+DAffine translation(DVec3 offset) {
+  DAffine map(1.0);
+  map[3] = offset;
+  return map;
+}
+
+DAffine scaling(DVec3 factors) {
+  DAffine map(1.0);
+  for (int axis = 0; axis < 3; ++axis) map[axis][axis] = factors[axis];
+  return map;
+}
+
+std::optional<DAffine> rotation(double degrees, DVec3 axis) {
+  const double length = glm::length(axis);
+  if (!(length > 0.0)) return std::nullopt;
+  const DVec3 a = axis / length;
+  const double angle = degrees * std::numbers::pi / 180.0;
+  // Quarter turns are exact: exporters use them to swap axes, and dust in the matrix would tilt every plane.
+  const double quarters = degrees / 90.0;
+  const bool exact = quarters == std::floor(quarters) && std::abs(quarters) < 1e9;
+  const auto quarter = exact ? static_cast<int64_t>(quarters) & 3 : 0;
+  const double s = exact ? (quarter == 1 ? 1.0 : quarter == 3 ? -1.0 : 0.0) : std::sin(angle);
+  const double c = exact ? (quarter == 0 ? 1.0 : quarter == 2 ? -1.0 : 0.0) : std::cos(angle);
+  // Rodrigues' formula, column by column.
+  DAffine map(1.0);
+  for (int column = 0; column < 3; ++column) {
+    DVec3 unit(0.0);
+    unit[column] = 1.0;
+    map[column] = unit * c + glm::cross(a, unit) * s + a * (a[column] * (1.0 - c));
+  }
+  return map;
+}
+
+std::optional<DAffine> look_at(DVec3 eye, DVec3 target, DVec3 up) {
+  const DVec3 view = target - eye;
+  if (!(glm::length(view) > 0.0) || !(glm::length(up) > 0.0)) return std::nullopt;
+  const DVec3 forward = glm::normalize(view);
+  const DVec3 sideways = glm::cross(glm::normalize(up), forward);
+  if (!(glm::length(sideways) > 1e-12)) return std::nullopt; // parallel, up to the rounding of the text
+  const DVec3 right = glm::normalize(sideways);
+  const DAffine world_from_camera(right, glm::cross(forward, right), forward, eye);
+  return inverse(world_from_camera);
+}
+
+std::optional<DAffine> affine_from_columns(std::span<const double, 16> m) {
+  if (m[3] != 0.0 || m[7] != 0.0 || m[11] != 0.0 || m[15] == 0.0) return std::nullopt;
+  DAffine map;
+  for (size_t column = 0; column < 4; ++column)
+    map[static_cast<int>(column)] = DVec3(m[column * 4], m[column * 4 + 1], m[column * 4 + 2]) / m[15];
+  return map;
+}
+
+bool is_finite(const DAffine& map) {
+  return is_finite(map[0]) && is_finite(map[1]) && is_finite(map[2]) && is_finite(map[3]);
+}
+
+bool is_invertible(const DAffine& map) {
+  if (!is_finite(map)) return false;
+  const double determinant = glm::determinant(glm::dmat3(map));
+  return determinant != 0.0 && std::isfinite(determinant) && is_finite(inverse(map));
+}
+
+} // namespace packtrace

@@ -1,0 +1,222 @@
+#include "runtime/ao/ao_integrator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <type_traits>
+
+#include <embree3/rtcore.h>
+
+#include "pbrt_import/scene/error.h"
+#include "runtime/trace/tiles.h"
+
+namespace packtrace {
+namespace {
+
+constexpr uint32_t kTilePixels = kTileSize * kTileSize;
+
+/// What hits at each distance do to a sample; see AoConfig.
+class Coefficient {
+public:
+  explicit Coefficient(const AoConfig& config)
+      : lambda_(config.falloff ? config.lambda : 0.0), darkening_(1.0 - config.min_visibility),
+        rho_(config.interreflection) {
+    if (!config.falloff) return;
+    if (config.lambda > 0.0f && config.cutoff > 0.0f)
+      end_ = std::min(1.0, std::sqrt(-std::log(double(config.cutoff)) / config.lambda));
+    floor_ = config.continuous ? std::exp(-lambda_ * end_ * end_) : 0.0;
+    linear_ = config.continuous && 1.0 - floor_ < 1e-6; // the limit for lambda -> 0
+  }
+
+  /// Distance that rays need to see, in radii.
+  double end() const { return end_; }
+
+  /// @param x distance in radii, [0, end]
+  /// @param luminance of the surface that was hit; only matters for rho > 0
+  double visibility(double x, double luminance) const {
+    x = std::min(x, end_);
+    const double occlusion = linear_ ? 1.0 - (x / end_) * (x / end_)
+                             : lambda_ > 0.0 ? (std::exp(-lambda_ * x * x) - floor_) / (1.0 - floor_) : 1.0;
+    const double k = 1.0 - darkening_ * std::clamp(occlusion, 0.0, 1.0);
+    return rho_ > 0.0 && k > 0.0 ? k / (1.0 - rho_ * luminance * (1.0 - k)) : k;
+  }
+
+private:
+  double lambda_, darkening_, rho_;
+  double end_ = 1.0;
+  double floor_ = 0.0;
+  bool linear_ = false;
+};
+
+/// An orthonormal pair for a unit vector. Source: Duff et al., "Building an orthonormal basis, revisited" (2017).
+void make_basis(Vec3 n, Vec3& tangent, Vec3& bitangent) {
+  const float sign = std::copysign(1.0f, n.z);
+  const float a = -1.0f / (sign + n.z), b = n.x * n.y * a;
+  tangent = {1.0f + sign * n.x * n.x * a, sign * b, -sign * n.x};
+  bitangent = {b, sign + n.y * n.y * a, -n.y};
+}
+
+/// A pixel that casts rays.
+struct ShadingPoint {
+  size_t pixel;
+  PixelSampler::Pixel sampler;
+  Vec3 origin; ///< unit space
+  Vec3 geometric;
+  Vec3 normal, tangent, bitangent;
+};
+
+class AoTracer {
+public:
+  AoTracer(const SceneSource& source, const EmbreeScene& scene, const GBuffer& gbuffer, const AoConfig& config,
+           uint32_t frame_index, AoFrame& out)
+      : source_(source), scene_(scene), gbuffer_(gbuffer), config_(config), coefficient_(config),
+        sampler_(config.sampler, config.seed), first_sample_(static_cast<uint64_t>(frame_index) * config.spp),
+        unit_radius_(config.radius * scene.space().scale()),
+        unit_reach_(static_cast<float>(unit_radius_ * coefficient_.end())), out_(out) {}
+
+  /// Needs RTCRayHit for distances, RTCRay otherwise.
+  template <typename Ray> void trace_tile(const Tile& tile) const {
+    ShadingPoint points[kTilePixels];
+    const uint32_t count = gather(tile, points);
+    if (count == 0) return;
+    alignas(64) Ray rays[kTilePixels];
+    double visibility[kTilePixels] = {}, distance[kTilePixels] = {};
+    for (uint32_t s = 0; s < config_.spp; ++s) {
+      const PixelSampler::Number number = sampler_.number(first_sample_ + s);
+      for (uint32_t i = 0; i < count; ++i) set_ray(points[i], number, rays[i]);
+      query(rays, count);
+      for (uint32_t i = 0; i < count; ++i) accumulate(rays[i], visibility[i], distance[i]);
+    }
+    const double per_sample = 1.0 / config_.spp;
+    for (uint32_t i = 0; i < count; ++i) {
+      out_.ao[points[i].pixel] = static_cast<float>(visibility[i] * per_sample);
+      out_.hit_distance[points[i].pixel] = static_cast<float>(distance[i] * per_sample * config_.radius);
+    }
+  }
+
+private:
+  /// Collects a tile's hits, 4 x 4 pixels at a time so that neighbouring rays share cache lines of the tree, and
+  /// marks its misses.
+  uint32_t gather(const Tile& tile, ShadingPoint* points) const {
+    uint32_t count = 0;
+    for (uint32_t code = 0; code < kTilePixels; ++code) {
+      const uint32_t x = tile.x0 + morton_even_bits(code), y = tile.y0 + morton_even_bits(code >> 1);
+      if (x >= tile.x1 || y >= tile.y1) continue;
+      const size_t pixel = static_cast<size_t>(y) * gbuffer_.size.width + x;
+      if (gbuffer_.instance[pixel] == kNoInstance) {
+        out_.ao[pixel] = kInvalidAo;
+        out_.hit_distance[pixel] = 0.0f;
+        continue;
+      }
+      ShadingPoint& point = points[count++];
+      point.pixel = pixel;
+      point.sampler = sampler_.pixel(x, y);
+      point.geometric = gbuffer_.geometric_normal[pixel];
+      point.normal = gbuffer_.normal[pixel];
+      make_basis(point.normal, point.tangent, point.bitangent);
+      const DVec3 origin = DVec3(gbuffer_.position[pixel]) + DVec3(point.geometric) * double(gbuffer_.offset[pixel]);
+      point.origin = Vec3(scene_.space().to_unit(origin));
+    }
+    return count;
+  }
+
+  template <typename Ray> void set_ray(const ShadingPoint& point, const PixelSampler::Number& number, Ray& out) const {
+    const Vec3 local = cosine_direction(PixelSampler::point(point.sampler, number));
+    Vec3 direction = point.tangent * local.x + point.bitangent * local.y + point.normal * local.z;
+    const float height = glm::dot(direction, point.geometric);
+    if (height < 0.0f) direction -= 2.0f * height * point.geometric;
+    RTCRay& ray = as_ray(out);
+    ray.org_x = point.origin.x, ray.org_y = point.origin.y, ray.org_z = point.origin.z;
+    ray.dir_x = direction.x, ray.dir_y = direction.y, ray.dir_z = direction.z;
+    ray.tnear = 0.0f, ray.tfar = unit_reach_, ray.time = 0.0f;
+    ray.mask = kOcclusionRays, ray.id = 0, ray.flags = 0;
+    if constexpr (std::is_same_v<Ray, RTCRayHit>) {
+      out.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+      out.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    }
+  }
+
+  template <typename Ray> void query(Ray* rays, uint32_t count) const {
+    const FlushDenormals flush;
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    context.flags = RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+    if constexpr (std::is_same_v<Ray, RTCRayHit>)
+      rtcIntersect1M(scene_.handle(), &context, rays, count, sizeof(Ray));
+    else
+      rtcOccluded1M(scene_.handle(), &context, rays, count, sizeof(Ray));
+  }
+
+  void accumulate(const RTCRay& ray, double& visibility, double& distance) const {
+    const bool hit = ray.tfar < 0.0f; // Embree sets it to -inf
+    visibility += hit ? coefficient_.visibility(0.0, 0.0) : 1.0;
+    distance += hit ? 0.5 : 1.0;
+  }
+
+  void accumulate(const RTCRayHit& ray, double& visibility, double& distance) const {
+    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
+      visibility += 1.0;
+      distance += 1.0;
+      return;
+    }
+    const double x = ray.ray.tfar / unit_radius_;
+    visibility += coefficient_.visibility(x, config_.interreflection > 0.0f ? luminance(ray.hit) : 0.0);
+    distance += std::min(x, 1.0);
+  }
+
+  /// Of the hit surface's albedo, Rec. 709 weights.
+  double luminance(const RTCHit& hit) const {
+    const EmbreeScene::Hit surface = scene_.resolve(hit.instID[0], hit.geomID, hit.primID);
+    const Vec3 albedo = source_.materials()[source_.material_of(surface.geometry, surface.triangle)].albedo;
+    return std::clamp(0.2126 * albedo.x + 0.7152 * albedo.y + 0.0722 * albedo.z, 0.0, 1.0);
+  }
+
+  static RTCRay& as_ray(RTCRay& ray) { return ray; }
+  static RTCRay& as_ray(RTCRayHit& ray) { return ray.ray; }
+
+  const SceneSource& source_;
+  const EmbreeScene& scene_;
+  const GBuffer& gbuffer_;
+  const AoConfig& config_;
+  const Coefficient coefficient_;
+  const PixelSampler sampler_;
+  const uint64_t first_sample_;
+  const double unit_radius_;
+  const float unit_reach_;
+  AoFrame& out_;
+};
+
+void require(bool condition, const char* message) {
+  if (!condition) throw Error(ErrorKind::kUsage, std::string("ambient occlusion: ") + message);
+}
+
+} // namespace
+
+float default_ao_radius(const Bounds& bounds) {
+  const double radius = 0.05 * bounds.diagonal();
+  return radius > 0.0 && std::isfinite(radius) ? static_cast<float>(radius) : 1.0f;
+}
+
+void validate(const AoConfig& config) {
+  const auto within = [](float value, float lo, float hi) { return value >= lo && value <= hi; }; // false for NaN
+  require(config.radius > 0.0f && std::isfinite(config.radius), "the radius must be positive and finite");
+  require(config.spp >= 1 && config.spp <= 65536, "samples per pixel must be 1 to 65536");
+  require(within(config.lambda, 0.0f, 20.0f), "lambda must be 0 to 20");
+  require(config.cutoff >= 0.0f && config.cutoff < 1.0f, "the cutoff must be at least 0 and less than 1");
+  require(within(config.min_visibility, 0.0f, 1.0f), "the minimum visibility must be 0 to 1");
+  require(within(config.interreflection, 0.0f, 1.0f), "interreflection must be 0 to 1");
+}
+
+void trace_ao(const SceneSource& source, const EmbreeScene& scene, const GBuffer& gbuffer, const AoConfig& config,
+              uint32_t frame_index, AoFrame& ao, Progress& progress) {
+  validate(config);
+  if (ao.size != gbuffer.size || ao.ao.size() != gbuffer.size.pixels()) ao.resize(gbuffer.size);
+  const AoTracer tracer(source, scene, gbuffer, config, frame_index, ao);
+  const bool closest = config.falloff || config.interreflection > 0.0f;
+  progress.begin("ambient occlusion", gbuffer.size.pixels());
+  for_each_tile(gbuffer.size, progress, [&](const Tile& tile) {
+    closest ? tracer.trace_tile<RTCRayHit>(tile) : tracer.trace_tile<RTCRay>(tile);
+  });
+}
+
+} // namespace packtrace

@@ -1,0 +1,288 @@
+#include "runtime/commands/compare_command.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "pbrt_import/scene/error.h"
+#include "runtime/commands/cli_support.h"
+#include "runtime/commands/json_output.h"
+#include "runtime/commands/output_file.h"
+#include "runtime/image/false_color.h"
+#include "runtime/image/metrics.h"
+#include "runtime/image/png.h"
+#include "runtime/image/read_image.h"
+
+namespace packtrace {
+
+namespace {
+
+struct CompareOptions {
+  std::string test, reference, layer;
+  std::vector<std::string> metrics{"all"};
+  std::array<std::optional<double>, 5> limits; ///< by MetricKind::kAll order
+  std::optional<double> max_mismatch;          ///< fraction of pixels
+  double pixels_per_degree = kFlipPixelsPerDegree;
+  std::string diff, diff_metric = "mae";
+  float diff_white = 0.25f;
+};
+
+struct MetricKind {
+  const char* name;
+  const char* json_name;
+  bool higher_is_better;
+  uint32_t smallest_side; ///< of images it can be computed for
+  bool colors_only;       ///< needs 1 or 3 channels
+};
+constexpr std::array<MetricKind, 5> kMetrics{{{"rmse", "rmse", false, 1, false},
+                                              {"mae", "mae", false, 1, false},
+                                              {"psnr", "psnr_db", true, 1, false},
+                                              {"ssim", "ssim", true, kSsimWindow, false},
+                                              {"flip", "flip", false, 1, true}}};
+
+size_t metric_index(std::string_view name) {
+  const auto found =
+      std::find_if(kMetrics.begin(), kMetrics.end(), [&](const MetricKind& m) { return m.name == name; });
+  return static_cast<size_t>(found - kMetrics.begin());
+}
+
+/// Two images made alike, and which of their pixels have values.
+struct ImagePair {
+  Image test, reference;
+  std::string layer;
+  std::vector<uint8_t> valid; ///< empty: all
+  uint64_t compared = 0;      ///< pixels with a value in both
+  uint64_t mismatched = 0;    ///< pixels with a value in only one
+  bool alpha_ignored = false;
+};
+
+void drop_alpha(LoadedImage& loaded) {
+  if (loaded.alpha) loaded.image = keep_channels(loaded.image, loaded.image.channels - 1);
+  loaded.alpha = false;
+}
+
+/// Pixels of an ambient occlusion layer that have a value. PNG files and other layers have one everywhere.
+std::vector<uint8_t> valid_pixels(const LoadedImage& loaded) {
+  std::vector<uint8_t> valid;
+  if (!loaded.layer.starts_with("ao") || loaded.image.channels != 1) return valid;
+  valid.reserve(loaded.image.data.size());
+  for (const float ao : loaded.image.data) valid.push_back(ao >= 0.0f || std::isnan(ao)); // NaN is an error to report
+  return valid;
+}
+
+ImagePair load_pair(const CompareOptions& options) {
+  LoadedImage test = read_image(options.test, options.layer), reference = read_image(options.reference, options.layer);
+  if (test.image.size != reference.image.size)
+    throw Error(ErrorKind::kInput,
+                fmt::format("images differ in size: {} is {} x {} pixels, {} is {} x {}", options.test,
+                            test.image.size.width, test.image.size.height, options.reference,
+                            reference.image.size.width, reference.image.size.height));
+  ImagePair pair;
+  pair.layer = test.layer;
+  pair.alpha_ignored = test.alpha || reference.alpha;
+  drop_alpha(test), drop_alpha(reference);
+
+  const std::vector<uint8_t> a = valid_pixels(test), b = valid_pixels(reference);
+  pair.compared = test.image.size.pixels();
+  if (!a.empty() || !b.empty()) {
+    // A picture that cannot say "no value" takes the other's word for it.
+    pair.valid = a.empty() ? b : a;
+    for (size_t i = 0; i < pair.valid.size() && !a.empty() && !b.empty(); ++i) {
+      pair.mismatched += a[i] != b[i];
+      pair.valid[i] = a[i] & b[i];
+    }
+    pair.compared = static_cast<uint64_t>(std::count(pair.valid.begin(), pair.valid.end(), 1));
+  }
+  if (test.image.channels == 1 && reference.image.channels == 3) test.image = grey_to_rgb(test.image);
+  if (reference.image.channels == 1 && test.image.channels == 3) reference.image = grey_to_rgb(reference.image);
+  pair.test = std::move(test.image), pair.reference = std::move(reference.image);
+  return pair;
+}
+
+bool applicable(const MetricKind& kind, const Image& image) {
+  if (std::min(image.size.width, image.size.height) < kind.smallest_side) return false;
+  return !kind.colors_only || image.channels == 1 || image.channels == 3;
+}
+
+Metric compute(size_t metric, const ImagePair& pair, const CompareOptions& options, bool error_map) {
+  const MetricOptions how{pair.valid, error_map};
+  switch (metric) {
+  case 0:
+    return rmse(pair.test, pair.reference, how);
+  case 1:
+    return mae(pair.test, pair.reference, how);
+  case 2:
+    return psnr(pair.test, pair.reference, how);
+  case 3:
+    return ssim(pair.test, pair.reference, how);
+  default:
+    return flip(pair.test, pair.reference, how, options.pixels_per_degree);
+  }
+}
+
+/// Metrics asked for by name, by "all" where they can be computed, or by a limit or the difference picture.
+std::array<bool, 5> wanted_metrics(const CompareOptions& options, const Image& image) {
+  std::array<bool, 5> wanted{};
+  for (const std::string& name : options.metrics)
+    for (size_t i = 0; i < kMetrics.size(); ++i)
+      if (name == kMetrics[i].name || (name == "all" && applicable(kMetrics[i], image))) wanted[i] = true;
+  for (size_t i = 0; i < kMetrics.size(); ++i)
+    if (options.limits[i]) wanted[i] = true;
+  if (!options.diff.empty()) wanted[metric_index(options.diff_metric)] = true;
+  return wanted;
+}
+
+/// One limit that was given, and how the images did.
+struct Check {
+  std::string name;
+  double limit = 0.0, value = 0.0;
+  bool passed = false;
+};
+
+std::vector<Check> check_limits(const CompareOptions& options, const ImagePair& pair,
+                                const std::array<std::optional<double>, 5>& values) {
+  std::vector<Check> checks;
+  for (size_t i = 0; i < kMetrics.size(); ++i)
+    if (options.limits[i]) {
+      const double limit = *options.limits[i], value = *values[i];
+      checks.push_back(
+          {kMetrics[i].name, limit, value, kMetrics[i].higher_is_better ? value >= limit : value <= limit});
+    }
+  if (options.max_mismatch) {
+    const double value = static_cast<double>(pair.mismatched) / static_cast<double>(pair.test.size.pixels());
+    checks.push_back({"mismatch", *options.max_mismatch, value, value <= *options.max_mismatch});
+  }
+  return checks;
+}
+
+nlohmann::json to_json(const CompareOptions& options, const ImagePair& pair,
+                       const std::array<std::optional<double>, 5>& values, const std::vector<Check>& checks) {
+  nlohmann::json metrics = nlohmann::json::object(), limits = nlohmann::json::array();
+  for (size_t i = 0; i < kMetrics.size(); ++i)
+    if (values[i]) metrics[kMetrics[i].json_name] = *values[i]; // the PSNR of equal images, infinity, becomes null
+  for (const Check& check : checks)
+    limits.push_back({{"name", check.name}, {"limit", check.limit}, {"value", check.value}, {"passed", check.passed}});
+  return {{"command", "compare"},
+          {"schema_version", 1},
+          {"test", options.test},
+          {"reference", options.reference},
+          {"layer", pair.layer},
+          {"width", pair.test.size.width},
+          {"height", pair.test.size.height},
+          {"channels", pair.test.channels},
+          {"compared_pixels", pair.compared},
+          {"mismatched_pixels", pair.mismatched},
+          {"identical", pair.mismatched == 0 && pair.test.data == pair.reference.data},
+          {"metrics", metrics},
+          {"limits", limits},
+          {"passed", std::all_of(checks.begin(), checks.end(), [](const Check& c) { return c.passed; })}};
+}
+
+void print_results(const ImagePair& pair, const std::array<std::optional<double>, 5>& values,
+                   const std::vector<Check>& checks) {
+  std::string text;
+  for (size_t i = 0; i < kMetrics.size(); ++i)
+    if (values[i]) text += fmt::format("{:<5} {:.6g}{}\n", kMetrics[i].name, *values[i], i == 2 ? " dB" : "");
+  text += fmt::format("over {} of {} pixels\n", pair.compared, pair.test.size.pixels());
+  for (const Check& check : checks)
+    text += fmt::format("limit {} {:.6g}: {}\n", check.name, check.limit, check.passed ? "ok" : "EXCEEDED");
+  std::fwrite(text.data(), 1, text.size(), stdout);
+}
+
+void print_notes(const ImagePair& pair, const GlobalOptions& globals) {
+  Diagnostics notes;
+  if (pair.mismatched > 0)
+    notes.report(Severity::kWarning, {},
+                 fmt::format("{} pixels have a value in only one image; metrics leave them out", pair.mismatched));
+  if (pair.alpha_ignored) notes.report(Severity::kNote, {}, "alpha channels are not compared");
+  report_diagnostics(notes, globals);
+}
+
+int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
+  JsonOutput json(globals.json, globals.force);
+  std::optional<OutputFile> diff;
+  if (!options.diff.empty()) diff.emplace(options.diff, globals.force);
+
+  const ImagePair pair = load_pair(options);
+  print_notes(pair, globals);
+  const std::array<bool, 5> wanted = wanted_metrics(options, pair.test);
+  std::array<std::optional<double>, 5> values;
+  for (size_t i = 0; i < kMetrics.size(); ++i) {
+    if (!wanted[i]) continue;
+    const bool shown = diff && i == metric_index(options.diff_metric);
+    const Metric metric = compute(i, pair, options, shown);
+    values[i] = metric.value;
+    if (shown)
+      write_png(diff->path(), heat_map(pair.test.size, metric.error_map.data, options.diff_white), PngTransfer::kRaw);
+  }
+
+  const std::vector<Check> checks = check_limits(options, pair, values);
+  if (!globals.quiet && !json.to_stdout()) print_results(pair, values, checks);
+  if (diff) diff->commit();
+  json.write(to_json(options, pair, values, checks));
+  for (const Check& check : checks)
+    if (!check.passed)
+      throw Error(ErrorKind::kLimitExceeded,
+                  fmt::format("{} is {:.6g}, beyond its limit {:.6g}", check.name, check.value, check.limit));
+  return 0;
+}
+
+/// A finite number in [lo, hi]; unlike CLI::Range it refuses NaN.
+CLI::Validator number_in(double lo, double hi) {
+  return CLI::Validator(
+      [lo, hi](std::string& text) -> std::string {
+        double value = 0.0;
+        if (CLI::detail::lexical_cast(text, value) && value >= lo && value <= hi) return {};
+        return fmt::format("{} is not a number in [{}, {}]", text, lo, hi);
+      },
+      fmt::format("[{}, {}]", lo, hi));
+}
+
+} // namespace
+
+void add_compare_command(CLI::App& app, GlobalOptions& globals) {
+  const auto options = std::make_shared<CompareOptions>();
+  CLI::App& verb = add_verb(app, globals, "compare", "Measure how different two images are",
+                            [options, &globals] { return run_compare(*options, globals); });
+  verb.add_option("test", options->test, "PNG (read as sRGB) or EXR")->required();
+  verb.add_option("reference", options->reference, "The image to compare with")->required();
+  verb.add_option("--layer", options->layer, "EXR layer (default: ao, else colours, else the only one)");
+  verb.add_option("--metric", options->metrics, "Metrics to compute: all, rmse, mae, psnr, ssim, flip")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"all", "rmse", "mae", "psnr", "ssim", "flip"}))
+      ->default_str("all");
+  verb.add_option("--ppd", options->pixels_per_degree, "FLIP: pixels per degree of visual angle")
+      ->check(number_in(1e-3, 1000.0))
+      ->capture_default_str();
+
+  const std::string group = "Limits: exit code 5 beyond them";
+  constexpr double kHuge = 1e30;
+  verb.add_option("--max-rmse", options->limits[0])->check(number_in(0.0, kHuge))->group(group);
+  verb.add_option("--max-mae", options->limits[1])->check(number_in(0.0, kHuge))->group(group);
+  verb.add_option("--min-psnr", options->limits[2], "dB")->check(number_in(-kHuge, kHuge))->group(group);
+  verb.add_option("--min-ssim", options->limits[3])->check(number_in(-1.0, 1.0))->group(group);
+  verb.add_option("--max-flip", options->limits[4])->check(number_in(0.0, 1.0))->group(group);
+  verb.add_option("--max-mismatch", options->max_mismatch, "Fraction of pixels with a value in only one image")
+      ->check(number_in(0.0, 1.0))
+      ->group(group);
+
+  verb.add_option("--diff", options->diff, "Write a PNG of the errors: black, red, yellow, white");
+  verb.add_option("--diff-metric", options->diff_metric, "Whose error per pixel to show")
+      ->check(CLI::IsMember({"rmse", "mae", "psnr", "ssim", "flip"}))
+      ->capture_default_str();
+  verb.add_option("--diff-white", options->diff_white, "Error shown as white")
+      ->check(number_in(1e-6, 1e6))
+      ->capture_default_str();
+}
+
+} // namespace packtrace

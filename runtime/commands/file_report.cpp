@@ -1,0 +1,99 @@
+#include "runtime/commands/file_report.h"
+
+#include <array>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace packtrace {
+namespace {
+
+using Row = std::pair<const char*, uint64_t>;
+
+std::array<Row, 14> stream_rows(const StreamBytes& bytes) {
+  return {{{"indices", bytes.indices},
+           {"positions", bytes.positions},
+           {"normals", bytes.normals},
+           {"uvs", bytes.uvs},
+           {"payload_padding", bytes.payload_padding},
+           {"cluster_records", bytes.cluster_records},
+           {"geometry_records", bytes.geometry_records},
+           {"instance_records", bytes.instance_records},
+           {"material_records", bytes.material_records},
+           {"masks", bytes.masks},
+           {"cameras", bytes.cameras},
+           {"strings", bytes.strings},
+           {"header_and_alignment", bytes.header_and_alignment},
+           {"total", bytes.total}}};
+}
+
+const char* precision_name(uint32_t kind) {
+  constexpr std::array<const char*, 4> kNames{"edge_fraction", "diagonal_fraction", "absolute", "position_bits"};
+  return kind < kNames.size() ? kNames[kind] : "unknown";
+}
+
+std::array<double, 3> array_of(DVec3 v) { return {v.x, v.y, v.z}; }
+
+} // namespace
+
+nlohmann::json to_json(const FileSummary& s) {
+  nlohmann::json bytes, grids = nlohmann::json::array();
+  for (const auto& [name, count] : stream_rows(s.bytes)) bytes[name] = count;
+  for (const GridUse& use : s.grids)
+    grids.push_back({{"step", use.grid.step()}, {"world_space", use.world_space}, {"geometries", use.geometries}});
+  return {
+      {"triangles", s.triangles},
+      {"placed_triangles", s.placed_triangles},
+      {"vertices", s.vertices},
+      {"clusters", s.clusters},
+      {"triangles_per_cluster", s.triangles_per_cluster},
+      {"geometries", s.geometries},
+      {"shared_geometries", s.shared_geometries},
+      {"instances", s.instances},
+      {"materials", s.materials},
+      {"masks", s.masks},
+      {"cameras", s.cameras},
+      {"bytes", bytes},
+      {"bytes_per_triangle", s.bytes_per_triangle},
+      {"bytes_per_placed_triangle", s.bytes_per_placed_triangle},
+      {"grids", grids},
+      {"max_position_error", s.max_position_error},
+      {"max_position_error_bound", s.max_position_error_bound},
+      {"max_normal_error_degrees", s.max_normal_error_degrees},
+      {"max_uv_error", s.max_uv_error},
+      {"bounds", {{"lo", array_of(s.bounds.lo)}, {"hi", array_of(s.bounds.hi)}}},
+      {"precision", {{"kind", precision_name(s.bake.precision_kind)}, {"value", s.bake.precision_value}}},
+      {"source_triangles", s.bake.source_triangles},
+      {"dropped_triangles", s.bake.dropped_triangles},
+      {"unused_triangles", s.bake.unused_triangles},
+      {"collapsed_triangles", s.bake.collapsed_triangles},
+      {"merged_vertices", s.bake.merged_vertices},
+  };
+}
+
+std::string to_text(const FileSummary& s) {
+  const auto triangles = static_cast<double>(s.triangles);
+  std::string text = fmt::format(
+      "triangles {:L} stored, {:L} placed   vertices {:L}   clusters {:L} ({:.1f} triangles each)\n"
+      "geometries {:L} ({:L} shared)   instances {:L}   materials {:L}   masks {:L}   cameras {:L}\n",
+      s.triangles, s.placed_triangles, s.vertices, s.clusters, s.triangles_per_cluster, s.geometries, s.shared_geometries,
+      s.instances, s.materials, s.masks, s.cameras);
+  const DVec3 extent = s.bounds.extent();
+  text += fmt::format("bounds {:.6g} x {:.6g} x {:.6g}", extent.x, extent.y, extent.z);
+  if (!s.grids.empty())
+    text += fmt::format("   grid step {:.4g}{}{}", s.grids.front().grid.step(),
+                        s.grids.front().world_space ? " (world)" : "",
+                        s.grids.size() > 1 ? fmt::format(" and {} more", s.grids.size() - 1) : std::string());
+  text += fmt::format("\nmeasured error: position {:.4g} (bound {:.4g})   normal {:.3f} degrees\n\n",
+                      s.max_position_error, s.max_position_error_bound, s.max_normal_error_degrees);
+  text += fmt::format("{:<22}{:>14}{:>16}\n", "stream", "bytes", "per triangle");
+  for (const auto& [name, bytes] : stream_rows(s.bytes))
+    if (bytes > 0)
+      text += fmt::format("{:<22}{:>14}{:>16.3f}\n", name, bytes, triangles > 0 ? static_cast<double>(bytes) / triangles : 0.0);
+  if (s.placed_triangles != s.triangles)
+    text += fmt::format("{:<22}{:>14}{:>16.3f}\n", "total, as placed", s.bytes.total, s.bytes_per_placed_triangle);
+  return text;
+}
+
+} // namespace packtrace

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "runtime/commands/output_file.h"
+#include "runtime/image/exr.h"
+#include "runtime/render/renderer.h"
+
+namespace packtrace {
+
+/// The layers a render can write, in the order `--help` lists them.
+const std::vector<std::string>& aov_names();
+
+/// The image files of one render. Made before the work starts, so that a target that cannot be written is known at
+/// once; nothing appears under its name before write() has written all of them.
+class ImageOutputs {
+public:
+  /// @param files ending in .exr (one file of all chosen layers) or .png (one file a layer: NAME.png for a single
+  ///   layer, NAME.LAYER.png for several)
+  /// @param aovs layers from aov_names(), or "all"; empty: all for .exr and "ao" for .png
+  /// Throws Error(kUsage) for other endings and layer names; otherwise like OutputFile.
+  ImageOutputs(const std::vector<std::string>& files, const std::vector<std::string>& aovs, bool force);
+
+  /// Throws Error(kIo).
+  void write(const RenderedImage& image, const ExrAttributes& attributes);
+
+  /// The files, in the order of writing.
+  std::vector<std::string> targets() const;
+
+private:
+  struct Entry {
+    std::unique_ptr<OutputFile> file;
+    bool exr = false;
+    std::vector<std::string> aovs;
+  };
+  std::vector<Entry> entries_;
+};
+
+} // namespace packtrace

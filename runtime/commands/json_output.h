@@ -1,0 +1,33 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "runtime/commands/output_file.h"
+
+namespace packtrace {
+
+/// Where --json goes. Made before the work starts, so that a target that cannot be written is known at once.
+class JsonOutput {
+public:
+  /// @param destination a file, "-" for standard output, empty for nowhere
+  /// Throws like OutputFile.
+  JsonOutput(const std::string& destination, bool force);
+
+  /// Something is to be written.
+  bool wanted() const { return file_ || to_stdout_; }
+  /// Standard output is taken: text for people does not belong there.
+  bool to_stdout() const { return to_stdout_; }
+
+  /// Writes the document, indented by 2, with a final newline. NaN and infinities become null, bytes that are not
+  /// UTF-8 become U+FFFD. Throws Error(kIo) where writing fails.
+  void write(const nlohmann::json& document);
+
+private:
+  std::optional<OutputFile> file_;
+  bool to_stdout_ = false;
+};
+
+} // namespace packtrace

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "compress/format/baked_file.h"
+#include "pbrt_import/import_scene.h"
+#include "pbrt_import/scene/progress.h"
+#include "runtime/commands/cli_support.h"
+#include "runtime/commands/progress_display.h"
+#include "runtime/trace/scene_source.h"
+
+namespace packtrace {
+
+/// True for .ptk files: by the name, or by the first bytes where the name says something else.
+bool is_baked_file(const std::filesystem::path& file);
+
+/// Imports a pbrt file, prints its diagnostics, and refuses scenes without triangles.
+/// Throws Error(kInput) where the file cannot be read, nothing is left of it, or strict is set and there was a problem.
+ImportResult import_for_command(const std::filesystem::path& file, bool strict, const GlobalOptions& globals,
+                                Progress& progress, ProgressDisplay& display);
+
+/// A scene on disk, packed or not, ready to be traced.
+struct LoadedScene {
+  std::optional<BakedFile> baked;    ///< of a .ptk
+  std::unique_ptr<Scene> imported;   ///< of a .pbrt
+  std::unique_ptr<SceneSource> source; ///< over one of the two
+};
+
+/// Throws like BakedFile::open() and import_for_command().
+LoadedScene load_scene(const std::filesystem::path& file, bool strict, const GlobalOptions& globals, Progress& progress,
+                       ProgressDisplay& display);
+
+} // namespace packtrace

@@ -1,0 +1,39 @@
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "pbrt_import/scene/error.h"
+#include "runtime/commands/bake_command.h"
+#include "runtime/commands/cli_support.h"
+#include "runtime/commands/compare_command.h"
+#include "runtime/commands/info_command.h"
+#include "runtime/commands/render_command.h"
+
+namespace {
+
+/// A verb that is documented to come, so that asking for it gives a better answer than "unknown".
+void add_planned_verb(CLI::App& app, packtrace::GlobalOptions& globals, const std::string& name) {
+  packtrace::add_verb(app, globals, name, "Planned", [name]() -> int {
+    throw packtrace::Error(packtrace::ErrorKind::kUnsupported, "'" + name + "' is planned but not there yet");
+  })
+      .allow_extras()
+      ->group("");
+}
+
+} // namespace
+
+int main(int argc, char** argv) {
+  packtrace::install_interrupt_handlers();
+  CLI::App app("packtrace: compact, ray-traceable assets from pbrt-v3 scenes, and ambient occlusion traced over them",
+               "packtrace");
+  app.set_version_flag("--version", PACKTRACE_VERSION);
+  app.footer("packtrace VERB --help explains a verb.\n"
+             "Exit codes: 0 ok, 2 usage, 3 input, 4 unsupported, 5 accuracy or limit exceeded, 6 I/O, 7 cancelled.");
+  packtrace::GlobalOptions globals;
+  packtrace::add_bake_command(app, globals);
+  packtrace::add_info_command(app, globals);
+  packtrace::add_render_command(app, globals);
+  packtrace::add_compare_command(app, globals);
+  for (const char* verb : {"measure", "export", "view"}) add_planned_verb(app, globals, verb);
+  return packtrace::run_verbs(app, globals, argc, argv);
+}

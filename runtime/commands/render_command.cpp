@@ -1,0 +1,223 @@
+#include "runtime/commands/render_command.h"
+
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "pbrt_import/scene/error.h"
+#include "runtime/camera/camera_rays.h"
+#include "runtime/commands/cli_support.h"
+#include "runtime/commands/image_outputs.h"
+#include "runtime/commands/json_output.h"
+#include "runtime/commands/loaded_scene.h"
+#include "runtime/commands/process_usage.h"
+#include "runtime/commands/progress_display.h"
+#include "runtime/render/renderer.h"
+
+namespace packtrace {
+namespace {
+
+constexpr ImageSize kDefaultSize{1280, 720};
+constexpr uint32_t kGroundTruthSpp = 1024;
+
+struct RenderOptions {
+  std::string input;
+  std::vector<std::string> outputs, aovs;
+  uint32_t camera = 0;
+  std::string size;
+  uint32_t supersample = 1;
+  std::optional<uint32_t> spp, frames;
+  bool ground_truth = false, no_denoise = false, strict = false, robust = false;
+  std::optional<float> ao_radius;
+  bool ao_falloff_off = false;
+  float ao_interreflection = 0.0f;
+  uint64_t seed = 0;
+  std::string backend = "embree";
+  std::string bvh = "medium";
+};
+
+ImageSize parse_size(const std::string& text) {
+  ImageSize size;
+  const size_t cross = text.find('x');
+  const auto number = [&](std::string_view digits, uint32_t& value) {
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    return error == std::errc() && end == digits.data() + digits.size() && !digits.empty();
+  };
+  if (cross == std::string::npos || !number(std::string_view(text).substr(0, cross), size.width) ||
+      !number(std::string_view(text).substr(cross + 1), size.height))
+    throw Error(ErrorKind::kUsage, "--size " + text + ": write WIDTHxHEIGHT, for example 1280x720");
+  return size;
+}
+
+Camera choose_camera(const SceneSource& source, const RenderOptions& options, const GlobalOptions& globals) {
+  const std::span<const Camera> cameras = source.cameras();
+  if (options.camera < cameras.size()) return cameras[options.camera];
+  if (options.camera > 0)
+    throw Error(ErrorKind::kUsage, fmt::format("--camera {}: the scene has {} camera{}", options.camera, cameras.size(),
+                                               cameras.size() == 1 ? "" : "s"));
+  if (!globals.quiet) fmt::print(stderr, "{}: warning: no camera; framing the scene's bounds\n", options.input);
+  return framing_camera(source.world_bounds(), options.size.empty() ? kDefaultSize : parse_size(options.size));
+}
+
+RenderConfig make_config(const SceneSource& source, const Camera& camera, const RenderOptions& options) {
+  RenderConfig config;
+  config.size = options.size.empty() ? ImageSize{camera.width_px, camera.height_px} : parse_size(options.size);
+  config.supersample = options.supersample;
+  config.denoise = !options.no_denoise && !options.ground_truth;
+  config.frames = options.frames.value_or(options.ground_truth ? 1 : 32);
+  config.ao.spp = options.spp.value_or(options.ground_truth ? kGroundTruthSpp : 1);
+  config.ao.radius = options.ao_radius.value_or(default_ao_radius(source.world_bounds()));
+  config.ao.falloff = !options.ao_falloff_off;
+  config.ao.interreflection = options.ao_interreflection;
+  config.ao.seed = options.seed;
+  validate(config);
+  validate(config.ao);
+  return config;
+}
+
+void check_backend(const std::string& backend) {
+  if (backend == "embree") return;
+  if (backend == "packed" || backend == "vulkan")
+    throw Error(ErrorKind::kUnsupported, "--backend " + backend + " is not there yet; use embree");
+  throw Error(ErrorKind::kUsage, "--backend " + backend + ": there are embree, packed and vulkan");
+}
+
+double mean_of_valid(const std::vector<float>& ao) {
+  double sum = 0;
+  uint64_t count = 0;
+  for (const float value : ao)
+    if (value >= 0) sum += static_cast<double>(value), ++count;
+  return count ? sum / static_cast<double>(count) : 0;
+}
+
+double rate_m(uint64_t rays, double seconds) { return seconds > 0 ? static_cast<double>(rays) / seconds * 1e-6 : 0; }
+
+nlohmann::json report(const RenderOptions& options, const RenderConfig& config, const RenderedImage& image,
+                      const SceneSource& source, const EmbreeScene& scene, const std::vector<std::string>& files) {
+  const auto hits = std::count_if(image.instance.begin(), image.instance.end(), [](uint32_t i) { return i != kNoInstance; });
+  const RenderTimings& t = image.timings;
+  return {
+      {"verb", "render"},
+      {"input", options.input},
+      {"files", files},
+      {"width", image.size.width},
+      {"height", image.size.height},
+      {"supersample", config.supersample},
+      {"frames", config.frames},
+      {"spp", config.ao.spp},
+      {"denoise", config.denoise},
+      {"ao_radius", config.ao.radius},
+      {"ao_falloff", config.ao.falloff},
+      {"seed", config.ao.seed},
+      {"hit_pixels", hits},
+      {"mean_ao", mean_of_valid(image.ao)},
+      {"rays", {{"primary", image.primary_rays}, {"ao", image.ao_rays}}},
+      {"mrays_per_s", {{"primary", rate_m(image.primary_rays, t.primary_s)}, {"ao", rate_m(image.ao_rays, t.ao_s)}}},
+      {"seconds", {{"bvh", t.build_s}, {"primary", t.primary_s}, {"ao", t.ao_s}, {"denoise", t.denoise_s}}},
+      {"resident_bytes", {{"source", source.resident_bytes()}, {"tracing", scene.resident_bytes()}, {"bvh", scene.bvh_bytes()}}},
+      {"peak_rss_bytes", peak_rss_bytes()},
+  };
+}
+
+void print(const nlohmann::json& r) {
+  const auto& seconds = r.at("seconds");
+  const auto frames = r.at("frames").get<double>();
+  fmt::print("{}x{} pixels, {} frame{} of {} spp, mean ao {:.4f}\n", r.at("width").get<int>(), r.at("height").get<int>(),
+             r.at("frames").get<int>(), frames == 1 ? "" : "s", r.at("spp").get<int>(), r.at("mean_ao").get<double>());
+  fmt::print("  bvh       {:8.3f} s   {:.1f} MiB resident\n", seconds.at("bvh").get<double>(),
+             static_cast<double>(r.at("resident_bytes").at("tracing").get<uint64_t>()) / (1 << 20));
+  fmt::print("  primary   {:8.3f} s   {:.1f} Mrays/s\n", seconds.at("primary").get<double>(),
+             r.at("mrays_per_s").at("primary").get<double>());
+  fmt::print("  ao        {:8.3f} s   {:.1f} Mrays/s\n", seconds.at("ao").get<double>(),
+             r.at("mrays_per_s").at("ao").get<double>());
+  if (r.at("denoise").get<bool>())
+    fmt::print("  denoise   {:8.3f} s   {:.1f} ms a frame\n", seconds.at("denoise").get<double>(),
+               seconds.at("denoise").get<double>() * 1e3 / frames);
+  for (const auto& file : r.at("files")) fmt::print("wrote {}\n", file.get<std::string>());
+}
+
+int run(const RenderOptions& options, const GlobalOptions& globals) {
+  check_backend(options.backend);
+  if (options.bvh != "medium" && options.bvh != "high")
+    throw Error(ErrorKind::kUsage, "--bvh " + options.bvh + ": there are medium and high");
+  if (!options.size.empty()) parse_size(options.size);
+  JsonOutput json(globals.json, globals.force);
+  ProgressDisplay display(globals);
+  Progress progress(display.observer());
+  const LoadedScene loaded = load_scene(options.input, options.strict, globals, progress, display);
+  ImageOutputs outputs(options.outputs, options.aovs, globals.force);
+  const Camera camera = choose_camera(*loaded.source, options, globals);
+  const RenderConfig config = make_config(*loaded.source, camera, options);
+
+  const auto start = std::chrono::steady_clock::now();
+  progress.begin("bvh", 0);
+  const EmbreeScene scene(*loaded.source,
+                          {options.bvh == "high" ? BvhQuality::kHigh : BvhQuality::kMedium, options.robust});
+  const double build_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  RenderedImage image = render_view(*loaded.source, scene, camera, config, progress);
+  image.timings.build_s = build_s;
+  display.finish();
+
+  outputs.write(image, {{"comments", std::string("packtrace render")},
+                        {"aoRadius", static_cast<double>(config.ao.radius)},
+                        {"aoSpp", static_cast<int>(config.ao.spp)},
+                        {"frames", static_cast<int>(config.frames)}});
+  const nlohmann::json result = report(options, config, image, *loaded.source, scene, outputs.targets());
+  if (json.wanted()) json.write(result);
+  if (!json.to_stdout() && !globals.quiet) print(result);
+  return 0;
+}
+
+} // namespace
+
+void add_render_command(CLI::App& app, GlobalOptions& globals) {
+  const auto options = std::make_shared<RenderOptions>();
+  CLI::App& verb = add_verb(app, globals, "render", "Trace and denoise ambient occlusion",
+                            [options, &globals] { return run(*options, globals); });
+  verb.add_option("FILE", options->input, "A .ptk file, or a .pbrt scene to be traced in floats without packing")->required();
+  verb.add_option("-o,--output", options->outputs, "Image to write, .exr or .png; may be repeated")
+      ->required()
+      ->type_name("FILE")
+      ->allow_extra_args(false);
+  verb.add_option("--aov", options->aovs,
+                  "Layers, separated by commas: ao, ao_raw, depth, normal, instance, albedo, shaded, or all "
+                  "(default: all in .exr, ao in .png). Several layers become NAME.LAYER.png")
+      ->delimiter(',')
+      ->type_name("LAYERS");
+  verb.add_option("--camera", options->camera, "Which of the scene's cameras, from 0")->type_name("I");
+  verb.add_option("--size", options->size, "Image size (default: the scene's film)")->type_name("WxH");
+  verb.add_option("--supersample", options->supersample, "Trace at N times the size per axis and filter down (default 1)")
+      ->type_name("N");
+  verb.add_option("--frames", options->frames, "Frames to accumulate and denoise (default 32)")->type_name("N");
+  verb.add_option("--spp", options->spp, "Ambient occlusion rays per pixel and frame (default 1)")->type_name("N");
+  verb.add_flag("--ground-truth", options->ground_truth, "No denoiser, one frame of 1024 spp unless said otherwise");
+  verb.add_flag("--no-denoise", options->no_denoise, "Average the frames and do nothing else");
+  verb.add_option("--ao-radius", options->ao_radius,
+                  "Longest occlusion distance in world units (default: 5 % of the scene's diagonal)")
+      ->type_name("R");
+  verb.add_flag("--ao-no-falloff", options->ao_falloff_off,
+                "Every hit within the radius occludes fully, however far: plain visibility");
+  verb.add_option("--ao-interreflection", options->ao_interreflection,
+                  "Share of light bounced back by what a ray hits, 0..1 (default 0: off)")
+      ->type_name("RHO");
+  verb.add_option("--seed", options->seed, "Seed of the sample pattern (default 0)")->type_name("N");
+  verb.add_option("--backend", options->backend, "embree (packed and vulkan are planned)")->type_name("NAME");
+  verb.add_option("--bvh", options->bvh, "Embree's tree: medium, or high (slower to build, faster to trace)")
+      ->type_name("QUALITY");
+  verb.add_flag("--robust", options->robust, "Embree's watertight mode");
+  verb.add_flag("--strict", options->strict, "Stop at the first problem in a .pbrt scene");
+  verb.footer("Examples:\n"
+              "  packtrace render house.ptk -o house.png\n"
+              "  packtrace render house.ptk -o house.png -o house.exr --aov all --supersample 2\n"
+              "  packtrace render scene.pbrt -o truth.exr --ground-truth --spp 1024");
+}
+
+} // namespace packtrace

@@ -1,0 +1,85 @@
+#include "runtime/denoise/guides.h"
+
+#include <atomic>
+#include <cmath>
+#include <limits>
+
+#include "runtime/denoise/simd.h"
+
+namespace packtrace {
+namespace {
+
+constexpr float kLargest = std::numeric_limits<float>::max();
+
+/// 1 / z, or 0 where z is no distance or its inverse is no number.
+inline float disparity_of(float z) { return z >= std::numeric_limits<float>::min() && z <= kLargest ? 1.0f / z : 0.0f; }
+
+/// A component of a unit vector, with some room for rounding; false for NaN.
+inline bool is_component(float c) { return c >= -2.0f && c <= 2.0f; }
+
+PACKTRACE_AVX2_CLONES
+void load_row(int width, const float* __restrict z, const float* __restrict normal, float* __restrict disparity,
+              float* __restrict nx, float* __restrict ny, float* __restrict nz) {
+  for (int x = 0; x < width; ++x) {
+    const float cx = normal[3 * x], cy = normal[3 * x + 1], cz = normal[3 * x + 2];
+    const bool good = is_component(cx) & is_component(cy) & is_component(cz);
+    disparity[x] = disparity_of(z[x]);
+    nx[x] = good ? cx : 0.0f;
+    ny[x] = good ? cy : 0.0f;
+    nz[x] = good ? cz : 0.0f;
+  }
+}
+
+/// Counts pixels whose guides differ or that move.
+PACKTRACE_AVX2_CLONES
+int count_changes(int width, const float* __restrict z, const float* __restrict normal,
+                  const uint32_t* __restrict instance, const float* __restrict motion,
+                  const float* __restrict disparity, const float* __restrict nx, const float* __restrict ny,
+                  const float* __restrict nz, const uint32_t* __restrict old_instance) {
+  int changes = 0;
+  for (int x = 0; x < width; ++x) {
+    const float cx = normal[3 * x], cy = normal[3 * x + 1], cz = normal[3 * x + 2];
+    const bool good = is_component(cx) & is_component(cy) & is_component(cz);
+    const bool same = (disparity_of(z[x]) == disparity[x]) & ((good ? cx : 0.0f) == nx[x]) &
+                      ((good ? cy : 0.0f) == ny[x]) & ((good ? cz : 0.0f) == nz[x]) & (instance[x] == old_instance[x]);
+    changes += same ? 0 : 1;
+  }
+  for (int i = 0; i < 2 * width; ++i) changes += std::abs(motion[i]) <= kStillMotion ? 0 : 1; // NaN counts as motion
+  return changes;
+}
+
+} // namespace
+
+void Guides::resize(ImageSize new_size) {
+  size = new_size;
+  disparity.resize(size), normal_x.resize(size), normal_y.resize(size), normal_z.resize(size), instance.resize(size);
+}
+
+void Guides::load(const GBuffer& gbuffer) {
+  const int width = static_cast<int>(size.width);
+  for_row_blocks(size.height, [&](int first, int last) {
+    for (int y = first; y < last; ++y) {
+      const size_t begin = static_cast<size_t>(y) * size.width;
+      load_row(width, &gbuffer.view_z[begin], &gbuffer.normal[begin].x, disparity.row(y), normal_x.row(y),
+               normal_y.row(y), normal_z.row(y));
+      std::copy_n(&gbuffer.instance[begin], size.width, instance.row(y));
+    }
+  });
+}
+
+bool Guides::still_matches(const GBuffer& gbuffer) const {
+  const int width = static_cast<int>(size.width);
+  std::atomic<bool> still{true};
+  for_row_blocks(size.height, [&](int first, int last) {
+    for (int y = first; y < last && still.load(std::memory_order_relaxed); ++y) {
+      const size_t begin = static_cast<size_t>(y) * size.width;
+      if (count_changes(width, &gbuffer.view_z[begin], &gbuffer.normal[begin].x, &gbuffer.instance[begin],
+                        &gbuffer.motion_px[begin].x, disparity.row(y), normal_x.row(y), normal_y.row(y),
+                        normal_z.row(y), instance.row(y)) != 0)
+        still.store(false, std::memory_order_relaxed);
+    }
+  });
+  return still.load();
+}
+
+} // namespace packtrace

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/partitioner.h>
+
+#include "runtime/gbuffer.h"
+
+namespace packtrace {
+
+/// Zeroed pixels around every plane, so that filters read past the image without asking.
+inline constexpr int kPlaneBorder = 8;
+
+/// One channel of an image, row by row, inside a border of kPlaneBorder pixels that stay zero.
+template <typename T>
+class Plane {
+public:
+  /// Zeroes everything.
+  void resize(ImageSize size) {
+    stride_ = static_cast<size_t>(size.width) + 2 * kPlaneBorder;
+    data_.assign(stride_ * (static_cast<size_t>(size.height) + 2 * kPlaneBorder), T{});
+  }
+  void clear() { std::fill(data_.begin(), data_.end(), T{}); }
+
+  /// Pixel (0, y), y in [-kPlaneBorder, height + kPlaneBorder). Columns -kPlaneBorder to width + kPlaneBorder exist.
+  T* row(int y) { return data_.data() + offset(y); }
+  const T* row(int y) const { return data_.data() + offset(y); }
+
+private:
+  size_t offset(int y) const { return static_cast<size_t>(y + kPlaneBorder) * stride_ + kPlaneBorder; }
+  size_t stride_ = 0;
+  std::vector<T> data_;
+};
+
+/// Rows that one task works on. Fixed, so that nothing depends on the number of threads.
+inline constexpr int kRowsPerTask = 32;
+
+/// Calls body(first_row, last_row) for half-open blocks that cover [0, height), in parallel.
+template <typename Body>
+void for_row_blocks(uint32_t height, const Body& body) {
+  const int rows = static_cast<int>(height);
+  const int blocks = (rows + kRowsPerTask - 1) / kRowsPerTask;
+  tbb::parallel_for(
+      tbb::blocked_range<int>(0, blocks, 1),
+      [&](const tbb::blocked_range<int>& range) {
+        for (int i = range.begin(); i != range.end(); ++i)
+          body(i * kRowsPerTask, std::min(rows, (i + 1) * kRowsPerTask));
+      },
+      tbb::simple_partitioner());
+}
+
+} // namespace packtrace

@@ -1,0 +1,142 @@
+#include "runtime/denoise/temporal_blend.h"
+
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include <tbb/enumerable_thread_specific.h>
+
+#include "runtime/denoise/simd.h"
+
+namespace packtrace {
+namespace {
+
+/// Frames that the window's variance counts for beside the history's own.
+constexpr float kVariancePrior = 4.0f;
+
+/// Variance below which values count as free of noise: far below the square of one step of 8 bits.
+constexpr float kLeastVariance = 1e-8f;
+
+struct AccumulateRow {
+  const float *ao, *disparity;
+  float *mean, *square, *fast, *samples, *out_ao, *out_valid, *out_change;
+};
+
+PACKTRACE_AVX2_CLONES
+void accumulate_row(int width, const AccumulateRow& rows, float longest, float fast_frames) {
+  const AccumulateRow r = rows;
+#pragma GCC ivdep
+  for (int x = 0; x < width; ++x) {
+    const bool valid = (r.ao[x] >= 0.0f) & (r.ao[x] <= std::numeric_limits<float>::max()) & (r.disparity[x] > 0.0f);
+    const float value = valid ? smaller(r.ao[x], 1.0f) : 0.0f;
+    const float count = smaller(r.samples[x] + 1.0f, longest);
+    const float share = valid ? 1.0f / count : 0.0f;
+    const float fast_share = valid ? 1.0f / smaller(count, fast_frames) : 0.0f;
+    const float new_mean = r.mean[x] + (value - r.mean[x]) * share;
+    const float new_fast = r.fast[x] + (value - r.fast[x]) * fast_share;
+    r.mean[x] = new_mean;
+    r.square[x] += (value * value - r.square[x]) * share;
+    r.fast[x] = new_fast;
+    r.samples[x] = valid ? count : smaller(r.samples[x], longest);
+    r.out_ao[x] = value;
+    r.out_valid[x] = valid ? 1.0f : 0.0f;
+    r.out_change[x] = valid ? new_fast - new_mean : 0.0f;
+  }
+}
+
+/// `change` less `limit`, towards 0.
+inline float excess(float change, float limit) { return std::copysign(larger(std::abs(change) - limit, 0.0f), change); }
+
+struct CorrectRow {
+  const float *count, *local_variance, *change, *narrow_count, *narrow_change, *disparity;
+  float *mean, *square, *samples, *variance, *value, *precision;
+};
+
+struct CorrectScales {
+  float fast_share; ///< variance of the fast history per variance of a sample
+  float gamma, tolerance, response, fast_frames, trust_frames;
+};
+
+/// Returns the least count of samples of a pixel that the camera ray hit.
+PACKTRACE_AVX2_CLONES
+float correct_row(int width, const CorrectRow& rows, CorrectScales s) {
+  const CorrectRow r = rows;
+  int32_t youngest = std::numeric_limits<int32_t>::max(); // bits of floats >= 0 are ordered like integers
+#pragma GCC ivdep
+  for (int x = 0; x < width; ++x) {
+    const float noise = r.local_variance[x] * s.fast_share;
+    const float wide = excess(r.change[x], s.gamma * std::sqrt(noise / larger(r.count[x], 1.0f)) + s.tolerance);
+    const float narrow =
+        excess(r.narrow_change[x], s.gamma * std::sqrt(noise / larger(r.narrow_count[x], 1.0f)) + s.tolerance);
+    const float wanted = std::abs(narrow) > std::abs(wide) ? narrow : wide;
+    const bool seen = r.samples[x] > 0.0f;
+    const float old_mean = r.mean[x];
+    const float new_mean = seen ? smaller(larger(old_mean + wanted, 0.0f), 1.0f) : old_mean;
+    const float shift = new_mean - old_mean;
+    const float kept = 1.0f - smaller(s.response * std::abs(shift), 1.0f);
+    const float n = smaller(r.samples[x], larger(r.samples[x] * kept, s.fast_frames));
+    const float moment = larger(r.square[x] - old_mean * old_mean, 0.0f); // a shift leaves the variance alone
+    const float sample_variance = (kVariancePrior * r.local_variance[x] + n * moment) / (kVariancePrior + n);
+    const float variance = seen ? sample_variance / larger(n, 1.0f) : 0.0f;
+    const float distrust = s.trust_frames / larger(n, 1.0f);
+    const float hit_samples = r.disparity[x] > 0.0f ? n : std::numeric_limits<float>::max();
+    const int32_t bits = std::bit_cast<int32_t>(hit_samples);
+    youngest = bits < youngest ? bits : youngest;
+    r.mean[x] = new_mean;
+    r.square[x] = moment + new_mean * new_mean;
+    r.samples[x] = n;
+    r.variance[x] = variance;
+    r.value[x] = new_mean;
+    r.precision[x] = 1.0f / (variance * (1.0f + distrust * distrust) + kLeastVariance);
+  }
+  return std::bit_cast<float>(youngest);
+}
+
+} // namespace
+
+void accumulate(std::span<const float> ao, const Guides& guides, const DenoiserConfig& config, History& history,
+                FrameSamples& samples) {
+  const float longest = static_cast<float>(config.max_tspp), fast_frames = static_cast<float>(config.fast_frames);
+  for_row_blocks(guides.size.height, [&](int first, int last) {
+    for (int y = first; y < last; ++y) {
+      const AccumulateRow row{&ao[static_cast<size_t>(y) * guides.size.width],
+                              guides.disparity.row(y),
+                              history.mean.row(y),
+                              history.square.row(y),
+                              history.fast.row(y),
+                              history.samples.row(y),
+                              samples.ao.row(y),
+                              samples.valid.row(y),
+                              samples.change.row(y)};
+      accumulate_row(static_cast<int>(guides.size.width), row, longest, fast_frames);
+    }
+  });
+}
+
+void correct_history(const FrameSamples& samples, const Guides& guides, const DenoiserConfig& config, History& history,
+                     std::span<float> value_variance, NoisyImage& image) {
+  const float share = 1.0f / static_cast<float>(config.fast_frames);
+  const CorrectScales scales{share / (2.0f - share),
+                             config.change_gamma,
+                             config.change_tolerance,
+                             config.change_response,
+                             static_cast<float>(config.fast_frames),
+                             config.blur_trust_frames};
+  tbb::enumerable_thread_specific<LocalStatisticsRows> statistics(guides.size.width, config.window);
+  for_row_blocks(guides.size.height, [&](int first, int last) {
+    LocalStatisticsRows& rows = statistics.local();
+    rows.begin(samples, first);
+    for (int y = first; y < last; ++y) {
+      const LocalStatistics& local = rows.at(samples, y);
+      const CorrectRow row{local.count.data(),         local.variance.data(),
+                           local.change.data(),        local.narrow_count.data(),
+                           local.narrow_change.data(), guides.disparity.row(y),
+                           history.mean.row(y),        history.square.row(y),
+                           history.samples.row(y),     &value_variance[static_cast<size_t>(y) * guides.size.width],
+                           image.value.row(y),         image.precision.row(y)};
+      image.youngest[static_cast<size_t>(y)] = correct_row(static_cast<int>(guides.size.width), row, scales);
+    }
+  });
+}
+
+} // namespace packtrace

@@ -1,0 +1,141 @@
+#include <algorithm>
+#include <cstring>
+#include <limits>
+#include <new>
+#include <set>
+#include <type_traits>
+
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfDoubleAttribute.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfIntAttribute.h>
+#include <OpenEXR/ImfIO.h>
+#include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfStringAttribute.h>
+
+#include "pbrt_import/scene/error.h"
+#include "runtime/image/exr.h"
+#include "runtime/image/file_bytes.h"
+
+namespace packtrace {
+
+namespace {
+
+/// Collects a file in memory, so that a full disk is noticed when the bytes are written in one go.
+class MemoryWriter : public Imf::OStream {
+public:
+  MemoryWriter() : OStream("memory") {}
+  void write(const char bytes[], int count) override {
+    const size_t n = static_cast<size_t>(count);
+    if (position_ + n > bytes_.size()) bytes_.resize(position_ + n);
+    std::memcpy(bytes_.data() + position_, bytes, n);
+    position_ += n;
+  }
+  uint64_t tellp() override { return position_; }
+  void seekp(uint64_t position) override { position_ = position; }
+  std::vector<std::byte> take() { return std::move(bytes_); }
+
+private:
+  std::vector<std::byte> bytes_;
+  size_t position_ = 0;
+};
+
+std::string full_name(const std::string& layer, const std::string& channel) {
+  if (layer.empty()) return channel;
+  return channel.empty() ? layer : layer + "." + channel;
+}
+
+void check_layers(ImageSize size, std::span<const Layer> layers) {
+  if (size.width < 1 || size.height < 1 || size.width > kMaxImageSide || size.height > kMaxImageSide)
+    throw Error(ErrorKind::kUsage, "an image of " + std::to_string(size.width) + " x " + std::to_string(size.height) +
+                                       " pixels cannot be written as EXR");
+  std::set<std::string> names;
+  for (const Layer& layer : layers) {
+    const size_t samples = std::visit([](auto span) { return span.size(); }, layer.data);
+    if (layer.channels.empty() || samples != size.pixels() * layer.channels.size())
+      throw Error(ErrorKind::kUsage, "EXR layer \"" + layer.name + "\": " + std::to_string(samples) +
+                                         " samples do not fit its channels and the image's size");
+    for (const std::string& channel : layer.channels) {
+      const std::string name = full_name(layer.name, channel);
+      if (name.empty() || name.size() > 255 || name.find('\0') != std::string::npos || !names.insert(name).second)
+        throw Error(ErrorKind::kUsage, "EXR channel name \"" + name + "\" is empty, too long or used twice");
+    }
+  }
+  if (names.empty()) throw Error(ErrorKind::kUsage, "an EXR file needs at least one layer");
+}
+
+void add_attributes(Imf::Header& header, const ExrAttributes& attributes) {
+  for (const auto& [name, value] : attributes) {
+    // Present already: one that the format itself defines.
+    if (name.empty() || name.size() > 255 || header.find(name) != header.end() || name == "tiles" ||
+        name == "chunkCount")
+      throw Error(ErrorKind::kUsage, "EXR attribute name \"" + name + "\" cannot be used");
+    if (const int* integer = std::get_if<int>(&value)) header.insert(name, Imf::IntAttribute(*integer));
+    if (const double* real = std::get_if<double>(&value)) header.insert(name, Imf::DoubleAttribute(*real));
+    if (const auto* text = std::get_if<std::string>(&value)) header.insert(name, Imf::StringAttribute(*text));
+  }
+}
+
+/// 16-bit copies of a layer's samples: OpenEXR converts types only when reading.
+std::vector<half> to_half(std::span<const float> samples) {
+  std::vector<half> result(samples.size());
+  std::transform(samples.begin(), samples.end(), result.begin(), [](float value) { return half(value); });
+  return result;
+}
+
+template <class Sample>
+void add_slices(Imf::FrameBuffer& frame, Imf::PixelType type, const Layer& layer, ImageSize size,
+                const Sample* samples) {
+  const size_t stride = sizeof(Sample) * layer.channels.size();
+  for (size_t c = 0; c < layer.channels.size(); ++c) {
+    // OpenEXR's slices are for reading too, hence the cast; writing does not change them.
+    char* base = reinterpret_cast<char*>(const_cast<Sample*>(samples + c));
+    frame.insert(full_name(layer.name, layer.channels[c]), Imf::Slice(type, base, stride, stride * size.width));
+  }
+}
+
+} // namespace
+
+std::vector<std::byte> encode_exr(ImageSize size, std::span<const Layer> layers, const ExrAttributes& attributes) {
+  check_layers(size, layers);
+  Imf::Header header(static_cast<int>(size.width), static_cast<int>(size.height));
+  header.compression() = Imf::ZIP_COMPRESSION;
+  add_attributes(header, attributes);
+
+  Imf::FrameBuffer frame;
+  std::vector<std::vector<half>> halves; // alive until the pixels are written
+  for (const Layer& layer : layers) {
+    Imf::PixelType type = Imf::UINT;
+    if (const auto* integers = std::get_if<std::span<const uint32_t>>(&layer.data)) {
+      add_slices(frame, type, layer, size, integers->data());
+    } else if (const auto floats = std::get<std::span<const float>>(layer.data); layer.half) {
+      type = Imf::HALF;
+      add_slices(frame, type, layer, size, halves.emplace_back(to_half(floats)).data());
+    } else {
+      type = Imf::FLOAT;
+      add_slices(frame, type, layer, size, floats.data());
+    }
+    for (const std::string& channel : layer.channels)
+      header.channels().insert(full_name(layer.name, channel), Imf::Channel(type));
+  }
+
+  MemoryWriter writer;
+  try {
+    Imf::OutputFile file(writer, header);
+    file.setFrameBuffer(frame);
+    file.writePixels(static_cast<int>(size.height));
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw Error(ErrorKind::kIo, std::string("cannot encode EXR: ") + error.what());
+  }
+  return writer.take();
+}
+
+void write_exr(const std::filesystem::path& path, ImageSize size, std::span<const Layer> layers,
+               const ExrAttributes& attributes) {
+  write_file_bytes(path, encode_exr(size, layers, attributes));
+}
+
+} // namespace packtrace

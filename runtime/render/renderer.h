@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "pbrt_import/scene/progress.h"
+#include "runtime/ao/ao_integrator.h"
+#include "runtime/denoise/denoiser.h"
+#include "runtime/gbuffer.h"
+#include "runtime/trace/embree_scene.h"
+#include "runtime/trace/scene_source.h"
+
+namespace packtrace {
+
+/// One still view: how it is sampled over frames and how it is resolved.
+struct RenderConfig {
+  ImageSize size;               ///< of the result
+  uint32_t supersample = 1;     ///< [1, 8]: traced and denoised at this multiple per axis, box-filtered at the end
+  uint32_t frames = 32;         ///< [1, 65536]: each traces AoConfig::spp samples a pixel
+  bool denoise = true;          ///< false: frames are averaged, nothing else
+  AoConfig ao;
+  DenoiserConfig denoiser;
+};
+
+/// Throws Error(kUsage) naming the option that is out of range.
+void validate(const RenderConfig& config);
+
+/// Seconds of wall time, summed over frames.
+struct RenderTimings {
+  double build_s = 0;   ///< decode and BVH
+  double primary_s = 0; ///< one frame: the view does not change
+  double ao_s = 0;
+  double denoise_s = 0;
+};
+
+/// What a view looks like, rows top to bottom. Pixels whose camera rays all miss: depth 0, instance kNoInstance, ao and
+/// ao_raw kInvalidAo, rest 0. With supersampling every layer is the mean over the sub-pixels that hit, and instance that of
+/// the first of them.
+struct RenderedImage {
+  ImageSize size;
+  std::vector<float> ao;       ///< denoised, or the mean over all frames
+  std::vector<float> ao_raw;   ///< of the last frame alone
+  std::vector<float> depth;    ///< camera-space z, world units
+  std::vector<float> coverage; ///< share of sub-pixels that hit something
+  std::vector<Vec3> normal;    ///< world space
+  std::vector<Vec3> albedo;    ///< linear sRGB
+  std::vector<Vec3> shaded;    ///< albedo x ao, emitters as they are: the scene under an even sky, linear sRGB
+  std::vector<uint32_t> instance;
+  RenderTimings timings;
+  uint64_t ao_rays = 0;
+  uint64_t primary_rays = 0;
+};
+
+/// Renders one camera. scene must have been built from source.
+/// The image depends on its arguments alone, not on the number of threads.
+/// Throws Error(kUsage) for a config out of range, Error(kCancelled).
+RenderedImage render_view(const SceneSource& source, const EmbreeScene& scene, const Camera& camera,
+                          const RenderConfig& config, Progress& progress);
+
+} // namespace packtrace

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include <embree3/rtcore.h>
+
+#include "pbrt_import/scene/error.h"
+
+namespace packtrace {
+
+struct ReleaseRtc {
+  void operator()(RTCSceneTy* scene) const { rtcReleaseScene(scene); }
+  void operator()(RTCGeometryTy* geometry) const { rtcReleaseGeometry(geometry); }
+  void operator()(RTCDeviceTy* device) const { rtcReleaseDevice(device); }
+};
+template <typename T> using RtcPtr = std::unique_ptr<T, ReleaseRtc>;
+
+/// An Embree device that counts its memory and turns error codes into Error.
+class EmbreeDevice {
+public:
+  /// Throws Error(kUnsupported) if the device cannot be made or was built without ray masks, filter functions,
+  /// ray streams or triangles.
+  EmbreeDevice();
+  EmbreeDevice(const EmbreeDevice&) = delete;
+  EmbreeDevice& operator=(const EmbreeDevice&) = delete;
+
+  RTCDevice get() const { return device_.get(); }
+
+  /// Throws what was reported since the last call: Error(kLimitExceeded) for lack of memory, else Error(kUnsupported).
+  void check();
+
+  /// Bytes allocated now.
+  uint64_t bytes() const { return static_cast<uint64_t>(bytes_.load(std::memory_order_relaxed)); }
+
+private:
+  static void on_error(void* self, RTCError code, const char* text);
+  static bool on_memory(void* self, ssize_t bytes, bool post);
+
+  std::atomic<int64_t> bytes_{0};
+  std::mutex mutex_;
+  RTCError code_ = RTC_ERROR_NONE; ///< the first since check()
+  std::string text_;
+  RtcPtr<RTCDeviceTy> device_; ///< last: its callbacks use the members above
+};
+
+} // namespace packtrace

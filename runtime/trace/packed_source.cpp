@@ -1,0 +1,85 @@
+#include "runtime/trace/packed_source.h"
+
+#include <cassert>
+#include <cmath>
+#include <limits>
+
+#include "compress/format/baked_file.h"
+#include "compress/format/cluster_codec.h"
+
+namespace packtrace {
+namespace {
+
+/// A triangle within its cluster.
+struct ClusterTriangle {
+  ClusterView cluster;
+  Triangle vertices;
+};
+
+ClusterTriangle find_triangle(const BakedFile& file, uint32_t geometry, uint32_t triangle) {
+  const ClusterView cluster = file.cluster(geometry, file.cluster_of_triangle(geometry, triangle));
+  return {cluster, cluster.triangle(triangle - cluster.record().first_triangle)};
+}
+
+} // namespace
+
+PackedSource::PackedSource(const BakedFile& file)
+    : file_(file), materials_(file.materials()), cameras_(file.cameras()), world_bounds_(file.world_bounds()) {
+  instances_.reserve(file.instances().size());
+  for (uint32_t i = 0; i < file.instances().size(); ++i)
+    instances_.push_back({file.instances()[i].geometry, file.world_from_object(i)});
+}
+
+uint32_t PackedSource::geometry_count() const { return static_cast<uint32_t>(file_.geometries().size()); }
+
+GeometryCounts PackedSource::counts(uint32_t geometry) const {
+  const baked::GeometryRecord& record = file_.geometries()[geometry];
+  return {record.vertex_count, record.triangle_count};
+}
+
+void PackedSource::decode(uint32_t geometry, std::span<Vec3> positions, std::span<Triangle> triangles) const {
+  assert(positions.size() == counts(geometry).vertices && triangles.size() == counts(geometry).triangles);
+  const auto clusters = static_cast<uint32_t>(file_.clusters(geometry).size());
+  for (uint32_t c = 0; c < clusters; ++c) {
+    const ClusterView cluster = file_.cluster(geometry, c);
+    const baked::ClusterRecord& record = cluster.record();
+    decode_positions(cluster, positions.subspan(record.first_vertex, cluster.vertex_count()));
+    decode_indices(cluster, record.first_vertex, triangles.subspan(record.first_triangle, cluster.triangle_count()));
+  }
+}
+
+uint32_t PackedSource::material_of(uint32_t geometry, uint32_t triangle) const {
+  return file_.clusters(geometry)[file_.cluster_of_triangle(geometry, triangle)].material;
+}
+
+std::optional<Vec3> PackedSource::shading_normal(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const {
+  const auto [cluster, v] = find_triangle(file_, geometry, triangle);
+  if (!cluster.has_normals()) return std::nullopt;
+  const Vec3 n = cluster.normal(v.x) * (1.0f - barycentrics.x - barycentrics.y) + cluster.normal(v.y) * barycentrics.x +
+                 cluster.normal(v.z) * barycentrics.y;
+  const float length = glm::length(n);
+  if (!(length > 0.0f)) return std::nullopt; // opposed vertex normals cancel
+  return n / length;
+}
+
+Vec2 PackedSource::uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const {
+  const auto [cluster, v] = find_triangle(file_, geometry, triangle);
+  if (!cluster.has_uvs()) return Vec2(0);
+  return cluster.uv(v.x) * (1.0f - barycentrics.x - barycentrics.y) + cluster.uv(v.y) * barycentrics.x +
+         cluster.uv(v.z) * barycentrics.y;
+}
+
+float PackedSource::position_error(uint32_t geometry) const {
+  const double bound = file_.geometries()[geometry].position_error_bound;
+  const auto rounded = static_cast<float>(bound);
+  return rounded >= bound ? rounded : std::nextafter(rounded, std::numeric_limits<float>::infinity());
+}
+
+AlphaMaskView PackedSource::mask(uint32_t index) const { return file_.mask(index); }
+
+uint64_t PackedSource::resident_bytes() const {
+  return file_.file_bytes() + materials_.size() * sizeof(Material) + cameras_.size() * sizeof(Camera) +
+         instances_.size() * sizeof(PlacedGeometry);
+}
+
+} // namespace packtrace

@@ -1,0 +1,84 @@
+// The layering of docs/architecture.md, checked from the include lines of the tree.
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Layer {
+  std::string folder;
+  std::vector<std::string> may_include; ///< folders, besides its own
+};
+
+// The most specific folder decides, so longer paths come first.
+const std::vector<Layer> kLayers = {
+    {"pbrt_import/scene/", {}},
+    {"pbrt_import/", {"pbrt_import/scene/"}},
+    {"compress/format/", {"pbrt_import/scene/"}},
+    {"compress/bake/", {"compress/format/", "pbrt_import/scene/"}},
+    {"runtime/commands/", {"runtime/", "compress/format/", "compress/bake/", "pbrt_import/", "pbrt_import/scene/"}},
+    {"runtime/", {"compress/format/", "pbrt_import/scene/"}},
+};
+
+const Layer* layer_of(const std::string& path) {
+  for (const Layer& layer : kLayers)
+    if (path.starts_with(layer.folder)) return &layer;
+  return nullptr;
+}
+
+std::vector<std::string> project_includes(const fs::path& file) {
+  std::vector<std::string> result;
+  std::ifstream in(file);
+  for (std::string line; std::getline(in, line);) {
+    if (!line.starts_with("#include \"")) continue;
+    const size_t end = line.find('"', 10);
+    result.push_back(line.substr(10, end - 10));
+  }
+  return result;
+}
+
+std::vector<std::string> broken_rules(const std::string& path, const std::vector<std::string>& includes) {
+  std::vector<std::string> broken;
+  const Layer* from = layer_of(path);
+  for (const std::string& include : includes) {
+    const Layer* to = layer_of(include);
+    if (!to) {
+      broken.push_back(path + " includes " + include + ", which is in no layer");
+    } else if (to != from &&
+               std::find(from->may_include.begin(), from->may_include.end(), to->folder) == from->may_include.end()) {
+      broken.push_back(path + " includes " + include);
+    }
+  }
+  return broken;
+}
+
+TEST(Architecture, IncludesFollowTheDataFlow) {
+  const fs::path root = PACKTRACE_SOURCE_DIR;
+  size_t files = 0;
+  for (const char* top : {"pbrt_import", "compress", "runtime"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(root / top)) {
+      const std::string extension = entry.path().extension().string();
+      if (extension != ".h" && extension != ".cpp") continue;
+      ++files;
+      const std::string path = fs::relative(entry.path(), root).generic_string();
+      for (const std::string& broken : broken_rules(path, project_includes(entry.path()))) ADD_FAILURE() << broken;
+    }
+  }
+  EXPECT_GT(files, 40u) << "the tree was not found";
+}
+
+TEST(Architecture, TheCheckSeesABrokenRule) {
+  EXPECT_EQ(broken_rules("compress/format/x.cpp", {"compress/bake/bake_scene.h"}).size(), 1u);
+  EXPECT_EQ(broken_rules("runtime/trace/x.cpp", {"pbrt_import/parser.h"}).size(), 1u);
+  EXPECT_EQ(broken_rules("runtime/trace/x.cpp", {"parser.h"}).size(), 1u);
+  EXPECT_TRUE(broken_rules("compress/bake/x.cpp", {"compress/format/baked_file.h", "compress/bake/y.h"}).empty());
+}
+
+} // namespace

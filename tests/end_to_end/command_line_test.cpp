@@ -1,0 +1,244 @@
+// Every exit code and every promise of the command line about files, tried on the program itself.
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/end_to_end/command.h"
+
+namespace packtrace::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+size_t file_count(const fs::path& directory) {
+  return static_cast<size_t>(std::distance(fs::directory_iterator(directory), fs::directory_iterator()));
+}
+
+/// A directory with the small scene in it and, on request, its baked file.
+class Workbench {
+public:
+  Workbench() { write_text(scene(), small_scene_text()); }
+  std::string scene() const { return directory_ / "small.pbrt"; }
+  std::string baked() const { return directory_ / "small.ptk"; }
+  std::string operator/(const std::string& name) const { return directory_ / name; }
+  const fs::path& path() const { return directory_.path(); }
+  void bake() const {
+    const CommandResult result = run_packtrace({"bake", scene(), "-o", baked(), "-q"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+  }
+
+private:
+  TemporaryDirectory directory_;
+};
+
+TEST(CommandLine, HelpNamesEveryVerb) {
+  const CommandResult result = run_packtrace({"--help"});
+  EXPECT_EQ(result.exit_code, 0);
+  for (const char* verb : {"bake", "info", "render", "compare"})
+    EXPECT_NE(result.out.find(verb), std::string::npos) << verb;
+}
+
+TEST(CommandLine, NothingToDoIsAUsageError) { EXPECT_EQ(run_packtrace({}).exit_code, 2); }
+
+TEST(CommandLine, UnknownVerbIsAUsageErrorThatNamesIt) {
+  const CommandResult result = run_packtrace({"polish", "x"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("polish"), std::string::npos) << result.err;
+}
+
+TEST(CommandLine, PlannedVerbSaysThatItIsNotThereYet) {
+  for (const char* verb : {"measure", "export", "view"}) {
+    const CommandResult result = run_packtrace({verb});
+    EXPECT_EQ(result.exit_code, 4) << verb;
+    EXPECT_NE(result.err.find(verb), std::string::npos) << result.err;
+  }
+}
+
+TEST(CommandLine, OptionOutOfRangeIsAUsageErrorAndWritesNothing) {
+  const Workbench bench;
+  for (const auto& [option, value] : {std::pair{"--precision", "0"}, std::pair{"--precision", "-1"},
+                                      std::pair{"--precision", "nan"}, std::pair{"--precision-abs", "inf"},
+                                      std::pair{"--position-bits", "0"}, std::pair{"--position-bits", "99"}}) {
+    const CommandResult result = run_packtrace({"bake", bench.scene(), "-o", bench.baked(), option, value});
+    EXPECT_EQ(result.exit_code, 2) << option << ' ' << value << '\n' << result.err;
+  }
+  EXPECT_EQ(file_count(bench.path()), 1u);
+}
+
+TEST(CommandLine, MissingInputIsAnInputErrorThatNamesTheFile) {
+  const TemporaryDirectory directory;
+  for (const char* name : {"none.pbrt", "none.ptk"}) {
+    for (const char* verb : {"info", "render", "bake"}) {
+      std::vector<std::string> arguments = {verb, directory / name};
+      if (arguments[0] != "info") arguments.insert(arguments.end(), {"-o", directory / "out.png"});
+      const CommandResult result = run_packtrace(arguments);
+      EXPECT_EQ(result.exit_code, 3) << verb << ' ' << name << '\n' << result.err;
+      EXPECT_NE(result.err.find(name), std::string::npos) << result.err;
+    }
+  }
+  EXPECT_EQ(file_count(directory.path()), 0u);
+}
+
+TEST(CommandLine, ExistingOutputIsKeptWithoutForce) {
+  const Workbench bench;
+  bench.bake();
+  write_text(bench.baked(), "mine");
+  const CommandResult refused = run_packtrace({"bake", bench.scene(), "-o", bench.baked()});
+  EXPECT_EQ(refused.exit_code, 6);
+  EXPECT_NE(refused.err.find("--force"), std::string::npos) << refused.err;
+  EXPECT_EQ(read_text(bench.baked()), "mine");
+  EXPECT_EQ(run_packtrace({"bake", bench.scene(), "-o", bench.baked(), "--force"}).exit_code, 0);
+  EXPECT_NE(read_text(bench.baked()), "mine");
+}
+
+TEST(CommandLine, ExistingPictureIsKeptWithoutForce) {
+  const Workbench bench;
+  bench.bake();
+  for (const char* name : {"out.png", "out.exr"}) {
+    write_text(bench / name, "mine");
+    EXPECT_EQ(run_packtrace({"render", bench.baked(), "-o", bench / name, "--frames", "1"}).exit_code, 6);
+    EXPECT_EQ(read_text(bench / name), "mine");
+  }
+}
+
+TEST(CommandLine, UnwritableOutputIsAnIoErrorAndLeavesNothing) {
+  const Workbench bench;
+  bench.bake();
+  const size_t before = file_count(bench.path());
+  const std::string nowhere = bench / "no/such/folder/out.";
+  EXPECT_EQ(run_packtrace({"bake", bench.scene(), "-o", nowhere + "ptk"}).exit_code, 6);
+  EXPECT_EQ(run_packtrace({"render", bench.baked(), "-o", nowhere + "png"}).exit_code, 6);
+  EXPECT_EQ(run_packtrace({"render", bench.baked(), "-o", nowhere + "exr"}).exit_code, 6);
+  EXPECT_EQ(file_count(bench.path()), before);
+}
+
+TEST(CommandLine, UnknownImageFormatIsAUsageError) {
+  const Workbench bench;
+  bench.bake();
+  const CommandResult result = run_packtrace({"render", bench.baked(), "-o", bench / "out.webp"});
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+}
+
+TEST(CommandLine, EmptySceneIsAnInputError) {
+  const Workbench bench;
+  write_text(bench / "empty.pbrt", "WorldBegin\nWorldEnd\n");
+  const CommandResult baked = run_packtrace({"bake", bench / "empty.pbrt", "-o", bench / "empty.ptk"});
+  EXPECT_EQ(baked.exit_code, 3) << baked.err;
+  EXPECT_NE(baked.err.find("no triangles"), std::string::npos) << baked.err;
+  EXPECT_FALSE(fs::exists(bench / "empty.ptk"));
+}
+
+TEST(CommandLine, SceneWithoutCameraIsFramedWithAWarning) {
+  const Workbench bench;
+  std::string text = small_scene_text();
+  text.erase(0, text.find("WorldBegin"));
+  write_text(bench / "bare.pbrt", text);
+  ASSERT_EQ(run_packtrace({"bake", bench / "bare.pbrt", "-o", bench / "bare.ptk"}).exit_code, 0);
+  const CommandResult result = run_packtrace({"render", bench / "bare.ptk", "-o", bench / "bare.png", "--size", "64x48",
+                                              "--frames", "1", "--json", bench / "bare.json"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.err.find("camera"), std::string::npos) << result.err;
+  const auto report = nlohmann::json::parse(read_text(bench / "bare.json"));
+  EXPECT_GT(report.at("hit_pixels").get<int>(), 64 * 48 / 10) << "the default camera must see the scene";
+}
+
+TEST(CommandLine, CameraNumberOutOfRangeIsAUsageError) {
+  const Workbench bench;
+  bench.bake();
+  EXPECT_EQ(run_packtrace({"render", bench.baked(), "-o", bench / "x.png", "--camera", "7"}).exit_code, 2);
+}
+
+TEST(CommandLine, EveryTruncatedPrefixOfABakedFileIsRefused) {
+  const Workbench bench;
+  bench.bake();
+  const std::string bytes = read_text(bench.baked());
+  ASSERT_GT(bytes.size(), 200u);
+  // The library test tries every length; here a spread of them goes through the program.
+  for (size_t length = 0; length < bytes.size(); length += std::max<size_t>(1, bytes.size() / 40)) {
+    write_text(bench / "cut.ptk", bytes.substr(0, length));
+    const CommandResult result = run_packtrace({"info", bench / "cut.ptk"});
+    EXPECT_EQ(result.exit_code, 3) << length << " of " << bytes.size() << " bytes\n" << result.err;
+    EXPECT_NE(result.err.find("cut.ptk"), std::string::npos) << result.err;
+  }
+}
+
+TEST(CommandLine, FlippedBitsInABakedFileAreRefused) {
+  const Workbench bench;
+  bench.bake();
+  const std::string bytes = read_text(bench.baked());
+  for (size_t i = 0; i < 40; ++i) {
+    std::string damaged = bytes;
+    const size_t at = i * (bytes.size() - 1) / 39;
+    damaged[at] = static_cast<char>(damaged[at] ^ (1 << (i % 8)));
+    write_text(bench / "bad.ptk", damaged);
+    const int code = run_packtrace({"info", bench / "bad.ptk"}).exit_code;
+    EXPECT_TRUE(code == 3 || code == 4) << "byte " << at << " exit " << code; // 4: the version field itself
+  }
+}
+
+TEST(CommandLine, AnotherVersionIsUnsupported) {
+  const Workbench bench;
+  bench.bake();
+  std::string bytes = read_text(bench.baked());
+  bytes[8] = static_cast<char>(bytes[8] + 1); // FileHeader::version, docs/baked_format.md
+  write_text(bench / "new.ptk", bytes);
+  const CommandResult result = run_packtrace({"info", bench / "new.ptk"});
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_NE(result.err.find("version"), std::string::npos) << result.err;
+}
+
+TEST(CommandLine, MissingMeshIsOneLocatedErrorAndTheRestIsBaked) {
+  const Workbench bench;
+  std::string text = small_scene_text();
+  text.insert(text.find("WorldEnd"), "Shape \"plymesh\" \"string filename\" [\"gone.ply\"]\n");
+  write_text(bench / "holes.pbrt", text);
+  const CommandResult result =
+      run_packtrace({"bake", bench / "holes.pbrt", "-o", bench / "holes.ptk", "--json", bench / "holes.json"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.err.find("holes.pbrt:8:"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("gone.ply"), std::string::npos) << result.err;
+  EXPECT_EQ(nlohmann::json::parse(read_text(bench / "holes.json")).at("triangles").get<int>(), 4);
+  EXPECT_EQ(run_packtrace({"bake", bench / "holes.pbrt", "-o", bench / "strict.ptk", "--strict"}).exit_code, 3);
+  EXPECT_FALSE(fs::exists(bench / "strict.ptk"));
+}
+
+TEST(CommandLine, TheBakedFileIsTheSameForAnyThreadCount) {
+  const Workbench bench;
+  for (const char* threads : {"1", "2", "5"})
+    ASSERT_EQ(run_packtrace({"bake", bench.scene(), "-o", bench / threads, "--threads", threads, "-q"}).exit_code, 0);
+  EXPECT_EQ(read_text(bench / "1"), read_text(bench / "2"));
+  EXPECT_EQ(read_text(bench / "1"), read_text(bench / "5"));
+}
+
+TEST(CommandLine, QuietSaysNothingAndJsonOnStandardOutputIsAllThereIs) {
+  const Workbench bench;
+  const CommandResult result = run_packtrace({"bake", bench.scene(), "-o", bench.baked(), "-q", "--json", "-"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.err, "");
+  EXPECT_EQ(nlohmann::json::parse(result.out).at("triangles").get<int>(), 4);
+}
+
+TEST(CommandLine, DryRunReportsAndWritesNothing) {
+  const Workbench bench;
+  const CommandResult result = run_packtrace({"bake", bench.scene(), "-o", bench.baked(), "--dry-run", "--json", "-"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(nlohmann::json::parse(result.out).at("triangles").get<int>(), 4);
+  EXPECT_FALSE(fs::exists(bench.baked()));
+}
+
+TEST(CommandLine, CompareBeyondALimitExitsWithFive) {
+  const Workbench bench;
+  bench.bake();
+  ASSERT_EQ(run_packtrace({"render", bench.baked(), "-o", bench / "a.exr", "--frames", "1", "--no-denoise"}).exit_code, 0);
+  ASSERT_EQ(run_packtrace({"render", bench.baked(), "-o", bench / "b.exr", "--frames", "64"}).exit_code, 0);
+  EXPECT_EQ(run_packtrace({"compare", bench / "a.exr", bench / "a.exr", "--layer", "ao", "--max-rmse", "0"}).exit_code, 0);
+  EXPECT_EQ(run_packtrace({"compare", bench / "a.exr", bench / "b.exr", "--layer", "ao", "--max-rmse", "0"}).exit_code, 5);
+}
+
+} // namespace
+} // namespace packtrace::test

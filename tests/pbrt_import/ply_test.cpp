@@ -1,0 +1,409 @@
+#include "pbrt_import/ply.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <random>
+#include <string>
+#include <string_view>
+
+#include <gtest/gtest.h>
+
+#include "pbrt_import/scene/error.h"
+
+namespace packtrace {
+namespace {
+
+struct Reports {
+  std::vector<std::string> messages;
+  ReportFn fn() {
+    return [this](Severity, uint32_t, std::string message) { messages.push_back(std::move(message)); };
+  }
+};
+
+PlyMesh read(const std::string& text, Reports* reports = nullptr) {
+  return read_ply(std::as_bytes(std::span(text)), reports ? reports->fn() : ReportFn());
+}
+
+/// The message of the Error that reading throws; "" if it does not.
+std::string error_of(const std::string& text) {
+  try {
+    read(text);
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::kInput);
+    return error.what();
+  }
+  return "";
+}
+
+enum class Format { kAscii, kLittle, kBig };
+constexpr Format kFormats[] = {Format::kAscii, Format::kLittle, Format::kBig};
+
+/// Writes PLY files value by value, in the types the header names.
+class Writer {
+public:
+  explicit Writer(Format format) : format_(format) {
+    constexpr const char* kNames[] = {"ascii", "binary_little_endian", "binary_big_endian"};
+    text_ = "ply\nformat " + std::string(kNames[static_cast<int>(format)]) + " 1.0\n";
+  }
+  Writer& line(const std::string& line) {
+    text_ += line + "\n";
+    return *this;
+  }
+  Writer& put(const std::string& type, double value) {
+    if (format_ == Format::kAscii) {
+      char buffer[64];
+      std::snprintf(buffer, sizeof buffer, "%.17g ", value);
+      text_ += buffer;
+    } else if (type == "char" || type == "int8") {
+      bytes(static_cast<int8_t>(value));
+    } else if (type == "uchar" || type == "uint8") {
+      bytes(static_cast<uint8_t>(value));
+    } else if (type == "short" || type == "int16") {
+      bytes(static_cast<int16_t>(value));
+    } else if (type == "ushort" || type == "uint16") {
+      bytes(static_cast<uint16_t>(value));
+    } else if (type == "int" || type == "int32") {
+      bytes(static_cast<int32_t>(value));
+    } else if (type == "uint" || type == "uint32") {
+      bytes(static_cast<uint32_t>(value));
+    } else if (type == "float" || type == "float32") {
+      bytes(static_cast<float>(value));
+    } else {
+      bytes(value);
+    }
+    return *this;
+  }
+  Writer& row(const std::string& type, std::initializer_list<double> values) {
+    for (const double value : values) put(type, value);
+    return *this;
+  }
+  Writer& list(const std::string& length_type, const std::string& type, std::initializer_list<double> values) {
+    put(length_type, static_cast<double>(values.size()));
+    return row(type, values);
+  }
+  const std::string& text() const { return text_; }
+
+private:
+  template <class T>
+  void bytes(T value) {
+    auto raw = std::bit_cast<std::array<char, sizeof(T)>>(value);
+    if (format_ == Format::kBig) std::reverse(raw.begin(), raw.end());
+    text_.append(raw.data(), raw.size());
+  }
+  Format format_;
+  std::string text_;
+};
+
+/// A square of two triangles with normals and uvs.
+std::string square(Format format, const std::string& real = "float", const std::string& length = "uchar",
+                   const std::string& index = "int") {
+  Writer writer(format);
+  writer.line("element vertex 4");
+  for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "u", "v"}) writer.line("property " + real + " " + name);
+  writer.line("element face 2").line("property list " + length + " " + index + " vertex_indices").line("end_header");
+  writer.row(real, {0, 0, 5, 0, 0, 1, 0, 0}).row(real, {1, 0, 5, 0, 0, 1, 1, 0});
+  writer.row(real, {1, 1, 5, 0, 0, 1, 1, 1}).row(real, {0, 1, 5, 0, 0, 1, 0, 1});
+  writer.list(length, index, {0, 1, 2}).list(length, index, {0, 2, 3});
+  return writer.text();
+}
+
+void expect_square(const PlyMesh& ply) {
+  const std::vector<Vec3> corners{{0, 0, 5}, {1, 0, 5}, {1, 1, 5}, {0, 1, 5}};
+  EXPECT_EQ(ply.mesh.positions, corners);
+  EXPECT_EQ(ply.mesh.normals, std::vector<Vec3>(4, Vec3(0, 0, 1)));
+  EXPECT_EQ(ply.mesh.uvs, (std::vector<Vec2>{{0, 0}, {1, 0}, {1, 1}, {0, 1}}));
+  EXPECT_EQ(ply.mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}}));
+  EXPECT_EQ(ply.dropped_triangles, 0u);
+}
+
+TEST(Ply, EveryFormatAndTypeGivesTheSameMesh) {
+  constexpr std::array kReals{"float", "float32", "double", "float64", "int8", "uchar", "int16", "ushort", "int32"};
+  constexpr std::array kIntegers{"char", "int8",   "uchar", "uint8", "short", "int16",
+                                 "int",  "ushort", "int32", "uint",  "uint32"};
+  for (const Format format : kFormats) {
+    for (const char* real : kReals) expect_square(read(square(format, real)));
+    for (const char* length : kIntegers)
+      for (const char* index : kIntegers) expect_square(read(square(format, "float", length, index)));
+    expect_square(read(square(format, "float", "uchar", "float")));
+  }
+}
+
+TEST(Ply, ReadsFixedBytes) {
+  static constexpr unsigned char kBody[] = {
+      0x00, 0x00, 0x80, 0x3f, 0x00, 0x00, 0x00, 0xc0, 0x00, 0x00, 0x40, 0x40, // 1 -2 3
+      0x0a, 0x0d, 0x20, 0x41, 0x00, 0x00, 0x00, 0x00, 0xff, 0xff, 0x7f, 0x7f, // 10.003183 0 FLT_MAX
+      0x01, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x80, 0xcd, 0xcc, 0xcc, 0x3d, // smallest denormal, -0, 0.1
+      0x03, 0x02, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x01, 0x00, 0x00, 0x00};
+  std::string text = "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                     "property float z\nelement face 1\nproperty list uint8 int vertex_indices\nend_header\n";
+  text.append(reinterpret_cast<const char*>(kBody), sizeof kBody);
+  const Mesh mesh = read(text).mesh;
+  ASSERT_EQ(mesh.positions.size(), 3u);
+  EXPECT_EQ(std::memcmp(mesh.positions.data(), kBody, 36), 0);
+  EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{2, 0, 1}}));
+}
+
+TEST(Ply, PolygonsBecomeFansInOrder) {
+  for (const Format format : kFormats) {
+    Writer writer(format);
+    writer.line("element vertex 6").line("property float x").line("property float y").line("property float z");
+    writer.line("element face 5").line("property list uchar int vertex_index").line("end_header");
+    for (int i = 0; i < 6; ++i) writer.row("float", {i * 1.0, i * i * 1.0, 0});
+    writer.list("uchar", "int", {0, 1, 2}).list("uchar", "int", {5, 4, 3, 2}).list("uchar", "int", {0, 1, 2, 3, 4});
+    writer.list("uchar", "int", {1, 2}).list("uchar", "int", {3, 1, 5});
+    Reports reports;
+    const PlyMesh ply = read(writer.text(), &reports);
+    EXPECT_EQ(ply.mesh.triangles,
+              (std::vector<Triangle>{{0, 1, 2}, {5, 4, 3}, {5, 3, 2}, {0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {3, 1, 5}}));
+    EXPECT_EQ(ply.dropped_triangles, 0u);
+    ASSERT_EQ(reports.messages.size(), 1u);
+    EXPECT_NE(reports.messages[0].find("1 faces have fewer than three"), std::string::npos);
+  }
+}
+
+TEST(Ply, SkipsWhatItDoesNotKnow) {
+  for (const Format format : kFormats) {
+    Writer writer(format);
+    writer.line("comment made by hand").line("obj_info num_cols 512").line("");
+    writer.line("element material 2").line("property uchar red").line("property list ushort double weights");
+    writer.line("element camera 1").line("property double fov");
+    writer.line("element vertex 3").line("property list uchar short bones").line("property float z");
+    writer.line("property uchar alpha").line("property double y").line("property float x").line("property float u");
+    writer.line("element nothing 4000000000000");
+    writer.line("element face 1").line("property list uchar uint face_indices").line("property short group");
+    writer.line("property list uchar int vertex_indices").line("property list uchar float texcoord");
+    writer.line("element edge 9").line("property int vertex1").line("end_header");
+    writer.put("uchar", 255).list("ushort", "double", {1, 2}).put("uchar", 0).list("ushort", "double", {});
+    writer.put("double", 45);
+    for (int i = 0; i < 3; ++i) {
+      if (i == 1)
+        writer.list("uchar", "short", {7, 8});
+      else
+        writer.list("uchar", "short", {});
+      writer.put("float", i).put("uchar", 9).put("double", 10 + i).put("float", 20 + i * i).put("float", 0.5);
+    }
+    writer.list("uchar", "uint", {77, 78}).put("short", -3).list("uchar", "int", {2, 1, 0});
+    writer.list("uchar", "float", {0, 0, 1, 0, 1, 1}); // the edges are missing: nothing needs them
+    const Mesh mesh = read(writer.text()).mesh;
+    EXPECT_EQ(mesh.positions, (std::vector<Vec3>{{20, 10, 0}, {21, 11, 1}, {24, 12, 2}}));
+    EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{2, 1, 0}}));
+    EXPECT_TRUE(mesh.normals.empty());
+    EXPECT_TRUE(mesh.uvs.empty()) << "u without v";
+  }
+}
+
+TEST(Ply, FacesMayComeBeforeVertices) {
+  for (const Format format : kFormats) {
+    Writer writer(format);
+    writer.line("element face 2").line("property list uchar int vertex_indices");
+    writer.line("element vertex 3").line("property float x").line("property float y").line("property float z");
+    writer.line("end_header").list("uchar", "int", {0, 1, 2}).list("uchar", "int", {0, 2, 3});
+    writer.row("float", {0, 0, 0, 1, 0, 0, 0, 1, 0});
+    const PlyMesh ply = read(writer.text());
+    EXPECT_EQ(ply.mesh.triangles, (std::vector<Triangle>{{0, 1, 2}}));
+    EXPECT_EQ(ply.dropped_triangles, 1u) << "vertex 3 does not exist";
+  }
+}
+
+TEST(Ply, UnderstandsAllNamesOfTextureCoordinates) {
+  constexpr std::pair<const char*, const char*> kNames[] = {
+      {"u", "v"}, {"s", "t"}, {"texture_u", "texture_v"}, {"texture_s", "texture_t"}};
+  for (const auto& [first, second] : kNames) {
+    Writer writer(Format::kLittle);
+    writer.line("element vertex 3").line("property float x").line("property float y").line("property float z");
+    writer.line(std::string("property float ") + second).line("property uchar pad");
+    writer.line(std::string("property float ") + first);
+    writer.line("element face 1").line("property list uchar int vertex_indices").line("end_header");
+    for (int i = 0; i < 3; ++i)
+      writer.row("float", {i * 1.0, i * i * 1.0, 0, 0.25 * i}).put("uchar", 1).put("float", i);
+    writer.list("uchar", "int", {0, 1, 2});
+    EXPECT_EQ(read(writer.text()).mesh.uvs, (std::vector<Vec2>{{0, 0}, {1, 0.25f}, {2, 0.5f}})) << first;
+  }
+}
+
+TEST(Ply, HeaderLinesMayEndInLfCrLfOrCr) {
+  for (const Format format : kFormats) {
+    const std::string text = square(format);
+    const size_t body = text.find("end_header\n") + 11;
+    for (const std::string line_end : {"\r\n", "\r"}) {
+      std::string other;
+      for (const char c : text.substr(0, body)) other += c == '\n' ? line_end : std::string(1, c);
+      expect_square(read(other + text.substr(body)));
+    }
+  }
+  // Where lines end in CR alone, a line feed after the header is data.
+  Writer writer(Format::kLittle);
+  writer.line("element vertex 3").line("property uchar x").line("property uchar y").line("property uchar z");
+  writer.line("element face 1").line("property list uchar uchar vertex_indices").line("end_header");
+  std::string text = writer.text();
+  std::replace(text.begin(), text.end(), '\n', '\r');
+  text += std::string("\n\0\0\1\0\0\2\1\0\3\0\1\2", 13);
+  EXPECT_EQ(read(text).mesh.positions[0], Vec3(10, 0, 0));
+}
+
+TEST(Ply, EveryTruncatedPrefixIsAnError) {
+  for (const Format format : kFormats) {
+    std::string text = square(format);
+    if (format == Format::kAscii) text.pop_back(); // the blank after the last number
+    for (size_t size = 0; size < text.size(); ++size) EXPECT_NE(error_of(text.substr(0, size)), "") << size;
+    EXPECT_EQ(error_of(text), "");
+  }
+}
+
+TEST(Ply, CountsBeyondTheFileAreRejectedBeforeAllocating) {
+  for (const char* count : {"2000000000", "18446744073709551615", "6148914691236517206"}) {
+    for (const Format format : kFormats) {
+      std::string vertices = square(format), faces = vertices;
+      vertices.replace(vertices.find("vertex 4") + 7, 1, count);
+      faces.replace(faces.find("face 2") + 5, 1, count);
+      EXPECT_NE(error_of(vertices), "") << count;
+      EXPECT_NE(error_of(faces), "") << count;
+    }
+  }
+  EXPECT_NE(error_of("ply\nformat ascii 1.0\nelement vertex 18446744073709551616\nend_header\n"), "");
+  EXPECT_NE(error_of("ply\nformat ascii 1.0\nelement vertex -3\nend_header\n"), "");
+}
+
+TEST(Ply, ListLengthsBeyondTheFileAreRejected) {
+  for (const Format format : kFormats) {
+    for (const double length : {4294967280.0, 2147483648.0, 40.0}) {
+      Writer writer(format);
+      writer.line("element vertex 3").line("property float x").line("property float y").line("property float z");
+      writer.line("element face 1").line("property list uint int vertex_indices").line("end_header");
+      writer.row("float", {0, 0, 0, 1, 0, 0, 0, 1, 0}).put("uint", length).row("int", {0, 1, 2});
+      EXPECT_NE(error_of(writer.text()).find("list is longer"), std::string::npos);
+    }
+    Writer negative(format);
+    negative.line("element x 1").line("property list int int nothing");
+    negative.line("element vertex 1").line("property float x").line("property float y").line("property float z");
+    negative.line("element face 1").line("property list int int vertex_indices").line("end_header").put("int", -1);
+    negative.row("float", {0, 0, 0}).list("int", "int", {0, 0, 0});
+    EXPECT_NE(error_of(negative.text()).find("not a count"), std::string::npos);
+  }
+}
+
+TEST(Ply, BadIndicesCostTheirTriangleAndOneReport) {
+  for (const Format format : kFormats) {
+    for (const char* type : {"int", "double"}) {
+      Writer writer(format);
+      writer.line("element vertex 4").line("property float x").line("property float y").line("property float z");
+      writer.line("element face 5").line(std::string("property list uchar ") + type + " vertex_indices");
+      writer.line("end_header").row("float", {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0});
+      writer.list("uchar", type, {0, 1, -1}).list("uchar", type, {0, 1, 2, 4}).list("uchar", type, {0, 2, 2147483647});
+      writer.list("uchar", type, {1, 1, 2}).list("uchar", type, {3, 1, 2});
+      Reports reports;
+      const PlyMesh ply = read(writer.text(), &reports);
+      EXPECT_EQ(ply.mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {3, 1, 2}}));
+      EXPECT_EQ(ply.dropped_triangles, 4u);
+      ASSERT_EQ(reports.messages.size(), 2u);
+      EXPECT_EQ(reports.messages[0], "3 triangles (the first is number 0) dropped: vertex index out of range");
+      EXPECT_EQ(reports.messages[1], "1 triangle (number 4) dropped: repeated vertex index");
+    }
+  }
+}
+
+TEST(Ply, AsciiNumbersAreReadToTheLastBit) {
+  const std::string header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                             "property double z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  const Mesh mesh = read(header + "0.1 -1e-3 +16777217\r\n\t1e-60 3.4028235e38 1.4e-45\n\n-0 007 .5 3 0 1 2").mesh;
+  EXPECT_EQ(mesh.positions[0], Vec3(0.1f, -1e-3f, 16777216.0f));
+  EXPECT_EQ(mesh.positions[1], Vec3(0.0f, std::numeric_limits<float>::max(), std::numeric_limits<float>::denorm_min()));
+  EXPECT_EQ(mesh.positions[2], Vec3(0.0f, 7.0f, 0.5f));
+  EXPECT_NE(error_of(header + "0 0 0 1 0 0 0 1,5 0 3 0 1 2").find("line 10: expected a number, found '1,5'"),
+            std::string::npos);
+  Reports reports;
+  EXPECT_EQ(read(header + "nan 0 0 1 0 1e400 -inf 1 0 3 0 1 2", &reports).dropped_triangles, 1u);
+  EXPECT_EQ(reports.messages.size(), 1u);
+}
+
+TEST(Ply, MalformedHeadersAreErrorsWithTheirLine) {
+  const std::string ok = square(Format::kAscii);
+  EXPECT_EQ(error_of(""), "not a PLY file: it does not begin with 'ply'");
+  EXPECT_NE(error_of("plywood\n" + ok), "");
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = ok;
+    text.replace(text.find(from), from.size(), to);
+    return error_of(text);
+  };
+  EXPECT_EQ(with("ascii", "utf8"), "line 2: unknown format 'utf8'");
+  EXPECT_EQ(with("1.0", "2.0"), "line 2: expected 'format NAME 1.0'");
+  EXPECT_EQ(with("format ascii 1.0\n", ""), "line 13: the header has no 'format'");
+  EXPECT_EQ(with("float x", "half x"), "line 4: unknown type 'half'");
+  EXPECT_EQ(with("float x", "float x extra"), "line 4: expected 'property TYPE NAME'");
+  EXPECT_EQ(with("element vertex 4", "element vertex 4k"), "line 3: expected 'element NAME COUNT'");
+  EXPECT_EQ(with("list uchar int", "list float int"), "line 13: the length of a list must have an integer type");
+  EXPECT_EQ(with("element face", "elephant face"), "line 12: unknown keyword 'elephant'");
+  EXPECT_EQ(with("float x", "float q"), "the vertices have no x, y and z");
+  EXPECT_EQ(with("vertex_indices", "face_indices"), "the faces have no list vertex_indices or vertex_index");
+  EXPECT_EQ(with("element vertex 4", "element face 0\nelement vertex 4"), "more than one element 'face'");
+  EXPECT_EQ(with("element vertex 4", "element vertex 0"), "no vertices");
+  EXPECT_EQ(with("element face 2", "element polygon 2"), "no faces");
+}
+
+/// Whatever the bytes, the result is an Error or a mesh that keeps its contract.
+void expect_error_or_sound_mesh(const std::string& text) {
+  try {
+    const Mesh mesh = read(text).mesh;
+    EXPECT_LE(mesh.triangles.size(), text.size());
+    EXPECT_TRUE(mesh.normals.empty() || mesh.normals.size() == mesh.positions.size());
+    EXPECT_TRUE(mesh.uvs.empty() || mesh.uvs.size() == mesh.positions.size());
+    for (const Triangle& t : mesh.triangles)
+      ASSERT_TRUE(t.x < mesh.positions.size() && t.y < mesh.positions.size() && t.z < mesh.positions.size());
+    for (const Vec3& p : mesh.positions) ASSERT_TRUE(is_finite(p));
+    for (const Vec3& n : mesh.normals) ASSERT_NEAR(glm::length(n), 1.0f, 1e-5f);
+  } catch (const Error&) {
+  }
+}
+
+TEST(Ply, DamagedFilesNeverGiveABrokenMesh) {
+  std::mt19937 random(7);
+  for (const Format format : kFormats) {
+    const std::string whole = square(format);
+    for (int i = 0; i < 4000; ++i) {
+      std::string text = whole;
+      for (uint32_t flips = 1 + random() % 4; flips > 0; --flips)
+        text[random() % text.size()] ^= static_cast<char>(1u << random() % 8);
+      if (random() % 4 == 0) text.erase(random() % text.size(), random() % 8);
+      expect_error_or_sound_mesh(text);
+    }
+  }
+}
+
+std::string slurp(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// Triangles of the PLY files that a scene file's plymesh lines name, as far as they exist.
+uint64_t count_scene_triangles(const std::filesystem::path& folder) {
+  std::ifstream scene(folder / "scene.pbrt");
+  uint64_t count = 0;
+  for (std::string line; std::getline(scene, line);) {
+    const size_t shape = line.find("Shape \"plymesh\""), begin = line.find("models/");
+    if (shape == line.npos || begin == line.npos || line.find('#') < shape) continue;
+    const std::filesystem::path file = folder / line.substr(begin, line.find('"', begin) - begin);
+    if (std::filesystem::exists(file)) count += read(slurp(file)).mesh.triangles.size();
+  }
+  return count;
+}
+
+TEST(Ply, RealScenesHaveTheirReferenceTriangleCounts) {
+  const char* const scenes = std::getenv("PACKTRACE_SCENES");
+  if (!scenes) GTEST_SKIP() << "PACKTRACE_SCENES is not set";
+  EXPECT_EQ(count_scene_triangles(std::filesystem::path(scenes) / "house"), 1571178u);
+  EXPECT_EQ(count_scene_triangles(std::filesystem::path(scenes) / "spaceship"), 318558u);
+  const Mesh bunny = read(slurp(std::filesystem::path(scenes) / "bunny/bun_zipper.ply")).mesh;
+  EXPECT_EQ(bunny.triangles.size(), 69451u);
+  EXPECT_EQ(bunny.positions[0], Vec3(-0.0378297f, 0.12794f, 0.00447467f));
+}
+
+} // namespace
+} // namespace packtrace

@@ -1,0 +1,133 @@
+#include "runtime/commands/output_file.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "runtime/commands/json_output.h"
+#include "runtime/image/file_bytes.h"
+#include "tests/runtime/image/image_test_support.h"
+#include "tests/runtime/image/temporary_folder.h"
+
+namespace packtrace {
+namespace {
+
+void write_text(const std::filesystem::path& path, std::string_view text) {
+  write_file_bytes(path, std::as_bytes(std::span(text)));
+}
+
+std::string read_text(const std::filesystem::path& path) {
+  const std::vector<std::byte> bytes = read_file_bytes(path);
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+TEST(OutputFile, AppearsOnlyWhenCommitted) {
+  const TemporaryFolder folder;
+  OutputFile file(folder / "a.txt", false);
+  write_text(file.path(), "new");
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.txt"));
+  file.commit();
+  EXPECT_EQ(read_text(folder / "a.txt"), "new");
+  EXPECT_EQ(folder.files(), 1u);
+}
+
+TEST(OutputFile, LeavesNothingWhenAbandoned) {
+  const TemporaryFolder folder;
+  write_text(folder / "a.txt", "old");
+  {
+    const OutputFile file(folder / "a.txt", true);
+    write_text(file.path(), "half");
+    EXPECT_EQ(folder.files(), 2u);
+  }
+  EXPECT_EQ(read_text(folder / "a.txt"), "old");
+  EXPECT_EQ(folder.files(), 1u);
+}
+
+TEST(OutputFile, ReplacesOnlyWithForce) {
+  const TemporaryFolder folder;
+  write_text(folder / "a.txt", "old");
+  EXPECT_EQ(error_kind_of([&] { OutputFile(folder / "a.txt", false); }), ErrorKind::kIo);
+  OutputFile file(folder / "a.txt", true);
+  write_text(file.path(), "new");
+  file.commit();
+  EXPECT_EQ(read_text(folder / "a.txt"), "new");
+}
+
+TEST(OutputFile, DoesNotReplaceWhatAppearedMeanwhile) {
+  const TemporaryFolder folder;
+  {
+    OutputFile file(folder / "a.txt", false);
+    write_text(folder / "a.txt", "somebody else's");
+    EXPECT_EQ(error_kind_of([&] { file.commit(); }), ErrorKind::kIo);
+  }
+  EXPECT_EQ(read_text(folder / "a.txt"), "somebody else's");
+  EXPECT_EQ(folder.files(), 1u);
+}
+
+TEST(OutputFile, RefusesWhatIsNotAFile) {
+  const TemporaryFolder folder;
+  write_text(folder / "file", "");
+  EXPECT_EQ(error_kind_of([&] { OutputFile(folder.path(), true); }), ErrorKind::kIo);
+  EXPECT_EQ(error_kind_of([&] { OutputFile(folder / "", true); }), ErrorKind::kIo);
+  EXPECT_EQ(error_kind_of([&] { OutputFile("/dev/null", true); }), ErrorKind::kIo);
+  EXPECT_EQ(error_kind_of([&] { OutputFile(folder / "missing" / "a", true); }), ErrorKind::kIo);
+  EXPECT_EQ(error_kind_of([&] { OutputFile(folder / "file" / "a", true); }), ErrorKind::kIo);
+  EXPECT_EQ(error_kind_of([&] { OutputFile("", true); }), ErrorKind::kUsage);
+}
+
+TEST(OutputFile, WritesThroughSymbolicLinks) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "elsewhere");
+  write_text(folder / "elsewhere" / "a.txt", "old");
+  std::filesystem::create_symlink(folder / "elsewhere" / "a.txt", folder / "link");
+  EXPECT_EQ(error_kind_of([&] { OutputFile(folder / "link", false); }), ErrorKind::kIo);
+  OutputFile file(folder / "link", true);
+  write_text(file.path(), "new");
+  file.commit();
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
+  EXPECT_EQ(read_text(folder / "elsewhere" / "a.txt"), "new");
+}
+
+TEST(OutputFile, UnfinishedFilesCanBeRemovedAtOnce) {
+  const TemporaryFolder folder;
+  OutputFile kept(folder / "kept", false);
+  kept.commit();
+  const OutputFile a(folder / "a", false), b(folder / "b", false);
+  EXPECT_EQ(folder.files(), 3u);
+  remove_unfinished_output();
+  EXPECT_EQ(folder.files(), 1u);
+  EXPECT_TRUE(std::filesystem::exists(folder / "kept"));
+}
+
+TEST(JsonOutput, WritesFilesThatParse) {
+  const TemporaryFolder folder;
+  JsonOutput json(folder / "a.json", false);
+  EXPECT_TRUE(json.wanted());
+  EXPECT_FALSE(json.to_stdout());
+  json.write({{"psnr", std::numeric_limits<double>::infinity()}, {"nan", std::nan("")}, {"name", "bad \xff byte"}});
+  const nlohmann::json read = nlohmann::json::parse(read_text(folder / "a.json"));
+  EXPECT_TRUE(read["psnr"].is_null());
+  EXPECT_TRUE(read["nan"].is_null());
+  EXPECT_EQ(read["name"], "bad \xef\xbf\xbd byte");
+}
+
+TEST(JsonOutput, DashIsStandardOutput) {
+  JsonOutput json("-", false);
+  EXPECT_TRUE(json.to_stdout());
+  testing::internal::CaptureStdout();
+  json.write({{"a", 1}});
+  EXPECT_EQ(testing::internal::GetCapturedStdout(), "{\n  \"a\": 1\n}\n");
+}
+
+TEST(JsonOutput, NowhereIsNowhere) {
+  JsonOutput json("", false);
+  EXPECT_FALSE(json.wanted());
+  testing::internal::CaptureStdout();
+  json.write({{"a", 1}});
+  EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
+}
+
+} // namespace
+} // namespace packtrace

@@ -1,0 +1,225 @@
+#include <cmath>
+#include <cstring>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "runtime/trace/float_source.h"
+#include "tests/runtime/trace/test_scenes.h"
+
+namespace packtrace {
+namespace {
+
+using test::add_object;
+using test::add_shape;
+using test::ao_at;
+using test::camera_at;
+using test::quad;
+using test::render;
+using test::Rendered;
+
+AoConfig visibility(float radius, uint32_t spp = 16) {
+  AoConfig config;
+  config.radius = radius;
+  config.spp = spp;
+  config.falloff = false;
+  return config;
+}
+
+/// Floor y = 0 and a ceiling y = 1 of some material over the origin.
+Scene roofed(MaterialFlags roof_flags) {
+  Scene scene;
+  add_shape(scene, quad({-1000, 0, -1000}, {0, 0, 2000}, {2000, 0, 0}));
+  add_shape(scene, quad({-1000, 1, -1000}, {2000, 0, 0}, {0, 0, 2000}), roof_flags);
+  return scene;
+}
+
+TEST(AoVisibility, OnlyOccludingMaterialsOcclude) {
+  const auto ao = [](MaterialFlags flags) { return ao_at(roofed(flags), {0, 0, 0}, {0, 1, 0}, visibility(1e6f)); };
+  EXPECT_LT(ao(0), 1e-4);
+  EXPECT_LT(ao(kInvisible), 1e-4);
+  EXPECT_LT(ao(kMirror | kEmissive), 1e-4);
+  EXPECT_EQ(ao(kTransmissive), 1.0);
+  EXPECT_EQ(ao(kNoShadow), 1.0);
+  EXPECT_EQ(ao(kAbsent), 1.0);
+}
+
+TEST(AoVisibility, MixedMaterialsOfOneInstancedObjectKeepTheirClasses) {
+  // Half of the roof is glass, half is not, in one object.
+  Scene scene;
+  const uint32_t object = add_object(scene, quad({-1000, 1, -1000}, {1000, 0, 0}, {0, 0, 2000}));
+  add_object(scene, quad({0, 1, -1000}, {1000, 0, 0}, {0, 0, 2000}), kTransmissive);
+  scene.objects[object].shapes.push_back(scene.objects[1].shapes[0]);
+  scene.objects.pop_back();
+  scene.instances.push_back({object, Affine(test::placed({0, 0, 0}, DVec3(1), 180))});
+  EXPECT_NEAR(ao_at(scene, {0, 0, 0}, {0, 1, 0}, visibility(1e6f, 256)), 0.5, 1e-3);
+}
+
+/// Stripes of half opaque, half absent texels, much finer than the roof is high.
+AlphaMask stripes() { return {64, 1, WrapMode::kRepeat, Vec2(64000), Vec2(0), {0u, ~0u}}; }
+
+TEST(AoVisibility, AlphaMasksOpenTheRoofForTheirRays) {
+  // 1/2 but for the rims, which bilinear footprints make opaque.
+  Scene scene = roofed(kAlphaMask);
+  scene.masks.push_back(stripes());
+  scene.materials[1].alpha_mask = 0;
+  const double all_rays = ao_at(scene, {0, 0, 0}, {0, 1, 0}, visibility(1e6f, 256));
+  EXPECT_NEAR(all_rays, 0.5, 0.05);
+  scene.materials[1] = {"", kShadowAlphaMask, Vec3(0.5f), kNoMask, 0};
+  EXPECT_EQ(ao_at(scene, {0, 0, 0}, {0, 1, 0}, visibility(1e6f, 256)), all_rays);
+  AoConfig closest = visibility(1e6f, 256);
+  closest.interreflection = 1e-6f; // the closest-hit path
+  EXPECT_NEAR(ao_at(scene, {0, 0, 0}, {0, 1, 0}, closest), all_rays, 1e-5);
+}
+
+TEST(AoRobustness, ConvexBodiesDoNotShadowThemselves) {
+  const Mesh mesh = test::sphere({0, 0, 0}, 1, 40);
+  struct Place {
+    DVec3 translation, scale;
+  };
+  for (const auto& [translation, scale] :
+       {Place{{0, 0, 0}, DVec3(1)}, Place{{1000, 200, -3000}, DVec3(1)}, Place{{1e5, 0, 1e5}, DVec3(10)},
+        Place{{0, 0, 0}, {0.1, 3, 1}}, Place{{20, 30, 10}, {-1, 5, 0.2}}})
+    for (const bool instanced : {false, true}) {
+      const DAffine place = test::placed(translation, scale, 37, {1, 3, 2});
+      Scene scene;
+      if (instanced) {
+        add_object(scene, mesh);
+        scene.instances.push_back({0, Affine(place)});
+        // A second copy far away makes unit space larger than the object.
+        scene.instances.push_back({0, Affine(test::placed(translation + DVec3(1000, 0, 0)))});
+      } else {
+        add_shape(scene, mesh, 0, place);
+      }
+      const double size = 3.0 * std::max({std::abs(scale.x), std::abs(scale.y), std::abs(scale.z)});
+      const Rendered image = render(scene, camera_at(translation - DVec3(0, 0, size), translation), {96, 96},
+                                    visibility(static_cast<float>(size)));
+      uint64_t hits = 0;
+      double occluded = 0.0;
+      for (const float ao : image.ao.ao) {
+        if (ao == kInvalidAo) continue;
+        ++hits;
+        occluded += 1.0 - ao;
+      }
+      EXPECT_GT(hits, 100u);
+      EXPECT_LE(occluded / static_cast<double>(hits), 5e-4) << translation.x << " " << scale.y << " " << instanced;
+    }
+}
+
+TEST(AoRobustness, InstancesGiveTheAoOfBakedGeometry) {
+  const Mesh mesh = test::box({-1, -1, -1}, {1, 1, 1});
+  for (const DVec3 scale : {DVec3(-1, 1, 1), DVec3(0.3, 2, 1)}) {
+    Scene baked, instanced;
+    add_shape(baked, quad({-50, -1, -50}, {0, 0, 100}, {100, 0, 0}));
+    instanced = baked;
+    const DAffine place = test::placed({0, 0.5, 0}, scale, 20, {0, 1, 0.2});
+    add_shape(baked, mesh, 0, place);
+    add_object(instanced, mesh);
+    instanced.instances.push_back({0, Affine(place)});
+    const Camera camera = camera_at({3, 4, -6}, {0, 0, 0});
+    const Rendered a = render(baked, camera, {64, 64}, visibility(3)), b = render(instanced, camera, {64, 64}, visibility(3));
+    uint32_t different = 0;
+    for (size_t i = 0; i < a.ao.ao.size(); ++i) different += std::abs(a.ao.ao[i] - b.ao.ao[i]) > 0.05f;
+    EXPECT_LE(different, 4u);
+  }
+}
+
+TEST(AoRobustness, AnyScaleGivesTheSameImage) {
+  const auto at_scale = [](double scale) {
+    Scene scene;
+    const auto s = static_cast<float>(scale);
+    add_shape(scene, quad({-9 * s, 0, -9 * s}, {0, 0, 18 * s}, {18 * s, 0, 0}));
+    add_shape(scene, test::sphere({0, s, 0}, s, 24));
+    add_object(scene, test::box({-s, -s, -s}, {s, s, s}));
+    scene.instances.push_back({0, Affine(test::placed(DVec3(3, 1, 1) * scale, {1, 1, -1}, 30))});
+    AoConfig config = visibility(4 * s);
+    config.falloff = true;
+    return render(scene, camera_at(DVec3(3, 4, -9) * scale, DVec3(0, 0, 0)), {64, 48}, config);
+  };
+  const Rendered one = at_scale(1.0);
+  double sum = 0.0;
+  for (const float ao : one.ao.ao) sum += ao;
+  EXPECT_LT(sum / 3072, 0.99);
+  for (const double scale : {0x1p-60, 0x1p60, 1e-20, 1e20, 1e-30, 1e30}) {
+    const Rendered other = at_scale(scale);
+    uint32_t different = 0;
+    for (size_t i = 0; i < one.ao.ao.size(); ++i) different += std::abs(one.ao.ao[i] - other.ao.ao[i]) > 0.02f;
+    EXPECT_LE(different, 3u) << scale;
+    for (size_t i = 0; i < one.ao.ao.size(); ++i) {
+      if (one.ao.ao[i] == kInvalidAo || other.ao.ao[i] == kInvalidAo) continue;
+      ASSERT_NEAR(other.gbuffer.view_z[i] / scale, one.gbuffer.view_z[i], 1e-2 * one.gbuffer.view_z[i]);
+    }
+  }
+}
+
+TEST(AoFrames, FramesOfOneSampleAreOneFrameOfMany) {
+  Scene scene = roofed(0);
+  const FloatSource source(scene);
+  const EmbreeScene embree(source, {});
+  const GBuffer gbuffer = test::point_gbuffer({0, 0, 0}, {0, 1, 0}, 1e-5f);
+  Progress progress;
+  AoFrame whole, part;
+  trace_ao(source, embree, gbuffer, visibility(1.5f, 32), 3, whole, progress);
+  std::vector<double> sum(gbuffer.size.pixels());
+  for (uint32_t frame = 0; frame < 32; ++frame) {
+    trace_ao(source, embree, gbuffer, visibility(1.5f, 1), 96 + frame, part, progress);
+    for (size_t i = 0; i < sum.size(); ++i) sum[i] += part.ao[i];
+  }
+  for (size_t i = 0; i < sum.size(); ++i) EXPECT_FLOAT_EQ(whole.ao[i], static_cast<float>(sum[i] / 32));
+}
+
+TEST(AoFrames, MissesAreInvalidEvenOverOldContents) {
+  const Scene scene = roofed(0);
+  const FloatSource source(scene);
+  const EmbreeScene embree(source, {});
+  GBuffer gbuffer;
+  gbuffer.resize({9, 7});
+  AoFrame frame;
+  frame.resize({9, 7});
+  frame.ao.assign(63, 0.5f);
+  frame.hit_distance.assign(63, 3.0f);
+  Progress progress;
+  trace_ao(source, embree, gbuffer, visibility(1), 0, frame, progress);
+  for (size_t i = 0; i < 63; ++i) {
+    EXPECT_EQ(frame.ao[i], kInvalidAo);
+    EXPECT_EQ(frame.hit_distance[i], 0.0f);
+  }
+}
+
+TEST(AoFrames, SameBytesForAnyThreadCountAndBuild) {
+  Scene scene = roofed(0);
+  scene.shapes.pop_back();
+  for (int i = 0; i < 12; ++i)
+    add_shape(scene, test::sphere({float(i % 4), 0.5f, float(i / 4)}, 0.45f, 20), i % 3 == 0 ? kTransmissive : 0u);
+  const Camera camera = camera_at({2, 3, -5}, {2, 0, 1});
+  AoConfig config = visibility(2, 2);
+  for (const bool falloff : {false, true}) {
+    config.falloff = falloff;
+    const Rendered reference = render(scene, camera, {150, 90}, config);
+    for (const size_t threads : {size_t{1}, size_t{2}, size_t{4}}) {
+      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+      const Rendered again = render(scene, camera, {150, 90}, config);
+      EXPECT_EQ(std::memcmp(reference.ao.ao.data(), again.ao.ao.data(), again.ao.ao.size() * sizeof(float)), 0);
+      EXPECT_EQ(std::memcmp(reference.ao.hit_distance.data(), again.ao.hit_distance.data(),
+                            again.ao.hit_distance.size() * sizeof(float)),
+                0);
+    }
+  }
+}
+
+TEST(AoFrames, AllBvhVariantsAgree) {
+  Scene scene = roofed(0);
+  scene.shapes.pop_back();
+  for (int i = 0; i < 9; ++i) add_shape(scene, test::sphere({float(i % 3), 0.5f, float(i / 3)}, 0.49f, 24));
+  const Camera camera = camera_at({2, 3, -5}, {1, 0, 1});
+  const Rendered reference = render(scene, camera, {96, 64}, visibility(2));
+  for (const EmbreeConfig config : {EmbreeConfig{BvhQuality::kHigh, false}, EmbreeConfig{BvhQuality::kMedium, true}}) {
+    const Rendered other = render(scene, camera, {96, 64}, visibility(2), config);
+    uint32_t different = 0;
+    for (size_t i = 0; i < other.ao.ao.size(); ++i) different += reference.ao.ao[i] != other.ao.ao[i];
+    EXPECT_LE(different, 20u);
+  }
+}
+
+} // namespace
+} // namespace packtrace

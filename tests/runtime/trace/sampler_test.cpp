@@ -1,0 +1,127 @@
+#include "runtime/ao/sampler.h"
+
+#include <set>
+
+#include <gtest/gtest.h>
+
+namespace packtrace {
+namespace {
+
+const SamplerKind kKinds[] = {SamplerKind::kSpaceTimeNet, SamplerKind::kPixelSobol, SamplerKind::kIndependent};
+
+/// True if every elementary box of a (0, k, 2)-net in base 2 holds exactly one of the 2^k points.
+bool is_net(const std::vector<Vec2>& points) {
+  const auto count = static_cast<uint32_t>(points.size());
+  for (uint32_t columns = 1; columns <= count; columns *= 2) {
+    const uint32_t rows = count / columns;
+    std::set<uint32_t> boxes;
+    for (const Vec2 p : points)
+      boxes.insert(static_cast<uint32_t>(p.x * float(columns)) * rows + static_cast<uint32_t>(p.y * float(rows)));
+    if (boxes.size() != count) return false;
+  }
+  return true;
+}
+
+/// Points of an aligned block of pixels over a run of samples.
+std::vector<Vec2> block_points(const PixelSampler& sampler, uint32_t x0, uint32_t y0, uint32_t size, uint64_t first,
+                               uint64_t count) {
+  std::vector<Vec2> points;
+  for (uint64_t n = first; n < first + count; ++n)
+    for (uint32_t y = y0; y < y0 + size; ++y)
+      for (uint32_t x = x0; x < x0 + size; ++x)
+        points.push_back(PixelSampler::point(sampler.pixel(x, y), sampler.number(n)));
+  return points;
+}
+
+TEST(PixelSampler, EveryPixelIsANetOverTime) {
+  for (const SamplerKind kind : {SamplerKind::kSpaceTimeNet, SamplerKind::kPixelSobol}) {
+    const PixelSampler sampler(kind, 7);
+    for (const uint64_t count : {2u, 4u, 8u, 16u, 32u, 64u, 256u, 1024u})
+      EXPECT_TRUE(is_net(block_points(sampler, 13, 5, 1, 3 * count, count))) << count;
+    EXPECT_TRUE(is_net(block_points(sampler, 13, 5, 1, 65536 + 64, 64))); // past the sequence's end: scrambled anew
+  }
+}
+
+TEST(PixelSampler, AlignedPixelBlocksAreNetsInEveryFrame) {
+  const PixelSampler sampler(SamplerKind::kSpaceTimeNet, 1);
+  for (const uint64_t frame : {0u, 1u, 17u, 1000u}) {
+    EXPECT_TRUE(is_net(block_points(sampler, 8, 24, 8, frame, 1)));
+    EXPECT_TRUE(is_net(block_points(sampler, 4, 8, 4, frame, 1)));
+    EXPECT_TRUE(is_net(block_points(sampler, 2, 6, 2, frame, 1)));
+  }
+}
+
+TEST(PixelSampler, BlocksAndFramesTogetherAreNets) {
+  const PixelSampler sampler(SamplerKind::kSpaceTimeNet, 99);
+  EXPECT_TRUE(is_net(block_points(sampler, 2, 4, 2, 8, 4)));
+  EXPECT_TRUE(is_net(block_points(sampler, 4, 4, 4, 16, 16)));
+  EXPECT_TRUE(is_net(block_points(sampler, 8, 0, 8, 64, 64)));
+}
+
+TEST(PixelSampler, PointsLieInTheUnitSquareAndFillIt) {
+  for (const SamplerKind kind : kKinds) {
+    const PixelSampler sampler(kind, 3);
+    double sum_x = 0, sum_y = 0, sum_xy = 0;
+    for (const Vec2 p : block_points(sampler, 0, 0, 64, 5, 4)) {
+      ASSERT_TRUE(p.x >= 0.0f && p.x < 1.0f && p.y >= 0.0f && p.y < 1.0f);
+      sum_x += p.x, sum_y += p.y, sum_xy += p.x * p.y;
+    }
+    const double n = 64 * 64 * 4;
+    EXPECT_NEAR(sum_x / n, 0.5, 0.01);
+    EXPECT_NEAR(sum_y / n, 0.5, 0.01);
+    EXPECT_NEAR(sum_xy / n, 0.25, 0.01);
+  }
+}
+
+TEST(PixelSampler, SeedsPixelsAndSamplesAllMatter) {
+  for (const SamplerKind kind : kKinds) {
+    const PixelSampler a(kind, 1), b(kind, 2), c(kind, uint64_t{1} << 32);
+    std::set<std::pair<float, float>> distinct;
+    const auto add = [&](Vec2 p) { distinct.insert({p.x, p.y}); };
+    add(PixelSampler::point(a.pixel(1, 2), a.number(0)));
+    add(PixelSampler::point(b.pixel(1, 2), b.number(0)));
+    add(PixelSampler::point(c.pixel(1, 2), c.number(0)));
+    add(PixelSampler::point(a.pixel(2, 1), a.number(0)));
+    add(PixelSampler::point(a.pixel(1, 2), a.number(1)));
+    add(PixelSampler::point(a.pixel(1, 2), a.number(65536)));
+    EXPECT_EQ(distinct.size(), 6u);
+  }
+}
+
+TEST(PixelSampler, BlocksAreDecorrelated) {
+  const PixelSampler sampler(SamplerKind::kSpaceTimeNet, 0);
+  std::set<std::pair<uint32_t, uint32_t>> seeds;
+  for (uint32_t y = 0; y < 135; ++y)
+    for (uint32_t x = 0; x < 240; ++x) {
+      const PixelSampler::Pixel pixel = sampler.pixel(8 * x, 8 * y);
+      seeds.insert({pixel.seed_x, pixel.seed_y});
+    }
+  EXPECT_EQ(seeds.size(), 240u * 135u);
+}
+
+TEST(CosineDirection, IsUnitAndCosineWeighted) {
+  const PixelSampler sampler(SamplerKind::kPixelSobol, 4);
+  Vec3 sum(0);
+  double z_squared = 0;
+  constexpr uint32_t kCount = 16384;
+  for (uint32_t n = 0; n < kCount; ++n) {
+    const Vec3 d = cosine_direction(PixelSampler::point(sampler.pixel(0, 0), sampler.number(n)));
+    ASSERT_NEAR(glm::length(d), 1.0f, 1e-6f);
+    ASSERT_GE(d.z, 0.0f);
+    sum += d;
+    z_squared += d.z * d.z;
+  }
+  EXPECT_NEAR(sum.x / kCount, 0.0, 1e-3);
+  EXPECT_NEAR(sum.y / kCount, 0.0, 1e-3);
+  EXPECT_NEAR(sum.z / kCount, 2.0 / 3.0, 1e-3);
+  EXPECT_NEAR(z_squared / kCount, 0.5, 1e-3);
+}
+
+TEST(CosineDirection, HandlesTheSquaresCornersAndCentre) {
+  for (const Vec2 p : {Vec2(0, 0), Vec2(0x1.fffffep-1f, 0), Vec2(0, 0x1.fffffep-1f), Vec2(0.5f, 0.5f)})
+    EXPECT_NEAR(glm::length(cosine_direction(p)), 1.0f, 1e-6f);
+  EXPECT_EQ(cosine_direction({0.5f, 0.5f}).z, 1.0f);
+}
+
+} // namespace
+} // namespace packtrace
