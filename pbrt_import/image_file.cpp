@@ -12,6 +12,14 @@
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfRgbaFile.h>
+
+#define STB_IMAGE_STATIC // other libraries of a program may bring their own copy
+#define STB_IMAGE_IMPLEMENTATION
+#define STBI_NO_STDIO
+#define STBI_NO_GIF
+#define STBI_NO_PIC
+#define STBI_NO_PNM
+#define STBI_NO_PSD
 #include <stb/stb_image.h>
 
 #include "pbrt_import/number.h"
@@ -61,8 +69,8 @@ void check_size(uint64_t width, uint64_t height, uint64_t bytes_per_pixel, uint6
   if (width == 0 || height == 0) fail("the image has no pixels");
   constexpr uint64_t kMaxSide = 1u << 24;
   if (width > kMaxSide || height > kMaxSide || width * height > max_bytes / bytes_per_pixel)
-    throw Error(ErrorKind::kLimitExceeded,
-                "decoding its " + std::to_string(width) + " x " + std::to_string(height) + " pixels needs too much memory");
+    throw Error(ErrorKind::kLimitExceeded, "decoding its " + std::to_string(width) + " x " + std::to_string(height) +
+                                               " pixels needs too much memory");
 }
 
 /// Source: IEC 61966-2-1.

@@ -1,1 +1,73 @@
-// placeholder while the module is being written
+#include "pbrt_import/import_scene.h"
+
+#include <string>
+
+#include "pbrt_import/file_names.h"
+#include "pbrt_import/parser.h"
+#include "pbrt_import/reporter.h"
+#include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene_builder.h"
+#include "pbrt_import/source_stack.h"
+
+namespace packtrace {
+namespace {
+
+void check_options(const ImportOptions& options) {
+  const auto require = [](bool ok, const char* what) {
+    if (!ok) throw Error(ErrorKind::kUsage, std::string("import options: ") + what);
+  };
+  require(options.max_include_depth >= 1, "max_include_depth must be at least 1");
+  require(options.max_included_files >= 1, "max_included_files must be at least 1");
+  require(options.max_nesting >= 1, "max_nesting must be at least 1");
+  require(options.memory_budget_bytes >= 1, "memory_budget_bytes must be at least 1");
+  require(options.tessellation_tolerance >= 1e-6 && options.tessellation_tolerance <= 0.5,
+          "tessellation_tolerance must lie within [1e-6, 0.5]");
+}
+
+/// In strict mode, whatever was reported is a reason to fail.
+void require_clean(const Diagnostics& diagnostics) {
+  const uint64_t problems = diagnostics.count(Severity::kError) + diagnostics.count(Severity::kWarning);
+  if (problems == 0) return;
+  for (const Diagnostic& diagnostic : diagnostics.entries()) {
+    if (diagnostic.severity == Severity::kNote) continue;
+    const std::string place = to_string(diagnostic.location);
+    throw Error(ErrorKind::kInput, (place.empty() ? std::string() : place + ": ") + diagnostic.message + " (" +
+                                       std::to_string(problems) + " problems in all, not accepted in strict mode)");
+  }
+}
+
+} // namespace
+
+ImportResult import_scene(const std::filesystem::path& main_file, const ImportOptions& options,
+                          Diagnostics& diagnostics, Progress& progress) {
+  check_options(options);
+  SourceFiles files;
+  Reporter reporter(files, diagnostics);
+  const SourceLimits limits{options.max_include_depth, options.max_included_files, options.memory_budget_bytes};
+  SourceStack source(main_file, limits, files, reporter);
+  std::error_code error;
+  const uint64_t main_bytes = std::filesystem::file_size(main_file, error);
+  progress.begin("reading scene", error ? 0 : main_bytes);
+  const FileNames file_names(main_file.parent_path(), options.allow_files_outside_scene_folder);
+  Parser parser(source, file_names, reporter);
+  SceneBuilder builder(options, file_names, reporter);
+  Directive directive;
+  constexpr uint64_t kProgressStep = 1024; // directives
+  uint64_t reported_bytes = 0;
+  for (uint64_t count = 0; parser.next(directive); ++count) {
+    builder.handle(directive);
+    if (count % kProgressStep != 0) continue;
+    const uint64_t bytes = source.bytes_read();
+    progress.advance(bytes - reported_bytes);
+    reported_bytes = bytes;
+  }
+  reporter.next_directive(); // what is missing at the end comes after everything else
+  ImportResult result = builder.finish(source.place(), progress);
+  result.statistics.files_read += source.files_opened();
+  result.statistics.bytes_read += source.bytes_read();
+  reporter.finish();
+  if (options.strict) require_clean(diagnostics);
+  return result;
+}
+
+} // namespace packtrace

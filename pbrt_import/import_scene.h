@@ -24,7 +24,7 @@ struct ImportOptions {
 /// What an import read, for reports.
 struct ImportStatistics {
   uint64_t directives = 0;
-  uint64_t files_read = 0;                ///< scene text, PLY and image files, each once
+  uint64_t files_read = 0;                ///< scene text (each time it is included), PLY and image files
   uint64_t bytes_read = 0;                ///< their content, inflated
   std::map<std::string, uint64_t> shapes; ///< Shape directives by kind, whether or not they could be used
   uint64_t shapes_skipped = 0;            ///< not in the scene because of an error in them

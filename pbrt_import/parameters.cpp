@@ -138,6 +138,12 @@ std::span<const int32_t> ParameterList::integers(std::string_view name) const {
   return found ? std::span<const int32_t>(found->integers) : std::span<const int32_t>();
 }
 
+std::vector<float> ParameterList::take_floats(std::string_view name, ParameterType type) {
+  const Parameter* const found = find(name, {type});
+  if (!found) return {};
+  return std::move(parameters_[static_cast<size_t>(found - parameters_.data())].floats);
+}
+
 void ParameterList::mark_used(std::span<const std::string_view> names) const {
   for (const std::string_view name : names)
     if (!was_asked(name)) asked_.push_back(name);
@@ -155,8 +161,8 @@ std::string_view closest_name(std::string_view name, std::span<const std::string
   constexpr size_t kLongestName = 64;
   if (name.empty() || name.size() > kLongestName) return {};
   std::string_view best;
-  // Two edits, but no more than a third of the name: "fov" is no misspelling of "lod".
-  size_t best_distance = std::min<size_t>(4, 2 * ((name.size() + 1) / 3)) + 1;
+  // Two edits, but no more than a third of the name: "Ks" is no misspelling of "Kd". A difference in case always is.
+  size_t best_distance = 2 * std::min<size_t>(2, name.size() / 3) + 2;
   for (const std::string_view candidate : candidates) {
     if (candidate == name || candidate.size() > name.size() + 2 || name.size() > candidate.size() + 2) continue;
     if (const size_t distance = doubled_distance(name, candidate); distance < best_distance)

@@ -78,6 +78,9 @@ public:
   std::span<const float> floats(std::string_view name, ParameterType type) const;
   std::span<const int32_t> integers(std::string_view name) const;
 
+  /// Moves all values out; empty if there are none.
+  std::vector<float> take_floats(std::string_view name, ParameterType type);
+
   /// Declares names as known without needing their values.
   void mark_used(std::span<const std::string_view> names) const;
 

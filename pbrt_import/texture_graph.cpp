@@ -1,6 +1,8 @@
 #include "pbrt_import/texture_graph.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 
 namespace packtrace {
@@ -11,6 +13,17 @@ bool is_zero(Vec3 v) { return v.x == 0.0f && v.y == 0.0f && v.z == 0.0f; }
 bool is_usable(const TextureMapping& mapping) {
   return mapping.is_uv && mapping.scale.x != 0.0f && mapping.scale.y != 0.0f && std::isfinite(mapping.scale.x) &&
          std::isfinite(mapping.scale.y) && std::isfinite(mapping.offset.x) && std::isfinite(mapping.offset.y);
+}
+
+/// @param x,y texel, whole numbers, possibly outside the image
+bool texel_nonzero(const ImageSummary& image, WrapMode wrap, double x, double y) {
+  const double w = image.width, h = image.height;
+  if (wrap == WrapMode::kRepeat) x -= w * std::floor(x / w), y -= h * std::floor(y / h);
+  if (wrap == WrapMode::kBlack && !(x >= 0.0 && x < w && y >= 0.0 && y < h)) return false;
+  const auto column = static_cast<uint32_t>(std::clamp(x, 0.0, w - 1.0));
+  const auto row = static_cast<uint32_t>(std::clamp(y, 0.0, h - 1.0));
+  return (image.nonzero[static_cast<size_t>(row) * AlphaMask::row_words(image.width) + column / 32] >> (column % 32)) &
+         1u;
 }
 
 } // namespace
@@ -102,13 +115,20 @@ Vec3 TextureGraph::average(Node node) {
     const NodeData& data = nodes_[averages_.size()];
     Vec3 value = data.value;
     switch (data.kind) {
-    case Kind::kConstant: break;
-    case Kind::kImage: value *= images_[data.a].missing ? Vec3(1.0f) : images_[data.a].summary.average; break;
-    case Kind::kProduct: value = averages_[data.a] * averages_[data.b]; break;
+    case Kind::kConstant:
+      break;
+    case Kind::kImage:
+      value *= images_[data.a].missing ? Vec3(1.0f) : images_[data.a].summary.average;
+      break;
+    case Kind::kProduct:
+      value = averages_[data.a] * averages_[data.b];
+      break;
     case Kind::kMix:
       value = (Vec3(1.0f) - averages_[data.c]) * averages_[data.a] + averages_[data.c] * averages_[data.b];
       break;
-    case Kind::kCheckerboard: value = 0.5f * (averages_[data.a] + averages_[data.b]); break;
+    case Kind::kCheckerboard:
+      value = 0.5f * (averages_[data.a] + averages_[data.b]);
+      break;
     }
     averages_.push_back(value);
   }
@@ -117,24 +137,21 @@ Vec3 TextureGraph::average(Node node) {
 
 bool TextureGraph::nonzero(const NodeData& data, Vec2 uv, std::span<const uint8_t> operands) const {
   switch (data.kind) {
-  case Kind::kConstant: return !is_zero(data.value);
+  case Kind::kConstant:
+    return !is_zero(data.value);
   case Kind::kImage: {
     const ImageRequest& image = images_[data.a];
     if (is_zero(data.value)) return false;
     if (image.missing || !is_usable(data.mapping)) return true;
     // The texel itself, not pbrt's bilinear neighbourhood: AlphaMaskView looks at that.
     const Vec2 st = uv * data.mapping.scale + data.mapping.offset;
-    const double x = std::floor(static_cast<double>(st.x) * image.summary.width);
-    const double y = std::floor((1.0 - static_cast<double>(st.y)) * image.summary.height);
-    const AlphaMask mask{image.summary.width, image.summary.height, data.wrap, Vec2(1.0f), Vec2(0.0f), {}};
-    AlphaMaskView texels = view(mask);
-    texels.words = image.summary.nonzero;
-    const Vec2 centre((static_cast<float>(x) + 0.5f) / static_cast<float>(mask.width),
-                      1.0f - (static_cast<float>(y) + 0.5f) / static_cast<float>(mask.height));
-    return texels.opaque(centre);
+    return texel_nonzero(image.summary, data.wrap, std::floor(static_cast<double>(st.x) * image.summary.width),
+                         std::floor((1.0 - static_cast<double>(st.y)) * image.summary.height));
   }
-  case Kind::kProduct: return operands[0] && operands[1];
-  case Kind::kMix: return operands[0] || (operands[1] && operands[2]);
+  case Kind::kProduct:
+    return operands[0] && operands[1];
+  case Kind::kMix:
+    return operands[0] || (operands[1] && operands[2]); // an amount of exactly 1 is not told apart
   case Kind::kCheckerboard: {
     if (!is_usable(data.mapping)) return operands[0] || operands[1];
     const Vec2 st = uv * data.mapping.scale + data.mapping.offset;
@@ -144,3 +161,70 @@ bool TextureGraph::nonzero(const NodeData& data, Vec2 uv, std::span<const uint8_
   }
   return true;
 }
+
+TextureGraph::MaskResult TextureGraph::alpha_mask(Node node) const {
+  MaskResult result;
+  const std::vector<Node> order = reachable(node);
+  constexpr size_t kMostNodes = 64; // what a row of texels may cost
+  const NodeData* layout = nullptr; ///< the image that sets the resolution
+  bool only_image_varies = true, sampled = false;
+  for (const Node n : order) {
+    const NodeData& data = nodes_[n];
+    const bool is_image = data.kind == Kind::kImage && !images_[data.a].missing && !is_zero(data.value);
+    if (is_image && !is_usable(data.mapping)) result.exact = false;
+    if (is_image && is_usable(data.mapping)) {
+      only_image_varies = only_image_varies && !layout;
+      if (!layout || images_[data.a].summary.width > images_[layout->a].summary.width) layout = &data;
+    }
+    sampled = sampled || data.kind == Kind::kCheckerboard;
+  }
+  if (order.size() > kMostNodes) {
+    result.exact = false;
+    return result;
+  }
+  result.exact = result.exact && !sampled && only_image_varies;
+  AlphaMask& mask = result.mask;
+  constexpr uint32_t kSampledSize = 1024; // for procedural textures
+  mask.width = layout ? images_[layout->a].summary.width : sampled ? kSampledSize : 1;
+  mask.height = layout ? images_[layout->a].summary.height : sampled ? kSampledSize : 1;
+  if (layout) mask.wrap = layout->wrap, mask.uv_scale = layout->mapping.scale, mask.uv_offset = layout->mapping.offset;
+  rasterize(order, mask);
+  size_t set = 0;
+  for (const uint32_t word : mask.words) set += static_cast<size_t>(std::popcount(word));
+  const size_t all = static_cast<size_t>(mask.width) * mask.height;
+  // Outside a black-wrapped image everything is 0, however opaque the image.
+  const bool all_set = set == all && !(layout && mask.wrap == WrapMode::kBlack);
+  result.kind = set == 0 ? MaskKind::kAllHoles : all_set ? MaskKind::kNoHoles : MaskKind::kSomeHoles;
+  if (result.kind != MaskKind::kSomeHoles) mask = {};
+  return result;
+}
+
+/// Evaluates the nodes, operands first, at each texel's centre; the last one's result goes to the mask.
+void TextureGraph::rasterize(std::span<const Node> order, AlphaMask& mask) const {
+  mask.words.assign(static_cast<size_t>(AlphaMask::row_words(mask.width)) * mask.height, 0);
+  std::vector<uint8_t> results(order.size());
+  const auto slot = [&](Node n) {
+    return static_cast<size_t>(std::lower_bound(order.begin(), order.end(), n) - order.begin());
+  };
+  std::vector<std::array<size_t, 3>> operand_slots(order.size());
+  for (size_t i = 0; i < order.size(); ++i) {
+    const NodeData& data = nodes_[order[i]];
+    if (data.kind == Kind::kProduct || data.kind == Kind::kMix || data.kind == Kind::kCheckerboard)
+      operand_slots[i] = {slot(data.a), slot(data.b), data.kind == Kind::kMix ? slot(data.c) : 0};
+  }
+  for (uint32_t y = 0; y < mask.height; ++y)
+    for (uint32_t x = 0; x < mask.width; ++x) {
+      const Vec2 st((static_cast<float>(x) + 0.5f) / static_cast<float>(mask.width),
+                    1.0f - (static_cast<float>(y) + 0.5f) / static_cast<float>(mask.height));
+      const Vec2 uv = (st - mask.uv_offset) / mask.uv_scale;
+      for (size_t i = 0; i < order.size(); ++i) {
+        const std::array<size_t, 3>& from = operand_slots[i];
+        const uint8_t operands[3] = {results[from[0]], results[from[1]], results[from[2]]};
+        results[i] = nonzero(nodes_[order[i]], uv, operands);
+      }
+      if (results.back())
+        mask.words[static_cast<size_t>(y) * AlphaMask::row_words(mask.width) + x / 32] |= 1u << (x % 32);
+    }
+}
+
+} // namespace packtrace

@@ -58,11 +58,11 @@ public:
   Vec3 average(Node node);
 
   /// Where the texture is exactly 0, as pbrt's alpha test asks.
-  enum class MaskKind { kOpaque, kAbsent, kMask };
+  enum class MaskKind { kNoHoles, kAllHoles, kSomeHoles };
   struct MaskResult {
-    MaskKind kind = MaskKind::kOpaque;
-    AlphaMask mask;     ///< for kMask
-    bool exact = true;  ///< false: sampled, or holes ignored because they cannot be told from uv
+    MaskKind kind = MaskKind::kNoHoles;
+    AlphaMask mask;    ///< for kSomeHoles
+    bool exact = true; ///< false: sampled, or holes ignored because they cannot be told from uv
   };
   MaskResult alpha_mask(Node node) const;
 
@@ -77,6 +77,7 @@ private:
   };
   Node add(const NodeData& data);
   std::vector<Node> reachable(Node node) const;
+  void rasterize(std::span<const Node> order, AlphaMask& mask) const;
   bool nonzero(const NodeData& data, Vec2 uv, std::span<const uint8_t> operands) const;
 
   std::vector<NodeData> nodes_;

@@ -24,6 +24,13 @@ struct Foliage {
   double droop = 0.3; ///< how far tips hang, as a part of their length
 };
 
+/// More leaves are smaller leaves: together they cover the same area.
+Foliage refined(Foliage foliage, double detail) {
+  const double size = detail > 1.0 ? 1.0 / std::sqrt(detail) : 1.0;
+  foliage.length *= size, foliage.width *= size;
+  return foliage;
+}
+
 uint32_t scaled(double count, double detail) { return static_cast<uint32_t>(std::max(1.0, count * detail + 0.5)); }
 
 void add_leaf_towards(Model& model, const Foliage& foliage, DVec3 stalk, DVec3 outward, double lightness, Random& random) {
@@ -94,7 +101,7 @@ Model make_broadleaf(Random& random, double detail) {
     const auto [s, c] = sin_cos(2.0 * kPi * i / 5.0 + random.uniform(-0.3, 0.3));
     crowns.push_back({{1.35 * c, random.uniform(3.0, 3.9), 1.35 * s}, DVec3(random.uniform(0.95, 1.3))});
   }
-  const Foliage foliage{"leaf_light", "leaf_dark", 0.52, 0.34, 0.35};
+  const Foliage foliage = refined({"leaf_light", "leaf_dark", 0.52, 0.34, 0.35}, detail);
   return make_branched({0.1, 2.1, 0}, 0.22, crowns, foliage, scaled(760, detail), random);
 }
 
@@ -104,7 +111,7 @@ Model make_olive(Random& random, double detail) {
     const auto [s, c] = sin_cos(2.0 * kPi * i / 4.0 + random.uniform(-0.4, 0.4));
     crowns.push_back({{0.9 * c, random.uniform(2.2, 3.0), 0.9 * s}, DVec3(1.0, 0.75, 1.0) * random.uniform(0.8, 1.2)});
   }
-  const Foliage foliage{"olive", "leaf_dark", 0.45, 0.2, 0.3};
+  const Foliage foliage = refined({"olive", "leaf_dark", 0.45, 0.2, 0.3}, detail);
   return make_branched({0.25, 1.1, 0.1}, 0.24, crowns, foliage, scaled(560, detail), random);
 }
 
@@ -114,14 +121,14 @@ Model make_umbrella_pine(Random& random, double detail) {
     const auto [s, c] = sin_cos(2.0 * kPi * i / 6.0 + random.uniform(-0.3, 0.3));
     crowns.push_back({{0.3 + 2.1 * c, random.uniform(7.1, 7.6), 2.1 * s}, DVec3(1.3, 0.6, 1.3) * random.uniform(0.85, 1.1)});
   }
-  const Foliage foliage{"pine", "leaf_dark", 0.5, 0.2, -0.4};
+  const Foliage foliage = refined({"pine", "leaf_dark", 0.5, 0.2, -0.4}, detail);
   return make_branched({0.25, 5.6, 0}, 0.26, crowns, foliage, scaled(820, detail), random);
 }
 
 Model make_cypress(Random& random, double detail) {
   Model model;
   add_limb(model, DVec3(0, -0.6, 0), DVec3(0, 6.5, 0), 0.16, 0.05, 0.02, random);
-  const Foliage foliage{"cypress", "leaf_dark", 0.6, 0.24, -0.9};
+  const Foliage foliage = refined({"cypress", "leaf_dark", 0.6, 0.24, -0.9}, detail);
   const uint32_t count = scaled(620, detail);
   for (uint32_t i = 0; i < count; ++i) {
     const double t = random.uniform();
@@ -140,7 +147,7 @@ Model make_cypress(Random& random, double detail) {
 Model make_conifer(Random& random, double detail) {
   Model model;
   add_limb(model, DVec3(0, -0.6, 0), DVec3(0, 11.5, 0), 0.28, 0.04, 0.05, random);
-  const Foliage foliage{"cypress", "leaf_dark", 0.62, 0.22, 0.25};
+  const Foliage foliage = refined({"cypress", "leaf_dark", 0.62, 0.22, 0.25}, detail);
   constexpr int kWhorls = 13;
   const uint32_t leaves = scaled(13, detail);
   for (int level = 0; level < kWhorls; ++level) {
@@ -198,7 +205,7 @@ Model make_bush(Random& random, double detail) {
   const Crown crowns[] = {{{0, 0.35, 0}, DVec3(0.6, 0.5, 0.6)}, {{0.45, 0.25, 0.15}, DVec3(0.45, 0.38, 0.45)},
                           {{-0.35, 0.28, -0.2}, DVec3(0.5, 0.4, 0.45)}};
   Model model;
-  cover(model, crowns, {"leaf_light", "leaf_dark", 0.3, 0.2, 0.0}, scaled(170, detail), random);
+  cover(model, crowns, refined({"leaf_light", "leaf_dark", 0.3, 0.2, 0.0}, detail), scaled(170, detail), random);
   model.finish();
   return model;
 }
@@ -207,8 +214,8 @@ Model make_blossom_bush(Random& random, double detail) {
   const Crown crowns[] = {{{0, 0.6, 0}, DVec3(0.8, 0.6, 0.5)}, {{0.3, 1.3, 0.1}, DVec3(0.7, 0.5, 0.4)},
                           {{-0.4, 1.0, 0.0}, DVec3(0.5, 0.6, 0.4)}};
   Model model;
-  cover(model, crowns, {"leaf_light", "leaf_dark", 0.3, 0.2, 0.2}, scaled(130, detail), random);
-  cover(model, crowns, {"blossom", "blossom", 0.26, 0.22, 0.1}, scaled(120, detail), random);
+  cover(model, crowns, refined({"leaf_light", "leaf_dark", 0.3, 0.2, 0.2}, detail), scaled(130, detail), random);
+  cover(model, crowns, refined({"blossom", "blossom", 0.26, 0.22, 0.1}, detail), scaled(120, detail), random);
   model.finish();
   return model;
 }

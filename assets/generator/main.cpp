@@ -1,9 +1,14 @@
 #include <cstdio>
 #include <exception>
+#include <functional>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "assets/generator/displaced_mesh.h"
+#include "assets/generator/extreme.h"
+#include "assets/generator/forest.h"
+#include "assets/generator/leaf_mask.h"
 #include "assets/generator/town.h"
 #include "pbrt_import/scene/error.h"
 
@@ -15,19 +20,50 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   OutputConfig output;
   TownConfig town;
-  const auto add_verb = [&](const char* name, const char* about) {
+  ForestConfig forest;
+  DisplacedMeshConfig mesh;
+  ExtremeConfig extreme;
+  std::function<SceneTotals()> generate;
+  const auto add_verb = [&](const char* name, const char* about, std::function<SceneTotals()> make) {
     CLI::App* verb = app.add_subcommand(name, about);
     verb->add_option("-o,--output", output.folder, "folder to write into; made if missing")->required();
     verb->add_flag("--force", output.overwrite, "overwrite files that exist");
+    verb->callback([&generate, chosen = std::move(make)] { generate = chosen; });
     return verb;
   };
-  CLI::App* town_verb = add_verb("town", "a harbour town on a terraced hillside");
-  town_verb->add_option("--seed", town.seed, "chooses everything that is left to chance")->capture_default_str();
-  town_verb->add_option("--instances", town.instances, "about how many [3000, 20000000]")->capture_default_str();
-  CLI11_PARSE(app, argc, argv);
+  const auto add_seed = [](CLI::App* verb, uint64_t& seed) {
+    verb->add_option("--seed", seed, "chooses everything that is left to chance")->capture_default_str();
+  };
 
-  SceneTotals totals;
-  if (town_verb->parsed()) totals = generate_town(town, output);
+  CLI::App* verb = add_verb("town", "a harbour town on a terraced hillside", [&] { return generate_town(town, output); });
+  add_seed(verb, town.seed);
+  verb->add_option("--instances", town.instances, "about how many [3000, 20000000]")->capture_default_str();
+
+  verb = add_verb("forest", "instanced trees up to any count", [&] { return generate_forest(forest, output); });
+  add_seed(verb, forest.seed);
+  CLI::Option* triangles = verb->add_option("--triangles", forest.triangles, "placed, at least [100000, 1e11]");
+  triangles->capture_default_str();
+  verb->add_option("--instances", forest.instances, "this many plants instead [100, 50000000]")->excludes(triangles);
+
+  verb = add_verb("mesh", "one unique displaced mesh", [&] { return generate_displaced_mesh(mesh, output); });
+  verb->alias("grid");
+  add_seed(verb, mesh.seed);
+  verb->add_option("--triangles", mesh.triangles, "at least [100, 2000000000]")->capture_default_str();
+
+  verb = add_verb("extreme", "sizes from 1e-6 to 1e7 side by side", [&] { return generate_extreme(extreme, output); });
+  add_seed(verb, extreme.seed);
+
+  add_verb("leaf", "the alpha mask of assets/room's plant", [&] {
+    generate_leaf_mask(output);
+    return SceneTotals{};
+  });
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorKind::kUsage);
+  }
+
+  const SceneTotals totals = generate();
   fmt::print("{} instances, {} unique triangles, {} placed triangles\n", totals.instances, totals.unique_triangles,
              totals.placed_triangles);
   return 0;

@@ -20,7 +20,7 @@ SceneWriter::SceneWriter(const OutputConfig& config, std::string name, std::stri
                           "\"string filename\" [ \"{}.exr\" ]\n",
                           view.width_px, view.height_px, name_));
   main_.write("Sampler \"halton\" \"integer pixelsamples\" [ 64 ]\n"
-              "Integrator \"ao\" \"integer nsamples\" [ 4 ]\n\nWorldBegin\n"
+              "Integrator \"ambientocclusion\" \"integer nsamples\" [ 16 ]\n\nWorldBegin\n"
               "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ]\n\n");
 }
 
@@ -44,13 +44,11 @@ void SceneWriter::model(std::string_view model_name, const Model& model) {
   models_.insert_or_assign(std::string(model_name), std::move(stored));
 }
 
-void SceneWriter::shapes(OutputFile& file, const StoredModel& model, const MaterialChoice& choice,
-                         std::string_view parameters) {
+void SceneWriter::shapes(OutputFile& file, const StoredModel& model, const MaterialChoice& choice) {
   for (const StoredPart& part : model.parts) {
     const auto chosen = choice.find(part.material);
-    file.write(fmt::format("NamedMaterial \"{}\" Shape \"plymesh\" \"string filename\" \"{}\"{}{}\n",
-                           chosen == choice.end() ? part.material : chosen->second, part.file,
-                           parameters.empty() ? "" : " ", parameters));
+    file.write(fmt::format("NamedMaterial \"{}\" Shape \"plymesh\" \"string filename\" \"{}\"\n",
+                           chosen == choice.end() ? part.material : chosen->second, part.file));
   }
 }
 
@@ -58,7 +56,7 @@ void SceneWriter::object(std::string_view object_name, std::string_view model_na
   const auto stored = models_.find(model_name);
   assert(stored != models_.end());
   objects_.write(fmt::format("ObjectBegin \"{}\"\n", object_name));
-  shapes(objects_, stored->second, choice, {});
+  shapes(objects_, stored->second, choice);
   objects_.write("ObjectEnd\n");
   object_triangles_.insert_or_assign(std::string(object_name), stored->second.triangle_count);
 }
@@ -80,11 +78,17 @@ void SceneWriter::instance(std::string_view object_name, const DAffine& m) {
   totals_.placed_triangles += triangles->second;
 }
 
-void SceneWriter::world_shape(std::string_view model_name, std::string_view parameters) {
+void SceneWriter::world_shape(std::string_view model_name) {
   const auto stored = models_.find(model_name);
   assert(stored != models_.end());
-  shapes(objects_, stored->second, {}, parameters);
+  shapes(objects_, stored->second, {});
   totals_.placed_triangles += stored->second.triangle_count;
+}
+
+void SceneWriter::world_file(std::string_view file, std::string_view material, uint64_t triangle_count) {
+  shapes(objects_, {{{std::string(file), std::string(material)}}, triangle_count}, {});
+  totals_.unique_triangles += triangle_count;
+  totals_.placed_triangles += triangle_count;
 }
 
 SceneTotals SceneWriter::finish() {

@@ -47,8 +47,6 @@ public:
 
   /// Diffuse, linear sRGB in [0,1].
   void material(std::string_view name, Vec3 albedo);
-  /// Opens for look-ups what Material lines follow.
-  void main_text(std::string_view text) { main_.write(text); }
 
   /// Stores a finished model's meshes and remembers them under a name.
   void model(std::string_view model_name, const Model& model);
@@ -57,8 +55,10 @@ public:
   /// model() and object() in one.
   void object(std::string_view object_name, const Model& model);
   void instance(std::string_view object_name, const DAffine& world_from_object);
-  /// A stored model placed once, in the world, as it is. @param parameters appended to each Shape
-  void world_shape(std::string_view model_name, std::string_view parameters = {});
+  /// A stored model placed once, in the world, as it is.
+  void world_shape(std::string_view model_name);
+  /// A PLY file under the folder that the caller wrote itself, placed once in the world.
+  void world_file(std::string_view file, std::string_view material, uint64_t triangle_count);
 
   /// Ends and names all files.
   SceneTotals finish();
@@ -71,7 +71,7 @@ private:
     std::vector<StoredPart> parts;
     uint64_t triangle_count = 0;
   };
-  void shapes(OutputFile& file, const StoredModel& model, const MaterialChoice& choice, std::string_view parameters);
+  void shapes(OutputFile& file, const StoredModel& model, const MaterialChoice& choice);
 
   OutputConfig config_;
   std::string name_;

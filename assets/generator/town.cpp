@@ -92,14 +92,15 @@ private:
 void TownBuilder::build_street(uint32_t level) {
   build_stairs(level);
   const double back = TownTerrain::level_begin(level + 1);
-  double angle = kFirstAngle + radians(random_.uniform(0.0, 4.0));
+  double angle = kFirstAngle - radians(5.0) + radians(random_.uniform(0.0, 4.0));
   while (angle < kLastAngle) {
     const double radius = terrain_.quay_radius(angle) + back - 6.0;
     const double ahead = angle + 4.0 / radius;
     const bool room = terraced(angle, back - 2.0) && terraced(ahead, back - 2.0);
     const double wild = 0.06 + 0.045 * level;
-    if (!room) {
-      angle += 2.0 / radius;
+    if (!room) { // too narrow to build on: the terrace's ends are gardens
+      if (terrain_.built(angle, back - 3.0) > 0.6) build_garden(level, angle);
+      angle += 3.0 / radius;
     } else if (level + 1 < TownTerrain::kLevels && near_stairs(level, ahead, 5.5)) {
       angle += 1.0 / radius;
     } else if (random_.chance(wild)) {
@@ -197,9 +198,9 @@ void TownBuilder::build_edges() {
       if (terrain_.built(middle, edge) < 0.9) continue;
       const auto [s, c] = sin_cos(middle);
       const double r = terrain_.quay_radius(middle) + edge;
-      // The edge is not quite a circle: turn each piece along it.
+      // The edge is not quite a circle: turn each piece along it (small angles).
       const double slope = (terrain_.quay_radius(middle + step / 2) - terrain_.quay_radius(middle - step / 2)) / kWallModule;
-      const double turn = middle - std::asin(std::clamp(slope, -0.5, 0.5)) * 0.0 - slope;
+      const double turn = middle - slope;
       const DVec3 top(r * s, TownTerrain::level_height(level), r * c);
       if (level == 0) {
         put(any(objects_.quay), top, turn);
@@ -253,7 +254,7 @@ void TownBuilder::build_pier() {
   const auto [ls, lc] = sin_cos(landing);
   const DVec3 to = DVec3(ls, 0, lc) * (terrain_.quay_radius(landing) + 0.5) + DVec3(0, TownTerrain::kQuayHeight, 0);
   const DVec3 way = glm::normalize(to - from), right(way.z, 0, -way.x);
-  const double turn = std::abs(way.z) > 0.0 ? radians(21.0) : 0.0;
+  const double turn = radians(21.0); // about the way's; things on a pier are never quite straight
   const auto pieces = static_cast<uint32_t>(glm::length(to - from) / kWallModule);
   const DAffine heading(right, DVec3(0, 1, 0), way, DVec3(0.0));
   for (uint32_t i = 0; i < pieces; ++i) {

@@ -41,7 +41,7 @@ double TownTerrain::quay_radius(double angle) const { return 35.0 + 4.5 * value_
 
 double TownTerrain::land(double angle, double inland) const {
   const double ragged = angle + 0.05 * value_noise({angle * 9.0, inland * 0.05, 0.0}, seed_ + 1);
-  const double recede = radians(17) * smooth_step(0.0, 170.0, inland); // opens the view along the coast
+  const double recede = radians(8) * smooth_step(10.0, 170.0, inland); // opens the view along the coast
   return smooth_step(radians(-38), radians(-23), ragged - recede);
 }
 

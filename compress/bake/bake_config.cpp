@@ -14,7 +14,7 @@ void BakeConfig::validate() const {
   };
   switch (precision_kind) {
   case PrecisionKind::kEdgeFraction:
-    return require(precision > 0.0 && precision <= 1.0, "a fraction of the median edge must be above 0 and at most 1");
+    return require(precision >= 1e-9 && precision <= 1.0, "a fraction of the median edge must be 1e-9 .. 1");
   case PrecisionKind::kDiagonalFraction:
     return require(precision >= 1e-12 && precision <= 0.1, "a fraction of the diagonal must be 1e-12 .. 0.1");
   case PrecisionKind::kAbsolute:

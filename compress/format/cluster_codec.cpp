@@ -41,7 +41,7 @@ ClusterView::ClusterView(const baked::GeometryRecord& geometry, const baked::Clu
       bits_(payload + uint64_t{4} * cluster.payload_offset), layout_{cluster.triangle_count, cluster.vertex_count,
                                                                      cluster.restart_count},
       step_(PositionGrid{geometry.step_mantissa, geometry.step_exponent}.step()),
-      uv_step_(std::ldexp(1.0f, geometry.uv_exponent[0]), std::ldexp(1.0f, geometry.uv_exponent[1])),
+      uv_step_(exp2_exact(geometry.uv_exponent[0]), exp2_exact(geometry.uv_exponent[1])),
       position_stride_(position_stride(cluster)) {
   for (size_t axis = 0; axis < 3; ++axis)
     base_[axis] = geometry.origin[axis] + int64_t{cluster.anchor[axis]} * (int64_t{1} << geometry.anchor_shift);

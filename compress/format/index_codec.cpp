@@ -78,9 +78,17 @@ void decode_triangles(const uint8_t* bits, const IndexLayout& layout, uint32_t b
   const Mask128 restart(bits, 0, layout.triangle_count), left(bits, layout.triangle_count, layout.triangle_count);
   const uint32_t width = layout.index_bits();
   uint64_t fresh_at = layout.fresh_bit(), explicit_at = layout.explicit_bit();
-  uint32_t used = base;
+  uint64_t fresh = 0; // bits from fresh_at on
+  uint32_t fresh_left = 0, used = base;
   const auto next_corner = [&] {
-    if (read_bits(bits, fresh_at++, 1) != 0) return used++;
+    if (fresh_left == 0) {
+      fresh = read_bits(bits, fresh_at, kMaxFieldBits);
+      fresh_at += kMaxFieldBits;
+      fresh_left = kMaxFieldBits;
+    }
+    const bool is_fresh = (fresh & 1u) != 0;
+    fresh >>= 1, --fresh_left;
+    if (is_fresh) return used++;
     const auto vertex = static_cast<uint32_t>(read_bits(bits, explicit_at, width));
     explicit_at += width;
     return base + vertex;

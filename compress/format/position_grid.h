@@ -1,12 +1,18 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {
+
+/// 2^exponent for -1022..1023.
+inline double exp2_exact(int32_t exponent) {
+  return std::bit_cast<double>(static_cast<uint64_t>(exponent + 1023) << 52);
+}
 
 /// A point of the position lattice: whole steps from 0 along x, y, z.
 using LatticePoint = std::array<int64_t, 3>;
@@ -17,7 +23,7 @@ struct PositionGrid {
   uint32_t mantissa = 8; ///< 8..15
   int32_t exponent = -3; ///< kMinStepExponent..kMaxStepExponent
 
-  double step() const { return std::ldexp(static_cast<double>(mantissa), exponent); }
+  double step() const { return static_cast<double>(mantissa) * exp2_exact(exponent); }
   bool operator==(const PositionGrid&) const = default;
 };
 

@@ -17,8 +17,9 @@ std::string_view to_string(Severity severity) {
 std::string to_string(const SourceLocation& location) {
   if (!location.file) return {};
   std::string text = location.file->path;
-  if (location.line > 0) text += ":" + std::to_string(location.line);
-  if (location.line > 0 && location.column > 0) text += ":" + std::to_string(location.column);
+  // append() rather than ":" + ..., about which GCC 12 warns in error (-Wrestrict).
+  if (location.line > 0) text.append(":").append(std::to_string(location.line));
+  if (location.line > 0 && location.column > 0) text.append(":").append(std::to_string(location.column));
   return text;
 }
 

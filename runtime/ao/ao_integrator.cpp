@@ -35,8 +35,9 @@ public:
   /// @param luminance of the surface that was hit; only matters for rho > 0
   double visibility(double x, double luminance) const {
     x = std::min(x, end_);
-    const double occlusion = linear_ ? 1.0 - (x / end_) * (x / end_)
-                             : lambda_ > 0.0 ? (std::exp(-lambda_ * x * x) - floor_) / (1.0 - floor_) : 1.0;
+    const double occlusion = linear_         ? 1.0 - (x / end_) * (x / end_)
+                             : lambda_ > 0.0 ? (std::exp(-lambda_ * x * x) - floor_) / (1.0 - floor_)
+                                             : 1.0;
     const double k = 1.0 - darkening_ * std::clamp(occlusion, 0.0, 1.0);
     return rho_ > 0.0 && k > 0.0 ? k / (1.0 - rho_ * luminance * (1.0 - k)) : k;
   }
@@ -75,7 +76,8 @@ public:
         unit_reach_(static_cast<float>(unit_radius_ * coefficient_.end())), out_(out) {}
 
   /// Needs RTCRayHit for distances, RTCRay otherwise.
-  template <typename Ray> void trace_tile(const Tile& tile) const {
+  template <typename Ray>
+  void trace_tile(const Tile& tile) const {
     ShadingPoint points[kTilePixels];
     const uint32_t count = gather(tile, points);
     if (count == 0) return;
@@ -120,7 +122,8 @@ private:
     return count;
   }
 
-  template <typename Ray> void set_ray(const ShadingPoint& point, const PixelSampler::Number& number, Ray& out) const {
+  template <typename Ray>
+  void set_ray(const ShadingPoint& point, const PixelSampler::Number& number, Ray& out) const {
     const Vec3 local = cosine_direction(PixelSampler::point(point.sampler, number));
     Vec3 direction = point.tangent * local.x + point.bitangent * local.y + point.normal * local.z;
     const float height = glm::dot(direction, point.geometric);
@@ -136,7 +139,8 @@ private:
     }
   }
 
-  template <typename Ray> void query(Ray* rays, uint32_t count) const {
+  template <typename Ray>
+  void query(Ray* rays, uint32_t count) const {
     const FlushDenormals flush;
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);

@@ -10,19 +10,20 @@
 namespace packtrace {
 
 /// Parameters of ambient occlusion. A hit at distance t darkens its direction by
-///   occlusion = exp(-lambda x^2), x = t / radius, seen up to the distance x_end where it falls to `cutoff` (at most 1),
+///   occlusion = exp(-lambda x^2), x = t / radius, seen up to the distance x_end where it falls to `cutoff` (at most
+///   1),
 /// made continuous there as (exp(-lambda x^2) - exp(-lambda x_end^2)) / (1 - exp(-lambda x_end^2)): 1 at the surface,
 /// 0 at the end. The sample is then 1 - (1 - min_visibility) occlusion, and a miss is 1.
 /// With interreflection rho the sample k of a hit becomes k / (1 - rho L (1 - k)), L the hit surface's luminance.
 struct AoConfig {
-  float radius = 1.0f;           ///< world units, > 0; see default_ao_radius()
-  uint32_t spp = 1;              ///< samples per pixel and frame, 1..65536
-  bool falloff = true;           ///< false: every hit within radius occludes fully
-  float lambda = 2.0f;           ///< 0..20
-  float cutoff = 0.4f;           ///< 0..below 1
-  bool continuous = true;        ///< false: occlusion steps down at x_end instead of fading to zero
-  float min_visibility = 0.0f;   ///< 0..1: what full occlusion leaves
-  float interreflection = 0.0f;  ///< rho, 0..1; 0: off
+  float radius = 1.0f;          ///< world units, > 0; see default_ao_radius()
+  uint32_t spp = 1;             ///< samples per pixel and frame, 1..65536
+  bool falloff = true;          ///< false: every hit within radius occludes fully
+  float lambda = 2.0f;          ///< 0..20
+  float cutoff = 0.4f;          ///< 0..below 1
+  bool continuous = true;       ///< false: occlusion steps down at x_end instead of fading to zero
+  float min_visibility = 0.0f;  ///< 0..1: what full occlusion leaves
+  float interreflection = 0.0f; ///< rho, 0..1; 0: off
   uint64_t seed = 0;
   SamplerKind sampler = SamplerKind::kSpaceTimeNet;
 };

@@ -28,7 +28,11 @@ constexpr std::array<Column, kNumberBits> number_columns() {
 }
 constexpr std::array<Column, kNumberBits> kNumberColumns = number_columns();
 
-constexpr std::array<Column, kBlockBits> kPixelColumns = {{{0xb7ff, 0x854f}, {0x7e66, 0xef59}, {0x9c2d, 0x9ef5}, {0xad83, 0xf7c1}, {0xe44f, 0xbc30}, {0xc8fd, 0x1e43}}};
+/// For the Morton code of a pixel in its block. Together with the columns above they were searched for so that these
+/// sets of points are (0, m, 2)-nets: aligned 2^a pixels of one sample number, a <= 6; 2 x 2 pixels of 4 aligned sample
+/// numbers, 4 x 4 of 16, 8 x 8 of 64. A test checks all of them.
+constexpr std::array<Column, kBlockBits> kPixelColumns = {
+    {{0xb7ff, 0x854f}, {0x7e66, 0xef59}, {0x9c2d, 0x9ef5}, {0xad83, 0xf7c1}, {0xe44f, 0xbc30}, {0xc8fd, 0x1e43}}};
 
 /// Bijective hash. Source: Wellons, "Prospecting for hash functions" (2018), lowbias32.
 constexpr uint32_t hash32(uint32_t x) {

@@ -12,6 +12,14 @@ enum class SamplerKind : uint8_t {
   kIndependent,  ///< hashed random numbers
 };
 
+/// Why kSpaceTimeNet is the default: RMSE of AO on a synthetic scene (64 x 64 pixels, a sphere and a wall, 12 seeds),
+/// of one pixel or after a 7 x 7 box filter:
+///
+///                  1 sample, box   4 frames, box   16 frames, box   32 frames, box   32 frames, pixel
+///   kSpaceTimeNet      .0341           .0145           .0059            .0039            .0314
+///   kPixelSobol        .0565           .0212           .0076            .0046            .0313
+///   kIndependent       .0563           .0268           .0137            .0095            .0649
+///
 /// Points in the unit square for every pixel and sample number, without state: sample n of a pixel is the same
 /// however samples are split into frames, so 32 frames of 1 sample are one frame of 32.
 class PixelSampler {

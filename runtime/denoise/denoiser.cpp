@@ -1,6 +1,8 @@
 #include "runtime/denoise/denoiser.h"
 
 #include <limits>
+#include <cstdio>
+#include <cstdlib>
 #include <string>
 #include <utility>
 
@@ -10,6 +12,7 @@
 #include "runtime/denoise/edge_blur.h"
 #include "runtime/denoise/edge_weights.h"
 #include "runtime/denoise/guides.h"
+#include "runtime/denoise/noise_level.h"
 #include "runtime/denoise/reprojection.h"
 #include "runtime/denoise/simd.h"
 #include "runtime/denoise/temporal_blend.h"
@@ -56,7 +59,8 @@ struct AoDenoiser::State {
   DepthDerivatives derivatives;
   std::vector<EdgeWeights> edges = {EdgeWeights(1), EdgeWeights(2), EdgeWeights(4)};
   FrameSamples samples;
-  NoisyImage image, scratch;
+  NoisyImage image;
+  BlurScratch scratch;
   DenoisedAo result;
 };
 
@@ -89,9 +93,11 @@ void AoDenoiser::State::blur() {
   const Plane<float>& tspp = now.history.samples;
   fill_unsampled(now.guides, tspp, edges, image);
   const Fade fade{static_cast<float>(config.blur_fade_begin), static_cast<float>(config.blur_fade_end)};
-  for (size_t i = 0; i < kBlurPasses; ++i) edge_blur(edges[i], tspp, fade, config.blur_sigma, size, image, scratch);
-  disocclusion_blur(tspp, std::span(edges).subspan(kBlurPasses), static_cast<float>(config.disocclusion_frames),
-                    config.blur_sigma, size, image, scratch);
+  const ValueLimit limit{config.blur_limit, noise_ratio(now.guides, now.history, result.variance)};
+  for (size_t i = 0; i < kBlurPasses; ++i) edge_blur(edges[i], tspp, fade, limit, size, image, scratch);
+  if (getenv("DBG")) fprintf(stderr, "ratio %g\n", limit.noise_ratio);
+  disocclusion_blur(tspp, std::span(edges).subspan(kBlurPasses), static_cast<float>(config.disocclusion_frames), limit,
+                    size, image, scratch);
 }
 
 void AoDenoiser::State::write(DenoisedAo& out) const {

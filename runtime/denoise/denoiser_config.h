@@ -48,8 +48,9 @@ struct DenoiserConfig {
   /// ... and in depth derivatives along the offset. [0..10]
   float blur_slope = 0.5f;
 
-  /// Blur weight: standard deviations of the noise by which values may differ; larger blurs more. [0.1..100]
-  float blur_sigma = 2.5f;
+  /// Blur weight: mean squared difference of two patches, as a multiple of what noise alone makes of it, from which on
+  /// they are not mixed. (1..100]
+  float blur_limit = 3.0f;
 
   /// Frames of history below which the measured noise is not trusted to find edges by value. [0..1000]
   float blur_trust_frames = 10.0f;

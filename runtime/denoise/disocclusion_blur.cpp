@@ -51,9 +51,9 @@ void fill_unsampled(const Guides& guides, const Plane<float>& samples, std::span
   });
 }
 
-void disocclusion_blur(const Plane<float>& samples, std::span<const EdgeWeights> edges, float frames, float sigma,
-                       ImageSize size, NoisyImage& image, NoisyImage& scratch) {
-  for (const EdgeWeights& step : edges) edge_blur(step, samples, Fade{0.0f, frames}, sigma, size, image, scratch);
+void disocclusion_blur(const Plane<float>& samples, std::span<const EdgeWeights> edges, float frames, ValueLimit limit,
+                       ImageSize size, NoisyImage& image, BlurScratch& scratch) {
+  for (const EdgeWeights& step : edges) edge_blur(step, samples, Fade{0.0f, frames}, limit, size, image, scratch);
 }
 
 } // namespace packtrace

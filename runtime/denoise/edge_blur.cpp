@@ -1,6 +1,7 @@
 #include "runtime/denoise/edge_blur.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "runtime/denoise/simd.h"
@@ -9,98 +10,169 @@ namespace packtrace {
 namespace {
 
 constexpr float kAside = 0.27901f, kCentre = 0.44198f;
-constexpr float kStraight = kAside * kCentre / 255.0f; // Gaussian and the scale of edge weights
+constexpr float kStraight = kAside * kCentre / 255.0f; // Gaussian and the scale of weights
 constexpr float kDiagonal = kAside * kAside / 255.0f;
 
-/// What a row reads: values and precisions of it and the rows one step above and below, and the edge weights that leave
-/// it and the row above.
+/// Squared differences in units of the noise between two rows of pixels, and where both lie on one surface.
+PACKTRACE_AVX2_CLONES
+void compare_row(int begin, int end, const float* __restrict value, const float* __restrict other,
+                 const float* __restrict precision, const float* __restrict other_precision,
+                 const uint8_t* __restrict edge, float* __restrict distance, uint8_t* __restrict same) {
+  for (int x = begin; x < end; ++x) {
+    const float difference = other[x] - value[x];
+    const float noise_units = difference * difference * smaller(precision[x], other_precision[x]);
+    distance[x] = edge[x] != 0 ? noise_units : 0.0f;
+  }
+  for (int x = begin; x < end; ++x) same[x] = edge[x] != 0 ? 1 : 0;
+}
+
+/// What compare_row() found in three rows, one above the other.
+struct Patch {
+  const float* distance[3];
+  const uint8_t* same[3];
+};
+
+/// Edge weights times value weights of a row. Columns -1 to width of everything in `patch` and `column` exist.
+PACKTRACE_AVX2_CLONES
+void weigh_row(int width, const Patch& patch, float half_scale, float limit, const uint8_t* __restrict edge,
+               float* __restrict column, uint8_t* __restrict same_column, uint8_t* __restrict weights) {
+  const float* __restrict d0 = patch.distance[0];
+  const float* __restrict d1 = patch.distance[1];
+  const float* __restrict d2 = patch.distance[2];
+  for (int x = -1; x <= width; ++x) column[x] = d0[x] + d1[x] + d2[x];
+  const uint8_t* __restrict s0 = patch.same[0];
+  const uint8_t* __restrict s1 = patch.same[1];
+  const uint8_t* __restrict s2 = patch.same[2];
+  for (int x = -1; x <= width; ++x) same_column[x] = static_cast<uint8_t>(s0[x] + s1[x] + s2[x]);
+  const float slope = 1.0f / (limit - 1.0f);
+  for (int x = 0; x < width; ++x) {
+    const float sum = column[x - 1] + column[x] + column[x + 1];
+    const float count = static_cast<float>(same_column[x - 1] + same_column[x] + same_column[x + 1]);
+    const float keep = smaller(larger((limit - half_scale * sum / larger(count, 1.0f)) * slope, 0.0f), 1.0f);
+    const float weight = static_cast<float>(static_cast<int>(edge[x])) * (keep * keep);
+    weights[x] = static_cast<uint8_t>(static_cast<int>(weight + 0.5f));
+  }
+}
+
+/// The rows of one direction that weigh_row() works on, kept while the patches slide down.
+class PatchRows {
+public:
+  explicit PatchRows(int width) : stride_(static_cast<size_t>(width) + 2), distance_(4 * stride_), same_(4 * stride_) {}
+
+  float* distance(int y) { return distance_.data() + slot(y); }
+  uint8_t* same(int y) { return same_.data() + slot(y); }
+  float* column() { return distance_.data() + 3 * stride_ + 1; }
+  uint8_t* same_column() { return same_.data() + 3 * stride_ + 1; }
+  Patch patch(int y) { return {{distance(y - 1), distance(y), distance(y + 1)}, {same(y - 1), same(y), same(y + 1)}}; }
+
+private:
+  size_t slot(int y) const { return static_cast<size_t>((y + 3) % 3) * stride_ + 1; }
+  size_t stride_;
+  std::vector<float> distance_;
+  std::vector<uint8_t> same_;
+};
+
+void weigh_values(const NoisyImage& image, const EdgeWeights& edges, size_t direction, ValueLimit limit, int width,
+                  int first, int last, Plane<uint8_t>& weights) {
+  const int dx = edges.step() * EdgeWeights::kDirections[direction][0];
+  const int dy = edges.step() * EdgeWeights::kDirections[direction][1];
+  const Plane<uint8_t>& edge = edges.direction(direction);
+  PatchRows rows(width);
+  const auto compare = [&](int y) {
+    compare_row(-1, width + 1, image.value.row(y), image.value.row(y + dy) + dx, image.precision.row(y),
+                image.precision.row(y + dy) + dx, edge.row(y), rows.distance(y), rows.same(y));
+  };
+  compare(first - 1), compare(first);
+  for (int y = first; y < last; ++y) {
+    compare(y + 1);
+    weigh_row(width, rows.patch(y), 0.5f / limit.noise_ratio, limit.distance, edge.row(y), rows.column(),
+              rows.same_column(), weights.row(y));
+  }
+}
+
+/// What a row reads: values of it and the rows one step above and below, and the weights that leave it and the row
+/// above.
 struct BlurRow {
-  const float *value, *value_above, *value_below;
-  const float *precision, *precision_above, *precision_below;
+  const float *value, *value_above, *value_below, *precision, *samples;
   const uint8_t *right, *down, *down_right, *down_left;
   const uint8_t *above_down, *above_down_right, *above_down_left;
-  const float* samples;
   float *out_value, *out_precision;
 };
 
 struct Sums {
   float flux = 0, taken = 0, squares = 0;
+
+  void add(float difference, uint8_t weight, float gaussian) {
+    const float w = static_cast<float>(static_cast<int>(weight)) * gaussian;
+    flux += w * difference;
+    taken += w;
+    squares += w * w;
+  }
 };
 
-inline void add_tap(Sums& sums, float value, float other, float precision, float other_precision, uint8_t edge,
-                    float gaussian, float scale) {
-  const float difference = other - value;
-  const float keep = larger(0.0f, 1.0f - difference * difference * scale * smaller(precision, other_precision));
-  const float weight = static_cast<float>(static_cast<int>(edge)) * gaussian * (keep * keep);
-  sums.flux += weight * difference;
-  sums.taken += weight;
-  sums.squares += weight * weight;
-}
-
 PACKTRACE_AVX2_CLONES
-void blur_row(int width, ptrdiff_t step, const BlurRow& rows, Fade fade, float scale) {
+void blur_row(int width, ptrdiff_t step, const BlurRow& rows, Fade fade) {
   const BlurRow r = rows;
   const float fade_scale = 1.0f / (fade.end - fade.begin);
 #pragma GCC ivdep
   for (ptrdiff_t x = 0; x < width; ++x) {
-    const float v = r.value[x], p = r.precision[x];
+    const float v = r.value[x];
     Sums sums;
-    add_tap(sums, v, r.value[x + step], p, r.precision[x + step], r.right[x], kStraight, scale);
-    add_tap(sums, v, r.value[x - step], p, r.precision[x - step], r.right[x - step], kStraight, scale);
-    add_tap(sums, v, r.value_below[x], p, r.precision_below[x], r.down[x], kStraight, scale);
-    add_tap(sums, v, r.value_above[x], p, r.precision_above[x], r.above_down[x], kStraight, scale);
-    add_tap(sums, v, r.value_below[x + step], p, r.precision_below[x + step], r.down_right[x], kDiagonal, scale);
-    add_tap(sums, v, r.value_above[x - step], p, r.precision_above[x - step], r.above_down_right[x - step], kDiagonal,
-            scale);
-    add_tap(sums, v, r.value_below[x - step], p, r.precision_below[x - step], r.down_left[x], kDiagonal, scale);
-    add_tap(sums, v, r.value_above[x + step], p, r.precision_above[x + step], r.above_down_left[x + step], kDiagonal,
-            scale);
+    sums.add(r.value[x + step] - v, r.right[x], kStraight);
+    sums.add(r.value[x - step] - v, r.right[x - step], kStraight);
+    sums.add(r.value_below[x] - v, r.down[x], kStraight);
+    sums.add(r.value_above[x] - v, r.above_down[x], kStraight);
+    sums.add(r.value_below[x + step] - v, r.down_right[x], kDiagonal);
+    sums.add(r.value_above[x - step] - v, r.above_down_right[x - step], kDiagonal);
+    sums.add(r.value_below[x - step] - v, r.down_left[x], kDiagonal);
+    sums.add(r.value_above[x + step] - v, r.above_down_left[x + step], kDiagonal);
     const float strength = smaller(larger((fade.end - r.samples[x]) * fade_scale, 0.0f), 1.0f);
     const float kept = 1.0f - strength * sums.taken;
     r.out_value[x] = v + strength * sums.flux;
-    r.out_precision[x] = p / (kept * kept + strength * strength * sums.squares);
+    r.out_precision[x] = r.precision[x] / std::sqrt(kept * kept + strength * strength * sums.squares);
   }
 }
 
-BlurRow make_row(const NoisyImage& in, const EdgeWeights& edges, const Plane<float>& samples, int y, NoisyImage& out) {
-  const int above = y - edges.step(), below = y + edges.step();
-  return {in.value.row(y),
-          in.value.row(above),
-          in.value.row(below),
-          in.precision.row(y),
-          in.precision.row(above),
-          in.precision.row(below),
-          edges.direction(0).row(y),
-          edges.direction(1).row(y),
-          edges.direction(2).row(y),
-          edges.direction(3).row(y),
-          edges.direction(1).row(above),
-          edges.direction(2).row(above),
-          edges.direction(3).row(above),
+BlurRow make_row(const NoisyImage& image, int step, const Plane<float>& samples, int y, BlurScratch& scratch) {
+  const auto& weights = scratch.weights;
+  return {image.value.row(y),
+          image.value.row(y - step),
+          image.value.row(y + step),
+          image.precision.row(y),
           samples.row(y),
-          out.value.row(y),
-          out.precision.row(y)};
+          weights[0].row(y),
+          weights[1].row(y),
+          weights[2].row(y),
+          weights[3].row(y),
+          weights[1].row(y - step),
+          weights[2].row(y - step),
+          weights[3].row(y - step),
+          scratch.image.value.row(y),
+          scratch.image.precision.row(y)};
 }
 
 } // namespace
 
-void edge_blur(const EdgeWeights& edges, const Plane<float>& samples, Fade fade, float sigma, ImageSize size,
-               NoisyImage& image, NoisyImage& scratch) {
+void edge_blur(const EdgeWeights& edges, const Plane<float>& samples, Fade fade, ValueLimit limit, ImageSize size,
+               NoisyImage& image, BlurScratch& scratch) {
   if (std::none_of(image.youngest.begin(), image.youngest.end(), [&](float tspp) { return tspp < fade.end; })) return;
   const int width = static_cast<int>(size.width);
-  const float scale = 0.5f / (sigma * sigma);
+  for_row_blocks(size.height, [&](int first, int last) {
+    for (size_t direction = 0; direction < EdgeWeights::kDirections.size(); ++direction)
+      weigh_values(image, edges, direction, limit, width, first, last, scratch.weights[direction]);
+  });
   for_row_blocks(size.height, [&](int first, int last) {
     for (int y = first; y < last; ++y) {
       if (image.youngest[static_cast<size_t>(y)] < fade.end) {
-        blur_row(width, edges.step(), make_row(image, edges, samples, y, scratch), fade, scale);
+        blur_row(width, edges.step(), make_row(image, edges.step(), samples, y, scratch), fade);
       } else {
-        std::copy_n(image.value.row(y), width, scratch.value.row(y));
-        std::copy_n(image.precision.row(y), width, scratch.precision.row(y));
+        std::copy_n(image.value.row(y), width, scratch.image.value.row(y));
+        std::copy_n(image.precision.row(y), width, scratch.image.precision.row(y));
       }
     }
   });
-  std::swap(image.value, scratch.value);
-  std::swap(image.precision, scratch.precision);
+  std::swap(image.value, scratch.image.value);
+  std::swap(image.precision, scratch.image.precision);
 }
 
 } // namespace packtrace

@@ -76,7 +76,8 @@ float correct_row(int width, const CorrectRow& rows, CorrectScales s) {
     const float kept = 1.0f - smaller(s.response * std::abs(shift), 1.0f);
     const float n = smaller(r.samples[x], larger(r.samples[x] * kept, s.fast_frames));
     const float moment = larger(r.square[x] - old_mean * old_mean, 0.0f); // a shift leaves the variance alone
-    const float sample_variance = (kVariancePrior * r.local_variance[x] + n * moment) / (kVariancePrior + n);
+    const float sample_variance =
+        (kVariancePrior * r.local_variance[x] + n * moment) / (kVariancePrior + larger(n, 1.0f) - 1.0f);
     const float variance = seen ? sample_variance / larger(n, 1.0f) : 0.0f;
     const float distrust = s.trust_frames / larger(n, 1.0f);
     const float hit_samples = r.disparity[x] > 0.0f ? n : std::numeric_limits<float>::max();

@@ -247,10 +247,10 @@ const ExrLayer& choose_layer(const ExrInfo& info, std::string_view layer, std::s
   }
   if (found != info.layers.end()) return *found;
   std::string list;
-  for (const ExrLayer& candidate : info.layers) list += (list.empty() ? "" : ", ") + candidate.name;
-  fail(name, layer.empty()
-                 ? "name one of its layers: " + list
-                 : "it has no layer \"" + std::string(layer) + "\", but " + (list.empty() ? "colours" : list));
+  for (const ExrLayer& candidate : info.layers)
+    list.append(list.empty() ? "" : ", ").append(candidate.name.empty() ? "(colours)" : candidate.name);
+  if (layer.empty()) fail(name, "it has several layers, name one: " + list);
+  fail(name, "it has no layer \"" + std::string(layer) + "\", but " + list);
 }
 
 Image decode_exr(std::span<const std::byte> bytes, std::string_view name, std::string_view layer) {

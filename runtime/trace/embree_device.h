@@ -16,7 +16,8 @@ struct ReleaseRtc {
   void operator()(RTCGeometryTy* geometry) const { rtcReleaseGeometry(geometry); }
   void operator()(RTCDeviceTy* device) const { rtcReleaseDevice(device); }
 };
-template <typename T> using RtcPtr = std::unique_ptr<T, ReleaseRtc>;
+template <typename T>
+using RtcPtr = std::unique_ptr<T, ReleaseRtc>;
 
 /// An Embree device that counts its memory and turns error codes into Error.
 class EmbreeDevice {

@@ -139,8 +139,7 @@ struct EmbreeScene::Decoded {
     triangles.resize(counts.triangles);
     source.decode(geometry, positions, triangles);
     bounds = bounds_of(positions);
-    if (!positions.empty() &&
-        !std::all_of(positions.begin(), positions.end(), [](Vec3 p) { return is_finite(p); }))
+    if (!positions.empty() && !std::all_of(positions.begin(), positions.end(), [](Vec3 p) { return is_finite(p); }))
       throw Error(ErrorKind::kInput, geometry_label(geometry) + " has positions beyond the range of float");
     const auto in_range = [&](const Triangle& t) { return std::max({t.x, t.y, t.z}) < counts.vertices; };
     if (!std::all_of(triangles.begin(), triangles.end(), in_range))
@@ -170,13 +169,10 @@ void EmbreeScene::place(std::vector<Decoded>& decoded) {
   Bounds world;
   for (size_t i = 0; i < instances.size(); ++i) {
     const DAffine world_from_object(instances[i].world_from_object);
-    const Bounds box = transform_bounds(world_from_object, decoded[instances[i].geometry].bounds);
-    if (box.empty()) continue;
-    // NaN corners vanish in min and max, so look at the transform too.
-    const glm::dmat3 linear(world_from_object);
-    if (!std::isfinite(norm(linear)) || !is_finite(DVec3(world_from_object[3])))
+    if (!std::isfinite(norm(glm::dmat3(world_from_object))) || !is_finite(DVec3(world_from_object[3])))
       throw Error(ErrorKind::kInput, "the transform of instance " + std::to_string(i) + " is not finite");
-    world.extend(box);
+    const Bounds box = transform_bounds(world_from_object, decoded[instances[i].geometry].bounds);
+    if (!box.empty()) world.extend(box);
   }
   space_ = UnitSpace(world);
 
@@ -297,7 +293,8 @@ EmbreeScene::Hit EmbreeScene::resolve(uint32_t instance, uint32_t geometry, uint
   const Placement& placement = placements_[attachment.placement];
   const Vec3* positions = surfaces_[placement.surface].positions.data();
   const Triangle& t = part.triangles[primitive];
-  return {&placement, part.geometry, part.source_triangle(primitive), {positions + t.x, positions + t.y, positions + t.z}};
+  return {
+      &placement, part.geometry, part.source_triangle(primitive), {positions + t.x, positions + t.y, positions + t.z}};
 }
 
 uint64_t EmbreeScene::bvh_bytes() const { return device_->embree.bytes(); }

@@ -86,7 +86,7 @@ public:
   struct Hit {
     const Placement* placement = nullptr;
     uint32_t geometry = 0;
-    uint32_t triangle = 0;      ///< number in the geometry
+    uint32_t triangle = 0;     ///< number in the geometry
     const Vec3* vertices[3]{}; ///< in the surface's coordinates
   };
 

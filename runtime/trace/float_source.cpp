@@ -111,8 +111,8 @@ Vec2 FloatSource::uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) co
 }
 
 uint64_t FloatSource::resident_bytes() const {
-  uint64_t bytes = parts_.size() * sizeof(Part) + geometries_.size() * sizeof(Geometry) +
-                   instances_.size() * sizeof(PlacedGeometry);
+  uint64_t bytes =
+      parts_.size() * sizeof(Part) + geometries_.size() * sizeof(Geometry) + instances_.size() * sizeof(PlacedGeometry);
   for (const Mesh& mesh : scene_.meshes)
     bytes += mesh.positions.size() * sizeof(Vec3) + mesh.normals.size() * sizeof(Vec3) +
              mesh.uvs.size() * sizeof(Vec2) + mesh.triangles.size() * sizeof(Triangle);

@@ -34,16 +34,16 @@ public:
 private:
   void trace_packet(uint32_t x0, uint32_t y0, const Tile& tile) const {
     PacketPixels pixels;
-    DVec3 directions[kPacketSize];
+    CameraRay rays[kPacketSize]; // in unit space
     RTCRayHit16 packet;
     for (uint32_t lane = 0; lane < kPacketSize; ++lane) {
       const uint32_t x = x0 + lane % 4, y = y0 + lane / 4;
       const bool valid = x < tile.x1 && y < tile.y1;
       pixels.x[lane] = x, pixels.y[lane] = y;
       pixels.valid[lane] = valid ? -1 : 0;
-      const CameraRay ray = now_.ray(std::min(x, tile.x1 - 1), std::min(y, tile.y1 - 1));
-      directions[lane] = ray.direction;
-      set_ray(packet, lane, scene_.space().to_unit(ray.origin), ray.direction);
+      rays[lane] = now_.ray(std::min(x, tile.x1 - 1), std::min(y, tile.y1 - 1));
+      rays[lane].origin = scene_.space().to_unit(rays[lane].origin);
+      set_ray(packet, lane, rays[lane].origin, rays[lane].direction);
     }
     {
       const FlushDenormals flush;
@@ -58,7 +58,7 @@ private:
       if (packet.hit.geomID[lane] == RTC_INVALID_GEOMETRY_ID)
         write_miss(pixel);
       else
-        write_hit(pixel, glm::dvec2(pixels.x[lane], pixels.y[lane]) + 0.5, directions[lane], packet.hit, lane);
+        write_hit(pixel, glm::dvec2(pixels.x[lane], pixels.y[lane]) + 0.5, rays[lane], packet.hit, lane);
     }
   }
 
@@ -81,18 +81,19 @@ private:
     out_.motion_px[pixel] = Vec2(0);
   }
 
-  void write_hit(size_t pixel, glm::dvec2 centre_px, DVec3 direction, const RTCHit16& hits, uint32_t lane) const {
+  void write_hit(size_t pixel, glm::dvec2 centre_px, const CameraRay& ray, const RTCHit16& hits, uint32_t lane) const {
     const EmbreeScene::Hit hit = scene_.resolve(hits.instID[0][lane], hits.geomID[lane], hits.primID[lane]);
     const EmbreeScene::Placement& placement = *hit.placement;
     const Vec2 barycentrics(hits.u[lane], hits.v[lane]);
     const DVec3 v0(*hit.vertices[0]), e1 = DVec3(*hit.vertices[1]) - v0, e2 = DVec3(*hit.vertices[2]) - v0;
-    const DVec3 on_surface = v0 + e1 * double(barycentrics.x) + e2 * double(barycentrics.y);
+    const DVec3 cross = glm::cross(e1, e2);
 
     const bool placed = placement.instanced;
-    const DVec3 unit_position = placed ? transform_point(placement.unit_from_surface, on_surface) : on_surface;
+    const DVec3 facing = facing_normal(placed ? placement.surface_normal * cross : cross, ray.direction);
+    const DVec3 interpolated = v0 + e1 * double(barycentrics.x) + e2 * double(barycentrics.y);
+    const DVec3 from_barycentrics = placed ? transform_point(placement.unit_from_surface, interpolated) : interpolated;
+    const DVec3 unit_position = on_ray(ray, from_barycentrics, facing);
     const DVec3 position = scene_.space().from_unit(unit_position);
-    const DVec3 cross = glm::cross(e1, e2);
-    const DVec3 facing = facing_normal(placed ? placement.surface_normal * cross : cross, direction);
     const uint32_t material = source_.material_of(hit.geometry, hit.triangle);
 
     out_.view_z[pixel] = std::max(static_cast<float>(now_.view_z(position)), std::numeric_limits<float>::denorm_min());
@@ -105,6 +106,17 @@ private:
     out_.offset[pixel] =
         static_cast<float>(ray_offset(hit, scene_.space(), unit_position, facing) / scene_.space().scale());
     out_.motion_px[pixel] = motion(position, centre_px);
+  }
+
+  /// The point of the surface's plane on the ray. Barycentrics are floats: on a large triangle they stay on the plane
+  /// but stray from the pixel. Where the ray grazes the plane or leaves the triangle they are the better choice.
+  static DVec3 on_ray(const CameraRay& ray, DVec3 from_barycentrics, DVec3 normal) {
+    constexpr double kMinCosine = 1e-3, kMaxMove = 0x1p-20; // of unit space's size
+    const double cosine = glm::dot(normal, ray.direction);
+    if (!(cosine < -kMinCosine)) return from_barycentrics;
+    const double t = glm::dot(normal, from_barycentrics - ray.origin) / cosine;
+    const DVec3 point = ray.origin + ray.direction * t;
+    return glm::distance(point, from_barycentrics) <= kMaxMove ? point : from_barycentrics;
   }
 
   /// Unit normal against the ray; the ray's own direction where the triangle has no area.

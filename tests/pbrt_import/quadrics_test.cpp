@@ -97,7 +97,7 @@ Case cone(const std::string& name, ConeParameters c, uint32_t loops) {
 double distance_to_parabola(double k, double r, double z) {
   double a = r, b = std::sqrt(std::max(0.0, z / k));
   const auto at = [&](double x) { return std::hypot(x - r, k * x * x - z); };
-  for (int i = 0; i < 60; ++i) {
+  for (int i = 0; i < 30; ++i) {
     const double third = (b - a) / 3;
     if (at(a + third) < at(b - third))
       b -= third;
@@ -183,7 +183,7 @@ TEST(Quadrics, NoTriangleLeavesTheSurfaceByMoreThanTheTolerance) {
       const Mesh mesh = c.tessellate(tolerance);
       double worst = 0.0, worst_vertex = 0.0;
       for (const Vec3& p : mesh.positions) worst_vertex = std::max(worst_vertex, c.distance(DVec3(p)));
-      constexpr int kSteps = 8;
+      constexpr int kSteps = 4;
       for (const Triangle& t : mesh.triangles)
         for (int i = 0; i <= kSteps; ++i)
           for (int j = 0; i + j <= kSteps; ++j)

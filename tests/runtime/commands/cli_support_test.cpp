@@ -18,18 +18,18 @@
 namespace packtrace {
 namespace {
 
-struct Run {
+struct Outcome {
   int code = -1;
   std::string out, err;
 };
 
 /// Runs a program whose only verb, "go", does `action`.
-Run run(std::vector<const char*> arguments, std::function<int(const GlobalOptions&)> action) {
+Outcome run(std::vector<const char*> arguments, std::function<int(const GlobalOptions&)> action) {
   CLI::App app("test");
   GlobalOptions globals;
   add_verb(app, globals, "go", "Goes", [&] { return action(globals); });
   arguments.insert(arguments.begin(), "packtrace");
-  Run result;
+  Outcome result;
   testing::internal::CaptureStdout();
   testing::internal::CaptureStderr();
   result.code = run_verbs(app, globals, static_cast<int>(arguments.size()), arguments.data());
@@ -40,7 +40,7 @@ Run run(std::vector<const char*> arguments, std::function<int(const GlobalOption
 
 TEST(CliSupport, GlobalOptionsReachTheVerb) {
   GlobalOptions seen;
-  const Run result =
+  const Outcome result =
       run({"go", "-q", "-vv", "--json", "-", "--force", "--threads", "3"}, [&](const GlobalOptions& globals) {
         seen = globals;
         EXPECT_EQ(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism), 3u);
@@ -66,7 +66,7 @@ TEST(CliSupport, WrongCommandLinesExitWithTwoAndRunNothing) {
                                                     {"go", "--threads", "many"},
                                                     {"go", "extra"},
                                                     {"go", "--json"}}) {
-    const Run result = run(arguments, never);
+    const Outcome result = run(arguments, never);
     EXPECT_EQ(result.code, 2);
     EXPECT_FALSE(result.err.empty());
   }
@@ -74,7 +74,7 @@ TEST(CliSupport, WrongCommandLinesExitWithTwoAndRunNothing) {
 
 TEST(CliSupport, HelpIsASuccess) {
   for (const std::vector<const char*>& arguments : {std::vector<const char*>{"--help"}, {"go", "--help"}}) {
-    const Run result = run(arguments, [](const GlobalOptions&) { return 9; });
+    const Outcome result = run(arguments, [](const GlobalOptions&) { return 9; });
     EXPECT_EQ(result.code, 0);
     EXPECT_NE(result.out.find("go"), std::string::npos);
   }
@@ -83,7 +83,7 @@ TEST(CliSupport, HelpIsASuccess) {
 TEST(CliSupport, ErrorsBecomeExitCodesAndOneLine) {
   for (const ErrorKind kind : {ErrorKind::kUsage, ErrorKind::kInput, ErrorKind::kUnsupported, ErrorKind::kLimitExceeded,
                                ErrorKind::kIo, ErrorKind::kCancelled}) {
-    const Run result = run({"go"}, [&](const GlobalOptions&) -> int { throw Error(kind, "a.ptk: broken"); });
+    const Outcome result = run({"go"}, [&](const GlobalOptions&) -> int { throw Error(kind, "a.ptk: broken"); });
     EXPECT_EQ(result.code, static_cast<int>(kind));
     EXPECT_EQ(result.err, "packtrace: error: a.ptk: broken\n");
     EXPECT_EQ(result.out, "");
@@ -117,18 +117,16 @@ TEST(CliSupport, TheSecondInterruptEndsWithoutLeavingFiles) {
   EXPECT_EQ(folder.files(), 0u);
 }
 
-Diagnostics some_problems() {
-  Diagnostics diagnostics;
+void report_some_problems(Diagnostics& diagnostics) {
   const auto file = std::make_shared<const SourceFile>(SourceFile{"error: a.pbrt", {}});
   diagnostics.report(Severity::kNote, {file, 1, 1}, "a note", 1);
   diagnostics.report(Severity::kWarning, {file, 2, 1}, "a warning", 2);
   diagnostics.report(Severity::kError, {file, 3, 1}, "an error", 3);
-  return diagnostics;
 }
 
 TEST(CliSupport, DiagnosticsAreShownByVerbosity) {
-  // Diagnostics cannot be copied or moved: it is made in place.
-  const Diagnostics diagnostics = some_problems();
+  Diagnostics diagnostics;
+  report_some_problems(diagnostics);
   const auto lines = [&](bool quiet, int verbosity) {
     GlobalOptions globals;
     globals.quiet = quiet, globals.verbosity = verbosity;
@@ -141,7 +139,8 @@ TEST(CliSupport, DiagnosticsAreShownByVerbosity) {
 }
 
 TEST(CliSupport, ColourMarksTheSeverityAndNotThePlace) {
-  const Diagnostics diagnostics = some_problems();
+  Diagnostics diagnostics;
+  report_some_problems(diagnostics);
   GlobalOptions globals;
   globals.quiet = true;
   EXPECT_EQ(format_diagnostics(diagnostics, globals, true), "error: a.pbrt:3:1: \x1b[31merror:\x1b[0m an error\n");

@@ -77,7 +77,8 @@ TEST(AoAnalytic, ParallelPlatesWithinARadius) {
 }
 
 /// Mean of f(distance) over a plane at height h, by midpoints of the uniform cos^2.
-template <typename F> double plate_mean(double height, const F& f) {
+template <typename F>
+double plate_mean(double height, const F& f) {
   constexpr int kSteps = 200000;
   double sum = 0;
   for (int i = 0; i < kSteps; ++i) sum += f(height / std::sqrt((i + 0.5) / kSteps));
@@ -97,9 +98,8 @@ TEST(AoAnalytic, ParallelPlatesWithFalloff) {
   EXPECT_NEAR(ao_at(scene, {0, 0, 0}, {0, 1, 0}, config),
               plate_mean(2, [&](double t) { return 1 - 0.9 * occlusion(t); }), 1e-3);
   config.continuous = true;
-  EXPECT_NEAR(
-      ao_at(scene, {0, 0, 0}, {0, 1, 0}, config),
-      plate_mean(2, [&](double t) { return t < end ? 1 - 0.9 * (occlusion(t) - 0.4) / 0.6 : 1.0; }), 1e-3);
+  EXPECT_NEAR(ao_at(scene, {0, 0, 0}, {0, 1, 0}, config),
+              plate_mean(2, [&](double t) { return t < end ? 1 - 0.9 * (occlusion(t) - 0.4) / 0.6 : 1.0; }), 1e-3);
 }
 
 TEST(AoAnalytic, ContinuousFalloffHasNoStepAtItsEnd) {

@@ -117,7 +117,8 @@ TEST(AoRobustness, InstancesGiveTheAoOfBakedGeometry) {
     add_object(instanced, mesh);
     instanced.instances.push_back({0, Affine(place)});
     const Camera camera = camera_at({3, 4, -6}, {0, 0, 0});
-    const Rendered a = render(baked, camera, {64, 64}, visibility(3)), b = render(instanced, camera, {64, 64}, visibility(3));
+    const Rendered a = render(baked, camera, {64, 64}, visibility(3)),
+                   b = render(instanced, camera, {64, 64}, visibility(3));
     uint32_t different = 0;
     for (size_t i = 0; i < a.ao.ao.size(); ++i) different += std::abs(a.ao.ao[i] - b.ao.ao[i]) > 0.05f;
     EXPECT_LE(different, 4u);

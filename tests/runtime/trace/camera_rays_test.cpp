@@ -171,8 +171,8 @@ TEST(FramingCamera, SeesTheWholeBoxAtAnyScale) {
       const PrimaryCamera camera(framing_camera(bounds, size), size);
       double widest = 0.0;
       for (int i = 0; i < 8; ++i) {
-        const auto p = camera.project({i & 1 ? bounds.lo.x : bounds.hi.x, i & 2 ? bounds.lo.y : bounds.hi.y,
-                                       i & 4 ? bounds.lo.z : bounds.hi.z});
+        const auto p = camera.project(
+            {i & 1 ? bounds.lo.x : bounds.hi.x, i & 2 ? bounds.lo.y : bounds.hi.y, i & 4 ? bounds.lo.z : bounds.hi.z});
         ASSERT_TRUE(p.has_value());
         const glm::dvec2 from_centre = glm::abs(p->pixel / glm::dvec2(size.width, size.height) - 0.5);
         widest = std::max({widest, from_centre.x, from_centre.y});

@@ -80,7 +80,8 @@ uint32_t add_shape(Scene& scene, Mesh mesh, MaterialFlags flags, const DAffine& 
 
 uint32_t add_object(Scene& scene, Mesh mesh, MaterialFlags flags) {
   const uint32_t material = add_mesh_and_material(scene, std::move(mesh), flags);
-  scene.objects.push_back({"object", {{static_cast<uint32_t>(scene.meshes.size() - 1), material, false, DAffine(1.0)}}});
+  scene.objects.push_back(
+      {"object", {{static_cast<uint32_t>(scene.meshes.size() - 1), material, false, DAffine(1.0)}}});
   return static_cast<uint32_t>(scene.objects.size() - 1);
 }
 

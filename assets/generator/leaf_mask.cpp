@@ -1,0 +1,54 @@
+#include "assets/generator/leaf_mask.h"
+
+#include <cmath>
+#include <vector>
+
+#define STB_IMAGE_WRITE_IMPLEMENTATION
+#define STB_IMAGE_WRITE_STATIC
+#define STBI_WRITE_NO_STDIO
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wconversion"
+#pragma GCC diagnostic ignored "-Wunused-function"
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+#include <stb/stb_image_write.h>
+#pragma GCC diagnostic pop
+
+#include "assets/generator/placement.h"
+
+namespace packtrace {
+namespace {
+
+constexpr int kWidth = 96, kHeight = 128;
+
+/// Inside the leaf, x across in [-1,1], y from stalk 0 to tip 1.
+bool inside(double x, double y) {
+  if (y < 0.12) return std::abs(x) < 0.035; // stalk
+  const double t = (y - 0.12) / 0.86;
+  if (t > 1.0) return false;
+  const double lobes = 0.86 + 0.14 * sin_cos(2.0 * kPi * (5.0 * t - 0.55 * std::abs(x))).cos; // notches slant to the tip
+  const double edge = 1.3 * std::sqrt(std::sqrt(t)) * std::sqrt(1.0 - t) * lobes + 0.03 * (1.0 - t);
+  if (std::abs(x) > edge) return false;
+  const double rib = std::abs(x) / (edge + 1e-9);
+  const double hole = sin_cos(2.0 * kPi * (5.0 * t + 0.5 - 0.55 * std::abs(x))).cos;
+  return !(rib > 0.25 && rib < 0.48 && hole > 0.86 && t < 0.85);
+}
+
+} // namespace
+
+void generate_leaf_mask(const OutputConfig& output) {
+  std::vector<unsigned char> texels;
+  for (int row = 0; row < kHeight; ++row) {
+    for (int column = 0; column < kWidth; ++column) {
+      const double x = (column + 0.5) / kWidth * 2.0 - 1.0, y = 1.0 - (row + 0.5) / kHeight;
+      texels.push_back(inside(x, y) ? 255 : 0);
+    }
+  }
+  OutputFile file(output.folder / "leaf.png", output.overwrite);
+  const auto sink = [](void* context, void* bytes, int size) {
+    static_cast<OutputFile*>(context)->write({static_cast<const char*>(bytes), static_cast<size_t>(size)});
+  };
+  stbi_write_png_to_func(sink, &file, kWidth, kHeight, 1, texels.data(), kWidth);
+  file.close();
+}
+
+} // namespace packtrace

@@ -1,0 +1,130 @@
+#include "pbrt_import/file_loader.h"
+
+#include <algorithm>
+#include <memory>
+#include <new>
+#include <stdexcept>
+
+#include <tbb/parallel_for.h>
+
+#include "pbrt_import/input_file.h"
+#include "pbrt_import/ply.h"
+#include "pbrt_import/scene/error.h"
+#include "pbrt_import/tokenizer.h"
+
+namespace packtrace {
+namespace {
+
+/// Runs work; what goes wrong with one file becomes that file's error text.
+template <class Work>
+std::string error_of(Work work) {
+  try {
+    work();
+    return {};
+  } catch (const Error& error) {
+    if (error.kind() == ErrorKind::kCancelled) throw;
+    return error.what();
+  } catch (const std::bad_alloc&) {
+    return "not enough memory";
+  } catch (const std::length_error&) {
+    return "not enough memory";
+  }
+}
+
+} // namespace
+
+uint32_t FileLoader::request_ply(const std::filesystem::path& path, const Place& place, uint32_t slot) {
+  const auto [it, inserted] = ply_by_path_.try_emplace(path.string(), static_cast<uint32_t>(plys_.size()));
+  if (inserted) {
+    plys_.push_back({path, slot, false, {}, {}});
+    ply_by_slot_.emplace(slot, it->second);
+  }
+  PlyFile& file = plys_[it->second];
+  file.uses.push_back({place, reporter_.sequence()});
+  return file.slot;
+}
+
+void FileLoader::require(uint32_t slot) {
+  if (const auto it = ply_by_slot_.find(slot); it != ply_by_slot_.end()) plys_[it->second].needed = true;
+}
+
+void FileLoader::read_ply_file(PlyFile& file, Mesh& mesh) const {
+  Outcome& outcome = file.outcome;
+  outcome.error = error_of([&] {
+    const std::vector<std::byte> bytes = read_whole_file(file.path, options_.memory_budget_bytes);
+    outcome.bytes = bytes.size();
+    PlyMesh ply = read_ply(bytes, [&](Severity severity, uint32_t line, std::string message) {
+      outcome.reports.push_back({severity, line, std::move(message)});
+    });
+    outcome.dropped_triangles = ply.dropped_triangles;
+    mesh = std::move(ply.mesh);
+    mesh.name = file.path.filename().string();
+  });
+}
+
+FileLoader::Outcome FileLoader::read_image_file(ImageRequest& image) const {
+  Outcome outcome;
+  outcome.error = error_of([&] {
+    const std::vector<std::byte> bytes = read_whole_file(image.path, options_.memory_budget_bytes);
+    outcome.bytes = bytes.size();
+    image.summary = read_image(bytes, image.decode_srgb, image.want_mask, options_.memory_budget_bytes);
+  });
+  image.missing = !outcome.error.empty();
+  return outcome;
+}
+
+void FileLoader::load(std::vector<Mesh>& meshes, std::vector<ImageRequest>& images, Progress& progress,
+                      ImportStatistics& statistics, uint64_t& dropped_triangles) {
+  std::vector<PlyFile*> wanted_plys;
+  for (PlyFile& file : plys_)
+    if (file.needed) wanted_plys.push_back(&file);
+  std::vector<ImageRequest*> wanted_images;
+  for (ImageRequest& image : images)
+    if (image.needed && !image.missing) wanted_images.push_back(&image);
+  std::vector<Outcome> image_outcomes(wanted_images.size());
+  const size_t count = wanted_images.size() + wanted_plys.size();
+  progress.begin("reading meshes and images", count);
+  tbb::parallel_for(size_t{0}, count, [&](size_t i) {
+    if (i < wanted_images.size()) // images first: one may take longer than many meshes
+      image_outcomes[i] = read_image_file(*wanted_images[i]);
+    else
+      read_ply_file(*wanted_plys[i - wanted_images.size()], meshes[wanted_plys[i - wanted_images.size()]->slot]);
+    progress.advance();
+  });
+  for (size_t i = 0; i < wanted_images.size(); ++i) {
+    report_image(*wanted_images[i], image_outcomes[i]);
+    statistics.bytes_read += image_outcomes[i].bytes;
+    statistics.files_read += image_outcomes[i].error.empty();
+  }
+  for (const PlyFile* const file : wanted_plys) {
+    report_ply(*file);
+    statistics.bytes_read += file->outcome.bytes;
+    statistics.files_read += file->outcome.error.empty();
+    if (!file->outcome.error.empty()) statistics.shapes_skipped += file->uses.size();
+    dropped_triangles += file->outcome.dropped_triangles;
+  }
+}
+
+void FileLoader::report_ply(const PlyFile& file) {
+  for (const PlyUse& use : file.uses) {
+    if (file.outcome.error.empty()) break;
+    reporter_.set_sequence(use.sequence);
+    reporter_.error(use.place,
+                    "plymesh " + in_quotes(file.path.string()) + ": " + file.outcome.error + "; the shape is skipped");
+  }
+  if (file.outcome.reports.empty()) return;
+  reporter_.set_sequence(file.uses.front().sequence);
+  const auto source =
+      std::make_shared<SourceFile>(SourceFile{file.path.string(), reporter_.locate(file.uses.front().place)});
+  for (const Report& report : file.outcome.reports)
+    reporter_.report(report.severity, SourceLocation{source, report.line, 0}, report.message);
+}
+
+void FileLoader::report_image(const ImageRequest& image, const Outcome& outcome) {
+  if (outcome.error.empty()) return;
+  reporter_.set_sequence(image.sequence);
+  reporter_.error(image.place,
+                  "texture file " + in_quotes(image.path.string()) + ": " + outcome.error + "; it counts as white");
+}
+
+} // namespace packtrace

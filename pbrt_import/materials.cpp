@@ -1,0 +1,283 @@
+#include "pbrt_import/materials.h"
+
+#include <algorithm>
+#include <array>
+#include <span>
+
+#include "pbrt_import/spectrum.h"
+#include "pbrt_import/tokenizer.h"
+
+namespace packtrace {
+namespace {
+
+using Node = TextureGraph::Node;
+
+/// Every name pbrt-v3's materials look up, by kind.
+std::span<const std::string_view> parameter_names(std::string_view kind) {
+  static constexpr std::string_view kMatte[] = {"Kd", "sigma", "bumpmap"};
+  static constexpr std::string_view kPlastic[] = {"Kd", "Ks", "roughness", "remaproughness", "bumpmap"};
+  static constexpr std::string_view kUber[] = {"Kd",         "Ks",  "Kr",    "Kt",      "roughness",      "uroughness",
+                                               "vroughness", "eta", "index", "opacity", "remaproughness", "bumpmap"};
+  static constexpr std::string_view kTranslucent[] = {
+      "Kd", "Ks", "reflect", "transmit", "roughness", "remaproughness", "bumpmap"};
+  static constexpr std::string_view kSubstrate[] = {"Kd",     "Ks", "uroughness", "vroughness", "remaproughness",
+                                                    "bumpmap"};
+  static constexpr std::string_view kMirror[] = {"Kr", "bumpmap"};
+  static constexpr std::string_view kGlass[] = {
+      "Kr", "Kt", "eta", "index", "uroughness", "vroughness", "remaproughness", "bumpmap"};
+  static constexpr std::string_view kMetal[] = {
+      "eta", "k", "roughness", "uroughness", "vroughness", "remaproughness", "bumpmap"};
+  static constexpr std::string_view kDisney[] = {"color",        "metallic",       "eta",       "roughness",
+                                                 "speculartint", "anisotropic",    "sheen",     "sheentint",
+                                                 "clearcoat",    "clearcoatgloss", "spectrans", "scatterdistance",
+                                                 "thin",         "flatness",       "difftrans", "bumpmap"};
+  static constexpr std::string_view kHair[] = {"sigma_a", "color",  "eumelanin", "pheomelanin",
+                                               "eta",     "beta_m", "beta_n",    "alpha"};
+  static constexpr std::string_view kSubsurface[] = {
+      "name",       "sigma_a",    "sigma_s",        "Kr",     "Kt", "eta", "g", "scale", "roughness",
+      "uroughness", "vroughness", "remaproughness", "bumpmap"};
+  static constexpr std::string_view kKdSubsurface[] = {
+      "Kd",     "mfp", "Kr", "Kt", "eta", "g", "scale", "roughness", "uroughness", "vroughness", "remaproughness",
+      "bumpmap"};
+  static constexpr std::string_view kFourier[] = {"bsdffile", "bumpmap"};
+  static constexpr std::string_view kMix[] = {"amount", "namedmaterial1", "namedmaterial2"};
+  struct Entry {
+    std::string_view kind;
+    std::span<const std::string_view> names;
+  };
+  static constexpr Entry kEntries[] = {
+      {"matte", kMatte},
+      {"plastic", kPlastic},
+      {"uber", kUber},
+      {"translucent", kTranslucent},
+      {"substrate", kSubstrate},
+      {"mirror", kMirror},
+      {"glass", kGlass},
+      {"metal", kMetal},
+      {"disney", kDisney},
+      {"hair", kHair},
+      {"subsurface", kSubsurface},
+      {"kdsubsurface", kKdSubsurface},
+      {"fourier", kFourier},
+      {"mix", kMix},
+      {"none", {}},
+      {"", {}},
+  };
+  for (const Entry& entry : kEntries)
+    if (entry.kind == kind) return entry.names;
+  return {};
+}
+
+constexpr std::string_view kKinds[] = {"matte", "plastic", "uber", "translucent", "substrate",    "mirror",  "glass",
+                                       "metal", "disney",  "hair", "subsurface",  "kdsubsurface", "fourier", "mix",
+                                       "none",  ""};
+
+/// Whether a float parameter is a constant of at least bound.
+bool is_at_least(const TextureParameters& parameters, std::string_view name, float bound) {
+  const std::optional<Node> node = parameters.find_float(name);
+  const Vec3* const value = node ? parameters.context().graph.constant_value(*node) : nullptr;
+  return value && value->x >= bound;
+}
+
+Node metal_albedo(const TextureParameters& parameters) {
+  MetalIndices indices = *metal_by_name("Cu"); // pbrt's default
+  for (const std::string_view name : {"eta", "k"}) {
+    const auto by_name = metal_by_name(parameters.spectrum_file(name));
+    Vec3& value = name == "eta" ? indices.eta : indices.k;
+    if (by_name) value = name == "eta" ? by_name->eta : by_name->k;
+    if (const std::optional<Node> node = parameters.find_spectrum(name)) {
+      // Textured indices are rare enough to stand for their default.
+      if (const Vec3* const constant = parameters.context().graph.constant_value(*node)) value = *constant;
+    }
+  }
+  Vec3 albedo;
+  for (int c = 0; c < 3; ++c)
+    albedo[c] = conductor_albedo(std::max(indices.eta[c], 0.0f), std::max(indices.k[c], 0.0f));
+  return parameters.context().graph.constant(albedo);
+}
+
+/// Diffuse colour, or what stands for it, and flags of a material that is not a mix.
+void fill_recipe(MaterialRecipe& recipe, std::string_view kind, const TextureParameters& parameters) {
+  TextureGraph& graph = parameters.context().graph;
+  const auto spectrum = [&](std::string_view name, float fallback) {
+    return parameters.spectrum(name, Vec3(fallback));
+  };
+  if (kind == "plastic" || kind == "translucent") {
+    recipe.albedo = spectrum("Kd", 0.25f);
+  } else if (kind == "uber") {
+    recipe.albedo = spectrum("Kd", 0.25f);
+    const std::optional<Node> opacity = parameters.find_spectrum("opacity");
+    const Vec3* const value = opacity ? graph.constant_value(*opacity) : nullptr;
+    if (value && *value == Vec3(0.0f)) recipe.flags |= kTransmissive;
+  } else if (kind == "mirror") {
+    recipe.albedo = spectrum("Kr", 0.9f);
+    recipe.flags |= kMirror;
+  } else if (kind == "glass") {
+    recipe.albedo = spectrum("Kt", 1.0f);
+    recipe.flags |= kTransmissive;
+  } else if (kind == "metal") {
+    recipe.albedo = metal_albedo(parameters);
+    recipe.flags |= kMetal;
+  } else if (kind == "disney") {
+    recipe.albedo = spectrum("color", 0.5f);
+    if (is_at_least(parameters, "metallic", 0.5f)) recipe.flags |= kMetal;
+    if (is_at_least(parameters, "spectrans", 0.5f)) recipe.flags |= kTransmissive;
+  } else if (kind == "hair") {
+    recipe.albedo = spectrum("color", 0.2f); // pbrt's default is brown hair: eumelanin 1.3
+  } else if (kind == "subsurface") {
+    recipe.albedo = graph.constant(Vec3(0.8f)); // most of its measured media scatter far more than they absorb
+  } else if (kind == "none" || kind.empty()) {
+    recipe.albedo = graph.constant(Vec3(0.0f));
+    recipe.flags |= kInvisible;
+  } else if (kind == "fourier") {
+    recipe.albedo = graph.constant(Vec3(0.5f));
+  } else {
+    recipe.albedo = spectrum("Kd", 0.5f); // matte, substrate, kdsubsurface
+  }
+}
+
+Vec3 clamped(Vec3 v) { return glm::clamp(v, Vec3(0.0f), Vec3(1.0f)); }
+
+} // namespace
+
+MaterialLibrary::MaterialLibrary(TextureGraph& graph) : graph_(graph) {
+  definitions_.push_back({"matte", {}, {"default", 0, graph.constant(Vec3(0.5f))}});
+}
+
+uint32_t MaterialLibrary::define(const Directive& directive, const TextureContext& context) {
+  const bool named = directive.kind == DirectiveKind::kMakeNamedMaterial;
+  const TextureParameters parameters(context, directive.parameters);
+  std::string kind = directive.names[0];
+  if (named) {
+    const Parameter* const type = directive.parameters.find("type", {ParameterType::kString});
+    if (!type || type->strings.size() != 1)
+      context.reporter.error(directive.place, "MakeNamedMaterial " + in_quotes(directive.names[0]) +
+                                                  " has no \"string type\"; matte is used");
+    kind = parameters.get_string("type", "matte");
+  }
+  if (std::find(std::begin(kKinds), std::end(kKinds), kind) == std::end(kKinds)) {
+    context.reporter.error(directive.place, "unknown material " + in_quotes(kind) + "; matte is used" +
+                                                did_you_mean(closest_name(kind, kKinds)));
+    kind = "matte";
+  }
+  const uint32_t number = add(kind, named ? directive.names[0] : kind.empty() ? "none" : kind, parameters);
+  definitions_[number].parameters = directive.parameters;
+  report_unused(directive.parameters, context.reporter);
+  return number;
+}
+
+uint32_t MaterialLibrary::add(std::string kind, std::string name, const TextureParameters& parameters) {
+  MaterialRecipe recipe{std::move(name), 0, 0};
+  if (kind == "mix") {
+    const auto part = [&](std::string_view parameter) -> const MaterialRecipe& {
+      const std::string part_name = parameters.get_string(parameter, "");
+      const std::optional<uint32_t> found = parameters.context().state.named_materials.find(part_name);
+      if (!found)
+        parameters.context().reporter.error(
+            parameters.context().place,
+            "mix material: no named material " + in_quotes(part_name) + " for \"" + std::string(parameter) +
+                "\"; grey matte is used" + did_you_mean(parameters.context().state.named_materials.closest(part_name)));
+      return definitions_[found ? *found : kDefault].recipe;
+    };
+    const MaterialRecipe &a = part("namedmaterial1"), &b = part("namedmaterial2");
+    // pbrt weights the first material with amount.
+    recipe.albedo = graph_.mix(b.albedo, a.albedo, parameters.spectrum("amount", Vec3(0.5f)));
+    recipe.flags = (a.flags & b.flags) | ((a.flags | b.flags) & kNormalMap);
+  } else {
+    fill_recipe(recipe, kind, parameters);
+  }
+  // Exporters for other renderers write "Normal"; pbrt knows "bumpmap" only.
+  for (const std::string_view map : {"bumpmap", "normalmap", "Normal"})
+    if (kind != "mix" && parameters.has(map)) recipe.flags |= kNormalMap;
+  if (!graph_.constant_value(recipe.albedo)) recipe.flags |= kAlbedoTexture;
+  parameters.mark_used(parameter_names(kind));
+  definitions_.push_back({std::move(kind), {}, std::move(recipe)});
+  return static_cast<uint32_t>(definitions_.size() - 1);
+}
+
+uint32_t MaterialLibrary::with_shape_parameters(uint32_t base, const ParameterList& shape,
+                                                const TextureContext& context) {
+  const std::span<const std::string_view> names = parameter_names(definitions_[base].kind);
+  const bool overrides = std::any_of(shape.all().begin(), shape.all().end(), [&](const Parameter& parameter) {
+    return !parameter.used && std::find(names.begin(), names.end(), parameter.name) != names.end();
+  });
+  if (!overrides) return base;
+  const ParameterList base_parameters = definitions_[base].parameters; // definitions_ grows below
+  const uint32_t number =
+      add(definitions_[base].kind, definitions_[base].recipe.name, TextureParameters(context, shape, &base_parameters));
+  definitions_[number].parameters = base_parameters;
+  return number;
+}
+
+uint32_t MaterialLibrary::use(const MaterialUse& use) {
+  const auto [it, inserted] = use_numbers_.try_emplace(use, static_cast<uint32_t>(uses_.size()));
+  if (inserted) uses_.push_back(use);
+  return it->second;
+}
+
+void MaterialLibrary::require_images() {
+  for (const MaterialUse& use : uses_) {
+    graph_.require(definitions_[use.recipe].recipe.albedo, false);
+    if (use.alpha != kNone) graph_.require(use.alpha, true);
+    if (use.shadow_alpha != kNone) graph_.require(use.shadow_alpha, true);
+  }
+}
+
+Vec3 MaterialLibrary::albedo_of(Node node, const std::string& name, Reporter& reporter) {
+  const Vec3 albedo = graph_.average(node);
+  const Vec3 inside = clamped(albedo);
+  if (inside != albedo)
+    reporter.report(Severity::kNote, SourceLocation{},
+                    "material " + in_quotes(name) + ": its colour leaves [0, 1] and is clamped");
+  return inside;
+}
+
+std::vector<uint32_t> MaterialLibrary::resolve(std::vector<Material>& materials, std::vector<AlphaMask>& masks,
+                                               Reporter& reporter) {
+  std::map<Node, std::pair<TextureGraph::MaskKind, uint32_t>> mask_of_node;
+  const auto mask_of = [&](Node node) {
+    const auto [it, inserted] = mask_of_node.try_emplace(node, TextureGraph::MaskKind::kNoHoles, kNoMask);
+    if (!inserted) return it->second;
+    TextureGraph::MaskResult result = graph_.alpha_mask(node);
+    if (!result.exact)
+      reporter.report(Severity::kNote, SourceLocation{},
+                      "an alpha texture is not a plain image over uv; its holes are approximated");
+    if (result.kind == TextureGraph::MaskKind::kSomeHoles) {
+      it->second.second = static_cast<uint32_t>(masks.size());
+      masks.push_back(std::move(result.mask));
+    }
+    it->second.first = result.kind;
+    return it->second;
+  };
+  using Key = std::tuple<std::string, MaterialFlags, std::array<float, 3>, uint32_t, uint32_t>;
+  std::map<Key, uint32_t> numbers;
+  std::vector<uint32_t> result;
+  for (const MaterialUse& use : uses_) {
+    const MaterialRecipe& recipe = definitions_[use.recipe].recipe;
+    Material material{recipe.name, recipe.flags, albedo_of(recipe.albedo, recipe.name, reporter), kNoMask, kNoMask};
+    if (use.area_light != kNone) material.flags |= use.area_light == 1 ? kEmissive | kEmitsBothSides : kEmissive;
+    if (use.alpha != kNone) {
+      const auto [kind, mask] = mask_of(use.alpha);
+      material.alpha_mask = mask;
+      if (kind == TextureGraph::MaskKind::kAllHoles) material.flags |= kAbsent;
+      if (kind == TextureGraph::MaskKind::kSomeHoles) material.flags |= kAlphaMask;
+    }
+    if (use.shadow_alpha != kNone) {
+      const auto [kind, mask] = mask_of(use.shadow_alpha);
+      material.shadow_alpha_mask = mask;
+      if (kind == TextureGraph::MaskKind::kAllHoles) material.flags |= kNoShadow;
+      if (kind == TextureGraph::MaskKind::kSomeHoles) material.flags |= kShadowAlphaMask;
+    }
+    const Key key{material.name,
+                  material.flags,
+                  {material.albedo.x, material.albedo.y, material.albedo.z},
+                  material.alpha_mask,
+                  material.shadow_alpha_mask};
+    const auto [it, inserted] = numbers.try_emplace(key, static_cast<uint32_t>(materials.size()));
+    if (inserted) materials.push_back(std::move(material));
+    result.push_back(it->second);
+  }
+  return result;
+}
+
+} // namespace packtrace

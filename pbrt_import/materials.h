@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "pbrt_import/graphics_state.h"
+#include "pbrt_import/parser.h"
+#include "pbrt_import/scene/scene.h"
+#include "pbrt_import/texture_parameters.h"
+
+namespace packtrace {
+
+/// A pbrt material reduced to what the Material of a scene says, textures still as nodes.
+struct MaterialRecipe {
+  std::string name; ///< the MakeNamedMaterial name, or the material's kind
+  MaterialFlags flags = 0;
+  TextureGraph::Node albedo = 0;
+};
+
+/// A recipe as one shape uses it.
+struct MaterialUse {
+  uint32_t recipe = 0;
+  uint32_t alpha = kNone;        ///< texture node; kNone: opaque
+  uint32_t shadow_alpha = kNone; ///< texture node
+  uint32_t area_light = kNone;   ///< as Attributes::area_light
+  auto operator<=>(const MaterialUse&) const = default;
+};
+
+/// All materials of a scene by number.
+class MaterialLibrary {
+public:
+  explicit MaterialLibrary(TextureGraph& graph);
+
+  /// pbrt's material for shapes before any Material directive.
+  static constexpr uint32_t kDefault = 0;
+
+  /// Reads a Material or MakeNamedMaterial directive, as far as its name is known. Reports problems.
+  uint32_t define(const Directive& directive, const TextureContext& context);
+
+  /// The material that a shape with those parameters has: base, or a new one where the shape sets some of base's
+  /// parameters. Marks the parameters it takes as used.
+  uint32_t with_shape_parameters(uint32_t base, const ParameterList& shape, const TextureContext& context);
+
+  /// Number for a shape to hold until resolve().
+  uint32_t use(const MaterialUse& use);
+
+  /// Marks the images that used materials depend on as needed.
+  void require_images();
+
+  /// Makes a scene material of each use(), equal ones once, and the masks they need. Call once images are read.
+  /// @return for each use its index in materials
+  std::vector<uint32_t> resolve(std::vector<Material>& materials, std::vector<AlphaMask>& masks, Reporter& reporter);
+
+private:
+  struct Definition {
+    std::string kind;
+    ParameterList parameters;
+    MaterialRecipe recipe;
+  };
+  uint32_t add(std::string kind, std::string name, const TextureParameters& parameters);
+  Vec3 albedo_of(TextureGraph::Node node, const std::string& name, Reporter& reporter);
+
+  TextureGraph& graph_;
+  std::vector<Definition> definitions_;
+  std::map<MaterialUse, uint32_t> use_numbers_;
+  std::vector<MaterialUse> uses_;
+};
+
+} // namespace packtrace

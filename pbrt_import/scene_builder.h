@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "pbrt_import/cameras.h"
+#include "pbrt_import/file_loader.h"
+#include "pbrt_import/file_names.h"
+#include "pbrt_import/graphics_state.h"
+#include "pbrt_import/import_scene.h"
+#include "pbrt_import/materials.h"
+#include "pbrt_import/parser.h"
+#include "pbrt_import/reporter.h"
+#include "pbrt_import/texture_graph.h"
+
+namespace packtrace {
+
+/// Carries out directives: keeps the graphics state and collects shapes, objects, instances and cameras.
+class SceneBuilder {
+public:
+  SceneBuilder(const ImportOptions& options, const FileNames& file_names, Reporter& reporter);
+
+  /// May take large arrays out of the directive's parameters.
+  void handle(Directive& directive);
+
+  /// Reads the files that the scene needs and returns it. Call once, after the last directive.
+  /// @param end where the text ended
+  ImportResult finish(const Place& end, Progress& progress);
+
+private:
+  enum class Phase { kOptions, kWorld, kDone, kSecondWorld };
+
+  bool allowed_here(const Directive& directive);
+  void handle_transform(const Directive& directive);
+  void handle_active_transform(const Directive& directive);
+  void handle_coordinate_system(const Directive& directive);
+  void handle_named_material(const Directive& directive);
+  void handle_texture(const Directive& directive);
+  void handle_area_light(const Directive& directive);
+  void begin_world(const Directive& directive);
+  void end_world(const Place& place);
+  void open(BlockKind kind, const Directive& directive);
+  void close(BlockKind kind, const Directive& directive);
+  void begin_object(const Directive& directive);
+  void add_instance(const Directive& directive);
+
+  void add_shape(Directive& directive);
+  bool make_mesh(Directive& directive, Shape& shape);
+  bool make_ply_mesh(const Directive& directive, Shape& shape);
+  bool make_inline_mesh(Directive& directive, Shape& shape);
+  bool read_alpha(const Directive& directive, const TextureContext& context, MaterialUse& use);
+
+  void drop_unusable_shapes(const std::vector<uint32_t>& material_numbers, std::vector<Shape>& shapes);
+  void drop_unused_objects();
+
+  TextureContext context(const Place& place) { return {state_, file_names_, graph_, reporter_, place}; }
+
+  const ImportOptions& options_;
+  const FileNames& file_names_;
+  Reporter& reporter_;
+  Phase phase_ = Phase::kOptions;
+  GraphicsState state_;
+  std::unordered_map<std::string, TransformPair> coordinate_systems_;
+  TextureGraph graph_;
+  MaterialLibrary materials_{graph_};
+  FileLoader loader_;
+  CameraCollector cameras_;
+  Scene scene_; ///< shapes hold MaterialLibrary uses instead of materials until finish()
+  ImportStatistics statistics_;
+  std::unordered_map<std::string, uint32_t> object_numbers_;
+  std::vector<Place> object_places_;
+  uint32_t current_object_ = kNone;
+  uint32_t nested_objects_ = 0;  ///< ObjectBegins that were refused but will have their ObjectEnd
+  uint64_t ignored_blocks_ = 0;  ///< open ones beyond the nesting limit
+  uint32_t open_blocks_[3] = {}; ///< by kind
+  uint64_t mesh_bytes_ = 0;
+};
+
+} // namespace packtrace

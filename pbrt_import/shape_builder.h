@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string_view>
+
+#include "pbrt_import/parameters.h"
+#include "pbrt_import/scene/scene.h"
+#include "pbrt_import/shapes/report.h"
+
+namespace packtrace {
+
+struct ShapeContext {
+  double tessellation_tolerance = 1e-3;
+  const ReportFn& report;
+  uint64_t dropped_triangles = 0; ///< added to
+};
+
+/// Makes the triangles of one kind of shape from its parameters, in the shape's own space; takes large arrays out of
+/// the list. Throws Error, message without a place, if the shape is unusable.
+using ShapeFunction = Mesh (*)(ParameterList& parameters, ShapeContext& context);
+
+/// A kind of shape whose triangles come from its parameters alone, so not plymesh.
+struct ShapeKind {
+  std::string_view name;
+  ShapeFunction make = nullptr; ///< null: known to pbrt, but not supported
+};
+
+/// @return null if pbrt knows no such shape
+const ShapeKind* find_shape_kind(std::string_view name);
+
+/// The known kind, plymesh included, that name is most likely a misspelling of; empty: none.
+std::string_view closest_shape_kind(std::string_view name);
+
+} // namespace packtrace

@@ -1,0 +1,201 @@
+#include "pbrt_import/shapes/curve.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "pbrt_import/scene/error.h"
+#include "pbrt_import/shapes/mesh_cleanup.h"
+
+namespace packtrace {
+namespace {
+
+using Bezier = std::array<DVec3, 4>;
+constexpr uint32_t kSides = 8; // a side's sagitta is 1 - cos(pi / 8) = 7.6% of the radius, within width / 20
+constexpr double kMaxPieces = 1024.0;
+
+[[noreturn]] void fail(const std::string& problem) { throw Error(ErrorKind::kInput, problem); }
+
+Bezier elevated(DVec3 a, DVec3 b, DVec3 c) { return {a, glm::mix(a, b, 2.0 / 3.0), glm::mix(b, c, 1.0 / 3.0), c}; }
+
+/// Every segment as a cubic Bezier curve.
+std::vector<Bezier> segments_of(const CurveParameters& curve) {
+  if (curve.degree != 2 && curve.degree != 3) fail("the curve's degree is neither 2 nor 3");
+  const size_t degree = curve.degree, count = curve.points.size();
+  const bool bezier = curve.basis == CurveBasis::kBezier;
+  if (count < degree + 1 || (bezier && (count - 1) % degree != 0))
+    fail(std::to_string(count) + " control points do not make curve segments of degree " + std::to_string(degree));
+  const size_t segment_count = bezier ? (count - 1) / degree : count - degree;
+  std::vector<Bezier> segments(segment_count);
+  for (size_t s = 0; s < segment_count; ++s) {
+    std::array<DVec3, 4> p{};
+    const size_t first = bezier ? s * degree : s;
+    for (size_t i = 0; i <= degree; ++i) p[i] = DVec3(curve.points[first + i]);
+    if (bezier && degree == 3)
+      segments[s] = p;
+    else if (bezier)
+      segments[s] = elevated(p[0], p[1], p[2]);
+    else if (degree == 2)
+      segments[s] = elevated((p[0] + p[1]) / 2.0, p[1], (p[1] + p[2]) / 2.0);
+    else
+      segments[s] = {(p[0] + 4.0 * p[1] + p[2]) / 6.0, (2.0 * p[1] + p[2]) / 3.0, (p[1] + 2.0 * p[2]) / 3.0,
+                     (p[1] + 4.0 * p[2] + p[3]) / 6.0};
+  }
+  return segments;
+}
+
+/// A cross-section of the curve.
+struct Station {
+  DVec3 centre{0.0};
+  DVec3 tangent{0.0}; ///< unit
+  DVec3 normal{0.0};  ///< unit, across the tangent
+  double width = 0.0;
+  double u = 0.0;
+};
+
+DVec3 tangent_at(const Bezier& b, double t) {
+  const double s = 1.0 - t;
+  const DVec3 d = s * s * (b[1] - b[0]) + 2.0 * s * t * (b[2] - b[1]) + t * t * (b[3] - b[2]);
+  return glm::dot(d, d) > 0.0 ? d : b[3] - b[0]; // where control points coincide, as pbrt does
+}
+
+DVec3 point_at(const Bezier& b, double t) {
+  const double s = 1.0 - t;
+  return s * s * s * b[0] + 3.0 * s * s * t * b[1] + 3.0 * s * t * t * b[2] + t * t * t * b[3];
+}
+
+/// Pieces of equal parameter so that chords stay within tolerance: the second derivative is at most 6 times the
+/// largest second difference of the control points.
+uint32_t piece_count(const Bezier& b, double tolerance) {
+  const double bend = std::max(glm::length(b[0] - 2.0 * b[1] + b[2]), glm::length(b[1] - 2.0 * b[2] + b[3]));
+  return static_cast<uint32_t>(std::clamp(std::ceil(std::sqrt(6.0 * bend / (8.0 * tolerance))), 1.0, kMaxPieces));
+}
+
+/// pbrt's interpolation of a ribbon's normals on the sphere.
+DVec3 slerp(DVec3 a, DVec3 b, double t) {
+  const double angle = std::acos(std::clamp(glm::dot(a, b), 0.0, 1.0)), sine = std::sin(angle);
+  if (sine < 1e-6) return glm::mix(a, b, t);
+  return (std::sin((1.0 - t) * angle) * a + std::sin(t * angle) * b) / sine;
+}
+
+DVec3 unit(Vec3 v) {
+  const double length = glm::length(DVec3(v));
+  if (!(length > 0.0) || !std::isfinite(length)) fail("a curve's normal is zero or not finite");
+  return DVec3(v) / length;
+}
+
+std::vector<Station> stations_of(const CurveParameters& curve, const std::vector<Bezier>& segments) {
+  std::vector<Station> stations;
+  const double tolerance = std::max(curve.width0, curve.width1) / 20.0;
+  const auto count = static_cast<double>(segments.size());
+  for (size_t s = 0; s < segments.size(); ++s) {
+    const Bezier& b = segments[s];
+    if (glm::dot(tangent_at(b, 0.0), tangent_at(b, 0.0)) == 0.0) continue; // pbrt never hits a segment without length
+    const uint32_t pieces = piece_count(b, tolerance);
+    for (uint32_t i = stations.empty() ? 0 : 1; i <= pieces; ++i) {
+      const double t = static_cast<double>(i) / pieces, u = (static_cast<double>(s) + t) / count;
+      const DVec3 tangent = tangent_at(b, t);
+      if (glm::dot(tangent, tangent) == 0.0) continue;
+      Station station{point_at(b, t), glm::normalize(tangent), DVec3(0.0),
+                      glm::mix(double{curve.width0}, double{curve.width1}, u), u};
+      if (curve.type == CurveType::kRibbon)
+        station.normal = slerp(unit(curve.normals[s]), unit(curve.normals[s + 1]), t);
+      stations.push_back(station);
+    }
+  }
+  if (stations.size() < 2) fail("the curve has no length");
+  return stations;
+}
+
+/// Normals that turn about the tangent as little as possible: each is the one before, reflected twice.
+void add_rotation_minimizing_frames(std::vector<Station>& stations) {
+  const DVec3 t = stations[0].tangent;
+  const DVec3 axis = std::abs(t.x) < 0.6 ? DVec3(1, 0, 0) : DVec3(0, 1, 0);
+  stations[0].normal = glm::normalize(glm::cross(t, axis));
+  for (size_t i = 1; i < stations.size(); ++i) {
+    const Station& before = stations[i - 1];
+    const auto reflected = [](DVec3 x, DVec3 across) {
+      const double square = glm::dot(across, across);
+      return square > 0.0 ? x - (2.0 * glm::dot(across, x) / square) * across : x;
+    };
+    const DVec3 step = stations[i].centre - before.centre;
+    const DVec3 normal = reflected(before.normal, step), tangent = reflected(before.tangent, step);
+    DVec3 turned = reflected(normal, stations[i].tangent - tangent);
+    turned -= glm::dot(turned, stations[i].tangent) * stations[i].tangent; // rounding must not accumulate
+    stations[i].normal = glm::normalize(turned);
+  }
+}
+
+/// Joins rows of row_size vertices, leaving out triangles that a width of zero has collapsed.
+void join_rows(Mesh& mesh, uint32_t row_size) {
+  const auto add = [&](uint32_t a, uint32_t b, uint32_t c) {
+    const Vec3 p = mesh.positions[a], q = mesh.positions[b], r = mesh.positions[c];
+    if (p != q && q != r && r != p) mesh.triangles.emplace_back(a, b, c);
+  };
+  for (uint32_t row = 0; row + row_size < mesh.positions.size(); row += row_size) {
+    for (uint32_t i = 0; i + 1 < row_size; ++i) {
+      const uint32_t a = row + i, b = a + row_size, c = b + 1, d = a + 1;
+      add(a, b, c);
+      add(a, c, d);
+    }
+  }
+}
+
+Mesh make_tube(std::vector<Station> stations) {
+  add_rotation_minimizing_frames(stations);
+  Mesh mesh;
+  for (const Station& s : stations) {
+    const DVec3 other = glm::cross(s.normal, s.tangent); // so that along x around points outwards
+    for (uint32_t i = 0; i <= kSides; ++i) {
+      const double angle = 2.0 * std::numbers::pi * (i % kSides) / kSides; // the seam's columns coincide
+      const DVec3 out = std::cos(angle) * s.normal + std::sin(angle) * other;
+      mesh.positions.emplace_back(s.centre + out * (s.width / 2));
+      mesh.normals.emplace_back(out);
+      mesh.uvs.emplace_back(s.u, static_cast<double>(i) / kSides);
+    }
+  }
+  join_rows(mesh, kSides + 1);
+  return mesh;
+}
+
+Mesh make_ribbon(const std::vector<Station>& stations) {
+  Mesh mesh;
+  for (const Station& s : stations) {
+    const DVec3 across = glm::cross(s.normal, s.tangent);
+    const double length = glm::length(across);
+    if (!(length > 1e-12)) continue; // the normal is along the curve: no ribbon here
+    const DVec3 half = across * (s.width / (2.0 * length));
+    for (const double v : {0.0, 1.0}) {
+      mesh.positions.emplace_back(s.centre + half * (2.0 * v - 1.0));
+      mesh.normals.emplace_back(glm::normalize(glm::cross(s.tangent, across)));
+      mesh.uvs.emplace_back(s.u, v);
+    }
+  }
+  join_rows(mesh, 2);
+  return mesh;
+}
+
+} // namespace
+
+Mesh tessellate_curve(const CurveParameters& curve) {
+  for (const Vec3& p : curve.points)
+    if (!is_finite(p)) fail("a control point of the curve is not finite");
+  if (!std::isfinite(curve.width0) || !std::isfinite(curve.width1) || curve.width0 < 0.0f || curve.width1 < 0.0f)
+    fail("a width of the curve is negative or not finite");
+  if (curve.width0 == 0.0f && curve.width1 == 0.0f) fail("the curve has no width");
+  const std::vector<Bezier> segments = segments_of(curve);
+  const bool ribbon = curve.type == CurveType::kRibbon;
+  if (ribbon && curve.normals.size() != segments.size() + 1)
+    fail("a ribbon of " + std::to_string(segments.size()) + " segments needs one normal more than segments, not " +
+         std::to_string(curve.normals.size()));
+  std::vector<Station> stations = stations_of(curve, segments);
+  Mesh mesh = ribbon ? make_ribbon(stations) : make_tube(std::move(stations));
+  drop_bad_triangles(mesh, {});
+  if (mesh.triangles.empty()) fail("nothing of the curve can be drawn");
+  return mesh;
+}
+
+} // namespace packtrace

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "pbrt_import/scene/scene.h"
+
+namespace packtrace {
+
+/// pbrt-v3's heightfield: nu x nv samples over the unit square, (x / (nu - 1), y / (nv - 1), heights[y * nu + x]); two
+/// triangles per square; uv = xy; no normals. Samples that are not finite stay: drop_bad_triangles removes what they
+/// touch.
+/// Throws Error(kInput) if nu or nv is below 2 or heights does not have nu * nv samples.
+Mesh make_heightfield(uint32_t nu, uint32_t nv, std::span<const float> heights);
+
+} // namespace packtrace

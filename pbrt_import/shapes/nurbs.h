@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "pbrt_import/scene/scene.h"
+
+namespace packtrace {
+
+/// pbrt-v3's nurbs. Control points are homogeneous, (wx, wy, wz, w), u fastest; from "P" they have w = 1.
+struct NurbsParameters {
+  uint32_t nu = 0; ///< control points along u
+  uint32_t nv = 0;
+  uint32_t u_order = 0; ///< degree plus one
+  uint32_t v_order = 0;
+  std::span<const float> u_knots; ///< nu + u_order of them, not decreasing
+  std::span<const float> v_knots;
+  std::optional<float> u0, u1, v0, v1; ///< the part to draw; none: all of it
+  std::span<const glm::vec4> control_points;
+};
+
+/// A grid of triangles whose lines include the knots, refined along u and v until the middles of grid edges are within
+/// half of relative_tolerance x size of the surface, size being half the diagonal of the control points' box, or until
+/// 128 segments per knot span. Normals along cross(dp/du, dp/dv); uvs are the surface's own parameters, as in pbrt-v3.
+/// Collapsed triangles at poles are left out.
+/// @param relative_tolerance within [1e-6, 0.5]
+/// Throws Error(kInput) if counts, knots or ranges do not fit together or a value or a point of the surface is not
+/// finite, Error(kLimitExceeded) if the grid would exceed 2^24 vertices.
+/// Source: Carl de Boor, A Practical Guide to Splines, 1978, chapter 10.
+Mesh tessellate_nurbs(const NurbsParameters& nurbs, double relative_tolerance);
+
+} // namespace packtrace

@@ -1,0 +1,177 @@
+#include "pbrt_import/textures.h"
+
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "pbrt_import/tokenizer.h"
+
+namespace packtrace {
+namespace {
+
+using Node = TextureGraph::Node;
+
+/// One Texture directive being read.
+struct TextureMaker {
+  const Directive& directive;
+  const TextureContext& context;
+  TextureParameters parameters;
+  bool is_float;
+
+  Node operand(std::string_view name, float fallback) const {
+    return is_float ? parameters.float_texture(name, fallback) : parameters.spectrum(name, Vec3(fallback));
+  }
+  Node constant(Vec3 value) const { return context.graph.constant(value); }
+  Node constant_of(std::string_view name, float fallback) const {
+    return is_float ? constant(Vec3(parameters.get_float(name, fallback)))
+                    : constant(parameters.constant_spectrum(name, Vec3(fallback)));
+  }
+};
+
+TextureMapping read_mapping(const TextureMaker& maker) {
+  const ParameterList& list = maker.directive.parameters;
+  const std::string kind = list.get_string("mapping", "uv");
+  TextureMapping mapping;
+  mapping.is_uv = kind == "uv";
+  if (mapping.is_uv) {
+    mapping.scale = {list.get_float("uscale", 1.0f), list.get_float("vscale", 1.0f)};
+    mapping.offset = {list.get_float("udelta", 0.0f), list.get_float("vdelta", 0.0f)};
+  } else if (kind == "planar") {
+    constexpr std::string_view kNames[] = {"v1", "v2", "udelta", "vdelta"};
+    list.mark_used(kNames);
+  } else if (kind != "spherical" && kind != "cylindrical") {
+    maker.context.reporter.error(maker.directive.place, "unknown texture mapping " + in_quotes(kind) + "; uv is used");
+    mapping.is_uv = true;
+  }
+  return mapping;
+}
+
+std::optional<Node> make_imagemap(const TextureMaker& maker) {
+  const TextureContext& context = maker.context;
+  const ParameterList& list = maker.directive.parameters;
+  constexpr std::string_view kFiltering[] = {"trilinear", "maxanisotropy"};
+  list.mark_used(kFiltering);
+  const TextureMapping mapping = read_mapping(maker);
+  const float scale = list.get_float("scale", 1.0f);
+  WrapMode wrap = WrapMode::kRepeat;
+  const std::string wrap_name = list.get_string("wrap", "repeat");
+  if (wrap_name == "black")
+    wrap = WrapMode::kBlack;
+  else if (wrap_name == "clamp")
+    wrap = WrapMode::kClamp;
+  else if (wrap_name != "repeat")
+    context.reporter.error(maker.directive.place, "unknown wrap mode " + in_quotes(wrap_name) + "; repeat is used");
+  const Parameter* const file = list.find("filename", {ParameterType::kString});
+  if (!file || file->strings.size() != 1) {
+    context.reporter.error(maker.directive.place, "imagemap texture without a \"string filename\"");
+    return maker.constant(Vec3(scale));
+  }
+  const std::filesystem::path path = context.file_names.resolve(file->strings[0], file->place, context.reporter);
+  if (path.empty()) return maker.constant(Vec3(scale));
+  // pbrt's rule: formats that usually are sRGB-encoded are taken to be.
+  std::string extension = path.extension().string();
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c + 32);
+  const bool decode_srgb = list.get_bool("gamma", extension == ".png" || extension == ".tga");
+  const uint32_t image =
+      context.graph.request_image(path, decode_srgb, maker.directive.place, context.reporter.sequence());
+  std::error_code error;
+  ImageRequest& request = context.graph.images()[image];
+  if (!request.missing && !std::filesystem::is_regular_file(path, error)) {
+    request.missing = true;
+    context.reporter.error(file->place, "no such texture file " + in_quotes(path.string()) + "; it counts as white");
+  }
+  return context.graph.image(image, Vec3(scale), wrap, mapping);
+}
+
+Node make_bilerp(const TextureMaker& maker) {
+  read_mapping(maker);
+  // The mean over the unit square is the mean of the corners.
+  Vec3 sum(0.0f);
+  for (const auto& [name, fallback] : {std::pair{"v00", 0.0f}, {"v01", 1.0f}, {"v10", 0.0f}, {"v11", 1.0f}})
+    sum += *maker.context.graph.constant_value(maker.constant_of(name, fallback));
+  return maker.constant(sum / 4.0f);
+}
+
+Node make_checkerboard(const TextureMaker& maker) {
+  const ParameterList& list = maker.directive.parameters;
+  const int32_t dimension = list.get_integer("dimension", 2);
+  constexpr std::string_view kFiltering[] = {"aamode"};
+  list.mark_used(kFiltering);
+  TextureMapping mapping;
+  if (dimension == 2)
+    mapping = read_mapping(maker);
+  else
+    mapping.is_uv = false;
+  if (dimension != 2 && dimension != 3)
+    maker.context.reporter.error(maker.directive.place,
+                                 std::to_string(dimension) + " dimensional checkerboard is not supported; taken as 3");
+  return maker.context.graph.checkerboard(maker.operand("tex1", 1.0f), maker.operand("tex2", 0.0f), mapping);
+}
+
+Node make_dots(const TextureMaker& maker) {
+  read_mapping(maker);
+  // Every second cell has a disk of radius 0.35 somewhere inside it.
+  constexpr float kInside = 0.5f * std::numbers::pi_v<float> * 0.35f * 0.35f;
+  return maker.context.graph.mix(maker.operand("outside", 0.0f), maker.operand("inside", 1.0f),
+                                 maker.constant(Vec3(kInside)));
+}
+
+Node make_mean(const TextureMaker& maker, Vec3 mean) {
+  constexpr std::string_view kNames[] = {"octaves", "roughness", "scale", "variation"};
+  maker.directive.parameters.mark_used(kNames);
+  return maker.constant(mean);
+}
+
+std::optional<Node> make_by_class(const TextureMaker& maker, const std::string& kind) {
+  TextureGraph& graph = maker.context.graph;
+  if (kind == "constant") return maker.constant_of("value", 1.0f);
+  if (kind == "scale") return graph.product(maker.operand("tex1", 1.0f), maker.operand("tex2", 1.0f));
+  if (kind == "mix") {
+    const Node a = maker.operand("tex1", 0.0f), b = maker.operand("tex2", 1.0f);
+    return graph.mix(a, b, maker.parameters.float_texture("amount", 0.5f));
+  }
+  if (kind == "imagemap") return make_imagemap(maker);
+  if (kind == "bilerp") return make_bilerp(maker);
+  if (kind == "checkerboard") return make_checkerboard(maker);
+  if (kind == "dots") return make_dots(maker);
+  if (kind == "uv") {
+    read_mapping(maker);
+    return maker.constant(Vec3(0.5f, 0.5f, 0.0f));
+  }
+  // About the means of pbrt-v3's procedural textures at their default parameters; an average colour asks for no more.
+  if (kind == "fbm") return make_mean(maker, Vec3(0.0f));
+  if (kind == "wrinkled") return make_mean(maker, Vec3(0.6f));
+  if (kind == "windy") return make_mean(maker, Vec3(0.15f));
+  if (kind == "marble") return make_mean(maker, Vec3(0.80f, 0.80f, 0.84f));
+  if (kind == "ptex") {
+    constexpr std::string_view kNames[] = {"filename", "gamma"};
+    maker.directive.parameters.mark_used(kNames);
+    maker.context.reporter.warning(maker.directive.place, "ptex textures are not supported; 0.5 is used");
+    return maker.constant(Vec3(0.5f));
+  }
+  constexpr std::string_view kClasses[] = {"constant",     "scale",  "mix", "imagemap", "bilerp",
+                                           "checkerboard", "dots",   "uv",  "fbm",      "wrinkled",
+                                           "windy",        "marble", "ptex"};
+  maker.context.reporter.error(maker.directive.place,
+                               "unknown texture class " + in_quotes(kind) + did_you_mean(closest_name(kind, kClasses)));
+  return std::nullopt;
+}
+
+} // namespace
+
+std::optional<TextureGraph::Node> make_texture(const Directive& directive, const TextureContext& context) {
+  const std::string& type = directive.names[1];
+  if (type != "float" && type != "spectrum" && type != "color") {
+    context.reporter.error(directive.place,
+                           "unknown texture type " + in_quotes(type) + ", neither \"float\" nor \"spectrum\"");
+    return std::nullopt;
+  }
+  const TextureMaker maker{directive, context, TextureParameters(context, directive.parameters), type == "float"};
+  const std::optional<Node> node = make_by_class(maker, directive.names[2]);
+  if (node) report_unused(directive.parameters, context.reporter);
+  return node;
+}
+
+} // namespace packtrace

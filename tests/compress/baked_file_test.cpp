@@ -1,0 +1,204 @@
+#include "compress/format/baked_file.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include <gtest/gtest.h>
+#include <xxhash.h>
+
+#include "compress/format/file_summary.h"
+#include "pbrt_import/scene/error.h"
+#include "tests/compress/test_scenes.h"
+
+namespace packtrace {
+namespace {
+
+/// A small file with something in every section.
+Scene full_scene() {
+  Scene scene = test::scene_of(test::grid_mesh(3, 0.1f, true));
+  AlphaMask mask;
+  mask.width = 40, mask.height = 2;
+  mask.words = {1, 2, 3, 4};
+  mask.uv_scale = {2, 1};
+  scene.masks.push_back(mask);
+  scene.materials.push_back({"leaf", kAlphaMask, Vec3(0.1f, 0.5f, 0.2f), 0, kNoMask});
+  test::add_shape(scene, test::grid_mesh(2), test::translation({0, 0, 1}), 1);
+  scene.meshes.push_back(test::sphere_mesh(4));
+  Object object{"ball", {Shape{2, 0, false, DAffine(1.0)}}};
+  scene.objects.push_back(object);
+  scene.instances.push_back({0, Affine(test::translation({5, 0, 0}))});
+  scene.instances.push_back({0, Affine(test::translation({-5, 0, 0}))});
+  Camera camera;
+  camera.screen_window = glm::dvec4(-1, 1, -2, 2);
+  camera.film_name = "out.exr";
+  scene.cameras.push_back(camera);
+  scene.dropped_triangles = 3;
+  return scene;
+}
+
+ErrorKind open_kind(std::span<const std::byte> bytes, std::string* message = nullptr) {
+  try {
+    (void)BakedFile::from_bytes(bytes);
+  } catch (const Error& error) {
+    if (message) *message = error.what();
+    return error.kind();
+  }
+  ADD_FAILURE() << "the file was accepted";
+  return ErrorKind::kCancelled;
+}
+
+/// Makes the hashes right again, so that damage reaches the checks behind them.
+void rehash(std::vector<std::byte>& bytes) {
+  const XXH128_hash_t hash =
+      XXH3_128bits(bytes.data() + sizeof(baked::FileHeader), bytes.size() - sizeof(baked::FileHeader));
+  const std::array<uint64_t, 2> content = {hash.low64, hash.high64};
+  std::memcpy(bytes.data() + offsetof(baked::FileHeader, content_hash), content.data(), sizeof content);
+  const uint64_t header = XXH3_64bits(bytes.data(), offsetof(baked::FileHeader, header_hash));
+  std::memcpy(bytes.data() + offsetof(baked::FileHeader, header_hash), &header, sizeof header);
+}
+
+/// Reads everything a reader can ask for.
+void read_all(const BakedFile& file) {
+  for (uint32_t g = 0; g < file.geometries().size(); ++g) {
+    const test::Decoded all = test::decode(file, g);
+    for (const Triangle& t : all.triangles) ASSERT_LT(std::max({t.x, t.y, t.z}), all.positions.size());
+    for (const Vec3 p : all.positions) ASSERT_TRUE(is_finite(p));
+    for (uint32_t i = 0; i < all.triangles.size(); ++i)
+      ASSERT_LT(file.cluster_of_triangle(g, i), file.clusters(g).size());
+    for (uint32_t c = 0; c < file.clusters(g).size(); ++c) {
+      const ClusterView view = file.cluster(g, c);
+      for (uint32_t i = 0; i < view.triangle_count(); ++i) {
+        const Triangle t = view.triangle(i);
+        ASSERT_LT(std::max({t.x, t.y, t.z}), view.vertex_count());
+      }
+    }
+  }
+  for (uint32_t i = 0; i < file.sections().masks.size(); ++i) (void)file.mask(i).opaque(Vec2(0.3f, 0.7f));
+  for (const Material& m : file.materials()) (void)m.name.size();
+  (void)file.cameras();
+  (void)summarize(file);
+}
+
+TEST(BakedFile, EverythingComesBack) {
+  const Scene scene = full_scene();
+  const BakedScene baked = test::bake(scene);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  ASSERT_EQ(file.geometries().size(), 3u);
+  ASSERT_EQ(file.instances().size(), 4u);
+  EXPECT_EQ(file.instances()[2].geometry, file.instances()[3].geometry);
+  EXPECT_EQ(file.world_from_object(3)[3], Vec3(-5, 0, 0));
+  const auto materials = file.materials();
+  ASSERT_EQ(materials.size(), 2u);
+  EXPECT_EQ(materials[1].name, "leaf");
+  EXPECT_EQ(materials[1].flags, kAlphaMask);
+  EXPECT_EQ(materials[1].albedo, Vec3(0.1f, 0.5f, 0.2f));
+  EXPECT_EQ(materials[1].alpha_mask, 0u);
+  EXPECT_EQ(file.mask(0).width, 40u);
+  EXPECT_EQ(file.mask(0).uv_scale, Vec2(2, 1));
+  EXPECT_TRUE(std::ranges::equal(file.mask(0).words, scene.masks[0].words));
+  const auto cameras = file.cameras();
+  ASSERT_EQ(cameras.size(), 1u);
+  EXPECT_EQ(cameras[0].screen_window, scene.cameras[0].screen_window);
+  EXPECT_EQ(cameras[0].film_name, "out.exr");
+  EXPECT_EQ(file.text(file.geometries()[2].name), "ball");
+  EXPECT_EQ(file.summary().dropped_triangles, 3u);
+  EXPECT_NEAR(file.world_bounds().lo.x, -6.0, 0.01);
+  EXPECT_NEAR(file.world_bounds().hi.x, 6.0, 0.01);
+  read_all(file);
+}
+
+TEST(BakedFile, EveryTruncatedPrefixIsRefused) {
+  const BakedScene baked = test::bake(full_scene());
+  for (size_t size = 0; size < baked.bytes.size(); ++size)
+    ASSERT_EQ(open_kind(std::span(baked.bytes).first(size)), ErrorKind::kInput) << size;
+}
+
+TEST(BakedFile, TrailingBytesAreRefused) {
+  BakedScene baked = test::bake(full_scene());
+  baked.bytes.resize(baked.bytes.size() + 64);
+  EXPECT_EQ(open_kind(baked.bytes), ErrorKind::kInput);
+}
+
+TEST(BakedFile, EverySingleBitFlipIsRefused) {
+  BakedScene baked = test::bake(full_scene());
+  for (size_t bit = 0; bit < 8 * baked.bytes.size(); ++bit) {
+    const auto flip = static_cast<std::byte>(1u << (bit % 8));
+    baked.bytes[bit / 8] ^= flip;
+    const ErrorKind kind = open_kind(baked.bytes);
+    const bool in_version = bit / 8 >= 8 && bit / 8 < 12;
+    ASSERT_EQ(kind, in_version ? ErrorKind::kUnsupported : ErrorKind::kInput) << bit;
+    baked.bytes[bit / 8] ^= flip;
+  }
+}
+
+TEST(BakedFile, DamageWithRightHashesIsRefusedOrHarmless) {
+  const BakedScene baked = test::bake(full_scene());
+  test::Random random(14);
+  uint32_t refused = 0, accepted = 0;
+  for (int round = 0; round < 20000; ++round) {
+    std::vector<std::byte> bytes = baked.bytes;
+    const uint32_t changes = 1 + random.bits() % 3;
+    for (uint32_t i = 0; i < changes; ++i) {
+      const size_t at = 12 + random.bits() % (bytes.size() - 12); // behind magic and version
+      constexpr std::array<uint8_t, 6> kValues = {0, 1, 0x7f, 0x80, 0xff, 0xfe};
+      bytes[at] = static_cast<std::byte>(random.bits() % 2 ? kValues[random.bits() % 6] : random.bits() & 0xffu);
+    }
+    rehash(bytes);
+    try {
+      const BakedFile file = BakedFile::from_bytes(bytes);
+      read_all(file);
+      ++accepted;
+    } catch (const Error& error) {
+      ASSERT_EQ(error.kind(), ErrorKind::kInput) << error.what();
+      ++refused;
+    }
+    if (testing::Test::HasFatalFailure()) return;
+  }
+  EXPECT_GT(refused, 1000u); // both ways are taken, or this test tests nothing
+  EXPECT_GT(accepted, 100u);
+}
+
+TEST(BakedFile, MessagesNameWhatAndWhere) {
+  BakedScene baked = test::bake(full_scene());
+  baked::FileHeader header;
+  std::memcpy(&header, baked.bytes.data(), sizeof header);
+  const size_t at = header.sections[baked::kInstances].offset + 3 * sizeof(baked::InstanceRecord) +
+                    offsetof(baked::InstanceRecord, geometry);
+  baked.bytes[at] = std::byte{200};
+  rehash(baked.bytes);
+  std::string message;
+  EXPECT_EQ(open_kind(baked.bytes, &message), ErrorKind::kInput);
+  EXPECT_EQ(message, "memory: damaged baked file: instance 3: geometry");
+  const std::string_view text = "Shape \"sphere\"";
+  EXPECT_EQ(open_kind(std::as_bytes(std::span(text)), &message), ErrorKind::kInput);
+  EXPECT_EQ(message, "memory: not a packtrace baked file");
+}
+
+TEST(BakedFile, MovingKeepsItsViewsValid) {
+  BakedFile first = BakedFile::from_bytes(test::bake(full_scene()).bytes);
+  const ClusterView view = first.cluster(0, 0);
+  const Vec3 before = view.position(0);
+  const BakedFile second = std::move(first);
+  EXPECT_EQ(view.position(0), before);
+  EXPECT_EQ(second.cluster(0, 0).position(0), before);
+}
+
+TEST(FileSummary, StreamsAddUpToTheFile) {
+  const FileSummary s = summarize(BakedFile::from_bytes(test::bake(full_scene()).bytes));
+  const StreamBytes& b = s.bytes;
+  EXPECT_EQ(b.indices + b.positions + b.normals + b.uvs + b.payload_padding + b.cluster_records + b.geometry_records +
+                b.instance_records + b.material_records + b.masks + b.cameras + b.strings + b.header_and_alignment,
+            b.total);
+  EXPECT_GT(b.uvs, 0u);
+  EXPECT_GT(b.normals, 0u);
+  EXPECT_EQ(s.shared_geometries, 1u);
+  EXPECT_EQ(s.placed_triangles, 18u + 8u + 2u * 48u);
+  EXPECT_EQ(s.triangles, 18u + 8u + 48u);
+  ASSERT_EQ(s.grids.size(), 2u);
+  EXPECT_TRUE(s.grids[0].world_space);
+  EXPECT_EQ(s.grids[0].geometries, 2u);
+  EXPECT_LE(s.max_position_error, s.max_position_error_bound);
+}
+
+} // namespace
+} // namespace packtrace

@@ -1,0 +1,79 @@
+#include "compress/bake/clusterize.h"
+
+#include <algorithm>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "compress/format/index_codec.h"
+#include "tests/compress/test_scenes.h"
+
+namespace packtrace {
+namespace {
+
+Clusters run(const Mesh& mesh) {
+  std::vector<DVec3> centroids;
+  for (const Triangle& t : mesh.triangles)
+    centroids.emplace_back(DVec3(mesh.positions[t.x]) + DVec3(mesh.positions[t.y]) + DVec3(mesh.positions[t.z]));
+  const auto vertices = static_cast<uint32_t>(mesh.positions.size());
+  return clusterize({mesh.triangles, mesh.triangles, centroids, vertices, vertices});
+}
+
+void expect_valid(const Mesh& mesh, const Clusters& clusters) {
+  std::vector<uint32_t> sorted = clusters.order;
+  std::sort(sorted.begin(), sorted.end());
+  ASSERT_EQ(sorted.size(), mesh.triangles.size());
+  for (uint32_t i = 0; i < sorted.size(); ++i) ASSERT_EQ(sorted[i], i);
+  uint32_t begin = 0;
+  for (const uint32_t end : clusters.ends) {
+    ASSERT_GT(end, begin);
+    EXPECT_LE(end - begin, kMaxClusterTriangles);
+    std::set<uint32_t> vertices;
+    for (uint32_t i = begin; i < end; ++i)
+      for (int corner = 0; corner < 3; ++corner) vertices.insert(mesh.triangles[clusters.order[i]][corner]);
+    EXPECT_LE(vertices.size(), kMaxClusterVertices);
+    begin = end;
+  }
+  EXPECT_EQ(begin, mesh.triangles.size());
+}
+
+TEST(Clusterize, EveryTriangleIsInOneClusterWithinTheLimits) {
+  for (const Mesh& mesh : {test::grid_mesh(1), test::grid_mesh(60), test::sphere_mesh(40), test::soup_mesh(1000, 1)})
+    expect_valid(mesh, run(mesh));
+  expect_valid({}, run({}));
+}
+
+TEST(Clusterize, ClustersAreNinetyPercentFull) {
+  for (const Mesh& mesh : {test::grid_mesh(100), test::sphere_mesh(70)})
+    EXPECT_GE(static_cast<double>(mesh.triangles.size()) / static_cast<double>(run(mesh).ends.size()), 115.0);
+}
+
+TEST(Clusterize, ClustersAreCompact) {
+  const Mesh mesh = test::grid_mesh(100);
+  const Clusters clusters = run(mesh);
+  double area = 0.0;
+  uint32_t begin = 0;
+  for (const uint32_t end : clusters.ends) {
+    Bounds box;
+    for (uint32_t i = begin; i < end; ++i)
+      for (int corner = 0; corner < 3; ++corner)
+        box.extend(DVec3(mesh.positions[mesh.triangles[clusters.order[i]][corner]]));
+    area += box.extent().x * box.extent().y;
+    begin = end;
+  }
+  EXPECT_LT(area, 2.5); // boxes of perfect squares would cover the unit square exactly once
+}
+
+TEST(Clusterize, EdgesOfManyTrianglesAreNoTrouble) {
+  Mesh fan; // 500 triangles around one edge
+  fan.positions = {Vec3(0), Vec3(0, 0, 1)};
+  for (uint32_t i = 0; i < 500; ++i) {
+    fan.positions.emplace_back(1.0f, static_cast<float>(i), 0.0f);
+    fan.triangles.emplace_back(0, 1, i + 2);
+  }
+  fan.triangles.emplace_back(7, 7, 7);
+  expect_valid(fan, run(fan));
+}
+
+} // namespace
+} // namespace packtrace

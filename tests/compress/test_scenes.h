@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "compress/bake/bake_scene.h"
+#include "pbrt_import/scene/scene.h"
+
+namespace packtrace::test {
+
+/// n x n quads in the plane z = 0 over [0,1]^2, bumped by `bump`; normals of the bumped surface if wanted.
+Mesh grid_mesh(uint32_t n, float bump = 0.0f, bool normals = false);
+
+/// Latitude-longitude sphere around the origin with outward normals and winding, without collapsed triangles.
+Mesh sphere_mesh(uint32_t rings, float radius = 1.0f);
+
+/// Triangles that share nothing, in [-1,1]^3. Deterministic.
+Mesh soup_mesh(uint32_t triangles, uint32_t seed);
+
+/// Uniform floats in [lo, hi), the same everywhere.
+class Random {
+public:
+  explicit Random(uint32_t seed) : state_(seed * uint64_t{0x9e3779b97f4a7c15} + 1) {}
+  uint32_t bits();
+  float uniform(float lo, float hi);
+
+private:
+  uint64_t state_;
+};
+
+DAffine translation(DVec3 by);
+DAffine scaling(DVec3 by);
+
+/// Adds the mesh as a world shape with its own material.
+Scene scene_of(Mesh mesh, const DAffine& world_from_mesh = DAffine(1.0));
+void add_shape(Scene& scene, Mesh mesh, const DAffine& world_from_mesh = DAffine(1.0), uint32_t material = 0);
+
+/// Bakes with diagnostics thrown away.
+BakedScene bake(const Scene& scene, const BakeConfig& config = {});
+
+/// A geometry decoded as a whole, cluster after cluster.
+struct Decoded {
+  std::vector<Vec3> positions;
+  std::vector<Vec3> normals; ///< zero for clusters without
+  std::vector<Vec2> uvs;     ///< zero for clusters without
+  std::vector<Triangle> triangles;
+  std::vector<uint32_t> materials; ///< per triangle
+};
+Decoded decode(const BakedFile& file, uint32_t geometry);
+
+} // namespace packtrace::test

@@ -1,0 +1,109 @@
+#include "runtime/denoise/denoiser.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "tests/runtime/denoise/synthetic.h"
+
+namespace packtrace {
+namespace {
+
+using namespace synthetic;
+
+constexpr ImageSize kSize{64, 512};
+constexpr uint32_t kEdge = 32; ///< first column of the right side
+
+/// Denoises noise on the left of kEdge beside unoccluded pixels on the right; returns what of it reaches the right.
+/// Noise, so that values do not give the edge away: only guides can.
+float worst_leak(const GBuffer& g, uint32_t frames) {
+  AoDenoiser denoiser;
+  float worst = 0;
+  for (uint32_t f = 0; f < frames; ++f) {
+    const AoFrame frame =
+        samples(kSize, [&](uint32_t x, uint32_t y) { return x < kEdge ? noisy(0.5f, x, y, f) : 1.0f; });
+    const DenoisedAo& result = denoiser.next_frame(g, frame);
+    for (uint32_t y = 0; y < kSize.height; ++y)
+      for (uint32_t x = kEdge; x < kSize.width; ++x)
+        worst = std::max(worst, 1.0f - result.ao[static_cast<size_t>(y) * kSize.width + x]);
+  }
+  return worst;
+}
+
+GBuffer walls(const std::function<void(GBuffer&, size_t i, uint32_t x)>& change) {
+  GBuffer g = wall(kSize);
+  for (uint32_t y = 0; y < kSize.height; ++y)
+    for (uint32_t x = 0; x < kSize.width; ++x) change(g, static_cast<size_t>(y) * kSize.width + x, x);
+  return g;
+}
+
+TEST(DenoiserEdges, WithoutAnEdgeInTheGuidesNoiseDoesSpread) { // or the tests below could not fail
+  EXPECT_GT(worst_leak(wall(kSize), 1), 0.05f);
+}
+
+TEST(DenoiserEdges, DepthStepOfATenthDoesNotLeak) {
+  for (float step : {0.9f, 1.1f})
+    EXPECT_LE(worst_leak(walls([&](GBuffer& g, size_t i, uint32_t x) {
+                           if (x >= kEdge) g.view_z[i] *= step;
+                         }),
+                         16),
+              0.01f)
+        << step;
+}
+
+TEST(DenoiserEdges, DepthStepBehindASteepSurfaceDoesNotLeak) {
+  EXPECT_LE(worst_leak(walls([&](GBuffer& g, size_t i, uint32_t x) { // disparity is linear on a plane
+                         const float slope = 1.0f / (0.1f + 0.002f * static_cast<float>(x));
+                         g.view_z[i] = x < kEdge ? slope : 2.0f * slope;
+                         g.normal[i] = glm::normalize(Vec3(0.7f, 0, -0.7f));
+                       }),
+                       16),
+            0.01f);
+}
+
+TEST(DenoiserEdges, RightAngleCreaseDoesNotLeak) {
+  EXPECT_LE(worst_leak(walls([&](GBuffer& g, size_t i, uint32_t x) {
+                         const float c = std::sqrt(0.5f);
+                         g.view_z[i] = 10.0f - 0.01f * std::abs(static_cast<float>(x) - 31.5f);
+                         g.normal[i] = Vec3(x < kEdge ? -c : c, 0, -c);
+                       }),
+                       16),
+            0.01f);
+}
+
+TEST(DenoiserEdges, MissesDoNotLeak) {
+  AoDenoiser denoiser;
+  const GBuffer g = walls([](GBuffer& b, size_t i, uint32_t x) {
+    if (x < kEdge) b.view_z[i] = 0.0f, b.normal[i] = Vec3(0), b.instance[i] = kNoInstance;
+  });
+  const AoFrame frame = samples(kSize, [](uint32_t x, uint32_t) { return x < kEdge ? kInvalidAo : 0.8f; });
+  const DenoisedAo& result = denoiser.next_frame(g, frame);
+  for (size_t i = 0; i < kSize.pixels(); ++i) ASSERT_EQ(result.ao[i], i % kSize.width < kEdge ? kInvalidAo : 0.8f);
+}
+
+TEST(DenoiserEdges, TiltedPlanesBlurLikeFlatOnes) {
+  const auto rmse = [](const GBuffer& g) {
+    AoDenoiser denoiser;
+    return rmse_of(denoiser.next_frame(g, noise(kSize, 0.5f, 3)).ao, kSize, all(kSize),
+                   [](uint32_t, uint32_t) { return expected(0.5f); });
+  };
+  const double tilted = rmse(walls([](GBuffer& g, size_t i, uint32_t x) {
+    g.view_z[i] = 1.0f / (0.05f + 0.004f * static_cast<float>(x)); // five times nearer on the right
+    g.normal[i] = glm::normalize(Vec3(1, 0, -0.2f));
+  }));
+  EXPECT_LE(tilted, 1.1 * rmse(wall(kSize)));
+}
+
+TEST(DenoiserEdges, ContactShadowsOnOneSurfaceStaySharpOnceSampled) {
+  AoDenoiser denoiser;
+  const float left = 0.9f, right = 0.1f;
+  const DenoisedAo* result = nullptr;
+  for (uint32_t f = 0; f < 64; ++f)
+    result = &denoiser.next_frame(
+        wall(kSize), samples(kSize, [&](uint32_t x, uint32_t y) { return noisy(x < kEdge ? left : right, x, y, f); }));
+  EXPECT_NEAR(mean_of(result->ao, kSize, {kEdge - 1, 0, kEdge, kSize.height}), expected(left), 0.01);
+  EXPECT_NEAR(mean_of(result->ao, kSize, {kEdge, 0, kEdge + 1, kSize.height}), expected(right), 0.01);
+}
+
+} // namespace
+} // namespace packtrace

@@ -1,0 +1,171 @@
+#include "runtime/denoise/denoiser.h"
+
+#include <array>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "runtime/denoise/reprojection.h"
+#include "tests/runtime/denoise/synthetic.h"
+
+namespace packtrace {
+namespace {
+
+using namespace synthetic;
+
+constexpr ImageSize kSize{160, 96};
+
+TEST(Reprojection, IntegerPansFetchTheSameBits) {
+  const ImageSize size{33, 21};
+  FrameHistory previous;
+  previous.guides.resize(size), previous.history.resize(size);
+  GBuffer g = wall(size);
+  previous.guides.load(g);
+  for (int y = 0; y < 21; ++y)
+    for (int x = 0; x < 33; ++x) {
+      const auto random = [&](uint32_t c) { return uniform(static_cast<uint32_t>(x), static_cast<uint32_t>(y), c); };
+      previous.history.mean.row(y)[x] = random(0), previous.history.square.row(y)[x] = random(1);
+      previous.history.fast.row(y)[x] = random(2), previous.history.samples.row(y)[x] = 7.0f;
+    }
+  DepthDerivatives derivatives;
+  derivatives.resize(size);
+  derivatives.compute(previous.guides);
+  for (Vec2& motion : g.motion_px) motion = Vec2(3, -2);
+  History out;
+  out.resize(size);
+  for (int y = 0; y < 21; ++y) std::fill_n(out.mean.row(y), 33, 0.5f); // what a rejection must overwrite
+  reproject(previous, previous.guides, derivatives, g.motion_px, DenoiserConfig{}, out);
+  for (int y = 0; y < 21; ++y)
+    for (int x = 0; x < 33; ++x) {
+      const bool seen = x >= 3 && y + 2 < 21;
+      ASSERT_EQ(out.samples.row(y)[x], seen ? 7.0f : 0.0f);
+      ASSERT_EQ(out.mean.row(y)[x], seen ? previous.history.mean.row(y + 2)[x - 3] : 0.0f);
+      ASSERT_EQ(out.square.row(y)[x], seen ? previous.history.square.row(y + 2)[x - 3] : 0.0f);
+      ASSERT_EQ(out.fast.row(y)[x], seen ? previous.history.fast.row(y + 2)[x - 3] : 0.0f);
+    }
+}
+
+/// Denoises a second frame whose guides changed; true if its pixels kept the history of the first.
+bool keeps_history(const std::function<void(GBuffer&, size_t)>& change) {
+  AoDenoiser denoiser;
+  GBuffer g = wall(kSize);
+  denoiser.next_frame(g, noise(kSize, 0.5f, 0));
+  for (size_t i = 0; i < kSize.pixels(); ++i) change(g, i);
+  return denoiser.next_frame(g, noise(kSize, 0.5f, 1)).tspp[kSize.pixels() / 2 + 80] > 1.5f;
+}
+
+TEST(Reprojection, AnotherDepthNormalOrInstanceIsAnotherSurface) {
+  EXPECT_TRUE(keeps_history([](GBuffer&, size_t) {}));
+  EXPECT_TRUE(keeps_history([](GBuffer& g, size_t i) { g.view_z[i] *= 1.01f; })); // the camera backs off a little
+  EXPECT_FALSE(keeps_history([](GBuffer& g, size_t i) { g.view_z[i] *= 1.1f; }));
+  EXPECT_FALSE(keeps_history([](GBuffer& g, size_t i) { g.normal[i] = Vec3(0.8f, 0, -0.6f); }));
+  EXPECT_FALSE(keeps_history([](GBuffer& g, size_t i) { g.instance[i] = 1; }));
+  EXPECT_FALSE(keeps_history([](GBuffer& g, size_t i) { g.motion_px[i] = Vec2(1e30f, 0); }));
+}
+
+/// PSNR after 64 frames of a wall with soft occlusion that moves `pan` pixels a frame.
+double psnr_of_pan(Vec2 pan) {
+  DenoiserConfig config;
+  config.max_tspp = config.max_tspp_moving; // the same history for both
+  AoDenoiser denoiser(config);
+  const auto p_at = [](float x, float y) { return 0.5f + 0.3f * std::sin(x * 0.15f) * std::cos(y * 0.2f); };
+  double rmse = 0;
+  for (uint32_t f = 0; f < 64; ++f) {
+    const Vec2 shift = pan * static_cast<float>(f);
+    const auto p = [&](uint32_t x, uint32_t y) {
+      return p_at(static_cast<float>(x) - shift.x, static_cast<float>(y) - shift.y);
+    };
+    GBuffer g = wall(kSize);
+    for (Vec2& motion : g.motion_px) motion = f == 0 ? Vec2(0) : pan;
+    const DenoisedAo& result =
+        denoiser.next_frame(g, samples(kSize, [&](uint32_t x, uint32_t y) { return noisy(p(x, y), x, y, f); }));
+    rmse = rmse_of(result.ao, kSize, {40, 40, 120, 56}, [&](uint32_t x, uint32_t y) { return expected(p(x, y)); });
+  }
+  return -20.0 * std::log10(rmse);
+}
+
+TEST(Reprojection, SubPixelPansLoseLittle) {
+  const double still = psnr_of_pan(Vec2(0));
+  EXPECT_GE(psnr_of_pan(Vec2(0.37f, 0.0f)), still - 2.0);
+  EXPECT_GE(psnr_of_pan(Vec2(0.5f, -0.5f)), still - 2.0);
+  EXPECT_GE(psnr_of_pan(Vec2(-0.1f, 0.2f)), still - 2.0);
+}
+
+TEST(AoDenoiser, DisoccludedSurfacesCatchUpInTwelveFrames) {
+  const float p = 0.5f;
+  const auto covered = [](uint32_t f, uint32_t x, uint32_t y) { // a card that moves 16 pixels right at frame 40
+    const uint32_t left = f < 40 ? 40 : 56;
+    return x >= left && x < left + 40 && y >= 20 && y < 76;
+  };
+  AoDenoiser denoiser;
+  for (uint32_t f = 0; f < 52; ++f) {
+    GBuffer g = wall(kSize);
+    for (uint32_t i = 0; i < kSize.pixels(); ++i) {
+      if (!covered(f, i % kSize.width, i / kSize.width)) continue;
+      g.view_z[i] = 5.0f, g.instance[i] = 1;
+      if (f == 40) g.motion_px[i] = Vec2(16, 0);
+    }
+    const DenoisedAo& result = denoiser.next_frame(g, noise(kSize, p, f));
+    if (f == 40) {
+      EXPECT_EQ(result.tspp[48 * kSize.width + 48], 1.0f);  // uncovered
+      EXPECT_EQ(result.tspp[48 * kSize.width + 75], 34.0f); // the card took its history along, as long as may be
+    }
+    for (float ao : result.ao) ASSERT_TRUE(ao >= 0.0f && ao <= 1.0f);
+    if (f != 51) continue;
+    const auto truth = [&](uint32_t, uint32_t) { return expected(p); };
+    EXPECT_LE(rmse_of(result.ao, kSize, {40, 20, 56, 76}, truth),
+              1.5 * rmse_of(result.ao, kSize, {104, 0, 160, 96}, truth));
+  }
+}
+
+/// Shares of a change of occlusion that are left 4, 8, 16 and 32 frames after it.
+std::array<double, 4> ghost(float before, float after, Rect changed, const DenoiserConfig& config = {}) {
+  AoDenoiser denoiser(config);
+  std::array<double, 4> left{};
+  for (uint32_t f = 0; f < 96 + 32; ++f) {
+    const AoFrame frame = samples(kSize, [&](uint32_t x, uint32_t y) {
+      const bool inside = x >= changed.x0 && x < changed.x1 && y >= changed.y0 && y < changed.y1;
+      return noisy(inside && f < 96 ? before : after, x, y, f);
+    });
+    const DenoisedAo& result = denoiser.next_frame(wall(kSize), frame);
+    const double residual = std::abs(mean_of(result.ao, kSize, changed) - static_cast<double>(expected(after))) /
+                            std::abs(static_cast<double>(expected(before) - expected(after)));
+    const uint32_t frames = f + 1 - std::min(f + 1, 96u);
+    for (size_t i = 0; i < 4; ++i)
+      if (frames == (4u << i)) left[i] = residual;
+  }
+  return left;
+}
+
+void expect_ghost_gone(const std::array<double, 4>& left) {
+  EXPECT_LE(left[0], 0.5);
+  EXPECT_LE(left[1], 0.25);
+  EXPECT_LE(left[2], 0.10);
+  EXPECT_LE(left[3], 0.03);
+}
+
+TEST(AoDenoiser, GhostOfARemovedOccluderFades) {
+  expect_ghost_gone(ghost(0.9f, 0.1f, {40, 20, 110, 76}));
+  expect_ghost_gone(ghost(0.1f, 0.9f, {40, 20, 110, 76})); // and of one that appears
+}
+
+TEST(AoDenoiser, GhostOfAChangeWithinTheNoiseFadesToo) { // 0.15 of a noise of 0.375
+  const std::array<double, 4> left = ghost(0.6f, 0.4f, {40, 20, 110, 76});
+  EXPECT_LE(left[2], 0.2);
+  EXPECT_LE(left[3], 0.1);
+}
+
+TEST(AoDenoiser, GhostOfAThinOccluderFades) {
+  const std::array<double, 4> left = ghost(0.95f, 0.05f, {80, 20, 83, 76});
+  EXPECT_LE(left[2], 0.2);
+  EXPECT_LE(left[3], 0.1);
+}
+
+TEST(AoDenoiser, WithoutCorrectionGhostsStay) { // or the tests above could not fail
+  DenoiserConfig config;
+  config.change_tolerance = 1.0f;
+  EXPECT_GT(ghost(0.9f, 0.1f, {40, 20, 110, 76}, config)[3], 0.5);
+}
+
+} // namespace
+} // namespace packtrace

@@ -1,0 +1,120 @@
+#include "runtime/trace/packed_source.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "compress/bake/bake_scene.h"
+#include "compress/format/baked_file.h"
+#include "runtime/trace/float_source.h"
+#include "runtime/trace/primary_visibility.h"
+#include "tests/runtime/trace/test_scenes.h"
+
+namespace packtrace {
+namespace {
+
+using test::add_object;
+using test::add_shape;
+
+BakedFile bake(const Scene& scene, BakeConfig config = {}) {
+  Diagnostics diagnostics;
+  Progress progress;
+  return BakedFile::from_bytes(bake_to_bytes(scene, config, diagnostics, progress).bytes);
+}
+
+/// A floor, a masked screen, a glass sphere and three placements of a smooth one, one of them mirrored.
+Scene varied_scene() {
+  Scene scene;
+  add_shape(scene, test::quad({-8, 0, -8}, {0, 0, 16}, {16, 0, 0}));
+  add_shape(scene, test::quad({-4, 0, 4}, {8, 0, 0}, {0, 5, 0}), kAlphaMask);
+  scene.masks.push_back({64, 1, WrapMode::kRepeat, Vec2(4, 1), Vec2(0), {0u, ~0u}});
+  scene.materials[1].alpha_mask = 0;
+  add_shape(scene, test::sphere({3, 1, 0}, 1, 24), kTransmissive);
+  add_object(scene, test::sphere({0, 0, 0}, 1, 32));
+  scene.materials[3].albedo = Vec3(0.9f, 0.5f, 0.1f);
+  for (const DVec3 scale : {DVec3(1), DVec3(-1, 0.7, 1), DVec3(0.5, 1.5, 0.5)})
+    scene.instances.push_back({0, Affine(test::placed({-2.5 * scale.y, 1, 4 * scale.x - 4}, scale, 25))});
+  return scene;
+}
+
+struct Image {
+  GBuffer gbuffer;
+  AoFrame ao;
+};
+
+Image render(const SceneSource& source) {
+  const EmbreeScene embree(source, {});
+  const PrimaryCamera camera(test::camera_at({2, 5, -10}, {0, 1, 0}), {160, 90});
+  AoConfig config;
+  config.radius = 4;
+  config.spp = 16;
+  Progress progress;
+  Image image;
+  trace_primary(source, embree, camera, camera, image.gbuffer, progress);
+  trace_ao(source, embree, image.gbuffer, config, 0, image.ao, progress);
+  return image;
+}
+
+TEST(PackedSource, RendersTheImageOfTheFloats) {
+  const Scene scene = varied_scene();
+  const BakedFile file = bake(scene);
+  const PackedSource packed(file);
+  const FloatSource floats(scene);
+  ASSERT_EQ(packed.instances().size(), floats.instances().size());
+  const Image a = render(packed), b = render(floats);
+  uint32_t different = 0, hits = 0;
+  double sum = 0.0;
+  for (size_t i = 0; i < a.ao.ao.size(); ++i) {
+    if (a.gbuffer.instance[i] != b.gbuffer.instance[i]) {
+      ++different;
+      continue;
+    }
+    if (a.gbuffer.instance[i] == kNoInstance) continue;
+    ++hits;
+    EXPECT_EQ(a.gbuffer.albedo[i], b.gbuffer.albedo[i]);
+    EXPECT_NEAR(a.gbuffer.view_z[i], b.gbuffer.view_z[i], 0.05f);
+    sum += std::abs(a.ao.ao[i] - b.ao.ao[i]);
+  }
+  EXPECT_GT(hits, 5000u);
+  EXPECT_LT(different, 100u); // silhouettes
+  EXPECT_LT(sum / hits, 0.005);
+}
+
+TEST(PackedSource, DecodedTrianglesMatchRandomAccess) {
+  const BakedFile file = bake(varied_scene());
+  const PackedSource source(file);
+  for (uint32_t g = 0; g < source.geometry_count(); ++g) {
+    const GeometryCounts counts = source.counts(g);
+    std::vector<Vec3> positions(counts.vertices);
+    std::vector<Triangle> triangles(counts.triangles);
+    source.decode(g, positions, triangles);
+    for (uint32_t t = 0; t < counts.triangles; ++t) {
+      const uint32_t c = file.cluster_of_triangle(g, t);
+      const ClusterView cluster = file.cluster(g, c);
+      const Triangle local = cluster.triangle(t - cluster.record().first_triangle);
+      for (int k = 0; k < 3; ++k) ASSERT_EQ(positions[triangles[t][k]], cluster.position(local[k]));
+      ASSERT_EQ(source.material_of(g, t), cluster.material());
+    }
+  }
+}
+
+TEST(PackedSource, PositionErrorBoundsTheDecodedSurface) {
+  Scene scene;
+  add_shape(scene, test::sphere({0, 0, 0}, 1, 48));
+  BakeConfig config;
+  config.precision_kind = PrecisionKind::kPositionBits;
+  config.precision = 10;
+  const BakedFile file = bake(scene, config);
+  const PackedSource source(file);
+  const GeometryCounts counts = source.counts(0);
+  std::vector<Vec3> positions(counts.vertices);
+  std::vector<Triangle> triangles(counts.triangles);
+  source.decode(0, positions, triangles);
+  const double bound = source.position_error(0);
+  EXPECT_GT(bound, 1e-4);
+  EXPECT_LT(bound, 2e-3);
+  for (const Vec3 p : positions) EXPECT_LE(std::abs(glm::length(DVec3(p)) - 1.0), bound * std::sqrt(3.0) + 1e-6);
+}
+
+} // namespace
+} // namespace packtrace
