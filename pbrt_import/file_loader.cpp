@@ -109,8 +109,8 @@ void FileLoader::report_ply(const PlyFile& file) {
   for (const PlyUse& use : file.uses) {
     if (file.outcome.error.empty()) break;
     reporter_.set_sequence(use.sequence);
-    reporter_.error(use.place,
-                    "plymesh " + in_quotes(file.path.string()) + ": " + file.outcome.error + "; the shape is skipped");
+    reporter_.error(use.place, "plymesh " + in_quotes(file.path.string(), kMaxShownPath) + ": " + file.outcome.error +
+                                   "; the shape is skipped");
   }
   if (file.outcome.reports.empty()) return;
   reporter_.set_sequence(file.uses.front().sequence);
@@ -123,8 +123,8 @@ void FileLoader::report_ply(const PlyFile& file) {
 void FileLoader::report_image(const ImageRequest& image, const Outcome& outcome) {
   if (outcome.error.empty()) return;
   reporter_.set_sequence(image.sequence);
-  reporter_.error(image.place,
-                  "texture file " + in_quotes(image.path.string()) + ": " + outcome.error + "; it counts as white");
+  reporter_.error(image.place, "texture file " + in_quotes(image.path.string(), kMaxShownPath) + ": " + outcome.error +
+                                   "; it counts as white");
 }
 
 } // namespace packtrace

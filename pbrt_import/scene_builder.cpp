@@ -153,6 +153,7 @@ void SceneBuilder::handle_transform(const Directive& directive) {
     break;
   case K::kLookAt:
     map = look_at({n[0], n[1], n[2]}, {n[3], n[4], n[5]}, {n[6], n[7], n[8]}), count = 9;
+    if (map) map = inverse(*map); // pbrt's current transform is camera_from_world
     problem = "eye and target coincide, or up is parallel to the view";
     break;
   case K::kTransform:

@@ -142,10 +142,7 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
   const std::string& name = directive.names[0];
   const ShapeKind* const kind = find_shape_kind(name);
   std::string problem;
-  if (!kind)
-    problem = "unknown shape" + did_you_mean(closest_shape_kind(name));
-  else if (!kind->make)
-    problem = "this shape is not supported";
+  if (!kind) problem = "unknown shape" + did_you_mean(closest_shape_kind(name));
   const ReportFn report = [&](Severity severity, uint32_t, std::string message) {
     reporter_.report(severity, directive.place, name + ": " + message);
   };

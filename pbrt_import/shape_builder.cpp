@@ -1,14 +1,20 @@
 #include "pbrt_import/shape_builder.h"
 
+#include <cmath>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/shapes/curve.h"
+#include "pbrt_import/shapes/heightfield.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
+#include "pbrt_import/shapes/nurbs.h"
 #include "pbrt_import/shapes/quadrics.h"
 #include "pbrt_import/shapes/subdivision.h"
+#include "pbrt_import/tokenizer.h"
 
 namespace packtrace {
 namespace {
@@ -44,6 +50,12 @@ std::vector<Triangle> take_triangles(ParameterList& parameters, ShapeContext& co
     triangles[i] = {static_cast<uint32_t>(indices[3 * i]), static_cast<uint32_t>(indices[3 * i + 1]),
                     static_cast<uint32_t>(indices[3 * i + 2])};
   return triangles;
+}
+
+uint32_t count_of(const ParameterList& parameters, std::string_view name, int32_t fallback) {
+  const int32_t count = parameters.get_integer(name, fallback);
+  if (count < 0) throw Error(ErrorKind::kInput, "negative " + in_quotes(name));
+  return static_cast<uint32_t>(count);
 }
 
 Mesh make_triangle_mesh(ParameterList& parameters, ShapeContext& context) {
@@ -116,12 +128,63 @@ Mesh make_hyperboloid(ParameterList& parameters, ShapeContext& context) {
 Mesh make_loop_subdivision(ParameterList& parameters, ShapeContext& context) {
   constexpr std::string_view kUnneeded[] = {"scheme"};
   parameters.mark_used(kUnneeded);
-  const int32_t levels = parameters.get_integer("levels", parameters.get_integer("nlevels", 3));
-  if (levels < 0) throw Error(ErrorKind::kInput, "negative subdivision levels");
+  const int32_t default_levels = parameters.get_integer("nlevels", 3);
+  const uint32_t levels = count_of(parameters, "levels", default_levels);
   const std::vector<Triangle> triangles = take_triangles(parameters, context);
   const std::vector<Vec3> points = grouped<Vec3>(parameters.take_floats("P", ParameterType::kPoint3));
   if (points.empty()) throw Error(ErrorKind::kInput, "no \"point P\"");
-  return subdivide_loop(points, triangles, static_cast<uint32_t>(levels), context.report);
+  return subdivide_loop(points, triangles, levels, context.report);
+}
+
+Mesh make_curve(ParameterList& parameters, ShapeContext&) {
+  constexpr std::string_view kUnneeded[] = {"splitdepth"};
+  parameters.mark_used(kUnneeded);
+  CurveParameters curve;
+  const std::string type = parameters.get_string("type", "flat"), basis = parameters.get_string("basis", "bezier");
+  if (type != "flat" && type != "ribbon" && type != "cylinder")
+    throw Error(ErrorKind::kInput, "type " + in_quotes(type) + " is neither flat, ribbon nor cylinder");
+  if (basis != "bezier" && basis != "bspline")
+    throw Error(ErrorKind::kInput, "basis " + in_quotes(basis) + " is neither bezier nor bspline");
+  curve.type = type == "ribbon" ? CurveType::kRibbon : type == "cylinder" ? CurveType::kCylinder : CurveType::kFlat;
+  curve.basis = basis == "bspline" ? CurveBasis::kBspline : CurveBasis::kBezier;
+  curve.degree = count_of(parameters, "degree", 3);
+  const float width = parameters.get_float("width", 1.0f);
+  curve.width0 = parameters.get_float("width0", width);
+  curve.width1 = parameters.get_float("width1", width);
+  const std::vector<Vec3> points = grouped<Vec3>(parameters.take_floats("P", ParameterType::kPoint3));
+  const std::vector<Vec3> normals = grouped<Vec3>(parameters.take_floats("N", ParameterType::kNormal));
+  curve.points = points;
+  curve.normals = normals;
+  return tessellate_curve(curve);
+}
+
+Mesh make_nurbs(ParameterList& parameters, ShapeContext& context) {
+  NurbsParameters nurbs;
+  nurbs.nu = count_of(parameters, "nu", 0);
+  nurbs.nv = count_of(parameters, "nv", 0);
+  nurbs.u_order = count_of(parameters, "uorder", 0);
+  nurbs.v_order = count_of(parameters, "vorder", 0);
+  nurbs.u_knots = parameters.floats("uknots", ParameterType::kFloat);
+  nurbs.v_knots = parameters.floats("vknots", ParameterType::kFloat);
+  const auto limit = [&](std::string_view name) {
+    constexpr float kAbsent = std::numeric_limits<float>::quiet_NaN();
+    const float value = parameters.get_float(name, kAbsent);
+    return std::isnan(value) ? std::nullopt : std::optional<float>(value);
+  };
+  nurbs.u0 = limit("u0"), nurbs.u1 = limit("u1"), nurbs.v0 = limit("v0"), nurbs.v1 = limit("v1");
+  std::vector<glm::vec4> points;
+  for (const Vec3 p : grouped<Vec3>(parameters.take_floats("P", ParameterType::kPoint3))) points.emplace_back(p, 1.0f);
+  if (points.empty()) points = grouped<glm::vec4>(parameters.take_floats("Pw", ParameterType::kFloat));
+  if (points.empty()) throw Error(ErrorKind::kInput, "no control points, neither \"point P\" nor \"float Pw\"");
+  nurbs.control_points = points;
+  return tessellate_nurbs(nurbs, context.tessellation_tolerance);
+}
+
+Mesh make_height_field(ParameterList& parameters, ShapeContext& context) {
+  const uint32_t nu = count_of(parameters, "nu", 0), nv = count_of(parameters, "nv", 0);
+  Mesh mesh = make_heightfield(nu, nv, parameters.floats("Pz", ParameterType::kFloat));
+  context.dropped_triangles += drop_bad_triangles(mesh, context.report);
+  return mesh;
 }
 
 constexpr ShapeKind kKinds[] = {
@@ -133,9 +196,9 @@ constexpr ShapeKind kKinds[] = {
     {"cone", make_cone},
     {"paraboloid", make_paraboloid},
     {"hyperboloid", make_hyperboloid},
-    {"curve", nullptr},
-    {"nurbs", nullptr},
-    {"heightfield", nullptr},
+    {"curve", make_curve},
+    {"nurbs", make_nurbs},
+    {"heightfield", make_height_field},
 };
 
 } // namespace

@@ -24,7 +24,7 @@ using ShapeFunction = Mesh (*)(ParameterList& parameters, ShapeContext& context)
 /// A kind of shape whose triangles come from its parameters alone, so not plymesh.
 struct ShapeKind {
   std::string_view name;
-  ShapeFunction make = nullptr; ///< null: known to pbrt, but not supported
+  ShapeFunction make = nullptr;
 };
 
 /// @return null if pbrt knows no such shape

@@ -57,7 +57,7 @@ void SourceStack::give_up(const std::string& why) {
 }
 
 void SourceStack::include(const std::filesystem::path& path, const Place& place) {
-  const std::string name = in_quotes(path.string());
+  const std::string name = in_quotes(path.string(), kMaxShownPath);
   if (files_open_.size() >= limits_.max_depth) {
     reporter_.error(place, "included files are nested more than " + std::to_string(limits_.max_depth) + " deep; " +
                                name + " is skipped");

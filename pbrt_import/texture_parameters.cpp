@@ -115,8 +115,8 @@ std::optional<Vec3> TextureParameters::rgb_from_file(const Parameter& parameter)
     return rgb;
   } catch (const Error& error) {
     if (metal_by_name(parameter.strings[0])) return std::nullopt; // the caller knows that metal without the file
-    context_.reporter.error(parameter.place,
-                            "cannot read spectrum file " + in_quotes(path.string()) + ": " + error.what());
+    context_.reporter.error(parameter.place, "cannot read spectrum file " + in_quotes(path.string(), kMaxShownPath) +
+                                                 ": " + error.what());
     return std::nullopt;
   }
 }

@@ -80,7 +80,8 @@ std::optional<Node> make_imagemap(const TextureMaker& maker) {
   ImageRequest& request = context.graph.images()[image];
   if (!request.missing && !std::filesystem::is_regular_file(path, error)) {
     request.missing = true;
-    context.reporter.error(file->place, "no such texture file " + in_quotes(path.string()) + "; it counts as white");
+    context.reporter.error(file->place,
+                           "no such texture file " + in_quotes(path.string(), kMaxShownPath) + "; it counts as white");
   }
   return context.graph.image(image, Vec3(scale), wrap, mapping);
 }

@@ -212,12 +212,11 @@ std::string unescape(std::string_view raw, bool& unknown_escape) {
   return text;
 }
 
-std::string in_quotes(std::string_view text) {
-  constexpr size_t kMaxLength = 60;
+std::string in_quotes(std::string_view text, size_t max_length) {
   constexpr char kHex[] = "0123456789abcdef";
   std::string shown(1, '"');
   for (const char c : text) {
-    if (shown.size() >= kMaxLength) {
+    if (shown.size() > max_length) {
       shown += "...";
       break;
     }

@@ -78,7 +78,8 @@ private:
 /// @param unknown_escape set to true where a back-slash was kept
 std::string unescape(std::string_view raw, bool& unknown_escape);
 
-/// Text for messages, in double quotes: unprintable bytes as \xNN, cut after 60 characters.
-std::string in_quotes(std::string_view text);
+/// Text for messages, in double quotes: unprintable bytes as \xNN, cut after max_length characters.
+inline constexpr size_t kMaxShownPath = 4096;
+std::string in_quotes(std::string_view text, size_t max_length = 60);
 
 } // namespace packtrace

@@ -38,17 +38,6 @@ std::optional<DAffine> rotation(double degrees, DVec3 axis) {
   return map;
 }
 
-std::optional<DAffine> look_at(DVec3 eye, DVec3 target, DVec3 up) {
-  const DVec3 view = target - eye;
-  if (!(glm::length(view) > 0.0) || !(glm::length(up) > 0.0)) return std::nullopt;
-  const DVec3 forward = glm::normalize(view);
-  const DVec3 sideways = glm::cross(glm::normalize(up), forward);
-  if (!(glm::length(sideways) > 1e-12)) return std::nullopt; // parallel, up to the rounding of the text
-  const DVec3 right = glm::normalize(sideways);
-  const DAffine world_from_camera(right, glm::cross(forward, right), forward, eye);
-  return inverse(world_from_camera);
-}
-
 std::optional<DAffine> affine_from_columns(std::span<const double, 16> m) {
   if (m[3] != 0.0 || m[7] != 0.0 || m[11] != 0.0 || m[15] == 0.0) return std::nullopt;
   DAffine map;

@@ -14,9 +14,6 @@ DAffine scaling(DVec3 factors);
 /// @return none if axis has no direction
 std::optional<DAffine> rotation(double degrees, DVec3 axis);
 
-/// camera_from_world of a camera at eye. @return none if eye and target coincide or up is parallel to the view
-std::optional<DAffine> look_at(DVec3 eye, DVec3 target, DVec3 up);
-
 /// From 16 numbers column after column. A bottom row (0,0,0,w) is divided out. @return none if the map is not affine
 std::optional<DAffine> affine_from_columns(std::span<const double, 16> columns);
 

@@ -18,8 +18,12 @@ void add_triangle(Mesh& mesh, DVec3 a, DVec3 b, DVec3 c) {
 }
 
 void add_quad(Mesh& mesh, uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
-  mesh.triangles.emplace_back(a, b, c);
-  mesh.triangles.emplace_back(a, c, d);
+  const auto& p = mesh.positions;
+  const auto add = [&](uint32_t i, uint32_t j, uint32_t k) { // quads may run to a point; what has no area stays out
+    if (p[i] != p[j] && p[j] != p[k] && p[k] != p[i]) mesh.triangles.emplace_back(i, j, k);
+  };
+  add(a, b, c);
+  add(a, c, d);
 }
 
 void add_quad(Mesh& mesh, DVec3 a, DVec3 b, DVec3 c, DVec3 d) {

@@ -21,7 +21,7 @@ uint32_t add_vertex(Mesh& mesh, DVec3 position);
 void add_triangle(Mesh& mesh, DVec3 a, DVec3 b, DVec3 c);
 /// Planar quad; its normal is that of triangle abc.
 void add_quad(Mesh& mesh, DVec3 a, DVec3 b, DVec3 c, DVec3 d);
-/// Quad over existing vertices.
+/// Quad over existing vertices. Halves without area, two of whose corners coincide, are left out.
 void add_quad(Mesh& mesh, uint32_t a, uint32_t b, uint32_t c, uint32_t d);
 
 /// Axis-aligned box in the frame: 8 vertices, 12 triangles.

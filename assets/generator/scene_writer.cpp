@@ -29,64 +29,75 @@ void SceneWriter::material(std::string_view name, Vec3 albedo) {
                           albedo.x, albedo.y, albedo.z));
 }
 
-void SceneWriter::model(std::string_view model_name, const Model& model) {
-  StoredModel stored;
-  for (const ModelPart& part : model.parts()) {
+void SceneWriter::model(std::string_view model_name, Model model) {
+  const uint64_t triangle_count = model.triangle_count();
+  models_.insert_or_assign(std::string(model_name), StoredModel{std::move(model), {}, triangle_count, false});
+}
+
+void SceneWriter::object(std::string_view object_name, std::string_view model_name, const MaterialChoice& choice) {
+  object_names_.insert_or_assign(std::string(object_name), StoredObject{std::string(model_name), choice, false});
+}
+
+void SceneWriter::object(std::string_view object_name, Model new_model) {
+  model(object_name, std::move(new_model));
+  object(object_name, object_name);
+}
+
+const SceneWriter::StoredModel& SceneWriter::written_model(std::string_view name) {
+  const auto found = models_.find(name);
+  assert(found != models_.end());
+  StoredModel& stored = found->second;
+  if (stored.written) return stored;
+  for (const ModelPart& part : stored.model.parts()) {
     if (part.mesh.triangles.empty()) continue;
-    const std::string file_name = fmt::format("geometry/{}_{}.ply", model_name, stored.parts.size());
+    const std::string file_name = fmt::format("geometry/{}_{}.ply", name, stored.parts.size());
     OutputFile file(config_.folder / file_name, config_.overwrite);
     write_ply(file, part.mesh);
     file.close();
     stored.parts.push_back({file_name, part.material});
-    stored.triangle_count += part.mesh.triangles.size();
   }
+  stored.model = Model();
+  stored.written = true;
   totals_.unique_triangles += stored.triangle_count;
-  models_.insert_or_assign(std::string(model_name), std::move(stored));
+  return stored;
 }
 
-void SceneWriter::shapes(OutputFile& file, const StoredModel& model, const MaterialChoice& choice) {
-  for (const StoredPart& part : model.parts) {
+void SceneWriter::write_shapes(const std::vector<PlyPart>& parts, const MaterialChoice& choice) {
+  for (const PlyPart& part : parts) {
     const auto chosen = choice.find(part.material);
-    file.write(fmt::format("NamedMaterial \"{}\" Shape \"plymesh\" \"string filename\" \"{}\"\n",
-                           chosen == choice.end() ? part.material : chosen->second, part.file));
+    objects_.write(fmt::format("NamedMaterial \"{}\" Shape \"plymesh\" \"string filename\" \"{}\"\n",
+                               chosen == choice.end() ? part.material : chosen->second, part.file));
   }
-}
-
-void SceneWriter::object(std::string_view object_name, std::string_view model_name, const MaterialChoice& choice) {
-  const auto stored = models_.find(model_name);
-  assert(stored != models_.end());
-  objects_.write(fmt::format("ObjectBegin \"{}\"\n", object_name));
-  shapes(objects_, stored->second, choice);
-  objects_.write("ObjectEnd\n");
-  object_triangles_.insert_or_assign(std::string(object_name), stored->second.triangle_count);
-}
-
-void SceneWriter::object(std::string_view object_name, const Model& new_model) {
-  model(object_name, new_model);
-  object(object_name, object_name);
 }
 
 void SceneWriter::instance(std::string_view object_name, const DAffine& m) {
-  const auto triangles = object_triangles_.find(object_name);
-  assert(triangles != object_triangles_.end());
+  const auto found = object_names_.find(object_name);
+  assert(found != object_names_.end());
+  StoredObject& object = found->second;
+  const StoredModel& model = written_model(object.model);
+  if (!object.written) {
+    objects_.write(fmt::format("ObjectBegin \"{}\"\n", object_name));
+    write_shapes(model.parts, object.choice);
+    objects_.write("ObjectEnd\n");
+    object.written = true;
+  }
   // Four significant digits move the far end of a 20 m object by a millimetre; places need more.
   instances_.write(fmt::format("Transform [{:.4g} {:.4g} {:.4g} 0 {:.4g} {:.4g} {:.4g} 0 {:.4g} {:.4g} {:.4g} 0 "
                                "{:.6g} {:.6g} {:.6g} 1]ObjectInstance \"{}\"\n",
                                m[0].x, m[0].y, m[0].z, m[1].x, m[1].y, m[1].z, m[2].x, m[2].y, m[2].z, m[3].x, m[3].y,
                                m[3].z, object_name));
   ++totals_.instances;
-  totals_.placed_triangles += triangles->second;
+  totals_.placed_triangles += model.triangle_count;
 }
 
 void SceneWriter::world_shape(std::string_view model_name) {
-  const auto stored = models_.find(model_name);
-  assert(stored != models_.end());
-  shapes(objects_, stored->second, {});
-  totals_.placed_triangles += stored->second.triangle_count;
+  const StoredModel& model = written_model(model_name);
+  write_shapes(model.parts, {});
+  totals_.placed_triangles += model.triangle_count;
 }
 
 void SceneWriter::world_file(std::string_view file, std::string_view material, uint64_t triangle_count) {
-  shapes(objects_, {{{std::string(file), std::string(material)}}, triangle_count}, {});
+  write_shapes({{std::string(file), std::string(material)}}, {});
   totals_.unique_triangles += triangle_count;
   totals_.placed_triangles += triangle_count;
 }

@@ -48,12 +48,12 @@ public:
   /// Diffuse, linear sRGB in [0,1].
   void material(std::string_view name, Vec3 albedo);
 
-  /// Stores a finished model's meshes and remembers them under a name.
-  void model(std::string_view model_name, const Model& model);
-  /// ObjectBegin ... ObjectEnd over a stored model, under its own name or with other materials.
+  /// Remembers a finished model under a name; its meshes go to disk when something first shows it.
+  void model(std::string_view model_name, Model model);
+  /// A model under a name of its own, with other materials if chosen; ObjectBegin is written with its first instance.
   void object(std::string_view object_name, std::string_view model_name, const MaterialChoice& choice = {});
   /// model() and object() in one.
-  void object(std::string_view object_name, const Model& model);
+  void object(std::string_view object_name, Model model);
   void instance(std::string_view object_name, const DAffine& world_from_object);
   /// A stored model placed once, in the world, as it is.
   void world_shape(std::string_view model_name);
@@ -64,20 +64,28 @@ public:
   SceneTotals finish();
 
 private:
-  struct StoredPart {
+  struct PlyPart {
     std::string file, material;
   };
   struct StoredModel {
-    std::vector<StoredPart> parts;
+    Model model; ///< emptied once written
+    std::vector<PlyPart> parts;
     uint64_t triangle_count = 0;
+    bool written = false;
   };
-  void shapes(OutputFile& file, const StoredModel& model, const MaterialChoice& choice);
+  struct StoredObject {
+    std::string model;
+    MaterialChoice choice;
+    bool written = false;
+  };
+  const StoredModel& written_model(std::string_view name);
+  void write_shapes(const std::vector<PlyPart>& parts, const MaterialChoice& choice);
 
   OutputConfig config_;
   std::string name_;
   OutputFile main_, objects_, instances_;
   std::map<std::string, StoredModel, std::less<>> models_;
-  std::map<std::string, uint64_t, std::less<>> object_triangles_;
+  std::map<std::string, StoredObject, std::less<>> object_names_;
   SceneTotals totals_;
 };
 

@@ -210,7 +210,8 @@ void TownBuilder::build_edges() {
       if (near_stairs(level - 1, middle, 2.3) || level == TownTerrain::kLevels) continue;
       const DVec3 inside = top + DVec3(s, 0, c) * 0.12;
       const uint64_t run = hash_bits(config_.seed + level * 1000 + piece / 4) % 5;
-      if (run < 2) put("railing", inside, turn);
+      if (run < 2 && level < 6) put("railing", inside, turn);
+      else if (run < 2) put(any(objects_.fences), inside, turn);
       else if (run < 4) put(any(objects_.parapets), inside, turn);
       else put(any(objects_.pots), inside + DVec3(s, 0, c) * 0.3, random_.uniform(0.0, 6.0), 1.1);
     }
@@ -225,6 +226,7 @@ void TownBuilder::build_quay() {
   };
   along_quay(9.0, 1.2, [&](double angle) { put_on("lamp_post", angle, 1.2, 0, angle); });
   along_quay(5.0, 0.55, [&](double angle) { put_on("bollard", angle, 0.55, 0, angle); });
+  along_quay(17.0, 1.9, [&](double angle) { put_on(any(objects_.palms), angle + 0.05, 1.9, 0, random_.uniform(0.0, 6.0), 0.95); });
   along_quay(6.3, 2.6, [&](double angle) {
     const double pick = random_.uniform();
     const double turn = angle + random_.uniform(-0.3, 0.3);
@@ -238,7 +240,7 @@ void TownBuilder::build_quay() {
       put(any(objects_.crates), terrain_.place(angle + 0.012, 1.85, 0) + DVec3(0, 0.8, 0), turn + 0.7);
       put_on("barrel", angle - 0.03, 2.0, 0, turn);
       put_on("rope_coil", angle - 0.02, 1.1, 0, turn);
-    } else if (pick < 0.85) {
+    } else if (pick < 0.86) {
       put_on(any(objects_.palms), angle, 2.6, 0, random_.uniform(0.0, 6.0), random_.uniform(0.85, 1.15));
     } else if (pick < 0.93) {
       put_on(any(objects_.racks), angle, 2.4, 0, turn);
@@ -325,7 +327,7 @@ void TownBuilder::build_boats() {
   put(objects_.fishing_boats[2], {16.0, 0, 12.0}, radians(75));
   put("sailing_boat", {-46.0, 0, 62.0}, radians(64));
   put("sailing_boat", {-110.0, 0, 190.0}, radians(-70), 1.2);
-  put("sailing_boat", {9.0, 0, 3.0}, radians(35));
+  put("sailing_boat", {27.0, 0, 8.0}, radians(20), 0.9);
 }
 
 void TownBuilder::put_plant(DVec3 at, double wildness) {

@@ -40,18 +40,10 @@ public:
     measure();
     choose_grids();
     pack();
-    progress_.begin("assembling the file", 0);
-    FileSections sections(scene_);
-    for (size_t i = 0; i < packed_.size(); ++i) {
-      sections.add_geometry(packed_[i].record, packed_[i].encoded, plan_.geometries[i].name);
-      packed_[i].encoded = {};
-    }
-    sections.set_instances(plan_.instances);
-    add_up();
     BakedScene result;
-    result.bytes = sections.assemble(summary(sections));
+    result.bytes = assemble();
     // Reading back what was written is part of the bake: nothing leaves it that a reader would refuse.
-    report_.file = summarize(BakedFile::from_bytes(result.bytes, "bake result"));
+    report_.file = summarize(BakedFile::borrow_bytes(result.bytes, "bake result"));
     result.report = std::move(report_);
     return result;
   }
@@ -63,6 +55,18 @@ private:
     QuantizeStats stats;
     uint64_t unneeded_uv_bytes = 0;
   };
+
+  std::vector<std::byte> assemble() {
+    progress_.begin("assembling the file", 0);
+    FileSections sections(scene_);
+    for (size_t i = 0; i < packed_.size(); ++i) {
+      sections.add_geometry(packed_[i].record, packed_[i].encoded, plan_.geometries[i].name);
+      packed_[i].encoded = {};
+    }
+    sections.set_instances(plan_.instances);
+    add_up();
+    return sections.assemble(summary(sections));
+  }
 
   void measure() {
     progress_.begin("measuring geometry", plan_.geometries.size());

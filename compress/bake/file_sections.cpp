@@ -1,5 +1,6 @@
 #include "compress/bake/file_sections.h"
 
+#include <cmath>
 #include <limits>
 
 #include "compress/format/baked_image.h"
@@ -7,6 +8,13 @@
 #include "pbrt_import/scene/error.h"
 
 namespace packtrace {
+namespace {
+
+void require(bool ok, const std::string& what) {
+  if (!ok) throw Error(ErrorKind::kInput, "invalid scene: " + what);
+}
+
+} // namespace
 
 FileSections::FileSections(const Scene& scene) {
   add_materials(scene);
@@ -24,11 +32,20 @@ baked::StringRef FileSections::add_string(std::string_view text) {
 
 void FileSections::add_materials(const Scene& scene) {
   for (const Material& material : scene.materials) {
+    const auto mask = [&](MaterialFlags flag, uint32_t index) {
+      if ((material.flags & flag) == 0) return baked::kNone;
+      require(index < scene.masks.size(), "an alpha mask of material " + material.name + " does not exist");
+      return index;
+    };
+    require((material.flags & ~kAllMaterialFlags) == 0, "unknown flags of material " + material.name);
+    for (int channel = 0; channel < 3; ++channel)
+      require(material.albedo[channel] >= 0.0f && material.albedo[channel] <= 1.0f,
+              "the albedo of material " + material.name + " is outside [0, 1]");
     baked::MaterialRecord record{};
     record.flags = material.flags;
     record.albedo = {material.albedo.x, material.albedo.y, material.albedo.z};
-    record.alpha_mask = material.alpha_mask;
-    record.shadow_alpha_mask = material.shadow_alpha_mask;
+    record.alpha_mask = mask(kAlphaMask, material.alpha_mask);
+    record.shadow_alpha_mask = mask(kShadowAlphaMask, material.shadow_alpha_mask);
     record.name = add_string(material.name);
     materials_.push_back(record);
   }
@@ -36,8 +53,11 @@ void FileSections::add_materials(const Scene& scene) {
 
 void FileSections::add_masks(const Scene& scene) {
   for (const AlphaMask& mask : scene.masks) {
-    if (mask.words.size() != size_t{AlphaMask::row_words(mask.width)} * mask.height)
-      throw Error(ErrorKind::kInput, "invalid scene: an alpha mask's bits and size disagree");
+    require(mask.width > 0 && mask.height > 0 &&
+                mask.words.size() == size_t{AlphaMask::row_words(mask.width)} * mask.height,
+            "an alpha mask's bits and size disagree");
+    for (const float f : {mask.uv_scale.x, mask.uv_scale.y, mask.uv_offset.x, mask.uv_offset.y})
+      require(std::isfinite(f), "an alpha mask's texture transform is not finite");
     baked::MaskRecord record{};
     record.first_word = mask_words_.size();
     record.width = mask.width;
@@ -52,16 +72,22 @@ void FileSections::add_masks(const Scene& scene) {
 
 void FileSections::add_cameras(const Scene& scene) {
   for (const Camera& camera : scene.cameras) {
+    require(camera.width_px > 0 && camera.height_px > 0, "a camera's film has no pixels");
     baked::CameraRecord record{};
+    bool finite = std::isfinite(camera.fov_degrees);
     for (int column = 0; column < 4; ++column)
-      for (int row = 0; row < 3; ++row)
+      for (int row = 0; row < 3; ++row) {
         record.world_from_camera[static_cast<size_t>(3 * column + row)] = camera.world_from_camera[column][row];
+        finite &= std::isfinite(camera.world_from_camera[column][row]);
+      }
     record.fov_degrees = camera.fov_degrees;
     if (camera.screen_window) {
       const glm::dvec4& w = *camera.screen_window;
       record.screen_window = {w.x, w.y, w.z, w.w};
       record.has_screen_window = 1;
+      for (const double d : record.screen_window) finite &= std::isfinite(d);
     }
+    require(finite, "a camera's transform, angle or screen window is not finite");
     record.projection = static_cast<uint32_t>(camera.projection);
     record.width_px = camera.width_px;
     record.height_px = camera.height_px;

@@ -7,20 +7,28 @@
 
 namespace packtrace {
 
-BakedFile::BakedFile(std::unique_ptr<MappedFile> map, std::vector<std::byte> owned, const std::string& name)
-    : map_(std::move(map)), owned_(std::move(owned)), bytes_(map_ ? map_->bytes() : std::span<const std::byte>(owned_)),
-      sections_(validate_baked_file(bytes_, name)) {}
+BakedFile::BakedFile(std::unique_ptr<MappedFile> map, std::vector<std::byte> owned, std::span<const std::byte> bytes,
+                     const std::string& name)
+    : map_(std::move(map)), owned_(std::move(owned)), bytes_(bytes), sections_(validate_baked_file(bytes, name)) {}
 
 BakedFile::BakedFile(BakedFile&&) noexcept = default;
 BakedFile& BakedFile::operator=(BakedFile&&) noexcept = default;
 BakedFile::~BakedFile() = default;
 
 BakedFile BakedFile::open(const std::filesystem::path& path) {
-  return BakedFile(std::make_unique<MappedFile>(path), {}, path.string());
+  auto map = std::make_unique<MappedFile>(path);
+  const auto bytes = map->bytes();
+  return BakedFile(std::move(map), {}, bytes, path.string());
 }
 
 BakedFile BakedFile::from_bytes(std::span<const std::byte> bytes, const std::string& name) {
-  return BakedFile(nullptr, std::vector<std::byte>(bytes.begin(), bytes.end()), name);
+  std::vector<std::byte> owned(bytes.begin(), bytes.end());
+  const std::span<const std::byte> copy(owned); // moving the vector keeps its elements in place
+  return BakedFile(nullptr, std::move(owned), copy, name);
+}
+
+BakedFile BakedFile::borrow_bytes(std::span<const std::byte> bytes, const std::string& name) {
+  return BakedFile(nullptr, {}, bytes, name);
 }
 
 std::span<const baked::ClusterRecord> BakedFile::clusters(uint32_t geometry) const {

@@ -44,6 +44,9 @@ public:
   /// @param name stands for the path in errors
   static BakedFile from_bytes(std::span<const std::byte> bytes, const std::string& name = "memory");
 
+  /// The same for bytes that the caller keeps alive and unchanged; 8-byte aligned.
+  static BakedFile borrow_bytes(std::span<const std::byte> bytes, const std::string& name = "memory");
+
   BakedFile(BakedFile&&) noexcept;
   BakedFile& operator=(BakedFile&&) noexcept;
   ~BakedFile();
@@ -67,10 +70,11 @@ public:
   Bounds world_bounds() const;
 
 private:
-  BakedFile(std::unique_ptr<MappedFile> map, std::vector<std::byte> owned, const std::string& name);
+  BakedFile(std::unique_ptr<MappedFile> map, std::vector<std::byte> owned, std::span<const std::byte> bytes,
+            const std::string& name);
 
-  std::unique_ptr<MappedFile> map_;
-  std::vector<std::byte> owned_; // where there is no map
+  std::unique_ptr<MappedFile> map_; // owner of bytes_, or
+  std::vector<std::byte> owned_;    // owner of bytes_, or neither: borrowed
   std::span<const std::byte> bytes_;
   BakedSections sections_;
 };

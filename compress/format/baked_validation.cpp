@@ -158,6 +158,8 @@ private:
       if (!(g.max_position_error >= 0.0 && g.max_position_error <= g.position_error_bound &&
             std::isfinite(g.position_error_bound)))
         fail("geometry", i, "position error");
+      for (const float e : {g.max_normal_error_degrees, g.mean_normal_error_degrees, g.max_uv_error})
+        if (!(e >= 0.0f && std::isfinite(e))) fail("geometry", i, "normal or texture coordinate error");
       if ((g.flags & ~baked::kGeometryFlags) != 0) fail("geometry", i, "flags");
       if (!text_ok(g.name)) fail("geometry", i, "name");
       check_clusters(i, g);
@@ -226,6 +228,8 @@ private:
     if (s.reserved != 0 || s.precision_kind > 3 || s.world_step_mantissa > kMaxStepMantissa ||
         s.world_step_exponent < kMinStepExponent || s.world_step_exponent > kMaxStepExponent)
       fail("summary");
+    for (size_t axis = 0; axis < 3; ++axis)
+      if (std::isnan(s.bounds_lo[axis]) || std::isnan(s.bounds_hi[axis])) fail("summary bounds");
   }
 
   std::span<const std::byte> bytes_;

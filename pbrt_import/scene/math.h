@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <optional>
 
 #include <glm/glm.hpp>
 
@@ -46,5 +47,16 @@ inline DAffine inverse(const DAffine& to_from) {
 
 inline bool is_finite(Vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 inline bool is_finite(DVec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+/// pbrt's LookAt as world_from_camera; none where eye and target coincide or up is parallel to the view.
+inline std::optional<DAffine> look_at(DVec3 eye, DVec3 target, DVec3 up) {
+  const DVec3 view = target - eye;
+  if (!(glm::length(view) > 0.0) || !(glm::length(up) > 0.0)) return std::nullopt;
+  const DVec3 forward = glm::normalize(view);
+  const DVec3 sideways = glm::cross(glm::normalize(up), forward);
+  if (!(glm::length(sideways) > 1e-12)) return std::nullopt; // parallel, up to the rounding of decimal input
+  const DVec3 right = glm::normalize(sideways);
+  return DAffine(right, glm::cross(forward, right), forward, eye);
+}
 
 } // namespace packtrace

@@ -144,6 +144,20 @@ struct Grid {
   std::vector<double> u, v;
 };
 
+/// How far the middles of cells are from the diagonals that cut them, at most.
+double worst_centre(const Grid& grid, const Surface& surface) {
+  double worst = 0.0;
+  for (size_t j = 1; j < grid.v.size(); ++j) {
+    for (size_t i = 1; i < grid.u.size(); ++i) {
+      const DVec3 diagonal =
+          (surface.at(grid.u[i - 1], grid.v[j - 1]).position + surface.at(grid.u[i], grid.v[j]).position) / 2.0;
+      const double u = (grid.u[i - 1] + grid.u[i]) / 2, v = (grid.v[j - 1] + grid.v[j]) / 2;
+      worst = std::max(worst, glm::distance(surface.at(u, v).position, diagonal));
+    }
+  }
+  return worst;
+}
+
 Grid refine(const Axis& u, const Axis& v, const Surface& surface, double tolerance) {
   // Four segments to begin with, so that an inflection in the middle of a span does not look straight.
   uint32_t u_segments = u.order > 2 ? 4 : 1, v_segments = v.order > 2 ? 4 : 1;
@@ -152,12 +166,14 @@ Grid refine(const Axis& u, const Axis& v, const Surface& surface, double toleran
     if (uint64_t{grid.u.size()} * grid.v.size() > kMaxVertices)
       throw Error(ErrorKind::kLimitExceeded,
                   "the nurbs surface asks for more than " + std::to_string(kMaxVertices) + " vertices");
-    const bool refine_u = u_segments < kMaxSegmentsPerSpan && worst_middle(grid.u, grid.v, [&](double x, double y) {
-                                                                return surface.at(x, y).position;
-                                                              }) > tolerance;
-    const bool refine_v = v_segments < kMaxSegmentsPerSpan && worst_middle(grid.v, grid.u, [&](double y, double x) {
-                                                                return surface.at(x, y).position;
-                                                              }) > tolerance;
+    bool refine_u =
+        worst_middle(grid.u, grid.v, [&](double x, double y) { return surface.at(x, y).position; }) > tolerance / 2;
+    bool refine_v =
+        worst_middle(grid.v, grid.u, [&](double y, double x) { return surface.at(x, y).position; }) > tolerance / 2;
+    // Cells may also be twisted while their edges are straight.
+    if (!refine_u && !refine_v) refine_u = refine_v = worst_centre(grid, surface) > tolerance;
+    refine_u = refine_u && u_segments < kMaxSegmentsPerSpan;
+    refine_v = refine_v && v_segments < kMaxSegmentsPerSpan;
     if (!refine_u && !refine_v) return grid;
     u_segments *= refine_u ? 2 : 1;
     v_segments *= refine_v ? 2 : 1;
@@ -212,7 +228,7 @@ Mesh tessellate_nurbs(const NurbsParameters& nurbs, double relative_tolerance) {
     bounds.extend(DVec3(p) / double{p.w});
   }
   const Surface surface(u, v, nurbs.control_points);
-  return mesh_of(refine(u, v, surface, relative_tolerance / 2 * bounds.diagonal() / 2), surface);
+  return mesh_of(refine(u, v, surface, relative_tolerance * bounds.diagonal() / 2), surface);
 }
 
 } // namespace packtrace

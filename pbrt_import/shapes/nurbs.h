@@ -20,10 +20,10 @@ struct NurbsParameters {
   std::span<const glm::vec4> control_points;
 };
 
-/// A grid of triangles whose lines include the knots, refined along u and v until the middles of grid edges are within
-/// half of relative_tolerance x size of the surface, size being half the diagonal of the control points' box, or until
-/// 128 segments per knot span. Normals along cross(dp/du, dp/dv); uvs are the surface's own parameters, as in pbrt-v3.
-/// Collapsed triangles at poles are left out.
+/// A grid of triangles whose lines include the knots, refined along u and v until the middles of its edges are within
+/// half of, and the middles of its cells within, relative_tolerance x size of the surface, size being half the diagonal
+/// of the control points' box, or until 128 segments per knot span. Normals along cross(dp/du, dp/dv); uvs are the
+/// surface's own parameters, as in pbrt-v3. Triangles that collapse at poles are left out.
 /// @param relative_tolerance within [1e-6, 0.5]
 /// Throws Error(kInput) if counts, knots or ranges do not fit together or a value or a point of the surface is not
 /// finite, Error(kLimitExceeded) if the grid would exceed 2^24 vertices.

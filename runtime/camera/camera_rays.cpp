@@ -100,20 +100,13 @@ std::optional<ProjectedPoint> PrimaryCamera::project(DVec3 world) const {
   return ProjectedPoint{uv * glm::dvec2(size_.width, size_.height) - offset_px_, view_z(world)};
 }
 
-DAffine look_at(DVec3 eye, DVec3 target, DVec3 up) {
-  const DVec3 forward = glm::normalize(target - eye);
-  const DVec3 right = glm::normalize(glm::cross(glm::normalize(up), forward));
-  require(packtrace::is_finite(right), "LookAt: the view direction is zero or parallel to the up vector");
-  return DAffine(right, glm::cross(forward, right), forward, eye);
-}
-
 Camera framing_camera(const Bounds& bounds, ImageSize size) {
   Camera camera;
   camera.width_px = size.width;
   camera.height_px = size.height;
   camera.fov_degrees = 40.0;
   const DVec3 centre = bounds.empty() ? DVec3(0.0) : bounds.centre();
-  camera.world_from_camera = look_at(DVec3(0.6, 0.5, -1.0), DVec3(0.0), DVec3(0.0, 1.0, 0.0));
+  camera.world_from_camera = *look_at(DVec3(0.6, 0.5, -1.0), DVec3(0.0), DVec3(0.0, 1.0, 0.0));
 
   // The smallest distance at which every corner of the box lies inside the frustum, plus a margin.
   const glm::dvec4 window = default_window(size);

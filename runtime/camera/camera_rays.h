@@ -57,9 +57,6 @@ private:
   double depth_scale_; ///< world units per camera unit along camera z
 };
 
-/// world_from_camera of pbrt's LookAt. Throws Error(kInput) if eye and target coincide or up is parallel to the view.
-DAffine look_at(DVec3 eye, DVec3 target, DVec3 up);
-
 /// A perspective camera that sees all of a box from in front, above and to the right (world +y up), for scenes
 /// without a camera. Works for any scale; an empty or point-like box gets a unit distance.
 Camera framing_camera(const Bounds& bounds, ImageSize size);

@@ -1,8 +1,6 @@
 #include "runtime/denoise/denoiser.h"
 
 #include <limits>
-#include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <utility>
 
@@ -12,7 +10,6 @@
 #include "runtime/denoise/edge_blur.h"
 #include "runtime/denoise/edge_weights.h"
 #include "runtime/denoise/guides.h"
-#include "runtime/denoise/noise_level.h"
 #include "runtime/denoise/reprojection.h"
 #include "runtime/denoise/simd.h"
 #include "runtime/denoise/temporal_blend.h"
@@ -93,9 +90,8 @@ void AoDenoiser::State::blur() {
   const Plane<float>& tspp = now.history.samples;
   fill_unsampled(now.guides, tspp, edges, image);
   const Fade fade{static_cast<float>(config.blur_fade_begin), static_cast<float>(config.blur_fade_end)};
-  const ValueLimit limit{config.blur_limit, noise_ratio(now.guides, now.history, result.variance)};
+  const float limit = config.blur_limit;
   for (size_t i = 0; i < kBlurPasses; ++i) edge_blur(edges[i], tspp, fade, limit, size, image, scratch);
-  if (getenv("DBG")) fprintf(stderr, "ratio %g\n", limit.noise_ratio);
   disocclusion_blur(tspp, std::span(edges).subspan(kBlurPasses), static_cast<float>(config.disocclusion_frames), limit,
                     size, image, scratch);
 }

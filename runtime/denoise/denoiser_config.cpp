@@ -1,7 +1,6 @@
 #include "runtime/denoise/denoiser_config.h"
 
 #include <bit>
-#include <cmath>
 #include <string>
 #include <string_view>
 
@@ -41,7 +40,7 @@ void DenoiserConfig::validate() const {
   require_power_of_two("blur_normal_power", blur_normal_power);
   require_range("blur_depth", blur_depth, 0.0f, 1.0f);
   require_range("blur_slope", blur_slope, 0.0f, 10.0f);
-  require_range("blur_limit", blur_limit, std::nextafter(1.0f, 2.0f), 100.0f);
+  require_range("blur_limit", blur_limit, 1.25f, 100.0f);
   require_range("blur_trust_frames", blur_trust_frames, 0.0f, 1000.0f);
   require_range<uint32_t>("blur_fade_begin", blur_fade_begin, 0, 65535);
   require_range<uint32_t>("blur_fade_end", blur_fade_end, 0, 65535);

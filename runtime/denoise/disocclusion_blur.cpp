@@ -51,7 +51,7 @@ void fill_unsampled(const Guides& guides, const Plane<float>& samples, std::span
   });
 }
 
-void disocclusion_blur(const Plane<float>& samples, std::span<const EdgeWeights> edges, float frames, ValueLimit limit,
+void disocclusion_blur(const Plane<float>& samples, std::span<const EdgeWeights> edges, float frames, float limit,
                        ImageSize size, NoisyImage& image, BlurScratch& scratch) {
   for (const EdgeWeights& step : edges) edge_blur(step, samples, Fade{0.0f, frames}, limit, size, image, scratch);
 }

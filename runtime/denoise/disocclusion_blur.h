@@ -16,7 +16,7 @@ void fill_unsampled(const Guides& guides, const Plane<float>& samples, std::span
 
 /// The passes for surfaces that came into view a few frames ago: one edge_blur for each entry of `edges`, of a strength
 /// that falls from 1 to 0 at `frames` frames of history.
-void disocclusion_blur(const Plane<float>& samples, std::span<const EdgeWeights> edges, float frames, ValueLimit limit,
+void disocclusion_blur(const Plane<float>& samples, std::span<const EdgeWeights> edges, float frames, float limit,
                        ImageSize size, NoisyImage& image, BlurScratch& scratch);
 
 } // namespace packtrace

@@ -13,6 +13,10 @@ constexpr float kAside = 0.27901f, kCentre = 0.44198f;
 constexpr float kStraight = kAside * kCentre / 255.0f; // Gaussian and the scale of weights
 constexpr float kDiagonal = kAside * kAside / 255.0f;
 
+/// Mean squared difference of patches, in units of the noise, up to which they are taken for equal: a little above the
+/// 1 that is expected, for it varies.
+constexpr float kNoise = 1.2f;
+
 /// Squared differences in units of the noise between two rows of pixels, and where both lie on one surface.
 PACKTRACE_AVX2_CLONES
 void compare_row(int begin, int end, const float* __restrict value, const float* __restrict other,
@@ -34,8 +38,8 @@ struct Patch {
 
 /// Edge weights times value weights of a row. Columns -1 to width of everything in `patch` and `column` exist.
 PACKTRACE_AVX2_CLONES
-void weigh_row(int width, const Patch& patch, float half_scale, float limit, const uint8_t* __restrict edge,
-               float* __restrict column, uint8_t* __restrict same_column, uint8_t* __restrict weights) {
+void weigh_row(int width, const Patch& patch, float limit, const uint8_t* __restrict edge, float* __restrict column,
+               uint8_t* __restrict same_column, uint8_t* __restrict weights) {
   const float* __restrict d0 = patch.distance[0];
   const float* __restrict d1 = patch.distance[1];
   const float* __restrict d2 = patch.distance[2];
@@ -44,11 +48,11 @@ void weigh_row(int width, const Patch& patch, float half_scale, float limit, con
   const uint8_t* __restrict s1 = patch.same[1];
   const uint8_t* __restrict s2 = patch.same[2];
   for (int x = -1; x <= width; ++x) same_column[x] = static_cast<uint8_t>(s0[x] + s1[x] + s2[x]);
-  const float slope = 1.0f / (limit - 1.0f);
+  const float slope = 1.0f / (limit - kNoise);
   for (int x = 0; x < width; ++x) {
     const float sum = column[x - 1] + column[x] + column[x + 1];
     const float count = static_cast<float>(same_column[x - 1] + same_column[x] + same_column[x + 1]);
-    const float keep = smaller(larger((limit - half_scale * sum / larger(count, 1.0f)) * slope, 0.0f), 1.0f);
+    const float keep = smaller(larger((limit - 0.5f * sum / larger(count, 1.0f)) * slope, 0.0f), 1.0f);
     const float weight = static_cast<float>(static_cast<int>(edge[x])) * (keep * keep);
     weights[x] = static_cast<uint8_t>(static_cast<int>(weight + 0.5f));
   }
@@ -72,7 +76,7 @@ private:
   std::vector<uint8_t> same_;
 };
 
-void weigh_values(const NoisyImage& image, const EdgeWeights& edges, size_t direction, ValueLimit limit, int width,
+void weigh_values(const NoisyImage& image, const EdgeWeights& edges, size_t direction, float limit, int width,
                   int first, int last, Plane<uint8_t>& weights) {
   const int dx = edges.step() * EdgeWeights::kDirections[direction][0];
   const int dy = edges.step() * EdgeWeights::kDirections[direction][1];
@@ -85,8 +89,7 @@ void weigh_values(const NoisyImage& image, const EdgeWeights& edges, size_t dire
   compare(first - 1), compare(first);
   for (int y = first; y < last; ++y) {
     compare(y + 1);
-    weigh_row(width, rows.patch(y), 0.5f / limit.noise_ratio, limit.distance, edge.row(y), rows.column(),
-              rows.same_column(), weights.row(y));
+    weigh_row(width, rows.patch(y), limit, edge.row(y), rows.column(), rows.same_column(), weights.row(y));
   }
 }
 
@@ -129,6 +132,7 @@ void blur_row(int width, ptrdiff_t step, const BlurRow& rows, Fade fade) {
     const float strength = smaller(larger((fade.end - r.samples[x]) * fade_scale, 0.0f), 1.0f);
     const float kept = 1.0f - strength * sums.taken;
     r.out_value[x] = v + strength * sums.flux;
+    // Differences that noise made large were mixed less, so less noise is gone than the weights say.
     r.out_precision[x] = r.precision[x] / std::sqrt(kept * kept + strength * strength * sums.squares);
   }
 }
@@ -153,7 +157,7 @@ BlurRow make_row(const NoisyImage& image, int step, const Plane<float>& samples,
 
 } // namespace
 
-void edge_blur(const EdgeWeights& edges, const Plane<float>& samples, Fade fade, ValueLimit limit, ImageSize size,
+void edge_blur(const EdgeWeights& edges, const Plane<float>& samples, Fade fade, float limit, ImageSize size,
                NoisyImage& image, BlurScratch& scratch) {
   if (std::none_of(image.youngest.begin(), image.youngest.end(), [&](float tspp) { return tspp < fade.end; })) return;
   const int width = static_cast<int>(size.width);

@@ -9,6 +9,9 @@ namespace {
 /// History with less weight than this is noise of the tests, not a surface.
 constexpr float kLeastWeight = 1e-3f;
 
+/// Footprints with less weight cross an edge that sharpening would overshoot at.
+constexpr float kSharpenWeight = 0.9f;
+
 struct Tests {
   float depth, slope;
   int normal_squarings;
@@ -34,9 +37,40 @@ float agreement(const Guides& previous, int x, int y, const Surface& surface, co
   return depth_weight * cosine;
 }
 
+/// Whether a pixel may take part in sharpening: the tests without weights, and without the normals.
+bool same_surface(const FrameHistory& previous, int x, int y, const Surface& surface) {
+  return previous.guides.instance.row(y)[x] == surface.instance && previous.history.samples.row(y)[x] > 0.0f &&
+         std::abs(previous.guides.disparity.row(y)[x] - surface.disparity) <= surface.tolerance;
+}
+
+/// What Catmull-Rom interpolation along x or y adds to linear interpolation between a and b, the first of two equally
+/// spaced neighbours before and after: -t (1 - t) / 2 times the second differences at a and b, interpolated.
+/// Source: R. Keys, "Cubic convolution interpolation for digital image processing", 1981, a = -1/2.
+inline float sharpening(float before, float a, float b, float after, float t) {
+  return -0.5f * t * (1.0f - t) * ((1.0f - t) * (before - 2.0f * a + b) + t * (a - 2.0f * b + after));
+}
+
+/// Linear interpolation of every frame's history is a blur that adds up. This undoes it to second order along both axes
+/// where the 2 x 2 footprint at (x, y) and the eight pixels around it without the corners show one surface; else 0.
+float sharpen(const FrameHistory& previous, int x, int y, float tx, float ty, const Surface& surface) {
+  for (int i = 0; i < 2; ++i) {
+    if (!same_surface(previous, x - 1, y + i, surface) || !same_surface(previous, x + 2, y + i, surface) ||
+        !same_surface(previous, x + i, y - 1, surface) || !same_surface(previous, x + i, y + 2, surface) ||
+        !same_surface(previous, x, y + i, surface) || !same_surface(previous, x + 1, y + i, surface))
+      return 0.0f;
+  }
+  const auto m = [&](int dx, int dy) { return previous.history.mean.row(y + dy)[x + dx]; };
+  const float along_x = (1.0f - ty) * sharpening(m(-1, 0), m(0, 0), m(1, 0), m(2, 0), tx) +
+                        ty * sharpening(m(-1, 1), m(0, 1), m(1, 1), m(2, 1), tx);
+  const float along_y = (1.0f - tx) * sharpening(m(0, -1), m(0, 0), m(0, 1), m(0, 2), ty) +
+                        tx * sharpening(m(1, -1), m(1, 0), m(1, 1), m(1, 2), ty);
+  return along_x + along_y;
+}
+
 /// Weighted sum of history over a 2 x 2 footprint.
 struct Gathered {
   float weight = 0, mean = 0, square = 0, fast = 0, samples = 0;
+  float sharpening = 0; // to be added to the mean
 
   void add(const History& history, int x, int y, float w) {
     const float count = history.samples.row(y)[x];
@@ -51,8 +85,10 @@ struct Gathered {
   void store(History& history, int x, int y, float longest) const {
     const bool found = weight > kLeastWeight;
     const float scale = found ? 1.0f / weight : 0.0f;
-    history.mean.row(y)[x] = mean * scale;
-    history.square.row(y)[x] = square * scale;
+    const float linear = mean * scale;
+    const float sharp = found ? std::clamp(linear + sharpening, 0.0f, 1.0f) : 0.0f;
+    history.mean.row(y)[x] = sharp;
+    history.square.row(y)[x] = square * scale + (sharp - linear) * (sharp + linear); // the variance stays
     history.fast.row(y)[x] = fast * scale;
     history.samples.row(y)[x] = found ? std::min(samples, longest) : 0.0f;
   }
@@ -91,6 +127,8 @@ void reproject(const FrameHistory& previous, const Guides& guides, const DepthDe
       const float w = bilinear * agreement(previous.guides, px, py, surface, tests); // the border counts as missed
       if (w > 0.0f) sum.add(previous.history, px, py, w);
     }
+    if (sum.weight > kSharpenWeight && (fx > 0.0f || fy > 0.0f))
+      sum.sharpening = sharpen(previous, static_cast<int>(floor_x), static_cast<int>(floor_y), fx, fy, surface);
     return sum;
   };
 

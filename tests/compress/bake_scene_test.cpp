@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "compress/bake/geometry_plan.h"
 #include "pbrt_import/scene/error.h"
 #include "tests/compress/test_scenes.h"
 
@@ -417,6 +416,10 @@ TEST(BakeScene, ScenesThatBreakTheRulesAreRefused) {
   EXPECT_EQ(broken([](Scene& s) { s.shapes[0].parent_from_mesh[3].x = kNan; }), ErrorKind::kInput);
   EXPECT_EQ(broken([](Scene& s) { s.materials[1].alpha_mask = 1; }), ErrorKind::kInput);
   EXPECT_EQ(broken([](Scene& s) { s.masks[0].words.pop_back(); }), ErrorKind::kInput);
+  EXPECT_EQ(broken([](Scene& s) { s.masks[0].uv_scale.x = kNan; }), ErrorKind::kInput);
+  EXPECT_EQ(broken([](Scene& s) { s.materials[2].albedo.x = 1.5f; }), ErrorKind::kInput);
+  EXPECT_EQ(broken([](Scene& s) { s.cameras.push_back({}), s.cameras[0].width_px = 0; }), ErrorKind::kInput);
+  EXPECT_EQ(broken([](Scene& s) { s.cameras.push_back({}), s.cameras[0].fov_degrees = kNan; }), ErrorKind::kInput);
   EXPECT_EQ(broken([](Scene& s) { s.instances.push_back({0, Affine(1.0f)}); }), ErrorKind::kInput);
 }
 

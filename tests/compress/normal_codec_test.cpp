@@ -48,7 +48,7 @@ TEST(Zsign32, ErrorIsBoundedAtTheEquator) {
   test::Random random(4);
   double worst = 0.0;
   for (int i = 0; i < 100000; ++i) {
-    const double phi = random.uniform(0.0f, 6.2831853f), z = random.uniform(-1e-4f, 1e-4f);
+    const double phi = random.uniform(0.0f, 6.2831853f), z = random.uniform(-0.01f, 0.01f);
     const DVec3 n = glm::normalize(DVec3(std::cos(phi), std::sin(phi), z));
     worst = std::max(worst, angle_degrees(n, DVec3(decode_zsign32(encode_zsign32(n)))));
   }

@@ -79,7 +79,9 @@ TEST(AoDenoiser, GarbageEverywhereGivesSoundImages) {
     const DenoisedAo& result = denoiser.next_frame(g, frame);
     expect_sound(result);
     for (size_t i = 0; i < kSize.pixels(); ++i)
-      if (!(g.view_z[i] > 0.0f)) ASSERT_EQ(result.ao[i], kInvalidAo);
+      if (!(g.view_z[i] > 0.0f)) {
+        ASSERT_EQ(result.ao[i], kInvalidAo);
+      }
   }
 }
 

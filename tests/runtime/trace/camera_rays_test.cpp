@@ -56,7 +56,7 @@ TEST(PrimaryCamera, FieldOfViewSpansTheShorterAxis) {
 TEST(PrimaryCamera, LookAtDoesNotMirror) {
   // Looking along +x from the origin with y up in pbrt's left-handed world: right is cross(y, x) = -z.
   Camera camera = perspective(90);
-  camera.world_from_camera = look_at(DVec3(0), DVec3(1, 0, 0), DVec3(0, 2, 0));
+  camera.world_from_camera = *look_at(DVec3(0), DVec3(1, 0, 0), DVec3(0, 2, 0));
   const PrimaryCamera primary(camera, {100, 100});
   const auto right = primary.project({10, 0, -5}), up = primary.project({10, 5, 0});
   ASSERT_TRUE(right && up);
@@ -68,7 +68,7 @@ TEST(PrimaryCamera, LookAtDoesNotMirror) {
 }
 
 TEST(PrimaryCamera, LookAtAlongZIsATranslation) {
-  const DAffine m = look_at(DVec3(1, 2, 3), DVec3(1, 2, 9), DVec3(0, 1, 0));
+  const DAffine m = *look_at(DVec3(1, 2, 3), DVec3(1, 2, 9), DVec3(0, 1, 0));
   expect_near(m[0], {1, 0, 0}, 0);
   expect_near(m[1], {0, 1, 0}, 0);
   expect_near(m[2], {0, 0, 1}, 0);
@@ -133,7 +133,7 @@ TEST(PrimaryCamera, EnvironmentCoversTheSphereLikePbrt) {
 
 TEST(PrimaryCamera, ProjectionInvertsRays) {
   Camera camera = perspective(35);
-  camera.world_from_camera = look_at(DVec3(3, 4, -9), DVec3(1, 0, 2), DVec3(0.1, 1, 0));
+  camera.world_from_camera = *look_at(DVec3(3, 4, -9), DVec3(1, 0, 2), DVec3(0.1, 1, 0));
   expect_projects_back(camera, {640, 360}, 12.0);
   camera.projection = Projection::kOrthographic;
   expect_projects_back(camera, {640, 360}, 12.0);

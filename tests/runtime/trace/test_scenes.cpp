@@ -111,7 +111,7 @@ double ao_at(const Scene& scene, Vec3 position, Vec3 normal, const AoConfig& con
 
 Camera camera_at(DVec3 eye, DVec3 target, double fov_degrees) {
   Camera camera;
-  camera.world_from_camera = look_at(eye, target, DVec3(0, 1, 0));
+  camera.world_from_camera = *look_at(eye, target, DVec3(0, 1, 0));
   camera.fov_degrees = fov_degrees;
   return camera;
 }

@@ -1,0 +1,165 @@
+#include "pbrt_import/shapes/curve.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "pbrt_import/scene/bounds.h"
+#include "pbrt_import/scene/error.h"
+
+namespace packtrace {
+namespace {
+
+const std::vector<Vec3> kStraight{{0, 0, 0}, {0, 0, 1}, {0, 0, 2}, {0, 0, 3}};
+const std::vector<Vec3> kBent{{0, 0, 0}, {0, 0, 4}, {4, 0, 4}, {4, 4, 4}};
+
+CurveParameters curve_through(const std::vector<Vec3>& points, float width = 0.5f) {
+  CurveParameters curve;
+  curve.points = points;
+  curve.width0 = curve.width1 = width;
+  return curve;
+}
+
+void expect_sound(const Mesh& mesh) {
+  ASSERT_FALSE(mesh.triangles.empty());
+  ASSERT_EQ(mesh.normals.size(), mesh.positions.size());
+  ASSERT_EQ(mesh.uvs.size(), mesh.positions.size());
+  for (const Vec3& n : mesh.normals) ASSERT_NEAR(glm::length(n), 1.0f, 1e-5f);
+  for (const Triangle& t : mesh.triangles) {
+    const Vec3 p0 = mesh.positions[t.x], n = glm::cross(mesh.positions[t.y] - p0, mesh.positions[t.z] - p0);
+    ASSERT_GT(glm::length(n), 0.0f);
+    for (int k = 0; k < 3; ++k) EXPECT_GT(glm::dot(glm::normalize(n), mesh.normals[t[k]]), 0.5f);
+  }
+}
+
+/// From p to the cubic Bezier curve, by sampling.
+float distance_to(const std::vector<Vec3>& b, Vec3 p) {
+  float nearest = std::numeric_limits<float>::infinity();
+  for (int i = 0; i <= 10000; ++i) {
+    const float t = static_cast<float>(i) / 10000.0f, s = 1.0f - t;
+    const Vec3 q = s * s * s * b[0] + 3 * s * s * t * b[1] + 3 * s * t * t * b[2] + t * t * t * b[3];
+    nearest = std::min(nearest, glm::distance(p, q));
+  }
+  return nearest;
+}
+
+TEST(Curve, StraightCurveIsATubeOfItsWidth) {
+  for (const CurveType type : {CurveType::kFlat, CurveType::kCylinder}) {
+    CurveParameters curve = curve_through(kStraight);
+    curve.type = type;
+    const Mesh mesh = tessellate_curve(curve);
+    expect_sound(mesh);
+    EXPECT_EQ(mesh.triangles.size(), 16u);
+    for (const Vec3& p : mesh.positions) EXPECT_NEAR(std::hypot(p.x, p.y), 0.25f, 1e-6f);
+    EXPECT_EQ(bounds_of(mesh.positions).lo.z, 0.0);
+    EXPECT_EQ(bounds_of(mesh.positions).hi.z, 3.0);
+  }
+}
+
+TEST(Curve, BentTubeFollowsItsCentreLine) {
+  for (const float width : {0.5f, 0.02f}) {
+    const Mesh mesh = tessellate_curve(curve_through(kBent, width));
+    expect_sound(mesh);
+    for (const Vec3& p : mesh.positions) EXPECT_NEAR(distance_to(kBent, p), width / 2, 1e-3f);
+    for (const Triangle& t : mesh.triangles) {
+      const Vec3 middle = (mesh.positions[t.x] + mesh.positions[t.y] + mesh.positions[t.z]) / 3.0f;
+      EXPECT_NEAR(distance_to(kBent, middle), width / 2, width / 20 + width / 20 + 1e-3f);
+    }
+  }
+}
+
+TEST(Curve, DegreesAndBasesDescribeTheSameParabola) {
+  const std::vector<Vec3> quadratic{{0, 0, 0}, {1, 2, 0}, {2, 0, 0}};
+  const std::vector<Vec3> cubic{{0, 0, 0}, {2 / 3.f, 4 / 3.f, 0}, {4 / 3.f, 4 / 3.f, 0}, {2, 0, 0}};
+  const std::vector<Vec3> spline{{-1, -2, 0}, {1, 2, 0}, {3, -2, 0}}; // midpoints (0,0), (2,0)
+  CurveParameters a = curve_through(quadratic), b = curve_through(cubic), c = curve_through(spline);
+  a.degree = c.degree = 2;
+  c.basis = CurveBasis::kBspline;
+  const Mesh first = tessellate_curve(a);
+  for (const Mesh& mesh : {tessellate_curve(b), tessellate_curve(c)}) {
+    ASSERT_EQ(mesh.positions.size(), first.positions.size());
+    for (size_t i = 0; i < mesh.positions.size(); ++i)
+      EXPECT_LT(glm::distance(mesh.positions[i], first.positions[i]), 1e-5f);
+  }
+}
+
+TEST(Curve, CubicSplineOfPointsOnALineIsTheLine) {
+  const std::vector<Vec3> points{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}, {4, 0, 0}, {5, 0, 0}};
+  CurveParameters curve = curve_through(points);
+  curve.basis = CurveBasis::kBspline;
+  const Mesh mesh = tessellate_curve(curve);
+  EXPECT_NEAR(bounds_of(mesh.positions).lo.x, 1.0, 1e-6);
+  EXPECT_NEAR(bounds_of(mesh.positions).hi.x, 4.0, 1e-6);
+}
+
+TEST(Curve, SegmentsJoinAndWidthsVaryOverAllOfThem) {
+  const std::vector<Vec3> points{{0, 0, 0}, {0, 0, 1}, {0, 0, 2}, {0, 0, 3}, {0, 0, 4}, {0, 0, 5}, {0, 0, 6}};
+  CurveParameters curve = curve_through(points);
+  curve.width0 = 1.0f;
+  curve.width1 = 0.0f;
+  const Mesh mesh = tessellate_curve(curve);
+  expect_sound(mesh);
+  EXPECT_EQ(mesh.triangles.size(), 16u + 8u) << "the second segment ends in a point";
+  for (const Vec3& p : mesh.positions) EXPECT_NEAR(std::hypot(p.x, p.y), 0.5f * (1.0f - p.z / 6.0f), 1e-6f);
+}
+
+TEST(Curve, RibbonFacesItsNormals) {
+  CurveParameters curve = curve_through(kStraight);
+  curve.type = CurveType::kRibbon;
+  const std::vector<Vec3> normals{{0, 5, 0}, {0, 1, 0}};
+  curve.normals = normals;
+  const Mesh mesh = tessellate_curve(curve);
+  expect_sound(mesh);
+  EXPECT_EQ(mesh.triangles.size(), 2u);
+  for (const Vec3& n : mesh.normals) EXPECT_EQ(n, Vec3(0, 1, 0));
+  for (const Vec3& p : mesh.positions) EXPECT_EQ(std::abs(p.x), 0.25f);
+}
+
+TEST(Curve, RibbonTurnsWithItsNormals) {
+  const std::vector<Vec3> normals{{0, 1, 0}, {1, 0, 0}};
+  CurveParameters curve = curve_through(kBent);
+  curve.type = CurveType::kRibbon;
+  curve.normals = normals;
+  const Mesh mesh = tessellate_curve(curve);
+  EXPECT_GT(glm::dot(mesh.normals.front(), Vec3(0, 1, 0)), 0.999f);
+  EXPECT_GT(glm::dot(mesh.normals.back(), Vec3(1, 0, 0)), 0.999f);
+}
+
+TEST(Curve, CoincidentControlPointsAreHarmless) {
+  for (const std::vector<Vec3>& points : {std::vector<Vec3>{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {1, 1, 1}},
+                                          {{0, 0, 0}, {0, 0, 0}, {1, 1, 1}, {1, 1, 1}},
+                                          {{0, 0, 0}, {1, 0, 0}, {1, 0, 0}, {0, 0, 0}}}) {
+    const Mesh mesh = tessellate_curve(curve_through(points, 0.1f));
+    for (const Vec3& p : mesh.positions) ASSERT_TRUE(is_finite(p));
+    for (const Vec3& n : mesh.normals) ASSERT_NEAR(glm::length(n), 1.0f, 1e-5f);
+  }
+}
+
+TEST(Curve, WhatCannotBeDrawnIsAnError) {
+  const std::vector<Vec3> point(4, Vec3(1.0f)), three(kStraight.begin(), kStraight.begin() + 3);
+  EXPECT_THROW(tessellate_curve(curve_through(point)), Error);
+  EXPECT_THROW(tessellate_curve(curve_through(three)), Error);
+  EXPECT_THROW(tessellate_curve(curve_through({})), Error);
+  EXPECT_THROW(tessellate_curve(curve_through(kStraight, 0.0f)), Error);
+  EXPECT_THROW(tessellate_curve(curve_through(kStraight, -1.0f)), Error);
+  EXPECT_THROW(tessellate_curve(curve_through(kStraight, std::numeric_limits<float>::quiet_NaN())), Error);
+  std::vector<Vec3> bad = kStraight;
+  bad[2].y = std::numeric_limits<float>::infinity();
+  EXPECT_THROW(tessellate_curve(curve_through(bad)), Error);
+  CurveParameters curve = curve_through(kStraight);
+  curve.degree = 4;
+  EXPECT_THROW(tessellate_curve(curve), Error);
+  curve.degree = 3;
+  curve.type = CurveType::kRibbon;
+  EXPECT_THROW(tessellate_curve(curve), Error) << "no normals";
+  const std::vector<Vec3> along{{0, 0, 1}, {0, 0, 1}}, zero{{0, 0, 0}, {0, 0, 1}};
+  curve.normals = along;
+  EXPECT_THROW(tessellate_curve(curve), Error) << "normals along the curve";
+  curve.normals = zero;
+  EXPECT_THROW(tessellate_curve(curve), Error);
+}
+
+} // namespace
+} // namespace packtrace

@@ -1,0 +1,74 @@
+#include "pbrt_import/parameters.h"
+
+#include <array>
+
+#include <gtest/gtest.h>
+
+namespace packtrace {
+namespace {
+
+Parameter number(std::string name, std::vector<float> values) {
+  Parameter parameter;
+  parameter.type = ParameterType::kFloat;
+  parameter.name = std::move(name);
+  parameter.floats = std::move(values);
+  return parameter;
+}
+
+TEST(Parameters, SynonymsAreTheSameType) {
+  EXPECT_EQ(parameter_type("color"), parameter_type("rgb"));
+  EXPECT_EQ(parameter_type("point"), parameter_type("point3"));
+  EXPECT_EQ(parameter_type("vector"), parameter_type("vector3"));
+  EXPECT_EQ(parameter_type("colour"), std::nullopt);
+}
+
+TEST(Parameters, LastOfTheSameNameAndTypeWins) {
+  ParameterList list;
+  list.add(number("radius", {1}));
+  list.add(number("radius", {2}));
+  EXPECT_EQ(list.get_float("radius", 0), 2);
+  EXPECT_EQ(list.all().size(), 1u);
+}
+
+TEST(Parameters, LastWinsInVeryLongListsToo) {
+  ParameterList list;
+  for (int i = 0; i < 100; ++i) list.add(number("p" + std::to_string(i % 50), {static_cast<float>(i)}));
+  for (int i = 0; i < 50; ++i) EXPECT_EQ(list.get_float("p" + std::to_string(i), -1), static_cast<float>(50 + i));
+}
+
+TEST(Parameters, WrongCountGivesTheDefaultAndStaysUnused) {
+  ParameterList list;
+  list.add(number("radius", {1, 2}));
+  EXPECT_EQ(list.get_float("radius", 7), 7);
+  EXPECT_FALSE(list.all()[0].used);
+}
+
+TEST(Parameters, WrongTypeGivesTheDefaultAndStaysUnused) {
+  ParameterList list;
+  list.add(number("levels", {2}));
+  EXPECT_EQ(list.get_integer("levels", 3), 3);
+  EXPECT_FALSE(list.all()[0].used);
+  EXPECT_TRUE(list.was_asked("levels"));
+}
+
+TEST(Parameters, TakingMovesTheValuesOut) {
+  ParameterList list;
+  list.add(number("x", {1, 2, 3}));
+  EXPECT_EQ(list.take_floats("x", ParameterType::kFloat), (std::vector<float>{1, 2, 3}));
+  EXPECT_TRUE(list.take_floats("x", ParameterType::kFloat).empty());
+  EXPECT_TRUE(list.take_floats("x", ParameterType::kPoint3).empty());
+}
+
+TEST(ClosestName, FindsTyposButNotOtherWords) {
+  const std::array<std::string_view, 5> names = {"radius", "zmin", "zmax", "Kd", "filename"};
+  EXPECT_EQ(closest_name("radus", names), "radius");
+  EXPECT_EQ(closest_name("fileName", names), "filename");
+  EXPECT_EQ(closest_name("kd", names), "Kd");
+  EXPECT_EQ(closest_name("Ks", names), "");
+  EXPECT_EQ(closest_name("roughness", names), "");
+  EXPECT_EQ(closest_name("", names), "");
+  EXPECT_EQ(closest_name(std::string(100'000, 'x'), names), "");
+}
+
+} // namespace
+} // namespace packtrace

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "pbrt_import/import_scene.h"
+
+namespace packtrace {
+
+/// A folder of its own for one test, removed with it.
+class SceneFolder {
+public:
+  SceneFolder() {
+    const auto* const test = testing::UnitTest::GetInstance()->current_test_info();
+    path_ = std::filesystem::temp_directory_path() /
+            ("packtrace_" + std::to_string(::getpid()) + "_" + test->test_suite_name() + "_" + test->name());
+    std::filesystem::remove_all(path_);
+    std::filesystem::create_directories(path_);
+  }
+  ~SceneFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  SceneFolder(const SceneFolder&) = delete;
+  SceneFolder& operator=(const SceneFolder&) = delete;
+
+  std::filesystem::path write(const std::string& name, std::string_view content) const {
+    const std::filesystem::path file = path_ / name;
+    std::filesystem::create_directories(file.parent_path());
+    std::ofstream(file, std::ios::binary).write(content.data(), static_cast<std::streamsize>(content.size()));
+    return file;
+  }
+  const std::filesystem::path& path() const { return path_; }
+
+private:
+  std::filesystem::path path_;
+};
+
+/// "name7" of "name" and 7.
+inline std::string numbered(std::string name, int number) { return name += std::to_string(number); }
+
+/// What an import gave, with its diagnostics as text.
+struct Imported {
+  Scene scene;
+  ImportStatistics statistics;
+  std::vector<Diagnostic> diagnostics;
+
+  uint64_t count(Severity severity) const {
+    uint64_t total = 0;
+    for (const Diagnostic& diagnostic : diagnostics) total += diagnostic.severity == severity ? diagnostic.count : 0;
+    return total;
+  }
+  /// The diagnostics as "file:line:column: severity: message" lines.
+  std::string text() const {
+    std::string all;
+    for (const Diagnostic& diagnostic : diagnostics) all += to_string(diagnostic) + "\n";
+    return all;
+  }
+  bool reported(std::string_view part) const { return text().find(part) != std::string::npos; }
+};
+
+inline Imported import_file(const std::filesystem::path& file, const ImportOptions& options = {}) {
+  Diagnostics diagnostics;
+  Progress progress;
+  ImportResult result = import_scene(file, options, diagnostics, progress);
+  return {std::move(result.scene), std::move(result.statistics), diagnostics.entries()};
+}
+
+/// Imports text as scene.pbrt of the folder.
+inline Imported import_text(const SceneFolder& folder, std::string_view text, const ImportOptions& options = {}) {
+  return import_file(folder.write("scene.pbrt", text), options);
+}
+
+/// Imports what stands between WorldBegin and WorldEnd; its first line is line 1.
+inline Imported import_world(const SceneFolder& folder, std::string_view world, const ImportOptions& options = {}) {
+  return import_text(folder, "WorldBegin " + std::string(world) + "\nWorldEnd\n", options);
+}
+
+inline constexpr std::string_view kTriangle =
+    " Shape \"trianglemesh\" \"integer indices\" [0 1 2] \"point P\" [0 0 0  1 0 0  0 1 0] ";
+
+} // namespace packtrace
