@@ -17,13 +17,13 @@ mkdir -p "$out"
 echo "== 3/4 Bake $scene"
 "$packtrace" bake "$scene" -o "$out/scene.ptk" --force --json "$out/bake.json"
 echo "== 4/4 Trace and denoise"
-"$packtrace" render "$out/scene.ptk" -o "$out/picture.png" -o "$out/layers.exr" --aov shaded --frames 32 --supersample 2 --force --json "$out/render.json"
-"$packtrace" render "$out/scene.ptk" -o "$out/ao.png" --frames 32 --force --quiet
+"$packtrace" render "$out/scene.ptk" -o "$out/picture.png" -o "$out/layers.exr" --aov all --supersample 2 --frames 32 \
+  --force --json "$out/render.json"
 echo
 "$packtrace" info "$out/scene.ptk"
 echo
 echo "Done in $((SECONDS - started)) s:"
-echo "  $out/picture.png   denoised ambient occlusion times albedo"
-echo "  $out/ao.png        the ambient occlusion alone"
-echo "  $out/layers.exr    every layer: ao, ao_raw, depth, normal, instance, albedo, shaded"
-echo "  $out/scene.ptk     the baked scene; the table above says what each byte is for"
+echo "  $out/picture.shaded.png   denoised ambient occlusion times albedo"
+echo "  $out/picture.ao.png       the ambient occlusion alone; beside it depth, normals, instances, albedo"
+echo "  $out/layers.exr           all layers in floats"
+echo "  $out/scene.ptk            the baked scene; the table above says what each byte is for"

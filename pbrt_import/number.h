@@ -26,7 +26,7 @@ NumberText<T> parse_number(std::string_view word);
 constexpr bool is_space(char c) { return c == ' ' || c == '\n' || c == '\t' || c == '\r'; }
 constexpr bool ends_word(char c) { return is_space(c) || c == '"' || c == '[' || c == ']' || c == '\0'; }
 
-/// How far past the place they start at the scanners below may look.
+/// How many zeros must follow the text in a buffer that the scanners below work on.
 inline constexpr size_t kScannerReach = 64;
 
 namespace detail {
@@ -36,61 +36,68 @@ inline constexpr double kPowersOfTen[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e
 
 inline bool is_digit(char c) { return static_cast<unsigned char>(c - '0') < 10; }
 
-inline uint64_t load8(const char* p) {
-  static_assert(std::endian::native == std::endian::little, "the digit tricks read little-endian words");
+inline constexpr uint64_t kWholePowersOfTen[] = {1,       10,        100,        1'000,      10'000,
+                                                 100'000, 1'000'000, 10'000'000, 100'000'000};
+
+/// The digits at p, up to eight, without a loop: how long a number is cannot be predicted, and branches on it would
+/// cost more than all the arithmetic.
+struct DigitRun {
+  uint64_t value;
+  uint32_t count;
+};
+
+inline DigitRun scan_digits(const char* p) {
+  static_assert(std::endian::native == std::endian::little, "the first character must be the lowest byte");
   uint64_t word;
   std::memcpy(&word, p, sizeof word);
-  return word;
-}
-
-/// All eight bytes are '0'..'9': adding 6 must not carry a digit out of the 0x3_ row.
-inline bool are_eight_digits(uint64_t word) {
-  return ((word & 0xF0F0F0F0F0F0F0F0u) | (((word + 0x0606060606060606u) & 0xF0F0F0F0F0F0F0F0u) >> 4)) ==
-         0x3333333333333333u;
-}
-
-/// Value of eight digits, most significant in the lowest byte: first pairs in every second byte, then all four pairs
-/// weighted into the upper half of a product.
-inline uint64_t eight_digits(uint64_t word) {
-  word -= 0x3030303030303030u;
-  word = word * 10 + (word >> 8);
-  const uint64_t low = (word & 0x000000FF000000FFu) * (1'000'000ull << 32 | 100);
-  const uint64_t high = ((word >> 16) & 0x000000FF000000FFu) * (10'000ull << 32 | 1);
-  return (low + high) >> 32;
+  word ^= 0x3030303030303030u; // digits become 0..9
+  // Bit 7 of each byte above 9; carries only spoil bytes after the first such one.
+  const uint64_t others = ((word + 0x7676767676767676u) | word) & 0x8080808080808080u;
+  const auto count = static_cast<uint32_t>(others ? std::countr_zero(others) / 8 : 8);
+  const uint32_t half = 32 - 4 * count; // two shifts: one by 64 would be undefined
+  word = word << half << half;          // zeros in front, the last digit in the highest byte
+  word = word * 10 + (word >> 8);       // pairs in every second byte
+  constexpr uint64_t kPairs = 0x000000FF000000FFu;
+  const uint64_t value =
+      ((word & kPairs) * (1'000'000ull << 32 | 100) + ((word >> 16) & kPairs) * (10'000ull << 32 | 1)) >> 32;
+  return {value, count};
 }
 
 } // namespace detail
 
 /// The common form of a number, read fast: at most 19 digits, small exponent, ended by a delimiter.
-/// @param p start of the number; kScannerReach bytes from here are readable
+/// @param p start of the number in a buffer that ends with kScannerReach zeros
 /// @return one past the number, with value set to what std::from_chars would give; null: let parse_number decide
 inline const char* scan_double(const char* p, double& value) {
   using namespace detail;
   const bool negative = *p == '-';
   p += negative;
   const char* const first = p;
-  uint64_t mantissa = 0;
-  int exponent = 0;
-  while (is_digit(*p) && p - first < 20) mantissa = mantissa * 10 + static_cast<uint64_t>(*p++ - '0');
-  std::ptrdiff_t digits = p - first;
+  DigitRun run = scan_digits(p);
+  uint64_t mantissa = run.value;
+  p += run.count;
+  if (run.count == 8)
+    while (is_digit(*p)) mantissa = mantissa * 10 + static_cast<uint64_t>(*p++ - '0');
+  std::ptrdiff_t digits = p - first, exponent = 0;
   if (*p == '.') {
     const char* const fraction = ++p;
-    if (const uint64_t word = load8(p); digits <= 11 && are_eight_digits(word))
-      mantissa = mantissa * 100'000'000 + eight_digits(word), p += 8;
-    while (is_digit(*p) && p - first < 22) mantissa = mantissa * 10 + static_cast<uint64_t>(*p++ - '0');
-    exponent = static_cast<int>(fraction - p);
+    run = scan_digits(p);
+    mantissa = mantissa * kWholePowersOfTen[run.count] + run.value;
+    p += run.count;
+    if (run.count == 8)
+      while (is_digit(*p)) mantissa = mantissa * 10 + static_cast<uint64_t>(*p++ - '0');
+    exponent = fraction - p;
     digits += p - fraction;
   }
-  if (digits == 0 || digits > 19) return nullptr; // 19 digits fit in 64 bits
+  if (digits == 0 || digits > 19) return nullptr; // 19 digits fit in 64 bits; with more, mantissa is worthless
   if ((*p | 0x20) == 'e') {
     ++p;
     const bool negative_exponent = *p == '-';
     p += negative_exponent || *p == '+';
-    const char* const exponent_first = p;
-    int written = 0;
-    while (is_digit(*p) && p - exponent_first < 4) written = written * 10 + (*p++ - '0');
-    if (p == exponent_first) return nullptr;
-    exponent += negative_exponent ? -written : written;
+    run = scan_digits(p);
+    if (run.count == 0 || run.count == 8) return nullptr;
+    p += run.count;
+    exponent += negative_exponent ? -static_cast<std::ptrdiff_t>(run.value) : static_cast<std::ptrdiff_t>(run.value);
   }
   if (!ends_word(*p)) return nullptr;
   // Both operands are exact, so there is one rounding.
@@ -115,15 +122,16 @@ inline const char* scan_float(const char* p, float& value) {
   return p;
 }
 
-/// Like scan_float for whole numbers that fit in 32 bits.
+/// Like scan_double for whole numbers that fit in 32 bits.
 inline const char* scan_integer(const char* p, int32_t& value) {
   using namespace detail;
   const bool negative = *p == '-';
   p += negative;
-  const char* const first = p;
-  int64_t magnitude = 0;
-  while (is_digit(*p) && p - first < 11) magnitude = magnitude * 10 + (*p++ - '0');
-  if (p == first || !ends_word(*p)) return nullptr;
+  const DigitRun run = scan_digits(p);
+  auto magnitude = static_cast<int64_t>(run.value);
+  p += run.count;
+  for (int more = 0; run.count == 8 && more < 3 && is_digit(*p); ++more) magnitude = magnitude * 10 + (*p++ - '0');
+  if (run.count == 0 || !ends_word(*p)) return nullptr;
   const int64_t wide = negative ? -magnitude : magnitude;
   if (wide < INT32_MIN || wide > INT32_MAX) return nullptr;
   value = static_cast<int32_t>(wide);

@@ -85,14 +85,32 @@ constexpr DirectiveInfo kInfos[] = {
     {"WorldEnd", K::kWorldEnd},
 };
 static_assert(std::size(kInfos) == 37);
-static_assert(std::is_sorted(std::begin(kInfos), std::end(kInfos),
-                             [](const DirectiveInfo& a, const DirectiveInfo& b) { return a.keyword < b.keyword; }));
+
+constexpr size_t kSlots = 128;
+
+/// Few collisions among the keywords, and independent of a word's length.
+constexpr size_t slot_of(std::string_view word) {
+  const auto letter = [&](size_t i) { return static_cast<size_t>(static_cast<unsigned char>(word[i])); };
+  return (letter(0) * 5 + letter(word.size() / 2) * 11 + letter(word.size() - 1) * 3 + word.size() * 17) % kSlots;
+}
+
+/// Open addressing: index into kInfos plus one, 0 where free.
+constexpr std::array<uint8_t, kSlots> make_slots() {
+  std::array<uint8_t, kSlots> slots{};
+  for (size_t i = 0; i < std::size(kInfos); ++i) {
+    size_t slot = slot_of(kInfos[i].keyword);
+    while (slots[slot] != 0) slot = (slot + 1) % kSlots;
+    slots[slot] = static_cast<uint8_t>(i + 1);
+  }
+  return slots;
+}
 
 const DirectiveInfo* find_info(std::string_view keyword) {
-  const DirectiveInfo* const found =
-      std::lower_bound(std::begin(kInfos), std::end(kInfos), keyword,
-                       [](const DirectiveInfo& info, std::string_view key) { return info.keyword < key; });
-  return found != std::end(kInfos) && found->keyword == keyword ? found : nullptr;
+  static constexpr std::array<uint8_t, kSlots> kSlotTable = make_slots();
+  if (keyword.empty()) return nullptr;
+  for (size_t slot = slot_of(keyword); kSlotTable[slot] != 0; slot = (slot + 1) % kSlots)
+    if (kInfos[kSlotTable[slot] - 1].keyword == keyword) return &kInfos[kSlotTable[slot] - 1];
+  return nullptr;
 }
 
 std::string_view closest_directive(std::string_view word) {

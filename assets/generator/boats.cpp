@@ -7,7 +7,7 @@
 #include "assets/generator/facade.h"
 #include "assets/generator/primitives.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 namespace {
 
 const DAffine kHere(1.0);
@@ -17,7 +17,7 @@ struct HullConfig {
   double half_width = 0.8;
   double freeboard = 0.5; ///< height of the side amidships
   double draught = 0.25;
-  double rise = 0.4;       ///< how much higher the bow is
+  double rise = 0.4;        ///< how much higher the bow is
   double stern_width = 0.7; ///< as a part of the half width
 };
 
@@ -38,14 +38,17 @@ void add_skin(Mesh& mesh, const HullConfig& c, double side, double v0, double v1
   const auto first = static_cast<uint32_t>(mesh.positions.size());
   for (uint32_t i = 0; i <= kLong; ++i) {
     for (uint32_t j = 0; j <= kRound; ++j) {
-      add_vertex(mesh, hull_point(c, static_cast<double>(i) / kLong, mix(v0, v1, static_cast<double>(j) / kRound), side, thickness));
+      add_vertex(mesh, hull_point(c, static_cast<double>(i) / kLong, mix(v0, v1, static_cast<double>(j) / kRound), side,
+                                  thickness));
     }
   }
   for (uint32_t i = 0; i < kLong; ++i) {
     for (uint32_t j = 0; j < kRound; ++j) {
       const uint32_t a = first + i * (kRound + 1) + j, b = a + kRound + 1;
-      if ((side > 0) != inside) add_quad(mesh, a, a + 1, b + 1, b);
-      else add_quad(mesh, a, b, b + 1, a + 1);
+      if ((side > 0) != inside)
+        add_quad(mesh, a, a + 1, b + 1, b);
+      else
+        add_quad(mesh, a, b, b + 1, a + 1);
     }
   }
 }
@@ -65,7 +68,8 @@ void add_hull(Model& model, const HullConfig& c) {
   Mesh& transom = model.flat("hull");
   for (int j = 0; j < 5; ++j) {
     const double v0 = j / 5.0, v1 = (j + 1) / 5.0;
-    add_quad(transom, hull_point(c, 0, v0, -1, 0), hull_point(c, 0, v1, -1, 0), hull_point(c, 0, v1, 1, 0), hull_point(c, 0, v0, 1, 0));
+    add_quad(transom, hull_point(c, 0, v0, -1, 0), hull_point(c, 0, v1, -1, 0), hull_point(c, 0, v1, 1, 0),
+             hull_point(c, 0, v0, 1, 0));
   }
 }
 
@@ -74,12 +78,14 @@ void add_deck(Mesh& mesh, const HullConfig& c, double v, double u0, double u1) {
   constexpr int kCells = 8;
   for (int i = 0; i < kCells; ++i) {
     const double a = mix(u0, u1, i / 8.0), b = mix(u0, u1, (i + 1) / 8.0);
-    add_quad(mesh, hull_point(c, a, v, -1, 0.05), hull_point(c, b, v, -1, 0.05), hull_point(c, b, v, 1, 0.05), hull_point(c, a, v, 1, 0.05));
+    add_quad(mesh, hull_point(c, a, v, -1, 0.05), hull_point(c, b, v, -1, 0.05), hull_point(c, b, v, 1, 0.05),
+             hull_point(c, a, v, 1, 0.05));
   }
 }
 
 void add_line(Model& model, DVec3 from, DVec3 to, double sag) {
-  const DVec3 path[] = {from, glm::mix(from, to, 0.33) - DVec3(0, sag, 0), glm::mix(from, to, 0.67) - DVec3(0, sag, 0), to};
+  const DVec3 path[] = {from, glm::mix(from, to, 0.33) - DVec3(0, sag, 0), glm::mix(from, to, 0.67) - DVec3(0, sag, 0),
+                        to};
   const double radii[] = {0.02, 0.02, 0.02, 0.02};
   add_tube(model.smooth("rope"), path, radii, 3);
 }
@@ -131,13 +137,15 @@ Model make_fishing_boat(Random& random) {
   add_deck(model.flat("wood"), c, 0.72, 0.0, 0.93);
   const double deck = hull_point(c, 0.4, 0.72, 1, 0).y;
   const DAffine house = translation({-0.85, deck - 0.1, -0.4}); // wheelhouse
-  const Opening front[] = {{OpeningKind::kBalconyDoor, 0.15, 1.2, 0.78, 1.85, false}, {OpeningKind::kBalconyDoor, 0.92, 1.2, 1.55, 1.85, false}};
+  const Opening front[] = {{OpeningKind::kBalconyDoor, 0.15, 1.2, 0.78, 1.85, false},
+                           {OpeningKind::kBalconyDoor, 0.92, 1.2, 1.55, 1.85, false}};
   const Opening side[] = {{OpeningKind::kBalconyDoor, 0.4, 1.2, 1.4, 1.85, false}};
   Model cabin;
   const DVec3 corners[] = {{0, 0, 0}, {1.7, 0, 0}, {1.7, 0, 1.8}, {0, 0, 1.8}};
   for (int k = 0; k < 4; ++k) {
     const DAffine f = compose(house, compose(translation(corners[k]), rotation_y(-kPi / 2 * k)));
-    add_facade(cabin, f, k % 2 == 0 ? 1.7 : 1.8, 2.1, k % 2 == 0 ? std::span<const Opening>(front) : std::span<const Opening>(side));
+    add_facade(cabin, f, k % 2 == 0 ? 1.7 : 1.8, 2.1,
+               k % 2 == 0 ? std::span<const Opening>(front) : std::span<const Opening>(side));
   }
   for (const ModelPart& part : cabin.parts()) { // its walls are painted planks, not masonry
     Mesh& mesh = model.flat(part.material == "wall" ? "white" : part.material);
@@ -153,7 +161,8 @@ Model make_fishing_boat(Random& random) {
   for (int i = 0; i < 5; ++i) { // fish boxes on the after deck
     const double x = random.uniform(-0.8, 0.8);
     const double z = -2.0 - 0.5 * i;
-    add_box(model.flat(i % 2 == 0 ? "wood" : "red"), kHere, {x - 0.35, deck - 0.1, z}, {x + 0.35, deck + 0.3, z + 0.42});
+    add_box(model.flat(i % 2 == 0 ? "wood" : "red"), kHere, {x - 0.35, deck - 0.1, z},
+            {x + 0.35, deck + 0.3, z + 0.42});
   }
   for (const double z : {-2.4, -0.6, 1.2}) { // fenders
     for (const double sign : {-1.0, 1.0}) {
@@ -185,4 +194,4 @@ Model make_sailing_boat(Random& random) {
   return model;
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

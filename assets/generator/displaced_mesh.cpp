@@ -13,7 +13,7 @@
 #include "assets/generator/primitives.h"
 #include "pbrt_import/scene/error.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 namespace {
 
 constexpr double kRingRadius = 10.0, kTubeRadius = 3.4;
@@ -39,7 +39,8 @@ DVec3 ring_point(double u, double v, uint64_t seed, uint32_t octaves) {
 class Ring {
 public:
   explicit Ring(const DisplacedMeshConfig& config) : seed_(config.seed) {
-    around_ = std::max<uint64_t>(5, static_cast<uint64_t>(std::ceil(std::sqrt(static_cast<double>(config.triangles) * 1.4))));
+    around_ =
+        std::max<uint64_t>(5, static_cast<uint64_t>(std::ceil(std::sqrt(static_cast<double>(config.triangles) * 1.4))));
     across_ = std::max<uint64_t>(5, (config.triangles + 2 * around_ - 1) / (2 * around_));
     // Detail down to about two cells: more would be noise, less would leave large meshes smooth.
     octaves_ = 3;
@@ -62,7 +63,8 @@ public:
       for (uint64_t k = 0; k < across_; ++k) {
         const uint64_t next_row = (row + 1) % around_, next = (k + 1) % across_;
         const auto a = static_cast<uint32_t>(row * across_ + k), b = static_cast<uint32_t>(row * across_ + next);
-        const auto c = static_cast<uint32_t>(next_row * across_ + next), d = static_cast<uint32_t>(next_row * across_ + k);
+        const auto c = static_cast<uint32_t>(next_row * across_ + next),
+                   d = static_cast<uint32_t>(next_row * across_ + k);
         write_ply_triangle(file, {a, b, c});
         write_ply_triangle(file, {a, c, d});
       }
@@ -73,9 +75,11 @@ private:
   void fill_row(uint64_t row, Vertex* out) const {
     const double du = 0.5 / static_cast<double>(around_), dv = 0.5 / static_cast<double>(across_);
     for (uint64_t k = 0; k < across_; ++k) {
-      const double u = static_cast<double>(row) / static_cast<double>(around_), v = static_cast<double>(k) / static_cast<double>(across_);
+      const double u = static_cast<double>(row) / static_cast<double>(around_),
+                   v = static_cast<double>(k) / static_cast<double>(across_);
       const DVec3 p = ring_point(u, v, seed_, octaves_);
-      const DVec3 along_u = ring_point(u + du, v, seed_, octaves_) - p, along_v = ring_point(u, v + dv, seed_, octaves_) - p;
+      const DVec3 along_u = ring_point(u + du, v, seed_, octaves_) - p,
+                  along_v = ring_point(u, v + dv, seed_, octaves_) - p;
       out[k] = {Vec3(p), Vec3(glm::normalize(glm::cross(along_v, along_u)))};
     }
   }
@@ -105,4 +109,4 @@ SceneTotals generate_displaced_mesh(const DisplacedMeshConfig& config, const Out
   return writer.finish();
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

@@ -4,7 +4,7 @@
 
 #include "assets/generator/scene_writer.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
 struct DisplacedMeshConfig {
   uint64_t seed = 3;
@@ -16,4 +16,4 @@ struct DisplacedMeshConfig {
 /// Throws Error(kUsage) out of range, Error(kIo) on disk trouble.
 SceneTotals generate_displaced_mesh(const DisplacedMeshConfig& config, const OutputConfig& output);
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

@@ -9,14 +9,15 @@
 #include "assets/generator/placement.h"
 #include "assets/generator/primitives.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 namespace {
 
-constexpr const char* kComment =
-    "# Extremes of scale in one scene: a crumb of 1e-6 before a mountain of 1e6, both the same mesh, on one ground of 4e6;\n"
-    "# a cluster 1e7 away; slabs without thickness; needles 1e7 times longer than wide.\n"
-    "# To be seen: crumbs resting on the ground at the left, paper-thin slabs leaning at the right, the mountain on the horizon.\n"
-    "# Made by packtrace_scenegen extreme.\n\n";
+constexpr const char* kComment = "# Extremes of scale in one scene: a crumb of 1e-6 before a mountain of 1e6, both the "
+                                 "same mesh, on one ground of 4e6;\n"
+                                 "# a cluster 1e7 away; slabs without thickness; needles 1e7 times longer than wide.\n"
+                                 "# To be seen: crumbs resting on the ground at the left, paper-thin slabs leaning at "
+                                 "the right, the mountain on the horizon.\n"
+                                 "# Made by packtrace_scenegen extreme.\n\n";
 
 /// A card in the frame's xy square, stored twice back to back: two coincident faces, no volume.
 Model make_slab() {
@@ -27,7 +28,7 @@ Model make_slab() {
   return model;
 }
 
-/// A closed box squeezed to zero height: top and bottom coincide, its four sides are degenerate triangles.
+/// A box squeezed to zero height: its top and bottom coincide, its sides are gone.
 Model make_flat_box() {
   Model model;
   add_box(model.flat("slab"), DAffine(1.0), {-1, 0, -1}, {1, 0, 1});
@@ -52,8 +53,10 @@ SceneTotals generate_extreme(const ExtremeConfig& config, const OutputConfig& ou
   // Eye 2e-6 above the ground, crumbs 5e-6 ahead; lengths in units of the scene.
   const ViewConfig view{{0.0, 2.2e-6, -8e-6}, {0.2e-6, 1.6e-6, 0.0}, 45.0, 1280, 720};
   SceneWriter writer(output, "extreme", kComment, view);
-  const std::pair<const char*, Vec3> paints[] = {{"ground", {0.55f, 0.50f, 0.42f}}, {"boulder", {0.60f, 0.36f, 0.24f}},
-                                                 {"snow", {0.80f, 0.83f, 0.88f}},   {"slab", {0.25f, 0.45f, 0.60f}},
+  const std::pair<const char*, Vec3> paints[] = {{"ground", {0.55f, 0.50f, 0.42f}},
+                                                 {"boulder", {0.60f, 0.36f, 0.24f}},
+                                                 {"snow", {0.80f, 0.83f, 0.88f}},
+                                                 {"slab", {0.25f, 0.45f, 0.60f}},
                                                  {"needle", {0.85f, 0.70f, 0.20f}}};
   for (const auto& [name, albedo] : paints) writer.material(name, albedo);
 
@@ -73,7 +76,8 @@ SceneTotals generate_extreme(const ExtremeConfig& config, const OutputConfig& ou
     writer.instance("boulder", stand_at(at, random.uniform(0.0, 6.0), random.uniform(0.4e-6, 1.2e-6)));
   }
   for (int i = 0; i < 5; ++i) {
-    const DAffine lean = compose(translation({(1.2 + 0.55 * i) * 1e-6, 0.0, 0.4e-6 * i}), compose(rotation_y(0.5), rotation_x(0.12 * i)));
+    const DAffine lean = compose(translation({(1.2 + 0.55 * i) * 1e-6, 0.0, 0.4e-6 * i}),
+                                 compose(rotation_y(0.5), rotation_x(0.12 * i)));
     writer.instance("slab", compose(lean, scaling(DVec3(0.5e-6, 0.9e-6, 1.0))));
   }
   writer.instance("flat_box", stand_at({0.6e-6, 0.3e-6, -1.2e-6}, 0.4, 0.4e-6));
@@ -82,9 +86,10 @@ SceneTotals generate_extreme(const ExtremeConfig& config, const OutputConfig& ou
   writer.instance("boulder", stand_at({7e5, 0.0, 1.4e6}, 2.0, 2e5));
   for (int i = 0; i < 24; ++i) { // seen by nobody here, but in every bound
     const DVec3 at{1e7 + random.uniform(-40.0, 40.0), random.uniform(0.0, 20.0), 1e7 + random.uniform(-40.0, 40.0)};
-    writer.instance(i % 2 == 0 ? "boulder" : "needles", stand_at(at, random.uniform(0.0, 6.0), random.uniform(1.0, 9.0)));
+    writer.instance(i % 2 == 0 ? "boulder" : "needles",
+                    stand_at(at, random.uniform(0.0, 6.0), random.uniform(1.0, 9.0)));
   }
   return writer.finish();
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

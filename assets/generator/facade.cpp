@@ -6,7 +6,7 @@
 
 #include "assets/generator/primitives.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 namespace {
 
 constexpr double kReveal = 0.22; ///< depth of panes behind the wall's face
@@ -50,7 +50,8 @@ void add_reveal(Mesh& mesh, const DAffine& f, const Opening& o, double depth) {
   const DVec3 corners[] = {{o.x0, o.y0, 0}, {o.x1, o.y0, 0}, {o.x1, o.y1, 0}, {o.x0, o.y1, 0}};
   for (size_t i = 0; i < 4; ++i) {
     const DVec3 a = corners[i], b = corners[(i + 1) % 4], back(0, 0, depth);
-    add_quad(mesh, transform_point(f, a), transform_point(f, a + back), transform_point(f, b + back), transform_point(f, b));
+    add_quad(mesh, transform_point(f, a), transform_point(f, a + back), transform_point(f, b + back),
+             transform_point(f, b));
   }
 }
 
@@ -84,8 +85,10 @@ void add_window(Model& model, const DAffine& f, const Opening& o) {
   add_panes(model, f, o);
   if (o.kind == OpeningKind::kBalconyDoor) return;
   add_box(model.flat("stone"), f, {o.x0 - 0.12, o.y0 - 0.1, -0.14}, {o.x1 + 0.12, o.y0, 0.02});
-  if (o.kind == OpeningKind::kShutteredWindow) add_shutters(model, f, o);
-  else add_box(model.flat("stone"), f, {o.x0 - 0.1, o.y1, -0.07}, {o.x1 + 0.1, o.y1 + 0.16, 0.02});
+  if (o.kind == OpeningKind::kShutteredWindow)
+    add_shutters(model, f, o);
+  else
+    add_box(model.flat("stone"), f, {o.x0 - 0.1, o.y1, -0.07}, {o.x1 + 0.1, o.y1 + 0.16, 0.02});
 }
 
 void add_door(Model& model, const DAffine& f, const Opening& o) {
@@ -126,7 +129,8 @@ void add_arch(Model& model, const DAffine& f, const Opening& o, double depth) {
     const double rim = radius + 0.2; // voussoirs stand proud of the wall
     add_quad(stone, on_circle(i, radius, -0.06), on_circle(i, rim, -0.06), on_circle(i + 1, rim, -0.06),
              on_circle(i + 1, radius, -0.06));
-    add_quad(stone, on_circle(i, rim, -0.06), on_circle(i, rim, 0), on_circle(i + 1, rim, 0), on_circle(i + 1, rim, -0.06));
+    add_quad(stone, on_circle(i, rim, -0.06), on_circle(i, rim, 0), on_circle(i + 1, rim, 0),
+             on_circle(i + 1, rim, -0.06));
     add_quad(stone, on_circle(i, radius, 0), on_circle(i, radius, -0.06), on_circle(i + 1, radius, -0.06),
              on_circle(i + 1, radius, 0));
   }
@@ -148,9 +152,15 @@ void add_facade(Model& model, const DAffine& frame, double width, double height,
     switch (o.kind) {
     case OpeningKind::kWindow:
     case OpeningKind::kShutteredWindow:
-    case OpeningKind::kBalconyDoor: add_window(model, frame, o); break;
-    case OpeningKind::kDoor: add_door(model, frame, o); break;
-    case OpeningKind::kArch: add_arch(model, frame, o, 0.4); break;
+    case OpeningKind::kBalconyDoor:
+      add_window(model, frame, o);
+      break;
+    case OpeningKind::kDoor:
+      add_door(model, frame, o);
+      break;
+    case OpeningKind::kArch:
+      add_arch(model, frame, o, 0.4);
+      break;
     case OpeningKind::kRecess:
       add_reveal(model.flat("wall"), frame, o, 0.5);
       add_panel(model.flat("glass"), frame, o.x0, o.y0, o.x1, o.y1, 0.5);
@@ -162,7 +172,8 @@ void add_facade(Model& model, const DAffine& frame, double width, double height,
 void add_tiles(Model& model, const DAffine& frame, double width, double length, double inset, Random& random) {
   static constexpr const char* kShades[] = {"tile_a", "tile_a", "tile_b", "tile_c"};
   const double pitch = 0.4, run = 0.62;
-  const auto columns = static_cast<uint32_t>(std::ceil(width / pitch)), rows = static_cast<uint32_t>(std::ceil(length / run));
+  const auto columns = static_cast<uint32_t>(std::ceil(width / pitch)),
+             rows = static_cast<uint32_t>(std::ceil(length / run));
   for (uint32_t j = 0; j < rows; ++j) {
     const double y0 = length * j / rows, y1 = std::min(length, length * (j + 1) / rows + 0.05);
     const double margin = inset * (y0 + y1) * 0.5 / length;
@@ -197,4 +208,4 @@ void add_railing(Model& model, std::string_view material, const DAffine& frame, 
   add_box(mesh, frame, {0, 0.12, -0.03}, {length, 0.17, 0.03});
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

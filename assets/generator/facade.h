@@ -7,7 +7,7 @@
 #include "assets/generator/placement.h"
 #include "assets/generator/random.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
 enum class OpeningKind { kWindow, kShutteredWindow, kBalconyDoor, kDoor, kArch, kRecess };
 
@@ -32,4 +32,4 @@ void add_tiles(Model& model, const DAffine& frame, double width, double length, 
 void add_railing(Model& model, std::string_view material, const DAffine& frame, double length, double height,
                  double spacing);
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

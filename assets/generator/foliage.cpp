@@ -8,7 +8,7 @@
 
 #include "assets/generator/primitives.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 namespace {
 
 /// An ellipsoid that leaves grow on.
@@ -33,7 +33,8 @@ Foliage refined(Foliage foliage, double detail) {
 
 uint32_t scaled(double count, double detail) { return static_cast<uint32_t>(std::max(1.0, count * detail + 0.5)); }
 
-void add_leaf_towards(Model& model, const Foliage& foliage, DVec3 stalk, DVec3 outward, double lightness, Random& random) {
+void add_leaf_towards(Model& model, const Foliage& foliage, DVec3 stalk, DVec3 outward, double lightness,
+                      Random& random) {
   const double size = random.uniform(0.75, 1.25);
   DVec3 direction = outward + random_direction(random) * 0.7 - DVec3(0, foliage.droop, 0);
   const double length = glm::length(direction);
@@ -119,7 +120,8 @@ Model make_umbrella_pine(Random& random, double detail) {
   std::vector<Crown> crowns{{{0.3, 7.9, 0}, DVec3(1.9, 0.75, 1.9)}};
   for (int i = 0; i < 6; ++i) {
     const auto [s, c] = sin_cos(2.0 * kPi * i / 6.0 + random.uniform(-0.3, 0.3));
-    crowns.push_back({{0.3 + 2.1 * c, random.uniform(7.1, 7.6), 2.1 * s}, DVec3(1.3, 0.6, 1.3) * random.uniform(0.85, 1.1)});
+    crowns.push_back(
+        {{0.3 + 2.1 * c, random.uniform(7.1, 7.6), 2.1 * s}, DVec3(1.3, 0.6, 1.3) * random.uniform(0.85, 1.1)});
   }
   const Foliage foliage = refined({"pine", "leaf_dark", 0.5, 0.2, -0.4}, detail);
   return make_branched({0.25, 5.6, 0}, 0.26, crowns, foliage, scaled(820, detail), random);
@@ -138,7 +140,8 @@ Model make_cypress(Random& random, double detail) {
     const auto [s, c] = sin_cos(random.uniform(0.0, 2.0 * kPi));
     const DVec3 out(c, 0.3, s);
     const double depth = random.uniform(0.75, 1.0);
-    add_leaf_towards(model, foliage, DVec3(c * radius * depth, height, s * radius * depth), out, depth * 1.6 - 0.6, random);
+    add_leaf_towards(model, foliage, DVec3(c * radius * depth, height, s * radius * depth), out, depth * 1.6 - 0.6,
+                     random);
   }
   model.finish();
   return model;
@@ -202,7 +205,8 @@ Model make_palm(Random& random, double detail) {
 }
 
 Model make_bush(Random& random, double detail) {
-  const Crown crowns[] = {{{0, 0.35, 0}, DVec3(0.6, 0.5, 0.6)}, {{0.45, 0.25, 0.15}, DVec3(0.45, 0.38, 0.45)},
+  const Crown crowns[] = {{{0, 0.35, 0}, DVec3(0.6, 0.5, 0.6)},
+                          {{0.45, 0.25, 0.15}, DVec3(0.45, 0.38, 0.45)},
                           {{-0.35, 0.28, -0.2}, DVec3(0.5, 0.4, 0.45)}};
   Model model;
   cover(model, crowns, refined({"leaf_light", "leaf_dark", 0.3, 0.2, 0.0}, detail), scaled(170, detail), random);
@@ -211,7 +215,8 @@ Model make_bush(Random& random, double detail) {
 }
 
 Model make_blossom_bush(Random& random, double detail) {
-  const Crown crowns[] = {{{0, 0.6, 0}, DVec3(0.8, 0.6, 0.5)}, {{0.3, 1.3, 0.1}, DVec3(0.7, 0.5, 0.4)},
+  const Crown crowns[] = {{{0, 0.6, 0}, DVec3(0.8, 0.6, 0.5)},
+                          {{0.3, 1.3, 0.1}, DVec3(0.7, 0.5, 0.4)},
                           {{-0.4, 1.0, 0.0}, DVec3(0.5, 0.6, 0.4)}};
   Model model;
   cover(model, crowns, refined({"leaf_light", "leaf_dark", 0.3, 0.2, 0.2}, detail), scaled(130, detail), random);
@@ -234,4 +239,4 @@ Model make_grass_tuft(Random& random, double detail) {
   return model;
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

@@ -14,7 +14,7 @@
 #include "assets/generator/primitives.h"
 #include "pbrt_import/scene/error.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 namespace {
 
 constexpr double kCell = 3.6; ///< metres between neighbouring plants
@@ -30,7 +30,8 @@ struct Species {
 };
 
 double ground_height(double x, double z, uint64_t seed) {
-  return 9.0 * fractal_noise({x * 0.012, 0.0, z * 0.012}, seed, 4) + 0.25 * fractal_noise({x * 0.35, 1.0, z * 0.35}, seed + 1, 2);
+  return 9.0 * fractal_noise({x * 0.012, 0.0, z * 0.012}, seed, 4) +
+         0.25 * fractal_noise({x * 0.35, 1.0, z * 0.35}, seed + 1, 2);
 }
 
 double path_x(double z, uint64_t seed) { return 6.0 * value_noise({0.5, 0.5, z * 0.03}, seed + 2); }
@@ -44,8 +45,8 @@ public:
 
   void build() {
     const double each = mean_triangles();
-    const double wanted = config_.instances != 0 ? static_cast<double>(config_.instances)
-                                                 : static_cast<double>(config_.triangles) / each;
+    const double wanted =
+        config_.instances != 0 ? static_cast<double>(config_.instances) : static_cast<double>(config_.triangles) / each;
     const auto side = static_cast<uint64_t>(std::ceil(std::sqrt(wanted * 1.08))) + 4; // the path takes some cells
     write_ground(static_cast<double>(side) * kCell);
     uint64_t plants = 0, triangles = 0;
@@ -79,8 +80,8 @@ private:
 
 void ForestBuilder::write_materials() {
   const std::pair<const char*, Vec3> paints[] = {
-      {"bark", {0.20f, 0.14f, 0.10f}},       {"leaf_light", {0.30f, 0.44f, 0.10f}}, {"leaf_dark", {0.11f, 0.23f, 0.06f}},
-      {"cypress", {0.10f, 0.24f, 0.11f}},    {"olive", {0.37f, 0.43f, 0.22f}},      {"rock_a", {0.42f, 0.39f, 0.35f}},
+      {"bark", {0.20f, 0.14f, 0.10f}},    {"leaf_light", {0.30f, 0.44f, 0.10f}}, {"leaf_dark", {0.11f, 0.23f, 0.06f}},
+      {"cypress", {0.10f, 0.24f, 0.11f}}, {"olive", {0.37f, 0.43f, 0.22f}},      {"rock_a", {0.42f, 0.39f, 0.35f}},
       {"soil", {0.25f, 0.22f, 0.12f}}};
   for (const auto& [name, albedo] : paints) writer_.material(name, albedo);
 }
@@ -151,7 +152,8 @@ ViewConfig forest_view(uint64_t seed) {
 
 SceneTotals generate_forest(const ForestConfig& config, const OutputConfig& output) {
   if (config.triangles < 100'000 || config.triangles > 100'000'000'000) {
-    throw Error(ErrorKind::kUsage, fmt::format("--triangles {}: a forest takes 100000 to 100000000000", config.triangles));
+    throw Error(ErrorKind::kUsage,
+                fmt::format("--triangles {}: a forest takes 100000 to 100000000000", config.triangles));
   }
   if (config.instances != 0 && (config.instances < 100 || config.instances > 50'000'000)) {
     throw Error(ErrorKind::kUsage, fmt::format("--instances {}: a forest takes 100 to 50000000", config.instances));
@@ -161,4 +163,4 @@ SceneTotals generate_forest(const ForestConfig& config, const OutputConfig& outp
   return writer.finish();
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

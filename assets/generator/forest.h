@@ -4,7 +4,7 @@
 
 #include "assets/generator/scene_writer.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
 struct ForestConfig {
   uint64_t seed = 11;
@@ -12,8 +12,8 @@ struct ForestConfig {
   uint64_t instances = 0;          ///< if not 0: this many plants instead; [100, 50000000]
 };
 
-/// A clearing-lined forest of a few species, placed as often as asked: FOLDER/forest.pbrt. Memory does not grow with it.
-/// Throws Error(kUsage) out of range, Error(kIo) on disk trouble.
+/// A clearing-lined forest of a few species, placed as often as asked: FOLDER/forest.pbrt. Memory does not grow with
+/// it. Throws Error(kUsage) out of range, Error(kIo) on disk trouble.
 SceneTotals generate_forest(const ForestConfig& config, const OutputConfig& output);
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

@@ -7,7 +7,7 @@
 #include "assets/generator/placement.h"
 #include "assets/generator/primitives.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 namespace {
 
 constexpr double kEaves = 0.42;
@@ -22,7 +22,11 @@ DAffine side_frame(double x0, double x1, double z0, double z1, int side) {
 Opening window(double centre, double floor_y, bool shutters, Random& random) {
   const bool lit = random.chance(0.12);
   return {shutters ? OpeningKind::kShutteredWindow : OpeningKind::kWindow,
-          centre - 0.45, floor_y + 0.95, centre + 0.45, floor_y + 2.3, lit};
+          centre - 0.45,
+          floor_y + 0.95,
+          centre + 0.45,
+          floor_y + 2.3,
+          lit};
 }
 
 std::vector<Opening> front_openings(const HouseConfig& c, Random& random) {
@@ -131,10 +135,13 @@ void add_hip(Model& model, const DAffine& frame, double width, double depth, dou
     const DAffine tilt = compose(translation({0, -kEaves * s / c, 0}), rotation_x(kPi / 2 - pitch_rad));
     add_slope(model, compose(frame, compose(side, tilt)), run, length, half + kEaves, random);
   }
-  const DVec3 a(half, rise, depth >= width ? half : depth / 2), b(width - half, rise, depth >= width ? depth - half : depth / 2);
+  const DVec3 a(half, rise, depth >= width ? half : depth / 2),
+      b(width - half, rise, depth >= width ? depth - half : depth / 2);
   const double drop = -kEaves * s / c;
-  const DVec3 corners[] = {{-kEaves, drop, -kEaves}, {width + kEaves, drop, -kEaves},
-                           {width + kEaves, drop, depth + kEaves}, {-kEaves, drop, depth + kEaves}};
+  const DVec3 corners[] = {{-kEaves, drop, -kEaves},
+                           {width + kEaves, drop, -kEaves},
+                           {width + kEaves, drop, depth + kEaves},
+                           {-kEaves, drop, depth + kEaves}};
   const DVec3 lift(0, 0.06, 0);
   for (int k = 0; k < 4; ++k) {
     const bool low_end = depth >= width ? k < 2 : (k == 0 || k == 3);
@@ -198,7 +205,8 @@ void add_walls(House& house, const HouseConfig& c, Random& random) {
       add_box(stone, kHere, {left, y + 0.02, -0.05}, {left + w, y + kFloorHeight / 6.0 - 0.02, 0.03});
     }
   }
-  if (c.floors > 1) add_box(stone, kHere, {x0 - 0.05, kFloorHeight - 0.08, -0.06}, {x1 + 0.05, kFloorHeight + 0.06, 0.02});
+  if (c.floors > 1)
+    add_box(stone, kHere, {x0 - 0.05, kFloorHeight - 0.08, -0.06}, {x1 + 0.05, kFloorHeight + 0.06, 0.02});
 }
 
 } // namespace
@@ -213,12 +221,19 @@ House make_house(const HouseConfig& c, Random& random) {
   const DAffine roof = translation({-c.width / 2, top, 0});
   const double pitch = radians(random.uniform(24.0, 31.0));
   switch (c.roof) {
-  case RoofKind::kGable: add_gable(model, roof, c.width, c.depth, pitch, random); break;
-  case RoofKind::kGableToFront:
-    add_gable(model, compose(translation({-c.width / 2, top, c.depth}), rotation_y(kPi / 2)), c.depth, c.width, pitch, random);
+  case RoofKind::kGable:
+    add_gable(model, roof, c.width, c.depth, pitch, random);
     break;
-  case RoofKind::kHip: add_hip(model, roof, c.width, c.depth, pitch, random); break;
-  case RoofKind::kTerrace: add_terrace(model, roof, c.width, c.depth); break;
+  case RoofKind::kGableToFront:
+    add_gable(model, compose(translation({-c.width / 2, top, c.depth}), rotation_y(kPi / 2)), c.depth, c.width, pitch,
+              random);
+    break;
+  case RoofKind::kHip:
+    add_hip(model, roof, c.width, c.depth, pitch, random);
+    break;
+  case RoofKind::kTerrace:
+    add_terrace(model, roof, c.width, c.depth);
+    break;
   }
   const double side = random.chance(0.5) ? 1.0 : -1.0;
   add_chimney(model, {side * c.width * 0.28, top + 1.15, c.depth * 0.62});
@@ -229,12 +244,14 @@ House make_house(const HouseConfig& c, Random& random) {
 Model make_church(Random& random) {
   Model model;
   const double width = 9.0, depth = 17.0, height = 8.5;
-  const Opening front[] = {{OpeningKind::kArch, 3.6, 0.0, 5.4, 3.6, false}, {OpeningKind::kRecess, 4.0, 5.0, 5.0, 6.6, false}};
+  const Opening front[] = {{OpeningKind::kArch, 3.6, 0.0, 5.4, 3.6, false},
+                           {OpeningKind::kRecess, 4.0, 5.0, 5.0, 6.6, false}};
   std::vector<Opening> nave;
   for (int i = 0; i < 4; ++i) nave.push_back({OpeningKind::kRecess, 2.2 + 3.8 * i, 3.2, 3.2 + 3.8 * i, 6.6, false});
   for (int side = 0; side < 4; ++side) {
-    const std::span<const Opening> holes = side == 0 ? std::span<const Opening>(front)
-                                           : side == 2 ? std::span<const Opening>() : std::span<const Opening>(nave);
+    const std::span<const Opening> holes = side == 0   ? std::span<const Opening>(front)
+                                           : side == 2 ? std::span<const Opening>()
+                                                       : std::span<const Opening>(nave);
     add_facade(model, side_frame(-width / 2, width / 2, 0, depth, side), side % 2 == 0 ? width : depth, height, holes);
   }
   add_box(model.flat("door"), kHere, {-0.95, 0, 0.35}, {0.95, 3.6, 0.45});
@@ -244,11 +261,13 @@ Model make_church(Random& random) {
       add_tapered_box(model.flat("stone"), kHere, {x, -1.0, 0.3 + 3.9 * i}, {x + 0.5, 7.0, 1.1 + 3.9 * i}, 0.8);
     }
   }
-  add_gable(model, compose(translation({-width / 2, height, depth}), rotation_y(kPi / 2)), depth, width, radians(34), random);
+  add_gable(model, compose(translation({-width / 2, height, depth}), rotation_y(kPi / 2)), depth, width, radians(34),
+            random);
 
   const double x0 = width / 2 - 0.2, x1 = x0 + 4.6, z0 = 0.6, z1 = z0 + 4.6; // the bell tower
   const Opening low[] = {{OpeningKind::kWindow, 1.8, 7.0, 2.8, 9.2, false}};
-  const Opening bells[] = {{OpeningKind::kArch, 0.7, 0.9, 2.0, 3.6, false}, {OpeningKind::kArch, 2.6, 0.9, 3.9, 3.6, false}};
+  const Opening bells[] = {{OpeningKind::kArch, 0.7, 0.9, 2.0, 3.6, false},
+                           {OpeningKind::kArch, 2.6, 0.9, 3.9, 3.6, false}};
   for (int side = 0; side < 4; ++side) {
     const DAffine frame = side_frame(x0, x1, z0, z1, side);
     add_facade(model, frame, 4.6, 14.5, low);
@@ -319,4 +338,4 @@ Model make_windmill(Random& random) {
   return model;
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

@@ -6,7 +6,7 @@
 #include "assets/generator/model.h"
 #include "assets/generator/random.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
 enum class RoofKind : uint32_t { kGable, kGableToFront, kHip, kTerrace };
 
@@ -37,4 +37,4 @@ Model make_church(Random& random);     ///< nave and bell tower, about 24 m tall
 Model make_lighthouse(Random& random); ///< about 17 m
 Model make_windmill(Random& random);   ///< about 10 m, sails towards -z
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

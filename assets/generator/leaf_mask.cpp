@@ -15,7 +15,7 @@
 
 #include "assets/generator/placement.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 namespace {
 
 constexpr int kWidth = 96, kHeight = 128;
@@ -25,8 +25,9 @@ bool inside(double x, double y) {
   if (y < 0.12) return std::abs(x) < 0.035; // stalk
   const double t = (y - 0.12) / 0.86;
   if (t > 1.0) return false;
-  const double lobes = 0.86 + 0.14 * sin_cos(2.0 * kPi * (5.0 * t - 0.55 * std::abs(x))).cos; // notches slant to the tip
-  const double edge = 1.3 * std::sqrt(std::sqrt(t)) * std::sqrt(1.0 - t) * lobes + 0.03 * (1.0 - t);
+  const double lobes =
+      0.93 + 0.07 * sin_cos(2.0 * kPi * (5.0 * t - 0.55 * std::abs(x))).cos; // notches slant to the tip
+  const double edge = 1.75 * std::sqrt(t) * (1.0 - t) * (1.25 - 0.25 * t) * lobes + 0.03 * (1.0 - t);
   if (std::abs(x) > edge) return false;
   const double rib = std::abs(x) / (edge + 1e-9);
   const double hole = sin_cos(2.0 * kPi * (5.0 * t + 0.5 - 0.55 * std::abs(x))).cos;
@@ -51,4 +52,4 @@ void generate_leaf_mask(const OutputConfig& output) {
   file.close();
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

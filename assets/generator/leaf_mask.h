@@ -2,10 +2,10 @@
 
 #include "assets/generator/scene_writer.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
 /// Writes FOLDER/leaf.png: 96 x 128 texels of 8-bit grey, 255 inside a lobed, pierced leaf that points up, 0 outside.
 /// Throws Error(kIo) on disk trouble.
 void generate_leaf_mask(const OutputConfig& output);
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

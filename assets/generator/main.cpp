@@ -12,7 +12,7 @@
 #include "assets/generator/town.h"
 #include "pbrt_import/scene/error.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 namespace {
 
 int run(int argc, char** argv) {
@@ -35,7 +35,8 @@ int run(int argc, char** argv) {
     verb->add_option("--seed", seed, "chooses everything that is left to chance")->capture_default_str();
   };
 
-  CLI::App* verb = add_verb("town", "a harbour town on a terraced hillside", [&] { return generate_town(town, output); });
+  CLI::App* verb =
+      add_verb("town", "a harbour town on a terraced hillside", [&] { return generate_town(town, output); });
   add_seed(verb, town.seed);
   verb->add_option("--instances", town.instances, "about how many [3000, 20000000]")->capture_default_str();
 
@@ -70,11 +71,11 @@ int run(int argc, char** argv) {
 }
 
 } // namespace
-} // namespace packtrace
+} // namespace packtrace::scenegen
 
 int main(int argc, char** argv) {
   try {
-    return packtrace::run(argc, argv);
+    return packtrace::scenegen::run(argc, argv);
   } catch (const packtrace::Error& error) {
     fmt::print(stderr, "packtrace_scenegen: {}\n", error.what());
     return error.exit_code();

@@ -7,7 +7,7 @@
 #include "assets/generator/noise.h"
 #include "assets/generator/primitives.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 namespace {
 
 const DAffine kHere(1.0);
@@ -24,7 +24,8 @@ void add_courses(Model& model, double y0, double y1, double course, double block
       double end = x + block * random.uniform(0.65, 1.35);
       if (end > kHalf - block * 0.4) end = kHalf;
       const double front = -relief * random.uniform();
-      add_box(model.flat(kStones[random.below(4)]), kHere, {x + 0.015, bottom + 0.015, front}, {end - 0.015, top - 0.015, 0.25});
+      add_box(model.flat(kStones[random.below(4)]), kHere, {x + 0.015, bottom + 0.015, front},
+              {end - 0.015, top - 0.015, 0.25});
       x = end;
     }
   }
@@ -58,12 +59,14 @@ Model make_stairs(uint32_t steps, double rise, double run, double width) {
   const double half = width / 2;
   for (uint32_t i = 0; i < steps; ++i) {
     Mesh& mesh = model.flat(i % 3 == 1 ? "stone_b" : "stone");
-    add_box(mesh, kHere, {-half, i * rise - (i == 0 ? 0.6 : 0.25), i * run - 0.03}, {half, (i + 1) * rise, (i + 1) * run + 0.1});
+    add_box(mesh, kHere, {-half, i * rise - (i == 0 ? 0.6 : 0.25), i * run - 0.03},
+            {half, (i + 1) * rise, (i + 1) * run + 0.1});
   }
   const double height = steps * rise, length = steps * run;
   for (const double x : {-half - 0.28, half}) { // stringers, as parallelograms with a sloping top
     Mesh& mesh = model.flat("stone_b");
-    const DVec3 corners[] = {{x, -0.6, -0.3}, {x, 0.75, -0.3}, {x, height + 0.75, length}, {x, height - 0.6, length + 0.1}};
+    const DVec3 corners[] = {
+        {x, -0.6, -0.3}, {x, 0.75, -0.3}, {x, height + 0.75, length}, {x, height - 0.6, length + 0.1}};
     const DVec3 across(0.28, 0, 0);
     add_quad(mesh, corners[0], corners[3], corners[2], corners[1]);
     add_quad(mesh, corners[0] + across, corners[1] + across, corners[2] + across, corners[3] + across);
@@ -105,7 +108,8 @@ Model make_pier(Random& random) {
     const double left = -2.0 - random.uniform(0.0, 0.12);
     const double right = 2.0 + random.uniform(0.0, 0.12);
     const double top = random.uniform(0.0, 0.02);
-    add_box(model.flat(random.chance(0.3) ? "wood_dark" : "wood"), kHere, {left, -0.07, z + 0.012}, {right, top, z + 0.238});
+    add_box(model.flat(random.chance(0.3) ? "wood_dark" : "wood"), kHere, {left, -0.07, z + 0.012},
+            {right, top, z + 0.238});
   }
   Mesh& beams = model.flat("wood_dark");
   for (const double x : {-1.7, 0.0, 1.7}) add_box(beams, kHere, {x - 0.1, -0.3, 0.0}, {x + 0.1, -0.07, kWallModule});
@@ -130,4 +134,4 @@ Model make_rock(std::string_view material, Random& random) {
   return model;
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

@@ -2,7 +2,7 @@
 
 #include "assets/generator/primitives.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
 Mesh& Model::part(std::string_view material, bool smooth) {
   for (ModelPart& part : parts_) {
@@ -24,4 +24,4 @@ uint64_t Model::triangle_count() const {
   return count;
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

@@ -6,7 +6,7 @@
 
 #include "pbrt_import/scene/scene.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
 /// One mesh of one material.
 struct ModelPart {
@@ -34,4 +34,4 @@ private:
   std::deque<ModelPart> parts_;
 };
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

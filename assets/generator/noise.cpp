@@ -4,7 +4,7 @@
 
 #include "assets/generator/random.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 namespace {
 
 double lattice_value(int64_t x, int64_t y, int64_t z, uint64_t seed) {
@@ -40,4 +40,4 @@ double fractal_noise(DVec3 point, uint64_t seed, uint32_t octaves) {
   return total > 0.0 ? sum / total : 0.0;
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

@@ -7,7 +7,7 @@
 
 #include "pbrt_import/scene/error.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
 namespace {
 constexpr size_t kBufferBytes = size_t{1} << 20;
@@ -57,4 +57,4 @@ void OutputFile::fail(std::string_view action) const {
   throw Error(ErrorKind::kIo, path_.string() + ": " + std::string(action) + ": " + std::strerror(reason));
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
 /// A file under way: written through a buffer to a temporary name beside its own, given its name by close().
 /// One that is not closed leaves nothing behind. Every function throws Error(kIo) if the disk refuses.
@@ -21,7 +21,8 @@ public:
 
   void write(std::string_view bytes);
   /// The object's bytes as they lie in memory.
-  template <typename T> void write_value(const T& value) {
+  template <typename T>
+  void write_value(const T& value) {
     write(std::string_view(reinterpret_cast<const char*>(&value), sizeof value));
   }
   void close();
@@ -39,4 +40,4 @@ private:
   bool closed_ = false;
 };
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

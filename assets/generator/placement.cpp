@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
 SinCos sin_cos(double angle_rad) {
   // pi/2 in two parts keeps the reduced angle exact to 2^-80 over the stated range.
@@ -18,10 +18,14 @@ SinCos sin_cos(double angle_rad) {
   }
   sine *= x;
   switch (static_cast<int64_t>(quarter) & 3) {
-  case 0: return {sine, cosine};
-  case 1: return {cosine, -sine};
-  case 2: return {-sine, -cosine};
-  default: return {-cosine, sine};
+  case 0:
+    return {sine, cosine};
+  case 1:
+    return {cosine, -sine};
+  case 2:
+    return {-sine, -cosine};
+  default:
+    return {-cosine, sine};
   }
 }
 
@@ -75,4 +79,4 @@ DVec3 random_direction(Random& random) {
   return {ring * c, y, ring * s};
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

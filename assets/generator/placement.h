@@ -3,7 +3,7 @@
 #include "assets/generator/random.h"
 #include "pbrt_import/scene/math.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
 inline constexpr double kPi = 3.14159265358979323846;
 constexpr double radians(double degrees) { return degrees * (kPi / 180.0); }
@@ -36,4 +36,4 @@ DAffine along(DVec3 origin, DVec3 direction);
 /// Uniform on the unit sphere.
 DVec3 random_direction(Random& random);
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

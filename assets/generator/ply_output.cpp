@@ -7,14 +7,15 @@
 
 #include <fmt/format.h>
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
 static_assert(std::endian::native == std::endian::little, "PLY bytes are written as they lie in memory");
 
 namespace {
 
 /// Writes 3 or 4 vertex numbers as one face.
-template <typename Index> void write_face(OutputFile& file, std::initializer_list<uint32_t> vertices) {
+template <typename Index>
+void write_face(OutputFile& file, std::initializer_list<uint32_t> vertices) {
   char record[1 + 4 * sizeof(Index)];
   size_t size = 0;
   record[size++] = static_cast<char>(vertices.size());
@@ -30,11 +31,14 @@ bool makes_quad(std::span<const Triangle> triangles, size_t i) {
   return i + 1 < triangles.size() && triangles[i].x == triangles[i + 1].x && triangles[i].z == triangles[i + 1].y;
 }
 
-template <typename Index> void write_faces(OutputFile& file, std::span<const Triangle> triangles) {
+template <typename Index>
+void write_faces(OutputFile& file, std::span<const Triangle> triangles) {
   for (size_t i = 0; i < triangles.size(); ++i) {
     const Triangle& t = triangles[i];
-    if (makes_quad(triangles, i)) write_face<Index>(file, {t.x, t.y, t.z, triangles[++i].z});
-    else write_face<Index>(file, {t.x, t.y, t.z});
+    if (makes_quad(triangles, i))
+      write_face<Index>(file, {t.x, t.y, t.z, triangles[++i].z});
+    else
+      write_face<Index>(file, {t.x, t.y, t.z});
   }
 }
 
@@ -42,7 +46,8 @@ template <typename Index> void write_faces(OutputFile& file, std::span<const Tri
 
 void write_ply_header(OutputFile& file, const PlyLayout& layout) {
   file.write("ply\nformat binary_little_endian 1.0\ncomment packtrace_scenegen\n");
-  file.write(fmt::format("element vertex {}\nproperty float x\nproperty float y\nproperty float z\n", layout.vertex_count));
+  file.write(
+      fmt::format("element vertex {}\nproperty float x\nproperty float y\nproperty float z\n", layout.vertex_count));
   if (layout.normals) file.write("property float nx\nproperty float ny\nproperty float nz\n");
   if (layout.uvs) file.write("property float u\nproperty float v\n");
   file.write(fmt::format("element face {}\nproperty list uchar {} vertex_indices\nend_header\n", layout.face_count,
@@ -60,8 +65,10 @@ void write_ply(OutputFile& file, const Mesh& mesh) {
     if (layout.normals) file.write_value(mesh.normals[i]);
     if (layout.uvs) file.write_value(mesh.uvs[i]);
   }
-  if (layout.short_indices) write_faces<uint16_t>(file, mesh.triangles);
-  else write_faces<uint32_t>(file, mesh.triangles);
+  if (layout.short_indices)
+    write_faces<uint16_t>(file, mesh.triangles);
+  else
+    write_faces<uint32_t>(file, mesh.triangles);
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

@@ -5,7 +5,7 @@
 #include "assets/generator/output_file.h"
 #include "pbrt_import/scene/scene.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
 /// What a PLY header announces.
 struct PlyLayout {
@@ -24,4 +24,4 @@ void write_ply_triangle(OutputFile& file, const Triangle& triangle); ///< of 32-
 /// A whole mesh, small: 16-bit indices where they suffice, and neighbouring triangles (a,b,c) (a,c,d) as one quad.
 void write_ply(OutputFile& file, const Mesh& mesh);
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

@@ -3,7 +3,7 @@
 #include <cassert>
 #include <vector>
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
 uint32_t add_vertex(Mesh& mesh, DVec3 position) {
   mesh.positions.emplace_back(position);
@@ -172,4 +172,4 @@ void compute_normals(Mesh& mesh) {
   }
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

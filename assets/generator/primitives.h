@@ -12,7 +12,7 @@
 #include "assets/generator/placement.h"
 #include "pbrt_import/scene/scene.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
 /// Building blocks of meshes. Each appends to `mesh`; `frame` takes the block's own space to the model's.
 /// Geometric normals, cross(p1 - p0, p2 - p0), point out of closed blocks.
@@ -60,4 +60,4 @@ private:
 /// Area-weighted vertex normals from the triangles that share each vertex.
 void compute_normals(Mesh& mesh);
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

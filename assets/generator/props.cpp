@@ -6,7 +6,7 @@
 #include "assets/generator/noise.h"
 #include "assets/generator/primitives.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 namespace {
 
 const DAffine kHere(1.0);
@@ -26,8 +26,8 @@ void add_awning(Model& model, const DAffine& f, double width, double depth, doub
   for (int i = 0; i < stripes; ++i) {
     Mesh& mesh = model.flat(i % 2 == 0 ? "canvas_a" : "canvas_b");
     const double x0 = width * i / stripes, x1 = width * (i + 1) / stripes, middle = (x0 + x1) / 2;
-    add_quad(mesh, transform_point(f, {x0, -drop, -depth}), transform_point(f, {x0, 0, 0}), transform_point(f, {x1, 0, 0}),
-             transform_point(f, {x1, -drop, -depth}));
+    add_quad(mesh, transform_point(f, {x0, -drop, -depth}), transform_point(f, {x0, 0, 0}),
+             transform_point(f, {x1, 0, 0}), transform_point(f, {x1, -drop, -depth}));
     add_quad(mesh, transform_point(f, {x0, -drop - 0.22, -depth}), transform_point(f, {x0, -drop, -depth}),
              transform_point(f, {x1, -drop, -depth}), transform_point(f, {x1, -drop - 0.22, -depth}));
     add_triangle(mesh, transform_point(f, {x0, -drop - 0.22, -depth}), transform_point(f, {x1, -drop - 0.22, -depth}),
@@ -96,7 +96,8 @@ Model make_rope_coil() {
 
 Model make_bollard() {
   Model model;
-  static constexpr glm::dvec2 kProfile[] = {{0.26, -0.1}, {0.25, 0.08}, {0.15, 0.14}, {0.13, 0.42}, {0.22, 0.5}, {0.22, 0.58}, {0.12, 0.65}, {0.0, 0.66}};
+  static constexpr glm::dvec2 kProfile[] = {{0.26, -0.1}, {0.25, 0.08}, {0.15, 0.14}, {0.13, 0.42},
+                                            {0.22, 0.5},  {0.22, 0.58}, {0.12, 0.65}, {0.0, 0.66}};
   add_lathe(model.smooth("iron"), kHere, kProfile, 14);
   model.finish();
   return model;
@@ -104,7 +105,8 @@ Model make_bollard() {
 
 Model make_lamp_post() {
   Model model;
-  static constexpr glm::dvec2 kPost[] = {{0.16, -0.1}, {0.16, 0.3}, {0.09, 0.42}, {0.06, 0.6}, {0.05, 3.2}, {0.09, 3.3}, {0.03, 3.4}};
+  static constexpr glm::dvec2 kPost[] = {{0.16, -0.1}, {0.16, 0.3}, {0.09, 0.42}, {0.06, 0.6},
+                                         {0.05, 3.2},  {0.09, 3.3}, {0.03, 3.4}};
   static constexpr glm::dvec2 kGlass[] = {{0.1, 3.4}, {0.19, 3.85}};
   static constexpr glm::dvec2 kHat[] = {{0.26, 3.84}, {0.22, 3.92}, {0.08, 4.1}, {0.04, 4.2}, {0.0, 4.28}};
   add_lathe(model.smooth("iron"), kHere, kPost, 10);
@@ -133,7 +135,8 @@ Model make_bench() {
 
 Model make_flower_pot(Random& random) {
   Model model;
-  static constexpr glm::dvec2 kPot[] = {{0.16, 0.0}, {0.24, 0.4}, {0.28, 0.4}, {0.28, 0.48}, {0.22, 0.48}, {0.2, 0.42}, {0.0, 0.42}};
+  static constexpr glm::dvec2 kPot[] = {{0.16, 0.0},  {0.24, 0.4}, {0.28, 0.4}, {0.28, 0.48},
+                                        {0.22, 0.48}, {0.2, 0.42}, {0.0, 0.42}};
   add_lathe(model.flat("pot"), kHere, kPot, 14);
   add_flowers(model, translation({0, 0.62, 0}), {0.3, 0.24, 0.3}, 60, random);
   return model;
@@ -149,7 +152,8 @@ Model make_flower_box(Random& random) {
 Model make_market_stall(Random& random) {
   Model model;
   for (const double x : {-1.25, 1.2}) {
-    for (const double z : {-0.8, 0.85}) add_box(model.flat("wood"), kHere, {x, 0, z}, {x + 0.06, z < 0 ? 2.1 : 2.6, z + 0.06});
+    for (const double z : {-0.8, 0.85})
+      add_box(model.flat("wood"), kHere, {x, 0, z}, {x + 0.06, z < 0 ? 2.1 : 2.6, z + 0.06});
   }
   add_awning(model, translation({-1.4, 2.65, 0.95}), 2.8, 2.1, 0.55, 8);
   add_box(model.flat("wood_dark"), kHere, {-1.2, 0.0, -0.6}, {1.2, 0.75, 0.6});
@@ -158,7 +162,8 @@ Model make_market_stall(Random& random) {
     const DAffine f = compose(translation({-1.15 + 0.78 * box, 0.78, -0.62}), rotation_x(-0.3));
     add_box(model.flat("wood"), f, {0, 0, 0}, {0.72, 0.16, 1.15});
     for (int i = 0; i < 15; ++i) {
-      const DVec3 at{0.12 + 0.12 * (i % 5) + random.uniform(-0.02, 0.02), 0.18, 0.2 + 0.33 * (i / 5) + random.uniform(-0.04, 0.04)};
+      const DVec3 at{0.12 + 0.12 * (i % 5) + random.uniform(-0.02, 0.02), 0.18,
+                     0.2 + 0.33 * (i / 5) + random.uniform(-0.04, 0.04)};
       const DAffine ball = compose(f, compose(translation(at), scaling(DVec3(0.085))));
       add_blob(model.smooth(kFruit[box]), ball, 2, [](DVec3) { return 0.0; });
     }
@@ -176,12 +181,14 @@ Model make_cafe_table(Random& random) {
   for (int i = 0; i < kPanels; ++i) {
     const auto a = sin_cos(2 * kPi * i / kPanels), b = sin_cos(2 * kPi * (i + 1) / kPanels);
     Mesh& cloth = model.flat(i % 2 == 0 ? "canvas_a" : "canvas_b");
-    const DVec3 top(0, 2.75, 0), pa(1.35 * a.cos, 2.2, 1.35 * a.sin), pb(1.35 * b.cos, 2.2, 1.35 * b.sin), hem(0, 0.18, 0);
+    const DVec3 top(0, 2.75, 0), pa(1.35 * a.cos, 2.2, 1.35 * a.sin), pb(1.35 * b.cos, 2.2, 1.35 * b.sin),
+        hem(0, 0.18, 0);
     add_triangle(cloth, pa, top, pb);
     add_quad(cloth, pa - hem, pa, pb, pb - hem);
   }
   const double turn = random.uniform(0.0, kPi);
-  for (int i = 0; i < 3; ++i) add_chair(model, compose(rotation_y(turn + 2 * kPi * i / 3.0), translation({0, 0, 0.75})));
+  for (int i = 0; i < 3; ++i)
+    add_chair(model, compose(rotation_y(turn + 2 * kPi * i / 3.0), translation({0, 0, 0.75})));
   model.finish();
   return model;
 }
@@ -192,10 +199,12 @@ Model make_laundry(Random& random) {
   const DVec3 path[] = {{0, 0, 0}, {1.3, -0.12, 0}, {2.7, -0.12, 0}, {4, 0, 0}};
   const double radii[] = {0.012, 0.012, 0.012, 0.012};
   add_tube(model.smooth("rope"), path, radii, 3);
-  for (const double end : {0.0, 4.0}) add_box(model.flat("iron"), kHere, {end - 0.02, -0.02, 0.0}, {end + 0.02, 0.02, 0.45});
+  for (const double end : {0.0, 4.0})
+    add_box(model.flat("iron"), kHere, {end - 0.02, -0.02, 0.0}, {end + 0.02, 0.02, 0.45});
   double x = 0.3;
   while (x < 3.3) {
-    const double width = random.uniform(0.35, 0.7), length = random.uniform(0.5, 1.0), blow = random.uniform(-0.2, 0.25);
+    const double width = random.uniform(0.35, 0.7), length = random.uniform(0.5, 1.0),
+                 blow = random.uniform(-0.2, 0.25);
     Mesh& mesh = model.flat(kCloth[random.below(4)]);
     const auto cloth = [&](double u, double v) { // hangs from the line, blown at the hem
       return DVec3(x + width * u, -0.1 - length * v, blow * v * v + 0.05 * v * sin_cos(9.0 * u).sin);
@@ -225,7 +234,8 @@ Model make_fish_rack(Random& random) {
     const double y = 0.6 + 0.19 * j, z = -0.24 + 0.03 * j;
     add_rod(model.smooth("rope"), {-1.45, y, z}, {1.55, y, z}, 0.012, 3);
     const double x = random.uniform(-1.3, 1.3);
-    add_blob(model.smooth("red"), compose(translation({x, y, z - 0.05}), scaling(DVec3(0.08))), 3, [](DVec3) { return 0.0; });
+    add_blob(model.smooth("red"), compose(translation({x, y, z - 0.05}), scaling(DVec3(0.08))), 3,
+             [](DVec3) { return 0.0; });
   }
   model.finish();
   return model;
@@ -252,7 +262,8 @@ Model make_gull(Random& random) {
     add_triangle(white, back, tail, rib);
     add_triangle(white, nose, rib, belly);
     add_triangle(white, belly, rib, tail);
-    add_quad(white, rib + DVec3(0, 0, 0.1), elbow + DVec3(0, 0, 0.05), elbow - DVec3(0, 0, 0.14), rib - DVec3(0, 0, 0.12));
+    add_quad(white, rib + DVec3(0, 0, 0.1), elbow + DVec3(0, 0, 0.05), elbow - DVec3(0, 0, 0.14),
+             rib - DVec3(0, 0, 0.12));
     add_triangle(model.flat("stone_c"), elbow + DVec3(0, 0, 0.05), tip, elbow - DVec3(0, 0, 0.14));
   }
   return model;
@@ -272,4 +283,4 @@ Model make_cloud(Random& random) {
   return model;
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
 /// A bijective 64-bit hash. Source: D. Stafford, "Better Bit Mixing", 2011, variant 13.
 constexpr uint64_t hash_bits(uint64_t x) {
@@ -31,4 +31,4 @@ private:
   uint64_t state_;
 };
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

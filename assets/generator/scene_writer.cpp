@@ -6,7 +6,7 @@
 
 #include "assets/generator/ply_output.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
 SceneWriter::SceneWriter(const OutputConfig& config, std::string name, std::string_view comment, const ViewConfig& view)
     : config_(config), name_(std::move(name)), main_(config.folder / (name_ + ".pbrt"), config.overwrite),
@@ -110,4 +110,4 @@ SceneTotals SceneWriter::finish() {
   return totals_;
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

@@ -11,7 +11,7 @@
 #include "assets/generator/model.h"
 #include "assets/generator/output_file.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
 /// Where a generator writes.
 struct OutputConfig {
@@ -38,8 +38,8 @@ struct SceneTotals {
   uint64_t placed_triangles = 0; ///< instances and world shapes
 };
 
-/// Writes a pbrt-v3 scene: FOLDER/NAME.pbrt, which includes NAME_objects.pbrt and NAME_instances.pbrt, and binary PLY files
-/// under FOLDER/geometry. Instances stream to disk. Every function throws Error(kIo) if the disk refuses.
+/// Writes a pbrt-v3 scene: FOLDER/NAME.pbrt, which includes NAME_objects.pbrt and NAME_instances.pbrt, and binary PLY
+/// files under FOLDER/geometry. Instances stream to disk. Every function throws Error(kIo) if the disk refuses.
 class SceneWriter {
 public:
   /// @param comment '#' lines for the head of the scene file: what is to be seen
@@ -89,4 +89,4 @@ private:
   SceneTotals totals_;
 };
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

@@ -12,7 +12,7 @@
 #include "assets/generator/town_terrain.h"
 #include "pbrt_import/scene/error.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 namespace {
 
 constexpr const char* kComment =
@@ -32,8 +32,9 @@ public:
       : config_(config), writer_(writer), terrain_(config.seed), objects_(write_town_objects(writer, config.seed)) {}
 
   void build() {
-    for (const auto& [name, model] : {std::pair{"ground", terrain_.make_ground()}, std::pair{"sea", terrain_.make_sea()},
-                                      std::pair{"mountains", terrain_.make_mountains()}}) {
+    for (const auto& [name, model] :
+         {std::pair{"ground", terrain_.make_ground()}, std::pair{"sea", terrain_.make_sea()},
+          std::pair{"mountains", terrain_.make_mountains()}}) {
       writer_.model(name, model);
       writer_.world_shape(name);
     }
@@ -47,7 +48,9 @@ public:
   }
 
 private:
-  const std::string& any(const std::vector<std::string>& list) { return list[random_.below(static_cast<uint32_t>(list.size()))]; }
+  const std::string& any(const std::vector<std::string>& list) {
+    return list[random_.below(static_cast<uint32_t>(list.size()))];
+  }
 
   void put(std::string_view object, DVec3 at, double turn, double scale = 1.0) {
     writer_.instance(object, stand_at(at, turn, scale));
@@ -143,9 +146,12 @@ void TownBuilder::decorate(const HouseStyle& style, const DAffine& frame) {
   for (const double side : {-1.0, 1.0}) {
     if (style.config.arcade || !random_.chance(0.55)) continue;
     const DVec3 corner{side * (half - 0.4), 0.0, -0.45};
-    if (random_.chance(0.65)) add(any(objects_.pots), corner, random_.uniform(0.0, 6.0), 1.0);
-    else if (random_.chance(0.5)) add("barrel", corner, 0.0, 0.85);
-    else add(any(objects_.blossoms), corner + DVec3(0, 0, 0.2), 0.0, 1.1);
+    if (random_.chance(0.65))
+      add(any(objects_.pots), corner, random_.uniform(0.0, 6.0), 1.0);
+    else if (random_.chance(0.5))
+      add("barrel", corner, 0.0, 0.85);
+    else
+      add(any(objects_.blossoms), corner + DVec3(0, 0, 0.2), 0.0, 1.1);
   }
   if (style.config.floors > 1 && !style.config.balcony && random_.chance(0.22)) {
     add(any(objects_.laundry), {-half + 0.5, kFloorHeight * 2.0 - 0.35, -0.45}, 0.0, (style.config.width - 1.0) / 4.0);
@@ -154,13 +160,16 @@ void TownBuilder::decorate(const HouseStyle& style, const DAffine& frame) {
 
 void TownBuilder::build_garden(uint32_t level, double angle) {
   const double back = TownTerrain::level_begin(level + 1), radius = terrain_.quay_radius(angle) + back;
-  const auto& tree = random_.chance(0.4) ? objects_.cypresses : random_.chance(0.5) ? objects_.broadleaves : objects_.olives;
+  const auto& tree = random_.chance(0.4)   ? objects_.cypresses
+                     : random_.chance(0.5) ? objects_.broadleaves
+                                           : objects_.olives;
   const double size = random_.uniform(0.75, 1.0);
   put_on(any(tree), angle, back - 2.4, level, random_.uniform(0.0, 6.0), size);
   for (int i = 0; i < 4; ++i) {
     const double inland = back - random_.uniform(0.8, 4.5);
     const double beside = angle + random_.uniform(-1.5, 1.5) / radius;
-    put_on(any(random_.chance(0.4) ? objects_.blossoms : objects_.bushes), beside, inland, level, random_.uniform(0.0, 6.0));
+    put_on(any(random_.chance(0.4) ? objects_.blossoms : objects_.bushes), beside, inland, level,
+           random_.uniform(0.0, 6.0));
   }
 }
 
@@ -181,7 +190,8 @@ void TownBuilder::build_stairs(uint32_t level) {
     const DVec3 foot((radius + top - run) * s, TownTerrain::level_height(level), (radius + top - run) * c);
     put("stairs", foot, angle);
     for (const double side : {-1.6, 1.6}) {
-      if (random_.chance(0.7)) put(any(objects_.pots), foot + DVec3(c * side, 0.0, -s * side), random_.uniform(0.0, 6.0));
+      if (random_.chance(0.7))
+        put(any(objects_.pots), foot + DVec3(c * side, 0.0, -s * side), random_.uniform(0.0, 6.0));
     }
   }
 }
@@ -199,7 +209,8 @@ void TownBuilder::build_edges() {
       const auto [s, c] = sin_cos(middle);
       const double r = terrain_.quay_radius(middle) + edge;
       // The edge is not quite a circle: turn each piece along it (small angles).
-      const double slope = (terrain_.quay_radius(middle + step / 2) - terrain_.quay_radius(middle - step / 2)) / kWallModule;
+      const double slope =
+          (terrain_.quay_radius(middle + step / 2) - terrain_.quay_radius(middle - step / 2)) / kWallModule;
       const double turn = middle - slope;
       const DVec3 top(r * s, TownTerrain::level_height(level), r * c);
       if (level == 0) {
@@ -210,23 +221,29 @@ void TownBuilder::build_edges() {
       if (near_stairs(level - 1, middle, 2.3) || level == TownTerrain::kLevels) continue;
       const DVec3 inside = top + DVec3(s, 0, c) * 0.12;
       const uint64_t run = hash_bits(config_.seed + level * 1000 + piece / 4) % 5;
-      if (run < 2 && level < 6) put("railing", inside, turn);
-      else if (run < 2) put(any(objects_.fences), inside, turn);
-      else if (run < 4) put(any(objects_.parapets), inside, turn);
-      else put(any(objects_.pots), inside + DVec3(s, 0, c) * 0.3, random_.uniform(0.0, 6.0), 1.1);
+      if (run < 2 && level < 6)
+        put("railing", inside, turn);
+      else if (run < 2)
+        put(any(objects_.fences), inside, turn);
+      else if (run < 4)
+        put(any(objects_.parapets), inside, turn);
+      else
+        put(any(objects_.pots), inside + DVec3(s, 0, c) * 0.3, random_.uniform(0.0, 6.0), 1.1);
     }
   }
 }
 
 void TownBuilder::build_quay() {
   const auto along_quay = [&](double spacing, double inland, const auto& place) {
-    for (double angle = kFirstAngle + 0.05; angle < kLastAngle; angle += spacing / (terrain_.quay_radius(angle) + inland)) {
+    for (double angle = kFirstAngle + 0.05; angle < kLastAngle;
+         angle += spacing / (terrain_.quay_radius(angle) + inland)) {
       if (terraced(angle, inland)) place(angle);
     }
   };
   along_quay(9.0, 1.2, [&](double angle) { put_on("lamp_post", angle, 1.2, 0, angle); });
   along_quay(5.0, 0.55, [&](double angle) { put_on("bollard", angle, 0.55, 0, angle); });
-  along_quay(17.0, 1.9, [&](double angle) { put_on(any(objects_.palms), angle + 0.05, 1.9, 0, random_.uniform(0.0, 6.0), 0.95); });
+  along_quay(17.0, 1.9,
+             [&](double angle) { put_on(any(objects_.palms), angle + 0.05, 1.9, 0, random_.uniform(0.0, 6.0), 0.95); });
   along_quay(6.3, 2.6, [&](double angle) {
     const double pick = random_.uniform();
     const double turn = angle + random_.uniform(-0.3, 0.3);
@@ -296,12 +313,15 @@ void TownBuilder::build_landmarks() {
   for (int i = 0; i < 26; ++i) {
     const auto [s, c] = sin_cos(i * 2.4);
     const double out = 1.7 * std::sqrt(static_cast<double>(i));
-    put(any(objects_.shore_rocks), islet + DVec3(s * out, 1.4 - 0.24 * out, c * out), i * 1.3, random_.uniform(5.0, 8.0));
+    put(any(objects_.shore_rocks), islet + DVec3(s * out, 1.4 - 0.24 * out, c * out), i * 1.3,
+        random_.uniform(5.0, 8.0));
   }
   put("lighthouse", islet + DVec3(0, 3.6, 0), radians(10));
-  for (int i = 0; i < 9; ++i) {
-    const DVec3 at{random_.uniform(-260.0, 260.0), random_.uniform(105.0, 150.0), random_.uniform(380.0, 460.0)};
-    put(any(objects_.clouds), at, random_.uniform(-0.4, 0.4), random_.uniform(1.4, 2.6));
+  static constexpr double kClouds[][4] = {{-215, 118, 400, 2.0}, {-150, 152, 430, 1.5}, {-250, 168, 440, 1.2},
+                                          {15, 150, 420, 2.1},   {60, 132, 440, 1.5},   {215, 158, 430, 1.9},
+                                          {-95, 128, 450, 1.3},  {150, 182, 440, 1.4}};
+  for (const auto& cloud : kClouds) {
+    put(any(objects_.clouds), {cloud[0], cloud[1], cloud[2]}, random_.uniform(-0.4, 0.4), cloud[3]);
   }
   for (int i = 0; i < 18; ++i) {
     const DVec3 at{random_.uniform(-45.0, 35.0), random_.uniform(11.0, 26.0), random_.uniform(0.0, 45.0)};
@@ -310,15 +330,18 @@ void TownBuilder::build_landmarks() {
 }
 
 void TownBuilder::build_boats() {
-  for (double angle = kFirstAngle + 0.06; angle < kLastAngle; angle += 5.2 / terrain_.quay_radius(angle)) { // at the quay
+  for (double angle = kFirstAngle + 0.06; angle < kLastAngle;
+       angle += 5.2 / terrain_.quay_radius(angle)) { // at the quay
     const bool large = random_.chance(0.35);
     const double out = large ? -3.2 : -2.2;
     const DVec3 at = terrain_.place(angle, out - (large ? 2.8 : 1.0), 0);
     const double turn = angle + kPi * (random_.chance(0.7) ? 1.0 : 0.0) + random_.uniform(-0.12, 0.12);
-    if (terrain_.built(angle, 1.0) > 0.9) put(any(large ? objects_.fishing_boats : objects_.rowing_boats), {at.x, 0.0, at.z}, turn);
+    if (terrain_.built(angle, 1.0) > 0.9)
+      put(any(large ? objects_.fishing_boats : objects_.rowing_boats), {at.x, 0.0, at.z}, turn);
     if (large) angle += 1.0 / terrain_.quay_radius(angle);
   }
-  static constexpr double kMoored[][3] = {{3, -6, 0.9}, {13, 6, 2.2}, {-4, 14, 0.4}, {22, -3, 1.4}, {8, 18, 2.9}, {-28, 26, 0.7}};
+  static constexpr double kMoored[][3] = {{3, -6, 0.9},  {13, 6, 2.2}, {-4, 14, 0.4},
+                                          {22, -3, 1.4}, {8, 18, 2.9}, {-28, 26, 0.7}};
   for (const auto& boat : kMoored) {
     put(any(objects_.rowing_boats), {boat[0], 0, boat[1]}, boat[2]);
     put("buoy", DVec3(boat[0] + 3.0, 0, boat[1] + 1.0), boat[2]);
@@ -333,11 +356,16 @@ void TownBuilder::build_boats() {
 void TownBuilder::put_plant(DVec3 at, double wildness) {
   const double turn = random_.uniform(0.0, 2.0 * kPi), size = random_.uniform(0.7, 1.2);
   const double patch = fractal_noise(at * 0.045, config_.seed + 60, 2);
-  if (wildness > 0.75) put(any(objects_.rocks), at, turn, size * 1.8);
-  else if (patch > 0.28) put(any(objects_.pines), at, turn, size);
-  else if (patch > 0.05) put(any(objects_.broadleaves), at, turn, size);
-  else if (patch > -0.22) put(any(objects_.olives), at, turn, size);
-  else put(any(objects_.cypresses), at, turn, size);
+  if (wildness > 0.75)
+    put(any(objects_.rocks), at, turn, size * 1.8);
+  else if (patch > 0.28)
+    put(any(objects_.pines), at, turn, size);
+  else if (patch > 0.05)
+    put(any(objects_.broadleaves), at, turn, size);
+  else if (patch > -0.22)
+    put(any(objects_.olives), at, turn, size);
+  else
+    put(any(objects_.cypresses), at, turn, size);
 }
 
 /// Trees on a coarse jittered grid; then the rest of the instances as undergrowth, so many that the total comes out.
@@ -356,8 +384,10 @@ void TownBuilder::build_hillside() {
       if (!open_ground(a, s, at)) continue;
       const bool shore = at.y < 3.5;
       const double density = 0.5 + 0.45 * fractal_noise(at * 0.05, config_.seed + 61, 3);
-      if (shore) put(any(objects_.shore_rocks), at, wildness * 6.0, random_.uniform(1.5, 3.5));
-      else if (wildness < density) put_plant(at - DVec3(0, 0.15, 0), wildness);
+      if (shore)
+        put(any(objects_.shore_rocks), at, wildness * 6.0, random_.uniform(1.5, 3.5));
+      else if (wildness < density)
+        put_plant(at - DVec3(0, 0.15, 0), wildness);
     }
   }
   const uint32_t wanted = config_.instances > placed_ ? config_.instances - placed_ : 0;
@@ -372,7 +402,10 @@ void TownBuilder::build_hillside() {
     }
     ++done;
     const double pick = random_.uniform(), turn = random_.uniform(0.0, 2.0 * kPi), size = random_.uniform(0.8, 1.7);
-    put(any(pick < 0.45 ? objects_.tufts : pick < 0.9 ? objects_.bushes : objects_.rocks), at - DVec3(0, 0.05, 0), turn, size);
+    put(any(pick < 0.45  ? objects_.tufts
+            : pick < 0.9 ? objects_.bushes
+                         : objects_.rocks),
+        at - DVec3(0, 0.05, 0), turn, size);
   }
 }
 
@@ -388,4 +421,4 @@ SceneTotals generate_town(const TownConfig& config, const OutputConfig& output) 
   return writer.finish();
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

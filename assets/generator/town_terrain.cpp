@@ -10,7 +10,7 @@
 #include "assets/generator/placement.h"
 #include "assets/generator/primitives.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 namespace {
 
 constexpr double kFirstAngle = radians(-62), kLastAngle = radians(112);
@@ -145,15 +145,18 @@ Model TownTerrain::make_sea() const {
   PatchBuilder patch(model, points);
   for (size_t j = 0; j + 1 < radii.size(); ++j) {
     for (size_t i = 0; i < kColumns; ++i) {
-      const double angle = kFrom + 2.0 * kPi * (static_cast<double>(i) + 0.5) / kColumns, radius = (radii[j] + radii[j + 1]) * 0.5;
+      const double angle = kFrom + 2.0 * kPi * (static_cast<double>(i) + 0.5) / kColumns,
+                   radius = (radii[j] + radii[j + 1]) * 0.5;
       const bool coast = angle > kFirstAngle && angle < kLastAngle;
       const double ground = coast ? height(angle, std::min(radius - quay_radius(angle), 200.0)) : -8.0;
       if (ground > 1.2) continue; // under the land
       const size_t low = j * kColumns + i, high = low + kColumns, next = i + 1 < kColumns ? 1 : 1 - kColumns;
       const DVec3 middle = (points[low] + points[high + next]) * 0.5;
-      const double depth = -ground - 0.6 + 0.9 * fractal_noise(middle * 0.05, seed_ + 9, 3) + 6.0 * smooth_step(45.0, 420.0, radius);
+      const double depth =
+          -ground - 0.6 + 0.9 * fractal_noise(middle * 0.05, seed_ + 9, 3) + 6.0 * smooth_step(45.0, 420.0, radius);
       const double shade = std::clamp(depth / 13.0, 0.0, 0.999) * kSeaShades;
-      patch.quad(depth < 0.0 ? "foam" : fmt::format("water_{}", static_cast<int>(shade)), {low, high, high + next, low + next});
+      patch.quad(depth < 0.0 ? "foam" : fmt::format("water_{}", static_cast<int>(shade)),
+                 {low, high, high + next, low + next});
     }
   }
   return model;
@@ -188,4 +191,4 @@ Model TownTerrain::make_mountains() const {
   return model;
 }
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

@@ -5,13 +5,13 @@
 #include "assets/generator/model.h"
 #include "assets/generator/random.h"
 
-namespace packtrace {
+namespace packtrace::scenegen {
 
-/// The shape of the harbour town's hill: an amphitheatre of terraces around a bay whose middle is the origin. Places are
-/// (angle, inland): angle from +z towards +x in radians, metres inland from the quay's edge. Sea level is y = 0.
+/// The shape of the harbour town's hill: an amphitheatre of terraces around a bay whose middle is the origin. Places
+/// are (angle, inland): angle from +z towards +x in radians, metres inland from the quay's edge. Sea level is y = 0.
 class TownTerrain {
 public:
-  static constexpr uint32_t kLevels = 8;         ///< level 0 is the quay
+  static constexpr uint32_t kLevels = 8; ///< level 0 is the quay
   static constexpr double kQuayHeight = 1.3;
   static constexpr double kQuayWidth = 12.0;
   static constexpr double kTerraceWidth = 9.6;
@@ -49,4 +49,4 @@ private:
   uint64_t seed_;
 };
 
-} // namespace packtrace
+} // namespace packtrace::scenegen

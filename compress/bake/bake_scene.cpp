@@ -7,7 +7,6 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
-#include "compress/bake/baked_writer.h"
 #include "compress/bake/file_sections.h"
 #include "compress/bake/geometry_encoder.h"
 #include "compress/bake/geometry_measure.h"
@@ -15,6 +14,8 @@
 #include "compress/format/baked_image.h"
 #include "compress/format/bit_stream.h"
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/file_bytes.h"
+#include "pbrt_import/scene/output_file.h"
 
 namespace packtrace {
 namespace {
@@ -268,10 +269,11 @@ BakedScene bake_to_bytes(const Scene& scene, const BakeConfig& config, Diagnosti
 BakeReport bake_scene(const Scene& scene, const BakeConfig& config, const std::filesystem::path& output, bool force,
                       Diagnostics& diagnostics, Progress& progress) {
   config.validate();
-  check_output(output, force);
+  OutputFile file(output, force);
   BakedScene baked = bake_to_bytes(scene, config, diagnostics, progress);
   progress.begin("writing the file", 0);
-  write_file_atomically(output, baked.bytes, force);
+  write_file_bytes(file.path(), baked.bytes);
+  file.commit();
   return std::move(baked.report);
 }
 

@@ -16,7 +16,7 @@ struct AlphaMask {
   uint32_t width = 0;  ///< texels
   uint32_t height = 0; ///< texels
   WrapMode wrap = WrapMode::kRepeat;
-  Vec2 uv_scale{1.0f};  ///< st = uv * uv_scale + uv_offset
+  Vec2 uv_scale{1.0f}; ///< st = uv * uv_scale + uv_offset
   Vec2 uv_offset{0.0f};
   std::vector<uint32_t> words; ///< height x row_words(width), bit x%32 of word x/32 is texel x
 

@@ -7,9 +7,12 @@ namespace packtrace {
 
 std::string_view to_string(Severity severity) {
   switch (severity) {
-  case Severity::kNote: return "note";
-  case Severity::kWarning: return "warning";
-  case Severity::kError: return "error";
+  case Severity::kNote:
+    return "note";
+  case Severity::kWarning:
+    return "warning";
+  case Severity::kError:
+    return "error";
   }
   return "unknown";
 }

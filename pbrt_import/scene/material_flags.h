@@ -8,18 +8,18 @@ namespace packtrace {
 /// Bits not named here are zero.
 using MaterialFlags = uint32_t;
 
-inline constexpr MaterialFlags kAlphaMask = 1u << 0;        ///< surface is absent for all rays where the mask is 0
-inline constexpr MaterialFlags kShadowAlphaMask = 1u << 1;  ///< surface is absent for occlusion rays where the mask is 0
-inline constexpr MaterialFlags kTransmissive = 1u << 2;     ///< glass-like: seen by the camera, does not occlude
-inline constexpr MaterialFlags kMirror = 1u << 3;           ///< specular reflection dominates
-inline constexpr MaterialFlags kEmissive = 1u << 4;         ///< carries an area light
-inline constexpr MaterialFlags kEmitsBothSides = 1u << 5;   ///< the area light is twosided
-inline constexpr MaterialFlags kInvisible = 1u << 6;        ///< pbrt "none" material: camera rays pass, occlusion rays hit
-inline constexpr MaterialFlags kAbsent = 1u << 7;           ///< constant alpha 0: nothing sees it; not stored
-inline constexpr MaterialFlags kNoShadow = 1u << 8;         ///< constant shadowalpha 0: camera rays hit, occlusion rays pass
-inline constexpr MaterialFlags kAlbedoTexture = 1u << 9;    ///< albedo is the average of a texture
-inline constexpr MaterialFlags kNormalMap = 1u << 10;       ///< a normal or bump map was given
-inline constexpr MaterialFlags kMetal = 1u << 11;           ///< albedo is a metal's reflectance
+inline constexpr MaterialFlags kAlphaMask = 1u << 0;       ///< surface is absent for all rays where the mask is 0
+inline constexpr MaterialFlags kShadowAlphaMask = 1u << 1; ///< surface is absent for occlusion rays where the mask is 0
+inline constexpr MaterialFlags kTransmissive = 1u << 2;    ///< glass-like: seen by the camera, does not occlude
+inline constexpr MaterialFlags kMirror = 1u << 3;          ///< specular reflection dominates
+inline constexpr MaterialFlags kEmissive = 1u << 4;        ///< carries an area light
+inline constexpr MaterialFlags kEmitsBothSides = 1u << 5;  ///< the area light is twosided
+inline constexpr MaterialFlags kInvisible = 1u << 6; ///< pbrt "none" material: camera rays pass, occlusion rays hit
+inline constexpr MaterialFlags kAbsent = 1u << 7;    ///< constant alpha 0: nothing sees it; not stored
+inline constexpr MaterialFlags kNoShadow = 1u << 8;  ///< constant shadowalpha 0: camera rays hit, occlusion rays pass
+inline constexpr MaterialFlags kAlbedoTexture = 1u << 9; ///< albedo is the average of a texture
+inline constexpr MaterialFlags kNormalMap = 1u << 10;    ///< a normal or bump map was given
+inline constexpr MaterialFlags kMetal = 1u << 11;        ///< albedo is a metal's reflectance
 inline constexpr MaterialFlags kAllMaterialFlags = (1u << 12) - 1;
 
 /// Camera rays can hit it.

@@ -13,7 +13,8 @@ using DVec3 = glm::dvec3;
 using Triangle = glm::uvec3; ///< three vertex indices
 
 /// Affine maps, GLM's column-major 4 columns x 3 rows: columns 0..2 are the linear part, column 3 the translation.
-/// Named `to_from_from`: world_from_object. All spaces are pbrt's left-handed ones (camera: +x right, +y up, +z forward).
+/// Named `to_from_from`: world_from_object. All spaces are pbrt's left-handed ones (camera: +x right, +y up, +z
+/// forward).
 using Affine = glm::mat4x3;
 using DAffine = glm::dmat4x3;
 

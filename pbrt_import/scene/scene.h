@@ -37,8 +37,8 @@ struct Material {
 
 /// One pbrt Shape: a mesh placed in its parent's space (the world, or the object it belongs to).
 struct Shape {
-  uint32_t mesh = 0;     ///< into Scene::meshes; several shapes may share one
-  uint32_t material = 0; ///< into Scene::materials
+  uint32_t mesh = 0;                ///< into Scene::meshes; several shapes may share one
+  uint32_t material = 0;            ///< into Scene::materials
   bool reverse_orientation = false; ///< the geometric normal is the negated one
   DAffine parent_from_mesh{1.0};    ///< may mirror; never singular
 };

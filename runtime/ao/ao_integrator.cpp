@@ -197,7 +197,7 @@ void require(bool condition, const char* message) {
 } // namespace
 
 float default_ao_radius(const Bounds& bounds) {
-  const double radius = 0.05 * bounds.diagonal();
+  const double radius = 0.1 * bounds.diagonal();
   return radius > 0.0 && std::isfinite(radius) ? static_cast<float>(radius) : 1.0f;
 }
 

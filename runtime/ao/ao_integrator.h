@@ -28,7 +28,7 @@ struct AoConfig {
   SamplerKind sampler = SamplerKind::kSpaceTimeNet;
 };
 
-/// A radius for scenes whose units are not known: 5 % of the diagonal; 1 for boxes without extent.
+/// A radius for scenes whose units are not known: 10 % of the diagonal; 1 for boxes without extent.
 float default_ao_radius(const Bounds& bounds);
 
 /// Throws Error(kUsage) naming the first parameter out of range.

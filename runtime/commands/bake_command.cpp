@@ -68,7 +68,8 @@ nlohmann::json report(const BakeOptions& options, const BakeReport& baked, const
                     {"textures_missing", imported.textures_missing}};
   json["dropped_streams"] = nlohmann::json::array();
   for (const DroppedStream& dropped : baked.dropped)
-    json["dropped_streams"].push_back({{"stream", dropped.stream}, {"reason", dropped.reason}, {"bytes_saved", dropped.source_bytes}});
+    json["dropped_streams"].push_back(
+        {{"stream", dropped.stream}, {"reason", dropped.reason}, {"bytes_saved", dropped.source_bytes}});
   json["warnings"] = baked.warnings;
   return json;
 }
@@ -96,13 +97,19 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
 
   if (json.wanted()) json.write(report(options, baked, imported.statistics, import_s, bake_s));
   if (json.to_stdout() || globals.quiet) return 0;
-  fmt::print("{}: import {:.3f} s, bake {:.3f} s, peak memory {:.0f} MiB\n", options.dry_run ? "dry run" : options.output,
-             import_s, bake_s, static_cast<double>(peak_rss_bytes()) / (1 << 20));
-  fmt::print("{:L} triangles in {:L} bytes: {:.3f} bytes a triangle; position error {:.3g}, normal error {:.3f} degrees\n",
-             baked.file.triangles, baked.file.bytes.total, baked.file.bytes_per_triangle, baked.max_position_error,
-             baked.max_normal_error_degrees);
+  fmt::print("{}: import {:.3f} s, bake {:.3f} s, peak memory {:.0f} MiB\n",
+             options.dry_run ? "dry run" : options.output, import_s, bake_s,
+             static_cast<double>(peak_rss_bytes()) / (1 << 20));
+  fmt::print(
+      "{}",
+      fmt::format(
+          grouped(),
+          "{:L} triangles in {:L} bytes: {:.3f} bytes a triangle; position error {:.3g}, normal error {:.3f} degrees\n",
+          baked.file.triangles, baked.file.bytes.total, baked.file.bytes_per_triangle, baked.max_position_error,
+          baked.max_normal_error_degrees));
   for (const DroppedStream& dropped : baked.dropped)
-    fmt::print("dropped {}: {} ({:L} bytes saved)\n", dropped.stream, dropped.reason, dropped.source_bytes);
+    fmt::print("{}", fmt::format(grouped(), "dropped {}: {} ({:L} bytes of source saved)\n", dropped.stream,
+                                 dropped.reason, dropped.source_bytes));
   if (globals.verbosity > 0) fmt::print("\n{}", to_text(baked.file));
   return 0;
 }
@@ -126,11 +133,12 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   precision.require_option(0, 1);
   verb.add_flag("--dry-run", options->dry_run, "Do everything but write the file");
   verb.add_flag("--strict", options->strict, "Fail if the scene has any problem");
-  verb.footer("The grid is shared by all geometry of the world, so meshes that touch stay closed. The error that was measured\n"
-              "against the source is printed, stored in the file, and never above half a step per axis.\n"
-              "Examples:\n"
-              "  packtrace bake house.pbrt -o house.ptk\n"
-              "  packtrace bake house.pbrt -o small.ptk --precision 1e-4 --json report.json");
+  verb.footer(
+      "The grid is shared by all geometry of the world, so meshes that touch stay closed. The error that was measured\n"
+      "against the source is printed, stored in the file, and never above half a step per axis.\n"
+      "Examples:\n"
+      "  packtrace bake house.pbrt -o house.ptk\n"
+      "  packtrace bake house.pbrt -o small.ptk --precision 1e-4 --json report.json");
 }
 
 } // namespace packtrace

@@ -13,7 +13,7 @@
 
 #include "pbrt_import/scene/error.h"
 #include "pbrt_import/scene/progress.h"
-#include "runtime/commands/output_file.h"
+#include "pbrt_import/scene/output_file.h"
 
 namespace packtrace {
 

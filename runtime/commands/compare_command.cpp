@@ -17,7 +17,7 @@
 #include "pbrt_import/scene/error.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/json_output.h"
-#include "runtime/commands/output_file.h"
+#include "pbrt_import/scene/output_file.h"
 #include "runtime/image/false_color.h"
 #include "runtime/image/metrics.h"
 #include "runtime/image/png.h"

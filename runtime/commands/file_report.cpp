@@ -37,6 +37,15 @@ std::array<double, 3> array_of(DVec3 v) { return {v.x, v.y, v.z}; }
 
 } // namespace
 
+const std::locale& grouped() {
+  struct Thousands : std::numpunct<char> {
+    char do_thousands_sep() const override { return ','; }
+    std::string do_grouping() const override { return "\3"; }
+  };
+  static const std::locale kLocale(std::locale::classic(), new Thousands); // the locale deletes it
+  return kLocale;
+}
+
 nlohmann::json to_json(const FileSummary& s) {
   nlohmann::json bytes, grids = nlohmann::json::array();
   for (const auto& [name, count] : stream_rows(s.bytes)) bytes[name] = count;
@@ -74,11 +83,12 @@ nlohmann::json to_json(const FileSummary& s) {
 
 std::string to_text(const FileSummary& s) {
   const auto triangles = static_cast<double>(s.triangles);
-  std::string text = fmt::format(
-      "triangles {:L} stored, {:L} placed   vertices {:L}   clusters {:L} ({:.1f} triangles each)\n"
-      "geometries {:L} ({:L} shared)   instances {:L}   materials {:L}   masks {:L}   cameras {:L}\n",
-      s.triangles, s.placed_triangles, s.vertices, s.clusters, s.triangles_per_cluster, s.geometries, s.shared_geometries,
-      s.instances, s.materials, s.masks, s.cameras);
+  std::string text =
+      fmt::format(grouped(),
+                  "triangles {:L} stored, {:L} placed   vertices {:L}   clusters {:L} ({:.1f} triangles each)\n"
+                  "geometries {:L} ({:L} shared)   instances {:L}   materials {:L}   masks {:L}   cameras {:L}\n",
+                  s.triangles, s.placed_triangles, s.vertices, s.clusters, s.triangles_per_cluster, s.geometries,
+                  s.shared_geometries, s.instances, s.materials, s.masks, s.cameras);
   const DVec3 extent = s.bounds.extent();
   text += fmt::format("bounds {:.6g} x {:.6g} x {:.6g}", extent.x, extent.y, extent.z);
   if (!s.grids.empty())
@@ -90,9 +100,11 @@ std::string to_text(const FileSummary& s) {
   text += fmt::format("{:<22}{:>14}{:>16}\n", "stream", "bytes", "per triangle");
   for (const auto& [name, bytes] : stream_rows(s.bytes))
     if (bytes > 0)
-      text += fmt::format("{:<22}{:>14}{:>16.3f}\n", name, bytes, triangles > 0 ? static_cast<double>(bytes) / triangles : 0.0);
+      text += fmt::format(grouped(), "{:<22}{:>14L}{:>16.3f}\n", name, bytes,
+                          triangles > 0 ? static_cast<double>(bytes) / triangles : 0.0);
   if (s.placed_triangles != s.triangles)
-    text += fmt::format("{:<22}{:>14}{:>16.3f}\n", "total, as placed", s.bytes.total, s.bytes_per_placed_triangle);
+    text += fmt::format(grouped(), "{:<22}{:>14L}{:>16.3f}\n", "total, as placed", s.bytes.total,
+                        s.bytes_per_placed_triangle);
   return text;
 }
 

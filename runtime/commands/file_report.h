@@ -1,5 +1,6 @@
 #pragma once
 
+#include <locale>
 #include <string>
 
 #include <nlohmann/json_fwd.hpp>
@@ -11,7 +12,10 @@ namespace packtrace {
 /// What a baked file holds, as `info --json` and `bake --json` write it (docs/json_output.md).
 nlohmann::json to_json(const FileSummary& summary);
 
-/// The same for people: counts, errors, and a table of bytes by stream.
+/// For fmt's {:L}: 1234567 as 1,234,567, whatever the user's locale.
+const std::locale& grouped();
+
+/// The same as to_json() for people: counts, errors, and a table of bytes by stream.
 std::string to_text(const FileSummary& summary);
 
 } // namespace packtrace

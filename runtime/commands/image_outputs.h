@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/commands/output_file.h"
+#include "pbrt_import/scene/output_file.h"
 #include "runtime/image/exr.h"
 #include "runtime/render/renderer.h"
 

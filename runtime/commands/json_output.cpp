@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pbrt_import/scene/error.h"
-#include "runtime/image/file_bytes.h"
+#include "pbrt_import/scene/file_bytes.h"
 
 namespace packtrace {
 

@@ -5,7 +5,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "runtime/commands/output_file.h"
+#include "pbrt_import/scene/output_file.h"
 
 namespace packtrace {
 

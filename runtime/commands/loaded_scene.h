@@ -24,8 +24,8 @@ ImportResult import_for_command(const std::filesystem::path& file, bool strict, 
 
 /// A scene on disk, packed or not, ready to be traced.
 struct LoadedScene {
-  std::optional<BakedFile> baked;    ///< of a .ptk
-  std::unique_ptr<Scene> imported;   ///< of a .pbrt
+  std::optional<BakedFile> baked;      ///< of a .ptk
+  std::unique_ptr<Scene> imported;     ///< of a .pbrt
   std::unique_ptr<SceneSource> source; ///< over one of the two
 };
 

@@ -13,9 +13,11 @@ namespace {
 
 /// A verb that is documented to come, so that asking for it gives a better answer than "unknown".
 void add_planned_verb(CLI::App& app, packtrace::GlobalOptions& globals, const std::string& name) {
-  packtrace::add_verb(app, globals, name, "Planned", [name]() -> int {
-    throw packtrace::Error(packtrace::ErrorKind::kUnsupported, "'" + name + "' is planned but not there yet");
-  })
+  packtrace::add_verb(app, globals, name, "Planned",
+                      [name]() -> int {
+                        throw packtrace::Error(packtrace::ErrorKind::kUnsupported,
+                                               "'" + name + "' is planned but not there yet");
+                      })
       .allow_extras()
       ->group("");
 }

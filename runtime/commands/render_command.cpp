@@ -31,7 +31,7 @@ constexpr uint32_t kGroundTruthSpp = 1024;
 struct RenderOptions {
   std::string input;
   std::vector<std::string> outputs, aovs;
-  uint32_t camera = 0;
+  std::string camera = "0"; ///< number, or "auto"
   std::string size;
   uint32_t supersample = 1;
   std::optional<uint32_t> spp, frames;
@@ -44,27 +44,33 @@ struct RenderOptions {
   std::string bvh = "medium";
 };
 
+bool parse_number(std::string_view digits, uint32_t& value) {
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  return error == std::errc() && end == digits.data() + digits.size();
+}
+
 ImageSize parse_size(const std::string& text) {
   ImageSize size;
   const size_t cross = text.find('x');
-  const auto number = [&](std::string_view digits, uint32_t& value) {
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    return error == std::errc() && end == digits.data() + digits.size() && !digits.empty();
-  };
-  if (cross == std::string::npos || !number(std::string_view(text).substr(0, cross), size.width) ||
-      !number(std::string_view(text).substr(cross + 1), size.height))
+  if (cross == std::string::npos || !parse_number(std::string_view(text).substr(0, cross), size.width) ||
+      !parse_number(std::string_view(text).substr(cross + 1), size.height))
     throw Error(ErrorKind::kUsage, "--size " + text + ": write WIDTHxHEIGHT, for example 1280x720");
   return size;
 }
 
 Camera choose_camera(const SceneSource& source, const RenderOptions& options, const GlobalOptions& globals) {
   const std::span<const Camera> cameras = source.cameras();
-  if (options.camera < cameras.size()) return cameras[options.camera];
-  if (options.camera > 0)
-    throw Error(ErrorKind::kUsage, fmt::format("--camera {}: the scene has {} camera{}", options.camera, cameras.size(),
+  const ImageSize size = options.size.empty() ? kDefaultSize : parse_size(options.size);
+  if (options.camera == "auto") return framing_camera(source.world_bounds(), size);
+  uint32_t index = 0;
+  if (!parse_number(options.camera, index))
+    throw Error(ErrorKind::kUsage, "--camera " + options.camera + ": give a number from 0, or auto");
+  if (index < cameras.size()) return cameras[index];
+  if (index > 0)
+    throw Error(ErrorKind::kUsage, fmt::format("--camera {}: the scene has {} camera{}", index, cameras.size(),
                                                cameras.size() == 1 ? "" : "s"));
   if (!globals.quiet) fmt::print(stderr, "{}: warning: no camera; framing the scene's bounds\n", options.input);
-  return framing_camera(source.world_bounds(), options.size.empty() ? kDefaultSize : parse_size(options.size));
+  return framing_camera(source.world_bounds(), size);
 }
 
 RenderConfig make_config(const SceneSource& source, const Camera& camera, const RenderOptions& options) {
@@ -102,7 +108,8 @@ double rate_m(uint64_t rays, double seconds) { return seconds > 0 ? static_cast<
 
 nlohmann::json report(const RenderOptions& options, const RenderConfig& config, const RenderedImage& image,
                       const SceneSource& source, const EmbreeScene& scene, const std::vector<std::string>& files) {
-  const auto hits = std::count_if(image.instance.begin(), image.instance.end(), [](uint32_t i) { return i != kNoInstance; });
+  const auto hits =
+      std::count_if(image.instance.begin(), image.instance.end(), [](uint32_t i) { return i != kNoInstance; });
   const RenderTimings& t = image.timings;
   return {
       {"verb", "render"},
@@ -122,7 +129,8 @@ nlohmann::json report(const RenderOptions& options, const RenderConfig& config, 
       {"rays", {{"primary", image.primary_rays}, {"ao", image.ao_rays}}},
       {"mrays_per_s", {{"primary", rate_m(image.primary_rays, t.primary_s)}, {"ao", rate_m(image.ao_rays, t.ao_s)}}},
       {"seconds", {{"bvh", t.build_s}, {"primary", t.primary_s}, {"ao", t.ao_s}, {"denoise", t.denoise_s}}},
-      {"resident_bytes", {{"source", source.resident_bytes()}, {"tracing", scene.resident_bytes()}, {"bvh", scene.bvh_bytes()}}},
+      {"resident_bytes",
+       {{"source", source.resident_bytes()}, {"tracing", scene.resident_bytes()}, {"bvh", scene.bvh_bytes()}}},
       {"peak_rss_bytes", peak_rss_bytes()},
   };
 }
@@ -130,8 +138,9 @@ nlohmann::json report(const RenderOptions& options, const RenderConfig& config, 
 void print(const nlohmann::json& r) {
   const auto& seconds = r.at("seconds");
   const auto frames = r.at("frames").get<double>();
-  fmt::print("{}x{} pixels, {} frame{} of {} spp, mean ao {:.4f}\n", r.at("width").get<int>(), r.at("height").get<int>(),
-             r.at("frames").get<int>(), frames == 1 ? "" : "s", r.at("spp").get<int>(), r.at("mean_ao").get<double>());
+  fmt::print("{}x{} pixels, {} frame{} of {} spp, mean ao {:.4f}\n", r.at("width").get<int>(),
+             r.at("height").get<int>(), r.at("frames").get<int>(), frames == 1 ? "" : "s", r.at("spp").get<int>(),
+             r.at("mean_ao").get<double>());
   fmt::print("  bvh       {:8.3f} s   {:.1f} MiB resident\n", seconds.at("bvh").get<double>(),
              static_cast<double>(r.at("resident_bytes").at("tracing").get<uint64_t>()) / (1 << 20));
   fmt::print("  primary   {:8.3f} s   {:.1f} Mrays/s\n", seconds.at("primary").get<double>(),
@@ -171,6 +180,8 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
                         {"aoSpp", static_cast<int>(config.ao.spp)},
                         {"frames", static_cast<int>(config.frames)}});
   const nlohmann::json result = report(options, config, image, *loaded.source, scene, outputs.targets());
+  if (result.at("hit_pixels") == 0 && !globals.quiet)
+    fmt::print(stderr, "{}: warning: this camera sees nothing of the scene; try --camera auto\n", options.input);
   if (json.wanted()) json.write(result);
   if (!json.to_stdout() && !globals.quiet) print(result);
   return 0;
@@ -182,7 +193,8 @@ void add_render_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<RenderOptions>();
   CLI::App& verb = add_verb(app, globals, "render", "Trace and denoise ambient occlusion",
                             [options, &globals] { return run(*options, globals); });
-  verb.add_option("FILE", options->input, "A .ptk file, or a .pbrt scene to be traced in floats without packing")->required();
+  verb.add_option("FILE", options->input, "A .ptk file, or a .pbrt scene to be traced in floats without packing")
+      ->required();
   verb.add_option("-o,--output", options->outputs, "Image to write, .exr or .png; may be repeated")
       ->required()
       ->type_name("FILE")
@@ -192,16 +204,19 @@ void add_render_command(CLI::App& app, GlobalOptions& globals) {
                   "(default: all in .exr, ao in .png). Several layers become NAME.LAYER.png")
       ->delimiter(',')
       ->type_name("LAYERS");
-  verb.add_option("--camera", options->camera, "Which of the scene's cameras, from 0")->type_name("I");
+  verb.add_option("--camera", options->camera,
+                  "Which of the scene's cameras, from 0 (the default); auto frames all of the scene")
+      ->type_name("I|auto");
   verb.add_option("--size", options->size, "Image size (default: the scene's film)")->type_name("WxH");
-  verb.add_option("--supersample", options->supersample, "Trace at N times the size per axis and filter down (default 1)")
+  verb.add_option("--supersample", options->supersample,
+                  "Trace at N times the size per axis and filter down (default 1)")
       ->type_name("N");
   verb.add_option("--frames", options->frames, "Frames to accumulate and denoise (default 32)")->type_name("N");
   verb.add_option("--spp", options->spp, "Ambient occlusion rays per pixel and frame (default 1)")->type_name("N");
   verb.add_flag("--ground-truth", options->ground_truth, "No denoiser, one frame of 1024 spp unless said otherwise");
   verb.add_flag("--no-denoise", options->no_denoise, "Average the frames and do nothing else");
   verb.add_option("--ao-radius", options->ao_radius,
-                  "Longest occlusion distance in world units (default: 5 % of the scene's diagonal)")
+                  "Longest occlusion distance in world units (default: 10 % of the scene's diagonal)")
       ->type_name("R");
   verb.add_flag("--ao-no-falloff", options->ao_falloff_off,
                 "Every hit within the radius occludes fully, however far: plain visibility");

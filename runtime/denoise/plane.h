@@ -30,6 +30,9 @@ public:
   T* row(int y) { return data_.data() + offset(y); }
   const T* row(int y) const { return data_.data() + offset(y); }
 
+  /// Pixels from one row to the next; the same for all planes of one size.
+  ptrdiff_t stride() const { return static_cast<ptrdiff_t>(stride_); }
+
 private:
   size_t offset(int y) const { return static_cast<size_t>(y + kPlaneBorder) * stride_ + kPlaneBorder; }
   size_t stride_ = 0;

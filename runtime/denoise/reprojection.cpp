@@ -2,6 +2,9 @@
 
 #include <bit>
 #include <cmath>
+#include <limits>
+
+#include "runtime/denoise/simd.h"
 
 namespace packtrace {
 namespace {
@@ -25,45 +28,59 @@ struct Surface {
   uint32_t instance;
 };
 
+/// The previous frame by offsets from pixel (0, 0), which are the same in all planes: y * stride + x.
+struct Previous {
+  explicit Previous(const FrameHistory& frame)
+      : disparity(frame.guides.disparity.row(0)), normal_x(frame.guides.normal_x.row(0)),
+        normal_y(frame.guides.normal_y.row(0)), normal_z(frame.guides.normal_z.row(0)),
+        instance(frame.guides.instance.row(0)), mean(frame.history.mean.row(0)), square(frame.history.square.row(0)),
+        fast(frame.history.fast.row(0)), samples(frame.history.samples.row(0)), stride(frame.history.mean.stride()) {}
+
+  const float *disparity, *normal_x, *normal_y, *normal_z;
+  const uint32_t* instance;
+  const float *mean, *square, *fast, *samples;
+  ptrdiff_t stride;
+};
+
 /// 0 if the previous pixel shows another surface, up to 1 if it agrees.
-float agreement(const Guides& previous, int x, int y, const Surface& surface, const Tests& tests) {
-  const float disparity = previous.disparity.row(y)[x];
-  if (!(disparity > 0.0f) || (tests.instance && previous.instance.row(y)[x] != surface.instance)) return 0.0f;
-  const float depth_weight = surface.tolerance / std::max(std::abs(disparity - surface.disparity), surface.tolerance);
-  if (!(depth_weight >= 0.5f)) return 0.0f;
-  const Vec3 normal(previous.normal_x.row(y)[x], previous.normal_y.row(y)[x], previous.normal_z.row(y)[x]);
-  float cosine = std::clamp(1.1f * glm::dot(normal, surface.normal), 0.0f, 1.0f);
+inline float agreement(const Previous& previous, ptrdiff_t at, const Surface& surface, const Tests& tests) {
+  const float disparity = previous.disparity[at];
+  if (!(disparity > 0.0f) || (tests.instance && previous.instance[at] != surface.instance)) return 0.0f;
+  const float distance = std::abs(disparity - surface.disparity);
+  if (!(distance <= 2.0f * surface.tolerance)) return 0.0f;
+  const float depth_weight = distance > surface.tolerance ? surface.tolerance / distance : 1.0f;
+  const float dot = previous.normal_x[at] * surface.normal.x + previous.normal_y[at] * surface.normal.y +
+                    previous.normal_z[at] * surface.normal.z;
+  float cosine = smaller(larger(1.1f * dot, 0.0f), 1.0f);
   for (int i = 0; i < tests.normal_squarings; ++i) cosine *= cosine;
   return depth_weight * cosine;
 }
 
 /// Whether a pixel may take part in sharpening: the tests without weights, and without the normals.
-bool same_surface(const FrameHistory& previous, int x, int y, const Surface& surface) {
-  return previous.guides.instance.row(y)[x] == surface.instance && previous.history.samples.row(y)[x] > 0.0f &&
-         std::abs(previous.guides.disparity.row(y)[x] - surface.disparity) <= surface.tolerance;
+inline bool same_surface(const Previous& previous, ptrdiff_t at, const Surface& surface) {
+  return previous.instance[at] == surface.instance && previous.samples[at] > 0.0f &&
+         std::abs(previous.disparity[at] - surface.disparity) <= surface.tolerance;
 }
 
-/// What Catmull-Rom interpolation along x or y adds to linear interpolation between a and b, the first of two equally
-/// spaced neighbours before and after: -t (1 - t) / 2 times the second differences at a and b, interpolated.
+/// What Catmull-Rom interpolation along x or y adds to linear interpolation between a and b, with their neighbours
+/// before and after: -t (1 - t) / 2 times the second differences at a and b, interpolated.
 /// Source: R. Keys, "Cubic convolution interpolation for digital image processing", 1981, a = -1/2.
 inline float sharpening(float before, float a, float b, float after, float t) {
   return -0.5f * t * (1.0f - t) * ((1.0f - t) * (before - 2.0f * a + b) + t * (a - 2.0f * b + after));
 }
 
 /// Linear interpolation of every frame's history is a blur that adds up. This undoes it to second order along both axes
-/// where the 2 x 2 footprint at (x, y) and the eight pixels around it without the corners show one surface; else 0.
-float sharpen(const FrameHistory& previous, int x, int y, float tx, float ty, const Surface& surface) {
-  for (int i = 0; i < 2; ++i) {
-    if (!same_surface(previous, x - 1, y + i, surface) || !same_surface(previous, x + 2, y + i, surface) ||
-        !same_surface(previous, x + i, y - 1, surface) || !same_surface(previous, x + i, y + 2, surface) ||
-        !same_surface(previous, x, y + i, surface) || !same_surface(previous, x + 1, y + i, surface))
-      return 0.0f;
-  }
-  const auto m = [&](int dx, int dy) { return previous.history.mean.row(y + dy)[x + dx]; };
-  const float along_x = (1.0f - ty) * sharpening(m(-1, 0), m(0, 0), m(1, 0), m(2, 0), tx) +
-                        ty * sharpening(m(-1, 1), m(0, 1), m(1, 1), m(2, 1), tx);
-  const float along_y = (1.0f - tx) * sharpening(m(0, -1), m(0, 0), m(0, 1), m(0, 2), ty) +
-                        tx * sharpening(m(1, -1), m(1, 0), m(1, 1), m(1, 2), ty);
+/// where the 2 x 2 footprint from `at` and the eight pixels around it without the corners show one surface; else 0.
+float sharpen(const Previous& previous, ptrdiff_t at, float tx, float ty, const Surface& surface) {
+  const ptrdiff_t down = previous.stride;
+  const ptrdiff_t taps[12] = {0, 1, down, down + 1, -1, down - 1, 2, down + 2, -down, 1 - down, 2 * down, 2 * down + 1};
+  for (const ptrdiff_t tap : taps)
+    if (!same_surface(previous, at + tap, surface)) return 0.0f;
+  const float* m = previous.mean + at;
+  const float along_x = (1.0f - ty) * sharpening(m[-1], m[0], m[1], m[2], tx) +
+                        ty * sharpening(m[down - 1], m[down], m[down + 1], m[down + 2], tx);
+  const float along_y = (1.0f - tx) * sharpening(m[-down], m[0], m[down], m[2 * down], ty) +
+                        tx * sharpening(m[1 - down], m[1], m[down + 1], m[2 * down + 1], ty);
   return along_x + along_y;
 }
 
@@ -72,74 +89,93 @@ struct Gathered {
   float weight = 0, mean = 0, square = 0, fast = 0, samples = 0;
   float sharpening = 0; // to be added to the mean
 
-  void add(const History& history, int x, int y, float w) {
-    const float count = history.samples.row(y)[x];
+  void add(const Previous& previous, ptrdiff_t at, float w) {
+    const float count = previous.samples[at];
     if (!(count > 0.0f)) return; // seen before, but never sampled
     weight += w;
-    mean += w * history.mean.row(y)[x];
-    square += w * history.square.row(y)[x];
-    fast += w * history.fast.row(y)[x];
+    mean += w * previous.mean[at];
+    square += w * previous.square[at];
+    fast += w * previous.fast[at];
     samples += w * count;
   }
-
-  void store(History& history, int x, int y, float longest) const {
-    const bool found = weight > kLeastWeight;
-    const float scale = found ? 1.0f / weight : 0.0f;
-    const float linear = mean * scale;
-    const float sharp = found ? std::clamp(linear + sharpening, 0.0f, 1.0f) : 0.0f;
-    history.mean.row(y)[x] = sharp;
-    history.square.row(y)[x] = square * scale + (sharp - linear) * (sharp + linear); // the variance stays
-    history.fast.row(y)[x] = fast * scale;
-    history.samples.row(y)[x] = found ? std::min(samples, longest) : 0.0f;
-  }
 };
+
+/// The reprojection of one frame.
+class Reprojection {
+public:
+  Reprojection(const FrameHistory& previous, const Guides& guides, const DepthDerivatives& derivatives,
+               const DenoiserConfig& config)
+      : previous_(previous), guides_(guides),
+        derivatives_(derivatives), tests_{config.reprojection_depth, config.reprojection_slope,
+                                          std::countr_zero(config.reprojection_normal_power),
+                                          config.reprojection_instance_test},
+        width_(static_cast<float>(guides.size.width)), height_(static_cast<float>(guides.size.height)) {}
+
+  Gathered gather(int x, int y, Vec2 motion) const {
+    Gathered sum;
+    const float from_x = static_cast<float>(x) - motion.x, from_y = static_cast<float>(y) - motion.y;
+    // Also false for NaN, and what passes fits an int.
+    if (!(from_x > -1.0f && from_x < width_ && from_y > -1.0f && from_y < height_)) return sum;
+    const Surface surface = surface_at(x, y);
+    const float floor_x = std::floor(from_x), floor_y = std::floor(from_y);
+    const float fx = from_x - floor_x, fy = from_y - floor_y;
+    const ptrdiff_t at = static_cast<int>(floor_y) * previous_.stride + static_cast<int>(floor_x);
+    const auto corner = [&](ptrdiff_t tap, float bilinear) { // the border counts as missed
+      if (!(bilinear > 0.0f)) return;
+      const float w = bilinear * agreement(previous_, tap, surface, tests_);
+      if (w > 0.0f) sum.add(previous_, tap, w);
+    };
+    corner(at, (1.0f - fx) * (1.0f - fy));
+    corner(at + 1, fx * (1.0f - fy));
+    corner(at + previous_.stride, (1.0f - fx) * fy);
+    corner(at + previous_.stride + 1, fx * fy);
+    if (sum.weight > kSharpenWeight && (fx > 0.0f || fy > 0.0f))
+      sum.sharpening = sharpen(previous_, at, fx, fy, surface);
+    return sum;
+  }
+
+private:
+  Surface surface_at(int x, int y) const {
+    const float disparity = guides_.disparity.row(y)[x];
+    const float slope = std::abs(derivatives_.x.row(y)[x]) + std::abs(derivatives_.y.row(y)[x]);
+    return {disparity, tests_.depth * disparity + tests_.slope * slope + std::numeric_limits<float>::min(),
+            Vec3(guides_.normal_x.row(y)[x], guides_.normal_y.row(y)[x], guides_.normal_z.row(y)[x]),
+            guides_.instance.row(y)[x]};
+  }
+
+  Previous previous_;
+  const Guides& guides_;
+  const DepthDerivatives& derivatives_;
+  Tests tests_;
+  float width_, height_;
+};
+
+void store(const Gathered& sum, float longest, History& history, int x, int y) {
+  const bool found = sum.weight > kLeastWeight;
+  const float scale = found ? 1.0f / sum.weight : 0.0f;
+  const float linear = sum.mean * scale;
+  const float sharp = found ? smaller(larger(linear + sum.sharpening, 0.0f), 1.0f) : 0.0f;
+  history.mean.row(y)[x] = sharp;
+  history.square.row(y)[x] = sum.square * scale + (sharp - linear) * (sharp + linear); // the variance stays
+  history.fast.row(y)[x] = sum.fast * scale;
+  history.samples.row(y)[x] = found ? smaller(sum.samples, longest) : 0.0f;
+}
 
 } // namespace
 
 void reproject(const FrameHistory& previous, const Guides& guides, const DepthDerivatives& derivatives,
                std::span<const Vec2> motion_px, const DenoiserConfig& config, History& reprojected) {
-  const int width = static_cast<int>(guides.size.width), height = static_cast<int>(guides.size.height);
-  const Tests tests{config.reprojection_depth, config.reprojection_slope,
-                    std::countr_zero(config.reprojection_normal_power), config.reprojection_instance_test};
+  const Reprojection reprojection(previous, guides, derivatives, config);
   const float longest_still = static_cast<float>(config.max_tspp);
   const float longest_moving = static_cast<float>(std::min(config.max_tspp, config.max_tspp_moving));
-
-  const auto gather = [&](int x, int y, Vec2 motion) {
-    Gathered sum;
-    const float from_x = static_cast<float>(x) - motion.x, from_y = static_cast<float>(y) - motion.y;
-    // Also false for NaN, and what passes fits an int.
-    if (!(from_x > -1.0f && from_x < static_cast<float>(width) && from_y > -1.0f &&
-          from_y < static_cast<float>(height)))
-      return sum;
-    const Surface surface{guides.disparity.row(y)[x],
-                          tests.depth * guides.disparity.row(y)[x] +
-                              tests.slope * (std::abs(derivatives.x.row(y)[x]) + std::abs(derivatives.y.row(y)[x])) +
-                              1e-37f,
-                          Vec3(guides.normal_x.row(y)[x], guides.normal_y.row(y)[x], guides.normal_z.row(y)[x]),
-                          guides.instance.row(y)[x]};
-    const float floor_x = std::floor(from_x), floor_y = std::floor(from_y);
-    const float fx = from_x - floor_x, fy = from_y - floor_y;
-    for (int corner = 0; corner < 4; ++corner) {
-      const int right = corner & 1, down = corner >> 1;
-      const float bilinear = (right ? fx : 1.0f - fx) * (down ? fy : 1.0f - fy);
-      if (!(bilinear > 0.0f)) continue;
-      const int px = static_cast<int>(floor_x) + right, py = static_cast<int>(floor_y) + down;
-      const float w = bilinear * agreement(previous.guides, px, py, surface, tests); // the border counts as missed
-      if (w > 0.0f) sum.add(previous.history, px, py, w);
-    }
-    if (sum.weight > kSharpenWeight && (fx > 0.0f || fy > 0.0f))
-      sum.sharpening = sharpen(previous, static_cast<int>(floor_x), static_cast<int>(floor_y), fx, fy, surface);
-    return sum;
-  };
-
   for_row_blocks(guides.size.height, [&](int first, int last) {
     for (int y = first; y < last; ++y) {
       const Vec2* motion = &motion_px[static_cast<size_t>(y) * guides.size.width];
-      for (int x = 0; x < width; ++x) {
+      for (int x = 0; x < static_cast<int>(guides.size.width); ++x) {
         const bool still = std::abs(motion[x].x) <= kStillMotion && std::abs(motion[x].y) <= kStillMotion;
         Gathered sum;
-        if (guides.disparity.row(y)[x] > 0.0f) sum = gather(x, y, still ? Vec2(0) : motion[x]);
-        sum.store(reprojected, x, y, still ? longest_still : longest_moving);
+        if (guides.disparity.row(y)[x] > 0.0f) sum = reprojection.gather(x, y, still ? Vec2(0) : motion[x]);
+        store(sum, still ? longest_still : longest_moving, reprojected, x, y);
       }
     }
   });

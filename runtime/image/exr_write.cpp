@@ -15,8 +15,8 @@
 #include <OpenEXR/ImfStringAttribute.h>
 
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/file_bytes.h"
 #include "runtime/image/exr.h"
-#include "runtime/image/file_bytes.h"
 
 namespace packtrace {
 

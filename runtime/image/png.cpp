@@ -16,7 +16,7 @@
 #include <stb/stb_image_write.h>
 
 #include "pbrt_import/scene/error.h"
-#include "runtime/image/file_bytes.h"
+#include "pbrt_import/scene/file_bytes.h"
 
 namespace packtrace {
 

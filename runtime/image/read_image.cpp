@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/file_bytes.h"
 #include "runtime/image/exr.h"
-#include "runtime/image/file_bytes.h"
 #include "runtime/image/png.h"
 
 namespace packtrace {

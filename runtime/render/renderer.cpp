@@ -131,8 +131,10 @@ RenderedImage render_view(const SceneSource& source, const EmbreeScene& scene, c
     trace_ao(source, scene, g, config.ao, frame, raw, silent);
     image.timings.ao_s += tracing.seconds();
     const Stopwatch denoising;
-    if (!config.denoise) mean.add(raw);
-    else if (const DenoisedAo& denoised = denoiser.next_frame(g, raw); frame + 1 == config.frames) ao = denoised.ao;
+    if (!config.denoise)
+      mean.add(raw);
+    else if (const DenoisedAo& denoised = denoiser.next_frame(g, raw); frame + 1 == config.frames)
+      ao = denoised.ao;
     image.timings.denoise_s += denoising.seconds();
     progress.advance();
   }

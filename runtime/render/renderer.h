@@ -15,10 +15,10 @@ namespace packtrace {
 
 /// One still view: how it is sampled over frames and how it is resolved.
 struct RenderConfig {
-  ImageSize size;               ///< of the result
-  uint32_t supersample = 1;     ///< [1, 8]: traced and denoised at this multiple per axis, box-filtered at the end
-  uint32_t frames = 32;         ///< [1, 65536]: each traces AoConfig::spp samples a pixel
-  bool denoise = true;          ///< false: frames are averaged, nothing else
+  ImageSize size;           ///< of the result
+  uint32_t supersample = 1; ///< [1, 8]: traced and denoised at this multiple per axis, box-filtered at the end
+  uint32_t frames = 32;     ///< [1, 65536]: each traces AoConfig::spp samples a pixel
+  bool denoise = true;      ///< false: frames are averaged, nothing else
   AoConfig ao;
   DenoiserConfig denoiser;
 };
@@ -35,8 +35,8 @@ struct RenderTimings {
 };
 
 /// What a view looks like, rows top to bottom. Pixels whose camera rays all miss: depth 0, instance kNoInstance, ao and
-/// ao_raw kInvalidAo, rest 0. With supersampling every layer is the mean over the sub-pixels that hit, and instance that of
-/// the first of them.
+/// ao_raw kInvalidAo, rest 0. With supersampling every layer is the mean over the sub-pixels that hit, and instance
+/// that of the first of them.
 struct RenderedImage {
   ImageSize size;
   std::vector<float> ao;       ///< denoised, or the mean over all frames

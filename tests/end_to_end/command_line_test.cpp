@@ -61,9 +61,9 @@ TEST(CommandLine, PlannedVerbSaysThatItIsNotThereYet) {
 
 TEST(CommandLine, OptionOutOfRangeIsAUsageErrorAndWritesNothing) {
   const Workbench bench;
-  for (const auto& [option, value] : {std::pair{"--precision", "0"}, std::pair{"--precision", "-1"},
-                                      std::pair{"--precision", "nan"}, std::pair{"--precision-abs", "inf"},
-                                      std::pair{"--position-bits", "0"}, std::pair{"--position-bits", "99"}}) {
+  for (const auto& [option, value] :
+       {std::pair{"--precision", "0"}, std::pair{"--precision", "-1"}, std::pair{"--precision", "nan"},
+        std::pair{"--precision-abs", "inf"}, std::pair{"--position-bits", "0"}, std::pair{"--position-bits", "99"}}) {
     const CommandResult result = run_packtrace({"bake", bench.scene(), "-o", bench.baked(), option, value});
     EXPECT_EQ(result.exit_code, 2) << option << ' ' << value << '\n' << result.err;
   }
@@ -234,10 +234,13 @@ TEST(CommandLine, DryRunReportsAndWritesNothing) {
 TEST(CommandLine, CompareBeyondALimitExitsWithFive) {
   const Workbench bench;
   bench.bake();
-  ASSERT_EQ(run_packtrace({"render", bench.baked(), "-o", bench / "a.exr", "--frames", "1", "--no-denoise"}).exit_code, 0);
+  ASSERT_EQ(run_packtrace({"render", bench.baked(), "-o", bench / "a.exr", "--frames", "1", "--no-denoise"}).exit_code,
+            0);
   ASSERT_EQ(run_packtrace({"render", bench.baked(), "-o", bench / "b.exr", "--frames", "64"}).exit_code, 0);
-  EXPECT_EQ(run_packtrace({"compare", bench / "a.exr", bench / "a.exr", "--layer", "ao", "--max-rmse", "0"}).exit_code, 0);
-  EXPECT_EQ(run_packtrace({"compare", bench / "a.exr", bench / "b.exr", "--layer", "ao", "--max-rmse", "0"}).exit_code, 5);
+  EXPECT_EQ(run_packtrace({"compare", bench / "a.exr", bench / "a.exr", "--layer", "ao", "--max-rmse", "0"}).exit_code,
+            0);
+  EXPECT_EQ(run_packtrace({"compare", bench / "a.exr", bench / "b.exr", "--layer", "ao", "--max-rmse", "0"}).exit_code,
+            5);
 }
 
 } // namespace

@@ -15,6 +15,8 @@ Parameter number(std::string name, std::vector<float> values) {
   return parameter;
 }
 
+std::string numbered(int number) { return std::string("p").append(std::to_string(number)); }
+
 TEST(Parameters, SynonymsAreTheSameType) {
   EXPECT_EQ(parameter_type("color"), parameter_type("rgb"));
   EXPECT_EQ(parameter_type("point"), parameter_type("point3"));
@@ -32,8 +34,8 @@ TEST(Parameters, LastOfTheSameNameAndTypeWins) {
 
 TEST(Parameters, LastWinsInVeryLongListsToo) {
   ParameterList list;
-  for (int i = 0; i < 100; ++i) list.add(number("p" + std::to_string(i % 50), {static_cast<float>(i)}));
-  for (int i = 0; i < 50; ++i) EXPECT_EQ(list.get_float("p" + std::to_string(i), -1), static_cast<float>(50 + i));
+  for (int i = 0; i < 100; ++i) list.add(number(numbered(i % 50), {static_cast<float>(i)}));
+  for (int i = 0; i < 50; ++i) EXPECT_EQ(list.get_float(numbered(i), -1), static_cast<float>(50 + i));
 }
 
 TEST(Parameters, WrongCountGivesTheDefaultAndStaysUnused) {

@@ -27,7 +27,7 @@ std::string listing(Tokenizer tokenizer) {
     const Token token = tokenizer.next();
     all += kKinds[static_cast<size_t>(token.kind)];
     if (token.kind == TokenKind::kWord || token.kind == TokenKind::kString) all.append(":").append(token.text);
-    all += "@" + std::to_string(token.line) + ":" + std::to_string(token.column) + " ";
+    all.append("@").append(std::to_string(token.line)).append(":").append(std::to_string(token.column)).append(" ");
     if (token.kind == TokenKind::kEnd) return all;
   }
 }
@@ -162,7 +162,7 @@ TEST(Number, PlainDecimalsAreRoundedLikeFromChars) {
     std::string text = std::to_string(random() % 100'000'000 >> random() % 27);
     if (random() % 4) {
       std::string fraction = std::to_string(random());
-      text += "." + fraction.substr(0, random() % (fraction.size() + 1));
+      text.append(".").append(fraction, 0, random() % (fraction.size() + 1));
     }
     if (random() % 2) text.insert(text.begin(), '-');
     const float value = scanned(text), expected = reference(text);

@@ -12,7 +12,7 @@
 
 #include "pbrt_import/scene/error.h"
 #include "pbrt_import/scene/progress.h"
-#include "runtime/commands/output_file.h"
+#include "pbrt_import/scene/output_file.h"
 #include "tests/runtime/image/temporary_folder.h"
 
 namespace packtrace {

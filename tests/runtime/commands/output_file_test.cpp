@@ -1,4 +1,4 @@
-#include "runtime/commands/output_file.h"
+#include "pbrt_import/scene/output_file.h"
 
 #include <cmath>
 #include <limits>
@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "runtime/commands/json_output.h"
-#include "runtime/image/file_bytes.h"
+#include "pbrt_import/scene/file_bytes.h"
 #include "tests/runtime/image/image_test_support.h"
 #include "tests/runtime/image/temporary_folder.h"
 

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "runtime/image/file_bytes.h"
+#include "pbrt_import/scene/file_bytes.h"
 #include "tests/runtime/image/image_test_support.h"
 #include "tests/runtime/image/temporary_folder.h"
 

@@ -1,4 +1,4 @@
-#include "runtime/image/file_bytes.h"
+#include "pbrt_import/scene/file_bytes.h"
 
 #include <cerrno>
 #include <cstdint>

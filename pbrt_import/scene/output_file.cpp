@@ -1,4 +1,4 @@
-#include "runtime/commands/output_file.h"
+#include "pbrt_import/scene/output_file.h"
 
 #include <array>
 #include <atomic>
@@ -74,6 +74,16 @@ fs::path create_temporary(const fs::path& target) {
   fail(target, "cannot find a free temporary name");
 }
 
+/// On disk before it gets its name: after a crash the name stands for the old file or for all of the new one.
+void flush_to_disk(const fs::path& file, const fs::path& target) {
+  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  const bool flushed =
+      descriptor >= 0 && (fsync(descriptor) == 0 || errno == EINVAL); // EINVAL: not for this file system
+  const int error = errno;
+  if (descriptor >= 0) close(descriptor);
+  if (!flushed) fail(target, std::string("cannot be written to disk: ") + std::strerror(error));
+}
+
 /// Renames without replacing, where the file system can do that in one step.
 int rename_if_free(const fs::path& from, const fs::path& to) {
   if (renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
@@ -102,6 +112,7 @@ OutputFile::~OutputFile() {
 }
 
 void OutputFile::commit() {
+  flush_to_disk(temporary_, target_);
   const int error = force_ ? (std::rename(temporary_.c_str(), target_.c_str()) == 0 ? 0 : errno)
                            : rename_if_free(temporary_, target_);
   if (error == EEXIST) fail(target_, "appeared while it was being made; --force replaces it");

@@ -1,14 +1,17 @@
-#include "compress/bake/baked_writer.h"
+#include "compress/bake/bake_scene.h"
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/file_bytes.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {
@@ -16,14 +19,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class BakedWriter : public testing::Test {
+class BakeOutput : public testing::Test {
 protected:
-  BakedWriter()
+  BakeOutput()
       : folder_(fs::temp_directory_path() / ("packtrace_writer_" + std::to_string(::getpid()) + "_" +
                                              testing::UnitTest::GetInstance()->current_test_info()->name())) {
     fs::create_directories(folder_);
   }
-  ~BakedWriter() override { fs::remove_all(folder_); }
+  ~BakeOutput() override { fs::remove_all(folder_); }
 
   static std::string content(const fs::path& path) {
     std::ifstream file(path, std::ios::binary);
@@ -44,37 +47,28 @@ protected:
   fs::path folder_;
 };
 
-TEST_F(BakedWriter, WritesTheBytesAndLeavesNothingElse) {
-  write_file_atomically(folder_ / "a.ptk", bytes("hello"), false);
-  EXPECT_EQ(content(folder_ / "a.ptk"), "hello");
-  EXPECT_EQ(files(), 1u);
-}
-
-TEST_F(BakedWriter, AnExistingFileNeedsForce) {
-  write_file_atomically(folder_ / "a.ptk", bytes("old"), false);
-  EXPECT_EQ(kind_of([&] { write_file_atomically(folder_ / "a.ptk", bytes("new"), false); }), ErrorKind::kIo);
+TEST_F(BakeOutput, AWriteThatFailsHalfWayLeavesTheOldFileAlone) {
+  write_file_bytes(folder_ / "a.ptk", bytes("old"));
+  struct rlimit limit {};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &limit), 0);
+  struct rlimit small = limit;
+  small.rlim_cur = 1000; // bytes a file may have, less than any baked file
+  const auto previous = std::signal(SIGXFSZ, SIG_IGN);
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+  const Scene scene = test::scene_of(test::grid_mesh(8));
+  Diagnostics diagnostics;
+  Progress progress;
+  EXPECT_EQ(kind_of([&] { bake_scene(scene, {}, folder_ / "a.ptk", true, diagnostics, progress); }), ErrorKind::kIo);
+  EXPECT_EQ(::setrlimit(RLIMIT_FSIZE, &limit), 0);
+  std::signal(SIGXFSZ, previous);
   EXPECT_EQ(content(folder_ / "a.ptk"), "old");
-  write_file_atomically(folder_ / "a.ptk", bytes("new"), true);
-  EXPECT_EQ(content(folder_ / "a.ptk"), "new");
   EXPECT_EQ(files(), 1u);
 }
 
-TEST_F(BakedWriter, PlacesThatCannotBeWrittenAreIoErrors) {
-  EXPECT_EQ(kind_of([&] { write_file_atomically(folder_ / "missing" / "a.ptk", bytes("x"), false); }), ErrorKind::kIo);
-  EXPECT_EQ(kind_of([&] { write_file_atomically(folder_, bytes("x"), true); }), ErrorKind::kIo);
-  EXPECT_EQ(kind_of([&] { write_file_atomically("/proc/packtrace.ptk", bytes("x"), true); }), ErrorKind::kIo);
-  EXPECT_EQ(files(), 0u);
-}
-
-TEST_F(BakedWriter, AFullDeviceLeavesNoFile) {
-  if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
-  EXPECT_EQ(kind_of([&] { write_file_atomically("/dev/full/a.ptk", bytes("x"), false); }), ErrorKind::kIo);
-}
-
-TEST_F(BakedWriter, TheOutputIsCheckedBeforeTheSceneIsBaked) {
+TEST_F(BakeOutput, TheOutputIsCheckedBeforeTheSceneIsBaked) {
   Scene bad = test::scene_of(test::grid_mesh(2));
   bad.shapes[0].mesh = 99; // would be Error(kInput) as soon as work starts
-  write_file_atomically(folder_ / "a.ptk", bytes("old"), false);
+  write_file_bytes(folder_ / "a.ptk", bytes("old"));
   Diagnostics diagnostics;
   Progress progress;
   EXPECT_EQ(kind_of([&] { bake_scene(bad, {}, folder_ / "a.ptk", false, diagnostics, progress); }), ErrorKind::kIo);
@@ -82,7 +76,7 @@ TEST_F(BakedWriter, TheOutputIsCheckedBeforeTheSceneIsBaked) {
   EXPECT_EQ(files(), 1u);
 }
 
-TEST_F(BakedWriter, ABakedFileOpensFromDisk) {
+TEST_F(BakeOutput, ABakedFileOpensFromDisk) {
   Diagnostics diagnostics;
   Progress progress;
   const Scene scene = test::scene_of(test::sphere_mesh(12));

@@ -1,0 +1,169 @@
+#include <cmath>
+#include <functional>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "assets/generator/displaced_mesh.h"
+#include "assets/generator/extreme.h"
+#include "assets/generator/forest.h"
+#include "assets/generator/leaf_mask.h"
+#include "assets/generator/placement.h"
+#include "assets/generator/town.h"
+#include "pbrt_import/scene/error.h"
+#include "tests/assets/test_folder.h"
+
+namespace packtrace::scenegen {
+namespace {
+
+const std::filesystem::path kAssets = std::filesystem::path(PACKTRACE_SOURCE_DIR) / "assets";
+
+ErrorKind kind_of_error(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error.kind();
+  }
+  ADD_FAILURE() << "no Error was thrown";
+  return ErrorKind::kUnsupported;
+}
+
+std::map<std::string, std::string> generate_all(const std::filesystem::path& folder, uint64_t seed) {
+  generate_town({seed, 3000}, {folder / "town", false});
+  generate_forest({seed, 200'000, 0}, {folder / "forest", false});
+  generate_displaced_mesh({seed, 40'000}, {folder / "mesh", false});
+  generate_extreme({seed}, {folder / "extreme", false});
+  generate_leaf_mask({folder / "leaf", false});
+  return files_under(folder);
+}
+
+TEST(Generators, SameSeedGivesTheSameBytes) {
+  const TestFolder folder;
+  EXPECT_TRUE(same_files(generate_all(folder / "a", 42), generate_all(folder / "b", 42)));
+}
+
+TEST(Generators, AnotherSeedGivesAnotherScene) {
+  const TestFolder folder;
+  const auto a = generate_all(folder / "a", 42), b = generate_all(folder / "b", 43);
+  for (const char* name : {"town/town_instances.pbrt", "forest/forest_instances.pbrt", "mesh/geometry/ring.ply",
+                           "extreme/extreme_instances.pbrt"}) {
+    EXPECT_NE(a.at(name), b.at(name)) << name;
+  }
+}
+
+TEST(Generators, ThreadCountDoesNotShow) {
+  const TestFolder folder;
+  for (const size_t threads : {1, 4}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    generate_displaced_mesh({3, 900'000}, {folder / std::to_string(threads), false});
+  }
+  EXPECT_TRUE(same_files(files_under(folder / "1"), files_under(folder / "4")));
+}
+
+TEST(CommittedScenes, AreWhatTheGeneratorWritesToday) {
+  const TestFolder folder;
+  generate_town({}, {folder / "town", false});
+  generate_extreme({}, {folder / "extreme", false});
+  generate_leaf_mask({folder / "leaf", false});
+  EXPECT_TRUE(same_files(files_under(kAssets / "town"), files_under(folder / "town")));
+  EXPECT_TRUE(same_files(files_under(kAssets / "extreme"), files_under(folder / "extreme")));
+  EXPECT_EQ(files_under(kAssets / "room").at("leaf.png"), files_under(folder / "leaf").at("leaf.png"));
+}
+
+TEST(CommittedScenes, TownIsSmallAndFull) {
+  uint64_t bytes = 0;
+  for (const auto& [name, content] : files_under(kAssets / "town")) bytes += content.size();
+  EXPECT_LE(bytes, 3u << 20);
+  const TestFolder folder;
+  EXPECT_GE(generate_town({}, {folder / "town", false}).instances, 3000u);
+}
+
+TEST(Generators, TownPlacesAsManyInstancesAsAsked) {
+  const TestFolder folder;
+  const SceneTotals totals = generate_town({7, 20'000}, {folder / "town", false});
+  EXPECT_EQ(totals.instances, 20'000u);
+}
+
+TEST(Generators, ForestReachesItsTriangleCountWithinOneTree) {
+  const TestFolder folder;
+  const SceneTotals totals = generate_forest({1, 3'000'000, 0}, {folder / "forest", false});
+  EXPECT_GE(totals.placed_triangles, 3'000'000u);
+  EXPECT_LT(totals.placed_triangles, 3'000'000u + 100'000u);
+  EXPECT_EQ(generate_forest({1, 3'000'000, 777}, {folder / "counted", false}).instances, 777u);
+}
+
+TEST(Generators, MeshHasAtLeastTheTrianglesAsked) {
+  const TestFolder folder;
+  for (const uint64_t wanted : {100u, 12'345u, 500'000u}) {
+    const SceneTotals totals = generate_displaced_mesh({1, wanted}, {folder / std::to_string(wanted), false});
+    EXPECT_GE(totals.unique_triangles, wanted);
+    EXPECT_LE(static_cast<double>(totals.unique_triangles), 1.2 * static_cast<double>(wanted) + 60.0);
+  }
+}
+
+TEST(Generators, OptionsOutOfRangeAreRejectedBeforeAnythingIsWritten) {
+  const TestFolder folder;
+  const OutputConfig output{folder / "out", false};
+  EXPECT_EQ(kind_of_error([&] { generate_town({1, 2999}, output); }), ErrorKind::kUsage);
+  EXPECT_EQ(kind_of_error([&] { generate_forest({1, 99'999, 0}, output); }), ErrorKind::kUsage);
+  EXPECT_EQ(kind_of_error([&] { generate_forest({1, 1'000'000, 50'000'001}, output); }), ErrorKind::kUsage);
+  EXPECT_EQ(kind_of_error([&] { generate_displaced_mesh({1, 2'000'000'001}, output); }), ErrorKind::kUsage);
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+}
+
+TEST(OutputFile, ExistingFilesStayUnlessForced) {
+  const TestFolder folder;
+  const OutputConfig gentle{folder / "x", false}, forced{folder / "x", true};
+  generate_extreme({1}, gentle);
+  const auto first = files_under(folder / "x");
+  EXPECT_EQ(kind_of_error([&] { generate_extreme({2}, gentle); }), ErrorKind::kIo);
+  EXPECT_TRUE(same_files(first, files_under(folder / "x")))
+      << "a refused run must leave everything, and nothing of its own";
+  generate_extreme({2}, forced);
+  EXPECT_FALSE(same_files(first, files_under(folder / "x")));
+}
+
+TEST(OutputFile, WhatIsNotClosedLeavesNothing) {
+  const TestFolder folder;
+  {
+    OutputFile file(folder / "a.txt", false);
+    file.write("half");
+  }
+  EXPECT_TRUE(files_under(folder / "").empty());
+}
+
+TEST(OutputFile, AFullDiskIsAnError) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
+  const TestFolder folder;
+  std::filesystem::create_symlink("/dev/full", folder / "full.txt.part");
+  EXPECT_EQ(kind_of_error([&] {
+              OutputFile file(folder / "full.txt", false);
+              file.write(std::string(3u << 20, 'x'));
+              file.close();
+            }),
+            ErrorKind::kIo);
+}
+
+TEST(Placement, SineAndCosineAgreeWithTheLibraryOverTheStatedRange) {
+  double worst = 0.0;
+  Random random(1);
+  for (int i = 0; i < 200'000; ++i) {
+    const double angle = i < 1000 ? (i - 500) * kPi / 8.0 : random.uniform(-1e6, 1e6);
+    const auto [s, c] = sin_cos(angle);
+    worst = std::max({worst, std::abs(s - std::sin(angle)), std::abs(c - std::cos(angle))});
+  }
+  EXPECT_LE(worst, 2e-15);
+}
+
+TEST(Placement, RandomNumbersAreTheSameEverywhere) {
+  Random random(1, 2);
+  EXPECT_EQ(hash_bits(1), 0x5692161d100b05e5u); // fixed: a change here changes every committed scene
+  double sum = 0.0;
+  uint32_t histogram[8] = {};
+  for (int i = 0; i < 80'000; ++i) sum += random.uniform(), ++histogram[random.below(8)];
+  EXPECT_NEAR(sum / 80'000, 0.5, 0.005);
+  for (const uint32_t count : histogram) EXPECT_NEAR(count, 10'000, 500);
+}
+
+} // namespace
+} // namespace packtrace::scenegen
