@@ -1,5 +1,6 @@
 #include "runtime/commands/bake_command.h"
 
+#include <array>
 #include <chrono>
 #include <memory>
 #include <optional>
@@ -122,15 +123,18 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
                             [options, &globals] { return run(*options, globals); });
   verb.add_option("SCENE", options->input, "A pbrt-v3 scene")->required();
   verb.add_option("-o,--output", options->output, "The .ptk file to write")->type_name("FILE");
-  CLI::Option_group& precision = *verb.add_option_group("Precision of positions, at most one of");
-  precision
-      .add_option("--precision-edge", options->precision_edge,
-                  "Grid step as a fraction of the median edge length (default 1/128)")
-      ->type_name("F");
-  precision.add_option("--precision", options->precision, "Grid step as a fraction of the diagonal")->type_name("REL");
-  precision.add_option("--precision-abs", options->precision_abs, "Grid step in world units")->type_name("UNITS");
-  precision.add_option("--position-bits", options->position_bits, "Bits over the longest side, 1..40")->type_name("N");
-  precision.require_option(0, 1);
+  const auto add_precision = [&](const char* name, auto& value, const char* type, const char* description) {
+    return verb.add_option(name, value, description)->type_name(type)->group("Precision of positions, at most one of");
+  };
+  const std::array<CLI::Option*, 4> precisions{
+      add_precision("--precision-edge", options->precision_edge, "F",
+                    "Grid step as a fraction of the median edge length (default 1/128)"),
+      add_precision("--precision", options->precision, "REL", "Grid step as a fraction of the diagonal"),
+      add_precision("--precision-abs", options->precision_abs, "UNITS", "Grid step in world units"),
+      add_precision("--position-bits", options->position_bits, "N", "Bits over the longest side, 1..40")};
+  for (CLI::Option* option : precisions)
+    for (CLI::Option* other : precisions)
+      if (option != other) option->excludes(other);
   verb.add_flag("--dry-run", options->dry_run, "Do everything but write the file");
   verb.add_flag("--strict", options->strict, "Fail if the scene has any problem");
   verb.footer(

@@ -12,8 +12,8 @@
 #include <unistd.h>
 
 #include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/progress.h"
 #include "pbrt_import/scene/output_file.h"
+#include "pbrt_import/scene/progress.h"
 
 namespace packtrace {
 
@@ -72,6 +72,17 @@ int parse(CLI::App& app, int argc, const char* const* argv) {
   }
 }
 
+/// CLI11 says "a subcommand is required" for a verb that it does not know; this names it.
+std::optional<std::string> unknown_verb(const CLI::App& app, int argc, const char* const* argv) {
+  if (argc < 2 || argv[1][0] == '-') return std::nullopt;
+  std::string known;
+  for (const CLI::App* verb : app.get_subcommands({})) {
+    if (verb->get_name() == argv[1]) return std::nullopt;
+    if (!verb->get_group().empty()) known += (known.empty() ? "" : ", ") + verb->get_name();
+  }
+  return "unknown verb '" + std::string(argv[1]) + "'; there are " + known;
+}
+
 extern "C" void on_interrupt(int) {
   static_assert(std::atomic<bool>::is_always_lock_free);
   if (!Progress::cancelled()) return Progress::cancel();
@@ -100,6 +111,7 @@ CLI::App& add_verb(CLI::App& app, GlobalOptions& globals, const std::string& nam
 }
 
 int run_verbs(CLI::App& app, GlobalOptions& globals, int argc, const char* const* argv) {
+  if (const auto problem = unknown_verb(app, argc, argv)) return fail(*problem, static_cast<int>(ErrorKind::kUsage));
   app.require_subcommand(1);
   if (const int code = parse(app, argc, argv); code != 0 || !globals.action) return code;
   try {
