@@ -149,7 +149,7 @@ Model make_cypress(Random& random, double detail) {
 
 Model make_conifer(Random& random, double detail) {
   Model model;
-  add_limb(model, DVec3(0, -0.6, 0), DVec3(0, 11.5, 0), 0.28, 0.04, 0.05, random);
+  add_limb(model, DVec3(0, -0.6, 0), DVec3(0, 10.8, 0), 0.28, 0.03, 0.05, random);
   const Foliage foliage = refined({"cypress", "leaf_dark", 0.62, 0.22, 0.25}, detail);
   constexpr int kWhorls = 13;
   const uint32_t leaves = scaled(13, detail);

@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <ostream>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -23,6 +24,8 @@ struct Case {
   fs::path file;
   bool external = false; ///< below PACKTRACE_SCENES
 };
+
+void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 
 std::vector<Case> cases() {
   std::vector<Case> result;
@@ -57,6 +60,7 @@ protected:
 
   void render(const std::string& input, const std::string& output, std::vector<std::string> more) const {
     std::vector<std::string> arguments = {"render", input, "-o", output, "--size", size_, "-q"};
+    if (limits_.contains("camera")) arguments.insert(arguments.end(), {"--camera", limits_.at("camera")});
     arguments.insert(arguments.end(), more.begin(), more.end());
     const CommandResult result = run_packtrace(arguments);
     ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -75,7 +79,9 @@ protected:
 };
 
 TEST_P(WholeScene, HasTheReferenceCountsAndStaysSmall) {
-  if (limits_.contains("triangles")) EXPECT_EQ(report_.at("triangles"), limits_.at("triangles"));
+  if (limits_.contains("triangles")) {
+    EXPECT_EQ(report_.at("triangles"), limits_.at("triangles"));
+  }
   if (limits_.contains("errors")) {
     size_t errors = 0;
     for (size_t at = bake_.err.find(": error: "); at != std::string::npos; at = bake_.err.find(": error: ", at + 1))
