@@ -1,6 +1,7 @@
 #include "pbrt_import/file_loader.h"
 
 #include <algorithm>
+#include <atomic>
 #include <memory>
 #include <new>
 #include <stdexcept>
@@ -32,6 +33,11 @@ std::string error_of(Work work) {
 }
 
 } // namespace
+
+uint64_t bytes_of(const Mesh& mesh) {
+  return mesh.positions.size() * sizeof(Vec3) + mesh.normals.size() * sizeof(Vec3) + mesh.uvs.size() * sizeof(Vec2) +
+         mesh.triangles.size() * sizeof(Triangle);
+}
 
 uint32_t FileLoader::request_ply(const std::filesystem::path& path, const Place& place, uint32_t slot) {
   const auto [it, inserted] = ply_by_path_.try_emplace(path.string(), static_cast<uint32_t>(plys_.size()));
@@ -83,12 +89,21 @@ void FileLoader::load(std::vector<Mesh>& meshes, std::vector<ImageRequest>& imag
     if (image.needed && !image.missing) wanted_images.push_back(&image);
   std::vector<Outcome> image_outcomes(wanted_images.size());
   const size_t count = wanted_images.size() + wanted_plys.size();
+  std::atomic<uint64_t> mesh_bytes{0};
+  for (const Mesh& mesh : meshes) mesh_bytes += bytes_of(mesh);
   progress.begin("reading meshes and images", count);
   tbb::parallel_for(size_t{0}, count, [&](size_t i) {
-    if (i < wanted_images.size()) // images first: one may take longer than many meshes
+    if (i < wanted_images.size()) { // images first: one may take longer than many meshes
       image_outcomes[i] = read_image_file(*wanted_images[i]);
-    else
-      read_ply_file(*wanted_plys[i - wanted_images.size()], meshes[wanted_plys[i - wanted_images.size()]->slot]);
+    } else {
+      PlyFile& file = *wanted_plys[i - wanted_images.size()];
+      read_ply_file(file, meshes[file.slot]);
+      // Leaving out those beyond the limit would leave out others in each run.
+      const uint64_t bytes = bytes_of(meshes[file.slot]);
+      if (mesh_bytes.fetch_add(bytes) + bytes > options_.memory_budget_bytes)
+        throw Error(ErrorKind::kLimitExceeded, "all meshes together exceed the memory budget of " +
+                                                   std::to_string(options_.memory_budget_bytes) + " bytes");
+    }
     progress.advance();
   });
   for (size_t i = 0; i < wanted_images.size(); ++i) {

@@ -8,9 +8,13 @@
 
 #include "pbrt_import/import_scene.h"
 #include "pbrt_import/reporter.h"
+#include "pbrt_import/scene/scene.h"
 #include "pbrt_import/texture_graph.h"
 
 namespace packtrace {
+
+/// Memory that a mesh's vertices and triangles take.
+uint64_t bytes_of(const Mesh& mesh);
 
 /// The PLY files that shapes ask for, each read once, all in parallel with the images once the text has been read.
 class FileLoader {
@@ -26,7 +30,8 @@ public:
   void require(uint32_t slot);
 
   /// Reads all files that are needed into meshes and images. A mesh that cannot be read stays empty and is reported
-  /// for each shape that asked for it. Throws Error(kCancelled).
+  /// for each shape that asked for it. Throws Error(kCancelled), and Error(kLimitExceeded) once all meshes together
+  /// exceed the memory budget.
   void load(std::vector<Mesh>& meshes, std::vector<ImageRequest>& images, Progress& progress,
             ImportStatistics& statistics, uint64_t& dropped_triangles);
 

@@ -162,10 +162,11 @@ ImageSummary read_exr(std::span<const std::byte> bytes, bool want_mask, uint64_t
                sizeof(Imf::Rgba), max_bytes);
     const auto w = static_cast<uint32_t>(width);
     Summarizer summarizer(w, static_cast<uint32_t>(height), want_mask);
-    constexpr int kRows = 64; // whole blocks of every compression but the rarest
-    std::vector<Imf::Rgba> rows(static_cast<size_t>(w) * kRows);
-    for (int first = box.min.y; first <= box.max.y; first += kRows) {
-      const int last = std::min(first + kRows - 1, box.max.y);
+    constexpr int64_t kBlock = 64; // whole blocks of every compression but the rarest
+    const auto block = static_cast<int>(std::min(height, kBlock));
+    std::vector<Imf::Rgba> rows(static_cast<size_t>(w) * static_cast<size_t>(block));
+    for (int first = box.min.y; first <= box.max.y; first += block) {
+      const int last = std::min(first + block - 1, box.max.y);
       // The library addresses pixel (x, y) as base + x + y * stride.
       Imf::Rgba* const base = rows.data() - box.min.x - static_cast<int64_t>(first) * width;
       file.setFrameBuffer(base, 1, w);

@@ -49,7 +49,8 @@ struct ImportResult {
 /// that are never instanced, and materials, masks and meshes that nothing uses, are left out.
 ///
 /// Throws Error(kUsage) if an option is out of range, Error(kInput) if the main file cannot be read at all,
-/// Error(kInput) if options.strict and a warning or an error was reported, Error(kCancelled) on cancellation.
+/// Error(kInput) if options.strict and a warning or an error was reported, Error(kLimitExceeded) if the meshes of PLY
+/// files exceed memory_budget_bytes together, Error(kCancelled) on cancellation.
 ImportResult import_scene(const std::filesystem::path& main_file, const ImportOptions& options,
                           Diagnostics& diagnostics, Progress& progress);
 

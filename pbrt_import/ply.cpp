@@ -11,6 +11,7 @@
 #include "pbrt_import/ply_header.h"
 #include "pbrt_import/scene/error.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
+#include "pbrt_import/tokenizer.h"
 
 namespace packtrace {
 namespace {
@@ -65,8 +66,8 @@ struct Position {
 };
 
 [[noreturn]] void fail_at(const Position& at, const std::string& problem) {
-  throw Error(ErrorKind::kInput, problem + " (in " + at.element->name + " " + std::to_string(at.row) + " of " +
-                                     std::to_string(at.element->count) + ")");
+  throw Error(ErrorKind::kInput, problem + " (in element " + in_quotes(at.element->name) + ", row " +
+                                     std::to_string(at.row) + " of " + std::to_string(at.element->count) + ")");
 }
 
 /// The values of a binary body, one by one.
@@ -157,8 +158,7 @@ private:
     const NumberText<T> result = parse_number<T>(word);
     if (result.used != word.size()) {
       const auto line = std::count(begin_, next_, '\n') + 1;
-      fail_at(at,
-              "line " + std::to_string(line) + ": expected a number, found '" + std::string(word.substr(0, 40)) + "'");
+      fail_at(at, "line " + std::to_string(line) + ": expected a number, found " + in_quotes(word));
     }
     next_ = word_end;
     return result.value;
@@ -176,7 +176,7 @@ void check_row_count(Source& source, const PlyElement& element) {
   const uint64_t row_size = source.min_row_size(element);
   if (row_size != 0 && element.count > source.remaining() / row_size)
     throw Error(ErrorKind::kInput, "the file is truncated: it is too short for " + std::to_string(element.count) +
-                                       " rows of element '" + element.name + "'");
+                                       " rows of element " + in_quotes(element.name));
 }
 
 template <class Source>

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/tokenizer.h"
 
 namespace packtrace {
 namespace {
@@ -63,7 +64,7 @@ public:
   }
   PlyType type(size_t i) const {
     const auto type = type_named(word(i));
-    if (!type) fail("unknown type '" + std::string(word(i).substr(0, 40)) + "'");
+    if (!type) fail("unknown type " + in_quotes(word(i)));
     return *type;
   }
 
@@ -91,7 +92,7 @@ PlyFormat read_format(const HeaderReader& reader) {
   if (name == "ascii") return PlyFormat::kAscii;
   if (name == "binary_little_endian") return PlyFormat::kLittleEndian;
   if (name == "binary_big_endian") return PlyFormat::kBigEndian;
-  reader.fail("unknown format '" + std::string(name.substr(0, 40)) + "'");
+  reader.fail("unknown format " + in_quotes(name));
 }
 
 PlyElement read_element(const HeaderReader& reader) {
@@ -167,7 +168,7 @@ PlyHeader parse_ply_header(std::span<const std::byte> bytes) {
       if (header.elements.empty()) reader.fail("'property' before any 'element'");
       header.elements.back().properties.push_back(read_property(reader));
     } else {
-      reader.fail("unknown keyword '" + std::string(keyword.substr(0, 40)) + "'");
+      reader.fail("unknown keyword " + in_quotes(keyword));
     }
   }
   if (!has_format) reader.fail("the header has no 'format'");

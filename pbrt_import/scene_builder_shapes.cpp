@@ -13,11 +13,6 @@
 namespace packtrace {
 namespace {
 
-uint64_t bytes_of(const Mesh& mesh) {
-  return mesh.positions.size() * sizeof(Vec3) + mesh.normals.size() * sizeof(Vec3) + mesh.uvs.size() * sizeof(Vec2) +
-         mesh.triangles.size() * sizeof(Triangle);
-}
-
 /// Renumbers the elements that something uses, in order, and drops the others.
 template <class Element>
 std::vector<uint32_t> keep_used(std::vector<Element>& elements, const std::vector<uint8_t>& used) {
@@ -218,6 +213,9 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
   const std::vector<uint32_t> material_numbers = materials_.resolve(scene_.materials, scene_.masks, reporter_);
   drop_unusable_shapes(material_numbers, scene_.shapes);
   for (Object& object : scene_.objects) drop_unusable_shapes(material_numbers, object.shapes);
+  if (const uint64_t absent = statistics_.shapes_absent; absent > 0)
+    reporter_.note(end, absent == 1 ? "1 shape is left out: its alpha is 0 everywhere"
+                                    : std::to_string(absent) + " shapes are left out: their alpha is 0 everywhere");
   drop_unused_objects();
   drop_unused(scene_);
   scene_.cameras = cameras_.finish();

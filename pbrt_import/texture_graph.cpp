@@ -15,6 +15,10 @@ bool is_usable(const TextureMapping& mapping) {
          std::isfinite(mapping.scale.y) && std::isfinite(mapping.offset.x) && std::isfinite(mapping.offset.y);
 }
 
+glm::dvec2 mapped(glm::dvec2 uv, const TextureMapping& mapping) {
+  return uv * glm::dvec2(mapping.scale) + glm::dvec2(mapping.offset);
+}
+
 /// @param x,y texel, whole numbers, possibly outside the image
 bool texel_nonzero(const ImageSummary& image, WrapMode wrap, double x, double y) {
   const double w = image.width, h = image.height;
@@ -36,6 +40,13 @@ TextureGraph::Node TextureGraph::add(const NodeData& data) {
 TextureGraph::Node TextureGraph::constant(Vec3 value) {
   NodeData data;
   data.value = value;
+  return add(data);
+}
+
+TextureGraph::Node TextureGraph::procedural(Vec3 mean) {
+  NodeData data;
+  data.kind = Kind::kProcedural;
+  data.value = mean;
   return add(data);
 }
 
@@ -91,7 +102,7 @@ std::vector<TextureGraph::Node> TextureGraph::reachable(Node node) const {
     seen[top] = 1;
     found.push_back(top);
     const NodeData& data = nodes_[top];
-    if (data.kind == Kind::kConstant || data.kind == Kind::kImage) continue;
+    if (data.kind == Kind::kConstant || data.kind == Kind::kProcedural || data.kind == Kind::kImage) continue;
     open.push_back(data.a);
     open.push_back(data.b);
     if (data.kind == Kind::kMix) open.push_back(data.c);
@@ -116,6 +127,7 @@ Vec3 TextureGraph::average(Node node) {
     Vec3 value = data.value;
     switch (data.kind) {
     case Kind::kConstant:
+    case Kind::kProcedural:
       break;
     case Kind::kImage:
       value *= images_[data.a].missing ? Vec3(1.0f) : images_[data.a].summary.average;
@@ -135,18 +147,21 @@ Vec3 TextureGraph::average(Node node) {
   return averages_[node];
 }
 
-bool TextureGraph::nonzero(const NodeData& data, Vec2 uv, std::span<const uint8_t> operands) const {
+bool TextureGraph::nonzero(const NodeData& data, glm::dvec2 uv, std::span<const uint8_t> operands) const {
   switch (data.kind) {
   case Kind::kConstant:
     return !is_zero(data.value);
+  case Kind::kProcedural:
+    return true;
   case Kind::kImage: {
     const ImageRequest& image = images_[data.a];
     if (is_zero(data.value)) return false;
     if (image.missing || !is_usable(data.mapping)) return true;
     // The texel itself, not pbrt's bilinear neighbourhood: AlphaMaskView looks at that.
-    const Vec2 st = uv * data.mapping.scale + data.mapping.offset;
-    return texel_nonzero(image.summary, data.wrap, std::floor(static_cast<double>(st.x) * image.summary.width),
-                         std::floor((1.0 - static_cast<double>(st.y)) * image.summary.height));
+    const glm::dvec2 st = mapped(uv, data.mapping);
+    if (!std::isfinite(st.x) || !std::isfinite(st.y)) return true; // as AlphaMaskView does
+    return texel_nonzero(image.summary, data.wrap, std::floor(st.x * image.summary.width),
+                         std::floor((1.0 - st.y) * image.summary.height));
   }
   case Kind::kProduct:
     return operands[0] && operands[1];
@@ -154,7 +169,7 @@ bool TextureGraph::nonzero(const NodeData& data, Vec2 uv, std::span<const uint8_
     return operands[0] || (operands[1] && operands[2]); // an amount of exactly 1 is not told apart
   case Kind::kCheckerboard: {
     if (!is_usable(data.mapping)) return operands[0] || operands[1];
-    const Vec2 st = uv * data.mapping.scale + data.mapping.offset;
+    const glm::dvec2 st = mapped(uv, data.mapping);
     const double cell = std::floor(st.x) + std::floor(st.y);
     return operands[cell - 2.0 * std::floor(cell / 2.0) == 0.0 ? 0 : 1];
   }
@@ -166,17 +181,19 @@ TextureGraph::MaskResult TextureGraph::alpha_mask(Node node) const {
   MaskResult result;
   const std::vector<Node> order = reachable(node);
   constexpr size_t kMostNodes = 64; // what a row of texels may cost
-  const NodeData* layout = nullptr; ///< the image that sets the resolution
+  const NodeData* layout = nullptr; // the image that sets the resolution
+  const NodeData* board = nullptr;  // the checkerboard that sets the period where there is no image
   bool only_image_varies = true, sampled = false;
   for (const Node n : order) {
     const NodeData& data = nodes_[n];
     const bool is_image = data.kind == Kind::kImage && !images_[data.a].missing && !is_zero(data.value);
-    if (is_image && !is_usable(data.mapping)) result.exact = false;
+    if (data.kind == Kind::kProcedural || (is_image && !is_usable(data.mapping))) result.exact = false;
     if (is_image && is_usable(data.mapping)) {
       only_image_varies = only_image_varies && !layout;
       if (!layout || images_[data.a].summary.width > images_[layout->a].summary.width) layout = &data;
     }
     sampled = sampled || data.kind == Kind::kCheckerboard;
+    if (data.kind == Kind::kCheckerboard && !board && is_usable(data.mapping)) board = &data;
   }
   if (order.size() > kMostNodes) {
     result.exact = false;
@@ -187,7 +204,11 @@ TextureGraph::MaskResult TextureGraph::alpha_mask(Node node) const {
   constexpr uint32_t kSampledSize = 1024; // for procedural textures
   mask.width = layout ? images_[layout->a].summary.width : sampled ? kSampledSize : 1;
   mask.height = layout ? images_[layout->a].summary.height : sampled ? kSampledSize : 1;
-  if (layout) mask.wrap = layout->wrap, mask.uv_scale = layout->mapping.scale, mask.uv_offset = layout->mapping.offset;
+  if (layout) {
+    mask.wrap = layout->wrap, mask.uv_scale = layout->mapping.scale, mask.uv_offset = layout->mapping.offset;
+  } else if (board) { // a checkerboard repeats after two cells
+    mask.uv_scale = 0.5f * board->mapping.scale, mask.uv_offset = 0.5f * board->mapping.offset;
+  }
   rasterize(order, mask);
   size_t set = 0;
   for (const uint32_t word : mask.words) set += static_cast<size_t>(std::popcount(word));
@@ -214,9 +235,8 @@ void TextureGraph::rasterize(std::span<const Node> order, AlphaMask& mask) const
   }
   for (uint32_t y = 0; y < mask.height; ++y)
     for (uint32_t x = 0; x < mask.width; ++x) {
-      const Vec2 st((static_cast<float>(x) + 0.5f) / static_cast<float>(mask.width),
-                    1.0f - (static_cast<float>(y) + 0.5f) / static_cast<float>(mask.height));
-      const Vec2 uv = (st - mask.uv_offset) / mask.uv_scale;
+      const glm::dvec2 st((x + 0.5) / mask.width, 1.0 - (y + 0.5) / mask.height);
+      const glm::dvec2 uv = (st - glm::dvec2(mask.uv_offset)) / glm::dvec2(mask.uv_scale);
       for (size_t i = 0; i < order.size(); ++i) {
         const std::array<size_t, 3>& from = operand_slots[i];
         const uint8_t operands[3] = {results[from[0]], results[from[1]], results[from[2]]};

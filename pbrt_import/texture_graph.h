@@ -39,6 +39,7 @@ public:
   using Node = uint32_t;
 
   Node constant(Vec3 value);
+  Node procedural(Vec3 mean); ///< varies in a way that only its mean is known of; not 0 anywhere
   Node image(uint32_t image, Vec3 scale, WrapMode wrap, const TextureMapping& mapping);
   Node product(Node a, Node b);
   Node mix(Node a, Node b, Node amount); ///< (1 - amount) a + amount b
@@ -67,18 +68,18 @@ public:
   MaskResult alpha_mask(Node node) const;
 
 private:
-  enum class Kind : uint8_t { kConstant, kImage, kProduct, kMix, kCheckerboard };
+  enum class Kind : uint8_t { kConstant, kProcedural, kImage, kProduct, kMix, kCheckerboard };
   struct NodeData {
     Kind kind = Kind::kConstant;
     WrapMode wrap = WrapMode::kRepeat;
     uint32_t a = 0, b = 0, c = 0; ///< operands; kImage: a is the image
-    Vec3 value{0.0f};             ///< kConstant: the value; kImage: the scale
+    Vec3 value{0.0f};             ///< kConstant: the value; kProcedural: the mean; kImage: the scale
     TextureMapping mapping;
   };
   Node add(const NodeData& data);
   std::vector<Node> reachable(Node node) const;
   void rasterize(std::span<const Node> order, AlphaMask& mask) const;
-  bool nonzero(const NodeData& data, Vec2 uv, std::span<const uint8_t> operands) const;
+  bool nonzero(const NodeData& data, glm::dvec2 uv, std::span<const uint8_t> operands) const;
 
   std::vector<NodeData> nodes_;
   std::vector<Vec3> averages_; ///< of the first nodes; grows on demand

@@ -92,7 +92,7 @@ Node make_bilerp(const TextureMaker& maker) {
   Vec3 sum(0.0f);
   for (const auto& [name, fallback] : {std::pair{"v00", 0.0f}, {"v01", 1.0f}, {"v10", 0.0f}, {"v11", 1.0f}})
     sum += *maker.context.graph.constant_value(maker.constant_of(name, fallback));
-  return maker.constant(sum / 4.0f);
+  return maker.context.graph.procedural(sum / 4.0f);
 }
 
 Node make_checkerboard(const TextureMaker& maker) {
@@ -116,13 +116,13 @@ Node make_dots(const TextureMaker& maker) {
   // Every second cell has a disk of radius 0.35 somewhere inside it.
   constexpr float kInside = 0.5f * std::numbers::pi_v<float> * 0.35f * 0.35f;
   return maker.context.graph.mix(maker.operand("outside", 0.0f), maker.operand("inside", 1.0f),
-                                 maker.constant(Vec3(kInside)));
+                                 maker.context.graph.procedural(Vec3(kInside)));
 }
 
 Node make_mean(const TextureMaker& maker, Vec3 mean) {
   constexpr std::string_view kNames[] = {"octaves", "roughness", "scale", "variation"};
   maker.directive.parameters.mark_used(kNames);
-  return maker.constant(mean);
+  return maker.context.graph.procedural(mean);
 }
 
 std::optional<Node> make_by_class(const TextureMaker& maker, const std::string& kind) {

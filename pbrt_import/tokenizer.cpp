@@ -33,7 +33,7 @@ void Tokenizer::check_encoding() {
   };
   if (starts_with("\xff\xfe") || starts_with("\xfe\xff"))
     throw Error(ErrorKind::kInput,
-                "the file is UTF-16 text (it starts with the bytes 0xFF and 0xFE); save it as UTF-8");
+                "the file is UTF-16 text (it starts with the byte order mark U+FEFF in 16 bits); save it as UTF-8");
   if (starts_with("\xef\xbb\xbf")) position_ = 3, line_start_ = 3;
 }
 

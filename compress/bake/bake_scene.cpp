@@ -1,12 +1,12 @@
 #include "compress/bake/bake_scene.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
+#include <limits>
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
+#include "compress/bake/brief.h"
 #include "compress/bake/file_sections.h"
 #include "compress/bake/geometry_encoder.h"
 #include "compress/bake/geometry_measure.h"
@@ -19,13 +19,6 @@
 
 namespace packtrace {
 namespace {
-
-/// A short decimal form for messages; std::to_string shows 1e-9 as 0.
-std::string brief(double value) {
-  std::array<char, 32> text{};
-  const auto [end, code] = std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 3);
-  return code == std::errc{} ? std::string(text.data(), end) : "?";
-}
 
 double mean_normal_error(const QuantizeStats& stats) {
   return stats.normal_count > 0 ? stats.normal_error_sum / static_cast<double>(stats.normal_count) : 0.0;
@@ -164,7 +157,7 @@ private:
     return record;
   }
 
-  /// Box of all instances, from the boxes of their geometries.
+  /// Box of all instances, from the boxes of their geometries. Throws Error(kInput) where one leaves the float range.
   Bounds placed_bounds(const FileSections& sections) const {
     Bounds bounds;
     for (const baked::InstanceRecord& instance : plan_.instances) {
@@ -174,8 +167,15 @@ private:
       box.lo = DVec3(g.bounds_lo[0], g.bounds_lo[1], g.bounds_lo[2]);
       box.hi = DVec3(g.bounds_hi[0], g.bounds_hi[1], g.bounds_hi[2]);
       const auto& m = instance.world_from_object;
-      bounds.extend(
-          transform_bounds(DAffine(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]), box));
+      const Bounds placed =
+          transform_bounds(DAffine(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]), box);
+      constexpr double kMax = std::numeric_limits<float>::max();
+      for (int axis = 0; axis < 3; ++axis)
+        if (!(placed.lo[axis] >= -kMax && placed.hi[axis] <= kMax))
+          throw Error(ErrorKind::kInput, "an instance of " + plan_.geometries[instance.geometry].name +
+                                             " leaves the float range: its coordinates reach " +
+                                             brief(std::max(-placed.lo[axis], placed.hi[axis])));
+      bounds.extend(placed);
     }
     return bounds;
   }

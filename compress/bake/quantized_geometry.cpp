@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
+#include "compress/bake/brief.h"
 #include "compress/bake/weld_table.h"
 #include "compress/format/normal_codec.h"
 #include "pbrt_import/scene/error.h"
@@ -83,8 +84,8 @@ public:
     for (size_t i = 0; i < plan_.parts.size(); ++i) add_part(plan_.parts[i], needs_.parts[i]);
     if (const double bound = position_error_bound(step_, max_abs); out_.stats.max_position_error > bound)
       throw Error(ErrorKind::kLimitExceeded, plan_.name + ": measured position error " +
-                                                 std::to_string(out_.stats.max_position_error) + " exceeds its bound " +
-                                                 std::to_string(bound));
+                                                 brief(out_.stats.max_position_error) + " exceeds its bound " +
+                                                 brief(bound));
     out_.stats.distinct_vertices = out_.vertices.size();
     return std::move(out_);
   }
@@ -106,10 +107,9 @@ private:
 
   void check_limits(double max_abs) const {
     if (max_abs / step_ < static_cast<double>(kMaxLattice) - 1.0) return;
-    throw Error(ErrorKind::kLimitExceeded, plan_.name + ": coordinates up to " + std::to_string(max_abs) +
-                                               " at a step of " + std::to_string(step_) +
-                                               " exceed the lattice limit of 2^" + std::to_string(kMaxLatticeBits) +
-                                               " steps; choose a coarser precision");
+    throw Error(ErrorKind::kLimitExceeded, plan_.name + ": coordinates up to " + brief(max_abs) + " at a step of " +
+                                               brief(step_) + " exceed the lattice limit of 2^" +
+                                               std::to_string(kMaxLatticeBits) + " steps; choose a coarser precision");
   }
 
   /// Everything about the part that is in hand, by source vertex or triangle.

@@ -77,13 +77,14 @@ public:
 
   /// Needs RTCRayHit for distances, RTCRay otherwise.
   template <typename Ray>
-  void trace_tile(const Tile& tile) const {
+  void trace_tile(const Tile& tile, const Progress& progress) const {
     ShadingPoint points[kTilePixels];
     const uint32_t count = gather(tile, points);
     if (count == 0) return;
     alignas(64) Ray rays[kTilePixels];
     double visibility[kTilePixels] = {}, distance[kTilePixels] = {};
     for (uint32_t s = 0; s < config_.spp; ++s) {
+      progress.check_cancelled(); // a tile of 65,536 samples takes minutes
       const PixelSampler::Number number = sampler_.number(first_sample_ + s);
       for (uint32_t i = 0; i < count; ++i) set_ray(points[i], number, rays[i]);
       query(rays, count);
@@ -217,9 +218,8 @@ void trace_ao(const SceneSource& source, const EmbreeScene& scene, const GBuffer
   if (ao.size != gbuffer.size || ao.ao.size() != gbuffer.size.pixels()) ao.resize(gbuffer.size);
   const AoTracer tracer(source, scene, gbuffer, config, frame_index, ao);
   const bool closest = config.falloff || config.interreflection > 0.0f;
-  progress.begin("ambient occlusion", gbuffer.size.pixels());
   for_each_tile(gbuffer.size, progress, [&](const Tile& tile) {
-    closest ? tracer.trace_tile<RTCRayHit>(tile) : tracer.trace_tile<RTCRay>(tile);
+    closest ? tracer.trace_tile<RTCRayHit>(tile, progress) : tracer.trace_tile<RTCRay>(tile, progress);
   });
 }
 

@@ -2,10 +2,10 @@
 
 #include <csignal>
 #include <cstdlib>
-#include <filesystem>
 #include <new>
 #include <optional>
 #include <string_view>
+#include <system_error>
 
 #include <CLI/CLI.hpp>
 #include <tbb/global_control.h>
@@ -117,12 +117,16 @@ int run_verbs(CLI::App& app, GlobalOptions& globals, int argc, const char* const
   try {
     std::optional<tbb::global_control> limit;
     if (globals.threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, globals.threads);
-    return globals.action();
+    const int code = globals.action();
+    // What is still buffered would otherwise be lost without a word, for example on a full disk.
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+      throw Error(ErrorKind::kIo, "cannot write to standard output");
+    return code;
   } catch (const Error& error) {
     return fail(error.what(), error.exit_code());
   } catch (const std::bad_alloc&) {
     return fail("not enough memory", static_cast<int>(ErrorKind::kLimitExceeded));
-  } catch (const std::filesystem::filesystem_error& error) {
+  } catch (const std::system_error& error) { // of std::filesystem, or fmt::print on a full disk
     return fail(error.what(), static_cast<int>(ErrorKind::kIo));
   } catch (const std::exception& error) {
     return fail(std::string("internal: ") + error.what(), kInternalError);

@@ -15,9 +15,9 @@
 #include <nlohmann/json.hpp>
 
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/output_file.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/json_output.h"
-#include "pbrt_import/scene/output_file.h"
 #include "runtime/image/false_color.h"
 #include "runtime/image/metrics.h"
 #include "runtime/image/png.h"
@@ -172,8 +172,7 @@ nlohmann::json to_json(const CompareOptions& options, const ImagePair& pair,
     if (values[i]) metrics[kMetrics[i].json_name] = *values[i]; // the PSNR of equal images, infinity, becomes null
   for (const Check& check : checks)
     limits.push_back({{"name", check.name}, {"limit", check.limit}, {"value", check.value}, {"passed", check.passed}});
-  return {{"command", "compare"},
-          {"schema_version", 1},
+  return {{"verb", "compare"},
           {"test", options.test},
           {"reference", options.reference},
           {"layer", pair.layer},

@@ -20,7 +20,10 @@ std::vector<std::string> chosen(const std::vector<std::string>& aovs, const std:
     for (const std::string& aov : aov_names()) known += ", " + aov;
     throw Error(ErrorKind::kUsage, "--aov " + name + ": no such layer; there are " + known);
   }
-  return names;
+  std::vector<std::string> unique;
+  for (const std::string& name : names)
+    if (std::find(unique.begin(), unique.end(), name) == unique.end()) unique.push_back(name);
+  return unique;
 }
 
 std::span<const float> floats_of(const std::vector<Vec3>& vectors) {
@@ -74,17 +77,26 @@ const std::vector<std::string>& aov_names() {
   return kNames;
 }
 
+void ImageOutputs::add(const std::filesystem::path& target, bool force, bool exr, std::vector<std::string> aovs) {
+  auto file = std::make_unique<OutputFile>(target, force);
+  for (const Entry& entry : entries_)
+    if (std::filesystem::absolute(entry.file->target()).lexically_normal() ==
+        std::filesystem::absolute(file->target()).lexically_normal())
+      throw Error(ErrorKind::kUsage, target.string() + ": two outputs would go to this file");
+  entries_.push_back({std::move(file), exr, std::move(aovs)});
+}
+
 ImageOutputs::ImageOutputs(const std::vector<std::string>& files, const std::vector<std::string>& aovs, bool force) {
   for (const std::string& name : files) {
     const std::filesystem::path path(name);
     if (path.extension() == ".exr") {
-      entries_.push_back({std::make_unique<OutputFile>(path, force), true, chosen(aovs, "all")});
+      add(path, force, true, chosen(aovs, "all"));
     } else if (path.extension() == ".png") {
       const std::vector<std::string> layers = chosen(aovs, "ao");
       for (const std::string& aov : layers) {
         std::filesystem::path target = path;
         if (layers.size() > 1) target.replace_extension("." + aov + ".png");
-        entries_.push_back({std::make_unique<OutputFile>(target, force), false, {aov}});
+        add(target, force, false, {aov});
       }
     } else {
       throw Error(ErrorKind::kUsage, name + ": images end in .exr or .png");

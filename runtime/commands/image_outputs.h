@@ -22,7 +22,8 @@ public:
   /// @param files ending in .exr (one file of all chosen layers) or .png (one file a layer: NAME.png for a single
   ///   layer, NAME.LAYER.png for several)
   /// @param aovs layers from aov_names(), or "all"; empty: all for .exr and "ao" for .png
-  /// Throws Error(kUsage) for other endings and layer names; otherwise like OutputFile.
+  /// Throws Error(kUsage) for other endings and layer names, and for two outputs to one file; otherwise like
+  /// OutputFile.
   ImageOutputs(const std::vector<std::string>& files, const std::vector<std::string>& aovs, bool force);
 
   /// Throws Error(kIo).
@@ -37,6 +38,8 @@ private:
     bool exr = false;
     std::vector<std::string> aovs;
   };
+  void add(const std::filesystem::path& target, bool force, bool exr, std::vector<std::string> aovs);
+
   std::vector<Entry> entries_;
 };
 

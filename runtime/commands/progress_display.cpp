@@ -57,7 +57,7 @@ void ProgressDisplay::observe(std::string_view phase, uint64_t done, uint64_t to
   }
   const std::lock_guard lock(mutex_);
   if (begins || phase != phase_) {
-    end_phase();
+    end_phase(true); // the work went on, so it was done, whatever it had counted
     phase_ = phase;
     phase_start_ = now;
     done_ = 0;
@@ -77,22 +77,23 @@ void ProgressDisplay::print(const std::string& text, bool last_of_phase) {
   std::fflush(config_.stream);
 }
 
-void ProgressDisplay::end_phase() {
+void ProgressDisplay::end_phase(bool done) {
   if (phase_.empty()) return;
   const double elapsed = config_.seconds() - phase_start_;
   // A phase that stopped early shows how far it came, but no promise about the rest.
-  const bool whole = total_ == 0 || done_ >= total_;
-  print(whole ? fmt::format("{}: {}", phase_, duration_text(elapsed))
-              : fmt::format("{}: stopped at {}% after {}", phase_,
-                            static_cast<int>(100.0 * static_cast<double>(done_) / static_cast<double>(total_)),
-                            duration_text(elapsed)),
-        true);
+  const bool whole = done || total_ == 0 || done_ >= total_;
+  if (config_.terminal || !whole || elapsed >= kWorthALine)
+    print(whole ? fmt::format("{}: {}", phase_, duration_text(elapsed))
+                : fmt::format("{}: stopped at {}% after {}", phase_,
+                              static_cast<int>(100.0 * static_cast<double>(done_) / static_cast<double>(total_)),
+                              duration_text(elapsed)),
+          true);
   phase_.clear();
 }
 
 void ProgressDisplay::finish() {
   const std::lock_guard lock(mutex_);
-  end_phase();
+  end_phase(false);
 }
 
 } // namespace packtrace

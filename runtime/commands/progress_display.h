@@ -18,7 +18,7 @@ struct GlobalOptions;
 std::string progress_text(std::string_view phase, uint64_t done, uint64_t total, double elapsed_s);
 
 /// Shows a Progress on standard error: one line per phase that updates itself on a terminal, otherwise a plain line
-/// when a phase ends and every kPlainInterval in between. It must outlive the Progress that it observes.
+/// when a phase of some length ends and every kPlainInterval in between. It must outlive the Progress that it observes.
 class ProgressDisplay {
 public:
   struct Config {
@@ -29,6 +29,7 @@ public:
   };
   static constexpr double kTerminalInterval = 0.1; ///< seconds
   static constexpr double kPlainInterval = 10.0;   ///< seconds
+  static constexpr double kWorthALine = 0.5;       ///< seconds; shorter phases are not mentioned in plain lines
 
   explicit ProgressDisplay(const GlobalOptions& globals);
   explicit ProgressDisplay(Config config);
@@ -45,7 +46,7 @@ public:
 private:
   void observe(std::string_view phase, uint64_t done, uint64_t total);
   void print(const std::string& text, bool last_of_phase);
-  void end_phase();
+  void end_phase(bool done);
 
   Config config_;
   std::mutex mutex_;

@@ -45,7 +45,7 @@ private:
 
   int width_, radius_;
   std::vector<float> ring_;    // [quantity][row modulo window][x]
-  std::vector<float> scratch_; // prefix of pairs while summing a row
+  std::vector<float> scratch_; // squares of a row and its border
   LocalStatistics result_;
 };
 

@@ -124,11 +124,10 @@ RenderedImage render_view(const SceneSource& source, const EmbreeScene& scene, c
   AoDenoiser denoiser(config.denoiser);
   FrameMean mean;
   std::vector<float> ao;
-  Progress silent; // the frame is the unit that is shown
-  progress.begin("ambient occlusion", config.frames);
+  progress.begin("ambient occlusion", config.frames * static_cast<uint64_t>(g.size.pixels()));
   for (uint32_t frame = 0; frame < config.frames; ++frame) {
     const Stopwatch tracing;
-    trace_ao(source, scene, g, config.ao, frame, raw, silent);
+    trace_ao(source, scene, g, config.ao, frame, raw, progress);
     image.timings.ao_s += tracing.seconds();
     const Stopwatch denoising;
     if (!config.denoise)
@@ -136,7 +135,6 @@ RenderedImage render_view(const SceneSource& source, const EmbreeScene& scene, c
     else if (const DenoisedAo& denoised = denoiser.next_frame(g, raw); frame + 1 == config.frames)
       ao = denoised.ao;
     image.timings.denoise_s += denoising.seconds();
-    progress.advance();
   }
   if (!config.denoise) ao = mean.result();
   resolve(source, g, ao, raw.ao, config.supersample, image);

@@ -1,5 +1,7 @@
 #include "runtime/trace/embree_device.h"
 
+#include <utility>
+
 namespace packtrace {
 
 EmbreeDevice::EmbreeDevice() : device_(rtcNewDevice(nullptr)) {
@@ -16,10 +18,10 @@ EmbreeDevice::EmbreeDevice() : device_(rtcNewDevice(nullptr)) {
 void EmbreeDevice::check() {
   const std::lock_guard lock(mutex_);
   if (code_ == RTC_ERROR_NONE) return;
-  const ErrorKind kind = code_ == RTC_ERROR_OUT_OF_MEMORY ? ErrorKind::kLimitExceeded : ErrorKind::kUnsupported;
-  const std::string message = "Embree: " + (text_.empty() ? "error " + std::to_string(code_) : text_);
-  code_ = RTC_ERROR_NONE;
-  throw Error(kind, message);
+  const RTCError code = std::exchange(code_, RTC_ERROR_NONE);
+  if (code == RTC_ERROR_CANCELLED) throw Error(ErrorKind::kCancelled, "cancelled");
+  const ErrorKind kind = code == RTC_ERROR_OUT_OF_MEMORY ? ErrorKind::kLimitExceeded : ErrorKind::kUnsupported;
+  throw Error(kind, "Embree: " + (text_.empty() ? "error " + std::to_string(code) : text_));
 }
 
 void EmbreeDevice::on_error(void* self, RTCError code, const char* text) {

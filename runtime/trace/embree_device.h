@@ -30,7 +30,8 @@ public:
 
   RTCDevice get() const { return device_.get(); }
 
-  /// Throws what was reported since the last call: Error(kLimitExceeded) for lack of memory, else Error(kUnsupported).
+  /// Throws what was reported since the last call: Error(kLimitExceeded) for lack of memory, Error(kCancelled) for a
+  /// build that was stopped, else Error(kUnsupported).
   void check();
 
   /// Bytes allocated now.

@@ -12,6 +12,7 @@
 #include <xmmintrin.h>
 
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/progress.h"
 #include "runtime/trace/alpha_filter.h"
 #include "runtime/trace/embree_device.h"
 
@@ -46,6 +47,9 @@ bool traceable_as_instance(const DAffine& unit_from_surface) {
 glm::dmat3 absolute(const glm::dmat3& m) { return {glm::abs(m[0]), glm::abs(m[1]), glm::abs(m[2])}; }
 
 bool is_identity(const Affine& m) { return m == Affine(1.0f); }
+
+/// Building has no phases to show, but takes seconds.
+void stop_if_cancelled() { Progress().check_cancelled(); }
 
 std::string geometry_label(uint32_t geometry) { return "geometry " + std::to_string(geometry); }
 
@@ -89,6 +93,8 @@ struct EmbreeScene::Device {
     const bool high = config.quality == BvhQuality::kHigh;
     rtcSetSceneBuildQuality(scene.get(), high ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
     rtcSetSceneFlags(scene.get(), config.robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
+    rtcSetSceneProgressMonitorFunction(
+        scene.get(), [](void*, double) { return !Progress::cancelled(); }, nullptr);
     return scene;
   }
 
@@ -155,9 +161,11 @@ EmbreeScene::EmbreeScene(const SceneSource& source, EmbreeConfig config)
     ++decoded[placed.geometry].uses;
   }
   tbb::parallel_for(uint32_t{0}, source.geometry_count(), [&](uint32_t g) {
+    stop_if_cancelled();
     if (decoded[g].uses > 0 && source.counts(g).triangles > 0) decoded[g].read(source, g);
   });
   place(decoded);
+  stop_if_cancelled();
   attach();
 }
 

@@ -17,12 +17,14 @@ inline constexpr uint32_t kOcclusionRays = 1u << 1; ///< hit what occludes() say
 
 enum class BvhQuality : uint8_t {
   kMedium, ///< deterministic
-  kHigh,   ///< spatial splits: slower to build, traces 15-30 % faster; the tree may differ from build to build
+  kHigh,   ///< spatial splits: slower to build, faster to trace; the tree may differ from build to build
 };
 
 struct EmbreeConfig {
   BvhQuality quality = BvhQuality::kMedium;
-  bool robust = false; ///< watertight edges, 18-22 % slower, and no spatial splits
+  /// Watertight: no ray passes between two triangles that share an edge. Without, about one camera ray in 40,000 does
+  /// on finely tessellated surfaces and leaves a dot; tracing is up to a fifth faster then, and kHigh splits in space.
+  bool robust = true;
 };
 
 /// Sets flush-to-zero and denormals-are-zero for its lifetime on its thread, as Embree wants around ray queries.
@@ -49,7 +51,8 @@ class EmbreeScene {
 public:
   /// Keeps a reference: the source must outlive the scene.
   /// Throws Error(kInput) for positions or transforms that are not finite or indices out of range,
-  /// Error(kLimitExceeded) if memory runs out, Error(kUnsupported) for an Embree built without the needed features.
+  /// Error(kLimitExceeded) if memory runs out, Error(kUnsupported) for an Embree built without the needed features,
+  /// Error(kCancelled) after Progress::cancel().
   EmbreeScene(const SceneSource& source, EmbreeConfig config);
   ~EmbreeScene();
   EmbreeScene(const EmbreeScene&) = delete;

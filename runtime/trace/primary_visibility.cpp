@@ -111,7 +111,7 @@ private:
   /// The point of the surface's plane on the ray. Barycentrics are floats: on a large triangle they stay on the plane
   /// but stray from the pixel. Where the ray grazes the plane or leaves the triangle they are the better choice.
   static DVec3 on_ray(const CameraRay& ray, DVec3 from_barycentrics, DVec3 normal) {
-    constexpr double kMinCosine = 1e-3, kMaxMove = 0x1p-20; // of unit space's size
+    constexpr double kMinCosine = 1e-3, kMaxMove = 0x1p-20 * UnitSpace::kHalfSize;
     const double cosine = glm::dot(normal, ray.direction);
     if (!(cosine < -kMinCosine)) return from_barycentrics;
     const double t = glm::dot(normal, from_barycentrics - ray.origin) / cosine;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "pbrt_import/scene/bounds.h"
@@ -7,19 +8,29 @@
 
 namespace packtrace {
 
-/// A uniform power-of-two scale and a translation that bring a box to the size of the unit cube: what lies in the box
-/// has coordinates in [-1, 1]. Tracing there keeps products of lengths inside the float range for any scale of scene.
+/// A uniform power-of-two scale, and a translation where it is free, that bring a box into [-kHalfSize, kHalfSize] on every
+/// axis. Tracing there keeps products of three lengths inside the float range for any scale of scene, and for things
+/// 1e-18 of its size in it: kHalfSize is large because floats that are too small become zero without notice.
+/// Both are exact for float coordinates: a box is moved along an axis only where no coordinate in it is more than
+/// twice another, so that subtracting its centre loses nothing (Sterbenz' lemma). Moving a box that holds the origin
+/// would round away small things near the origin of a large scene.
 class UnitSpace {
 public:
+  static constexpr double kHalfSize = 0x1p20;
+
   UnitSpace() = default;
 
-  /// The space of a box. An empty box gives the identity; a box without extent is only translated.
+  /// The space of a box. An empty box gives the identity; a box without extent away from the origin is only moved.
   explicit UnitSpace(const Bounds& bounds) {
     if (bounds.empty()) return;
-    const DVec3 half = bounds.extent() * 0.5;
-    const double size = std::max(half.x, std::max(half.y, half.z));
-    centre_ = bounds.centre();
-    if (size > 0.0) scale_ = std::ldexp(1.0, -std::ilogb(size) - 1);
+    double size = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double lo = bounds.lo[axis], hi = bounds.hi[axis];
+      const bool free = (lo > 0.0 && hi <= 2.0 * lo) || (hi < 0.0 && lo >= 2.0 * hi);
+      if (free) centre_[axis] = static_cast<double>(static_cast<float>(bounds.centre()[axis]));
+      size = std::max({size, std::abs(lo - centre_[axis]), std::abs(hi - centre_[axis])});
+    }
+    if (size > 0.0) scale_ = std::ldexp(kHalfSize, -std::ilogb(size) - 1);
   }
 
   DVec3 to_unit(DVec3 p) const { return (p - centre_) * scale_; }

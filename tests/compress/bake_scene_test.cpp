@@ -423,6 +423,22 @@ TEST(BakeScene, ScenesThatBreakTheRulesAreRefused) {
   EXPECT_EQ(broken([](Scene& s) { s.instances.push_back({0, Affine(1.0f)}); }), ErrorKind::kInput);
 }
 
+TEST(BakeScene, InstancesThatLeaveTheFloatRangeAreRefusedByName) {
+  Scene scene = scene_of(test::grid_mesh(2), test::scaling(DVec3(1e30)));
+  scene.objects.push_back({"galaxy", std::move(scene.shapes)});
+  scene.shapes.clear();
+  scene.instances.push_back({0, Affine(test::scaling(DVec3(1e7)))});
+  EXPECT_NO_THROW((void)bake(scene));
+  scene.instances.push_back({0, Affine(test::scaling(DVec3(1e20)))});
+  try {
+    (void)bake(scene);
+    ADD_FAILURE() << "accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::kInput);
+    EXPECT_EQ(std::string(error.what()).find("an instance of galaxy leaves the float range"), 0u) << error.what();
+  }
+}
+
 TEST(BakeScene, LatticesBeyondTheLimitAreAnErrorThatNamesIt) {
   Scene scene = scene_of(test::grid_mesh(4), test::scaling(DVec3(1e30)));
   try {
@@ -430,6 +446,8 @@ TEST(BakeScene, LatticesBeyondTheLimitAreAnErrorThatNamesIt) {
     ADD_FAILURE() << "accepted";
   } catch (const Error& error) {
     EXPECT_EQ(error.kind(), ErrorKind::kLimitExceeded);
+    EXPECT_NE(std::string(error.what()).find("coordinates up to 1e+30 at a step of 9"), std::string::npos)
+        << error.what();
     EXPECT_NE(std::string(error.what()).find("2^55"), std::string::npos);
   }
 }

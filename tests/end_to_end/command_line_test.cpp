@@ -124,6 +124,33 @@ TEST(CommandLine, UnknownImageFormatIsAUsageError) {
   EXPECT_EQ(result.exit_code, 2) << result.err;
 }
 
+TEST(CommandLine, TwoPicturesInOneFileAreAUsageErrorAndWriteNothing) {
+  const Workbench bench;
+  for (const char* same : {"a.png", "./a.png"}) {
+    const CommandResult result =
+        run_packtrace({"render", bench.scene(), "--force", "-o", bench / "a.png", "-o", bench / same});
+    EXPECT_EQ(result.exit_code, 2) << result.err;
+    EXPECT_NE(result.err.find("a.png: two outputs"), std::string::npos) << result.err;
+    EXPECT_EQ(file_count(bench.path()), 1u);
+  }
+}
+
+TEST(CommandLine, ALayerNamedTwiceIsWrittenOnce) {
+  const Workbench bench;
+  for (const char* name : {"a.png", "a.exr"}) {
+    const CommandResult result =
+        run_packtrace({"render", bench.scene(), "--frames", "1", "--aov", "ao,ao", "-o", bench / name});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_TRUE(fs::exists(bench / name));
+  }
+}
+
+TEST(CommandLine, PicturesAreCheckedBeforeTheSceneIsRead) {
+  const Workbench bench;
+  const CommandResult result = run_packtrace({"render", bench / "missing.pbrt", "-o", bench / "a.jpg"});
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+}
+
 TEST(CommandLine, EmptySceneIsAnInputError) {
   const Workbench bench;
   write_text(bench / "empty.pbrt", "WorldBegin\nWorldEnd\n");

@@ -317,7 +317,7 @@ TEST(Ply, AsciiNumbersAreReadToTheLastBit) {
   EXPECT_EQ(mesh.positions[0], Vec3(0.1f, -1e-3f, 16777216.0f));
   EXPECT_EQ(mesh.positions[1], Vec3(0.0f, std::numeric_limits<float>::max(), std::numeric_limits<float>::denorm_min()));
   EXPECT_EQ(mesh.positions[2], Vec3(0.0f, 7.0f, 0.5f));
-  EXPECT_NE(error_of(header + "0 0 0 1 0 0 0 1,5 0 3 0 1 2").find("line 10: expected a number, found '1,5'"),
+  EXPECT_NE(error_of(header + "0 0 0 1 0 0 0 1,5 0 3 0 1 2").find("line 10: expected a number, found \"1,5\""),
             std::string::npos);
   Reports reports;
   EXPECT_EQ(read(header + "nan 0 0 1 0 1e400 -inf 1 0 3 0 1 2", &reports).dropped_triangles, 1u);
@@ -333,14 +333,16 @@ TEST(Ply, MalformedHeadersAreErrorsWithTheirLine) {
     text.replace(text.find(from), from.size(), to);
     return error_of(text);
   };
-  EXPECT_EQ(with("ascii", "utf8"), "line 2: unknown format 'utf8'");
+  EXPECT_EQ(with("ascii", "utf8"), "line 2: unknown format \"utf8\"");
   EXPECT_EQ(with("1.0", "2.0"), "line 2: expected 'format NAME 1.0'");
   EXPECT_EQ(with("format ascii 1.0\n", ""), "line 13: the header has no 'format'");
-  EXPECT_EQ(with("float x", "half x"), "line 4: unknown type 'half'");
+  EXPECT_EQ(with("float x", "half x"), "line 4: unknown type \"half\"");
   EXPECT_EQ(with("float x", "float x extra"), "line 4: expected 'property TYPE NAME'");
   EXPECT_EQ(with("element vertex 4", "element vertex 4k"), "line 3: expected 'element NAME COUNT'");
   EXPECT_EQ(with("list uchar int", "list float int"), "line 13: the length of a list must have an integer type");
-  EXPECT_EQ(with("element face", "elephant face"), "line 12: unknown keyword 'elephant'");
+  EXPECT_EQ(with("element face", "elephant face"), "line 12: unknown keyword \"elephant\"");
+  EXPECT_EQ(with("float x", "h\x1b[31mf x"), "line 4: unknown type \"h\\x1b[31mf\"")
+      << "control bytes must not reach a terminal";
   EXPECT_EQ(with("float x", "float q"), "the vertices have no x, y and z");
   EXPECT_EQ(with("vertex_indices", "face_indices"), "the faces have no list vertex_indices or vertex_index");
   EXPECT_EQ(with("element vertex 4", "element face 0\nelement vertex 4"), "more than one element 'face'");

@@ -86,4 +86,24 @@ inline Imported import_world(const SceneFolder& folder, std::string_view world, 
 inline constexpr std::string_view kTriangle =
     " Shape \"trianglemesh\" \"integer indices\" [0 1 2] \"point P\" [0 0 0  1 0 0  0 1 0] ";
 
+/// A file with that triangle, and the shape that names it.
+inline constexpr std::string_view kPly =
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+    "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+inline std::string ply_shape(const std::string& file) {
+  return "Shape \"plymesh\" \"string filename\" \"" + file + "\"\n";
+}
+
+/// A shape's vertex in its parent's space.
+inline DVec3 placed(const Shape& shape, const Scene& scene, size_t vertex) {
+  return transform_point(shape.parent_from_mesh, DVec3(scene.meshes[shape.mesh].positions[vertex]));
+}
+
+/// The one material there should be.
+inline Material only_material(const Imported& imported) {
+  EXPECT_EQ(imported.scene.materials.size(), 1u) << imported.text();
+  return imported.scene.materials.empty() ? Material{} : imported.scene.materials[0];
+}
+
 } // namespace packtrace

@@ -29,11 +29,6 @@ std::string pfm(uint32_t width, uint32_t height, const std::vector<float>& rgb) 
 
 std::span<const std::byte> bytes(const std::string& text) { return std::as_bytes(std::span(text)); }
 
-Material only_material(const Imported& imported) {
-  EXPECT_EQ(imported.scene.materials.size(), 1u) << imported.text();
-  return imported.scene.materials.empty() ? Material{} : imported.scene.materials[0];
-}
-
 TEST(ImageFile, SrgbIsAveragedLinearly) {
   const std::string file = grey_tga(2, 1, {0, 255});
   EXPECT_NEAR(read_image(bytes(file), true, false, 1 << 20).average.x, 0.5, 1e-6);
@@ -201,6 +196,32 @@ TEST(AlphaTextures, ImagesBecomeMasks) {
   EXPECT_FALSE(view(mask).opaque({0.45f, 0.5f}));
 }
 
+TEST(AlphaTextures, ExtremeMappingsKeepTheImagesTexels) {
+  const SceneFolder folder;
+  folder.write("a.tga", grey_tga(2, 1, {0, 255}));
+  for (const char* const mapping : {"\"float uscale\" 1e-44", "\"float udelta\" 1e7", "\"float uscale\" -1e38"}) {
+    const Imported imported =
+        import_world(folder, "Texture \"a\" \"float\" \"imagemap\" \"string filename\" \"a.tga\" " +
+                                 std::string(mapping) + std::string(kTriangle) + "\"texture alpha\" \"a\"");
+    ASSERT_EQ(imported.scene.masks.size(), 1u) << mapping << imported.text();
+    EXPECT_EQ(imported.scene.masks[0].words, std::vector<uint32_t>{2}) << mapping;
+  }
+}
+
+TEST(AlphaTextures, CheckerboardsRepeatEveryTwoCells) {
+  const SceneFolder folder;
+  const Imported imported = import_world(
+      folder, "Texture \"c\" \"float\" \"checkerboard\" \"float uscale\" 3 \"float vscale\" 3 \"float udelta\" 1" +
+                  std::string(kTriangle) + "\"texture alpha\" \"c\"");
+  ASSERT_EQ(imported.scene.masks.size(), 1u) << imported.text();
+  const AlphaMaskView mask = view(imported.scene.masks[0]);
+  for (int v = -4; v < 4; ++v)
+    for (int u = -4; u < 4; ++u) {
+      const Vec2 centre((static_cast<float>(u) + 0.5f) / 3.0f, (static_cast<float>(v) + 0.5f) / 3.0f);
+      EXPECT_EQ(mask.opaque(centre), (u + 1 + v) % 2 == 0) << u << " " << v;
+    }
+}
+
 TEST(AlphaTextures, ProductsHaveTheHolesOfBoth) {
   const SceneFolder folder;
   folder.write("a.tga", grey_tga(4, 1, {255, 255, 0, 0}));
@@ -236,9 +257,22 @@ TEST(AlphaTextures, ConstantsNeedNoMask) {
     EXPECT_TRUE(imported.scene.shapes.empty()) << absent;
     EXPECT_TRUE(imported.scene.materials.empty());
     EXPECT_EQ(imported.statistics.shapes_absent, 1u);
+    EXPECT_TRUE(imported.reported("note: 1 shape is left out: its alpha is 0 everywhere")) << imported.text();
     EXPECT_EQ(imported.count(Severity::kError), 0u) << imported.text();
   }
   EXPECT_EQ(only_material(with("\"float shadowalpha\" 0")).flags, kNoShadow);
+}
+
+TEST(AlphaTextures, ProceduralOnesDoNotMakeShapesVanish) {
+  const SceneFolder folder;
+  for (const char* const texture :
+       {"\"fbm\"", "\"wrinkled\"", "\"bilerp\" \"float v01\" 0 \"float v11\" 0", "\"dots\""}) {
+    const Imported imported = import_world(folder, "Texture \"t\" \"float\" " + std::string(texture) +
+                                                       std::string(kTriangle) + "\"texture alpha\" \"t\"");
+    EXPECT_EQ(imported.scene.shapes.size(), 1u) << texture;
+    EXPECT_EQ(only_material(imported).flags, 0u) << texture;
+    EXPECT_TRUE(imported.reported("its holes are approximated")) << texture << imported.text();
+  }
 }
 
 TEST(AlphaTextures, DeepTextureGraphsEnd) {

@@ -1,7 +1,9 @@
 #include "runtime/commands/cli_support.h"
 
 #include <algorithm>
+#include <array>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <new>
 
@@ -11,8 +13,8 @@
 #include <unistd.h>
 
 #include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/progress.h"
 #include "pbrt_import/scene/output_file.h"
+#include "pbrt_import/scene/progress.h"
 #include "tests/runtime/image/temporary_folder.h"
 
 namespace packtrace {
@@ -91,6 +93,20 @@ TEST(CliSupport, ErrorsBecomeExitCodesAndOneLine) {
   EXPECT_EQ(run({"go"}, [](const GlobalOptions&) -> int { throw std::bad_alloc(); }).code, 5);
   EXPECT_EQ(run({"go"}, [](const GlobalOptions&) -> int { throw std::logic_error("no"); }).code, 1);
   EXPECT_EQ(run({"go"}, [](const GlobalOptions&) { return 4; }).code, 4);
+}
+
+TEST(CliSupport, LostOutputIsAnIoError) {
+  struct Guard { // the lost stream is the process's own
+    static void run() {
+      CLI::App app("test");
+      GlobalOptions globals;
+      add_verb(app, globals, "go", "Goes", [] { return std::puts("a line that stays in the buffer") < 0 ? 1 : 0; });
+      const std::array<const char*, 2> arguments{"packtrace", "go"};
+      const bool full = std::freopen("/dev/full", "w", stdout) != nullptr;
+      std::_Exit(full ? run_verbs(app, globals, 2, arguments.data()) : 1);
+    }
+  };
+  EXPECT_EXIT(Guard::run(), testing::ExitedWithCode(6), "cannot write to standard output");
 }
 
 TEST(CliSupport, TheFirstInterruptCancels) {

@@ -59,6 +59,21 @@ TEST(ProgressDisplay, PlainOutputIsSparse) {
                            "reading: 25.0 s\npacking: 1.0 s\n");
 }
 
+TEST(ProgressDisplay, PlainOutputLeavesOutMomentsAndTrustsThatWorkWentOn) {
+  Screen screen(false);
+  Progress progress(screen.display().observer());
+  progress.begin("reading", 100); // never counted, yet the next phase began
+  screen.wait(2.0);
+  progress.begin("measuring", 10);
+  screen.wait(0.1);
+  progress.advance(10);
+  progress.begin("packing", 10);
+  screen.wait(0.1);
+  progress.advance(5);
+  screen.display().finish();
+  EXPECT_EQ(screen.text(), "reading: 2.0 s\npacking: stopped at 50% after 0.1 s\n");
+}
+
 TEST(ProgressDisplay, ATerminalHasOneLinePerPhase) {
   Screen screen(true);
   Progress progress(screen.display().observer());

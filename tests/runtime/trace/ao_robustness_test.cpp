@@ -1,9 +1,12 @@
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include "pbrt_import/scene/error.h"
 #include "runtime/trace/float_source.h"
 #include "tests/runtime/trace/test_scenes.h"
 
@@ -185,6 +188,48 @@ TEST(AoFrames, MissesAreInvalidEvenOverOldContents) {
     EXPECT_EQ(frame.ao[i], kInvalidAo);
     EXPECT_EQ(frame.hit_distance[i], 0.0f);
   }
+}
+
+/// Cancellation is process-wide and has no way back: these run in processes of their own.
+TEST(AoFrames, CancellingStopsWithinATile) {
+  struct Guard {
+    static void run() {
+      const Scene scene = roofed(0);
+      const FloatSource source(scene);
+      const EmbreeScene embree(source, {});
+      const GBuffer gbuffer = test::point_gbuffer({0, 0, 0}, {0, 1, 0}, 1e-5f);
+      AoFrame frame;
+      Progress progress;
+      Progress::cancel();
+      try {
+        trace_ao(source, embree, gbuffer, visibility(1), 0, frame, progress);
+      } catch (const Error& error) {
+        const bool finished = std::any_of(frame.ao.begin(), frame.ao.end(), [](float ao) { return ao != kInvalidAo; });
+        std::_Exit(finished ? 1 : error.exit_code());
+      }
+      std::_Exit(0);
+    }
+  };
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(Guard::run(), testing::ExitedWithCode(7), "");
+}
+
+TEST(EmbreeScene, CancellingStopsTheBuild) {
+  struct Guard {
+    static void run() {
+      const Scene scene = roofed(0);
+      const FloatSource source(scene);
+      Progress::cancel();
+      try {
+        const EmbreeScene embree(source, {});
+      } catch (const Error& error) {
+        std::_Exit(error.exit_code());
+      }
+      std::_Exit(0);
+    }
+  };
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(Guard::run(), testing::ExitedWithCode(7), "");
 }
 
 TEST(AoFrames, SameBytesForAnyThreadCountAndBuild) {

@@ -279,5 +279,20 @@ TEST(EmbreeScene, CountsItsBytes) {
   EXPECT_LT(embree.resident_bytes(), 400 * triangles);
 }
 
+TEST(PrimaryVisibility, NothingIsSeenThroughAClosedMesh) {
+  Scene scene; // small triangles far away, where float arithmetic is coarse
+  add_shape(scene, test::sphere({0, 0, 0}, 1, 150));
+  add_shape(scene, quad({-100, -90, -100}, {200, 0, 0}, {0, 0, 200}));
+  const Vec3 eye(60, 10, -20);
+  const GBuffer g = trace(scene, camera_at(DVec3(eye), {0, 0, 0}, 1.2), {700, 700});
+  size_t hits = 0, behind = 0;
+  for (size_t i = 0; i < g.instance.size(); ++i) {
+    hits += g.instance[i] == 0;
+    behind += g.instance[i] != 0 || glm::dot(g.position[i], glm::normalize(eye)) < 0.0f;
+  }
+  EXPECT_GT(hits, 400000u); // the sphere fills the picture
+  EXPECT_EQ(behind, 0u);
+}
+
 } // namespace
 } // namespace packtrace

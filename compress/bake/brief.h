@@ -1,0 +1,17 @@
+#pragma once
+
+#include <array>
+#include <charconv>
+#include <string>
+#include <system_error>
+
+namespace packtrace {
+
+/// A short decimal form for messages; std::to_string shows 1e-9 as 0.
+inline std::string brief(double value) {
+  std::array<char, 32> text{};
+  const auto [end, code] = std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 3);
+  return code == std::errc{} ? std::string(text.data(), end) : "?";
+}
+
+} // namespace packtrace
