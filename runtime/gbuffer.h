@@ -32,7 +32,8 @@ struct GBuffer {
   std::vector<uint32_t> instance;     ///< SceneSource::instances() index
   std::vector<uint32_t> material;     ///< SceneSource::materials() index
   std::vector<float> offset;          ///< ray-origin offset along the geometric normal, world units (docs/accuracy.md)
-  /// Pixels to subtract from this pixel's centre to find the same surface point in the previous frame (x right, y down).
+  /// Pixels to subtract from this pixel's centre to find the same surface point in the previous frame (x right, y
+  /// down).
   std::vector<Vec2> motion_px;
 
   void resize(ImageSize new_size) {
@@ -47,8 +48,9 @@ struct GBuffer {
 /// Ambient occlusion of one frame before denoising.
 struct AoFrame {
   ImageSize size;
-  std::vector<float> ao;           ///< 1 = open, 0 = fully occluded, kInvalidAo = none
-  std::vector<float> hit_distance; ///< mean distance of the samples' hits, misses counting as the AO radius; world units
+  std::vector<float> ao; ///< 1 = open, 0 = fully occluded, kInvalidAo = none
+  std::vector<float>
+      hit_distance; ///< mean distance of the samples' hits, misses counting as the AO radius; world units
 
   void resize(ImageSize new_size) {
     size = new_size;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <chrono>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -79,6 +80,9 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   const BakeConfig config = make_config(options);
   if (options.output.empty() && !options.dry_run)
     throw Error(ErrorKind::kUsage, "bake needs -o OUT.ptk, or --dry-run to write nothing");
+  std::error_code not_there;
+  if (std::filesystem::equivalent(options.input, options.output, not_there))
+    throw Error(ErrorKind::kUsage, options.output + ": the output is the input");
   JsonOutput json(globals.json, globals.force);
   ProgressDisplay display(globals);
   Progress progress(display.observer());

@@ -33,9 +33,11 @@ ImportResult import_for_command(const std::filesystem::path& file, bool strict, 
     throw;
   }
   display.finish();
-  report_diagnostics(diagnostics, globals);
-  if (placed_triangle_count(result.scene) == 0)
-    throw Error(ErrorKind::kInput, file.string() + ": the scene has no triangles to work with");
+  const bool empty = placed_triangle_count(result.scene) == 0;
+  GlobalOptions shown = globals;
+  if (empty) shown.verbosity = std::max(shown.verbosity, 1); // notes may say why
+  report_diagnostics(diagnostics, shown);
+  if (empty) throw Error(ErrorKind::kInput, file.string() + ": the scene has no triangles to work with");
   return result;
 }
 

@@ -43,6 +43,10 @@ private:
       pixels.valid[lane] = valid ? -1 : 0;
       rays[lane] = now_.ray(std::min(x, tile.x1 - 1), std::min(y, tile.y1 - 1));
       rays[lane].origin = scene_.space().to_unit(rays[lane].origin);
+      if (!approach(rays[lane]) && valid) {
+        pixels.valid[lane] = 0;
+        write_miss(static_cast<size_t>(y) * out_.size.width + x);
+      }
       set_ray(packet, lane, rays[lane].origin, rays[lane].direction);
     }
     {
@@ -60,6 +64,21 @@ private:
       else
         write_hit(pixel, glm::dvec2(pixels.x[lane], pixels.y[lane]) + 0.5, rays[lane], packet.hit, lane);
     }
+  }
+
+  /// Moves the origin of a ray that starts far away along the ray to just before the scene: floats keep what is seen
+  /// there sharp, and Embree takes origins up to 1.8e18 only. False, and a harmless ray, where it passes the scene by.
+  static bool approach(CameraRay& ray) {
+    constexpr double kNear = 4.0 * UnitSpace::kHalfSize; // the scene's box ends at sqrt(3) kHalfSize
+    if (glm::length(ray.origin) <= kNear) return true;
+    const double closest = -glm::dot(ray.origin, ray.direction);
+    const DVec3 point = ray.origin + ray.direction * closest;
+    if (closest > 0.0 && glm::length(point) <= kNear) {
+      ray.origin = point - ray.direction * kNear;
+      return true;
+    }
+    ray.origin = DVec3(0.0);
+    return false;
   }
 
   static void set_ray(RTCRayHit16& packet, uint32_t lane, DVec3 origin, DVec3 direction) {

@@ -21,9 +21,9 @@ struct GeometryCounts {
 };
 
 /// What tracing and shading need of a scene, whether it lies in a baked file (PackedSource) or in floats
-/// (FloatSource). Triangle numbers of a geometry are the order in which decode() lists them. All functions are const and may be
-/// called from several threads; per-hit functions do not allocate.
-/// Both sources number instances alike: the scene's shapes outside objects in file order, then its object instances.
+/// (FloatSource). Triangle numbers of a geometry are the order in which decode() lists them. All functions are const
+/// and may be called from several threads; per-hit functions do not allocate. Both sources number instances alike: the
+/// scene's shapes outside objects in file order, then its object instances.
 class SceneSource {
 public:
   virtual ~SceneSource() = default;

@@ -8,9 +8,9 @@
 
 namespace packtrace {
 
-/// A uniform power-of-two scale, and a translation where it is free, that bring a box into [-kHalfSize, kHalfSize] on every
-/// axis. Tracing there keeps products of three lengths inside the float range for any scale of scene, and for things
-/// 1e-18 of its size in it: kHalfSize is large because floats that are too small become zero without notice.
+/// A uniform power-of-two scale, and a translation where it is free, that bring a box into [-kHalfSize, kHalfSize] on
+/// every axis. Tracing there keeps products of three lengths inside the float range for any scale of scene, and for
+/// things 1e-18 of its size in it: kHalfSize is large because floats that are too small become zero without notice.
 /// Both are exact for float coordinates: a box is moved along an axis only where no coordinate in it is more than
 /// twice another, so that subtracting its centre loses nothing (Sterbenz' lemma). Moving a box that holds the origin
 /// would round away small things near the origin of a large scene.

@@ -96,6 +96,23 @@ TEST(CommandLine, ExistingOutputIsKeptWithoutForce) {
   EXPECT_NE(read_text(bench.baked()), "mine");
 }
 
+TEST(CommandLine, TheInputIsNeverOverwritten) {
+  const Workbench bench;
+  EXPECT_EQ(run_packtrace({"bake", bench.scene(), "-o", bench.scene(), "--force"}).exit_code, 2);
+  EXPECT_EQ(read_text(bench.scene()), small_scene_text());
+}
+
+TEST(CommandLine, AnEmptySceneSaysWhy) {
+  const Workbench bench;
+  std::string text = small_scene_text();
+  for (size_t at = text.find("Shape"); at != std::string::npos; at = text.find("Shape", at + 40))
+    text.insert(text.find('\n', at), " \"float alpha\" [0]");
+  write_text(bench / "clear.pbrt", text);
+  const CommandResult result = run_packtrace({"bake", bench / "clear.pbrt", "-o", bench.baked()});
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_NE(result.err.find("note:"), std::string::npos) << result.err;
+}
+
 TEST(CommandLine, ExistingPictureIsKeptWithoutForce) {
   const Workbench bench;
   bench.bake();

@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "runtime/commands/json_output.h"
 #include "pbrt_import/scene/file_bytes.h"
+#include "runtime/commands/json_output.h"
 #include "tests/runtime/image/image_test_support.h"
 #include "tests/runtime/image/temporary_folder.h"
 

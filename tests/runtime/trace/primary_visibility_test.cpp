@@ -95,6 +95,20 @@ TEST(PrimaryVisibility, EmptyScenesMissEverywhere) {
   EXPECT_TRUE(same_bytes(trace(no_triangles, camera_at({0, 0, 0}, {0, 0, 1}), {5, 3}), empty));
 }
 
+TEST(PrimaryVisibility, CamerasFarAwaySeeWhatTheyPointAt) {
+  Camera camera = camera_at({0, 0, -3e19}, {0, 0, 0}, 90);
+  const GBuffer wide = trace(wall_scene(), camera, {8, 8});
+  for (const uint32_t instance : wide.instance)
+    EXPECT_EQ(instance, kNoInstance) << "the wall is far smaller than a pixel";
+  camera.projection = Projection::kOrthographic;
+  const GBuffer g = trace(wall_scene(), camera, {8, 8});
+  for (size_t i = 0; i < g.instance.size(); ++i) {
+    EXPECT_EQ(g.instance[i], 0u);
+    EXPECT_NEAR(g.position[i].z, 5.0f, 1e-3f);
+    EXPECT_LE(std::abs(g.position[i].x), 1.0f);
+  }
+}
+
 TEST(PrimaryVisibility, RightOfTheViewerIsRightInTheImage) {
   Scene scene;
   add_shape(scene, quad({10, -100, -200}, {0, 0, 200}, {0, 200, 0})); // x = 10, z < 0: right when looking along +x
