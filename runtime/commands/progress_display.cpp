@@ -80,14 +80,9 @@ void ProgressDisplay::print(const std::string& text, bool last_of_phase) {
 void ProgressDisplay::end_phase(bool done) {
   if (phase_.empty()) return;
   const double elapsed = config_.seconds() - phase_start_;
-  // A phase that stopped early shows how far it came, but no promise about the rest.
   const bool whole = done || total_ == 0 || done_ >= total_;
   if (config_.terminal || !whole || elapsed >= kWorthALine)
-    print(whole ? fmt::format("{}: {}", phase_, duration_text(elapsed))
-                : fmt::format("{}: stopped at {}% after {}", phase_,
-                              static_cast<int>(100.0 * static_cast<double>(done_) / static_cast<double>(total_)),
-                              duration_text(elapsed)),
-          true);
+    print(fmt::format("{}: {}{}", phase_, whole ? "" : "stopped after ", duration_text(elapsed)), true);
   phase_.clear();
 }
 

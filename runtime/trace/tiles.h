@@ -8,7 +8,7 @@
 
 namespace packtrace {
 
-inline constexpr uint32_t kTileSize = 32; ///< pixels per axis; 16 was measured 10 % slower
+inline constexpr uint32_t kTileSize = 32; ///< pixels per axis
 
 /// Half-open pixel rectangle, at most kTileSize on each axis.
 struct Tile {
