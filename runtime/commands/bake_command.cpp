@@ -1,7 +1,6 @@
 #include "runtime/commands/bake_command.h"
 
 #include <array>
-#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -19,6 +18,7 @@
 #include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/process_usage.h"
 #include "runtime/commands/progress_display.h"
+#include "runtime/stopwatch.h"
 
 namespace packtrace {
 namespace {
@@ -39,14 +39,6 @@ BakeConfig make_config(const BakeOptions& options) {
   config.validate();
   return config;
 }
-
-class Stopwatch {
-public:
-  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-
-private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 nlohmann::json report(const BakeOptions& options, const BakeReport& baked, const ImportStatistics& imported,
                       double import_s, double bake_s) {

@@ -1,7 +1,6 @@
 #include "runtime/commands/render_command.h"
 
 #include <charconv>
-#include <chrono>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -21,6 +20,7 @@
 #include "runtime/commands/process_usage.h"
 #include "runtime/commands/progress_display.h"
 #include "runtime/render/renderer.h"
+#include "runtime/stopwatch.h"
 
 namespace packtrace {
 namespace {
@@ -166,11 +166,11 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   const Camera camera = choose_camera(*loaded.source, options, globals);
   const RenderConfig config = make_config(*loaded.source, camera, options);
 
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch building;
   progress.begin("bvh", 0);
   const EmbreeScene scene(*loaded.source,
                           {options.bvh == "high" ? BvhQuality::kHigh : BvhQuality::kMedium, !options.fast_edges});
-  const double build_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double build_s = building.seconds();
   RenderedImage image = render_view(*loaded.source, scene, camera, config, progress);
   image.timings.build_s = build_s;
   display.finish();

@@ -1,11 +1,11 @@
 #include "runtime/render/renderer.h"
 
 #include <algorithm>
-#include <chrono>
 #include <string>
 
 #include "pbrt_import/scene/error.h"
 #include "runtime/camera/camera_rays.h"
+#include "runtime/stopwatch.h"
 #include "runtime/trace/primary_visibility.h"
 
 namespace packtrace {
@@ -15,14 +15,6 @@ constexpr uint32_t kMaxSupersample = 8;
 constexpr uint32_t kMaxFrames = 65536;
 constexpr uint32_t kMaxTracedSide = 1u << 16;
 constexpr size_t kMaxTracedPixels = size_t{1} << 28;
-
-class Stopwatch {
-public:
-  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-
-private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 void require(bool condition, const std::string& message) {
   if (!condition) throw Error(ErrorKind::kUsage, message);
