@@ -34,11 +34,6 @@ std::string error_of(Work work) {
 
 } // namespace
 
-uint64_t bytes_of(const Mesh& mesh) {
-  return mesh.positions.size() * sizeof(Vec3) + mesh.normals.size() * sizeof(Vec3) + mesh.uvs.size() * sizeof(Vec2) +
-         mesh.triangles.size() * sizeof(Triangle);
-}
-
 uint32_t FileLoader::request_ply(const std::filesystem::path& path, const Place& place, uint32_t slot) {
   const auto [it, inserted] = ply_by_path_.try_emplace(path.string(), static_cast<uint32_t>(plys_.size()));
   if (inserted) {

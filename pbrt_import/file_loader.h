@@ -13,9 +13,6 @@
 
 namespace packtrace {
 
-/// Memory that a mesh's vertices and triangles take.
-uint64_t bytes_of(const Mesh& mesh);
-
 /// The PLY files that shapes ask for, each read once, all in parallel with the images once the text has been read.
 class FileLoader {
 public:

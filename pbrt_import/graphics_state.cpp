@@ -6,30 +6,31 @@
 namespace packtrace {
 
 void ScopedNames::define(std::string_view name, uint32_t value) {
-  auto it = values_.find(name);
-  if (it == values_.end()) it = values_.emplace(std::string(name), std::nullopt).first;
-  undo_.push_back({&it->first, it->second});
-  it->second = value;
+  const uint32_t number = names_.intern(name);
+  if (number == values_.size()) values_.push_back(kNone);
+  undo_.push_back({number, values_[number]});
+  values_[number] = value;
 }
 
 std::optional<uint32_t> ScopedNames::find(std::string_view name) const {
-  const auto it = values_.find(name);
-  return it == values_.end() ? std::nullopt : it->second;
+  const std::optional<uint32_t> number = names_.find(name);
+  if (!number || values_[*number] == kNone) return std::nullopt;
+  return values_[*number];
 }
 
 std::string ScopedNames::closest(std::string_view name) const {
   constexpr size_t kMostNames = 10'000; // a hint is not worth more comparisons than that
   if (values_.size() > kMostNames) return {};
   std::vector<std::string_view> names;
-  for (const auto& [key, value] : values_)
-    if (value) names.push_back(key);
+  for (uint32_t number = 0; number < values_.size(); ++number)
+    if (values_[number] != kNone) names.push_back(names_.name(number));
   std::sort(names.begin(), names.end());
   return std::string(closest_name(name, names));
 }
 
 void ScopedNames::restore(size_t mark) {
   while (undo_.size() > mark) {
-    values_.find(*undo_.back().name)->second = undo_.back().previous;
+    values_[undo_.back().name] = undo_.back().previous;
     undo_.pop_back();
   }
 }

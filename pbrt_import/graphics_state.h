@@ -1,22 +1,24 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <unordered_map>
 #include <vector>
 
+#include "pbrt_import/name_table.h"
 #include "pbrt_import/parameters.h"
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {
 
+inline constexpr uint32_t kNone = ~0u;
+
 /// Names that stand for numbers, where blocks give back what was visible before them. Opening a block costs nothing
 /// however many names there are; closing one costs the definitions made inside it.
 class ScopedNames {
 public:
+  /// @param value not kNone
   void define(std::string_view name, uint32_t value);
   std::optional<uint32_t> find(std::string_view name) const;
   /// The visible name that name is most likely a misspelling of; the one first in the alphabet of several.
@@ -26,15 +28,12 @@ public:
   void restore(size_t mark);
 
 private:
-  struct Hash {
-    using is_transparent = void;
-    size_t operator()(std::string_view text) const { return std::hash<std::string_view>{}(text); }
-  };
   struct Undo {
-    const std::string* name; ///< key of values_, which never moves
-    std::optional<uint32_t> previous;
+    uint32_t name;
+    uint32_t previous;
   };
-  std::unordered_map<std::string, std::optional<uint32_t>, Hash, std::equal_to<>> values_;
+  NameTable names_;
+  std::vector<uint32_t> values_; ///< by name; kNone: not visible
   std::vector<Undo> undo_;
 };
 
@@ -43,8 +42,6 @@ struct TransformPair {
   DAffine start{1.0};
   DAffine end{1.0};
 };
-
-inline constexpr uint32_t kNone = ~0u;
 
 /// What AttributeBegin saves, names apart.
 struct Attributes {

@@ -65,16 +65,22 @@ struct InputFile::State {
   std::vector<unsigned char> compressed;
   bool member_open = false; ///< inside a gzip member: the end of the file here means truncation
 
-  size_t read_plain(char* to, size_t size) {
+  /// @param read_some gets a pointer, a size and how much came before; returns like POSIX read
+  template <class ReadSome>
+  static size_t read_fully(char* to, size_t size, ReadSome read_some) {
     size_t got = 0;
     while (got < size) {
-      const ssize_t n = ::read(file.get(), to + got, std::min<size_t>(size - got, 1u << 30));
+      const ssize_t n = read_some(to + got, std::min<size_t>(size - got, 1u << 30), got);
       if (n < 0 && errno == EINTR) continue;
       if (n < 0) fail(std::string("reading failed: ") + std::strerror(errno));
       if (n == 0) break;
       got += static_cast<size_t>(n);
     }
     return got;
+  }
+
+  size_t read_plain(char* to, size_t size) {
+    return read_fully(to, size, [&](char* p, size_t n, size_t) { return ::read(file.get(), p, n); });
   }
 
   /// True if there is compressed input to work on.
@@ -85,6 +91,12 @@ struct InputFile::State {
     z.next_in = compressed.data();
     z.avail_in = static_cast<uInt>(n);
     return n > 0;
+  }
+
+  void check_limit(uint64_t bytes) const {
+    if (bytes > max_bytes)
+      throw Error(ErrorKind::kLimitExceeded,
+                  "content exceeds the limit of " + std::to_string(max_bytes) + " bytes for this file");
   }
 
   size_t read_inflated(char* to, size_t size) {
@@ -137,9 +149,15 @@ size_t InputFile::read(std::span<char> buffer) {
   const size_t got = state_->inflater ? state_->read_inflated(buffer.data(), buffer.size())
                                       : state_->read_plain(buffer.data(), buffer.size());
   state_->delivered_bytes += got;
-  if (state_->delivered_bytes > state_->max_bytes)
-    throw Error(ErrorKind::kLimitExceeded,
-                "content exceeds the limit of " + std::to_string(state_->max_bytes) + " bytes for this file");
+  state_->check_limit(state_->delivered_bytes);
+  return got;
+}
+
+size_t InputFile::read_at(uint64_t offset, std::span<char> buffer) const {
+  const size_t got = State::read_fully(buffer.data(), buffer.size(), [&](char* p, size_t n, size_t done) {
+    return ::pread(state_->file.get(), p, n, static_cast<off_t>(offset + done));
+  });
+  state_->check_limit(offset + got);
   return got;
 }
 

@@ -23,6 +23,9 @@ public:
   /// Throws Error(kInput) if reading fails or gzip data is damaged, Error(kLimitExceeded) past max_bytes.
   size_t read(std::span<char> buffer);
 
+  /// Like read, from an offset in the content of a file that is not compressed. Any thread may call it.
+  size_t read_at(uint64_t offset, std::span<char> buffer) const;
+
   /// Bytes on disk.
   uint64_t stored_bytes() const;
   bool compressed() const;

@@ -26,8 +26,14 @@ NumberText<T> parse_number(std::string_view word);
 constexpr bool is_space(char c) { return c == ' ' || c == '\n' || c == '\t' || c == '\r'; }
 constexpr bool ends_word(char c) { return is_space(c) || c == '"' || c == '[' || c == ']' || c == '\0'; }
 
+/// Whether a word that starts with c may be a number, nan or inf.
+constexpr bool may_start_number(char c) {
+  return static_cast<unsigned char>(c - '0') < 10 || c == '-' || c == '+' || c == '.' || (c | 0x20) == 'n' ||
+         (c | 0x20) == 'i';
+}
+
 /// How many zeros must follow the text in a buffer that the scanners below work on.
-inline constexpr size_t kScannerReach = 64;
+inline constexpr size_t kScannerReach = 72;
 
 namespace detail {
 

@@ -138,10 +138,16 @@ std::span<const int32_t> ParameterList::integers(std::string_view name) const {
   return found ? std::span<const int32_t>(found->integers) : std::span<const int32_t>();
 }
 
-std::vector<float> ParameterList::take_floats(std::string_view name, ParameterType type) {
+std::vector<Vec3> ParameterList::take_vectors(std::string_view name, ParameterType type) {
   const Parameter* const found = find(name, {type});
   if (!found) return {};
-  return std::move(parameters_[static_cast<size_t>(found - parameters_.data())].floats);
+  return parameters_[static_cast<size_t>(found - parameters_.data())].floats.take_triplets();
+}
+
+std::vector<Triangle> ParameterList::take_triangles(std::string_view name) {
+  const Parameter* const found = find(name, {ParameterType::kInteger});
+  if (!found) return {};
+  return parameters_[static_cast<size_t>(found - parameters_.data())].integers.take_triplets();
 }
 
 void ParameterList::mark_used(std::span<const std::string_view> names) const {

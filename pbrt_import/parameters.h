@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "pbrt_import/number_array.h"
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {
@@ -45,8 +46,8 @@ struct Parameter {
   ParameterType type = ParameterType::kFloat;
   std::string name;
   Place place;
-  std::vector<float> floats;        ///< all kinds of points, vectors, spectra: components one after the other
-  std::vector<int32_t> integers;    ///< integer, and bool as 0 or 1
+  FloatArray floats;                ///< all kinds of points, vectors, spectra: components one after the other
+  IntegerArray integers;            ///< integer, and bool as 0 or 1
   std::vector<std::string> strings; ///< string, texture, spectrum files: escapes not replaced yet
   mutable bool used = false;        ///< somebody asked for it with its type
 };
@@ -78,8 +79,9 @@ public:
   std::span<const float> floats(std::string_view name, ParameterType type) const;
   std::span<const int32_t> integers(std::string_view name) const;
 
-  /// Moves all values out; empty if there are none.
-  std::vector<float> take_floats(std::string_view name, ParameterType type);
+  /// Moves all values out in groups of three; empty if there are none.
+  std::vector<Vec3> take_vectors(std::string_view name, ParameterType type);
+  std::vector<Triangle> take_triangles(std::string_view name);
 
   /// Declares names as known without needing their values.
   void mark_used(std::span<const std::string_view> names) const;

@@ -125,6 +125,30 @@ bool is_numeric(ParameterType type) {
   return type != ParameterType::kString && type != ParameterType::kTexture && type != ParameterType::kBool;
 }
 
+/// Appends, converting if need be.
+template <class Number>
+void append(std::vector<double>& values, std::span<const Number> more) {
+  values.insert(values.end(), more.begin(), more.end());
+}
+template <class Number, class Triplet, class Other>
+void append(NumberArray<Number, Triplet>& values, std::span<const Other> more) {
+  values.append(more);
+}
+
+/// parse_number of a word in the tokenizer's window, which scanners may read beyond.
+template <class T>
+NumberText<T> parse_word(std::string_view word) {
+  NumberText<T> number;
+  const char* end = nullptr;
+  if constexpr (std::is_same_v<T, float>)
+    end = scan_float(word.data(), number.value);
+  else
+    end = scan_double(word.data(), number.value);
+  if (end != word.data() + word.size()) return parse_number<T>(word);
+  number.used = word.size();
+  return number;
+}
+
 /// Components per value: values come in multiples of it.
 size_t components(ParameterType type) {
   switch (type) {
@@ -225,9 +249,12 @@ bool Parser::read_directive_names(const DirectiveInfo& info, Directive& directiv
       report_unexpected("a quoted name after " + std::string(info.keyword));
       return false;
     }
-    bool unknown_escape = false;
     if (info.kind == K::kInclude) include_name_ = token.text;
-    directive.names[directive.name_count++] = unescape(token.text, unknown_escape);
+    bool unknown_escape = false;
+    if (token.text.find('\\') == std::string_view::npos)
+      directive.names[directive.name_count++] = token.text;
+    else
+      directive.names[directive.name_count++] = unescape(token.text, unknown_escape);
     source_.consume();
   }
   return true;
@@ -246,12 +273,13 @@ void Parser::skip_to_directive() {
   while (source_.peek().kind != TokenKind::kEnd && !is_directive(source_.peek())) source_.consume();
 }
 
-template <class T>
-bool Parser::take_number(std::vector<T>& values) {
+template <class Values>
+bool Parser::take_number(Values& values) {
+  using T = typename Values::value_type;
   const Token& token = source_.peek();
-  if (token.kind != TokenKind::kWord) return false;
+  if (token.kind != TokenKind::kWord || !may_start_number(token.text[0])) return false;
   using Parsed = std::conditional_t<std::is_same_v<T, float>, float, double>;
-  const NumberText<Parsed> number = parse_number<Parsed>(token.text);
+  const NumberText<Parsed> number = parse_word<Parsed>(token.text);
   if (number.used == 0 || is_directive(token)) return false;
   if (number.used < token.text.size())
     reporter_.warning(source_.place(),
@@ -272,9 +300,9 @@ bool Parser::take_number(std::vector<T>& values) {
   return true;
 }
 
-template <class T>
-void Parser::read_number_run(std::vector<T>& values) {
-  do source_.read_numbers(values);
+template <class Values>
+void Parser::read_number_run(Values& values) {
+  do source_.read_numbers<typename Values::value_type>([&](auto numbers) { append(values, numbers); });
   while (take_number(values));
 }
 
@@ -409,7 +437,7 @@ void Parser::cut_excess(Parameter& parameter) {
                                          std::to_string(components(parameter.type)) + ", found " +
                                          std::to_string(parameter.floats.size()) + "; the last " +
                                          std::to_string(excess) + " are ignored");
-  parameter.floats.resize(parameter.floats.size() - excess);
+  parameter.floats.truncate(parameter.floats.size() - excess);
 }
 
 } // namespace packtrace

@@ -89,10 +89,10 @@ private:
   bool take_string(Parameter& parameter);
   bool take_bool(Parameter& parameter);
   void cut_excess(Parameter& parameter);
-  template <class T>
-  void read_number_run(std::vector<T>& values);
-  template <class T>
-  bool take_number(std::vector<T>& values);
+  template <class Values>
+  void read_number_run(Values& values);
+  template <class Values>
+  bool take_number(Values& values);
   void skip_value();
   void skip_to_directive();
   void report_unexpected(const std::string& expected);

@@ -44,7 +44,8 @@ bool is_world_only(K kind) {
 } // namespace
 
 SceneBuilder::SceneBuilder(const ImportOptions& options, const FileNames& file_names, Reporter& reporter)
-    : options_(options), file_names_(file_names), reporter_(reporter), loader_(options, reporter) {}
+    : options_(options), file_names_(file_names), reporter_(reporter), loader_(options, reporter),
+      mesh_queue_(options.tessellation_tolerance) {}
 
 bool SceneBuilder::allowed_here(const Directive& directive) {
   if (phase_ == Phase::kSecondWorld) return false;
@@ -338,6 +339,9 @@ void SceneBuilder::add_instance(const Directive& directive) {
   if (!is_invertible(DAffine(world_from_object)))
     return reporter_.error(directive.place, "the instance's transform has no inverse (a scale of 0?); it is skipped");
   if (state_.animated()) reporter_.note(directive.place, "animated instance: its transform at the start is used");
+  // Room that is never used costs address space only, where copies would cost memory while they are made.
+  if (scene_.instances.size() == scene_.instances.capacity())
+    scene_.instances.reserve(std::max<size_t>(1024, 4 * scene_.instances.size()));
   scene_.instances.push_back({found->second, world_from_object});
 }
 

@@ -11,6 +11,7 @@
 #include "pbrt_import/graphics_state.h"
 #include "pbrt_import/import_scene.h"
 #include "pbrt_import/materials.h"
+#include "pbrt_import/mesh_queue.h"
 #include "pbrt_import/parser.h"
 #include "pbrt_import/reporter.h"
 #include "pbrt_import/texture_graph.h"
@@ -50,6 +51,9 @@ private:
   bool make_mesh(Directive& directive, Shape& shape);
   bool make_ply_mesh(const Directive& directive, Shape& shape);
   bool make_inline_mesh(Directive& directive, Shape& shape);
+  bool skip_shape(const std::string& kind, const Place& place, const std::string& problem);
+  bool report_mesh(MeshQueue::Entry& entry);
+  void take_queued_meshes();
   bool read_alpha(const Directive& directive, const TextureContext& context, MaterialUse& use);
 
   void drop_unusable_shapes(const std::vector<uint32_t>& material_numbers, std::vector<Shape>& shapes);
@@ -75,7 +79,8 @@ private:
   uint32_t nested_objects_ = 0;  ///< ObjectBegins that were refused but will have their ObjectEnd
   uint64_t ignored_blocks_ = 0;  ///< open ones beyond the nesting limit
   uint32_t open_blocks_[3] = {}; ///< by kind
-  uint64_t mesh_bytes_ = 0;
+  uint64_t mesh_bytes_ = 0; ///< of all meshes made from text, queued ones at most
+  MeshQueue mesh_queue_;    ///< last: its tasks end before anything else does
 };
 
 } // namespace packtrace

@@ -136,38 +136,62 @@ bool SceneBuilder::make_ply_mesh(const Directive& directive, Shape& shape) {
 bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
   const std::string& name = directive.names[0];
   const ShapeKind* const kind = find_shape_kind(name);
-  std::string problem;
-  if (!kind) problem = "unknown shape" + did_you_mean(closest_shape_kind(name));
+  if (!kind) return skip_shape(name, directive.place, "unknown shape" + did_you_mean(closest_shape_kind(name)));
   const ReportFn report = [&](Severity severity, uint32_t, std::string message) {
     reporter_.report(severity, directive.place, name + ": " + message);
   };
-  Mesh mesh;
+  MeshQueue::Entry entry;
+  entry.kind = name;
+  entry.place = directive.place;
+  entry.sequence = reporter_.sequence();
+  entry.slot = static_cast<uint32_t>(scene_.meshes.size());
   try {
-    ShapeContext shape_context{options_.tessellation_tolerance, report, 0};
-    if (problem.empty()) {
-      mesh = kind->make(directive.parameters, shape_context);
-      scene_.dropped_triangles += shape_context.dropped_triangles;
-      if (mesh.triangles.empty()) problem = "no triangle is left";
-    }
+    entry.job = kind->read(directive.parameters, report);
   } catch (const Error& error) {
-    problem = error.what();
-  } catch (const std::bad_alloc&) {
-    problem = "not enough memory";
-  } catch (const std::length_error&) {
-    problem = "not enough memory";
+    return skip_shape(name, directive.place, error.what());
   }
-  if (problem.empty() && bytes_of(mesh) > options_.memory_budget_bytes - mesh_bytes_)
-    problem =
-        "all meshes together exceed the memory budget of " + std::to_string(options_.memory_budget_bytes) + " bytes";
-  if (!problem.empty()) {
-    reporter_.error(directive.place, "Shape " + in_quotes(name) + " is skipped: " + problem);
-    return false;
+  constexpr uint64_t kWorthATask = 32 * 1024;
+  const uint64_t bytes = entry.job.bytes_at_most;
+  if (bytes < kWorthATask || bytes > options_.memory_budget_bytes - mesh_bytes_) {
+    entry.made = run_job(entry.job, options_.tessellation_tolerance);
+    if (entry.made.problem.empty() && bytes_of(entry.made.mesh) > options_.memory_budget_bytes - mesh_bytes_)
+      entry.made.problem =
+          "all meshes together exceed the memory budget of " + std::to_string(options_.memory_budget_bytes) + " bytes";
+    mesh_bytes_ += entry.made.problem.empty() ? bytes_of(entry.made.mesh) : 0;
+    if (!report_mesh(entry)) return false;
+    scene_.meshes.push_back(std::move(entry.made.mesh));
+  } else {
+    mesh_bytes_ += bytes;
+    scene_.meshes.emplace_back();
+    mesh_queue_.add(std::move(entry));
   }
-  mesh_bytes_ += bytes_of(mesh);
-  mesh.name = name + ":" + std::to_string(directive.place.line);
-  shape.mesh = static_cast<uint32_t>(scene_.meshes.size());
-  scene_.meshes.push_back(std::move(mesh));
+  shape.mesh = static_cast<uint32_t>(scene_.meshes.size() - 1);
   return true;
+}
+
+bool SceneBuilder::skip_shape(const std::string& kind, const Place& place, const std::string& problem) {
+  reporter_.error(place, "Shape " + in_quotes(kind) + " is skipped: " + problem);
+  return false;
+}
+
+/// @return false if the mesh could not be made
+bool SceneBuilder::report_mesh(MeshQueue::Entry& entry) {
+  for (auto& [severity, message] : entry.made.reports)
+    reporter_.report(severity, entry.place, entry.kind + ": " + message);
+  scene_.dropped_triangles += entry.made.dropped_triangles;
+  entry.made.mesh.name = entry.kind + ":" + std::to_string(entry.place.line);
+  return entry.made.problem.empty() || skip_shape(entry.kind, entry.place, entry.made.problem);
+}
+
+/// Waits for the meshes that were made meanwhile. One that could not be made stays empty.
+void SceneBuilder::take_queued_meshes() {
+  mesh_queue_.finish([&](MeshQueue::Entry& entry) {
+    reporter_.set_sequence(entry.sequence);
+    if (report_mesh(entry))
+      scene_.meshes[entry.slot] = std::move(entry.made.mesh);
+    else
+      ++statistics_.shapes_skipped;
+  });
 }
 
 /// Objects that nothing shows are not worth reading their files.
@@ -204,10 +228,14 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
   } else if (phase_ == Phase::kOptions) {
     reporter_.warning(end, "the file ends without WorldBegin: the scene is empty");
   }
+  const uint64_t last_sequence = reporter_.sequence();
+  take_queued_meshes();
+  reporter_.set_sequence(last_sequence);
   drop_unused_objects();
   for_each_shape(scene_, [&](const Shape& shape) { loader_.require(shape.mesh); });
   materials_.require_images();
   loader_.load(scene_.meshes, graph_.images(), progress, statistics_, scene_.dropped_triangles);
+  reporter_.set_sequence(last_sequence);
   for (const ImageRequest& image : graph_.images())
     ++(image.missing ? statistics_.textures_missing : statistics_.textures_found);
   const std::vector<uint32_t> material_numbers = materials_.resolve(scene_.materials, scene_.masks, reporter_);

@@ -17,14 +17,21 @@ struct ShapeContext {
   uint64_t dropped_triangles = 0; ///< added to
 };
 
-/// Makes the triangles of one kind of shape from its parameters, in the shape's own space; takes large arrays out of
-/// the list. Throws Error, message without a place, if the shape is unusable.
-using ShapeFunction = Mesh (*)(ParameterList& parameters, ShapeContext& context);
+/// All that is needed to make the triangles of a shape, in the shape's own space.
+struct MeshJob {
+  /// Any thread may call it, once. Throws Error, message without a place, if the shape is unusable.
+  std::function<Mesh(ShapeContext& context)> make;
+  uint64_t bytes_at_most = 0; ///< bound on bytes_of(mesh); 0: not known
+};
+
+/// Takes what one kind of shape needs out of the list. Throws Error, message without a place, if the shape is unusable.
+/// @param report problems with the parameters
+using ShapeFunction = MeshJob (*)(ParameterList& parameters, const ReportFn& report);
 
 /// A kind of shape whose triangles come from its parameters alone, so not plymesh.
 struct ShapeKind {
   std::string_view name;
-  ShapeFunction make = nullptr;
+  ShapeFunction read = nullptr;
 };
 
 /// @return null if pbrt knows no such shape

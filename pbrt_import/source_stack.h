@@ -32,10 +32,10 @@ public:
   /// Of the token that peek() gives.
   Place place() const { return {files_open_.back().number, token_.line, token_.column}; }
 
-  /// Appends the plain numbers that come next in the current file. Only right after consume().
-  template <class T>
-  void read_numbers(std::vector<T>& values) {
-    guarded([&](Tokenizer& tokenizer) { tokenizer.read_numbers(values); });
+  /// Tokenizer::read_numbers of the current file. Only right after consume().
+  template <class T, class Take>
+  void read_numbers(Take take) {
+    guarded([&](Tokenizer& tokenizer) { tokenizer.read_numbers<T>(take); });
   }
 
   /// Goes on with the start of another file. Reports and stays where it is if that is not possible.

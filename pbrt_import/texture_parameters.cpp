@@ -80,7 +80,7 @@ Vec3 TextureParameters::constant_spectrum(std::string_view name, Vec3 fallback) 
 
 std::optional<Vec3> TextureParameters::rgb_value(const Parameter& parameter) const {
   if (!parameter.strings.empty()) return rgb_from_file(parameter);
-  const std::vector<float>& v = parameter.floats;
+  const std::span<const float> v = parameter.floats;
   const bool one_value = parameter.type == ParameterType::kSpectrum
                              ? v.size() >= 2
                              : v.size() == (parameter.type == ParameterType::kBlackbody ? 2 : 3);

@@ -1,6 +1,7 @@
 #include "pbrt_import/tokenizer.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 
 #include "pbrt_import/number.h"
@@ -9,27 +10,33 @@
 namespace packtrace {
 namespace {
 
-// Where a window has fewer bytes left than this, number runs first read on, so that a number is never cut.
-constexpr size_t kNumberRoom = 4 * kScannerReach;
-
-bool is_bad_byte(char c) {
+constexpr bool is_bad_byte(char c) {
   const auto byte = static_cast<unsigned char>(c);
   return (byte < 0x20 && !is_space(c) && c != '\v' && c != '\f') || byte == 0x7f || byte >= 0xf8;
 }
 
+/// By byte: whether a word goes on with it.
+constexpr std::array<bool, 256> make_word_bytes() {
+  std::array<bool, 256> table{};
+  for (size_t i = 0; i < table.size(); ++i) {
+    const char c = static_cast<char>(i);
+    table[i] = !ends_word(c) && !is_bad_byte(c);
+  }
+  return table;
+}
+constexpr std::array<bool, 256> kWordBytes = make_word_bytes();
+
 } // namespace
 
-Tokenizer::Tokenizer(InputFile file, size_t window_bytes) : file_(std::move(file)) {
-  const uint64_t useful =
-      file_.compressed() ? window_bytes : std::min<uint64_t>(window_bytes, file_.stored_bytes() + 1);
-  window_.resize(std::max<size_t>(static_cast<size_t>(useful), 4) + kScannerReach);
-  refill();
+Tokenizer::Tokenizer(InputFile file, size_t window_bytes)
+    : blocks_(std::make_unique<TextBlocks>(std::move(file), window_bytes)) {
+  show(blocks_->at(0));
   check_encoding();
 }
 
 void Tokenizer::check_encoding() {
   const auto starts_with = [&](std::string_view mark) {
-    return std::string_view(window_.data(), size_).substr(0, mark.size()) == mark;
+    return std::string_view(window_, size_).substr(0, mark.size()) == mark;
   };
   if (starts_with("\xff\xfe") || starts_with("\xfe\xff"))
     throw Error(ErrorKind::kInput,
@@ -37,21 +44,49 @@ void Tokenizer::check_encoding() {
   if (starts_with("\xef\xbb\xbf")) position_ = 3, line_start_ = 3;
 }
 
+void Tokenizer::show(const TextBlock& block) {
+  const uint64_t offset = consumed_bytes();
+  block_ = &block;
+  run_ = 0;
+  window_ = block.text.data();
+  size_ = block.size;
+  window_offset_ = block.offset;
+  position_ = std::min(static_cast<size_t>(offset - block.offset), size_);
+  at_end_ = block.last;
+}
+
 bool Tokenizer::refill() {
   if (at_end_) return false;
+  const uint64_t offset = consumed_bytes();
+  const uint64_t wanted = offset / blocks_->block_bytes(), last = block_->offset / blocks_->block_bytes();
+  if (wanted > last) {
+    show(blocks_->at(wanted));
+    return true;
+  }
+  // What begins here is longer than the blocks overlap.
   const size_t kept = size_ - position_;
-  std::memmove(window_.data(), window_.data() + position_, kept);
-  window_offset_ += position_;
+  if (window_ == joined_.data())
+    joined_.erase(joined_.begin(), joined_.begin() + static_cast<std::ptrdiff_t>(position_));
+  else
+    joined_.assign(window_ + position_, window_ + size_);
+  joined_.resize(kept); // without the zeros
+  block_ = &blocks_->at(last + 1);
+  run_ = 0;
+  const size_t known = std::min(static_cast<size_t>(offset + kept - block_->offset), block_->size);
+  joined_.insert(joined_.end(), block_->text.data() + known, block_->text.data() + block_->size);
+  size_ = joined_.size();
+  joined_.resize(size_ + kScannerReach, '\0');
+  window_ = joined_.data();
+  window_offset_ = offset;
   position_ = 0;
-  size_ = kept;
-  const size_t capacity = window_.size() - kScannerReach;
-  if (kept > capacity / 2) window_.resize(capacity * 2 + kScannerReach); // one long token
-  const size_t room = window_.size() - kScannerReach - kept;
-  const size_t got = file_.read({window_.data() + kept, room});
-  at_end_ = got < room;
-  size_ = kept + got;
-  std::fill_n(window_.data() + size_, kScannerReach, '\0');
-  return got > 0;
+  at_end_ = block_->last;
+  return size_ > kept;
+}
+
+void Tokenizer::skip(const NumberRun& run) {
+  position_ = static_cast<size_t>(run.end - window_offset_);
+  line_ += run.line_ends;
+  if (run.line_ends > 0) line_start_ = run.line_start;
 }
 
 void Tokenizer::count_line_end(size_t at) {
@@ -61,17 +96,18 @@ void Tokenizer::count_line_end(size_t at) {
 
 void Tokenizer::skip_comment() {
   while (true) {
-    const char* const end = window_.data() + size_;
-    const char* const start = window_.data() + position_;
+    const char* const end = window_ + size_;
+    const char* const start = window_ + position_;
     const char* const stop = std::find_if(start, end, [](char c) { return c == '\n' || c == '\r'; });
-    position_ = static_cast<size_t>(stop - window_.data());
+    position_ = static_cast<size_t>(stop - window_);
     if (stop != end || !refill()) return;
   }
 }
 
 bool Tokenizer::skip_space_and_comments() {
   while (true) {
-    if (position_ == size_ && !refill()) return false;
+    while (position_ == size_)
+      if (!refill()) return false;
     const char c = window_[position_];
     if (c == '\n') {
       count_line_end(position_);
@@ -89,10 +125,11 @@ bool Tokenizer::skip_space_and_comments() {
 }
 
 Token Tokenizer::make(TokenKind kind, size_t start, size_t end) const {
-  return {kind, {window_.data() + start, end - start}, token_line_, token_column_};
+  return {kind, {window_ + start, end - start}, token_line_, token_column_};
 }
 
 Token Tokenizer::next() {
+  if (window_ == joined_.data() && consumed_bytes() >= block_->offset) show(*block_);
   const bool found = skip_space_and_comments();
   token_line_ = line_;
   token_column_ = static_cast<uint32_t>(std::min<uint64_t>(consumed_bytes() - line_start_ + 1, UINT32_MAX));
@@ -139,60 +176,14 @@ Token Tokenizer::read_word() {
   while (true) {
     if (position_ + length >= size_ && !refill()) break;
     if (position_ + length >= size_) continue;
-    if (const char c = window_[position_ + length]; ends_word(c) || is_bad_byte(c)) break;
-    ++length;
+    // The zeros behind the window end words, too.
+    const char* const start = window_ + position_;
+    while (kWordBytes[static_cast<unsigned char>(start[length])]) ++length;
+    if (position_ + length < size_) break;
   }
   const size_t start = position_;
   position_ += length;
   return make(TokenKind::kWord, start, position_);
-}
-
-template <class T, class Scan>
-void Tokenizer::read_run(std::vector<T>& values, Scan scan) {
-  constexpr size_t kChunk = 1024;
-  T chunk[kChunk];
-  size_t count = 0;
-  while (true) {
-    while (!at_end_ && size_ - position_ < kNumberRoom) refill();
-    // Before the end of the file a number is scanned only where all of it is certain to be in the window.
-    const char* const limit = window_.data() + (at_end_ ? size_ : size_ - kScannerReach);
-    const char* p = window_.data() + position_;
-    bool stopped = false;
-    while (p < limit) {
-      if (*p == ' ' || *p == '\t') {
-        ++p;
-      } else if (*p == '\n') {
-        count_line_end(static_cast<size_t>(p++ - window_.data()));
-      } else if (*p == '\r') {
-        if (p[1] != '\n') count_line_end(static_cast<size_t>(p - window_.data()));
-        ++p;
-      } else if (const char* const end = scan(p, chunk[count]); end) {
-        p = end;
-        if (++count == kChunk) {
-          values.insert(values.end(), chunk, chunk + count);
-          count = 0;
-        }
-      } else {
-        stopped = true;
-        break;
-      }
-    }
-    position_ = static_cast<size_t>(p - window_.data());
-    if (stopped || at_end_) break;
-  }
-  values.insert(values.end(), chunk, chunk + count);
-}
-
-void Tokenizer::read_numbers(std::vector<float>& values) {
-  read_run(values, [](const char* p, float& value) { return scan_float(p, value); });
-}
-
-void Tokenizer::read_numbers(std::vector<double>& values) {
-  read_run(values, [](const char* p, double& value) { return scan_double(p, value); });
-}
-
-void Tokenizer::read_numbers(std::vector<int32_t>& values) {
-  read_run(values, [](const char* p, int32_t& value) { return scan_integer(p, value); });
 }
 
 std::string unescape(std::string_view raw, bool& unknown_escape) {

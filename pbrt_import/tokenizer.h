@@ -2,11 +2,13 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
-#include "pbrt_import/input_file.h"
+#include "pbrt_import/text_blocks.h"
 
 namespace packtrace {
 
@@ -27,8 +29,8 @@ struct Token {
   uint32_t column = 0;   ///< in bytes, from 1
 };
 
-/// Splits one pbrt-v3 file into tokens in a single pass over a window of it. Lines end with LF, CR LF or CR; a UTF-8
-/// byte order mark is skipped. Memory: one window, larger only for tokens larger than it.
+/// Splits one pbrt-v3 file into tokens in a single pass over a window of it: a block, or a copy of several where a token
+/// lies across them. Lines end with LF, CR LF or CR; a UTF-8 byte order mark is skipped.
 class Tokenizer {
 public:
   static constexpr size_t kDefaultWindow = 256 * 1024;
@@ -39,19 +41,24 @@ public:
   /// The next token. Throws Error like InputFile::read.
   Token next();
 
-  /// Appends the run of plain numbers that starts here; stops before anything that needs next() to decide, which
-  /// includes numbers in uncommon notation. Throws Error like InputFile::read.
-  void read_numbers(std::vector<float>& values);
-  void read_numbers(std::vector<double>& values);
-  void read_numbers(std::vector<int32_t>& values);
+  /// Calls take(std::span<const T>) with the numbers that come next in the file, as many as were converted ahead:
+  /// maybe none, and never more than up to the end of their array. T is float, double or int32_t; take may get a span
+  /// of int32_t whatever T is. Throws Error like InputFile::read.
+  template <class T, class Take>
+  void read_numbers(Take take);
 
   /// Content bytes consumed.
   uint64_t consumed_bytes() const { return window_offset_ + position_; }
-  const InputFile& file() const { return file_; }
+  const InputFile& file() const { return blocks_->file(); }
 
 private:
-  /// Discards what is consumed and reads on. False if nothing more came.
+  /// Reads on, so that the window goes on where it ends now. False at the end of the file.
   bool refill();
+  void show(const TextBlock& block);
+  /// The run that starts at the current position and can be read as T; null if there is none.
+  template <class T>
+  const NumberRun* find_run();
+  void skip(const NumberRun& run);
   bool skip_space_and_comments();
   void skip_comment();
   void count_line_end(size_t at);
@@ -59,11 +66,12 @@ private:
   Token read_word();
   Token make(TokenKind kind, size_t start, size_t end) const;
   void check_encoding();
-  template <class T, class Scan>
-  void read_run(std::vector<T>& values, Scan scan);
 
-  InputFile file_;
-  std::vector<char> window_; ///< size_ bytes, then kScannerReach zeros
+  std::unique_ptr<TextBlocks> blocks_;
+  const TextBlock* block_ = nullptr; ///< the one read last
+  size_t run_ = 0;                   ///< runs of block_ before it lie behind the current position
+  std::vector<char> joined_;         ///< the window where that is not block_'s text
+  const char* window_ = nullptr;     ///< size_ bytes, then kScannerReach zeros
   size_t size_ = 0;
   size_t position_ = 0;
   uint64_t window_offset_ = 0; ///< of window_[0] in the content
@@ -81,5 +89,33 @@ std::string unescape(std::string_view raw, bool& unknown_escape);
 /// Text for messages, in double quotes: unprintable bytes as \xNN, cut after max_length characters.
 inline constexpr size_t kMaxShownPath = 4096;
 std::string in_quotes(std::string_view text, size_t max_length = 60);
+
+template <class T, class Take>
+void Tokenizer::read_numbers(Take take) {
+  while (const NumberRun* const run = find_run<T>()) {
+    using Kind = NumberRun::Kind;
+    const auto part = [&](const auto& numbers) { return std::span(numbers).subspan(run->first, run->count); };
+    if (run->kind == Kind::kInteger)
+      take(part(block_->integers));
+    else if constexpr (std::is_same_v<T, float>)
+      take(part(block_->floats));
+    else if constexpr (std::is_same_v<T, double>)
+      take(part(block_->doubles));
+    skip(*run);
+  }
+}
+
+template <class T>
+const NumberRun* Tokenizer::find_run() {
+  const uint64_t offset = consumed_bytes();
+  if (offset >= block_->offset + blocks_->block_bytes() && !refill()) return nullptr;
+  while (run_ < block_->runs.size() && block_->runs[run_].begin < offset) ++run_;
+  if (run_ == block_->runs.size() || block_->runs[run_].begin != offset) return nullptr;
+  const NumberRun& run = block_->runs[run_];
+  constexpr NumberRun::Kind kKind = std::is_same_v<T, int32_t> ? NumberRun::Kind::kInteger
+                                    : std::is_same_v<T, float> ? NumberRun::Kind::kFloat
+                                                               : NumberRun::Kind::kDouble;
+  return run.kind == kKind || run.kind == NumberRun::Kind::kInteger ? &run : nullptr;
+}
 
 } // namespace packtrace

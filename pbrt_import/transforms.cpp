@@ -42,7 +42,9 @@ std::optional<DAffine> affine_from_columns(std::span<const double, 16> m) {
   if (m[3] != 0.0 || m[7] != 0.0 || m[11] != 0.0 || m[15] == 0.0) return std::nullopt;
   DAffine map;
   for (size_t column = 0; column < 4; ++column)
-    map[static_cast<int>(column)] = DVec3(m[column * 4], m[column * 4 + 1], m[column * 4 + 2]) / m[15];
+    map[static_cast<int>(column)] = DVec3(m[column * 4], m[column * 4 + 1], m[column * 4 + 2]);
+  if (m[15] != 1.0)
+    for (int column = 0; column < 4; ++column) map[column] /= m[15];
   return map;
 }
 
@@ -53,6 +55,14 @@ bool is_finite(const DAffine& map) {
 bool is_invertible(const DAffine& map) {
   if (!is_finite(map)) return false;
   const double determinant = glm::determinant(glm::dmat3(map));
+  // Far from overflow: nine products of two entries, and the offset, divided by the determinant.
+  constexpr double kModerate = 1e90;
+  const auto moderate = [](DVec3 v) {
+    return std::abs(v.x) < kModerate && std::abs(v.y) < kModerate && std::abs(v.z) < kModerate;
+  };
+  if (std::abs(determinant) > 1.0 / kModerate && moderate(map[0]) && moderate(map[1]) && moderate(map[2]) &&
+      moderate(map[3]))
+    return true;
   return determinant != 0.0 && std::isfinite(determinant) && is_finite(inverse(map));
 }
 

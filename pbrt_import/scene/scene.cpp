@@ -11,6 +11,11 @@ uint64_t triangle_count(const Scene& scene, const std::vector<Shape>& shapes) {
 
 } // namespace
 
+uint64_t bytes_of(const Mesh& mesh) {
+  return mesh.positions.size() * sizeof(Vec3) + mesh.normals.size() * sizeof(Vec3) + mesh.uvs.size() * sizeof(Vec2) +
+         mesh.triangles.size() * sizeof(Triangle);
+}
+
 uint64_t unique_triangle_count(const Scene& scene) {
   uint64_t total = triangle_count(scene, scene.shapes);
   for (const Object& object : scene.objects) total += triangle_count(scene, object.shapes);

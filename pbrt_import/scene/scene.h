@@ -83,6 +83,8 @@ struct Scene {
   uint64_t dropped_triangles = 0; ///< degenerate, out-of-range or not finite; each is in the diagnostics
 };
 
+/// Memory that a mesh's vertices and triangles take.
+uint64_t bytes_of(const Mesh& mesh);
 /// Triangles stored once: each shape's mesh, objects counted once however often instanced.
 uint64_t unique_triangle_count(const Scene& scene);
 /// Triangles as placed: every instance counted.

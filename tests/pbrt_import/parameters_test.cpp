@@ -7,11 +7,11 @@
 namespace packtrace {
 namespace {
 
-Parameter number(std::string name, std::vector<float> values) {
+Parameter number(std::string name, const std::vector<float>& values) {
   Parameter parameter;
   parameter.type = ParameterType::kFloat;
   parameter.name = std::move(name);
-  parameter.floats = std::move(values);
+  parameter.floats = FloatArray(values);
   return parameter;
 }
 
@@ -56,9 +56,9 @@ TEST(Parameters, WrongTypeGivesTheDefaultAndStaysUnused) {
 TEST(Parameters, TakingMovesTheValuesOut) {
   ParameterList list;
   list.add(number("x", {1, 2, 3}));
-  EXPECT_EQ(list.take_floats("x", ParameterType::kFloat), (std::vector<float>{1, 2, 3}));
-  EXPECT_TRUE(list.take_floats("x", ParameterType::kFloat).empty());
-  EXPECT_TRUE(list.take_floats("x", ParameterType::kPoint3).empty());
+  EXPECT_EQ(list.take_vectors("x", ParameterType::kFloat), (std::vector<Vec3>{{1, 2, 3}}));
+  EXPECT_TRUE(list.take_vectors("x", ParameterType::kFloat).empty());
+  EXPECT_TRUE(list.take_vectors("x", ParameterType::kPoint3).empty());
 }
 
 TEST(ClosestName, FindsTyposButNotOtherWords) {

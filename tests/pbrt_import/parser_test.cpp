@@ -81,16 +81,17 @@ TEST_F(ParserTest, AllDirectivesAreKnown) {
 
 TEST_F(ParserTest, EveryParameterTypeIsRead) {
   const auto all =
-      parse("Shape \"x\" \"integer i\" [1 -2] \"float f\" 1.5 \"bool b\" [\"true\" \"false\"] \"string s\" \"text\" "
+      parse("Shape \"x\" \"integer i\" [1 -2] \"float f\" 1.5 \"bool on\" [\"true\"] \"bool off\" \"false\" \"string s\" \"text\" "
             "\"texture t\" [\"name\"] \"point2 p2\" [1 2] \"vector2 v2\" [1 2] \"point p\" [1 2 3] "
             "\"vector v\" [1 2 3] \"normal n\" [1 2 3] \"rgb r\" [1 2 3] \"color c\" [1 2 3] \"xyz x\" [1 2 3] "
             "\"blackbody k\" [5000 1] \"spectrum sp\" [400 1 500 2] \"spectrum file\" \"a.spd\"");
   ASSERT_EQ(all.size(), 1u);
   const ParameterList& list = all[0].parameters;
-  EXPECT_EQ(list.all().size(), 16u);
+  EXPECT_EQ(list.all().size(), 17u);
   EXPECT_EQ(list.integers("i")[1], -2);
   EXPECT_EQ(list.get_float("f", 0), 1.5f);
-  EXPECT_EQ(list.find("b", {ParameterType::kBool})->integers, (std::vector<int32_t>{1, 0}));
+  EXPECT_TRUE(list.get_bool("on", false));
+  EXPECT_FALSE(list.get_bool("off", true));
   EXPECT_EQ(list.get_string("s", ""), "text");
   EXPECT_EQ(list.floats("c", ParameterType::kRgb).size(), 3u);
   EXPECT_EQ(list.find("file", {ParameterType::kSpectrum})->strings.size(), 1u);

@@ -1,0 +1,54 @@
+#include "pbrt_import/mesh_queue.h"
+
+#include <new>
+#include <stdexcept>
+
+#include <tbb/task_arena.h>
+
+#include "pbrt_import/scene/error.h"
+
+namespace packtrace {
+
+MadeMesh run_job(const MeshJob& job, double tessellation_tolerance) {
+  MadeMesh made;
+  const ReportFn report = [&](Severity severity, uint32_t, std::string message) {
+    made.reports.emplace_back(severity, std::move(message));
+  };
+  try {
+    ShapeContext context{tessellation_tolerance, report, 0};
+    made.mesh = job.make(context);
+    made.dropped_triangles = context.dropped_triangles;
+    if (made.mesh.triangles.empty()) made.problem = "no triangle is left";
+  } catch (const Error& error) {
+    made.problem = error.what();
+  } catch (const std::bad_alloc&) {
+    made.problem = "not enough memory";
+  } catch (const std::length_error&) {
+    made.problem = "not enough memory";
+  }
+  return made;
+}
+
+void MeshQueue::add(Entry entry) {
+  constexpr uint64_t kMaxPendingBytes = 64u << 20; // then this thread works, too
+  entries_.push_back(std::move(entry));
+  Entry& queued = entries_.back();
+  pending_bytes_ += queued.job.bytes_at_most;
+  const auto work = [this, &queued] {
+    queued.made = run_job(queued.job, tolerance_);
+    queued.job.make = nullptr;
+  };
+  if (tbb::this_task_arena::max_concurrency() == 1) return work();
+  tasks_.run(work);
+  if (pending_bytes_ < kMaxPendingBytes) return;
+  tasks_.wait();
+  pending_bytes_ = 0;
+}
+
+void MeshQueue::finish(const std::function<void(Entry&)>& take) {
+  tasks_.wait();
+  for (Entry& entry : entries_) take(entry);
+  entries_.clear();
+}
+
+} // namespace packtrace

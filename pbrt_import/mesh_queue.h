@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <tbb/task_group.h>
+
+#include "pbrt_import/parameters.h"
+#include "pbrt_import/scene/diagnostics.h"
+#include "pbrt_import/shape_builder.h"
+
+namespace packtrace {
+
+/// What became of a MeshJob.
+struct MadeMesh {
+  Mesh mesh;
+  std::string problem; ///< empty: mesh has triangles
+  std::vector<std::pair<Severity, std::string>> reports;
+  uint64_t dropped_triangles = 0;
+};
+
+MadeMesh run_job(const MeshJob& job, double tessellation_tolerance);
+
+/// Makes meshes on all threads while the scene's text is still being read.
+class MeshQueue {
+public:
+  /// A mesh to be made, and what its maker needs to know again once it is there.
+  struct Entry {
+    MeshJob job;
+    std::string kind; ///< of shape, for messages
+    Place place;
+    uint64_t sequence = 0; ///< Reporter's
+    uint32_t slot = 0;     ///< in Scene::meshes
+    MadeMesh made;
+  };
+
+  explicit MeshQueue(double tessellation_tolerance) : tolerance_(tessellation_tolerance) {}
+  ~MeshQueue() { tasks_.wait(); }
+  MeshQueue(const MeshQueue&) = delete;
+  MeshQueue& operator=(const MeshQueue&) = delete;
+
+  void add(Entry entry);
+  /// Waits for all of them and hands them over in the order they came.
+  void finish(const std::function<void(Entry&)>& take);
+
+private:
+  double tolerance_;
+  std::deque<Entry> entries_; ///< stay where they are
+  uint64_t pending_bytes_ = 0;
+  tbb::task_group tasks_;
+};
+
+} // namespace packtrace

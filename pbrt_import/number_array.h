@@ -1,0 +1,74 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <vector>
+
+#include "pbrt_import/scene/math.h"
+
+namespace packtrace {
+
+/// A growing row of numbers, stored in groups of three: what the large ones become, points or triangles, is taken out
+/// without a copy.
+template <class Number, class Triplet>
+class NumberArray {
+  static_assert(sizeof(Triplet) == 3 * sizeof(Number));
+
+public:
+  using value_type = Number;
+
+  NumberArray() = default;
+  explicit NumberArray(std::span<const Number> values) { append(values); }
+
+  size_t size() const { return size_; }
+  bool empty() const { return size_ == 0; }
+  Number operator[](size_t i) const { return data()[i]; }
+  operator std::span<const Number>() const { return {data(), size_}; }
+
+  void push_back(Number value) { append(std::span<const Number>(&value, 1)); }
+
+  /// Values of another type are converted.
+  template <class Other>
+  void append(std::span<const Other> values) {
+    grow(values.size());
+    std::copy(values.begin(), values.end(), reinterpret_cast<Number*>(triplets_.data()) + size_);
+    size_ += values.size();
+  }
+
+  /// @param size at most the present one
+  void truncate(size_t size) {
+    size_ = size;
+    triplets_.resize((size + 2) / 3);
+  }
+
+  /// All of it, but for an incomplete last group. Leaves nothing.
+  std::vector<Triplet> take_triplets() {
+    triplets_.resize(size_ / 3);
+    size_ = 0;
+    return std::move(triplets_);
+  }
+
+private:
+  const Number* data() const { return reinterpret_cast<const Number*>(triplets_.data()); }
+
+  /// The first append allocates just what it needs, since most arrays come in one piece; room that is never used costs
+  /// address space, not memory, where an array is large.
+  void grow(size_t more) {
+    constexpr size_t kLarge = 1u << 18;
+    const size_t needed = (size_ + more + 2) / 3;
+    if (needed > triplets_.capacity() && size_ > 0)
+      triplets_.reserve(std::max(needed, triplets_.capacity() * (needed < kLarge ? 2 : 4)));
+    triplets_.resize(needed);
+  }
+
+  std::vector<Triplet> triplets_;
+  size_t size_ = 0;
+};
+
+using FloatArray = NumberArray<float, Vec3>;
+using IntegerArray = NumberArray<int32_t, Triangle>;
+
+} // namespace packtrace
