@@ -11,6 +11,9 @@
 
 namespace packtrace {
 
+/// Asks for memory that is about to be written for the first time to come in large pages, if it is large.
+void prefer_large_pages(void* memory, size_t bytes);
+
 /// A growing row of numbers, stored in groups of three: what the large ones become, points or triangles, is taken out
 /// without a copy.
 template <class Number, class Triplet>
@@ -59,8 +62,10 @@ private:
   void grow(size_t more) {
     constexpr size_t kLarge = 1u << 18;
     const size_t needed = (size_ + more + 2) / 3;
-    if (needed > triplets_.capacity() && size_ > 0)
-      triplets_.reserve(std::max(needed, triplets_.capacity() * (needed < kLarge ? 2 : 4)));
+    if (needed > triplets_.capacity()) {
+      triplets_.reserve(size_ == 0 ? needed : std::max(needed, triplets_.capacity() * (needed < kLarge ? 2 : 4)));
+      prefer_large_pages(triplets_.data(), triplets_.capacity() * sizeof(Triplet));
+    }
     triplets_.resize(needed);
   }
 

@@ -88,7 +88,7 @@ void ParameterList::add(Parameter parameter) {
 }
 
 const Parameter* ParameterList::find(std::string_view name, std::initializer_list<ParameterType> types) const {
-  if (!was_asked(name)) asked_.push_back(name);
+  asked_.push_back(name);
   for (auto it = parameters_.rbegin(); it != parameters_.rend(); ++it)
     if (it->name == name && std::find(types.begin(), types.end(), it->type) != types.end()) {
       it->used = true;
@@ -151,8 +151,7 @@ std::vector<Triangle> ParameterList::take_triangles(std::string_view name) {
 }
 
 void ParameterList::mark_used(std::span<const std::string_view> names) const {
-  for (const std::string_view name : names)
-    if (!was_asked(name)) asked_.push_back(name);
+  asked_.insert(asked_.end(), names.begin(), names.end());
   for (const Parameter& parameter : parameters_)
     if (std::find(names.begin(), names.end(), parameter.name) != names.end()) parameter.used = true;
 }

@@ -92,7 +92,7 @@ public:
 
 private:
   std::vector<Parameter> parameters_;
-  mutable std::vector<std::string_view> asked_; ///< literals
+  mutable std::vector<std::string_view> asked_; ///< literals, some of them often
 };
 
 /// The candidate within two edits of name that needs fewest; empty if none. Case differences count half an edit.

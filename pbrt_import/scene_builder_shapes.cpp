@@ -179,7 +179,8 @@ bool SceneBuilder::report_mesh(MeshQueue::Entry& entry) {
   for (auto& [severity, message] : entry.made.reports)
     reporter_.report(severity, entry.place, entry.kind + ": " + message);
   scene_.dropped_triangles += entry.made.dropped_triangles;
-  entry.made.mesh.name = entry.kind + ":" + std::to_string(entry.place.line);
+  entry.made.mesh.name = entry.kind;
+  entry.made.mesh.name.append(":").append(std::to_string(entry.place.line));
   return entry.made.problem.empty() || skip_shape(entry.kind, entry.place, entry.made.problem);
 }
 

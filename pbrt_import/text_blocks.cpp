@@ -146,6 +146,9 @@ private:
       ++count;
       return true;
     };
+    // A kernel takes its time to start.
+    constexpr size_t kShortArray = 48;
+    if (std::memchr(p, ']', kShortArray)) kernel = nullptr;
     do {
       if (kernel && p - text_ >= static_cast<std::ptrdiff_t>(kKernelLead)) {
         const NumberBatch batch = kernel(p, end_, chunk + count, kChunk - count);

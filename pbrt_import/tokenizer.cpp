@@ -15,16 +15,25 @@ constexpr bool is_bad_byte(char c) {
   return (byte < 0x20 && !is_space(c) && c != '\v' && c != '\f') || byte == 0x7f || byte >= 0xf8;
 }
 
-/// By byte: whether a word goes on with it.
-constexpr std::array<bool, 256> make_word_bytes() {
+/// Which bytes a predicate holds for.
+template <class Predicate>
+constexpr std::array<bool, 256> table_of(Predicate predicate) {
   std::array<bool, 256> table{};
-  for (size_t i = 0; i < table.size(); ++i) {
-    const char c = static_cast<char>(i);
-    table[i] = !ends_word(c) && !is_bad_byte(c);
-  }
+  for (size_t i = 0; i < table.size(); ++i) table[i] = predicate(static_cast<char>(i));
   return table;
 }
-constexpr std::array<bool, 256> kWordBytes = make_word_bytes();
+
+/// What a word goes on with, and a string as long as there is nothing to decide. Neither holds the zeros that follow a
+/// window.
+constexpr std::array<bool, 256> kWordBytes = table_of([](char c) { return !ends_word(c) && !is_bad_byte(c); });
+constexpr std::array<bool, 256> kPlainStringBytes =
+    table_of([](char c) { return c != '"' && c != '\\' && c != '\n' && c != '\r' && !is_bad_byte(c); });
+
+size_t count_while(const char* text, const std::array<bool, 256>& bytes) {
+  const char* p = text;
+  while (bytes[static_cast<unsigned char>(*p)]) ++p;
+  return static_cast<size_t>(p - text);
+}
 
 } // namespace
 
@@ -146,6 +155,7 @@ Token Tokenizer::read_string() {
   size_t length = 1; // from position_, which refill() moves
   while (true) {
     if (position_ + length >= size_ && !refill()) break;
+    length += count_while(window_ + position_ + length, kPlainStringBytes);
     if (position_ + length >= size_) continue;
     const char c = window_[position_ + length];
     if (c == '"') {
@@ -176,9 +186,7 @@ Token Tokenizer::read_word() {
   while (true) {
     if (position_ + length >= size_ && !refill()) break;
     if (position_ + length >= size_) continue;
-    // The zeros behind the window end words, too.
-    const char* const start = window_ + position_;
-    while (kWordBytes[static_cast<unsigned char>(start[length])]) ++length;
+    length += count_while(window_ + position_ + length, kWordBytes);
     if (position_ + length < size_) break;
   }
   const size_t start = position_;
