@@ -18,8 +18,8 @@ struct NumberBatch {
 };
 
 /// Convert numbers in plain notation, at most 16 digits with or without a point, that are set apart by space, up to the
-/// first word that is anything else. Values are those of scan_integer, scan_float and scan_double; minus zero is no
-/// integer.
+/// first word that is anything else. Values are rounded correctly; minus zero is no integer. A number that takes more
+/// care than that is left alone.
 /// @param text kKernelLead bytes before it and kKernelReach bytes behind limit must be readable
 /// @param limit numbers that start at or behind it are left alone
 /// @param values room for capacity numbers

@@ -51,6 +51,7 @@ private:
   bool make_mesh(Directive& directive, Shape& shape);
   bool make_ply_mesh(const Directive& directive, Shape& shape);
   bool make_inline_mesh(Directive& directive, Shape& shape);
+  bool make_or_queue(MeshQueue::Entry entry);
   bool skip_shape(const std::string& kind, const Place& place, const std::string& problem);
   bool report_mesh(MeshQueue::Entry& entry);
   void take_queued_meshes();
@@ -79,6 +80,8 @@ private:
   uint32_t nested_objects_ = 0;  ///< ObjectBegins that were refused but will have their ObjectEnd
   uint64_t ignored_blocks_ = 0;  ///< open ones beyond the nesting limit
   uint32_t open_blocks_[3] = {}; ///< by kind
+  NameTable same_meshes_;                 ///< MeshJob::same_as
+  std::vector<uint32_t> same_mesh_slots_; ///< in Scene::meshes, by number in same_meshes_
   uint64_t mesh_bytes_ = 0; ///< of all meshes made from text, queued ones at most
   MeshQueue mesh_queue_;    ///< last: its tasks end before anything else does
 };

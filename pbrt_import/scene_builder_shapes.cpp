@@ -150,22 +150,40 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
   } catch (const Error& error) {
     return skip_shape(name, directive.place, error.what());
   }
+  if (entry.job.scale != 1.0)
+    shape.parent_from_mesh = compose(shape.parent_from_mesh, scaling(DVec3(entry.job.scale)));
+  const std::string same_as = entry.job.same_as;
+  if (const std::optional<uint32_t> known = same_as.empty() ? std::nullopt : same_meshes_.find(same_as)) {
+    shape.mesh = same_mesh_slots_[*known];
+    return true;
+  }
+  if (!make_or_queue(std::move(entry))) return false;
+  shape.mesh = static_cast<uint32_t>(scene_.meshes.size() - 1);
+  if (!same_as.empty()) {
+    same_meshes_.intern(same_as);
+    same_mesh_slots_.push_back(shape.mesh);
+  }
+  return true;
+}
+
+/// Adds a mesh to the scene, empty until take_queued_meshes() if making it is worth a task.
+/// @return false if the mesh could not be made
+bool SceneBuilder::make_or_queue(MeshQueue::Entry entry) {
   constexpr uint64_t kWorthATask = 32 * 1024;
-  const uint64_t bytes = entry.job.bytes_at_most;
-  if (bytes < kWorthATask || bytes > options_.memory_budget_bytes - mesh_bytes_) {
-    entry.made = run_job(entry.job, options_.tessellation_tolerance);
-    if (entry.made.problem.empty() && bytes_of(entry.made.mesh) > options_.memory_budget_bytes - mesh_bytes_)
-      entry.made.problem =
-          "all meshes together exceed the memory budget of " + std::to_string(options_.memory_budget_bytes) + " bytes";
-    mesh_bytes_ += entry.made.problem.empty() ? bytes_of(entry.made.mesh) : 0;
-    if (!report_mesh(entry)) return false;
-    scene_.meshes.push_back(std::move(entry.made.mesh));
-  } else {
-    mesh_bytes_ += bytes;
+  const uint64_t bytes_left = options_.memory_budget_bytes - mesh_bytes_;
+  if (entry.job.bytes_at_most >= kWorthATask && entry.job.bytes_at_most <= bytes_left) {
+    mesh_bytes_ += entry.job.bytes_at_most;
     scene_.meshes.emplace_back();
     mesh_queue_.add(std::move(entry));
+    return true;
   }
-  shape.mesh = static_cast<uint32_t>(scene_.meshes.size() - 1);
+  entry.made = run_job(entry.job, options_.tessellation_tolerance);
+  if (entry.made.problem.empty() && bytes_of(entry.made.mesh) > bytes_left)
+    entry.made.problem =
+        "all meshes together exceed the memory budget of " + std::to_string(options_.memory_budget_bytes) + " bytes";
+  if (!report_mesh(entry)) return false;
+  mesh_bytes_ += bytes_of(entry.made.mesh);
+  scene_.meshes.push_back(std::move(entry.made.mesh));
   return true;
 }
 

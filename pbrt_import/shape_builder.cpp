@@ -1,5 +1,6 @@
 #include "pbrt_import/shape_builder.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -69,11 +70,22 @@ MeshJob read_triangle_mesh(ParameterList& parameters, const ReportFn& report) {
   mesh.normals = parameters.take_vectors("N", ParameterType::kNormal);
   mesh.uvs = read_uvs(parameters);
   const uint64_t bytes = bytes_of(mesh);
-  return {[mesh = std::move(mesh)](ShapeContext& context) mutable {
+  return {.make = [mesh = std::move(mesh)](ShapeContext& context) mutable {
             context.dropped_triangles += drop_bad_triangles(mesh, context.report);
             return std::move(mesh);
           },
-          bytes};
+          .bytes_at_most = bytes};
+}
+
+/// A job for a quadric, which is small enough a description to find equal ones by.
+template <class Quadric>
+MeshJob quadric_job(std::string_view kind, const Quadric& quadric, Mesh (*tessellate)(const Quadric&, double)) {
+  static_assert(std::is_trivially_copyable_v<Quadric> && sizeof(Quadric) % sizeof(float) == 0);
+  MeshJob job;
+  job.make = [=](ShapeContext& context) { return tessellate(quadric, context.tessellation_tolerance); };
+  job.same_as = kind;
+  job.same_as.append(reinterpret_cast<const char*>(&quadric), sizeof quadric);
+  return job;
 }
 
 MeshJob read_sphere(ParameterList& parameters, const ReportFn&) {
@@ -82,7 +94,14 @@ MeshJob read_sphere(ParameterList& parameters, const ReportFn&) {
   sphere.z_min = parameters.get_float("zmin", -sphere.radius);
   sphere.z_max = parameters.get_float("zmax", sphere.radius);
   sphere.phi_max = parameters.get_float("phimax", 360.0f);
-  return {[=](ShapeContext& context) { return tessellate_sphere(sphere, context.tessellation_tolerance); }};
+  // Whole spheres are all the same but for their size: scenes of many particles need only one.
+  const bool whole = std::min(sphere.z_min, sphere.z_max) <= -sphere.radius &&
+                     std::max(sphere.z_min, sphere.z_max) >= sphere.radius;
+  const double scale = whole && sphere.radius > 0.0f && std::isfinite(sphere.radius) ? sphere.radius : 1.0;
+  if (scale != 1.0) sphere = {1.0f, -1.0f, 1.0f, sphere.phi_max};
+  MeshJob job = quadric_job("sphere", sphere, tessellate_sphere);
+  job.scale = scale;
+  return job;
 }
 
 MeshJob read_cylinder(ParameterList& parameters, const ReportFn&) {
@@ -91,7 +110,7 @@ MeshJob read_cylinder(ParameterList& parameters, const ReportFn&) {
   cylinder.z_min = parameters.get_float("zmin", -1.0f);
   cylinder.z_max = parameters.get_float("zmax", 1.0f);
   cylinder.phi_max = parameters.get_float("phimax", 360.0f);
-  return {[=](ShapeContext& context) { return tessellate_cylinder(cylinder, context.tessellation_tolerance); }};
+  return quadric_job("cylinder", cylinder, tessellate_cylinder);
 }
 
 MeshJob read_disk(ParameterList& parameters, const ReportFn&) {
@@ -100,7 +119,7 @@ MeshJob read_disk(ParameterList& parameters, const ReportFn&) {
   disk.radius = parameters.get_float("radius", 1.0f);
   disk.inner_radius = parameters.get_float("innerradius", 0.0f);
   disk.phi_max = parameters.get_float("phimax", 360.0f);
-  return {[=](ShapeContext& context) { return tessellate_disk(disk, context.tessellation_tolerance); }};
+  return quadric_job("disk", disk, tessellate_disk);
 }
 
 MeshJob read_cone(ParameterList& parameters, const ReportFn&) {
@@ -108,7 +127,7 @@ MeshJob read_cone(ParameterList& parameters, const ReportFn&) {
   cone.radius = parameters.get_float("radius", 1.0f);
   cone.height = parameters.get_float("height", 1.0f);
   cone.phi_max = parameters.get_float("phimax", 360.0f);
-  return {[=](ShapeContext& context) { return tessellate_cone(cone, context.tessellation_tolerance); }};
+  return quadric_job("cone", cone, tessellate_cone);
 }
 
 MeshJob read_paraboloid(ParameterList& parameters, const ReportFn&) {
@@ -117,7 +136,7 @@ MeshJob read_paraboloid(ParameterList& parameters, const ReportFn&) {
   paraboloid.z_min = parameters.get_float("zmin", 0.0f);
   paraboloid.z_max = parameters.get_float("zmax", 1.0f);
   paraboloid.phi_max = parameters.get_float("phimax", 360.0f);
-  return {[=](ShapeContext& context) { return tessellate_paraboloid(paraboloid, context.tessellation_tolerance); }};
+  return quadric_job("paraboloid", paraboloid, tessellate_paraboloid);
 }
 
 MeshJob read_hyperboloid(ParameterList& parameters, const ReportFn&) {
@@ -125,7 +144,7 @@ MeshJob read_hyperboloid(ParameterList& parameters, const ReportFn&) {
   hyperboloid.p1 = parameters.get_point("p1", hyperboloid.p1);
   hyperboloid.p2 = parameters.get_point("p2", hyperboloid.p2);
   hyperboloid.phi_max = parameters.get_float("phimax", 360.0f);
-  return {[=](ShapeContext& context) { return tessellate_hyperboloid(hyperboloid, context.tessellation_tolerance); }};
+  return quadric_job("hyperboloid", hyperboloid, tessellate_hyperboloid);
 }
 
 /// Each level makes four triangles of one and at most a vertex for each of them.
@@ -144,10 +163,10 @@ MeshJob read_loop_subdivision(ParameterList& parameters, const ReportFn& report)
   std::vector<Triangle> triangles = take_triangles(parameters, report);
   std::vector<Vec3> points = take_points(parameters);
   const uint64_t bytes = subdivided_bytes(points.size(), triangles.size(), levels);
-  return {[levels, triangles = std::move(triangles), points = std::move(points)](ShapeContext& context) {
+  return {.make = [levels, triangles = std::move(triangles), points = std::move(points)](ShapeContext& context) {
             return subdivide_loop(points, triangles, levels, context.report);
           },
-          bytes};
+          .bytes_at_most = bytes};
 }
 
 MeshJob read_curve(ParameterList& parameters, const ReportFn&) {
@@ -165,7 +184,7 @@ MeshJob read_curve(ParameterList& parameters, const ReportFn&) {
   const float width = parameters.get_float("width", 1.0f);
   curve.width0 = parameters.get_float("width0", width);
   curve.width1 = parameters.get_float("width1", width);
-  return {[curve, points = parameters.take_vectors("P", ParameterType::kPoint3),
+  return {.make = [curve, points = parameters.take_vectors("P", ParameterType::kPoint3),
            normals = parameters.take_vectors("N", ParameterType::kNormal)](ShapeContext&) mutable {
     curve.points = points;
     curve.normals = normals;
@@ -193,7 +212,7 @@ MeshJob read_nurbs(ParameterList& parameters, const ReportFn&) {
     return std::isnan(value) ? std::nullopt : std::optional<float>(value);
   };
   nurbs.u0 = limit("u0"), nurbs.u1 = limit("u1"), nurbs.v0 = limit("v0"), nurbs.v1 = limit("v1");
-  return {[nurbs, u_knots = grouped<float>(parameters.floats("uknots", ParameterType::kFloat)),
+  return {.make = [nurbs, u_knots = grouped<float>(parameters.floats("uknots", ParameterType::kFloat)),
            v_knots = grouped<float>(parameters.floats("vknots", ParameterType::kFloat)),
            points = take_control_points(parameters)](ShapeContext& context) mutable {
     nurbs.u_knots = u_knots;
@@ -208,12 +227,12 @@ MeshJob read_height_field(ParameterList& parameters, const ReportFn&) {
   std::vector<float> heights = grouped<float>(parameters.floats("Pz", ParameterType::kFloat));
   // One vertex and two triangles a sample.
   const uint64_t bytes = heights.size() * (sizeof(Vec3) + sizeof(Vec2) + 2 * sizeof(Triangle));
-  return {[nu, nv, heights = std::move(heights)](ShapeContext& context) {
+  return {.make = [nu, nv, heights = std::move(heights)](ShapeContext& context) {
             Mesh mesh = make_heightfield(nu, nv, heights);
             context.dropped_triangles += drop_bad_triangles(mesh, context.report);
             return mesh;
           },
-          bytes};
+          .bytes_at_most = bytes};
 }
 
 constexpr ShapeKind kKinds[] = {

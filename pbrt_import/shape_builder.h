@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "pbrt_import/parameters.h"
@@ -22,6 +23,8 @@ struct MeshJob {
   /// Any thread may call it, once. Throws Error, message without a place, if the shape is unusable.
   std::function<Mesh(ShapeContext& context)> make;
   uint64_t bytes_at_most = 0; ///< bound on bytes_of(mesh); 0: not known
+  std::string same_as{};      ///< jobs that have it in common make the same mesh; empty: this one stands alone
+  double scale = 1.0;         ///< the shape is the mesh scaled by it
 };
 
 /// Takes what one kind of shape needs out of the list. Throws Error, message without a place, if the shape is unusable.

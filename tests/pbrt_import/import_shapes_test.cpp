@@ -3,6 +3,7 @@
 #include <oneapi/tbb/global_control.h>
 
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/transforms.h"
 #include "tests/pbrt_import/scene_folder.h"
 
 namespace packtrace {
@@ -24,7 +25,51 @@ TEST(Shapes, EveryQuadricHasItsDefaults) {
 TEST(Shapes, SphereLimitsFollowTheRadius) {
   const SceneFolder folder;
   const Imported imported = import_world(folder, "Shape \"sphere\" \"float radius\" 3");
-  EXPECT_NEAR(bounds_of(imported.scene.meshes[0].positions).lo.z, -3.0, 1e-6);
+  EXPECT_NEAR(world_bounds(imported.scene).lo.z, -3.0, 1e-6);
+}
+
+TEST(Shapes, EqualQuadricsShareAMesh) {
+  const SceneFolder folder;
+  const Imported imported = import_world(folder, "Shape \"sphere\" Translate 9 0 0 Shape \"sphere\" \"float radius\" 2.5 "
+                                                 "Shape \"sphere\" \"float zmax\" .5 Shape \"disk\" Shape \"disk\" "
+                                                 "Shape \"disk\" \"float height\" 1");
+  ASSERT_EQ(imported.scene.shapes.size(), 6u) << imported.text();
+  const auto mesh = [&](size_t shape) { return imported.scene.shapes[shape].mesh; };
+  EXPECT_EQ(mesh(0), mesh(1)); // whole spheres differ in scale only
+  EXPECT_NE(mesh(0), mesh(2));
+  EXPECT_EQ(mesh(3), mesh(4));
+  EXPECT_NE(mesh(4), mesh(5));
+  EXPECT_EQ(imported.scene.shapes[1].parent_from_mesh, compose(translation({9, 0, 0}), scaling(DVec3(2.5))));
+}
+
+TEST(Shapes, MeshesMadeByOtherThreadsKeepTheirOrderAndTheirReports) {
+  const SceneFolder folder;
+  std::string text;
+  for (int i = 0; i < 40; ++i) { // large enough for tasks of their own, and every third one with a bad triangle
+    std::string indices, points;
+    for (int k = 0; k < 2000; ++k) {
+      indices += "0 1 2 ";
+      points += std::to_string(i) + " " + std::to_string(k) + " 0 1 0 0 0 1 0 ";
+    }
+    if (i % 3 == 0) indices += "0 1 " + std::to_string(100'000 + i);
+    text += "Shape \"trianglemesh\" \"integer indices\" [" + indices + "] \"point P\" [" + points + "]\n";
+    if (i % 7 == 0) text += "Shape \"trianglemesh\" \"integer indices\" [0 1 2] \"point P\" [0 0 0]\n";
+  }
+  std::vector<std::string> reports;
+  for (const size_t threads : {size_t{1}, size_t{4}}) {
+    const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism, threads);
+    const Imported imported = import_world(folder, text);
+    ASSERT_EQ(imported.scene.shapes.size(), 40u);
+    for (int i = 0; i < 40; ++i) {
+      const Mesh& mesh = imported.scene.meshes[imported.scene.shapes[static_cast<size_t>(i)].mesh];
+      ASSERT_EQ(mesh.triangles.size(), 2000u);
+      ASSERT_EQ(mesh.positions[0].x, static_cast<float>(i));
+    }
+    EXPECT_EQ(imported.scene.dropped_triangles, 14u + 6u);
+    EXPECT_EQ(imported.statistics.shapes_skipped, 6u);
+    reports.push_back(imported.text());
+  }
+  EXPECT_EQ(reports[0], reports[1]);
 }
 
 TEST(Shapes, LoopSubdivisionTakesBothSpellingsOfLevels) {
