@@ -15,7 +15,7 @@ namespace {
 
 using Bezier = std::array<DVec3, 4>;
 constexpr uint32_t kSides = 8; // a side's sagitta is 1 - cos(pi / 8) = 7.6% of the radius, within width / 20
-constexpr double kMaxPieces = 1024.0;
+constexpr size_t kMaxStations = (size_t{1} << 24) / (kSides + 1);
 
 [[noreturn]] void fail(const std::string& problem) { throw Error(ErrorKind::kInput, problem); }
 
@@ -71,7 +71,16 @@ DVec3 point_at(const Bezier& b, double t) {
 /// largest second difference of the control points.
 uint32_t piece_count(const Bezier& b, double tolerance) {
   const double bend = std::max(glm::length(b[0] - 2.0 * b[1] + b[2]), glm::length(b[1] - 2.0 * b[2] + b[3]));
-  return static_cast<uint32_t>(std::clamp(std::ceil(std::sqrt(6.0 * bend / (8.0 * tolerance))), 1.0, kMaxPieces));
+  return static_cast<uint32_t>(std::max(1.0, std::ceil(std::sqrt(6.0 * bend / (8.0 * tolerance)))));
+}
+
+/// How far a chord may be from its curve: width / 20, as in pbrt, but not finer than floats are at the points, where no
+/// segment needs more than 7000 pieces.
+double centre_tolerance(const CurveParameters& curve) {
+  float largest = 0.0f;
+  for (const Vec3& p : curve.points) largest = std::max({largest, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+  constexpr double kRounding = 1.0 / (1 << 23);
+  return std::max(double{std::max(curve.width0, curve.width1)} / 20.0, kRounding * largest);
 }
 
 /// pbrt's interpolation of a ribbon's normals on the sphere.
@@ -87,28 +96,82 @@ DVec3 unit(Vec3 v) {
   return DVec3(v) / length;
 }
 
-std::vector<Station> stations_of(const CurveParameters& curve, const std::vector<Bezier>& segments) {
-  std::vector<Station> stations;
-  const double tolerance = std::max(curve.width0, curve.width1) / 20.0;
-  const auto count = static_cast<double>(segments.size());
-  for (size_t s = 0; s < segments.size(); ++s) {
-    const Bezier& b = segments[s];
-    if (glm::dot(tangent_at(b, 0.0), tangent_at(b, 0.0)) == 0.0) continue; // pbrt never hits a segment without length
-    const uint32_t pieces = piece_count(b, tolerance);
-    for (uint32_t i = stations.empty() ? 0 : 1; i <= pieces; ++i) {
-      const double t = static_cast<double>(i) / pieces, u = (static_cast<double>(s) + t) / count;
-      const DVec3 tangent = tangent_at(b, t);
-      if (glm::dot(tangent, tangent) == 0.0) continue;
-      Station station{point_at(b, t), glm::normalize(tangent), DVec3(0.0),
-                      glm::mix(double{curve.width0}, double{curve.width1}, u), u};
-      if (curve.type == CurveType::kRibbon)
-        station.normal = slerp(unit(curve.normals[s]), unit(curve.normals[s + 1]), t);
-      stations.push_back(station);
+[[noreturn]] void fail_too_many() {
+  throw Error(ErrorKind::kLimitExceeded, "the curve's width asks for more than 2^24 vertices");
+}
+
+/// Walks along the segments and puts a station wherever a cross-section is needed.
+class StationMaker {
+public:
+  StationMaker(const CurveParameters& curve, std::span<const Bezier> segments)
+      : curve_(curve), segment_count_(static_cast<double>(segments.size())), tolerance_(centre_tolerance(curve)) {
+    uint64_t count = 1;
+    for (const Bezier& b : segments) count += piece_count(b, tolerance_);
+    if (count > kMaxStations) fail_too_many();
+    stations_.reserve(count);
+    for (size_t s = 0; s < segments.size(); ++s) add_segment(segments[s], s);
+  }
+
+  std::vector<Station> take() {
+    if (stations_.size() < 2) fail("the curve has no length");
+    return std::move(stations_);
+  }
+
+private:
+  static constexpr double kSmooth = 0.999;    // cosine: 2.6 degrees
+  static constexpr double kLargestTurn = 0.8; // cosine: 37 degrees, where the outside of a bend loses 5% of the radius
+
+  void add_segment(const Bezier& b, size_t index) {
+    if (glm::dot(tangent_at(b, 0.0), tangent_at(b, 0.0)) == 0.0) return; // pbrt never hits a segment without length
+    const uint32_t pieces = piece_count(b, tolerance_);
+    Station from = station_at(b, index, 0.0);
+    // At a corner the segment before ends and this one starts with a cross-section of its own.
+    if (stations_.empty() || glm::dot(stations_.back().tangent, from.tangent) < kSmooth) push(from);
+    for (uint32_t i = 1; i <= pieces; ++i) {
+      const Station to = station_at(b, index, static_cast<double>(i) / pieces);
+      add_piece(b, index, from, static_cast<double>(i - 1) / pieces, to, static_cast<double>(i) / pieces);
+      from = to;
     }
   }
-  if (stations.size() < 2) fail("the curve has no length");
-  return stations;
-}
+
+  /// Splits a piece that turns far, down to what may as well be a cusp.
+  void add_piece(const Bezier& b, size_t index, const Station& from, double t_from, const Station& to, double t_to) {
+    constexpr double kShortest = 1e-6; // of the segment's parameter
+    if (glm::dot(from.tangent, to.tangent) < kLargestTurn && t_to - t_from > kShortest) {
+      const double middle = (t_from + t_to) / 2;
+      const Station between = station_at(b, index, middle);
+      add_piece(b, index, from, t_from, between, middle);
+      add_piece(b, index, between, middle, to, t_to);
+    } else {
+      push(to);
+    }
+  }
+
+  void push(const Station& station) {
+    if (stations_.size() == kMaxStations) fail_too_many();
+    stations_.push_back(station);
+  }
+
+  Station station_at(const Bezier& b, size_t index, double t) const {
+    const double u = (static_cast<double>(index) + t) / segment_count_;
+    Station station{point_at(b, t), DVec3(0.0), DVec3(0.0), glm::mix(double{curve_.width0}, double{curve_.width1}, u),
+                    u};
+    const DVec3 tangent = tangent_at(b, t);
+    // Both may vanish inside a loop that comes back to its start; there any direction is as good.
+    if (glm::dot(tangent, tangent) > 0.0)
+      station.tangent = glm::normalize(tangent);
+    else
+      station.tangent = stations_.empty() ? glm::normalize(tangent_at(b, 0.0)) : stations_.back().tangent;
+    if (curve_.type == CurveType::kRibbon)
+      station.normal = slerp(unit(curve_.normals[index]), unit(curve_.normals[index + 1]), t);
+    return station;
+  }
+
+  const CurveParameters& curve_;
+  double segment_count_;
+  double tolerance_;
+  std::vector<Station> stations_;
+};
 
 /// Normals that turn about the tangent as little as possible: each is the one before, reflected twice.
 void add_rotation_minimizing_frames(std::vector<Station>& stations) {
@@ -191,9 +254,11 @@ Mesh tessellate_curve(const CurveParameters& curve) {
   if (ribbon && curve.normals.size() != segments.size() + 1)
     fail("a ribbon of " + std::to_string(segments.size()) + " segments needs one normal more than segments, not " +
          std::to_string(curve.normals.size()));
-  std::vector<Station> stations = stations_of(curve, segments);
+  std::vector<Station> stations = StationMaker(curve, segments).take();
   Mesh mesh = ribbon ? make_ribbon(stations) : make_tube(std::move(stations));
-  drop_bad_triangles(mesh, {});
+  for (const Vec3& p : mesh.positions)
+    if (!is_finite(p)) fail("the curve leaves the range of single precision");
+  drop_bad_triangles(mesh, {}); // vertices of triangles that were left out
   if (mesh.triangles.empty()) fail("nothing of the curve can be drawn");
   return mesh;
 }

@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
+#include <locale>
+#include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pbrt_import/scene/bounds.h"
@@ -18,6 +22,13 @@ constexpr uint32_t kMaxOrder = 32;
 constexpr uint32_t kMaxSegmentsPerSpan = 128;
 
 [[noreturn]] void fail(const std::string& problem) { throw Error(ErrorKind::kInput, problem); }
+
+std::string two_digits(double value) {
+  std::ostringstream stream;
+  stream.imbue(std::locale::classic());
+  stream << std::setprecision(2) << value;
+  return stream.str();
+}
 
 /// The knots of one direction and the part of its domain that is drawn.
 struct Axis {
@@ -85,31 +96,63 @@ struct SurfacePoint {
 
 class Surface {
 public:
-  Surface(const Axis& u, const Axis& v, std::span<const glm::vec4> points) : u_(u), v_(v), points_(points) {}
-
-  SurfacePoint at(double u, double v) const {
-    const uint32_t u_span = u_.span_of(u), v_span = v_.span_of(v);
-    DVec4 row[kMaxOrder], column[kMaxOrder], column_u[kMaxOrder];
-    for (uint32_t j = 0; j < v_.order; ++j) {
-      const size_t first = size_t{v_span + 1 - v_.order + j} * u_.count + (u_span + 1 - u_.order);
-      for (uint32_t i = 0; i < u_.order; ++i) row[i] = DVec4(points_[first + i]);
-      const Jet jet = de_boor(u_, u_span, u, row);
-      column[j] = jet.value;
-      column_u[j] = jet.derivative;
-    }
-    const Jet along_v = de_boor(v_, v_span, v, column);
-    const DVec4 du = de_boor(v_, v_span, v, column_u).value;
-    const DVec4 p = along_v.value;
-    const auto projected = [&](const DVec4& d) { return (DVec3(d) * p.w - DVec3(p) * d.w) / (p.w * p.w); };
-    const SurfacePoint point{DVec3(p) / p.w, glm::cross(projected(du), projected(along_v.derivative))};
-    if (!is_finite(Vec3(point.position))) fail("a point of the nurbs surface is not finite");
-    return point;
+  Surface(const Axis& u, const Axis& v, std::span<const glm::vec4> points) : u_(u), v_(v), points_(points) {
+    weight_is_positive_ = row(v.begin).weight(u.begin) > 0.0;
   }
+
+  /// The surface along u at one v: a curve whose control points are worked out once.
+  class Row {
+  public:
+    Row(const Surface& surface, double v) : surface_(surface), jets_(surface.u_.count) {
+      const Axis& axis = surface.v_;
+      const uint32_t span = axis.span_of(v);
+      DVec4 column[kMaxOrder];
+      for (uint32_t i = 0; i < surface.u_.count; ++i) {
+        for (uint32_t j = 0; j < axis.order; ++j)
+          column[j] = DVec4(surface.points_[size_t{span + 1 - axis.order + j} * surface.u_.count + i]);
+        jets_[i] = de_boor(axis, span, v, column);
+      }
+    }
+
+    double weight(double u) const { return curve(u, &Jet::value).value.w; }
+
+    SurfacePoint at(double u) const {
+      const Jet along_u = curve(u, &Jet::value);
+      const DVec4 p = along_u.value, dv = curve(u, &Jet::derivative).value;
+      if ((p.w > 0.0) != surface_.weight_is_positive_) fail("the nurbs surface runs through infinity");
+      const auto projected = [&](const DVec4& d) { return (DVec3(d) * p.w - DVec3(p) * d.w) / (p.w * p.w); };
+      const SurfacePoint point{DVec3(p) / p.w, glm::cross(projected(along_u.derivative), projected(dv))};
+      if (!is_finite(Vec3(point.position))) fail("a point of the nurbs surface is not finite");
+      return point;
+    }
+
+    std::vector<DVec3> positions(std::span<const double> us) const {
+      std::vector<DVec3> result;
+      result.reserve(us.size());
+      for (const double u : us) result.push_back(at(u).position);
+      return result;
+    }
+
+  private:
+    Jet curve(double u, DVec4 Jet::*which) const {
+      const Axis& axis = surface_.u_;
+      const uint32_t span = axis.span_of(u), first = span + 1 - axis.order;
+      DVec4 points[kMaxOrder];
+      for (uint32_t i = 0; i < axis.order; ++i) points[i] = jets_[first + i].*which;
+      return de_boor(axis, span, u, points);
+    }
+
+    const Surface& surface_;
+    std::vector<Jet> jets_; ///< the curve's control points and their derivatives along v
+  };
+
+  Row row(double v) const { return Row(*this, v); }
 
 private:
   const Axis& u_;
   const Axis& v_;
   std::span<const glm::vec4> points_;
+  bool weight_is_positive_ = true; ///< everywhere, or everywhere negative
 };
 
 /// Knots within the drawn range and its ends, with each span cut into equal segments.
@@ -125,70 +168,95 @@ std::vector<double> grid_lines(const Axis& axis, uint32_t segments) {
   return lines;
 }
 
-/// How far the middles of the grid's edges across `lines` are from the surface, at most.
-template <class At>
-double worst_middle(const std::vector<double>& lines, const std::vector<double>& others, At at) {
-  double worst = 0.0;
-  for (const double other : others) {
-    DVec3 previous = at(lines[0], other);
-    for (size_t i = 1; i < lines.size(); ++i) {
-      const DVec3 next = at(lines[i], other), middle = at((lines[i - 1] + lines[i]) / 2, other);
-      worst = std::max(worst, glm::distance(middle, (previous + next) / 2.0));
-      previous = next;
-    }
-  }
-  return worst;
-}
-
 struct Grid {
   std::vector<double> u, v;
+
+  uint64_t vertex_count() const { return uint64_t{u.size()} * v.size(); }
 };
 
-/// How far the middles of cells are from the diagonals that cut them, at most.
-double worst_centre(const Grid& grid, const Surface& surface) {
-  double worst = 0.0;
-  for (size_t j = 1; j < grid.v.size(); ++j) {
-    for (size_t i = 1; i < grid.u.size(); ++i) {
-      const DVec3 diagonal =
-          (surface.at(grid.u[i - 1], grid.v[j - 1]).position + surface.at(grid.u[i], grid.v[j]).position) / 2.0;
-      const double u = (grid.u[i - 1] + grid.u[i]) / 2, v = (grid.v[j - 1] + grid.v[j]) / 2;
-      worst = std::max(worst, glm::distance(surface.at(u, v).position, diagonal));
+/// Lines with the middles between them: 2 n - 1 of them.
+std::vector<double> with_middles(const std::vector<double>& lines) {
+  std::vector<double> result{lines[0]};
+  for (size_t i = 1; i < lines.size(); ++i) result.insert(result.end(), {(lines[i - 1] + lines[i]) / 2, lines[i]});
+  return result;
+}
+
+/// How far the surface is from the triangles of a grid, at most, where that is looked at.
+struct Deviation {
+  double along_u = 0.0; ///< of the middles of edges
+  double along_v = 0.0;
+  double centre = 0.0; ///< of the middles of cells from the diagonals that cut them
+  double size = 0.0;   ///< half the diagonal of the surface's box
+
+  /// The relative tolerance that the grid keeps.
+  double tolerance() const { return size > 0.0 ? std::max({2 * along_u, 2 * along_v, centre}) / size : 0.0; }
+};
+
+Deviation measure(const Grid& grid, const Surface& surface, const CheckCancelledFn& check_cancelled) {
+  const std::vector<double> us = with_middles(grid.u);
+  Deviation worst;
+  Bounds bounds;
+  std::vector<DVec3> low;
+  for (size_t j = 0; j < grid.v.size(); ++j) {
+    if (check_cancelled) check_cancelled();
+    std::vector<DVec3> high = surface.row(grid.v[j]).positions(us);
+    for (const DVec3& p : high) bounds.extend(p);
+    for (size_t i = 2; i < us.size(); i += 2)
+      worst.along_u = std::max(worst.along_u, glm::distance(high[i - 1], (high[i - 2] + high[i]) / 2.0));
+    if (j > 0) {
+      const std::vector<DVec3> middle = surface.row((grid.v[j - 1] + grid.v[j]) / 2).positions(us);
+      for (size_t i = 0; i < us.size(); i += 2)
+        worst.along_v = std::max(worst.along_v, glm::distance(middle[i], (low[i] + high[i]) / 2.0));
+      for (size_t i = 2; i < us.size(); i += 2)
+        worst.centre = std::max(worst.centre, glm::distance(middle[i - 1], (low[i - 2] + high[i]) / 2.0));
     }
+    low = std::move(high);
   }
+  worst.size = bounds.diagonal() / 2;
   return worst;
 }
 
-Grid refine(const Axis& u, const Axis& v, const Surface& surface, double tolerance) {
+Grid refine(const Axis& u, const Axis& v, const Surface& surface, double relative_tolerance, const ReportFn& report,
+            const CheckCancelledFn& check_cancelled) {
   // Four segments to begin with, so that an inflection in the middle of a span does not look straight.
   uint32_t u_segments = u.order > 2 ? 4 : 1, v_segments = v.order > 2 ? 4 : 1;
+  Grid grid{grid_lines(u, u_segments), grid_lines(v, v_segments)};
+  if (grid.vertex_count() > kMaxVertices)
+    throw Error(ErrorKind::kLimitExceeded,
+                "the nurbs surface asks for more than " + std::to_string(kMaxVertices) + " vertices");
   while (true) {
-    Grid grid{grid_lines(u, u_segments), grid_lines(v, v_segments)};
-    if (uint64_t{grid.u.size()} * grid.v.size() > kMaxVertices)
-      throw Error(ErrorKind::kLimitExceeded,
-                  "the nurbs surface asks for more than " + std::to_string(kMaxVertices) + " vertices");
-    bool refine_u =
-        worst_middle(grid.u, grid.v, [&](double x, double y) { return surface.at(x, y).position; }) > tolerance / 2;
-    bool refine_v =
-        worst_middle(grid.v, grid.u, [&](double y, double x) { return surface.at(x, y).position; }) > tolerance / 2;
-    // Cells may also be twisted while their edges are straight.
-    if (!refine_u && !refine_v) refine_u = refine_v = worst_centre(grid, surface) > tolerance;
+    const Deviation deviation = measure(grid, surface, check_cancelled);
+    if (deviation.tolerance() <= relative_tolerance) return grid;
+    const double most = relative_tolerance * deviation.size / 2;
+    bool refine_u = deviation.along_u > most, refine_v = deviation.along_v > most;
+    if (!refine_u && !refine_v) refine_u = refine_v = true; // cells may be twisted while their edges are straight
     refine_u = refine_u && u_segments < kMaxSegmentsPerSpan;
     refine_v = refine_v && v_segments < kMaxSegmentsPerSpan;
-    if (!refine_u && !refine_v) return grid;
     u_segments *= refine_u ? 2 : 1;
     v_segments *= refine_v ? 2 : 1;
+    Grid finer{grid_lines(u, u_segments), grid_lines(v, v_segments)};
+    if (finer.vertex_count() > kMaxVertices || finer.vertex_count() == grid.vertex_count()) {
+      if (report)
+        report(Severity::kWarning, 0,
+               "the surface is followed to within " + two_digits(deviation.tolerance()) +
+                   " of its size only, not the tolerance of " + two_digits(relative_tolerance));
+      return grid;
+    }
+    grid = std::move(finer);
   }
 }
 
-Mesh mesh_of(const Grid& grid, const Surface& surface) {
+Mesh mesh_of(const Grid& grid, const Surface& surface, const CheckCancelledFn& check_cancelled) {
   Mesh mesh;
-  const size_t count = grid.u.size() * grid.v.size();
+  const size_t count = grid.vertex_count();
   mesh.positions.reserve(count);
   mesh.normals.reserve(count);
   mesh.uvs.reserve(count);
   for (const double v : grid.v) {
+    if (check_cancelled) check_cancelled();
+    const Surface::Row row = surface.row(v);
     for (const double u : grid.u) {
-      const SurfacePoint point = surface.at(u, v);
+      const SurfacePoint point = row.at(u);
       const double length = glm::length(point.normal);
       mesh.positions.emplace_back(point.position);
       mesh.normals.emplace_back(length > 0.0 && std::isfinite(length) ? point.normal / length : DVec3(0.0));
@@ -213,7 +281,8 @@ Mesh mesh_of(const Grid& grid, const Surface& surface) {
 
 } // namespace
 
-Mesh tessellate_nurbs(const NurbsParameters& nurbs, double relative_tolerance) {
+Mesh tessellate_nurbs(const NurbsParameters& nurbs, double relative_tolerance, const ReportFn& report,
+                      const CheckCancelledFn& check_cancelled) {
   if (!(relative_tolerance >= 1e-6 && relative_tolerance <= 0.5))
     fail("the tessellation tolerance is not within [1e-6, 0.5]");
   const Axis u = make_axis("u", nurbs.nu, nurbs.u_order, nurbs.u_knots, nurbs.u0, nurbs.u1);
@@ -221,14 +290,10 @@ Mesh tessellate_nurbs(const NurbsParameters& nurbs, double relative_tolerance) {
   if (uint64_t{nurbs.nu} * nurbs.nv != nurbs.control_points.size())
     fail("the nurbs surface has " + std::to_string(nurbs.control_points.size()) +
          " control points for nu x nv = " + std::to_string(uint64_t{nurbs.nu} * nurbs.nv));
-  Bounds bounds;
-  for (const glm::vec4& p : nurbs.control_points) {
-    if (!is_finite(Vec3(p)) || !std::isfinite(p.w) || p.w == 0.0f)
-      fail("a control point is not finite or has weight 0");
-    bounds.extend(DVec3(p) / double{p.w});
-  }
+  for (const glm::vec4& p : nurbs.control_points)
+    if (!is_finite(Vec3(p)) || !std::isfinite(p.w)) fail("a control point is not finite");
   const Surface surface(u, v, nurbs.control_points);
-  return mesh_of(refine(u, v, surface, relative_tolerance * bounds.diagonal() / 2), surface);
+  return mesh_of(refine(u, v, surface, relative_tolerance, report, check_cancelled), surface, check_cancelled);
 }
 
 } // namespace packtrace

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "pbrt_import/scene/scene.h"
+#include "pbrt_import/shapes/report.h"
 
 namespace packtrace {
 
@@ -22,12 +23,15 @@ struct NurbsParameters {
 
 /// A grid of triangles whose lines include the knots, refined along u and v until the middles of its edges are within
 /// half of, and the middles of its cells within, relative_tolerance x size of the surface, size being half the diagonal
-/// of the control points' box, or until 128 segments per knot span. Normals along cross(dp/du, dp/dv); uvs are the
-/// surface's own parameters, as in pbrt-v3. Triangles that collapse at poles are left out.
+/// of the surface's box. Refinement ends at 128 segments per knot span or 2^24 vertices, with a warning that names the
+/// tolerance that was reached. Normals along cross(dp/du, dp/dv); uvs are the surface's own parameters, as in pbrt-v3.
+/// Triangles that collapse at poles are left out. Weights may be negative or zero as long as the surface stays finite.
 /// @param relative_tolerance within [1e-6, 0.5]
-/// Throws Error(kInput) if counts, knots or ranges do not fit together or a value or a point of the surface is not
-/// finite, Error(kLimitExceeded) if the grid would exceed 2^24 vertices.
-/// Source: Carl de Boor, A Practical Guide to Splines, 1978, chapter 10.
-Mesh tessellate_nurbs(const NurbsParameters& nurbs, double relative_tolerance);
+/// Throws Error(kInput) if counts, knots or ranges do not fit together, a value or a point of the surface is not finite
+/// or the surface runs through infinity (its weight changes sign), Error(kLimitExceeded) if the knots alone ask for
+/// more than 2^24 vertices, and whatever check_cancelled throws. Source: Carl de Boor, A Practical Guide to Splines,
+/// 1978, chapter 10.
+Mesh tessellate_nurbs(const NurbsParameters& nurbs, double relative_tolerance, const ReportFn& report = {},
+                      const CheckCancelledFn& check_cancelled = {});
 
 } // namespace packtrace

@@ -3,18 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <limits>
 #include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/shapes/mesh_cleanup.h"
 
 namespace packtrace {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr uint64_t kMaxVertices = uint64_t{1} << 24;
 
 [[noreturn]] void fail(const std::string& problem) { throw Error(ErrorKind::kInput, problem); }
 
@@ -26,14 +27,12 @@ void require_finite(std::initializer_list<float> values) {
   for (const float value : values) require(std::isfinite(value), "a parameter is not finite");
 }
 
-void require_tolerance(double tolerance) {
-  require(tolerance >= 1e-6 && tolerance <= 0.5, "the tessellation tolerance is not within [1e-6, 0.5]");
+void require_float_range(double radius) {
+  require(radius <= std::numeric_limits<float>::max(), "the quadric leaves the range of single precision");
 }
 
-double sweep_angle(float phi_max_degrees) {
-  require(std::isfinite(phi_max_degrees), "phimax is not finite");
-  require(phi_max_degrees > 0.0f, "phimax leaves nothing to draw");
-  return phi_max_degrees >= 360.0f ? 2.0 * kPi : phi_max_degrees * (kPi / 180.0);
+void require_tolerance(double tolerance) {
+  require(tolerance >= 1e-6 && tolerance <= 0.5, "the tessellation tolerance is not within [1e-6, 0.5]");
 }
 
 /// Segments of an arc so that chords stay within tolerance x radius of it: 1 - cos(step / 2) <= tolerance.
@@ -42,30 +41,41 @@ uint32_t arc_segments(double angle, double tolerance) {
   return static_cast<uint32_t>(std::max(1.0, std::ceil(angle / step - 1e-9)));
 }
 
+/// (cos, sin), exact at multiples of 90 degrees and symmetric about them.
+glm::dvec2 direction_at(double degrees) {
+  const double quarter = std::round(degrees / 90.0);
+  const double rest = (degrees - 90.0 * quarter) * (kPi / 180.0), c = std::cos(rest), s = std::sin(rest);
+  switch (static_cast<int>(quarter) % 4) {
+  case 0:
+    return {c, s};
+  case 1:
+    return {-s, c};
+  case 2:
+    return {-c, -s};
+  default:
+    return {s, -c};
+  }
+}
+
 /// The directions of the columns of a sweep.
 struct Sweep {
   std::vector<glm::dvec2> directions; ///< (cos phi, sin phi), segments + 1 of them
-  double angle = 0.0;                 ///< radians
+  double step = 0.0;                  ///< radians between two of them
 
   uint32_t segments() const { return static_cast<uint32_t>(directions.size() - 1); }
 };
 
-/// Full sweeps get a multiple of four segments, so that they reach their bounding box, and end exactly where they
-/// begin.
-Sweep make_sweep(double angle, double tolerance) {
-  uint32_t segments = arc_segments(angle, tolerance);
-  const bool full = angle == 2.0 * kPi;
-  if (full) segments = (segments + 3) / 4 * 4;
-  Sweep sweep{std::vector<glm::dvec2>(segments + 1), angle};
-  for (uint32_t i = 0; i <= segments; ++i) {
-    const double phi = angle * i / segments;
-    sweep.directions[i] = {std::cos(phi), std::sin(phi)};
-  }
-  if (full) {
-    const uint32_t quarter = segments / 4;
-    const glm::dvec2 axes[] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}, {1, 0}};
-    for (uint32_t i = 0; i <= 4; ++i) sweep.directions[i * quarter] = axes[i];
-  }
+/// The same columns for all quadrics of the same phi_max, so that their rims meet. They may use half of the tolerance:
+/// where rows have chords too, both sagittas add up in the middle of a cell. Full sweeps get a multiple of four
+/// segments, so that they reach their bounding box.
+Sweep make_sweep(float phi_max_degrees, double relative_tolerance) {
+  require(std::isfinite(phi_max_degrees), "phimax is not finite");
+  require(phi_max_degrees > 0.0f, "phimax leaves nothing to draw");
+  const double degrees = std::min(phi_max_degrees, 360.0f), angle = degrees * (kPi / 180.0);
+  uint32_t segments = arc_segments(angle, relative_tolerance / 2);
+  if (degrees == 360.0) segments = (segments + 3) / 4 * 4;
+  Sweep sweep{std::vector<glm::dvec2>(segments + size_t{1}), angle / segments};
+  for (uint32_t i = 0; i <= segments; ++i) sweep.directions[i] = direction_at(degrees * i / segments);
   return sweep;
 }
 
@@ -85,9 +95,6 @@ DVec3 rotated(DVec3 p, glm::dvec2 direction) {
 class SweptMesh {
 public:
   SweptMesh(const Sweep& sweep, size_t row_count) : sweep_(sweep) {
-    if (uint64_t{row_count} * (sweep.segments() + 1) > kMaxVertices)
-      throw Error(ErrorKind::kLimitExceeded,
-                  "the tolerance asks for more than " + std::to_string(kMaxVertices) + " vertices in one quadric");
     const size_t columns = sweep.segments() + size_t{1};
     mesh_.positions.reserve(columns * row_count);
     mesh_.normals.reserve(columns * row_count);
@@ -105,7 +112,7 @@ public:
       // The bisector of two neighbouring columns; never zero, as a sweep step is less than half a turn.
       const glm::dvec2 direction =
           pole ? glm::normalize(sweep_.directions[i] + sweep_.directions[i + 1]) : sweep_.directions[i];
-      mesh_.positions.emplace_back(rotated(point.position, direction));
+      mesh_.positions.emplace_back(rotated(point.position, direction) + 0.0); // no negative zeros
       mesh_.normals.emplace_back(glm::normalize(rotated(point.normal, direction)));
       mesh_.uvs.emplace_back(static_cast<float>((i + (pole ? 0.5 : 0.0)) / segments), static_cast<float>(point.v));
     }
@@ -114,26 +121,40 @@ public:
     row_is_pole_ = pole;
   }
 
-  Mesh take() { return std::move(mesh_); }
+  Mesh take() {
+    if (collapsed_) drop_bad_triangles(mesh_, {}); // their vertices
+    require(!mesh_.triangles.empty(), "the quadric is too thin for single precision");
+    return std::move(mesh_);
+  }
 
 private:
   void join(uint32_t upper, bool upper_is_pole) {
     for (uint32_t i = 0; i < sweep_.segments(); ++i) {
       const uint32_t a = row_ + i, b = a + 1, c = upper + i + 1, d = upper + i;
       if (row_is_pole_) {
-        if (!upper_is_pole) mesh_.triangles.emplace_back(a, c, d);
+        if (!upper_is_pole) add(a, c, d);
         continue;
       }
       if (upper_is_pole) {
-        mesh_.triangles.emplace_back(a, b, d);
+        add(a, b, d);
         continue;
       }
-      mesh_.triangles.emplace_back(a, b, c);
-      mesh_.triangles.emplace_back(a, c, d);
+      add(a, b, c);
+      add(a, c, d);
     }
   }
 
+  /// Leaves out triangles whose corners rounding to float has put in one place.
+  void add(uint32_t a, uint32_t b, uint32_t c) {
+    const Vec3 p = mesh_.positions[a], q = mesh_.positions[b], r = mesh_.positions[c];
+    if (p == q || q == r || r == p)
+      collapsed_ = true;
+    else
+      mesh_.triangles.emplace_back(a, b, c);
+  }
+
   const Sweep& sweep_;
+  bool collapsed_ = false;
   Mesh mesh_;
   uint32_t row_ = 0;
   bool row_is_pole_ = false;
@@ -148,11 +169,17 @@ Mesh sweep_profile(const Sweep& sweep, const std::vector<ProfilePoint>& profile)
 /// t = i / n, exact at both ends.
 double fraction(uint32_t i, uint32_t n) { return static_cast<double>(i) / n; }
 
-/// Rows for a curve parameter whose own bound says how many segments it needs.
-uint32_t profile_segments(double needed) {
-  if (!(needed < static_cast<double>(kMaxVertices)))
-    throw Error(ErrorKind::kLimitExceeded, "the quadric's shape asks for too many segments");
-  return std::max(1u, static_cast<uint32_t>(std::ceil(needed)));
+/// Radii from r_begin up to r_end so that chords of z = k r^2 between neighbours stay within tolerance of it: |k|
+/// step^2 / 4 along z, times the cosine of the chord's slope, which is at least 2 |k| r. About 1 / sqrt(2 tolerance /
+/// r_end) of them at most, however steep it is.
+std::vector<double> parabola_radii(double r_begin, double r_end, double k, double tolerance) {
+  std::vector<double> radii{r_begin};
+  while (radii.back() < r_end) {
+    const double r = radii.back(), slope = 2.0 * k * r, left = r_end - r;
+    const double step = 2.0 * std::sqrt(tolerance / std::abs(k)) * std::pow(1.0 + slope * slope, 0.25);
+    radii.push_back(left <= step ? r_end : r + std::min(step, left / 2)); // no sliver at the end
+  }
+  return radii;
 }
 
 } // namespace
@@ -162,23 +189,25 @@ Mesh tessellate_sphere(const SphereParameters& sphere, double relative_tolerance
   require_finite({sphere.radius, sphere.z_min, sphere.z_max});
   const double radius = sphere.radius;
   require(radius > 0.0, "the sphere's radius is not positive");
-  const auto [low, high] = std::minmax({double{sphere.z_min}, double{sphere.z_max}});
-  const double theta_min = std::acos(std::clamp(low, -radius, radius) / radius); // the larger angle: pbrt's names
-  const double theta_max = std::acos(std::clamp(high, -radius, radius) / radius);
-  require(theta_min > theta_max, "zmin and zmax leave nothing of the sphere");
-  // Each direction may use half of the tolerance: their sagittas add up in the middle of a cell.
-  const Sweep sweep = make_sweep(sweep_angle(sphere.phi_max), relative_tolerance / 2);
+  const auto [first, second] = std::minmax({double{sphere.z_min}, double{sphere.z_max}});
+  const double low = std::clamp(first, -radius, radius), high = std::clamp(second, -radius, radius);
+  require(low < high, "zmin and zmax leave nothing of the sphere");
+  const double theta_min = std::acos(low / radius), theta_max = std::acos(high / radius); // pbrt's names
+  const Sweep sweep = make_sweep(sphere.phi_max, relative_tolerance);
   uint32_t rows = arc_segments(theta_min - theta_max, relative_tolerance / 2);
-  const bool whole = theta_min == kPi && theta_max == 0.0;
+  const bool whole = low == -radius && high == radius;
   if (whole) rows += rows % 2; // a row at the equator, so that the sphere reaches its bounding box
   std::vector<ProfilePoint> profile(rows + 1);
   for (uint32_t i = 0; i <= rows; ++i) {
     const double v = fraction(i, rows), theta = theta_min + v * (theta_max - theta_min);
-    const double z = i == 0 ? std::cos(theta_min) : i == rows ? std::cos(theta_max) : std::cos(theta);
-    const bool pole = (i == 0 && theta_min == kPi) || (i == rows && theta_max == 0.0);
-    const bool equator = whole && 2 * i == rows;
-    const DVec3 normal = pole ? DVec3(0.0, 0.0, z) : equator ? DVec3(1, 0, 0) : DVec3(std::sin(theta), 0.0, z);
-    profile[i] = {normal * radius, normal, v};
+    DVec3 position(radius * std::sin(theta), 0.0, radius * std::cos(theta));
+    if (i == 0 || i == rows) { // where other shapes may meet it
+      const double z = i == 0 ? low : high;
+      position = {std::sqrt((radius - z) * (radius + z)), 0.0, z};
+    } else if (whole && 2 * i == rows) {
+      position = {radius, 0.0, 0.0};
+    }
+    profile[i] = {position, position, v};
   }
   return sweep_profile(sweep, profile);
 }
@@ -188,7 +217,7 @@ Mesh tessellate_cylinder(const CylinderParameters& cylinder, double relative_tol
   require_finite({cylinder.radius, cylinder.z_min, cylinder.z_max});
   require(cylinder.radius > 0.0f, "the cylinder's radius is not positive");
   require(cylinder.z_min != cylinder.z_max, "the cylinder has no height");
-  const Sweep sweep = make_sweep(sweep_angle(cylinder.phi_max), relative_tolerance);
+  const Sweep sweep = make_sweep(cylinder.phi_max, relative_tolerance);
   const auto [low, high] = std::minmax({double{cylinder.z_min}, double{cylinder.z_max}});
   const double radius = cylinder.radius;
   return sweep_profile(sweep, {{{radius, 0, low}, {1, 0, 0}, 0.0}, {{radius, 0, high}, {1, 0, 0}, 1.0}});
@@ -200,7 +229,7 @@ Mesh tessellate_disk(const DiskParameters& disk, double relative_tolerance) {
   require(disk.radius > 0.0f, "the disk's radius is not positive");
   require(disk.inner_radius >= 0.0f && disk.inner_radius < disk.radius,
           "the disk's inner radius is not within [0, radius)");
-  const Sweep sweep = make_sweep(sweep_angle(disk.phi_max), relative_tolerance);
+  const Sweep sweep = make_sweep(disk.phi_max, relative_tolerance);
   const double height = disk.height;
   return sweep_profile(sweep,
                        {{{disk.radius, 0, height}, {0, 0, 1}, 0.0}, {{disk.inner_radius, 0, height}, {0, 0, 1}, 1.0}});
@@ -211,7 +240,7 @@ Mesh tessellate_cone(const ConeParameters& cone, double relative_tolerance) {
   require_finite({cone.radius, cone.height});
   require(cone.radius > 0.0f, "the cone's radius is not positive");
   require(cone.height > 0.0f, "the cone's height is not positive");
-  const Sweep sweep = make_sweep(sweep_angle(cone.phi_max), relative_tolerance);
+  const Sweep sweep = make_sweep(cone.phi_max, relative_tolerance);
   const double radius = cone.radius, height = cone.height;
   const DVec3 normal(height, 0.0, radius);
   return sweep_profile(sweep, {{{radius, 0, 0}, normal, 0.0}, {{0, 0, height}, normal, 1.0}});
@@ -226,18 +255,17 @@ Mesh tessellate_paraboloid(const ParaboloidParameters& paraboloid, double relati
   const double radius = paraboloid.radius, k = z_max / (radius * radius); // z = k r^2
   const double low = z_max > 0.0 ? std::max(z_min, 0.0) : z_min;          // v still counts from z_min
   require(low < z_max, "zmin and zmax leave nothing of the paraboloid");
-  const double r_low = std::sqrt(low / k), r_high = radius;
-  const Sweep sweep = make_sweep(sweep_angle(paraboloid.phi_max), relative_tolerance / 2);
-  // Steps of equal r: a chord's sagitta along z is |k| step^2 / 4.
-  const double largest = std::max(r_low, r_high);
-  const double step = std::sqrt(4.0 * (relative_tolerance / 2) * largest / std::abs(k));
-  const uint32_t rows = profile_segments(std::abs(r_high - r_low) / step);
-  std::vector<ProfilePoint> profile(rows + 1);
-  for (uint32_t i = 0; i <= rows; ++i) {
-    const double r = i == rows ? r_high : r_low + fraction(i, rows) * (r_high - r_low);
-    const double z = i == 0 ? low : i == rows ? z_max : k * r * r;
+  const double r_low = std::sqrt(low / k), largest = std::max(r_low, radius);
+  require_float_range(largest);
+  const Sweep sweep = make_sweep(paraboloid.phi_max, relative_tolerance);
+  std::vector<double> radii = parabola_radii(std::min(r_low, radius), largest, k, relative_tolerance / 2 * largest);
+  if (r_low > radius) std::reverse(radii.begin(), radii.end());
+  std::vector<ProfilePoint> profile;
+  profile.reserve(radii.size());
+  for (const double r : radii) {
+    const double z = r == r_low ? low : r == radius ? z_max : k * r * r;
     // dp/du is along +y and dp/dv along (1, 0, 2 k r) / (2 k r), which for k < 0 points towards smaller r.
-    profile[i] = {{r, 0, z}, {2.0 * std::abs(k) * r, 0.0, k > 0.0 ? -1.0 : 1.0}, (z - z_min) / (z_max - z_min)};
+    profile.push_back({{r, 0, z}, {2.0 * std::abs(k) * r, 0.0, k > 0.0 ? -1.0 : 1.0}, (z - z_min) / (z_max - z_min)});
   }
   return sweep_profile(sweep, profile);
 }
@@ -251,7 +279,8 @@ Mesh tessellate_hyperboloid(const HyperboloidParameters& hyperboloid, double rel
   const double radius = std::max(glm::length(q1), glm::length(q2));
   require(p1.z != p2.z, "the hyperboloid's p1 and p2 are at the same height");
   require(radius > 0.0, "the hyperboloid's p1 and p2 are both on the axis");
-  const Sweep sweep = make_sweep(sweep_angle(hyperboloid.phi_max), relative_tolerance / 2);
+  require_float_range(radius);
+  const Sweep sweep = make_sweep(hyperboloid.phi_max, relative_tolerance);
   const DVec3 along = p2 - p1;
   const auto facing = [&](glm::dvec2 q) { // cross(dp/du, dp/dv) where the segment is at q
     return DVec3(q.x * along.z, q.y * along.z, -(q.x * along.x + q.y * along.y));
@@ -266,8 +295,8 @@ Mesh tessellate_hyperboloid(const HyperboloidParameters& hyperboloid, double rel
     return sweep_profile(sweep, profile);
   }
   // Cells between two rulings are saddles: a diagonal leaves them by at most a quarter of their ends' relative turn.
-  const double step = sweep.angle / sweep.segments();
-  const uint32_t rows = profile_segments(step * glm::length(q2 - q1) / (4.0 * (relative_tolerance / 2) * radius));
+  const auto rows = static_cast<uint32_t>(
+      std::max(1.0, std::ceil(sweep.step * glm::length(q2 - q1) / (4.0 * (relative_tolerance / 2) * radius))));
   std::vector<ProfilePoint> profile(rows + 1);
   for (uint32_t i = 0; i <= rows; ++i) {
     const double v = fraction(i, rows);

@@ -44,10 +44,12 @@ struct HyperboloidParameters { ///< the segment p1 p2 swept around the z axis
 /// both kinds of normal along cross(dp/du, dp/dv). Vertices lie on the surface (rounded to float); no point of a
 /// triangle is farther from the surface than relative_tolerance x radius, the radius being the largest distance of the
 /// quadric from its axis. Full sweeps close exactly: the seam's two columns, and the vertices of a pole, have
-/// bit-identical positions. No triangle is degenerate.
+/// bit-identical positions. So have the rims of two quadrics that meet in one circle, given the same phi_max and
+/// tolerance. No triangle is degenerate. There are less than 2^23 vertices at the finest tolerance, whatever the
+/// parameters.
 /// @param relative_tolerance within [1e-6, 0.5]
-/// Throws Error(kInput) if a parameter is not finite or leaves nothing to draw (radius <= 0, empty range), and
-/// Error(kLimitExceeded) if the tolerance asks for more than 2^24 vertices.
+/// Throws Error(kInput) if a parameter is not finite or leaves nothing to draw (radius <= 0, empty range, thinner than
+/// floats can tell).
 /// Source: Matt Pharr, Wenzel Jakob and Greg Humphreys, Physically Based Rendering, 3rd edition, 2016, chapter 3.
 Mesh tessellate_sphere(const SphereParameters& sphere, double relative_tolerance);
 Mesh tessellate_cylinder(const CylinderParameters& cylinder, double relative_tolerance);

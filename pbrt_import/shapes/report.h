@@ -12,4 +12,7 @@ namespace packtrace {
 /// May be empty: then nobody listens.
 using ReportFn = std::function<void(Severity severity, uint32_t line, std::string message)>;
 
+/// Called now and then by shapes that may take long; throws to stop them, usually Error(kCancelled). May be empty.
+using CheckCancelledFn = std::function<void()>;
+
 } // namespace packtrace

@@ -271,11 +271,13 @@ std::vector<Vec3> limit_normals(const Level& level) {
 }
 
 /// The control mesh as a Level, with what cannot be drawn removed.
-Level control_level(std::span<const Vec3> points, std::span<const Triangle> triangles, const ReportFn& report) {
+Level control_level(std::span<const Vec3> points, std::span<const Triangle> triangles, const ReportFn& report,
+                    uint64_t* dropped_triangles) {
   Mesh mesh;
   mesh.positions.assign(points.begin(), points.end());
   mesh.triangles.assign(triangles.begin(), triangles.end());
-  drop_bad_triangles(mesh, report);
+  const uint64_t dropped = drop_bad_triangles(mesh, report);
+  if (dropped_triangles) *dropped_triangles += dropped;
   Level level;
   level.points.assign(mesh.positions.begin(), mesh.positions.end());
   level.start.reserve(mesh.triangles.size() * 3);
@@ -305,11 +307,14 @@ void check_budget(uint64_t triangle_count, uint32_t levels) {
 } // namespace
 
 Mesh subdivide_loop(std::span<const Vec3> points, std::span<const Triangle> triangles, uint32_t levels,
-                    const ReportFn& report) {
+                    const ReportFn& report, uint64_t* dropped_triangles, const CheckCancelledFn& check_cancelled) {
   check_budget(triangles.size(), levels);
-  Level level = control_level(points, triangles, report);
+  Level level = control_level(points, triangles, report, dropped_triangles);
   if (level.start.empty()) return {};
-  for (uint32_t i = 0; i < levels; ++i) level = subdivide(level);
+  for (uint32_t i = 0; i < levels; ++i) {
+    if (check_cancelled) check_cancelled();
+    level = subdivide(level);
+  }
   Mesh mesh;
   mesh.normals = limit_normals(level);
   const std::vector<DVec3> limit = smooth(level, limit_weight, kLimitBoundaryWeight);
@@ -318,7 +323,7 @@ Mesh subdivide_loop(std::span<const Vec3> points, std::span<const Triangle> tria
   for (size_t h = 0; h < level.start.size(); h += 3)
     mesh.triangles.emplace_back(level.start[h], level.start[h + 1], level.start[h + 2]);
   const bool flat_spots = std::find(mesh.normals.begin(), mesh.normals.end(), Vec3(0.0f)) != mesh.normals.end();
-  if (flat_spots) drop_bad_triangles(mesh, report);
+  if (flat_spots) drop_bad_triangles(mesh, report); // mends the normals
   return mesh;
 }
 

@@ -19,10 +19,13 @@ inline constexpr uint64_t kMaxSubdividedTriangles = uint64_t{1} << 26;
 /// Where more than two triangles meet at an edge, or several fans at a point, or neighbours disagree in orientation,
 /// the surface is cut there as if it had a boundary (reported); no triangle is lost.
 /// @param points control points; @param triangles indices into them
-/// Throws Error(kLimitExceeded), before allocating, if the result would exceed kMaxSubdividedTriangles.
+/// @param dropped_triangles the number of dropped ones is added to it; may be null
+/// Throws Error(kLimitExceeded), before allocating, if the result would exceed kMaxSubdividedTriangles, and whatever
+/// check_cancelled throws.
 /// Source: Charles Loop, Smooth Subdivision Surfaces Based on Triangles, 1987; weights as in Physically Based
 /// Rendering, 3rd edition, 2016, section 3.8.
 Mesh subdivide_loop(std::span<const Vec3> points, std::span<const Triangle> triangles, uint32_t levels,
-                    const ReportFn& report);
+                    const ReportFn& report, uint64_t* dropped_triangles = nullptr,
+                    const CheckCancelledFn& check_cancelled = {});
 
 } // namespace packtrace

@@ -1,8 +1,12 @@
 #include "pbrt_import/shapes/curve.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -127,6 +131,104 @@ TEST(Curve, RibbonTurnsWithItsNormals) {
   EXPECT_GT(glm::dot(mesh.normals.back(), Vec3(1, 0, 0)), 0.999f);
 }
 
+/// Edges by position that belong to one triangle only.
+size_t boundary_edge_count(const Mesh& mesh) {
+  using Place = std::array<float, 3>;
+  std::map<std::pair<Place, Place>, int> edges;
+  const auto place = [&](uint32_t v) {
+    const Vec3 p = mesh.positions[v];
+    return Place{p.x, p.y, p.z};
+  };
+  for (const Triangle& t : mesh.triangles)
+    for (int k = 0; k < 3; ++k) ++edges[std::minmax(place(t[k]), place(t[(k + 1) % 3]))];
+  return static_cast<size_t>(std::count_if(edges.begin(), edges.end(), [](const auto& e) { return e.second == 1; }));
+}
+
+TEST(Curve, TubesHaveNoCapsAndNoOtherHoles) {
+  const std::vector<Vec3> wave{{0, 0, 0}, {1, 2, 0}, {2, -2, 1}, {3, 0, 0}, {4, 2, -1}, {5, -2, 0}, {6, 0, 0}};
+  for (const CurveBasis basis : {CurveBasis::kBezier, CurveBasis::kBspline})
+    for (const uint32_t degree : {2u, 3u})
+      for (const CurveType type : {CurveType::kFlat, CurveType::kCylinder, CurveType::kRibbon})
+        for (const float width1 : {0.3f, 0.1f}) {
+          CurveParameters curve = curve_through(wave, 0.3f);
+          curve.basis = basis;
+          curve.degree = degree;
+          curve.type = type;
+          curve.width1 = width1;
+          const std::vector<Vec3> normals((basis == CurveBasis::kBezier ? 6 / degree : 7 - degree) + 1, Vec3(0, 0, 1));
+          if (type == CurveType::kRibbon) curve.normals = normals;
+          const Mesh mesh = tessellate_curve(curve);
+          ASSERT_FALSE(mesh.triangles.empty());
+          EXPECT_TRUE(type == CurveType::kRibbon || boundary_edge_count(mesh) == 16u) << degree;
+          for (const Vec3& n : mesh.normals) ASSERT_NEAR(glm::length(n), 1.0f, 1e-5f);
+          EXPECT_EQ(mesh.uvs.front().x, 0.0f);
+          EXPECT_EQ(mesh.uvs.back().x, 1.0f);
+          // Widths are linear in u.
+          const size_t row = type == CurveType::kRibbon ? 2 : 9;
+          for (size_t i = 0; i < mesh.positions.size(); i += row) {
+            const Vec3 opposite = mesh.positions[i + row / 2];
+            EXPECT_NEAR(glm::distance(mesh.positions[i], opposite), glm::mix(0.3f, width1, mesh.uvs[i].x), 1e-5f);
+          }
+        }
+}
+
+TEST(Curve, SplinesGoThroughTheirKnotPoints) {
+  const std::vector<Vec3> p{{0, 0, 0}, {1, 2, 0}, {2, -2, 1}, {3, 0, 0}, {4, 2, -1}};
+  for (const uint32_t degree : {2u, 3u}) {
+    CurveParameters curve = curve_through(p, 0.1f);
+    curve.basis = CurveBasis::kBspline;
+    curve.degree = degree;
+    const size_t segments = p.size() - degree;
+    const Mesh mesh = tessellate_curve(curve);
+    for (size_t s = 0; s <= segments; ++s) {
+      // The uniform basis functions at a knot: 1/2 1/2, or 1/6 2/3 1/6.
+      const Vec3 knot = degree == 2 ? (p[s] + p[s + 1]) / 2.0f : (p[s] + 4.0f * p[s + 1] + p[s + 2]) / 6.0f;
+      const float u = static_cast<float>(s) / static_cast<float>(segments);
+      size_t found = 0;
+      for (size_t i = 0; i < mesh.positions.size(); ++i)
+        if (mesh.uvs[i].x == u) {
+          EXPECT_NEAR(glm::distance(mesh.positions[i], knot), 0.05f, 1e-6f);
+          ++found;
+        }
+      EXPECT_EQ(found, 9u) << s;
+    }
+  }
+}
+
+TEST(Curve, CornersKeepTheFullWidthOnBothSides) {
+  const std::vector<Vec3> points{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}, {3, 1, 0}, {3, 2, 0}, {3, 3, 0}};
+  const Mesh mesh = tessellate_curve(curve_through(points, 1.0f));
+  EXPECT_EQ(boundary_edge_count(mesh), 16u);
+  for (const Vec3& p : mesh.positions) {
+    const bool first = p.y <= 0.5f && p.x <= 3.0f && std::abs(std::hypot(p.y, p.z) - 0.5f) < 1e-6f;
+    const bool second = p.x >= 2.5f && p.y >= 0.0f && std::abs(std::hypot(p.x - 3, p.z) - 0.5f) < 1e-6f;
+    EXPECT_TRUE(first || second) << p.x << " " << p.y << " " << p.z;
+  }
+}
+
+TEST(Curve, BendsTighterThanTheWidthAreStillRound) {
+  const std::vector<Vec3> hairpin{{0, 0, 0}, {0, 0, 10}, {1e-3f, 0, 10}, {1e-3f, 0, 0}};
+  for (const float width : {2.0f, 0.5f}) {
+    const Bounds box = bounds_of(tessellate_curve(curve_through(hairpin, width)).positions);
+    EXPECT_LE(box.hi.z, 7.5 + width / 2 + 1e-5);
+    EXPECT_GE(box.hi.z, 7.5 + width / 2 * 0.949 * 0.924 - width / 20) << "cos 18.4 degrees, cos(pi / 8)";
+  }
+}
+
+TEST(Curve, ThinCurvesAreNotFollowedFinerThanFloatsAre) {
+  for (const float width : {1e-3f, 1e-5f, 1e-6f, 1e-12f})
+    EXPECT_LT(tessellate_curve(curve_through(kBent, width)).positions.size(), 9u * 7001u) << width;
+  EXPECT_GT(tessellate_curve(curve_through(kBent, 1e-5f)).positions.size(), 9u * 1000u);
+  std::vector<Vec3> long_curve;
+  for (int i = 0; i < 3001; ++i) long_curve.emplace_back(i % 7, i % 5, i % 3);
+  try {
+    (void)tessellate_curve(curve_through(long_curve, 1e-12f));
+    ADD_FAILURE() << "accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::kLimitExceeded);
+  }
+}
+
 TEST(Curve, CoincidentControlPointsAreHarmless) {
   for (const std::vector<Vec3>& points : {std::vector<Vec3>{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {1, 1, 1}},
                                           {{0, 0, 0}, {0, 0, 0}, {1, 1, 1}, {1, 1, 1}},
@@ -148,6 +250,8 @@ TEST(Curve, WhatCannotBeDrawnIsAnError) {
   std::vector<Vec3> bad = kStraight;
   bad[2].y = std::numeric_limits<float>::infinity();
   EXPECT_THROW(tessellate_curve(curve_through(bad)), Error);
+  const std::vector<Vec3> huge{{0, 0, 0}, {3.4e38f, 0, 0}, {3.4e38f, 0, 0}, {3.4e38f, 3.4e38f, 0}};
+  EXPECT_THROW(tessellate_curve(curve_through(huge, 1e38f)), Error) << "overflows";
   CurveParameters curve = curve_through(kStraight);
   curve.degree = 4;
   EXPECT_THROW(tessellate_curve(curve), Error);

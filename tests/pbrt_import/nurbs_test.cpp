@@ -1,8 +1,13 @@
 #include "pbrt_import/shapes/nurbs.h"
 
+#include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -33,24 +38,59 @@ Patch bilinear(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
   return patch;
 }
 
-/// The unit sphere: a half circle (v, from the south pole) swept along a full one (u), both rational quadratics.
-Patch sphere() {
-  const auto h = static_cast<float>(std::sqrt(0.5));
-  const glm::vec3 circle[] = {{1, 0, 1},   {1, 1, h},  {0, 1, 1},  {-1, 1, h}, {-1, 0, 1},
-                              {-1, -1, h}, {0, -1, 1}, {1, -1, h}, {1, 0, 1}};           // x, y, w
-  const glm::vec3 profile[] = {{0, -1, 1}, {1, -1, h}, {1, 0, 1}, {1, 1, h}, {0, 1, 1}}; // r, z, w
+/// A full circle as nine points of a rational quadratic: x, y, w.
+const auto kHalf = static_cast<float>(std::sqrt(0.5));
+const std::vector<glm::vec3> kCircle{{1, 0, 1},       {1, 1, kHalf}, {0, 1, 1},      {-1, 1, kHalf}, {-1, 0, 1},
+                                     {-1, -1, kHalf}, {0, -1, 1},    {1, -1, kHalf}, {1, 0, 1}};
+const std::vector<float> kCircleKnots{0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4};
+
+/// A profile (r, z, w), rational quadratic along v, turned around the z axis along u.
+Patch turned(const std::vector<glm::vec3>& profile, const std::vector<float>& knots) {
   Patch patch;
   patch.parameters.nu = 9;
-  patch.parameters.nv = 5;
+  patch.parameters.nv = static_cast<uint32_t>(profile.size());
   patch.parameters.u_order = patch.parameters.v_order = 3;
-  patch.u_knots = {0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4};
-  patch.v_knots = {0, 0, 0, 1, 1, 2, 2, 2};
+  patch.u_knots = kCircleKnots;
+  patch.v_knots = knots;
   for (const glm::vec3& p : profile)
-    for (const glm::vec3& c : circle) {
+    for (const glm::vec3& c : kCircle) {
       const float w = p.z * c.z;
       patch.points.emplace_back(p.x * c.x * w, p.x * c.y * w, p.y * w, w);
     }
   return patch;
+}
+
+/// The unit sphere: a half circle from the south pole.
+Patch sphere() {
+  return turned({{0, -1, 1}, {1, -1, kHalf}, {1, 0, 1}, {1, 1, kHalf}, {0, 1, 1}}, {0, 0, 0, 1, 1, 2, 2, 2});
+}
+
+/// Radii 2 and 0.5.
+Patch torus() {
+  std::vector<glm::vec3> profile;
+  for (const glm::vec3& c : kCircle) profile.emplace_back(2 + 0.5f * c.x, 0.5f * c.y, c.z);
+  return turned(profile, kCircleKnots);
+}
+
+/// One rational arc of degree 2 in the xy plane, (wx, wy, w), raised from z = 0 to 1.
+Patch wall(const std::vector<glm::vec3>& arc) {
+  Patch patch;
+  patch.parameters.nu = patch.parameters.u_order = 3;
+  patch.parameters.nv = patch.parameters.v_order = 2;
+  patch.u_knots = {0, 0, 0, 1, 1, 1};
+  patch.v_knots = {0, 0, 1, 1};
+  for (const float z : {0.0f, 1.0f})
+    for (const glm::vec3& p : arc) patch.points.emplace_back(p.x, p.y, z * p.z, p.z);
+  return patch;
+}
+
+double area_of(const Mesh& mesh) {
+  double area = 0.0;
+  for (const Triangle& t : mesh.triangles) {
+    const DVec3 a(mesh.positions[t.x]), b(mesh.positions[t.y]), c(mesh.positions[t.z]);
+    area += glm::length(glm::cross(b - a, c - a)) / 2;
+  }
+  return area;
 }
 
 TEST(Nurbs, FlatPatchIsTwoTriangles) {
@@ -90,6 +130,105 @@ TEST(Nurbs, RationalSphereIsRoundWithinTheTolerance) {
   }
 }
 
+TEST(Nurbs, RationalTorusHasItsAreaAndVolumeAndCloses) {
+  for (const double tolerance : {0.05, 1e-3}) {
+    const Mesh mesh = tessellate_nurbs(torus().view(), tolerance);
+    double volume = 0.0;
+    std::map<std::array<float, 3>, uint32_t> places;
+    std::map<std::pair<uint32_t, uint32_t>, int> edges;
+    const auto place = [&](uint32_t v) {
+      const Vec3 p = mesh.positions[v] + Vec3(0.0f);
+      return places.try_emplace({p.x, p.y, p.z}, static_cast<uint32_t>(places.size())).first->second;
+    };
+    for (const Triangle& t : mesh.triangles) {
+      const DVec3 a(mesh.positions[t.x]), b(mesh.positions[t.y]), c(mesh.positions[t.z]);
+      volume += glm::dot(a, glm::cross(b, c)) / 6.0;
+      for (int k = 0; k < 3; ++k) ++edges[{place(t[k]), place(t[(k + 1) % 3])}];
+    }
+    for (const auto& [edge, count] : edges)
+      EXPECT_EQ(edges.count({edge.second, edge.first}), 1u) << "the seams' positions are the same floats";
+    constexpr double kPi = std::numbers::pi;
+    // Half the diagonal of its box, 5 x 5 x 1, over the smaller radius: relative to that one, errors are so much
+    // larger.
+    const double worst = 2 * tolerance * std::sqrt(51.0) / 2 / 0.5;
+    EXPECT_NEAR(area_of(mesh) / (4 * kPi * kPi * 2 * 0.5), 1.0, worst);
+    EXPECT_NEAR(volume / (2 * kPi * kPi * 2 * 0.25), 1.0, worst);
+    for (size_t i = 0; i < mesh.positions.size(); ++i) {
+      const Vec3 p = mesh.positions[i], ring = 2.0f * glm::normalize(Vec3(p.x, p.y, 0));
+      EXPECT_NEAR(glm::distance(p, ring), 0.5f, 1e-6f);
+      EXPECT_GT(glm::dot(glm::normalize(p - ring), mesh.normals[i]), 0.99999f);
+    }
+  }
+}
+
+TEST(Nurbs, WeightsMayBeZeroOrNegative) {
+  const struct {
+    std::vector<glm::vec3> arc;
+    double angle; ///< of the unit circle
+  } cases[] = {{{{1, 0, 1}, {kHalf, kHalf, kHalf}, {0, 1, 1}}, 90},
+               {{{1, 0, 1}, {0, 1, 0}, {-1, 0, 1}}, 180},
+               {{{1, 0, 1}, {-kHalf, -kHalf, -kHalf}, {0, 1, 1}}, 270},
+               {{{-1, 0, -1}, {-kHalf, -kHalf, -kHalf}, {0, -1, -1}}, 90}};
+  for (const auto& c : cases) {
+    Patch patch = wall(c.arc);
+    const Mesh mesh = tessellate_nurbs(patch.view(), 1e-4);
+    for (const Vec3& p : mesh.positions) EXPECT_NEAR(std::hypot(p.x, p.y), 1.0f, 1e-6f);
+    EXPECT_NEAR(area_of(mesh), c.angle * std::numbers::pi / 180, 1e-3);
+  }
+}
+
+TEST(Nurbs, SurfacesThroughInfinityAreErrors) {
+  for (const float w : {-1.0f, -4.0f, 0.0f}) {
+    Patch patch = bilinear({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0});
+    patch.points[3].w = w;
+    EXPECT_THROW(tessellate_nurbs(patch.view(), 0.01), Error) << w;
+  }
+  Patch nowhere = wall({{1, 0, 0}, {0, 1, 0}, {1, 1, 0}});
+  EXPECT_THROW(tessellate_nurbs(nowhere.view(), 0.01), Error);
+}
+
+std::vector<std::string> g_reports;
+void keep_report(Severity severity, uint32_t, std::string message) {
+  EXPECT_EQ(severity, Severity::kWarning);
+  g_reports.push_back(std::move(message));
+}
+
+TEST(Nurbs, ToleranceThatIsNotReachedIsReported) {
+  Patch torn; // a knot as often as the order: two sheets that are joined by a step
+  torn.parameters.nu = 4;
+  torn.parameters.nv = torn.parameters.u_order = torn.parameters.v_order = 2;
+  torn.u_knots = {0, 0, 1, 1, 2, 2};
+  torn.v_knots = {0, 0, 1, 1};
+  for (const float y : {0.0f, 1.0f})
+    for (const float x : {0.0f, 1.0f, 5.0f, 6.0f}) torn.points.emplace_back(x, y, 0, 1);
+  g_reports.clear();
+  const Mesh mesh = tessellate_nurbs(torn.view(), 1e-3, keep_report);
+  EXPECT_EQ(mesh.triangles.size(), 2u * 2u * 128u);
+  EXPECT_NEAR(area_of(mesh), 6.0, 1e-4);
+  ASSERT_EQ(g_reports.size(), 1u);
+  // The middle of the step's cell is 2 away from the chord; twice that over half of the box's diagonal.
+  EXPECT_EQ(g_reports[0], "the surface is followed to within 1.3 of its size only, not the tolerance of 0.001");
+  g_reports.clear();
+  (void)tessellate_nurbs(sphere().view(), 1e-3, keep_report);
+  EXPECT_TRUE(g_reports.empty());
+}
+
+TEST(Nurbs, LongWorkCanBeCancelled) {
+  for (const int calls : {0, 5, 40}) {
+    int left = calls;
+    const CheckCancelledFn check = [&] {
+      if (left-- == 0) throw Error(ErrorKind::kCancelled, "stop");
+    };
+    try {
+      (void)tessellate_nurbs(torus().view(), 1e-3, {}, check);
+      ADD_FAILURE() << "not stopped";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::kCancelled);
+    }
+    EXPECT_EQ(left, -1);
+  }
+}
+
 TEST(Nurbs, RangesCutThePatch) {
   Patch patch = bilinear({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0});
   patch.parameters.u0 = 0.25f;
@@ -126,7 +265,7 @@ TEST(Nurbs, WhatDoesNotFitTogetherIsAnError) {
   expect_error([](Patch& p) { p.u_knots = {0, 1, 1, 1}; });
   expect_error([](Patch& p) { p.u_knots[3] = std::numeric_limits<float>::quiet_NaN(); });
   expect_error([](Patch& p) { p.points.pop_back(); });
-  expect_error([](Patch& p) { p.points[0].w = 0.0f; });
+  expect_error([](Patch& p) { p.points[0].w = std::numeric_limits<float>::quiet_NaN(); });
   expect_error([](Patch& p) { p.points[1].y = std::numeric_limits<float>::infinity(); });
   expect_error([](Patch& p) { p.parameters.v1 = 2.0f; });
   expect_error([](Patch& p) { p.parameters.v0 = 1.0f; });

@@ -338,11 +338,39 @@ TEST(Subdivision, HostileTopologyLosesNoTriangle) {
   }
 }
 
+TEST(Subdivision, LimitsAreTheMasksOfTheirValence) {
+  // A pyramid's apex over a ring at 0 ends up at 1 - n gamma of its height, gamma = 1 / (n + 3 / (8 beta)).
+  for (const uint32_t n : {3u, 4u, 5u, 6u, 7u, 20u, 64u, 1000u}) {
+    Control control = double_pyramid(n);
+    control.points[0] = {0, 0, 1};
+    for (size_t i = 2; i < control.points.size(); ++i) control.points[i].z = 0.0f;
+    const float expected = n == 3 ? 0.4f : 0.5f; // beta is 3 / 16 for 3, else 3 / (8 n)
+    for (uint32_t levels = 0; levels <= 3; ++levels) {
+      const Mesh mesh = subdivide(control, levels);
+      EXPECT_NEAR(mesh.positions[0].z, expected, 1e-6f) << n;
+      EXPECT_GT(mesh.normals[0].z, 0.99f) << n;
+    }
+  }
+}
+
+TEST(Subdivision, WorkCanBeCancelledBetweenLevels) {
+  uint32_t calls = 0;
+  const CheckCancelledFn check = [&] {
+    if (++calls == 3) throw Error(ErrorKind::kCancelled, "stop");
+  };
+  const Control control = octahedron();
+  EXPECT_THROW(subdivide_loop(control.points, control.triangles, 5, {}, nullptr, check), Error);
+  EXPECT_EQ(calls, 3u);
+}
+
 TEST(Subdivision, BadTrianglesAreDroppedAndReported) {
   Control control = octahedron();
   control.points.push_back({std::numeric_limits<float>::quiet_NaN(), 0, 0});
   control.triangles.insert(control.triangles.end(), {{0, 1, 99}, {0, 0, 1}, {0, 1, 6}});
-  const Mesh mesh = subdivide(control, 1);
+  g_messages.clear();
+  uint64_t dropped = 10;
+  const Mesh mesh = subdivide_loop(control.points, control.triangles, 1, keep_message, &dropped);
+  EXPECT_EQ(dropped, 13u);
   EXPECT_EQ(mesh.triangles.size(), 32u);
   EXPECT_EQ(boundary_edge_count(mesh), 0u);
   EXPECT_EQ(g_messages.size(), 3u);
