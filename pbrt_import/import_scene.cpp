@@ -50,7 +50,7 @@ ImportResult import_scene(const std::filesystem::path& main_file, const ImportOp
   progress.begin("reading scene", error ? 0 : main_bytes);
   const FileNames file_names(main_file.parent_path(), options.allow_files_outside_scene_folder);
   Parser parser(source, file_names, reporter);
-  SceneBuilder builder(options, file_names, reporter);
+  SceneBuilder builder(options, file_names, reporter, progress);
   Directive directive;
   constexpr uint64_t kProgressStep = 1024; // directives
   uint64_t reported_bytes = 0;

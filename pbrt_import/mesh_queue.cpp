@@ -9,17 +9,18 @@
 
 namespace packtrace {
 
-MadeMesh run_job(const MeshJob& job, double tessellation_tolerance) {
+MadeMesh run_job(const MeshJob& job, double tessellation_tolerance, const CheckCancelledFn& check_cancelled) {
   MadeMesh made;
   const ReportFn report = [&](Severity severity, uint32_t, std::string message) {
     made.reports.emplace_back(severity, std::move(message));
   };
   try {
-    ShapeContext context{tessellation_tolerance, report, 0};
+    ShapeContext context{tessellation_tolerance, report, check_cancelled, 0};
     made.mesh = job.make(context);
     made.dropped_triangles = context.dropped_triangles;
     if (made.mesh.triangles.empty()) made.problem = "no triangle is left";
   } catch (const Error& error) {
+    if (error.kind() == ErrorKind::kCancelled) throw;
     made.problem = error.what();
   } catch (const std::bad_alloc&) {
     made.problem = "not enough memory";
@@ -29,13 +30,22 @@ MadeMesh run_job(const MeshJob& job, double tessellation_tolerance) {
   return made;
 }
 
+MeshQueue::~MeshQueue() {
+  try {
+    tasks_.cancel();
+    tasks_.wait();
+  } catch (const Error&) {
+    // Whoever asked for the end knows already.
+  }
+}
+
 void MeshQueue::add(Entry entry) {
   constexpr uint64_t kMaxPendingBytes = 64u << 20; // then this thread works, too
   entries_.push_back(std::move(entry));
   Entry& queued = entries_.back();
   pending_bytes_ += queued.job.bytes_at_most;
   const auto work = [this, &queued] {
-    queued.made = run_job(queued.job, tolerance_);
+    queued.made = run_job(queued.job, tolerance_, check_cancelled_);
     queued.job.make = nullptr;
   };
   if (tbb::this_task_arena::max_concurrency() == 1) return work();

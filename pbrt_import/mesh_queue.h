@@ -23,7 +23,8 @@ struct MadeMesh {
   uint64_t dropped_triangles = 0;
 };
 
-MadeMesh run_job(const MeshJob& job, double tessellation_tolerance);
+/// Throws what check_cancelled throws.
+MadeMesh run_job(const MeshJob& job, double tessellation_tolerance, const CheckCancelledFn& check_cancelled);
 
 /// Makes meshes on all threads while the scene's text is still being read.
 class MeshQueue {
@@ -38,8 +39,9 @@ public:
     MadeMesh made;
   };
 
-  explicit MeshQueue(double tessellation_tolerance) : tolerance_(tessellation_tolerance) {}
-  ~MeshQueue() { tasks_.wait(); }
+  MeshQueue(double tessellation_tolerance, const CheckCancelledFn& check_cancelled)
+      : tolerance_(tessellation_tolerance), check_cancelled_(check_cancelled) {}
+  ~MeshQueue();
   MeshQueue(const MeshQueue&) = delete;
   MeshQueue& operator=(const MeshQueue&) = delete;
 
@@ -49,6 +51,7 @@ public:
 
 private:
   double tolerance_;
+  const CheckCancelledFn& check_cancelled_;
   std::deque<Entry> entries_; ///< stay where they are
   uint64_t pending_bytes_ = 0;
   tbb::task_group tasks_;

@@ -43,9 +43,11 @@ bool is_world_only(K kind) {
 
 } // namespace
 
-SceneBuilder::SceneBuilder(const ImportOptions& options, const FileNames& file_names, Reporter& reporter)
+SceneBuilder::SceneBuilder(const ImportOptions& options, const FileNames& file_names, Reporter& reporter,
+                           Progress& progress)
     : options_(options), file_names_(file_names), reporter_(reporter), loader_(options, reporter),
-      mesh_queue_(options.tessellation_tolerance) {}
+      check_cancelled_([&progress] { progress.check_cancelled(); }),
+      mesh_queue_(options.tessellation_tolerance, check_cancelled_) {}
 
 bool SceneBuilder::allowed_here(const Directive& directive) {
   if (phase_ == Phase::kSecondWorld) return false;

@@ -21,7 +21,7 @@ namespace packtrace {
 /// Carries out directives: keeps the graphics state and collects shapes, objects, instances and cameras.
 class SceneBuilder {
 public:
-  SceneBuilder(const ImportOptions& options, const FileNames& file_names, Reporter& reporter);
+  SceneBuilder(const ImportOptions& options, const FileNames& file_names, Reporter& reporter, Progress& progress);
 
   /// May take large arrays out of the directive's parameters.
   void handle(Directive& directive);
@@ -80,6 +80,7 @@ private:
   uint32_t nested_objects_ = 0;  ///< ObjectBegins that were refused but will have their ObjectEnd
   uint64_t ignored_blocks_ = 0;  ///< open ones beyond the nesting limit
   uint32_t open_blocks_[3] = {}; ///< by kind
+  const CheckCancelledFn check_cancelled_;
   NameTable same_meshes_;                 ///< MeshJob::same_as
   std::vector<uint32_t> same_mesh_slots_; ///< in Scene::meshes, by number in same_meshes_
   uint64_t mesh_bytes_ = 0; ///< of all meshes made from text, queued ones at most

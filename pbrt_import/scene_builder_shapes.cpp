@@ -177,8 +177,10 @@ bool SceneBuilder::make_or_queue(MeshQueue::Entry entry) {
     mesh_queue_.add(std::move(entry));
     return true;
   }
-  entry.made = run_job(entry.job, options_.tessellation_tolerance);
-  if (entry.made.problem.empty() && bytes_of(entry.made.mesh) > bytes_left)
+  if (entry.job.bytes_at_least <= bytes_left)
+    entry.made = run_job(entry.job, options_.tessellation_tolerance, check_cancelled_);
+  const uint64_t bytes = std::max(bytes_of(entry.made.mesh), entry.job.bytes_at_least);
+  if (entry.made.problem.empty() && bytes > bytes_left)
     entry.made.problem =
         "all meshes together exceed the memory budget of " + std::to_string(options_.memory_budget_bytes) + " bytes";
   if (!report_mesh(entry)) return false;

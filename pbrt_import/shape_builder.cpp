@@ -29,11 +29,23 @@ std::vector<Vector> grouped(std::span<const float> components) {
   return vectors;
 }
 
-std::vector<Vec2> read_uvs(const ParameterList& parameters) {
+/// Like grouped, of a parameter whose type does not say how its values are grouped.
+template <class Vector>
+std::vector<Vector> read_groups(const ParameterList& parameters, std::string_view name, ParameterType type,
+                                const ReportFn& report) {
+  const std::span<const float> values = parameters.floats(name, type);
+  constexpr size_t kGroup = sizeof(Vector) / sizeof(float);
+  if (const size_t excess = values.size() % kGroup)
+    report(Severity::kWarning, 0,
+           "parameter " + in_quotes(name) + " takes values in groups of " + std::to_string(kGroup) + ", found " +
+               std::to_string(values.size()) + "; the last " + std::to_string(excess) + " are ignored");
+  return grouped<Vector>(values);
+}
+
+std::vector<Vec2> read_uvs(const ParameterList& parameters, const ReportFn& report) {
   for (const ParameterType type : {ParameterType::kPoint2, ParameterType::kFloat})
     for (const std::string_view name : {"uv", "st"})
-      if (const std::span<const float> values = parameters.floats(name, type); !values.empty())
-        return grouped<Vec2>(values);
+      if (std::vector<Vec2> uvs = read_groups<Vec2>(parameters, name, type, report); !uvs.empty()) return uvs;
   return {};
 }
 
@@ -68,13 +80,14 @@ MeshJob read_triangle_mesh(ParameterList& parameters, const ReportFn& report) {
   if (mesh.positions.size() >= std::numeric_limits<uint32_t>::max())
     throw Error(ErrorKind::kLimitExceeded, "more than 2^32 - 2 vertices");
   mesh.normals = parameters.take_vectors("N", ParameterType::kNormal);
-  mesh.uvs = read_uvs(parameters);
-  const uint64_t bytes = bytes_of(mesh);
-  return {.make = [mesh = std::move(mesh)](ShapeContext& context) mutable {
-            context.dropped_triangles += drop_bad_triangles(mesh, context.report);
-            return std::move(mesh);
-          },
-          .bytes_at_most = bytes};
+  mesh.uvs = read_uvs(parameters, report);
+  MeshJob job;
+  job.bytes_at_most = bytes_of(mesh);
+  job.make = [mesh = std::move(mesh)](ShapeContext& context) mutable {
+    context.dropped_triangles += drop_bad_triangles(mesh, context.report);
+    return std::move(mesh);
+  };
+  return job;
 }
 
 /// A job for a quadric, which is small enough a description to find equal ones by.
@@ -147,14 +160,6 @@ MeshJob read_hyperboloid(ParameterList& parameters, const ReportFn&) {
   return quadric_job("hyperboloid", hyperboloid, tessellate_hyperboloid);
 }
 
-/// Each level makes four triangles of one and at most a vertex for each of them.
-uint64_t subdivided_bytes(size_t points, size_t triangles, uint32_t levels) {
-  constexpr uint32_t kFewLevels = 12; // more: not worth a guess
-  if (levels > kFewLevels) return 0;
-  const uint64_t made = static_cast<uint64_t>(triangles) << (2 * levels);
-  return (points + made) * 2 * sizeof(Vec3) + made * sizeof(Triangle);
-}
-
 MeshJob read_loop_subdivision(ParameterList& parameters, const ReportFn& report) {
   constexpr std::string_view kUnneeded[] = {"scheme"};
   parameters.mark_used(kUnneeded);
@@ -162,20 +167,27 @@ MeshJob read_loop_subdivision(ParameterList& parameters, const ReportFn& report)
   const uint32_t levels = count_of(parameters, "levels", default_levels);
   std::vector<Triangle> triangles = take_triangles(parameters, report);
   std::vector<Vec3> points = take_points(parameters);
-  const uint64_t bytes = subdivided_bytes(points.size(), triangles.size(), levels);
-  return {.make = [levels, triangles = std::move(triangles), points = std::move(points)](ShapeContext& context) {
-            return subdivide_loop(points, triangles, levels, context.report);
-          },
-          .bytes_at_most = bytes};
+  MeshJob job;
+  // Each level makes four triangles of one and at most a vertex for each of them.
+  if (constexpr uint32_t kFewLevels = 12; levels <= kFewLevels) { // more: refused for the number of triangles
+    const uint64_t made = static_cast<uint64_t>(triangles.size()) << (2 * levels);
+    job.bytes_at_least = made * sizeof(Triangle);
+    job.bytes_at_most = job.bytes_at_least + (points.size() + made) * 2 * sizeof(Vec3);
+  }
+  job.make = [levels, triangles = std::move(triangles), points = std::move(points)](ShapeContext& context) {
+    return subdivide_loop(points, triangles, levels, context.report, &context.dropped_triangles,
+                          context.check_cancelled);
+  };
+  return job;
 }
 
-MeshJob read_curve(ParameterList& parameters, const ReportFn&) {
+MeshJob read_curve(ParameterList& parameters, const ReportFn& report) {
   constexpr std::string_view kUnneeded[] = {"splitdepth"};
   parameters.mark_used(kUnneeded);
   CurveParameters curve;
   const std::string type = parameters.get_string("type", "flat"), basis = parameters.get_string("basis", "bezier");
   if (type != "flat" && type != "ribbon" && type != "cylinder")
-    throw Error(ErrorKind::kInput, "type " + in_quotes(type) + " is neither flat, ribbon nor cylinder");
+    report(Severity::kError, 0, "type " + in_quotes(type) + " is neither flat, ribbon nor cylinder; it is drawn round");
   if (basis != "bezier" && basis != "bspline")
     throw Error(ErrorKind::kInput, "basis " + in_quotes(basis) + " is neither bezier nor bspline");
   curve.type = type == "ribbon" ? CurveType::kRibbon : type == "cylinder" ? CurveType::kCylinder : CurveType::kFlat;
@@ -184,55 +196,62 @@ MeshJob read_curve(ParameterList& parameters, const ReportFn&) {
   const float width = parameters.get_float("width", 1.0f);
   curve.width0 = parameters.get_float("width0", width);
   curve.width1 = parameters.get_float("width1", width);
-  return {.make = [curve, points = parameters.take_vectors("P", ParameterType::kPoint3),
-           normals = parameters.take_vectors("N", ParameterType::kNormal)](ShapeContext&) mutable {
+  std::vector<Vec3> normals = parameters.take_vectors("N", ParameterType::kNormal);
+  if (!normals.empty() && curve.type != CurveType::kRibbon)
+    report(Severity::kWarning, 0, "normals are for ribbons only; they are ignored");
+  MeshJob job;
+  job.make = [curve, points = parameters.take_vectors("P", ParameterType::kPoint3),
+              normals = std::move(normals)](ShapeContext&) mutable {
     curve.points = points;
     curve.normals = normals;
     return tessellate_curve(curve);
-  }};
+  };
+  return job;
 }
 
-std::vector<glm::vec4> take_control_points(ParameterList& parameters) {
+std::vector<glm::vec4> take_control_points(ParameterList& parameters, const ReportFn& report) {
   std::vector<glm::vec4> points;
   for (const Vec3 p : parameters.take_vectors("P", ParameterType::kPoint3)) points.emplace_back(p, 1.0f);
-  if (points.empty()) points = grouped<glm::vec4>(parameters.floats("Pw", ParameterType::kFloat));
+  if (points.empty()) points = read_groups<glm::vec4>(parameters, "Pw", ParameterType::kFloat, report);
   if (points.empty()) throw Error(ErrorKind::kInput, "no control points, neither \"point P\" nor \"float Pw\"");
   return points;
 }
 
-MeshJob read_nurbs(ParameterList& parameters, const ReportFn&) {
+MeshJob read_nurbs(ParameterList& parameters, const ReportFn& report) {
   NurbsParameters nurbs;
   nurbs.nu = count_of(parameters, "nu", 0);
   nurbs.nv = count_of(parameters, "nv", 0);
   nurbs.u_order = count_of(parameters, "uorder", 0);
   nurbs.v_order = count_of(parameters, "vorder", 0);
   const auto limit = [&](std::string_view name) {
-    constexpr float kAbsent = std::numeric_limits<float>::quiet_NaN();
-    const float value = parameters.get_float(name, kAbsent);
-    return std::isnan(value) ? std::nullopt : std::optional<float>(value);
+    const float value = parameters.get_float(name, 0.0f), other_default = parameters.get_float(name, 1.0f);
+    const bool absent = value == 0.0f && other_default == 1.0f;
+    return absent ? std::nullopt : std::optional<float>(value);
   };
   nurbs.u0 = limit("u0"), nurbs.u1 = limit("u1"), nurbs.v0 = limit("v0"), nurbs.v1 = limit("v1");
-  return {.make = [nurbs, u_knots = grouped<float>(parameters.floats("uknots", ParameterType::kFloat)),
-           v_knots = grouped<float>(parameters.floats("vknots", ParameterType::kFloat)),
-           points = take_control_points(parameters)](ShapeContext& context) mutable {
+  MeshJob job;
+  job.make = [nurbs, u_knots = grouped<float>(parameters.floats("uknots", ParameterType::kFloat)),
+              v_knots = grouped<float>(parameters.floats("vknots", ParameterType::kFloat)),
+              points = take_control_points(parameters, report)](ShapeContext& context) mutable {
     nurbs.u_knots = u_knots;
     nurbs.v_knots = v_knots;
     nurbs.control_points = points;
-    return tessellate_nurbs(nurbs, context.tessellation_tolerance);
-  }};
+    return tessellate_nurbs(nurbs, context.tessellation_tolerance, context.report, context.check_cancelled);
+  };
+  return job;
 }
 
 MeshJob read_height_field(ParameterList& parameters, const ReportFn&) {
   const uint32_t nu = count_of(parameters, "nu", 0), nv = count_of(parameters, "nv", 0);
   std::vector<float> heights = grouped<float>(parameters.floats("Pz", ParameterType::kFloat));
-  // One vertex and two triangles a sample.
-  const uint64_t bytes = heights.size() * (sizeof(Vec3) + sizeof(Vec2) + 2 * sizeof(Triangle));
-  return {.make = [nu, nv, heights = std::move(heights)](ShapeContext& context) {
-            Mesh mesh = make_heightfield(nu, nv, heights);
-            context.dropped_triangles += drop_bad_triangles(mesh, context.report);
-            return mesh;
-          },
-          .bytes_at_most = bytes};
+  MeshJob job;
+  job.bytes_at_most = heights.size() * (sizeof(Vec3) + sizeof(Vec2) + 2 * sizeof(Triangle)); // two triangles a sample
+  job.make = [nu, nv, heights = std::move(heights)](ShapeContext& context) {
+    Mesh mesh = make_heightfield(nu, nv, heights);
+    context.dropped_triangles += drop_bad_triangles(mesh, context.report);
+    return mesh;
+  };
+  return job;
 }
 
 constexpr ShapeKind kKinds[] = {

@@ -15,6 +15,7 @@ namespace packtrace {
 struct ShapeContext {
   double tessellation_tolerance = 1e-3;
   const ReportFn& report;
+  const CheckCancelledFn& check_cancelled;
   uint64_t dropped_triangles = 0; ///< added to
 };
 
@@ -22,7 +23,8 @@ struct ShapeContext {
 struct MeshJob {
   /// Any thread may call it, once. Throws Error, message without a place, if the shape is unusable.
   std::function<Mesh(ShapeContext& context)> make;
-  uint64_t bytes_at_most = 0; ///< bound on bytes_of(mesh); 0: not known
+  uint64_t bytes_at_most = 0;  ///< bound on bytes_of(mesh); 0: not known
+  uint64_t bytes_at_least = 0; ///< as far as can be told before it is made
   std::string same_as{};      ///< jobs that have it in common make the same mesh; empty: this one stands alone
   double scale = 1.0;         ///< the shape is the mesh scaled by it
 };
