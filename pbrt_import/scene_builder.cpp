@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pbrt_import/scene/error.h"
 #include "pbrt_import/textures.h"
 #include "pbrt_import/tokenizer.h"
-#include "pbrt_import/transforms.h"
 
 namespace packtrace {
 namespace {
@@ -47,7 +47,6 @@ SceneBuilder::SceneBuilder(const ImportOptions& options, const FileNames& file_n
     : options_(options), file_names_(file_names), reporter_(reporter), loader_(options, reporter) {}
 
 bool SceneBuilder::allowed_here(const Directive& directive) {
-  if (phase_ == Phase::kSecondWorld) return false;
   if (phase_ != Phase::kOptions && is_option(directive.kind)) {
     reporter_.error(directive.place, std::string(directive.keyword) + " belongs before WorldBegin; it is ignored");
     return false;
@@ -63,6 +62,14 @@ bool SceneBuilder::allowed_here(const Directive& directive) {
 void SceneBuilder::handle(Directive& directive) {
   ++statistics_.directives;
   if (!allowed_here(directive)) return;
+  if (directive.kind == K::kWorldBegin) return begin_world(directive);
+  if (directive.kind == K::kWorldEnd) return end_world(directive.place);
+  if (phase_ == Phase::kOptions && statistics_.worlds > 0 && !options_behind_world_)
+    options_behind_world_ = directive.place;
+  if (reading()) carry_out(directive);
+}
+
+void SceneBuilder::carry_out(Directive& directive) {
   switch (directive.kind) {
   case K::kAttributeBegin:
     return open(BlockKind::kAttribute, directive);
@@ -93,41 +100,42 @@ void SceneBuilder::handle(Directive& directive) {
     return handle_coordinate_system(directive);
   case K::kCamera:
     coordinate_systems_["camera"] = {inverse(state_.transform().start), inverse(state_.transform().end)};
-    return cameras_.add_camera(directive, state_.transform().start, reporter_);
+    return cameras_.add_camera(directive, state_.transform(), reporter_);
   case K::kFilm:
     return cameras_.add_film(directive, reporter_);
   case K::kTexture:
     return handle_texture(directive);
   case K::kMaterial:
-    state_.attributes.material = materials_.define(directive, context(directive.place));
-    return;
   case K::kMakeNamedMaterial:
-    return state_.named_materials.define(directive.names[0], materials_.define(directive, context(directive.place)));
+    return handle_material(directive);
   case K::kNamedMaterial:
     return handle_named_material(directive);
   case K::kAreaLightSource:
     return handle_area_light(directive);
   case K::kLightSource:
     ++statistics_.light_sources;
+    ++statistics_.ignored["light_sources"];
     return;
   case K::kReverseOrientation:
     state_.attributes.reverse_orientation = !state_.attributes.reverse_orientation;
     return;
   case K::kShape:
     return add_shape(directive);
-  case K::kWorldBegin:
-    return begin_world(directive);
-  case K::kWorldEnd:
-    return end_world(directive.place);
+  case K::kTransformTimes:
+    return handle_transform_times(directive);
+  case K::kMakeNamedMedium:
+  case K::kMediumInterface:
+    return handle_medium(directive);
   case K::kAccelerator:
   case K::kIntegrator:
   case K::kPixelFilter:
   case K::kSampler:
-  case K::kTransformTimes:
-  case K::kMakeNamedMedium:
-  case K::kMediumInterface:
-  case K::kInclude:
-    return; // nothing that ambient occlusion depends on
+    ++statistics_.ignored["render_settings"];
+    return;
+  case K::kWorldBegin: // handle() has seen to these
+  case K::kWorldEnd:
+  case K::kInclude: // never leaves the parser
+    return;
   }
 }
 
@@ -195,6 +203,36 @@ void SceneBuilder::handle_coordinate_system(const Directive& directive) {
   state_.set_transform(found->second);
 }
 
+void SceneBuilder::handle_transform_times(const Directive& directive) {
+  const TransformTimes times{directive.numbers[0], directive.numbers[1]};
+  if (!std::isfinite(times.start) || !std::isfinite(times.end))
+    return reporter_.error(directive.place, "TransformTimes is ignored: a number is not finite");
+  if (times.end < times.start)
+    reporter_.warning(directive.place,
+                      "TransformTimes end before they start: things jump from start to end at " + to_text(times.start));
+  transform_times_ = times;
+}
+
+void SceneBuilder::handle_material(const Directive& directive) {
+  const bool named = directive.kind == K::kMakeNamedMaterial;
+  const Parameter* const type = named ? directive.parameters.find("type", {ParameterType::kString}) : nullptr;
+  const std::string kind = !named ? directive.names[0] : type && type->strings.size() == 1 ? type->strings[0] : "matte";
+  ++statistics_.materials[kind.empty() ? "none" : kind];
+  const uint32_t material = materials_.define(directive, context(directive.place));
+  if (named)
+    state_.named_materials.define(directive.names[0], material);
+  else
+    state_.attributes.material = material;
+}
+
+void SceneBuilder::handle_medium(const Directive& directive) {
+  const bool defines = directive.kind == K::kMakeNamedMedium;
+  ++statistics_.ignored[defines ? "media" : "medium_interfaces"];
+  for (uint32_t i = 0; i < directive.name_count; ++i)
+    if (!directive.names[i].empty()) // which stands for empty space
+      (defines ? media_ : media_uses_).try_emplace(directive.names[i], directive.place);
+}
+
 void SceneBuilder::handle_named_material(const Directive& directive) {
   const std::optional<uint32_t> found = state_.named_materials.find(directive.names[0]);
   if (found)
@@ -229,12 +267,11 @@ void SceneBuilder::handle_area_light(const Directive& directive) {
 void SceneBuilder::begin_world(const Directive& directive) {
   if (phase_ == Phase::kWorld)
     return reporter_.error(directive.place, "WorldBegin inside the world block; it is ignored");
-  if (phase_ == Phase::kDone) {
-    phase_ = Phase::kSecondWorld;
-    return reporter_.error(directive.place,
-                           "a second world block: only the first one is imported, all from here on is ignored");
-  }
   phase_ = Phase::kWorld;
+  ++statistics_.worlds;
+  options_behind_world_.reset();
+  if (!reading()) return;
+  settle_time();
   state_.reset_transform();
   coordinate_systems_["world"] = state_.transform();
 }
@@ -249,7 +286,8 @@ void SceneBuilder::end_world(const Place& place) {
   std::fill(std::begin(open_blocks_), std::end(open_blocks_), 0u);
   ignored_blocks_ = nested_objects_ = 0;
   current_object_ = kNone;
-  phase_ = Phase::kDone;
+  phase_ = Phase::kOptions;
+  ++world_;
 }
 
 void SceneBuilder::open(BlockKind kind, const Directive& directive) {
@@ -334,11 +372,136 @@ void SceneBuilder::add_instance(const Directive& directive) {
     return reporter_.error(directive.place,
                            "no object " + in_quotes(name) + "; the instance is skipped" + did_you_mean(suggestion));
   }
-  const Affine world_from_object(state_.transform().start);
+  const Placement placement = place(directive, "instance");
+  const Affine world_from_object(placement.map);
   if (!is_invertible(DAffine(world_from_object)))
     return reporter_.error(directive.place, "the instance's transform has no inverse (a scale of 0?); it is skipped");
-  if (state_.animated()) reporter_.note(directive.place, "animated instance: its transform at the start is used");
+  if (placement.animation != kNotAnimated)
+    scene_.animated_instances.push_back({static_cast<uint32_t>(scene_.instances.size()), placement.animation});
   scene_.instances.push_back({found->second, world_from_object});
+}
+
+SceneBuilder::Placement SceneBuilder::place(const Directive& directive, std::string_view thing) {
+  const TransformPair& pair = state_.transform();
+  if (!state_.animated()) return {pair.start, kNotAnimated};
+  const std::optional<AnimatedTransform> keys = animate(pair.start, pair.end, transform_times_);
+  if (!keys) {
+    if (is_invertible(pair.start)) // else whoever asked reports it
+      reporter_.error(directive.place, "animated " + std::string(thing) +
+                                           ": its transform at EndTime has no inverse; it stands as at its start");
+    return {pair.start, kNotAnimated};
+  }
+  reporter_.note(directive.place, "animated " + std::string(thing) + ": it stands as at time " + to_text(scene_.time));
+  std::vector<AnimatedTransform>& all = scene_.animations;
+  const bool as_before = !all.empty() && all.back().start.map == pair.start && all.back().end.map == pair.end;
+  if (!as_before) all.push_back(*keys);
+  return {interpolate(*keys, scene_.time), static_cast<uint32_t>(all.size() - 1)};
+}
+
+/// Options are complete: says when everything is looked at.
+void SceneBuilder::settle_time() {
+  scene_.time = options_.time.value_or(cameras_.shutter_open());
+  cameras_.settle(scene_.time, transform_times_, scene_.animations, reporter_);
+}
+
+void SceneBuilder::check_worlds(const Place& end) {
+  const uint64_t worlds = statistics_.worlds;
+  if (options_.world > std::max<uint64_t>(worlds, 1))
+    throw Error(ErrorKind::kInput, to_string(reporter_.locate({end.file, 0, 0})) + ": there is no world " +
+                                       std::to_string(options_.world) + ": the file has " + std::to_string(worlds));
+  if (worlds == 0) return settle_time();
+  if (worlds > 1)
+    reporter_.note(end, "the file has " + std::to_string(worlds) + " worlds; world " + std::to_string(options_.world) +
+                            " is read");
+  if (phase_ != Phase::kOptions) return;
+  phase_ = Phase::kDone;
+  if (options_behind_world_)
+    reporter_.warning(*options_behind_world_,
+                      "what follows the last WorldEnd has no effect: options belong before their WorldBegin");
+}
+
+void SceneBuilder::report_media() {
+  for (const auto& [name, place] : media_uses_)
+    if (!media_.contains(name)) reporter_.error(place, "MediumInterface: no medium " + in_quotes(name));
+  for (const auto& [name, place] : media_)
+    if (!media_uses_.contains(name)) reporter_.note(place, "medium " + in_quotes(name) + " is never used");
+}
+
+std::vector<SceneBuilder::InstanceIdentity> SceneBuilder::animated_instances() const {
+  std::vector<InstanceIdentity> identities;
+  if (scene_.animated_instances.empty()) return identities;
+  std::vector<uint32_t> counts(scene_.objects.size(), 0);
+  auto next = scene_.animated_instances.begin();
+  for (uint32_t i = 0; i < scene_.instances.size() && next != scene_.animated_instances.end(); ++i) {
+    const uint32_t object = scene_.instances[i].object;
+    const uint32_t ordinal = counts[object]++;
+    if (next->instance != i) continue;
+    identities.push_back({scene_.objects[object].shapes.data(), ordinal, next->animation});
+    ++next;
+  }
+  return identities;
+}
+
+/// Points animated_instances at what is left of the instances, and leaves out animations that nothing has.
+void SceneBuilder::renumber_animations(Scene& scene, const std::vector<InstanceIdentity>& instances) {
+  if (scene.animations.empty()) return;
+  std::map<std::pair<const Shape*, uint32_t>, uint32_t> animation_of;
+  for (const InstanceIdentity& identity : instances)
+    animation_of[{identity.shapes, identity.ordinal}] = identity.animation;
+  std::vector<uint32_t> counts(scene.objects.size(), 0);
+  scene.animated_instances.clear();
+  for (uint32_t i = 0; i < scene.instances.size(); ++i) {
+    const uint32_t object = scene.instances[i].object;
+    const auto found = animation_of.find({scene.objects[object].shapes.data(), counts[object]++});
+    if (found != animation_of.end()) scene.animated_instances.push_back({i, found->second});
+  }
+
+  const auto for_each_user = [&](auto function) {
+    const auto visit = [&](auto& things) {
+      for (auto& thing : things)
+        if (thing.animation != kNotAnimated) function(thing.animation);
+    };
+    visit(scene.shapes);
+    for (Object& object : scene.objects) visit(object.shapes);
+    visit(scene.animated_instances);
+    visit(scene.cameras);
+  };
+  std::vector<uint32_t> numbers(scene.animations.size(), kNotAnimated);
+  for_each_user([&](uint32_t animation) { numbers[animation] = 0; });
+  uint32_t count = 0;
+  for (size_t i = 0; i < numbers.size(); ++i) {
+    if (numbers[i] == kNotAnimated) continue;
+    scene.animations[count] = scene.animations[i];
+    numbers[i] = count++;
+  }
+  scene.animations.resize(count);
+  for_each_user([&](uint32_t& animation) { animation = numbers[animation]; });
+}
+
+void SceneBuilder::count_features(ImportResult& result) {
+  const Scene& scene = result.scene;
+  ImportStatistics& statistics = result.statistics;
+  const auto animated = [](const auto& thing) { return thing.animation != kNotAnimated; };
+  const auto count = [&](const auto& things) {
+    return static_cast<uint64_t>(std::count_if(things.begin(), things.end(), animated));
+  };
+  statistics.animated_shapes = count(scene.shapes);
+  for (const Object& object : scene.objects) statistics.animated_shapes += count(object.shapes);
+  statistics.animated_instances = scene.animated_instances.size();
+  statistics.animated_cameras = count(scene.cameras);
+  const auto bumps = std::count_if(scene.materials.begin(), scene.materials.end(),
+                                   [](const Material& material) { return (material.flags & kNormalMap) != 0; });
+  if (bumps > 0) statistics.ignored["bump_maps"] = static_cast<uint64_t>(bumps);
+}
+
+ImportResult SceneBuilder::result(const Place& end, Progress& progress) {
+  check_worlds(end);
+  report_media();
+  const std::vector<InstanceIdentity> animated = animated_instances();
+  ImportResult result = finish(end, progress);
+  renumber_animations(result.scene, animated);
+  count_features(result);
+  return result;
 }
 
 } // namespace packtrace

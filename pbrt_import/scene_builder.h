@@ -1,7 +1,11 @@
 #pragma once
 
+#include <compare>
 #include <cstdint>
+#include <map>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <unordered_map>
 #include <vector>
 
@@ -14,6 +18,7 @@
 #include "pbrt_import/parser.h"
 #include "pbrt_import/reporter.h"
 #include "pbrt_import/texture_graph.h"
+#include "pbrt_import/transforms.h"
 
 namespace packtrace {
 
@@ -27,16 +32,36 @@ public:
 
   /// Reads the files that the scene needs and returns it. Call once, after the last directive.
   /// @param end where the text ended
-  ImportResult finish(const Place& end, Progress& progress);
+  /// Throws Error(kInput) if the text has no world of the number asked for.
+  ImportResult result(const Place& end, Progress& progress);
 
 private:
-  enum class Phase { kOptions, kWorld, kDone, kSecondWorld };
+  enum class Phase { kOptions, kWorld, kDone };
+
+  /// The current transform at the scene's time.
+  struct Placement {
+    DAffine map{1.0};
+    uint32_t animation = kNotAnimated; ///< into Scene::animations
+  };
+  /// An animated instance, told apart from others by what stays when unused objects and their instances are dropped.
+  struct InstanceIdentity {
+    const Shape* shapes = nullptr; ///< of its object: they stay where they are in memory
+    uint32_t ordinal = 0;          ///< among the object's instances
+    uint32_t animation = 0;
+    auto operator<=>(const InstanceIdentity&) const = default;
+  };
+
+  bool reading() const { return world_ == options_.world; }
 
   bool allowed_here(const Directive& directive);
+  void carry_out(Directive& directive);
   void handle_transform(const Directive& directive);
   void handle_active_transform(const Directive& directive);
   void handle_coordinate_system(const Directive& directive);
+  void handle_transform_times(const Directive& directive);
+  void handle_material(const Directive& directive);
   void handle_named_material(const Directive& directive);
+  void handle_medium(const Directive& directive);
   void handle_texture(const Directive& directive);
   void handle_area_light(const Directive& directive);
   void begin_world(const Directive& directive);
@@ -45,6 +70,15 @@ private:
   void close(BlockKind kind, const Directive& directive);
   void begin_object(const Directive& directive);
   void add_instance(const Directive& directive);
+  Placement place(const Directive& directive, std::string_view thing);
+
+  void settle_time();
+  void check_worlds(const Place& end);
+  void report_media();
+  std::vector<InstanceIdentity> animated_instances() const;
+  static void renumber_animations(Scene& scene, const std::vector<InstanceIdentity>& instances);
+  static void count_features(ImportResult& result);
+  ImportResult finish(const Place& end, Progress& progress);
 
   void add_shape(Directive& directive);
   bool make_mesh(Directive& directive, Shape& shape);
@@ -61,14 +95,19 @@ private:
   const FileNames& file_names_;
   Reporter& reporter_;
   Phase phase_ = Phase::kOptions;
+  uint32_t world_ = 1; ///< number of the world that directives belong to, from its options to its WorldEnd
+  std::optional<Place> options_behind_world_;
+  TransformTimes transform_times_;
   GraphicsState state_;
   std::unordered_map<std::string, TransformPair> coordinate_systems_;
   TextureGraph graph_;
   MaterialLibrary materials_{graph_};
   FileLoader loader_;
-  CameraCollector cameras_;
   Scene scene_; ///< shapes hold MaterialLibrary uses instead of materials until finish()
   ImportStatistics statistics_;
+  CameraCollector cameras_{statistics_.ignored};
+  std::map<std::string, Place> media_;      ///< where MakeNamedMedium defines them
+  std::map<std::string, Place> media_uses_; ///< where MediumInterface names them first
   std::unordered_map<std::string, uint32_t> object_numbers_;
   std::vector<Place> object_places_;
   uint32_t current_object_ = kNone;

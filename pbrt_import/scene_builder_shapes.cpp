@@ -62,7 +62,9 @@ void SceneBuilder::add_shape(Directive& directive) {
   const bool known = kind == "plymesh" || find_shape_kind(kind);
   ++statistics_.shapes[known ? kind : "unknown"];
   Shape shape;
-  shape.parent_from_mesh = state_.transform().start;
+  const Placement placement = place(directive, "shape");
+  shape.parent_from_mesh = placement.map;
+  shape.animation = placement.animation;
   shape.reverse_orientation = state_.attributes.reverse_orientation;
   bool usable = !directive.damaged; // else reported by the parser
   if (usable && !is_invertible(shape.parent_from_mesh)) {
@@ -87,13 +89,14 @@ void SceneBuilder::add_shape(Directive& directive) {
       state_.attributes.material == kNone ? MaterialLibrary::kDefault : state_.attributes.material;
   use.recipe = materials_.with_shape_parameters(material, directive.parameters, here);
   report_unused(directive.parameters, reporter_);
-  if (state_.attributes.area_light != kNone && current_object_ != kNone) {
-    reporter_.warning(directive.place, "area lights in objects do not emit, as in pbrt");
+  const bool in_object = current_object_ != kNone;
+  if (state_.attributes.area_light != kNone && (in_object || state_.animated())) {
+    reporter_.warning(directive.place, std::string("area lights ") + (in_object ? "in objects" : "on animated shapes") +
+                                           " do not emit, as in pbrt");
   } else {
     use.area_light = state_.attributes.area_light;
     statistics_.area_lights += use.area_light != kNone;
   }
-  if (state_.animated()) reporter_.note(directive.place, "animated shape: its transform at the start is used");
   shape.material = materials_.use(use);
   (current_object_ == kNone ? scene_.shapes : scene_.objects[current_object_].shapes).push_back(shape);
 }
