@@ -1,5 +1,6 @@
 #include "pbrt_import/import_scene.h"
 
+#include <cmath>
 #include <string>
 
 #include "pbrt_import/file_names.h"
@@ -20,6 +21,8 @@ void check_options(const ImportOptions& options) {
   require(options.max_included_files >= 1, "max_included_files must be at least 1");
   require(options.max_nesting >= 1, "max_nesting must be at least 1");
   require(options.memory_budget_bytes >= 1, "memory_budget_bytes must be at least 1");
+  require(options.world >= 1, "worlds are numbered from 1");
+  require(!options.time || std::isfinite(*options.time), "the time must be finite");
   require(options.tessellation_tolerance >= 1e-6 && options.tessellation_tolerance <= 0.5,
           "tessellation_tolerance must lie within [1e-6, 0.5]");
 }

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "pbrt_import/scene/diagnostics.h"
@@ -19,6 +20,8 @@ struct ImportOptions {
   uint32_t max_nesting = 1u << 16;              ///< open Attribute, Transform and Object blocks
   double tessellation_tolerance = 1e-3;         ///< relative to the curved shape's radius, within [1e-6, 0.5]
   bool allow_files_outside_scene_folder = true; ///< exporters write "../textures/x.png"
+  uint32_t world = 1;                           ///< which WorldBegin ... WorldEnd with its options, from 1
+  std::optional<double> time;                   ///< when to look at what moves; none: as the camera's shutter opens
 };
 
 /// What an import read, for reports.
@@ -34,6 +37,12 @@ struct ImportStatistics {
   uint64_t textures_found = 0;            ///< image files that textures name, each once
   uint64_t textures_missing = 0;
   uint64_t triangles = 0; ///< stored, unique_triangle_count()
+  uint64_t worlds = 0;    ///< in the text; one of them was read, and only its things are counted here
+  std::map<std::string, uint64_t> materials; ///< Material and MakeNamedMaterial directives by kind as written
+  uint64_t animated_shapes = 0;              ///< in the scene, those of objects once
+  uint64_t animated_instances = 0;
+  uint64_t animated_cameras = 0;
+  std::map<std::string, uint64_t> ignored; ///< features met that nothing is made of, docs/json_output.md names them
 };
 
 struct ImportResult {
@@ -42,15 +51,19 @@ struct ImportResult {
 };
 
 /// Reads a pbrt-v3 scene with everything it includes. Problems are reported to diagnostics, each with its place, and
-/// the rest of the scene is kept; a scene without a single shape is returned as such. Animated transforms are taken at
-/// their start. The same files give the same result and diagnostics for any thread count.
+/// the rest of the scene is kept; a scene without a single shape is returned as such. The same files give the same
+/// result and diagnostics for any thread count.
+///
+/// Of several worlds one is read with the options before it, as if it stood alone; the text of the others is checked,
+/// files they name (but includes) are not opened. Everything stands where it is at one time, Scene::time; the keys of
+/// what moves are in Scene::animations.
 ///
 /// Scene::cameras[0] is the camera pbrt renders with, the file's last one; earlier ones follow in file order. Objects
 /// that are never instanced, and materials, masks and meshes that nothing uses, are left out.
 ///
-/// Throws Error(kUsage) if an option is out of range, Error(kInput) if the main file cannot be read at all,
-/// Error(kInput) if options.strict and a warning or an error was reported, Error(kLimitExceeded) if the meshes of PLY
-/// files exceed memory_budget_bytes together, Error(kCancelled) on cancellation.
+/// Throws Error(kUsage) if an option is out of range, Error(kInput) if the main file cannot be read at all or has no
+/// world of that number, Error(kInput) if options.strict and a warning or an error was reported, Error(kLimitExceeded)
+/// if the meshes of PLY files exceed memory_budget_bytes together, Error(kCancelled) on cancellation.
 ImportResult import_scene(const std::filesystem::path& main_file, const ImportOptions& options,
                           Diagnostics& diagnostics, Progress& progress);
 

@@ -1,45 +1,33 @@
 #include "pbrt_import/scene_builder.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "pbrt_import/scene/error.h"
 #include "pbrt_import/textures.h"
 #include "pbrt_import/tokenizer.h"
-#include "pbrt_import/transforms.h"
 
 namespace packtrace {
 namespace {
 
 using K = DirectiveKind;
 
-bool is_option(K kind) {
-  return kind == K::kAccelerator || kind == K::kCamera || kind == K::kFilm || kind == K::kIntegrator ||
-         kind == K::kPixelFilter || kind == K::kSampler || kind == K::kTransformTimes;
-}
+/// Where directives may stand, by kind.
+enum class Section : uint8_t { kAnywhere, kOptions, kWorld };
 
-bool is_world_only(K kind) {
-  switch (kind) {
-  case K::kAttributeBegin:
-  case K::kAttributeEnd:
-  case K::kTransformBegin:
-  case K::kTransformEnd:
-  case K::kObjectBegin:
-  case K::kObjectEnd:
-  case K::kObjectInstance:
-  case K::kTexture:
-  case K::kMaterial:
-  case K::kMakeNamedMaterial:
-  case K::kNamedMaterial:
-  case K::kLightSource:
-  case K::kAreaLightSource:
-  case K::kShape:
-  case K::kReverseOrientation:
-  case K::kWorldEnd:
-    return true;
-  default:
-    return false;
-  }
-}
+constexpr auto kSections = [] {
+  std::array<Section, static_cast<size_t>(K::kWorldEnd) + 1> sections{};
+  for (const K kind : {K::kAccelerator, K::kCamera, K::kFilm, K::kIntegrator, K::kPixelFilter, K::kSampler,
+                       K::kTransformTimes})
+    sections[static_cast<size_t>(kind)] = Section::kOptions;
+  for (const K kind : {K::kAttributeBegin, K::kAttributeEnd, K::kTransformBegin, K::kTransformEnd, K::kObjectBegin,
+                       K::kObjectEnd, K::kObjectInstance, K::kTexture, K::kMaterial, K::kMakeNamedMaterial,
+                       K::kNamedMaterial, K::kLightSource, K::kAreaLightSource, K::kShape, K::kReverseOrientation,
+                       K::kWorldEnd})
+    sections[static_cast<size_t>(kind)] = Section::kWorld;
+  return sections;
+}();
 
 } // namespace
 
@@ -50,12 +38,12 @@ SceneBuilder::SceneBuilder(const ImportOptions& options, const FileNames& file_n
       mesh_queue_(options.tessellation_tolerance, check_cancelled_) {}
 
 bool SceneBuilder::allowed_here(const Directive& directive) {
-  if (phase_ == Phase::kSecondWorld) return false;
-  if (phase_ != Phase::kOptions && is_option(directive.kind)) {
+  const Section section = kSections[static_cast<size_t>(directive.kind)];
+  if (section == Section::kOptions && phase_ != Phase::kOptions) {
     reporter_.error(directive.place, std::string(directive.keyword) + " belongs before WorldBegin; it is ignored");
     return false;
   }
-  if (phase_ != Phase::kWorld && is_world_only(directive.kind)) {
+  if (section == Section::kWorld && phase_ != Phase::kWorld) {
     reporter_.error(directive.place,
                     std::string(directive.keyword) + " belongs between WorldBegin and WorldEnd; it is ignored");
     return false;
@@ -66,6 +54,14 @@ bool SceneBuilder::allowed_here(const Directive& directive) {
 void SceneBuilder::handle(Directive& directive) {
   ++statistics_.directives;
   if (!allowed_here(directive)) return;
+  if (directive.kind == K::kWorldBegin) return begin_world(directive);
+  if (directive.kind == K::kWorldEnd) return end_world(directive.place);
+  if (phase_ == Phase::kOptions && statistics_.worlds > 0 && !options_behind_world_)
+    options_behind_world_ = directive.place;
+  if (reading()) carry_out(directive);
+}
+
+void SceneBuilder::carry_out(Directive& directive) {
   switch (directive.kind) {
   case K::kAttributeBegin:
     return open(BlockKind::kAttribute, directive);
@@ -96,41 +92,42 @@ void SceneBuilder::handle(Directive& directive) {
     return handle_coordinate_system(directive);
   case K::kCamera:
     coordinate_systems_["camera"] = {inverse(state_.transform().start), inverse(state_.transform().end)};
-    return cameras_.add_camera(directive, state_.transform().start, reporter_);
+    return cameras_.add_camera(directive, state_.transform(), reporter_);
   case K::kFilm:
     return cameras_.add_film(directive, reporter_);
   case K::kTexture:
     return handle_texture(directive);
   case K::kMaterial:
-    state_.attributes.material = materials_.define(directive, context(directive.place));
-    return;
   case K::kMakeNamedMaterial:
-    return state_.named_materials.define(directive.names[0], materials_.define(directive, context(directive.place)));
+    return handle_material(directive);
   case K::kNamedMaterial:
     return handle_named_material(directive);
   case K::kAreaLightSource:
     return handle_area_light(directive);
   case K::kLightSource:
     ++statistics_.light_sources;
+    ++statistics_.ignored["light_sources"];
     return;
   case K::kReverseOrientation:
     state_.attributes.reverse_orientation = !state_.attributes.reverse_orientation;
     return;
   case K::kShape:
     return add_shape(directive);
-  case K::kWorldBegin:
-    return begin_world(directive);
-  case K::kWorldEnd:
-    return end_world(directive.place);
+  case K::kTransformTimes:
+    return handle_transform_times(directive);
+  case K::kMakeNamedMedium:
+  case K::kMediumInterface:
+    return handle_medium(directive);
   case K::kAccelerator:
   case K::kIntegrator:
   case K::kPixelFilter:
   case K::kSampler:
-  case K::kTransformTimes:
-  case K::kMakeNamedMedium:
-  case K::kMediumInterface:
-  case K::kInclude:
-    return; // nothing that ambient occlusion depends on
+    ++statistics_.ignored["render_settings"];
+    return;
+  case K::kWorldBegin: // handle() has seen to these
+  case K::kWorldEnd:
+  case K::kInclude: // never leaves the parser
+    return;
   }
 }
 
@@ -198,6 +195,36 @@ void SceneBuilder::handle_coordinate_system(const Directive& directive) {
   state_.set_transform(found->second);
 }
 
+void SceneBuilder::handle_transform_times(const Directive& directive) {
+  const TransformTimes times{directive.numbers[0], directive.numbers[1]};
+  if (!std::isfinite(times.start) || !std::isfinite(times.end))
+    return reporter_.error(directive.place, "TransformTimes is ignored: a number is not finite");
+  if (times.end < times.start)
+    reporter_.warning(directive.place,
+                      "TransformTimes end before they start: things jump from start to end at " + to_text(times.start));
+  transform_times_ = times;
+}
+
+void SceneBuilder::handle_material(const Directive& directive) {
+  const bool named = directive.kind == K::kMakeNamedMaterial;
+  const Parameter* const type = named ? directive.parameters.find("type", {ParameterType::kString}) : nullptr;
+  const std::string kind = !named ? directive.names[0] : type && type->strings.size() == 1 ? type->strings[0] : "matte";
+  ++statistics_.materials[kind.empty() ? "none" : kind];
+  const uint32_t material = materials_.define(directive, context(directive.place));
+  if (named)
+    state_.named_materials.define(directive.names[0], material);
+  else
+    state_.attributes.material = material;
+}
+
+void SceneBuilder::handle_medium(const Directive& directive) {
+  const bool defines = directive.kind == K::kMakeNamedMedium;
+  ++statistics_.ignored[defines ? "media" : "medium_interfaces"];
+  for (uint32_t i = 0; i < directive.name_count; ++i)
+    if (!directive.names[i].empty()) // which stands for empty space
+      (defines ? media_ : media_uses_).try_emplace(directive.names[i], directive.place);
+}
+
 void SceneBuilder::handle_named_material(const Directive& directive) {
   const std::optional<uint32_t> found = state_.named_materials.find(directive.names[0]);
   if (found)
@@ -227,124 +254,6 @@ void SceneBuilder::handle_area_light(const Directive& directive) {
   const bool both_sides = directive.parameters.get_bool("twosided", false);
   state_.attributes.area_light = radiance == Vec3(0.0f) ? kNone : both_sides ? 1 : 0;
   report_unused(directive.parameters, reporter_);
-}
-
-void SceneBuilder::begin_world(const Directive& directive) {
-  if (phase_ == Phase::kWorld)
-    return reporter_.error(directive.place, "WorldBegin inside the world block; it is ignored");
-  if (phase_ == Phase::kDone) {
-    phase_ = Phase::kSecondWorld;
-    return reporter_.error(directive.place,
-                           "a second world block: only the first one is imported, all from here on is ignored");
-  }
-  phase_ = Phase::kWorld;
-  state_.reset_transform();
-  coordinate_systems_["world"] = state_.transform();
-}
-
-void SceneBuilder::end_world(const Place& place) {
-  const std::vector<Block> open = state_.blocks();
-  for (const Block& block : open)
-    reporter_.warning(block.place, std::string(begin_keyword(block.kind)) + " without its " +
-                                       std::string(end_keyword(block.kind)) + " before the world ends at " +
-                                       to_string(reporter_.locate(place)));
-  while (!state_.blocks().empty()) state_.close_block();
-  std::fill(std::begin(open_blocks_), std::end(open_blocks_), 0u);
-  ignored_blocks_ = nested_objects_ = 0;
-  current_object_ = kNone;
-  phase_ = Phase::kDone;
-}
-
-void SceneBuilder::open(BlockKind kind, const Directive& directive) {
-  if (state_.blocks().size() >= options_.max_nesting) {
-    ++ignored_blocks_;
-    return reporter_.error(directive.place, "blocks are nested more than " + std::to_string(options_.max_nesting) +
-                                                " deep; deeper ones do not keep the state apart");
-  }
-  state_.open_block(kind, directive.place);
-  ++open_blocks_[static_cast<size_t>(kind)];
-}
-
-void SceneBuilder::close(BlockKind kind, const Directive& directive) {
-  if (ignored_blocks_ > 0) {
-    --ignored_blocks_;
-    return;
-  }
-  const std::string end(end_keyword(kind)), begin(begin_keyword(kind));
-  const auto top = [&]() -> const Block& { return state_.blocks().back(); };
-  if (open_blocks_[static_cast<size_t>(kind)] == 0) {
-    std::string message = end + " without " + begin;
-    if (!state_.blocks().empty())
-      message += "; the innermost open block is the " + std::string(begin_keyword(top().kind)) + " at " +
-                 to_string(reporter_.locate(top().place));
-    return reporter_.error(directive.place, std::move(message));
-  }
-  while (true) {
-    const Block& block = top();
-    const BlockKind closed = block.kind;
-    if (closed != kind)
-      reporter_.error(directive.place, end + " closes the " + std::string(begin_keyword(closed)) + " at " +
-                                           to_string(reporter_.locate(block.place)) + ", which has no " +
-                                           std::string(end_keyword(closed)) + " before it");
-    state_.close_block();
-    --open_blocks_[static_cast<size_t>(closed)];
-    if (closed == BlockKind::kObject) {
-      if (nested_objects_ > 0)
-        --nested_objects_;
-      else
-        current_object_ = kNone;
-    }
-    if (closed == kind) return;
-  }
-}
-
-void SceneBuilder::begin_object(const Directive& directive) {
-  const uint64_t ignored_before = ignored_blocks_;
-  open(BlockKind::kObject, directive);
-  if (ignored_blocks_ != ignored_before) return;
-  if (current_object_ != kNone) {
-    ++nested_objects_;
-    return reporter_.error(directive.place, "ObjectBegin " + in_quotes(directive.names[0]) + " inside object " +
-                                                in_quotes(scene_.objects[current_object_].name) +
-                                                "; its shapes belong to the outer object");
-  }
-  current_object_ = static_cast<uint32_t>(scene_.objects.size());
-  const auto [it, inserted] = object_numbers_.try_emplace(directive.names[0], current_object_);
-  if (!inserted) {
-    reporter_.warning(directive.place, "object " + in_quotes(directive.names[0]) +
-                                           " is defined again; later instances show the new one, unlike the one at " +
-                                           to_string(reporter_.locate(object_places_[it->second])));
-    it->second = current_object_;
-  }
-  scene_.objects.push_back({directive.names[0], {}});
-  object_places_.push_back(directive.place);
-}
-
-void SceneBuilder::add_instance(const Directive& directive) {
-  const std::string& name = directive.names[0];
-  if (current_object_ != kNone)
-    return reporter_.error(directive.place, "ObjectInstance " + in_quotes(name) + " inside object " +
-                                                in_quotes(scene_.objects[current_object_].name) +
-                                                "; objects cannot hold instances");
-  const auto found = object_numbers_.find(name);
-  if (found == object_numbers_.end()) {
-    std::string_view suggestion;
-    if (object_numbers_.size() <= 1000) { // a hint is not worth more comparisons than that
-      std::vector<std::string_view> names;
-      for (const Object& object : scene_.objects) names.push_back(object.name);
-      suggestion = closest_name(name, names);
-    }
-    return reporter_.error(directive.place,
-                           "no object " + in_quotes(name) + "; the instance is skipped" + did_you_mean(suggestion));
-  }
-  const Affine world_from_object(state_.transform().start);
-  if (!is_invertible(DAffine(world_from_object)))
-    return reporter_.error(directive.place, "the instance's transform has no inverse (a scale of 0?); it is skipped");
-  if (state_.animated()) reporter_.note(directive.place, "animated instance: its transform at the start is used");
-  // Room that is never used costs address space only, where copies would cost memory while they are made.
-  if (scene_.instances.size() == scene_.instances.capacity())
-    scene_.instances.reserve(std::max<size_t>(1024, 4 * scene_.instances.size()));
-  scene_.instances.push_back({found->second, world_from_object});
 }
 
 } // namespace packtrace

@@ -1,7 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <unordered_map>
 #include <vector>
 
@@ -15,6 +18,7 @@
 #include "pbrt_import/parser.h"
 #include "pbrt_import/reporter.h"
 #include "pbrt_import/texture_graph.h"
+#include "pbrt_import/transforms.h"
 
 namespace packtrace {
 
@@ -28,16 +32,28 @@ public:
 
   /// Reads the files that the scene needs and returns it. Call once, after the last directive.
   /// @param end where the text ended
+  /// Throws Error(kInput) if the text has no world of the number asked for.
   ImportResult finish(const Place& end, Progress& progress);
 
 private:
-  enum class Phase { kOptions, kWorld, kDone, kSecondWorld };
+  enum class Phase { kOptions, kWorld, kDone };
+
+  /// The current transform at the scene's time.
+  struct Placement {
+    DAffine map{1.0};
+    uint32_t animation = kNotAnimated; ///< into Scene::animations
+  };
+  bool reading() const { return world_ == options_.world; }
 
   bool allowed_here(const Directive& directive);
+  void carry_out(Directive& directive);
   void handle_transform(const Directive& directive);
   void handle_active_transform(const Directive& directive);
   void handle_coordinate_system(const Directive& directive);
+  void handle_transform_times(const Directive& directive);
+  void handle_material(const Directive& directive);
   void handle_named_material(const Directive& directive);
+  void handle_medium(const Directive& directive);
   void handle_texture(const Directive& directive);
   void handle_area_light(const Directive& directive);
   void begin_world(const Directive& directive);
@@ -46,6 +62,12 @@ private:
   void close(BlockKind kind, const Directive& directive);
   void begin_object(const Directive& directive);
   void add_instance(const Directive& directive);
+  Placement place(const Directive& directive, std::string_view thing);
+
+  void settle_time();
+  void check_worlds(const Place& end);
+  void report_media();
+  void count_features();
 
   void add_shape(Directive& directive);
   bool make_mesh(Directive& directive, Shape& shape);
@@ -58,7 +80,6 @@ private:
   bool read_alpha(const Directive& directive, const TextureContext& context, MaterialUse& use);
 
   void drop_unusable_shapes(const std::vector<uint32_t>& material_numbers, std::vector<Shape>& shapes);
-  void drop_unused_objects();
 
   TextureContext context(const Place& place) { return {state_, file_names_, graph_, reporter_, place}; }
 
@@ -66,15 +87,21 @@ private:
   const FileNames& file_names_;
   Reporter& reporter_;
   Phase phase_ = Phase::kOptions;
+  uint32_t world_ = 1; ///< number of the world that directives belong to, from its options to its WorldEnd
+  std::optional<Place> options_behind_world_;
+  TransformTimes transform_times_;
   GraphicsState state_;
   std::unordered_map<std::string, TransformPair> coordinate_systems_;
   TextureGraph graph_;
   MaterialLibrary materials_{graph_};
   FileLoader loader_;
-  CameraCollector cameras_;
   Scene scene_; ///< shapes hold MaterialLibrary uses instead of materials until finish()
   ImportStatistics statistics_;
-  std::unordered_map<std::string, uint32_t> object_numbers_;
+  CameraCollector cameras_{statistics_.ignored};
+  std::map<std::string, Place> media_;      ///< where MakeNamedMedium defines them
+  std::map<std::string, Place> media_uses_; ///< where MediumInterface names them first
+  NameTable object_names_;
+  std::vector<uint32_t> objects_by_name_; ///< into Scene::objects, by number in object_names_
   std::vector<Place> object_places_;
   uint32_t current_object_ = kNone;
   uint32_t nested_objects_ = 0;  ///< ObjectBegins that were refused but will have their ObjectEnd

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene_pruning.h"
 #include "pbrt_import/shape_builder.h"
 #include "pbrt_import/tokenizer.h"
 #include "pbrt_import/transforms.h"
@@ -13,46 +14,11 @@
 namespace packtrace {
 namespace {
 
-/// Renumbers the elements that something uses, in order, and drops the others.
-template <class Element>
-std::vector<uint32_t> keep_used(std::vector<Element>& elements, const std::vector<uint8_t>& used) {
-  std::vector<uint32_t> numbers(elements.size(), 0);
-  uint32_t count = 0;
-  for (size_t i = 0; i < elements.size(); ++i) {
-    if (!used[i]) continue;
-    numbers[i] = count;
-    if (count != i) elements[count] = std::move(elements[i]);
-    ++count;
-  }
-  elements.erase(elements.begin() + count, elements.end());
-  return numbers;
-}
-
 template <class Function>
 void for_each_shape(Scene& scene, Function function) {
   for (Shape& shape : scene.shapes) function(shape);
   for (Object& object : scene.objects)
     for (Shape& shape : object.shapes) function(shape);
-}
-
-/// Leaves out meshes, materials and masks that no shape uses.
-void drop_unused(Scene& scene) {
-  std::vector<uint8_t> meshes(scene.meshes.size()), materials(scene.materials.size()), masks(scene.masks.size());
-  for_each_shape(scene, [&](const Shape& shape) { meshes[shape.mesh] = materials[shape.material] = 1; });
-  const std::vector<uint32_t> mesh_numbers = keep_used(scene.meshes, meshes);
-  const std::vector<uint32_t> material_numbers = keep_used(scene.materials, materials);
-  for_each_shape(scene, [&](Shape& shape) {
-    shape.mesh = mesh_numbers[shape.mesh];
-    shape.material = material_numbers[shape.material];
-  });
-  const auto for_each_mask = [&](auto function) {
-    for (Material& material : scene.materials)
-      for (uint32_t* const mask : {&material.alpha_mask, &material.shadow_alpha_mask})
-        if (*mask != kNoMask) function(*mask);
-  };
-  for_each_mask([&](uint32_t mask) { masks[mask] = 1; });
-  const std::vector<uint32_t> mask_numbers = keep_used(scene.masks, masks);
-  for_each_mask([&](uint32_t& mask) { mask = mask_numbers[mask]; });
 }
 
 } // namespace
@@ -62,7 +28,9 @@ void SceneBuilder::add_shape(Directive& directive) {
   const bool known = kind == "plymesh" || find_shape_kind(kind);
   ++statistics_.shapes[known ? kind : "unknown"];
   Shape shape;
-  shape.parent_from_mesh = state_.transform().start;
+  const Placement placement = place(directive, "shape");
+  shape.parent_from_mesh = placement.map;
+  shape.animation = placement.animation;
   shape.reverse_orientation = state_.attributes.reverse_orientation;
   bool usable = !directive.damaged; // else reported by the parser
   if (usable && !is_invertible(shape.parent_from_mesh)) {
@@ -87,13 +55,14 @@ void SceneBuilder::add_shape(Directive& directive) {
       state_.attributes.material == kNone ? MaterialLibrary::kDefault : state_.attributes.material;
   use.recipe = materials_.with_shape_parameters(material, directive.parameters, here);
   report_unused(directive.parameters, reporter_);
-  if (state_.attributes.area_light != kNone && current_object_ != kNone) {
-    reporter_.warning(directive.place, "area lights in objects do not emit, as in pbrt");
+  const bool in_object = current_object_ != kNone;
+  if (state_.attributes.area_light != kNone && (in_object || state_.animated())) {
+    reporter_.warning(directive.place, std::string("area lights ") + (in_object ? "in objects" : "on animated shapes") +
+                                           " do not emit, as in pbrt");
   } else {
     use.area_light = state_.attributes.area_light;
     statistics_.area_lights += use.area_light != kNone;
   }
-  if (state_.animated()) reporter_.note(directive.place, "animated shape: its transform at the start is used");
   shape.material = materials_.use(use);
   (current_object_ == kNone ? scene_.shapes : scene_.objects[current_object_].shapes).push_back(shape);
 }
@@ -215,23 +184,6 @@ void SceneBuilder::take_queued_meshes() {
   });
 }
 
-/// Objects that nothing shows are not worth reading their files.
-void SceneBuilder::drop_unused_objects() {
-  std::vector<uint8_t> used(scene_.objects.size(), 0);
-  for (const Instance& instance : scene_.instances) used[instance.object] = 1;
-  for (size_t i = 0; i < scene_.objects.size(); ++i) {
-    const Object& object = scene_.objects[i];
-    if (!used[i] && !object.shapes.empty())
-      reporter_.note(object_places_[i], "object " + in_quotes(object.name) + " is never instanced; it is left out");
-    if (object.shapes.empty()) used[i] = 0;
-  }
-  std::erase_if(scene_.instances, [&](const Instance& instance) { return !used[instance.object]; });
-  object_places_.clear(); // numbers change
-  object_numbers_.clear();
-  const std::vector<uint32_t> numbers = keep_used(scene_.objects, used);
-  for (Instance& instance : scene_.instances) instance.object = numbers[instance.object];
-}
-
 void SceneBuilder::drop_unusable_shapes(const std::vector<uint32_t>& material_numbers, std::vector<Shape>& shapes) {
   std::erase_if(shapes, [&](Shape& shape) {
     shape.material = material_numbers[shape.material];
@@ -242,7 +194,24 @@ void SceneBuilder::drop_unusable_shapes(const std::vector<uint32_t>& material_nu
   });
 }
 
+/// Counts what the finished scene has and its text could not tell.
+void SceneBuilder::count_features() {
+  const auto count = [](const auto& things) {
+    return static_cast<uint64_t>(std::count_if(things.begin(), things.end(),
+                                               [](const auto& thing) { return thing.animation != kNotAnimated; }));
+  };
+  statistics_.animated_shapes = count(scene_.shapes);
+  for (const Object& object : scene_.objects) statistics_.animated_shapes += count(object.shapes);
+  statistics_.animated_instances = scene_.animated_instances.size();
+  statistics_.animated_cameras = count(scene_.cameras);
+  const auto bumps = std::count_if(scene_.materials.begin(), scene_.materials.end(),
+                                   [](const Material& material) { return (material.flags & kNormalMap) != 0; });
+  if (bumps > 0) statistics_.ignored["bump_maps"] = static_cast<uint64_t>(bumps);
+}
+
 ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
+  check_worlds(end);
+  report_media();
   if (phase_ == Phase::kWorld) {
     reporter_.warning(end, "the file ends without WorldEnd");
     end_world(end);
@@ -252,7 +221,11 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
   const uint64_t last_sequence = reporter_.sequence();
   take_queued_meshes();
   reporter_.set_sequence(last_sequence);
-  drop_unused_objects();
+  // What nothing shows is not worth reading its files.
+  drop_unused_objects(scene_, [&](uint32_t object) {
+    reporter_.note(object_places_[object],
+                   "object " + in_quotes(scene_.objects[object].name) + " is never instanced; it is left out");
+  });
   for_each_shape(scene_, [&](const Shape& shape) { loader_.require(shape.mesh); });
   materials_.require_images();
   loader_.load(scene_.meshes, graph_.images(), progress, statistics_, scene_.dropped_triangles);
@@ -265,13 +238,14 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
   if (const uint64_t absent = statistics_.shapes_absent; absent > 0)
     reporter_.note(end, absent == 1 ? "1 shape is left out: its alpha is 0 everywhere"
                                     : std::to_string(absent) + " shapes are left out: their alpha is 0 everywhere");
-  drop_unused_objects();
-  drop_unused(scene_);
   scene_.cameras = cameras_.finish();
+  drop_unused_objects(scene_, [](uint32_t) {});
+  drop_unused_parts(scene_);
   if (scene_.cameras.size() > 1)
     reporter_.note(end,
                    std::to_string(scene_.cameras.size()) + " cameras: the last one comes first, as pbrt uses that");
   statistics_.triangles = unique_triangle_count(scene_);
+  count_features();
   return {std::move(scene_), std::move(statistics_)};
 }
 

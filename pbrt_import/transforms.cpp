@@ -1,5 +1,7 @@
 #include "pbrt_import/transforms.h"
 
+#include <array>
+#include <charconv>
 #include <cmath>
 #include <numbers>
 
@@ -64,6 +66,44 @@ bool is_invertible(const DAffine& map) {
       moderate(map[3]))
     return true;
   return determinant != 0.0 && std::isfinite(determinant) && is_finite(inverse(map));
+}
+
+std::optional<TransformKey> decompose(const DAffine& map) {
+  if (!is_invertible(map)) return std::nullopt;
+  const glm::dmat3 linear(map);
+  const auto norm = [](const glm::dmat3& m) {
+    return std::sqrt(glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
+  };
+  // Newton's iteration for the nearest orthogonal matrix. The factor makes its first steps count for any scale; near
+  // the end it is 1 and convergence quadratic.
+  constexpr int kMostSteps = 64;
+  constexpr double kConverged = 1e-14;
+  glm::dmat3 rotation = linear;
+  double change = 1.0;
+  for (int step = 0; step < kMostSteps && change > kConverged; ++step) {
+    const glm::dmat3 inverted = glm::transpose(glm::inverse(rotation));
+    const double factor = std::sqrt(norm(inverted) / norm(rotation));
+    const glm::dmat3 next = (rotation * factor + inverted / factor) * 0.5;
+    change = norm(next - rotation) / norm(next);
+    rotation = next;
+  }
+  if (!(change <= std::sqrt(kConverged))) return std::nullopt; // singular as far as doubles can tell
+  if (glm::determinant(rotation) < 0.0) rotation = -rotation;
+  return TransformKey{map, glm::normalize(glm::quat_cast(rotation)), glm::transpose(rotation) * linear};
+}
+
+std::string to_text(double time) {
+  std::array<char, 32> digits{};
+  const auto [end, error] = std::to_chars(digits.data(), digits.data() + digits.size(), time);
+  return std::string(digits.data(), end);
+}
+
+std::optional<AnimatedTransform> animate(const DAffine& start, const DAffine& end, TransformTimes times) {
+  const std::optional<TransformKey> start_key = decompose(start);
+  std::optional<TransformKey> end_key = decompose(end);
+  if (!start_key || !end_key) return std::nullopt;
+  if (glm::dot(start_key->rotation, end_key->rotation) < 0.0) end_key->rotation = -end_key->rotation;
+  return AnimatedTransform{times.start, times.end, *start_key, *end_key};
 }
 
 } // namespace packtrace

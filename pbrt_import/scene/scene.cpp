@@ -16,6 +16,15 @@ uint64_t bytes_of(const Mesh& mesh) {
          mesh.triangles.size() * sizeof(Triangle);
 }
 
+DAffine interpolate(const AnimatedTransform& keys, double time) {
+  if (time <= keys.start_time) return keys.start.map;
+  if (time >= keys.end_time) return keys.end.map;
+  const double s = (time - keys.start_time) / (keys.end_time - keys.start_time);
+  const glm::dmat3 scale = keys.start.scale * (1.0 - s) + keys.end.scale * s;
+  const glm::dmat3 linear = glm::mat3_cast(glm::slerp(keys.start.rotation, keys.end.rotation, s)) * scale;
+  return DAffine(linear[0], linear[1], linear[2], glm::mix(keys.start.map[3], keys.end.map[3], s));
+}
+
 uint64_t unique_triangle_count(const Scene& scene) {
   uint64_t total = triangle_count(scene, scene.shapes);
   for (const Object& object : scene.objects) total += triangle_count(scene, object.shapes);

@@ -27,7 +27,8 @@ struct BakeOptions {
   std::string input, output;
   std::optional<double> precision, precision_abs, precision_edge;
   std::optional<uint32_t> position_bits;
-  bool strict = false, dry_run = false;
+  SceneOptions scene;
+  bool dry_run = false;
 };
 
 BakeConfig make_config(const BakeOptions& options) {
@@ -80,7 +81,7 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   Progress progress(display.observer());
 
   const Stopwatch importing;
-  const ImportResult imported = import_for_command(options.input, options.strict, globals, progress, display);
+  const ImportResult imported = import_for_command(options.input, options.scene, globals, progress, display);
   const double import_s = importing.seconds();
 
   Diagnostics diagnostics;
@@ -132,7 +133,7 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
     for (CLI::Option* other : precisions)
       if (option != other) option->excludes(other);
   verb.add_flag("--dry-run", options->dry_run, "Do everything but write the file");
-  verb.add_flag("--strict", options->strict, "Fail if the scene has any problem");
+  add_scene_options(verb, options->scene);
   verb.footer(
       "The grid is shared by all geometry of the world, so meshes that touch stay closed. The error that was measured\n"
       "against the source is printed, stored in the file, and never above half a step per axis.\n"

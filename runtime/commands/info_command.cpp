@@ -1,7 +1,11 @@
 #include "runtime/commands/info_command.h"
 
+#include <algorithm>
+#include <map>
 #include <memory>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -18,13 +22,39 @@ namespace {
 
 struct InfoOptions {
   std::string input;
-  bool strict = false;
+  SceneOptions scene;
 };
 
-nlohmann::json to_json(const ImportResult& imported) {
+const char* name_of(Projection projection) {
+  switch (projection) {
+  case Projection::kPerspective:
+    return "perspective";
+  case Projection::kOrthographic:
+    return "orthographic";
+  case Projection::kEnvironment:
+    return "environment";
+  }
+  return "unknown";
+}
+
+nlohmann::json to_json(const Camera& camera) {
+  nlohmann::json json = {{"projection", name_of(camera.projection)},
+                         {"width", camera.width_px},
+                         {"height", camera.height_px},
+                         {"film", camera.film_name},
+                         {"shutter", {camera.shutter_open, camera.shutter_close}},
+                         {"animated", camera.animation != kNotAnimated}};
+  if (camera.projection == Projection::kPerspective) json["fov"] = camera.fov_degrees;
+  if (const auto& w = camera.screen_window) json["screen_window"] = {w->x, w->y, w->z, w->w};
+  return json;
+}
+
+nlohmann::json to_json(const ImportResult& imported, uint32_t world) {
   const Scene& scene = imported.scene;
   const ImportStatistics& statistics = imported.statistics;
   const Bounds bounds = world_bounds(scene);
+  nlohmann::json cameras = nlohmann::json::array();
+  for (const Camera& camera : scene.cameras) cameras.push_back(to_json(camera));
   return {
       {"triangles", unique_triangle_count(scene)},
       {"placed_triangles", placed_triangle_count(scene)},
@@ -36,19 +66,37 @@ nlohmann::json to_json(const ImportResult& imported) {
       {"objects", scene.objects.size()},
       {"instances", scene.instances.size()},
       {"materials", scene.materials.size()},
+      {"materials_by_kind", statistics.materials},
       {"masks", scene.masks.size()},
       {"cameras", scene.cameras.size()},
+      {"camera_list", std::move(cameras)},
       {"area_lights", statistics.area_lights},
       {"light_sources", statistics.light_sources},
       {"textures_found", statistics.textures_found},
       {"textures_missing", statistics.textures_missing},
+      {"worlds", statistics.worlds},
+      {"world", world},
+      {"time", scene.time},
+      {"animated",
+       {{"shapes", statistics.animated_shapes},
+        {"instances", statistics.animated_instances},
+        {"cameras", statistics.animated_cameras}}},
+      {"ignored", statistics.ignored},
       {"directives", statistics.directives},
       {"files", statistics.files_read},
       {"file_bytes", statistics.bytes_read},
       {"bounds", {{"lo", {bounds.lo.x, bounds.lo.y, bounds.lo.z}}, {"hi", {bounds.hi.x, bounds.hi.y, bounds.hi.z}}}}};
 }
 
-std::string to_text(const ImportResult& imported) {
+/// "title   a 1   b 2", without its end of line.
+std::string row_of(std::string_view title, const std::map<std::string, uint64_t>& counts) {
+  std::string row(title);
+  for (const auto& [name, count] : counts) row += fmt::format(grouped(), "   {} {:L}", name, count);
+  std::replace(row.begin(), row.end(), '_', ' ');
+  return row;
+}
+
+std::string to_text(const ImportResult& imported, uint32_t world) {
   const Scene& scene = imported.scene;
   const ImportStatistics& s = imported.statistics;
   std::string text = fmt::format(
@@ -63,9 +111,18 @@ std::string to_text(const ImportResult& imported) {
   const DVec3 extent = world_bounds(scene).extent();
   text += fmt::format(grouped(), "bounds {:.6g} x {:.6g} x {:.6g}   read {:L} bytes in {:L} files\n", extent.x,
                       extent.y, extent.z, s.bytes_read, s.files_read);
-  text += "shapes";
-  for (const auto& [kind, count] : s.shapes) text += fmt::format(grouped(), "   {} {:L}", kind, count);
-  return text + fmt::format(grouped(), "   ({:L} skipped, {:L} absent)\n", s.shapes_skipped, s.shapes_absent);
+  text += row_of("shapes", s.shapes) +
+          fmt::format(grouped(), "   ({:L} skipped, {:L} absent)\n", s.shapes_skipped, s.shapes_absent);
+  if (!s.materials.empty()) text += row_of("materials by kind", s.materials) + "\n";
+  for (const Camera& camera : scene.cameras)
+    text += fmt::format("camera   {} {}x{} \"{}\"{}\n", name_of(camera.projection), camera.width_px, camera.height_px,
+                        camera.film_name, camera.animation == kNotAnimated ? "" : "   animated");
+  if (s.worlds > 1) text += fmt::format("world {} of {}\n", world, s.worlds);
+  if (s.animated_shapes + s.animated_instances + s.animated_cameras > 0)
+    text += fmt::format(grouped(), "animated   shapes {:L}   instances {:L}   cameras {:L}   (shown as at time {})\n",
+                        s.animated_shapes, s.animated_instances, s.animated_cameras, scene.time);
+  if (!s.ignored.empty()) text += row_of("ignored", s.ignored) + "\n";
+  return text;
 }
 
 int run(const InfoOptions& options, const GlobalOptions& globals) {
@@ -75,13 +132,14 @@ int run(const InfoOptions& options, const GlobalOptions& globals) {
   nlohmann::json document;
   std::string text;
   if (is_baked_file(options.input)) {
+    require_no_scene_choice(options.input, options.scene);
     const FileSummary summary = summarize(BakedFile::open(options.input));
     document = to_json(summary);
     text = to_text(summary);
   } else {
-    const ImportResult imported = import_for_command(options.input, options.strict, globals, progress, display);
-    document = to_json(imported);
-    text = to_text(imported);
+    const ImportResult imported = import_for_command(options.input, options.scene, globals, progress, display);
+    document = to_json(imported, options.scene.world);
+    text = to_text(imported, options.scene.world);
   }
   document["verb"] = "info";
   document["input"] = options.input;
@@ -97,7 +155,7 @@ void add_info_command(CLI::App& app, GlobalOptions& globals) {
   CLI::App& verb = add_verb(app, globals, "info", "Say what a .ptk file or a .pbrt scene holds",
                             [options, &globals] { return run(*options, globals); });
   verb.add_option("FILE", options->input, "A .ptk file or a .pbrt scene")->required();
-  verb.add_flag("--strict", options->strict, "Fail if a .pbrt scene has any problem");
+  add_scene_options(verb, options->scene);
   verb.footer("Example:\n  packtrace info house.ptk --json -");
 }
 

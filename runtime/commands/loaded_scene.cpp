@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <fstream>
+
+#include <CLI/CLI.hpp>
 
 #include "pbrt_import/scene/error.h"
 #include "runtime/trace/float_source.h"
@@ -19,11 +22,33 @@ bool is_baked_file(const std::filesystem::path& file) {
                           [](char a, uint8_t b) { return static_cast<uint8_t>(a) == b; });
 }
 
-ImportResult import_for_command(const std::filesystem::path& file, bool strict, const GlobalOptions& globals,
-                                Progress& progress, ProgressDisplay& display) {
+void add_scene_options(CLI::App& verb, SceneOptions& options) {
+  constexpr const char* kGroup = "Reading of .pbrt scenes";
+  verb.add_flag("--strict", options.strict, "Fail if the scene has any problem")->group(kGroup);
+  verb.add_option("--world", options.world, "Which of the file's worlds, from 1 (the default)")
+      ->check(CLI::Range(1u, UINT32_MAX))
+      ->type_name("N")
+      ->group(kGroup);
+  verb.add_option("--time", options.time,
+                  "When to look at what moves, in the unit of TransformTimes (default: as the camera's shutter opens)")
+      ->type_name("T")
+      ->group(kGroup);
+}
+
+void require_no_scene_choice(const std::filesystem::path& file, const SceneOptions& options) {
+  const char* const option = options.time ? "--time" : options.world != 1 ? "--world" : nullptr;
+  if (option)
+    throw Error(ErrorKind::kUsage, file.string() + ": " + option +
+                                       " is for .pbrt scenes; a .ptk file holds one world at one time, chosen by bake");
+}
+
+ImportResult import_for_command(const std::filesystem::path& file, const SceneOptions& scene_options,
+                                const GlobalOptions& globals, Progress& progress, ProgressDisplay& display) {
   Diagnostics diagnostics;
   ImportOptions options;
-  options.strict = strict;
+  options.strict = scene_options.strict;
+  options.world = scene_options.world;
+  options.time = scene_options.time;
   ImportResult result;
   try {
     result = import_scene(file, options, diagnostics, progress);
@@ -41,14 +66,16 @@ ImportResult import_for_command(const std::filesystem::path& file, bool strict, 
   return result;
 }
 
-LoadedScene load_scene(const std::filesystem::path& file, bool strict, const GlobalOptions& globals, Progress& progress,
-                       ProgressDisplay& display) {
+LoadedScene load_scene(const std::filesystem::path& file, const SceneOptions& scene_options,
+                       const GlobalOptions& globals, Progress& progress, ProgressDisplay& display) {
   LoadedScene loaded;
   if (is_baked_file(file)) {
+    require_no_scene_choice(file, scene_options);
     loaded.baked.emplace(BakedFile::open(file));
     loaded.source = std::make_unique<PackedSource>(*loaded.baked);
   } else {
-    loaded.imported = std::make_unique<Scene>(import_for_command(file, strict, globals, progress, display).scene);
+    loaded.imported =
+        std::make_unique<Scene>(import_for_command(file, scene_options, globals, progress, display).scene);
     loaded.source = std::make_unique<FloatSource>(*loaded.imported);
   }
   return loaded;

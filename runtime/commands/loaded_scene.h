@@ -17,10 +17,24 @@ namespace packtrace {
 /// True for .ptk files: by the name, or by the first bytes where the name says something else.
 bool is_baked_file(const std::filesystem::path& file);
 
+/// How verbs read a pbrt scene; as in ImportOptions.
+struct SceneOptions {
+  bool strict = false;
+  uint32_t world = 1;
+  std::optional<double> time;
+};
+
+/// Adds --strict, --world and --time to a verb; options must outlive it.
+void add_scene_options(CLI::App& verb, SceneOptions& options);
+
+/// Throws Error(kUsage) where options ask for what only a .pbrt scene has: a baked file holds one world at one time.
+void require_no_scene_choice(const std::filesystem::path& file, const SceneOptions& options);
+
 /// Imports a pbrt file, prints its diagnostics, and refuses scenes without triangles.
-/// Throws Error(kInput) where the file cannot be read, nothing is left of it, or strict is set and there was a problem.
-ImportResult import_for_command(const std::filesystem::path& file, bool strict, const GlobalOptions& globals,
-                                Progress& progress, ProgressDisplay& display);
+/// Throws Error(kInput) where the file cannot be read, lacks the world asked for, nothing is left of it, or strict is
+/// set and there was a problem.
+ImportResult import_for_command(const std::filesystem::path& file, const SceneOptions& scene_options,
+                                const GlobalOptions& globals, Progress& progress, ProgressDisplay& display);
 
 /// A scene on disk, packed or not, ready to be traced.
 struct LoadedScene {
@@ -29,8 +43,8 @@ struct LoadedScene {
   std::unique_ptr<SceneSource> source; ///< over one of the two
 };
 
-/// Throws like BakedFile::open() and import_for_command().
-LoadedScene load_scene(const std::filesystem::path& file, bool strict, const GlobalOptions& globals, Progress& progress,
-                       ProgressDisplay& display);
+/// Throws like BakedFile::open(), require_no_scene_choice() and import_for_command().
+LoadedScene load_scene(const std::filesystem::path& file, const SceneOptions& scene_options,
+                       const GlobalOptions& globals, Progress& progress, ProgressDisplay& display);
 
 } // namespace packtrace

@@ -35,7 +35,8 @@ struct RenderOptions {
   std::string size;
   uint32_t supersample = 1;
   std::optional<uint32_t> spp, frames;
-  bool ground_truth = false, no_denoise = false, strict = false, fast_edges = false;
+  bool ground_truth = false, no_denoise = false, fast_edges = false;
+  SceneOptions scene;
   std::optional<float> ao_radius;
   bool ao_falloff_off = false;
   float ao_interreflection = 0.0f;
@@ -162,7 +163,7 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   ImageOutputs outputs(options.outputs, options.aovs, globals.force); // before the work, like the above
   ProgressDisplay display(globals);
   Progress progress(display.observer());
-  const LoadedScene loaded = load_scene(options.input, options.strict, globals, progress, display);
+  const LoadedScene loaded = load_scene(options.input, options.scene, globals, progress, display);
   const Camera camera = choose_camera(*loaded.source, options, globals);
   const RenderConfig config = make_config(*loaded.source, camera, options);
 
@@ -230,7 +231,7 @@ void add_render_command(CLI::App& app, GlobalOptions& globals) {
   verb.add_flag(
       "--fast-edges", options->fast_edges,
       "Up to a fifth faster, but a few rays slip between triangles that touch; --bvh high needs it to pay off");
-  verb.add_flag("--strict", options->strict, "Stop at the first problem in a .pbrt scene");
+  add_scene_options(verb, options->scene);
   verb.footer("Examples:\n"
               "  packtrace render house.ptk -o house.png\n"
               "  packtrace render house.ptk -o house.png -o house.exr --aov all --supersample 2\n"

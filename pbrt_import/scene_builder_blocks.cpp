@@ -1,0 +1,177 @@
+// The part of SceneBuilder that keeps worlds, blocks, objects and instances.
+#include <algorithm>
+
+#include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene_builder.h"
+#include "pbrt_import/tokenizer.h"
+
+namespace packtrace {
+
+void SceneBuilder::begin_world(const Directive& directive) {
+  if (phase_ == Phase::kWorld)
+    return reporter_.error(directive.place, "WorldBegin inside the world block; it is ignored");
+  phase_ = Phase::kWorld;
+  ++statistics_.worlds;
+  options_behind_world_.reset();
+  if (!reading()) return;
+  settle_time();
+  state_.reset_transform();
+  coordinate_systems_["world"] = state_.transform();
+}
+
+void SceneBuilder::end_world(const Place& place) {
+  const std::vector<Block> open = state_.blocks();
+  for (const Block& block : open)
+    reporter_.warning(block.place, std::string(begin_keyword(block.kind)) + " without its " +
+                                       std::string(end_keyword(block.kind)) + " before the world ends at " +
+                                       to_string(reporter_.locate(place)));
+  while (!state_.blocks().empty()) state_.close_block();
+  std::fill(std::begin(open_blocks_), std::end(open_blocks_), 0u);
+  ignored_blocks_ = nested_objects_ = 0;
+  current_object_ = kNone;
+  phase_ = Phase::kOptions;
+  ++world_;
+}
+
+void SceneBuilder::open(BlockKind kind, const Directive& directive) {
+  if (state_.blocks().size() >= options_.max_nesting) {
+    ++ignored_blocks_;
+    return reporter_.error(directive.place, "blocks are nested more than " + std::to_string(options_.max_nesting) +
+                                                " deep; deeper ones do not keep the state apart");
+  }
+  state_.open_block(kind, directive.place);
+  ++open_blocks_[static_cast<size_t>(kind)];
+}
+
+void SceneBuilder::close(BlockKind kind, const Directive& directive) {
+  if (ignored_blocks_ > 0) {
+    --ignored_blocks_;
+    return;
+  }
+  const auto top = [&]() -> const Block& { return state_.blocks().back(); };
+  if (open_blocks_[static_cast<size_t>(kind)] == 0) {
+    std::string message = std::string(end_keyword(kind)) + " without " + std::string(begin_keyword(kind));
+    if (!state_.blocks().empty())
+      message += "; the innermost open block is the " + std::string(begin_keyword(top().kind)) + " at " +
+                 to_string(reporter_.locate(top().place));
+    return reporter_.error(directive.place, std::move(message));
+  }
+  while (true) {
+    const Block& block = top();
+    const BlockKind closed = block.kind;
+    if (closed != kind)
+      reporter_.error(directive.place, std::string(end_keyword(kind)) + " closes the " + std::string(begin_keyword(closed)) + " at " +
+                                           to_string(reporter_.locate(block.place)) + ", which has no " +
+                                           std::string(end_keyword(closed)) + " before it");
+    state_.close_block();
+    --open_blocks_[static_cast<size_t>(closed)];
+    if (closed == BlockKind::kObject) {
+      if (nested_objects_ > 0)
+        --nested_objects_;
+      else
+        current_object_ = kNone;
+    }
+    if (closed == kind) return;
+  }
+}
+
+void SceneBuilder::begin_object(const Directive& directive) {
+  const uint64_t ignored_before = ignored_blocks_;
+  open(BlockKind::kObject, directive);
+  if (ignored_blocks_ != ignored_before) return;
+  if (current_object_ != kNone) {
+    ++nested_objects_;
+    return reporter_.error(directive.place, "ObjectBegin " + in_quotes(directive.names[0]) + " inside object " +
+                                                in_quotes(scene_.objects[current_object_].name) +
+                                                "; its shapes belong to the outer object");
+  }
+  current_object_ = static_cast<uint32_t>(scene_.objects.size());
+  const uint32_t name = object_names_.intern(directive.names[0]);
+  if (name < objects_by_name_.size()) {
+    reporter_.warning(directive.place, "object " + in_quotes(directive.names[0]) +
+                                           " is defined again; later instances show the new one, unlike the one at " +
+                                           to_string(reporter_.locate(object_places_[objects_by_name_[name]])));
+    objects_by_name_[name] = current_object_;
+  } else {
+    objects_by_name_.push_back(current_object_);
+  }
+  scene_.objects.push_back({directive.names[0], {}});
+  object_places_.push_back(directive.place);
+}
+
+void SceneBuilder::add_instance(const Directive& directive) {
+  const std::string& name = directive.names[0];
+  if (current_object_ != kNone)
+    return reporter_.error(directive.place, "ObjectInstance " + in_quotes(name) + " inside object " +
+                                                in_quotes(scene_.objects[current_object_].name) +
+                                                "; objects cannot hold instances");
+  const std::optional<uint32_t> found = object_names_.find(name);
+  if (!found) {
+    std::string_view suggestion;
+    if (object_names_.size() <= 1000) { // a hint is not worth more comparisons than that
+      std::vector<std::string_view> names;
+      for (uint32_t i = 0; i < object_names_.size(); ++i) names.push_back(object_names_.name(i));
+      suggestion = closest_name(name, names);
+    }
+    return reporter_.error(directive.place,
+                           "no object " + in_quotes(name) + "; the instance is skipped" + did_you_mean(suggestion));
+  }
+  const Placement placement = place(directive, "instance");
+  const Affine world_from_object(placement.map);
+  if (!is_invertible(DAffine(world_from_object)))
+    return reporter_.error(directive.place, "the instance's transform has no inverse (a scale of 0?); it is skipped");
+  // Room that is never used costs address space only, where copies would cost memory while they are made.
+  if (scene_.instances.size() == scene_.instances.capacity())
+    scene_.instances.reserve(std::max<size_t>(1024, 4 * scene_.instances.size()));
+  if (placement.animation != kNotAnimated)
+    scene_.animated_instances.push_back({static_cast<uint32_t>(scene_.instances.size()), placement.animation});
+  scene_.instances.push_back({objects_by_name_[*found], world_from_object});
+}
+
+SceneBuilder::Placement SceneBuilder::place(const Directive& directive, std::string_view thing) {
+  const TransformPair& pair = state_.transform();
+  if (!state_.animated()) return {pair.start, kNotAnimated};
+  const std::optional<AnimatedTransform> keys = animate(pair.start, pair.end, transform_times_);
+  if (!keys) {
+    if (is_invertible(pair.start)) // else whoever asked reports it
+      reporter_.error(directive.place, "animated " + std::string(thing) +
+                                           ": its transform at EndTime has no inverse; it stands as at its start");
+    return {pair.start, kNotAnimated};
+  }
+  reporter_.note(directive.place, "animated " + std::string(thing) + ": it stands as at time " + to_text(scene_.time));
+  std::vector<AnimatedTransform>& all = scene_.animations;
+  const bool as_before = !all.empty() && all.back().start.map == pair.start && all.back().end.map == pair.end;
+  if (!as_before) all.push_back(*keys);
+  return {interpolate(*keys, scene_.time), static_cast<uint32_t>(all.size() - 1)};
+}
+
+/// Options are complete: says when everything is looked at.
+void SceneBuilder::settle_time() {
+  scene_.time = options_.time.value_or(cameras_.shutter_open());
+  cameras_.settle(scene_.time, transform_times_, scene_.animations, reporter_);
+}
+
+void SceneBuilder::check_worlds(const Place& end) {
+  const uint64_t worlds = statistics_.worlds;
+  if (options_.world > std::max<uint64_t>(worlds, 1))
+    throw Error(ErrorKind::kInput, to_string(reporter_.locate({end.file, 0, 0})) + ": there is no world " +
+                                       std::to_string(options_.world) + ": the file has " + std::to_string(worlds));
+  if (worlds == 0) return settle_time();
+  if (worlds > 1)
+    reporter_.note(end, "the file has " + std::to_string(worlds) + " worlds; world " + std::to_string(options_.world) +
+                            " is read");
+  if (phase_ != Phase::kOptions) return;
+  phase_ = Phase::kDone;
+  if (options_behind_world_)
+    reporter_.warning(*options_behind_world_,
+                      "what follows the last WorldEnd has no effect: options belong before their WorldBegin");
+}
+
+void SceneBuilder::report_media() {
+  for (const auto& [name, place] : media_uses_)
+    if (!media_.contains(name)) reporter_.error(place, "MediumInterface: no medium " + in_quotes(name));
+  for (const auto& [name, place] : media_)
+    if (!media_uses_.contains(name)) reporter_.note(place, "medium " + in_quotes(name) + " is never used");
+}
+
+} // namespace packtrace

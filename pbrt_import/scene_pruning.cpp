@@ -1,0 +1,88 @@
+#include "pbrt_import/scene_pruning.h"
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+namespace packtrace {
+namespace {
+
+/// Renumbers the elements that something uses, in order, and drops the others.
+template <class Element>
+std::vector<uint32_t> keep_used(std::vector<Element>& elements, const std::vector<uint8_t>& used) {
+  std::vector<uint32_t> numbers(elements.size(), 0);
+  uint32_t count = 0;
+  for (size_t i = 0; i < elements.size(); ++i) {
+    if (!used[i]) continue;
+    numbers[i] = count;
+    if (count != i) elements[count] = std::move(elements[i]);
+    ++count;
+  }
+  elements.erase(elements.begin() + count, elements.end());
+  return numbers;
+}
+
+template <class Function>
+void for_each_shape(Scene& scene, Function function) {
+  for (Shape& shape : scene.shapes) function(shape);
+  for (Object& object : scene.objects)
+    for (Shape& shape : object.shapes) function(shape);
+}
+
+void drop_unused_animations(Scene& scene) {
+  if (scene.animations.empty()) return;
+  const auto for_each_user = [&](auto function) {
+    const auto visit = [&](auto& things) {
+      for (auto& thing : things)
+        if (thing.animation != kNotAnimated) function(thing.animation);
+    };
+    visit(scene.shapes);
+    for (Object& object : scene.objects) visit(object.shapes);
+    visit(scene.animated_instances);
+    visit(scene.cameras);
+  };
+  std::vector<uint8_t> used(scene.animations.size(), 0);
+  for_each_user([&](uint32_t animation) { used[animation] = 1; });
+  const std::vector<uint32_t> numbers = keep_used(scene.animations, used);
+  for_each_user([&](uint32_t& animation) { animation = numbers[animation]; });
+}
+
+} // namespace
+
+void drop_unused_objects(Scene& scene, const std::function<void(uint32_t object)>& unused) {
+  std::vector<uint8_t> shown(scene.objects.size(), 0);
+  for (const Instance& instance : scene.instances) shown[instance.object] = 1;
+  for (uint32_t i = 0; i < scene.objects.size(); ++i) {
+    if (!shown[i] && !scene.objects[i].shapes.empty()) unused(i);
+    if (scene.objects[i].shapes.empty()) shown[i] = 0;
+  }
+  std::vector<uint8_t> kept(scene.instances.size());
+  for (size_t i = 0; i < kept.size(); ++i) kept[i] = shown[scene.instances[i].object];
+  const std::vector<uint32_t> instance_numbers = keep_used(scene.instances, kept);
+  std::erase_if(scene.animated_instances, [&](const AnimatedInstance& animated) { return !kept[animated.instance]; });
+  for (AnimatedInstance& animated : scene.animated_instances) animated.instance = instance_numbers[animated.instance];
+  const std::vector<uint32_t> numbers = keep_used(scene.objects, shown);
+  for (Instance& instance : scene.instances) instance.object = numbers[instance.object];
+}
+
+void drop_unused_parts(Scene& scene) {
+  std::vector<uint8_t> meshes(scene.meshes.size()), materials(scene.materials.size()), masks(scene.masks.size());
+  for_each_shape(scene, [&](const Shape& shape) { meshes[shape.mesh] = materials[shape.material] = 1; });
+  const std::vector<uint32_t> mesh_numbers = keep_used(scene.meshes, meshes);
+  const std::vector<uint32_t> material_numbers = keep_used(scene.materials, materials);
+  for_each_shape(scene, [&](Shape& shape) {
+    shape.mesh = mesh_numbers[shape.mesh];
+    shape.material = material_numbers[shape.material];
+  });
+  const auto for_each_mask = [&](auto function) {
+    for (Material& material : scene.materials)
+      for (uint32_t* const mask : {&material.alpha_mask, &material.shadow_alpha_mask})
+        if (*mask != kNoMask) function(*mask);
+  };
+  for_each_mask([&](uint32_t mask) { masks[mask] = 1; });
+  const std::vector<uint32_t> mask_numbers = keep_used(scene.masks, masks);
+  for_each_mask([&](uint32_t& mask) { mask = mask_numbers[mask]; });
+  drop_unused_animations(scene);
+}
+
+} // namespace packtrace
