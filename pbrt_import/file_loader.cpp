@@ -58,6 +58,7 @@ void FileLoader::read_ply_file(PlyFile& file, Mesh& mesh) const {
       outcome.reports.push_back({severity, line, std::move(message)});
     });
     outcome.dropped_triangles = ply.dropped_triangles;
+    if (ply.mesh.triangles.empty()) throw Error(ErrorKind::kInput, "no triangle is left");
     mesh = std::move(ply.mesh);
     mesh.name = file.path.filename().string();
   });
@@ -131,10 +132,16 @@ void FileLoader::report_ply(const PlyFile& file) {
 }
 
 void FileLoader::report_image(const ImageRequest& image, const Outcome& outcome) {
-  if (outcome.error.empty()) return;
+  const uint64_t bad_pixels = image.summary.not_finite_pixels;
+  if (outcome.error.empty() && bad_pixels == 0) return;
   reporter_.set_sequence(image.sequence);
-  reporter_.error(image.place, "texture file " + in_quotes(image.path.string(), kMaxShownPath) + ": " + outcome.error +
-                                   "; it counts as white");
+  const std::string file = "texture file " + in_quotes(image.path.string(), kMaxShownPath) + ": ";
+  if (!outcome.error.empty())
+    reporter_.error(image.place, file + outcome.error + "; it counts as white");
+  else
+    reporter_.warning(image.place, file + (bad_pixels == 1 ? "1 pixel is not finite; it counts as black"
+                                                           : std::to_string(bad_pixels) +
+                                                                 " pixels are not finite; they count as black"));
 }
 
 } // namespace packtrace

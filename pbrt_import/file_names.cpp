@@ -23,7 +23,7 @@ std::filesystem::path FileNames::resolve(std::string_view raw, const Place& plac
   bool unknown_escape = false;
   const std::string name = unescape(raw, unknown_escape);
   if (name.empty()) {
-    reporter.error(place, "empty file name");
+    reporter.error(place, "empty file name; nothing is read");
     return {};
   }
   std::filesystem::path path = (folder_ / name).lexically_normal();
@@ -46,7 +46,7 @@ std::filesystem::path FileNames::resolve(std::string_view raw, const Place& plac
     const auto real_folder = std::filesystem::weakly_canonical(folder_.empty() ? "." : folder_, error);
     const auto relative = std::filesystem::weakly_canonical(path, error).lexically_relative(real_folder);
     if (error || relative.empty() || *relative.begin() == "..") {
-      reporter.error(place, "file name " + in_quotes(raw) + " leads out of the scene's folder");
+      reporter.error(place, "file name " + in_quotes(raw) + " leads out of the scene's folder; it is not read");
       return {};
     }
   }

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include <OpenEXR/ImfArray.h>
 #include <OpenEXR/ImfHeader.h>
@@ -31,6 +32,8 @@ namespace {
 
 [[noreturn]] void fail(const std::string& why) { throw Error(ErrorKind::kInput, why); }
 
+constexpr const char* kTruncated = "damaged image: the file is truncated";
+
 /// Takes pixels one after the other, rows from the top.
 class Summarizer {
 public:
@@ -41,7 +44,10 @@ public:
   }
 
   void add(uint32_t x, uint32_t y, Vec3 pixel) {
-    if (!is_finite(pixel)) return;
+    if (!is_finite(pixel)) {
+      ++summary_.not_finite_pixels;
+      return;
+    }
     row_ += DVec3(pixel);
     if (want_mask_ && (pixel.x != 0.0f || pixel.y != 0.0f || pixel.z != 0.0f))
       summary_.nonzero[static_cast<size_t>(y) * AlphaMask::row_words(width_) + x / 32] |= 1u << (x % 32);
@@ -65,12 +71,17 @@ private:
   DVec3 row_{0.0}, total_{0.0};
 };
 
-void check_size(uint64_t width, uint64_t height, uint64_t bytes_per_pixel, uint64_t max_bytes) {
+/// @param stored_bytes of the file
+void check_size(uint64_t width, uint64_t height, uint64_t bytes_per_pixel, uint64_t stored_bytes, uint64_t max_bytes) {
   if (width == 0 || height == 0) fail("the image has no pixels");
   constexpr uint64_t kMaxSide = 1u << 24;
   if (width > kMaxSide || height > kMaxSide || width * height > max_bytes / bytes_per_pixel)
     throw Error(ErrorKind::kLimitExceeded, "decoding its " + std::to_string(width) + " x " + std::to_string(height) +
                                                " pixels needs too much memory");
+  constexpr uint64_t kMostPixelsPerByte = 1u << 16; // PNG reaches 8256; EXR's DWAB compression has chunks of 96 bytes
+  if (width * height / kMostPixelsPerByte > stored_bytes)
+    fail("damaged image: its " + std::to_string(stored_bytes) + " bytes cannot hold the " + std::to_string(width) +
+         " x " + std::to_string(height) + " pixels it claims");
 }
 
 /// Source: IEC 61966-2-1.
@@ -94,33 +105,82 @@ ImageSummary summarize(const T* pixels, int width, int height, bool want_mask, T
   return summarizer.finish();
 }
 
+/// Bytes in memory as stb_image reads them, which takes whatever is behind the end of some formats as zeros.
+class StbStream {
+public:
+  explicit StbStream(std::span<const std::byte> bytes) : bytes_(bytes) {}
+  static stbi_io_callbacks callbacks() {
+    return {[](void* self, char* to, int size) { return static_cast<StbStream*>(self)->read(to, size); },
+            [](void* self, int count) { static_cast<StbStream*>(self)->skip(count); },
+            [](void* self) { return static_cast<StbStream*>(self)->at_end() ? 1 : 0; }};
+  }
+
+  /// More was asked for than there is.
+  bool truncated() const { return truncated_; }
+
+private:
+  int read(char* to, int size) {
+    const auto wanted = static_cast<size_t>(std::max(size, 0));
+    const size_t count = std::min(wanted, bytes_.size() - position_);
+    if (count > 0) std::memcpy(to, bytes_.data() + position_, count);
+    position_ += count;
+    // The first destination is stb_image's own buffer, which it fills with what there is; all others want every byte.
+    if (!buffer_) buffer_ = to;
+    if (to == buffer_ ? count == 0 : count < wanted) truncated_ = true;
+    return static_cast<int>(count);
+  }
+  void skip(int count) {
+    const auto left = static_cast<int64_t>(bytes_.size() - position_), at = static_cast<int64_t>(position_);
+    position_ += static_cast<size_t>(std::clamp<int64_t>(count, -at, left));
+  }
+  bool at_end() const { return position_ == bytes_.size(); }
+
+  std::span<const std::byte> bytes_;
+  size_t position_ = 0;
+  const char* buffer_ = nullptr;
+  bool truncated_ = false;
+};
+
 ImageSummary read_stb(std::span<const std::byte> bytes, bool decode_srgb, bool want_mask, uint64_t max_bytes) {
   if (bytes.size() > static_cast<size_t>(INT32_MAX)) fail("the image file exceeds 2 GiB");
   const auto* const data = reinterpret_cast<const stbi_uc*>(bytes.data());
   const int size = static_cast<int>(bytes.size());
   int width = 0, height = 0, channels = 0;
-  if (!stbi_info_from_memory(data, size, &width, &height, &channels))
+  if (!stbi_info_from_memory(data, size, &width, &height, &channels)) {
+    const std::string_view text(reinterpret_cast<const char*>(data), bytes.size());
+    for (const auto& [format, magic] : {std::pair<std::string_view, std::string_view>{"PNG", "\x89PNG"},
+                                        {"JPEG", "\xff\xd8"},
+                                        {"HDR", "#?RADIANCE"},
+                                        {"BMP", "BM"}})
+      if (text.starts_with(magic))
+        fail("the header of the " + std::string(format) + " image is damaged, or claims more pixels than can be read");
     fail("not an image in a known format (PNG, TGA, EXR, PFM, HDR, JPEG, BMP)");
+  }
   const bool is_float = stbi_is_hdr_from_memory(data, size) != 0;
   const bool is_wide = stbi_is_16_bit_from_memory(data, size) != 0;
   // stb_image holds up to two copies, of four channels at most.
-  check_size(static_cast<uint64_t>(width), static_cast<uint64_t>(height), is_float ? 32 : is_wide ? 16 : 8, max_bytes);
-  const auto load = [&](auto* pixels) {
+  const uint64_t pixel_bytes = is_float ? 32 : is_wide ? 16 : 8;
+  check_size(static_cast<uint64_t>(width), static_cast<uint64_t>(height), pixel_bytes, bytes.size(), max_bytes);
+  const auto load = [&](auto decode) {
+    StbStream stream(bytes);
+    const stbi_io_callbacks callbacks = StbStream::callbacks();
+    auto* const pixels = decode(&callbacks, &stream, &width, &height, &channels, 3);
     std::unique_ptr<std::remove_pointer_t<decltype(pixels)>, StbFree> owner(pixels);
+    if (stream.truncated()) fail(kTruncated);
     if (!owner) fail(std::string("damaged image: ") + stbi_failure_reason());
     return owner;
   };
   if (is_float) {
-    const auto pixels = load(stbi_loadf_from_memory(data, size, &width, &height, &channels, 3));
+    const auto pixels = load(stbi_loadf_from_callbacks);
     return summarize(pixels.get(), width, height, want_mask, [](float v) { return v; });
   }
   if (is_wide) {
-    const auto pixels = load(stbi_load_16_from_memory(data, size, &width, &height, &channels, 3));
+    const auto pixels = load(stbi_load_16_from_callbacks);
     return summarize(pixels.get(), width, height, want_mask, [&](stbi_us v) {
       return decode_srgb ? linear_from_srgb(static_cast<float>(v) / 65535.0f) : static_cast<float>(v) / 65535.0f;
     });
   }
-  const auto pixels = load(stbi_load_from_memory(data, size, &width, &height, &channels, 3));
+  const auto pixels = load(stbi_load_from_callbacks);
   std::array<float, 256> linear{};
   for (size_t i = 0; i < linear.size(); ++i) {
     const float v = static_cast<float>(i) / 255.0f;
@@ -136,14 +196,14 @@ public:
 
   bool read(char c[], int n) override {
     const auto count = static_cast<size_t>(std::max(n, 0));
-    if (count > bytes_.size() - position_) throw Error(ErrorKind::kInput, "the file ends early");
+    if (count > bytes_.size() - position_) fail(kTruncated);
     std::memcpy(c, bytes_.data() + position_, count);
     position_ += count;
     return position_ < bytes_.size();
   }
   uint64_t tellg() override { return position_; }
   void seekg(uint64_t position) override {
-    if (position > bytes_.size()) throw Error(ErrorKind::kInput, "the file ends early");
+    if (position > bytes_.size()) fail(kTruncated);
     position_ = static_cast<size_t>(position);
   }
 
@@ -159,7 +219,9 @@ ImageSummary read_exr(std::span<const std::byte> bytes, bool want_mask, uint64_t
     const Imath::Box2i box = file.dataWindow();
     const int64_t width = int64_t{box.max.x} - box.min.x + 1, height = int64_t{box.max.y} - box.min.y + 1;
     check_size(static_cast<uint64_t>(std::max<int64_t>(width, 0)), static_cast<uint64_t>(std::max<int64_t>(height, 0)),
-               sizeof(Imf::Rgba), max_bytes);
+               sizeof(Imf::Rgba), bytes.size(), max_bytes);
+    if ((file.channels() & (Imf::WRITE_RGB | Imf::WRITE_YC)) == 0)
+      fail("the EXR image has none of the channels R, G, B and Y");
     const auto w = static_cast<uint32_t>(width);
     Summarizer summarizer(w, static_cast<uint32_t>(height), want_mask);
     constexpr int64_t kBlock = 64; // whole blocks of every compression but the rarest
@@ -195,17 +257,19 @@ ImageSummary read_pfm(std::span<const std::byte> bytes, bool want_mask, uint64_t
   for (double& value : header) {
     while (!text.empty() && is_space(text[0])) text.remove_prefix(1);
     const NumberText<double> number = parse_number<double>(text.substr(0, 32));
-    if (number.used == 0 || number.used >= text.size()) fail("damaged PFM header");
+    if (number.used == 0 || number.used >= text.size()) fail("damaged PFM header: expected width, height and scale");
     value = number.value;
     text.remove_prefix(number.used);
   }
   text.remove_prefix(1); // the one white-space character before the pixels
-  if (!(header[0] >= 1 && header[0] <= 1 << 24 && header[1] >= 1 && header[1] <= 1 << 24 && header[2] != 0.0))
-    fail("damaged PFM header");
+  const auto is_side = [](double v) { return v >= 1 && v <= 1 << 24 && v == std::floor(v); };
+  if (!is_side(header[0]) || !is_side(header[1]))
+    fail("damaged PFM header: width and height must be whole numbers from 1 to 16777216");
+  if (!std::isfinite(header[2]) || header[2] == 0.0) fail("damaged PFM header: the scale must be finite and not 0");
   const auto width = static_cast<uint32_t>(header[0]), height = static_cast<uint32_t>(header[1]);
-  check_size(width, height, 12, max_bytes);
+  check_size(width, height, 12, bytes.size(), max_bytes);
   const size_t row_bytes = static_cast<size_t>(width) * channels * 4;
-  if (text.size() / row_bytes < height) fail("truncated PFM image");
+  if (text.size() / row_bytes < height) fail(kTruncated);
   const bool swap = header[2] > 0.0;
   Summarizer summarizer(width, height, want_mask);
   for (uint32_t y = 0; y < height; ++y) {

@@ -12,9 +12,10 @@ namespace packtrace {
 
 /// What the importer keeps of a texture image.
 struct ImageSummary {
-  uint32_t width = 0;            ///< pixels
-  uint32_t height = 0;           ///< pixels
-  Vec3 average{0.0f};            ///< linear RGB; pixels that are not finite count as 0
+  uint32_t width = 0;  ///< pixels
+  uint32_t height = 0; ///< pixels
+  Vec3 average{0.0f};  ///< linear RGB; pixels that are not finite count as 0
+  uint64_t not_finite_pixels = 0;
   std::vector<uint32_t> nonzero; ///< AlphaMask's layout: bit set where luminance is not 0
 };
 

@@ -68,6 +68,21 @@ std::span<const std::string_view> parameter_names(std::string_view kind) {
   return {};
 }
 
+/// The type that pbrt-v3's materials want a parameter to have.
+TextureParameters::Kind parameter_kind(std::string_view material, std::string_view name) {
+  using Kind = TextureParameters::Kind;
+  constexpr std::string_view kSpectra[] = {
+      "Kd",      "Ks",      "Kr",  "Kt", "opacity", "reflect", "transmit", "color", "scatterdistance",
+      "sigma_a", "sigma_s", "mfp", "k",  "amount"};
+  constexpr std::string_view kStrings[] = {"name", "namedmaterial1", "namedmaterial2", "bsdffile"};
+  constexpr std::string_view kBools[] = {"remaproughness", "thin"};
+  const auto is_in = [&](const auto& names) {
+    return std::find(std::begin(names), std::end(names), name) != std::end(names);
+  };
+  if (is_in(kSpectra) || (name == "eta" && material == "metal")) return Kind::kSpectrum;
+  return is_in(kStrings) ? Kind::kString : is_in(kBools) ? Kind::kBool : Kind::kFloat;
+}
+
 constexpr std::string_view kKinds[] = {"matte", "plastic", "uber", "translucent", "substrate",    "mirror",  "glass",
                                        "metal", "disney",  "hair", "subsurface",  "kdsubsurface", "fourier", "mix",
                                        "none",  ""};
@@ -141,7 +156,7 @@ Vec3 clamped(Vec3 v) { return glm::clamp(v, Vec3(0.0f), Vec3(1.0f)); }
 } // namespace
 
 MaterialLibrary::MaterialLibrary(TextureGraph& graph) : graph_(graph) {
-  definitions_.push_back({"matte", {}, {"default", 0, graph.constant(Vec3(0.5f))}});
+  definitions_.push_back({"matte", {}, {"default", 0, graph.constant(Vec3(0.5f))}, {}});
 }
 
 uint32_t MaterialLibrary::define(const Directive& directive, const TextureContext& context) {
@@ -149,6 +164,9 @@ uint32_t MaterialLibrary::define(const Directive& directive, const TextureContex
   const TextureParameters parameters(context, directive.parameters);
   std::string kind = directive.names[0];
   if (named) {
+    if (context.state.named_materials.find(directive.names[0]))
+      context.reporter.warning(directive.place, "named material " + in_quotes(directive.names[0]) +
+                                                    " is defined again; what follows uses the new one");
     const Parameter* const type = directive.parameters.find("type", {ParameterType::kString});
     if (!type || type->strings.size() != 1)
       context.reporter.error(directive.place, "MakeNamedMaterial " + in_quotes(directive.names[0]) +
@@ -172,7 +190,11 @@ uint32_t MaterialLibrary::add(std::string kind, std::string name, const TextureP
     const auto part = [&](std::string_view parameter) -> const MaterialRecipe& {
       const std::string part_name = parameters.get_string(parameter, "");
       const std::optional<uint32_t> found = parameters.context().state.named_materials.find(part_name);
-      if (!found)
+      if (part_name.empty())
+        parameters.context().reporter.error(parameters.context().place, "mix material without a \"string " +
+                                                                            std::string(parameter) +
+                                                                            "\"; grey matte is used");
+      else if (!found)
         parameters.context().reporter.error(
             parameters.context().place,
             "mix material: no named material " + in_quotes(part_name) + " for \"" + std::string(parameter) +
@@ -187,11 +209,13 @@ uint32_t MaterialLibrary::add(std::string kind, std::string name, const TextureP
     fill_recipe(recipe, kind, parameters);
   }
   // Exporters for other renderers write "Normal"; pbrt knows "bumpmap" only.
-  for (const std::string_view map : {"bumpmap", "normalmap", "Normal"})
+  for (const std::string_view map : {"normalmap", "Normal"})
     if (kind != "mix" && parameters.has(map)) recipe.flags |= kNormalMap;
+  if (kind != "mix" && parameters.find_float("bumpmap")) recipe.flags |= kNormalMap;
   if (!graph_.constant_value(recipe.albedo)) recipe.flags |= kAlbedoTexture;
-  parameters.mark_used(parameter_names(kind));
-  definitions_.push_back({std::move(kind), {}, std::move(recipe)});
+  for (const std::string_view parameter : parameter_names(kind))
+    parameters.check(parameter, parameter_kind(kind, parameter));
+  definitions_.push_back({std::move(kind), {}, std::move(recipe), parameters.context().place});
   return static_cast<uint32_t>(definitions_.size() - 1);
 }
 
@@ -223,12 +247,15 @@ void MaterialLibrary::require_images() {
   }
 }
 
-Vec3 MaterialLibrary::albedo_of(Node node, const std::string& name, Reporter& reporter) {
-  const Vec3 albedo = graph_.average(node);
+Vec3 MaterialLibrary::albedo_of(const Definition& definition, Reporter& reporter) {
+  const Vec3 albedo = graph_.average(definition.recipe.albedo);
+  const auto material = [&] { return "material " + in_quotes(definition.recipe.name); };
+  if (!is_finite(albedo)) {
+    reporter.error(definition.place, material() + ": its colour is not finite; grey is used");
+    return Vec3(0.5f);
+  }
   const Vec3 inside = clamped(albedo);
-  if (inside != albedo)
-    reporter.report(Severity::kNote, SourceLocation{},
-                    "material " + in_quotes(name) + ": its colour leaves [0, 1] and is clamped");
+  if (inside != albedo) reporter.note(definition.place, material() + ": its colour leaves [0, 1] and is clamped");
   return inside;
 }
 
@@ -239,9 +266,11 @@ std::vector<uint32_t> MaterialLibrary::resolve(std::vector<Material>& materials,
     const auto [it, inserted] = mask_of_node.try_emplace(node, TextureGraph::MaskKind::kNoHoles, kNoMask);
     if (!inserted) return it->second;
     TextureGraph::MaskResult result = graph_.alpha_mask(node);
-    if (!result.exact)
-      reporter.report(Severity::kNote, SourceLocation{},
-                      "an alpha texture is not a plain image over uv; its holes are approximated");
+    if (!result.exact) {
+      const TextureGraph::Origin origin = graph_.origin(node);
+      reporter.note(origin.place, "alpha texture " + in_quotes(origin.name) +
+                                      " is not a plain image over uv; its holes are approximated");
+    }
     if (result.kind == TextureGraph::MaskKind::kSomeHoles) {
       it->second.second = static_cast<uint32_t>(masks.size());
       masks.push_back(std::move(result.mask));
@@ -254,7 +283,7 @@ std::vector<uint32_t> MaterialLibrary::resolve(std::vector<Material>& materials,
   std::vector<uint32_t> result;
   for (const MaterialUse& use : uses_) {
     const MaterialRecipe& recipe = definitions_[use.recipe].recipe;
-    Material material{recipe.name, recipe.flags, albedo_of(recipe.albedo, recipe.name, reporter), kNoMask, kNoMask};
+    Material material{recipe.name, recipe.flags, albedo_of(definitions_[use.recipe], reporter), kNoMask, kNoMask};
     if (use.area_light != kNone) material.flags |= use.area_light == 1 ? kEmissive | kEmitsBothSides : kEmissive;
     if (use.alpha != kNone) {
       const auto [kind, mask] = mask_of(use.alpha);

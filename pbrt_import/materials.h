@@ -59,9 +59,10 @@ private:
     std::string kind;
     ParameterList parameters;
     MaterialRecipe recipe;
+    Place place; ///< of the directive that made it: a material's, or a shape's that overrides parameters
   };
   uint32_t add(std::string kind, std::string name, const TextureParameters& parameters);
-  Vec3 albedo_of(TextureGraph::Node node, const std::string& name, Reporter& reporter);
+  Vec3 albedo_of(const Definition& definition, Reporter& reporter);
 
   TextureGraph& graph_;
   std::vector<Definition> definitions_;

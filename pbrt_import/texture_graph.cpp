@@ -88,6 +88,11 @@ uint32_t TextureGraph::request_image(const std::filesystem::path& path, bool dec
   return it->second;
 }
 
+TextureGraph::Origin TextureGraph::origin(Node node) const {
+  const auto found = origins_.find(node);
+  return found == origins_.end() ? Origin{} : found->second;
+}
+
 const Vec3* TextureGraph::constant_value(Node node) const {
   return nodes_[node].kind == Kind::kConstant ? &nodes_[node].value : nullptr;
 }
@@ -180,7 +185,6 @@ bool TextureGraph::nonzero(const NodeData& data, glm::dvec2 uv, std::span<const 
 TextureGraph::MaskResult TextureGraph::alpha_mask(Node node) const {
   MaskResult result;
   const std::vector<Node> order = reachable(node);
-  constexpr size_t kMostNodes = 64; // what a row of texels may cost
   const NodeData* layout = nullptr; // the image that sets the resolution
   const NodeData* board = nullptr;  // the checkerboard that sets the period where there is no image
   bool only_image_varies = true, sampled = false;
@@ -195,10 +199,6 @@ TextureGraph::MaskResult TextureGraph::alpha_mask(Node node) const {
     sampled = sampled || data.kind == Kind::kCheckerboard;
     if (data.kind == Kind::kCheckerboard && !board && is_usable(data.mapping)) board = &data;
   }
-  if (order.size() > kMostNodes) {
-    result.exact = false;
-    return result;
-  }
   result.exact = result.exact && !sampled && only_image_varies;
   AlphaMask& mask = result.mask;
   constexpr uint32_t kSampledSize = 1024; // for procedural textures
@@ -208,6 +208,13 @@ TextureGraph::MaskResult TextureGraph::alpha_mask(Node node) const {
     mask.wrap = layout->wrap, mask.uv_scale = layout->mapping.scale, mask.uv_offset = layout->mapping.offset;
   } else if (board) { // a checkerboard repeats after two cells
     mask.uv_scale = 0.5f * board->mapping.scale, mask.uv_offset = 0.5f * board->mapping.offset;
+  }
+  constexpr size_t kMostNodes = 64;                        // per texel
+  constexpr uint64_t kMostEvaluations = uint64_t{1} << 31; // seconds, where nodes and texels multiply to hours
+  if (order.size() > kMostNodes || uint64_t{mask.width} * mask.height > kMostEvaluations / order.size()) {
+    result.exact = false;
+    mask = {};
+    return result;
   }
   rasterize(order, mask);
   size_t set = 0;

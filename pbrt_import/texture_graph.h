@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <map>
 #include <span>
+#include <string>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -49,6 +51,16 @@ public:
   uint32_t request_image(const std::filesystem::path& path, bool decode_srgb, const Place& place, uint64_t sequence);
   std::vector<ImageRequest>& images() { return images_; }
 
+  /// A Texture directive that stands for a node.
+  struct Origin {
+    std::string name;
+    Place place;
+  };
+  /// The first origin of a node stays.
+  void set_origin(Node node, const std::string& name, const Place& place) { origins_.try_emplace(node, name, place); }
+  /// Nameless for nodes that no directive stands for.
+  Origin origin(Node node) const;
+
   /// The value, where it is the same everywhere and no image has to be read for it.
   const Vec3* constant_value(Node node) const;
 
@@ -83,6 +95,7 @@ private:
 
   std::vector<NodeData> nodes_;
   std::vector<Vec3> averages_; ///< of the first nodes; grows on demand
+  std::unordered_map<Node, Origin> origins_;
   std::vector<ImageRequest> images_;
   std::map<std::pair<std::filesystem::path, bool>, uint32_t> image_numbers_;
 };

@@ -1,5 +1,6 @@
 #include "pbrt_import/texture_parameters.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "pbrt_import/input_file.h"
@@ -59,7 +60,12 @@ std::optional<TextureParameters::Node> TextureParameters::find_float(std::string
   if (const Parameter* const texture = find(name, {ParameterType::kTexture}))
     return find_texture(*texture, context_.state.float_textures, context_.state.spectrum_textures, "float");
   const Parameter* const value = find(name, {ParameterType::kFloat});
-  if (!value || value->floats.size() != 1) return std::nullopt;
+  if (!value) return std::nullopt;
+  if (value->floats.size() != 1) {
+    context_.reporter.error(value->place, "parameter " + describe(*value) + " takes one number, found " +
+                                              std::to_string(value->floats.size()) + "; its default is used");
+    return std::nullopt;
+  }
   if (!std::isfinite(value->floats[0])) {
     context_.reporter.error(value->place, "parameter " + describe(*value) + " is not finite; its default is used");
     return std::nullopt;
@@ -89,6 +95,14 @@ std::optional<Vec3> TextureParameters::rgb_value(const Parameter& parameter) con
                             "parameter " + describe(parameter) + " does not hold one colour; its default is used");
     return std::nullopt;
   }
+  if (!std::all_of(v.begin(), v.end(), [](float value) { return std::isfinite(value); })) {
+    context_.reporter.error(parameter.place,
+                            "parameter " + describe(parameter) + " is not finite; its default is used");
+    return std::nullopt;
+  }
+  if (parameter.type == ParameterType::kBlackbody && v[0] <= 0.0f)
+    context_.reporter.warning(parameter.place, "parameter " + describe(parameter) +
+                                                   " has a temperature that is not above 0 kelvin: it is black");
   Vec3 rgb;
   if (parameter.type == ParameterType::kSpectrum)
     rgb = rgb_from_samples(v);
@@ -97,7 +111,8 @@ std::optional<Vec3> TextureParameters::rgb_value(const Parameter& parameter) con
   else
     rgb = parameter.type == ParameterType::kXyz ? rgb_from_xyz({v[0], v[1], v[2]}) : Vec3(v[0], v[1], v[2]);
   if (is_finite(rgb)) return rgb;
-  context_.reporter.error(parameter.place, "parameter " + describe(parameter) + " is not finite; its default is used");
+  context_.reporter.error(parameter.place,
+                          "parameter " + describe(parameter) + " is out of range; its default is used");
   return std::nullopt;
 }
 
@@ -114,7 +129,9 @@ std::optional<Vec3> TextureParameters::rgb_from_file(const Parameter& parameter)
     if (!is_finite(rgb)) throw Error(ErrorKind::kInput, "its values are not finite");
     return rgb;
   } catch (const Error& error) {
-    if (metal_by_name(parameter.strings[0])) return std::nullopt; // the caller knows that metal without the file
+    std::error_code ignored;
+    if (metal_by_name(parameter.strings[0]) && !std::filesystem::exists(path, ignored))
+      return std::nullopt; // the caller knows that metal without the file
     context_.reporter.error(parameter.place, "cannot read spectrum file " + in_quotes(path.string(), kMaxShownPath) +
                                                  ": " + error.what());
     return std::nullopt;
@@ -137,6 +154,26 @@ float TextureParameters::get_float(std::string_view name, float fallback) const 
 
 std::string TextureParameters::get_string(std::string_view name, std::string_view fallback) const {
   return first_.get_string(name, second_ ? second_->get_string(name, fallback) : std::string(fallback));
+}
+
+void TextureParameters::check(std::string_view name, Kind kind) const {
+  find(name, {}); // the name is known, whatever its type
+  const auto unread = [&](const Parameter& parameter) { return parameter.name == name && !parameter.used; };
+  if (std::none_of(first_.all().begin(), first_.all().end(), unread)) return;
+  switch (kind) {
+  case Kind::kFloat:
+    find_float(name);
+    return;
+  case Kind::kSpectrum:
+    find_spectrum(name);
+    return;
+  case Kind::kBool:
+    first_.get_bool(name, false);
+    return;
+  case Kind::kString:
+    first_.get_string(name, "");
+    return;
+  }
 }
 
 void TextureParameters::mark_used(std::span<const std::string_view> names) const {

@@ -48,6 +48,10 @@ public:
   std::string_view spectrum_file(std::string_view name) const;
   void mark_used(std::span<const std::string_view> names) const;
 
+  enum class Kind { kFloat, kSpectrum, kBool, kString };
+  /// Reads a parameter whose value is not needed, as far as nobody has yet: mistakes in it are reported.
+  void check(std::string_view name, Kind kind) const;
+
   const TextureContext& context() const { return context_; }
 
 private:

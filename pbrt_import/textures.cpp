@@ -24,13 +24,21 @@ struct TextureMaker {
   }
   Node constant(Vec3 value) const { return context.graph.constant(value); }
   Node constant_of(std::string_view name, float fallback) const {
-    return is_float ? constant(Vec3(parameters.get_float(name, fallback)))
+    return is_float ? constant(Vec3(finite_float(name, fallback)))
                     : constant(parameters.constant_spectrum(name, Vec3(fallback)));
+  }
+  float finite_float(std::string_view name, float fallback) const {
+    const float value = parameters.get_float(name, fallback);
+    if (std::isfinite(value)) return value;
+    context.reporter.error(directive.place, "parameter " + in_quotes("float " + std::string(name)) +
+                                                " is not finite; its default is used");
+    return fallback;
   }
 };
 
 TextureMapping read_mapping(const TextureMaker& maker) {
   const ParameterList& list = maker.directive.parameters;
+  constexpr std::string_view kMappings[] = {"uv", "planar", "spherical", "cylindrical"};
   const std::string kind = list.get_string("mapping", "uv");
   TextureMapping mapping;
   mapping.is_uv = kind == "uv";
@@ -41,7 +49,8 @@ TextureMapping read_mapping(const TextureMaker& maker) {
     constexpr std::string_view kNames[] = {"v1", "v2", "udelta", "vdelta"};
     list.mark_used(kNames);
   } else if (kind != "spherical" && kind != "cylindrical") {
-    maker.context.reporter.error(maker.directive.place, "unknown texture mapping " + in_quotes(kind) + "; uv is used");
+    maker.context.reporter.error(maker.directive.place, "unknown texture mapping " + in_quotes(kind) + "; uv is used" +
+                                                            did_you_mean(closest_name(kind, kMappings)));
     mapping.is_uv = true;
   }
   return mapping;
@@ -53,7 +62,8 @@ std::optional<Node> make_imagemap(const TextureMaker& maker) {
   constexpr std::string_view kFiltering[] = {"trilinear", "maxanisotropy"};
   list.mark_used(kFiltering);
   const TextureMapping mapping = read_mapping(maker);
-  const float scale = list.get_float("scale", 1.0f);
+  const float scale = maker.finite_float("scale", 1.0f);
+  constexpr std::string_view kWraps[] = {"repeat", "black", "clamp"};
   WrapMode wrap = WrapMode::kRepeat;
   const std::string wrap_name = list.get_string("wrap", "repeat");
   if (wrap_name == "black")
@@ -61,10 +71,11 @@ std::optional<Node> make_imagemap(const TextureMaker& maker) {
   else if (wrap_name == "clamp")
     wrap = WrapMode::kClamp;
   else if (wrap_name != "repeat")
-    context.reporter.error(maker.directive.place, "unknown wrap mode " + in_quotes(wrap_name) + "; repeat is used");
+    context.reporter.error(maker.directive.place, "unknown wrap mode " + in_quotes(wrap_name) + "; repeat is used" +
+                                                      did_you_mean(closest_name(wrap_name, kWraps)));
   const Parameter* const file = list.find("filename", {ParameterType::kString});
   if (!file || file->strings.size() != 1) {
-    context.reporter.error(maker.directive.place, "imagemap texture without a \"string filename\"");
+    context.reporter.error(maker.directive.place, "imagemap texture without a \"string filename\"; it counts as white");
     return maker.constant(Vec3(scale));
   }
   const std::filesystem::path path = context.file_names.resolve(file->strings[0], file->place, context.reporter);
@@ -80,8 +91,11 @@ std::optional<Node> make_imagemap(const TextureMaker& maker) {
   ImageRequest& request = context.graph.images()[image];
   if (!request.missing && !std::filesystem::is_regular_file(path, error)) {
     request.missing = true;
+    const std::string name = in_quotes(path.string(), kMaxShownPath);
     context.reporter.error(file->place,
-                           "no such texture file " + in_quotes(path.string(), kMaxShownPath) + "; it counts as white");
+                           (std::filesystem::exists(path, error) ? "texture file " + name + " is not a regular file"
+                                                                 : "no such texture file " + name) +
+                               "; it counts as white");
   }
   return context.graph.image(image, Vec3(scale), wrap, mapping);
 }
@@ -165,13 +179,23 @@ std::optional<Node> make_by_class(const TextureMaker& maker, const std::string& 
 std::optional<TextureGraph::Node> make_texture(const Directive& directive, const TextureContext& context) {
   const std::string& type = directive.names[1];
   if (type != "float" && type != "spectrum" && type != "color") {
-    context.reporter.error(directive.place,
-                           "unknown texture type " + in_quotes(type) + ", neither \"float\" nor \"spectrum\"");
+    constexpr std::string_view kTypes[] = {"float", "spectrum", "color"};
+    context.reporter.error(directive.place, "unknown texture type " + in_quotes(type) +
+                                                ", neither \"float\" nor \"spectrum\"" +
+                                                did_you_mean(closest_name(type, kTypes)));
     return std::nullopt;
   }
-  const TextureMaker maker{directive, context, TextureParameters(context, directive.parameters), type == "float"};
+  const bool is_float = type == "float";
+  const ScopedNames& names = is_float ? context.state.float_textures : context.state.spectrum_textures;
+  if (names.find(directive.names[0]))
+    context.reporter.warning(directive.place, std::string(is_float ? "float" : "spectrum") + " texture " +
+                                                  in_quotes(directive.names[0]) +
+                                                  " is defined again; what follows uses the new one");
+  const TextureMaker maker{directive, context, TextureParameters(context, directive.parameters), is_float};
   const std::optional<Node> node = make_by_class(maker, directive.names[2]);
-  if (node) report_unused(directive.parameters, context.reporter);
+  if (!node) return std::nullopt;
+  report_unused(directive.parameters, context.reporter);
+  context.graph.set_origin(*node, directive.names[0], directive.place);
   return node;
 }
 
