@@ -65,10 +65,12 @@ void CameraCollector::add_camera(const Directive& directive, const TransformPair
   } else if (kind == "environment") {
     camera.projection = Projection::kEnvironment;
   } else if (kind != "perspective") {
+    constexpr std::string_view kCameras[] = {"perspective", "orthographic", "environment", "realistic"};
     const bool realistic = kind == "realistic";
     reporter.report(realistic ? Severity::kWarning : Severity::kError, directive.place,
                     realistic ? "realistic cameras are not supported; a perspective camera of 45 degrees stands for it"
-                              : "unknown camera " + in_quotes(kind) + "; it is left out");
+                              : "unknown camera " + in_quotes(kind) + "; it is left out" +
+                                    did_you_mean(closest_name(kind, kCameras)));
     if (!realistic) return;
     ++ignored_["realistic_cameras"];
     camera.fov_degrees = 45.0;

@@ -18,14 +18,8 @@ std::optional<uint32_t> ScopedNames::find(std::string_view name) const {
   return values_[*number];
 }
 
-std::string ScopedNames::closest(std::string_view name) const {
-  constexpr size_t kMostNames = 10'000; // a hint is not worth more comparisons than that
-  if (values_.size() > kMostNames) return {};
-  std::vector<std::string_view> names;
-  for (uint32_t number = 0; number < values_.size(); ++number)
-    if (values_[number] != kNone) names.push_back(names_.name(number));
-  std::sort(names.begin(), names.end());
-  return std::string(closest_name(name, names));
+std::string_view ScopedNames::closest(std::string_view name) const {
+  return names_.closest(name, [this](uint32_t number) { return values_[number] != kNone; });
 }
 
 void ScopedNames::restore(size_t mark) {

@@ -21,8 +21,8 @@ public:
   /// @param value not kNone
   void define(std::string_view name, uint32_t value);
   std::optional<uint32_t> find(std::string_view name) const;
-  /// The visible name that name is most likely a misspelling of; the one first in the alphabet of several.
-  std::string closest(std::string_view name) const;
+  /// The visible name that name is most likely a misspelling of; empty: none.
+  std::string_view closest(std::string_view name) const;
 
   size_t mark() const { return undo_.size(); }
   void restore(size_t mark);

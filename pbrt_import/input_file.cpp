@@ -63,6 +63,7 @@ struct InputFile::State {
   uint64_t delivered_bytes = 0;
   std::unique_ptr<Inflater> inflater; ///< null: plain file
   std::vector<unsigned char> compressed;
+  const char* damage = nullptr; ///< found while inflating
   bool member_open = false; ///< inside a gzip member: the end of the file here means truncation
 
   /// @param read_some gets a pointer, a size and how much came before; returns like POSIX read
@@ -99,7 +100,9 @@ struct InputFile::State {
                   "content exceeds the limit of " + std::to_string(max_bytes) + " bytes for this file");
   }
 
+  /// What could be inflated before damage comes first, then the damage is reported.
   size_t read_inflated(char* to, size_t size) {
+    if (damage) fail(damage);
     z_stream& z = inflater->stream();
     size_t got = 0;
     while (got < size && refill()) {
@@ -113,9 +116,13 @@ struct InputFile::State {
       const int status = inflate(&z, Z_NO_FLUSH);
       got += room - z.avail_out;
       if (status == Z_STREAM_END) member_open = false;
-      if (status != Z_OK && status != Z_STREAM_END && status != Z_BUF_ERROR) fail("damaged gzip data");
+      if (status != Z_OK && status != Z_STREAM_END && status != Z_BUF_ERROR) {
+        damage = "damaged gzip data";
+        break;
+      }
     }
-    if (got < size && member_open) fail("truncated gzip data");
+    if (got < size && member_open && !damage) damage = "truncated gzip data";
+    if (damage && got == 0) fail(damage);
     return got;
   }
 };
@@ -180,7 +187,10 @@ std::vector<std::byte> read_whole_file(const std::filesystem::path& path, uint64
     content.resize(size + room);
     const size_t got = file.read({reinterpret_cast<char*>(content.data()) + size, room});
     size += got;
-    if (got < room) break;
+    if (got < room) {
+      if (char none; file.compressed()) file.read({&none, 1}); // throws if more was to come
+      break;
+    }
     room = std::max<size_t>(size, kCompressedChunk);
   }
   content.resize(size);

@@ -19,8 +19,9 @@ public:
   InputFile(InputFile&&) noexcept;
   InputFile& operator=(InputFile&&) noexcept;
 
-  /// Fills buffer from the start; fewer bytes than asked for only at the end of the file.
-  /// Throws Error(kInput) if reading fails or gzip data is damaged, Error(kLimitExceeded) past max_bytes.
+  /// Fills buffer from the start; fewer bytes than asked for only at the end of the file, or before damaged gzip data,
+  /// which the next call throws Error(kInput) for. Throws Error(kInput) if reading fails, Error(kLimitExceeded) past
+  /// max_bytes.
   size_t read(std::span<char> buffer);
 
   /// Like read, from an offset in the content of a file that is not compressed. Any thread may call it.

@@ -101,8 +101,11 @@ Node metal_albedo(const TextureParameters& parameters) {
     Vec3& value = name == "eta" ? indices.eta : indices.k;
     if (by_name) value = name == "eta" ? by_name->eta : by_name->k;
     if (const std::optional<Node> node = parameters.find_spectrum(name)) {
-      // Textured indices are rare enough to stand for their default.
-      if (const Vec3* const constant = parameters.context().graph.constant_value(*node)) value = *constant;
+      if (const Vec3* const constant = parameters.context().graph.constant_value(*node))
+        value = *constant;
+      else
+        parameters.context().reporter.note(parameters.context().place, "metal: a texture for \"" + std::string(name) +
+                                                                           "\" is not supported; copper's is used");
     }
   }
   Vec3 albedo;
@@ -129,7 +132,11 @@ void fill_recipe(MaterialRecipe& recipe, std::string_view kind, const TexturePar
     recipe.flags |= kMirror;
   } else if (kind == "glass") {
     recipe.albedo = spectrum("Kt", 1.0f);
-    recipe.flags |= kTransmissive;
+    const Vec3* const transmitted = graph.constant_value(recipe.albedo);
+    if (transmitted && *transmitted == Vec3(0.0f))
+      recipe.albedo = spectrum("Kr", 1.0f); // nothing passes
+    else
+      recipe.flags |= kTransmissive;
   } else if (kind == "metal") {
     recipe.albedo = metal_albedo(parameters);
     recipe.flags |= kMetal;
@@ -203,7 +210,9 @@ uint32_t MaterialLibrary::add(std::string kind, std::string name, const TextureP
     };
     const MaterialRecipe &a = part("namedmaterial1"), &b = part("namedmaterial2");
     // pbrt weights the first material with amount.
-    recipe.albedo = graph_.mix(b.albedo, a.albedo, parameters.spectrum("amount", Vec3(0.5f)));
+    Node amount = parameters.spectrum("amount", Vec3(0.5f));
+    if (const Vec3* const constant = graph_.constant_value(amount)) amount = graph_.constant(clamped(*constant));
+    recipe.albedo = graph_.mix(b.albedo, a.albedo, amount);
     recipe.flags = (a.flags & b.flags) | ((a.flags | b.flags) & kNormalMap);
   } else {
     fill_recipe(recipe, kind, parameters);
@@ -221,6 +230,8 @@ uint32_t MaterialLibrary::add(std::string kind, std::string name, const TextureP
 
 uint32_t MaterialLibrary::with_shape_parameters(uint32_t base, const ParameterList& shape,
                                                 const TextureContext& context) {
+  const std::span<const Parameter> all = shape.all();
+  if (std::all_of(all.begin(), all.end(), [](const Parameter& parameter) { return parameter.used; })) return base;
   const std::span<const std::string_view> names = parameter_names(definitions_[base].kind);
   const bool overrides = std::any_of(shape.all().begin(), shape.all().end(), [&](const Parameter& parameter) {
     return !parameter.used && std::find(names.begin(), names.end(), parameter.name) != names.end();
@@ -234,6 +245,15 @@ uint32_t MaterialLibrary::with_shape_parameters(uint32_t base, const ParameterLi
 }
 
 uint32_t MaterialLibrary::use(const MaterialUse& use) {
+  const bool plain = use.alpha == kNone && use.shadow_alpha == kNone && use.area_light == kNone;
+  if (plain) { // most are
+    plain_uses_.resize(definitions_.size(), kNone);
+    uint32_t& number = plain_uses_[use.recipe];
+    if (number != kNone) return number;
+    number = static_cast<uint32_t>(uses_.size());
+    uses_.push_back(use);
+    return number;
+  }
   const auto [it, inserted] = use_numbers_.try_emplace(use, static_cast<uint32_t>(uses_.size()));
   if (inserted) uses_.push_back(use);
   return it->second;

@@ -66,7 +66,8 @@ private:
 
   TextureGraph& graph_;
   std::vector<Definition> definitions_;
-  std::map<MaterialUse, uint32_t> use_numbers_;
+  std::vector<uint32_t> plain_uses_; ///< by recipe, without alpha and light; kNone: not used yet
+  std::map<MaterialUse, uint32_t> use_numbers_; ///< of the others
   std::vector<MaterialUse> uses_;
 };
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <functional>
 
+#include "pbrt_import/parameters.h"
+
 namespace packtrace {
 namespace {
 
@@ -36,6 +38,17 @@ uint32_t NameTable::intern(std::string_view name) {
     slot = {hash, static_cast<uint32_t>(names_.size())};
   }
   return slot.number_plus_one - 1;
+}
+
+std::string_view NameTable::closest(std::string_view name, const std::function<bool(uint32_t)>& visible) const {
+  constexpr uint64_t kMostCompared = 1'000'000;
+  compared_ += names_.size();
+  if (compared_ > kMostCompared) return {};
+  std::vector<std::string_view> candidates;
+  for (uint32_t number = 0; number < names_.size(); ++number)
+    if (visible(number)) candidates.push_back(names_[number]);
+  std::sort(candidates.begin(), candidates.end());
+  return closest_name(name, candidates);
 }
 
 void NameTable::grow() {

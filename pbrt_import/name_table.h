@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string_view>
@@ -14,6 +15,11 @@ public:
   /// The name's number, a new one if it is new.
   uint32_t intern(std::string_view name);
   std::optional<uint32_t> find(std::string_view name) const;
+
+  /// The name that name is most likely a misspelling of, the first in the alphabet of several; empty: none. A broken
+  /// file must not become a slow one: after a million comparisons in all there are no more hints.
+  /// @param visible tells by number which names may be given
+  std::string_view closest(std::string_view name, const std::function<bool(uint32_t)>& visible) const;
 
   /// @param number below size(); the view lives as long as the table
   std::string_view name(uint32_t number) const { return names_[number]; }
@@ -34,6 +40,7 @@ private:
   std::vector<std::unique_ptr<char[]>> text_; ///< what names_ look at
   char* room_ = nullptr;                      ///< in the last of text_
   size_t room_bytes_ = 0;
+  mutable uint64_t compared_ = 0; ///< names, to find hints
 };
 
 } // namespace packtrace

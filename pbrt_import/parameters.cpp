@@ -72,6 +72,12 @@ std::string_view to_string(ParameterType type) {
   return "unknown";
 }
 
+std::string_view closest_parameter_type(std::string_view name) {
+  std::array<std::string_view, std::size(kTypeNames)> names;
+  std::transform(std::begin(kTypeNames), std::end(kTypeNames), names.begin(), [](const auto& entry) { return entry.first; });
+  return closest_name(name, names);
+}
+
 std::string describe(const Parameter& parameter) {
   return in_quotes(std::string(to_string(parameter.type)) + ' ' + parameter.name);
 }

@@ -40,6 +40,8 @@ enum class ParameterType : uint8_t {
 
 std::optional<ParameterType> parameter_type(std::string_view name);
 std::string_view to_string(ParameterType type);
+/// The type's name that name is most likely a misspelling of; empty: none.
+std::string_view closest_parameter_type(std::string_view name);
 
 /// One `"type name" [ values ]`. Values are in the one vector that fits the type.
 struct Parameter {

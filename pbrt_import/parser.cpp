@@ -121,6 +121,8 @@ std::string_view closest_directive(std::string_view word) {
 
 bool is_directive(const Token& token) { return token.kind == TokenKind::kWord && find_info(token.text) != nullptr; }
 
+bool is_letter(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'); }
+
 bool is_numeric(ParameterType type) {
   return type != ParameterType::kString && type != ParameterType::kTexture && type != ParameterType::kBool;
 }
@@ -176,9 +178,12 @@ bool Parser::next(Directive& directive) {
     if (token.kind == TokenKind::kEnd) return false;
     const DirectiveInfo* const info = token.kind == TokenKind::kWord ? find_info(token.text) : nullptr;
     if (!info) {
-      std::string message = token.kind == TokenKind::kWord ? "unknown directive " + describe(token)
-                                                           : "expected a directive, found " + describe(token);
-      if (token.kind == TokenKind::kWord) message += did_you_mean(closest_directive(token.text));
+      const bool number = token.kind == TokenKind::kWord && parse_number<double>(token.text).used > 0;
+      const bool word = token.kind == TokenKind::kWord && !number;
+      std::string message = word     ? "unknown directive " + describe(token)
+                            : number ? "expected a directive, found the number " + describe(token)
+                                     : "expected a directive, found " + describe(token);
+      if (word) message += did_you_mean(closest_directive(token.text));
       if (token.kind != TokenKind::kBadByte) reporter_.error(source_.place(), std::move(message));
       source_.consume();
       skip_to_directive();
@@ -269,8 +274,16 @@ void Parser::report_unexpected(const std::string& expected) {
     reporter_.error(source_.place(), "expected " + expected + ", found " + describe(token));
 }
 
+/// To what is a directive, or stands where one would and may be meant to be one: a word in front of a line.
 void Parser::skip_to_directive() {
-  while (source_.peek().kind != TokenKind::kEnd && !is_directive(source_.peek())) source_.consume();
+  uint32_t line = source_.place().line;
+  while (source_.peek().kind != TokenKind::kEnd && !is_directive(source_.peek())) {
+    const Token& token = source_.peek();
+    const bool in_front = token.line != line && token.kind == TokenKind::kWord && is_letter(token.text[0]);
+    if (in_front && parse_number<double>(token.text).used == 0) return;
+    line = token.line;
+    source_.consume();
+  }
 }
 
 template <class Values>
@@ -338,14 +351,18 @@ bool Parser::read_declaration(std::string_view text, Parameter& parameter) {
   };
   const std::string_view type_name = word();
   const std::string_view name = word();
+  const std::string_view more = word();
   const std::optional<ParameterType> type = parameter_type(type_name);
   if (type && !name.empty()) {
     parameter.type = *type;
     parameter.name = std::string(name);
+    if (!more.empty())
+      reporter_.warning(parameter.place, in_quotes(text) + " has more than a type and a name; the rest is ignored");
     return true;
   }
   if (!type && !name.empty())
-    reporter_.error(parameter.place, "unknown parameter type " + in_quotes(type_name) + " in " + in_quotes(text));
+    reporter_.error(parameter.place, "unknown parameter type " + in_quotes(type_name) + " in " + in_quotes(text) +
+                                             did_you_mean(closest_parameter_type(type_name)));
   else
     reporter_.error(parameter.place, "a parameter is declared as \"type name\", found " + in_quotes(text));
   return false;

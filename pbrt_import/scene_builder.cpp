@@ -91,7 +91,7 @@ void SceneBuilder::carry_out(Directive& directive) {
   case K::kCoordSysTransform:
     return handle_coordinate_system(directive);
   case K::kCamera:
-    coordinate_systems_["camera"] = {inverse(state_.transform().start), inverse(state_.transform().end)};
+    define_coordinate_system("camera", {inverse(state_.transform().start), inverse(state_.transform().end)});
     return cameras_.add_camera(directive, state_.transform(), reporter_);
   case K::kFilm:
     return cameras_.add_film(directive, reporter_);
@@ -176,23 +176,29 @@ void SceneBuilder::handle_transform(const Directive& directive) {
 
 void SceneBuilder::handle_active_transform(const Directive& directive) {
   const std::string& which = directive.names[0];
+  constexpr std::string_view kWhich[] = {"All", "StartTime", "EndTime"};
   const uint8_t bits = which == "All" ? 3 : which == "StartTime" ? 1 : which == "EndTime" ? 2 : 0;
   if (bits == 0)
     return reporter_.error(directive.place,
-                           "ActiveTransform takes All, StartTime or EndTime, found " + in_quotes(which));
+                           "ActiveTransform takes All, StartTime or EndTime, found " + in_quotes(which) +
+                               did_you_mean(closest_name(which, kWhich)));
   state_.set_active(bits);
 }
 
 void SceneBuilder::handle_coordinate_system(const Directive& directive) {
   const std::string& name = directive.names[0];
-  if (directive.kind == K::kCoordinateSystem) {
-    coordinate_systems_[name] = state_.transform();
-    return;
-  }
-  const auto found = coordinate_systems_.find(name);
-  if (found == coordinate_systems_.end())
-    return reporter_.error(directive.place, "no coordinate system " + in_quotes(name) + "; the transform stays");
-  state_.set_transform(found->second);
+  if (directive.kind == K::kCoordinateSystem) return define_coordinate_system(name, state_.transform());
+  const std::optional<uint32_t> found = coordinate_system_names_.find(name);
+  if (!found)
+    return reporter_.error(directive.place, "no coordinate system " + in_quotes(name) + "; the transform stays" +
+                                                 did_you_mean(coordinate_system_names_.closest(name, [](uint32_t) { return true; })));
+  state_.set_transform(coordinate_systems_[*found]);
+}
+
+void SceneBuilder::define_coordinate_system(std::string_view name, const TransformPair& transform) {
+  const uint32_t number = coordinate_system_names_.intern(name);
+  if (number == coordinate_systems_.size()) coordinate_systems_.emplace_back();
+  coordinate_systems_[number] = transform;
 }
 
 void SceneBuilder::handle_transform_times(const Directive& directive) {
@@ -243,8 +249,10 @@ void SceneBuilder::handle_texture(const Directive& directive) {
 
 void SceneBuilder::handle_area_light(const Directive& directive) {
   const std::string& kind = directive.names[0];
+  constexpr std::string_view kAreaLights[] = {"diffuse", "area"};
   if (kind != "diffuse" && kind != "area") // "area" is what pbrt-v2 files say
-    return reporter_.error(directive.place, "unknown area light " + in_quotes(kind) + "; it is ignored");
+    return reporter_.error(directive.place, "unknown area light " + in_quotes(kind) + "; it is ignored" +
+                                                did_you_mean(closest_name(kind, kAreaLights)));
   const TextureContext here = context(directive.place);
   const TextureParameters parameters(here, directive.parameters);
   const Vec3 radiance =

@@ -5,7 +5,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <unordered_map>
 #include <vector>
 
 #include "pbrt_import/cameras.h"
@@ -50,6 +49,7 @@ private:
   void handle_transform(const Directive& directive);
   void handle_active_transform(const Directive& directive);
   void handle_coordinate_system(const Directive& directive);
+  void define_coordinate_system(std::string_view name, const TransformPair& transform);
   void handle_transform_times(const Directive& directive);
   void handle_material(const Directive& directive);
   void handle_named_material(const Directive& directive);
@@ -91,7 +91,8 @@ private:
   std::optional<Place> options_behind_world_;
   TransformTimes transform_times_;
   GraphicsState state_;
-  std::unordered_map<std::string, TransformPair> coordinate_systems_;
+  NameTable coordinate_system_names_;
+  std::vector<TransformPair> coordinate_systems_; ///< by number in coordinate_system_names_
   TextureGraph graph_;
   MaterialLibrary materials_{graph_};
   FileLoader loader_;

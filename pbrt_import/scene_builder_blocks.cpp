@@ -16,7 +16,7 @@ void SceneBuilder::begin_world(const Directive& directive) {
   if (!reading()) return;
   settle_time();
   state_.reset_transform();
-  coordinate_systems_["world"] = state_.transform();
+  define_coordinate_system("world", state_.transform());
 }
 
 void SceneBuilder::end_world(const Place& place) {
@@ -106,16 +106,9 @@ void SceneBuilder::add_instance(const Directive& directive) {
                                                 in_quotes(scene_.objects[current_object_].name) +
                                                 "; objects cannot hold instances");
   const std::optional<uint32_t> found = object_names_.find(name);
-  if (!found) {
-    std::string_view suggestion;
-    if (object_names_.size() <= 1000) { // a hint is not worth more comparisons than that
-      std::vector<std::string_view> names;
-      for (uint32_t i = 0; i < object_names_.size(); ++i) names.push_back(object_names_.name(i));
-      suggestion = closest_name(name, names);
-    }
-    return reporter_.error(directive.place,
-                           "no object " + in_quotes(name) + "; the instance is skipped" + did_you_mean(suggestion));
-  }
+  if (!found)
+    return reporter_.error(directive.place, "no object " + in_quotes(name) + "; the instance is skipped" +
+                                                did_you_mean(object_names_.closest(name, [](uint32_t) { return true; })));
   const Placement placement = place(directive, "instance");
   const Affine world_from_object(placement.map);
   if (!is_invertible(DAffine(world_from_object)))

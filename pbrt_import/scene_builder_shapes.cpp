@@ -91,7 +91,9 @@ bool SceneBuilder::make_mesh(Directive& directive, Shape& shape) {
 bool SceneBuilder::make_ply_mesh(const Directive& directive, Shape& shape) {
   const Parameter* const file = directive.parameters.find("filename", {ParameterType::kString});
   if (!file || file->strings.size() != 1) {
-    reporter_.error(directive.place, "plymesh without a \"string filename\"; the shape is skipped");
+    reporter_.error(directive.place, file ? "plymesh takes one file name, found " + std::to_string(file->strings.size()) +
+                                                "; the shape is skipped"
+                                          : "plymesh without a \"string filename\"; the shape is skipped");
     return false;
   }
   const std::filesystem::path path = file_names_.resolve(file->strings[0], file->place, reporter_);

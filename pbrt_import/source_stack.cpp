@@ -47,7 +47,9 @@ const Token& SourceStack::peek() {
 
 void SourceStack::report_bad_byte() {
   OpenFile& file = files_open_.back();
-  reporter_.error(place(), "byte " + byte_name(token_.text[0]) + " does not belong in a pbrt file");
+  const bool nul = token_.text[0] == '\0';
+  reporter_.error(place(), "byte " + byte_name(token_.text[0]) + " does not belong in a pbrt file" +
+                               (nul ? "; is this UTF-16 text? save it as UTF-8" : ""));
   if (++file.bad_bytes > kMaxBadBytes) give_up("this is not a text file");
 }
 

@@ -207,10 +207,10 @@ TextBlocks::~TextBlocks() {
 
 void TextBlocks::queue(uint64_t number) {
   Slot& slot = slot_of(number);
-  slot.failure = nullptr;
+  slot.failure = damage_;
   TextBlock& block = slot.block;
   block.offset = number * stride_;
-  if (file_.compressed()) {
+  if (file_.compressed() && !damage_) {
     try {
       inflate(block);
     } catch (...) {
@@ -229,6 +229,15 @@ void TextBlocks::inflate(TextBlock& block) {
   const size_t wanted = stride_ + kOverlap;
   block.size = carry_.size() + file_.read({block.text.data() + carry_.size(), wanted - carry_.size()});
   block.last = block.size < wanted;
+  if (block.last) {
+    try {
+      char none;
+      (void)file_.read({&none, 1});
+    } catch (...) { // damage comes after what could be inflated
+      block.last = false;
+      damage_ = std::current_exception();
+    }
+  }
   inflated_all_ = block.last;
   const auto end = block.text.begin() + static_cast<std::ptrdiff_t>(block.size);
   carry_.assign(std::min(block.text.begin() + static_cast<std::ptrdiff_t>(stride_), end), end);

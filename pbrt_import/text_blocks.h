@@ -81,6 +81,7 @@ private:
   uint64_t queued_ = 0;                      ///< blocks with smaller numbers were queued
   uint64_t next_ = 0;                        ///< blocks with smaller numbers were handed out or skipped
   bool inflated_all_ = false;
+  std::exception_ptr damage_;                ///< of a compressed file, behind the blocks queued so far
   std::vector<char> carry_;                 ///< compressed files: what was read beyond the last queued block's stride
   std::unique_ptr<tbb::task_group> helpers_; ///< null: nobody else works on blocks
 };

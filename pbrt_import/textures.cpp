@@ -103,10 +103,13 @@ std::optional<Node> make_imagemap(const TextureMaker& maker) {
 Node make_bilerp(const TextureMaker& maker) {
   read_mapping(maker);
   // The mean over the unit square is the mean of the corners.
-  Vec3 sum(0.0f);
+  Vec3 corners[4];
+  size_t count = 0;
   for (const auto& [name, fallback] : {std::pair{"v00", 0.0f}, {"v01", 1.0f}, {"v10", 0.0f}, {"v11", 1.0f}})
-    sum += *maker.context.graph.constant_value(maker.constant_of(name, fallback));
-  return maker.context.graph.procedural(sum / 4.0f);
+    corners[count++] = *maker.context.graph.constant_value(maker.constant_of(name, fallback));
+  if (std::all_of(corners, corners + 4, [&](const Vec3& corner) { return corner == corners[0]; }))
+    return maker.constant(corners[0]);
+  return maker.context.graph.procedural((corners[0] + corners[1] + corners[2] + corners[3]) / 4.0f);
 }
 
 Node make_checkerboard(const TextureMaker& maker) {
@@ -155,10 +158,11 @@ std::optional<Node> make_by_class(const TextureMaker& maker, const std::string& 
     read_mapping(maker);
     return maker.constant(Vec3(0.5f, 0.5f, 0.0f));
   }
-  // About the means of pbrt-v3's procedural textures at their default parameters; an average colour asks for no more.
-  if (kind == "fbm") return make_mean(maker, Vec3(0.0f));
-  if (kind == "wrinkled") return make_mean(maker, Vec3(0.6f));
-  if (kind == "windy") return make_mean(maker, Vec3(0.15f));
+  // About the means of pbrt-v3's procedural textures at their default parameters, negative values being black; an
+  // average colour asks for no more.
+  if (kind == "fbm") return make_mean(maker, Vec3(maker.is_float ? 0.0f : 0.12f));
+  if (kind == "wrinkled") return make_mean(maker, Vec3(0.4f));
+  if (kind == "windy") return make_mean(maker, Vec3(0.03f));
   if (kind == "marble") return make_mean(maker, Vec3(0.80f, 0.80f, 0.84f));
   if (kind == "ptex") {
     constexpr std::string_view kNames[] = {"filename", "gamma"};

@@ -12,7 +12,7 @@ namespace {
 
 constexpr bool is_bad_byte(char c) {
   const auto byte = static_cast<unsigned char>(c);
-  return (byte < 0x20 && !is_space(c) && c != '\v' && c != '\f') || byte == 0x7f || byte >= 0xf8;
+  return (byte < 0x20 && !is_space(c) && c != '\v' && c != '\f') || byte == 0x7f || byte == 0xff;
 }
 
 /// Which bytes a predicate holds for.
@@ -211,19 +211,37 @@ std::string unescape(std::string_view raw, bool& unknown_escape) {
   return text;
 }
 
+namespace {
+
+/// Bytes of the UTF-8 character at the start of text, 0 if there is none. Overlong forms are not looked for: all that
+/// matters is what a terminal makes of it.
+size_t utf8_length(std::string_view text) {
+  const auto byte = static_cast<unsigned char>(text[0]);
+  const size_t length = byte < 0x80 ? 1 : byte >= 0xc2 && byte < 0xe0 ? 2 : (byte & 0xf0) == 0xe0 ? 3 : byte < 0xf5 ? 4 : 0;
+  if (length > text.size() || (byte >= 0x80 && byte < 0xc2)) return 0;
+  const auto continues = [](char c) { return (static_cast<unsigned char>(c) & 0xc0) == 0x80; };
+  return std::all_of(text.begin() + 1, text.begin() + static_cast<std::ptrdiff_t>(length), continues) ? length : 0;
+}
+
+} // namespace
+
 std::string in_quotes(std::string_view text, size_t max_length) {
   constexpr char kHex[] = "0123456789abcdef";
+  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf"; // nobody would see it
   std::string shown(1, '"');
-  for (const char c : text) {
+  for (size_t i = 0; i < text.size();) {
     if (shown.size() > max_length) {
       shown += "...";
       break;
     }
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte >= 0x20 && byte != 0x7f && byte < 0xf8)
-      shown += c;
+    const auto byte = static_cast<unsigned char>(text[i]);
+    size_t length = byte < 0x20 || byte == 0x7f ? 0 : utf8_length(text.substr(i));
+    if (text.substr(i).starts_with(kByteOrderMark)) length = 0;
+    if (length > 0)
+      shown += text.substr(i, length);
     else
       shown += {'\\', 'x', kHex[byte >> 4], kHex[byte & 15]};
+    i += std::max<size_t>(length, 1);
   }
   shown += '"';
   return shown;
