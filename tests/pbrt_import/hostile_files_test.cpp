@@ -162,6 +162,12 @@ std::vector<HostileCase> images() {
       image_case("PngOfSixteenBits", "a.png", png(1, 1, 16, std::string("\0\x80\x01\x80\x02\x80\x03", 7)), ""),
       image_case("PngNamedTga", "a.tga", good_png(), ""),
       image_case("PngGzipped", "a.png", gzip(good_png()), ""),
+      image_case("PngGzipTruncated", "a.png", without_end(gzip(good_png()), 1),
+                 R"(scene.pbrt:2:1: error: texture file "a.png": truncated gzip data; it counts as white
+)"),
+      image_case("PngGzipDamaged", "a.png", flipped(gzip(good_png()), gzip(good_png()).size() - 8),
+                 R"(scene.pbrt:2:1: error: texture file "a.png": damaged gzip data; it counts as white
+)"),
       image_case(
           "PngTruncatedInItsHeader", "a.png", good_png().substr(0, 20),
           R"(scene.pbrt:2:1: error: texture file "a.png": the header of the PNG image is damaged, or claims more pixels than can be read; it counts as white
@@ -481,29 +487,56 @@ scene.pbrt:4:1: error: WorldEnd belongs between WorldBegin and WorldEnd; it is i
        {{"a", "\xff\xfeI\0d\0"s}}},
       {"IncludeBinary",
        world("Include \"a\""),
-       "a:1:1: error: unknown directive \"\x89"
-       "PNG\"\n  included from scene.pbrt:2:1\na:2:1: error: byte 0x1A does not belong in a pbrt file\n  included from "
-       "scene.pbrt:2:1\na:3:1: error: byte 0x00 does not belong in a pbrt file (21 times, first here)\n  included from "
-       "scene.pbrt:2:1\na:4:8: error: byte 0x02 does not belong in a pbrt file (3 times, first here)\n  included from "
-       "scene.pbrt:2:1\na:4:12: error: byte 0x01 does not belong in a pbrt file\n  included from "
-       "scene.pbrt:2:1\na:4:13: error: byte 0x08 does not belong in a pbrt file\n  included from "
-       "scene.pbrt:2:1\na:4:25: error: byte 0x0F does not belong in a pbrt file\n  included from "
-       "scene.pbrt:2:1\na:4:42: error: byte 0x07 does not belong in a pbrt file\n  included from "
-       "scene.pbrt:2:1\na:4:46: error: byte 0x05 does not belong in a pbrt file\n  included from "
-       "scene.pbrt:2:1\na:4:48: error: byte 0x1D does not belong in a pbrt file\n  included from scene.pbrt:2:1\n",
+       R"(a:1:1: error: unknown directive "\x89PNG"
+  included from scene.pbrt:2:1
+a:2:1: error: byte 0x1A does not belong in a pbrt file
+  included from scene.pbrt:2:1
+a:3:1: error: byte 0x00 does not belong in a pbrt file; is this UTF-16 text? save it as UTF-8 (21 times, first here)
+  included from scene.pbrt:2:1
+a:4:1: error: unknown directive "IHDR"
+  included from scene.pbrt:2:1
+a:4:8: error: byte 0x02 does not belong in a pbrt file (3 times, first here)
+  included from scene.pbrt:2:1
+a:4:12: error: byte 0x01 does not belong in a pbrt file
+  included from scene.pbrt:2:1
+a:4:13: error: byte 0x08 does not belong in a pbrt file
+  included from scene.pbrt:2:1
+a:4:25: error: byte 0x0F does not belong in a pbrt file
+  included from scene.pbrt:2:1
+a:4:42: error: byte 0x07 does not belong in a pbrt file
+  included from scene.pbrt:2:1
+a:4:46: error: byte 0x05 does not belong in a pbrt file
+  included from scene.pbrt:2:1
+a:4:48: error: byte 0x1D does not belong in a pbrt file
+  included from scene.pbrt:2:1
+)",
        {1, 1, 0, 0},
        {{"a", good_png()}}},
       {"IncludeEmpty", world("Include \"a\""), "", {1, 1, 0, 0}, {{"a", ""}}},
       {"IncludeGzipped", world("Include \"a.gz\""), "", {2, 2, 0, 0}, {{"a.gz", gzip(kTriangle)}}},
       {"IncludeGzipTruncated",
        world("Include \"a.gz\""),
-       R"(scene.pbrt:2:1: error: cannot include "a.gz": truncated gzip data
+       R"(a.gz: error: truncated gzip data; the rest of the file is skipped
+  included from scene.pbrt:2:1
 )",
-       {1, 1, 0, 0},
+       {2, 101, 0, 0},
        {{"a.gz", without_end(gzip("Shape \"disk\" Nonsense"), 9)}}},
+      {"IncludeGzipTruncatedInAnArray",
+       world("Include \"a.gz\""),
+       R"(a.gz: error: truncated gzip data; the rest of the file is skipped
+  included from scene.pbrt:2:1
+a.gz:2:31: error: "[" without its "]": the values of parameter "radius" run into "Shape"
+  included from scene.pbrt:2:1
+)",
+       {2, 2, 1, 0},
+       {{"a.gz",
+         without_end(gzip(std::string(kTriangle) + "\nShape \"sphere\" \"float radius\" [ 2 ] Nonsense"), 15)}}},
       {"IncludeGzipDamaged",
        world("Include \"a.gz\""),
-       R"(scene.pbrt:2:1: error: cannot include "a.gz": damaged gzip data
+       R"(a.gz: error: damaged gzip data; the rest of the file is skipped
+  included from scene.pbrt:2:1
+a.gz:1:1: error: unknown directive "So9pe"
+  included from scene.pbrt:2:1
 )",
        {1, 1, 0, 0},
        {{"a.gz", flipped(gzip("Shape \"disk\""), 12)}}},
@@ -515,10 +548,29 @@ scene.pbrt:4:1: error: WorldEnd belongs between WorldBegin and WorldEnd; it is i
        {{"a.gz", "\x1f\x8b"}}},
       {"IncludeGzipWithNoiseBehind",
        world("Include \"a.gz\""),
-       R"(scene.pbrt:2:1: error: cannot include "a.gz": damaged gzip data
+       R"(a.gz: error: damaged gzip data; the rest of the file is skipped
+  included from scene.pbrt:2:1
+)",
+       {2, 101, 0, 0},
+       {{"a.gz", gzip("Shape \"disk\"") + "noise"}}},
+      {"PlyGzipTruncated",
+       world(ply_shape("a.ply")),
+       R"(scene.pbrt:2:1: error: plymesh "a.ply": truncated gzip data; the shape is skipped
+)",
+       {1, 1, 1, 0},
+       {{"a.ply", without_end(gzip(kPly), 1)}}},
+      {"PlyGzipChecksumWrong",
+       world(ply_shape("a.ply")),
+       R"(scene.pbrt:2:1: error: plymesh "a.ply": damaged gzip data; the shape is skipped
+)",
+       {1, 1, 1, 0},
+       {{"a.ply", flipped(gzip(kPly), gzip(kPly).size() - 8)}}},
+      {"SpectrumFileGzipTruncated",
+       world("Material \"matte\" \"spectrum Kd\" \"a.spd\""),
+       R"(scene.pbrt:2:18: error: cannot read spectrum file "a.spd": truncated gzip data
 )",
        {1, 1, 0, 0},
-       {{"a.gz", gzip("Shape \"disk\"") + "noise"}}},
+       {{"a.spd", without_end(gzip("400 0.5\n700 0.5\n"), 1)}}},
       with({"IncludeGzipBomb",
             world("Include \"a.gz\""),
             R"(a.gz: error: content exceeds the limit of 1000000 bytes for this file; the rest of the file is skipped
@@ -534,18 +586,16 @@ scene.pbrt:4:1: error: WorldEnd belongs between WorldBegin and WorldEnd; it is i
        {1, 1, 0, 0}},
       {"MainFileGzipTruncated",
        without_end(gzip(world("Shape \"disk\"")), 12),
-       R"(scene.pbrt: truncated gzip data)",
-       {},
-       {},
-       {},
-       ErrorKind::kInput},
+       R"(scene.pbrt: error: truncated gzip data; the rest of the file is skipped
+scene.pbrt:3:79: warning: the file ends without WorldEnd
+)",
+       {2, 101, 0, 0}},
+      {"MainFileGzipOfTwoBytes", "\x1f\x8b", R"(scene.pbrt: truncated gzip data)", {}, {}, {}, ErrorKind::kInput},
       {"MainFileGzipChecksumWrong",
        flipped(gzip(world("Shape \"disk\"")), gzip(world("Shape \"disk\"")).size() - 8),
-       R"(scene.pbrt: damaged gzip data)",
-       {},
-       {},
-       {},
-       ErrorKind::kInput},
+       R"(scene.pbrt: error: damaged gzip data; the rest of the file is skipped
+)",
+       {2, 101, 0, 0}},
       with(
           {"MainFileGzipBomb",
            bomb,
@@ -634,7 +684,7 @@ scene.pbrt:2:17: warning: file names have back-slashes, "models\a.ply"; read as 
        {1, 1, 1, 0}},
       {"PlyWithTwoNames",
        world("Shape \"plymesh\" \"string filename\" [ \"a.ply\" \"b.ply\" ]"),
-       R"(scene.pbrt:2:1: error: plymesh without a "string filename"; the shape is skipped
+       R"(scene.pbrt:2:1: error: plymesh takes one file name, found 2; the shape is skipped
 )",
        {1, 1, 1, 0}},
       {"PlyNameMisspelled",

@@ -37,10 +37,8 @@ std::vector<HostileCase> encodings() {
       {"Utf8ByteOrderMark", "\xef\xbb\xbf" + world(""), "", {1, 1, 0, 0}},
       {"ByteOrderMarkInTheMiddle",
        world("\xef\xbb\xbf Identity"),
-       "scene.pbrt:2:1: error: unknown directive \"\xef"
-       "\xbb"
-       "\xbf"
-       "\"\n",
+       R"(scene.pbrt:2:1: error: unknown directive "\xef\xbb\xbf"
+)",
        {1, 1, 0, 0}},
       {"LinesEndInCrLf",
        with_line_ends(kMistakes, "\r\n"),
@@ -78,34 +76,34 @@ scene.pbrt:6:4: error: Scale takes 3 numbers, found 1; it is ignored
       {"Utf16WithoutMark",
        utf16("Identity\n", false),
        R"(scene.pbrt:1:1: error: unknown directive "I"
-scene.pbrt:1:2: error: byte 0x00 does not belong in a pbrt file (9 times, first here)
+scene.pbrt:1:2: error: byte 0x00 does not belong in a pbrt file; is this UTF-16 text? save it as UTF-8 (9 times, first here)
 scene.pbrt:2:2: warning: the file ends without WorldBegin: the scene is empty
 )",
        {0, 0, 0, 0}},
       {"NulBetweenDirectives",
        world("Identity\n\0\nIdentity"s),
-       R"(scene.pbrt:3:1: error: byte 0x00 does not belong in a pbrt file
+       R"(scene.pbrt:3:1: error: byte 0x00 does not belong in a pbrt file; is this UTF-16 text? save it as UTF-8
 )",
        {1, 1, 0, 0}},
       {"NulInsideAWord",
        world("Sca\0le 2 2 2"s),
        R"(scene.pbrt:2:1: error: unknown directive "Sca"
-scene.pbrt:2:4: error: byte 0x00 does not belong in a pbrt file
+scene.pbrt:2:4: error: byte 0x00 does not belong in a pbrt file; is this UTF-16 text? save it as UTF-8
 )",
        {1, 1, 0, 0}},
       {"NulInsideAString",
        world("Material \"mat\0te\""s),
-       R"(scene.pbrt:2:14: error: byte 0x00 does not belong in a pbrt file
+       R"(scene.pbrt:2:14: error: byte 0x00 does not belong in a pbrt file; is this UTF-16 text? save it as UTF-8
 )",
        {1, 1, 0, 0}},
       {"NulInsideAnArray",
        world("Shape \"sphere\" \"float radius\" [ 2 \0 ]"s),
-       R"(scene.pbrt:2:35: error: byte 0x00 does not belong in a pbrt file
+       R"(scene.pbrt:2:35: error: byte 0x00 does not belong in a pbrt file; is this UTF-16 text? save it as UTF-8
 )",
        {1, 1, 1, 0}},
       {"NulBehindTheEnd",
        world("") + std::string(3, '\0'),
-       R"(scene.pbrt:5:1: error: byte 0x00 does not belong in a pbrt file (3 times, first here)
+       R"(scene.pbrt:5:1: error: byte 0x00 does not belong in a pbrt file; is this UTF-16 text? save it as UTF-8 (3 times, first here)
 )",
        {1, 1, 0, 0}},
       {"FfBytes",
@@ -126,6 +124,42 @@ scene.pbrt:2:4: error: byte 0x00 does not belong in a pbrt file
       {"Latin1IsTakenAsItIs",
        world("MakeNamedMaterial \"caf\xe9\" \"string type\" \"mirror\" NamedMaterial \"caf\xe9\""),
        "",
+       {1, 1, 0, 0}},
+      {"Latin1UpToItsLastLettersIsText",
+       world("MakeNamedMaterial \"gr\xfcn\" \"string type\" \"mirror\" NamedMaterial \"gr\xfcn\"\n"
+             "MakeNamedMaterial \"\xf8\xf9\xfa\xfb\xfd\xfe\" \"string type\" \"mirror\" # \xf8\xff\n"
+             "NamedMaterial \"\xf8\xf9\xfa\xfb\xfd\xfe\""),
+       "",
+       {1, 1, 0, 0}},
+      {"Latin1IsShownInHexadecimal",
+       world("MakeNamedMaterial \"gr\xfcn\" \"string type\" \"mirror\"\nNamedMaterial \"Gr\xfcn\"\n"
+             "NamedMaterial \"\xc4rger\"\n\xfc"
+             "ber"),
+       R"(scene.pbrt:3:1: error: no named material "Gr\xfcn"; the material before it stays; did you mean "gr\xfcn"?
+scene.pbrt:4:1: error: no named material "\xc4rger"; the material before it stays
+scene.pbrt:5:1: error: unknown directive "\xfcber"
+)",
+       {1, 1, 0, 0}},
+      {"Utf8IsShownAsItIs",
+       world("NamedMaterial \"gr\xc3\xbcn\"\nNamedMaterial \"\xe6\x9c\xa8\"\nNamedMaterial \"\xf0\x9f\x8c\xb2\""),
+       "scene.pbrt:2:1: error: no named material \"gr\xc3\xbcn\"; the material before it stays\n"
+       "scene.pbrt:3:1: error: no named material \"\xe6\x9c\xa8\"; the material before it stays\n"
+       "scene.pbrt:4:1: error: no named material \"\xf0\x9f\x8c\xb2\"; the material before it stays\n",
+       {1, 1, 0, 0}},
+      {"DamagedUtf8IsShownInHexadecimal",
+       world("NamedMaterial \"\xc3\"\nNamedMaterial \"\xe6\x9c\"\nNamedMaterial \"\x9f\x8c\xb2!\"\n"
+             "NamedMaterial \"\xf5\x80\x80\x80\"\nNamedMaterial \"\xc0\xaf\""),
+       R"(scene.pbrt:2:1: error: no named material "\xc3"; the material before it stays
+scene.pbrt:3:1: error: no named material "\xe6\x9c"; the material before it stays
+scene.pbrt:4:1: error: no named material "\x9f\x8c\xb2!"; the material before it stays
+scene.pbrt:5:1: error: no named material "\xf5\x80\x80\x80"; the material before it stays
+scene.pbrt:6:1: error: no named material "\xc0\xaf"; the material before it stays
+)",
+       {1, 1, 0, 0}},
+      {"ByteOrderMarkInAName",
+       world("MakeNamedMaterial \"gold\" \"string type\" \"metal\"\nNamedMaterial \"\xef\xbb\xbfgold\""),
+       R"(scene.pbrt:3:1: error: no named material "\xef\xbb\xbfgold"; the material before it stays
+)",
        {1, 1, 0, 0}},
       {"FormFeedIsNoSpace",
        world("Scale\f2 2 2"),
@@ -154,17 +188,19 @@ scene.pbrt:2:4: error: byte 0x00 does not belong in a pbrt file
        {0, 0, 0, 0}},
       {"PngInsteadOfText",
        "\x89PNG\r\n\x1a\n\0\0\0\rIHDR"s,
-       "scene.pbrt:1:1: error: unknown directive \"\x89"
-       "PNG\"\nscene.pbrt:2:1: error: byte 0x1A does not belong in a pbrt file\nscene.pbrt:3:1: error: byte 0x00 does "
-       "not belong in a pbrt file (3 times, first here)\nscene.pbrt:4:5: warning: the file ends without WorldBegin: "
-       "the scene is empty\n",
+       R"(scene.pbrt:1:1: error: unknown directive "\x89PNG"
+scene.pbrt:2:1: error: byte 0x1A does not belong in a pbrt file
+scene.pbrt:3:1: error: byte 0x00 does not belong in a pbrt file; is this UTF-16 text? save it as UTF-8 (3 times, first here)
+scene.pbrt:4:1: error: unknown directive "IHDR"
+scene.pbrt:4:5: warning: the file ends without WorldBegin: the scene is empty
+)",
        {0, 0, 0, 0}},
       {"ElfInsteadOfText",
        "\x7f"s + "ELF\2\1\1\0\0\0\0\0\0\0\0\0"s,
        R"(scene.pbrt:1:1: error: byte 0x7F does not belong in a pbrt file
 scene.pbrt:1:5: error: byte 0x02 does not belong in a pbrt file
 scene.pbrt:1:6: error: byte 0x01 does not belong in a pbrt file (2 times, first here)
-scene.pbrt:1:8: error: byte 0x00 does not belong in a pbrt file (9 times, first here)
+scene.pbrt:1:8: error: byte 0x00 does not belong in a pbrt file; is this UTF-16 text? save it as UTF-8 (9 times, first here)
 scene.pbrt:1:17: warning: the file ends without WorldBegin: the scene is empty
 )",
        {0, 0, 0, 0}},
@@ -212,6 +248,7 @@ scene.pbrt:1:101: warning: the file ends without WorldEnd
       {"StringWithALineEndInside",
        world("Material \"mat\nte\""),
        R"(scene.pbrt:2:10: error: string without its closing quote: "mat"
+scene.pbrt:3:1: error: unknown directive "te"
 )",
        {1, 1, 0, 0}},
       {"StringEndsInABackslash",
@@ -270,7 +307,23 @@ scene.pbrt:2:39: error: expected a parameter or a directive, found "]"
        {1, 1, 0, 0}},
       {"StrayNumber",
        world("Identity 5 Identity"),
-       R"(scene.pbrt:2:10: error: unknown directive "5"
+       R"(scene.pbrt:2:10: error: expected a directive, found the number "5"
+)",
+       {1, 1, 0, 0}},
+      {"StrayNumbers",
+       world("Identity -1.5e3 7 8 Identity\n.5\nIdentity +2 Identity 3rd"),
+       R"(scene.pbrt:2:10: error: expected a directive, found the number "-1.5e3"
+scene.pbrt:3:1: error: expected a directive, found the number ".5"
+scene.pbrt:4:10: error: expected a directive, found the number "+2"
+scene.pbrt:4:22: error: expected a directive, found the number "3rd"
+)",
+       {1, 1, 0, 0}},
+      {"WordsThatBeginLikeNumbers",
+       world("Info\nNaming\ninfinite\nE5"),
+       R"(scene.pbrt:2:1: error: unknown directive "Info"
+scene.pbrt:3:1: error: unknown directive "Naming"
+scene.pbrt:4:1: error: unknown directive "infinite"
+scene.pbrt:5:1: error: unknown directive "E5"
 )",
        {1, 1, 0, 0}},
       {"MegabyteWord",
@@ -397,6 +450,30 @@ std::vector<HostileCase> parameters() {
        R"(scene.pbrt:2:16: error: unknown parameter type "flaot" in "flaot radius"
 )",
        {1, 1, 1, 0}},
+      {"ParameterTypesMisspelled",
+       world(kTri + "\"flot alpha\" 1 \"Float alpha\" 1 \"texure alpha\" \"t\"\n\"Normal N\" [0 0 1] "
+                    "\"intger i\" 1 \"spectrm Kd\" [1 1]\n\"strings s\" [\"a\"] \"colour Kd\" [1 1 1]"),
+       R"(scene.pbrt:2:81: error: unknown parameter type "flot" in "flot alpha"; did you mean "float"?
+scene.pbrt:2:96: error: unknown parameter type "Float" in "Float alpha"; did you mean "float"?
+scene.pbrt:2:112: error: unknown parameter type "texure" in "texure alpha"; did you mean "texture"?
+scene.pbrt:3:1: error: unknown parameter type "Normal" in "Normal N"; did you mean "normal"?
+scene.pbrt:3:20: error: unknown parameter type "intger" in "intger i"; did you mean "integer"?
+scene.pbrt:3:33: error: unknown parameter type "spectrm" in "spectrm Kd"; did you mean "spectrum"?
+scene.pbrt:4:1: error: unknown parameter type "strings" in "strings s"; did you mean "string"?
+scene.pbrt:4:19: error: unknown parameter type "colour" in "colour Kd"; did you mean "color"?
+)",
+       {1, 1, 1, 0}},
+      {"DeclarationWithThreeWords",
+       world(kTri + "\"float alpha beta\" 0.5\n\"float \talpha  beta gamma\" 0.5"),
+       R"(scene.pbrt:2:81: warning: "float alpha beta" has more than a type and a name; the rest is ignored
+scene.pbrt:3:1: warning: "float \x09alpha  beta gamma" has more than a type and a name; the rest is ignored
+)",
+       {2, 2, 0, 0}},
+      {"DeclarationOfUnknownTypeWithThreeWords",
+       world("Shape \"sphere\" \"my float radius\" 2"),
+       R"(scene.pbrt:2:16: error: unknown parameter type "my" in "my float radius"
+)",
+       {1, 1, 1, 0}},
       {"UnknownParameterTypeWithArray",
        world("Shape \"sphere\" \"quaternion q\" [ 1 2 3 4 ] \"float radius\" 2"),
        R"(scene.pbrt:2:16: error: unknown parameter type "quaternion" in "quaternion q"
@@ -446,7 +523,7 @@ std::vector<HostileCase> parameters() {
       {"ValueMissing",
        world("Shape \"sphere\" \"float radius\" \"float zmin\" 0"),
        R"(scene.pbrt:2:31: error: expected a value for parameter "radius", found the string "float zmin"
-scene.pbrt:2:44: error: unknown directive "0"
+scene.pbrt:2:44: error: expected a directive, found the number "0"
 )",
        {1, 1, 1, 0}},
       {"SameParameterTwice",
@@ -629,6 +706,27 @@ scene.pbrt:4:1: error: unknown directive "Trnslate"; did you mean "Translate"?
 scene.pbrt:6:1: error: unknown directive "AtributeEnd"; did you mean "AttributeEnd"?
 )",
        {1, 1, 0, 0}},
+      {"DirectivesMisspelledInARow",
+       world("AttributBegin\nTrnslate 1 0 0\nAtributeEnd"),
+       R"(scene.pbrt:2:1: error: unknown directive "AttributBegin"; did you mean "AttributeBegin"?
+scene.pbrt:3:1: error: unknown directive "Trnslate"; did you mean "Translate"?
+scene.pbrt:4:1: error: unknown directive "AtributeEnd"; did you mean "AttributeEnd"?
+)",
+       {1, 1, 0, 0}},
+      {"DirectivesMisspelledWithArguments",
+       world("  Matrial \"matte\" \"rgb Kd\"\n    [ 1 0 0 ]\n\t\"float sigma\"\n  10\n  -5 nan\n"
+             "  shpe \"sphere\" Shap\nIdentity"),
+       R"(scene.pbrt:2:3: error: unknown directive "Matrial"; did you mean "Material"?
+scene.pbrt:7:3: error: unknown directive "shpe"; did you mean "Shape"?
+)",
+       {1, 1, 0, 0}},
+      {"DirectiveMisspelledBehindOneThatIsIgnored",
+       world("Scale 1\nTrnslate 1 0 0\nShape\nTrnslte 1 0 0\nIdentity"),
+       R"(scene.pbrt:2:1: error: Scale takes 3 numbers, found 1; it is ignored
+scene.pbrt:3:1: error: unknown directive "Trnslate"; did you mean "Translate"?
+scene.pbrt:5:1: error: expected a quoted name after Shape, found "Trnslte"
+)",
+       {1, 1, 0, 0}},
       {"ActiveTransformInQuotes",
        world("ActiveTransform \"All\""),
        R"(scene.pbrt:2:17: error: expected All, StartTime or EndTime after ActiveTransform, found the string "All"
@@ -637,6 +735,22 @@ scene.pbrt:6:1: error: unknown directive "AtributeEnd"; did you mean "AttributeE
       {"ActiveTransformSometimes",
        world("ActiveTransform Sometimes"),
        R"(scene.pbrt:2:1: error: ActiveTransform takes All, StartTime or EndTime, found "Sometimes"
+)",
+       {1, 1, 0, 0}},
+      {"ActiveTransformMisspelled",
+       world("ActiveTransform all\nActiveTransform StartTim\nActiveTransform Endtime"),
+       R"(scene.pbrt:2:1: error: ActiveTransform takes All, StartTime or EndTime, found "all"; did you mean "All"?
+scene.pbrt:3:1: error: ActiveTransform takes All, StartTime or EndTime, found "StartTim"; did you mean "StartTime"?
+scene.pbrt:4:1: error: ActiveTransform takes All, StartTime or EndTime, found "Endtime"; did you mean "EndTime"?
+)",
+       {1, 1, 0, 0}},
+      {"CoordinateSystemsMisspelled",
+       "Camera \"perspective\"\n" +
+           world("CoordinateSystem \"Sun1\"\nCoordSysTransform \"sun1\"\nCoordSysTransform \"camra\"\n"
+                 "CoordSysTransform \"World\""),
+       R"(scene.pbrt:4:1: error: no coordinate system "sun1"; the transform stays; did you mean "Sun1"?
+scene.pbrt:5:1: error: no coordinate system "camra"; the transform stays; did you mean "camera"?
+scene.pbrt:6:1: error: no coordinate system "World"; the transform stays; did you mean "world"?
 )",
        {1, 1, 0, 0}},
       {"CoordinateSystemUndefined",
@@ -740,6 +854,27 @@ TEST(HostileSizes, HundredThousandUnknownMaterials) {
   expect_linear(small, large);
   EXPECT_EQ(without_folder(to_string(large.imported.diagnostics.front()), folder),
             "scene.pbrt:2:1: error: unknown material \"matte0\"; matte is used; did you mean \"matte\"?");
+  EXPECT_EQ(kept_of(large.imported), (Kept{1, 1, 0, 0}));
+}
+
+TEST(HostileSizes, ThousandsOfUnknownNamedMaterialsAmongThousands) {
+  const SceneFolder folder;
+  const auto import = [&](int unknown, int defined) {
+    return timed_import(
+        folder, world(listed(defined,
+                             [](int i) {
+                               return numbered("MakeNamedMaterial \"metal", i) + "\" \"string type\" \"metal\"\n";
+                             }) +
+                      listed(unknown, [](int i) { return numbered("NamedMaterial \"metl", i) + "\"\n"; })));
+  };
+  const Timed small = import(1000, 2250), large = import(4000, 9000);
+  expect_linear(small, large);
+  ASSERT_EQ(large.imported.diagnostics.size(), 4000u);
+  EXPECT_EQ(without_folder(to_string(large.imported.diagnostics.front()), folder),
+            "scene.pbrt:9002:1: error: no named material \"metl0\"; the material before it stays; did you mean "
+            "\"metal0\"?");
+  EXPECT_EQ(without_folder(to_string(large.imported.diagnostics.back()), folder), // so many get no hints
+            "scene.pbrt:13001:1: error: no named material \"metl3999\"; the material before it stays");
   EXPECT_EQ(kept_of(large.imported), (Kept{1, 1, 0, 0}));
 }
 

@@ -126,6 +126,23 @@ scene.pbrt:2:1: error: Shape "trianglemesh" is skipped: no triangle is left
        R"(scene.pbrt:2:1: warning: trianglemesh: 4 vertex normals (the first is number 0) zero or not finite: recomputed from the faces around
 )",
        {2, 3, 0, 0}},
+      {"UvsAsFloatsLeftOver",
+       world(std::string(kTriangle) + "\"float uv\" [0 0 1 0 0 1 7]\n" + std::string(kTriangle) +
+             "\"float st\" [0 0 1 0 0 1 7]"),
+       R"(scene.pbrt:2:2: warning: trianglemesh: parameter "uv" takes values in groups of 2, found 7; the last 1 are ignored
+scene.pbrt:3:2: warning: trianglemesh: parameter "st" takes values in groups of 2, found 7; the last 1 are ignored
+)",
+       {3, 3, 0, 0}},
+      {"UvsAsPointsLeftOver",
+       world(std::string(kTriangle) + "\"point2 uv\" [0 0 1 0 0 1 7]"),
+       R"(scene.pbrt:2:81: warning: parameter "point2 uv" takes values in groups of 2, found 7; the last 1 are ignored
+)",
+       {2, 2, 0, 0}},
+      {"UvOfOneFloat",
+       world(std::string(kTriangle) + "\"float uv\" 7"),
+       R"(scene.pbrt:2:2: warning: trianglemesh: parameter "uv" takes values in groups of 2, found 1; the last 1 are ignored
+)",
+       {2, 2, 0, 0}},
       {"UvsNotANumber",
        world(square("\"point2 uv\" [nan 0 1 0 1 1 0 inf]")),
        R"(scene.pbrt:2:1: warning: trianglemesh: 2 uvs (the first is number 0) not finite: set to zero
@@ -181,6 +198,10 @@ scene.pbrt:2:1: error: Shape "trianglemesh" is skipped: no triangle is left
 
 std::vector<HostileCase> shapes() {
   const std::string control = "\"integer indices\" [0 1 2] \"point P\" [0 0 0 1 0 0 0 1 0]";
+  const std::string nurbs =
+      "Shape \"nurbs\" \"integer nu\" 2 \"integer nv\" 2 \"integer uorder\" 2 \"integer vorder\" 2 "
+      "\"float uknots\" [0 0 1 1] \"float vknots\" [0 0 1 1] ";
+  const std::string patch = "\"point P\" [0 0 0 1 0 0 0 1 0 1 1 0] ";
   return {
       {"SphereRadiusZero",
        world("Shape \"sphere\" \"float radius\" 0"),
@@ -257,7 +278,14 @@ std::vector<HostileCase> shapes() {
        R"(scene.pbrt:2:1: warning: loopsubdiv: 1 triangle (number 0) dropped: vertex index out of range
 scene.pbrt:2:1: error: Shape "loopsubdiv" is skipped: no triangle is left
 )",
-       {1, 1, 1, 0}},
+       {1, 1, 1, 1}},
+      {"LoopOneLeft",
+       world("Shape \"loopsubdiv\" \"integer levels\" 1 \"integer indices\" [0 1 9 0 1 2 1 1 2] "
+             "\"point P\" [0 0 0 1 0 0 0 1 0]"),
+       R"(scene.pbrt:2:1: warning: loopsubdiv: 1 triangle (number 0) dropped: vertex index out of range
+scene.pbrt:2:1: warning: loopsubdiv: 1 triangle (number 2) dropped: repeated vertex index
+)",
+       {2, 5, 0, 2}},
       {"HeightfieldAbsurdCounts",
        world("Shape \"heightfield\" \"integer nu\" 2147483647 \"integer nv\" 2147483647 \"float Pz\" [0 1 2 3]"),
        R"(scene.pbrt:2:1: error: Shape "heightfield" is skipped: the heightfield has 4 heights for 2147483647 x 2147483647 samples
@@ -306,6 +334,23 @@ scene.pbrt:2:1: error: Shape "loopsubdiv" is skipped: no triangle is left
        R"(scene.pbrt:2:1: error: Shape "nurbs" is skipped: no control points, neither "point P" nor "float Pw"
 )",
        {1, 1, 1, 0}},
+      {"NurbsWeightedPointsLeftOver",
+       world(nurbs + "\"float Pw\" [0 0 0 1 1 0 0 1 0 1 0 1 1 1 0 1 7]"),
+       R"(scene.pbrt:2:1: warning: nurbs: parameter "Pw" takes values in groups of 4, found 17; the last 1 are ignored
+)",
+       {2, 3, 0, 0}},
+      {"NurbsRangeNotANumber",
+       world(nurbs + patch + "\"float u0\" nan\n" + nurbs + patch + "\"float v1\" nan"),
+       R"(scene.pbrt:2:1: error: Shape "nurbs" is skipped: the range of u is empty or leaves the knots
+scene.pbrt:3:1: error: Shape "nurbs" is skipped: the range of v is empty or leaves the knots
+)",
+       {1, 1, 2, 0}},
+      {"NurbsRangeInfinite",
+       world(nurbs + patch + "\"float u0\" -inf"),
+       R"(scene.pbrt:2:1: error: Shape "nurbs" is skipped: the range of u is empty or leaves the knots
+)",
+       {1, 1, 1, 0}},
+      {"NurbsRangeOfItsKnots", world(nurbs + patch + "\"float u0\" 0 \"float u1\" 1"), "", {2, 3, 0, 0}},
       {"NurbsKnotsDecrease",
        world("Shape \"nurbs\" \"integer nu\" 2 \"integer nv\" 2 \"integer uorder\" 2 \"integer vorder\" 2 \"float "
              "uknots\" [0 1 0 1] \"float vknots\" [0 0 1 1] \"point P\" [0 0 0 1 0 0 0 1 0 1 1 0]"),
@@ -314,9 +359,21 @@ scene.pbrt:2:1: error: Shape "loopsubdiv" is skipped: no triangle is left
        {1, 1, 1, 0}},
       {"CurveUnknownType",
        world("Shape \"curve\" \"string type\" \"round\" \"point P\" [0 0 0 1 0 0 2 0 0 3 0 0]"),
-       R"(scene.pbrt:2:1: error: Shape "curve" is skipped: type "round" is neither flat, ribbon nor cylinder
+       R"(scene.pbrt:2:1: error: curve: type "round" is neither flat, ribbon nor cylinder; it is drawn round
 )",
-       {1, 1, 1, 0}},
+       {2, 17, 0, 0}},
+      {"CurveNormalsWithoutRibbon",
+       world(
+           "Shape \"curve\" \"point P\" [0 0 0 1 0 0 2 0 0 3 0 0] \"normal N\" [0 0 1 0 0 1]\nShape \"curve\" \"string "
+           "type\" \"cylinder\" \"point P\" [0 0 0 1 0 0 2 0 0 3 0 0] \"normal N\" [0 0 nan]"),
+       R"(scene.pbrt:2:1: warning: curve: normals are for ribbons only; they are ignored (2 times, first here)
+)",
+       {3, 33, 0, 0}},
+      {"CurveNormalsOfARibbon",
+       world("Shape \"curve\" \"string type\" \"ribbon\" \"point P\" [0 0 0 1 0 0 2 0 0 3 0 0] \"normal N\" [0 0 1 0 0 "
+             "1]"),
+       "",
+       {2, 3, 0, 0}},
       {"CurveUnknownBasis",
        world("Shape \"curve\" \"string basis\" \"hermite\" \"point P\" [0 0 0 1 0 0 2 0 0 3 0 0]"),
        R"(scene.pbrt:2:1: error: Shape "curve" is skipped: basis "hermite" is neither bezier nor bspline
@@ -481,7 +538,15 @@ scene.pbrt:2:1: note: object "o" is never instanced; it is left out
        {1, 1, 0, 0}},
       {"CameraMisspelled",
        "Camera \"perspectiv\"\n" + world(""),
-       R"(scene.pbrt:1:1: error: unknown camera "perspectiv"; it is left out
+       R"(scene.pbrt:1:1: error: unknown camera "perspectiv"; it is left out; did you mean "perspective"?
+)",
+       {1, 1, 0, 0}},
+      {"CamerasMisspelled",
+       "Camera \"Orthographic\"\nCamera \"enviroment\"\nCamera \"realistc\"\nCamera \"fisheye\"\n" + world(""),
+       R"(scene.pbrt:1:1: error: unknown camera "Orthographic"; it is left out; did you mean "orthographic"?
+scene.pbrt:2:1: error: unknown camera "enviroment"; it is left out; did you mean "environment"?
+scene.pbrt:3:1: error: unknown camera "realistc"; it is left out; did you mean "realistic"?
+scene.pbrt:4:1: error: unknown camera "fisheye"; it is left out
 )",
        {1, 1, 0, 0}},
       {"CameraFlattened",
@@ -600,6 +665,19 @@ scene.pbrt:2:1: note: material "matte": its colour leaves [0, 1] and is clamped
        world("Material \"metal\" \"rgb eta\" [-1 -1 -1] \"rgb k\" [1e38 1e38 1e38]"),
        "",
        {1, 1, 0, 0}},
+      {"MetalOfTextures",
+       world("Texture \"n\" \"spectrum\" \"fbm\"\nMaterial \"metal\" \"texture eta\" \"n\"\nMaterial \"metal\" "
+             "\"texture k\" "
+             "\"n\" \"rgb eta\" [1 1 1]"),
+       R"(scene.pbrt:3:1: note: metal: a texture for "eta" is not supported; copper's is used
+scene.pbrt:4:1: note: metal: a texture for "k" is not supported; copper's is used
+)",
+       {1, 1, 0, 0}},
+      {"MetalOfAConstantTexture",
+       world("Texture \"n\" \"spectrum\" \"constant\" \"rgb value\" [1 1 1]\nMaterial \"metal\" \"texture eta\" \"n\" "
+             "\"texture k\" \"n\""),
+       "",
+       {1, 1, 0, 0}},
       {"NamedMaterialUndefined",
        world("NamedMaterial \"gold\""),
        R"(scene.pbrt:2:1: error: no named material "gold"; the material before it stays
@@ -647,7 +725,14 @@ scene.pbrt:2:1: error: mix material without a "string namedmaterial2"; grey matt
        {1, 1, 0, 0}},
       {"AreaLightUnknown",
        world("AreaLightSource \"difuse\""),
-       R"(scene.pbrt:2:1: error: unknown area light "difuse"; it is ignored
+       R"(scene.pbrt:2:1: error: unknown area light "difuse"; it is ignored; did you mean "diffuse"?
+)",
+       {1, 1, 0, 0}},
+      {"AreaLightsMisspelled",
+       world("AreaLightSource \"Area\"\nAreaLightSource \"Diffuse\"\nAreaLightSource \"spot\""),
+       R"(scene.pbrt:2:1: error: unknown area light "Area"; it is ignored; did you mean "area"?
+scene.pbrt:3:1: error: unknown area light "Diffuse"; it is ignored; did you mean "diffuse"?
+scene.pbrt:4:1: error: unknown area light "spot"; it is ignored
 )",
        {1, 1, 0, 0}},
       {"TextureOfItself",
@@ -724,6 +809,97 @@ scene.pbrt:2:1: error: mix material without a "string namedmaterial2"; grey matt
 )",
        {1, 1, 0, 0}},
   };
+}
+
+// What materials come to that ask for the odd
+
+struct ColourCase {
+  const char* text;
+  Vec3 albedo;
+  MaterialFlags flags;
+};
+
+void expect_colours(const std::vector<ColourCase>& cases) {
+  const SceneFolder folder;
+  const std::string start = "MakeNamedMaterial \"a\" \"string type\" \"matte\" \"rgb Kd\" [0.2 0.2 0.2] "
+                            "MakeNamedMaterial \"b\" \"string type\" \"matte\" \"rgb Kd\" [0.8 0.8 0.8] "
+                            "Texture \"zero\" \"spectrum\" \"constant\" \"rgb value\" [0 0 0] "
+                            "Texture \"two\" \"spectrum\" \"constant\" \"rgb value\" [2 2 2] ";
+  for (const ColourCase& c : cases) {
+    const Imported imported = import_world(folder, start + c.text + std::string(kTriangle));
+    const Material material = only_material(imported);
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(material.albedo[i], c.albedo[i], 1e-6f) << c.text;
+    EXPECT_EQ(material.flags, c.flags) << c.text;
+    EXPECT_EQ(imported.text(), "") << c.text;
+  }
+}
+
+TEST(HostileColours, GlassThatTransmitsNothingIsOpaque) {
+  expect_colours(
+      {{"Material \"glass\" \"rgb Kt\" [0 0 0]", Vec3(1.0f), 0},
+       {"Material \"glass\" \"rgb Kt\" [0 0 0] \"rgb Kr\" [0.1 0.2 0.3]", Vec3(0.1f, 0.2f, 0.3f), 0},
+       {"Material \"glass\" \"texture Kt\" \"zero\" \"rgb Kr\" [0.1 0.2 0.3]", Vec3(0.1f, 0.2f, 0.3f), 0},
+       {"Material \"glass\" \"rgb Kt\" [0 0 0] \"rgb Kr\" [0 0 0]", Vec3(0.0f), 0},
+       {"Material \"glass\" \"rgb Kt\" [0 0.5 0] \"rgb Kr\" [0.1 0.2 0.3]", Vec3(0.0f, 0.5f, 0.0f), kTransmissive}});
+}
+
+TEST(HostileColours, AmountsOfMixesAreClamped) {
+  const std::string mix = "Material \"mix\" \"string namedmaterial1\" \"a\" \"string namedmaterial2\" \"b\" ";
+  const std::string many = mix + "\"rgb amount\" [2 -1 0.5]", two = mix + "\"texture amount\" \"two\"",
+                    most = mix + "\"rgb amount\" [1e38 1e38 1e38]", negative = mix + "\"rgb amount\" [-1 -1 -1]";
+  expect_colours({{many.c_str(), Vec3(0.2f, 0.8f, 0.5f), 0},
+                  {two.c_str(), Vec3(0.2f), 0},
+                  {most.c_str(), Vec3(0.2f), 0},
+                  {negative.c_str(), Vec3(0.8f), 0}});
+}
+
+TEST(HostileColours, MetalsOfTexturesAreCopper) {
+  const SceneFolder folder;
+  const auto albedo = [&](const std::string& parameters) {
+    return only_material(import_world(folder, "Texture \"n\" \"spectrum\" \"fbm\" Material \"metal\" " + parameters +
+                                                  std::string(kTriangle)))
+        .albedo;
+  };
+  EXPECT_EQ(albedo("\"texture eta\" \"n\" \"texture k\" \"n\""), albedo(""));
+  EXPECT_EQ(albedo("\"texture eta\" \"n\" \"rgb k\" [3 3 3]"), albedo("\"rgb k\" [3 3 3]"));
+}
+
+// Equal quadrics
+
+TEST(HostileQuadrics, EqualOnesShareAMesh) {
+  const SceneFolder folder;
+  const auto meshes = [&](const std::string& shapes) {
+    const Imported imported = import_world(folder, shapes);
+    EXPECT_EQ(imported.text(), "") << shapes;
+    expect_sound(imported.scene);
+    return imported.scene.meshes.size();
+  };
+  for (const char* const kind : {"sphere", "cylinder", "disk", "cone", "paraboloid"}) {
+    const std::string shape = "Shape \"" + std::string(kind) + "\" ", two = "\"float radius\" 2 ";
+    EXPECT_EQ(meshes(shape + shape + shape + "\"float radius\" 1 "), 1u) << kind;
+    EXPECT_EQ(meshes(shape + "\"float phimax\" 90 " + shape + "\"float phimax\" 91 "), 2u) << kind;
+    EXPECT_EQ(meshes(shape + shape + two + shape + two), kind == std::string("sphere") ? 1u : 2u) << kind;
+  }
+  const std::string cut = "\"float zmax\" 0.5 ";
+  EXPECT_EQ(meshes("Shape \"sphere\" " + cut + "Shape \"sphere\" \"float radius\" 2 " + cut), 2u);
+  EXPECT_EQ(meshes("Shape \"hyperboloid\" Shape \"hyperboloid\" Shape \"hyperboloid\" \"point p1\" [1 1 0] "), 2u);
+}
+
+TEST(HostileQuadrics, WholeSpheresAreScaledToTheirSize) {
+  const SceneFolder folder;
+  for (const char* const text : {"3", "1e-20", "1e18", "3 \"float zmin\" -9 \"float zmax\" 9"}) {
+    const Imported imported =
+        import_world(folder, "Translate 1 0 0 Shape \"sphere\" \"float radius\" " + std::string(text));
+    EXPECT_EQ(imported.text(), "");
+    ASSERT_EQ(imported.scene.shapes.size(), 1u) << text;
+    const double radius = std::stod(text);
+    const Mesh& mesh = imported.scene.meshes[0];
+    for (size_t i = 0; i < mesh.positions.size(); ++i) {
+      EXPECT_NEAR(glm::length(DVec3(mesh.positions[i])), 1.0, 1e-6);
+      const DVec3 centred = placed(imported.scene.shapes[0], imported.scene, i) - DVec3(1, 0, 0);
+      ASSERT_NEAR(glm::length(centred), radius, 1e-6 * std::max(radius, 1.0)) << text;
+    }
+  }
 }
 
 const bool kRegistered = register_cases("HostileMeshes", meshes(), __FILE__) &&

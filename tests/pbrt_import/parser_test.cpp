@@ -81,7 +81,8 @@ TEST_F(ParserTest, AllDirectivesAreKnown) {
 
 TEST_F(ParserTest, EveryParameterTypeIsRead) {
   const auto all =
-      parse("Shape \"x\" \"integer i\" [1 -2] \"float f\" 1.5 \"bool on\" [\"true\"] \"bool off\" \"false\" \"string s\" \"text\" "
+      parse("Shape \"x\" \"integer i\" [1 -2] \"float f\" 1.5 \"bool on\" [\"true\"] \"bool off\" \"false\" \"string "
+            "s\" \"text\" "
             "\"texture t\" [\"name\"] \"point2 p2\" [1 2] \"vector2 v2\" [1 2] \"point p\" [1 2 3] "
             "\"vector v\" [1 2 3] \"normal n\" [1 2 3] \"rgb r\" [1 2 3] \"color c\" [1 2 3] \"xyz x\" [1 2 3] "
             "\"blackbody k\" [5000 1] \"spectrum sp\" [400 1 500 2] \"spectrum file\" \"a.spd\"");
@@ -178,8 +179,10 @@ TEST_F(ParserTest, OddIntegersAreReported) {
 TEST_F(ParserTest, BadBytesAreNamed) {
   const auto all = parse(std::string_view("Identity\n\0\nIdentity \xff Identity", 30));
   EXPECT_EQ(all.size(), 3u);
-  EXPECT_EQ(messages_, "scene.pbrt:2:1: error: byte 0x00 does not belong in a pbrt file\n"
-                       "scene.pbrt:3:10: error: byte 0xFF does not belong in a pbrt file\n");
+  EXPECT_EQ(messages_,
+            "scene.pbrt:2:1: error: byte 0x00 does not belong in a pbrt file; is this UTF-16 text? save it as "
+            "UTF-8\n"
+            "scene.pbrt:3:10: error: byte 0xFF does not belong in a pbrt file\n");
 }
 
 TEST_F(ParserTest, BinaryFilesAreGivenUp) {

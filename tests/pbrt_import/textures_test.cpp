@@ -136,6 +136,28 @@ TEST(Textures, ArithmeticIsDoneOnAverages) {
   EXPECT_NEAR(material.albedo.z, 0.625f, 1e-6f);
 }
 
+TEST(Textures, ProceduralOnesGiveTheirMeans) {
+  const SceneFolder folder;
+  struct Case {
+    const char* texture;
+    Vec3 mean;
+  };
+  for (const Case& c : {Case{"\"fbm\"", Vec3(0.12f)},
+                        {"\"fbm\" \"integer octaves\" 4 \"float roughness\" 0.3", Vec3(0.12f)},
+                        {"\"wrinkled\"", Vec3(0.4f)},
+                        {"\"windy\"", Vec3(0.03f)},
+                        {"\"bilerp\"", Vec3(0.5f)},
+                        {"\"bilerp\" \"rgb v00\" [0.1 0.2 0.3] \"rgb v11\" [0.5 0.2 0.1]", Vec3(0.4f, 0.35f, 0.35f)},
+                        {"\"bilerp\" \"rgb v00\" [1 1 1] \"rgb v10\" [1 1 1]", Vec3(1.0f)}}) {
+    const Imported imported =
+        import_world(folder, "Texture \"t\" \"spectrum\" " + std::string(c.texture) +
+                                 " Material \"matte\" \"texture Kd\" \"t\"" + std::string(kTriangle));
+    const Material material = only_material(imported);
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(material.albedo[i], c.mean[i], 1e-6f) << c.texture;
+    EXPECT_EQ(imported.text(), "") << c.texture;
+  }
+}
+
 TEST(Textures, MissingImagesAreReportedAndWhite) {
   const SceneFolder folder;
   const Imported imported = import_world(folder, "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" "
@@ -265,14 +287,28 @@ TEST(AlphaTextures, ConstantsNeedNoMask) {
 
 TEST(AlphaTextures, ProceduralOnesDoNotMakeShapesVanish) {
   const SceneFolder folder;
-  for (const char* const texture :
-       {"\"fbm\"", "\"wrinkled\"", "\"bilerp\" \"float v01\" 0 \"float v11\" 0", "\"dots\""}) {
+  for (const char* const texture : {"\"fbm\"", "\"wrinkled\"", "\"windy\"", "\"bilerp\" \"float v01\" 0", "\"dots\""}) {
     const Imported imported = import_world(folder, "Texture \"t\" \"float\" " + std::string(texture) +
                                                        std::string(kTriangle) + "\"texture alpha\" \"t\"");
     EXPECT_EQ(imported.scene.shapes.size(), 1u) << texture;
     EXPECT_EQ(only_material(imported).flags, 0u) << texture;
     EXPECT_TRUE(imported.reported("its holes are approximated")) << texture << imported.text();
   }
+}
+
+TEST(AlphaTextures, BilerpsOfEqualCornersAreConstants) {
+  const SceneFolder folder;
+  const auto with = [&](const std::string& corners) {
+    return import_world(folder, "Texture \"t\" \"float\" \"bilerp\" " + corners + std::string(kTriangle) +
+                                    "\"texture alpha\" \"t\"");
+  };
+  const Imported absent = with("\"float v01\" 0 \"float v11\" 0");
+  EXPECT_TRUE(absent.scene.shapes.empty());
+  EXPECT_EQ(absent.statistics.shapes_absent, 1u);
+  EXPECT_TRUE(absent.reported("note: 1 shape is left out: its alpha is 0 everywhere")) << absent.text();
+  const Imported opaque = with("\"float v00\" 1 \"float v10\" 1");
+  EXPECT_EQ(only_material(opaque).flags, 0u);
+  EXPECT_EQ(opaque.text(), "");
 }
 
 TEST(AlphaTextures, DeepTextureGraphsEnd) {
