@@ -1,0 +1,120 @@
+// Baked files: validation, and everything a reader can ask of a file that passed it. Most changes to a file would only
+// spoil its hashes, so each input is tried as it is and once more with the header's sizes and hashes made right.
+
+#include <algorithm>
+#include <cstring>
+#include <span>
+#include <vector>
+
+#include <xxhash.h>
+
+#include "compress/format/baked_file.h"
+#include "compress/format/file_summary.h"
+#include "pbrt_import/scene/error.h"
+#include "tests/fuzz/fuzz_target.h"
+
+namespace packtrace::fuzz {
+namespace {
+
+void make_hashes_right(std::vector<std::byte>& bytes) {
+  baked::FileHeader header;
+  if (bytes.size() < sizeof header) return;
+  std::memcpy(&header, bytes.data(), sizeof header);
+  header.magic = baked::kMagic;
+  header.header_bytes = sizeof header;
+  header.file_bytes = bytes.size();
+  const XXH128_hash_t hash = XXH3_128bits(bytes.data() + sizeof header, bytes.size() - sizeof header);
+  header.content_hash = {hash.low64, hash.high64};
+  header.header_hash = XXH3_64bits(&header, offsetof(baked::FileHeader, header_hash));
+  std::memcpy(bytes.data(), &header, sizeof header);
+}
+
+bool same_bits(const void* a, const void* b, size_t bytes) { return std::memcmp(a, b, bytes) == 0; }
+
+/// Decodes a cluster as a whole and vertex by vertex.
+void read_cluster(const ClusterView& cluster) {
+  const uint32_t vertices = cluster.vertex_count(), count = cluster.triangle_count();
+  std::vector<Vec3> positions(vertices), normals(cluster.has_normals() ? vertices : 0);
+  std::vector<Vec2> uvs(cluster.has_uvs() ? vertices : 0);
+  std::vector<Triangle> triangles(count);
+  decode_positions(cluster, positions);
+  decode_indices(cluster, 0, triangles);
+  if (cluster.has_normals()) decode_normals(cluster, normals);
+  if (cluster.has_uvs()) decode_uvs(cluster, uvs);
+  Vec3 lo, hi;
+  cluster.bounds(lo, hi);
+  for (uint32_t v = 0; v < vertices; ++v) {
+    const Vec3 p = cluster.position(v);
+    require(is_finite(p), "position not finite");
+    require(same_bits(&p, &positions[v], sizeof p), "positions differ");
+    for (int axis = 0; axis < 3; ++axis) require(p[axis] >= lo[axis] && p[axis] <= hi[axis], "vertex outside the box");
+    if (cluster.has_normals()) {
+      const Vec3 n = cluster.normal(v);
+      require(same_bits(&n, &normals[v], sizeof n), "normals differ");
+      require(std::abs(glm::length(n) - 1.0f) < 1e-3f, "normal not of unit length");
+    }
+    if (cluster.has_uvs()) {
+      const Vec2 uv = cluster.uv(v);
+      require(same_bits(&uv, &uvs[v], sizeof uv), "texture coordinates differ");
+      require(std::isfinite(uv.x) && std::isfinite(uv.y), "texture coordinate not finite");
+    }
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    const Triangle t = cluster.triangle(i);
+    require(std::max({t.x, t.y, t.z}) < vertices, "vertex index out of range");
+    require(t == triangles[i], "triangles differ");
+  }
+  (void)cluster.stream_bits();
+}
+
+void read_geometry(const BakedFile& file, uint32_t geometry) {
+  const auto clusters = static_cast<uint32_t>(file.clusters(geometry).size());
+  for (uint32_t c = 0; c < clusters; ++c) {
+    const ClusterView cluster = file.cluster(geometry, c);
+    require(cluster.material() < file.sections().materials.size(), "material number");
+    read_cluster(cluster);
+    const uint32_t first = cluster.record().first_triangle;
+    for (const uint32_t triangle : {first, first + cluster.triangle_count() - 1})
+      require(file.cluster_of_triangle(geometry, triangle) == c, "cluster of a triangle");
+  }
+}
+
+void read_rest(const BakedFile& file) {
+  for (uint32_t i = 0; i < file.instances().size(); ++i) {
+    const Affine map = file.world_from_object(i);
+    for (int column = 0; column < 4; ++column) require(is_finite(map[column]), "instance transform");
+  }
+  for (uint32_t i = 0; i < file.sections().masks.size(); ++i) {
+    const AlphaMaskView mask = file.mask(i);
+    for (const Vec2 uv : {Vec2(0.3f, 0.7f), Vec2(-1e30f, 1e30f), Vec2(0.0f), Vec2(1.0f)}) (void)mask.opaque(uv);
+  }
+  for (const Material& material : file.materials())
+    for (const uint32_t mask : {material.alpha_mask, material.shadow_alpha_mask})
+      require(mask == kNoMask || mask < file.sections().masks.size(), "mask number");
+  require(file.cameras().size() == file.sections().cameras.size(), "number of cameras");
+  (void)file.world_bounds();
+  require(summarize(file).bytes.total == file.file_bytes(), "summary of the file");
+}
+
+void read_baked(std::span<const std::byte> bytes) {
+  try {
+    const BakedFile file = BakedFile::from_bytes(bytes);
+    for (uint32_t g = 0; g < file.geometries().size(); ++g) read_geometry(file, g);
+    read_rest(file);
+  } catch (const Error& error) {
+    require(error.kind() == ErrorKind::kInput || error.kind() == ErrorKind::kUnsupported, "kind of error");
+  }
+}
+
+} // namespace
+} // namespace packtrace::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace packtrace::fuzz;
+  const std::span bytes = std::as_bytes(std::span(data, size));
+  read_baked(bytes);
+  std::vector<std::byte> repaired(bytes.begin(), bytes.end());
+  make_hashes_right(repaired);
+  read_baked(repaired);
+  return 0;
+}

@@ -1,0 +1,80 @@
+// import_scene() on whole scenes of several files (scene_files.h), within small limits so that inputs take
+// milliseconds.
+
+#include <cstdlib>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <tbb/task_arena.h>
+
+#include "pbrt_import/import_scene.h"
+#include "pbrt_import/scene/error.h"
+#include "tests/fuzz/fuzz_target.h"
+#include "tests/fuzz/scene_contract.h"
+#include "tests/fuzz/scene_files.h"
+
+namespace packtrace::fuzz {
+namespace {
+
+ImportOptions small_limits() {
+  ImportOptions options;
+  options.memory_budget_bytes = 16u << 20;
+  options.max_include_depth = 4;
+  options.max_included_files = 16;
+  options.max_nesting = 32;
+  options.tessellation_tolerance = 0.05;
+  options.allow_files_outside_scene_folder = false; // inputs must mean the same on every machine
+  return options;
+}
+
+/// What an import on so many threads gives, as bytes; with the error's text where it fails.
+std::string outcome(const std::filesystem::path& main_file, const ImportOptions& options, int threads) {
+  Diagnostics diagnostics;
+  Progress progress;
+  try {
+    tbb::task_arena arena(threads);
+    const ImportResult result = arena.execute([&] { return import_scene(main_file, options, diagnostics, progress); });
+    require_import_contract(result, diagnostics);
+    if (options.strict)
+      require(diagnostics.count(Severity::kWarning) + diagnostics.count(Severity::kError) == 0,
+              "problems accepted in strict mode");
+    (void)placed_triangle_count(result.scene);
+    (void)world_bounds(result.scene);
+    return fingerprint(result, diagnostics);
+  } catch (const Error& error) {
+    require(error.kind() == ErrorKind::kInput || error.kind() == ErrorKind::kLimitExceeded, "kind of error");
+    require(*error.what() != '\0', "error without a text");
+    return error.what();
+  }
+}
+
+} // namespace
+} // namespace packtrace::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace packtrace::fuzz;
+  static SceneFilesFolder folder;
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  const std::filesystem::path main_file = folder.write(text);
+  auto options = small_limits();
+  const std::string alone = outcome(main_file, options, 1);
+  constexpr size_t kSeldom = 16; // these repeat the work
+  switch (std::hash<std::string_view>{}(text) % kSeldom) {
+  case 0:
+    require(outcome(main_file, options, 2) == alone, "the result depends on the number of threads");
+    break;
+  case 1:
+    options.strict = true;
+    (void)outcome(main_file, options, 1);
+    break;
+  case 2:
+    options.world = 2;
+    options.time = 0.25;
+    (void)outcome(main_file, options, 1);
+    break;
+  default:
+    break;
+  }
+  return 0;
+}
