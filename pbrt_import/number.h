@@ -32,7 +32,7 @@ constexpr bool may_start_number(char c) {
          (c | 0x20) == 'i';
 }
 
-/// How many zeros must follow the text in a buffer that the scanners below work on.
+/// How far the scanners below read ahead: the text they work on is followed by that many zeros, or goes on.
 inline constexpr size_t kScannerReach = 72;
 
 namespace detail {
@@ -69,6 +69,12 @@ inline DigitRun scan_digits(const char* p) {
   return {value, count};
 }
 
+/// The digits behind the first eight. Stops where there are more than a mantissa holds, so that nothing reads far ahead.
+inline const char* scan_more_digits(const char* p, uint64_t& mantissa) {
+  for (int more = 0; more < 12 && is_digit(*p); ++more) mantissa = mantissa * 10 + static_cast<uint64_t>(*p++ - '0');
+  return p;
+}
+
 } // namespace detail
 
 /// The common form of a number, read fast: at most 19 digits, small exponent, ended by a delimiter.
@@ -82,16 +88,14 @@ inline const char* scan_double(const char* p, double& value) {
   DigitRun run = scan_digits(p);
   uint64_t mantissa = run.value;
   p += run.count;
-  if (run.count == 8)
-    while (is_digit(*p)) mantissa = mantissa * 10 + static_cast<uint64_t>(*p++ - '0');
+  if (run.count == 8) p = scan_more_digits(p, mantissa);
   std::ptrdiff_t digits = p - first, exponent = 0;
   if (*p == '.') {
     const char* const fraction = ++p;
     run = scan_digits(p);
     mantissa = mantissa * kWholePowersOfTen[run.count] + run.value;
     p += run.count;
-    if (run.count == 8)
-      while (is_digit(*p)) mantissa = mantissa * 10 + static_cast<uint64_t>(*p++ - '0');
+    if (run.count == 8) p = scan_more_digits(p, mantissa);
     exponent = fraction - p;
     digits += p - fraction;
   }
