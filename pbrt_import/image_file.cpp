@@ -9,30 +9,33 @@
 #include <string>
 #include <utility>
 
-#include <OpenEXR/ImfArray.h>
-#include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfRgbaFile.h>
 
 #define STB_IMAGE_STATIC // other libraries of a program may bring their own copy
 #define STB_IMAGE_IMPLEMENTATION
 #define STBI_NO_STDIO
-#define STBI_NO_GIF
-#define STBI_NO_PIC
-#define STBI_NO_PNM
-#define STBI_NO_PSD
+#define STBI_NO_LINEAR
+#define STBI_ONLY_PNG // the others, but for HDR, are not in pbrt's language either, and the JPEG and HDR decoders
+#define STBI_ONLY_TGA // read and write beyond their buffers
 #include <stb/stb_image.h>
 
 #include "pbrt_import/number.h"
+#include "pbrt_import/radiance.h"
 #include "pbrt_import/scene/alpha_mask.h"
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/exr_header.h"
+#include "pbrt_import/scene/png_chunks.h"
 
 namespace packtrace {
 namespace {
 
 [[noreturn]] void fail(const std::string& why) { throw Error(ErrorKind::kInput, why); }
 
+constexpr const char* kDamaged = "damaged image: ";
 constexpr const char* kTruncated = "damaged image: the file is truncated";
+
+constexpr uint64_t kMostPixelsPerByte = 1u << 16; // PNG reaches 8256; EXR's DWAB compression has chunks of 96 bytes
 
 /// Takes pixels one after the other, rows from the top.
 class Summarizer {
@@ -78,7 +81,6 @@ void check_size(uint64_t width, uint64_t height, uint64_t bytes_per_pixel, uint6
   if (width > kMaxSide || height > kMaxSide || width * height > max_bytes / bytes_per_pixel)
     throw Error(ErrorKind::kLimitExceeded, "decoding its " + std::to_string(width) + " x " + std::to_string(height) +
                                                " pixels needs too much memory");
-  constexpr uint64_t kMostPixelsPerByte = 1u << 16; // PNG reaches 8256; EXR's DWAB compression has chunks of 96 bytes
   if (width * height / kMostPixelsPerByte > stored_bytes)
     fail("damaged image: its " + std::to_string(stored_bytes) + " bytes cannot hold the " + std::to_string(width) +
          " x " + std::to_string(height) + " pixels it claims");
@@ -141,40 +143,29 @@ private:
   bool truncated_ = false;
 };
 
-ImageSummary read_stb(std::span<const std::byte> bytes, bool decode_srgb, bool want_mask, uint64_t max_bytes) {
-  if (bytes.size() > static_cast<size_t>(INT32_MAX)) fail("the image file exceeds 2 GiB");
-  const auto* const data = reinterpret_cast<const stbi_uc*>(bytes.data());
-  const int size = static_cast<int>(bytes.size());
-  int width = 0, height = 0, channels = 0;
-  if (!stbi_info_from_memory(data, size, &width, &height, &channels)) {
-    const std::string_view text(reinterpret_cast<const char*>(data), bytes.size());
-    for (const auto& [format, magic] : {std::pair<std::string_view, std::string_view>{"PNG", "\x89PNG"},
-                                        {"JPEG", "\xff\xd8"},
-                                        {"HDR", "#?RADIANCE"},
-                                        {"BMP", "BM"}})
-      if (text.starts_with(magic))
-        fail("the header of the " + std::string(format) + " image is damaged, or claims more pixels than can be read");
-    fail("not an image in a known format (PNG, TGA, EXR, PFM, HDR, JPEG, BMP)");
-  }
-  const bool is_float = stbi_is_hdr_from_memory(data, size) != 0;
-  const bool is_wide = stbi_is_16_bit_from_memory(data, size) != 0;
+/// What is known of an image before stb_image decodes it.
+struct StoredImage {
+  uint32_t width = 0, height = 0;
+  uint32_t bits_per_sample = 8;
+};
+
+/// @param bytes whose header has been read
+ImageSummary decode_stb(std::span<const std::byte> bytes, const StoredImage& image, bool decode_srgb, bool want_mask,
+                        uint64_t max_bytes) {
   // stb_image holds up to two copies, of four channels at most.
-  const uint64_t pixel_bytes = is_float ? 32 : is_wide ? 16 : 8;
-  check_size(static_cast<uint64_t>(width), static_cast<uint64_t>(height), pixel_bytes, bytes.size(), max_bytes);
+  const uint64_t pixel_bytes = image.bits_per_sample > 8 ? 16 : 8;
+  check_size(image.width, image.height, pixel_bytes, bytes.size(), max_bytes);
+  int width = 0, height = 0, channels = 0;
   const auto load = [&](auto decode) {
     StbStream stream(bytes);
     const stbi_io_callbacks callbacks = StbStream::callbacks();
     auto* const pixels = decode(&callbacks, &stream, &width, &height, &channels, 3);
     std::unique_ptr<std::remove_pointer_t<decltype(pixels)>, StbFree> owner(pixels);
     if (stream.truncated()) fail(kTruncated);
-    if (!owner) fail(std::string("damaged image: ") + stbi_failure_reason());
+    if (!owner) fail(std::string(kDamaged) + stbi_failure_reason());
     return owner;
   };
-  if (is_float) {
-    const auto pixels = load(stbi_loadf_from_callbacks);
-    return summarize(pixels.get(), width, height, want_mask, [](float v) { return v; });
-  }
-  if (is_wide) {
+  if (image.bits_per_sample > 8) {
     const auto pixels = load(stbi_load_16_from_callbacks);
     return summarize(pixels.get(), width, height, want_mask, [&](stbi_us v) {
       return decode_srgb ? linear_from_srgb(static_cast<float>(v) / 65535.0f) : static_cast<float>(v) / 65535.0f;
@@ -189,6 +180,34 @@ ImageSummary read_stb(std::span<const std::byte> bytes, bool decode_srgb, bool w
   return summarize(pixels.get(), width, height, want_mask, [&](stbi_uc v) { return linear[v]; });
 }
 
+/// PNG, or TGA, which has no mark of its own: what nothing else claims.
+ImageSummary read_stb(std::span<const std::byte> bytes, bool is_png, bool decode_srgb, bool want_mask,
+                      uint64_t max_bytes) {
+  if (bytes.size() > static_cast<size_t>(INT32_MAX)) fail("the image file exceeds 2 GiB");
+  if (is_png) {
+    const PngHeader header = check_png_chunks(bytes, PngChecksums::kIgnore, kDamaged);
+    return decode_stb(bytes, {header.width, header.height, header.bits_per_sample}, decode_srgb, want_mask, max_bytes);
+  }
+  const auto* const data = reinterpret_cast<const stbi_uc*>(bytes.data());
+  int width = 0, height = 0, channels = 0;
+  if (!stbi_info_from_memory(data, static_cast<int>(bytes.size()), &width, &height, &channels))
+    fail("not an image in a known format (PNG, TGA, EXR, PFM, HDR)");
+  return decode_stb(bytes, {static_cast<uint32_t>(width), static_cast<uint32_t>(height)}, decode_srgb, want_mask,
+                    max_bytes);
+}
+
+ImageSummary read_hdr(std::span<const std::byte> bytes, bool want_mask, uint64_t max_bytes) {
+  RadianceReader reader(bytes);
+  check_size(reader.width(), reader.height(), 12, bytes.size(), max_bytes);
+  Summarizer summarizer(reader.width(), reader.height(), want_mask);
+  for (uint32_t y = 0; y < reader.height(); ++y) {
+    const std::span<const Vec3> row = reader.read_row();
+    for (uint32_t x = 0; x < reader.width(); ++x) summarizer.add(x, y, row[x]);
+    summarizer.end_row();
+  }
+  return summarizer.finish();
+}
+
 /// OpenEXR's view of bytes in memory.
 class MemoryStream : public Imf::IStream {
 public:
@@ -197,7 +216,7 @@ public:
   bool read(char c[], int n) override {
     const auto count = static_cast<size_t>(std::max(n, 0));
     if (count > bytes_.size() - position_) fail(kTruncated);
-    std::memcpy(c, bytes_.data() + position_, count);
+    if (count > 0) std::memcpy(c, bytes_.data() + position_, count);
     position_ += count;
     return position_ < bytes_.size();
   }
@@ -212,14 +231,28 @@ private:
   size_t position_ = 0;
 };
 
+/// Before OpenEXR, which allocates first, gets to see the file.
+void check_exr(std::span<const std::byte> bytes, uint64_t max_bytes) {
+  if (const std::string_view why = unsupported_exr_kind(bytes); !why.empty()) fail(std::string(why));
+  const ExrHeader header = scan_exr_header(bytes, kDamaged);
+  check_size(header.width(), header.height(), sizeof(Imf::Rgba), bytes.size(), max_bytes);
+  // OpenEXR keeps a few blocks, packed and unpacked.
+  constexpr uint64_t kBlockCopies = 4, kFreeBytes = 64u << 20;
+  const uint64_t block = header.block_bytes();
+  if (block > max_bytes / kBlockCopies)
+    throw Error(ErrorKind::kLimitExceeded,
+                "decoding its blocks of " + std::to_string(block) + " bytes needs too much memory");
+  if (block > kFreeBytes && block / kMostPixelsPerByte > bytes.size())
+    fail("damaged image: its " + std::to_string(bytes.size()) + " bytes cannot hold the blocks it claims");
+}
+
 ImageSummary read_exr(std::span<const std::byte> bytes, bool want_mask, uint64_t max_bytes) {
+  check_exr(bytes, max_bytes);
   try {
     MemoryStream stream(bytes);
     Imf::RgbaInputFile file(stream, 1);
     const Imath::Box2i box = file.dataWindow();
     const int64_t width = int64_t{box.max.x} - box.min.x + 1, height = int64_t{box.max.y} - box.min.y + 1;
-    check_size(static_cast<uint64_t>(std::max<int64_t>(width, 0)), static_cast<uint64_t>(std::max<int64_t>(height, 0)),
-               sizeof(Imf::Rgba), bytes.size(), max_bytes);
     if ((file.channels() & (Imf::WRITE_RGB | Imf::WRITE_YC)) == 0)
       fail("the EXR image has none of the channels R, G, B and Y");
     const auto w = static_cast<uint32_t>(width);
@@ -229,9 +262,10 @@ ImageSummary read_exr(std::span<const std::byte> bytes, bool want_mask, uint64_t
     std::vector<Imf::Rgba> rows(static_cast<size_t>(w) * static_cast<size_t>(block));
     for (int first = box.min.y; first <= box.max.y; first += block) {
       const int last = std::min(first + block - 1, box.max.y);
-      // The library addresses pixel (x, y) as base + x + y * stride.
-      Imf::Rgba* const base = rows.data() - box.min.x - static_cast<int64_t>(first) * width;
-      file.setFrameBuffer(base, 1, w);
+      // The library addresses pixel (x, y) as base + x + y * stride. Windows may lie anywhere, so this is no pointer.
+      const auto before = static_cast<uint64_t>(box.min.x + int64_t{first} * width) * sizeof(Imf::Rgba);
+      const uint64_t base = reinterpret_cast<uintptr_t>(rows.data()) - before;
+      file.setFrameBuffer(reinterpret_cast<Imf::Rgba*>(base), 1, w);
       file.readPixels(first, last);
       const Imf::Rgba* pixel = rows.data();
       for (int y = first; y <= last; ++y) {
@@ -288,13 +322,30 @@ ImageSummary read_pfm(std::span<const std::byte> bytes, bool want_mask, uint64_t
   return summarizer.finish();
 }
 
+/// Names by their first bytes, none of which start a TGA file, formats that people do put into scenes.
+std::string_view other_format(std::string_view file) {
+  using namespace std::string_view_literals;
+  for (const auto& [magic, name] : {std::pair{"\xff\xd8\xff"sv, "JPEG"sv},
+                                    {"BM"sv, "BMP"sv},
+                                    {"GIF8"sv, "GIF"sv},
+                                    {"II*\0"sv, "TIFF"sv},
+                                    {"MM\0*"sv, "TIFF"sv},
+                                    {"8BPS"sv, "Photoshop"sv},
+                                    {"DDS "sv, "DDS"sv}})
+    if (file.starts_with(magic)) return name;
+  return {};
+}
+
 } // namespace
 
 ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, bool want_mask, uint64_t max_bytes) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (text.starts_with("\x76\x2f\x31\x01")) return read_exr(bytes, want_mask, max_bytes);
   if (text.starts_with("PF") || text.starts_with("Pf")) return read_pfm(bytes, want_mask, max_bytes);
-  return read_stb(bytes, decode_srgb, want_mask, max_bytes);
+  if (text.starts_with("#?")) return read_hdr(bytes, want_mask, max_bytes);
+  if (const std::string_view name = other_format(text); !name.empty())
+    fail("images in " + std::string(name) + " format are not read, only PNG, TGA, EXR, PFM and HDR");
+  return read_stb(bytes, text.starts_with("\x89PNG"), decode_srgb, want_mask, max_bytes);
 }
 
 } // namespace packtrace

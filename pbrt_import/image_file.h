@@ -19,7 +19,8 @@ struct ImageSummary {
   std::vector<uint32_t> nonzero; ///< AlphaMask's layout: bit set where luminance is not 0
 };
 
-/// Reads PNG, TGA, JPEG, BMP and HDR (stb_image), OpenEXR, and PFM; alpha channels are ignored, as pbrt does.
+/// Reads PNG and TGA (stb_image), OpenEXR, PFM, which are pbrt's formats, and HDR; alpha channels are ignored, as pbrt
+/// does. Other formats are refused by name: pbrt does not read them either.
 /// @param bytes the whole file
 /// @param decode_srgb whether integer formats are sRGB-encoded
 /// @param want_mask whether to fill ImageSummary::nonzero

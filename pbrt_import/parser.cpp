@@ -123,6 +123,13 @@ bool is_directive(const Token& token) { return token.kind == TokenKind::kWord &&
 
 bool is_letter(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'); }
 
+/// A number, maybe with other characters behind it; a word like "Info" is none, though it begins like one.
+bool is_number(const Token& token) {
+  if (token.kind != TokenKind::kWord) return false;
+  const size_t used = parse_number<double>(token.text).used;
+  return used == token.text.size() || (used > 0 && !is_letter(token.text[0]));
+}
+
 bool is_numeric(ParameterType type) {
   return type != ParameterType::kString && type != ParameterType::kTexture && type != ParameterType::kBool;
 }
@@ -178,15 +185,16 @@ bool Parser::next(Directive& directive) {
     if (token.kind == TokenKind::kEnd) return false;
     const DirectiveInfo* const info = token.kind == TokenKind::kWord ? find_info(token.text) : nullptr;
     if (!info) {
-      const bool number = token.kind == TokenKind::kWord && parse_number<double>(token.text).used > 0;
+      const bool number = is_number(token);
       const bool word = token.kind == TokenKind::kWord && !number;
       std::string message = word     ? "unknown directive " + describe(token)
                             : number ? "expected a directive, found the number " + describe(token)
                                      : "expected a directive, found " + describe(token);
       if (word) message += did_you_mean(closest_directive(token.text));
       if (token.kind != TokenKind::kBadByte) reporter_.error(source_.place(), std::move(message));
+      const uint32_t line = token.line;
       source_.consume();
-      skip_to_directive();
+      skip_to_directive(line);
       continue;
     }
     reporter_.next_directive();
@@ -197,8 +205,11 @@ bool Parser::next(Directive& directive) {
     directive.damaged = false;
     directive.parameters.clear();
     source_.consume();
-    if (!read_arguments(*info, directive)) {
-      skip_to_directive();
+    const uint64_t cut_before = source_.cut_strings();
+    const bool readable = read_arguments(*info, directive);
+    if (source_.cut_strings() != cut_before) directive.damaged = true;
+    if (!readable) {
+      skip_to_directive(directive.place.line);
       continue;
     }
     if (info->kind != K::kInclude) return true;
@@ -252,6 +263,7 @@ bool Parser::read_directive_names(const DirectiveInfo& info, Directive& directiv
     if (token.kind != TokenKind::kString) {
       if (info.kind == K::kMediumInterface && directive.name_count == 1) return true;
       report_unexpected("a quoted name after " + std::string(info.keyword));
+      if (token.kind == TokenKind::kWord && !is_directive(token)) source_.consume(); // reported
       return false;
     }
     if (info.kind == K::kInclude) include_name_ = token.text;
@@ -274,13 +286,11 @@ void Parser::report_unexpected(const std::string& expected) {
     reporter_.error(source_.place(), "expected " + expected + ", found " + describe(token));
 }
 
-/// To what is a directive, or stands where one would and may be meant to be one: a word in front of a line.
-void Parser::skip_to_directive() {
-  uint32_t line = source_.place().line;
+/// To what is a directive, or stands where one would and may be meant to be one: a word in front of a line behind line.
+void Parser::skip_to_directive(uint32_t line) {
   while (source_.peek().kind != TokenKind::kEnd && !is_directive(source_.peek())) {
     const Token& token = source_.peek();
-    const bool in_front = token.line != line && token.kind == TokenKind::kWord && is_letter(token.text[0]);
-    if (in_front && parse_number<double>(token.text).used == 0) return;
+    if (token.line != line && token.kind == TokenKind::kWord && is_letter(token.text[0]) && !is_number(token)) return;
     line = token.line;
     source_.consume();
   }
@@ -336,8 +346,9 @@ void Parser::read_parameters(Directive& directive) {
   if (source_.peek().kind == TokenKind::kWord || source_.peek().kind == TokenKind::kEnd) return;
   report_unexpected("a parameter or a directive");
   directive.damaged = true;
+  const uint32_t line = source_.place().line;
   source_.consume();
-  skip_to_directive();
+  skip_to_directive(line);
 }
 
 bool Parser::read_declaration(std::string_view text, Parameter& parameter) {

@@ -94,7 +94,7 @@ private:
   template <class Values>
   bool take_number(Values& values);
   void skip_value();
-  void skip_to_directive();
+  void skip_to_directive(uint32_t line);
   void report_unexpected(const std::string& expected);
 
   SourceStack& source_;

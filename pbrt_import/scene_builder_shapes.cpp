@@ -121,8 +121,11 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
   } catch (const Error& error) {
     return skip_shape(name, directive.place, error.what());
   }
-  if (entry.job.scale != 1.0)
+  if (entry.job.scale != 1.0) {
     shape.parent_from_mesh = compose(shape.parent_from_mesh, scaling(DVec3(entry.job.scale)));
+    if (!is_invertible(shape.parent_from_mesh))
+      return skip_shape(name, directive.place, "its size leaves the range of numbers");
+  }
   const std::string same_as = entry.job.same_as;
   if (const std::optional<uint32_t> known = same_as.empty() ? std::nullopt : same_meshes_.find(same_as)) {
     shape.mesh = same_mesh_slots_[*known];

@@ -219,6 +219,7 @@ size_t utf8_length(std::string_view text) {
   const auto byte = static_cast<unsigned char>(text[0]);
   const size_t length = byte < 0x80 ? 1 : byte >= 0xc2 && byte < 0xe0 ? 2 : (byte & 0xf0) == 0xe0 ? 3 : byte < 0xf5 ? 4 : 0;
   if (length > text.size() || (byte >= 0x80 && byte < 0xc2)) return 0;
+  if (byte == 0xc2 && static_cast<unsigned char>(text[1]) < 0xa0) return 0; // control characters, too
   const auto continues = [](char c) { return (static_cast<unsigned char>(c) & 0xc0) == 0x80; };
   return std::all_of(text.begin() + 1, text.begin() + static_cast<std::ptrdiff_t>(length), continues) ? length : 0;
 }

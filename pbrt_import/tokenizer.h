@@ -47,6 +47,9 @@ public:
   template <class T, class Take>
   void read_numbers(Take take);
 
+  /// After next() threw: whether that was within a string.
+  bool in_string() const { return position_ < size_ && window_[position_] == '"'; }
+
   /// Content bytes consumed.
   uint64_t consumed_bytes() const { return window_offset_ + position_; }
   const InputFile& file() const { return blocks_->file(); }

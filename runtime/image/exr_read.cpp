@@ -12,9 +12,10 @@
 #include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfStringAttribute.h>
-#include <OpenEXR/ImfTileDescription.h>
+#include <OpenEXR/ImfXdr.h>
 
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/exr_header.h"
 #include "pbrt_import/scene/file_bytes.h"
 #include "runtime/image/exr.h"
 
@@ -22,8 +23,6 @@ namespace packtrace {
 
 namespace {
 
-constexpr uint32_t kMagic = 20000630;
-constexpr uint32_t kVersion = 2, kTiledFlag = 0x200, kLongNamesFlag = 0x400, kDeepFlag = 0x800, kMultiPartFlag = 0x1000;
 constexpr size_t kMaxChannels = 1024;
 constexpr uint32_t kMaxTileSide = 8192, kMinTileSide = 8;
 /// More than any of the format's lossless codecs can shrink; a file may claim that many times its own length, so that
@@ -42,7 +41,7 @@ public:
     const size_t n = static_cast<size_t>(count);
     if (count < 0 || position_ > bytes_.size() || n > bytes_.size() - position_)
       throw std::runtime_error("the file ends too early");
-    std::memcpy(target, bytes_.data() + position_, n);
+    if (n > 0) std::memcpy(target, bytes_.data() + position_, n);
     position_ += n;
     return position_ < bytes_.size();
   }
@@ -54,97 +53,43 @@ private:
   uint64_t position_ = 0;
 };
 
-/// Steps through the header without believing it.
-struct HeaderScan {
-  std::span<const std::byte> bytes;
-  std::string_view name;
-  size_t at = 0;
-
-  uint32_t u32() {
-    if (bytes.size() - at < 4) fail(name, "damaged EXR file: its header is cut off");
-    uint32_t value = 0;
-    for (size_t i = 0; i < 4; ++i) value |= std::to_integer<uint32_t>(bytes[at + i]) << (8 * i);
-    at += 4;
-    return value;
-  }
-  std::string_view text() {
-    const size_t longest = std::min<size_t>(bytes.size() - at, 256);
-    const auto* begin = reinterpret_cast<const char*>(bytes.data() + at);
-    const void* end = std::memchr(begin, 0, longest);
-    if (!end) fail(name, "damaged EXR file: a name in its header does not end");
-    const std::string_view result(begin, static_cast<size_t>(static_cast<const char*>(end) - begin));
-    at += result.size() + 1;
-    return result;
-  }
-};
-
-/// Makes sure that no length inside the header exceeds the file: OpenEXR allocates before it reads.
-/// Returns the version field.
-uint32_t scan_header(std::span<const std::byte> bytes, std::string_view name) {
-  HeaderScan scan{bytes, name};
-  if (bytes.size() < 8 || scan.u32() != kMagic) fail(name, "not an EXR file");
-  const uint32_t version = scan.u32();
-  if ((version & 0xff) != kVersion || (version & ~(0xffu | kTiledFlag | kLongNamesFlag)) != 0) {
-    const char* what = (version & kMultiPartFlag) != 0 ? "multi-part EXR files are not supported"
-                       : (version & kDeepFlag) != 0    ? "deep EXR files are not supported"
-                                                       : "unknown version of the EXR format";
-    fail(name, what, ErrorKind::kUnsupported);
-  }
-  while (!scan.text().empty()) {
-    const std::string_view type = scan.text();
-    const uint64_t length = scan.u32();
-    if (length > bytes.size() - scan.at) fail(name, "damaged EXR file: an attribute is larger than the file");
-    const size_t end = scan.at + length;
-    if (type == "stringvector") {
-      HeaderScan strings{bytes.first(end), name, scan.at};
-      while (strings.at < end) {
-        const uint64_t string_length = strings.u32();
-        if (string_length > end - strings.at) fail(name, "damaged EXR file: a string is larger than its attribute");
-        strings.at += string_length;
-      }
-    }
-    scan.at = end;
-  }
-  return version;
-}
-
-Imf::Header read_header(std::span<const std::byte> bytes, std::string_view name) {
-  int version = static_cast<int>(scan_header(bytes, name));
-  MemoryReader reader(bytes, std::string(name));
-  reader.seekg(8);
-  Imf::Header header;
-  header.readFrom(reader, version);
-  header.sanityCheck((static_cast<uint32_t>(version) & kTiledFlag) != 0);
-  return header;
-}
-
-size_t bytes_of(Imf::PixelType type) { return type == Imf::HALF ? 2 : 4; }
-
 /// The data window's size, once the file is known to be long enough to fill it.
-ImageSize checked_size(const Imf::Header& header, uint64_t file_bytes, std::string_view name) {
-  const auto& window = header.dataWindow();
-  const int64_t width = int64_t{window.max.x} - window.min.x + 1, height = int64_t{window.max.y} - window.min.y + 1;
+ImageSize checked_size(const ExrHeader& header, uint64_t file_bytes, std::string_view name) {
+  const uint64_t width = header.width(), height = header.height(), pixel_bytes = header.pixel_bytes();
   if (width < 1 || height < 1) fail(name, "damaged EXR file: it has no pixels");
-  uint64_t channel_count = 0, pixel_bytes = 0;
-  for (auto channel = header.channels().begin(); channel != header.channels().end(); ++channel) {
-    ++channel_count;
-    pixel_bytes += bytes_of(channel.channel().type);
-  }
-  if (channel_count < 1 || channel_count > kMaxChannels) fail(name, "EXR file without channels or with too many");
-  uint64_t rows = 256; // the most scan lines that one compressed block holds
-  if (header.hasTileDescription()) {
-    const Imf::TileDescription& tiles = header.tileDescription();
-    if (std::max(tiles.xSize, tiles.ySize) > kMaxTileSide || std::min(tiles.xSize, tiles.ySize) < kMinTileSide)
+  if (header.channels.empty() || header.channels.size() > kMaxChannels)
+    fail(name, "EXR file without channels or with too many");
+  if (header.tile_width > 0) {
+    const auto [narrow, wide] = std::minmax(header.tile_width, header.tile_height);
+    if (wide > kMaxTileSide || narrow < kMinTileSide)
       fail(name, "EXR tile size is not supported", ErrorKind::kUnsupported);
-    rows = std::max<uint64_t>(rows, tiles.ySize);
   }
-  rows = std::max(rows, static_cast<uint64_t>(height));
   if (width > kMaxImageSide || height > kMaxImageSide ||
-      static_cast<uint64_t>(width) * rows * pixel_bytes > std::max(kFreeBytes, kMaxRatio * file_bytes))
+      std::max(width * height * pixel_bytes, header.block_bytes()) > std::max(kFreeBytes, kMaxRatio * file_bytes))
     fail(name, "image of " + std::to_string(width) + " x " + std::to_string(height) + " pixels and " +
-                   std::to_string(channel_count) + " channels is too large for a file of " +
+                   std::to_string(header.channels.size()) + " channels is too large for a file of " +
                    std::to_string(file_bytes) + " bytes");
   return {static_cast<uint32_t>(width), static_cast<uint32_t>(height)};
+}
+
+/// A header that OpenEXR may be trusted with, and the size of its data window.
+struct CheckedHeader {
+  Imf::Header header;
+  ImageSize size;
+};
+
+CheckedHeader read_header(std::span<const std::byte> bytes, std::string_view name) {
+  if (const std::string_view why = unsupported_exr_kind(bytes); !why.empty())
+    fail(name, std::string(why), ErrorKind::kUnsupported);
+  const ExrHeader found = scan_exr_header(bytes, std::string(name) + ": damaged EXR file: ");
+  CheckedHeader checked{{}, checked_size(found, bytes.size(), name)};
+  MemoryReader reader(bytes, std::string(name));
+  reader.seekg(4);
+  int version = 0;
+  Imf::Xdr::read<Imf::StreamIO>(reader, version);
+  checked.header.readFrom(reader, version);
+  checked.header.sanityCheck(found.tile_width > 0);
+  return checked;
 }
 
 /// Runs OpenEXR's code; whatever it throws becomes an Error about this file.
@@ -231,8 +176,8 @@ std::vector<Sample> read_pixels(std::span<const std::byte> bytes, std::string_vi
 
 ExrInfo exr_info(std::span<const std::byte> bytes, std::string_view name) {
   return guarded(name, [&] {
-    const Imf::Header header = read_header(bytes, name);
-    return info_of(header, checked_size(header, bytes.size(), name));
+    const auto [header, size] = read_header(bytes, name);
+    return info_of(header, size);
   });
 }
 
@@ -255,8 +200,8 @@ const ExrLayer& choose_layer(const ExrInfo& info, std::string_view layer, std::s
 
 Image decode_exr(std::span<const std::byte> bytes, std::string_view name, std::string_view layer) {
   return guarded(name, [&] {
-    const Imf::Header header = read_header(bytes, name);
-    const ExrInfo info = info_of(header, checked_size(header, bytes.size(), name));
+    const auto [header, size] = read_header(bytes, name);
+    const ExrInfo info = info_of(header, size);
     const ExrLayer& chosen = choose_layer(info, layer, name);
     Image image;
     image.size = info.size;
@@ -268,8 +213,8 @@ Image decode_exr(std::span<const std::byte> bytes, std::string_view name, std::s
 
 std::vector<uint32_t> decode_exr_uint(std::span<const std::byte> bytes, std::string_view name, std::string_view layer) {
   return guarded(name, [&] {
-    const Imf::Header header = read_header(bytes, name);
-    const ExrInfo info = info_of(header, checked_size(header, bytes.size(), name));
+    const auto [header, size] = read_header(bytes, name);
+    const ExrInfo info = info_of(header, size);
     const ExrLayer& chosen = choose_layer(info, layer, name);
     if (chosen.channels.size() != 1 || chosen.channels[0].type != ExrType::kUint)
       fail(name, "EXR layer \"" + std::string(layer) + "\" is not one integer channel");

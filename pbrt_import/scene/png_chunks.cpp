@@ -1,0 +1,152 @@
+#include "pbrt_import/scene/png_chunks.h"
+
+#include <algorithm>
+#include <cstring>
+#include <string_view>
+#include <vector>
+
+#include <zlib.h>
+
+#include "pbrt_import/scene/error.h"
+
+namespace packtrace {
+namespace {
+
+constexpr std::string_view kSignature = "\x89PNG\r\n\x1a\n";
+constexpr size_t kChunkBytes = 12; // length, type, checksum
+constexpr uint64_t kDeflateRatio = 1032;
+/// What data may unpack to beyond what the header asks for: other readers ignore surplus too, but a few bytes must not
+/// demand gigabytes.
+constexpr uint64_t kSurplusBytes = uint64_t{64} << 20;
+
+uint32_t read_be32(std::span<const std::byte> bytes, size_t at) {
+  uint32_t value = 0;
+  for (size_t i = 0; i < 4; ++i) value = value << 8 | std::to_integer<uint32_t>(bytes[at + i]);
+  return value;
+}
+
+/// Bytes of the filtered rows of an image of that size.
+uint64_t row_bytes(const PngHeader& header, uint64_t width, uint64_t height) {
+  const uint64_t bits_per_pixel = uint64_t{header.bits_per_sample} * header.channels;
+  return width == 0 ? 0 : height * (1 + (width * bits_per_pixel + 7) / 8);
+}
+
+/// What the image data unpack to.
+uint64_t unpacked_bytes(const PngHeader& header) {
+  if (!header.interlaced) return row_bytes(header, header.width, header.height);
+  struct Pass {
+    uint32_t x, y, step_x, step_y;
+  };
+  constexpr Pass kPasses[] = {{0, 0, 8, 8}, {4, 0, 8, 8}, {0, 4, 4, 8}, {2, 0, 4, 4},
+                              {0, 2, 2, 4}, {1, 0, 2, 2}, {0, 1, 1, 2}};
+  const auto count = [](uint64_t size, uint64_t first, uint64_t step) {
+    return size > first ? (size - first + step - 1) / step : 0;
+  };
+  uint64_t bytes = 0;
+  for (const Pass& pass : kPasses)
+    bytes += row_bytes(header, count(header.width, pass.x, pass.step_x), count(header.height, pass.y, pass.step_y));
+  return bytes;
+}
+
+class Checker {
+public:
+  Checker(std::span<const std::byte> bytes, const std::string& complaint) : bytes_(bytes), complaint_(complaint) {}
+
+  PngHeader check(PngChecksums checksums) {
+    const std::string_view text(reinterpret_cast<const char*>(bytes_.data()), bytes_.size());
+    if (!text.starts_with(kSignature)) damaged("its first bytes are not those of a PNG file");
+    PngHeader header;
+    std::string_view type;
+    for (size_t at = kSignature.size(); type != "IEND";) {
+      if (bytes_.size() - at < kChunkBytes) damaged("the file is truncated");
+      const size_t length = read_be32(bytes_, at);
+      if (length > bytes_.size() - at - kChunkBytes) damaged("the file is truncated");
+      type = text.substr(at + 4, 4);
+      const std::span<const std::byte> data = bytes_.subspan(at + 8, length);
+      if (checksums == PngChecksums::kVerify && checksum(at + 4, length + 4) != read_be32(bytes_, at + 8 + length))
+        damaged("wrong checksum");
+      if ((at == kSignature.size()) != (type == "IHDR")) damaged("the header chunk is not where it belongs");
+      if (type == "IHDR") header = read_header(data);
+      if (type == "IDAT") add(data);
+      at += kChunkBytes + length;
+    }
+    check_amount(unpacked_bytes(header));
+    return header;
+  }
+
+private:
+  [[noreturn]] void damaged(const char* what) const { throw Error(ErrorKind::kInput, complaint_ + what); }
+
+  uint32_t checksum(size_t at, size_t count) const {
+    return static_cast<uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(bytes_.data() + at), count));
+  }
+
+  PngHeader read_header(std::span<const std::byte> data) const {
+    if (data.size() != 13) damaged("wrong header size");
+    PngHeader header;
+    header.width = read_be32(data, 0);
+    header.height = read_be32(data, 4);
+    header.bits_per_sample = std::to_integer<uint32_t>(data[8]);
+    const auto color_type = std::to_integer<uint32_t>(data[9]), interlace = std::to_integer<uint32_t>(data[12]);
+    if (header.width == 0 || header.height == 0) damaged("it has no pixels");
+    if (header.width > INT32_MAX || header.height > INT32_MAX) damaged("impossible size");
+    constexpr uint32_t kChannels[7] = {1, 0, 3, 1, 2, 0, 4}; // grey, RGB, palette, grey with alpha, RGBA
+    header.channels = color_type < 7 ? kChannels[color_type] : 0;
+    if (header.channels == 0) damaged("unknown kind of colours");
+    const uint32_t bits = header.bits_per_sample;
+    const bool fits = color_type == 0 ? bits <= 16 : color_type == 3 ? bits <= 8 : bits == 8 || bits == 16;
+    if (!fits || bits == 0 || (bits & (bits - 1)) != 0) damaged("impossible number of bits per sample");
+    if (interlace > 1) damaged("unknown kind of interlacing");
+    header.interlaced = interlace == 1;
+    return header;
+  }
+
+  void add(std::span<const std::byte> data) {
+    // Legal in front of other data, but nobody writes it, and decoders copy from null pointers.
+    if (data.empty() && data_.empty()) damaged("an image data chunk is empty");
+    if (!data.empty()) data_.push_back(data);
+    packed_bytes_ += data.size();
+  }
+
+  void check_amount(uint64_t wanted) const {
+    if (data_.empty()) damaged("it has no image data");
+    if (wanted / kDeflateRatio > packed_bytes_) damaged("too little data for its size");
+    const uint64_t most = wanted + kSurplusBytes;
+    if (packed_bytes_ > most / kDeflateRatio && unpacks_beyond(most)) damaged("too much data for its size");
+  }
+
+  /// Whether the data unpack to more than that many bytes; if they are damaged, up to where they are.
+  bool unpacks_beyond(uint64_t most) const {
+    z_stream stream{};
+    if (inflateInit(&stream) != Z_OK) throw std::bad_alloc();
+    std::vector<Bytef> scratch(64 << 10);
+    uint64_t total = 0;
+    int status = Z_OK;
+    for (size_t i = 0; i < data_.size() && status == Z_OK && total <= most; ++i) {
+      stream.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(data_[i].data()));
+      stream.avail_in = static_cast<uInt>(data_[i].size());
+      do {
+        stream.next_out = scratch.data();
+        stream.avail_out = static_cast<uInt>(scratch.size());
+        status = inflate(&stream, Z_NO_FLUSH);
+        total += scratch.size() - stream.avail_out;
+      } while (status == Z_OK && total <= most && (stream.avail_in > 0 || stream.avail_out == 0));
+      if (status == Z_BUF_ERROR) status = Z_OK; // this chunk is used up exactly
+    }
+    inflateEnd(&stream);
+    return total > most;
+  }
+
+  std::span<const std::byte> bytes_;
+  const std::string& complaint_;
+  std::vector<std::span<const std::byte>> data_;
+  uint64_t packed_bytes_ = 0;
+};
+
+} // namespace
+
+PngHeader check_png_chunks(std::span<const std::byte> bytes, PngChecksums checksums, const std::string& complaint) {
+  return Checker(bytes, complaint).check(checksums);
+}
+
+} // namespace packtrace

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+namespace packtrace {
+
+/// What the header chunk of a PNG file says.
+struct PngHeader {
+  uint32_t width = 0, height = 0; ///< pixels, at least 1
+  uint32_t bits_per_sample = 0;   ///< 1, 2, 4, 8 or 16; of an index where there is a palette
+  uint32_t channels = 0;          ///< as stored: 1 where there is a palette
+  bool interlaced = false;
+};
+
+enum class PngChecksums : uint8_t { kIgnore, kVerify };
+
+/// Walks all chunks of a PNG file, so that a decoder can rely on what they say before it allocates: each lies within
+/// the file, the header comes first, there are image data, and these unpack to about as much as the header asks for.
+/// @param bytes the whole file; what lies behind the end chunk is ignored
+/// @param complaint what the message of an Error begins with, such as "a.png: damaged PNG file: "
+/// Throws Error(kInput) otherwise. Takes memory for one small buffer.
+/// Source: ISO/IEC 15948:2003 (PNG), sections 5 and 11.2.
+PngHeader check_png_chunks(std::span<const std::byte> bytes, PngChecksums checksums, const std::string& complaint);
+
+} // namespace packtrace
