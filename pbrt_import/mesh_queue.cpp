@@ -34,7 +34,7 @@ MeshQueue::~MeshQueue() {
   try {
     tasks_.cancel();
     tasks_.wait();
-  } catch (const Error&) {
+  } catch (...) {
     // Whoever asked for the end knows already.
   }
 }

@@ -22,6 +22,7 @@ constexpr size_t kOverlap = 256;
 // Below this a file is read faster than a task is started.
 constexpr uint64_t kSmallFile = 512 * 1024;
 constexpr size_t kBlocksAheadPerThread = 2;
+constexpr size_t kMostThreads = 8; // one thread cannot take what more of them give
 
 /// Offset in text of the first space in it, npos if there is none.
 size_t first_space(std::string_view text) {
@@ -192,7 +193,7 @@ TextBlocks::TextBlocks(InputFile file, size_t block_bytes) : file_(std::move(fil
       std::min<size_t>(static_cast<size_t>(tbb::this_task_arena::max_concurrency()),
                        tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   if (threads > 1 && file_.stored_bytes() >= kSmallFile) helpers_ = std::make_unique<tbb::task_group>();
-  slots_.resize(helpers_ ? 1 + kBlocksAheadPerThread * threads : 1);
+  slots_.resize(helpers_ ? 1 + kBlocksAheadPerThread * std::min(threads, kMostThreads) : 1);
   for (std::unique_ptr<Slot>& slot : slots_) slot = std::make_unique<Slot>();
 }
 

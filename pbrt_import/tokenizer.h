@@ -33,7 +33,7 @@ struct Token {
 /// lies across them. Lines end with LF, CR LF or CR; a UTF-8 byte order mark is skipped.
 class Tokenizer {
 public:
-  static constexpr size_t kDefaultWindow = 256 * 1024;
+  static constexpr size_t kDefaultWindow = 128 * 1024;
 
   /// Throws Error like InputFile::read, and Error(kInput) for UTF-16.
   explicit Tokenizer(InputFile file, size_t window_bytes = kDefaultWindow);
