@@ -16,8 +16,9 @@
 #define STB_IMAGE_IMPLEMENTATION
 #define STBI_NO_STDIO
 #define STBI_NO_LINEAR
-#define STBI_ONLY_PNG // the others, but for HDR, are not in pbrt's language either, and the JPEG and HDR decoders
-#define STBI_ONLY_TGA // read and write beyond their buffers
+// What it decodes beyond these, JPEG above all, reads and writes outside of its buffers where files are damaged.
+#define STBI_ONLY_PNG
+#define STBI_ONLY_TGA
 #include <stb/stb_image.h>
 
 #include "pbrt_import/number.h"
