@@ -47,7 +47,7 @@ std::vector<std::byte> read_file_bytes(const std::filesystem::path& path) {
 void write_file_bytes(const std::filesystem::path& path, std::span<const std::byte> bytes) {
   File file(std::fopen(path.c_str(), "wb"));
   if (!file) throw Error(ErrorKind::kIo, reason(path, "cannot open for writing", errno));
-  const bool written = std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size();
+  const bool written = bytes.empty() || std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size();
   const int write_error = errno;
   // Buffered bytes meet a full disk only here.
   const bool closed = std::fclose(file.release()) == 0;

@@ -170,7 +170,7 @@ std::vector<HostileCase> images() {
 )"),
       image_case(
           "PngTruncatedInItsHeader", "a.png", good_png().substr(0, 20),
-          R"(scene.pbrt:2:1: error: texture file "a.png": the header of the PNG image is damaged, or claims more pixels than can be read; it counts as white
+          R"(scene.pbrt:2:1: error: texture file "a.png": damaged image: the file is truncated; it counts as white
 )"),
       image_case(
           "PngTruncatedInItsPixels", "a.png", good_png().substr(0, 45),
@@ -184,23 +184,23 @@ std::vector<HostileCase> images() {
                  R"(scene.pbrt:2:1: error: texture file "a.png": damaged image: bad zlib header; it counts as white
 )"),
       image_case("PngOfTooFewRows", "a.png", png(100, 100, 8, std::string(10, '\0')),
-                 R"(scene.pbrt:2:1: error: texture file "a.png": damaged image: not enough pixels; it counts as white
+                 R"(scene.pbrt:2:1: error: texture file "a.png": damaged image: too little data for its size; it counts as white
 )"),
       image_case(
           "PngOfNoPixels", "a.png", png(0, 0, 8, ""),
-          R"(scene.pbrt:2:1: error: texture file "a.png": the header of the PNG image is damaged, or claims more pixels than can be read; it counts as white
+          R"(scene.pbrt:2:1: error: texture file "a.png": damaged image: it has no pixels; it counts as white
 )"),
       image_case(
           "PngOfTrillionsOfPixels", "a.png", png(1 << 24, 1 << 24, 8, ""),
-          R"(scene.pbrt:2:1: error: texture file "a.png": the header of the PNG image is damaged, or claims more pixels than can be read; it counts as white
+          R"(scene.pbrt:2:1: error: texture file "a.png": damaged image: too little data for its size; it counts as white
 )"),
       image_case(
           "PngOfMillionsOfPixels", "a.png", png(20'000, 20'000, 8, ""),
-          R"(scene.pbrt:2:1: error: texture file "a.png": the header of the PNG image is damaged, or claims more pixels than can be read; it counts as white
+          R"(scene.pbrt:2:1: error: texture file "a.png": damaged image: too little data for its size; it counts as white
 )"),
       image_case(
           "TgaOfNoPixels", "a.tga", tga(0, 0, 0),
-          R"(scene.pbrt:2:1: error: texture file "a.tga": not an image in a known format (PNG, TGA, EXR, PFM, HDR, JPEG, BMP); it counts as white
+          R"(scene.pbrt:2:1: error: texture file "a.tga": not an image in a known format (PNG, TGA, EXR, PFM, HDR); it counts as white
 )"),
       image_case(
           "TgaTruncated", "a.tga", tga(2, 2, 3),
@@ -220,7 +220,7 @@ std::vector<HostileCase> images() {
 )"),
       image_case(
           "BmpTruncated", "a.bmp", bmp(4, 4, 20),
-          R"(scene.pbrt:2:1: error: texture file "a.bmp": damaged image: the file is truncated; it counts as white
+          R"(scene.pbrt:2:1: error: texture file "a.bmp": images in BMP format are not read, only PNG, TGA, EXR, PFM and HDR; it counts as white
 )"),
       image_case(
           "HdrHeaderOnly", "a.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 4\n",
@@ -228,19 +228,19 @@ std::vector<HostileCase> images() {
 )"),
       image_case(
           "JpegNoise", "a.jpg", "\xff\xd8\xff\xe0" + std::string(100, '\x5a'),
-          R"(scene.pbrt:2:1: error: texture file "a.jpg": the header of the JPEG image is damaged, or claims more pixels than can be read; it counts as white
+          R"(scene.pbrt:2:1: error: texture file "a.jpg": images in JPEG format are not read, only PNG, TGA, EXR, PFM and HDR; it counts as white
 )"),
       image_case(
           "GifIsNotSupported", "a.gif", "GIF89a\1\0\1\0\0\0\0"s,
-          R"(scene.pbrt:2:1: error: texture file "a.gif": not an image in a known format (PNG, TGA, EXR, PFM, HDR, JPEG, BMP); it counts as white
+          R"(scene.pbrt:2:1: error: texture file "a.gif": images in GIF format are not read, only PNG, TGA, EXR, PFM and HDR; it counts as white
 )"),
       image_case(
           "TextNamedPng", "a.png", "this is no image",
-          R"(scene.pbrt:2:1: error: texture file "a.png": not an image in a known format (PNG, TGA, EXR, PFM, HDR, JPEG, BMP); it counts as white
+          R"(scene.pbrt:2:1: error: texture file "a.png": not an image in a known format (PNG, TGA, EXR, PFM, HDR); it counts as white
 )"),
       image_case(
           "EmptyImage", "a.png", "",
-          R"(scene.pbrt:2:1: error: texture file "a.png": not an image in a known format (PNG, TGA, EXR, PFM, HDR, JPEG, BMP); it counts as white
+          R"(scene.pbrt:2:1: error: texture file "a.png": not an image in a known format (PNG, TGA, EXR, PFM, HDR); it counts as white
 )"),
       image_case("PfmLittleEndian", "a.pfm", pfm("PF\n1 1\n-1.0\n", {0.5f, 0.25f, 0.125f}), ""),
       image_case("PfmBigEndian", "a.pfm", "PF\n1 1\n1.0\n\x3f\0\0\0\x3f\0\0\0\x3f\0\0\0"s, ""),
@@ -307,7 +307,7 @@ std::vector<HostileCase> images() {
 )"),
       image_case(
           "ExrOfNoRows", "a.exr", exr_with_corner(3, -1),
-          R"(scene.pbrt:2:1: error: texture file "a.exr": damaged EXR image: Cannot read image file "image". Invalid data window in image header.; it counts as white
+          R"(scene.pbrt:2:1: error: texture file "a.exr": the image has no pixels; it counts as white
 )"),
       {"ImageMissing",
        world("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"gone.png\""),
@@ -849,7 +849,6 @@ TEST(HostileFiles, ImagesKeepTheirMeanColour) {
   EXPECT_EQ(albedo_of("a.pfm", "PF\n1 1\n1.0\n\x3f\0\0\0\x3f\0\0\0\x3e\x80\0\0"s), Vec3(0.5f, 0.5f, 0.25f));
   EXPECT_EQ(albedo_of("16.png", png(1, 1, 16, std::string("\0\x80\x01\0\0\xff\xff", 7))),
             Vec3(0x8001 / 65535.0f, 0.0f, 1.0f));
-  EXPECT_EQ(albedo_of("a.bmp", bmp(2, 1, 8)), Vec3(0x40 / 255.0f));
 }
 
 TEST(HostileFiles, LargeAlphaImagesWithManyNodesAreApproximated) {
@@ -874,7 +873,6 @@ TEST(HostileFiles, EveryTruncationOfAnImageIsAnError) {
   const SceneFolder folder;
   for (const auto& [name, content] : {std::pair<std::string, std::string>{"a.png", good_png()},
                                       {"a.tga", tga(3, 2, 6)},
-                                      {"a.bmp", bmp(4, 2, 24)},
                                       {"a.exr", exr()}}) {
     for (size_t size = 0; size < content.size(); size += name == "a.exr" ? 7 : 1) {
       folder.write(name, content.substr(0, size));
