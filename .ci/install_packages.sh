@@ -4,9 +4,10 @@ set -euo pipefail
 
 packages=(
   g++ cmake ninja-build ccache pkg-config
-  libtbb-dev libglm-dev libembree-dev libopenexr-dev libopenmesh-dev libxxhash-dev libstb-dev zlib1g-dev
+  libtbb-dev libglm-dev libembree-dev libopenexr-dev libopenmesh-dev libxxhash-dev libzstd-dev libstb-dev zlib1g-dev
   libcli11-dev libfmt-dev nlohmann-json3-dev
-  libgtest-dev libbenchmark-dev
+  libgtest-dev libbenchmark-dev python3
+  libdraco-dev libmeshoptimizer-dev # what the packing benchmark compares with
 )
 
 missing=()

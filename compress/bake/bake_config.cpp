@@ -1,5 +1,6 @@
 #include "compress/bake/bake_config.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -8,24 +9,44 @@
 
 namespace packtrace {
 
-void BakeConfig::validate() const {
-  const auto require = [](bool ok, const char* range) {
-    if (!ok) throw Error(ErrorKind::kUsage, std::string("precision out of range: ") + range);
-  };
-  switch (precision_kind) {
+namespace {
+
+constexpr double kMaxFlatDegrees = 0.1;
+
+void require(bool ok, const char* what, const char* range) {
+  if (!ok) throw Error(ErrorKind::kUsage, std::string(what) + " out of range: " + range);
+}
+
+void validate_precision(PrecisionKind kind, double precision) {
+  constexpr const char* kWhat = "precision";
+  switch (kind) {
   case PrecisionKind::kEdgeFraction:
-    return require(precision >= 1e-9 && precision <= 1.0, "a fraction of the median edge must be 1e-9 .. 1");
+    return require(precision >= 1e-9 && precision <= 1.0, kWhat, "a fraction of the median edge must be 1e-9 .. 1");
   case PrecisionKind::kDiagonalFraction:
-    return require(precision >= 1e-12 && precision <= 0.1, "a fraction of the diagonal must be 1e-12 .. 0.1");
+    return require(precision >= 1e-12 && precision <= 0.1, kWhat, "a fraction of the diagonal must be 1e-12 .. 0.1");
   case PrecisionKind::kAbsolute:
     return require(precision >= std::numeric_limits<float>::denorm_min() &&
                        precision <= std::numeric_limits<float>::max(),
-                   "an absolute precision must be a positive float");
+                   kWhat, "an absolute precision must be a positive float");
   case PrecisionKind::kPositionBits:
-    return require(precision >= 1.0 && precision <= 40.0 && precision == std::floor(precision),
+    return require(precision >= 1.0 && precision <= 40.0 && precision == std::floor(precision), kWhat,
                    "position bits must be a whole number 1 .. 40");
   }
   throw Error(ErrorKind::kUsage, "unknown kind of precision");
 }
+
+} // namespace
+
+void BakeConfig::validate() const {
+  validate_precision(precision_kind, precision);
+  require(normal_error_degrees >= 0.0025 && normal_error_degrees <= 10.0, "normal error",
+          "degrees must be .0025 .. 10");
+}
+
+double BakeConfig::max_normal_error_degrees() const {
+  return normals ? format_of(*normals).max_error_degrees : normal_error_degrees;
+}
+
+double BakeConfig::flat_degrees() const { return std::min(kMaxFlatDegrees, max_normal_error_degrees()); }
 
 } // namespace packtrace

@@ -1,6 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+
+#include "compress/format/normal_codec.h"
+#include "compress/format/page_codec.h"
 
 namespace packtrace {
 
@@ -19,6 +23,21 @@ struct BakeConfig {
   /// 1/128 of the median edge: positions move by at most 1/256 of a typical edge per axis, face normals of typical
   /// triangles by less than half a degree.
   double precision = 1.0 / 128.0;
+
+  /// Of every geometry; without one, each geometry gets the axis encoding of the fewest bits whose largest error,
+  /// measured over its own normals, is at most normal_error_degrees.
+  std::optional<NormalEncoding> normals;
+  /// What axis24 keeps for every direction: shading from such normals differs by less than a thousandth. .0025 .. 10;
+  /// without meaning where `normals` is given.
+  double normal_error_degrees = 0.04;
+
+  /// The largest angle between a normal of the source and what is decoded.
+  double max_normal_error_degrees() const;
+  /// Triangles whose three normals are all this close to the decoded face's normal, or to its opposite, store none.
+  double flat_degrees() const;
+
+  /// How the file lies on disk. Changes nothing that is decoded from it.
+  PageCodec codec = PageCodec::kNone;
 
   /// Throws Error(kUsage) if a value is out of its range. Nothing is ever clamped.
   void validate() const;

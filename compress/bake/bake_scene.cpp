@@ -11,6 +11,7 @@
 #include "compress/bake/geometry_encoder.h"
 #include "compress/bake/geometry_measure.h"
 #include "compress/bake/geometry_plan.h"
+#include "compress/bake/page_encoder.h"
 #include "compress/format/baked_image.h"
 #include "compress/format/bit_stream.h"
 #include "pbrt_import/scene/error.h"
@@ -36,6 +37,10 @@ public:
     pack();
     BakedScene result;
     result.bytes = assemble();
+    if (config_.codec != PageCodec::kNone) {
+      progress_.begin("coding pages", 0);
+      result.bytes = encode_paged_file(BakedFile::borrow_bytes(result.bytes, "bake result"), config_.codec);
+    }
     // Reading back what was written is part of the bake: nothing leaves it that a reader would refuse.
     report_.file = summarize(BakedFile::borrow_bytes(result.bytes, "bake result"));
     result.report = std::move(report_);
@@ -135,8 +140,8 @@ private:
     const GeometryPlan& plan = plan_.geometries[index];
     const GeometryMeasure& measure = measures_[index];
     const GeometryNeeds needs = analyse_requirements(scene_, plan);
-    const QuantizedGeometry q =
-        quantize_geometry(scene_, plan, needs, grids_[index], measure.max_abs(), measure.bounds.lo, measure.bounds.hi);
+    const QuantizedGeometry q = quantize_geometry(scene_, plan, needs, config_, grids_[index], measure.max_abs(),
+                                                  measure.bounds.lo, measure.bounds.hi);
     return {record_of(plan, q, position_error_bound(q.grid.step(), measure.max_abs())), encode_geometry(scene_, q),
             q.stats, unneeded_uv_bytes(scene_, plan, needs)};
   }
@@ -150,6 +155,7 @@ private:
     record.step_exponent = q.grid.exponent;
     record.anchor_shift = q.anchor_shift;
     record.uv_exponent = q.uv_exponent;
+    record.normal_encoding = static_cast<uint32_t>(q.normal_encoding);
     record.max_normal_error_degrees = static_cast<float>(q.stats.max_normal_error_degrees);
     record.mean_normal_error_degrees = static_cast<float>(mean_normal_error(q.stats));
     record.max_uv_error = static_cast<float>(q.stats.max_uv_error);
@@ -207,7 +213,8 @@ private:
     report_.unused_triangles = plan_.unused_triangles;
     if (uv_bytes > 0) report_.dropped.push_back({"texture coordinates", "no alpha mask looks them up", uv_bytes});
     if (all.flat_triangles > 0)
-      report_.dropped.push_back({"normals", "they equal the face normal within " + brief(kFlatDegrees) + " degrees",
+      report_.dropped.push_back({"normals",
+                                 "they equal the face normal within " + brief(config_.flat_degrees()) + " degrees",
                                  all.flat_triangles * 3 * sizeof(Vec3)});
     if (all.repaired_normals > 0)
       warn(std::to_string(all.repaired_normals) + " normals have no direction; face normals took their place");

@@ -81,6 +81,7 @@ public:
     frame_.step_exponent = geometry.grid.exponent;
     frame_.anchor_shift = geometry.anchor_shift;
     frame_.uv_exponent = geometry.uv_exponent;
+    frame_.normal_encoding = static_cast<uint32_t>(geometry.normal_encoding);
   }
 
   EncodedChunk run() {
@@ -151,8 +152,9 @@ private:
       if (kind_.uvs) uvs.push_back(v.uv);
     }
     const size_t offset = writer_.bytes().size();
-    out_.clusters.push_back(encode_cluster(
-        {&strips, positions, codes, uvs, kind_.material, geometry_.origin, geometry_.anchor_shift}, writer_));
+    out_.clusters.push_back(encode_cluster({&strips, positions, codes, uvs, kind_.material, geometry_.origin,
+                                            geometry_.anchor_shift, geometry_.normal_encoding},
+                                           writer_));
     out_.clusters.back().payload_offset = static_cast<uint32_t>(offset / 4);
 
     const auto vertex = [&](uint32_t local) { return vertex_numbers_.values[used[local]]; };

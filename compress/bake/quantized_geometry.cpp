@@ -49,9 +49,10 @@ void for_each(size_t count, const PerItem& per_item) {
   });
 }
 
+constexpr double kDegreesPerRadian = 57.295779513082320877;
+
 /// Between two unit vectors.
 double angle_degrees(DVec3 a, DVec3 b) {
-  constexpr double kDegreesPerRadian = 57.295779513082320877;
   return 2.0 * std::asin(std::min(0.5 * glm::length(a - b), 1.0)) * kDegreesPerRadian;
 }
 
@@ -65,9 +66,10 @@ DVec3 safe_normalize(DVec3 v) {
 
 class Quantizer {
 public:
-  Quantizer(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs, const PositionGrid& grid)
-      : scene_(scene), plan_(plan), needs_(needs), step_(grid.step()), position_table_(count_vertices()),
-        vertex_table_(2 * count_vertices()) {
+  Quantizer(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs, const BakeConfig& config,
+            const PositionGrid& grid)
+      : scene_(scene), plan_(plan), needs_(needs), config_(config), step_(grid.step()),
+        position_table_(count_vertices()), vertex_table_(2 * count_vertices()) {
     out_.grid = grid;
     out_.uv_exponent = needs.uv_exponent;
   }
@@ -81,11 +83,16 @@ public:
       const auto bits = static_cast<uint32_t>(std::bit_width(static_cast<uint64_t>(hi - lo)));
       out_.anchor_shift = std::max(out_.anchor_shift, bits > 31 ? bits - 31 : 0u);
     }
-    for (size_t i = 0; i < plan_.parts.size(); ++i) add_part(plan_.parts[i], needs_.parts[i]);
-    if (const double bound = position_error_bound(step_, max_abs); out_.stats.max_position_error > bound)
-      throw Error(ErrorKind::kLimitExceeded, plan_.name + ": measured position error " +
-                                                 brief(out_.stats.max_position_error) + " exceeds its bound " +
-                                                 brief(bound));
+    std::vector<Work> parts;
+    for (size_t i = 0; i < plan_.parts.size(); ++i) parts.push_back(quantize_part(plan_.parts[i], needs_.parts[i]));
+    out_.normal_encoding = config_.normals ? *config_.normals : choose_normal_encoding(parts);
+    for (size_t i = 0; i < plan_.parts.size(); ++i) {
+      encode_normals(parts[i]);
+      weld(plan_.parts[i], needs_.parts[i], parts[i]);
+      parts[i] = {};
+    }
+    require_bound("position error", out_.stats.max_position_error, position_error_bound(step_, max_abs));
+    require_bound("normal error in degrees", out_.stats.max_normal_error_degrees, config_.max_normal_error_degrees());
     out_.stats.distinct_vertices = out_.vertices.size();
     return std::move(out_);
   }
@@ -112,17 +119,24 @@ private:
                                                std::to_string(kMaxLatticeBits) + " steps; choose a coarser precision");
   }
 
-  /// Everything about the part that is in hand, by source vertex or triangle.
+  void require_bound(const char* what, double measured, double bound) const {
+    if (measured > bound)
+      throw Error(ErrorKind::kLimitExceeded,
+                  plan_.name + ": measured " + what + " " + brief(measured) + " exceeds its bound " + brief(bound));
+  }
+
+  /// Everything about a part that is in hand, by source vertex or triangle.
   struct Work {
     std::vector<LatticePoint> lattice;
-    std::vector<DVec3> normals; ///< unit or empty
+    std::vector<DVec3> normals;  ///< unit or empty
+    std::vector<uint8_t> smooth; ///< per normal: some triangle that is not flat has it
     std::vector<uint32_t> codes;
     std::vector<UvLattice> uvs;
     std::vector<Triangle> triangles; ///< winding as in the file
     std::vector<uint8_t> flat;
   };
 
-  void add_part(const GeometryPart& part, const PartNeeds& needs) {
+  Work quantize_part(const GeometryPart& part, const PartNeeds& needs) {
     const Mesh& mesh = scene_.meshes[part.mesh];
     Work work;
     quantize_positions(part, mesh, work);
@@ -132,8 +146,8 @@ private:
     work.flat.assign(work.triangles.size(), 1);
     if (needs.normals) quantize_normals(part, mesh, work);
     if (needs.uvs) quantize_uvs(mesh, work);
-    weld(part, needs, work);
     out_.stats.source_vertices += mesh.positions.size();
+    return work;
   }
 
   void quantize_positions(const GeometryPart& part, const Mesh& mesh, Work& work) {
@@ -177,35 +191,67 @@ private:
     if (zeros > 0) repair_normals(work);
     out_.stats.repaired_normals += zeros;
 
-    const double flat_cosine = std::cos(kFlatDegrees / 57.295779513082320877);
-    const auto flat_sign = [&](const Triangle& t, DVec3 n) { // tracing turns normals to the side that is seen
-      const double x = glm::dot(work.normals[t.x], n), y = glm::dot(work.normals[t.y], n),
-                   z = glm::dot(work.normals[t.z], n);
-      if (std::min({x, y, z}) >= flat_cosine) return 1.0;
-      return std::max({x, y, z}) <= -flat_cosine ? -1.0 : 0.0;
+    // A little less, so that rounding never lifts a measured angle above it.
+    const double flat_chord = 2.0 * std::sin(config_.flat_degrees() / kDegreesPerRadian * 0.5) * (1.0 - 1e-9);
+    const auto near = [&](const Triangle& t, DVec3 n) {
+      for (int corner = 0; corner < 3; ++corner) {
+        const DVec3 d = work.normals[t[corner]] - n;
+        if (!(glm::dot(d, d) <= flat_chord * flat_chord)) return false;
+      }
+      return true;
     };
-    std::vector<uint8_t> used(work.normals.size());
     const ErrorStats flat_errors = accumulate_errors(work.triangles.size(), [&](size_t i, ErrorStats& stats) {
       const Triangle& t = work.triangles[i];
       const DVec3 n = face_normal(work, t);
-      const double sign = flat_sign(t, n);
+      // Tracing turns normals to the side that is seen, so either side of the face will do.
+      const double sign = near(t, n) ? 1.0 : near(t, -n) ? -1.0 : 0.0;
       work.flat[i] = sign != 0.0;
       for (int corner = 0; corner < 3 && sign != 0.0; ++corner)
         stats.add(angle_degrees(work.normals[t[corner]], sign * n));
     });
+    out_.stats.flat_triangles += flat_errors.count / 3;
+    add_normal_errors(flat_errors);
+    work.smooth.assign(work.normals.size(), 0);
     for (size_t i = 0; i < work.triangles.size(); ++i)
-      for (int corner = 0; corner < 3 && work.flat[i] == 0; ++corner) used[work.triangles[i][corner]] = 1;
-    work.codes.assign(work.normals.size(), 0);
-    const ErrorStats code_errors = accumulate_errors(work.normals.size(), [&](size_t i, ErrorStats& stats) {
-      if (used[i] == 0) return;
-      work.codes[i] = encode_zsign32(work.normals[i]);
-      stats.add(angle_degrees(work.normals[i], glm::normalize(DVec3(decode_zsign32(work.codes[i])))));
-    });
-    const ErrorStats errors = ErrorStats::join(flat_errors, code_errors);
+      for (int corner = 0; corner < 3 && work.flat[i] == 0; ++corner) work.smooth[work.triangles[i][corner]] = 1;
+  }
+
+  void add_normal_errors(const ErrorStats& errors) {
     out_.stats.max_normal_error_degrees = std::max(out_.stats.max_normal_error_degrees, errors.max);
     out_.stats.normal_error_sum += errors.sum;
     out_.stats.normal_count += errors.count;
-    out_.stats.flat_triangles += flat_errors.count / 3;
+  }
+
+  static double encoding_error(NormalEncoding encoding, DVec3 normal, uint32_t code) {
+    return angle_degrees(normal, glm::normalize(DVec3(decode_normal(encoding, code))));
+  }
+
+  /// The first of the axis family whose largest error is within config's; the last where there is none.
+  NormalEncoding choose_normal_encoding(const std::vector<Work>& parts) const {
+    for (const NormalEncoding encoding : {NormalEncoding::kAxis16, NormalEncoding::kAxis24})
+      if (std::all_of(parts.begin(), parts.end(), [&](const Work& part) { return keeps_error(encoding, part); }))
+        return encoding;
+    return NormalEncoding::kAxis32;
+  }
+
+  bool keeps_error(NormalEncoding encoding, const Work& work) const {
+    std::atomic<bool> kept{true};
+    for_each(work.normals.size(), [&](size_t i) {
+      if (work.smooth[i] == 0 || !kept.load(std::memory_order_relaxed)) return;
+      if (encoding_error(encoding, work.normals[i], encode_normal(encoding, work.normals[i])) >
+          config_.normal_error_degrees)
+        kept.store(false, std::memory_order_relaxed);
+    });
+    return kept;
+  }
+
+  void encode_normals(Work& work) {
+    work.codes.assign(work.normals.size(), 0);
+    add_normal_errors(accumulate_errors(work.normals.size(), [&](size_t i, ErrorStats& stats) {
+      if (work.smooth[i] == 0) return;
+      work.codes[i] = encode_normal(out_.normal_encoding, work.normals[i]);
+      stats.add(encoding_error(out_.normal_encoding, work.normals[i], work.codes[i]));
+    }));
   }
 
   /// Gives vertices without a direction that of a triangle they belong to.
@@ -291,6 +337,7 @@ private:
   const Scene& scene_;
   const GeometryPlan& plan_;
   const GeometryNeeds& needs_;
+  const BakeConfig& config_;
   double step_;
   WeldTable position_table_, vertex_table_;
   QuantizedGeometry out_;
@@ -299,8 +346,9 @@ private:
 } // namespace
 
 QuantizedGeometry quantize_geometry(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs,
-                                    const PositionGrid& grid, double max_abs, DVec3 lowest, DVec3 highest) {
-  return Quantizer(scene, plan, needs, grid).run(max_abs, lowest, highest);
+                                    const BakeConfig& config, const PositionGrid& grid, double max_abs, DVec3 lowest,
+                                    DVec3 highest) {
+  return Quantizer(scene, plan, needs, config, grid).run(max_abs, lowest, highest);
 }
 
 } // namespace packtrace

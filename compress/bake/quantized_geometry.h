@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "compress/bake/bake_config.h"
 #include "compress/bake/geometry_plan.h"
 #include "compress/bake/requirements.h"
 #include "compress/format/position_grid.h"
@@ -14,7 +15,7 @@ namespace packtrace {
 /// A vertex after quantisation; vertices are distinct.
 struct QuantizedVertex {
   uint32_t position = 0;    ///< into QuantizedGeometry::positions
-  uint32_t normal_code = 0; ///< zsign32; 0 at corners of flat triangles
+  uint32_t normal_code = 0; ///< of QuantizedGeometry::normal_encoding; 0 at corners of flat triangles
   UvLattice uv{};           ///< 0 where the material needs none
   bool operator==(const QuantizedVertex&) const = default;
 };
@@ -45,6 +46,7 @@ struct QuantizeStats {
 /// One geometry on its lattice: welded, wound for the file, in the order of its parts.
 struct QuantizedGeometry {
   PositionGrid grid;
+  NormalEncoding normal_encoding = NormalEncoding::kAxis16;
   std::array<int32_t, 2> uv_exponent{};
   LatticePoint origin{};     ///< smallest coordinates
   uint32_t anchor_shift = 0; ///< so that extents >> anchor_shift fit int32_t
@@ -57,12 +59,10 @@ struct QuantizedGeometry {
   QuantizeStats stats;
 };
 
-/// Normals this close to the decoded face normal are not stored.
-inline constexpr double kFlatDegrees = 0.1;
-
-/// Throws Error(kLimitExceeded) where the lattice is too large for its limit, or a measured position error exceeds
-/// position_error_bound(); Error(kInput) for normals that are not finite.
+/// Throws Error(kLimitExceeded) where the lattice is too large for its limit, or a measured error exceeds
+/// position_error_bound() or config.max_normal_error_degrees(); Error(kInput) for normals that are not finite.
 QuantizedGeometry quantize_geometry(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs,
-                                    const PositionGrid& grid, double max_abs, DVec3 lowest, DVec3 highest);
+                                    const BakeConfig& config, const PositionGrid& grid, double max_abs, DVec3 lowest,
+                                    DVec3 highest);
 
 } // namespace packtrace

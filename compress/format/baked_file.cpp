@@ -6,10 +6,20 @@
 #include "compress/format/mapped_file.h"
 
 namespace packtrace {
+namespace {
+
+DiskForm resident_form(std::span<const std::byte> bytes) {
+  DiskForm form;
+  form.file_bytes = bytes.size();
+  return form;
+}
+
+} // namespace
 
 BakedFile::BakedFile(std::unique_ptr<MappedFile> map, std::vector<std::byte> owned, std::span<const std::byte> bytes,
-                     const std::string& name)
-    : map_(std::move(map)), owned_(std::move(owned)), bytes_(bytes), sections_(validate_baked_file(bytes, name)) {}
+                     const DiskForm& disk, const std::string& name)
+    : map_(std::move(map)), owned_(std::move(owned)), bytes_(bytes), disk_(disk),
+      sections_(validate_baked_file(bytes, name)) {}
 
 BakedFile::BakedFile(BakedFile&&) noexcept = default;
 BakedFile& BakedFile::operator=(BakedFile&&) noexcept = default;
@@ -18,17 +28,27 @@ BakedFile::~BakedFile() = default;
 BakedFile BakedFile::open(const std::filesystem::path& path) {
   auto map = std::make_unique<MappedFile>(path);
   const auto bytes = map->bytes();
-  return BakedFile(std::move(map), {}, bytes, path.string());
+  if (is_paged_file(bytes)) return expand(bytes, path.string());
+  return BakedFile(std::move(map), {}, bytes, resident_form(bytes), path.string());
+}
+
+BakedFile BakedFile::expand(std::span<const std::byte> bytes, const std::string& name) {
+  DiskForm disk;
+  std::vector<std::byte> owned = expand_paged_file(bytes, name, disk);
+  const std::span<const std::byte> resident(owned); // moving the vector keeps its elements in place
+  return BakedFile(nullptr, std::move(owned), resident, disk, name);
 }
 
 BakedFile BakedFile::from_bytes(std::span<const std::byte> bytes, const std::string& name) {
+  if (is_paged_file(bytes)) return expand(bytes, name);
   std::vector<std::byte> owned(bytes.begin(), bytes.end());
-  const std::span<const std::byte> copy(owned); // moving the vector keeps its elements in place
-  return BakedFile(nullptr, std::move(owned), copy, name);
+  const std::span<const std::byte> copy(owned);
+  return BakedFile(nullptr, std::move(owned), copy, resident_form(copy), name);
 }
 
 BakedFile BakedFile::borrow_bytes(std::span<const std::byte> bytes, const std::string& name) {
-  return BakedFile(nullptr, {}, bytes, name);
+  if (is_paged_file(bytes)) return expand(bytes, name);
+  return BakedFile(nullptr, {}, bytes, resident_form(bytes), name);
 }
 
 std::span<const baked::ClusterRecord> BakedFile::clusters(uint32_t geometry) const {

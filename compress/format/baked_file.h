@@ -9,6 +9,7 @@
 
 #include "compress/format/baked_format.h"
 #include "compress/format/cluster_codec.h"
+#include "compress/format/page_codec.h"
 #include "pbrt_import/scene/alpha_mask.h"
 #include "pbrt_import/scene/scene.h"
 
@@ -36,7 +37,7 @@ struct BakedSections {
 /// live as long as the BakedFile (moving it keeps them). All functions are const and may run on several threads.
 class BakedFile {
 public:
-  /// Maps the file and validates it.
+  /// Maps the file and validates it. Files of codec fast and small are decoded into memory first.
   /// Throws Error(kInput) saying what is wrong and where; Error(kUnsupported) for other format versions; Error(kIo).
   static BakedFile open(const std::filesystem::path& path);
 
@@ -55,7 +56,11 @@ public:
   std::span<const baked::InstanceRecord> instances() const { return sections_.instances; }
   const baked::SummaryRecord& summary() const { return sections_.summary.front(); }
   const BakedSections& sections() const { return sections_; }
+  /// The file with codec none, which is what is held in memory.
+  std::span<const std::byte> bytes() const { return bytes_; }
   uint64_t file_bytes() const { return bytes_.size(); }
+  /// As it was opened.
+  const DiskForm& disk() const { return disk_; }
   std::string_view text(baked::StringRef ref) const { return sections_.text(ref); }
 
   std::span<const baked::ClusterRecord> clusters(uint32_t geometry) const;
@@ -71,11 +76,13 @@ public:
 
 private:
   BakedFile(std::unique_ptr<MappedFile> map, std::vector<std::byte> owned, std::span<const std::byte> bytes,
-            const std::string& name);
+            const DiskForm& disk, const std::string& name);
+  static BakedFile expand(std::span<const std::byte> bytes, const std::string& name);
 
   std::unique_ptr<MappedFile> map_; // owner of bytes_, or
   std::vector<std::byte> owned_;    // owner of bytes_, or neither: borrowed
   std::span<const std::byte> bytes_;
+  DiskForm disk_;
   BakedSections sections_;
 };
 

@@ -7,12 +7,12 @@
 
 #include "pbrt_import/scene/material_flags.h"
 
-/// What lies in a .ptk file, version 1; docs/baked_format.md says it in words. Little-endian; every section starts at a
+/// What lies in a .ptk file, version 2; docs/baked_format.md says it in words. Little-endian; every section starts at a
 /// multiple of 64 bytes; bytes that no field or section owns are zero.
 namespace packtrace::baked {
 
 inline constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'K', 0x89, '\r', '\n', 0x1a, 0};
-inline constexpr uint32_t kVersion = 1;
+inline constexpr uint32_t kVersion = 2;
 inline constexpr size_t kSectionAlignment = 64;
 inline constexpr uint32_t kNone = ~0u;
 
@@ -77,19 +77,23 @@ struct GeometryRecord {
   std::array<int32_t, 2> uv_exponent;
   std::array<float, 3> bounds_lo; ///< of the decoded vertices; lo > hi where there are none
   std::array<float, 3> bounds_hi;
-  float max_normal_error_degrees;
-  float mean_normal_error_degrees;
+  float max_normal_error_degrees;  ///< measured against the source
+  float mean_normal_error_degrees; ///< of all its normals
   float max_uv_error;
   uint32_t flags;
   std::array<uint32_t, 8> class_clusters; ///< clusters of each material class; sums to cluster_count
   StringRef name;
+  uint32_t normal_encoding; ///< normal_codec.h, of all its clusters
+  uint32_t reserved;
 };
 
 // ClusterRecord::flags
 inline constexpr uint8_t kClusterHasNormals = 1u << 0;
 inline constexpr uint8_t kClusterHasUvs = 1u << 1;
-inline constexpr uint8_t kClusterMixedSigns = 1u << 2; ///< normals carry their sign bit
-inline constexpr uint8_t kClusterFlags = kClusterHasNormals | kClusterHasUvs | kClusterMixedSigns;
+inline constexpr uint8_t kClusterMixedCharts = 1u << 2; ///< each normal carries its chart
+inline constexpr uint32_t kClusterChartShift = 3;       ///< else all are unfolded around this one:
+inline constexpr uint8_t kClusterChart = 7u << kClusterChartShift;
+inline constexpr uint8_t kClusterFlags = kClusterHasNormals | kClusterHasUvs | kClusterMixedCharts | kClusterChart;
 
 /// Up to 128 triangles of one material. Payload, bit by bit without gaps: strips (index_codec.h); per vertex the
 /// lattice coordinates x, y, z less the anchor; normals; texture coordinates.
@@ -99,13 +103,13 @@ struct ClusterRecord {
   uint32_t first_vertex;   ///< within the geometry
   uint32_t material;
   std::array<int32_t, 3> anchor;        ///< lattice, less the geometry's origin, in 2^anchor_shift steps
-  uint32_t normal_base;                 ///< zsign32 code with the smallest x and y of the cluster
+  std::array<int16_t, 2> normal_anchor; ///< of x and y, in units of two codes
   uint16_t vertex_count;                ///< 1..256
   uint16_t normal_palette;              ///< distinct normals, or 0: one per vertex in order
   uint8_t triangle_count;               ///< 1..128
   uint8_t restart_count;                ///< strips, 1..triangle_count
   std::array<uint8_t, 3> position_bits; ///< 0..57 per axis
-  std::array<uint8_t, 2> normal_bits;   ///< above the base: x 0..15, y 0..16
+  std::array<uint8_t, 2> normal_bits;   ///< above the anchor: x and y, 0..17
   uint8_t flags;
 };
 
@@ -167,13 +171,15 @@ inline constexpr bool kIsPod = std::is_trivially_copyable_v<T>&& std::is_standar
 static_assert(kIsPod<FileHeader> && sizeof(SectionRecord) == 24 && sizeof(FileHeader) == 384);
 static_assert(offsetof(FileHeader, content_hash) == 24 && offsetof(FileHeader, sections) == 48 &&
               offsetof(FileHeader, padding) == 288 && offsetof(FileHeader, header_hash) == 376);
-static_assert(kIsPod<GeometryRecord> && sizeof(GeometryRecord) == 176 && alignof(GeometryRecord) == 8);
+static_assert(kIsPod<GeometryRecord> && sizeof(GeometryRecord) == 184 && alignof(GeometryRecord) == 8);
 static_assert(offsetof(GeometryRecord, origin) == 24 && offsetof(GeometryRecord, cluster_count) == 64 &&
               offsetof(GeometryRecord, bounds_lo) == 96 && offsetof(GeometryRecord, flags) == 132 &&
-              offsetof(GeometryRecord, class_clusters) == 136 && offsetof(GeometryRecord, name) == 168);
+              offsetof(GeometryRecord, class_clusters) == 136 && offsetof(GeometryRecord, name) == 168 &&
+              offsetof(GeometryRecord, normal_encoding) == 176);
 static_assert(kIsPod<ClusterRecord> && sizeof(ClusterRecord) == 44 && alignof(ClusterRecord) == 4);
-static_assert(offsetof(ClusterRecord, anchor) == 16 && offsetof(ClusterRecord, vertex_count) == 32 &&
-              offsetof(ClusterRecord, triangle_count) == 36 && offsetof(ClusterRecord, flags) == 43);
+static_assert(offsetof(ClusterRecord, anchor) == 16 && offsetof(ClusterRecord, normal_anchor) == 28 &&
+              offsetof(ClusterRecord, vertex_count) == 32 && offsetof(ClusterRecord, triangle_count) == 36 &&
+              offsetof(ClusterRecord, flags) == 43);
 static_assert(kIsPod<MaterialRecord> && sizeof(MaterialRecord) == 32 && offsetof(MaterialRecord, alpha_mask) == 16);
 static_assert(kIsPod<InstanceRecord> && sizeof(InstanceRecord) == 52 && offsetof(InstanceRecord, geometry) == 48);
 static_assert(kIsPod<MaskRecord> && sizeof(MaskRecord) == 40 && offsetof(MaskRecord, uv_scale) == 24);

@@ -160,6 +160,9 @@ private:
         fail("geometry", i, "position error");
       for (const float e : {g.max_normal_error_degrees, g.mean_normal_error_degrees, g.max_uv_error})
         if (!(e >= 0.0f && std::isfinite(e))) fail("geometry", i, "normal or texture coordinate error");
+      if (g.mean_normal_error_degrees > g.max_normal_error_degrees || g.max_normal_error_degrees > 180.0f)
+        fail("geometry", i, "normal error");
+      if (g.normal_encoding >= kNormalFormats.size() || g.reserved != 0) fail("geometry", i, "normal encoding");
       if ((g.flags & ~baked::kGeometryFlags) != 0) fail("geometry", i, "flags");
       if (!text_ok(g.name)) fail("geometry", i, "name");
       check_clusters(i, g);

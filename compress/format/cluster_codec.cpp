@@ -1,17 +1,18 @@
 #include "compress/format/cluster_codec.h"
 
+#include <algorithm>
 #include <cassert>
 #include <numeric>
 
 #include "compress/format/bit_stream.h"
-#include "compress/format/normal_codec.h"
 
 namespace packtrace {
 namespace {
 
 constexpr uint32_t kUvAnchorBits = 32, kUvWidthBits = 5;
 constexpr uint32_t kUvHeaderBits = 2 * (kUvAnchorBits + kUvWidthBits);
-constexpr uint32_t kMaxUvBits = 26; // -2^24 .. 2^24
+constexpr uint32_t kMaxUvBits = 26;     // -2^24 .. 2^24
+constexpr uint32_t kMaxNormalBits = 17; // three times the codes of axis32
 
 uint32_t uv_width(const uint8_t* bits, uint32_t uv_bit, uint32_t axis) {
   return static_cast<uint32_t>(read_bits(bits, uv_bit + 2 * kUvAnchorBits + axis * kUvWidthBits, kUvWidthBits));
@@ -25,12 +26,35 @@ uint32_t position_stride(const baked::ClusterRecord& record) {
   return std::accumulate(record.position_bits.begin(), record.position_bits.end(), 0u);
 }
 
-uint32_t normal_stream_bits(const baked::ClusterRecord& record) {
+uint32_t normal_stride(const baked::GeometryRecord& geometry, const baked::ClusterRecord& record) {
+  const auto encoding = static_cast<NormalEncoding>(geometry.normal_encoding);
+  return uint32_t{record.normal_bits[0]} + record.normal_bits[1] +
+         ((record.flags & baked::kClusterMixedCharts) != 0 ? bits_for_count(format_of(encoding).charts) : 0);
+}
+
+uint32_t normal_stream_bits(const baked::ClusterRecord& record, uint32_t stride) {
   if ((record.flags & baked::kClusterHasNormals) == 0) return 0;
-  const uint32_t code_bits = uint32_t{record.normal_bits[0]} + record.normal_bits[1] +
-                             ((record.flags & baked::kClusterMixedSigns) != 0 ? 1u : 0u);
-  if (record.normal_palette == 0) return record.vertex_count * code_bits;
-  return record.normal_palette * code_bits + record.vertex_count * bits_for_count(record.normal_palette);
+  if (record.normal_palette == 0) return record.vertex_count * stride;
+  return record.normal_palette * stride + record.vertex_count * bits_for_count(record.normal_palette);
+}
+
+uint32_t chart_of(const baked::ClusterRecord& record) {
+  return (uint32_t{record.flags} & baked::kClusterChart) >> baked::kClusterChartShift;
+}
+
+std::optional<std::string_view> find_normal_fault(const baked::GeometryRecord& geometry,
+                                                  const baked::ClusterRecord& cluster) {
+  const bool mixed = (cluster.flags & baked::kClusterMixedCharts) != 0;
+  if ((cluster.flags & baked::kClusterHasNormals) == 0) {
+    const bool none = cluster.normal_anchor == std::array<int16_t, 2>{} && cluster.normal_palette == 0 &&
+                      cluster.normal_bits == std::array<uint8_t, 2>{} && !mixed && chart_of(cluster) == 0;
+    return none ? std::nullopt : std::optional<std::string_view>("normals without their flag");
+  }
+  const uint32_t charts = format_of(static_cast<NormalEncoding>(geometry.normal_encoding)).charts;
+  if (mixed ? charts == 1 || chart_of(cluster) != 0 : chart_of(cluster) >= charts) return "normal chart";
+  if (std::max(cluster.normal_bits[0], cluster.normal_bits[1]) > kMaxNormalBits) return "normal bits";
+  if (cluster.normal_palette > cluster.vertex_count) return "normal palette";
+  return std::nullopt;
 }
 
 } // namespace
@@ -42,12 +66,13 @@ ClusterView::ClusterView(const baked::GeometryRecord& geometry, const baked::Clu
                                                                      cluster.restart_count},
       step_(PositionGrid{geometry.step_mantissa, geometry.step_exponent}.step()),
       uv_step_(exp2_exact(geometry.uv_exponent[0]), exp2_exact(geometry.uv_exponent[1])),
-      position_stride_(position_stride(cluster)) {
+      normal_encoding_(static_cast<NormalEncoding>(geometry.normal_encoding)),
+      normal_stride_(normal_stride(geometry, cluster)), position_stride_(position_stride(cluster)) {
   for (size_t axis = 0; axis < 3; ++axis)
     base_[axis] = geometry.origin[axis] + int64_t{cluster.anchor[axis]} * (int64_t{1} << geometry.anchor_shift);
   position_bit_ = layout_.total_bits();
   normal_bit_ = position_bit_ + layout_.vertex_count * position_stride_;
-  uv_bit_ = normal_bit_ + normal_stream_bits(cluster);
+  uv_bit_ = normal_bit_ + normal_stream_bits(cluster, normal_stride_);
 }
 
 LatticePoint ClusterView::lattice(uint32_t vertex) const {
@@ -65,32 +90,24 @@ Vec3 ClusterView::position(uint32_t vertex) const {
   return {from_lattice(q[0], step_), from_lattice(q[1], step_), from_lattice(q[2], step_)};
 }
 
-uint32_t ClusterView::normal_code_bits() const {
-  return uint32_t{record_->normal_bits[0]} + record_->normal_bits[1] +
-         ((record_->flags & baked::kClusterMixedSigns) != 0 ? 1u : 0u);
-}
-
-uint32_t ClusterView::normal_code_at(uint64_t bit) const {
-  const uint32_t x_bits = record_->normal_bits[0], y_bits = record_->normal_bits[1];
-  const auto field = static_cast<uint32_t>(read_bits(bits_, bit, normal_code_bits()));
-  const uint32_t y = field & ((1u << y_bits) - 1), x = (field >> y_bits) & ((1u << x_bits) - 1);
-  const uint32_t sign = (record_->flags & baked::kClusterMixedSigns) != 0 ? (field >> (x_bits + y_bits)) << 31 : 0u;
-  return record_->normal_base + (x << 16) + y + sign;
-}
-
-uint32_t ClusterView::normal_code(uint32_t vertex) const {
+NormalFields ClusterView::normal_fields(uint32_t vertex) const {
   assert(has_normals());
-  const uint32_t palette = record_->normal_palette;
+  const uint32_t palette = record_->normal_palette, x_bits = record_->normal_bits[0], y_bits = record_->normal_bits[1];
   uint32_t entry = vertex;
   if (palette != 0) {
     const uint32_t width = bits_for_count(palette);
     entry = static_cast<uint32_t>(
-        read_bits(bits_, normal_bit_ + palette * normal_code_bits() + uint64_t{vertex} * width, width));
+        read_bits(bits_, normal_bit_ + palette * normal_stride_ + uint64_t{vertex} * width, width));
   }
-  return normal_code_at(normal_bit_ + uint64_t{entry} * normal_code_bits());
+  const uint64_t field = read_bits(bits_, normal_bit_ + uint64_t{entry} * normal_stride_, normal_stride_);
+  const auto y = static_cast<int32_t>(field & ((1u << y_bits) - 1));
+  const auto x = static_cast<int32_t>((field >> y_bits) & ((1u << x_bits) - 1));
+  return fold_normal(normal_encoding_,
+                     {chart_of(*record_) + static_cast<uint32_t>(field >> (x_bits + y_bits)), // one of the two is 0
+                      2 * record_->normal_anchor[0] + x, 2 * record_->normal_anchor[1] + y});
 }
 
-Vec3 ClusterView::normal(uint32_t vertex) const { return decode_zsign32(normal_code(vertex)); }
+Vec3 ClusterView::normal(uint32_t vertex) const { return decode_normal(normal_encoding_, normal_fields(vertex)); }
 
 Vec2 ClusterView::uv(uint32_t vertex) const {
   assert(has_uvs());
@@ -111,8 +128,8 @@ void ClusterView::bounds(Vec3& lo, Vec3& hi) const {
 }
 
 ClusterView::StreamBits ClusterView::stream_bits() const {
-  StreamBits bits{layout_.total_bits(), uint64_t{layout_.vertex_count} * position_stride_, normal_stream_bits(*record_),
-                  0};
+  StreamBits bits{layout_.total_bits(), uint64_t{layout_.vertex_count} * position_stride_,
+                  normal_stream_bits(*record_, normal_stride_), 0};
   if (has_uvs())
     bits.uvs =
         kUvHeaderBits + uint64_t{layout_.vertex_count} * (uv_width(bits_, uv_bit_, 0) + uv_width(bits_, uv_bit_, 1));
@@ -170,14 +187,7 @@ std::optional<std::string_view> find_cluster_fault(const baked::GeometryRecord& 
     if (low < -2 * kMaxLattice || high > 8 * kMaxLattice) return "position anchor";
   }
   if ((cluster.flags & ~baked::kClusterFlags) != 0) return "flags";
-  const bool has_normals = (cluster.flags & baked::kClusterHasNormals) != 0;
-  if (has_normals) {
-    if (cluster.normal_bits[0] > kNormalXBits || cluster.normal_bits[1] > kNormalYBits) return "normal bits";
-    if (cluster.normal_palette > cluster.vertex_count) return "normal palette";
-  } else if (cluster.normal_base != 0 || cluster.normal_palette != 0 || cluster.normal_bits[0] != 0 ||
-             cluster.normal_bits[1] != 0 || (cluster.flags & baked::kClusterMixedSigns) != 0) {
-    return "normals without their flag";
-  }
+  if (const auto fault = find_normal_fault(geometry, cluster)) return fault;
 
   const uint64_t begin = uint64_t{4} * cluster.payload_offset;
   const auto fits = [&](uint64_t bits) { return begin <= payload_bytes && (bits + 7) / 8 <= payload_bytes - begin; };
@@ -186,8 +196,8 @@ std::optional<std::string_view> find_cluster_fault(const baked::GeometryRecord& 
   if (!strips_are_valid(bits, layout)) return "triangle strips";
   const ClusterView view(geometry, cluster, payload);
   const bool has_uvs = view.has_uvs();
-  const uint64_t uv_bit =
-      uint64_t{layout.total_bits()} + layout.vertex_count * position_stride(cluster) + normal_stream_bits(cluster);
+  const uint64_t uv_bit = uint64_t{layout.total_bits()} + layout.vertex_count * position_stride(cluster) +
+                          normal_stream_bits(cluster, normal_stride(geometry, cluster));
   if (!fits(uv_bit + (has_uvs ? kUvHeaderBits : 0))) return "payload extent";
   if (cluster.normal_palette != 0)
     for (uint32_t v = 0, width = bits_for_count(cluster.normal_palette); v < layout.vertex_count; ++v)

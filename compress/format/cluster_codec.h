@@ -8,6 +8,7 @@
 
 #include "compress/format/baked_format.h"
 #include "compress/format/index_codec.h"
+#include "compress/format/normal_codec.h"
 #include "compress/format/position_grid.h"
 #include "compress/format/uv_codec.h"
 #include "pbrt_import/scene/math.h"
@@ -36,8 +37,10 @@ public:
   LatticePoint lattice(uint32_t vertex) const;
   /// Unit length, object space. Needs has_normals().
   Vec3 normal(uint32_t vertex) const;
-  /// The zsign32 code itself. Needs has_normals().
-  uint32_t normal_code(uint32_t vertex) const;
+  /// Canonical, of normal_encoding(). Needs has_normals().
+  NormalFields normal_fields(uint32_t vertex) const;
+  uint32_t normal_code(uint32_t vertex) const { return join_normal_code(normal_encoding_, normal_fields(vertex)); }
+  NormalEncoding normal_encoding() const { return normal_encoding_; } ///< of the geometry
   /// Needs has_uvs().
   Vec2 uv(uint32_t vertex) const;
 
@@ -60,15 +63,14 @@ private:
   friend void decode_normals(const ClusterView&, std::span<Vec3>);
   friend void decode_uvs(const ClusterView&, std::span<Vec2>);
 
-  uint32_t normal_code_bits() const;
-  uint32_t normal_code_at(uint64_t bit) const;
-
   const baked::ClusterRecord* record_;
   const uint8_t* bits_;
   IndexLayout layout_;
   LatticePoint base_; ///< of the smallest coordinates
   double step_;
   Vec2 uv_step_;
+  NormalEncoding normal_encoding_;
+  uint32_t normal_stride_;   ///< bits per vertex or palette entry
   uint32_t position_stride_; ///< bits per vertex
   uint32_t position_bit_, normal_bit_, uv_bit_;
 };
@@ -96,8 +98,9 @@ struct ClusterInput {
   std::span<const uint32_t> normal_codes; ///< empty: none
   std::span<const UvLattice> uvs;         ///< empty: none
   uint32_t material = 0;
-  LatticePoint origin{};     ///< of the geometry
-  uint32_t anchor_shift = 0; ///< of the geometry
+  LatticePoint origin{};                                    ///< of the geometry
+  uint32_t anchor_shift = 0;                                ///< of the geometry
+  NormalEncoding normal_encoding = NormalEncoding::kAxis24; ///< of normal_codes
 };
 
 /// Appends the payload, padded to 4 bytes, and returns the record. payload_offset, first_triangle and first_vertex are

@@ -5,7 +5,7 @@
 
 #include "compress/format/bit_stream.h"
 #include "compress/format/cluster_codec.h"
-#include "compress/format/normal_codec.h"
+#include "compress/format/normal_packing.h"
 
 namespace packtrace {
 namespace {
@@ -26,42 +26,31 @@ void write_positions(const ClusterInput& input, baked::ClusterRecord& record, Bi
       writer.put(static_cast<uint64_t>(p[axis] - base[axis]), record.position_bits[axis]);
 }
 
-uint32_t code_x(uint32_t code) { return (code >> 16) & 0x7fffu; }
-uint32_t code_y(uint32_t code) { return code & 0xffffu; }
-
-void write_normals(std::span<const uint32_t> codes, baked::ClusterRecord& record, BitWriter& writer) {
+void write_normals(const ClusterInput& input, baked::ClusterRecord& record, BitWriter& writer) {
+  const std::span<const uint32_t> codes = input.normal_codes;
   if (codes.empty()) return;
+  const NormalEncoding encoding = input.normal_encoding;
   std::vector<uint32_t> palette(codes.begin(), codes.end());
   std::sort(palette.begin(), palette.end());
   palette.erase(std::unique(palette.begin(), palette.end()), palette.end());
+  std::vector<NormalFields> fields;
+  for (const uint32_t code : palette) fields.push_back(split_normal_code(encoding, code));
+  const NormalPacking packing = choose_normal_packing(encoding, fields);
 
-  uint32_t x_lo = ~0u, x_hi = 0, y_lo = ~0u, y_hi = 0;
-  for (const uint32_t code : palette) {
-    x_lo = std::min(x_lo, code_x(code)), x_hi = std::max(x_hi, code_x(code));
-    y_lo = std::min(y_lo, code_y(code)), y_hi = std::max(y_hi, code_y(code));
-  }
-  const bool mixed_signs = (palette.front() >> 31) != (palette.back() >> 31);
-  record.flags = static_cast<uint8_t>(baked::kClusterHasNormals | (mixed_signs ? baked::kClusterMixedSigns : 0));
-  record.normal_base = (palette.front() & 0x80000000u) | (x_lo << 16) | y_lo;
-  const auto x_bits = static_cast<uint32_t>(std::bit_width(x_hi - x_lo));
-  const auto y_bits = static_cast<uint32_t>(std::bit_width(y_hi - y_lo));
-  record.normal_bits = {static_cast<uint8_t>(x_bits), static_cast<uint8_t>(y_bits)};
-  const uint32_t code_bits = x_bits + y_bits + (mixed_signs ? 1 : 0);
-  const auto put_code = [&](uint32_t code) {
-    const uint64_t sign = mixed_signs ? code >> 31 : 0;
-    writer.put((code_y(code) - y_lo) | (uint64_t{code_x(code) - x_lo} << y_bits) | (sign << (x_bits + y_bits)),
-               code_bits);
-  };
-
-  const uint32_t entry_bits = bits_for_count(palette.size());
-  if (palette.size() * code_bits + codes.size() * entry_bits < codes.size() * code_bits) {
+  record.flags = static_cast<uint8_t>(baked::kClusterHasNormals | (packing.chart << baked::kClusterChartShift) |
+                                      (packing.mixed_charts ? baked::kClusterMixedCharts : 0));
+  record.normal_anchor = packing.anchor;
+  record.normal_bits = packing.bits;
+  const uint32_t stride = packing.stride(), entry_bits = bits_for_count(palette.size());
+  const auto put = [&](NormalFields normal) { writer.put(packed_normal(encoding, packing, normal), stride); };
+  if (palette.size() * stride + codes.size() * entry_bits < codes.size() * stride) {
     record.normal_palette = static_cast<uint16_t>(palette.size());
-    for (const uint32_t code : palette) put_code(code);
+    for (const NormalFields& normal : fields) put(normal);
     for (const uint32_t code : codes)
       writer.put(static_cast<uint64_t>(std::lower_bound(palette.begin(), palette.end(), code) - palette.begin()),
                  entry_bits);
   } else {
-    for (const uint32_t code : codes) put_code(code);
+    for (const uint32_t code : codes) put(split_normal_code(encoding, code));
   }
 }
 
@@ -96,7 +85,7 @@ baked::ClusterRecord encode_cluster(const ClusterInput& input, BitWriter& writer
   record.restart_count = static_cast<uint8_t>(layout.restart_count);
   write_strips(*input.strips, writer);
   write_positions(input, record, writer);
-  write_normals(input.normal_codes, record, writer);
+  write_normals(input, record, writer);
   write_uvs(input.uvs, record, writer);
   writer.align(4);
   return record;

@@ -40,6 +40,21 @@ void add_grid(std::vector<GridUse>& grids, const baked::GeometryRecord& g) {
     grids.push_back({grid, world, 1});
 }
 
+void add_normals(std::vector<NormalUse>& uses, const baked::GeometryRecord& g,
+                 std::span<const baked::ClusterRecord> clusters) {
+  uint64_t vertices = 0;
+  for (const baked::ClusterRecord& cluster : clusters)
+    if ((cluster.flags & baked::kClusterHasNormals) != 0) vertices += cluster.vertex_count;
+  if (vertices == 0) return;
+  const auto encoding = static_cast<NormalEncoding>(g.normal_encoding);
+  auto use = std::lower_bound(uses.begin(), uses.end(), encoding,
+                              [](const NormalUse& one, NormalEncoding other) { return one.encoding < other; });
+  if (use == uses.end() || use->encoding != encoding) use = uses.insert(use, NormalUse{encoding});
+  ++use->geometries;
+  use->vertices += vertices;
+  use->max_error_degrees = std::max(use->max_error_degrees, g.max_normal_error_degrees);
+}
+
 } // namespace
 
 FileSummary summarize(const BakedFile& file) {
@@ -61,6 +76,7 @@ FileSummary summarize(const BakedFile& file) {
     summary.max_normal_error_degrees = std::max(summary.max_normal_error_degrees, g.max_normal_error_degrees);
     summary.max_uv_error = std::max(summary.max_uv_error, g.max_uv_error);
     if (g.cluster_count > 0) add_grid(summary.grids, g);
+    add_normals(summary.normals, g, file.clusters(static_cast<uint32_t>(i)));
   }
   std::sort(summary.grids.begin(), summary.grids.end(), [](const GridUse& a, const GridUse& b) {
     return std::tuple(!a.world_space, a.grid.step()) < std::tuple(!b.world_space, b.grid.step());
@@ -72,6 +88,7 @@ FileSummary summarize(const BakedFile& file) {
   summary.masks = s.masks.size();
   summary.cameras = s.cameras.size();
   summary.bytes = stream_bytes(file);
+  summary.disk = file.disk();
   const auto per = [&](uint64_t count) {
     return count > 0 ? static_cast<double>(summary.bytes.total) / static_cast<double>(count) : 0.0;
   };

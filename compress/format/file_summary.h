@@ -25,15 +25,25 @@ struct GridUse {
   uint32_t geometries = 0;
 };
 
+/// One encoding of normals in use.
+struct NormalUse {
+  NormalEncoding encoding;
+  uint32_t geometries = 0;     ///< that store normals
+  uint64_t vertices = 0;       ///< with a normal, sum over clusters
+  float max_error_degrees = 0; ///< measured, flat normals that are not stored included
+};
+
 /// What `info` shows of a baked file.
 struct FileSummary {
   uint64_t triangles = 0, placed_triangles = 0, vertices = 0, placed_vertices = 0, clusters = 0;
   uint64_t geometries = 0, shared_geometries = 0, instances = 0, materials = 0, masks = 0, cameras = 0;
-  StreamBytes bytes;
+  StreamBytes bytes; ///< with codec none
+  DiskForm disk;
   double bytes_per_triangle = 0.0; ///< whole file over stored triangles; 0 without triangles
   double bytes_per_placed_triangle = 0.0;
   double triangles_per_cluster = 0.0;
   std::vector<GridUse> grids;      ///< world space first, then by step, finest first
+  std::vector<NormalUse> normals;  ///< by encoding
   double max_position_error = 0.0; ///< measured, largest axis, object units, over all geometries
   double max_position_error_bound = 0.0;
   float max_normal_error_degrees = 0.0f;

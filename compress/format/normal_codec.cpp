@@ -1,45 +1,204 @@
 #include "compress/format/normal_codec.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 namespace packtrace {
 namespace {
 
-constexpr int32_t kXCodes = 32766, kYCodes = 65534; // the codes of +1; larger ones are never written
+constexpr int32_t kZsignXLast = 32766, kZsignYLast = 65534; // the codes of +1; larger ones are never written
 
-} // namespace
+int32_t last_x(const NormalFormat& format) { return static_cast<int32_t>(format.x_codes) - 1; }
+int32_t last_y(const NormalFormat& format) { return static_cast<int32_t>(format.y_codes) - 1; }
 
-Vec3 decode_zsign32(uint32_t code) {
-  const float x = static_cast<float>((code >> 16) & 0x7fffu) * (2.0f / static_cast<float>(kXCodes)) - 1.0f;
-  const float y = static_cast<float>(code & 0xffffu) * (2.0f / static_cast<float>(kYCodes)) - 1.0f;
+Vec3 decode_zsign(NormalFields fields) {
+  const float x = static_cast<float>(fields.x) * (2.0f / static_cast<float>(kZsignXLast)) - 1.0f;
+  const float y = static_cast<float>(fields.y) * (2.0f / static_cast<float>(kZsignYLast)) - 1.0f;
   const float planar = x * x + y * y;
   if (planar >= 1.0f) {
     const float scale = 1.0f / std::sqrt(planar);
     return {x * scale, y * scale, 0.0f};
   }
   const float z = std::sqrt(1.0f - planar);
-  return {x, y, (code >> 31) != 0 ? -z : z};
+  return {x, y, fields.chart != 0 ? -z : z};
 }
 
-uint32_t encode_zsign32(DVec3 n) {
+/// @param t twice the distance from the middle code, over the number of steps: -1 .. 1
+float warp(float t) { return t * (static_cast<float>(kAxisSlope) + static_cast<float>(kAxisCubic) * (t * t)); }
+
+double inverse_warp(double x) {
+  double t = x * 1.4142135623730951;
+  for (int i = 0; i < 3; ++i) // Newton; the first guess is within .04, each step about squares that
+    t -= (t * (kAxisSlope + kAxisCubic * t * t) - x) / (kAxisSlope + 3.0 * kAxisCubic * t * t);
+  return t;
+}
+
+Vec3 decode_axis(const NormalFormat& format, NormalFields fields) {
+  const int32_t last = last_x(format);
+  const float scale = 1.0f / static_cast<float>(last);
+  const float u = warp(static_cast<float>(2 * fields.x - last) * scale);
+  const float v = warp(static_cast<float>(2 * fields.y - last) * scale);
+  // The sum first: it is the same when the two change places, as they do between charts.
+  const float w = std::sqrt(std::max(1.0f - (u * u + v * v), 0.0f));
+  const float signed_w = (fields.chart & 1u) != 0 ? -w : w;
+  const uint32_t axis = fields.chart / 2;
+  return axis == 0 ? Vec3(signed_w, u, v) : axis == 1 ? Vec3(v, signed_w, u) : Vec3(u, v, signed_w);
+}
+
+Vec3 decode_oct(const NormalFormat& format, NormalFields fields) {
+  const int32_t middle = last_x(format) / 2;
+  const float scale = 1.0f / static_cast<float>(middle);
+  float x = static_cast<float>(fields.x - middle) * scale;
+  float y = static_cast<float>(fields.y - middle) * scale;
+  const float z = 1.0f - std::abs(x) - std::abs(y);
+  const float fold = std::max(-z, 0.0f);
+  x -= std::copysign(fold, x);
+  y -= std::copysign(fold, y);
+  const float length = std::sqrt(x * x + y * y + z * z);
+  return {x / length, y / length, z / length};
+}
+
+/// The candidate nearest to n: all of x0 .. x1 by y0 .. y1 in one chart.
+class Nearest {
+public:
+  Nearest(NormalEncoding encoding, DVec3 n) : encoding_(encoding), n_(n) {}
+
+  void search(uint32_t chart, int32_t x0, int32_t x1, int32_t y0, int32_t y1) {
+    for (int32_t x = x0; x <= x1; ++x)
+      for (int32_t y = y0; y <= y1; ++y) {
+        // The chord, not the dot product: cosines this close to 1 all look alike.
+        const DVec3 d = DVec3(decode_normal(encoding_, NormalFields{chart, x, y})) - n_;
+        const double distance = glm::dot(d, d);
+        if (distance < distance_) distance_ = distance, best_ = {chart, x, y};
+      }
+  }
+
+  uint32_t code() const { return join_normal_code(encoding_, best_); }
+
+private:
+  NormalEncoding encoding_;
+  DVec3 n_;
+  NormalFields best_;
+  double distance_ = 5.0; // squared chords of the unit sphere are at most 4
+};
+
+int32_t rounded(double x) { return static_cast<int32_t>(std::lrint(x)); }
+
+void search_zsign(Nearest& nearest, DVec3 n) {
+  const int32_t x = rounded((n.x + 1.0) * 0.5 * kZsignXLast), y = rounded((n.y + 1.0) * 0.5 * kZsignYLast);
+  nearest.search(std::signbit(n.z) ? 1 : 0, std::max(x - 1, 0), std::min(x + 1, kZsignXLast), std::max(y - 1, 0),
+                 std::min(y + 1, kZsignYLast));
+}
+
+/// The lower of the two of last + 1 codes of -1 .. 1 around t.
+int32_t code_below(double t, int32_t last) {
+  return std::clamp(static_cast<int32_t>((t + 1.0) * 0.5 * last), 0, last - 1);
+}
+
+void search_axis(Nearest& nearest, int32_t last, DVec3 n) {
+  int axis = 0;
+  for (int other = 1; other < 3; ++other)
+    if (std::abs(n[other]) > std::abs(n[axis])) axis = other;
+  const int32_t x = code_below(inverse_warp(n[(axis + 1) % 3]), last);
+  const int32_t y = code_below(inverse_warp(n[(axis + 2) % 3]), last);
+  nearest.search(static_cast<uint32_t>(2 * axis) + (n[axis] < 0.0 ? 1 : 0), x, x + 1, y, y + 1);
+}
+
+void search_oct(Nearest& nearest, int32_t last, DVec3 n) {
+  n /= std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
+  const int32_t x = code_below(n.z < 0.0 ? std::copysign(1.0 - std::abs(n.y), n.x) : n.x, last);
+  const int32_t y = code_below(n.z < 0.0 ? std::copysign(1.0 - std::abs(n.x), n.y) : n.y, last);
+  nearest.search(0, x, x + 1, y, y + 1);
+}
+
+} // namespace
+
+std::optional<NormalEncoding> find_normal_encoding(std::string_view name) {
+  for (size_t i = 0; i < kNormalFormats.size(); ++i)
+    if (kNormalFormats[i].name == name) return static_cast<NormalEncoding>(i);
+  return std::nullopt;
+}
+
+NormalFields split_normal_code(NormalEncoding encoding, uint32_t code) {
+  const NormalFormat& format = format_of(encoding);
+  const uint32_t column = code / format.y_codes;
+  return {std::min(column / format.x_codes, format.charts - 1), static_cast<int32_t>(column % format.x_codes),
+          static_cast<int32_t>(code % format.y_codes)};
+}
+
+uint32_t join_normal_code(NormalEncoding encoding, NormalFields fields) {
+  const NormalFormat& format = format_of(encoding);
+  return (fields.chart * format.x_codes + static_cast<uint32_t>(fields.x)) * format.y_codes +
+         static_cast<uint32_t>(fields.y);
+}
+
+// On the cross around face a with sign s, x runs along axis a + 1 and y along a + 2. Beyond the face's border x goes on
+// along the neighbour, one code later: from there on it counts how far the neighbour's coordinate along a has sunk.
+
+std::optional<NormalFields> unfold_normal(NormalEncoding encoding, NormalFields fields, uint32_t chart) {
+  if (fields.chart == chart) return fields;
+  const NormalFormat& format = format_of(encoding);
+  if (format.family != NormalFamily::kAxis || fields.chart / 2 == chart / 2) return std::nullopt;
+  const int32_t last = last_x(format);
+  const bool along_x = fields.chart / 2 == (chart / 2 + 1) % 3;
+  const int32_t height = along_x ? fields.y : fields.x; // along the chart's axis
+  const int32_t sunk = (chart & 1u) != 0 ? height : last - height;
+  const int32_t beyond = (fields.chart & 1u) != 0 ? -1 - sunk : last + 1 + sunk;
+  return along_x ? NormalFields{chart, beyond, fields.x} : NormalFields{chart, fields.y, beyond};
+}
+
+NormalFields fold_normal(NormalEncoding encoding, NormalFields fields) {
+  const NormalFormat& format = format_of(encoding);
+  const uint32_t chart = std::min(fields.chart, format.charts - 1);
+  const int32_t last = last_x(format);
+  const auto beyond = [&](int32_t c) { return std::max(c - last, -c); }; // of the border; above 0 outside
+  const int32_t x = std::clamp(fields.x, 0, last), y = std::clamp(fields.y, 0, last_y(format));
+  if (format.family != NormalFamily::kAxis || std::max(beyond(fields.x), beyond(fields.y)) <= 0) return {chart, x, y};
+  const bool along_x = beyond(fields.x) > 0;
+  const int32_t sunk = std::min(beyond(along_x ? fields.x : fields.y) - 1, last);
+  const int32_t height = (chart & 1u) != 0 ? sunk : last - sunk;
+  const uint32_t sign = (along_x ? fields.x : fields.y) < 0 ? 1 : 0;
+  const uint32_t neighbour = 2 * ((chart / 2 + (along_x ? 1 : 2)) % 3) + sign;
+  return along_x ? NormalFields{neighbour, y, height} : NormalFields{neighbour, height, x};
+}
+
+Vec3 decode_normal(NormalEncoding encoding, NormalFields fields) {
+  const NormalFormat& format = format_of(encoding);
+  switch (format.family) {
+  case NormalFamily::kZsign:
+    return decode_zsign(fields);
+  case NormalFamily::kAxis:
+    return decode_axis(format, fields);
+  case NormalFamily::kOct:
+    return decode_oct(format, fields);
+  }
+  assert(false);
+  return {};
+}
+
+Vec3 decode_normal(NormalEncoding encoding, uint32_t code) {
+  return decode_normal(encoding, split_normal_code(encoding, code));
+}
+
+uint32_t encode_normal(NormalEncoding encoding, DVec3 n) {
   // Scaling by the largest component first keeps the squares away from overflow and from zero.
   n /= std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)});
   n /= glm::length(n);
-  const uint32_t sign = std::signbit(n.z) ? 0x80000000u : 0u;
-  const auto x0 = static_cast<int32_t>(std::lrint((n.x + 1.0) * 0.5 * kXCodes));
-  const auto y0 = static_cast<int32_t>(std::lrint((n.y + 1.0) * 0.5 * kYCodes));
-  uint32_t best = 0;
-  double best_distance = 5.0; // squared chords of the unit sphere are at most 4
-  for (int32_t x = std::max(x0 - 1, 0); x <= std::min(x0 + 1, kXCodes); ++x)
-    for (int32_t y = std::max(y0 - 1, 0); y <= std::min(y0 + 1, kYCodes); ++y) {
-      const uint32_t code = sign | (static_cast<uint32_t>(x) << 16) | static_cast<uint32_t>(y);
-      // The chord, not the dot product: cosines this close to 1 all look alike.
-      const DVec3 d = DVec3(decode_zsign32(code)) - n;
-      const double distance = glm::dot(d, d);
-      if (distance < best_distance) best_distance = distance, best = code;
-    }
-  return best;
+  const NormalFormat& format = format_of(encoding);
+  Nearest nearest(encoding, n);
+  switch (format.family) {
+  case NormalFamily::kZsign:
+    search_zsign(nearest, n);
+    break;
+  case NormalFamily::kAxis:
+    search_axis(nearest, last_x(format), n);
+    break;
+  case NormalFamily::kOct:
+    search_oct(nearest, last_x(format) - 1, n); // one code of the power of two is left
+    break;
+  }
+  return nearest.code();
 }
 
 } // namespace packtrace

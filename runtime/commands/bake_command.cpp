@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -23,20 +24,35 @@
 namespace packtrace {
 namespace {
 
+constexpr const char* kAutoNormals = "auto";
+
 struct BakeOptions {
   std::string input, output;
   std::optional<double> precision, precision_abs, precision_edge;
   std::optional<uint32_t> position_bits;
+  std::string normals = kAutoNormals;
+  std::optional<double> normal_error;
+  std::string codec{name_of(PageCodec::kNone)};
   SceneOptions scene;
   bool dry_run = false;
 };
 
 BakeConfig make_config(const BakeOptions& options) {
   BakeConfig config;
-  if (options.precision) config = {PrecisionKind::kDiagonalFraction, *options.precision};
-  if (options.precision_abs) config = {PrecisionKind::kAbsolute, *options.precision_abs};
-  if (options.precision_edge) config = {PrecisionKind::kEdgeFraction, *options.precision_edge};
-  if (options.position_bits) config = {PrecisionKind::kPositionBits, static_cast<double>(*options.position_bits)};
+  const auto set_precision = [&](PrecisionKind kind, double value) {
+    config.precision_kind = kind;
+    config.precision = value;
+  };
+  if (options.precision) set_precision(PrecisionKind::kDiagonalFraction, *options.precision);
+  if (options.precision_abs) set_precision(PrecisionKind::kAbsolute, *options.precision_abs);
+  if (options.precision_edge) set_precision(PrecisionKind::kEdgeFraction, *options.precision_edge);
+  if (options.position_bits) set_precision(PrecisionKind::kPositionBits, static_cast<double>(*options.position_bits));
+  config.normals = find_normal_encoding(options.normals);
+  if (config.normals && options.normal_error)
+    throw Error(ErrorKind::kUsage,
+                "--normal-error chooses an encoding; it is of no use with --normals " + options.normals);
+  if (options.normal_error) config.normal_error_degrees = *options.normal_error;
+  config.codec = find_page_codec(options.codec).value(); // the option's check knows the names
   config.validate();
   return config;
 }
@@ -102,9 +118,10 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
       "{}",
       fmt::format(
           grouped(),
-          "{:L} triangles in {:L} bytes: {:.3f} bytes a triangle; position error {:.3g}, normal error {:.3f} degrees\n",
+          "{:L} triangles in {:L} bytes: {:.3f} bytes a triangle; position error {:.3g}, normal error {:.4f} degrees\n",
           baked.file.triangles, baked.file.bytes.total, baked.file.bytes_per_triangle, baked.max_position_error,
           baked.max_normal_error_degrees));
+  fmt::print("{}", disk_text(baked.file));
   for (const DroppedStream& dropped : baked.dropped)
     fmt::print("{}", fmt::format(grouped(), "dropped {}: {} ({:L} bytes of source saved)\n", dropped.stream,
                                  dropped.reason, dropped.source_bytes));
@@ -132,6 +149,24 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   for (CLI::Option* option : precisions)
     for (CLI::Option* other : precisions)
       if (option != other) option->excludes(other);
+  std::vector<std::string> encodings{kAutoNormals};
+  for (const NormalFormat& format : kNormalFormats) encodings.emplace_back(format.name);
+  verb.add_option("--normals", options->normals,
+                  "Encoding of normals; auto: axis16, axis24 or axis32 by --normal-error")
+      ->check(CLI::IsMember(encodings))
+      ->default_str(kAutoNormals)
+      ->group("Normals");
+  verb.add_option(
+          "--normal-error", options->normal_error,
+          "Largest angle that auto allows between a normal and the decoded one, .0025..10 degrees (default .04: "
+          "what 24 bits keep for every direction)")
+      ->type_name("DEGREES")
+      ->group("Normals");
+  verb.add_option("--codec", options->codec,
+                  "Form on disk: none is mapped and traced as it is; fast and small are smaller, and decoded when opened")
+      ->check(CLI::IsMember({std::string(name_of(PageCodec::kNone)), std::string(name_of(PageCodec::kFast)),
+                             std::string(name_of(PageCodec::kSmall))}))
+      ->default_str(std::string(name_of(PageCodec::kNone)));
   verb.add_flag("--dry-run", options->dry_run, "Do everything but write the file");
   add_scene_options(verb, options->scene);
   verb.footer(

@@ -28,6 +28,25 @@ std::array<Row, 14> stream_rows(const StreamBytes& bytes) {
            {"total", bytes.total}}};
 }
 
+std::array<std::pair<const char*, uint64_t>, kPageStreams + 1> disk_rows(const DiskForm& disk) {
+  const auto& bytes = disk.stream_bytes;
+  const auto of = [&](PageStream stream) { return bytes[static_cast<size_t>(stream)]; };
+  return {{{"topology", of(PageStream::kTopology)},
+           {"positions", of(PageStream::kPositions)},
+           {"normals", of(PageStream::kNormals)},
+           {"uvs", of(PageStream::kUvs)},
+           {"cluster_records", of(PageStream::kRecords)},
+           {"tables", disk.table_bytes}}};
+}
+
+nlohmann::json disk_json(const DiskForm& disk) {
+  nlohmann::json json = {{"codec", name_of(disk.codec)}, {"bytes", disk.file_bytes}};
+  if (disk.codec == PageCodec::kNone) return json;
+  json["pages"] = disk.page_count;
+  for (const auto& [name, bytes] : disk_rows(disk)) json["streams"][name] = bytes;
+  return json;
+}
+
 const char* precision_name(uint32_t kind) {
   constexpr std::array<const char*, 4> kNames{"edge_fraction", "diagonal_fraction", "absolute", "position_bits"};
   return kind < kNames.size() ? kNames[kind] : "unknown";
@@ -47,10 +66,15 @@ const std::locale& grouped() {
 }
 
 nlohmann::json to_json(const FileSummary& s) {
-  nlohmann::json bytes, grids = nlohmann::json::array();
+  nlohmann::json bytes, grids = nlohmann::json::array(), normals = nlohmann::json::array();
   for (const auto& [name, count] : stream_rows(s.bytes)) bytes[name] = count;
   for (const GridUse& use : s.grids)
     grids.push_back({{"step", use.grid.step()}, {"world_space", use.world_space}, {"geometries", use.geometries}});
+  for (const NormalUse& use : s.normals)
+    normals.push_back({{"encoding", format_of(use.encoding).name},
+                       {"geometries", use.geometries},
+                       {"vertices", use.vertices},
+                       {"max_error_degrees", use.max_error_degrees}});
   return {
       {"triangles", s.triangles},
       {"placed_triangles", s.placed_triangles},
@@ -66,7 +90,9 @@ nlohmann::json to_json(const FileSummary& s) {
       {"bytes", bytes},
       {"bytes_per_triangle", s.bytes_per_triangle},
       {"bytes_per_placed_triangle", s.bytes_per_placed_triangle},
+      {"disk", disk_json(s.disk)},
       {"grids", grids},
+      {"normals", normals},
       {"max_position_error", s.max_position_error},
       {"max_position_error_bound", s.max_position_error_bound},
       {"max_normal_error_degrees", s.max_normal_error_degrees},
@@ -79,6 +105,14 @@ nlohmann::json to_json(const FileSummary& s) {
       {"collapsed_triangles", s.bake.collapsed_triangles},
       {"merged_vertices", s.bake.merged_vertices},
   };
+}
+
+std::string disk_text(const FileSummary& s) {
+  if (s.disk.codec == PageCodec::kNone) return {};
+  return fmt::format(grouped(), "on disk, codec {}: {:L} bytes, {:.3f} a triangle, in {:L} pages\n",
+                     name_of(s.disk.codec), s.disk.file_bytes,
+                     s.triangles > 0 ? static_cast<double>(s.disk.file_bytes) / static_cast<double>(s.triangles) : 0.0,
+                     s.disk.page_count);
 }
 
 std::string to_text(const FileSummary& s) {
@@ -95,13 +129,24 @@ std::string to_text(const FileSummary& s) {
     text += fmt::format("   grid step {:.4g}{}{}", s.grids.front().grid.step(),
                         s.grids.front().world_space ? " (world)" : "",
                         s.grids.size() > 1 ? fmt::format(" and {} more", s.grids.size() - 1) : std::string());
-  text += fmt::format("\nmeasured error: position {:.4g} (bound {:.4g})   normal {:.3f} degrees\n\n",
+  text += fmt::format("\nmeasured error: position {:.4g} (bound {:.4g})   normal {:.4f} degrees\n\n",
                       s.max_position_error, s.max_position_error_bound, s.max_normal_error_degrees);
+  for (const NormalUse& use : s.normals)
+    text += fmt::format(grouped(), "normals {}: {:L} geometries, {:L} vertices, error {:.4f} degrees\n",
+                        format_of(use.encoding).name, use.geometries, use.vertices, use.max_error_degrees);
+  if (!s.normals.empty()) text += "\n";
   text += fmt::format("{:<22}{:>14}{:>16}\n", "stream", "bytes", "per triangle");
   for (const auto& [name, bytes] : stream_rows(s.bytes))
     if (bytes > 0)
       text += fmt::format(grouped(), "{:<22}{:>14L}{:>16.3f}\n", name, bytes,
                           triangles > 0 ? static_cast<double>(bytes) / triangles : 0.0);
+  if (s.disk.codec != PageCodec::kNone) {
+    text += "\n" + disk_text(s);
+    for (const auto& [name, bytes] : disk_rows(s.disk))
+      if (bytes > 0)
+        text += fmt::format(grouped(), "{:<22}{:>14L}{:>16.3f}\n", name, bytes,
+                            triangles > 0 ? static_cast<double>(bytes) / triangles : 0.0);
+  }
   if (s.placed_triangles != s.triangles)
     text += fmt::format(grouped(), "{:<22}{:>14L}{:>16.3f}\n", "total, as placed", s.bytes.total,
                         s.bytes_per_placed_triangle);

@@ -15,6 +15,9 @@ nlohmann::json to_json(const FileSummary& summary);
 /// For fmt's {:L}: 1234567 as 1,234,567, whatever the user's locale.
 const std::locale& grouped();
 
+/// One line on the bytes on disk; empty for files with codec none.
+std::string disk_text(const FileSummary& summary);
+
 /// The same as to_json() for people: counts, errors, and a table of bytes by stream.
 std::string to_text(const FileSummary& summary);
 

@@ -44,5 +44,29 @@ TEST(BakeConfig, ValuesOutOfRangeAreRefusedNotClamped) {
   EXPECT_FALSE(accepted(static_cast<PrecisionKind>(9), 1.0));
 }
 
+TEST(BakeConfig, NormalErrorsOutOfRangeAreRefusedNotClamped) {
+  BakeConfig config;
+  for (const double bad : {0.0, -1.0, 0.0024, 10.1, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    config.normal_error_degrees = bad;
+    EXPECT_THROW(config.validate(), Error) << bad;
+  }
+  for (const double good : {0.0025, 0.04, 10.0}) {
+    config.normal_error_degrees = good;
+    EXPECT_NO_THROW(config.validate()) << good;
+  }
+  // The promise can be kept for all normals at the lowest and at the default error.
+  EXPECT_LE(format_of(NormalEncoding::kAxis32).max_error_degrees, 0.0025);
+  EXPECT_LE(format_of(NormalEncoding::kAxis24).max_error_degrees, BakeConfig{}.normal_error_degrees);
+}
+
+TEST(BakeConfig, AStatedEncodingPromisesItsOwnError) {
+  BakeConfig config;
+  EXPECT_EQ(config.max_normal_error_degrees(), 0.04);
+  EXPECT_EQ(config.flat_degrees(), 0.04);
+  config.normals = NormalEncoding::kZsign32;
+  EXPECT_EQ(config.max_normal_error_degrees(), format_of(NormalEncoding::kZsign32).max_error_degrees);
+  EXPECT_EQ(config.flat_degrees(), 0.1);
+}
+
 } // namespace
 } // namespace packtrace

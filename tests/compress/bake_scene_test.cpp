@@ -275,14 +275,67 @@ TEST(BakeScene, BytesDoNotDependOnThreads) {
   for (const auto& result : results) EXPECT_TRUE(result == results[0]);
 }
 
-TEST(BakeScene, NormalsComeBackWithinTheCodecsError) {
+BakeConfig normals(std::optional<NormalEncoding> encoding, double error_degrees = 0.04) {
+  BakeConfig config;
+  config.normals = encoding;
+  config.normal_error_degrees = error_degrees;
+  return config;
+}
+
+TEST(BakeScene, NormalsComeBackWithinTheErrorOfEachEncoding) {
   const Mesh mesh = test::sphere_mesh(30);
-  const BakedScene baked = bake(scene_of(mesh));
-  const Decoded all = decode(BakedFile::from_bytes(baked.bytes), 0);
-  for (size_t i = 0; i < all.positions.size(); ++i) // on a unit sphere positions are normals
-    EXPECT_GT(glm::dot(all.normals[i], glm::normalize(all.positions[i])), 0.9999f);
-  EXPECT_GT(baked.report.mean_normal_error_degrees, 0.0);
-  EXPECT_LT(baked.report.max_normal_error_degrees, 0.34);
+  for (uint32_t i = 0; i < kNormalFormats.size(); ++i) {
+    const auto encoding = static_cast<NormalEncoding>(i);
+    const BakedScene baked = bake(scene_of(mesh), normals(encoding));
+    const BakedFile file = BakedFile::from_bytes(baked.bytes);
+    EXPECT_EQ(file.geometries()[0].normal_encoding, i);
+    const double limit = kNormalFormats[i].max_error_degrees;
+    const Decoded all = decode(file, 0);
+    for (size_t v = 0; v < all.positions.size(); ++v) // on a unit sphere positions are normals, to .2 degrees here
+      EXPECT_GT(glm::dot(all.normals[v], glm::normalize(all.positions[v])), std::cos((limit + 0.2) / 57.29));
+    EXPECT_LE(baked.report.max_normal_error_degrees, limit) << kNormalFormats[i].name;
+    if (encoding != NormalEncoding::kZsign32) { // whose worst normals are few
+      EXPECT_GT(baked.report.max_normal_error_degrees, 0.3 * limit);
+    }
+    EXPECT_GT(baked.report.mean_normal_error_degrees, 0.0);
+    EXPECT_EQ(file.geometries()[0].max_normal_error_degrees, static_cast<float>(baked.report.max_normal_error_degrees));
+  }
+}
+
+TEST(BakeScene, AutoTakesTheFewestBitsThatKeepTheError) {
+  const auto chosen = [](const Mesh& mesh, double error_degrees) {
+    const BakedScene baked = bake(scene_of(mesh), normals(std::nullopt, error_degrees));
+    EXPECT_LE(baked.report.max_normal_error_degrees, error_degrees);
+    const std::vector<NormalUse>& uses = baked.report.file.normals;
+    EXPECT_EQ(uses.size(), 1u);
+    EXPECT_EQ(uses.front().geometries, 1u);
+    EXPECT_EQ(uses.front().vertices, baked.report.file.vertices);
+    return uses.front().encoding;
+  };
+  const Mesh sphere = test::sphere_mesh(30);
+  EXPECT_EQ(chosen(sphere, 1.0), NormalEncoding::kAxis16);
+  EXPECT_EQ(chosen(sphere, 0.5), NormalEncoding::kAxis24);
+  EXPECT_EQ(chosen(sphere, 0.04), NormalEncoding::kAxis24);
+  EXPECT_EQ(chosen(sphere, 0.01), NormalEncoding::kAxis32);
+  EXPECT_EQ(chosen(sphere, 0.0025), NormalEncoding::kAxis32);
+  Mesh bent = test::grid_mesh(4); // every normal along an axis: any number of bits is enough
+  for (size_t i = 0; i < bent.positions.size(); ++i)
+    bent.normals.push_back(i % 2 == 0 ? Vec3(1, 0, 0) : Vec3(0, -1, 0));
+  EXPECT_EQ(chosen(bent, 0.0025), NormalEncoding::kAxis16);
+}
+
+TEST(BakeScene, EveryPartOfAGeometryHasItsEncoding) {
+  Scene scene;
+  scene.materials.push_back({});
+  Mesh bent = test::grid_mesh(4);
+  bent.normals.assign(bent.positions.size(), Vec3(1, 0, 0));
+  scene.meshes = {bent, test::sphere_mesh(12)};
+  scene.objects.push_back({"two", {Shape{0, 0, false, DAffine(1.0)}, Shape{1, 0, false, DAffine(1.0)}}});
+  scene.instances.push_back({0, Affine(1.0f)});
+  const BakedFile file = BakedFile::from_bytes(bake(scene).bytes);
+  EXPECT_EQ(file.geometries()[0].normal_encoding, static_cast<uint32_t>(NormalEncoding::kAxis24));
+  const Decoded all = decode(file, 0);
+  EXPECT_GE(std::count(all.normals.begin(), all.normals.end(), Vec3(1, 0, 0)), 25); // perhaps some of the sphere's too
 }
 
 TEST(BakeScene, FlatNormalsAreDroppedAndSaidToBe) {

@@ -1,5 +1,7 @@
 #include "compress/format/cluster_codec.h"
 
+#include <cstring>
+
 #include <gtest/gtest.h>
 
 #include "compress/format/bit_stream.h"
@@ -16,12 +18,21 @@ struct Case {
   std::vector<UvLattice> uvs;
   baked::GeometryRecord geometry{};
 
-  Case() { geometry.step_mantissa = 8, geometry.step_exponent = -10; }
+  Case() {
+    geometry.step_mantissa = 8, geometry.step_exponent = -10;
+    geometry.normal_encoding = static_cast<uint32_t>(NormalEncoding::kZsign32);
+  }
+  NormalEncoding encoding() const { return static_cast<NormalEncoding>(geometry.normal_encoding); }
 };
 
-/// Encodes, checks that the fault finder agrees, and compares every way of reading with what went in.
-std::vector<uint8_t> expect_round_trip(const Case& c) {
-  const Strips strips = find_strips(c.triangles, static_cast<uint32_t>(c.positions.size()));
+/// One cluster with the bytes it lies in, kReadSlackBytes included.
+struct Encoded {
+  baked::ClusterRecord record;
+  std::vector<uint8_t> bytes;
+  uint64_t payload_bytes() const { return bytes.size() - kReadSlackBytes; }
+};
+
+Encoded encode(const Case& c, const Strips& strips) {
   std::vector<LatticePoint> positions;
   std::vector<uint32_t> codes;
   std::vector<UvLattice> uvs;
@@ -31,11 +42,18 @@ std::vector<uint8_t> expect_round_trip(const Case& c) {
     if (!c.uvs.empty()) uvs.push_back(c.uvs[v]);
   }
   BitWriter writer;
-  const baked::ClusterRecord record =
-      encode_cluster({&strips, positions, codes, uvs, 5, c.geometry.origin, c.geometry.anchor_shift}, writer);
-  std::vector<uint8_t> bytes = writer.bytes();
-  const uint64_t payload_bytes = bytes.size();
-  bytes.resize(bytes.size() + kReadSlackBytes);
+  const ClusterInput input{&strips, positions, codes, uvs, 5, c.geometry.origin, c.geometry.anchor_shift, c.encoding()};
+  Encoded encoded{encode_cluster(input, writer), writer.bytes()};
+  encoded.bytes.resize(encoded.bytes.size() + kReadSlackBytes);
+  return encoded;
+}
+
+/// Encodes, checks that the fault finder agrees, and compares every way of reading with what went in.
+std::vector<uint8_t> expect_round_trip(const Case& c) {
+  const Strips strips = find_strips(c.triangles, static_cast<uint32_t>(c.positions.size()));
+  const Encoded encoded = encode(c, strips);
+  const auto& [record, bytes] = encoded;
+  const uint64_t payload_bytes = encoded.payload_bytes();
   EXPECT_EQ(find_cluster_fault(c.geometry, record, bytes.data(), payload_bytes), std::nullopt);
   if (payload_bytes >= 4) {
     EXPECT_TRUE(find_cluster_fault(c.geometry, record, bytes.data(), payload_bytes - 4));
@@ -53,18 +71,19 @@ std::vector<uint8_t> expect_round_trip(const Case& c) {
   Vec3 lo, hi;
   view.bounds(lo, hi);
   for (uint32_t v = 0; v < view.vertex_count(); ++v) {
-    EXPECT_EQ(view.lattice(v), positions[v]);
+    const uint32_t source = strips.vertex_order[v];
+    EXPECT_EQ(view.lattice(v), c.positions[source]);
     EXPECT_EQ(view.position(v), all[v]);
     EXPECT_TRUE(glm::all(glm::lessThanEqual(lo, all[v])) && glm::all(glm::lessThanEqual(all[v], hi)));
     if (view.has_normals()) {
-      EXPECT_EQ(view.normal_code(v), codes[v]);
-      EXPECT_EQ(normals[v], decode_zsign32(codes[v]));
+      EXPECT_EQ(view.normal_code(v), c.codes[source]);
+      EXPECT_EQ(normals[v], decode_normal(c.encoding(), c.codes[source]));
     }
     if (view.has_uvs()) {
       EXPECT_EQ(view.uv(v), all_uvs[v]);
       const float u_step = std::ldexp(1.0f, c.geometry.uv_exponent[0]),
                   v_step = std::ldexp(1.0f, c.geometry.uv_exponent[1]);
-      EXPECT_EQ(view.uv(v), Vec2(from_uv_lattice(uvs[v][0], u_step), from_uv_lattice(uvs[v][1], v_step)));
+      EXPECT_EQ(view.uv(v), Vec2(from_uv_lattice(c.uvs[source][0], u_step), from_uv_lattice(c.uvs[source][1], v_step)));
     }
   }
   return bytes;
@@ -139,23 +158,37 @@ TEST(ClusterCodec, GoldenBytes) {
   bytes.resize(bytes.size() - kReadSlackBytes);
   const std::vector<uint8_t> expected = {0xf1,       // strips: restart 10, left 00, fresh 1111
                                          0x10, 0xbc, // positions: x - 100 and z + 3 in 2 bits each, y in none
-                                         0x80, 0x53, // normals: y - 0x7fff below x - 0x3fff, 2 bits each
-                                         0,    0,    0,    0,    0,    0,    0,   0, // uvs: anchors
-                                         0xa5, 0x00, 0x00, 0x01, 0x80, 0x10, 0x02};  // widths 5 and 5, then u and v
+                                         0x29, 0x33, // normals: y - 0x7ffe in 3 bits below x - 0x3ffe in 2
+                                         0x09, 0,    0,    0,    0,    0,    0,   0, // uvs from bit 4 on: anchors
+                                         0x50, 0x0a, 0x00, 0x10, 0x00, 0x08, 0x21};  // widths 5 and 5, then u and v
   EXPECT_EQ(bytes, expected);
+}
+
+TEST(ClusterCodec, GoldenBytesOfNormalsAcrossAnEdgeOfTheCube) {
+  constexpr auto kEncoding = NormalEncoding::kAxis24;
+  Case c;
+  c.geometry.normal_encoding = static_cast<uint32_t>(kEncoding);
+  c.triangles = {{0, 1, 2}, {2, 1, 3}};
+  c.positions = {{100, 7, -3}, {101, 7, -3}, {100, 7, 0}, {103, 7, -1}};
+  // On the faces +z and +x, at most three codes from their edge. Around +x, y is 1670 + 1 where the edge is crossed.
+  for (const NormalFields fields :
+       {NormalFields{4, 1670, 835}, NormalFields{0, 835, 1670}, NormalFields{4, 1668, 836}, NormalFields{0, 836, 1669}})
+    c.codes.push_back(join_normal_code(kEncoding, fields));
+  const auto [record, bytes] = encode(c, find_strips(c.triangles, 4));
+  EXPECT_EQ(record.flags, baked::kClusterHasNormals); // around chart 0
+  EXPECT_EQ(record.normal_anchor, (std::array<int16_t, 2>{417, 834}));
+  EXPECT_EQ(record.normal_bits, (std::array<uint8_t, 2>{2, 3}));
+  const std::vector<uint8_t> expected = {0xf1, 0x10, 0xbc,        // as above
+                                         0x4b, 0xd5, 0x08, 0, 0}; // y - 1668 below x - 834: 3, 1; 2, 1; 5, 2; 1, 2
+  EXPECT_EQ(std::vector<uint8_t>(bytes.begin(), bytes.end() - kReadSlackBytes), expected);
+  expect_round_trip(c);
 }
 
 TEST(ClusterCodec, FaultsOfARecordAreFound) {
   test::Random random(13);
   const Case c = random_case(random, 64);
-  const Strips strips = find_strips(c.triangles, 64);
-  std::vector<LatticePoint> positions;
-  for (const uint32_t v : strips.vertex_order) positions.push_back(c.positions[v]);
-  BitWriter writer;
-  const baked::ClusterRecord good = encode_cluster({&strips, positions, {}, {}, 0, {}, 0}, writer);
-  std::vector<uint8_t> bytes = writer.bytes();
-  const uint64_t size = bytes.size();
-  bytes.resize(bytes.size() + kReadSlackBytes);
+  const auto [good, bytes] = encode(c, find_strips(c.triangles, 64));
+  const uint64_t size = bytes.size() - kReadSlackBytes;
   const auto fault = [&](auto&& change) {
     baked::ClusterRecord record = good;
     change(record);
@@ -172,12 +205,130 @@ TEST(ClusterCodec, FaultsOfARecordAreFound) {
   EXPECT_TRUE(fault([](auto& r) { r.position_bits[1] = 58; }));
   EXPECT_TRUE(fault([](auto& r) { r.position_bits[1] = 57; })); // beyond the payload
   EXPECT_TRUE(fault([](auto& r) { r.normal_bits[0] = 1; }));
+  EXPECT_TRUE(fault([](auto& r) { r.normal_anchor[1] = -1; }));
+  EXPECT_TRUE(fault([](auto& r) { r.flags = baked::kClusterMixedCharts; }));
+  EXPECT_TRUE(fault([](auto& r) { r.flags = 1u << baked::kClusterChartShift; }));
   EXPECT_TRUE(fault([](auto& r) { r.flags = 0x80; }));
-  EXPECT_TRUE(fault([](auto& r) { r.flags |= baked::kClusterHasNormals, r.normal_bits[1] = 17; }));
+  EXPECT_TRUE(fault([](auto& r) { r.flags |= baked::kClusterHasNormals, r.normal_bits[1] = 18; }));
+  EXPECT_FALSE(fault([](auto& r) { r.flags |= baked::kClusterHasNormals; })); // one normal for all, in no bits
+  EXPECT_TRUE(fault([](auto& r) { r.flags |= baked::kClusterHasNormals | (2u << baked::kClusterChartShift); }));
   EXPECT_TRUE(fault([](auto& r) { r.flags |= baked::kClusterHasNormals, r.normal_palette = 300; }));
   EXPECT_TRUE(fault([](auto& r) { r.flags |= baked::kClusterHasUvs; }));
   EXPECT_TRUE(fault([](auto& r) { r.payload_offset = 0x7fffffff; }));
 }
+
+/// Clusters with normals of one encoding, by how they are packed.
+class ClusterNormals : public testing::TestWithParam<NormalEncoding> {
+protected:
+  uint32_t code(DVec3 n) const { return encode_normal(GetParam(), n); }
+  Case make_case(test::Random& random) const {
+    Case c = random_case(random, 60);
+    c.geometry.normal_encoding = static_cast<uint32_t>(GetParam());
+    return c;
+  }
+  static DVec3 any_direction(test::Random& random) {
+    return {random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)};
+  }
+  /// Everywhere, and around every `stride`-th of the cube's faces, edges and corners: 60 normals, seven, or one.
+  std::vector<Case> cases(test::Random& random, int stride) const {
+    std::vector<DVec3> middles{DVec3(0.0)};
+    for (int i = 0; i < 27; i += stride) middles.emplace_back(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+    std::vector<Case> result;
+    for (const DVec3 middle : middles)
+      for (const uint32_t distinct : {60u, 7u, 1u}) {
+        Case c = make_case(random);
+        for (uint32_t v = 0; v < 60; ++v)
+          c.codes.push_back(v < distinct ? code(middle * 4.0 + any_direction(random)) : c.codes[v % distinct]);
+        result.push_back(c);
+      }
+    return result;
+  }
+};
+
+TEST_P(ClusterNormals, RoundTrip) {
+  test::Random random(30);
+  for (const Case& c : cases(random, 1)) expect_round_trip(c);
+}
+
+TEST_P(ClusterNormals, NormalsAroundOneDirectionTakeFewBits) {
+  test::Random random(31);
+  Case c = make_case(random);
+  const auto size = [&](DVec3 middle) {
+    c.codes.clear();
+    for (uint32_t v = 0; v < 60; ++v) c.codes.push_back(code(middle * 20.0 + any_direction(random)));
+    return expect_round_trip(c).size();
+  };
+  const size_t all = size(DVec3(0.0));
+  for (const DVec3 middle : {DVec3(0, 0.2, 1), DVec3(0.6, 0.1, 0.4), DVec3(0.3, 0.7, 0.3)})
+    EXPECT_LT(size(middle) + 60 * 4 / 8, all); // a tenth of the sphere's width: four bits of each component's at most
+  if (format_of(GetParam()).family != NormalFamily::kAxis) return;
+  for (int i = 0; i < 8; ++i) { // also across the edges and corners of the cube
+    const DVec3 corner(i % 2 * 2 - 1, i / 2 % 2 * 2 - 1, i / 4 * 2 - 1);
+    EXPECT_LT(size(corner) + 60 * 4 / 8, all) << i;
+    EXPECT_LT(size(corner * DVec3(1, 1, 0)) + 60 * 4 / 8, all) << i;
+  }
+}
+
+/// Reads all normals; they are unit vectors whatever the bits say.
+void expect_unit_normals(const Case& c, const baked::ClusterRecord& record, const uint8_t* payload) {
+  const ClusterView view(c.geometry, record, payload);
+  if (!view.has_normals()) return;
+  for (uint32_t v = 0; v < view.vertex_count(); ++v) {
+    ASSERT_NEAR(glm::length(view.normal(v)), 1.0f, 3e-7f);
+    ASSERT_EQ(decode_normal(c.encoding(), view.normal_code(v)), view.normal(v));
+  }
+}
+
+TEST_P(ClusterNormals, TruncatedPrefixesAreFaults) {
+  test::Random random(32);
+  for (const Case& c : cases(random, 10)) {
+    const Encoded good = encode(c, find_strips(c.triangles, 60));
+    const uint64_t used = (ClusterView(c.geometry, good.record, good.bytes.data()).stream_bits().total() + 7) / 8;
+    for (uint64_t size = 0; size < good.payload_bytes(); ++size) {
+      const std::vector<uint8_t> prefix(good.bytes.begin(),
+                                        good.bytes.begin() + static_cast<std::ptrdiff_t>(size + kReadSlackBytes));
+      const bool fault = find_cluster_fault(c.geometry, good.record, prefix.data(), size).has_value();
+      ASSERT_EQ(fault, size < used) << size; // all but the padding is needed
+    }
+  }
+}
+
+TEST_P(ClusterNormals, FlippedBitsAreFaultsOrHarmless) {
+  test::Random random(33);
+  uint32_t harmless = 0, faults = 0;
+  for (const Case& c : cases(random, 10)) {
+    const Encoded good = encode(c, find_strips(c.triangles, 60));
+    const auto read = [&](const Encoded& damaged) {
+      if (find_cluster_fault(c.geometry, damaged.record, damaged.bytes.data(), damaged.payload_bytes())) {
+        ++faults;
+      } else {
+        ++harmless;
+        expect_unit_normals(c, damaged.record, damaged.bytes.data());
+      }
+    };
+    for (size_t bit = 0; bit < 8 * sizeof good.record; ++bit) {
+      Encoded damaged = good;
+      std::array<uint8_t, sizeof good.record> raw{};
+      std::memcpy(raw.data(), &good.record, sizeof good.record);
+      raw[bit / 8] ^= static_cast<uint8_t>(1u << (bit % 8));
+      std::memcpy(&damaged.record, raw.data(), sizeof good.record);
+      read(damaged);
+    }
+    for (size_t bit = 0; bit < 8 * good.payload_bytes(); ++bit) {
+      Encoded damaged = good;
+      damaged.bytes[bit / 8] ^= static_cast<uint8_t>(1u << (bit % 8));
+      read(damaged);
+    }
+  }
+  EXPECT_GT(harmless, 1000u); // both ways are taken, or this test tests nothing
+  EXPECT_GT(faults, 1000u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Encodings, ClusterNormals,
+                         testing::Values(NormalEncoding::kZsign32, NormalEncoding::kAxis32, NormalEncoding::kAxis24,
+                                         NormalEncoding::kAxis16, NormalEncoding::kOct32, NormalEncoding::kOct24,
+                                         NormalEncoding::kOct20, NormalEncoding::kOct16),
+                         [](const auto& test) { return std::string(format_of(test.param).name); });
 
 } // namespace
 } // namespace packtrace

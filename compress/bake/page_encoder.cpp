@@ -1,0 +1,252 @@
+#include "compress/bake/page_encoder.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <memory>
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+#include <xxhash.h>
+#include <zstd.h>
+
+#include "compress/bake/page_recorder.h"
+#include "compress/bake/rans_writer.h"
+#include "compress/format/page_cluster.h"
+#include "compress/format/page_decoder.h"
+#include "compress/format/page_model.h"
+#include "pbrt_import/scene/error.h"
+
+namespace packtrace {
+namespace {
+
+using Bytes = std::vector<uint8_t>;
+using StreamBits = std::array<double, kPageStreams>;
+
+constexpr int kZstdLevel = 19; // slow to write, as quick to read as any
+
+Bytes zip(ZSTD_CCtx* context, std::span<const uint8_t> bytes) {
+  Bytes out(ZSTD_compressBound(bytes.size()));
+  const size_t size = ZSTD_compressCCtx(context, out.data(), out.size(), bytes.data(), bytes.size(), kZstdLevel);
+  if (ZSTD_isError(size) != 0) throw Error(ErrorKind::kLimitExceeded, "zstd cannot compress a page");
+  out.resize(size);
+  return out;
+}
+
+void append(Bytes& to, std::span<const uint8_t> bytes) { to.insert(to.end(), bytes.begin(), bytes.end()); }
+
+void append_number(Bytes& to, size_t value) {
+  const auto number = static_cast<uint32_t>(value);
+  append(to, {reinterpret_cast<const uint8_t*>(&number), sizeof number});
+}
+
+Bytes write_small(PageRecorder& recorder, StreamBits& bits) {
+  std::array<NibbleModel, context::kCount> models;
+  RansWriter writer(recorder.symbols().size());
+  for (const auto& [context, value] : recorder.symbols())
+    bits[static_cast<size_t>(page_stream_of(context))] += writer.put(models[context], value);
+  Bytes page;
+  append_number(page, recorder.fields().size());
+  append(page, recorder.fields());
+  append(page, writer.finish());
+  return page;
+}
+
+Bytes write_fast(PageRecorder& recorder, ZSTD_CCtx* zstd, StreamBits& bits) {
+  std::array<Bytes, 1 + kSymbolStreams> streams;
+  std::array<uint32_t, 1 + kSymbolStreams> context_of{};
+  streams[0] = recorder.fields();
+  for (const auto& [context, value] : recorder.symbols()) {
+    const size_t stream = size_t{1} + kSymbolStreamOf[context];
+    streams[stream].push_back(value);
+    context_of[stream] = context;
+  }
+  Bytes table, data;
+  for (size_t i = 0; i < streams.size(); ++i) {
+    append_number(table, streams[i].size());
+    if (streams[i].empty()) continue;
+    const Bytes frame = zip(zstd, streams[i]);
+    const bool smaller = frame.size() < streams[i].size();
+    append_number(table, smaller ? frame.size() : 0);
+    append(data, smaller ? frame : streams[i]);
+    if (i > 0)
+      bits[static_cast<size_t>(page_stream_of(context_of[i]))] +=
+          8.0 * static_cast<double>(std::min(frame.size(), streams[i].size()));
+  }
+  append(table, data);
+  return table;
+}
+
+/// Where a page begins and what it holds.
+struct PageRange {
+  uint64_t first_cluster, payload_offset;
+  uint32_t cluster_count, payload_bytes;
+};
+
+struct EncodedPage {
+  baked::PageRecord record{};
+  Bytes bytes;
+  std::array<uint64_t, kPageStreams> stream_bytes{};
+};
+
+class PageEncoder {
+public:
+  PageEncoder(const BakedSections& sections, PageCodec codec) : sections_(sections), codec_(codec) {}
+
+  EncodedPage run(const PageRange& range) {
+    EncodedPage page;
+    page.record.payload_bytes = range.payload_bytes;
+    page.record.cluster_count = range.cluster_count;
+    StreamBits bits{};
+    page.record.form = static_cast<uint32_t>(codec_);
+    page.bytes = encode(range, bits);
+    page.record.disk_bytes = static_cast<uint32_t>(page.bytes.size());
+    if (!comes_back(page, range)) store(page, range, bits);
+    page.record.hash = XXH3_64bits(page.bytes.data(), page.bytes.size());
+    page.stream_bytes = whole_bytes(bits, page.bytes.size());
+    return page;
+  }
+
+private:
+  const baked::GeometryRecord& geometry_of(uint64_t cluster) const {
+    const auto after = std::upper_bound(
+        sections_.geometries.begin(), sections_.geometries.end(), cluster,
+        [](uint64_t number, const baked::GeometryRecord& g) { return number < g.first_cluster + g.cluster_count; });
+    return *after;
+  }
+
+  std::span<const baked::ClusterRecord> clusters(const PageRange& range) const {
+    return sections_.clusters.subspan(static_cast<size_t>(range.first_cluster), range.cluster_count);
+  }
+  std::span<const uint8_t> payload(const PageRange& range) const {
+    return sections_.payload.subspan(static_cast<size_t>(range.payload_offset), range.payload_bytes);
+  }
+
+  Bytes encode(const PageRange& range, StreamBits& bits) {
+    PageRecorder recorder;
+    PageModel<PageRecorder> model(recorder);
+    model.begin();
+    for (uint32_t i = 0; i < range.cluster_count; ++i) {
+      const baked::GeometryRecord& geometry = geometry_of(range.first_cluster + i);
+      unpack_cluster({geometry, clusters(range)[i], sections_.payload.data() + geometry.payload_offset}, *values_);
+      model.code_cluster(geometry, *values_);
+    }
+    for (size_t i = 0; i < kPageStreams; ++i) bits[i] = static_cast<double>(recorder.field_bits()[i]);
+    return codec_ == PageCodec::kSmall ? write_small(recorder, bits) : write_fast(recorder, zstd_.get(), bits);
+  }
+
+  bool comes_back(const EncodedPage& page, const PageRange& range) {
+    if (!page_record_ok(page.record, codec_)) return false;
+    std::vector<baked::ClusterRecord> records(range.cluster_count);
+    Bytes bytes(range.payload_bytes);
+    if (!decoder_.decode(page.record, page.bytes, {sections_.geometries, range.first_cluster, range.payload_offset},
+                         records, bytes))
+      return false;
+    for (size_t i = 0; i < records.size(); ++i) {
+      baked::ClusterRecord expected = clusters(range)[i];
+      expected.first_triangle = 0, expected.first_vertex = 0;
+      if (std::memcmp(&expected, &records[i], sizeof expected) != 0) return false;
+    }
+    return std::ranges::equal(bytes, payload(range));
+  }
+
+  void store(EncodedPage& page, const PageRange& range, StreamBits& bits) {
+    Bytes resident(range.cluster_count * sizeof(baked::ClusterRecord));
+    std::memcpy(resident.data(), clusters(range).data(), resident.size());
+    append(resident, payload(range));
+    page.bytes = zip(zstd_.get(), resident);
+    page.record.form = static_cast<uint32_t>(PageCodec::kNone);
+    page.record.disk_bytes = static_cast<uint32_t>(page.bytes.size());
+    bits = {};
+    if (!page_record_ok(page.record, codec_))
+      throw Error(ErrorKind::kLimitExceeded, "a page cannot be stored within the format's limits");
+  }
+
+  /// What belongs to no stream, such as sizes and what rounding leaves, counts as records.
+  static std::array<uint64_t, kPageStreams> whole_bytes(const StreamBits& bits, uint64_t total) {
+    std::array<uint64_t, kPageStreams> bytes{};
+    uint64_t rest = total;
+    for (size_t i = 0; i + 1 < kPageStreams; ++i) {
+      bytes[i] = std::min(rest, static_cast<uint64_t>(bits[i] / 8.0));
+      rest -= bytes[i];
+    }
+    bytes.back() = rest;
+    return bytes;
+  }
+
+  const BakedSections& sections_;
+  PageCodec codec_;
+  std::unique_ptr<ClusterValues> values_ = std::make_unique<ClusterValues>();
+  std::unique_ptr<ZSTD_CCtx, size_t (*)(ZSTD_CCtx*)> zstd_{ZSTD_createCCtx(), &ZSTD_freeCCtx};
+  PageDecoder decoder_;
+};
+
+/// Payload bytes of each cluster: up to the next one's.
+std::vector<PageRange> split_into_pages(const BakedSections& sections) {
+  std::vector<PageRange> pages;
+  for (const baked::GeometryRecord& g : sections.geometries)
+    for (uint32_t i = 0; i < g.cluster_count; ++i) {
+      const auto* record = &sections.clusters[static_cast<size_t>(g.first_cluster) + i];
+      const uint64_t begin = uint64_t{4} * record->payload_offset;
+      const uint64_t end = i + 1 < g.cluster_count ? uint64_t{4} * record[1].payload_offset : g.payload_bytes;
+      const auto bytes = static_cast<uint32_t>(end - begin);
+      if (pages.empty() || pages.back().payload_bytes + bytes > baked::kPagePayload ||
+          pages.back().cluster_count == baked::kMaxPageClusters)
+        pages.push_back({g.first_cluster + i, g.payload_offset + begin, 0, 0});
+      ++pages.back().cluster_count;
+      pages.back().payload_bytes += bytes;
+    }
+  return pages;
+}
+
+} // namespace
+
+std::vector<std::byte> encode_paged_file(const BakedFile& file, PageCodec codec) {
+  const BakedSections& sections = file.sections();
+  const std::span<const std::byte> bytes = file.bytes();
+  const std::vector<PageRange> ranges = split_into_pages(sections);
+  std::vector<EncodedPage> pages(ranges.size());
+  tbb::enumerable_thread_specific<PageEncoder> encoders([&] { return PageEncoder(sections, codec); });
+  tbb::parallel_for(size_t{0}, ranges.size(), [&](size_t i) { pages[i] = encoders.local().run(ranges[i]); });
+
+  const auto* resident = reinterpret_cast<const uint8_t*>(bytes.data());
+  const auto offset_of = [&](const void* section) {
+    return static_cast<size_t>(static_cast<const uint8_t*>(section) - resident);
+  };
+  const size_t head_end = offset_of(sections.clusters.data());
+  const size_t tail_begin = offset_of(sections.materials.data());
+  const std::unique_ptr<ZSTD_CCtx, size_t (*)(ZSTD_CCtx*)> zstd{ZSTD_createCCtx(), &ZSTD_freeCCtx};
+  Bytes head = zip(zstd.get(), {resident, head_end});
+  Bytes tail = zip(zstd.get(), {resident + tail_begin, bytes.size() - tail_begin});
+
+  Bytes table;
+  baked::PagedHeader header{};
+  for (const EncodedPage& page : pages) {
+    append(table, {reinterpret_cast<const uint8_t*>(&page.record), sizeof page.record});
+    for (size_t i = 0; i < kPageStreams; ++i) header.stream_bytes[i] += page.stream_bytes[i];
+    header.file_bytes += page.bytes.size();
+  }
+  append(table, head);
+  append(table, tail);
+  header.magic = baked::kMagic;
+  header.version = baked::kVersion;
+  header.header_bytes = sizeof header;
+  header.file_bytes += sizeof header + table.size();
+  header.codec = static_cast<uint32_t>(codec);
+  header.page_count = static_cast<uint32_t>(pages.size());
+  header.resident_bytes = bytes.size();
+  header.head_bytes = head_end, header.head_disk_bytes = head.size();
+  header.tail_bytes = bytes.size() - tail_begin, header.tail_disk_bytes = tail.size();
+  header.table_hash = XXH3_64bits(table.data(), table.size());
+  header.header_hash = XXH3_64bits(&header, offsetof(baked::PagedHeader, header_hash));
+
+  std::vector<std::byte> out(static_cast<size_t>(header.file_bytes));
+  std::memcpy(out.data(), &header, sizeof header);
+  std::byte* at =
+      std::copy_n(reinterpret_cast<const std::byte*>(table.data()), table.size(), out.data() + sizeof header);
+  for (const EncodedPage& page : pages)
+    at = std::copy_n(reinterpret_cast<const std::byte*>(page.bytes.data()), page.bytes.size(), at);
+  return out;
+}
+
+} // namespace packtrace

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+#include "compress/format/rans.h"
+
+namespace packtrace {
+
+/// The words that RansReader reads, from all symbols of a page in order.
+class RansWriter {
+public:
+  explicit RansWriter(size_t symbols) { steps_.reserve(symbols); }
+
+  /// Returns the symbol's cost in bits.
+  double put(NibbleModel& model, uint32_t symbol) {
+    const uint32_t frequency = model.frequency(symbol);
+    steps_.push_back({static_cast<uint16_t>(model.below(symbol)), static_cast<uint16_t>(frequency)});
+    model.update(symbol);
+    return kProbabilityBits - std::log2(frequency);
+  }
+
+  std::vector<uint8_t> finish() const {
+    // Symbol i went through state i % 2 of the reader; backwards, the states end as the reader's begin.
+    std::array<uint32_t, 2> state{RansReader::kLowest, RansReader::kLowest};
+    std::vector<uint16_t> words; // last first
+    for (size_t i = steps_.size(); i-- > 0;) {
+      const auto [below, frequency] = steps_[i];
+      uint32_t& x = state[i % 2];
+      if (x >= uint64_t{frequency} << (32 - kProbabilityBits)) {
+        words.push_back(static_cast<uint16_t>(x));
+        x >>= 16;
+      }
+      x = ((x / frequency) << kProbabilityBits) + x % frequency + below;
+    }
+    for (const uint32_t x : {state[1], state[0]}) {
+      words.push_back(static_cast<uint16_t>(x >> 16));
+      words.push_back(static_cast<uint16_t>(x));
+    }
+    std::reverse(words.begin(), words.end());
+    std::vector<uint8_t> bytes(2 * words.size());
+    std::memcpy(bytes.data(), words.data(), bytes.size());
+    return bytes;
+  }
+
+private:
+  struct Step {
+    uint16_t below, frequency;
+  };
+  std::vector<Step> steps_;
+};
+
+} // namespace packtrace

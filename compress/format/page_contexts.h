@@ -1,0 +1,67 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+
+namespace packtrace {
+
+/// Streams of a page: what `info` tells apart, and what codec `fast` compresses apart.
+enum class PageStream : uint32_t { kTopology, kPositions, kNormals, kUvs, kRecords, kCount };
+inline constexpr uint32_t kPageStreams = static_cast<uint32_t>(PageStream::kCount);
+
+/// Numbers of the adaptive models that symbols are coded with. PageModel says what selects one within a range.
+namespace context {
+inline constexpr uint32_t kStripCorner = 0, kFirstCorner = 1, kSecondCorner = 2, kThirdCorner = 3; // kinds of corners
+inline constexpr uint32_t kTurn = 0;                   // 9 pairs of turns x 4 open edges, without and with normals
+inline constexpr uint32_t kStripNaming = kTurn + 72;   // 4 pairs of corners x same turn x 12 states of the guesses
+inline constexpr uint32_t kNaming = kStripNaming + 96; // 3 corners of a strip's first triangle x 12
+inline constexpr uint32_t kVersion = kNaming + 36;
+inline constexpr uint32_t kVersionBack = kVersion + 1;
+inline constexpr uint32_t kBack = kVersionBack + 1; // 4 kinds
+inline constexpr uint32_t kPageBack = kBack + 4;
+inline constexpr uint32_t kPosition = kPageBack + 1;      // 20 extents x 3 surprises
+inline constexpr uint32_t kNormalChoice = kPosition + 60; // 3 last x 3 known x 3
+inline constexpr uint32_t kNormalSeam = kNormalChoice + 27;
+inline constexpr uint32_t kNormalX = kNormalSeam + 1;
+inline constexpr uint32_t kNormalY = kNormalX + 1; // 16 widths of x
+inline constexpr uint32_t kUv = kNormalY + 16;     // 2 axes
+inline constexpr uint32_t kSameMaterial = kUv + 2;
+inline constexpr uint32_t kHasNormals = kSameMaterial + 1; // 2 of the last
+inline constexpr uint32_t kHasUvs = kHasNormals + 2;       // 2 of the last
+inline constexpr uint32_t kFull = kHasUvs + 2;
+inline constexpr uint32_t kNormalChart = kFull + 1;
+inline constexpr uint32_t kNormalPalette = kNormalChart + 1;
+inline constexpr uint32_t kCount = kNormalPalette + 1;
+} // namespace context
+
+/// What a model, or the bit fields that follow its symbols, count as.
+constexpr PageStream page_stream_of(uint32_t number) {
+  if (number < context::kPosition) return PageStream::kTopology;
+  if (number < context::kNormalChoice) return PageStream::kPositions;
+  if (number < context::kUv) return PageStream::kNormals;
+  return number < context::kSameMaterial ? PageStream::kUvs : PageStream::kRecords;
+}
+
+/// Codec `fast` has no models; it compresses each of these groups of symbols apart.
+inline constexpr uint32_t kSymbolStreams = 14;
+inline constexpr auto kSymbolStreamOf = [] {
+  using namespace context;
+  std::array<uint8_t, context::kCount> stream{};
+  for (uint32_t i = 0; i < context::kCount; ++i) {
+    uint32_t group = 0;
+    if (i >= kStripNaming) group = 1;
+    if (i >= kNaming) group = 2;
+    if (i >= kVersion) group = 3;
+    if (i >= kPosition) group = 4 + (i - kPosition) / 3 / 4; // by extent
+    if (i >= kNormalChoice) group = 9;
+    if (i >= kNormalX) group = 10;
+    if (i >= kNormalY) group = 11;
+    if (i >= kUv) group = 12;
+    if (i >= kSameMaterial) group = 13;
+    stream[i] = static_cast<uint8_t>(group);
+  }
+  return stream;
+}();
+
+} // namespace packtrace

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "compress/format/normal_codec.h"
+
+namespace packtrace {
+
+/// Canonical fields near those of a direction: a guess, not an encoding. The same on every machine: +, -, x, / and
+/// square root of doubles. Vectors of length zero get some fields.
+/// @param n any length below 1e150
+inline NormalFields predict_normal_fields(NormalEncoding encoding, DVec3 n) {
+  const NormalFormat& format = format_of(encoding);
+  const auto x_last = static_cast<int32_t>(format.x_codes) - 1, y_last = static_cast<int32_t>(format.y_codes) - 1;
+  /// Of -1 .. 1.
+  const auto code = [](double t, int32_t last) {
+    return std::clamp(static_cast<int32_t>((t + 1.0) * 0.5 * last + 0.5), 0, last);
+  };
+  if (format.family == NormalFamily::kOct) {
+    const double sum = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
+    if (sum > 0.0) n *= 1.0 / sum;
+    const double fold = std::max(-n.z, 0.0);
+    return {0, code(n.x + std::copysign(fold, n.x), x_last - 1), code(n.y + std::copysign(fold, n.y), y_last - 1)};
+  }
+  const double length = std::sqrt(glm::dot(n, n));
+  if (length > 0.0) n *= 1.0 / length;
+  if (format.family == NormalFamily::kZsign) return {n.z < 0.0 ? 1u : 0u, code(n.x, x_last - 1), code(n.y, y_last - 1)};
+  int axis = 0;
+  for (int other = 1; other < 3; ++other)
+    if (std::abs(n[other]) > std::abs(n[axis])) axis = other;
+  // decode_normal()'s cubic inverted by a series that is right to a few thousandths, and one step of Newton.
+  constexpr double kSlope = 803.0 / 1024.0, kCubic = 0.70710678118654752440 - kSlope;
+  const auto unwarp = [](double x) {
+    const double square = x * x, t = x * (1.2752 + square * (0.16 + square * 0.23));
+    return t - (t * (kSlope + kCubic * t * t) - x) / (kSlope + 3.0 * kCubic * t * t);
+  };
+  return {static_cast<uint32_t>(2 * axis) + (n[axis] < 0.0 ? 1 : 0), code(unwarp(n[(axis + 1) % 3]), x_last),
+          code(unwarp(n[(axis + 2) % 3]), y_last)};
+}
+
+} // namespace packtrace

@@ -1,0 +1,100 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "compress/format/bit_stream.h"
+#include "compress/format/page_contexts.h"
+#include "compress/format/position_grid.h"
+#include "compress/format/rans.h"
+
+namespace packtrace {
+
+/// Bit fields in order, never read outside their bytes: fields that are missing are zero, and whole() says so.
+class FieldReader {
+public:
+  FieldReader() = default;
+  /// @param bytes 8 readable bytes follow them
+  explicit FieldReader(std::span<const uint8_t> bytes) : bytes_(bytes.data()), end_(8 * uint64_t{bytes.size()}) {}
+
+  uint64_t take(uint32_t bits) {
+    if (bits > end_ - at_) {
+      missing_ = true;
+      return 0;
+    }
+    at_ += bits;
+    return read_bits(bytes_, at_ - bits, bits);
+  }
+  /// Whether nothing was missing and less than a byte is left.
+  bool whole() const { return !missing_ && end_ - at_ < 8; }
+
+private:
+  const uint8_t* bytes_ = nullptr;
+  uint64_t end_ = 0, at_ = 0;
+  bool missing_ = false;
+};
+
+/// Coder (page_model.h) of pages of codec `small`.
+class SmallPageReader {
+public:
+  static constexpr bool kDecodes = true;
+
+  /// @param fields bit fields; 8 readable bytes follow them
+  /// @param words of a RansWriter
+  void begin(std::span<const uint8_t> fields, std::span<const uint8_t> words) {
+    models_.fill(NibbleModel());
+    fields_ = FieldReader(fields);
+    symbols_ = RansReader(words);
+  }
+
+  uint32_t symbol(uint32_t context, uint32_t) { return symbols_.symbol(models_[context]); }
+  uint64_t raw(uint32_t, uint64_t, uint32_t bits) { return fields_.take(bits); }
+  bool whole() const { return symbols_.whole() && fields_.whole(); }
+
+private:
+  std::array<NibbleModel, context::kCount> models_;
+  FieldReader fields_;
+  RansReader symbols_;
+};
+
+/// Coder (page_model.h) of pages of codec `fast`: each stream of symbols has a byte per symbol.
+class FastPageReader {
+public:
+  static constexpr bool kDecodes = true;
+
+  /// @param fields bit fields; 8 readable bytes follow them
+  void begin(std::span<const uint8_t> fields, const std::array<std::span<const uint8_t>, kSymbolStreams>& symbols) {
+    fields_ = FieldReader(fields);
+    missing_ = false;
+    for (size_t i = 0; i < kSymbolStreams; ++i)
+      streams_[i] = {symbols[i].data(), symbols[i].data() + symbols[i].size()};
+  }
+
+  uint32_t symbol(uint32_t context, uint32_t) {
+    Stream& stream = streams_[kSymbolStreamOf[context]];
+    if (stream.at == stream.end) {
+      missing_ = true;
+      return 0;
+    }
+    return *stream.at++ & 15u;
+  }
+  uint64_t raw(uint32_t, uint64_t, uint32_t bits) { return fields_.take(bits); }
+  bool whole() const {
+    for (const Stream& stream : streams_)
+      if (stream.at != stream.end) return false;
+    return !missing_ && fields_.whole();
+  }
+
+private:
+  struct Stream {
+    const uint8_t* at = nullptr;
+    const uint8_t* end = nullptr;
+  };
+  std::array<Stream, kSymbolStreams> streams_{};
+  FieldReader fields_;
+  bool missing_ = false;
+};
+
+} // namespace packtrace

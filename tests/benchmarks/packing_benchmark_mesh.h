@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "pbrt_import/scene/scene.h"
+
+namespace packtrace {
+
+/// What a codec is asked to keep.
+enum class PackedStreams {
+  kPositions, ///< positions and triangles; vertices at one place are one vertex
+  kAll,       ///< normals and texture coordinates as well
+};
+
+/// One mesh that every codec packs.
+struct PackingInput {
+  std::string name;
+  Scene scene; ///< where the mesh came from
+  Mesh mesh;   ///< all shapes of the scene's world in world space; normals everywhere, uvs where any shape has them
+};
+
+/// All shapes outside objects as one mesh. Shapes without normals get area-weighted ones, shapes without texture
+/// coordinates zeros where others have them. Materials and instances are left out.
+Mesh merge_world(const Scene& scene);
+
+/// Only positions and triangles, vertices with equal positions merged; triangles that lose a corner by it are kept.
+Mesh weld_positions(const Mesh& mesh);
+
+/// Imports a scene and merges its world. Throws as import_scene() does.
+/// @param largest_only leaves out all shapes but the one of most triangles, such as a plane that a scan stands on
+PackingInput load_packing_input(const std::string& name, const std::filesystem::path& main_file,
+                                bool largest_only = false);
+
+/// A ring of eroded rock with vertex normals (packtrace_scenegen's displaced mesh), written to `folder` and read back.
+PackingInput generated_packing_input(uint64_t triangles, const std::filesystem::path& folder);
+
+/// Median length of the triangles' edges, those of length 0 left out; 0 if there are none.
+double median_edge(const Mesh& mesh);
+
+/// Lowest corner and longest side of the box around the positions.
+struct PackingBox {
+  Vec3 lo{0.0f};
+  double side = 0.0;
+};
+PackingBox packing_box(const Mesh& mesh);
+
+} // namespace packtrace

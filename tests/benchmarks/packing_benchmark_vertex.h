@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "tests/benchmarks/packing_benchmark_codecs.h"
+
+namespace packtrace {
+
+/// A mesh in vertices of one fixed size: position on the lattice above the box's corner, octahedral normal, uv.
+struct FixedVertices {
+  PackingBox box;
+  double step = 0.0;
+  Vec2 uv_lo{0.0f}, uv_step{0.0f};
+  bool wide = false; ///< positions of 32 bits
+  bool has_normals = false, has_uvs = false;
+  size_t vertex_count = 0;
+  std::vector<std::byte> bytes; ///< vertex_count x stride()
+
+  /// Bytes per vertex, a multiple of 4.
+  size_t stride() const;
+};
+
+/// Arrays that a decoder of FixedVertices fills.
+struct PlainMesh {
+  std::vector<Vec3> positions, normals;
+  std::vector<Vec2> uvs;
+  std::vector<Triangle> triangles;
+};
+
+FixedVertices pack_vertices(const Mesh& mesh, const PackingPrecision& precision);
+/// Fills positions, normals and uvs from vertex bytes laid out as `layout` says.
+void unpack_vertices(const FixedVertices& layout, std::span<const std::byte> bytes, PlainMesh& out);
+
+/// @param source_vertex of each decoded vertex; empty: the same numbers
+PackingErrors compare_vertices(const Mesh& source, const PlainMesh& decoded, std::span<const uint32_t> source_vertex);
+
+} // namespace packtrace

@@ -1,0 +1,365 @@
+#include <algorithm>
+#include <array>
+#include <cfloat>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <tbb/global_control.h>
+#if defined(__SSE2__)
+#include <xmmintrin.h>
+#endif
+
+#include "compress/format/position_grid.h"
+#include "pbrt_import/scene/error.h"
+#include "tests/compress/test_scenes.h"
+#include "tests/pbrt_import/scene_folder.h"
+
+namespace packtrace {
+namespace {
+
+using test::bake;
+using test::Decoded;
+using test::scene_of;
+
+/// A geometry's source: positions in the space it is stored in, double, and triangles of any winding.
+struct Source {
+  std::vector<DVec3> positions;
+  std::vector<Triangle> triangles;
+
+  void add(const Mesh& mesh, const DAffine& transform) {
+    const auto first = static_cast<uint32_t>(positions.size());
+    for (const Vec3 p : mesh.positions) positions.push_back(transform_point(transform, DVec3(p)));
+    for (const Triangle& t : mesh.triangles) triangles.push_back(t + first);
+  }
+};
+
+Source source_of(const Mesh& mesh, const DAffine& transform = DAffine(1.0)) {
+  Source source;
+  source.add(mesh, transform);
+  return source;
+}
+
+/// Triangles as sorted corner numbers, in order: equal lists are equal sets of triangles.
+std::vector<std::array<uint32_t, 3>> corner_sets(const std::vector<Triangle>& triangles) {
+  std::vector<std::array<uint32_t, 3>> sets;
+  for (const Triangle& t : triangles) {
+    sets.push_back({t.x, t.y, t.z});
+    std::sort(sets.back().begin(), sets.back().end());
+  }
+  std::sort(sets.begin(), sets.end());
+  return sets;
+}
+
+/// Finds source vertices by place.
+class SourceIndex {
+public:
+  explicit SourceIndex(const Source& source) : source_(source), by_x_(source.positions.size()) {
+    std::iota(by_x_.begin(), by_x_.end(), 0u);
+    std::sort(by_x_.begin(), by_x_.end(), [&](uint32_t a, uint32_t b) { return at(a).x < at(b).x; });
+  }
+
+  /// Numbers of the vertices within `bound` of p along every axis; at most two.
+  std::vector<uint32_t> near(DVec3 p, double bound) const {
+    std::vector<uint32_t> found;
+    auto i = std::lower_bound(by_x_.begin(), by_x_.end(), p.x - bound,
+                              [&](uint32_t vertex, double x) { return at(vertex).x < x; });
+    for (; i != by_x_.end() && at(*i).x <= p.x + bound && found.size() < 2; ++i) {
+      const DVec3 off = glm::abs(at(*i) - p);
+      if (off.y <= bound && off.z <= bound) found.push_back(*i);
+    }
+    return found;
+  }
+
+private:
+  DVec3 at(uint32_t vertex) const { return source_.positions[vertex]; }
+
+  const Source& source_;
+  std::vector<uint32_t> by_x_;
+};
+
+/// Checks a geometry against its source: the bound it states is half a step and what floats add, every decoded vertex
+/// lies within the bound of a source vertex, and triangles connect the same vertices, as far as places tell them apart.
+void expect_holds(const BakedFile& file, uint32_t g, const Source& source, double flushed = 0.0) {
+  const baked::GeometryRecord& record = file.geometries()[g];
+  const double step = PositionGrid{record.step_mantissa, record.step_exponent}.step();
+  double max_abs = 0.0;
+  for (const DVec3 p : source.positions) max_abs = std::max({max_abs, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+  EXPECT_LE(record.position_error_bound, step / 2 + (max_abs + step) * (0x1p-24 + 0x1p-50) + 0x1p-149);
+  EXPECT_LE(record.max_position_error, record.position_error_bound);
+  ASSERT_EQ(record.triangle_count, source.triangles.size());
+
+  const Decoded decoded = test::decode(file, g);
+  const SourceIndex index(source);
+  const double bound = record.position_error_bound * (1 + 1e-12) + flushed;
+  std::vector<uint32_t> vertex(decoded.positions.size());
+  bool told_apart = true;
+  for (size_t i = 0; i < vertex.size(); ++i) {
+    ASSERT_TRUE(is_finite(decoded.positions[i]));
+    const auto found = index.near(DVec3(decoded.positions[i]), bound);
+    ASSERT_FALSE(found.empty()) << "decoded vertex " << i << " is near no source vertex";
+    vertex[i] = found[0];
+    told_apart = told_apart && found.size() == 1;
+  }
+  if (!told_apart) return;
+  std::vector<Triangle> triangles;
+  for (const Triangle& t : decoded.triangles) triangles.emplace_back(vertex[t.x], vertex[t.y], vertex[t.z]);
+  EXPECT_EQ(corner_sets(triangles), corner_sets(source.triangles));
+}
+
+BakeConfig precision(PrecisionKind kind, double value) {
+  BakeConfig config;
+  config.precision_kind = kind;
+  config.precision = value;
+  return config;
+}
+
+void expect_survives(const Mesh& mesh, const DAffine& transform = DAffine(1.0), const BakeConfig& config = {}) {
+  const BakedScene baked = bake(scene_of(mesh, transform), config);
+  expect_holds(BakedFile::from_bytes(baked.bytes), 0, source_of(mesh, transform));
+}
+
+/// Subnormal floats are read and written as 0 while it lives, on this thread.
+class FlushToZero {
+public:
+#if defined(__SSE2__)
+  FlushToZero() : before_(_mm_getcsr()) { _mm_setcsr(before_ | 0x8040u); } // flush to zero, denormals are zero
+  ~FlushToZero() { _mm_setcsr(before_); }
+  static constexpr bool kAvailable = true;
+
+private:
+  unsigned before_;
+#else
+  static constexpr bool kAvailable = false;
+#endif
+};
+
+TEST(Extremes, EveryScaleThatFloatsHold) {
+  for (int exponent = -38; exponent <= 37; ++exponent) {
+    SCOPED_TRACE("scale 1e" + std::to_string(exponent));
+    const DAffine scale = test::scaling(DVec3(std::pow(10.0, exponent)));
+    expect_survives(test::sphere_mesh(9), scale);
+    expect_survives(test::sphere_mesh(9), scale, precision(PrecisionKind::kPositionBits, 24.0));
+    expect_survives(test::sphere_mesh(9), scale, precision(PrecisionKind::kDiagonalFraction, 1e-6));
+  }
+}
+
+void expect_refused(const Scene& scene, const BakeConfig& config = {}) {
+  try {
+    (void)bake(scene, config);
+    FAIL() << "was baked";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::kLimitExceeded) << error.what();
+  }
+}
+
+TEST(Extremes, TheLargestFloats) {
+  for (const float radius : {1e38f, 3e38f, FLT_MAX}) {
+    SCOPED_TRACE(radius);
+    expect_survives(test::sphere_mesh(9, radius));
+  }
+  // Steps of 2^126: the nearest lattice point is 2^128, which is no float.
+  expect_refused(scene_of(test::sphere_mesh(9, FLT_MAX)), precision(PrecisionKind::kPositionBits, 3.0));
+}
+
+TEST(Extremes, ScalesThatNoGridHoldsAreRefused) {
+  Scene scene = scene_of(test::sphere_mesh(20), test::scaling(DVec3(1e-30)));
+  test::add_shape(scene, test::sphere_mesh(4), test::scaling(DVec3(1e30)));
+  expect_refused(scene);
+}
+
+TEST(Extremes, PlacesFarFromTheOrigin) {
+  for (const double distance : {1e3, 1e5, 1e7, -1e7, 1e9, 1e12})
+    for (const double scale : {1e-20, 1.0, 1e20}) {
+      SCOPED_TRACE("at " + std::to_string(distance) + " extents, scale " + std::to_string(scale));
+      const DVec3 place(distance * scale, 0.0, -distance * scale);
+      expect_survives(test::sphere_mesh(9), compose(test::translation(place), test::scaling(DVec3(scale))));
+    }
+}
+
+TEST(Extremes, AxesWithoutExtent) {
+  for (uint32_t axes = 0; axes < 8; ++axes)
+    for (const double place : {0.0, 1.0, -1e10, 1e-35}) {
+      SCOPED_TRACE("axes " + std::to_string(axes) + " at " + std::to_string(place));
+      const auto size = [&](uint32_t axis) { return (axes & axis) != 0 ? 1.0 : 0.0; };
+      expect_survives(test::sphere_mesh(7),
+                      compose(test::translation(DVec3(place)), test::scaling({size(1), size(2), size(4)})));
+    }
+}
+
+TEST(Extremes, SubnormalPositions) {
+  for (const double scale : {1e-38, 1e-40, 1e-42, 1e-44, 1e-45, 1e-50}) {
+    SCOPED_TRACE(scale);
+    expect_survives(test::sphere_mesh(9), test::scaling(DVec3(scale)));
+    Mesh mesh = test::sphere_mesh(9); // in the source's own floats
+    for (Vec3& p : mesh.positions) p = Vec3(DVec3(p) * scale);
+    expect_survives(mesh);
+  }
+}
+
+TEST(Extremes, FlushingSubnormalsChangesNothingElse) {
+  if (!FlushToZero::kAvailable) GTEST_SKIP() << "no such mode on this processor";
+  const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+  for (const double scale : {1e-30, 1.0, 1e30}) {
+    SCOPED_TRACE(scale);
+    const Mesh mesh = test::grid_mesh(30, 0.2f, true);
+    const Scene scene = scene_of(mesh, compose(test::translation(DVec3(scale)), test::scaling(DVec3(scale))));
+    const std::vector<std::byte> expected = bake(scene).bytes;
+    const Decoded plain = test::decode(BakedFile::from_bytes(expected), 0);
+    const FlushToZero flush;
+    EXPECT_TRUE(bake(scene).bytes == expected);
+    const Decoded flushed = test::decode(BakedFile::from_bytes(expected), 0);
+    EXPECT_EQ(flushed.positions, plain.positions);
+    EXPECT_EQ(flushed.normals, plain.normals);
+    EXPECT_EQ(flushed.triangles, plain.triangles);
+  }
+}
+
+TEST(Extremes, SubnormalPositionsMoveByNoMoreThanTheirSizeWhenFlushed) {
+  if (!FlushToZero::kAvailable) GTEST_SKIP() << "no such mode on this processor";
+  for (const double scale : {1e-36, 1e-38, 1e-40, 1e-44}) {
+    SCOPED_TRACE(scale);
+    const Mesh mesh = test::sphere_mesh(9);
+    const DAffine transform = test::scaling(DVec3(scale));
+    const Source source = source_of(mesh, transform);
+    const BakedFile file = BakedFile::from_bytes(bake(scene_of(mesh, transform)).bytes);
+    const FlushToZero flush;
+    expect_holds(file, 0, source, double{FLT_MIN});
+  }
+}
+
+TEST(Extremes, OneVertexAndOneTriangle) {
+  Mesh point;
+  point.positions = {Vec3(3.0f, -4.0f, 5.0f)};
+  expect_survives(point); // no triangle, so nothing to store
+  for (const Vec3 second : {Vec3(1, 0, 0), Vec3(1e-30f, 0, 0), Vec3(1e30f, 0, 0)}) {
+    Mesh triangle;
+    triangle.positions = {Vec3(0.0f), second, Vec3(0, second.x, 0)};
+    triangle.triangles = {{0, 1, 2}};
+    expect_survives(triangle);
+  }
+  Mesh collapsed; // three vertices in one place
+  collapsed.positions.assign(3, Vec3(1e6f, 2.0f, -3.0f));
+  collapsed.triangles = {{0, 1, 2}};
+  expect_survives(collapsed);
+}
+
+TEST(Extremes, IndicesBeyond16Bits) {
+  const Mesh mesh = test::grid_mesh(300, 0.1f);
+  ASSERT_GT(mesh.positions.size(), 65'536u);
+  expect_survives(mesh);
+}
+
+TEST(Extremes, PositionsThatAreNotFiniteAreDroppedCountedAndLocated) {
+  const SceneFolder folder;
+  const Imported imported = import_text(folder, R"(WorldBegin
+Shape "trianglemesh" "integer indices" [0 1 2  0 2 3  0 3 4  0 4 5  1 2 3]
+  "point P" [0 0 0  1 0 0  1 1 0  0 1 0  nan 1 0  0 -inf 1]
+WorldEnd
+)");
+  EXPECT_EQ(imported.scene.dropped_triangles, 2u);
+  EXPECT_TRUE(imported.reported("scene.pbrt:2:1: warning: trianglemesh: 2 triangles")) << imported.text();
+  EXPECT_TRUE(imported.reported("vertex position not finite")) << imported.text();
+  const BakedScene baked = bake(imported.scene);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  EXPECT_EQ(file.summary().dropped_triangles, 2u);
+  ASSERT_EQ(file.geometries().size(), 1u);
+  expect_holds(file, 0, source_of(imported.scene.meshes[0]));
+  EXPECT_EQ(file.geometries()[0].triangle_count, 3u);
+}
+
+/// Every geometry of a file against the shapes it was made from.
+void expect_scene_holds(const Scene& scene, const BakeConfig& config) {
+  const BakedScene baked = bake(scene, config);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  ASSERT_EQ(file.instances().size(), scene.shapes.size() + scene.instances.size());
+  std::vector<bool> seen(file.geometries().size());
+  for (uint32_t i = 0; i < file.instances().size(); ++i) {
+    const uint32_t g = file.instances()[i].geometry;
+    if (seen[g]) continue;
+    seen[g] = true;
+    SCOPED_TRACE("geometry " + std::string(file.text(file.geometries()[g].name)));
+    Source source;
+    if (i < scene.shapes.size()) {
+      const Shape& shape = scene.shapes[i];
+      const bool in_world = (file.geometries()[g].flags & baked::kWorldSpace) != 0;
+      source.add(scene.meshes[shape.mesh], in_world ? shape.parent_from_mesh : DAffine(1.0));
+    } else {
+      for (const Shape& shape : scene.objects[scene.instances[i - scene.shapes.size()].object].shapes)
+        source.add(scene.meshes[shape.mesh], shape.parent_from_mesh);
+    }
+    expect_holds(file, g, source);
+  }
+  EXPECT_EQ(std::count(seen.begin(), seen.end(), false), 0);
+}
+
+TEST(Extremes, ScalesSideBySideInOneScene) {
+  Diagnostics diagnostics;
+  Progress progress;
+  const Scene scene =
+      import_scene(PACKTRACE_SOURCE_DIR "/assets/extreme/extreme.pbrt", {}, diagnostics, progress).scene;
+  ASSERT_GT(scene.instances.size(), 0u);
+  expect_scene_holds(scene, {});
+  expect_scene_holds(scene, precision(PrecisionKind::kDiagonalFraction, 1e-7));
+}
+
+TEST(Extremes, WorldShapesOfEveryScaleShareOneGrid) {
+  Scene scene;
+  scene.materials.push_back({});
+  uint32_t rings = 8; // no two shapes are alike, or they would share a geometry of its own grid
+  for (const double scale : {1e-6, 1e-3, 1.0, 1e3, 1e6})
+    test::add_shape(scene, test::sphere_mesh(rings++),
+                    compose(test::translation({2.5 * scale, 0, 0}), test::scaling(DVec3(scale))));
+  const BakedScene baked = bake(scene);
+  for (const baked::GeometryRecord& geometry : BakedFile::from_bytes(baked.bytes).geometries())
+    EXPECT_NE(geometry.flags & baked::kWorldSpace, 0u);
+  expect_scene_holds(scene, {});
+  expect_scene_holds(scene, precision(PrecisionKind::kAbsolute, 1e-8));
+}
+
+uint64_t peak_rss_bytes() {
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);
+  return static_cast<uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+TEST(Extremes, TwentyMillionVerticesInBoundedMemory) {
+  if (std::getenv("PACKTRACE_HUGE_MESHES") == nullptr) GTEST_SKIP() << "PACKTRACE_HUGE_MESHES is not set";
+  constexpr uint32_t kSide = 4472;
+  Mesh mesh = test::grid_mesh(kSide, 0.1f);
+  mesh.uvs = {};
+  const uint64_t triangles = mesh.triangles.size();
+  ASSERT_GE(mesh.positions.size(), 20'000'000u);
+  const Scene scene = scene_of(std::move(mesh));
+  const uint64_t before = peak_rss_bytes();
+  const BakedScene baked = bake(scene);
+  const double per_triangle = static_cast<double>(peak_rss_bytes() - before) / static_cast<double>(triangles);
+  RecordProperty("peak_rss_bytes", std::to_string(peak_rss_bytes()));
+  RecordProperty("bake_bytes_per_triangle", std::to_string(per_triangle));
+  EXPECT_LT(per_triangle, 100.0);
+
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  const baked::GeometryRecord& record = file.geometries()[0];
+  ASSERT_EQ(record.triangle_count, triangles);
+  EXPECT_LE(record.max_position_error, record.position_error_bound);
+  std::vector<Vec3> positions;
+  for (uint32_t c = 0; c < record.cluster_count; ++c) { // the source is a grid: each vertex tells where it belongs
+    const ClusterView cluster = file.cluster(0, c);
+    positions.resize(cluster.vertex_count());
+    decode_positions(cluster, positions);
+    for (const Vec3 p : positions) {
+      const auto column = static_cast<uint32_t>(std::lround(p.x * kSide));
+      const auto row = static_cast<uint32_t>(std::lround(p.y * kSide));
+      const DVec3 off = glm::abs(DVec3(p) - DVec3(scene.meshes[0].positions[row * (kSide + 1) + column]));
+      ASSERT_LE(std::max({off.x, off.y, off.z}), record.position_error_bound);
+    }
+  }
+}
+
+} // namespace
+} // namespace packtrace

@@ -1,0 +1,191 @@
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include "compress/format/baked_file.h"
+#include "tests/compress/test_scenes.h"
+#include "tests/pbrt_import/scene_folder.h"
+
+namespace packtrace {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Arrays as ptk_reader.py's compare() wants them.
+class Dump {
+public:
+  template <typename Value>
+  void put(std::span<const Value> values) {
+    const auto bytes = std::as_bytes(values);
+    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
+  }
+  template <typename Value>
+  void put(const std::vector<Value>& values) {
+    put(std::span<const Value>(values));
+  }
+  void put_number(uint32_t number) { put(std::span<const uint32_t>(&number, 1)); }
+  const std::vector<std::byte>& bytes() const { return bytes_; }
+
+private:
+  std::vector<std::byte> bytes_;
+};
+
+std::vector<std::byte> dump(const BakedFile& file) {
+  Dump out;
+  out.put_number(static_cast<uint32_t>(file.geometries().size()));
+  for (uint32_t g = 0; g < file.geometries().size(); ++g) {
+    const test::Decoded mesh = test::decode(file, g);
+    out.put_number(static_cast<uint32_t>(mesh.positions.size()));
+    out.put_number(static_cast<uint32_t>(mesh.triangles.size()));
+    for (uint32_t c = 0; c < file.clusters(g).size(); ++c) {
+      const ClusterView cluster = file.cluster(g, c);
+      for (uint32_t v = 0; v < cluster.vertex_count(); ++v) out.put(std::span<const int64_t>(cluster.lattice(v)));
+    }
+    out.put(mesh.positions);
+    out.put(mesh.normals);
+    out.put(mesh.uvs);
+    out.put(mesh.triangles);
+    out.put(mesh.materials);
+  }
+  out.put_number(static_cast<uint32_t>(file.instances().size()));
+  for (const baked::InstanceRecord& instance : file.instances()) {
+    out.put(std::span<const float>(instance.world_from_object));
+    out.put_number(instance.geometry);
+  }
+  return out.bytes();
+}
+
+/// Files of a baked scene, and the reader that is written from the format's description.
+class IndependentReader : public testing::Test {
+protected:
+  void SetUp() override {
+    if (std::system("python3 --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "python3 is not installed";
+  }
+
+  void write(const Scene& scene, const BakeConfig& config = {}) {
+    baked_ = test::bake(scene, config).bytes;
+    dump_ = dump(BakedFile::from_bytes(baked_));
+  }
+  std::vector<std::byte>& baked() { return baked_; }
+  std::vector<std::byte>& dumped() { return dump_; }
+
+  /// The reader's exit code: 0 where it decodes the same.
+  int read() const {
+    store("scene.ptk", baked_);
+    store("scene.dump", dump_);
+    const std::string command = "python3 '" PACKTRACE_SOURCE_DIR "/tests/compress/reader/ptk_reader.py' '" +
+                                (folder_.path() / "scene.ptk").string() + "' --expect '" +
+                                (folder_.path() / "scene.dump").string() + "' >/dev/null";
+    const int status = std::system(command.c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+
+private:
+  void store(const std::string& name, const std::vector<std::byte>& bytes) const {
+    folder_.write(name, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  }
+
+  SceneFolder folder_;
+  std::vector<std::byte> baked_, dump_;
+};
+
+class IndependentReaderOfAssets : public IndependentReader, public testing::WithParamInterface<const char*> {};
+
+TEST_P(IndependentReaderOfAssets, DecodesTheSame) {
+  const fs::path file = fs::path(PACKTRACE_SOURCE_DIR) / "assets" / GetParam();
+  Diagnostics diagnostics;
+  Progress progress;
+  write(import_scene(file, {}, diagnostics, progress).scene);
+  EXPECT_GT(baked().size(), 10'000u);
+  EXPECT_EQ(read(), 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, IndependentReaderOfAssets,
+                         testing::Values("room/room.pbrt", "extreme/extreme.pbrt", "features/quadrics.pbrt"),
+                         [](const auto& scene) {
+                           const std::string name = scene.param;
+                           return name.substr(name.find('/') + 1, name.rfind('.') - name.find('/') - 1);
+                         });
+
+/// Normals of every direction, few different normals, texture coordinates, single triangles, instances.
+Scene scene_of_every_stream() {
+  Scene scene = test::scene_of(test::sphere_mesh(30));
+  AlphaMask mask;
+  mask.width = 64, mask.height = 32;
+  mask.words.assign(2 * 32, 0x0f0f0f0fu);
+  scene.masks.push_back(mask);
+  scene.materials.push_back({"leaf", kAlphaMask, Vec3(0.5f), 0, kNoMask});
+  test::add_shape(scene, test::grid_mesh(40, 0.3f, true), test::translation({-3, 2, 1}), 1);
+  Mesh faceted = test::grid_mesh(20, 0.4f);
+  faceted.normals.assign(faceted.positions.size(), Vec3(0.0f, 0.6f, 0.8f));
+  for (size_t i = 0; i < faceted.normals.size(); i += 3) faceted.normals[i] = Vec3(0.6f, 0.0f, -0.8f);
+  test::add_shape(scene, faceted, test::scaling({1, -1, 1}));
+  test::add_shape(scene, test::soup_mesh(300, 4));
+  scene.meshes.push_back(test::sphere_mesh(9));
+  scene.objects.push_back({"ball", {Shape{static_cast<uint32_t>(scene.meshes.size() - 1), 0, false, DAffine(1.0)}}});
+  scene.instances.push_back({0, Affine(test::translation({5, 5, 5}))});
+  return scene;
+}
+
+TEST_F(IndependentReader, DecodesEveryStream) {
+  write(scene_of_every_stream());
+  const BakedFile file = BakedFile::from_bytes(baked());
+  EXPECT_GT(file.summary().stream_bits[2], 0u); // normals
+  EXPECT_GT(file.summary().stream_bits[3], 0u); // texture coordinates
+  EXPECT_EQ(read(), 0);
+}
+
+TEST_F(IndependentReader, DecodesEveryEncodingOfNormals) {
+  for (uint32_t encoding = 0; encoding < kNormalFormats.size(); ++encoding) {
+    BakeConfig config;
+    config.normals = static_cast<NormalEncoding>(encoding);
+    write(scene_of_every_stream(), config);
+    EXPECT_EQ(read(), 0) << format_of(*config.normals).name;
+  }
+}
+
+TEST_F(IndependentReader, DecodesGeometryOfMoreThanTwoToThe31Steps) {
+  Scene scene = test::scene_of(test::grid_mesh(3), test::scaling(DVec3(1e-6)));
+  Mesh& mesh = scene.meshes[0];
+  const Mesh far = test::grid_mesh(3);
+  const auto first = static_cast<uint32_t>(mesh.positions.size());
+  for (const Vec3 p : far.positions) mesh.positions.push_back(p + Vec3(1e6f, -1e6f, 1e6f));
+  for (const Triangle& t : far.triangles) mesh.triangles.push_back(t + first);
+  mesh.uvs.clear();
+  BakeConfig config;
+  config.precision_kind = PrecisionKind::kPositionBits;
+  config.precision = 40.0;
+  write(scene, config);
+  EXPECT_GT(BakedFile::from_bytes(baked()).geometries()[0].anchor_shift, 0u);
+  EXPECT_EQ(read(), 0);
+}
+
+TEST_F(IndependentReader, RefusesFilesOfOtherCodecs) {
+  BakeConfig config;
+  config.codec = PageCodec::kSmall;
+  write(test::scene_of(test::sphere_mesh(8)), config);
+  EXPECT_EQ(read(), 3);
+}
+
+TEST_F(IndependentReader, TellsWhatDiffersFromWhatIsNoFile) {
+  write(test::scene_of(test::sphere_mesh(8)));
+  ASSERT_EQ(read(), 0);
+  const std::vector<std::byte> good = dumped();
+  dumped()[16] ^= std::byte{1}; // of the first lattice coordinate
+  EXPECT_EQ(read(), 1);
+  dumped() = good;
+  dumped().pop_back();
+  EXPECT_EQ(read(), 1);
+  dumped() = good;
+  baked()[8] ^= std::byte{0x40}; // the version
+  EXPECT_EQ(read(), 3);
+}
+
+} // namespace
+} // namespace packtrace
