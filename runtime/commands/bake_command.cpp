@@ -162,8 +162,9 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
           "what 24 bits keep for every direction)")
       ->type_name("DEGREES")
       ->group("Normals");
-  verb.add_option("--codec", options->codec,
-                  "Form on disk: none is mapped and traced as it is; fast and small are smaller, and decoded when opened")
+  verb.add_option(
+          "--codec", options->codec,
+          "Form on disk: none is mapped and traced as it is; fast and small are smaller, and decoded when opened")
       ->check(CLI::IsMember({std::string(name_of(PageCodec::kNone)), std::string(name_of(PageCodec::kFast)),
                              std::string(name_of(PageCodec::kSmall))}))
       ->default_str(std::string(name_of(PageCodec::kNone)));
