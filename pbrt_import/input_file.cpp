@@ -191,7 +191,8 @@ std::vector<std::byte> read_whole_file(const std::filesystem::path& path, uint64
       if (char none; file.compressed()) file.read({&none, 1}); // throws if more was to come
       break;
     }
-    room = std::max<size_t>(size, kCompressedChunk);
+    // One byte more than allowed is enough to find out.
+    room = static_cast<size_t>(std::min<uint64_t>(std::max<size_t>(size, kCompressedChunk), max_bytes - size + 1));
   }
   content.resize(size);
   return content;

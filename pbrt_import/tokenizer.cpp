@@ -152,6 +152,13 @@ Token Tokenizer::next() {
 }
 
 Token Tokenizer::read_string() {
+  in_string_ = true; // if refill() throws
+  const Token token = find_string_end();
+  in_string_ = false;
+  return token;
+}
+
+Token Tokenizer::find_string_end() {
   size_t length = 1; // from position_, which refill() moves
   while (true) {
     if (position_ + length >= size_ && !refill()) break;

@@ -48,7 +48,7 @@ public:
   void read_numbers(Take take);
 
   /// After next() threw: whether that was within a string.
-  bool in_string() const { return position_ < size_ && window_[position_] == '"'; }
+  bool in_string() const { return in_string_; }
 
   /// Content bytes consumed.
   uint64_t consumed_bytes() const { return window_offset_ + position_; }
@@ -66,6 +66,7 @@ private:
   void skip_comment();
   void count_line_end(size_t at);
   Token read_string();
+  Token find_string_end();
   Token read_word();
   Token make(TokenKind kind, size_t start, size_t end) const;
   void check_encoding();
@@ -78,6 +79,7 @@ private:
   size_t size_ = 0;
   size_t position_ = 0;
   uint64_t window_offset_ = 0; ///< of window_[0] in the content
+  bool in_string_ = false;     ///< read_string() has not come to an end
   bool at_end_ = false;        ///< the file has nothing after the window
   uint32_t line_ = 1;
   uint64_t line_start_ = 0; ///< offset of the line's first byte in the content

@@ -211,10 +211,10 @@ ExrHeader scan_exr_header(std::span<const std::byte> bytes, const std::string& c
   const uint32_t version = file.u32();
   ExrHeader header = Attributes().read(file, (version & kTiledFlag) != 0);
   // One offset for each block follows, even in files whose other blocks were never written.
-  const uint64_t block_count =
-      header.tile_width > 0 ? blocks(header.width(), header.tile_width) * blocks(header.height(), header.tile_height)
-                            : blocks(header.height(), header.block_lines);
-  if (block_count > file.left() / 8) file.damaged(kTruncated);
+  const bool tiled = header.tile_width > 0;
+  const uint64_t columns = tiled ? blocks(header.width(), header.tile_width) : 1;
+  const uint64_t rows = blocks(header.height(), tiled ? header.tile_height : header.block_lines);
+  if (columns > 0 && rows > file.left() / 8 / columns) file.damaged(kTruncated);
   return header;
 }
 

@@ -18,6 +18,8 @@ constexpr uint64_t kDeflateRatio = 1032;
 /// What data may unpack to beyond what the header asks for: other readers ignore surplus too, but a few bytes must not
 /// demand gigabytes.
 constexpr uint64_t kSurplusBytes = uint64_t{64} << 20;
+/// Beyond all that readers take; below it, looking for surplus takes seconds.
+constexpr uint64_t kMostBytes = uint64_t{8} << 30;
 
 uint32_t read_be32(std::span<const std::byte> bytes, size_t at) {
   uint32_t value = 0;
@@ -25,10 +27,12 @@ uint32_t read_be32(std::span<const std::byte> bytes, size_t at) {
   return value;
 }
 
-/// Bytes of the filtered rows of an image of that size.
+/// Bytes of the filtered rows of an image of that size; at most 2^60, so that seven passes can be added.
 uint64_t row_bytes(const PngHeader& header, uint64_t width, uint64_t height) {
   const uint64_t bits_per_pixel = uint64_t{header.bits_per_sample} * header.channels;
-  return width == 0 ? 0 : height * (1 + (width * bits_per_pixel + 7) / 8);
+  const uint64_t row = width == 0 ? 0 : 1 + (width * bits_per_pixel + 7) / 8;
+  constexpr uint64_t kMost = uint64_t{1} << 60;
+  return row > 0 && height > kMost / row ? kMost : height * row;
 }
 
 /// What the image data unpack to.
@@ -110,6 +114,7 @@ private:
 
   void check_amount(uint64_t wanted) const {
     if (data_.empty()) damaged("it has no image data");
+    if (wanted > kMostBytes) damaged("it claims more pixels than any image has");
     if (wanted / kDeflateRatio > packed_bytes_) damaged("too little data for its size");
     const uint64_t most = wanted + kSurplusBytes;
     if (packed_bytes_ > most / kDeflateRatio && unpacks_beyond(most)) damaged("too much data for its size");
