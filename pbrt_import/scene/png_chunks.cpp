@@ -114,8 +114,8 @@ private:
 
   void check_amount(uint64_t wanted) const {
     if (data_.empty()) damaged("it has no image data");
-    if (wanted > kMostBytes) damaged("it claims more pixels than any image has");
     if (wanted / kDeflateRatio > packed_bytes_) damaged("too little data for its size");
+    if (wanted > kMostBytes) damaged("it has more pixels than are read");
     const uint64_t most = wanted + kSurplusBytes;
     if (packed_bytes_ > most / kDeflateRatio && unpacks_beyond(most)) damaged("too much data for its size");
   }
