@@ -316,8 +316,8 @@ TEST(Extremes, WorldShapesOfEveryScaleShareOneGrid) {
     test::add_shape(scene, test::sphere_mesh(rings++),
                     compose(test::translation({2.5 * scale, 0, 0}), test::scaling(DVec3(scale))));
   const BakedScene baked = bake(scene);
-  for (const baked::GeometryRecord& geometry : BakedFile::from_bytes(baked.bytes).geometries())
-    EXPECT_NE(geometry.flags & baked::kWorldSpace, 0u);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  for (const baked::GeometryRecord& geometry : file.geometries()) EXPECT_NE(geometry.flags & baked::kWorldSpace, 0u);
   expect_scene_holds(scene, {});
   expect_scene_holds(scene, precision(PrecisionKind::kAbsolute, 1e-8));
 }
