@@ -3,37 +3,16 @@
 #include <algorithm>
 #include <atomic>
 #include <memory>
-#include <new>
-#include <stdexcept>
 
 #include <tbb/parallel_for.h>
 
 #include "pbrt_import/input_file.h"
 #include "pbrt_import/ply.h"
+#include "pbrt_import/problem_text.h"
 #include "pbrt_import/scene/error.h"
 #include "pbrt_import/tokenizer.h"
 
 namespace packtrace {
-namespace {
-
-/// Runs work; what goes wrong with one file becomes that file's error text.
-template <class Work>
-std::string error_of(Work work) {
-  try {
-    work();
-    return {};
-  } catch (const Error& error) {
-    if (error.kind() == ErrorKind::kCancelled) throw;
-    return error.what();
-  } catch (const std::bad_alloc&) {
-    return "not enough memory";
-  } catch (const std::length_error&) {
-    return "not enough memory";
-  }
-}
-
-} // namespace
-
 uint32_t FileLoader::request_ply(const std::filesystem::path& path, const Place& place, uint32_t slot) {
   const auto [it, inserted] = ply_by_path_.try_emplace(path.string(), static_cast<uint32_t>(plys_.size()));
   if (inserted) {
@@ -51,7 +30,7 @@ void FileLoader::require(uint32_t slot) {
 
 void FileLoader::read_ply_file(PlyFile& file, Mesh& mesh) const {
   Outcome& outcome = file.outcome;
-  outcome.error = error_of([&] {
+  outcome.error = problem_of([&] {
     const std::vector<std::byte> bytes = read_whole_file(file.path, options_.memory_budget_bytes);
     outcome.bytes = bytes.size();
     PlyMesh ply = read_ply(bytes, [&](Severity severity, uint32_t line, std::string message) {
@@ -66,7 +45,7 @@ void FileLoader::read_ply_file(PlyFile& file, Mesh& mesh) const {
 
 FileLoader::Outcome FileLoader::read_image_file(ImageRequest& image) const {
   Outcome outcome;
-  outcome.error = error_of([&] {
+  outcome.error = problem_of([&] {
     const std::vector<std::byte> bytes = read_whole_file(image.path, options_.memory_budget_bytes);
     outcome.bytes = bytes.size();
     image.summary = read_image(bytes, image.decode_srgb, image.want_mask, options_.memory_budget_bytes);

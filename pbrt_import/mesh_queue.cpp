@@ -1,11 +1,8 @@
 #include "pbrt_import/mesh_queue.h"
 
-#include <new>
-#include <stdexcept>
-
 #include <tbb/task_arena.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/problem_text.h"
 
 namespace packtrace {
 
@@ -14,19 +11,12 @@ MadeMesh run_job(const MeshJob& job, double tessellation_tolerance, const CheckC
   const ReportFn report = [&](Severity severity, uint32_t, std::string message) {
     made.reports.emplace_back(severity, std::move(message));
   };
-  try {
+  made.problem = problem_of([&] {
     ShapeContext context{tessellation_tolerance, report, check_cancelled, 0};
     made.mesh = job.make(context);
     made.dropped_triangles = context.dropped_triangles;
-    if (made.mesh.triangles.empty()) made.problem = "no triangle is left";
-  } catch (const Error& error) {
-    if (error.kind() == ErrorKind::kCancelled) throw;
-    made.problem = error.what();
-  } catch (const std::bad_alloc&) {
-    made.problem = "not enough memory";
-  } catch (const std::length_error&) {
-    made.problem = "not enough memory";
-  }
+    if (made.mesh.triangles.empty()) throw Error(ErrorKind::kInput, "no triangle is left");
+  });
   return made;
 }
 

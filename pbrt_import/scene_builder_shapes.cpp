@@ -2,26 +2,14 @@
 #include "pbrt_import/scene_builder.h"
 
 #include <algorithm>
-#include <new>
-#include <stdexcept>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/problem_text.h"
 #include "pbrt_import/scene_pruning.h"
 #include "pbrt_import/shape_builder.h"
 #include "pbrt_import/tokenizer.h"
 #include "pbrt_import/transforms.h"
 
 namespace packtrace {
-namespace {
-
-template <class Function>
-void for_each_shape(Scene& scene, Function function) {
-  for (Shape& shape : scene.shapes) function(shape);
-  for (Object& object : scene.objects)
-    for (Shape& shape : object.shapes) function(shape);
-}
-
-} // namespace
 
 void SceneBuilder::add_shape(Directive& directive) {
   const std::string& kind = directive.names[0];
@@ -116,11 +104,8 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
   entry.place = directive.place;
   entry.sequence = reporter_.sequence();
   entry.slot = static_cast<uint32_t>(scene_.meshes.size());
-  try {
-    entry.job = kind->read(directive.parameters, report);
-  } catch (const Error& error) {
-    return skip_shape(name, directive.place, error.what());
-  }
+  const std::string problem = problem_of([&] { entry.job = kind->read(directive.parameters, report); });
+  if (!problem.empty()) return skip_shape(name, directive.place, problem);
   if (entry.job.scale != 1.0) {
     shape.parent_from_mesh = compose(shape.parent_from_mesh, scaling(DVec3(entry.job.scale)));
     if (!is_invertible(shape.parent_from_mesh))

@@ -22,13 +22,6 @@ std::vector<uint32_t> keep_used(std::vector<Element>& elements, const std::vecto
   return numbers;
 }
 
-template <class Function>
-void for_each_shape(Scene& scene, Function function) {
-  for (Shape& shape : scene.shapes) function(shape);
-  for (Object& object : scene.objects)
-    for (Shape& shape : object.shapes) function(shape);
-}
-
 void drop_unused_animations(Scene& scene) {
   if (scene.animations.empty()) return;
   const auto for_each_user = [&](auto function) {

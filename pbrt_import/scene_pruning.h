@@ -6,6 +6,14 @@
 
 namespace packtrace {
 
+/// Calls function(Shape&) for the shapes of the world, then for those of each object.
+template <class Function>
+void for_each_shape(Scene& scene, Function function) {
+  for (Shape& shape : scene.shapes) function(shape);
+  for (Object& object : scene.objects)
+    for (Shape& shape : object.shapes) function(shape);
+}
+
 /// Leaves out objects that nothing shows and objects without shapes, with the instances of the latter; what is left
 /// keeps its order.
 /// @param unused called with the number of each object that has shapes but no instance

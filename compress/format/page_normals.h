@@ -30,10 +30,9 @@ inline NormalFields predict_normal_fields(NormalEncoding encoding, DVec3 n) {
   for (int other = 1; other < 3; ++other)
     if (std::abs(n[other]) > std::abs(n[axis])) axis = other;
   // decode_normal()'s cubic inverted by a series that is right to a few thousandths, and one step of Newton.
-  constexpr double kSlope = 803.0 / 1024.0, kCubic = 0.70710678118654752440 - kSlope;
   const auto unwarp = [](double x) {
     const double square = x * x, t = x * (1.2752 + square * (0.16 + square * 0.23));
-    return t - (t * (kSlope + kCubic * t * t) - x) / (kSlope + 3.0 * kCubic * t * t);
+    return t - (t * (kAxisSlope + kAxisCubic * t * t) - x) / (kAxisSlope + 3.0 * kAxisCubic * t * t);
   };
   return {static_cast<uint32_t>(2 * axis) + (n[axis] < 0.0 ? 1 : 0), code(unwarp(n[(axis + 1) % 3]), x_last),
           code(unwarp(n[(axis + 2) % 3]), y_last)};

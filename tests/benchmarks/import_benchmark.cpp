@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "pbrt_import/scene/error.h"
+#include "tests/benchmarks/benchmark_main.h"
 #include "tests/benchmarks/import_timing.h"
 
 namespace packtrace {
@@ -333,14 +334,4 @@ int run(int argc, char** argv) {
 } // namespace
 } // namespace packtrace
 
-int main(int argc, char** argv) {
-  try {
-    return packtrace::run(argc, argv);
-  } catch (const packtrace::Error& error) {
-    fmt::print(stderr, "import_benchmark: {}\n", error.what());
-    return error.exit_code();
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "import_benchmark: {}\n", error.what());
-    return 1;
-  }
-}
+int main(int argc, char** argv) { return packtrace::benchmark_main("import_benchmark", packtrace::run, argc, argv); }

@@ -20,6 +20,7 @@
 #include "compress/format/normal_codec.h"
 #include "pbrt_import/scene/error.h"
 #include "runtime/stopwatch.h"
+#include "tests/benchmarks/benchmark_main.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"
 
 namespace packtrace {
@@ -213,14 +214,4 @@ int run(int argc, char** argv) {
 } // namespace
 } // namespace packtrace
 
-int main(int argc, char** argv) {
-  try {
-    return packtrace::run(argc, argv);
-  } catch (const packtrace::Error& error) {
-    fmt::print(stderr, "normal_benchmark: {}\n", error.what());
-    return error.exit_code();
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "normal_benchmark: {}\n", error.what());
-    return 1;
-  }
-}
+int main(int argc, char** argv) { return packtrace::benchmark_main("normal_benchmark", packtrace::run, argc, argv); }

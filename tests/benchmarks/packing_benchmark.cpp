@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "pbrt_import/scene/error.h"
+#include "tests/benchmarks/benchmark_main.h"
 #include "tests/benchmarks/packing_benchmark_codecs.h"
 #include "tests/benchmarks/packing_benchmark_cracks.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"
@@ -230,14 +231,4 @@ int run(int argc, char** argv) {
 } // namespace
 } // namespace packtrace
 
-int main(int argc, char** argv) {
-  try {
-    return packtrace::run(argc, argv);
-  } catch (const packtrace::Error& error) {
-    fmt::print(stderr, "packing_benchmark: {}\n", error.what());
-    return error.exit_code();
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "packing_benchmark: {}\n", error.what());
-    return 1;
-  }
-}
+int main(int argc, char** argv) { return packtrace::benchmark_main("packing_benchmark", packtrace::run, argc, argv); }

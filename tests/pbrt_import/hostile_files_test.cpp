@@ -4,12 +4,12 @@
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
-#include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfRgbaFile.h>
 #include <sys/stat.h>
 #include <zlib.h>
 
+#include "tests/pbrt_import/exr_stream.h"
 #include "tests/pbrt_import/hostile_case.h"
 
 namespace packtrace {
@@ -90,23 +90,6 @@ std::string pfm(const std::string& header, const std::vector<float>& values) {
   file.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float));
   return file;
 }
-
-class StringStream : public Imf::OStream {
-public:
-  StringStream() : Imf::OStream("image") {}
-  void write(const char c[], int n) override {
-    text_.resize(std::max(text_.size(), position_ + static_cast<size_t>(n)));
-    std::memcpy(text_.data() + position_, c, static_cast<size_t>(n));
-    position_ += static_cast<size_t>(n);
-  }
-  uint64_t tellp() override { return position_; }
-  void seekp(uint64_t position) override { position_ = static_cast<size_t>(position); }
-  const std::string& text() const { return text_; }
-
-private:
-  std::string text_;
-  size_t position_ = 0;
-};
 
 std::string exr() {
   StringStream stream;

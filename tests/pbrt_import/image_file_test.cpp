@@ -10,7 +10,6 @@
 #include <gtest/gtest.h>
 #include <OpenEXR/ImfFloatVectorAttribute.h>
 #include <OpenEXR/ImfHeader.h>
-#include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfKeyCodeAttribute.h>
 #include <OpenEXR/ImfMatrixAttribute.h>
 #include <OpenEXR/ImfPreviewImage.h>
@@ -25,6 +24,7 @@
 #include <zlib.h>
 
 #include "pbrt_import/scene/error.h"
+#include "tests/pbrt_import/exr_stream.h"
 
 namespace packtrace {
 namespace {
@@ -274,23 +274,6 @@ TEST(PfmImage, ColoursAndGreyAreRead) {
 }
 
 // EXR
-
-class StringStream : public Imf::OStream {
-public:
-  StringStream() : Imf::OStream("image") {}
-  void write(const char c[], int n) override {
-    text_.resize(std::max(text_.size(), position_ + static_cast<size_t>(n)));
-    std::memcpy(text_.data() + position_, c, static_cast<size_t>(n));
-    position_ += static_cast<size_t>(n);
-  }
-  uint64_t tellp() override { return position_; }
-  void seekp(uint64_t position) override { position_ = static_cast<size_t>(position); }
-  const std::string& text() const { return text_; }
-
-private:
-  std::string text_;
-  size_t position_ = 0;
-};
 
 const Imf::Rgba kPixel(0.25f, 0.5f, 0.75f);
 
