@@ -142,8 +142,8 @@ private:
     const GeometryNeeds needs = analyse_requirements(scene_, plan);
     const QuantizedGeometry q = quantize_geometry(scene_, plan, needs, config_, grids_[index], measure.max_abs(),
                                                   measure.bounds.lo, measure.bounds.hi);
-    return {record_of(plan, q, position_error_bound(q.grid.step(), measure.max_abs())), encode_geometry(scene_, q),
-            q.stats, unneeded_uv_bytes(scene_, plan, needs)};
+    return {record_of(plan, q, position_error_bound(q.grid.step(), measure.max_abs())),
+            encode_geometry(scene_, q, split_geometry(scene_, q)), q.stats, unneeded_uv_bytes(scene_, plan, needs)};
   }
 
   static baked::GeometryRecord record_of(const GeometryPlan& plan, const QuantizedGeometry& q, double error_bound) {

@@ -1,46 +1,16 @@
 #include "compress/bake/geometry_encoder.h"
 
 #include <algorithm>
-#include <bit>
 #include <limits>
-#include <tuple>
 
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
 
-#include "compress/bake/clusterize.h"
 #include "compress/bake/weld_table.h"
 #include "compress/format/bit_stream.h"
 #include "pbrt_import/scene/error.h"
 
 namespace packtrace {
 namespace {
-
-constexpr uint32_t kChunkTriangles = 1u << 14; // worked on alone; clusters do not cross chunks
-constexpr uint32_t kMortonBits = 21;           // per axis
-
-/// Every third bit.
-constexpr uint64_t spread(uint64_t x) {
-  x = (x | (x << 32)) & 0x001f00000000ffffu;
-  x = (x | (x << 16)) & 0x001f0000ff0000ffu;
-  x = (x | (x << 8)) & 0x100f00f00f00f00fu;
-  x = (x | (x << 4)) & 0x10c30c30c30c30c3u;
-  return (x | (x << 2)) & 0x1249249249249249u;
-}
-
-struct SortKey {
-  uint32_t rank; ///< of the kind
-  uint32_t triangle;
-  uint64_t morton;
-  bool operator<(const SortKey& other) const {
-    return std::tie(rank, morton, triangle) < std::tie(other.rank, other.morton, other.triangle);
-  }
-};
-
-/// A run of one kind's triangles.
-struct Chunk {
-  uint32_t begin = 0, end = 0; ///< of the sorted triangles
-};
 
 struct EncodedChunk {
   std::vector<baked::ClusterRecord> clusters; ///< payload_offset from the chunk's start, firsts not set
@@ -54,28 +24,28 @@ void add(ClusterView::StreamBits& total, const ClusterView::StreamBits& bits) {
       total.uvs += bits.uvs;
 }
 
-/// Numbers the values of a chunk 0, 1, ...; numbers of other chunks' values do not matter to it.
-class Renumbering {
+/// Numbers a cluster's vertices 0, 1, ... in the order they come.
+class VertexNumbers {
 public:
-  explicit Renumbering(size_t capacity) : table_(capacity) {}
-  uint32_t operator()(uint32_t value) {
-    const auto next = static_cast<uint32_t>(values.size());
+  uint32_t operator()(uint32_t vertex) {
+    const auto next = static_cast<uint32_t>(values_.size());
     const uint32_t number =
-        table_.find_or_add(mix_words(value, 0), next, [&](uint32_t other) { return values[other] == value; });
-    if (number == next) values.push_back(value);
+        table_.find_or_add(mix_words(vertex, 0), next, [&](uint32_t other) { return values_[other] == vertex; });
+    if (number == next) values_.push_back(vertex);
     return number;
   }
-  std::vector<uint32_t> values;
+  std::span<const uint32_t> values() const { return values_; }
 
 private:
-  WeldTable table_;
+  WeldTable table_{kMaxClusterVertices};
+  std::vector<uint32_t> values_;
 };
 
+/// Encodes a run of clusters.
 class ChunkEncoder {
 public:
-  ChunkEncoder(const QuantizedGeometry& geometry, std::span<const SortKey> triangles)
-      : geometry_(geometry), triangles_(triangles), kind_(geometry.kinds[geometry.kind_of[triangles[0].triangle]]),
-        vertex_numbers_(3 * triangles.size()) {
+  ChunkEncoder(const QuantizedGeometry& geometry, const GeometryClusters& clusters)
+      : geometry_(geometry), all_(clusters) {
     frame_.origin = geometry.origin;
     frame_.step_mantissa = geometry.grid.mantissa;
     frame_.step_exponent = geometry.grid.exponent;
@@ -84,104 +54,64 @@ public:
     frame_.normal_encoding = static_cast<uint32_t>(geometry.normal_encoding);
   }
 
-  EncodedChunk run() {
-    const Clusters clusters = split();
-    uint32_t begin = 0;
-    for (const uint32_t end : clusters.ends) {
-      encode({clusters.order.data() + begin, end - begin});
-      begin = end;
-    }
+  EncodedChunk run(std::span<const ClusterRange> clusters) {
+    for (const ClusterRange& cluster : clusters) encode(cluster);
     out_.payload = writer_.bytes();
     out_.payload.resize(out_.payload.size() + kReadSlackBytes);
-    for (const baked::ClusterRecord& record : out_.clusters) inspect(record);
+    for (size_t i = 0; i < clusters.size(); ++i) inspect(out_.clusters[i], geometry_.kinds[clusters[i].kind]);
     out_.payload.resize(out_.payload.size() - kReadSlackBytes);
     return std::move(out_);
   }
 
 private:
-  Clusters split() {
-    corners_.reserve(triangles_.size());
-    Renumbering point_numbers(3 * triangles_.size());
-    std::vector<Triangle> points;
-    std::vector<DVec3> centroids;
-    points.reserve(triangles_.size()), centroids.reserve(triangles_.size());
-    for (const SortKey& key : triangles_) {
-      const Triangle& t = geometry_.triangles[key.triangle];
-      Triangle vertex{}, point{};
-      DVec3 sum(0.0);
-      for (int corner = 0; corner < 3; ++corner) {
-        vertex[corner] = vertex_numbers_(t[corner]);
-        const uint32_t position = geometry_.vertices[t[corner]].position;
-        point[corner] = point_numbers(position);
-        for (int axis = 0; axis < 3; ++axis) {
-          const auto i = static_cast<size_t>(axis);
-          sum[axis] += static_cast<double>(geometry_.positions[position][i] - geometry_.origin[i]);
-        }
-      }
-      corners_.push_back(vertex), points.push_back(point), centroids.push_back(sum);
-    }
-    return clusterize({corners_, points, centroids, static_cast<uint32_t>(vertex_numbers_.values.size()),
-                       static_cast<uint32_t>(point_numbers.values.size())});
-  }
-
-  void encode(std::span<const uint32_t> members) {
-    // Vertices get numbers within the cluster by a short search: at most 256 of them.
-    local_.resize(vertex_numbers_.values.size(), 0);
-    std::vector<uint32_t> used;
+  void encode(const ClusterRange& cluster) {
+    const TriangleKind& kind = geometry_.kinds[cluster.kind];
+    VertexNumbers numbers;
     std::vector<Triangle> local_triangles;
-    for (const uint32_t member : members) {
-      Triangle t{};
-      for (int corner = 0; corner < 3; ++corner) {
-        const uint32_t number = corners_[member][corner];
-        uint32_t& local = local_[number];
-        if (local >= used.size() || used[local] != number)
-          local = static_cast<uint32_t>(used.size()), used.push_back(number);
-        t[corner] = local;
-      }
-      local_triangles.push_back(t);
-    }
+    for (const Triangle& t : std::span(all_.triangles).subspan(cluster.first_triangle, cluster.triangle_count))
+      local_triangles.emplace_back(numbers(t.x), numbers(t.y), numbers(t.z));
+    const std::span<const uint32_t> used = numbers.values();
     const Strips strips = find_strips(local_triangles, static_cast<uint32_t>(used.size()));
 
     std::vector<LatticePoint> positions;
     std::vector<uint32_t> codes;
     std::vector<UvLattice> uvs;
     for (const uint32_t local : strips.vertex_order) {
-      const QuantizedVertex& v = geometry_.vertices[vertex_numbers_.values[used[local]]];
+      const QuantizedVertex& v = geometry_.vertices[used[local]];
       positions.push_back(geometry_.positions[v.position]);
-      if (!kind_.flat) codes.push_back(v.normal_code);
-      if (kind_.uvs) uvs.push_back(v.uv);
+      if (!kind.flat) codes.push_back(v.normal_code);
+      if (kind.uvs) uvs.push_back(v.uv);
     }
     const size_t offset = writer_.bytes().size();
-    out_.clusters.push_back(encode_cluster({&strips, positions, codes, uvs, kind_.material, geometry_.origin,
+    out_.clusters.push_back(encode_cluster({&strips, positions, codes, uvs, kind.material, geometry_.origin,
                                             geometry_.anchor_shift, geometry_.normal_encoding},
                                            writer_));
     out_.clusters.back().payload_offset = static_cast<uint32_t>(offset / 4);
 
-    const auto vertex = [&](uint32_t local) { return vertex_numbers_.values[used[local]]; };
-    for (const uint32_t local : strips.vertex_order) expected_vertices_.push_back(vertex(local));
+    for (const uint32_t local : strips.vertex_order) expected_vertices_.push_back(used[local]);
     for (const uint32_t triangle : strips.triangle_order) {
       const Triangle& t = local_triangles[triangle];
-      expected_triangles_.emplace_back(vertex(t.x), vertex(t.y), vertex(t.z));
+      expected_triangles_.emplace_back(used[t.x], used[t.y], used[t.z]);
     }
   }
 
-  bool same_vertex(const ClusterView& view, uint32_t local, uint32_t expected) const {
+  bool same_vertex(const ClusterView& view, const TriangleKind& kind, uint32_t local, uint32_t expected) const {
     const QuantizedVertex& v = geometry_.vertices[expected];
     if (view.lattice(local) != geometry_.positions[v.position]) return false;
-    if (view.has_normals() == kind_.flat || view.has_uvs() != kind_.uvs) return false;
-    if (!kind_.flat && view.normal_code(local) != v.normal_code) return false;
+    if (view.has_normals() == kind.flat || view.has_uvs() != kind.uvs) return false;
+    if (!kind.flat && view.normal_code(local) != v.normal_code) return false;
     const auto decoded = [&](size_t axis) {
       return from_uv_lattice(v.uv[axis], std::ldexp(1.0f, geometry_.uv_exponent[axis]));
     };
-    return !kind_.uvs || view.uv(local) == Vec2(decoded(0), decoded(1));
+    return !kind.uvs || view.uv(local) == Vec2(decoded(0), decoded(1));
   }
 
   /// Decodes a cluster, compares it with what went in, and adds to the totals.
-  void inspect(const baked::ClusterRecord& record) {
+  void inspect(const baked::ClusterRecord& record, const TriangleKind& kind) {
     const ClusterView view(frame_, record, out_.payload.data());
     const uint32_t* vertices = expected_vertices_.data() + first_vertex_;
     bool same = true;
-    for (uint32_t v = 0; v < view.vertex_count(); ++v) same &= same_vertex(view, v, vertices[v]);
+    for (uint32_t v = 0; v < view.vertex_count(); ++v) same &= same_vertex(view, kind, v, vertices[v]);
     std::array<Triangle, kMaxClusterTriangles> triangles;
     decode_indices(view, 0, triangles);
     for (uint32_t i = 0; i < view.triangle_count(); ++i) {
@@ -200,12 +130,8 @@ private:
   }
 
   const QuantizedGeometry& geometry_;
-  std::span<const SortKey> triangles_;
-  TriangleKind kind_;
+  const GeometryClusters& all_;
   baked::GeometryRecord frame_{};
-  Renumbering vertex_numbers_;
-  std::vector<Triangle> corners_;           // per triangle of the chunk, renumbered
-  std::vector<uint32_t> local_;             // vertex -> number in the cluster last encoded with it
   std::vector<uint32_t> expected_vertices_; // of all clusters, in order
   std::vector<Triangle> expected_triangles_;
   size_t first_vertex_ = 0, first_triangle_ = 0;
@@ -213,67 +139,16 @@ private:
   EncodedChunk out_;
 };
 
-/// Rank of each kind: material class, then material, so that classes are contiguous.
-std::vector<uint32_t> rank_kinds(const Scene& scene, const std::vector<TriangleKind>& kinds) {
-  std::vector<uint32_t> order(kinds.size()), rank(kinds.size());
-  for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
-  const auto key = [&](uint32_t i) {
-    const TriangleKind& k = kinds[i];
-    return std::tuple(baked::material_class(scene.materials[k.material].flags), k.material, k.flat, k.uvs);
-  };
-  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
-  for (uint32_t i = 0; i < order.size(); ++i) rank[order[i]] = i;
-  return rank;
-}
-
-std::vector<SortKey> sort_triangles(const QuantizedGeometry& geometry, const std::vector<uint32_t>& rank) {
-  int64_t extent = 0;
-  for (const LatticePoint& p : geometry.positions)
-    for (size_t axis = 0; axis < 3; ++axis) extent = std::max(extent, p[axis] - geometry.origin[axis]);
-  const auto bits = static_cast<uint32_t>(std::bit_width(static_cast<uint64_t>(extent) * 3)); // of a sum of corners
-  const uint32_t shift = bits > kMortonBits ? bits - kMortonBits : 0;
-
-  std::vector<SortKey> keys(geometry.triangles.size());
-  tbb::parallel_for(size_t{0}, keys.size(), [&](size_t i) {
-    uint64_t morton = 0;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      uint64_t sum = 0;
-      for (int corner = 0; corner < 3; ++corner) {
-        const QuantizedVertex& v = geometry.vertices[geometry.triangles[i][corner]];
-        sum += static_cast<uint64_t>(geometry.positions[v.position][axis] - geometry.origin[axis]);
-      }
-      morton |= spread(sum >> shift) << axis;
-    }
-    keys[i] = {rank[geometry.kind_of[i]], static_cast<uint32_t>(i), morton};
-  });
-  tbb::parallel_sort(keys.begin(), keys.end());
-  return keys;
-}
-
-/// Chunks of nearly equal size, each of one kind.
-std::vector<Chunk> split_into_chunks(std::span<const SortKey> keys) {
-  std::vector<Chunk> chunks;
-  for (size_t begin = 0; begin < keys.size();) {
-    size_t end = begin;
-    while (end < keys.size() && keys[end].rank == keys[begin].rank) ++end;
-    const size_t count = (end - begin + kChunkTriangles - 1) / kChunkTriangles;
-    for (size_t i = 0; i < count; ++i)
-      chunks.push_back({static_cast<uint32_t>(begin + (end - begin) * i / count),
-                        static_cast<uint32_t>(begin + (end - begin) * (i + 1) / count)});
-    begin = end;
-  }
-  return chunks;
-}
-
 } // namespace
 
-EncodedGeometry encode_geometry(const Scene& scene, const QuantizedGeometry& geometry) {
-  const std::vector<SortKey> keys = sort_triangles(geometry, rank_kinds(scene, geometry.kinds));
-  const std::vector<Chunk> chunks = split_into_chunks(keys);
-  std::vector<EncodedChunk> encoded(chunks.size());
-  tbb::parallel_for(size_t{0}, chunks.size(), [&](size_t i) {
-    encoded[i] =
-        ChunkEncoder(geometry, std::span(keys).subspan(chunks[i].begin, chunks[i].end - chunks[i].begin)).run();
+EncodedGeometry encode_geometry(const Scene& scene, const QuantizedGeometry& geometry,
+                                const GeometryClusters& clusters) {
+  constexpr size_t kRun = 128; // clusters
+  const size_t runs = (clusters.clusters.size() + kRun - 1) / kRun;
+  std::vector<EncodedChunk> encoded(runs);
+  tbb::parallel_for(size_t{0}, runs, [&](size_t i) {
+    const auto all = std::span(clusters.clusters);
+    encoded[i] = ChunkEncoder(geometry, clusters).run(all.subspan(i * kRun, std::min(kRun, all.size() - i * kRun)));
   });
 
   EncodedGeometry out;

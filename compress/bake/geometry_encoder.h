@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "compress/bake/geometry_clusters.h"
 #include "compress/bake/quantized_geometry.h"
 #include "compress/format/baked_format.h"
 #include "compress/format/cluster_codec.h"
@@ -19,8 +20,9 @@ struct EncodedGeometry {
   ClusterView::StreamBits stream_bits;
 };
 
-/// Splits a geometry into clusters, encodes them and checks by decoding that nothing changed. Bytes do not depend on
-/// the thread count. Throws Error(kLimitExceeded) where the payload exceeds 16 GiB.
-EncodedGeometry encode_geometry(const Scene& scene, const QuantizedGeometry& geometry);
+/// Encodes the clusters and checks by decoding that nothing changed. Bytes do not depend on the thread count.
+/// Throws Error(kLimitExceeded) where the payload exceeds 16 GiB.
+EncodedGeometry encode_geometry(const Scene& scene, const QuantizedGeometry& geometry,
+                                const GeometryClusters& clusters);
 
 } // namespace packtrace

@@ -1,0 +1,153 @@
+#include "compress/bake/geometry_clusters.h"
+
+#include <algorithm>
+#include <bit>
+#include <tuple>
+
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+#include "compress/bake/clusterize.h"
+#include "compress/bake/morton.h"
+#include "compress/bake/weld_table.h"
+#include "compress/format/baked_format.h"
+
+namespace packtrace {
+namespace {
+
+constexpr uint32_t kChunkTriangles = 1u << 14; // worked on alone; clusters do not cross chunks
+
+struct SortKey {
+  uint32_t rank; ///< of the kind
+  uint32_t triangle;
+  uint64_t morton;
+  bool operator<(const SortKey& other) const {
+    return std::tie(rank, morton, triangle) < std::tie(other.rank, other.morton, other.triangle);
+  }
+};
+
+/// A run of one kind's triangles.
+struct Chunk {
+  uint32_t begin = 0, end = 0; ///< of the sorted triangles
+};
+
+/// Numbers the values of a chunk 0, 1, ...; the numbers of other chunks' values do not matter to it.
+class Renumbering {
+public:
+  explicit Renumbering(size_t capacity) : table_(capacity) {}
+  uint32_t operator()(uint32_t value) {
+    const auto next = static_cast<uint32_t>(values.size());
+    const uint32_t number =
+        table_.find_or_add(mix_words(value, 0), next, [&](uint32_t other) { return values[other] == value; });
+    if (number == next) values.push_back(value);
+    return number;
+  }
+  std::vector<uint32_t> values;
+
+private:
+  WeldTable table_;
+};
+
+/// Clusters of the sorted triangles of a chunk, which their `order` counts.
+Clusters split_chunk(const QuantizedGeometry& geometry, std::span<const SortKey> keys) {
+  Renumbering vertex_numbers(3 * keys.size()), point_numbers(3 * keys.size());
+  std::vector<Triangle> vertices, points;
+  std::vector<DVec3> centroids;
+  vertices.reserve(keys.size()), points.reserve(keys.size()), centroids.reserve(keys.size());
+  for (const SortKey& key : keys) {
+    const Triangle& t = geometry.triangles[key.triangle];
+    Triangle vertex{}, point{};
+    DVec3 sum(0.0);
+    for (int corner = 0; corner < 3; ++corner) {
+      vertex[corner] = vertex_numbers(t[corner]);
+      const uint32_t position = geometry.vertices[t[corner]].position;
+      point[corner] = point_numbers(position);
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto i = static_cast<size_t>(axis);
+        sum[axis] += static_cast<double>(geometry.positions[position][i] - geometry.origin[i]);
+      }
+    }
+    vertices.push_back(vertex), points.push_back(point), centroids.push_back(sum);
+  }
+  return clusterize({vertices, points, centroids, static_cast<uint32_t>(vertex_numbers.values.size()),
+                     static_cast<uint32_t>(point_numbers.values.size())});
+}
+
+/// Rank of each kind: material class, then material, so that classes are contiguous.
+std::vector<uint32_t> rank_kinds(const Scene& scene, const std::vector<TriangleKind>& kinds) {
+  std::vector<uint32_t> order(kinds.size()), rank(kinds.size());
+  for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+  const auto key = [&](uint32_t i) {
+    const TriangleKind& k = kinds[i];
+    return std::tuple(baked::material_class(scene.materials[k.material].flags), k.material, k.flat, k.uvs);
+  };
+  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
+  for (uint32_t i = 0; i < order.size(); ++i) rank[order[i]] = i;
+  return rank;
+}
+
+std::vector<SortKey> sort_triangles(const QuantizedGeometry& geometry, const std::vector<uint32_t>& rank) {
+  int64_t extent = 0;
+  for (const LatticePoint& p : geometry.positions)
+    for (size_t axis = 0; axis < 3; ++axis) extent = std::max(extent, p[axis] - geometry.origin[axis]);
+  const auto bits = static_cast<uint32_t>(std::bit_width(static_cast<uint64_t>(extent) * 3)); // of a sum of corners
+  const uint32_t shift = bits > kMortonBits ? bits - kMortonBits : 0;
+
+  std::vector<SortKey> keys(geometry.triangles.size());
+  tbb::parallel_for(size_t{0}, keys.size(), [&](size_t i) {
+    std::array<uint64_t, 3> place{};
+    for (size_t axis = 0; axis < 3; ++axis) {
+      uint64_t sum = 0;
+      for (int corner = 0; corner < 3; ++corner) {
+        const QuantizedVertex& v = geometry.vertices[geometry.triangles[i][corner]];
+        sum += static_cast<uint64_t>(geometry.positions[v.position][axis] - geometry.origin[axis]);
+      }
+      place[axis] = sum >> shift;
+    }
+    keys[i] = {rank[geometry.kind_of[i]], static_cast<uint32_t>(i), morton_code(place[0], place[1], place[2])};
+  });
+  tbb::parallel_sort(keys.begin(), keys.end());
+  return keys;
+}
+
+/// Chunks of nearly equal size, each of one kind.
+std::vector<Chunk> split_into_chunks(std::span<const SortKey> keys) {
+  std::vector<Chunk> chunks;
+  for (size_t begin = 0; begin < keys.size();) {
+    size_t end = begin;
+    while (end < keys.size() && keys[end].rank == keys[begin].rank) ++end;
+    const size_t count = (end - begin + kChunkTriangles - 1) / kChunkTriangles;
+    for (size_t i = 0; i < count; ++i)
+      chunks.push_back({static_cast<uint32_t>(begin + (end - begin) * i / count),
+                        static_cast<uint32_t>(begin + (end - begin) * (i + 1) / count)});
+    begin = end;
+  }
+  return chunks;
+}
+
+} // namespace
+
+GeometryClusters split_geometry(const Scene& scene, const QuantizedGeometry& geometry) {
+  const std::vector<SortKey> keys = sort_triangles(geometry, rank_kinds(scene, geometry.kinds));
+  const std::vector<Chunk> chunks = split_into_chunks(keys);
+  std::vector<Clusters> split(chunks.size());
+  GeometryClusters result;
+  result.triangles.resize(keys.size());
+  tbb::parallel_for(size_t{0}, chunks.size(), [&](size_t i) {
+    const Chunk& chunk = chunks[i];
+    split[i] = split_chunk(geometry, std::span(keys).subspan(chunk.begin, chunk.end - chunk.begin));
+    for (uint32_t k = 0; k < chunk.end - chunk.begin; ++k)
+      result.triangles[chunk.begin + k] = geometry.triangles[keys[chunk.begin + split[i].order[k]].triangle];
+  });
+  for (size_t i = 0; i < chunks.size(); ++i) {
+    uint32_t begin = chunks[i].begin;
+    for (const uint32_t end : split[i].ends) {
+      const uint32_t next = chunks[i].begin + end;
+      result.clusters.push_back({begin, next - begin, geometry.kind_of[keys[begin].triangle]});
+      begin = next;
+    }
+  }
+  return result;
+}
+
+} // namespace packtrace

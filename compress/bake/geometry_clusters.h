@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "compress/bake/quantized_geometry.h"
+
+namespace packtrace {
+
+/// Triangles of one kind next to each other.
+struct ClusterRange {
+  uint32_t first_triangle = 0, triangle_count = 0; ///< of GeometryClusters::triangles
+  uint32_t kind = 0;                               ///< of QuantizedGeometry::kinds
+};
+
+/// The triangles of a geometry, cluster by cluster.
+struct GeometryClusters {
+  std::vector<Triangle> triangles; ///< into QuantizedGeometry::vertices
+  std::vector<ClusterRange> clusters;
+};
+
+/// Splits a geometry into clusters of at most 128 triangles and 256 vertices, ordered by material class, kind and
+/// place. Depends on its input only, not on the thread count.
+GeometryClusters split_geometry(const Scene& scene, const QuantizedGeometry& geometry);
+
+} // namespace packtrace

@@ -1,0 +1,236 @@
+#include "compress/bake/lod/cluster_groups.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <tuple>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+#include "compress/bake/morton.h"
+
+namespace packtrace {
+namespace {
+
+constexpr uint32_t kNone = ~0u;
+constexpr uint32_t kFewClusters = kGroupTargetClusters / 3; // groups below that join another where they can
+
+/// A side of a triangle on a cluster's border.
+struct BorderEdge {
+  uint32_t a, b, cluster;
+  bool operator<(const BorderEdge& o) const { return std::tie(a, b, cluster) < std::tie(o.a, o.b, o.cluster); }
+};
+
+uint32_t begin_of(std::span<const uint32_t> ends, uint32_t i) { return i == 0 ? 0 : ends[i - 1]; }
+
+void append_border(const ClusterRuns& clusters, uint32_t cluster, std::vector<BorderEdge>& out) {
+  std::vector<std::pair<uint32_t, uint32_t>> edges;
+  for (uint32_t i = begin_of(clusters.ends, cluster); i < clusters.ends[cluster]; ++i) {
+    const Triangle& t = clusters.points[i];
+    for (int k = 0; k < 3; ++k) {
+      const uint32_t p = t[k], q = t[(k + 1) % 3];
+      if (p != q) edges.emplace_back(std::min(p, q), std::max(p, q));
+    }
+  }
+  std::sort(edges.begin(), edges.end());
+  for (size_t i = 0, next; i < edges.size(); i = next) {
+    for (next = i + 1; next < edges.size() && edges[next] == edges[i];) ++next;
+    if (next == i + 1) out.push_back({edges[i].first, edges[i].second, cluster});
+  }
+}
+
+std::vector<BorderEdge> border_edges(const ClusterRuns& clusters) {
+  constexpr size_t kBatch = 64;
+  const size_t count = clusters.ends.size(), batches = (count + kBatch - 1) / kBatch;
+  std::vector<std::vector<BorderEdge>> found(batches);
+  tbb::parallel_for(size_t{0}, batches, [&](size_t batch) {
+    for (size_t i = batch * kBatch; i < std::min(count, (batch + 1) * kBatch); ++i)
+      append_border(clusters, static_cast<uint32_t>(i), found[batch]);
+  });
+  std::vector<BorderEdge> edges;
+  for (const auto& part : found) edges.insert(edges.end(), part.begin(), part.end());
+  tbb::parallel_sort(edges.begin(), edges.end());
+  return edges;
+}
+
+/// Neighbours of each cluster with the number of edges in common.
+struct Adjacency {
+  struct Link {
+    uint32_t cluster, edges;
+  };
+  std::vector<uint32_t> first; ///< of links, per cluster, and one more
+  std::vector<Link> links;
+  std::span<const Link> of(uint32_t cluster) const {
+    return std::span(links).subspan(first[cluster], first[cluster + 1] - first[cluster]);
+  }
+};
+
+Adjacency find_adjacency(const ClusterRuns& clusters) {
+  constexpr size_t kMostSharers = 8; // an edge of more clusters than that joins only the first of them
+  const std::vector<BorderEdge> edges = border_edges(clusters);
+  std::vector<std::pair<uint32_t, uint32_t>> pairs;
+  for (size_t i = 0, next; i < edges.size(); i = next) {
+    for (next = i + 1; next < edges.size() && edges[next].a == edges[i].a && edges[next].b == edges[i].b;) ++next;
+    const size_t end = std::min(next, i + kMostSharers);
+    for (size_t k = i; k < end; ++k)
+      for (size_t l = i; l < end; ++l)
+        if (l != k) pairs.emplace_back(edges[k].cluster, edges[l].cluster);
+  }
+  tbb::parallel_sort(pairs.begin(), pairs.end());
+  Adjacency result;
+  result.first.assign(clusters.ends.size() + 1, 0);
+  for (size_t i = 0, next; i < pairs.size(); i = next) {
+    for (next = i + 1; next < pairs.size() && pairs[next] == pairs[i];) ++next;
+    result.links.push_back({pairs[i].second, static_cast<uint32_t>(next - i)});
+    ++result.first[pairs[i].first + 1];
+  }
+  std::partial_sum(result.first.begin(), result.first.end(), result.first.begin());
+  return result;
+}
+
+std::vector<uint32_t> spatial_order(std::span<const DVec3> centers) {
+  DVec3 lo(0.0), hi(0.0);
+  for (size_t i = 0; i < centers.size(); ++i) {
+    lo = i == 0 ? centers[i] : glm::min(lo, centers[i]);
+    hi = i == 0 ? centers[i] : glm::max(hi, centers[i]);
+  }
+  const double extent = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z});
+  const double scale = extent > 0.0 ? static_cast<double>((1u << kMortonBits) - 1) / extent : 0.0;
+  std::vector<std::pair<uint64_t, uint32_t>> keys(centers.size());
+  for (uint32_t i = 0; i < keys.size(); ++i) {
+    const DVec3 p = (centers[i] - lo) * scale;
+    keys[i] = {morton_code(static_cast<uint64_t>(p.x), static_cast<uint64_t>(p.y), static_cast<uint64_t>(p.z)), i};
+  }
+  tbb::parallel_sort(keys.begin(), keys.end());
+  std::vector<uint32_t> order(keys.size());
+  for (size_t i = 0; i < keys.size(); ++i) order[i] = keys[i].second;
+  return order;
+}
+
+class Grouper {
+public:
+  explicit Grouper(const ClusterRuns& clusters)
+      : adjacency_(find_adjacency(clusters)), order_(spatial_order(clusters.centers)),
+        group_of_(clusters.ends.size(), kNone), weight_(clusters.ends.size(), 0) {
+    total_.reserve(group_of_.size());
+    for (uint32_t i = 0; i < group_of_.size(); ++i) {
+      uint32_t sum = 0;
+      for (const auto& link : adjacency_.of(i)) sum += link.edges;
+      total_.push_back(sum);
+    }
+  }
+
+  std::vector<uint32_t> run() {
+    for (;;) {
+      skip_taken();
+      if (cursor_ == order_.size()) break;
+      grow();
+    }
+    return number_groups();
+  }
+
+private:
+  void skip_taken() {
+    while (cursor_ < order_.size() && group_of_[order_[cursor_]] != kNone) ++cursor_;
+  }
+
+  void grow() {
+    const auto group = static_cast<uint32_t>(sizes_.size());
+    sizes_.push_back(0);
+    members_.clear(), frontier_.clear();
+    take(order_[cursor_], group);
+    while (sizes_[group] < kGroupTargetClusters) {
+      uint32_t next = pick();
+      if (next == kNone) {
+        if (sizes_[group] >= kFewClusters && !isolated()) break;
+        skip_taken();
+        if (cursor_ == order_.size()) break;
+        next = order_[cursor_];
+      }
+      take(next, group);
+    }
+    for (const uint32_t cluster : frontier_) weight_[cluster] = 0;
+    if (sizes_[group] < kFewClusters) join_neighbour(group);
+  }
+
+  /// No member has a neighbour outside: nothing is lost by going on elsewhere.
+  bool isolated() const {
+    return std::all_of(members_.begin(), members_.end(), [&](uint32_t cluster) {
+      const auto links = adjacency_.of(cluster);
+      return std::all_of(links.begin(), links.end(),
+                         [&](const auto& link) { return group_of_[link.cluster] == group_of_[cluster]; });
+    });
+  }
+
+  void take(uint32_t cluster, uint32_t group) {
+    group_of_[cluster] = group;
+    ++sizes_[group];
+    members_.push_back(cluster);
+    for (const auto& link : adjacency_.of(cluster)) {
+      if (group_of_[link.cluster] != kNone) continue;
+      if (weight_[link.cluster] == 0) frontier_.push_back(link.cluster);
+      weight_[link.cluster] += link.edges;
+    }
+  }
+
+  /// The cluster whose border lies most within the group.
+  uint32_t pick() {
+    uint32_t best = kNone;
+    double best_share = -1.0;
+    size_t kept = 0;
+    for (const uint32_t cluster : frontier_) {
+      if (group_of_[cluster] != kNone) {
+        weight_[cluster] = 0;
+        continue;
+      }
+      frontier_[kept++] = cluster;
+      const double share = static_cast<double>(weight_[cluster]) / total_[cluster];
+      if (share > best_share) best = cluster, best_share = share;
+    }
+    frontier_.resize(kept);
+    return best;
+  }
+
+  /// A small group becomes part of the one it shares the longest border with, of those with room.
+  void join_neighbour(uint32_t group) {
+    std::vector<std::pair<uint32_t, uint32_t>> shared; // group, edges
+    for (const uint32_t cluster : members_)
+      for (const auto& link : adjacency_.of(cluster)) {
+        const uint32_t other = group_of_[link.cluster];
+        if (other == group || other == kNone || sizes_[other] + sizes_[group] > kMaxGroupClusters) continue;
+        const auto found = std::find_if(shared.begin(), shared.end(), [&](const auto& s) { return s.first == other; });
+        if (found == shared.end())
+          shared.emplace_back(other, link.edges);
+        else
+          found->second += link.edges;
+      }
+    if (shared.empty()) return;
+    const uint32_t into = std::max_element(shared.begin(), shared.end(), [](const auto& a, const auto& b) {
+                            return a.second < b.second;
+                          })->first;
+    for (const uint32_t cluster : members_) group_of_[cluster] = into;
+    sizes_[into] += sizes_[group];
+    sizes_[group] = 0;
+  }
+
+  std::vector<uint32_t> number_groups() {
+    std::vector<uint32_t> number(sizes_.size());
+    uint32_t count = 0;
+    for (size_t i = 0; i < sizes_.size(); ++i) number[i] = sizes_[i] > 0 ? count++ : kNone;
+    for (uint32_t& group : group_of_) group = number[group];
+    return std::move(group_of_);
+  }
+
+  Adjacency adjacency_;
+  std::vector<uint32_t> order_, group_of_, weight_, total_, sizes_;
+  std::vector<uint32_t> members_, frontier_; // of the group that grows
+  size_t cursor_ = 0;
+};
+
+} // namespace
+
+std::vector<uint32_t> group_clusters(const ClusterRuns& clusters) { return Grouper(clusters).run(); }
+
+} // namespace packtrace

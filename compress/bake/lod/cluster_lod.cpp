@@ -1,0 +1,238 @@
+#include "compress/bake/lod/cluster_lod.h"
+
+#include <algorithm>
+#include <atomic>
+#include <limits>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include "compress/bake/lod/cluster_groups.h"
+#include "compress/bake/lod/lod_group_builder.h"
+#include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/progress.h"
+
+namespace packtrace {
+namespace {
+
+constexpr uint32_t kNone = ~0u;
+constexpr double kWorthwhile = 0.85;      // groups that keep more of their triangles are left as they are
+constexpr double kInflation = 1.0 + 1e-6; // of spheres around spheres: more than roundings can shrink them
+
+double distance(DVec3 a, DVec3 b) { return glm::length(a - b); }
+
+/// A ball around balls: about the middle of their boxes.
+LodSphere enclose(std::span<const LodSphere> spheres) {
+  DVec3 lo(std::numeric_limits<double>::infinity()), hi(-lo);
+  for (const LodSphere& s : spheres) lo = glm::min(lo, s.center - s.radius), hi = glm::max(hi, s.center + s.radius);
+  LodSphere result{0.5 * (lo + hi), 0.0};
+  for (const LodSphere& s : spheres)
+    result.radius = std::max(result.radius, distance(result.center, s.center) + s.radius);
+  result.radius *= kInflation;
+  return result;
+}
+
+class LodBuilder {
+public:
+  LodBuilder(const QuantizedGeometry& geometry, Progress& progress) : g_(geometry), progress_(progress) {
+    lod_.positions = geometry.positions;
+    lod_.vertices = geometry.vertices;
+    for (const TriangleKind& kind : geometry.kinds) seam_of_kind_.push_back(kind.material);
+  }
+
+  ClusterLod run(const GeometryClusters& base) {
+    take_base(base);
+    locked_for_ever_.assign(lod_.positions.size(), 0);
+    std::vector<uint32_t> active(lod_.clusters.size());
+    for (uint32_t i = 0; i < active.size(); ++i) active[i] = i;
+    for (uint32_t level = 0; !active.empty(); ++level) {
+      if (level == kMaxLodLevels) throw Error(ErrorKind::kLimitExceeded, "more levels of detail than the format holds");
+      lod_.level_count = level + 1;
+      active = build_level(level, active);
+    }
+    return std::move(lod_);
+  }
+
+private:
+  void take_base(const GeometryClusters& base) {
+    lod_.triangles.reserve(2 * base.triangles.size());
+    lod_.triangles = base.triangles;
+    for (const ClusterRange& range : base.clusters) lod_.clusters.push_back({range, 0, kNoGroup, kNoGroup});
+    cluster_spheres_.resize(lod_.clusters.size());
+    tbb::parallel_for(size_t{0}, lod_.clusters.size(),
+                      [&](size_t i) { cluster_spheres_[i] = bound(lod_.clusters[i]); });
+  }
+
+  DVec3 point(uint32_t position) const {
+    DVec3 p;
+    for (size_t axis = 0; axis < 3; ++axis)
+      p[static_cast<int>(axis)] = static_cast<double>(lod_.positions[position][axis] - g_.origin[axis]);
+    return p;
+  }
+
+  LodSphere bound(const LodCluster& cluster) const {
+    DVec3 lo(std::numeric_limits<double>::infinity()), hi(-lo);
+    const auto for_each_point = [&](const auto& visit) {
+      for (uint32_t i = 0; i < cluster.range.triangle_count; ++i)
+        for (int corner = 0; corner < 3; ++corner)
+          visit(point(lod_.vertices[lod_.triangles[cluster.range.first_triangle + i][corner]].position));
+    };
+    for_each_point([&](DVec3 p) { lo = glm::min(lo, p), hi = glm::max(hi, p); });
+    LodSphere sphere{0.5 * (lo + hi), 0.0};
+    for_each_point([&](DVec3 p) { sphere.radius = std::max(sphere.radius, distance(p, sphere.center)); });
+    sphere.radius *= kInflation;
+    return sphere;
+  }
+
+  /// Groups the clusters and simplifies each group. Returns the new clusters.
+  std::vector<uint32_t> build_level(uint32_t level, const std::vector<uint32_t>& active) {
+    const std::vector<std::vector<uint32_t>> members = form_groups(active);
+    const auto first_group = static_cast<uint32_t>(lod_.groups.size());
+    lod_.groups.resize(first_group + members.size());
+    std::vector<SimplifiedGroup> results(members.size());
+    if (active.size() > 1) { // a single cluster is the coarsest that there can be
+      mark_owners(members);
+      tbb::parallel_for(size_t{0}, members.size(), [&](size_t i) {
+        results[i] = simplify_group(members[i]);
+        progress_.advance(members[i].size());
+      });
+    }
+    for (size_t i = 0; i < members.size(); ++i)
+      finish_group(first_group + static_cast<uint32_t>(i), level, members[i], results[i]);
+    return append(level, first_group, results);
+  }
+
+  std::vector<std::vector<uint32_t>> form_groups(const std::vector<uint32_t>& active) const {
+    std::vector<Triangle> points;
+    std::vector<uint32_t> ends;
+    std::vector<DVec3> centers;
+    for (const uint32_t number : active) {
+      const LodCluster& c = lod_.clusters[number];
+      for (uint32_t i = 0; i < c.range.triangle_count; ++i)
+        points.push_back(points_of(lod_.triangles[c.range.first_triangle + i]));
+      ends.push_back(static_cast<uint32_t>(points.size()));
+      centers.push_back(cluster_spheres_[number].center);
+    }
+    const std::vector<uint32_t> group_of = group_clusters({points, ends, centers});
+    std::vector<std::vector<uint32_t>> members;
+    for (size_t i = 0; i < active.size(); ++i) {
+      if (group_of[i] >= members.size()) members.resize(group_of[i] + 1);
+      members[group_of[i]].push_back(active[i]);
+    }
+    return members;
+  }
+
+  Triangle points_of(const Triangle& t) const {
+    return {lod_.vertices[t.x].position, lod_.vertices[t.y].position, lod_.vertices[t.z].position};
+  }
+
+  /// owner_ becomes each position's group, or kShared where there are several.
+  void mark_owners(const std::vector<std::vector<uint32_t>>& members) {
+    owner_.assign(lod_.positions.size(), kNone);
+    tbb::parallel_for(size_t{0}, members.size(), [&](size_t group) {
+      for (const uint32_t number : members[group]) {
+        const LodCluster& c = lod_.clusters[number];
+        for (uint32_t i = 0; i < c.range.triangle_count; ++i)
+          for (int corner = 0; corner < 3; ++corner) {
+            const Triangle& t = lod_.triangles[c.range.first_triangle + i];
+            std::atomic_ref<uint32_t> owner(owner_[lod_.vertices[t[corner]].position]);
+            uint32_t expected = kNone;
+            if (!owner.compare_exchange_strong(expected, static_cast<uint32_t>(group), std::memory_order_relaxed) &&
+                expected != group)
+              owner.store(kShared, std::memory_order_relaxed);
+          }
+      }
+    });
+  }
+
+  SimplifiedGroup simplify_group(const std::vector<uint32_t>& members) const {
+    LodGroupInput input{g_, lod_.positions, lod_.vertices, lod_.triangles,  {},
+                        {}, seam_of_kind_,  owner_,        locked_for_ever_};
+    for (const uint32_t number : members) {
+      input.clusters.push_back(&lod_.clusters[number]);
+      const uint32_t generating = lod_.clusters[number].generating_group;
+      input.errors.push_back(generating == kNoGroup ? 0.0 : lod_.groups[generating].error);
+    }
+    SimplifiedGroup result = packtrace::simplify_group(input);
+    if (static_cast<double>(result.triangles.size()) > kWorthwhile * static_cast<double>(result.source_triangles))
+      result = {};
+    return result;
+  }
+
+  void finish_group(uint32_t number, uint32_t level, const std::vector<uint32_t>& members,
+                    const SimplifiedGroup& result) {
+    LodGroup& group = lod_.groups[number];
+    group.level = level;
+    group.terminal = result.triangles.empty();
+    group.error = group.terminal ? std::numeric_limits<double>::infinity() : result.error;
+    std::vector<LodSphere> spheres;
+    for (const uint32_t member : members) {
+      LodCluster& c = lod_.clusters[member];
+      c.group = number;
+      spheres.push_back(cluster_spheres_[member]);
+      if (group.terminal)
+        for (uint32_t i = 0; i < c.range.triangle_count; ++i)
+          for (int corner = 0; corner < 3; ++corner)
+            locked_for_ever_[lod_.vertices[lod_.triangles[c.range.first_triangle + i][corner]].position] = 1;
+    }
+    group.sphere = enclose(spheres);
+  }
+
+  /// New positions, vertices, triangles and clusters of all groups, in their order.
+  std::vector<uint32_t> append(uint32_t level, uint32_t first_group, const std::vector<SimplifiedGroup>& results) {
+    std::vector<uint32_t> added;
+    for (size_t i = 0; i < results.size(); ++i) {
+      const SimplifiedGroup& r = results[i];
+      const uint32_t group = first_group + static_cast<uint32_t>(i);
+      const auto first_position = static_cast<uint32_t>(lod_.positions.size());
+      const auto first_vertex = static_cast<uint32_t>(lod_.vertices.size());
+      const auto first_triangle = static_cast<uint32_t>(lod_.triangles.size());
+      lod_.positions.insert(lod_.positions.end(), r.new_positions.begin(), r.new_positions.end());
+      for (QuantizedVertex v : r.new_vertices) {
+        if (v.position >= kNewNumber) v.position += first_position - kNewNumber;
+        lod_.vertices.push_back(v);
+      }
+      for (Triangle t : r.triangles) {
+        for (int corner = 0; corner < 3; ++corner)
+          if (t[corner] >= kNewNumber) t[corner] += first_vertex - kNewNumber;
+        lod_.triangles.push_back(t);
+      }
+      uint32_t begin = 0;
+      for (size_t c = 0; c < r.cluster_ends.size(); ++c) {
+        added.push_back(static_cast<uint32_t>(lod_.clusters.size()));
+        lod_.clusters.push_back(
+            {{first_triangle + begin, r.cluster_ends[c] - begin, r.cluster_kinds[c]}, level + 1, kNoGroup, group});
+        cluster_spheres_.push_back(lod_.groups[group].sphere);
+        begin = r.cluster_ends[c];
+      }
+    }
+    if (lod_.positions.size() >= kNewNumber || lod_.vertices.size() >= kNewNumber)
+      throw Error(ErrorKind::kLimitExceeded, "levels of detail of more than 2^31 vertices in one geometry");
+    locked_for_ever_.resize(lod_.positions.size(), 0);
+    return added;
+  }
+
+  const QuantizedGeometry& g_;
+  Progress& progress_;
+  ClusterLod lod_;
+  std::vector<uint32_t> seam_of_kind_;
+  std::vector<LodSphere> cluster_spheres_; ///< of level 0: their own; else that of the generating group
+  std::vector<uint32_t> owner_;
+  std::vector<uint8_t> locked_for_ever_; ///< positions of terminal groups
+};
+
+} // namespace
+
+ClusterLod build_cluster_lod(const QuantizedGeometry& geometry, const GeometryClusters& base, Progress& progress) {
+  progress.begin("building levels of detail", 0);
+  return LodBuilder(geometry, progress).run(base);
+}
+
+uint64_t level_triangles(const ClusterLod& lod, uint32_t level) {
+  uint64_t count = 0;
+  for (const LodCluster& c : lod.clusters)
+    if (c.level == level || (c.level < level && lod.groups[c.group].terminal)) count += c.range.triangle_count;
+  return count;
+}
+
+} // namespace packtrace

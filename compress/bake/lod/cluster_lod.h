@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "compress/bake/geometry_clusters.h"
+
+namespace packtrace {
+
+class Progress;
+
+inline constexpr uint32_t kNoGroup = ~0u;
+inline constexpr uint32_t kMaxLodLevels = 32;
+
+/// A ball in lattice steps from the geometry's origin.
+struct LodSphere {
+  DVec3 center{0.0};
+  double radius = 0.0;
+};
+
+/// Up to 128 triangles of one kind at one level.
+struct LodCluster {
+  ClusterRange range; ///< of ClusterLod::triangles
+  uint32_t level = 0;
+  uint32_t group = kNoGroup;            ///< it is part of
+  uint32_t generating_group = kNoGroup; ///< it was simplified from; none at level 0
+};
+
+/// Clusters that were simplified together.
+struct LodGroup {
+  uint32_t level = 0;    ///< of its clusters
+  bool terminal = false; ///< nothing coarser was made from it: its clusters stand for themselves at all coarser levels
+  /// Of what was made from it, in lattice steps: no point of that surface is further than this from the part of level 0
+  /// that it stands for, nor the other way round. At least as large as that of every group below. Infinite if terminal.
+  double error = 0.0;
+  LodSphere sphere; ///< holds the spheres of all groups below, and so everything it was ever made from
+};
+
+/// The levels of one geometry. A cut takes, for some threshold, each cluster whose group's error is above it and whose
+/// generating group's is not; whatever the threshold, the cut covers the surface once and has no crack.
+struct ClusterLod {
+  std::vector<LatticePoint> positions;   ///< those of the geometry, then new ones
+  std::vector<QuantizedVertex> vertices; ///< those of the geometry, then new ones
+  std::vector<Triangle> triangles;       ///< into vertices
+  std::vector<LodCluster> clusters;      ///< level by level; level 0 as given
+  std::vector<LodGroup> groups;          ///< level by level
+  uint32_t level_count = 0;
+};
+
+/// Builds coarser levels until one cluster is left, or nothing that can be simplified. Any triangles will do.
+/// Same result for any thread count. Throws Error(kCancelled), Error(kLimitExceeded).
+/// @param base the geometry's clusters
+ClusterLod build_cluster_lod(const QuantizedGeometry& geometry, const GeometryClusters& base, Progress& progress);
+
+/// Triangles of the discrete level: its clusters, and those of terminal groups below it.
+uint64_t level_triangles(const ClusterLod& lod, uint32_t level);
+
+} // namespace packtrace

@@ -1,0 +1,203 @@
+#include "compress/bake/lod/lod_group_builder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <tuple>
+
+#include "compress/bake/clusterize.h"
+#include "compress/bake/lod/loose_pieces.h"
+#include "compress/bake/lod/simplify.h"
+#include "compress/bake/lod/surface_bound.h"
+#include "compress/bake/morton.h"
+#include "compress/bake/weld_table.h"
+#include "compress/format/normal_codec.h"
+
+namespace packtrace {
+namespace {
+
+class GroupBuilder {
+public:
+  explicit GroupBuilder(const LodGroupInput& input) : in_(input), encoding_(input.geometry.normal_encoding) {
+    for (const LodCluster* c : in_.clusters) out_.source_triangles += c->range.triangle_count;
+  }
+
+  SimplifiedGroup run() {
+    gather();
+    SimplifyConfig config;
+    config.target_triangles = static_cast<uint32_t>(out_.source_triangles / 2);
+    config.seam_of_kind = in_.seam_of_kind;
+    config.keep_points = keep_points_;
+    const std::vector<DVec3> points = mesh_.points;
+    const std::vector<LodTriangle> triangles = mesh_.triangles;
+    simplify(mesh_, config);
+    bound_errors(points, triangles, mesh_);
+    if (mesh_.triangles.size() > config.target_triangles) drop_loose_pieces(mesh_, config.target_triangles);
+    for (const LodTriangle& t : mesh_.triangles) out_.error = std::max(out_.error, t.error);
+    for (const double error : in_.errors) out_.error = std::max(out_.error, error);
+    number_vertices();
+    split();
+    return std::move(out_);
+  }
+
+private:
+  /// A number for each value, 0, 1, ... in the order they come.
+  uint32_t local(WeldTable& table, std::vector<uint32_t>& values, uint32_t value) {
+    const auto next = static_cast<uint32_t>(values.size());
+    const uint32_t number =
+        table.find_or_add(mix_words(value, 0), next, [&](uint32_t other) { return values[other] == value; });
+    if (number == next) values.push_back(value);
+    return number;
+  }
+
+  void gather() {
+    WeldTable point_table(3 * out_.source_triangles), wedge_table(3 * out_.source_triangles);
+    std::vector<uint32_t> wedge_vertices;
+    for (size_t i = 0; i < in_.clusters.size(); ++i) {
+      const LodCluster& c = *in_.clusters[i];
+      const TriangleKind& kind = in_.geometry.kinds[c.range.kind];
+      keep_points_ |= kind.uvs;
+      const bool plain = kind.flat && !kind.uvs;
+      for (uint32_t k = 0; k < c.range.triangle_count; ++k) {
+        const Triangle& v = in_.triangles[c.range.first_triangle + k];
+        LodTriangle t{{}, Triangle(Wedge::kNone), c.range.kind, in_.errors[i]};
+        for (int corner = 0; corner < 3; ++corner) {
+          t.points[corner] = local(point_table, positions_, in_.vertices[v[corner]].position);
+          if (!plain) t.wedges[corner] = local(wedge_table, wedge_vertices, v[corner]);
+        }
+        if (t.points.x != t.points.y && t.points.y != t.points.z && t.points.z != t.points.x)
+          mesh_.triangles.push_back(t);
+      }
+    }
+    for (const uint32_t vertex : wedge_vertices)
+      mesh_.wedges.push_back({DVec3(decode_normal(encoding_, in_.vertices[vertex].normal_code)), vertex});
+    place_points();
+  }
+
+  /// Coordinates from about the middle of the group, so that they are small.
+  void place_points() {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      int64_t lo = std::numeric_limits<int64_t>::max(), hi = std::numeric_limits<int64_t>::min();
+      for (const uint32_t p : positions_)
+        lo = std::min(lo, in_.positions[p][axis]), hi = std::max(hi, in_.positions[p][axis]);
+      center_[axis] = lo + (hi - lo) / 2;
+    }
+    for (const uint32_t p : positions_) {
+      DVec3 d;
+      for (size_t axis = 0; axis < 3; ++axis)
+        d[static_cast<int>(axis)] = static_cast<double>(in_.positions[p][axis] - center_[axis]);
+      mesh_.points.push_back(d);
+      mesh_.locked.push_back(in_.owner[p] == kShared || in_.locked_for_ever[p] != 0);
+    }
+  }
+
+  /// The vertex of a corner: an old one where nothing changed, else a new one.
+  uint32_t vertex_number(uint32_t point, uint32_t wedge, const TriangleKind& kind) {
+    QuantizedVertex v{position_number(point), 0, {}};
+    if (wedge != Wedge::kNone) {
+      const Wedge& w = mesh_.wedges[wedge];
+      if (w.source != Wedge::kNone) {
+        const QuantizedVertex& source = in_.vertices[w.source];
+        if (source.position == v.position) return w.source;
+        v.normal_code = source.normal_code, v.uv = source.uv;
+      } else if (!kind.flat) {
+        v.normal_code = encode_normal(encoding_, w.normal);
+      }
+    }
+    const auto next = static_cast<uint32_t>(out_.new_vertices.size());
+    const uint64_t uv = static_cast<uint32_t>(v.uv[0]) | (uint64_t{static_cast<uint32_t>(v.uv[1])} << 32);
+    const uint32_t number = vertex_table_->find_or_add(mix_words(v.position, v.normal_code, uv), next,
+                                                       [&](uint32_t other) { return out_.new_vertices[other] == v; });
+    if (number == next) out_.new_vertices.push_back(v);
+    return kNewNumber + number;
+  }
+
+  uint32_t position_number(uint32_t point) {
+    if (mesh_.moved[point] == 0) return positions_[point];
+    uint32_t& number = new_position_[point];
+    if (number == Wedge::kNone) {
+      number = kNewNumber + static_cast<uint32_t>(out_.new_positions.size());
+      LatticePoint p{};
+      for (size_t axis = 0; axis < 3; ++axis)
+        p[axis] = center_[axis] + static_cast<int64_t>(mesh_.points[point][static_cast<int>(axis)]);
+      out_.new_positions.push_back(p);
+    }
+    return number;
+  }
+
+  void number_vertices() {
+    WeldTable table(3 * mesh_.triangles.size());
+    vertex_table_ = &table;
+    new_position_.assign(mesh_.points.size(), Wedge::kNone);
+    for (const LodTriangle& t : mesh_.triangles) {
+      Triangle v{};
+      for (int corner = 0; corner < 3; ++corner)
+        v[corner] = vertex_number(t.points[corner], t.wedges[corner], in_.geometry.kinds[t.kind]);
+      vertices_.push_back(v);
+    }
+  }
+
+  /// Clusters of each kind's triangles, in an order that keeps neighbours close.
+  void split() {
+    std::vector<std::tuple<uint32_t, uint64_t, uint32_t>> keys; // kind, place, triangle
+    DVec3 lo(std::numeric_limits<double>::infinity()), hi(-lo);
+    for (const DVec3& p : mesh_.points) lo = glm::min(lo, p), hi = glm::max(hi, p);
+    const double extent = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z, 1.0});
+    const double scale = static_cast<double>((1u << kMortonBits) - 1) / (3.0 * extent);
+    for (uint32_t i = 0; i < mesh_.triangles.size(); ++i) {
+      const DVec3 p = (corner_sum(i) - 3.0 * lo) * scale;
+      keys.emplace_back(mesh_.triangles[i].kind,
+                        morton_code(static_cast<uint64_t>(p.x), static_cast<uint64_t>(p.y), static_cast<uint64_t>(p.z)),
+                        i);
+    }
+    std::sort(keys.begin(), keys.end());
+    for (size_t begin = 0, end; begin < keys.size(); begin = end) {
+      std::vector<uint32_t> triangles;
+      for (end = begin; end < keys.size() && std::get<0>(keys[end]) == std::get<0>(keys[begin]); ++end)
+        triangles.push_back(std::get<2>(keys[end]));
+      split_kind(std::get<0>(keys[begin]), triangles);
+    }
+  }
+
+  DVec3 corner_sum(uint32_t triangle) const {
+    const Triangle& t = mesh_.triangles[triangle].points;
+    return mesh_.points[t.x] + mesh_.points[t.y] + mesh_.points[t.z];
+  }
+
+  void split_kind(uint32_t kind, const std::vector<uint32_t>& triangles) {
+    std::vector<uint32_t> numbers;
+    WeldTable table(3 * triangles.size());
+    std::vector<Triangle> vertices, points;
+    std::vector<DVec3> centroids;
+    for (const uint32_t triangle : triangles) {
+      Triangle v{};
+      for (int corner = 0; corner < 3; ++corner) v[corner] = local(table, numbers, vertices_[triangle][corner]);
+      vertices.push_back(v);
+      points.push_back(mesh_.triangles[triangle].points);
+      centroids.push_back(corner_sum(triangle));
+    }
+    const Clusters clusters = clusterize({vertices, points, centroids, static_cast<uint32_t>(numbers.size()),
+                                          static_cast<uint32_t>(mesh_.points.size())});
+    const auto before = static_cast<uint32_t>(out_.triangles.size());
+    for (const uint32_t member : clusters.order) out_.triangles.push_back(vertices_[triangles[member]]);
+    for (const uint32_t end : clusters.ends)
+      out_.cluster_ends.push_back(before + end), out_.cluster_kinds.push_back(kind);
+  }
+
+  const LodGroupInput& in_;
+  NormalEncoding encoding_;
+  SimplifiedGroup out_;
+  SimplifyMesh mesh_;
+  LatticePoint center_{};
+  bool keep_points_ = false;
+  std::vector<uint32_t> positions_;    // of each point
+  std::vector<uint32_t> new_position_; // of each point that moved
+  std::vector<Triangle> vertices_;     // of each triangle that is left
+  WeldTable* vertex_table_ = nullptr;
+};
+
+} // namespace
+
+SimplifiedGroup simplify_group(const LodGroupInput& input) { return GroupBuilder(input).run(); }
+
+} // namespace packtrace

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "compress/bake/lod/cluster_lod.h"
+
+namespace packtrace {
+
+/// In results that are made before it is known how many positions and vertices come before: the first new one is this.
+inline constexpr uint32_t kNewNumber = 1u << 31;
+/// LodGroupInput::owner of positions that several groups have.
+inline constexpr uint32_t kShared = ~0u - 1;
+
+/// The clusters of a group, and what its surroundings ask for. Everything is read only: groups are simplified in
+/// parallel.
+struct LodGroupInput {
+  const QuantizedGeometry& geometry;
+  std::span<const LatticePoint> positions;
+  std::span<const QuantizedVertex> vertices;
+  std::span<const Triangle> triangles;
+  std::vector<const LodCluster*> clusters;
+  std::vector<double> errors; ///< of each cluster's surface
+  std::span<const uint32_t> seam_of_kind;
+  std::span<const uint32_t> owner;          ///< per position; kShared ones stay
+  std::span<const uint8_t> locked_for_ever; ///< per position; those stay too
+};
+
+/// What a group became.
+struct SimplifiedGroup {
+  uint64_t source_triangles = 0;
+  double error = 0.0;                        ///< lattice steps
+  std::vector<LatticePoint> new_positions;   ///< numbered from kNewNumber
+  std::vector<QuantizedVertex> new_vertices; ///< numbered from kNewNumber
+  std::vector<Triangle> triangles;           ///< vertices, cluster by cluster
+  std::vector<uint32_t> cluster_ends;
+  std::vector<uint32_t> cluster_kinds;
+};
+
+/// Halves the triangles of a group as far as its locked positions allow, and splits the result into clusters.
+/// Triangles with two corners in one place are left out.
+SimplifiedGroup simplify_group(const LodGroupInput& input);
+
+} // namespace packtrace

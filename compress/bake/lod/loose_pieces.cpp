@@ -1,0 +1,145 @@
+#include "compress/bake/lod/loose_pieces.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <vector>
+
+#include "compress/bake/lod/triangle_distance.h"
+
+namespace packtrace {
+namespace {
+
+constexpr uint32_t kNone = ~0u;
+
+struct Piece {
+  std::vector<uint32_t> triangles;
+  DVec3 center{0.0};
+  double error = 0.0; ///< largest of its triangles
+  bool locked = false, dropped = false;
+};
+
+/// Where a piece's surface would be found once it is dropped.
+struct Stand {
+  double distance = std::numeric_limits<double>::infinity();
+  uint32_t piece = kNone, triangle = kNone;
+};
+
+class Dropper {
+public:
+  explicit Dropper(SimplifyMesh& mesh) : m_(mesh) {}
+
+  void run(uint32_t target) {
+    find_pieces();
+    if (pieces_.size() < 2) return;
+    size_t live = m_.triangles.size();
+    std::vector<Stand> stands(pieces_.size());
+    std::vector<uint32_t> order;
+    for (uint32_t i = 0; i < pieces_.size(); ++i)
+      if (!pieces_[i].locked && pieces_[i].triangles.size() <= live - target)
+        stands[i] = find_stand(i), order.push_back(i);
+    std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+      return stands[a].distance != stands[b].distance ? stands[a].distance < stands[b].distance : a < b;
+    });
+    for (const uint32_t i : order) {
+      if (live <= target) break;
+      Stand stand = stands[i];
+      if (pieces_[stand.piece].dropped) stand = find_stand(i);
+      if (stand.piece == kNone) break; // the last one
+      LodTriangle& t = m_.triangles[stand.triangle];
+      t.error = std::max(t.error, pieces_[i].error + stand.distance);
+      pieces_[stand.piece].error = std::max(pieces_[stand.piece].error, t.error);
+      pieces_[i].dropped = true;
+      live -= pieces_[i].triangles.size();
+    }
+    remove_dropped();
+  }
+
+private:
+  void find_pieces() {
+    std::vector<uint32_t> parent(m_.points.size());
+    std::iota(parent.begin(), parent.end(), 0u);
+    const auto root = [&](uint32_t p) {
+      while (parent[p] != p) p = parent[p] = parent[parent[p]];
+      return p;
+    };
+    for (const LodTriangle& t : m_.triangles)
+      for (int i = 1; i < 3; ++i) {
+        const uint32_t a = root(t.points[0]), b = root(t.points[i]);
+        parent[std::max(a, b)] = std::min(a, b);
+      }
+    std::vector<uint32_t> piece_of(m_.points.size(), kNone);
+    for (uint32_t i = 0; i < m_.triangles.size(); ++i) {
+      const LodTriangle& t = m_.triangles[i];
+      uint32_t& number = piece_of[root(t.points[0])];
+      if (number == kNone) number = static_cast<uint32_t>(pieces_.size()), pieces_.emplace_back();
+      Piece& piece = pieces_[number];
+      piece.triangles.push_back(i);
+      piece.error = std::max(piece.error, t.error);
+      for (int corner = 0; corner < 3; ++corner) {
+        piece.center += m_.points[t.points[corner]];
+        piece.locked |= m_.locked[t.points[corner]] != 0;
+      }
+    }
+    for (Piece& piece : pieces_) piece.center /= static_cast<double>(3 * piece.triangles.size());
+  }
+
+  /// The largest distance of a piece's points from one triangle, which bounds that of all its surface: distance to a
+  /// convex set is convex.
+  /// Infinite where it is not below `limit`.
+  double distance(const Piece& piece, const Triangle& to, double limit) const {
+    double largest2 = 0.0;
+    for (const uint32_t triangle : piece.triangles)
+      for (int i = 0; i < 3; ++i) {
+        const DVec3 p = m_.points[m_.triangles[triangle].points[i]];
+        const DVec3 d = p - nearest_point(p, m_.points[to.x], m_.points[to.y], m_.points[to.z]);
+        largest2 = std::max(largest2, glm::dot(d, d));
+        if (largest2 >= limit * limit) return std::numeric_limits<double>::infinity();
+      }
+    return std::sqrt(largest2);
+  }
+
+  Stand find_stand(uint32_t number) const {
+    constexpr size_t kTried = 3; // pieces with the nearest centres
+    std::array<std::pair<double, uint32_t>, kTried> nearest;
+    nearest.fill({std::numeric_limits<double>::infinity(), kNone});
+    const Piece& piece = pieces_[number];
+    for (uint32_t i = 0; i < pieces_.size(); ++i) {
+      if (i == number || pieces_[i].dropped) continue;
+      const DVec3 d = pieces_[i].center - piece.center;
+      std::pair<double, uint32_t> candidate{glm::dot(d, d), i};
+      for (auto& entry : nearest)
+        if (candidate < entry) std::swap(candidate, entry);
+    }
+    Stand best;
+    for (const auto& [unused, other] : nearest) {
+      if (other == kNone) continue;
+      for (const uint32_t triangle : pieces_[other].triangles) {
+        const double d = distance(piece, m_.triangles[triangle].points, best.distance);
+        if (d < best.distance) best = {d, other, triangle};
+      }
+    }
+    return best;
+  }
+
+  void remove_dropped() {
+    std::vector<uint8_t> gone(m_.triangles.size());
+    for (const Piece& piece : pieces_)
+      for (const uint32_t triangle : piece.triangles) gone[triangle] = piece.dropped;
+    size_t kept = 0;
+    for (size_t i = 0; i < m_.triangles.size(); ++i)
+      if (gone[i] == 0) m_.triangles[kept++] = m_.triangles[i];
+    m_.triangles.resize(kept);
+  }
+
+  SimplifyMesh& m_;
+  std::vector<Piece> pieces_;
+};
+
+} // namespace
+
+void drop_loose_pieces(SimplifyMesh& mesh, uint32_t target_triangles) { Dropper(mesh).run(target_triangles); }
+
+} // namespace packtrace

@@ -1,0 +1,404 @@
+#include "compress/bake/lod/simplify.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "compress/bake/lod/quadric.h"
+#include "compress/bake/weld_table.h"
+
+namespace packtrace {
+namespace {
+
+constexpr uint32_t kNone = ~0u;
+constexpr double kBorderWeight = 8.0;  // of border planes against the triangles' own
+constexpr double kSeamWeight = 2.0;    // where the material changes
+constexpr double kCreaseWeight = 0.25; // where normals or texture coordinates change
+constexpr double kLargestTurn = 0.2;   // cosine; a triangle may turn by less than that in one collapse
+
+struct Edge {
+  uint32_t a, b;  ///< points at first; follow merged_into_
+  uint32_t stamp; ///< of both when the cost was computed
+};
+
+struct HeapEntry {
+  double cost;
+  uint32_t edge;
+  bool operator<(const HeapEntry& o) const { return cost != o.cost ? cost > o.cost : edge > o.edge; } // least on top
+};
+
+class Simplifier {
+public:
+  Simplifier(SimplifyMesh& mesh, const SimplifyConfig& config) : m_(mesh), config_(config) {}
+
+  void run() {
+    m_.moved.assign(m_.points.size(), 0);
+    m_.stands_for.resize(m_.points.size());
+    for (uint32_t i = 0; i < m_.stands_for.size(); ++i) m_.stands_for[i] = i;
+    live_ = m_.triangles.size();
+    for (const DVec3& p : m_.points) lo_ = glm::min(lo_, p), hi_ = glm::max(hi_, p);
+    if (live_ <= config_.target_triangles) return;
+    link_corners();
+    find_edges();
+    fill_heap();
+    while (live_ > config_.target_triangles && !heap_.empty()) {
+      const size_t before = live_;
+      drain_heap();
+      if (live_ == before) break;
+      retry_rejected();
+    }
+    compact();
+    for (uint32_t i = 0; i < merged_into_.size(); ++i) m_.stands_for[i] = root(i);
+  }
+
+private:
+  static constexpr uint8_t kBorder = 1;
+
+  // ---- what is where
+
+  void link_corners() {
+    const size_t count = m_.triangles.size();
+    next_corner_.assign(3 * count, kNone);
+    first_corner_.assign(m_.points.size(), kNone);
+    last_corner_.assign(m_.points.size(), kNone);
+    for (uint32_t corner = 0; corner < 3 * count; ++corner) append(point_of(corner), corner);
+    alive_.assign(count, 1);
+    merged_into_.resize(m_.points.size());
+    for (uint32_t i = 0; i < merged_into_.size(); ++i) merged_into_[i] = i;
+    stamp_.assign(m_.points.size(), 0);
+    flags_.assign(m_.points.size(), 0);
+    quadrics_.assign(m_.points.size(), {});
+    mark_.assign(m_.points.size(), 0);
+    wedge_into_.resize(m_.wedges.size());
+    for (uint32_t i = 0; i < wedge_into_.size(); ++i) wedge_into_[i] = i;
+  }
+
+  uint32_t point_of(uint32_t corner) const { return m_.triangles[corner / 3].points[static_cast<int>(corner % 3)]; }
+
+  void append(uint32_t point, uint32_t corner) {
+    if (first_corner_[point] == kNone)
+      first_corner_[point] = corner;
+    else
+      next_corner_[last_corner_[point]] = corner;
+    last_corner_[point] = corner;
+  }
+
+  uint32_t root(uint32_t point) {
+    while (merged_into_[point] != point) point = merged_into_[point] = merged_into_[merged_into_[point]];
+    return point;
+  }
+
+  uint32_t wedge_root(uint32_t wedge) const {
+    while (wedge != Wedge::kNone && wedge_into_[wedge] != wedge) wedge = wedge_into_[wedge];
+    return wedge;
+  }
+
+  DVec3 area_normal(const Triangle& t) const {
+    return glm::cross(m_.points[t.y] - m_.points[t.x], m_.points[t.z] - m_.points[t.x]);
+  }
+
+  // ---- edges and costs at the start
+
+  /// A side of a triangle while edges are looked for.
+  struct EdgeUse {
+    uint32_t a, b, uses, triangle;
+    bool seam, crease;
+  };
+
+  void find_edges() {
+    std::vector<EdgeUse> uses;
+    uses.reserve(m_.triangles.size() * 2);
+    WeldTable table(3 * m_.triangles.size());
+    for (uint32_t i = 0; i < m_.triangles.size(); ++i) {
+      const Triangle& t = m_.triangles[i].points;
+      for (uint32_t corner = 0; corner < 3; ++corner) {
+        const uint32_t p = t[static_cast<int>(corner)], q = t[static_cast<int>((corner + 1) % 3)];
+        const uint32_t a = std::min(p, q), b = std::max(p, q);
+        const auto next = static_cast<uint32_t>(uses.size());
+        const uint32_t found = table.find_or_add(
+            mix_words(a, b), next, [&](uint32_t other) { return uses[other].a == a && uses[other].b == b; });
+        if (found == next)
+          uses.push_back({a, b, 1, i, false, false});
+        else
+          join(uses[found], i);
+      }
+    }
+    add_triangle_planes();
+    edges_.reserve(uses.size());
+    for (const EdgeUse& e : uses) {
+      if (e.uses == 1) flags_[e.a] |= kBorder, flags_[e.b] |= kBorder;
+      const double weight = e.uses == 1 ? kBorderWeight : e.seam ? kSeamWeight : e.crease ? kCreaseWeight : 0.0;
+      if (weight > 0.0) add_side_plane(e, weight);
+      if (!(m_.locked[e.a] && m_.locked[e.b])) edges_.push_back({e.a, e.b, 0});
+    }
+  }
+
+  void join(EdgeUse& e, uint32_t triangle) const {
+    const LodTriangle &s = m_.triangles[e.triangle], &t = m_.triangles[triangle];
+    ++e.uses;
+    e.seam |= config_.seam_of_kind[s.kind] != config_.seam_of_kind[t.kind];
+    const auto wedge_at = [](const LodTriangle& of, uint32_t point) {
+      for (int i = 0; i < 3; ++i)
+        if (of.points[i] == point) return of.wedges[i];
+      return Wedge::kNone;
+    };
+    e.crease |= s.kind == t.kind && (wedge_at(s, e.a) != wedge_at(t, e.a) || wedge_at(s, e.b) != wedge_at(t, e.b));
+  }
+
+  void add_triangle_planes() {
+    for (const LodTriangle& t : m_.triangles) {
+      const DVec3 n = area_normal(t.points);
+      const double area = glm::length(n);
+      if (!(area > 0.0)) continue;
+      Quadric q;
+      q.add_plane(n / area, m_.points[t.points.x], area);
+      for (int i = 0; i < 3; ++i) quadrics_[t.points[i]].add(q);
+    }
+  }
+
+  /// A plane through the edge, upright on its triangle.
+  void add_side_plane(const EdgeUse& e, double weight) {
+    const DVec3 along = m_.points[e.b] - m_.points[e.a];
+    const DVec3 side = glm::cross(along, area_normal(m_.triangles[e.triangle].points));
+    const double length = glm::length(side);
+    if (!(length > 0.0)) return;
+    Quadric q;
+    q.add_plane(side / length, m_.points[e.a], weight * glm::dot(along, along));
+    quadrics_[e.a].add(q);
+    quadrics_[e.b].add(q);
+  }
+
+  // ---- which point an edge becomes
+
+  struct Placement {
+    DVec3 point;
+    double cost;
+    double along; ///< 0 at a .. 1 at b
+  };
+
+  Placement place(uint32_t a, uint32_t b) const {
+    Quadric q = quadrics_[a];
+    q.add(quadrics_[b]);
+    const DVec3 &pa = m_.points[a], &pb = m_.points[b];
+    // What must not move stays; a border point does not leave the border for one inside.
+    const bool keep_a = m_.locked[a] || ((flags_[a] & kBorder) != 0 && (flags_[b] & kBorder) == 0);
+    const bool keep_b = m_.locked[b] || ((flags_[b] & kBorder) != 0 && (flags_[a] & kBorder) == 0);
+    if (keep_a) return {pa, q.at(pa), 0.0};
+    if (keep_b) return {pb, q.at(pb), 1.0};
+    Placement best{pa, q.at(pa), 0.0};
+    if (const double cost = q.at(pb); cost < best.cost) best = {pb, cost, 1.0};
+    if (config_.keep_points) return best;
+    const DVec3 middle = 0.5 * (pa + pb), along = pb - pa;
+    DVec3 p = q.minimum(middle);
+    const double reach = glm::dot(along, along);
+    if (!(glm::dot(p - middle, p - middle) <= reach)) p = middle;
+    p = glm::clamp(p, lo_, hi_);
+    p = DVec3(std::nearbyint(p.x), std::nearbyint(p.y), std::nearbyint(p.z));
+    if (const double cost = q.at(p); cost < best.cost && reach > 0.0)
+      best = {p, cost, std::clamp(glm::dot(p - pa, along) / reach, 0.0, 1.0)};
+    return best;
+  }
+
+  void fill_heap() {
+    heap_.reserve(edges_.size());
+    for (uint32_t i = 0; i < edges_.size(); ++i) heap_.push_back({place(edges_[i].a, edges_[i].b).cost, i});
+    std::make_heap(heap_.begin(), heap_.end());
+  }
+
+  void push(HeapEntry entry) {
+    heap_.push_back(entry);
+    std::push_heap(heap_.begin(), heap_.end());
+  }
+
+  void drain_heap() {
+    while (live_ > config_.target_triangles && !heap_.empty()) {
+      std::pop_heap(heap_.begin(), heap_.end());
+      const HeapEntry top = heap_.back();
+      heap_.pop_back();
+      Edge& e = edges_[top.edge];
+      const uint32_t a = root(e.a), b = root(e.b);
+      if (a == b || (m_.locked[a] && m_.locked[b])) continue;
+      const Placement placement = place(a, b);
+      // What happened around it since may have made it dearer than others.
+      if (e.stamp != stamp_[a] + stamp_[b]) {
+        e.stamp = stamp_[a] + stamp_[b];
+        if (!heap_.empty() && placement.cost > heap_.front().cost) {
+          push({placement.cost, top.edge});
+          continue;
+        }
+      }
+      try_collapse(a, b, placement, top.edge);
+    }
+  }
+
+  void retry_rejected() {
+    for (const uint32_t edge : rejected_) {
+      const uint32_t a = root(edges_[edge].a), b = root(edges_[edge].b);
+      if (a != b && !(m_.locked[a] && m_.locked[b])) heap_.push_back({place(a, b).cost, edge});
+    }
+    rejected_.clear();
+    std::make_heap(heap_.begin(), heap_.end());
+  }
+
+  // ---- one collapse
+
+  /// The triangles around a and b. False where the collapse would leave no triangle there, or fold the surface.
+  bool gather_star(uint32_t a, uint32_t b) {
+    star_.clear();
+    removed_.clear();
+    ++mark_value_;
+    size_t common = 0, third = 0;
+    drop_dead(a);
+    for (uint32_t c = first_corner_[a]; c != kNone; c = next_corner_[c]) {
+      const uint32_t triangle = c / 3;
+      const Triangle& t = m_.triangles[triangle].points;
+      const bool both = t.x == b || t.y == b || t.z == b;
+      (both ? removed_ : star_).push_back(triangle);
+      for (int i = 0; i < 3; ++i)
+        if (t[i] != a && t[i] != b) {
+          if (both && mark_[t[i]] != 4 * mark_value_ + 2) ++third;
+          mark_[t[i]] = both ? 4 * mark_value_ + 2 : std::max(mark_[t[i]], 4 * mark_value_ + 1);
+        }
+    }
+    drop_dead(b);
+    for (uint32_t c = first_corner_[b]; c != kNone; c = next_corner_[c]) {
+      const uint32_t triangle = c / 3;
+      const Triangle& t = m_.triangles[triangle].points;
+      const bool both = t.x == a || t.y == a || t.z == a;
+      if (!both) star_.push_back(triangle);
+      for (int i = 0; i < 3; ++i)
+        if (t[i] != a && t[i] != b && mark_[t[i]] >= 4 * mark_value_ + 1 && mark_[t[i]] <= 4 * mark_value_ + 2)
+          ++common, mark_[t[i]] = 4 * mark_value_ + 3;
+    }
+    // Neighbours of both are just the third corners of the triangles at the edge: else the surface would touch itself.
+    return !star_.empty() && !removed_.empty() && common == third;
+  }
+
+  /// Unlinks the corners of triangles that are gone.
+  void drop_dead(uint32_t point) {
+    uint32_t* link = &first_corner_[point];
+    uint32_t last = kNone;
+    while (*link != kNone) {
+      if (alive_[*link / 3] == 0)
+        *link = next_corner_[*link];
+      else
+        last = *link, link = &next_corner_[*link];
+    }
+    last_corner_[point] = last;
+  }
+
+  void try_collapse(uint32_t a, uint32_t b, const Placement& placement, uint32_t edge) {
+    const bool a_border = (flags_[a] & kBorder) != 0, b_border = (flags_[b] & kBorder) != 0;
+    // Two border points across the inside: the surface would be pinched.
+    if (!gather_star(a, b) || (a_border && b_border && removed_.size() != 1) || turns_over(a, b, placement.point))
+      rejected_.push_back(edge);
+    else
+      collapse(a, b, placement);
+  }
+
+  bool turns_over(uint32_t a, uint32_t b, DVec3 point) const {
+    return std::any_of(star_.begin(), star_.end(),
+                       [&](uint32_t triangle) { return turns_over(triangle, a, b, point); });
+  }
+
+  bool turns_over(uint32_t triangle, uint32_t a, uint32_t b, DVec3 point) const {
+    const Triangle& t = m_.triangles[triangle].points;
+    std::array<DVec3, 3> p;
+    for (int i = 0; i < 3; ++i) p[static_cast<size_t>(i)] = t[i] == a || t[i] == b ? point : m_.points[t[i]];
+    const DVec3 before = area_normal(t), after = glm::cross(p[1] - p[0], p[2] - p[0]);
+    const double lengths2 = glm::dot(before, before) * glm::dot(after, after);
+    const double dot = glm::dot(before, after);
+    if (!(glm::dot(before, before) > 0.0)) return false; // had no side
+    return !(dot > 0.0) || dot * dot < kLargestTurn * kLargestTurn * lengths2;
+  }
+
+  void collapse(uint32_t a, uint32_t b, const Placement& placement) {
+    merge_wedges(a, b, placement.along);
+    for (const uint32_t triangle : removed_) alive_[triangle] = 0, --live_;
+    // The point of the corner lists that stays is the one that must not move, or a.
+    const bool keep_b = m_.locked[b] != 0 || (m_.locked[a] == 0 && placement.point == m_.points[b]);
+    const uint32_t kept = keep_b ? b : a, gone = keep_b ? a : b;
+    for (uint32_t c = first_corner_[gone]; c != kNone; c = next_corner_[c])
+      m_.triangles[c / 3].points[static_cast<int>(c % 3)] = kept;
+    if (first_corner_[gone] != kNone) {
+      if (first_corner_[kept] == kNone)
+        first_corner_[kept] = first_corner_[gone];
+      else
+        next_corner_[last_corner_[kept]] = first_corner_[gone];
+      last_corner_[kept] = last_corner_[gone];
+      first_corner_[gone] = kNone;
+    }
+    merged_into_[gone] = kept;
+    quadrics_[kept].add(quadrics_[gone]);
+    flags_[kept] |= flags_[gone];
+    if (m_.points[kept] != placement.point) m_.points[kept] = placement.point, m_.moved[kept] = 1;
+    stamp_[kept] += stamp_[gone] + 1;
+  }
+
+  /// Corners of a and b that a vanishing triangle joins become one wedge; the others keep theirs.
+  void merge_wedges(uint32_t a, uint32_t b, double along) {
+    std::array<uint32_t, 4> done{};
+    size_t done_count = 0; // a seam that ends here goes on at one side only
+    const auto is_done = [&](uint32_t wedge) {
+      return std::find(done.begin(), done.begin() + done_count, wedge) != done.begin() + done_count;
+    };
+    for (const uint32_t triangle : removed_) {
+      const LodTriangle& t = m_.triangles[triangle];
+      uint32_t wa = Wedge::kNone, wb = Wedge::kNone;
+      for (int i = 0; i < 3; ++i) {
+        if (t.points[i] == a) wa = wedge_root(t.wedges[i]);
+        if (t.points[i] == b) wb = wedge_root(t.wedges[i]);
+      }
+      if (wa == Wedge::kNone || wb == Wedge::kNone || wa == wb || is_done(wa) || is_done(wb)) continue;
+      if (along == 0.0) {
+        wedge_into_[wb] = wa;
+      } else if (along == 1.0) {
+        wedge_into_[wa] = wb;
+      } else {
+        Wedge merged;
+        const Wedge &u = m_.wedges[wa], &v = m_.wedges[wb];
+        const DVec3 n = (1.0 - along) * u.normal + along * v.normal;
+        const double length = glm::length(n);
+        merged.normal = length > 0.0 ? n / length : u.normal;
+        const auto number = static_cast<uint32_t>(m_.wedges.size());
+        m_.wedges.push_back(merged);
+        wedge_into_.push_back(number);
+        wedge_into_[wa] = wedge_into_[wb] = number;
+      }
+      if (done_count < done.size()) done[done_count++] = wedge_root(wa);
+    }
+  }
+
+  void compact() {
+    size_t kept = 0;
+    for (size_t i = 0; i < m_.triangles.size(); ++i) {
+      if (alive_[i] == 0) continue;
+      LodTriangle t = m_.triangles[i];
+      for (int corner = 0; corner < 3; ++corner) t.wedges[corner] = wedge_root(t.wedges[corner]);
+      m_.triangles[kept++] = t;
+    }
+    m_.triangles.resize(kept);
+  }
+
+  SimplifyMesh& m_;
+  const SimplifyConfig& config_;
+  size_t live_ = 0;
+  DVec3 lo_{std::numeric_limits<double>::infinity()}, hi_{-lo_};   // nothing leaves this box
+  std::vector<uint32_t> next_corner_, first_corner_, last_corner_; // lists of corners around each point
+  std::vector<uint8_t> alive_, flags_;
+  std::vector<uint32_t> merged_into_, wedge_into_, stamp_;
+  std::vector<Quadric> quadrics_;
+  std::vector<Edge> edges_;
+  std::vector<HeapEntry> heap_;
+  std::vector<uint32_t> rejected_;
+  std::vector<uint32_t> mark_;
+  uint32_t mark_value_ = 0;
+  std::vector<uint32_t> star_, removed_; // triangles with one of a and b, with both
+};
+
+} // namespace
+
+void simplify(SimplifyMesh& mesh, const SimplifyConfig& config) { Simplifier(mesh, config).run(); }
+
+} // namespace packtrace

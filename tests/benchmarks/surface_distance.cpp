@@ -1,0 +1,101 @@
+#include "tests/benchmarks/surface_distance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <tbb/parallel_for.h>
+
+#include "compress/bake/lod/triangle_distance.h"
+
+namespace packtrace {
+namespace {
+
+struct Query {
+  std::span<const DVec3> positions;
+  std::span<const Triangle> triangles;
+  DVec3 point;
+  double best2 = std::numeric_limits<double>::infinity();
+};
+
+bool visit(RTCPointQueryFunctionArguments* args) {
+  auto& query = *static_cast<Query*>(args->userPtr);
+  const Triangle& t = query.triangles[args->primID];
+  const DVec3 d =
+      query.point - nearest_point(query.point, query.positions[t.x], query.positions[t.y], query.positions[t.z]);
+  const double distance2 = glm::dot(d, d);
+  if (!(distance2 < query.best2)) return false;
+  query.best2 = distance2;
+  // A little more, as boxes and queries are rounded to float.
+  args->query->radius = static_cast<float>(std::sqrt(distance2) * 1.000001);
+  return true;
+}
+
+} // namespace
+
+SurfaceDistance::SurfaceDistance(std::span<const DVec3> positions, std::span<const Triangle> triangles)
+    : positions_(positions), triangles_(triangles), device_(rtcNewDevice(nullptr)), scene_(rtcNewScene(device_)) {
+  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+  auto* vertices = static_cast<float*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, positions.size()));
+  for (size_t i = 0; i < positions.size(); ++i)
+    for (int axis = 0; axis < 3; ++axis) vertices[3 * i + static_cast<size_t>(axis)] = static_cast<float>(positions[i][axis]);
+  auto* indices = static_cast<uint32_t*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, triangles.size()));
+  for (size_t i = 0; i < triangles.size(); ++i)
+    for (int corner = 0; corner < 3; ++corner) indices[3 * i + static_cast<size_t>(corner)] = triangles[i][corner];
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(scene_, geometry);
+  rtcReleaseGeometry(geometry);
+  rtcCommitScene(scene_);
+}
+
+SurfaceDistance::~SurfaceDistance() {
+  rtcReleaseScene(scene_);
+  rtcReleaseDevice(device_);
+}
+
+double SurfaceDistance::operator()(DVec3 point) const {
+  Query query{positions_, triangles_, point};
+  RTCPointQuery rtc_query{static_cast<float>(point.x), static_cast<float>(point.y), static_cast<float>(point.z), 0.0f,
+                          std::numeric_limits<float>::infinity()};
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  rtcPointQuery(scene_, &rtc_query, &context, visit, &query);
+  return std::sqrt(query.best2);
+}
+
+DistanceStats surface_distance(std::span<const DVec3> from_positions, std::span<const Triangle> from_triangles,
+                               const SurfaceDistance& to, size_t samples) {
+  double total = 0.0;
+  std::vector<double> areas(from_triangles.size());
+  for (size_t i = 0; i < areas.size(); ++i) {
+    const Triangle& t = from_triangles[i];
+    areas[i] = glm::length(glm::cross(from_positions[t.y] - from_positions[t.x], from_positions[t.z] - from_positions[t.x]));
+    total += areas[i];
+  }
+  std::vector<double> max(areas.size()), weighted(areas.size());
+  tbb::parallel_for(size_t{0}, areas.size(), [&](size_t i) {
+    const Triangle& t = from_triangles[i];
+    const DVec3 &a = from_positions[t.x], &b = from_positions[t.y], &c = from_positions[t.z];
+    double largest = std::max({to(a), to(b), to(c)});
+    const auto count =
+        1 + static_cast<size_t>(total > 0.0 ? areas[i] / total * static_cast<double>(samples) : 0.0);
+    double sum2 = 0.0;
+    for (size_t k = 0; k < count; ++k) { // a lattice of the plane, folded into the triangle
+      double u = std::fmod(0.5 + static_cast<double>(k) * 0.7548776662466927, 1.0);
+      double v = std::fmod(0.25 + static_cast<double>(k) * 0.5698402909980532, 1.0);
+      if (u + v > 1.0) u = 1.0 - u, v = 1.0 - v;
+      const double d = to(a + u * (b - a) + v * (c - a));
+      largest = std::max(largest, d), sum2 += d * d;
+    }
+    max[i] = largest, weighted[i] = sum2 / static_cast<double>(count) * areas[i];
+  });
+  DistanceStats stats;
+  double sum = 0.0;
+  for (size_t i = 0; i < areas.size(); ++i) stats.max = std::max(stats.max, max[i]), sum += weighted[i];
+  stats.rms = total > 0.0 ? std::sqrt(sum / total) : 0.0;
+  return stats;
+}
+
+} // namespace packtrace
