@@ -162,9 +162,9 @@ private:
     std::vector<Bound> bounds;
     double largest = 0.0;
     refine(
-        p, kMaxCuts, candidates_.size(), [&](DVec3 q, uint32_t i) { return distance(q, candidates_[i]); },
-        [&](uint32_t i, double d) {
-          bounds.push_back({candidates_[i], d}), largest = std::max(largest, d);
+        p, kMaxCuts, candidates_, [&](DVec3 q, uint32_t after) { return distance(q, after); },
+        [&](uint32_t after, double d) {
+          bounds.push_back({after, d}), largest = std::max(largest, d);
         });
     if (largest < best_bound_) best_ = std::move(bounds), best_bound_ = largest;
   }
@@ -255,32 +255,40 @@ private:
     return glm::length(p - nearest_point(p, corner_after(after, 0), corner_after(after, 1), corner_after(after, 2)));
   }
 
-  /// Bounds the distance of a triangle from one of several, cutting it as long as that makes the bound much smaller:
-  /// the distance from one triangle is convex, so the three corners bound it for all of it.
+  /// Bounds the distance of a triangle from the nearest of several, cutting it as long as that makes the bound much
+  /// smaller: the distance from one triangle is convex, so the three corners bound it for all of it.
+  /// @param among numbers that distance_to understands
   template <typename DistanceTo, typename Noted>
-  void refine(const std::array<DVec3, 3>& t, int cuts, size_t count, const DistanceTo& distance_to,
+  void refine(const std::array<DVec3, 3>& t, int cuts, std::span<const uint32_t> among, const DistanceTo& distance_to,
               const Noted& noted) {
     double best = std::numeric_limits<double>::infinity();
     std::array<double, 3> nearest{best, best, best};
     uint32_t where = 0;
-    for (uint32_t i = 0; i < count; ++i) {
+    for (const uint32_t number : among) {
       double largest = 0.0;
       for (size_t k = 0; k < 3; ++k) {
-        const double d = distance_to(t[k], i);
+        const double d = distance_to(t[k], number);
         nearest[k] = std::min(nearest[k], d), largest = std::max(largest, d);
       }
-      if (largest < best) best = largest, where = i;
+      if (largest < best) best = largest, where = number;
     }
-    if (count == 0) return;
-    const double least = *std::max_element(nearest.begin(), nearest.end());
-    if (cuts == 0 || best <= std::max(kGoodEnough * least, floor_)) {
+    if (among.empty()) return;
+    const double enough = std::max(kGoodEnough * std::max({nearest[0], nearest[1], nearest[2]}), floor_);
+    if (cuts == 0 || best <= enough) {
       noted(where, best);
       return;
     }
+    // What is too far from all of it serves none of its parts.
+    const DVec3 center = (t[0] + t[1] + t[2]) / 3.0;
+    const double radius =
+        std::max({glm::length(t[0] - center), glm::length(t[1] - center), glm::length(t[2] - center)});
+    std::vector<uint32_t> kept;
+    for (const uint32_t number : among)
+      if (number == where || distance_to(center, number) <= radius + enough) kept.push_back(number);
     const DVec3 ab = 0.5 * (t[0] + t[1]), bc = 0.5 * (t[1] + t[2]), ca = 0.5 * (t[2] + t[0]);
     for (const auto& part :
          {std::array{t[0], ab, ca}, std::array{ab, t[1], bc}, std::array{ca, bc, t[2]}, std::array{ab, bc, ca}})
-      refine(part, cuts - 1, count, distance_to, noted);
+      refine(part, cuts - 1, kept, distance_to, noted);
   }
 
   /// Where the new surface has points of its own.
@@ -315,12 +323,12 @@ private:
     for (int i = 0; i < 3; ++i)
       for (const uint32_t t : old_fans_.of(after_[s].points[i])) near.push_back(t);
     refine(
-        {a, b, c}, kMaxCuts, near.size(),
-        [&](DVec3 p, uint32_t i) {
-          const Triangle& t = before_[near[i]].points;
+        {a, b, c}, kMaxCuts, near,
+        [&](DVec3 p, uint32_t before) {
+          const Triangle& t = before_[before].points;
           return glm::length(p - nearest_point(p, points_[t.x], points_[t.y], points_[t.z]));
         },
-        [&](uint32_t i, double distance) { note(s, distance, before_[near[i]].error); });
+        [&](uint32_t before, double distance) { note(s, distance, before_[before].error); });
   }
 
   std::span<const DVec3> points_;

@@ -12,12 +12,19 @@ DVec3 nearest_point(DVec3 p, DVec3 a, DVec3 b) {
 }
 
 DVec3 nearest_point(DVec3 p, DVec3 a, DVec3 b, DVec3 c) {
-  const DVec3 n = glm::cross(b - a, c - a);
-  const double n2 = glm::dot(n, n);
-  if (n2 > 0.0) {
-    const bool inside = glm::dot(glm::cross(b - a, p - a), n) >= 0.0 && glm::dot(glm::cross(c - b, p - b), n) >= 0.0 &&
-                        glm::dot(glm::cross(a - c, p - c), n) >= 0.0;
-    if (inside) return p - n * (glm::dot(p - a, n) / n2);
+  // Over the plane, p = a + v (b - a) + w (c - a): the foot is the nearest point where it lies inside. Else it is on
+  // one of the sides that p is beyond.
+  const DVec3 ab = b - a, ac = c - a, ap = p - a;
+  const double d00 = glm::dot(ab, ab), d01 = glm::dot(ab, ac), d11 = glm::dot(ac, ac);
+  const double p0 = glm::dot(ap, ab), p1 = glm::dot(ap, ac);
+  const double area2 = d00 * d11 - d01 * d01;
+  const double v = d11 * p0 - d01 * p1, w = d00 * p1 - d01 * p0;
+  if (area2 > 1e-12 * d00 * d11) {
+    if (v >= 0.0 && w >= 0.0 && v + w <= area2) return a + (v / area2) * ab + (w / area2) * ac;
+    // Beyond one side only: it is the only one that p sees.
+    if (v >= 0.0 && w >= 0.0) return nearest_point(p, b, c);
+    if (v >= 0.0 && v + w <= area2) return nearest_point(p, a, b);
+    if (w >= 0.0 && v + w <= area2) return nearest_point(p, a, c);
   }
   const DVec3 q[3] = {nearest_point(p, a, b), nearest_point(p, b, c), nearest_point(p, c, a)};
   const auto distance2 = [&](DVec3 r) { return glm::dot(r - p, r - p); };
