@@ -6,7 +6,7 @@
 #include "compress/bake/geometry_measure.h"
 #include "compress/bake/lod/cluster_lod.h"
 #include "pbrt_import/scene/progress.h"
-#include "tests/benchmarks/surface_distance.h"
+#include "tests/compress/lod/surface_distance.h"
 #include "tests/benchmarks/packing_benchmark_mesh.h"
 using namespace packtrace;
 int main(int argc, char** argv) {

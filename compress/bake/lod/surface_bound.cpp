@@ -14,6 +14,7 @@ constexpr double kCovered = 1e-6;    // of a triangle's area may be left over: r
 constexpr double kSeen = 0.02;       // of a new triangle's area may be met by no old one, between their directions
 constexpr int kMaxCuts = 5;          // how often a triangle is cut in four where no other way is left
 constexpr double kGoodEnough = 1.25; // then: of what cutting could still gain
+constexpr size_t kLargeFan = 48;     // triangles around a point
 constexpr double kSteep = 0.05;      // cosine; what is steeper is not seen from there
 constexpr double kInflation = 1.001; // of what was measured, for all roundings
 constexpr size_t kMaxCorners = 8;    // of a triangle cut by three lines: six
@@ -120,17 +121,39 @@ private:
   void find_candidates(const Triangle& points) {
     candidates_.clear();
     ++stamp_value_;
-    for (int i = 0; i < 3; ++i) add_candidates(m_.stands_for[points[i]]);
+    const Triangle corners(m_.stands_for[points.x], m_.stands_for[points.y], m_.stands_for[points.z]);
+    for (int i = 0; i < 3; ++i) add_candidates(near_fan(fans_, after_, corners, i, [](uint32_t p) { return p; }));
   }
-  void add_candidates(uint32_t point) {
-    for (const uint32_t t : fans_.of(point))
+  void add_candidates(std::span<const uint32_t> triangles) {
+    for (const uint32_t t : triangles)
       if (stamp_[t] != stamp_value_) stamp_[t] = stamp_value_, candidates_.push_back(t);
   }
   /// One ring more.
   void widen_candidates() {
     const size_t count = candidates_.size();
     for (size_t i = 0; i < count; ++i)
-      for (int k = 0; k < 3; ++k) add_candidates(after_[candidates_[i]].points[k]);
+      for (int k = 0; k < 3; ++k)
+        if (const auto fan = fans_.of(after_[candidates_[i]].points[k]); fan.size() <= kLargeFan) add_candidates(fan);
+  }
+
+  /// The triangles around a corner; where there are very many, those that have another of the corners too, or else a
+  /// few.
+  template <typename PointOf>
+  std::span<const uint32_t> near_fan(const Fans& fans, std::span<const LodTriangle> triangles, const Triangle& corners,
+                                     int corner, const PointOf& point_of) {
+    const std::span<const uint32_t> fan = fans.of(corners[corner]);
+    if (fan.size() <= kLargeFan) return fan;
+    fan_.clear();
+    for (const uint32_t t : fan)
+      for (int i = 0; i < 3; ++i) {
+        const uint32_t p = point_of(triangles[t].points[i]);
+        if (p != corners[corner] && (p == corners.x || p == corners.y || p == corners.z)) {
+          fan_.push_back(t);
+          break;
+        }
+      }
+    if (fan_.empty()) return fan.first(kLargeFan);
+    return std::span<const uint32_t>(fan_).first(std::min(fan_.size(), kLargeFan));
   }
 
   void measure_before(const LodTriangle& t) {
@@ -320,8 +343,9 @@ private:
     const double area = glm::length(glm::cross(b - a, c - a));
     if (seen_[s] >= area * (1.0 - kSeen)) return;
     std::vector<uint32_t> near;
+    const auto stands_for = [&](uint32_t p) { return m_.stands_for[p]; };
     for (int i = 0; i < 3; ++i)
-      for (const uint32_t t : old_fans_.of(after_[s].points[i])) near.push_back(t);
+      for (const uint32_t t : near_fan(old_fans_, before_, after_[s].points, i, stands_for)) near.push_back(t);
     refine(
         {a, b, c}, kMaxCuts, near,
         [&](DVec3 p, uint32_t before) {
@@ -335,7 +359,7 @@ private:
   std::span<const LodTriangle> before_;
   SimplifyMesh& m_;
   std::span<const LodTriangle> after_;
-  std::vector<uint32_t> stamp_, candidates_;
+  std::vector<uint32_t> stamp_, candidates_, fan_;
   std::vector<double> seen_; ///< area of each triangle after that was met, times 2
   std::vector<double> errors_;
   Fans fans_, old_fans_;

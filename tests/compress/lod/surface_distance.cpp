@@ -1,4 +1,4 @@
-#include "tests/benchmarks/surface_distance.h"
+#include "tests/compress/lod/surface_distance.h"
 
 #include <algorithm>
 #include <cmath>
@@ -39,7 +39,8 @@ SurfaceDistance::SurfaceDistance(std::span<const DVec3> positions, std::span<con
   auto* vertices = static_cast<float*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, positions.size()));
   for (size_t i = 0; i < positions.size(); ++i)
-    for (int axis = 0; axis < 3; ++axis) vertices[3 * i + static_cast<size_t>(axis)] = static_cast<float>(positions[i][axis]);
+    for (int axis = 0; axis < 3; ++axis)
+      vertices[3 * i + static_cast<size_t>(axis)] = static_cast<float>(positions[i][axis]);
   auto* indices = static_cast<uint32_t*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, triangles.size()));
   for (size_t i = 0; i < triangles.size(); ++i)
@@ -71,7 +72,8 @@ DistanceStats surface_distance(std::span<const DVec3> from_positions, std::span<
   std::vector<double> areas(from_triangles.size());
   for (size_t i = 0; i < areas.size(); ++i) {
     const Triangle& t = from_triangles[i];
-    areas[i] = glm::length(glm::cross(from_positions[t.y] - from_positions[t.x], from_positions[t.z] - from_positions[t.x]));
+    areas[i] =
+        glm::length(glm::cross(from_positions[t.y] - from_positions[t.x], from_positions[t.z] - from_positions[t.x]));
     total += areas[i];
   }
   std::vector<double> max(areas.size()), weighted(areas.size());
@@ -79,8 +81,7 @@ DistanceStats surface_distance(std::span<const DVec3> from_positions, std::span<
     const Triangle& t = from_triangles[i];
     const DVec3 &a = from_positions[t.x], &b = from_positions[t.y], &c = from_positions[t.z];
     double largest = std::max({to(a), to(b), to(c)});
-    const auto count =
-        1 + static_cast<size_t>(total > 0.0 ? areas[i] / total * static_cast<double>(samples) : 0.0);
+    const auto count = 1 + static_cast<size_t>(total > 0.0 ? areas[i] / total * static_cast<double>(samples) : 0.0);
     double sum2 = 0.0;
     for (size_t k = 0; k < count; ++k) { // a lattice of the plane, folded into the triangle
       double u = std::fmod(0.5 + static_cast<double>(k) * 0.7548776662466927, 1.0);

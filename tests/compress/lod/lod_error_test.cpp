@@ -1,0 +1,90 @@
+// That the errors of levels of detail are never below what is measured.
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+#include "tests/compress/lod/lod_meshes.h"
+#include "tests/compress/lod/surface_distance.h"
+
+namespace packtrace::test {
+namespace {
+
+/// What the measurement may round up.
+double with_rounding(double error) { return error * (1.0 + 1e-6) + 1e-6; }
+
+class LodErrorOf : public testing::TestWithParam<NamedMesh> {
+protected:
+  LodErrorOf() {
+    for (const LatticePoint& q : built_.lod.positions) {
+      DVec3 p;
+      for (size_t axis = 0; axis < 3; ++axis)
+        p[static_cast<int>(axis)] = static_cast<double>(q[axis] - built_.geometry.origin[axis]);
+      points_.push_back(p);
+    }
+  }
+
+  std::vector<Triangle> triangles_of(const std::vector<uint32_t>& clusters) const {
+    std::vector<Triangle> result;
+    const ClusterLod& lod = built_.lod;
+    for (const uint32_t number : clusters) {
+      const ClusterRange& range = lod.clusters[number].range;
+      for (uint32_t i = 0; i < range.triangle_count; ++i) {
+        const Triangle& t = lod.triangles[range.first_triangle + i];
+        result.emplace_back(lod.vertices[t.x].position, lod.vertices[t.y].position, lod.vertices[t.z].position);
+      }
+    }
+    return result;
+  }
+
+  double two_sided(const std::vector<Triangle>& a, const std::vector<Triangle>& b, size_t samples) const {
+    const SurfaceDistance to_a(points_, a), to_b(points_, b);
+    return std::max(surface_distance(points_, a, to_b, samples).max, surface_distance(points_, b, to_a, samples).max);
+  }
+
+  const BuiltLod built_ = build_lod(GetParam().mesh);
+  std::vector<DVec3> points_;
+};
+
+/// The other way round says nothing: what a group was made from reaches further than the group.
+TEST_P(LodErrorOf, IsNotBelowTheDistanceOfEachGroupFromItsPartOfLevelZero) {
+  const ClusterLod& lod = built_.lod;
+  // The clusters of level 0 that a group stands for.
+  std::vector<std::vector<uint32_t>> stands_for(lod.groups.size()), made(lod.groups.size());
+  for (uint32_t i = 0; i < lod.clusters.size(); ++i) {
+    const LodCluster& c = lod.clusters[i];
+    std::vector<uint32_t>& all = stands_for[c.group];
+    if (c.generating_group == kNoGroup) {
+      all.push_back(i);
+    } else {
+      made[c.generating_group].push_back(i);
+      all.insert(all.end(), stands_for[c.generating_group].begin(), stands_for[c.generating_group].end());
+    }
+  }
+  for (size_t i = 0; i < lod.groups.size(); ++i) {
+    if (lod.groups[i].terminal) continue;
+    std::sort(stands_for[i].begin(), stands_for[i].end());
+    stands_for[i].erase(std::unique(stands_for[i].begin(), stands_for[i].end()), stands_for[i].end());
+    const std::vector<Triangle> base = triangles_of(stands_for[i]);
+    const SurfaceDistance to_base(points_, base);
+    EXPECT_LE(surface_distance(points_, triangles_of(made[i]), to_base, 1000).max, with_rounding(lod.groups[i].error))
+        << "group " << i << " of level " << lod.groups[i].level;
+  }
+}
+
+TEST_P(LodErrorOf, IsNotBelowTheDistanceOfCuts) {
+  const ClusterLod& lod = built_.lod;
+  const std::vector<Triangle> base = triangles_of(cut_clusters(lod, 0.0));
+  for (uint32_t level = 0; level + 1 < lod.level_count; ++level) {
+    double threshold = 0.0;
+    for (const LodGroup& group : lod.groups)
+      if (group.level == level && !group.terminal) threshold = std::max(threshold, group.error);
+    EXPECT_LE(two_sided(base, triangles_of(cut_clusters(lod, threshold)), 4000), with_rounding(threshold));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(StressMeshes, LodErrorOf, testing::ValuesIn(stress_meshes()),
+                         [](const auto& tested) { return identifier(tested.param.name); });
+
+} // namespace
+} // namespace packtrace::test

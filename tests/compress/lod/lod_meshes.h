@@ -1,0 +1,51 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "compress/bake/lod/cluster_lod.h"
+#include "pbrt_import/scene/scene.h"
+
+namespace packtrace::test {
+
+/// A closed torus without normals, all vertices shared.
+Mesh torus_mesh(uint32_t around, uint32_t across);
+
+/// The mesh with every second triangle's corners made its own, with normals of its own: seams everywhere.
+Mesh half_faceted(const Mesh& mesh);
+
+/// Closed tetrahedra at random in [-1,1]^3.
+Mesh tetrahedra_mesh(uint32_t count, uint32_t seed);
+
+/// Meshes that levels must survive.
+struct NamedMesh {
+  std::string name;
+  Mesh mesh;
+  bool closed = false;
+};
+std::vector<NamedMesh> stress_meshes();
+std::vector<NamedMesh> closed_stress_meshes();
+/// A name for a test.
+std::string identifier(std::string name);
+
+/// A mesh on its lattice with clusters and levels.
+struct BuiltLod {
+  QuantizedGeometry geometry;
+  GeometryClusters base;
+  ClusterLod lod;
+};
+BuiltLod build_lod(const Mesh& mesh);
+
+/// The clusters to take where errors up to `threshold` are allowed.
+std::vector<uint32_t> cut_clusters(const ClusterLod& lod, double threshold);
+
+/// How often each directed edge of the triangles is there more than its opposite, by lattice point; only edges with a
+/// count other than 0. Empty for closed surfaces.
+struct BoundaryEdge {
+  LatticePoint a, b; ///< a < b
+  int64_t count;     ///< of a -> b less that of b -> a
+  bool operator==(const BoundaryEdge&) const = default;
+};
+std::vector<BoundaryEdge> boundary(const ClusterLod& lod, const std::vector<uint32_t>& clusters);
+
+} // namespace packtrace::test

@@ -1,0 +1,163 @@
+#include "compress/bake/lod/simplify.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "compress/bake/lod/loose_pieces.h"
+#include "compress/bake/lod/surface_bound.h"
+#include "compress/bake/lod/triangle_distance.h"
+#include "tests/compress/lod/lod_meshes.h"
+#include "tests/compress/test_scenes.h"
+
+namespace packtrace::test {
+namespace {
+
+constexpr std::array<uint32_t, 1> kOneSeam = {0};
+
+SimplifyMesh whole_number_mesh(const Mesh& mesh, double scale) {
+  SimplifyMesh out;
+  for (const Vec3& p : mesh.positions) out.points.push_back(glm::round(DVec3(p) * scale));
+  out.locked.assign(out.points.size(), 0);
+  for (const Triangle& t : mesh.triangles) out.triangles.push_back({t, Triangle(Wedge::kNone), 0, 0.0});
+  return out;
+}
+
+SimplifyConfig to(uint32_t triangles) {
+  SimplifyConfig config;
+  config.target_triangles = triangles;
+  config.seam_of_kind = kOneSeam;
+  return config;
+}
+
+TEST(Simplify, ReachesTheTarget) {
+  SimplifyMesh mesh = whole_number_mesh(torus_mesh(80, 40), 1e5);
+  simplify(mesh, to(1000));
+  EXPECT_LE(mesh.triangles.size(), 1000u);
+  EXPECT_GE(mesh.triangles.size(), 998u);
+}
+
+TEST(Simplify, LeavesWhatIsSmallEnough) {
+  SimplifyMesh mesh = whole_number_mesh(torus_mesh(20, 10), 1e5);
+  const size_t before = mesh.triangles.size();
+  simplify(mesh, to(400));
+  EXPECT_EQ(mesh.triangles.size(), before);
+}
+
+TEST(Simplify, LockedPointsStay) {
+  SimplifyMesh mesh = whole_number_mesh(torus_mesh(60, 40), 1e5);
+  const std::vector<DVec3> before = mesh.points;
+  for (size_t i = 0; i < mesh.locked.size(); i += 3) mesh.locked[i] = 1;
+  simplify(mesh, to(10));
+  std::vector<uint8_t> used(before.size());
+  for (const LodTriangle& t : mesh.triangles)
+    for (int i = 0; i < 3; ++i) used[t.points[i]] = 1;
+  for (size_t i = 0; i < before.size(); i += 3) {
+    EXPECT_EQ(mesh.points[i], before[i]);
+    EXPECT_EQ(used[i], 1);
+  }
+}
+
+TEST(Simplify, PointsStayOnWholeNumbersAndInTheBox) {
+  SimplifyMesh mesh = whole_number_mesh(sphere_mesh(40), 1e4);
+  simplify(mesh, to(300));
+  for (const DVec3& p : mesh.points) {
+    EXPECT_EQ(p, glm::round(p));
+    EXPECT_LE(std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}), 1e4);
+  }
+}
+
+TEST(Simplify, AFlatPlaneStaysFlatAndWhole) {
+  SimplifyMesh mesh = whole_number_mesh(grid_mesh(32), 3200.0);
+  const std::vector<DVec3> points = mesh.points;
+  const std::vector<LodTriangle> triangles = mesh.triangles;
+  simplify(mesh, to(2));
+  EXPECT_LE(mesh.triangles.size(), 6u);
+  bound_errors(points, triangles, mesh);
+  double area = 0.0;
+  for (const LodTriangle& t : mesh.triangles) {
+    EXPECT_LT(t.error, 1e-6);
+    area += glm::length(glm::cross(mesh.points[t.points.y] - mesh.points[t.points.x],
+                                   mesh.points[t.points.z] - mesh.points[t.points.x]));
+  }
+  EXPECT_DOUBLE_EQ(area, 2.0 * 3200.0 * 3200.0);
+}
+
+TEST(Simplify, MaterialSeamsStay) {
+  SimplifyMesh mesh = whole_number_mesh(grid_mesh(32), 3200.0); // left half of one material, right half of another
+  for (LodTriangle& t : mesh.triangles) {
+    double x = 0.0;
+    for (int i = 0; i < 3; ++i) x += mesh.points[t.points[i]].x / 3.0;
+    t.kind = x > 1600.0;
+  }
+  const std::array<uint32_t, 2> seams = {0, 1};
+  SimplifyConfig config = to(60);
+  config.seam_of_kind = seams;
+  simplify(mesh, config);
+  for (const LodTriangle& t : mesh.triangles)
+    for (int i = 0; i < 3; ++i) {
+      const double side = t.kind == 0 ? -1.0 : 1.0;
+      EXPECT_GE(side * (mesh.points[t.points[i]].x - 1600.0), 0.0);
+    }
+}
+
+TEST(Simplify, WedgesOfOnePointStayApart) {
+  const Mesh faceted = half_faceted(torus_mesh(40, 20));
+  SimplifyMesh mesh = whole_number_mesh(torus_mesh(40, 20), 1e5);
+  for (size_t i = 0; i < mesh.triangles.size(); ++i) { // each triangle with a normal of its own
+    const auto wedge = static_cast<uint32_t>(mesh.wedges.size());
+    mesh.wedges.push_back({glm::normalize(DVec3(faceted.normals[i % faceted.normals.size()])), wedge});
+    mesh.triangles[i].wedges = Triangle(wedge);
+  }
+  simplify(mesh, to(400));
+  EXPECT_LE(mesh.triangles.size(), 400u);
+  for (const LodTriangle& t : mesh.triangles)
+    for (int i = 0; i < 3; ++i) {
+      ASSERT_LT(t.wedges[i], mesh.wedges.size());
+      EXPECT_NEAR(glm::length(mesh.wedges[t.wedges[i]].normal), 1.0, 1e-9);
+    }
+}
+
+TEST(LoosePieces, GoNearestFirstAndCountTheirDistance) {
+  SimplifyMesh mesh; // five small triangles along a line, at 0, 10, 30, 70, 150
+  for (const double x : {0.0, 10.0, 30.0, 70.0, 150.0}) {
+    const auto first = static_cast<uint32_t>(mesh.points.size());
+    for (const DVec3& p : {DVec3(x, 0, 0), DVec3(x, 1, 0), DVec3(x, 0, 1)}) mesh.points.push_back(p);
+    mesh.triangles.push_back({Triangle(first, first + 1, first + 2), Triangle(Wedge::kNone), 0, 0.0});
+  }
+  mesh.locked.assign(mesh.points.size(), 0);
+  drop_loose_pieces(mesh, 3);
+  ASSERT_EQ(mesh.triangles.size(), 3u);
+  double largest = 0.0;
+  for (const LodTriangle& t : mesh.triangles) largest = std::max(largest, t.error);
+  EXPECT_GE(largest, 10.0);
+  EXPECT_LE(largest, 31.0);
+  drop_loose_pieces(mesh, 0);
+  EXPECT_EQ(mesh.triangles.size(), 1u);
+}
+
+TEST(LoosePieces, LockedOnesStay) {
+  SimplifyMesh mesh = whole_number_mesh(tetrahedra_mesh(20, 9), 1e5);
+  for (size_t i = 0; i < mesh.locked.size(); i += 4) mesh.locked[i] = 1;
+  drop_loose_pieces(mesh, 0);
+  EXPECT_EQ(mesh.triangles.size(), 80u);
+}
+
+TEST(NearestPoint, IsNearestOfManyPointsOfTheTriangle) {
+  Random random(3);
+  const auto point = [&] { return DVec3(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)); };
+  for (int repeat = 0; repeat < 2000; ++repeat) {
+    const DVec3 a = point(), b = point(), c = repeat % 10 == 0 ? a + 0.5 * (b - a) : point(), p = 2.0 * point();
+    const double found = glm::length(p - nearest_point(p, a, b, c));
+    double least = 1e300;
+    constexpr int kSteps = 40;
+    for (int i = 0; i <= kSteps; ++i)
+      for (int k = 0; k <= kSteps - i; ++k)
+        least = std::min(least, glm::length(p - (a + (b - a) * (i / double{kSteps}) + (c - a) * (k / double{kSteps}))));
+    EXPECT_LE(found, least + 1e-9);
+    EXPECT_GE(found, least - 0.1);
+  }
+}
+
+} // namespace
+} // namespace packtrace::test
