@@ -20,6 +20,12 @@ struct Quadric {
     bx += w.x * d, by += w.y * d, bz += w.z * d, c += weight * d * d;
   }
 
+  /// The point itself: keeps what is placed near it.
+  void add_point(DVec3 point, double weight) {
+    xx += weight, yy += weight, zz += weight;
+    bx -= weight * point.x, by -= weight * point.y, bz -= weight * point.z, c += weight * glm::dot(point, point);
+  }
+
   void add(const Quadric& o) {
     xx += o.xx, xy += o.xy, xz += o.xz, yy += o.yy, yz += o.yz, zz += o.zz;
     bx += o.bx, by += o.by, bz += o.bz, c += o.c;

@@ -15,7 +15,8 @@ constexpr uint32_t kNone = ~0u;
 constexpr double kBorderWeight = 8.0;  // of border planes against the triangles' own
 constexpr double kSeamWeight = 2.0;    // where the material changes
 constexpr double kCreaseWeight = 0.25; // where normals or texture coordinates change
-constexpr double kLargestTurn = 0.2;   // cosine; a triangle may turn by less than that in one collapse
+constexpr double kStayWeight = 1e-4; // of the point itself: where all is flat, short edges go first and none gets long
+constexpr double kLargestTurn = 0.2; // cosine; a triangle may turn by less than that in one collapse
 
 struct Edge {
   uint32_t a, b;  ///< points at first; follow merged_into_
@@ -153,7 +154,10 @@ private:
       if (!(area > 0.0)) continue;
       Quadric q;
       q.add_plane(n / area, m_.points[t.points.x], area);
-      for (int i = 0; i < 3; ++i) quadrics_[t.points[i]].add(q);
+      for (int i = 0; i < 3; ++i) {
+        quadrics_[t.points[i]].add(q);
+        quadrics_[t.points[i]].add_point(m_.points[t.points[i]], kStayWeight * area);
+      }
     }
   }
 
