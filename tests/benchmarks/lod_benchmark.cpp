@@ -1,0 +1,246 @@
+// Levels of detail: how fast they are built, how far they are from the source and what is said of it, and the
+// simplifier beside meshoptimizer's and OpenMesh's: docs/cluster_lod.md.
+
+#include <algorithm>
+#include <chrono>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <tbb/global_control.h>
+#include <unistd.h>
+
+#include "compress/bake/lod/cluster_lod.h"
+#include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/progress.h"
+#include "tests/benchmarks/benchmark_main.h"
+#include "tests/benchmarks/lod_benchmark_simplifiers.h"
+#include "tests/benchmarks/packing_benchmark_machine.h"
+#include "tests/benchmarks/packing_benchmark_mesh.h"
+#include "tests/compress/lod/lod_meshes.h"
+#include "tests/compress/lod/surface_distance.h"
+
+namespace packtrace {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+struct Options {
+  fs::path scenes, json_file;
+  uint64_t generated_triangles = 500'000;
+  size_t samples = 500'000;
+  bool simplifiers = true;
+  std::vector<std::string> inputs;
+};
+
+struct Times {
+  double cpu = 0.0, wall = 0.0; ///< seconds
+};
+
+template <typename Call>
+Times timed(const Call& call) {
+  const auto wall = std::chrono::steady_clock::now();
+  const std::clock_t cpu = std::clock();
+  call();
+  return {static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC,
+          std::chrono::duration<double>(std::chrono::steady_clock::now() - wall).count()};
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+double diagonal(const std::vector<DVec3>& positions) {
+  DVec3 lo(1e300), hi(-1e300);
+  for (const DVec3& p : positions) lo = glm::min(lo, p), hi = glm::max(hi, p);
+  return glm::length(hi - lo);
+}
+
+std::vector<DVec3> lattice_points(const QuantizedGeometry& geometry, const std::vector<LatticePoint>& positions) {
+  std::vector<DVec3> points;
+  for (const LatticePoint& q : positions) {
+    DVec3 p;
+    for (size_t axis = 0; axis < 3; ++axis)
+      p[static_cast<int>(axis)] = static_cast<double>(q[axis] - geometry.origin[axis]);
+    points.push_back(p);
+  }
+  return points;
+}
+
+void append_points(const ClusterLod& lod, const LodCluster& cluster, std::vector<Triangle>& out) {
+  for (uint32_t i = 0; i < cluster.range.triangle_count; ++i) {
+    const Triangle& t = lod.triangles[cluster.range.first_triangle + i];
+    out.emplace_back(lod.vertices[t.x].position, lod.vertices[t.y].position, lod.vertices[t.z].position);
+  }
+}
+
+/// Both ways; lattice steps.
+struct Distance {
+  double rms = 0.0, max = 0.0;
+};
+Distance between(const BareMesh& a, const SurfaceDistance& to_a, const BareMesh& b, size_t samples) {
+  const SurfaceDistance to_b(b.positions, b.triangles);
+  const DistanceStats from_a = surface_distance(a.positions, a.triangles, to_b, samples);
+  const DistanceStats from_b = surface_distance(b.positions, b.triangles, to_a, samples);
+  return {std::max(from_a.rms, from_b.rms), std::max(from_a.max, from_b.max)};
+}
+
+Json measure_levels(const test::BuiltLod& built, const Options& options) {
+  const ClusterLod& lod = built.lod;
+  BareMesh base, level_mesh;
+  base.positions = lattice_points(built.geometry, lod.positions);
+  for (const LodCluster& c : lod.clusters)
+    if (c.level == 0) append_points(lod, c, base.triangles);
+  level_mesh.positions = base.positions;
+  const SurfaceDistance to_base(base.positions, base.triangles);
+  const double size = diagonal(base.positions);
+
+  Json levels = Json::array();
+  double stated = 0.0; // of all that this level is made of
+  fmt::print(
+      "\n| level | triangles | clusters | terminal groups | stated error, median / largest (% of diagonal) | measured "
+      "rms / largest | stated : measured |\n|---|---|---|---|---|---|---|\n");
+  for (uint32_t level = 0; level < lod.level_count; ++level) {
+    level_mesh.triangles.clear();
+    uint64_t clusters = 0, terminal = 0;
+    for (const LodCluster& c : lod.clusters)
+      if (c.level == level || (c.level < level && lod.groups[c.group].terminal))
+        append_points(lod, c, level_mesh.triangles), ++clusters;
+    std::vector<double> errors;
+    for (const LodGroup& g : lod.groups) {
+      if (g.level == level) terminal += g.terminal;
+      if (g.level + 1 == level && !g.terminal) errors.push_back(g.error);
+    }
+    for (const double e : errors) stated = std::max(stated, e);
+    const Distance d = level == 0 ? Distance{} : between(base, to_base, level_mesh, options.samples);
+    fmt::print("| {} | {} | {} | {} | {:.4f} / {:.4f} | {:.4f} / {:.4f} | {:.2f} |\n", level,
+               level_mesh.triangles.size(), clusters, terminal, 100 * median(errors) / size, 100 * stated / size,
+               100 * d.rms / size, 100 * d.max / size, d.max > 0.0 ? stated / d.max : 1.0);
+    levels.push_back({{"triangles", level_mesh.triangles.size()},
+                      {"clusters", clusters},
+                      {"terminal_groups", terminal},
+                      {"median_stated_error", median(errors) / size},
+                      {"stated_error", stated / size},
+                      {"measured_rms", d.rms / size},
+                      {"measured_max", d.max / size}});
+  }
+  return levels;
+}
+
+Json measure_simplifiers(const test::BuiltLod& built, const Options& options) {
+  BareMesh base;
+  base.positions = lattice_points(built.geometry, built.geometry.positions);
+  for (const Triangle& t : built.geometry.triangles)
+    base.triangles.emplace_back(built.geometry.vertices[t.x].position, built.geometry.vertices[t.y].position,
+                                built.geometry.vertices[t.z].position);
+  const SurfaceDistance to_base(base.positions, base.triangles);
+  const double size = diagonal(base.positions);
+  struct Simplifier {
+    const char* name;
+    SimplifierResult (*run)(const BareMesh&, uint32_t);
+  };
+  Json rows = Json::array();
+  fmt::print("\n| the whole mesh, one thread | kept | triangles | rms (% of diagonal) | largest | Mtri/s "
+             "|\n|---|---|---|---|---|---|\n");
+  for (const double kept : {0.5, 0.1, 0.01})
+    for (const Simplifier& s :
+         {Simplifier{"packtrace", simplify_with_packtrace}, Simplifier{"meshoptimizer", simplify_with_meshoptimizer},
+          Simplifier{"OpenMesh", simplify_with_openmesh}}) {
+      const auto target = static_cast<uint32_t>(kept * static_cast<double>(base.triangles.size()));
+      const SimplifierResult r = s.run(base, target);
+      const Distance d = r.mesh.triangles.empty() ? Distance{} : between(base, to_base, r.mesh, options.samples);
+      const double speed = static_cast<double>(base.triangles.size()) / r.seconds * 1e-6;
+      fmt::print("| {} | {} % | {}{} | {:.5f} | {:.4f} | {:.2f} |\n", s.name, 100 * kept, r.mesh.triangles.size(),
+                 r.lost_triangles > 0 ? fmt::format(" ({} not taken)", r.lost_triangles) : "", 100 * d.rms / size,
+                 100 * d.max / size, speed);
+      rows.push_back({{"simplifier", s.name},
+                      {"kept", kept},
+                      {"triangles", r.mesh.triangles.size()},
+                      {"lost_triangles", r.lost_triangles},
+                      {"rms", d.rms / size},
+                      {"max", d.max / size},
+                      {"mtri_per_s", speed}});
+    }
+  return rows;
+}
+
+Json measure_input(const std::string& name, const Mesh& mesh, const Options& options) {
+  test::BuiltLod built;
+  fmt::print("\n## {}\n\n", name);
+  Json json{{"name", name}, {"triangles", mesh.triangles.size()}};
+  for (const size_t threads : {size_t{1}, size_t{2}}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    if (threads == 1) built = test::build_lod(mesh);
+    const auto triangles = static_cast<double>(built.base.triangles.size());
+    const Times times = timed([&] {
+      Progress progress;
+      built.lod = build_cluster_lod(built.geometry, built.base, progress);
+    });
+    fmt::print("{} threads: {:.2f} Mtri/s of wall time, {:.2f} of CPU time\n", threads, triangles / times.wall * 1e-6,
+               triangles / times.cpu * 1e-6);
+    json["build"].push_back({{"threads", threads}, {"wall_s", times.wall}, {"cpu_s", times.cpu}});
+  }
+  json["levels"] = measure_levels(built, options);
+  if (options.simplifiers) json["simplifiers"] = measure_simplifiers(built, options);
+  return json;
+}
+
+PackingInput find_input(const std::string& name, const Options& options) {
+  if (name != "generated") // the bunny without the plane below it
+    return load_packing_input(name, options.scenes / name / "scene.pbrt", name == "bunny");
+  const fs::path folder = fs::temp_directory_path() / ("lod_benchmark_" + std::to_string(::getpid()));
+  PackingInput input = generated_packing_input(options.generated_triangles, folder);
+  fs::remove_all(folder);
+  return input;
+}
+
+int run(int argc, char** argv) {
+  Options options;
+  CLI::App app{"Builds levels of detail and measures them, and simplifies with this project and others; see "
+               "docs/cluster_lod.md."};
+  app.add_option("--scenes", options.scenes, "holds bunny, spaceship and house")->envname("PACKTRACE_SCENES");
+  app.add_option("--generated-triangles", options.generated_triangles, "of the generated mesh")->capture_default_str();
+  app.add_option("--samples", options.samples, "points at which surfaces are compared, each way")
+      ->capture_default_str();
+  app.add_flag("!--levels-only", options.simplifiers, "leaves the other programs' simplifiers out");
+  app.add_option("--json", options.json_file, "writes all figures here");
+  app.add_option("INPUT", options.inputs, "which; all if none is named")
+      ->check(CLI::IsMember({"bunny", "spaceship", "house", "generated"}));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorKind::kUsage);
+  }
+  if (options.inputs.empty()) {
+    options.inputs = {"generated"};
+    if (!options.scenes.empty()) options.inputs.insert(options.inputs.begin(), {"bunny", "spaceship", "house"});
+  }
+  std::ofstream out;
+  if (!options.json_file.empty()) out.open(options.json_file);
+  if (!out) throw Error(ErrorKind::kIo, options.json_file.string() + ": cannot write");
+  Json json = describe_machine();
+  for (const std::string& name : options.inputs)
+    json["inputs"].push_back(measure_input(name, weld_positions(find_input(name, options).mesh), options));
+  if (out.is_open()) out << json.dump(2) << std::endl;
+  if (!out) throw Error(ErrorKind::kIo, options.json_file.string() + ": cannot write");
+  for (const Json& input : json["inputs"])
+    for (const Json& level : input["levels"])
+      if (level["measured_max"].get<double>() > level["stated_error"].get<double>() * (1.0 + 1e-6) + 1e-9)
+        throw Error(ErrorKind::kLimitExceeded,
+                    input["name"].get<std::string>() + ": a level is further from the source than it says");
+  return 0;
+}
+
+} // namespace
+} // namespace packtrace
+
+int main(int argc, char** argv) { return packtrace::benchmark_main("lod_benchmark", packtrace::run, argc, argv); }
