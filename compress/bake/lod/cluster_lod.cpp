@@ -57,6 +57,7 @@ private:
   void take_base(const GeometryClusters& base) {
     lod_.triangles.reserve(2 * base.triangles.size());
     lod_.triangles = base.triangles;
+    triangle_errors_.assign(base.triangles.size(), 0.0);
     for (const ClusterRange& range : base.clusters) lod_.clusters.push_back({range, 0, kNoGroup, kNoGroup});
     cluster_spheres_.resize(lod_.clusters.size());
     tbb::parallel_for(size_t{0}, lod_.clusters.size(),
@@ -146,13 +147,9 @@ private:
   }
 
   SimplifiedGroup simplify_group(const std::vector<uint32_t>& members) const {
-    LodGroupInput input{g_, lod_.positions, lod_.vertices, lod_.triangles,  {},
-                        {}, seam_of_kind_,  owner_,        locked_for_ever_};
-    for (const uint32_t number : members) {
-      input.clusters.push_back(&lod_.clusters[number]);
-      const uint32_t generating = lod_.clusters[number].generating_group;
-      input.errors.push_back(generating == kNoGroup ? 0.0 : lod_.groups[generating].error);
-    }
+    LodGroupInput input{g_,     lod_.positions,  lod_.vertices, lod_.triangles, {}, triangle_errors_, seam_of_kind_,
+                        owner_, locked_for_ever_};
+    for (const uint32_t number : members) input.clusters.push_back(&lod_.clusters[number]);
     SimplifiedGroup result = packtrace::simplify_group(input);
     if (static_cast<double>(result.triangles.size()) > kWorthwhile * static_cast<double>(result.source_triangles))
       result = {};
@@ -165,6 +162,9 @@ private:
     group.level = level;
     group.terminal = result.triangles.empty();
     group.error = group.terminal ? std::numeric_limits<double>::infinity() : result.error;
+    for (const uint32_t member : members) // never less than below: cuts rely on it
+      if (const uint32_t below = lod_.clusters[member].generating_group; below != kNoGroup)
+        group.error = std::max(group.error, lod_.groups[below].error);
     std::vector<LodSphere> spheres;
     for (const uint32_t member : members) {
       LodCluster& c = lod_.clusters[member];
@@ -197,6 +197,7 @@ private:
           if (t[corner] >= kNewNumber) t[corner] += first_vertex - kNewNumber;
         lod_.triangles.push_back(t);
       }
+      triangle_errors_.insert(triangle_errors_.end(), r.errors.begin(), r.errors.end());
       uint32_t begin = 0;
       for (size_t c = 0; c < r.cluster_ends.size(); ++c) {
         added.push_back(static_cast<uint32_t>(lod_.clusters.size()));
@@ -217,6 +218,7 @@ private:
   ClusterLod lod_;
   std::vector<uint32_t> seam_of_kind_;
   std::vector<LodSphere> cluster_spheres_; ///< of level 0: their own; else that of the generating group
+  std::vector<double> triangle_errors_;
   std::vector<uint32_t> owner_;
   std::vector<uint8_t> locked_for_ever_; ///< positions of terminal groups
 };

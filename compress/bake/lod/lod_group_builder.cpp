@@ -34,7 +34,6 @@ public:
     bound_errors(points, triangles, mesh_);
     if (mesh_.triangles.size() > config.target_triangles) drop_loose_pieces(mesh_, config.target_triangles);
     for (const LodTriangle& t : mesh_.triangles) out_.error = std::max(out_.error, t.error);
-    for (const double error : in_.errors) out_.error = std::max(out_.error, error);
     number_vertices();
     split();
     return std::move(out_);
@@ -60,7 +59,7 @@ private:
       const bool plain = kind.flat && !kind.uvs;
       for (uint32_t k = 0; k < c.range.triangle_count; ++k) {
         const Triangle& v = in_.triangles[c.range.first_triangle + k];
-        LodTriangle t{{}, Triangle(Wedge::kNone), c.range.kind, in_.errors[i]};
+        LodTriangle t{{}, Triangle(Wedge::kNone), c.range.kind, in_.errors[c.range.first_triangle + k]};
         for (int corner = 0; corner < 3; ++corner) {
           t.points[corner] = local(point_table, positions_, in_.vertices[v[corner]].position);
           if (!plain) t.wedges[corner] = local(wedge_table, wedge_vertices, v[corner]);
@@ -179,7 +178,10 @@ private:
     const Clusters clusters = clusterize({vertices, points, centroids, static_cast<uint32_t>(numbers.size()),
                                           static_cast<uint32_t>(mesh_.points.size())});
     const auto before = static_cast<uint32_t>(out_.triangles.size());
-    for (const uint32_t member : clusters.order) out_.triangles.push_back(vertices_[triangles[member]]);
+    for (const uint32_t member : clusters.order) {
+      out_.triangles.push_back(vertices_[triangles[member]]);
+      out_.errors.push_back(mesh_.triangles[triangles[member]].error);
+    }
     for (const uint32_t end : clusters.ends)
       out_.cluster_ends.push_back(before + end), out_.cluster_kinds.push_back(kind);
   }

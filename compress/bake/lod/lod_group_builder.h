@@ -21,7 +21,7 @@ struct LodGroupInput {
   std::span<const QuantizedVertex> vertices;
   std::span<const Triangle> triangles;
   std::vector<const LodCluster*> clusters;
-  std::vector<double> errors; ///< of each cluster's surface
+  std::span<const double> errors; ///< per triangle: of its surface
   std::span<const uint32_t> seam_of_kind;
   std::span<const uint32_t> owner;          ///< per position; kShared ones stay
   std::span<const uint8_t> locked_for_ever; ///< per position; those stay too
@@ -34,6 +34,7 @@ struct SimplifiedGroup {
   std::vector<LatticePoint> new_positions;   ///< numbered from kNewNumber
   std::vector<QuantizedVertex> new_vertices; ///< numbered from kNewNumber
   std::vector<Triangle> triangles;           ///< vertices, cluster by cluster
+  std::vector<double> errors;                ///< of each
   std::vector<uint32_t> cluster_ends;
   std::vector<uint32_t> cluster_kinds;
 };
