@@ -26,7 +26,7 @@ struct Point2 {
 /// A convex polygon in a triangle's plane.
 struct Polygon {
   std::array<Point2, kMaxCorners> corners;
-  size_t count = 0;
+  size_t count;
 };
 
 /// A part of a triangle before that lies over one after.
@@ -44,21 +44,22 @@ struct Bound {
 
 double cross(Point2 a, Point2 b, Point2 c) { return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x); }
 
-/// What lies to the left of a -> b.
-Polygon cut(const Polygon& in, Point2 a, Point2 b) {
-  Polygon out;
-  double last = cross(a, b, in.corners[in.count - 1]);
+/// Keeps what lies to the left of a -> b.
+void cut(Polygon& polygon, Point2 a, Point2 b) {
+  const Polygon in = polygon;
+  polygon.count = 0;
+  Point2 p = in.corners[in.count - 1];
+  double last = cross(a, b, p);
   for (size_t i = 0; i < in.count; ++i) {
-    const Point2 &p = in.corners[i == 0 ? in.count - 1 : i - 1], &q = in.corners[i];
+    const Point2 q = in.corners[i];
     const double next = cross(a, b, q);
     if ((last < 0.0) != (next < 0.0)) {
       const double t = last / (last - next);
-      out.corners[out.count++] = {p.x + t * (q.x - p.x), p.y + t * (q.y - p.y)};
+      polygon.corners[polygon.count++] = {p.x + t * (q.x - p.x), p.y + t * (q.y - p.y)};
     }
-    if (next >= 0.0) out.corners[out.count++] = q;
-    last = next;
+    if (next >= 0.0) polygon.corners[polygon.count++] = q;
+    p = q, last = next;
   }
-  return out;
 }
 
 double area2(const Polygon& p) {
@@ -104,6 +105,10 @@ public:
 
   void run() {
     errors_.assign(after_.size(), 0.0);
+    for (uint32_t s = 0; s < after_.size(); ++s)
+      normals_.push_back(glm::cross(corner_after(s, 1) - corner_after(s, 0), corner_after(s, 2) - corner_after(s, 0)));
+    flat_.resize(m_.points.size());
+    flat_stamp_.resize(m_.points.size());
     measure_moved_points();
     for (const LodTriangle& t : before_) measure_before(t);
     for (uint32_t i = 0; i < after_.size(); ++i) measure_after(i);
@@ -158,6 +163,7 @@ private:
 
   void measure_before(const LodTriangle& t) {
     find_candidates(t.points);
+    if (is_unchanged(t)) return;
     const std::array<DVec3, 3> p = {points_[t.points.x], points_[t.points.y], points_[t.points.z]};
     best_.clear();
     best_bound_ = std::numeric_limits<double>::infinity();
@@ -166,11 +172,24 @@ private:
     for (const Bound& bound : best_) note(bound.after, bound.distance, t.error);
   }
 
+  /// Whether the triangle is there as it was; then that is noted.
+  bool is_unchanged(const LodTriangle& t) {
+    for (int i = 0; i < 3; ++i)
+      if (m_.stands_for[t.points[i]] != t.points[i] || m_.moved[t.points[i]] != 0) return false;
+    for (const uint32_t s : candidates_)
+      if (const Triangle& p = after_[s].points; p == t.points || p == Triangle(t.points.y, t.points.z, t.points.x) ||
+                                                p == Triangle(t.points.z, t.points.x, t.points.y)) {
+        note(s, 0.0, t.error);
+        seen_[s] += glm::length(normals_[s]);
+        return true;
+      }
+    return false;
+  }
+
   /// Seen from where the new surface faces, slivers and small dents lie flatter; and it may reach further.
   void try_harder(const std::array<DVec3, 3>& p) {
     DVec3 facing(0.0);
-    for (const uint32_t s : candidates_)
-      facing += glm::cross(corner_after(s, 1) - corner_after(s, 0), corner_after(s, 2) - corner_after(s, 0));
+    for (const uint32_t s : candidates_) facing += normals_[s];
     widen_candidates();
     lay_over(p, facing);
     if (best_bound_ <= floor_) return;
@@ -214,6 +233,7 @@ private:
     const DVec3 normal = glm::cross(t[1] - t[0], t[2] - t[0]);
     if (!(area > kSteep * glm::length(normal))) return;
     pieces_.clear();
+    ++flat_stamp_value_;
     double covered = 0.0;
     for (size_t i = 0; i < candidates_.size() && covered < area * (1.0 - kCovered); ++i)
       covered += lay_one_over(whole, frame, candidates_[i]);
@@ -228,28 +248,41 @@ private:
     if (largest < best_bound_) best_.swap(bounds_), best_bound_ = largest;
   }
 
+  Point2 flat_after(const Frame& frame, uint32_t point) {
+    if (flat_stamp_[point] != flat_stamp_value_)
+      flat_stamp_[point] = flat_stamp_value_, flat_[point] = frame.flat(m_.points[point]);
+    return flat_[point];
+  }
+
   /// Twice the area that the candidate covers.
   double lay_one_over(const Polygon& whole, const Frame& frame, uint32_t s) {
-    const std::array<Point2, 3> f = {frame.flat(corner_after(s, 0)), frame.flat(corner_after(s, 1)),
-                                     frame.flat(corner_after(s, 2))};
+    const Triangle& points = after_[s].points;
+    const std::array<Point2, 3> f = {flat_after(frame, points.x), flat_after(frame, points.y),
+                                     flat_after(frame, points.z)};
     const double facing = cross(f[0], f[1], f[2]);
     if (!(facing > 0.0)) return 0.0;
-    // Mostly one of their sides separates them.
+    // Mostly a side of one of them separates them.
+    std::array<bool, 3> cuts{};
     for (size_t k = 0; k < 3; ++k) {
       const Point2 &p = f[k], &q = f[(k + 1) % 3];
-      if (cross(p, q, whole.corners[0]) <= 0.0 && cross(p, q, whole.corners[1]) <= 0.0 &&
-          cross(p, q, whole.corners[2]) <= 0.0)
-        return 0.0;
+      const double d0 = cross(p, q, whole.corners[0]), d1 = cross(p, q, whole.corners[1]),
+                   d2 = cross(p, q, whole.corners[2]);
+      if (std::max({d0, d1, d2}) <= 0.0) return 0.0;
+      cuts[k] = std::min({d0, d1, d2}) < 0.0;
+      const Point2 &r = whole.corners[k], &t = whole.corners[(k + 1) % 3];
+      if (std::max({cross(r, t, f[0]), cross(r, t, f[1]), cross(r, t, f[2])}) <= 0.0) return 0.0;
     }
-    Piece piece{whole, s, 0.0};
-    for (size_t k = 0; k < 3; ++k) {
-      piece.polygon = cut(piece.polygon, f[k], f[(k + 1) % 3]);
-      if (piece.polygon.count < 3) return 0.0;
+    Piece& piece = pieces_.emplace_back();
+    piece.polygon = whole;
+    piece.after = s;
+    for (size_t k = 0; k < 3 && piece.polygon.count >= 3; ++k)
+      if (cuts[k]) cut(piece.polygon, f[k], f[(k + 1) % 3]);
+    const double size = piece.polygon.count < 3 ? 0.0 : area2(piece.polygon);
+    if (!(size > 0.0)) {
+      pieces_.pop_back();
+      return 0.0;
     }
-    const double size = area2(piece.polygon);
-    if (!(size > 0.0)) return 0.0;
     piece.seen = size / facing;
-    pieces_.push_back(piece);
     return size;
   }
 
@@ -257,7 +290,7 @@ private:
   double piece_distance(const Piece& piece, const Frame& frame, DVec3 slope) {
     const uint32_t s = piece.after;
     const DVec3 a = corner_after(s, 0);
-    const DVec3 normal = glm::cross(corner_after(s, 1) - a, corner_after(s, 2) - a);
+    const DVec3& normal = normals_[s];
     seen_[s] += piece.seen * glm::length(normal);
     const double nz = glm::dot(normal, frame.z);
     std::array<DVec3, kMaxCorners> corners;
@@ -340,7 +373,7 @@ private:
   /// A triangle after of which the ones before saw too little: it is measured itself.
   void measure_after(uint32_t s) {
     const DVec3 a = corner_after(s, 0), b = corner_after(s, 1), c = corner_after(s, 2);
-    const double area = glm::length(glm::cross(b - a, c - a));
+    const double area = glm::length(normals_[s]);
     if (seen_[s] >= area * (1.0 - kSeen)) return;
     std::vector<uint32_t> near;
     const auto stands_for = [&](uint32_t p) { return m_.stands_for[p]; };
@@ -362,6 +395,10 @@ private:
   std::vector<uint32_t> stamp_, candidates_, fan_;
   std::vector<double> seen_; ///< area of each triangle after that was met, times 2
   std::vector<double> errors_;
+  std::vector<DVec3> normals_; ///< of triangles after, twice their area long
+  std::vector<Point2> flat_;   ///< points after in the plane at hand, where flat_stamp_ says so
+  std::vector<uint32_t> flat_stamp_;
+  uint32_t flat_stamp_value_ = 0;
   Fans fans_, old_fans_;
   uint32_t stamp_value_ = 0;
   std::vector<Piece> pieces_;
