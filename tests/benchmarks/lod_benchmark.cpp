@@ -157,7 +157,11 @@ Json measure_simplifiers(const test::BuiltLod& built, const Options& options) {
           Simplifier{"OpenMesh", simplify_with_openmesh}}) {
       const auto target = static_cast<uint32_t>(kept * static_cast<double>(base.triangles.size()));
       const SimplifierResult r = s.run(base, target);
-      const Distance d = r.mesh.triangles.empty() ? Distance{} : between(base, to_base, r.mesh, options.samples);
+      if (r.mesh.triangles.empty()) {
+        fmt::print("| {} | {} % | does not take the mesh | | | |\n", s.name, 100 * kept);
+        continue;
+      }
+      const Distance d = between(base, to_base, r.mesh, options.samples);
       const double speed = static_cast<double>(base.triangles.size()) / r.seconds * 1e-6;
       fmt::print("| {} | {} % | {}{} | {:.5f} | {:.4f} | {:.2f} |\n", s.name, 100 * kept, r.mesh.triangles.size(),
                  r.lost_triangles > 0 ? fmt::format(" ({} not taken)", r.lost_triangles) : "", 100 * d.rms / size,

@@ -24,7 +24,7 @@ struct SimplifierResult {
 SimplifierResult simplify_with_packtrace(const BareMesh& mesh, uint32_t target_triangles);
 /// meshopt_simplify() without an error limit.
 SimplifierResult simplify_with_meshoptimizer(const BareMesh& mesh, uint32_t target_triangles);
-/// DecimaterT with ModQuadric and ModNormalFlipping (90 degrees).
+/// DecimaterT with ModQuadric and ModNormalFlipping (90 degrees). Empty where it cannot hold the mesh.
 SimplifierResult simplify_with_openmesh(const BareMesh& mesh, uint32_t target_triangles);
 
 } // namespace packtrace

@@ -42,7 +42,7 @@ protected:
     return std::max(surface_distance(points_, a, to_b, samples).max, surface_distance(points_, b, to_a, samples).max);
   }
 
-  const BuiltLod built_ = build_lod(GetParam().mesh);
+  const BuiltLod built_ = build_lod(GetParam().make());
   std::vector<DVec3> points_;
 };
 

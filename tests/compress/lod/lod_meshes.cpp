@@ -66,40 +66,67 @@ Mesh tetrahedra_mesh(uint32_t count, uint32_t seed) {
   return mesh;
 }
 
-std::vector<NamedMesh> stress_meshes() {
-  std::vector<NamedMesh> all;
-  all.push_back({"torus", torus_mesh(96, 64), true});
-  all.push_back({"half faceted torus", half_faceted(torus_mesh(96, 64)), true});
-  all.push_back({"2000 tetrahedra", tetrahedra_mesh(2000, 1), true});
-  Mesh fin = torus_mesh(48, 32); // every edge twice in both directions, and one point that all share
-  const auto count = static_cast<uint32_t>(fin.triangles.size());
+namespace {
+
+/// Every edge twice in both directions.
+Mesh two_sided_sheet() {
+  Mesh mesh = torus_mesh(48, 32);
+  const auto count = static_cast<uint32_t>(mesh.triangles.size());
   for (uint32_t i = 0; i < count; ++i)
-    fin.triangles.emplace_back(fin.triangles[i].x, fin.triangles[i].z, fin.triangles[i].y);
-  all.push_back({"two-sided sheet", fin, true});
-  Mesh touching = tetrahedra_mesh(1500, 3); // non-manifold: every piece hangs on the same point
-  for (size_t i = 0; i < touching.positions.size(); i += 4) touching.positions[i] = Vec3(0.0f);
-  all.push_back({"tetrahedra on one point", touching, true});
-  all.push_back({"sphere", sphere_mesh(80), false}); // open by a hair at its seam where roundings differ
-  all.push_back({"bumped plane with a border", grid_mesh(80, 0.05f, true), false});
-  all.push_back({"flat plane", grid_mesh(70), false});
-  all.push_back({"soup", soup_mesh(6000, 7), false});
-  Mesh twice = grid_mesh(50, 0.05f);
-  const std::vector<Triangle> once = twice.triangles;
-  twice.triangles.insert(twice.triangles.end(), once.begin(), once.end());
-  all.push_back({"every triangle twice", twice, false});
-  Mesh flat = grid_mesh(50);
-  for (Vec3& p : flat.positions) p.y = 0.25f; // every triangle is a line
-  all.push_back({"triangles without area", flat, false});
-  Mesh star; // 3000 triangles around one edge
-  star.positions = {Vec3(0, 0, -1), Vec3(0, 0, 1)};
+    mesh.triangles.emplace_back(mesh.triangles[i].x, mesh.triangles[i].z, mesh.triangles[i].y);
+  return mesh;
+}
+
+/// Not manifold: every piece hangs on the same point.
+Mesh tetrahedra_on_one_point() {
+  Mesh mesh = tetrahedra_mesh(1500, 3);
+  for (size_t i = 0; i < mesh.positions.size(); i += 4) mesh.positions[i] = Vec3(0.0f);
+  return mesh;
+}
+
+Mesh every_triangle_twice() {
+  Mesh mesh = grid_mesh(50, 0.05f);
+  const std::vector<Triangle> once = mesh.triangles;
+  mesh.triangles.insert(mesh.triangles.end(), once.begin(), once.end());
+  return mesh;
+}
+
+/// Every triangle is a line.
+Mesh without_area() {
+  Mesh mesh = grid_mesh(50);
+  for (Vec3& p : mesh.positions) p.y = 0.25f;
+  return mesh;
+}
+
+Mesh triangles_around_an_edge() {
+  Mesh mesh;
+  mesh.positions = {Vec3(0, 0, -1), Vec3(0, 0, 1)};
   for (uint32_t i = 0; i < 3000; ++i) {
     const double angle = 2.0 * M_PI * i / 3000.0;
-    star.positions.push_back(Vec3(DVec3(std::cos(angle), std::sin(angle), 0.0)));
-    star.triangles.emplace_back(0, 1, i + 2);
+    mesh.positions.push_back(Vec3(DVec3(std::cos(angle), std::sin(angle), 0.0)));
+    mesh.triangles.emplace_back(0, 1, i + 2);
   }
-  all.push_back({"3000 triangles around an edge", star, false});
-  all.push_back({"one triangle", soup_mesh(1, 1), false});
-  return all;
+  return mesh;
+}
+
+} // namespace
+
+std::vector<NamedMesh> stress_meshes() {
+  return {
+      {"torus", [] { return torus_mesh(96, 64); }, true},
+      {"half faceted torus", [] { return half_faceted(torus_mesh(96, 64)); }, true},
+      {"2000 tetrahedra", [] { return tetrahedra_mesh(2000, 1); }, true},
+      {"two sided sheet", two_sided_sheet, true},
+      {"tetrahedra on one point", tetrahedra_on_one_point, true},
+      {"sphere", [] { return sphere_mesh(80); }, false}, // open by a hair at its seam, where roundings differ
+      {"bumped plane with a border", [] { return grid_mesh(80, 0.05f, true); }, false},
+      {"flat plane", [] { return grid_mesh(70); }, false},
+      {"soup", [] { return soup_mesh(6000, 7); }, false},
+      {"every triangle twice", every_triangle_twice, false},
+      {"triangles without area", without_area, false},
+      {"3000 triangles around an edge", triangles_around_an_edge, false},
+      {"one triangle", [] { return soup_mesh(1, 1); }, false},
+  };
 }
 
 std::vector<NamedMesh> closed_stress_meshes() {

@@ -20,7 +20,7 @@ Mesh tetrahedra_mesh(uint32_t count, uint32_t seed);
 /// Meshes that levels must survive.
 struct NamedMesh {
   std::string name;
-  Mesh mesh;
+  Mesh (*make)();
   bool closed = false;
 };
 std::vector<NamedMesh> stress_meshes();
