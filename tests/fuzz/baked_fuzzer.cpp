@@ -1,5 +1,6 @@
-// Baked files: validation, and everything a reader can ask of a file that passed it. Most changes to a file would only
-// spoil its hashes, so each input is tried as it is and once more with the header's sizes and hashes made right.
+// Baked files, resident and in disk form: decoding of pages, validation, and everything a reader can ask of a file that
+// passed it. Most changes to a file would only spoil its hashes, so each input is tried as it is, with the sizes and
+// hashes of header, table and pages made right, and with those of what its pages are decoded to made right, too.
 
 #include <algorithm>
 #include <cstring>
@@ -10,13 +11,14 @@
 
 #include "compress/format/baked_file.h"
 #include "compress/format/file_summary.h"
+#include "compress/format/page_codec.h"
 #include "pbrt_import/scene/error.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace packtrace::fuzz {
 namespace {
 
-void make_hashes_right(std::vector<std::byte>& bytes) {
+void make_resident_hashes_right(std::span<std::byte> bytes) {
   baked::FileHeader header;
   if (bytes.size() < sizeof header) return;
   std::memcpy(&header, bytes.data(), sizeof header);
@@ -26,6 +28,37 @@ void make_hashes_right(std::vector<std::byte>& bytes) {
   const XXH128_hash_t hash = XXH3_128bits(bytes.data() + sizeof header, bytes.size() - sizeof header);
   header.content_hash = {hash.low64, hash.high64};
   header.header_hash = XXH3_64bits(&header, offsetof(baked::FileHeader, header_hash));
+  std::memcpy(bytes.data(), &header, sizeof header);
+}
+
+/// Hashes of the pages where their sizes allow that, the last page ending with the file; then that of the table.
+void make_page_hashes_right(std::span<std::byte> bytes, baked::PagedHeader& header) {
+  const uint64_t limit = bytes.size();
+  const uint64_t table_bytes = uint64_t{header.page_count} * sizeof(baked::PageRecord);
+  if (header.head_disk_bytes > limit || header.tail_disk_bytes > limit) return;
+  const uint64_t data = sizeof header + table_bytes + header.head_disk_bytes + header.tail_disk_bytes;
+  if (data > limit) return;
+  std::byte* const table = bytes.data() + sizeof header;
+  uint64_t at = data;
+  for (uint32_t i = 0; i < header.page_count; ++i) {
+    baked::PageRecord page;
+    std::memcpy(&page, table + i * sizeof page, sizeof page);
+    if (i + 1 == header.page_count) page.disk_bytes = static_cast<uint32_t>(limit - at);
+    if (page.disk_bytes > limit - at) break;
+    page.hash = XXH3_64bits(bytes.data() + at, page.disk_bytes);
+    at += page.disk_bytes;
+    std::memcpy(table + i * sizeof page, &page, sizeof page);
+  }
+  header.table_hash = XXH3_64bits(table, static_cast<size_t>(data) - sizeof header);
+}
+
+void make_hashes_right(std::span<std::byte> bytes) {
+  baked::PagedHeader header;
+  if (!is_paged_file(bytes) || bytes.size() < sizeof header) return make_resident_hashes_right(bytes);
+  std::memcpy(&header, bytes.data(), sizeof header);
+  header.file_bytes = bytes.size();
+  make_page_hashes_right(bytes, header);
+  header.header_hash = XXH3_64bits(&header, offsetof(baked::PagedHeader, header_hash));
   std::memcpy(bytes.data(), &header, sizeof header);
 }
 
@@ -96,14 +129,32 @@ void read_rest(const BakedFile& file) {
   require(summarize(file).bytes.total == file.file_bytes(), "summary of the file");
 }
 
-void read_baked(std::span<const std::byte> bytes) {
+/// Calls read, which may refuse the file.
+template <class Read>
+void expect_read_or_refused(Read read) {
   try {
-    const BakedFile file = BakedFile::from_bytes(bytes);
-    for (uint32_t g = 0; g < file.geometries().size(); ++g) read_geometry(file, g);
-    read_rest(file);
+    read();
   } catch (const Error& error) {
     require(error.kind() == ErrorKind::kInput || error.kind() == ErrorKind::kUnsupported, "kind of error");
   }
+}
+
+void read_baked(std::span<const std::byte> bytes) {
+  expect_read_or_refused([&] {
+    const BakedFile file = BakedFile::from_bytes(bytes);
+    for (uint32_t g = 0; g < file.geometries().size(); ++g) read_geometry(file, g);
+    read_rest(file);
+  });
+}
+
+/// What pages are decoded to after changes no longer has its content hash: validation would look at nothing else.
+void read_decoded_pages(std::span<const std::byte> bytes) {
+  expect_read_or_refused([&] {
+    DiskForm form;
+    std::vector<std::byte> resident = expand_paged_file(bytes, "memory", form);
+    make_resident_hashes_right(resident);
+    read_baked(resident);
+  });
 }
 
 } // namespace
@@ -116,5 +167,6 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   std::vector<std::byte> repaired(bytes.begin(), bytes.end());
   make_hashes_right(repaired);
   read_baked(repaired);
+  if (packtrace::is_paged_file(repaired)) read_decoded_pages(repaired);
   return 0;
 }
