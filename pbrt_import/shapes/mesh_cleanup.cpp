@@ -25,7 +25,11 @@ struct Tally {
   }
   /// "3 triangles (the first is number 17) dropped: ..."
   void report_to(const ReportFn& report, Severity severity, std::string_view noun, std::string_view text) const {
-    if (count == 0 || !report) return;
+    if (count > 0 && report) describe_to(report, severity, noun, text);
+  }
+
+private:
+  void describe_to(const ReportFn& report, Severity severity, std::string_view noun, std::string_view text) const {
     std::string message = std::to_string(count);
     message.append(" ").append(noun).append(count == 1 ? " (number " : "s (the first is number ");
     message.append(std::to_string(first)).append(") ").append(text);
