@@ -93,10 +93,10 @@ void ParameterList::add(Parameter parameter) {
   parameters_.push_back(std::move(parameter));
 }
 
-const Parameter* ParameterList::find(std::string_view name, std::initializer_list<ParameterType> types) const {
+const Parameter* ParameterList::find_type_in(uint32_t type_bits, std::string_view name) const {
   asked_.push_back(name);
   for (auto it = parameters_.rbegin(); it != parameters_.rend(); ++it)
-    if (it->name == name && std::find(types.begin(), types.end(), it->type) != types.end()) {
+    if ((type_bits & bit_of(it->type)) != 0 && it->name == name) {
       it->used = true;
       return &*it;
     }

@@ -52,6 +52,7 @@ void SceneBuilder::add_shape(Directive& directive) {
     statistics_.area_lights += use.area_light != kNone;
   }
   shape.material = materials_.use(use);
+  if (current_object_ == kNone) reserve_one_more(scene_.shapes);
   (current_object_ == kNone ? scene_.shapes : scene_.objects[current_object_].shapes).push_back(shape);
 }
 
@@ -96,11 +97,12 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
   const std::string& name = directive.names[0];
   const ShapeKind* const kind = find_shape_kind(name);
   if (!kind) return skip_shape(name, directive.place, "unknown shape" + did_you_mean(closest_shape_kind(name)));
-  const ReportFn report = [&](Severity severity, uint32_t, std::string message) {
-    reporter_.report(severity, directive.place, name + ": " + message);
+  // Captures no more than fits in a std::function.
+  const ReportFn report = [this, &directive](Severity severity, uint32_t, std::string message) {
+    reporter_.report(severity, directive.place, directive.names[0] + ": " + message);
   };
   MeshQueue::Entry entry;
-  entry.kind = name;
+  entry.kind = kind->name;
   entry.place = directive.place;
   entry.sequence = reporter_.sequence();
   entry.slot = static_cast<uint32_t>(scene_.meshes.size());
@@ -111,7 +113,7 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
     if (!is_invertible(shape.parent_from_mesh))
       return skip_shape(name, directive.place, "its size leaves the range of numbers");
   }
-  const std::string same_as = entry.job.same_as;
+  const std::string same_as = std::move(entry.job.same_as);
   if (const std::optional<uint32_t> known = same_as.empty() ? std::nullopt : same_meshes_.find(same_as)) {
     shape.mesh = same_mesh_slots_[*known];
     return true;
@@ -127,11 +129,12 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
 
 /// Adds a mesh to the scene, empty until take_queued_meshes() if making it is worth a task.
 /// @return false if the mesh could not be made
-bool SceneBuilder::make_or_queue(MeshQueue::Entry entry) {
+bool SceneBuilder::make_or_queue(MeshQueue::Entry&& entry) {
   constexpr uint64_t kWorthATask = 32 * 1024;
   const uint64_t bytes_left = options_.memory_budget_bytes - mesh_bytes_;
   if (entry.job.bytes_at_most >= kWorthATask && entry.job.bytes_at_most <= bytes_left) {
     mesh_bytes_ += entry.job.bytes_at_most;
+    reserve_one_more(scene_.meshes);
     scene_.meshes.emplace_back();
     mesh_queue_.add(std::move(entry));
     return true;
@@ -144,11 +147,12 @@ bool SceneBuilder::make_or_queue(MeshQueue::Entry entry) {
         "all meshes together exceed the memory budget of " + std::to_string(options_.memory_budget_bytes) + " bytes";
   if (!report_mesh(entry)) return false;
   mesh_bytes_ += bytes_of(entry.made.mesh);
+  reserve_one_more(scene_.meshes);
   scene_.meshes.push_back(std::move(entry.made.mesh));
   return true;
 }
 
-bool SceneBuilder::skip_shape(const std::string& kind, const Place& place, const std::string& problem) {
+bool SceneBuilder::skip_shape(std::string_view kind, const Place& place, const std::string& problem) {
   reporter_.error(place, "Shape " + in_quotes(kind) + " is skipped: " + problem);
   return false;
 }
@@ -156,10 +160,10 @@ bool SceneBuilder::skip_shape(const std::string& kind, const Place& place, const
 /// @return false if the mesh could not be made
 bool SceneBuilder::report_mesh(MeshQueue::Entry& entry) {
   for (auto& [severity, message] : entry.made.reports)
-    reporter_.report(severity, entry.place, entry.kind + ": " + message);
+    reporter_.report(severity, entry.place, std::string(entry.kind) + ": " + message);
   scene_.dropped_triangles += entry.made.dropped_triangles;
-  entry.made.mesh.name = entry.kind;
-  entry.made.mesh.name.append(":").append(std::to_string(entry.place.line));
+  mesh_name_.assign(entry.kind).append(":").append(std::to_string(entry.place.line));
+  entry.made.mesh.name = std::string(mesh_name_); // without room to grow: there may be many
   return entry.made.problem.empty() || skip_shape(entry.kind, entry.place, entry.made.problem);
 }
 
