@@ -4,35 +4,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <iterator>
 #include <span>
 #include <vector>
 
+#include "pbrt_import/large_pages.h"
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {
-
-/// Asks for memory that is about to be written for the first time to come in large pages, if it is large.
-void prefer_large_pages(void* memory, size_t bytes);
-
-/// Makes room for capacity elements like reserve(), the old ones moved only after prefer_large_pages().
-template <class T>
-void reserve_large(std::vector<T>& elements, size_t capacity) {
-  std::vector<T> larger;
-  larger.reserve(capacity);
-  prefer_large_pages(larger.data(), capacity * sizeof(T));
-  larger.insert(larger.end(), std::make_move_iterator(elements.begin()), std::make_move_iterator(elements.end()));
-  elements = std::move(larger);
-}
-
-/// Room for one more of what there may be many of. Room that is never used costs address space only, where copies
-/// would cost time, and memory while they are made.
-template <class T>
-void reserve_one_more(std::vector<T>& elements) {
-  constexpr size_t kFirst = 1024, kFew = 1u << 16;
-  if (elements.size() < elements.capacity()) return;
-  reserve_large(elements, std::max(kFirst, elements.size() * (elements.size() < kFew ? 16 : 4)));
-}
 
 /// A growing row of numbers, stored in groups of three: what the large ones become, points or triangles, is taken out
 /// without a copy.

@@ -12,6 +12,7 @@
 #include "pbrt_import/file_names.h"
 #include "pbrt_import/graphics_state.h"
 #include "pbrt_import/import_scene.h"
+#include "pbrt_import/large_pages.h"
 #include "pbrt_import/materials.h"
 #include "pbrt_import/mesh_queue.h"
 #include "pbrt_import/parser.h"
@@ -113,7 +114,8 @@ private:
   std::vector<uint32_t> same_mesh_slots_; ///< in Scene::meshes, by number in same_meshes_
   std::string mesh_name_;                 ///< scratch
   uint64_t mesh_bytes_ = 0; ///< of all meshes made from text, queued ones at most
-  MeshQueue mesh_queue_;    ///< last: its tasks end before anything else does
+  LargeHeapPages heap_pages_;
+  MeshQueue mesh_queue_; ///< last: its tasks end before anything else does
 };
 
 } // namespace packtrace

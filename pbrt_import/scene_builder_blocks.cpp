@@ -1,6 +1,7 @@
 // The part of SceneBuilder that keeps worlds, blocks, objects and instances.
 #include <algorithm>
 
+#include "pbrt_import/large_pages.h"
 #include "pbrt_import/scene/error.h"
 #include "pbrt_import/scene_builder.h"
 #include "pbrt_import/tokenizer.h"

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "pbrt_import/large_pages.h"
 #include "pbrt_import/problem_text.h"
 #include "pbrt_import/scene_pruning.h"
 #include "pbrt_import/shape_builder.h"
@@ -131,6 +132,8 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
 /// @return false if the mesh could not be made
 bool SceneBuilder::make_or_queue(MeshQueue::Entry&& entry) {
   constexpr uint64_t kWorthATask = 32 * 1024;
+  constexpr uint64_t kLeast = 128; // its name, and what blocks are rounded up to
+  heap_pages_.about_to_allocate(entry.job.bytes_at_most + kLeast);
   const uint64_t bytes_left = options_.memory_budget_bytes - mesh_bytes_;
   if (entry.job.bytes_at_most >= kWorthATask && entry.job.bytes_at_most <= bytes_left) {
     mesh_bytes_ += entry.job.bytes_at_most;
