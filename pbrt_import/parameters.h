@@ -61,8 +61,11 @@ std::string describe(const Parameter& parameter);
 /// it as used; what stays unused is a mistake in the scene worth reporting.
 class ParameterList {
 public:
-  void add(Parameter parameter);
-  void clear() { parameters_.clear(), asked_.clear(); }
+  /// A new parameter to be filled in; then keep() or drop() it.
+  Parameter& append() { return parameters_.emplace_back(); }
+  void keep();
+  void drop() { parameters_.pop_back(); }
+  void clear() { parameters_.clear(), asked_.clear(), types_ = 0; }
   bool empty() const { return parameters_.empty(); }
   std::span<const Parameter> all() const { return parameters_; }
 
@@ -101,6 +104,7 @@ private:
   const Parameter* find_type_in(uint32_t type_bits, std::string_view name) const;
 
   std::vector<Parameter> parameters_;
+  uint32_t types_ = 0;                          ///< bit_of() all of them
   mutable std::vector<std::string_view> asked_; ///< literals, some of them often
 };
 
