@@ -12,6 +12,7 @@
 #include "compress/bake/geometry_measure.h"
 #include "compress/bake/geometry_plan.h"
 #include "compress/bake/page_encoder.h"
+#include "compress/bake/touching_boxes.h"
 #include "compress/format/baked_image.h"
 #include "compress/format/bit_stream.h"
 #include "pbrt_import/scene/error.h"
@@ -34,6 +35,7 @@ public:
   BakedScene run() {
     measure();
     choose_grids();
+    find_touching_instances();
     pack();
     BakedScene result;
     result.bytes = assemble();
@@ -63,6 +65,7 @@ private:
       packed_[i].encoded = {};
     }
     sections.set_instances(plan_.instances);
+    sections.set_material_slots(plan_.material_slots);
     add_up();
     return sections.assemble(summary(sections));
   }
@@ -117,11 +120,35 @@ private:
     if (far > 0)
       warn(std::to_string(far) + " of " + std::to_string(grids_.size()) +
            " geometries lie so far from the origin that float positions are coarser than the step of their grid");
-    const auto local = static_cast<size_t>(std::count_if(plan_.geometries.begin(), plan_.geometries.end(),
-                                                         [](const GeometryPlan& p) { return !p.world_space; }));
-    if (local > 0 && plan_.geometries.size() > 1)
-      warn(std::to_string(local) + " instanced geometries have grids of their own: where they touch other geometry, "
-                                   "edges agree only within the position error");
+  }
+
+  /// Instances that may open seams, as their grid is not that of what lies beside them.
+  void find_touching_instances() {
+    std::vector<Bounds> boxes(plan_.instances.size());
+    std::vector<uint8_t> own_grid(boxes.size());
+    uint64_t instances = 0;
+    for (size_t i = 0; i < boxes.size(); ++i) {
+      const uint32_t geometry = plan_.instances[i].geometry;
+      own_grid[i] = !plan_.geometries[geometry].world_space;
+      instances += own_grid[i];
+      boxes[i] = placed_box(plan_.instances[i], grown(measures_[geometry].bounds, grids_[geometry].step()));
+    }
+    if (instances == 0) return;
+    report_.touching_instances = count_touching(boxes, own_grid);
+    if (report_.touching_instances > 0)
+      warn("instanced geometry keeps a grid of its own: the boxes of " + std::to_string(report_.touching_instances) +
+           " of " + std::to_string(instances) +
+           " instances touch other geometry, where seams may open by half a step of both grids");
+  }
+
+  static Bounds grown(Bounds box, double by) {
+    if (!box.empty()) box.lo -= by, box.hi += by;
+    return box;
+  }
+
+  static Bounds placed_box(const baked::InstanceRecord& instance, const Bounds& box) {
+    const auto& m = instance.world_from_object;
+    return transform_bounds(DAffine(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]), box);
   }
 
   void pack() {
@@ -139,11 +166,11 @@ private:
   Packed pack_one(size_t index) const {
     const GeometryPlan& plan = plan_.geometries[index];
     const GeometryMeasure& measure = measures_[index];
-    const GeometryNeeds needs = analyse_requirements(scene_, plan);
+    const GeometryNeeds needs = analyse_requirements(scene_, plan_, plan);
     const QuantizedGeometry q = quantize_geometry(scene_, plan, needs, config_, grids_[index], measure.max_abs(),
                                                   measure.bounds.lo, measure.bounds.hi);
-    return {record_of(plan, q, position_error_bound(q.grid.step(), measure.max_abs())), encode_geometry(scene_, q),
-            q.stats, unneeded_uv_bytes(scene_, plan, needs)};
+    return {record_of(plan, q, position_error_bound(q.grid.step(), measure.max_abs())), encode_geometry(q), q.stats,
+            unneeded_uv_bytes(scene_, plan, needs)};
   }
 
   static baked::GeometryRecord record_of(const GeometryPlan& plan, const QuantizedGeometry& q, double error_bound) {
@@ -160,6 +187,7 @@ private:
     record.mean_normal_error_degrees = static_cast<float>(mean_normal_error(q.stats));
     record.max_uv_error = static_cast<float>(q.stats.max_uv_error);
     record.flags = plan.world_space ? baked::kWorldSpace : 0;
+    record.slot_count = static_cast<uint32_t>(plan.slot_class.size());
     return record;
   }
 
@@ -172,9 +200,7 @@ private:
       Bounds box;
       box.lo = DVec3(g.bounds_lo[0], g.bounds_lo[1], g.bounds_lo[2]);
       box.hi = DVec3(g.bounds_hi[0], g.bounds_hi[1], g.bounds_hi[2]);
-      const auto& m = instance.world_from_object;
-      const Bounds placed =
-          transform_bounds(DAffine(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]), box);
+      const Bounds placed = placed_box(instance, box);
       constexpr double kMax = std::numeric_limits<float>::max();
       for (int axis = 0; axis < 3; ++axis)
         if (!(placed.lo[axis] >= -kMax && placed.hi[axis] <= kMax))
@@ -208,6 +234,7 @@ private:
     report_.mean_normal_error_degrees = mean_normal_error(all);
     report_.source_triangles = unique_triangle_count(scene_);
     report_.shared_shapes = plan_.shared_shapes;
+    report_.instanced_shapes = plan_.instanced_shapes;
     report_.shared_objects = plan_.shared_objects;
     report_.unused_objects = plan_.unused_objects;
     report_.unused_triangles = plan_.unused_triangles;

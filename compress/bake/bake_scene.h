@@ -23,6 +23,8 @@ struct BakeReport {
   uint64_t merged_vertices = 0;     ///< equal after quantisation to another one of their geometry
   uint64_t collapsed_triangles = 0; ///< kept, though two of their corners fell on one lattice point
   uint64_t shared_shapes = 0;       ///< shapes outside objects that use another's geometry
+  uint64_t instanced_shapes = 0;    ///< shapes outside objects that lie on a grid of their own as they share a geometry
+  uint64_t touching_instances = 0;  ///< on grids of their own, in boxes that touch other geometry's
   uint64_t shared_objects = 0;      ///< objects that use another's geometry
   uint64_t unused_objects = 0;      ///< never instanced; not stored
   uint64_t unused_triangles = 0;

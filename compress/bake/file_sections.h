@@ -22,6 +22,8 @@ public:
 
   void set_instances(std::vector<baked::InstanceRecord> instances) { instances_ = std::move(instances); }
 
+  void set_material_slots(std::vector<uint32_t> slots) { material_slots_ = std::move(slots); }
+
   const std::vector<baked::GeometryRecord>& geometries() const { return geometries_; }
   const ClusterView::StreamBits& stream_bits() const { return stream_bits_; }
 
@@ -43,6 +45,7 @@ private:
   std::vector<uint32_t> mask_words_;
   std::vector<baked::CameraRecord> cameras_;
   std::string strings_;
+  std::vector<uint32_t> material_slots_;
   ClusterView::StreamBits stream_bits_;
 };
 

@@ -72,6 +72,7 @@ public:
         position_table_(count_vertices()), vertex_table_(2 * count_vertices()) {
     out_.grid = grid;
     out_.uv_exponent = needs.uv_exponent;
+    out_.slot_class = plan.slot_class;
   }
 
   QuantizedGeometry run(double max_abs, DVec3 lowest, DVec3 highest) {
@@ -315,7 +316,7 @@ private:
     std::array<uint32_t, 2> kinds{kUnset, kUnset};
     for (size_t i = 0; i < work.triangles.size(); ++i) {
       const uint8_t flat = work.flat[i];
-      if (kinds[flat] == kUnset) kinds[flat] = kind_number({part.material, flat != 0, needs.uvs});
+      if (kinds[flat] == kUnset) kinds[flat] = kind_number({part.slot, flat != 0, needs.uvs});
       Triangle t{};
       for (int corner = 0; corner < 3; ++corner) {
         const uint32_t source = work.triangles[i][corner];

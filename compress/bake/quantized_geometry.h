@@ -20,9 +20,9 @@ struct QuantizedVertex {
   bool operator==(const QuantizedVertex&) const = default;
 };
 
-/// Triangles that share a material and the streams they need.
+/// Triangles that share a material slot and the streams they need.
 struct TriangleKind {
-  uint32_t material = 0;
+  uint32_t slot = 0;
   bool flat = false; ///< all normals are the face normal: none are stored
   bool uvs = false;
   bool operator==(const TriangleKind&) const = default;
@@ -52,9 +52,10 @@ struct QuantizedGeometry {
   uint32_t anchor_shift = 0; ///< so that extents >> anchor_shift fit int32_t
   std::vector<LatticePoint> positions;
   std::vector<QuantizedVertex> vertices;
-  std::vector<Triangle> triangles; ///< into vertices
-  std::vector<TriangleKind> kinds; ///< distinct
-  std::vector<uint32_t> kind_of;   ///< per triangle, into kinds
+  std::vector<Triangle> triangles;  ///< into vertices
+  std::vector<TriangleKind> kinds;  ///< distinct
+  std::vector<uint32_t> kind_of;    ///< per triangle, into kinds
+  std::vector<uint32_t> slot_class; ///< material class by slot, ascending
 
   QuantizeStats stats;
 };

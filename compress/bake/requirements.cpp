@@ -20,24 +20,28 @@ Vec2 max_abs_uv(const Mesh& mesh) {
 
 } // namespace
 
-GeometryNeeds analyse_requirements(const Scene& scene, const GeometryPlan& plan) {
+GeometryNeeds analyse_requirements(const Scene& scene, const ScenePlan& scene_plan, const GeometryPlan& plan) {
   GeometryNeeds needs;
   Vec2 largest(0.0f);
   std::vector<const AlphaMask*> masks;
   for (const GeometryPart& part : plan.parts) {
     const Mesh& mesh = scene.meshes[part.mesh];
-    const Material& material = scene.materials[part.material];
-    needs.parts.push_back({!mesh.normals.empty(), needs_mask(material.flags)});
-    if (!needs_mask(material.flags)) continue;
+    const bool masked = !mesh.triangles.empty() && (plan.slot_class[part.slot] & baked::kMaskedClass) != 0;
+    needs.parts.push_back({!mesh.normals.empty(), masked});
+    if (!masked) continue;
     largest = glm::max(largest, max_abs_uv(mesh));
-    const auto add = [&](MaterialFlags flag, uint32_t mask) {
-      if ((material.flags & flag) == 0) return;
-      if (mask >= scene.masks.size())
-        throw Error(ErrorKind::kInput, "invalid scene: an alpha mask of material " + material.name + " does not exist");
-      masks.push_back(&scene.masks[mask]);
-    };
-    add(kAlphaMask, material.alpha_mask);
-    add(kShadowAlphaMask, material.shadow_alpha_mask);
+    for (const uint32_t run : plan.material_runs) {
+      const Material& material = scene.materials[scene_plan.material_slots[run + part.slot]];
+      const auto add = [&](MaterialFlags flag, uint32_t mask) {
+        if ((material.flags & flag) == 0) return;
+        if (mask >= scene.masks.size())
+          throw Error(ErrorKind::kInput,
+                      "invalid scene: an alpha mask of material " + material.name + " does not exist");
+        masks.push_back(&scene.masks[mask]);
+      };
+      add(kAlphaMask, material.alpha_mask);
+      add(kShadowAlphaMask, material.shadow_alpha_mask);
+    }
   }
   for (size_t i = 0; i < masks.size(); ++i) {
     const AlphaMask& mask = *masks[i];

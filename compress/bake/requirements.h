@@ -29,7 +29,7 @@ struct DroppedStream {
 };
 
 /// Decides the streams of one geometry. Throws Error(kInput) if a material's mask does not exist.
-GeometryNeeds analyse_requirements(const Scene& scene, const GeometryPlan& plan);
+GeometryNeeds analyse_requirements(const Scene& scene, const ScenePlan& scene_plan, const GeometryPlan& plan);
 
 /// Source bytes of texture coordinates that no stored material looks up.
 uint64_t unneeded_uv_bytes(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs);

@@ -7,12 +7,12 @@
 
 #include "pbrt_import/scene/material_flags.h"
 
-/// What lies in a .ptk file, version 2; docs/baked_format.md says it in words. Little-endian; every section starts at a
+/// What lies in a .ptk file, version 3; docs/baked_format.md says it in words. Little-endian; every section starts at a
 /// multiple of 64 bytes; bytes that no field or section owns are zero.
 namespace packtrace::baked {
 
 inline constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'K', 0x89, '\r', '\n', 0x1a, 0};
-inline constexpr uint32_t kVersion = 2;
+inline constexpr uint32_t kVersion = 3;
 inline constexpr size_t kSectionAlignment = 64;
 inline constexpr uint32_t kNone = ~0u;
 
@@ -26,8 +26,9 @@ enum Section : uint32_t {
   kMasks,
   kMaskWords, ///< uint32_t, rows of all masks
   kCameras,
-  kStrings, ///< UTF-8 bytes, not terminated
-  kSummary, ///< one record
+  kStrings,       ///< UTF-8 bytes, not terminated
+  kSummary,       ///< one record
+  kMaterialSlots, ///< uint32_t: materials, in runs that instances begin at
   kSectionCount
 };
 
@@ -47,7 +48,7 @@ struct FileHeader {
   uint32_t section_count;
   uint32_t reserved;
   std::array<SectionRecord, kSectionCount> sections;
-  std::array<uint64_t, 11> padding;
+  std::array<uint64_t, 8> padding;
   uint64_t header_hash; ///< XXH3-64 of the header before this field
 };
 
@@ -84,7 +85,7 @@ struct GeometryRecord {
   std::array<uint32_t, 8> class_clusters; ///< clusters of each material class; sums to cluster_count
   StringRef name;
   uint32_t normal_encoding; ///< normal_codec.h, of all its clusters
-  uint32_t reserved;
+  uint32_t slot_count;      ///< of material slots, ordered by material_class(); 0 without clusters
 };
 
 // ClusterRecord::flags
@@ -95,13 +96,13 @@ inline constexpr uint32_t kClusterChartShift = 3;       ///< else all are unfold
 inline constexpr uint8_t kClusterChart = 7u << kClusterChartShift;
 inline constexpr uint8_t kClusterFlags = kClusterHasNormals | kClusterHasUvs | kClusterMixedCharts | kClusterChart;
 
-/// Up to 128 triangles of one material. Payload, bit by bit without gaps: strips (index_codec.h); per vertex the
+/// Up to 128 triangles of one material slot. Payload, bit by bit without gaps: strips (index_codec.h); per vertex the
 /// lattice coordinates x, y, z less the anchor; normals; texture coordinates.
 struct ClusterRecord {
-  uint32_t payload_offset; ///< in 4-byte words from the geometry's payload
-  uint32_t first_triangle; ///< within the geometry
-  uint32_t first_vertex;   ///< within the geometry
-  uint32_t material;
+  uint32_t payload_offset;              ///< in 4-byte words from the geometry's payload
+  uint32_t first_triangle;              ///< within the geometry
+  uint32_t first_vertex;                ///< within the geometry
+  uint32_t material_slot;               ///< each instance has a material for it: that at its first_slot + this
   std::array<int32_t, 3> anchor;        ///< lattice, less the geometry's origin, in 2^anchor_shift steps
   std::array<int16_t, 2> normal_anchor; ///< of x and y, in units of two codes
   uint16_t vertex_count;                ///< 1..256
@@ -124,6 +125,7 @@ struct MaterialRecord {
 struct InstanceRecord {
   std::array<float, 12> world_from_object; ///< four columns of three
   uint32_t geometry;
+  uint32_t first_slot; ///< into the material slots, of the geometry's slot_count
 };
 
 struct MaskRecord {
@@ -170,7 +172,7 @@ inline constexpr bool kIsPod = std::is_trivially_copyable_v<T>&& std::is_standar
 
 static_assert(kIsPod<FileHeader> && sizeof(SectionRecord) == 24 && sizeof(FileHeader) == 384);
 static_assert(offsetof(FileHeader, content_hash) == 24 && offsetof(FileHeader, sections) == 48 &&
-              offsetof(FileHeader, padding) == 288 && offsetof(FileHeader, header_hash) == 376);
+              offsetof(FileHeader, padding) == 312 && offsetof(FileHeader, header_hash) == 376);
 static_assert(kIsPod<GeometryRecord> && sizeof(GeometryRecord) == 184 && alignof(GeometryRecord) == 8);
 static_assert(offsetof(GeometryRecord, origin) == 24 && offsetof(GeometryRecord, cluster_count) == 64 &&
               offsetof(GeometryRecord, bounds_lo) == 96 && offsetof(GeometryRecord, flags) == 132 &&
@@ -181,7 +183,7 @@ static_assert(offsetof(ClusterRecord, anchor) == 16 && offsetof(ClusterRecord, n
               offsetof(ClusterRecord, vertex_count) == 32 && offsetof(ClusterRecord, triangle_count) == 36 &&
               offsetof(ClusterRecord, flags) == 43);
 static_assert(kIsPod<MaterialRecord> && sizeof(MaterialRecord) == 32 && offsetof(MaterialRecord, alpha_mask) == 16);
-static_assert(kIsPod<InstanceRecord> && sizeof(InstanceRecord) == 52 && offsetof(InstanceRecord, geometry) == 48);
+static_assert(kIsPod<InstanceRecord> && sizeof(InstanceRecord) == 56 && offsetof(InstanceRecord, first_slot) == 52);
 static_assert(kIsPod<MaskRecord> && sizeof(MaskRecord) == 40 && offsetof(MaskRecord, uv_scale) == 24);
 static_assert(kIsPod<CameraRecord> && sizeof(CameraRecord) == 160 && offsetof(CameraRecord, projection) == 136);
 static_assert(kIsPod<SummaryRecord> && sizeof(SummaryRecord) == 152 && offsetof(SummaryRecord, stream_bits) == 120);
@@ -191,11 +193,13 @@ inline constexpr std::array<uint32_t, kSectionCount> kRecordBytes = {
     sizeof(GeometryRecord), sizeof(ClusterRecord),  1,
     sizeof(MaterialRecord), sizeof(InstanceRecord), sizeof(MaskRecord),
     sizeof(uint32_t),       sizeof(CameraRecord),   1,
-    sizeof(SummaryRecord)};
+    sizeof(SummaryRecord),  sizeof(uint32_t)};
+
+inline constexpr uint32_t kMaskedClass = 4; ///< bit of a material class: a mask must be looked up
 
 /// Order of clusters within a geometry, 0..7: solid and seen by everything first, masked ones last.
 constexpr uint32_t material_class(MaterialFlags flags) {
-  return (camera_visible(flags) ? 0u : 1u) | (occludes(flags) ? 0u : 2u) | (needs_mask(flags) ? 4u : 0u);
+  return (camera_visible(flags) ? 0u : 1u) | (occludes(flags) ? 0u : 2u) | (needs_mask(flags) ? kMaskedClass : 0u);
 }
 
 } // namespace packtrace::baked

@@ -18,7 +18,7 @@ StreamBytes stream_bytes(const BakedFile& file) {
   bytes.cluster_records = s.clusters.size_bytes();
   bytes.geometry_records = s.geometries.size_bytes();
   bytes.instance_records = s.instances.size_bytes();
-  bytes.material_records = s.materials.size_bytes();
+  bytes.material_records = s.materials.size_bytes() + s.material_slots.size_bytes();
   bytes.masks = s.masks.size_bytes() + s.mask_words.size_bytes();
   bytes.cameras = s.cameras.size_bytes();
   bytes.strings = s.strings.size();
