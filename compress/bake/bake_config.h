@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "compress/format/baked_format.h"
 #include "compress/format/normal_codec.h"
 #include "compress/format/page_codec.h"
 
@@ -35,6 +36,11 @@ struct BakeConfig {
   double max_normal_error_degrees() const;
   /// Triangles whose three normals are all this close to the decoded face's normal, or to its opposite, store none.
   double flat_degrees() const;
+
+  /// What the file is to be good for: streams that it does not need are left out.
+  baked::Purpose purpose = baked::kAo;
+  bool keep_normals = false; ///< of every triangle whose source has them
+  bool keep_uvs = false;     ///< of every mesh that has them
 
   /// How the file lies on disk. Changes nothing that is decoded from it.
   PageCodec codec = PageCodec::kNone;

@@ -12,6 +12,7 @@
 #include "compress/bake/geometry_measure.h"
 #include "compress/bake/geometry_plan.h"
 #include "compress/bake/page_encoder.h"
+#include "compress/bake/requirement_table.h"
 #include "compress/bake/touching_boxes.h"
 #include "compress/format/baked_image.h"
 #include "compress/format/bit_stream.h"
@@ -54,18 +55,22 @@ private:
     baked::GeometryRecord record{};
     EncodedGeometry encoded;
     QuantizeStats stats;
-    uint64_t unneeded_uv_bytes = 0;
+    GeometryNeeds needs;
   };
 
   std::vector<std::byte> assemble() {
     progress_.begin("assembling the file", 0);
     FileSections sections(scene_);
+    RequirementTable requirements;
     for (size_t i = 0; i < packed_.size(); ++i) {
+      packed_[i].record.requirements = requirements.add(scene_, plan_.geometries[i], packed_[i].needs, packed_[i].stats,
+                                                        packed_[i].encoded.stream_bits);
       sections.add_geometry(packed_[i].record, packed_[i].encoded, plan_.geometries[i].name);
       packed_[i].encoded = {};
     }
     sections.set_instances(plan_.instances);
     sections.set_material_slots(plan_.material_slots);
+    sections.set_requirements(requirements.rows());
     add_up();
     return sections.assemble(summary(sections));
   }
@@ -166,11 +171,11 @@ private:
   Packed pack_one(size_t index) const {
     const GeometryPlan& plan = plan_.geometries[index];
     const GeometryMeasure& measure = measures_[index];
-    const GeometryNeeds needs = analyse_requirements(scene_, plan_, plan);
+    const GeometryNeeds needs = analyse_requirements(scene_, plan_, plan, config_);
     const QuantizedGeometry q = quantize_geometry(scene_, plan, needs, config_, grids_[index], measure.max_abs(),
                                                   measure.bounds.lo, measure.bounds.hi);
     return {record_of(plan, q, position_error_bound(q.grid.step(), measure.max_abs())), encode_geometry(q), q.stats,
-            unneeded_uv_bytes(scene_, plan, needs)};
+            needs};
   }
 
   static baked::GeometryRecord record_of(const GeometryPlan& plan, const QuantizedGeometry& q, double error_bound) {
@@ -215,7 +220,6 @@ private:
   /// Everything the report says of the scene as a whole.
   void add_up() {
     QuantizeStats all;
-    uint64_t uv_bytes = 0;
     for (const Packed& p : packed_) {
       const QuantizeStats& s = p.stats;
       report_.source_vertices += s.source_vertices;
@@ -226,10 +230,8 @@ private:
       report_.max_uv_error = std::max(report_.max_uv_error, s.max_uv_error);
       all.normal_error_sum += s.normal_error_sum;
       all.normal_count += s.normal_count;
-      all.flat_triangles += s.flat_triangles;
       all.repaired_normals += s.repaired_normals;
       all.replaced_uvs += s.replaced_uvs;
-      uv_bytes += p.unneeded_uv_bytes;
     }
     report_.mean_normal_error_degrees = mean_normal_error(all);
     report_.source_triangles = unique_triangle_count(scene_);
@@ -238,11 +240,6 @@ private:
     report_.shared_objects = plan_.shared_objects;
     report_.unused_objects = plan_.unused_objects;
     report_.unused_triangles = plan_.unused_triangles;
-    if (uv_bytes > 0) report_.dropped.push_back({"texture coordinates", "no alpha mask looks them up", uv_bytes});
-    if (all.flat_triangles > 0)
-      report_.dropped.push_back({"normals",
-                                 "they equal the face normal within " + brief(config_.flat_degrees()) + " degrees",
-                                 all.flat_triangles * 3 * sizeof(Vec3)});
     if (all.repaired_normals > 0)
       warn(std::to_string(all.repaired_normals) + " normals have no direction; face normals took their place");
     if (all.replaced_uvs > 0)
@@ -268,6 +265,8 @@ private:
     s.bounds_hi = {bounds.hi.x, bounds.hi.y, bounds.hi.z};
     s.precision_kind = static_cast<uint32_t>(config_.precision_kind);
     s.precision_value = config_.precision;
+    s.purpose = config_.purpose | (uint32_t{config_.keep_normals} << (baked::kKeepShift + baked::kNormals)) |
+                (uint32_t{config_.keep_uvs} << (baked::kKeepShift + baked::kUvs));
     if (report_.world_step > 0.0)
       s.world_step_mantissa = world_grid_.mantissa, s.world_step_exponent = world_grid_.exponent;
     const ClusterView::StreamBits& bits = sections.stream_bits();

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "compress/bake/bake_config.h"
-#include "compress/bake/requirements.h"
 #include "compress/format/file_summary.h"
 #include "pbrt_import/scene/diagnostics.h"
 #include "pbrt_import/scene/progress.h"
@@ -33,7 +32,6 @@ struct BakeReport {
   double max_position_error = 0.0; ///< measured against the source, largest axis, object units
   double max_normal_error_degrees = 0.0, mean_normal_error_degrees = 0.0;
   double max_uv_error = 0.0;
-  std::vector<DroppedStream> dropped;
   std::vector<std::string> warnings; ///< also in the diagnostics
 };
 

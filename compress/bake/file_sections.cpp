@@ -128,7 +128,8 @@ std::vector<std::byte> FileSections::assemble(const baked::SummaryRecord& summar
                               cameras_,
                               strings_,
                               {&summary, 1},
-                              material_slots_});
+                              material_slots_,
+                              requirements_});
 }
 
 } // namespace packtrace

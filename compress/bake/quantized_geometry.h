@@ -34,6 +34,7 @@ struct QuantizeStats {
   uint64_t distinct_vertices = 0;
   uint64_t collapsed_triangles = 0; ///< two corners fell on one lattice point
   uint64_t flat_triangles = 0;      ///< whose meshes have normals that need not be stored
+  uint64_t inferred_normals = 0;    ///< of the source that only such triangles have
   uint64_t repaired_normals = 0;    ///< were zero, or became so under a flattening transform
   uint64_t replaced_uvs = 0;        ///< were not finite
   double max_position_error = 0.0;  ///< largest axis

@@ -30,6 +30,7 @@ struct BakedSections {
   std::span<const char> strings;
   std::span<const baked::SummaryRecord> summary; ///< exactly one
   std::span<const uint32_t> material_slots;
+  std::span<const baked::RequirementRecord> requirements;
 
   std::string_view text(baked::StringRef ref) const { return {strings.data() + ref.offset, ref.bytes}; }
 };

@@ -29,6 +29,7 @@ enum Section : uint32_t {
   kStrings,       ///< UTF-8 bytes, not terminated
   kSummary,       ///< one record
   kMaterialSlots, ///< uint32_t: materials, in runs that instances begin at
+  kRequirements,
   kSectionCount
 };
 
@@ -48,7 +49,7 @@ struct FileHeader {
   uint32_t section_count;
   uint32_t reserved;
   std::array<SectionRecord, kSectionCount> sections;
-  std::array<uint64_t, 8> padding;
+  std::array<uint64_t, 5> padding;
   uint64_t header_hash; ///< XXH3-64 of the header before this field
 };
 
@@ -85,7 +86,9 @@ struct GeometryRecord {
   std::array<uint32_t, 8> class_clusters; ///< clusters of each material class; sums to cluster_count
   StringRef name;
   uint32_t normal_encoding; ///< normal_codec.h, of all its clusters
-  uint32_t slot_count;      ///< of material slots, ordered by material_class(); 0 without clusters
+  uint32_t reserved;
+  uint32_t slot_count;   ///< of material slots, ordered by material_class(); 0 without clusters
+  uint32_t requirements; ///< requirement_bit()s: reasons that hold for some of its triangles
 };
 
 // ClusterRecord::flags
@@ -149,6 +152,42 @@ struct CameraRecord {
   StringRef film_name;
 };
 
+/// What the file is to be good for.
+enum Purpose : uint32_t { kAo, kShading, kPurposeCount };
+
+/// Streams that geometry has only where something needs them.
+enum Stream : uint32_t { kNormals, kUvs, kTangents, kStreamCount };
+
+/// Why a stream is in the file, or not: up to kInferred it is not stored, from kForMask on it is, except tangents.
+enum Reason : uint32_t {
+  kAbsent,       ///< the source has none, or nothing that would need it
+  kUnused,       ///< nothing looks at it for this purpose
+  kInferred,     ///< normals: the face's
+  kForMask,      ///< an alpha mask looks it up
+  kForTexture,   ///< a texture looks it up
+  kForNormalMap, ///< a normal or bump map needs it
+  kForShading,   ///< normals: they differ from the face's
+  kOnRequest,    ///< the user asked for it
+  kReasonCount
+};
+
+/// Of GeometryRecord::requirements.
+constexpr uint32_t requirement_bit(uint32_t stream, uint32_t reason) { return 1u << (kReasonCount * stream + reason); }
+inline constexpr uint32_t kAllRequirements = (1u << (uint32_t{kReasonCount} * kStreamCount)) - 1;
+
+inline constexpr uint32_t kKeepShift = 8; ///< of SummaryRecord::purpose
+
+/// What was decided about some triangles, of all geometries together. Ordered by stream, then reason.
+struct RequirementRecord {
+  uint32_t stream;
+  uint32_t reason;
+  uint32_t geometries; ///< with such triangles
+  uint32_t reserved;
+  uint64_t triangles;
+  uint64_t source_bytes; ///< that the stream takes in the source
+  uint64_t stored_bits;  ///< of the payload; a geometry's count for the last of the stream's reasons
+};
+
 /// What the bake did: figures for people, nothing that decoding needs.
 struct SummaryRecord {
   uint64_t source_triangles;  ///< of all shapes and objects of the scene
@@ -163,7 +202,7 @@ struct SummaryRecord {
   uint32_t precision_kind;      ///< 0 edge fraction, 1 diagonal fraction, 2 absolute, 3 bits
   uint32_t world_step_mantissa; ///< 0: no world-space geometry
   int32_t world_step_exponent;
-  uint32_t reserved;
+  uint32_t purpose;                    ///< Purpose; bits kKeepShift + Stream: all of it was to be kept
   std::array<uint64_t, 4> stream_bits; ///< payload: indices, positions, normals, uvs
 };
 
@@ -172,12 +211,12 @@ inline constexpr bool kIsPod = std::is_trivially_copyable_v<T>&& std::is_standar
 
 static_assert(kIsPod<FileHeader> && sizeof(SectionRecord) == 24 && sizeof(FileHeader) == 384);
 static_assert(offsetof(FileHeader, content_hash) == 24 && offsetof(FileHeader, sections) == 48 &&
-              offsetof(FileHeader, padding) == 312 && offsetof(FileHeader, header_hash) == 376);
-static_assert(kIsPod<GeometryRecord> && sizeof(GeometryRecord) == 184 && alignof(GeometryRecord) == 8);
+              offsetof(FileHeader, padding) == 336 && offsetof(FileHeader, header_hash) == 376);
+static_assert(kIsPod<GeometryRecord> && sizeof(GeometryRecord) == 192 && alignof(GeometryRecord) == 8);
 static_assert(offsetof(GeometryRecord, origin) == 24 && offsetof(GeometryRecord, cluster_count) == 64 &&
               offsetof(GeometryRecord, bounds_lo) == 96 && offsetof(GeometryRecord, flags) == 132 &&
               offsetof(GeometryRecord, class_clusters) == 136 && offsetof(GeometryRecord, name) == 168 &&
-              offsetof(GeometryRecord, normal_encoding) == 176);
+              offsetof(GeometryRecord, normal_encoding) == 176 && offsetof(GeometryRecord, slot_count) == 184);
 static_assert(kIsPod<ClusterRecord> && sizeof(ClusterRecord) == 44 && alignof(ClusterRecord) == 4);
 static_assert(offsetof(ClusterRecord, anchor) == 16 && offsetof(ClusterRecord, normal_anchor) == 28 &&
               offsetof(ClusterRecord, vertex_count) == 32 && offsetof(ClusterRecord, triangle_count) == 36 &&
@@ -186,6 +225,8 @@ static_assert(kIsPod<MaterialRecord> && sizeof(MaterialRecord) == 32 && offsetof
 static_assert(kIsPod<InstanceRecord> && sizeof(InstanceRecord) == 56 && offsetof(InstanceRecord, first_slot) == 52);
 static_assert(kIsPod<MaskRecord> && sizeof(MaskRecord) == 40 && offsetof(MaskRecord, uv_scale) == 24);
 static_assert(kIsPod<CameraRecord> && sizeof(CameraRecord) == 160 && offsetof(CameraRecord, projection) == 136);
+static_assert(kIsPod<RequirementRecord> && sizeof(RequirementRecord) == 40);
+static_assert(kAllRequirements == 0xffffff);
 static_assert(kIsPod<SummaryRecord> && sizeof(SummaryRecord) == 152 && offsetof(SummaryRecord, stream_bits) == 120);
 
 /// sizeof the records of each section.
@@ -193,7 +234,7 @@ inline constexpr std::array<uint32_t, kSectionCount> kRecordBytes = {
     sizeof(GeometryRecord), sizeof(ClusterRecord),  1,
     sizeof(MaterialRecord), sizeof(InstanceRecord), sizeof(MaskRecord),
     sizeof(uint32_t),       sizeof(CameraRecord),   1,
-    sizeof(SummaryRecord),  sizeof(uint32_t)};
+    sizeof(SummaryRecord),  sizeof(uint32_t),       sizeof(RequirementRecord)};
 
 inline constexpr uint32_t kMaskedClass = 4; ///< bit of a material class: a mask must be looked up
 

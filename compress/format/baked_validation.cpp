@@ -26,6 +26,7 @@ public:
     check_instances();
     check_geometries();
     check_cameras();
+    check_requirements();
     check_summary();
     return sections_;
   }
@@ -89,7 +90,8 @@ private:
                  section<baked::CameraRecord>(baked::kCameras),
                  section<char>(baked::kStrings),
                  section<baked::SummaryRecord>(baked::kSummary),
-                 section<uint32_t>(baked::kMaterialSlots)};
+                 section<uint32_t>(baked::kMaterialSlots),
+                 section<baked::RequirementRecord>(baked::kRequirements)};
     if (sections_.payload.size() < kReadSlackBytes) fail("payload section without its final zero bytes");
     if (sections_.summary.size() != 1) fail("summary section must hold one record");
     if (sections_.geometries.size() >= baked::kNone || sections_.instances.size() >= baked::kNone ||
@@ -165,8 +167,9 @@ private:
         if (!(e >= 0.0f && std::isfinite(e))) fail("geometry", i, "normal or texture coordinate error");
       if (g.mean_normal_error_degrees > g.max_normal_error_degrees || g.max_normal_error_degrees > 180.0f)
         fail("geometry", i, "normal error");
-      if (g.normal_encoding >= kNormalFormats.size()) fail("geometry", i, "normal encoding");
+      if (g.normal_encoding >= kNormalFormats.size() || g.reserved != 0) fail("geometry", i, "normal encoding");
       if ((g.flags & ~baked::kGeometryFlags) != 0) fail("geometry", i, "flags");
+      if ((g.requirements & ~baked::kAllRequirements) != 0) fail("geometry", i, "requirements");
       if (!text_ok(g.name)) fail("geometry", i, "name");
       check_slots(i, g);
       check_clusters(i, g);
@@ -271,10 +274,27 @@ private:
     }
   }
 
+  void check_requirements() {
+    for (size_t i = 0; i < sections_.requirements.size(); ++i) {
+      const baked::RequirementRecord& r = sections_.requirements[i];
+      if (r.stream >= baked::kStreamCount || r.reason >= baked::kReasonCount || r.reserved != 0)
+        fail("requirement", i, "stream or reason");
+      if (r.geometries == 0 || r.geometries > sections_.geometries.size()) fail("requirement", i, "geometries");
+      if (i == 0) continue;
+      const baked::RequirementRecord& before = sections_.requirements[i - 1];
+      if (r.stream < before.stream || (r.stream == before.stream && r.reason <= before.reason))
+        fail("requirement", i, "order");
+    }
+    const uint32_t purpose = sections_.summary.front().purpose;
+    if ((purpose & ((1u << baked::kKeepShift) - 1)) >= baked::kPurposeCount ||
+        purpose >> baked::kKeepShift >> baked::kStreamCount != 0)
+      fail("purpose");
+  }
+
   void check_summary() {
     const baked::SummaryRecord& s = sections_.summary.front();
-    if (s.reserved != 0 || s.precision_kind > 3 || s.world_step_mantissa > kMaxStepMantissa ||
-        s.world_step_exponent < kMinStepExponent || s.world_step_exponent > kMaxStepExponent)
+    if (s.precision_kind > 3 || s.world_step_mantissa > kMaxStepMantissa || s.world_step_exponent < kMinStepExponent ||
+        s.world_step_exponent > kMaxStepExponent)
       fail("summary");
     for (size_t axis = 0; axis < 3; ++axis)
       if (std::isnan(s.bounds_lo[axis]) || std::isnan(s.bounds_hi[axis])) fail("summary bounds");

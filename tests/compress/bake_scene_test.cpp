@@ -438,10 +438,15 @@ TEST(BakeScene, EveryPartOfAGeometryHasItsEncoding) {
 TEST(BakeScene, FlatNormalsAreDroppedAndSaidToBe) {
   const BakedScene baked = bake(scene_of(test::grid_mesh(20, 0.0f, true)));
   EXPECT_EQ(baked.report.file.bytes.normals, 0u);
-  ASSERT_EQ(baked.report.dropped.size(), 2u);
-  EXPECT_EQ(baked.report.dropped[0].stream, "texture coordinates");
-  EXPECT_EQ(baked.report.dropped[1].stream, "normals");
-  EXPECT_EQ(baked.report.dropped[1].source_bytes, 800u * 3 * 12);
+  const std::vector<baked::RequirementRecord>& rows = baked.report.file.requirements;
+  ASSERT_EQ(rows.size(), 3u);
+  EXPECT_EQ(rows[0].stream, baked::kNormals);
+  EXPECT_EQ(rows[0].reason, baked::kInferred);
+  EXPECT_EQ(rows[0].triangles, 800u);
+  EXPECT_EQ(rows[0].source_bytes, 441u * 12);
+  EXPECT_EQ(rows[1].stream, baked::kUvs);
+  EXPECT_EQ(rows[1].reason, baked::kUnused);
+  EXPECT_EQ(rows[1].source_bytes, 441u * 8);
   EXPECT_GT(bake(scene_of(test::grid_mesh(20, 0.2f, true))).report.file.bytes.normals, 0u);
 }
 
