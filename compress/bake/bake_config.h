@@ -42,6 +42,8 @@ struct BakeConfig {
   bool keep_normals = false; ///< of every triangle whose source has them
   bool keep_uvs = false;     ///< of every mesh that has them
 
+  bool strict = false; ///< fail where something would be left out for leaving the range of floats
+
   /// How the file lies on disk. Changes nothing that is decoded from it.
   PageCodec codec = PageCodec::kNone;
 

@@ -1,7 +1,6 @@
 #include "compress/bake/bake_scene.h"
 
 #include <algorithm>
-#include <limits>
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
@@ -11,6 +10,7 @@
 #include "compress/bake/geometry_encoder.h"
 #include "compress/bake/geometry_measure.h"
 #include "compress/bake/geometry_plan.h"
+#include "compress/bake/nested_grids.h"
 #include "compress/bake/page_encoder.h"
 #include "compress/bake/requirement_table.h"
 #include "compress/bake/touching_boxes.h"
@@ -36,7 +36,7 @@ public:
   BakedScene run() {
     measure();
     choose_grids();
-    find_touching_instances();
+    place_instances();
     pack();
     BakedScene result;
     result.bytes = assemble();
@@ -84,23 +84,17 @@ private:
     tbb::parallel_for(size_t{0}, plan_.geometries.size(), [&](size_t i) {
       const GeometryPlan& plan = plan_.geometries[i];
       Scratch& mine = scratch.local();
-      if (plan.world_space) {
-        measures_[i].bounds = measure_geometry(scene_, plan, mine.world);
-      } else {
-        mine.local.clear();
-        measures_[i].bounds = measure_geometry(scene_, plan, mine.local);
-        measures_[i].median_edge = mine.local.median();
-      }
+      mine.local.clear();
+      measures_[i].bounds = measure_geometry(scene_, plan, mine.local);
+      measures_[i].median_edge = mine.local.median();
+      if (plan.world_space) mine.world.add(mine.local);
       progress_.advance();
     });
     LengthHistogram edges;
     for (const Scratch& one : scratch) edges.add(one.world);
     world_.median_edge = edges.median();
     for (size_t i = 0; i < measures_.size(); ++i)
-      if (plan_.geometries[i].world_space) {
-        world_.bounds.extend(measures_[i].bounds);
-        measures_[i].median_edge = world_.median_edge;
-      }
+      if (plan_.geometries[i].world_space) world_.bounds.extend(measures_[i].bounds);
   }
 
   void choose_grids() {
@@ -110,11 +104,15 @@ private:
       report_.world_step = world_grid_.step();
       report_.world_median_edge = world_.median_edge;
     }
+    const std::vector<uint32_t> halvings = any_world ? nest_grids(scene_, plan_, measures_, config_, world_grid_.step())
+                                                     : std::vector<uint32_t>(plan_.geometries.size());
     uint64_t coarse = 0, far = 0;
     for (size_t i = 0; i < grids_.size(); ++i) {
       const GeometryPlan& plan = plan_.geometries[i];
       if (measures_[i].bounds.empty()) continue; // nothing to quantise: the default grid
       grids_[i] = plan.world_space ? world_grid_ : choose_grid(config_, measures_[i], plan.max_stretch);
+      grids_[i].exponent -= static_cast<int32_t>(halvings[i]);
+      report_.nested_geometries += halvings[i] > 0;
       const double step = grids_[i].step();
       coarse += measures_[i].median_edge > 0.0 && step > measures_[i].median_edge / 8.0;
       far += measures_[i].max_abs() * 0x1p-23 > step;
@@ -127,23 +125,53 @@ private:
            " geometries lie so far from the origin that float positions are coarser than the step of their grid");
   }
 
-  /// Instances that may open seams, as their grid is not that of what lies beside them.
-  void find_touching_instances() {
+  /// Leaves out what leaves the range of floats, and looks for instances that may open seams, as their grid is not that
+  /// of what lies beside them.
+  void place_instances() {
     std::vector<Bounds> boxes(plan_.instances.size());
     std::vector<uint8_t> own_grid(boxes.size());
+    std::vector<uint32_t> uses(plan_.geometries.size());
     uint64_t instances = 0;
     for (size_t i = 0; i < boxes.size(); ++i) {
-      const uint32_t geometry = plan_.instances[i].geometry;
+      baked::InstanceRecord& instance = plan_.instances[i];
+      if (instance.geometry == baked::kNone) continue;
+      const uint32_t geometry = instance.geometry;
+      const Bounds box = placed_box(instance, grown(measures_[geometry].bounds, grids_[geometry].step()));
+      if (!box.empty() && !within_float_range(box)) {
+        plan_.left_out.push_back(beyond_float_range("an instance of " + plan_.geometries[geometry].name, box));
+        instance.geometry = baked::kNone;
+        continue;
+      }
+      boxes[i] = box;
       own_grid[i] = !plan_.geometries[geometry].world_space;
       instances += own_grid[i];
-      boxes[i] = placed_box(plan_.instances[i], grown(measures_[geometry].bounds, grids_[geometry].step()));
+      ++uses[geometry];
     }
+    report_left_out(uses);
     if (instances == 0) return;
     report_.touching_instances = count_touching(boxes, own_grid);
     if (report_.touching_instances > 0)
       warn("instanced geometry keeps a grid of its own: the boxes of " + std::to_string(report_.touching_instances) +
            " of " + std::to_string(instances) +
            " instances touch other geometry, where seams may open by half a step of both grids");
+  }
+
+  /// Gives what is left out an empty geometry, and empties geometries that nothing places any more.
+  void report_left_out(const std::vector<uint32_t>& uses) {
+    report_.left_out = plan_.left_out.size();
+    if (report_.left_out == 0) return;
+    if (config_.strict) throw Error(ErrorKind::kInput, plan_.left_out.front());
+    for (const std::string& what : plan_.left_out) diagnostics_.report(Severity::kError, {}, what + "; it is left out");
+    for (size_t i = 0; i < uses.size(); ++i)
+      if (uses[i] == 0) {
+        plan_.geometries[i] = {plan_.geometries[i].name, {}, {}, {}, plan_.geometries[i].world_space, 1.0};
+        measures_[i] = {};
+      }
+    const auto empty = static_cast<uint32_t>(plan_.geometries.size());
+    plan_.geometries.push_back({"left out", {}, {}, {}, false, 1.0});
+    measures_.emplace_back(), grids_.emplace_back(), packed_.emplace_back();
+    for (baked::InstanceRecord& instance : plan_.instances)
+      if (instance.geometry == baked::kNone) instance = {{1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, empty, 0};
   }
 
   static Bounds grown(Bounds box, double by) {
@@ -196,7 +224,7 @@ private:
     return record;
   }
 
-  /// Box of all instances, from the boxes of their geometries. Throws Error(kInput) where one leaves the float range.
+  /// Box of all instances, from the boxes of their geometries.
   Bounds placed_bounds(const FileSections& sections) const {
     Bounds bounds;
     for (const baked::InstanceRecord& instance : plan_.instances) {
@@ -205,14 +233,7 @@ private:
       Bounds box;
       box.lo = DVec3(g.bounds_lo[0], g.bounds_lo[1], g.bounds_lo[2]);
       box.hi = DVec3(g.bounds_hi[0], g.bounds_hi[1], g.bounds_hi[2]);
-      const Bounds placed = placed_box(instance, box);
-      constexpr double kMax = std::numeric_limits<float>::max();
-      for (int axis = 0; axis < 3; ++axis)
-        if (!(placed.lo[axis] >= -kMax && placed.hi[axis] <= kMax))
-          throw Error(ErrorKind::kInput, "an instance of " + plan_.geometries[instance.geometry].name +
-                                             " leaves the float range: its coordinates reach " +
-                                             brief(std::max(-placed.lo[axis], placed.hi[axis])));
-      bounds.extend(placed);
+      bounds.extend(placed_box(instance, box));
     }
     return bounds;
   }
@@ -270,6 +291,7 @@ private:
     if (report_.world_step > 0.0)
       s.world_step_mantissa = world_grid_.mantissa, s.world_step_exponent = world_grid_.exponent;
     const ClusterView::StreamBits& bits = sections.stream_bits();
+    s.left_out = report_.left_out;
     s.stream_bits = {bits.indices, bits.positions, bits.normals, bits.uvs};
     return s;
   }

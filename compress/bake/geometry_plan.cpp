@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <map>
 #include <optional>
 #include <span>
@@ -11,6 +12,7 @@
 #include <tbb/parallel_for.h>
 #include <xxhash.h>
 
+#include "compress/bake/brief.h"
 #include "pbrt_import/scene/error.h"
 
 namespace packtrace {
@@ -85,12 +87,14 @@ public:
   ScenePlan run() {
     check();
     equal_mesh_ = first_equal_meshes(scene_);
+    find_mesh_boxes();
     find_used_objects();
     plan_world_shapes();
     plan_objects();
     for (uint32_t g = 0; g < drafts_.size(); ++g) assign_slots(g);
     for (size_t i = 0; i < plan_.instances.size(); ++i) {
       baked::InstanceRecord& instance = plan_.instances[i];
+      if (instance.geometry == baked::kNone) continue;
       instance.first_slot = drafts_[instance.geometry].first_slot[user_of_[i]];
     }
     return std::move(plan_);
@@ -135,10 +139,36 @@ private:
     return draft.users++;
   }
 
+  void find_mesh_boxes() {
+    mesh_boxes_.resize(scene_.meshes.size());
+    tbb::parallel_for(size_t{0}, mesh_boxes_.size(),
+                      [&](size_t i) { mesh_boxes_[i] = bounds_of(scene_.meshes[i].positions); });
+  }
+
+  /// Box of a shape where it is placed, if that leaves the range of floats.
+  std::optional<Bounds> beyond_range(const Shape& shape) const {
+    const Bounds& mesh_box = mesh_boxes_[shape.mesh];
+    if (mesh_box.empty() || !within_float_range(mesh_box)) return {}; // no mesh of a scene: refused when measured
+    if (within_float_range(transform_bounds(shape.parent_from_mesh, mesh_box))) return {};
+    Bounds box; // the tight one
+    for (const Vec3 p : scene_.meshes[shape.mesh].positions)
+      box.extend(transform_point(shape.parent_from_mesh, DVec3(p)));
+    if (within_float_range(box)) return {};
+    return box;
+  }
+
+  /// Keeps the instance's number in use.
+  void leave_out(std::string what) {
+    plan_.left_out.push_back(std::move(what));
+    plan_.instances.push_back(instance_of(baked::kNone, Affine(1.0f)));
+    user_of_.push_back(0);
+  }
+
   void add_instance(uint32_t geometry, uint32_t user, const Affine& world_from_object) {
     for (int column = 0; column < 4; ++column)
-      require(is_finite(world_from_object[column]),
-              "the transform of an instance of " + plan_.geometries[geometry].name + " exceeds the float range");
+      if (!is_finite(world_from_object[column]))
+        return leave_out("an instance of " + plan_.geometries[geometry].name +
+                         " leaves the float range: so does its transform");
     plan_.instances.push_back(instance_of(geometry, world_from_object));
     user_of_.push_back(user);
     GeometryPlan& plan = plan_.geometries[geometry];
@@ -190,6 +220,10 @@ private:
   void plan_world_shapes() {
     std::map<GroupKey, Group> groups = group_shapes();
     for (const Shape& shape : scene_.shapes) {
+      if (const std::optional<Bounds> box = beyond_range(shape)) {
+        leave_out(beyond_float_range(scene_.meshes[shape.mesh].name, *box));
+        continue;
+      }
       Group& group = groups[key_of(shape)];
       const bool instanced = group.instanced(scene_.meshes[shape.mesh].triangles.size());
       const bool share = instanced || (group.shapes > 1 && group.one_transform);
@@ -244,12 +278,18 @@ private:
     };
     std::vector<Use> use_of(scene_.objects.size());
     for (size_t i = 0; i < scene_.objects.size(); ++i) {
-      const Object& object = scene_.objects[i];
+      Object object = scene_.objects[i];
       if (used_[i] == 0) {
         ++plan_.unused_objects;
         for (const Shape& shape : object.shapes) plan_.unused_triangles += scene_.meshes[shape.mesh].triangles.size();
         continue;
       }
+      std::erase_if(object.shapes, [&](const Shape& shape) {
+        const std::optional<Bounds> box = beyond_range(shape);
+        if (box)
+          plan_.left_out.push_back(beyond_float_range(scene_.meshes[shape.mesh].name + " of " + object.name, *box));
+        return box.has_value();
+      });
       const auto next = static_cast<uint32_t>(plan_.geometries.size());
       const auto [found, inserted] = geometry_with_.try_emplace(content_key(object.shapes), next);
       if (inserted)
@@ -306,6 +346,7 @@ private:
 
   const Scene& scene_;
   std::vector<uint32_t> equal_mesh_;
+  std::vector<Bounds> mesh_boxes_;
   std::vector<uint8_t> used_;                      // by object
   std::vector<Draft> drafts_;                      // by geometry
   std::vector<uint32_t> user_of_;                  // by instance
@@ -315,6 +356,18 @@ private:
 };
 
 } // namespace
+
+bool within_float_range(const Bounds& box) {
+  constexpr double kMax = std::numeric_limits<float>::max();
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(box.lo[axis] >= -kMax && box.hi[axis] <= kMax)) return false;
+  return true;
+}
+
+std::string beyond_float_range(const std::string& name, const Bounds& box) {
+  const DVec3 largest = glm::max(-box.lo, box.hi);
+  return name + " leaves the float range: its coordinates reach " + brief(std::max({largest.x, largest.y, largest.z}));
+}
 
 ScenePlan plan_scene(const Scene& scene) { return Planner(scene).run(); }
 

@@ -32,7 +32,8 @@ struct GeometryPlan {
 
 struct ScenePlan {
   std::vector<GeometryPlan> geometries;
-  /// The scene's shapes outside objects in order, then its object instances in order.
+  /// The scene's shapes outside objects in order, then its object instances in order. The geometry is kNone where
+  /// something is left out.
   std::vector<baked::InstanceRecord> instances;
   std::vector<uint32_t> material_slots; ///< materials, in runs that instances begin at
   uint64_t shared_shapes = 0;           ///< world shapes that use another's geometry
@@ -40,11 +41,18 @@ struct ScenePlan {
   uint64_t shared_objects = 0;          ///< objects that use another's geometry
   uint64_t unused_objects = 0;          ///< never instanced, not stored
   uint64_t unused_triangles = 0;        ///< theirs
+  std::vector<std::string> left_out;    ///< what leaves the range of floats where it is placed, and how far
 };
 
 /// World shapes with equal meshes of different indices share a geometry from this size on. Below they stay on the
 /// world's grid: they are tiles of one surface more often than copies of one thing, and an own grid opens seams.
 inline constexpr size_t kMinSharedTriangles = 128;
+
+/// Whether all coordinates of the box are floats.
+bool within_float_range(const Bounds& box);
+
+/// "NAME leaves the float range: its coordinates reach 1e40".
+std::string beyond_float_range(const std::string& name, const Bounds& box);
 
 /// Decides which shapes and objects share a geometry: those with equal triangles, winding and material classes.
 /// Equality is of bytes, found by hash and verified. Materials may differ, each instance has its own.

@@ -114,7 +114,12 @@ private:
   }
 
   void check_limits(double max_abs) const {
-    if (max_abs / step_ < static_cast<double>(kMaxLattice) - 1.0) return;
+    if (max_abs / step_ < static_cast<double>(kMaxLattice) - 1.0) {
+      if (std::isfinite(from_lattice(to_lattice(max_abs, step_), step_))) return;
+      throw Error(ErrorKind::kLimitExceeded, plan_.name + ": coordinates up to " + brief(max_abs) +
+                                                 " round to more than the largest float at a step of " + brief(step_) +
+                                                 "; choose a finer precision");
+    }
     throw Error(ErrorKind::kLimitExceeded, plan_.name + ": coordinates up to " + brief(max_abs) + " at a step of " +
                                                brief(step_) + " exceed the lattice limit of 2^" +
                                                std::to_string(kMaxLatticeBits) + " steps; choose a coarser precision");

@@ -204,6 +204,7 @@ struct SummaryRecord {
   int32_t world_step_exponent;
   uint32_t purpose;                    ///< Purpose; bits kKeepShift + Stream: all of it was to be kept
   std::array<uint64_t, 4> stream_bits; ///< payload: indices, positions, normals, uvs
+  uint64_t left_out;                   ///< shapes and instances that leave the float range; not stored
 };
 
 template <typename T>
@@ -227,7 +228,7 @@ static_assert(kIsPod<MaskRecord> && sizeof(MaskRecord) == 40 && offsetof(MaskRec
 static_assert(kIsPod<CameraRecord> && sizeof(CameraRecord) == 160 && offsetof(CameraRecord, projection) == 136);
 static_assert(kIsPod<RequirementRecord> && sizeof(RequirementRecord) == 40);
 static_assert(kAllRequirements == 0xffffff);
-static_assert(kIsPod<SummaryRecord> && sizeof(SummaryRecord) == 152 && offsetof(SummaryRecord, stream_bits) == 120);
+static_assert(kIsPod<SummaryRecord> && sizeof(SummaryRecord) == 160 && offsetof(SummaryRecord, stream_bits) == 120);
 
 /// sizeof the records of each section.
 inline constexpr std::array<uint32_t, kSectionCount> kRecordBytes = {

@@ -60,6 +60,7 @@ BakeConfig make_config(const BakeOptions& options) {
   if (options.normal_error) config.normal_error_degrees = *options.normal_error;
   config.purpose = options.purpose == kPurposes[baked::kShading] ? baked::kShading : baked::kAo;
   for (const std::string& stream : options.keep) (stream == kKeepUvs ? config.keep_uvs : config.keep_normals) = true;
+  config.strict = options.scene.strict;
   config.codec = find_page_codec(options.codec).value(); // the option's check knows the names
   config.validate();
   return config;
@@ -79,6 +80,8 @@ nlohmann::json report(const BakeOptions& options, const BakeReport& baked, const
   json["touching_instances"] = baked.touching_instances;
   json["shared_objects"] = baked.shared_objects;
   json["unused_objects"] = baked.unused_objects;
+  json["left_out"] = baked.left_out;
+  json["nested_geometries"] = baked.nested_geometries;
   json["median_edge"] = baked.world_median_edge;
   json["import"] = {{"directives", imported.directives},
                     {"files", imported.files_read},
@@ -132,6 +135,11 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   if (baked.instanced_shapes > 0)
     fmt::print("{}", fmt::format(grouped(), "{:L} shapes outside objects share geometry, on grids of its own\n",
                                  baked.instanced_shapes));
+  if (baked.nested_geometries > 0)
+    fmt::print("{}", fmt::format(grouped(), "{:L} geometries have finer steps, as they are small beside the scene's\n",
+                                 baked.nested_geometries));
+  if (baked.left_out > 0)
+    fmt::print("{}", fmt::format(grouped(), "{:L} shapes and instances are left out\n", baked.left_out));
   fmt::print("{}", dropped_streams_text(baked.file));
   if (globals.verbosity > 0) fmt::print("\n{}", to_text(baked.file, true));
   return 0;

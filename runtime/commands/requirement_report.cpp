@@ -92,7 +92,7 @@ std::string materials_sentence(const FileSummary& s) {
 }
 
 std::string sentence(const GeometryUse& use, uint32_t purpose) {
-  std::string text = fmt::format(grouped(), "  {}: {:L} triangles, {:L} instances, {:L} materials",
+  std::string text = fmt::format(grouped(), "  {}: triangles {:L}   instances {:L}   materials {:L}",
                                  use.name.empty() ? "(no name)" : use.name, use.triangles, use.instances, use.slots);
   for (uint32_t stream = 0; stream < baked::kStreamCount; ++stream) {
     bool stored = false;
@@ -125,8 +125,7 @@ nlohmann::json to_json(const GeometryUse& use) {
   for (uint32_t stream = 0; stream < baked::kStreamCount; ++stream) {
     nlohmann::json reasons = nlohmann::json::array();
     for (uint32_t reason = 0; reason < baked::kReasonCount; ++reason)
-      if ((use.requirements & baked::requirement_bit(stream, reason)) != 0)
-        reasons.push_back(kReasonNames[reason]);
+      if ((use.requirements & baked::requirement_bit(stream, reason)) != 0) reasons.push_back(kReasonNames[reason]);
     json["reasons"][std::string(kStreamNames[stream])] = std::move(reasons);
   }
   return json;

@@ -233,7 +233,7 @@ TEST(FileSummary, StreamsAddUpToTheFile) {
   const FileSummary s = summarize(BakedFile::from_bytes(test::bake(full_scene()).bytes));
   const StreamBytes& b = s.bytes;
   EXPECT_EQ(b.indices + b.positions + b.normals + b.uvs + b.payload_padding + b.cluster_records + b.geometry_records +
-                b.instance_records + b.material_records + b.masks + b.cameras + b.strings + b.header_and_alignment,
+                b.instance_records + b.material_records + b.masks + b.cameras + b.strings + b.requirement_records + b.header_and_alignment,
             b.total);
   EXPECT_GT(b.uvs, 0u);
   EXPECT_GT(b.normals, 0u);

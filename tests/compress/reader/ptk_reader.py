@@ -56,7 +56,8 @@ GEOMETRY = Record(
     ("step_mantissa", "I"), ("step_exponent", "i"), ("anchor_shift", "I"), ("uv_exponent", "2i"),
     ("bounds_lo", "3f"), ("bounds_hi", "3f"),
     ("max_normal_error_degrees", "f"), ("mean_normal_error_degrees", "f"), ("max_uv_error", "f"),
-    ("flags", "I"), ("class_clusters", "8I"), ("name", "2I"), ("normal_encoding", "I"), ("slot_count", "I"))
+    ("flags", "I"), ("class_clusters", "8I"), ("name", "2I"), ("normal_encoding", "I"),
+    ("reserved", "I"), ("slot_count", "I"), ("requirements", "I"))
 CLUSTER = Record(
     ("payload_offset", "I"), ("first_triangle", "I"), ("first_vertex", "I"), ("material_slot", "I"),
     ("anchor", "3i"), ("normal_anchor", "2h"), ("vertex_count", "H"), ("normal_palette", "H"),
@@ -73,13 +74,18 @@ SUMMARY = Record(
     ("source_triangles", "Q"), ("dropped_triangles", "Q"), ("unused_triangles", "Q"), ("source_vertices", "Q"),
     ("merged_vertices", "Q"), ("collapsed_triangles", "Q"), ("bounds_lo", "3d"), ("bounds_hi", "3d"),
     ("precision_value", "d"), ("precision_kind", "I"), ("world_step_mantissa", "I"), ("world_step_exponent", "i"),
-    ("reserved", "I"), ("stream_bits", "4Q"))
+    ("purpose", "I"), ("stream_bits", "4Q"), ("left_out", "Q"))
+
+REQUIREMENT = Record(
+    ("stream", "I"), ("reason", "I"), ("geometries", "I"), ("reserved", "I"),
+    ("triangles", "Q"), ("source_bytes", "Q"), ("stored_bits", "Q"))
 
 # In the order of the section table; None: bytes.
 SECTIONS = (
     ("geometries", GEOMETRY), ("clusters", CLUSTER), ("payload", None), ("materials", MATERIAL),
     ("instances", INSTANCE), ("masks", MASK), ("mask_words", Record(("word", "I"))), ("cameras", CAMERA),
-    ("strings", None), ("summary", SUMMARY), ("material_slots", Record(("material", "I"))))
+    ("strings", None), ("summary", SUMMARY), ("material_slots", Record(("material", "I"))),
+    ("requirements", REQUIREMENT))
 
 
 def index_bits(count):
