@@ -56,6 +56,8 @@ private:
     EncodedGeometry encoded;
     QuantizeStats stats;
     GeometryNeeds needs;
+
+    size_t bytes() const { return encoded.payload.size() + encoded.clusters.size() * sizeof(baked::ClusterRecord); }
   };
 
   std::vector<std::byte> assemble() {
@@ -136,13 +138,13 @@ private:
       baked::InstanceRecord& instance = plan_.instances[i];
       if (instance.geometry == baked::kNone) continue;
       const uint32_t geometry = instance.geometry;
-      const Bounds box = placed_box(instance, grown(measures_[geometry].bounds, grids_[geometry].step()));
-      if (!box.empty() && !within_float_range(box)) {
+      const Bounds& bounds = measures_[geometry].bounds;
+      if (const Bounds box = placed_box(instance, bounds); !box.empty() && !within_float_range(box)) {
         plan_.left_out.push_back(beyond_float_range("an instance of " + plan_.geometries[geometry].name, box));
         instance.geometry = baked::kNone;
         continue;
       }
-      boxes[i] = box;
+      boxes[i] = placed_box(instance, grown(bounds, grids_[geometry].step()));
       own_grid[i] = !plan_.geometries[geometry].world_space;
       instances += own_grid[i];
       ++uses[geometry];
@@ -197,9 +199,19 @@ private:
   }
 
   Packed pack_one(size_t index) const {
+    GeometryNeeds needs = analyse_requirements(scene_, plan_, plan_.geometries[index], config_);
+    Packed packed = pack_with(index, needs);
+    // Flat triangles need clusters of their own. Where only some are flat, those may take more than the normals do.
+    const bool mixed = packed.stats.flat_triangles > 0 && packed.encoded.stream_bits.normals > 0;
+    needs.infer_normals = false;
+    if (mixed)
+      if (Packed other = pack_with(index, needs); other.bytes() < packed.bytes()) return other;
+    return packed;
+  }
+
+  Packed pack_with(size_t index, const GeometryNeeds& needs) const {
     const GeometryPlan& plan = plan_.geometries[index];
     const GeometryMeasure& measure = measures_[index];
-    const GeometryNeeds needs = analyse_requirements(scene_, plan_, plan, config_);
     const QuantizedGeometry q = quantize_geometry(scene_, plan, needs, config_, grids_[index], measure.max_abs(),
                                                   measure.bounds.lo, measure.bounds.hi);
     return {record_of(plan, q, position_error_bound(q.grid.step(), measure.max_abs())), encode_geometry(q), q.stats,

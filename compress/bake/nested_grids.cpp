@@ -17,8 +17,9 @@ namespace {
 
 constexpr double kRoughEdge = 1.0 / 8.0; // steps of more than this fraction of an edge show
 constexpr double kRoughFactor = 16.0;    // the same, of what was asked for
-constexpr double kFloatStep = 0x1p-24;   // finer than floats are at the same coordinate: no use
-constexpr double kMaxSteps = 0x1p50;     // coordinates stay well inside the lattice
+constexpr double kFloatStep = 0x1p-23;   // finer than floats are at the same coordinate: no use
+constexpr double kMaxHalvings = 1000.0;
+constexpr double kMaxSteps = 0x1p50; // coordinates stay well inside the lattice
 
 /// Positions are compared as floats: what the source has as one point may differ in the last bits of doubles.
 uint64_t position_key(DVec3 p) {
@@ -60,8 +61,9 @@ private:
     const GeometryMeasure& measure = measures_[g];
     if (!plan_.geometries[g].world_space || measure.bounds.empty() || !(measure.median_edge > 0.0)) return 0;
     if (world_step_ <= std::max(kRoughFactor * precision_, kRoughEdge) * measure.median_edge) return 0;
-    const double step = std::max(precision_ * measure.median_edge, measure.max_abs() * kFloatStep);
-    return step < world_step_ ? static_cast<uint32_t>(std::ceil(std::log2(world_step_ / step))) : 0;
+    const double wanted = std::ceil(std::log2(world_step_ / (precision_ * measure.median_edge)));
+    const double useful = std::floor(std::log2(world_step_ / (measure.max_abs() * kFloatStep)));
+    return static_cast<uint32_t>(std::clamp(std::min(wanted, useful), 0.0, kMaxHalvings));
   }
 
   struct Key {

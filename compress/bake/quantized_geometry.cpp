@@ -150,7 +150,8 @@ private:
     if (part.flip)
       for (Triangle& t : work.triangles) std::swap(t.y, t.z);
     work.flat.assign(work.triangles.size(), 1);
-    if (needs.store_normals()) quantize_normals(part, mesh, work, needs.normals != baked::kOnRequest);
+    if (needs.store_normals())
+      quantize_normals(part, mesh, work, needs.normals != baked::kOnRequest && needs_.infer_normals);
     if (needs.store_uvs()) quantize_uvs(mesh, work);
     out_.stats.source_vertices += mesh.positions.size();
     return work;

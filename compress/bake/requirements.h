@@ -27,6 +27,7 @@ private:
 struct GeometryNeeds {
   std::vector<PartNeeds> parts;         ///< as in the plan
   std::array<int32_t, 2> uv_exponent{}; ///< 0 where no part needs uvs
+  bool infer_normals = true;            ///< store none of triangles whose normals are the face's
 };
 
 /// Textures of unknown size are taken to have this many texels along u and v where they ask for texture coordinates.

@@ -166,7 +166,7 @@ enum Reason : uint32_t {
   kForMask,      ///< an alpha mask looks it up
   kForTexture,   ///< a texture looks it up
   kForNormalMap, ///< a normal or bump map needs it
-  kForShading,   ///< normals: they differ from the face's
+  kForShading,   ///< normals: not the face's, or among such, where separating them takes more
   kOnRequest,    ///< the user asked for it
   kReasonCount
 };

@@ -220,6 +220,25 @@ TEST(BakedFile, MaterialSlotsAreChecked) {
             damaged + "cluster 0: material slot");
 }
 
+TEST(BakedFile, RequirementsAreChecked) {
+  const std::vector<std::byte> bytes = test::bake(full_scene()).bytes;
+  ASSERT_GE(BakedFile::from_bytes(bytes).sections().requirements.size(), 3u);
+  const std::string damaged = "memory: damaged baked file: ";
+  constexpr size_t kRow = sizeof(baked::RequirementRecord);
+  const auto message = [&](size_t at, uint32_t value) { return message_after(bytes, baked::kRequirements, at, value); };
+  EXPECT_EQ(message(0, baked::kStreamCount), damaged + "requirement 0: stream or reason");
+  EXPECT_EQ(message(4, baked::kReasonCount), damaged + "requirement 0: stream or reason");
+  EXPECT_EQ(message(kRow + 8, 0), damaged + "requirement 1: geometries");
+  EXPECT_EQ(message(kRow + 8, 4), damaged + "requirement 1: geometries"); // of three
+  EXPECT_EQ(message(kRow + 12, 1), damaged + "requirement 1: stream or reason");
+  EXPECT_EQ(message(0, baked::kTangents), damaged + "requirement 1: order");
+  EXPECT_EQ(message_after(bytes, baked::kSummary, offsetof(baked::SummaryRecord, purpose), 2), damaged + "purpose");
+  EXPECT_EQ(message_after(bytes, baked::kSummary, offsetof(baked::SummaryRecord, purpose), 8u << baked::kKeepShift),
+            damaged + "purpose");
+  EXPECT_EQ(message_after(bytes, baked::kGeometries, offsetof(baked::GeometryRecord, requirements), 1u << 24),
+            damaged + "geometry 0: requirements");
+}
+
 TEST(BakedFile, MovingKeepsItsViewsValid) {
   BakedFile first = BakedFile::from_bytes(test::bake(full_scene()).bytes);
   const ClusterView view = first.cluster(0, 0);
@@ -233,7 +252,8 @@ TEST(FileSummary, StreamsAddUpToTheFile) {
   const FileSummary s = summarize(BakedFile::from_bytes(test::bake(full_scene()).bytes));
   const StreamBytes& b = s.bytes;
   EXPECT_EQ(b.indices + b.positions + b.normals + b.uvs + b.payload_padding + b.cluster_records + b.geometry_records +
-                b.instance_records + b.material_records + b.masks + b.cameras + b.strings + b.requirement_records + b.header_and_alignment,
+                b.instance_records + b.material_records + b.masks + b.cameras + b.strings + b.requirement_records +
+                b.header_and_alignment,
             b.total);
   EXPECT_GT(b.uvs, 0u);
   EXPECT_GT(b.normals, 0u);
