@@ -10,7 +10,7 @@
 namespace packtrace {
 
 /// How BakeConfig::precision is meant. World-space geometry has one step for the whole scene, instanced geometry a step
-/// of its own; "the geometry" below is all world-space geometry together, or the one instanced geometry.
+/// of its own; "the geometry" below is all that lies outside objects together, or the one instanced geometry.
 enum class PrecisionKind : uint32_t {
   kEdgeFraction = 0,     ///< step <= precision x the geometry's median edge length; 1e-9 <= precision <= 1
   kDiagonalFraction = 1, ///< step <= precision x the diagonal of the geometry's box; 1e-12 <= precision <= 0.1

@@ -1,6 +1,7 @@
 #include "compress/bake/bake_scene.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
@@ -83,6 +84,7 @@ private:
       LengthHistogram world, local;
     };
     tbb::enumerable_thread_specific<Scratch> scratch;
+    const std::vector<std::vector<double>> scales = instanced_scales();
     tbb::parallel_for(size_t{0}, plan_.geometries.size(), [&](size_t i) {
       const GeometryPlan& plan = plan_.geometries[i];
       Scratch& mine = scratch.local();
@@ -90,6 +92,7 @@ private:
       measures_[i].bounds = measure_geometry(scene_, plan, mine.local);
       measures_[i].median_edge = mine.local.median();
       if (plan.world_space) mine.world.add(mine.local);
+      for (const double scale : scales[i]) mine.world.add_scaled(mine.local, scale);
       progress_.advance();
     });
     LengthHistogram edges;
@@ -97,10 +100,34 @@ private:
     world_.median_edge = edges.median();
     for (size_t i = 0; i < measures_.size(); ++i)
       if (plan_.geometries[i].world_space) world_.bounds.extend(measures_[i].bounds);
+    for (size_t i = 0; i < scene_.shapes.size(); ++i)
+      if (const baked::InstanceRecord& instance = plan_.instances[i]; is_instanced_shape(instance))
+        world_.bounds.extend(placed_box(instance, measures_[instance.geometry].bounds));
+  }
+
+  /// Of the first instances, which are the shapes outside objects.
+  bool is_instanced_shape(const baked::InstanceRecord& instance) const {
+    return instance.geometry != baked::kNone && !plan_.geometries[instance.geometry].world_space;
+  }
+
+  /// For each geometry how much its world shapes, if they are instanced, scale it: the root mean square over the axes.
+  /// They count for the scene's step like all other shapes outside objects.
+  std::vector<std::vector<double>> instanced_scales() const {
+    std::vector<std::vector<double>> scales(plan_.geometries.size());
+    for (size_t i = 0; i < scene_.shapes.size(); ++i) {
+      const baked::InstanceRecord& instance = plan_.instances[i];
+      if (!is_instanced_shape(instance)) continue;
+      double sum = 0.0;
+      for (size_t k = 0; k < 9; ++k) sum += double{instance.world_from_object[k]} * instance.world_from_object[k];
+      scales[instance.geometry].push_back(std::sqrt(sum / 3.0));
+    }
+    return scales;
   }
 
   void choose_grids() {
-    const bool any_world = !world_.bounds.empty();
+    bool any_world = false;
+    for (size_t i = 0; i < measures_.size(); ++i)
+      any_world |= plan_.geometries[i].world_space && !measures_[i].bounds.empty();
     if (any_world) {
       world_grid_ = choose_grid(config_, world_, 1.0);
       report_.world_step = world_grid_.step();

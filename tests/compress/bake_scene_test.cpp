@@ -290,6 +290,30 @@ TEST(BakeScene, ShapesOfOneMeshShareItHoweverSmall) {
   EXPECT_LT(baked.bytes.size(), 1001 * (sizeof(baked::InstanceRecord) + 4 + sizeof(baked::MaterialRecord)) + 4096);
 }
 
+TEST(BakeScene, InstancedShapesCountForTheScenesStep) {
+  // A floor of two large triangles below many small spheres, which would lose its place if the floor alone counted.
+  Scene scene = scene_of(test::grid_mesh(1), compose(test::translation({-50, -50, -1}), test::scaling(DVec3(100))));
+  scene.meshes.push_back(test::sphere_mesh(8));
+  for (uint32_t i = 0; i < 20; ++i)
+    scene.shapes.emplace_back(
+        1, 0, false, compose(test::translation({2.0 * i, 0, 0}), test::scaling(DVec3(i % 2 == 0 ? 0.5 : 1.0))));
+  const BakeReport shared = bake(scene).report;
+  EXPECT_EQ(shared.instanced_shapes, 20u);
+  Scene wide = scene;
+  wide.shapes[20].parent_from_mesh = test::translation({1000, 0, 0});
+  EXPECT_GT(bake(wide, precision(PrecisionKind::kPositionBits, 14.0)).report.world_step, 1000.0 / (1 << 14) * 0.88);
+  for (uint32_t i = 1; i < 21; ++i) { // the same as meshes that nothing shares
+    Mesh own = scene.meshes[1];
+    own.positions[0].z *= 1.0f + 1e-3f * static_cast<float>(i);
+    scene.shapes[i].mesh = static_cast<uint32_t>(scene.meshes.size());
+    scene.meshes.push_back(own);
+  }
+  const BakeReport apart = bake(scene).report;
+  EXPECT_EQ(apart.instanced_shapes, 0u);
+  EXPECT_NEAR(shared.world_median_edge, apart.world_median_edge, 0.04 * apart.world_median_edge);
+  EXPECT_LT(shared.world_median_edge, 1.0);
+}
+
 TEST(BakeScene, InstancesOnGridsOfTheirOwnThatTouchAreCounted) {
   Scene scene;
   scene.materials.resize(1);
