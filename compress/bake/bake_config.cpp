@@ -39,6 +39,7 @@ void validate_precision(PrecisionKind kind, double precision) {
 
 void BakeConfig::validate() const {
   validate_precision(precision_kind, precision);
+  require(purpose < baked::kPurposeCount, "purpose", "ao or shading");
   require(normal_error_degrees >= 0.0025 && normal_error_degrees <= 10.0, "normal error",
           "degrees must be .0025 .. 10");
 }

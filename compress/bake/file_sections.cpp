@@ -127,7 +127,9 @@ std::vector<std::byte> FileSections::assemble(const baked::SummaryRecord& summar
                               mask_words_,
                               cameras_,
                               strings_,
-                              {&summary, 1}});
+                              {&summary, 1},
+                              material_slots_,
+                              requirements_});
 }
 
 } // namespace packtrace

@@ -152,7 +152,7 @@ private:
       if (kind_.uvs) uvs.push_back(v.uv);
     }
     const size_t offset = writer_.bytes().size();
-    out_.clusters.push_back(encode_cluster({&strips, positions, codes, uvs, kind_.material, geometry_.origin,
+    out_.clusters.push_back(encode_cluster({&strips, positions, codes, uvs, kind_.slot, geometry_.origin,
                                             geometry_.anchor_shift, geometry_.normal_encoding},
                                            writer_));
     out_.clusters.back().payload_offset = static_cast<uint32_t>(offset / 4);
@@ -213,13 +213,13 @@ private:
   EncodedChunk out_;
 };
 
-/// Rank of each kind: material class, then material, so that classes are contiguous.
-std::vector<uint32_t> rank_kinds(const Scene& scene, const std::vector<TriangleKind>& kinds) {
+/// Rank of each kind: slots, which are ordered by class, so that classes are contiguous.
+std::vector<uint32_t> rank_kinds(const std::vector<TriangleKind>& kinds) {
   std::vector<uint32_t> order(kinds.size()), rank(kinds.size());
   for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   const auto key = [&](uint32_t i) {
     const TriangleKind& k = kinds[i];
-    return std::tuple(baked::material_class(scene.materials[k.material].flags), k.material, k.flat, k.uvs);
+    return std::tuple(k.slot, k.flat, k.uvs);
   };
   std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
   for (uint32_t i = 0; i < order.size(); ++i) rank[order[i]] = i;
@@ -267,8 +267,8 @@ std::vector<Chunk> split_into_chunks(std::span<const SortKey> keys) {
 
 } // namespace
 
-EncodedGeometry encode_geometry(const Scene& scene, const QuantizedGeometry& geometry) {
-  const std::vector<SortKey> keys = sort_triangles(geometry, rank_kinds(scene, geometry.kinds));
+EncodedGeometry encode_geometry(const QuantizedGeometry& geometry) {
+  const std::vector<SortKey> keys = sort_triangles(geometry, rank_kinds(geometry.kinds));
   const std::vector<Chunk> chunks = split_into_chunks(keys);
   std::vector<EncodedChunk> encoded(chunks.size());
   tbb::parallel_for(size_t{0}, chunks.size(), [&](size_t i) {
@@ -289,7 +289,7 @@ EncodedGeometry encode_geometry(const Scene& scene, const QuantizedGeometry& geo
       record.first_vertex = out.vertex_count;
       out.triangle_count += record.triangle_count;
       out.vertex_count += record.vertex_count;
-      ++out.class_clusters[baked::material_class(scene.materials[record.material].flags)];
+      ++out.class_clusters[geometry.slot_class[record.material_slot]];
       out.clusters.push_back(record);
     }
     out.payload.insert(out.payload.end(), chunk.payload.begin(), chunk.payload.end());

@@ -21,6 +21,6 @@ struct EncodedGeometry {
 
 /// Splits a geometry into clusters, encodes them and checks by decoding that nothing changed. Bytes do not depend on
 /// the thread count. Throws Error(kLimitExceeded) where the payload exceeds 16 GiB.
-EncodedGeometry encode_geometry(const Scene& scene, const QuantizedGeometry& geometry);
+EncodedGeometry encode_geometry(const QuantizedGeometry& geometry);
 
 } // namespace packtrace

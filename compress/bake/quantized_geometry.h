@@ -20,9 +20,9 @@ struct QuantizedVertex {
   bool operator==(const QuantizedVertex&) const = default;
 };
 
-/// Triangles that share a material and the streams they need.
+/// Triangles that share a material slot and the streams they need.
 struct TriangleKind {
-  uint32_t material = 0;
+  uint32_t slot = 0;
   bool flat = false; ///< all normals are the face normal: none are stored
   bool uvs = false;
   bool operator==(const TriangleKind&) const = default;
@@ -34,6 +34,7 @@ struct QuantizeStats {
   uint64_t distinct_vertices = 0;
   uint64_t collapsed_triangles = 0; ///< two corners fell on one lattice point
   uint64_t flat_triangles = 0;      ///< whose meshes have normals that need not be stored
+  uint64_t inferred_normals = 0;    ///< of the source that only such triangles have
   uint64_t repaired_normals = 0;    ///< were zero, or became so under a flattening transform
   uint64_t replaced_uvs = 0;        ///< were not finite
   double max_position_error = 0.0;  ///< largest axis
@@ -52,9 +53,10 @@ struct QuantizedGeometry {
   uint32_t anchor_shift = 0; ///< so that extents >> anchor_shift fit int32_t
   std::vector<LatticePoint> positions;
   std::vector<QuantizedVertex> vertices;
-  std::vector<Triangle> triangles; ///< into vertices
-  std::vector<TriangleKind> kinds; ///< distinct
-  std::vector<uint32_t> kind_of;   ///< per triangle, into kinds
+  std::vector<Triangle> triangles;  ///< into vertices
+  std::vector<TriangleKind> kinds;  ///< distinct
+  std::vector<uint32_t> kind_of;    ///< per triangle, into kinds
+  std::vector<uint32_t> slot_class; ///< material class by slot, ascending
 
   QuantizeStats stats;
 };

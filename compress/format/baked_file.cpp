@@ -77,6 +77,11 @@ Affine BakedFile::world_from_object(uint32_t instance) const {
   return Affine(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]);
 }
 
+std::span<const uint32_t> BakedFile::instance_materials(uint32_t instance) const {
+  const baked::InstanceRecord& record = sections_.instances[instance];
+  return sections_.material_slots.subspan(record.first_slot, sections_.geometries[record.geometry].slot_count);
+}
+
 AlphaMaskView BakedFile::mask(uint32_t index) const {
   const baked::MaskRecord& record = sections_.masks[index];
   const size_t words = size_t{AlphaMask::row_words(record.width)} * record.height;

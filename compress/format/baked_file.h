@@ -29,6 +29,8 @@ struct BakedSections {
   std::span<const baked::CameraRecord> cameras;
   std::span<const char> strings;
   std::span<const baked::SummaryRecord> summary; ///< exactly one
+  std::span<const uint32_t> material_slots;
+  std::span<const baked::RequirementRecord> requirements;
 
   std::string_view text(baked::StringRef ref) const { return {strings.data() + ref.offset, ref.bytes}; }
 };
@@ -69,6 +71,8 @@ public:
   uint32_t cluster_of_triangle(uint32_t geometry, uint32_t triangle) const;
 
   Affine world_from_object(uint32_t instance) const;
+  /// Materials of the instance's geometry, by slot.
+  std::span<const uint32_t> instance_materials(uint32_t instance) const;
   AlphaMaskView mask(uint32_t index) const;
   std::vector<Material> materials() const;
   std::vector<Camera> cameras() const;

@@ -25,7 +25,7 @@ public:
 
   uint32_t triangle_count() const { return layout_.triangle_count; }
   uint32_t vertex_count() const { return layout_.vertex_count; }
-  uint32_t material() const { return record_->material; }
+  uint32_t material_slot() const { return record_->material_slot; }
   bool has_normals() const { return (record_->flags & baked::kClusterHasNormals) != 0; }
   bool has_uvs() const { return (record_->flags & baked::kClusterHasUvs) != 0; }
 
@@ -97,7 +97,7 @@ struct ClusterInput {
   std::span<const LatticePoint> positions;
   std::span<const uint32_t> normal_codes; ///< empty: none
   std::span<const UvLattice> uvs;         ///< empty: none
-  uint32_t material = 0;
+  uint32_t material_slot = 0;
   LatticePoint origin{};                                    ///< of the geometry
   uint32_t anchor_shift = 0;                                ///< of the geometry
   NormalEncoding normal_encoding = NormalEncoding::kAxis24; ///< of normal_codes

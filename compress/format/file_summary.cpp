@@ -18,14 +18,15 @@ StreamBytes stream_bytes(const BakedFile& file) {
   bytes.cluster_records = s.clusters.size_bytes();
   bytes.geometry_records = s.geometries.size_bytes();
   bytes.instance_records = s.instances.size_bytes();
-  bytes.material_records = s.materials.size_bytes();
+  bytes.requirement_records = s.requirements.size_bytes();
+  bytes.material_records = s.materials.size_bytes() + s.material_slots.size_bytes();
   bytes.masks = s.masks.size_bytes() + s.mask_words.size_bytes();
   bytes.cameras = s.cameras.size_bytes();
   bytes.strings = s.strings.size();
   bytes.total = file.file_bytes();
   bytes.header_and_alignment = bytes.total - s.payload.size() - bytes.cluster_records - bytes.geometry_records -
                                bytes.instance_records - bytes.material_records - bytes.masks - bytes.cameras -
-                               bytes.strings;
+                               bytes.strings - bytes.requirement_records;
   return bytes;
 }
 
@@ -55,6 +56,39 @@ void add_normals(std::vector<NormalUse>& uses, const baked::GeometryRecord& g,
   use->max_error_degrees = std::max(use->max_error_degrees, g.max_normal_error_degrees);
 }
 
+GeometryUse use_of(const BakedFile& file, uint32_t geometry, uint32_t instances) {
+  const baked::GeometryRecord& g = file.geometries()[geometry];
+  GeometryUse use;
+  use.name = file.text(g.name);
+  use.requirements = g.requirements, use.slots = g.slot_count;
+  use.instances = instances, use.triangles = g.triangle_count;
+  for (uint32_t c = 0; c < g.cluster_count; ++c) {
+    const ClusterView view = file.cluster(geometry, c);
+    const ClusterView::StreamBits bits = view.stream_bits();
+    use.normal_triangles += view.has_normals() ? view.triangle_count() : 0;
+    use.uv_triangles += view.has_uvs() ? view.triangle_count() : 0;
+    use.normal_bits += bits.normals, use.uv_bits += bits.uvs;
+  }
+  return use;
+}
+
+void add_materials(FileSummary& summary, const BakedSections& s) {
+  std::vector<int64_t> change(s.material_slots.size() + 1); // of the number of instances that have the slot
+  for (const baked::InstanceRecord& instance : s.instances) {
+    ++change[instance.first_slot];
+    --change[instance.first_slot + s.geometries[instance.geometry].slot_count];
+  }
+  std::vector<uint8_t> used(s.materials.size());
+  int64_t instances = 0;
+  for (size_t i = 0; i < s.material_slots.size(); ++i) {
+    instances += change[i];
+    if (instances > 0) used[s.material_slots[i]] = 1;
+  }
+  for (size_t i = 0; i < used.size(); ++i)
+    if (used[i] != 0) ++summary.materials_in_use, summary.material_flags |= s.materials[i].flags;
+  for (const baked::GeometryRecord& g : s.geometries) summary.max_slots = std::max(summary.max_slots, g.slot_count);
+}
+
 } // namespace
 
 FileSummary summarize(const BakedFile& file) {
@@ -77,10 +111,13 @@ FileSummary summarize(const BakedFile& file) {
     summary.max_uv_error = std::max(summary.max_uv_error, g.max_uv_error);
     if (g.cluster_count > 0) add_grid(summary.grids, g);
     add_normals(summary.normals, g, file.clusters(static_cast<uint32_t>(i)));
+    summary.by_geometry.push_back(use_of(file, static_cast<uint32_t>(i), uses[i]));
   }
   std::sort(summary.grids.begin(), summary.grids.end(), [](const GridUse& a, const GridUse& b) {
     return std::tuple(!a.world_space, a.grid.step()) < std::tuple(!b.world_space, b.grid.step());
   });
+  add_materials(summary, s);
+  summary.requirements.assign(s.requirements.begin(), s.requirements.end());
   summary.clusters = s.clusters.size();
   summary.geometries = s.geometries.size();
   summary.instances = s.instances.size();

@@ -63,7 +63,7 @@ void unpack_cluster(const ClusterView& view, ClusterValues& values) {
   values.triangle_count = view.triangle_count();
   values.vertex_count = view.vertex_count();
   values.restart_count = view.layout().restart_count;
-  values.material = view.material();
+  values.material = view.material_slot();
   values.has_normals = view.has_normals();
   values.has_uvs = view.has_uvs();
   unpack_strips(view, values);
@@ -247,7 +247,7 @@ bool ClusterPacker::append(const baked::GeometryRecord& geometry, const ClusterV
                            baked::ClusterRecord& record) {
   record = {};
   const IndexLayout layout{values.triangle_count, values.vertex_count, values.restart_count};
-  record.material = values.material;
+  record.material_slot = values.material;
   record.triangle_count = static_cast<uint8_t>(layout.triangle_count);
   record.vertex_count = static_cast<uint16_t>(layout.vertex_count);
   record.restart_count = static_cast<uint8_t>(layout.restart_count);

@@ -15,7 +15,7 @@ enum class Turn : uint8_t { kRight = 0, kLeft = 1, kRestart = 2 };
 /// What one cluster holds, as values: all that its record and bit streams say, and nothing of how they say it.
 struct ClusterValues {
   uint32_t triangle_count = 0, vertex_count = 0, restart_count = 0;
-  uint32_t material = 0;
+  uint32_t material = 0; ///< slot
   bool has_normals = false, has_uvs = false;
   std::array<Turn, kMaxClusterTriangles> turns;
   uint32_t corner_count = 0;

@@ -6,12 +6,14 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "runtime/commands/requirement_report.h"
+
 namespace packtrace {
 namespace {
 
 using Row = std::pair<const char*, uint64_t>;
 
-std::array<Row, 14> stream_rows(const StreamBytes& bytes) {
+std::array<Row, 15> stream_rows(const StreamBytes& bytes) {
   return {{{"indices", bytes.indices},
            {"positions", bytes.positions},
            {"normals", bytes.normals},
@@ -24,6 +26,7 @@ std::array<Row, 14> stream_rows(const StreamBytes& bytes) {
            {"masks", bytes.masks},
            {"cameras", bytes.cameras},
            {"strings", bytes.strings},
+           {"requirement_records", bytes.requirement_records},
            {"header_and_alignment", bytes.header_and_alignment},
            {"total", bytes.total}}};
 }
@@ -65,7 +68,7 @@ const std::locale& grouped() {
   return kLocale;
 }
 
-nlohmann::json to_json(const FileSummary& s) {
+nlohmann::json to_json(const FileSummary& s, bool by_geometry) {
   nlohmann::json bytes, grids = nlohmann::json::array(), normals = nlohmann::json::array();
   for (const auto& [name, count] : stream_rows(s.bytes)) bytes[name] = count;
   for (const GridUse& use : s.grids)
@@ -104,6 +107,7 @@ nlohmann::json to_json(const FileSummary& s) {
       {"unused_triangles", s.bake.unused_triangles},
       {"collapsed_triangles", s.bake.collapsed_triangles},
       {"merged_vertices", s.bake.merged_vertices},
+      {"requirements", requirements_json(s, by_geometry)},
   };
 }
 
@@ -115,7 +119,7 @@ std::string disk_text(const FileSummary& s) {
                      s.disk.page_count);
 }
 
-std::string to_text(const FileSummary& s) {
+std::string to_text(const FileSummary& s, bool by_geometry) {
   const auto triangles = static_cast<double>(s.triangles);
   std::string text =
       fmt::format(grouped(),
@@ -150,7 +154,7 @@ std::string to_text(const FileSummary& s) {
   if (s.placed_triangles != s.triangles)
     text += fmt::format(grouped(), "{:<22}{:>14L}{:>16.3f}\n", "total, as placed", s.bytes.total,
                         s.bytes_per_placed_triangle);
-  return text;
+  return text + "\n" + requirements_text(s, by_geometry);
 }
 
 } // namespace packtrace

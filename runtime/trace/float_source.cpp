@@ -85,8 +85,8 @@ const FloatSource::Part& FloatSource::part_of(uint32_t geometry, uint32_t triang
   return *(next - 1);
 }
 
-uint32_t FloatSource::material_of(uint32_t geometry, uint32_t triangle) const {
-  return part_of(geometry, triangle).material;
+uint32_t FloatSource::material_of(uint32_t instance, uint32_t triangle) const {
+  return part_of(instances_[instance].geometry, triangle).material;
 }
 
 std::optional<Vec3> FloatSource::shading_normal(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const {

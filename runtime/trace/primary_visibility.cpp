@@ -113,7 +113,7 @@ private:
     const DVec3 from_barycentrics = placed ? transform_point(placement.unit_from_surface, interpolated) : interpolated;
     const DVec3 unit_position = on_ray(ray, from_barycentrics, facing);
     const DVec3 position = scene_.space().from_unit(unit_position);
-    const uint32_t material = source_.material_of(hit.geometry, hit.triangle);
+    const uint32_t material = source_.material_of(placement.instance, hit.triangle);
 
     out_.view_z[pixel] = std::max(static_cast<float>(now_.view_z(position)), std::numeric_limits<float>::denorm_min());
     out_.position[pixel] = Vec3(position);

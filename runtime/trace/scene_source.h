@@ -34,8 +34,10 @@ public:
   /// Object-space vertices and triangles; the spans have exactly the sizes of counts().
   virtual void decode(uint32_t geometry, std::span<Vec3> positions, std::span<Triangle> triangles) const = 0;
 
-  /// Into materials().
-  virtual uint32_t material_of(uint32_t geometry, uint32_t triangle) const = 0;
+  /// Into materials(). Instances of one geometry may have different materials, but each triangle's have one
+  /// baked::material_class() in all of them.
+  /// @param triangle of the instance's geometry
+  virtual uint32_t material_of(uint32_t instance, uint32_t triangle) const = 0;
 
   /// Interpolated vertex normal in object space, unit length; none where the surface is flat.
   /// @param barycentrics weights of the triangle's second and third vertex

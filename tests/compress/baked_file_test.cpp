@@ -174,6 +174,71 @@ TEST(BakedFile, MessagesNameWhatAndWhere) {
   EXPECT_EQ(message, "memory: not a packtrace baked file");
 }
 
+/// Changes one u32 of a file and returns what opening it says.
+std::string message_after(std::vector<std::byte> bytes, baked::Section section, size_t at, uint32_t value) {
+  baked::FileHeader header;
+  std::memcpy(&header, bytes.data(), sizeof header);
+  std::memcpy(bytes.data() + header.sections[section].offset + at, &value, sizeof value);
+  rehash(bytes);
+  std::string message;
+  EXPECT_EQ(open_kind(bytes, &message), ErrorKind::kInput);
+  return message;
+}
+
+TEST(BakedFile, MaterialSlotsAreChecked) {
+  Scene scene = full_scene(); // materials 0: plain, 1: masked
+  scene.instances.push_back({1, Affine(1.0f)});
+  scene.objects.push_back({"masked ball", {Shape{2, 1, false, DAffine(1.0)}, Shape{0, 0, false, DAffine(1.0)}}});
+  const std::vector<std::byte> bytes = test::bake(scene).bytes;
+  const BakedFile file = BakedFile::from_bytes(bytes);
+  ASSERT_EQ(file.sections().material_slots.size(), 4u); // {0}, {1}, {0, 1}
+  ASSERT_EQ(file.instances()[4].first_slot, 2u);
+  ASSERT_EQ(file.geometries()[3].slot_count, 2u);
+  const auto message = [&](baked::Section section, size_t at, uint32_t value) {
+    return message_after(bytes, section, at, value);
+  };
+  const auto slots_of = [](size_t geometry) {
+    return geometry * sizeof(baked::GeometryRecord) + offsetof(baked::GeometryRecord, slot_count);
+  };
+  const auto first_slot_of = [](size_t instance) {
+    return instance * sizeof(baked::InstanceRecord) + offsetof(baked::InstanceRecord, first_slot);
+  };
+  const std::string damaged = "memory: damaged baked file: ";
+  EXPECT_EQ(message(baked::kMaterialSlots, 4, 2), damaged + "material slot 1: material");
+  EXPECT_EQ(message(baked::kGeometries, slots_of(0), 0), damaged + "geometry 0: material slots");
+  EXPECT_EQ(message(baked::kGeometries, slots_of(2), 2), damaged + "geometry 2: material slots"); // of one cluster
+  EXPECT_EQ(message(baked::kGeometries, slots_of(2), ~0u), damaged + "instance 2: material slots");
+  EXPECT_EQ(message(baked::kInstances, first_slot_of(4), 3), damaged + "instance 4: material slots");
+  EXPECT_EQ(message(baked::kInstances, first_slot_of(0), ~0u), damaged + "instance 0: material slots");
+  EXPECT_EQ(message(baked::kInstances, first_slot_of(3), 1), damaged + "instance 3: material classes"); // not 2's
+  EXPECT_EQ(message(baked::kInstances, first_slot_of(4), 1), damaged + "instance 4: material classes"); // descending
+  EXPECT_EQ(message(baked::kInstances, first_slot_of(0), 1), damaged + "cluster 0: material class order");
+  EXPECT_EQ(
+      message(baked::kInstances, 4 * sizeof(baked::InstanceRecord) + offsetof(baked::InstanceRecord, geometry), 0),
+      damaged + "geometry 3: no instance places it");
+  EXPECT_EQ(message(baked::kClusters, offsetof(baked::ClusterRecord, material_slot), 1),
+            damaged + "cluster 0: material slot");
+}
+
+TEST(BakedFile, RequirementsAreChecked) {
+  const std::vector<std::byte> bytes = test::bake(full_scene()).bytes;
+  ASSERT_GE(BakedFile::from_bytes(bytes).sections().requirements.size(), 3u);
+  const std::string damaged = "memory: damaged baked file: ";
+  constexpr size_t kRow = sizeof(baked::RequirementRecord);
+  const auto message = [&](size_t at, uint32_t value) { return message_after(bytes, baked::kRequirements, at, value); };
+  EXPECT_EQ(message(0, baked::kStreamCount), damaged + "requirement 0: stream or reason");
+  EXPECT_EQ(message(4, baked::kReasonCount), damaged + "requirement 0: stream or reason");
+  EXPECT_EQ(message(kRow + 8, 0), damaged + "requirement 1: geometries");
+  EXPECT_EQ(message(kRow + 8, 4), damaged + "requirement 1: geometries"); // of three
+  EXPECT_EQ(message(kRow + 12, 1), damaged + "requirement 1: stream or reason");
+  EXPECT_EQ(message(0, baked::kTangents), damaged + "requirement 1: order");
+  EXPECT_EQ(message_after(bytes, baked::kSummary, offsetof(baked::SummaryRecord, purpose), 2), damaged + "purpose");
+  EXPECT_EQ(message_after(bytes, baked::kSummary, offsetof(baked::SummaryRecord, purpose), 8u << baked::kKeepShift),
+            damaged + "purpose");
+  EXPECT_EQ(message_after(bytes, baked::kGeometries, offsetof(baked::GeometryRecord, requirements), 1u << 24),
+            damaged + "geometry 0: requirements");
+}
+
 TEST(BakedFile, MovingKeepsItsViewsValid) {
   BakedFile first = BakedFile::from_bytes(test::bake(full_scene()).bytes);
   const ClusterView view = first.cluster(0, 0);
@@ -187,7 +252,8 @@ TEST(FileSummary, StreamsAddUpToTheFile) {
   const FileSummary s = summarize(BakedFile::from_bytes(test::bake(full_scene()).bytes));
   const StreamBytes& b = s.bytes;
   EXPECT_EQ(b.indices + b.positions + b.normals + b.uvs + b.payload_padding + b.cluster_records + b.geometry_records +
-                b.instance_records + b.material_records + b.masks + b.cameras + b.strings + b.header_and_alignment,
+                b.instance_records + b.material_records + b.masks + b.cameras + b.strings + b.requirement_records +
+                b.header_and_alignment,
             b.total);
   EXPECT_GT(b.uvs, 0u);
   EXPECT_GT(b.normals, 0u);

@@ -59,7 +59,7 @@ std::vector<uint8_t> expect_round_trip(const Case& c) {
     EXPECT_TRUE(find_cluster_fault(c.geometry, record, bytes.data(), payload_bytes - 4));
   }
   const ClusterView view(c.geometry, record, bytes.data());
-  EXPECT_EQ(view.material(), 5u);
+  EXPECT_EQ(view.material_slot(), 5u);
   EXPECT_EQ(view.has_normals(), !c.codes.empty());
   EXPECT_EQ(view.has_uvs(), !c.uvs.empty());
   EXPECT_EQ((view.stream_bits().total() + 31) / 32 * 4, payload_bytes);

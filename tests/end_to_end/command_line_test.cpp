@@ -43,6 +43,44 @@ TEST(CommandLine, HelpNamesEveryVerb) {
     EXPECT_NE(result.out.find(verb), std::string::npos) << verb;
 }
 
+TEST(CommandLine, RequirementsAreExplainedInSentencesAndAsData) {
+  const Workbench bench;
+  write_text(bench / "textured.pbrt", R"(WorldBegin
+Texture "checks" "spectrum" "checkerboard"
+Material "matte" "texture Kd" "checks"
+Shape "trianglemesh" "integer indices" [0 1 2 0 2 3] "point P" [0 0 0  1 0 0  1 1 0.3  0 1 0] "float uv" [0 0 1 0 1 1 0 1]
+WorldEnd
+)");
+  const std::string file = bench / "textured.ptk";
+  const CommandResult ao = run_packtrace({"bake", bench / "textured.pbrt", "-o", file, "-v"});
+  ASSERT_EQ(ao.exit_code, 0) << ao.err;
+  for (const char* sentence :
+       {"required for ao:", "uv dropped: no masked material, 2 triangles of 1 geometries, 32 bytes of source saved",
+        "normals: the source has none, 2 triangles of 1 geometries",
+        "materials: 1 of 1 in use, at most 1 in one geometry (0 bits); flags in use: albedo texture (1 of 12 bits), ao "
+        "looks at: none",
+        "triangles 2   instances 1   materials 1; normals: the source has none; uv dropped"})
+    EXPECT_NE(ao.out.find(sentence), std::string::npos) << sentence << "\n" << ao.out;
+
+  const CommandResult shading =
+      run_packtrace({"bake", bench / "textured.pbrt", "-o", file, "-q", "--force", "--for", "shading"});
+  ASSERT_EQ(shading.exit_code, 0) << shading.err;
+  const CommandResult info = run_packtrace({"info", file, "-v", "--json", "-"});
+  const auto requirements = nlohmann::json::parse(info.out).at("requirements");
+  EXPECT_EQ(requirements.at("for"), "shading");
+  EXPECT_EQ(requirements.at("streams").at(1).at("reason"), "texture");
+  EXPECT_EQ(requirements.at("streams").at(1).at("source_bytes"), 32);
+  EXPECT_GT(requirements.at("streams").at(1).at("stored_bytes"), 0);
+  EXPECT_EQ(requirements.at("geometries").at(0).at("reasons").at("uv"), nlohmann::json({"texture"}));
+  EXPECT_FALSE(nlohmann::json::parse(run_packtrace({"info", file, "--json", "-"}).out)
+                   .at("requirements")
+                   .contains("geometries"));
+  EXPECT_NE(run_packtrace({"info", file}).out.find("uv kept: textures look them up, 2 triangles"), std::string::npos);
+
+  EXPECT_EQ(run_packtrace({"bake", bench.scene(), "--dry-run", "--for", "beauty"}).exit_code, 2);
+  EXPECT_EQ(run_packtrace({"bake", bench.scene(), "--dry-run", "--keep", "uv,colours"}).exit_code, 2);
+}
+
 TEST(CommandLine, NothingToDoIsAUsageError) { EXPECT_EQ(run_packtrace({}).exit_code, 2); }
 
 TEST(CommandLine, UnknownVerbIsAUsageErrorThatNamesIt) {

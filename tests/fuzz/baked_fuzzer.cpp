@@ -104,7 +104,7 @@ void read_geometry(const BakedFile& file, uint32_t geometry) {
   const auto clusters = static_cast<uint32_t>(file.clusters(geometry).size());
   for (uint32_t c = 0; c < clusters; ++c) {
     const ClusterView cluster = file.cluster(geometry, c);
-    require(cluster.material() < file.sections().materials.size(), "material number");
+    require(cluster.material_slot() < file.geometries()[geometry].slot_count, "material slot");
     read_cluster(cluster);
     const uint32_t first = cluster.record().first_triangle;
     for (const uint32_t triangle : {first, first + cluster.triangle_count() - 1})
@@ -116,6 +116,8 @@ void read_rest(const BakedFile& file) {
   for (uint32_t i = 0; i < file.instances().size(); ++i) {
     const Affine map = file.world_from_object(i);
     for (int column = 0; column < 4; ++column) require(is_finite(map[column]), "instance transform");
+    for (const uint32_t material : file.instance_materials(i))
+      require(material < file.sections().materials.size(), "material number");
   }
   for (uint32_t i = 0; i < file.sections().masks.size(); ++i) {
     const AlphaMaskView mask = file.mask(i);

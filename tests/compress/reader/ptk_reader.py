@@ -16,7 +16,7 @@ import sys
 import zlib
 from dataclasses import dataclass
 
-VERSION = 2
+VERSION = 3
 MAGIC = b"PTK\x89\r\n\x1a\0"
 HEADER_BYTES = 384
 DISK_FORM_HEADER_BYTES = 192
@@ -56,13 +56,14 @@ GEOMETRY = Record(
     ("step_mantissa", "I"), ("step_exponent", "i"), ("anchor_shift", "I"), ("uv_exponent", "2i"),
     ("bounds_lo", "3f"), ("bounds_hi", "3f"),
     ("max_normal_error_degrees", "f"), ("mean_normal_error_degrees", "f"), ("max_uv_error", "f"),
-    ("flags", "I"), ("class_clusters", "8I"), ("name", "2I"), ("normal_encoding", "I"), ("reserved", "I"))
+    ("flags", "I"), ("class_clusters", "8I"), ("name", "2I"), ("normal_encoding", "I"),
+    ("reserved", "I"), ("slot_count", "I"), ("requirements", "I"))
 CLUSTER = Record(
-    ("payload_offset", "I"), ("first_triangle", "I"), ("first_vertex", "I"), ("material", "I"),
+    ("payload_offset", "I"), ("first_triangle", "I"), ("first_vertex", "I"), ("material_slot", "I"),
     ("anchor", "3i"), ("normal_anchor", "2h"), ("vertex_count", "H"), ("normal_palette", "H"),
     ("triangle_count", "B"), ("restart_count", "B"), ("position_bits", "3B"), ("normal_bits", "2B"), ("flags", "B"))
 MATERIAL = Record(("flags", "I"), ("albedo", "3f"), ("alpha_mask", "I"), ("shadow_alpha_mask", "I"), ("name", "2I"))
-INSTANCE = Record(("world_from_object", "12f"), ("geometry", "I"))
+INSTANCE = Record(("world_from_object", "12f"), ("geometry", "I"), ("first_slot", "I"))
 MASK = Record(
     ("first_word", "Q"), ("width", "I"), ("height", "I"), ("wrap", "I"), ("reserved", "I"),
     ("uv_scale", "2f"), ("uv_offset", "2f"))
@@ -73,13 +74,18 @@ SUMMARY = Record(
     ("source_triangles", "Q"), ("dropped_triangles", "Q"), ("unused_triangles", "Q"), ("source_vertices", "Q"),
     ("merged_vertices", "Q"), ("collapsed_triangles", "Q"), ("bounds_lo", "3d"), ("bounds_hi", "3d"),
     ("precision_value", "d"), ("precision_kind", "I"), ("world_step_mantissa", "I"), ("world_step_exponent", "i"),
-    ("reserved", "I"), ("stream_bits", "4Q"))
+    ("purpose", "I"), ("stream_bits", "4Q"), ("left_out", "Q"))
+
+REQUIREMENT = Record(
+    ("stream", "I"), ("reason", "I"), ("geometries", "I"), ("reserved", "I"),
+    ("triangles", "Q"), ("source_bytes", "Q"), ("stored_bits", "Q"))
 
 # In the order of the section table; None: bytes.
 SECTIONS = (
     ("geometries", GEOMETRY), ("clusters", CLUSTER), ("payload", None), ("materials", MATERIAL),
     ("instances", INSTANCE), ("masks", MASK), ("mask_words", Record(("word", "I"))), ("cameras", CAMERA),
-    ("strings", None), ("summary", SUMMARY))
+    ("strings", None), ("summary", SUMMARY), ("material_slots", Record(("material", "I"))),
+    ("requirements", REQUIREMENT))
 
 
 def index_bits(count):
@@ -117,7 +123,7 @@ class Mesh:
     normals: list  # (0, 0, 0) in flat clusters
     uvs: list  # (0, 0) in clusters without
     triangles: list
-    materials: list  # per triangle
+    slots: list  # per triangle, of materials
 
 
 def read_triangles(bits, cluster):
@@ -301,6 +307,10 @@ class BakedFile:
         first = geometry["first_cluster"]
         return self.sections["clusters"][first : first + geometry["cluster_count"]]
 
+    def instance_materials(self, instance):
+        first, count = instance["first_slot"], self.sections["geometries"][instance["geometry"]]["slot_count"]
+        return [slot["material"] for slot in self.sections["material_slots"][first : first + count]]
+
     def decode(self, geometry):
         mesh = Mesh([], [], [], [], [], [])
         step = geometry["step_mantissa"] * math.ldexp(1.0, geometry["step_exponent"])
@@ -316,7 +326,7 @@ class BakedFile:
             bits = Bits(data)
             for triangle in read_triangles(bits, cluster):
                 mesh.triangles.append(tuple(first_vertex + corner for corner in triangle))
-                mesh.materials.append(cluster["material"])
+                mesh.slots.append(cluster["material_slot"])
             mesh.lattice += read_lattice(bits, cluster, geometry)
             count = cluster["vertex_count"]
             flags = cluster["flags"]
@@ -366,8 +376,8 @@ def require_equal(what, ours, theirs):
 
 def compare(baked, meshes, dump):
     """A dump: geometries (u32); for each vertices, triangles (u32), then lattice (3 i64 a vertex), positions, normals
-    (3 floats a vertex), uvs (2 floats), triangles (3 u32 each), materials (u32 a triangle); instances (u32); for each
-    12 floats and a geometry (u32). All must be equal."""
+    (3 floats a vertex), uvs (2 floats), triangles (3 u32 each), material slots (u32 a triangle); instances (u32); for each
+    12 floats, a geometry (u32) and its materials by slot (u32 each). All must be equal."""
     require_equal("geometries", [len(meshes)], dump.take("I", 1))
     for number, mesh in enumerate(meshes):
         vertices, triangles = len(mesh.lattice), len(mesh.triangles)
@@ -378,12 +388,14 @@ def compare(baked, meshes, dump):
         require_equal(what + "normals", flat(mesh.normals), dump.take("f", 3 * vertices))
         require_equal(what + "uvs", flat(mesh.uvs), dump.take("f", 2 * vertices))
         require_equal(what + "triangles", flat(mesh.triangles), dump.take("I", 3 * triangles))
-        require_equal(what + "materials", mesh.materials, dump.take("I", triangles))
+        require_equal(what + "slots", mesh.slots, dump.take("I", triangles))
     instances = baked.sections["instances"]
     require_equal("instances", [len(instances)], dump.take("I", 1))
     for number, instance in enumerate(instances):
         require_equal(f"instance {number}", instance["world_from_object"], dump.take("f", 12))
         require_equal(f"instance {number}", [instance["geometry"]], dump.take("I", 1))
+        materials = baked.instance_materials(instance)
+        require_equal(f"instance {number}: materials", materials, dump.take("I", len(materials)))
     if dump.at != len(dump.data):
         raise Differs("the dump holds more than the file")
 
