@@ -5,6 +5,7 @@
 
 #include "compress/format/normal_codec.h"
 #include "compress/format/page_codec.h"
+#include "compress/format/uv_codec.h"
 
 namespace packtrace {
 
@@ -35,6 +36,9 @@ struct BakeConfig {
   double max_normal_error_degrees() const;
   /// Triangles whose three normals are all this close to the decoded face's normal, or to its opposite, store none.
   double flat_degrees() const;
+
+  /// Of every geometry; without one the lattice, whose step follows from the size of the textures looked up.
+  std::optional<UvEncoding> uvs;
 
   /// How the file lies on disk. Changes nothing that is decoded from it.
   PageCodec codec = PageCodec::kNone;

@@ -155,6 +155,7 @@ private:
     record.step_exponent = q.grid.exponent;
     record.anchor_shift = q.anchor_shift;
     record.uv_exponent = q.uv_exponent;
+    record.uv_encoding = static_cast<uint32_t>(q.uv_encoding);
     record.normal_encoding = static_cast<uint32_t>(q.normal_encoding);
     record.max_normal_error_degrees = static_cast<float>(q.stats.max_normal_error_degrees);
     record.mean_normal_error_degrees = static_cast<float>(mean_normal_error(q.stats));
@@ -189,7 +190,7 @@ private:
   /// Everything the report says of the scene as a whole.
   void add_up() {
     QuantizeStats all;
-    uint64_t uv_bytes = 0;
+    uint64_t uv_bytes = 0, coarse_uvs = 0;
     for (const Packed& p : packed_) {
       const QuantizeStats& s = p.stats;
       report_.source_vertices += s.source_vertices;
@@ -204,6 +205,8 @@ private:
       all.repaired_normals += s.repaired_normals;
       all.replaced_uvs += s.replaced_uvs;
       uv_bytes += p.unneeded_uv_bytes;
+      coarse_uvs += s.max_uv_error_texels > 0.5;
+      report_.max_uv_error_texels = std::max(report_.max_uv_error_texels, s.max_uv_error_texels);
     }
     report_.mean_normal_error_degrees = mean_normal_error(all);
     report_.source_triangles = unique_triangle_count(scene_);
@@ -220,6 +223,9 @@ private:
       warn(std::to_string(all.repaired_normals) + " normals have no direction; face normals took their place");
     if (all.replaced_uvs > 0)
       warn(std::to_string(all.replaced_uvs) + " texture coordinates are not finite; (0, 0) took their place");
+    if (coarse_uvs > 0)
+      warn("texture coordinates of " + std::to_string(coarse_uvs) + " geometries are up to " +
+           brief(report_.max_uv_error_texels) + " texels off; without an encoding of your own they stay within 1/32");
     if (report_.collapsed_triangles > 0)
       warn(std::to_string(report_.collapsed_triangles) +
            " triangles are smaller than the grid's step and have no area");

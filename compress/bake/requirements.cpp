@@ -43,6 +43,8 @@ GeometryNeeds analyse_requirements(const Scene& scene, const GeometryPlan& plan)
     const AlphaMask& mask = *masks[i];
     const std::array<int32_t, 2> exponent = {choose_uv_exponent(mask.width, mask.uv_scale.x, largest.x),
                                              choose_uv_exponent(mask.height, mask.uv_scale.y, largest.y)};
+    needs.texels_per_uv[0] = std::max(needs.texels_per_uv[0], std::abs(double{mask.uv_scale.x}) * mask.width);
+    needs.texels_per_uv[1] = std::max(needs.texels_per_uv[1], std::abs(double{mask.uv_scale.y}) * mask.height);
     for (size_t axis = 0; axis < 2; ++axis)
       needs.uv_exponent[axis] = i == 0 ? exponent[axis] : std::min(needs.uv_exponent[axis], exponent[axis]);
   }

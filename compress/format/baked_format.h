@@ -7,12 +7,12 @@
 
 #include "pbrt_import/scene/material_flags.h"
 
-/// What lies in a .ptk file, version 2; docs/baked_format.md says it in words. Little-endian; every section starts at a
+/// What lies in a .ptk file, version 3; docs/baked_format.md says it in words. Little-endian; every section starts at a
 /// multiple of 64 bytes; bytes that no field or section owns are zero.
 namespace packtrace::baked {
 
 inline constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'K', 0x89, '\r', '\n', 0x1a, 0};
-inline constexpr uint32_t kVersion = 2;
+inline constexpr uint32_t kVersion = 3;
 inline constexpr size_t kSectionAlignment = 64;
 inline constexpr uint32_t kNone = ~0u;
 
@@ -73,9 +73,9 @@ struct GeometryRecord {
   uint32_t vertex_count; ///< sum over clusters
   uint32_t step_mantissa;
   int32_t step_exponent;
-  uint32_t anchor_shift; ///< cluster anchors count 2^anchor_shift steps
-  std::array<int32_t, 2> uv_exponent;
-  std::array<float, 3> bounds_lo; ///< of the decoded vertices; lo > hi where there are none
+  uint32_t anchor_shift;              ///< cluster anchors count 2^anchor_shift steps
+  std::array<int32_t, 2> uv_exponent; ///< 0 unless the encoding is the lattice
+  std::array<float, 3> bounds_lo;     ///< of the decoded vertices; lo > hi where there are none
   std::array<float, 3> bounds_hi;
   float max_normal_error_degrees;  ///< measured against the source
   float mean_normal_error_degrees; ///< of all its normals
@@ -84,7 +84,7 @@ struct GeometryRecord {
   std::array<uint32_t, 8> class_clusters; ///< clusters of each material class; sums to cluster_count
   StringRef name;
   uint32_t normal_encoding; ///< normal_codec.h, of all its clusters
-  uint32_t reserved;
+  uint32_t uv_encoding;     ///< uv_codec.h, of all its clusters
 };
 
 // ClusterRecord::flags
@@ -175,7 +175,7 @@ static_assert(kIsPod<GeometryRecord> && sizeof(GeometryRecord) == 184 && alignof
 static_assert(offsetof(GeometryRecord, origin) == 24 && offsetof(GeometryRecord, cluster_count) == 64 &&
               offsetof(GeometryRecord, bounds_lo) == 96 && offsetof(GeometryRecord, flags) == 132 &&
               offsetof(GeometryRecord, class_clusters) == 136 && offsetof(GeometryRecord, name) == 168 &&
-              offsetof(GeometryRecord, normal_encoding) == 176);
+              offsetof(GeometryRecord, normal_encoding) == 176 && offsetof(GeometryRecord, uv_encoding) == 180);
 static_assert(kIsPod<ClusterRecord> && sizeof(ClusterRecord) == 44 && alignof(ClusterRecord) == 4);
 static_assert(offsetof(ClusterRecord, anchor) == 16 && offsetof(ClusterRecord, normal_anchor) == 28 &&
               offsetof(ClusterRecord, vertex_count) == 32 && offsetof(ClusterRecord, triangle_count) == 36 &&

@@ -162,7 +162,10 @@ private:
         if (!(e >= 0.0f && std::isfinite(e))) fail("geometry", i, "normal or texture coordinate error");
       if (g.mean_normal_error_degrees > g.max_normal_error_degrees || g.max_normal_error_degrees > 180.0f)
         fail("geometry", i, "normal error");
-      if (g.normal_encoding >= kNormalFormats.size() || g.reserved != 0) fail("geometry", i, "normal encoding");
+      if (g.normal_encoding >= kNormalFormats.size()) fail("geometry", i, "normal encoding");
+      if (g.uv_encoding >= kUvEncodingNames.size() ||
+          (g.uv_encoding != static_cast<uint32_t>(UvEncoding::kLattice) && g.uv_exponent != std::array<int32_t, 2>{}))
+        fail("geometry", i, "texture coordinate encoding");
       if ((g.flags & ~baked::kGeometryFlags) != 0) fail("geometry", i, "flags");
       if (!text_ok(g.name)) fail("geometry", i, "name");
       check_clusters(i, g);

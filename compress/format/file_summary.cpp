@@ -1,6 +1,7 @@
 #include "compress/format/file_summary.h"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 
 namespace packtrace {
@@ -55,6 +56,38 @@ void add_normals(std::vector<NormalUse>& uses, const baked::GeometryRecord& g,
   use->max_error_degrees = std::max(use->max_error_degrees, g.max_normal_error_degrees);
 }
 
+/// Texels per unit of texture coordinate, along the axis of more, of the finest texture that a material looks up.
+double texels_per_uv(const BakedSections& s, const baked::MaterialRecord& material) {
+  double most = 0.0;
+  for (const uint32_t number : {material.alpha_mask, material.shadow_alpha_mask}) {
+    if (number == baked::kNone) continue;
+    const baked::MaskRecord& mask = s.masks[number];
+    most = std::max(
+        {most, std::abs(double{mask.uv_scale[0]}) * mask.width, std::abs(double{mask.uv_scale[1]}) * mask.height});
+  }
+  return most;
+}
+
+void add_uvs(std::vector<UvUse>& uses, const BakedSections& s, const baked::GeometryRecord& g,
+             std::span<const baked::ClusterRecord> clusters) {
+  uint64_t vertices = 0;
+  double texels = 0.0;
+  for (const baked::ClusterRecord& cluster : clusters) {
+    if ((cluster.flags & baked::kClusterHasUvs) == 0) continue;
+    vertices += cluster.vertex_count;
+    texels = std::max(texels, texels_per_uv(s, s.materials[cluster.material]));
+  }
+  if (vertices == 0) return;
+  const auto encoding = static_cast<UvEncoding>(g.uv_encoding);
+  auto use = std::lower_bound(uses.begin(), uses.end(), encoding,
+                              [](const UvUse& one, UvEncoding other) { return one.encoding < other; });
+  if (use == uses.end() || use->encoding != encoding) use = uses.insert(use, UvUse{encoding});
+  ++use->geometries;
+  use->vertices += vertices;
+  use->max_error = std::max(use->max_error, g.max_uv_error);
+  use->max_error_texels = std::max(use->max_error_texels, g.max_uv_error * texels);
+}
+
 } // namespace
 
 FileSummary summarize(const BakedFile& file) {
@@ -77,6 +110,7 @@ FileSummary summarize(const BakedFile& file) {
     summary.max_uv_error = std::max(summary.max_uv_error, g.max_uv_error);
     if (g.cluster_count > 0) add_grid(summary.grids, g);
     add_normals(summary.normals, g, file.clusters(static_cast<uint32_t>(i)));
+    add_uvs(summary.uvs, s, g, file.clusters(static_cast<uint32_t>(i)));
   }
   std::sort(summary.grids.begin(), summary.grids.end(), [](const GridUse& a, const GridUse& b) {
     return std::tuple(!a.world_space, a.grid.step()) < std::tuple(!b.world_space, b.grid.step());

@@ -33,6 +33,15 @@ struct NormalUse {
   float max_error_degrees = 0; ///< measured, flat normals that are not stored included
 };
 
+/// One encoding of texture coordinates in use.
+struct UvUse {
+  UvEncoding encoding;
+  uint32_t geometries = 0;     ///< that store texture coordinates
+  uint64_t vertices = 0;       ///< with one, sum over clusters
+  float max_error = 0;         ///< measured, larger axis
+  double max_error_texels = 0; ///< a bound: the largest error of a geometry times its finest texture's larger side
+};
+
 /// What `info` shows of a baked file.
 struct FileSummary {
   uint64_t triangles = 0, placed_triangles = 0, vertices = 0, placed_vertices = 0, clusters = 0;
@@ -44,6 +53,7 @@ struct FileSummary {
   double triangles_per_cluster = 0.0;
   std::vector<GridUse> grids;      ///< world space first, then by step, finest first
   std::vector<NormalUse> normals;  ///< by encoding
+  std::vector<UvUse> uvs;          ///< by encoding
   double max_position_error = 0.0; ///< measured, largest axis, object units, over all geometries
   double max_position_error_bound = 0.0;
   float max_normal_error_degrees = 0.0f;

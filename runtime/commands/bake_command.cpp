@@ -24,14 +24,15 @@
 namespace packtrace {
 namespace {
 
-constexpr const char* kAutoNormals = "auto";
+constexpr const char* kAuto = "auto";
 
 struct BakeOptions {
   std::string input, output;
   std::optional<double> precision, precision_abs, precision_edge;
   std::optional<uint32_t> position_bits;
-  std::string normals = kAutoNormals;
+  std::string normals = kAuto;
   std::optional<double> normal_error;
+  std::string uvs = kAuto;
   std::string codec{name_of(PageCodec::kNone)};
   SceneOptions scene;
   bool dry_run = false;
@@ -52,6 +53,7 @@ BakeConfig make_config(const BakeOptions& options) {
     throw Error(ErrorKind::kUsage,
                 "--normal-error chooses an encoding; it is of no use with --normals " + options.normals);
   if (options.normal_error) config.normal_error_degrees = *options.normal_error;
+  config.uvs = find_uv_encoding(options.uvs);
   config.codec = find_page_codec(options.codec).value(); // the option's check knows the names
   config.validate();
   return config;
@@ -149,12 +151,12 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   for (CLI::Option* option : precisions)
     for (CLI::Option* other : precisions)
       if (option != other) option->excludes(other);
-  std::vector<std::string> encodings{kAutoNormals};
+  std::vector<std::string> encodings{kAuto};
   for (const NormalFormat& format : kNormalFormats) encodings.emplace_back(format.name);
   verb.add_option("--normals", options->normals,
                   "Encoding of normals; auto: axis16, axis24 or axis32 by --normal-error")
       ->check(CLI::IsMember(encodings))
-      ->default_str(kAutoNormals)
+      ->default_str(kAuto)
       ->group("Normals");
   verb.add_option(
           "--normal-error", options->normal_error,
@@ -162,6 +164,15 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
           "what 24 bits keep for every direction)")
       ->type_name("DEGREES")
       ->group("Normals");
+  verb.add_option(
+          "--uvs", options->uvs,
+          "Texture coordinates: auto keeps 1/32 texel wherever they lie; unorm16 (steps of 1/65535) and fp16 are "
+          "for compatibility")
+      ->check(CLI::IsMember(
+          std::vector<std::string>{kAuto, std::string(kUvEncodingNames[static_cast<size_t>(UvEncoding::kUnorm16)]),
+                                   std::string(kUvEncodingNames[static_cast<size_t>(UvEncoding::kFp16)])}))
+      ->default_str(kAuto)
+      ->group("Texture coordinates");
   verb.add_option(
           "--codec", options->codec,
           "Form on disk: none is mapped and traced as it is; fast and small are smaller, and decoded when opened")

@@ -66,7 +66,8 @@ const std::locale& grouped() {
 }
 
 nlohmann::json to_json(const FileSummary& s) {
-  nlohmann::json bytes, grids = nlohmann::json::array(), normals = nlohmann::json::array();
+  nlohmann::json bytes, grids = nlohmann::json::array(), normals = nlohmann::json::array(),
+                        uvs = nlohmann::json::array();
   for (const auto& [name, count] : stream_rows(s.bytes)) bytes[name] = count;
   for (const GridUse& use : s.grids)
     grids.push_back({{"step", use.grid.step()}, {"world_space", use.world_space}, {"geometries", use.geometries}});
@@ -75,6 +76,12 @@ nlohmann::json to_json(const FileSummary& s) {
                        {"geometries", use.geometries},
                        {"vertices", use.vertices},
                        {"max_error_degrees", use.max_error_degrees}});
+  for (const UvUse& use : s.uvs)
+    uvs.push_back({{"encoding", kUvEncodingNames[static_cast<size_t>(use.encoding)]},
+                   {"geometries", use.geometries},
+                   {"vertices", use.vertices},
+                   {"max_error", use.max_error},
+                   {"max_error_texels", use.max_error_texels}});
   return {
       {"triangles", s.triangles},
       {"placed_triangles", s.placed_triangles},
@@ -93,6 +100,7 @@ nlohmann::json to_json(const FileSummary& s) {
       {"disk", disk_json(s.disk)},
       {"grids", grids},
       {"normals", normals},
+      {"uvs", uvs},
       {"max_position_error", s.max_position_error},
       {"max_position_error_bound", s.max_position_error_bound},
       {"max_normal_error_degrees", s.max_normal_error_degrees},
@@ -134,7 +142,11 @@ std::string to_text(const FileSummary& s) {
   for (const NormalUse& use : s.normals)
     text += fmt::format(grouped(), "normals {}: {:L} geometries, {:L} vertices, error {:.4f} degrees\n",
                         format_of(use.encoding).name, use.geometries, use.vertices, use.max_error_degrees);
-  if (!s.normals.empty()) text += "\n";
+  for (const UvUse& use : s.uvs)
+    text += fmt::format(grouped(), "uvs {}: {:L} geometries, {:L} vertices, error {:.3g}, {:.3g} texels at most\n",
+                        kUvEncodingNames[static_cast<size_t>(use.encoding)], use.geometries, use.vertices,
+                        use.max_error, use.max_error_texels);
+  if (!s.normals.empty() || !s.uvs.empty()) text += "\n";
   text += fmt::format("{:<22}{:>14}{:>16}\n", "stream", "bytes", "per triangle");
   for (const auto& [name, bytes] : stream_rows(s.bytes))
     if (bytes > 0)

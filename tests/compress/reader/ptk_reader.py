@@ -16,7 +16,7 @@ import sys
 import zlib
 from dataclasses import dataclass
 
-VERSION = 2
+VERSION = 3
 MAGIC = b"PTK\x89\r\n\x1a\0"
 HEADER_BYTES = 384
 DISK_FORM_HEADER_BYTES = 192
@@ -56,7 +56,7 @@ GEOMETRY = Record(
     ("step_mantissa", "I"), ("step_exponent", "i"), ("anchor_shift", "I"), ("uv_exponent", "2i"),
     ("bounds_lo", "3f"), ("bounds_hi", "3f"),
     ("max_normal_error_degrees", "f"), ("mean_normal_error_degrees", "f"), ("max_uv_error", "f"),
-    ("flags", "I"), ("class_clusters", "8I"), ("name", "2I"), ("normal_encoding", "I"), ("reserved", "I"))
+    ("flags", "I"), ("class_clusters", "8I"), ("name", "2I"), ("normal_encoding", "I"), ("uv_encoding", "I"))
 CLUSTER = Record(
     ("payload_offset", "I"), ("first_triangle", "I"), ("first_vertex", "I"), ("material", "I"),
     ("anchor", "3i"), ("normal_anchor", "2h"), ("vertex_count", "H"), ("normal_palette", "H"),
@@ -252,12 +252,21 @@ def read_normals(bits, cluster, geometry):
     return [palette[bits.take(width)] for _ in range(count)]
 
 
+def uv_of(code, encoding, exponent):
+    if encoding == 0:
+        return to_float32(code * math.ldexp(1.0, exponent))
+    if encoding == 1:
+        return to_float32(code / 65535.0)
+    magnitude = struct.unpack("<e", struct.pack("<H", min(abs(code), 31743)))[0]
+    return -magnitude if code < 0 else magnitude
+
+
 def read_uvs(bits, cluster, geometry):
     anchors = bits.take_signed(32), bits.take_signed(32)
     widths = bits.take(5), bits.take(5)
-    steps = [math.ldexp(1.0, exponent) for exponent in geometry["uv_exponent"]]
     return [
-        tuple(to_float32((anchor + bits.take(width)) * step) for anchor, width, step in zip(anchors, widths, steps))
+        tuple(uv_of(anchor + bits.take(width), geometry["uv_encoding"], exponent)
+              for anchor, width, exponent in zip(anchors, widths, geometry["uv_exponent"]))
         for _ in range(cluster["vertex_count"])]
 
 
