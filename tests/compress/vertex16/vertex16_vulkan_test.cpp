@@ -63,7 +63,7 @@ TEST(Vertex16Vulkan, TheShaderDecodesWhatTheHeaderDoes) {
       ASSERT_EQ(got[11], tangent.w) << i;
     }
   }
-  EXPECT_LE(largest, 1e-6f); // square roots, divisions and fused operations differ between devices
+  EXPECT_LE(largest, 4e-6f); // .0003 degrees: square roots, divisions and fused operations differ between devices
   std::printf("%s: normals and tangents of %u vertices within %g\n", gpu->device().c_str(), kBatch * kBatches,
               static_cast<double>(largest));
 }
