@@ -217,12 +217,12 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
                    "object " + in_quotes(scene_.objects[object].name) + " is never instanced; it is left out");
   });
   for_each_shape(scene_, [&](const Shape& shape) { loader_.require(shape.mesh); });
-  materials_.require_images();
+  materials_.require_images(options_.keep_textures);
   loader_.load(scene_.meshes, graph_.images(), progress, statistics_, scene_.dropped_triangles);
   reporter_.set_sequence(last_sequence);
   for (const ImageRequest& image : graph_.images())
     ++(image.missing ? statistics_.textures_missing : statistics_.textures_found);
-  const std::vector<uint32_t> material_numbers = materials_.resolve(scene_.materials, scene_.masks, reporter_);
+  const std::vector<uint32_t> material_numbers = materials_.resolve(scene_, options_.memory_budget_bytes, reporter_);
   drop_unusable_shapes(material_numbers, scene_.shapes);
   for (Object& object : scene_.objects) drop_unusable_shapes(material_numbers, object.shapes);
   if (const uint64_t absent = statistics_.shapes_absent; absent > 0)

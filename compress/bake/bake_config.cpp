@@ -41,6 +41,7 @@ void BakeConfig::validate() const {
   validate_precision(precision_kind, precision);
   require(normal_error_degrees >= 0.0025 && normal_error_degrees <= 10.0, "normal error",
           "degrees must be .0025 .. 10");
+  require(min_texture_psnr_db >= 10.0 && min_texture_psnr_db <= 100.0, "texture PSNR", "dB must be 10 .. 100");
 }
 
 double BakeConfig::max_normal_error_degrees() const {

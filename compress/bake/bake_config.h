@@ -5,6 +5,7 @@
 
 #include "compress/format/normal_codec.h"
 #include "compress/format/page_codec.h"
+#include "compress/format/texture_codec.h"
 #include "compress/format/uv_codec.h"
 
 namespace packtrace {
@@ -39,6 +40,13 @@ struct BakeConfig {
 
   /// Of every geometry; without one the lattice, whose step follows from the size of the textures looked up.
   std::optional<UvEncoding> uvs;
+
+  /// Whether textures of materials are stored, with the texture coordinates that they and normal maps need.
+  bool textures = false;
+  /// Of every texture; without one, the smallest for each whose PSNR is at least min_texture_psnr_db.
+  std::optional<TextureCodec> texture_codec;
+  /// Of sRGB-encoded values. 10 .. 100; without meaning where a codec is given.
+  double min_texture_psnr_db = 34.0;
 
   /// How the file lies on disk. Changes nothing that is decoded from it.
   PageCodec codec = PageCodec::kNone;

@@ -34,6 +34,7 @@ public:
   BakedScene run() {
     measure();
     choose_grids();
+    encode_textures();
     pack();
     BakedScene result;
     result.bytes = assemble();
@@ -57,7 +58,7 @@ private:
 
   std::vector<std::byte> assemble() {
     progress_.begin("assembling the file", 0);
-    FileSections sections(scene_);
+    FileSections sections(scene_, textures_);
     for (size_t i = 0; i < packed_.size(); ++i) {
       sections.add_geometry(packed_[i].record, packed_[i].encoded, plan_.geometries[i].name);
       packed_[i].encoded = {};
@@ -124,6 +125,21 @@ private:
                                    "edges agree only within the position error");
   }
 
+  void encode_textures() {
+    if (!config_.textures) return;
+    progress_.begin("encoding textures", scene_.textures.size());
+    textures_.resize(scene_.textures.size());
+    for (const AlbedoTexture& texture : scene_.textures)
+      if (texture.width == 0 || texture.height == 0 ||
+          texture.rgb.size() != uint64_t{3} * texture.width * texture.height)
+        throw Error(ErrorKind::kInput, "invalid scene: the size of texture " + texture.name);
+    tbb::parallel_for(size_t{0}, textures_.size(), [&](size_t i) {
+      progress_.check_cancelled();
+      textures_[i] = encode_texture(scene_.textures[i], config_.texture_codec, config_.min_texture_psnr_db);
+      progress_.advance();
+    });
+  }
+
   void pack() {
     uint64_t triangles = 0;
     for (const GeometryPlan& plan : plan_.geometries)
@@ -139,7 +155,7 @@ private:
   Packed pack_one(size_t index) const {
     const GeometryPlan& plan = plan_.geometries[index];
     const GeometryMeasure& measure = measures_[index];
-    const GeometryNeeds needs = analyse_requirements(scene_, plan);
+    const GeometryNeeds needs = analyse_requirements(scene_, plan, config_.textures);
     const QuantizedGeometry q = quantize_geometry(scene_, plan, needs, config_, grids_[index], measure.max_abs(),
                                                   measure.bounds.lo, measure.bounds.hi);
     return {record_of(plan, q, position_error_bound(q.grid.step(), measure.max_abs())), encode_geometry(scene_, q),
@@ -214,7 +230,7 @@ private:
     report_.shared_objects = plan_.shared_objects;
     report_.unused_objects = plan_.unused_objects;
     report_.unused_triangles = plan_.unused_triangles;
-    if (uv_bytes > 0) report_.dropped.push_back({"texture coordinates", "no alpha mask looks them up", uv_bytes});
+    if (uv_bytes > 0) report_.dropped.push_back({"texture coordinates", config_.textures ? "no texture or mask looks them up" : "no alpha mask looks them up", uv_bytes});
     if (all.flat_triangles > 0)
       report_.dropped.push_back({"normals",
                                  "they equal the face normal within " + brief(config_.flat_degrees()) + " degrees",
@@ -269,6 +285,7 @@ private:
   PositionGrid world_grid_;
   std::vector<PositionGrid> grids_;
   std::vector<Packed> packed_;
+  std::vector<EncodedTexture> textures_; // as in the scene; empty where they are not kept
   BakeReport report_;
 };
 

@@ -18,36 +18,50 @@ Vec2 max_abs_uv(const Mesh& mesh) {
   return largest;
 }
 
+/// What texture coordinates have to find their way in.
+struct TexelGrid {
+  std::array<uint32_t, 2> size{};
+  Vec2 uv_scale{1.0f};
+};
+
+/// Of normal maps, which are not read.
+constexpr TexelGrid kNormalMapGrid{{4096, 4096}, Vec2(1.0f)};
+
+void add_textures(const Scene& scene, const Material& material, bool textures, std::vector<TexelGrid>& to) {
+  const auto add = [&](const auto& all, uint32_t number, const char* what) {
+    if (number >= all.size())
+      throw Error(ErrorKind::kInput,
+                  std::string("invalid scene: ") + what + " of material " + material.name + " does not exist");
+    to.push_back({{all[number].width, all[number].height}, all[number].uv_scale});
+  };
+  if ((material.flags & kAlphaMask) != 0) add(scene.masks, material.alpha_mask, "an alpha mask");
+  if ((material.flags & kShadowAlphaMask) != 0) add(scene.masks, material.shadow_alpha_mask, "an alpha mask");
+  if (!textures) return;
+  if (material.albedo_texture != kNoTexture) add(scene.textures, material.albedo_texture, "the texture");
+  if ((material.flags & kNormalMap) != 0) to.push_back(kNormalMapGrid);
+}
+
 } // namespace
 
-GeometryNeeds analyse_requirements(const Scene& scene, const GeometryPlan& plan) {
+GeometryNeeds analyse_requirements(const Scene& scene, const GeometryPlan& plan, bool textures) {
   GeometryNeeds needs;
   Vec2 largest(0.0f);
-  std::vector<const AlphaMask*> masks;
+  std::vector<TexelGrid> looked_up;
   for (const GeometryPart& part : plan.parts) {
     const Mesh& mesh = scene.meshes[part.mesh];
-    const Material& material = scene.materials[part.material];
-    needs.parts.push_back({!mesh.normals.empty(), needs_mask(material.flags)});
-    if (!needs_mask(material.flags)) continue;
-    largest = glm::max(largest, max_abs_uv(mesh));
-    const auto add = [&](MaterialFlags flag, uint32_t mask) {
-      if ((material.flags & flag) == 0) return;
-      if (mask >= scene.masks.size())
-        throw Error(ErrorKind::kInput, "invalid scene: an alpha mask of material " + material.name + " does not exist");
-      masks.push_back(&scene.masks[mask]);
-    };
-    add(kAlphaMask, material.alpha_mask);
-    add(kShadowAlphaMask, material.shadow_alpha_mask);
+    const size_t before = looked_up.size();
+    add_textures(scene, scene.materials[part.material], textures, looked_up);
+    needs.parts.push_back({!mesh.normals.empty(), looked_up.size() > before});
+    if (looked_up.size() > before) largest = glm::max(largest, max_abs_uv(mesh));
   }
-  for (size_t i = 0; i < masks.size(); ++i) {
-    const AlphaMask& mask = *masks[i];
-    const std::array<int32_t, 2> exponent = {choose_uv_exponent(mask.width, mask.uv_scale.x, largest.x),
-                                             choose_uv_exponent(mask.height, mask.uv_scale.y, largest.y)};
-    needs.texels_per_uv[0] = std::max(needs.texels_per_uv[0], std::abs(double{mask.uv_scale.x}) * mask.width);
-    needs.texels_per_uv[1] = std::max(needs.texels_per_uv[1], std::abs(double{mask.uv_scale.y}) * mask.height);
-    for (size_t axis = 0; axis < 2; ++axis)
-      needs.uv_exponent[axis] = i == 0 ? exponent[axis] : std::min(needs.uv_exponent[axis], exponent[axis]);
-  }
+  for (size_t i = 0; i < looked_up.size(); ++i)
+    for (size_t axis = 0; axis < 2; ++axis) {
+      const float scale = looked_up[i].uv_scale[static_cast<int>(axis)];
+      const int32_t exponent = choose_uv_exponent(looked_up[i].size[axis], scale, largest[static_cast<int>(axis)]);
+      needs.uv_exponent[axis] = i == 0 ? exponent : std::min(needs.uv_exponent[axis], exponent);
+      needs.texels_per_uv[axis] =
+          std::max(needs.texels_per_uv[axis], std::abs(double{scale}) * looked_up[i].size[axis]);
+    }
   return needs;
 }
 

@@ -12,7 +12,7 @@ namespace packtrace {
 /// Which streams a part of a geometry carries.
 struct PartNeeds {
   bool normals = false; ///< the mesh has them; flat triangles are found later, triangle by triangle
-  bool uvs = false;     ///< the material looks into a mask
+  bool uvs = false;     ///< the material looks into a mask or texture that is stored
 };
 
 struct GeometryNeeds {
@@ -29,8 +29,9 @@ struct DroppedStream {
   bool operator==(const DroppedStream&) const = default;
 };
 
-/// Decides the streams of one geometry. Throws Error(kInput) if a material's mask does not exist.
-GeometryNeeds analyse_requirements(const Scene& scene, const GeometryPlan& plan);
+/// Decides the streams of one geometry. Throws Error(kInput) if a material's mask or texture does not exist.
+/// @param textures whether textures are stored
+GeometryNeeds analyse_requirements(const Scene& scene, const GeometryPlan& plan, bool textures);
 
 /// Source bytes of texture coordinates that no stored material looks up.
 uint64_t unneeded_uv_bytes(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs);

@@ -67,7 +67,7 @@ public:
     const BakedSections& s = file_.sections();
     Vertex16Export result;
     result.bytes = vertex16::assemble({vertices_, indices16_, indices32_, geometries_, draws_, instances_, s.materials,
-                                       s.masks, s.mask_words, s.strings});
+                                       s.masks, s.mask_words, s.textures, s.texture_bytes, s.strings});
     // Reading back what was written is part of the export.
     vertex16::validate(result.bytes, "export result");
     report_.geometries = geometries_.size(), report_.draws = draws_.size();

@@ -45,7 +45,8 @@ uint32_t diamond_code(double x, double y) {
 }
 
 /// Whether moving texture coordinates by a whole number looks up the same texels.
-bool repeats_every_tile(const baked::MaskRecord& mask) {
+template <class Record>
+bool repeats_every_tile(const Record& mask) {
   const auto whole = [](float f) { return f == std::floor(f); };
   return mask.wrap == static_cast<uint32_t>(WrapMode::kRepeat) && whole(mask.uv_scale[0]) && whole(mask.uv_scale[1]);
 }
@@ -89,7 +90,8 @@ private:
   bool every_texture_repeats(const baked::MaterialRecord& material) const {
     for (const uint32_t mask : {material.alpha_mask, material.shadow_alpha_mask})
       if (mask != baked::kNone && !repeats_every_tile(file_.sections().masks[mask])) return false;
-    return true;
+    return material.albedo_texture == baked::kNone ||
+           repeats_every_tile(file_.sections().textures[material.albedo_texture]);
   }
 
   void begin_draw(uint32_t material, uint32_t flags) {

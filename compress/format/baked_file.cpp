@@ -88,13 +88,26 @@ AlphaMaskView BakedFile::mask(uint32_t index) const {
           sections_.mask_words.subspan(static_cast<size_t>(record.first_word), words)};
 }
 
+TextureView BakedFile::texture(uint32_t index) const {
+  const baked::TextureRecord& record = sections_.textures[index];
+  const auto codec = static_cast<TextureCodec>(record.codec);
+  return {record.width,
+          record.height,
+          static_cast<WrapMode>(record.wrap),
+          Vec2(record.uv_scale[0], record.uv_scale[1]),
+          Vec2(record.uv_offset[0], record.uv_offset[1]),
+          codec,
+          sections_.texture_bytes.subspan(static_cast<size_t>(record.first_byte),
+                                          static_cast<size_t>(packtrace::texture_bytes(codec, record.width, record.height)))};
+}
+
 std::vector<Material> BakedFile::materials() const {
   std::vector<Material> result;
   result.reserve(sections_.materials.size());
   for (const baked::MaterialRecord& record : sections_.materials)
     result.push_back({std::string(text(record.name)), record.flags,
                       Vec3(record.albedo[0], record.albedo[1], record.albedo[2]), record.alpha_mask,
-                      record.shadow_alpha_mask});
+                      record.shadow_alpha_mask, record.albedo_texture});
   return result;
 }
 

@@ -10,6 +10,7 @@
 #include "compress/format/baked_format.h"
 #include "compress/format/cluster_codec.h"
 #include "compress/format/page_codec.h"
+#include "compress/format/texture_codec.h"
 #include "pbrt_import/scene/alpha_mask.h"
 #include "pbrt_import/scene/scene.h"
 
@@ -26,6 +27,8 @@ struct BakedSections {
   std::span<const baked::InstanceRecord> instances;
   std::span<const baked::MaskRecord> masks;
   std::span<const uint32_t> mask_words;
+  std::span<const baked::TextureRecord> textures;
+  std::span<const uint8_t> texture_bytes;
   std::span<const baked::CameraRecord> cameras;
   std::span<const char> strings;
   std::span<const baked::SummaryRecord> summary; ///< exactly one
@@ -70,6 +73,7 @@ public:
 
   Affine world_from_object(uint32_t instance) const;
   AlphaMaskView mask(uint32_t index) const;
+  TextureView texture(uint32_t index) const;
   std::vector<Material> materials() const;
   std::vector<Camera> cameras() const;
   Bounds world_bounds() const;

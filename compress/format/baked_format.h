@@ -25,6 +25,8 @@ enum Section : uint32_t {
   kInstances,
   kMasks,
   kMaskWords, ///< uint32_t, rows of all masks
+  kTextures,
+  kTextureBytes, ///< of all textures
   kCameras,
   kStrings, ///< UTF-8 bytes, not terminated
   kSummary, ///< one record
@@ -47,7 +49,7 @@ struct FileHeader {
   uint32_t section_count;
   uint32_t reserved;
   std::array<SectionRecord, kSectionCount> sections;
-  std::array<uint64_t, 11> padding;
+  std::array<uint64_t, 5> padding;
   uint64_t header_hash; ///< XXH3-64 of the header before this field
 };
 
@@ -118,6 +120,7 @@ struct MaterialRecord {
   std::array<float, 3> albedo;
   uint32_t alpha_mask;        ///< or kNone
   uint32_t shadow_alpha_mask; ///< or kNone
+  uint32_t albedo_texture;    ///< or kNone
   StringRef name;
 };
 
@@ -134,6 +137,19 @@ struct MaskRecord {
   uint32_t reserved;
   std::array<float, 2> uv_scale;
   std::array<float, 2> uv_offset;
+};
+
+struct TextureRecord {
+  uint64_t first_byte; ///< into the texture bytes
+  uint32_t width;
+  uint32_t height;
+  uint32_t wrap;  ///< 0 repeat, 1 black, 2 clamp
+  uint32_t codec; ///< texture_codec.h
+  std::array<float, 2> uv_scale;
+  std::array<float, 2> uv_offset;
+  float psnr_db; ///< measured; infinite where nothing was lost
+  uint32_t reserved;
+  StringRef name;
 };
 
 struct CameraRecord {
@@ -170,7 +186,7 @@ inline constexpr bool kIsPod = std::is_trivially_copyable_v<T>&& std::is_standar
 
 static_assert(kIsPod<FileHeader> && sizeof(SectionRecord) == 24 && sizeof(FileHeader) == 384);
 static_assert(offsetof(FileHeader, content_hash) == 24 && offsetof(FileHeader, sections) == 48 &&
-              offsetof(FileHeader, padding) == 288 && offsetof(FileHeader, header_hash) == 376);
+              offsetof(FileHeader, padding) == 336 && offsetof(FileHeader, header_hash) == 376);
 static_assert(kIsPod<GeometryRecord> && sizeof(GeometryRecord) == 184 && alignof(GeometryRecord) == 8);
 static_assert(offsetof(GeometryRecord, origin) == 24 && offsetof(GeometryRecord, cluster_count) == 64 &&
               offsetof(GeometryRecord, bounds_lo) == 96 && offsetof(GeometryRecord, flags) == 132 &&
@@ -180,9 +196,12 @@ static_assert(kIsPod<ClusterRecord> && sizeof(ClusterRecord) == 44 && alignof(Cl
 static_assert(offsetof(ClusterRecord, anchor) == 16 && offsetof(ClusterRecord, normal_anchor) == 28 &&
               offsetof(ClusterRecord, vertex_count) == 32 && offsetof(ClusterRecord, triangle_count) == 36 &&
               offsetof(ClusterRecord, flags) == 43);
-static_assert(kIsPod<MaterialRecord> && sizeof(MaterialRecord) == 32 && offsetof(MaterialRecord, alpha_mask) == 16);
+static_assert(kIsPod<MaterialRecord> && sizeof(MaterialRecord) == 36 && offsetof(MaterialRecord, alpha_mask) == 16 &&
+              offsetof(MaterialRecord, name) == 28);
 static_assert(kIsPod<InstanceRecord> && sizeof(InstanceRecord) == 52 && offsetof(InstanceRecord, geometry) == 48);
 static_assert(kIsPod<MaskRecord> && sizeof(MaskRecord) == 40 && offsetof(MaskRecord, uv_scale) == 24);
+static_assert(kIsPod<TextureRecord> && sizeof(TextureRecord) == 56 && offsetof(TextureRecord, uv_scale) == 24 &&
+              offsetof(TextureRecord, name) == 48);
 static_assert(kIsPod<CameraRecord> && sizeof(CameraRecord) == 160 && offsetof(CameraRecord, projection) == 136);
 static_assert(kIsPod<SummaryRecord> && sizeof(SummaryRecord) == 152 && offsetof(SummaryRecord, stream_bits) == 120);
 
@@ -190,8 +209,8 @@ static_assert(kIsPod<SummaryRecord> && sizeof(SummaryRecord) == 152 && offsetof(
 inline constexpr std::array<uint32_t, kSectionCount> kRecordBytes = {
     sizeof(GeometryRecord), sizeof(ClusterRecord),  1,
     sizeof(MaterialRecord), sizeof(InstanceRecord), sizeof(MaskRecord),
-    sizeof(uint32_t),       sizeof(CameraRecord),   1,
-    sizeof(SummaryRecord)};
+    sizeof(uint32_t),       sizeof(TextureRecord),  1,
+    sizeof(CameraRecord),   1,                      sizeof(SummaryRecord)};
 
 /// Order of clusters within a geometry, 0..7: solid and seen by everything first, masked ones last.
 constexpr uint32_t material_class(MaterialFlags flags) {

@@ -10,7 +10,7 @@
 namespace packtrace {
 namespace {
 
-static_assert(baked::kNone == kNoMask);
+static_assert(baked::kNone == kNoMask && baked::kNone == kNoTexture);
 
 /// Checks one file image. Every failure names the file, the section and the record.
 class Validator {
@@ -22,6 +22,7 @@ public:
     check_section_table();
     if (!zero_between_sections()) fail("nonzero bytes between sections");
     check_materials_and_masks();
+    check_textures();
     check_geometries();
     check_instances();
     check_cameras();
@@ -85,13 +86,16 @@ private:
                  section<baked::InstanceRecord>(baked::kInstances),
                  section<baked::MaskRecord>(baked::kMasks),
                  section<uint32_t>(baked::kMaskWords),
+                 section<baked::TextureRecord>(baked::kTextures),
+                 section<uint8_t>(baked::kTextureBytes),
                  section<baked::CameraRecord>(baked::kCameras),
                  section<char>(baked::kStrings),
                  section<baked::SummaryRecord>(baked::kSummary)};
     if (sections_.payload.size() < kReadSlackBytes) fail("payload section without its final zero bytes");
     if (sections_.summary.size() != 1) fail("summary section must hold one record");
     if (sections_.geometries.size() >= baked::kNone || sections_.instances.size() >= baked::kNone ||
-        sections_.materials.size() >= baked::kNone || sections_.masks.size() >= baked::kNone)
+        sections_.materials.size() >= baked::kNone || sections_.masks.size() >= baked::kNone ||
+        sections_.textures.size() >= baked::kNone)
       fail("too many records");
   }
 
@@ -125,6 +129,9 @@ private:
       if (!mask_ok((m.flags & kAlphaMask) != 0, m.alpha_mask) ||
           !mask_ok((m.flags & kShadowAlphaMask) != 0, m.shadow_alpha_mask))
         fail("material", i, "alpha mask");
+      const bool texture_ok = m.albedo_texture == baked::kNone ||
+                              ((m.flags & kAlbedoTexture) != 0 && m.albedo_texture < sections_.textures.size());
+      if (!texture_ok) fail("material", i, "albedo texture");
       if (!text_ok(m.name)) fail("material", i, "name");
     }
     for (size_t i = 0; i < sections_.masks.size(); ++i) {
@@ -135,6 +142,14 @@ private:
         fail("mask", i, "extent");
       for (const float f : {m.uv_scale[0], m.uv_scale[1], m.uv_offset[0], m.uv_offset[1]})
         if (!std::isfinite(f)) fail("mask", i, "texture transform");
+    }
+  }
+
+  void check_textures() {
+    for (size_t i = 0; i < sections_.textures.size(); ++i) {
+      const baked::TextureRecord& t = sections_.textures[i];
+      if (const auto fault = find_texture_fault(t, sections_.texture_bytes.size())) fail("texture", i, *fault);
+      if (!text_ok(t.name)) fail("texture", i, "name");
     }
   }
 
@@ -193,6 +208,8 @@ private:
       if (const auto fault = find_cluster_fault(g, c, payload, g.payload_bytes)) fail("cluster", number, *fault);
       if (needs_mask(flags) && (c.flags & baked::kClusterHasUvs) == 0)
         fail("cluster", number, "masked material without texture coordinates");
+      if (sections_.materials[c.material].albedo_texture != baked::kNone && (c.flags & baked::kClusterHasUvs) == 0)
+        fail("cluster", number, "textured material without texture coordinates");
       triangles += c.triangle_count;
       vertices += c.vertex_count;
     }

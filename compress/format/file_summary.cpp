@@ -21,11 +21,12 @@ StreamBytes stream_bytes(const BakedFile& file) {
   bytes.instance_records = s.instances.size_bytes();
   bytes.material_records = s.materials.size_bytes();
   bytes.masks = s.masks.size_bytes() + s.mask_words.size_bytes();
+  bytes.textures = s.textures.size_bytes() + s.texture_bytes.size();
   bytes.cameras = s.cameras.size_bytes();
   bytes.strings = s.strings.size();
   bytes.total = file.file_bytes();
   bytes.header_and_alignment = bytes.total - s.payload.size() - bytes.cluster_records - bytes.geometry_records -
-                               bytes.instance_records - bytes.material_records - bytes.masks - bytes.cameras -
+                               bytes.instance_records - bytes.material_records - bytes.masks - bytes.textures - bytes.cameras -
                                bytes.strings;
   return bytes;
 }
@@ -59,6 +60,11 @@ void add_normals(std::vector<NormalUse>& uses, const baked::GeometryRecord& g,
 /// Texels per unit of texture coordinate, along the axis of more, of the finest texture that a material looks up.
 double texels_per_uv(const BakedSections& s, const baked::MaterialRecord& material) {
   double most = 0.0;
+  if (material.albedo_texture != baked::kNone) {
+    const baked::TextureRecord& texture = s.textures[material.albedo_texture];
+    most = std::max(std::abs(double{texture.uv_scale[0]}) * texture.width,
+                    std::abs(double{texture.uv_scale[1]}) * texture.height);
+  }
   for (const uint32_t number : {material.alpha_mask, material.shadow_alpha_mask}) {
     if (number == baked::kNone) continue;
     const baked::MaskRecord& mask = s.masks[number];
@@ -115,6 +121,9 @@ FileSummary summarize(const BakedFile& file) {
   std::sort(summary.grids.begin(), summary.grids.end(), [](const GridUse& a, const GridUse& b) {
     return std::tuple(!a.world_space, a.grid.step()) < std::tuple(!b.world_space, b.grid.step());
   });
+  for (const baked::TextureRecord& t : s.textures)
+    summary.textures.push_back({std::string(s.text(t.name)), t.width, t.height, static_cast<TextureCodec>(t.codec),
+                                texture_bytes(static_cast<TextureCodec>(t.codec), t.width, t.height), t.psnr_db});
   summary.clusters = s.clusters.size();
   summary.geometries = s.geometries.size();
   summary.instances = s.instances.size();

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string_view>
 
@@ -20,7 +22,7 @@ std::optional<UvEncoding> find_uv_encoding(std::string_view name);
 using UvLattice = std::array<int32_t, 2>;
 inline constexpr int32_t kMaxUvLattice = (1 << 30) - 1;
 inline constexpr int32_t kMinUvExponent = -148;
-inline constexpr int32_t kMaxUvExponent = 104; // the ulp of the largest floats
+inline constexpr int32_t kMaxUvExponent = 98; // by which the largest float has 30 bits
 inline constexpr int32_t kMaxFp16Code = 0x7bff;
 
 /// Codes per texel of the finest texture that a geometry's coordinates look up.
@@ -44,12 +46,13 @@ class UvDecoder {
 public:
   UvDecoder(UvEncoding encoding, int32_t exponent);
 
-  /// Total: codes beyond fp16's give its largest number.
+  /// Total: codes beyond fp16's, and results beyond floats, give the largest number.
   /// Lattice: the nearest float to code 2^exponent, which is exact where |code| <= 2^24 and else within half an ulp;
   /// a float that the step divides comes back exactly. unorm16: the nearest float to code / 65535.
   float operator()(int64_t code) const {
     if (encoding_ == UvEncoding::kFp16) return from_fp16(code);
-    return static_cast<float>(static_cast<double>(code) * step_ / divisor_);
+    constexpr double kMost = std::numeric_limits<float>::max();
+    return static_cast<float>(std::clamp(static_cast<double>(code) * step_ / divisor_, -kMost, kMost));
   }
 
 private:

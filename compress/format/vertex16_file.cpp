@@ -6,6 +6,7 @@
 
 #include <xxhash.h>
 
+#include "compress/format/texture_codec.h"
 #include "pbrt_import/scene/alpha_mask.h"
 #include "pbrt_import/scene/error.h"
 
@@ -82,6 +83,8 @@ private:
           section<baked::MaterialRecord>(kMaterials),
           section<baked::MaskRecord>(kMasks),
           section<uint32_t>(kMaskWords),
+          section<baked::TextureRecord>(kTextures),
+          section<uint8_t>(kTextureBytes),
           section<char>(kStrings)};
   }
 
@@ -136,10 +139,13 @@ private:
     const auto mask_ok = [&](uint32_t mask) { return mask == baked::kNone || mask < s_.masks.size(); };
     for (size_t i = 0; i < s_.materials.size(); ++i) {
       const baked::MaterialRecord& m = s_.materials[i];
-      require(mask_ok(m.alpha_mask) && mask_ok(m.shadow_alpha_mask) && m.name.offset <= s_.strings.size() &&
+      require(mask_ok(m.alpha_mask) && mask_ok(m.shadow_alpha_mask) &&
+                  (m.albedo_texture == baked::kNone || m.albedo_texture < s_.textures.size()) && m.name.offset <= s_.strings.size() &&
                   m.name.bytes <= s_.strings.size() - m.name.offset,
               "material", i);
     }
+    for (size_t i = 0; i < s_.textures.size(); ++i)
+      require(!find_texture_fault(s_.textures[i], s_.texture_bytes.size()), "texture", i);
     for (size_t i = 0; i < s_.masks.size(); ++i) {
       const baked::MaskRecord& m = s_.masks[i];
       const uint64_t words = uint64_t{AlphaMask::row_words(m.width)} * m.height;
@@ -161,7 +167,7 @@ std::vector<std::byte> assemble(const Sections& s) {
   const std::array<std::span<const std::byte>, kSectionCount> parts = {
       std::as_bytes(s.vertices),   std::as_bytes(s.indices16), std::as_bytes(s.indices32), std::as_bytes(s.geometries),
       std::as_bytes(s.draws),      std::as_bytes(s.instances), std::as_bytes(s.materials), std::as_bytes(s.masks),
-      std::as_bytes(s.mask_words), std::as_bytes(s.strings)};
+      std::as_bytes(s.mask_words), std::as_bytes(s.textures), std::as_bytes(s.texture_bytes), std::as_bytes(s.strings)};
   Header header{};
   header.magic = kMagic;
   header.version = kVersion;

@@ -21,6 +21,8 @@ struct Sections {
   std::span<const baked::MaterialRecord> materials;
   std::span<const baked::MaskRecord> masks;
   std::span<const uint32_t> mask_words;
+  std::span<const baked::TextureRecord> textures;
+  std::span<const uint8_t> texture_bytes;
   std::span<const char> strings;
 
   /// Corner of a draw's triangles, 0 .. index_count - 1, as a place in vertices.

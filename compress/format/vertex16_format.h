@@ -25,6 +25,8 @@ enum Section : uint32_t {
   kMaterials, ///< this and the rest as in the .ptk file
   kMasks,
   kMaskWords,
+  kTextures,
+  kTextureBytes,
   kStrings,
   kSectionCount
 };
@@ -38,7 +40,7 @@ struct Header {
   uint32_t section_count;
   uint32_t reserved;
   std::array<baked::SectionRecord, kSectionCount> sections;
-  std::array<uint64_t, 11> padding;
+  std::array<uint64_t, 5> padding;
   uint64_t header_hash; ///< XXH3-64 of the header before this field
 };
 
@@ -101,6 +103,8 @@ inline constexpr std::array<uint32_t, kSectionCount> kRecordBytes = {sizeof(glm:
                                                                      baked::kRecordBytes[baked::kMaterials],
                                                                      baked::kRecordBytes[baked::kMasks],
                                                                      baked::kRecordBytes[baked::kMaskWords],
-                                                                     baked::kRecordBytes[baked::kStrings]};
+                                                                     baked::kRecordBytes[baked::kTextures],
+    baked::kRecordBytes[baked::kTextureBytes],
+    baked::kRecordBytes[baked::kStrings]};
 
 } // namespace packtrace::vertex16

@@ -24,7 +24,7 @@
 namespace packtrace {
 namespace {
 
-constexpr const char* kAuto = "auto";
+constexpr const char *kAuto = "auto", *kNoTextures = "none";
 
 struct BakeOptions {
   std::string input, output;
@@ -33,6 +33,8 @@ struct BakeOptions {
   std::string normals = kAuto;
   std::optional<double> normal_error;
   std::string uvs = kAuto;
+  std::string textures = kNoTextures;
+  std::optional<double> texture_psnr;
   std::string codec{name_of(PageCodec::kNone)};
   SceneOptions scene;
   bool dry_run = false;
@@ -54,6 +56,11 @@ BakeConfig make_config(const BakeOptions& options) {
                 "--normal-error chooses an encoding; it is of no use with --normals " + options.normals);
   if (options.normal_error) config.normal_error_degrees = *options.normal_error;
   config.uvs = find_uv_encoding(options.uvs);
+  config.textures = options.textures != kNoTextures;
+  config.texture_codec = find_texture_codec(options.textures);
+  if (options.texture_psnr && options.textures != kAuto)
+    throw Error(ErrorKind::kUsage, "--texture-psnr chooses codecs; it is of no use without --textures auto");
+  if (options.texture_psnr) config.min_texture_psnr_db = *options.texture_psnr;
   config.codec = find_page_codec(options.codec).value(); // the option's check knows the names
   config.validate();
   return config;
@@ -99,7 +106,7 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   Progress progress(display.observer());
 
   const Stopwatch importing;
-  const ImportResult imported = import_for_command(options.input, options.scene, globals, progress, display);
+  const ImportResult imported = import_for_command(options.input, options.scene, globals, progress, display, config.textures);
   const double import_s = importing.seconds();
 
   Diagnostics diagnostics;
@@ -173,6 +180,17 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
                                    std::string(kUvEncodingNames[static_cast<size_t>(UvEncoding::kFp16)])}))
       ->default_str(kAuto)
       ->group("Texture coordinates");
+  std::vector<std::string> texture_codecs{kNoTextures, kAuto};
+  texture_codecs.insert(texture_codecs.end(), kTextureCodecNames.begin(), kTextureCodecNames.end());
+  verb.add_option("--textures", options->textures,
+                  "Textures of materials: none leaves their average; auto takes for each the smallest codec that "
+                  "--texture-psnr allows")
+      ->check(CLI::IsMember(texture_codecs))
+      ->default_str(kNoTextures)
+      ->group("Textures");
+  verb.add_option("--texture-psnr", options->texture_psnr, "What auto keeps, 10..100 dB of sRGB values (default 34)")
+      ->type_name("DB")
+      ->group("Textures");
   verb.add_option(
           "--codec", options->codec,
           "Form on disk: none is mapped and traced as it is; fast and small are smaller, and decoded when opened")

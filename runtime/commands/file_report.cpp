@@ -11,7 +11,7 @@ namespace {
 
 using Row = std::pair<const char*, uint64_t>;
 
-std::array<Row, 14> stream_rows(const StreamBytes& bytes) {
+std::array<Row, 15> stream_rows(const StreamBytes& bytes) {
   return {{{"indices", bytes.indices},
            {"positions", bytes.positions},
            {"normals", bytes.normals},
@@ -22,6 +22,7 @@ std::array<Row, 14> stream_rows(const StreamBytes& bytes) {
            {"instance_records", bytes.instance_records},
            {"material_records", bytes.material_records},
            {"masks", bytes.masks},
+           {"textures", bytes.textures},
            {"cameras", bytes.cameras},
            {"strings", bytes.strings},
            {"header_and_alignment", bytes.header_and_alignment},
@@ -82,6 +83,14 @@ nlohmann::json to_json(const FileSummary& s) {
                    {"vertices", use.vertices},
                    {"max_error", use.max_error},
                    {"max_error_texels", use.max_error_texels}});
+  nlohmann::json textures = nlohmann::json::array();
+  for (const TextureUse& use : s.textures)
+    textures.push_back({{"name", use.name},
+                        {"width", use.width},
+                        {"height", use.height},
+                        {"codec", kTextureCodecNames[static_cast<size_t>(use.codec)]},
+                        {"bytes", use.bytes},
+                        {"psnr_db", use.psnr_db}});
   return {
       {"triangles", s.triangles},
       {"placed_triangles", s.placed_triangles},
@@ -101,6 +110,7 @@ nlohmann::json to_json(const FileSummary& s) {
       {"grids", grids},
       {"normals", normals},
       {"uvs", uvs},
+      {"textures", textures},
       {"max_position_error", s.max_position_error},
       {"max_position_error_bound", s.max_position_error_bound},
       {"max_normal_error_degrees", s.max_normal_error_degrees},
@@ -147,6 +157,10 @@ std::string to_text(const FileSummary& s) {
                         kUvEncodingNames[static_cast<size_t>(use.encoding)], use.geometries, use.vertices,
                         use.max_error, use.max_error_texels);
   if (!s.normals.empty() || !s.uvs.empty()) text += "\n";
+  for (const TextureUse& use : s.textures)
+    text += fmt::format(grouped(), "texture {}: {:L} x {:L}, {}, {:L} bytes, PSNR {:.2f} dB\n", use.name, use.width,
+                        use.height, kTextureCodecNames[static_cast<size_t>(use.codec)], use.bytes, use.psnr_db);
+  if (!s.textures.empty()) text += "\n";
   text += fmt::format("{:<22}{:>14}{:>16}\n", "stream", "bytes", "per triangle");
   for (const auto& [name, bytes] : stream_rows(s.bytes))
     if (bytes > 0)
