@@ -334,13 +334,16 @@ std::optional<AlbedoTexture> TextureGraph::albedo_texture(Node node) {
   } else {
     texture.uv_scale = 0.5f * board->mapping.scale, texture.uv_offset = 0.5f * board->mapping.offset;
   }
-  constexpr size_t kMostNodes = 64; // per texel
-  if (order.size() > kMostNodes || uint64_t{texture.width} * texture.height > kMostTextureTexels) return std::nullopt;
+  const uint64_t texels = uint64_t{texture.width} * texture.height;
+  constexpr size_t kMostNodes = 64;                        // per texel
+  constexpr uint64_t kMostEvaluations = uint64_t{1} << 28; // seconds, where nodes and texels multiply to minutes
+  if (order.size() > kMostNodes || texels > kMostTextureTexels || texels > kMostEvaluations / order.size())
+    return std::nullopt;
   if (order.size() == 1 && nodes_[node].value == Vec3(1.0f)) {
     texture.rgb = images_[layout->a].summary.rgb;
     return texture;
   }
-  texture.rgb.resize(static_cast<size_t>(texture.width) * texture.height * 3);
+  texture.rgb.resize(static_cast<size_t>(texels) * 3);
   uint8_t* to = texture.rgb.data();
   rasterize<Vec3>(
       order, texture, [&](Node n, glm::dvec2 uv, std::span<const Vec3> operands) { return colour(n, uv, operands); },

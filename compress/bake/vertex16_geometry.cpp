@@ -8,6 +8,7 @@
 #include <string>
 
 #include "compress/bake/weld_table.h"
+#include "compress/format/tangent_codec.h"
 #include "compress/format/vertex16_fields.h"
 #include "pbrt_import/scene/error.h"
 
@@ -35,13 +36,6 @@ struct SourceVertex {
 
 double angle_degrees(DVec3 a, DVec3 b) {
   return 2.0 * std::asin(std::min(0.5 * glm::length(a - b), 1.0)) * kDegreesPerRadian;
-}
-
-/// Of the place t in 0 .. 4 on the square |x| + |y| = 1; 64 codes a side.
-uint32_t diamond_code(double x, double y) {
-  const double along = x / (std::abs(x) + std::abs(y));
-  const double t = y >= 0.0 ? 1.0 - along : 3.0 + along;
-  return static_cast<uint32_t>(std::lrint(t * 64.0)) & 255u;
 }
 
 /// Whether moving texture coordinates by a whole number looks up the same texels.
@@ -124,25 +118,24 @@ private:
 
   void add_triangle(const ClusterView& view, const Triangle& t,
                     const std::array<SourceVertex, kMaxClusterVertices>& vertices, bool tangents) {
-    DVec3 tangent(0.0), cross(0.0);
-    double area_uv = 0.0;
+    UvTangent from_uv;
+    DVec3 cross(0.0);
     if (tangents) {
-      const DVec3 p0 = decoded(vertices[t.x].position), e1 = decoded(vertices[t.y].position) - p0,
-                  e2 = decoded(vertices[t.z].position) - p0;
-      const glm::dvec2 uv0(vertices[t.x].uv), d1 = glm::dvec2(vertices[t.y].uv) - uv0,
-                                              d2 = glm::dvec2(vertices[t.z].uv) - uv0;
-      cross = glm::cross(e1, e2);
-      area_uv = d1.x * d2.y - d2.x * d1.y;
-      tangent = (e1 * d2.y - e2 * d1.y) * (area_uv < 0.0 ? -1.0 : 1.0);
-      const double length = glm::length(tangent);
-      tangent = length > 0.0 && area_uv != 0.0 ? tangent * (glm::length(cross) / length) : DVec3(0.0);
+      std::array<DVec3, 3> positions;
+      std::array<glm::dvec2, 3> uvs;
+      for (int corner = 0; corner < 3; ++corner) {
+        positions[static_cast<size_t>(corner)] = decoded(vertices[t[corner]].position);
+        uvs[static_cast<size_t>(corner)] = glm::dvec2(vertices[t[corner]].uv);
+      }
+      from_uv = uv_tangent(positions, uvs);
+      cross = glm::cross(positions[1] - positions[0], positions[2] - positions[0]);
     }
     for (int corner = 0; corner < 3; ++corner) {
       SourceVertex vertex = vertices[t[corner]];
       if (tangents)
-        vertex.mirrored = glm::dot(DVec3(view.normal(t[corner])), cross) * (area_uv < 0.0 ? -1.0 : 1.0) < 0.0 ? 1 : 0;
+        vertex.mirrored = (glm::dot(DVec3(view.normal(t[corner])), cross) < 0.0) != from_uv.mirrored ? 1 : 0;
       const uint32_t number = weld(vertex);
-      tangents_[number] += tangent;
+      tangents_[number] += from_uv.tangent * from_uv.area;
       has_tangent_[number] = static_cast<uint8_t>(has_tangent_[number] | (tangents ? 1 : 0));
       out_.indices.push_back(number);
     }
@@ -228,9 +221,10 @@ private:
           frame.uv_origin[axis]);
     const DVec3 normal(decode_normal(NormalEncoding::kAxis24, source.normal));
     const DVec3 tangent = has_tangent_[v] != 0 ? tangent_of(v, normal) : DVec3(0.0);
-    const uint32_t angle = has_tangent_[v] != 0 ? diamond_code(glm::dot(tangent, DVec3(basis_x(normal))),
-                                                               glm::dot(tangent, DVec3(basis_y(normal))))
-                                                : 0;
+    const uint32_t angle =
+        has_tangent_[v] != 0
+            ? encode_diamond({glm::dot(tangent, DVec3(basis_x(normal))), glm::dot(tangent, DVec3(basis_y(normal)))}, 8)
+            : 0;
     const glm::uvec4 packed = vertex16::vertex16_pack(position[0], position[1], position[2], source.mirrored,
                                                       source.normal, angle, uv[0], uv[1]);
     measure(v, packed, tangent);

@@ -287,5 +287,35 @@ TEST(CommandLine, CompareBeyondALimitExitsWithFive) {
             5);
 }
 
+TEST(CommandLine, TexturesOfTheFileLookLikeThoseOfTheScene) {
+  const TemporaryDirectory directory;
+  const std::string scene = PACKTRACE_SOURCE_DIR "/assets/textured/textured.pbrt", baked = directory / "t.ptk";
+  const auto render = [&](const std::string& from, const std::string& to) {
+    return run_packtrace({"render", from, "-o", to, "--aov", "albedo", "--frames", "1", "--size", "160x90", "--force"})
+        .exit_code;
+  };
+  const auto compare = [&](const char* psnr) {
+    return run_packtrace(
+               {"compare", directory / "t.exr", directory / "truth.exr", "--layer", "albedo", "--min-psnr", psnr})
+        .exit_code;
+  };
+  ASSERT_EQ(render(scene, directory / "truth.exr"), 0);
+  ASSERT_EQ(run_packtrace({"bake", scene, "-o", baked, "-q"}).exit_code, 0);
+  ASSERT_EQ(render(baked, directory / "t.exr"), 0);
+  EXPECT_EQ(compare("30"), 5) << "averages are no textures";
+  ASSERT_EQ(run_packtrace({"bake", scene, "-o", baked, "-q", "--force", "--textures", "auto"}).exit_code, 0);
+  ASSERT_EQ(render(baked, directory / "t.exr"), 0);
+  EXPECT_EQ(compare("38"), 0);
+  const CommandResult info = run_packtrace({"info", baked});
+  EXPECT_NE(info.out.find("texture bricks: 128 x 128, bc1, 8,192 bytes, PSNR 41."), std::string::npos) << info.out;
+  const CommandResult exported = run_packtrace({"export", baked, "-o", directory / "t.v16", "--layout", "vertex16"});
+  EXPECT_EQ(exported.exit_code, 0) << exported.err;
+  EXPECT_NE(exported.out.find("9,816 triangles in 5 draws of 5 geometries"), std::string::npos) << exported.out;
+  EXPECT_EQ(run_packtrace({"export", baked, "-o", directory / "t.v16"}).exit_code, 6) << "it is there already";
+  EXPECT_EQ(run_packtrace({"export", directory / "t.v16", "-o", directory / "u.v16"}).exit_code, 3);
+  EXPECT_EQ(run_packtrace({"export", baked, "-o", directory / "u.v16", "--layout", "obj"}).exit_code, 2);
+  EXPECT_EQ(run_packtrace({"bake", scene, "-o", baked, "--force", "--texture-psnr", "40"}).exit_code, 2);
+}
+
 } // namespace
 } // namespace packtrace::test

@@ -20,11 +20,14 @@ void bake_input(const std::filesystem::path& input, const std::filesystem::path&
   const std::string text(std::istreambuf_iterator<char>(in), {});
   fuzz::SceneFilesFolder files;
   ImportOptions options;
+  options.keep_textures = true;
   options.tessellation_tolerance = 0.1; // small files make small changes matter
   Diagnostics diagnostics;
   Progress progress;
   const ImportResult result = import_scene(files.write(text), options, diagnostics, progress);
-  write_file_bytes(folder / input.stem(), bake_to_bytes(result.scene, {}, diagnostics, progress).bytes);
+  BakeConfig config;
+  config.textures = true;
+  write_file_bytes(folder / input.stem(), bake_to_bytes(result.scene, config, diagnostics, progress).bytes);
 }
 
 } // namespace

@@ -61,11 +61,16 @@ CLUSTER = Record(
     ("payload_offset", "I"), ("first_triangle", "I"), ("first_vertex", "I"), ("material", "I"),
     ("anchor", "3i"), ("normal_anchor", "2h"), ("vertex_count", "H"), ("normal_palette", "H"),
     ("triangle_count", "B"), ("restart_count", "B"), ("position_bits", "3B"), ("normal_bits", "2B"), ("flags", "B"))
-MATERIAL = Record(("flags", "I"), ("albedo", "3f"), ("alpha_mask", "I"), ("shadow_alpha_mask", "I"), ("name", "2I"))
+MATERIAL = Record(
+    ("flags", "I"), ("albedo", "3f"), ("alpha_mask", "I"), ("shadow_alpha_mask", "I"),
+    ("albedo_texture", "I"), ("name", "2I"))
 INSTANCE = Record(("world_from_object", "12f"), ("geometry", "I"))
 MASK = Record(
     ("first_word", "Q"), ("width", "I"), ("height", "I"), ("wrap", "I"), ("reserved", "I"),
     ("uv_scale", "2f"), ("uv_offset", "2f"))
+TEXTURE = Record(
+    ("first_byte", "Q"), ("width", "I"), ("height", "I"), ("wrap", "I"), ("codec", "I"),
+    ("uv_scale", "2f"), ("uv_offset", "2f"), ("psnr_db", "f"), ("reserved", "I"), ("name", "2I"))
 CAMERA = Record(
     ("world_from_camera", "12d"), ("fov_degrees", "d"), ("screen_window", "4d"), ("projection", "I"),
     ("has_screen_window", "I"), ("width_px", "I"), ("height_px", "I"), ("film_name", "2I"))
@@ -78,7 +83,8 @@ SUMMARY = Record(
 # In the order of the section table; None: bytes.
 SECTIONS = (
     ("geometries", GEOMETRY), ("clusters", CLUSTER), ("payload", None), ("materials", MATERIAL),
-    ("instances", INSTANCE), ("masks", MASK), ("mask_words", Record(("word", "I"))), ("cameras", CAMERA),
+    ("instances", INSTANCE), ("masks", MASK), ("mask_words", Record(("word", "I"))), ("textures", TEXTURE),
+    ("texture_bytes", None), ("cameras", CAMERA),
     ("strings", None), ("summary", SUMMARY))
 
 

@@ -210,6 +210,35 @@ TEST(Vertex16Export, ChartsAreMovedToTheFirstTileWhereTexturesRepeat) {
   EXPECT_GE(uv_of_first().x, 500.0f);
 }
 
+TEST(Vertex16Export, TangentsPointAlongUWhereANormalMapNeedsThem) {
+  Scene scene = test::scene_of(test::grid_mesh(20, 0.2f, true));
+  Mesh mirrored = test::grid_mesh(20, 0.2f, true); // v as it was, u backwards
+  for (Vec2& uv : mirrored.uvs) uv.x = 1.0f - uv.x;
+  test::add_shape(scene, mirrored, test::translation({2, 0, 0}));
+  scene.materials[0].flags |= kNormalMap;
+  BakeConfig config;
+  config.textures = true; // keeps the texture coordinates
+  const BakedFile file = BakedFile::from_bytes(test::bake(scene, config).bytes);
+  const Vertex16Export exported = export_of(file);
+  EXPECT_GT(exported.report.max_tangent_error_degrees, 0.3);
+  EXPECT_LE(exported.report.max_tangent_error_degrees, 0.9);
+  const Sections s = vertex16::validate(exported.bytes, "test");
+  for (uint32_t g = 0; g < 2; ++g) {
+    uint32_t vertices = 0;
+    for (const DrawRecord& draw : s.draws)
+      if (draw.geometry == g && (draw.flags & vertex16::kDrawTangents) != 0)
+        for (uint32_t i = 0; i < draw.index_count; ++i, ++vertices) {
+          const glm::uvec4 v = s.vertices[s.vertex(draw, i)];
+          const glm::vec4 t = vertex16::vertex16_tangent(v, vertex16::vertex16_decode_normal(v));
+          EXPECT_GT(g == 0 ? t.x : -t.x, 0.4f); // steep in places, but never across
+          EXPECT_LT(std::abs(t.y), 0.6f);
+          EXPECT_EQ(t.w, g == 0 ? 1.0f : -1.0f);
+        }
+    EXPECT_GT(vertices, 1000u);
+  }
+  EXPECT_EQ(export_of(BakedFile::from_bytes(test::bake(scene).bytes)).report.max_tangent_error_degrees, 0.0);
+}
+
 TEST(Vertex16Export, BytesDoNotDependOnThreads) {
   const BakedFile file = BakedFile::from_bytes(test::bake(mixed_scene()).bytes);
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);

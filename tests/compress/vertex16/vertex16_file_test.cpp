@@ -6,6 +6,7 @@
 #include <xxhash.h>
 
 #include "compress/bake/vertex16_export.h"
+#include "compress/format/texture_codec.h"
 #include "pbrt_import/scene/error.h"
 #include "tests/compress/test_scenes.h"
 
@@ -20,10 +21,13 @@ std::vector<std::byte> small_file() {
   mask.width = 40, mask.height = 2;
   mask.words = {1, 2, 3, 4};
   scene.masks.push_back(mask);
-  scene.materials.push_back({"leaf", kAlphaMask, Vec3(0.1f, 0.5f, 0.2f), 0, kNoMask});
-  test::add_shape(scene, test::grid_mesh(2), test::translation({0, 0, 1}), 1);
+  scene.materials.push_back({"leaf", kAlphaMask | kAlbedoTexture | kNormalMap, Vec3(0.1f, 0.5f, 0.2f), 0, kNoMask, 0});
+  scene.textures.push_back({"t", 2, 2, WrapMode::kRepeat, Vec2(1), Vec2(0), std::vector<uint8_t>(12, 9)});
+  test::add_shape(scene, test::grid_mesh(2, 0.3f, true), test::translation({0, 0, 1}), 1);
+  BakeConfig config;
+  config.textures = true;
   Progress progress;
-  return export_vertex16(BakedFile::from_bytes(test::bake(scene).bytes), progress).bytes;
+  return export_vertex16(BakedFile::from_bytes(test::bake(scene, config).bytes), progress).bytes;
 }
 
 ErrorKind refusal(std::span<const std::byte> bytes) {
@@ -75,6 +79,8 @@ void read_all(const vertex16::Sections& s) {
     }
   for (const baked::MaskRecord& mask : s.masks)
     sum += static_cast<float>(s.mask_words[mask.first_word + (mask.width + 31) / 32 * mask.height - 1]);
+  for (const baked::TextureRecord& t : s.textures)
+    sum += s.texture_bytes[t.first_byte + texture_bytes(static_cast<TextureCodec>(t.codec), t.width, t.height) - 1];
   for (const vertex16::InstanceRecord& instance : s.instances)
     sum += static_cast<float>(s.geometries[instance.geometry].vertex_count);
   volatile float sink = sum;
