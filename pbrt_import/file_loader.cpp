@@ -50,7 +50,8 @@ FileLoader::Outcome FileLoader::read_image_file(ImageRequest& image) const {
   outcome.error = problem_of([&] {
     const std::vector<std::byte> bytes = read_whole_file(image.path, options_.memory_budget_bytes);
     outcome.bytes = bytes.size();
-    image.summary = read_image(bytes, image.decode_srgb, image.want_mask, options_.memory_budget_bytes);
+    image.summary =
+        read_image(bytes, image.decode_srgb, {image.want_mask, image.want_colours}, options_.memory_budget_bytes);
   });
   image.missing = !outcome.error.empty();
   return outcome;

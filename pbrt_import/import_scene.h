@@ -20,6 +20,7 @@ struct ImportOptions {
   uint32_t max_nesting = 1u << 16;              ///< open Attribute, Transform and Object blocks
   double tessellation_tolerance = 1e-3;         ///< relative to the curved shape's radius, within [1e-6, 0.5]
   bool allow_files_outside_scene_folder = true; ///< exporters write "../textures/x.png"
+  bool keep_textures = false;                   ///< fill Scene::textures; else materials have averages only
   uint32_t world = 1;                           ///< which WorldBegin ... WorldEnd with its options, from 1
   std::optional<double> time;                   ///< when to look at what moves; none: as the camera's shutter opens
 };

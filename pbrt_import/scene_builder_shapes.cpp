@@ -81,8 +81,8 @@ bool SceneBuilder::make_mesh(Directive& directive, Shape& shape) {
 bool SceneBuilder::make_ply_mesh(const Directive& directive, Shape& shape) {
   const Parameter* const file = directive.parameters.find("filename", {ParameterType::kString});
   if (!file || file->strings.size() != 1) {
-    reporter_.error(directive.place, file ? "plymesh takes one file name, found " + std::to_string(file->strings.size()) +
-                                                "; the shape is skipped"
+    reporter_.error(directive.place, file ? "plymesh takes one file name, found " +
+                                                std::to_string(file->strings.size()) + "; the shape is skipped"
                                           : "plymesh without a \"string filename\"; the shape is skipped");
     return false;
   }
@@ -194,8 +194,8 @@ void SceneBuilder::drop_unusable_shapes(const std::vector<uint32_t>& material_nu
 /// Counts what the finished scene has and its text could not tell.
 void SceneBuilder::count_features() {
   const auto count = [](const auto& things) {
-    return static_cast<uint64_t>(std::count_if(things.begin(), things.end(),
-                                               [](const auto& thing) { return thing.animation != kNotAnimated; }));
+    return static_cast<uint64_t>(
+        std::count_if(things.begin(), things.end(), [](const auto& thing) { return thing.animation != kNotAnimated; }));
   };
   statistics_.animated_shapes = count(scene_.shapes);
   for (const Object& object : scene_.objects) statistics_.animated_shapes += count(object.shapes);
@@ -224,12 +224,12 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
                    "object " + in_quotes(scene_.objects[object].name) + " is never instanced; it is left out");
   });
   for_each_shape(scene_, [&](const Shape& shape) { loader_.require(shape.mesh); });
-  materials_.require_images();
+  materials_.require_images(options_.keep_textures);
   loader_.load(scene_.meshes, graph_.images(), progress, statistics_, scene_.dropped_triangles);
   reporter_.set_sequence(last_sequence);
   for (const ImageRequest& image : graph_.images())
     ++(image.missing ? statistics_.textures_missing : statistics_.textures_found);
-  const std::vector<uint32_t> material_numbers = materials_.resolve(scene_.materials, scene_.masks, reporter_);
+  const std::vector<uint32_t> material_numbers = materials_.resolve(scene_, options_.memory_budget_bytes, reporter_);
   drop_unusable_shapes(material_numbers, scene_.shapes);
   for (Object& object : scene_.objects) drop_unusable_shapes(material_numbers, object.shapes);
   if (const uint64_t absent = statistics_.shapes_absent; absent > 0)

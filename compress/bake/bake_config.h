@@ -6,6 +6,8 @@
 #include "compress/format/baked_format.h"
 #include "compress/format/normal_codec.h"
 #include "compress/format/page_codec.h"
+#include "compress/format/texture_codec.h"
+#include "compress/format/uv_codec.h"
 
 namespace packtrace {
 
@@ -43,6 +45,16 @@ struct BakeConfig {
   bool keep_uvs = false;     ///< of every mesh that has them
 
   bool strict = false; ///< fail where something would be left out for leaving the range of floats
+
+  /// Of every geometry; without one the lattice, whose step follows from the size of the textures looked up.
+  std::optional<UvEncoding> uvs;
+
+  /// Whether textures of materials are stored; for purpose kShading only.
+  bool textures = false;
+  /// Of every texture; without one, the smallest for each whose PSNR is at least min_texture_psnr_db.
+  std::optional<TextureCodec> texture_codec;
+  /// Of sRGB-encoded values. 10 .. 100; without meaning where a codec is given.
+  double min_texture_psnr_db = 34.0;
 
   /// How the file lies on disk. Changes nothing that is decoded from it.
   PageCodec codec = PageCodec::kNone;

@@ -38,6 +38,7 @@ public:
     measure();
     choose_grids();
     place_instances();
+    encode_textures();
     pack();
     BakedScene result;
     result.bytes = assemble();
@@ -63,7 +64,7 @@ private:
 
   std::vector<std::byte> assemble() {
     progress_.begin("assembling the file", 0);
-    FileSections sections(scene_);
+    FileSections sections(scene_, textures_);
     RequirementTable requirements;
     for (size_t i = 0; i < packed_.size(); ++i) {
       packed_[i].record.requirements = requirements.add(scene_, plan_.geometries[i], packed_[i].needs, packed_[i].stats,
@@ -213,6 +214,21 @@ private:
     return transform_bounds(DAffine(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]), box);
   }
 
+  void encode_textures() {
+    if (!config_.textures) return;
+    progress_.begin("encoding textures", scene_.textures.size());
+    textures_.resize(scene_.textures.size());
+    for (const AlbedoTexture& texture : scene_.textures)
+      if (texture.width == 0 || texture.height == 0 ||
+          texture.rgb.size() != uint64_t{3} * texture.width * texture.height)
+        throw Error(ErrorKind::kInput, "invalid scene: the size of texture " + texture.name);
+    tbb::parallel_for(size_t{0}, textures_.size(), [&](size_t i) {
+      progress_.check_cancelled();
+      textures_[i] = encode_texture(scene_.textures[i], config_.texture_codec, config_.min_texture_psnr_db);
+      progress_.advance();
+    });
+  }
+
   void pack() {
     uint64_t triangles = 0;
     for (const GeometryPlan& plan : plan_.geometries)
@@ -254,6 +270,7 @@ private:
     record.step_exponent = q.grid.exponent;
     record.anchor_shift = q.anchor_shift;
     record.uv_exponent = q.uv_exponent;
+    record.uv_encoding = static_cast<uint32_t>(q.uv_encoding);
     record.normal_encoding = static_cast<uint32_t>(q.normal_encoding);
     record.max_normal_error_degrees = static_cast<float>(q.stats.max_normal_error_degrees);
     record.mean_normal_error_degrees = static_cast<float>(mean_normal_error(q.stats));
@@ -280,6 +297,7 @@ private:
   /// Everything the report says of the scene as a whole.
   void add_up() {
     QuantizeStats all;
+    uint64_t coarse_uvs = 0;
     for (const Packed& p : packed_) {
       const QuantizeStats& s = p.stats;
       report_.source_vertices += s.source_vertices;
@@ -292,6 +310,8 @@ private:
       all.normal_count += s.normal_count;
       all.repaired_normals += s.repaired_normals;
       all.replaced_uvs += s.replaced_uvs;
+      coarse_uvs += s.max_uv_error_texels > 0.5;
+      report_.max_uv_error_texels = std::max(report_.max_uv_error_texels, s.max_uv_error_texels);
     }
     report_.mean_normal_error_degrees = mean_normal_error(all);
     report_.source_triangles = unique_triangle_count(scene_);
@@ -304,6 +324,9 @@ private:
       warn(std::to_string(all.repaired_normals) + " normals have no direction; face normals took their place");
     if (all.replaced_uvs > 0)
       warn(std::to_string(all.replaced_uvs) + " texture coordinates are not finite; (0, 0) took their place");
+    if (coarse_uvs > 0)
+      warn("texture coordinates of " + std::to_string(coarse_uvs) + " geometries are up to " +
+           brief(report_.max_uv_error_texels) + " texels off; without an encoding of your own they stay within 1/32");
     if (report_.collapsed_triangles > 0)
       warn(std::to_string(report_.collapsed_triangles) +
            " triangles are smaller than the grid's step and have no area");
@@ -350,6 +373,7 @@ private:
   PositionGrid world_grid_;
   std::vector<PositionGrid> grids_;
   std::vector<Packed> packed_;
+  std::vector<EncodedTexture> textures_; // as in the scene; empty where they are not kept
   BakeReport report_;
 };
 

@@ -34,6 +34,7 @@ struct BakeReport {
   double max_position_error = 0.0; ///< measured against the source, largest axis, object units
   double max_normal_error_degrees = 0.0, mean_normal_error_degrees = 0.0;
   double max_uv_error = 0.0;
+  double max_uv_error_texels = 0.0;  ///< of the finest texture that the same geometry looks up
   std::vector<std::string> warnings; ///< also in the diagnostics
 };
 

@@ -80,6 +80,7 @@ public:
     frame_.step_mantissa = geometry.grid.mantissa;
     frame_.step_exponent = geometry.grid.exponent;
     frame_.anchor_shift = geometry.anchor_shift;
+    frame_.uv_encoding = static_cast<uint32_t>(geometry.uv_encoding);
     frame_.uv_exponent = geometry.uv_exponent;
     frame_.normal_encoding = static_cast<uint32_t>(geometry.normal_encoding);
   }
@@ -170,10 +171,7 @@ private:
     if (view.lattice(local) != geometry_.positions[v.position]) return false;
     if (view.has_normals() == kind_.flat || view.has_uvs() != kind_.uvs) return false;
     if (!kind_.flat && view.normal_code(local) != v.normal_code) return false;
-    const auto decoded = [&](size_t axis) {
-      return from_uv_lattice(v.uv[axis], std::ldexp(1.0f, geometry_.uv_exponent[axis]));
-    };
-    return !kind_.uvs || view.uv(local) == Vec2(decoded(0), decoded(1));
+    return !kind_.uvs || view.uv_code(local) == std::array<int64_t, 2>{v.uv[0], v.uv[1]};
   }
 
   /// Decodes a cluster, compares it with what went in, and adds to the totals.

@@ -71,8 +71,9 @@ public:
       : scene_(scene), plan_(plan), needs_(needs), config_(config), step_(grid.step()),
         position_table_(count_vertices()), vertex_table_(2 * count_vertices()) {
     out_.grid = grid;
-    out_.uv_exponent = needs.uv_exponent;
     out_.slot_class = plan.slot_class;
+    out_.uv_encoding = config.uvs.value_or(UvEncoding::kLattice);
+    if (out_.uv_encoding == UvEncoding::kLattice) out_.uv_exponent = needs.uv_exponent;
   }
 
   QuantizedGeometry run(double max_abs, DVec3 lowest, DVec3 highest) {
@@ -288,15 +289,22 @@ private:
     for (size_t i = 0; i < work.uvs.size(); ++i) {
       const bool finite = std::isfinite(mesh.uvs[i].x) && std::isfinite(mesh.uvs[i].y);
       out_.stats.replaced_uvs += !finite;
-      for (int axis = 0; axis < 2 && finite; ++axis) {
-        const int32_t exponent = out_.uv_exponent[static_cast<size_t>(axis)];
-        const int32_t q = to_uv_lattice(mesh.uvs[i][axis], exponent);
-        work.uvs[i][static_cast<size_t>(axis)] = q;
-        const double decoded = from_uv_lattice(q, std::ldexp(1.0f, exponent));
-        out_.stats.max_uv_error =
-            std::max(out_.stats.max_uv_error, std::abs(decoded - static_cast<double>(mesh.uvs[i][axis])));
-      }
+      for (size_t axis = 0; axis < 2 && finite; ++axis)
+        work.uvs[i][axis] = quantize_uv(mesh, axis, mesh.uvs[i][static_cast<int>(axis)]);
     }
+  }
+
+  int32_t quantize_uv(const Mesh& mesh, size_t axis, float uv) {
+    const std::optional<int32_t> code = encode_uv(out_.uv_encoding, uv, out_.uv_exponent[axis]);
+    if (!code)
+      throw Error(ErrorKind::kLimitExceeded, mesh.name + ": texture coordinate " + brief(uv) + " is beyond what " +
+                                                 std::string(kUvEncodingNames[static_cast<size_t>(out_.uv_encoding)]) +
+                                                 " holds");
+    const double decoded = UvDecoder(out_.uv_encoding, out_.uv_exponent[axis])(*code);
+    const double error = std::abs(decoded - static_cast<double>(uv));
+    out_.stats.max_uv_error = std::max(out_.stats.max_uv_error, error);
+    out_.stats.max_uv_error_texels = std::max(out_.stats.max_uv_error_texels, error * needs_.texels_per_uv[axis]);
+    return *code;
   }
 
   uint32_t weld_position(const LatticePoint& p) {

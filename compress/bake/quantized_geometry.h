@@ -39,15 +39,17 @@ struct QuantizeStats {
   uint64_t replaced_uvs = 0;        ///< were not finite
   double max_position_error = 0.0;  ///< largest axis
   double max_normal_error_degrees = 0.0;
-  double normal_error_sum = 0.0; ///< degrees
-  uint64_t normal_count = 0;     ///< in normal_error_sum
-  double max_uv_error = 0.0;
+  double normal_error_sum = 0.0;    ///< degrees
+  uint64_t normal_count = 0;        ///< in normal_error_sum
+  double max_uv_error = 0.0;        ///< larger axis
+  double max_uv_error_texels = 0.0; ///< of the finest texture that is looked up
 };
 
 /// One geometry on its lattice: welded, wound for the file, in the order of its parts.
 struct QuantizedGeometry {
   PositionGrid grid;
   NormalEncoding normal_encoding = NormalEncoding::kAxis16;
+  UvEncoding uv_encoding = UvEncoding::kLattice;
   std::array<int32_t, 2> uv_exponent{};
   LatticePoint origin{};     ///< smallest coordinates
   uint32_t anchor_shift = 0; ///< so that extents >> anchor_shift fit int32_t
@@ -62,7 +64,8 @@ struct QuantizedGeometry {
 };
 
 /// Throws Error(kLimitExceeded) where the lattice is too large for its limit, or a measured error exceeds
-/// position_error_bound() or config.max_normal_error_degrees(); Error(kInput) for normals that are not finite.
+/// position_error_bound() or config.max_normal_error_degrees(), or a texture coordinate is beyond config.uvs;
+/// Error(kInput) for normals that are not finite.
 QuantizedGeometry quantize_geometry(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs,
                                     const BakeConfig& config, const PositionGrid& grid, double max_abs, DVec3 lowest,
                                     DVec3 highest);

@@ -24,72 +24,96 @@ struct LookUp {
   Vec2 uv_scale{1.0f};
 };
 
+/// Of textures that are not read.
+constexpr LookUp kAssumedLookUp{{kAssumedTexels, kAssumedTexels}, Vec2(1.0f)};
+
+/// What the materials of one slot ask for together.
+struct SlotNeeds {
+  MaterialFlags flags = 0;
+  bool textured = false; ///< shading looks up a texture of its colour
+  std::vector<LookUp> look_ups;
+};
+
 class Analysis {
 public:
   Analysis(const Scene& scene, const ScenePlan& scene_plan, const GeometryPlan& plan, const BakeConfig& config)
-      : scene_(scene), plan_(plan), config_(config), slot_flags_(plan.slot_class.size()) {
+      : scene_(scene), plan_(plan), config_(config), slots_(plan.slot_class.size()) {
     for (const uint32_t run : plan.material_runs)
-      for (size_t slot = 0; slot < slot_flags_.size(); ++slot) {
-        const Material& material = scene.materials[scene_plan.material_slots[run + slot]];
-        slot_flags_[slot] |= material.flags;
-        if ((material.flags & kAlphaMask) != 0) add_mask(material, material.alpha_mask);
-        if ((material.flags & kShadowAlphaMask) != 0) add_mask(material, material.shadow_alpha_mask);
-      }
+      for (size_t slot = 0; slot < slots_.size(); ++slot)
+        add_material(slots_[slot], scene.materials[scene_plan.material_slots[run + slot]]);
   }
 
   GeometryNeeds run() {
     GeometryNeeds needs;
     Vec2 largest(0.0f);
+    std::vector<LookUp> look_ups;
     for (const GeometryPart& part : plan_.parts) {
       const Mesh& mesh = scene_.meshes[part.mesh];
-      needs.parts.push_back(mesh.triangles.empty() ? PartNeeds{} : needs_of(mesh, slot_flags_[part.slot]));
+      const SlotNeeds& slot = slots_[part.slot];
+      needs.parts.push_back(mesh.triangles.empty() ? PartNeeds{} : needs_of(mesh, slot));
       const PartNeeds& part_needs = needs.parts.back();
       if (!part_needs.store_uvs()) continue;
       largest = glm::max(largest, max_abs_uv(mesh));
-      if (part_needs.uvs != baked::kForMask) look_ups_.push_back({{kAssumedTexels, kAssumedTexels}, Vec2(1.0f)});
+      look_ups.insert(look_ups.end(), slot.look_ups.begin(), slot.look_ups.end());
+      if (part_needs.uvs == baked::kOnRequest) look_ups.push_back(kAssumedLookUp);
     }
-    const bool any =
-        std::any_of(needs.parts.begin(), needs.parts.end(), [](const PartNeeds& p) { return p.store_uvs(); });
-    for (size_t i = 0; any && i < look_ups_.size(); ++i)
+    for (size_t i = 0; i < look_ups.size(); ++i)
       for (int axis = 0; axis < 2; ++axis) {
         const auto a = static_cast<size_t>(axis);
-        const int32_t exponent = choose_uv_exponent(look_ups_[i].size[a], look_ups_[i].uv_scale[axis], largest[axis]);
+        const float scale = look_ups[i].uv_scale[axis];
+        const int32_t exponent = choose_uv_exponent(look_ups[i].size[a], scale, largest[axis]);
         needs.uv_exponent[a] = i == 0 ? exponent : std::min(needs.uv_exponent[a], exponent);
+        needs.texels_per_uv[a] = std::max(needs.texels_per_uv[a], std::abs(double{scale}) * look_ups[i].size[a]);
       }
     return needs;
   }
 
 private:
-  void add_mask(const Material& material, uint32_t mask) {
-    if (mask >= scene_.masks.size())
-      throw Error(ErrorKind::kInput, "invalid scene: an alpha mask of material " + material.name + " does not exist");
-    look_ups_.push_back({{scene_.masks[mask].width, scene_.masks[mask].height}, scene_.masks[mask].uv_scale});
+  bool shading() const { return config_.purpose == baked::kShading; }
+
+  void add_material(SlotNeeds& slot, const Material& material) const {
+    slot.flags |= material.flags;
+    const auto add = [&](const auto& all, uint32_t number, const char* what) {
+      if (number >= all.size())
+        throw Error(ErrorKind::kInput,
+                    std::string("invalid scene: ") + what + " of material " + material.name + " does not exist");
+      slot.look_ups.push_back({{all[number].width, all[number].height}, all[number].uv_scale});
+    };
+    if ((material.flags & kAlphaMask) != 0) add(scene_.masks, material.alpha_mask, "an alpha mask");
+    if ((material.flags & kShadowAlphaMask) != 0) add(scene_.masks, material.shadow_alpha_mask, "an alpha mask");
+    if (!shading()) return;
+    if (config_.textures && material.albedo_texture != kNoTexture) {
+      add(scene_.textures, material.albedo_texture, "the texture");
+      slot.textured = true;
+    } else if (!config_.textures && (material.flags & kAlbedoTexture) != 0) {
+      slot.look_ups.push_back(kAssumedLookUp);
+      slot.textured = true;
+    }
+    if ((material.flags & kNormalMap) != 0) slot.look_ups.push_back(kAssumedLookUp);
   }
 
-  PartNeeds needs_of(const Mesh& mesh, MaterialFlags flags) const {
-    const bool shading = config_.purpose == baked::kShading;
+  PartNeeds needs_of(const Mesh& mesh, const SlotNeeds& slot) const {
     PartNeeds needs;
     if (!mesh.normals.empty())
-      needs.normals = config_.keep_normals    ? baked::kOnRequest
-                      : camera_visible(flags) ? baked::kForShading
-                                              : baked::kUnused;
-    if (needs_mask(flags)) // also without uvs in the source: (0, 0) is looked up then
+      needs.normals = config_.keep_normals         ? baked::kOnRequest
+                      : camera_visible(slot.flags) ? baked::kForShading
+                                                   : baked::kUnused;
+    if (needs_mask(slot.flags)) // also without uvs in the source: (0, 0) is looked up then
       needs.uvs = baked::kForMask;
     else if (!mesh.uvs.empty())
-      needs.uvs = config_.keep_uvs                           ? baked::kOnRequest
-                  : shading && (flags & kAlbedoTexture) != 0 ? baked::kForTexture
-                  : shading && (flags & kNormalMap) != 0     ? baked::kForNormalMap
-                                                             : baked::kUnused;
-    if ((flags & kNormalMap) != 0 && !mesh.uvs.empty())
-      needs.tangents = shading ? baked::kForNormalMap : baked::kUnused;
+      needs.uvs = config_.keep_uvs                              ? baked::kOnRequest
+                  : slot.textured                               ? baked::kForTexture
+                  : shading() && (slot.flags & kNormalMap) != 0 ? baked::kForNormalMap
+                                                                : baked::kUnused;
+    if ((slot.flags & kNormalMap) != 0 && !mesh.uvs.empty())
+      needs.tangents = shading() ? baked::kForNormalMap : baked::kUnused;
     return needs;
   }
 
   const Scene& scene_;
   const GeometryPlan& plan_;
   const BakeConfig& config_;
-  std::vector<MaterialFlags> slot_flags_; // of all materials of each slot
-  std::vector<LookUp> look_ups_;
+  std::vector<SlotNeeds> slots_;
 };
 
 } // namespace

@@ -25,6 +25,8 @@ enum Section : uint32_t {
   kInstances,
   kMasks,
   kMaskWords, ///< uint32_t, rows of all masks
+  kTextures,
+  kTextureBytes, ///< of all textures
   kCameras,
   kStrings,       ///< UTF-8 bytes, not terminated
   kSummary,       ///< one record
@@ -49,7 +51,7 @@ struct FileHeader {
   uint32_t section_count;
   uint32_t reserved;
   std::array<SectionRecord, kSectionCount> sections;
-  std::array<uint64_t, 5> padding;
+  std::array<uint64_t, 7> padding;
   uint64_t header_hash; ///< XXH3-64 of the header before this field
 };
 
@@ -75,9 +77,9 @@ struct GeometryRecord {
   uint32_t vertex_count; ///< sum over clusters
   uint32_t step_mantissa;
   int32_t step_exponent;
-  uint32_t anchor_shift; ///< cluster anchors count 2^anchor_shift steps
-  std::array<int32_t, 2> uv_exponent;
-  std::array<float, 3> bounds_lo; ///< of the decoded vertices; lo > hi where there are none
+  uint32_t anchor_shift;              ///< cluster anchors count 2^anchor_shift steps
+  std::array<int32_t, 2> uv_exponent; ///< 0 unless the encoding is the lattice
+  std::array<float, 3> bounds_lo;     ///< of the decoded vertices; lo > hi where there are none
   std::array<float, 3> bounds_hi;
   float max_normal_error_degrees;  ///< measured against the source
   float mean_normal_error_degrees; ///< of all its normals
@@ -86,9 +88,9 @@ struct GeometryRecord {
   std::array<uint32_t, 8> class_clusters; ///< clusters of each material class; sums to cluster_count
   StringRef name;
   uint32_t normal_encoding; ///< normal_codec.h, of all its clusters
-  uint32_t reserved;
-  uint32_t slot_count;   ///< of material slots, ordered by material_class(); 0 without clusters
-  uint32_t requirements; ///< requirement_bit()s: reasons that hold for some of its triangles
+  uint32_t uv_encoding;     ///< uv_codec.h, of all its clusters
+  uint32_t slot_count;      ///< of material slots, ordered by material_class(); 0 without clusters
+  uint32_t requirements;    ///< requirement_bit()s: reasons that hold for some of its triangles
 };
 
 // ClusterRecord::flags
@@ -122,6 +124,7 @@ struct MaterialRecord {
   std::array<float, 3> albedo;
   uint32_t alpha_mask;        ///< or kNone
   uint32_t shadow_alpha_mask; ///< or kNone
+  uint32_t albedo_texture;    ///< or kNone
   StringRef name;
 };
 
@@ -139,6 +142,19 @@ struct MaskRecord {
   uint32_t reserved;
   std::array<float, 2> uv_scale;
   std::array<float, 2> uv_offset;
+};
+
+struct TextureRecord {
+  uint64_t first_byte; ///< into the texture bytes
+  uint32_t width;
+  uint32_t height;
+  uint32_t wrap;  ///< 0 repeat, 1 black, 2 clamp
+  uint32_t codec; ///< texture_codec.h
+  std::array<float, 2> uv_scale;
+  std::array<float, 2> uv_offset;
+  float psnr_db; ///< measured; infinite where nothing was lost
+  uint32_t reserved;
+  StringRef name;
 };
 
 struct CameraRecord {
@@ -210,9 +226,9 @@ struct SummaryRecord {
 template <typename T>
 inline constexpr bool kIsPod = std::is_trivially_copyable_v<T>&& std::is_standard_layout_v<T>;
 
-static_assert(kIsPod<FileHeader> && sizeof(SectionRecord) == 24 && sizeof(FileHeader) == 384);
+static_assert(kIsPod<FileHeader> && sizeof(SectionRecord) == 24 && sizeof(FileHeader) == 448);
 static_assert(offsetof(FileHeader, content_hash) == 24 && offsetof(FileHeader, sections) == 48 &&
-              offsetof(FileHeader, padding) == 336 && offsetof(FileHeader, header_hash) == 376);
+              offsetof(FileHeader, padding) == 384 && offsetof(FileHeader, header_hash) == 440);
 static_assert(kIsPod<GeometryRecord> && sizeof(GeometryRecord) == 192 && alignof(GeometryRecord) == 8);
 static_assert(offsetof(GeometryRecord, origin) == 24 && offsetof(GeometryRecord, cluster_count) == 64 &&
               offsetof(GeometryRecord, bounds_lo) == 96 && offsetof(GeometryRecord, flags) == 132 &&
@@ -222,20 +238,32 @@ static_assert(kIsPod<ClusterRecord> && sizeof(ClusterRecord) == 44 && alignof(Cl
 static_assert(offsetof(ClusterRecord, anchor) == 16 && offsetof(ClusterRecord, normal_anchor) == 28 &&
               offsetof(ClusterRecord, vertex_count) == 32 && offsetof(ClusterRecord, triangle_count) == 36 &&
               offsetof(ClusterRecord, flags) == 43);
-static_assert(kIsPod<MaterialRecord> && sizeof(MaterialRecord) == 32 && offsetof(MaterialRecord, alpha_mask) == 16);
+static_assert(kIsPod<MaterialRecord> && sizeof(MaterialRecord) == 36 && offsetof(MaterialRecord, alpha_mask) == 16 &&
+              offsetof(MaterialRecord, name) == 28);
 static_assert(kIsPod<InstanceRecord> && sizeof(InstanceRecord) == 56 && offsetof(InstanceRecord, first_slot) == 52);
 static_assert(kIsPod<MaskRecord> && sizeof(MaskRecord) == 40 && offsetof(MaskRecord, uv_scale) == 24);
+static_assert(kIsPod<TextureRecord> && sizeof(TextureRecord) == 56 && offsetof(TextureRecord, uv_scale) == 24 &&
+              offsetof(TextureRecord, name) == 48);
 static_assert(kIsPod<CameraRecord> && sizeof(CameraRecord) == 160 && offsetof(CameraRecord, projection) == 136);
 static_assert(kIsPod<RequirementRecord> && sizeof(RequirementRecord) == 40);
 static_assert(kAllRequirements == 0xffffff);
 static_assert(kIsPod<SummaryRecord> && sizeof(SummaryRecord) == 160 && offsetof(SummaryRecord, stream_bits) == 120);
 
 /// sizeof the records of each section.
-inline constexpr std::array<uint32_t, kSectionCount> kRecordBytes = {
-    sizeof(GeometryRecord), sizeof(ClusterRecord),  1,
-    sizeof(MaterialRecord), sizeof(InstanceRecord), sizeof(MaskRecord),
-    sizeof(uint32_t),       sizeof(CameraRecord),   1,
-    sizeof(SummaryRecord),  sizeof(uint32_t),       sizeof(RequirementRecord)};
+inline constexpr std::array<uint32_t, kSectionCount> kRecordBytes = {sizeof(GeometryRecord),
+                                                                     sizeof(ClusterRecord),
+                                                                     1,
+                                                                     sizeof(MaterialRecord),
+                                                                     sizeof(InstanceRecord),
+                                                                     sizeof(MaskRecord),
+                                                                     sizeof(uint32_t),
+                                                                     sizeof(TextureRecord),
+                                                                     1,
+                                                                     sizeof(CameraRecord),
+                                                                     1,
+                                                                     sizeof(SummaryRecord),
+                                                                     sizeof(uint32_t),
+                                                                     sizeof(RequirementRecord)};
 
 inline constexpr uint32_t kMaskedClass = 4; ///< bit of a material class: a mask must be looked up
 

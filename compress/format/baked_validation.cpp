@@ -11,7 +11,7 @@
 namespace packtrace {
 namespace {
 
-static_assert(baked::kNone == kNoMask);
+static_assert(baked::kNone == kNoMask && baked::kNone == kNoTexture);
 
 /// Checks one file image. Every failure names the file, the section and the record.
 class Validator {
@@ -23,6 +23,7 @@ public:
     check_section_table();
     if (!zero_between_sections()) fail("nonzero bytes between sections");
     check_materials_and_masks();
+    check_textures();
     check_instances();
     check_geometries();
     check_cameras();
@@ -87,6 +88,8 @@ private:
                  section<baked::InstanceRecord>(baked::kInstances),
                  section<baked::MaskRecord>(baked::kMasks),
                  section<uint32_t>(baked::kMaskWords),
+                 section<baked::TextureRecord>(baked::kTextures),
+                 section<uint8_t>(baked::kTextureBytes),
                  section<baked::CameraRecord>(baked::kCameras),
                  section<char>(baked::kStrings),
                  section<baked::SummaryRecord>(baked::kSummary),
@@ -96,7 +99,7 @@ private:
     if (sections_.summary.size() != 1) fail("summary section must hold one record");
     if (sections_.geometries.size() >= baked::kNone || sections_.instances.size() >= baked::kNone ||
         sections_.materials.size() >= baked::kNone || sections_.masks.size() >= baked::kNone ||
-        sections_.material_slots.size() >= baked::kNone)
+        sections_.textures.size() >= baked::kNone || sections_.material_slots.size() >= baked::kNone)
       fail("too many records");
   }
 
@@ -130,6 +133,9 @@ private:
       if (!mask_ok((m.flags & kAlphaMask) != 0, m.alpha_mask) ||
           !mask_ok((m.flags & kShadowAlphaMask) != 0, m.shadow_alpha_mask))
         fail("material", i, "alpha mask");
+      const bool texture_ok = m.albedo_texture == baked::kNone ||
+                              ((m.flags & kAlbedoTexture) != 0 && m.albedo_texture < sections_.textures.size());
+      if (!texture_ok) fail("material", i, "albedo texture");
       if (!text_ok(m.name)) fail("material", i, "name");
     }
     for (size_t i = 0; i < sections_.masks.size(); ++i) {
@@ -140,6 +146,14 @@ private:
         fail("mask", i, "extent");
       for (const float f : {m.uv_scale[0], m.uv_scale[1], m.uv_offset[0], m.uv_offset[1]})
         if (!std::isfinite(f)) fail("mask", i, "texture transform");
+    }
+  }
+
+  void check_textures() {
+    for (size_t i = 0; i < sections_.textures.size(); ++i) {
+      const baked::TextureRecord& t = sections_.textures[i];
+      if (const auto fault = find_texture_fault(t, sections_.texture_bytes.size())) fail("texture", i, *fault);
+      if (!text_ok(t.name)) fail("texture", i, "name");
     }
   }
 
@@ -167,7 +181,10 @@ private:
         if (!(e >= 0.0f && std::isfinite(e))) fail("geometry", i, "normal or texture coordinate error");
       if (g.mean_normal_error_degrees > g.max_normal_error_degrees || g.max_normal_error_degrees > 180.0f)
         fail("geometry", i, "normal error");
-      if (g.normal_encoding >= kNormalFormats.size() || g.reserved != 0) fail("geometry", i, "normal encoding");
+      if (g.normal_encoding >= kNormalFormats.size()) fail("geometry", i, "normal encoding");
+      if (g.uv_encoding >= kUvEncodingNames.size() ||
+          (g.uv_encoding != static_cast<uint32_t>(UvEncoding::kLattice) && g.uv_exponent != std::array<int32_t, 2>{}))
+        fail("geometry", i, "texture coordinate encoding");
       if ((g.flags & ~baked::kGeometryFlags) != 0) fail("geometry", i, "flags");
       if ((g.requirements & ~baked::kAllRequirements) != 0) fail("geometry", i, "requirements");
       if (!text_ok(g.name)) fail("geometry", i, "name");

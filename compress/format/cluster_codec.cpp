@@ -11,7 +11,7 @@ namespace {
 
 constexpr uint32_t kUvAnchorBits = 32, kUvWidthBits = 5;
 constexpr uint32_t kUvHeaderBits = 2 * (kUvAnchorBits + kUvWidthBits);
-constexpr uint32_t kMaxUvBits = 26;     // -2^24 .. 2^24
+constexpr uint32_t kMaxUvBits = 31;     // -kMaxUvLattice .. kMaxUvLattice
 constexpr uint32_t kMaxNormalBits = 17; // three times the codes of axis32
 
 uint32_t uv_width(const uint8_t* bits, uint32_t uv_bit, uint32_t axis) {
@@ -65,7 +65,8 @@ ClusterView::ClusterView(const baked::GeometryRecord& geometry, const baked::Clu
       bits_(payload + uint64_t{4} * cluster.payload_offset), layout_{cluster.triangle_count, cluster.vertex_count,
                                                                      cluster.restart_count},
       step_(PositionGrid{geometry.step_mantissa, geometry.step_exponent}.step()),
-      uv_step_(exp2_exact(geometry.uv_exponent[0]), exp2_exact(geometry.uv_exponent[1])),
+      u_decoder_(static_cast<UvEncoding>(geometry.uv_encoding), geometry.uv_exponent[0]),
+      v_decoder_(static_cast<UvEncoding>(geometry.uv_encoding), geometry.uv_exponent[1]),
       normal_encoding_(static_cast<NormalEncoding>(geometry.normal_encoding)),
       normal_stride_(normal_stride(geometry, cluster)), position_stride_(position_stride(cluster)) {
   for (size_t axis = 0; axis < 3; ++axis)
@@ -109,13 +110,17 @@ NormalFields ClusterView::normal_fields(uint32_t vertex) const {
 
 Vec3 ClusterView::normal(uint32_t vertex) const { return decode_normal(normal_encoding_, normal_fields(vertex)); }
 
-Vec2 ClusterView::uv(uint32_t vertex) const {
+std::array<int64_t, 2> ClusterView::uv_code(uint32_t vertex) const {
   assert(has_uvs());
   const uint32_t u_bits = uv_width(bits_, uv_bit_, 0), v_bits = uv_width(bits_, uv_bit_, 1);
   const uint64_t bit = uv_bit_ + kUvHeaderBits + uint64_t{vertex} * (u_bits + v_bits);
-  const int32_t u = uv_anchor(bits_, uv_bit_, 0) + static_cast<int32_t>(read_bits(bits_, bit, u_bits));
-  const int32_t v = uv_anchor(bits_, uv_bit_, 1) + static_cast<int32_t>(read_bits(bits_, bit + u_bits, v_bits));
-  return {from_uv_lattice(u, uv_step_.x), from_uv_lattice(v, uv_step_.y)};
+  return {uv_anchor(bits_, uv_bit_, 0) + static_cast<int64_t>(read_bits(bits_, bit, u_bits)),
+          uv_anchor(bits_, uv_bit_, 1) + static_cast<int64_t>(read_bits(bits_, bit + u_bits, v_bits))};
+}
+
+Vec2 ClusterView::uv(uint32_t vertex) const {
+  const auto [u, v] = uv_code(vertex);
+  return {u_decoder_(u), v_decoder_(v)};
 }
 
 void ClusterView::bounds(Vec3& lo, Vec3& hi) const {

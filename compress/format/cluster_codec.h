@@ -43,6 +43,8 @@ public:
   NormalEncoding normal_encoding() const { return normal_encoding_; } ///< of the geometry
   /// Needs has_uvs().
   Vec2 uv(uint32_t vertex) const;
+  /// As stored, of the geometry's encoding. Needs has_uvs().
+  std::array<int64_t, 2> uv_code(uint32_t vertex) const;
 
   /// A box in object space that holds every vertex, from the record alone: at most a power of two larger per axis.
   void bounds(Vec3& lo, Vec3& hi) const;
@@ -68,7 +70,7 @@ private:
   IndexLayout layout_;
   LatticePoint base_; ///< of the smallest coordinates
   double step_;
-  Vec2 uv_step_;
+  UvDecoder u_decoder_, v_decoder_;
   NormalEncoding normal_encoding_;
   uint32_t normal_stride_;   ///< bits per vertex or palette entry
   uint32_t position_stride_; ///< bits per vertex

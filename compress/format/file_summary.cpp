@@ -1,6 +1,7 @@
 #include "compress/format/file_summary.h"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 
 namespace packtrace {
@@ -21,12 +22,13 @@ StreamBytes stream_bytes(const BakedFile& file) {
   bytes.requirement_records = s.requirements.size_bytes();
   bytes.material_records = s.materials.size_bytes() + s.material_slots.size_bytes();
   bytes.masks = s.masks.size_bytes() + s.mask_words.size_bytes();
+  bytes.textures = s.textures.size_bytes() + s.texture_bytes.size();
   bytes.cameras = s.cameras.size_bytes();
   bytes.strings = s.strings.size();
   bytes.total = file.file_bytes();
   bytes.header_and_alignment = bytes.total - s.payload.size() - bytes.cluster_records - bytes.geometry_records -
-                               bytes.instance_records - bytes.material_records - bytes.masks - bytes.cameras -
-                               bytes.strings - bytes.requirement_records;
+                               bytes.instance_records - bytes.material_records - bytes.masks - bytes.textures -
+                               bytes.cameras - bytes.strings - bytes.requirement_records;
   return bytes;
 }
 
@@ -54,6 +56,52 @@ void add_normals(std::vector<NormalUse>& uses, const baked::GeometryRecord& g,
   ++use->geometries;
   use->vertices += vertices;
   use->max_error_degrees = std::max(use->max_error_degrees, g.max_normal_error_degrees);
+}
+
+/// Texels per unit of texture coordinate, along the axis of more, of the finest texture that a material looks up.
+double texels_per_uv(const BakedSections& s, const baked::MaterialRecord& material) {
+  double most = 0.0;
+  if (material.albedo_texture != baked::kNone) {
+    const baked::TextureRecord& texture = s.textures[material.albedo_texture];
+    most = std::max(std::abs(double{texture.uv_scale[0]}) * texture.width,
+                    std::abs(double{texture.uv_scale[1]}) * texture.height);
+  }
+  for (const uint32_t number : {material.alpha_mask, material.shadow_alpha_mask}) {
+    if (number == baked::kNone) continue;
+    const baked::MaskRecord& mask = s.masks[number];
+    most = std::max(
+        {most, std::abs(double{mask.uv_scale[0]}) * mask.width, std::abs(double{mask.uv_scale[1]}) * mask.height});
+  }
+  return most;
+}
+
+/// Largest of the texels of runs of slots, whose beginnings ascend. Looks at each slot once, however much they overlap.
+double finest_texture(const std::vector<double>& texels_of_slot, const std::vector<uint32_t>& runs, uint32_t slots) {
+  double most = 0.0;
+  uint64_t end = 0;
+  for (const uint32_t run : runs) {
+    for (uint64_t i = std::max<uint64_t>(run, end); i < uint64_t{run} + slots; ++i)
+      most = std::max(most, texels_of_slot[static_cast<size_t>(i)]);
+    end = uint64_t{run} + slots;
+  }
+  return most;
+}
+
+/// @param texels per unit of texture coordinate, of the finest texture that any instance's materials look up
+void add_uvs(std::vector<UvUse>& uses, const baked::GeometryRecord& g, std::span<const baked::ClusterRecord> clusters,
+             double texels) {
+  uint64_t vertices = 0;
+  for (const baked::ClusterRecord& cluster : clusters)
+    if ((cluster.flags & baked::kClusterHasUvs) != 0) vertices += cluster.vertex_count;
+  if (vertices == 0) return;
+  const auto encoding = static_cast<UvEncoding>(g.uv_encoding);
+  auto use = std::lower_bound(uses.begin(), uses.end(), encoding,
+                              [](const UvUse& one, UvEncoding other) { return one.encoding < other; });
+  if (use == uses.end() || use->encoding != encoding) use = uses.insert(use, UvUse{encoding});
+  ++use->geometries;
+  use->vertices += vertices;
+  use->max_error = std::max(use->max_error, g.max_uv_error);
+  use->max_error_texels = std::max(use->max_error_texels, g.max_uv_error * texels);
 }
 
 GeometryUse use_of(const BakedFile& file, uint32_t geometry, uint32_t instances) {
@@ -100,6 +148,9 @@ FileSummary summarize(const BakedFile& file) {
     summary.placed_triangles += s.geometries[instance.geometry].triangle_count;
     summary.placed_vertices += s.geometries[instance.geometry].vertex_count;
   }
+  std::vector<double> texels; // by material slot
+  for (const uint32_t material : s.material_slots) texels.push_back(texels_per_uv(s, s.materials[material]));
+  const std::vector<std::vector<uint32_t>> runs = material_runs(s);
   for (size_t i = 0; i < s.geometries.size(); ++i) {
     const baked::GeometryRecord& g = s.geometries[i];
     summary.triangles += g.triangle_count;
@@ -111,6 +162,7 @@ FileSummary summarize(const BakedFile& file) {
     summary.max_uv_error = std::max(summary.max_uv_error, g.max_uv_error);
     if (g.cluster_count > 0) add_grid(summary.grids, g);
     add_normals(summary.normals, g, file.clusters(static_cast<uint32_t>(i)));
+    add_uvs(summary.uvs, g, file.clusters(static_cast<uint32_t>(i)), finest_texture(texels, runs[i], g.slot_count));
     summary.by_geometry.push_back(use_of(file, static_cast<uint32_t>(i), uses[i]));
   }
   std::sort(summary.grids.begin(), summary.grids.end(), [](const GridUse& a, const GridUse& b) {
@@ -118,6 +170,9 @@ FileSummary summarize(const BakedFile& file) {
   });
   add_materials(summary, s);
   summary.requirements.assign(s.requirements.begin(), s.requirements.end());
+  for (const baked::TextureRecord& t : s.textures)
+    summary.textures.push_back({std::string(s.text(t.name)), t.width, t.height, static_cast<TextureCodec>(t.codec),
+                                texture_bytes(static_cast<TextureCodec>(t.codec), t.width, t.height), t.psnr_db});
   summary.clusters = s.clusters.size();
   summary.geometries = s.geometries.size();
   summary.instances = s.instances.size();

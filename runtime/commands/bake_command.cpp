@@ -25,7 +25,7 @@
 namespace packtrace {
 namespace {
 
-constexpr const char* kAutoNormals = "auto";
+constexpr const char *kAuto = "auto", *kNoTextures = "none";
 constexpr std::array<const char*, baked::kPurposeCount> kPurposes{"ao", "shading"};
 constexpr const char* kKeepNormals = "normals";
 constexpr const char* kKeepUvs = "uv";
@@ -34,10 +34,13 @@ struct BakeOptions {
   std::string input, output;
   std::optional<double> precision, precision_abs, precision_edge;
   std::optional<uint32_t> position_bits;
-  std::string normals = kAutoNormals;
+  std::string normals = kAuto;
   std::optional<double> normal_error;
   std::string purpose = kPurposes[baked::kAo];
   std::vector<std::string> keep;
+  std::string uvs = kAuto;
+  std::optional<std::string> textures; ///< without one, what the purpose needs
+  std::optional<double> texture_psnr;
   std::string codec{name_of(PageCodec::kNone)};
   SceneOptions scene;
   bool dry_run = false;
@@ -61,6 +64,15 @@ BakeConfig make_config(const BakeOptions& options) {
   config.purpose = options.purpose == kPurposes[baked::kShading] ? baked::kShading : baked::kAo;
   for (const std::string& stream : options.keep) (stream == kKeepUvs ? config.keep_uvs : config.keep_normals) = true;
   config.strict = options.scene.strict;
+  config.uvs = find_uv_encoding(options.uvs);
+  const std::string textures = options.textures.value_or(config.purpose == baked::kShading ? kAuto : kNoTextures);
+  config.textures = textures != kNoTextures;
+  config.texture_codec = find_texture_codec(textures);
+  if (config.textures && config.purpose != baked::kShading)
+    throw Error(ErrorKind::kUsage, "--textures " + textures + " is for shading; add --for shading");
+  if (options.texture_psnr && textures != kAuto)
+    throw Error(ErrorKind::kUsage, "--texture-psnr chooses codecs; it is of no use without --textures auto");
+  if (options.texture_psnr) config.min_texture_psnr_db = *options.texture_psnr;
   config.codec = find_page_codec(options.codec).value(); // the option's check knows the names
   config.validate();
   return config;
@@ -107,7 +119,8 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   Progress progress(display.observer());
 
   const Stopwatch importing;
-  const ImportResult imported = import_for_command(options.input, options.scene, globals, progress, display);
+  const ImportResult imported =
+      import_for_command(options.input, options.scene, globals, progress, display, config.textures);
   const double import_s = importing.seconds();
 
   Diagnostics diagnostics;
@@ -165,12 +178,12 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   for (CLI::Option* option : precisions)
     for (CLI::Option* other : precisions)
       if (option != other) option->excludes(other);
-  std::vector<std::string> encodings{kAutoNormals};
+  std::vector<std::string> encodings{kAuto};
   for (const NormalFormat& format : kNormalFormats) encodings.emplace_back(format.name);
   verb.add_option("--normals", options->normals,
                   "Encoding of normals; auto: axis16, axis24 or axis32 by --normal-error")
       ->check(CLI::IsMember(encodings))
-      ->default_str(kAutoNormals)
+      ->default_str(kAuto)
       ->group("Normals");
   verb.add_option(
           "--normal-error", options->normal_error,
@@ -179,8 +192,8 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
       ->type_name("DEGREES")
       ->group("Normals");
   verb.add_option("--for", options->purpose,
-                  "What the file is to be good for; what that does not need is left out. shading also keeps texture "
-                  "coordinates of textured materials")
+                  "What the file is to be good for; what that does not need is left out. shading also keeps textures "
+                  "of materials, and the texture coordinates that they and normal maps need")
       ->check(CLI::IsMember(std::vector<std::string>(kPurposes.begin(), kPurposes.end())))
       ->default_str(options->purpose)
       ->group("What is kept");
@@ -189,6 +202,25 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
       ->check(CLI::IsMember({std::string(kKeepUvs), std::string(kKeepNormals)}))
       ->type_name("STREAMS")
       ->group("What is kept");
+  verb.add_option(
+          "--uvs", options->uvs,
+          "Texture coordinates: auto keeps 1/32 texel wherever they lie; unorm16 (steps of 1/65535) and fp16 are "
+          "for compatibility")
+      ->check(CLI::IsMember(
+          std::vector<std::string>{kAuto, std::string(kUvEncodingNames[static_cast<size_t>(UvEncoding::kUnorm16)]),
+                                   std::string(kUvEncodingNames[static_cast<size_t>(UvEncoding::kFp16)])}))
+      ->default_str(kAuto)
+      ->group("Texture coordinates");
+  std::vector<std::string> texture_codecs{kNoTextures, kAuto};
+  texture_codecs.insert(texture_codecs.end(), kTextureCodecNames.begin(), kTextureCodecNames.end());
+  verb.add_option("--textures", options->textures,
+                  "Textures of materials: none leaves their average; auto takes for each the smallest codec that "
+                  "--texture-psnr allows (default auto with --for shading, else none)")
+      ->check(CLI::IsMember(texture_codecs))
+      ->group("Textures");
+  verb.add_option("--texture-psnr", options->texture_psnr, "What auto keeps, 10..100 dB of sRGB values (default 34)")
+      ->type_name("DB")
+      ->group("Textures");
   verb.add_option(
           "--codec", options->codec,
           "Form on disk: none is mapped and traced as it is; fast and small are smaller, and decoded when opened")

@@ -117,6 +117,7 @@ uint64_t FloatSource::resident_bytes() const {
     bytes += mesh.positions.size() * sizeof(Vec3) + mesh.normals.size() * sizeof(Vec3) +
              mesh.uvs.size() * sizeof(Vec2) + mesh.triangles.size() * sizeof(Triangle);
   for (const AlphaMask& mask : scene_.masks) bytes += mask.words.size() * sizeof(uint32_t);
+  for (const AlbedoTexture& texture : scene_.textures) bytes += texture.rgb.size();
   return bytes;
 }
 

@@ -27,6 +27,7 @@ public:
   std::span<const PlacedGeometry> instances() const override { return instances_; }
   std::span<const Material> materials() const override { return scene_.materials; }
   AlphaMaskView mask(uint32_t index) const override { return view(scene_.masks[index]); }
+  TextureView texture(uint32_t index) const override { return view(scene_.textures[index]); }
   std::span<const Camera> cameras() const override { return scene_.cameras; }
   Bounds world_bounds() const override { return world_bounds_; }
   uint64_t resident_bytes() const override;

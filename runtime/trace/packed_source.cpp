@@ -77,6 +77,8 @@ float PackedSource::position_error(uint32_t geometry) const {
   return rounded >= bound ? rounded : std::nextafter(rounded, std::numeric_limits<float>::infinity());
 }
 
+TextureView PackedSource::texture(uint32_t index) const { return file_.texture(index); }
+
 AlphaMaskView PackedSource::mask(uint32_t index) const { return file_.mask(index); }
 
 uint64_t PackedSource::resident_bytes() const {

@@ -25,6 +25,7 @@ public:
   std::span<const PlacedGeometry> instances() const override { return instances_; }
   std::span<const Material> materials() const override { return materials_; }
   AlphaMaskView mask(uint32_t index) const override;
+  TextureView texture(uint32_t index) const override;
   std::span<const Camera> cameras() const override { return cameras_; }
   Bounds world_bounds() const override { return world_bounds_; }
 

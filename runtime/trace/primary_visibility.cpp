@@ -5,6 +5,7 @@
 
 #include <embree3/rtcore.h>
 
+#include "runtime/trace/albedo_lookup.h"
 #include "runtime/trace/ray_offset.h"
 #include "runtime/trace/tiles.h"
 
@@ -119,7 +120,7 @@ private:
     out_.position[pixel] = Vec3(position);
     out_.geometric_normal[pixel] = Vec3(facing);
     out_.normal[pixel] = shading_normal(hit, barycentrics, facing);
-    out_.albedo[pixel] = source_.materials()[material].albedo;
+    out_.albedo[pixel] = surface_albedo(source_, hit.geometry, hit.triangle, material, barycentrics);
     out_.instance[pixel] = placement.instance;
     out_.material[pixel] = material;
     out_.offset[pixel] =

@@ -5,6 +5,7 @@
 #include <span>
 #include <string_view>
 
+#include "compress/format/texture_codec.h"
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace {
@@ -52,6 +53,8 @@ public:
   virtual std::span<const PlacedGeometry> instances() const = 0;
   virtual std::span<const Material> materials() const = 0;
   virtual AlphaMaskView mask(uint32_t index) const = 0;
+  /// Of Material::albedo_texture.
+  virtual TextureView texture(uint32_t) const { return {}; }
   virtual std::span<const Camera> cameras() const = 0;
   virtual Bounds world_bounds() const = 0;
 

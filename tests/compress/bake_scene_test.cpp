@@ -521,6 +521,51 @@ TEST(BakeScene, TextureCoordinatesAreKeptWhereAMaskNeedsThem) {
   EXPECT_LE(baked.report.max_uv_error, 1.0 / (2 * 16 * 32));
 }
 
+TEST(BakeScene, EncodingsOfTextureCoordinatesAreSelectable) {
+  Scene scene = masked_scene();
+  scene.shapes[0].material = 1;
+  for (const UvEncoding encoding : {UvEncoding::kUnorm16, UvEncoding::kFp16}) {
+    BakeConfig config;
+    config.uvs = encoding;
+    const BakedScene baked = bake(scene, config);
+    const BakedFile file = BakedFile::from_bytes(baked.bytes);
+    EXPECT_EQ(file.geometries()[0].uv_encoding, static_cast<uint32_t>(encoding));
+    EXPECT_EQ(file.geometries()[0].uv_exponent, (std::array<int32_t, 2>{}));
+    ASSERT_EQ(baked.report.file.uvs.size(), 1u);
+    EXPECT_EQ(baked.report.file.uvs[0].encoding, encoding);
+    const float bound = encoding == UvEncoding::kUnorm16 ? 0.5f / 65535.0f + 0x1p-24f : 0x1p-12f;
+    EXPECT_GT(baked.report.max_uv_error, 0.0);
+    EXPECT_LE(baked.report.max_uv_error, bound);
+    EXPECT_LE(baked.report.max_uv_error_texels, baked.report.file.uvs[0].max_error_texels * (1 + 1e-6));
+    const Decoded all = decode(file, 0);
+    for (size_t i = 0; i < all.positions.size(); ++i) EXPECT_NEAR(all.uvs[i].x, all.positions[i].x, bound + 0.001);
+    for (const PageCodec codec : {PageCodec::kFast, PageCodec::kSmall}) {
+      config.codec = codec;
+      const std::vector<std::byte> paged = bake(scene, config).bytes;
+      const BakedFile small = BakedFile::from_bytes(paged);
+      EXPECT_TRUE(std::equal(small.bytes().begin(), small.bytes().end(), baked.bytes.begin(), baked.bytes.end()));
+    }
+  }
+}
+
+TEST(BakeScene, HalfFloatCoordinatesAreRefusedOrWarnedOfWhereTheyBreak) {
+  Scene scene = masked_scene();
+  scene.shapes[0].material = 1;
+  BakeConfig config;
+  config.uvs = UvEncoding::kFp16;
+  EXPECT_TRUE(bake(scene, config).report.warnings.empty()); // a mask of 64 texels
+  for (Vec2& uv : scene.meshes[0].uvs) uv *= 40.0f;
+  const BakedScene rough = bake(scene, config);
+  ASSERT_EQ(rough.report.warnings.size(), 1u);
+  EXPECT_NE(rough.report.warnings[0].find("texels off"), std::string::npos);
+  EXPECT_TRUE(bake(scene).report.warnings.empty());
+  scene.meshes[0].uvs[3].x = 70000.0f;
+  EXPECT_THROW(bake(scene, config), Error);
+  config.uvs = UvEncoding::kUnorm16;
+  EXPECT_THROW(bake(scene, config), Error);
+  EXPECT_LE(bake(scene).report.max_uv_error_texels, 1.0 / 32.0);
+}
+
 TEST(BakeScene, TextureCoordinatesThatAreNotFiniteAreReplacedWithAWarning) {
   Scene scene = masked_scene();
   scene.shapes[0].material = 1;

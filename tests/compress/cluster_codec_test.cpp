@@ -81,9 +81,10 @@ std::vector<uint8_t> expect_round_trip(const Case& c) {
     }
     if (view.has_uvs()) {
       EXPECT_EQ(view.uv(v), all_uvs[v]);
-      const float u_step = std::ldexp(1.0f, c.geometry.uv_exponent[0]),
-                  v_step = std::ldexp(1.0f, c.geometry.uv_exponent[1]);
-      EXPECT_EQ(view.uv(v), Vec2(from_uv_lattice(c.uvs[source][0], u_step), from_uv_lattice(c.uvs[source][1], v_step)));
+      const auto encoding = static_cast<UvEncoding>(c.geometry.uv_encoding);
+      const UvDecoder u(encoding, c.geometry.uv_exponent[0]), v_of(encoding, c.geometry.uv_exponent[1]);
+      EXPECT_EQ(view.uv_code(v), (std::array<int64_t, 2>{c.uvs[source][0], c.uvs[source][1]}));
+      EXPECT_EQ(view.uv(v), Vec2(u(c.uvs[source][0]), v_of(c.uvs[source][1])));
     }
   }
   return bytes;

@@ -67,6 +67,25 @@ TEST(Requirements, TextureCoordinatesStayForWhatLooksThemUp) {
   EXPECT_EQ(needs(scene_with(kPlain), config(baked::kAo, false, true)).uvs, baked::kOnRequest);
 }
 
+TEST(Requirements, WithTexturesStoredOnlyThoseLookTextureCoordinatesUp) {
+  BakeConfig with_textures = config(baked::kShading);
+  with_textures.textures = true;
+  Scene scene = scene_with(kPainted); // its texture is none that could be stored
+  EXPECT_EQ(needs(scene, with_textures).uvs, baked::kUnused);
+  scene.textures.push_back({"t", 64, 256, WrapMode::kRepeat, Vec2(2, 1), Vec2(0), std::vector<uint8_t>(3 * 64 * 256)});
+  scene.materials[kPainted].albedo_texture = 0;
+  EXPECT_EQ(needs(scene, with_textures).uvs, baked::kForTexture);
+  const ScenePlan plan = plan_scene(scene);
+  const GeometryNeeds stored = analyse_requirements(scene, plan, plan.geometries.front(), with_textures);
+  EXPECT_EQ(stored.texels_per_uv, (std::array<double, 2>{128.0, 256.0}));
+  const GeometryNeeds elsewhere = analyse_requirements(scene, plan, plan.geometries.front(), config(baked::kShading));
+  EXPECT_EQ(elsewhere.texels_per_uv[0], double{kAssumedTexels});
+  EXPECT_EQ(elsewhere.uv_exponent[0], stored.uv_exponent[0] - 5);
+  EXPECT_EQ(elsewhere.uv_exponent[1], stored.uv_exponent[1] - 4);
+  scene.materials[kPainted].albedo_texture = 1;
+  EXPECT_THROW((void)analyse_requirements(scene, plan, plan.geometries.front(), with_textures), Error);
+}
+
 TEST(Requirements, NormalsStayWhereTheCameraSeesThem) {
   const auto normals = [](uint32_t material, const BakeConfig& c) { return needs(scene_with(material), c).normals; };
   EXPECT_EQ(normals(kPlain, config(baked::kAo)), baked::kForShading);

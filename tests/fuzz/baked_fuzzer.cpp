@@ -123,9 +123,17 @@ void read_rest(const BakedFile& file) {
     const AlphaMaskView mask = file.mask(i);
     for (const Vec2 uv : {Vec2(0.3f, 0.7f), Vec2(-1e30f, 1e30f), Vec2(0.0f), Vec2(1.0f)}) (void)mask.opaque(uv);
   }
-  for (const Material& material : file.materials())
+  for (uint32_t i = 0; i < file.sections().textures.size(); ++i) {
+    const TextureView texture = file.texture(i);
+    (void)texture.texel(texture.width - 1, texture.height - 1);
+    for (const Vec2 uv : {Vec2(0.3f, 0.7f), Vec2(-1e30f, 1e30f), Vec2(0.0f), Vec2(1.0f)}) (void)texture.sample(uv);
+  }
+  for (const Material& material : file.materials()) {
+    require(material.albedo_texture == kNoTexture || material.albedo_texture < file.sections().textures.size(),
+            "texture number");
     for (const uint32_t mask : {material.alpha_mask, material.shadow_alpha_mask})
       require(mask == kNoMask || mask < file.sections().masks.size(), "mask number");
+  }
   require(file.cameras().size() == file.sections().cameras.size(), "number of cameras");
   (void)file.world_bounds();
   require(summarize(file).bytes.total == file.file_bytes(), "summary of the file");

@@ -21,12 +21,15 @@ void bake_input(const std::filesystem::path& input, const std::filesystem::path&
   const std::string text(std::istreambuf_iterator<char>(in), {});
   fuzz::SceneFilesFolder files;
   ImportOptions options;
+  options.keep_textures = true;
   options.tessellation_tolerance = 0.1; // small files make small changes matter
   Diagnostics diagnostics;
   Progress progress;
   const ImportResult result = import_scene(files.write(text), options, diagnostics, progress);
   for (const PageCodec codec : {PageCodec::kNone, PageCodec::kFast, PageCodec::kSmall}) {
     BakeConfig config;
+    config.purpose = baked::kShading;
+    config.textures = true;
     config.codec = codec;
     const std::string name = input.stem().string() + "." + std::string(name_of(codec));
     write_file_bytes(folder / name, bake_to_bytes(result.scene, config, diagnostics, progress).bytes);

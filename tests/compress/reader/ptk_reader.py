@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 VERSION = 3
 MAGIC = b"PTK\x89\r\n\x1a\0"
-HEADER_BYTES = 384
+HEADER_BYTES = 448
 DISK_FORM_HEADER_BYTES = 192
 NONE = 0xFFFFFFFF
 
@@ -56,17 +56,22 @@ GEOMETRY = Record(
     ("step_mantissa", "I"), ("step_exponent", "i"), ("anchor_shift", "I"), ("uv_exponent", "2i"),
     ("bounds_lo", "3f"), ("bounds_hi", "3f"),
     ("max_normal_error_degrees", "f"), ("mean_normal_error_degrees", "f"), ("max_uv_error", "f"),
-    ("flags", "I"), ("class_clusters", "8I"), ("name", "2I"), ("normal_encoding", "I"),
-    ("reserved", "I"), ("slot_count", "I"), ("requirements", "I"))
+    ("flags", "I"), ("class_clusters", "8I"), ("name", "2I"), ("normal_encoding", "I"), ("uv_encoding", "I"),
+    ("slot_count", "I"), ("requirements", "I"))
 CLUSTER = Record(
     ("payload_offset", "I"), ("first_triangle", "I"), ("first_vertex", "I"), ("material_slot", "I"),
     ("anchor", "3i"), ("normal_anchor", "2h"), ("vertex_count", "H"), ("normal_palette", "H"),
     ("triangle_count", "B"), ("restart_count", "B"), ("position_bits", "3B"), ("normal_bits", "2B"), ("flags", "B"))
-MATERIAL = Record(("flags", "I"), ("albedo", "3f"), ("alpha_mask", "I"), ("shadow_alpha_mask", "I"), ("name", "2I"))
+MATERIAL = Record(
+    ("flags", "I"), ("albedo", "3f"), ("alpha_mask", "I"), ("shadow_alpha_mask", "I"),
+    ("albedo_texture", "I"), ("name", "2I"))
 INSTANCE = Record(("world_from_object", "12f"), ("geometry", "I"), ("first_slot", "I"))
 MASK = Record(
     ("first_word", "Q"), ("width", "I"), ("height", "I"), ("wrap", "I"), ("reserved", "I"),
     ("uv_scale", "2f"), ("uv_offset", "2f"))
+TEXTURE = Record(
+    ("first_byte", "Q"), ("width", "I"), ("height", "I"), ("wrap", "I"), ("codec", "I"),
+    ("uv_scale", "2f"), ("uv_offset", "2f"), ("psnr_db", "f"), ("reserved", "I"), ("name", "2I"))
 CAMERA = Record(
     ("world_from_camera", "12d"), ("fov_degrees", "d"), ("screen_window", "4d"), ("projection", "I"),
     ("has_screen_window", "I"), ("width_px", "I"), ("height_px", "I"), ("film_name", "2I"))
@@ -83,9 +88,9 @@ REQUIREMENT = Record(
 # In the order of the section table; None: bytes.
 SECTIONS = (
     ("geometries", GEOMETRY), ("clusters", CLUSTER), ("payload", None), ("materials", MATERIAL),
-    ("instances", INSTANCE), ("masks", MASK), ("mask_words", Record(("word", "I"))), ("cameras", CAMERA),
-    ("strings", None), ("summary", SUMMARY), ("material_slots", Record(("material", "I"))),
-    ("requirements", REQUIREMENT))
+    ("instances", INSTANCE), ("masks", MASK), ("mask_words", Record(("word", "I"))), ("textures", TEXTURE),
+    ("texture_bytes", None), ("cameras", CAMERA), ("strings", None), ("summary", SUMMARY),
+    ("material_slots", Record(("material", "I"))), ("requirements", REQUIREMENT))
 
 
 def index_bits(count):
@@ -258,12 +263,21 @@ def read_normals(bits, cluster, geometry):
     return [palette[bits.take(width)] for _ in range(count)]
 
 
+def uv_of(code, encoding, exponent):
+    if encoding == 0:
+        return to_float32(code * math.ldexp(1.0, exponent))
+    if encoding == 1:
+        return to_float32(code / 65535.0)
+    magnitude = struct.unpack("<e", struct.pack("<H", min(abs(code), 31743)))[0]
+    return -magnitude if code < 0 else magnitude
+
+
 def read_uvs(bits, cluster, geometry):
     anchors = bits.take_signed(32), bits.take_signed(32)
     widths = bits.take(5), bits.take(5)
-    steps = [math.ldexp(1.0, exponent) for exponent in geometry["uv_exponent"]]
     return [
-        tuple(to_float32((anchor + bits.take(width)) * step) for anchor, width, step in zip(anchors, widths, steps))
+        tuple(uv_of(anchor + bits.take(width), geometry["uv_encoding"], exponent)
+              for anchor, width, exponent in zip(anchors, widths, geometry["uv_exponent"]))
         for _ in range(cluster["vertex_count"])]
 
 

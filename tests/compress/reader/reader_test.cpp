@@ -155,6 +155,17 @@ TEST_F(IndependentReader, DecodesEveryEncodingOfNormals) {
   }
 }
 
+TEST_F(IndependentReader, DecodesEveryEncodingOfTextureCoordinates) {
+  for (const UvEncoding encoding : {UvEncoding::kLattice, UvEncoding::kUnorm16, UvEncoding::kFp16}) {
+    BakeConfig config;
+    config.uvs = encoding;
+    Scene scene = scene_of_every_stream();
+    for (Vec2& uv : scene.meshes[1].uvs) uv = uv * 7.0f - Vec2(3.0f);
+    write(scene, config);
+    EXPECT_EQ(read(), 0) << kUvEncodingNames[static_cast<size_t>(encoding)];
+  }
+}
+
 TEST_F(IndependentReader, DecodesGeometryOfMoreThanTwoToThe31Steps) {
   Scene scene = test::scene_of(test::grid_mesh(3), test::scaling(DVec3(1e-6)));
   Mesh& mesh = scene.meshes[0];
