@@ -7,12 +7,12 @@
 
 #include "pbrt_import/scene/material_flags.h"
 
-/// What lies in a .ptk file, version 2; docs/baked_format.md says it in words. Little-endian; every section starts at a
+/// What lies in a .ptk file, version 3; docs/baked_format.md says it in words. Little-endian; every section starts at a
 /// multiple of 64 bytes; bytes that no field or section owns are zero.
 namespace packtrace::baked {
 
 inline constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'K', 0x89, '\r', '\n', 0x1a, 0};
-inline constexpr uint32_t kVersion = 2;
+inline constexpr uint32_t kVersion = 3;
 inline constexpr size_t kSectionAlignment = 64;
 inline constexpr uint32_t kNone = ~0u;
 

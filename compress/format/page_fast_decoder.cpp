@@ -1,0 +1,344 @@
+#include "compress/format/page_fast_decoder.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+
+#include <zstd.h>
+
+#include "compress/format/page_codec.h"
+#include "compress/format/page_fast_kernels.h"
+
+namespace packtrace {
+
+using namespace page_fast;
+
+/// What is known of the cluster that is being decoded.
+struct FastPageReader::Work {
+  /// Where a field's residuals lie, for escapes.
+  struct Field {
+    const uint8_t* bytes = nullptr;
+    uint64_t bit = 0;
+    uint32_t low_bits = 0, shift = 0, count = 0;
+  };
+
+  WalkInput input;
+  std::array<Layout, kChannels> layouts;
+  std::array<uint64_t, kChannels> prefix_bit{}; ///< of what is copied: palettes, anchors of texture coordinates
+  std::array<uint32_t, kChannels> prefix_bits{};
+  std::array<Field, kChannels * kChannelFields> fields;
+  const uint8_t* turns = nullptr; ///< bits
+  const uint8_t* fresh = nullptr;
+  std::array<uint64_t, 2> restarts{};
+  WalkMemory memory;
+};
+
+FastPageReader::FastPageReader() : work_(std::make_unique<Work>()) {}
+FastPageReader::~FastPageReader() = default;
+
+bool FastPageReader::begin(ZSTD_DCtx_s* zstd, std::span<const uint8_t> page, uint32_t cluster_count,
+                           uint32_t payload_bytes) {
+  struct Place {
+    uint32_t bytes, disk_bytes;
+  };
+  std::array<Place, kParts> places;
+  if (page.size() < sizeof places) return false;
+  std::memcpy(places.data(), page.data(), sizeof places);
+  uint64_t total = 0, disk_total = sizeof places;
+  for (const Place& place : places) {
+    if (place.bytes > baked::kMaxPagePayload * 4 || place.disk_bytes > place.bytes) return false;
+    total += place.bytes, disk_total += place.disk_bytes;
+  }
+  if (disk_total != page.size()) return false;
+  if (bytes_.size() < total + kPartSlackBytes) bytes_.resize(total + kPartSlackBytes);
+  uint8_t* to = bytes_.data();
+  const uint8_t* from = page.data() + sizeof places;
+  for (uint32_t i = 0; i < kParts; ++i) {
+    const auto [bytes, disk_bytes] = places[i];
+    if (disk_bytes == bytes)
+      std::copy_n(from, bytes, to);
+    else if (ZSTD_decompressDCtx(zstd, to, bytes, from, disk_bytes) != bytes)
+      return false;
+    parts_[i] = {to, to + bytes};
+    to += bytes, from += disk_bytes;
+  }
+  std::memset(to, 0, kPartSlackBytes);
+  if (places[kHeaders].bytes != cluster_count * kHeaderBytes) return false;
+  field_bit_ = 0, field_end_ = 8 * uint64_t{places[kFields].bytes};
+  cluster_ = 0, cluster_count_ = cluster_count;
+  last_ = {};
+  last_import_ = 0;
+  page_vertex_count_ = 0;
+  payload_.begin(payload_bytes);
+  return true;
+}
+
+bool FastPageReader::take_bits(uint64_t count, uint64_t& first) {
+  if (count > field_end_ - field_bit_) return false;
+  first = field_bit_;
+  field_bit_ += count;
+  return true;
+}
+
+Header FastPageReader::next_header() {
+  std::array<uint8_t, sizeof(Header)> row{};
+  const uint8_t* column = parts_[kHeaders].at + cluster_;
+  for (size_t i = 0; i < kHeaderBytes; ++i, column += cluster_count_) row[i] = *column;
+  ++cluster_;
+  Header header;
+  std::memcpy(&header, row.data(), sizeof header);
+  return header;
+}
+
+bool FastPageReader::read_record(const Header& header, baked::ClusterRecord& record) {
+  record = {};
+  record.material = last_.material ^ header.material;
+  for (size_t i = 0; i < 3; ++i)
+    record.anchor[i] =
+        static_cast<int32_t>(static_cast<uint32_t>(last_.anchor[i]) + static_cast<uint32_t>(unzigzag(header.anchor[i])));
+  for (size_t i = 0; i < 2; ++i)
+    record.normal_anchor[i] = static_cast<int16_t>(static_cast<uint64_t>(last_.normal_anchor[i]) +
+                                                   unzigzag(header.normal_anchor[i]));
+  record.vertex_count = static_cast<uint16_t>(header.vertices + 1);
+  record.normal_palette = header.palette;
+  record.triangle_count = static_cast<uint8_t>(header.triangles + 1);
+  record.restart_count = static_cast<uint8_t>(header.strips + 1);
+  record.position_bits = header.position_bits;
+  record.normal_bits = header.normal_bits;
+  record.flags = header.flags;
+  last_ = record;
+  if (header.triangles >= kMaxClusterTriangles || header.strips > header.triangles) return false;
+  for (const uint8_t bits : record.position_bits)
+    if (bits > kMaxFieldBits) return false;
+  for (const uint8_t bits : record.normal_bits)
+    if (bits > 24) return false;
+  return record.normal_palette <= record.vertex_count &&
+         record.vertex_count <= record.triangle_count + 2u * record.restart_count;
+}
+
+bool FastPageReader::read_topology(const Header& header, const IndexLayout& layout) {
+  Work& w = *work_;
+  const uint32_t triangles = layout.triangle_count, corners = layout.corner_count(), vertices = layout.vertex_count;
+  const auto bytes_of = [](uint32_t bits) { return (bits + 7) / 8; };
+  w.turns = parts_[kBits].take(bytes_of(triangles));
+  w.fresh = parts_[kBits].take(bytes_of(corners));
+  const uint8_t* creases = parts_[kBits].take(header.creases != 0 ? bytes_of(vertices) : 0);
+  const uint8_t* imports = parts_[kBits].take(header.imports != 0 ? bytes_of(vertices) : 0);
+  const uint8_t* runs = parts_[kRuns].take(layout.restart_count);
+  if (w.turns == nullptr || w.fresh == nullptr || creases == nullptr || imports == nullptr || runs == nullptr)
+    return false;
+
+  w.restarts = {};
+  uint32_t first = 0;
+  for (uint32_t i = 0; i < layout.restart_count; ++i) {
+    if (runs[i] == 0 || first >= triangles) return false;
+    w.restarts[first >> 6] |= uint64_t{1} << (first & 63u);
+    first += runs[i];
+  }
+  if (first != triangles) return false;
+
+  WalkMemory& m = w.memory;
+  expand_bits(w.turns, triangles, m.left.data());
+  if (expand_bits(w.fresh, corners, m.fresh.data()) != vertices) return false;
+  if (header.creases + header.imports != 0) {
+    m.crease.fill(0), m.import.fill(0);
+    if (header.creases != 0 && expand_bits(creases, vertices, m.crease.data()) != header.creases) return false;
+    if (header.imports != 0 && expand_bits(imports, vertices, m.import.data()) != header.imports) return false;
+  }
+  const uint32_t old_count = corners - vertices + header.creases;
+  const uint8_t* olds = parts_[kOlds].take(old_count);
+  if (olds == nullptr) return false;
+  add_up_olds(olds, old_count, m.olds.data());
+  w.input = {runs, layout.restart_count};
+  return true;
+}
+
+bool FastPageReader::read_uv_layout(const baked::ClusterRecord& record) {
+  Work& w = *work_;
+  w.layouts[kUvs] = {};
+  w.prefix_bits[kUvs] = 0;
+  if ((record.flags & baked::kClusterHasUvs) == 0) return true;
+  w.prefix_bits[kUvs] = 2 * (kUvAnchorBits + kUvWidthBits);
+  if (!take_bits(w.prefix_bits[kUvs], w.prefix_bit[kUvs])) return false;
+  const uint8_t* bits = parts_[kFields].at;
+  uint64_t at = w.prefix_bit[kUvs];
+  Layout& layout = w.layouts[kUvs];
+  layout.field_count = 2;
+  for (size_t i = 0; i < 2; ++i, at += kUvAnchorBits)
+    layout.base[i] = static_cast<uint32_t>(read_bits(bits, at, kUvAnchorBits));
+  for (size_t i = 0; i < 2; ++i, at += kUvWidthBits)
+    layout.width[i] = static_cast<uint32_t>(read_bits(bits, at, kUvWidthBits));
+  return !layout.verbatim();
+}
+
+bool FastPageReader::read_channel(uint32_t channel, const Header& header, uint32_t count, uint32_t vertex_count) {
+  Work& w = *work_;
+  const Layout& layout = w.layouts[channel];
+  const uint8_t* bits = parts_[kFields].at;
+  uint64_t first = 0;
+  uint64_t* residuals = w.memory.residuals[channel].data();
+  if (layout.verbatim()) {
+    std::fill_n(residuals, vertex_count + 1, uint64_t{0});
+    return take_bits(uint64_t{layout.stride()} * vertex_count, w.prefix_bit[channel]);
+  }
+  if (!take_bits(layout.stride(), first)) return false;
+  residuals[0] = read_bits(bits, first, layout.stride());
+  std::fill_n(residuals + 1, vertex_count, uint64_t{0});
+  uint32_t shift = 0;
+  for (uint32_t i = 0; i < layout.field_count; ++i) {
+    Work::Field& field = w.fields[channel * kChannelFields + i];
+    const uint32_t coding = header.coding[channel * kChannelFields + i];
+    field.low_bits = coding & kLowBitsMask, field.shift = shift, field.count = count;
+    field.bytes = parts_[kResiduals + (coding >> kClassShift)].take(count);
+    if (field.bytes == nullptr || field.low_bits > kMaxFieldBits - kByteBits ||
+        !take_bits(uint64_t{count} * field.low_bits, field.bit))
+      return false;
+    add_residuals(field.bytes, count, bits, field.bit, field.low_bits, shift, residuals + 1);
+    shift += layout.width[i];
+  }
+  return true;
+}
+
+bool FastPageReader::read_channels(const Header& header, const baked::ClusterRecord& record) {
+  Work& w = *work_;
+  const uint32_t vertex_count = record.vertex_count, taken = 1u + header.creases + header.imports;
+  const bool has_normals = w.layouts[kNormals].field_count != 0, has_uvs = w.layouts[kUvs].field_count != 0;
+  if (taken > vertex_count || !take_bits(w.prefix_bits[kNormals], w.prefix_bit[kNormals])) return false;
+  if (!read_channel(kPositions, header, vertex_count - taken, vertex_count)) return false;
+  const uint32_t attributes = vertex_count - 1u - header.imports;
+  if (has_normals &&
+      !read_channel(kNormals, header, record.normal_palette != 0 ? vertex_count - 1 : attributes, vertex_count))
+    return false;
+  if (has_uvs && !read_channel(kUvs, header, attributes, vertex_count)) return false;
+  return read_escapes(header);
+}
+
+bool FastPageReader::read_escapes(const Header& header) {
+  Work& w = *work_;
+  const uint8_t* bits = parts_[kFields].at;
+  for (uint32_t i = 0; i < header.escapes; ++i) {
+    uint64_t at = 0, value_at = 0;
+    if (!take_bits(kEscapeFieldBits + kEscapeIndexBits + kEscapeWidthBits, at)) return false;
+    const auto number = static_cast<uint32_t>(read_bits(bits, at, kEscapeFieldBits));
+    const auto index = static_cast<uint32_t>(read_bits(bits, at + kEscapeFieldBits, kEscapeIndexBits));
+    const auto width =
+        static_cast<uint32_t>(read_bits(bits, at + kEscapeFieldBits + kEscapeIndexBits, kEscapeWidthBits));
+    if (number >= w.fields.size()) return false;
+    const Work::Field& field = w.fields[number];
+    if (w.layouts[number / kChannelFields].field_count <= number % kChannelFields ||
+        w.layouts[number / kChannelFields].verbatim() || index >= field.count || width > kMaxFieldBits ||
+        !take_bits(width, value_at))
+      return false;
+    const uint64_t low = read_bits(bits, field.bit + uint64_t{index} * field.low_bits, field.low_bits);
+    const uint64_t without = (uint64_t{field.bytes[index]} << field.low_bits) | low;
+    const uint64_t with = (read_bits(bits, value_at, width) << field.low_bits) | low;
+    w.memory.residuals[number / kChannelFields][1 + index] += (unzigzag(with) - unzigzag(without)) << field.shift;
+  }
+  return true;
+}
+
+/// The words of the vertices that are those of clusters before.
+bool FastPageReader::read_imports(const Header& header, uint32_t channels) {
+  Work& w = *work_;
+  const uint8_t* low = parts_[kRefLow].take(header.imports);
+  const uint8_t* high = parts_[kRefHigh].take(header.imports);
+  if (low == nullptr || high == nullptr) return false;
+  for (uint32_t i = 0; i < header.imports; ++i) {
+    last_import_ += static_cast<uint32_t>(unzigzag(low[i] | uint64_t{high[i]} << 8));
+    if (last_import_ >= page_vertex_count_) return false;
+    for (uint32_t channel = 0; channel < channels; ++channel) {
+      const Layout& layout = w.layouts[channel];
+      uint64_t word = 0;
+      uint32_t shift = 0;
+      for (uint32_t f = 0; f < layout.field_count; ++f) {
+        const uint32_t field = page_vertices_[channel * kChannelFields + f][last_import_] - layout.base[f];
+        word |= (field & ((uint64_t{1} << layout.width[f]) - 1)) << (shift & 63u);
+        shift += layout.width[f];
+      }
+      w.memory.words[channel][kFirstImport + i] = word;
+    }
+  }
+  return true;
+}
+
+void FastPageReader::keep_vertices(uint32_t vertex_count) {
+  Work& w = *work_;
+  const size_t first = page_vertex_count_, needed = first + vertex_count;
+  for (uint32_t channel = 0; channel < kChannels; ++channel) {
+    const Layout& layout = w.layouts[channel];
+    for (uint32_t f = 0, shift = 0; f < kChannelFields; shift += layout.width[f], ++f) {
+      std::vector<uint32_t>& fields = page_vertices_[channel * kChannelFields + f];
+      if (fields.size() < needed) fields.resize(2 * needed);
+      if (f < layout.field_count && !layout.verbatim())
+        keep_field(w.memory.words[channel].data(), vertex_count, shift, layout.width[f], layout.base[f],
+                   fields.data() + first);
+    }
+  }
+  page_vertex_count_ += vertex_count;
+}
+
+void FastPageReader::put_bits(const uint8_t* bytes, uint64_t first, uint64_t count) {
+  for (; count > kMaxFieldBits; first += kMaxFieldBits, count -= kMaxFieldBits)
+    payload_.put(read_bits(bytes, first, kMaxFieldBits), kMaxFieldBits);
+  payload_.put(read_bits(bytes, first, static_cast<uint32_t>(count)), static_cast<uint32_t>(count));
+}
+
+void FastPageReader::put_cluster(const baked::ClusterRecord& record, const IndexLayout& layout) {
+  Work& w = *work_;
+  put_bits(reinterpret_cast<const uint8_t*>(w.restarts.data()), 0, layout.triangle_count);
+  put_bits(w.turns, 0, layout.triangle_count);
+  put_bits(w.fresh, 0, layout.corner_count());
+  const uint32_t width = layout.index_bits();
+  for (uint32_t i = 0, n = layout.corner_count() - layout.vertex_count; i < n; ++i)
+    payload_.put(w.memory.explicits[i] & ((1u << width) - 1), width);
+  for (uint32_t channel = 0; channel < kChannels; ++channel) {
+    const Layout& one = w.layouts[channel];
+    if (one.field_count == 0) continue;
+    if (one.verbatim()) {
+      put_bits(parts_[kFields].at, w.prefix_bit[channel], uint64_t{one.stride()} * record.vertex_count);
+      continue;
+    }
+    if (channel != kPositions) put_bits(parts_[kFields].at, w.prefix_bit[channel], w.prefix_bits[channel]);
+    const uint32_t stride = one.stride();
+    const uint64_t mask = (uint64_t{1} << stride) - 1;
+    const uint64_t* words = w.memory.words[channel].data();
+    for (uint32_t v = 0; v < record.vertex_count; ++v) payload_.put(words[v] & mask, stride);
+  }
+}
+
+bool FastPageReader::append(const baked::GeometryRecord& geometry, baked::ClusterRecord& record) {
+  Work& w = *work_;
+  const Header header = next_header();
+  if (!read_record(header, record)) return false;
+  const IndexLayout layout{record.triangle_count, record.vertex_count, record.restart_count};
+  w.layouts[kPositions] = position_layout(geometry, record);
+  w.layouts[kNormals] = normal_layout(geometry, record);
+  if (record.normal_palette != 0 && w.layouts[kNormals].field_count == 0) return false;
+  w.prefix_bits[kNormals] = record.normal_palette * (uint32_t{record.normal_bits[0]} + record.normal_bits[1] +
+                                                     normal_chart_bits(geometry, record));
+  if (!read_topology(header, layout) || !read_uv_layout(record) || !read_channels(header, record)) return false;
+
+  const bool has_normals = w.layouts[kNormals].field_count != 0, has_uvs = w.layouts[kUvs].field_count != 0;
+  const bool shared = header.creases + header.imports != 0;
+  if (header.imports != 0 && !read_imports(header, kChannels)) return false;
+  w.input.imports_normals = record.normal_palette == 0;
+  walk_strips(w.input, w.memory, has_normals, has_uvs, shared);
+  keep_vertices(record.vertex_count);
+
+  uint64_t bits = layout.total_bits();
+  for (uint32_t channel = 0; channel < kChannels; ++channel)
+    if (w.layouts[channel].field_count != 0)
+      bits += uint64_t{w.layouts[channel].stride()} * record.vertex_count +
+              (channel == kPositions ? 0 : w.prefix_bits[channel]);
+  if (!payload_.begin_cluster(bits)) return false;
+  put_cluster(record, layout);
+  return true;
+}
+
+bool FastPageReader::whole() const {
+  for (uint32_t i = 0; i < kParts; ++i)
+    if (i != kFields && i != kHeaders && parts_[i].at != parts_[i].end) return false;
+  return cluster_ == cluster_count_ && field_end_ - field_bit_ < 8;
+}
+
+} // namespace packtrace
