@@ -107,7 +107,6 @@ void FastPageWriter::add(const baked::GeometryRecord& geometry, const baked::Clu
   geometry_ = &geometry;
   header_ = {};
   for (std::vector<uint64_t>& residuals : residuals_) residuals.clear();
-  escapes_.clear();
   last_old_ = 0;
   read_vertices(view);
   find_sources(view);
@@ -301,16 +300,20 @@ void FastPageWriter::add_fields(const ClusterView& view) {
     }
     put(channel, vertices_[0].words[channel], layout.stride());
     for (uint32_t i = 0; i < layout.field_count; ++i) code_field(channel, i);
+    put_escapes(channel);
   }
+}
+
+void FastPageWriter::put_escapes(Channel channel) {
   for (const Escape& escape : escapes_) {
-    const auto channel = static_cast<Channel>(escape.field / kChannelFields);
     const auto width = static_cast<uint32_t>(std::bit_width(escape.high));
     put(channel, escape.field, kEscapeFieldBits);
     put(channel, escape.index, kEscapeIndexBits);
     put(channel, width, kEscapeWidthBits);
     put(channel, escape.high, width);
   }
-  header_.escapes = static_cast<uint8_t>(escapes_.size());
+  header_.escapes[channel] = static_cast<uint8_t>(escapes_.size());
+  escapes_.clear();
 }
 
 void FastPageWriter::code_field(Channel channel, uint32_t field) {
@@ -321,7 +324,7 @@ void FastPageWriter::code_field(Channel channel, uint32_t field) {
   header_.coding[number] = static_cast<uint8_t>(low_bits | (residual_class << kClassShift));
   for (uint32_t i = 0; i < residuals.size(); ++i) {
     const uint64_t high = residuals[i] >> low_bits;
-    if (high > kByteMask) escapes_.push_back({number, i, high});
+    if (high > kByteMask) escapes_.push_back({field, i, high});
     parts_[kResiduals + residual_class].push_back(high > kByteMask ? 0 : static_cast<uint8_t>(high));
     put(channel, residuals[i] & ((uint64_t{1} << low_bits) - 1), low_bits);
   }

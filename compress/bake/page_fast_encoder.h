@@ -58,6 +58,7 @@ private:
   void add_fields(const ClusterView& view);
   void copy_bits(const ClusterView& view, page_fast::Channel channel, uint64_t first, uint64_t count);
   void code_field(page_fast::Channel channel, uint32_t field);
+  void put_escapes(page_fast::Channel channel);
   void put(page_fast::Channel channel, uint64_t value, uint32_t bits);
   void add_header(const baked::ClusterRecord& record);
   void remember(const ClusterView& view);

@@ -47,18 +47,18 @@ struct Header {
   uint8_t flags;                         ///< as in the record
   uint8_t creases;                       ///< fresh vertices at the place of an older one of the cluster
   uint8_t imports;                       ///< fresh vertices that are those of a cluster before
-  uint8_t escapes;                       ///< residuals with more bits
+  std::array<uint8_t, kChannels> escapes; ///< residuals with more than a byte above their low bits
   std::array<uint8_t, 3> position_bits;
   std::array<uint8_t, 2> normal_bits;
   std::array<uint8_t, kChannels * kChannelFields> coding; ///< of a field: low bits, and 64 times the class
-  std::array<uint8_t, 1> padding;
+  std::array<uint8_t, 3> padding;
 };
-inline constexpr size_t kHeaderBytes = 43; ///< what is stored of it
-static_assert(sizeof(Header) == 44 && offsetof(Header, padding) == kHeaderBytes &&
+inline constexpr size_t kHeaderBytes = 45; ///< what is stored of it
+static_assert(sizeof(Header) == 48 && offsetof(Header, padding) == kHeaderBytes &&
               std::is_trivially_copyable_v<Header>);
 
 inline constexpr uint32_t kLowBitsMask = 63, kClassShift = 6;
-inline constexpr uint32_t kEscapeFieldBits = 4, kEscapeIndexBits = 8, kEscapeWidthBits = 6;
+inline constexpr uint32_t kEscapeFieldBits = 2, kEscapeIndexBits = 8, kEscapeWidthBits = 6;
 inline constexpr uint32_t kUvAnchorBits = 32, kUvWidthBits = 5;
 inline constexpr uint32_t kByteBits = 8;
 

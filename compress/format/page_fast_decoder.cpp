@@ -15,21 +15,15 @@ using namespace page_fast;
 
 /// What is known of the cluster that is being decoded.
 struct FastPageReader::Work {
-  /// Where a field's residuals lie, for escapes.
-  struct Field {
-    const uint8_t* bytes = nullptr;
-    uint64_t bit = 0;
-    uint32_t low_bits = 0, shift = 0, count = 0;
-  };
-
-  WalkInput input;
   std::array<Layout, kChannels> layouts;
   std::array<uint64_t, kChannels> prefix_bit{}; ///< of what is copied: palettes, anchors of texture coordinates
   std::array<uint32_t, kChannels> prefix_bits{};
-  std::array<Field, kChannels * kChannelFields> fields;
   const uint8_t* turns = nullptr; ///< bits
   const uint8_t* fresh = nullptr;
   std::array<uint64_t, 2> restarts{};
+  std::array<uint8_t, kMaxClusterVertices> imports; ///< vertices
+  WalkMemory::Words residuals{};                    ///< of one channel, without gaps
+  WalkInput input;
   WalkMemory memory;
 };
 
@@ -144,12 +138,21 @@ bool FastPageReader::read_topology(const Header& header, const IndexLayout& layo
     m.crease.fill(0), m.import.fill(0);
     if (header.creases != 0 && expand_bits(creases, vertices, m.crease.data()) != header.creases) return false;
     if (header.imports != 0 && expand_bits(imports, vertices, m.import.data()) != header.imports) return false;
+    for (uint32_t v = 0, i = 0; v < vertices; ++v) {
+      w.imports[i] = static_cast<uint8_t>(v);
+      i += m.import[v];
+      m.guessed[v] = uint64_t{m.import[v]} - 1;
+    }
   }
   const uint32_t old_count = corners - vertices + header.creases;
   const uint8_t* olds = parts_[kOlds].take(old_count);
   if (olds == nullptr) return false;
   add_up_olds(olds, old_count, m.olds.data());
-  w.input = {runs, layout.restart_count};
+  w.input = {runs,
+             layout.restart_count,
+             {true, w.layouts[kNormals].field_count != 0, w.layouts[kUvs].field_count != 0},
+             {header.imports != 0, header.imports != 0 && w.layouts[kNormals].field_count > 1, header.imports != 0},
+             header.creases != 0};
   return true;
 }
 
@@ -171,91 +174,97 @@ bool FastPageReader::read_uv_layout(const baked::ClusterRecord& record) {
   return !layout.verbatim();
 }
 
-bool FastPageReader::read_channel(uint32_t channel, const Header& header, uint32_t count, uint32_t vertex_count) {
+bool FastPageReader::read_channel(uint32_t channel, const Header& header, uint32_t vertex_count) {
   Work& w = *work_;
   const Layout& layout = w.layouts[channel];
   const uint8_t* bits = parts_[kFields].at;
+  const uint8_t creases = channel == kPositions ? header.creases : 0;
+  const uint8_t imports = w.input.imported[channel] ? header.imports : 0;
+  const bool gaps = creases + imports != 0;
+  uint64_t* residuals = gaps ? w.residuals.data() : w.memory.residuals[channel].data();
+  if (1u + creases + imports > vertex_count) return false;
+  const uint32_t count = vertex_count - 1 - creases - imports;
   uint64_t first = 0;
-  uint64_t* residuals = w.memory.residuals[channel].data();
-  if (layout.verbatim()) {
-    std::fill_n(residuals, vertex_count + 1, uint64_t{0});
-    return take_bits(uint64_t{layout.stride()} * vertex_count, w.prefix_bit[channel]);
-  }
+  std::fill_n(residuals, vertex_count, uint64_t{0});
+  if (layout.verbatim())
+    return !gaps && take_bits(uint64_t{layout.stride()} * vertex_count, w.prefix_bit[channel]);
   if (!take_bits(layout.stride(), first)) return false;
   residuals[0] = read_bits(bits, first, layout.stride());
-  std::fill_n(residuals + 1, vertex_count, uint64_t{0});
-  uint32_t shift = 0;
-  for (uint32_t i = 0; i < layout.field_count; ++i) {
-    Work::Field& field = w.fields[channel * kChannelFields + i];
+  std::array<Field, kChannelFields> fields;
+  for (uint32_t i = 0, shift = 0; i < layout.field_count; shift += layout.width[i], ++i) {
     const uint32_t coding = header.coding[channel * kChannelFields + i];
-    field.low_bits = coding & kLowBitsMask, field.shift = shift, field.count = count;
-    field.bytes = parts_[kResiduals + (coding >> kClassShift)].take(count);
+    Field& field = fields[i] = {parts_[kResiduals + (coding >> kClassShift)].take(count), 0, coding & kLowBitsMask, shift};
     if (field.bytes == nullptr || field.low_bits > kMaxFieldBits - kByteBits ||
         !take_bits(uint64_t{count} * field.low_bits, field.bit))
       return false;
     add_residuals(field.bytes, count, bits, field.bit, field.low_bits, shift, residuals + 1);
-    shift += layout.width[i];
   }
+  for (uint32_t i = 0; i < header.escapes[channel]; ++i)
+    if (!read_escape(std::span(fields).first(layout.field_count), count, residuals + 1)) return false;
+  if (gaps) spread_channel(channel, creases != 0, imports != 0, vertex_count);
   return true;
+}
+
+bool FastPageReader::read_escape(std::span<const Field> fields, uint32_t count, uint64_t* residuals) {
+  const uint8_t* bits = parts_[kFields].at;
+  uint64_t at = 0;
+  const auto take = [&](uint32_t width) {
+    at += width;
+    return static_cast<uint32_t>(read_bits(bits, at - width, width));
+  };
+  if (!take_bits(kEscapeFieldBits + kEscapeIndexBits + kEscapeWidthBits, at)) return false;
+  const uint32_t number = take(kEscapeFieldBits), index = take(kEscapeIndexBits), width = take(kEscapeWidthBits);
+  if (number >= fields.size() || index >= count || width > kMaxFieldBits || !take_bits(width, at)) return false;
+  const Field& field = fields[number];
+  const uint64_t low = read_bits(bits, field.bit + uint64_t{index} * field.low_bits, field.low_bits);
+  const uint64_t without = (uint64_t{field.bytes[index]} << field.low_bits) | low;
+  const uint64_t with = (read_bits(bits, at, width) << field.low_bits) | low;
+  residuals[index] += (unzigzag(with) - unzigzag(without)) << field.shift;
+  return true;
+}
+
+/// Leaves gaps for the vertices that have no residuals.
+void FastPageReader::spread_channel(uint32_t channel, bool creases, bool imports, uint32_t vertex_count) {
+  WalkMemory& m = work_->memory;
+  std::array<uint8_t, kMaxClusterVertices> either;
+  const uint8_t* gaps = creases ? m.crease.data() : m.import.data();
+  if (creases && imports) {
+    for (uint32_t v = 0; v < vertex_count; ++v) either[v] = m.crease[v] | m.import[v];
+    gaps = either.data();
+  }
+  spread_residuals(work_->residuals.data(), gaps, vertex_count, m.residuals[channel].data());
 }
 
 bool FastPageReader::read_channels(const Header& header, const baked::ClusterRecord& record) {
   Work& w = *work_;
-  const uint32_t vertex_count = record.vertex_count, taken = 1u + header.creases + header.imports;
-  const bool has_normals = w.layouts[kNormals].field_count != 0, has_uvs = w.layouts[kUvs].field_count != 0;
-  if (taken > vertex_count || !take_bits(w.prefix_bits[kNormals], w.prefix_bit[kNormals])) return false;
-  if (!read_channel(kPositions, header, vertex_count - taken, vertex_count)) return false;
-  const uint32_t attributes = vertex_count - 1u - header.imports;
-  if (has_normals &&
-      !read_channel(kNormals, header, record.normal_palette != 0 ? vertex_count - 1 : attributes, vertex_count))
-    return false;
-  if (has_uvs && !read_channel(kUvs, header, attributes, vertex_count)) return false;
-  return read_escapes(header);
-}
-
-bool FastPageReader::read_escapes(const Header& header) {
-  Work& w = *work_;
-  const uint8_t* bits = parts_[kFields].at;
-  for (uint32_t i = 0; i < header.escapes; ++i) {
-    uint64_t at = 0, value_at = 0;
-    if (!take_bits(kEscapeFieldBits + kEscapeIndexBits + kEscapeWidthBits, at)) return false;
-    const auto number = static_cast<uint32_t>(read_bits(bits, at, kEscapeFieldBits));
-    const auto index = static_cast<uint32_t>(read_bits(bits, at + kEscapeFieldBits, kEscapeIndexBits));
-    const auto width =
-        static_cast<uint32_t>(read_bits(bits, at + kEscapeFieldBits + kEscapeIndexBits, kEscapeWidthBits));
-    if (number >= w.fields.size()) return false;
-    const Work::Field& field = w.fields[number];
-    if (w.layouts[number / kChannelFields].field_count <= number % kChannelFields ||
-        w.layouts[number / kChannelFields].verbatim() || index >= field.count || width > kMaxFieldBits ||
-        !take_bits(width, value_at))
-      return false;
-    const uint64_t low = read_bits(bits, field.bit + uint64_t{index} * field.low_bits, field.low_bits);
-    const uint64_t without = (uint64_t{field.bytes[index]} << field.low_bits) | low;
-    const uint64_t with = (read_bits(bits, value_at, width) << field.low_bits) | low;
-    w.memory.residuals[number / kChannelFields][1 + index] += (unzigzag(with) - unzigzag(without)) << field.shift;
-  }
-  return true;
+  if (!take_bits(w.prefix_bits[kNormals], w.prefix_bit[kNormals])) return false;
+  for (uint32_t channel = 0; channel < kChannels; ++channel)
+    if (w.input.has[channel] && !read_channel(channel, header, record.vertex_count)) return false;
+  return header.imports == 0 || read_imports(header);
 }
 
 /// The words of the vertices that are those of clusters before.
-bool FastPageReader::read_imports(const Header& header, uint32_t channels) {
+bool FastPageReader::read_imports(const Header& header) {
   Work& w = *work_;
   const uint8_t* low = parts_[kRefLow].take(header.imports);
   const uint8_t* high = parts_[kRefHigh].take(header.imports);
   if (low == nullptr || high == nullptr) return false;
+  std::array<uint32_t, kMaxClusterVertices> originals;
   for (uint32_t i = 0; i < header.imports; ++i) {
     last_import_ += static_cast<uint32_t>(unzigzag(low[i] | uint64_t{high[i]} << 8));
     if (last_import_ >= page_vertex_count_) return false;
-    for (uint32_t channel = 0; channel < channels; ++channel) {
-      const Layout& layout = w.layouts[channel];
-      uint64_t word = 0;
-      uint32_t shift = 0;
-      for (uint32_t f = 0; f < layout.field_count; ++f) {
-        const uint32_t field = page_vertices_[channel * kChannelFields + f][last_import_] - layout.base[f];
-        word |= (field & ((uint64_t{1} << layout.width[f]) - 1)) << (shift & 63u);
-        shift += layout.width[f];
+    originals[i] = last_import_;
+  }
+  for (uint32_t channel = 0; channel < kChannels; ++channel) {
+    if (!w.input.has[channel] || !w.input.imported[channel]) continue;
+    const Layout& layout = w.layouts[channel];
+    for (uint32_t f = 0, shift = 0; f < layout.field_count; shift += layout.width[f], ++f) {
+      const uint32_t* fields = page_vertices_[channel * kChannelFields + f].data();
+      const uint64_t mask = (uint64_t{1} << layout.width[f]) - 1;
+      for (uint32_t i = 0; i < header.imports; ++i) {
+        uint64_t& word = w.memory.residuals[channel][w.imports[i]];
+        word = (f == 0 ? 0 : word) | ((fields[originals[i]] - layout.base[f]) & mask) << shift;
       }
-      w.memory.words[channel][kFirstImport + i] = word;
     }
   }
   return true;
@@ -316,13 +325,8 @@ bool FastPageReader::append(const baked::GeometryRecord& geometry, baked::Cluste
   if (record.normal_palette != 0 && w.layouts[kNormals].field_count == 0) return false;
   w.prefix_bits[kNormals] = record.normal_palette * (uint32_t{record.normal_bits[0]} + record.normal_bits[1] +
                                                      normal_chart_bits(geometry, record));
-  if (!read_topology(header, layout) || !read_uv_layout(record) || !read_channels(header, record)) return false;
-
-  const bool has_normals = w.layouts[kNormals].field_count != 0, has_uvs = w.layouts[kUvs].field_count != 0;
-  const bool shared = header.creases + header.imports != 0;
-  if (header.imports != 0 && !read_imports(header, kChannels)) return false;
-  w.input.imports_normals = record.normal_palette == 0;
-  walk_strips(w.input, w.memory, has_normals, has_uvs, shared);
+  if (!read_uv_layout(record) || !read_topology(header, layout) || !read_channels(header, record)) return false;
+  walk_strips(w.input, w.memory);
   keep_vertices(record.vertex_count);
 
   uint64_t bits = layout.total_bits();

@@ -47,16 +47,23 @@ private:
     }
   };
 
+  /// Where a field's residuals lie.
+  struct Field {
+    const uint8_t* bytes = nullptr;
+    uint64_t bit = 0; ///< of the low bits
+    uint32_t low_bits = 0, shift = 0;
+  };
+
   bool take_bits(uint64_t count, uint64_t& first);
   page_fast::Header next_header();
   bool read_record(const page_fast::Header& header, baked::ClusterRecord& record);
   bool read_topology(const page_fast::Header& header, const IndexLayout& layout);
   bool read_uv_layout(const baked::ClusterRecord& record);
   bool read_channels(const page_fast::Header& header, const baked::ClusterRecord& record);
-  bool read_channel(uint32_t channel, const page_fast::Header& header, uint32_t count, uint32_t vertex_count);
-  bool read_escapes(const page_fast::Header& header);
-  bool read_imports(const page_fast::Header& header, uint32_t channels);
-  void walk(uint32_t channels, bool shared, bool imports_normals);
+  bool read_channel(uint32_t channel, const page_fast::Header& header, uint32_t vertex_count);
+  bool read_escape(std::span<const Field> fields, uint32_t count, uint64_t* residuals);
+  void spread_channel(uint32_t channel, bool creases, bool imports, uint32_t vertex_count);
+  bool read_imports(const page_fast::Header& header);
   void keep_vertices(uint32_t vertex_count);
   void put_bits(const uint8_t* bytes, uint64_t first, uint64_t count);
   void put_cluster(const baked::ClusterRecord& record, const IndexLayout& layout);
