@@ -299,9 +299,29 @@ void FastPageWriter::add_fields(const ClusterView& view) {
       continue;
     }
     put(channel, vertices_[0].words[channel], layout.stride());
-    for (uint32_t i = 0; i < layout.field_count; ++i) code_field(channel, i);
+    code_channel(channel);
     put_escapes(channel);
   }
+}
+
+void FastPageWriter::code_channel(Channel channel) {
+  const uint32_t first = channel * kChannelFields, field_count = layouts_[channel].field_count;
+  std::array<uint32_t, kChannelFields> low_bits{};
+  for (uint32_t i = 0; i < field_count; ++i) {
+    const std::vector<uint64_t>& residuals = residuals_[first + i];
+    low_bits[i] = choose_low_bits(residuals, kMaxEscapes - static_cast<uint32_t>(escapes_.size()));
+    const uint32_t residual_class = class_of(residuals, low_bits[i]);
+    header_.coding[first + i] = static_cast<uint8_t>(low_bits[i] | (residual_class << kClassShift));
+    for (uint32_t k = 0; k < residuals.size(); ++k) {
+      const uint64_t high = residuals[k] >> low_bits[i];
+      if (high > kByteMask) escapes_.push_back({i, k, high});
+      parts_[kResiduals + residual_class].push_back(high > kByteMask ? 0 : static_cast<uint8_t>(high));
+    }
+    residual_counts_[residual_class][channel] += residuals.size();
+  }
+  for (size_t k = 0; k < residuals_[first].size(); ++k)
+    for (uint32_t i = 0; i < field_count; ++i)
+      put(channel, residuals_[first + i][k] & ((uint64_t{1} << low_bits[i]) - 1), low_bits[i]);
 }
 
 void FastPageWriter::put_escapes(Channel channel) {
@@ -314,21 +334,6 @@ void FastPageWriter::put_escapes(Channel channel) {
   }
   header_.escapes[channel] = static_cast<uint8_t>(escapes_.size());
   escapes_.clear();
-}
-
-void FastPageWriter::code_field(Channel channel, uint32_t field) {
-  const uint32_t number = channel * kChannelFields + field;
-  const std::vector<uint64_t>& residuals = residuals_[number];
-  const uint32_t low_bits = choose_low_bits(residuals, kMaxEscapes - static_cast<uint32_t>(escapes_.size()));
-  const uint32_t residual_class = class_of(residuals, low_bits);
-  header_.coding[number] = static_cast<uint8_t>(low_bits | (residual_class << kClassShift));
-  for (uint32_t i = 0; i < residuals.size(); ++i) {
-    const uint64_t high = residuals[i] >> low_bits;
-    if (high > kByteMask) escapes_.push_back({field, i, high});
-    parts_[kResiduals + residual_class].push_back(high > kByteMask ? 0 : static_cast<uint8_t>(high));
-    put(channel, residuals[i] & ((uint64_t{1} << low_bits) - 1), low_bits);
-  }
-  residual_counts_[residual_class][channel] += residuals.size();
 }
 
 void FastPageWriter::add_header(const baked::ClusterRecord& record) {

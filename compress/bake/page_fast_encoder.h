@@ -57,7 +57,7 @@ private:
   void add_residuals(uint32_t vertex, std::array<int32_t, 3> guess);
   void add_fields(const ClusterView& view);
   void copy_bits(const ClusterView& view, page_fast::Channel channel, uint64_t first, uint64_t count);
-  void code_field(page_fast::Channel channel, uint32_t field);
+  void code_channel(page_fast::Channel channel);
   void put_escapes(page_fast::Channel channel);
   void put(page_fast::Channel channel, uint64_t value, uint32_t bits);
   void add_header(const baked::ClusterRecord& record);

@@ -184,28 +184,30 @@ bool FastPageReader::read_channel(uint32_t channel, const Header& header, uint32
   uint64_t* residuals = gaps ? w.residuals.data() : w.memory.residuals[channel].data();
   if (1u + creases + imports > vertex_count) return false;
   const uint32_t count = vertex_count - 1 - creases - imports;
-  uint64_t first = 0;
-  std::fill_n(residuals, vertex_count, uint64_t{0});
-  if (layout.verbatim())
+  if (layout.verbatim()) {
+    std::fill_n(residuals, vertex_count, uint64_t{0});
     return !gaps && take_bits(uint64_t{layout.stride()} * vertex_count, w.prefix_bit[channel]);
+  }
+  uint64_t first = 0;
   if (!take_bits(layout.stride(), first)) return false;
   residuals[0] = read_bits(bits, first, layout.stride());
-  std::array<Field, kChannelFields> fields;
+  ChannelCode code{layout.field_count, {}, bits, 0, 0};
   for (uint32_t i = 0, shift = 0; i < layout.field_count; shift += layout.width[i], ++i) {
-    const uint32_t coding = header.coding[channel * kChannelFields + i];
-    Field& field = fields[i] = {parts_[kResiduals + (coding >> kClassShift)].take(count), 0, coding & kLowBitsMask, shift};
-    if (field.bytes == nullptr || field.low_bits > kMaxFieldBits - kByteBits ||
-        !take_bits(uint64_t{count} * field.low_bits, field.bit))
-      return false;
-    add_residuals(field.bytes, count, bits, field.bit, field.low_bits, shift, residuals + 1);
+    const uint32_t coding = header.coding[channel * kChannelFields + i], low_bits = coding & kLowBitsMask;
+    code.fields[i] = {parts_[kResiduals + (coding >> kClassShift)].take(count), low_bits, code.low_stride, shift};
+    code.low_stride += low_bits;
+    if (code.fields[i].bytes == nullptr || code.low_stride > kMaxFieldBits) return false;
   }
+  if (!take_bits(uint64_t{count} * code.low_stride, code.low_bit)) return false;
+  kernels_->read_residuals(code, count, residuals + 1);
   for (uint32_t i = 0; i < header.escapes[channel]; ++i)
-    if (!read_escape(std::span(fields).first(layout.field_count), count, residuals + 1)) return false;
+    if (!read_escape(code, count, residuals + 1)) return false;
   if (gaps) spread_channel(channel, creases != 0, imports != 0, vertex_count);
   return true;
 }
 
-bool FastPageReader::read_escape(std::span<const Field> fields, uint32_t count, uint64_t* residuals) {
+/// A residual that has more bits.
+bool FastPageReader::read_escape(const ChannelCode& code, uint32_t count, uint64_t* residuals) {
   const uint8_t* bits = parts_[kFields].at;
   uint64_t at = 0;
   const auto take = [&](uint32_t width) {
@@ -214,12 +216,11 @@ bool FastPageReader::read_escape(std::span<const Field> fields, uint32_t count, 
   };
   if (!take_bits(kEscapeFieldBits + kEscapeIndexBits + kEscapeWidthBits, at)) return false;
   const uint32_t number = take(kEscapeFieldBits), index = take(kEscapeIndexBits), width = take(kEscapeWidthBits);
-  if (number >= fields.size() || index >= count || width > kMaxFieldBits || !take_bits(width, at)) return false;
-  const Field& field = fields[number];
-  const uint64_t low = read_bits(bits, field.bit + uint64_t{index} * field.low_bits, field.low_bits);
-  const uint64_t without = (uint64_t{field.bytes[index]} << field.low_bits) | low;
-  const uint64_t with = (read_bits(bits, at, width) << field.low_bits) | low;
-  residuals[index] += (unzigzag(with) - unzigzag(without)) << field.shift;
+  if (number >= code.field_count || index >= count || width > kMaxFieldBits || !take_bits(width, at)) return false;
+  const FieldCode& field = code.fields[number];
+  const uint64_t low = code.low_of(index);
+  residuals[index] +=
+      residual_word(field, read_bits(bits, at, width), low) - residual_word(field, field.bytes[index], low);
   return true;
 }
 
@@ -277,9 +278,9 @@ void FastPageReader::keep_vertices(uint32_t vertex_count) {
     const Layout& layout = w.layouts[channel];
     for (uint32_t f = 0, shift = 0; f < kChannelFields; shift += layout.width[f], ++f) {
       std::vector<uint32_t>& fields = page_vertices_[channel * kChannelFields + f];
-      if (fields.size() < needed) fields.resize(2 * needed);
+      if (fields.size() < needed + kSpareWords) fields.resize(2 * needed + kSpareWords);
       if (f < layout.field_count && !layout.verbatim())
-        keep_field(w.memory.words[channel].data(), vertex_count, shift, layout.width[f], layout.base[f],
+        kernels_->keep_field(w.memory.words[channel].data(), vertex_count, shift, layout.width[f], layout.base[f],
                    fields.data() + first);
     }
   }
@@ -298,8 +299,10 @@ void FastPageReader::put_cluster(const baked::ClusterRecord& record, const Index
   put_bits(w.turns, 0, layout.triangle_count);
   put_bits(w.fresh, 0, layout.corner_count());
   const uint32_t width = layout.index_bits();
-  for (uint32_t i = 0, n = layout.corner_count() - layout.vertex_count; i < n; ++i)
-    payload_.put(w.memory.explicits[i] & ((1u << width) - 1), width);
+  const uint8_t* explicits = w.memory.explicits.data();
+  const uint32_t count = layout.corner_count() - layout.vertex_count, index_mask = (1u << width) - 1;
+  payload_.put_each(count / 4, 4 * width, [&](uint32_t i) { return pack_four(explicits + size_t{4} * i, width); });
+  payload_.put_each(count % 4, width, [&](uint32_t i) { return explicits[count / 4 * 4 + i] & index_mask; });
   for (uint32_t channel = 0; channel < kChannels; ++channel) {
     const Layout& one = w.layouts[channel];
     if (one.field_count == 0) continue;
@@ -311,7 +314,7 @@ void FastPageReader::put_cluster(const baked::ClusterRecord& record, const Index
     const uint32_t stride = one.stride();
     const uint64_t mask = (uint64_t{1} << stride) - 1;
     const uint64_t* words = w.memory.words[channel].data();
-    for (uint32_t v = 0; v < record.vertex_count; ++v) payload_.put(words[v] & mask, stride);
+    payload_.put_each(record.vertex_count, stride, [&](uint32_t v) { return words[v] & mask; });
   }
 }
 

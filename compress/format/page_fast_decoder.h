@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/page_fast.h"
+#include "compress/format/page_fast_kernels.h"
 #include "compress/format/payload_writer.h"
 
 struct ZSTD_DCtx_s;
@@ -47,13 +47,6 @@ private:
     }
   };
 
-  /// Where a field's residuals lie.
-  struct Field {
-    const uint8_t* bytes = nullptr;
-    uint64_t bit = 0; ///< of the low bits
-    uint32_t low_bits = 0, shift = 0;
-  };
-
   bool take_bits(uint64_t count, uint64_t& first);
   page_fast::Header next_header();
   bool read_record(const page_fast::Header& header, baked::ClusterRecord& record);
@@ -61,7 +54,7 @@ private:
   bool read_uv_layout(const baked::ClusterRecord& record);
   bool read_channels(const page_fast::Header& header, const baked::ClusterRecord& record);
   bool read_channel(uint32_t channel, const page_fast::Header& header, uint32_t vertex_count);
-  bool read_escape(std::span<const Field> fields, uint32_t count, uint64_t* residuals);
+  bool read_escape(const page_fast::ChannelCode& code, uint32_t count, uint64_t* residuals);
   void spread_channel(uint32_t channel, bool creases, bool imports, uint32_t vertex_count);
   bool read_imports(const page_fast::Header& header);
   void keep_vertices(uint32_t vertex_count);
@@ -78,6 +71,7 @@ private:
   /// Fields of the page's vertices so far, as differences to 0, modulo 2^32.
   std::array<std::vector<uint32_t>, page_fast::kChannels * page_fast::kChannelFields> page_vertices_;
   uint32_t page_vertex_count_ = 0;
+  const page_fast::FieldKernels* kernels_ = &page_fast::field_kernels();
   std::unique_ptr<Work> work_;
 };
 

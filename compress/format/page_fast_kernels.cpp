@@ -104,6 +104,24 @@ void walk_channels(const WalkInput& input, WalkMemory& memory, const std::array<
     Walk<kCount, false, false>(input, memory, channels).run();
 }
 
+template <uint32_t kCount>
+void sum_fields(const ChannelCode& code, uint32_t count, uint64_t* out) {
+  if (code.low_stride == 0) {
+    for (uint32_t i = 0; i < count; ++i) {
+      uint64_t word = 0;
+      for (uint32_t f = 0; f < kCount; ++f) word += unzigzag(code.fields[f].bytes[i]) << code.fields[f].shift;
+      out[i] = word;
+    }
+    return;
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    const uint64_t low = code.low_of(i);
+    uint64_t word = 0;
+    for (uint32_t f = 0; f < kCount; ++f) word += residual_word(code.fields[f], code.fields[f].bytes[i], low);
+    out[i] = word;
+  }
+}
+
 } // namespace
 
 uint32_t expand_bits(const uint8_t* bits, uint32_t count, uint8_t* out) {
@@ -128,14 +146,21 @@ void add_up_olds(const uint8_t* differences, uint32_t count, uint8_t* out) {
   }
 }
 
-void add_residuals(const uint8_t* bytes, uint32_t count, const uint8_t* bits, uint64_t bit, uint32_t low_bits,
-                   uint32_t shift, uint64_t* out) {
-  if (low_bits == 0) {
-    for (uint32_t i = 0; i < count; ++i) out[i] += unzigzag(bytes[i]) << shift;
-    return;
-  }
-  for (uint32_t i = 0; i < count; ++i, bit += low_bits)
-    out[i] += unzigzag((uint64_t{bytes[i]} << low_bits) | read_bits(bits, bit, low_bits)) << shift;
+void read_residuals(const ChannelCode& code, uint32_t count, uint64_t* out) {
+  if (code.field_count == 3)
+    sum_fields<3>(code, count, out);
+  else if (code.field_count == 2)
+    sum_fields<2>(code, count, out);
+  else
+    sum_fields<1>(code, count, out);
+}
+
+uint64_t pack_four(const uint8_t* bytes, uint32_t width) {
+  uint32_t four = 0;
+  std::memcpy(&four, bytes, sizeof four);
+  four &= ((1u << width) - 1) * 0x01010101u;
+  const uint32_t two = (four & 0x00ff00ffu) | ((four & 0xff00ff00u) >> (8 - width));
+  return (two & 0xffffu) | (uint64_t{two >> 16} << (2 * width));
 }
 
 void spread_residuals(const uint64_t* residuals, const uint8_t* flags, uint32_t count, uint64_t* out) {
@@ -159,6 +184,16 @@ void walk_strips(const WalkInput& input, WalkMemory& memory) {
 void keep_field(const uint64_t* words, uint32_t count, uint32_t shift, uint32_t width, uint32_t base, uint32_t* out) {
   const uint64_t mask = (uint64_t{1} << width) - 1;
   for (uint32_t i = 0; i < count; ++i) out[i] = static_cast<uint32_t>((words[i] >> shift) & mask) + base;
+}
+
+const FieldKernels& field_kernels() {
+  static constexpr FieldKernels kPortable{read_residuals, keep_field};
+#if defined(__x86_64__)
+  static constexpr FieldKernels kAvx2{avx2::read_residuals, avx2::keep_field};
+  static const bool has_avx2 = __builtin_cpu_supports("avx2");
+  if (has_avx2) return kAvx2;
+#endif
+  return kPortable;
 }
 
 } // namespace packtrace::page_fast

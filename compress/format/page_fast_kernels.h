@@ -41,9 +41,29 @@ uint32_t expand_bits(const uint8_t* bits, uint32_t count, uint8_t* out);
 /// Zigzag differences to the last, modulo 256, added up.
 void add_up_olds(const uint8_t* differences, uint32_t count, uint8_t* out);
 
-/// Adds to out[i] the signed number with bytes[i] above low_bits bits, as a zigzag number, times 2^shift.
-void add_residuals(const uint8_t* bytes, uint32_t count, const uint8_t* bits, uint64_t bit, uint32_t low_bits,
-                   uint32_t shift, uint64_t* out);
+/// Where the residuals of one field lie.
+struct FieldCode {
+  const uint8_t* bytes = nullptr; ///< above the low bits
+  uint32_t low_bits = 0, low_at = 0; ///< within the low bits of a vertex
+  uint32_t shift = 0;                ///< of the field in its word
+};
+
+/// The low bits of all of a channel's fields lie together.
+struct ChannelCode {
+  uint32_t field_count = 0; ///< 1..3
+  FieldCode fields[kChannelFields]; ///< no std::array, whose functions are inline
+  const uint8_t* low = nullptr;
+  uint64_t low_bit = 0;    ///< where they begin
+  uint32_t low_stride = 0; ///< bits of a vertex, 0..57
+
+  uint64_t low_of(uint32_t index) const { return read_bits(low, low_bit + uint64_t{index} * low_stride, low_stride); }
+};
+
+/// What one field adds to a word: a zigzag number, `high` above the field's low bits.
+inline uint64_t residual_word(const FieldCode& field, uint64_t high, uint64_t low) {
+  const uint64_t below = (low >> field.low_at) & ((uint64_t{1} << field.low_bits) - 1);
+  return unzigzag((high << field.low_bits) | below) << field.shift;
+}
 
 /// Makes room for the vertices with flags[i] != 0: out[i] = residuals[k] for the k-th of the others. Those get any.
 void spread_residuals(const uint64_t* residuals, const uint8_t* flags, uint32_t count, uint64_t* out);
@@ -52,7 +72,28 @@ void spread_residuals(const uint64_t* residuals, const uint8_t* flags, uint32_t 
 /// as there are vertices.
 void walk_strips(const WalkInput& input, WalkMemory& memory);
 
-/// out[i] = the field of words[i], plus base.
+/// The low bits of four bytes as one number of 4 width bits; width 0..8.
+uint64_t pack_four(const uint8_t* bytes, uint32_t width);
+
+/// out[i] = the sum of all fields of residual i. Up to kSpareWords words behind out[count - 1] may be overwritten.
+void read_residuals(const ChannelCode& code, uint32_t count, uint64_t* out);
+
+/// out[i] = the field of words[i], plus base. Reads and overwrites up to kSpareWords entries behind the last.
 void keep_field(const uint64_t* words, uint32_t count, uint32_t shift, uint32_t width, uint32_t base, uint32_t* out);
+
+/// The last two, which have the same results for every processor.
+struct FieldKernels {
+  void (*read_residuals)(const ChannelCode& code, uint32_t count, uint64_t* out) = nullptr;
+  void (*keep_field)(const uint64_t* words, uint32_t count, uint32_t shift, uint32_t width, uint32_t base,
+                     uint32_t* out) = nullptr;
+};
+
+/// Those for this processor.
+const FieldKernels& field_kernels();
+
+namespace avx2 {
+void read_residuals(const ChannelCode& code, uint32_t count, uint64_t* out);
+void keep_field(const uint64_t* words, uint32_t count, uint32_t shift, uint32_t width, uint32_t base, uint32_t* out);
+} // namespace avx2
 
 } // namespace packtrace::page_fast

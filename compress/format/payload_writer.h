@@ -31,13 +31,26 @@ public:
 
   /// @param bits 0..57; value must fit
   void put(uint64_t value, uint32_t bits) {
-    pending_ |= value << pending_bits_;
-    pending_bits_ += bits;
-    std::memcpy(at_, &pending_, sizeof pending_);
-    const uint32_t whole = pending_bits_ & ~7u;
-    at_ += whole >> 3;
-    pending_ = whole == 64 ? 0 : pending_ >> whole;
-    pending_bits_ -= whole;
+    put_each(1, bits, [&](uint32_t) { return value; });
+  }
+
+  /// value_of(0) to value_of(count - 1), `bits` bits each.
+  template <class ValueOf>
+  void put_each(uint32_t count, uint32_t bits, const ValueOf& value_of) {
+    // In registers: what is stored could be these members, for all the compiler knows.
+    uint8_t* at = at_;
+    uint64_t pending = pending_;
+    uint32_t pending_bits = pending_bits_;
+    for (uint32_t i = 0; i < count; ++i) {
+      pending |= value_of(i) << pending_bits;
+      pending_bits += bits;
+      std::memcpy(at, &pending, sizeof pending);
+      const uint32_t whole = pending_bits & ~7u;
+      at += whole >> 3;
+      pending = whole == 64 ? 0 : pending >> whole;
+      pending_bits -= whole;
+    }
+    at_ = at, pending_ = pending, pending_bits_ = pending_bits;
   }
 
   size_t size() const { return static_cast<size_t>(word_ * 4); }
