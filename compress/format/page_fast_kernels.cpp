@@ -69,7 +69,7 @@ private:
     }
   }
 
-  void corner(std::array<Corners, kCount>& t, std::array<uint64_t, kCount>& guess) {
+  void corner(std::array<Corners, kCount>& t, const std::array<uint64_t, kCount>& guess) {
     const uint32_t fresh = memory_.fresh[corner_++], named = memory_.olds[old_];
     const uint32_t placed = kCreases ? fresh & (memory_.crease[vertex_] ^ 1u) : fresh; // not at a named vertex
     old_ += placed ^ 1u;
@@ -78,9 +78,10 @@ private:
       explicit_ += fresh ^ 1u;
     }
     for (uint32_t k = 0; k < kCount; ++k) {
-      if constexpr (kImports) guess[k] &= guessed_[k][vertex_];
-      const uint64_t word =
-          select(mask_of(k == 0 ? placed : fresh), guess[k] + residuals_[k][vertex_], words_[k][named]);
+      // All but the last two operations can be done before the guess is known.
+      const uint64_t is_new = mask_of(k == 0 ? placed : fresh);
+      const uint64_t rest = select(is_new, residuals_[k][vertex_], words_[k][named]);
+      const uint64_t word = (guess[k] & (kImports ? is_new & guessed_[k][vertex_] : is_new)) + rest;
       words_[k][vertex_] = word; // overwritten unless it is a new vertex
       t[k].c = word;
     }
