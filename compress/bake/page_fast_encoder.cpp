@@ -54,8 +54,8 @@ uint32_t choose_low_bits(std::span<const uint64_t> residuals, uint32_t max_escap
   return best;
 }
 
-/// A zstd frame of almost nothing but Huffman codes, which is the quickest to read; searching for short repetitions makes
-/// pages .3 % smaller. Or the bytes as they are.
+/// A zstd frame of almost nothing but Huffman codes, which is the quickest to read; searching for short repetitions
+/// makes pages .3 % smaller. Or the bytes as they are.
 std::vector<uint8_t> zip_part(ZSTD_CCtx* zstd, const std::vector<uint8_t>& bytes) {
   if (bytes.empty()) return {};
   std::vector<uint8_t> out(ZSTD_compressBound(bytes.size()));
@@ -264,9 +264,9 @@ void FastPageWriter::add_residuals(uint32_t vertex, std::array<int32_t, 3> guess
     if (copied || layout.verbatim()) continue;
     for (uint32_t i = 0; i < layout.field_count; ++i) {
       const auto value = [&](int32_t v) {
-        return v == kNoVertex ? 0
-                              : static_cast<int64_t>(
-                                    field_of(layout, vertices_[static_cast<size_t>(v)].words[channel], i));
+        return v == kNoVertex
+                   ? 0
+                   : static_cast<int64_t>(field_of(layout, vertices_[static_cast<size_t>(v)].words[channel], i));
       };
       residuals_[channel * kChannelFields + i].push_back(
           zigzag(value(static_cast<int32_t>(vertex)) - (value(guess[0]) + value(guess[1]) - value(guess[2]))));
@@ -364,7 +364,8 @@ std::vector<uint8_t> FastPageWriter::finish(ZSTD_CCtx_s* zstd, std::array<double
   fields_.align(1);
   parts_[kFields] = fields_.bytes();
   for (size_t byte = 0; byte < kHeaderBytes; ++byte)
-    for (const Header& header : headers_) parts_[kHeaders].push_back(std::bit_cast<std::array<uint8_t, sizeof header>>(header)[byte]);
+    for (const Header& header : headers_)
+      parts_[kHeaders].push_back(std::bit_cast<std::array<uint8_t, sizeof header>>(header)[byte]);
   bits = field_bits_;
   Bytes page, data;
   for (uint32_t i = 0; i < kParts; ++i) {
@@ -386,8 +387,8 @@ void FastPageWriter::count_part(uint32_t part, double part_bits, std::array<doub
   if (part < kResiduals || parts_[part].empty()) return;
   for (uint32_t channel = 0; channel < kChannels; ++channel)
     bits[static_cast<size_t>(kStreamOf[channel])] += part_bits *
-                                                      static_cast<double>(residual_counts_[part - kResiduals][channel]) /
-                                                      static_cast<double>(parts_[part].size());
+                                                     static_cast<double>(residual_counts_[part - kResiduals][channel]) /
+                                                     static_cast<double>(parts_[part].size());
 }
 
 } // namespace packtrace

@@ -208,7 +208,9 @@ void ClusterPacker::put_positions(const ClusterValues& values, const baked::Clus
 }
 
 void ClusterPacker::put_normals(const ClusterValues& values) {
-  const auto put_one = [&](NormalFields fields) { payload_.put(packed_normal(encoding_, normals_, fields), normals_.stride()); };
+  const auto put_one = [&](NormalFields fields) {
+    payload_.put(packed_normal(encoding_, normals_, fields), normals_.stride());
+  };
   if (palette_count_ == 0) {
     for (uint32_t v = 0; v < values.vertex_count; ++v) put_one(values.normals[v]);
     return;

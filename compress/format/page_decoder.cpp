@@ -81,8 +81,8 @@ struct PageDecoder::Scratch {
                               std::span<baked::ClusterRecord> clusters, std::span<uint8_t> payload) {
     const auto end_of = [](const baked::GeometryRecord& one) { return one.first_cluster + one.cluster_count; };
     const auto ended = [&](const baked::GeometryRecord& one) { return end_of(one) <= place.first_cluster; };
-    auto g = static_cast<size_t>(
-        std::partition_point(place.geometries.begin(), place.geometries.end(), ended) - place.geometries.begin());
+    auto g = static_cast<size_t>(std::partition_point(place.geometries.begin(), place.geometries.end(), ended) -
+                                 place.geometries.begin());
     for (size_t i = 0; i < clusters.size(); ++i) {
       while (g < place.geometries.size() && end_of(place.geometries[g]) <= place.first_cluster + i) ++g;
       if (g == place.geometries.size()) return false;

@@ -37,16 +37,16 @@ inline constexpr uint32_t kChannelFields = 3; ///< at most
 
 /// What is said of a cluster; differences are to the cluster before, as zigzag numbers.
 struct Header {
-  std::array<uint32_t, 3> anchor;        ///< difference
-  uint32_t material;                     ///< exclusive or with the last
-  std::array<uint16_t, 2> normal_anchor; ///< difference
-  uint16_t palette;                      ///< as in the record
-  uint8_t triangles;                     ///< less one
-  uint8_t vertices;                      ///< less one
-  uint8_t strips;                        ///< less one
-  uint8_t flags;                         ///< as in the record
-  uint8_t creases;                       ///< fresh vertices at the place of an older one of the cluster
-  uint8_t imports;                       ///< fresh vertices that are those of a cluster before
+  std::array<uint32_t, 3> anchor;         ///< difference
+  uint32_t material;                      ///< exclusive or with the last
+  std::array<uint16_t, 2> normal_anchor;  ///< difference
+  uint16_t palette;                       ///< as in the record
+  uint8_t triangles;                      ///< less one
+  uint8_t vertices;                       ///< less one
+  uint8_t strips;                         ///< less one
+  uint8_t flags;                          ///< as in the record
+  uint8_t creases;                        ///< fresh vertices at the place of an older one of the cluster
+  uint8_t imports;                        ///< fresh vertices that are those of a cluster before
   std::array<uint8_t, kChannels> escapes; ///< residuals with more than a byte above their low bits
   std::array<uint8_t, 3> position_bits;
   std::array<uint8_t, 2> normal_bits;

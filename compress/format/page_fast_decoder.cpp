@@ -88,11 +88,11 @@ bool FastPageReader::read_record(const Header& header, baked::ClusterRecord& rec
   record = {};
   record.material = last_.material ^ header.material;
   for (size_t i = 0; i < 3; ++i)
-    record.anchor[i] =
-        static_cast<int32_t>(static_cast<uint32_t>(last_.anchor[i]) + static_cast<uint32_t>(unzigzag(header.anchor[i])));
+    record.anchor[i] = static_cast<int32_t>(static_cast<uint32_t>(last_.anchor[i]) +
+                                            static_cast<uint32_t>(unzigzag(header.anchor[i])));
   for (size_t i = 0; i < 2; ++i)
-    record.normal_anchor[i] = static_cast<int16_t>(static_cast<uint64_t>(last_.normal_anchor[i]) +
-                                                   unzigzag(header.normal_anchor[i]));
+    record.normal_anchor[i] =
+        static_cast<int16_t>(static_cast<uint64_t>(last_.normal_anchor[i]) + unzigzag(header.normal_anchor[i]));
   record.vertex_count = static_cast<uint16_t>(header.vertices + 1);
   record.normal_palette = header.palette;
   record.triangle_count = static_cast<uint8_t>(header.triangles + 1);
@@ -281,7 +281,7 @@ void FastPageReader::keep_vertices(uint32_t vertex_count) {
       if (fields.size() < needed + kSpareWords) fields.resize(2 * needed + kSpareWords);
       if (f < layout.field_count && !layout.verbatim())
         kernels_->keep_field(w.memory.words[channel].data(), vertex_count, shift, layout.width[f], layout.base[f],
-                   fields.data() + first);
+                             fields.data() + first);
     }
   }
   page_vertex_count_ += vertex_count;

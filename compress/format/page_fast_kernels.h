@@ -30,9 +30,9 @@ struct WalkMemory {
 struct WalkInput {
   const uint8_t* runs = nullptr; ///< triangles of each strip, at most 128 in all
   uint32_t run_count = 0;
-  std::array<bool, kChannels> has{}; ///< of the positions always
+  std::array<bool, kChannels> has{};      ///< of the positions always
   std::array<bool, kChannels> imported{}; ///< `guessed` is to be looked at
-  bool creases = false;              ///< so is `crease`, and olds[] holds their originals as well
+  bool creases = false;                   ///< so is `crease`, and olds[] holds their originals as well
 };
 
 /// Bit i as byte i, 0 or 1, for i < count; some bytes behind are zeroed. Returns how many are 1.
@@ -43,14 +43,14 @@ void add_up_olds(const uint8_t* differences, uint32_t count, uint8_t* out);
 
 /// Where the residuals of one field lie.
 struct FieldCode {
-  const uint8_t* bytes = nullptr; ///< above the low bits
+  const uint8_t* bytes = nullptr;    ///< above the low bits
   uint32_t low_bits = 0, low_at = 0; ///< within the low bits of a vertex
   uint32_t shift = 0;                ///< of the field in its word
 };
 
 /// The low bits of all of a channel's fields lie together.
 struct ChannelCode {
-  uint32_t field_count = 0; ///< 1..3
+  uint32_t field_count = 0;         ///< 1..3
   FieldCode fields[kChannelFields]; ///< no std::array, whose functions are inline
   const uint8_t* low = nullptr;
   uint64_t low_bit = 0;    ///< where they begin

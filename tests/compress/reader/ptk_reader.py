@@ -16,7 +16,7 @@ import sys
 import zlib
 from dataclasses import dataclass
 
-VERSION = 2
+VERSION = 3
 MAGIC = b"PTK\x89\r\n\x1a\0"
 HEADER_BYTES = 384
 DISK_FORM_HEADER_BYTES = 192
