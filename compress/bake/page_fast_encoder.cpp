@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <limits>
 
 #include <zstd.h>
 
@@ -17,19 +16,12 @@ using namespace page_fast;
 namespace {
 
 constexpr uint32_t kByteMask = (1u << kByteBits) - 1;
-constexpr int64_t kNothing = std::numeric_limits<int64_t>::min();
 constexpr int32_t kNoVertex = -1;
 constexpr uint32_t kMaxEscapes = 255;
 constexpr std::array<PageStream, kChannels> kStreamOf{PageStream::kPositions, PageStream::kNormals, PageStream::kUvs};
 
 void put_bytes(std::vector<uint8_t>& to, const BitWriter& writer) {
   to.insert(to.end(), writer.bytes().begin(), writer.bytes().end());
-}
-
-uint64_t field_of(const Layout& layout, uint64_t word, uint32_t field) {
-  uint32_t shift = 0;
-  for (uint32_t i = 0; i < field; ++i) shift += layout.width[i];
-  return (word >> shift) & ((uint64_t{1} << layout.width[field]) - 1);
 }
 
 /// How many of the residuals have more bits than a byte above low_bits.
@@ -80,15 +72,6 @@ uint32_t class_of(std::span<const uint64_t> residuals, uint32_t low_bits) {
 
 } // namespace
 
-size_t FastPageWriter::VertexHash::operator()(const VertexKey& key) const {
-  uint64_t hash = 0;
-  for (const int64_t part : key) {
-    hash = (hash ^ static_cast<uint64_t>(part)) * 0x9e3779b97f4a7c15u;
-    hash ^= hash >> 32;
-  }
-  return static_cast<size_t>(hash);
-}
-
 void FastPageWriter::put(Channel channel, uint64_t value, uint32_t bits) {
   fields_.put(value, bits);
   field_bits_[static_cast<size_t>(kStreamOf[channel])] += bits;
@@ -138,65 +121,6 @@ void FastPageWriter::read_vertices(const ClusterView& view) {
       at += stride;
     }
   }
-}
-
-FastPageWriter::VertexKey FastPageWriter::key_of(const ClusterView& view, uint32_t vertex, bool with_normal) const {
-  VertexKey key;
-  key.fill(kNothing);
-  const LatticePoint point = view.lattice(vertex);
-  std::copy(point.begin(), point.end(), key.begin());
-  const auto absolute = [&](uint32_t channel, uint32_t field) {
-    const uint64_t value = field_of(layouts_[channel], vertices_[vertex].words[channel], field);
-    return static_cast<int64_t>(static_cast<uint32_t>(value) + layouts_[channel].base[field]);
-  };
-  if (with_normal) {
-    key[3] = view.record().flags & (baked::kClusterMixedCharts | baked::kClusterChart);
-    for (uint32_t i = 0; i < 3; ++i) key[4 + i] = absolute(kNormals, i);
-  }
-  if (view.has_uvs()) key[7] = absolute(kUvs, 0), key[8] = absolute(kUvs, 1);
-  return key;
-}
-
-void FastPageWriter::find_sources(const ClusterView& view) {
-  const baked::ClusterRecord& record = view.record();
-  if (layouts_[kPositions].verbatim()) return;
-  const bool with_normals = view.has_normals() && record.normal_palette == 0;
-  const bool narrow = *std::ranges::max_element(record.position_bits) <= 32;
-  std::unordered_map<VertexKey, uint32_t, VertexHash> places;
-  uint32_t creases = 0, imports = 0, import = last_import_;
-  for (uint32_t v = 0; v < vertices_.size(); ++v) {
-    VertexKey place{};
-    std::ranges::copy(view.lattice(v), place.begin());
-    const auto crease = places.find(place);
-    if (v > 0 && narrow) {
-      const auto found = page_vertices_.find(key_of(view, v, with_normals));
-      const int64_t distance =
-          found == page_vertices_.end() ? 0 : static_cast<int64_t>(found->second) - static_cast<int64_t>(import);
-      if (found != page_vertices_.end() && imports < 255 && std::abs(distance) < 1 << 15 &&
-          (with_normals || crease == places.end())) {
-        vertices_[v].source = Source::kImport;
-        vertices_[v].original = import = found->second;
-        ++imports;
-      }
-    }
-    if (vertices_[v].source == Source::kNew && crease != places.end() && creases < 255) {
-      vertices_[v].source = Source::kCrease;
-      vertices_[v].original = crease->second;
-      ++creases;
-    }
-    places[place] = v;
-  }
-  // Few of them are not worth a bit a vertex.
-  const auto drop = [&](Source source, uint32_t& count, uint32_t least) {
-    if (count * least >= vertices_.size()) return;
-    for (Vertex& vertex : vertices_)
-      if (vertex.source == source) vertex.source = Source::kNew;
-    count = 0;
-  };
-  drop(Source::kCrease, creases, 16);
-  drop(Source::kImport, imports, 24);
-  header_.creases = static_cast<uint8_t>(creases);
-  header_.imports = static_cast<uint8_t>(imports);
 }
 
 void FastPageWriter::add_topology(const ClusterView& view) {
@@ -347,17 +271,6 @@ void FastPageWriter::add_header(const baked::ClusterRecord& record) {
   header_.normal_bits = record.normal_bits;
   headers_.push_back(header_);
   last_ = record;
-}
-
-/// Later clusters may import the vertices.
-void FastPageWriter::remember(const ClusterView& view) {
-  const bool with_normals = view.has_normals() && view.record().normal_palette == 0;
-  const bool narrow = *std::ranges::max_element(view.record().position_bits) <= 32 && !layouts_[kPositions].verbatim();
-  for (uint32_t v = 0; v < vertices_.size(); ++v, ++page_vertex_count_) {
-    if (!narrow) continue;
-    page_vertices_[key_of(view, v, false)] = page_vertex_count_;
-    if (with_normals) page_vertices_[key_of(view, v, true)] = page_vertex_count_;
-  }
 }
 
 std::vector<uint8_t> FastPageWriter::finish(ZSTD_CCtx_s* zstd, std::array<double, kPageStreams>& bits) {

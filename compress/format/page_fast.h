@@ -95,6 +95,12 @@ inline Layout normal_layout(const baked::GeometryRecord& geometry, const baked::
           {static_cast<uint32_t>(2 * record.normal_anchor[1]), static_cast<uint32_t>(2 * record.normal_anchor[0]), 0}};
 }
 
+inline uint64_t field_of(const Layout& layout, uint64_t word, uint32_t field) {
+  uint32_t shift = 0;
+  for (uint32_t i = 0; i < field; ++i) shift += layout.width[i];
+  return (word >> shift) & ((uint64_t{1} << layout.width[field]) - 1);
+}
+
 inline constexpr uint64_t zigzag(int64_t value) {
   const auto shifted = static_cast<uint64_t>(value) << 1;
   return value < 0 ? ~shifted : shifted;
