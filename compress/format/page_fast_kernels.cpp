@@ -7,8 +7,14 @@
 namespace packtrace::page_fast {
 namespace {
 
+/// Two channels in one register.
+using Pair [[gnu::vector_size(16)]] = uint64_t;
+
 /// All of `a` where mask is ~0, of `b` where it is 0.
-uint64_t select(uint64_t mask, uint64_t a, uint64_t b) { return b ^ ((a ^ b) & mask); }
+template <class Lane>
+Lane select(Lane mask, Lane a, Lane b) {
+  return b ^ ((a ^ b) & mask);
+}
 uint64_t mask_of(uint64_t bit) { return 0 - bit; }
 
 constexpr WalkMemory::Words kAll = [] {
@@ -17,59 +23,88 @@ constexpr WalkMemory::Words kAll = [] {
   return all;
 }();
 
-/// The words of the last triangle's corners in one channel.
-struct Corners {
-  uint64_t a = 0, b = 0, c = 0;
+/// One or two channels.
+template <class Lane>
+struct Channels {
+  static constexpr size_t kCount = sizeof(Lane) / sizeof(uint64_t);
+
+  std::array<uint64_t*, kCount> words;
+  std::array<const uint64_t*, kCount> residuals, guessed;
+
+  template <class Pointers>
+  static Lane load(const Pointers& from, uint32_t i) {
+    if constexpr (kCount == 1)
+      return from[0][i];
+    else
+      return Lane{from[0][i], from[1][i]};
+  }
+  void store(uint32_t i, Lane word) const {
+    if constexpr (kCount == 1)
+      words[0][i] = word;
+    else
+      words[0][i] = word[0], words[1][i] = word[1];
+  }
+  static Lane both(uint64_t first, uint64_t second) {
+    if constexpr (kCount == 1)
+      return first;
+    else
+      return Lane{first, second};
+  }
+
+  Lane a{}, b{}, c{}; ///< words of the last triangle's corners
 };
 
-/// The channels behind the first are attributes, which creases have of their own.
-template <uint32_t kCount, bool kImports, bool kCreases>
+/// Positions, and attributes, which creases have of their own, behind them.
+template <class Lane, uint32_t kCount, bool kImports, bool kCreases>
 class Walk {
 public:
-  Walk(const WalkInput& input, WalkMemory& memory, const std::array<uint32_t, kCount>& channels)
+  /// @param channels positions first; one may be there twice
+  Walk(const WalkInput& input, WalkMemory& memory,
+       const std::array<uint32_t, kCount * Channels<Lane>::kCount>& channels)
       : input_(input), memory_(memory) {
-    for (uint32_t k = 0; k < kCount; ++k) {
-      words_[k] = memory.words[channels[k]].data();
-      residuals_[k] = memory.residuals[channels[k]].data();
-      guessed_[k] = input.imported[channels[k]] ? memory.guessed.data() : kAll.data();
+    for (uint32_t i = 0; i < channels.size(); ++i) {
+      Channels<Lane>& one = t_[i / Channels<Lane>::kCount];
+      one.words[i % Channels<Lane>::kCount] = memory.words[channels[i]].data();
+      one.residuals[i % Channels<Lane>::kCount] = memory.residuals[channels[i]].data();
+      one.guessed[i % Channels<Lane>::kCount] = input.imported[channels[i]] ? memory.guessed.data() : kAll.data();
     }
   }
 
   void run() {
     const uint8_t* left = memory_.left.data();
-    std::array<Corners, kCount> t{};
     for (uint32_t strip = 0; strip < input_.run_count; ++strip) {
-      first_triangle(t);
+      first_triangle();
       ++left;
       for (uint32_t i = 1; i < input_.runs[strip]; ++i) {
-        const uint64_t go_left = mask_of(*left++);
-        std::array<uint64_t, kCount> guess;
+        const uint64_t turn = mask_of(*left++);
+        const Lane go_left = Channels<Lane>::both(turn, turn);
+        std::array<Lane, kCount> guess;
         for (uint32_t k = 0; k < kCount; ++k) {
-          Corners& one = t[k];
-          guess[k] = one.c + ((one.b - one.a) ^ go_left) - go_left; // p + q - o
-          const uint64_t a = select(go_left, one.a, one.c);
-          one.b = select(go_left, one.c, one.b);
-          one.a = a;
+          Channels<Lane>& t = t_[k];
+          guess[k] = t.c + ((t.b - t.a) ^ go_left) - go_left; // p + q - o
+          const Lane a = select(go_left, t.a, t.c);
+          t.b = select(go_left, t.c, t.b);
+          t.a = a;
         }
-        corner(t, guess);
+        corner(guess);
       }
     }
     if constexpr (!kCreases) std::memcpy(memory_.explicits.data(), memory_.olds.data(), memory_.explicits.size());
   }
 
 private:
-  void first_triangle(std::array<Corners, kCount>& t) {
+  void first_triangle() {
     for (uint32_t i = 0; i < 3; ++i) {
-      std::array<uint64_t, kCount> guess;
+      std::array<Lane, kCount> guess;
       for (uint32_t k = 0; k < kCount; ++k) {
-        guess[k] = t[k].c;
-        t[k].a = t[k].b, t[k].b = t[k].c;
+        guess[k] = t_[k].c;
+        t_[k].a = t_[k].b, t_[k].b = t_[k].c;
       }
-      corner(t, guess);
+      corner(guess);
     }
   }
 
-  void corner(std::array<Corners, kCount>& t, const std::array<uint64_t, kCount>& guess) {
+  void corner(const std::array<Lane, kCount>& guess) {
     const uint32_t fresh = memory_.fresh[corner_++], named = memory_.olds[old_];
     const uint32_t placed = kCreases ? fresh & (memory_.crease[vertex_] ^ 1u) : fresh; // not at a named vertex
     old_ += placed ^ 1u;
@@ -79,30 +114,31 @@ private:
     }
     for (uint32_t k = 0; k < kCount; ++k) {
       // All but the last two operations can be done before the guess is known.
-      const uint64_t is_new = mask_of(k == 0 ? placed : fresh);
-      const uint64_t rest = select(is_new, residuals_[k][vertex_], words_[k][named]);
-      const uint64_t word = (guess[k] & (kImports ? is_new & guessed_[k][vertex_] : is_new)) + rest;
-      words_[k][vertex_] = word; // overwritten unless it is a new vertex
-      t[k].c = word;
+      Channels<Lane>& t = t_[k];
+      const Lane is_new = Channels<Lane>::both(mask_of(k == 0 ? placed : fresh), mask_of(fresh));
+      const Lane rest = select(is_new, t.load(t.residuals, vertex_), t.load(t.words, named));
+      const Lane is_guessed = kImports ? is_new & t.load(t.guessed, vertex_) : is_new;
+      t.c = (guess[k] & is_guessed) + rest;
+      t.store(vertex_, t.c); // overwritten unless it is a new vertex
     }
     vertex_ += fresh;
   }
 
   const WalkInput& input_;
   WalkMemory& memory_;
-  std::array<uint64_t*, kCount> words_;
-  std::array<const uint64_t*, kCount> residuals_, guessed_;
+  std::array<Channels<Lane>, kCount> t_;
   uint32_t corner_ = 0, vertex_ = 0, old_ = 0, explicit_ = 0;
 };
 
-template <uint32_t kCount>
-void walk_channels(const WalkInput& input, WalkMemory& memory, const std::array<uint32_t, kCount>& channels) {
+template <class Lane, uint32_t kCount>
+void walk_channels(const WalkInput& input, WalkMemory& memory,
+                   const std::array<uint32_t, kCount * Channels<Lane>::kCount>& channels) {
   if (input.creases)
-    Walk<kCount, true, true>(input, memory, channels).run();
+    Walk<Lane, kCount, true, true>(input, memory, channels).run();
   else if (input.imported[kPositions])
-    Walk<kCount, true, false>(input, memory, channels).run();
+    Walk<Lane, kCount, true, false>(input, memory, channels).run();
   else
-    Walk<kCount, false, false>(input, memory, channels).run();
+    Walk<Lane, kCount, false, false>(input, memory, channels).run();
 }
 
 template <uint32_t kCount>
@@ -173,13 +209,13 @@ void spread_residuals(const uint64_t* residuals, const uint8_t* flags, uint32_t 
 
 void walk_strips(const WalkInput& input, WalkMemory& memory) {
   if (input.has[kNormals] && input.has[kUvs])
-    walk_channels<3>(input, memory, {kPositions, kNormals, kUvs});
+    walk_channels<Pair, 2>(input, memory, {kPositions, kNormals, kUvs, kUvs});
   else if (input.has[kNormals])
-    walk_channels<2>(input, memory, {kPositions, kNormals});
+    walk_channels<Pair, 1>(input, memory, {kPositions, kNormals});
   else if (input.has[kUvs])
-    walk_channels<2>(input, memory, {kPositions, kUvs});
+    walk_channels<Pair, 1>(input, memory, {kPositions, kUvs});
   else
-    walk_channels<1>(input, memory, {kPositions});
+    walk_channels<uint64_t, 1>(input, memory, {kPositions});
 }
 
 void keep_field(const uint64_t* words, uint32_t count, uint32_t shift, uint32_t width, uint32_t base, uint32_t* out) {
