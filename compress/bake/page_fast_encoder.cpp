@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <map>
 
 #include <zstd.h>
 
@@ -17,7 +18,7 @@ namespace {
 
 constexpr uint32_t kByteMask = (1u << kByteBits) - 1;
 constexpr int32_t kNoVertex = -1;
-constexpr uint32_t kMaxEscapes = 255;
+constexpr uint32_t kMaxEscapes = 255, kMaxCreases = 255;
 constexpr std::array<PageStream, kChannels> kStreamOf{PageStream::kPositions, PageStream::kNormals, PageStream::kUvs};
 
 void put_bytes(std::vector<uint8_t>& to, const BitWriter& writer) {
@@ -80,33 +81,29 @@ void FastPageWriter::put(Channel channel, uint64_t value, uint32_t bits) {
 void FastPageWriter::add(const baked::GeometryRecord& geometry, const baked::ClusterRecord& record,
                          const uint8_t* payload) {
   const ClusterView view(geometry, record, payload);
-  if (geometry_ != &geometry) page_vertices_.clear();
   geometry_ = &geometry;
   header_ = {};
   for (std::vector<uint64_t>& residuals : residuals_) residuals.clear();
   last_old_ = 0;
   read_vertices(view);
-  find_sources(view);
+  find_creases(view);
   add_topology(view);
   add_fields(view);
-  remember(view);
   add_header(record);
 }
 
 /// The words of each vertex, as they lie in the cluster's streams.
 void FastPageWriter::read_vertices(const ClusterView& view) {
   const baked::ClusterRecord& record = view.record();
-  layouts_ = {position_layout(*geometry_, record), normal_layout(*geometry_, record), Layout{}};
+  layouts_ = {position_layout(record), normal_layout(*geometry_, record), Layout{}};
   const ClusterView::StreamBits stream = view.stream_bits();
   const uint64_t normal_bit = stream.indices + stream.positions, uv_bit = normal_bit + stream.normals;
   const uint64_t vertex_count = record.vertex_count;
   prefix_bit_ = {stream.indices, normal_bit, uv_bit}, prefix_bits_ = {};
   prefix_bits_[kNormals] = stream.normals - vertex_count * layouts_[kNormals].stride();
   if (view.has_uvs()) {
-    uint64_t at = uv_bit;
+    uint64_t at = uv_bit + 2 * kUvAnchorBits;
     layouts_[kUvs].field_count = 2;
-    for (size_t i = 0; i < 2; ++i, at += kUvAnchorBits)
-      layouts_[kUvs].base[i] = static_cast<uint32_t>(read_bits(view.bits(), at, kUvAnchorBits));
     for (size_t i = 0; i < 2; ++i, at += kUvWidthBits)
       layouts_[kUvs].width[i] = static_cast<uint32_t>(read_bits(view.bits(), at, kUvWidthBits));
     prefix_bits_[kUvs] = at - uv_bit;
@@ -123,10 +120,32 @@ void FastPageWriter::read_vertices(const ClusterView& view) {
   }
 }
 
+/// Fresh vertices at the place of an older one, as normals that differ make them.
+void FastPageWriter::find_creases(const ClusterView& view) {
+  if (layouts_[kPositions].verbatim()) return;
+  std::map<LatticePoint, uint32_t> places;
+  uint32_t count = 0;
+  for (uint32_t v = 0; v < vertices_.size(); ++v) {
+    const auto [place, is_new] = places.try_emplace(view.lattice(v), v);
+    if (!is_new && count < kMaxCreases) {
+      vertices_[v].is_crease = true;
+      vertices_[v].original = place->second;
+      ++count;
+    }
+    place->second = v;
+  }
+  // Few of them are not worth a bit a vertex.
+  if (count * 16 < vertices_.size()) {
+    for (Vertex& vertex : vertices_) vertex.is_crease = false;
+    count = 0;
+  }
+  header_.creases = static_cast<uint8_t>(count);
+}
+
 void FastPageWriter::add_topology(const ClusterView& view) {
   ClusterValues values;
   unpack_cluster(view, values);
-  BitWriter turns, fresh, creases, imports;
+  BitWriter turns, fresh, creases;
   std::array<int32_t, 3> t{kNoVertex, kNoVertex, kNoVertex};
   uint32_t corner = 0, used = 0;
   const auto next = [&](std::array<int32_t, 3> guess) {
@@ -150,42 +169,30 @@ void FastPageWriter::add_topology(const ClusterView& view) {
     }
     ++parts_[kRuns].back();
   }
-  for (const Vertex& vertex : vertices_) {
-    creases.put(vertex.source == Source::kCrease ? 1 : 0, 1);
-    imports.put(vertex.source == Source::kImport ? 1 : 0, 1);
-  }
-  for (BitWriter* writer : {&turns, &fresh, &creases, &imports}) writer->align(1);
+  for (const Vertex& vertex : vertices_) creases.put(vertex.is_crease ? 1 : 0, 1);
+  for (BitWriter* writer : {&turns, &fresh, &creases}) writer->align(1);
   put_bytes(parts_[kBits], turns);
   put_bytes(parts_[kBits], fresh);
   if (header_.creases != 0) put_bytes(parts_[kBits], creases);
-  if (header_.imports != 0) put_bytes(parts_[kBits], imports);
 }
 
 /// @param guess p, q, o; p alone where a strip begins
 void FastPageWriter::add_corner(uint32_t vertex, bool fresh, std::array<int32_t, 3> guess) {
   const Vertex& one = vertices_[vertex];
-  if (!fresh || one.source == Source::kCrease) {
+  if (!fresh || one.is_crease) {
     const uint32_t named = fresh ? one.original : vertex;
     const auto difference = static_cast<int8_t>(static_cast<uint8_t>(named - last_old_));
     parts_[kOlds].push_back(static_cast<uint8_t>(zigzag(difference)));
     last_old_ = named;
-  } else if (one.source == Source::kImport) {
-    const uint64_t distance = zigzag(static_cast<int64_t>(one.original) - static_cast<int64_t>(last_import_));
-    parts_[kRefLow].push_back(static_cast<uint8_t>(distance));
-    parts_[kRefHigh].push_back(static_cast<uint8_t>(distance >> 8));
-    last_import_ = one.original;
   }
   if (fresh && vertex > 0) add_residuals(vertex, guess);
 }
 
 void FastPageWriter::add_residuals(uint32_t vertex, std::array<int32_t, 3> guess) {
   const Vertex& one = vertices_[vertex];
-  const bool palette = layouts_[kNormals].field_count == 1;
   for (uint32_t channel = 0; channel < kChannels; ++channel) {
     const Layout& layout = layouts_[channel];
-    const bool copied = channel == kPositions ? one.source != Source::kNew
-                                              : one.source == Source::kImport && !(channel == kNormals && palette);
-    if (copied || layout.verbatim()) continue;
+    if ((channel == kPositions && one.is_crease) || layout.verbatim()) continue;
     for (uint32_t i = 0; i < layout.field_count; ++i) {
       const auto value = [&](int32_t v) {
         return v == kNoVertex
@@ -295,8 +302,7 @@ std::vector<uint8_t> FastPageWriter::finish(ZSTD_CCtx_s* zstd, std::array<double
 }
 
 void FastPageWriter::count_part(uint32_t part, double part_bits, std::array<double, kPageStreams>& bits) const {
-  if (part == kBits || part == kRuns || part == kOlds || part == kRefLow || part == kRefHigh)
-    bits[static_cast<size_t>(PageStream::kTopology)] += part_bits;
+  if (part == kBits || part == kRuns || part == kOlds) bits[static_cast<size_t>(PageStream::kTopology)] += part_bits;
   if (part < kResiduals || parts_[part].empty()) return;
   for (uint32_t channel = 0; channel < kChannels; ++channel)
     bits[static_cast<size_t>(kStreamOf[channel])] += part_bits *

@@ -3,7 +3,6 @@
 #include <array>
 #include <cstdint>
 #include <span>
-#include <unordered_map>
 #include <vector>
 
 #include "compress/format/bit_stream.h"
@@ -29,19 +28,11 @@ public:
 private:
   using Bytes = std::vector<uint8_t>;
   static constexpr uint32_t kCoded = page_fast::kChannels * page_fast::kChannelFields;
-  /// What an imported vertex has in common with its original: lattice point, chart and normal, texture coordinates.
-  using VertexKey = std::array<int64_t, 9>;
-  struct VertexHash {
-    size_t operator()(const VertexKey& key) const;
-  };
-  /// Where a vertex's place comes from.
-  enum class Source : uint8_t { kNew, kCrease, kImport };
   struct Vertex {
-    Source source = Source::kNew;
-    uint32_t original = 0; ///< vertex of the cluster, or of the page
+    bool is_crease = false;
+    uint32_t original = 0; ///< of a crease: an older vertex at its place
     std::array<uint64_t, page_fast::kChannels> words{};
   };
-
   /// A residual with more than a byte above the low bits.
   struct Escape {
     uint32_t field;
@@ -50,8 +41,7 @@ private:
   };
 
   void read_vertices(const ClusterView& view);
-  void find_sources(const ClusterView& view);
-  VertexKey key_of(const ClusterView& view, uint32_t vertex, bool with_normal) const;
+  void find_creases(const ClusterView& view);
   void add_topology(const ClusterView& view);
   void add_corner(uint32_t vertex, bool fresh, std::array<int32_t, 3> guess);
   void add_residuals(uint32_t vertex, std::array<int32_t, 3> guess);
@@ -61,7 +51,6 @@ private:
   void put_escapes(page_fast::Channel channel);
   void put(page_fast::Channel channel, uint64_t value, uint32_t bits);
   void add_header(const baked::ClusterRecord& record);
-  void remember(const ClusterView& view);
   void count_part(uint32_t part, double part_bits, std::array<double, kPageStreams>& bits) const;
 
   BitWriter fields_;
@@ -72,8 +61,6 @@ private:
 
   const baked::GeometryRecord* geometry_ = nullptr;
   baked::ClusterRecord last_{};
-  std::unordered_map<VertexKey, uint32_t, VertexHash> page_vertices_;
-  uint32_t page_vertex_count_ = 0, last_import_ = 0;
 
   // Of the cluster.
   page_fast::Header header_{};

@@ -21,11 +21,9 @@ namespace packtrace::page_fast {
 enum Part : uint32_t {
   kFields,    ///< bit fields
   kHeaders,   ///< the bytes of all clusters' headers, byte 0 of all first
-  kBits,      ///< per cluster, each from a whole byte on: turns, fresh corners, creases, imports
+  kBits,      ///< per cluster, each from a whole byte on: turns, fresh corners, creases
   kRuns,      ///< triangles of each strip
   kOlds,      ///< vertices that corners name
-  kRefLow,    ///< page vertices that are imported: low bytes
-  kRefHigh,   ///< high bytes
   kResiduals, ///< low bytes of residuals, in kClasses parts
   kParts = kResiduals + 4
 };
@@ -46,16 +44,13 @@ struct Header {
   uint8_t strips;                         ///< less one
   uint8_t flags;                          ///< as in the record
   uint8_t creases;                        ///< fresh vertices at the place of an older one of the cluster
-  uint8_t imports;                        ///< fresh vertices that are those of a cluster before
   std::array<uint8_t, kChannels> escapes; ///< residuals with more than a byte above their low bits
   std::array<uint8_t, 3> position_bits;
   std::array<uint8_t, 2> normal_bits;
   std::array<uint8_t, kChannels * kChannelFields> coding; ///< of a field: low bits, and 64 times the class
-  std::array<uint8_t, 3> padding;
 };
-inline constexpr size_t kHeaderBytes = 45; ///< what is stored of it
-static_assert(sizeof(Header) == 48 && offsetof(Header, padding) == kHeaderBytes &&
-              std::is_trivially_copyable_v<Header>);
+inline constexpr size_t kHeaderBytes = 44;
+static_assert(sizeof(Header) == kHeaderBytes && std::is_trivially_copyable_v<Header>);
 
 inline constexpr uint32_t kLowBitsMask = 63, kClassShift = 6;
 inline constexpr uint32_t kEscapeFieldBits = 2, kEscapeIndexBits = 8, kEscapeWidthBits = 6;
@@ -65,20 +60,15 @@ inline constexpr uint32_t kByteBits = 8;
 /// One channel of one cluster.
 struct Layout {
   uint32_t field_count = 0;
-  std::array<uint32_t, kChannelFields> width{}, base{}; ///< base: what the field is a difference to, modulo 2^32
+  std::array<uint32_t, kChannelFields> width{};
 
   uint32_t stride() const { return width[0] + width[1] + width[2]; }
   /// Wider words than a stream field can be are stored as they are.
   bool verbatim() const { return stride() > kMaxFieldBits; }
 };
 
-inline Layout position_layout(const baked::GeometryRecord& geometry, const baked::ClusterRecord& record) {
-  Layout layout{3, {}, {}};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    layout.width[axis] = record.position_bits[axis];
-    layout.base[axis] = static_cast<uint32_t>(record.anchor[axis]) << geometry.anchor_shift;
-  }
-  return layout;
+inline Layout position_layout(const baked::ClusterRecord& record) {
+  return {3, {record.position_bits[0], record.position_bits[1], record.position_bits[2]}};
 }
 
 /// Bits of a normal, or of a palette entry.
@@ -89,10 +79,8 @@ inline uint32_t normal_chart_bits(const baked::GeometryRecord& geometry, const b
 
 inline Layout normal_layout(const baked::GeometryRecord& geometry, const baked::ClusterRecord& record) {
   if ((record.flags & baked::kClusterHasNormals) == 0) return {};
-  if (record.normal_palette != 0) return {1, {bits_for_count(record.normal_palette)}, {}};
-  return {3,
-          {record.normal_bits[1], record.normal_bits[0], normal_chart_bits(geometry, record)},
-          {static_cast<uint32_t>(2 * record.normal_anchor[1]), static_cast<uint32_t>(2 * record.normal_anchor[0]), 0}};
+  if (record.normal_palette != 0) return {1, {bits_for_count(record.normal_palette)}};
+  return {3, {record.normal_bits[1], record.normal_bits[0], normal_chart_bits(geometry, record)}};
 }
 
 inline uint64_t field_of(const Layout& layout, uint64_t word, uint32_t field) {

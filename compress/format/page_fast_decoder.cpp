@@ -21,8 +21,7 @@ struct FastPageReader::Work {
   const uint8_t* turns = nullptr; ///< bits
   const uint8_t* fresh = nullptr;
   std::array<uint64_t, 2> restarts{};
-  std::array<uint8_t, kMaxClusterVertices> imports; ///< vertices
-  WalkMemory::Words residuals{};                    ///< of one channel, without gaps
+  WalkMemory::Words residuals{}; ///< of one channel, without gaps
   WalkInput input;
   WalkMemory memory;
 };
@@ -61,8 +60,6 @@ bool FastPageReader::begin(ZSTD_DCtx_s* zstd, std::span<const uint8_t> page, uin
   field_bit_ = 0, field_end_ = 8 * uint64_t{places[kFields].bytes};
   cluster_ = 0, cluster_count_ = cluster_count;
   last_ = {};
-  last_import_ = 0;
-  page_vertex_count_ = 0;
   payload_.begin(payload_bytes);
   return true;
 }
@@ -117,10 +114,8 @@ bool FastPageReader::read_topology(const Header& header, const IndexLayout& layo
   w.turns = parts_[kBits].take(bytes_of(triangles));
   w.fresh = parts_[kBits].take(bytes_of(corners));
   const uint8_t* creases = parts_[kBits].take(header.creases != 0 ? bytes_of(vertices) : 0);
-  const uint8_t* imports = parts_[kBits].take(header.imports != 0 ? bytes_of(vertices) : 0);
   const uint8_t* runs = parts_[kRuns].take(layout.restart_count);
-  if (w.turns == nullptr || w.fresh == nullptr || creases == nullptr || imports == nullptr || runs == nullptr)
-    return false;
+  if (w.turns == nullptr || w.fresh == nullptr || creases == nullptr || runs == nullptr) return false;
 
   w.restarts = {};
   uint32_t first = 0;
@@ -134,16 +129,7 @@ bool FastPageReader::read_topology(const Header& header, const IndexLayout& layo
   WalkMemory& m = w.memory;
   expand_bits(w.turns, triangles, m.left.data());
   if (expand_bits(w.fresh, corners, m.fresh.data()) != vertices) return false;
-  if (header.creases + header.imports != 0) {
-    m.crease.fill(0), m.import.fill(0);
-    if (header.creases != 0 && expand_bits(creases, vertices, m.crease.data()) != header.creases) return false;
-    if (header.imports != 0 && expand_bits(imports, vertices, m.import.data()) != header.imports) return false;
-    for (uint32_t v = 0, i = 0; v < vertices; ++v) {
-      w.imports[i] = static_cast<uint8_t>(v);
-      i += m.import[v];
-      m.guessed[v] = uint64_t{m.import[v]} - 1;
-    }
-  }
+  if (header.creases != 0 && expand_bits(creases, vertices, m.crease.data()) != header.creases) return false;
   const uint32_t old_count = corners - vertices + header.creases;
   const uint8_t* olds = parts_[kOlds].take(old_count);
   if (olds == nullptr) return false;
@@ -151,7 +137,6 @@ bool FastPageReader::read_topology(const Header& header, const IndexLayout& layo
   w.input = {runs,
              layout.restart_count,
              {true, w.layouts[kNormals].field_count != 0, w.layouts[kUvs].field_count != 0},
-             {header.imports != 0, header.imports != 0 && w.layouts[kNormals].field_count > 1, header.imports != 0},
              header.creases != 0};
   return true;
 }
@@ -164,11 +149,9 @@ bool FastPageReader::read_uv_layout(const baked::ClusterRecord& record) {
   w.prefix_bits[kUvs] = 2 * (kUvAnchorBits + kUvWidthBits);
   if (!take_bits(w.prefix_bits[kUvs], w.prefix_bit[kUvs])) return false;
   const uint8_t* bits = parts_[kFields].at;
-  uint64_t at = w.prefix_bit[kUvs];
+  uint64_t at = w.prefix_bit[kUvs] + 2 * kUvAnchorBits;
   Layout& layout = w.layouts[kUvs];
   layout.field_count = 2;
-  for (size_t i = 0; i < 2; ++i, at += kUvAnchorBits)
-    layout.base[i] = static_cast<uint32_t>(read_bits(bits, at, kUvAnchorBits));
   for (size_t i = 0; i < 2; ++i, at += kUvWidthBits)
     layout.width[i] = static_cast<uint32_t>(read_bits(bits, at, kUvWidthBits));
   return !layout.verbatim();
@@ -179,14 +162,12 @@ bool FastPageReader::read_channel(uint32_t channel, const Header& header, uint32
   const Layout& layout = w.layouts[channel];
   const uint8_t* bits = parts_[kFields].at;
   const uint8_t creases = channel == kPositions ? header.creases : 0;
-  const uint8_t imports = w.input.imported[channel] ? header.imports : 0;
-  const bool gaps = creases + imports != 0;
-  uint64_t* residuals = gaps ? w.residuals.data() : w.memory.residuals[channel].data();
-  if (1u + creases + imports > vertex_count) return false;
-  const uint32_t count = vertex_count - 1 - creases - imports;
+  uint64_t* residuals = creases != 0 ? w.residuals.data() : w.memory.residuals[channel].data();
+  if (creases >= vertex_count) return false;
+  const uint32_t count = vertex_count - 1 - creases;
   if (layout.verbatim()) {
     std::fill_n(residuals, vertex_count, uint64_t{0});
-    return !gaps && take_bits(uint64_t{layout.stride()} * vertex_count, w.prefix_bit[channel]);
+    return creases == 0 && take_bits(uint64_t{layout.stride()} * vertex_count, w.prefix_bit[channel]);
   }
   uint64_t first = 0;
   if (!take_bits(layout.stride(), first)) return false;
@@ -199,10 +180,11 @@ bool FastPageReader::read_channel(uint32_t channel, const Header& header, uint32
     if (code.fields[i].bytes == nullptr || code.low_stride > kMaxFieldBits) return false;
   }
   if (!take_bits(uint64_t{count} * code.low_stride, code.low_bit)) return false;
-  kernels_->read_residuals(code, count, residuals + 1);
+  read_residuals_(code, count, residuals + 1);
   for (uint32_t i = 0; i < header.escapes[channel]; ++i)
     if (!read_escape(code, count, residuals + 1)) return false;
-  if (gaps) spread_channel(channel, creases != 0, imports != 0, vertex_count);
+  if (creases != 0)
+    spread_residuals(residuals, w.memory.crease.data(), vertex_count, w.memory.residuals[channel].data());
   return true;
 }
 
@@ -224,67 +206,12 @@ bool FastPageReader::read_escape(const ChannelCode& code, uint32_t count, uint64
   return true;
 }
 
-/// Leaves gaps for the vertices that have no residuals.
-void FastPageReader::spread_channel(uint32_t channel, bool creases, bool imports, uint32_t vertex_count) {
-  WalkMemory& m = work_->memory;
-  std::array<uint8_t, kMaxClusterVertices> either;
-  const uint8_t* gaps = creases ? m.crease.data() : m.import.data();
-  if (creases && imports) {
-    for (uint32_t v = 0; v < vertex_count; ++v) either[v] = m.crease[v] | m.import[v];
-    gaps = either.data();
-  }
-  spread_residuals(work_->residuals.data(), gaps, vertex_count, m.residuals[channel].data());
-}
-
 bool FastPageReader::read_channels(const Header& header, const baked::ClusterRecord& record) {
   Work& w = *work_;
   if (!take_bits(w.prefix_bits[kNormals], w.prefix_bit[kNormals])) return false;
   for (uint32_t channel = 0; channel < kChannels; ++channel)
     if (w.input.has[channel] && !read_channel(channel, header, record.vertex_count)) return false;
-  return header.imports == 0 || read_imports(header);
-}
-
-/// The words of the vertices that are those of clusters before.
-bool FastPageReader::read_imports(const Header& header) {
-  Work& w = *work_;
-  const uint8_t* low = parts_[kRefLow].take(header.imports);
-  const uint8_t* high = parts_[kRefHigh].take(header.imports);
-  if (low == nullptr || high == nullptr) return false;
-  std::array<uint32_t, kMaxClusterVertices> originals;
-  for (uint32_t i = 0; i < header.imports; ++i) {
-    last_import_ += static_cast<uint32_t>(unzigzag(low[i] | uint64_t{high[i]} << 8));
-    if (last_import_ >= page_vertex_count_) return false;
-    originals[i] = last_import_;
-  }
-  for (uint32_t channel = 0; channel < kChannels; ++channel) {
-    if (!w.input.has[channel] || !w.input.imported[channel]) continue;
-    const Layout& layout = w.layouts[channel];
-    for (uint32_t f = 0, shift = 0; f < layout.field_count; shift += layout.width[f], ++f) {
-      const uint32_t* fields = page_vertices_[channel * kChannelFields + f].data();
-      const uint64_t mask = (uint64_t{1} << layout.width[f]) - 1;
-      for (uint32_t i = 0; i < header.imports; ++i) {
-        uint64_t& word = w.memory.residuals[channel][w.imports[i]];
-        word = (f == 0 ? 0 : word) | ((fields[originals[i]] - layout.base[f]) & mask) << shift;
-      }
-    }
-  }
   return true;
-}
-
-void FastPageReader::keep_vertices(uint32_t vertex_count) {
-  Work& w = *work_;
-  const size_t first = page_vertex_count_, needed = first + vertex_count;
-  for (uint32_t channel = 0; channel < kChannels; ++channel) {
-    const Layout& layout = w.layouts[channel];
-    for (uint32_t f = 0, shift = 0; f < kChannelFields; shift += layout.width[f], ++f) {
-      std::vector<uint32_t>& fields = page_vertices_[channel * kChannelFields + f];
-      if (fields.size() < needed + kSpareWords) fields.resize(2 * needed + kSpareWords);
-      if (f < layout.field_count && !layout.verbatim())
-        kernels_->keep_field(w.memory.words[channel].data(), vertex_count, shift, layout.width[f], layout.base[f],
-                             fields.data() + first);
-    }
-  }
-  page_vertex_count_ += vertex_count;
 }
 
 void FastPageReader::put_bits(const uint8_t* bytes, uint64_t first, uint64_t count) {
@@ -323,14 +250,13 @@ bool FastPageReader::append(const baked::GeometryRecord& geometry, baked::Cluste
   const Header header = next_header();
   if (!read_record(header, record)) return false;
   const IndexLayout layout{record.triangle_count, record.vertex_count, record.restart_count};
-  w.layouts[kPositions] = position_layout(geometry, record);
+  w.layouts[kPositions] = position_layout(record);
   w.layouts[kNormals] = normal_layout(geometry, record);
   if (record.normal_palette != 0 && w.layouts[kNormals].field_count == 0) return false;
   w.prefix_bits[kNormals] = record.normal_palette * (uint32_t{record.normal_bits[0]} + record.normal_bits[1] +
                                                      normal_chart_bits(geometry, record));
   if (!read_uv_layout(record) || !read_topology(header, layout) || !read_channels(header, record)) return false;
   walk_strips(w.input, w.memory);
-  keep_vertices(record.vertex_count);
 
   uint64_t bits = layout.total_bits();
   for (uint32_t channel = 0; channel < kChannels; ++channel)

@@ -55,9 +55,6 @@ private:
   bool read_channels(const page_fast::Header& header, const baked::ClusterRecord& record);
   bool read_channel(uint32_t channel, const page_fast::Header& header, uint32_t vertex_count);
   bool read_escape(const page_fast::ChannelCode& code, uint32_t count, uint64_t* residuals);
-  void spread_channel(uint32_t channel, bool creases, bool imports, uint32_t vertex_count);
-  bool read_imports(const page_fast::Header& header);
-  void keep_vertices(uint32_t vertex_count);
   void put_bits(const uint8_t* bytes, uint64_t first, uint64_t count);
   void put_cluster(const baked::ClusterRecord& record, const IndexLayout& layout);
 
@@ -66,12 +63,8 @@ private:
   uint64_t field_bit_ = 0, field_end_ = 0; ///< in part kFields
   uint32_t cluster_ = 0, cluster_count_ = 0;
   baked::ClusterRecord last_{};
-  uint32_t last_import_ = 0;
   PayloadWriter payload_;
-  /// Fields of the page's vertices so far, as differences to 0, modulo 2^32.
-  std::array<std::vector<uint32_t>, page_fast::kChannels * page_fast::kChannelFields> page_vertices_;
-  uint32_t page_vertex_count_ = 0;
-  const page_fast::FieldKernels* kernels_ = &page_fast::field_kernels();
+  page_fast::ResidualKernel read_residuals_ = page_fast::residual_kernel();
   std::unique_ptr<Work> work_;
 };
 

@@ -17,19 +17,13 @@ Lane select(Lane mask, Lane a, Lane b) {
 }
 uint64_t mask_of(uint64_t bit) { return 0 - bit; }
 
-constexpr WalkMemory::Words kAll = [] {
-  WalkMemory::Words all{};
-  for (uint64_t& word : all) word = ~uint64_t{0};
-  return all;
-}();
-
 /// One or two channels.
 template <class Lane>
 struct Channels {
   static constexpr size_t kCount = sizeof(Lane) / sizeof(uint64_t);
 
   std::array<uint64_t*, kCount> words;
-  std::array<const uint64_t*, kCount> residuals, guessed;
+  std::array<const uint64_t*, kCount> residuals;
 
   template <class Pointers>
   static Lane load(const Pointers& from, uint32_t i) {
@@ -55,7 +49,7 @@ struct Channels {
 };
 
 /// Positions, and attributes, which creases have of their own, behind them.
-template <class Lane, uint32_t kCount, bool kImports, bool kCreases>
+template <class Lane, uint32_t kCount, bool kCreases>
 class Walk {
 public:
   /// @param channels positions first; one may be there twice
@@ -66,7 +60,6 @@ public:
       Channels<Lane>& one = t_[i / Channels<Lane>::kCount];
       one.words[i % Channels<Lane>::kCount] = memory.words[channels[i]].data();
       one.residuals[i % Channels<Lane>::kCount] = memory.residuals[channels[i]].data();
-      one.guessed[i % Channels<Lane>::kCount] = input.imported[channels[i]] ? memory.guessed.data() : kAll.data();
     }
   }
 
@@ -117,8 +110,7 @@ private:
       Channels<Lane>& t = t_[k];
       const Lane is_new = Channels<Lane>::both(mask_of(k == 0 ? placed : fresh), mask_of(fresh));
       const Lane rest = select(is_new, t.load(t.residuals, vertex_), t.load(t.words, named));
-      const Lane is_guessed = kImports ? is_new & t.load(t.guessed, vertex_) : is_new;
-      t.c = (guess[k] & is_guessed) + rest;
+      t.c = (guess[k] & is_new) + rest;
       t.store(vertex_, t.c); // overwritten unless it is a new vertex
     }
     vertex_ += fresh;
@@ -134,11 +126,9 @@ template <class Lane, uint32_t kCount>
 void walk_channels(const WalkInput& input, WalkMemory& memory,
                    const std::array<uint32_t, kCount * Channels<Lane>::kCount>& channels) {
   if (input.creases)
-    Walk<Lane, kCount, true, true>(input, memory, channels).run();
-  else if (input.imported[kPositions])
-    Walk<Lane, kCount, true, false>(input, memory, channels).run();
+    Walk<Lane, kCount, true>(input, memory, channels).run();
   else
-    Walk<Lane, kCount, false, false>(input, memory, channels).run();
+    Walk<Lane, kCount, false>(input, memory, channels).run();
 }
 
 template <uint32_t kCount>
@@ -218,19 +208,12 @@ void walk_strips(const WalkInput& input, WalkMemory& memory) {
     walk_channels<uint64_t, 1>(input, memory, {kPositions});
 }
 
-void keep_field(const uint64_t* words, uint32_t count, uint32_t shift, uint32_t width, uint32_t base, uint32_t* out) {
-  const uint64_t mask = (uint64_t{1} << width) - 1;
-  for (uint32_t i = 0; i < count; ++i) out[i] = static_cast<uint32_t>((words[i] >> shift) & mask) + base;
-}
-
-const FieldKernels& field_kernels() {
-  static constexpr FieldKernels kPortable{read_residuals, keep_field};
+ResidualKernel residual_kernel() {
 #if defined(__x86_64__)
-  static constexpr FieldKernels kAvx2{avx2::read_residuals, avx2::keep_field};
   static const bool has_avx2 = __builtin_cpu_supports("avx2");
-  if (has_avx2) return kAvx2;
+  if (has_avx2) return avx2::read_residuals;
 #endif
-  return kPortable;
+  return read_residuals;
 }
 
 } // namespace packtrace::page_fast

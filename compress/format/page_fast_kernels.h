@@ -19,20 +19,18 @@ struct WalkMemory {
 
   std::array<uint8_t, kMaxClusterTriangles + kSpareWords> left{};
   std::array<uint8_t, kMaxClusterCorners + kSpareWords> fresh{};
-  std::array<uint8_t, kMaxClusterVertices + kSpareWords> crease{}, import{}; ///< by vertex
+  std::array<uint8_t, kMaxClusterVertices + kSpareWords> crease{}; ///< by vertex
   std::array<uint8_t, kMaxClusterCorners + kMaxClusterVertices + kSpareWords> olds{};
   std::array<uint8_t, kMaxClusterCorners + kSpareWords> explicits{}; ///< vertices that corners name which are not fresh
-  std::array<Words, kChannels> residuals{}; ///< by vertex: what it is off its guess, or all of it where it is imported
-  Words guessed{};                          ///< by vertex: 0 where it is imported, else ~0
+  std::array<Words, kChannels> residuals{};                          ///< by vertex: what it is off its guess
   std::array<Words, kChannels> words{};
 };
 
 struct WalkInput {
   const uint8_t* runs = nullptr; ///< triangles of each strip, at most 128 in all
   uint32_t run_count = 0;
-  std::array<bool, kChannels> has{};      ///< of the positions always
-  std::array<bool, kChannels> imported{}; ///< `guessed` is to be looked at
-  bool creases = false;                   ///< so is `crease`, and olds[] holds their originals as well
+  std::array<bool, kChannels> has{}; ///< of the positions always
+  bool creases = false;              ///< `crease` is to be looked at, and olds[] holds their originals as well
 };
 
 /// Bit i as byte i, 0 or 1, for i < count; some bytes behind are zeroed. Returns how many are 1.
@@ -78,22 +76,12 @@ uint64_t pack_four(const uint8_t* bytes, uint32_t width);
 /// out[i] = the sum of all fields of residual i. Up to kSpareWords words behind out[count - 1] may be overwritten.
 void read_residuals(const ChannelCode& code, uint32_t count, uint64_t* out);
 
-/// out[i] = the field of words[i], plus base. Reads and overwrites up to kSpareWords entries behind the last.
-void keep_field(const uint64_t* words, uint32_t count, uint32_t shift, uint32_t width, uint32_t base, uint32_t* out);
-
-/// The last two, which have the same results for every processor.
-struct FieldKernels {
-  void (*read_residuals)(const ChannelCode& code, uint32_t count, uint64_t* out) = nullptr;
-  void (*keep_field)(const uint64_t* words, uint32_t count, uint32_t shift, uint32_t width, uint32_t base,
-                     uint32_t* out) = nullptr;
-};
-
-/// Those for this processor.
-const FieldKernels& field_kernels();
+/// The same, by the instructions of this processor.
+using ResidualKernel = void (*)(const ChannelCode& code, uint32_t count, uint64_t* out);
+ResidualKernel residual_kernel();
 
 namespace avx2 {
 void read_residuals(const ChannelCode& code, uint32_t count, uint64_t* out);
-void keep_field(const uint64_t* words, uint32_t count, uint32_t shift, uint32_t width, uint32_t base, uint32_t* out);
-} // namespace avx2
+}
 
 } // namespace packtrace::page_fast

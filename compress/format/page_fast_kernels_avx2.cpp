@@ -63,17 +63,6 @@ void read_residuals(const ChannelCode& code, uint32_t count, uint64_t* out) {
     sum_fields<1>(code, count, out);
 }
 
-void keep_field(const uint64_t* words, uint32_t count, uint32_t shift, uint32_t width, uint32_t base, uint32_t* out) {
-  const __m128i shift_count = count_of(shift), bases = _mm_set1_epi32(static_cast<int>(base));
-  const __m256i mask = mask_of(width), even = _mm256_setr_epi32(0, 2, 4, 6, 0, 2, 4, 6);
-  for (uint32_t i = 0; i < count; i += 4) {
-    const __m256i word = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(words + i));
-    const __m256i field = _mm256_and_si256(_mm256_srl_epi64(word, shift_count), mask);
-    const __m128i low = _mm256_castsi256_si128(_mm256_permutevar8x32_epi32(field, even));
-    _mm_storeu_si128(reinterpret_cast<__m128i*>(out + i), _mm_add_epi32(low, bases));
-  }
-}
-
 } // namespace packtrace::page_fast::avx2
 
 #endif

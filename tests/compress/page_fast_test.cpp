@@ -121,7 +121,6 @@ TEST(FastPage, HeadersOutOfRangeAreRefused) {
   EXPECT_FALSE(decodes([](Header& h) { h.coding[0] = 63; }));
   EXPECT_FALSE(decodes([](Header& h) { h.palette = 2; }));
   EXPECT_FALSE(decodes([](Header& h) { h.creases = 1; }));
-  EXPECT_FALSE(decodes([](Header& h) { h.imports = 1; }));
   EXPECT_FALSE(decodes([](Header& h) { h.escapes[0] = 1; }));
   EXPECT_FALSE(decodes([](Header& h) { h.flags = baked::kClusterHasNormals; }));
   EXPECT_FALSE(decodes([](Header& h) { h.flags = baked::kClusterHasUvs; }));
@@ -167,13 +166,6 @@ uint32_t total(const std::vector<Header>& headers, const Of& of) {
   uint32_t sum = 0;
   for (const Header& header : headers) sum += of(header);
   return sum;
-}
-
-TEST(FastPage, BordersBetweenClustersAreImported) {
-  for (const bool normals : {false, true}) {
-    const std::vector<Header> headers = headers_of(test::scene_of(test::grid_mesh(40, 0.1f, normals)));
-    EXPECT_GT(total(headers, [](const Header& h) { return uint32_t{h.imports}; }), 200u);
-  }
 }
 
 TEST(FastPage, CreasesShareThePlaceOfAnOlderVertex) {
@@ -245,18 +237,9 @@ TEST(FastPage, KernelsAgreeAndReadWhatWasWritten) {
     code.low = low.data(), code.low_bit = first;
     std::vector<uint64_t> portable(count + kSpareWords), chosen(count + kSpareWords);
     read_residuals(code, count, portable.data());
-    field_kernels().read_residuals(code, count, chosen.data());
+    residual_kernel()(code, count, chosen.data());
     ASSERT_TRUE(std::equal(expected.begin(), expected.end(), portable.begin())) << round;
     ASSERT_TRUE(std::equal(expected.begin(), expected.end(), chosen.begin())) << round;
-
-    const uint32_t width = random.bits() % 33, at = random.bits() % 32, base = random.bits();
-    std::vector<uint32_t> kept(count + kSpareWords), kept_chosen(count + kSpareWords);
-    keep_field(portable.data(), count, at, width, base, kept.data());
-    field_kernels().keep_field(chosen.data(), count, at, width, base, kept_chosen.data());
-    for (uint32_t i = 0; i < count; ++i) {
-      ASSERT_EQ(kept[i], static_cast<uint32_t>((expected[i] >> at) % (uint64_t{1} << width)) + base);
-      ASSERT_EQ(kept_chosen[i], kept[i]);
-    }
   }
 }
 
