@@ -20,7 +20,7 @@ struct FastPageReader::Work {
   std::array<uint32_t, kChannels> prefix_bits{};
   const uint8_t* turns = nullptr; ///< bits
   const uint8_t* fresh = nullptr;
-  std::array<uint64_t, 2> restarts{};
+  std::array<uint64_t, 3> restarts{}; ///< bits; the last word is only read
   WalkMemory::Words residuals{}; ///< of one channel, without gaps
   WalkInput input;
   WalkMemory memory;
