@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "compress/format/bit_stream.h"
+#include "compress/format/normal_kernels.h"
 
 namespace packtrace {
 namespace {
@@ -93,13 +94,18 @@ Vec3 ClusterView::position(uint32_t vertex) const {
 
 NormalFields ClusterView::normal_fields(uint32_t vertex) const {
   assert(has_normals());
-  const uint32_t palette = record_->normal_palette, x_bits = record_->normal_bits[0], y_bits = record_->normal_bits[1];
+  const uint32_t palette = record_->normal_palette;
   uint32_t entry = vertex;
   if (palette != 0) {
     const uint32_t width = bits_for_count(palette);
     entry = static_cast<uint32_t>(
         read_bits(bits_, normal_bit_ + palette * normal_stride_ + uint64_t{vertex} * width, width));
   }
+  return normal_entry(entry);
+}
+
+NormalFields ClusterView::normal_entry(uint32_t entry) const {
+  const uint32_t x_bits = record_->normal_bits[0], y_bits = record_->normal_bits[1];
   const uint64_t field = read_bits(bits_, normal_bit_ + uint64_t{entry} * normal_stride_, normal_stride_);
   const auto y = static_cast<int32_t>(field & ((1u << y_bits) - 1));
   const auto x = static_cast<int32_t>((field >> y_bits) & ((1u << x_bits) - 1));
@@ -168,7 +174,50 @@ void decode_indices(const ClusterView& cluster, uint32_t base, std::span<Triangl
 
 void decode_normals(const ClusterView& cluster, std::span<Vec3> out) {
   assert(cluster.has_normals() && out.size() >= cluster.vertex_count());
-  for (uint32_t v = 0; v < cluster.vertex_count(); ++v) out[v] = cluster.normal(v);
+  const uint32_t vertex_count = cluster.vertex_count(), palette = cluster.record_->normal_palette;
+  if (palette == 0) {
+    cluster.decode_normal_entries(vertex_count, out);
+    return;
+  }
+  std::array<Vec3, kMaxClusterVertices> entries;
+  cluster.decode_normal_entries(palette, entries);
+  const uint32_t width = bits_for_count(palette);
+  uint64_t bit = cluster.normal_bit_ + uint64_t{palette} * cluster.normal_stride_;
+  for (uint32_t v = 0; v < vertex_count; ++v, bit += width)
+    out[v] = entries[static_cast<size_t>(read_bits(cluster.bits_, bit, width))];
+}
+
+void ClusterView::decode_normal_entries(uint32_t count, std::span<Vec3> out) const {
+  static_assert(sizeof(Vec3) == 3 * sizeof(float));
+  const NormalFormat& format = format_of(normal_encoding_);
+  const AxisNormalKernel kernel = axis_normal_kernel();
+  if (format.family != NormalFamily::kAxis || kernel == nullptr) {
+    for (uint32_t i = 0; i < count; ++i) out[i] = decode_normal(normal_encoding_, normal_entry(i));
+    return;
+  }
+  const auto last = static_cast<int32_t>(format.x_codes) - 1;
+  const AxisNormalStream stream{bits_,
+                                normal_bit_,
+                                normal_stride_,
+                                count,
+                                record_->normal_bits[0],
+                                record_->normal_bits[1],
+                                2 * record_->normal_anchor[0],
+                                2 * record_->normal_anchor[1],
+                                static_cast<int32_t>(chart_of(*record_)),
+                                last,
+                                1.0f / static_cast<float>(last),
+                                static_cast<float>(kAxisSlope),
+                                static_cast<float>(kAxisCubic)};
+  kernel(stream, &out[0].x);
+}
+
+AxisNormalKernel axis_normal_kernel() {
+#if defined(__x86_64__)
+  static const bool has_avx2 = __builtin_cpu_supports("avx2");
+  if (has_avx2) return avx2::decode_axis_normals;
+#endif
+  return nullptr;
 }
 
 void decode_uvs(const ClusterView& cluster, std::span<Vec2> out) {

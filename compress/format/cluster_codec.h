@@ -65,6 +65,10 @@ private:
   friend void decode_normals(const ClusterView&, std::span<Vec3>);
   friend void decode_uvs(const ClusterView&, std::span<Vec2>);
 
+  /// Of a vertex, or of an entry of the palette.
+  NormalFields normal_entry(uint32_t entry) const;
+  void decode_normal_entries(uint32_t count, std::span<Vec3> out) const;
+
   const baked::ClusterRecord* record_;
   const uint8_t* bits_;
   IndexLayout layout_;
