@@ -67,13 +67,17 @@ void FileLoader::load(std::vector<Mesh>& meshes, std::vector<ImageRequest>& imag
     if (image.needed && !image.missing) wanted_images.push_back(&image);
   std::vector<Outcome> image_outcomes(wanted_images.size());
   const size_t count = wanted_images.size() + wanted_plys.size();
-  std::atomic<uint64_t> mesh_bytes{0};
+  std::atomic<uint64_t> mesh_bytes{0}, colour_bytes{0};
   for (const Mesh& mesh : meshes) mesh_bytes += bytes_of(mesh);
   tbb::enumerable_thread_specific<LargeHeapPages> heap_pages;
   progress.begin("reading meshes and images", count);
   tbb::parallel_for(size_t{0}, count, [&](size_t i) {
     if (i < wanted_images.size()) { // images first: one may take longer than many meshes
       image_outcomes[i] = read_image_file(*wanted_images[i]);
+      const uint64_t bytes = wanted_images[i]->summary.rgb.size();
+      if (colour_bytes.fetch_add(bytes) + bytes > options_.memory_budget_bytes)
+        throw Error(ErrorKind::kLimitExceeded, "all textures together exceed the memory budget of " +
+                                                   std::to_string(options_.memory_budget_bytes) + " bytes");
     } else {
       PlyFile& file = *wanted_plys[i - wanted_images.size()];
       std::error_code unknown; // found out when it is read

@@ -411,5 +411,27 @@ TEST(AlbedoTextures, EqualOnesAreStoredOnceAndUnusedOnesNot) {
   EXPECT_EQ(kept.scene.textures[0].name, "a");
 }
 
+TEST(AlbedoTextures, TogetherStayWithinTheBudget) {
+  const SceneFolder folder;
+  std::string world;
+  for (const std::string name : {"a", "b", "c"}) { // 3000 bytes of colours each
+    folder.write(name + ".tga", grey_tga(100, 10, std::vector<uint8_t>(1000, static_cast<uint8_t>(name[0]))));
+    world += "Texture \"" + name + "\" \"spectrum\" \"imagemap\" \"string filename\" \"" + name + ".tga\"\n" +
+             "Material \"matte\" \"texture Kd\" \"" + name + "\"\n" + std::string(kTriangle) + "\n";
+  }
+  folder.write("three.pbrt", "WorldBegin\n" + world + "\nWorldEnd\n");
+  const auto textures = [&](uint64_t budget, bool keep) {
+    ImportOptions options;
+    options.keep_textures = keep;
+    options.memory_budget_bytes = budget;
+    Diagnostics diagnostics;
+    Progress progress;
+    return import_scene(folder.path() / "three.pbrt", options, diagnostics, progress).scene.textures.size();
+  };
+  EXPECT_EQ(textures(9000, true), 3u);
+  EXPECT_EQ(textures(8999, false), 0u);
+  EXPECT_THROW(textures(8999, true), Error);
+}
+
 } // namespace
 } // namespace packtrace

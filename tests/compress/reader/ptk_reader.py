@@ -281,6 +281,38 @@ def read_uvs(bits, cluster, geometry):
         for _ in range(cluster["vertex_count"])]
 
 
+def rgb_of_565(number):
+    red, green, blue = number >> 11, number >> 5 & 63, number & 31
+    return red << 3 | red >> 2, green << 2 | green >> 4, blue << 3 | blue >> 2
+
+
+def bc1_colours(first, second):
+    a, b = rgb_of_565(first), rgb_of_565(second)
+    if first > second:
+        return a, b, [(2 * x + y + 1) // 3 for x, y in zip(a, b)], [(x + 2 * y + 1) // 3 for x, y in zip(a, b)]
+    return a, b, [(x + y + 1) // 2 for x, y in zip(a, b)], (0, 0, 0)
+
+
+def read_texels(texture, data):
+    """All texels from the top, three values each."""
+    width, height, codec = texture["width"], texture["height"], texture["codec"]
+    if codec == 0:
+        return list(data[: 3 * width * height])
+    if codec == 1:
+        return [data[3 * number + c] for number in data[768 : 768 + width * height] for c in range(3)]
+    if codec == 2:
+        low, high = data[0:3], data[3:6]
+        levels = [((code >> 6, 3), (code >> 2 & 15, 15), (code & 3, 3)) for code in data[6 : 6 + width * height]]
+        return [(low[c] * (n - q) + high[c] * q + n // 2) // n for texel in levels for c, (q, n) in enumerate(texel)]
+    texels = []
+    for y in range(height):
+        for x in range(width):
+            block = 8 * (y // 4 * ((width + 3) // 4) + x // 4)
+            colours = bc1_colours(*struct.unpack_from("<HH", data, block))
+            texels += colours[data[block + 4 + y % 4] >> 2 * (x % 4) & 3]
+    return texels
+
+
 class BakedFile:
     """A file's records, and its geometries decoded on demand."""
 
@@ -391,7 +423,8 @@ def require_equal(what, ours, theirs):
 def compare(baked, meshes, dump):
     """A dump: geometries (u32); for each vertices, triangles (u32), then lattice (3 i64 a vertex), positions, normals
     (3 floats a vertex), uvs (2 floats), triangles (3 u32 each), material slots (u32 a triangle); instances (u32); for each
-    12 floats, a geometry (u32) and its materials by slot (u32 each). All must be equal."""
+    12 floats, a geometry (u32) and its materials by slot (u32 each); of all textures the texels (3 u8 each). All must be
+    equal."""
     require_equal("geometries", [len(meshes)], dump.take("I", 1))
     for number, mesh in enumerate(meshes):
         vertices, triangles = len(mesh.lattice), len(mesh.triangles)
@@ -410,6 +443,9 @@ def compare(baked, meshes, dump):
         require_equal(f"instance {number}", [instance["geometry"]], dump.take("I", 1))
         materials = baked.instance_materials(instance)
         require_equal(f"instance {number}: materials", materials, dump.take("I", len(materials)))
+    for number, texture in enumerate(baked.sections["textures"]):
+        texels = read_texels(texture, baked.sections["texture_bytes"][texture["first_byte"] :])
+        require_equal(f"texture {number}", texels, list(dump.take("B", 3 * texture["width"] * texture["height"])))
     if dump.at != len(dump.data):
         raise Differs("the dump holds more than the file")
 

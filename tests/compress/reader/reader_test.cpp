@@ -59,6 +59,11 @@ std::vector<std::byte> dump(const BakedFile& file) {
     out.put_number(file.instances()[i].geometry);
     out.put(file.instance_materials(i));
   }
+  for (uint32_t i = 0; i < file.sections().textures.size(); ++i) {
+    const TextureView texture = file.texture(i);
+    for (uint32_t y = 0; y < texture.height; ++y)
+      for (uint32_t x = 0; x < texture.width; ++x) out.put(std::span<const uint8_t>(texture.texel(x, y)));
+  }
   return out.bytes();
 }
 
@@ -163,6 +168,27 @@ TEST_F(IndependentReader, DecodesEveryEncodingOfTextureCoordinates) {
     for (Vec2& uv : scene.meshes[1].uvs) uv = uv * 7.0f - Vec2(3.0f);
     write(scene, config);
     EXPECT_EQ(read(), 0) << kUvEncodingNames[static_cast<size_t>(encoding)];
+  }
+}
+
+TEST_F(IndependentReader, DecodesEveryCodecOfTextures) {
+  Scene scene = test::scene_of(test::grid_mesh(4));
+  scene.materials[0].flags = kAlbedoTexture, scene.materials[0].albedo_texture = 0;
+  test::Random random(8);
+  for (const uint32_t width : {16u, 7u}) {
+    scene.textures.push_back({"noise", width, 9, WrapMode::kRepeat, Vec2(1), Vec2(0), {}});
+    for (uint32_t i = 0; i < 3 * width * 9; ++i)
+      scene.textures.back().rgb.push_back(static_cast<uint8_t>(random.bits() % (1 + i / 3)));
+  }
+  for (size_t codec = 0; codec < kTextureCodecNames.size(); ++codec) {
+    BakeConfig config;
+    config.purpose = baked::kShading;
+    config.textures = true;
+    config.texture_codec = static_cast<TextureCodec>(codec);
+    write(scene, config);
+    EXPECT_EQ(read(), 0) << kTextureCodecNames[codec];
+    dumped().back() ^= std::byte{1};
+    EXPECT_EQ(read(), 1) << "a texel that differs";
   }
 }
 
