@@ -1,9 +1,7 @@
 #include "compress/bake/bake_scene.h"
 
 #include <algorithm>
-#include <cmath>
 
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include "compress/bake/brief.h"
@@ -14,6 +12,7 @@
 #include "compress/bake/nested_grids.h"
 #include "compress/bake/page_encoder.h"
 #include "compress/bake/requirement_table.h"
+#include "compress/bake/scene_measure.h"
 #include "compress/bake/touching_boxes.h"
 #include "compress/format/baked_image.h"
 #include "compress/format/bit_stream.h"
@@ -32,7 +31,7 @@ class Baker {
 public:
   Baker(const Scene& scene, const BakeConfig& config, Diagnostics& diagnostics, Progress& progress)
       : scene_(scene), config_(config), diagnostics_(diagnostics), progress_(progress), plan_(plan_scene(scene)),
-        measures_(plan_.geometries.size()), grids_(plan_.geometries.size()), packed_(plan_.geometries.size()) {}
+        grids_(plan_.geometries.size()), packed_(plan_.geometries.size()) {}
 
   BakedScene run() {
     measure();
@@ -81,61 +80,21 @@ private:
 
   void measure() {
     progress_.begin("measuring geometry", plan_.geometries.size());
-    struct Scratch {
-      LengthHistogram world, local;
-    };
-    tbb::enumerable_thread_specific<Scratch> scratch;
-    const std::vector<std::vector<double>> scales = instanced_scales();
-    tbb::parallel_for(size_t{0}, plan_.geometries.size(), [&](size_t i) {
-      const GeometryPlan& plan = plan_.geometries[i];
-      Scratch& mine = scratch.local();
-      mine.local.clear();
-      measures_[i].bounds = measure_geometry(scene_, plan, mine.local);
-      measures_[i].median_edge = mine.local.median();
-      if (plan.world_space) mine.world.add(mine.local);
-      for (const double scale : scales[i]) mine.world.add_scaled(mine.local, scale);
-      progress_.advance();
-    });
-    LengthHistogram edges;
-    for (const Scratch& one : scratch) edges.add(one.world);
-    world_.median_edge = edges.median();
-    for (size_t i = 0; i < measures_.size(); ++i)
-      if (plan_.geometries[i].world_space) world_.bounds.extend(measures_[i].bounds);
-    for (size_t i = 0; i < scene_.shapes.size(); ++i)
-      if (const baked::InstanceRecord& instance = plan_.instances[i]; is_instanced_shape(instance))
-        world_.bounds.extend(placed_box(instance, measures_[instance.geometry].bounds));
-  }
-
-  /// Of the first instances, which are the shapes outside objects.
-  bool is_instanced_shape(const baked::InstanceRecord& instance) const {
-    return instance.geometry != baked::kNone && !plan_.geometries[instance.geometry].world_space;
-  }
-
-  /// For each geometry how much its world shapes, if they are instanced, scale it: the root mean square over the axes.
-  /// They count for the scene's step like all other shapes outside objects.
-  std::vector<std::vector<double>> instanced_scales() const {
-    std::vector<std::vector<double>> scales(plan_.geometries.size());
-    for (size_t i = 0; i < scene_.shapes.size(); ++i) {
-      const baked::InstanceRecord& instance = plan_.instances[i];
-      if (!is_instanced_shape(instance)) continue;
-      double sum = 0.0;
-      for (size_t k = 0; k < 9; ++k) sum += double{instance.world_from_object[k]} * instance.world_from_object[k];
-      scales[instance.geometry].push_back(std::sqrt(sum / 3.0));
-    }
-    return scales;
+    SceneMeasure measure = measure_scene(scene_, plan_, progress_);
+    measures_ = std::move(measure.geometries);
+    world_ = measure.world;
+    has_world_space_ = measure.has_world_space;
   }
 
   void choose_grids() {
-    bool any_world = false;
-    for (size_t i = 0; i < measures_.size(); ++i)
-      any_world |= plan_.geometries[i].world_space && !measures_[i].bounds.empty();
-    if (any_world) {
+    if (has_world_space_) {
       world_grid_ = choose_grid(config_, world_, 1.0);
       report_.world_step = world_grid_.step();
       report_.world_median_edge = world_.median_edge;
     }
-    const std::vector<uint32_t> halvings = any_world ? nest_grids(scene_, plan_, measures_, config_, world_grid_.step())
-                                                     : std::vector<uint32_t>(plan_.geometries.size());
+    const std::vector<uint32_t> halvings = has_world_space_
+                                               ? nest_grids(scene_, plan_, measures_, config_, world_grid_.step())
+                                               : std::vector<uint32_t>(plan_.geometries.size());
     uint64_t coarse = 0, far = 0;
     for (size_t i = 0; i < grids_.size(); ++i) {
       const GeometryPlan& plan = plan_.geometries[i];
@@ -207,11 +166,6 @@ private:
   static Bounds grown(Bounds box, double by) {
     if (!box.empty()) box.lo -= by, box.hi += by;
     return box;
-  }
-
-  static Bounds placed_box(const baked::InstanceRecord& instance, const Bounds& box) {
-    const auto& m = instance.world_from_object;
-    return transform_bounds(DAffine(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]), box);
   }
 
   void encode_textures() {
@@ -370,6 +324,7 @@ private:
   ScenePlan plan_;
   std::vector<GeometryMeasure> measures_;
   GeometryMeasure world_;
+  bool has_world_space_ = false;
   PositionGrid world_grid_;
   std::vector<PositionGrid> grids_;
   std::vector<Packed> packed_;

@@ -231,8 +231,10 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   verb.add_flag("--dry-run", options->dry_run, "Do everything but write the file");
   add_scene_options(verb, options->scene);
   verb.footer(
-      "The grid is shared by all geometry of the world, so meshes that touch stay closed. The error that was measured\n"
-      "against the source is printed, stored in the file, and never above half a step per axis.\n"
+      "Shapes outside objects lie on one grid, so meshes that touch stay closed; shapes that share a mesh are stored "
+      "once,\n"
+      "on a grid of its own. The error that was measured against the source is printed, stored in the file, and never\n"
+      "above half a step per axis. What was left out, and why, is printed; -v says it of each geometry.\n"
       "Examples:\n"
       "  packtrace bake house.pbrt -o house.ptk\n"
       "  packtrace bake house.pbrt -o small.ptk --precision 1e-4 --json report.json");

@@ -738,6 +738,16 @@ TEST(BakeScene, TransformsOfSharedShapesThatNoFloatHoldsAreLeftOut) {
   EXPECT_GT(baked.report.file.triangles, 0u);
 }
 
+TEST(BakeScene, WhatIsLeftAloneStaysOnTheWorldsGrid) {
+  Scene scene = scene_of(test::sphere_mesh(12));
+  scene.shapes.push_back(scene.shapes[0]);
+  scene.shapes[1].parent_from_mesh = test::scaling(DVec3(1e50)); // left out: the other one shares with nobody
+  const BakedScene baked = bake(scene);
+  EXPECT_EQ(baked.report.left_out, 1u);
+  EXPECT_EQ(baked.report.instanced_shapes, 0u);
+  EXPECT_NE(BakedFile::from_bytes(baked.bytes).geometries()[0].flags & baked::kWorldSpace, 0u);
+}
+
 TEST(BakeScene, LatticesBeyondTheLimitAreAnErrorThatNamesIt) {
   Scene scene = scene_of(test::grid_mesh(4), test::scaling(DVec3(1e30)));
   try {
