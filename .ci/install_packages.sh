@@ -7,6 +7,7 @@ packages=(
   libtbb-dev libglm-dev libembree-dev libopenexr-dev libopenmesh-dev libxxhash-dev libzstd-dev libstb-dev zlib1g-dev
   libcli11-dev libfmt-dev nlohmann-json3-dev
   libgtest-dev libbenchmark-dev python3
+  glslang-tools spirv-tools libvulkan-dev mesa-vulkan-drivers # the GLSL of vertex16 is compiled and run on the CPU
   libdraco-dev libmeshoptimizer-dev # what the packing benchmark compares with
 )
 

@@ -94,7 +94,8 @@ void CameraCollector::add_camera(const Directive& directive, const TransformPair
       reporter.error(directive.place, "frameaspectratio must be one positive number; the film's is used");
   }
   report_unused(list, reporter);
-  if (!is_invertible(camera_from_world.start)) {
+  // The inverse of what is only invertible by the rounding of a flattening map may not be invertible itself.
+  if (!is_invertible(camera_from_world.start) || !is_invertible(inverse(camera_from_world.start))) {
     reporter.error(directive.place, "the camera's transform has no inverse; the camera is left out");
     return;
   }

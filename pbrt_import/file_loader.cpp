@@ -4,9 +4,11 @@
 #include <atomic>
 #include <memory>
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include "pbrt_import/input_file.h"
+#include "pbrt_import/large_pages.h"
 #include "pbrt_import/ply.h"
 #include "pbrt_import/problem_text.h"
 #include "pbrt_import/scene/error.h"
@@ -48,7 +50,8 @@ FileLoader::Outcome FileLoader::read_image_file(ImageRequest& image) const {
   outcome.error = problem_of([&] {
     const std::vector<std::byte> bytes = read_whole_file(image.path, options_.memory_budget_bytes);
     outcome.bytes = bytes.size();
-    image.summary = read_image(bytes, image.decode_srgb, image.want_mask, options_.memory_budget_bytes);
+    image.summary =
+        read_image(bytes, image.decode_srgb, {image.want_mask, image.want_colours}, options_.memory_budget_bytes);
   });
   image.missing = !outcome.error.empty();
   return outcome;
@@ -64,14 +67,22 @@ void FileLoader::load(std::vector<Mesh>& meshes, std::vector<ImageRequest>& imag
     if (image.needed && !image.missing) wanted_images.push_back(&image);
   std::vector<Outcome> image_outcomes(wanted_images.size());
   const size_t count = wanted_images.size() + wanted_plys.size();
-  std::atomic<uint64_t> mesh_bytes{0};
+  std::atomic<uint64_t> mesh_bytes{0}, colour_bytes{0};
   for (const Mesh& mesh : meshes) mesh_bytes += bytes_of(mesh);
+  tbb::enumerable_thread_specific<LargeHeapPages> heap_pages;
   progress.begin("reading meshes and images", count);
   tbb::parallel_for(size_t{0}, count, [&](size_t i) {
     if (i < wanted_images.size()) { // images first: one may take longer than many meshes
       image_outcomes[i] = read_image_file(*wanted_images[i]);
+      const uint64_t bytes = wanted_images[i]->summary.rgb.size();
+      if (colour_bytes.fetch_add(bytes) + bytes > options_.memory_budget_bytes)
+        throw Error(ErrorKind::kLimitExceeded, "all textures together exceed the memory budget of " +
+                                                   std::to_string(options_.memory_budget_bytes) + " bytes");
     } else {
       PlyFile& file = *wanted_plys[i - wanted_images.size()];
+      std::error_code unknown; // found out when it is read
+      const uint64_t stored_bytes = std::filesystem::file_size(file.path, unknown);
+      if (!unknown) heap_pages.local().about_to_allocate(2 * stored_bytes);
       read_ply_file(file, meshes[file.slot]);
       // Leaving out those beyond the limit would leave out others in each run.
       const uint64_t bytes = bytes_of(meshes[file.slot]);

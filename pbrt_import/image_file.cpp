@@ -23,7 +23,7 @@
 
 #include "pbrt_import/number.h"
 #include "pbrt_import/radiance.h"
-#include "pbrt_import/scene/alpha_mask.h"
+#include "pbrt_import/scene/albedo_texture.h"
 #include "pbrt_import/scene/error.h"
 #include "pbrt_import/scene/exr_header.h"
 #include "pbrt_import/scene/png_chunks.h"
@@ -41,10 +41,13 @@ constexpr uint64_t kMostPixelsPerByte = 1u << 16; // PNG reaches 8256; EXR's DWA
 /// Takes pixels one after the other, rows from the top.
 class Summarizer {
 public:
-  Summarizer(uint32_t width, uint32_t height, bool want_mask) : width_(width), want_mask_(want_mask) {
+  Summarizer(uint32_t width, uint32_t height, ImageWants wants)
+      : width_(width), want_mask_(wants.mask), want_colours_(wants.colours) {
     summary_.width = width;
     summary_.height = height;
-    if (want_mask) summary_.nonzero.assign(static_cast<size_t>(AlphaMask::row_words(width)) * height, 0);
+    want_colours_ = want_colours_ && uint64_t{width} * height <= kMostTextureTexels;
+    if (want_colours_) summary_.rgb.assign(static_cast<size_t>(width) * height * 3, 0);
+    if (want_mask_) summary_.nonzero.assign(static_cast<size_t>(AlphaMask::row_words(width)) * height, 0);
   }
 
   void add(uint32_t x, uint32_t y, Vec3 pixel) {
@@ -53,6 +56,9 @@ public:
       return;
     }
     row_ += DVec3(pixel);
+    if (want_colours_)
+      for (size_t c = 0; c < 3; ++c)
+        summary_.rgb[(static_cast<size_t>(y) * width_ + x) * 3 + c] = srgb8_of_linear(pixel[static_cast<int>(c)]);
     if (want_mask_ && (pixel.x != 0.0f || pixel.y != 0.0f || pixel.z != 0.0f))
       summary_.nonzero[static_cast<size_t>(y) * AlphaMask::row_words(width_) + x / 32] |= 1u << (x % 32);
   }
@@ -71,7 +77,7 @@ public:
 private:
   ImageSummary summary_;
   uint32_t width_;
-  bool want_mask_;
+  bool want_mask_, want_colours_;
   DVec3 row_{0.0}, total_{0.0};
 };
 
@@ -97,9 +103,9 @@ struct StbFree {
 };
 
 template <class T, class ToLinear>
-ImageSummary summarize(const T* pixels, int width, int height, bool want_mask, ToLinear to_linear) {
+ImageSummary summarize(const T* pixels, int width, int height, ImageWants wants, ToLinear to_linear) {
   const auto w = static_cast<uint32_t>(width), h = static_cast<uint32_t>(height);
-  Summarizer summarizer(w, h, want_mask);
+  Summarizer summarizer(w, h, wants);
   for (uint32_t y = 0; y < h; ++y) {
     for (uint32_t x = 0; x < w; ++x, pixels += 3)
       summarizer.add(x, y, {to_linear(pixels[0]), to_linear(pixels[1]), to_linear(pixels[2])});
@@ -151,7 +157,7 @@ struct StoredImage {
 };
 
 /// @param bytes whose header has been read
-ImageSummary decode_stb(std::span<const std::byte> bytes, const StoredImage& image, bool decode_srgb, bool want_mask,
+ImageSummary decode_stb(std::span<const std::byte> bytes, const StoredImage& image, bool decode_srgb, ImageWants wants,
                         uint64_t max_bytes) {
   // stb_image holds up to two copies, of four channels at most.
   const uint64_t pixel_bytes = image.bits_per_sample > 8 ? 16 : 8;
@@ -168,7 +174,7 @@ ImageSummary decode_stb(std::span<const std::byte> bytes, const StoredImage& ima
   };
   if (image.bits_per_sample > 8) {
     const auto pixels = load(stbi_load_16_from_callbacks);
-    return summarize(pixels.get(), width, height, want_mask, [&](stbi_us v) {
+    return summarize(pixels.get(), width, height, wants, [&](stbi_us v) {
       return decode_srgb ? linear_from_srgb(static_cast<float>(v) / 65535.0f) : static_cast<float>(v) / 65535.0f;
     });
   }
@@ -178,29 +184,29 @@ ImageSummary decode_stb(std::span<const std::byte> bytes, const StoredImage& ima
     const float v = static_cast<float>(i) / 255.0f;
     linear[i] = decode_srgb ? linear_from_srgb(v) : v;
   }
-  return summarize(pixels.get(), width, height, want_mask, [&](stbi_uc v) { return linear[v]; });
+  return summarize(pixels.get(), width, height, wants, [&](stbi_uc v) { return linear[v]; });
 }
 
 /// PNG, or TGA, which has no mark of its own: what nothing else claims.
-ImageSummary read_stb(std::span<const std::byte> bytes, bool is_png, bool decode_srgb, bool want_mask,
+ImageSummary read_stb(std::span<const std::byte> bytes, bool is_png, bool decode_srgb, ImageWants wants,
                       uint64_t max_bytes) {
   if (bytes.size() > static_cast<size_t>(INT32_MAX)) fail("the image file exceeds 2 GiB");
   if (is_png) {
     const PngHeader header = check_png_chunks(bytes, PngChecksums::kIgnore, kDamaged);
-    return decode_stb(bytes, {header.width, header.height, header.bits_per_sample}, decode_srgb, want_mask, max_bytes);
+    return decode_stb(bytes, {header.width, header.height, header.bits_per_sample}, decode_srgb, wants, max_bytes);
   }
   const auto* const data = reinterpret_cast<const stbi_uc*>(bytes.data());
   int width = 0, height = 0, channels = 0;
   if (!stbi_info_from_memory(data, static_cast<int>(bytes.size()), &width, &height, &channels))
     fail("not an image in a known format (PNG, TGA, EXR, PFM, HDR)");
-  return decode_stb(bytes, {static_cast<uint32_t>(width), static_cast<uint32_t>(height)}, decode_srgb, want_mask,
+  return decode_stb(bytes, {static_cast<uint32_t>(width), static_cast<uint32_t>(height)}, decode_srgb, wants,
                     max_bytes);
 }
 
-ImageSummary read_hdr(std::span<const std::byte> bytes, bool want_mask, uint64_t max_bytes) {
+ImageSummary read_hdr(std::span<const std::byte> bytes, ImageWants wants, uint64_t max_bytes) {
   RadianceReader reader(bytes);
   check_size(reader.width(), reader.height(), 12, bytes.size(), max_bytes);
-  Summarizer summarizer(reader.width(), reader.height(), want_mask);
+  Summarizer summarizer(reader.width(), reader.height(), wants);
   for (uint32_t y = 0; y < reader.height(); ++y) {
     const std::span<const Vec3> row = reader.read_row();
     for (uint32_t x = 0; x < reader.width(); ++x) summarizer.add(x, y, row[x]);
@@ -247,7 +253,7 @@ void check_exr(std::span<const std::byte> bytes, uint64_t max_bytes) {
     fail("damaged image: its " + std::to_string(bytes.size()) + " bytes cannot hold the blocks it claims");
 }
 
-ImageSummary read_exr(std::span<const std::byte> bytes, bool want_mask, uint64_t max_bytes) {
+ImageSummary read_exr(std::span<const std::byte> bytes, ImageWants wants, uint64_t max_bytes) {
   check_exr(bytes, max_bytes);
   try {
     MemoryStream stream(bytes);
@@ -257,7 +263,7 @@ ImageSummary read_exr(std::span<const std::byte> bytes, bool want_mask, uint64_t
     if ((file.channels() & (Imf::WRITE_RGB | Imf::WRITE_YC)) == 0)
       fail("the EXR image has none of the channels R, G, B and Y");
     const auto w = static_cast<uint32_t>(width);
-    Summarizer summarizer(w, static_cast<uint32_t>(height), want_mask);
+    Summarizer summarizer(w, static_cast<uint32_t>(height), wants);
     constexpr int64_t kBlock = 64; // whole blocks of every compression but the rarest
     const auto block = static_cast<int>(std::min(height, kBlock));
     std::vector<Imf::Rgba> rows(static_cast<size_t>(w) * static_cast<size_t>(block));
@@ -284,7 +290,7 @@ ImageSummary read_exr(std::span<const std::byte> bytes, bool want_mask, uint64_t
 }
 
 /// Portable float map: "PF" or "Pf", width, height, scale (negative: little-endian), then rows from the bottom.
-ImageSummary read_pfm(std::span<const std::byte> bytes, bool want_mask, uint64_t max_bytes) {
+ImageSummary read_pfm(std::span<const std::byte> bytes, ImageWants wants, uint64_t max_bytes) {
   std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   const size_t channels = text[1] == 'F' ? 3 : 1;
   text.remove_prefix(2);
@@ -306,7 +312,7 @@ ImageSummary read_pfm(std::span<const std::byte> bytes, bool want_mask, uint64_t
   const size_t row_bytes = static_cast<size_t>(width) * channels * 4;
   if (text.size() / row_bytes < height) fail(kTruncated);
   const bool swap = header[2] > 0.0;
-  Summarizer summarizer(width, height, want_mask);
+  Summarizer summarizer(width, height, wants);
   for (uint32_t y = 0; y < height; ++y) {
     const char* row = text.data() + (height - 1 - y) * row_bytes;
     for (uint32_t x = 0; x < width; ++x) {
@@ -339,14 +345,14 @@ std::string_view other_format(std::string_view file) {
 
 } // namespace
 
-ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, bool want_mask, uint64_t max_bytes) {
+ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants, uint64_t max_bytes) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  if (text.starts_with("\x76\x2f\x31\x01")) return read_exr(bytes, want_mask, max_bytes);
-  if (text.starts_with("PF") || text.starts_with("Pf")) return read_pfm(bytes, want_mask, max_bytes);
-  if (text.starts_with("#?")) return read_hdr(bytes, want_mask, max_bytes);
+  if (text.starts_with("\x76\x2f\x31\x01")) return read_exr(bytes, wants, max_bytes);
+  if (text.starts_with("PF") || text.starts_with("Pf")) return read_pfm(bytes, wants, max_bytes);
+  if (text.starts_with("#?")) return read_hdr(bytes, wants, max_bytes);
   if (const std::string_view name = other_format(text); !name.empty())
     fail("images in " + std::string(name) + " format are not read, only PNG, TGA, EXR, PFM and HDR");
-  return read_stb(bytes, text.starts_with("\x89PNG"), decode_srgb, want_mask, max_bytes);
+  return read_stb(bytes, text.starts_with("\x89PNG"), decode_srgb, wants, max_bytes);
 }
 
 } // namespace packtrace

@@ -16,17 +16,29 @@ struct ImageSummary {
   uint32_t height = 0; ///< pixels
   Vec3 average{0.0f};  ///< linear RGB; pixels that are not finite count as 0
   uint64_t not_finite_pixels = 0;
+  std::vector<uint8_t> rgb;      ///< AlbedoTexture's layout, clamped to [0, 1]; empty if not wanted or too large
   std::vector<uint32_t> nonzero; ///< AlphaMask's layout: bit set where luminance is not 0
 };
+
+/// What to keep of an image besides its size and average.
+struct ImageWants {
+  bool mask = false;    ///< ImageSummary::nonzero
+  bool colours = false; ///< ImageSummary::rgb
+};
+
+/// Images of more texels are known by their average only.
+inline constexpr uint64_t kMostTextureTexels = uint64_t{1} << 26;
 
 /// Reads PNG and TGA (stb_image), OpenEXR, PFM, which are pbrt's formats, and HDR; alpha channels are ignored, as pbrt
 /// does. Other formats are refused by name: pbrt does not read them either.
 /// @param bytes the whole file
 /// @param decode_srgb whether integer formats are sRGB-encoded
-/// @param want_mask whether to fill ImageSummary::nonzero
 /// @param max_bytes for the decoded pixels
 /// Throws Error(kInput), message without a file name, if it is none of these or damaged, Error(kLimitExceeded) if
 /// decoding would take more than max_bytes.
-ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, bool want_mask, uint64_t max_bytes);
+ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants, uint64_t max_bytes);
+inline ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, bool want_mask, uint64_t max_bytes) {
+  return read_image(bytes, decode_srgb, ImageWants{want_mask, false}, max_bytes);
+}
 
 } // namespace packtrace

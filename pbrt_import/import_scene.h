@@ -14,12 +14,13 @@ namespace packtrace {
 
 struct ImportOptions {
   bool strict = false;                          ///< any warning or error fails the import, once all are reported
-  uint64_t memory_budget_bytes = 16ull << 30;   ///< for one file's content, and for all meshes together
+  uint64_t memory_budget_bytes = 16ull << 30;   ///< for one file's content, all meshes together, all textures
   uint32_t max_include_depth = 64;              ///< files open at once
   uint64_t max_included_files = 1'000'000;      ///< opened in all
   uint32_t max_nesting = 1u << 16;              ///< open Attribute, Transform and Object blocks
   double tessellation_tolerance = 1e-3;         ///< relative to the curved shape's radius, within [1e-6, 0.5]
   bool allow_files_outside_scene_folder = true; ///< exporters write "../textures/x.png"
+  bool keep_textures = false;                   ///< fill Scene::textures; else materials have averages only
   uint32_t world = 1;                           ///< which WorldBegin ... WorldEnd with its options, from 1
   std::optional<double> time;                   ///< when to look at what moves; none: as the camera's shutter opens
 };
@@ -63,7 +64,8 @@ struct ImportResult {
 ///
 /// Throws Error(kUsage) if an option is out of range, Error(kInput) if the main file cannot be read at all or has no
 /// world of that number, Error(kInput) if options.strict and a warning or an error was reported, Error(kLimitExceeded)
-/// if the meshes of PLY files exceed memory_budget_bytes together, Error(kCancelled) on cancellation.
+/// if the meshes of PLY files, or the colours of all textures, exceed memory_budget_bytes together, Error(kCancelled)
+/// on cancellation.
 ImportResult import_scene(const std::filesystem::path& main_file, const ImportOptions& options,
                           Diagnostics& diagnostics, Progress& progress);
 

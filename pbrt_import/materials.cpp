@@ -160,6 +160,18 @@ void fill_recipe(MaterialRecipe& recipe, std::string_view kind, const TexturePar
 
 Vec3 clamped(Vec3 v) { return glm::clamp(v, Vec3(0.0f), Vec3(1.0f)); }
 
+/// The number of an equal texture, the new one's where there is none.
+uint32_t add_texture(std::vector<AlbedoTexture>& textures, AlbedoTexture texture) {
+  const auto same = [&](const AlbedoTexture& other) {
+    return other.width == texture.width && other.height == texture.height && other.wrap == texture.wrap &&
+           other.uv_scale == texture.uv_scale && other.uv_offset == texture.uv_offset && other.rgb == texture.rgb;
+  };
+  const auto found = std::find_if(textures.begin(), textures.end(), same);
+  const auto number = static_cast<uint32_t>(found - textures.begin());
+  if (found == textures.end()) textures.push_back(std::move(texture));
+  return number;
+}
+
 } // namespace
 
 MaterialLibrary::MaterialLibrary(TextureGraph& graph) : graph_(graph) {
@@ -259,11 +271,12 @@ uint32_t MaterialLibrary::use(const MaterialUse& use) {
   return it->second;
 }
 
-void MaterialLibrary::require_images() {
+void MaterialLibrary::require_images(bool colours) {
+  colours_ = colours;
   for (const MaterialUse& use : uses_) {
-    graph_.require(definitions_[use.recipe].recipe.albedo, false);
-    if (use.alpha != kNone) graph_.require(use.alpha, true);
-    if (use.shadow_alpha != kNone) graph_.require(use.shadow_alpha, true);
+    graph_.require(definitions_[use.recipe].recipe.albedo, {false, colours});
+    if (use.alpha != kNone) graph_.require(use.alpha, {true, false});
+    if (use.shadow_alpha != kNone) graph_.require(use.shadow_alpha, {true, false});
   }
 }
 
@@ -279,8 +292,26 @@ Vec3 MaterialLibrary::albedo_of(const Definition& definition, Reporter& reporter
   return inside;
 }
 
-std::vector<uint32_t> MaterialLibrary::resolve(std::vector<Material>& materials, std::vector<AlphaMask>& masks,
-                                               Reporter& reporter) {
+uint32_t MaterialLibrary::texture_of(const Definition& definition, Scene& scene, uint64_t texture_bytes,
+                                     Reporter& reporter) {
+  if (!colours_ || (definition.recipe.flags & kAlbedoTexture) == 0) return kNoTexture;
+  const auto [it, inserted] = texture_of_node_.try_emplace(definition.recipe.albedo, kNoTexture);
+  if (!inserted) return it->second;
+  std::optional<AlbedoTexture> texture = graph_.albedo_texture(definition.recipe.albedo);
+  if (!texture) return kNoTexture;
+  uint64_t bytes = texture->rgb.size();
+  for (const AlbedoTexture& other : scene.textures) bytes += other.rgb.size();
+  if (bytes > texture_bytes) {
+    reporter.note(definition.place, "texture " + in_quotes(texture->name) +
+                                        ": all textures together exceed the memory budget; its average is used");
+    return kNoTexture;
+  }
+  return it->second = add_texture(scene.textures, std::move(*texture));
+}
+
+std::vector<uint32_t> MaterialLibrary::resolve(Scene& scene, uint64_t texture_bytes, Reporter& reporter) {
+  std::vector<Material>& materials = scene.materials;
+  std::vector<AlphaMask>& masks = scene.masks;
   std::map<Node, std::pair<TextureGraph::MaskKind, uint32_t>> mask_of_node;
   const auto mask_of = [&](Node node) {
     const auto [it, inserted] = mask_of_node.try_emplace(node, TextureGraph::MaskKind::kNoHoles, kNoMask);
@@ -298,12 +329,13 @@ std::vector<uint32_t> MaterialLibrary::resolve(std::vector<Material>& materials,
     it->second.first = result.kind;
     return it->second;
   };
-  using Key = std::tuple<std::string, MaterialFlags, std::array<float, 3>, uint32_t, uint32_t>;
+  using Key = std::tuple<std::string, MaterialFlags, std::array<float, 3>, uint32_t, uint32_t, uint32_t>;
   std::map<Key, uint32_t> numbers;
   std::vector<uint32_t> result;
   for (const MaterialUse& use : uses_) {
     const MaterialRecipe& recipe = definitions_[use.recipe].recipe;
     Material material{recipe.name, recipe.flags, albedo_of(definitions_[use.recipe], reporter), kNoMask, kNoMask};
+    material.albedo_texture = texture_of(definitions_[use.recipe], scene, texture_bytes, reporter);
     if (use.area_light != kNone) material.flags |= use.area_light == 1 ? kEmissive | kEmitsBothSides : kEmissive;
     if (use.alpha != kNone) {
       const auto [kind, mask] = mask_of(use.alpha);
@@ -321,7 +353,8 @@ std::vector<uint32_t> MaterialLibrary::resolve(std::vector<Material>& materials,
                   material.flags,
                   {material.albedo.x, material.albedo.y, material.albedo.z},
                   material.alpha_mask,
-                  material.shadow_alpha_mask};
+                  material.shadow_alpha_mask,
+                  material.albedo_texture};
     const auto [it, inserted] = numbers.try_emplace(key, static_cast<uint32_t>(materials.size()));
     if (inserted) materials.push_back(std::move(material));
     result.push_back(it->second);

@@ -48,11 +48,14 @@ public:
   uint32_t use(const MaterialUse& use);
 
   /// Marks the images that used materials depend on as needed.
-  void require_images();
+  /// @param colours whether resolve() is to make textures
+  void require_images(bool colours);
 
-  /// Makes a scene material of each use(), equal ones once, and the masks they need. Call once images are read.
-  /// @return for each use its index in materials
-  std::vector<uint32_t> resolve(std::vector<Material>& materials, std::vector<AlphaMask>& masks, Reporter& reporter);
+  /// Makes a scene material of each use(), equal ones once, with the masks they need, and the textures if their images
+  /// were required with colours. Call once images are read.
+  /// @param texture_bytes for all textures together; what exceeds it is left as an average, with a note
+  /// @return for each use its index in scene.materials
+  std::vector<uint32_t> resolve(Scene& scene, uint64_t texture_bytes, Reporter& reporter);
 
 private:
   struct Definition {
@@ -63,10 +66,13 @@ private:
   };
   uint32_t add(std::string kind, std::string name, const TextureParameters& parameters);
   Vec3 albedo_of(const Definition& definition, Reporter& reporter);
+  uint32_t texture_of(const Definition& definition, Scene& scene, uint64_t texture_bytes, Reporter& reporter);
 
   TextureGraph& graph_;
+  bool colours_ = false;
+  std::map<TextureGraph::Node, uint32_t> texture_of_node_; ///< kNoTexture: none
   std::vector<Definition> definitions_;
-  std::vector<uint32_t> plain_uses_; ///< by recipe, without alpha and light; kNone: not used yet
+  std::vector<uint32_t> plain_uses_;            ///< by recipe, without alpha and light; kNone: not used yet
   std::map<MaterialUse, uint32_t> use_numbers_; ///< of the others
   std::vector<MaterialUse> uses_;
 };

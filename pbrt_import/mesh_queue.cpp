@@ -3,17 +3,23 @@
 #include <tbb/task_arena.h>
 
 #include "pbrt_import/problem_text.h"
+#include "pbrt_import/shapes/mesh_cleanup.h"
 
 namespace packtrace {
 
-MadeMesh run_job(const MeshJob& job, double tessellation_tolerance, const CheckCancelledFn& check_cancelled) {
+MadeMesh run_job(MeshJob& job, double tessellation_tolerance, const CheckCancelledFn& check_cancelled) {
   MadeMesh made;
   const ReportFn report = [&](Severity severity, uint32_t, std::string message) {
     made.reports.emplace_back(severity, std::move(message));
   };
   made.problem = problem_of([&] {
     ShapeContext context{tessellation_tolerance, report, check_cancelled, 0};
-    made.mesh = job.make(context);
+    if (job.make) {
+      made.mesh = job.make(context);
+    } else {
+      made.mesh = std::move(job.given);
+      context.dropped_triangles = drop_bad_triangles(made.mesh, report);
+    }
     made.dropped_triangles = context.dropped_triangles;
     if (made.mesh.triangles.empty()) throw Error(ErrorKind::kInput, "no triangle is left");
   });

@@ -4,6 +4,7 @@
 #include <deque>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -24,7 +25,8 @@ struct MadeMesh {
 };
 
 /// Throws what check_cancelled throws.
-MadeMesh run_job(const MeshJob& job, double tessellation_tolerance, const CheckCancelledFn& check_cancelled);
+/// @param job its mesh is taken out
+MadeMesh run_job(MeshJob& job, double tessellation_tolerance, const CheckCancelledFn& check_cancelled);
 
 /// Makes meshes on all threads while the scene's text is still being read.
 class MeshQueue {
@@ -32,7 +34,7 @@ public:
   /// A mesh to be made, and what its maker needs to know again once it is there.
   struct Entry {
     MeshJob job;
-    std::string kind; ///< of shape, for messages
+    std::string_view kind; ///< ShapeKind::name, for messages
     Place place;
     uint64_t sequence = 0; ///< Reporter's
     uint32_t slot = 0;     ///< in Scene::meshes

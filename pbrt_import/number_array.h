@@ -7,12 +7,10 @@
 #include <span>
 #include <vector>
 
+#include "pbrt_import/large_pages.h"
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {
-
-/// Asks for memory that is about to be written for the first time to come in large pages, if it is large.
-void prefer_large_pages(void* memory, size_t bytes);
 
 /// A growing row of numbers, stored in groups of three: what the large ones become, points or triangles, is taken out
 /// without a copy.
@@ -62,10 +60,9 @@ private:
   void grow(size_t more) {
     constexpr size_t kLarge = 1u << 18;
     const size_t needed = (size_ + more + 2) / 3;
-    if (needed > triplets_.capacity()) {
-      triplets_.reserve(size_ == 0 ? needed : std::max(needed, triplets_.capacity() * (needed < kLarge ? 2 : 4)));
-      prefer_large_pages(triplets_.data(), triplets_.capacity() * sizeof(Triplet));
-    }
+    if (needed > triplets_.capacity())
+      reserve_large(triplets_,
+                    size_ == 0 ? needed : std::max(needed, triplets_.capacity() * (needed < kLarge ? 2 : 4)));
     triplets_.resize(needed);
   }
 

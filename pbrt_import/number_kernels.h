@@ -17,9 +17,9 @@ struct NumberBatch {
   const char* last_line_end = nullptr; ///< its last character; null: none
 };
 
-/// Convert numbers in plain notation, at most 16 digits with or without a point, that are set apart by space, up to the
-/// first word that is anything else. Values are rounded correctly; minus zero is no integer. A number that takes more
-/// care than that is left alone.
+/// Convert numbers in plain notation, at most 16 digits with or without a point, that are set apart by space, up to a
+/// `]` or the first word that is anything else. Values are rounded correctly; minus zero is no integer. A number that
+/// takes more care than that is left alone.
 /// @param text kKernelLead bytes before it and kKernelReach bytes behind limit must be readable
 /// @param limit numbers that start at or behind it are left alone
 /// @param values room for capacity numbers

@@ -26,6 +26,7 @@ __m128i last_bytes(size_t n) { return load16(kTailMasks + n); }
 struct Layout {
   uint64_t spaces;
   uint64_t line_ends; ///< LF, and CR where no LF follows
+  uint64_t closes;    ///< ]
 };
 
 uint64_t mask_of(__m256i low, __m256i high) {
@@ -45,7 +46,8 @@ uint64_t mask_of(__m256i low, __m256i high) {
     return _mm256_cmpeq_epi8(_mm256_shuffle_epi8(space_by_low_bits, bytes), bytes);
   };
   const auto equal = [](__m256i bytes, char c) { return _mm256_cmpeq_epi8(bytes, _mm256_set1_epi8(c)); };
-  Layout layout{mask_of(spaces(low), spaces(high)), mask_of(equal(low, '\n'), equal(high, '\n'))};
+  Layout layout{mask_of(spaces(low), spaces(high)), mask_of(equal(low, '\n'), equal(high, '\n')),
+                mask_of(equal(low, ']'), equal(high, ']'))};
   if (const uint64_t returns = mask_of(equal(low, '\r'), equal(high, '\r')))
     layout.line_ends |= returns & ~mask_of(equal(load32(p + 1), '\n'), equal(load32(p + 33), '\n'));
   return layout;
@@ -151,14 +153,21 @@ NumberBatch convert(const char* text, const char* limit, T* values, size_t capac
   bool stopped = false;
   while (p < limit && !stopped) {
     const Layout layout = layout_of(p);
-    uint64_t starts = ~layout.spaces & (layout.spaces << 1 | 1);
+    const uint64_t gaps = layout.spaces | layout.closes;
+    uint64_t starts = ~gaps & (gaps << 1 | 1);
     if (limit - p < 64) starts &= (uint64_t{1} << (limit - p)) - 1;
-    uint64_t ends = layout.spaces & ~(layout.spaces << 1 | 1);
+    uint64_t ends = gaps & ~(gaps << 1 | 1);
+    if (layout.closes != 0) { // the array's end
+      starts &= _blsmsk_u64(layout.closes);
+      stopped = true;
+    }
     size_t done = 0; // bytes of these 64
     while (ends && starts) {
       const size_t begin = _tzcnt_u64(starts), end = _tzcnt_u64(ends);
-      stopped = value == room_end || !read(p + begin, p + end, *value);
-      if (stopped) break;
+      if (value == room_end || !read(p + begin, p + end, *value)) {
+        stopped = true;
+        break;
+      }
       ++value;
       done = end;
       starts = _blsr_u64(starts);

@@ -82,21 +82,24 @@ std::string describe(const Parameter& parameter) {
   return in_quotes(std::string(to_string(parameter.type)) + ' ' + parameter.name);
 }
 
-void ParameterList::add(Parameter parameter) {
+void ParameterList::keep() {
   constexpr size_t kLinearSearch = 32; // longer lists are hostile or wrong: last wins through find() going backwards
-  if (parameters_.size() <= kLinearSearch)
-    for (Parameter& existing : parameters_)
-      if (existing.type == parameter.type && existing.name == parameter.name) {
-        existing = std::move(parameter);
-        return;
-      }
-  parameters_.push_back(std::move(parameter));
+  Parameter& last = parameters_.back();
+  types_ |= bit_of(last.type);
+  if (parameters_.size() > kLinearSearch + 1) return;
+  for (Parameter& existing : std::span(parameters_).first(parameters_.size() - 1))
+    if (existing.type == last.type && existing.name == last.name) {
+      existing = std::move(last);
+      parameters_.pop_back();
+      return;
+    }
 }
 
-const Parameter* ParameterList::find(std::string_view name, std::initializer_list<ParameterType> types) const {
+const Parameter* ParameterList::find_type_in(uint32_t type_bits, std::string_view name) const {
   asked_.push_back(name);
+  if ((types_ & type_bits) == 0) return nullptr;
   for (auto it = parameters_.rbegin(); it != parameters_.rend(); ++it)
-    if (it->name == name && std::find(types.begin(), types.end(), it->type) != types.end()) {
+    if ((type_bits & bit_of(it->type)) != 0 && it->name == name) {
       it->used = true;
       return &*it;
     }

@@ -61,13 +61,20 @@ std::string describe(const Parameter& parameter);
 /// it as used; what stays unused is a mistake in the scene worth reporting.
 class ParameterList {
 public:
-  void add(Parameter parameter);
-  void clear() { parameters_.clear(), asked_.clear(); }
+  /// A new parameter to be filled in; then keep() or drop() it.
+  Parameter& append() { return parameters_.emplace_back(); }
+  void keep();
+  void drop() { parameters_.pop_back(); }
+  void clear() { parameters_.clear(), asked_.clear(), types_ = 0; }
   bool empty() const { return parameters_.empty(); }
   std::span<const Parameter> all() const { return parameters_; }
 
   /// The parameter of that name with one of those types; null if there is none.
-  const Parameter* find(std::string_view name, std::initializer_list<ParameterType> types) const;
+  const Parameter* find(std::string_view name, std::initializer_list<ParameterType> types) const {
+    uint32_t bits = 0;
+    for (const ParameterType type : types) bits |= bit_of(type);
+    return find_type_in(bits, name);
+  }
 
   /// First value of a parameter with exactly one value, else the fallback.
   float get_float(std::string_view name, float fallback) const;
@@ -93,7 +100,11 @@ public:
   bool was_asked(std::string_view name) const;
 
 private:
+  static constexpr uint32_t bit_of(ParameterType type) { return 1u << static_cast<uint32_t>(type); }
+  const Parameter* find_type_in(uint32_t type_bits, std::string_view name) const;
+
   std::vector<Parameter> parameters_;
+  uint32_t types_ = 0;                          ///< bit_of() all of them
   mutable std::vector<std::string_view> asked_; ///< literals, some of them often
 };
 

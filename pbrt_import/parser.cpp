@@ -331,15 +331,16 @@ void Parser::read_number_run(Values& values) {
 
 void Parser::read_parameters(Directive& directive) {
   while (source_.peek().kind == TokenKind::kString) {
-    Parameter parameter;
+    Parameter& parameter = directive.parameters.append();
     parameter.place = source_.place();
     const bool declared = read_declaration(source_.peek().text, parameter);
     source_.consume();
     if (!declared) skip_value();
     if (declared && read_values(parameter)) {
       cut_excess(parameter);
-      directive.parameters.add(std::move(parameter));
+      directive.parameters.keep();
     } else {
+      directive.parameters.drop();
       directive.damaged = true;
     }
   }

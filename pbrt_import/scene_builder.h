@@ -12,6 +12,7 @@
 #include "pbrt_import/file_names.h"
 #include "pbrt_import/graphics_state.h"
 #include "pbrt_import/import_scene.h"
+#include "pbrt_import/large_pages.h"
 #include "pbrt_import/materials.h"
 #include "pbrt_import/mesh_queue.h"
 #include "pbrt_import/parser.h"
@@ -73,8 +74,8 @@ private:
   bool make_mesh(Directive& directive, Shape& shape);
   bool make_ply_mesh(const Directive& directive, Shape& shape);
   bool make_inline_mesh(Directive& directive, Shape& shape);
-  bool make_or_queue(MeshQueue::Entry entry);
-  bool skip_shape(const std::string& kind, const Place& place, const std::string& problem);
+  bool make_or_queue(MeshQueue::Entry&& entry);
+  bool skip_shape(std::string_view kind, const Place& place, const std::string& problem);
   bool report_mesh(MeshQueue::Entry& entry);
   void take_queued_meshes();
   bool read_alpha(const Directive& directive, const TextureContext& context, MaterialUse& use);
@@ -111,8 +112,10 @@ private:
   const CheckCancelledFn check_cancelled_;
   NameTable same_meshes_;                 ///< MeshJob::same_as
   std::vector<uint32_t> same_mesh_slots_; ///< in Scene::meshes, by number in same_meshes_
+  std::string mesh_name_;                 ///< scratch
   uint64_t mesh_bytes_ = 0; ///< of all meshes made from text, queued ones at most
-  MeshQueue mesh_queue_;    ///< last: its tasks end before anything else does
+  LargeHeapPages heap_pages_;
+  MeshQueue mesh_queue_; ///< last: its tasks end before anything else does
 };
 
 } // namespace packtrace

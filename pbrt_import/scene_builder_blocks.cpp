@@ -1,6 +1,7 @@
 // The part of SceneBuilder that keeps worlds, blocks, objects and instances.
 #include <algorithm>
 
+#include "pbrt_import/large_pages.h"
 #include "pbrt_import/scene/error.h"
 #include "pbrt_import/scene_builder.h"
 #include "pbrt_import/tokenizer.h"
@@ -113,9 +114,7 @@ void SceneBuilder::add_instance(const Directive& directive) {
   const Affine world_from_object(placement.map);
   if (!is_invertible(DAffine(world_from_object)))
     return reporter_.error(directive.place, "the instance's transform has no inverse (a scale of 0?); it is skipped");
-  // Room that is never used costs address space only, where copies would cost memory while they are made.
-  if (scene_.instances.size() == scene_.instances.capacity())
-    scene_.instances.reserve(std::max<size_t>(1024, 4 * scene_.instances.size()));
+  reserve_one_more(scene_.instances);
   if (placement.animation != kNotAnimated)
     scene_.animated_instances.push_back({static_cast<uint32_t>(scene_.instances.size()), placement.animation});
   scene_.instances.push_back({objects_by_name_[*found], world_from_object});

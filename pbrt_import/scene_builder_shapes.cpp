@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "pbrt_import/large_pages.h"
 #include "pbrt_import/problem_text.h"
 #include "pbrt_import/scene_pruning.h"
 #include "pbrt_import/shape_builder.h"
@@ -52,6 +53,7 @@ void SceneBuilder::add_shape(Directive& directive) {
     statistics_.area_lights += use.area_light != kNone;
   }
   shape.material = materials_.use(use);
+  if (current_object_ == kNone) reserve_one_more(scene_.shapes);
   (current_object_ == kNone ? scene_.shapes : scene_.objects[current_object_].shapes).push_back(shape);
 }
 
@@ -79,8 +81,8 @@ bool SceneBuilder::make_mesh(Directive& directive, Shape& shape) {
 bool SceneBuilder::make_ply_mesh(const Directive& directive, Shape& shape) {
   const Parameter* const file = directive.parameters.find("filename", {ParameterType::kString});
   if (!file || file->strings.size() != 1) {
-    reporter_.error(directive.place, file ? "plymesh takes one file name, found " + std::to_string(file->strings.size()) +
-                                                "; the shape is skipped"
+    reporter_.error(directive.place, file ? "plymesh takes one file name, found " +
+                                                std::to_string(file->strings.size()) + "; the shape is skipped"
                                           : "plymesh without a \"string filename\"; the shape is skipped");
     return false;
   }
@@ -96,11 +98,12 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
   const std::string& name = directive.names[0];
   const ShapeKind* const kind = find_shape_kind(name);
   if (!kind) return skip_shape(name, directive.place, "unknown shape" + did_you_mean(closest_shape_kind(name)));
-  const ReportFn report = [&](Severity severity, uint32_t, std::string message) {
-    reporter_.report(severity, directive.place, name + ": " + message);
+  // Captures no more than fits in a std::function.
+  const ReportFn report = [this, &directive](Severity severity, uint32_t, std::string message) {
+    reporter_.report(severity, directive.place, directive.names[0] + ": " + message);
   };
   MeshQueue::Entry entry;
-  entry.kind = name;
+  entry.kind = kind->name;
   entry.place = directive.place;
   entry.sequence = reporter_.sequence();
   entry.slot = static_cast<uint32_t>(scene_.meshes.size());
@@ -111,7 +114,7 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
     if (!is_invertible(shape.parent_from_mesh))
       return skip_shape(name, directive.place, "its size leaves the range of numbers");
   }
-  const std::string same_as = entry.job.same_as;
+  const std::string same_as = std::move(entry.job.same_as);
   if (const std::optional<uint32_t> known = same_as.empty() ? std::nullopt : same_meshes_.find(same_as)) {
     shape.mesh = same_mesh_slots_[*known];
     return true;
@@ -127,11 +130,14 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
 
 /// Adds a mesh to the scene, empty until take_queued_meshes() if making it is worth a task.
 /// @return false if the mesh could not be made
-bool SceneBuilder::make_or_queue(MeshQueue::Entry entry) {
+bool SceneBuilder::make_or_queue(MeshQueue::Entry&& entry) {
   constexpr uint64_t kWorthATask = 32 * 1024;
+  constexpr uint64_t kLeast = 128; // its name, and what blocks are rounded up to
+  heap_pages_.about_to_allocate(entry.job.bytes_at_most + kLeast);
   const uint64_t bytes_left = options_.memory_budget_bytes - mesh_bytes_;
   if (entry.job.bytes_at_most >= kWorthATask && entry.job.bytes_at_most <= bytes_left) {
     mesh_bytes_ += entry.job.bytes_at_most;
+    reserve_one_more(scene_.meshes);
     scene_.meshes.emplace_back();
     mesh_queue_.add(std::move(entry));
     return true;
@@ -144,11 +150,12 @@ bool SceneBuilder::make_or_queue(MeshQueue::Entry entry) {
         "all meshes together exceed the memory budget of " + std::to_string(options_.memory_budget_bytes) + " bytes";
   if (!report_mesh(entry)) return false;
   mesh_bytes_ += bytes_of(entry.made.mesh);
+  reserve_one_more(scene_.meshes);
   scene_.meshes.push_back(std::move(entry.made.mesh));
   return true;
 }
 
-bool SceneBuilder::skip_shape(const std::string& kind, const Place& place, const std::string& problem) {
+bool SceneBuilder::skip_shape(std::string_view kind, const Place& place, const std::string& problem) {
   reporter_.error(place, "Shape " + in_quotes(kind) + " is skipped: " + problem);
   return false;
 }
@@ -156,10 +163,10 @@ bool SceneBuilder::skip_shape(const std::string& kind, const Place& place, const
 /// @return false if the mesh could not be made
 bool SceneBuilder::report_mesh(MeshQueue::Entry& entry) {
   for (auto& [severity, message] : entry.made.reports)
-    reporter_.report(severity, entry.place, entry.kind + ": " + message);
+    reporter_.report(severity, entry.place, std::string(entry.kind) + ": " + message);
   scene_.dropped_triangles += entry.made.dropped_triangles;
-  entry.made.mesh.name = entry.kind;
-  entry.made.mesh.name.append(":").append(std::to_string(entry.place.line));
+  mesh_name_.assign(entry.kind).append(":").append(std::to_string(entry.place.line));
+  entry.made.mesh.name = std::string(mesh_name_); // without room to grow: there may be many
   return entry.made.problem.empty() || skip_shape(entry.kind, entry.place, entry.made.problem);
 }
 
@@ -187,8 +194,8 @@ void SceneBuilder::drop_unusable_shapes(const std::vector<uint32_t>& material_nu
 /// Counts what the finished scene has and its text could not tell.
 void SceneBuilder::count_features() {
   const auto count = [](const auto& things) {
-    return static_cast<uint64_t>(std::count_if(things.begin(), things.end(),
-                                               [](const auto& thing) { return thing.animation != kNotAnimated; }));
+    return static_cast<uint64_t>(
+        std::count_if(things.begin(), things.end(), [](const auto& thing) { return thing.animation != kNotAnimated; }));
   };
   statistics_.animated_shapes = count(scene_.shapes);
   for (const Object& object : scene_.objects) statistics_.animated_shapes += count(object.shapes);
@@ -217,12 +224,12 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
                    "object " + in_quotes(scene_.objects[object].name) + " is never instanced; it is left out");
   });
   for_each_shape(scene_, [&](const Shape& shape) { loader_.require(shape.mesh); });
-  materials_.require_images();
+  materials_.require_images(options_.keep_textures);
   loader_.load(scene_.meshes, graph_.images(), progress, statistics_, scene_.dropped_triangles);
   reporter_.set_sequence(last_sequence);
   for (const ImageRequest& image : graph_.images())
     ++(image.missing ? statistics_.textures_missing : statistics_.textures_found);
-  const std::vector<uint32_t> material_numbers = materials_.resolve(scene_.materials, scene_.masks, reporter_);
+  const std::vector<uint32_t> material_numbers = materials_.resolve(scene_, options_.memory_budget_bytes, reporter_);
   drop_unusable_shapes(material_numbers, scene_.shapes);
   for (Object& object : scene_.objects) drop_unusable_shapes(material_numbers, object.shapes);
   if (const uint64_t absent = statistics_.shapes_absent; absent > 0)

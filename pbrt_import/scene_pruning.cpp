@@ -75,6 +75,12 @@ void drop_unused_parts(Scene& scene) {
   for_each_mask([&](uint32_t mask) { masks[mask] = 1; });
   const std::vector<uint32_t> mask_numbers = keep_used(scene.masks, masks);
   for_each_mask([&](uint32_t& mask) { mask = mask_numbers[mask]; });
+  std::vector<uint8_t> textures(scene.textures.size());
+  for (const Material& material : scene.materials)
+    if (material.albedo_texture != kNoTexture) textures[material.albedo_texture] = 1;
+  const std::vector<uint32_t> texture_numbers = keep_used(scene.textures, textures);
+  for (Material& material : scene.materials)
+    if (material.albedo_texture != kNoTexture) material.albedo_texture = texture_numbers[material.albedo_texture];
   drop_unused_animations(scene);
 }
 

@@ -24,8 +24,12 @@ namespace {
 template <class Vector>
 std::vector<Vector> grouped(std::span<const float> components) {
   static_assert(sizeof(Vector) % sizeof(float) == 0);
-  std::vector<Vector> vectors(components.size() * sizeof(float) / sizeof(Vector));
-  if (!vectors.empty()) std::memcpy(vectors.data(), components.data(), vectors.size() * sizeof(Vector));
+  const size_t count = components.size() * sizeof(float) / sizeof(Vector);
+  std::vector<Vector> vectors;
+  if (count == 0) return vectors;
+  reserve_large(vectors, count);
+  vectors.resize(count);
+  std::memcpy(vectors.data(), components.data(), count * sizeof(Vector));
   return vectors;
 }
 
@@ -74,19 +78,15 @@ uint32_t count_of(const ParameterList& parameters, std::string_view name, int32_
 MeshJob read_triangle_mesh(ParameterList& parameters, const ReportFn& report) {
   constexpr std::string_view kUnneeded[] = {"S", "faceIndices", "discarddegenerateUVs"};
   parameters.mark_used(kUnneeded);
-  Mesh mesh;
+  MeshJob job;
+  Mesh& mesh = job.given;
   mesh.triangles = take_triangles(parameters, report);
   mesh.positions = take_points(parameters);
   if (mesh.positions.size() >= std::numeric_limits<uint32_t>::max())
     throw Error(ErrorKind::kLimitExceeded, "more than 2^32 - 2 vertices");
   mesh.normals = parameters.take_vectors("N", ParameterType::kNormal);
   mesh.uvs = read_uvs(parameters, report);
-  MeshJob job;
   job.bytes_at_most = bytes_of(mesh);
-  job.make = [mesh = std::move(mesh)](ShapeContext& context) mutable {
-    context.dropped_triangles += drop_bad_triangles(mesh, context.report);
-    return std::move(mesh);
-  };
   return job;
 }
 

@@ -21,8 +21,10 @@ struct ShapeContext {
 
 /// All that is needed to make the triangles of a shape, in the shape's own space.
 struct MeshJob {
-  /// Any thread may call it, once. Throws Error, message without a place, if the shape is unusable.
-  std::function<Mesh(ShapeContext& context)> make;
+  /// Any thread may call it, once. Throws Error, message without a place, if the shape is unusable. Empty: the mesh is
+  /// there already, and only drop_bad_triangles() is still to come.
+  std::function<Mesh(ShapeContext& context)> make{};
+  Mesh given{};                ///< where make is empty
   uint64_t bytes_at_most = 0;  ///< bound on bytes_of(mesh); 0: not known
   uint64_t bytes_at_least = 0; ///< as far as can be told before it is made
   std::string same_as{};      ///< jobs that have it in common make the same mesh; empty: this one stands alone

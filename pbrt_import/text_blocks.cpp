@@ -141,6 +141,10 @@ private:
     const auto scan_one = [&] {
       for (; p < end_ && is_space(*p); ++p)
         if (*p == '\n' || (*p == '\r' && p[1] != '\n')) add_line_ends(1, p);
+      if (p < end_ && detail::is_digit(*p) && ends_word(p[1])) { // most numbers of short arrays
+        chunk[count++] = static_cast<T>(*p++ - '0');
+        return true;
+      }
       const char* const end = p < end_ ? scan(p, chunk[count]) : nullptr;
       if (!end) return false;
       p = end;

@@ -4,6 +4,8 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 namespace packtrace {
 namespace {
@@ -19,16 +21,27 @@ glm::dvec2 mapped(glm::dvec2 uv, const TextureMapping& mapping) {
   return uv * glm::dvec2(mapping.scale) + glm::dvec2(mapping.offset);
 }
 
+/// Where a texel lies in its image, or nothing where a black-wrapped image ends.
 /// @param x,y texel, whole numbers, possibly outside the image
-bool texel_nonzero(const ImageSummary& image, WrapMode wrap, double x, double y) {
+std::optional<std::pair<uint32_t, uint32_t>> wrapped_texel(const ImageSummary& image, WrapMode wrap, double x,
+                                                           double y) {
   const double w = image.width, h = image.height;
   if (wrap == WrapMode::kRepeat) x -= w * std::floor(x / w), y -= h * std::floor(y / h);
-  if (wrap == WrapMode::kBlack && !(x >= 0.0 && x < w && y >= 0.0 && y < h)) return false;
-  const auto column = static_cast<uint32_t>(std::clamp(x, 0.0, w - 1.0));
-  const auto row = static_cast<uint32_t>(std::clamp(y, 0.0, h - 1.0));
+  if (wrap == WrapMode::kBlack && !(x >= 0.0 && x < w && y >= 0.0 && y < h)) return std::nullopt;
+  return std::pair{static_cast<uint32_t>(std::clamp(x, 0.0, w - 1.0)),
+                   static_cast<uint32_t>(std::clamp(y, 0.0, h - 1.0))};
+}
+
+bool texel_nonzero(const ImageSummary& image, WrapMode wrap, double x, double y) {
+  const auto texel = wrapped_texel(image, wrap, x, y);
+  if (!texel) return false;
+  const auto [column, row] = *texel;
   return (image.nonzero[static_cast<size_t>(row) * AlphaMask::row_words(image.width) + column / 32] >> (column % 32)) &
          1u;
 }
+
+/// The side of textures that have no image to give them one: checkerboards.
+constexpr uint32_t kSampledMaskSize = 1024, kSampledTextureSize = 256;
 
 } // namespace
 
@@ -116,13 +129,14 @@ std::vector<TextureGraph::Node> TextureGraph::reachable(Node node) const {
   return found;
 }
 
-void TextureGraph::require(Node node, bool want_mask) {
+void TextureGraph::require(Node node, ImageWants wants) {
   if (nodes_[node].kind == Kind::kConstant) return;
   for (const Node n : reachable(node))
     if (nodes_[n].kind == Kind::kImage) {
       ImageRequest& image = images_[nodes_[n].a];
       image.needed = true;
-      image.want_mask = image.want_mask || want_mask;
+      image.want_mask = image.want_mask || wants.mask;
+      image.want_colours = image.want_colours || wants.colours;
     }
 }
 
@@ -201,9 +215,8 @@ TextureGraph::MaskResult TextureGraph::alpha_mask(Node node) const {
   }
   result.exact = result.exact && !sampled && only_image_varies;
   AlphaMask& mask = result.mask;
-  constexpr uint32_t kSampledSize = 1024; // for procedural textures
-  mask.width = layout ? images_[layout->a].summary.width : sampled ? kSampledSize : 1;
-  mask.height = layout ? images_[layout->a].summary.height : sampled ? kSampledSize : 1;
+  mask.width = layout ? images_[layout->a].summary.width : sampled ? kSampledMaskSize : 1;
+  mask.height = layout ? images_[layout->a].summary.height : sampled ? kSampledMaskSize : 1;
   if (layout) {
     mask.wrap = layout->wrap, mask.uv_scale = layout->mapping.scale, mask.uv_offset = layout->mapping.offset;
   } else if (board) { // a checkerboard repeats after two cells
@@ -216,7 +229,16 @@ TextureGraph::MaskResult TextureGraph::alpha_mask(Node node) const {
     mask = {};
     return result;
   }
-  rasterize(order, mask);
+  mask.words.assign(static_cast<size_t>(AlphaMask::row_words(mask.width)) * mask.height, 0);
+  rasterize<uint8_t>(
+      order, mask,
+      [&](Node n, glm::dvec2 uv, std::span<const uint8_t> operands) -> uint8_t {
+        return nonzero(nodes_[n], uv, operands);
+      },
+      [&](uint32_t x, uint32_t y, uint8_t opaque) {
+        if (opaque != 0)
+          mask.words[static_cast<size_t>(y) * AlphaMask::row_words(mask.width) + x / 32] |= 1u << (x % 32);
+      });
   size_t set = 0;
   for (const uint32_t word : mask.words) set += static_cast<size_t>(std::popcount(word));
   const size_t all = static_cast<size_t>(mask.width) * mask.height;
@@ -227,10 +249,11 @@ TextureGraph::MaskResult TextureGraph::alpha_mask(Node node) const {
   return result;
 }
 
-/// Evaluates the nodes, operands first, at each texel's centre; the last one's result goes to the mask.
-void TextureGraph::rasterize(std::span<const Node> order, AlphaMask& mask) const {
-  mask.words.assign(static_cast<size_t>(AlphaMask::row_words(mask.width)) * mask.height, 0);
-  std::vector<uint8_t> results(order.size());
+/// Evaluates the nodes, operands first, at each texel's centre; the last one's result is put at the texel.
+template <class Value, class Texture, class Evaluate, class Put>
+void TextureGraph::rasterize(std::span<const Node> order, const Texture& texture, const Evaluate& evaluate,
+                             const Put& put) const {
+  std::vector<Value> results(order.size());
   const auto slot = [&](Node n) {
     return static_cast<size_t>(std::lower_bound(order.begin(), order.end(), n) - order.begin());
   };
@@ -240,18 +263,94 @@ void TextureGraph::rasterize(std::span<const Node> order, AlphaMask& mask) const
     if (data.kind == Kind::kProduct || data.kind == Kind::kMix || data.kind == Kind::kCheckerboard)
       operand_slots[i] = {slot(data.a), slot(data.b), data.kind == Kind::kMix ? slot(data.c) : 0};
   }
-  for (uint32_t y = 0; y < mask.height; ++y)
-    for (uint32_t x = 0; x < mask.width; ++x) {
-      const glm::dvec2 st((x + 0.5) / mask.width, 1.0 - (y + 0.5) / mask.height);
-      const glm::dvec2 uv = (st - glm::dvec2(mask.uv_offset)) / glm::dvec2(mask.uv_scale);
+  for (uint32_t y = 0; y < texture.height; ++y)
+    for (uint32_t x = 0; x < texture.width; ++x) {
+      const glm::dvec2 st((x + 0.5) / texture.width, 1.0 - (y + 0.5) / texture.height);
+      const glm::dvec2 uv = (st - glm::dvec2(texture.uv_offset)) / glm::dvec2(texture.uv_scale);
       for (size_t i = 0; i < order.size(); ++i) {
         const std::array<size_t, 3>& from = operand_slots[i];
-        const uint8_t operands[3] = {results[from[0]], results[from[1]], results[from[2]]};
-        results[i] = nonzero(nodes_[order[i]], uv, operands);
+        const std::array<Value, 3> operands{results[from[0]], results[from[1]], results[from[2]]};
+        results[i] = evaluate(order[i], uv, std::span<const Value>(operands));
       }
-      if (results.back())
-        mask.words[static_cast<size_t>(y) * AlphaMask::row_words(mask.width) + x / 32] |= 1u << (x % 32);
+      put(x, y, results.back());
     }
+}
+
+Vec3 TextureGraph::image_colour(Node node, glm::dvec2 uv) const {
+  const NodeData& data = nodes_[node];
+  const ImageRequest& image = images_[data.a];
+  const glm::dvec2 st = mapped(uv, data.mapping);
+  if (image.missing || !is_usable(data.mapping) || !std::isfinite(st.x) || !std::isfinite(st.y)) return averages_[node];
+  const auto texel = wrapped_texel(image.summary, data.wrap, std::floor(st.x * image.summary.width),
+                                   std::floor((1.0 - st.y) * image.summary.height));
+  if (!texel) return Vec3(0.0f);
+  const uint8_t* const rgb =
+      image.summary.rgb.data() + (static_cast<size_t>(texel->second) * image.summary.width + texel->first) * 3;
+  const std::array<float, 256>& linear = linear_of_srgb8();
+  return data.value * Vec3(linear[rgb[0]], linear[rgb[1]], linear[rgb[2]]);
+}
+
+Vec3 TextureGraph::colour(Node node, glm::dvec2 uv, std::span<const Vec3> operands) const {
+  const NodeData& data = nodes_[node];
+  switch (data.kind) {
+  case Kind::kConstant:
+  case Kind::kProcedural:
+    return data.value;
+  case Kind::kImage:
+    return image_colour(node, uv);
+  case Kind::kProduct:
+    return operands[0] * operands[1];
+  case Kind::kMix:
+    return (Vec3(1.0f) - operands[2]) * operands[0] + operands[2] * operands[1];
+  case Kind::kCheckerboard: {
+    if (!is_usable(data.mapping)) return averages_[node];
+    const glm::dvec2 st = mapped(uv, data.mapping);
+    const double cell = std::floor(st.x) + std::floor(st.y);
+    return operands[cell - 2.0 * std::floor(cell / 2.0) == 0.0 ? 0 : 1];
+  }
+  }
+  return data.value;
+}
+
+std::optional<AlbedoTexture> TextureGraph::albedo_texture(Node node) {
+  average(node); // those of all nodes up to it
+  const std::vector<Node> order = reachable(node);
+  const NodeData *layout = nullptr, *board = nullptr; // as in alpha_mask()
+  for (const Node n : order) {
+    const NodeData& data = nodes_[n];
+    if (data.kind == Kind::kImage && !images_[data.a].missing && is_usable(data.mapping)) {
+      if (images_[data.a].summary.rgb.empty()) return std::nullopt;
+      if (!layout || images_[data.a].summary.width > images_[layout->a].summary.width) layout = &data;
+    }
+    if (data.kind == Kind::kCheckerboard && !board && is_usable(data.mapping)) board = &data;
+  }
+  if (!layout && !board) return std::nullopt;
+  AlbedoTexture texture;
+  texture.name = origin(node).name;
+  texture.width = texture.height = kSampledTextureSize;
+  if (layout) {
+    texture.width = images_[layout->a].summary.width, texture.height = images_[layout->a].summary.height;
+    texture.wrap = layout->wrap, texture.uv_scale = layout->mapping.scale, texture.uv_offset = layout->mapping.offset;
+  } else {
+    texture.uv_scale = 0.5f * board->mapping.scale, texture.uv_offset = 0.5f * board->mapping.offset;
+  }
+  const uint64_t texels = uint64_t{texture.width} * texture.height;
+  constexpr size_t kMostNodes = 64;                        // per texel
+  constexpr uint64_t kMostEvaluations = uint64_t{1} << 28; // seconds, where nodes and texels multiply to minutes
+  if (order.size() > kMostNodes || texels > kMostTextureTexels || texels > kMostEvaluations / order.size())
+    return std::nullopt;
+  if (order.size() == 1 && nodes_[node].value == Vec3(1.0f)) {
+    texture.rgb = images_[layout->a].summary.rgb;
+    return texture;
+  }
+  texture.rgb.resize(static_cast<size_t>(texels) * 3);
+  uint8_t* to = texture.rgb.data();
+  rasterize<Vec3>(
+      order, texture, [&](Node n, glm::dvec2 uv, std::span<const Vec3> operands) { return colour(n, uv, operands); },
+      [&](uint32_t, uint32_t, Vec3 value) {
+        for (int c = 0; c < 3; ++c) *to++ = srgb8_of_linear(value[c]);
+      });
+  return texture;
 }
 
 } // namespace packtrace

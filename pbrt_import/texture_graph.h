@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <unordered_map>
@@ -11,7 +12,7 @@
 
 #include "pbrt_import/image_file.h"
 #include "pbrt_import/parameters.h"
-#include "pbrt_import/scene/alpha_mask.h"
+#include "pbrt_import/scene/albedo_texture.h"
 
 namespace packtrace {
 
@@ -30,6 +31,7 @@ struct ImageRequest {
   uint64_t sequence = 0; ///< of that texture's directive
   bool needed = false;   ///< something visible depends on it
   bool want_mask = false;
+  bool want_colours = false;
   bool missing = false; ///< no such file, or unreadable: counts as 1 everywhere, as in pbrt
   ImageSummary summary; ///< filled in by whoever reads the files
 };
@@ -64,8 +66,8 @@ public:
   /// The value, where it is the same everywhere and no image has to be read for it.
   const Vec3* constant_value(Node node) const;
 
-  /// Marks the images behind node as needed.
-  void require(Node node, bool want_mask);
+  /// Marks the images behind node as needed, and what is wanted of them.
+  void require(Node node, ImageWants wants);
 
   /// Mean over the texture's domain; of a product the product of means.
   Vec3 average(Node node);
@@ -79,6 +81,10 @@ public:
   };
   MaskResult alpha_mask(Node node) const;
 
+  /// The colours over uv, sampled at the texels of the widest image; nothing where uv does not change them, where an
+  /// image's colours were not kept, or there are more than kMostTextureTexels. What has no uv counts with its average.
+  std::optional<AlbedoTexture> albedo_texture(Node node);
+
 private:
   enum class Kind : uint8_t { kConstant, kProcedural, kImage, kProduct, kMix, kCheckerboard };
   struct NodeData {
@@ -90,8 +96,11 @@ private:
   };
   Node add(const NodeData& data);
   std::vector<Node> reachable(Node node) const;
-  void rasterize(std::span<const Node> order, AlphaMask& mask) const;
+  template <class Value, class Texture, class Evaluate, class Put>
+  void rasterize(std::span<const Node> order, const Texture& texture, const Evaluate& evaluate, const Put& put) const;
   bool nonzero(const NodeData& data, glm::dvec2 uv, std::span<const uint8_t> operands) const;
+  Vec3 colour(Node node, glm::dvec2 uv, std::span<const Vec3> operands) const;
+  Vec3 image_colour(Node node, glm::dvec2 uv) const;
 
   std::vector<NodeData> nodes_;
   std::vector<Vec3> averages_; ///< of the first nodes; grows on demand

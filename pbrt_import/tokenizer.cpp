@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstring>
 
 #include "pbrt_import/number.h"
@@ -29,10 +30,44 @@ constexpr std::array<bool, 256> kWordBytes = table_of([](char c) { return !ends_
 constexpr std::array<bool, 256> kPlainStringBytes =
     table_of([](char c) { return c != '"' && c != '\\' && c != '\n' && c != '\r' && !is_bad_byte(c); });
 
-size_t count_while(const char* text, const std::array<bool, 256>& bytes) {
+constexpr uint64_t kOnes = 0x0101010101010101u, kHighBits = 0x80 * kOnes;
+
+// Eight bytes at once: bit 7 of those below a bound, or equal to a character. Bytes after the first such one may seem
+// to be so, too, and those from 0x80 on may seem to be anything.
+constexpr uint64_t bytes_below(uint64_t word, uint64_t bound) { return word - bound * kOnes; }
+constexpr uint64_t bytes_equal(uint64_t word, char c) { return (word ^ static_cast<unsigned char>(c) * kOnes) - kOnes; }
+constexpr uint64_t bytes_from_0x7f(uint64_t word) { return word | (word + kOnes); }
+
+/// How many bytes in a row the table holds for.
+/// @param special_bytes of eight bytes: bit 7 of the first for which the table may not hold
+template <class SpecialBytes>
+size_t count_while(const char* text, const std::array<bool, 256>& bytes, SpecialBytes special_bytes) {
+  static_assert(kScannerReach >= sizeof(uint64_t) && std::endian::native == std::endian::little);
   const char* p = text;
-  while (bytes[static_cast<unsigned char>(*p)]) ++p;
-  return static_cast<size_t>(p - text);
+  while (true) {
+    uint64_t word;
+    std::memcpy(&word, p, sizeof word);
+    const uint64_t special = special_bytes(word) & kHighBits;
+    if (special == 0) {
+      p += sizeof word;
+      continue;
+    }
+    p += std::countr_zero(special) / 8;
+    if (!bytes[static_cast<unsigned char>(*p)]) return static_cast<size_t>(p - text);
+    ++p;
+  }
+}
+
+size_t count_word_bytes(const char* text) {
+  return count_while(text, kWordBytes, [](uint64_t word) {
+    return bytes_below(word, '"' + 1) | bytes_equal(word, '[') | bytes_equal(word, ']') | bytes_from_0x7f(word);
+  });
+}
+
+size_t count_plain_string_bytes(const char* text) {
+  return count_while(text, kPlainStringBytes, [](uint64_t word) {
+    return bytes_below(word, ' ') | bytes_equal(word, '"') | bytes_equal(word, '\\') | bytes_from_0x7f(word);
+  });
 }
 
 } // namespace
@@ -118,6 +153,7 @@ bool Tokenizer::skip_space_and_comments() {
     while (position_ == size_)
       if (!refill()) return false;
     const char c = window_[position_];
+    if (static_cast<unsigned char>(c) > '#') return true;
     if (c == '\n') {
       count_line_end(position_);
     } else if (c == '\r') {
@@ -145,7 +181,7 @@ Token Tokenizer::next() {
   if (!found) return make(TokenKind::kEnd, position_, position_);
   const char c = window_[position_];
   if (c == '"') return read_string();
-  if (c != '[' && c != ']' && !is_bad_byte(c)) return read_word();
+  if (kWordBytes[static_cast<unsigned char>(c)]) return read_word();
   const TokenKind kind = c == '[' ? TokenKind::kOpen : c == ']' ? TokenKind::kClose : TokenKind::kBadByte;
   ++position_;
   return make(kind, position_ - 1, position_);
@@ -162,7 +198,7 @@ Token Tokenizer::find_string_end() {
   size_t length = 1; // from position_, which refill() moves
   while (true) {
     if (position_ + length >= size_ && !refill()) break;
-    length += count_while(window_ + position_ + length, kPlainStringBytes);
+    length += count_plain_string_bytes(window_ + position_ + length);
     if (position_ + length >= size_) continue;
     const char c = window_[position_ + length];
     if (c == '"') {
@@ -193,7 +229,7 @@ Token Tokenizer::read_word() {
   while (true) {
     if (position_ + length >= size_ && !refill()) break;
     if (position_ + length >= size_) continue;
-    length += count_while(window_ + position_ + length, kWordBytes);
+    length += count_word_bytes(window_ + position_ + length);
     if (position_ + length < size_) break;
   }
   const size_t start = position_;

@@ -3,13 +3,16 @@
 #include <cstdint>
 #include <optional>
 
+#include "compress/format/baked_format.h"
 #include "compress/format/normal_codec.h"
 #include "compress/format/page_codec.h"
+#include "compress/format/texture_codec.h"
+#include "compress/format/uv_codec.h"
 
 namespace packtrace {
 
 /// How BakeConfig::precision is meant. World-space geometry has one step for the whole scene, instanced geometry a step
-/// of its own; "the geometry" below is all world-space geometry together, or the one instanced geometry.
+/// of its own; "the geometry" below is all that lies outside objects together, or the one instanced geometry.
 enum class PrecisionKind : uint32_t {
   kEdgeFraction = 0,     ///< step <= precision x the geometry's median edge length; 1e-9 <= precision <= 1
   kDiagonalFraction = 1, ///< step <= precision x the diagonal of the geometry's box; 1e-12 <= precision <= 0.1
@@ -35,6 +38,23 @@ struct BakeConfig {
   double max_normal_error_degrees() const;
   /// Triangles whose three normals are all this close to the decoded face's normal, or to its opposite, store none.
   double flat_degrees() const;
+
+  /// What the file is to be good for: streams that it does not need are left out.
+  baked::Purpose purpose = baked::kAo;
+  bool keep_normals = false; ///< of every triangle whose source has them
+  bool keep_uvs = false;     ///< of every mesh that has them
+
+  bool strict = false; ///< fail where something would be left out for leaving the range of floats
+
+  /// Of every geometry; without one the lattice, whose step follows from the size of the textures looked up.
+  std::optional<UvEncoding> uvs;
+
+  /// Whether textures of materials are stored; for purpose kShading only.
+  bool textures = false;
+  /// Of every texture; without one, the smallest for each whose PSNR is at least min_texture_psnr_db.
+  std::optional<TextureCodec> texture_codec;
+  /// Of sRGB-encoded values. 10 .. 100; without meaning where a codec is given.
+  double min_texture_psnr_db = 34.0;
 
   /// How the file lies on disk. Changes nothing that is decoded from it.
   PageCodec codec = PageCodec::kNone;

@@ -1,9 +1,7 @@
 #include "compress/bake/bake_scene.h"
 
 #include <algorithm>
-#include <limits>
 
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include "compress/bake/brief.h"
@@ -11,7 +9,11 @@
 #include "compress/bake/geometry_encoder.h"
 #include "compress/bake/geometry_measure.h"
 #include "compress/bake/geometry_plan.h"
+#include "compress/bake/nested_grids.h"
 #include "compress/bake/page_encoder.h"
+#include "compress/bake/requirement_table.h"
+#include "compress/bake/scene_measure.h"
+#include "compress/bake/touching_boxes.h"
 #include "compress/format/baked_image.h"
 #include "compress/format/bit_stream.h"
 #include "pbrt_import/scene/error.h"
@@ -29,11 +31,13 @@ class Baker {
 public:
   Baker(const Scene& scene, const BakeConfig& config, Diagnostics& diagnostics, Progress& progress)
       : scene_(scene), config_(config), diagnostics_(diagnostics), progress_(progress), plan_(plan_scene(scene)),
-        measures_(plan_.geometries.size()), grids_(plan_.geometries.size()), packed_(plan_.geometries.size()) {}
+        grids_(plan_.geometries.size()), packed_(plan_.geometries.size()) {}
 
   BakedScene run() {
     measure();
     choose_grids();
+    place_instances();
+    encode_textures();
     pack();
     BakedScene result;
     result.bytes = assemble();
@@ -52,61 +56,52 @@ private:
     baked::GeometryRecord record{};
     EncodedGeometry encoded;
     QuantizeStats stats;
-    uint64_t unneeded_uv_bytes = 0;
+    GeometryNeeds needs;
+
+    size_t bytes() const { return encoded.payload.size() + encoded.clusters.size() * sizeof(baked::ClusterRecord); }
   };
 
   std::vector<std::byte> assemble() {
     progress_.begin("assembling the file", 0);
-    FileSections sections(scene_);
+    FileSections sections(scene_, textures_);
+    RequirementTable requirements;
     for (size_t i = 0; i < packed_.size(); ++i) {
+      packed_[i].record.requirements = requirements.add(scene_, plan_.geometries[i], packed_[i].needs, packed_[i].stats,
+                                                        packed_[i].encoded.stream_bits);
       sections.add_geometry(packed_[i].record, packed_[i].encoded, plan_.geometries[i].name);
       packed_[i].encoded = {};
     }
     sections.set_instances(plan_.instances);
+    sections.set_material_slots(plan_.material_slots);
+    sections.set_requirements(requirements.rows());
     add_up();
     return sections.assemble(summary(sections));
   }
 
   void measure() {
     progress_.begin("measuring geometry", plan_.geometries.size());
-    struct Scratch {
-      LengthHistogram world, local;
-    };
-    tbb::enumerable_thread_specific<Scratch> scratch;
-    tbb::parallel_for(size_t{0}, plan_.geometries.size(), [&](size_t i) {
-      const GeometryPlan& plan = plan_.geometries[i];
-      Scratch& mine = scratch.local();
-      if (plan.world_space) {
-        measures_[i].bounds = measure_geometry(scene_, plan, mine.world);
-      } else {
-        mine.local.clear();
-        measures_[i].bounds = measure_geometry(scene_, plan, mine.local);
-        measures_[i].median_edge = mine.local.median();
-      }
-      progress_.advance();
-    });
-    LengthHistogram edges;
-    for (const Scratch& one : scratch) edges.add(one.world);
-    world_.median_edge = edges.median();
-    for (size_t i = 0; i < measures_.size(); ++i)
-      if (plan_.geometries[i].world_space) {
-        world_.bounds.extend(measures_[i].bounds);
-        measures_[i].median_edge = world_.median_edge;
-      }
+    SceneMeasure measure = measure_scene(scene_, plan_, progress_);
+    measures_ = std::move(measure.geometries);
+    world_ = measure.world;
+    has_world_space_ = measure.has_world_space;
   }
 
   void choose_grids() {
-    const bool any_world = !world_.bounds.empty();
-    if (any_world) {
+    if (has_world_space_) {
       world_grid_ = choose_grid(config_, world_, 1.0);
       report_.world_step = world_grid_.step();
       report_.world_median_edge = world_.median_edge;
     }
+    const std::vector<uint32_t> halvings = has_world_space_
+                                               ? nest_grids(scene_, plan_, measures_, config_, world_grid_.step())
+                                               : std::vector<uint32_t>(plan_.geometries.size());
     uint64_t coarse = 0, far = 0;
     for (size_t i = 0; i < grids_.size(); ++i) {
       const GeometryPlan& plan = plan_.geometries[i];
       if (measures_[i].bounds.empty()) continue; // nothing to quantise: the default grid
       grids_[i] = plan.world_space ? world_grid_ : choose_grid(config_, measures_[i], plan.max_stretch);
+      grids_[i].exponent -= static_cast<int32_t>(halvings[i]);
+      report_.nested_geometries += halvings[i] > 0;
       const double step = grids_[i].step();
       coarse += measures_[i].median_edge > 0.0 && step > measures_[i].median_edge / 8.0;
       far += measures_[i].max_abs() * 0x1p-23 > step;
@@ -117,11 +112,75 @@ private:
     if (far > 0)
       warn(std::to_string(far) + " of " + std::to_string(grids_.size()) +
            " geometries lie so far from the origin that float positions are coarser than the step of their grid");
-    const auto local = static_cast<size_t>(std::count_if(plan_.geometries.begin(), plan_.geometries.end(),
-                                                         [](const GeometryPlan& p) { return !p.world_space; }));
-    if (local > 0 && plan_.geometries.size() > 1)
-      warn(std::to_string(local) + " instanced geometries have grids of their own: where they touch other geometry, "
-                                   "edges agree only within the position error");
+  }
+
+  /// Leaves out what leaves the range of floats, and looks for instances that may open seams, as their grid is not that
+  /// of what lies beside them.
+  void place_instances() {
+    std::vector<Bounds> boxes(plan_.instances.size());
+    std::vector<uint8_t> own_grid(boxes.size());
+    std::vector<uint32_t> uses(plan_.geometries.size());
+    uint64_t instances = 0;
+    for (size_t i = 0; i < boxes.size(); ++i) {
+      baked::InstanceRecord& instance = plan_.instances[i];
+      if (instance.geometry == baked::kNone) continue;
+      const uint32_t geometry = instance.geometry;
+      const Bounds& bounds = measures_[geometry].bounds;
+      if (const Bounds box = placed_box(instance, bounds); !box.empty() && !within_float_range(box)) {
+        plan_.left_out.push_back(beyond_float_range("an instance of " + plan_.geometries[geometry].name, box));
+        instance.geometry = baked::kNone;
+        continue;
+      }
+      boxes[i] = placed_box(instance, grown(bounds, grids_[geometry].step()));
+      own_grid[i] = !plan_.geometries[geometry].world_space;
+      instances += own_grid[i];
+      ++uses[geometry];
+    }
+    report_left_out(uses);
+    if (instances == 0) return;
+    report_.touching_instances = count_touching(boxes, own_grid);
+    if (report_.touching_instances > 0)
+      warn("instanced geometry keeps a grid of its own: the boxes of " + std::to_string(report_.touching_instances) +
+           " of " + std::to_string(instances) +
+           " instances touch other geometry, where seams may open by half a step of both grids");
+  }
+
+  /// Gives what is left out an empty geometry, and empties geometries that nothing places any more.
+  void report_left_out(const std::vector<uint32_t>& uses) {
+    report_.left_out = plan_.left_out.size();
+    if (report_.left_out == 0) return;
+    if (config_.strict) throw Error(ErrorKind::kInput, plan_.left_out.front());
+    for (const std::string& what : plan_.left_out) diagnostics_.report(Severity::kError, {}, what + "; it is left out");
+    for (size_t i = 0; i < uses.size(); ++i)
+      if (uses[i] == 0) {
+        plan_.geometries[i] = {plan_.geometries[i].name, {}, {}, {}, plan_.geometries[i].world_space, 1.0};
+        measures_[i] = {};
+      }
+    const auto empty = static_cast<uint32_t>(plan_.geometries.size());
+    plan_.geometries.push_back({"left out", {}, {}, {}, false, 1.0});
+    measures_.emplace_back(), grids_.emplace_back(), packed_.emplace_back();
+    for (baked::InstanceRecord& instance : plan_.instances)
+      if (instance.geometry == baked::kNone) instance = {{1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, empty, 0};
+  }
+
+  static Bounds grown(Bounds box, double by) {
+    if (!box.empty()) box.lo -= by, box.hi += by;
+    return box;
+  }
+
+  void encode_textures() {
+    if (!config_.textures) return;
+    progress_.begin("encoding textures", scene_.textures.size());
+    textures_.resize(scene_.textures.size());
+    for (const AlbedoTexture& texture : scene_.textures)
+      if (texture.width == 0 || texture.height == 0 ||
+          texture.rgb.size() != uint64_t{3} * texture.width * texture.height)
+        throw Error(ErrorKind::kInput, "invalid scene: the size of texture " + texture.name);
+    tbb::parallel_for(size_t{0}, textures_.size(), [&](size_t i) {
+      progress_.check_cancelled();
+      textures_[i] = encode_texture(scene_.textures[i], config_.texture_codec, config_.min_texture_psnr_db);
+      progress_.advance();
+    });
   }
 
   void pack() {
@@ -137,13 +196,23 @@ private:
   }
 
   Packed pack_one(size_t index) const {
+    GeometryNeeds needs = analyse_requirements(scene_, plan_, plan_.geometries[index], config_);
+    Packed packed = pack_with(index, needs);
+    // Flat triangles need clusters of their own. Where only some are flat, those may take more than the normals do.
+    const bool mixed = packed.stats.flat_triangles > 0 && packed.encoded.stream_bits.normals > 0;
+    needs.infer_normals = false;
+    if (mixed)
+      if (Packed other = pack_with(index, needs); other.bytes() < packed.bytes()) return other;
+    return packed;
+  }
+
+  Packed pack_with(size_t index, const GeometryNeeds& needs) const {
     const GeometryPlan& plan = plan_.geometries[index];
     const GeometryMeasure& measure = measures_[index];
-    const GeometryNeeds needs = analyse_requirements(scene_, plan);
     const QuantizedGeometry q = quantize_geometry(scene_, plan, needs, config_, grids_[index], measure.max_abs(),
                                                   measure.bounds.lo, measure.bounds.hi);
-    return {record_of(plan, q, position_error_bound(q.grid.step(), measure.max_abs())),
-            encode_geometry(scene_, q, split_geometry(scene_, q)), q.stats, unneeded_uv_bytes(scene_, plan, needs)};
+    return {record_of(plan, q, position_error_bound(q.grid.step(), measure.max_abs())), encode_geometry(q, split_geometry(q)),
+            q.stats, needs};
   }
 
   static baked::GeometryRecord record_of(const GeometryPlan& plan, const QuantizedGeometry& q, double error_bound) {
@@ -155,15 +224,17 @@ private:
     record.step_exponent = q.grid.exponent;
     record.anchor_shift = q.anchor_shift;
     record.uv_exponent = q.uv_exponent;
+    record.uv_encoding = static_cast<uint32_t>(q.uv_encoding);
     record.normal_encoding = static_cast<uint32_t>(q.normal_encoding);
     record.max_normal_error_degrees = static_cast<float>(q.stats.max_normal_error_degrees);
     record.mean_normal_error_degrees = static_cast<float>(mean_normal_error(q.stats));
     record.max_uv_error = static_cast<float>(q.stats.max_uv_error);
     record.flags = plan.world_space ? baked::kWorldSpace : 0;
+    record.slot_count = static_cast<uint32_t>(plan.slot_class.size());
     return record;
   }
 
-  /// Box of all instances, from the boxes of their geometries. Throws Error(kInput) where one leaves the float range.
+  /// Box of all instances, from the boxes of their geometries.
   Bounds placed_bounds(const FileSections& sections) const {
     Bounds bounds;
     for (const baked::InstanceRecord& instance : plan_.instances) {
@@ -172,16 +243,7 @@ private:
       Bounds box;
       box.lo = DVec3(g.bounds_lo[0], g.bounds_lo[1], g.bounds_lo[2]);
       box.hi = DVec3(g.bounds_hi[0], g.bounds_hi[1], g.bounds_hi[2]);
-      const auto& m = instance.world_from_object;
-      const Bounds placed =
-          transform_bounds(DAffine(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]), box);
-      constexpr double kMax = std::numeric_limits<float>::max();
-      for (int axis = 0; axis < 3; ++axis)
-        if (!(placed.lo[axis] >= -kMax && placed.hi[axis] <= kMax))
-          throw Error(ErrorKind::kInput, "an instance of " + plan_.geometries[instance.geometry].name +
-                                             " leaves the float range: its coordinates reach " +
-                                             brief(std::max(-placed.lo[axis], placed.hi[axis])));
-      bounds.extend(placed);
+      bounds.extend(placed_box(instance, box));
     }
     return bounds;
   }
@@ -189,7 +251,7 @@ private:
   /// Everything the report says of the scene as a whole.
   void add_up() {
     QuantizeStats all;
-    uint64_t uv_bytes = 0;
+    uint64_t coarse_uvs = 0;
     for (const Packed& p : packed_) {
       const QuantizeStats& s = p.stats;
       report_.source_vertices += s.source_vertices;
@@ -200,26 +262,25 @@ private:
       report_.max_uv_error = std::max(report_.max_uv_error, s.max_uv_error);
       all.normal_error_sum += s.normal_error_sum;
       all.normal_count += s.normal_count;
-      all.flat_triangles += s.flat_triangles;
       all.repaired_normals += s.repaired_normals;
       all.replaced_uvs += s.replaced_uvs;
-      uv_bytes += p.unneeded_uv_bytes;
+      coarse_uvs += s.max_uv_error_texels > 0.5;
+      report_.max_uv_error_texels = std::max(report_.max_uv_error_texels, s.max_uv_error_texels);
     }
     report_.mean_normal_error_degrees = mean_normal_error(all);
     report_.source_triangles = unique_triangle_count(scene_);
     report_.shared_shapes = plan_.shared_shapes;
+    report_.instanced_shapes = plan_.instanced_shapes;
     report_.shared_objects = plan_.shared_objects;
     report_.unused_objects = plan_.unused_objects;
     report_.unused_triangles = plan_.unused_triangles;
-    if (uv_bytes > 0) report_.dropped.push_back({"texture coordinates", "no alpha mask looks them up", uv_bytes});
-    if (all.flat_triangles > 0)
-      report_.dropped.push_back({"normals",
-                                 "they equal the face normal within " + brief(config_.flat_degrees()) + " degrees",
-                                 all.flat_triangles * 3 * sizeof(Vec3)});
     if (all.repaired_normals > 0)
       warn(std::to_string(all.repaired_normals) + " normals have no direction; face normals took their place");
     if (all.replaced_uvs > 0)
       warn(std::to_string(all.replaced_uvs) + " texture coordinates are not finite; (0, 0) took their place");
+    if (coarse_uvs > 0)
+      warn("texture coordinates of " + std::to_string(coarse_uvs) + " geometries are up to " +
+           brief(report_.max_uv_error_texels) + " texels off; without an encoding of your own they stay within 1/32");
     if (report_.collapsed_triangles > 0)
       warn(std::to_string(report_.collapsed_triangles) +
            " triangles are smaller than the grid's step and have no area");
@@ -241,9 +302,12 @@ private:
     s.bounds_hi = {bounds.hi.x, bounds.hi.y, bounds.hi.z};
     s.precision_kind = static_cast<uint32_t>(config_.precision_kind);
     s.precision_value = config_.precision;
+    s.purpose = config_.purpose | (uint32_t{config_.keep_normals} << (baked::kKeepShift + baked::kNormals)) |
+                (uint32_t{config_.keep_uvs} << (baked::kKeepShift + baked::kUvs));
     if (report_.world_step > 0.0)
       s.world_step_mantissa = world_grid_.mantissa, s.world_step_exponent = world_grid_.exponent;
     const ClusterView::StreamBits& bits = sections.stream_bits();
+    s.left_out = report_.left_out;
     s.stream_bits = {bits.indices, bits.positions, bits.normals, bits.uvs};
     return s;
   }
@@ -260,9 +324,11 @@ private:
   ScenePlan plan_;
   std::vector<GeometryMeasure> measures_;
   GeometryMeasure world_;
+  bool has_world_space_ = false;
   PositionGrid world_grid_;
   std::vector<PositionGrid> grids_;
   std::vector<Packed> packed_;
+  std::vector<EncodedTexture> textures_; // as in the scene; empty where they are not kept
   BakeReport report_;
 };
 

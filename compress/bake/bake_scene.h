@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "compress/bake/bake_config.h"
-#include "compress/bake/requirements.h"
 #include "compress/format/file_summary.h"
 #include "pbrt_import/scene/diagnostics.h"
 #include "pbrt_import/scene/progress.h"
@@ -23,15 +22,19 @@ struct BakeReport {
   uint64_t merged_vertices = 0;     ///< equal after quantisation to another one of their geometry
   uint64_t collapsed_triangles = 0; ///< kept, though two of their corners fell on one lattice point
   uint64_t shared_shapes = 0;       ///< shapes outside objects that use another's geometry
+  uint64_t instanced_shapes = 0;    ///< shapes outside objects that lie on a grid of their own as they share a geometry
+  uint64_t touching_instances = 0;  ///< on grids of their own, in boxes that touch other geometry's
   uint64_t shared_objects = 0;      ///< objects that use another's geometry
   uint64_t unused_objects = 0;      ///< never instanced; not stored
   uint64_t unused_triangles = 0;
+  uint64_t left_out = 0;   ///< shapes and instances that leave the float range; each is in the diagnostics
   double world_step = 0.0; ///< 0: no world-space geometry
   double world_median_edge = 0.0;
+  uint64_t nested_geometries = 0;  ///< in world space on a finer grid than the scene's, as they are so small
   double max_position_error = 0.0; ///< measured against the source, largest axis, object units
   double max_normal_error_degrees = 0.0, mean_normal_error_degrees = 0.0;
   double max_uv_error = 0.0;
-  std::vector<DroppedStream> dropped;
+  double max_uv_error_texels = 0.0;  ///< of the finest texture that the same geometry looks up
   std::vector<std::string> warnings; ///< also in the diagnostics
 };
 
@@ -41,7 +44,10 @@ struct BakedScene {
 };
 
 /// Packs a scene. The bytes depend on scene and config only, not on thread count or time.
-/// Throws Error(kUsage) for a config out of range, Error(kInput) for scenes that break the rules of scene.h,
+/// Shapes and instances that leave the range of floats where they are placed are left out and reported as errors in the
+/// diagnostics; their instance numbers stay, of an empty geometry.
+/// Throws Error(kUsage) for a config out of range, Error(kInput) for scenes that break the rules of scene.h, or where
+/// something would be left out and config is strict,
 /// Error(kLimitExceeded) where a limit of the format or the promised accuracy cannot be met, Error(kCancelled).
 BakedScene bake_to_bytes(const Scene& scene, const BakeConfig& config, Diagnostics& diagnostics, Progress& progress);
 

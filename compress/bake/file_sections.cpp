@@ -16,9 +16,10 @@ void require(bool ok, const std::string& what) {
 
 } // namespace
 
-FileSections::FileSections(const Scene& scene) {
-  add_materials(scene);
+FileSections::FileSections(const Scene& scene, const std::vector<EncodedTexture>& textures) {
+  add_materials(scene, !textures.empty());
   add_masks(scene);
+  add_textures(scene, textures);
   add_cameras(scene);
 }
 
@@ -30,7 +31,7 @@ baked::StringRef FileSections::add_string(std::string_view text) {
   return ref;
 }
 
-void FileSections::add_materials(const Scene& scene) {
+void FileSections::add_materials(const Scene& scene, bool textured) {
   for (const Material& material : scene.materials) {
     const auto mask = [&](MaterialFlags flag, uint32_t index) {
       if ((material.flags & flag) == 0) return baked::kNone;
@@ -46,6 +47,10 @@ void FileSections::add_materials(const Scene& scene) {
     record.albedo = {material.albedo.x, material.albedo.y, material.albedo.z};
     record.alpha_mask = mask(kAlphaMask, material.alpha_mask);
     record.shadow_alpha_mask = mask(kShadowAlphaMask, material.shadow_alpha_mask);
+    record.albedo_texture = textured ? material.albedo_texture : baked::kNone;
+    require(record.albedo_texture == baked::kNone ||
+                (record.albedo_texture < scene.textures.size() && (material.flags & kAlbedoTexture) != 0),
+            "the texture of material " + material.name + " does not exist, or its flag is not set");
     record.name = add_string(material.name);
     materials_.push_back(record);
   }
@@ -67,6 +72,25 @@ void FileSections::add_masks(const Scene& scene) {
     record.uv_offset = {mask.uv_offset.x, mask.uv_offset.y};
     mask_words_.insert(mask_words_.end(), mask.words.begin(), mask.words.end());
     masks_.push_back(record);
+  }
+}
+
+void FileSections::add_textures(const Scene& scene, const std::vector<EncodedTexture>& textures) {
+  for (size_t i = 0; i < textures.size(); ++i) {
+    const AlbedoTexture& texture = scene.textures[i];
+    baked::TextureRecord record{};
+    record.first_byte = texture_bytes_.size();
+    record.width = texture.width;
+    record.height = texture.height;
+    record.wrap = static_cast<uint32_t>(texture.wrap);
+    record.codec = static_cast<uint32_t>(textures[i].codec);
+    record.uv_scale = {texture.uv_scale.x, texture.uv_scale.y};
+    record.uv_offset = {texture.uv_offset.x, texture.uv_offset.y};
+    record.psnr_db = static_cast<float>(textures[i].psnr_db);
+    record.name = add_string(texture.name);
+    texture_bytes_.insert(texture_bytes_.end(), textures[i].data.begin(), textures[i].data.end());
+    require(!find_texture_fault(record, texture_bytes_.size()), "texture " + texture.name);
+    textures_.push_back(record);
   }
 }
 
@@ -125,9 +149,13 @@ std::vector<std::byte> FileSections::assemble(const baked::SummaryRecord& summar
                               instances_,
                               masks_,
                               mask_words_,
+                              textures_,
+                              texture_bytes_,
                               cameras_,
                               strings_,
-                              {&summary, 1}});
+                              {&summary, 1},
+                              material_slots_,
+                              requirements_});
 }
 
 } // namespace packtrace

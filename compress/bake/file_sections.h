@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "compress/bake/geometry_encoder.h"
+#include "compress/bake/texture_encoder.h"
 #include "compress/format/baked_format.h"
 #include "pbrt_import/scene/scene.h"
 
@@ -14,13 +15,17 @@ namespace packtrace {
 /// Gathers the records of a file.
 class FileSections {
 public:
-  /// Takes materials, masks and cameras. Throws Error(kInput) where they break the rules of scene.h.
-  explicit FileSections(const Scene& scene);
+  /// Takes materials, masks, textures and cameras. Throws Error(kInput) where they break the rules of scene.h.
+  /// @param textures of the scene in order, or none: then materials refer to none
+  FileSections(const Scene& scene, const std::vector<EncodedTexture>& textures);
 
   /// Completes the record with ranges, counts, bounds and name, and appends it with its clusters and payload.
   void add_geometry(baked::GeometryRecord record, const EncodedGeometry& encoded, std::string_view name);
 
   void set_instances(std::vector<baked::InstanceRecord> instances) { instances_ = std::move(instances); }
+
+  void set_material_slots(std::vector<uint32_t> slots) { material_slots_ = std::move(slots); }
+  void set_requirements(std::vector<baked::RequirementRecord> rows) { requirements_ = std::move(rows); }
 
   const std::vector<baked::GeometryRecord>& geometries() const { return geometries_; }
   const ClusterView::StreamBits& stream_bits() const { return stream_bits_; }
@@ -30,8 +35,9 @@ public:
 
 private:
   baked::StringRef add_string(std::string_view text);
-  void add_materials(const Scene& scene);
+  void add_materials(const Scene& scene, bool textured);
   void add_masks(const Scene& scene);
+  void add_textures(const Scene& scene, const std::vector<EncodedTexture>& textures);
   void add_cameras(const Scene& scene);
 
   std::vector<baked::GeometryRecord> geometries_;
@@ -41,8 +47,12 @@ private:
   std::vector<baked::InstanceRecord> instances_;
   std::vector<baked::MaskRecord> masks_;
   std::vector<uint32_t> mask_words_;
+  std::vector<baked::TextureRecord> textures_;
+  std::vector<uint8_t> texture_bytes_;
   std::vector<baked::CameraRecord> cameras_;
   std::string strings_;
+  std::vector<uint32_t> material_slots_;
+  std::vector<baked::RequirementRecord> requirements_;
   ClusterView::StreamBits stream_bits_;
 };
 

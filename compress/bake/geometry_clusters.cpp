@@ -73,13 +73,13 @@ Clusters split_chunk(const QuantizedGeometry& geometry, std::span<const SortKey>
                      static_cast<uint32_t>(point_numbers.values.size())});
 }
 
-/// Rank of each kind: material class, then material, so that classes are contiguous.
-std::vector<uint32_t> rank_kinds(const Scene& scene, const std::vector<TriangleKind>& kinds) {
+/// Rank of each kind: slots, which are ordered by class, so that classes are contiguous.
+std::vector<uint32_t> rank_kinds(const std::vector<TriangleKind>& kinds) {
   std::vector<uint32_t> order(kinds.size()), rank(kinds.size());
   for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   const auto key = [&](uint32_t i) {
     const TriangleKind& k = kinds[i];
-    return std::tuple(baked::material_class(scene.materials[k.material].flags), k.material, k.flat, k.uvs);
+    return std::tuple(k.slot, k.flat, k.uvs);
   };
   std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
   for (uint32_t i = 0; i < order.size(); ++i) rank[order[i]] = i;
@@ -127,8 +127,8 @@ std::vector<Chunk> split_into_chunks(std::span<const SortKey> keys) {
 
 } // namespace
 
-GeometryClusters split_geometry(const Scene& scene, const QuantizedGeometry& geometry) {
-  const std::vector<SortKey> keys = sort_triangles(geometry, rank_kinds(scene, geometry.kinds));
+GeometryClusters split_geometry(const QuantizedGeometry& geometry) {
+  const std::vector<SortKey> keys = sort_triangles(geometry, rank_kinds(geometry.kinds));
   const std::vector<Chunk> chunks = split_into_chunks(keys);
   std::vector<Clusters> split(chunks.size());
   GeometryClusters result;

@@ -19,8 +19,8 @@ struct GeometryClusters {
   std::vector<ClusterRange> clusters;
 };
 
-/// Splits a geometry into clusters of at most 128 triangles and 256 vertices, ordered by material class, kind and
+/// Splits a geometry into clusters of at most 128 triangles and 256 vertices, ordered by material slot, kind and
 /// place. Depends on its input only, not on the thread count.
-GeometryClusters split_geometry(const Scene& scene, const QuantizedGeometry& geometry);
+GeometryClusters split_geometry(const QuantizedGeometry& geometry);
 
 } // namespace packtrace

@@ -50,6 +50,7 @@ public:
     frame_.step_mantissa = geometry.grid.mantissa;
     frame_.step_exponent = geometry.grid.exponent;
     frame_.anchor_shift = geometry.anchor_shift;
+    frame_.uv_encoding = static_cast<uint32_t>(geometry.uv_encoding);
     frame_.uv_exponent = geometry.uv_exponent;
     frame_.normal_encoding = static_cast<uint32_t>(geometry.normal_encoding);
   }
@@ -83,7 +84,7 @@ private:
       if (kind.uvs) uvs.push_back(v.uv);
     }
     const size_t offset = writer_.bytes().size();
-    out_.clusters.push_back(encode_cluster({&strips, positions, codes, uvs, kind.material, geometry_.origin,
+    out_.clusters.push_back(encode_cluster({&strips, positions, codes, uvs, kind.slot, geometry_.origin,
                                             geometry_.anchor_shift, geometry_.normal_encoding},
                                            writer_));
     out_.clusters.back().payload_offset = static_cast<uint32_t>(offset / 4);
@@ -100,10 +101,7 @@ private:
     if (view.lattice(local) != geometry_.positions[v.position]) return false;
     if (view.has_normals() == kind.flat || view.has_uvs() != kind.uvs) return false;
     if (!kind.flat && view.normal_code(local) != v.normal_code) return false;
-    const auto decoded = [&](size_t axis) {
-      return from_uv_lattice(v.uv[axis], std::ldexp(1.0f, geometry_.uv_exponent[axis]));
-    };
-    return !kind.uvs || view.uv(local) == Vec2(decoded(0), decoded(1));
+    return !kind.uvs || view.uv_code(local) == std::array<int64_t, 2>{v.uv[0], v.uv[1]};
   }
 
   /// Decodes a cluster, compares it with what went in, and adds to the totals.
@@ -141,8 +139,7 @@ private:
 
 } // namespace
 
-EncodedGeometry encode_geometry(const Scene& scene, const QuantizedGeometry& geometry,
-                                const GeometryClusters& clusters) {
+EncodedGeometry encode_geometry(const QuantizedGeometry& geometry, const GeometryClusters& clusters) {
   constexpr size_t kRun = 128; // clusters
   const size_t runs = (clusters.clusters.size() + kRun - 1) / kRun;
   std::vector<EncodedChunk> encoded(runs);
@@ -164,7 +161,7 @@ EncodedGeometry encode_geometry(const Scene& scene, const QuantizedGeometry& geo
       record.first_vertex = out.vertex_count;
       out.triangle_count += record.triangle_count;
       out.vertex_count += record.vertex_count;
-      ++out.class_clusters[baked::material_class(scene.materials[record.material].flags)];
+      ++out.class_clusters[geometry.slot_class[record.material_slot]];
       out.clusters.push_back(record);
     }
     out.payload.insert(out.payload.end(), chunk.payload.begin(), chunk.payload.end());

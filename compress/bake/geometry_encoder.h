@@ -22,7 +22,6 @@ struct EncodedGeometry {
 
 /// Encodes the clusters and checks by decoding that nothing changed. Bytes do not depend on the thread count.
 /// Throws Error(kLimitExceeded) where the payload exceeds 16 GiB.
-EncodedGeometry encode_geometry(const Scene& scene, const QuantizedGeometry& geometry,
-                                const GeometryClusters& clusters);
+EncodedGeometry encode_geometry(const QuantizedGeometry& geometry, const GeometryClusters& clusters);
 
 } // namespace packtrace

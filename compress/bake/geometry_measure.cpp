@@ -25,6 +25,20 @@ void LengthHistogram::add(const LengthHistogram& other) {
   end_ = std::max(end_, other.end_);
 }
 
+void LengthHistogram::add_scaled(const LengthHistogram& other, double factor) {
+  for (size_t i = other.first_; i < other.end_; ++i) {
+    if (other.counts_[i] == 0) continue;
+    const uint64_t middle = (uint64_t{i} << (52 - kMantissaBits)) | (uint64_t{1} << (51 - kMantissaBits));
+    const double squared = std::bit_cast<double>(middle) * factor * factor;
+    if (!(squared > 0.0) || !std::isfinite(squared)) continue;
+    const auto bin = static_cast<size_t>(std::bit_cast<uint64_t>(squared) >> (52 - kMantissaBits));
+    counts_[bin] += other.counts_[i];
+    total_ += other.counts_[i];
+    first_ = std::min(first_, bin);
+    end_ = std::max(end_, bin + 1);
+  }
+}
+
 void LengthHistogram::clear() {
   for (size_t i = first_; i < end_; ++i) counts_[i] = 0;
   first_ = kBins, end_ = 0, total_ = 0;

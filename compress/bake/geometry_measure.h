@@ -18,6 +18,8 @@ public:
   /// Zero lengths are not counted.
   void add_squared(double squared_length);
   void add(const LengthHistogram& other);
+  /// Its lengths times a positive factor, to half a bin.
+  void add_scaled(const LengthHistogram& other, double factor);
   void clear();
 
   /// The lower edge of the median's bin: at most the median and at least .98 of it; 0 if nothing was added.

@@ -3,53 +3,20 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <map>
 #include <optional>
+#include <span>
 #include <tuple>
 
 #include <tbb/parallel_for.h>
-#include <xxhash.h>
 
+#include "compress/bake/brief.h"
+#include "compress/bake/equal_meshes.h"
 #include "pbrt_import/scene/error.h"
 
 namespace packtrace {
 namespace {
-
-template <typename T>
-size_t byte_size(const std::vector<T>& v) {
-  return v.size() * sizeof(T);
-}
-
-template <typename T>
-bool same_bytes(const std::vector<T>& a, const std::vector<T>& b) {
-  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), byte_size(a)) == 0);
-}
-
-bool same_content(const Mesh& a, const Mesh& b) {
-  return same_bytes(a.positions, b.positions) && same_bytes(a.normals, b.normals) && same_bytes(a.uvs, b.uvs) &&
-         same_bytes(a.triangles, b.triangles);
-}
-
-std::pair<uint64_t, uint64_t> content_hash(const Mesh& mesh) {
-  const auto hash = [](const auto& v) { return XXH3_128bits(v.data(), byte_size(v)); };
-  const std::array<XXH128_hash_t, 4> parts = {hash(mesh.positions), hash(mesh.normals), hash(mesh.uvs),
-                                              hash(mesh.triangles)};
-  const XXH128_hash_t all = XXH3_128bits(parts.data(), sizeof parts);
-  return {all.high64, all.low64};
-}
-
-/// For each mesh the first mesh with equal content.
-std::vector<uint32_t> first_equal_meshes(const Scene& scene) {
-  std::vector<std::pair<uint64_t, uint64_t>> hashes(scene.meshes.size());
-  tbb::parallel_for(size_t{0}, hashes.size(), [&](size_t i) { hashes[i] = content_hash(scene.meshes[i]); });
-  std::map<std::pair<uint64_t, uint64_t>, uint32_t> first_with;
-  std::vector<uint32_t> result(hashes.size());
-  for (uint32_t i = 0; i < result.size(); ++i) {
-    const uint32_t first = first_with.try_emplace(hashes[i], i).first->second;
-    result[i] = same_content(scene.meshes[first], scene.meshes[i]) ? first : i;
-  }
-  return result;
-}
 
 bool same_transform(const DAffine& a, const DAffine& b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
@@ -70,6 +37,13 @@ baked::InstanceRecord instance_of(uint32_t geometry, const Affine& world_from_ob
   return record;
 }
 
+/// A geometry in the making. Each user, a world shape or an object, brings a material for each part.
+struct Draft {
+  std::vector<uint32_t> part_materials; ///< user by user
+  uint32_t users = 0;
+  std::vector<uint32_t> first_slot; ///< by user
+};
+
 class Planner {
 public:
   explicit Planner(const Scene& scene) : scene_(scene) {}
@@ -77,8 +51,16 @@ public:
   ScenePlan run() {
     check();
     equal_mesh_ = first_equal_meshes(scene_);
+    find_mesh_boxes();
+    find_used_objects();
     plan_world_shapes();
     plan_objects();
+    for (uint32_t g = 0; g < drafts_.size(); ++g) assign_slots(g);
+    for (size_t i = 0; i < plan_.instances.size(); ++i) {
+      baked::InstanceRecord& instance = plan_.instances[i];
+      if (instance.geometry == baked::kNone) continue;
+      instance.first_slot = drafts_[instance.geometry].first_slot[user_of_[i]];
+    }
     return std::move(plan_);
   }
 
@@ -106,110 +88,251 @@ private:
     }
   }
 
+  uint32_t class_of(const Shape& shape) const { return baked::material_class(scene_.materials[shape.material].flags); }
+
   uint32_t add_geometry(GeometryPlan plan) {
     plan_.geometries.push_back(std::move(plan));
+    drafts_.emplace_back();
     return static_cast<uint32_t>(plan_.geometries.size() - 1);
   }
 
-  /// One group of world shapes with equal content, material and orientation.
+  /// @return the user's number
+  uint32_t add_user(uint32_t geometry, std::span<const Shape> shapes) {
+    Draft& draft = drafts_[geometry];
+    for (const Shape& shape : shapes) draft.part_materials.push_back(shape.material);
+    return draft.users++;
+  }
+
+  void find_mesh_boxes() {
+    mesh_boxes_.resize(scene_.meshes.size());
+    tbb::parallel_for(size_t{0}, mesh_boxes_.size(),
+                      [&](size_t i) { mesh_boxes_[i] = bounds_of(scene_.meshes[i].positions); });
+  }
+
+  /// Box of a shape where it is placed, if that leaves the range of floats.
+  std::optional<Bounds> beyond_range(const Shape& shape) const {
+    const Bounds& mesh_box = mesh_boxes_[shape.mesh];
+    if (mesh_box.empty() || !within_float_range(mesh_box)) return {}; // no mesh of a scene: refused when measured
+    if (within_float_range(transform_bounds(shape.parent_from_mesh, mesh_box))) return {};
+    Bounds box; // the tight one
+    for (const Vec3 p : scene_.meshes[shape.mesh].positions)
+      box.extend(transform_point(shape.parent_from_mesh, DVec3(p)));
+    if (within_float_range(box)) return {};
+    return box;
+  }
+
+  /// Keeps the instance's number in use.
+  void leave_out(std::string what) {
+    plan_.left_out.push_back(std::move(what));
+    plan_.instances.push_back(instance_of(baked::kNone, Affine(1.0f)));
+    user_of_.push_back(0);
+  }
+
+  void add_instance(uint32_t geometry, uint32_t user, const Affine& world_from_object) {
+    for (int column = 0; column < 4; ++column)
+      if (!is_finite(world_from_object[column]))
+        return leave_out("an instance of " + plan_.geometries[geometry].name +
+                         " leaves the float range: so does its transform");
+    plan_.instances.push_back(instance_of(geometry, world_from_object));
+    user_of_.push_back(user);
+    GeometryPlan& plan = plan_.geometries[geometry];
+    plan.max_stretch = std::max(plan.max_stretch, stretch(plan_.instances.back().world_from_object));
+  }
+
+  /// World shapes, and objects of one shape that is not moved, with equal content, material class and orientation.
   struct Group {
-    uint32_t shapes = 0;
-    bool one_transform = true;
-    DAffine transform{1.0}; ///< of the first
+    uint32_t shapes = 0, objects = 0;
+    bool one_transform = true; ///< of the shapes
+    bool one_mesh = false;     ///< some of them are one mesh of the scene
+    DAffine transform{1.0};    ///< of the first shape
     std::optional<uint32_t> geometry;
+
+    bool shared() const { return shapes + objects > 1; }
+    /// On a grid of its own.
+    bool instanced(size_t triangles) const {
+      return shared() && !(one_transform && objects == 0) && (one_mesh || triangles >= kMinSharedTriangles);
+    }
   };
   using GroupKey = std::tuple<uint32_t, uint32_t, bool>;
 
-  void plan_world_shapes() {
-    const auto key_of = [&](const Shape& s) {
-      return GroupKey(equal_mesh_[s.mesh], s.material, s.reverse_orientation);
-    };
+  GroupKey key_of(const Shape& s) const { return GroupKey(equal_mesh_[s.mesh], class_of(s), s.reverse_orientation); }
+
+  std::map<GroupKey, Group> group_shapes() const {
     std::map<GroupKey, Group> groups;
-    for (const Shape& shape : scene_.shapes) {
+    std::vector<uint8_t> mesh_seen(scene_.meshes.size());
+    const auto add = [&](const Shape& shape) -> Group& {
       Group& group = groups[key_of(shape)];
+      group.one_mesh |= mesh_seen[shape.mesh] != 0;
+      mesh_seen[shape.mesh] = 1;
+      return group;
+    };
+    for (const Shape& shape : scene_.shapes) {
+      if (beyond_range(shape)) continue;
+      Group& group = add(shape);
       if (group.shapes++ == 0)
         group.transform = shape.parent_from_mesh;
       else
         group.one_transform &= same_transform(group.transform, shape.parent_from_mesh);
     }
+    for (size_t i = 0; i < scene_.objects.size(); ++i) {
+      const std::vector<Shape>& shapes = scene_.objects[i].shapes;
+      if (used_[i] != 0 && shapes.size() == 1 && same_transform(shapes[0].parent_from_mesh, DAffine(1.0)))
+        ++add(shapes[0]).objects;
+    }
+    return groups;
+  }
+
+  void plan_world_shapes() {
+    std::map<GroupKey, Group> groups = group_shapes();
     for (const Shape& shape : scene_.shapes) {
+      if (const std::optional<Bounds> box = beyond_range(shape)) {
+        leave_out(beyond_float_range(scene_.meshes[shape.mesh].name, *box));
+        continue;
+      }
       Group& group = groups[key_of(shape)];
-      const Mesh& mesh = scene_.meshes[shape.mesh];
-      const bool share = group.shapes > 1 && (group.one_transform || mesh.triangles.size() >= kMinSharedTriangles);
-      const bool local = share && !group.one_transform;
+      const bool instanced = group.instanced(scene_.meshes[shape.mesh].triangles.size());
+      const bool share = instanced || (group.shapes > 1 && group.one_transform);
       plan_.shared_shapes += share && group.geometry;
+      plan_.instanced_shapes += instanced;
+      Shape placed = shape;
+      if (instanced) placed.parent_from_mesh = DAffine(1.0);
       uint32_t geometry = group.geometry.value_or(0);
       if (!share || !group.geometry) {
-        const bool mirrored = !local && swaps_handedness(shape.parent_from_mesh);
-        geometry = add_geometry({mesh.name,
-                                 {{shape.mesh, shape.material, shape.reverse_orientation != mirrored,
-                                   local ? DAffine(1.0) : shape.parent_from_mesh}},
-                                 !local,
-                                 local ? 0.0 : 1.0});
+        geometry = add_geometry(plan_of(scene_.meshes[shape.mesh].name, {&placed, 1}));
+        plan_.geometries.back().world_space = !instanced;
+        plan_.geometries.back().max_stretch = instanced ? 0.0 : 1.0;
         if (share) group.geometry = geometry;
+        if (instanced) geometry_with_[content_key({&placed, 1})] = geometry;
       }
-      add_instance(geometry, local ? Affine(shape.parent_from_mesh) : Affine(1.0f));
+      add_instance(geometry, add_user(geometry, {&placed, 1}),
+                   instanced ? Affine(shape.parent_from_mesh) : Affine(1.0f));
     }
   }
 
-  void add_instance(uint32_t geometry, const Affine& world_from_object) {
-    for (int column = 0; column < 4; ++column)
-      require(is_finite(world_from_object[column]),
-              "the transform of an instance of " + plan_.geometries[geometry].name + " exceeds the float range");
-    plan_.instances.push_back(instance_of(geometry, world_from_object));
-    GeometryPlan& plan = plan_.geometries[geometry];
-    plan.max_stretch = std::max(plan.max_stretch, stretch(plan_.instances.back().world_from_object));
+  static GeometryPlan plan_of(const std::string& name, std::span<const Shape> shapes) {
+    GeometryPlan plan;
+    plan.name = name;
+    plan.max_stretch = 0.0;
+    for (const Shape& shape : shapes)
+      plan.parts.push_back({shape.mesh, 0, shape.reverse_orientation != swaps_handedness(shape.parent_from_mesh),
+                            shape.parent_from_mesh});
+    return plan;
   }
 
-  /// Bytes that are equal for objects with equal content.
-  std::string object_key(const Object& object) const {
+  /// Bytes that are equal for objects that can share a geometry.
+  std::string content_key(std::span<const Shape> shapes) const {
     std::string key;
     const auto append = [&key](const auto& value) { key.append(reinterpret_cast<const char*>(&value), sizeof value); };
-    for (const Shape& shape : object.shapes) {
+    for (const Shape& shape : shapes) {
       append(equal_mesh_[shape.mesh]);
-      append(shape.material);
+      append(class_of(shape));
       append(static_cast<uint8_t>(shape.reverse_orientation));
       append(shape.parent_from_mesh);
     }
     return key;
   }
 
+  void find_used_objects() {
+    used_.resize(scene_.objects.size());
+    for (const Instance& instance : scene_.instances) used_[instance.object] = 1;
+  }
+
   void plan_objects() {
-    std::vector<uint8_t> used(scene_.objects.size());
-    for (const Instance& instance : scene_.instances) used[instance.object] = 1;
-    std::map<std::string, uint32_t> geometry_with;
-    std::vector<uint32_t> geometry_of(scene_.objects.size());
+    struct Use {
+      uint32_t geometry = 0, user = 0;
+    };
+    std::vector<Use> use_of(scene_.objects.size());
     for (size_t i = 0; i < scene_.objects.size(); ++i) {
-      const Object& object = scene_.objects[i];
-      if (used[i] == 0) {
+      Object object = scene_.objects[i];
+      if (used_[i] == 0) {
         ++plan_.unused_objects;
         for (const Shape& shape : object.shapes) plan_.unused_triangles += scene_.meshes[shape.mesh].triangles.size();
         continue;
       }
+      std::erase_if(object.shapes, [&](const Shape& shape) {
+        const std::optional<Bounds> box = beyond_range(shape);
+        if (box)
+          plan_.left_out.push_back(beyond_float_range(scene_.meshes[shape.mesh].name + " of " + object.name, *box));
+        return box.has_value();
+      });
       const auto next = static_cast<uint32_t>(plan_.geometries.size());
-      const auto [found, inserted] = geometry_with.try_emplace(object_key(object), next);
-      geometry_of[i] = found->second;
-      if (!inserted) {
+      const auto [found, inserted] = geometry_with_.try_emplace(content_key(object.shapes), next);
+      if (inserted)
+        add_geometry(plan_of(object.name, object.shapes));
+      else
         ++plan_.shared_objects;
-        continue;
-      }
-      GeometryPlan plan{object.name, {}, false, 0.0};
-      for (const Shape& shape : object.shapes)
-        plan.parts.push_back({shape.mesh, shape.material,
-                              shape.reverse_orientation != swaps_handedness(shape.parent_from_mesh),
-                              shape.parent_from_mesh});
-      add_geometry(std::move(plan));
+      use_of[i] = {found->second, add_user(found->second, object.shapes)};
     }
     for (const Instance& instance : scene_.instances)
-      add_instance(geometry_of[instance.object], instance.world_from_object);
+      add_instance(use_of[instance.object].geometry, use_of[instance.object].user, instance.world_from_object);
+  }
+
+  /// Parts share a slot where every user has one material for them. Slots are ordered by class, then by materials.
+  void assign_slots(uint32_t geometry) {
+    Draft& draft = drafts_[geometry];
+    GeometryPlan& plan = plan_.geometries[geometry];
+    const size_t parts = plan.parts.size();
+    using Column = std::pair<uint32_t, std::vector<uint32_t>>; // class, and a material for each user
+    std::map<Column, std::vector<size_t>> parts_of;
+    for (size_t p = 0; p < parts; ++p) {
+      if (scene_.meshes[plan.parts[p].mesh].triangles.empty()) continue; // or it would have a slot without clusters
+      Column column;
+      for (uint32_t u = 0; u < draft.users; ++u) column.second.push_back(draft.part_materials[u * parts + p]);
+      column.first = baked::material_class(scene_.materials[column.second.front()].flags);
+      parts_of[std::move(column)].push_back(p);
+    }
+    for (const auto& [column, members] : parts_of) {
+      for (const size_t p : members) plan.parts[p].slot = static_cast<uint32_t>(plan.slot_class.size());
+      plan.slot_class.push_back(column.first);
+    }
+    draft.first_slot.resize(draft.users);
+    std::vector<uint32_t> run(parts_of.size());
+    for (uint32_t u = 0; u < draft.users; ++u) {
+      std::transform(parts_of.begin(), parts_of.end(), run.begin(),
+                     [u](const auto& slot) { return slot.first.second[u]; });
+      draft.first_slot[u] = place_run(run);
+      plan.material_runs.push_back(draft.first_slot[u]);
+    }
+    std::sort(plan.material_runs.begin(), plan.material_runs.end());
+    plan.material_runs.erase(std::unique(plan.material_runs.begin(), plan.material_runs.end()),
+                             plan.material_runs.end());
+    draft.part_materials = {};
+  }
+
+  uint32_t place_run(const std::vector<uint32_t>& run) {
+    const auto end = static_cast<uint32_t>(plan_.material_slots.size());
+    const auto [found, inserted] = runs_.try_emplace(run, end);
+    if (!inserted) return found->second;
+    if (run.size() >= baked::kNone - end)
+      throw Error(ErrorKind::kLimitExceeded, "the materials of all geometries take more than 2^32 slots");
+    plan_.material_slots.insert(plan_.material_slots.end(), run.begin(), run.end());
+    return end;
   }
 
   const Scene& scene_;
   std::vector<uint32_t> equal_mesh_;
+  std::vector<Bounds> mesh_boxes_;
+  std::vector<uint8_t> used_;                      // by object
+  std::vector<Draft> drafts_;                      // by geometry
+  std::vector<uint32_t> user_of_;                  // by instance
+  std::map<std::string, uint32_t> geometry_with_;  // by content_key(), of geometries that are not in world space
+  std::map<std::vector<uint32_t>, uint32_t> runs_; // of materials, to their first slot
   ScenePlan plan_;
 };
 
 } // namespace
+
+bool within_float_range(const Bounds& box) {
+  constexpr double kMax = std::numeric_limits<float>::max();
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(box.lo[axis] >= -kMax && box.hi[axis] <= kMax)) return false;
+  return true;
+}
+
+std::string beyond_float_range(const std::string& name, const Bounds& box) {
+  const DVec3 largest = glm::max(-box.lo, box.hi);
+  return name + " leaves the float range: its coordinates reach " + brief(std::max({largest.x, largest.y, largest.z}));
+}
 
 ScenePlan plan_scene(const Scene& scene) { return Planner(scene).run(); }
 

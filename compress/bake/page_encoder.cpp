@@ -10,6 +10,7 @@
 #include <xxhash.h>
 #include <zstd.h>
 
+#include "compress/bake/page_fast_encoder.h"
 #include "compress/bake/page_recorder.h"
 #include "compress/bake/rans_writer.h"
 #include "compress/format/page_cluster.h"
@@ -50,31 +51,6 @@ Bytes write_small(PageRecorder& recorder, StreamBits& bits) {
   append(page, recorder.fields());
   append(page, writer.finish());
   return page;
-}
-
-Bytes write_fast(PageRecorder& recorder, ZSTD_CCtx* zstd, StreamBits& bits) {
-  std::array<Bytes, 1 + kSymbolStreams> streams;
-  std::array<uint32_t, 1 + kSymbolStreams> context_of{};
-  streams[0] = recorder.fields();
-  for (const auto& [context, value] : recorder.symbols()) {
-    const size_t stream = size_t{1} + kSymbolStreamOf[context];
-    streams[stream].push_back(value);
-    context_of[stream] = context;
-  }
-  Bytes table, data;
-  for (size_t i = 0; i < streams.size(); ++i) {
-    append_number(table, streams[i].size());
-    if (streams[i].empty()) continue;
-    const Bytes frame = zip(zstd, streams[i]);
-    const bool smaller = frame.size() < streams[i].size();
-    append_number(table, smaller ? frame.size() : 0);
-    append(data, smaller ? frame : streams[i]);
-    if (i > 0)
-      bits[static_cast<size_t>(page_stream_of(context_of[i]))] +=
-          8.0 * static_cast<double>(std::min(frame.size(), streams[i].size()));
-  }
-  append(table, data);
-  return table;
 }
 
 /// Where a page begins and what it holds.
@@ -123,6 +99,10 @@ private:
   }
 
   Bytes encode(const PageRange& range, StreamBits& bits) {
+    return codec_ == PageCodec::kSmall ? encode_small(range, bits) : encode_fast(range, bits);
+  }
+
+  Bytes encode_small(const PageRange& range, StreamBits& bits) {
     PageRecorder recorder;
     PageModel<PageRecorder> model(recorder);
     model.begin();
@@ -132,7 +112,16 @@ private:
       model.code_cluster(geometry, *values_);
     }
     for (size_t i = 0; i < kPageStreams; ++i) bits[i] = static_cast<double>(recorder.field_bits()[i]);
-    return codec_ == PageCodec::kSmall ? write_small(recorder, bits) : write_fast(recorder, zstd_.get(), bits);
+    return write_small(recorder, bits);
+  }
+
+  Bytes encode_fast(const PageRange& range, StreamBits& bits) {
+    FastPageWriter writer;
+    for (uint32_t i = 0; i < range.cluster_count; ++i) {
+      const baked::GeometryRecord& geometry = geometry_of(range.first_cluster + i);
+      writer.add(geometry, clusters(range)[i], sections_.payload.data() + geometry.payload_offset);
+    }
+    return writer.finish(zstd_.get(), bits);
   }
 
   bool comes_back(const EncodedPage& page, const PageRange& range) {

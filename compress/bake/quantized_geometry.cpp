@@ -71,7 +71,9 @@ public:
       : scene_(scene), plan_(plan), needs_(needs), config_(config), step_(grid.step()),
         position_table_(count_vertices()), vertex_table_(2 * count_vertices()) {
     out_.grid = grid;
-    out_.uv_exponent = needs.uv_exponent;
+    out_.slot_class = plan.slot_class;
+    out_.uv_encoding = config.uvs.value_or(UvEncoding::kLattice);
+    if (out_.uv_encoding == UvEncoding::kLattice) out_.uv_exponent = needs.uv_exponent;
   }
 
   QuantizedGeometry run(double max_abs, DVec3 lowest, DVec3 highest) {
@@ -113,7 +115,12 @@ private:
   }
 
   void check_limits(double max_abs) const {
-    if (max_abs / step_ < static_cast<double>(kMaxLattice) - 1.0) return;
+    if (max_abs / step_ < static_cast<double>(kMaxLattice) - 1.0) {
+      if (std::isfinite(from_lattice(to_lattice(max_abs, step_), step_))) return;
+      throw Error(ErrorKind::kLimitExceeded, plan_.name + ": coordinates up to " + brief(max_abs) +
+                                                 " round to more than the largest float at a step of " + brief(step_) +
+                                                 "; choose a finer precision");
+    }
     throw Error(ErrorKind::kLimitExceeded, plan_.name + ": coordinates up to " + brief(max_abs) + " at a step of " +
                                                brief(step_) + " exceed the lattice limit of 2^" +
                                                std::to_string(kMaxLatticeBits) + " steps; choose a coarser precision");
@@ -144,8 +151,9 @@ private:
     if (part.flip)
       for (Triangle& t : work.triangles) std::swap(t.y, t.z);
     work.flat.assign(work.triangles.size(), 1);
-    if (needs.normals) quantize_normals(part, mesh, work);
-    if (needs.uvs) quantize_uvs(mesh, work);
+    if (needs.store_normals())
+      quantize_normals(part, mesh, work, needs.normals != baked::kOnRequest && needs_.infer_normals);
+    if (needs.store_uvs()) quantize_uvs(mesh, work);
     out_.stats.source_vertices += mesh.positions.size();
     return work;
   }
@@ -175,7 +183,7 @@ private:
     return safe_normalize(glm::cross(ab, ac));
   }
 
-  void quantize_normals(const GeometryPart& part, const Mesh& mesh, Work& work) {
+  void quantize_normals(const GeometryPart& part, const Mesh& mesh, Work& work, bool infer) {
     if (mesh.normals.size() != mesh.positions.size())
       throw Error(ErrorKind::kInput, mesh.name + ": normals and positions differ in number");
     const glm::dmat3 matrix = normal_matrix(part.geometry_from_mesh);
@@ -190,7 +198,20 @@ private:
     if (!finite) throw Error(ErrorKind::kInput, mesh.name + ": a normal is not finite");
     if (zeros > 0) repair_normals(work);
     out_.stats.repaired_normals += zeros;
+    if (infer)
+      find_flat_triangles(work);
+    else
+      work.flat.assign(work.triangles.size(), 0);
+    work.smooth.assign(work.normals.size(), 0);
+    for (size_t i = 0; i < work.triangles.size(); ++i)
+      for (int corner = 0; corner < 3 && work.flat[i] == 0; ++corner) work.smooth[work.triangles[i][corner]] = 1;
+    if (infer)
+      out_.stats.inferred_normals +=
+          static_cast<uint64_t>(std::count(work.smooth.begin(), work.smooth.end(), uint8_t{0}));
+  }
 
+  /// Triangles whose normals are the face's.
+  void find_flat_triangles(Work& work) {
     // A little less, so that rounding never lifts a measured angle above it.
     const double flat_chord = 2.0 * std::sin(config_.flat_degrees() / kDegreesPerRadian * 0.5) * (1.0 - 1e-9);
     const auto near = [&](const Triangle& t, DVec3 n) {
@@ -211,9 +232,6 @@ private:
     });
     out_.stats.flat_triangles += flat_errors.count / 3;
     add_normal_errors(flat_errors);
-    work.smooth.assign(work.normals.size(), 0);
-    for (size_t i = 0; i < work.triangles.size(); ++i)
-      for (int corner = 0; corner < 3 && work.flat[i] == 0; ++corner) work.smooth[work.triangles[i][corner]] = 1;
   }
 
   void add_normal_errors(const ErrorStats& errors) {
@@ -271,15 +289,22 @@ private:
     for (size_t i = 0; i < work.uvs.size(); ++i) {
       const bool finite = std::isfinite(mesh.uvs[i].x) && std::isfinite(mesh.uvs[i].y);
       out_.stats.replaced_uvs += !finite;
-      for (int axis = 0; axis < 2 && finite; ++axis) {
-        const int32_t exponent = out_.uv_exponent[static_cast<size_t>(axis)];
-        const int32_t q = to_uv_lattice(mesh.uvs[i][axis], exponent);
-        work.uvs[i][static_cast<size_t>(axis)] = q;
-        const double decoded = from_uv_lattice(q, std::ldexp(1.0f, exponent));
-        out_.stats.max_uv_error =
-            std::max(out_.stats.max_uv_error, std::abs(decoded - static_cast<double>(mesh.uvs[i][axis])));
-      }
+      for (size_t axis = 0; axis < 2 && finite; ++axis)
+        work.uvs[i][axis] = quantize_uv(mesh, axis, mesh.uvs[i][static_cast<int>(axis)]);
     }
+  }
+
+  int32_t quantize_uv(const Mesh& mesh, size_t axis, float uv) {
+    const std::optional<int32_t> code = encode_uv(out_.uv_encoding, uv, out_.uv_exponent[axis]);
+    if (!code)
+      throw Error(ErrorKind::kLimitExceeded, mesh.name + ": texture coordinate " + brief(uv) + " is beyond what " +
+                                                 std::string(kUvEncodingNames[static_cast<size_t>(out_.uv_encoding)]) +
+                                                 " holds");
+    const double decoded = UvDecoder(out_.uv_encoding, out_.uv_exponent[axis])(*code);
+    const double error = std::abs(decoded - static_cast<double>(uv));
+    out_.stats.max_uv_error = std::max(out_.stats.max_uv_error, error);
+    out_.stats.max_uv_error_texels = std::max(out_.stats.max_uv_error_texels, error * needs_.texels_per_uv[axis]);
+    return *code;
   }
 
   uint32_t weld_position(const LatticePoint& p) {
@@ -315,7 +340,7 @@ private:
     std::array<uint32_t, 2> kinds{kUnset, kUnset};
     for (size_t i = 0; i < work.triangles.size(); ++i) {
       const uint8_t flat = work.flat[i];
-      if (kinds[flat] == kUnset) kinds[flat] = kind_number({part.material, flat != 0, needs.uvs});
+      if (kinds[flat] == kUnset) kinds[flat] = kind_number({part.slot, flat != 0, needs.store_uvs()});
       Triangle t{};
       for (int corner = 0; corner < 3; ++corner) {
         const uint32_t source = work.triangles[i][corner];

@@ -20,9 +20,9 @@ struct QuantizedVertex {
   bool operator==(const QuantizedVertex&) const = default;
 };
 
-/// Triangles that share a material and the streams they need.
+/// Triangles that share a material slot and the streams they need.
 struct TriangleKind {
-  uint32_t material = 0;
+  uint32_t slot = 0;
   bool flat = false; ///< all normals are the face normal: none are stored
   bool uvs = false;
   bool operator==(const TriangleKind&) const = default;
@@ -34,33 +34,38 @@ struct QuantizeStats {
   uint64_t distinct_vertices = 0;
   uint64_t collapsed_triangles = 0; ///< two corners fell on one lattice point
   uint64_t flat_triangles = 0;      ///< whose meshes have normals that need not be stored
+  uint64_t inferred_normals = 0;    ///< of the source that only such triangles have
   uint64_t repaired_normals = 0;    ///< were zero, or became so under a flattening transform
   uint64_t replaced_uvs = 0;        ///< were not finite
   double max_position_error = 0.0;  ///< largest axis
   double max_normal_error_degrees = 0.0;
-  double normal_error_sum = 0.0; ///< degrees
-  uint64_t normal_count = 0;     ///< in normal_error_sum
-  double max_uv_error = 0.0;
+  double normal_error_sum = 0.0;    ///< degrees
+  uint64_t normal_count = 0;        ///< in normal_error_sum
+  double max_uv_error = 0.0;        ///< larger axis
+  double max_uv_error_texels = 0.0; ///< of the finest texture that is looked up
 };
 
 /// One geometry on its lattice: welded, wound for the file, in the order of its parts.
 struct QuantizedGeometry {
   PositionGrid grid;
   NormalEncoding normal_encoding = NormalEncoding::kAxis16;
+  UvEncoding uv_encoding = UvEncoding::kLattice;
   std::array<int32_t, 2> uv_exponent{};
   LatticePoint origin{};     ///< smallest coordinates
   uint32_t anchor_shift = 0; ///< so that extents >> anchor_shift fit int32_t
   std::vector<LatticePoint> positions;
   std::vector<QuantizedVertex> vertices;
-  std::vector<Triangle> triangles; ///< into vertices
-  std::vector<TriangleKind> kinds; ///< distinct
-  std::vector<uint32_t> kind_of;   ///< per triangle, into kinds
+  std::vector<Triangle> triangles;  ///< into vertices
+  std::vector<TriangleKind> kinds;  ///< distinct
+  std::vector<uint32_t> kind_of;    ///< per triangle, into kinds
+  std::vector<uint32_t> slot_class; ///< material class by slot, ascending
 
   QuantizeStats stats;
 };
 
 /// Throws Error(kLimitExceeded) where the lattice is too large for its limit, or a measured error exceeds
-/// position_error_bound() or config.max_normal_error_degrees(); Error(kInput) for normals that are not finite.
+/// position_error_bound() or config.max_normal_error_degrees(), or a texture coordinate is beyond config.uvs;
+/// Error(kInput) for normals that are not finite.
 QuantizedGeometry quantize_geometry(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs,
                                     const BakeConfig& config, const PositionGrid& grid, double max_abs, DVec3 lowest,
                                     DVec3 highest);

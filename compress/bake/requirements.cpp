@@ -18,42 +18,109 @@ Vec2 max_abs_uv(const Mesh& mesh) {
   return largest;
 }
 
+/// Something that looks uvs up: texels along the two axes for a step of 1 in u and v.
+struct LookUp {
+  std::array<uint32_t, 2> size{};
+  Vec2 uv_scale{1.0f};
+};
+
+/// Of textures that are not read.
+constexpr LookUp kAssumedLookUp{{kAssumedTexels, kAssumedTexels}, Vec2(1.0f)};
+
+/// What the materials of one slot ask for together.
+struct SlotNeeds {
+  MaterialFlags flags = 0;
+  bool textured = false; ///< shading looks up a texture of its colour
+  std::vector<LookUp> look_ups;
+};
+
+class Analysis {
+public:
+  Analysis(const Scene& scene, const ScenePlan& scene_plan, const GeometryPlan& plan, const BakeConfig& config)
+      : scene_(scene), plan_(plan), config_(config), slots_(plan.slot_class.size()) {
+    for (const uint32_t run : plan.material_runs)
+      for (size_t slot = 0; slot < slots_.size(); ++slot)
+        add_material(slots_[slot], scene.materials[scene_plan.material_slots[run + slot]]);
+  }
+
+  GeometryNeeds run() {
+    GeometryNeeds needs;
+    Vec2 largest(0.0f);
+    std::vector<LookUp> look_ups;
+    for (const GeometryPart& part : plan_.parts) {
+      const Mesh& mesh = scene_.meshes[part.mesh];
+      const SlotNeeds& slot = slots_[part.slot];
+      needs.parts.push_back(mesh.triangles.empty() ? PartNeeds{} : needs_of(mesh, slot));
+      const PartNeeds& part_needs = needs.parts.back();
+      if (!part_needs.store_uvs()) continue;
+      largest = glm::max(largest, max_abs_uv(mesh));
+      look_ups.insert(look_ups.end(), slot.look_ups.begin(), slot.look_ups.end());
+      if (part_needs.uvs == baked::kOnRequest) look_ups.push_back(kAssumedLookUp);
+    }
+    for (size_t i = 0; i < look_ups.size(); ++i)
+      for (int axis = 0; axis < 2; ++axis) {
+        const auto a = static_cast<size_t>(axis);
+        const float scale = look_ups[i].uv_scale[axis];
+        const int32_t exponent = choose_uv_exponent(look_ups[i].size[a], scale, largest[axis]);
+        needs.uv_exponent[a] = i == 0 ? exponent : std::min(needs.uv_exponent[a], exponent);
+        needs.texels_per_uv[a] = std::max(needs.texels_per_uv[a], std::abs(double{scale}) * look_ups[i].size[a]);
+      }
+    return needs;
+  }
+
+private:
+  bool shading() const { return config_.purpose == baked::kShading; }
+
+  void add_material(SlotNeeds& slot, const Material& material) const {
+    slot.flags |= material.flags;
+    const auto add = [&](const auto& all, uint32_t number, const char* what) {
+      if (number >= all.size())
+        throw Error(ErrorKind::kInput,
+                    std::string("invalid scene: ") + what + " of material " + material.name + " does not exist");
+      slot.look_ups.push_back({{all[number].width, all[number].height}, all[number].uv_scale});
+    };
+    if ((material.flags & kAlphaMask) != 0) add(scene_.masks, material.alpha_mask, "an alpha mask");
+    if ((material.flags & kShadowAlphaMask) != 0) add(scene_.masks, material.shadow_alpha_mask, "an alpha mask");
+    if (!shading()) return;
+    if (config_.textures && material.albedo_texture != kNoTexture) {
+      add(scene_.textures, material.albedo_texture, "the texture");
+      slot.textured = true;
+    } else if (!config_.textures && (material.flags & kAlbedoTexture) != 0) {
+      slot.look_ups.push_back(kAssumedLookUp);
+      slot.textured = true;
+    }
+    if ((material.flags & kNormalMap) != 0) slot.look_ups.push_back(kAssumedLookUp);
+  }
+
+  PartNeeds needs_of(const Mesh& mesh, const SlotNeeds& slot) const {
+    PartNeeds needs;
+    if (!mesh.normals.empty())
+      needs.normals = config_.keep_normals         ? baked::kOnRequest
+                      : camera_visible(slot.flags) ? baked::kForShading
+                                                   : baked::kUnused;
+    if (needs_mask(slot.flags)) // also without uvs in the source: (0, 0) is looked up then
+      needs.uvs = baked::kForMask;
+    else if (!mesh.uvs.empty())
+      needs.uvs = config_.keep_uvs                              ? baked::kOnRequest
+                  : slot.textured                               ? baked::kForTexture
+                  : shading() && (slot.flags & kNormalMap) != 0 ? baked::kForNormalMap
+                                                                : baked::kUnused;
+    if ((slot.flags & kNormalMap) != 0 && !mesh.uvs.empty())
+      needs.tangents = shading() ? baked::kForNormalMap : baked::kUnused;
+    return needs;
+  }
+
+  const Scene& scene_;
+  const GeometryPlan& plan_;
+  const BakeConfig& config_;
+  std::vector<SlotNeeds> slots_;
+};
+
 } // namespace
 
-GeometryNeeds analyse_requirements(const Scene& scene, const GeometryPlan& plan) {
-  GeometryNeeds needs;
-  Vec2 largest(0.0f);
-  std::vector<const AlphaMask*> masks;
-  for (const GeometryPart& part : plan.parts) {
-    const Mesh& mesh = scene.meshes[part.mesh];
-    const Material& material = scene.materials[part.material];
-    needs.parts.push_back({!mesh.normals.empty(), needs_mask(material.flags)});
-    if (!needs_mask(material.flags)) continue;
-    largest = glm::max(largest, max_abs_uv(mesh));
-    const auto add = [&](MaterialFlags flag, uint32_t mask) {
-      if ((material.flags & flag) == 0) return;
-      if (mask >= scene.masks.size())
-        throw Error(ErrorKind::kInput, "invalid scene: an alpha mask of material " + material.name + " does not exist");
-      masks.push_back(&scene.masks[mask]);
-    };
-    add(kAlphaMask, material.alpha_mask);
-    add(kShadowAlphaMask, material.shadow_alpha_mask);
-  }
-  for (size_t i = 0; i < masks.size(); ++i) {
-    const AlphaMask& mask = *masks[i];
-    const std::array<int32_t, 2> exponent = {choose_uv_exponent(mask.width, mask.uv_scale.x, largest.x),
-                                             choose_uv_exponent(mask.height, mask.uv_scale.y, largest.y)};
-    for (size_t axis = 0; axis < 2; ++axis)
-      needs.uv_exponent[axis] = i == 0 ? exponent[axis] : std::min(needs.uv_exponent[axis], exponent[axis]);
-  }
-  return needs;
-}
-
-uint64_t unneeded_uv_bytes(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs) {
-  uint64_t bytes = 0;
-  for (size_t i = 0; i < plan.parts.size(); ++i)
-    if (!needs.parts[i].uvs) bytes += scene.meshes[plan.parts[i].mesh].uvs.size() * sizeof(Vec2);
-  return bytes;
+GeometryNeeds analyse_requirements(const Scene& scene, const ScenePlan& scene_plan, const GeometryPlan& plan,
+                                   const BakeConfig& config) {
+  return Analysis(scene, scene_plan, plan, config).run();
 }
 
 } // namespace packtrace

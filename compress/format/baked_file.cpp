@@ -77,6 +77,22 @@ Affine BakedFile::world_from_object(uint32_t instance) const {
   return Affine(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]);
 }
 
+std::span<const uint32_t> BakedFile::instance_materials(uint32_t instance) const {
+  const baked::InstanceRecord& record = sections_.instances[instance];
+  return sections_.material_slots.subspan(record.first_slot, sections_.geometries[record.geometry].slot_count);
+}
+
+std::vector<std::vector<uint32_t>> material_runs(const BakedSections& sections) {
+  std::vector<std::vector<uint32_t>> runs(sections.geometries.size());
+  for (const baked::InstanceRecord& instance : sections.instances)
+    runs[instance.geometry].push_back(instance.first_slot);
+  for (std::vector<uint32_t>& of_geometry : runs) {
+    std::sort(of_geometry.begin(), of_geometry.end());
+    of_geometry.erase(std::unique(of_geometry.begin(), of_geometry.end()), of_geometry.end());
+  }
+  return runs;
+}
+
 AlphaMaskView BakedFile::mask(uint32_t index) const {
   const baked::MaskRecord& record = sections_.masks[index];
   const size_t words = size_t{AlphaMask::row_words(record.width)} * record.height;
@@ -88,13 +104,27 @@ AlphaMaskView BakedFile::mask(uint32_t index) const {
           sections_.mask_words.subspan(static_cast<size_t>(record.first_word), words)};
 }
 
+TextureView BakedFile::texture(uint32_t index) const {
+  const baked::TextureRecord& record = sections_.textures[index];
+  const auto codec = static_cast<TextureCodec>(record.codec);
+  return {record.width,
+          record.height,
+          static_cast<WrapMode>(record.wrap),
+          Vec2(record.uv_scale[0], record.uv_scale[1]),
+          Vec2(record.uv_offset[0], record.uv_offset[1]),
+          codec,
+          sections_.texture_bytes.subspan(
+              static_cast<size_t>(record.first_byte),
+              static_cast<size_t>(packtrace::texture_bytes(codec, record.width, record.height)))};
+}
+
 std::vector<Material> BakedFile::materials() const {
   std::vector<Material> result;
   result.reserve(sections_.materials.size());
   for (const baked::MaterialRecord& record : sections_.materials)
     result.push_back({std::string(text(record.name)), record.flags,
                       Vec3(record.albedo[0], record.albedo[1], record.albedo[2]), record.alpha_mask,
-                      record.shadow_alpha_mask});
+                      record.shadow_alpha_mask, record.albedo_texture});
   return result;
 }
 

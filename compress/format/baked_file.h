@@ -10,6 +10,7 @@
 #include "compress/format/baked_format.h"
 #include "compress/format/cluster_codec.h"
 #include "compress/format/page_codec.h"
+#include "compress/format/texture_codec.h"
 #include "pbrt_import/scene/alpha_mask.h"
 #include "pbrt_import/scene/scene.h"
 
@@ -26,9 +27,13 @@ struct BakedSections {
   std::span<const baked::InstanceRecord> instances;
   std::span<const baked::MaskRecord> masks;
   std::span<const uint32_t> mask_words;
+  std::span<const baked::TextureRecord> textures;
+  std::span<const uint8_t> texture_bytes;
   std::span<const baked::CameraRecord> cameras;
   std::span<const char> strings;
   std::span<const baked::SummaryRecord> summary; ///< exactly one
+  std::span<const uint32_t> material_slots;
+  std::span<const baked::RequirementRecord> requirements;
 
   std::string_view text(baked::StringRef ref) const { return {strings.data() + ref.offset, ref.bytes}; }
 };
@@ -69,7 +74,10 @@ public:
   uint32_t cluster_of_triangle(uint32_t geometry, uint32_t triangle) const;
 
   Affine world_from_object(uint32_t instance) const;
+  /// Materials of the instance's geometry, by slot.
+  std::span<const uint32_t> instance_materials(uint32_t instance) const;
   AlphaMaskView mask(uint32_t index) const;
+  TextureView texture(uint32_t index) const;
   std::vector<Material> materials() const;
   std::vector<Camera> cameras() const;
   Bounds world_bounds() const;
@@ -85,6 +93,9 @@ private:
   DiskForm disk_;
   BakedSections sections_;
 };
+
+/// By geometry: where the runs of material slots of its instances begin, ascending, each once.
+std::vector<std::vector<uint32_t>> material_runs(const BakedSections& sections);
 
 /// Validates a whole file image and returns its sections; what BakedFile does when it opens.
 /// @param bytes 8-byte aligned

@@ -7,12 +7,12 @@
 
 #include "pbrt_import/scene/material_flags.h"
 
-/// What lies in a .ptk file, version 2; docs/baked_format.md says it in words. Little-endian; every section starts at a
+/// What lies in a .ptk file, version 3; docs/baked_format.md says it in words. Little-endian; every section starts at a
 /// multiple of 64 bytes; bytes that no field or section owns are zero.
 namespace packtrace::baked {
 
 inline constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'K', 0x89, '\r', '\n', 0x1a, 0};
-inline constexpr uint32_t kVersion = 2;
+inline constexpr uint32_t kVersion = 3;
 inline constexpr size_t kSectionAlignment = 64;
 inline constexpr uint32_t kNone = ~0u;
 
@@ -25,9 +25,13 @@ enum Section : uint32_t {
   kInstances,
   kMasks,
   kMaskWords, ///< uint32_t, rows of all masks
+  kTextures,
+  kTextureBytes, ///< of all textures
   kCameras,
-  kStrings, ///< UTF-8 bytes, not terminated
-  kSummary, ///< one record
+  kStrings,       ///< UTF-8 bytes, not terminated
+  kSummary,       ///< one record
+  kMaterialSlots, ///< uint32_t: materials, in runs that instances begin at
+  kRequirements,
   kSectionCount
 };
 
@@ -47,7 +51,7 @@ struct FileHeader {
   uint32_t section_count;
   uint32_t reserved;
   std::array<SectionRecord, kSectionCount> sections;
-  std::array<uint64_t, 11> padding;
+  std::array<uint64_t, 7> padding;
   uint64_t header_hash; ///< XXH3-64 of the header before this field
 };
 
@@ -73,9 +77,9 @@ struct GeometryRecord {
   uint32_t vertex_count; ///< sum over clusters
   uint32_t step_mantissa;
   int32_t step_exponent;
-  uint32_t anchor_shift; ///< cluster anchors count 2^anchor_shift steps
-  std::array<int32_t, 2> uv_exponent;
-  std::array<float, 3> bounds_lo; ///< of the decoded vertices; lo > hi where there are none
+  uint32_t anchor_shift;              ///< cluster anchors count 2^anchor_shift steps
+  std::array<int32_t, 2> uv_exponent; ///< 0 unless the encoding is the lattice
+  std::array<float, 3> bounds_lo;     ///< of the decoded vertices; lo > hi where there are none
   std::array<float, 3> bounds_hi;
   float max_normal_error_degrees;  ///< measured against the source
   float mean_normal_error_degrees; ///< of all its normals
@@ -84,7 +88,9 @@ struct GeometryRecord {
   std::array<uint32_t, 8> class_clusters; ///< clusters of each material class; sums to cluster_count
   StringRef name;
   uint32_t normal_encoding; ///< normal_codec.h, of all its clusters
-  uint32_t reserved;
+  uint32_t uv_encoding;     ///< uv_codec.h, of all its clusters
+  uint32_t slot_count;      ///< of material slots, ordered by material_class(); 0 without clusters
+  uint32_t requirements;    ///< requirement_bit()s: reasons that hold for some of its triangles
 };
 
 // ClusterRecord::flags
@@ -95,13 +101,13 @@ inline constexpr uint32_t kClusterChartShift = 3;       ///< else all are unfold
 inline constexpr uint8_t kClusterChart = 7u << kClusterChartShift;
 inline constexpr uint8_t kClusterFlags = kClusterHasNormals | kClusterHasUvs | kClusterMixedCharts | kClusterChart;
 
-/// Up to 128 triangles of one material. Payload, bit by bit without gaps: strips (index_codec.h); per vertex the
+/// Up to 128 triangles of one material slot. Payload, bit by bit without gaps: strips (index_codec.h); per vertex the
 /// lattice coordinates x, y, z less the anchor; normals; texture coordinates.
 struct ClusterRecord {
-  uint32_t payload_offset; ///< in 4-byte words from the geometry's payload
-  uint32_t first_triangle; ///< within the geometry
-  uint32_t first_vertex;   ///< within the geometry
-  uint32_t material;
+  uint32_t payload_offset;              ///< in 4-byte words from the geometry's payload
+  uint32_t first_triangle;              ///< within the geometry
+  uint32_t first_vertex;                ///< within the geometry
+  uint32_t material_slot;               ///< each instance has a material for it: that at its first_slot + this
   std::array<int32_t, 3> anchor;        ///< lattice, less the geometry's origin, in 2^anchor_shift steps
   std::array<int16_t, 2> normal_anchor; ///< of x and y, in units of two codes
   uint16_t vertex_count;                ///< 1..256
@@ -118,12 +124,14 @@ struct MaterialRecord {
   std::array<float, 3> albedo;
   uint32_t alpha_mask;        ///< or kNone
   uint32_t shadow_alpha_mask; ///< or kNone
+  uint32_t albedo_texture;    ///< or kNone
   StringRef name;
 };
 
 struct InstanceRecord {
   std::array<float, 12> world_from_object; ///< four columns of three
   uint32_t geometry;
+  uint32_t first_slot; ///< into the material slots, of the geometry's slot_count
 };
 
 struct MaskRecord {
@@ -136,6 +144,19 @@ struct MaskRecord {
   std::array<float, 2> uv_offset;
 };
 
+struct TextureRecord {
+  uint64_t first_byte; ///< into the texture bytes
+  uint32_t width;
+  uint32_t height;
+  uint32_t wrap;  ///< 0 repeat, 1 black, 2 clamp
+  uint32_t codec; ///< texture_codec.h
+  std::array<float, 2> uv_scale;
+  std::array<float, 2> uv_offset;
+  float psnr_db; ///< measured; infinite where nothing was lost
+  uint32_t reserved;
+  StringRef name;
+};
+
 struct CameraRecord {
   std::array<double, 12> world_from_camera; ///< four columns of three
   double fov_degrees;
@@ -145,6 +166,42 @@ struct CameraRecord {
   uint32_t width_px;
   uint32_t height_px;
   StringRef film_name;
+};
+
+/// What the file is to be good for.
+enum Purpose : uint32_t { kAo, kShading, kPurposeCount };
+
+/// Streams that geometry has only where something needs them.
+enum Stream : uint32_t { kNormals, kUvs, kTangents, kStreamCount };
+
+/// Why a stream is in the file, or not: up to kInferred it is not stored, from kForMask on it is, except tangents.
+enum Reason : uint32_t {
+  kAbsent,       ///< the source has none, or nothing that would need it
+  kUnused,       ///< nothing looks at it for this purpose
+  kInferred,     ///< normals: the face's
+  kForMask,      ///< an alpha mask looks it up
+  kForTexture,   ///< a texture looks it up
+  kForNormalMap, ///< a normal or bump map needs it
+  kForShading,   ///< normals: not the face's, or among such, where separating them takes more
+  kOnRequest,    ///< the user asked for it
+  kReasonCount
+};
+
+/// Of GeometryRecord::requirements.
+constexpr uint32_t requirement_bit(uint32_t stream, uint32_t reason) { return 1u << (kReasonCount * stream + reason); }
+inline constexpr uint32_t kAllRequirements = (1u << (uint32_t{kReasonCount} * kStreamCount)) - 1;
+
+inline constexpr uint32_t kKeepShift = 8; ///< of SummaryRecord::purpose
+
+/// What was decided about some triangles, of all geometries together. Ordered by stream, then reason.
+struct RequirementRecord {
+  uint32_t stream;
+  uint32_t reason;
+  uint32_t geometries; ///< with such triangles
+  uint32_t reserved;
+  uint64_t triangles;
+  uint64_t source_bytes; ///< that the stream takes in the source
+  uint64_t stored_bits;  ///< of the payload; a geometry's count for the last of the stream's reasons
 };
 
 /// What the bake did: figures for people, nothing that decoding needs.
@@ -161,41 +218,58 @@ struct SummaryRecord {
   uint32_t precision_kind;      ///< 0 edge fraction, 1 diagonal fraction, 2 absolute, 3 bits
   uint32_t world_step_mantissa; ///< 0: no world-space geometry
   int32_t world_step_exponent;
-  uint32_t reserved;
+  uint32_t purpose;                    ///< Purpose; bits kKeepShift + Stream: all of it was to be kept
   std::array<uint64_t, 4> stream_bits; ///< payload: indices, positions, normals, uvs
+  uint64_t left_out;                   ///< shapes and instances that leave the float range; not stored
 };
 
 template <typename T>
 inline constexpr bool kIsPod = std::is_trivially_copyable_v<T>&& std::is_standard_layout_v<T>;
 
-static_assert(kIsPod<FileHeader> && sizeof(SectionRecord) == 24 && sizeof(FileHeader) == 384);
+static_assert(kIsPod<FileHeader> && sizeof(SectionRecord) == 24 && sizeof(FileHeader) == 448);
 static_assert(offsetof(FileHeader, content_hash) == 24 && offsetof(FileHeader, sections) == 48 &&
-              offsetof(FileHeader, padding) == 288 && offsetof(FileHeader, header_hash) == 376);
-static_assert(kIsPod<GeometryRecord> && sizeof(GeometryRecord) == 184 && alignof(GeometryRecord) == 8);
+              offsetof(FileHeader, padding) == 384 && offsetof(FileHeader, header_hash) == 440);
+static_assert(kIsPod<GeometryRecord> && sizeof(GeometryRecord) == 192 && alignof(GeometryRecord) == 8);
 static_assert(offsetof(GeometryRecord, origin) == 24 && offsetof(GeometryRecord, cluster_count) == 64 &&
               offsetof(GeometryRecord, bounds_lo) == 96 && offsetof(GeometryRecord, flags) == 132 &&
               offsetof(GeometryRecord, class_clusters) == 136 && offsetof(GeometryRecord, name) == 168 &&
-              offsetof(GeometryRecord, normal_encoding) == 176);
+              offsetof(GeometryRecord, normal_encoding) == 176 && offsetof(GeometryRecord, slot_count) == 184);
 static_assert(kIsPod<ClusterRecord> && sizeof(ClusterRecord) == 44 && alignof(ClusterRecord) == 4);
 static_assert(offsetof(ClusterRecord, anchor) == 16 && offsetof(ClusterRecord, normal_anchor) == 28 &&
               offsetof(ClusterRecord, vertex_count) == 32 && offsetof(ClusterRecord, triangle_count) == 36 &&
               offsetof(ClusterRecord, flags) == 43);
-static_assert(kIsPod<MaterialRecord> && sizeof(MaterialRecord) == 32 && offsetof(MaterialRecord, alpha_mask) == 16);
-static_assert(kIsPod<InstanceRecord> && sizeof(InstanceRecord) == 52 && offsetof(InstanceRecord, geometry) == 48);
+static_assert(kIsPod<MaterialRecord> && sizeof(MaterialRecord) == 36 && offsetof(MaterialRecord, alpha_mask) == 16 &&
+              offsetof(MaterialRecord, name) == 28);
+static_assert(kIsPod<InstanceRecord> && sizeof(InstanceRecord) == 56 && offsetof(InstanceRecord, first_slot) == 52);
 static_assert(kIsPod<MaskRecord> && sizeof(MaskRecord) == 40 && offsetof(MaskRecord, uv_scale) == 24);
+static_assert(kIsPod<TextureRecord> && sizeof(TextureRecord) == 56 && offsetof(TextureRecord, uv_scale) == 24 &&
+              offsetof(TextureRecord, name) == 48);
 static_assert(kIsPod<CameraRecord> && sizeof(CameraRecord) == 160 && offsetof(CameraRecord, projection) == 136);
-static_assert(kIsPod<SummaryRecord> && sizeof(SummaryRecord) == 152 && offsetof(SummaryRecord, stream_bits) == 120);
+static_assert(kIsPod<RequirementRecord> && sizeof(RequirementRecord) == 40);
+static_assert(kAllRequirements == 0xffffff);
+static_assert(kIsPod<SummaryRecord> && sizeof(SummaryRecord) == 160 && offsetof(SummaryRecord, stream_bits) == 120);
 
 /// sizeof the records of each section.
-inline constexpr std::array<uint32_t, kSectionCount> kRecordBytes = {
-    sizeof(GeometryRecord), sizeof(ClusterRecord),  1,
-    sizeof(MaterialRecord), sizeof(InstanceRecord), sizeof(MaskRecord),
-    sizeof(uint32_t),       sizeof(CameraRecord),   1,
-    sizeof(SummaryRecord)};
+inline constexpr std::array<uint32_t, kSectionCount> kRecordBytes = {sizeof(GeometryRecord),
+                                                                     sizeof(ClusterRecord),
+                                                                     1,
+                                                                     sizeof(MaterialRecord),
+                                                                     sizeof(InstanceRecord),
+                                                                     sizeof(MaskRecord),
+                                                                     sizeof(uint32_t),
+                                                                     sizeof(TextureRecord),
+                                                                     1,
+                                                                     sizeof(CameraRecord),
+                                                                     1,
+                                                                     sizeof(SummaryRecord),
+                                                                     sizeof(uint32_t),
+                                                                     sizeof(RequirementRecord)};
+
+inline constexpr uint32_t kMaskedClass = 4; ///< bit of a material class: a mask must be looked up
 
 /// Order of clusters within a geometry, 0..7: solid and seen by everything first, masked ones last.
 constexpr uint32_t material_class(MaterialFlags flags) {
-  return (camera_visible(flags) ? 0u : 1u) | (occludes(flags) ? 0u : 2u) | (needs_mask(flags) ? 4u : 0u);
+  return (camera_visible(flags) ? 0u : 1u) | (occludes(flags) ? 0u : 2u) | (needs_mask(flags) ? kMaskedClass : 0u);
 }
 
 } // namespace packtrace::baked

@@ -15,10 +15,13 @@ constexpr uint64_t align_up(uint64_t bytes) {
 
 std::vector<std::byte> assemble_baked_file(const BakedSections& sections) {
   const std::array<std::span<const std::byte>, baked::kSectionCount> parts = {
-      std::as_bytes(sections.geometries), std::as_bytes(sections.clusters),  std::as_bytes(sections.payload),
-      std::as_bytes(sections.materials),  std::as_bytes(sections.instances), std::as_bytes(sections.masks),
-      std::as_bytes(sections.mask_words), std::as_bytes(sections.cameras),   std::as_bytes(sections.strings),
-      std::as_bytes(sections.summary)};
+      std::as_bytes(sections.geometries),     std::as_bytes(sections.clusters),
+      std::as_bytes(sections.payload),        std::as_bytes(sections.materials),
+      std::as_bytes(sections.instances),      std::as_bytes(sections.masks),
+      std::as_bytes(sections.mask_words),     std::as_bytes(sections.textures),
+      std::as_bytes(sections.texture_bytes),  std::as_bytes(sections.cameras),
+      std::as_bytes(sections.strings),        std::as_bytes(sections.summary),
+      std::as_bytes(sections.material_slots), std::as_bytes(sections.requirements)};
   baked::FileHeader header{};
   header.magic = baked::kMagic;
   header.version = baked::kVersion;

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -10,7 +11,7 @@
 namespace packtrace {
 namespace {
 
-static_assert(baked::kNone == kNoMask);
+static_assert(baked::kNone == kNoMask && baked::kNone == kNoTexture);
 
 /// Checks one file image. Every failure names the file, the section and the record.
 class Validator {
@@ -22,9 +23,11 @@ public:
     check_section_table();
     if (!zero_between_sections()) fail("nonzero bytes between sections");
     check_materials_and_masks();
-    check_geometries();
+    check_textures();
     check_instances();
+    check_geometries();
     check_cameras();
+    check_requirements();
     check_summary();
     return sections_;
   }
@@ -85,13 +88,18 @@ private:
                  section<baked::InstanceRecord>(baked::kInstances),
                  section<baked::MaskRecord>(baked::kMasks),
                  section<uint32_t>(baked::kMaskWords),
+                 section<baked::TextureRecord>(baked::kTextures),
+                 section<uint8_t>(baked::kTextureBytes),
                  section<baked::CameraRecord>(baked::kCameras),
                  section<char>(baked::kStrings),
-                 section<baked::SummaryRecord>(baked::kSummary)};
+                 section<baked::SummaryRecord>(baked::kSummary),
+                 section<uint32_t>(baked::kMaterialSlots),
+                 section<baked::RequirementRecord>(baked::kRequirements)};
     if (sections_.payload.size() < kReadSlackBytes) fail("payload section without its final zero bytes");
     if (sections_.summary.size() != 1) fail("summary section must hold one record");
     if (sections_.geometries.size() >= baked::kNone || sections_.instances.size() >= baked::kNone ||
-        sections_.materials.size() >= baked::kNone || sections_.masks.size() >= baked::kNone)
+        sections_.materials.size() >= baked::kNone || sections_.masks.size() >= baked::kNone ||
+        sections_.textures.size() >= baked::kNone || sections_.material_slots.size() >= baked::kNone)
       fail("too many records");
   }
 
@@ -125,6 +133,9 @@ private:
       if (!mask_ok((m.flags & kAlphaMask) != 0, m.alpha_mask) ||
           !mask_ok((m.flags & kShadowAlphaMask) != 0, m.shadow_alpha_mask))
         fail("material", i, "alpha mask");
+      const bool texture_ok = m.albedo_texture == baked::kNone ||
+                              ((m.flags & kAlbedoTexture) != 0 && m.albedo_texture < sections_.textures.size());
+      if (!texture_ok) fail("material", i, "albedo texture");
       if (!text_ok(m.name)) fail("material", i, "name");
     }
     for (size_t i = 0; i < sections_.masks.size(); ++i) {
@@ -135,6 +146,14 @@ private:
         fail("mask", i, "extent");
       for (const float f : {m.uv_scale[0], m.uv_scale[1], m.uv_offset[0], m.uv_offset[1]})
         if (!std::isfinite(f)) fail("mask", i, "texture transform");
+    }
+  }
+
+  void check_textures() {
+    for (size_t i = 0; i < sections_.textures.size(); ++i) {
+      const baked::TextureRecord& t = sections_.textures[i];
+      if (const auto fault = find_texture_fault(t, sections_.texture_bytes.size())) fail("texture", i, *fault);
+      if (!text_ok(t.name)) fail("texture", i, "name");
     }
   }
 
@@ -162,15 +181,51 @@ private:
         if (!(e >= 0.0f && std::isfinite(e))) fail("geometry", i, "normal or texture coordinate error");
       if (g.mean_normal_error_degrees > g.max_normal_error_degrees || g.max_normal_error_degrees > 180.0f)
         fail("geometry", i, "normal error");
-      if (g.normal_encoding >= kNormalFormats.size() || g.reserved != 0) fail("geometry", i, "normal encoding");
+      if (g.normal_encoding >= kNormalFormats.size()) fail("geometry", i, "normal encoding");
+      if (g.uv_encoding >= kUvEncodingNames.size() ||
+          (g.uv_encoding != static_cast<uint32_t>(UvEncoding::kLattice) && g.uv_exponent != std::array<int32_t, 2>{}))
+        fail("geometry", i, "texture coordinate encoding");
       if ((g.flags & ~baked::kGeometryFlags) != 0) fail("geometry", i, "flags");
+      if ((g.requirements & ~baked::kAllRequirements) != 0) fail("geometry", i, "requirements");
       if (!text_ok(g.name)) fail("geometry", i, "name");
+      check_slots(i, g);
       check_clusters(i, g);
       next_cluster += g.cluster_count;
       next_payload += g.payload_bytes;
     }
     if (next_cluster != sections_.clusters.size()) fail("clusters that belong to no geometry");
     if (next_payload != sections_.payload.size() - kReadSlackBytes) fail("payload that belongs to no geometry");
+  }
+
+  uint32_t class_of_slot(uint32_t slot) const {
+    return baked::material_class(sections_.materials[sections_.material_slots[slot]].flags);
+  }
+
+  /// Where each run of slots of one class ends, so that runs of thousands of slots compare in a few steps.
+  void find_class_ends() {
+    class_ends_.resize(sections_.material_slots.size());
+    for (auto i = static_cast<uint32_t>(class_ends_.size()); i-- > 0;)
+      class_ends_[i] =
+          i + 1 < class_ends_.size() && class_of_slot(i) == class_of_slot(i + 1) ? class_ends_[i + 1] : i + 1;
+  }
+
+  /// Whether two runs of slots have the same classes, in ascending order.
+  bool same_classes(uint32_t first, uint32_t other, uint32_t count) const {
+    for (uint32_t i = 0; i < count;) {
+      const uint32_t end = std::min(class_ends_[first + i] - first, count);
+      if (end != std::min(class_ends_[other + i] - other, count)) return false;
+      if (class_of_slot(first + i) != class_of_slot(other + i)) return false;
+      if (end < count && class_of_slot(first + end) < class_of_slot(first + i)) return false;
+      i = end;
+    }
+    return true;
+  }
+
+  void check_slots(size_t geometry, const baked::GeometryRecord& g) const {
+    if (g.cluster_count == 0 ? g.slot_count != 0 : g.slot_count == 0 || g.slot_count > g.cluster_count)
+      fail("geometry", geometry, "material slots");
+    if (g.cluster_count > 0 && first_slots_[geometry] == baked::kNone)
+      fail("geometry", geometry, "no instance places it");
   }
 
   void check_clusters(size_t geometry, const baked::GeometryRecord& g) {
@@ -180,15 +235,15 @@ private:
     for (uint32_t i = 0; i < g.cluster_count; ++i) {
       const uint64_t number = g.first_cluster + i;
       const baked::ClusterRecord& c = sections_.clusters[static_cast<size_t>(number)];
-      if (c.material >= sections_.materials.size()) fail("cluster", number, "material");
+      if (c.material_slot >= g.slot_count) fail("cluster", number, "material slot");
       for (; material_class < 8 && of_class == g.class_clusters[material_class]; of_class = 0) ++material_class;
-      const MaterialFlags flags = sections_.materials[c.material].flags;
-      if (baked::material_class(flags) != material_class) fail("cluster", number, "material class order");
+      const uint32_t of_cluster = class_of_slot(first_slots_[geometry] + c.material_slot);
+      if (of_cluster != material_class) fail("cluster", number, "material class order");
       ++of_class;
       if (c.first_triangle != triangles || c.first_vertex != vertices)
         fail("cluster", number, "first triangle or vertex");
       if (const auto fault = find_cluster_fault(g, c, payload, g.payload_bytes)) fail("cluster", number, *fault);
-      if (needs_mask(flags) && (c.flags & baked::kClusterHasUvs) == 0)
+      if ((of_cluster & baked::kMaskedClass) != 0 && (c.flags & baked::kClusterHasUvs) == 0)
         fail("cluster", number, "masked material without texture coordinates");
       triangles += c.triangle_count;
       vertices += c.vertex_count;
@@ -204,11 +259,21 @@ private:
   }
 
   void check_instances() {
+    for (size_t i = 0; i < sections_.material_slots.size(); ++i)
+      if (sections_.material_slots[i] >= sections_.materials.size()) fail("material slot", i, "material");
+    find_class_ends();
+    first_slots_.assign(sections_.geometries.size(), baked::kNone);
     for (size_t i = 0; i < sections_.instances.size(); ++i) {
       const baked::InstanceRecord& instance = sections_.instances[i];
       if (instance.geometry >= sections_.geometries.size()) fail("instance", i, "geometry");
       for (const float f : instance.world_from_object)
         if (!std::isfinite(f)) fail("instance", i, "transform");
+      const uint32_t slots = sections_.geometries[instance.geometry].slot_count;
+      if (slots > sections_.material_slots.size() || instance.first_slot > sections_.material_slots.size() - slots)
+        fail("instance", i, "material slots");
+      uint32_t& first = first_slots_[instance.geometry];
+      if (first == baked::kNone) first = instance.first_slot;
+      if (!same_classes(first, instance.first_slot, slots)) fail("instance", i, "material classes");
     }
   }
 
@@ -226,10 +291,27 @@ private:
     }
   }
 
+  void check_requirements() {
+    for (size_t i = 0; i < sections_.requirements.size(); ++i) {
+      const baked::RequirementRecord& r = sections_.requirements[i];
+      if (r.stream >= baked::kStreamCount || r.reason >= baked::kReasonCount || r.reserved != 0)
+        fail("requirement", i, "stream or reason");
+      if (r.geometries == 0 || r.geometries > sections_.geometries.size()) fail("requirement", i, "geometries");
+      if (i == 0) continue;
+      const baked::RequirementRecord& before = sections_.requirements[i - 1];
+      if (r.stream < before.stream || (r.stream == before.stream && r.reason <= before.reason))
+        fail("requirement", i, "order");
+    }
+    const uint32_t purpose = sections_.summary.front().purpose;
+    if ((purpose & ((1u << baked::kKeepShift) - 1)) >= baked::kPurposeCount ||
+        purpose >> baked::kKeepShift >> baked::kStreamCount != 0)
+      fail("purpose");
+  }
+
   void check_summary() {
     const baked::SummaryRecord& s = sections_.summary.front();
-    if (s.reserved != 0 || s.precision_kind > 3 || s.world_step_mantissa > kMaxStepMantissa ||
-        s.world_step_exponent < kMinStepExponent || s.world_step_exponent > kMaxStepExponent)
+    if (s.precision_kind > 3 || s.world_step_mantissa > kMaxStepMantissa || s.world_step_exponent < kMinStepExponent ||
+        s.world_step_exponent > kMaxStepExponent)
       fail("summary");
     for (size_t axis = 0; axis < 3; ++axis)
       if (std::isnan(s.bounds_lo[axis]) || std::isnan(s.bounds_hi[axis])) fail("summary bounds");
@@ -239,6 +321,8 @@ private:
   const std::string& name_;
   baked::FileHeader header_{};
   BakedSections sections_;
+  std::vector<uint32_t> class_ends_;  // by material slot
+  std::vector<uint32_t> first_slots_; // by geometry: of its first instance; the others have the same classes
 };
 
 } // namespace

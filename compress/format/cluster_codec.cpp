@@ -5,13 +5,14 @@
 #include <numeric>
 
 #include "compress/format/bit_stream.h"
+#include "compress/format/normal_kernels.h"
 
 namespace packtrace {
 namespace {
 
 constexpr uint32_t kUvAnchorBits = 32, kUvWidthBits = 5;
 constexpr uint32_t kUvHeaderBits = 2 * (kUvAnchorBits + kUvWidthBits);
-constexpr uint32_t kMaxUvBits = 26;     // -2^24 .. 2^24
+constexpr uint32_t kMaxUvBits = 31;     // -kMaxUvLattice .. kMaxUvLattice
 constexpr uint32_t kMaxNormalBits = 17; // three times the codes of axis32
 
 uint32_t uv_width(const uint8_t* bits, uint32_t uv_bit, uint32_t axis) {
@@ -65,7 +66,8 @@ ClusterView::ClusterView(const baked::GeometryRecord& geometry, const baked::Clu
       bits_(payload + uint64_t{4} * cluster.payload_offset), layout_{cluster.triangle_count, cluster.vertex_count,
                                                                      cluster.restart_count},
       step_(PositionGrid{geometry.step_mantissa, geometry.step_exponent}.step()),
-      uv_step_(exp2_exact(geometry.uv_exponent[0]), exp2_exact(geometry.uv_exponent[1])),
+      u_decoder_(static_cast<UvEncoding>(geometry.uv_encoding), geometry.uv_exponent[0]),
+      v_decoder_(static_cast<UvEncoding>(geometry.uv_encoding), geometry.uv_exponent[1]),
       normal_encoding_(static_cast<NormalEncoding>(geometry.normal_encoding)),
       normal_stride_(normal_stride(geometry, cluster)), position_stride_(position_stride(cluster)) {
   for (size_t axis = 0; axis < 3; ++axis)
@@ -92,13 +94,18 @@ Vec3 ClusterView::position(uint32_t vertex) const {
 
 NormalFields ClusterView::normal_fields(uint32_t vertex) const {
   assert(has_normals());
-  const uint32_t palette = record_->normal_palette, x_bits = record_->normal_bits[0], y_bits = record_->normal_bits[1];
+  const uint32_t palette = record_->normal_palette;
   uint32_t entry = vertex;
   if (palette != 0) {
     const uint32_t width = bits_for_count(palette);
     entry = static_cast<uint32_t>(
         read_bits(bits_, normal_bit_ + palette * normal_stride_ + uint64_t{vertex} * width, width));
   }
+  return normal_entry(entry);
+}
+
+NormalFields ClusterView::normal_entry(uint32_t entry) const {
+  const uint32_t x_bits = record_->normal_bits[0], y_bits = record_->normal_bits[1];
   const uint64_t field = read_bits(bits_, normal_bit_ + uint64_t{entry} * normal_stride_, normal_stride_);
   const auto y = static_cast<int32_t>(field & ((1u << y_bits) - 1));
   const auto x = static_cast<int32_t>((field >> y_bits) & ((1u << x_bits) - 1));
@@ -109,13 +116,17 @@ NormalFields ClusterView::normal_fields(uint32_t vertex) const {
 
 Vec3 ClusterView::normal(uint32_t vertex) const { return decode_normal(normal_encoding_, normal_fields(vertex)); }
 
-Vec2 ClusterView::uv(uint32_t vertex) const {
+std::array<int64_t, 2> ClusterView::uv_code(uint32_t vertex) const {
   assert(has_uvs());
   const uint32_t u_bits = uv_width(bits_, uv_bit_, 0), v_bits = uv_width(bits_, uv_bit_, 1);
   const uint64_t bit = uv_bit_ + kUvHeaderBits + uint64_t{vertex} * (u_bits + v_bits);
-  const int32_t u = uv_anchor(bits_, uv_bit_, 0) + static_cast<int32_t>(read_bits(bits_, bit, u_bits));
-  const int32_t v = uv_anchor(bits_, uv_bit_, 1) + static_cast<int32_t>(read_bits(bits_, bit + u_bits, v_bits));
-  return {from_uv_lattice(u, uv_step_.x), from_uv_lattice(v, uv_step_.y)};
+  return {uv_anchor(bits_, uv_bit_, 0) + static_cast<int64_t>(read_bits(bits_, bit, u_bits)),
+          uv_anchor(bits_, uv_bit_, 1) + static_cast<int64_t>(read_bits(bits_, bit + u_bits, v_bits))};
+}
+
+Vec2 ClusterView::uv(uint32_t vertex) const {
+  const auto [u, v] = uv_code(vertex);
+  return {u_decoder_(u), v_decoder_(v)};
 }
 
 void ClusterView::bounds(Vec3& lo, Vec3& hi) const {
@@ -163,7 +174,50 @@ void decode_indices(const ClusterView& cluster, uint32_t base, std::span<Triangl
 
 void decode_normals(const ClusterView& cluster, std::span<Vec3> out) {
   assert(cluster.has_normals() && out.size() >= cluster.vertex_count());
-  for (uint32_t v = 0; v < cluster.vertex_count(); ++v) out[v] = cluster.normal(v);
+  const uint32_t vertex_count = cluster.vertex_count(), palette = cluster.record_->normal_palette;
+  if (palette == 0) {
+    cluster.decode_normal_entries(vertex_count, out);
+    return;
+  }
+  std::array<Vec3, kMaxClusterVertices> entries;
+  cluster.decode_normal_entries(palette, entries);
+  const uint32_t width = bits_for_count(palette);
+  uint64_t bit = cluster.normal_bit_ + uint64_t{palette} * cluster.normal_stride_;
+  for (uint32_t v = 0; v < vertex_count; ++v, bit += width)
+    out[v] = entries[static_cast<size_t>(read_bits(cluster.bits_, bit, width))];
+}
+
+void ClusterView::decode_normal_entries(uint32_t count, std::span<Vec3> out) const {
+  static_assert(sizeof(Vec3) == 3 * sizeof(float));
+  const NormalFormat& format = format_of(normal_encoding_);
+  const AxisNormalKernel kernel = axis_normal_kernel();
+  if (format.family != NormalFamily::kAxis || kernel == nullptr) {
+    for (uint32_t i = 0; i < count; ++i) out[i] = decode_normal(normal_encoding_, normal_entry(i));
+    return;
+  }
+  const auto last = static_cast<int32_t>(format.x_codes) - 1;
+  const AxisNormalStream stream{bits_,
+                                normal_bit_,
+                                normal_stride_,
+                                count,
+                                record_->normal_bits[0],
+                                record_->normal_bits[1],
+                                2 * record_->normal_anchor[0],
+                                2 * record_->normal_anchor[1],
+                                static_cast<int32_t>(chart_of(*record_)),
+                                last,
+                                1.0f / static_cast<float>(last),
+                                static_cast<float>(kAxisSlope),
+                                static_cast<float>(kAxisCubic)};
+  kernel(stream, &out[0].x);
+}
+
+AxisNormalKernel axis_normal_kernel() {
+#if defined(__x86_64__)
+  static const bool has_avx2 = __builtin_cpu_supports("avx2");
+  if (has_avx2) return avx2::decode_axis_normals;
+#endif
+  return nullptr;
 }
 
 void decode_uvs(const ClusterView& cluster, std::span<Vec2> out) {

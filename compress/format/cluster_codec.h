@@ -25,7 +25,7 @@ public:
 
   uint32_t triangle_count() const { return layout_.triangle_count; }
   uint32_t vertex_count() const { return layout_.vertex_count; }
-  uint32_t material() const { return record_->material; }
+  uint32_t material_slot() const { return record_->material_slot; }
   bool has_normals() const { return (record_->flags & baked::kClusterHasNormals) != 0; }
   bool has_uvs() const { return (record_->flags & baked::kClusterHasUvs) != 0; }
 
@@ -43,6 +43,8 @@ public:
   NormalEncoding normal_encoding() const { return normal_encoding_; } ///< of the geometry
   /// Needs has_uvs().
   Vec2 uv(uint32_t vertex) const;
+  /// As stored, of the geometry's encoding. Needs has_uvs().
+  std::array<int64_t, 2> uv_code(uint32_t vertex) const;
 
   /// A box in object space that holds every vertex, from the record alone: at most a power of two larger per axis.
   void bounds(Vec3& lo, Vec3& hi) const;
@@ -63,12 +65,16 @@ private:
   friend void decode_normals(const ClusterView&, std::span<Vec3>);
   friend void decode_uvs(const ClusterView&, std::span<Vec2>);
 
+  /// Of a vertex, or of an entry of the palette.
+  NormalFields normal_entry(uint32_t entry) const;
+  void decode_normal_entries(uint32_t count, std::span<Vec3> out) const;
+
   const baked::ClusterRecord* record_;
   const uint8_t* bits_;
   IndexLayout layout_;
   LatticePoint base_; ///< of the smallest coordinates
   double step_;
-  Vec2 uv_step_;
+  UvDecoder u_decoder_, v_decoder_;
   NormalEncoding normal_encoding_;
   uint32_t normal_stride_;   ///< bits per vertex or palette entry
   uint32_t position_stride_; ///< bits per vertex
@@ -97,7 +103,7 @@ struct ClusterInput {
   std::span<const LatticePoint> positions;
   std::span<const uint32_t> normal_codes; ///< empty: none
   std::span<const UvLattice> uvs;         ///< empty: none
-  uint32_t material = 0;
+  uint32_t material_slot = 0;
   LatticePoint origin{};                                    ///< of the geometry
   uint32_t anchor_shift = 0;                                ///< of the geometry
   NormalEncoding normal_encoding = NormalEncoding::kAxis24; ///< of normal_codes

@@ -79,7 +79,7 @@ baked::ClusterRecord encode_cluster(const ClusterInput& input, BitWriter& writer
   assert(input.normal_codes.empty() || input.normal_codes.size() == layout.vertex_count);
   assert(input.uvs.empty() || input.uvs.size() == layout.vertex_count);
   baked::ClusterRecord record{};
-  record.material = input.material;
+  record.material_slot = input.material_slot;
   record.triangle_count = static_cast<uint8_t>(layout.triangle_count);
   record.vertex_count = static_cast<uint16_t>(layout.vertex_count);
   record.restart_count = static_cast<uint8_t>(layout.restart_count);

@@ -1,6 +1,7 @@
 #include "compress/format/file_summary.h"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 
 namespace packtrace {
@@ -18,14 +19,16 @@ StreamBytes stream_bytes(const BakedFile& file) {
   bytes.cluster_records = s.clusters.size_bytes();
   bytes.geometry_records = s.geometries.size_bytes();
   bytes.instance_records = s.instances.size_bytes();
-  bytes.material_records = s.materials.size_bytes();
+  bytes.requirement_records = s.requirements.size_bytes();
+  bytes.material_records = s.materials.size_bytes() + s.material_slots.size_bytes();
   bytes.masks = s.masks.size_bytes() + s.mask_words.size_bytes();
+  bytes.textures = s.textures.size_bytes() + s.texture_bytes.size();
   bytes.cameras = s.cameras.size_bytes();
   bytes.strings = s.strings.size();
   bytes.total = file.file_bytes();
   bytes.header_and_alignment = bytes.total - s.payload.size() - bytes.cluster_records - bytes.geometry_records -
-                               bytes.instance_records - bytes.material_records - bytes.masks - bytes.cameras -
-                               bytes.strings;
+                               bytes.instance_records - bytes.material_records - bytes.masks - bytes.textures -
+                               bytes.cameras - bytes.strings - bytes.requirement_records;
   return bytes;
 }
 
@@ -55,6 +58,85 @@ void add_normals(std::vector<NormalUse>& uses, const baked::GeometryRecord& g,
   use->max_error_degrees = std::max(use->max_error_degrees, g.max_normal_error_degrees);
 }
 
+/// Texels per unit of texture coordinate, along the axis of more, of the finest texture that a material looks up.
+double texels_per_uv(const BakedSections& s, const baked::MaterialRecord& material) {
+  double most = 0.0;
+  if (material.albedo_texture != baked::kNone) {
+    const baked::TextureRecord& texture = s.textures[material.albedo_texture];
+    most = std::max(std::abs(double{texture.uv_scale[0]}) * texture.width,
+                    std::abs(double{texture.uv_scale[1]}) * texture.height);
+  }
+  for (const uint32_t number : {material.alpha_mask, material.shadow_alpha_mask}) {
+    if (number == baked::kNone) continue;
+    const baked::MaskRecord& mask = s.masks[number];
+    most = std::max(
+        {most, std::abs(double{mask.uv_scale[0]}) * mask.width, std::abs(double{mask.uv_scale[1]}) * mask.height});
+  }
+  return most;
+}
+
+/// Largest of the texels of runs of slots, whose beginnings ascend. Looks at each slot once, however much they overlap.
+double finest_texture(const std::vector<double>& texels_of_slot, const std::vector<uint32_t>& runs, uint32_t slots) {
+  double most = 0.0;
+  uint64_t end = 0;
+  for (const uint32_t run : runs) {
+    for (uint64_t i = std::max<uint64_t>(run, end); i < uint64_t{run} + slots; ++i)
+      most = std::max(most, texels_of_slot[static_cast<size_t>(i)]);
+    end = uint64_t{run} + slots;
+  }
+  return most;
+}
+
+/// @param texels per unit of texture coordinate, of the finest texture that any instance's materials look up
+void add_uvs(std::vector<UvUse>& uses, const baked::GeometryRecord& g, std::span<const baked::ClusterRecord> clusters,
+             double texels) {
+  uint64_t vertices = 0;
+  for (const baked::ClusterRecord& cluster : clusters)
+    if ((cluster.flags & baked::kClusterHasUvs) != 0) vertices += cluster.vertex_count;
+  if (vertices == 0) return;
+  const auto encoding = static_cast<UvEncoding>(g.uv_encoding);
+  auto use = std::lower_bound(uses.begin(), uses.end(), encoding,
+                              [](const UvUse& one, UvEncoding other) { return one.encoding < other; });
+  if (use == uses.end() || use->encoding != encoding) use = uses.insert(use, UvUse{encoding});
+  ++use->geometries;
+  use->vertices += vertices;
+  use->max_error = std::max(use->max_error, g.max_uv_error);
+  use->max_error_texels = std::max(use->max_error_texels, g.max_uv_error * texels);
+}
+
+GeometryUse use_of(const BakedFile& file, uint32_t geometry, uint32_t instances) {
+  const baked::GeometryRecord& g = file.geometries()[geometry];
+  GeometryUse use;
+  use.name = file.text(g.name);
+  use.requirements = g.requirements, use.slots = g.slot_count;
+  use.instances = instances, use.triangles = g.triangle_count;
+  for (uint32_t c = 0; c < g.cluster_count; ++c) {
+    const ClusterView view = file.cluster(geometry, c);
+    const ClusterView::StreamBits bits = view.stream_bits();
+    use.normal_triangles += view.has_normals() ? view.triangle_count() : 0;
+    use.uv_triangles += view.has_uvs() ? view.triangle_count() : 0;
+    use.normal_bits += bits.normals, use.uv_bits += bits.uvs;
+  }
+  return use;
+}
+
+void add_materials(FileSummary& summary, const BakedSections& s) {
+  std::vector<int64_t> change(s.material_slots.size() + 1); // of the number of instances that have the slot
+  for (const baked::InstanceRecord& instance : s.instances) {
+    ++change[instance.first_slot];
+    --change[instance.first_slot + s.geometries[instance.geometry].slot_count];
+  }
+  std::vector<uint8_t> used(s.materials.size());
+  int64_t instances = 0;
+  for (size_t i = 0; i < s.material_slots.size(); ++i) {
+    instances += change[i];
+    if (instances > 0) used[s.material_slots[i]] = 1;
+  }
+  for (size_t i = 0; i < used.size(); ++i)
+    if (used[i] != 0) ++summary.materials_in_use, summary.material_flags |= s.materials[i].flags;
+  for (const baked::GeometryRecord& g : s.geometries) summary.max_slots = std::max(summary.max_slots, g.slot_count);
+}
+
 } // namespace
 
 FileSummary summarize(const BakedFile& file) {
@@ -66,6 +148,9 @@ FileSummary summarize(const BakedFile& file) {
     summary.placed_triangles += s.geometries[instance.geometry].triangle_count;
     summary.placed_vertices += s.geometries[instance.geometry].vertex_count;
   }
+  std::vector<double> texels; // by material slot
+  for (const uint32_t material : s.material_slots) texels.push_back(texels_per_uv(s, s.materials[material]));
+  const std::vector<std::vector<uint32_t>> runs = material_runs(s);
   for (size_t i = 0; i < s.geometries.size(); ++i) {
     const baked::GeometryRecord& g = s.geometries[i];
     summary.triangles += g.triangle_count;
@@ -77,10 +162,17 @@ FileSummary summarize(const BakedFile& file) {
     summary.max_uv_error = std::max(summary.max_uv_error, g.max_uv_error);
     if (g.cluster_count > 0) add_grid(summary.grids, g);
     add_normals(summary.normals, g, file.clusters(static_cast<uint32_t>(i)));
+    add_uvs(summary.uvs, g, file.clusters(static_cast<uint32_t>(i)), finest_texture(texels, runs[i], g.slot_count));
+    summary.by_geometry.push_back(use_of(file, static_cast<uint32_t>(i), uses[i]));
   }
   std::sort(summary.grids.begin(), summary.grids.end(), [](const GridUse& a, const GridUse& b) {
     return std::tuple(!a.world_space, a.grid.step()) < std::tuple(!b.world_space, b.grid.step());
   });
+  add_materials(summary, s);
+  summary.requirements.assign(s.requirements.begin(), s.requirements.end());
+  for (const baked::TextureRecord& t : s.textures)
+    summary.textures.push_back({std::string(s.text(t.name)), t.width, t.height, static_cast<TextureCodec>(t.codec),
+                                texture_bytes(static_cast<TextureCodec>(t.codec), t.width, t.height), t.psnr_db});
   summary.clusters = s.clusters.size();
   summary.geometries = s.geometries.size();
   summary.instances = s.instances.size();

@@ -1,5 +1,6 @@
 #include "compress/format/index_codec.h"
 
+#include <algorithm>
 #include <bit>
 #include <cassert>
 
@@ -134,16 +135,16 @@ bool strips_are_valid(const uint8_t* bits, const IndexLayout& layout) {
   if ((restart.word[0] & left.word[0]) != 0 || (restart.word[1] & left.word[1]) != 0) return false;
   const uint32_t width = layout.index_bits();
   if (fresh_before(bits, layout.fresh_bit(), layout.corner_count()) != layout.vertex_count) return false;
+  // Of the corners that are not fresh, the k-th has corner - k fresh ones before it.
   uint64_t explicit_at = layout.explicit_bit();
-  for (uint32_t corner = 0, used = 0; corner < layout.corner_count(); ++corner) {
-    if (read_bits(bits, layout.fresh_bit() + corner, 1) != 0) {
-      ++used;
-      continue;
-    }
-    if (read_bits(bits, explicit_at, width) >= used) return false;
-    explicit_at += width;
+  bool valid = true;
+  for (uint32_t first = 0, k = 0; first < layout.corner_count(); first += 32) {
+    const uint32_t count = std::min(layout.corner_count() - first, 32u);
+    uint64_t named = ~read_bits(bits, layout.fresh_bit() + first, count) & ((uint64_t{1} << count) - 1);
+    for (; named != 0; named &= named - 1, ++k, explicit_at += width)
+      valid &= read_bits(bits, explicit_at, width) < first + static_cast<uint32_t>(std::countr_zero(named)) - k;
   }
-  return true;
+  return valid;
 }
 
 } // namespace packtrace

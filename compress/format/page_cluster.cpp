@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
 #include <limits>
 
 #include "compress/format/bit_stream.h"
@@ -63,29 +62,13 @@ void unpack_cluster(const ClusterView& view, ClusterValues& values) {
   values.triangle_count = view.triangle_count();
   values.vertex_count = view.vertex_count();
   values.restart_count = view.layout().restart_count;
-  values.material = view.material();
+  values.material = view.material_slot();
   values.has_normals = view.has_normals();
   values.has_uvs = view.has_uvs();
   unpack_strips(view, values);
   for (uint32_t v = 0; v < values.vertex_count; ++v) values.positions[v] = view.lattice(v);
   if (values.has_normals) unpack_normals(view, values);
   if (values.has_uvs) unpack_uvs(view, values);
-}
-
-void ClusterPacker::begin(size_t bytes) {
-  limit_ = bytes;
-  bytes_.assign(bytes + 2 * kReadSlackBytes, 0);
-  word_ = 0;
-}
-
-void ClusterPacker::put(uint64_t value, uint32_t bits) {
-  pending_ |= value << pending_bits_;
-  pending_bits_ += bits;
-  std::memcpy(at_, &pending_, sizeof pending_);
-  const uint32_t whole = pending_bits_ & ~7u;
-  at_ += whole >> 3;
-  pending_ = whole == 64 ? 0 : pending_ >> whole;
-  pending_bits_ -= whole;
 }
 
 bool ClusterPacker::plan_positions(const baked::GeometryRecord& geometry, const ClusterValues& values,
@@ -183,13 +166,13 @@ void ClusterPacker::put_strips(const ClusterValues& values, const IndexLayout& l
     const uint32_t count = std::min(layout.triangle_count - first, 32u);
     uint64_t word = 0;
     for (uint32_t i = 0; i < count; ++i) word |= uint64_t{values.turns[first + i] == Turn::kRestart} << i;
-    put(word, count);
+    payload_.put(word, count);
   }
   for (uint32_t first = 0; first < layout.triangle_count; first += 32) {
     const uint32_t count = std::min(layout.triangle_count - first, 32u);
     uint64_t word = 0;
     for (uint32_t i = 0; i < count; ++i) word |= uint64_t{values.turns[first + i] == Turn::kLeft} << i;
-    put(word, count);
+    payload_.put(word, count);
   }
   uint32_t used = 0, explicit_count = 0;
   std::array<uint16_t, kMaxClusterCorners> explicits;
@@ -203,10 +186,10 @@ void ClusterPacker::put_strips(const ClusterValues& values, const IndexLayout& l
       explicit_count += !fresh, used += fresh;
       word |= uint64_t{fresh} << i;
     }
-    put(word, count);
+    payload_.put(word, count);
   }
   const uint32_t width = layout.index_bits();
-  for (uint32_t i = 0; i < explicit_count; ++i) put(explicits[i], width);
+  for (uint32_t i = 0; i < explicit_count; ++i) payload_.put(explicits[i], width);
 }
 
 void ClusterPacker::put_positions(const ClusterValues& values, const baked::ClusterRecord& record) {
@@ -217,37 +200,39 @@ void ClusterPacker::put_positions(const ClusterValues& values, const baked::Clus
     const auto x = static_cast<uint64_t>(p[0] - base_[0]), y = static_cast<uint64_t>(p[1] - base_[1]),
                z = static_cast<uint64_t>(p[2] - base_[2]);
     if (vertex_bits <= kMaxFieldBits) {
-      put(x | (y << x_bits) | (z << (x_bits + y_bits)), vertex_bits);
+      payload_.put(x | (y << x_bits) | (z << (x_bits + y_bits)), vertex_bits);
     } else {
-      put(x, x_bits), put(y, y_bits), put(z, z_bits);
+      payload_.put(x, x_bits), payload_.put(y, y_bits), payload_.put(z, z_bits);
     }
   }
 }
 
 void ClusterPacker::put_normals(const ClusterValues& values) {
-  const auto put_one = [&](NormalFields fields) { put(packed_normal(encoding_, normals_, fields), normals_.stride()); };
+  const auto put_one = [&](NormalFields fields) {
+    payload_.put(packed_normal(encoding_, normals_, fields), normals_.stride());
+  };
   if (palette_count_ == 0) {
     for (uint32_t v = 0; v < values.vertex_count; ++v) put_one(values.normals[v]);
     return;
   }
   for (uint32_t i = 0; i < palette_count_; ++i) put_one(palette_[i]);
   const uint32_t width = bits_for_count(palette_count_);
-  for (uint32_t v = 0; v < values.vertex_count; ++v) put(palette_entry_[v], width);
+  for (uint32_t v = 0; v < values.vertex_count; ++v) payload_.put(palette_entry_[v], width);
 }
 
 void ClusterPacker::put_uvs(const ClusterValues& values) {
-  for (const int32_t lo : uv_lo_) put(static_cast<uint32_t>(lo), kUvAnchorBits);
-  for (const uint32_t width : uv_bits_) put(width, kUvWidthBits);
+  for (const int32_t lo : uv_lo_) payload_.put(static_cast<uint32_t>(lo), kUvAnchorBits);
+  for (const uint32_t width : uv_bits_) payload_.put(width, kUvWidthBits);
   for (uint32_t v = 0; v < values.vertex_count; ++v)
     for (size_t axis = 0; axis < 2; ++axis)
-      put(static_cast<uint32_t>(values.uvs[v][axis]) - static_cast<uint32_t>(uv_lo_[axis]), uv_bits_[axis]);
+      payload_.put(static_cast<uint32_t>(values.uvs[v][axis]) - static_cast<uint32_t>(uv_lo_[axis]), uv_bits_[axis]);
 }
 
 bool ClusterPacker::append(const baked::GeometryRecord& geometry, const ClusterValues& values,
                            baked::ClusterRecord& record) {
   record = {};
   const IndexLayout layout{values.triangle_count, values.vertex_count, values.restart_count};
-  record.material = values.material;
+  record.material_slot = values.material;
   record.triangle_count = static_cast<uint8_t>(layout.triangle_count);
   record.vertex_count = static_cast<uint16_t>(layout.vertex_count);
   record.restart_count = static_cast<uint8_t>(layout.restart_count);
@@ -260,16 +245,11 @@ bool ClusterPacker::append(const baked::GeometryRecord& geometry, const ClusterV
     bits += palette_count_ == 0 ? count * normals_.stride()
                                 : palette_count_ * normals_.stride() + count * bits_for_count(palette_count_);
   if (values.has_uvs) bits += 2 * (kUvAnchorBits + kUvWidthBits) + count * (uv_bits_[0] + uv_bits_[1]);
-  const uint64_t words = (bits + 31) / 32;
-  if (4 * (word_ + words) > limit_) return false;
-
-  at_ = bytes_.data() + 4 * word_;
-  pending_ = 0, pending_bits_ = 0;
+  if (!payload_.begin_cluster(bits)) return false;
   put_strips(values, layout);
   put_positions(values, record);
   if (values.has_normals) put_normals(values);
   if (values.has_uvs) put_uvs(values);
-  word_ += words;
   return true;
 }
 

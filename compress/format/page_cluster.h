@@ -2,10 +2,10 @@
 
 #include <array>
 #include <cstdint>
-#include <vector>
 
 #include "compress/format/cluster_codec.h"
 #include "compress/format/normal_packing.h"
+#include "compress/format/payload_writer.h"
 
 namespace packtrace {
 
@@ -15,7 +15,7 @@ enum class Turn : uint8_t { kRight = 0, kLeft = 1, kRestart = 2 };
 /// What one cluster holds, as values: all that its record and bit streams say, and nothing of how they say it.
 struct ClusterValues {
   uint32_t triangle_count = 0, vertex_count = 0, restart_count = 0;
-  uint32_t material = 0;
+  uint32_t material = 0; ///< slot
   bool has_normals = false, has_uvs = false;
   std::array<Turn, kMaxClusterTriangles> turns;
   uint32_t corner_count = 0;
@@ -34,33 +34,26 @@ void unpack_cluster(const ClusterView& view, ClusterValues& values);
 class ClusterPacker {
 public:
   /// Starts over with a buffer for `bytes` bytes.
-  void begin(size_t bytes);
+  void begin(size_t bytes) { payload_.begin(bytes); }
 
   /// The record without payload_offset, first_triangle and first_vertex. Returns false, having written nothing, where
   /// the values cannot be those of a valid cluster of this geometry, or do not fit the buffer.
   bool append(const baked::GeometryRecord& geometry, const ClusterValues& values, baked::ClusterRecord& record);
 
-  size_t size() const { return static_cast<size_t>(word_ * 4); }
-  const uint8_t* data() const { return bytes_.data(); }
+  size_t size() const { return payload_.size(); }
+  const uint8_t* data() const { return payload_.data(); }
 
 private:
   bool plan_positions(const baked::GeometryRecord& geometry, const ClusterValues& values, baked::ClusterRecord& record);
   bool plan_normals(const baked::GeometryRecord& geometry, const ClusterValues& values, baked::ClusterRecord& record);
   void find_palette(const ClusterValues& values);
   bool plan_uvs(const ClusterValues& values, baked::ClusterRecord& record);
-  void put(uint64_t value, uint32_t bits);
   void put_strips(const ClusterValues& values, const IndexLayout& layout);
   void put_normals(const ClusterValues& values);
   void put_positions(const ClusterValues& values, const baked::ClusterRecord& record);
   void put_uvs(const ClusterValues& values);
 
-  std::vector<uint8_t> bytes_;
-  uint64_t word_ = 0;  // where the next cluster begins, in 4 bytes
-  uint64_t limit_ = 0; // bytes
-  uint8_t* at_ = nullptr;
-  uint64_t pending_ = 0;
-  uint32_t pending_bits_ = 0;
-
+  PayloadWriter payload_;
   LatticePoint base_{};
   NormalEncoding encoding_{};
   NormalPacking normals_;

@@ -14,6 +14,7 @@
 #include "compress/format/normal_codec.h"
 #include "compress/format/page_decoder.h"
 #include "compress/format/position_grid.h"
+#include "compress/format/uv_codec.h"
 #include "pbrt_import/scene/error.h"
 
 namespace packtrace {
@@ -135,7 +136,8 @@ private:
       const baked::GeometryRecord& g = geometries_[i];
       bool ok = g.first_cluster == clusters && g.payload_offset == payload &&
                 g.payload_bytes <= payload_bytes_ - payload && g.cluster_count <= cluster_count_ - clusters &&
-                g.anchor_shift < 32 && g.normal_encoding < kNormalFormats.size();
+                g.anchor_shift < 32 && g.normal_encoding < kNormalFormats.size() &&
+                g.uv_encoding < kUvEncodingNames.size();
       for (const int64_t o : g.origin) ok &= o >= -kMaxLattice && o <= kMaxLattice;
       if (!ok) fail("geometry " + std::to_string(i));
       clusters += g.cluster_count, payload += g.payload_bytes;

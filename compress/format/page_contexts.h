@@ -6,7 +6,7 @@
 
 namespace packtrace {
 
-/// Streams of a page: what `info` tells apart, and what codec `fast` compresses apart.
+/// Streams of a page: what `info` tells apart.
 enum class PageStream : uint32_t { kTopology, kPositions, kNormals, kUvs, kRecords, kCount };
 inline constexpr uint32_t kPageStreams = static_cast<uint32_t>(PageStream::kCount);
 
@@ -42,26 +42,5 @@ constexpr PageStream page_stream_of(uint32_t number) {
   if (number < context::kUv) return PageStream::kNormals;
   return number < context::kSameMaterial ? PageStream::kUvs : PageStream::kRecords;
 }
-
-/// Codec `fast` has no models; it compresses each of these groups of symbols apart.
-inline constexpr uint32_t kSymbolStreams = 14;
-inline constexpr auto kSymbolStreamOf = [] {
-  using namespace context;
-  std::array<uint8_t, context::kCount> stream{};
-  for (uint32_t i = 0; i < context::kCount; ++i) {
-    uint32_t group = 0;
-    if (i >= kStripNaming) group = 1;
-    if (i >= kNaming) group = 2;
-    if (i >= kVersion) group = 3;
-    if (i >= kPosition) group = 4 + (i - kPosition) / 3 / 4; // by extent
-    if (i >= kNormalChoice) group = 9;
-    if (i >= kNormalX) group = 10;
-    if (i >= kNormalY) group = 11;
-    if (i >= kUv) group = 12;
-    if (i >= kSameMaterial) group = 13;
-    stream[i] = static_cast<uint8_t>(group);
-  }
-  return stream;
-}();
 
 } // namespace packtrace

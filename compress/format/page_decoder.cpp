@@ -9,6 +9,7 @@
 #include <zstd.h>
 
 #include "compress/format/page_cluster.h"
+#include "compress/format/page_fast_decoder.h"
 #include "compress/format/page_model.h"
 #include "compress/format/page_readers.h"
 
@@ -47,9 +48,8 @@ bool unzip(ZSTD_DCtx* context, std::span<const uint8_t> from, std::span<uint8_t>
 
 struct PageDecoder::Scratch {
   SmallPageReader small;
+  PageModel<SmallPageReader> model{small};
   FastPageReader fast;
-  PageModel<SmallPageReader> small_model{small};
-  PageModel<FastPageReader> fast_model{fast};
   ClusterValues values;
   ClusterPacker packer;
   std::vector<uint8_t> bytes;
@@ -66,43 +66,6 @@ struct PageDecoder::Scratch {
     return true;
   }
 
-  /// Codec fast: of the bit fields and of each stream of symbols the size and, where that is not 0, the size of its
-  /// zstd frame, or 0 where it lies there as it is; then all of these.
-  bool begin_fast(std::span<const uint8_t> page) {
-    Parts parts(page);
-    constexpr size_t kParts = 1 + kSymbolStreams;
-    std::array<uint32_t, kParts> sizes{}, frames{};
-    uint64_t total = 0;
-    for (size_t i = 0; i < kParts; ++i) {
-      const auto size = parts.number();
-      if (!size || *size > baked::kMaxPagePayload * 4) return false;
-      total += sizes[i] = *size;
-      if (sizes[i] == 0) continue;
-      const auto frame = parts.number();
-      if (!frame) return false;
-      frames[i] = *frame;
-    }
-    bytes.resize(total + kReadSlackBytes);
-    std::array<std::span<const uint8_t>, kParts> streams;
-    size_t at = 0;
-    for (size_t i = 0; i < kParts; ++i) {
-      const auto frame = parts.take(frames[i] == 0 ? sizes[i] : frames[i]);
-      if (!frame) return false;
-      const std::span<uint8_t> out(bytes.data() + at, sizes[i]);
-      if (frames[i] == 0)
-        std::copy(frame->begin(), frame->end(), out.begin());
-      else if (!unzip(zstd.get(), *frame, out))
-        return false;
-      streams[i] = out;
-      at += sizes[i];
-    }
-    if (!parts.rest().empty()) return false;
-    std::array<std::span<const uint8_t>, kSymbolStreams> symbols;
-    std::copy(streams.begin() + 1, streams.end(), symbols.begin());
-    fast.begin(streams[0], symbols);
-    return true;
-  }
-
   bool decode_stored(std::span<const uint8_t> page, std::span<baked::ClusterRecord> clusters,
                      std::span<uint8_t> payload) {
     bytes.resize(clusters.size_bytes() + payload.size());
@@ -112,28 +75,47 @@ struct PageDecoder::Scratch {
     return true;
   }
 
-  template <class Model>
-  bool decode_clusters(Model& model, const PagePlace& place, std::span<baked::ClusterRecord> clusters,
-                       std::span<uint8_t> payload) {
-    model.begin();
-    packer.begin(payload.size());
+  /// @param append writes the next cluster behind those in `packed`, whose record it returns; false where it cannot
+  template <class Packed, class Append>
+  static bool decode_clusters(const Packed& packed, const Append& append, const PagePlace& place,
+                              std::span<baked::ClusterRecord> clusters, std::span<uint8_t> payload) {
     const auto end_of = [](const baked::GeometryRecord& one) { return one.first_cluster + one.cluster_count; };
     const auto ended = [&](const baked::GeometryRecord& one) { return end_of(one) <= place.first_cluster; };
-    auto g = static_cast<size_t>(
-        std::partition_point(place.geometries.begin(), place.geometries.end(), ended) - place.geometries.begin());
+    auto g = static_cast<size_t>(std::partition_point(place.geometries.begin(), place.geometries.end(), ended) -
+                                 place.geometries.begin());
     for (size_t i = 0; i < clusters.size(); ++i) {
       while (g < place.geometries.size() && end_of(place.geometries[g]) <= place.first_cluster + i) ++g;
       if (g == place.geometries.size()) return false;
       const baked::GeometryRecord& geometry = place.geometries[g];
-      const uint64_t offset = place.payload_offset + packer.size();
-      if (offset < geometry.payload_offset) return false;
-      model.code_cluster(geometry, values);
-      if (model.fault() || !packer.append(geometry, values, clusters[i])) return false;
+      const uint64_t offset = place.payload_offset + packed.size();
+      if (offset < geometry.payload_offset || !append(geometry, clusters[i])) return false;
       clusters[i].payload_offset = static_cast<uint32_t>((offset - geometry.payload_offset) / 4);
     }
-    if (packer.size() != payload.size()) return false;
-    std::memcpy(payload.data(), packer.data(), payload.size());
+    if (packed.size() != payload.size()) return false;
+    std::memcpy(payload.data(), packed.data(), payload.size());
     return true;
+  }
+
+  bool decode_small(std::span<const uint8_t> page, const PagePlace& place, std::span<baked::ClusterRecord> clusters,
+                    std::span<uint8_t> payload) {
+    if (!begin_small(page)) return false;
+    model.begin();
+    packer.begin(payload.size());
+    const auto append = [&](const baked::GeometryRecord& geometry, baked::ClusterRecord& record) {
+      model.code_cluster(geometry, values);
+      return !model.fault() && packer.append(geometry, values, record);
+    };
+    return decode_clusters(packer, append, place, clusters, payload) && small.whole();
+  }
+
+  bool decode_fast(std::span<const uint8_t> page, const PagePlace& place, std::span<baked::ClusterRecord> clusters,
+                   std::span<uint8_t> payload) {
+    if (!fast.begin(zstd.get(), page, static_cast<uint32_t>(clusters.size()), static_cast<uint32_t>(payload.size())))
+      return false;
+    const auto append = [&](const baked::GeometryRecord& geometry, baked::ClusterRecord& record) {
+      return fast.append(geometry, record);
+    };
+    return decode_clusters(fast, append, place, clusters, payload) && fast.whole();
   }
 };
 
@@ -147,9 +129,9 @@ bool PageDecoder::decode(const baked::PageRecord& record, std::span<const uint8_
   case PageCodec::kNone:
     return s.decode_stored(page, clusters, payload);
   case PageCodec::kFast:
-    return s.begin_fast(page) && s.decode_clusters(s.fast_model, place, clusters, payload) && s.fast.whole();
+    return s.decode_fast(page, place, clusters, payload);
   case PageCodec::kSmall:
-    return s.begin_small(page) && s.decode_clusters(s.small_model, place, clusters, payload) && s.small.whole();
+    return s.decode_small(page, place, clusters, payload);
   }
   return false;
 }

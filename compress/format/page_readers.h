@@ -59,42 +59,4 @@ private:
   RansReader symbols_;
 };
 
-/// Coder (page_model.h) of pages of codec `fast`: each stream of symbols has a byte per symbol.
-class FastPageReader {
-public:
-  static constexpr bool kDecodes = true;
-
-  /// @param fields bit fields; 8 readable bytes follow them
-  void begin(std::span<const uint8_t> fields, const std::array<std::span<const uint8_t>, kSymbolStreams>& symbols) {
-    fields_ = FieldReader(fields);
-    missing_ = false;
-    for (size_t i = 0; i < kSymbolStreams; ++i)
-      streams_[i] = {symbols[i].data(), symbols[i].data() + symbols[i].size()};
-  }
-
-  uint32_t symbol(uint32_t context, uint32_t) {
-    Stream& stream = streams_[kSymbolStreamOf[context]];
-    if (stream.at == stream.end) {
-      missing_ = true;
-      return 0;
-    }
-    return *stream.at++ & 15u;
-  }
-  uint64_t raw(uint32_t, uint64_t, uint32_t bits) { return fields_.take(bits); }
-  bool whole() const {
-    for (const Stream& stream : streams_)
-      if (stream.at != stream.end) return false;
-    return !missing_ && fields_.whole();
-  }
-
-private:
-  struct Stream {
-    const uint8_t* at = nullptr;
-    const uint8_t* end = nullptr;
-  };
-  std::array<Stream, kSymbolStreams> streams_{};
-  FieldReader fields_;
-  bool missing_ = false;
-};
-
 } // namespace packtrace

@@ -7,6 +7,7 @@
 
 #include <glm/gtc/quaternion.hpp>
 
+#include "pbrt_import/scene/albedo_texture.h"
 #include "pbrt_import/scene/alpha_mask.h"
 #include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/scene/material_flags.h"
@@ -27,6 +28,7 @@ struct Mesh {
 };
 
 inline constexpr uint32_t kNoMask = ~0u;
+inline constexpr uint32_t kNoTexture = ~0u;
 
 /// What ambient occlusion and simple shading need of a pbrt material together with its shape's alpha and light.
 struct Material {
@@ -35,6 +37,7 @@ struct Material {
   Vec3 albedo{0.5f};                    ///< linear sRGB, [0,1]
   uint32_t alpha_mask = kNoMask;        ///< into Scene::masks, for all rays
   uint32_t shadow_alpha_mask = kNoMask; ///< into Scene::masks, for occlusion rays only
+  uint32_t albedo_texture = kNoTexture; ///< into Scene::textures; albedo is its average
 };
 
 /// An invertible map and its parts: map = translation (its last column) * rotation * scale.
@@ -114,7 +117,8 @@ struct Scene {
   std::vector<Mesh> meshes;
   std::vector<Material> materials;
   std::vector<AlphaMask> masks;
-  std::vector<Shape> shapes; ///< those outside objects, parent = world
+  std::vector<AlbedoTexture> textures; ///< empty unless the import kept them
+  std::vector<Shape> shapes;           ///< those outside objects, parent = world
   std::vector<Object> objects;
   std::vector<Instance> instances;
   std::vector<Camera> cameras; ///< empty where the file has none

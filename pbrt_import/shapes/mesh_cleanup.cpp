@@ -1,8 +1,11 @@
 #include "pbrt_import/shapes/mesh_cleanup.h"
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <string_view>
+
+#include <tbb/parallel_for.h>
 
 namespace packtrace {
 namespace {
@@ -15,9 +18,18 @@ struct Tally {
   void add(uint64_t where) {
     if (count++ == 0) first = where;
   }
+  /// What came after this.
+  void operator+=(const Tally& more) {
+    if (count == 0) first = more.first;
+    count += more.count;
+  }
   /// "3 triangles (the first is number 17) dropped: ..."
   void report_to(const ReportFn& report, Severity severity, std::string_view noun, std::string_view text) const {
-    if (count == 0 || !report) return;
+    if (count > 0 && report) describe_to(report, severity, noun, text);
+  }
+
+private:
+  void describe_to(const ReportFn& report, Severity severity, std::string_view noun, std::string_view text) const {
     std::string message = std::to_string(count);
     message.append(" ").append(noun).append(count == 1 ? " (number " : "s (the first is number ");
     message.append(std::to_string(first)).append(") ").append(text);
@@ -25,44 +37,95 @@ struct Tally {
   }
 };
 
+/// The sum, in order, of what count_up(begin, end) returns for the pieces of [0, count). Pieces of large meshes are
+/// shared among all threads.
+template <class CountUp>
+auto add_up(size_t count, CountUp count_up) {
+  constexpr size_t kPiece = 1u << 15;
+  if (count <= kPiece) return count_up(size_t{0}, count);
+  std::vector<decltype(count_up(size_t{0}, count))> sums((count + kPiece - 1) / kPiece);
+  tbb::parallel_for(size_t{0}, sums.size(), [&](size_t i) {
+    sums[i] = count_up(i * kPiece, std::min(count, (i + 1) * kPiece));
+  });
+  for (size_t i = 1; i < sums.size(); ++i) sums[0] += sums[i];
+  return sums[0];
+}
+
 /// Integer arithmetic, so that the compiler vectorises the loop.
 bool all_finite(const std::vector<Vec3>& points) {
   constexpr uint32_t kExponent = 0x7f800000u;
-  uint32_t bad = 0;
-  for (const Vec3& p : points) {
-    const auto is_bad = [](float f) { return uint32_t{(std::bit_cast<uint32_t>(f) & kExponent) == kExponent}; };
-    bad |= is_bad(p.x) | is_bad(p.y) | is_bad(p.z);
-  }
-  return bad == 0;
+  const auto count_bad = [&](size_t begin, size_t end) {
+    uint32_t bad = 0;
+    for (size_t i = begin; i < end; ++i) {
+      const auto is_bad = [](float f) { return uint32_t{(std::bit_cast<uint32_t>(f) & kExponent) == kExponent}; };
+      bad |= is_bad(points[i].x) | is_bad(points[i].y) | is_bad(points[i].z);
+    }
+    return uint64_t{bad};
+  };
+  return add_up(points.size(), count_bad) == 0;
 }
+
+struct TriangleTallies {
+  Tally out_of_range, repeated, not_finite, coincident;
+
+  uint64_t dropped() const { return out_of_range.count + repeated.count + not_finite.count; }
+  void operator+=(const TriangleTallies& more) {
+    out_of_range += more.out_of_range;
+    repeated += more.repeated;
+    not_finite += more.not_finite;
+    coincident += more.coincident;
+  }
+};
+
+/// What is wrong with triangles, one by one.
+class TriangleCheck {
+public:
+  explicit TriangleCheck(const std::vector<Vec3>& positions)
+      : positions_(positions), all_finite_(all_finite(positions)) {}
+
+  /// @return false: the triangle is to be dropped
+  bool operator()(const Triangle& t, size_t number, TriangleTallies& tallies) const {
+    const std::vector<Vec3>& p = positions_;
+    if (t.x >= p.size() || t.y >= p.size() || t.z >= p.size())
+      tallies.out_of_range.add(number);
+    else if (t.x == t.y || t.y == t.z || t.z == t.x)
+      tallies.repeated.add(number);
+    else if (!all_finite_ && !(is_finite(p[t.x]) && is_finite(p[t.y]) && is_finite(p[t.z])))
+      tallies.not_finite.add(number);
+    else {
+      if (p[t.x] == p[t.y] || p[t.y] == p[t.z] || p[t.z] == p[t.x]) tallies.coincident.add(number);
+      return true;
+    }
+    return false;
+  }
+
+private:
+  const std::vector<Vec3>& positions_;
+  const bool all_finite_;
+};
 
 /// Removes bad triangles and marks the vertices of the others.
 uint64_t drop_triangles(Mesh& mesh, std::vector<uint8_t>& used, const ReportFn& report) {
-  const std::vector<Vec3>& p = mesh.positions;
-  const bool check_finite = !all_finite(p);
-  Tally out_of_range, repeated, not_finite, coincident;
-  size_t kept = 0;
-  for (size_t i = 0; i < mesh.triangles.size(); ++i) {
-    const Triangle t = mesh.triangles[i];
-    if (t.x >= p.size() || t.y >= p.size() || t.z >= p.size()) {
-      out_of_range.add(i);
-    } else if (t.x == t.y || t.y == t.z || t.z == t.x) {
-      repeated.add(i);
-    } else if (check_finite && !(is_finite(p[t.x]) && is_finite(p[t.y]) && is_finite(p[t.z]))) {
-      not_finite.add(i);
-    } else {
-      if (p[t.x] == p[t.y] || p[t.y] == p[t.z] || p[t.z] == p[t.x]) coincident.add(i);
-      used[t.x] = used[t.y] = used[t.z] = 1;
-      mesh.triangles[kept++] = t;
+  const TriangleCheck check(mesh.positions);
+  const TriangleTallies all = add_up(mesh.triangles.size(), [&](size_t begin, size_t end) {
+    TriangleTallies tallies;
+    for (size_t i = begin; i < end; ++i) {
+      const Triangle t = mesh.triangles[i];
+      if (!check(t, i, tallies)) continue;
+      for (const uint32_t vertex : {t.x, t.y, t.z}) // of other threads' triangles, too
+        std::atomic_ref(used[vertex]).store(1, std::memory_order_relaxed);
     }
+    return tallies;
+  });
+  if (all.dropped() > 0) {
+    TriangleTallies again;
+    std::erase_if(mesh.triangles, [&](const Triangle& t) { return !check(t, 0, again); });
   }
-  const uint64_t dropped = mesh.triangles.size() - kept;
-  mesh.triangles.resize(kept);
-  out_of_range.report_to(report, Severity::kWarning, "triangle", "dropped: vertex index out of range");
-  repeated.report_to(report, Severity::kWarning, "triangle", "dropped: repeated vertex index");
-  not_finite.report_to(report, Severity::kWarning, "triangle", "dropped: vertex position not finite");
-  coincident.report_to(report, Severity::kNote, "triangle", "without area kept: two corners coincide");
-  return dropped;
+  all.out_of_range.report_to(report, Severity::kWarning, "triangle", "dropped: vertex index out of range");
+  all.repeated.report_to(report, Severity::kWarning, "triangle", "dropped: repeated vertex index");
+  all.not_finite.report_to(report, Severity::kWarning, "triangle", "dropped: vertex position not finite");
+  all.coincident.report_to(report, Severity::kNote, "triangle", "without area kept: two corners coincide");
+  return all.dropped();
 }
 
 template <class T>
@@ -104,24 +167,27 @@ void normals_from_faces(Mesh& mesh, const std::vector<uint8_t>& marked) {
   }
 }
 
-void fix_normals(Mesh& mesh, const ReportFn& report) {
+/// The normal with length 1, as it is where it has no direction.
+bool make_unit(Vec3& n) {
   constexpr float kUnitTolerance = 4e-7f; // on the squared length; a few roundings of a float unit vector
-  std::vector<uint8_t> bad;
-  Tally tally;
-  for (size_t i = 0; i < mesh.normals.size(); ++i) {
-    Vec3& n = mesh.normals[i];
-    if (std::abs(glm::dot(n, n) - 1.0f) <= kUnitTolerance) continue;
-    const DVec3 wide(n);
-    const double length = glm::length(wide); // cannot overflow: the components are floats
-    if (length > 0.0 && std::isfinite(length)) {
-      n = Vec3(wide / length);
-    } else {
-      if (bad.empty()) bad.resize(mesh.normals.size());
-      bad[i] = 1;
-      tally.add(i);
-    }
-  }
+  if (std::abs(glm::dot(n, n) - 1.0f) <= kUnitTolerance) return true;
+  const DVec3 wide(n);
+  const double length = glm::length(wide); // cannot overflow: the components are floats
+  if (!(length > 0.0 && std::isfinite(length))) return false;
+  n = Vec3(wide / length);
+  return true;
+}
+
+void fix_normals(Mesh& mesh, const ReportFn& report) {
+  const Tally tally = add_up(mesh.normals.size(), [&](size_t begin, size_t end) {
+    Tally bad;
+    for (size_t i = begin; i < end; ++i)
+      if (!make_unit(mesh.normals[i])) bad.add(i);
+    return bad;
+  });
   if (tally.count == 0) return;
+  std::vector<uint8_t> bad(mesh.normals.size());
+  for (size_t i = tally.first; i < bad.size(); ++i) bad[i] = !make_unit(mesh.normals[i]);
   normals_from_faces(mesh, bad);
   tally.report_to(report, Severity::kWarning, "vertex normal", "zero or not finite: recomputed from the faces around");
 }
@@ -145,13 +211,16 @@ uint64_t drop_bad_triangles(Mesh& mesh, const ReportFn& report) {
   const uint64_t dropped = drop_triangles(mesh, used, report);
   drop_unused_vertices(mesh, used);
   fix_normals(mesh, report);
-  Tally bad_uvs;
-  for (size_t i = 0; i < mesh.uvs.size(); ++i) {
-    Vec2& uv = mesh.uvs[i];
-    if (std::isfinite(uv.x) && std::isfinite(uv.y)) continue;
-    uv = Vec2(0.0f);
-    bad_uvs.add(i);
-  }
+  const Tally bad_uvs = add_up(mesh.uvs.size(), [&](size_t begin, size_t end) {
+    Tally bad;
+    for (size_t i = begin; i < end; ++i) {
+      Vec2& uv = mesh.uvs[i];
+      if (std::isfinite(uv.x) && std::isfinite(uv.y)) continue;
+      uv = Vec2(0.0f);
+      bad.add(i);
+    }
+    return bad;
+  });
   bad_uvs.report_to(report, Severity::kWarning, "uv", "not finite: set to zero");
   return dropped;
 }

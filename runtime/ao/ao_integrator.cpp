@@ -172,7 +172,8 @@ private:
   /// Of the hit surface's albedo, Rec. 709 weights.
   double luminance(const RTCHit& hit) const {
     const EmbreeScene::Hit surface = scene_.resolve(hit.instID[0], hit.geomID, hit.primID);
-    const Vec3 albedo = source_.materials()[source_.material_of(surface.geometry, surface.triangle)].albedo;
+    const uint32_t material = source_.material_of(surface.placement->instance, surface.triangle);
+    const Vec3 albedo = source_.materials()[material].albedo;
     return std::clamp(0.2126 * albedo.x + 0.7152 * albedo.y + 0.0722 * albedo.z, 0.0, 1.0);
   }
 

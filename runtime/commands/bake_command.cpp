@@ -19,19 +19,28 @@
 #include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/process_usage.h"
 #include "runtime/commands/progress_display.h"
+#include "runtime/commands/requirement_report.h"
 #include "runtime/stopwatch.h"
 
 namespace packtrace {
 namespace {
 
-constexpr const char* kAutoNormals = "auto";
+constexpr const char *kAuto = "auto", *kNoTextures = "none";
+constexpr std::array<const char*, baked::kPurposeCount> kPurposes{"ao", "shading"};
+constexpr const char* kKeepNormals = "normals";
+constexpr const char* kKeepUvs = "uv";
 
 struct BakeOptions {
   std::string input, output;
   std::optional<double> precision, precision_abs, precision_edge;
   std::optional<uint32_t> position_bits;
-  std::string normals = kAutoNormals;
+  std::string normals = kAuto;
   std::optional<double> normal_error;
+  std::string purpose = kPurposes[baked::kAo];
+  std::vector<std::string> keep;
+  std::string uvs = kAuto;
+  std::optional<std::string> textures; ///< without one, what the purpose needs
+  std::optional<double> texture_psnr;
   std::string codec{name_of(PageCodec::kNone)};
   SceneOptions scene;
   bool dry_run = false;
@@ -52,14 +61,26 @@ BakeConfig make_config(const BakeOptions& options) {
     throw Error(ErrorKind::kUsage,
                 "--normal-error chooses an encoding; it is of no use with --normals " + options.normals);
   if (options.normal_error) config.normal_error_degrees = *options.normal_error;
+  config.purpose = options.purpose == kPurposes[baked::kShading] ? baked::kShading : baked::kAo;
+  for (const std::string& stream : options.keep) (stream == kKeepUvs ? config.keep_uvs : config.keep_normals) = true;
+  config.strict = options.scene.strict;
+  config.uvs = find_uv_encoding(options.uvs);
+  const std::string textures = options.textures.value_or(config.purpose == baked::kShading ? kAuto : kNoTextures);
+  config.textures = textures != kNoTextures;
+  config.texture_codec = find_texture_codec(textures);
+  if (config.textures && config.purpose != baked::kShading)
+    throw Error(ErrorKind::kUsage, "--textures " + textures + " is for shading; add --for shading");
+  if (options.texture_psnr && textures != kAuto)
+    throw Error(ErrorKind::kUsage, "--texture-psnr chooses codecs; it is of no use without --textures auto");
+  if (options.texture_psnr) config.min_texture_psnr_db = *options.texture_psnr;
   config.codec = find_page_codec(options.codec).value(); // the option's check knows the names
   config.validate();
   return config;
 }
 
 nlohmann::json report(const BakeOptions& options, const BakeReport& baked, const ImportStatistics& imported,
-                      double import_s, double bake_s) {
-  nlohmann::json json = to_json(baked.file);
+                      double import_s, double bake_s, bool by_geometry) {
+  nlohmann::json json = to_json(baked.file, by_geometry);
   json["verb"] = "bake";
   json["input"] = options.input;
   json["output"] = options.dry_run ? nlohmann::json() : nlohmann::json(options.output);
@@ -67,8 +88,12 @@ nlohmann::json report(const BakeOptions& options, const BakeReport& baked, const
   json["peak_rss_bytes"] = peak_rss_bytes();
   json["mean_normal_error_degrees"] = baked.mean_normal_error_degrees;
   json["shared_shapes"] = baked.shared_shapes;
+  json["instanced_shapes"] = baked.instanced_shapes;
+  json["touching_instances"] = baked.touching_instances;
   json["shared_objects"] = baked.shared_objects;
   json["unused_objects"] = baked.unused_objects;
+  json["left_out"] = baked.left_out;
+  json["nested_geometries"] = baked.nested_geometries;
   json["median_edge"] = baked.world_median_edge;
   json["import"] = {{"directives", imported.directives},
                     {"files", imported.files_read},
@@ -77,10 +102,7 @@ nlohmann::json report(const BakeOptions& options, const BakeReport& baked, const
                     {"shapes_skipped", imported.shapes_skipped},
                     {"textures_found", imported.textures_found},
                     {"textures_missing", imported.textures_missing}};
-  json["dropped_streams"] = nlohmann::json::array();
-  for (const DroppedStream& dropped : baked.dropped)
-    json["dropped_streams"].push_back(
-        {{"stream", dropped.stream}, {"reason", dropped.reason}, {"bytes_saved", dropped.source_bytes}});
+  json["dropped_streams"] = dropped_streams_json(baked.file);
   json["warnings"] = baked.warnings;
   return json;
 }
@@ -97,7 +119,8 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   Progress progress(display.observer());
 
   const Stopwatch importing;
-  const ImportResult imported = import_for_command(options.input, options.scene, globals, progress, display);
+  const ImportResult imported =
+      import_for_command(options.input, options.scene, globals, progress, display, config.textures);
   const double import_s = importing.seconds();
 
   Diagnostics diagnostics;
@@ -109,7 +132,7 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   display.finish();
   report_diagnostics(diagnostics, globals);
 
-  if (json.wanted()) json.write(report(options, baked, imported.statistics, import_s, bake_s));
+  if (json.wanted()) json.write(report(options, baked, imported.statistics, import_s, bake_s, globals.verbosity > 0));
   if (json.to_stdout() || globals.quiet) return 0;
   fmt::print("{}: import {:.3f} s, bake {:.3f} s, peak memory {:.0f} MiB\n",
              options.dry_run ? "dry run" : options.output, import_s, bake_s,
@@ -122,10 +145,16 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
           baked.file.triangles, baked.file.bytes.total, baked.file.bytes_per_triangle, baked.max_position_error,
           baked.max_normal_error_degrees));
   fmt::print("{}", disk_text(baked.file));
-  for (const DroppedStream& dropped : baked.dropped)
-    fmt::print("{}", fmt::format(grouped(), "dropped {}: {} ({:L} bytes of source saved)\n", dropped.stream,
-                                 dropped.reason, dropped.source_bytes));
-  if (globals.verbosity > 0) fmt::print("\n{}", to_text(baked.file));
+  if (baked.instanced_shapes > 0)
+    fmt::print("{}", fmt::format(grouped(), "{:L} shapes outside objects share geometry, on grids of its own\n",
+                                 baked.instanced_shapes));
+  if (baked.nested_geometries > 0)
+    fmt::print("{}", fmt::format(grouped(), "{:L} geometries have finer steps, as they are small beside the scene's\n",
+                                 baked.nested_geometries));
+  if (baked.left_out > 0)
+    fmt::print("{}", fmt::format(grouped(), "{:L} shapes and instances are left out\n", baked.left_out));
+  fmt::print("{}", dropped_streams_text(baked.file));
+  if (globals.verbosity > 0) fmt::print("\n{}", to_text(baked.file, true));
   return 0;
 }
 
@@ -149,12 +178,12 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   for (CLI::Option* option : precisions)
     for (CLI::Option* other : precisions)
       if (option != other) option->excludes(other);
-  std::vector<std::string> encodings{kAutoNormals};
+  std::vector<std::string> encodings{kAuto};
   for (const NormalFormat& format : kNormalFormats) encodings.emplace_back(format.name);
   verb.add_option("--normals", options->normals,
                   "Encoding of normals; auto: axis16, axis24 or axis32 by --normal-error")
       ->check(CLI::IsMember(encodings))
-      ->default_str(kAutoNormals)
+      ->default_str(kAuto)
       ->group("Normals");
   verb.add_option(
           "--normal-error", options->normal_error,
@@ -162,17 +191,50 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
           "what 24 bits keep for every direction)")
       ->type_name("DEGREES")
       ->group("Normals");
+  verb.add_option("--for", options->purpose,
+                  "What the file is to be good for; what that does not need is left out. shading also keeps textures "
+                  "of materials, and the texture coordinates that they and normal maps need")
+      ->check(CLI::IsMember(std::vector<std::string>(kPurposes.begin(), kPurposes.end())))
+      ->default_str(options->purpose)
+      ->group("What is kept");
+  verb.add_option("--keep", options->keep, "Streams to keep everywhere, needed or not: uv, normals")
+      ->delimiter(',')
+      ->check(CLI::IsMember({std::string(kKeepUvs), std::string(kKeepNormals)}))
+      ->type_name("STREAMS")
+      ->group("What is kept");
+  verb.add_option(
+          "--uvs", options->uvs,
+          "Texture coordinates: auto keeps 1/32 texel wherever they lie; unorm16 (steps of 1/65535) and fp16 are "
+          "for compatibility")
+      ->check(CLI::IsMember(
+          std::vector<std::string>{kAuto, std::string(kUvEncodingNames[static_cast<size_t>(UvEncoding::kUnorm16)]),
+                                   std::string(kUvEncodingNames[static_cast<size_t>(UvEncoding::kFp16)])}))
+      ->default_str(kAuto)
+      ->group("Texture coordinates");
+  std::vector<std::string> texture_codecs{kNoTextures, kAuto};
+  texture_codecs.insert(texture_codecs.end(), kTextureCodecNames.begin(), kTextureCodecNames.end());
+  verb.add_option("--textures", options->textures,
+                  "Textures of materials: none leaves their average; auto takes for each the smallest codec that "
+                  "--texture-psnr allows (default auto with --for shading, else none)")
+      ->check(CLI::IsMember(texture_codecs))
+      ->group("Textures");
+  verb.add_option("--texture-psnr", options->texture_psnr, "What auto keeps, 10..100 dB of sRGB values (default 34)")
+      ->type_name("DB")
+      ->group("Textures");
   verb.add_option(
           "--codec", options->codec,
-          "Form on disk: none is mapped and traced as it is; fast and small are smaller, and decoded when opened")
+          "Form on disk: none is mapped and traced as it is; fast and small are smaller, and decoded when opened, fast "
+          "some eight times as quickly")
       ->check(CLI::IsMember({std::string(name_of(PageCodec::kNone)), std::string(name_of(PageCodec::kFast)),
                              std::string(name_of(PageCodec::kSmall))}))
       ->default_str(std::string(name_of(PageCodec::kNone)));
   verb.add_flag("--dry-run", options->dry_run, "Do everything but write the file");
   add_scene_options(verb, options->scene);
   verb.footer(
-      "The grid is shared by all geometry of the world, so meshes that touch stay closed. The error that was measured\n"
-      "against the source is printed, stored in the file, and never above half a step per axis.\n"
+      "Shapes outside objects lie on one grid, so meshes that touch stay closed; shapes that share a mesh are stored "
+      "once,\n"
+      "on a grid of its own. The error that was measured against the source is printed, stored in the file, and never\n"
+      "above half a step per axis. What was left out, and why, is printed; -v says it of each geometry.\n"
       "Examples:\n"
       "  packtrace bake house.pbrt -o house.ptk\n"
       "  packtrace bake house.pbrt -o small.ptk --precision 1e-4 --json report.json");

@@ -6,12 +6,14 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "runtime/commands/requirement_report.h"
+
 namespace packtrace {
 namespace {
 
 using Row = std::pair<const char*, uint64_t>;
 
-std::array<Row, 14> stream_rows(const StreamBytes& bytes) {
+std::array<Row, 16> stream_rows(const StreamBytes& bytes) {
   return {{{"indices", bytes.indices},
            {"positions", bytes.positions},
            {"normals", bytes.normals},
@@ -22,8 +24,10 @@ std::array<Row, 14> stream_rows(const StreamBytes& bytes) {
            {"instance_records", bytes.instance_records},
            {"material_records", bytes.material_records},
            {"masks", bytes.masks},
+           {"textures", bytes.textures},
            {"cameras", bytes.cameras},
            {"strings", bytes.strings},
+           {"requirement_records", bytes.requirement_records},
            {"header_and_alignment", bytes.header_and_alignment},
            {"total", bytes.total}}};
 }
@@ -65,8 +69,9 @@ const std::locale& grouped() {
   return kLocale;
 }
 
-nlohmann::json to_json(const FileSummary& s) {
-  nlohmann::json bytes, grids = nlohmann::json::array(), normals = nlohmann::json::array();
+nlohmann::json to_json(const FileSummary& s, bool by_geometry) {
+  nlohmann::json bytes, grids = nlohmann::json::array(), normals = nlohmann::json::array(),
+                        uvs = nlohmann::json::array();
   for (const auto& [name, count] : stream_rows(s.bytes)) bytes[name] = count;
   for (const GridUse& use : s.grids)
     grids.push_back({{"step", use.grid.step()}, {"world_space", use.world_space}, {"geometries", use.geometries}});
@@ -75,6 +80,20 @@ nlohmann::json to_json(const FileSummary& s) {
                        {"geometries", use.geometries},
                        {"vertices", use.vertices},
                        {"max_error_degrees", use.max_error_degrees}});
+  for (const UvUse& use : s.uvs)
+    uvs.push_back({{"encoding", kUvEncodingNames[static_cast<size_t>(use.encoding)]},
+                   {"geometries", use.geometries},
+                   {"vertices", use.vertices},
+                   {"max_error", use.max_error},
+                   {"max_error_texels", use.max_error_texels}});
+  nlohmann::json textures = nlohmann::json::array();
+  for (const TextureUse& use : s.textures)
+    textures.push_back({{"name", use.name},
+                        {"width", use.width},
+                        {"height", use.height},
+                        {"codec", kTextureCodecNames[static_cast<size_t>(use.codec)]},
+                        {"bytes", use.bytes},
+                        {"psnr_db", use.psnr_db}});
   return {
       {"triangles", s.triangles},
       {"placed_triangles", s.placed_triangles},
@@ -93,6 +112,8 @@ nlohmann::json to_json(const FileSummary& s) {
       {"disk", disk_json(s.disk)},
       {"grids", grids},
       {"normals", normals},
+      {"uvs", uvs},
+      {"textures", textures},
       {"max_position_error", s.max_position_error},
       {"max_position_error_bound", s.max_position_error_bound},
       {"max_normal_error_degrees", s.max_normal_error_degrees},
@@ -104,6 +125,7 @@ nlohmann::json to_json(const FileSummary& s) {
       {"unused_triangles", s.bake.unused_triangles},
       {"collapsed_triangles", s.bake.collapsed_triangles},
       {"merged_vertices", s.bake.merged_vertices},
+      {"requirements", requirements_json(s, by_geometry)},
   };
 }
 
@@ -115,7 +137,7 @@ std::string disk_text(const FileSummary& s) {
                      s.disk.page_count);
 }
 
-std::string to_text(const FileSummary& s) {
+std::string to_text(const FileSummary& s, bool by_geometry) {
   const auto triangles = static_cast<double>(s.triangles);
   std::string text =
       fmt::format(grouped(),
@@ -134,7 +156,15 @@ std::string to_text(const FileSummary& s) {
   for (const NormalUse& use : s.normals)
     text += fmt::format(grouped(), "normals {}: {:L} geometries, {:L} vertices, error {:.4f} degrees\n",
                         format_of(use.encoding).name, use.geometries, use.vertices, use.max_error_degrees);
-  if (!s.normals.empty()) text += "\n";
+  for (const UvUse& use : s.uvs)
+    text += fmt::format(grouped(), "uvs {}: {:L} geometries, {:L} vertices, error {:.3g}, {:.3g} texels at most\n",
+                        kUvEncodingNames[static_cast<size_t>(use.encoding)], use.geometries, use.vertices,
+                        use.max_error, use.max_error_texels);
+  if (!s.normals.empty() || !s.uvs.empty()) text += "\n";
+  for (const TextureUse& use : s.textures)
+    text += fmt::format(grouped(), "texture {}: {:L} x {:L}, {}, {:L} bytes, PSNR {:.2f} dB\n", use.name, use.width,
+                        use.height, kTextureCodecNames[static_cast<size_t>(use.codec)], use.bytes, use.psnr_db);
+  if (!s.textures.empty()) text += "\n";
   text += fmt::format("{:<22}{:>14}{:>16}\n", "stream", "bytes", "per triangle");
   for (const auto& [name, bytes] : stream_rows(s.bytes))
     if (bytes > 0)
@@ -150,7 +180,7 @@ std::string to_text(const FileSummary& s) {
   if (s.placed_triangles != s.triangles)
     text += fmt::format(grouped(), "{:<22}{:>14L}{:>16.3f}\n", "total, as placed", s.bytes.total,
                         s.bytes_per_placed_triangle);
-  return text;
+  return text + "\n" + requirements_text(s, by_geometry);
 }
 
 } // namespace packtrace

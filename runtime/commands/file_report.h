@@ -10,7 +10,8 @@
 namespace packtrace {
 
 /// What a baked file holds, as `info --json` and `bake --json` write it (docs/json_output.md).
-nlohmann::json to_json(const FileSummary& summary);
+/// @param by_geometry also what each geometry requires
+nlohmann::json to_json(const FileSummary& summary, bool by_geometry);
 
 /// For fmt's {:L}: 1234567 as 1,234,567, whatever the user's locale.
 const std::locale& grouped();
@@ -19,6 +20,6 @@ const std::locale& grouped();
 std::string disk_text(const FileSummary& summary);
 
 /// The same as to_json() for people: counts, errors, and a table of bytes by stream.
-std::string to_text(const FileSummary& summary);
+std::string to_text(const FileSummary& summary, bool by_geometry);
 
 } // namespace packtrace

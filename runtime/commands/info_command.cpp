@@ -134,8 +134,8 @@ int run(const InfoOptions& options, const GlobalOptions& globals) {
   if (is_baked_file(options.input)) {
     require_no_scene_choice(options.input, options.scene);
     const FileSummary summary = summarize(BakedFile::open(options.input));
-    document = to_json(summary);
-    text = to_text(summary);
+    document = to_json(summary, globals.verbosity > 0);
+    text = to_text(summary, globals.verbosity > 0);
   } else {
     const ImportResult imported = import_for_command(options.input, options.scene, globals, progress, display);
     document = to_json(imported, options.scene.world);

@@ -43,12 +43,14 @@ void require_no_scene_choice(const std::filesystem::path& file, const SceneOptio
 }
 
 ImportResult import_for_command(const std::filesystem::path& file, const SceneOptions& scene_options,
-                                const GlobalOptions& globals, Progress& progress, ProgressDisplay& display) {
+                                const GlobalOptions& globals, Progress& progress, ProgressDisplay& display,
+                                bool keep_textures) {
   Diagnostics diagnostics;
   ImportOptions options;
   options.strict = scene_options.strict;
   options.world = scene_options.world;
   options.time = scene_options.time;
+  options.keep_textures = keep_textures;
   ImportResult result;
   try {
     result = import_scene(file, options, diagnostics, progress);
@@ -75,7 +77,7 @@ LoadedScene load_scene(const std::filesystem::path& file, const SceneOptions& sc
     loaded.source = std::make_unique<PackedSource>(*loaded.baked);
   } else {
     loaded.imported =
-        std::make_unique<Scene>(import_for_command(file, scene_options, globals, progress, display).scene);
+        std::make_unique<Scene>(import_for_command(file, scene_options, globals, progress, display, true).scene);
     loaded.source = std::make_unique<FloatSource>(*loaded.imported);
   }
   return loaded;

@@ -31,10 +31,12 @@ void add_scene_options(CLI::App& verb, SceneOptions& options);
 void require_no_scene_choice(const std::filesystem::path& file, const SceneOptions& options);
 
 /// Imports a pbrt file, prints its diagnostics, and refuses scenes without triangles.
+/// @param keep_textures as in ImportOptions
 /// Throws Error(kInput) where the file cannot be read, lacks the world asked for, nothing is left of it, or strict is
 /// set and there was a problem.
 ImportResult import_for_command(const std::filesystem::path& file, const SceneOptions& scene_options,
-                                const GlobalOptions& globals, Progress& progress, ProgressDisplay& display);
+                                const GlobalOptions& globals, Progress& progress, ProgressDisplay& display,
+                                bool keep_textures = false);
 
 /// A scene on disk, packed or not, ready to be traced.
 struct LoadedScene {

@@ -6,6 +6,7 @@
 #include "runtime/commands/bake_command.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/compare_command.h"
+#include "runtime/commands/export_command.h"
 #include "runtime/commands/info_command.h"
 #include "runtime/commands/render_command.h"
 
@@ -36,6 +37,7 @@ int main(int argc, char** argv) {
   packtrace::add_info_command(app, globals);
   packtrace::add_render_command(app, globals);
   packtrace::add_compare_command(app, globals);
-  for (const char* verb : {"measure", "export", "view"}) add_planned_verb(app, globals, verb);
+  packtrace::add_export_command(app, globals);
+  for (const char* verb : {"measure", "view"}) add_planned_verb(app, globals, verb);
   return packtrace::run_verbs(app, globals, argc, argv);
 }

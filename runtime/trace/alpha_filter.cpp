@@ -2,13 +2,13 @@
 
 namespace packtrace {
 
-bool surface_present(const SceneSource& source, uint32_t geometry, uint32_t triangle, Vec2 barycentrics,
+bool surface_present(const SceneSource& source, uint32_t instance, uint32_t triangle, Vec2 barycentrics,
                      bool occlusion_ray) {
-  const Material& material = source.materials()[source.material_of(geometry, triangle)];
+  const Material& material = source.materials()[source.material_of(instance, triangle)];
   const bool all_rays = (material.flags & kAlphaMask) && material.alpha_mask != kNoMask;
   const bool shadows = occlusion_ray && (material.flags & kShadowAlphaMask) && material.shadow_alpha_mask != kNoMask;
   if (!all_rays && !shadows) return true;
-  const Vec2 uv = source.uv(geometry, triangle, barycentrics);
+  const Vec2 uv = source.uv(source.instances()[instance].geometry, triangle, barycentrics);
   if (all_rays && !source.mask(material.alpha_mask).opaque(uv)) return false;
   return !shadows || source.mask(material.shadow_alpha_mask).opaque(uv);
 }

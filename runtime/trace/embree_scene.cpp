@@ -60,7 +60,7 @@ FlushDenormals::~FlushDenormals() { _mm_setcsr(saved_); }
 
 /// Triangles of one surface with the same class; the user data of one RTCGeometry.
 struct EmbreeScene::Part {
-  const SceneSource* source = nullptr;
+  const EmbreeScene* scene = nullptr;
   uint32_t geometry = 0;
   uint32_t material_class = 0;
   std::vector<Triangle> triangles;
@@ -76,7 +76,10 @@ struct EmbreeScene::Part {
       const uint32_t triangle = part.source_triangle(RTCHitN_primID(args->hit, args->N, i));
       const Vec2 barycentrics(RTCHitN_u(args->hit, args->N, i), RTCHitN_v(args->hit, args->N, i));
       const bool occlusion = (RTCRayN_mask(args->ray, args->N, i) & kOcclusionRays) != 0;
-      if (!surface_present(*part.source, part.geometry, triangle, barycentrics, occlusion)) args->valid[i] = 0;
+      const Attachment& attachment =
+          part.scene->attachment_of(RTCHitN_instID(args->hit, args->N, i, 0), RTCHitN_geomID(args->hit, args->N, i));
+      const uint32_t instance = part.scene->placements_[attachment.placement].instance;
+      if (!surface_present(part.scene->source_, instance, triangle, barycentrics, occlusion)) args->valid[i] = 0;
     }
   }
 };
@@ -199,9 +202,9 @@ void EmbreeScene::place(std::vector<Decoded>& decoded) {
     placement.instance = i;
     placement.object_normal = normal_matrix(world_from_object);
     if (direct || !traceable_as_instance(unit_from_own)) {
-      placement.surface = add_surface(g, decoded[g], unit_from_object);
+      placement.surface = add_surface(i, decoded[g], unit_from_object);
     } else {
-      if (instanced_surface[g] == kNone) instanced_surface[g] = add_surface(g, decoded[g], own.unit_from_outer());
+      if (instanced_surface[g] == kNone) instanced_surface[g] = add_surface(i, decoded[g], own.unit_from_outer());
       placement.surface = instanced_surface[g];
       placement.instanced = true;
       placement.unit_from_surface = unit_from_own;
@@ -217,25 +220,26 @@ void EmbreeScene::place(std::vector<Decoded>& decoded) {
   }
 }
 
-uint32_t EmbreeScene::add_surface(uint32_t geometry, const Decoded& decoded, const DAffine& surface_from_object) {
+uint32_t EmbreeScene::add_surface(uint32_t instance, const Decoded& decoded, const DAffine& surface_from_object) {
   Surface surface;
-  surface.geometry = geometry;
+  surface.geometry = source_.instances()[instance].geometry;
   surface.positions.resize(decoded.positions.size() + kPaddingVertices, Vec3(0));
   tbb::parallel_for(tbb::blocked_range<size_t>(0, decoded.positions.size(), 65536), [&](const auto& range) {
     for (size_t i = range.begin(); i < range.end(); ++i)
       surface.positions[i] = Vec3(transform_point(surface_from_object, DVec3(decoded.positions[i])));
   });
-  split_parts(surface, decoded.triangles);
+  split_parts(surface, decoded.triangles, instance);
   surfaces_.push_back(std::move(surface));
   return static_cast<uint32_t>(surfaces_.size() - 1);
 }
 
 /// Sorts a surface's triangles into one part for each class of material; invisible ones go nowhere.
-void EmbreeScene::split_parts(Surface& surface, const std::vector<Triangle>& triangles) {
+/// @param instance any that places it: classes are the same in all of them
+void EmbreeScene::split_parts(Surface& surface, const std::vector<Triangle>& triangles, uint32_t instance) {
   const std::span<const Material> materials = source_.materials();
   std::array<Part, kClassCount> by_class;
   for (uint32_t t = 0; t < triangles.size(); ++t) {
-    const uint32_t material = source_.material_of(surface.geometry, t);
+    const uint32_t material = source_.material_of(instance, t);
     if (material >= materials.size())
       throw Error(ErrorKind::kInput, geometry_label(surface.geometry) + " has a triangle without a material");
     Part& part = by_class[material_class(materials[material].flags)];
@@ -249,7 +253,7 @@ void EmbreeScene::split_parts(Surface& surface, const std::vector<Triangle>& tri
     if (part.triangles.size() == triangles.size()) part.source_triangles = {};
     part.triangles.shrink_to_fit();
     part.source_triangles.shrink_to_fit();
-    part.source = &source_;
+    part.scene = this;
     part.geometry = surface.geometry;
     part.material_class = c;
     parts_.push_back(std::move(part));
@@ -294,9 +298,13 @@ void EmbreeScene::attach() {
 
 RTCSceneTy* EmbreeScene::handle() const { return device_->top.get(); }
 
+const EmbreeScene::Attachment& EmbreeScene::attachment_of(uint32_t instance, uint32_t geometry) const {
+  return attachments_[instance != RTC_INVALID_GEOMETRY_ID ? instance : geometry];
+}
+
 EmbreeScene::Hit EmbreeScene::resolve(uint32_t instance, uint32_t geometry, uint32_t primitive) const {
   const bool instanced = instance != RTC_INVALID_GEOMETRY_ID;
-  const Attachment& attachment = attachments_[instanced ? instance : geometry];
+  const Attachment& attachment = attachment_of(instance, geometry);
   const Part& part = parts_[attachment.part + (instanced ? geometry : 0u)];
   const Placement& placement = placements_[attachment.placement];
   const Vec3* positions = surfaces_[placement.surface].positions.data();

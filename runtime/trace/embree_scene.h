@@ -111,8 +111,9 @@ private:
   };
 
   void place(std::vector<Decoded>& decoded);
-  uint32_t add_surface(uint32_t geometry, const Decoded& decoded, const DAffine& surface_from_object);
-  void split_parts(Surface& surface, const std::vector<Triangle>& triangles);
+  uint32_t add_surface(uint32_t instance, const Decoded& decoded, const DAffine& surface_from_object);
+  void split_parts(Surface& surface, const std::vector<Triangle>& triangles, uint32_t instance);
+  const Attachment& attachment_of(uint32_t instance, uint32_t geometry) const;
   void attach();
 
   const SceneSource& source_;

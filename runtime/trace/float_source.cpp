@@ -85,8 +85,8 @@ const FloatSource::Part& FloatSource::part_of(uint32_t geometry, uint32_t triang
   return *(next - 1);
 }
 
-uint32_t FloatSource::material_of(uint32_t geometry, uint32_t triangle) const {
-  return part_of(geometry, triangle).material;
+uint32_t FloatSource::material_of(uint32_t instance, uint32_t triangle) const {
+  return part_of(instances_[instance].geometry, triangle).material;
 }
 
 std::optional<Vec3> FloatSource::shading_normal(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const {
@@ -117,6 +117,7 @@ uint64_t FloatSource::resident_bytes() const {
     bytes += mesh.positions.size() * sizeof(Vec3) + mesh.normals.size() * sizeof(Vec3) +
              mesh.uvs.size() * sizeof(Vec2) + mesh.triangles.size() * sizeof(Triangle);
   for (const AlphaMask& mask : scene_.masks) bytes += mask.words.size() * sizeof(uint32_t);
+  for (const AlbedoTexture& texture : scene_.textures) bytes += texture.rgb.size();
   return bytes;
 }
 

@@ -20,13 +20,14 @@ public:
   uint32_t geometry_count() const override { return static_cast<uint32_t>(geometries_.size()); }
   GeometryCounts counts(uint32_t geometry) const override { return geometries_[geometry].counts; }
   void decode(uint32_t geometry, std::span<Vec3> positions, std::span<Triangle> triangles) const override;
-  uint32_t material_of(uint32_t geometry, uint32_t triangle) const override;
+  uint32_t material_of(uint32_t instance, uint32_t triangle) const override;
   std::optional<Vec3> shading_normal(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const override;
   Vec2 uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const override;
   float position_error(uint32_t) const override { return 0.0f; }
   std::span<const PlacedGeometry> instances() const override { return instances_; }
   std::span<const Material> materials() const override { return scene_.materials; }
   AlphaMaskView mask(uint32_t index) const override { return view(scene_.masks[index]); }
+  TextureView texture(uint32_t index) const override { return view(scene_.textures[index]); }
   std::span<const Camera> cameras() const override { return scene_.cameras; }
   Bounds world_bounds() const override { return world_bounds_; }
   uint64_t resident_bytes() const override;

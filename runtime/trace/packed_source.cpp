@@ -48,8 +48,10 @@ void PackedSource::decode(uint32_t geometry, std::span<Vec3> positions, std::spa
   }
 }
 
-uint32_t PackedSource::material_of(uint32_t geometry, uint32_t triangle) const {
-  return file_.clusters(geometry)[file_.cluster_of_triangle(geometry, triangle)].material;
+uint32_t PackedSource::material_of(uint32_t instance, uint32_t triangle) const {
+  const uint32_t geometry = instances_[instance].geometry;
+  const uint32_t cluster = file_.cluster_of_triangle(geometry, triangle);
+  return file_.instance_materials(instance)[file_.clusters(geometry)[cluster].material_slot];
 }
 
 std::optional<Vec3> PackedSource::shading_normal(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const {
@@ -74,6 +76,8 @@ float PackedSource::position_error(uint32_t geometry) const {
   const auto rounded = static_cast<float>(bound);
   return rounded >= bound ? rounded : std::nextafter(rounded, std::numeric_limits<float>::infinity());
 }
+
+TextureView PackedSource::texture(uint32_t index) const { return file_.texture(index); }
 
 AlphaMaskView PackedSource::mask(uint32_t index) const { return file_.mask(index); }
 

@@ -18,13 +18,14 @@ public:
   uint32_t geometry_count() const override;
   GeometryCounts counts(uint32_t geometry) const override;
   void decode(uint32_t geometry, std::span<Vec3> positions, std::span<Triangle> triangles) const override;
-  uint32_t material_of(uint32_t geometry, uint32_t triangle) const override;
+  uint32_t material_of(uint32_t instance, uint32_t triangle) const override;
   std::optional<Vec3> shading_normal(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const override;
   Vec2 uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const override;
   float position_error(uint32_t geometry) const override;
   std::span<const PlacedGeometry> instances() const override { return instances_; }
   std::span<const Material> materials() const override { return materials_; }
   AlphaMaskView mask(uint32_t index) const override;
+  TextureView texture(uint32_t index) const override;
   std::span<const Camera> cameras() const override { return cameras_; }
   Bounds world_bounds() const override { return world_bounds_; }
 

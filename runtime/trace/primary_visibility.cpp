@@ -5,6 +5,7 @@
 
 #include <embree3/rtcore.h>
 
+#include "runtime/trace/albedo_lookup.h"
 #include "runtime/trace/ray_offset.h"
 #include "runtime/trace/tiles.h"
 
@@ -113,13 +114,13 @@ private:
     const DVec3 from_barycentrics = placed ? transform_point(placement.unit_from_surface, interpolated) : interpolated;
     const DVec3 unit_position = on_ray(ray, from_barycentrics, facing);
     const DVec3 position = scene_.space().from_unit(unit_position);
-    const uint32_t material = source_.material_of(hit.geometry, hit.triangle);
+    const uint32_t material = source_.material_of(placement.instance, hit.triangle);
 
     out_.view_z[pixel] = std::max(static_cast<float>(now_.view_z(position)), std::numeric_limits<float>::denorm_min());
     out_.position[pixel] = Vec3(position);
     out_.geometric_normal[pixel] = Vec3(facing);
     out_.normal[pixel] = shading_normal(hit, barycentrics, facing);
-    out_.albedo[pixel] = source_.materials()[material].albedo;
+    out_.albedo[pixel] = surface_albedo(source_, hit.geometry, hit.triangle, material, barycentrics);
     out_.instance[pixel] = placement.instance;
     out_.material[pixel] = material;
     out_.offset[pixel] =

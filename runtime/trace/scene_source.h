@@ -5,6 +5,7 @@
 #include <span>
 #include <string_view>
 
+#include "compress/format/texture_codec.h"
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace {
@@ -34,8 +35,10 @@ public:
   /// Object-space vertices and triangles; the spans have exactly the sizes of counts().
   virtual void decode(uint32_t geometry, std::span<Vec3> positions, std::span<Triangle> triangles) const = 0;
 
-  /// Into materials().
-  virtual uint32_t material_of(uint32_t geometry, uint32_t triangle) const = 0;
+  /// Into materials(). Instances of one geometry may have different materials, but each triangle's have one
+  /// baked::material_class() in all of them.
+  /// @param triangle of the instance's geometry
+  virtual uint32_t material_of(uint32_t instance, uint32_t triangle) const = 0;
 
   /// Interpolated vertex normal in object space, unit length; none where the surface is flat.
   /// @param barycentrics weights of the triangle's second and third vertex
@@ -50,6 +53,8 @@ public:
   virtual std::span<const PlacedGeometry> instances() const = 0;
   virtual std::span<const Material> materials() const = 0;
   virtual AlphaMaskView mask(uint32_t index) const = 0;
+  /// Of Material::albedo_texture.
+  virtual TextureView texture(uint32_t) const { return {}; }
   virtual std::span<const Camera> cameras() const = 0;
   virtual Bounds world_bounds() const = 0;
 

@@ -51,6 +51,20 @@ TEST(CommittedScenes, RoomImportsWithoutComplaint) {
   EXPECT_GT(scene.instances.size(), 500u);
 }
 
+TEST(CommittedScenes, TexturedHasFiveTexturesAMaskAndABumpMap) {
+  Diagnostics diagnostics;
+  Progress progress;
+  ImportOptions options;
+  options.keep_textures = true;
+  const Scene scene = import_scene(kAssets / "textured/textured.pbrt", options, diagnostics, progress).scene;
+  EXPECT_EQ(complaints(diagnostics), "");
+  EXPECT_EQ(scene.textures.size(), 5u);
+  EXPECT_EQ(scene.masks.size(), 1u);
+  EXPECT_EQ(std::count_if(scene.materials.begin(), scene.materials.end(),
+                          [](const Material& m) { return (m.flags & kNormalMap) != 0; }),
+            1);
+}
+
 TEST(CommittedScenes, ExtremeKeepsItsSmallestAndItsLargest) {
   const Scene scene = import_quietly(kAssets / "extreme/extreme.pbrt").scene;
   std::vector<float> sizes;

@@ -22,6 +22,10 @@ Scene full_scene() {
   mask.uv_scale = {2, 1};
   scene.masks.push_back(mask);
   scene.materials.push_back({"leaf", kAlphaMask, Vec3(0.1f, 0.5f, 0.2f), 0, kNoMask});
+  scene.textures.push_back({"checks", 5, 3, WrapMode::kClamp, Vec2(1, 2), Vec2(0.5f, 0), {}});
+  for (uint8_t i = 0; i < 45; ++i) scene.textures[0].rgb.push_back(static_cast<uint8_t>(i * 5));
+  scene.materials[1].flags |= kAlbedoTexture;
+  scene.materials[1].albedo_texture = 0;
   test::add_shape(scene, test::grid_mesh(2), test::translation({0, 0, 1}), 1);
   scene.meshes.push_back(test::sphere_mesh(4));
   Object object{"ball", {Shape{2, 0, false, DAffine(1.0)}}};
@@ -34,6 +38,14 @@ Scene full_scene() {
   scene.cameras.push_back(camera);
   scene.dropped_triangles = 3;
   return scene;
+}
+
+BakedScene full_bake() {
+  BakeConfig config;
+  config.purpose = baked::kShading;
+  config.textures = true;
+  config.texture_codec = TextureCodec::kBc1;
+  return test::bake(full_scene(), config);
 }
 
 ErrorKind open_kind(std::span<const std::byte> bytes, std::string* message = nullptr) {
@@ -74,6 +86,11 @@ void read_all(const BakedFile& file) {
     }
   }
   for (uint32_t i = 0; i < file.sections().masks.size(); ++i) (void)file.mask(i).opaque(Vec2(0.3f, 0.7f));
+  for (uint32_t i = 0; i < file.sections().textures.size(); ++i) {
+    const TextureView texture = file.texture(i);
+    for (uint32_t x = 0; x < std::min(texture.width, 100u); ++x) (void)texture.texel(x, texture.height - 1);
+    ASSERT_TRUE(is_finite(texture.sample(Vec2(0.3f, 0.7f))));
+  }
   for (const Material& m : file.materials()) (void)m.name.size();
   (void)file.cameras();
   (void)summarize(file);
@@ -81,7 +98,7 @@ void read_all(const BakedFile& file) {
 
 TEST(BakedFile, EverythingComesBack) {
   const Scene scene = full_scene();
-  const BakedScene baked = test::bake(scene);
+  const BakedScene baked = full_bake();
   const BakedFile file = BakedFile::from_bytes(baked.bytes);
   ASSERT_EQ(file.geometries().size(), 3u);
   ASSERT_EQ(file.instances().size(), 4u);
@@ -90,7 +107,16 @@ TEST(BakedFile, EverythingComesBack) {
   const auto materials = file.materials();
   ASSERT_EQ(materials.size(), 2u);
   EXPECT_EQ(materials[1].name, "leaf");
-  EXPECT_EQ(materials[1].flags, kAlphaMask);
+  EXPECT_EQ(materials[1].flags, kAlphaMask | kAlbedoTexture);
+  EXPECT_EQ(materials[1].albedo_texture, 0u);
+  EXPECT_EQ(materials[0].albedo_texture, kNoTexture);
+  const TextureView texture = file.texture(0);
+  EXPECT_EQ(texture.width, 5u);
+  EXPECT_EQ(texture.height, 3u);
+  EXPECT_EQ(texture.wrap, WrapMode::kClamp);
+  EXPECT_EQ(texture.uv_scale, Vec2(1, 2));
+  EXPECT_EQ(texture.codec, TextureCodec::kBc1);
+  EXPECT_EQ(file.text(file.sections().textures[0].name), "checks");
   EXPECT_EQ(materials[1].albedo, Vec3(0.1f, 0.5f, 0.2f));
   EXPECT_EQ(materials[1].alpha_mask, 0u);
   EXPECT_EQ(file.mask(0).width, 40u);
@@ -108,19 +134,19 @@ TEST(BakedFile, EverythingComesBack) {
 }
 
 TEST(BakedFile, EveryTruncatedPrefixIsRefused) {
-  const BakedScene baked = test::bake(full_scene());
+  const BakedScene baked = full_bake();
   for (size_t size = 0; size < baked.bytes.size(); ++size)
     ASSERT_EQ(open_kind(std::span(baked.bytes).first(size)), ErrorKind::kInput) << size;
 }
 
 TEST(BakedFile, TrailingBytesAreRefused) {
-  BakedScene baked = test::bake(full_scene());
+  BakedScene baked = full_bake();
   baked.bytes.resize(baked.bytes.size() + 64);
   EXPECT_EQ(open_kind(baked.bytes), ErrorKind::kInput);
 }
 
 TEST(BakedFile, EverySingleBitFlipIsRefused) {
-  BakedScene baked = test::bake(full_scene());
+  BakedScene baked = full_bake();
   for (size_t bit = 0; bit < 8 * baked.bytes.size(); ++bit) {
     const auto flip = static_cast<std::byte>(1u << (bit % 8));
     baked.bytes[bit / 8] ^= flip;
@@ -132,7 +158,7 @@ TEST(BakedFile, EverySingleBitFlipIsRefused) {
 }
 
 TEST(BakedFile, DamageWithRightHashesIsRefusedOrHarmless) {
-  const BakedScene baked = test::bake(full_scene());
+  const BakedScene baked = full_bake();
   test::Random random(14);
   uint32_t refused = 0, accepted = 0;
   for (int round = 0; round < 20000; ++round) {
@@ -159,7 +185,7 @@ TEST(BakedFile, DamageWithRightHashesIsRefusedOrHarmless) {
 }
 
 TEST(BakedFile, MessagesNameWhatAndWhere) {
-  BakedScene baked = test::bake(full_scene());
+  BakedScene baked = full_bake();
   baked::FileHeader header;
   std::memcpy(&header, baked.bytes.data(), sizeof header);
   const size_t at = header.sections[baked::kInstances].offset + 3 * sizeof(baked::InstanceRecord) +
@@ -174,8 +200,73 @@ TEST(BakedFile, MessagesNameWhatAndWhere) {
   EXPECT_EQ(message, "memory: not a packtrace baked file");
 }
 
+/// Changes one u32 of a file and returns what opening it says.
+std::string message_after(std::vector<std::byte> bytes, baked::Section section, size_t at, uint32_t value) {
+  baked::FileHeader header;
+  std::memcpy(&header, bytes.data(), sizeof header);
+  std::memcpy(bytes.data() + header.sections[section].offset + at, &value, sizeof value);
+  rehash(bytes);
+  std::string message;
+  EXPECT_EQ(open_kind(bytes, &message), ErrorKind::kInput);
+  return message;
+}
+
+TEST(BakedFile, MaterialSlotsAreChecked) {
+  Scene scene = full_scene(); // materials 0: plain, 1: masked
+  scene.instances.push_back({1, Affine(1.0f)});
+  scene.objects.push_back({"masked ball", {Shape{2, 1, false, DAffine(1.0)}, Shape{0, 0, false, DAffine(1.0)}}});
+  const std::vector<std::byte> bytes = test::bake(scene).bytes;
+  const BakedFile file = BakedFile::from_bytes(bytes);
+  ASSERT_EQ(file.sections().material_slots.size(), 4u); // {0}, {1}, {0, 1}
+  ASSERT_EQ(file.instances()[4].first_slot, 2u);
+  ASSERT_EQ(file.geometries()[3].slot_count, 2u);
+  const auto message = [&](baked::Section section, size_t at, uint32_t value) {
+    return message_after(bytes, section, at, value);
+  };
+  const auto slots_of = [](size_t geometry) {
+    return geometry * sizeof(baked::GeometryRecord) + offsetof(baked::GeometryRecord, slot_count);
+  };
+  const auto first_slot_of = [](size_t instance) {
+    return instance * sizeof(baked::InstanceRecord) + offsetof(baked::InstanceRecord, first_slot);
+  };
+  const std::string damaged = "memory: damaged baked file: ";
+  EXPECT_EQ(message(baked::kMaterialSlots, 4, 2), damaged + "material slot 1: material");
+  EXPECT_EQ(message(baked::kGeometries, slots_of(0), 0), damaged + "geometry 0: material slots");
+  EXPECT_EQ(message(baked::kGeometries, slots_of(2), 2), damaged + "geometry 2: material slots"); // of one cluster
+  EXPECT_EQ(message(baked::kGeometries, slots_of(2), ~0u), damaged + "instance 2: material slots");
+  EXPECT_EQ(message(baked::kInstances, first_slot_of(4), 3), damaged + "instance 4: material slots");
+  EXPECT_EQ(message(baked::kInstances, first_slot_of(0), ~0u), damaged + "instance 0: material slots");
+  EXPECT_EQ(message(baked::kInstances, first_slot_of(3), 1), damaged + "instance 3: material classes"); // not 2's
+  EXPECT_EQ(message(baked::kInstances, first_slot_of(4), 1), damaged + "instance 4: material classes"); // descending
+  EXPECT_EQ(message(baked::kInstances, first_slot_of(0), 1), damaged + "cluster 0: material class order");
+  EXPECT_EQ(
+      message(baked::kInstances, 4 * sizeof(baked::InstanceRecord) + offsetof(baked::InstanceRecord, geometry), 0),
+      damaged + "geometry 3: no instance places it");
+  EXPECT_EQ(message(baked::kClusters, offsetof(baked::ClusterRecord, material_slot), 1),
+            damaged + "cluster 0: material slot");
+}
+
+TEST(BakedFile, RequirementsAreChecked) {
+  const std::vector<std::byte> bytes = test::bake(full_scene()).bytes;
+  ASSERT_GE(BakedFile::from_bytes(bytes).sections().requirements.size(), 3u);
+  const std::string damaged = "memory: damaged baked file: ";
+  constexpr size_t kRow = sizeof(baked::RequirementRecord);
+  const auto message = [&](size_t at, uint32_t value) { return message_after(bytes, baked::kRequirements, at, value); };
+  EXPECT_EQ(message(0, baked::kStreamCount), damaged + "requirement 0: stream or reason");
+  EXPECT_EQ(message(4, baked::kReasonCount), damaged + "requirement 0: stream or reason");
+  EXPECT_EQ(message(kRow + 8, 0), damaged + "requirement 1: geometries");
+  EXPECT_EQ(message(kRow + 8, 4), damaged + "requirement 1: geometries"); // of three
+  EXPECT_EQ(message(kRow + 12, 1), damaged + "requirement 1: stream or reason");
+  EXPECT_EQ(message(0, baked::kTangents), damaged + "requirement 1: order");
+  EXPECT_EQ(message_after(bytes, baked::kSummary, offsetof(baked::SummaryRecord, purpose), 2), damaged + "purpose");
+  EXPECT_EQ(message_after(bytes, baked::kSummary, offsetof(baked::SummaryRecord, purpose), 8u << baked::kKeepShift),
+            damaged + "purpose");
+  EXPECT_EQ(message_after(bytes, baked::kGeometries, offsetof(baked::GeometryRecord, requirements), 1u << 24),
+            damaged + "geometry 0: requirements");
+}
+
 TEST(BakedFile, MovingKeepsItsViewsValid) {
-  BakedFile first = BakedFile::from_bytes(test::bake(full_scene()).bytes);
+  BakedFile first = BakedFile::from_bytes(full_bake().bytes);
   const ClusterView view = first.cluster(0, 0);
   const Vec3 before = view.position(0);
   const BakedFile second = std::move(first);
@@ -184,13 +275,18 @@ TEST(BakedFile, MovingKeepsItsViewsValid) {
 }
 
 TEST(FileSummary, StreamsAddUpToTheFile) {
-  const FileSummary s = summarize(BakedFile::from_bytes(test::bake(full_scene()).bytes));
+  const FileSummary s = summarize(BakedFile::from_bytes(full_bake().bytes));
   const StreamBytes& b = s.bytes;
   EXPECT_EQ(b.indices + b.positions + b.normals + b.uvs + b.payload_padding + b.cluster_records + b.geometry_records +
-                b.instance_records + b.material_records + b.masks + b.cameras + b.strings + b.header_and_alignment,
+                b.instance_records + b.material_records + b.masks + b.textures + b.cameras + b.strings +
+                b.requirement_records + b.header_and_alignment,
             b.total);
   EXPECT_GT(b.uvs, 0u);
   EXPECT_GT(b.normals, 0u);
+  EXPECT_GT(b.textures, 0u);
+  ASSERT_EQ(s.textures.size(), 1u);
+  EXPECT_EQ(s.textures[0].bytes, 16u);
+  EXPECT_GT(s.textures[0].psnr_db, 20.0f);
   EXPECT_EQ(s.shared_geometries, 1u);
   EXPECT_EQ(s.placed_triangles, 18u + 8u + 2u * 48u);
   EXPECT_EQ(s.triangles, 18u + 8u + 48u);

@@ -59,7 +59,7 @@ std::vector<uint8_t> expect_round_trip(const Case& c) {
     EXPECT_TRUE(find_cluster_fault(c.geometry, record, bytes.data(), payload_bytes - 4));
   }
   const ClusterView view(c.geometry, record, bytes.data());
-  EXPECT_EQ(view.material(), 5u);
+  EXPECT_EQ(view.material_slot(), 5u);
   EXPECT_EQ(view.has_normals(), !c.codes.empty());
   EXPECT_EQ(view.has_uvs(), !c.uvs.empty());
   EXPECT_EQ((view.stream_bits().total() + 31) / 32 * 4, payload_bytes);
@@ -81,9 +81,10 @@ std::vector<uint8_t> expect_round_trip(const Case& c) {
     }
     if (view.has_uvs()) {
       EXPECT_EQ(view.uv(v), all_uvs[v]);
-      const float u_step = std::ldexp(1.0f, c.geometry.uv_exponent[0]),
-                  v_step = std::ldexp(1.0f, c.geometry.uv_exponent[1]);
-      EXPECT_EQ(view.uv(v), Vec2(from_uv_lattice(c.uvs[source][0], u_step), from_uv_lattice(c.uvs[source][1], v_step)));
+      const auto encoding = static_cast<UvEncoding>(c.geometry.uv_encoding);
+      const UvDecoder u(encoding, c.geometry.uv_exponent[0]), v_of(encoding, c.geometry.uv_exponent[1]);
+      EXPECT_EQ(view.uv_code(v), (std::array<int64_t, 2>{c.uvs[source][0], c.uvs[source][1]}));
+      EXPECT_EQ(view.uv(v), Vec2(u(c.uvs[source][0]), v_of(c.uvs[source][1])));
     }
   }
   return bytes;
@@ -322,6 +323,50 @@ TEST_P(ClusterNormals, FlippedBitsAreFaultsOrHarmless) {
   }
   EXPECT_GT(harmless, 1000u); // both ways are taken, or this test tests nothing
   EXPECT_GT(faults, 1000u);
+}
+
+/// Whatever the bits are: charts that do not exist, codes far beyond the cross of unfolded faces.
+TEST_P(ClusterNormals, AllAtOnceAreThoseOneByOne) {
+  test::Random random(17);
+  uint32_t charts = 0;
+  for (int round = 0; round < 3000; ++round) {
+    const uint32_t vertex_count = 3 + random.bits() % 254;
+    baked::GeometryRecord geometry{};
+    geometry.step_mantissa = 8;
+    geometry.normal_encoding = static_cast<uint32_t>(GetParam());
+    const uint32_t width = round % 3 == 0 ? 17 : 1 + random.bits() % 12;
+    baked::ClusterRecord record{};
+    record.triangle_count = record.restart_count = 128;
+    record.vertex_count = static_cast<uint16_t>(vertex_count);
+    record.normal_bits = {static_cast<uint8_t>(width), static_cast<uint8_t>(random.bits() % (width + 1))};
+    for (int16_t& anchor : record.normal_anchor)
+      anchor = static_cast<int16_t>(round % 2 == 0 ? random.bits() : random.bits() % 1000 - 500);
+    const uint32_t chart_count = format_of(GetParam()).charts, chart = random.bits() % chart_count;
+    const bool mixed = chart_count > 1 && random.bits() % 3 == 0;
+    record.flags = static_cast<uint8_t>(baked::kClusterHasNormals | (mixed ? uint32_t{baked::kClusterMixedCharts}
+                                                                           : chart << baked::kClusterChartShift));
+    const IndexLayout layout{128, vertex_count, 128};
+    std::vector<uint8_t> bytes(layout.total_bits() / 8 + vertex_count * 6 + kReadSlackBytes);
+    for (uint8_t& byte : bytes) byte = static_cast<uint8_t>(random.bits());
+    const uint32_t stride = record.normal_bits[0] + record.normal_bits[1] + (mixed ? bits_for_count(chart_count) : 0u);
+    if (random.bits() % 4 == 0) { // an index below 2^7 each
+      record.normal_palette = 128;
+      record.vertex_count = 200;
+      bytes.resize(layout.total_bits() / 8 + 128 * 6 + 200 + 2 * kReadSlackBytes);
+    } else {
+      const uint64_t bits = layout.total_bits() + uint64_t{vertex_count} * stride;
+      bytes.resize(static_cast<size_t>((bits + 7) / 8) + kReadSlackBytes); // not a byte more than is promised
+    }
+    const ClusterView view(geometry, record, bytes.data());
+    std::vector<Vec3> normals(view.vertex_count());
+    decode_normals(view, normals);
+    for (uint32_t v = 0; v < view.vertex_count(); ++v) {
+      const Vec3 one = view.normal(v);
+      ASSERT_EQ(std::memcmp(&one, &normals[v], sizeof one), 0) << round << " " << v;
+      charts |= 1u << view.normal_fields(v).chart;
+    }
+  }
+  EXPECT_EQ(charts, (1u << format_of(GetParam()).charts) - 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Encodings, ClusterNormals,

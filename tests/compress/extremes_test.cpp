@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <iterator>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -149,12 +150,13 @@ TEST(Extremes, EveryScaleThatFloatsHold) {
   }
 }
 
-void expect_refused(const Scene& scene, const BakeConfig& config = {}) {
+void expect_refused(const Scene& scene, const BakeConfig& config, const std::string& message) {
   try {
     (void)bake(scene, config);
     FAIL() << "was baked";
   } catch (const Error& error) {
     EXPECT_EQ(error.kind(), ErrorKind::kLimitExceeded) << error.what();
+    EXPECT_NE(std::string(error.what()).find(message), std::string::npos) << error.what();
   }
 }
 
@@ -164,13 +166,14 @@ TEST(Extremes, TheLargestFloats) {
     expect_survives(test::sphere_mesh(9, radius));
   }
   // Steps of 2^126: the nearest lattice point is 2^128, which is no float.
-  expect_refused(scene_of(test::sphere_mesh(9, FLT_MAX)), precision(PrecisionKind::kPositionBits, 3.0));
+  expect_refused(scene_of(test::sphere_mesh(9, FLT_MAX)), precision(PrecisionKind::kPositionBits, 3.0),
+                 "sphere: coordinates up to 3.4e+38 round to more than the largest float at a step of 9.57e+37");
 }
 
 TEST(Extremes, ScalesThatNoGridHoldsAreRefused) {
   Scene scene = scene_of(test::sphere_mesh(20), test::scaling(DVec3(1e-30)));
   test::add_shape(scene, test::sphere_mesh(4), test::scaling(DVec3(1e30)));
-  expect_refused(scene);
+  expect_refused(scene, {}, "exceed the lattice limit");
 }
 
 TEST(Extremes, PlacesFarFromTheOrigin) {
@@ -308,7 +311,7 @@ TEST(Extremes, ScalesSideBySideInOneScene) {
   expect_scene_holds(scene, precision(PrecisionKind::kDiagonalFraction, 1e-7));
 }
 
-TEST(Extremes, WorldShapesOfEveryScaleShareOneGrid) {
+TEST(Extremes, WorldShapesOfEveryScaleShareOneLattice) {
   Scene scene;
   scene.materials.push_back({});
   uint32_t rings = 8; // no two shapes are alike, or they would share a geometry of its own grid
@@ -317,9 +320,87 @@ TEST(Extremes, WorldShapesOfEveryScaleShareOneGrid) {
                     compose(test::translation({2.5 * scale, 0, 0}), test::scaling(DVec3(scale))));
   const BakedScene baked = bake(scene);
   const BakedFile file = BakedFile::from_bytes(baked.bytes);
-  for (const baked::GeometryRecord& geometry : file.geometries()) EXPECT_NE(geometry.flags & baked::kWorldSpace, 0u);
+  for (const baked::GeometryRecord& geometry : file.geometries()) {
+    EXPECT_NE(geometry.flags & baked::kWorldSpace, 0u);
+    EXPECT_EQ(geometry.step_mantissa, file.summary().world_step_mantissa); // finer by powers of two
+    EXPECT_LE(geometry.step_exponent, file.summary().world_step_exponent);
+  }
   expect_scene_holds(scene, {});
   expect_scene_holds(scene, precision(PrecisionKind::kAbsolute, 1e-8));
+}
+
+double step_of(const baked::GeometryRecord& g) { return PositionGrid{g.step_mantissa, g.step_exponent}.step(); }
+
+/// A mountain of 20,000 triangles over 1e6 units.
+Scene mountain_scene() { return scene_of(test::grid_mesh(100, 0.3f), test::scaling(DVec3(1e6))); }
+
+TEST(Extremes, CrumbsBeforeAMountainKeepTheirShape) {
+  Scene scene = mountain_scene();
+  const DAffine small = compose(test::translation({-1e-5, 0, 0}), test::scaling(DVec3(1e-6)));
+  test::add_shape(scene, test::sphere_mesh(9), small);
+  test::add_shape(scene, test::grid_mesh(5, 0.1f), // as fine as floats are there
+                  compose(test::translation({2e6, 0, 0}), test::scaling(DVec3(100))));
+  const BakedScene baked = bake(scene);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  EXPECT_EQ(baked.report.nested_geometries, 2u);
+  EXPECT_EQ(baked.report.collapsed_triangles, 0u);
+  EXPECT_TRUE(baked.report.warnings.empty()) << baked.report.warnings.front();
+  const double world = baked.report.world_step;
+  EXPECT_EQ(step_of(file.geometries()[0]), world);
+  for (const uint32_t g : {1u, 2u}) {
+    EXPECT_NE(file.geometries()[g].flags & baked::kWorldSpace, 0u);
+    EXPECT_EQ(file.geometries()[g].step_mantissa, file.geometries()[0].step_mantissa);
+  }
+  EXPECT_LT(step_of(file.geometries()[1]), 1e-6 / 128);
+  EXPECT_GT(step_of(file.geometries()[1]), 1e-6 / 128 / 20);
+  EXPECT_GE(step_of(file.geometries()[2]), 2e6 * 0x1p-23);
+  EXPECT_LE(step_of(file.geometries()[2]), 2e6 * 0x1p-22);
+  expect_scene_holds(scene, {});
+  // Who asks for an absolute error, or one relative to the scene, gets just that.
+  for (const BakeConfig& config :
+       {precision(PrecisionKind::kAbsolute, 10.0), precision(PrecisionKind::kPositionBits, 14.0),
+        precision(PrecisionKind::kDiagonalFraction, 1e-5)})
+    EXPECT_EQ(bake(scene, config).report.nested_geometries, 0u);
+}
+
+/// Distinct decoded positions of a geometry.
+std::vector<std::array<float, 3>> positions_of(const BakedFile& file, uint32_t g) {
+  std::vector<std::array<float, 3>> all;
+  for (const Vec3 p : test::decode(file, g).positions) all.push_back({p.x, p.y, p.z});
+  std::sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  return all;
+}
+
+size_t common_positions(const BakedFile& file, uint32_t a, uint32_t b) {
+  const auto first = positions_of(file, a), second = positions_of(file, b);
+  std::vector<std::array<float, 3>> both;
+  std::set_intersection(first.begin(), first.end(), second.begin(), second.end(), std::back_inserter(both));
+  return both.size();
+}
+
+TEST(Extremes, SmallThingsThatTouchStayClosed) {
+  // Two small patches with a border in common, of different fineness, and one that hangs on a vertex of the mountain.
+  Scene scene = mountain_scene();
+  const DVec3 place(-1e3, 0, 0);
+  Mesh left = test::grid_mesh(8, 0.1f), right = test::grid_mesh(16, 0.1f);
+  for (Vec3& p : right.positions) p.x += 1.0f, p.z = 0.0f;
+  for (Vec3& p : left.positions) p.z = 0.0f;
+  test::add_shape(scene, left, test::translation(place));
+  test::add_shape(scene, right, test::translation(place));
+  const DVec3 peak = DVec3(scene.meshes[0].positions[5000]) * 1e6;
+  test::add_shape(scene, test::grid_mesh(8), test::translation(DVec3(Vec3(peak))));
+  const BakedScene baked = bake(scene);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  EXPECT_EQ(baked.report.nested_geometries, 2u);
+  EXPECT_EQ(step_of(file.geometries()[1]), step_of(file.geometries()[2]));
+  EXPECT_LT(step_of(file.geometries()[1]), 1.0 / 16 / 128);
+  EXPECT_EQ(common_positions(file, 1, 2), 9u); // the border, every vertex of the coarser patch
+  EXPECT_EQ(step_of(file.geometries()[3]), baked.report.world_step);
+  EXPECT_GE(common_positions(file, 0, 3), 1u);
+  ASSERT_GE(baked.report.warnings.size(), 1u); // of the one that stays coarse
+  EXPECT_NE(baked.report.warnings[0].find("1 of 4 geometries have a step above an eighth"), std::string::npos)
+      << baked.report.warnings[0];
 }
 
 uint64_t peak_rss_bytes() {

@@ -121,7 +121,7 @@ Decoded decode(const BakedFile& file, uint32_t geometry) {
     decode_indices(view, static_cast<uint32_t>(vertex), std::span(out.triangles).subspan(triangle));
     if (view.has_normals()) decode_normals(view, std::span(out.normals).subspan(vertex));
     if (view.has_uvs()) decode_uvs(view, std::span(out.uvs).subspan(vertex));
-    out.materials.resize(out.triangles.size(), view.material());
+    out.slots.resize(out.triangles.size(), view.material_slot());
   }
   return out;
 }

@@ -44,7 +44,7 @@ struct Decoded {
   std::vector<Vec3> normals; ///< zero for clusters without
   std::vector<Vec2> uvs;     ///< zero for clusters without
   std::vector<Triangle> triangles;
-  std::vector<uint32_t> materials; ///< per triangle
+  std::vector<uint32_t> slots; ///< per triangle, of materials
 };
 Decoded decode(const BakedFile& file, uint32_t geometry);
 

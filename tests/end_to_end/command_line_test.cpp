@@ -39,8 +39,46 @@ private:
 TEST(CommandLine, HelpNamesEveryVerb) {
   const CommandResult result = run_packtrace({"--help"});
   EXPECT_EQ(result.exit_code, 0);
-  for (const char* verb : {"bake", "info", "render", "compare"})
+  for (const char* verb : {"bake", "info", "render", "compare", "export"})
     EXPECT_NE(result.out.find(verb), std::string::npos) << verb;
+}
+
+TEST(CommandLine, RequirementsAreExplainedInSentencesAndAsData) {
+  const Workbench bench;
+  write_text(bench / "textured.pbrt", R"(WorldBegin
+Texture "checks" "spectrum" "checkerboard"
+Material "matte" "texture Kd" "checks"
+Shape "trianglemesh" "integer indices" [0 1 2 0 2 3] "point P" [0 0 0  1 0 0  1 1 0.3  0 1 0] "float uv" [0 0 1 0 1 1 0 1]
+WorldEnd
+)");
+  const std::string file = bench / "textured.ptk";
+  const CommandResult ao = run_packtrace({"bake", bench / "textured.pbrt", "-o", file, "-v"});
+  ASSERT_EQ(ao.exit_code, 0) << ao.err;
+  for (const char* sentence :
+       {"required for ao:", "uv dropped: no masked material, 2 triangles of 1 geometries, 32 bytes of source saved",
+        "normals: the source has none, 2 triangles of 1 geometries",
+        "materials: 1 of 1 in use, at most 1 in one geometry (0 bits); flags in use: albedo texture (1 of 12 bits), ao "
+        "looks at: none",
+        "triangles 2   instances 1   materials 1; normals: the source has none; uv dropped"})
+    EXPECT_NE(ao.out.find(sentence), std::string::npos) << sentence << "\n" << ao.out;
+
+  const CommandResult shading =
+      run_packtrace({"bake", bench / "textured.pbrt", "-o", file, "-q", "--force", "--for", "shading"});
+  ASSERT_EQ(shading.exit_code, 0) << shading.err;
+  const CommandResult info = run_packtrace({"info", file, "-v", "--json", "-"});
+  const auto requirements = nlohmann::json::parse(info.out).at("requirements");
+  EXPECT_EQ(requirements.at("for"), "shading");
+  EXPECT_EQ(requirements.at("streams").at(1).at("reason"), "texture");
+  EXPECT_EQ(requirements.at("streams").at(1).at("source_bytes"), 32);
+  EXPECT_GT(requirements.at("streams").at(1).at("stored_bytes"), 0);
+  EXPECT_EQ(requirements.at("geometries").at(0).at("reasons").at("uv"), nlohmann::json({"texture"}));
+  EXPECT_FALSE(nlohmann::json::parse(run_packtrace({"info", file, "--json", "-"}).out)
+                   .at("requirements")
+                   .contains("geometries"));
+  EXPECT_NE(run_packtrace({"info", file}).out.find("uv kept: textures look them up, 2 triangles"), std::string::npos);
+
+  EXPECT_EQ(run_packtrace({"bake", bench.scene(), "--dry-run", "--for", "beauty"}).exit_code, 2);
+  EXPECT_EQ(run_packtrace({"bake", bench.scene(), "--dry-run", "--keep", "uv,colours"}).exit_code, 2);
 }
 
 TEST(CommandLine, NothingToDoIsAUsageError) { EXPECT_EQ(run_packtrace({}).exit_code, 2); }
@@ -52,7 +90,7 @@ TEST(CommandLine, UnknownVerbIsAUsageErrorThatNamesIt) {
 }
 
 TEST(CommandLine, PlannedVerbSaysThatItIsNotThereYet) {
-  for (const char* verb : {"measure", "export", "view"}) {
+  for (const char* verb : {"measure", "view"}) {
     const CommandResult result = run_packtrace({verb});
     EXPECT_EQ(result.exit_code, 4) << verb;
     EXPECT_NE(result.err.find(verb), std::string::npos) << result.err;
@@ -285,6 +323,38 @@ TEST(CommandLine, CompareBeyondALimitExitsWithFive) {
             0);
   EXPECT_EQ(run_packtrace({"compare", bench / "a.exr", bench / "b.exr", "--layer", "ao", "--max-rmse", "0"}).exit_code,
             5);
+}
+
+TEST(CommandLine, TexturesOfTheFileLookLikeThoseOfTheScene) {
+  const TemporaryDirectory directory;
+  const std::string scene = PACKTRACE_SOURCE_DIR "/assets/textured/textured.pbrt", baked = directory / "t.ptk";
+  const auto render = [&](const std::string& from, const std::string& to) {
+    return run_packtrace({"render", from, "-o", to, "--aov", "albedo", "--frames", "1", "--size", "160x90", "--force"})
+        .exit_code;
+  };
+  const auto compare = [&](const char* psnr) {
+    return run_packtrace(
+               {"compare", directory / "t.exr", directory / "truth.exr", "--layer", "albedo", "--min-psnr", psnr})
+        .exit_code;
+  };
+  ASSERT_EQ(render(scene, directory / "truth.exr"), 0);
+  ASSERT_EQ(run_packtrace({"bake", scene, "-o", baked, "-q"}).exit_code, 0);
+  ASSERT_EQ(render(baked, directory / "t.exr"), 0);
+  EXPECT_EQ(compare("30"), 5) << "averages are no textures";
+  ASSERT_EQ(run_packtrace({"bake", scene, "-o", baked, "-q", "--force", "--for", "shading"}).exit_code, 0);
+  ASSERT_EQ(render(baked, directory / "t.exr"), 0);
+  EXPECT_EQ(compare("38"), 0);
+  const CommandResult info = run_packtrace({"info", baked});
+  EXPECT_NE(info.out.find("texture bricks: 128 x 128, bc1, 8,192 bytes, PSNR 41."), std::string::npos) << info.out;
+  const CommandResult exported = run_packtrace({"export", baked, "-o", directory / "t.v16", "--layout", "vertex16"});
+  EXPECT_EQ(exported.exit_code, 0) << exported.err;
+  EXPECT_NE(exported.out.find("9,816 triangles in 5 draws of 5 geometries"), std::string::npos) << exported.out;
+  EXPECT_EQ(run_packtrace({"export", baked, "-o", directory / "t.v16"}).exit_code, 6) << "it is there already";
+  EXPECT_EQ(run_packtrace({"export", directory / "t.v16", "-o", directory / "u.v16"}).exit_code, 3);
+  EXPECT_EQ(run_packtrace({"export", baked, "-o", directory / "u.v16", "--layout", "obj"}).exit_code, 2);
+  EXPECT_EQ(run_packtrace({"bake", scene, "-o", baked, "--force", "--texture-psnr", "40"}).exit_code, 2);
+  EXPECT_EQ(run_packtrace({"bake", scene, "-o", baked, "--force", "--textures", "bc1"}).exit_code, 2) << "not for ao";
+  EXPECT_EQ(run_packtrace({"bake", scene, "-o", baked, "--force", "-q", "--textures", "none"}).exit_code, 0);
 }
 
 } // namespace

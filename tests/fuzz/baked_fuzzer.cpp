@@ -1,5 +1,6 @@
-// Baked files: validation, and everything a reader can ask of a file that passed it. Most changes to a file would only
-// spoil its hashes, so each input is tried as it is and once more with the header's sizes and hashes made right.
+// Baked files, resident and in disk form: decoding of pages, validation, and everything a reader can ask of a file that
+// passed it. Most changes to a file would only spoil its hashes, so each input is tried as it is, with the sizes and
+// hashes of header, table and pages made right, and with those of what its pages are decoded to made right, too.
 
 #include <algorithm>
 #include <cstring>
@@ -10,13 +11,14 @@
 
 #include "compress/format/baked_file.h"
 #include "compress/format/file_summary.h"
+#include "compress/format/page_codec.h"
 #include "pbrt_import/scene/error.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace packtrace::fuzz {
 namespace {
 
-void make_hashes_right(std::vector<std::byte>& bytes) {
+void make_resident_hashes_right(std::span<std::byte> bytes) {
   baked::FileHeader header;
   if (bytes.size() < sizeof header) return;
   std::memcpy(&header, bytes.data(), sizeof header);
@@ -26,6 +28,37 @@ void make_hashes_right(std::vector<std::byte>& bytes) {
   const XXH128_hash_t hash = XXH3_128bits(bytes.data() + sizeof header, bytes.size() - sizeof header);
   header.content_hash = {hash.low64, hash.high64};
   header.header_hash = XXH3_64bits(&header, offsetof(baked::FileHeader, header_hash));
+  std::memcpy(bytes.data(), &header, sizeof header);
+}
+
+/// Hashes of the pages where their sizes allow that, the last page ending with the file; then that of the table.
+void make_page_hashes_right(std::span<std::byte> bytes, baked::PagedHeader& header) {
+  const uint64_t limit = bytes.size();
+  const uint64_t table_bytes = uint64_t{header.page_count} * sizeof(baked::PageRecord);
+  if (header.head_disk_bytes > limit || header.tail_disk_bytes > limit) return;
+  const uint64_t data = sizeof header + table_bytes + header.head_disk_bytes + header.tail_disk_bytes;
+  if (data > limit) return;
+  std::byte* const table = bytes.data() + sizeof header;
+  uint64_t at = data;
+  for (uint32_t i = 0; i < header.page_count; ++i) {
+    baked::PageRecord page;
+    std::memcpy(&page, table + i * sizeof page, sizeof page);
+    if (i + 1 == header.page_count) page.disk_bytes = static_cast<uint32_t>(limit - at);
+    if (page.disk_bytes > limit - at) break;
+    page.hash = XXH3_64bits(bytes.data() + at, page.disk_bytes);
+    at += page.disk_bytes;
+    std::memcpy(table + i * sizeof page, &page, sizeof page);
+  }
+  header.table_hash = XXH3_64bits(table, static_cast<size_t>(data) - sizeof header);
+}
+
+void make_hashes_right(std::span<std::byte> bytes) {
+  baked::PagedHeader header;
+  if (!is_paged_file(bytes) || bytes.size() < sizeof header) return make_resident_hashes_right(bytes);
+  std::memcpy(&header, bytes.data(), sizeof header);
+  header.file_bytes = bytes.size();
+  make_page_hashes_right(bytes, header);
+  header.header_hash = XXH3_64bits(&header, offsetof(baked::PagedHeader, header_hash));
   std::memcpy(bytes.data(), &header, sizeof header);
 }
 
@@ -71,7 +104,7 @@ void read_geometry(const BakedFile& file, uint32_t geometry) {
   const auto clusters = static_cast<uint32_t>(file.clusters(geometry).size());
   for (uint32_t c = 0; c < clusters; ++c) {
     const ClusterView cluster = file.cluster(geometry, c);
-    require(cluster.material() < file.sections().materials.size(), "material number");
+    require(cluster.material_slot() < file.geometries()[geometry].slot_count, "material slot");
     read_cluster(cluster);
     const uint32_t first = cluster.record().first_triangle;
     for (const uint32_t triangle : {first, first + cluster.triangle_count() - 1})
@@ -83,27 +116,55 @@ void read_rest(const BakedFile& file) {
   for (uint32_t i = 0; i < file.instances().size(); ++i) {
     const Affine map = file.world_from_object(i);
     for (int column = 0; column < 4; ++column) require(is_finite(map[column]), "instance transform");
+    for (const uint32_t material : file.instance_materials(i))
+      require(material < file.sections().materials.size(), "material number");
   }
   for (uint32_t i = 0; i < file.sections().masks.size(); ++i) {
     const AlphaMaskView mask = file.mask(i);
     for (const Vec2 uv : {Vec2(0.3f, 0.7f), Vec2(-1e30f, 1e30f), Vec2(0.0f), Vec2(1.0f)}) (void)mask.opaque(uv);
   }
-  for (const Material& material : file.materials())
+  for (uint32_t i = 0; i < file.sections().textures.size(); ++i) {
+    const TextureView texture = file.texture(i);
+    (void)texture.texel(texture.width - 1, texture.height - 1);
+    for (const Vec2 uv : {Vec2(0.3f, 0.7f), Vec2(-1e30f, 1e30f), Vec2(0.0f), Vec2(1.0f)}) (void)texture.sample(uv);
+  }
+  for (const Material& material : file.materials()) {
+    require(material.albedo_texture == kNoTexture || material.albedo_texture < file.sections().textures.size(),
+            "texture number");
     for (const uint32_t mask : {material.alpha_mask, material.shadow_alpha_mask})
       require(mask == kNoMask || mask < file.sections().masks.size(), "mask number");
+  }
   require(file.cameras().size() == file.sections().cameras.size(), "number of cameras");
   (void)file.world_bounds();
   require(summarize(file).bytes.total == file.file_bytes(), "summary of the file");
 }
 
-void read_baked(std::span<const std::byte> bytes) {
+/// Calls read, which may refuse the file.
+template <class Read>
+void expect_read_or_refused(Read read) {
   try {
-    const BakedFile file = BakedFile::from_bytes(bytes);
-    for (uint32_t g = 0; g < file.geometries().size(); ++g) read_geometry(file, g);
-    read_rest(file);
+    read();
   } catch (const Error& error) {
     require(error.kind() == ErrorKind::kInput || error.kind() == ErrorKind::kUnsupported, "kind of error");
   }
+}
+
+void read_baked(std::span<const std::byte> bytes) {
+  expect_read_or_refused([&] {
+    const BakedFile file = BakedFile::from_bytes(bytes);
+    for (uint32_t g = 0; g < file.geometries().size(); ++g) read_geometry(file, g);
+    read_rest(file);
+  });
+}
+
+/// What pages are decoded to after changes no longer has its content hash: validation would look at nothing else.
+void read_decoded_pages(std::span<const std::byte> bytes) {
+  expect_read_or_refused([&] {
+    DiskForm form;
+    std::vector<std::byte> resident = expand_paged_file(bytes, "memory", form);
+    make_resident_hashes_right(resident);
+    read_baked(resident);
+  });
 }
 
 } // namespace
@@ -116,5 +177,6 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   std::vector<std::byte> repaired(bytes.begin(), bytes.end());
   make_hashes_right(repaired);
   read_baked(repaired);
+  if (packtrace::is_paged_file(repaired)) read_decoded_pages(repaired);
   return 0;
 }

@@ -24,6 +24,7 @@ ImportOptions small_limits() {
   options.max_included_files = 16;
   options.max_nesting = 32;
   options.tessellation_tolerance = 0.05;
+  options.keep_textures = true;
   options.allow_files_outside_scene_folder = false; // inputs must mean the same on every machine
   return options;
 }

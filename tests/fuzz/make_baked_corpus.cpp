@@ -1,10 +1,11 @@
-// Writes the baked form of scenes of the import corpus, so that the baked corpus always has the current format.
+// Writes the baked forms of scenes of the import corpus, so that the baked corpus always has the current format.
 
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <string>
 
 #include "compress/bake/bake_scene.h"
 #include "pbrt_import/import_scene.h"
@@ -20,11 +21,19 @@ void bake_input(const std::filesystem::path& input, const std::filesystem::path&
   const std::string text(std::istreambuf_iterator<char>(in), {});
   fuzz::SceneFilesFolder files;
   ImportOptions options;
+  options.keep_textures = true;
   options.tessellation_tolerance = 0.1; // small files make small changes matter
   Diagnostics diagnostics;
   Progress progress;
   const ImportResult result = import_scene(files.write(text), options, diagnostics, progress);
-  write_file_bytes(folder / input.stem(), bake_to_bytes(result.scene, {}, diagnostics, progress).bytes);
+  for (const PageCodec codec : {PageCodec::kNone, PageCodec::kFast, PageCodec::kSmall}) {
+    BakeConfig config;
+    config.purpose = baked::kShading;
+    config.textures = true;
+    config.codec = codec;
+    const std::string name = input.stem().string() + "." + std::string(name_of(codec));
+    write_file_bytes(folder / name, bake_to_bytes(result.scene, config, diagnostics, progress).bytes);
+  }
 }
 
 } // namespace

@@ -30,7 +30,7 @@ private:
   std::vector<bool> used_;
 };
 
-void require_material(const Material& material, Uses& masks) {
+void require_material(const Material& material, Uses& masks, Uses& textures) {
   for (int c = 0; c < 3; ++c) require(material.albedo[c] >= 0.0f && material.albedo[c] <= 1.0f, "albedo outside [0,1]");
   require((material.flags & ~kAllMaterialFlags) == 0 && (material.flags & kAbsent) == 0, "material flags");
   const auto require_mask = [&](MaterialFlags flag, uint32_t mask) {
@@ -39,6 +39,17 @@ void require_material(const Material& material, Uses& masks) {
   };
   require_mask(kAlphaMask, material.alpha_mask);
   require_mask(kShadowAlphaMask, material.shadow_alpha_mask);
+  if (material.albedo_texture == kNoTexture) return;
+  require((material.flags & kAlbedoTexture) != 0, "texture without its flag");
+  textures.add(material.albedo_texture, "texture number");
+}
+
+void require_texture(const AlbedoTexture& texture) {
+  require(texture.width > 0 && texture.height > 0, "texture without texels");
+  require(texture.rgb.size() == size_t{3} * texture.width * texture.height, "size of a texture");
+  require(static_cast<uint32_t>(texture.wrap) <= 2, "wrap mode of a texture");
+  for (const Vec2 v : {texture.uv_scale, texture.uv_offset})
+    require(std::isfinite(v.x) && std::isfinite(v.y), "transform of a texture");
 }
 
 void require_mask(const AlphaMask& mask) {
@@ -87,6 +98,7 @@ void require_camera(const Camera& camera) {
 
 void require_scene_contract(const Scene& scene) {
   Uses meshes(scene.meshes.size()), materials(scene.materials.size()), masks(scene.masks.size());
+  Uses textures(scene.textures.size());
   Uses objects(scene.objects.size()), animations(scene.animations.size());
   const auto require_animation_number = [&](uint32_t number) {
     if (number != kNotAnimated) animations.add(number, "animation number");
@@ -110,7 +122,8 @@ void require_scene_contract(const Scene& scene) {
     objects.add(instance.object, "object number");
     require(is_affine_invertible(DAffine(instance.world_from_object)), "instance transform");
   }
-  for (const Material& material : scene.materials) require_material(material, masks);
+  for (const Material& material : scene.materials) require_material(material, masks, textures);
+  for (const AlbedoTexture& texture : scene.textures) require_texture(texture);
   for (const AlphaMask& mask : scene.masks) require_mask(mask);
   for (const Camera& camera : scene.cameras) {
     require_camera(camera);
@@ -125,7 +138,7 @@ void require_scene_contract(const Scene& scene) {
     require(moving.animation != kNotAnimated, "animated instance without an animation");
     require_animation_number(moving.animation);
   }
-  require(meshes.all() && materials.all() && masks.all() && objects.all() && animations.all(),
+  require(meshes.all() && materials.all() && masks.all() && textures.all() && objects.all() && animations.all(),
           "something unused was kept");
 }
 
@@ -174,6 +187,7 @@ void append_scene(std::string& to, const Scene& scene) {
     append_bytes(to, material.albedo);
     append_bytes(to, material.alpha_mask);
     append_bytes(to, material.shadow_alpha_mask);
+    append_bytes(to, material.albedo_texture);
   }
   for (const AlphaMask& mask : scene.masks) {
     append_bytes(to, mask.width);
@@ -182,6 +196,15 @@ void append_scene(std::string& to, const Scene& scene) {
     append_bytes(to, mask.uv_scale);
     append_bytes(to, mask.uv_offset);
     append_all(to, mask.words);
+  }
+  for (const AlbedoTexture& texture : scene.textures) {
+    append(to, texture.name);
+    append_bytes(to, texture.width);
+    append_bytes(to, texture.height);
+    append_bytes(to, texture.wrap);
+    append_bytes(to, texture.uv_scale);
+    append_bytes(to, texture.uv_offset);
+    append_all(to, texture.rgb);
   }
   append_shapes(to, scene.shapes);
   for (const Object& object : scene.objects) {

@@ -1,5 +1,6 @@
 #include "pbrt_import/shapes/mesh_cleanup.h"
 
+#include <algorithm>
 #include <limits>
 
 #include <gtest/gtest.h>
@@ -126,6 +127,42 @@ TEST_F(MeshCleanup, UvsThatAreNotFiniteBecomeZero) {
   clean(mesh);
   EXPECT_EQ(mesh.uvs, (std::vector<Vec2>{{0.5f, 0.5f}, {0, 0}, {0, 0}, {1, 1}}));
   EXPECT_EQ(reports_.size(), 1u);
+}
+
+TEST_F(MeshCleanup, LargeMeshesAreCheckedLikeSmallOnes) {
+  constexpr uint32_t kVertices = 100'000, kLost = 50'000; // many pieces' worth
+  Mesh mesh;
+  for (uint32_t i = 0; i < kVertices; ++i) mesh.positions.emplace_back(i, i % 2, 0);
+  for (uint32_t i = 0; i + 2 < kVertices; ++i) mesh.triangles.emplace_back(i, i + 1, i + 2);
+  mesh.normals.assign(kVertices, Vec3(0, 0, 2));
+  mesh.uvs.assign(kVertices, Vec2(0.5f));
+  std::vector<Triangle> expected;
+  for (Triangle t : mesh.triangles) {
+    if (t.x == 40'000 || t.x == 70'001 || t.x == 70'003 || (t.x <= kLost && kLost <= t.z)) continue;
+    for (int k = 0; k < 3; ++k) t[k] -= t[k] > kLost;
+    expected.push_back(t);
+  }
+  mesh.triangles[40'000].y = kVertices;
+  mesh.triangles[70'001].y = mesh.triangles[70'001].z;
+  mesh.triangles[70'003].y = mesh.triangles[70'003].x;
+  mesh.positions[kLost].z = kNan;
+  mesh.normals[33'000] = mesh.normals[80'000] = Vec3(0.0f);
+  mesh.uvs[34'000].x = mesh.uvs[99'999].y = kInfinity;
+  EXPECT_EQ(clean(mesh), 6u);
+  EXPECT_TRUE(mesh.triangles == expected);
+  EXPECT_EQ(mesh.positions.size(), kVertices - 1);
+  EXPECT_EQ(mesh.positions[kLost], Vec3(kLost + 1, 1, 0));
+  EXPECT_EQ(std::count(mesh.normals.begin(), mesh.normals.end(), Vec3(0, 0, 1)) +
+                std::count(mesh.normals.begin(), mesh.normals.end(), Vec3(0, 0, -1)),
+            kVertices - 1);
+  EXPECT_EQ(std::count(mesh.uvs.begin(), mesh.uvs.end(), Vec2(0.5f)), kVertices - 3);
+  ASSERT_EQ(reports_.size(), 5u);
+  EXPECT_EQ(reports_[0].message, "1 triangle (number 40000) dropped: vertex index out of range");
+  EXPECT_EQ(reports_[1].message, "2 triangles (the first is number 70001) dropped: repeated vertex index");
+  EXPECT_EQ(reports_[2].message, "3 triangles (the first is number 49998) dropped: vertex position not finite");
+  EXPECT_EQ(reports_[3].message,
+            "2 vertex normals (the first is number 33000) zero or not finite: recomputed from the faces around");
+  EXPECT_EQ(reports_[4].message, "2 uvs (the first is number 34000) not finite: set to zero");
 }
 
 TEST_F(MeshCleanup, NothingLeftIsAnEmptyMesh) {

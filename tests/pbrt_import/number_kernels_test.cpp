@@ -71,7 +71,7 @@ void expect_right_numbers(const RandomText& text, NumberBatch (*kernel)(const ch
     };
     for (size_t i = 0; i < batch.count; ++i) {
       skip_space();
-      const char* const end = std::find_if(p, text.end(), is_space);
+      const char* const end = std::find_if(p, text.end(), [](char c) { return is_space(c) || c == ']'; });
       T expected{};
       const auto [read_to, error] = std::from_chars(p, end, expected);
       ASSERT_TRUE(read_to == end && error == std::errc()) << std::string(p, end);
@@ -113,6 +113,25 @@ TEST(NumberKernels, ConvertPlainNumbersWithoutHelp) {
       kernels->floats(text.data() + kKernelLead, text.data() + size, values.data(), values.size());
   EXPECT_EQ(batch.count, 1000u);
   EXPECT_EQ(batch.line_ends, 333u); // the last one comes after the last number
+}
+
+TEST(NumberKernels, TakeTheNumberBeforeTheBracketAndStopThere) {
+  const NumberKernels* const kernels = number_kernels();
+  if (!kernels) GTEST_SKIP() << "this processor has no AVX2";
+  for (size_t numbers = 1; numbers < 60; ++numbers) {
+    std::string text(kKernelLead, ' ');
+    for (size_t i = 0; i < numbers; ++i) text += (i > 0 ? " " : "") + std::to_string(i);
+    const size_t close = text.size();
+    text += "] 7 8 9 ";
+    const size_t size = text.size();
+    text.append(kKernelReach, '\0');
+    std::vector<int32_t> values(100);
+    const NumberBatch batch =
+        kernels->integers(text.data() + kKernelLead, text.data() + size, values.data(), values.size());
+    ASSERT_EQ(batch.count, numbers);
+    ASSERT_EQ(batch.end, text.data() + close);
+    ASSERT_EQ(values[numbers - 1], static_cast<int32_t>(numbers - 1));
+  }
 }
 
 TEST(NumberKernels, FloatsNearTheMiddleRoundOnce) {

@@ -15,6 +15,11 @@ Parameter number(std::string name, const std::vector<float>& values) {
   return parameter;
 }
 
+void add(ParameterList& list, Parameter parameter) {
+  list.append() = std::move(parameter);
+  list.keep();
+}
+
 std::string numbered(int number) { return std::string("p").append(std::to_string(number)); }
 
 TEST(Parameters, SynonymsAreTheSameType) {
@@ -26,28 +31,28 @@ TEST(Parameters, SynonymsAreTheSameType) {
 
 TEST(Parameters, LastOfTheSameNameAndTypeWins) {
   ParameterList list;
-  list.add(number("radius", {1}));
-  list.add(number("radius", {2}));
+  add(list, number("radius", {1}));
+  add(list, number("radius", {2}));
   EXPECT_EQ(list.get_float("radius", 0), 2);
   EXPECT_EQ(list.all().size(), 1u);
 }
 
 TEST(Parameters, LastWinsInVeryLongListsToo) {
   ParameterList list;
-  for (int i = 0; i < 100; ++i) list.add(number(numbered(i % 50), {static_cast<float>(i)}));
+  for (int i = 0; i < 100; ++i) add(list, number(numbered(i % 50), {static_cast<float>(i)}));
   for (int i = 0; i < 50; ++i) EXPECT_EQ(list.get_float(numbered(i), -1), static_cast<float>(50 + i));
 }
 
 TEST(Parameters, WrongCountGivesTheDefaultAndStaysUnused) {
   ParameterList list;
-  list.add(number("radius", {1, 2}));
+  add(list, number("radius", {1, 2}));
   EXPECT_EQ(list.get_float("radius", 7), 7);
   EXPECT_FALSE(list.all()[0].used);
 }
 
 TEST(Parameters, WrongTypeGivesTheDefaultAndStaysUnused) {
   ParameterList list;
-  list.add(number("levels", {2}));
+  add(list, number("levels", {2}));
   EXPECT_EQ(list.get_integer("levels", 3), 3);
   EXPECT_FALSE(list.all()[0].used);
   EXPECT_TRUE(list.was_asked("levels"));
@@ -55,7 +60,7 @@ TEST(Parameters, WrongTypeGivesTheDefaultAndStaysUnused) {
 
 TEST(Parameters, TakingMovesTheValuesOut) {
   ParameterList list;
-  list.add(number("x", {1, 2, 3}));
+  add(list, number("x", {1, 2, 3}));
   EXPECT_EQ(list.take_vectors("x", ParameterType::kFloat), (std::vector<Vec3>{{1, 2, 3}}));
   EXPECT_TRUE(list.take_vectors("x", ParameterType::kFloat).empty());
   EXPECT_TRUE(list.take_vectors("x", ParameterType::kPoint3).empty());

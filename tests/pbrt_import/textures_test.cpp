@@ -328,5 +328,110 @@ TEST(AlphaTextures, DeepTextureGraphsEnd) {
   EXPECT_FALSE(shallow.reported("approximated"));
 }
 
+/// The world with textures kept.
+ImportResult with_textures(const SceneFolder& folder, const std::string& world) {
+  folder.write("kept.pbrt", "WorldBegin\n" + world + "\nWorldEnd\n");
+  ImportOptions options;
+  options.keep_textures = true;
+  Diagnostics diagnostics;
+  Progress progress;
+  return import_scene(folder.path() / "kept.pbrt", options, diagnostics, progress);
+}
+
+const std::string kMatte = "Material \"matte\" \"texture Kd\" \"t\"\n" + std::string(kTriangle) + "\n";
+
+TEST(AlbedoTextures, ImagesAreKeptAsTheyAre) {
+  const SceneFolder folder;
+  folder.write("a.tga", grey_tga(3, 2, {0, 10, 20, 128, 200, 255}));
+  const std::string image = "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.tga\" ";
+  const ImportResult kept = with_textures(folder, image +
+                                                      "\"float uscale\" 3 \"float vdelta\" 0.5 "
+                                                      "\"string wrap\" \"clamp\"\n" +
+                                                      kMatte);
+  ASSERT_EQ(kept.scene.textures.size(), 1u);
+  const AlbedoTexture& texture = kept.scene.textures[0];
+  EXPECT_EQ(texture.name, "t");
+  EXPECT_EQ(texture.width, 3u);
+  EXPECT_EQ(texture.height, 2u);
+  EXPECT_EQ(texture.wrap, WrapMode::kClamp);
+  EXPECT_EQ(texture.uv_scale, Vec2(3, 1));
+  EXPECT_EQ(texture.uv_offset, Vec2(0, 0.5f));
+  EXPECT_EQ(texture.rgb,
+            (std::vector<uint8_t>{0, 0, 0, 10, 10, 10, 20, 20, 20, 128, 128, 128, 200, 200, 200, 255, 255, 255}));
+  EXPECT_EQ(kept.scene.materials.at(0).albedo_texture, 0u);
+  EXPECT_EQ(kept.scene.materials[0].flags, kAlbedoTexture);
+  EXPECT_TRUE(import_world(folder, image + "\n" + kMatte).scene.textures.empty()) << "not unless asked for";
+}
+
+TEST(AlbedoTextures, ExpressionsAreEvaluatedAtTheTexels) {
+  const SceneFolder folder;
+  folder.write("a.tga", grey_tga(2, 1, {0, 255}));
+  const std::string image = "Texture \"i\" \"spectrum\" \"imagemap\" \"string filename\" \"a.tga\"\n";
+  const auto rgb_of = [&](const std::string& texture) {
+    const ImportResult kept = with_textures(folder, image + texture + "\n" + kMatte);
+    return kept.scene.textures.size() == 1 ? kept.scene.textures[0].rgb : std::vector<uint8_t>{};
+  };
+  EXPECT_EQ(rgb_of("Texture \"t\" \"spectrum\" \"scale\" \"texture tex1\" \"i\" \"rgb tex2\" [ 1 0 0.5 ]"),
+            (std::vector<uint8_t>{0, 0, 0, 255, 0, 188}));
+  EXPECT_EQ(rgb_of("Texture \"t\" \"spectrum\" \"mix\" \"texture tex1\" \"i\" \"rgb tex2\" [ 1 1 1 ]"),
+            (std::vector<uint8_t>{188, 188, 188, 255, 255, 255}));
+  const std::vector<uint8_t> checks =
+      rgb_of("Texture \"t\" \"spectrum\" \"checkerboard\" \"rgb tex1\" [ 1 0 0 ] \"rgb tex2\" [ 0 1 0 ]");
+  ASSERT_EQ(checks.size(), 3u * 256 * 256);
+  EXPECT_EQ((std::vector<uint8_t>{checks.begin(), checks.begin() + 3}), (std::vector<uint8_t>{0, 255, 0})); // u < v
+  EXPECT_EQ((std::vector<uint8_t>{checks.end() - 3 * 256, checks.end() - 3 * 255}), (std::vector<uint8_t>{255, 0, 0}));
+}
+
+TEST(AlbedoTextures, WhatUvDoesNotChangeIsAnAverage) {
+  const SceneFolder folder;
+  folder.write("a.tga", grey_tga(2, 1, {0, 255}));
+  for (const char* const texture :
+       {"\"imagemap\" \"string filename\" \"a.tga\" \"string mapping\" \"spherical\"", "\"fbm\"",
+        "\"imagemap\" \"string filename\" \"missing.tga\"", "\"constant\" \"rgb value\" [ 0.2 0.3 0.4 ]"}) {
+    const ImportResult kept =
+        with_textures(folder, "Texture \"t\" \"spectrum\" " + std::string(texture) + "\n" + kMatte);
+    EXPECT_TRUE(kept.scene.textures.empty()) << texture;
+    EXPECT_EQ(kept.scene.materials.at(0).albedo_texture, kNoTexture) << texture;
+  }
+}
+
+TEST(AlbedoTextures, EqualOnesAreStoredOnceAndUnusedOnesNot) {
+  const SceneFolder folder;
+  folder.write("a.tga", grey_tga(2, 1, {0, 255}));
+  folder.write("b.tga", grey_tga(2, 1, {0, 255}));
+  folder.write("c.tga", grey_tga(2, 1, {9, 255}));
+  std::string world;
+  for (const std::string name : {"a", "b", "c"}) {
+    world += "Texture \"" + name + "\" \"spectrum\" \"imagemap\" \"string filename\" \"" + name + ".tga\"\n";
+    world += "Material \"matte\" \"texture Kd\" \"" + name + "\"\n";
+    if (name != "c") world += std::string(kTriangle) + "\n";
+  }
+  const ImportResult kept = with_textures(folder, world);
+  ASSERT_EQ(kept.scene.textures.size(), 1u);
+  EXPECT_EQ(kept.scene.textures[0].name, "a");
+}
+
+TEST(AlbedoTextures, TogetherStayWithinTheBudget) {
+  const SceneFolder folder;
+  std::string world;
+  for (const std::string name : {"a", "b", "c"}) { // 3000 bytes of colours each
+    folder.write(name + ".tga", grey_tga(100, 10, std::vector<uint8_t>(1000, static_cast<uint8_t>(name[0]))));
+    world += "Texture \"" + name + "\" \"spectrum\" \"imagemap\" \"string filename\" \"" + name + ".tga\"\n" +
+             "Material \"matte\" \"texture Kd\" \"" + name + "\"\n" + std::string(kTriangle) + "\n";
+  }
+  folder.write("three.pbrt", "WorldBegin\n" + world + "\nWorldEnd\n");
+  const auto textures = [&](uint64_t budget, bool keep) {
+    ImportOptions options;
+    options.keep_textures = keep;
+    options.memory_budget_bytes = budget;
+    Diagnostics diagnostics;
+    Progress progress;
+    return import_scene(folder.path() / "three.pbrt", options, diagnostics, progress).scene.textures.size();
+  };
+  EXPECT_EQ(textures(9000, true), 3u);
+  EXPECT_EQ(textures(8999, false), 0u);
+  EXPECT_THROW(textures(8999, true), Error);
+}
+
 } // namespace
 } // namespace packtrace

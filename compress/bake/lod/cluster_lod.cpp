@@ -37,7 +37,7 @@ public:
   LodBuilder(const QuantizedGeometry& geometry, Progress& progress) : g_(geometry), progress_(progress) {
     lod_.positions = geometry.positions;
     lod_.vertices = geometry.vertices;
-    for (const TriangleKind& kind : geometry.kinds) seam_of_kind_.push_back(kind.material);
+    for (const TriangleKind& kind : geometry.kinds) seam_of_kind_.push_back(kind.slot);
   }
 
   ClusterLod run(const GeometryClusters& base) {

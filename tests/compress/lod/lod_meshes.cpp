@@ -151,9 +151,9 @@ BuiltLod build_lod(const Mesh& mesh) {
   measure.median_edge = edges.median();
   BuiltLod result;
   result.geometry =
-      quantize_geometry(scene, plan.geometries[0], analyse_requirements(scene, plan.geometries[0]), config,
+      quantize_geometry(scene, plan.geometries[0], analyse_requirements(scene, plan, plan.geometries[0], config), config,
                         choose_grid(config, measure, 1.0), measure.max_abs(), measure.bounds.lo, measure.bounds.hi);
-  result.base = split_geometry(scene, result.geometry);
+  result.base = split_geometry(result.geometry);
   Progress progress;
   result.lod = build_cluster_lod(result.geometry, result.base, progress);
   return result;

@@ -16,9 +16,9 @@ import sys
 import zlib
 from dataclasses import dataclass
 
-VERSION = 2
+VERSION = 3
 MAGIC = b"PTK\x89\r\n\x1a\0"
-HEADER_BYTES = 384
+HEADER_BYTES = 448
 DISK_FORM_HEADER_BYTES = 192
 NONE = 0xFFFFFFFF
 
@@ -56,16 +56,22 @@ GEOMETRY = Record(
     ("step_mantissa", "I"), ("step_exponent", "i"), ("anchor_shift", "I"), ("uv_exponent", "2i"),
     ("bounds_lo", "3f"), ("bounds_hi", "3f"),
     ("max_normal_error_degrees", "f"), ("mean_normal_error_degrees", "f"), ("max_uv_error", "f"),
-    ("flags", "I"), ("class_clusters", "8I"), ("name", "2I"), ("normal_encoding", "I"), ("reserved", "I"))
+    ("flags", "I"), ("class_clusters", "8I"), ("name", "2I"), ("normal_encoding", "I"), ("uv_encoding", "I"),
+    ("slot_count", "I"), ("requirements", "I"))
 CLUSTER = Record(
-    ("payload_offset", "I"), ("first_triangle", "I"), ("first_vertex", "I"), ("material", "I"),
+    ("payload_offset", "I"), ("first_triangle", "I"), ("first_vertex", "I"), ("material_slot", "I"),
     ("anchor", "3i"), ("normal_anchor", "2h"), ("vertex_count", "H"), ("normal_palette", "H"),
     ("triangle_count", "B"), ("restart_count", "B"), ("position_bits", "3B"), ("normal_bits", "2B"), ("flags", "B"))
-MATERIAL = Record(("flags", "I"), ("albedo", "3f"), ("alpha_mask", "I"), ("shadow_alpha_mask", "I"), ("name", "2I"))
-INSTANCE = Record(("world_from_object", "12f"), ("geometry", "I"))
+MATERIAL = Record(
+    ("flags", "I"), ("albedo", "3f"), ("alpha_mask", "I"), ("shadow_alpha_mask", "I"),
+    ("albedo_texture", "I"), ("name", "2I"))
+INSTANCE = Record(("world_from_object", "12f"), ("geometry", "I"), ("first_slot", "I"))
 MASK = Record(
     ("first_word", "Q"), ("width", "I"), ("height", "I"), ("wrap", "I"), ("reserved", "I"),
     ("uv_scale", "2f"), ("uv_offset", "2f"))
+TEXTURE = Record(
+    ("first_byte", "Q"), ("width", "I"), ("height", "I"), ("wrap", "I"), ("codec", "I"),
+    ("uv_scale", "2f"), ("uv_offset", "2f"), ("psnr_db", "f"), ("reserved", "I"), ("name", "2I"))
 CAMERA = Record(
     ("world_from_camera", "12d"), ("fov_degrees", "d"), ("screen_window", "4d"), ("projection", "I"),
     ("has_screen_window", "I"), ("width_px", "I"), ("height_px", "I"), ("film_name", "2I"))
@@ -73,13 +79,18 @@ SUMMARY = Record(
     ("source_triangles", "Q"), ("dropped_triangles", "Q"), ("unused_triangles", "Q"), ("source_vertices", "Q"),
     ("merged_vertices", "Q"), ("collapsed_triangles", "Q"), ("bounds_lo", "3d"), ("bounds_hi", "3d"),
     ("precision_value", "d"), ("precision_kind", "I"), ("world_step_mantissa", "I"), ("world_step_exponent", "i"),
-    ("reserved", "I"), ("stream_bits", "4Q"))
+    ("purpose", "I"), ("stream_bits", "4Q"), ("left_out", "Q"))
+
+REQUIREMENT = Record(
+    ("stream", "I"), ("reason", "I"), ("geometries", "I"), ("reserved", "I"),
+    ("triangles", "Q"), ("source_bytes", "Q"), ("stored_bits", "Q"))
 
 # In the order of the section table; None: bytes.
 SECTIONS = (
     ("geometries", GEOMETRY), ("clusters", CLUSTER), ("payload", None), ("materials", MATERIAL),
-    ("instances", INSTANCE), ("masks", MASK), ("mask_words", Record(("word", "I"))), ("cameras", CAMERA),
-    ("strings", None), ("summary", SUMMARY))
+    ("instances", INSTANCE), ("masks", MASK), ("mask_words", Record(("word", "I"))), ("textures", TEXTURE),
+    ("texture_bytes", None), ("cameras", CAMERA), ("strings", None), ("summary", SUMMARY),
+    ("material_slots", Record(("material", "I"))), ("requirements", REQUIREMENT))
 
 
 def index_bits(count):
@@ -117,7 +128,7 @@ class Mesh:
     normals: list  # (0, 0, 0) in flat clusters
     uvs: list  # (0, 0) in clusters without
     triangles: list
-    materials: list  # per triangle
+    slots: list  # per triangle, of materials
 
 
 def read_triangles(bits, cluster):
@@ -252,13 +263,54 @@ def read_normals(bits, cluster, geometry):
     return [palette[bits.take(width)] for _ in range(count)]
 
 
+def uv_of(code, encoding, exponent):
+    if encoding == 0:
+        return to_float32(code * math.ldexp(1.0, exponent))
+    if encoding == 1:
+        return to_float32(code / 65535.0)
+    magnitude = struct.unpack("<e", struct.pack("<H", min(abs(code), 31743)))[0]
+    return -magnitude if code < 0 else magnitude
+
+
 def read_uvs(bits, cluster, geometry):
     anchors = bits.take_signed(32), bits.take_signed(32)
     widths = bits.take(5), bits.take(5)
-    steps = [math.ldexp(1.0, exponent) for exponent in geometry["uv_exponent"]]
     return [
-        tuple(to_float32((anchor + bits.take(width)) * step) for anchor, width, step in zip(anchors, widths, steps))
+        tuple(uv_of(anchor + bits.take(width), geometry["uv_encoding"], exponent)
+              for anchor, width, exponent in zip(anchors, widths, geometry["uv_exponent"]))
         for _ in range(cluster["vertex_count"])]
+
+
+def rgb_of_565(number):
+    red, green, blue = number >> 11, number >> 5 & 63, number & 31
+    return red << 3 | red >> 2, green << 2 | green >> 4, blue << 3 | blue >> 2
+
+
+def bc1_colours(first, second):
+    a, b = rgb_of_565(first), rgb_of_565(second)
+    if first > second:
+        return a, b, [(2 * x + y + 1) // 3 for x, y in zip(a, b)], [(x + 2 * y + 1) // 3 for x, y in zip(a, b)]
+    return a, b, [(x + y + 1) // 2 for x, y in zip(a, b)], (0, 0, 0)
+
+
+def read_texels(texture, data):
+    """All texels from the top, three values each."""
+    width, height, codec = texture["width"], texture["height"], texture["codec"]
+    if codec == 0:
+        return list(data[: 3 * width * height])
+    if codec == 1:
+        return [data[3 * number + c] for number in data[768 : 768 + width * height] for c in range(3)]
+    if codec == 2:
+        low, high = data[0:3], data[3:6]
+        levels = [((code >> 6, 3), (code >> 2 & 15, 15), (code & 3, 3)) for code in data[6 : 6 + width * height]]
+        return [(low[c] * (n - q) + high[c] * q + n // 2) // n for texel in levels for c, (q, n) in enumerate(texel)]
+    texels = []
+    for y in range(height):
+        for x in range(width):
+            block = 8 * (y // 4 * ((width + 3) // 4) + x // 4)
+            colours = bc1_colours(*struct.unpack_from("<HH", data, block))
+            texels += colours[data[block + 4 + y % 4] >> 2 * (x % 4) & 3]
+    return texels
 
 
 class BakedFile:
@@ -301,6 +353,10 @@ class BakedFile:
         first = geometry["first_cluster"]
         return self.sections["clusters"][first : first + geometry["cluster_count"]]
 
+    def instance_materials(self, instance):
+        first, count = instance["first_slot"], self.sections["geometries"][instance["geometry"]]["slot_count"]
+        return [slot["material"] for slot in self.sections["material_slots"][first : first + count]]
+
     def decode(self, geometry):
         mesh = Mesh([], [], [], [], [], [])
         step = geometry["step_mantissa"] * math.ldexp(1.0, geometry["step_exponent"])
@@ -316,7 +372,7 @@ class BakedFile:
             bits = Bits(data)
             for triangle in read_triangles(bits, cluster):
                 mesh.triangles.append(tuple(first_vertex + corner for corner in triangle))
-                mesh.materials.append(cluster["material"])
+                mesh.slots.append(cluster["material_slot"])
             mesh.lattice += read_lattice(bits, cluster, geometry)
             count = cluster["vertex_count"]
             flags = cluster["flags"]
@@ -366,8 +422,9 @@ def require_equal(what, ours, theirs):
 
 def compare(baked, meshes, dump):
     """A dump: geometries (u32); for each vertices, triangles (u32), then lattice (3 i64 a vertex), positions, normals
-    (3 floats a vertex), uvs (2 floats), triangles (3 u32 each), materials (u32 a triangle); instances (u32); for each
-    12 floats and a geometry (u32). All must be equal."""
+    (3 floats a vertex), uvs (2 floats), triangles (3 u32 each), material slots (u32 a triangle); instances (u32); for each
+    12 floats, a geometry (u32) and its materials by slot (u32 each); of all textures the texels (3 u8 each). All must be
+    equal."""
     require_equal("geometries", [len(meshes)], dump.take("I", 1))
     for number, mesh in enumerate(meshes):
         vertices, triangles = len(mesh.lattice), len(mesh.triangles)
@@ -378,12 +435,17 @@ def compare(baked, meshes, dump):
         require_equal(what + "normals", flat(mesh.normals), dump.take("f", 3 * vertices))
         require_equal(what + "uvs", flat(mesh.uvs), dump.take("f", 2 * vertices))
         require_equal(what + "triangles", flat(mesh.triangles), dump.take("I", 3 * triangles))
-        require_equal(what + "materials", mesh.materials, dump.take("I", triangles))
+        require_equal(what + "slots", mesh.slots, dump.take("I", triangles))
     instances = baked.sections["instances"]
     require_equal("instances", [len(instances)], dump.take("I", 1))
     for number, instance in enumerate(instances):
         require_equal(f"instance {number}", instance["world_from_object"], dump.take("f", 12))
         require_equal(f"instance {number}", [instance["geometry"]], dump.take("I", 1))
+        materials = baked.instance_materials(instance)
+        require_equal(f"instance {number}: materials", materials, dump.take("I", len(materials)))
+    for number, texture in enumerate(baked.sections["textures"]):
+        texels = read_texels(texture, baked.sections["texture_bytes"][texture["first_byte"] :])
+        require_equal(f"texture {number}", texels, list(dump.take("B", 3 * texture["width"] * texture["height"])))
     if dump.at != len(dump.data):
         raise Differs("the dump holds more than the file")
 

@@ -83,6 +83,7 @@ TEST(FloatSource, ObjectsMergeTheirShapesAndKeepMaterials) {
   scene.materials.resize(3);
   scene.objects[object].shapes.push_back({1, 1, false, DAffine(1.0)});
   scene.objects[object].shapes.push_back({2, 2, false, test::placed({10, 0, 0})});
+  scene.instances.push_back({object, Affine(1.0f)});
   const FloatSource source(scene);
   const Decoded decoded(source, 0);
   EXPECT_EQ(source.material_of(0, 1), 0u);

@@ -80,10 +80,44 @@ TEST(PackedSource, RendersTheImageOfTheFloats) {
   EXPECT_LT(sum / hits, 0.005);
 }
 
+TEST(PackedSource, InstancesOfOneGeometryHaveMaterialsAndMasksOfTheirOwn) {
+  Scene scene;
+  add_shape(scene, test::quad({-8, 0, -8}, {0, 0, 16}, {16, 0, 0}));
+  scene.masks.push_back({64, 1, WrapMode::kRepeat, Vec2(4, 1), Vec2(0), {0u, ~0u}});
+  scene.masks.push_back({32, 4, WrapMode::kRepeat, Vec2(1, 3), Vec2(0), {~0u, 0u, ~0u, 0u}});
+  const auto mesh = static_cast<uint32_t>(scene.meshes.size());
+  scene.meshes.push_back(test::sphere({0, 0, 0}, 1, 24));
+  for (uint32_t i = 0; i < 4; ++i) { // two plain ones, two with different masks
+    Material material;
+    material.albedo = Vec3(0.2f * static_cast<float>(i), 0.5f, 0.1f);
+    if (i > 1) material.flags = kAlphaMask, material.alpha_mask = i - 2;
+    scene.materials.push_back(material);
+    scene.shapes.emplace_back(mesh, i + 1, false, test::placed({2.5 * i - 4, 1, 0}));
+  }
+  const BakedFile file = bake(scene);
+  ASSERT_EQ(file.geometries().size(), 3u); // the floor, the sphere without texture coordinates, the one with
+  const Image a = render(PackedSource(file)), b = render(FloatSource(scene));
+  uint32_t different = 0;
+  std::array<uint32_t, 5> seen{};
+  for (size_t i = 0; i < a.ao.ao.size(); ++i) {
+    if (a.gbuffer.instance[i] != b.gbuffer.instance[i]) {
+      ++different;
+      continue;
+    }
+    if (a.gbuffer.instance[i] == kNoInstance) continue;
+    ++seen[a.gbuffer.instance[i]];
+    EXPECT_EQ(a.gbuffer.albedo[i], b.gbuffer.albedo[i]);
+    EXPECT_EQ(a.gbuffer.material[i], b.gbuffer.material[i]);
+  }
+  for (const uint32_t pixels : seen) EXPECT_GT(pixels, 100u);
+  EXPECT_LT(different, 150u); // silhouettes, also of the masks
+}
+
 TEST(PackedSource, DecodedTrianglesMatchRandomAccess) {
   const BakedFile file = bake(varied_scene());
   const PackedSource source(file);
-  for (uint32_t g = 0; g < source.geometry_count(); ++g) {
+  for (uint32_t i = 0; i < source.instances().size(); ++i) {
+    const uint32_t g = source.instances()[i].geometry;
     const GeometryCounts counts = source.counts(g);
     std::vector<Vec3> positions(counts.vertices);
     std::vector<Triangle> triangles(counts.triangles);
@@ -93,7 +127,7 @@ TEST(PackedSource, DecodedTrianglesMatchRandomAccess) {
       const ClusterView cluster = file.cluster(g, c);
       const Triangle local = cluster.triangle(t - cluster.record().first_triangle);
       for (int k = 0; k < 3; ++k) ASSERT_EQ(positions[triangles[t][k]], cluster.position(local[k]));
-      ASSERT_EQ(source.material_of(g, t), cluster.material());
+      ASSERT_EQ(source.material_of(i, t), file.instance_materials(i)[cluster.material_slot()]);
     }
   }
 }

@@ -308,5 +308,18 @@ TEST(PrimaryVisibility, NothingIsSeenThroughAClosedMesh) {
   EXPECT_EQ(behind, 0u);
 }
 
+TEST(PrimaryVisibility, TexturesAreLookedUpWhereTheRayHits) {
+  Scene scene = wall_scene(kAlbedoTexture, 5);
+  scene.meshes[0].uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  scene.textures.push_back({"halves", 2, 1, WrapMode::kClamp, Vec2(1), Vec2(0), {255, 0, 0, 0, 0, 255}});
+  scene.materials[0].albedo_texture = 0;
+  const GBuffer g = trace(scene, camera_at({0, 0, 0}, {0, 0, 1}, 90.0), {64, 64}); // sees the wall from edge to edge
+  const size_t row = 32 * 64;
+  EXPECT_EQ(g.albedo[row + 2], Vec3(1, 0, 0));
+  EXPECT_EQ(g.albedo[row + 61], Vec3(0, 0, 1));
+  EXPECT_NEAR(g.albedo[row + 31].x, 0.5f, 0.05f);
+  EXPECT_NEAR(g.albedo[row + 31].x + g.albedo[row + 31].z, 1.0f, 1e-5f); // a blend in linear light
+}
+
 } // namespace
 } // namespace packtrace

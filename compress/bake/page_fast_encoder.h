@@ -1,0 +1,75 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "compress/format/bit_stream.h"
+#include "compress/format/cluster_codec.h"
+#include "compress/format/page_contexts.h"
+#include "compress/format/page_fast.h"
+
+struct ZSTD_CCtx_s;
+
+namespace packtrace {
+
+/// Writes one page of codec `fast`.
+class FastPageWriter {
+public:
+  /// The page's next cluster, which must be valid.
+  /// @param payload of the geometry
+  void add(const baked::GeometryRecord& geometry, const baked::ClusterRecord& record, const uint8_t* payload);
+
+  /// The page. Nothing may be added afterwards.
+  /// @param bits by PageStream, of all that is written; sizes of parts are left out
+  std::vector<uint8_t> finish(ZSTD_CCtx_s* zstd, std::array<double, kPageStreams>& bits);
+
+private:
+  using Bytes = std::vector<uint8_t>;
+  static constexpr uint32_t kCoded = page_fast::kChannels * page_fast::kChannelFields;
+  struct Vertex {
+    bool is_crease = false;
+    uint32_t original = 0; ///< of a crease: an older vertex at its place
+    std::array<uint64_t, page_fast::kChannels> words{};
+  };
+  /// A residual with more than a byte above the low bits.
+  struct Escape {
+    uint32_t field;
+    uint32_t index;
+    uint64_t high; ///< all above the low bits
+  };
+
+  void read_vertices(const ClusterView& view);
+  void find_creases(const ClusterView& view);
+  void add_topology(const ClusterView& view);
+  void add_corner(uint32_t vertex, bool fresh, std::array<int32_t, 3> guess);
+  void add_residuals(uint32_t vertex, std::array<int32_t, 3> guess);
+  void add_fields(const ClusterView& view);
+  void copy_bits(const ClusterView& view, page_fast::Channel channel, uint64_t first, uint64_t count);
+  void code_channel(page_fast::Channel channel);
+  void put_escapes(page_fast::Channel channel);
+  void put(page_fast::Channel channel, uint64_t value, uint32_t bits);
+  void add_header(const baked::ClusterRecord& record);
+  void count_part(uint32_t part, double part_bits, std::array<double, kPageStreams>& bits) const;
+
+  BitWriter fields_;
+  std::array<Bytes, page_fast::kParts> parts_;
+  std::vector<page_fast::Header> headers_;
+  std::array<double, kPageStreams> field_bits_{};
+  std::array<std::array<uint64_t, page_fast::kChannels>, page_fast::kClasses> residual_counts_{};
+
+  const baked::GeometryRecord* geometry_ = nullptr;
+  baked::ClusterRecord last_{};
+
+  // Of the cluster.
+  page_fast::Header header_{};
+  std::array<page_fast::Layout, page_fast::kChannels> layouts_;
+  std::array<uint64_t, page_fast::kChannels> prefix_bit_{}, prefix_bits_{};
+  std::vector<Vertex> vertices_;
+  uint32_t last_old_ = 0;
+  std::array<std::vector<uint64_t>, kCoded> residuals_; ///< zigzag
+  std::vector<Escape> escapes_;
+};
+
+} // namespace packtrace
