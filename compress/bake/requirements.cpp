@@ -22,10 +22,11 @@ Vec2 max_abs_uv(const Mesh& mesh) {
 struct TexelGrid {
   std::array<uint32_t, 2> size{};
   Vec2 uv_scale{1.0f};
+  bool stored = true;
 };
 
 /// Of normal maps, which are not read.
-constexpr TexelGrid kNormalMapGrid{{4096, 4096}, Vec2(1.0f)};
+constexpr TexelGrid kNormalMapGrid{{4096, 4096}, Vec2(1.0f), false};
 
 void add_textures(const Scene& scene, const Material& material, bool textures, std::vector<TexelGrid>& to) {
   const auto add = [&](const auto& all, uint32_t number, const char* what) {
@@ -59,6 +60,7 @@ GeometryNeeds analyse_requirements(const Scene& scene, const GeometryPlan& plan,
       const float scale = looked_up[i].uv_scale[static_cast<int>(axis)];
       const int32_t exponent = choose_uv_exponent(looked_up[i].size[axis], scale, largest[static_cast<int>(axis)]);
       needs.uv_exponent[axis] = i == 0 ? exponent : std::min(needs.uv_exponent[axis], exponent);
+      if (!looked_up[i].stored) continue;
       needs.texels_per_uv[axis] =
           std::max(needs.texels_per_uv[axis], std::abs(double{scale}) * looked_up[i].size[axis]);
     }

@@ -18,7 +18,7 @@ struct PartNeeds {
 struct GeometryNeeds {
   std::vector<PartNeeds> parts;          ///< as in the plan
   std::array<int32_t, 2> uv_exponent{};  ///< 0 where no part needs uvs
-  std::array<double, 2> texels_per_uv{}; ///< of the finest texture looked up
+  std::array<double, 2> texels_per_uv{}; ///< of the finest mask or texture that is stored
 };
 
 /// One reason why data of the source is not in the file.
