@@ -22,15 +22,17 @@ Vec2 max_abs_uv(const Mesh& mesh) {
 struct LookUp {
   std::array<uint32_t, 2> size{};
   Vec2 uv_scale{1.0f};
+  bool stored = true;
 };
 
 /// Of textures that are not read.
-constexpr LookUp kAssumedLookUp{{kAssumedTexels, kAssumedTexels}, Vec2(1.0f)};
+constexpr LookUp kAssumedLookUp{{kAssumedTexels, kAssumedTexels}, Vec2(1.0f), false};
 
 /// What the materials of one slot ask for together.
 struct SlotNeeds {
   MaterialFlags flags = 0;
-  bool textured = false; ///< shading looks up a texture of its colour
+  bool textured = false;   ///< shading looks up a texture of its colour
+  bool stores_uvs = false; ///< some part does
   std::vector<LookUp> look_ups;
 };
 
@@ -46,23 +48,28 @@ public:
   GeometryNeeds run() {
     GeometryNeeds needs;
     Vec2 largest(0.0f);
-    std::vector<LookUp> look_ups;
+    bool on_request = false;
     for (const GeometryPart& part : plan_.parts) {
       const Mesh& mesh = scene_.meshes[part.mesh];
-      const SlotNeeds& slot = slots_[part.slot];
+      SlotNeeds& slot = slots_[part.slot];
       needs.parts.push_back(mesh.triangles.empty() ? PartNeeds{} : needs_of(mesh, slot));
       const PartNeeds& part_needs = needs.parts.back();
       if (!part_needs.store_uvs()) continue;
       largest = glm::max(largest, max_abs_uv(mesh));
-      look_ups.insert(look_ups.end(), slot.look_ups.begin(), slot.look_ups.end());
-      if (part_needs.uvs == baked::kOnRequest) look_ups.push_back(kAssumedLookUp);
+      slot.stores_uvs = true;
+      on_request |= part_needs.uvs == baked::kOnRequest;
     }
+    std::vector<LookUp> look_ups;
+    if (on_request) look_ups.push_back(kAssumedLookUp);
+    for (const SlotNeeds& slot : slots_)
+      if (slot.stores_uvs) look_ups.insert(look_ups.end(), slot.look_ups.begin(), slot.look_ups.end());
     for (size_t i = 0; i < look_ups.size(); ++i)
       for (int axis = 0; axis < 2; ++axis) {
         const auto a = static_cast<size_t>(axis);
         const float scale = look_ups[i].uv_scale[axis];
         const int32_t exponent = choose_uv_exponent(look_ups[i].size[a], scale, largest[axis]);
         needs.uv_exponent[a] = i == 0 ? exponent : std::min(needs.uv_exponent[a], exponent);
+        if (!look_ups[i].stored) continue;
         needs.texels_per_uv[a] = std::max(needs.texels_per_uv[a], std::abs(double{scale}) * look_ups[i].size[a]);
       }
     return needs;

@@ -27,7 +27,7 @@ private:
 struct GeometryNeeds {
   std::vector<PartNeeds> parts;          ///< as in the plan
   std::array<int32_t, 2> uv_exponent{};  ///< 0 where no part needs uvs
-  std::array<double, 2> texels_per_uv{}; ///< of the finest texture looked up
+  std::array<double, 2> texels_per_uv{}; ///< of the finest mask or texture that is stored
   bool infer_normals = true;             ///< store none of triangles whose normals are the face's
 };
 
@@ -37,8 +37,7 @@ inline constexpr uint32_t kAssumedTexels = 4096;
 /// Decides which streams a geometry needs, from the flags of all materials that its instances give to its parts:
 /// - normals: where the camera can see the surface;
 /// - uvs: where an alpha mask looks them up; for shading also where a normal map does, or a texture: one that is
-/// stored,
-///   or with textures left out any, as it may come from elsewhere;
+///   stored, or any if none are, as it may come from elsewhere;
 /// - tangents: for shading, where a normal map needs them;
 /// and whatever config.keep asks for. Throws Error(kInput) if a material's mask or stored texture does not exist.
 GeometryNeeds analyse_requirements(const Scene& scene, const ScenePlan& scene_plan, const GeometryPlan& plan,

@@ -79,7 +79,7 @@ TEST(Requirements, WithTexturesStoredOnlyThoseLookTextureCoordinatesUp) {
   const GeometryNeeds stored = analyse_requirements(scene, plan, plan.geometries.front(), with_textures);
   EXPECT_EQ(stored.texels_per_uv, (std::array<double, 2>{128.0, 256.0}));
   const GeometryNeeds elsewhere = analyse_requirements(scene, plan, plan.geometries.front(), config(baked::kShading));
-  EXPECT_EQ(elsewhere.texels_per_uv[0], double{kAssumedTexels});
+  EXPECT_EQ(elsewhere.texels_per_uv[0], 0.0); // of no stored texture
   EXPECT_EQ(elsewhere.uv_exponent[0], stored.uv_exponent[0] - 5);
   EXPECT_EQ(elsewhere.uv_exponent[1], stored.uv_exponent[1] - 4);
   scene.materials[kPainted].albedo_texture = 1;
