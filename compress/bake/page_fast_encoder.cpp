@@ -220,7 +220,8 @@ void FastPageWriter::add_fields(const ClusterView& view) {
     const Layout& layout = layouts_[channel];
     if (layout.field_count == 0) continue;
     if (layout.verbatim()) {
-      copy_bits(view, channel, prefix_bit_[channel], uint64_t{layout.stride()} * vertices_.size());
+      copy_bits(view, channel, prefix_bit_[channel] + prefix_bits_[channel],
+                uint64_t{layout.stride()} * vertices_.size());
       continue;
     }
     put(channel, vertices_[0].words[channel], layout.stride());

@@ -18,6 +18,7 @@ struct FastPageReader::Work {
   std::array<Layout, kChannels> layouts;
   std::array<uint64_t, kChannels> prefix_bit{}; ///< of what is copied: palettes, anchors of texture coordinates
   std::array<uint32_t, kChannels> prefix_bits{};
+  std::array<uint64_t, kChannels> verbatim_bit{}; ///< of the words that are copied
   const uint8_t* turns = nullptr; ///< bits
   const uint8_t* fresh = nullptr;
   std::array<uint64_t, 3> restarts{}; ///< bits; the last word is only read
@@ -154,7 +155,7 @@ bool FastPageReader::read_uv_layout(const baked::ClusterRecord& record) {
   layout.field_count = 2;
   for (size_t i = 0; i < 2; ++i, at += kUvWidthBits)
     layout.width[i] = static_cast<uint32_t>(read_bits(bits, at, kUvWidthBits));
-  return !layout.verbatim();
+  return true;
 }
 
 bool FastPageReader::read_channel(uint32_t channel, const Header& header, uint32_t vertex_count) {
@@ -167,7 +168,7 @@ bool FastPageReader::read_channel(uint32_t channel, const Header& header, uint32
   const uint32_t count = vertex_count - 1 - creases;
   if (layout.verbatim()) {
     std::fill_n(residuals, vertex_count, uint64_t{0});
-    return creases == 0 && take_bits(uint64_t{layout.stride()} * vertex_count, w.prefix_bit[channel]);
+    return creases == 0 && take_bits(uint64_t{layout.stride()} * vertex_count, w.verbatim_bit[channel]);
   }
   uint64_t first = 0;
   if (!take_bits(layout.stride(), first)) return false;
@@ -233,11 +234,11 @@ void FastPageReader::put_cluster(const baked::ClusterRecord& record, const Index
   for (uint32_t channel = 0; channel < kChannels; ++channel) {
     const Layout& one = w.layouts[channel];
     if (one.field_count == 0) continue;
+    if (channel != kPositions) put_bits(parts_[kFields].at, w.prefix_bit[channel], w.prefix_bits[channel]);
     if (one.verbatim()) {
-      put_bits(parts_[kFields].at, w.prefix_bit[channel], uint64_t{one.stride()} * record.vertex_count);
+      put_bits(parts_[kFields].at, w.verbatim_bit[channel], uint64_t{one.stride()} * record.vertex_count);
       continue;
     }
-    if (channel != kPositions) put_bits(parts_[kFields].at, w.prefix_bit[channel], w.prefix_bits[channel]);
     const uint32_t stride = one.stride();
     const uint64_t mask = (uint64_t{1} << stride) - 1;
     const uint64_t* words = w.memory.words[channel].data();

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <limits>
 #include <vector>
@@ -201,6 +202,25 @@ TEST(FastPage, PositionsWiderThanAWordComeBack) {
     ASSERT_EQ(headers.size(), 1u);
     EXPECT_GT(headers[0].position_bits[0] + headers[0].position_bits[1] + headers[0].position_bits[2], 57);
   }
+}
+
+TEST(FastPage, TextureCoordinatesWiderThanAWordComeBack) {
+  Mesh mesh = test::grid_mesh(4, 0.5f, true);
+  for (Vec2& uv : mesh.uvs) uv = (uv - 0.5f) * 24000.0f;
+  const Scene scene = test::scene_of(mesh);
+  BakeConfig config;
+  config.keep_uvs = true;
+  const BakedFile file = BakedFile::from_bytes(test::bake(scene, config).bytes);
+  const ClusterView view = file.cluster(0, 0);
+  int bits = 0;
+  for (size_t axis = 0; axis < 2; ++axis) {
+    int64_t least = view.uv_code(0)[axis], most = least;
+    for (uint32_t v = 1; v < view.vertex_count(); ++v)
+      least = std::min(least, view.uv_code(v)[axis]), most = std::max(most, view.uv_code(v)[axis]);
+    bits += static_cast<int>(std::bit_width(static_cast<uint64_t>(most - least)));
+  }
+  EXPECT_GT(bits, 57);
+  EXPECT_EQ(headers_of(scene, config).size(), 1u);
 }
 
 TEST(FastPage, KernelsAgreeAndReadWhatWasWritten) {
