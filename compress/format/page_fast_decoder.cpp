@@ -19,10 +19,10 @@ struct FastPageReader::Work {
   std::array<uint64_t, kChannels> prefix_bit{}; ///< of what is copied: palettes, anchors of texture coordinates
   std::array<uint32_t, kChannels> prefix_bits{};
   std::array<uint64_t, kChannels> verbatim_bit{}; ///< of the words that are copied
-  const uint8_t* turns = nullptr; ///< bits
+  const uint8_t* turns = nullptr;                 ///< bits
   const uint8_t* fresh = nullptr;
   std::array<uint64_t, 3> restarts{}; ///< bits; the last word is only read
-  WalkMemory::Words residuals{}; ///< of one channel, without gaps
+  WalkMemory::Words residuals{};      ///< of one channel, without gaps
   WalkInput input;
   WalkMemory memory;
 };
