@@ -1,5 +1,6 @@
 #pragma once
 
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,8 @@ struct NamedMesh {
   Mesh (*make)();
   bool closed = false;
 };
+/// For gtest.
+inline void PrintTo(const NamedMesh& mesh, std::ostream* out) { *out << mesh.name; }
 std::vector<NamedMesh> stress_meshes();
 std::vector<NamedMesh> closed_stress_meshes();
 /// A name for a test.
