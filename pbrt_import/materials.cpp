@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <span>
+#include <string_view>
 
 #include "pbrt_import/spectrum.h"
 #include "pbrt_import/tokenizer.h"
@@ -160,18 +162,6 @@ void fill_recipe(MaterialRecipe& recipe, std::string_view kind, const TexturePar
 
 Vec3 clamped(Vec3 v) { return glm::clamp(v, Vec3(0.0f), Vec3(1.0f)); }
 
-/// The number of an equal texture, the new one's where there is none.
-uint32_t add_texture(std::vector<AlbedoTexture>& textures, AlbedoTexture texture) {
-  const auto same = [&](const AlbedoTexture& other) {
-    return other.width == texture.width && other.height == texture.height && other.wrap == texture.wrap &&
-           other.uv_scale == texture.uv_scale && other.uv_offset == texture.uv_offset && other.rgb == texture.rgb;
-  };
-  const auto found = std::find_if(textures.begin(), textures.end(), same);
-  const auto number = static_cast<uint32_t>(found - textures.begin());
-  if (found == textures.end()) textures.push_back(std::move(texture));
-  return number;
-}
-
 } // namespace
 
 MaterialLibrary::MaterialLibrary(TextureGraph& graph) : graph_(graph) {
@@ -297,16 +287,41 @@ uint32_t MaterialLibrary::texture_of(const Definition& definition, Scene& scene,
   if (!colours_ || (definition.recipe.flags & kAlbedoTexture) == 0) return kNoTexture;
   const auto [it, inserted] = texture_of_node_.try_emplace(definition.recipe.albedo, kNoTexture);
   if (!inserted) return it->second;
-  std::optional<AlbedoTexture> texture = graph_.albedo_texture(definition.recipe.albedo);
+  const uint64_t left = texture_bytes - std::min(texture_bytes, texture_bytes_used_);
+  std::optional<AlbedoTexture> texture = graph_.albedo_texture(definition.recipe.albedo, left);
   if (!texture) return kNoTexture;
-  uint64_t bytes = texture->rgb.size();
-  for (const AlbedoTexture& other : scene.textures) bytes += other.rgb.size();
-  if (bytes > texture_bytes) {
+  if (texture->rgb.empty()) {
     reporter.note(definition.place, "texture " + in_quotes(texture->name) +
                                         ": all textures together exceed the memory budget; its average is used");
     return kNoTexture;
   }
   return it->second = add_texture(scene.textures, std::move(*texture));
+}
+
+uint32_t MaterialLibrary::add_texture(std::vector<AlbedoTexture>& textures, AlbedoTexture texture) {
+  const std::array<float, 7> place = {texture.uv_scale.x,
+                                      texture.uv_scale.y,
+                                      texture.uv_offset.x,
+                                      texture.uv_offset.y,
+                                      static_cast<float>(texture.width),
+                                      static_cast<float>(texture.height),
+                                      static_cast<float>(texture.wrap)};
+  const auto hash_of = [](const auto& v) {
+    return std::hash<std::string_view>()({reinterpret_cast<const char*>(v.data()), v.size() * sizeof v[0]});
+  };
+  const size_t hash = hash_of(texture.rgb) * 31 + hash_of(place);
+  const auto [first, last] = textures_by_hash_.equal_range(hash);
+  for (auto it = first; it != last; ++it) {
+    const AlbedoTexture& other = textures[it->second];
+    if (other.width == texture.width && other.height == texture.height && other.wrap == texture.wrap &&
+        other.uv_scale == texture.uv_scale && other.uv_offset == texture.uv_offset && other.rgb == texture.rgb)
+      return it->second;
+  }
+  const auto number = static_cast<uint32_t>(textures.size());
+  textures_by_hash_.emplace(hash, number);
+  texture_bytes_used_ += texture.rgb.size();
+  textures.push_back(std::move(texture));
+  return number;
 }
 
 std::vector<uint32_t> MaterialLibrary::resolve(Scene& scene, uint64_t texture_bytes, Reporter& reporter) {

@@ -4,6 +4,7 @@
 #include <map>
 #include <string>
 #include <tuple>
+#include <unordered_map>
 #include <vector>
 
 #include "pbrt_import/graphics_state.h"
@@ -67,10 +68,13 @@ private:
   uint32_t add(std::string kind, std::string name, const TextureParameters& parameters);
   Vec3 albedo_of(const Definition& definition, Reporter& reporter);
   uint32_t texture_of(const Definition& definition, Scene& scene, uint64_t texture_bytes, Reporter& reporter);
+  uint32_t add_texture(std::vector<AlbedoTexture>& textures, AlbedoTexture texture);
 
   TextureGraph& graph_;
   bool colours_ = false;
   std::map<TextureGraph::Node, uint32_t> texture_of_node_; ///< kNoTexture: none
+  std::unordered_multimap<size_t, uint32_t> textures_by_hash_;
+  uint64_t texture_bytes_used_ = 0;
   std::vector<Definition> definitions_;
   std::vector<uint32_t> plain_uses_;            ///< by recipe, without alpha and light; kNone: not used yet
   std::map<MaterialUse, uint32_t> use_numbers_; ///< of the others

@@ -83,9 +83,11 @@ public:
 
   /// The colours over uv, sampled at the texels of the widest image; nothing where uv does not change them, where an
   /// image's colours were not kept, or there are more than kMostTextureTexels. What has no uv counts with its average.
-  std::optional<AlbedoTexture> albedo_texture(Node node);
+  /// Without texels where those would take more than most_bytes, or all textures so far too many evaluations.
+  std::optional<AlbedoTexture> albedo_texture(Node node, uint64_t most_bytes);
 
 private:
+  uint64_t evaluations_left_ = uint64_t{1} << 32; ///< of nodes at texels, for the textures of a scene
   enum class Kind : uint8_t { kConstant, kProcedural, kImage, kProduct, kMix, kCheckerboard };
   struct NodeData {
     Kind kind = Kind::kConstant;

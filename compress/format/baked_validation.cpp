@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
+#include <vector>
 
 #include <xxhash.h>
 
@@ -117,8 +119,10 @@ private:
     return zero(end, bytes_.size());
   }
 
-  bool text_ok(baked::StringRef ref) const {
-    return ref.offset <= sections_.strings.size() && ref.bytes <= sections_.strings.size() - ref.offset;
+  /// Texts do not share bytes, so that all names together are no larger than the section.
+  bool text_ok(baked::StringRef ref) {
+    text_bytes_ += ref.bytes;
+    return text_bytes_ <= sections_.strings.size() && ref.offset <= sections_.strings.size() && ref.bytes <= sections_.strings.size() - ref.offset;
   }
 
   void check_materials_and_masks() {
@@ -275,6 +279,20 @@ private:
       if (first == baked::kNone) first = instance.first_slot;
       if (!same_classes(first, instance.first_slot, slots)) fail("instance", i, "material classes");
     }
+    check_runs();
+  }
+
+  /// The runs of slots of one geometry are equal or apart, so that going through all of them takes no longer than the file.
+  void check_runs() const {
+    std::vector<std::pair<uint32_t, uint32_t>> runs; // geometry, first slot
+    for (const baked::InstanceRecord& instance : sections_.instances)
+      runs.emplace_back(instance.geometry, instance.first_slot);
+    std::sort(runs.begin(), runs.end());
+    runs.erase(std::unique(runs.begin(), runs.end()), runs.end());
+    for (size_t i = 1; i < runs.size(); ++i)
+      if (runs[i].first == runs[i - 1].first &&
+          runs[i].second - runs[i - 1].second < sections_.geometries[runs[i].first].slot_count)
+        fail("geometry", runs[i].first, "overlapping material slots");
   }
 
   void check_cameras() {
@@ -322,6 +340,7 @@ private:
   baked::FileHeader header_{};
   BakedSections sections_;
   std::vector<uint32_t> class_ends_;  // by material slot
+  uint64_t text_bytes_ = 0;
   std::vector<uint32_t> first_slots_; // by geometry: of its first instance; the others have the same classes
 };
 

@@ -64,8 +64,8 @@ struct GeometryRecord {
 
 // DrawRecord::flags
 inline constexpr uint32_t kDrawFlat = 1u << 0;     ///< all vertices have the flat normal; otherwise none has
-inline constexpr uint32_t kDrawUvs = 1u << 1;      ///< else they are 0
-inline constexpr uint32_t kDrawTangents = 1u << 2; ///< else they are 0
+inline constexpr uint32_t kDrawUvs = 1u << 1;      ///< else they mean nothing
+inline constexpr uint32_t kDrawTangents = 1u << 2; ///< else they mean nothing
 inline constexpr uint32_t kDrawFlags = kDrawFlat | kDrawUvs | kDrawTangents;
 
 /// Triangles of one geometry with one material slot: DrawIndexed(index_count, 1, first_index, vertex_offset, 0).

@@ -234,7 +234,7 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
       "Shapes outside objects lie on one grid, so meshes that touch stay closed; shapes that share a mesh are stored "
       "once,\n"
       "on a grid of its own. The error that was measured against the source is printed, stored in the file, and never\n"
-      "above half a step per axis. What was left out, and why, is printed; -v says it of each geometry.\n"
+      "above half a step per axis and the rounding to floats. What was left out, and why, is printed; -v says it of each geometry.\n"
       "Examples:\n"
       "  packtrace bake house.pbrt -o house.ptk\n"
       "  packtrace bake house.pbrt -o small.ptk --precision 1e-4 --json report.json");

@@ -46,7 +46,6 @@ public:
     std::vector<uint32_t> active(lod_.clusters.size());
     for (uint32_t i = 0; i < active.size(); ++i) active[i] = i;
     for (uint32_t level = 0; !active.empty(); ++level) {
-      if (level == kMaxLodLevels) throw Error(ErrorKind::kLimitExceeded, "more levels of detail than the format holds");
       lod_.level_count = level + 1;
       active = build_level(level, active);
     }
@@ -91,7 +90,8 @@ private:
     const auto first_group = static_cast<uint32_t>(lod_.groups.size());
     lod_.groups.resize(first_group + members.size());
     std::vector<SimplifiedGroup> results(members.size());
-    if (active.size() > 1) { // a single cluster is the coarsest that there can be
+    // A single cluster is the coarsest that there can be; and the last level has nothing above it.
+    if (active.size() > 1 && level + 1 < kMaxLodLevels) {
       mark_owners(members);
       tbb::parallel_for(size_t{0}, members.size(), [&](size_t i) {
         results[i] = simplify_group(members[i]);

@@ -48,7 +48,7 @@ struct ClusterLod {
   uint32_t level_count = 0;
 };
 
-/// Builds coarser levels until one cluster is left, or nothing that can be simplified. Any triangles will do.
+/// Builds coarser levels until one cluster is left, nothing that can be simplified, or kMaxLodLevels. Any triangles will do.
 /// Same result for any thread count. Throws Error(kCancelled), Error(kLimitExceeded).
 /// @param base the geometry's clusters
 ClusterLod build_cluster_lod(const QuantizedGeometry& geometry, const GeometryClusters& base, Progress& progress);

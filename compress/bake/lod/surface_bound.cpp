@@ -163,6 +163,8 @@ private:
 
   void measure_before(const LodTriangle& t) {
     find_candidates(t.points);
+    if (candidates_.empty()) // all that its corners became part of is gone: then anything may be the nearest
+      for (uint32_t s = 0; s < after_.size(); ++s) candidates_.push_back(s);
     if (is_unchanged(t)) return;
     const std::array<DVec3, 3> p = {points_[t.points.x], points_[t.points.y], points_[t.points.z]};
     best_.clear();

@@ -77,6 +77,34 @@ Mesh two_sided_sheet() {
   return mesh;
 }
 
+/// Triangles that share corners only, each with the next.
+Mesh vertex_chain() {
+  Random random(11);
+  Mesh mesh;
+  Vec3 at(0.0f);
+  const auto step = [&] { return Vec3(random.uniform(-0.1f, 1), random.uniform(-1, 1), random.uniform(-1, 1)); };
+  mesh.positions.push_back(at);
+  for (uint32_t i = 0; i < 3000; ++i) {
+    const Vec3 next = at + step();
+    mesh.positions.push_back(at + 0.5f * step());
+    mesh.positions.push_back(next);
+    mesh.triangles.emplace_back(2 * i, 2 * i + 1, 2 * i + 2);
+    at = next;
+  }
+  return mesh;
+}
+
+/// A torn, bumpy sheet seen from both sides.
+Mesh rough_two_sided_sheet() {
+  Random random(12);
+  Mesh mesh = grid_mesh(60);
+  for (Vec3& p : mesh.positions) p.z += random.uniform(0.0f, 0.02f);
+  std::erase_if(mesh.triangles, [&](const Triangle&) { return random.uniform(0, 1) < 0.1f; });
+  const std::vector<Triangle> front = mesh.triangles;
+  for (const Triangle& t : front) mesh.triangles.emplace_back(t.x, t.z, t.y);
+  return mesh;
+}
+
 /// Not manifold: every piece hangs on the same point.
 Mesh tetrahedra_on_one_point() {
   Mesh mesh = tetrahedra_mesh(1500, 3);
@@ -118,6 +146,8 @@ std::vector<NamedMesh> stress_meshes() {
       {"2000 tetrahedra", [] { return tetrahedra_mesh(2000, 1); }, true},
       {"two sided sheet", two_sided_sheet, true},
       {"tetrahedra on one point", tetrahedra_on_one_point, true},
+      {"vertex chain", vertex_chain, false},
+      {"rough two sided sheet", rough_two_sided_sheet, true},
       {"sphere", [] { return sphere_mesh(80); }, false}, // open by a hair at its seam, where roundings differ
       {"bumped plane with a border", [] { return grid_mesh(80, 0.05f, true); }, false},
       {"flat plane", [] { return grid_mesh(70); }, false},
@@ -150,9 +180,9 @@ BuiltLod build_lod(const Mesh& mesh) {
   measure.bounds = measure_geometry(scene, plan.geometries[0], edges);
   measure.median_edge = edges.median();
   BuiltLod result;
-  result.geometry =
-      quantize_geometry(scene, plan.geometries[0], analyse_requirements(scene, plan, plan.geometries[0], config), config,
-                        choose_grid(config, measure, 1.0), measure.max_abs(), measure.bounds.lo, measure.bounds.hi);
+  result.geometry = quantize_geometry(
+      scene, plan.geometries[0], analyse_requirements(scene, plan, plan.geometries[0], config), config,
+      choose_grid(config, measure, 1.0), measure.max_abs(), measure.bounds.lo, measure.bounds.hi);
   result.base = split_geometry(result.geometry);
   Progress progress;
   result.lod = build_cluster_lod(result.geometry, result.base, progress);
