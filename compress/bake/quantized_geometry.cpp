@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
+#include "compress/bake/angle.h"
 #include "compress/bake/brief.h"
 #include "compress/bake/weld_table.h"
 #include "compress/format/normal_codec.h"
@@ -47,13 +48,6 @@ void for_each(size_t count, const PerItem& per_item) {
   tbb::parallel_for(tbb::blocked_range<size_t>(0, count, kGrain), [&](const tbb::blocked_range<size_t>& range) {
     for (size_t i = range.begin(); i < range.end(); ++i) per_item(i);
   });
-}
-
-constexpr double kDegreesPerRadian = 57.295779513082320877;
-
-/// Between two unit vectors.
-double angle_degrees(DVec3 a, DVec3 b) {
-  return 2.0 * std::asin(std::min(0.5 * glm::length(a - b), 1.0)) * kDegreesPerRadian;
 }
 
 /// Zero stays zero.

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <string>
 
+#include "compress/bake/angle.h"
 #include "compress/bake/weld_table.h"
 #include "compress/format/tangent_codec.h"
 #include "compress/format/vertex16_fields.h"
@@ -16,7 +17,6 @@ namespace packtrace {
 namespace {
 
 constexpr int64_t kPositionCodes = int64_t{1} << 21, kUvCodes = int64_t{1} << 16;
-constexpr double kDegreesPerRadian = 57.295779513082320877;
 constexpr uint32_t kMostShort = 65535; // vertices with 16-bit indices: 0xffff stays free for primitive restart
 
 /// A vertex as the file has it.
@@ -33,10 +33,6 @@ struct SourceVertex {
     return mix_words(place, normal | (uint64_t{mirrored} << 32), uvs);
   }
 };
-
-double angle_degrees(DVec3 a, DVec3 b) {
-  return 2.0 * std::asin(std::min(0.5 * glm::length(a - b), 1.0)) * kDegreesPerRadian;
-}
 
 /// Whether moving texture coordinates by a whole number looks up the same texels.
 template <class Record>

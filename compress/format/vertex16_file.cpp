@@ -6,16 +6,13 @@
 
 #include <xxhash.h>
 
+#include "compress/format/section_file.h"
 #include "compress/format/texture_codec.h"
 #include "pbrt_import/scene/alpha_mask.h"
 #include "pbrt_import/scene/error.h"
 
 namespace packtrace::vertex16 {
 namespace {
-
-constexpr uint64_t align_up(uint64_t bytes) {
-  return (bytes + baked::kSectionAlignment - 1) / baked::kSectionAlignment * baked::kSectionAlignment;
-}
 
 class Validator {
 public:
@@ -67,13 +64,13 @@ private:
     uint64_t end = sizeof header_;
     for (uint32_t i = 0; i < kSectionCount; ++i) {
       const baked::SectionRecord& record = header_.sections[i];
-      require(record.record_bytes == kRecordBytes[i] && record.reserved == 0 && record.offset == align_up(end) &&
+      require(record.record_bytes == kRecordBytes[i] && record.reserved == 0 && record.offset == align_section(end) &&
                   record.offset <= bytes_.size() && record.bytes <= bytes_.size() - record.offset &&
                   record.bytes % record.record_bytes == 0 && record.bytes / record.record_bytes < baked::kNone,
               "section", i);
       end = record.offset + record.bytes;
     }
-    if (align_up(end) != bytes_.size()) fail("size of the file");
+    if (align_section(end) != bytes_.size()) fail("size of the file");
     s_ = {section<glm::uvec4>(kVertices),
           section<uint16_t>(kIndices16),
           section<uint32_t>(kIndices32),
@@ -179,22 +176,7 @@ std::vector<std::byte> assemble(const Sections& s) {
   Header header{};
   header.magic = kMagic;
   header.version = kVersion;
-  header.header_bytes = sizeof header;
-  header.section_count = kSectionCount;
-  uint64_t end = sizeof header;
-  for (size_t i = 0; i < parts.size(); ++i) {
-    header.sections[i] = {end, parts[i].size(), kRecordBytes[i], 0};
-    end = align_up(end + parts[i].size());
-  }
-  header.file_bytes = end;
-  std::vector<std::byte> file(static_cast<size_t>(end));
-  for (size_t i = 0; i < parts.size(); ++i)
-    if (!parts[i].empty()) std::memcpy(file.data() + header.sections[i].offset, parts[i].data(), parts[i].size());
-  const XXH128_hash_t hash = XXH3_128bits(file.data() + sizeof header, file.size() - sizeof header);
-  header.content_hash = {hash.low64, hash.high64};
-  header.header_hash = XXH3_64bits(&header, offsetof(Header, header_hash));
-  std::memcpy(file.data(), &header, sizeof header);
-  return file;
+  return assemble_section_file(header, parts, kRecordBytes);
 }
 
 Sections validate(std::span<const std::byte> bytes, const std::string& name) { return Validator(bytes, name).run(); }

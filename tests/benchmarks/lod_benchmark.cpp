@@ -14,7 +14,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
-#include <unistd.h>
 
 #include "compress/bake/lod/cluster_lod.h"
 #include "pbrt_import/scene/error.h"
@@ -198,15 +197,6 @@ Json measure_input(const std::string& name, const Mesh& mesh, const Options& opt
   return json;
 }
 
-PackingInput find_input(const std::string& name, const Options& options) {
-  if (name != "generated") // the bunny without the plane below it
-    return load_packing_input(name, options.scenes / name / "scene.pbrt", name == "bunny");
-  const fs::path folder = fs::temp_directory_path() / ("lod_benchmark_" + std::to_string(::getpid()));
-  PackingInput input = generated_packing_input(options.generated_triangles, folder);
-  fs::remove_all(folder);
-  return input;
-}
-
 int run(int argc, char** argv) {
   Options options;
   CLI::App app{"Builds levels of detail and measures them, and simplifies with this project and others; see "
@@ -233,7 +223,7 @@ int run(int argc, char** argv) {
   if (!out) throw Error(ErrorKind::kIo, options.json_file.string() + ": cannot write");
   Json json = describe_machine();
   for (const std::string& name : options.inputs)
-    json["inputs"].push_back(measure_input(name, weld_positions(find_input(name, options).mesh), options));
+    json["inputs"].push_back(measure_input(name, weld_positions(find_packing_input(name, options.scenes, options.generated_triangles).mesh), options));
   if (out.is_open()) out << json.dump(2) << std::endl;
   if (!out) throw Error(ErrorKind::kIo, options.json_file.string() + ": cannot write");
   for (const Json& input : json["inputs"])

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstdio>
-#include <ctime>
 
 #include <sys/wait.h>
 #include <unistd.h>
@@ -15,15 +14,10 @@
 #include <OpenMesh/Tools/Decimater/ModQuadricT.hh>
 
 #include "compress/bake/lod/simplify.h"
+#include "tests/benchmarks/thread_cpu_time.h"
 
 namespace packtrace {
 namespace {
-
-double thread_cpu_seconds() {
-  timespec time{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_nsec) * 1e-9;
-}
 
 struct Traits : OpenMesh::DefaultTraits {
   using Point = OpenMesh::Vec3d;

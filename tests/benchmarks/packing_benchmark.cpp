@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -12,7 +11,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
-#include <unistd.h>
 
 #include "pbrt_import/scene/error.h"
 #include "tests/benchmarks/benchmark_main.h"
@@ -20,6 +18,7 @@
 #include "tests/benchmarks/packing_benchmark_cracks.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"
 #include "tests/benchmarks/packing_benchmark_mesh.h"
+#include "tests/benchmarks/thread_cpu_time.h"
 
 namespace packtrace {
 namespace {
@@ -38,12 +37,6 @@ struct Options {
   std::string codec; ///< part of the names of those to measure
   std::vector<std::string> inputs;
 };
-
-double thread_cpu_seconds() {
-  timespec time{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_nsec) * 1e-9;
-}
 
 /// Least CPU time of one call, all of it in this thread: called again until `budget_s` are used up, at least once.
 template <typename Call>
@@ -178,15 +171,6 @@ Json measure_input(const PackingInput& input, const Options& options) {
   return json;
 }
 
-PackingInput find_input(const std::string& name, const Options& options) {
-  if (name != "generated") // the bunny without the plane below it
-    return load_packing_input(name, options.scenes / name / "scene.pbrt", name == "bunny");
-  const fs::path folder = fs::temp_directory_path() / ("packing_benchmark_" + std::to_string(::getpid()));
-  PackingInput input = generated_packing_input(options.generated_triangles, folder);
-  fs::remove_all(folder);
-  return input;
-}
-
 int run(int argc, char** argv) {
   Options options;
   CLI::App app{"Packs meshes with this project and with others, for the same error; see docs/packing_benchmark.md."};
@@ -220,7 +204,7 @@ int run(int argc, char** argv) {
   fmt::print("{}, load average {:.1f}; commit {}; CPU time of one thread\n", json["cpu"].get<std::string>(),
              json["load_average"].get<double>(), json["commit"].get<std::string>());
   for (const std::string& name : options.inputs)
-    json["inputs"].push_back(measure_input(find_input(name, options), options));
+    json["inputs"].push_back(measure_input(find_packing_input(name, options.scenes, options.generated_triangles), options));
   if (out.is_open()) out << json.dump(2) << std::endl;
   require_written();
   const bool closed = std::all_of(json["inputs"].begin(), json["inputs"].end(),

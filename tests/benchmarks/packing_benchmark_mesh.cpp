@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include <unistd.h>
+
 #include "assets/generator/displaced_mesh.h"
 #include "pbrt_import/import_scene.h"
 
@@ -106,6 +108,16 @@ PackingInput generated_packing_input(uint64_t triangles, const std::filesystem::
   config.triangles = triangles;
   scenegen::generate_displaced_mesh(config, {folder, true});
   return load_packing_input("generated", folder / "mesh.pbrt");
+}
+
+PackingInput find_packing_input(const std::string& name, const std::filesystem::path& scenes,
+                                uint64_t generated_triangles) {
+  if (name != "generated") return load_packing_input(name, scenes / name / "scene.pbrt", name == "bunny");
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("packtrace_benchmark_" + std::to_string(::getpid()));
+  PackingInput input = generated_packing_input(generated_triangles, folder);
+  std::filesystem::remove_all(folder);
+  return input;
 }
 
 double median_edge(const Mesh& mesh) {

@@ -36,6 +36,10 @@ PackingInput load_packing_input(const std::string& name, const std::filesystem::
 /// A ring of eroded rock with vertex normals (packtrace_scenegen's displaced mesh), written to `folder` and read back.
 PackingInput generated_packing_input(uint64_t triangles, const std::filesystem::path& folder);
 
+/// By name: "generated", or a folder of `scenes`; of the bunny without the plane below it.
+PackingInput find_packing_input(const std::string& name, const std::filesystem::path& scenes,
+                                uint64_t generated_triangles);
+
 /// Median length of the triangles' edges, those of length 0 left out; 0 if there are none.
 double median_edge(const Mesh& mesh);
 
