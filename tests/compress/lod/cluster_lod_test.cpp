@@ -48,7 +48,7 @@ protected:
 
 TEST_P(ClusterLodOf, KeepsItsLimits) {
   ASSERT_FALSE(lod_.clusters.empty());
-  EXPECT_LE(lod_.level_count, kMaxLodLevels);
+  EXPECT_LE(lod_.level_count, baked::kMaxLodLevels);
   for (const LodCluster& c : lod_.clusters) {
     EXPECT_GE(c.range.triangle_count, 1u);
     EXPECT_LE(c.range.triangle_count, kMaxClusterTriangles);
