@@ -16,16 +16,6 @@
 namespace packtrace::test {
 namespace {
 
-/// 0, every error there is, and the nearest values on both sides of it.
-std::vector<double> thresholds(const ClusterLod& lod) {
-  std::set<double> values{0.0};
-  for (const LodGroup& group : lod.groups)
-    if (!group.terminal)
-      for (const double t : {std::nextafter(group.error, 0.0), group.error, std::nextafter(group.error, 1e300)})
-        values.insert(t);
-  return {values.begin(), values.end()};
-}
-
 /// Clusters by the group that they were made from.
 std::vector<std::vector<uint32_t>> clusters_made_by(const ClusterLod& lod) {
   std::vector<std::vector<uint32_t>> made(lod.groups.size());
