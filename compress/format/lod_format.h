@@ -31,7 +31,7 @@ static_assert(sizeof(LodLevelRecord) == 48 && std::is_trivially_copyable_v<LodLe
 /// Clusters of one level that were simplified together (docs/cluster_lod.md). Object space. Rounded such that spheres
 /// still hold those of the groups below and errors are no smaller than theirs.
 struct LodGroupRecord {
-  std::array<float, 3> center; ///< of a ball that holds everything that the group was ever made from
+  std::array<float, 3> center; ///< of a ball that holds its clusters and all they were ever made from
   float radius;
   float error; ///< of what was made from it against level 0, object units; infinite: terminal, nothing coarser was made
   uint32_t level; ///< of its clusters

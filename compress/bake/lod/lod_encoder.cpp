@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 
 namespace packtrace {
 namespace {
@@ -39,11 +40,10 @@ public:
 
   /// Level by level; false where something is beyond the range of floats.
   bool run(std::vector<baked::LodGroupRecord>& out) {
-    std::vector<std::vector<uint32_t>> below(lod_.groups.size()); // groups that its clusters were made from
-    for (const LodCluster& c : lod_.clusters)
-      if (c.generating_group != kNoGroup) below[c.group].push_back(c.generating_group);
+    std::vector<std::vector<uint32_t>> members(lod_.groups.size());
+    for (uint32_t i = 0; i < lod_.clusters.size(); ++i) members[lod_.clusters[i].group].push_back(i);
     for (size_t i = 0; i < lod_.groups.size(); ++i) {
-      out.push_back(encode(lod_.groups[i], below[i], out));
+      out.push_back(encode(lod_.groups[i], members[i], out));
       const baked::LodGroupRecord& record = out.back();
       bool finite = std::isfinite(record.radius) && std::isinf(record.error) == lod_.groups[i].terminal;
       for (const float c : record.center) finite &= std::isfinite(c);
@@ -53,7 +53,7 @@ public:
   }
 
 private:
-  baked::LodGroupRecord encode(const LodGroup& group, const std::vector<uint32_t>& below,
+  baked::LodGroupRecord encode(const LodGroup& group, const std::vector<uint32_t>& members,
                                const std::vector<baked::LodGroupRecord>& done) const {
     baked::LodGroupRecord record{};
     record.level = group.level;
@@ -67,18 +67,33 @@ private:
       off += std::abs(static_cast<double>(record.center[axis]) - center);
     }
     record.radius = round_up((group.sphere.radius * step_ + off) * kFloatRoundings);
-    for (const uint32_t number : below) {
-      const baked::LodGroupRecord& inner = done[number];
-      double squared = 0.0;
-      for (size_t axis = 0; axis < 3; ++axis) {
-        const double d = static_cast<double>(record.center[axis]) - static_cast<double>(inner.center[axis]);
-        squared += d * d;
-      }
-      const double reach = (std::sqrt(squared) + static_cast<double>(inner.radius)) * kFloatRoundings;
-      record.radius = std::max(record.radius, round_up(reach));
+    for (const uint32_t number : members) {
+      const LodCluster& cluster = lod_.clusters[number];
+      // New points may lie a little outside what they were made from.
+      record.radius = std::max(record.radius, round_up((reach(cluster, record) + decoding_error_) * kFloatRoundings));
+      if (cluster.generating_group == kNoGroup) continue;
+      const baked::LodGroupRecord& inner = done[cluster.generating_group];
+      const double outermost = distance(record, point(inner)) + static_cast<double>(inner.radius);
+      record.radius = std::max(record.radius, round_up(outermost * kFloatRoundings));
       record.error = std::max(record.error, inner.error);
     }
     return record;
+  }
+
+  static DVec3 point(const baked::LodGroupRecord& g) { return DVec3(g.center[0], g.center[1], g.center[2]); }
+  static double distance(const baked::LodGroupRecord& from, DVec3 to) { return glm::length(point(from) - to); }
+
+  /// How far the cluster's points are from a group's centre.
+  double reach(const LodCluster& cluster, const baked::LodGroupRecord& from) const {
+    double furthest = 0.0;
+    for (const Triangle& t :
+         std::span(lod_.triangles).subspan(cluster.range.first_triangle, cluster.range.triangle_count))
+      for (int corner = 0; corner < 3; ++corner) {
+        const LatticePoint& p = lod_.positions[lod_.vertices[t[corner]].position];
+        const DVec3 lattice(static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2]));
+        furthest = std::max(furthest, distance(from, lattice * step_));
+      }
+    return furthest;
   }
 
   const QuantizedGeometry& g_;
