@@ -5,6 +5,7 @@
 #include <optional>
 
 #include <tbb/parallel_for.h>
+#include <tbb/task_group.h>
 
 #include "compress/bake/brief.h"
 #include "compress/bake/file_sections.h"
@@ -258,7 +259,8 @@ private:
       }
     ClusterLod lod = build_cluster_lod(geometry, clusters, progress_, max_levels);
     EncodedLod encoded = encode_lod(geometry, lod);
-    if (store_) store_->keep(key, encoded);
+    // Where another geometry failed or all was cancelled, inner loops return with their work undone.
+    if (store_ && !tbb::is_current_task_group_canceling()) store_->keep(key, encoded);
     return encoded;
   }
 

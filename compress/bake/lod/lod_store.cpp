@@ -138,6 +138,7 @@ std::optional<EncodedLod> decode(std::span<const std::byte> bytes, const LodKey&
     e.stream_bits = {level.stream_bits[0], level.stream_bits[1], level.stream_bits[2], level.stream_bits[3]};
     lod.levels.push_back({std::move(e), level.triangles, level.group_count, level.error});
   }
+  if (cluster != clusters.size() || byte != payload.size()) return std::nullopt;
   return lod;
 }
 

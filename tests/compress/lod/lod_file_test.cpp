@@ -355,6 +355,29 @@ TEST(LodFile, AnInterruptedBakeGoesOnWithWhatItHas) {
   EXPECT_FALSE(std::filesystem::exists(config.resume));
 }
 
+/// Wherever it is interrupted: what it leaves behind is whole.
+TEST(LodFile, AnInterruptedBakeLeavesNoHalfMadeLevels) {
+  const SceneFolder folder;
+  Scene scene = mixed_scene();
+  for (uint32_t i = 0; i < 6; ++i) add_shape(scene, torus_mesh(60 + 10 * i, 40), translation({4.0 * i, 9, 0}));
+  BakeConfig config = lod_config();
+  const std::vector<std::byte> whole = bake(scene, config).bytes;
+  config.resume = folder.path() / "levels";
+  uint64_t resumed = 0;
+  for (const uint64_t stop : {1u, 20u, 40u, 60u, 80u}) {
+    Diagnostics diagnostics;
+    Progress progress([&](std::string_view phase, uint64_t done, uint64_t total) {
+      if (phase.ends_with("levels") && 100 * done >= stop * total) throw Error(ErrorKind::kCancelled, "stopped");
+    });
+    EXPECT_THROW((void)bake_to_bytes(scene, config, diagnostics, progress), Error) << stop;
+    const BakedScene after = bake(scene, config);
+    EXPECT_TRUE(after.bytes == whole) << stop;
+    resumed += after.report.resumed_geometries;
+    LodStore(config.resume).clear();
+  }
+  EXPECT_GT(resumed, 0u);
+}
+
 TEST(LodFile, DamagedLevelsOfAnInterruptedBakeAreMadeAgain) {
   const SceneFolder folder;
   BuiltLod built = build_lod(torus_mesh(24, 16));
