@@ -8,7 +8,8 @@ packages=(
   libcli11-dev libfmt-dev nlohmann-json3-dev
   libgtest-dev libbenchmark-dev python3
   glslang-tools spirv-tools libvulkan-dev mesa-vulkan-drivers # the GLSL of vertex16 is compiled and run on the CPU
-  libdraco-dev libmeshoptimizer-dev # what the packing benchmark compares with
+  libdraco-dev libtinygltf-dev # glTF export
+  libmeshoptimizer-dev # what the packing benchmark compares with
 )
 
 missing=()

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "compress/bake/vertex16_export.h"
+#include "compress/exchange/gltf_export.h"
 #include "pbrt_import/scene/error.h"
 #include "pbrt_import/scene/file_bytes.h"
 #include "pbrt_import/scene/output_file.h"
@@ -21,11 +22,20 @@
 namespace packtrace {
 namespace {
 
-constexpr const char* kVertex16 = "vertex16";
+constexpr const char *kVertex16 = "vertex16", *kGltf = "gltf", *kDraco = "draco", *kNone = "none";
 
 struct ExportOptions {
   std::string input, output;
-  std::string layout = kVertex16;
+  std::string layout; ///< empty: by the output's extension
+  std::string codec = kDraco;
+  GltfConfig gltf;
+};
+
+/// Bytes to be written and what is said about them.
+struct Exported {
+  std::vector<std::byte> bytes;
+  nlohmann::json json;
+  std::string text;
 };
 
 nlohmann::json to_json(const ExportOptions& options, const Vertex16Report& r) {
@@ -65,6 +75,67 @@ std::string to_text(const ExportOptions& options, const Vertex16Report& r) {
   return text;
 }
 
+nlohmann::json to_json(const ExportOptions& options, const GltfReport& r) {
+  return {{"verb", "export"},
+          {"input", options.input},
+          {"output", options.output},
+          {"layout", kGltf},
+          {"codec", options.codec},
+          {"meshes", r.meshes},
+          {"primitives", r.primitives},
+          {"nodes", r.nodes},
+          {"materials", r.materials},
+          {"images", r.images},
+          {"cameras", r.cameras},
+          {"vertices", r.vertices},
+          {"triangles", r.triangles},
+          {"bytes", {{"geometry", r.geometry_bytes}, {"images", r.image_bytes}, {"total", r.file_bytes}}},
+          {"collapsed_triangles", r.collapsed_triangles},
+          {"plain_primitives", r.plain_primitives},
+          {"simplified_materials", r.simplified_materials},
+          {"skipped_cameras", r.skipped_cameras},
+          {"peak_rss_bytes", peak_rss_bytes()}};
+}
+
+std::string to_text(const ExportOptions& options, const GltfReport& r) {
+  const double per = r.triangles > 0 ? 1.0 / static_cast<double>(r.triangles) : 0.0;
+  std::string text = fmt::format(
+      grouped(),
+      "{}: {:L} vertices, {:L} triangles in {:L} primitives; {:L} meshes, {:L} nodes, {:L} materials, {:L} images, "
+      "{:L} cameras\n{:L} bytes: geometry {:L} ({:.2f} a triangle), images {:L}\n",
+      options.output, r.vertices, r.triangles, r.primitives, r.meshes, r.nodes, r.materials, r.images, r.cameras,
+      r.file_bytes, r.geometry_bytes, static_cast<double>(r.geometry_bytes) * per, r.image_bytes);
+  const auto note = [&](uint64_t count, const char* what) {
+    if (count > 0) text += fmt::format(grouped(), "{:L} {}\n", count, what);
+  };
+  note(r.collapsed_triangles, "triangles without area, two corners in one place, were left out by Draco");
+  note(r.plain_primitives, "primitives need more than Draco's 30 bits, or it refused them: stored as floats");
+  note(r.simplified_materials, "materials have a mask and a texture that lie differently: the texture was left out");
+  note(r.skipped_cameras, "cameras have a projection that glTF does not know");
+  return text;
+}
+
+/// The layout asked for, or that of the output's extension.
+std::string layout_of(const ExportOptions& options) {
+  const std::string extension = std::filesystem::path(options.output).extension().string();
+  if (extension == ".gltf")
+    throw Error(ErrorKind::kUsage, options.output + ": glTF is written as one binary file, .glb");
+  if (!options.layout.empty()) return options.layout;
+  return extension == ".glb" ? kGltf : kVertex16;
+}
+
+Exported export_file(const ExportOptions& options, Progress& progress) {
+  const BakedFile file = BakedFile::open(options.input);
+  if (layout_of(options) == kGltf) {
+    GltfConfig config = options.gltf;
+    config.draco = options.codec == kDraco;
+    GltfExport result = export_gltf(file, config, progress);
+    return {std::move(result.bytes), to_json(options, result.report), to_text(options, result.report)};
+  }
+  Vertex16Export result = export_vertex16(file, progress);
+  return {std::move(result.bytes), to_json(options, result.report), to_text(options, result.report)};
+}
+
 int run(const ExportOptions& options, const GlobalOptions& globals) {
   std::error_code not_there;
   if (std::filesystem::equivalent(options.input, options.output, not_there))
@@ -73,13 +144,13 @@ int run(const ExportOptions& options, const GlobalOptions& globals) {
   OutputFile output(options.output, globals.force);
   ProgressDisplay display(globals);
   Progress progress(display.observer());
-  const Vertex16Export result = export_vertex16(BakedFile::open(options.input), progress);
+  const Exported result = export_file(options, progress);
   write_file_bytes(output.path(), result.bytes);
   output.commit();
   display.finish();
-  if (json.wanted()) json.write(to_json(options, result.report));
+  if (json.wanted()) json.write(result.json);
   if (json.to_stdout() || globals.quiet) return 0;
-  fmt::print("{}", to_text(options, result.report));
+  fmt::print("{}", result.text);
   return 0;
 }
 
@@ -87,18 +158,32 @@ int run(const ExportOptions& options, const GlobalOptions& globals) {
 
 void add_export_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<ExportOptions>();
-  CLI::App& verb = add_verb(app, globals, "export", "Write a .ptk file as plain vertex and index buffers",
+  CLI::App& verb = add_verb(app, globals, "export", "Write a .ptk file in a form that other programs read",
                             [options, &globals] { return run(*options, globals); });
   verb.add_option("FILE", options->input, "A .ptk file")->required();
   verb.add_option("-o,--output", options->output, "The file to write")->type_name("FILE")->required();
-  verb.add_option("--layout", options->layout, "vertex16: 16 bytes a vertex, 16- or 32-bit indices")
-      ->check(CLI::IsMember({kVertex16}))
-      ->default_str(kVertex16);
+  verb.add_option("--layout", options->layout,
+                  "vertex16: 16 bytes a vertex, 16- or 32-bit indices; gltf: one binary glTF 2.0 file with materials,\n"
+                  "instances, textures and cameras. Default: gltf for .glb, else vertex16")
+      ->check(CLI::IsMember({kVertex16, kGltf}));
+  verb.add_option("--codec", options->codec, "gltf: draco compresses (KHR_draco_mesh_compression), none stores floats")
+      ->check(CLI::IsMember({kDraco, kNone}))
+      ->capture_default_str();
+  verb.add_option("--level", options->gltf.codec.level, "draco: 0 fastest to 10 smallest")
+      ->check(CLI::Range(0, 10))
+      ->capture_default_str();
+  verb.add_option("--normal-bits", options->gltf.codec.normal_bits, "draco: bits of normals, 2 to 30")
+      ->check(CLI::Range(2, 30))
+      ->capture_default_str();
+  verb.add_option("--uv-bits", options->gltf.codec.uv_bits, "draco: bits of texture coordinates, 1 to 30")
+      ->check(CLI::Range(1, 30))
+      ->capture_default_str();
   verb.footer(
       "vertex16 packs position 3x21, normal 24, tangent 1+8 and uv 2x16 bits. docs/vertex16.md lays out the file,\n"
-      "compress/format/vertex16.glsl and vertex16_decode.h decode it.\n"
-      "Example:\n"
-      "  packtrace export house.ptk -o house.v16 --layout vertex16");
+      "compress/format/vertex16.glsl and vertex16_decode.h decode it. glTF positions stay on the file's lattice.\n"
+      "Examples:\n"
+      "  packtrace export house.ptk -o house.v16 --layout vertex16\n"
+      "  packtrace export house.ptk -o house.glb --level 10");
 }
 
 } // namespace packtrace

@@ -23,7 +23,9 @@ const std::vector<Layer> kLayers = {
     {"pbrt_import/", {"pbrt_import/scene/"}},
     {"compress/format/", {"pbrt_import/scene/"}},
     {"compress/bake/", {"compress/format/", "pbrt_import/scene/"}},
-    {"runtime/commands/", {"runtime/", "compress/format/", "compress/bake/", "pbrt_import/", "pbrt_import/scene/"}},
+    {"compress/exchange/", {"compress/format/", "pbrt_import/scene/"}},
+    {"runtime/commands/",
+     {"runtime/", "compress/format/", "compress/bake/", "compress/exchange/", "pbrt_import/", "pbrt_import/scene/"}},
     {"runtime/", {"compress/format/", "pbrt_import/scene/"}},
 };
 

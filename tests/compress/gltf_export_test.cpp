@@ -1,0 +1,390 @@
+#include "compress/exchange/gltf_export.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <numbers>
+#include <set>
+
+#include <draco/compression/decode.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <tbb/global_control.h>
+#include <tiny_gltf.h>
+
+#include "pbrt_import/scene/error.h"
+#include "tests/compress/test_scenes.h"
+
+namespace packtrace {
+namespace {
+
+GltfExport export_of(const BakedFile& file, const GltfConfig& config = {}) {
+  Progress progress;
+  return export_gltf(file, config, progress);
+}
+
+GltfConfig plain() {
+  GltfConfig config;
+  config.draco = false;
+  return config;
+}
+
+uint32_t word_at(const std::vector<std::byte>& bytes, size_t place) {
+  uint32_t word = 0;
+  std::memcpy(&word, bytes.data() + place, sizeof word);
+  return word;
+}
+
+/// tinygltf without Draco refuses accessors without bytes of their own, as Draco's are: they get the first buffer view.
+std::vector<std::byte> readable_without_draco(const std::vector<std::byte>& glb) {
+  constexpr size_t kHeader = 12, kChunkHeader = 8;
+  const size_t json_bytes = word_at(glb, kHeader);
+  const auto* const text = reinterpret_cast<const char*>(glb.data()) + kHeader + kChunkHeader;
+  nlohmann::json json = nlohmann::json::parse(text, text + json_bytes);
+  if (json.contains("accessors"))
+    for (nlohmann::json& accessor : json["accessors"])
+      if (!accessor.contains("bufferView")) accessor["bufferView"] = 0;
+  std::string changed = json.dump();
+  changed.resize((changed.size() + 3) / 4 * 4, ' ');
+  std::vector<std::byte> result(glb.begin(), glb.begin() + kHeader + kChunkHeader);
+  const auto set_word = [&](size_t place, size_t value) {
+    const auto word = static_cast<uint32_t>(value);
+    std::memcpy(result.data() + place, &word, sizeof word);
+  };
+  set_word(8, glb.size() - json_bytes + changed.size());
+  set_word(kHeader, changed.size());
+  const auto bytes = std::as_bytes(std::span(changed));
+  result.insert(result.end(), bytes.begin(), bytes.end());
+  result.insert(result.end(), glb.begin() + static_cast<ptrdiff_t>(kHeader + kChunkHeader + json_bytes), glb.end());
+  return result;
+}
+
+tinygltf::Model parse(const GltfExport& from) {
+  EXPECT_EQ(word_at(from.bytes, 8), from.bytes.size());
+  const std::vector<std::byte> bytes = readable_without_draco(from.bytes);
+  tinygltf::Model model;
+  std::string errors, warnings;
+  EXPECT_TRUE(tinygltf::TinyGLTF().LoadBinaryFromMemory(&model, &errors, &warnings,
+                                                        reinterpret_cast<const unsigned char*>(bytes.data()),
+                                                        static_cast<unsigned int>(bytes.size())))
+      << errors;
+  return model;
+}
+
+struct Part {
+  std::vector<Vec3> positions, normals;
+  std::vector<Vec2> uvs;
+  std::vector<Triangle> triangles;
+};
+
+template <typename Value>
+std::vector<Value> accessor_values(const tinygltf::Model& model, int accessor, size_t count) {
+  const tinygltf::BufferView& view =
+      model.bufferViews[static_cast<size_t>(model.accessors[static_cast<size_t>(accessor)].bufferView)];
+  EXPECT_EQ(view.byteLength, count * sizeof(Value));
+  std::vector<Value> values(count);
+  std::memcpy(static_cast<void*>(values.data()), model.buffers[0].data.data() + view.byteOffset, view.byteLength);
+  return values;
+}
+
+template <typename Value>
+std::vector<Value> draco_values(const draco::Mesh& mesh, const tinygltf::Value& ids, const char* name) {
+  std::vector<Value> values;
+  if (!ids.Has(name)) return values;
+  const draco::PointAttribute* const attribute =
+      mesh.GetAttributeByUniqueId(static_cast<uint32_t>(ids.Get(name).GetNumberAsInt()));
+  for (draco::PointIndex point(0); point < mesh.num_points(); ++point)
+    attribute->GetMappedValue(point, &values.emplace_back());
+  return values;
+}
+
+/// One primitive, decoded as any reader would, after comparing it with what the accessors promise.
+Part part_of(const tinygltf::Model& model, const tinygltf::Primitive& primitive) {
+  Part part;
+  const auto count = [&](int accessor) { return model.accessors[static_cast<size_t>(accessor)].count; };
+  const size_t vertices = count(primitive.attributes.at("POSITION")), indices = count(primitive.indices);
+  const auto extension = primitive.extensions.find("KHR_draco_mesh_compression");
+  if (extension == primitive.extensions.end()) {
+    part.positions = accessor_values<Vec3>(model, primitive.attributes.at("POSITION"), vertices);
+    if (primitive.attributes.count("NORMAL"))
+      part.normals = accessor_values<Vec3>(model, primitive.attributes.at("NORMAL"), vertices);
+    if (primitive.attributes.count("TEXCOORD_0"))
+      part.uvs = accessor_values<Vec2>(model, primitive.attributes.at("TEXCOORD_0"), vertices);
+    part.triangles = accessor_values<Triangle>(model, primitive.indices, indices / 3);
+    return part;
+  }
+  const tinygltf::BufferView& view =
+      model.bufferViews[static_cast<size_t>(extension->second.Get("bufferView").GetNumberAsInt())];
+  draco::DecoderBuffer buffer;
+  buffer.Init(reinterpret_cast<const char*>(model.buffers[0].data.data()) + view.byteOffset, view.byteLength);
+  const auto decoded = draco::Decoder().DecodeMeshFromBuffer(&buffer);
+  EXPECT_TRUE(decoded.ok());
+  const draco::Mesh& mesh = *decoded.value();
+  const tinygltf::Value& ids = extension->second.Get("attributes");
+  part.positions = draco_values<Vec3>(mesh, ids, "POSITION");
+  part.normals = draco_values<Vec3>(mesh, ids, "NORMAL");
+  part.uvs = draco_values<Vec2>(mesh, ids, "TEXCOORD_0");
+  for (draco::FaceIndex f(0); f < mesh.num_faces(); ++f)
+    part.triangles.emplace_back(mesh.face(f)[0].value(), mesh.face(f)[1].value(), mesh.face(f)[2].value());
+  EXPECT_EQ(part.positions.size(), vertices);
+  EXPECT_EQ(3 * part.triangles.size(), indices);
+  EXPECT_EQ(part.normals.empty(), primitive.attributes.count("NORMAL") == 0);
+  EXPECT_EQ(part.uvs.empty(), primitive.attributes.count("TEXCOORD_0") == 0);
+  return part;
+}
+
+using Face = std::array<LatticePoint, 3>;
+
+Face face_of(Face face) {
+  std::rotate(face.begin(), std::min_element(face.begin(), face.end()), face.end()); // keeps the winding
+  return face;
+}
+
+double step_of(const BakedFile& file, uint32_t geometry) {
+  const baked::GeometryRecord& record = file.geometries()[geometry];
+  return PositionGrid{record.step_mantissa, record.step_exponent}.step();
+}
+
+std::multiset<Face> faces_of(const BakedFile& file, uint32_t geometry) {
+  std::multiset<Face> faces;
+  for (uint32_t c = 0; c < file.clusters(geometry).size(); ++c) {
+    const ClusterView view = file.cluster(geometry, c);
+    for (uint32_t i = 0; i < view.triangle_count(); ++i) {
+      const Triangle t = view.triangle(i);
+      faces.insert(face_of({view.lattice(t.x), view.lattice(t.y), view.lattice(t.z)}));
+    }
+  }
+  return faces;
+}
+
+/// Faces of a mesh on the lattice of a step, and that its positions lie on it.
+std::multiset<Face> faces_of(const tinygltf::Model& model, const tinygltf::Mesh& mesh, double step) {
+  std::multiset<Face> faces;
+  for (const tinygltf::Primitive& primitive : mesh.primitives) {
+    const Part part = part_of(model, primitive);
+    for (const Triangle& t : part.triangles) {
+      Face face;
+      for (int corner = 0; corner < 3; ++corner)
+        for (int axis = 0; axis < 3; ++axis) {
+          const double steps = part.positions[t[corner]][axis] / step;
+          face[static_cast<size_t>(corner)][static_cast<size_t>(axis)] = std::llround(steps);
+          EXPECT_LT(std::abs(steps - std::round(steps)), 0.05);
+        }
+      faces.insert(face_of(face));
+    }
+  }
+  return faces;
+}
+
+/// Flat and smooth parts, a masked and a textured material, an object placed twice with a mirror.
+Scene mixed_scene() {
+  Scene scene = test::scene_of(test::sphere_mesh(20));
+  AlphaMask mask;
+  mask.width = 64, mask.height = 32;
+  mask.uv_scale = Vec2(2.0f), mask.uv_offset = Vec2(0.25f);
+  mask.words.assign(2 * 32, 0x0f0f0f0fu);
+  scene.masks.push_back(mask);
+  scene.materials.push_back({"leaf", kAlphaMask, Vec3(0.5f), 0, kNoMask});
+  test::add_shape(scene, test::grid_mesh(40, 0.3f, true), test::translation({-3, 2, 1}), 1);
+  test::add_shape(scene, test::soup_mesh(300, 4));
+  scene.meshes.push_back(test::sphere_mesh(9));
+  scene.objects.push_back({"ball", {Shape{3, 0, false, DAffine(1.0)}, Shape{1, 1, true, test::scaling({2, 2, -2})}}});
+  for (const double x : {5.0, -5.0}) scene.instances.push_back({0, Affine(test::translation({x, 5, 5}))});
+  return scene;
+}
+
+class GltfCodecs : public testing::TestWithParam<bool> {};
+
+TEST_P(GltfCodecs, EveryTriangleStaysOnTheLattice) {
+  const BakedScene baked = test::bake(mixed_scene());
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  GltfConfig config;
+  config.draco = GetParam();
+  const GltfExport result = export_of(file, config);
+  const tinygltf::Model model = parse(result);
+  EXPECT_EQ(result.report.collapsed_triangles, 0u);
+  ASSERT_EQ(model.nodes.size(), 1 + file.instances().size());
+  for (size_t i = 0; i < file.instances().size(); ++i) {
+    const uint32_t geometry = file.instances()[i].geometry;
+    const tinygltf::Node& node = model.nodes[1 + i];
+    const tinygltf::Mesh& mesh = model.meshes[static_cast<size_t>(node.mesh)];
+    EXPECT_EQ(faces_of(model, mesh, step_of(file, geometry)), faces_of(file, geometry)) << i;
+    for (size_t column = 0; column < 4 && !node.matrix.empty(); ++column)
+      for (size_t row = 0; row < 3; ++row)
+        EXPECT_EQ(node.matrix[4 * column + row], file.instances()[i].world_from_object[3 * column + row]);
+  }
+}
+INSTANTIATE_TEST_SUITE_P(All, GltfCodecs, testing::Bool());
+
+TEST(GltfExport, NormalsAndTextureCoordinatesAreWithinTheirBits) {
+  BakeConfig bake;
+  bake.keep_uvs = true;
+  const BakedScene baked = test::bake(mixed_scene(), bake);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  const tinygltf::Model exact = parse(export_of(file, plain())), coded = parse(export_of(file));
+  size_t normals = 0, uvs = 0;
+  for (size_t m = 0; m < exact.meshes.size(); ++m)
+    for (size_t p = 0; p < exact.meshes[m].primitives.size(); ++p) {
+      const Part a = part_of(exact, exact.meshes[m].primitives[p]), b = part_of(coded, coded.meshes[m].primitives[p]);
+      // Every coded vertex has an exact one at its place that it stands for.
+      std::multimap<std::array<float, 3>, size_t> places;
+      const auto key = [](Vec3 v) {
+        return std::array<float, 3>{std::round(v.x * 1e4f), std::round(v.y * 1e4f), std::round(v.z * 1e4f)};
+      };
+      for (size_t i = 0; i < a.positions.size(); ++i) places.emplace(key(a.positions[i]), i);
+      for (size_t i = 0; i < b.positions.size(); ++i) {
+        const auto [first, last] = places.equal_range(key(b.positions[i]));
+        if (first == last) continue; // on the edge of a rounding cell
+        float normal_cosine = -1.0f, uv_distance = 1e9f;
+        for (auto at = first; at != last; ++at) {
+          if (!b.normals.empty())
+            normal_cosine = std::max(normal_cosine, glm::dot(a.normals[at->second], b.normals[i]));
+          if (!b.uvs.empty()) uv_distance = std::min(uv_distance, glm::distance(a.uvs[at->second], b.uvs[i]));
+        }
+        normals += !b.normals.empty(), uvs += !b.uvs.empty();
+        if (!b.normals.empty()) {
+          EXPECT_GT(normal_cosine, 0.999995f);
+        } // .04 degrees at 12 bits, and rounding
+        if (!b.uvs.empty()) {
+          EXPECT_LT(uv_distance, 4.0f / 16384.0f);
+        }
+      }
+    }
+  EXPECT_GT(normals, 1000u);
+  EXPECT_GT(uvs, 1000u);
+}
+
+TEST(GltfExport, WorldSpaceNeighboursDecodeToTheSameBits) {
+  // Two grids side by side share the points x = 1.
+  Scene scene = test::scene_of(test::grid_mesh(16, 0.2f));
+  test::add_shape(scene, test::grid_mesh(16, 0.2f), test::translation({1, 0, 0}));
+  scene.materials.push_back({"other", 0, Vec3(0.1f), kNoMask, kNoMask});
+  scene.shapes.back().material = 1;
+  const BakedScene baked = test::bake(scene);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  const tinygltf::Model model = parse(export_of(file));
+  std::map<LatticePoint, std::set<std::array<float, 3>>> bits;
+  const double step = step_of(file, 0);
+  for (const tinygltf::Mesh& mesh : model.meshes)
+    for (const tinygltf::Primitive& primitive : mesh.primitives)
+      for (const Vec3& p : part_of(model, primitive).positions)
+        bits[{std::llround(p.x / step), std::llround(p.y / step), std::llround(p.z / step)}].insert({p.x, p.y, p.z});
+  for (const auto& [point, values] : bits) EXPECT_EQ(values.size(), 1u);
+}
+
+TEST(GltfExport, MaterialsHaveMasksAndFlags) {
+  const BakedScene baked = test::bake(mixed_scene());
+  const tinygltf::Model model = parse(export_of(BakedFile::from_bytes(baked.bytes)));
+  const auto leaf =
+      std::find_if(model.materials.begin(), model.materials.end(), [](const auto& m) { return m.name == "leaf"; });
+  ASSERT_NE(leaf, model.materials.end());
+  EXPECT_EQ(leaf->alphaMode, "MASK");
+  EXPECT_EQ(leaf->extras.Get("flags").GetNumberAsInt(), static_cast<int>(kAlphaMask));
+  EXPECT_EQ(leaf->pbrMetallicRoughness.baseColorFactor, (std::vector<double>{0.5, 0.5, 0.5, 1.0}));
+  const tinygltf::Texture& texture =
+      model.textures[static_cast<size_t>(leaf->pbrMetallicRoughness.baseColorTexture.index)];
+  const tinygltf::Image& image = model.images[static_cast<size_t>(texture.source)];
+  ASSERT_EQ(image.width, 64);
+  ASSERT_EQ(image.height, 32);
+  ASSERT_EQ(image.component, 4);
+  for (size_t x = 0; x < 64; ++x) EXPECT_EQ(image.image[4 * x + 3], x % 8 < 4 ? 255 : 0);
+  // v counts from the bottom: 1 - (2 v + 1/4) from the top.
+  const tinygltf::Value& transform = leaf->pbrMetallicRoughness.baseColorTexture.extensions.at("KHR_texture_transform");
+  EXPECT_EQ(transform.Get("scale").Get(1).GetNumberAsDouble(), -2.0);
+  EXPECT_EQ(transform.Get("offset").Get(0).GetNumberAsDouble(), 0.25);
+  EXPECT_EQ(transform.Get("offset").Get(1).GetNumberAsDouble(), 0.75);
+}
+
+TEST(GltfExport, CamerasSeeTheSame) {
+  Scene scene = mixed_scene();
+  Camera camera;
+  camera.world_from_camera = *look_at({3, 4, -9}, {0.5, 0, 0}, {0, 1, 0});
+  camera.fov_degrees = 50.0;
+  camera.width_px = 640, camera.height_px = 360;
+  scene.cameras.push_back(camera);
+  const BakedScene baked = test::bake(scene);
+  const tinygltf::Model model = parse(export_of(BakedFile::from_bytes(baked.bytes)));
+  ASSERT_EQ(model.cameras.size(), 1u);
+  const tinygltf::PerspectiveCamera& lens = model.cameras[0].perspective;
+  EXPECT_NEAR(lens.yfov, 50.0 * std::numbers::pi / 180.0, 1e-12); // the shorter axis
+  EXPECT_NEAR(lens.aspectRatio, 640.0 / 360.0, 1e-12);
+  glm::dmat4 node(1.0), mirror(1.0);
+  for (int i = 0; i < 16; ++i) node[i / 4][i % 4] = model.nodes.back().matrix[static_cast<size_t>(i)];
+  mirror[0][0] = -1.0;
+  const glm::dmat4 global = mirror * node;
+  EXPECT_NEAR(glm::determinant(glm::dmat3(global)), 1.0, 1e-9) << "cameras must not be mirrored";
+  const DVec3 point(0.3, 0.7, 0.2);
+  const DVec3 here = transform_point(inverse(camera.world_from_camera), point);
+  const glm::dvec4 there = glm::inverse(global) * mirror * glm::dvec4(point, 1.0);
+  EXPECT_NEAR(there.x / -there.z, here.x / here.z, 1e-9);
+  EXPECT_NEAR(there.y / -there.z, here.y / here.z, 1e-9);
+}
+
+TEST(GltfExport, InstancesWithOtherMaterialsShareBuffers) {
+  Scene scene = test::scene_of(test::sphere_mesh(12));
+  scene.shapes.clear();
+  scene.materials.push_back({"red", 0, Vec3(1, 0, 0), kNoMask, kNoMask});
+  for (uint32_t m = 0; m < 2; ++m) {
+    scene.objects.push_back({"ball", {Shape{0, m, false, DAffine(1.0)}}});
+    scene.instances.push_back({m, Affine(test::translation({3.0 * m, 0, 0}))});
+  }
+  const BakedScene baked = test::bake(scene);
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  ASSERT_EQ(file.geometries().size(), 1u);
+  const tinygltf::Model model = parse(export_of(file));
+  ASSERT_EQ(model.meshes.size(), 2u);
+  EXPECT_EQ(model.meshes[0].primitives[0].attributes, model.meshes[1].primitives[0].attributes);
+  EXPECT_NE(model.meshes[0].primitives[0].material, model.meshes[1].primitives[0].material);
+}
+
+TEST(GltfExport, CollapsedTrianglesAreCounted) {
+  Mesh mesh = test::grid_mesh(4);
+  mesh.triangles.push_back(Triangle(3, 3, 4));
+  const BakedScene baked = test::bake(test::scene_of(mesh));
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  const uint64_t all = faces_of(file, 0).size();
+  const GltfExport coded = export_of(file), exact = export_of(file, plain());
+  EXPECT_EQ(exact.report.triangles, all);
+  EXPECT_EQ(coded.report.triangles + coded.report.collapsed_triangles, all);
+}
+
+TEST(GltfExport, GeometryBeyondDracosBitsIsStoredAsFloats) {
+  Scene scene = test::scene_of(test::grid_mesh(8));
+  test::add_shape(scene, test::grid_mesh(9), test::translation({3e6, 0, 0}));
+  BakeConfig config;
+  config.precision_kind = PrecisionKind::kAbsolute;
+  config.precision = 1e-4;
+  const BakedScene baked = test::bake(scene, config);
+  const GltfExport result = export_of(BakedFile::from_bytes(baked.bytes));
+  EXPECT_EQ(result.report.plain_primitives, 2u);
+  EXPECT_TRUE(parse(result).extensionsRequired.empty());
+}
+
+TEST(GltfExport, EmptyScenesAreFiles) {
+  const BakedScene baked = test::bake(Scene{});
+  const tinygltf::Model model = parse(export_of(BakedFile::from_bytes(baked.bytes)));
+  EXPECT_TRUE(model.meshes.empty());
+}
+
+TEST(GltfExport, BytesDoNotDependOnThreads) {
+  const BakedScene baked = test::bake(mixed_scene());
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  const GltfExport many = export_of(file);
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  EXPECT_EQ(export_of(file).bytes, many.bytes);
+}
+
+TEST(GltfExport, RefusesValuesOutOfRange) {
+  const BakedScene baked = test::bake(Scene{});
+  const BakedFile file = BakedFile::from_bytes(baked.bytes);
+  for (const DracoConfig codec : {DracoConfig{11, 12, 14}, DracoConfig{7, 1, 14}, DracoConfig{7, 12, 31}}) {
+    GltfConfig config;
+    config.codec = codec;
+    EXPECT_THROW(export_of(file, config), Error);
+  }
+}
+
+} // namespace
+} // namespace packtrace
