@@ -1,0 +1,24 @@
+#include "runtime/trace/packed/lanes_scalar.h"
+#include "runtime/trace/packed/traversal.h"
+
+namespace packtrace::packed {
+namespace {
+
+struct ScalarKernel : ScalarLanes {
+  struct NodeRay {
+    explicit NodeRay(const GridRay&) {}
+  };
+
+  static uint32_t test_node(const baked::PackedNode& node, const NodeRay&, const GridRay& ray, float (&entry)[8]) {
+    return test_boxes<ScalarLanes>(node, ray, entry);
+  }
+  static uint32_t decode(const TraceCluster& cluster, uint32_t first, uint32_t count, DecodedBatch& out) {
+    return decode_batch_scalar(cluster, first, count, out);
+  }
+};
+
+} // namespace
+
+const Kernels kScalarKernels = kernels_of<ScalarKernel>("scalar");
+
+} // namespace packtrace::packed
