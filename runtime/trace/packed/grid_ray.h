@@ -103,6 +103,21 @@ inline void aim(GridRay& ray, const double origin[3], const double direction[3],
   ray.sy = d[ray.ky] / d[ray.kz];
 }
 
+/// Scales a direction by a power of two so that its largest component is in [1, 2); t_scale: t of before for one t of
+/// now. False where there is no direction, or coordinates are beyond any use.
+inline bool normalize(const double origin[3], double direction[3], double& t_scale) {
+  double largest = 0.0, away = 0.0;
+  for (uint32_t i = 0; i < 3; ++i) {
+    const double size = __builtin_fabs(direction[i]), far = __builtin_fabs(origin[i]);
+    largest = size > largest ? size : largest;
+    away = far > away ? far : away;
+  }
+  if (!(largest > 0.0 && largest < 1e300 && away < 1e300)) return false;
+  t_scale = 1.0 / power_below(largest);
+  for (uint32_t i = 0; i < 3; ++i) direction[i] *= t_scale;
+  return true;
+}
+
 /// Into a tree's grid. False where nothing can be hit.
 /// @param tmax of the ray in unit space, inclusive
 inline bool enter(const TracePlacement& placement, const TraceTree& tree, const KernelRay& from, float tmax,
@@ -115,21 +130,14 @@ inline bool enter(const TracePlacement& placement, const TraceTree& tree, const 
     origin[i] = m[i] * double{from.origin[0]} + m[3 + i] * double{from.origin[1]} + m[6 + i] * double{from.origin[2]} +
                 m[9 + i];
   }
-  double largest = 0.0, away = 0.0;
-  for (uint32_t i = 0; i < 3; ++i) {
-    const double size = __builtin_fabs(direction[i]), far = __builtin_fabs(origin[i]);
-    largest = size > largest ? size : largest;
-    away = far > away ? far : away;
-  }
-  if (!(largest > 0.0 && largest < 1e300 && away < 1e300)) return false;
-  const double power = power_below(largest);
-  for (double& component : direction) component /= power;
-  ray.t_scale = 1.0 / power;
+  if (!normalize(origin, direction, ray.t_scale)) return false;
   ray.t_begin = 0.0;
   const double reach = double{tree.max_coordinate};
+  const double away = __builtin_fmax(__builtin_fmax(__builtin_fabs(origin[0]), __builtin_fabs(origin[1])),
+                                     __builtin_fabs(origin[2]));
   if (away > 4.0 * reach && !approach(placement, 0x1p-8 * reach, origin, direction, ray.t_begin)) return false;
-  ray.tnear = static_cast<float>(double{from.tnear} * power - ray.t_begin);
-  ray.tmax = static_cast<float>(double{tmax} * power - ray.t_begin);
+  ray.tnear = static_cast<float>(double{from.tnear} / ray.t_scale - ray.t_begin);
+  ray.tmax = static_cast<float>(double{tmax} / ray.t_scale - ray.t_begin);
   aim(ray, origin, direction, tree.max_coordinate);
   return ray.tmax >= 0.0f;
 }

@@ -1,16 +1,16 @@
-#include "runtime/trace/packed/lanes_avx512.h"
+#include "runtime/trace/packed/batch_decode_avx512.h"
+#include "runtime/trace/packed/group_boxes_avx512.h"
+#include "runtime/trace/packed/lanes_avx2.h"
 #include "runtime/trace/packed/traversal.h"
 
 namespace packtrace::packed {
 namespace {
 
 struct Avx512Kernel : Avx2Lanes {
-  using NodeRay = Avx512NodeRay;
+  using Boxes = Avx512GroupBoxes;
+  using BoxRay = Avx512GroupRay;
+  using Children = Avx512ChildRays;
 
-  static uint32_t test_node(const baked::PackedNode& node, const NodeRay& node_ray, const GridRay& ray,
-                            float (&entry)[8]) {
-    return test_boxes(node, node_ray, ray.tmax, entry);
-  }
   static uint32_t decode(const TraceCluster& cluster, uint32_t first, uint32_t count, DecodedBatch& out) {
     return decode_batch_avx512(cluster, first, count, out);
   }

@@ -5,13 +5,10 @@ namespace packtrace::packed {
 namespace {
 
 struct ScalarKernel : ScalarLanes {
-  struct NodeRay {
-    explicit NodeRay(const GridRay&) {}
-  };
+  using Boxes = GroupBoxes<ScalarLanes>;
+  using BoxRay = GroupRay<ScalarLanes>;
+  using Children = ChildRays<ScalarLanes>;
 
-  static uint32_t test_node(const baked::PackedNode& node, const NodeRay&, const GridRay& ray, float (&entry)[8]) {
-    return test_boxes<ScalarLanes>(node, ray, entry);
-  }
   static uint32_t decode(const TraceCluster& cluster, uint32_t first, uint32_t count, DecodedBatch& out) {
     return decode_batch_scalar(cluster, first, count, out);
   }

@@ -76,7 +76,11 @@ inline constexpr uint32_t kMaxTopDepth = 64;
 
 /// What the kernels count if they are asked to.
 struct KernelCounters {
-  uint64_t rays = 0, nodes = 0, leaves = 0, triangles = 0, batches_decoded = 0, exact_triangles = 0, placements = 0;
+  uint64_t rays = 0, placements = 0; ///< placements: entered, each ray its own
+  uint64_t nodes = 0, node_rays = 0; ///< nodes visited by groups, and by each ray in them
+  uint64_t leaves = 0, leaf_rays = 0;
+  uint64_t triangles = 0; ///< tested against a ray each
+  uint64_t batches_decoded = 0, exact_triangles = 0;
 };
 
 struct KernelScene {

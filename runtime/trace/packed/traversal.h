@@ -1,12 +1,17 @@
 #pragma once
 
 #include "runtime/trace/packed/batch_decode.h"
-#include "runtime/trace/packed/node_test.h"
+#include "runtime/trace/packed/group_boxes.h"
 #include "runtime/trace/packed/triangle_test.h"
 
-/// One ray at a time through trees of nodes.
+/// Groups of rays through trees of nodes.
 namespace packtrace::packed {
 namespace {
+
+/// Rays that are traced together: as many as a word has bits. They go through a node together, each box at its own, so
+/// that a node is read and set up once for all of them, and nothing waits for the outcome of one ray's test.
+/// Idea: Barringer, Akenine-Moeller, "Dynamic ray stream traversal" (2014).
+constexpr uint32_t kGroup = 64;
 
 /// PackedNode::children as one number.
 struct NodeChildren {
@@ -25,106 +30,227 @@ struct NodeChildren {
 
 inline uint32_t byte_of(uint64_t word, uint32_t slot) { return static_cast<uint32_t>(word >> (8 * slot)) & 0xffu; }
 
-/// One ray class and scene, for many rays on one thread.
-template <typename Lanes, bool kCount>
+inline uint32_t first_bit(uint64_t word) { return static_cast<uint32_t>(__builtin_ctzll(word)); }
+
+struct Pending {
+  uint64_t rays; ///< as bits
+  uint32_t node;
+  float t; ///< where the first of them enters; only for order
+};
+
+/// Any hits (kAny) or nearest hits of one ray class in one scene, on one thread.
+template <typename Lanes, bool kAny, bool kCount>
 class Traversal {
 public:
-  Traversal(const KernelScene& scene, BatchCache& cache, uint32_t ray_class, KernelCounters* counters)
-      : scene_(scene), cache_(cache), ray_class_(ray_class), counters_(counters) {}
+  /// @param occluded or hits, one for each ray
+  Traversal(const KernelScene& scene, BatchCache& cache, const KernelRay* rays, uint32_t ray_class, uint8_t* occluded,
+            KernelHit* hits, KernelCounters* counters)
+      : scene_(scene), cache_(cache), rays_(rays), ray_class_(ray_class), occluded_(occluded), hits_(hits),
+        counters_(counters) {}
 
-  void closest(const KernelRay& from, KernelHit& hit) {
-    hit = {__builtin_inff(), 0.0f, 0.0f, ~0u, 0, 0};
-    trace(from, [&](uint32_t placement, float tmax) {
-      GridRay ray;
-      if (!enter_placement(placement, from, tmax, ray)) return tmax;
-      return closest_in_tree(placement, ray, tmax, hit);
-    });
-  }
-
-  bool any(const KernelRay& from) {
-    bool found = false;
-    trace(from, [&](uint32_t placement, float tmax) {
-      GridRay ray;
-      if (!enter_placement(placement, from, tmax, ray) || !any_in_tree(placement, ray)) return tmax;
-      found = true;
-      return -1.0f;
-    });
-    return found;
+  /// Traces them all, by octant in groups of neighbours.
+  void run(size_t count) {
+    uint32_t numbers[8][kGroup], sizes[8] = {};
+    for (size_t i = 0; i < count; ++i) {
+      const auto number = static_cast<uint32_t>(i);
+      if constexpr (kCount) ++counters_->rays;
+      if constexpr (kAny)
+        occluded_[i] = 0;
+      else
+        hits_[i] = {__builtin_inff(), 0.0f, 0.0f, ~0u, 0, 0};
+      if (!(rays_[i].tfar > rays_[i].tnear)) continue;
+      const uint32_t octant = octant_of(rays_[i].direction);
+      numbers[octant][sizes[octant]++] = number;
+      if (sizes[octant] == kGroup) {
+        trace_group(numbers[octant], kGroup);
+        sizes[octant] = 0;
+      }
+    }
+    for (uint32_t octant = 0; octant < 8; ++octant)
+      if (sizes[octant] > 0) trace_group(numbers[octant], sizes[octant]);
   }
 
 private:
-  struct Pending {
-    float t;
-    uint32_t node;
+  /// Rays in the coordinates of one tree. Those that are not in use are not set.
+  struct Group {
+    GridRay rays[kGroup];
+    typename Lanes::BoxRay boxes[kGroup];
   };
 
-  /// Calls visit(placement, tmax) for placements along the ray; it returns the new tmax.
-  template <typename Visit>
-  void trace(const KernelRay& from, Visit visit) {
-    if constexpr (kCount) ++counters_->rays;
-    if (!(from.tfar > from.tnear)) return;
-    const float tmax = next_below(from.tfar);
-    if (scene_.top_nodes != nullptr)
-      trace_top(from, tmax, visit);
-    else if (scene_.placement_count > 0)
-      visit(0u, tmax);
+  static uint32_t octant_of(const float (&v)[3]) {
+    return (__builtin_signbit(v[0]) ? 1u : 0u) | (__builtin_signbit(v[1]) ? 2u : 0u) |
+           (__builtin_signbit(v[2]) ? 4u : 0u);
   }
 
-  template <typename Visit>
-  void trace_top(const KernelRay& from, float tmax, Visit visit) {
-    GridRay ray;
-    double origin[3], direction[3], largest = 0.0;
-    for (uint32_t i = 0; i < 3; ++i) {
-      origin[i] = double{from.origin[i]};
-      direction[i] = double{from.direction[i]};
-      largest = __builtin_fabs(direction[i]) > largest ? __builtin_fabs(direction[i]) : largest;
-    }
-    if (!(largest > 0.0 && largest < 1e300)) return;
-    const double power = power_below(largest);
-    for (double& component : direction) component /= power;
-    aim(ray, origin, direction, scene_.top_max_coordinate);
-    ray.tnear = static_cast<float>(double{from.tnear} * power);
-    Pending stack[kMaxTopDepth * 8];
+  void trace_group(const uint32_t* numbers, uint32_t count) {
+    numbers_ = numbers;
+    alive_ = ~uint64_t{0} >> (kGroup - count);
+    for (uint32_t i = 0; i < count; ++i) tmax_[i] = next_below(rays_[numbers[i]].tfar);
+    if (scene_.top_nodes != nullptr)
+      trace_top();
+    else if (scene_.placement_count > 0)
+      trace_placement(0, alive_);
+  }
+
+  /// Through the tree over placements.
+  void trace_top() {
+    Group group;
+    const uint64_t rays = aim_all(group);
+    uint32_t near_at[3];
+    set_near(group.rays[0], near_at);
+    Pending stack[kMaxTopDepth * (baked::kNodeWidth - 1) + 1];
     uint32_t size = 0;
-    stack[size++] = {0.0f, 0};
+    if (rays != 0) stack[size++] = {rays, 0, 0.0f};
     while (size > 0) {
       const Pending next = stack[--size];
-      ray.tmax = static_cast<float>(double{tmax} * power);
-      if (next.t > ray.tmax) continue;
+      const uint64_t active = next.rays & alive_;
+      if (active == 0) continue;
       if ((next.node & kTopLeaf) != 0) {
-        tmax = visit(next.node & ~kTopLeaf, tmax);
-        if (tmax < 0.0f) return;
+        trace_placement(next.node & ~kTopLeaf, active);
+        if constexpr (!kAny)
+          for (uint64_t m = active; m != 0; m &= m - 1)
+            group.boxes[first_bit(m)].set_tmax(static_cast<float>(double{tmax_[first_bit(m)]} / unit_[first_bit(m)]));
         continue;
       }
       const TopNode& node = scene_.top_nodes[next.node];
-      alignas(32) float entry[8];
-      const uint32_t begin = size;
-      for (uint32_t slots = test_boxes<Lanes>(node, ray, entry); slots != 0; slots &= slots - 1) {
-        const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
-        if (node.child[slot] != kTopNone) push_sorted(stack, begin, size, {entry[slot], node.child[slot]});
-      }
+      push_children(typename Lanes::Boxes(node, near_at), group, active, 0xff, stack, size, [&](uint32_t slot) {
+        return node.child[slot];
+      });
     }
   }
 
-  /// Keeps stack[begin..size) descending, so that the nearest is on top.
-  static void push_sorted(Pending* stack, uint32_t begin, uint32_t& size, Pending item) {
-    uint32_t at = size++;
-    for (; at > begin && stack[at - 1].t < item.t; --at) stack[at] = stack[at - 1];
-    stack[at] = item;
+  /// Sets up unit-space rays. Returns those that have a direction.
+  uint64_t aim_all(Group& group) {
+    uint64_t rays = 0;
+    for (uint64_t m = alive_; m != 0; m &= m - 1) {
+      const uint32_t i = first_bit(m);
+      const KernelRay& from = rays_[numbers_[i]];
+      double origin[3], direction[3];
+      for (uint32_t axis = 0; axis < 3; ++axis)
+        origin[axis] = double{from.origin[axis]}, direction[axis] = double{from.direction[axis]};
+      GridRay& ray = group.rays[i];
+      ray.t_begin = 0.0;
+      if (!normalize(origin, direction, ray.t_scale)) continue;
+      unit_[i] = ray.t_scale;
+      ray.tnear = static_cast<float>(double{from.tnear} / ray.t_scale);
+      ray.tmax = static_cast<float>(double{tmax_[i]} / ray.t_scale);
+      aim(ray, origin, direction, scene_.top_max_coordinate);
+      group.boxes[i].set(ray);
+      rays |= uint64_t{1} << i;
+    }
+    return rays;
   }
 
-  bool enter_placement(uint32_t placement, const KernelRay& from, float tmax, GridRay& ray) {
+  static void set_near(const GridRay& ray, uint32_t (&near_at)[3]) {
+    for (uint32_t axis = 0; axis < 3; ++axis) near_at[axis] = ray.near_at[axis];
+  }
+
+  void trace_placement(uint32_t placement, uint64_t rays) {
     const TracePlacement& place = scene_.placements[placement];
-    if ((place.ray_classes & ray_class_) == 0) return false;
-    if constexpr (kCount) ++counters_->placements;
-    return enter(place, scene_.trees[place.tree], from, tmax, ray);
+    if ((place.ray_classes & ray_class_) == 0) return;
+    const TraceTree& tree = scene_.trees[place.tree];
+    Group group;
+    uint64_t octants[8] = {};
+    for (; rays != 0; rays &= rays - 1) {
+      const uint32_t i = first_bit(rays);
+      if constexpr (kCount) ++counters_->placements;
+      GridRay& ray = group.rays[i];
+      if (!enter(place, tree, rays_[numbers_[i]], tmax_[i], ray)) continue;
+      group.boxes[i].set(ray);
+      octants[octant_of(ray.inverse)] |= uint64_t{1} << i;
+    }
+    for (const uint64_t together : octants)
+      if (together != 0) trace_tree(placement, tree.nodes, group, together);
+  }
+
+  /// Through one placed tree, rays of one octant of it.
+  void trace_tree(uint32_t placement, const baked::PackedNode* nodes, Group& group, uint64_t rays) {
+    uint32_t near_at[3];
+    set_near(group.rays[first_bit(rays)], near_at);
+    Pending stack[baked::kMaxTreeDepth * (baked::kNodeWidth - 1) + 1];
+    uint32_t size = 0;
+    stack[size++] = {rays, 0, 0.0f};
+    while (size > 0) {
+      const Pending next = stack[--size];
+      const uint64_t active = next.rays & alive_;
+      if (active == 0) continue;
+      const baked::PackedNode& node = nodes[next.node];
+      if constexpr (kCount) ++counters_->nodes, counters_->node_rays += count_ones(active);
+      if ((node.ray_classes & ray_class_) == 0) continue;
+      const NodeChildren children(node);
+      const typename Lanes::Boxes boxes(node, near_at);
+      if (children.leaves())
+        trace_leaves(placement, node, children, boxes, group, active);
+      else
+        push_children(boxes, group, active, children.slots(), stack, size, [&](uint32_t slot) {
+          __builtin_prefetch(nodes + node.first_child + slot);
+          return node.first_child + slot;
+        });
+    }
+  }
+
+  static typename Lanes::Children pass_boxes(const typename Lanes::Boxes& boxes, const Group& group, uint64_t rays) {
+    typename Lanes::Children children;
+    for (; rays != 0; rays &= rays - 1) children.add(boxes, group.boxes[first_bit(rays)], first_bit(rays));
+    return children;
+  }
+
+  /// Pushes the children of a node that rays pass; of nearest hits, the one that the first ray enters first on top.
+  template <typename Number>
+  static void push_children(const typename Lanes::Boxes& boxes, const Group& group, uint64_t rays, uint32_t slots,
+                            Pending* stack, uint32_t& size, Number number) {
+    uint64_t by_child[baked::kNodeWidth];
+    slots &= pass_boxes(boxes, group, rays).read(by_child);
+    float t[baked::kNodeWidth] = {};
+    if constexpr (!kAny) Lanes::Children::enter(boxes, group.boxes[first_bit(rays)], t);
+    const uint32_t begin = size;
+    for (; slots != 0; slots &= slots - 1) {
+      const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
+      uint32_t at = size++;
+      if constexpr (!kAny)
+        for (; at > begin && stack[at - 1].t < t[slot]; --at) stack[at] = stack[at - 1];
+      stack[at] = {by_child[slot], number(slot), t[slot]};
+    }
+  }
+
+  void trace_leaves(uint32_t placement, const baked::PackedNode& node, NodeChildren children,
+                    const typename Lanes::Boxes& boxes, Group& group, uint64_t rays) {
+    if ((scene_.clusters[node.cluster].flags & ray_class_) == 0) return;
+    uint64_t by_child[baked::kNodeWidth];
+    uint32_t slots = children.slots() & pass_boxes(boxes, group, rays).read(by_child);
+    const uint64_t begins = children.leaf_begins();
+    for (; slots != 0; slots &= slots - 1) {
+      const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
+      if (const uint64_t active = by_child[slot] & alive_; active != 0)
+        trace_leaf(placement, node.cluster, node.first_triangle + byte_of(begins, slot), byte_of(children.bytes, slot),
+                   group, active);
+    }
+  }
+
+  void trace_leaf(uint32_t placement, uint32_t cluster, uint32_t first, uint32_t count, Group& group, uint64_t rays) {
+    if constexpr (kCount) ++counters_->leaves, counters_->leaf_rays += count_ones(rays);
+    while (count > 0) {
+      const DecodedBatch& batch = decoded(cluster, first, count);
+      if constexpr (kCount) counters_->triangles += count_ones(rays) * batch.count;
+      for (uint64_t m = rays; m != 0; m &= m - 1) {
+        const uint32_t i = first_bit(m);
+        BatchHits hits;
+        uint64_t exact = 0;
+        const uint32_t lanes = test_triangles<Lanes>(batch, group.rays[i], hits, exact);
+        if constexpr (kCount) counters_->exact_triangles += exact;
+        if (lanes != 0) take_hits({placement, cluster, first}, i, hits, lanes, group);
+      }
+      rays &= alive_;
+      first += batch.count;
+      count -= batch.count;
+    }
   }
 
   const DecodedBatch& decoded(uint32_t cluster, uint32_t first, uint32_t count) {
     const uint64_t tag = (uint64_t{cluster} << 8 | first) + 1;
     const auto hash = static_cast<uint32_t>(tag) * 0x9e3779b1u;
     DecodedBatch& batch = cache_.entries[hash >> cache_.hash_shift];
-    if (batch.tag != tag || batch.count > count) {
+    if (batch.tag != tag) {
       if constexpr (kCount) ++counters_->batches_decoded;
       const TraceCluster& packed = scene_.clusters[cluster];
       batch.tag = tag;
@@ -134,170 +260,64 @@ private:
     return batch;
   }
 
-  bool present(uint32_t placement, uint32_t cluster, uint32_t triangle, const BatchHits& hits, uint32_t lane) const {
-    return scene_.present(scene_.owner, placement, cluster, triangle, hits.u[lane], hits.v[lane], ray_class_);
-  }
+  struct Place {
+    uint32_t placement, cluster, triangle;
+  };
 
-  /// Calls use(first triangle, hits, lanes) for each batch of a leaf that is hit, until it returns true.
-  template <typename Use>
-  bool for_hits(const GridRay& ray, uint32_t cluster, uint32_t first, uint32_t count, Use use) {
-    if constexpr (kCount) ++counters_->leaves, counters_->triangles += count;
-    while (count > 0) {
-      const DecodedBatch& batch = decoded(cluster, first, count);
-      BatchHits hits;
-      uint64_t exact = 0;
-      const uint32_t lanes = test_triangles<Lanes>(batch, ray, hits, exact);
-      if constexpr (kCount) counters_->exact_triangles += exact;
-      if (lanes != 0 && use(first, hits, lanes)) return true;
-      first += batch.count;
-      count -= batch.count;
-    }
-    return false;
-  }
-
-  bool any_in_leaf(uint32_t placement, const GridRay& ray, uint32_t cluster, uint32_t first, uint32_t count) {
-    const uint8_t flags = scene_.clusters[cluster].flags;
-    return for_hits(ray, cluster, first, count, [&](uint32_t begin, const BatchHits& hits, uint32_t lanes) {
-      if ((flags & kMasked) == 0) return true;
-      for (; lanes != 0; lanes &= lanes - 1) {
-        const auto lane = static_cast<uint32_t>(__builtin_ctz(lanes));
-        if (present(placement, cluster, begin + lane, hits, lane)) return true;
+  /// Of ray i, in these lanes of a batch that begins at `place`.
+  void take_hits(Place place, uint32_t i, const BatchHits& hits, uint32_t lanes, Group& group) {
+    const bool masked = (scene_.clusters[place.cluster].flags & kMasked) != 0;
+    const uint32_t begin = place.triangle;
+    for (; lanes != 0; lanes &= lanes - 1) {
+      const auto lane = static_cast<uint32_t>(__builtin_ctz(lanes));
+      place.triangle = begin + lane;
+      GridRay& ray = group.rays[i];
+      const float t = hits.t[lane];
+      if constexpr (!kAny)
+        if (t > ray.tmax || (t == ray.tmax && !precedes(place, hits_[numbers_[i]]))) continue;
+      if (masked && !scene_.present(scene_.owner, place.placement, place.cluster, place.triangle, hits.u[lane],
+                                    hits.v[lane], ray_class_))
+        continue;
+      if constexpr (kAny) {
+        occluded_[numbers_[i]] = 1;
+        alive_ &= ~(uint64_t{1} << i);
+        return;
       }
-      return false;
-    });
-  }
-
-  bool any_in_node(uint32_t placement, const GridRay& ray, const baked::PackedNode& node, NodeChildren children,
-                   uint32_t slots) {
-    if ((scene_.clusters[node.cluster].flags & ray_class_) == 0) return false;
-    const uint64_t begins = children.leaf_begins();
-    for (; slots != 0; slots &= slots - 1) {
-      const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
-      if (any_in_leaf(placement, ray, node.cluster, node.first_triangle + byte_of(begins, slot),
-                      byte_of(children.bytes, slot)))
-        return true;
-    }
-    return false;
-  }
-
-  bool any_in_tree(uint32_t placement, const GridRay& ray) {
-    const baked::PackedNode* nodes = scene_.trees[scene_.placements[placement].tree].nodes;
-    const typename Lanes::NodeRay node_ray(ray);
-    uint32_t stack[kStackSize], size = 0;
-    for (uint32_t at = 0;;) {
-      const baked::PackedNode& node = nodes[at];
-      if constexpr (kCount) ++counters_->nodes;
-      if ((node.ray_classes & ray_class_) != 0) {
-        const NodeChildren children(node);
-        alignas(32) float entry[8];
-        uint32_t slots = Lanes::test_node(node, node_ray, ray, entry) & children.slots();
-        if (children.leaves()) {
-          if (slots != 0 && any_in_node(placement, ray, node, children, slots)) return true;
-        } else {
-          for (; slots != 0; slots &= slots - 1) {
-            stack[size] = node.first_child + static_cast<uint32_t>(__builtin_ctz(slots));
-            __builtin_prefetch(nodes + stack[size++]);
-          }
-        }
-      }
-      if (size == 0) return false;
-      at = stack[--size];
+      ray.tmax = t;
+      group.boxes[i].set_tmax(t);
+      tmax_[i] = static_cast<float>((double{t} + ray.t_begin) * ray.t_scale);
+      hits_[numbers_[i]] = {tmax_[i], hits.u[lane], hits.v[lane], place.placement, place.cluster, place.triangle};
     }
   }
 
   /// Of two hits at one place the one with the smaller numbers counts.
-  static bool precedes(uint32_t placement, uint32_t cluster, uint32_t triangle, const KernelHit& hit) {
-    if (hit.placement != placement) return placement < hit.placement; // as all are than kNoHit
-    if (hit.cluster != cluster) return cluster < hit.cluster;
-    return triangle < hit.triangle;
+  static bool precedes(const Place& place, const KernelHit& hit) {
+    if (hit.placement != place.placement) return place.placement < hit.placement; // as all are than no hit's
+    if (hit.cluster != place.cluster) return place.cluster < hit.cluster;
+    return place.triangle < hit.triangle;
   }
-
-  void closest_in_leaf(uint32_t placement, GridRay& ray, uint32_t cluster, uint32_t first, uint32_t count,
-                       KernelHit& hit, bool& nearer) {
-    const uint8_t flags = scene_.clusters[cluster].flags;
-    for_hits(ray, cluster, first, count, [&](uint32_t begin, const BatchHits& hits, uint32_t lanes) {
-      for (; lanes != 0; lanes &= lanes - 1) {
-        const auto lane = static_cast<uint32_t>(__builtin_ctz(lanes));
-        const float t = hits.t[lane];
-        if (t > ray.tmax || (t == ray.tmax && !precedes(placement, cluster, begin + lane, hit))) continue;
-        if ((flags & kMasked) != 0 && !present(placement, cluster, begin + lane, hits, lane)) continue;
-        hit.u = hits.u[lane], hit.v = hits.v[lane];
-        hit.placement = placement, hit.cluster = cluster, hit.triangle = begin + lane;
-        ray.tmax = t;
-        nearer = true;
-      }
-      return false;
-    });
-  }
-
-  void closest_in_node(uint32_t placement, GridRay& ray, const baked::PackedNode& node, NodeChildren children,
-                       uint32_t slots, const float (&entry)[8], KernelHit& hit, bool& nearer) {
-    if ((scene_.clusters[node.cluster].flags & ray_class_) == 0) return;
-    const uint64_t begins = children.leaf_begins();
-    for (; slots != 0; slots &= slots - 1) {
-      const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
-      if (entry[slot] <= ray.tmax)
-        closest_in_leaf(placement, ray, node.cluster, node.first_triangle + byte_of(begins, slot),
-                        byte_of(children.bytes, slot), hit, nearer);
-    }
-  }
-
-  /// Returns the new tmax in unit space.
-  float closest_in_tree(uint32_t placement, GridRay& ray, float tmax, KernelHit& hit) {
-    const baked::PackedNode* nodes = scene_.trees[scene_.placements[placement].tree].nodes;
-    const typename Lanes::NodeRay node_ray(ray);
-    Pending stack[kStackSize];
-    uint32_t size = 0;
-    bool nearer = false;
-    for (uint32_t at = 0;;) {
-      const baked::PackedNode& node = nodes[at];
-      if constexpr (kCount) ++counters_->nodes;
-      if ((node.ray_classes & ray_class_) != 0) {
-        const NodeChildren children(node);
-        alignas(32) float entry[8];
-        uint32_t slots = Lanes::test_node(node, node_ray, ray, entry) & children.slots();
-        if (children.leaves()) {
-          if (slots != 0) closest_in_node(placement, ray, node, children, slots, entry, hit, nearer);
-        } else {
-          for (const uint32_t begin = size; slots != 0; slots &= slots - 1) {
-            const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
-            __builtin_prefetch(nodes + node.first_child + slot);
-            push_sorted(stack, begin, size, {entry[slot], node.first_child + slot});
-          }
-        }
-      }
-      do {
-        if (size == 0) return nearer ? hit.t = from_grid(ray) : tmax;
-        --size;
-      } while (stack[size].t > ray.tmax);
-      at = stack[size].node;
-    }
-  }
-
-  static float from_grid(const GridRay& ray) {
-    return static_cast<float>((double{ray.tmax} + ray.t_begin) * ray.t_scale);
-  }
-
-  static constexpr uint32_t kStackSize = baked::kMaxTreeDepth * (baked::kNodeWidth - 1) + 1;
 
   const KernelScene& scene_;
   BatchCache& cache_;
+  const KernelRay* const rays_;
   const uint32_t ray_class_;
+  uint8_t* const occluded_;
+  KernelHit* const hits_;
   KernelCounters* const counters_;
+  // Of the group that is being traced:
+  const uint32_t* numbers_ = nullptr; ///< of its rays
+  uint64_t alive_ = 0;                ///< rays that still look for a hit
+  float tmax_[kGroup];                ///< in unit space
+  double unit_[kGroup];               ///< unit-space t of one t in the top tree
 };
 
-template <typename Lanes, bool kCount>
-void closest_hits(const KernelScene& scene, BatchCache& cache, const KernelRay* rays, size_t count, uint32_t ray_class,
-                  KernelHit* hits, KernelCounters* counters) {
-  Traversal<Lanes, kCount> traversal(scene, cache, ray_class, counters);
-  for (size_t i = 0; i < count; ++i) traversal.closest(rays[i], hits[i]);
-}
-
-template <typename Lanes, bool kCount>
-void any_hits(const KernelScene& scene, BatchCache& cache, const KernelRay* rays, size_t count, uint32_t ray_class,
-              uint8_t* occluded, KernelCounters* counters) {
-  Traversal<Lanes, kCount> traversal(scene, cache, ray_class, counters);
-  for (size_t i = 0; i < count; ++i) occluded[i] = traversal.any(rays[i]) ? 1 : 0;
+template <typename Lanes, bool kAny>
+void trace(const KernelScene& scene, BatchCache& cache, const KernelRay* rays, size_t count, uint32_t ray_class,
+           uint8_t* occluded, KernelHit* hits, KernelCounters* counters) {
+  if (counters != nullptr)
+    Traversal<Lanes, kAny, true>(scene, cache, rays, ray_class, occluded, hits, counters).run(count);
+  else
+    Traversal<Lanes, kAny, false>(scene, cache, rays, ray_class, occluded, hits, counters).run(count);
 }
 
 /// The functions of one instruction set.
@@ -306,13 +326,11 @@ constexpr Kernels kernels_of(const char* isa) {
   return {isa,
           [](const KernelScene& scene, BatchCache& cache, const KernelRay* rays, size_t count, uint32_t ray_class,
              KernelHit* hits, KernelCounters* counters) {
-            const auto run = counters != nullptr ? closest_hits<Lanes, true> : closest_hits<Lanes, false>;
-            run(scene, cache, rays, count, ray_class, hits, counters);
+            trace<Lanes, false>(scene, cache, rays, count, ray_class, nullptr, hits, counters);
           },
           [](const KernelScene& scene, BatchCache& cache, const KernelRay* rays, size_t count, uint32_t ray_class,
              uint8_t* occluded, KernelCounters* counters) {
-            const auto run = counters != nullptr ? any_hits<Lanes, true> : any_hits<Lanes, false>;
-            run(scene, cache, rays, count, ray_class, occluded, counters);
+            trace<Lanes, true>(scene, cache, rays, count, ray_class, occluded, nullptr, counters);
           },
           [](const TraceCluster& cluster, uint32_t first, uint32_t count, DecodedBatch& out) {
             return out.count = Lanes::decode(cluster, first, count, out);

@@ -1,90 +1,12 @@
 #pragma once
 
-#include "runtime/trace/packed/batch_strips.h"
-#include "runtime/trace/packed/grid_ray.h"
-#include "runtime/trace/packed/lanes_avx2.h"
+#include <immintrin.h>
 
-/// What AVX-512 does better than eight lanes of AVX2.
+#include "runtime/trace/packed/batch_strips.h"
+
+/// Decodes a batch in a handful of registers.
 namespace packtrace::packed {
 namespace {
-
-/// Bytes 16.. of a node into floats 1 + q / 2^15, by a choice among them and the bytes of constants: eight near planes of
-/// an axis, then eight far ones. [far planes first][axis]
-struct PlaneBytes {
-  alignas(64) uint8_t from[2][3][64];
-};
-
-constexpr uint8_t kConstantBytes = 64; // from here on an index means the other operand
-
-constexpr PlaneBytes plane_bytes() {
-  PlaneBytes bytes{};
-  for (uint32_t backward = 0; backward < 2; ++backward)
-    for (uint32_t axis = 0; axis < 3; ++axis)
-      for (uint32_t lane = 0; lane < 16; ++lane) {
-        const bool high = (lane >= 8) != (backward != 0);
-        uint8_t* at = bytes.from[backward][axis] + 4 * lane;
-        at[0] = kConstantBytes; // 0x00
-        at[1] = static_cast<uint8_t>(offsetof(baked::PackedNode, lo) - 16 + 8 * axis + lane % 8 + (high ? kBoundBytes : 0));
-        at[2] = kConstantBytes + 2; // 0x80
-        at[3] = kConstantBytes + 3; // 0x3f
-      }
-  return bytes;
-}
-
-constexpr PlaneBytes kPlaneBytes = plane_bytes();
-constexpr float kPlaneUnit = 0x1p15f;
-
-/// A ray for test_boxes(): vectors of x, y, z and nothing, twice, and twice the negated.
-struct Avx512NodeRay {
-  __m512i bytes[3];
-  __m512 origin, inverse, bias, pad, tnear;
-
-  explicit Avx512NodeRay(const GridRay& ray) {
-    const __m512 sign = _mm512_castsi512_ps(
-        _mm512_maskz_set1_epi32(static_cast<__mmask16>(0xff00), static_cast<int>(0x80000000u)));
-    for (uint32_t axis = 0; axis < 3; ++axis)
-      bytes[axis] = _mm512_load_si512(kPlaneBytes.from[ray.near_at[axis] >= kBoundBytes ? 1 : 0][axis]);
-    const auto repeat = [](const float (&v)[3]) { return _mm512_broadcast_f32x4(_mm_setr_ps(v[0], v[1], v[2], 0.0f)); };
-    origin = repeat(ray.origin);
-    const __m512 plain = repeat(ray.inverse);
-    inverse = _mm512_xor_ps(plain, sign);
-    // The constant 1 in planes makes sums in which 2^15 planes cancel: their rounding is 2^-24 of those, or 2^-9 planes.
-    bias = _mm512_fmadd_ps(_mm512_abs_ps(plain), _mm512_set1_ps(0x1p-22f), inverse);
-    pad = repeat(ray.pad);
-    tnear = _mm512_set1_ps(ray.tnear);
-  }
-};
-
-/// As test_boxes() in node_test.h, all planes of an axis in one register: the far ones negated, so that the largest
-/// parameter counts in both halves.
-inline uint32_t test_boxes(const baked::PackedNode& node, const Avx512NodeRay& ray, float tmax, float (&entry)[8]) {
-  const auto* bytes = reinterpret_cast<const uint8_t*>(&node);
-  const __m512i head = _mm512_broadcast_i32x4(_mm_loadu_si128(reinterpret_cast<const __m128i*>(bytes)));
-  const __m512 from_origin = _mm512_sub_ps(_mm512_cvtepi32_ps(head), ray.origin);
-  const __m512 at = _mm512_fmsub_ps(from_origin, ray.inverse, ray.pad);
-  const __m512i exponents = _mm512_and_si512(
-      _mm512_srlv_epi32(_mm512_shuffle_epi32(head, _MM_PERM_DDDD),
-                        _mm512_setr_epi32(0, 5, 10, 0, 0, 5, 10, 0, 0, 5, 10, 0, 0, 5, 10, 0)),
-      _mm512_set1_epi32(31));
-  const __m512 unit =
-      _mm512_castsi512_ps(_mm512_slli_epi32(_mm512_add_epi32(exponents, _mm512_set1_epi32(127 + 15)), 23));
-  const __m512 scale = _mm512_mul_ps(unit, ray.inverse);
-  const __m512 bias = _mm512_fnmadd_ps(unit, ray.bias, at);
-  const __m512i planes = _mm512_loadu_si512(bytes + 16);
-  const __m512i constants = _mm512_set1_epi32(0x3f800000);
-  const auto parameter = [&](const __m512i& from, __m512 axis_scale, __m512 axis_bias) {
-    return _mm512_fmadd_ps(_mm512_castsi512_ps(_mm512_permutex2var_epi8(planes, from, constants)), axis_scale, axis_bias);
-  };
-  const __m512 limits = _mm512_mask_blend_ps(static_cast<__mmask16>(0xff00), ray.tnear, _mm512_set1_ps(-tmax));
-  const __m512 x = parameter(ray.bytes[0], _mm512_permute_ps(scale, 0x00), _mm512_permute_ps(bias, 0x00));
-  const __m512 y = parameter(ray.bytes[1], _mm512_permute_ps(scale, 0x55), _mm512_permute_ps(bias, 0x55));
-  const __m512 z = parameter(ray.bytes[2], _mm512_permute_ps(scale, 0xaa), _mm512_permute_ps(bias, 0xaa));
-  const __m512 latest = _mm512_max_ps(_mm512_max_ps(x, y), _mm512_max_ps(z, limits));
-  const __m256 begin = _mm512_castps512_ps256(latest);
-  const __m256 end = _mm256_xor_ps(_mm512_extractf32x8_ps(latest, 1), _mm256_set1_ps(-0.0f));
-  _mm256_store_ps(entry, begin);
-  return _mm256_cmp_ps_mask(begin, end, _CMP_LE_OQ);
-}
 
 /// The vertices of a batch's corners. Lanes behind them are 0.
 inline __m512i batch_vertices(const TraceCluster& cluster, const BatchStrips& batch) {
