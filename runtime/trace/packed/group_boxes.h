@@ -1,56 +1,58 @@
 #pragma once
 
-#include "runtime/trace/packed/grid_ray.h"
+#include "runtime/trace/packed/ray_group.h"
 
-/// A node's boxes against many rays of one octant, with all of a node's work done once.
+/// A node's boxes against rays of one octant, with all of a node's work done once.
 namespace packtrace::packed {
 namespace {
+
+constexpr uint32_t kBoundBytes = 24; ///< of PackedNode::lo, and of hi behind it
+
+inline float float_of_bits(uint32_t bits) {
+  float x;
+  __builtin_memcpy(&x, &bits, sizeof x);
+  return x;
+}
+
+/// A node's coordinates along an axis are origin + unit q.
+struct NodeAxis {
+  float origin, unit;
+  const uint8_t *near, *far;
+
+  /// @param backward whether rays pass hi first
+  NodeAxis(const baked::PackedNode& node, uint32_t axis, bool backward) {
+    const auto* bytes = reinterpret_cast<const uint8_t*>(&node);
+    int32_t lattice;
+    __builtin_memcpy(&lattice, bytes + 4 * axis, sizeof lattice);
+    origin = static_cast<float>(lattice);
+    unit = float_of_bits((((uint32_t{node.exponents} >> (5 * axis)) & 31u) + 127u) << 23);
+    const uint8_t* bounds = bytes + offsetof(baked::PackedNode, lo) + 8 * axis;
+    near = bounds + (backward ? kBoundBytes : 0);
+    far = bounds + (backward ? 0 : kBoundBytes);
+  }
+};
 
 /// Near and far planes of a node's children, in the grid; which of lo and hi are near is the rays' octant's.
 template <typename Lanes>
 struct GroupBoxes {
   typename Lanes::F near[3], far[3];
 
-  GroupBoxes(const baked::PackedNode& node, const uint32_t (&near_at)[3]) {
-    const auto* bytes = reinterpret_cast<const uint8_t*>(&node);
-    const uint8_t* bounds = bytes + offsetof(baked::PackedNode, lo);
+  GroupBoxes(const baked::PackedNode& node, uint32_t octant) {
     for (uint32_t axis = 0; axis < 3; ++axis) {
-      const uint32_t exponent_bits = (((uint32_t{node.exponents} >> (5 * axis)) & 31u) + 127u) << 23;
-      float unit;
-      __builtin_memcpy(&unit, &exponent_bits, sizeof unit);
-      int32_t origin;
-      __builtin_memcpy(&origin, bytes + 4 * axis, sizeof origin);
-      const auto at = Lanes::set(static_cast<float>(origin)), units = Lanes::set(unit);
-      near[axis] = Lanes::fma(Lanes::load_bytes(bounds + near_at[axis]), units, at);
-      far[axis] = Lanes::fma(Lanes::load_bytes(bounds + 16 * axis + kBoundBytes - near_at[axis]), units, at);
+      const NodeAxis at(node, axis, ((octant >> axis) & 1u) != 0);
+      const auto origin = Lanes::set(at.origin), unit = Lanes::set(at.unit);
+      near[axis] = Lanes::fma(Lanes::load_bytes(at.near), unit, origin);
+      far[axis] = Lanes::fma(Lanes::load_bytes(at.far), unit, origin);
     }
   }
 
-  GroupBoxes(const TopNode& node, const uint32_t (&near_at)[3]) {
+  GroupBoxes(const TopNode& node, uint32_t octant) {
     for (uint32_t axis = 0; axis < 3; ++axis) {
-      const bool forward = near_at[axis] < kBoundBytes;
-      near[axis] = Lanes::load(forward ? node.lo[axis] : node.hi[axis]);
-      far[axis] = Lanes::load(forward ? node.hi[axis] : node.lo[axis]);
+      const bool backward = ((octant >> axis) & 1u) != 0;
+      near[axis] = Lanes::load(backward ? node.hi[axis] : node.lo[axis]);
+      far[axis] = Lanes::load(backward ? node.lo[axis] : node.hi[axis]);
     }
   }
-};
-
-/// A ray against them: plane p is passed at p inverse + bias.
-template <typename Lanes>
-struct GroupRay {
-  float inverse[3], near[3], far[3], tnear, tmax;
-
-  void set(const GridRay& ray) {
-    for (uint32_t axis = 0; axis < 3; ++axis) {
-      const float back = ray.origin[axis] * ray.inverse[axis];
-      inverse[axis] = ray.inverse[axis];
-      near[axis] = -back - ray.pad[axis];
-      far[axis] = -back + ray.pad[axis];
-    }
-    tnear = ray.tnear;
-    set_tmax(ray.tmax);
-  }
-  void set_tmax(float t) { tmax = t; }
 };
 
 /// By child of a node: the rays that pass its box, as bits.
@@ -58,22 +60,23 @@ template <typename Lanes>
 struct ChildRays {
   uint64_t rays[baked::kNodeWidth] = {};
 
-  void add(const GroupBoxes<Lanes>& boxes, const GroupRay<Lanes>& ray, uint32_t number) {
+  void add(const GroupBoxes<Lanes>& boxes, const RayGroup& group, uint32_t ray) {
     using F = typename Lanes::F;
-    F begin = Lanes::set(ray.tnear), end = Lanes::set(ray.tmax);
+    F begin = Lanes::set(group.limits[ray][0]), end = Lanes::set(group.tmax(ray));
     for (uint32_t axis = 0; axis < 3; ++axis) {
-      const F inverse = Lanes::set(ray.inverse[axis]);
-      begin = Lanes::max(begin, Lanes::fma(boxes.near[axis], inverse, Lanes::set(ray.near[axis])));
-      end = Lanes::min(end, Lanes::fma(boxes.far[axis], inverse, Lanes::set(ray.far[axis])));
+      const F inverse = Lanes::set(group.inverse[axis][ray]);
+      begin = Lanes::max(begin, Lanes::fma(boxes.near[axis], inverse, Lanes::set(group.bias[axis][ray][0])));
+      end = Lanes::min(end, Lanes::fma(boxes.far[axis], inverse, Lanes::set(-group.bias[axis][ray][1])));
     }
     for (uint32_t hit = Lanes::less_equal(begin, end); hit != 0; hit &= hit - 1)
-      rays[__builtin_ctz(hit)] |= uint64_t{1} << number;
+      rays[__builtin_ctz(hit)] |= uint64_t{1} << ray;
   }
 
   /// Where a ray enters the boxes.
-  static void enter(const GroupBoxes<Lanes>& boxes, const GroupRay<Lanes>& ray, float (&t)[baked::kNodeWidth]) {
+  static void enter(const GroupBoxes<Lanes>& boxes, const RayGroup& group, uint32_t ray,
+                    float (&t)[baked::kNodeWidth]) {
     const auto at = [&](uint32_t axis) {
-      return Lanes::fma(boxes.near[axis], Lanes::set(ray.inverse[axis]), Lanes::set(ray.near[axis]));
+      return Lanes::fma(boxes.near[axis], Lanes::set(group.inverse[axis][ray]), Lanes::set(group.bias[axis][ray][0]));
     };
     Lanes::store(t, Lanes::max(Lanes::max(at(0), at(1)), at(2)));
   }

@@ -6,7 +6,6 @@ namespace {
 
 struct Avx2Kernel : Avx2Lanes {
   using Boxes = GroupBoxes<Avx2Lanes>;
-  using BoxRay = GroupRay<Avx2Lanes>;
   using Children = ChildRays<Avx2Lanes>;
 
   static uint32_t decode(const TraceCluster& cluster, uint32_t first, uint32_t count, DecodedBatch& out) {

@@ -8,7 +8,6 @@ namespace {
 
 struct Avx512Kernel : Avx2Lanes {
   using Boxes = Avx512GroupBoxes;
-  using BoxRay = Avx512GroupRay;
   using Children = Avx512ChildRays;
 
   static uint32_t decode(const TraceCluster& cluster, uint32_t first, uint32_t count, DecodedBatch& out) {

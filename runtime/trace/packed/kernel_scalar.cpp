@@ -6,7 +6,6 @@ namespace {
 
 struct ScalarKernel : ScalarLanes {
   using Boxes = GroupBoxes<ScalarLanes>;
-  using BoxRay = GroupRay<ScalarLanes>;
   using Children = ChildRays<ScalarLanes>;
 
   static uint32_t decode(const TraceCluster& cluster, uint32_t first, uint32_t count, DecodedBatch& out) {

@@ -64,14 +64,14 @@ struct TracePlacement {
   uint32_t ray_classes;
 };
 
-/// Of the tree over placements. Children: kTopLeaf + placement, or a node after this one; kTopNone.
+/// Of the tree over placements. Children: kTopLeaf + placement, or a node after this one.
 struct alignas(64) TopNode {
   float lo[3][baked::kNodeWidth]; ///< unit space, rounded outwards; lo > hi where there is no child
   float hi[3][baked::kNodeWidth];
   uint32_t child[baked::kNodeWidth];
+  uint32_t slots; ///< in use, as bits
 };
 inline constexpr uint32_t kTopLeaf = 1u << 31;
-inline constexpr uint32_t kTopNone = ~0u;
 inline constexpr uint32_t kMaxTopDepth = 64;
 
 /// What the kernels count if they are asked to.
@@ -89,6 +89,7 @@ struct KernelScene {
   const TracePlacement* placements;
   const TopNode* top_nodes; ///< null: placement 0 is all there is
   uint32_t placement_count;
+  TracePlacement top;       ///< of top_nodes, whose grid is unit space
   float top_max_coordinate; ///< of the boxes in top_nodes
   /// Decodes triangles of a kWide cluster; returns how many.
   uint32_t (*decode_wide)(const void* owner, uint32_t cluster, uint32_t first, uint32_t count, DecodedBatch& out);

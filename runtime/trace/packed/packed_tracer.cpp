@@ -89,11 +89,16 @@ TreeBox placed_box(const packed::TracePlacement& placement, const DAffine& unit_
   return box;
 }
 
-float largest_coordinate(const TreeBox& box) {
-  float largest = 0.0f;
-  for (size_t axis = 0; axis < 3; ++axis)
-    largest = std::max({largest, std::abs(box.lo[axis]), std::abs(box.hi[axis])});
-  return largest;
+/// Sets up the tree over placements as something placed in unit space itself.
+void place_top(std::span<const TreeBox> boxes, packed::KernelScene& scene) {
+  TreeBox all = boxes[0];
+  for (const TreeBox& box : boxes) all.extend(box);
+  scene.top = {};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    scene.top.grid_from_unit[3 * axis + axis] = 1.0;
+    scene.top.box_lo[axis] = all.lo[axis], scene.top.box_hi[axis] = all.hi[axis];
+    scene.top_max_coordinate = std::max({scene.top_max_coordinate, std::abs(all.lo[axis]), std::abs(all.hi[axis])});
+  }
 }
 
 } // namespace
@@ -159,8 +164,7 @@ PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, Pac
   if (t.placements.size() > 1) {
     t.top = build_top_tree(t.boxes);
     t.scene.top_nodes = t.top.data();
-    for (const TreeBox& box : t.boxes)
-      t.scene.top_max_coordinate = std::max(t.scene.top_max_coordinate, largest_coordinate(box));
+    place_top(t.boxes, t.scene);
   }
   t.scene.owner = this;
   t.scene.decode_wide = [](const void* owner, uint32_t cluster, uint32_t first, uint32_t count,

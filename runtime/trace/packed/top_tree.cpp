@@ -1,26 +1,14 @@
 #include "runtime/trace/packed/top_tree.h"
 
-#include <algorithm>
-#include <limits>
-
 #include "compress/bvh/wide_tree.h"
 
 namespace packtrace {
 namespace {
 
-packed::TopNode empty_node() {
-  packed::TopNode node{};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    std::fill(std::begin(node.lo[axis]), std::end(node.lo[axis]), std::numeric_limits<float>::max());
-    std::fill(std::begin(node.hi[axis]), std::end(node.hi[axis]), -std::numeric_limits<float>::max());
-  }
-  std::fill(std::begin(node.child), std::end(node.child), packed::kTopNone);
-  return node;
-}
-
 void set_child(packed::TopNode& node, uint32_t slot, const TreeBox& box, uint32_t child) {
   for (size_t axis = 0; axis < 3; ++axis) node.lo[axis][slot] = box.lo[axis], node.hi[axis][slot] = box.hi[axis];
   node.child[slot] = child;
+  node.slots |= 1u << slot;
 }
 
 } // namespace
@@ -32,9 +20,9 @@ std::vector<packed::TopNode> build_top_tree(std::span<const TreeBox> boxes) {
   std::vector<packed::TopNode> nodes;
   std::vector<uint32_t> place(wide.size());
   for (size_t i = 0; i < wide.size(); ++i)
-    if (wide[i].child_count > 0) place[i] = static_cast<uint32_t>(nodes.size()), nodes.push_back(empty_node());
+    if (wide[i].child_count > 0) place[i] = static_cast<uint32_t>(nodes.size()), nodes.emplace_back();
   if (nodes.empty()) { // one box
-    nodes.push_back(empty_node());
+    nodes.emplace_back();
     set_child(nodes[0], 0, boxes[0], packed::kTopLeaf);
     return nodes;
   }

@@ -4,14 +4,11 @@
 #include "runtime/trace/packed/group_boxes.h"
 #include "runtime/trace/packed/triangle_test.h"
 
-/// Groups of rays through trees of nodes.
+/// Groups of rays through trees of nodes. They come to a node together, as one word of bits, and leave for each child
+/// those that pass its box: a node is read and set up once for all of them, and nothing waits for the outcome of one
+/// ray's test. Idea: Barringer, Akenine-Moeller, "Dynamic ray stream traversal" (2014).
 namespace packtrace::packed {
 namespace {
-
-/// Rays that are traced together: as many as a word has bits. They go through a node together, each box at its own, so
-/// that a node is read and set up once for all of them, and nothing waits for the outcome of one ray's test.
-/// Idea: Barringer, Akenine-Moeller, "Dynamic ray stream traversal" (2014).
-constexpr uint32_t kGroup = 64;
 
 /// PackedNode::children as one number.
 struct NodeChildren {
@@ -71,12 +68,6 @@ public:
   }
 
 private:
-  /// Rays in the coordinates of one tree. Those that are not in use are not set.
-  struct Group {
-    GridRay rays[kGroup];
-    typename Lanes::BoxRay boxes[kGroup];
-  };
-
   static uint32_t octant_of(const float (&v)[3]) {
     return (__builtin_signbit(v[0]) ? 1u : 0u) | (__builtin_signbit(v[1]) ? 2u : 0u) |
            (__builtin_signbit(v[2]) ? 4u : 0u);
@@ -85,22 +76,43 @@ private:
   void trace_group(const uint32_t* numbers, uint32_t count) {
     numbers_ = numbers;
     alive_ = ~uint64_t{0} >> (kGroup - count);
-    for (uint32_t i = 0; i < count; ++i) tmax_[i] = next_below(rays_[numbers[i]].tfar);
+    for (uint32_t i = 0; i < ((count + kBlock - 1) & ~(kBlock - 1)); ++i) { // whole blocks
+      const KernelRay& ray = rays_[numbers[i < count ? i : 0]];
+      for (uint32_t axis = 0; axis < 3; ++axis)
+        unit_.origin[axis][i] = ray.origin[axis], unit_.direction[axis][i] = ray.direction[axis];
+      unit_.tnear[i] = ray.tnear;
+      unit_.tmax[i] = next_below(ray.tfar);
+    }
     if (scene_.top_nodes != nullptr)
       trace_top();
     else if (scene_.placement_count > 0)
       trace_placement(0, alive_);
   }
 
+  /// Calls visit(rays, octant) for the rays of each octant.
+  template <typename Visit>
+  static void by_octant(const RayGroup& group, uint64_t rays, Visit visit) {
+    while (rays != 0) {
+      const uint32_t octant = group.octant[first_bit(rays)];
+      uint64_t together = 0;
+      for (uint64_t m = rays; m != 0; m &= m - 1)
+        if (group.octant[first_bit(m)] == octant) together |= m & (0 - m);
+      visit(together, octant);
+      rays &= ~together;
+    }
+  }
+
   /// Through the tree over placements.
   void trace_top() {
-    Group group;
-    const uint64_t rays = aim_all(group);
-    uint32_t near_at[3];
-    set_near(group.rays[0], near_at);
+    RayGroup group;
+    const uint64_t rays = enter(scene_.top, scene_.top_max_coordinate, unit_, alive_, group);
+    by_octant(group, rays, [&](uint64_t together, uint32_t octant) { trace_top(group, together, octant); });
+  }
+
+  void trace_top(RayGroup& group, uint64_t rays, uint32_t octant) {
     Pending stack[kMaxTopDepth * (baked::kNodeWidth - 1) + 1];
     uint32_t size = 0;
-    if (rays != 0) stack[size++] = {rays, 0, 0.0f};
+    stack[size++] = {rays, 0, 0.0f};
     while (size > 0) {
       const Pending next = stack[--size];
       const uint64_t active = next.rays & alive_;
@@ -108,65 +120,33 @@ private:
       if ((next.node & kTopLeaf) != 0) {
         trace_placement(next.node & ~kTopLeaf, active);
         if constexpr (!kAny)
-          for (uint64_t m = active; m != 0; m &= m - 1)
-            group.boxes[first_bit(m)].set_tmax(static_cast<float>(double{tmax_[first_bit(m)]} / unit_[first_bit(m)]));
+          for (uint64_t m = active; m != 0; m &= m - 1) {
+            const uint32_t i = first_bit(m);
+            group.set_tmax(i, static_cast<float>(double{unit_.tmax[i]} / group.t_scale[i] - group.t_begin[i]));
+          }
         continue;
       }
       const TopNode& node = scene_.top_nodes[next.node];
-      push_children(typename Lanes::Boxes(node, near_at), group, active, 0xff, stack, size, [&](uint32_t slot) {
-        return node.child[slot];
-      });
+      push_children(typename Lanes::Boxes(node, octant), group, active, node.slots, stack, size,
+                    [&](uint32_t slot) { return node.child[slot]; });
     }
-  }
-
-  /// Sets up unit-space rays. Returns those that have a direction.
-  uint64_t aim_all(Group& group) {
-    uint64_t rays = 0;
-    for (uint64_t m = alive_; m != 0; m &= m - 1) {
-      const uint32_t i = first_bit(m);
-      const KernelRay& from = rays_[numbers_[i]];
-      double origin[3], direction[3];
-      for (uint32_t axis = 0; axis < 3; ++axis)
-        origin[axis] = double{from.origin[axis]}, direction[axis] = double{from.direction[axis]};
-      GridRay& ray = group.rays[i];
-      ray.t_begin = 0.0;
-      if (!normalize(origin, direction, ray.t_scale)) continue;
-      unit_[i] = ray.t_scale;
-      ray.tnear = static_cast<float>(double{from.tnear} / ray.t_scale);
-      ray.tmax = static_cast<float>(double{tmax_[i]} / ray.t_scale);
-      aim(ray, origin, direction, scene_.top_max_coordinate);
-      group.boxes[i].set(ray);
-      rays |= uint64_t{1} << i;
-    }
-    return rays;
-  }
-
-  static void set_near(const GridRay& ray, uint32_t (&near_at)[3]) {
-    for (uint32_t axis = 0; axis < 3; ++axis) near_at[axis] = ray.near_at[axis];
   }
 
   void trace_placement(uint32_t placement, uint64_t rays) {
     const TracePlacement& place = scene_.placements[placement];
     if ((place.ray_classes & ray_class_) == 0) return;
+    if constexpr (kCount) counters_->placements += count_ones(rays);
     const TraceTree& tree = scene_.trees[place.tree];
-    Group group;
-    uint64_t octants[8] = {};
-    for (; rays != 0; rays &= rays - 1) {
-      const uint32_t i = first_bit(rays);
-      if constexpr (kCount) ++counters_->placements;
-      GridRay& ray = group.rays[i];
-      if (!enter(place, tree, rays_[numbers_[i]], tmax_[i], ray)) continue;
-      group.boxes[i].set(ray);
-      octants[octant_of(ray.inverse)] |= uint64_t{1} << i;
-    }
-    for (const uint64_t together : octants)
-      if (together != 0) trace_tree(placement, tree.nodes, group, together);
+    RayGroup group;
+    rays = enter(place, tree.max_coordinate, unit_, rays, group);
+    by_octant(group, rays, [&](uint64_t together, uint32_t octant) {
+      trace_tree(placement, tree.nodes, group, together, octant);
+    });
   }
 
   /// Through one placed tree, rays of one octant of it.
-  void trace_tree(uint32_t placement, const baked::PackedNode* nodes, Group& group, uint64_t rays) {
-    uint32_t near_at[3];
-    set_near(group.rays[first_bit(rays)], near_at);
+  void trace_tree(uint32_t placement, const baked::PackedNode* nodes, RayGroup& group, uint64_t rays,
+                  uint32_t octant) {
     Pending stack[baked::kMaxTreeDepth * (baked::kNodeWidth - 1) + 1];
     uint32_t size = 0;
     stack[size++] = {rays, 0, 0.0f};
@@ -178,7 +158,7 @@ private:
       if constexpr (kCount) ++counters_->nodes, counters_->node_rays += count_ones(active);
       if ((node.ray_classes & ray_class_) == 0) continue;
       const NodeChildren children(node);
-      const typename Lanes::Boxes boxes(node, near_at);
+      const typename Lanes::Boxes boxes(node, octant);
       if (children.leaves())
         trace_leaves(placement, node, children, boxes, group, active);
       else
@@ -189,20 +169,20 @@ private:
     }
   }
 
-  static typename Lanes::Children pass_boxes(const typename Lanes::Boxes& boxes, const Group& group, uint64_t rays) {
+  static typename Lanes::Children pass_boxes(const typename Lanes::Boxes& boxes, const RayGroup& group, uint64_t rays) {
     typename Lanes::Children children;
-    for (; rays != 0; rays &= rays - 1) children.add(boxes, group.boxes[first_bit(rays)], first_bit(rays));
+    for (; rays != 0; rays &= rays - 1) children.add(boxes, group, first_bit(rays));
     return children;
   }
 
   /// Pushes the children of a node that rays pass; of nearest hits, the one that the first ray enters first on top.
   template <typename Number>
-  static void push_children(const typename Lanes::Boxes& boxes, const Group& group, uint64_t rays, uint32_t slots,
+  static void push_children(const typename Lanes::Boxes& boxes, const RayGroup& group, uint64_t rays, uint32_t slots,
                             Pending* stack, uint32_t& size, Number number) {
     uint64_t by_child[baked::kNodeWidth];
     slots &= pass_boxes(boxes, group, rays).read(by_child);
     float t[baked::kNodeWidth] = {};
-    if constexpr (!kAny) Lanes::Children::enter(boxes, group.boxes[first_bit(rays)], t);
+    if constexpr (!kAny) Lanes::Children::enter(boxes, group, first_bit(rays), t);
     const uint32_t begin = size;
     for (; slots != 0; slots &= slots - 1) {
       const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
@@ -214,7 +194,7 @@ private:
   }
 
   void trace_leaves(uint32_t placement, const baked::PackedNode& node, NodeChildren children,
-                    const typename Lanes::Boxes& boxes, Group& group, uint64_t rays) {
+                    const typename Lanes::Boxes& boxes, RayGroup& group, uint64_t rays) {
     if ((scene_.clusters[node.cluster].flags & ray_class_) == 0) return;
     uint64_t by_child[baked::kNodeWidth];
     uint32_t slots = children.slots() & pass_boxes(boxes, group, rays).read(by_child);
@@ -227,7 +207,7 @@ private:
     }
   }
 
-  void trace_leaf(uint32_t placement, uint32_t cluster, uint32_t first, uint32_t count, Group& group, uint64_t rays) {
+  void trace_leaf(uint32_t placement, uint32_t cluster, uint32_t first, uint32_t count, RayGroup& group, uint64_t rays) {
     if constexpr (kCount) ++counters_->leaves, counters_->leaf_rays += count_ones(rays);
     while (count > 0) {
       const DecodedBatch& batch = decoded(cluster, first, count);
@@ -236,7 +216,7 @@ private:
         const uint32_t i = first_bit(m);
         BatchHits hits;
         uint64_t exact = 0;
-        const uint32_t lanes = test_triangles<Lanes>(batch, group.rays[i], hits, exact);
+        const uint32_t lanes = test_triangles<Lanes>(batch, group, i, hits, exact);
         if constexpr (kCount) counters_->exact_triangles += exact;
         if (lanes != 0) take_hits({placement, cluster, first}, i, hits, lanes, group);
       }
@@ -265,16 +245,15 @@ private:
   };
 
   /// Of ray i, in these lanes of a batch that begins at `place`.
-  void take_hits(Place place, uint32_t i, const BatchHits& hits, uint32_t lanes, Group& group) {
+  void take_hits(Place place, uint32_t i, const BatchHits& hits, uint32_t lanes, RayGroup& group) {
     const bool masked = (scene_.clusters[place.cluster].flags & kMasked) != 0;
     const uint32_t begin = place.triangle;
     for (; lanes != 0; lanes &= lanes - 1) {
       const auto lane = static_cast<uint32_t>(__builtin_ctz(lanes));
       place.triangle = begin + lane;
-      GridRay& ray = group.rays[i];
       const float t = hits.t[lane];
       if constexpr (!kAny)
-        if (t > ray.tmax || (t == ray.tmax && !precedes(place, hits_[numbers_[i]]))) continue;
+        if (t > group.tmax(i) || (t == group.tmax(i) && !precedes(place, hits_[numbers_[i]]))) continue;
       if (masked && !scene_.present(scene_.owner, place.placement, place.cluster, place.triangle, hits.u[lane],
                                     hits.v[lane], ray_class_))
         continue;
@@ -283,10 +262,9 @@ private:
         alive_ &= ~(uint64_t{1} << i);
         return;
       }
-      ray.tmax = t;
-      group.boxes[i].set_tmax(t);
-      tmax_[i] = static_cast<float>((double{t} + ray.t_begin) * ray.t_scale);
-      hits_[numbers_[i]] = {tmax_[i], hits.u[lane], hits.v[lane], place.placement, place.cluster, place.triangle};
+      group.set_tmax(i, t);
+      unit_.tmax[i] = static_cast<float>((double{t} + group.t_begin[i]) * group.t_scale[i]);
+      hits_[numbers_[i]] = {unit_.tmax[i], hits.u[lane], hits.v[lane], place.placement, place.cluster, place.triangle};
     }
   }
 
@@ -307,8 +285,7 @@ private:
   // Of the group that is being traced:
   const uint32_t* numbers_ = nullptr; ///< of its rays
   uint64_t alive_ = 0;                ///< rays that still look for a hit
-  float tmax_[kGroup];                ///< in unit space
-  double unit_[kGroup];               ///< unit-space t of one t in the top tree
+  UnitRays unit_;
 };
 
 template <typename Lanes, bool kAny>

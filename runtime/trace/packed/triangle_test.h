@@ -1,6 +1,6 @@
 #pragma once
 
-#include "runtime/trace/packed/grid_ray.h"
+#include "runtime/trace/packed/ray_group.h"
 
 /// Eight triangles against a ray: Woop, Benthin, Wald, "Watertight ray/triangle intersection" (2013), with exact signs.
 ///
@@ -47,17 +47,19 @@ inline uint32_t test_exactly(uint32_t lanes, const float (&x)[3][kBatch], const 
 /// The triangles that the ray hits in (tnear, tmax], as bits.
 /// @param exact_count counts triangles that took doubles
 template <typename Lanes>
-inline uint32_t test_triangles(const DecodedBatch& batch, const GridRay& ray, BatchHits& hits, uint64_t& exact_count) {
+inline uint32_t test_triangles(const DecodedBatch& batch, const RayGroup& group, uint32_t ray, BatchHits& hits,
+                               uint64_t& exact_count) {
   using F = typename Lanes::F;
   const auto relative = [&](uint32_t axis, uint32_t corner) {
-    return Lanes::sub(Lanes::load(batch.vertex[axis][corner]), Lanes::set(ray.origin[axis]));
+    return Lanes::sub(Lanes::load(batch.vertex[axis][corner]), Lanes::set(group.origin[axis][ray]));
   };
-  const F sx = Lanes::set(ray.sx), sy = Lanes::set(ray.sy);
+  const F sx = Lanes::set(group.shear[0][ray]), sy = Lanes::set(group.shear[1][ray]);
+  const uint32_t kx = group.axis[0][ray], ky = group.axis[1][ray], kz = group.axis[2][ray];
   F x[3], y[3], z[3];
   for (uint32_t corner = 0; corner < 3; ++corner) {
-    z[corner] = relative(ray.kz, corner);
-    x[corner] = Lanes::fnma(sx, z[corner], relative(ray.kx, corner));
-    y[corner] = Lanes::fnma(sy, z[corner], relative(ray.ky, corner));
+    z[corner] = relative(kz, corner);
+    x[corner] = Lanes::fnma(sx, z[corner], relative(kx, corner));
+    y[corner] = Lanes::fnma(sy, z[corner], relative(ky, corner));
   }
   const F u1 = Lanes::mul(x[2], y[1]), v1 = Lanes::mul(x[0], y[2]), w1 = Lanes::mul(x[1], y[0]);
   const F u = Lanes::sub(u1, Lanes::mul(y[2], x[1])), v = Lanes::sub(v1, Lanes::mul(y[0], x[2])),
@@ -74,7 +76,7 @@ inline uint32_t test_triangles(const DecodedBatch& batch, const GridRay& ray, Ba
   uint32_t hit = maybe & (Lanes::less(error, least) | Lanes::less(most, below));
   const F over = Lanes::div(Lanes::set(1.0f), Lanes::add(Lanes::add(u, v), w));
   const F depth = Lanes::fma(u, z[0], Lanes::fma(v, z[1], Lanes::mul(w, z[2])));
-  Lanes::store(hits.t, Lanes::mul(Lanes::mul(depth, over), Lanes::set(ray.sz)));
+  Lanes::store(hits.t, Lanes::mul(Lanes::mul(depth, over), Lanes::set(group.shear[2][ray])));
   Lanes::store(hits.u, Lanes::mul(v, over));
   Lanes::store(hits.v, Lanes::mul(w, over));
   if (const uint32_t unsure = maybe & ~hit; unsure != 0) {
@@ -85,10 +87,10 @@ inline uint32_t test_triangles(const DecodedBatch& batch, const GridRay& ray, Ba
       Lanes::store(zs[corner], z[corner]);
     }
     exact_count += static_cast<uint64_t>(__builtin_popcount(unsure));
-    hit |= test_exactly(unsure, xs, ys, zs, ray.sz, hits);
+    hit |= test_exactly(unsure, xs, ys, zs, group.shear[2][ray], hits);
   }
   const F t = Lanes::load(hits.t);
-  return hit & Lanes::less(Lanes::set(ray.tnear), t) & Lanes::less_equal(t, Lanes::set(ray.tmax));
+  return hit & Lanes::less(Lanes::set(group.limits[ray][0]), t) & Lanes::less_equal(t, Lanes::set(group.tmax(ray)));
 }
 
 } // namespace
