@@ -38,25 +38,13 @@ struct alignas(64) RayGroup {
   float origin[3][kGroup];
   float shear[3][kGroup]; ///< Woop's S
   uint32_t axis[3][kGroup]; ///< Woop's k: x, y, z; z is the direction's largest component
-  uint32_t octant[kGroup];  ///< bits 0, 1, 2: x, y, z decrease
+  uint64_t backward[3];     ///< rays along which x, y, z decrease, as bits
   double t_begin[kGroup];   ///< unit-space t = (t here + t_begin) t_scale
   double t_scale[kGroup];   ///< a power of two
 
   void set_tmax(uint32_t i, float t) { limits[i][1] = -t; }
   float tmax(uint32_t i) const { return -limits[i][1]; }
 };
-
-inline uint64_t double_bits(double x) {
-  uint64_t bits;
-  __builtin_memcpy(&bits, &x, sizeof bits);
-  return bits;
-}
-
-inline double bits_double(uint64_t bits) {
-  double x;
-  __builtin_memcpy(&x, &bits, sizeof x);
-  return x;
-}
 
 inline float next_below(float x) { // x > 0
   uint32_t bits;
@@ -66,45 +54,77 @@ inline float next_below(float x) { // x > 0
   return x;
 }
 
-inline double larger(double a, double b) { return a > b ? a : b; }
-inline float larger(float a, float b) { return a > b ? a : b; }
-
 constexpr uint32_t kBlock = 8; ///< rays that are set up at once
 
+// The compiler's own vectors, a lane for each ray of a block, so that all instruction sets get the same from one source.
+using Floats = float __attribute__((vector_size(4 * kBlock)));
+using Ints = int32_t __attribute__((vector_size(4 * kBlock)));
+using Doubles = double __attribute__((vector_size(8 * kBlock)));
+using Longs = int64_t __attribute__((vector_size(8 * kBlock)));
+using Bytes = int8_t __attribute__((vector_size(kBlock)));
+
+template <typename Vector, typename Element>
+inline void read_block(Vector& v, const Element* p) {
+  __builtin_memcpy(&v, p, sizeof v);
+}
+template <typename Vector, typename Element>
+inline void write_block(Element* p, const Vector& v) {
+  __builtin_memcpy(p, &v, sizeof v);
+}
+
+template <typename Vector>
+inline void keep_larger(Vector& a, const Vector& b) {
+  a = a > b ? a : b;
+}
+
+/// The lanes whose condition is all ones, as bits.
+template <typename Condition>
+inline uint32_t lane_bits(const Condition& condition) {
+  const Bytes bytes = __builtin_convertvector(condition, Bytes);
+  uint64_t word;
+  __builtin_memcpy(&word, &bytes, sizeof word);
+  return static_cast<uint32_t>(((word & 0x0101010101010101u) * 0x0102040810204080u) >> 56); // byte i adds bit 56 + i
+}
+
 /// A block of rays in a tree's grid, in doubles.
-struct alignas(64) GridBlock {
-  double origin[3][kBlock], direction[3][kBlock], largest[kBlock], away[kBlock], begin[kBlock], power[kBlock];
+struct GridBlock {
+  Doubles origin[3], direction[3];
+  Doubles power; ///< t here for one in unit space
+  Doubles begin; ///< that origins were moved by
 };
 
-/// Moves rays into the grid and scales their directions so that the largest component is in [1, 2).
-inline void move_block(const TracePlacement& placement, const UnitRays& from, uint32_t first, GridBlock& block) {
+/// Moves rays into the grid and scales their directions so that the largest component is in [1, 2). Returns the lanes
+/// that have a direction and coordinates of any use.
+inline uint32_t move_block(const TracePlacement& placement, const UnitRays& from, uint32_t first, GridBlock& block,
+                           Doubles& away) {
+  constexpr int64_t kMagnitude = 0x7fffffffffffffff;
   const double* m = placement.grid_from_unit;
-  for (uint32_t axis = 0; axis < 3; ++axis)
-    for (uint32_t l = 0; l < kBlock; ++l) {
-      const uint32_t i = first + l;
-      block.direction[axis][l] = m[axis] * double{from.direction[0][i]} + m[3 + axis] * double{from.direction[1][i]} +
-                                 m[6 + axis] * double{from.direction[2][i]};
-      block.origin[axis][l] = m[axis] * double{from.origin[0][i]} + m[3 + axis] * double{from.origin[1][i]} +
-                              m[6 + axis] * double{from.origin[2][i]} + m[9 + axis];
-    }
-  for (uint32_t l = 0; l < kBlock; ++l) {
-    block.largest[l] = larger(larger(__builtin_fabs(block.direction[0][l]), __builtin_fabs(block.direction[1][l])),
-                              __builtin_fabs(block.direction[2][l]));
-    block.away[l] = larger(larger(__builtin_fabs(block.origin[0][l]), __builtin_fabs(block.origin[1][l])),
-                           __builtin_fabs(block.origin[2][l]));
-    block.begin[l] = 0.0;
+  Doubles origin[3], direction[3], largest{};
+  away = Doubles{};
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    Floats in_unit;
+    read_block(in_unit, &from.origin[axis][first]);
+    origin[axis] = __builtin_convertvector(in_unit, Doubles);
+    read_block(in_unit, &from.direction[axis][first]);
+    direction[axis] = __builtin_convertvector(in_unit, Doubles);
   }
-  for (uint32_t l = 0; l < kBlock; ++l) {
-    uint64_t exponent = double_bits(block.largest[l]) >> 52;
-    exponent = exponent < 523u ? 523u : exponent;
-    exponent = exponent > 1523u ? 1523u : exponent;
-    block.power[l] = bits_double(exponent << 52);
-    const double scale = bits_double((2046u - exponent) << 52);
-    block.direction[0][l] *= scale;
-    block.direction[1][l] *= scale;
-    block.direction[2][l] *= scale;
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    block.direction[axis] = m[axis] * direction[0] + m[3 + axis] * direction[1] + m[6 + axis] * direction[2];
+    block.origin[axis] = m[axis] * origin[0] + m[3 + axis] * origin[1] + m[6 + axis] * origin[2] + m[9 + axis];
+    keep_larger(largest, reinterpret_cast<Doubles>(reinterpret_cast<Longs>(block.direction[axis]) & kMagnitude));
+    keep_larger(away, reinterpret_cast<Doubles>(reinterpret_cast<Longs>(block.origin[axis]) & kMagnitude));
   }
+  Longs exponent = reinterpret_cast<Longs>(largest) >> 52;
+  exponent = exponent < 523 ? Longs{} + 523 : exponent;
+  exponent = exponent > 1523 ? Longs{} + 1523 : exponent;
+  block.power = reinterpret_cast<Doubles>(exponent << 52);
+  const Doubles scale = reinterpret_cast<Doubles>((2046 - exponent) << 52);
+  for (Doubles& component : block.direction) component *= scale;
+  block.begin = Doubles{};
+  return lane_bits((largest > 0.0) & (largest < 1e300) & (away < 1e300));
 }
+
+inline double larger(double a, double b) { return a > b ? a : b; }
 
 /// Moves the origin of a ray that starts far from the tree to just before its box, where floats are finer. False where
 /// the ray passes the box by.
@@ -127,68 +147,54 @@ inline bool approach(const TracePlacement& placement, double margin, GridBlock& 
   return true;
 }
 
-/// The lanes that may hit something, as bits, once those far away have come near.
-inline uint32_t usable_lanes(const TracePlacement& placement, float max_coordinate, GridBlock& block) {
-  const double reach = kFar * double{max_coordinate};
-  uint32_t usable = 0, far = 0;
-  for (uint32_t l = 0; l < kBlock; ++l) {
-    const bool sound = block.largest[l] > 0.0 && block.largest[l] < 1e300 && block.away[l] < 1e300;
-    usable |= (sound ? 1u : 0u) << l;
-    far |= (block.away[l] > reach ? 1u : 0u) << l;
-  }
-  for (far &= usable; far != 0; far &= far - 1) {
-    const auto l = static_cast<uint32_t>(__builtin_ctz(far));
-    if (!approach(placement, 0x1p-8 * double{max_coordinate}, block, l)) usable &= ~(1u << l);
-  }
-  return usable;
+inline void write_pairs(float (*out)[2], const Floats& a, const Floats& b) {
+  write_block(&out[0][0], __builtin_shuffle(a, b, Ints{0, 8, 1, 9, 2, 10, 3, 11}));
+  write_block(&out[4][0], __builtin_shuffle(a, b, Ints{4, 12, 5, 13, 6, 14, 7, 15}));
 }
+
+inline Floats magnitude(const Floats& x) { return reinterpret_cast<Floats>(reinterpret_cast<Ints>(x) & 0x7fffffff); }
 
 inline void set_boxes(const GridBlock& block, const UnitRays& from, float max_coordinate, uint32_t first,
                       RayGroup& group) {
-  alignas(32) float pad[kBlock];
-  for (uint32_t l = 0; l < kBlock; ++l) {
-    const uint32_t i = first + l;
-    float reach = max_coordinate;
-    for (uint32_t axis = 0; axis < 3; ++axis) {
-      group.origin[axis][i] = static_cast<float>(block.origin[axis][l]);
-      reach = larger(reach, __builtin_fabsf(group.origin[axis][i]));
-    }
-    pad[l] = kBoxPad * reach;
-    group.octant[i] = 0;
-    group.t_begin[i] = block.begin[l];
-    group.t_scale[i] = 1.0 / block.power[l];
-    group.limits[i][0] = static_cast<float>(double{from.tnear[i]} * block.power[l] - block.begin[l]);
-    group.limits[i][1] = -static_cast<float>(double{from.tmax[i]} * block.power[l] - block.begin[l]);
+  Floats origin[3], reach = Floats{} + max_coordinate, tnear, tmax;
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    origin[axis] = __builtin_convertvector(block.origin[axis], Floats);
+    keep_larger(reach, magnitude(origin[axis]));
+    write_block(&group.origin[axis][first], origin[axis]);
   }
-  for (uint32_t axis = 0; axis < 3; ++axis)
-    for (uint32_t l = 0; l < kBlock; ++l) {
-      const uint32_t i = first + l;
-      const auto d = static_cast<float>(block.direction[axis][l]);
-      const float size = larger(__builtin_fabsf(d), kSmallestDirection);
-      const float inverse = __builtin_copysignf(1.0f / size, d);
-      const float back = group.origin[axis][i] * inverse, away = pad[l] * __builtin_fabsf(inverse);
-      group.inverse[axis][i] = inverse;
-      group.bias[axis][i][0] = -back - away;
-      group.bias[axis][i][1] = back - away;
-      group.octant[i] |= (inverse < 0.0f ? 1u : 0u) << axis;
-    }
+  read_block(tnear, &from.tnear[first]);
+  read_block(tmax, &from.tmax[first]);
+  const Doubles t_near = __builtin_convertvector(tnear, Doubles) * block.power - block.begin;
+  const Doubles t_max = __builtin_convertvector(tmax, Doubles) * block.power - block.begin;
+  write_pairs(&group.limits[first], __builtin_convertvector(t_near, Floats), -__builtin_convertvector(t_max, Floats));
+  write_block(&group.t_begin[first], block.begin);
+  write_block(&group.t_scale[first], 1.0 / block.power);
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    const Floats d = __builtin_convertvector(block.direction[axis], Floats), size = magnitude(d);
+    const Floats over = 1.0f / (size > kSmallestDirection ? size : Floats{} + kSmallestDirection);
+    const Ints sign = reinterpret_cast<Ints>(d) & static_cast<int32_t>(0x80000000u);
+    const Floats inverse = reinterpret_cast<Floats>(reinterpret_cast<Ints>(over) | sign);
+    const Floats back = origin[axis] * inverse, away = kBoxPad * reach * over;
+    write_block(&group.inverse[axis][first], inverse);
+    write_pairs(&group.bias[axis][first], -back - away, back - away);
+    group.backward[axis] |= uint64_t{lane_bits(inverse < 0.0f)} << first;
+  }
 }
 
 inline void set_shears(const GridBlock& block, uint32_t first, RayGroup& group) {
-  for (uint32_t l = 0; l < kBlock; ++l) {
-    const uint32_t i = first + l;
-    const auto x = static_cast<float>(block.direction[0][l]), y = static_cast<float>(block.direction[1][l]),
-               z = static_cast<float>(block.direction[2][l]);
-    const float ax = __builtin_fabsf(x), ay = __builtin_fabsf(y), az = __builtin_fabsf(z);
-    const bool by_z = (az >= ax) & (az >= ay), by_y = !by_z & (ay >= ax);
-    const float along = by_z ? z : by_y ? y : x;
-    group.axis[0][i] = by_z ? 0u : by_y ? 2u : 1u;
-    group.axis[1][i] = by_z ? 1u : by_y ? 0u : 2u;
-    group.axis[2][i] = by_z ? 2u : by_y ? 1u : 0u;
-    group.shear[0][i] = (by_z ? x : by_y ? z : y) / along;
-    group.shear[1][i] = (by_z ? y : by_y ? x : z) / along;
-    group.shear[2][i] = 1.0f / along;
-  }
+  const Floats x = __builtin_convertvector(block.direction[0], Floats),
+               y = __builtin_convertvector(block.direction[1], Floats),
+               z = __builtin_convertvector(block.direction[2], Floats);
+  const Floats ax = magnitude(x), ay = magnitude(y), az = magnitude(z);
+  const Ints by_z = (az >= ax) & (az >= ay), by_y = ~by_z & (ay >= ax);
+  const Floats along = by_z ? z : by_y ? y : x;
+  const Ints zero{};
+  write_block(&group.axis[0][first], by_z ? zero : by_y ? zero + 2 : zero + 1);
+  write_block(&group.axis[1][first], by_z ? zero + 1 : by_y ? zero : zero + 2);
+  write_block(&group.axis[2][first], by_z ? zero + 2 : by_y ? zero + 1 : zero);
+  write_block(&group.shear[0][first], (by_z ? x : by_y ? z : y) / along);
+  write_block(&group.shear[1][first], (by_z ? y : by_y ? x : z) / along);
+  write_block(&group.shear[2][first], 1.0f / along);
 }
 
 /// Moves rays into a tree's grid and sets them up. Returns those that may hit something.
@@ -196,15 +202,22 @@ inline void set_shears(const GridBlock& block, uint32_t first, RayGroup& group) 
 inline uint64_t enter(const TracePlacement& placement, float max_coordinate, const UnitRays& from, uint64_t rays,
                       RayGroup& group) {
   uint64_t entered = 0;
+  for (uint64_t& backward : group.backward) backward = 0;
   for (uint32_t first = 0; first < kGroup; first += kBlock) {
-    if (((rays >> first) & 0xffu) == 0) continue;
+    const auto wanted = static_cast<uint32_t>(rays >> first) & 0xffu;
+    if (wanted == 0) continue;
     GridBlock block;
-    move_block(placement, from, first, block);
-    entered |= uint64_t{usable_lanes(placement, max_coordinate, block)} << first;
+    Doubles away;
+    uint32_t usable = wanted & move_block(placement, from, first, block, away);
+    for (uint32_t far = usable & lane_bits(away > kFar * double{max_coordinate}); far != 0; far &= far - 1) {
+      const auto lane = static_cast<uint32_t>(__builtin_ctz(far));
+      if (!approach(placement, 0x1p-8 * double{max_coordinate}, block, lane)) usable &= ~(1u << lane);
+    }
+    entered |= uint64_t{usable} << first;
     set_boxes(block, from, max_coordinate, first, group);
     set_shears(block, first, group);
   }
-  return entered & rays;
+  return entered;
 }
 
 } // namespace

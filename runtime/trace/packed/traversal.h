@@ -93,10 +93,14 @@ private:
   template <typename Visit>
   static void by_octant(const RayGroup& group, uint64_t rays, Visit visit) {
     while (rays != 0) {
-      const uint32_t octant = group.octant[first_bit(rays)];
-      uint64_t together = 0;
-      for (uint64_t m = rays; m != 0; m &= m - 1)
-        if (group.octant[first_bit(m)] == octant) together |= m & (0 - m);
+      const uint32_t first = first_bit(rays);
+      uint64_t together = rays;
+      uint32_t octant = 0;
+      for (uint32_t axis = 0; axis < 3; ++axis) {
+        const uint64_t backward = (group.backward[axis] >> first) & 1u;
+        together &= group.backward[axis] ^ (backward - 1); // those whose bit is the same
+        octant |= static_cast<uint32_t>(backward) << axis;
+      }
       visit(together, octant);
       rays &= ~together;
     }
