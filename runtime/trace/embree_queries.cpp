@@ -2,76 +2,22 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cstddef>
 
-#include <embree3/rtcore.h>
-
+#include "runtime/trace/embree_rays.h"
 #include "runtime/trace/embree_tracer.h"
 #include "runtime/trace/flush_denormals.h"
 
 namespace packtrace {
 namespace {
 
-constexpr size_t kPacket = 16;
+constexpr size_t kPacket = RayPacket16::kRays;
 constexpr size_t kStream = 1024; ///< rays a stream call, as many as a tile has
 
-static_assert(sizeof(Ray) == 32 && offsetof(Ray, tnear) == 12 && offsetof(Ray, direction) == 16 &&
-              offsetof(Ray, tfar) == 28);
-
-struct QueryContext : RTCIntersectContext {
-  explicit QueryContext(RTCIntersectContextFlags order) {
-    rtcInitIntersectContext(this);
-    flags = order;
-  }
-};
-
-/// Four rows of x y z w to four columns, or back.
-void store_columns(const float* rows, size_t stride, float* x, float* y, float* z, float* w) {
-  __m128 a = _mm_loadu_ps(rows), b = _mm_loadu_ps(rows + stride), c = _mm_loadu_ps(rows + 2 * stride),
-         d = _mm_loadu_ps(rows + 3 * stride);
-  _MM_TRANSPOSE4_PS(a, b, c, d);
-  _mm_store_ps(x, a), _mm_store_ps(y, b), _mm_store_ps(z, c), _mm_store_ps(w, d);
-}
-
-/// Sixteen rays, or what is left of them.
-struct Packet {
-  alignas(64) int valid[kPacket];
-
-  void load(std::span<const Ray> rays, RTCRay16& out) {
-    constexpr size_t kRow = sizeof(Ray) / sizeof(float);
-    alignas(64) Ray padded[kPacket];
-    const Ray* from = rays.data();
-    if (rays.size() < kPacket) {
-      std::copy(rays.begin(), rays.end(), padded);
-      from = padded;
-    }
-    for (size_t i = 0; i < kPacket; i += 4) {
-      store_columns(&from[i].origin.x, kRow, out.org_x + i, out.org_y + i, out.org_z + i, out.tnear + i);
-      store_columns(&from[i].direction.x, kRow, out.dir_x + i, out.dir_y + i, out.dir_z + i, out.tfar + i);
-    }
-    for (size_t i = 0; i < kPacket; ++i) valid[i] = i < rays.size() && out.tnear[i] <= out.tfar[i] ? -1 : 0;
-  }
-};
-
-/// What does not differ from ray to ray and what Embree leaves alone.
-void set_constants(RTCRay16& ray, uint32_t ray_class) {
-  std::fill_n(ray.time, kPacket, 0.0f);
-  std::fill_n(ray.mask, kPacket, ray_class);
-  std::fill_n(ray.id, kPacket, 0u);
-  std::fill_n(ray.flags, kPacket, 0u);
-}
-
-void set_ray(const Ray& in, uint32_t ray_class, RTCRay& out) {
-  out.org_x = in.origin.x, out.org_y = in.origin.y, out.org_z = in.origin.z, out.tnear = in.tnear;
-  out.dir_x = in.direction.x, out.dir_y = in.direction.y, out.dir_z = in.direction.z, out.time = 0.0f;
-  out.tfar = in.tfar, out.mask = ray_class, out.id = 0, out.flags = 0;
-}
-
 void occluded_packets(RTCScene scene, std::span<const Ray> rays, uint32_t ray_class, std::span<uint8_t> occluded) {
-  QueryContext context(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
-  Packet packet;
+  EmbreeQuery context(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
+  RayPacket16 packet;
   RTCRay16 lanes;
-  set_constants(lanes, ray_class);
+  set_constants(ray_class, lanes);
   for (size_t first = 0; first < rays.size(); first += kPacket) {
     const size_t count = std::min(kPacket, rays.size() - first);
     packet.load(rays.subspan(first, count), lanes);
@@ -82,7 +28,7 @@ void occluded_packets(RTCScene scene, std::span<const Ray> rays, uint32_t ray_cl
 }
 
 void occluded_streams(RTCScene scene, std::span<const Ray> rays, uint32_t ray_class, std::span<uint8_t> occluded) {
-  QueryContext context(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
+  EmbreeQuery context(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
   alignas(64) RTCRay stream[kStream];
   for (size_t first = 0; first < rays.size(); first += kStream) {
     const size_t count = std::min(kStream, rays.size() - first);
@@ -109,15 +55,14 @@ RayHit EmbreeTracer::hit_of(float t, float u, float v, uint32_t instance, uint32
 }
 
 void EmbreeTracer::closest_packets(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits) const {
-  QueryContext context(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
-  Packet packet;
+  EmbreeQuery context(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
+  RayPacket16 packet;
   RTCRayHit16 lanes;
-  set_constants(lanes.ray, ray_class);
+  set_constants(ray_class, lanes.ray);
   for (size_t first = 0; first < rays.size(); first += kPacket) {
     const size_t count = std::min(kPacket, rays.size() - first);
     packet.load(rays.subspan(first, count), lanes.ray);
-    std::fill_n(lanes.hit.geomID, kPacket, RTC_INVALID_GEOMETRY_ID);
-    std::fill_n(lanes.hit.instID[0], kPacket, RTC_INVALID_GEOMETRY_ID);
+    forget_hits(lanes.hit);
     rtcIntersect16(packet.valid, handle(), &context, &lanes);
     for (size_t i = 0; i < count; ++i)
       hits[first + i] = hit_of(lanes.ray.tfar[i], lanes.hit.u[i], lanes.hit.v[i], lanes.hit.instID[0][i],
@@ -126,13 +71,12 @@ void EmbreeTracer::closest_packets(std::span<const Ray> rays, uint32_t ray_class
 }
 
 void EmbreeTracer::closest_streams(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits) const {
-  QueryContext context(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
+  EmbreeQuery context(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
   alignas(64) RTCRayHit stream[kStream];
   for (size_t first = 0; first < rays.size(); first += kStream) {
     const size_t count = std::min(kStream, rays.size() - first);
     for (size_t i = 0; i < count; ++i) {
-      set_ray(rays[first + i], ray_class, stream[i].ray);
-      stream[i].hit.geomID = stream[i].hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+      set_ray(rays[first + i], ray_class, stream[i]);
     }
     rtcIntersect1M(handle(), &context, stream, static_cast<unsigned>(count), sizeof(RTCRayHit));
     for (size_t i = 0; i < count; ++i) {

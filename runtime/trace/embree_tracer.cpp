@@ -75,7 +75,9 @@ struct EmbreeTracer::Device {
     embree.check();
     const bool high = config.quality == BvhQuality::kHigh;
     rtcSetSceneBuildQuality(scene.get(), high ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
-    rtcSetSceneFlags(scene.get(), config.robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
+    const int flags =
+        (config.robust ? RTC_SCENE_FLAG_ROBUST : 0) | (config.compact ? RTC_SCENE_FLAG_COMPACT : RTC_SCENE_FLAG_NONE);
+    rtcSetSceneFlags(scene.get(), static_cast<RTCSceneFlags>(flags));
     rtcSetSceneProgressMonitorFunction(
         scene.get(), [](void*, double) { return !Progress::cancelled(); }, nullptr);
     return scene;

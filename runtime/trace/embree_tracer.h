@@ -20,6 +20,7 @@ struct EmbreeConfig {
   /// Watertight: no ray passes between two triangles that share an edge. Without, about one camera ray in 40,000 does
   /// on finely tessellated surfaces and leaves a dot; tracing is up to a fifth faster then, and kHigh splits in space.
   bool robust = true;
+  bool compact = false; ///< smaller and slower trees
 };
 
 /// Traces one SceneSource with Embree 3: float triangles decoded once, and Embree's trees over them.

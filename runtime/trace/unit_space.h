@@ -39,6 +39,8 @@ public:
   /// Unit lengths per outer length; a power of two.
   double scale() const { return scale_; }
 
+  bool operator==(const UnitSpace&) const = default;
+
   DAffine unit_from_outer() const { return uniform(scale_, -centre_ * scale_); }
   DAffine outer_from_unit() const { return uniform(1.0 / scale_, centre_); }
 
