@@ -26,6 +26,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr const char* kRayTracer = "RayTracer"; ///< the call of rows that the renderer can use
+
 struct Options {
   TraceInputOptions inputs;
   std::filesystem::path json_file;
@@ -63,7 +65,7 @@ void add_tracer(const TraceInput& input, const char* name, const TracerConfig& c
   try {
     const Stopwatch watch;
     std::unique_ptr<RayTracer> tracer = make_tracer(input.source, &input.file, config);
-    out.rows.push_back({name, "RayTracer", std::move(tracer), 1e3 * watch.seconds(), config.embree.robust});
+    out.rows.push_back({name, kRayTracer, std::move(tracer), 1e3 * watch.seconds(), config.embree.robust});
   } catch (const Error& error) {
     if (error.kind() != ErrorKind::kUnsupported) throw;
     fmt::print(stderr, "{}: {}\n", name, error.what());
@@ -166,6 +168,31 @@ void print_row(const Json& row) {
              wrong);
 }
 
+/// The renderer's passes with each tracer that it can use.
+Json measure_passes(const TraceInput& input, const Systems& systems, const PrimaryCamera& camera, float radius,
+                    uint32_t threads, const Options& options) {
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+  Json passes = Json::array();
+  fmt::print("\nwhole passes of the renderer, Mrays/s:");
+  for (const System& row : systems.rows) {
+    if (row.call != kRayTracer) continue;
+    const std::vector<double> seconds =
+        time_passes(input.source, *row.tracer, camera, radius, options.repeats, options.cpu_clock);
+    Json json{{"system", row.name}, {"threads", threads}};
+    fmt::print(" {}", row.name);
+    for (size_t phase = 0; phase < seconds.size(); ++phase) {
+      const RecordedRays& rays = (*row.rays)[phase];
+      const double elapsed = options.cpu_clock ? seconds[phase] / threads : seconds[phase];
+      json["mrays_per_s"][std::string(rays.name)] = static_cast<double>(rays.count()) / elapsed * 1e-6;
+      fmt::print(", {} {:.1f}", rays.name, static_cast<double>(rays.count()) / elapsed * 1e-6);
+    }
+    fmt::print(";");
+    passes.push_back(std::move(json));
+  }
+  fmt::print("\n");
+  return passes;
+}
+
 /// Every row has every phase, with a speed.
 bool complete(const Json& rows, size_t expected) {
   return rows.size() == expected && std::all_of(rows.begin(), rows.end(), [](const Json& row) {
@@ -222,6 +249,8 @@ Json measure_input(const std::string& name, const Options& options) {
       json["rows"].push_back(row_json(*input, systems, row, threads));
       print_row(json["rows"].back());
     }
+    for (Json& pass : measure_passes(*input, systems, camera, radius, threads, options))
+      json["passes"].push_back(std::move(pass));
   }
   if (!complete(json["rows"], systems.rows.size() * options.threads.size()))
     throw Error(ErrorKind::kLimitExceeded, input->name + ": figures are missing");

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <limits>
 
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
@@ -14,6 +15,19 @@ namespace packtrace {
 namespace {
 
 bool is_gap(const Ray& ray) { return !(ray.tnear <= ray.tfar); }
+
+class Clock {
+public:
+  explicit Clock(bool cpu) : cpu_(cpu) {}
+  double seconds() const {
+    return cpu_ ? static_cast<double>(std::clock() - start_) / CLOCKS_PER_SEC : wall_.seconds();
+  }
+
+private:
+  bool cpu_;
+  std::clock_t start_ = std::clock();
+  Stopwatch wall_;
+};
 
 /// Hands rays on to another tracer and remembers them. For one thread.
 class RecordingTracer final : public RayTracer {
@@ -78,6 +92,29 @@ std::vector<RecordedRays> record_frame(const SceneSource& source, const RayTrace
   return frame;
 }
 
+std::vector<double> time_passes(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& camera,
+                                float ao_radius, uint32_t repeats, bool cpu_clock) {
+  std::vector<double> least(3, std::numeric_limits<double>::infinity());
+  Progress progress;
+  GBuffer gbuffer;
+  AoConfig config;
+  config.radius = ao_radius;
+  AoFrame ao;
+  for (uint32_t repeat = 0; repeat <= repeats; ++repeat) { // the first makes room
+    const auto take = [&](size_t phase, const auto& pass) {
+      const Clock watch(cpu_clock);
+      pass();
+      if (repeat > 0) least[phase] = std::min(least[phase], watch.seconds());
+    };
+    take(0, [&] { trace_primary(source, tracer, camera, camera, gbuffer, progress); });
+    config.falloff = false;
+    take(1, [&] { trace_ao(source, tracer, gbuffer, config, 0, ao, progress); });
+    config.falloff = true;
+    take(2, [&] { trace_ao(source, tracer, gbuffer, config, 0, ao, progress); });
+  }
+  return least;
+}
+
 std::vector<RecordedRays> moved(std::vector<RecordedRays> recorded, const UnitSpace& from, const UnitSpace& to) {
   if (from == to) return recorded;
   const double scale = to.scale() / from.scale();
@@ -95,8 +132,7 @@ double replay(const RecordedRays& recorded, const RayTracer& tracer, RayResults&
     results.occluded.resize(recorded.rays.size());
   else
     results.hits.resize(recorded.rays.size());
-  const std::clock_t cpu = std::clock();
-  const Stopwatch watch;
+  const Clock watch(cpu_clock);
   tbb::parallel_for(size_t{0}, recorded.ends.size(), [&](size_t i) {
     const size_t first = i == 0 ? 0 : recorded.ends[i - 1], count = recorded.ends[i] - first;
     const std::span rays(recorded.rays.data() + first, count);
@@ -105,7 +141,7 @@ double replay(const RecordedRays& recorded, const RayTracer& tracer, RayResults&
     else
       tracer.closest_hits(rays, recorded.ray_class, recorded.order, {results.hits.data() + first, count});
   });
-  return cpu_clock ? static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC : watch.seconds();
+  return watch.seconds();
 }
 
 uint64_t mismatches(const RecordedRays& recorded, const RayResults& a, const RayResults& b, double t_scale) {

@@ -27,6 +27,11 @@ struct RecordedRays {
 std::vector<RecordedRays> record_frame(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& camera,
                                        float ao_radius);
 
+/// Seconds that the renderer's passes over the same frame take, by phase: rays, what makes them and what is made of
+/// their hits. The least of `repeats`.
+std::vector<double> time_passes(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& camera,
+                                float ao_radius, uint32_t repeats, bool cpu_clock);
+
 /// The same in another tracer's space. t counts lengths there.
 std::vector<RecordedRays> moved(std::vector<RecordedRays> recorded, const UnitSpace& from, const UnitSpace& to);
 
