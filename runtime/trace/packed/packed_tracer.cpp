@@ -1,10 +1,8 @@
 #include "runtime/trace/packed/packed_tracer.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cassert>
 #include <cmath>
-#include <string>
 
 #include "compress/bvh/box_tree.h"
 #include "compress/format/packed_trees.h"
@@ -15,6 +13,7 @@
 #include "runtime/trace/packed/batch_cache.h"
 #include "runtime/trace/packed/top_tree.h"
 #include "runtime/trace/packed/trace_cluster.h"
+#include "runtime/trace/placement.h"
 
 namespace packtrace {
 namespace {
@@ -192,21 +191,15 @@ void PackedTracer::place() {
   Tables& t = *tables_;
   const std::span<const PlacedGeometry> instances = source_.instances();
   t.first_instance.assign(file_.geometries().size(), kNoPlace);
-  Bounds world;
-  for (uint32_t i = 0; i < instances.size(); ++i) {
-    const baked::GeometryRecord& geometry = file_.geometries()[instances[i].geometry];
-    if (t.first_instance[instances[i].geometry] == kNoPlace) t.first_instance[instances[i].geometry] = i;
-    const DAffine world_from_object(instances[i].world_from_object);
-    for (int column = 0; column < 4; ++column)
-      if (!is_finite(world_from_object[column]))
-        throw Error(ErrorKind::kInput, "the transform of instance " + std::to_string(i) + " is not finite");
+  for (uint32_t i = static_cast<uint32_t>(instances.size()); i-- > 0;) t.first_instance[instances[i].geometry] = i;
+  std::vector<Bounds> bounds(file_.geometries().size());
+  for (size_t g = 0; g < bounds.size(); ++g) {
+    const baked::GeometryRecord& geometry = file_.geometries()[g];
     if (geometry.cluster_count == 0) continue;
-    Bounds own;
-    own.extend(DVec3(geometry.bounds_lo[0], geometry.bounds_lo[1], geometry.bounds_lo[2]));
-    own.extend(DVec3(geometry.bounds_hi[0], geometry.bounds_hi[1], geometry.bounds_hi[2]));
-    world.extend(transform_bounds(world_from_object, own));
+    bounds[g].extend(DVec3(geometry.bounds_lo[0], geometry.bounds_lo[1], geometry.bounds_lo[2]));
+    bounds[g].extend(DVec3(geometry.bounds_hi[0], geometry.bounds_hi[1], geometry.bounds_hi[2]));
   }
-  space_ = UnitSpace(world);
+  space_ = UnitSpace(placed_bounds(source_, bounds));
 
   t.surfaces.resize(instances.size());
   bool world_placed = false;
@@ -216,12 +209,10 @@ void PackedTracer::place() {
     const DAffine world_from_object(instances[i].world_from_object);
     const DAffine unit_from_grid =
         compose(compose(space_.unit_from_outer(), world_from_object), outer_from_grid(t.packed.trees[tree]));
-    Placement& surface = t.surfaces[i];
-    surface.instance = i;
-    surface.instanced = true;
-    surface.unit_from_surface = unit_from_grid;
-    surface.surface_normal = normal_matrix(unit_from_grid);
-    surface.object_normal = normal_matrix(world_from_object);
+    t.surfaces[i] = instanced_placement(i, world_from_object, unit_from_grid);
+    // Rays move in doubles, and only what they become in the grid is rounded.
+    t.surfaces[i].moved_linear = glm::dmat3(0.0);
+    t.surfaces[i].moved_offset = DVec3(0.0);
     const bool in_world = t.packed.trees[tree].geometry == baked::kWorldTree;
     if (in_world && world_placed) continue;
     world_placed |= in_world;

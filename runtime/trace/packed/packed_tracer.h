@@ -22,7 +22,7 @@ public:
   PackedTracer& operator=(const PackedTracer&) = delete;
 
   std::string_view name() const override { return "packed"; }
-  std::string_view isa() const { return kernels_.isa; }
+  std::string_view isa() const override { return kernels_.isa; }
   const UnitSpace& space() const override { return space_; }
 
   void closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
