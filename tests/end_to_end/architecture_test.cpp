@@ -23,7 +23,7 @@ const std::vector<Layer> kLayers = {
     {"pbrt_import/", {"pbrt_import/scene/"}},
     {"compress/bvh/", {"pbrt_import/scene/"}},
     {"compress/format/", {"compress/bvh/", "pbrt_import/scene/"}},
-    {"compress/bake/", {"compress/format/", "pbrt_import/scene/"}},
+    {"compress/bake/", {"compress/bvh/", "compress/format/", "pbrt_import/scene/"}},
     {"runtime/commands/", {"runtime/", "compress/format/", "compress/bake/", "pbrt_import/", "pbrt_import/scene/"}},
     {"runtime/", {"compress/bvh/", "compress/format/", "pbrt_import/scene/"}},
 };
