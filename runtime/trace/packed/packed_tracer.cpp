@@ -20,7 +20,8 @@ namespace {
 
 static_assert(sizeof(Ray) == sizeof(packed::KernelRay) && offsetof(Ray, tfar) == offsetof(packed::KernelRay, tfar) &&
               offsetof(Ray, direction) == offsetof(packed::KernelRay, direction));
-static_assert(sizeof(RayHit) == sizeof(packed::KernelHit) && offsetof(RayHit, part) == offsetof(packed::KernelHit, cluster));
+static_assert(sizeof(RayHit) == sizeof(packed::KernelHit) &&
+              offsetof(RayHit, part) == offsetof(packed::KernelHit, cluster));
 static_assert(baked::kCameraBelow == kCameraRays && baked::kOcclusionBelow == kOcclusionRays);
 
 constexpr uint32_t kNoPlace = ~0u;
@@ -75,7 +76,7 @@ TreeBox placed_box(const packed::TracePlacement& placement, const DAffine& unit_
   }
   // Rays in the grid are off by 2^-22 of the largest coordinate there, see grid_ray.h.
   const DVec3 pad(0x1p-20 * glm::max(glm::max(std::abs(centre.x) + half.x, std::abs(centre.y) + half.y),
-                                    std::abs(centre.z) + half.z));
+                                     std::abs(centre.z) + half.z));
   const DVec3 middle = transform_point(unit_from_grid, centre);
   const DVec3 reach = glm::abs(unit_from_grid[0]) * (half.x + pad.x) + glm::abs(unit_from_grid[1]) * (half.y + pad.y) +
                       glm::abs(unit_from_grid[2]) * (half.z + pad.z);
@@ -107,11 +108,11 @@ struct PackedTracer::Tables {
   std::vector<packed::TraceCluster> clusters;
   std::vector<packed::TraceTree> trees;
   std::vector<packed::TracePlacement> placements;
-  std::vector<TreeBox> boxes;            ///< of placements
-  std::vector<uint32_t> instance_of;     ///< by placement; kNoPlace: the world's
-  std::vector<uint32_t> tree_of;         ///< by geometry, or kNoPlace
-  std::vector<uint32_t> first_instance;  ///< by geometry
-  std::vector<Placement> surfaces;       ///< by instance
+  std::vector<TreeBox> boxes;           ///< of placements
+  std::vector<uint32_t> instance_of;    ///< by placement; kNoPlace: the world's
+  std::vector<uint32_t> tree_of;        ///< by geometry, or kNoPlace
+  std::vector<uint32_t> first_instance; ///< by geometry
+  std::vector<Placement> surfaces;      ///< by instance
   std::vector<packed::TopNode> top;
   packed::KernelScene scene{};
   BatchCacheOwner caches;
@@ -127,8 +128,8 @@ struct PackedTracer::Tables {
       double lo[3], hi[3];
       root_box(tree.nodes[0], lo, hi);
       for (int axis = 0; axis < 3; ++axis)
-        tree.max_coordinate =
-            std::max({tree.max_coordinate, static_cast<float>(std::abs(lo[axis])), static_cast<float>(std::abs(hi[axis]))});
+        tree.max_coordinate = std::max(
+            {tree.max_coordinate, static_cast<float>(std::abs(lo[axis])), static_cast<float>(std::abs(hi[axis]))});
     }
     trees.push_back(tree);
     if (record.geometry != baked::kWorldTree) return add(record.geometry);
@@ -288,13 +289,14 @@ HitSurface PackedTracer::resolve(const RayHit& hit) const {
 
 std::vector<ResidentPart> PackedTracer::resident() const {
   const Tables& t = *tables_;
-  return {{"file", file_.file_bytes()},
-          {"nodes", t.packed.nodes.size() * sizeof(baked::PackedNode) + t.packed.trees.size() * sizeof(baked::TreeRecord)},
-          {"cluster table", t.clusters.size() * sizeof(packed::TraceCluster)},
-          {"placements", t.placements.size() * (sizeof(packed::TracePlacement) + sizeof(TreeBox) + sizeof(uint32_t)) +
-                             t.surfaces.size() * sizeof(Placement) + t.top.size() * sizeof(packed::TopNode) +
-                             (t.tree_of.size() + t.first_instance.size()) * sizeof(uint32_t)},
-          {"batch caches", BatchCacheOwner::bytes_of_all_threads()}};
+  return {
+      {"file", file_.file_bytes()},
+      {"nodes", t.packed.nodes.size() * sizeof(baked::PackedNode) + t.packed.trees.size() * sizeof(baked::TreeRecord)},
+      {"cluster table", t.clusters.size() * sizeof(packed::TraceCluster)},
+      {"placements", t.placements.size() * (sizeof(packed::TracePlacement) + sizeof(TreeBox) + sizeof(uint32_t)) +
+                         t.surfaces.size() * sizeof(Placement) + t.top.size() * sizeof(packed::TopNode) +
+                         (t.tree_of.size() + t.first_instance.size()) * sizeof(uint32_t)},
+      {"batch caches", BatchCacheOwner::bytes_of_all_threads()}};
 }
 
 } // namespace packtrace

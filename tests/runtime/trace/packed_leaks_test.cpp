@@ -33,7 +33,10 @@ std::vector<Ray> rays_from_inside(const SceneSource& source, const UnitSpace& sp
     const DVec3 size = (corner(1) - corner(0)) * 0.01;
     ray.origin = Vec3(space.to_unit(inside) + (i % 8 < 4 ? DVec3(0.0) : size * v));
     ray.direction = Vec3(target - DVec3(ray.origin));
-    if (i % 4 == 3) ray.direction[static_cast<int>(i / 4 % 3)] = 0.0f; // parallel to a plane of axes
+    if (i % 4 == 3) { // parallel to a plane of axes
+      ray.direction[static_cast<int>(i / 4 % 3)] = 0.0f;
+      if (ray.direction == Vec3(0)) ray.direction.x = 1.0f;
+    }
     if (i % 48 == 47) ray.direction = Vec3(0, i % 96 < 48 ? 1 : -1, 0);
   }
   return rays;
