@@ -178,13 +178,12 @@ private:
     uint64_t by_child[baked::kNodeWidth];
     slots &= Lanes::Children::pass(boxes, group, rays, by_child);
     float t[baked::kNodeWidth] = {};
-    if constexpr (!kAny) Lanes::Children::enter(boxes, group, first_bit(rays), t);
+    Lanes::Children::enter(boxes, group, first_bit(rays), t);
     const uint32_t begin = size;
     for (; slots != 0; slots &= slots - 1) {
       const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
       uint32_t at = size++;
-      if constexpr (!kAny)
-        for (; at > begin && stack[at - 1].t < t[slot]; --at) stack[at] = stack[at - 1];
+      for (; at > begin && stack[at - 1].t < t[slot]; --at) stack[at] = stack[at - 1];
       stack[at] = {by_child[slot], number(slot), t[slot]};
     }
   }
