@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -190,6 +191,7 @@ Json measure_passes(const TraceInput& input, const Systems& systems, const Prima
     passes.push_back(std::move(json));
   }
   fmt::print("\n");
+  std::fflush(stdout);
   return passes;
 }
 
