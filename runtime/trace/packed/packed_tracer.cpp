@@ -24,8 +24,6 @@ static_assert(sizeof(RayHit) == sizeof(packed::KernelHit) &&
               offsetof(RayHit, part) == offsetof(packed::KernelHit, cluster));
 static_assert(baked::kCameraBelow == kCameraRays && baked::kOcclusionBelow == kOcclusionRays);
 
-constexpr uint32_t kNoPlace = ~0u;
-
 const packed::KernelRay* kernel_rays(std::span<const Ray> rays) {
   return reinterpret_cast<const packed::KernelRay*>(rays.data());
 }
@@ -104,13 +102,15 @@ void place_top(std::span<const TreeBox> boxes, packed::KernelScene& scene) {
 } // namespace
 
 struct PackedTracer::Tables {
-  PackedTrees packed;
+  PackedTrees built; ///< where the file has no trees
+  std::span<const baked::TreeRecord> records;
+  std::span<const baked::PackedNode> nodes;
   std::vector<packed::TraceCluster> clusters;
   std::vector<packed::TraceTree> trees;
   std::vector<packed::TracePlacement> placements;
   std::vector<TreeBox> boxes;           ///< of placements
-  std::vector<uint32_t> instance_of;    ///< by placement; kNoPlace: the world's
-  std::vector<uint32_t> tree_of;        ///< by geometry, or kNoPlace
+  std::vector<uint32_t> instance_of;    ///< by placement; baked::kNone: the world's
+  std::vector<uint32_t> tree_of;        ///< by geometry, or baked::kNone
   std::vector<uint32_t> first_instance; ///< by geometry
   std::vector<Placement> surfaces;      ///< by instance
   std::vector<packed::TopNode> top;
@@ -118,12 +118,12 @@ struct PackedTracer::Tables {
   BatchCacheOwner caches;
 
   void add_tree(const BakedFile& file, uint32_t number) {
-    const baked::TreeRecord& record = packed.trees[number];
+    const baked::TreeRecord& record = records[number];
     const auto add = [&](uint32_t geometry) {
       tree_of[geometry] = number;
       add_clusters(file, record, geometry);
     };
-    packed::TraceTree tree{packed.nodes.data() + record.first_node, 1.0f};
+    packed::TraceTree tree{nodes.data() + record.first_node, 1.0f};
     if (record.node_count > 0) {
       double lo[3], hi[3];
       root_box(tree.nodes[0], lo, hi);
@@ -134,7 +134,7 @@ struct PackedTracer::Tables {
     trees.push_back(tree);
     if (record.geometry != baked::kWorldTree) return add(record.geometry);
     std::vector<uint8_t> own(tree_of.size(), 0);
-    for (const baked::TreeRecord& other : packed.trees)
+    for (const baked::TreeRecord& other : records)
       if (other.geometry != baked::kWorldTree) own[other.geometry] = 1;
     for (uint32_t g = 0; g < own.size(); ++g)
       if (own[g] == 0 && file.geometries()[g].cluster_count > 0) add(g);
@@ -152,10 +152,16 @@ struct PackedTracer::Tables {
 PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa)
     : file_(file), source_(source), kernels_(kernels_of(isa)), tables_(std::make_unique<Tables>()) {
   Tables& t = *tables_;
-  t.packed = build_packed_trees(file.sections());
+  t.records = file.sections().trees;
+  t.nodes = file.sections().nodes;
+  if (t.records.empty()) {
+    t.built = build_packed_trees(file.sections());
+    t.records = t.built.trees;
+    t.nodes = t.built.nodes;
+  }
   t.clusters.resize(file.sections().clusters.size());
-  t.tree_of.assign(file.geometries().size(), kNoPlace);
-  for (uint32_t i = 0; i < t.packed.trees.size(); ++i) t.add_tree(file, i);
+  t.tree_of.assign(file.geometries().size(), baked::kNone);
+  for (uint32_t i = 0; i < t.records.size(); ++i) t.add_tree(file, i);
   place();
   t.scene.clusters = t.clusters.data();
   t.scene.trees = t.trees.data();
@@ -172,7 +178,7 @@ PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, Pac
     const auto& tracer = *static_cast<const PackedTracer*>(owner);
     const uint32_t g = tracer.geometry_of_cluster(cluster);
     const baked::GeometryRecord& geometry = tracer.file_.geometries()[g];
-    return decode_batch_exactly(tracer.tables_->packed.trees[tracer.tables_->tree_of[g]], geometry,
+    return decode_batch_exactly(tracer.tables_->records[tracer.tables_->tree_of[g]], geometry,
                                 tracer.file_.cluster(g, static_cast<uint32_t>(cluster - geometry.first_cluster)), first,
                                 count, out);
   };
@@ -180,7 +186,7 @@ PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, Pac
                        uint32_t ray_class) {
     const auto& tracer = *static_cast<const PackedTracer*>(owner);
     const uint32_t g = tracer.geometry_of_cluster(cluster), placed = tracer.tables_->instance_of[placement];
-    return surface_present(tracer.source_, placed == kNoPlace ? tracer.tables_->first_instance[g] : placed,
+    return surface_present(tracer.source_, placed == baked::kNone ? tracer.tables_->first_instance[g] : placed,
                            tracer.file_.sections().clusters[cluster].first_triangle + triangle, Vec2(u, v),
                            ray_class == kOcclusionRays);
   };
@@ -191,7 +197,7 @@ PackedTracer::~PackedTracer() = default;
 void PackedTracer::place() {
   Tables& t = *tables_;
   const std::span<const PlacedGeometry> instances = source_.instances();
-  t.first_instance.assign(file_.geometries().size(), kNoPlace);
+  t.first_instance.assign(file_.geometries().size(), baked::kNone);
   for (uint32_t i = static_cast<uint32_t>(instances.size()); i-- > 0;) t.first_instance[instances[i].geometry] = i;
   std::vector<Bounds> bounds(file_.geometries().size());
   for (size_t g = 0; g < bounds.size(); ++g) {
@@ -206,25 +212,25 @@ void PackedTracer::place() {
   bool world_placed = false;
   for (uint32_t i = 0; i < instances.size(); ++i) {
     const uint32_t tree = t.tree_of[instances[i].geometry];
-    if (tree == kNoPlace) continue;
+    if (tree == baked::kNone) continue;
     const DAffine world_from_object(instances[i].world_from_object);
     const DAffine unit_from_grid =
-        compose(compose(space_.unit_from_outer(), world_from_object), outer_from_grid(t.packed.trees[tree]));
+        compose(compose(space_.unit_from_outer(), world_from_object), outer_from_grid(t.records[tree]));
     t.surfaces[i] = instanced_placement(i, world_from_object, unit_from_grid);
     // Rays move in doubles, and only what they become in the grid is rounded.
     t.surfaces[i].moved_linear = glm::dmat3(0.0);
     t.surfaces[i].moved_offset = DVec3(0.0);
-    const bool in_world = t.packed.trees[tree].geometry == baked::kWorldTree;
+    const bool in_world = t.records[tree].geometry == baked::kWorldTree;
     if (in_world && world_placed) continue;
     world_placed |= in_world;
-    add_placement(tree, in_world ? kNoPlace : i, unit_from_grid);
+    add_placement(tree, in_world ? baked::kNone : i, unit_from_grid);
   }
 }
 
-/// @param instance or kNoPlace for the world's tree
+/// @param instance or baked::kNone for the world's tree
 void PackedTracer::add_placement(uint32_t tree, uint32_t instance, const DAffine& unit_from_grid) {
   Tables& t = *tables_;
-  if (t.packed.trees[tree].node_count == 0) return;
+  if (t.records[tree].node_count == 0) return;
   const DAffine grid_from_unit = inverse(unit_from_grid);
   if (!invertible(unit_from_grid, grid_from_unit)) return flat_instances_.push_back(instance);
   packed::TracePlacement placement{};
@@ -276,10 +282,10 @@ HitSurface PackedTracer::resolve(const RayHit& hit) const {
   surface.geometry = geometry_of_cluster(hit.part);
   surface.triangle = file_.sections().clusters[hit.part].first_triangle + hit.triangle;
   const uint32_t instance = t.instance_of[hit.placement];
-  surface.placement = &t.surfaces[instance == kNoPlace ? t.first_instance[surface.geometry] : instance];
+  surface.placement = &t.surfaces[instance == baked::kNone ? t.first_instance[surface.geometry] : instance];
   const baked::GeometryRecord& geometry = file_.geometries()[surface.geometry];
   packed::DecodedBatch batch;
-  decode_batch_exactly(t.packed.trees[t.tree_of[surface.geometry]], geometry,
+  decode_batch_exactly(t.records[t.tree_of[surface.geometry]], geometry,
                        file_.cluster(surface.geometry, static_cast<uint32_t>(hit.part - geometry.first_cluster)),
                        hit.triangle, 1, batch);
   for (int corner = 0; corner < 3; ++corner)
@@ -289,14 +295,13 @@ HitSurface PackedTracer::resolve(const RayHit& hit) const {
 
 std::vector<ResidentPart> PackedTracer::resident() const {
   const Tables& t = *tables_;
-  return {
-      {"file", file_.file_bytes()},
-      {"nodes", t.packed.nodes.size() * sizeof(baked::PackedNode) + t.packed.trees.size() * sizeof(baked::TreeRecord)},
-      {"cluster table", t.clusters.size() * sizeof(packed::TraceCluster)},
-      {"placements", t.placements.size() * (sizeof(packed::TracePlacement) + sizeof(TreeBox) + sizeof(uint32_t)) +
-                         t.surfaces.size() * sizeof(Placement) + t.top.size() * sizeof(packed::TopNode) +
-                         (t.tree_of.size() + t.first_instance.size()) * sizeof(uint32_t)},
-      {"batch caches", BatchCacheOwner::bytes_of_all_threads()}};
+  return {{"file", file_.file_bytes()},
+          {"nodes built", t.built.nodes.size() * sizeof(baked::PackedNode)},
+          {"cluster table", t.clusters.size() * sizeof(packed::TraceCluster)},
+          {"placements", t.placements.size() * (sizeof(packed::TracePlacement) + sizeof(TreeBox) + sizeof(uint32_t)) +
+                             t.surfaces.size() * sizeof(Placement) + t.top.size() * sizeof(packed::TopNode) +
+                             (t.tree_of.size() + t.first_instance.size()) * sizeof(uint32_t)},
+          {"batch caches", BatchCacheOwner::bytes_of_all_threads()}};
 }
 
 } // namespace packtrace
