@@ -136,7 +136,7 @@ struct PackedTracer::Tables {
     std::vector<uint8_t> own(tree_of.size(), 0);
     for (const baked::TreeRecord& other : records)
       if (other.geometry != baked::kWorldTree) own[other.geometry] = 1;
-    for (uint32_t g = 0; g < own.size(); ++g)
+    for (uint32_t g = 0; g < file.base_geometry_count(); ++g)
       if (own[g] == 0 && file.geometries()[g].cluster_count > 0) add(g);
   }
 
