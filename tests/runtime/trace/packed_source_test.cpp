@@ -43,7 +43,7 @@ struct Image {
 };
 
 Image render(const SceneSource& source) {
-  const EmbreeScene embree(source, {});
+  const EmbreeTracer embree(source, {});
   const PrimaryCamera camera(test::camera_at({2, 5, -10}, {0, 1, 0}), {160, 90});
   AoConfig config;
   config.radius = 4;
@@ -53,6 +53,38 @@ Image render(const SceneSource& source) {
   trace_primary(source, embree, camera, camera, image.gbuffer, progress);
   trace_ao(source, embree, image.gbuffer, config, 0, image.ao, progress);
   return image;
+}
+
+TEST(PackedSource, LooksUpManyPlacesAsItDoesOne) {
+  const Scene scene = varied_scene();
+  const BakedFile file = bake(scene);
+  const PackedSource packed(file);
+  const FloatSource floats(scene);
+  for (const SceneSource* source :
+       {static_cast<const SceneSource*>(&packed), static_cast<const SceneSource*>(&floats)}) {
+    std::vector<SurfaceQuery> places; // back and forth between clusters and instances
+    for (uint32_t n = 0; n < 5000; ++n) {
+      const auto instance = n / 3 * 7 % static_cast<uint32_t>(source->instances().size());
+      const uint32_t triangles = source->counts(source->instances()[instance].geometry).triangles;
+      places.push_back({instance, n * 37 % triangles, Vec2(0.2f, 0.01f * static_cast<float>(n % 60))});
+    }
+    std::vector<SurfaceAttributes> found(places.size());
+    source->look_up(places, found);
+    uint32_t with_normal = 0;
+    for (size_t i = 0; i < places.size(); ++i) {
+      const SurfaceQuery& place = places[i];
+      const uint32_t geometry = source->instances()[place.instance].geometry;
+      ASSERT_EQ(found[i].material, source->material_of(place.instance, place.triangle)) << i;
+      const auto normal = source->shading_normal(geometry, place.triangle, place.barycentrics);
+      ASSERT_EQ(found[i].has_normal, normal.has_value()) << i;
+      if (normal) {
+        ++with_normal;
+        ASSERT_EQ(found[i].normal, *normal) << i;
+      }
+    }
+    EXPECT_GT(with_normal, 1000u);
+    EXPECT_LT(with_normal, 4500u);
+  }
 }
 
 TEST(PackedSource, RendersTheImageOfTheFloats) {

@@ -1,0 +1,204 @@
+#include "compress/format/packed_trees.h"
+
+#include <algorithm>
+#include <limits>
+
+#include <tbb/parallel_for.h>
+
+#include "compress/bvh/wide_tree.h"
+#include "compress/format/node_writer.h"
+#include "compress/format/tree_grid.h"
+#include "compress/format/tree_validation.h"
+#include "pbrt_import/scene/error.h"
+
+namespace packtrace {
+namespace {
+
+constexpr size_t kChunkClusters = 64; // worked on by one thread
+
+/// A cluster of a tree.
+struct TreeCluster {
+  uint32_t number = 0; ///< in the cluster section
+  uint32_t geometry = 0;
+  uint8_t ray_classes = 0;
+};
+
+/// Nodes with leaves, and the boxes of all below.
+struct LeafNodes {
+  std::vector<baked::PackedNode> nodes;
+  std::vector<TreeGridBox> boxes;
+};
+
+/// Builds the leaf nodes of one cluster after the other.
+class LeafNodeBuilder {
+public:
+  LeafNodeBuilder(const BakedSections& sections, const TreeCosts& costs, const baked::TreeRecord& tree)
+      : sections_(sections), costs_(costs), tree_(tree) {}
+
+  void add(const TreeCluster& cluster, LeafNodes& out) {
+    const baked::GeometryRecord& geometry = sections_.geometries[cluster.geometry];
+    const ClusterView view(geometry, sections_.clusters[cluster.number],
+                           sections_.payload.data() + geometry.payload_offset);
+    const std::span<const TreeGridBox> boxes = triangle_boxes(view, TreeGridMap(tree_, geometry), boxes_);
+    leaf_nodes_.clear();
+    find_leaf_nodes(boxes, costs_, leaf_nodes_);
+    for (const LeafNode& leaves : leaf_nodes_) {
+      out.nodes.push_back({});
+      out.boxes.push_back(write_leaf_node(leaves, boxes, cluster.number, cluster.ray_classes, out.nodes.back()));
+    }
+  }
+
+private:
+  const BakedSections& sections_;
+  const TreeCosts& costs_;
+  const baked::TreeRecord& tree_;
+  ClusterBoxes boxes_;
+  std::vector<LeafNode> leaf_nodes_;
+};
+
+class TreeBuilder {
+public:
+  TreeBuilder(const BakedSections& sections, const TreeCosts& costs) : sections_(sections), costs_(costs) {}
+
+  PackedTrees run() {
+    placed_ = sole_identity_instances(sections_);
+    std::vector<uint32_t> world, others;
+    find_world(world, others);
+    const size_t first = world.empty() ? 0 : 1;
+    std::vector<Tree> trees(first + others.size());
+    tbb::parallel_for(size_t{0}, trees.size(), [&](size_t i) {
+      trees[i] = i < first ? build(baked::kWorldTree, world) : build(others[i - first], {&others[i - first], 1});
+    });
+    PackedTrees out;
+    for (Tree& tree : trees) {
+      tree.record.first_node = out.nodes.size();
+      out.trees.push_back(tree.record);
+      out.nodes.insert(out.nodes.end(), tree.nodes.begin(), tree.nodes.end());
+      tree = {};
+    }
+    return out;
+  }
+
+private:
+  struct Tree {
+    baked::TreeRecord record{};
+    std::vector<baked::PackedNode> nodes;
+  };
+
+  bool may_join_world(uint32_t geometry) const {
+    return (sections_.geometries[geometry].flags & baked::kWorldSpace) != 0 && placed_[geometry] != baked::kNone;
+  }
+
+  /// Sorts the geometries with clusters into those of the world's tree and those with trees of their own.
+  void find_world(std::vector<uint32_t>& world, std::vector<uint32_t>& others) const {
+    const auto& geometries = sections_.geometries;
+    uint32_t mantissa = 0;
+    int32_t coarsest = std::numeric_limits<int32_t>::min();
+    for (uint32_t i = 0; i < geometries.size(); ++i)
+      if (geometries[i].cluster_count > 0 && may_join_world(i)) {
+        if (mantissa == 0) mantissa = geometries[i].step_mantissa;
+        if (geometries[i].step_mantissa == mantissa) coarsest = std::max(coarsest, geometries[i].step_exponent);
+      }
+    for (uint32_t i = 0; i < geometries.size(); ++i)
+      if (geometries[i].cluster_count > 0) {
+        const bool joins = may_join_world(i) && geometries[i].step_mantissa == mantissa &&
+                           coarsest - geometries[i].step_exponent <= kMaxTreeStepDoublings / 2;
+        (joins ? world : others).push_back(i);
+      }
+  }
+
+  Tree build(uint32_t name, std::span<const uint32_t> geometries) const {
+    Tree tree;
+    tree.record.geometry = name;
+    std::vector<const baked::GeometryRecord*> records;
+    for (const uint32_t g : geometries) records.push_back(&sections_.geometries[g]);
+    choose_tree_grid(records, sections_.clusters, tree.record);
+    const std::vector<TreeCluster> clusters = find_clusters(geometries);
+    build_nodes(build_leaf_nodes(clusters, tree.record), tree);
+    return tree;
+  }
+
+  /// Those that some ray can hit.
+  std::vector<TreeCluster> find_clusters(std::span<const uint32_t> geometries) const {
+    std::vector<TreeCluster> clusters;
+    for (const uint32_t g : geometries) {
+      const baked::GeometryRecord& geometry = sections_.geometries[g];
+      auto next = static_cast<uint32_t>(geometry.first_cluster);
+      for (uint32_t c = 0; c < geometry.class_clusters.size(); ++c) {
+        const uint8_t classes = ray_classes_of(c);
+        const uint32_t end = next + geometry.class_clusters[c];
+        if ((classes & (baked::kCameraBelow | baked::kOcclusionBelow)) != 0)
+          for (uint32_t i = next; i < end; ++i) clusters.push_back({i, g, classes});
+        next = end;
+      }
+    }
+    return clusters;
+  }
+
+  LeafNodes build_leaf_nodes(std::span<const TreeCluster> clusters, const baked::TreeRecord& tree) const {
+    const size_t chunks = (clusters.size() + kChunkClusters - 1) / kChunkClusters;
+    std::vector<LeafNodes> of_chunk(chunks);
+    tbb::parallel_for(size_t{0}, chunks, [&](size_t i) {
+      LeafNodeBuilder builder(sections_, costs_, tree);
+      const size_t first = i * kChunkClusters, count = std::min(kChunkClusters, clusters.size() - first);
+      for (const TreeCluster& cluster : clusters.subspan(first, count)) builder.add(cluster, of_chunk[i]);
+    });
+    LeafNodes all;
+    for (LeafNodes& chunk : of_chunk) {
+      all.nodes.insert(all.nodes.end(), chunk.nodes.begin(), chunk.nodes.end());
+      all.boxes.insert(all.boxes.end(), chunk.boxes.begin(), chunk.boxes.end());
+      chunk = {};
+    }
+    return all;
+  }
+
+  static void build_nodes(const LeafNodes& leaves, Tree& tree) {
+    if (leaves.nodes.size() > uint64_t{1} << 30)
+      throw Error(ErrorKind::kLimitExceeded, "a tree has more than 2^30 nodes with leaves");
+    std::vector<TreeBox> boxes;
+    boxes.reserve(leaves.boxes.size());
+    for (const TreeGridBox& box : leaves.boxes) {
+      TreeBox& out = boxes.emplace_back();
+      for (size_t axis = 0; axis < 3; ++axis)
+        out.lo[axis] = static_cast<float>(box.lo[axis]), out.hi[axis] = static_cast<float>(box.hi[axis]);
+    }
+    const BoxTree binary = build_box_tree(boxes, baked::kMaxTreeDepth);
+    const std::vector<WideNode> wide = collapse_box_tree(binary);
+    tree.nodes.resize(wide.size());
+    std::vector<TreeGridBox> whole(wide.size());
+    for (size_t i = wide.size(); i-- > 0;) {
+      if (wide[i].child_count == 0) {
+        const uint32_t leaf = binary.order[binary.nodes[wide[i].source].first];
+        tree.nodes[i] = leaves.nodes[leaf], whole[i] = leaves.boxes[leaf];
+      } else {
+        whole[i] = write_inner_node(wide[i].first_child, wide[i].child_count, tree.nodes, whole, tree.nodes[i]);
+      }
+    }
+    tree.record.node_count = static_cast<uint32_t>(wide.size());
+    tree.record.depth = depth_of(wide);
+  }
+
+  static uint32_t depth_of(std::span<const WideNode> wide) {
+    uint32_t depth = 0;
+    std::vector<uint8_t> level(wide.size());
+    for (size_t i = 0; i < wide.size(); ++i) {
+      if (i == 0) level[i] = 1;
+      depth = std::max<uint32_t>(depth, level[i]);
+      for (uint32_t child = 0; child < wide[i].child_count; ++child)
+        level[wide[i].first_child + child] = static_cast<uint8_t>(level[i] + 1);
+    }
+    return depth;
+  }
+
+  const BakedSections& sections_;
+  const TreeCosts& costs_;
+  std::vector<uint32_t> placed_; // by geometry: sole_identity_instances()
+};
+
+} // namespace
+
+PackedTrees build_packed_trees(const BakedSections& sections, const TreeCosts& costs) {
+  return TreeBuilder(sections, costs).run();
+}
+
+} // namespace packtrace

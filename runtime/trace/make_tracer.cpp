@@ -1,0 +1,23 @@
+#include "runtime/trace/make_tracer.h"
+
+#include "pbrt_import/scene/error.h"
+#include "runtime/trace/packed/packed_tracer.h"
+
+namespace packtrace {
+
+std::unique_ptr<RayTracer> make_tracer(const SceneSource& source, const BakedFile* file, const TracerConfig& config) {
+  if (config.backend == Backend::kPacked) {
+    if (file == nullptr)
+      throw Error(ErrorKind::kUnsupported, "backend packed traces baked files only; bake the scene, or use embree");
+    return std::make_unique<PackedTracer>(*file, source);
+  }
+  return std::make_unique<EmbreeTracer>(source, config.embree);
+}
+
+uint64_t resident_bytes(const RayTracer& tracer) {
+  uint64_t bytes = 0;
+  for (const ResidentPart& part : tracer.resident()) bytes += part.bytes;
+  return bytes;
+}
+
+} // namespace packtrace
