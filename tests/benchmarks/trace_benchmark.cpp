@@ -276,7 +276,10 @@ int run(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--width", options.size.width, "pixels")->capture_default_str();
   app.add_option("--height", options.size.height, "pixels")->capture_default_str();
-  app.add_option("--threads", options.threads, "how many, one table each")->delimiter(',')->capture_default_str();
+  app.add_option("--threads", options.threads, "how many, one table each")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->capture_default_str();
   app.add_option("--repeats", options.repeats, "of which the median counts")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000));
