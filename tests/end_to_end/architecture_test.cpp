@@ -23,8 +23,9 @@ const std::vector<Layer> kLayers = {
     {"pbrt_import/", {"pbrt_import/scene/"}},
     {"compress/format/", {"pbrt_import/scene/"}},
     {"compress/bake/", {"compress/format/", "pbrt_import/scene/"}},
-    {"runtime/commands/", {"runtime/", "compress/format/", "compress/bake/", "pbrt_import/", "pbrt_import/scene/"}},
-    {"runtime/", {"compress/format/", "pbrt_import/scene/"}},
+    {"runtime/lod/", {"compress/format/", "pbrt_import/scene/"}},
+    {"runtime/commands/", {"runtime/", "runtime/lod/", "compress/format/", "compress/bake/", "pbrt_import/", "pbrt_import/scene/"}},
+    {"runtime/", {"runtime/lod/", "compress/format/", "pbrt_import/scene/"}},
 };
 
 const Layer* layer_of(const std::string& path) {
