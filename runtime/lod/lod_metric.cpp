@@ -26,7 +26,7 @@ double largest_eigenvalue(const glm::dmat3& a) {
 
 } // namespace
 
-LodView make_lod_view(DVec3 eye_world, double near_world, double fov_y_rad, double height_px, double error_px) {
+DetailView make_detail_view(DVec3 eye_world, double near_world, double fov_y_rad, double height_px, double error_px) {
   const auto require = [](bool holds, const char* what) {
     if (!holds) throw Error(ErrorKind::kUsage, std::string("view of levels of detail: ") + what);
   };

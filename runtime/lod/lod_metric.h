@@ -9,7 +9,7 @@
 namespace packtrace {
 
 /// From where detail is judged. World space.
-struct LodView {
+struct DetailView {
   DVec3 eye{0.0};
   double near = 0.0;               ///< nothing is nearer than this; above 0
   double error_per_distance = 0.0; ///< error that may be seen, as the tangent of its angle
@@ -20,7 +20,7 @@ struct LodView {
 ///   error_per_distance = error_px tan(fov_y / 2) / (height_px / 2)
 /// @param fov_y_rad full vertical field of view, in (0, pi)
 /// Throws Error(kUsage) if a value is out of range or not finite.
-LodView make_lod_view(DVec3 eye_world, double near_world, double fov_y_rad, double height_px, double error_px);
+DetailView make_detail_view(DVec3 eye_world, double near_world, double fov_y_rad, double height_px, double error_px);
 
 /// No vector becomes longer than this many times its length: the largest singular value, rounded up by 1e-7 of it
 /// (which is how well it is known where the two largest are equal); at least 1e-300.
@@ -40,7 +40,7 @@ struct InstanceMetric {
   double slack = 0.0;
 
   /// @param reach LodGeometry::reach() @param stretch of largest_stretch()
-  InstanceMetric(const LodView& view, const DAffine& world_from_object, double stretch_of_linear, double reach)
+  InstanceMetric(const DetailView& view, const DAffine& world_from_object, double stretch_of_linear, double reach)
       : x(world_from_object[0]), y(world_from_object[1]), z(world_from_object[2]),
         offset(world_from_object[3] - view.eye), stretch(stretch_of_linear), near(view.near),
         error_per_distance(view.error_per_distance),
@@ -51,7 +51,7 @@ struct InstanceMetric {
     return glm::length(world_from_object[3]) + 2.0 * stretch_of_linear * reach;
   }
   /// 2^-46 of all lengths that come up: 128 roundings, where a distance has about 20.
-  static double rounding_slack(double extent, const LodView& view) {
+  static double rounding_slack(double extent, const DetailView& view) {
     return 0x1p-46 * (extent + glm::length(view.eye));
   }
 
@@ -88,13 +88,13 @@ struct InstanceBall {
 struct BallDistance {
   double center = 0.0, slack = 0.0;
 };
-inline BallDistance ball_distance(const LodView& view, const InstanceBall& ball) {
+inline BallDistance ball_distance(const DetailView& view, const InstanceBall& ball) {
   // More slack than any group has, whatever its level.
   constexpr double kSlacks = kMaxRuntimeLodLevels + 2.0;
   return {glm::length(ball.center - view.eye), kSlacks * InstanceMetric::rounding_slack(ball.extent, view)};
 }
 
-/// @param error_per_distance LodView's, or larger for instances that may be coarser
+/// @param error_per_distance DetailView's, or larger for instances that may be coarser
 inline AllowedErrors allowed_errors(double near, double error_per_distance, const BallDistance& distance,
                                     double stretch, double radius) {
   constexpr double kDown = 1.0 - 0x1p-40, kUp = 1.0 + 0x1p-40; // the division, and s r

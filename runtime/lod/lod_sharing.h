@@ -83,7 +83,7 @@ public:
   size_t instance_count() const { return slots_.size(); }
   const SharingConfig& config() const { return config_; }
   std::span<const LodGeometry> geometries() const { return geometries_; }
-  uint32_t geometry_of_instance(uint32_t instance) const { return slots_[slot_of_instance_[instance]].geometry; }
+  uint32_t geometry_of_instance(uint32_t instance) const { return geometry_of_instance_[instance]; }
   /// Of a geometry, fine to coarse: of its levels, or with kSteps of ratios.
   std::span<const LodStep> steps(uint32_t geometry) const { return steps_[geometry]; }
 
@@ -93,8 +93,8 @@ public:
   /// @param culled a byte an instance, not 0 for those without primary visibility; or empty
   /// @param plan is overwritten; its memory is used again
   /// Throws Error(kUsage) if `culled` has another size.
-  void plan(const LodView& view, std::span<const uint8_t> culled, LodPlan& plan);
-  LodPlan plan(const LodView& view, std::span<const uint8_t> culled = {}) {
+  void plan(const DetailView& view, std::span<const uint8_t> culled, LodPlan& plan);
+  LodPlan plan(const DetailView& view, std::span<const uint8_t> culled = {}) {
     LodPlan result;
     this->plan(view, culled, result);
     return result;
@@ -102,33 +102,51 @@ public:
 
 private:
   struct Slot {
-    uint32_t instance = 0, geometry = 0;
+    uint32_t instance = 0;
     InstanceBall ball;
   };
-  /// Of one instance in this view.
-  struct Choice {
+  /// What one instance may have in a view.
+  struct Need {
     double error_per_distance = 0.0;
     AllowedErrors allowed;
     LodRange range;
+  };
+  struct Choice {
+    uint64_t own_triangles = 0; ///< of its own cut, or fewer where that does not matter
     uint32_t step = 0;
-    InstanceCategory category = InstanceCategory::kLowest; ///< kOwn or not; the rest is found later
-    uint64_t own_triangles = 0;
+    uint8_t min_level = 0, max_level = 0;
+    InstanceCategory category = InstanceCategory::kLowest;
   };
   struct Block {
     uint32_t geometry, first, last; ///< slots
+  };
+  struct Saving {
+    uint64_t triangles;
+    uint32_t slot;
   };
   /// What one geometry adds to the plan.
   struct Part {
     std::vector<PlannedBlas> blas;
     std::vector<uint64_t> passed;
+    std::vector<uint32_t> users; ///< by step
+    std::vector<uint32_t> own;   ///< slots
+    std::vector<Saving> savings; ///< by own cuts, largest first
+  };
+  struct Frame {
+    DetailView view;
+    std::span<const uint8_t> culled;
   };
 
-  InstanceMetric metric(size_t slot, const LodView& view) const;
-  Choice choose(size_t slot, const LodView& view, bool culled) const;
-  void choose_step(size_t slot, const LodView& view, Choice& choice) const;
-  void plan_geometry(uint32_t geometry, const LodView& view, LodPlan& plan);
-  uint32_t choose_provider(uint32_t geometry, const LevelHistogram& histogram, std::vector<uint32_t>& own);
-  void add_own_cuts(uint32_t geometry, const LodView& view, std::span<const uint32_t> own);
+  Need need(const Frame& frame, const LodGeometry& geometry, size_t slot) const;
+  InstanceMetric metric(const Frame& frame, const LodGeometry& geometry, size_t slot, const Need& need) const;
+  void choose_slots(const Frame& frame, const Block& block, LodPlan& plan);
+  void choose_step(const Frame& frame, uint32_t geometry, size_t slot, const Need& need, Choice& choice) const;
+  void plan_geometry(const Frame& frame, uint32_t geometry, LodPlan& plan);
+  void fill_histogram(uint32_t geometry, LevelHistogram& histogram) const;
+  void balance(uint32_t geometry);
+  void add_steps(uint32_t geometry);
+  uint32_t choose_provider(uint32_t geometry, const LevelHistogram& histogram);
+  void add_own_cuts(const Frame& frame, uint32_t geometry);
   void collect(LodPlan& plan);
 
   std::span<const LodGeometry> geometries_;
@@ -136,7 +154,7 @@ private:
   std::vector<std::vector<LodStep>> steps_;
   std::vector<Slot> slots_; ///< instances by geometry
   std::vector<DAffine> transforms_;
-  std::vector<uint32_t> slot_of_instance_;
+  std::vector<uint32_t> slot_of_instance_, geometry_of_instance_;
   std::vector<uint32_t> first_slot_; ///< of each geometry, and the end
   std::vector<Block> blocks_;
   // Of the plan being made.

@@ -17,14 +17,20 @@ enum class SharingScheme : uint8_t {
 /// Every knob of the choice of detail. Values outside the stated range (NaN included) are rejected, never clamped. With
 /// the defaults no instance is given less detail than its own cut has, anywhere.
 struct SharingConfig {
-  SharingScheme scheme = SharingScheme::kLevels;
+  SharingScheme scheme = SharingScheme::kSteps;
 
   /// kSteps: triangles of one step by those of the next. [1.01..16]
-  double step_ratio = 1.5;
+  double step_ratio = 1.25;
 
-  /// kLevels, kSteps: an instance gets a cut of its own where what it would share has more than this many times the
-  /// triangles. Infinite: never. [1..infinity]
-  double own_cut_ratio = 1.25;
+  /// kLevels, kSteps: the instances of a geometry together trace at most this many times the triangles of their own
+  /// cuts. Within that as few BLASes are built as a greedy search finds: instances that save most by it get cuts of
+  /// their own, and steps that cost least to do without are not built: their users take the next finer one.
+  /// [1..infinity]
+  double traced_ratio = 1.25;
+
+  /// kLevels, kSteps: an instance whose step has more than this many times the triangles of its own cut gets its own
+  /// cut in any case. [1..infinity]
+  double own_cut_ratio = 4.0;
 
   /// How many levels, counted from the coarsest, may be shared; instances that need finer ones have their own cuts.
   /// [0..32]
