@@ -20,7 +20,7 @@ struct SharingConfig {
   SharingScheme scheme = SharingScheme::kSteps;
 
   /// kSteps: triangles of one step by those of the next. [1.01..16]
-  double step_ratio = 1.25;
+  double step_ratio = 1.15;
 
   /// kLevels, kSteps: the instances of a geometry together trace at most this many times the triangles of their own
   /// cuts. Within that as few BLASes are built as a greedy search finds: instances that save most by it get cuts of

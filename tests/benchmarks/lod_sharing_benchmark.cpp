@@ -49,8 +49,8 @@ std::vector<Scheme> schemes() {
   };
   add("per instance", SharingScheme::kPerInstance, [](SharingConfig&) {});
   add("one provider", SharingScheme::kOneProvider, [](SharingConfig&) {});
-  for (const double step : {1.0, 1.25, 1.5})
-    for (const double ratio : {1.0, 1.25})
+  for (const double step : {1.05, 1.1, 1.15, 1.25})
+    for (const double ratio : {1.25})
      for (const double own : {4.0})
       add(fmt::format("steps {}, traced {} own {}", step, ratio, own).c_str(), step == 1.0 ? SharingScheme::kLevels : SharingScheme::kSteps, [&](SharingConfig& c) {
         if (step > 1) c.step_ratio = step;
