@@ -11,17 +11,14 @@ constexpr float kInfinite = std::numeric_limits<float>::infinity();
 
 glm::dmat3 random_rotation(Random& random) {
   DVec3 axis(0.0);
-  while (!(glm::length(axis) > 0.1))
-    axis = {random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)};
+  while (!(glm::length(axis) > 0.1)) axis = {random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)};
   axis = glm::normalize(axis);
   const double angle = random.uniform(0.0f, 6.2831853f), c = std::cos(angle), s = std::sin(angle);
   const glm::dmat3 cross(DVec3(0, axis.z, -axis.y), DVec3(-axis.z, 0, axis.x), DVec3(axis.y, -axis.x, 0));
   return c * glm::dmat3(1.0) + s * cross + (1.0 - c) * glm::outerProduct(axis, axis);
 }
 
-DAffine affine(const glm::dmat3& linear, DVec3 translation) {
-  return {linear[0], linear[1], linear[2], translation};
-}
+DAffine affine(const glm::dmat3& linear, DVec3 translation) { return {linear[0], linear[1], linear[2], translation}; }
 
 DVec3 random_point(Random& random, double half_size) {
   const auto h = static_cast<float>(half_size);

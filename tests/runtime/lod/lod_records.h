@@ -22,13 +22,13 @@ struct LodRecords {
 /// Of levels that were built, in object units.
 LodRecords records_of(const BuiltLod& built);
 
-/// A tree of groups that no mesh has: random errors and balls, each holding those below, some groups terminal. Everything
-/// that the choice of detail reads of a geometry, for tests of many shapes.
+/// A tree of groups that no mesh has: random errors and balls, each holding those below, some groups terminal.
+/// Everything that the choice of detail reads of a geometry, for tests of many shapes.
 /// @param finest groups of level 0
 LodRecords random_records(uint32_t finest, uint32_t seed);
 
-/// Random affine map: rotated, scaled up to 24 : 1 along axes that are not those of the object, sheared, and every other
-/// one mirrored.
+/// Random affine map: rotated, scaled up to 24 : 1 along axes that are not those of the object, sheared, and every
+/// other one mirrored.
 DAffine random_affine(Random& random, double translation);
 
 /// Instances of random geometries at random in a box around 0.
