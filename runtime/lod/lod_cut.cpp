@@ -9,7 +9,7 @@ LodRange lod_range(const LodGeometry& geometry, const AllowedErrors& allowed, do
                    const BallDistance& distance, double stretch) {
   const std::span<const LodLevel> levels = geometry.levels();
   LodRange range;
-  while (range.min < geometry.last_level() && levels[range.min].largest_error <= allowed.near) ++range.min;
+  range.min = first_level(geometry, allowed);
   const double radius = geometry.ball().radius;
   for (range.max = range.min; range.max < geometry.last_level(); ++range.max) {
     const LodLevel& level = levels[range.max];

@@ -15,6 +15,14 @@ struct LodRange {
   uint32_t min = 0, max = 0;
 };
 
+/// The lower end of lod_range().
+inline uint32_t first_level(const LodGeometry& geometry, const AllowedErrors& allowed) {
+  const std::span<const LodLevel> levels = geometry.levels();
+  uint32_t level = 0;
+  while (level < geometry.last_level() && levels[level].largest_error <= allowed.near) ++level;
+  return level;
+}
+
 /// From the ball around the geometry and per-level facts only, so it costs a few operations a level and holds for any
 /// transform: level l is passed over where even its largest error passes at the near side of the ball, and not exceeded
 /// where its smallest does not pass at d = |M C - eye| + s (R - 2 r), r its smallest ball's radius.

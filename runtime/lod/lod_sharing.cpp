@@ -81,7 +81,9 @@ LodSharing::Need LodSharing::need(const Frame& frame, const LodGeometry& geometr
   need.error_per_distance = frame.view.error_per_distance * (culled ? config_.culled_error_scale : 1.0);
   const auto evaluate = [&] {
     need.allowed = allowed_errors(near, need.error_per_distance, distance, ball.stretch, radius);
-    need.range = lod_range(geometry, need.allowed, near, need.error_per_distance, distance, ball.stretch);
+    need.range.min = first_level(geometry, need.allowed);
+    if (frame.ranges)
+      need.range = lod_range(geometry, need.allowed, near, need.error_per_distance, distance, ball.stretch);
   };
   evaluate();
   if (culled && config_.culled_coarser_levels > 0 && need.range.min < geometry.last_level()) {
@@ -149,12 +151,12 @@ void LodSharing::choose_slots(const Frame& frame, const Block& block, LodPlan& p
 void LodSharing::plan(const DetailView& view, std::span<const uint8_t> culled, LodPlan& plan) {
   if (!culled.empty() && culled.size() != slots_.size())
     throw Error(ErrorKind::kUsage, "not as many visibility flags as instances");
-  const Frame frame{view, culled};
+  const bool histograms = config_.scheme == SharingScheme::kOneProvider || config_.measure;
+  const Frame frame{view, culled, histograms};
   plan.blas_of_instance.resize(slots_.size());
   plan.category_of_instance.resize(slots_.size());
   plan.allowed_error_of_instance.resize(slots_.size());
   tbb::parallel_for(size_t{0}, blocks_.size(), [&](size_t b) { choose_slots(frame, blocks_[b], plan); });
-  const bool histograms = config_.scheme == SharingScheme::kOneProvider || config_.measure;
   plan.histograms.assign(histograms ? geometries_.size() : 0, {});
   tbb::parallel_for(size_t{0}, geometries_.size(),
                     [&](size_t g) { plan_geometry(frame, static_cast<uint32_t>(g), plan); });
@@ -176,7 +178,8 @@ void LodSharing::plan_geometry(const Frame& frame, uint32_t geometry, LodPlan& p
     else
       ++part.users[choices_[slot].step];
   }
-  if (config_.scheme == SharingScheme::kLevels || config_.scheme == SharingScheme::kSteps) balance(geometry);
+  const bool by_steps = config_.scheme == SharingScheme::kLevels || config_.scheme == SharingScheme::kSteps;
+  if (by_steps && config_.traced_ratio > 0.0) balance(geometry);
   add_steps(geometry);
   uint32_t provider = kNone;
   if (config_.scheme == SharingScheme::kOneProvider) provider = choose_provider(geometry, plan.histograms[geometry]);

@@ -135,6 +135,7 @@ private:
   struct Frame {
     DetailView view;
     std::span<const uint8_t> culled;
+    bool ranges; ///< ends of ranges are asked for
   };
 
   Need need(const Frame& frame, const LodGeometry& geometry, size_t slot) const;

@@ -193,6 +193,33 @@ TEST(LodSharing, TracedTrianglesStayWithinTheRatio) {
     }
 }
 
+/// Where the limit asks for own cuts, nobody goes without who would save more by one.
+TEST(LodSharing, OwnCutsGoToThoseThatSaveMost) {
+  const std::vector<LodGeometry> geometries = some_geometries(4);
+  const std::vector<LodInstance> instances = wild_instances(400, 4, 11);
+  const DetailView view = view_from(DVec3(0.0));
+  SharingConfig config;
+  config.scheme = SharingScheme::kLevels;
+  config.own_cut_ratio = 1e9;
+  config.traced_ratio = 1.05;
+  config.share_equal_cuts = false;
+  LodSharing sharing(geometries, instances, config);
+  const LodPlan plan = sharing.plan(view);
+  std::vector<uint64_t> least_of_own(4, ~uint64_t{0}), most_of_others(4);
+  for (uint32_t i = 0; i < instances.size(); ++i) {
+    const uint32_t g = instances[i].geometry;
+    const std::span<const LodStep> steps = sharing.steps(g);
+    const uint64_t shared = steps[coarsest_step(steps, plan.allowed_error_of_instance[i])].triangles;
+    const uint64_t saved = shared - size_of_cut(geometries[g], own_cut(geometries[g], instances[i], view)).triangles;
+    if (plan.category_of_instance[i] == InstanceCategory::kOwn)
+      least_of_own[g] = std::min(least_of_own[g], saved);
+    else
+      most_of_others[g] = std::max(most_of_others[g], saved);
+  }
+  EXPECT_GT(plan.category_counts[static_cast<size_t>(InstanceCategory::kOwn)], 5u);
+  for (size_t g = 0; g < 4; ++g) EXPECT_GE(least_of_own[g], most_of_others[g]);
+}
+
 TEST(LodSharing, SharesMoreTheMoreMayBeTraced) {
   const std::vector<LodGeometry> geometries = some_geometries(5);
   const std::vector<LodInstance> instances = test::random_instances(3000, 5, 100.0, 2.0, 1);
