@@ -25,9 +25,11 @@ const std::vector<Layer> kLayers = {
     {"compress/format/", {"compress/bvh/", "pbrt_import/scene/"}},
     {"compress/bake/", {"compress/bvh/", "compress/format/", "pbrt_import/scene/"}},
     {"compress/exchange/", {"compress/format/", "pbrt_import/scene/"}},
+    {"runtime/lod/", {"compress/format/", "pbrt_import/scene/"}},
     {"runtime/commands/",
-     {"runtime/", "compress/format/", "compress/bake/", "compress/exchange/", "pbrt_import/", "pbrt_import/scene/"}},
-    {"runtime/", {"compress/bvh/", "compress/format/", "pbrt_import/scene/"}},
+     {"runtime/", "runtime/lod/", "compress/format/", "compress/bake/", "compress/exchange/", "pbrt_import/",
+      "pbrt_import/scene/"}},
+    {"runtime/", {"runtime/lod/", "compress/bvh/", "compress/format/", "pbrt_import/scene/"}},
 };
 
 const Layer* layer_of(const std::string& path) {
