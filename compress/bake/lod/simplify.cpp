@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "compress/bake/lod/quadric.h"
 #include "compress/bake/weld_table.h"
@@ -38,6 +39,8 @@ public:
     m_.stands_for.resize(m_.points.size());
     for (uint32_t i = 0; i < m_.stands_for.size(); ++i) m_.stands_for[i] = i;
     live_ = m_.triangles.size();
+    m_.source.resize(live_);
+    std::iota(m_.source.begin(), m_.source.end(), 0u);
     for (const DVec3& p : m_.points) lo_ = glm::min(lo_, p), hi_ = glm::max(hi_, p);
     if (live_ <= config_.target_triangles) return;
     link_corners();
@@ -380,9 +383,11 @@ private:
       if (alive_[i] == 0) continue;
       LodTriangle t = m_.triangles[i];
       for (int corner = 0; corner < 3; ++corner) t.wedges[corner] = wedge_root(t.wedges[corner]);
+      m_.source[kept] = static_cast<uint32_t>(i);
       m_.triangles[kept++] = t;
     }
     m_.triangles.resize(kept);
+    m_.source.resize(kept);
   }
 
   SimplifyMesh& m_;

@@ -32,6 +32,7 @@ struct SimplifyMesh {
   std::vector<LodTriangle> triangles;
   std::vector<uint8_t> moved;       ///< result, per point
   std::vector<uint32_t> stands_for; ///< result, per point: the one that it became
+  std::vector<uint32_t> source;     ///< result, per triangle: its number before
 };
 
 struct SimplifyConfig {
