@@ -14,6 +14,7 @@ namespace {
 constexpr double kSeen = 0.02;       // of a new triangle's area may be met by no old one
 constexpr double kInflation = 1.001; // of what was measured, for all roundings
 constexpr double kFine = 0.5;        // steps; distances below need no work
+constexpr double kSlack = 1.1;       // how much larger than it must be the error of a group may be stated to save work
 
 using Corners = std::array<DVec3, 3>;
 
@@ -55,8 +56,10 @@ private:
     largest_ = std::max(largest_, errors_[after]);
   }
 
-  /// A group is as far off as its worst part: what is no worse needs no closer look.
-  bool enough(double distance, double had) const { return distance <= kFine || stated(distance, had) <= largest_; }
+  /// A group is as far off as its worst part: what is hardly worse needs no closer look.
+  bool enough(double distance, double had) const {
+    return distance <= kFine || stated(distance, had) <= std::max(largest_, kSlack * proven_);
+  }
 
   void find_unchanged() {
     for (uint32_t s = 0; s < errors_.size(); ++s) {
@@ -86,7 +89,7 @@ private:
   /// The worst first: what they really are leaves most others as they are.
   void settle() {
     std::make_heap(laid_.begin(), laid_.end());
-    while (!laid_.empty() && laid_.front().stated > largest_) {
+    while (!laid_.empty() && laid_.front().stated > std::max(largest_, kSlack * proven_)) {
       std::pop_heap(laid_.begin(), laid_.end());
       const uint32_t t = laid_.back().triangle;
       laid_.pop_back();
@@ -130,29 +133,24 @@ private:
   void measure_harder(uint32_t t, double bound) {
     const Corners p = before_.corners(t);
     if (after_.candidates().empty()) after_.gather_all(); // all that its corners became part of is gone
-    DVec3 facing(0.0);
-    for (const uint32_t s : after_.candidates()) facing += after_.surface().area_normal(s);
-    after_.widen();
-    std::swap(best_, second_);
-    best_.clear();
-    if (const bool covered = after_.lay(p, facing, best_); covered) {
-      const double distance = look_closer(after_, t);
+    for (const bool wider : {false, true}) {
+      if (wider) {
+        if (enough(bound, had(t))) return accept(t);
+        prove(p, had(t));
+        if (enough(bound, had(t))) return accept(t);
+        after_.widen();
+      }
+      DVec3 facing(0.0);
+      for (const uint32_t s : after_.candidates()) facing += after_.surface().area_normal(s);
+      std::swap(best_, second_);
+      best_.clear();
+      const double distance =
+          after_.lay(p, facing, best_) ? look_closer(after_, t) : std::numeric_limits<double>::infinity();
       if (distance < bound)
         bound = distance;
       else
         std::swap(best_, second_);
-    } else {
-      std::swap(best_, second_);
     }
-    if (enough(bound, had(t))) return accept(t);
-    // It is not below this, as far as the candidates go.
-    double least = 0.0;
-    for (const DVec3& corner : p) {
-      double nearest = std::numeric_limits<double>::infinity();
-      for (const uint32_t s : after_.candidates()) nearest = std::min(nearest, after_.surface().distance(corner, s));
-      if (!after_.candidates().empty()) least = std::max(least, nearest);
-    }
-    largest_ = std::max(largest_, stated(least, had(t)));
     if (enough(bound, had(t))) return accept(t);
     refined_.clear();
     const double refined = refiner_.run(
@@ -162,6 +160,15 @@ private:
         });
     if (refined < bound) std::swap(best_, refined_);
     accept(t);
+  }
+
+  /// Its corners are this far from what it is measured against: as far as the candidates go, no error can be below.
+  void prove(const Corners& triangle, double had) {
+    for (const DVec3& corner : triangle) {
+      double nearest = std::numeric_limits<double>::infinity();
+      for (const uint32_t s : after_.candidates()) nearest = std::min(nearest, after_.surface().distance(corner, s));
+      if (!after_.candidates().empty()) proven_ = std::max(proven_, stated(nearest, had));
+    }
   }
 
   /// A triangle after of which the ones before saw too little: it is measured itself.
@@ -195,7 +202,8 @@ private:
   std::vector<uint32_t> not_covered_;
   std::vector<OverlayPiece> best_, second_, refined_; ///< of the triangle at hand
   TriangleRefiner refiner_;
-  double largest_ = 0.0; ///< the group's error is at least this
+  double largest_ = 0.0; ///< the group's error is at least this, as noted
+  double proven_ = 0.0;  ///< some triangle's error cannot be below, as far as its candidates go
 };
 
 } // namespace

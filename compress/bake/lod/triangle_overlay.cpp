@@ -8,8 +8,43 @@
 namespace packtrace {
 namespace {
 
-constexpr double kCovered = 1e-6; // of the triangle's area may be left over: roundings
-constexpr double kSteep = 0.05;   // cosine; what is steeper is not seen from there
+constexpr double kSteep = 0.05; // cosine; what is steeper is not seen from there
+static_assert(sizeof(DVec3) == 3 * sizeof(double));
+
+OverlayKernel pick_kernel() {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx2")) return avx2::overlay_kernel;
+#endif
+  return overlay_kernel;
+}
+
+/// Slopes of the coordinates along one axis.
+OverlayPoint slopes(double l1, double l2, double height) { return {-(l1 + l2), l1, l2, height}; }
+
+/// A convex part of a triangle of the surface, in coordinates of the one laid over it. Six corners, or nine where
+/// roundings bend it.
+struct Polygon {
+  std::array<OverlayPoint, 9> corners;
+  size_t count;
+};
+
+double coordinate(const OverlayPoint& p, int i) { return i == 0 ? p.l0 : i == 1 ? p.l1 : p.l2; }
+
+/// Keeps where a coordinate is not negative.
+Polygon cut(const Polygon& in, int i) {
+  Polygon out{{}, 0};
+  for (size_t k = 0; k < in.count; ++k) {
+    const OverlayPoint &p = in.corners[k == 0 ? in.count - 1 : k - 1], &q = in.corners[k];
+    const double last = coordinate(p, i), next = coordinate(q, i);
+    if ((last < 0.0) != (next < 0.0)) {
+      const double t = last / (last - next);
+      out.corners[out.count++] = {p.l0 + t * (q.l0 - p.l0), p.l1 + t * (q.l1 - p.l1), p.l2 + t * (q.l2 - p.l2),
+                                  p.height + t * (q.height - p.height)};
+    }
+    if (next >= 0.0) out.corners[out.count++] = q;
+  }
+  return out;
+}
 
 } // namespace
 
@@ -22,110 +57,63 @@ double OverlaySurface::distance(DVec3 p, uint32_t triangle) const {
   return glm::length(p - nearest_point(p, corner(triangle, 0), corner(triangle, 1), corner(triangle, 2)));
 }
 
+Overlay::Overlay(const OverlaySurface& surface)
+    : surface_(surface), projected_(surface.points.size()), outside_(surface.points.size()),
+      stamps_(surface.points.size()) {
+  corners_.reserve(3 * surface.triangles.size());
+  for (const LodTriangle& t : surface.triangles)
+    for (int i = 0; i < 3; ++i) corners_.push_back(t.points[i]);
+  task_.corners = corners_.data();
+  task_.projected = projected_.data();
+  task_.outside = outside_.data();
+  task_.stamps = stamps_.data();
+}
+
 bool Overlay::lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::span<const uint32_t> candidates,
                   std::vector<OverlayPiece>& pieces) {
+  static const OverlayKernel kernel = pick_kernel();
   const double length = glm::length(direction);
-  if (!(length > 0.0)) return false;
+  if (!(length > 0.0) || candidates.empty()) return false;
   const DVec3 z = direction / length;
-  const DVec3 e1 = triangle[1] - triangle[0], e2 = triangle[2] - triangle[0], normal = glm::cross(e1, e2);
-  const double seen = glm::dot(normal, z);
-  if (!(std::abs(seen) > kSteep * glm::length(normal))) return false;
-  // p = triangle[0] + l1 e1 + l2 e2 + height z
   triangle_ = triangle, direction_ = z;
-  to_l1_ = glm::cross(e2, z) / seen, to_l2_ = glm::cross(z, e1) / seen, to_height_ = normal / seen;
-  side_ = seen > 0.0 ? 1.0 : -1.0;
-  ++stamp_value_;
+  const DVec3 normal = glm::cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
+  double seen = glm::dot(normal, z);
+  if (!(std::abs(seen) > kSteep * glm::length(normal))) return false;
+  if (seen < 0.0) std::swap(triangle_[1], triangle_[2]), seen = -seen; // it is seen from behind
+  const DVec3 e1 = triangle_[1] - triangle_[0], e2 = triangle_[2] - triangle_[0];
+  // p = triangle_[0] + l1 e1 + l2 e2 + height z
+  const double scale = 1.0 / seen;
+  const DVec3 l1 = glm::cross(e2, z) * scale, l2 = glm::cross(z, e1) * scale, height = glm::cross(e1, e2) * scale;
+  task_.points = &surface_.points[0].x;
+  for (int axis = 0; axis < 3; ++axis) task_.origin[axis] = triangle_[0][axis];
+  task_.from_x = slopes(l1.x, l2.x, height.x);
+  task_.from_y = slopes(l1.y, l2.y, height.y);
+  task_.from_z = slopes(l1.z, l2.z, height.z);
+  ++task_.stamp;
 
   const size_t first = pieces.size();
+  pieces.resize(first + candidates.size());
   double covered = 0.0;
-  for (size_t i = 0; i < candidates.size() && covered < 1.0 - kCovered; ++i) {
-    double facing = 0.0;
-    const double area = cut_out(candidates[i], polygon_, facing);
-    if (!(area > 0.0)) continue;
-    double height = 0.0;
-    for (size_t k = 0; k < polygon_.count; ++k) height = std::max(height, std::abs(polygon_.corners[k].height));
-    pieces.push_back({candidates[i], height, area / facing});
-    covered += area;
-  }
-  if (covered >= 1.0 - kCovered && covered <= 1.0 + kCovered) return true;
-  pieces.resize(first);
-  return false;
+  const uint32_t count =
+      kernel(task_, candidates.data(), static_cast<uint32_t>(candidates.size()), pieces.data() + first, &covered);
+  const bool once = covered >= 1.0 - kOverlayCovered && covered <= 1.0 + kOverlayCovered;
+  pieces.resize(first + (once ? count : 0));
+  return once;
 }
 
-const Overlay::Projected& Overlay::project(uint32_t point) {
-  Projected& p = projected_[point];
-  if (stamp_[point] == stamp_value_) return p;
-  stamp_[point] = stamp_value_;
-  const DVec3 d = surface_.points[point] - triangle_[0];
-  p.corner = {glm::dot(d, to_l1_), glm::dot(d, to_l2_), glm::dot(d, to_height_)};
-  const double l0 = p.corner.l(0);
-  p.outside = static_cast<uint32_t>(l0 <= 0.0) | static_cast<uint32_t>(p.corner.l1 <= 0.0) << 1 |
-              static_cast<uint32_t>(p.corner.l2 <= 0.0) << 2;
-  p.beyond = static_cast<uint32_t>(l0 < 0.0) | static_cast<uint32_t>(p.corner.l1 < 0.0) << 1 |
-             static_cast<uint32_t>(p.corner.l2 < 0.0) << 2;
-  return p;
-}
-
-/// The part of a triangle of the surface that lies over the one at hand. Returns twice its area, where twice the area of
-/// the latter is 1; facing becomes that of the whole triangle.
-double Overlay::cut_out(uint32_t triangle, Polygon& polygon, double& facing) {
-  const Triangle& points = surface_.triangles[triangle].points;
-  const Projected &a = project(points.x), &b = project(points.y), &c = project(points.z);
-  if ((a.outside & b.outside & c.outside) != 0) return 0.0;
-  facing = side_ * ((b.corner.l1 - a.corner.l1) * (c.corner.l2 - a.corner.l2) -
-                    (b.corner.l2 - a.corner.l2) * (c.corner.l1 - a.corner.l1));
-  if (!(facing > 0.0)) return 0.0;
-  polygon.corners[0] = a.corner, polygon.corners[1] = b.corner, polygon.corners[2] = c.corner;
-  polygon.count = 3;
-  const uint32_t cuts = a.beyond | b.beyond | c.beyond;
-  if (cuts == 0) return facing;
-  for (size_t i = 0; i < 3; ++i)
-    if ((cuts & (1u << i)) != 0) {
-      cut(polygon, i);
-      if (polygon.count < 3) return 0.0;
-    }
-  double sum = 0.0;
-  const Corner& o = polygon.corners[0];
-  for (size_t i = 2; i < polygon.count; ++i) {
-    const Corner &p = polygon.corners[i - 1], &q = polygon.corners[i];
-    sum += (p.l1 - o.l1) * (q.l2 - o.l2) - (p.l2 - o.l2) * (q.l1 - o.l1);
-  }
-  return side_ * sum;
-}
-
-/// Keeps where the coordinate is not negative.
-void Overlay::cut(Polygon& polygon, size_t coordinate) {
-  const size_t count = polygon.count;
-  std::array<Corner, kMaxCorners> in;
-  std::copy_n(polygon.corners.begin(), count, in.begin());
-  size_t out = 0;
-  Corner p = in[count - 1];
-  double last = p.l(coordinate);
-  for (size_t i = 0; i < count; ++i) {
-    const Corner& q = in[i];
-    const double next = q.l(coordinate);
-    if ((last < 0.0) != (next < 0.0)) {
-      const double t = last / (last - next);
-      polygon.corners[out++] = {p.l1 + t * (q.l1 - p.l1), p.l2 + t * (q.l2 - p.l2),
-                                p.height + t * (q.height - p.height)};
-    }
-    if (next >= 0.0) polygon.corners[out++] = q;
-    p = q, last = next;
-  }
-  polygon.count = out;
-}
-
-double Overlay::nearest_distance(const OverlayPiece& piece) {
-  double facing = 0.0, largest = 0.0;
-  cut_out(piece.triangle, polygon_, facing);
+double Overlay::nearest_distance(const OverlayPiece& piece) const {
+  const uint32_t* points = &corners_[size_t{3} * piece.triangle];
+  Polygon polygon{{projected_[points[0]], projected_[points[1]], projected_[points[2]]}, 3};
+  for (int i = 0; i < 3; ++i) polygon = cut(polygon, i);
   const DVec3 e1 = triangle_[1] - triangle_[0], e2 = triangle_[2] - triangle_[0];
-  for (size_t i = 0; i < polygon_.count; ++i) {
-    const Corner& c = polygon_.corners[i];
+  double largest = 0.0;
+  for (size_t i = 0; i < polygon.count; ++i) {
+    const OverlayPoint& c = polygon.corners[i];
     const DVec3 on = triangle_[0] + c.l1 * e1 + c.l2 * e2, over = on + c.height * direction_;
     largest = std::max({largest, surface_.distance(on, piece.triangle),
                         glm::length(over - nearest_point(over, triangle_[0], triangle_[1], triangle_[2]))});
   }
-  return std::min(largest, piece.distance);
+  return polygon.count < 3 ? piece.distance : std::min(largest, piece.distance);
 }
 
 } // namespace packtrace
