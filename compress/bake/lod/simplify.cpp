@@ -5,11 +5,11 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "compress/bake/lod/edge_heap.h"
 #include "compress/bake/lod/edge_placement_body.h"
 #include "compress/bake/lod/quadric.h"
-#include "compress/bake/weld_table.h"
 
 namespace packtrace {
 namespace {
@@ -126,21 +126,24 @@ private:
   void find_edges() {
     std::vector<EdgeUse> uses;
     uses.reserve(m_.triangles.size() * 2);
-    WeldTable table(3 * m_.triangles.size());
+    std::vector<uint32_t> first(m_.points.size(), kNone), next; // lists of uses by their lower point
+    next.reserve(m_.triangles.size() * 2);
     side_edge_.resize(3 * m_.triangles.size());
     for (uint32_t i = 0; i < m_.triangles.size(); ++i) {
       const Triangle& t = m_.triangles[i].points;
       for (uint32_t corner = 0; corner < 3; ++corner) {
         const uint32_t p = t[static_cast<int>(corner)], q = t[static_cast<int>((corner + 1) % 3)];
         const uint32_t a = std::min(p, q), b = std::max(p, q);
-        const auto next = static_cast<uint32_t>(uses.size());
-        const uint32_t found = table.find_or_add(
-            mix_words(a, b), next, [&](uint32_t other) { return uses[other].a == a && uses[other].b == b; });
-        side_edge_[3 * i + corner] = found;
-        if (found == next)
+        uint32_t found = first[a];
+        while (found != kNone && uses[found].b != b) found = next[found];
+        if (found == kNone) {
+          found = static_cast<uint32_t>(uses.size());
           uses.push_back({a, b, 1, i, false, false});
-        else
+          next.push_back(std::exchange(first[a], found));
+        } else {
           join(uses[found], i);
+        }
+        side_edge_[3 * i + corner] = found;
       }
     }
     add_triangle_planes();
@@ -239,7 +242,7 @@ private:
       for (size_t lane = 0; lane < count; ++lane) {
         edges_[movable[first + lane]].placement = {
             {batch_.point[0][lane], batch_.point[1][lane], batch_.point[2][lane]}, batch_.cost[lane], batch_.along[lane]};
-        heap_.add({batch_.cost[lane], movable[first + lane]});
+        heap_.add(batch_.cost[lane], movable[first + lane]);
       }
     }
     heap_.sort();
@@ -247,7 +250,7 @@ private:
 
   void drain_heap() {
     while (live_ > config_.target_triangles && !heap_.empty()) {
-      const uint32_t edge = heap_.top().edge;
+      const uint32_t edge = heap_.top();
       Edge& e = edges_[edge];
       const uint32_t a = root(e.a), b = root(e.b);
       if (same_edge_[edge] != edge || a == b || (m_.locked[a] && m_.locked[b])) {
@@ -258,10 +261,7 @@ private:
       if (e.stamp != stamp_[a] + stamp_[b]) {
         e.stamp = stamp_[a] + stamp_[b];
         place(a, b, e.placement);
-        if (!heap_.stays_top(e.placement.cost)) {
-          heap_.replace_top({e.placement.cost, edge});
-          continue;
-        }
+        if (!heap_.change_top(e.placement.cost)) continue;
       }
       heap_.pop();
       try_collapse(a, b, e.placement, edge);
@@ -275,7 +275,7 @@ private:
       if (same_edge_[edge] != edge || a == b || (m_.locked[a] && m_.locked[b])) continue;
       e.stamp = stamp_[a] + stamp_[b];
       place(a, b, e.placement);
-      heap_.add({e.placement.cost, edge});
+      heap_.add(e.placement.cost, edge);
     }
     rejected_.clear();
     heap_.sort();

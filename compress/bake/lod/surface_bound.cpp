@@ -132,64 +132,76 @@ private:
   /// @param bound of best_
   void measure_harder(uint32_t t, double bound) {
     const Corners p = before_.corners(t);
-    if (after_.candidates().empty()) after_.gather_all(); // all that its corners became part of is gone
-    for (const bool wider : {false, true}) {
-      if (wider) {
-        if (enough(bound, had(t))) return accept(t);
-        prove(p, had(t));
-        if (enough(bound, had(t))) return accept(t);
-        after_.widen();
-      }
-      DVec3 facing(0.0);
-      for (const uint32_t s : after_.candidates()) facing += after_.surface().area_normal(s);
-      std::swap(best_, second_);
-      best_.clear();
-      const double distance =
-          after_.lay(p, facing, best_) ? look_closer(after_, t) : std::numeric_limits<double>::infinity();
-      if (distance < bound)
-        bound = distance;
-      else
-        std::swap(best_, second_);
-    }
+    if (after_.candidates().empty()) after_.gather_near(p[0]); // a line that hung together with nothing
+    look_along_facing(t, bound);
     if (enough(bound, had(t))) return accept(t);
-    refined_.clear();
-    const double refined = refiner_.run(
-        p, after_, [&](double distance, uint32_t) { return enough(distance, had(t)); },
-        [&](uint32_t s, double distance) {
-          refined_.push_back({s, distance, 0.0});
-        });
-    if (refined < bound) std::swap(best_, refined_);
+    after_.widen();
+    look_along_facing(t, bound);
+    if (enough(bound, had(t))) return accept(t);
+    // It is not below this, as far as the candidates go.
+    const double before = proven_, least = stated(farthest_corner(p), had(t));
+    proven_ = std::max(proven_, least);
+    if (!enough(bound, had(t))) {
+      refined_.clear();
+      const double refined = refiner_.run(
+          p, after_, [&](double distance, uint32_t) { return enough(distance, had(t)); },
+          [&](uint32_t s, double distance) {
+            refined_.push_back({s, distance, 0.0});
+          });
+      if (refined < bound) std::swap(best_, refined_), bound = refined;
+    }
+    proven_ = std::max(before, std::min(least, stated(bound, had(t))));
     accept(t);
   }
 
-  /// Its corners are this far from what it is measured against: as far as the candidates go, no error can be below.
-  void prove(const Corners& triangle, double had) {
+  /// Keeps the better of best_ and what is seen from where the candidates face.
+  void look_along_facing(uint32_t t, double& bound) {
+    DVec3 facing(0.0);
+    for (const uint32_t s : after_.candidates()) facing += after_.surface().area_normal(s);
+    std::swap(best_, second_);
+    best_.clear();
+    if (after_.lay(before_.corners(t), facing, best_))
+      if (const double distance = look_closer(after_, t); distance < bound) {
+        bound = distance;
+        return;
+      }
+    std::swap(best_, second_);
+  }
+
+  /// The distance of the corner that is farthest from all candidates.
+  double farthest_corner(const Corners& triangle) const {
+    double farthest = 0.0;
     for (const DVec3& corner : triangle) {
       double nearest = std::numeric_limits<double>::infinity();
       for (const uint32_t s : after_.candidates()) nearest = std::min(nearest, after_.surface().distance(corner, s));
-      if (!after_.candidates().empty()) proven_ = std::max(proven_, stated(nearest, had));
+      farthest = std::max(farthest, nearest);
     }
+    return after_.candidates().empty() ? 0.0 : farthest;
   }
 
   /// A triangle after of which the ones before saw too little: it is measured itself.
   void lay_over_before(uint32_t s) {
     before_.gather(after_.corner_points(s));
     const Corners p = after_.corners(s);
-    best_.clear();
-    if (before_.lay(p, after_.surface().area_normal(s), best_)) {
-      bool fine = true;
-      for (OverlayPiece& piece : best_) {
-        if (!enough(piece.distance, had(piece.triangle))) piece.distance = before_.overlay().nearest_distance(piece);
-        fine = fine && enough(piece.distance, had(piece.triangle));
-      }
-      if (fine) {
-        for (const OverlayPiece& piece : best_) note(s, piece.distance, had(piece.triangle));
-        return;
-      }
-    }
+    if (fits_over_before(s)) return;
+    before_.widen();
+    if (fits_over_before(s)) return;
     refiner_.run(
         p, before_, [&](double distance, uint32_t t) { return enough(distance, had(t)); },
         [&](uint32_t t, double distance) { note(s, distance, had(t)); });
+  }
+
+  /// Notes the distances where they are small enough.
+  bool fits_over_before(uint32_t s) {
+    best_.clear();
+    if (!before_.lay(after_.corners(s), after_.surface().area_normal(s), best_)) return false;
+    for (OverlayPiece& piece : best_)
+      if (!enough(piece.distance, had(piece.triangle))) {
+        piece.distance = before_.overlay().nearest_distance(piece);
+        if (!enough(piece.distance, had(piece.triangle))) return false;
+      }
+    for (const OverlayPiece& piece : best_) note(s, piece.distance, had(piece.triangle));
+    return true;
   }
 
   SimplifyMesh& m_;

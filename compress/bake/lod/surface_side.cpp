@@ -1,5 +1,6 @@
 #include "compress/bake/lod/surface_side.h"
 
+#include <algorithm>
 #include <numeric>
 
 namespace packtrace {
@@ -59,9 +60,16 @@ void SurfaceSide::widen() {
         for (const uint32_t t : around) add(t);
 }
 
-void SurfaceSide::gather_all() {
-  candidates_.resize(corner_points_.size());
-  std::iota(candidates_.begin(), candidates_.end(), 0u);
+void SurfaceSide::gather_near(DVec3 point) {
+  constexpr size_t kTried = 16;
+  std::vector<std::pair<double, uint32_t>> near(corner_points_.size());
+  for (uint32_t t = 0; t < near.size(); ++t) {
+    const DVec3 d = surface_.corner(t, 0) - point;
+    near[t] = {glm::dot(d, d), t};
+  }
+  const size_t count = std::min(near.size(), kTried);
+  std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(count), near.end());
+  for (size_t i = 0; i < count; ++i) add(near[i].second);
 }
 
 } // namespace packtrace

@@ -33,7 +33,7 @@ public:
   std::span<const uint32_t> candidates() const { return candidates_; }
   void gather(const Triangle& corners); ///< those around three points
   void widen();                         ///< one ring more
-  void gather_all();
+  void gather_near(DVec3 point);        ///< a few more: those with corners near it
   bool lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::vector<OverlayPiece>& pieces) {
     return overlay_.lay(triangle, direction, candidates_, pieces);
   }

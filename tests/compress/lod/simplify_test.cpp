@@ -126,20 +126,20 @@ TEST(LoosePieces, GoNearestFirstAndCountTheirDistance) {
     mesh.triangles.push_back({Triangle(first, first + 1, first + 2), Triangle(Wedge::kNone), 0, 0.0});
   }
   mesh.locked.assign(mesh.points.size(), 0);
-  drop_loose_pieces(mesh, 3);
+  drop_loose_pieces(mesh, {3, 3});
   ASSERT_EQ(mesh.triangles.size(), 3u);
   double largest = 0.0;
   for (const LodTriangle& t : mesh.triangles) largest = std::max(largest, t.error);
   EXPECT_GE(largest, 10.0);
   EXPECT_LE(largest, 31.0);
-  drop_loose_pieces(mesh, 0);
+  drop_loose_pieces(mesh, {});
   EXPECT_EQ(mesh.triangles.size(), 1u);
 }
 
 TEST(LoosePieces, LockedOnesStay) {
   SimplifyMesh mesh = whole_number_mesh(tetrahedra_mesh(20, 9), 1e5);
   for (size_t i = 0; i < mesh.locked.size(); i += 4) mesh.locked[i] = 1;
-  drop_loose_pieces(mesh, 0);
+  drop_loose_pieces(mesh, {});
   EXPECT_EQ(mesh.triangles.size(), 80u);
 }
 
