@@ -169,14 +169,17 @@ private:
   }
 
   /// The distance of the corner that is farthest from all candidates.
-  double farthest_corner(const Corners& triangle) const {
+  double farthest_corner(const Corners& triangle) {
+    set_.clear();
+    for (const uint32_t s : after_.candidates()) set_.add(after_.surface(), s);
     double farthest = 0.0;
     for (const DVec3& corner : triangle) {
-      double nearest = std::numeric_limits<double>::infinity();
-      for (const uint32_t s : after_.candidates()) nearest = std::min(nearest, after_.surface().distance(corner, s));
-      farthest = std::max(farthest, nearest);
+      set_.distances(corner, distances_);
+      if (!set_.empty())
+        farthest = std::max(farthest, *std::min_element(distances_.begin(),
+                                                        distances_.begin() + static_cast<std::ptrdiff_t>(set_.size())));
     }
-    return after_.candidates().empty() ? 0.0 : farthest;
+    return farthest;
   }
 
   /// A triangle after of which the ones before saw too little: it is measured itself.
@@ -214,6 +217,8 @@ private:
   std::vector<uint32_t> not_covered_;
   std::vector<OverlayPiece> best_, second_, refined_; ///< of the triangle at hand
   TriangleRefiner refiner_;
+  TriangleSet set_;
+  std::vector<double> distances_;
   double largest_ = 0.0; ///< the group's error is at least this, as noted
   double proven_ = 0.0;  ///< some triangle's error cannot be below, as far as its candidates go
 };

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "compress/bake/lod/surface_side.h"
+#include "compress/bake/lod/triangle_set.h"
 
 namespace packtrace {
 
@@ -21,9 +22,10 @@ public:
   double run(const std::array<DVec3, 3>& triangle, const SurfaceSide& side, const Enough& enough, const Noted& noted) {
     largest_ = side.candidates().empty() ? std::numeric_limits<double>::infinity() : 0.0;
     Level& top = levels_[0];
-    top.among.assign(side.candidates().begin(), side.candidates().end());
-    for (size_t k = 0; k < 3; ++k) top.points[k] = triangle[k], measure(side.surface(), top, k);
-    cut(0, {0, 1, 2}, side.surface(), enough, noted);
+    top.among.clear();
+    for (const uint32_t t : side.candidates()) top.among.add(side.surface(), t);
+    for (size_t k = 0; k < 3; ++k) top.points[k] = triangle[k], top.among.distances(triangle[k], top.distances[k]);
+    cut(0, {0, 1, 2}, enough, noted);
     return largest_;
   }
 
@@ -33,19 +35,13 @@ private:
 
   /// What a triangle is cut into: its corners and the middles of its sides, with their distances.
   struct Level {
-    std::vector<uint32_t> among;
+    TriangleSet among;
     std::array<DVec3, 6> points;
     std::array<std::vector<double>, 6> distances; ///< of each point from each of `among`
   };
 
-  static void measure(const OverlaySurface& surface, Level& level, size_t point) {
-    level.distances[point].clear();
-    for (const uint32_t t : level.among) level.distances[point].push_back(surface.distance(level.points[point], t));
-  }
-
   template <typename Enough, typename Noted>
-  void cut(size_t depth, const std::array<size_t, 3>& corners, const OverlaySurface& surface, const Enough& enough,
-           const Noted& noted) {
+  void cut(size_t depth, const std::array<size_t, 3>& corners, const Enough& enough, const Noted& noted) {
     const Level& level = levels_[depth];
     if (level.among.empty()) return;
     constexpr double kFar = std::numeric_limits<double>::infinity();
@@ -61,21 +57,21 @@ private:
       if (largest < best) best = largest, where = i;
     }
     const double good = kGoodEnough * std::max({nearest[0], nearest[1], nearest[2]});
-    if (depth == kMaxCuts || best <= good || enough(best, level.among[where])) {
+    if (depth == kMaxCuts || best <= good || enough(best, level.among.number(where))) {
       largest_ = std::max(largest_, best);
-      noted(level.among[where], best);
+      noted(level.among.number(where), best);
       return;
     }
-    divide(depth, corners, where, good, surface, enough);
+    divide(depth, corners, where, good, enough);
     for (const std::array<size_t, 3>& part :
          {std::array<size_t, 3>{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}})
-      cut(depth + 1, part, surface, enough, noted);
+      cut(depth + 1, part, enough, noted);
   }
 
   /// Sets up the next level: what is too far from the triangle serves none of its parts.
   template <typename Enough>
   void divide(size_t depth, const std::array<size_t, 3>& corners, size_t where, double good,
-              const OverlaySurface& surface, const Enough& enough) {
+              const Enough& enough) {
     const Level& from = levels_[depth];
     Level& to = levels_[depth + 1];
     std::array<double, 3> reach{}; // of the triangle from each corner
@@ -92,11 +88,11 @@ private:
     for (size_t i = 0; i < from.among.size(); ++i) {
       double least = 0.0;
       for (size_t k = 0; k < 3; ++k) least = std::max(least, from.distances[corners[k]][i] - reach[k]);
-      if (i != where && least > good && !enough(least, from.among[i])) continue;
-      to.among.push_back(from.among[i]);
+      if (i != where && least > good && !enough(least, from.among.number(i))) continue;
+      to.among.add(from.among, i);
       for (size_t k = 0; k < 3; ++k) to.distances[k].push_back(from.distances[corners[k]][i]);
     }
-    for (size_t k = 3; k < 6; ++k) measure(surface, to, k);
+    for (size_t k = 3; k < 6; ++k) to.among.distances(to.points[k], to.distances[k]);
   }
 
   std::array<Level, kMaxCuts + 1> levels_;
