@@ -185,13 +185,29 @@ private:
   /// A triangle after of which the ones before saw too little: it is measured itself.
   void lay_over_before(uint32_t s) {
     before_.gather(after_.corner_points(s));
-    const Corners p = after_.corners(s);
     if (fits_over_before(s)) return;
     before_.widen();
     if (fits_over_before(s)) return;
+    const double near = refine_over_before(s);
+    if (near > std::max(largest_, kSlack * proven_)) {
+      std::swap(refined_, second_);
+      before_.widen();
+      if (refine_over_before(s) >= near) std::swap(refined_, second_);
+    }
+    for (const OverlayPiece& piece : refined_) note(s, piece.distance, had(piece.triangle));
+  }
+
+  /// Returns the largest error that refined_ would make.
+  double refine_over_before(uint32_t s) {
+    double largest = 0.0;
+    refined_.clear();
     refiner_.run(
-        p, before_, [&](double distance, uint32_t t) { return enough(distance, had(t)); },
-        [&](uint32_t t, double distance) { note(s, distance, had(t)); });
+        after_.corners(s), before_, [&](double distance, uint32_t t) { return enough(distance, had(t)); },
+        [&](uint32_t t, double distance) {
+          refined_.push_back({t, distance, 0.0});
+          largest = std::max(largest, stated(distance, had(t)));
+        });
+    return largest;
   }
 
   /// Notes the distances where they are small enough.
