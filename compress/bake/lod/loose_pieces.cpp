@@ -46,22 +46,30 @@ public:
     std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
       return stands[a].distance != stands[b].distance ? stands[a].distance < stands[b].distance : a < b;
     });
-    for (const uint32_t i : order) {
-      if (live <= targets.triangles) break;
-      Stand stand = stands[i];
-      if (pieces_[stand.piece].dropped) stand = find_stand(i);
-      if (stand.piece == kNone) break; // the last one
-      if (pieces_[i].error + stand.distance > dear && live <= targets.at_any_cost) continue;
-      LodTriangle& t = m_.triangles[stand.triangle];
-      t.error = std::max(t.error, pieces_[i].error + stand.distance);
-      pieces_[stand.piece].error = std::max(pieces_[stand.piece].error, t.error);
-      pieces_[i].dropped = true;
-      live -= pieces_[i].triangles.size();
+    for (const bool any_cost : {false, true}) {
+      const uint32_t target = any_cost ? std::max(targets.triangles, targets.at_any_cost) : targets.triangles;
+      for (const uint32_t i : order) {
+        if (live <= target) break;
+        if (pieces_[i].dropped) continue;
+        if (stands[i].piece == kNone || pieces_[stands[i].piece].dropped) stands[i] = find_stand(i);
+        const Stand& stand = stands[i];
+        if (stand.piece == kNone) break; // the last one
+        if (!any_cost && pieces_[i].error + stand.distance > dear) continue;
+        drop(i, stand);
+        live -= pieces_[i].triangles.size();
+      }
     }
     remove_dropped();
   }
 
 private:
+  void drop(uint32_t piece, const Stand& stand) {
+    LodTriangle& t = m_.triangles[stand.triangle];
+    t.error = std::max(t.error, pieces_[piece].error + stand.distance);
+    pieces_[stand.piece].error = std::max(pieces_[stand.piece].error, t.error);
+    pieces_[piece].dropped = true;
+  }
+
   void find_pieces() {
     std::vector<uint32_t> parent(m_.points.size());
     std::iota(parent.begin(), parent.end(), 0u);
