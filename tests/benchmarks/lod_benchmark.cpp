@@ -225,7 +225,8 @@ int run(int argc, char** argv) {
   if (!out) throw Error(ErrorKind::kIo, options.json_file.string() + ": cannot write");
   Json json = describe_machine();
   for (const std::string& name : options.inputs)
-    json["inputs"].push_back(measure_input(name, weld_positions(find_packing_input(name, options.scenes, options.generated_triangles).mesh), options));
+    json["inputs"].push_back(measure_input(
+        name, weld_positions(find_packing_input(name, options.scenes, options.generated_triangles).mesh), options));
   if (out.is_open()) out << json.dump(2) << std::endl;
   if (!out) throw Error(ErrorKind::kIo, options.json_file.string() + ": cannot write");
   for (const Json& input : json["inputs"])

@@ -32,7 +32,7 @@ struct Vector4 {
 
 [[gnu::always_inline]] inline void distances_to_block(const double* point, const TriangleBlock& block, double* out) {
   using Stored = double __attribute__((vector_size(32), may_alias));
-  const auto in = [](const double* from) __attribute__((always_inline)) -> const Stored& {
+  const auto in = [](const double* from) __attribute__((always_inline))->const Stored& {
     return *reinterpret_cast<const Stored*>(from);
   };
   const Lanes zero = {};

@@ -6,7 +6,8 @@
 
 namespace packtrace {
 
-/// Edges by what their collapse costs, the cheapest on top; those of equal cost by number. Costs are compared as floats.
+/// Edges by what their collapse costs, the cheapest on top; those of equal cost by number. Costs are compared as
+/// floats.
 class EdgeHeap {
 public:
   bool empty() const { return keys_.empty(); }

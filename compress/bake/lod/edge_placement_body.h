@@ -40,7 +40,7 @@ template <typename T>
 [[gnu::always_inline]] inline void minimise(const Quadric4<T>& q, Vec4<T>& p) {
   const T zero = {}, one = zero + 1.0;
   const T trace = q.xx + q.yy + q.zz;
-  const T stay = 1e-4 * trace; // less curved directions are left alone
+  const T stay = 1e-4 * trace;              // less curved directions are left alone
   const T safe = trace > zero ? zero : one; // there is nothing at all
   // L D L^T = A + stay I
   const T d0 = one / (q.xx + stay + safe), l10 = q.xy * d0, l20 = q.xz * d0;
@@ -98,7 +98,7 @@ template <typename T>
 
 [[gnu::always_inline]] inline void place_four(EdgeBatch& batch) {
   using Stored = double __attribute__((vector_size(32), may_alias));
-  const auto in = [](const double* from) __attribute__((always_inline)) -> const Stored& {
+  const auto in = [](const double* from) __attribute__((always_inline))->const Stored& {
     return *reinterpret_cast<const Stored*>(from);
   };
   const Quadric4<Lanes> q = {in(batch.quadric[0]), in(batch.quadric[1]), in(batch.quadric[2]), in(batch.quadric[3]),

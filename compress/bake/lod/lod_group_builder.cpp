@@ -33,7 +33,8 @@ public:
     triangles.insert(triangles.end(), lines_.begin(), lines_.end());
     simplify(mesh_, config);
     bound_errors(points, triangles, mesh_);
-    if (mesh_.triangles.size() > config.target_triangles) drop_loose_pieces(mesh_, {config.target_triangles, worthwhile_triangles()});
+    if (mesh_.triangles.size() > config.target_triangles)
+      drop_loose_pieces(mesh_, {config.target_triangles, worthwhile_triangles()});
     for (const LodTriangle& t : mesh_.triangles) out_.error = std::max(out_.error, t.error);
     number_vertices();
     split();

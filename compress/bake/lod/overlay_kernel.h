@@ -29,7 +29,7 @@ struct OverlayTask {
 };
 
 /// Lays the triangle over the candidates until it is covered; those that face away are as if they were not there.
-/// Writes as many pieces as it returns, at most 3 more behind them, and the share of the triangle that they cover.
+/// Writes as many pieces as it returns, one per candidate at most, and the share of the triangle that they cover.
 using OverlayKernel = uint32_t (*)(const OverlayTask& task, const uint32_t* candidates, uint32_t count,
                                    OverlayPiece* pieces, double* covered);
 

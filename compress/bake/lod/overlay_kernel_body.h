@@ -34,8 +34,9 @@ struct Corner4 {
 };
 
 /// Adds what a side of the piece contributes to its area, and takes its ends into account for its height.
-[[gnu::always_inline]] inline void add_side(const Span4& span, const Mask& counts, const Lanes& x, const Lanes& y, const Lanes& h,
-                               const Lanes& dx, const Lanes& dy, const Lanes& dh, Lanes& area, Lanes& height) {
+[[gnu::always_inline]] inline void add_side(const Span4& span, const Mask& counts, const Lanes& x, const Lanes& y,
+                                            const Lanes& h, const Lanes& dx, const Lanes& dy, const Lanes& dh,
+                                            Lanes& area, Lanes& height) {
   const Lanes zero = {};
   const Mask valid = span.lo <= span.hi;
   const Lanes x0 = x + span.lo * dx, y0 = y + span.lo * dy, h0 = h + span.lo * dh;
@@ -54,8 +55,8 @@ struct Corner4 {
   clip(span, p.l1, q.l1);
   clip(span, p.l2, q.l2);
   // On one of the lines: the side there counts, this does not.
-  const Mask on = ((p.l0 == zero) & (q.l0 == zero)) | ((p.l1 == zero) & (q.l1 == zero)) |
-                  ((p.l2 == zero) & (q.l2 == zero));
+  const Mask on =
+      ((p.l0 == zero) & (q.l0 == zero)) | ((p.l1 == zero) & (q.l1 == zero)) | ((p.l2 == zero) & (q.l2 == zero));
   add_side(span, ~on, p.l1, p.l2, p.height, q.l1 - p.l1, q.l2 - p.l2, q.height - p.height, area, height);
 }
 
@@ -72,8 +73,8 @@ struct Sides4 {
 }
 
 /// Four triangles of the surface at once.
-[[gnu::always_inline]] inline void meet(const Corner4& a, const Corner4& b, const Corner4& c, Lanes& area, Lanes& height,
-                           Lanes& facing) {
+[[gnu::always_inline]] inline void meet(const Corner4& a, const Corner4& b, const Corner4& c, Lanes& area,
+                                        Lanes& height, Lanes& facing) {
   const Lanes zero = {}, one = zero + 1.0;
   const Mask all = zero == zero;
   facing = (b.l1 - a.l1) * (c.l2 - a.l2) - (b.l2 - a.l2) * (c.l1 - a.l1);
@@ -103,7 +104,7 @@ struct Sides4 {
 }
 
 [[gnu::always_inline]] inline void load(const OverlayPoint* const* from, Corner4& out) {
-  const auto at = [&](int i) __attribute__((always_inline)) -> const LanesIn& {
+  const auto at = [&](int i) __attribute__((always_inline))->const LanesIn& {
     return *reinterpret_cast<const LanesIn*>(from[i]);
   };
   const Mask low = {0, 4, 2, 6}, high = {1, 5, 3, 7}, front = {0, 1, 4, 5}, back = {2, 3, 6, 7};
@@ -130,7 +131,7 @@ struct Sides4 {
 }
 
 [[gnu::always_inline]] inline uint32_t lay_over(const OverlayTask& task, const uint32_t* candidates, uint32_t count,
-                                   OverlayPiece* pieces, double* covered) {
+                                                OverlayPiece* pieces, double* covered) {
   const OverlayPoint* corners[3][4];
   uint32_t waiting[4];
   uint32_t filled = 0, found = 0;

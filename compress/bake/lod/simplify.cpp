@@ -241,7 +241,9 @@ private:
       kernel(batch_);
       for (size_t lane = 0; lane < count; ++lane) {
         edges_[movable[first + lane]].placement = {
-            {batch_.point[0][lane], batch_.point[1][lane], batch_.point[2][lane]}, batch_.cost[lane], batch_.along[lane]};
+            {batch_.point[0][lane], batch_.point[1][lane], batch_.point[2][lane]},
+            batch_.cost[lane],
+            batch_.along[lane]};
         heap_.add(batch_.cost[lane], movable[first + lane]);
       }
     }

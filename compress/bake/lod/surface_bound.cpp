@@ -82,8 +82,8 @@ private:
     }
     double largest = 0.0;
     for (size_t i = first; i < pieces_.size(); ++i) largest = std::max(largest, pieces_[i].distance);
-    laid_.push_back({largest <= kFine ? 0.0 : stated(largest, had(t)), t, first,
-                     static_cast<uint32_t>(pieces_.size() - first)});
+    laid_.push_back(
+        {largest <= kFine ? 0.0 : stated(largest, had(t)), t, first, static_cast<uint32_t>(pieces_.size() - first)});
   }
 
   /// The worst first: what they really are leaves most others as they are.

@@ -91,13 +91,12 @@ bool Overlay::lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::sp
   task_.from_z = slopes(l1.z, l2.z, height.z);
   ++task_.stamp;
 
-  const size_t first = pieces.size();
-  pieces.resize(first + candidates.size());
+  if (found_.size() < candidates.size()) found_.resize(candidates.size());
   double covered = 0.0;
   const uint32_t count =
-      kernel(task_, candidates.data(), static_cast<uint32_t>(candidates.size()), pieces.data() + first, &covered);
+      kernel(task_, candidates.data(), static_cast<uint32_t>(candidates.size()), found_.data(), &covered);
   const bool once = covered >= 1.0 - kOverlayCovered && covered <= 1.0 + kOverlayCovered;
-  pieces.resize(first + (once ? count : 0));
+  if (once) pieces.insert(pieces.end(), found_.begin(), found_.begin() + count);
   return once;
 }
 

@@ -21,8 +21,8 @@ struct OverlaySurface {
 };
 
 /// Lays one triangle after another over parts of a surface: both are seen along one direction, where outlines cut them
-/// into convex pieces. Along that direction the distance between both planes is linear, so that of a piece is largest at
-/// one of its corners; distance from a triangle is convex, so the same is true of the nearest points.
+/// into convex pieces. Along that direction the distance between both planes is linear, so that of a piece is largest
+/// at one of its corners; distance from a triangle is convex, so the same is true of the nearest points.
 class Overlay {
 public:
   explicit Overlay(const OverlaySurface& surface);
@@ -41,6 +41,7 @@ private:
   std::vector<uint32_t> corners_;
   std::vector<OverlayPoint> projected_;
   std::vector<uint32_t> outside_, stamps_;
+  std::vector<OverlayPiece> found_; ///< what the kernel wrote
   OverlayTask task_{};
   std::array<DVec3, 3> triangle_{};
   DVec3 direction_{};

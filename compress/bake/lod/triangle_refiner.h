@@ -63,15 +63,13 @@ private:
       return;
     }
     divide(depth, corners, where, good, enough);
-    for (const std::array<size_t, 3>& part :
-         {std::array<size_t, 3>{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}})
+    for (const std::array<size_t, 3>& part : {std::array<size_t, 3>{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}})
       cut(depth + 1, part, enough, noted);
   }
 
   /// Sets up the next level: what is too far from the triangle serves none of its parts.
   template <typename Enough>
-  void divide(size_t depth, const std::array<size_t, 3>& corners, size_t where, double good,
-              const Enough& enough) {
+  void divide(size_t depth, const std::array<size_t, 3>& corners, size_t where, double good, const Enough& enough) {
     const Level& from = levels_[depth];
     Level& to = levels_[depth + 1];
     std::array<double, 3> reach{}; // of the triangle from each corner
@@ -80,8 +78,7 @@ private:
       to.distances[k].clear();
     }
     to.among.clear();
-    for (size_t k = 0; k < 3; ++k)
-      to.points[3 + k] = 0.5 * (to.points[k] + to.points[(k + 1) % 3]);
+    for (size_t k = 0; k < 3; ++k) to.points[3 + k] = 0.5 * (to.points[k] + to.points[(k + 1) % 3]);
     for (size_t k = 0; k < 3; ++k)
       reach[k] = std::max(glm::length(to.points[(k + 1) % 3] - to.points[k]),
                           glm::length(to.points[(k + 2) % 3] - to.points[k]));

@@ -200,7 +200,7 @@ TEST(EdgePlacement, IsNoWorseThanTheEnds) {
     batch.ends_only = repeat % 3 == 0;
     place_edges(batch);
     for (int lane = 0; lane < 4; ++lane) {
-      const auto cost = [&](const double (*p)[4]) {
+      const auto cost = [&](const double(*p)[4]) {
         const double x = p[0][lane], y = p[1][lane], z = p[2][lane];
         const auto q = [&](int i) { return batch.quadric[i][lane]; };
         return x * x * q(0) + 2 * x * y * q(1) + 2 * x * z * q(2) + y * y * q(3) + 2 * y * z * q(4) + z * z * q(5) +
