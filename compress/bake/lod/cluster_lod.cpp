@@ -16,7 +16,6 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kNone = ~0u;
-constexpr double kWorthwhile = 0.85;      // groups that keep more of their triangles are left as they are
 constexpr double kInflation = 1.0 + 1e-6; // of spheres around spheres: more than roundings can shrink them
 
 double distance(DVec3 a, DVec3 b) { return glm::length(a - b); }

@@ -29,10 +29,12 @@ public:
     config.seam_of_kind = in_.seam_of_kind;
     config.keep_points = keep_points_;
     const std::vector<DVec3> points = mesh_.points;
-    const std::vector<LodTriangle> triangles = mesh_.triangles;
+    std::vector<LodTriangle> triangles = mesh_.triangles;
+    triangles.insert(triangles.end(), lines_.begin(), lines_.end());
     simplify(mesh_, config);
     bound_errors(points, triangles, mesh_);
-    if (mesh_.triangles.size() > config.target_triangles) drop_loose_pieces(mesh_, config.target_triangles);
+    if (mesh_.triangles.size() > config.target_triangles)
+      drop_loose_pieces(mesh_, {config.target_triangles, worthwhile_triangles()});
     for (const LodTriangle& t : mesh_.triangles) out_.error = std::max(out_.error, t.error);
     number_vertices();
     split();
@@ -40,6 +42,10 @@ public:
   }
 
 private:
+  uint32_t worthwhile_triangles() const {
+    return static_cast<uint32_t>(kWorthwhile * static_cast<double>(out_.source_triangles));
+  }
+
   /// A number for each value, 0, 1, ... in the order they come.
   uint32_t local(WeldTable& table, std::vector<uint32_t>& values, uint32_t value) {
     const auto next = static_cast<uint32_t>(values.size());
@@ -64,8 +70,8 @@ private:
           t.points[corner] = local(point_table, positions_, in_.vertices[v[corner]].position);
           if (!plain) t.wedges[corner] = local(wedge_table, wedge_vertices, v[corner]);
         }
-        if (t.points.x != t.points.y && t.points.y != t.points.z && t.points.z != t.points.x)
-          mesh_.triangles.push_back(t);
+        const bool line = t.points.x == t.points.y || t.points.y == t.points.z || t.points.z == t.points.x;
+        (line ? lines_ : mesh_.triangles).push_back(t);
       }
     }
     for (const uint32_t vertex : wedge_vertices)
@@ -190,6 +196,7 @@ private:
   NormalEncoding encoding_;
   SimplifiedGroup out_;
   SimplifyMesh mesh_;
+  std::vector<LodTriangle> lines_; // triangles with two corners in one place
   LatticePoint center_{};
   bool keep_points_ = false;
   std::vector<uint32_t> positions_;    // of each point

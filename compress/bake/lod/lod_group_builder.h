@@ -13,6 +13,9 @@ inline constexpr uint32_t kNewNumber = 1u << 31;
 /// LodGroupInput::owner of positions that several groups have.
 inline constexpr uint32_t kShared = ~0u - 1;
 
+/// Groups that keep more of their triangles are left as they are.
+inline constexpr double kWorthwhile = 0.85;
+
 /// The clusters of a group, and what its surroundings ask for. Everything is read only: groups are simplified in
 /// parallel.
 struct LodGroupInput {
@@ -40,7 +43,7 @@ struct SimplifiedGroup {
 };
 
 /// Halves the triangles of a group as far as its locked positions allow, and splits the result into clusters.
-/// Triangles with two corners in one place are left out.
+/// Triangles with two corners in one place are left out; the lines that they were count as surface of the group.
 SimplifiedGroup simplify_group(const LodGroupInput& input);
 
 } // namespace packtrace

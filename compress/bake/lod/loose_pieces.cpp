@@ -13,6 +13,7 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kNone = ~0u;
+constexpr double kFewTimes = 3.0; // the largest error there was: what a piece may cost
 
 struct Piece {
   std::vector<uint32_t> triangles;
@@ -31,33 +32,44 @@ class Dropper {
 public:
   explicit Dropper(SimplifyMesh& mesh) : m_(mesh) {}
 
-  void run(uint32_t target) {
+  void run(const DropTargets& targets) {
     find_pieces();
     if (pieces_.size() < 2) return;
     size_t live = m_.triangles.size();
+    double dear = 0.0;
+    for (const Piece& piece : pieces_) dear = std::max(dear, kFewTimes * piece.error);
     std::vector<Stand> stands(pieces_.size());
     std::vector<uint32_t> order;
     for (uint32_t i = 0; i < pieces_.size(); ++i)
-      if (!pieces_[i].locked && pieces_[i].triangles.size() <= live - target)
+      if (!pieces_[i].locked && pieces_[i].triangles.size() <= live - targets.triangles)
         stands[i] = find_stand(i), order.push_back(i);
     std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
       return stands[a].distance != stands[b].distance ? stands[a].distance < stands[b].distance : a < b;
     });
-    for (const uint32_t i : order) {
-      if (live <= target) break;
-      Stand stand = stands[i];
-      if (pieces_[stand.piece].dropped) stand = find_stand(i);
-      if (stand.piece == kNone) break; // the last one
-      LodTriangle& t = m_.triangles[stand.triangle];
-      t.error = std::max(t.error, pieces_[i].error + stand.distance);
-      pieces_[stand.piece].error = std::max(pieces_[stand.piece].error, t.error);
-      pieces_[i].dropped = true;
-      live -= pieces_[i].triangles.size();
+    for (const bool any_cost : {false, true}) {
+      const uint32_t target = any_cost ? std::max(targets.triangles, targets.at_any_cost) : targets.triangles;
+      for (const uint32_t i : order) {
+        if (live <= target) break;
+        if (pieces_[i].dropped) continue;
+        if (stands[i].piece == kNone || pieces_[stands[i].piece].dropped) stands[i] = find_stand(i);
+        const Stand& stand = stands[i];
+        if (stand.piece == kNone) break; // the last one
+        if (!any_cost && pieces_[i].error + stand.distance > dear) continue;
+        drop(i, stand);
+        live -= pieces_[i].triangles.size();
+      }
     }
     remove_dropped();
   }
 
 private:
+  void drop(uint32_t piece, const Stand& stand) {
+    LodTriangle& t = m_.triangles[stand.triangle];
+    t.error = std::max(t.error, pieces_[piece].error + stand.distance);
+    pieces_[stand.piece].error = std::max(pieces_[stand.piece].error, t.error);
+    pieces_[piece].dropped = true;
+  }
+
   void find_pieces() {
     std::vector<uint32_t> parent(m_.points.size());
     std::iota(parent.begin(), parent.end(), 0u);
@@ -140,6 +152,6 @@ private:
 
 } // namespace
 
-void drop_loose_pieces(SimplifyMesh& mesh, uint32_t target_triangles) { Dropper(mesh).run(target_triangles); }
+void drop_loose_pieces(SimplifyMesh& mesh, const DropTargets& targets) { Dropper(mesh).run(targets); }
 
 } // namespace packtrace

@@ -6,9 +6,17 @@
 
 namespace packtrace {
 
+/// How far drop_loose_pieces() goes.
+struct DropTargets {
+  uint32_t triangles = 0; ///< none goes once there are so few
+  /// Those go on until so few are left that cost more than a few times the largest error that there was. Then pieces
+  /// that stand alone wait for coarser levels.
+  uint32_t at_any_cost = 0;
+};
+
 /// Drops pieces of the mesh that hang together with nothing else and have no locked point, those first that lie nearest
-/// to what is left, until target_triangles are left; one piece always stays. The error of a triangle near each dropped
-/// piece grows to hold for it too. Time grows with the square of the number of pieces.
-void drop_loose_pieces(SimplifyMesh& mesh, uint32_t target_triangles);
+/// to what is left; one piece always stays. The error of a triangle near each dropped piece grows to hold for it too.
+/// Time grows with the square of the number of pieces.
+void drop_loose_pieces(SimplifyMesh& mesh, const DropTargets& targets);
 
 } // namespace packtrace

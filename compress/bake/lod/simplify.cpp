@@ -4,9 +4,12 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <utility>
 
+#include "compress/bake/lod/edge_heap.h"
+#include "compress/bake/lod/edge_placement_body.h"
 #include "compress/bake/lod/quadric.h"
-#include "compress/bake/weld_table.h"
 
 namespace packtrace {
 namespace {
@@ -18,16 +21,25 @@ constexpr double kCreaseWeight = 0.25; // where normals or texture coordinates c
 constexpr double kStayWeight = 1e-4; // of the point itself: where all is flat, short edges go first and none gets long
 constexpr double kLargestTurn = 0.2; // cosine; a triangle may turn by less than that in one collapse
 
-struct Edge {
-  uint32_t a, b;  ///< points at first; follow merged_into_
-  uint32_t stamp; ///< of both when the cost was computed
+/// Which point an edge becomes.
+struct Placement {
+  DVec3 point;
+  double cost;
+  double along; ///< 0 at a .. 1 at b
 };
 
-struct HeapEntry {
-  double cost;
-  uint32_t edge;
-  bool operator<(const HeapEntry& o) const { return cost != o.cost ? cost > o.cost : edge > o.edge; } // least on top
+struct Edge {
+  uint32_t a, b;  ///< points at first; follow merged_into_
+  uint32_t stamp; ///< of both when the placement was computed
+  Placement placement;
 };
+
+PlacementKernel pick_placement_kernel() {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx2")) return avx2::place_edges;
+#endif
+  return place_edges;
+}
 
 class Simplifier {
 public:
@@ -38,8 +50,12 @@ public:
     m_.stands_for.resize(m_.points.size());
     for (uint32_t i = 0; i < m_.stands_for.size(); ++i) m_.stands_for[i] = i;
     live_ = m_.triangles.size();
+    m_.source.resize(live_);
+    std::iota(m_.source.begin(), m_.source.end(), 0u);
     for (const DVec3& p : m_.points) lo_ = glm::min(lo_, p), hi_ = glm::max(hi_, p);
     if (live_ <= config_.target_triangles) return;
+    for (int axis = 0; axis < 3; ++axis) batch_.lo[axis] = lo_[axis], batch_.hi[axis] = hi_[axis];
+    batch_.ends_only = config_.keep_points;
     link_corners();
     find_edges();
     fill_heap();
@@ -110,19 +126,24 @@ private:
   void find_edges() {
     std::vector<EdgeUse> uses;
     uses.reserve(m_.triangles.size() * 2);
-    WeldTable table(3 * m_.triangles.size());
+    std::vector<uint32_t> first(m_.points.size(), kNone), next; // lists of uses by their lower point
+    next.reserve(m_.triangles.size() * 2);
+    side_edge_.resize(3 * m_.triangles.size());
     for (uint32_t i = 0; i < m_.triangles.size(); ++i) {
       const Triangle& t = m_.triangles[i].points;
       for (uint32_t corner = 0; corner < 3; ++corner) {
         const uint32_t p = t[static_cast<int>(corner)], q = t[static_cast<int>((corner + 1) % 3)];
         const uint32_t a = std::min(p, q), b = std::max(p, q);
-        const auto next = static_cast<uint32_t>(uses.size());
-        const uint32_t found = table.find_or_add(
-            mix_words(a, b), next, [&](uint32_t other) { return uses[other].a == a && uses[other].b == b; });
-        if (found == next)
+        uint32_t found = first[a];
+        while (found != kNone && uses[found].b != b) found = next[found];
+        if (found == kNone) {
+          found = static_cast<uint32_t>(uses.size());
           uses.push_back({a, b, 1, i, false, false});
-        else
+          next.push_back(std::exchange(first[a], found));
+        } else {
           join(uses[found], i);
+        }
+        side_edge_[3 * i + corner] = found;
       }
     }
     add_triangle_planes();
@@ -131,8 +152,10 @@ private:
       if (e.uses == 1) flags_[e.a] |= kBorder, flags_[e.b] |= kBorder;
       const double weight = e.uses == 1 ? kBorderWeight : e.seam ? kSeamWeight : e.crease ? kCreaseWeight : 0.0;
       if (weight > 0.0) add_side_plane(e, weight);
-      if (!(m_.locked[e.a] && m_.locked[e.b])) edges_.push_back({e.a, e.b, 0});
+      edges_.push_back({e.a, e.b, 0, {}});
     }
+    same_edge_.resize(edges_.size());
+    std::iota(same_edge_.begin(), same_edge_.end(), 0u);
   }
 
   void join(EdgeUse& e, uint32_t triangle) const {
@@ -175,74 +198,89 @@ private:
 
   // ---- which point an edge becomes
 
-  struct Placement {
-    DVec3 point;
-    double cost;
-    double along; ///< 0 at a .. 1 at b
-  };
-
-  Placement place(uint32_t a, uint32_t b) const {
-    Quadric q = quadrics_[a];
-    q.add(quadrics_[b]);
-    const DVec3 &pa = m_.points[a], &pb = m_.points[b];
+  /// 1: a stays where it is, 2: b, 0: neither.
+  double keep(uint32_t a, uint32_t b) const {
     // What must not move stays; a border point does not leave the border for one inside.
-    const bool keep_a = m_.locked[a] || ((flags_[a] & kBorder) != 0 && (flags_[b] & kBorder) == 0);
-    const bool keep_b = m_.locked[b] || ((flags_[b] & kBorder) != 0 && (flags_[a] & kBorder) == 0);
-    if (keep_a) return {pa, q.at(pa), 0.0};
-    if (keep_b) return {pb, q.at(pb), 1.0};
-    Placement best{pa, q.at(pa), 0.0};
-    if (const double cost = q.at(pb); cost < best.cost) best = {pb, cost, 1.0};
-    if (config_.keep_points) return best;
-    const DVec3 middle = 0.5 * (pa + pb), along = pb - pa;
-    DVec3 p = q.minimum(middle);
-    const double reach = glm::dot(along, along);
-    if (!(glm::dot(p - middle, p - middle) <= reach)) p = middle;
-    p = glm::clamp(p, lo_, hi_);
-    p = DVec3(std::nearbyint(p.x), std::nearbyint(p.y), std::nearbyint(p.z));
-    if (const double cost = q.at(p); cost < best.cost && reach > 0.0)
-      best = {p, cost, std::clamp(glm::dot(p - pa, along) / reach, 0.0, 1.0)};
-    return best;
+    if (m_.locked[a] || ((flags_[a] & kBorder) != 0 && (flags_[b] & kBorder) == 0)) return 1.0;
+    if (m_.locked[b] || ((flags_[b] & kBorder) != 0 && (flags_[a] & kBorder) == 0)) return 2.0;
+    return 0.0;
+  }
+
+  void place(uint32_t a, uint32_t b, Placement& out) const {
+    const Quadric &qa = quadrics_[a], &qb = quadrics_[b];
+    const Quadric4<double> q = {qa.xx + qb.xx, qa.xy + qb.xy, qa.xz + qb.xz, qa.yy + qb.yy, qa.yz + qb.yz,
+                                qa.zz + qb.zz, qa.bx + qb.bx, qa.by + qb.by, qa.bz + qb.bz, qa.c + qb.c};
+    const DVec3 &pa = m_.points[a], &pb = m_.points[b];
+    Vec4<double> point{};
+    packtrace::place(q, {pa.x, pa.y, pa.z}, {pb.x, pb.y, pb.z}, keep(a, b), batch_, point, out.cost, out.along);
+    out.point = {point.x, point.y, point.z};
+  }
+
+  void put_in_batch(size_t lane, uint32_t a, uint32_t b) {
+    static_assert(sizeof(Quadric) == 10 * sizeof(double));
+    const double *qa = &quadrics_[a].xx, *qb = &quadrics_[b].xx;
+    for (size_t i = 0; i < 10; ++i) batch_.quadric[i][lane] = qa[i] + qb[i];
+    for (int axis = 0; axis < 3; ++axis)
+      batch_.a[axis][lane] = m_.points[a][axis], batch_.b[axis][lane] = m_.points[b][axis];
+    batch_.keep[lane] = keep(a, b);
   }
 
   void fill_heap() {
-    heap_.reserve(edges_.size());
-    for (uint32_t i = 0; i < edges_.size(); ++i) heap_.push_back({place(edges_[i].a, edges_[i].b).cost, i});
-    std::make_heap(heap_.begin(), heap_.end());
-  }
-
-  void push(HeapEntry entry) {
-    heap_.push_back(entry);
-    std::push_heap(heap_.begin(), heap_.end());
+    static const PlacementKernel kernel = pick_placement_kernel();
+    std::vector<uint32_t> movable;
+    movable.reserve(edges_.size());
+    for (uint32_t i = 0; i < edges_.size(); ++i)
+      if (!(m_.locked[edges_[i].a] && m_.locked[edges_[i].b])) movable.push_back(i);
+    heap_.reserve(movable.size());
+    for (size_t first = 0; first < movable.size(); first += 4) {
+      const size_t count = std::min<size_t>(4, movable.size() - first);
+      for (size_t lane = 0; lane < 4; ++lane) {
+        const Edge& e = edges_[movable[first + std::min(lane, count - 1)]];
+        put_in_batch(lane, e.a, e.b);
+      }
+      kernel(batch_);
+      for (size_t lane = 0; lane < count; ++lane) {
+        edges_[movable[first + lane]].placement = {
+            {batch_.point[0][lane], batch_.point[1][lane], batch_.point[2][lane]},
+            batch_.cost[lane],
+            batch_.along[lane]};
+        heap_.add(batch_.cost[lane], movable[first + lane]);
+      }
+    }
+    heap_.sort();
   }
 
   void drain_heap() {
     while (live_ > config_.target_triangles && !heap_.empty()) {
-      std::pop_heap(heap_.begin(), heap_.end());
-      const HeapEntry top = heap_.back();
-      heap_.pop_back();
-      Edge& e = edges_[top.edge];
+      const uint32_t edge = heap_.top();
+      Edge& e = edges_[edge];
       const uint32_t a = root(e.a), b = root(e.b);
-      if (a == b || (m_.locked[a] && m_.locked[b])) continue;
-      const Placement placement = place(a, b);
+      if (same_edge_[edge] != edge || a == b || (m_.locked[a] && m_.locked[b])) {
+        heap_.pop();
+        continue;
+      }
       // What happened around it since may have made it dearer than others.
       if (e.stamp != stamp_[a] + stamp_[b]) {
         e.stamp = stamp_[a] + stamp_[b];
-        if (!heap_.empty() && placement.cost > heap_.front().cost) {
-          push({placement.cost, top.edge});
-          continue;
-        }
+        place(a, b, e.placement);
+        if (!heap_.change_top(e.placement.cost)) continue;
       }
-      try_collapse(a, b, placement, top.edge);
+      heap_.pop();
+      try_collapse(a, b, e.placement, edge);
     }
   }
 
   void retry_rejected() {
     for (const uint32_t edge : rejected_) {
-      const uint32_t a = root(edges_[edge].a), b = root(edges_[edge].b);
-      if (a != b && !(m_.locked[a] && m_.locked[b])) heap_.push_back({place(a, b).cost, edge});
+      Edge& e = edges_[edge];
+      const uint32_t a = root(e.a), b = root(e.b);
+      if (same_edge_[edge] != edge || a == b || (m_.locked[a] && m_.locked[b])) continue;
+      e.stamp = stamp_[a] + stamp_[b];
+      place(a, b, e.placement);
+      heap_.add(e.placement.cost, edge);
     }
     rejected_.clear();
-    std::make_heap(heap_.begin(), heap_.end());
+    heap_.sort();
   }
 
   // ---- one collapse
@@ -319,10 +357,13 @@ private:
 
   void collapse(uint32_t a, uint32_t b, const Placement& placement) {
     merge_wedges(a, b, placement.along);
-    for (const uint32_t triangle : removed_) alive_[triangle] = 0, --live_;
     // The point of the corner lists that stays is the one that must not move, or a.
     const bool keep_b = m_.locked[b] != 0 || (m_.locked[a] == 0 && placement.point == m_.points[b]);
     const uint32_t kept = keep_b ? b : a, gone = keep_b ? a : b;
+    for (const uint32_t triangle : removed_) {
+      merge_edges(triangle, kept, gone);
+      alive_[triangle] = 0, --live_;
+    }
     for (uint32_t c = first_corner_[gone]; c != kNone; c = next_corner_[c])
       m_.triangles[c / 3].points[static_cast<int>(c % 3)] = kept;
     if (first_corner_[gone] != kNone) {
@@ -338,6 +379,23 @@ private:
     flags_[kept] |= flags_[gone];
     if (m_.points[kept] != placement.point) m_.points[kept] = placement.point, m_.moved[kept] = 1;
     stamp_[kept] += stamp_[gone] + 1;
+  }
+
+  uint32_t edge_root(uint32_t edge) {
+    while (same_edge_[edge] != edge) edge = same_edge_[edge] = same_edge_[same_edge_[edge]];
+    return edge;
+  }
+
+  /// The other two sides of a vanishing triangle become one.
+  void merge_edges(uint32_t triangle, uint32_t kept, uint32_t gone) {
+    const Triangle& t = m_.triangles[triangle].points;
+    uint32_t of_kept = kNone, of_gone = kNone;
+    for (int i = 0; i < 3; ++i) {
+      const uint32_t p = t[i], q = t[(i + 1) % 3], edge = side_edge_[3 * triangle + static_cast<uint32_t>(i)];
+      if (p != gone && q != gone) of_kept = edge_root(edge);
+      if (p != kept && q != kept) of_gone = edge_root(edge);
+    }
+    if (of_kept != of_gone) same_edge_[of_gone] = of_kept;
   }
 
   /// Corners of a and b that a vanishing triangle joins become one wedge; the others keep theirs.
@@ -380,9 +438,11 @@ private:
       if (alive_[i] == 0) continue;
       LodTriangle t = m_.triangles[i];
       for (int corner = 0; corner < 3; ++corner) t.wedges[corner] = wedge_root(t.wedges[corner]);
+      m_.source[kept] = static_cast<uint32_t>(i);
       m_.triangles[kept++] = t;
     }
     m_.triangles.resize(kept);
+    m_.source.resize(kept);
   }
 
   SimplifyMesh& m_;
@@ -394,7 +454,10 @@ private:
   std::vector<uint32_t> merged_into_, wedge_into_, stamp_;
   std::vector<Quadric> quadrics_;
   std::vector<Edge> edges_;
-  std::vector<HeapEntry> heap_;
+  std::vector<uint32_t> side_edge_; ///< per corner: the edge to the next corner; follow same_edge_
+  std::vector<uint32_t> same_edge_; ///< edges that became one
+  EdgeHeap heap_;
+  EdgeBatch batch_{};
   std::vector<uint32_t> rejected_;
   std::vector<uint32_t> mark_;
   uint32_t mark_value_ = 0;

@@ -32,6 +32,7 @@ struct SimplifyMesh {
   std::vector<LodTriangle> triangles;
   std::vector<uint8_t> moved;       ///< result, per point
   std::vector<uint32_t> stands_for; ///< result, per point: the one that it became
+  std::vector<uint32_t> source;     ///< result, per triangle: its number before
 };
 
 struct SimplifyConfig {
@@ -44,7 +45,7 @@ struct SimplifyConfig {
 /// go. Locked points and the edges between them stay, so that the triangles' signed boundary there is the same before
 /// and after, whatever they look like (non-manifold, duplicates, soup). No connected piece vanishes.
 /// Errors of the triangles are not touched: bound_errors() is for that.
-/// Depends on its input only. Time n log n in the number of triangles.
+/// Depends on its input only. Time n log n in the number of triangles, if no point has very many.
 void simplify(SimplifyMesh& mesh, const SimplifyConfig& config);
 
 } // namespace packtrace

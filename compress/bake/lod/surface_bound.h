@@ -15,7 +15,8 @@ namespace packtrace {
 /// of them is convex, so it is largest at the corners of the pieces into which their outlines cut it. What is covered
 /// by none, at borders that moved and in folds, is cut finer and measured alike. Source: Jonathan Cohen, Dinesh Manocha
 /// and Marc Olano, Simplifying Polygonal Models Using Successive Mappings, 1997 (the idea of overlaying both surfaces).
-/// @param points, triangles before; mesh.points and mesh.stands_for number the same points
+/// @param points, triangles before; mesh.points and mesh.stands_for number the same points. Behind those that
+/// simplify() had there may be more, whose corners need not be distinct.
 void bound_errors(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh);
 
 } // namespace packtrace

@@ -127,6 +127,24 @@ Mesh without_area() {
   return mesh;
 }
 
+/// Triangles with two corners in one place: some between triangles, some alone in space.
+Mesh lines_among_triangles() {
+  Random random(13);
+  Mesh mesh = grid_mesh(40, 0.05f);
+  const auto count = static_cast<uint32_t>(mesh.positions.size());
+  for (uint32_t i = 0; i < 200; ++i) {
+    const uint32_t a = random.bits() % count, b = i % 2 == 0 ? a + 1 : random.bits() % count;
+    mesh.triangles.emplace_back(a, a, b % count);
+  }
+  for (uint32_t i = 0; i < 50; ++i) {
+    const auto first = static_cast<uint32_t>(mesh.positions.size());
+    for (int k = 0; k < 2; ++k)
+      mesh.positions.emplace_back(random.uniform(0, 1), random.uniform(0, 1), random.uniform(0.0f, 0.3f));
+    mesh.triangles.emplace_back(first, first + 1, first);
+  }
+  return mesh;
+}
+
 Mesh triangles_around_an_edge() {
   Mesh mesh;
   mesh.positions = {Vec3(0, 0, -1), Vec3(0, 0, 1)};
@@ -155,6 +173,7 @@ std::vector<NamedMesh> stress_meshes() {
       {"soup", [] { return soup_mesh(6000, 7); }, false},
       {"every triangle twice", every_triangle_twice, false},
       {"triangles without area", without_area, false},
+      {"lines among triangles", lines_among_triangles, false},
       {"3000 triangles around an edge", triangles_around_an_edge, false},
       {"one triangle", [] { return soup_mesh(1, 1); }, false},
   };

@@ -126,20 +126,36 @@ TEST(LoosePieces, GoNearestFirstAndCountTheirDistance) {
     mesh.triangles.push_back({Triangle(first, first + 1, first + 2), Triangle(Wedge::kNone), 0, 0.0});
   }
   mesh.locked.assign(mesh.points.size(), 0);
-  drop_loose_pieces(mesh, 3);
+  drop_loose_pieces(mesh, {3, 3});
   ASSERT_EQ(mesh.triangles.size(), 3u);
   double largest = 0.0;
   for (const LodTriangle& t : mesh.triangles) largest = std::max(largest, t.error);
   EXPECT_GE(largest, 10.0);
   EXPECT_LE(largest, 31.0);
-  drop_loose_pieces(mesh, 0);
+  drop_loose_pieces(mesh, {});
   EXPECT_EQ(mesh.triangles.size(), 1u);
+}
+
+TEST(LoosePieces, DearOnesStayIfEnoughGo) {
+  SimplifyMesh mesh; // pairs of triangles 1 apart, pairs 100 apart
+  for (int pair = 0; pair < 4; ++pair)
+    for (const double x : {100.0 * pair, 100.0 * pair + 1.0}) {
+      const auto first = static_cast<uint32_t>(mesh.points.size());
+      for (const DVec3& p : {DVec3(x, 0, 0), DVec3(x, 1, 0), DVec3(x, 0, 1)}) mesh.points.push_back(p);
+      mesh.triangles.push_back({Triangle(first, first + 1, first + 2), Triangle(Wedge::kNone), 0, 0.5});
+    }
+  mesh.locked.assign(mesh.points.size(), 0);
+  drop_loose_pieces(mesh, {1, 6}); // those 1 away cost 1.5, which is three times the error that is there
+  ASSERT_EQ(mesh.triangles.size(), 4u);
+  for (const LodTriangle& t : mesh.triangles) EXPECT_DOUBLE_EQ(t.error, 1.5);
+  drop_loose_pieces(mesh, {1, 3}); // now they must
+  ASSERT_EQ(mesh.triangles.size(), 3u);
 }
 
 TEST(LoosePieces, LockedOnesStay) {
   SimplifyMesh mesh = whole_number_mesh(tetrahedra_mesh(20, 9), 1e5);
   for (size_t i = 0; i < mesh.locked.size(); i += 4) mesh.locked[i] = 1;
-  drop_loose_pieces(mesh, 0);
+  drop_loose_pieces(mesh, {});
   EXPECT_EQ(mesh.triangles.size(), 80u);
 }
 

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <vector>
+
+namespace packtrace {
+
+/// Edges by what their collapse costs, the cheapest on top; those of equal cost by number. Costs are compared as
+/// floats.
+class EdgeHeap {
+public:
+  bool empty() const { return keys_.empty(); }
+  size_t size() const { return keys_.size(); }
+  uint32_t top() const { return static_cast<uint32_t>(keys_.front()); }
+  void reserve(size_t count) { keys_.reserve(count); }
+
+  /// Without order, until sort() is called.
+  /// @param cost not negative
+  void add(double cost, uint32_t edge) { keys_.push_back(key(cost, edge)); }
+  void sort() {
+    for (size_t i = keys_.size() / 2; i-- > 0;) sink(i, keys_[i]);
+  }
+
+  void pop() {
+    const uint64_t last = keys_.back();
+    keys_.pop_back();
+    if (!keys_.empty()) sink(0, last);
+  }
+
+  /// Gives the top another cost. Returns whether it still is the top.
+  bool change_top(double cost) {
+    const uint64_t changed = key(cost, top());
+    sink(0, changed);
+    return keys_.front() == changed;
+  }
+
+private:
+  /// Floats that are not negative are ordered as their bits are.
+  static uint64_t key(double cost, uint32_t edge) {
+    return (uint64_t{std::bit_cast<uint32_t>(static_cast<float>(cost))} << 32) | edge;
+  }
+
+  void sink(size_t at, uint64_t key) {
+    const size_t size = keys_.size();
+    for (size_t child; (child = 2 * at + 1) < size; at = child) {
+      if (child + 1 < size) child += keys_[child + 1] < keys_[child];
+      if (keys_[child] >= key) break;
+      keys_[at] = keys_[child];
+    }
+    keys_[at] = key;
+  }
+
+  std::vector<uint64_t> keys_;
+};
+
+} // namespace packtrace

@@ -1,0 +1,10 @@
+#include "compress/bake/lod/overlay_kernel_body.h"
+
+namespace packtrace {
+
+uint32_t overlay_kernel(const OverlayTask& task, const uint32_t* candidates, uint32_t count, OverlayPiece* pieces,
+                        double* covered) {
+  return lay_over(task, candidates, count, pieces, covered);
+}
+
+} // namespace packtrace

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+
+namespace packtrace {
+
+/// Where the triangle that is laid over a surface meets one triangle of it.
+struct OverlayPiece {
+  uint32_t triangle;
+  double distance; ///< every point of the one there is within this of the other, and the other way round
+  double share;    ///< of the area of the surface's triangle
+};
+
+/// A point seen from a triangle: barycentric coordinates in its plane, and how far above it along the direction.
+struct alignas(32) OverlayPoint {
+  double l0, l1, l2, height;
+};
+
+/// What overlay kernels work on. Plain, as they are compiled for several processors.
+struct OverlayTask {
+  const double* points;    ///< x, y, z of the surface's points
+  const uint32_t* corners; ///< three per triangle of the surface
+  OverlayPoint* projected; ///< per point, where its stamp is `stamp`
+  uint32_t* outside;       ///< then: bit i: coordinate i is not above 0
+  uint32_t* stamps;
+  uint32_t stamp;
+  double origin[3];
+  OverlayPoint from_x, from_y, from_z; ///< coordinates' slopes; those of the origin are 1, 0, 0, 0
+};
+
+/// Lays the triangle over the candidates until it is covered; those that face away are as if they were not there.
+/// Writes as many pieces as it returns, one per candidate at most, and the share of the triangle that they cover.
+using OverlayKernel = uint32_t (*)(const OverlayTask& task, const uint32_t* candidates, uint32_t count,
+                                   OverlayPiece* pieces, double* covered);
+
+uint32_t overlay_kernel(const OverlayTask& task, const uint32_t* candidates, uint32_t count, OverlayPiece* pieces,
+                        double* covered);
+namespace avx2 {
+uint32_t overlay_kernel(const OverlayTask& task, const uint32_t* candidates, uint32_t count, OverlayPiece* pieces,
+                        double* covered);
+}
+
+inline constexpr double kOverlayCovered = 1e-6; ///< of the triangle's area may be left over: roundings
+
+} // namespace packtrace

@@ -1,0 +1,75 @@
+#include "compress/bake/lod/surface_side.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace packtrace {
+namespace {
+
+constexpr size_t kLargeFan = 48; // triangles around a point
+
+} // namespace
+
+void SurfaceSide::link() {
+  const auto for_each = [&](const auto& visit) {
+    for (uint32_t i = 0; i < corner_points_.size(); ++i) {
+      const Triangle& t = corner_points_[i];
+      visit(t.x, i);
+      if (t.y != t.x) visit(t.y, i);
+      if (t.z != t.x && t.z != t.y) visit(t.z, i);
+    }
+  };
+  first_.assign(surface_.points.size() + 1, 0);
+  for_each([&](uint32_t p, uint32_t) { ++first_[p]; });
+  std::exclusive_scan(first_.begin(), first_.end(), first_.begin(), 0u);
+  fans_.resize(first_.back());
+  std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
+  for_each([&](uint32_t p, uint32_t i) { fans_[next[p]++] = i; });
+}
+
+void SurfaceSide::gather(const Triangle& corners) {
+  candidates_.clear();
+  ++stamp_value_;
+  for (int i = 0; i < 3; ++i) {
+    const std::span<const uint32_t> around = fan(corners[i]);
+    if (around.size() > kLargeFan)
+      add_large_fan(around, corners, i);
+    else
+      for (const uint32_t t : around) add(t);
+  }
+}
+
+/// Those that have another of the corners too, or else a few.
+void SurfaceSide::add_large_fan(std::span<const uint32_t> fan, const Triangle& corners, int corner) {
+  size_t added = 0;
+  for (size_t k = 0; k < fan.size() && added < kLargeFan; ++k)
+    for (int i = 0; i < 3; ++i)
+      if (const uint32_t p = corner_points_[fan[k]][i];
+          p != corners[corner] && (p == corners.x || p == corners.y || p == corners.z)) {
+        add(fan[k]), ++added;
+        break;
+      }
+  for (size_t k = 0; k < kLargeFan && added == 0; ++k) add(fan[k]);
+}
+
+void SurfaceSide::widen() {
+  const size_t count = candidates_.size();
+  for (size_t i = 0; i < count; ++i)
+    for (int k = 0; k < 3; ++k)
+      if (const auto around = fan(corner_points_[candidates_[i]][k]); around.size() <= kLargeFan)
+        for (const uint32_t t : around) add(t);
+}
+
+void SurfaceSide::gather_near(DVec3 point) {
+  constexpr size_t kTried = 16;
+  std::vector<std::pair<double, uint32_t>> near(corner_points_.size());
+  for (uint32_t t = 0; t < near.size(); ++t) {
+    const DVec3 d = surface_.corner(t, 0) - point;
+    near[t] = {glm::dot(d, d), t};
+  }
+  const size_t count = std::min(near.size(), kTried);
+  std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(count), near.end());
+  for (size_t i = 0; i < count; ++i) add(near[i].second);
+}
+
+} // namespace packtrace

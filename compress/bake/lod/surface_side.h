@@ -1,0 +1,59 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "compress/bake/lod/triangle_overlay.h"
+
+namespace packtrace {
+
+/// A surface before or after, with what is around its points. Both use the numbers of points after: those before count
+/// as what they became.
+class SurfaceSide {
+public:
+  template <typename PointOf>
+  SurfaceSide(const OverlaySurface& surface, const PointOf& point_of)
+      : surface_(surface), overlay_(surface), stamp_(surface.triangles.size()) {
+    corner_points_.reserve(surface.triangles.size());
+    for (const LodTriangle& t : surface.triangles)
+      corner_points_.emplace_back(point_of(t.points.x), point_of(t.points.y), point_of(t.points.z));
+    link();
+  }
+
+  const OverlaySurface& surface() const { return surface_; }
+  Overlay& overlay() { return overlay_; }
+  const Triangle& corner_points(uint32_t triangle) const { return corner_points_[triangle]; }
+  std::array<DVec3, 3> corners(uint32_t triangle) const {
+    return {surface_.corner(triangle, 0), surface_.corner(triangle, 1), surface_.corner(triangle, 2)};
+  }
+
+  // What another triangle is measured against: a set of triangles of this side.
+  std::span<const uint32_t> candidates() const { return candidates_; }
+  void gather(const Triangle& corners); ///< those around three points
+  void widen();                         ///< one ring more
+  void gather_near(DVec3 point);        ///< a few more: those with corners near it
+  bool lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::vector<OverlayPiece>& pieces) {
+    return overlay_.lay(triangle, direction, candidates_, pieces);
+  }
+
+private:
+  void link();
+  std::span<const uint32_t> fan(uint32_t point) const {
+    return std::span(fans_).subspan(first_[point], first_[point + 1] - first_[point]);
+  }
+  void add_large_fan(std::span<const uint32_t> fan, const Triangle& corners, int corner);
+  void add(uint32_t triangle) {
+    if (stamp_[triangle] != stamp_value_) stamp_[triangle] = stamp_value_, candidates_.push_back(triangle);
+  }
+
+  OverlaySurface surface_;
+  Overlay overlay_;
+  std::vector<Triangle> corner_points_;
+  std::vector<uint32_t> first_, fans_; ///< triangles around points
+  std::vector<uint32_t> stamp_, candidates_;
+  uint32_t stamp_value_ = 0;
+};
+
+} // namespace packtrace

@@ -1,0 +1,118 @@
+#include "compress/bake/lod/triangle_overlay.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "compress/bake/lod/triangle_distance.h"
+
+namespace packtrace {
+namespace {
+
+constexpr double kSteep = 0.05; // cosine; what is steeper is not seen from there
+static_assert(sizeof(DVec3) == 3 * sizeof(double));
+
+OverlayKernel pick_kernel() {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx2")) return avx2::overlay_kernel;
+#endif
+  return overlay_kernel;
+}
+
+/// Slopes of the coordinates along one axis.
+OverlayPoint slopes(double l1, double l2, double height) { return {-(l1 + l2), l1, l2, height}; }
+
+/// A convex part of a triangle of the surface, in coordinates of the one laid over it. Six corners, or nine where
+/// roundings bend it.
+struct Polygon {
+  std::array<OverlayPoint, 9> corners;
+  size_t count;
+};
+
+double coordinate(const OverlayPoint& p, int i) { return i == 0 ? p.l0 : i == 1 ? p.l1 : p.l2; }
+
+/// Keeps where a coordinate is not negative.
+Polygon cut(const Polygon& in, int i) {
+  Polygon out{{}, 0};
+  for (size_t k = 0; k < in.count; ++k) {
+    const OverlayPoint &p = in.corners[k == 0 ? in.count - 1 : k - 1], &q = in.corners[k];
+    const double last = coordinate(p, i), next = coordinate(q, i);
+    if ((last < 0.0) != (next < 0.0)) {
+      const double t = last / (last - next);
+      out.corners[out.count++] = {p.l0 + t * (q.l0 - p.l0), p.l1 + t * (q.l1 - p.l1), p.l2 + t * (q.l2 - p.l2),
+                                  p.height + t * (q.height - p.height)};
+    }
+    if (next >= 0.0) out.corners[out.count++] = q;
+  }
+  return out;
+}
+
+} // namespace
+
+DVec3 OverlaySurface::area_normal(uint32_t triangle) const {
+  const DVec3& a = corner(triangle, 0);
+  return glm::cross(corner(triangle, 1) - a, corner(triangle, 2) - a);
+}
+
+double OverlaySurface::distance(DVec3 p, uint32_t triangle) const {
+  return glm::length(p - nearest_point(p, corner(triangle, 0), corner(triangle, 1), corner(triangle, 2)));
+}
+
+Overlay::Overlay(const OverlaySurface& surface)
+    : surface_(surface), projected_(surface.points.size()), outside_(surface.points.size()),
+      stamps_(surface.points.size()) {
+  corners_.reserve(3 * surface.triangles.size());
+  for (const LodTriangle& t : surface.triangles)
+    for (int i = 0; i < 3; ++i) corners_.push_back(t.points[i]);
+  task_.corners = corners_.data();
+  task_.projected = projected_.data();
+  task_.outside = outside_.data();
+  task_.stamps = stamps_.data();
+}
+
+bool Overlay::lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::span<const uint32_t> candidates,
+                  std::vector<OverlayPiece>& pieces) {
+  static const OverlayKernel kernel = pick_kernel();
+  const double length = glm::length(direction);
+  if (!(length > 0.0) || candidates.empty()) return false;
+  const DVec3 z = direction / length;
+  triangle_ = triangle, direction_ = z;
+  const DVec3 normal = glm::cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
+  double seen = glm::dot(normal, z);
+  if (!(std::abs(seen) > kSteep * glm::length(normal))) return false;
+  if (seen < 0.0) std::swap(triangle_[1], triangle_[2]), seen = -seen; // it is seen from behind
+  const DVec3 e1 = triangle_[1] - triangle_[0], e2 = triangle_[2] - triangle_[0];
+  // p = triangle_[0] + l1 e1 + l2 e2 + height z
+  const double scale = 1.0 / seen;
+  const DVec3 l1 = glm::cross(e2, z) * scale, l2 = glm::cross(z, e1) * scale, height = glm::cross(e1, e2) * scale;
+  task_.points = &surface_.points[0].x;
+  for (int axis = 0; axis < 3; ++axis) task_.origin[axis] = triangle_[0][axis];
+  task_.from_x = slopes(l1.x, l2.x, height.x);
+  task_.from_y = slopes(l1.y, l2.y, height.y);
+  task_.from_z = slopes(l1.z, l2.z, height.z);
+  ++task_.stamp;
+
+  if (found_.size() < candidates.size()) found_.resize(candidates.size());
+  double covered = 0.0;
+  const uint32_t count =
+      kernel(task_, candidates.data(), static_cast<uint32_t>(candidates.size()), found_.data(), &covered);
+  const bool once = covered >= 1.0 - kOverlayCovered && covered <= 1.0 + kOverlayCovered;
+  if (once) pieces.insert(pieces.end(), found_.begin(), found_.begin() + count);
+  return once;
+}
+
+double Overlay::nearest_distance(const OverlayPiece& piece) const {
+  const uint32_t* points = &corners_[size_t{3} * piece.triangle];
+  Polygon polygon{{projected_[points[0]], projected_[points[1]], projected_[points[2]]}, 3};
+  for (int i = 0; i < 3; ++i) polygon = cut(polygon, i);
+  const DVec3 e1 = triangle_[1] - triangle_[0], e2 = triangle_[2] - triangle_[0];
+  double largest = 0.0;
+  for (size_t i = 0; i < polygon.count; ++i) {
+    const OverlayPoint& c = polygon.corners[i];
+    const DVec3 on = triangle_[0] + c.l1 * e1 + c.l2 * e2, over = on + c.height * direction_;
+    largest = std::max({largest, surface_.distance(on, piece.triangle),
+                        glm::length(over - nearest_point(over, triangle_[0], triangle_[1], triangle_[2]))});
+  }
+  return polygon.count < 3 ? piece.distance : std::min(largest, piece.distance);
+}
+
+} // namespace packtrace

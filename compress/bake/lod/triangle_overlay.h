@@ -1,0 +1,50 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "compress/bake/lod/overlay_kernel.h"
+#include "compress/bake/lod/simplify.h"
+
+namespace packtrace {
+
+/// Triangles that another one is laid over.
+struct OverlaySurface {
+  std::span<const DVec3> points;
+  std::span<const LodTriangle> triangles;
+
+  const DVec3& corner(uint32_t triangle, int i) const { return points[triangles[triangle].points[i]]; }
+  DVec3 area_normal(uint32_t triangle) const; ///< twice the area long
+  double distance(DVec3 p, uint32_t triangle) const;
+};
+
+/// Lays one triangle after another over parts of a surface: both are seen along one direction, where outlines cut them
+/// into convex pieces. Along that direction the distance between both planes is linear, so that of a piece is largest
+/// at one of its corners; distance from a triangle is convex, so the same is true of the nearest points.
+class Overlay {
+public:
+  explicit Overlay(const OverlaySurface& surface);
+
+  /// Appends the pieces to `pieces` and returns true where the candidates cover the triangle just once. `pieces` is as
+  /// it was else. Triangles of the surface that face away are as if they were not there.
+  /// @param direction any length; false where the triangle is seen nearly from its side
+  bool lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::span<const uint32_t> candidates,
+           std::vector<OverlayPiece>& pieces);
+
+  /// The distance of a piece of the last lay() by nearest points: never more than along the direction.
+  double nearest_distance(const OverlayPiece& piece) const;
+
+private:
+  OverlaySurface surface_;
+  std::vector<uint32_t> corners_;
+  std::vector<OverlayPoint> projected_;
+  std::vector<uint32_t> outside_, stamps_;
+  std::vector<OverlayPiece> found_; ///< what the kernel wrote
+  OverlayTask task_{};
+  std::array<DVec3, 3> triangle_{};
+  DVec3 direction_{};
+};
+
+} // namespace packtrace

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "compress/bake/lod/distance_kernel.h"
+#include "compress/bake/lod/triangle_overlay.h"
+
+namespace packtrace {
+
+/// Numbered triangles of a surface that points are measured against, four at a time.
+class TriangleSet {
+public:
+  void clear() { numbers_.clear(), blocks_.clear(); }
+  void add(const OverlaySurface& surface, uint32_t triangle);
+  /// Adds triangle i of another set.
+  void add(const TriangleSet& other, size_t i);
+
+  size_t size() const { return numbers_.size(); }
+  bool empty() const { return numbers_.empty(); }
+  uint32_t number(size_t i) const { return numbers_[i]; }
+
+  /// The first size() of the result: how far the point is from each.
+  void distances(const DVec3& point, std::vector<double>& out) const;
+
+private:
+  TriangleBlock& next_block(uint32_t number, size_t& lane);
+
+  std::vector<uint32_t> numbers_;
+  std::vector<TriangleBlock> blocks_;
+};
+
+} // namespace packtrace

@@ -1,0 +1,287 @@
+// What measures and places four triangles or edges at once.
+
+#include <cmath>
+#include <cstring>
+
+#include <gtest/gtest.h>
+
+#include "compress/bake/lod/edge_heap.h"
+#include "compress/bake/lod/edge_placement.h"
+#include "compress/bake/lod/triangle_distance.h"
+#include "compress/bake/lod/triangle_overlay.h"
+#include "compress/bake/lod/triangle_set.h"
+#include "tests/compress/test_scenes.h"
+
+namespace packtrace::test {
+namespace {
+
+DVec3 random_point(Random& random) {
+  return 100.0 * DVec3(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1));
+}
+
+/// Points and triangles that an overlay can work on.
+struct Surface {
+  std::vector<DVec3> points;
+  std::vector<LodTriangle> triangles;
+  OverlaySurface view() const { return {points, triangles}; }
+  std::vector<uint32_t> all() const {
+    std::vector<uint32_t> numbers(triangles.size());
+    for (uint32_t i = 0; i < numbers.size(); ++i) numbers[i] = i;
+    return numbers;
+  }
+  std::array<DVec3, 3> corners(size_t i) const {
+    const Triangle& t = triangles[i].points;
+    return {points[t.x], points[t.y], points[t.z]};
+  }
+};
+
+/// A square [0, 100]^2, `cells` cells wide, points moved up and down by up to `height`.
+Surface bumpy_square(uint32_t cells, float height, uint32_t seed) {
+  Random random(seed);
+  Surface s;
+  for (uint32_t y = 0; y <= cells; ++y)
+    for (uint32_t x = 0; x <= cells; ++x)
+      s.points.emplace_back(100.0 * x / cells, 100.0 * y / cells, random.uniform(-height, height));
+  for (uint32_t y = 0; y < cells; ++y)
+    for (uint32_t x = 0; x < cells; ++x) {
+      const uint32_t a = y * (cells + 1) + x, b = a + cells + 1;
+      s.triangles.push_back({Triangle(a, a + 1, b + 1), Triangle(Wedge::kNone), 0, 0.0});
+      s.triangles.push_back({Triangle(a, b + 1, b), Triangle(Wedge::kNone), 0, 0.0});
+    }
+  return s;
+}
+
+Surface random_triangles(uint32_t count, uint32_t seed) {
+  Random random(seed);
+  Surface s;
+  for (uint32_t i = 0; i < count; ++i) {
+    const DVec3 a = random_point(random), b = i % 9 == 0 ? a : random_point(random);
+    const DVec3 c = i % 7 == 0 ? a + 0.5 * (b - a) : random_point(random);
+    for (const DVec3& p : {a, b, c}) s.points.push_back(p);
+    s.triangles.push_back({Triangle(3 * i, 3 * i + 1, 3 * i + 2), Triangle(Wedge::kNone), 0, 0.0});
+  }
+  return s;
+}
+
+TEST(TriangleSet, DistancesAreThoseOfTheNearestPoints) {
+  const Surface s = random_triangles(101, 1);
+  TriangleSet all, odd;
+  for (const uint32_t t : s.all()) all.add(s.view(), t);
+  for (size_t i = 1; i < all.size(); i += 2) odd.add(all, i);
+  ASSERT_EQ(all.size(), 101u);
+  ASSERT_EQ(odd.size(), 50u);
+  Random random(2);
+  std::vector<double> distances;
+  for (int repeat = 0; repeat < 100; ++repeat) {
+    const DVec3 p = 1.5 * random_point(random);
+    const auto expected = [&](uint32_t t) {
+      const std::array<DVec3, 3> c = s.corners(t);
+      return glm::length(p - nearest_point(p, c[0], c[1], c[2]));
+    };
+    all.distances(p, distances);
+    for (size_t i = 0; i < all.size(); ++i) EXPECT_NEAR(distances[i], expected(all.number(i)), 1e-9);
+    odd.distances(p, distances);
+    for (size_t i = 0; i < odd.size(); ++i) EXPECT_NEAR(distances[i], expected(odd.number(i)), 1e-9);
+  }
+}
+
+TEST(Overlay, PiecesBoundTheDistanceOfTheTriangle) {
+  const Surface coarse = bumpy_square(7, 5.0f, 3), fine = bumpy_square(11, 5.0f, 4);
+  const std::vector<uint32_t> all = coarse.all();
+  Overlay overlay(coarse.view());
+  std::vector<double> met(coarse.triangles.size());
+  for (size_t t = 0; t < fine.triangles.size(); ++t) {
+    const std::array<DVec3, 3> p = fine.corners(t);
+    std::vector<OverlayPiece> pieces;
+    ASSERT_TRUE(overlay.lay(p, DVec3(0, 0, 1), all, pieces)) << t;
+    double bound = 0.0, nearest_bound = 0.0;
+    for (const OverlayPiece& piece : pieces) {
+      met[piece.triangle] += piece.share;
+      bound = std::max(bound, piece.distance);
+      const double nearest = overlay.nearest_distance(piece);
+      EXPECT_LE(nearest, piece.distance);
+      nearest_bound = std::max(nearest_bound, nearest);
+    }
+    for (int i = 0; i <= 10; ++i)
+      for (int k = 0; k <= 10 - i; ++k) {
+        const DVec3 q = p[0] + 0.1 * i * (p[1] - p[0]) + 0.1 * k * (p[2] - p[0]);
+        double distance = 1e300;
+        for (const uint32_t s : all) distance = std::min(distance, coarse.view().distance(q, s));
+        EXPECT_LE(distance, nearest_bound + 1e-9);
+        EXPECT_LE(distance, bound + 1e-9);
+      }
+  }
+  for (const double share : met) EXPECT_NEAR(share, 1.0, 1e-6); // both cover the square once
+}
+
+TEST(Overlay, ACoincidingTriangleIsOnePiece) {
+  const Surface s = bumpy_square(5, 5.0f, 5);
+  const std::vector<uint32_t> all = s.all();
+  Overlay overlay(s.view());
+  for (const uint32_t t : all) {
+    std::vector<OverlayPiece> pieces;
+    ASSERT_TRUE(overlay.lay(s.corners(t), s.view().area_normal(t), all, pieces));
+    ASSERT_EQ(pieces.size(), 1u);
+    EXPECT_EQ(pieces[0].triangle, t);
+    EXPECT_NEAR(pieces[0].share, 1.0, 1e-9);
+    EXPECT_LT(pieces[0].distance, 1e-9);
+  }
+}
+
+TEST(Overlay, HolesAndSecondLayersAreNoCover) {
+  const Surface s = bumpy_square(4, 5.0f, 6), other = bumpy_square(3, 0.0f, 7);
+  Overlay overlay(s.view());
+  const std::array<DVec3, 3> p = other.corners(8);
+  std::vector<OverlayPiece> pieces;
+  ASSERT_TRUE(overlay.lay(p, DVec3(0, 0, 1), s.all(), pieces));
+  const std::vector<OverlayPiece> whole = pieces;
+  ASSERT_GE(whole.size(), 2u);
+  for (const OverlayPiece& left_out : whole) {
+    std::vector<uint32_t> with_hole = s.all();
+    std::erase(with_hole, left_out.triangle);
+    EXPECT_FALSE(overlay.lay(p, DVec3(0, 0, 1), with_hole, pieces));
+  }
+  std::vector<uint32_t> twice = {whole[0].triangle, whole[0].triangle};
+  for (const OverlayPiece& piece : whole) twice.push_back(piece.triangle);
+  EXPECT_FALSE(overlay.lay(p, DVec3(0, 0, 1), twice, pieces));
+  EXPECT_FALSE(overlay.lay(p, DVec3(0, 0, -1), s.all(), pieces)); // seen from behind
+  EXPECT_FALSE(overlay.lay(p, DVec3(1, 0, 0), s.all(), pieces));  // and from its side
+  EXPECT_EQ(pieces.size(), whole.size());                         // nothing was added
+}
+
+TEST(EdgeHeap, GivesEdgesByCostThenNumber) {
+  Random random(8);
+  EdgeHeap heap;
+  std::vector<std::pair<float, uint32_t>> expected;
+  for (uint32_t i = 0; i < 1000; ++i) {
+    const float cost = std::floor(random.uniform(0, 100)) * (i % 50 == 0 ? 1e-42f : 1e10f);
+    heap.add(cost, i);
+    expected.emplace_back(cost, i);
+  }
+  heap.sort();
+  std::sort(expected.begin(), expected.end());
+  for (const auto& [cost, edge] : expected) {
+    ASSERT_FALSE(heap.empty());
+    EXPECT_EQ(heap.top(), edge);
+    heap.pop();
+  }
+  EXPECT_TRUE(heap.empty());
+  for (uint32_t i = 0; i < 3; ++i) heap.add(i, i);
+  heap.sort();
+  EXPECT_TRUE(heap.change_top(0.5));
+  EXPECT_FALSE(heap.change_top(1.5));
+  EXPECT_EQ(heap.top(), 1u);
+}
+
+EdgeBatch random_batch(Random& random) {
+  EdgeBatch batch{};
+  for (int lane = 0; lane < 4; ++lane) {
+    for (int plane = 0; plane < 5; ++plane) { // a sum of squared distances to planes
+      const double n[4] = {random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-9, 9)};
+      for (int i = 0, k = 0; i < 3; ++i)
+        for (int l = i; l < 3; ++l) batch.quadric[k++][lane] += n[i] * n[l];
+      for (int i = 0; i < 3; ++i) batch.quadric[6 + i][lane] += n[i] * n[3];
+      batch.quadric[9][lane] += n[3] * n[3];
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      batch.a[axis][lane] = std::round(random.uniform(-20, 20));
+      batch.b[axis][lane] = std::round(random.uniform(-20, 20));
+      batch.lo[axis] = -30.0, batch.hi[axis] = 30.0;
+    }
+    batch.keep[lane] = static_cast<double>(random.bits() % 3);
+  }
+  return batch;
+}
+
+TEST(EdgePlacement, IsNoWorseThanTheEnds) {
+  Random random(9);
+  for (int repeat = 0; repeat < 300; ++repeat) {
+    EdgeBatch batch = random_batch(random);
+    batch.ends_only = repeat % 3 == 0;
+    place_edges(batch);
+    for (int lane = 0; lane < 4; ++lane) {
+      const auto cost = [&](const double(*p)[4]) {
+        const double x = p[0][lane], y = p[1][lane], z = p[2][lane];
+        const auto q = [&](int i) { return batch.quadric[i][lane]; };
+        return x * x * q(0) + 2 * x * y * q(1) + 2 * x * z * q(2) + y * y * q(3) + 2 * y * z * q(4) + z * z * q(5) +
+               2 * (x * q(6) + y * q(7) + z * q(8)) + q(9);
+      };
+      EXPECT_NEAR(batch.cost[lane], cost(batch.point), 1e-8);
+      if (batch.keep[lane] != 2.0) {
+        EXPECT_LE(batch.cost[lane], cost(batch.a) + 1e-8);
+      }
+      if (batch.keep[lane] != 1.0) {
+        EXPECT_LE(batch.cost[lane], cost(batch.b) + 1e-8);
+      }
+      for (int axis = 0; axis < 3; ++axis) {
+        EXPECT_EQ(batch.point[axis][lane], std::round(batch.point[axis][lane]));
+        if (batch.keep[lane] == 1.0) {
+          EXPECT_EQ(batch.point[axis][lane], batch.a[axis][lane]);
+        }
+        if (batch.keep[lane] == 2.0) {
+          EXPECT_EQ(batch.point[axis][lane], batch.b[axis][lane]);
+        }
+      }
+    }
+  }
+}
+
+#if defined(__x86_64__)
+
+TEST(LodKernels, GiveTheSameBitsOnEveryProcessor) {
+  if (!__builtin_cpu_supports("avx2")) GTEST_SKIP() << "no AVX2";
+  Random random(10);
+  const Surface s = random_triangles(64, 11);
+  std::vector<TriangleBlock> blocks(5);
+  for (TriangleBlock& block : blocks)
+    for (int axis = 0; axis < 3; ++axis)
+      for (int lane = 0; lane < 4; ++lane) {
+        block.a[axis][lane] = random.uniform(-9, 9);
+        block.ab[axis][lane] = random.uniform(-9, 9), block.ac[axis][lane] = random.uniform(-9, 9);
+      }
+  for (int repeat = 0; repeat < 200; ++repeat) {
+    EdgeBatch edges = random_batch(random), same_edges = edges;
+    place_edges(edges), avx2::place_edges(same_edges);
+    EXPECT_EQ(std::memcmp(edges.point, same_edges.point, sizeof edges.point), 0);
+    EXPECT_EQ(std::memcmp(edges.cost, same_edges.cost, sizeof edges.cost), 0);
+    EXPECT_EQ(std::memcmp(edges.along, same_edges.along, sizeof edges.along), 0);
+
+    const DVec3 p = random_point(random);
+    std::array<double, 20> far{}, same_far{};
+    triangle_distances(&p.x, blocks.data(), blocks.size(), far.data());
+    avx2::triangle_distances(&p.x, blocks.data(), blocks.size(), same_far.data());
+    EXPECT_EQ(std::memcmp(far.data(), same_far.data(), sizeof far), 0);
+
+    const auto lay = [&](OverlayKernel kernel, std::vector<OverlayPiece>& pieces) {
+      std::vector<OverlayPoint> projected(s.points.size());
+      std::vector<uint32_t> outside(s.points.size()), stamps(s.points.size()), corners(s.points.size());
+      for (uint32_t i = 0; i < corners.size(); ++i) corners[i] = i;
+      Random slopes(static_cast<uint32_t>(repeat));
+      OverlayTask task{};
+      task.points = &s.points[0].x, task.corners = corners.data(), task.projected = projected.data();
+      task.outside = outside.data(), task.stamps = stamps.data(), task.stamp = 1;
+      for (OverlayPoint* slope : {&task.from_x, &task.from_y, &task.from_z}) {
+        slope->l1 = 0.01 * slopes.uniform(-1, 1), slope->l2 = 0.01 * slopes.uniform(-1, 1);
+        slope->l0 = -(slope->l1 + slope->l2), slope->height = slopes.uniform(-1, 1);
+      }
+      double covered = 0.0;
+      const std::vector<uint32_t> all = s.all();
+      pieces.resize(all.size());
+      pieces.resize(kernel(task, all.data(), static_cast<uint32_t>(all.size()), pieces.data(), &covered));
+      return covered;
+    };
+    std::vector<OverlayPiece> pieces, same_pieces;
+    EXPECT_EQ(lay(overlay_kernel, pieces), lay(avx2::overlay_kernel, same_pieces));
+    ASSERT_EQ(pieces.size(), same_pieces.size());
+    for (size_t i = 0; i < pieces.size(); ++i) {
+      EXPECT_EQ(pieces[i].triangle, same_pieces[i].triangle);
+      EXPECT_EQ(pieces[i].distance, same_pieces[i].distance);
+      EXPECT_EQ(pieces[i].share, same_pieces[i].share);
+    }
+  }
+}
+
+#endif
+
+} // namespace
+} // namespace packtrace::test
