@@ -1,8 +1,14 @@
 #include "compress/format/node_writer.h"
 
 #include <cassert>
+#include <cstddef>
 
 namespace packtrace {
+
+static_assert(offsetof(baked::PackedNode, exponents) == 12 && offsetof(baked::PackedNode, first_child) == 16 &&
+              offsetof(baked::PackedNode, children) == 24 && offsetof(baked::PackedNode, lo) == 32 &&
+              offsetof(baked::PackedNode, hi) == 56);
+static_assert(offsetof(baked::TreeRecord, origin) == 16 && offsetof(baked::TreeRecord, step_mantissa) == 40);
 
 std::span<const TreeGridBox> triangle_boxes(const ClusterView& cluster, const TreeGridMap& map, ClusterBoxes& room) {
   std::array<Triangle, kMaxClusterTriangles> triangles;

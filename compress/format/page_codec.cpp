@@ -191,11 +191,12 @@ private:
 
   uint64_t node_bytes() const { return header_.node_count * sizeof(baked::PackedNode); }
 
+  /// Of the tail: nothing of it changes while nodes are made.
   template <typename T>
   std::span<const T> section(const baked::FileHeader& header, baked::Section number) const {
     const baked::SectionRecord& record = header.sections[number];
-    if (record.offset % baked::kSectionAlignment != 0 || record.offset > resident_.size() ||
-        record.bytes > resident_.size() - record.offset)
+    if (record.offset % baked::kSectionAlignment != 0 || record.offset > nodes_begin_ ||
+        record.bytes > nodes_begin_ - record.offset)
       fail("section " + std::to_string(number));
     return {reinterpret_cast<const T*>(resident_.data() + record.offset),
             static_cast<size_t>(record.bytes / sizeof(T))};

@@ -118,7 +118,7 @@ TEST_F(TreeDamage, RecordsAreChecked) {
   EXPECT_EQ(tree(0, offsetof(TreeRecord, reserved), 1), "tree 0: depth or reserved field");
   EXPECT_EQ(tree(0, offsetof(TreeRecord, geometry), 77), "tree 0: geometry");
   EXPECT_EQ(tree(1, offsetof(TreeRecord, geometry), baked::kWorldTree), "tree 1: geometry");
-  EXPECT_EQ(tree(1, offsetof(TreeRecord, geometry), 0), "geometry 2: no tree");
+  EXPECT_EQ(tree(1, offsetof(TreeRecord, geometry), 0), "geometry 0: lattice beyond that of its tree"); // not the ball's
   EXPECT_EQ(tree(0, offsetof(TreeRecord, step_mantissa), 7), "tree 0: step");
   EXPECT_EQ(tree(0, offsetof(TreeRecord, step_exponent), 5000), "tree 0: step");
   EXPECT_EQ(tree(0, offsetof(TreeRecord, origin) + 4, 1u << 30), "tree 0: origin");
