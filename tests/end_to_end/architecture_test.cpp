@@ -24,7 +24,8 @@ const std::vector<Layer> kLayers = {
     {"compress/format/", {"pbrt_import/scene/"}},
     {"compress/bake/", {"compress/format/", "pbrt_import/scene/"}},
     {"runtime/lod/", {"compress/format/", "pbrt_import/scene/"}},
-    {"runtime/commands/", {"runtime/", "runtime/lod/", "compress/format/", "compress/bake/", "pbrt_import/", "pbrt_import/scene/"}},
+    {"runtime/commands/",
+     {"runtime/", "runtime/lod/", "compress/format/", "compress/bake/", "pbrt_import/", "pbrt_import/scene/"}},
     {"runtime/", {"runtime/lod/", "compress/format/", "pbrt_import/scene/"}},
 };
 
