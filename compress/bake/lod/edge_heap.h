@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace packtrace {
@@ -38,7 +40,9 @@ public:
 private:
   /// Floats that are not negative are ordered as their bits are.
   static uint64_t key(double cost, uint32_t edge) {
-    return (uint64_t{std::bit_cast<uint32_t>(static_cast<float>(cost))} << 32) | edge;
+    constexpr double kLargest = std::numeric_limits<float>::max();
+    const auto rounded = static_cast<float>(std::min(cost, kLargest));
+    return (uint64_t{std::bit_cast<uint32_t>(rounded)} << 32) | edge;
   }
 
   void sink(size_t at, uint64_t key) {
