@@ -283,11 +283,11 @@ HitSurface PackedTracer::resolve(const RayHit& hit) const {
   surface.triangle = file_.sections().clusters[hit.part].first_triangle + hit.triangle;
   const uint32_t instance = t.instance_of[hit.placement];
   surface.placement = &t.surfaces[instance == baked::kNone ? t.first_instance[surface.geometry] : instance];
-  const baked::GeometryRecord& geometry = file_.geometries()[surface.geometry];
   packed::DecodedBatch batch;
-  decode_batch_exactly(t.records[t.tree_of[surface.geometry]], geometry,
-                       file_.cluster(surface.geometry, static_cast<uint32_t>(hit.part - geometry.first_cluster)),
-                       hit.triangle, 1, batch);
+  if (const packed::TraceCluster& cluster = t.clusters[hit.part]; (cluster.flags & packed::kWide) == 0)
+    kernels_.decode(cluster, hit.triangle, 1, batch);
+  else
+    t.scene.decode_wide(this, hit.part, hit.triangle, 1, batch);
   for (int corner = 0; corner < 3; ++corner)
     for (int axis = 0; axis < 3; ++axis) surface.vertices[corner][axis] = batch.vertex[axis][corner][0];
   return surface;

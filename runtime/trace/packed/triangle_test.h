@@ -75,8 +75,17 @@ inline uint32_t test_triangles(const DecodedBatch& batch, const RayGroup& group,
 
   uint32_t hit = maybe & (Lanes::less(error, least) | Lanes::less(most, below));
   const F over = Lanes::div(Lanes::set(1.0f), Lanes::add(Lanes::add(u, v), w));
-  const F depth = Lanes::fma(u, z[0], Lanes::fma(v, z[1], Lanes::mul(w, z[2])));
-  Lanes::store(hits.t, Lanes::mul(Lanes::mul(depth, over), Lanes::set(group.shear[2][ray])));
+  // From the plane rather than from the weights: what vertices have along an axis that the plane is perpendicular to is
+  // then all that counts, which is what ray offsets rely on.
+  const F px = relative(kx, 0), py = relative(ky, 0);
+  const F ex = Lanes::sub(relative(kx, 1), px), ey = Lanes::sub(relative(ky, 1), py), ez = Lanes::sub(z[1], z[0]);
+  const F fx = Lanes::sub(relative(kx, 2), px), fy = Lanes::sub(relative(ky, 2), py), fz = Lanes::sub(z[2], z[0]);
+  const F nx = Lanes::sub(Lanes::mul(ey, fz), Lanes::mul(ez, fy)),
+          ny = Lanes::sub(Lanes::mul(ez, fx), Lanes::mul(ex, fz)),
+          nz = Lanes::sub(Lanes::mul(ex, fy), Lanes::mul(ey, fx));
+  const F along = Lanes::fma(sx, nx, Lanes::fma(sy, ny, nz));
+  const F depth = Lanes::fma(px, nx, Lanes::fma(py, ny, Lanes::mul(z[0], nz)));
+  Lanes::store(hits.t, Lanes::mul(Lanes::div(depth, along), Lanes::set(group.shear[2][ray])));
   Lanes::store(hits.u, Lanes::mul(v, over));
   Lanes::store(hits.v, Lanes::mul(w, over));
   if (const uint32_t unsure = maybe & ~hit; unsure != 0) {
