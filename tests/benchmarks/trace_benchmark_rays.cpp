@@ -60,12 +60,14 @@ private:
   RecordedRays& out_;
 };
 
-bool differ(const RayHit& a, const RayHit& b, double t_scale) {
-  constexpr double kTolerance = 1e-4;
+/// Distances are known to a few roundings of where the ray starts, however near the hit is.
+bool differ(const Ray& ray, const RayHit& a, const RayHit& b, double t_scale) {
+  constexpr double kTolerance = 1e-4, kUlps = 4.0 * 0x1p-23;
   if (a.valid() != b.valid()) return true;
   if (!a.valid()) return false;
   const double ta = double(a.t), tb = double(b.t) * t_scale;
-  return std::abs(ta - tb) > kTolerance * std::max(ta, tb);
+  const Vec3 start = glm::abs(ray.origin);
+  return std::abs(ta - tb) > kTolerance * std::max(ta, tb) + kUlps * std::max({start.x, start.y, start.z});
 }
 
 } // namespace
@@ -147,7 +149,7 @@ double replay(const RecordedRays& recorded, const RayTracer& tracer, RayResults&
 uint64_t mismatches(const RecordedRays& recorded, const RayResults& a, const RayResults& b, double t_scale) {
   uint64_t count = 0;
   for (size_t i = 0; i < recorded.rays.size(); ++i)
-    count += recorded.any ? a.occluded[i] != b.occluded[i] : differ(a.hits[i], b.hits[i], t_scale);
+    count += recorded.any ? a.occluded[i] != b.occluded[i] : differ(recorded.rays[i], a.hits[i], b.hits[i], t_scale);
   return count;
 }
 

@@ -45,7 +45,8 @@ struct RayResults {
 /// @return seconds of wall time, or of CPU time of all threads
 double replay(const RecordedRays& recorded, const RayTracer& tracer, RayResults& results, bool cpu_clock);
 
-/// Rays of which two tracers disagree: whether there is a hit, or in t by more than 1e-4 of it.
+/// Rays of which two tracers disagree: whether there is a hit, or in t by more than 1e-4 of it and 4 ulp of the
+/// ray's origin.
 /// @param t_scale what a length of b is in a's space
 uint64_t mismatches(const RecordedRays& recorded, const RayResults& a, const RayResults& b, double t_scale);
 
