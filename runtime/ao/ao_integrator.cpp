@@ -3,9 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
-#include <type_traits>
-
-#include <embree3/rtcore.h>
 
 #include "pbrt_import/scene/error.h"
 #include "runtime/trace/tiles.h"
@@ -61,34 +58,34 @@ void make_basis(Vec3 n, Vec3& tangent, Vec3& bitangent) {
 struct ShadingPoint {
   size_t pixel;
   PixelSampler::Pixel sampler;
-  Vec3 origin; ///< unit space
   Vec3 geometric;
   Vec3 normal, tangent, bitangent;
 };
 
 class AoTracer {
 public:
-  AoTracer(const SceneSource& source, const EmbreeScene& scene, const GBuffer& gbuffer, const AoConfig& config,
+  AoTracer(const SceneSource& source, const RayTracer& tracer, const GBuffer& gbuffer, const AoConfig& config,
            uint32_t frame_index, AoFrame& out)
-      : source_(source), scene_(scene), gbuffer_(gbuffer), config_(config), coefficient_(config),
+      : source_(source), tracer_(tracer), gbuffer_(gbuffer), config_(config), coefficient_(config),
         sampler_(config.sampler, config.seed), first_sample_(static_cast<uint64_t>(frame_index) * config.spp),
-        unit_radius_(config.radius * scene.space().scale()),
+        unit_radius_(config.radius * tracer.space().scale()),
         unit_reach_(static_cast<float>(unit_radius_ * coefficient_.end())), out_(out) {}
 
-  /// Needs RTCRayHit for distances, RTCRay otherwise.
-  template <typename Ray>
+  /// Needs RayHit for distances, a byte otherwise.
+  template <typename Result>
   void trace_tile(const Tile& tile, const Progress& progress) const {
     ShadingPoint points[kTilePixels];
-    const uint32_t count = gather(tile, points);
-    if (count == 0) return;
     alignas(64) Ray rays[kTilePixels];
+    const uint32_t count = gather(tile, points, rays);
+    if (count == 0) return;
+    Result results[kTilePixels];
     double visibility[kTilePixels] = {}, distance[kTilePixels] = {};
     for (uint32_t s = 0; s < config_.spp; ++s) {
       progress.check_cancelled(); // a tile of 65,536 samples takes minutes
       const PixelSampler::Number number = sampler_.number(first_sample_ + s);
-      for (uint32_t i = 0; i < count; ++i) set_ray(points[i], number, rays[i]);
-      query(rays, count);
-      for (uint32_t i = 0; i < count; ++i) accumulate(rays[i], visibility[i], distance[i]);
+      for (uint32_t i = 0; i < count; ++i) rays[i].direction = direction(points[i], number);
+      query(std::span(rays, count), std::span(results, count));
+      for (uint32_t i = 0; i < count; ++i) accumulate(results[i], visibility[i], distance[i]);
     }
     const double per_sample = 1.0 / config_.spp;
     for (uint32_t i = 0; i < count; ++i) {
@@ -100,7 +97,7 @@ public:
 private:
   /// Collects a tile's hits, 4 x 4 pixels at a time so that neighbouring rays share cache lines of the tree, and
   /// marks its misses.
-  uint32_t gather(const Tile& tile, ShadingPoint* points) const {
+  uint32_t gather(const Tile& tile, ShadingPoint* points, Ray* rays) const {
     uint32_t count = 0;
     for (uint32_t code = 0; code < kTilePixels; ++code) {
       const uint32_t x = tile.x0 + morton_even_bits(code), y = tile.y0 + morton_even_bits(code >> 1);
@@ -111,77 +108,59 @@ private:
         out_.hit_distance[pixel] = 0.0f;
         continue;
       }
-      ShadingPoint& point = points[count++];
+      ShadingPoint& point = points[count];
       point.pixel = pixel;
       point.sampler = sampler_.pixel(x, y);
       point.geometric = gbuffer_.geometric_normal[pixel];
       point.normal = gbuffer_.normal[pixel];
       make_basis(point.normal, point.tangent, point.bitangent);
       const DVec3 origin = DVec3(gbuffer_.position[pixel]) + DVec3(point.geometric) * double(gbuffer_.offset[pixel]);
-      point.origin = Vec3(scene_.space().to_unit(origin));
+      rays[count].origin = Vec3(tracer_.space().to_unit(origin));
+      rays[count++].tfar = unit_reach_;
     }
     return count;
   }
 
-  template <typename Ray>
-  void set_ray(const ShadingPoint& point, const PixelSampler::Number& number, Ray& out) const {
+  Vec3 direction(const ShadingPoint& point, const PixelSampler::Number& number) const {
     const Vec3 local = cosine_direction(PixelSampler::point(point.sampler, number));
-    Vec3 direction = point.tangent * local.x + point.bitangent * local.y + point.normal * local.z;
+    const Vec3 direction = point.tangent * local.x + point.bitangent * local.y + point.normal * local.z;
     const float height = glm::dot(direction, point.geometric);
-    if (height < 0.0f) direction -= 2.0f * height * point.geometric;
-    RTCRay& ray = as_ray(out);
-    ray.org_x = point.origin.x, ray.org_y = point.origin.y, ray.org_z = point.origin.z;
-    ray.dir_x = direction.x, ray.dir_y = direction.y, ray.dir_z = direction.z;
-    ray.tnear = 0.0f, ray.tfar = unit_reach_, ray.time = 0.0f;
-    ray.mask = kOcclusionRays, ray.id = 0, ray.flags = 0;
-    if constexpr (std::is_same_v<Ray, RTCRayHit>) {
-      out.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-      out.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    }
+    return height < 0.0f ? direction - 2.0f * height * point.geometric : direction;
   }
 
-  template <typename Ray>
-  void query(Ray* rays, uint32_t count) const {
-    const FlushDenormals flush;
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    context.flags = RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
-    if constexpr (std::is_same_v<Ray, RTCRayHit>)
-      rtcIntersect1M(scene_.handle(), &context, rays, count, sizeof(Ray));
-    else
-      rtcOccluded1M(scene_.handle(), &context, rays, count, sizeof(Ray));
+  void query(std::span<const Ray> rays, std::span<RayHit> hits) const {
+    tracer_.closest_hits(rays, kOcclusionRays, RayOrder::kIncoherent, hits);
+  }
+  void query(std::span<const Ray> rays, std::span<uint8_t> occluded) const {
+    tracer_.any_hits(rays, kOcclusionRays, RayOrder::kIncoherent, occluded);
   }
 
-  void accumulate(const RTCRay& ray, double& visibility, double& distance) const {
-    const bool hit = ray.tfar < 0.0f; // Embree sets it to -inf
-    visibility += hit ? coefficient_.visibility(0.0, 0.0) : 1.0;
-    distance += hit ? 0.5 : 1.0;
+  void accumulate(uint8_t occluded, double& visibility, double& distance) const {
+    visibility += occluded ? coefficient_.visibility(0.0, 0.0) : 1.0;
+    distance += occluded ? 0.5 : 1.0;
   }
 
-  void accumulate(const RTCRayHit& ray, double& visibility, double& distance) const {
-    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
+  void accumulate(const RayHit& hit, double& visibility, double& distance) const {
+    if (!hit.valid()) {
       visibility += 1.0;
       distance += 1.0;
       return;
     }
-    const double x = ray.ray.tfar / unit_radius_;
-    visibility += coefficient_.visibility(x, config_.interreflection > 0.0f ? luminance(ray.hit) : 0.0);
+    const double x = hit.t / unit_radius_;
+    visibility += coefficient_.visibility(x, config_.interreflection > 0.0f ? luminance(hit) : 0.0);
     distance += std::min(x, 1.0);
   }
 
   /// Of the hit surface's albedo, Rec. 709 weights.
-  double luminance(const RTCHit& hit) const {
-    const EmbreeScene::Hit surface = scene_.resolve(hit.instID[0], hit.geomID, hit.primID);
+  double luminance(const RayHit& hit) const {
+    const HitSurface surface = tracer_.resolve(hit);
     const uint32_t material = source_.material_of(surface.placement->instance, surface.triangle);
     const Vec3 albedo = source_.materials()[material].albedo;
     return std::clamp(0.2126 * albedo.x + 0.7152 * albedo.y + 0.0722 * albedo.z, 0.0, 1.0);
   }
 
-  static RTCRay& as_ray(RTCRay& ray) { return ray; }
-  static RTCRay& as_ray(RTCRayHit& ray) { return ray.ray; }
-
   const SceneSource& source_;
-  const EmbreeScene& scene_;
+  const RayTracer& tracer_;
   const GBuffer& gbuffer_;
   const AoConfig& config_;
   const Coefficient coefficient_;
@@ -213,14 +192,14 @@ void validate(const AoConfig& config) {
   require(within(config.interreflection, 0.0f, 1.0f), "interreflection must be 0 to 1");
 }
 
-void trace_ao(const SceneSource& source, const EmbreeScene& scene, const GBuffer& gbuffer, const AoConfig& config,
+void trace_ao(const SceneSource& source, const RayTracer& tracer, const GBuffer& gbuffer, const AoConfig& config,
               uint32_t frame_index, AoFrame& ao, Progress& progress) {
   validate(config);
   if (ao.size != gbuffer.size || ao.ao.size() != gbuffer.size.pixels()) ao.resize(gbuffer.size);
-  const AoTracer tracer(source, scene, gbuffer, config, frame_index, ao);
+  const AoTracer ao_tracer(source, tracer, gbuffer, config, frame_index, ao);
   const bool closest = config.falloff || config.interreflection > 0.0f;
   for_each_tile(gbuffer.size, progress, [&](const Tile& tile) {
-    closest ? tracer.trace_tile<RTCRayHit>(tile, progress) : tracer.trace_tile<RTCRay>(tile, progress);
+    closest ? ao_tracer.trace_tile<RayHit>(tile, progress) : ao_tracer.trace_tile<uint8_t>(tile, progress);
   });
 }
 

@@ -5,7 +5,7 @@
 #include "pbrt_import/scene/progress.h"
 #include "runtime/ao/sampler.h"
 #include "runtime/gbuffer.h"
-#include "runtime/trace/embree_scene.h"
+#include "runtime/trace/ray_tracer.h"
 
 namespace packtrace {
 
@@ -42,11 +42,11 @@ void validate(const AoConfig& config);
 /// as half the radius in hit_distance.
 /// Sample frame_index * spp + i of a pixel's sequence is sample i of this frame. AO is in [min_visibility, 1], or
 /// kInvalidAo (distance 0) where the camera ray missed. The result is the same for any number of threads.
-/// @param gbuffer of this source and scene; ao is resized to it
+/// @param gbuffer of this source and tracer; ao is resized to it
 /// @param progress advances by the image's pixels, a tile at a time; its phase is begun by the caller, for one frame or
 ///        for many
 /// Throws Error(kUsage) as validate() does, Error(kCancelled).
-void trace_ao(const SceneSource& source, const EmbreeScene& scene, const GBuffer& gbuffer, const AoConfig& config,
+void trace_ao(const SceneSource& source, const RayTracer& tracer, const GBuffer& gbuffer, const AoConfig& config,
               uint32_t frame_index, AoFrame& ao, Progress& progress);
 
 } // namespace packtrace

@@ -21,6 +21,7 @@
 #include "runtime/commands/progress_display.h"
 #include "runtime/render/renderer.h"
 #include "runtime/stopwatch.h"
+#include "runtime/trace/make_tracer.h"
 
 namespace packtrace {
 namespace {
@@ -42,7 +43,7 @@ struct RenderOptions {
   float ao_interreflection = 0.0f;
   uint64_t seed = 0;
   std::string backend = "embree";
-  std::string bvh = "medium";
+  std::optional<std::string> bvh;
 };
 
 bool parse_number(std::string_view digits, uint32_t& value) {
@@ -90,11 +91,23 @@ RenderConfig make_config(const SceneSource& source, const Camera& camera, const 
   return config;
 }
 
-void check_backend(const std::string& backend) {
-  if (backend == "embree") return;
-  if (backend == "packed" || backend == "vulkan")
-    throw Error(ErrorKind::kUnsupported, "--backend " + backend + " is not there yet; use embree");
-  throw Error(ErrorKind::kUsage, "--backend " + backend + ": there are embree, packed and vulkan");
+TracerConfig tracer_config(const RenderOptions& options) {
+  TracerConfig config;
+  if (options.backend == "packed") {
+    if (options.bvh || options.fast_edges)
+      throw Error(ErrorKind::kUsage,
+                  "--bvh and --fast-edges are about Embree; backend packed has its tree in the file");
+    config.backend = Backend::kPacked;
+  } else if (options.backend == "vulkan") {
+    throw Error(ErrorKind::kUnsupported, "--backend vulkan is not there yet; use embree or packed");
+  } else if (options.backend != "embree") {
+    throw Error(ErrorKind::kUsage, "--backend " + options.backend + ": there are embree and packed");
+  }
+  const std::string quality = options.bvh.value_or("medium");
+  if (quality != "medium" && quality != "high")
+    throw Error(ErrorKind::kUsage, "--bvh " + quality + ": there are medium and high");
+  config.embree = {quality == "high" ? BvhQuality::kHigh : BvhQuality::kMedium, !options.fast_edges};
+  return config;
 }
 
 double mean_of_valid(const std::vector<float>& ao) {
@@ -108,13 +121,17 @@ double mean_of_valid(const std::vector<float>& ao) {
 double rate_m(uint64_t rays, double seconds) { return seconds > 0 ? static_cast<double>(rays) / seconds * 1e-6 : 0; }
 
 nlohmann::json report(const RenderOptions& options, const RenderConfig& config, const RenderedImage& image,
-                      const SceneSource& source, const EmbreeScene& scene, const std::vector<std::string>& files) {
+                      const SceneSource& source, const RayTracer& tracer, const std::vector<std::string>& files) {
   const auto hits =
       std::count_if(image.instance.begin(), image.instance.end(), [](uint32_t i) { return i != kNoInstance; });
   const RenderTimings& t = image.timings;
+  nlohmann::json parts;
+  for (const ResidentPart& part : tracer.resident()) parts[std::string(part.name)] = part.bytes;
   return {
       {"verb", "render"},
       {"input", options.input},
+      {"backend", tracer.name()},
+      {"isa", tracer.isa()},
       {"files", files},
       {"width", image.size.width},
       {"height", image.size.height},
@@ -131,9 +148,23 @@ nlohmann::json report(const RenderOptions& options, const RenderConfig& config, 
       {"mrays_per_s", {{"primary", rate_m(image.primary_rays, t.primary_s)}, {"ao", rate_m(image.ao_rays, t.ao_s)}}},
       {"seconds", {{"bvh", t.build_s}, {"primary", t.primary_s}, {"ao", t.ao_s}, {"denoise", t.denoise_s}}},
       {"resident_bytes",
-       {{"source", source.resident_bytes()}, {"tracing", scene.resident_bytes()}, {"bvh", scene.bvh_bytes()}}},
+       {{"source", source.resident_bytes()},
+        {"tracing", resident_bytes(tracer)},
+        {"bvh", parts.value("bvh", uint64_t{0})},
+        {"parts", parts}}},
       {"peak_rss_bytes", peak_rss_bytes()},
   };
+}
+
+std::string resident_text(const nlohmann::json& resident) {
+  const auto mib = [](const nlohmann::json& bytes) { return bytes.get<double>() / (1 << 20); };
+  std::string text = fmt::format("{:.1f} MiB", mib(resident.at("tracing")));
+  const char* separator = " (";
+  for (const auto& [name, bytes] : resident.at("parts").items()) {
+    text += fmt::format("{}{} {:.1f}", separator, name, mib(bytes));
+    separator = ", ";
+  }
+  return text + ")";
 }
 
 void print(const nlohmann::json& r) {
@@ -142,8 +173,8 @@ void print(const nlohmann::json& r) {
   fmt::print("{}x{} pixels, {} frame{} of {} spp, mean ao {:.4f}\n", r.at("width").get<int>(),
              r.at("height").get<int>(), r.at("frames").get<int>(), frames == 1 ? "" : "s", r.at("spp").get<int>(),
              r.at("mean_ao").get<double>());
-  fmt::print("  bvh       {:8.3f} s   {:.1f} MiB resident\n", seconds.at("bvh").get<double>(),
-             static_cast<double>(r.at("resident_bytes").at("tracing").get<uint64_t>()) / (1 << 20));
+  fmt::print("  bvh       {:8.3f} s   {}, {}; {} resident\n", seconds.at("bvh").get<double>(),
+             r.at("backend").get<std::string>(), r.at("isa").get<std::string>(), resident_text(r.at("resident_bytes")));
   fmt::print("  primary   {:8.3f} s   {:.1f} Mrays/s\n", seconds.at("primary").get<double>(),
              r.at("mrays_per_s").at("primary").get<double>());
   fmt::print("  ao        {:8.3f} s   {:.1f} Mrays/s\n", seconds.at("ao").get<double>(),
@@ -155,9 +186,7 @@ void print(const nlohmann::json& r) {
 }
 
 int run(const RenderOptions& options, const GlobalOptions& globals) {
-  check_backend(options.backend);
-  if (options.bvh != "medium" && options.bvh != "high")
-    throw Error(ErrorKind::kUsage, "--bvh " + options.bvh + ": there are medium and high");
+  const TracerConfig backend = tracer_config(options);
   if (!options.size.empty()) parse_size(options.size);
   JsonOutput json(globals.json, globals.force);
   ImageOutputs outputs(options.outputs, options.aovs, globals.force); // before the work, like the above
@@ -169,10 +198,10 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
 
   const Stopwatch building;
   progress.begin("bvh", 0);
-  const EmbreeScene scene(*loaded.source,
-                          {options.bvh == "high" ? BvhQuality::kHigh : BvhQuality::kMedium, !options.fast_edges});
+  const std::unique_ptr<RayTracer> tracer =
+      make_tracer(*loaded.source, loaded.baked ? &*loaded.baked : nullptr, backend);
   const double build_s = building.seconds();
-  RenderedImage image = render_view(*loaded.source, scene, camera, config, progress);
+  RenderedImage image = render_view(*loaded.source, *tracer, camera, config, progress);
   image.timings.build_s = build_s;
   display.finish();
 
@@ -180,7 +209,7 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
                         {"aoRadius", static_cast<double>(config.ao.radius)},
                         {"aoSpp", static_cast<int>(config.ao.spp)},
                         {"frames", static_cast<int>(config.frames)}});
-  const nlohmann::json result = report(options, config, image, *loaded.source, scene, outputs.targets());
+  const nlohmann::json result = report(options, config, image, *loaded.source, *tracer, outputs.targets());
   if (result.at("hit_pixels") == 0 && !globals.quiet)
     fmt::print(stderr, "{}: warning: this camera sees nothing of the scene; try --camera auto\n", options.input);
   if (json.wanted()) json.write(result);
@@ -225,8 +254,10 @@ void add_render_command(CLI::App& app, GlobalOptions& globals) {
                   "Share of light bounced back by what a ray hits, 0..1 (default 0: off)")
       ->type_name("RHO");
   verb.add_option("--seed", options->seed, "Seed of the sample pattern (default 0)")->type_name("N");
-  verb.add_option("--backend", options->backend, "embree (packed and vulkan are planned)")->type_name("NAME");
-  verb.add_option("--bvh", options->bvh, "Embree's tree: medium, or high (slower to build, faster to trace)")
+  verb.add_option("--backend", options->backend, "What traces the rays: embree (the default) or packed")
+      ->type_name("NAME");
+  verb.add_option("--bvh,--bvh-quality", options->bvh,
+                  "Embree's tree: medium (the default), or high (slower to build, faster to trace)")
       ->type_name("QUALITY");
   verb.add_flag(
       "--fast-edges", options->fast_edges,

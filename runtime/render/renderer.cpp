@@ -95,7 +95,7 @@ void validate(const RenderConfig& config) {
           "image size times supersample exceeds 65536 per side or 2^28 pixels");
 }
 
-RenderedImage render_view(const SceneSource& source, const EmbreeScene& scene, const Camera& camera,
+RenderedImage render_view(const SceneSource& source, const RayTracer& tracer, const Camera& camera,
                           const RenderConfig& config, Progress& progress) {
   validate(config);
   RenderedImage image;
@@ -104,7 +104,7 @@ RenderedImage render_view(const SceneSource& source, const EmbreeScene& scene, c
   const PrimaryCamera view(camera, traced_size(config));
   GBuffer g;
   const Stopwatch primary;
-  trace_primary(source, scene, view, view, g, progress);
+  trace_primary(source, tracer, view, view, g, progress);
   image.timings.primary_s = primary.seconds();
   image.primary_rays = g.size.pixels();
 
@@ -119,7 +119,7 @@ RenderedImage render_view(const SceneSource& source, const EmbreeScene& scene, c
   progress.begin("ambient occlusion", config.frames * static_cast<uint64_t>(g.size.pixels()));
   for (uint32_t frame = 0; frame < config.frames; ++frame) {
     const Stopwatch tracing;
-    trace_ao(source, scene, g, config.ao, frame, raw, progress);
+    trace_ao(source, tracer, g, config.ao, frame, raw, progress);
     image.timings.ao_s += tracing.seconds();
     const Stopwatch denoising;
     if (!config.denoise)

@@ -8,7 +8,7 @@
 #include "runtime/ao/ao_integrator.h"
 #include "runtime/denoise/denoiser.h"
 #include "runtime/gbuffer.h"
-#include "runtime/trace/embree_scene.h"
+#include "runtime/trace/ray_tracer.h"
 #include "runtime/trace/scene_source.h"
 
 namespace packtrace {
@@ -52,10 +52,10 @@ struct RenderedImage {
   uint64_t primary_rays = 0;
 };
 
-/// Renders one camera. scene must have been built from source.
+/// Renders one camera. tracer must have been built from source.
 /// The image depends on its arguments alone, not on the number of threads.
 /// Throws Error(kUsage) for a config out of range, Error(kCancelled).
-RenderedImage render_view(const SceneSource& source, const EmbreeScene& scene, const Camera& camera,
+RenderedImage render_view(const SceneSource& source, const RayTracer& tracer, const Camera& camera,
                           const RenderConfig& config, Progress& progress);
 
 } // namespace packtrace

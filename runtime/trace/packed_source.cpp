@@ -21,6 +21,16 @@ ClusterTriangle find_triangle(const BakedFile& file, uint32_t geometry, uint32_t
   return {cluster, cluster.triangle(triangle - cluster.record().first_triangle)};
 }
 
+std::optional<Vec3> interpolated_normal(const ClusterView& cluster, uint32_t triangle, Vec2 barycentrics) {
+  if (!cluster.has_normals()) return std::nullopt;
+  const Triangle v = cluster.triangle(triangle - cluster.record().first_triangle);
+  const Vec3 n = cluster.normal(v.x) * (1.0f - barycentrics.x - barycentrics.y) + cluster.normal(v.y) * barycentrics.x +
+                 cluster.normal(v.z) * barycentrics.y;
+  const float length = glm::length(n);
+  if (!(length > 0.0f)) return std::nullopt; // opposed vertex normals cancel
+  return n / length;
+}
+
 } // namespace
 
 PackedSource::PackedSource(const BakedFile& file)
@@ -55,13 +65,26 @@ uint32_t PackedSource::material_of(uint32_t instance, uint32_t triangle) const {
 }
 
 std::optional<Vec3> PackedSource::shading_normal(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const {
-  const auto [cluster, v] = find_triangle(file_, geometry, triangle);
-  if (!cluster.has_normals()) return std::nullopt;
-  const Vec3 n = cluster.normal(v.x) * (1.0f - barycentrics.x - barycentrics.y) + cluster.normal(v.y) * barycentrics.x +
-                 cluster.normal(v.z) * barycentrics.y;
-  const float length = glm::length(n);
-  if (!(length > 0.0f)) return std::nullopt; // opposed vertex normals cancel
-  return n / length;
+  const uint32_t cluster = file_.cluster_of_triangle(geometry, triangle);
+  return interpolated_normal(file_.cluster(geometry, cluster), triangle, barycentrics);
+}
+
+/// Finds and prepares a cluster only where it is not that of the place before.
+void PackedSource::look_up(std::span<const SurfaceQuery> places, std::span<SurfaceAttributes> out) const {
+  std::optional<ClusterView> cluster;
+  uint32_t geometry = 0, first = 0;
+  for (size_t i = 0; i < places.size(); ++i) {
+    const SurfaceQuery& place = places[i];
+    const uint32_t own_geometry = instances_[place.instance].geometry;
+    if (!cluster || own_geometry != geometry || place.triangle - first >= cluster->triangle_count()) {
+      geometry = own_geometry;
+      cluster.emplace(file_.cluster(geometry, file_.cluster_of_triangle(geometry, place.triangle)));
+      first = cluster->record().first_triangle;
+    }
+    const std::optional<Vec3> normal = interpolated_normal(*cluster, place.triangle, place.barycentrics);
+    out[i] = {file_.instance_materials(place.instance)[cluster->material_slot()], normal.has_value(),
+              normal.value_or(Vec3(0.0f))};
+  }
 }
 
 Vec2 PackedSource::uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const {

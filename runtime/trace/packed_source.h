@@ -20,6 +20,7 @@ public:
   void decode(uint32_t geometry, std::span<Vec3> positions, std::span<Triangle> triangles) const override;
   uint32_t material_of(uint32_t instance, uint32_t triangle) const override;
   std::optional<Vec3> shading_normal(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const override;
+  void look_up(std::span<const SurfaceQuery> places, std::span<SurfaceAttributes> out) const override;
   Vec2 uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const override;
   float position_error(uint32_t geometry) const override;
   std::span<const PlacedGeometry> instances() const override { return instances_; }

@@ -3,7 +3,7 @@
 #include "pbrt_import/scene/progress.h"
 #include "runtime/camera/camera_rays.h"
 #include "runtime/gbuffer.h"
-#include "runtime/trace/embree_scene.h"
+#include "runtime/trace/ray_tracer.h"
 
 namespace packtrace {
 
@@ -16,7 +16,7 @@ inline constexpr float kNoMotionPx = 1e9f;
 /// Motion is this pixel's centre minus the point's place in previous's image; it is exactly zero for equal cameras.
 /// offset is described in ray_offset.h. The result is the same for any number of threads.
 /// Throws Error(kCancelled).
-void trace_primary(const SceneSource& source, const EmbreeScene& scene, const PrimaryCamera& now,
+void trace_primary(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
                    const PrimaryCamera& previous, GBuffer& gbuffer, Progress& progress);
 
 } // namespace packtrace

@@ -15,7 +15,8 @@ namespace packtrace {
 inline constexpr uint32_t kCameraRays = 1u << 0;    ///< hit what camera_visible() says
 inline constexpr uint32_t kOcclusionRays = 1u << 1; ///< hit what occludes() says
 
-/// In the tracer's space(). Directions need not be unit length; t counts them.
+/// In the tracer's space(). Directions need not be unit length; t counts them. Where tfar < tnear there is nothing to
+/// hit: that is how a caller fills the gaps of a block of coherent rays.
 struct Ray {
   Vec3 origin{0.0f};
   float tnear = 0.0f; ///< >= 0
@@ -75,6 +76,8 @@ public:
   virtual ~RayTracer() = default;
 
   virtual std::string_view name() const = 0;
+  /// Instruction set of the kernels that run, such as avx2.
+  virtual std::string_view isa() const { return "portable"; }
   virtual const UnitSpace& space() const = 0;
 
   /// The nearest hit of each ray in (tnear, tfar). hits.size() == rays.size().

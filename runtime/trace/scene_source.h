@@ -21,6 +21,20 @@ struct GeometryCounts {
   uint32_t triangles = 0;
 };
 
+/// A place on a surface.
+struct SurfaceQuery {
+  uint32_t instance = 0;
+  uint32_t triangle = 0; ///< of the instance's geometry
+  Vec2 barycentrics{0.0f};
+};
+
+/// What SceneSource::material_of() and shading_normal() say of it.
+struct SurfaceAttributes {
+  uint32_t material = 0;
+  bool has_normal = false;
+  Vec3 normal{0.0f};
+};
+
 /// What tracing and shading need of a scene, whether it lies in a baked file (PackedSource) or in floats
 /// (FloatSource). Triangle numbers of a geometry are the order in which decode() lists them. All functions are const
 /// and may be called from several threads; per-hit functions do not allocate. Both sources number instances alike: the
@@ -43,6 +57,10 @@ public:
   /// Interpolated vertex normal in object space, unit length; none where the surface is flat.
   /// @param barycentrics weights of the triangle's second and third vertex
   virtual std::optional<Vec3> shading_normal(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const = 0;
+
+  /// material_of() and shading_normal() of many places at once, which is faster where neighbours lie close together.
+  /// @param out of the same size
+  virtual void look_up(std::span<const SurfaceQuery> places, std::span<SurfaceAttributes> out) const;
 
   /// Interpolated texture coordinates; (0,0) where the geometry has none.
   virtual Vec2 uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const = 0;

@@ -30,14 +30,18 @@ public:
       if (free) centre_[axis] = static_cast<double>(static_cast<float>(bounds.centre()[axis]));
       size = std::max({size, std::abs(lo - centre_[axis]), std::abs(hi - centre_[axis])});
     }
-    if (size > 0.0) scale_ = std::ldexp(kHalfSize, -std::ilogb(size) - 1);
+    if (size > 0.0) scale_ = std::ldexp(kHalfSize, -std::ilogb(size) - 1), inverse_scale_ = 1.0 / scale_;
   }
 
   DVec3 to_unit(DVec3 p) const { return (p - centre_) * scale_; }
-  DVec3 from_unit(DVec3 p) const { return p / scale_ + centre_; } // exact division: a power of two
+  DVec3 from_unit(DVec3 p) const { return p * inverse_scale_ + centre_; } // exact: a power of two
 
   /// Unit lengths per outer length; a power of two.
   double scale() const { return scale_; }
+  /// Outer lengths per unit length.
+  double inverse_scale() const { return inverse_scale_; }
+
+  bool operator==(const UnitSpace&) const = default;
 
   DAffine unit_from_outer() const { return uniform(scale_, -centre_ * scale_); }
   DAffine outer_from_unit() const { return uniform(1.0 / scale_, centre_); }
@@ -49,6 +53,7 @@ private:
 
   DVec3 centre_{0.0};
   double scale_ = 1.0;
+  double inverse_scale_ = 1.0;
 };
 
 } // namespace packtrace

@@ -151,7 +151,7 @@ TEST(AoAnalytic, HitDistanceIsTheMeanWithMissesAtTheRadius) {
   config.falloff = true;
   config.lambda = 0.5f; // sees to the radius
   const FloatSource source(scene);
-  const EmbreeScene embree(source, {});
+  const EmbreeTracer embree(source, {});
   Progress progress;
   AoFrame frame;
   trace_ao(source, embree, test::point_gbuffer({0, 0, 0}, {0, 1, 0}, 0), config, 0, frame, progress);

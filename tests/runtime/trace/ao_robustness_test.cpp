@@ -159,7 +159,7 @@ TEST(AoRobustness, AnyScaleGivesTheSameImage) {
 TEST(AoFrames, FramesOfOneSampleAreOneFrameOfMany) {
   Scene scene = roofed(0);
   const FloatSource source(scene);
-  const EmbreeScene embree(source, {});
+  const EmbreeTracer embree(source, {});
   const GBuffer gbuffer = test::point_gbuffer({0, 0, 0}, {0, 1, 0}, 1e-5f);
   Progress progress;
   AoFrame whole, part;
@@ -175,7 +175,7 @@ TEST(AoFrames, FramesOfOneSampleAreOneFrameOfMany) {
 TEST(AoFrames, MissesAreInvalidEvenOverOldContents) {
   const Scene scene = roofed(0);
   const FloatSource source(scene);
-  const EmbreeScene embree(source, {});
+  const EmbreeTracer embree(source, {});
   GBuffer gbuffer;
   gbuffer.resize({9, 7});
   AoFrame frame;
@@ -196,7 +196,7 @@ TEST(AoFrames, CancellingStopsWithinATile) {
     static void run() {
       const Scene scene = roofed(0);
       const FloatSource source(scene);
-      const EmbreeScene embree(source, {});
+      const EmbreeTracer embree(source, {});
       const GBuffer gbuffer = test::point_gbuffer({0, 0, 0}, {0, 1, 0}, 1e-5f);
       AoFrame frame;
       Progress progress;
@@ -214,14 +214,14 @@ TEST(AoFrames, CancellingStopsWithinATile) {
   EXPECT_EXIT(Guard::run(), testing::ExitedWithCode(7), "");
 }
 
-TEST(EmbreeScene, CancellingStopsTheBuild) {
+TEST(EmbreeTracer, CancellingStopsTheBuild) {
   struct Guard {
     static void run() {
       const Scene scene = roofed(0);
       const FloatSource source(scene);
       Progress::cancel();
       try {
-        const EmbreeScene embree(source, {});
+        const EmbreeTracer embree(source, {});
       } catch (const Error& error) {
         std::_Exit(error.exit_code());
       }

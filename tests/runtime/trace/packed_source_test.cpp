@@ -43,7 +43,7 @@ struct Image {
 };
 
 Image render(const SceneSource& source) {
-  const EmbreeScene embree(source, {});
+  const EmbreeTracer embree(source, {});
   const PrimaryCamera camera(test::camera_at({2, 5, -10}, {0, 1, 0}), {160, 90});
   AoConfig config;
   config.radius = 4;

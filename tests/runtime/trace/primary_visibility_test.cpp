@@ -8,6 +8,7 @@
 
 #include "pbrt_import/scene/error.h"
 #include "runtime/trace/float_source.h"
+#include "runtime/trace/make_tracer.h"
 #include "tests/runtime/trace/test_scenes.h"
 
 namespace packtrace {
@@ -20,7 +21,7 @@ using test::quad;
 
 GBuffer trace(const Scene& scene, const PrimaryCamera& now, const PrimaryCamera& previous, EmbreeConfig config = {}) {
   const FloatSource source(scene);
-  const EmbreeScene embree(source, config);
+  const EmbreeTracer embree(source, config);
   Progress progress;
   GBuffer gbuffer;
   trace_primary(source, embree, now, previous, gbuffer, progress);
@@ -77,7 +78,7 @@ TEST(PrimaryVisibility, MissesAreClean) {
   Scene scene = wall_scene();
   GBuffer g = trace(scene, camera_at({0, 0, 0}, {0, 0, 1}), {8, 8});
   const FloatSource source(scene);
-  const EmbreeScene embree(source, {});
+  const EmbreeTracer embree(source, {});
   const PrimaryCamera away(camera_at({0, 0, 0}, {0, 0, -1}), {8, 8});
   Progress progress;
   trace_primary(source, embree, away, away, g, progress); // over old contents
@@ -242,7 +243,7 @@ TEST(PrimaryVisibility, SameBytesForAnyThreadCountAndBuild) {
 TEST(PrimaryVisibility, PassesOnWhatTheProgressObserverThrows) {
   const Scene scene = wall_scene();
   const FloatSource source(scene);
-  const EmbreeScene embree(source, {});
+  const EmbreeTracer embree(source, {});
   const PrimaryCamera camera(camera_at({0, 0, 0}, {0, 0, 1}), {256, 256});
   Progress progress([](std::string_view, uint64_t done, uint64_t total) {
     EXPECT_EQ(total, 65536u);
@@ -266,31 +267,33 @@ TEST(PrimaryVisibility, PositionsOnHugeTrianglesStayOnTheirPixel) {
   }
 }
 
-TEST(EmbreeScene, RejectsPositionsThatLeaveTheFloatRange) {
+TEST(EmbreeTracer, RejectsPositionsThatLeaveTheFloatRange) {
   Scene scene;
   add_shape(scene, quad({0, 0, 0}, {1e30f, 0, 0}, {0, 1e30f, 0}), 0, test::placed({0, 0, 0}, DVec3(1e20)));
   const FloatSource source(scene);
-  EXPECT_THROW(EmbreeScene(source, {}), Error);
+  EXPECT_THROW(EmbreeTracer(source, {}), Error);
 }
 
-TEST(EmbreeScene, RejectsTransformsThatAreNotFinite) {
+TEST(EmbreeTracer, RejectsTransformsThatAreNotFinite) {
   Scene scene;
   add_object(scene, quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}));
   scene.instances.push_back({0, Affine(1.0f)});
   scene.instances[0].world_from_object[1][2] = NAN;
   const FloatSource source(scene);
-  EXPECT_THROW(EmbreeScene(source, {}), Error);
+  EXPECT_THROW(EmbreeTracer(source, {}), Error);
 }
 
-TEST(EmbreeScene, CountsItsBytes) {
+TEST(EmbreeTracer, CountsItsBytes) {
   Scene scene;
   add_shape(scene, test::sphere({0, 0, 0}, 1, 100));
   const FloatSource source(scene);
-  const EmbreeScene embree(source, {});
+  const EmbreeTracer embree(source, {});
   const uint64_t triangles = source.counts(0).triangles;
-  EXPECT_GT(embree.bvh_bytes(), 20 * triangles);
-  EXPECT_GT(embree.resident_bytes(), embree.bvh_bytes() + 18 * triangles);
-  EXPECT_LT(embree.resident_bytes(), 400 * triangles);
+  const std::vector<ResidentPart> parts = embree.resident();
+  ASSERT_EQ(parts.front().name, "bvh");
+  EXPECT_GT(parts.front().bytes, 20 * triangles);
+  EXPECT_GT(resident_bytes(embree), parts.front().bytes + 18 * triangles);
+  EXPECT_LT(resident_bytes(embree), 400 * triangles);
 }
 
 TEST(PrimaryVisibility, NothingIsSeenThroughAClosedMesh) {

@@ -100,7 +100,7 @@ GBuffer point_gbuffer(Vec3 position, Vec3 normal, float offset) {
 
 double ao_at(const Scene& scene, Vec3 position, Vec3 normal, const AoConfig& config, float offset) {
   const FloatSource source(scene);
-  const EmbreeScene embree(source, {});
+  const EmbreeTracer embree(source, {});
   Progress progress;
   AoFrame frame;
   trace_ao(source, embree, point_gbuffer(position, normal, offset), config, 0, frame, progress);
@@ -119,7 +119,7 @@ Camera camera_at(DVec3 eye, DVec3 target, double fov_degrees) {
 Rendered render(const Scene& scene, const Camera& camera, ImageSize size, const AoConfig& config,
                 EmbreeConfig embree_config) {
   const FloatSource source(scene);
-  const EmbreeScene embree(source, embree_config);
+  const EmbreeTracer embree(source, embree_config);
   const PrimaryCamera primary(camera, size);
   Progress progress;
   Rendered result;

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <memory>
+
+#include "runtime/trace/embree_tracer.h"
+
+namespace packtrace {
+
+class BakedFile;
+
+enum class Backend : uint8_t {
+  kEmbree, ///< decodes everything to float triangles
+  kPacked, ///< traces the packed clusters as they lie in a baked file
+};
+
+struct TracerConfig {
+  Backend backend = Backend::kEmbree;
+  EmbreeConfig embree;
+};
+
+/// The one place that knows all backends. Keeps references: source and file must outlive the tracer.
+/// @param file what source reads; null where it reads floats
+/// Throws Error(kUnsupported) for a backend that is not in this build, else as the backend's constructor.
+std::unique_ptr<RayTracer> make_tracer(const SceneSource& source, const BakedFile* file, const TracerConfig& config);
+
+/// All of resident() together.
+uint64_t resident_bytes(const RayTracer& tracer);
+
+} // namespace packtrace

@@ -1,0 +1,61 @@
+#include "runtime/trace/placement.h"
+
+#include <cmath>
+#include <string>
+
+#include "pbrt_import/scene/error.h"
+
+namespace packtrace {
+namespace {
+
+double norm(const glm::dmat3& m) {
+  return std::sqrt(glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
+}
+
+glm::dmat3 absolute(const glm::dmat3& m) { return {glm::abs(m[0]), glm::abs(m[1]), glm::abs(m[2])}; }
+
+} // namespace
+
+Placement direct_placement(uint32_t instance, const DAffine& world_from_object) {
+  Placement placement;
+  placement.instance = instance;
+  placement.object_normal = normal_matrix(world_from_object);
+  return placement;
+}
+
+Placement instanced_placement(uint32_t instance, const DAffine& world_from_object, const DAffine& unit_from_surface) {
+  Placement placement = direct_placement(instance, world_from_object);
+  placement.instanced = true;
+  placement.unit_from_surface = unit_from_surface;
+  placement.surface_normal = normal_matrix(unit_from_surface);
+  const DAffine surface_from_unit = inverse(unit_from_surface);
+  const glm::dmat3 inverted(surface_from_unit);
+  const glm::dmat3 growth = absolute(inverted) * absolute(glm::dmat3(unit_from_surface));
+  placement.moved_linear = growth * absolute(inverted);
+  placement.moved_offset = growth * glm::abs(DVec3(surface_from_unit[3]));
+  return placement;
+}
+
+bool traceable_as_instance(const DAffine& unit_from_surface) {
+  constexpr double kMaxNorm = 1e12, kMaxCondition = 65536.0;
+  const glm::dmat3 linear(unit_from_surface);
+  const glm::dmat3 inverted = glm::inverse(linear);
+  const double forward = norm(linear), backward = norm(inverted);
+  return forward <= kMaxNorm && backward <= kMaxNorm && forward * backward <= kMaxCondition; // false for NaN
+}
+
+Bounds placed_bounds(const SceneSource& source, std::span<const Bounds> bounds) {
+  Bounds world;
+  uint32_t index = 0;
+  for (const PlacedGeometry& placed : source.instances()) {
+    const DAffine world_from_object(placed.world_from_object);
+    if (!std::isfinite(norm(glm::dmat3(world_from_object))) || !is_finite(DVec3(world_from_object[3])))
+      throw Error(ErrorKind::kInput, "the transform of instance " + std::to_string(index) + " is not finite");
+    const Bounds box = transform_bounds(world_from_object, bounds[placed.geometry]);
+    if (!box.empty()) world.extend(box);
+    ++index;
+  }
+  return world;
+}
+
+} // namespace packtrace

@@ -1,0 +1,309 @@
+// The same recorded rays through every tracer there is, and through Embree in all its ways: docs/tracing.md.
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <tbb/global_control.h>
+
+#include "pbrt_import/scene/error.h"
+#include "runtime/stopwatch.h"
+#include "runtime/trace/make_tracer.h"
+#include "tests/benchmarks/benchmark_main.h"
+#include "tests/benchmarks/packing_benchmark_machine.h"
+#include "tests/benchmarks/trace_benchmark_embree.h"
+#include "tests/benchmarks/trace_benchmark_inputs.h"
+#include "tests/benchmarks/trace_benchmark_rays.h"
+
+namespace packtrace {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kRayTracer = "RayTracer"; ///< the call of rows that the renderer can use
+
+struct Options {
+  TraceInputOptions inputs;
+  std::filesystem::path json_file;
+  std::string camera = "0"; ///< number, or "auto"
+  ImageSize size{960, 540};
+  std::vector<uint32_t> threads{1, 2};
+  uint32_t repeats = 5;
+  bool cpu_clock = false;
+  std::optional<double> max_mismatches;
+  std::vector<std::string> names;
+};
+
+/// One row of the tables.
+struct System {
+  std::string name;
+  std::string call;
+  std::unique_ptr<RayTracer> tracer;
+  double build_ms = 0.0;
+  bool watertight = false;                                    ///< --max-mismatches is for these
+  std::shared_ptr<const std::vector<RecordedRays>> rays = {}; ///< in the tracer's space
+  std::vector<RayResults> results = std::vector<RayResults>(3);
+  std::vector<std::vector<double>> seconds = {}; ///< by phase, one for each repeat
+};
+
+/// All that trace one input. The trees that rows share are first, and go last.
+struct Systems {
+  std::vector<std::unique_ptr<EmbreeTracer>> trees;
+  std::vector<System> rows;
+  size_t single = 0, packets = 0; ///< rows of Embree's default that ratios refer to
+  size_t truth = 0;               ///< the row that mismatches are counted against
+  size_t truth_trees = 0;
+};
+
+void add_tracer(const TraceInput& input, const char* name, const TracerConfig& config, Systems& out) {
+  try {
+    const Stopwatch watch;
+    std::unique_ptr<RayTracer> tracer = make_tracer(input.source, &input.file, config);
+    out.rows.push_back({name, kRayTracer, std::move(tracer), 1e3 * watch.seconds(), config.embree.robust});
+  } catch (const Error& error) {
+    if (error.kind() != ErrorKind::kUnsupported) throw;
+    fmt::print(stderr, "{}: {}\n", name, error.what());
+  }
+}
+
+Systems make_systems(const TraceInput& input) {
+  struct Variant {
+    const char* name;
+    EmbreeConfig config;
+  };
+  struct Call {
+    const char* name;
+    EmbreeCall call;
+  };
+  Systems out;
+  for (const Variant& variant : {Variant{"Embree default", {BvhQuality::kMedium, false, false}},
+                                 Variant{"Embree robust", {BvhQuality::kMedium, true, false}},
+                                 Variant{"Embree high", {BvhQuality::kHigh, false, false}},
+                                 Variant{"Embree compact", {BvhQuality::kMedium, false, true}}}) {
+    const Stopwatch watch;
+    out.trees.push_back(std::make_unique<EmbreeTracer>(input.source, variant.config));
+    const double build_ms = 1e3 * watch.seconds();
+    for (const Call& call :
+         {Call{"1", EmbreeCall::kSingle}, Call{"16", EmbreeCall::kPacket16}, Call{"1M", EmbreeCall::kStream}})
+      out.rows.push_back(
+          {variant.name, call.name, direct_embree(*out.trees.back(), call.call), build_ms, variant.config.robust});
+  }
+  out.single = 0, out.packets = 1, out.truth = 3, out.truth_trees = 1;
+  add_tracer(input, "embree", {}, out);
+  add_tracer(input, "packed", {Backend::kPacked, {}}, out);
+  return out;
+}
+
+Camera choose_camera(const SceneSource& source, const Options& options) {
+  if (options.camera == "auto" || (options.camera == "0" && source.cameras().empty()))
+    return framing_camera(source.world_bounds(), options.size);
+  uint32_t index = 0;
+  const char* const end = options.camera.data() + options.camera.size();
+  if (std::from_chars(options.camera.data(), end, index).ptr != end || index >= source.cameras().size())
+    throw Error(ErrorKind::kUsage, "--camera " + options.camera + ": there is no such camera");
+  return source.cameras()[index];
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values.empty() ? 0.0 : values[values.size() / 2];
+}
+
+/// Of the times of one phase, repeat by repeat: what was faster in the same moment.
+double median_ratio(const std::vector<double>& reference, const std::vector<double>& seconds) {
+  std::vector<double> ratios;
+  for (size_t i = 0; i < seconds.size(); ++i) ratios.push_back(reference[i] / seconds[i]);
+  return median(ratios);
+}
+
+/// Fills seconds and results of all rows, in turn.
+void measure(Systems& systems, uint32_t threads, uint32_t repeats, bool cpu_clock) {
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+  for (System& row : systems.rows) row.seconds.assign(row.rays->size(), {});
+  for (uint32_t repeat = 0; repeat <= repeats; ++repeat) // the first warms up
+    for (size_t phase = 0; phase < systems.rows.front().rays->size(); ++phase)
+      for (System& row : systems.rows) {
+        const double seconds = replay((*row.rays)[phase], *row.tracer, row.results[phase], cpu_clock);
+        if (repeat > 0) row.seconds[phase].push_back(cpu_clock ? seconds / threads : seconds);
+      }
+}
+
+Json row_json(const TraceInput& input, const Systems& systems, const System& row, uint32_t threads) {
+  Json json{{"system", row.name},
+            {"call", row.call},
+            {"isa", row.tracer->isa()},
+            {"threads", threads},
+            {"resident_bytes", resident_bytes(*row.tracer)},
+            {"bytes_per_triangle",
+             static_cast<double>(resident_bytes(*row.tracer)) / static_cast<double>(input.unique_triangles())},
+            {"build_ms", row.build_ms}};
+  const System& truth = systems.rows[systems.truth];
+  const double t_scale = truth.tracer->space().scale() / row.tracer->space().scale();
+  for (size_t phase = 0; phase < row.rays->size(); ++phase) {
+    const RecordedRays& rays = (*row.rays)[phase];
+    const System& reference = systems.rows[rays.order == RayOrder::kCoherent ? systems.packets : systems.single];
+    const auto count = static_cast<double>(rays.count());
+    json["phases"].push_back({{"phase", rays.name},
+                              {"mrays_per_s", count / median(row.seconds[phase]) * 1e-6},
+                              {"ratio", median_ratio(reference.seconds[phase], row.seconds[phase])},
+                              {"mismatches", mismatches(rays, truth.results[phase], row.results[phase], t_scale)}});
+  }
+  return json;
+}
+
+void print_row(const Json& row) {
+  fmt::print("| {} | {} |", row["system"].get<std::string>(), row["call"].get<std::string>());
+  std::string wrong;
+  for (const Json& phase : row["phases"]) {
+    fmt::print(" {:.1f} ({:.2f}) |", phase["mrays_per_s"].get<double>(), phase["ratio"].get<double>());
+    wrong += fmt::format("{}{}", wrong.empty() ? "" : " / ", phase["mismatches"].get<uint64_t>());
+  }
+  fmt::print(" {:.1f} | {:.0f} | {} |\n", row["bytes_per_triangle"].get<double>(), row["build_ms"].get<double>(),
+             wrong);
+}
+
+/// The renderer's passes with each tracer that it can use.
+Json measure_passes(const TraceInput& input, const Systems& systems, const PrimaryCamera& camera, float radius,
+                    uint32_t threads, const Options& options) {
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+  Json passes = Json::array();
+  fmt::print("\nwhole passes of the renderer, Mrays/s:");
+  for (const System& row : systems.rows) {
+    if (row.call != kRayTracer) continue;
+    const std::vector<double> seconds =
+        time_passes(input.source, *row.tracer, camera, radius, options.repeats, options.cpu_clock);
+    Json json{{"system", row.name}, {"threads", threads}};
+    fmt::print(" {}", row.name);
+    for (size_t phase = 0; phase < seconds.size(); ++phase) {
+      const RecordedRays& rays = (*row.rays)[phase];
+      const double elapsed = options.cpu_clock ? seconds[phase] / threads : seconds[phase];
+      json["mrays_per_s"][std::string(rays.name)] = static_cast<double>(rays.count()) / elapsed * 1e-6;
+      fmt::print(", {} {:.1f}", rays.name, static_cast<double>(rays.count()) / elapsed * 1e-6);
+    }
+    fmt::print(";");
+    passes.push_back(std::move(json));
+  }
+  fmt::print("\n");
+  return passes;
+}
+
+/// Every row has every phase, with a speed.
+bool complete(const Json& rows, size_t expected) {
+  return rows.size() == expected && std::all_of(rows.begin(), rows.end(), [](const Json& row) {
+           return row["phases"].size() == 3 && row["resident_bytes"].get<uint64_t>() > 0 &&
+                  std::all_of(row["phases"].begin(), row["phases"].end(),
+                              [](const Json& phase) { return phase["ratio"].get<double>() > 0.0; });
+         });
+}
+
+void check_mismatches(const Json& rows, const Systems& systems, double most) {
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const System& row = systems.rows[i % systems.rows.size()];
+    for (size_t phase = 0; phase < row.rays->size(); ++phase) {
+      const auto wrong = rows[i]["phases"][phase]["mismatches"].get<double>();
+      if (row.watertight && wrong > most * static_cast<double>((*row.rays)[phase].count()))
+        throw Error(ErrorKind::kLimitExceeded, fmt::format("{} {}: {} of {} rays differ in {}", row.name, row.call,
+                                                           wrong, (*row.rays)[phase].count(), (*row.rays)[phase].name));
+    }
+  }
+}
+
+Json measure_input(const std::string& name, const Options& options) {
+  const std::unique_ptr<TraceInput> input = load_trace_input(name, options.inputs);
+  Systems systems = make_systems(*input);
+  const PrimaryCamera camera(choose_camera(input->source, options), options.size);
+  const float radius = default_ao_radius(input->source.world_bounds());
+  const RayTracer& recorder = *systems.trees[systems.truth_trees];
+  const auto frame =
+      std::make_shared<const std::vector<RecordedRays>>(record_frame(input->source, recorder, camera, radius));
+  for (System& row : systems.rows) {
+    const bool same = row.tracer->space() == recorder.space();
+    row.rays =
+        same ? frame
+             : std::make_shared<const std::vector<RecordedRays>>(moved(*frame, recorder.space(), row.tracer->space()));
+  }
+
+  Json json{{"name", input->name},
+            {"unique_triangles", input->unique_triangles()},
+            {"placed_triangles", input->placed_triangles()},
+            {"instances", input->source.instances().size()},
+            {"file_bytes", input->file.file_bytes()},
+            {"ao_radius", radius}};
+  fmt::print("\n## {}: {} triangles ({} placed), {} instances, AO radius {:.4g}\n", input->name,
+             input->unique_triangles(), input->placed_triangles(), input->source.instances().size(), radius);
+  for (const RecordedRays& phase : *frame) json["rays"][std::string(phase.name)] = phase.count();
+  json["rows"] = Json::array();
+  for (const uint32_t threads : options.threads) {
+    measure(systems, threads, options.repeats, options.cpu_clock);
+    fmt::print("\n{} thread{}; Mrays/s (ratio to Embree default: 16 for primary, 1 for ao)\n\n"
+               "| system | call | primary | ao any | ao closest | B/tri | build ms | mismatches |\n"
+               "|---|---|---|---|---|---|---|---|\n",
+               threads, threads == 1 ? "" : "s");
+    for (const System& row : systems.rows) {
+      json["rows"].push_back(row_json(*input, systems, row, threads));
+      print_row(json["rows"].back());
+    }
+    for (Json& pass : measure_passes(*input, systems, camera, radius, threads, options))
+      json["passes"].push_back(std::move(pass));
+  }
+  if (!complete(json["rows"], systems.rows.size() * options.threads.size()))
+    throw Error(ErrorKind::kLimitExceeded, input->name + ": figures are missing");
+  if (options.max_mismatches) check_mismatches(json["rows"], systems, *options.max_mismatches);
+  return json;
+}
+
+int run(int argc, char** argv) {
+  Options options;
+  CLI::App app{"Traces the same recorded rays with every tracer and in all ways of Embree; see docs/tracing.md."};
+  app.add_option("--scenes", options.inputs.scenes, "holds house, spaceship, bunny and killeroo")
+      ->envname("PACKTRACE_SCENES");
+  app.add_option("--mesh-triangles", options.inputs.mesh_triangles, "of the input mesh")->capture_default_str();
+  app.add_option("--forest-instances", options.inputs.forest_instances, "of the input forest")->capture_default_str();
+  app.add_option("--camera", options.camera, "which of the scene's, or auto")->capture_default_str();
+  app.add_option("--width", options.size.width, "pixels")->capture_default_str();
+  app.add_option("--height", options.size.height, "pixels")->capture_default_str();
+  app.add_option("--threads", options.threads, "how many, one table each")->delimiter(',')->capture_default_str();
+  app.add_option("--repeats", options.repeats, "of which the median counts")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000));
+  app.add_flag("--cpu-clock", options.cpu_clock,
+               "CPU time of all threads divided by their number, not wall time: for machines that do other things");
+  app.add_option("--max-mismatches", options.max_mismatches,
+                 "fail if watertight systems differ from Embree robust in more than this share of a phase's rays");
+  app.add_option("--json", options.json_file, "writes all figures here");
+  app.add_option("INPUT", options.names,
+                 "house, spaceship, bunny, killeroo, town; mesh and forest, which are generated; .ptk and .pbrt files "
+                 "(default: the first five, or town where there is no folder of scenes)");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorKind::kUsage);
+  }
+  if (options.names.empty()) {
+    options.names = {"town"};
+    if (!options.inputs.scenes.empty())
+      options.names.insert(options.names.begin(), {"house", "spaceship", "bunny", "killeroo"});
+  }
+  std::ofstream out;
+  if (!options.json_file.empty()) out.open(options.json_file);
+  Json json = describe_machine();
+  json["clock"] = options.cpu_clock ? "cpu" : "wall";
+  for (const std::string& name : options.names) json["inputs"].push_back(measure_input(name, options));
+  json["load_average_after"] = describe_machine()["load_average"];
+  fmt::print("\n{}, load average {:.1f} before, {:.1f} after\n", json["cpu"].get<std::string>(),
+             json["load_average"].get<double>(), json["load_average_after"].get<double>());
+  if (out.is_open()) out << json.dump(2) << std::endl;
+  if (!out) throw Error(ErrorKind::kIo, options.json_file.string() + ": cannot write");
+  return 0;
+}
+
+} // namespace
+} // namespace packtrace
+
+int main(int argc, char** argv) { return packtrace::benchmark_main("trace_benchmark", packtrace::run, argc, argv); }

@@ -1,0 +1,78 @@
+#include "tests/benchmarks/trace_benchmark_inputs.h"
+
+#include <unistd.h>
+
+#include "assets/generator/displaced_mesh.h"
+#include "assets/generator/forest.h"
+#include "compress/bake/bake_scene.h"
+#include "pbrt_import/import_scene.h"
+
+namespace packtrace {
+namespace {
+
+namespace fs = std::filesystem;
+
+BakedFile bake(const fs::path& scene_file) {
+  Diagnostics diagnostics;
+  Progress progress;
+  const Scene scene = import_scene(scene_file, {}, diagnostics, progress).scene;
+  return BakedFile::from_bytes(bake_to_bytes(scene, {}, diagnostics, progress).bytes, scene_file.string());
+}
+
+/// A folder that goes when this does.
+class TemporaryFolder {
+public:
+  TemporaryFolder() : path_(fs::temp_directory_path() / ("trace_benchmark." + std::to_string(::getpid()))) {}
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const fs::path& path() const { return path_; }
+
+private:
+  fs::path path_;
+};
+
+BakedFile find(const std::string& name, const TraceInputOptions& options) {
+  if (name == "town") return bake(fs::path(PACKTRACE_SOURCE_DIR) / "assets/town/town.pbrt");
+  if (name == "killeroo") return bake(options.scenes / name / "killeroo-simple.pbrt");
+  if (name == "house" || name == "spaceship" || name == "bunny") return bake(options.scenes / name / "scene.pbrt");
+  const TemporaryFolder folder;
+  if (name == "mesh") {
+    scenegen::DisplacedMeshConfig config;
+    config.triangles = options.mesh_triangles;
+    scenegen::generate_displaced_mesh(config, {folder.path(), true});
+    return bake(folder.path() / "mesh.pbrt");
+  }
+  if (name == "forest") {
+    scenegen::ForestConfig config;
+    config.instances = options.forest_instances;
+    scenegen::generate_forest(config, {folder.path(), true});
+    return bake(folder.path() / "forest.pbrt");
+  }
+  return fs::path(name).extension() == ".ptk" ? BakedFile::open(name) : bake(name);
+}
+
+} // namespace
+
+uint64_t TraceInput::unique_triangles() const {
+  uint64_t triangles = 0;
+  for (uint32_t g = 0; g < source.geometry_count(); ++g) triangles += source.counts(g).triangles;
+  return triangles;
+}
+
+uint64_t TraceInput::placed_triangles() const {
+  uint64_t triangles = 0;
+  for (const PlacedGeometry& placed : source.instances()) triangles += source.counts(placed.geometry).triangles;
+  return triangles;
+}
+
+std::unique_ptr<TraceInput> load_trace_input(const std::string& name, const TraceInputOptions& options) {
+  const fs::path path(name);
+  const std::string shown = path.has_extension() ? path.stem().string() : name;
+  return std::make_unique<TraceInput>(shown, find(name, options));
+}
+
+} // namespace packtrace
