@@ -45,6 +45,7 @@ void BakeConfig::validate() const {
   if (textures && purpose != baked::kShading)
     throw Error(ErrorKind::kUsage, "textures are for shading; for ambient occlusion nothing looks at them");
   require(min_texture_psnr_db >= 10.0 && min_texture_psnr_db <= 100.0, "texture PSNR", "dB must be 10 .. 100");
+  require(lod_levels >= 1 && lod_levels < baked::kMaxLodLevels, "levels of detail", "1 .. 31");
 }
 
 double BakeConfig::max_normal_error_degrees() const {

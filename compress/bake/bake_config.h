@@ -20,6 +20,13 @@ enum class PrecisionKind : uint32_t {
   kPositionBits = 3,     ///< step <= the box's longest side / (2^precision - 1); whole numbers 1..40
 };
 
+/// Which geometries get levels of detail (docs/cluster_lod.md).
+enum class LodUse : uint32_t {
+  kOff,
+  kInstanced, ///< those of several instances
+  kAll
+};
+
 /// Everything a user can choose about a bake.
 struct BakeConfig {
   PrecisionKind precision_kind = PrecisionKind::kEdgeFraction;
@@ -58,6 +65,10 @@ struct BakeConfig {
 
   /// How the file lies on disk. Changes nothing that is decoded from it.
   PageCodec codec = PageCodec::kNone;
+
+  LodUse lod = LodUse::kOff;
+  uint32_t lod_min_triangles = 512; ///< geometries of fewer get no levels
+  uint32_t lod_levels = 31;         ///< above the source's, at most; 1..31
 
   /// Throws Error(kUsage) if a value is out of its range. Nothing is ever clamped.
   void validate() const;

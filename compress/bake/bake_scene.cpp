@@ -9,6 +9,7 @@
 #include "compress/bake/geometry_encoder.h"
 #include "compress/bake/geometry_measure.h"
 #include "compress/bake/geometry_plan.h"
+#include "compress/bake/lod/lod_encoder.h"
 #include "compress/bake/nested_grids.h"
 #include "compress/bake/page_encoder.h"
 #include "compress/bake/requirement_table.h"
@@ -22,6 +23,9 @@
 
 namespace packtrace {
 namespace {
+
+/// Triangles that building levels of a geometry works through, as a multiple of its own: every level has half.
+constexpr uint64_t kLodWork = 2;
 
 double mean_normal_error(const QuantizeStats& stats) {
   return stats.normal_count > 0 ? stats.normal_error_sum / static_cast<double>(stats.normal_count) : 0.0;
@@ -57,6 +61,7 @@ private:
     EncodedGeometry encoded;
     QuantizeStats stats;
     GeometryNeeds needs;
+    EncodedLod lod;
 
     size_t bytes() const { return encoded.payload.size() + encoded.clusters.size() * sizeof(baked::ClusterRecord); }
   };
@@ -70,6 +75,11 @@ private:
                                                         packed_[i].encoded.stream_bits);
       sections.add_geometry(packed_[i].record, packed_[i].encoded, plan_.geometries[i].name);
       packed_[i].encoded = {};
+    }
+    for (size_t i = 0; i < packed_.size(); ++i) {
+      report_.lod_geometries += !packed_[i].lod.levels.empty();
+      sections.add_lod(static_cast<uint32_t>(i), packed_[i].lod);
+      packed_[i].lod = {};
     }
     sections.set_instances(plan_.instances);
     sections.set_material_slots(plan_.material_slots);
@@ -184,10 +194,10 @@ private:
   }
 
   void pack() {
+    lod_wanted_ = choose_lod();
     uint64_t triangles = 0;
-    for (const GeometryPlan& plan : plan_.geometries)
-      for (const GeometryPart& part : plan.parts) triangles += scene_.meshes[part.mesh].triangles.size();
-    progress_.begin("packing geometry", triangles);
+    for (size_t i = 0; i < packed_.size(); ++i) triangles += (lod_wanted_[i] != 0 ? 1 + kLodWork : 1) * triangles_of(i);
+    progress_.begin(config_.lod == LodUse::kOff ? "packing geometry" : "packing geometry and its levels", triangles);
     tbb::parallel_for(size_t{0}, packed_.size(), [&](size_t i) {
       progress_.check_cancelled();
       packed_[i] = pack_one(i);
@@ -195,24 +205,61 @@ private:
     });
   }
 
-  Packed pack_one(size_t index) const {
-    GeometryNeeds needs = analyse_requirements(scene_, plan_, plan_.geometries[index], config_);
-    Packed packed = pack_with(index, needs);
-    // Flat triangles need clusters of their own. Where only some are flat, those may take more than the normals do.
-    const bool mixed = packed.stats.flat_triangles > 0 && packed.encoded.stream_bits.normals > 0;
-    needs.infer_normals = false;
-    if (mixed)
-      if (Packed other = pack_with(index, needs); other.bytes() < packed.bytes()) return other;
-    return packed;
+  uint64_t triangles_of(size_t geometry) const {
+    uint64_t triangles = 0;
+    for (const GeometryPart& part : plan_.geometries[geometry].parts)
+      triangles += scene_.meshes[part.mesh].triangles.size();
+    return triangles;
   }
 
-  Packed pack_with(size_t index, const GeometryNeeds& needs) const {
+  /// By geometry: whether it is to have levels of detail.
+  std::vector<uint8_t> choose_lod() const {
+    std::vector<uint8_t> wanted(packed_.size());
+    if (config_.lod == LodUse::kOff) return wanted;
+    std::vector<uint32_t> uses(packed_.size());
+    for (const baked::InstanceRecord& instance : plan_.instances) ++uses[instance.geometry];
+    for (size_t i = 0; i < wanted.size(); ++i)
+      wanted[i] = (config_.lod == LodUse::kAll || uses[i] > 1) && triangles_of(i) >= config_.lod_min_triangles;
+    return wanted;
+  }
+
+  /// A geometry on its lattice and in clusters, and what it became.
+  struct Draft {
+    QuantizedGeometry quantized;
+    GeometryClusters clusters;
+    Packed packed;
+  };
+
+  Packed pack_one(size_t index) {
+    GeometryNeeds needs = analyse_requirements(scene_, plan_, plan_.geometries[index], config_);
+    Draft draft = pack_with(index, needs);
+    // Flat triangles need clusters of their own. Where only some are flat, those may take more than the normals do.
+    const bool mixed = draft.packed.stats.flat_triangles > 0 && draft.packed.encoded.stream_bits.normals > 0;
+    needs.infer_normals = false;
+    if (mixed)
+      if (Draft other = pack_with(index, needs); other.packed.bytes() < draft.packed.bytes()) draft = std::move(other);
+    if (lod_wanted_[index] != 0) {
+      ClusterLod lod = build_cluster_lod(draft.quantized, draft.clusters, progress_, config_.lod_levels + 1);
+      draft.clusters = {};
+      draft.packed.lod = encode_lod(draft.quantized, lod);
+    }
+    return std::move(draft.packed);
+  }
+
+  Draft pack_with(size_t index, const GeometryNeeds& needs) const {
     const GeometryPlan& plan = plan_.geometries[index];
     const GeometryMeasure& measure = measures_[index];
-    const QuantizedGeometry q = quantize_geometry(scene_, plan, needs, config_, grids_[index], measure.max_abs(),
-                                                  measure.bounds.lo, measure.bounds.hi);
-    return {record_of(plan, q, position_error_bound(q.grid.step(), measure.max_abs())), encode_geometry(q, split_geometry(q)),
-            q.stats, needs};
+    Draft draft;
+    draft.quantized = quantize_geometry(scene_, plan, needs, config_, grids_[index], measure.max_abs(),
+                                        measure.bounds.lo, measure.bounds.hi);
+    const QuantizedGeometry& q = draft.quantized;
+    draft.clusters = split_geometry(q);
+    draft.packed = {record_of(plan, q, position_error_bound(q.grid.step(), measure.max_abs())),
+                    encode_geometry(q, draft.clusters),
+                    q.stats,
+                    needs,
+                    {}};
+    return draft;
   }
 
   static baked::GeometryRecord record_of(const GeometryPlan& plan, const QuantizedGeometry& q, double error_bound) {
@@ -328,6 +375,7 @@ private:
   PositionGrid world_grid_;
   std::vector<PositionGrid> grids_;
   std::vector<Packed> packed_;
+  std::vector<uint8_t> lod_wanted_; // by geometry
   std::vector<EncodedTexture> textures_; // as in the scene; empty where they are not kept
   BakeReport report_;
 };

@@ -35,6 +35,7 @@ struct BakeReport {
   double max_normal_error_degrees = 0.0, mean_normal_error_degrees = 0.0;
   double max_uv_error = 0.0;
   double max_uv_error_texels = 0.0;  ///< of the finest texture that the same geometry looks up
+  uint64_t lod_geometries = 0;       ///< with levels of detail
   std::vector<std::string> warnings; ///< also in the diagnostics
 };
 

@@ -121,6 +121,30 @@ void FileSections::add_cameras(const Scene& scene) {
 }
 
 void FileSections::add_geometry(baked::GeometryRecord record, const EncodedGeometry& encoded, std::string_view name) {
+  record.name = add_string(name);
+  append(record, encoded);
+}
+
+void FileSections::add_lod(uint32_t base, const EncodedLod& lod) {
+  uint64_t first_group = lod_groups_.size(), first_link = lod_links_.size();
+  for (uint32_t number = 0; number < lod.levels.size(); ++number) {
+    const EncodedLod::Level& level = lod.levels[number];
+    const auto geometry = number == 0 ? base : static_cast<uint32_t>(geometries_.size());
+    if (number > 0) {
+      baked::GeometryRecord record = geometries_[base];
+      record.flags |= baked::kLodLevel;
+      record.name = {};
+      append(record, level.encoded);
+    }
+    lod_levels_.push_back(
+        {first_group, first_link, level.triangles, base, number, geometry, level.group_count, level.error, 0});
+    first_group += level.group_count, first_link += geometries_[geometry].cluster_count;
+  }
+  lod_groups_.insert(lod_groups_.end(), lod.groups.begin(), lod.groups.end());
+  lod_links_.insert(lod_links_.end(), lod.links.begin(), lod.links.end());
+}
+
+void FileSections::append(baked::GeometryRecord& record, const EncodedGeometry& encoded) {
   record.first_cluster = clusters_.size();
   record.payload_offset = payload_.size();
   record.payload_bytes = encoded.payload.size();
@@ -130,7 +154,6 @@ void FileSections::add_geometry(baked::GeometryRecord record, const EncodedGeome
   record.bounds_lo = {encoded.bounds_lo.x, encoded.bounds_lo.y, encoded.bounds_lo.z};
   record.bounds_hi = {encoded.bounds_hi.x, encoded.bounds_hi.y, encoded.bounds_hi.z};
   record.class_clusters = encoded.class_clusters;
-  record.name = add_string(name);
   geometries_.push_back(record);
   clusters_.insert(clusters_.end(), encoded.clusters.begin(), encoded.clusters.end());
   payload_.insert(payload_.end(), encoded.payload.begin(), encoded.payload.end());
@@ -155,7 +178,10 @@ std::vector<std::byte> FileSections::assemble(const baked::SummaryRecord& summar
                               strings_,
                               {&summary, 1},
                               material_slots_,
-                              requirements_});
+                              requirements_,
+                              lod_levels_,
+                              lod_groups_,
+                              lod_links_});
 }
 
 } // namespace packtrace

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "compress/bake/geometry_encoder.h"
+#include "compress/bake/lod/lod_encoder.h"
 #include "compress/bake/texture_encoder.h"
 #include "compress/format/baked_format.h"
 #include "pbrt_import/scene/scene.h"
@@ -22,6 +23,9 @@ public:
   /// Completes the record with ranges, counts, bounds and name, and appends it with its clusters and payload.
   void add_geometry(baked::GeometryRecord record, const EncodedGeometry& encoded, std::string_view name);
 
+  /// Appends levels of detail of a geometry, behind all others and in the order of their bases.
+  void add_lod(uint32_t base, const EncodedLod& lod);
+
   void set_instances(std::vector<baked::InstanceRecord> instances) { instances_ = std::move(instances); }
 
   void set_material_slots(std::vector<uint32_t> slots) { material_slots_ = std::move(slots); }
@@ -34,6 +38,7 @@ public:
   std::vector<std::byte> assemble(const baked::SummaryRecord& summary);
 
 private:
+  void append(baked::GeometryRecord& record, const EncodedGeometry& encoded);
   baked::StringRef add_string(std::string_view text);
   void add_materials(const Scene& scene, bool textured);
   void add_masks(const Scene& scene);
@@ -53,6 +58,9 @@ private:
   std::string strings_;
   std::vector<uint32_t> material_slots_;
   std::vector<baked::RequirementRecord> requirements_;
+  std::vector<baked::LodLevelRecord> lod_levels_;
+  std::vector<baked::LodGroupRecord> lod_groups_;
+  std::vector<baked::LodLinkRecord> lod_links_;
   ClusterView::StreamBits stream_bits_;
 };
 

@@ -14,7 +14,7 @@ namespace {
 
 /// Bits that each geometry's lattice loses. World-space geometry loses the same everywhere: what touches stays closed.
 std::vector<uint32_t> choose_shifts(const BakedFile& file) {
-  std::vector<uint32_t> shifts(file.geometries().size());
+  std::vector<uint32_t> shifts(file.base_geometry_count());
   tbb::parallel_for(size_t{0}, shifts.size(),
                     [&](size_t i) { shifts[i] = vertex16_shift(lattice_box(file, static_cast<uint32_t>(i))); });
   uint32_t world = 0;

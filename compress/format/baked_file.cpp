@@ -72,6 +72,27 @@ uint32_t BakedFile::cluster_of_triangle(uint32_t geometry, uint32_t triangle) co
   return static_cast<uint32_t>(after - records.begin()) - 1;
 }
 
+uint32_t BakedFile::base_geometry_count() const {
+  const auto end =
+      std::partition_point(sections_.geometries.begin(), sections_.geometries.end(),
+                           [](const baked::GeometryRecord& g) { return (g.flags & baked::kLodLevel) == 0; });
+  return static_cast<uint32_t>(end - sections_.geometries.begin());
+}
+
+LodView BakedFile::lod(uint32_t geometry) const {
+  const auto all = sections_.lod_levels;
+  const auto first =
+      std::partition_point(all.begin(), all.end(), [&](const baked::LodLevelRecord& l) { return l.base < geometry; });
+  auto end = first;
+  uint64_t groups = 0, links = 0;
+  for (; end != all.end() && end->base == geometry; ++end) // kMaxLodLevels at most
+    groups += end->group_count, links += sections_.geometries[end->geometry].cluster_count;
+  if (first == end) return {};
+  return {{first, end},
+          sections_.lod_groups.subspan(static_cast<size_t>(first->first_group), static_cast<size_t>(groups)),
+          sections_.lod_links.subspan(static_cast<size_t>(first->first_link), static_cast<size_t>(links))};
+}
+
 Affine BakedFile::world_from_object(uint32_t instance) const {
   const auto& m = sections_.instances[instance].world_from_object;
   return Affine(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]);

@@ -34,6 +34,9 @@ struct BakedSections {
   std::span<const baked::SummaryRecord> summary; ///< exactly one
   std::span<const uint32_t> material_slots;
   std::span<const baked::RequirementRecord> requirements;
+  std::span<const baked::LodLevelRecord> lod_levels;
+  std::span<const baked::LodGroupRecord> lod_groups;
+  std::span<const baked::LodLinkRecord> lod_links;
 
   std::string_view text(baked::StringRef ref) const { return {strings.data() + ref.offset, ref.bytes}; }
 };
@@ -72,6 +75,11 @@ public:
   ClusterView cluster(uint32_t geometry, uint32_t cluster) const;
   /// Of the geometry's cluster that holds a triangle; triangle < triangle_count. Takes O(log clusters).
   uint32_t cluster_of_triangle(uint32_t geometry, uint32_t triangle) const;
+
+  /// Geometries that instances can be of come first; those from here on are levels of detail of them.
+  uint32_t base_geometry_count() const;
+  /// Levels of detail of a geometry below base_geometry_count(); empty where it has none. Takes O(log levels).
+  LodView lod(uint32_t geometry) const;
 
   Affine world_from_object(uint32_t instance) const;
   /// Materials of the instance's geometry, by slot.

@@ -5,14 +5,15 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "compress/format/lod_format.h"
 #include "pbrt_import/scene/material_flags.h"
 
-/// What lies in a .ptk file, version 3; docs/baked_format.md says it in words. Little-endian; every section starts at a
+/// What lies in a .ptk file, version 4; docs/baked_format.md says it in words. Little-endian; every section starts at a
 /// multiple of 64 bytes; bytes that no field or section owns are zero.
 namespace packtrace::baked {
 
 inline constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'K', 0x89, '\r', '\n', 0x1a, 0};
-inline constexpr uint32_t kVersion = 3;
+inline constexpr uint32_t kVersion = 4;
 inline constexpr size_t kSectionAlignment = 64;
 inline constexpr uint32_t kNone = ~0u;
 
@@ -32,6 +33,9 @@ enum Section : uint32_t {
   kSummary,       ///< one record
   kMaterialSlots, ///< uint32_t: materials, in runs that instances begin at
   kRequirements,
+  kLodLevels, ///< LodLevelRecord, lod_format.h
+  kLodGroups, ///< LodGroupRecord
+  kLodLinks,  ///< LodLinkRecord
   kSectionCount
 };
 
@@ -51,7 +55,7 @@ struct FileHeader {
   uint32_t section_count;
   uint32_t reserved;
   std::array<SectionRecord, kSectionCount> sections;
-  std::array<uint64_t, 7> padding;
+  std::array<uint64_t, 6> padding;
   uint64_t header_hash; ///< XXH3-64 of the header before this field
 };
 
@@ -62,7 +66,8 @@ struct StringRef {
 
 // GeometryRecord::flags
 inline constexpr uint32_t kWorldSpace = 1u << 0; ///< on the scene's grid; its instances' transforms are the identity
-inline constexpr uint32_t kGeometryFlags = kWorldSpace;
+inline constexpr uint32_t kLodLevel = 1u << 1; ///< a coarser level of another geometry; no instances; behind all others
+inline constexpr uint32_t kGeometryFlags = kWorldSpace | kLodLevel;
 
 /// Clusters of one geometry, ordered by material_class().
 struct GeometryRecord {
@@ -226,9 +231,9 @@ struct SummaryRecord {
 template <typename T>
 inline constexpr bool kIsPod = std::is_trivially_copyable_v<T>&& std::is_standard_layout_v<T>;
 
-static_assert(kIsPod<FileHeader> && sizeof(SectionRecord) == 24 && sizeof(FileHeader) == 448);
+static_assert(kIsPod<FileHeader> && sizeof(SectionRecord) == 24 && sizeof(FileHeader) == 512);
 static_assert(offsetof(FileHeader, content_hash) == 24 && offsetof(FileHeader, sections) == 48 &&
-              offsetof(FileHeader, padding) == 384 && offsetof(FileHeader, header_hash) == 440);
+              offsetof(FileHeader, padding) == 456 && offsetof(FileHeader, header_hash) == 504);
 static_assert(kIsPod<GeometryRecord> && sizeof(GeometryRecord) == 192 && alignof(GeometryRecord) == 8);
 static_assert(offsetof(GeometryRecord, origin) == 24 && offsetof(GeometryRecord, cluster_count) == 64 &&
               offsetof(GeometryRecord, bounds_lo) == 96 && offsetof(GeometryRecord, flags) == 132 &&
@@ -263,7 +268,10 @@ inline constexpr std::array<uint32_t, kSectionCount> kRecordBytes = {sizeof(Geom
                                                                      1,
                                                                      sizeof(SummaryRecord),
                                                                      sizeof(uint32_t),
-                                                                     sizeof(RequirementRecord)};
+                                                                     sizeof(RequirementRecord),
+                                                                     sizeof(LodLevelRecord),
+                                                                     sizeof(LodGroupRecord),
+                                                                     sizeof(LodLinkRecord)};
 
 inline constexpr uint32_t kMaskedClass = 4; ///< bit of a material class: a mask must be looked up
 

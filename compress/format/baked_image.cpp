@@ -14,7 +14,9 @@ std::vector<std::byte> assemble_baked_file(const BakedSections& sections) {
       std::as_bytes(sections.mask_words),     std::as_bytes(sections.textures),
       std::as_bytes(sections.texture_bytes),  std::as_bytes(sections.cameras),
       std::as_bytes(sections.strings),        std::as_bytes(sections.summary),
-      std::as_bytes(sections.material_slots), std::as_bytes(sections.requirements)};
+      std::as_bytes(sections.material_slots), std::as_bytes(sections.requirements),
+      std::as_bytes(sections.lod_levels),     std::as_bytes(sections.lod_groups),
+      std::as_bytes(sections.lod_links)};
   baked::FileHeader header{};
   header.magic = baked::kMagic;
   header.version = baked::kVersion;

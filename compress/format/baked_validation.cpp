@@ -8,6 +8,7 @@
 
 #include "compress/format/baked_file.h"
 #include "compress/format/bit_stream.h"
+#include "compress/format/lod_validation.h"
 #include "pbrt_import/scene/error.h"
 
 namespace packtrace {
@@ -27,7 +28,9 @@ public:
     check_materials_and_masks();
     check_textures();
     check_instances();
+    check_lod_levels();
     check_geometries();
+    if (const auto fault = find_lod_group_fault(sections_)) fail(fault->section, fault->record, fault->what);
     check_cameras();
     check_requirements();
     check_summary();
@@ -96,7 +99,10 @@ private:
                  section<char>(baked::kStrings),
                  section<baked::SummaryRecord>(baked::kSummary),
                  section<uint32_t>(baked::kMaterialSlots),
-                 section<baked::RequirementRecord>(baked::kRequirements)};
+                 section<baked::RequirementRecord>(baked::kRequirements),
+                 section<baked::LodLevelRecord>(baked::kLodLevels),
+                 section<baked::LodGroupRecord>(baked::kLodGroups),
+                 section<baked::LodLinkRecord>(baked::kLodLinks)};
     if (sections_.payload.size() < kReadSlackBytes) fail("payload section without its final zero bytes");
     if (sections_.summary.size() != 1) fail("summary section must hold one record");
     if (sections_.geometries.size() >= baked::kNone || sections_.instances.size() >= baked::kNone ||
@@ -226,6 +232,7 @@ private:
   }
 
   void check_slots(size_t geometry, const baked::GeometryRecord& g) const {
+    if ((g.flags & baked::kLodLevel) != 0) return; // they are the base's
     if (g.cluster_count == 0 ? g.slot_count != 0 : g.slot_count == 0 || g.slot_count > g.cluster_count)
       fail("geometry", geometry, "material slots");
     if (g.cluster_count > 0 && first_slots_[geometry] == baked::kNone)
@@ -269,7 +276,9 @@ private:
     first_slots_.assign(sections_.geometries.size(), baked::kNone);
     for (size_t i = 0; i < sections_.instances.size(); ++i) {
       const baked::InstanceRecord& instance = sections_.instances[i];
-      if (instance.geometry >= sections_.geometries.size()) fail("instance", i, "geometry");
+      if (instance.geometry >= sections_.geometries.size() ||
+          (sections_.geometries[instance.geometry].flags & baked::kLodLevel) != 0)
+        fail("instance", i, "geometry");
       for (const float f : instance.world_from_object)
         if (!std::isfinite(f)) fail("instance", i, "transform");
       const uint32_t slots = sections_.geometries[instance.geometry].slot_count;
@@ -280,6 +289,12 @@ private:
       if (!same_classes(first, instance.first_slot, slots)) fail("instance", i, "material classes");
     }
     check_runs();
+  }
+
+  /// Levels of detail have their base's material slots.
+  void check_lod_levels() {
+    if (const auto fault = find_lod_level_fault(sections_)) fail(fault->section, fault->record, fault->what);
+    for (const baked::LodLevelRecord& level : sections_.lod_levels) first_slots_[level.geometry] = first_slots_[level.base];
   }
 
   /// The runs of slots of one geometry are equal or apart, so that going through all of them takes no longer than the file.

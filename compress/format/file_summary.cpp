@@ -20,6 +20,7 @@ StreamBytes stream_bytes(const BakedFile& file) {
   bytes.geometry_records = s.geometries.size_bytes();
   bytes.instance_records = s.instances.size_bytes();
   bytes.requirement_records = s.requirements.size_bytes();
+  bytes.lod_records = s.lod_levels.size_bytes() + s.lod_groups.size_bytes() + s.lod_links.size_bytes();
   bytes.material_records = s.materials.size_bytes() + s.material_slots.size_bytes();
   bytes.masks = s.masks.size_bytes() + s.mask_words.size_bytes();
   bytes.textures = s.textures.size_bytes() + s.texture_bytes.size();
@@ -28,7 +29,7 @@ StreamBytes stream_bytes(const BakedFile& file) {
   bytes.total = file.file_bytes();
   bytes.header_and_alignment = bytes.total - s.payload.size() - bytes.cluster_records - bytes.geometry_records -
                                bytes.instance_records - bytes.material_records - bytes.masks - bytes.textures -
-                               bytes.cameras - bytes.strings - bytes.requirement_records;
+                               bytes.cameras - bytes.strings - bytes.requirement_records - bytes.lod_records;
   return bytes;
 }
 
@@ -151,10 +152,12 @@ FileSummary summarize(const BakedFile& file) {
   std::vector<double> texels; // by material slot
   for (const uint32_t material : s.material_slots) texels.push_back(texels_per_uv(s, s.materials[material]));
   const std::vector<std::vector<uint32_t>> runs = material_runs(s);
-  for (size_t i = 0; i < s.geometries.size(); ++i) {
+  summary.geometries = file.base_geometry_count();
+  for (size_t i = 0; i < summary.geometries; ++i) {
     const baked::GeometryRecord& g = s.geometries[i];
     summary.triangles += g.triangle_count;
     summary.vertices += g.vertex_count;
+    summary.clusters += g.cluster_count;
     summary.shared_geometries += uses[i] > 1;
     summary.max_position_error = std::max(summary.max_position_error, g.max_position_error);
     summary.max_position_error_bound = std::max(summary.max_position_error_bound, g.position_error_bound);
@@ -173,8 +176,7 @@ FileSummary summarize(const BakedFile& file) {
   for (const baked::TextureRecord& t : s.textures)
     summary.textures.push_back({std::string(s.text(t.name)), t.width, t.height, static_cast<TextureCodec>(t.codec),
                                 texture_bytes(static_cast<TextureCodec>(t.codec), t.width, t.height), t.psnr_db});
-  summary.clusters = s.clusters.size();
-  summary.geometries = s.geometries.size();
+  summary.lod = summarize_lod(file);
   summary.instances = s.instances.size();
   summary.materials = s.materials.size();
   summary.masks = s.masks.size();

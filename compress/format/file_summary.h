@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "compress/format/baked_file.h"
+#include "compress/format/lod_summary.h"
 
 namespace packtrace {
 
@@ -14,6 +15,7 @@ struct StreamBytes {
   uint64_t payload_padding = 0;
   uint64_t cluster_records = 0, geometry_records = 0, instance_records = 0, material_records = 0;
   uint64_t masks = 0, textures = 0, cameras = 0, strings = 0, requirement_records = 0;
+  uint64_t lod_records = 0;          ///< levels, groups and links; other records and streams are of all levels
   uint64_t header_and_alignment = 0; ///< with the summary record
   uint64_t total = 0;                ///< of the file
 };
@@ -60,7 +62,7 @@ struct TextureUse {
   float psnr_db = 0; ///< infinite where nothing was lost
 };
 
-/// What `info` shows of a baked file.
+/// What `info` shows of a baked file. Geometries, triangles and so on are those of level 0; bytes are of all levels.
 struct FileSummary {
   uint64_t triangles = 0, placed_triangles = 0, vertices = 0, placed_vertices = 0, clusters = 0;
   uint64_t geometries = 0, shared_geometries = 0, instances = 0, materials = 0, masks = 0, cameras = 0;
@@ -72,7 +74,8 @@ struct FileSummary {
   std::vector<GridUse> grids;     ///< world space first, then by step, finest first
   std::vector<NormalUse> normals; ///< by encoding
   std::vector<TextureUse> textures;
-  std::vector<UvUse> uvs;          ///< by encoding
+  std::vector<UvUse> uvs; ///< by encoding
+  LodSummary lod;
   double max_position_error = 0.0; ///< measured, largest axis, object units, over all geometries
   double max_position_error_bound = 0.0;
   float max_normal_error_degrees = 0.0f;

@@ -1,5 +1,6 @@
 #include "runtime/commands/bake_command.h"
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <memory>
@@ -29,6 +30,7 @@ constexpr const char *kAuto = "auto", *kNoTextures = "none";
 constexpr std::array<const char*, baked::kPurposeCount> kPurposes{"ao", "shading"};
 constexpr const char* kKeepNormals = "normals";
 constexpr const char* kKeepUvs = "uv";
+constexpr std::array<const char*, 3> kLodUses{"off", "instanced", "all"}; // by LodUse
 
 struct BakeOptions {
   std::string input, output;
@@ -41,6 +43,8 @@ struct BakeOptions {
   std::string uvs = kAuto;
   std::optional<std::string> textures; ///< without one, what the purpose needs
   std::optional<double> texture_psnr;
+  std::string lod = kLodUses[0];
+  std::optional<uint32_t> lod_min_triangles, lod_levels;
   std::string codec{name_of(PageCodec::kNone)};
   SceneOptions scene;
   bool dry_run = false;
@@ -73,6 +77,11 @@ BakeConfig make_config(const BakeOptions& options) {
   if (options.texture_psnr && textures != kAuto)
     throw Error(ErrorKind::kUsage, "--texture-psnr chooses codecs; it is of no use without --textures auto");
   if (options.texture_psnr) config.min_texture_psnr_db = *options.texture_psnr;
+  config.lod = static_cast<LodUse>(std::find(kLodUses.begin(), kLodUses.end(), options.lod) - kLodUses.begin());
+  if (config.lod == LodUse::kOff && (options.lod_min_triangles || options.lod_levels))
+    throw Error(ErrorKind::kUsage, "--lod-min-triangles and --lod-levels are of no use without --lod instanced or all");
+  config.lod_min_triangles = options.lod_min_triangles.value_or(config.lod_min_triangles);
+  config.lod_levels = options.lod_levels.value_or(config.lod_levels);
   config.codec = find_page_codec(options.codec).value(); // the option's check knows the names
   config.validate();
   return config;
@@ -145,6 +154,11 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
           baked.file.triangles, baked.file.bytes.total, baked.file.bytes_per_triangle, baked.max_position_error,
           baked.max_normal_error_degrees));
   fmt::print("{}", disk_text(baked.file));
+  if (const LodTable& lod = baked.file.lod.all; !lod.levels.empty())
+    fmt::print("{}", fmt::format(grouped(),
+                                 "{} levels of detail of {:L} geometries: {:.3f} bytes for each of their {:L} triangles\n",
+                                 lod.levels.size() - 1, baked.lod_geometries, lod.bytes_per_triangle(),
+                                 lod.base_triangles()));
   if (baked.instanced_shapes > 0)
     fmt::print("{}", fmt::format(grouped(), "{:L} shapes outside objects share geometry, on grids of its own\n",
                                  baked.instanced_shapes));
@@ -221,6 +235,19 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   verb.add_option("--texture-psnr", options->texture_psnr, "What auto keeps, 10..100 dB of sRGB values (default 34)")
       ->type_name("DB")
       ->group("Textures");
+  verb.add_option("--lod", options->lod,
+                  "Levels of detail, each of about half the triangles of the one below: instanced makes them of "
+                  "geometries with more than one instance")
+      ->check(CLI::IsMember(std::vector<std::string>(kLodUses.begin(), kLodUses.end())))
+      ->default_str(options->lod)
+      ->group("Levels of detail");
+  verb.add_option("--lod-min-triangles", options->lod_min_triangles,
+                  "Geometries of fewer triangles get no levels (default 512)")
+      ->type_name("N")
+      ->group("Levels of detail");
+  verb.add_option("--lod-levels", options->lod_levels, "Coarser levels at most, 1..31 (default 31)")
+      ->type_name("N")
+      ->group("Levels of detail");
   verb.add_option(
           "--codec", options->codec,
           "Form on disk: none is mapped and traced as it is; fast and small are smaller, and decoded when opened, fast "

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "runtime/commands/lod_report.h"
 #include "runtime/commands/requirement_report.h"
 
 namespace packtrace {
@@ -13,7 +14,7 @@ namespace {
 
 using Row = std::pair<const char*, uint64_t>;
 
-std::array<Row, 16> stream_rows(const StreamBytes& bytes) {
+std::array<Row, 17> stream_rows(const StreamBytes& bytes) {
   return {{{"indices", bytes.indices},
            {"positions", bytes.positions},
            {"normals", bytes.normals},
@@ -28,6 +29,7 @@ std::array<Row, 16> stream_rows(const StreamBytes& bytes) {
            {"cameras", bytes.cameras},
            {"strings", bytes.strings},
            {"requirement_records", bytes.requirement_records},
+           {"lod_records", bytes.lod_records},
            {"header_and_alignment", bytes.header_and_alignment},
            {"total", bytes.total}}};
 }
@@ -126,6 +128,7 @@ nlohmann::json to_json(const FileSummary& s, bool by_geometry) {
       {"collapsed_triangles", s.bake.collapsed_triangles},
       {"merged_vertices", s.bake.merged_vertices},
       {"requirements", requirements_json(s, by_geometry)},
+      {"lod", lod_json(s, by_geometry)},
   };
 }
 
@@ -180,7 +183,7 @@ std::string to_text(const FileSummary& s, bool by_geometry) {
   if (s.placed_triangles != s.triangles)
     text += fmt::format(grouped(), "{:<22}{:>14L}{:>16.3f}\n", "total, as placed", s.bytes.total,
                         s.bytes_per_placed_triangle);
-  return text + "\n" + requirements_text(s, by_geometry);
+  return text + "\n" + lod_text(s, by_geometry) + requirements_text(s, by_geometry);
 }
 
 } // namespace packtrace

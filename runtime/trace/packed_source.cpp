@@ -40,7 +40,7 @@ PackedSource::PackedSource(const BakedFile& file)
     instances_.push_back({file.instances()[i].geometry, file.world_from_object(i)});
 }
 
-uint32_t PackedSource::geometry_count() const { return static_cast<uint32_t>(file_.geometries().size()); }
+uint32_t PackedSource::geometry_count() const { return file_.base_geometry_count(); }
 
 GeometryCounts PackedSource::counts(uint32_t geometry) const {
   const baked::GeometryRecord& record = file_.geometries()[geometry];

@@ -4,14 +4,16 @@
 #include <cstring>
 
 #include <gtest/gtest.h>
-#include <xxhash.h>
 
 #include "compress/format/file_summary.h"
 #include "pbrt_import/scene/error.h"
+#include "tests/compress/file_damage.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {
 namespace {
+
+using test::message_after, test::open_kind, test::rehash;
 
 /// A small file with something in every section.
 Scene full_scene() {
@@ -46,27 +48,6 @@ BakedScene full_bake() {
   config.textures = true;
   config.texture_codec = TextureCodec::kBc1;
   return test::bake(full_scene(), config);
-}
-
-ErrorKind open_kind(std::span<const std::byte> bytes, std::string* message = nullptr) {
-  try {
-    (void)BakedFile::from_bytes(bytes);
-  } catch (const Error& error) {
-    if (message) *message = error.what();
-    return error.kind();
-  }
-  ADD_FAILURE() << "the file was accepted";
-  return ErrorKind::kCancelled;
-}
-
-/// Makes the hashes right again, so that damage reaches the checks behind them.
-void rehash(std::vector<std::byte>& bytes) {
-  const XXH128_hash_t hash =
-      XXH3_128bits(bytes.data() + sizeof(baked::FileHeader), bytes.size() - sizeof(baked::FileHeader));
-  const std::array<uint64_t, 2> content = {hash.low64, hash.high64};
-  std::memcpy(bytes.data() + offsetof(baked::FileHeader, content_hash), content.data(), sizeof content);
-  const uint64_t header = XXH3_64bits(bytes.data(), offsetof(baked::FileHeader, header_hash));
-  std::memcpy(bytes.data() + offsetof(baked::FileHeader, header_hash), &header, sizeof header);
 }
 
 /// Reads everything a reader can ask for.
@@ -198,17 +179,6 @@ TEST(BakedFile, MessagesNameWhatAndWhere) {
   const std::string_view text = "Shape \"sphere\"";
   EXPECT_EQ(open_kind(std::as_bytes(std::span(text)), &message), ErrorKind::kInput);
   EXPECT_EQ(message, "memory: not a packtrace baked file");
-}
-
-/// Changes one u32 of a file and returns what opening it says.
-std::string message_after(std::vector<std::byte> bytes, baked::Section section, size_t at, uint32_t value) {
-  baked::FileHeader header;
-  std::memcpy(&header, bytes.data(), sizeof header);
-  std::memcpy(bytes.data() + header.sections[section].offset + at, &value, sizeof value);
-  rehash(bytes);
-  std::string message;
-  EXPECT_EQ(open_kind(bytes, &message), ErrorKind::kInput);
-  return message;
 }
 
 TEST(BakedFile, MaterialSlotsAreChecked) {

@@ -81,6 +81,42 @@ WorldEnd
   EXPECT_EQ(run_packtrace({"bake", bench.scene(), "--dry-run", "--keep", "uv,colours"}).exit_code, 2);
 }
 
+TEST(CommandLine, LevelsOfDetailAreReported) {
+  const Workbench bench;
+  write_text(bench / "ball.pbrt", "WorldBegin\nObjectBegin \"ball\"\nShape \"sphere\"\nObjectEnd\n"
+                                  "ObjectInstance \"ball\"\nTranslate 3 0 0\nObjectInstance \"ball\"\n"
+                                  "Translate 3 0 0\nShape \"paraboloid\"\nWorldEnd\n");
+  const std::string file = bench / "ball.ptk";
+  const auto bake = [&](std::vector<std::string> options) {
+    std::vector<std::string> arguments{"bake", bench / "ball.pbrt", "-o", file, "--force"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return run_packtrace(arguments);
+  };
+  const CommandResult instanced = bake({"--lod", "instanced", "--lod-levels", "3"});
+  ASSERT_EQ(instanced.exit_code, 0) << instanced.err;
+  EXPECT_NE(instanced.out.find("3 levels of detail of 1 geometries: "), std::string::npos) << instanced.out;
+  const auto lod = nlohmann::json::parse(run_packtrace({"info", file, "-v", "--json", "-"}).out).at("lod");
+  ASSERT_EQ(lod.at("levels").size(), 4u);
+  EXPECT_EQ(lod.at("geometries"), 1);
+  EXPECT_EQ(lod.at("by_geometry").at(0).at("name"), "ball");
+  EXPECT_EQ(lod.at("levels").at(0).at("max_error"), 0.0);
+  EXPECT_GT(lod.at("levels").at(3).at("max_error"), lod.at("levels").at(1).at("max_error"));
+  EXPECT_LT(lod.at("levels").at(1).at("triangles"), 0.6 * lod.at("triangles").get<double>());
+  EXPECT_NE(run_packtrace({"info", file}).out.find("levels of detail of 1 geometries"), std::string::npos);
+
+  ASSERT_EQ(bake({"--lod", "all"}).exit_code, 0);
+  EXPECT_EQ(nlohmann::json::parse(run_packtrace({"info", file, "--json", "-"}).out).at("lod").at("geometries"), 2);
+  ASSERT_EQ(bake({"--lod", "all", "--lod-min-triangles", "1000000"}).exit_code, 0);
+  EXPECT_TRUE(nlohmann::json::parse(run_packtrace({"info", file, "--json", "-"}).out).at("lod").is_null());
+
+  for (const auto& wrong : std::vector<std::vector<std::string>>{{"--lod", "some"},
+                                                                 {"--lod-levels", "3"},
+                                                                 {"--lod-min-triangles", "3"},
+                                                                 {"--lod", "all", "--lod-levels", "0"},
+                                                                 {"--lod", "all", "--lod-levels", "32"}})
+    EXPECT_EQ(bake(wrong).exit_code, 2) << wrong.back();
+}
+
 TEST(CommandLine, NothingToDoIsAUsageError) { EXPECT_EQ(run_packtrace({}).exit_code, 2); }
 
 TEST(CommandLine, UnknownVerbIsAUsageErrorThatNamesIt) {

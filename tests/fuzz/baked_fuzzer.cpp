@@ -3,6 +3,7 @@
 // hashes of header, table and pages made right, and with those of what its pages are decoded to made right, too.
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <span>
 #include <vector>
@@ -112,6 +113,25 @@ void read_geometry(const BakedFile& file, uint32_t geometry) {
   }
 }
 
+/// Each cluster of level 0 has one chain of groups upwards, along which errors grow and spheres hold those below.
+void read_lod(const BakedFile& file, uint32_t geometry) {
+  const LodView lod = file.lod(geometry);
+  std::vector<uint32_t> above(lod.groups.size(), baked::kNoLodGroup); // some group that is made from it
+  for (size_t level = 0; level < lod.levels.size(); ++level) {
+    require(lod.links_of(level).size() == file.clusters(lod.levels[level].geometry).size(), "number of links");
+    for (const baked::LodLinkRecord& link : lod.links_of(level)) {
+      require(link.group < lod.groups.size() && lod.groups[link.group].level == level, "group of a cluster");
+      if (link.generating_group != baked::kNoLodGroup) above[link.generating_group] = link.group;
+    }
+  }
+  for (uint32_t i = 0; i < above.size(); ++i) {
+    require((above[i] == baked::kNoLodGroup) == std::isinf(lod.groups[i].error), "terminal group");
+    if (above[i] == baked::kNoLodGroup) continue;
+    require(above[i] > i && lod.groups[above[i]].error >= lod.groups[i].error, "error of a group");
+    require(baked::holds_sphere(lod.groups[above[i]], lod.groups[i]), "sphere of a group");
+  }
+}
+
 void read_rest(const BakedFile& file) {
   for (uint32_t i = 0; i < file.instances().size(); ++i) {
     const Affine map = file.world_from_object(i);
@@ -153,6 +173,7 @@ void read_baked(std::span<const std::byte> bytes) {
   expect_read_or_refused([&] {
     const BakedFile file = BakedFile::from_bytes(bytes);
     for (uint32_t g = 0; g < file.geometries().size(); ++g) read_geometry(file, g);
+    for (uint32_t g = 0; g < file.base_geometry_count(); ++g) read_lod(file, g);
     read_rest(file);
   });
 }

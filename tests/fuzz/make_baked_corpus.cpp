@@ -26,14 +26,19 @@ void bake_input(const std::filesystem::path& input, const std::filesystem::path&
   Diagnostics diagnostics;
   Progress progress;
   const ImportResult result = import_scene(files.write(text), options, diagnostics, progress);
-  for (const PageCodec codec : {PageCodec::kNone, PageCodec::kFast, PageCodec::kSmall}) {
+  const auto write = [&](PageCodec codec, LodUse lod, const std::string& ending) {
     BakeConfig config;
+    config.lod = lod;
+    config.lod_min_triangles = 129; // of more than one cluster
     config.purpose = baked::kShading;
     config.textures = true;
     config.codec = codec;
-    const std::string name = input.stem().string() + "." + std::string(name_of(codec));
-    write_file_bytes(folder / name, bake_to_bytes(result.scene, config, diagnostics, progress).bytes);
-  }
+    write_file_bytes(folder / (input.stem().string() + "." + ending),
+                     bake_to_bytes(result.scene, config, diagnostics, progress).bytes);
+  };
+  for (const PageCodec codec : {PageCodec::kNone, PageCodec::kFast, PageCodec::kSmall})
+    write(codec, LodUse::kOff, std::string(name_of(codec)));
+  write(PageCodec::kNone, LodUse::kAll, "lod");
 }
 
 } // namespace

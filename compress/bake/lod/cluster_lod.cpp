@@ -34,7 +34,8 @@ LodSphere enclose(std::span<const LodSphere> spheres) {
 
 class LodBuilder {
 public:
-  LodBuilder(const QuantizedGeometry& geometry, Progress& progress) : g_(geometry), progress_(progress) {
+  LodBuilder(const QuantizedGeometry& geometry, Progress& progress, uint32_t max_levels)
+      : g_(geometry), progress_(progress), max_levels_(max_levels) {
     lod_.positions = geometry.positions;
     lod_.vertices = geometry.vertices;
     for (const TriangleKind& kind : geometry.kinds) seam_of_kind_.push_back(kind.slot);
@@ -91,11 +92,14 @@ private:
     lod_.groups.resize(first_group + members.size());
     std::vector<SimplifiedGroup> results(members.size());
     // A single cluster is the coarsest that there can be; and the last level has nothing above it.
-    if (active.size() > 1 && level + 1 < kMaxLodLevels) {
+    if (active.size() > 1 && level + 1 < max_levels_) {
       mark_owners(members);
       tbb::parallel_for(size_t{0}, members.size(), [&](size_t i) {
+        progress_.check_cancelled();
+        uint64_t triangles = 0;
+        for (const uint32_t member : members[i]) triangles += lod_.clusters[member].range.triangle_count;
         results[i] = simplify_group(members[i]);
-        progress_.advance(members[i].size());
+        progress_.advance(triangles);
       });
     }
     for (size_t i = 0; i < members.size(); ++i)
@@ -215,6 +219,7 @@ private:
 
   const QuantizedGeometry& g_;
   Progress& progress_;
+  const uint32_t max_levels_;
   ClusterLod lod_;
   std::vector<uint32_t> seam_of_kind_;
   std::vector<LodSphere> cluster_spheres_; ///< of level 0: their own; else that of the generating group
@@ -225,9 +230,9 @@ private:
 
 } // namespace
 
-ClusterLod build_cluster_lod(const QuantizedGeometry& geometry, const GeometryClusters& base, Progress& progress) {
-  progress.begin("building levels of detail", 0);
-  return LodBuilder(geometry, progress).run(base);
+ClusterLod build_cluster_lod(const QuantizedGeometry& geometry, const GeometryClusters& base, Progress& progress,
+                             uint32_t max_levels) {
+  return LodBuilder(geometry, progress, max_levels).run(base);
 }
 
 uint64_t level_triangles(const ClusterLod& lod, uint32_t level) {

@@ -5,13 +5,13 @@
 #include <vector>
 
 #include "compress/bake/geometry_clusters.h"
+#include "compress/format/lod_format.h"
 
 namespace packtrace {
 
 class Progress;
 
-inline constexpr uint32_t kNoGroup = ~0u;
-inline constexpr uint32_t kMaxLodLevels = 32;
+inline constexpr uint32_t kNoGroup = baked::kNoLodGroup;
 
 /// A ball in lattice steps from the geometry's origin.
 struct LodSphere {
@@ -48,10 +48,13 @@ struct ClusterLod {
   uint32_t level_count = 0;
 };
 
-/// Builds coarser levels until one cluster is left, nothing that can be simplified, or kMaxLodLevels. Any triangles will do.
+/// Builds coarser levels until one cluster is left, nothing that can be simplified, or max_levels. Any triangles will do.
 /// Same result for any thread count. Throws Error(kCancelled), Error(kLimitExceeded).
 /// @param base the geometry's clusters
-ClusterLod build_cluster_lod(const QuantizedGeometry& geometry, const GeometryClusters& base, Progress& progress);
+/// @param progress advances by triangles of all levels but the last: up to about twice those of level 0
+/// @param max_levels 1..baked::kMaxLodLevels, level 0 counted
+ClusterLod build_cluster_lod(const QuantizedGeometry& geometry, const GeometryClusters& base, Progress& progress,
+                             uint32_t max_levels = baked::kMaxLodLevels);
 
 /// Triangles of the discrete level: its clusters, and those of terminal groups below it.
 uint64_t level_triangles(const ClusterLod& lod, uint32_t level);

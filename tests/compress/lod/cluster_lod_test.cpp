@@ -16,16 +16,6 @@
 namespace packtrace::test {
 namespace {
 
-/// 0, every error there is, and the nearest values on both sides of it.
-std::vector<double> thresholds(const ClusterLod& lod) {
-  std::set<double> values{0.0};
-  for (const LodGroup& group : lod.groups)
-    if (!group.terminal)
-      for (const double t : {std::nextafter(group.error, 0.0), group.error, std::nextafter(group.error, 1e300)})
-        values.insert(t);
-  return {values.begin(), values.end()};
-}
-
 /// Clusters by the group that they were made from.
 std::vector<std::vector<uint32_t>> clusters_made_by(const ClusterLod& lod) {
   std::vector<std::vector<uint32_t>> made(lod.groups.size());
@@ -48,7 +38,7 @@ protected:
 
 TEST_P(ClusterLodOf, KeepsItsLimits) {
   ASSERT_FALSE(lod_.clusters.empty());
-  EXPECT_LE(lod_.level_count, kMaxLodLevels);
+  EXPECT_LE(lod_.level_count, baked::kMaxLodLevels);
   for (const LodCluster& c : lod_.clusters) {
     EXPECT_GE(c.range.triangle_count, 1u);
     EXPECT_LE(c.range.triangle_count, kMaxClusterTriangles);

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "compress/bake/geometry_measure.h"
 #include "compress/bake/requirements.h"
@@ -187,6 +188,15 @@ BuiltLod build_lod(const Mesh& mesh) {
   Progress progress;
   result.lod = build_cluster_lod(result.geometry, result.base, progress);
   return result;
+}
+
+std::vector<double> thresholds(const ClusterLod& lod) {
+  std::set<double> values{0.0};
+  for (const LodGroup& group : lod.groups)
+    if (!group.terminal)
+      for (const double t : {std::nextafter(group.error, 0.0), group.error, std::nextafter(group.error, 1e300)})
+        values.insert(t);
+  return {values.begin(), values.end()};
 }
 
 std::vector<uint32_t> cut_clusters(const ClusterLod& lod, double threshold) {

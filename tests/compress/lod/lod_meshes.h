@@ -39,6 +39,9 @@ struct BuiltLod {
 };
 BuiltLod build_lod(const Mesh& mesh);
 
+/// 0, every error there is, and the nearest values on both sides of it. Ascending.
+std::vector<double> thresholds(const ClusterLod& lod);
+
 /// The clusters to take where errors up to `threshold` are allowed.
 std::vector<uint32_t> cut_clusters(const ClusterLod& lod, double threshold);
 

@@ -16,13 +16,13 @@ import sys
 import zlib
 from dataclasses import dataclass
 
-VERSION = 3
+VERSION = 4
 MAGIC = b"PTK\x89\r\n\x1a\0"
-HEADER_BYTES = 448
+HEADER_BYTES = 512
 DISK_FORM_HEADER_BYTES = 192
 NONE = 0xFFFFFFFF
 
-WORLD_SPACE = 1  # geometry flag
+WORLD_SPACE, LOD_LEVEL = 1, 2  # geometry flags
 HAS_NORMALS, HAS_UVS, MIXED_CHARTS, CHART_SHIFT = 1, 2, 4, 3  # cluster flags
 
 
@@ -85,12 +85,19 @@ REQUIREMENT = Record(
     ("stream", "I"), ("reason", "I"), ("geometries", "I"), ("reserved", "I"),
     ("triangles", "Q"), ("source_bytes", "Q"), ("stored_bits", "Q"))
 
+LOD_LEVEL_RECORD = Record(
+    ("first_group", "Q"), ("first_link", "Q"), ("triangles", "Q"), ("base", "I"), ("level", "I"), ("geometry", "I"),
+    ("group_count", "I"), ("error", "f"), ("reserved", "I"))
+LOD_GROUP = Record(("center", "3f"), ("radius", "f"), ("error", "f"), ("level", "I"))
+LOD_LINK = Record(("group", "I"), ("generating_group", "I"))
+
 # In the order of the section table; None: bytes.
 SECTIONS = (
     ("geometries", GEOMETRY), ("clusters", CLUSTER), ("payload", None), ("materials", MATERIAL),
     ("instances", INSTANCE), ("masks", MASK), ("mask_words", Record(("word", "I"))), ("textures", TEXTURE),
     ("texture_bytes", None), ("cameras", CAMERA), ("strings", None), ("summary", SUMMARY),
-    ("material_slots", Record(("material", "I"))), ("requirements", REQUIREMENT))
+    ("material_slots", Record(("material", "I"))), ("requirements", REQUIREMENT),
+    ("lod_levels", LOD_LEVEL_RECORD), ("lod_groups", LOD_GROUP), ("lod_links", LOD_LINK))
 
 
 def index_bits(count):
@@ -357,6 +364,55 @@ class BakedFile:
         first, count = instance["first_slot"], self.sections["geometries"][instance["geometry"]]["slot_count"]
         return [slot["material"] for slot in self.sections["material_slots"][first : first + count]]
 
+    def levels(self, base):
+        return [level for level in self.sections["lod_levels"] if level["base"] == base]
+
+    def cut(self, base, threshold):
+        """Clusters, as (geometry, cluster of it), that stand for a geometry where errors up to `threshold` are allowed."""
+        levels = self.levels(base)
+        groups = self.sections["lod_groups"][levels[0]["first_group"]:]
+        chosen = []
+        for level in levels:
+            geometry = self.sections["geometries"][level["geometry"]]
+            for number in range(geometry["cluster_count"]):
+                link = self.sections["lod_links"][level["first_link"] + number]
+                made = 0.0 if link["generating_group"] == NONE else groups[link["generating_group"]]["error"]
+                if groups[link["group"]]["error"] > threshold >= made:
+                    chosen.append((level["geometry"], number))
+        return chosen
+
+    def check_levels(self, meshes):
+        """That levels hold the triangles that they say, and that where level 0 is closed, so is the cut at each level's
+        error."""
+        geometries = self.sections["geometries"]
+        for base, geometry in enumerate(geometries):
+            levels = self.levels(base)
+            if levels and geometry["flags"] & LOD_LEVEL:
+                raise BadFile("a level of detail has levels")
+            for number, level in enumerate(levels):
+                if level["level"] != number or bool(geometries[level["geometry"]]["flags"] & LOD_LEVEL) != (number > 0):
+                    raise BadFile("levels of detail are not in order")
+            was_closed = bool(levels) and self.is_closed(self.cut(base, 0.0), meshes)
+            for level in levels:
+                chosen = self.cut(base, level["error"])
+                triangles = sum(self.clusters(geometries[g])[c]["triangle_count"] for g, c in chosen)
+                if triangles > level["triangles"]: # a cut may be coarser: groups have smaller errors than the level
+                    raise BadFile("a cut has more triangles than the level of its error")
+                if was_closed and not self.is_closed(chosen, meshes):
+                    raise BadFile("a cut through levels of a closed surface is open")
+
+    def is_closed(self, chosen, meshes):
+        count = {}
+        for number, c in chosen:
+            mesh, cluster = meshes[number], self.clusters(self.sections["geometries"][number])[c]
+            first = cluster["first_triangle"]
+            for triangle in mesh.triangles[first : first + cluster["triangle_count"]]:
+                for a, b in zip(triangle, triangle[1:] + triangle[:1]):
+                    a, b = mesh.lattice[a], mesh.lattice[b]
+                    count[a, b] = count.get((a, b), 0) + 1
+                    count[b, a] = count.get((b, a), 0) - 1
+        return not any(count.values())
+
     def decode(self, geometry):
         mesh = Mesh([], [], [], [], [], [])
         step = geometry["step_mantissa"] * math.ldexp(1.0, geometry["step_exponent"])
@@ -423,8 +479,9 @@ def require_equal(what, ours, theirs):
 def compare(baked, meshes, dump):
     """A dump: geometries (u32); for each vertices, triangles (u32), then lattice (3 i64 a vertex), positions, normals
     (3 floats a vertex), uvs (2 floats), triangles (3 u32 each), material slots (u32 a triangle); instances (u32); for each
-    12 floats, a geometry (u32) and its materials by slot (u32 each); of all textures the texels (3 u8 each). All must be
-    equal."""
+    12 floats, a geometry (u32) and its materials by slot (u32 each); of all textures the texels (3 u8 each); for each
+    geometry that is no level itself the number of its levels (u32) and, where there are any, a threshold (float) and the cut for it: clusters
+    (u32), for each a geometry and a cluster of it (u32). All must be equal."""
     require_equal("geometries", [len(meshes)], dump.take("I", 1))
     for number, mesh in enumerate(meshes):
         vertices, triangles = len(mesh.lattice), len(mesh.triangles)
@@ -446,6 +503,16 @@ def compare(baked, meshes, dump):
     for number, texture in enumerate(baked.sections["textures"]):
         texels = read_texels(texture, baked.sections["texture_bytes"][texture["first_byte"] :])
         require_equal(f"texture {number}", texels, list(dump.take("B", 3 * texture["width"] * texture["height"])))
+    bases = [number for number, g in enumerate(baked.sections["geometries"]) if not g["flags"] & LOD_LEVEL]
+    for number in bases:
+        (levels,) = dump.take("I", 1)
+        require_equal(f"geometry {number}: levels", [len(baked.levels(number))], [levels])
+        if levels == 0:
+            continue
+        (threshold,) = dump.take("f", 1)
+        chosen = baked.cut(number, threshold)
+        require_equal(f"geometry {number}: cut", [len(chosen)], dump.take("I", 1))
+        require_equal(f"geometry {number}: cut", flat(chosen), dump.take("I", 2 * len(chosen)))
     if dump.at != len(dump.data):
         raise Differs("the dump holds more than the file")
 
@@ -469,6 +536,7 @@ def main():
         with open(arguments.file, "rb") as file:
             baked = BakedFile(file.read())
         meshes = [baked.decode(geometry) for geometry in baked.sections["geometries"]]
+        baked.check_levels(meshes)
         describe(baked, meshes)
         if arguments.expect:
             with open(arguments.expect, "rb") as file:

@@ -1,4 +1,5 @@
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <span>
@@ -36,6 +37,25 @@ private:
   std::vector<std::byte> bytes_;
 };
 
+/// A cut in the middle of a geometry's levels.
+void put_cut(Dump& out, const BakedFile& file, uint32_t geometry) {
+  const LodView lod = file.lod(geometry);
+  out.put_number(static_cast<uint32_t>(lod.levels.size()));
+  if (lod.levels.empty()) return;
+  const float threshold = 0.7f * lod.levels[lod.levels.size() / 2].error;
+  out.put(std::span<const float>(&threshold, 1));
+  std::vector<uint32_t> cut;
+  for (size_t level = 0; level < lod.levels.size(); ++level)
+    for (uint32_t c = 0; c < lod.links_of(level).size(); ++c) {
+      const baked::LodLinkRecord& link = lod.links_of(level)[c];
+      const float made = link.generating_group == baked::kNoLodGroup ? 0.0f : lod.groups[link.generating_group].error;
+      if (lod.groups[link.group].error > threshold && made <= threshold)
+        cut.insert(cut.end(), {lod.levels[level].geometry, c});
+    }
+  out.put_number(static_cast<uint32_t>(cut.size() / 2));
+  out.put(cut);
+}
+
 std::vector<std::byte> dump(const BakedFile& file) {
   Dump out;
   out.put_number(static_cast<uint32_t>(file.geometries().size()));
@@ -64,6 +84,7 @@ std::vector<std::byte> dump(const BakedFile& file) {
     for (uint32_t y = 0; y < texture.height; ++y)
       for (uint32_t x = 0; x < texture.width; ++x) out.put(std::span<const uint8_t>(texture.texel(x, y)));
   }
+  for (uint32_t g = 0; g < file.base_geometry_count(); ++g) put_cut(out, file, g);
   return out.bytes();
 }
 
@@ -187,7 +208,7 @@ TEST_F(IndependentReader, DecodesEveryCodecOfTextures) {
     config.texture_codec = static_cast<TextureCodec>(codec);
     write(scene, config);
     EXPECT_EQ(read(), 0) << kTextureCodecNames[codec];
-    dumped().back() ^= std::byte{1};
+    dumped()[dumped().size() - 1 - sizeof(uint32_t)] ^= std::byte{1}; // before the number of levels
     EXPECT_EQ(read(), 1) << "a texel that differs";
   }
 }
@@ -206,6 +227,28 @@ TEST_F(IndependentReader, DecodesGeometryOfMoreThanTwoToThe31Steps) {
   write(scene, config);
   EXPECT_GT(BakedFile::from_bytes(baked()).geometries()[0].anchor_shift, 0u);
   EXPECT_EQ(read(), 0);
+}
+
+TEST_F(IndependentReader, DecodesLevelsOfDetailAndCutsThem) {
+  Scene scene = scene_of_every_stream();
+  for (Vec3& n : scene.meshes[0].normals) n = glm::normalize(n + Vec3(0.0f, 0.3f, 0.0f));
+  BakeConfig config;
+  config.lod = LodUse::kAll;
+  config.lod_min_triangles = 200;
+  write(scene, config);
+  const BakedFile file = BakedFile::from_bytes(baked());
+  ASSERT_GT(file.lod(0).levels.size(), 3u);
+  ASSERT_GT(file.lod(1).levels.size(), 3u);
+  ASSERT_GT(file.lod(file.base_geometry_count() - 1).levels.size(), 1u);
+  EXPECT_EQ(read(), 0);
+  dumped().back() ^= std::byte{1}; // of the last cut's last cluster
+  EXPECT_EQ(read(), 1);
+  // A level that says it holds fewer triangles than a cut of its error needs.
+  baked::FileHeader header;
+  std::memcpy(&header, baked().data(), sizeof header);
+  const size_t at = header.sections[baked::kLodLevels].offset + sizeof(baked::LodLevelRecord);
+  std::memset(baked().data() + at + offsetof(baked::LodLevelRecord, triangles), 0, sizeof(uint64_t));
+  EXPECT_EQ(read(), 3);
 }
 
 TEST_F(IndependentReader, RefusesFilesOfOtherCodecs) {

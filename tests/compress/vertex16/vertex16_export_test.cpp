@@ -116,6 +116,15 @@ TEST(Vertex16Export, HoldsTheSameTrianglesBitForBit) {
   EXPECT_EQ(s.mask_words.size(), 64u);
 }
 
+TEST(Vertex16Export, LeavesOutLevelsOfDetail) {
+  BakeConfig config;
+  config.lod = LodUse::kAll;
+  const BakedFile without = BakedFile::from_bytes(test::bake(mixed_scene()).bytes);
+  const BakedFile with = BakedFile::from_bytes(test::bake(mixed_scene(), config).bytes);
+  ASSERT_GT(with.geometries().size(), without.geometries().size());
+  EXPECT_EQ(export_of(with).bytes, export_of(without).bytes);
+}
+
 TEST(Vertex16Export, VerticesAreDistinctAndDrawsMerged) {
   const BakedFile file = BakedFile::from_bytes(test::bake(mixed_scene()).bytes);
   const Vertex16Export exported = export_of(file);

@@ -113,6 +113,15 @@ TEST(PackedSource, InstancesOfOneGeometryHaveMaterialsAndMasksOfTheirOwn) {
   EXPECT_LT(different, 150u); // silhouettes, also of the masks
 }
 
+TEST(PackedSource, LevelsOfDetailAreNotTraced) {
+  BakeConfig config;
+  config.lod = LodUse::kAll;
+  const BakedFile without = bake(varied_scene()), with = bake(varied_scene(), config);
+  ASSERT_GT(with.geometries().size(), without.geometries().size());
+  EXPECT_EQ(PackedSource(with).geometry_count(), PackedSource(without).geometry_count());
+  EXPECT_EQ(render(PackedSource(with)).ao.ao, render(PackedSource(without)).ao.ao);
+}
+
 TEST(PackedSource, DecodedTrianglesMatchRandomAccess) {
   const BakedFile file = bake(varied_scene());
   const PackedSource source(file);

@@ -1,0 +1,151 @@
+#include "compress/bake/lod/lod_encoder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <span>
+
+namespace packtrace {
+namespace {
+
+// More than the roundings of a few operations in double; where balls hold balls, more than those in float.
+constexpr double kDoubleRoundings = 1.0 + 0x1p-48;
+constexpr double kFloatRoundings = 1.0 + 1e-6;
+
+/// The smallest float that is not below.
+float round_up(double value) {
+  if (value > static_cast<double>(std::numeric_limits<float>::max())) return std::numeric_limits<float>::infinity();
+  const auto nearest = static_cast<float>(value);
+  return static_cast<double>(nearest) < value ? std::nextafter(nearest, std::numeric_limits<float>::infinity())
+                                              : nearest;
+}
+
+/// How far a decoded point may lie from its lattice point, in object units: 0 where all coordinates are floats.
+double decoding_error(const std::vector<LatticePoint>& positions, const PositionGrid& grid) {
+  constexpr double kHalfFloatUlp = 0x1p-24, kSmallestFloatHalf = 0x1p-150;
+  int64_t largest = 0;
+  for (const LatticePoint& p : positions)
+    for (const int64_t coordinate : p) largest = std::max(largest, std::abs(coordinate));
+  if (largest <= (int64_t{1} << 24) / grid.mantissa && grid.exponent >= -149) return 0.0;
+  const double per_axis = static_cast<double>(largest) * grid.step() * kHalfFloatUlp * kDoubleRoundings;
+  return std::sqrt(3.0) * (per_axis + kSmallestFloatHalf) * kDoubleRoundings;
+}
+
+/// Errors and balls of groups in object units.
+class GroupEncoder {
+public:
+  GroupEncoder(const QuantizedGeometry& geometry, const ClusterLod& lod)
+      : g_(geometry), lod_(lod), step_(geometry.grid.step()), decoding_error_(decoding_error(lod.positions, g_.grid)) {}
+
+  /// Level by level; false where something is beyond the range of floats.
+  bool run(std::vector<baked::LodGroupRecord>& out) {
+    std::vector<std::vector<uint32_t>> members(lod_.groups.size());
+    for (uint32_t i = 0; i < lod_.clusters.size(); ++i) members[lod_.clusters[i].group].push_back(i);
+    for (size_t i = 0; i < lod_.groups.size(); ++i) {
+      out.push_back(encode(lod_.groups[i], members[i], out));
+      const baked::LodGroupRecord& record = out.back();
+      bool finite = std::isfinite(record.radius) && std::isinf(record.error) == lod_.groups[i].terminal;
+      for (const float c : record.center) finite &= std::isfinite(c);
+      if (!finite) return false;
+    }
+    return true;
+  }
+
+private:
+  baked::LodGroupRecord encode(const LodGroup& group, const std::vector<uint32_t>& members,
+                               const std::vector<baked::LodGroupRecord>& done) const {
+    baked::LodGroupRecord record{};
+    record.level = group.level;
+    // Both surfaces are decoded: each is off by what decoding loses.
+    record.error = round_up((group.error * step_ + 2.0 * decoding_error_) * kDoubleRoundings);
+    double off = decoding_error_; // of the centre, by rounding it
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double center =
+          (static_cast<double>(g_.origin[axis]) + group.sphere.center[static_cast<int>(axis)]) * step_;
+      record.center[axis] = static_cast<float>(center);
+      off += std::abs(static_cast<double>(record.center[axis]) - center);
+    }
+    record.radius = round_up((group.sphere.radius * step_ + off) * kFloatRoundings);
+    for (const uint32_t number : members) {
+      const LodCluster& cluster = lod_.clusters[number];
+      // New points may lie a little outside what they were made from.
+      record.radius = std::max(record.radius, round_up((reach(cluster, record) + decoding_error_) * kFloatRoundings));
+      if (cluster.generating_group == kNoGroup) continue;
+      const baked::LodGroupRecord& inner = done[cluster.generating_group];
+      const double outermost = distance(record, point(inner)) + static_cast<double>(inner.radius);
+      record.radius = std::max(record.radius, round_up(outermost * kFloatRoundings));
+      record.error = std::max(record.error, inner.error);
+    }
+    return record;
+  }
+
+  static DVec3 point(const baked::LodGroupRecord& g) { return DVec3(g.center[0], g.center[1], g.center[2]); }
+  static double distance(const baked::LodGroupRecord& from, DVec3 to) { return glm::length(point(from) - to); }
+
+  /// How far the cluster's points are from a group's centre.
+  double reach(const LodCluster& cluster, const baked::LodGroupRecord& from) const {
+    double furthest = 0.0;
+    for (const Triangle& t :
+         std::span(lod_.triangles).subspan(cluster.range.first_triangle, cluster.range.triangle_count))
+      for (int corner = 0; corner < 3; ++corner) {
+        const LatticePoint& p = lod_.positions[lod_.vertices[t[corner]].position];
+        const DVec3 lattice(static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2]));
+        furthest = std::max(furthest, distance(from, lattice * step_));
+      }
+    return furthest;
+  }
+
+  const QuantizedGeometry& g_;
+  const ClusterLod& lod_;
+  double step_, decoding_error_;
+};
+
+/// A level's clusters by material slot, which classes follow, and then as they came.
+std::vector<uint32_t> order_clusters(const QuantizedGeometry& geometry, const ClusterLod& lod, uint32_t begin,
+                                     uint32_t end) {
+  std::vector<uint32_t> order(end - begin);
+  std::iota(order.begin(), order.end(), begin);
+  std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+    return geometry.kinds[lod.clusters[a].range.kind].slot < geometry.kinds[lod.clusters[b].range.kind].slot;
+  });
+  return order;
+}
+
+} // namespace
+
+EncodedLod encode_lod(QuantizedGeometry& geometry, ClusterLod& lod) {
+  EncodedLod out;
+  if (lod.level_count < 2 || !GroupEncoder(geometry, lod).run(out.groups)) return {};
+  geometry.positions = std::move(lod.positions);
+  geometry.vertices = std::move(lod.vertices);
+  GeometryClusters level_clusters;
+  level_clusters.triangles = std::move(lod.triangles);
+  out.levels.resize(lod.level_count);
+  for (const baked::LodGroupRecord& group : out.groups) ++out.levels[group.level].group_count;
+  uint64_t terminal = 0;
+  float error = 0.0f;
+  for (uint32_t level = 0, begin = 0, end = 0; level < lod.level_count; ++level, begin = end) {
+    while (end < lod.clusters.size() && lod.clusters[end].level == level) ++end;
+    const std::vector<uint32_t> order =
+        level == 0 ? std::vector<uint32_t>{} : order_clusters(geometry, lod, begin, end);
+    level_clusters.clusters.clear();
+    EncodedLod::Level& to = out.levels[level];
+    to.triangles = terminal;
+    to.error = error;
+    for (uint32_t i = begin; i < end; ++i) {
+      const LodCluster& c = lod.clusters[level == 0 ? i : order[i - begin]]; // level 0 is as it is stored
+      out.links.push_back({c.group, c.generating_group});
+      if (level > 0) level_clusters.clusters.push_back(c.range);
+      to.triangles += c.range.triangle_count;
+      if (lod.groups[c.group].terminal)
+        terminal += c.range.triangle_count;
+      else
+        error = std::max(error, out.groups[c.group].error);
+    }
+    if (level > 0) to.encoded = encode_geometry(geometry, level_clusters);
+  }
+  return out;
+}
+
+} // namespace packtrace
