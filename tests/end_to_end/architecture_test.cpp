@@ -24,9 +24,11 @@ const std::vector<Layer> kLayers = {
     {"compress/format/", {"pbrt_import/scene/"}},
     {"compress/bake/", {"compress/format/", "pbrt_import/scene/"}},
     {"compress/exchange/", {"compress/format/", "pbrt_import/scene/"}},
+    {"runtime/lod/", {"compress/format/", "pbrt_import/scene/"}},
     {"runtime/commands/",
-     {"runtime/", "compress/format/", "compress/bake/", "compress/exchange/", "pbrt_import/", "pbrt_import/scene/"}},
-    {"runtime/", {"compress/format/", "pbrt_import/scene/"}},
+     {"runtime/", "runtime/lod/", "compress/format/", "compress/bake/", "compress/exchange/", "pbrt_import/",
+      "pbrt_import/scene/"}},
+    {"runtime/", {"runtime/lod/", "compress/format/", "pbrt_import/scene/"}},
 };
 
 const Layer* layer_of(const std::string& path) {

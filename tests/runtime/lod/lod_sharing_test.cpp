@@ -1,0 +1,437 @@
+#include "runtime/lod/lod_sharing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "pbrt_import/scene/error.h"
+#include "tests/runtime/lod/lod_records.h"
+
+namespace packtrace {
+namespace {
+
+constexpr SharingScheme kSchemes[] = {SharingScheme::kOff, SharingScheme::kPerInstance, SharingScheme::kOneProvider,
+                                      SharingScheme::kLevels, SharingScheme::kSteps};
+
+std::vector<LodGeometry> some_geometries(uint32_t count) {
+  std::vector<LodGeometry> geometries;
+  for (uint32_t i = 0; i < count; ++i) geometries.push_back(test::random_records(8 + 9 * i, i + 1).geometry());
+  return geometries;
+}
+
+/// Instances whose transforms shear, mirror and flatten, from within a few diagonals to far away.
+std::vector<LodInstance> wild_instances(uint32_t count, uint32_t geometries, uint32_t seed) {
+  test::Random random(seed);
+  std::vector<LodInstance> instances;
+  for (uint32_t i = 0; i < count; ++i)
+    instances.push_back({random.bits() % geometries, test::random_affine(random, std::exp2(random.uniform(2, 13)))});
+  return instances;
+}
+
+DetailView view_from(DVec3 eye, double error_px = 1.0) { return make_detail_view(eye, 0.01, 1.0, 1080.0, error_px); }
+
+InstanceMetric metric_of(const LodGeometry& geometry, const LodInstance& instance, const DetailView& view) {
+  return {view, instance.world_from_object, largest_stretch(instance.world_from_object), geometry.reach()};
+}
+
+/// Its own cut, by the definition.
+std::vector<uint64_t> own_cut(const LodGeometry& geometry, const LodInstance& instance, const DetailView& view) {
+  std::vector<uint64_t> passed(cut_words(geometry));
+  const InstanceMetric metric = metric_of(geometry, instance, view);
+  for (uint32_t rank = 0; rank < geometry.rank_count(); ++rank)
+    passed[rank / 64] |= uint64_t{metric.passes(geometry.ranks(), rank)} << (rank % 64);
+  return passed;
+}
+
+std::vector<uint64_t> used_cut(const LodSharing& sharing, const LodPlan& plan, uint32_t instance) {
+  const PlannedBlas& blas = plan.blas[plan.blas_of_instance[instance]];
+  return passed_of_blas(sharing.geometries()[blas.geometry], sharing.steps(blas.geometry), plan, blas);
+}
+
+uint32_t level_of_group(const LodGeometry& geometry, uint32_t group) {
+  uint32_t level = 0;
+  while (level < geometry.last_level() && geometry.levels()[level + 1].first_group <= group) ++level;
+  return level;
+}
+
+/// For each cluster of level 0, and so for each of its triangles: the level of the cut's cluster up a chain. Which of
+/// several chains depends on `turn`.
+std::vector<uint32_t> levels_of_triangles(const LodGeometry& geometry, std::span<const uint64_t> passed,
+                                          uint32_t turn) {
+  const std::span<const baked::LodLinkRecord> links = geometry.links();
+  std::vector<std::vector<uint32_t>> made(links.size() + 1);
+  for (uint32_t i = 0; i < links.size(); ++i)
+    if (links[i].generating_group != baked::kNoLodGroup) made[links[i].generating_group].push_back(i);
+  std::vector<uint32_t> levels;
+  for (uint32_t i = 0; i < links.size(); ++i) {
+    if (links[i].generating_group != baked::kNoLodGroup) continue;
+    uint32_t at = i;
+    for (;;) {
+      const uint32_t group = links[at].group, rank = geometry.rank_of_group(group);
+      if (rank == kNoRank || !rank_passes(passed, rank) || made[group].empty()) break;
+      at = made[group][(turn + i) % made[group].size()];
+    }
+    levels.push_back(level_of_group(geometry, links[at].group));
+  }
+  return levels;
+}
+
+/// Invariant: for every triangle of level 0, what an instance uses is of the level of its own cut or finer.
+TEST(LodSharing, StrictSchemesNeverGiveLessDetailThanTheOwnCut) {
+  const std::vector<LodGeometry> geometries = some_geometries(6);
+  const std::vector<LodInstance> instances = wild_instances(600, 6, 1);
+  for (const SharingScheme scheme : kSchemes)
+    for (const bool merge : {false, true}) {
+      SharingConfig config;
+      config.scheme = scheme;
+      config.merge_own_cuts = merge;
+      LodSharing sharing(geometries, instances, config);
+      size_t shared = 0, own = 0, finer = 0;
+      for (uint32_t frame = 0; frame < 3; ++frame) {
+        const DetailView view = view_from(DVec3(5.0 * frame, frame, -2.0 * frame));
+        const LodPlan plan = sharing.plan(view);
+        for (uint32_t i = 0; i < instances.size(); ++i) {
+          const LodGeometry& geometry = geometries[instances[i].geometry];
+          const std::vector<uint64_t> needed = own_cut(geometry, instances[i], view);
+          const std::vector<uint64_t> used = used_cut(sharing, plan, i);
+          for (size_t word = 0; word < used.size(); ++word) ASSERT_EQ(used[word] & ~needed[word], 0u);
+          for (uint32_t turn = 0; turn < 2; ++turn) {
+            const std::vector<uint32_t> own_levels = levels_of_triangles(geometry, needed, turn);
+            const std::vector<uint32_t> used_levels = levels_of_triangles(geometry, used, turn);
+            for (size_t t = 0; t < own_levels.size(); ++t) ASSERT_LE(used_levels[t], own_levels[t]);
+          }
+          const PlannedBlas& blas = plan.blas[plan.blas_of_instance[i]];
+          shared += blas.users > 1 && blas.kind != BlasKind::kLowest;
+          own += blas.kind == BlasKind::kOwn;
+          finer += used != needed;
+        }
+      }
+      if (scheme != SharingScheme::kPerInstance) {
+        EXPECT_GT(shared, 100u);
+        EXPECT_GT(finer, 50u);
+      }
+      if (scheme == SharingScheme::kPerInstance || scheme == SharingScheme::kOneProvider) {
+        EXPECT_GT(own, 5u);
+      }
+    }
+}
+
+TEST(LodSharing, PerInstanceGivesEachItsOwnCut) {
+  const std::vector<LodGeometry> geometries = some_geometries(4);
+  const std::vector<LodInstance> instances = wild_instances(300, 4, 2);
+  SharingConfig config;
+  config.scheme = SharingScheme::kPerInstance;
+  config.measure = true;
+  LodSharing sharing(geometries, instances, config);
+  const DetailView view = view_from(DVec3(0.0));
+  const LodPlan plan = sharing.plan(view);
+  uint64_t triangles = 0;
+  for (uint32_t i = 0; i < instances.size(); ++i) {
+    const std::vector<uint64_t> own = own_cut(geometries[instances[i].geometry], instances[i], view);
+    EXPECT_EQ(used_cut(sharing, plan, i), own);
+    triangles += size_of_cut(geometries[instances[i].geometry], own).triangles;
+  }
+  EXPECT_EQ(plan.traced_triangles, triangles);
+  EXPECT_EQ(plan.own_triangles, triangles);
+  EXPECT_EQ(plan.builds + plan.category_counts[0], instances.size());
+}
+
+/// What the plan counts is what it holds, and each BLAS of the size it says.
+TEST(LodSharing, PlansAddUp) {
+  const std::vector<LodGeometry> geometries = some_geometries(5);
+  const std::vector<LodInstance> instances = wild_instances(500, 5, 3);
+  for (const SharingScheme scheme : kSchemes) {
+    SharingConfig config;
+    config.scheme = scheme;
+    LodSharing sharing(geometries, instances, config);
+    const LodPlan plan = sharing.plan(view_from(DVec3(1.0)));
+    std::vector<uint32_t> users(plan.blas.size());
+    std::array<uint64_t, 4> categories{};
+    for (uint32_t i = 0; i < instances.size(); ++i) {
+      ++users[plan.blas_of_instance[i]];
+      ++categories[static_cast<size_t>(plan.category_of_instance[i])];
+      EXPECT_EQ(plan.blas[plan.blas_of_instance[i]].geometry, instances[i].geometry);
+    }
+    EXPECT_EQ(categories, plan.category_counts);
+    uint64_t builds = 0, built = 0, clusters = 0, traced = 0;
+    for (size_t b = 0; b < plan.blas.size(); ++b) {
+      const PlannedBlas& blas = plan.blas[b];
+      const LodGeometry& geometry = geometries[blas.geometry];
+      EXPECT_EQ(blas.users, users[b]);
+      EXPECT_GT(blas.users, 0u);
+      const CutSize size = size_of_cut(geometry, passed_of_blas(geometry, sharing.steps(blas.geometry), plan, blas));
+      EXPECT_EQ(blas.triangles, size.triangles);
+      EXPECT_EQ(blas.clusters, size.clusters);
+      traced += blas.triangles * blas.users;
+      if (blas.kind == BlasKind::kLowest) continue;
+      ++builds, built += blas.triangles, clusters += blas.clusters;
+    }
+    EXPECT_EQ(plan.builds, builds);
+    EXPECT_EQ(plan.built_triangles, built);
+    EXPECT_EQ(plan.built_clusters, clusters);
+    EXPECT_EQ(plan.traced_triangles, traced);
+    EXPECT_EQ(plan.category_counts[1] + plan.category_counts[3], plan.builds);
+  }
+}
+
+TEST(LodSharing, TracedTrianglesStayWithinTheRatio) {
+  const std::vector<LodGeometry> geometries = some_geometries(5);
+  for (const double ratio : {1.0, 1.1, 1.25, 2.0})
+    for (const SharingScheme scheme : {SharingScheme::kLevels, SharingScheme::kSteps}) {
+      SharingConfig config;
+      config.scheme = scheme;
+      config.traced_ratio = ratio;
+      config.measure = true;
+      LodSharing sharing(geometries, wild_instances(800, 5, 4), config);
+      const LodPlan plan = sharing.plan(view_from(DVec3(0.0)));
+      EXPECT_LE(static_cast<double>(plan.traced_triangles), ratio * static_cast<double>(plan.own_triangles));
+      EXPECT_GT(plan.builds, 0u);
+    }
+}
+
+/// Where the limit asks for own cuts, nobody goes without who would save more by one.
+TEST(LodSharing, OwnCutsGoToThoseThatSaveMost) {
+  const std::vector<LodGeometry> geometries = some_geometries(4);
+  const std::vector<LodInstance> instances = wild_instances(400, 4, 11);
+  const DetailView view = view_from(DVec3(0.0));
+  SharingConfig config;
+  config.scheme = SharingScheme::kLevels;
+  config.own_cut_ratio = 1e9;
+  config.traced_ratio = 1.05;
+  config.share_equal_cuts = false;
+  LodSharing sharing(geometries, instances, config);
+  const LodPlan plan = sharing.plan(view);
+  std::vector<uint64_t> least_of_own(4, ~uint64_t{0}), most_of_others(4);
+  for (uint32_t i = 0; i < instances.size(); ++i) {
+    const uint32_t g = instances[i].geometry;
+    const std::span<const LodStep> steps = sharing.steps(g);
+    const uint64_t shared = steps[coarsest_step(steps, plan.allowed_error_of_instance[i])].triangles;
+    const uint64_t saved = shared - size_of_cut(geometries[g], own_cut(geometries[g], instances[i], view)).triangles;
+    if (plan.category_of_instance[i] == InstanceCategory::kOwn)
+      least_of_own[g] = std::min(least_of_own[g], saved);
+    else
+      most_of_others[g] = std::max(most_of_others[g], saved);
+  }
+  EXPECT_GT(plan.category_counts[static_cast<size_t>(InstanceCategory::kOwn)], 5u);
+  for (size_t g = 0; g < 4; ++g) EXPECT_GE(least_of_own[g], most_of_others[g]);
+}
+
+TEST(LodSharing, SharesMoreTheMoreMayBeTraced) {
+  const std::vector<LodGeometry> geometries = some_geometries(5);
+  const std::vector<LodInstance> instances = test::random_instances(3000, 5, 100.0, 2.0, 1);
+  uint64_t before = ~uint64_t{0};
+  for (const double ratio : {1.0, 1.25, 2.0, 1e9}) {
+    SharingConfig config;
+    config.traced_ratio = ratio;
+    config.own_cut_ratio = 1e9;
+    const uint64_t builds = LodSharing(geometries, instances, config).plan(view_from(DVec3(0.0))).builds;
+    EXPECT_LT(builds, before);
+    before = builds;
+  }
+  EXPECT_LE(before, geometries.size()); // anything goes: one each
+}
+
+/// Histograms are those of the ranges, and do not depend on threads; nor does anything else of the plan.
+TEST(LodSharing, IsTheSameForAnyNumberOfThreads) {
+  const std::vector<LodGeometry> geometries = some_geometries(7);
+  const std::vector<LodInstance> instances = wild_instances(5000, 7, 5);
+  for (const SharingScheme scheme : kSchemes) {
+    SharingConfig config;
+    config.scheme = scheme;
+    config.measure = true;
+    std::vector<LodPlan> plans;
+    for (const size_t threads : {size_t{1}, size_t{2}, size_t{5}}) {
+      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+      LodSharing sharing(geometries, instances, config);
+      sharing.plan(view_from(DVec3(100.0))); // what came before does not count
+      plans.push_back(sharing.plan(view_from(DVec3(0.5))));
+    }
+    std::vector<uint32_t> starts(7), ends(7);
+    for (size_t g = 0; g < 7; ++g)
+      for (uint32_t level = 0; level < kMaxRuntimeLodLevels; ++level) {
+        const LevelHistogram& h = plans[0].histograms[g];
+        starts[g] += h.starts[level];
+        ends[g] += h.ends[level];
+        if (h.ends[level] == 0) continue;
+        const uint32_t provider = h.provider[level] & (kMaxLodInstances - 1);
+        EXPECT_EQ(instances[provider].geometry, g);
+        EXPECT_LE(h.provider[level] >> 27, level);
+      }
+    for (size_t g = 0; g < 7; ++g) {
+      const auto of_geometry = [&](const LodInstance& i) { return i.geometry == g; };
+      EXPECT_EQ(starts[g], std::count_if(instances.begin(), instances.end(), of_geometry));
+      EXPECT_EQ(ends[g], starts[g]);
+    }
+    for (size_t p = 1; p < plans.size(); ++p) {
+      EXPECT_EQ(plans[p].blas_of_instance, plans[0].blas_of_instance);
+      EXPECT_EQ(plans[p].category_of_instance, plans[0].category_of_instance);
+      EXPECT_EQ(plans[p].allowed_error_of_instance, plans[0].allowed_error_of_instance);
+      EXPECT_EQ(plans[p].passed, plans[0].passed);
+      EXPECT_EQ(plans[p].traced_triangles, plans[0].traced_triangles);
+      EXPECT_EQ(plans[p].own_triangles, plans[0].own_triangles);
+      ASSERT_EQ(plans[p].blas.size(), plans[0].blas.size());
+      for (size_t g = 0; g < 7; ++g) EXPECT_EQ(plans[p].histograms[g].provider, plans[0].histograms[g].provider);
+    }
+  }
+}
+
+/// Of instances that are alike the one with the highest number lends, each time.
+TEST(LodSharing, TheProviderIsStable) {
+  const std::vector<LodGeometry> geometries = some_geometries(1);
+  const std::vector<LodInstance> instances(50, {0, DAffine(DVec3(1, 0, 0), DVec3(0, 1, 0), DVec3(0, 0, 1), DVec3(8))});
+  SharingConfig config;
+  config.scheme = SharingScheme::kOneProvider;
+  LodSharing sharing(geometries, instances, config);
+  double error_px = 0.01; // one for which the first and the last level are the same, and not the coarsest
+  LodPlan plan;
+  do plan = sharing.plan(view_from(DVec3(0.0), error_px *= 1.2));
+  while (plan.category_counts[static_cast<size_t>(InstanceCategory::kShares)] == 0 && error_px < 1e6);
+  ASSERT_EQ(plan.category_counts[static_cast<size_t>(InstanceCategory::kShares)], 49u);
+  EXPECT_EQ(plan.category_of_instance[49], InstanceCategory::kProvider);
+  EXPECT_EQ(plan.builds, 1u);
+}
+
+TEST(LodSharing, ToleranceIsKeptToItsLevels) {
+  const std::vector<LodGeometry> geometries = some_geometries(4);
+  const std::vector<LodInstance> instances = wild_instances(600, 4, 6);
+  const DetailView view = view_from(DVec3(0.0));
+  SharingConfig config;
+  config.scheme = SharingScheme::kLevels;
+  config.tolerant_levels = 2;
+  config.traced_ratio = 1.0;
+  LodSharing sharing(geometries, instances, config);
+  const LodPlan plan = sharing.plan(view);
+  size_t coarser = 0;
+  for (uint32_t i = 0; i < instances.size(); ++i) {
+    const PlannedBlas& blas = plan.blas[plan.blas_of_instance[i]];
+    if (blas.kind == BlasKind::kOwn) continue;
+    const std::span<const LodStep> steps = sharing.steps(instances[i].geometry);
+    const uint32_t needed = coarsest_step(steps, plan.allowed_error_of_instance[i]);
+    EXPECT_LE(blas.index, needed + 2);
+    coarser += blas.index > needed;
+  }
+  EXPECT_GT(coarser, 50u);
+}
+
+TEST(LodSharing, OnlyEnabledLevelsAreShared) {
+  const std::vector<LodGeometry> geometries = some_geometries(4);
+  const std::vector<LodInstance> instances = wild_instances(600, 4, 7);
+  const DetailView view = view_from(DVec3(0.0));
+  for (const SharingScheme scheme : {SharingScheme::kOneProvider, SharingScheme::kLevels, SharingScheme::kSteps}) {
+    SharingConfig config;
+    config.scheme = scheme;
+    config.share_equal_cuts = false;
+    config.shared_levels = 0;
+    const LodPlan none = LodSharing(geometries, instances, config).plan(view);
+    EXPECT_EQ(none.category_counts[static_cast<size_t>(InstanceCategory::kShares)], 0u);
+    EXPECT_EQ(none.builds + none.category_counts[0], instances.size());
+    config.shared_levels = 3;
+    const LodPlan some = LodSharing(geometries, instances, config).plan(view);
+    EXPECT_LT(some.builds, none.builds);
+    config.shared_levels = 32;
+    EXPECT_LT(LodSharing(geometries, instances, config).plan(view).builds, some.builds);
+  }
+}
+
+TEST(LodSharing, CulledInstancesAreCoarserAndOthersAsTheyWere) {
+  const std::vector<LodGeometry> geometries = some_geometries(4);
+  const std::vector<LodInstance> instances = wild_instances(600, 4, 8);
+  const DetailView view = view_from(DVec3(0.0));
+  std::vector<uint8_t> culled(instances.size());
+  for (size_t i = 0; i < culled.size(); i += 2) culled[i] = 1;
+  SharingConfig config;
+  config.scheme = SharingScheme::kPerInstance;
+  const LodPlan before = LodSharing(geometries, instances, config).plan(view, culled);
+  for (const bool by_level : {false, true}) {
+    config.culled_coarser_levels = by_level ? 1 : 0;
+    config.culled_error_scale = by_level ? 1.0 : 4.0;
+    LodSharing sharing(geometries, instances, config);
+    const LodPlan plan = sharing.plan(view, culled);
+    size_t coarser = 0;
+    for (uint32_t i = 0; i < instances.size(); ++i) {
+      const uint64_t now = plan.blas[plan.blas_of_instance[i]].triangles;
+      const uint64_t then = before.blas[before.blas_of_instance[i]].triangles;
+      if (culled[i] != 0) {
+        EXPECT_LE(now, then);
+      } else {
+        EXPECT_EQ(now, then);
+      }
+      coarser += now < then;
+      if (by_level || culled[i] == 0) continue;
+      EXPECT_EQ(used_cut(sharing, plan, i),
+                own_cut(geometries[instances[i].geometry], instances[i], view_from(DVec3(0.0), 4.0)));
+    }
+    EXPECT_GT(coarser, 100u);
+  }
+  EXPECT_THROW(LodSharing(geometries, instances, config).plan(view, std::vector<uint8_t>(3)), Error);
+}
+
+TEST(LodSharing, MergedCutsAreOneAGeometry) {
+  const std::vector<LodGeometry> geometries = some_geometries(4);
+  const std::vector<LodInstance> instances = wild_instances(600, 4, 9);
+  SharingConfig config;
+  config.scheme = SharingScheme::kPerInstance;
+  config.merge_own_cuts = true;
+  const LodPlan plan = LodSharing(geometries, instances, config).plan(view_from(DVec3(0.0)));
+  EXPECT_EQ(plan.builds, 4u);
+}
+
+TEST(LodSharing, MovedInstancesAreSeenWhereTheyAre) {
+  const std::vector<LodGeometry> geometries = some_geometries(3);
+  std::vector<LodInstance> instances = wild_instances(200, 3, 10);
+  LodSharing sharing(geometries, instances, {});
+  const DetailView view = view_from(DVec3(0.0));
+  const LodPlan before = sharing.plan(view);
+  test::Random random(1);
+  for (uint32_t i = 0; i < instances.size(); i += 3) {
+    instances[i].world_from_object = test::random_affine(random, 30.0);
+    sharing.set_transform(i, instances[i].world_from_object);
+  }
+  const LodPlan after = sharing.plan(view);
+  const LodPlan expected = LodSharing(geometries, instances, {}).plan(view);
+  EXPECT_EQ(after.blas_of_instance, expected.blas_of_instance);
+  EXPECT_EQ(after.allowed_error_of_instance, expected.allowed_error_of_instance);
+  EXPECT_NE(after.allowed_error_of_instance, before.allowed_error_of_instance);
+}
+
+TEST(LodSharing, NothingIsNothing) {
+  const LodPlan plan = LodSharing({}, {}, {}).plan(view_from(DVec3(0.0)));
+  EXPECT_TRUE(plan.blas.empty());
+  const std::vector<LodGeometry> geometries = some_geometries(2);
+  EXPECT_TRUE(LodSharing(geometries, {}, {}).plan(view_from(DVec3(0.0))).blas.empty());
+}
+
+TEST(LodSharing, BadInputIsRejected) {
+  const std::vector<LodGeometry> geometries = some_geometries(2);
+  const auto make = [&](const LodInstance& instance, const SharingConfig& config) {
+    LodSharing sharing(geometries, {&instance, 1}, config);
+  };
+  const SharingConfig good;
+  EXPECT_NO_THROW(make({1, DAffine(1.0)}, good));
+  EXPECT_THROW(make({2, DAffine(1.0)}, good), Error);
+  DAffine infinite(1.0);
+  infinite[3][1] = std::numeric_limits<double>::infinity();
+  EXPECT_THROW(make({0, infinite}, good), Error);
+  const auto reject = [&](const auto& change) {
+    SharingConfig config;
+    change(config);
+    EXPECT_THROW(make({0, DAffine(1.0)}, config), Error);
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  reject([](SharingConfig& c) { c.step_ratio = 1.0; });
+  reject([&](SharingConfig& c) { c.step_ratio = nan; });
+  reject([](SharingConfig& c) { c.traced_ratio = 0.99; });
+  reject([&](SharingConfig& c) { c.own_cut_ratio = nan; });
+  reject([](SharingConfig& c) { c.shared_levels = 33; });
+  reject([](SharingConfig& c) { c.tolerant_levels = 33; });
+  reject([](SharingConfig& c) { c.culled_coarser_levels = 33; });
+  reject([](SharingConfig& c) { c.culled_error_scale = 0.5; });
+  reject([](SharingConfig& c) { c.scheme = static_cast<SharingScheme>(5); });
+}
+
+} // namespace
+} // namespace packtrace
