@@ -20,7 +20,7 @@ struct TracerConfig {
 
 /// The one place that knows all backends. Keeps references: source and file must outlive the tracer.
 /// @param file what source reads; null where it reads floats
-/// Throws Error(kUnsupported) for a backend that is not in this build, else as the backend's constructor.
+/// Throws Error(kUnsupported) for backend packed without a file, else as the backend's constructor.
 std::unique_ptr<RayTracer> make_tracer(const SceneSource& source, const BakedFile* file, const TracerConfig& config);
 
 /// All of resident() together.

@@ -21,14 +21,15 @@ struct Layer {
 const std::vector<Layer> kLayers = {
     {"pbrt_import/scene/", {}},
     {"pbrt_import/", {"pbrt_import/scene/"}},
-    {"compress/format/", {"pbrt_import/scene/"}},
+    {"compress/bvh/", {"pbrt_import/scene/"}},
+    {"compress/format/", {"compress/bvh/", "pbrt_import/scene/"}},
     {"compress/bake/", {"compress/format/", "pbrt_import/scene/"}},
     {"compress/exchange/", {"compress/format/", "pbrt_import/scene/"}},
     {"runtime/lod/", {"compress/format/", "pbrt_import/scene/"}},
     {"runtime/commands/",
      {"runtime/", "runtime/lod/", "compress/format/", "compress/bake/", "compress/exchange/", "pbrt_import/",
       "pbrt_import/scene/"}},
-    {"runtime/", {"runtime/lod/", "compress/format/", "pbrt_import/scene/"}},
+    {"runtime/", {"runtime/lod/", "compress/bvh/", "compress/format/", "pbrt_import/scene/"}},
 };
 
 const Layer* layer_of(const std::string& path) {

@@ -1,0 +1,158 @@
+#include "compress/bvh/box_tree.h"
+
+#include <algorithm>
+#include <bit>
+#include <cassert>
+#include <limits>
+#include <utility>
+
+#include <tbb/parallel_invoke.h>
+
+namespace packtrace {
+namespace {
+
+constexpr uint32_t kMaxBins = 16;
+constexpr uint32_t kParallelCount = 2048; // smaller subtrees are built by one thread
+
+TreeBox empty_box() {
+  constexpr float kInf = std::numeric_limits<float>::infinity();
+  return {{kInf, kInf, kInf}, {-kInf, -kInf, -kInf}};
+}
+
+/// Twice the centre along an axis.
+double centre(const TreeBox& box, size_t axis) { return double{box.lo[axis]} + box.hi[axis]; }
+
+struct Split {
+  double cost = std::numeric_limits<double>::infinity();
+  size_t axis = 0;
+  uint32_t bin = 0; ///< the first one on the right
+};
+
+/// Which bin a centre lies in.
+struct BinAxis {
+  double low = 0.0, scale = 0.0; ///< scale is 0 where all centres are equal
+  uint32_t bins = 0;
+
+  uint32_t operator()(double place) const {
+    const auto bin = static_cast<uint32_t>((place - low) * scale); // not negative
+    return std::min(bin, bins - 1);
+  }
+};
+
+class Builder {
+public:
+  Builder(std::span<const TreeBox> boxes, BoxTree& tree) : boxes_(boxes), tree_(tree) {}
+
+  /// Builds the subtree at `node` over order[first .. first + count), of at most `levels` levels.
+  void build(uint32_t node, uint32_t first, uint32_t count, uint32_t levels) {
+    BoxTreeNode& out = tree_.nodes[node];
+    out.first = first, out.count = count, out.right = 0;
+    const std::span<uint32_t> order = std::span(tree_.order).subspan(first, count);
+    out.box = empty_box();
+    TreeBox centres = empty_box();
+    for (const uint32_t i : order) {
+      const TreeBox& box = boxes_[i];
+      out.box.extend(box);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        const auto place = static_cast<float>(0.5 * centre(box, axis));
+        centres.lo[axis] = std::min(centres.lo[axis], place), centres.hi[axis] = std::max(centres.hi[axis], place);
+      }
+    }
+    if (count == 1) return;
+    const uint32_t left = split(order, centres, levels);
+    const uint32_t right = out.right = node + 2 * left;
+    const auto build_left = [=, this] { build(node + 1, first, left, levels - 1); };
+    const auto build_right = [=, this] { build(right, first + left, count - left, levels - 1); };
+    if (count >= kParallelCount) {
+      tbb::parallel_invoke(build_left, build_right);
+    } else {
+      build_left();
+      build_right();
+    }
+  }
+
+private:
+  /// Sorts the boxes to the left and right; how many are on the left, 1 .. count - 1.
+  uint32_t split(std::span<uint32_t> order, const TreeBox& centres, uint32_t levels) const {
+    const auto count = static_cast<uint32_t>(order.size());
+    // A subtree of k levels holds up to 2^(k - 1) boxes. Unless all but one of them fit on one side, only halving ends
+    // in time.
+    const bool must_halve = static_cast<uint32_t>(std::bit_width(count - 1)) + 1 >= levels;
+    if (!must_halve) {
+      std::array<BinAxis, 3> axes;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        axes[axis].bins = std::min(kMaxBins, 2 * count);
+        axes[axis].low = 2.0 * centres.lo[axis];
+        const double extent = 2.0 * (double{centres.hi[axis]} - centres.lo[axis]);
+        axes[axis].scale = extent > 0.0 ? axes[axis].bins / extent : 0.0;
+      }
+      Split best;
+      for (size_t axis = 0; axis < 3; ++axis)
+        if (axes[axis].scale > 0.0) find_split(order, axes[axis], axis, best);
+      if (best.bin > 0) {
+        const auto middle = std::partition(order.begin(), order.end(), [&](uint32_t i) {
+          return axes[best.axis](rounded_centre(boxes_[i], best.axis)) < best.bin;
+        });
+        return static_cast<uint32_t>(middle - order.begin());
+      }
+    }
+    halve(order, centres);
+    return count / 2;
+  }
+
+  static double rounded_centre(const TreeBox& box, size_t axis) {
+    return 2.0 * double{static_cast<float>(0.5 * centre(box, axis))};
+  }
+
+  void find_split(std::span<const uint32_t> order, const BinAxis& bins, size_t axis, Split& best) const {
+    std::array<TreeBox, kMaxBins> boxes;
+    std::array<uint32_t, kMaxBins> counts{};
+    for (uint32_t b = 0; b < bins.bins; ++b) boxes[b] = empty_box();
+    for (const uint32_t i : order) {
+      const uint32_t b = bins(rounded_centre(boxes_[i], axis));
+      boxes[b].extend(boxes_[i]);
+      ++counts[b];
+    }
+    std::array<double, kMaxBins> right_cost{}; // of bins b and above
+    TreeBox box = empty_box();
+    for (uint32_t b = bins.bins, n = 0; b-- > 1;) {
+      if (counts[b] > 0) box.extend(boxes[b]), n += counts[b];
+      right_cost[b] = n > 0 ? box.half_area() * n : -1.0;
+    }
+    box = empty_box();
+    for (uint32_t b = 1, n = 0; b < bins.bins; ++b) {
+      if (counts[b - 1] > 0) box.extend(boxes[b - 1]), n += counts[b - 1];
+      if (n == 0 || right_cost[b] < 0.0) continue;
+      const double cost = box.half_area() * n + right_cost[b];
+      if (cost < best.cost) best = {cost, axis, b};
+    }
+  }
+
+  /// Sorts the half with the lower centres along the longest axis to the left.
+  void halve(std::span<uint32_t> order, const TreeBox& centres) const {
+    size_t axis = 0;
+    for (size_t a = 1; a < 3; ++a)
+      if (double{centres.hi[a]} - centres.lo[a] > double{centres.hi[axis]} - centres.lo[axis]) axis = a;
+    const auto key = [&](uint32_t i) { return std::pair(centre(boxes_[i], axis), i); };
+    std::nth_element(order.begin(), order.begin() + static_cast<ptrdiff_t>(order.size() / 2), order.end(),
+                     [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
+  }
+
+  std::span<const TreeBox> boxes_;
+  BoxTree& tree_;
+};
+
+} // namespace
+
+BoxTree build_box_tree(std::span<const TreeBox> boxes, uint32_t max_depth) {
+  assert(boxes.size() <= uint64_t{1} << 31 && max_depth >= 33);
+  BoxTree tree;
+  if (boxes.empty()) return tree;
+  tree.nodes.resize(2 * boxes.size() - 1);
+  tree.order.resize(boxes.size());
+  for (uint32_t i = 0; i < tree.order.size(); ++i) tree.order[i] = i;
+  Builder(boxes, tree).build(0, 0, static_cast<uint32_t>(boxes.size()), max_depth);
+  return tree;
+}
+
+} // namespace packtrace

@@ -1,0 +1,87 @@
+#include "compress/bvh/wide_tree.h"
+
+#include <array>
+
+namespace packtrace {
+namespace {
+
+constexpr float kNodeCost = 0x1p-20f; // of the root's area, so that boxes without area get few nodes as well
+
+/// Of a subtree that takes i of its parent's children at most, i = 1 .. 8 in [i - 1].
+struct Choice {
+  std::array<float, kWideTreeWidth> cost{};      ///< sum of the areas of inner nodes
+  std::array<uint8_t, kWideTreeWidth> on_left{}; ///< children that the left subtree takes; 0: the subtree is one child
+};
+
+class Collapser {
+public:
+  explicit Collapser(const BoxTree& tree) : tree_(tree), choices_(tree.nodes.size()) {
+    const double area = tree.nodes.front().box.half_area();
+    scale_ = area > 0.0 ? 1.0 / area : 0.0;
+    for (size_t i = choices_.size(); i-- > 0;)
+      if (tree_.nodes[i].count > 1) choose(static_cast<uint32_t>(i));
+  }
+
+  std::vector<WideNode> run() {
+    std::vector<WideNode> nodes;
+    nodes.reserve(tree_.order.size() + tree_.order.size() / 4);
+    nodes.push_back({0, 0, 0});
+    std::vector<uint32_t> waiting{0};
+    std::vector<uint32_t> children;
+    while (!waiting.empty()) {
+      const uint32_t number = waiting.back();
+      waiting.pop_back();
+      const uint32_t source = nodes[number].source;
+      if (tree_.nodes[source].count == 1) continue;
+      children.clear();
+      gather(source, kWideTreeWidth, children);
+      nodes[number].first_child = static_cast<uint32_t>(nodes.size());
+      nodes[number].child_count = static_cast<uint32_t>(children.size());
+      for (auto i = static_cast<uint32_t>(children.size()); i-- > 0;)
+        waiting.push_back(static_cast<uint32_t>(nodes.size()) + i);
+      for (const uint32_t child : children) nodes.push_back({child, 0, 0});
+    }
+    return nodes;
+  }
+
+private:
+  void choose(uint32_t node) {
+    const Choice &left = choices_[node + 1], &right = choices_[tree_.nodes[node].right];
+    Choice& out = choices_[node];
+    for (uint32_t i = 2; i <= kWideTreeWidth; ++i) {
+      float least = left.cost[0] + right.cost[i - 2];
+      uint32_t on_left = 1;
+      for (uint32_t k = 2; k < i; ++k)
+        if (const float cost = left.cost[k - 1] + right.cost[i - k - 1]; cost < least) least = cost, on_left = k;
+      out.cost[i - 1] = least, out.on_left[i - 1] = static_cast<uint8_t>(on_left);
+    }
+    out.cost[0] =
+        static_cast<float>(tree_.nodes[node].box.half_area() * scale_) + kNodeCost + out.cost[kWideTreeWidth - 1];
+    for (uint32_t i = 2; i < kWideTreeWidth; ++i)
+      if (out.cost[0] < out.cost[i - 1]) out.cost[i - 1] = out.cost[0], out.on_left[i - 1] = 0;
+  }
+
+  /// The children that a subtree is when it may be up to `slots` of them.
+  void gather(uint32_t node, uint32_t slots, std::vector<uint32_t>& children) const {
+    const uint32_t on_left = slots == 1 ? 0 : choices_[node].on_left[slots - 1];
+    if (on_left == 0) {
+      children.push_back(node);
+      return;
+    }
+    gather(node + 1, on_left, children);
+    gather(tree_.nodes[node].right, slots - on_left, children);
+  }
+
+  const BoxTree& tree_;
+  std::vector<Choice> choices_;
+  double scale_ = 0.0;
+};
+
+} // namespace
+
+std::vector<WideNode> collapse_box_tree(const BoxTree& tree) {
+  if (tree.nodes.empty()) return {};
+  return Collapser(tree).run();
+}
+
+} // namespace packtrace

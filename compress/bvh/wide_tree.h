@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "compress/bvh/box_tree.h"
+
+namespace packtrace {
+
+inline constexpr uint32_t kWideTreeWidth = 8;
+
+/// A node of a wide tree. Children follow each other.
+struct WideNode {
+  uint32_t source = 0;      ///< the node of the binary tree that it stands for, whose box is its own
+  uint32_t first_child = 0; ///< above the node's own number
+  uint32_t child_count = 0; ///< 2..8, or 0 for one of the boxes: source's only one
+};
+
+/// Collapses a binary tree so that the sum of the inner nodes' areas is the least that any choice among its nodes
+/// gives. Node 0 is the root; a subtree's nodes lie together but for its root, which lies beside its siblings. Source:
+/// Ylitie, Karras, Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs" (2017),
+/// section 3.1, with leaves of one box.
+std::vector<WideNode> collapse_box_tree(const BoxTree& tree);
+
+} // namespace packtrace

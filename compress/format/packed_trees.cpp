@@ -1,0 +1,273 @@
+#include "compress/format/packed_trees.h"
+
+#include <algorithm>
+#include <limits>
+
+#include <tbb/parallel_for.h>
+
+#include "compress/bvh/wide_tree.h"
+#include "compress/format/node_writer.h"
+#include "compress/format/tree_grid.h"
+#include "pbrt_import/scene/error.h"
+
+namespace packtrace {
+namespace {
+
+constexpr size_t kChunkClusters = 64; // worked on by one thread
+
+/// A cluster of a tree.
+struct TreeCluster {
+  uint32_t number = 0; ///< in the cluster section
+  uint32_t geometry = 0;
+  uint8_t ray_classes = 0;
+};
+
+/// Nodes with leaves, and the boxes of all below.
+struct LeafNodes {
+  std::vector<baked::PackedNode> nodes;
+  std::vector<TreeGridBox> boxes;
+};
+
+uint8_t ray_classes(uint32_t material_class) {
+  return static_cast<uint8_t>(((material_class & 1u) == 0 ? baked::kCameraBelow : 0) |
+                              ((material_class & 2u) == 0 ? baked::kOcclusionBelow : 0) |
+                              ((material_class & baked::kMaskedClass) != 0 ? baked::kMaskedLeaves : 0));
+}
+
+/// Builds the leaf nodes of one cluster after the other.
+class LeafNodeBuilder {
+public:
+  LeafNodeBuilder(const BakedSections& sections, const TreeCosts& costs, const baked::TreeRecord& tree)
+      : sections_(sections), costs_(costs), tree_(tree) {}
+
+  void add(const TreeCluster& cluster, LeafNodes& out) {
+    const baked::GeometryRecord& geometry = sections_.geometries[cluster.geometry];
+    const ClusterView view(geometry, sections_.clusters[cluster.number],
+                           sections_.payload.data() + geometry.payload_offset);
+    find_triangle_boxes(view, TreeGridMap(tree_, geometry));
+    leaf_nodes_.clear();
+    find_leaf_nodes(std::span(boxes_).first(view.triangle_count()), costs_, leaf_nodes_);
+    for (const LeafNode& leaves : leaf_nodes_) add_node(cluster, leaves, out);
+  }
+
+private:
+  void find_triangle_boxes(const ClusterView& view, const TreeGridMap& map) {
+    std::array<Triangle, kMaxClusterTriangles> triangles;
+    std::array<TreeGridBox, kMaxClusterVertices> vertices;
+    decode_indices(view, 0, triangles);
+    for (uint32_t v = 0; v < view.vertex_count(); ++v) {
+      const LatticePoint q = view.lattice(v);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        vertices[v].lo[axis] = static_cast<int32_t>(map.floor(q[axis], axis));
+        vertices[v].hi[axis] = static_cast<int32_t>(map.ceil(q[axis], axis));
+      }
+    }
+    for (uint32_t t = 0; t < view.triangle_count(); ++t) {
+      boxes_[t] = vertices[triangles[t].x];
+      boxes_[t].extend(vertices[triangles[t].y]);
+      boxes_[t].extend(vertices[triangles[t].z]);
+    }
+  }
+
+  void add_node(const TreeCluster& cluster, const LeafNode& leaves, LeafNodes& out) const {
+    baked::PackedNode node{};
+    node.ray_classes = cluster.ray_classes;
+    node.first_triangle = static_cast<uint8_t>(leaves.first_triangle);
+    node.cluster = cluster.number;
+    node.children = leaves.triangles;
+    std::array<TreeGridBox, baked::kNodeWidth> boxes;
+    TreeGridBox whole = boxes_[leaves.first_triangle];
+    uint32_t triangle = leaves.first_triangle;
+    for (uint32_t leaf = 0; leaf < leaves.leaf_count; ++leaf) {
+      boxes[leaf] = boxes_[triangle];
+      for (const uint32_t end = triangle + leaves.triangles[leaf]; triangle < end; ++triangle)
+        boxes[leaf].extend(boxes_[triangle]);
+      whole.extend(boxes[leaf]);
+    }
+    write_boxes(std::span(boxes).first(leaves.leaf_count), node);
+    out.nodes.push_back(node);
+    out.boxes.push_back(whole);
+  }
+
+  const BakedSections& sections_;
+  const TreeCosts& costs_;
+  const baked::TreeRecord& tree_;
+  std::array<TreeGridBox, kMaxClusterTriangles> boxes_; // of the cluster's triangles
+  std::vector<LeafNode> leaf_nodes_;
+};
+
+class TreeBuilder {
+public:
+  TreeBuilder(const BakedSections& sections, const TreeCosts& costs) : sections_(sections), costs_(costs) {}
+
+  PackedTrees run() {
+    find_instances();
+    std::vector<uint32_t> world, others;
+    find_world(world, others);
+    const size_t first = world.empty() ? 0 : 1;
+    std::vector<Tree> trees(first + others.size());
+    tbb::parallel_for(size_t{0}, trees.size(), [&](size_t i) {
+      trees[i] = i < first ? build(baked::kWorldTree, world) : build(others[i - first], {&others[i - first], 1});
+    });
+    PackedTrees out;
+    for (Tree& tree : trees) {
+      tree.record.first_node = out.nodes.size();
+      out.trees.push_back(tree.record);
+      out.nodes.insert(out.nodes.end(), tree.nodes.begin(), tree.nodes.end());
+      tree = {};
+    }
+    return out;
+  }
+
+private:
+  struct Tree {
+    baked::TreeRecord record{};
+    std::vector<baked::PackedNode> nodes;
+  };
+
+  void find_instances() {
+    uses_.resize(sections_.geometries.size());
+    first_use_.resize(uses_.size());
+    for (uint32_t i = 0; i < sections_.instances.size(); ++i) {
+      const uint32_t geometry = sections_.instances[i].geometry;
+      if (uses_[geometry]++ == 0) first_use_[geometry] = i;
+    }
+  }
+
+  bool may_join_world(uint32_t geometry) const {
+    constexpr std::array<float, 12> kIdentity{1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+    return (sections_.geometries[geometry].flags & baked::kWorldSpace) != 0 && uses_[geometry] == 1 &&
+           sections_.instances[first_use_[geometry]].world_from_object == kIdentity;
+  }
+
+  /// Sorts the geometries with clusters into those of the world's tree and those with trees of their own.
+  void find_world(std::vector<uint32_t>& world, std::vector<uint32_t>& others) const {
+    constexpr int32_t kMaxHalvings = 60;
+    const auto& geometries = sections_.geometries;
+    uint32_t mantissa = 0;
+    int32_t coarsest = std::numeric_limits<int32_t>::min();
+    for (uint32_t i = 0; i < geometries.size(); ++i)
+      if (geometries[i].cluster_count > 0 && may_join_world(i)) {
+        if (mantissa == 0) mantissa = geometries[i].step_mantissa;
+        if (geometries[i].step_mantissa == mantissa) coarsest = std::max(coarsest, geometries[i].step_exponent);
+      }
+    for (uint32_t i = 0; i < geometries.size(); ++i)
+      if (geometries[i].cluster_count > 0) {
+        const bool joins = may_join_world(i) && geometries[i].step_mantissa == mantissa &&
+                           coarsest - geometries[i].step_exponent <= kMaxHalvings;
+        (joins ? world : others).push_back(i);
+      }
+  }
+
+  Tree build(uint32_t name, std::span<const uint32_t> geometries) const {
+    Tree tree;
+    tree.record.geometry = name;
+    std::vector<const baked::GeometryRecord*> records;
+    for (const uint32_t g : geometries) records.push_back(&sections_.geometries[g]);
+    choose_tree_grid(records, sections_.clusters, tree.record);
+    const std::vector<TreeCluster> clusters = find_clusters(geometries);
+    build_nodes(build_leaf_nodes(clusters, tree.record), tree);
+    return tree;
+  }
+
+  /// Those that some ray can hit.
+  std::vector<TreeCluster> find_clusters(std::span<const uint32_t> geometries) const {
+    std::vector<TreeCluster> clusters;
+    for (const uint32_t g : geometries) {
+      const baked::GeometryRecord& geometry = sections_.geometries[g];
+      auto next = static_cast<uint32_t>(geometry.first_cluster);
+      for (uint32_t c = 0; c < geometry.class_clusters.size(); ++c) {
+        const uint8_t classes = ray_classes(c);
+        const uint32_t end = next + geometry.class_clusters[c];
+        if ((classes & (baked::kCameraBelow | baked::kOcclusionBelow)) != 0)
+          for (uint32_t i = next; i < end; ++i) clusters.push_back({i, g, classes});
+        next = end;
+      }
+    }
+    return clusters;
+  }
+
+  LeafNodes build_leaf_nodes(std::span<const TreeCluster> clusters, const baked::TreeRecord& tree) const {
+    const size_t chunks = (clusters.size() + kChunkClusters - 1) / kChunkClusters;
+    std::vector<LeafNodes> of_chunk(chunks);
+    tbb::parallel_for(size_t{0}, chunks, [&](size_t i) {
+      LeafNodeBuilder builder(sections_, costs_, tree);
+      const size_t first = i * kChunkClusters, count = std::min(kChunkClusters, clusters.size() - first);
+      for (const TreeCluster& cluster : clusters.subspan(first, count)) builder.add(cluster, of_chunk[i]);
+    });
+    LeafNodes all;
+    for (LeafNodes& chunk : of_chunk) {
+      all.nodes.insert(all.nodes.end(), chunk.nodes.begin(), chunk.nodes.end());
+      all.boxes.insert(all.boxes.end(), chunk.boxes.begin(), chunk.boxes.end());
+      chunk = {};
+    }
+    return all;
+  }
+
+  static void build_nodes(const LeafNodes& leaves, Tree& tree) {
+    if (leaves.nodes.size() > uint64_t{1} << 30)
+      throw Error(ErrorKind::kLimitExceeded, "a tree has more than 2^30 nodes with leaves");
+    std::vector<TreeBox> boxes;
+    boxes.reserve(leaves.boxes.size());
+    for (const TreeGridBox& box : leaves.boxes) {
+      TreeBox& out = boxes.emplace_back();
+      for (size_t axis = 0; axis < 3; ++axis)
+        out.lo[axis] = static_cast<float>(box.lo[axis]), out.hi[axis] = static_cast<float>(box.hi[axis]);
+    }
+    const BoxTree binary = build_box_tree(boxes, baked::kMaxTreeDepth);
+    const std::vector<WideNode> wide = collapse_box_tree(binary);
+    tree.nodes.resize(wide.size());
+    std::vector<TreeGridBox> whole(wide.size());
+    for (size_t i = wide.size(); i-- > 0;) {
+      if (wide[i].child_count == 0) {
+        const uint32_t leaf = binary.order[binary.nodes[wide[i].source].first];
+        tree.nodes[i] = leaves.nodes[leaf], whole[i] = leaves.boxes[leaf];
+      } else {
+        whole[i] = make_inner(wide[i], tree.nodes, whole, tree.nodes[i]);
+      }
+    }
+    tree.record.node_count = static_cast<uint32_t>(wide.size());
+    tree.record.depth = depth_of(wide);
+  }
+
+  static TreeGridBox make_inner(const WideNode& wide, std::span<const baked::PackedNode> nodes,
+                                std::span<const TreeGridBox> whole, baked::PackedNode& out) {
+    out = {};
+    out.first_child = wide.first_child;
+    const std::span<const TreeGridBox> boxes = whole.subspan(wide.first_child, wide.child_count);
+    TreeGridBox box = boxes[0];
+    uint32_t classes = 0;
+    for (uint32_t child = 0; child < wide.child_count; ++child) {
+      out.children[child] = baked::kInnerChild;
+      classes |= nodes[wide.first_child + child].ray_classes;
+      box.extend(boxes[child]);
+    }
+    out.ray_classes = static_cast<uint8_t>(classes & (baked::kCameraBelow | baked::kOcclusionBelow));
+    write_boxes(boxes, out);
+    return box;
+  }
+
+  static uint32_t depth_of(std::span<const WideNode> wide) {
+    uint32_t depth = 0;
+    std::vector<uint8_t> level(wide.size());
+    for (size_t i = 0; i < wide.size(); ++i) {
+      if (i == 0) level[i] = 1;
+      depth = std::max<uint32_t>(depth, level[i]);
+      for (uint32_t child = 0; child < wide[i].child_count; ++child)
+        level[wide[i].first_child + child] = static_cast<uint8_t>(level[i] + 1);
+    }
+    return depth;
+  }
+
+  const BakedSections& sections_;
+  const TreeCosts& costs_;
+  std::vector<uint32_t> uses_, first_use_; // instances of each geometry
+};
+
+} // namespace
+
+PackedTrees build_packed_trees(const BakedSections& sections, const TreeCosts& costs) {
+  return TreeBuilder(sections, costs).run();
+}
+
+} // namespace packtrace

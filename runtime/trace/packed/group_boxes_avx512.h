@@ -1,0 +1,80 @@
+#pragma once
+
+#include <immintrin.h>
+
+#include "runtime/trace/packed/group_boxes.h"
+
+/// The same with all planes of an axis in one register: each child's near plane and, negated, its far one, so that the
+/// larger parameter counts for both.
+namespace packtrace::packed {
+namespace {
+
+struct Avx512GroupBoxes {
+  __m512 plane[3];
+
+  Avx512GroupBoxes(const baked::PackedNode& node, uint32_t octant) {
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+      const NodeAxis at(node, axis, ((octant >> axis) & 1u) != 0);
+      const __m128i near = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(at.near));
+      const __m128i far = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(at.far));
+      const __m512 q = _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(_mm_unpacklo_epi8(near, far)));
+      plane[axis] = negate_far(_mm512_fmadd_ps(q, _mm512_set1_ps(at.unit), _mm512_set1_ps(at.origin)));
+    }
+  }
+
+  Avx512GroupBoxes(const TopNode& node, uint32_t octant) {
+    const __m512i pairs = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+      const bool backward = ((octant >> axis) & 1u) != 0;
+      const __m256 near = _mm256_load_ps(backward ? node.hi[axis] : node.lo[axis]);
+      const __m256 far = _mm256_load_ps(backward ? node.lo[axis] : node.hi[axis]);
+      plane[axis] = negate_far(_mm512_permutex2var_ps(_mm512_castps256_ps512(near), pairs, _mm512_castps256_ps512(far)));
+    }
+  }
+
+private:
+  static __m512 negate_far(__m512 planes) {
+    return _mm512_castsi512_ps(
+        _mm512_xor_si512(_mm512_castps_si512(planes), _mm512_set1_epi64(static_cast<int64_t>(uint64_t{1} << 63))));
+  }
+};
+
+struct Avx512ChildRays {
+  __m512i rays = _mm512_setzero_si512();
+
+  void add(const Avx512GroupBoxes& boxes, const RayGroup& group, uint32_t ray) {
+    const auto pair = [](const float (&two)[2]) {
+      double both;
+      __builtin_memcpy(&both, two, sizeof both);
+      return _mm512_castpd_ps(_mm512_set1_pd(both));
+    };
+    const auto parameter = [&](uint32_t axis) {
+      return _mm512_fmadd_ps(boxes.plane[axis], _mm512_set1_ps(group.inverse[axis][ray]), pair(group.bias[axis][ray]));
+    };
+    const __m512 latest =
+        _mm512_max_ps(_mm512_max_ps(parameter(0), parameter(1)), _mm512_max_ps(parameter(2), pair(group.limits[ray])));
+    // begin <= end, that is begin + -end <= 0: the sign of a sum is exact. Both halves of 64 bits hold it.
+    const __m512 sum = _mm512_add_ps(latest, _mm512_permute_ps(latest, 0xb1));
+    const __mmask8 hit = _mm512_cmple_epi64_mask(_mm512_castps_si512(sum), _mm512_setzero_si512());
+    rays = _mm512_mask_or_epi64(rays, hit, rays, _mm512_set1_epi64(static_cast<int64_t>(uint64_t{1} << ray)));
+  }
+
+  static void enter(const Avx512GroupBoxes& boxes, const RayGroup& group, uint32_t ray,
+                    float (&t)[baked::kNodeWidth]) {
+    const auto at = [&](uint32_t axis) {
+      return _mm512_fmadd_ps(boxes.plane[axis], _mm512_set1_ps(group.inverse[axis][ray]),
+                             _mm512_set1_ps(group.bias[axis][ray][0]));
+    };
+    const __m512 begin = _mm512_max_ps(_mm512_max_ps(at(0), at(1)), at(2));
+    _mm256_storeu_ps(t, _mm512_castps512_ps256(_mm512_permutexvar_ps(
+                            _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 0, 0, 0, 0, 0, 0, 0, 0), begin)));
+  }
+
+  uint32_t read(uint64_t (&out)[baked::kNodeWidth]) const {
+    _mm512_storeu_si512(out, rays);
+    return _mm512_test_epi64_mask(rays, rays);
+  }
+};
+
+} // namespace
+} // namespace packtrace::packed

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+
+#include <immintrin.h>
+
+/// Eight lanes in one 256-bit register.
+namespace packtrace::packed {
+namespace {
+
+struct Avx2Lanes {
+  using F = __m256;
+
+  static F load(const float* p) { return _mm256_loadu_ps(p); }
+  static void store(float* p, F a) { _mm256_storeu_ps(p, a); }
+  static F load_bytes(const uint8_t* p) {
+    return _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))));
+  }
+  static F set(float x) { return _mm256_set1_ps(x); }
+  static F add(F a, F b) { return _mm256_add_ps(a, b); }
+  static F sub(F a, F b) { return _mm256_sub_ps(a, b); }
+  static F mul(F a, F b) { return _mm256_mul_ps(a, b); }
+  static F div(F a, F b) { return _mm256_div_ps(a, b); }
+  /// a b + c and c - a b, rounded once
+  static F fma(F a, F b, F c) { return _mm256_fmadd_ps(a, b, c); }
+  static F fnma(F a, F b, F c) { return _mm256_fnmadd_ps(a, b, c); }
+  static F min(F a, F b) { return _mm256_min_ps(a, b); }
+  static F max(F a, F b) { return _mm256_max_ps(a, b); }
+  static F abs(F a) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), a); }
+  static F negate(F a) { return _mm256_xor_ps(_mm256_set1_ps(-0.0f), a); }
+  static uint32_t less(F a, F b) { return bits(_mm256_cmp_ps(a, b, _CMP_LT_OQ)); }
+  static uint32_t less_equal(F a, F b) { return bits(_mm256_cmp_ps(a, b, _CMP_LE_OQ)); }
+
+private:
+  static uint32_t bits(F mask) { return static_cast<uint32_t>(_mm256_movemask_ps(mask)); }
+};
+
+} // namespace
+} // namespace packtrace::packed

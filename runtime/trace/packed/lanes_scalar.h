@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstdint>
+
+/// Eight lanes in portable C++: what the other instruction sets must agree with.
+namespace packtrace::packed {
+namespace {
+
+struct ScalarLanes {
+  struct F {
+    float lane[8];
+  };
+
+  template <typename Function>
+  static F each(Function function) {
+    F result;
+    for (uint32_t i = 0; i < 8; ++i) result.lane[i] = function(i);
+    return result;
+  }
+  template <typename Function>
+  static uint32_t bits(Function function) {
+    uint32_t result = 0;
+    for (uint32_t i = 0; i < 8; ++i) result |= (function(i) ? 1u : 0u) << i;
+    return result;
+  }
+
+  static F load(const float* p) {
+    return each([&](uint32_t i) { return p[i]; });
+  }
+  static void store(float* p, F a) {
+    for (uint32_t i = 0; i < 8; ++i) p[i] = a.lane[i];
+  }
+  static F load_bytes(const uint8_t* p) {
+    return each([&](uint32_t i) { return static_cast<float>(p[i]); });
+  }
+  static F set(float x) {
+    return each([&](uint32_t) { return x; });
+  }
+  static F add(F a, F b) {
+    return each([&](uint32_t i) { return a.lane[i] + b.lane[i]; });
+  }
+  static F sub(F a, F b) {
+    return each([&](uint32_t i) { return a.lane[i] - b.lane[i]; });
+  }
+  static F mul(F a, F b) {
+    return each([&](uint32_t i) { return a.lane[i] * b.lane[i]; });
+  }
+  static F div(F a, F b) {
+    return each([&](uint32_t i) { return a.lane[i] / b.lane[i]; });
+  }
+  /// a b + c and c - a b, rounded once
+  static F fma(F a, F b, F c) {
+    return each([&](uint32_t i) { return __builtin_fmaf(a.lane[i], b.lane[i], c.lane[i]); });
+  }
+  static F fnma(F a, F b, F c) {
+    return each([&](uint32_t i) { return __builtin_fmaf(-a.lane[i], b.lane[i], c.lane[i]); });
+  }
+  static F min(F a, F b) {
+    return each([&](uint32_t i) { return a.lane[i] < b.lane[i] ? a.lane[i] : b.lane[i]; });
+  }
+  static F max(F a, F b) {
+    return each([&](uint32_t i) { return a.lane[i] > b.lane[i] ? a.lane[i] : b.lane[i]; });
+  }
+  static F abs(F a) {
+    return each([&](uint32_t i) { return __builtin_fabsf(a.lane[i]); });
+  }
+  static F negate(F a) {
+    return each([&](uint32_t i) { return -a.lane[i]; });
+  }
+  static uint32_t less(F a, F b) {
+    return bits([&](uint32_t i) { return a.lane[i] < b.lane[i]; });
+  }
+  static uint32_t less_equal(F a, F b) {
+    return bits([&](uint32_t i) { return a.lane[i] <= b.lane[i]; });
+  }
+};
+
+} // namespace
+} // namespace packtrace::packed

@@ -1,0 +1,300 @@
+#include "runtime/trace/packed/packed_tracer.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include "compress/bvh/box_tree.h"
+#include "compress/format/packed_trees.h"
+#include "compress/format/position_grid.h"
+#include "pbrt_import/scene/bounds.h"
+#include "pbrt_import/scene/error.h"
+#include "runtime/trace/alpha_filter.h"
+#include "runtime/trace/packed/batch_cache.h"
+#include "runtime/trace/packed/top_tree.h"
+#include "runtime/trace/packed/trace_cluster.h"
+#include "runtime/trace/placement.h"
+
+namespace packtrace {
+namespace {
+
+static_assert(sizeof(Ray) == sizeof(packed::KernelRay) && offsetof(Ray, tfar) == offsetof(packed::KernelRay, tfar) &&
+              offsetof(Ray, direction) == offsetof(packed::KernelRay, direction));
+static_assert(sizeof(RayHit) == sizeof(packed::KernelHit) && offsetof(RayHit, part) == offsetof(packed::KernelHit, cluster));
+static_assert(baked::kCameraBelow == kCameraRays && baked::kOcclusionBelow == kOcclusionRays);
+
+constexpr uint32_t kNoPlace = ~0u;
+
+const packed::KernelRay* kernel_rays(std::span<const Ray> rays) {
+  return reinterpret_cast<const packed::KernelRay*>(rays.data());
+}
+packed::KernelHit* kernel_hits(std::span<RayHit> hits) { return reinterpret_cast<packed::KernelHit*>(hits.data()); }
+
+uint8_t ray_classes(uint32_t material_class) {
+  return static_cast<uint8_t>(((material_class & 1u) == 0 ? baked::kCameraBelow : 0) |
+                              ((material_class & 2u) == 0 ? baked::kOcclusionBelow : 0) |
+                              ((material_class & baked::kMaskedClass) != 0 ? baked::kMaskedLeaves : 0));
+}
+
+DAffine outer_from_grid(const baked::TreeRecord& tree) {
+  const double step = PositionGrid{tree.step_mantissa, tree.step_exponent}.step();
+  const DVec3 origin(static_cast<double>(tree.origin[0]), static_cast<double>(tree.origin[1]),
+                     static_cast<double>(tree.origin[2]));
+  return DAffine(DVec3(step, 0, 0), DVec3(0, step, 0), DVec3(0, 0, step), origin * step);
+}
+
+/// Whether doubles can invert it well enough that rays meet its surfaces where they are.
+bool invertible(const DAffine& to_from, const DAffine& from_to) {
+  constexpr double kMaxCondition = 1e9;
+  const auto norm = [](const DAffine& m) {
+    return std::sqrt(glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
+  };
+  return norm(to_from) * norm(from_to) <= kMaxCondition && is_finite(from_to[3]); // false for NaN
+}
+
+/// The root's box, in the tree's grid.
+void root_box(const baked::PackedNode& root, double (&lo)[3], double (&hi)[3]) {
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    uint32_t least = 255, most = 0;
+    for (uint32_t child = 0; child < baked::kNodeWidth && root.children[child] != baked::kNoChild; ++child) {
+      least = std::min<uint32_t>(least, root.lo[axis][child]);
+      most = std::max<uint32_t>(most, root.hi[axis][child]);
+    }
+    const double unit = std::ldexp(1.0, static_cast<int>(root.exponent(axis)));
+    lo[axis] = root.origin[axis] + least * unit;
+    hi[axis] = root.origin[axis] + most * unit;
+  }
+}
+
+/// In unit space, a little larger than what may be hit.
+TreeBox placed_box(const packed::TracePlacement& placement, const DAffine& unit_from_grid) {
+  DVec3 centre, half;
+  for (int axis = 0; axis < 3; ++axis) {
+    centre[axis] = 0.5 * (placement.box_lo[axis] + placement.box_hi[axis]);
+    half[axis] = 0.5 * (placement.box_hi[axis] - placement.box_lo[axis]);
+  }
+  // Rays in the grid are off by 2^-22 of the largest coordinate there, see grid_ray.h.
+  const DVec3 pad(0x1p-20 * glm::max(glm::max(std::abs(centre.x) + half.x, std::abs(centre.y) + half.y),
+                                    std::abs(centre.z) + half.z));
+  const DVec3 middle = transform_point(unit_from_grid, centre);
+  const DVec3 reach = glm::abs(unit_from_grid[0]) * (half.x + pad.x) + glm::abs(unit_from_grid[1]) * (half.y + pad.y) +
+                      glm::abs(unit_from_grid[2]) * (half.z + pad.z);
+  TreeBox box;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<size_t>(axis);
+    box.lo[i] = std::nextafter(static_cast<float>(middle[axis] - reach[axis]), -INFINITY);
+    box.hi[i] = std::nextafter(static_cast<float>(middle[axis] + reach[axis]), INFINITY);
+  }
+  return box;
+}
+
+/// Sets up the tree over placements as something placed in unit space itself.
+void place_top(std::span<const TreeBox> boxes, packed::KernelScene& scene) {
+  TreeBox all = boxes[0];
+  for (const TreeBox& box : boxes) all.extend(box);
+  scene.top = {};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    scene.top.grid_from_unit[3 * axis + axis] = 1.0;
+    scene.top.box_lo[axis] = all.lo[axis], scene.top.box_hi[axis] = all.hi[axis];
+    scene.top_max_coordinate = std::max({scene.top_max_coordinate, std::abs(all.lo[axis]), std::abs(all.hi[axis])});
+  }
+}
+
+} // namespace
+
+struct PackedTracer::Tables {
+  PackedTrees packed;
+  std::vector<packed::TraceCluster> clusters;
+  std::vector<packed::TraceTree> trees;
+  std::vector<packed::TracePlacement> placements;
+  std::vector<TreeBox> boxes;            ///< of placements
+  std::vector<uint32_t> instance_of;     ///< by placement; kNoPlace: the world's
+  std::vector<uint32_t> tree_of;         ///< by geometry, or kNoPlace
+  std::vector<uint32_t> first_instance;  ///< by geometry
+  std::vector<Placement> surfaces;       ///< by instance
+  std::vector<packed::TopNode> top;
+  packed::KernelScene scene{};
+  BatchCacheOwner caches;
+
+  void add_tree(const BakedFile& file, uint32_t number) {
+    const baked::TreeRecord& record = packed.trees[number];
+    const auto add = [&](uint32_t geometry) {
+      tree_of[geometry] = number;
+      add_clusters(file, record, geometry);
+    };
+    packed::TraceTree tree{packed.nodes.data() + record.first_node, 1.0f};
+    if (record.node_count > 0) {
+      double lo[3], hi[3];
+      root_box(tree.nodes[0], lo, hi);
+      for (int axis = 0; axis < 3; ++axis)
+        tree.max_coordinate =
+            std::max({tree.max_coordinate, static_cast<float>(std::abs(lo[axis])), static_cast<float>(std::abs(hi[axis]))});
+    }
+    trees.push_back(tree);
+    if (record.geometry != baked::kWorldTree) return add(record.geometry);
+    std::vector<uint8_t> own(tree_of.size(), 0);
+    for (const baked::TreeRecord& other : packed.trees)
+      if (other.geometry != baked::kWorldTree) own[other.geometry] = 1;
+    for (uint32_t g = 0; g < own.size(); ++g)
+      if (own[g] == 0 && file.geometries()[g].cluster_count > 0) add(g);
+  }
+
+  void add_clusters(const BakedFile& file, const baked::TreeRecord& tree, uint32_t g) {
+    const baked::GeometryRecord& geometry = file.geometries()[g];
+    uint32_t next = 0;
+    for (uint32_t c = 0; c < geometry.class_clusters.size(); ++c)
+      for (const uint32_t end = next + geometry.class_clusters[c]; next < end; ++next)
+        clusters[geometry.first_cluster + next] = trace_cluster(tree, geometry, file.cluster(g, next), ray_classes(c));
+  }
+};
+
+PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa)
+    : file_(file), source_(source), kernels_(kernels_of(isa)), tables_(std::make_unique<Tables>()) {
+  Tables& t = *tables_;
+  t.packed = build_packed_trees(file.sections());
+  t.clusters.resize(file.sections().clusters.size());
+  t.tree_of.assign(file.geometries().size(), kNoPlace);
+  for (uint32_t i = 0; i < t.packed.trees.size(); ++i) t.add_tree(file, i);
+  place();
+  t.scene.clusters = t.clusters.data();
+  t.scene.trees = t.trees.data();
+  t.scene.placements = t.placements.data();
+  t.scene.placement_count = static_cast<uint32_t>(t.placements.size());
+  if (t.placements.size() > 1) {
+    t.top = build_top_tree(t.boxes);
+    t.scene.top_nodes = t.top.data();
+    place_top(t.boxes, t.scene);
+  }
+  t.scene.owner = this;
+  t.scene.decode_wide = [](const void* owner, uint32_t cluster, uint32_t first, uint32_t count,
+                           packed::DecodedBatch& out) {
+    const auto& tracer = *static_cast<const PackedTracer*>(owner);
+    const uint32_t g = tracer.geometry_of_cluster(cluster);
+    const baked::GeometryRecord& geometry = tracer.file_.geometries()[g];
+    return decode_batch_exactly(tracer.tables_->packed.trees[tracer.tables_->tree_of[g]], geometry,
+                                tracer.file_.cluster(g, static_cast<uint32_t>(cluster - geometry.first_cluster)), first,
+                                count, out);
+  };
+  t.scene.present = [](const void* owner, uint32_t placement, uint32_t cluster, uint32_t triangle, float u, float v,
+                       uint32_t ray_class) {
+    const auto& tracer = *static_cast<const PackedTracer*>(owner);
+    const uint32_t g = tracer.geometry_of_cluster(cluster), placed = tracer.tables_->instance_of[placement];
+    return surface_present(tracer.source_, placed == kNoPlace ? tracer.tables_->first_instance[g] : placed,
+                           tracer.file_.sections().clusters[cluster].first_triangle + triangle, Vec2(u, v),
+                           ray_class == kOcclusionRays);
+  };
+}
+
+PackedTracer::~PackedTracer() = default;
+
+void PackedTracer::place() {
+  Tables& t = *tables_;
+  const std::span<const PlacedGeometry> instances = source_.instances();
+  t.first_instance.assign(file_.geometries().size(), kNoPlace);
+  for (uint32_t i = static_cast<uint32_t>(instances.size()); i-- > 0;) t.first_instance[instances[i].geometry] = i;
+  std::vector<Bounds> bounds(file_.geometries().size());
+  for (size_t g = 0; g < bounds.size(); ++g) {
+    const baked::GeometryRecord& geometry = file_.geometries()[g];
+    if (geometry.cluster_count == 0) continue;
+    bounds[g].extend(DVec3(geometry.bounds_lo[0], geometry.bounds_lo[1], geometry.bounds_lo[2]));
+    bounds[g].extend(DVec3(geometry.bounds_hi[0], geometry.bounds_hi[1], geometry.bounds_hi[2]));
+  }
+  space_ = UnitSpace(placed_bounds(source_, bounds));
+
+  t.surfaces.resize(instances.size());
+  bool world_placed = false;
+  for (uint32_t i = 0; i < instances.size(); ++i) {
+    const uint32_t tree = t.tree_of[instances[i].geometry];
+    if (tree == kNoPlace) continue;
+    const DAffine world_from_object(instances[i].world_from_object);
+    const DAffine unit_from_grid =
+        compose(compose(space_.unit_from_outer(), world_from_object), outer_from_grid(t.packed.trees[tree]));
+    t.surfaces[i] = instanced_placement(i, world_from_object, unit_from_grid);
+    // Rays move in doubles, and only what they become in the grid is rounded.
+    t.surfaces[i].moved_linear = glm::dmat3(0.0);
+    t.surfaces[i].moved_offset = DVec3(0.0);
+    const bool in_world = t.packed.trees[tree].geometry == baked::kWorldTree;
+    if (in_world && world_placed) continue;
+    world_placed |= in_world;
+    add_placement(tree, in_world ? kNoPlace : i, unit_from_grid);
+  }
+}
+
+/// @param instance or kNoPlace for the world's tree
+void PackedTracer::add_placement(uint32_t tree, uint32_t instance, const DAffine& unit_from_grid) {
+  Tables& t = *tables_;
+  if (t.packed.trees[tree].node_count == 0) return;
+  const DAffine grid_from_unit = inverse(unit_from_grid);
+  if (!invertible(unit_from_grid, grid_from_unit)) return flat_instances_.push_back(instance);
+  packed::TracePlacement placement{};
+  for (int column = 0; column < 4; ++column)
+    for (int axis = 0; axis < 3; ++axis) placement.grid_from_unit[3 * column + axis] = grid_from_unit[column][axis];
+  root_box(t.trees[tree].nodes[0], placement.box_lo, placement.box_hi);
+  placement.tree = tree;
+  placement.ray_classes = t.trees[tree].nodes[0].ray_classes;
+  t.boxes.push_back(placed_box(placement, unit_from_grid));
+  t.placements.push_back(placement);
+  t.instance_of.push_back(instance);
+}
+
+uint32_t PackedTracer::geometry_of_cluster(uint32_t cluster) const {
+  const auto geometries = file_.geometries();
+  const auto next = std::upper_bound(geometries.begin(), geometries.end(), cluster,
+                                     [](uint32_t c, const baked::GeometryRecord& g) { return c < g.first_cluster; });
+  return static_cast<uint32_t>(next - geometries.begin() - 1);
+}
+
+void PackedTracer::closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder, std::span<RayHit> hits) const {
+  assert(hits.size() == rays.size());
+  kernels_.closest(tables_->scene, tables_->caches.of_this_thread(), kernel_rays(rays), rays.size(), ray_class,
+                   kernel_hits(hits), nullptr);
+}
+
+void PackedTracer::any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder,
+                            std::span<uint8_t> occluded) const {
+  assert(occluded.size() == rays.size());
+  kernels_.any(tables_->scene, tables_->caches.of_this_thread(), kernel_rays(rays), rays.size(), ray_class,
+               occluded.data(), nullptr);
+}
+
+void PackedTracer::count_closest(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits,
+                                 packed::KernelCounters& counters) const {
+  kernels_.closest(tables_->scene, tables_->caches.of_this_thread(), kernel_rays(rays), rays.size(), ray_class,
+                   kernel_hits(hits), &counters);
+}
+
+void PackedTracer::count_any(std::span<const Ray> rays, uint32_t ray_class, std::span<uint8_t> occluded,
+                             packed::KernelCounters& counters) const {
+  kernels_.any(tables_->scene, tables_->caches.of_this_thread(), kernel_rays(rays), rays.size(), ray_class,
+               occluded.data(), &counters);
+}
+
+HitSurface PackedTracer::resolve(const RayHit& hit) const {
+  const Tables& t = *tables_;
+  HitSurface surface;
+  surface.geometry = geometry_of_cluster(hit.part);
+  surface.triangle = file_.sections().clusters[hit.part].first_triangle + hit.triangle;
+  const uint32_t instance = t.instance_of[hit.placement];
+  surface.placement = &t.surfaces[instance == kNoPlace ? t.first_instance[surface.geometry] : instance];
+  const baked::GeometryRecord& geometry = file_.geometries()[surface.geometry];
+  packed::DecodedBatch batch;
+  decode_batch_exactly(t.packed.trees[t.tree_of[surface.geometry]], geometry,
+                       file_.cluster(surface.geometry, static_cast<uint32_t>(hit.part - geometry.first_cluster)),
+                       hit.triangle, 1, batch);
+  for (int corner = 0; corner < 3; ++corner)
+    for (int axis = 0; axis < 3; ++axis) surface.vertices[corner][axis] = batch.vertex[axis][corner][0];
+  return surface;
+}
+
+std::vector<ResidentPart> PackedTracer::resident() const {
+  const Tables& t = *tables_;
+  return {{"file", file_.file_bytes()},
+          {"nodes", t.packed.nodes.size() * sizeof(baked::PackedNode) + t.packed.trees.size() * sizeof(baked::TreeRecord)},
+          {"cluster table", t.clusters.size() * sizeof(packed::TraceCluster)},
+          {"placements", t.placements.size() * (sizeof(packed::TracePlacement) + sizeof(TreeBox) + sizeof(uint32_t)) +
+                             t.surfaces.size() * sizeof(Placement) + t.top.size() * sizeof(packed::TopNode) +
+                             (t.tree_of.size() + t.first_instance.size()) * sizeof(uint32_t)},
+          {"batch caches", BatchCacheOwner::bytes_of_all_threads()}};
+}
+
+} // namespace packtrace

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <memory>
+
+#include "compress/format/baked_file.h"
+#include "runtime/trace/packed/isa.h"
+#include "runtime/trace/ray_tracer.h"
+
+namespace packtrace {
+
+/// Traces a baked file as it is: triangles are decoded from the clusters' bits when rays reach them, boxes are those of
+/// the file's trees. docs/packed_bvh.md describes how.
+class PackedTracer final : public RayTracer {
+public:
+  /// Keeps references: both must outlive the tracer.
+  /// @param source of the same file: instances, and masks on hits
+  /// Throws Error(kUnsupported) for an instruction set that this machine lacks, Error(kInput) for transforms that are
+  /// not finite.
+  PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa = chosen_isa());
+  ~PackedTracer() override;
+  PackedTracer(const PackedTracer&) = delete;
+  PackedTracer& operator=(const PackedTracer&) = delete;
+
+  std::string_view name() const override { return "packed"; }
+  std::string_view isa() const override { return kernels_.isa; }
+  const UnitSpace& space() const override { return space_; }
+
+  void closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
+                    std::span<RayHit> hits) const override;
+  void any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
+                std::span<uint8_t> occluded) const override;
+  HitSurface resolve(const RayHit& hit) const override;
+  std::vector<ResidentPart> resident() const override;
+
+  /// Instances that no ray hits because their transform flattens them, or nearly so.
+  std::span<const uint32_t> flat_instances() const { return flat_instances_; }
+
+  /// The same queries on the calling thread, adding up what the kernels do. Slower.
+  void count_closest(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits,
+                     packed::KernelCounters& counters) const;
+  void count_any(std::span<const Ray> rays, uint32_t ray_class, std::span<uint8_t> occluded,
+                 packed::KernelCounters& counters) const;
+
+private:
+  struct Tables;
+
+  void place();
+  void add_placement(uint32_t tree, uint32_t instance, const DAffine& unit_from_grid);
+  uint32_t geometry_of_cluster(uint32_t cluster) const;
+
+  const BakedFile& file_;
+  const SceneSource& source_;
+  const packed::Kernels& kernels_;
+  UnitSpace space_;
+  std::vector<uint32_t> flat_instances_;
+  std::unique_ptr<Tables> tables_;
+};
+
+} // namespace packtrace

@@ -1,0 +1,224 @@
+#pragma once
+
+#include <cstdint>
+
+#include "runtime/trace/packed/kernel_types.h"
+
+/// Rays in the coordinates of one tree, with what box and triangle tests need of them.
+namespace packtrace::packed {
+namespace {
+
+/// Rays that are traced together: as many as a word has bits.
+constexpr uint32_t kGroup = 64;
+
+/// Box planes are moved outwards by this times M, the largest coordinate among the ray's origin and the tree. All
+/// roundings in units of u = 2^-24, for a direction whose largest component is in [1, 2):
+///  - A hit triangle's point lies off the ray: a vertex rounds to float (1 M), less the origin (2 M), sheared with a
+///    rounded slope (2 M) in one rounding (4 M); it was an integer that rounded to float (1 M): at most 10 u M.
+///  - A plane's parameter p inv + b: the node's origin to float (1 M), its plane (1 M), inv's rounding (2 M, as b has the
+///    same one), b's product and pad (1 M each), the last rounding (2 M): 8 u M.
+///  - A component below 2^-40 counts as 2^-40: within the reach of 4 M, 2^-38 M.
+/// So 19 u M suffice, and 24 are taken.
+constexpr float kBoxPad = 24.0f * 0x1p-24f;
+constexpr float kSmallestDirection = 0x1p-40f;
+/// Origins farther from the tree's zero than its largest coordinate times this are moved along the ray.
+constexpr double kFar = 4.0;
+
+/// Rays as they come, in unit space.
+struct alignas(64) UnitRays {
+  float origin[3][kGroup], direction[3][kGroup], tnear[kGroup];
+  float tmax[kGroup]; ///< inclusive: of a nearest hit, its t
+};
+
+/// One array per value; those of rays that are not in use are not set.
+struct alignas(64) RayGroup {
+  float bias[3][kGroup][2]; ///< a near plane p is passed at p inverse + the first, a far one at p inverse - the second
+  float limits[kGroup][2];  ///< hits lie above the first and not beyond - the second
+  float inverse[3][kGroup]; ///< of the direction, never infinite
+  float origin[3][kGroup];
+  float shear[3][kGroup]; ///< Woop's S
+  uint32_t axis[3][kGroup]; ///< Woop's k: x, y, z; z is the direction's largest component
+  uint64_t backward[3];     ///< rays along which x, y, z decrease, as bits
+  double t_begin[kGroup];   ///< unit-space t = (t here + t_begin) t_scale
+  double t_scale[kGroup];   ///< a power of two
+
+  void set_tmax(uint32_t i, float t) { limits[i][1] = -t; }
+  float tmax(uint32_t i) const { return -limits[i][1]; }
+};
+
+inline float next_below(float x) { // x > 0
+  uint32_t bits;
+  __builtin_memcpy(&bits, &x, sizeof bits);
+  --bits;
+  __builtin_memcpy(&x, &bits, sizeof x);
+  return x;
+}
+
+constexpr uint32_t kBlock = 8; ///< rays that are set up at once
+
+// The compiler's own vectors, a lane for each ray of a block, so that all instruction sets get the same from one source.
+using Floats = float __attribute__((vector_size(4 * kBlock)));
+using Ints = int32_t __attribute__((vector_size(4 * kBlock)));
+using Doubles = double __attribute__((vector_size(8 * kBlock)));
+using Longs = int64_t __attribute__((vector_size(8 * kBlock)));
+using Bytes = int8_t __attribute__((vector_size(kBlock)));
+
+template <typename Vector, typename Element>
+inline void read_block(Vector& v, const Element* p) {
+  __builtin_memcpy(&v, p, sizeof v);
+}
+template <typename Vector, typename Element>
+inline void write_block(Element* p, const Vector& v) {
+  __builtin_memcpy(p, &v, sizeof v);
+}
+
+template <typename Vector>
+inline void keep_larger(Vector& a, const Vector& b) {
+  a = a > b ? a : b;
+}
+
+/// The lanes whose condition is all ones, as bits.
+template <typename Condition>
+inline uint32_t lane_bits(const Condition& condition) {
+  const Bytes bytes = __builtin_convertvector(condition, Bytes);
+  uint64_t word;
+  __builtin_memcpy(&word, &bytes, sizeof word);
+  return static_cast<uint32_t>(((word & 0x0101010101010101u) * 0x0102040810204080u) >> 56); // byte i adds bit 56 + i
+}
+
+/// A block of rays in a tree's grid, in doubles.
+struct GridBlock {
+  Doubles origin[3], direction[3];
+  Doubles power; ///< t here for one in unit space
+  Doubles begin; ///< that origins were moved by
+};
+
+/// Moves rays into the grid and scales their directions so that the largest component is in [1, 2). Returns the lanes
+/// that have a direction and coordinates of any use.
+inline uint32_t move_block(const TracePlacement& placement, const UnitRays& from, uint32_t first, GridBlock& block,
+                           Doubles& away) {
+  constexpr int64_t kMagnitude = 0x7fffffffffffffff;
+  const double* m = placement.grid_from_unit;
+  Doubles origin[3], direction[3], largest{};
+  away = Doubles{};
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    Floats in_unit;
+    read_block(in_unit, &from.origin[axis][first]);
+    origin[axis] = __builtin_convertvector(in_unit, Doubles);
+    read_block(in_unit, &from.direction[axis][first]);
+    direction[axis] = __builtin_convertvector(in_unit, Doubles);
+  }
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    block.direction[axis] = m[axis] * direction[0] + m[3 + axis] * direction[1] + m[6 + axis] * direction[2];
+    block.origin[axis] = m[axis] * origin[0] + m[3 + axis] * origin[1] + m[6 + axis] * origin[2] + m[9 + axis];
+    keep_larger(largest, reinterpret_cast<Doubles>(reinterpret_cast<Longs>(block.direction[axis]) & kMagnitude));
+    keep_larger(away, reinterpret_cast<Doubles>(reinterpret_cast<Longs>(block.origin[axis]) & kMagnitude));
+  }
+  Longs exponent = reinterpret_cast<Longs>(largest) >> 52;
+  exponent = exponent < 523 ? Longs{} + 523 : exponent;
+  exponent = exponent > 1523 ? Longs{} + 1523 : exponent;
+  block.power = reinterpret_cast<Doubles>(exponent << 52);
+  const Doubles scale = reinterpret_cast<Doubles>((2046 - exponent) << 52);
+  for (Doubles& component : block.direction) component *= scale;
+  block.begin = Doubles{};
+  return lane_bits((largest > 0.0) & (largest < 1e300) & (away < 1e300));
+}
+
+inline double larger(double a, double b) { return a > b ? a : b; }
+
+/// Moves the origin of a ray that starts far from the tree to just before its box, where floats are finer. False where
+/// the ray passes the box by.
+inline bool approach(const TracePlacement& placement, double margin, GridBlock& block, uint32_t lane) {
+  double begin = 0.0, end = 1e300;
+  for (uint32_t i = 0; i < 3; ++i) {
+    const double origin = block.origin[i][lane], direction = block.direction[i][lane];
+    const double lo = placement.box_lo[i] - margin - origin, hi = placement.box_hi[i] + margin - origin;
+    if (direction == 0.0) {
+      if (lo > 0.0 || hi < 0.0) return false;
+      continue;
+    }
+    const double a = lo / direction, b = hi / direction;
+    begin = larger(begin, a < b ? a : b);
+    end = end < (a < b ? b : a) ? end : (a < b ? b : a);
+  }
+  if (begin > end) return false;
+  for (uint32_t i = 0; i < 3; ++i) block.origin[i][lane] += begin * block.direction[i][lane];
+  block.begin[lane] = begin;
+  return true;
+}
+
+inline void write_pairs(float (*out)[2], const Floats& a, const Floats& b) {
+  write_block(&out[0][0], __builtin_shuffle(a, b, Ints{0, 8, 1, 9, 2, 10, 3, 11}));
+  write_block(&out[4][0], __builtin_shuffle(a, b, Ints{4, 12, 5, 13, 6, 14, 7, 15}));
+}
+
+inline Floats magnitude(const Floats& x) { return reinterpret_cast<Floats>(reinterpret_cast<Ints>(x) & 0x7fffffff); }
+
+inline void set_boxes(const GridBlock& block, const UnitRays& from, float max_coordinate, uint32_t first,
+                      RayGroup& group) {
+  Floats origin[3], reach = Floats{} + max_coordinate, tnear, tmax;
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    origin[axis] = __builtin_convertvector(block.origin[axis], Floats);
+    keep_larger(reach, magnitude(origin[axis]));
+    write_block(&group.origin[axis][first], origin[axis]);
+  }
+  read_block(tnear, &from.tnear[first]);
+  read_block(tmax, &from.tmax[first]);
+  const Doubles t_near = __builtin_convertvector(tnear, Doubles) * block.power - block.begin;
+  const Doubles t_max = __builtin_convertvector(tmax, Doubles) * block.power - block.begin;
+  write_pairs(&group.limits[first], __builtin_convertvector(t_near, Floats), -__builtin_convertvector(t_max, Floats));
+  write_block(&group.t_begin[first], block.begin);
+  write_block(&group.t_scale[first], 1.0 / block.power);
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    const Floats d = __builtin_convertvector(block.direction[axis], Floats), size = magnitude(d);
+    const Floats over = 1.0f / (size > kSmallestDirection ? size : Floats{} + kSmallestDirection);
+    const Ints sign = reinterpret_cast<Ints>(d) & static_cast<int32_t>(0x80000000u);
+    const Floats inverse = reinterpret_cast<Floats>(reinterpret_cast<Ints>(over) | sign);
+    const Floats back = origin[axis] * inverse, away = kBoxPad * reach * over;
+    write_block(&group.inverse[axis][first], inverse);
+    write_pairs(&group.bias[axis][first], -back - away, back - away);
+    group.backward[axis] |= uint64_t{lane_bits(inverse < 0.0f)} << first;
+  }
+}
+
+inline void set_shears(const GridBlock& block, uint32_t first, RayGroup& group) {
+  const Floats x = __builtin_convertvector(block.direction[0], Floats),
+               y = __builtin_convertvector(block.direction[1], Floats),
+               z = __builtin_convertvector(block.direction[2], Floats);
+  const Floats ax = magnitude(x), ay = magnitude(y), az = magnitude(z);
+  const Ints by_z = (az >= ax) & (az >= ay), by_y = ~by_z & (ay >= ax);
+  const Floats along = by_z ? z : by_y ? y : x;
+  const Ints zero{};
+  write_block(&group.axis[0][first], by_z ? zero : by_y ? zero + 2 : zero + 1);
+  write_block(&group.axis[1][first], by_z ? zero + 1 : by_y ? zero : zero + 2);
+  write_block(&group.axis[2][first], by_z ? zero + 2 : by_y ? zero + 1 : zero);
+  write_block(&group.shear[0][first], (by_z ? x : by_y ? z : y) / along);
+  write_block(&group.shear[1][first], (by_z ? y : by_y ? x : z) / along);
+  write_block(&group.shear[2][first], 1.0f / along);
+}
+
+/// Moves rays into a tree's grid and sets them up. Returns those that may hit something.
+/// @param rays as bits
+inline uint64_t enter(const TracePlacement& placement, float max_coordinate, const UnitRays& from, uint64_t rays,
+                      RayGroup& group) {
+  uint64_t entered = 0;
+  for (uint64_t& backward : group.backward) backward = 0;
+  for (uint32_t first = 0; first < kGroup; first += kBlock) {
+    const auto wanted = static_cast<uint32_t>(rays >> first) & 0xffu;
+    if (wanted == 0) continue;
+    GridBlock block;
+    Doubles away;
+    uint32_t usable = wanted & move_block(placement, from, first, block, away);
+    for (uint32_t far = usable & lane_bits(away > kFar * double{max_coordinate}); far != 0; far &= far - 1) {
+      const auto lane = static_cast<uint32_t>(__builtin_ctz(far));
+      if (!approach(placement, 0x1p-8 * double{max_coordinate}, block, lane)) usable &= ~(1u << lane);
+    }
+    entered |= uint64_t{usable} << first;
+    set_boxes(block, from, max_coordinate, first, group);
+    set_shears(block, first, group);
+  }
+  return entered;
+}
+
+} // namespace
+} // namespace packtrace::packed

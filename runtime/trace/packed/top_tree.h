@@ -1,0 +1,15 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "compress/bvh/box_tree.h"
+#include "runtime/trace/packed/kernel_types.h"
+
+namespace packtrace {
+
+/// Eight-wide nodes over boxes, root first; children are kTopLeaf + number of the box.
+/// @param boxes 1 .. 2^31 - 1
+std::vector<packed::TopNode> build_top_tree(std::span<const TreeBox> boxes);
+
+} // namespace packtrace

@@ -1,0 +1,322 @@
+#pragma once
+
+#include "runtime/trace/packed/batch_decode.h"
+#include "runtime/trace/packed/group_boxes.h"
+#include "runtime/trace/packed/triangle_test.h"
+
+/// Groups of rays through trees of nodes. They come to a node together, as one word of bits, and leave for each child
+/// those that pass its box: a node is read and set up once for all of them, and nothing waits for the outcome of one
+/// ray's test. Idea: Barringer, Akenine-Moeller, "Dynamic ray stream traversal" (2014).
+namespace packtrace::packed {
+namespace {
+
+/// PackedNode::children as one number.
+struct NodeChildren {
+  uint64_t bytes;
+
+  explicit NodeChildren(const baked::PackedNode& node) {
+    __builtin_memcpy(&bytes, reinterpret_cast<const uint8_t*>(&node) + offsetof(baked::PackedNode, children),
+                     sizeof bytes);
+  }
+  bool leaves() const { return (bytes & 0xffu) != baked::kInnerChild; }
+  /// Slots in use, which come first.
+  uint32_t slots() const { return bytes == 0 ? 0u : 0xffu >> (static_cast<uint32_t>(__builtin_clzll(bytes)) / 8); }
+  /// Byte i: triangles in the leaves of slots below i; at most 128.
+  uint64_t leaf_begins() const { return bytes * 0x0101010101010100u; }
+};
+
+inline uint32_t byte_of(uint64_t word, uint32_t slot) { return static_cast<uint32_t>(word >> (8 * slot)) & 0xffu; }
+
+inline uint32_t first_bit(uint64_t word) { return static_cast<uint32_t>(__builtin_ctzll(word)); }
+
+struct Pending {
+  uint64_t rays; ///< as bits
+  uint32_t node;
+  float t; ///< where the first of them enters; only for order
+};
+
+/// Any hits (kAny) or nearest hits of one ray class in one scene, on one thread.
+template <typename Lanes, bool kAny, bool kCount>
+class Traversal {
+public:
+  /// @param occluded or hits, one for each ray
+  Traversal(const KernelScene& scene, BatchCache& cache, const KernelRay* rays, uint32_t ray_class, uint8_t* occluded,
+            KernelHit* hits, KernelCounters* counters)
+      : scene_(scene), cache_(cache), rays_(rays), ray_class_(ray_class), occluded_(occluded), hits_(hits),
+        counters_(counters) {}
+
+  /// Traces them all, by octant in groups of neighbours.
+  void run(size_t count) {
+    uint32_t numbers[8][kGroup], sizes[8] = {};
+    for (size_t i = 0; i < count; ++i) {
+      const auto number = static_cast<uint32_t>(i);
+      if constexpr (kCount) ++counters_->rays;
+      if constexpr (kAny)
+        occluded_[i] = 0;
+      else
+        hits_[i] = {__builtin_inff(), 0.0f, 0.0f, ~0u, 0, 0};
+      if (!(rays_[i].tfar > rays_[i].tnear)) continue;
+      const uint32_t octant = octant_of(rays_[i].direction);
+      numbers[octant][sizes[octant]++] = number;
+      if (sizes[octant] == kGroup) {
+        trace_group(numbers[octant], kGroup);
+        sizes[octant] = 0;
+      }
+    }
+    for (uint32_t octant = 0; octant < 8; ++octant)
+      if (sizes[octant] > 0) trace_group(numbers[octant], sizes[octant]);
+  }
+
+private:
+  static uint32_t octant_of(const float (&v)[3]) {
+    return (__builtin_signbit(v[0]) ? 1u : 0u) | (__builtin_signbit(v[1]) ? 2u : 0u) |
+           (__builtin_signbit(v[2]) ? 4u : 0u);
+  }
+
+  void trace_group(const uint32_t* numbers, uint32_t count) {
+    numbers_ = numbers;
+    alive_ = ~uint64_t{0} >> (kGroup - count);
+    for (uint32_t i = 0; i < ((count + kBlock - 1) & ~(kBlock - 1)); ++i) { // whole blocks
+      const KernelRay& ray = rays_[numbers[i < count ? i : 0]];
+      for (uint32_t axis = 0; axis < 3; ++axis)
+        unit_.origin[axis][i] = ray.origin[axis], unit_.direction[axis][i] = ray.direction[axis];
+      unit_.tnear[i] = ray.tnear;
+      unit_.tmax[i] = next_below(ray.tfar);
+    }
+    if (scene_.top_nodes != nullptr)
+      trace_top();
+    else if (scene_.placement_count > 0)
+      trace_placement(0, alive_);
+  }
+
+  /// Calls visit(rays, octant) for the rays of each octant.
+  template <typename Visit>
+  static void by_octant(const RayGroup& group, uint64_t rays, Visit visit) {
+    while (rays != 0) {
+      const uint32_t first = first_bit(rays);
+      uint64_t together = rays;
+      uint32_t octant = 0;
+      for (uint32_t axis = 0; axis < 3; ++axis) {
+        const uint64_t backward = (group.backward[axis] >> first) & 1u;
+        together &= group.backward[axis] ^ (backward - 1); // those whose bit is the same
+        octant |= static_cast<uint32_t>(backward) << axis;
+      }
+      visit(together, octant);
+      rays &= ~together;
+    }
+  }
+
+  /// Through the tree over placements.
+  void trace_top() {
+    RayGroup group;
+    const uint64_t rays = enter(scene_.top, scene_.top_max_coordinate, unit_, alive_, group);
+    by_octant(group, rays, [&](uint64_t together, uint32_t octant) { trace_top(group, together, octant); });
+  }
+
+  void trace_top(RayGroup& group, uint64_t rays, uint32_t octant) {
+    Pending stack[kMaxTopDepth * (baked::kNodeWidth - 1) + 1];
+    uint32_t size = 0;
+    stack[size++] = {rays, 0, 0.0f};
+    while (size > 0) {
+      const Pending next = stack[--size];
+      const uint64_t active = next.rays & alive_;
+      if (active == 0) continue;
+      if ((next.node & kTopLeaf) != 0) {
+        trace_placement(next.node & ~kTopLeaf, active);
+        if constexpr (!kAny)
+          for (uint64_t m = active; m != 0; m &= m - 1) {
+            const uint32_t i = first_bit(m);
+            group.set_tmax(i, static_cast<float>(double{unit_.tmax[i]} / group.t_scale[i] - group.t_begin[i]));
+          }
+        continue;
+      }
+      const TopNode& node = scene_.top_nodes[next.node];
+      push_children(typename Lanes::Boxes(node, octant), group, active, node.slots, stack, size,
+                    [&](uint32_t slot) { return node.child[slot]; });
+    }
+  }
+
+  void trace_placement(uint32_t placement, uint64_t rays) {
+    const TracePlacement& place = scene_.placements[placement];
+    if ((place.ray_classes & ray_class_) == 0) return;
+    if constexpr (kCount) counters_->placements += count_ones(rays);
+    const TraceTree& tree = scene_.trees[place.tree];
+    RayGroup group;
+    rays = enter(place, tree.max_coordinate, unit_, rays, group);
+    by_octant(group, rays, [&](uint64_t together, uint32_t octant) {
+      trace_tree(placement, tree.nodes, group, together, octant);
+    });
+  }
+
+  /// Through one placed tree, rays of one octant of it.
+  void trace_tree(uint32_t placement, const baked::PackedNode* nodes, RayGroup& group, uint64_t rays,
+                  uint32_t octant) {
+    Pending stack[baked::kMaxTreeDepth * (baked::kNodeWidth - 1) + 1];
+    uint32_t size = 0;
+    stack[size++] = {rays, 0, 0.0f};
+    while (size > 0) {
+      const Pending next = stack[--size];
+      const uint64_t active = next.rays & alive_;
+      if (active == 0) continue;
+      const baked::PackedNode& node = nodes[next.node];
+      if constexpr (kCount) ++counters_->nodes, counters_->node_rays += count_ones(active);
+      if ((node.ray_classes & ray_class_) == 0) continue;
+      const NodeChildren children(node);
+      const typename Lanes::Boxes boxes(node, octant);
+      if (children.leaves())
+        trace_leaves(placement, node, children, boxes, group, active);
+      else
+        push_children(boxes, group, active, children.slots(), stack, size, [&](uint32_t slot) {
+          __builtin_prefetch(nodes + node.first_child + slot);
+          return node.first_child + slot;
+        });
+    }
+  }
+
+  static typename Lanes::Children pass_boxes(const typename Lanes::Boxes& boxes, const RayGroup& group, uint64_t rays) {
+    typename Lanes::Children children;
+    for (; rays != 0; rays &= rays - 1) children.add(boxes, group, first_bit(rays));
+    return children;
+  }
+
+  /// Pushes the children of a node that rays pass; of nearest hits, the one that the first ray enters first on top.
+  template <typename Number>
+  static void push_children(const typename Lanes::Boxes& boxes, const RayGroup& group, uint64_t rays, uint32_t slots,
+                            Pending* stack, uint32_t& size, Number number) {
+    uint64_t by_child[baked::kNodeWidth];
+    slots &= pass_boxes(boxes, group, rays).read(by_child);
+    float t[baked::kNodeWidth] = {};
+    if constexpr (!kAny) Lanes::Children::enter(boxes, group, first_bit(rays), t);
+    const uint32_t begin = size;
+    for (; slots != 0; slots &= slots - 1) {
+      const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
+      uint32_t at = size++;
+      if constexpr (!kAny)
+        for (; at > begin && stack[at - 1].t < t[slot]; --at) stack[at] = stack[at - 1];
+      stack[at] = {by_child[slot], number(slot), t[slot]};
+    }
+  }
+
+  void trace_leaves(uint32_t placement, const baked::PackedNode& node, NodeChildren children,
+                    const typename Lanes::Boxes& boxes, RayGroup& group, uint64_t rays) {
+    if ((scene_.clusters[node.cluster].flags & ray_class_) == 0) return;
+    uint64_t by_child[baked::kNodeWidth];
+    uint32_t slots = children.slots() & pass_boxes(boxes, group, rays).read(by_child);
+    const uint64_t begins = children.leaf_begins();
+    for (; slots != 0; slots &= slots - 1) {
+      const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
+      if (const uint64_t active = by_child[slot] & alive_; active != 0)
+        trace_leaf(placement, node.cluster, node.first_triangle + byte_of(begins, slot), byte_of(children.bytes, slot),
+                   group, active);
+    }
+  }
+
+  void trace_leaf(uint32_t placement, uint32_t cluster, uint32_t first, uint32_t count, RayGroup& group, uint64_t rays) {
+    if constexpr (kCount) ++counters_->leaves, counters_->leaf_rays += count_ones(rays);
+    while (count > 0) {
+      const DecodedBatch& batch = decoded(cluster, first, count);
+      if constexpr (kCount) counters_->triangles += count_ones(rays) * batch.count;
+      for (uint64_t m = rays; m != 0; m &= m - 1) {
+        const uint32_t i = first_bit(m);
+        BatchHits hits;
+        uint64_t exact = 0;
+        const uint32_t lanes = test_triangles<Lanes>(batch, group, i, hits, exact);
+        if constexpr (kCount) counters_->exact_triangles += exact;
+        if (lanes != 0) take_hits({placement, cluster, first}, i, hits, lanes, group);
+      }
+      rays &= alive_;
+      first += batch.count;
+      count -= batch.count;
+    }
+  }
+
+  const DecodedBatch& decoded(uint32_t cluster, uint32_t first, uint32_t count) {
+    const uint64_t tag = (uint64_t{cluster} << 8 | first) + 1;
+    const auto hash = static_cast<uint32_t>(tag) * 0x9e3779b1u;
+    DecodedBatch& batch = cache_.entries[hash >> cache_.hash_shift];
+    if (batch.tag != tag) {
+      if constexpr (kCount) ++counters_->batches_decoded;
+      const TraceCluster& packed = scene_.clusters[cluster];
+      batch.tag = tag;
+      batch.count = (packed.flags & kWide) == 0 ? Lanes::decode(packed, first, count, batch)
+                                                : scene_.decode_wide(scene_.owner, cluster, first, count, batch);
+    }
+    return batch;
+  }
+
+  struct Place {
+    uint32_t placement, cluster, triangle;
+  };
+
+  /// Of ray i, in these lanes of a batch that begins at `place`.
+  void take_hits(Place place, uint32_t i, const BatchHits& hits, uint32_t lanes, RayGroup& group) {
+    const bool masked = (scene_.clusters[place.cluster].flags & kMasked) != 0;
+    const uint32_t begin = place.triangle;
+    for (; lanes != 0; lanes &= lanes - 1) {
+      const auto lane = static_cast<uint32_t>(__builtin_ctz(lanes));
+      place.triangle = begin + lane;
+      const float t = hits.t[lane];
+      if constexpr (!kAny)
+        if (t > group.tmax(i) || (t == group.tmax(i) && !precedes(place, hits_[numbers_[i]]))) continue;
+      if (masked && !scene_.present(scene_.owner, place.placement, place.cluster, place.triangle, hits.u[lane],
+                                    hits.v[lane], ray_class_))
+        continue;
+      if constexpr (kAny) {
+        occluded_[numbers_[i]] = 1;
+        alive_ &= ~(uint64_t{1} << i);
+        return;
+      }
+      group.set_tmax(i, t);
+      unit_.tmax[i] = static_cast<float>((double{t} + group.t_begin[i]) * group.t_scale[i]);
+      hits_[numbers_[i]] = {unit_.tmax[i], hits.u[lane], hits.v[lane], place.placement, place.cluster, place.triangle};
+    }
+  }
+
+  /// Of two hits at one place the one with the smaller numbers counts.
+  static bool precedes(const Place& place, const KernelHit& hit) {
+    if (hit.placement != place.placement) return place.placement < hit.placement; // as all are than no hit's
+    if (hit.cluster != place.cluster) return place.cluster < hit.cluster;
+    return place.triangle < hit.triangle;
+  }
+
+  const KernelScene& scene_;
+  BatchCache& cache_;
+  const KernelRay* const rays_;
+  const uint32_t ray_class_;
+  uint8_t* const occluded_;
+  KernelHit* const hits_;
+  KernelCounters* const counters_;
+  // Of the group that is being traced:
+  const uint32_t* numbers_ = nullptr; ///< of its rays
+  uint64_t alive_ = 0;                ///< rays that still look for a hit
+  UnitRays unit_;
+};
+
+template <typename Lanes, bool kAny>
+void trace(const KernelScene& scene, BatchCache& cache, const KernelRay* rays, size_t count, uint32_t ray_class,
+           uint8_t* occluded, KernelHit* hits, KernelCounters* counters) {
+  if (counters != nullptr)
+    Traversal<Lanes, kAny, true>(scene, cache, rays, ray_class, occluded, hits, counters).run(count);
+  else
+    Traversal<Lanes, kAny, false>(scene, cache, rays, ray_class, occluded, hits, counters).run(count);
+}
+
+/// The functions of one instruction set.
+template <typename Lanes>
+constexpr Kernels kernels_of(const char* isa) {
+  return {isa,
+          [](const KernelScene& scene, BatchCache& cache, const KernelRay* rays, size_t count, uint32_t ray_class,
+             KernelHit* hits, KernelCounters* counters) {
+            trace<Lanes, false>(scene, cache, rays, count, ray_class, nullptr, hits, counters);
+          },
+          [](const KernelScene& scene, BatchCache& cache, const KernelRay* rays, size_t count, uint32_t ray_class,
+             uint8_t* occluded, KernelCounters* counters) {
+            trace<Lanes, true>(scene, cache, rays, count, ray_class, occluded, nullptr, counters);
+          },
+          [](const TraceCluster& cluster, uint32_t first, uint32_t count, DecodedBatch& out) {
+            return out.count = Lanes::decode(cluster, first, count, out);
+          }};
+}
+
+} // namespace
+} // namespace packtrace::packed
