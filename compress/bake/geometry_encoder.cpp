@@ -5,6 +5,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "compress/bake/node_groups.h"
 #include "compress/bake/weld_table.h"
 #include "compress/format/bit_stream.h"
 #include "pbrt_import/scene/error.h"
@@ -69,10 +70,11 @@ private:
     const TriangleKind& kind = geometry_.kinds[cluster.kind];
     VertexNumbers numbers;
     std::vector<Triangle> local_triangles;
-    for (const Triangle& t : std::span(all_.triangles).subspan(cluster.first_triangle, cluster.triangle_count))
+    groups_.find(geometry_, std::span(all_.triangles).subspan(cluster.first_triangle, cluster.triangle_count));
+    for (const Triangle& t : groups_.triangles())
       local_triangles.emplace_back(numbers(t.x), numbers(t.y), numbers(t.z));
     const std::span<const uint32_t> used = numbers.values();
-    const Strips strips = find_strips(local_triangles, static_cast<uint32_t>(used.size()));
+    const Strips strips = find_strips(local_triangles, static_cast<uint32_t>(used.size()), groups_.ends());
 
     std::vector<LatticePoint> positions;
     std::vector<uint32_t> codes;
@@ -133,6 +135,7 @@ private:
   std::vector<uint32_t> expected_vertices_; // of all clusters, in order
   std::vector<Triangle> expected_triangles_;
   size_t first_vertex_ = 0, first_triangle_ = 0;
+  NodeGroups groups_;
   BitWriter writer_;
   EncodedChunk out_;
 };

@@ -49,7 +49,10 @@ class BitWriter;
 
 /// Finds strips through triangles whose indices are below vertex_count. 1..128 triangles; at most 256 vertices in use.
 /// Triangles keep their winding but may start at another of their corners.
-Strips find_strips(std::span<const Triangle> triangles, uint32_t vertex_count);
+/// @param group_ends where groups of triangles end, ascending, the last one at the end of all; none: all are one group.
+///   A group's triangles stay together; the order of groups is free, and strips may go on from one to the next.
+Strips find_strips(std::span<const Triangle> triangles, uint32_t vertex_count,
+                   std::span<const uint32_t> group_ends = {});
 
 void write_strips(const Strips& strips, BitWriter& writer);
 

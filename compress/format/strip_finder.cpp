@@ -51,13 +51,16 @@ private:
   std::array<uint16_t, kTableSize> table_;
 };
 
-/// Walks strips greedily, always towards the triangle with the fewest ways out, so that few are left stranded.
+/// Walks strips greedily, always towards the triangle with the fewest ways out, so that few are left stranded. It
+/// leaves a group only once all of it is visited.
 class StripWalk {
 public:
-  StripWalk(std::span<const Triangle> triangles, uint32_t vertex_count)
+  StripWalk(std::span<const Triangle> triangles, uint32_t vertex_count, std::span<const uint32_t> group_ends)
       : triangles_(triangles), partners_(triangles), number_(vertex_count, ~0u) {
+    for (uint32_t group = 0, t = 0; group < group_ends.size(); ++group)
+      for (; t < group_ends[group]; ++t) group_of_[t] = static_cast<uint8_t>(group), ++left_in_group_[group];
     for (uint32_t t = 0; t < triangles.size(); ++t)
-      for (uint32_t e = 0; e < 3; ++e) exits_[t] += partners_[3 * t + e] != kNone;
+      for (uint32_t e = 0; e < 3; ++e) exits_[t] += is_exit(t, partners_[3 * t + e]);
   }
 
   Strips run() {
@@ -68,24 +71,32 @@ public:
   }
 
 private:
+  /// Whether a triangle that is not visited may come next.
+  bool may_come(uint32_t triangle) const { return left_in_group_[group_] == 0 || group_of_[triangle] == group_; }
+
   uint32_t pick_start() const {
     uint32_t best = ~0u;
     for (uint32_t t = 0; t < triangles_.size(); ++t)
-      if (!visited_[t] && (best == ~0u || exits_[t] < exits_[best])) best = t;
+      if (!visited_[t] && may_come(t) && (best == ~0u || exits_[t] < exits_[best])) best = t;
     return best;
   }
 
-  /// The unvisited triangle across an edge, as its edge number, or kNone.
+  /// Whether the triangle behind an edge is of the same group as `from`.
+  bool is_exit(uint32_t from, uint16_t edge) const { return edge != kNone && group_of_[edge / 3u] == group_of_[from]; }
+
+  /// The unvisited triangle that may come next across an edge, as its edge number, or kNone.
   uint16_t across(uint32_t edge) const {
     const uint16_t partner = partners_[edge];
-    return partner != kNone && !visited_[partner / 3u] ? partner : kNone;
+    return partner != kNone && !visited_[partner / 3u] && may_come(partner / 3u) ? partner : kNone;
   }
 
   void visit(uint32_t triangle, bool restart, bool left) {
     visited_[triangle] = true;
     for (uint32_t e = 0; e < 3; ++e)
-      if (const uint16_t partner = partners_[3 * triangle + e]; partner != kNone) --exits_[partner / 3u];
+      if (const uint16_t partner = partners_[3 * triangle + e]; is_exit(triangle, partner)) --exits_[partner / 3u];
     strips_.triangle_order.push_back(triangle);
+    group_ = group_of_[triangle];
+    --left_in_group_[group_];
     strips_.restart.push_back(restart);
     strips_.left.push_back(left);
     restart_count_ += restart;
@@ -130,15 +141,20 @@ private:
   std::vector<uint32_t> number_;                      // old vertex -> new, ~0 while unused
   std::array<uint8_t, kMaxClusterTriangles> exits_{}; // unvisited neighbours
   std::array<bool, kMaxClusterTriangles> visited_{};
+  std::array<uint8_t, kMaxClusterTriangles> group_of_{};
+  std::array<uint8_t, kMaxClusterTriangles> left_in_group_{}; // triangles that are not visited
+  uint32_t group_ = 0;                                        // of the last triangle; at first the first one
   uint32_t restart_count_ = 0;
   Strips strips_;
 };
 
 } // namespace
 
-Strips find_strips(std::span<const Triangle> triangles, uint32_t vertex_count) {
+Strips find_strips(std::span<const Triangle> triangles, uint32_t vertex_count, std::span<const uint32_t> group_ends) {
   assert(!triangles.empty() && triangles.size() <= kMaxClusterTriangles);
-  return StripWalk(triangles, vertex_count).run();
+  const auto all = static_cast<uint32_t>(triangles.size());
+  assert(group_ends.empty() || group_ends.back() == all);
+  return StripWalk(triangles, vertex_count, group_ends.empty() ? std::span(&all, 1) : group_ends).run();
 }
 
 } // namespace packtrace

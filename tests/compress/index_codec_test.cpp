@@ -56,6 +56,23 @@ TEST(IndexCodec, GridsRoundTripAndCostLittle) {
   EXPECT_LT(e.strips.layout.total_bits(), 128 * 8u); // one byte a triangle; u8 x 3 takes three
 }
 
+TEST(IndexCodec, GroupsStayTogether) {
+  const Mesh grid = test::grid_mesh(8);
+  const std::vector<uint32_t> ends = {30, 31, 64, 100, 128};
+  const Strips strips = find_strips(grid.triangles, 81, ends);
+  const auto group_of = [&](uint32_t triangle) {
+    return std::upper_bound(ends.begin(), ends.end(), triangle) - ends.begin();
+  };
+  uint32_t changes = 0;
+  for (size_t i = 1; i < 128; ++i)
+    changes += group_of(strips.triangle_order[i]) != group_of(strips.triangle_order[i - 1]);
+  EXPECT_EQ(changes, 4u);
+  std::vector<uint32_t> order = strips.triangle_order;
+  std::sort(order.begin(), order.end());
+  for (uint32_t i = 0; i < 128; ++i) ASSERT_EQ(order[i], i);
+  EXPECT_LE(strips.layout.restart_count, find_strips(grid.triangles, 81).layout.restart_count + 8u);
+}
+
 TEST(IndexCodec, DegenerateAndRepeatedTrianglesRoundTrip) {
   const std::vector<Triangle> triangles = {{0, 0, 0}, {0, 1, 1}, {0, 1, 2}, {0, 1, 2}, {2, 1, 0}, {1, 2, 2}, {2, 0, 1}};
   expect_round_trip(triangles, 3);

@@ -23,7 +23,7 @@ const std::vector<Layer> kLayers = {
     {"pbrt_import/", {"pbrt_import/scene/"}},
     {"compress/bvh/", {"pbrt_import/scene/"}},
     {"compress/format/", {"compress/bvh/", "pbrt_import/scene/"}},
-    {"compress/bake/", {"compress/format/", "pbrt_import/scene/"}},
+    {"compress/bake/", {"compress/bvh/", "compress/format/", "pbrt_import/scene/"}},
     {"compress/exchange/", {"compress/format/", "pbrt_import/scene/"}},
     {"runtime/lod/", {"compress/format/", "pbrt_import/scene/"}},
     {"runtime/commands/",
