@@ -202,88 +202,33 @@ void LodSharing::fill_histogram(uint32_t geometry, LevelHistogram& histogram) co
   }
 }
 
-namespace {
-
-/// Who builds what of one geometry.
-struct Balance {
-  std::vector<uint32_t> users;   ///< by step
-  std::vector<uint32_t> instead; ///< by step: the one its users take
-  uint64_t traced = 0;           ///< triangles over all instances
-  size_t builds = 0;             ///< of steps
-};
-
-/// Leaves out the step that costs least to do without, again and again, as long as no more than `limit` is traced.
-void leave_out_steps(std::span<const LodStep> steps, double limit, Balance& balance) {
-  std::vector<uint32_t>& users = balance.users;
-  balance.instead.resize(steps.size());
-  std::iota(balance.instead.begin(), balance.instead.end(), 0u);
-  const auto built = static_cast<uint32_t>(steps.size()) - 1; // the last one is always there
-  balance.builds = static_cast<size_t>(std::count_if(users.begin(), users.end() - 1, [](uint32_t u) { return u > 0; }));
-  for (;;) {
-    uint64_t least = ~uint64_t{0};
-    uint32_t finer = kNone, left_out = kNone, taken = kNone;
-    for (uint32_t step = 0; step < built; ++step) {
-      if (users[step] == 0) continue;
-      if (finer != kNone) {
-        const uint64_t cost = users[step] * (steps[finer].triangles - steps[step].triangles);
-        if (cost < least) least = cost, left_out = step, taken = finer;
-      }
-      finer = step;
-    }
-    if (left_out == kNone || static_cast<double>(balance.traced + least) > limit) break;
-    users[taken] += users[left_out];
-    users[left_out] = 0;
-    balance.instead[left_out] = taken;
-    balance.traced += least;
-    --balance.builds;
-  }
-  for (uint32_t step = 0; step < built; ++step) balance.instead[step] = balance.instead[balance.instead[step]];
-}
-
-} // namespace
-
-/// Fewest builds within SharingConfig::traced_ratio: some instances, those first that save most by it, get own cuts,
-/// such that more steps can be left out.
+/// Few builds within SharingConfig::traced_ratio.
 void LodSharing::balance(uint32_t geometry) {
-  constexpr size_t kTries = 16; // numbers of own cuts tried beyond those that the limit asks for
   const std::span<const LodStep> steps = steps_[geometry];
   Part& part = parts_[geometry];
   part.savings.clear();
-  Balance base{part.users, {}, 0, 0};
-  uint64_t own = 0;
+  uint64_t own = 0, traced = 0;
   for (uint32_t slot = first_slot_[geometry]; slot < first_slot_[geometry + 1]; ++slot) {
     const Choice& choice = choices_[slot];
     const uint64_t shared = steps[choice.step].triangles;
     own += choice.own_triangles;
-    base.traced += choice.category == InstanceCategory::kOwn ? choice.own_triangles : shared;
+    traced += choice.category == InstanceCategory::kOwn ? choice.own_triangles : shared;
     if (choice.category != InstanceCategory::kOwn && shared > choice.own_triangles)
-      part.savings.push_back({shared - choice.own_triangles, slot});
+      part.savings.push_back({shared - choice.own_triangles, choice.step, slot});
   }
-  std::sort(part.savings.begin(), part.savings.end(), [](const Saving& a, const Saving& b) {
+  std::sort(part.savings.begin(), part.savings.end(), [](const OwnCutSaving& a, const OwnCutSaving& b) {
     return a.triangles != b.triangles ? a.triangles > b.triangles : a.slot < b.slot;
   });
   const double limit = config_.traced_ratio * static_cast<double>(own);
-  Balance best;
-  size_t best_own = ~size_t{0}, last_try = part.savings.size();
-  for (size_t i = 0;; ++i) { // own cuts for the first i
-    if (static_cast<double>(base.traced) <= limit || i == part.savings.size()) {
-      if (best_own == ~size_t{0}) last_try = std::min(last_try, i + kTries);
-      Balance tried = base;
-      leave_out_steps(steps, limit, tried);
-      if (best_own == ~size_t{0} || i + tried.builds < best_own + best.builds) best = std::move(tried), best_own = i;
-    }
-    if (i >= last_try || (best_own != ~size_t{0} && i + 1 >= best_own + best.builds)) break;
-    base.traced -= part.savings[i].triangles;
-    --base.users[choices_[part.savings[i].slot].step];
-  }
-  for (size_t i = 0; i < best_own; ++i) {
+  SharingBalance balance = balance_builds(steps, part.users, traced, limit, part.savings);
+  for (size_t i = 0; i < balance.own_cuts; ++i) {
     choices_[part.savings[i].slot].category = InstanceCategory::kOwn;
     part.own.push_back(part.savings[i].slot);
   }
   std::sort(part.own.begin(), part.own.end());
-  part.users = std::move(best.users);
+  part.users = std::move(balance.users);
   for (uint32_t slot = first_slot_[geometry]; slot < first_slot_[geometry + 1]; ++slot)
-    choices_[slot].step = best.instead[choices_[slot].step];
+    choices_[slot].step = balance.instead[choices_[slot].step];
 }
 
 void LodSharing::add_steps(uint32_t geometry) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "runtime/lod/lod_cut.h"
+#include "runtime/lod/sharing_balance.h"
 #include "runtime/lod/sharing_config.h"
 
 namespace packtrace {
@@ -120,17 +121,13 @@ private:
   struct Block {
     uint32_t geometry, first, last; ///< slots
   };
-  struct Saving {
-    uint64_t triangles;
-    uint32_t slot;
-  };
   /// What one geometry adds to the plan.
   struct Part {
     std::vector<PlannedBlas> blas;
     std::vector<uint64_t> passed;
     std::vector<uint32_t> users; ///< by step
     std::vector<uint32_t> own;   ///< slots
-    std::vector<Saving> savings; ///< by own cuts, largest first
+    std::vector<OwnCutSaving> savings;
   };
   struct Frame {
     DetailView view;

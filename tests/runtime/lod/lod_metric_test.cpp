@@ -104,22 +104,30 @@ TEST(LodMetric, PassesNeverWithoutWhatIsBelow) {
   size_t upper_passes = 0, close = 0;
   for (int i = 0; i < 20000; ++i) {
     test::LodRecords records;
-    const DVec3 low(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1));
-    const float radius = random.uniform(0.0f, 0.2f), error = random.uniform(0.001f, 0.002f);
+    // Every other geometry is tiny and far from its origin, so that roundings are large for its size.
+    const bool tiny = i % 2 != 0;
+    const float size = tiny ? 1e-7f : 1.0f;
+    const DVec3 low = tiny ? DVec3(3000.0f, size * random.uniform(-1, 1), 0.0) : random_direction(random);
+    const DVec3 off = (tiny ? DVec3(0, 1, 0) : random_direction(random)) * double(size * random.uniform(0, 1));
+    const float radius = size * random.uniform(0.0f, 0.2f), error = random.uniform(0.001f, 0.002f);
     baked::LodGroupRecord below{{float(low.x), float(low.y), float(low.z)}, radius, error, 0}, above = below;
     above.level = 1;
-    const DVec3 off = random_direction(random) * double(random.uniform(0, 1));
     above.center = {float(low.x + off.x), float(low.y + off.y), float(low.z + off.z)}; // the radius is made to fit
     records.groups = {below, above};
     records.links = {{0, baked::kNoLodGroup}, {1, 0}};
     records.cluster_triangles = {128, 64};
     const LodGeometry geometry = records.geometry();
-    const DAffine m = test::random_affine(random, i % 3 == 0 ? 1e6 : 10.0);
+    DAffine m = test::random_affine(random, i % 3 == 0 ? 1e6 : 10.0);
+    if (tiny) { // rotated and scaled only, so that the bound by the largest stretch is sharp
+      m[0] = glm::normalize(m[0]);
+      m[1] = glm::normalize(m[1] - glm::dot(m[0], m[1]) * m[0]);
+      m[2] = glm::cross(m[0], m[1]);
+    }
     const double s = largest_stretch(m);
     // The eye on the line through both centres, on the side where the balls touch: distances are equal but for
     // roundings.
     const DVec3 touching = transform_point(m, low - off * (5.0 * random.uniform(0, 1)));
-    DetailView view = make_detail_view(touching, 1e-9, 1.0, 1000.0, 1.0);
+    DetailView view = make_detail_view(touching, 1e-30, 1.0, 1000.0, 1.0);
     const InstanceMetric probe(view, m, s, geometry.reach());
     const uint32_t upper = geometry.rank_of_group(1), lower = geometry.rank_of_group(0);
     const LodRanks& r = geometry.ranks();
