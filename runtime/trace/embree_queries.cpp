@@ -13,20 +13,7 @@ namespace {
 constexpr size_t kPacket = RayPacket16::kRays;
 constexpr size_t kStream = 1024; ///< rays a stream call, as many as a tile has
 
-void occluded_packets(RTCScene scene, std::span<const Ray> rays, uint32_t ray_class, std::span<uint8_t> occluded) {
-  EmbreeQuery context(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
-  RayPacket16 packet;
-  RTCRay16 lanes;
-  set_constants(ray_class, lanes);
-  for (size_t first = 0; first < rays.size(); first += kPacket) {
-    const size_t count = std::min(kPacket, rays.size() - first);
-    packet.load(rays.subspan(first, count), lanes);
-    rtcOccluded16(packet.valid, scene, &context, &lanes);
-    // Embree sets tfar to -inf; the rays that were not traced have any value there.
-    for (size_t i = 0; i < count; ++i) occluded[first + i] = packet.valid[i] != 0 && lanes.tfar[i] < 0.0f;
-  }
-}
-
+/// Of coherent rays, too: Debian's Embree 3.13.5 was seen not to return from rtcOccluded16 with the coherent flag.
 void occluded_streams(RTCScene scene, std::span<const Ray> rays, uint32_t ray_class, std::span<uint8_t> occluded) {
   EmbreeQuery context(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
   alignas(64) RTCRay stream[kStream];
@@ -93,12 +80,11 @@ void EmbreeTracer::closest_hits(std::span<const Ray> rays, uint32_t ray_class, R
   order == RayOrder::kCoherent ? closest_packets(rays, ray_class, hits) : closest_streams(rays, ray_class, hits);
 }
 
-void EmbreeTracer::any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
+void EmbreeTracer::any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder,
                             std::span<uint8_t> occluded) const {
   assert(occluded.size() == rays.size());
   const FlushDenormals flush;
-  order == RayOrder::kCoherent ? occluded_packets(handle(), rays, ray_class, occluded)
-                               : occluded_streams(handle(), rays, ray_class, occluded);
+  occluded_streams(handle(), rays, ray_class, occluded);
 }
 
 } // namespace packtrace

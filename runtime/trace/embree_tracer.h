@@ -25,8 +25,8 @@ struct EmbreeConfig {
 
 /// Traces one SceneSource with Embree 3: float triangles decoded once, and Embree's trees over them.
 ///
-/// Coherent rays go as packets of 16 with Embree's coherent flag, all others as streams with the incoherent one: on
-/// each kind of ray the other flag costs a factor of two to four (docs/tracing.md).
+/// Coherent closest hits go as packets of 16 with Embree's coherent flag, all else as streams with the incoherent one:
+/// on each kind of ray the other flag costs a factor of two to four (docs/tracing.md).
 ///
 /// Rays live in a unit space (space()), a power-of-two scale and a translation away from the world, so that scenes of
 /// any scale between 1e-30 and 1e30 work. Geometries that are placed once and untransformed share it; all others have

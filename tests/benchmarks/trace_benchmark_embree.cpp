@@ -64,7 +64,7 @@ void closest_packets(const Query& q, std::span<RayHit> hits) {
 }
 
 void any_packets(const Query& q, std::span<uint8_t> occluded) {
-  EmbreeQuery context(q.flag());
+  EmbreeQuery context(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT); // see embree_queries.cpp
   RayPacket16 packet;
   RTCRay16 lanes;
   set_constants(q.ray_class, lanes);

@@ -271,6 +271,26 @@ TEST(CommandLine, CameraNumberOutOfRangeIsAUsageError) {
   EXPECT_EQ(run_packtrace({"render", bench.baked(), "-o", bench / "x.png", "--camera", "7"}).exit_code, 2);
 }
 
+TEST(CommandLine, RenderNamesItsBackend) {
+  const Workbench bench;
+  bench.bake();
+  const auto render = [&](std::vector<std::string> more) {
+    std::vector<std::string> arguments = {"render", bench.baked(), "-o",     bench / "x.png", "--frames",
+                                          "1",      "--force",     "--json", bench / "x.json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_packtrace(arguments).exit_code;
+  };
+  ASSERT_EQ(render({"--backend", "embree", "--bvh-quality", "high"}), 0);
+  const auto report = nlohmann::json::parse(read_text(bench / "x.json"));
+  EXPECT_EQ(report.at("backend"), "embree");
+  EXPECT_FALSE(report.at("isa").get<std::string>().empty());
+  uint64_t sum = 0;
+  for (const auto& [name, bytes] : report.at("resident_bytes").at("parts").items()) sum += bytes.get<uint64_t>();
+  EXPECT_EQ(report.at("resident_bytes").at("tracing"), sum);
+  EXPECT_EQ(render({"--backend", "fast"}), 2);
+  EXPECT_EQ(render({"--backend", "packed", "--bvh", "high"}), 2);
+}
+
 TEST(CommandLine, EveryTruncatedPrefixOfABakedFileIsRefused) {
   const Workbench bench;
   bench.bake();

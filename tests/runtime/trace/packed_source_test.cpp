@@ -55,6 +55,38 @@ Image render(const SceneSource& source) {
   return image;
 }
 
+TEST(PackedSource, LooksUpManyPlacesAsItDoesOne) {
+  const Scene scene = varied_scene();
+  const BakedFile file = bake(scene);
+  const PackedSource packed(file);
+  const FloatSource floats(scene);
+  for (const SceneSource* source :
+       {static_cast<const SceneSource*>(&packed), static_cast<const SceneSource*>(&floats)}) {
+    std::vector<SurfaceQuery> places; // back and forth between clusters and instances
+    for (uint32_t n = 0; n < 5000; ++n) {
+      const auto instance = n / 3 * 7 % static_cast<uint32_t>(source->instances().size());
+      const uint32_t triangles = source->counts(source->instances()[instance].geometry).triangles;
+      places.push_back({instance, n * 37 % triangles, Vec2(0.2f, 0.01f * static_cast<float>(n % 60))});
+    }
+    std::vector<SurfaceAttributes> found(places.size());
+    source->look_up(places, found);
+    uint32_t with_normal = 0;
+    for (size_t i = 0; i < places.size(); ++i) {
+      const SurfaceQuery& place = places[i];
+      const uint32_t geometry = source->instances()[place.instance].geometry;
+      ASSERT_EQ(found[i].material, source->material_of(place.instance, place.triangle)) << i;
+      const auto normal = source->shading_normal(geometry, place.triangle, place.barycentrics);
+      ASSERT_EQ(found[i].has_normal, normal.has_value()) << i;
+      if (normal) {
+        ++with_normal;
+        ASSERT_EQ(found[i].normal, *normal) << i;
+      }
+    }
+    EXPECT_GT(with_normal, 1000u);
+    EXPECT_LT(with_normal, 4500u);
+  }
+}
+
 TEST(PackedSource, RendersTheImageOfTheFloats) {
   const Scene scene = varied_scene();
   const BakedFile file = bake(scene);
