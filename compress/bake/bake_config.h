@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 
 #include "compress/format/baked_format.h"
@@ -69,6 +70,10 @@ struct BakeConfig {
   LodUse lod = LodUse::kOff;
   uint32_t lod_min_triangles = 512; ///< geometries of fewer get no levels
   uint32_t lod_levels = 31;         ///< above the source's, at most; 1..31
+
+  /// A folder for finished levels of detail, which an interrupted bake finds there when it is started again; bake_scene()
+  /// removes them in the end. Empty: none. Changes no byte of the file.
+  std::filesystem::path resume;
 
   /// Throws Error(kUsage) if a value is out of its range. Nothing is ever clamped.
   void validate() const;

@@ -1,8 +1,11 @@
 #include "compress/bake/bake_scene.h"
 
 #include <algorithm>
+#include <atomic>
+#include <optional>
 
 #include <tbb/parallel_for.h>
+#include <tbb/task_group.h>
 
 #include "compress/bake/brief.h"
 #include "compress/bake/file_sections.h"
@@ -10,6 +13,7 @@
 #include "compress/bake/geometry_measure.h"
 #include "compress/bake/geometry_plan.h"
 #include "compress/bake/lod/lod_encoder.h"
+#include "compress/bake/lod/lod_store.h"
 #include "compress/bake/nested_grids.h"
 #include "compress/bake/page_encoder.h"
 #include "compress/bake/requirement_table.h"
@@ -195,6 +199,7 @@ private:
 
   void pack() {
     lod_wanted_ = choose_lod();
+    if (!config_.resume.empty()) store_.emplace(config_.resume);
     uint64_t triangles = 0;
     for (size_t i = 0; i < packed_.size(); ++i) triangles += (lod_wanted_[i] != 0 ? 1 + kLodWork : 1) * triangles_of(i);
     progress_.begin(config_.lod == LodUse::kOff ? "packing geometry" : "packing geometry and its levels", triangles);
@@ -238,12 +243,25 @@ private:
     needs.infer_normals = false;
     if (mixed)
       if (Draft other = pack_with(index, needs); other.packed.bytes() < draft.packed.bytes()) draft = std::move(other);
-    if (lod_wanted_[index] != 0) {
-      ClusterLod lod = build_cluster_lod(draft.quantized, draft.clusters, progress_, config_.lod_levels + 1);
-      draft.clusters = {};
-      draft.packed.lod = encode_lod(draft.quantized, lod);
-    }
+    if (lod_wanted_[index] != 0) draft.packed.lod = find_or_build_lod(draft.quantized, draft.clusters);
     return std::move(draft.packed);
+  }
+
+  /// @param geometry is used up
+  EncodedLod find_or_build_lod(QuantizedGeometry& geometry, const GeometryClusters& clusters) {
+    const uint32_t max_levels = config_.lod_levels + 1;
+    const LodKey key = store_ ? lod_key(geometry, clusters, max_levels) : LodKey{};
+    if (store_)
+      if (std::optional<EncodedLod> found = store_->find(key)) {
+        ++resumed_;
+        progress_.advance(kLodWork * clusters.triangles.size());
+        return std::move(*found);
+      }
+    ClusterLod lod = build_cluster_lod(geometry, clusters, progress_, max_levels);
+    EncodedLod encoded = encode_lod(geometry, lod);
+    // Where another geometry failed or all was cancelled, inner loops return with their work undone.
+    if (store_ && !tbb::is_current_task_group_canceling()) store_->keep(key, encoded);
+    return encoded;
   }
 
   Draft pack_with(size_t index, const GeometryNeeds& needs) const {
@@ -316,6 +334,7 @@ private:
     }
     report_.mean_normal_error_degrees = mean_normal_error(all);
     report_.source_triangles = unique_triangle_count(scene_);
+    report_.resumed_geometries = resumed_;
     report_.shared_shapes = plan_.shared_shapes;
     report_.instanced_shapes = plan_.instanced_shapes;
     report_.shared_objects = plan_.shared_objects;
@@ -376,6 +395,8 @@ private:
   std::vector<PositionGrid> grids_;
   std::vector<Packed> packed_;
   std::vector<uint8_t> lod_wanted_; // by geometry
+  std::optional<LodStore> store_;
+  std::atomic<uint64_t> resumed_{0};
   std::vector<EncodedTexture> textures_; // as in the scene; empty where they are not kept
   BakeReport report_;
 };
@@ -395,6 +416,7 @@ BakeReport bake_scene(const Scene& scene, const BakeConfig& config, const std::f
   progress.begin("writing the file", 0);
   write_file_bytes(file.path(), baked.bytes);
   file.commit();
+  if (!config.resume.empty()) LodStore(config.resume).clear();
   return std::move(baked.report);
 }
 

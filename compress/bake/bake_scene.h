@@ -36,6 +36,7 @@ struct BakeReport {
   double max_uv_error = 0.0;
   double max_uv_error_texels = 0.0;  ///< of the finest texture that the same geometry looks up
   uint64_t lod_geometries = 0;       ///< with levels of detail
+  uint64_t resumed_geometries = 0;   ///< whose levels an interrupted bake had left
   std::vector<std::string> warnings; ///< also in the diagnostics
 };
 
@@ -49,7 +50,8 @@ struct BakedScene {
 /// diagnostics; their instance numbers stay, of an empty geometry.
 /// Throws Error(kUsage) for a config out of range, Error(kInput) for scenes that break the rules of scene.h, or where
 /// something would be left out and config is strict,
-/// Error(kLimitExceeded) where a limit of the format or the promised accuracy cannot be met, Error(kCancelled).
+/// Error(kLimitExceeded) where a limit of the format or the promised accuracy cannot be met, Error(kCancelled),
+/// Error(kIo) where config.resume cannot be used.
 BakedScene bake_to_bytes(const Scene& scene, const BakeConfig& config, Diagnostics& diagnostics, Progress& progress);
 
 /// bake_to_bytes() into a file, which appears complete or not at all.

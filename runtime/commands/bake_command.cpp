@@ -45,6 +45,7 @@ struct BakeOptions {
   std::optional<double> texture_psnr;
   std::string lod = kLodUses[0];
   std::optional<uint32_t> lod_min_triangles, lod_levels;
+  std::string resume;
   std::string codec{name_of(PageCodec::kNone)};
   SceneOptions scene;
   bool dry_run = false;
@@ -78,10 +79,12 @@ BakeConfig make_config(const BakeOptions& options) {
     throw Error(ErrorKind::kUsage, "--texture-psnr chooses codecs; it is of no use without --textures auto");
   if (options.texture_psnr) config.min_texture_psnr_db = *options.texture_psnr;
   config.lod = static_cast<LodUse>(std::find(kLodUses.begin(), kLodUses.end(), options.lod) - kLodUses.begin());
-  if (config.lod == LodUse::kOff && (options.lod_min_triangles || options.lod_levels))
-    throw Error(ErrorKind::kUsage, "--lod-min-triangles and --lod-levels are of no use without --lod instanced or all");
+  if (config.lod == LodUse::kOff && (options.lod_min_triangles || options.lod_levels || !options.resume.empty()))
+    throw Error(ErrorKind::kUsage,
+                "--lod-min-triangles, --lod-levels and --resume are of no use without --lod instanced or all");
   config.lod_min_triangles = options.lod_min_triangles.value_or(config.lod_min_triangles);
   config.lod_levels = options.lod_levels.value_or(config.lod_levels);
+  config.resume = options.resume;
   config.codec = find_page_codec(options.codec).value(); // the option's check knows the names
   config.validate();
   return config;
@@ -102,6 +105,7 @@ nlohmann::json report(const BakeOptions& options, const BakeReport& baked, const
   json["shared_objects"] = baked.shared_objects;
   json["unused_objects"] = baked.unused_objects;
   json["left_out"] = baked.left_out;
+  json["resumed_geometries"] = baked.resumed_geometries;
   json["nested_geometries"] = baked.nested_geometries;
   json["median_edge"] = baked.world_median_edge;
   json["import"] = {{"directives", imported.directives},
@@ -159,6 +163,8 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
                                  "{} levels of detail of {:L} geometries: {:.3f} bytes for each of their {:L} triangles\n",
                                  lod.levels.size() - 1, baked.lod_geometries, lod.bytes_per_triangle(),
                                  lod.base_triangles()));
+  if (baked.resumed_geometries > 0)
+    fmt::print("{}", fmt::format(grouped(), "levels of {:L} geometries were there from before\n", baked.resumed_geometries));
   if (baked.instanced_shapes > 0)
     fmt::print("{}", fmt::format(grouped(), "{:L} shapes outside objects share geometry, on grids of its own\n",
                                  baked.instanced_shapes));
@@ -247,6 +253,11 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
       ->group("Levels of detail");
   verb.add_option("--lod-levels", options->lod_levels, "Coarser levels at most, 1..31 (default 31)")
       ->type_name("N")
+      ->group("Levels of detail");
+  verb.add_option("--resume", options->resume,
+                  "A folder for levels that are done: an interrupted bake, started again, takes them from there; removed "
+                  "when the file is written")
+      ->type_name("DIR")
       ->group("Levels of detail");
   verb.add_option(
           "--codec", options->codec,

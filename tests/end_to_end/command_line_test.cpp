@@ -112,6 +112,7 @@ TEST(CommandLine, LevelsOfDetailAreReported) {
   for (const auto& wrong : std::vector<std::vector<std::string>>{{"--lod", "some"},
                                                                  {"--lod-levels", "3"},
                                                                  {"--lod-min-triangles", "3"},
+                                                                 {"--resume", "x"},
                                                                  {"--lod", "all", "--lod-levels", "0"},
                                                                  {"--lod", "all", "--lod-levels", "32"}})
     EXPECT_EQ(bake(wrong).exit_code, 2) << wrong.back();

@@ -10,12 +10,15 @@
 #include <tbb/global_control.h>
 
 #include "compress/bake/lod/lod_encoder.h"
+#include "compress/bake/lod/lod_store.h"
 #include "compress/format/baked_file.h"
 #include "compress/format/file_summary.h"
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/file_bytes.h"
 #include "tests/compress/lod/lod_meshes.h"
 #include "tests/compress/lod/surface_distance.h"
 #include "tests/compress/test_scenes.h"
+#include "tests/pbrt_import/scene_folder.h"
 
 namespace packtrace::test {
 namespace {
@@ -324,6 +327,84 @@ TEST(LodFile, SameBytesForAnyThreadCountAndCodec) {
     EXPECT_LT(disk.size(), one.size());
     EXPECT_TRUE(std::ranges::equal(BakedFile::from_bytes(disk).bytes(), one)) << name_of(codec);
   }
+}
+
+TEST(LodFile, AnInterruptedBakeGoesOnWithWhatItHas) {
+  const SceneFolder folder;
+  BakeConfig config = lod_config();
+  const std::vector<std::byte> whole = bake(mixed_scene(), config).bytes;
+  config.resume = folder.path() / "levels";
+  const BakedScene first = bake(mixed_scene(), config);
+  EXPECT_EQ(first.bytes, whole);
+  EXPECT_EQ(first.report.resumed_geometries, 0u);
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(config.resume)) files.push_back(entry.path());
+  ASSERT_EQ(files.size(), 2u);
+  std::filesystem::remove(files[0]);
+  const BakedScene second = bake(mixed_scene(), config);
+  EXPECT_EQ(second.bytes, whole);
+  EXPECT_EQ(second.report.resumed_geometries, 1u);
+  const BakedScene third = bake(mixed_scene(), config);
+  EXPECT_EQ(third.bytes, whole);
+  EXPECT_EQ(third.report.resumed_geometries, 2u);
+  config.lod_levels = 2;
+  EXPECT_EQ(bake(mixed_scene(), config).report.resumed_geometries, 0u);
+  Diagnostics diagnostics;
+  Progress progress;
+  bake_scene(mixed_scene(), config, folder.path() / "out.ptk", false, diagnostics, progress);
+  EXPECT_FALSE(std::filesystem::exists(config.resume));
+}
+
+/// Wherever it is interrupted: what it leaves behind is whole.
+TEST(LodFile, AnInterruptedBakeLeavesNoHalfMadeLevels) {
+  const SceneFolder folder;
+  Scene scene = mixed_scene();
+  for (uint32_t i = 0; i < 6; ++i) add_shape(scene, torus_mesh(60 + 10 * i, 40), translation({4.0 * i, 9, 0}));
+  BakeConfig config = lod_config();
+  const std::vector<std::byte> whole = bake(scene, config).bytes;
+  config.resume = folder.path() / "levels";
+  uint64_t resumed = 0;
+  for (const uint64_t stop : {1u, 20u, 40u, 60u, 80u}) {
+    Diagnostics diagnostics;
+    Progress progress([&](std::string_view phase, uint64_t done, uint64_t total) {
+      if (phase.ends_with("levels") && 100 * done >= stop * total) throw Error(ErrorKind::kCancelled, "stopped");
+    });
+    EXPECT_THROW((void)bake_to_bytes(scene, config, diagnostics, progress), Error) << stop;
+    const BakedScene after = bake(scene, config);
+    EXPECT_TRUE(after.bytes == whole) << stop;
+    resumed += after.report.resumed_geometries;
+    LodStore(config.resume).clear();
+  }
+  EXPECT_GT(resumed, 0u);
+}
+
+TEST(LodFile, DamagedLevelsOfAnInterruptedBakeAreMadeAgain) {
+  const SceneFolder folder;
+  BuiltLod built = build_lod(torus_mesh(24, 16));
+  const LodKey key = lod_key(built.geometry, built.base, 9);
+  EXPECT_NE(key, lod_key(built.geometry, built.base, 8));
+  const EncodedLod lod = encode_lod(built.geometry, built.lod);
+  const LodStore store(folder.path());
+  EXPECT_FALSE(store.find(key));
+  store.keep(key, lod);
+  const std::optional<EncodedLod> found = store.find(key);
+  ASSERT_TRUE(found);
+  ASSERT_EQ(found->levels.size(), lod.levels.size());
+  EXPECT_EQ(found->levels.back().encoded.payload, lod.levels.back().encoded.payload);
+  const std::filesystem::path path = std::filesystem::directory_iterator(folder.path())->path();
+  const std::vector<std::byte> good = read_file_bytes(path);
+  const auto is_found = [&](std::span<const std::byte> bytes) {
+    write_file_bytes(path, bytes);
+    return store.find(key).has_value();
+  };
+  for (size_t size = 0; size < good.size(); size += 1 + size / 64) EXPECT_FALSE(is_found(std::span(good).first(size)));
+  std::vector<std::byte> damaged = good;
+  for (size_t i = 0; i < good.size(); i += 1 + i / 64) {
+    damaged[i] ^= std::byte{4};
+    EXPECT_FALSE(is_found(damaged)) << i;
+    damaged[i] = good[i];
+  }
+  EXPECT_TRUE(is_found(good));
 }
 
 TEST(LodFile, SummaryCountsLevelsAndTheirBytes) {

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+
+#include "compress/bake/lod/lod_encoder.h"
+
+namespace packtrace {
+
+/// What levels of detail follow from: XXH3-128 of a geometry on its lattice, its clusters and the number of levels.
+using LodKey = std::array<uint64_t, 2>;
+/// @param max_levels as build_cluster_lod() takes it
+LodKey lod_key(const QuantizedGeometry& geometry, const GeometryClusters& base, uint32_t max_levels);
+
+/// Levels of detail that are finished, one file for each geometry, so that an interrupted bake can go on with them. For
+/// one program and one machine: files of other versions, and damaged ones, are as if they were not there. Every
+/// function but clear() may run on several threads.
+class LodStore {
+public:
+  /// Makes the folder if it is missing. Throws Error(kIo) where that fails.
+  explicit LodStore(std::filesystem::path folder);
+
+  std::optional<EncodedLod> find(const LodKey& key) const;
+  /// The file appears whole or not at all. Throws Error(kIo).
+  void keep(const LodKey& key, const EncodedLod& lod) const;
+  /// Removes all such files, and the folder if nothing else is in it. Throws Error(kIo).
+  void clear() const;
+
+private:
+  std::filesystem::path path_of(const LodKey& key) const;
+
+  std::filesystem::path folder_;
+};
+
+} // namespace packtrace
