@@ -1,0 +1,125 @@
+#include <gtest/gtest.h>
+
+#include "tests/runtime/trace/packed_scenes.h"
+#include "tests/runtime/trace/test_scenes.h"
+
+namespace packtrace {
+namespace {
+
+using test::any;
+using test::BakedScene;
+
+/// From inside a closed mesh to its vertices, points of its edges and others, and along the axes: all must hit.
+std::vector<Ray> rays_from_inside(const SceneSource& source, const UnitSpace& space, DVec3 inside, size_t count,
+                                  uint32_t seed) {
+  const PlacedGeometry& instance = source.instances()[0];
+  const GeometryCounts counts = source.counts(instance.geometry);
+  std::vector<Vec3> positions(counts.vertices);
+  std::vector<Triangle> triangles(counts.triangles);
+  source.decode(instance.geometry, positions, triangles);
+  std::mt19937 generator(seed);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  std::vector<Ray> rays(count);
+  for (size_t i = 0; i < count; ++i) {
+    const Triangle t = triangles[generator() % triangles.size()];
+    const auto corner = [&](int k) {
+      return space.to_unit(transform_point(DAffine(instance.world_from_object), DVec3(positions[t[k]])));
+    };
+    const double u = unit(generator), v = unit(generator);
+    DVec3 target = corner(0);
+    if (i % 4 == 1) target += (corner(1) - corner(0)) * u;
+    if (i % 4 == 2) target += (corner(2) - corner(0)) * 0.5;
+    Ray& ray = rays[i];
+    const DVec3 size = (corner(1) - corner(0)) * 0.01;
+    ray.origin = Vec3(space.to_unit(inside) + (i % 8 < 4 ? DVec3(0.0) : size * v));
+    ray.direction = Vec3(target - DVec3(ray.origin));
+    if (i % 4 == 3) ray.direction[static_cast<int>(i / 4 % 3)] = 0.0f; // parallel to a plane of axes
+    if (i % 48 == 47) ray.direction = Vec3(0, i % 96 < 48 ? 1 : -1, 0);
+  }
+  return rays;
+}
+
+size_t leaks(const Scene& scene, DVec3 inside, size_t count, PackedIsa isa) {
+  const BakedScene baked(scene);
+  const PackedTracer tracer(baked.file, baked.source, isa);
+  size_t missed = 0;
+  for (const uint8_t hit : any(tracer, rays_from_inside(baked.source, tracer.space(), inside, count, 2)))
+    missed += hit == 0;
+  return missed;
+}
+
+TEST(PackedLeaks, NoRayLeavesAClosedMesh) {
+  Scene scene;
+  test::add_shape(scene, test::sphere({0, 0, 0}, 1, 50));
+  for (const PackedIsa isa : test::isas())
+    EXPECT_EQ(leaks(scene, {0.1, 0.2, -0.05}, isa == PackedIsa::kScalar ? 200000 : 1000000, isa), 0u);
+}
+
+TEST(PackedLeaks, NoneFromTheMiddleWhereEdgesAlign) {
+  Scene scene; // rays along its axis meet the poles, where dozens of edges meet
+  test::add_shape(scene, test::sphere({0, 0, 0}, 1, 24));
+  for (const PackedIsa isa : test::isas()) EXPECT_EQ(leaks(scene, {0, 0, 0}, 100000, isa), 0u);
+}
+
+TEST(PackedLeaks, NoneFarFromTheOrigin) {
+  Scene scene;
+  test::add_shape(scene, test::sphere({1000, 2000, -500}, 1, 40));
+  for (const PackedIsa isa : test::isas()) EXPECT_EQ(leaks(scene, {1000.1, 2000.2, -500}, 100000, isa), 0u);
+}
+
+TEST(PackedLeaks, NoneThroughInstances) {
+  for (const DVec3 scale : {DVec3(1, 1, 1), DVec3(-3, 0.02, 1), DVec3(1e-6, 1e-6, 2e-6)}) {
+    Scene scene;
+    test::add_object(scene, test::sphere({0, 0, 0}, 1, 40));
+    scene.instances.push_back({0, Affine(test::placed({5, 6, 7}, scale, 33, {1, 2, 3}))});
+    for (const PackedIsa isa : test::isas()) EXPECT_EQ(leaks(scene, {5, 6, 7}, 50000, isa), 0u) << scale.x;
+  }
+}
+
+TEST(PackedLeaks, NoneAtAnyScale) {
+  for (const double scale : {1e-30, 1e-15, 1e-3, 1e10, 1e30}) {
+    Scene scene;
+    test::add_shape(scene, test::sphere({0, 0, 0}, 1, 30), 0, test::placed({0, 0, 0}, DVec3(scale)));
+    for (const PackedIsa isa : test::isas())
+      EXPECT_EQ(leaks(scene, DVec3(0.1, 0.2, 0.3) * scale, 20000, isa), 0u) << scale;
+  }
+}
+
+TEST(PackedLeaks, NoneBesideDegenerateTriangles) {
+  Scene scene;
+  Mesh mesh = test::sphere({0, 0, 0}, 1, 30); // its poles' cells are degenerate already
+  const auto count = static_cast<uint32_t>(mesh.positions.size());
+  for (uint32_t i = 0; i + 7 < count; i += 7) mesh.triangles.emplace_back(i, i + 3, i);
+  test::add_shape(scene, mesh);
+  for (const PackedIsa isa : test::isas()) EXPECT_EQ(leaks(scene, {0.1, 0, 0.1}, 100000, isa), 0u);
+}
+
+TEST(PackedLeaks, OneTriangleIsHitInsideAndOnItsEdges) {
+  Scene scene;
+  Mesh mesh;
+  mesh.positions = {{-1, -1, 0}, {3, -1, 0}, {-1, 3, 0}};
+  mesh.triangles = {{0, 1, 2}};
+  test::add_shape(scene, mesh);
+  const BakedScene baked(scene);
+  for (const PackedIsa isa : test::isas()) {
+    const PackedTracer tracer(baked.file, baked.source, isa);
+    const auto hits = [&](double x, double y, float direction) {
+      Ray ray; // perpendicular: only the decision about x and y counts
+      ray.origin = Vec3(tracer.space().to_unit({x, y, -double{direction}}));
+      ray.direction = Vec3(0, 0, direction);
+      return any(tracer, {&ray, 1})[0] != 0;
+    };
+    for (const float direction : {1.0f, -1.0f}) { // both faces
+      EXPECT_TRUE(hits(0, 0, direction));
+      EXPECT_TRUE(hits(-1, 0, direction));
+      EXPECT_TRUE(hits(1, 1, direction));
+      EXPECT_TRUE(hits(-1, -1, direction));
+      EXPECT_FALSE(hits(1.001, 1.001, direction));
+      EXPECT_FALSE(hits(-1.001, 0, direction));
+      EXPECT_FALSE(hits(0, -1.001, direction));
+    }
+  }
+}
+
+} // namespace
+} // namespace packtrace

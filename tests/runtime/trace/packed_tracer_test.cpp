@@ -1,0 +1,300 @@
+#include "runtime/trace/packed/packed_tracer.h"
+
+#include <cstring>
+
+#include <gtest/gtest.h>
+#include <tbb/parallel_for.h>
+
+#include "runtime/trace/embree_tracer.h"
+#include "runtime/trace/ray_offset.h"
+#include "tests/runtime/trace/packed_scenes.h"
+#include "tests/runtime/trace/test_scenes.h"
+
+namespace packtrace {
+namespace {
+
+using test::add_object;
+using test::add_shape;
+using test::any;
+using test::BakedScene;
+using test::closest;
+using test::isas;
+using test::placed;
+using test::random_rays;
+
+/// World shapes and instances: turned, mirrored, squeezed, far apart, one of it masked, one not seen, one not occluding.
+Scene varied_scene() {
+  Scene scene;
+  add_shape(scene, test::quad({-8, 0, -8}, {0, 0, 16}, {16, 0, 0}));
+  add_shape(scene, test::quad({-4, 0, 4}, {8, 0, 0}, {0, 5, 0}), kAlphaMask);
+  scene.masks.push_back({64, 1, WrapMode::kRepeat, Vec2(4, 1), Vec2(0), {0u, ~0u}});
+  scene.materials[1].alpha_mask = 0;
+  add_shape(scene, test::sphere({3, 1, 0}, 1, 24), kTransmissive);
+  add_shape(scene, test::sphere({3, 4, 0}, 1, 24), kInvisible);
+  add_object(scene, test::sphere({0, 0, 0}, 1, 32));
+  for (const DVec3 scale : {DVec3(1), DVec3(-1, 0.7, 1), DVec3(0.5, 1.5, 0.5), DVec3(4, 0.01, -2)})
+    scene.instances.push_back({0, Affine(placed({-2.5 * scale.y, 1, 4 * scale.x - 4}, scale, 25))});
+  scene.instances.push_back({0, Affine(placed({3000, 20, -500}, DVec3(2), 70, {1, 1, 0}))});
+  return scene;
+}
+
+struct Difference {
+  size_t hits = 0, yes_no = 0, distance = 0;
+  double worst = 0.0; ///< of the others, relative
+};
+
+Difference difference(const RayTracer& a, const RayTracer& b, std::span<const Ray> rays, uint32_t ray_class) {
+  const std::vector<RayHit> of_a = closest(a, rays, ray_class), of_b = closest(b, rays, ray_class);
+  const std::vector<uint8_t> any_a = any(a, rays, ray_class);
+  Difference result;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    EXPECT_EQ(any_a[i] != 0, of_a[i].valid()) << "ray " << i;
+    result.hits += of_a[i].valid();
+    if (of_a[i].valid() != of_b[i].valid()) {
+      ++result.yes_no;
+    } else if (of_a[i].valid()) {
+      const double relative = std::abs(double{of_a[i].t} - of_b[i].t) / std::abs(double{of_b[i].t});
+      if (relative > 1e-3)
+        ++result.distance;
+      else
+        result.worst = std::max(result.worst, relative);
+    }
+  }
+  return result;
+}
+
+TEST(PackedTracer, FindsWhatEmbreeFinds) {
+  const BakedScene baked(varied_scene());
+  const EmbreeTracer embree(baked.source, {});
+  const PackedTracer packed(baked.file, baked.source);
+  ASSERT_EQ(embree.space().scale(), packed.space().scale());
+  const Bounds near{{-9, -1, -9}, {9, 6, 9}};
+  const std::vector<Ray> rays = random_rays(200000, near, packed.space());
+  for (const uint32_t ray_class : {kCameraRays, kOcclusionRays}) {
+    const Difference d = difference(packed, embree, rays, ray_class);
+    EXPECT_GT(d.hits, 30000u);
+    EXPECT_LE(d.yes_no, 4u); // Embree's instances lie where float matrices put them, 3000 units from here
+    EXPECT_LE(d.distance, 4u);
+    EXPECT_LT(d.worst, 1e-3);
+  }
+}
+
+TEST(PackedTracer, FindsTheSameWithAllInstructionSets) {
+  const BakedScene baked(varied_scene());
+  const PackedTracer truth(baked.file, baked.source, PackedIsa::kScalar);
+  const std::vector<Ray> rays = random_rays(30000, {{-9, -1, -9}, {9, 6, 9}}, truth.space(), 5);
+  const std::vector<RayHit> expected = closest(truth, rays);
+  const std::vector<uint8_t> occluded = any(truth, rays);
+  for (const PackedIsa isa : isas()) {
+    const PackedTracer tracer(baked.file, baked.source, isa);
+    EXPECT_EQ(std::memcmp(closest(tracer, rays).data(), expected.data(), rays.size() * sizeof(RayHit)), 0);
+    EXPECT_EQ(any(tracer, rays), occluded);
+  }
+}
+
+TEST(PackedTracer, FindsTheSameOnAllThreadsAndInAnyPortions) {
+  const BakedScene baked(varied_scene());
+  const PackedTracer tracer(baked.file, baked.source);
+  const std::vector<Ray> rays = random_rays(50000, {{-9, -1, -9}, {9, 6, 9}}, tracer.space(), 6);
+  const std::vector<RayHit> expected = closest(tracer, rays);
+  std::vector<RayHit> hits(rays.size());
+  tbb::parallel_for(size_t{0}, rays.size() / 50, [&](size_t portion) {
+    for (size_t at = portion * 50; at < portion * 50 + 50;) { // 1, 2, 3, ... at a time
+      const size_t count = std::min(at % 50 + 1, portion * 50 + 50 - at);
+      tracer.closest_hits({&rays[at], count}, kCameraRays, RayOrder::kCoherent, {&hits[at], count});
+      at += count;
+    }
+  });
+  EXPECT_EQ(std::memcmp(hits.data(), expected.data(), rays.size() * sizeof(RayHit)), 0);
+}
+
+/// The nearest triangle of all in doubles, by Cramer's rule in world space.
+double brute_force(const SceneSource& source, const std::vector<std::vector<DVec3>>& corners, const UnitSpace& space,
+                   const Ray& ray) {
+  const DVec3 o = space.from_unit(DVec3(ray.origin)), d = DVec3(ray.direction) / space.scale();
+  double nearest = std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < source.instances().size(); ++i)
+    for (size_t c = 0; c < corners[i].size(); c += 3) {
+      const DVec3 a = corners[i][c], e = corners[i][c + 1] - a, f = corners[i][c + 2] - a;
+      const DVec3 p = glm::cross(d, f), s = o - a, q = glm::cross(s, e);
+      const double det = glm::dot(e, p), u = glm::dot(s, p) / det, v = glm::dot(d, q) / det;
+      const double t = glm::dot(f, q) / det;
+      if (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > ray.tnear && t < ray.tfar) nearest = std::min(nearest, t);
+    }
+  return nearest;
+}
+
+TEST(PackedTracer, FindsWhatTryingAllTrianglesFinds) {
+  Scene scene;
+  add_shape(scene, test::sphere({0, 1, 0}, 1, 12));
+  add_shape(scene, test::quad({-3, 0, -3}, {0, 0, 6}, {6, 0, 0}));
+  add_object(scene, test::box({-0.5f, -0.5f, -0.5f}, {0.5f, 0.5f, 0.5f}));
+  scene.instances.push_back({0, Affine(placed({2, 1, 0}, DVec3(1, -2, 0.5), 30, {1, 2, 3}))});
+  scene.instances.push_back({0, Affine(placed({-2, 1, 0}, DVec3(0.3), 50, {0, 0, 1}))});
+  const BakedScene baked(scene);
+  const PackedTracer tracer(baked.file, baked.source);
+  std::vector<std::vector<DVec3>> corners;
+  for (const PlacedGeometry& placed_geometry : baked.source.instances()) {
+    const GeometryCounts counts = baked.source.counts(placed_geometry.geometry);
+    std::vector<Vec3> positions(counts.vertices);
+    std::vector<Triangle> triangles(counts.triangles);
+    baked.source.decode(placed_geometry.geometry, positions, triangles);
+    corners.emplace_back();
+    for (const Triangle& t : triangles)
+      for (int i = 0; i < 3; ++i)
+        corners.back().push_back(
+            transform_point(DAffine(placed_geometry.world_from_object), DVec3(positions[t[i]])));
+  }
+  std::vector<Ray> rays = random_rays(20000, baked.source.world_bounds(), tracer.space(), 9);
+  for (size_t i = 0; i < rays.size(); i += 3) rays[i].tnear = 0.2f, rays[i].tfar = 0.6f;
+  const std::vector<RayHit> hits = closest(tracer, rays);
+  size_t found = 0, different = 0;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    const double t = brute_force(baked.source, corners, tracer.space(), rays[i]);
+    found += hits[i].valid();
+    different += hits[i].valid() != std::isfinite(t) || (hits[i].valid() && std::abs(hits[i].t - t) > 1e-5);
+  }
+  EXPECT_GT(found, 3000u);
+  EXPECT_LE(different, 2u); // rays within rounding of an edge
+}
+
+TEST(PackedTracer, SaysWhatAHitIs) {
+  const BakedScene baked(varied_scene());
+  const PackedTracer tracer(baked.file, baked.source);
+  const std::vector<Ray> rays = random_rays(5000, {{-9, -1, -9}, {9, 6, 9}}, tracer.space(), 7);
+  const std::vector<RayHit> hits = closest(tracer, rays);
+  size_t count = 0;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    if (!hits[i].valid()) continue;
+    const HitSurface surface = tracer.resolve(hits[i]);
+    const PlacedGeometry& instance = baked.source.instances()[surface.placement->instance];
+    ASSERT_EQ(instance.geometry, surface.geometry);
+    const GeometryCounts counts = baked.source.counts(surface.geometry);
+    std::vector<Vec3> positions(counts.vertices);
+    std::vector<Triangle> triangles(counts.triangles);
+    baked.source.decode(surface.geometry, positions, triangles);
+    DVec3 point(0.0);
+    const double weights[] = {1.0 - double{hits[i].u} - hits[i].v, hits[i].u, hits[i].v};
+    const DVec3 on_ray = DVec3(rays[i].origin) + DVec3(rays[i].direction) * double{hits[i].t};
+    const double size = UnitSpace::kHalfSize;
+    for (int corner = 0; corner < 3; ++corner) {
+      const DVec3 in_unit = transform_point(surface.placement->unit_from_surface, DVec3(surface.vertices[corner]));
+      const DVec3 in_world = transform_point(DAffine(instance.world_from_object),
+                                             DVec3(positions[triangles[surface.triangle][corner]]));
+      EXPECT_LT(glm::distance(in_unit, tracer.space().to_unit(in_world)), 1e-6 * size);
+      point += in_unit * weights[corner];
+    }
+    EXPECT_LT(glm::distance(point, on_ray), 1e-6 * size);
+    ++count;
+  }
+  EXPECT_GT(count, 800u);
+}
+
+TEST(PackedTracer, RaysFromASurfaceDoNotHitIt) {
+  Scene scene = varied_scene();
+  scene.instances.pop_back(); // the far one makes units large
+  const BakedScene baked(scene);
+  const PackedTracer tracer(baked.file, baked.source);
+  const std::vector<Ray> rays = random_rays(100000, {{-9, -1, -9}, {9, 6, 9}}, tracer.space(), 8);
+  const std::vector<RayHit> hits = closest(tracer, rays);
+  std::vector<Ray> leaving;
+  std::vector<double> offsets;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    if (!hits[i].valid()) continue;
+    const HitSurface hit = tracer.resolve(hits[i]);
+    const DVec3 a(hit.vertices[0]), e = DVec3(hit.vertices[1]) - a, f = DVec3(hit.vertices[2]) - a;
+    DVec3 n = hit.placement->surface_normal * glm::cross(e, f);
+    if (!(glm::length(n) > 0.0)) continue;
+    n = glm::normalize(n);
+    if (glm::dot(n, DVec3(rays[i].direction)) > 0.0) n = -n;
+    const DVec3 p = transform_point(hit.placement->unit_from_surface, a + e * double{hits[i].u} + f * double{hits[i].v});
+    const double offset = ray_offset(hit, tracer.space(), p, n);
+    Ray ray;
+    ray.origin = Vec3(p + n * offset);
+    ray.direction = Vec3(n);
+    ray.tfar = static_cast<float>(8.0 * offset); // where only the surface itself could be
+    leaving.push_back(ray);
+    offsets.push_back(offset);
+  }
+  ASSERT_GT(leaving.size(), 20000u);
+  size_t hit_again = 0;
+  for (const uint8_t occluded : any(tracer, leaving)) hit_again += occluded;
+  EXPECT_LE(hit_again, leaving.size() / 10000);
+}
+
+TEST(PackedTracer, KeepsToTheRangeOfT) {
+  Scene scene;
+  add_shape(scene, test::quad({-1, -1, 2}, {2, 0, 0}, {0, 2, 0}));
+  add_shape(scene, test::quad({-1, -1, 4}, {2, 0, 0}, {0, 2, 0}));
+  const BakedScene baked(scene);
+  for (const PackedIsa isa : isas()) {
+    const PackedTracer tracer(baked.file, baked.source, isa);
+    Ray ray;
+    ray.origin = Vec3(tracer.space().to_unit({0.1, 0.2, 0}));
+    ray.direction = Vec3(0, 0, static_cast<float>(tracer.space().scale())); // t in world units
+    const RayHit first = closest(tracer, {&ray, 1})[0];
+    ASSERT_TRUE(first.valid());
+    EXPECT_NEAR(first.t, 2.0f, 1e-5f);
+    Ray beyond = ray;
+    beyond.tnear = first.t; // open at both ends
+    EXPECT_NEAR(closest(tracer, {&beyond, 1})[0].t, 4.0f, 1e-5f);
+    Ray before = ray;
+    before.tfar = first.t;
+    EXPECT_FALSE(closest(tracer, {&before, 1})[0].valid());
+    EXPECT_EQ(any(tracer, {&before, 1})[0], 0);
+    for (const float tfar : {-1.0f, 0.0f, std::numeric_limits<float>::quiet_NaN()}) {
+      Ray none = ray;
+      none.tfar = tfar;
+      EXPECT_EQ(any(tracer, {&none, 1})[0], 0);
+    }
+    Ray nowhere = ray;
+    nowhere.direction = Vec3(0);
+    EXPECT_EQ(any(tracer, {&nowhere, 1})[0], 0);
+    nowhere.direction = Vec3(std::numeric_limits<float>::quiet_NaN());
+    EXPECT_EQ(any(tracer, {&nowhere, 1})[0], 0);
+    nowhere.direction = Vec3(0, 0, std::numeric_limits<float>::infinity());
+    EXPECT_EQ(any(tracer, {&nowhere, 1})[0], 0);
+  }
+}
+
+TEST(PackedTracer, NamesInstancesThatAreFlat) {
+  Scene scene;
+  add_object(scene, test::sphere({0, 0, 0}, 1, 8));
+  scene.instances.push_back({0, Affine(placed({0, 0, 0}))});
+  scene.instances.push_back({0, Affine(placed({4, 0, 0}, DVec3(1, 0, 1)))});
+  const BakedScene baked(scene);
+  const PackedTracer tracer(baked.file, baked.source);
+  ASSERT_EQ(tracer.flat_instances().size(), 1u);
+  EXPECT_EQ(tracer.flat_instances()[0], 1u);
+}
+
+TEST(PackedTracer, TracesManyInstances) {
+  Scene scene;
+  add_object(scene, test::box({-0.3f, -0.3f, -0.3f}, {0.3f, 0.3f, 0.3f}));
+  for (int x = 0; x < 60; ++x)
+    for (int z = 0; z < 50; ++z)
+      scene.instances.push_back({0, Affine(placed({double(x), 0, double(z)}, DVec3(1), 7.0 * x + 11.0 * z))});
+  const BakedScene baked(scene);
+  const PackedTracer tracer(baked.file, baked.source);
+  std::vector<Ray> rays;
+  for (int x = 0; x < 60; ++x)
+    for (int z = 0; z < 50; ++z) {
+      Ray& ray = rays.emplace_back();
+      ray.origin = Vec3(tracer.space().to_unit({x + 0.01, 5, z + 0.02}));
+      ray.direction = Vec3(0, -1, 0);
+    }
+  const std::vector<RayHit> hits = closest(tracer, rays);
+  for (size_t i = 0; i < hits.size(); ++i) {
+    ASSERT_TRUE(hits[i].valid());
+    EXPECT_EQ(tracer.resolve(hits[i]).placement->instance, i);
+  }
+}
+
+TEST(PackedTracer, TracesNothing) {
+  const BakedScene baked{Scene{}};
+  const PackedTracer tracer(baked.file, baked.source);
+  EXPECT_EQ(any(tracer, std::vector<Ray>(100)), std::vector<uint8_t>(100, 0));
+}
+
+} // namespace
+} // namespace packtrace
