@@ -9,6 +9,7 @@
 #include "compress/format/position_grid.h"
 #include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/scene/error.h"
+#include "runtime/stopwatch.h"
 #include "runtime/trace/alpha_filter.h"
 #include "runtime/trace/packed/batch_cache.h"
 #include "runtime/trace/packed/top_tree.h"
@@ -109,19 +110,16 @@ struct PackedTracer::Tables {
   std::vector<packed::TracePlacement> placements;
   std::vector<TreeBox> boxes;            ///< of placements
   std::vector<uint32_t> instance_of;     ///< by placement; kNoPlace: the world's
-  std::vector<uint32_t> tree_of;         ///< by geometry, or kNoPlace
-  std::vector<uint32_t> first_instance;  ///< by geometry
+  std::vector<uint32_t> tree_of;         ///< by the source's geometry, or kNoPlace
+  std::vector<uint32_t> grid_of;         ///< by the file's geometry: a tree whose grid its clusters are read in
+  std::vector<uint32_t> first_instance;  ///< by the file's geometry; that of a level's base
   std::vector<Placement> surfaces;       ///< by instance
   std::vector<packed::TopNode> top;
   packed::KernelScene scene{};
   BatchCacheOwner caches;
 
-  void add_tree(const BakedFile& file, uint32_t number) {
+  void add_tree(uint32_t number) {
     const baked::TreeRecord& record = packed.trees[number];
-    const auto add = [&](uint32_t geometry) {
-      tree_of[geometry] = number;
-      add_clusters(file, record, geometry);
-    };
     packed::TraceTree tree{packed.nodes.data() + record.first_node, 1.0f};
     if (record.node_count > 0) {
       double lo[3], hi[3];
@@ -131,16 +129,13 @@ struct PackedTracer::Tables {
             std::max({tree.max_coordinate, static_cast<float>(std::abs(lo[axis])), static_cast<float>(std::abs(hi[axis]))});
     }
     trees.push_back(tree);
-    if (record.geometry != baked::kWorldTree) return add(record.geometry);
-    std::vector<uint8_t> own(tree_of.size(), 0);
-    for (const baked::TreeRecord& other : packed.trees)
-      if (other.geometry != baked::kWorldTree) own[other.geometry] = 1;
-    for (uint32_t g = 0; g < own.size(); ++g)
-      if (own[g] == 0 && file.geometries()[g].cluster_count > 0) add(g);
   }
 
-  void add_clusters(const BakedFile& file, const baked::TreeRecord& tree, uint32_t g) {
+  /// @param number of a tree in whose grid they are read
+  void add_clusters(const BakedFile& file, uint32_t number, uint32_t g) {
+    const baked::TreeRecord& tree = packed.trees[number];
     const baked::GeometryRecord& geometry = file.geometries()[g];
+    grid_of[g] = number;
     uint32_t next = 0;
     for (uint32_t c = 0; c < geometry.class_clusters.size(); ++c)
       for (const uint32_t end = next + geometry.class_clusters[c]; next < end; ++next)
@@ -149,12 +144,20 @@ struct PackedTracer::Tables {
 };
 
 PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa)
-    : file_(file), source_(source), kernels_(kernels_of(isa)), tables_(std::make_unique<Tables>()) {
+    : PackedTracer(file, source, nullptr, isa) {}
+
+PackedTracer::PackedTracer(const BakedFile& file, const LodSource& source, PackedIsa isa)
+    : PackedTracer(file, source, &source, isa) {}
+
+PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod, PackedIsa isa)
+    : file_(file), source_(source), lod_(lod), kernels_(kernels_of(isa)), tables_(std::make_unique<Tables>()) {
   Tables& t = *tables_;
-  t.packed = build_packed_trees(file.sections());
   t.clusters.resize(file.sections().clusters.size());
-  t.tree_of.assign(file.geometries().size(), kNoPlace);
-  for (uint32_t i = 0; i < t.packed.trees.size(); ++i) t.add_tree(file, i);
+  t.tree_of.assign(source.geometry_count(), kNoPlace);
+  t.grid_of.assign(file.geometries().size(), kNoPlace);
+  lod != nullptr ? build_lod() : build_whole();
+  for (uint32_t i = 0; i < t.packed.trees.size(); ++i) t.add_tree(i);
+  find_first_instances();
   place();
   t.scene.clusters = t.clusters.data();
   t.scene.trees = t.trees.data();
@@ -171,34 +174,121 @@ PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, Pac
     const auto& tracer = *static_cast<const PackedTracer*>(owner);
     const uint32_t g = tracer.geometry_of_cluster(cluster);
     const baked::GeometryRecord& geometry = tracer.file_.geometries()[g];
-    return decode_batch_exactly(tracer.tables_->packed.trees[tracer.tables_->tree_of[g]], geometry,
+    return decode_batch_exactly(tracer.tables_->packed.trees[tracer.tables_->grid_of[g]], geometry,
                                 tracer.file_.cluster(g, static_cast<uint32_t>(cluster - geometry.first_cluster)), first,
                                 count, out);
   };
   t.scene.present = [](const void* owner, uint32_t placement, uint32_t cluster, uint32_t triangle, float u, float v,
                        uint32_t ray_class) {
     const auto& tracer = *static_cast<const PackedTracer*>(owner);
-    const uint32_t g = tracer.geometry_of_cluster(cluster), placed = tracer.tables_->instance_of[placement];
-    return surface_present(tracer.source_, placed == kNoPlace ? tracer.tables_->first_instance[g] : placed,
-                           tracer.file_.sections().clusters[cluster].first_triangle + triangle, Vec2(u, v),
+    const uint32_t instance = tracer.instance_of(placement, cluster);
+    return surface_present(tracer.source_, instance, tracer.triangle_of(cluster, instance, triangle), Vec2(u, v),
                            ray_class == kOcclusionRays);
   };
 }
 
 PackedTracer::~PackedTracer() = default;
 
+/// Trees over all of level 0.
+void PackedTracer::build_whole() {
+  Tables& t = *tables_;
+  BakedSections sections = file_.sections();
+  sections.geometries = sections.geometries.first(file_.base_geometry_count());
+  t.packed = build_packed_trees(sections);
+  uint32_t world = kNoPlace;
+  for (uint32_t i = 0; i < t.packed.trees.size(); ++i) {
+    const uint32_t g = t.packed.trees[i].geometry;
+    if (g == baked::kWorldTree)
+      world = i;
+    else
+      t.tree_of[g] = i;
+  }
+  for (uint32_t g = 0; g < t.tree_of.size(); ++g) {
+    if (file_.geometries()[g].cluster_count == 0) continue;
+    if (t.tree_of[g] == kNoPlace) t.tree_of[g] = world;
+    t.add_clusters(file_, t.tree_of[g], g);
+  }
+}
+
+/// Trees over the clusters of BLASes.
+void PackedTracer::build_lod() {
+  Tables& t = *tables_;
+  const BakedSections& sections = file_.sections();
+  const std::vector<uint8_t> joins = ChosenTreeBuilder::joins_world(sections);
+  std::vector<ChosenClusters> chosen;
+  uint32_t world = kNoPlace;
+  const auto next_tree = [&](uint32_t geometry) {
+    chosen.push_back({geometry, {}});
+    return static_cast<uint32_t>(chosen.size()) - 1;
+  };
+  for (uint32_t b = 0; b < lod_->geometry_count(); ++b) {
+    const uint32_t base = lod_->base_geometry(b);
+    if (lod_->clusters(b).empty()) continue;
+    if (joins[base] != 0 && world == kNoPlace) world = next_tree(baked::kWorldTree);
+    const uint32_t tree = joins[base] != 0 ? world : next_tree(base);
+    t.tree_of[b] = tree;
+    for (const LodCluster& c : lod_->clusters(b))
+      chosen[tree].clusters.push_back(
+          static_cast<uint32_t>(file_.geometries()[c.geometry].first_cluster + c.cluster));
+  }
+  if (world != kNoPlace) std::ranges::sort(chosen[world].clusters); // levels of all of them are behind all of level 0
+  const Stopwatch making_clusters;
+  const ChosenTreeBuilder builder(sections, chosen);
+  lod_trees_.clusters_s = making_clusters.seconds();
+  const Stopwatch building;
+  t.packed = builder.build();
+  lod_trees_.trees_s = building.seconds();
+  for (uint32_t i = 0; i < chosen.size(); ++i) {
+    const uint64_t leaves = builder.leaf_nodes(i);
+    lod_trees_.trees.push_back({chosen[i].geometry, (leaves > 0 ? 2 * leaves - 1 : 0) * sizeof(baked::PackedNode),
+                                t.packed.trees[i].node_count * sizeof(baked::PackedNode)});
+  }
+  for (uint32_t b = 0; b < lod_->geometry_count(); ++b) {
+    const uint32_t base = lod_->base_geometry(b);
+    if (t.tree_of[b] == kNoPlace || t.grid_of[base] != kNoPlace) continue;
+    t.add_clusters(file_, t.tree_of[b], base);
+    for (const baked::LodLevelRecord& level : file_.lod(base).levels)
+      if (level.level > 0) t.add_clusters(file_, t.tree_of[b], level.geometry);
+  }
+}
+
+void PackedTracer::find_first_instances() {
+  Tables& t = *tables_;
+  const std::span<const baked::InstanceRecord> instances = file_.instances();
+  t.first_instance.assign(file_.geometries().size(), kNoPlace);
+  for (uint32_t i = static_cast<uint32_t>(instances.size()); i-- > 0;) t.first_instance[instances[i].geometry] = i;
+  for (const baked::LodLevelRecord& level : file_.sections().lod_levels)
+    t.first_instance[level.geometry] = t.first_instance[level.base];
+}
+
+/// Object space; empty where there is nothing.
+Bounds PackedTracer::bounds_of(uint32_t geometry) const {
+  if (lod_ != nullptr) return lod_->bounds(geometry);
+  const baked::GeometryRecord& record = file_.geometries()[geometry];
+  Bounds bounds;
+  if (record.cluster_count == 0) return bounds;
+  bounds.extend(DVec3(record.bounds_lo[0], record.bounds_lo[1], record.bounds_lo[2]));
+  bounds.extend(DVec3(record.bounds_hi[0], record.bounds_hi[1], record.bounds_hi[2]));
+  return bounds;
+}
+
+/// The instance that a cluster of a placement is of.
+uint32_t PackedTracer::instance_of(uint32_t placement, uint32_t cluster) const {
+  const uint32_t placed = tables_->instance_of[placement];
+  return placed != kNoPlace ? placed : tables_->first_instance[geometry_of_cluster(cluster)];
+}
+
+/// A cluster's triangle as the source numbers it.
+uint32_t PackedTracer::triangle_of(uint32_t cluster, uint32_t instance, uint32_t triangle) const {
+  if (lod_ != nullptr) return lod_->triangle_number(lod_->instances()[instance].geometry, cluster, triangle);
+  return file_.sections().clusters[cluster].first_triangle + triangle;
+}
+
 void PackedTracer::place() {
   Tables& t = *tables_;
   const std::span<const PlacedGeometry> instances = source_.instances();
-  t.first_instance.assign(file_.geometries().size(), kNoPlace);
-  for (uint32_t i = static_cast<uint32_t>(instances.size()); i-- > 0;) t.first_instance[instances[i].geometry] = i;
-  std::vector<Bounds> bounds(file_.geometries().size());
-  for (size_t g = 0; g < bounds.size(); ++g) {
-    const baked::GeometryRecord& geometry = file_.geometries()[g];
-    if (geometry.cluster_count == 0) continue;
-    bounds[g].extend(DVec3(geometry.bounds_lo[0], geometry.bounds_lo[1], geometry.bounds_lo[2]));
-    bounds[g].extend(DVec3(geometry.bounds_hi[0], geometry.bounds_hi[1], geometry.bounds_hi[2]));
-  }
+  std::vector<Bounds> bounds;
+  for (uint32_t g = 0; g < source_.geometry_count(); ++g) bounds.push_back(bounds_of(g));
   space_ = UnitSpace(placed_bounds(source_, bounds));
 
   t.surfaces.resize(instances.size());
@@ -272,15 +362,15 @@ void PackedTracer::count_any(std::span<const Ray> rays, uint32_t ray_class, std:
 HitSurface PackedTracer::resolve(const RayHit& hit) const {
   const Tables& t = *tables_;
   HitSurface surface;
-  surface.geometry = geometry_of_cluster(hit.part);
-  surface.triangle = file_.sections().clusters[hit.part].first_triangle + hit.triangle;
-  const uint32_t instance = t.instance_of[hit.placement];
-  surface.placement = &t.surfaces[instance == kNoPlace ? t.first_instance[surface.geometry] : instance];
-  const baked::GeometryRecord& geometry = file_.geometries()[surface.geometry];
+  const uint32_t g = geometry_of_cluster(hit.part), instance = instance_of(hit.placement, hit.part);
+  surface.placement = &t.surfaces[instance];
+  surface.geometry = source_.instances()[instance].geometry;
+  surface.triangle = triangle_of(hit.part, instance, hit.triangle);
+  const baked::GeometryRecord& geometry = file_.geometries()[g];
   packed::DecodedBatch batch;
-  decode_batch_exactly(t.packed.trees[t.tree_of[surface.geometry]], geometry,
-                       file_.cluster(surface.geometry, static_cast<uint32_t>(hit.part - geometry.first_cluster)),
-                       hit.triangle, 1, batch);
+  decode_batch_exactly(t.packed.trees[t.grid_of[g]], geometry,
+                       file_.cluster(g, static_cast<uint32_t>(hit.part - geometry.first_cluster)), hit.triangle, 1,
+                       batch);
   for (int corner = 0; corner < 3; ++corner)
     for (int axis = 0; axis < 3; ++axis) surface.vertices[corner][axis] = batch.vertex[axis][corner][0];
   return surface;
@@ -293,7 +383,7 @@ std::vector<ResidentPart> PackedTracer::resident() const {
           {"cluster table", t.clusters.size() * sizeof(packed::TraceCluster)},
           {"placements", t.placements.size() * (sizeof(packed::TracePlacement) + sizeof(TreeBox) + sizeof(uint32_t)) +
                              t.surfaces.size() * sizeof(Placement) + t.top.size() * sizeof(packed::TopNode) +
-                             (t.tree_of.size() + t.first_instance.size()) * sizeof(uint32_t)},
+                             (t.tree_of.size() + t.grid_of.size() + t.first_instance.size()) * sizeof(uint32_t)},
           {"batch caches", BatchCacheOwner::bytes_of_all_threads()}};
 }
 
