@@ -154,7 +154,7 @@ TEST_F(LodSourceTest, IsTheSameForAllTracersAndAnyNumberOfThreads) {
   for (const SharingScheme which : {SharingScheme::kPerInstance, SharingScheme::kOneProvider, SharingScheme::kLevels,
                                     SharingScheme::kSteps}) {
     const Detailed detailed(baked_, camera_, 0.1, scheme(which));
-    ASSERT_GT(detailed.source.geometry_count(), 3u);
+    ASSERT_GE(detailed.plan.builds, 2u);
     const PackedTracer packed(baked_.file, detailed.source);
     const GBuffer expected = primary(detailed.source, packed, camera_);
     const GBuffer embree = primary(detailed.source, EmbreeTracer(detailed.source, {}), camera_);
