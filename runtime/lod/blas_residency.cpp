@@ -93,12 +93,12 @@ BlasResidency::Substitute BlasResidency::substitute(const LodPlan& plan, uint32_
   const std::span<const LodStep> steps = sharing_.steps(planned.geometry);
   const BlasHandle* handles = &step_handles_[first_step_[planned.geometry]];
   BlasHandle fine = kNoBlas, coarse = kNoBlas; // the coarsest that is fine enough, the finest that is not
-  for (uint32_t step = coarsest_step(steps, allowed) + 1; step-- > 0 && fine == kNoBlas;) fine = handles[step];
-  for (uint32_t step = coarsest_step(steps, allowed) + 1; step < steps.size() && coarse == kNoBlas; ++step)
-    coarse = handles[step];
+  const uint32_t coarsest = plan.step_of_instance[instance];
+  for (uint32_t step = coarsest + 1; step-- > 0 && fine == kNoBlas;) fine = handles[step];
+  for (uint32_t step = coarsest + 1; step < steps.size() && coarse == kNoBlas; ++step) coarse = handles[step];
   if (const BlasHandle last = previous_[instance]; last != kNoBlas && residents_[last].live) {
     const ResidentBlas& blas = residents_[last];
-    bool enough = blas.error <= allowed;
+    bool enough = blas.error <= std::max(allowed, steps[coarsest].error);
     if (!enough && blas.kind == BlasKind::kOwn && planned.kind == BlasKind::kOwn) {
       const std::span<const uint64_t> passed = passed_of(plan, planned);
       enough = true;

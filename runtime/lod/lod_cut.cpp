@@ -35,13 +35,15 @@ void cut_of_instance(const LodGeometry& geometry, const InstanceMetric& metric, 
     passed[rank / 64] |= uint64_t{metric.passes(geometry.ranks(), rank)} << (rank % 64);
 }
 
-uint64_t count_cut_triangles(const LodGeometry& geometry, const InstanceMetric& metric, const AllowedErrors& allowed) {
+CutCount count_cut(const LodGeometry& geometry, const InstanceMetric& metric, const AllowedErrors& allowed) {
   const uint32_t certain = geometry.ranks_up_to(allowed.near), end = geometry.ranks_up_to(allowed.far);
   const LodRanks& ranks = geometry.ranks();
+  uint32_t prefix = certain;
+  while (prefix < end && metric.passes(ranks, prefix)) ++prefix;
   int64_t saved = 0;
-  for (uint32_t rank = certain; rank < end; ++rank)
+  for (uint32_t rank = prefix + 1; rank < end; ++rank)
     saved += metric.passes(ranks, rank) ? ranks.saved_triangles[rank] : 0;
-  return static_cast<uint64_t>(static_cast<int64_t>(geometry.triangles_of_prefix(certain)) - saved);
+  return {static_cast<uint64_t>(static_cast<int64_t>(geometry.triangles_of_prefix(prefix)) - saved), prefix};
 }
 
 namespace {

@@ -45,8 +45,12 @@ void set_prefix(std::span<uint64_t> passed, uint32_t count);
 void cut_of_instance(const LodGeometry& geometry, const InstanceMetric& metric, const AllowedErrors& allowed,
                      std::span<uint64_t> passed);
 
-/// Triangles of cut_of_instance(), without storing it.
-uint64_t count_cut_triangles(const LodGeometry& geometry, const InstanceMetric& metric, const AllowedErrors& allowed);
+/// Of cut_of_instance(), without storing it.
+struct CutCount {
+  uint64_t triangles = 0;
+  uint32_t prefix = 0; ///< so many of the first ranks pass
+};
+CutCount count_cut(const LodGeometry& geometry, const InstanceMetric& metric, const AllowedErrors& allowed);
 
 /// What a cut holds.
 struct CutSize {

@@ -197,6 +197,12 @@ std::vector<LodStep> ratio_steps(const LodGeometry& geometry, double ratio) {
   return steps;
 }
 
+uint32_t coarsest_step_of_prefix(std::span<const LodStep> steps, uint32_t passed) {
+  const auto end =
+      std::upper_bound(steps.begin(), steps.end(), passed, [](uint32_t p, const LodStep& s) { return p < s.passed; });
+  return end == steps.begin() ? 0 : static_cast<uint32_t>(end - steps.begin()) - 1;
+}
+
 uint32_t coarsest_step(std::span<const LodStep> steps, double error) {
   const auto end =
       std::upper_bound(steps.begin(), steps.end(), error, [](double e, const LodStep& s) { return e < s.error; });

@@ -107,6 +107,9 @@ std::vector<LodStep> level_steps(const LodGeometry& geometry);
 /// coarsest cut within it. Order and ends as above. @param ratio above 1
 std::vector<LodStep> ratio_steps(const LodGeometry& geometry, double ratio);
 
+/// The coarsest step that the first `passed` ranks allow.
+uint32_t coarsest_step_of_prefix(std::span<const LodStep> steps, uint32_t passed);
+
 /// The coarsest step of at most that error. @param steps of a geometry @param error at least 0
 uint32_t coarsest_step(std::span<const LodStep> steps, double error);
 

@@ -103,23 +103,29 @@ InstanceMetric LodSharing::metric(const Frame& frame, const LodGeometry& geometr
   return {view, transforms_[slot], slots_[slot].ball.stretch, geometry.reach()};
 }
 
-/// Shared or own, and which step, of schemes whose shared BLASes are steps.
-void LodSharing::choose_step(const Frame& frame, uint32_t number, size_t slot, const Need& need, Choice& choice) const {
+/// Shared or own, and which step, of schemes whose shared BLASes are steps. @param fine_step of what passes
+/// for sure; becomes the coarsest that has detail enough
+void LodSharing::choose_step(const Frame& frame, uint32_t number, size_t slot, const Need& need, Choice& choice,
+                             uint32_t& fine_step) const {
   const LodGeometry& geometry = geometries_[number];
   const std::span<const LodStep> steps = steps_[number];
   const auto last = static_cast<uint32_t>(steps.size()) - 1;
-  const uint32_t stride = config_.tolerant_levels + 1;
-  choice.step = coarsest_step(steps, need.allowed.near) + config_.tolerant_levels;
-  choice.step = choice.step >= last ? last : choice.step / stride * stride; // only every stride-th is built
-  const uint64_t shared = steps[choice.step].triangles;
-  const auto holds_too_much = [&](double ratio) {
-    return static_cast<double>(shared) > ratio * static_cast<double>(choice.own_triangles);
-  };
+  choice.step = fine_step;
   // Its own cut has no fewer triangles than what all groups that might pass leave.
-  choice.own_triangles = std::min(shared, geometry.triangles_of_prefix(geometry.ranks_up_to(need.allowed.far)));
-  if (holds_too_much(1.0))
-    choice.own_triangles = count_cut_triangles(geometry, metric(frame, geometry, slot, need), need.allowed);
-  if (need.range.min + config_.shared_levels < geometry.levels().size() || holds_too_much(config_.own_cut_ratio))
+  choice.own_triangles =
+      std::min(steps[choice.step].triangles, geometry.triangles_of_prefix(geometry.ranks_up_to(need.allowed.far)));
+  if (choice.own_triangles < steps[choice.step].triangles) {
+    const CutCount own = count_cut(geometry, metric(frame, geometry, slot, need), need.allowed);
+    choice.own_triangles = own.triangles;
+    choice.step = std::max(choice.step, coarsest_step_of_prefix(steps, own.prefix));
+  }
+  fine_step = choice.step;
+  const uint32_t stride = config_.tolerant_levels + 1;
+  choice.step += config_.tolerant_levels;
+  choice.step = choice.step >= last ? last : choice.step / stride * stride; // only every stride-th is built
+  const auto shared = static_cast<double>(steps[choice.step].triangles);
+  if (choice.step < last && (need.range.min + config_.shared_levels < geometry.levels().size() ||
+                             shared > config_.own_cut_ratio * static_cast<double>(choice.own_triangles)))
     choice.category = InstanceCategory::kOwn;
 }
 
@@ -128,6 +134,9 @@ void LodSharing::choose_slots(const Frame& frame, const Block& block, LodPlan& p
   const auto last_step = static_cast<uint32_t>(steps_[block.geometry].size()) - 1;
   for (uint32_t slot = block.first; slot < block.last; ++slot) {
     const Need wanted = need(frame, geometry, slot);
+    uint32_t& fine_step = plan.step_of_instance[slots_[slot].instance];
+    fine_step = coarsest_step(steps_[block.geometry], wanted.allowed.near);
+    plan.allowed_error_of_instance[slots_[slot].instance] = wanted.allowed.near;
     Choice choice;
     choice.min_level = static_cast<uint8_t>(wanted.range.min);
     choice.max_level = static_cast<uint8_t>(wanted.range.max);
@@ -137,14 +146,13 @@ void LodSharing::choose_slots(const Frame& frame, const Block& block, LodPlan& p
       choice.step = last_step;
       choice.own_triangles = steps_[block.geometry][last_step].triangles;
     } else if (config_.scheme == SharingScheme::kLevels || config_.scheme == SharingScheme::kSteps) {
-      choose_step(frame, block.geometry, slot, wanted, choice);
+      choose_step(frame, block.geometry, slot, wanted, choice, fine_step);
     } else {
       choice.category = InstanceCategory::kOwn;
     }
     if (config_.measure)
-      choice.own_triangles = count_cut_triangles(geometry, metric(frame, geometry, slot, wanted), wanted.allowed);
+      choice.own_triangles = count_cut(geometry, metric(frame, geometry, slot, wanted), wanted.allowed).triangles;
     choices_[slot] = choice;
-    plan.allowed_error_of_instance[slots_[slot].instance] = wanted.allowed.near;
   }
 }
 
@@ -156,6 +164,7 @@ void LodSharing::plan(const DetailView& view, std::span<const uint8_t> culled, L
   plan.blas_of_instance.resize(slots_.size());
   plan.category_of_instance.resize(slots_.size());
   plan.allowed_error_of_instance.resize(slots_.size());
+  plan.step_of_instance.resize(slots_.size());
   tbb::parallel_for(size_t{0}, blocks_.size(), [&](size_t b) { choose_slots(frame, blocks_[b], plan); });
   plan.histograms.assign(histograms ? geometries_.size() : 0, {});
   tbb::parallel_for(size_t{0}, geometries_.size(),

@@ -59,7 +59,8 @@ struct LodPlan {
   std::vector<uint64_t> passed;  ///< of own cuts
   std::vector<uint32_t> blas_of_instance;
   std::vector<InstanceCategory> category_of_instance;
-  std::vector<double> allowed_error_of_instance; ///< a cut up to this error has detail enough; object units
+  std::vector<double> allowed_error_of_instance; ///< all groups up to this error pass; object units
+  std::vector<uint32_t> step_of_instance;        ///< the coarsest one that has detail enough, used or not
   std::vector<LevelHistogram> histograms;        ///< by geometry; with kOneProvider or SharingConfig::measure only
   std::array<uint64_t, 4> category_counts{};     ///< by InstanceCategory
   uint64_t builds = 0;                           ///< BLASes that are not kLowest
@@ -138,7 +139,8 @@ private:
   Need need(const Frame& frame, const LodGeometry& geometry, size_t slot) const;
   InstanceMetric metric(const Frame& frame, const LodGeometry& geometry, size_t slot, const Need& need) const;
   void choose_slots(const Frame& frame, const Block& block, LodPlan& plan);
-  void choose_step(const Frame& frame, uint32_t geometry, size_t slot, const Need& need, Choice& choice) const;
+  void choose_step(const Frame& frame, uint32_t geometry, size_t slot, const Need& need, Choice& choice,
+                   uint32_t& fine_step) const;
   void plan_geometry(const Frame& frame, uint32_t geometry, LodPlan& plan);
   void fill_histogram(uint32_t geometry, LevelHistogram& histogram) const;
   void balance(uint32_t geometry);

@@ -6,35 +6,75 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kNone = ~0u;
-constexpr size_t kTries = 16; // numbers of own cuts tried beyond those that the limit asks for
+constexpr size_t kTries = 8; // numbers of own cuts tried beyond those that the limit asks for
+
+/// Which of the steps in use are built. Users of a step take the finest of the segment it is in, so by dynamic
+/// programming over ends of segments: the least triangles with one segment, two, ... until they are within the limit.
+class StepChooser {
+public:
+  StepChooser(std::span<const LodStep> steps, std::span<const uint32_t> users) : steps_(steps) {
+    for (uint32_t step = 0; step + 1 < steps.size(); ++step) { // the last needs no build
+      if (users[step] == 0) continue;
+      used_.push_back(step);
+      count_.push_back(count_.back() + users[step]);
+      triangles_.push_back(triangles_.back() + users[step] * steps[step].triangles);
+    }
+  }
+
+  /// First steps of the segments, ascending. @param room triangles that may be traced on top, at least 0
+  std::vector<uint32_t> choose(uint64_t room, uint64_t& spent) {
+    const size_t count = used_.size();
+    if (count == 0) return {};
+    std::vector<uint64_t> extra(count + 1), before(count + 1); // by how many steps are covered
+    for (size_t end = 1; end <= count; ++end) extra[end] = cost(0, end);
+    std::vector<std::vector<uint32_t>> first{std::vector<uint32_t>(count + 1)}; // of the last segment
+    while (extra[count] > room) {
+      const size_t segments = first.size() + 1;
+      before.swap(extra);
+      first.emplace_back(count + 1);
+      for (size_t end = segments; end <= count; ++end) {
+        extra[end] = ~uint64_t{0};
+        for (size_t begin = segments - 1; begin < end; ++begin)
+          if (const uint64_t all = before[begin] + cost(begin, end); all < extra[end])
+            extra[end] = all, first.back()[end] = static_cast<uint32_t>(begin);
+      }
+    }
+    spent = extra[count];
+    std::vector<uint32_t> built(first.size());
+    for (size_t segment = first.size(), end = count; segment-- > 0; end = first[segment][end])
+      built[segment] = used_[first[segment][end]];
+    return built;
+  }
+
+private:
+  /// Triangles on top if the users of [begin, end) take the first of them.
+  uint64_t cost(size_t begin, size_t end) const {
+    return steps_[used_[begin]].triangles * (count_[end] - count_[begin]) - (triangles_[end] - triangles_[begin]);
+  }
+
+  std::span<const LodStep> steps_;
+  std::vector<uint32_t> used_;
+  std::vector<uint64_t> count_{0}, triangles_{0}; ///< sums over those before
+};
 
 void leave_out_steps(std::span<const LodStep> steps, double limit, SharingBalance& balance) {
-  std::vector<uint32_t>& users = balance.users;
   balance.instead.resize(steps.size());
   std::iota(balance.instead.begin(), balance.instead.end(), 0u);
-  const auto built = static_cast<uint32_t>(steps.size()) - 1;
-  balance.builds = static_cast<size_t>(std::count_if(users.begin(), users.end() - 1, [](uint32_t u) { return u > 0; }));
-  for (;;) {
-    uint64_t least = ~uint64_t{0};
-    uint32_t finer = kNone, left_out = kNone, taken = kNone;
-    for (uint32_t step = 0; step < built; ++step) {
-      if (users[step] == 0) continue;
-      if (finer != kNone) {
-        const uint64_t cost = users[step] * (steps[finer].triangles - steps[step].triangles);
-        if (cost < least) least = cost, left_out = step, taken = finer;
-      }
-      finer = step;
-    }
-    if (left_out == kNone || static_cast<double>(balance.traced + least) > limit) break;
-    users[taken] += users[left_out];
-    users[left_out] = 0;
-    balance.instead[left_out] = taken;
-    balance.traced += least;
-    --balance.builds;
+  uint64_t spent = 0, room = 0;
+  if (const auto traced = static_cast<double>(balance.traced); limit > traced)
+    room = static_cast<uint64_t>(std::min(limit - traced, 0x1p62));
+  const std::vector<uint32_t> built = StepChooser(steps, balance.users).choose(room, spent);
+  balance.builds = built.size();
+  balance.traced += spent;
+  size_t segment = 0;
+  for (uint32_t step = 0; step + 1 < steps.size(); ++step) {
+    if (balance.users[step] == 0) continue;
+    if (segment + 1 < built.size() && built[segment + 1] == step) ++segment;
+    if (built[segment] == step) continue;
+    balance.instead[step] = built[segment];
+    balance.users[built[segment]] += balance.users[step];
+    balance.users[step] = 0;
   }
-  // Finer ones first: where they lead is known.
-  for (uint32_t step = 0; step < built; ++step) balance.instead[step] = balance.instead[balance.instead[step]];
 }
 
 } // namespace

@@ -24,9 +24,9 @@ struct OwnCutSaving {
   uint32_t slot = 0; ///< whose it is; for the caller
 };
 
-/// Few builds such that no more than `limit` triangles are traced. For growing numbers of own cuts, those first that
-/// save most, it leaves out the step that costs least to do without, again and again; its users take the next finer one
-/// that is built. The last step needs no build. Greedy: not always the fewest.
+/// Few builds such that no more than `limit` triangles are traced. Own cuts go to those that save most. For some
+/// numbers of them, from the least that the limit asks for, it finds the fewest steps to build: users of the others
+/// take the next finer one that is built. The last step needs no build.
 /// @param users by step @param traced triangles of all instances as they are
 /// @param savings of instances counted in `users`; sorted: largest first, ties by slot
 /// If the limit cannot be met, all savings are made and no step is left out.

@@ -18,7 +18,7 @@ void require_range(const char* name, double value, double low, double high) {
 
 void SharingConfig::validate() const {
   require_range("scheme", static_cast<double>(scheme), 0, static_cast<double>(SharingScheme::kSteps));
-  require_range("step_ratio", step_ratio, 1.01, 16.0);
+  require_range("step_ratio", step_ratio, 1.05, 16.0);
   if (traced_ratio != 0.0) require_range("traced_ratio", traced_ratio, 1.0, std::numeric_limits<double>::infinity());
   require_range("own_cut_ratio", own_cut_ratio, 1.0, std::numeric_limits<double>::infinity());
   require_range("shared_levels", shared_levels, 0, 32);

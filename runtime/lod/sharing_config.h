@@ -19,7 +19,7 @@ enum class SharingScheme : uint8_t {
 struct SharingConfig {
   SharingScheme scheme = SharingScheme::kSteps;
 
-  /// kSteps: triangles of one step by those of the next. [1.01..16]
+  /// kSteps: triangles of one step by those of the next. [1.05..16]
   double step_ratio = 1.15;
 
   /// kLevels, kSteps: the instances of a geometry together trace at most this many times the triangles of their own

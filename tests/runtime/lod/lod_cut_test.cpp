@@ -153,7 +153,11 @@ TEST(LodCut, EqualsBruteForceAndTraversal) {
       ASSERT_EQ(cut, traverse(c));
       uint64_t triangles = 0;
       for (const uint32_t i : cut) triangles += geometry.cluster_triangles()[i];
-      ASSERT_EQ(count_cut_triangles(geometry, c.metric(), c.allowed()), triangles);
+      const CutCount count = count_cut(geometry, c.metric(), c.allowed());
+      ASSERT_EQ(count.triangles, triangles);
+      uint32_t prefix = 0;
+      while (prefix < geometry.rank_count() && rank_passes(passed, prefix)) ++prefix;
+      ASSERT_EQ(count.prefix, prefix);
       mixed += c.range().min < c.range().max;
     }
   }

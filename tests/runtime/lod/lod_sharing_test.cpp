@@ -209,7 +209,7 @@ TEST(LodSharing, OwnCutsGoToThoseThatSaveMost) {
   for (uint32_t i = 0; i < instances.size(); ++i) {
     const uint32_t g = instances[i].geometry;
     const std::span<const LodStep> steps = sharing.steps(g);
-    const uint64_t shared = steps[coarsest_step(steps, plan.allowed_error_of_instance[i])].triangles;
+    const uint64_t shared = steps[plan.step_of_instance[i]].triangles;
     const uint64_t saved = shared - size_of_cut(geometries[g], own_cut(geometries[g], instances[i], view)).triangles;
     if (plan.category_of_instance[i] == InstanceCategory::kOwn)
       least_of_own[g] = std::min(least_of_own[g], saved);
@@ -270,6 +270,7 @@ TEST(LodSharing, IsTheSameForAnyNumberOfThreads) {
       EXPECT_EQ(plans[p].blas_of_instance, plans[0].blas_of_instance);
       EXPECT_EQ(plans[p].category_of_instance, plans[0].category_of_instance);
       EXPECT_EQ(plans[p].allowed_error_of_instance, plans[0].allowed_error_of_instance);
+      EXPECT_EQ(plans[p].step_of_instance, plans[0].step_of_instance);
       EXPECT_EQ(plans[p].passed, plans[0].passed);
       EXPECT_EQ(plans[p].traced_triangles, plans[0].traced_triangles);
       EXPECT_EQ(plans[p].own_triangles, plans[0].own_triangles);
@@ -310,7 +311,7 @@ TEST(LodSharing, ToleranceIsKeptToItsLevels) {
     const PlannedBlas& blas = plan.blas[plan.blas_of_instance[i]];
     if (blas.kind == BlasKind::kOwn) continue;
     const std::span<const LodStep> steps = sharing.steps(instances[i].geometry);
-    const uint32_t needed = coarsest_step(steps, plan.allowed_error_of_instance[i]);
+    const uint32_t needed = plan.step_of_instance[i];
     EXPECT_LE(blas.index, needed + 2);
     coarser += blas.index > needed;
   }

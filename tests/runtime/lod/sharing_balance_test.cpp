@@ -1,6 +1,7 @@
 #include "runtime/lod/sharing_balance.h"
 
 #include <algorithm>
+#include <bit>
 #include <numeric>
 
 #include <gtest/gtest.h>
@@ -87,6 +88,46 @@ TEST(SharingBalance, KeepsToTheLimitAndCountsRight) {
   }
   EXPECT_GT(own, 1000u);
   EXPECT_GT(left_out, 500u);
+}
+
+/// Against all subsets of steps.
+TEST(SharingBalance, BuildsTheFewestSteps) {
+  test::Random random(2);
+  size_t between = 0;
+  for (int i = 0; i < 500; ++i) {
+    std::vector<LodStep> steps(9);
+    uint64_t triangles = 100'000;
+    for (LodStep& step : steps) step.triangles = triangles = triangles * (50 + random.bits() % 45) / 100;
+    std::vector<uint32_t> users(steps.size());
+    uint64_t traced = 0;
+    size_t used = 0;
+    for (size_t k = 0; k < steps.size(); ++k) {
+      users[k] = random.bits() % 3 == 0 ? 0 : random.bits() % 50;
+      traced += users[k] * steps[k].triangles;
+      used += k + 1 < steps.size() && users[k] > 0;
+    }
+    const double limit = random.uniform(1.0f, 2.0f) * static_cast<double>(traced);
+    std::pair<size_t, uint64_t> fewest{~size_t{0}, 0}; // builds, then triangles
+    for (uint32_t subset = 0; subset < 256; ++subset) {
+      uint64_t all = 0;
+      size_t finer = steps.size();
+      bool covered = true;
+      for (size_t k = 0; k < 8; ++k) {
+        if ((subset >> k & 1) != 0) finer = k;
+        if (users[k] == 0) continue;
+        covered &= finer < steps.size();
+        if (covered) all += users[k] * steps[finer].triangles;
+      }
+      all += users[8] * steps[8].triangles;
+      if (covered && static_cast<double>(all) <= limit)
+        fewest = std::min(fewest, {static_cast<size_t>(std::popcount(subset)), all});
+    }
+    const SharingBalance balance = balance_builds(steps, users, traced, limit, {});
+    EXPECT_EQ(balance.builds, fewest.first);
+    EXPECT_EQ(balance.traced, fewest.second);
+    between += balance.builds > 1 && balance.builds < used;
+  }
+  EXPECT_GT(between, 100u);
 }
 
 } // namespace
