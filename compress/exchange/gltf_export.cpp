@@ -294,7 +294,7 @@ void validate(const GltfConfig& config) {
 
 GltfExport export_gltf(const BakedFile& file, const GltfConfig& config, Progress& progress) {
   validate(config);
-  const auto geometries = static_cast<uint32_t>(file.geometries().size());
+  const auto geometries = file.base_geometry_count(); // levels of detail stay behind
   std::vector<std::vector<EncodedPrimitive>> encoded(geometries);
   std::vector<LatticeBox> boxes(geometries);
   progress.begin("decoding", geometries);

@@ -362,6 +362,16 @@ TEST(GltfExport, GeometryBeyondDracosBitsIsStoredAsFloats) {
   EXPECT_TRUE(parse(result).extensionsRequired.empty());
 }
 
+TEST(GltfExport, LeavesOutLevelsOfDetail) {
+  const Scene scene = test::scene_of(test::sphere_mesh(20));
+  BakeConfig config;
+  config.lod = LodUse::kAll;
+  const BakedFile without = BakedFile::from_bytes(test::bake(scene).bytes);
+  const BakedFile with = BakedFile::from_bytes(test::bake(scene, config).bytes);
+  ASSERT_GT(with.geometries().size(), without.geometries().size());
+  EXPECT_EQ(export_of(with).bytes, export_of(without).bytes);
+}
+
 TEST(GltfExport, EmptyScenesAreFiles) {
   const BakedScene baked = test::bake(Scene{});
   const tinygltf::Model model = parse(export_of(BakedFile::from_bytes(baked.bytes)));
