@@ -41,37 +41,39 @@ public:
 
 private:
   void trace_row(uint32_t y0, const Tile& tile) const {
-    RayBatch t;
+    RayBatch batch;
     for (uint32_t x = tile.x0; x < tile.x1; x += kBlock)
-      for (uint32_t i = 0; i < kBlock * kBlock; ++i) add_ray(x + i % kBlock, y0 + i / kBlock, tile, t);
-    tracer_.closest_hits({t.rays, t.count}, kCameraRays, RayOrder::kCoherent, {t.hits, t.count});
-    for (uint32_t i = 0; i < t.count; ++i) {
-      if (t.x[i] >= tile.x1 || t.y[i] >= tile.y1) continue;
-      t.hits[i].valid() ? add_hit(i, t) : write_miss(pixel_of(i, t));
+      for (uint32_t i = 0; i < kBlock * kBlock; ++i) add_ray(x + i % kBlock, y0 + i / kBlock, tile, batch);
+    tracer_.closest_hits({batch.rays, batch.count}, kCameraRays, RayOrder::kCoherent, {batch.hits, batch.count});
+    for (uint32_t i = 0; i < batch.count; ++i) {
+      if (batch.x[i] >= tile.x1 || batch.y[i] >= tile.y1) continue;
+      batch.hits[i].valid() ? add_hit(i, batch) : write_miss(pixel_of(i, batch));
     }
-    source_.look_up({t.places, t.hit_count}, {t.attributes, t.hit_count});
-    for (uint32_t h = 0; h < t.hit_count; ++h) write_hit(h, t);
+    source_.look_up({batch.places, batch.hit_count}, {batch.attributes, batch.hit_count});
+    for (uint32_t h = 0; h < batch.hit_count; ++h) write_hit(h, batch);
   }
 
   /// @param x, y may lie beyond the tile
-  void add_ray(uint32_t x, uint32_t y, const Tile& tile, RayBatch& t) const {
-    const uint32_t i = t.count++;
-    t.x[i] = x, t.y[i] = y;
-    CameraRay& ray = t.exact[i] = now_.ray(std::min(x, tile.x1 - 1), std::min(y, tile.y1 - 1));
+  void add_ray(uint32_t x, uint32_t y, const Tile& tile, RayBatch& batch) const {
+    const uint32_t i = batch.count++;
+    batch.x[i] = x, batch.y[i] = y;
+    CameraRay& ray = batch.exact[i] = now_.ray(std::min(x, tile.x1 - 1), std::min(y, tile.y1 - 1));
     ray.origin = space_.to_unit(ray.origin);
     const bool traced = approach(ray) && x < tile.x1 && y < tile.y1;
-    t.rays[i] = {Vec3(ray.origin), 0.0f, Vec3(ray.direction), traced ? std::numeric_limits<float>::infinity() : -1.0f};
+    batch.rays[i] = {Vec3(ray.origin), 0.0f, Vec3(ray.direction),
+                     traced ? std::numeric_limits<float>::infinity() : -1.0f};
   }
 
-  size_t pixel_of(uint32_t i, const RayBatch& t) const {
-    return static_cast<size_t>(t.y[i]) * out_.size.width + t.x[i];
+  size_t pixel_of(uint32_t i, const RayBatch& batch) const {
+    return static_cast<size_t>(batch.y[i]) * out_.size.width + batch.x[i];
   }
 
-  void add_hit(uint32_t i, RayBatch& t) const {
-    const uint32_t h = t.hit_count++;
-    t.hit_rays[h] = i;
-    t.surfaces[h] = tracer_.resolve(t.hits[i]);
-    t.places[h] = {t.surfaces[h].placement->instance, t.surfaces[h].triangle, Vec2(t.hits[i].u, t.hits[i].v)};
+  void add_hit(uint32_t i, RayBatch& batch) const {
+    const uint32_t h = batch.hit_count++;
+    batch.hit_rays[h] = i;
+    batch.surfaces[h] = tracer_.resolve(batch.hits[i]);
+    batch.places[h] = {batch.surfaces[h].placement->instance, batch.surfaces[h].triangle,
+                       Vec2(batch.hits[i].u, batch.hits[i].v)};
   }
 
   /// Moves the origin of a ray that starts far away along the ray to just before the scene: floats keep what is seen
@@ -98,14 +100,14 @@ private:
     out_.motion_px[pixel] = Vec2(0);
   }
 
-  void write_hit(uint32_t h, const RayBatch& t) const {
-    const uint32_t i = t.hit_rays[h];
-    const CameraRay& ray = t.exact[i];
-    const HitSurface& hit = t.surfaces[h];
-    const SurfaceAttributes& attributes = t.attributes[h];
+  void write_hit(uint32_t h, const RayBatch& batch) const {
+    const uint32_t i = batch.hit_rays[h];
+    const CameraRay& ray = batch.exact[i];
+    const HitSurface& hit = batch.surfaces[h];
+    const SurfaceAttributes& attributes = batch.attributes[h];
     const Placement& placement = *hit.placement;
-    const Vec2 barycentrics(t.hits[i].u, t.hits[i].v);
-    const size_t pixel = pixel_of(i, t);
+    const Vec2 barycentrics(batch.hits[i].u, batch.hits[i].v);
+    const size_t pixel = pixel_of(i, batch);
     const DVec3 v0(hit.vertices[0]), e1 = DVec3(hit.vertices[1]) - v0, e2 = DVec3(hit.vertices[2]) - v0;
     const DVec3 cross = glm::cross(e1, e2);
 
@@ -125,7 +127,7 @@ private:
     out_.triangle[pixel] = hit.triangle;
     out_.material[pixel] = attributes.material;
     out_.offset[pixel] = static_cast<float>(ray_offset(hit, space_, unit_position, facing) * space_.inverse_scale());
-    out_.motion_px[pixel] = motion(position, glm::dvec2(t.x[i], t.y[i]) + 0.5);
+    out_.motion_px[pixel] = motion(position, glm::dvec2(batch.x[i], batch.y[i]) + 0.5);
   }
 
   /// The point of the surface's plane on the ray. Barycentrics are floats: on a large triangle they stay on the plane

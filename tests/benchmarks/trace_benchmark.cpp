@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -190,6 +191,7 @@ Json measure_passes(const TraceInput& input, const Systems& systems, const Prima
     passes.push_back(std::move(json));
   }
   fmt::print("\n");
+  std::fflush(stdout);
   return passes;
 }
 
@@ -217,11 +219,16 @@ void check_mismatches(const Json& rows, const Systems& systems, double most) {
 Json measure_input(const std::string& name, const Options& options) {
   const std::unique_ptr<TraceInput> input = load_trace_input(name, options.inputs);
   Systems systems = make_systems(*input);
-  const PrimaryCamera camera(choose_camera(input->source, options), options.size);
   const float radius = default_ao_radius(input->source.world_bounds());
   const RayTracer& recorder = *systems.trees[systems.truth_trees];
-  const auto frame =
-      std::make_shared<const std::vector<RecordedRays>>(record_frame(input->source, recorder, camera, radius));
+  PrimaryCamera camera(choose_camera(input->source, options), options.size);
+  std::vector<RecordedRays> recorded = record_frame(input->source, recorder, camera, radius);
+  if (recorded[1].count() == 0 && options.camera == "0") { // it looks past the scene
+    camera = PrimaryCamera(framing_camera(input->source.world_bounds(), options.size), options.size);
+    recorded = record_frame(input->source, recorder, camera, radius);
+  }
+  if (recorded[1].count() == 0) throw Error(ErrorKind::kInput, name + ": the camera sees nothing");
+  const auto frame = std::make_shared<const std::vector<RecordedRays>>(std::move(recorded));
   for (System& row : systems.rows) {
     const bool same = row.tracer->space() == recorder.space();
     row.rays =
@@ -265,10 +272,14 @@ int run(int argc, char** argv) {
       ->envname("PACKTRACE_SCENES");
   app.add_option("--mesh-triangles", options.inputs.mesh_triangles, "of the input mesh")->capture_default_str();
   app.add_option("--forest-instances", options.inputs.forest_instances, "of the input forest")->capture_default_str();
-  app.add_option("--camera", options.camera, "which of the scene's, or auto")->capture_default_str();
+  app.add_option("--camera", options.camera, "which of the scene's, or auto; auto instead of one that sees nothing")
+      ->capture_default_str();
   app.add_option("--width", options.size.width, "pixels")->capture_default_str();
   app.add_option("--height", options.size.height, "pixels")->capture_default_str();
-  app.add_option("--threads", options.threads, "how many, one table each")->delimiter(',')->capture_default_str();
+  app.add_option("--threads", options.threads, "how many, one table each")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->capture_default_str();
   app.add_option("--repeats", options.repeats, "of which the median counts")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000));
