@@ -67,6 +67,8 @@ struct BakeConfig {
   /// How the file lies on disk. Changes nothing that is decoded from it.
   PageCodec codec = PageCodec::kNone;
 
+  bool trees = true; ///< whether the file holds trees over its clusters, or they are built when it is traced
+
   LodUse lod = LodUse::kOff;
   uint32_t lod_min_triangles = 512; ///< geometries of fewer get no levels
   uint32_t lod_levels = 31;         ///< above the source's, at most; 1..31

@@ -88,6 +88,10 @@ private:
     sections.set_instances(plan_.instances);
     sections.set_material_slots(plan_.material_slots);
     sections.set_requirements(requirements.rows());
+    if (config_.trees) {
+      progress_.begin("building trees", 0);
+      sections.build_trees();
+    }
     add_up();
     return sections.assemble(summary(sections));
   }

@@ -163,6 +163,17 @@ void FileSections::append(baked::GeometryRecord& record, const EncodedGeometry& 
   stream_bits_.uvs += encoded.stream_bits.uvs;
 }
 
+void FileSections::build_trees() {
+  payload_.resize(payload_.size() + kReadSlackBytes);
+  BakedSections sections;
+  sections.geometries = geometries_;
+  sections.clusters = clusters_;
+  sections.payload = payload_;
+  sections.instances = instances_;
+  trees_ = build_packed_trees(sections);
+  payload_.resize(payload_.size() - kReadSlackBytes);
+}
+
 std::vector<std::byte> FileSections::assemble(const baked::SummaryRecord& summary) {
   payload_.resize(payload_.size() + kReadSlackBytes);
   return assemble_baked_file({geometries_,
@@ -181,7 +192,9 @@ std::vector<std::byte> FileSections::assemble(const baked::SummaryRecord& summar
                               requirements_,
                               lod_levels_,
                               lod_groups_,
-                              lod_links_});
+                              lod_links_,
+                              trees_.trees,
+                              trees_.nodes});
 }
 
 } // namespace packtrace

@@ -9,6 +9,7 @@
 #include "compress/bake/lod/lod_encoder.h"
 #include "compress/bake/texture_encoder.h"
 #include "compress/format/baked_format.h"
+#include "compress/format/packed_trees.h"
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace {
@@ -33,6 +34,9 @@ public:
 
   const std::vector<baked::GeometryRecord>& geometries() const { return geometries_; }
   const ClusterView::StreamBits& stream_bits() const { return stream_bits_; }
+
+  /// Makes the trees of what was added. Throws as build_packed_trees().
+  void build_trees();
 
   /// The file's bytes. Nothing may be added afterwards.
   std::vector<std::byte> assemble(const baked::SummaryRecord& summary);
@@ -61,6 +65,7 @@ private:
   std::vector<baked::LodLevelRecord> lod_levels_;
   std::vector<baked::LodGroupRecord> lod_groups_;
   std::vector<baked::LodLinkRecord> lod_links_;
+  PackedTrees trees_;
   ClusterView::StreamBits stream_bits_;
 };
 

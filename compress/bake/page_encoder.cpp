@@ -16,6 +16,7 @@
 #include "compress/format/page_cluster.h"
 #include "compress/format/page_decoder.h"
 #include "compress/format/page_model.h"
+#include "compress/format/tree_topology.h"
 #include "pbrt_import/scene/error.h"
 
 namespace packtrace {
@@ -188,6 +189,18 @@ std::vector<PageRange> split_into_pages(const BakedSections& sections) {
   return pages;
 }
 
+/// The bytes on disk and their form. Nodes in an order of their own are stored as they are.
+std::pair<Bytes, baked::NodeForm> encode_nodes(ZSTD_CCtx* zstd, const BakedSections& sections) {
+  if (sections.nodes.empty()) return {{}, baked::kNodesWhole};
+  const Bytes topology = pack_tree_topology(sections);
+  std::vector<baked::PackedNode> restored(sections.nodes.size());
+  if (restore_nodes(sections, topology, restored) &&
+      std::memcmp(restored.data(), sections.nodes.data(), sections.nodes.size_bytes()) == 0)
+    return {zip(zstd, topology), baked::kNodesTopology};
+  return {zip(zstd, {reinterpret_cast<const uint8_t*>(sections.nodes.data()), sections.nodes.size_bytes()}),
+          baked::kNodesWhole};
+}
+
 } // namespace
 
 std::vector<std::byte> encode_paged_file(const BakedFile& file, PageCodec codec) {
@@ -206,7 +219,8 @@ std::vector<std::byte> encode_paged_file(const BakedFile& file, PageCodec codec)
   const size_t tail_begin = offset_of(sections.materials.data());
   const std::unique_ptr<ZSTD_CCtx, size_t (*)(ZSTD_CCtx*)> zstd{ZSTD_createCCtx(), &ZSTD_freeCCtx};
   Bytes head = zip(zstd.get(), {resident, head_end});
-  Bytes tail = zip(zstd.get(), {resident + tail_begin, bytes.size() - tail_begin});
+  const size_t tail_end = offset_of(sections.nodes.data());
+  Bytes tail = zip(zstd.get(), {resident + tail_begin, tail_end - tail_begin});
 
   Bytes table;
   baked::PagedHeader header{};
@@ -215,8 +229,10 @@ std::vector<std::byte> encode_paged_file(const BakedFile& file, PageCodec codec)
     for (size_t i = 0; i < kPageStreams; ++i) header.stream_bytes[i] += page.stream_bytes[i];
     header.file_bytes += page.bytes.size();
   }
+  const auto [nodes, node_form] = encode_nodes(zstd.get(), sections);
   append(table, head);
   append(table, tail);
+  append(table, nodes);
   header.magic = baked::kMagic;
   header.version = baked::kVersion;
   header.header_bytes = sizeof header;
@@ -225,7 +241,8 @@ std::vector<std::byte> encode_paged_file(const BakedFile& file, PageCodec codec)
   header.page_count = static_cast<uint32_t>(pages.size());
   header.resident_bytes = bytes.size();
   header.head_bytes = head_end, header.head_disk_bytes = head.size();
-  header.tail_bytes = bytes.size() - tail_begin, header.tail_disk_bytes = tail.size();
+  header.tail_bytes = tail_end - tail_begin, header.tail_disk_bytes = tail.size();
+  header.node_count = sections.nodes.size(), header.node_disk_bytes = nodes.size(), header.node_form = node_form;
   header.table_hash = XXH3_64bits(table.data(), table.size());
   header.header_hash = XXH3_64bits(&header, offsetof(baked::PagedHeader, header_hash));
 

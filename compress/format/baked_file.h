@@ -37,6 +37,8 @@ struct BakedSections {
   std::span<const baked::LodLevelRecord> lod_levels;
   std::span<const baked::LodGroupRecord> lod_groups;
   std::span<const baked::LodLinkRecord> lod_links;
+  std::span<const baked::TreeRecord> trees; ///< none: build_packed_trees() makes them
+  std::span<const baked::PackedNode> nodes;
 
   std::string_view text(baked::StringRef ref) const { return {strings.data() + ref.offset, ref.bytes}; }
 };

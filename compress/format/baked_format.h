@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "compress/format/lod_format.h"
+#include "compress/format/packed_node.h"
 #include "pbrt_import/scene/material_flags.h"
 
 /// What lies in a .ptk file, version 4; docs/baked_format.md says it in words. Little-endian; every section starts at a
@@ -36,6 +37,8 @@ enum Section : uint32_t {
   kLodLevels, ///< LodLevelRecord, lod_format.h
   kLodGroups, ///< LodGroupRecord
   kLodLinks,  ///< LodLinkRecord
+  kTrees,     ///< TreeRecord, packed_node.h
+  kNodes,     ///< PackedNode, of all trees in order; the last section, as files of other codecs make it anew
   kSectionCount
 };
 
@@ -55,7 +58,6 @@ struct FileHeader {
   uint32_t section_count;
   uint32_t reserved;
   std::array<SectionRecord, kSectionCount> sections;
-  std::array<uint64_t, 6> padding;
   uint64_t header_hash; ///< XXH3-64 of the header before this field
 };
 
@@ -233,7 +235,7 @@ inline constexpr bool kIsPod = std::is_trivially_copyable_v<T>&& std::is_standar
 
 static_assert(kIsPod<FileHeader> && sizeof(SectionRecord) == 24 && sizeof(FileHeader) == 512);
 static_assert(offsetof(FileHeader, content_hash) == 24 && offsetof(FileHeader, sections) == 48 &&
-              offsetof(FileHeader, padding) == 456 && offsetof(FileHeader, header_hash) == 504);
+              offsetof(FileHeader, header_hash) == 504);
 static_assert(kIsPod<GeometryRecord> && sizeof(GeometryRecord) == 192 && alignof(GeometryRecord) == 8);
 static_assert(offsetof(GeometryRecord, origin) == 24 && offsetof(GeometryRecord, cluster_count) == 64 &&
               offsetof(GeometryRecord, bounds_lo) == 96 && offsetof(GeometryRecord, flags) == 132 &&
@@ -271,7 +273,9 @@ inline constexpr std::array<uint32_t, kSectionCount> kRecordBytes = {sizeof(Geom
                                                                      sizeof(RequirementRecord),
                                                                      sizeof(LodLevelRecord),
                                                                      sizeof(LodGroupRecord),
-                                                                     sizeof(LodLinkRecord)};
+                                                                     sizeof(LodLinkRecord),
+                                                                     sizeof(TreeRecord),
+                                                                     sizeof(PackedNode)};
 
 inline constexpr uint32_t kMaskedClass = 4; ///< bit of a material class: a mask must be looked up
 

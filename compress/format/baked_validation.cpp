@@ -9,6 +9,7 @@
 #include "compress/format/baked_file.h"
 #include "compress/format/bit_stream.h"
 #include "compress/format/lod_validation.h"
+#include "compress/format/tree_validation.h"
 #include "pbrt_import/scene/error.h"
 
 namespace packtrace {
@@ -31,6 +32,7 @@ public:
     check_lod_levels();
     check_geometries();
     if (const auto fault = find_lod_group_fault(sections_)) fail(fault->section, fault->record, fault->what);
+    if (const auto fault = find_tree_fault(sections_)) fail(fault->section, fault->record, fault->what);
     check_cameras();
     check_requirements();
     check_summary();
@@ -63,7 +65,7 @@ private:
     if (header_.file_bytes != bytes_.size())
       fail("it has " + std::to_string(bytes_.size()) + " bytes, its header says " + std::to_string(header_.file_bytes));
     if (header_.section_count != baked::kSectionCount) fail("section count");
-    if (header_.reserved != 0 || header_.padding != decltype(header_.padding){}) fail("reserved header fields");
+    if (header_.reserved != 0) fail("reserved header fields");
     const XXH128_hash_t hash = XXH3_128bits(bytes_.data() + sizeof header_, bytes_.size() - sizeof header_);
     if (hash.low64 != header_.content_hash[0] || hash.high64 != header_.content_hash[1])
       fail("content hash does not match");
@@ -102,7 +104,9 @@ private:
                  section<baked::RequirementRecord>(baked::kRequirements),
                  section<baked::LodLevelRecord>(baked::kLodLevels),
                  section<baked::LodGroupRecord>(baked::kLodGroups),
-                 section<baked::LodLinkRecord>(baked::kLodLinks)};
+                 section<baked::LodLinkRecord>(baked::kLodLinks),
+                 section<baked::TreeRecord>(baked::kTrees),
+                 section<baked::PackedNode>(baked::kNodes)};
     if (sections_.payload.size() < kReadSlackBytes) fail("payload section without its final zero bytes");
     if (sections_.summary.size() != 1) fail("summary section must hold one record");
     if (sections_.geometries.size() >= baked::kNone || sections_.instances.size() >= baked::kNone ||

@@ -21,6 +21,7 @@ StreamBytes stream_bytes(const BakedFile& file) {
   bytes.instance_records = s.instances.size_bytes();
   bytes.requirement_records = s.requirements.size_bytes();
   bytes.lod_records = s.lod_levels.size_bytes() + s.lod_groups.size_bytes() + s.lod_links.size_bytes();
+  bytes.trees = s.trees.size_bytes() + s.nodes.size_bytes();
   bytes.material_records = s.materials.size_bytes() + s.material_slots.size_bytes();
   bytes.masks = s.masks.size_bytes() + s.mask_words.size_bytes();
   bytes.textures = s.textures.size_bytes() + s.texture_bytes.size();
@@ -29,7 +30,7 @@ StreamBytes stream_bytes(const BakedFile& file) {
   bytes.total = file.file_bytes();
   bytes.header_and_alignment = bytes.total - s.payload.size() - bytes.cluster_records - bytes.geometry_records -
                                bytes.instance_records - bytes.material_records - bytes.masks - bytes.textures -
-                               bytes.cameras - bytes.strings - bytes.requirement_records - bytes.lod_records;
+                               bytes.cameras - bytes.strings - bytes.requirement_records - bytes.lod_records - bytes.trees;
   return bytes;
 }
 
@@ -143,6 +144,8 @@ void add_materials(FileSummary& summary, const BakedSections& s) {
 FileSummary summarize(const BakedFile& file) {
   const BakedSections& s = file.sections();
   FileSummary summary;
+  summary.trees = s.trees.size(), summary.nodes = s.nodes.size();
+  for (const baked::TreeRecord& tree : s.trees) summary.tree_depth = std::max(summary.tree_depth, tree.depth);
   std::vector<uint32_t> uses(s.geometries.size());
   for (const baked::InstanceRecord& instance : s.instances) {
     ++uses[instance.geometry];

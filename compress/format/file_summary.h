@@ -16,6 +16,7 @@ struct StreamBytes {
   uint64_t cluster_records = 0, geometry_records = 0, instance_records = 0, material_records = 0;
   uint64_t masks = 0, textures = 0, cameras = 0, strings = 0, requirement_records = 0;
   uint64_t lod_records = 0;          ///< levels, groups and links; other records and streams are of all levels
+  uint64_t trees = 0;                ///< records and nodes
   uint64_t header_and_alignment = 0; ///< with the summary record
   uint64_t total = 0;                ///< of the file
 };
@@ -76,6 +77,8 @@ struct FileSummary {
   std::vector<TextureUse> textures;
   std::vector<UvUse> uvs; ///< by encoding
   LodSummary lod;
+  uint64_t trees = 0, nodes = 0; ///< of all levels
+  uint32_t tree_depth = 0;       ///< of the deepest tree, in nodes
   double max_position_error = 0.0; ///< measured, largest axis, object units, over all geometries
   double max_position_error_bound = 0.0;
   float max_normal_error_degrees = 0.0f;

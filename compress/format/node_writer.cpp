@@ -1,8 +1,33 @@
 #include "compress/format/node_writer.h"
 
 #include <cassert>
+#include <cstddef>
 
 namespace packtrace {
+
+static_assert(offsetof(baked::PackedNode, exponents) == 12 && offsetof(baked::PackedNode, first_child) == 16 &&
+              offsetof(baked::PackedNode, children) == 24 && offsetof(baked::PackedNode, lo) == 32 &&
+              offsetof(baked::PackedNode, hi) == 56);
+static_assert(offsetof(baked::TreeRecord, origin) == 16 && offsetof(baked::TreeRecord, step_mantissa) == 40);
+
+std::span<const TreeGridBox> triangle_boxes(const ClusterView& cluster, const TreeGridMap& map, ClusterBoxes& room) {
+  std::array<Triangle, kMaxClusterTriangles> triangles;
+  std::array<TreeGridBox, kMaxClusterVertices> vertices;
+  decode_indices(cluster, 0, triangles);
+  for (uint32_t v = 0; v < cluster.vertex_count(); ++v) {
+    const LatticePoint q = cluster.lattice(v);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      vertices[v].lo[axis] = static_cast<int32_t>(map.floor(q[axis], axis));
+      vertices[v].hi[axis] = static_cast<int32_t>(map.ceil(q[axis], axis));
+    }
+  }
+  for (uint32_t t = 0; t < cluster.triangle_count(); ++t) {
+    room[t] = vertices[triangles[t].x];
+    room[t].extend(vertices[triangles[t].y]);
+    room[t].extend(vertices[triangles[t].z]);
+  }
+  return std::span(room).first(cluster.triangle_count());
+}
 
 void write_boxes(std::span<const TreeGridBox> boxes, baked::PackedNode& node) {
   assert(!boxes.empty() && boxes.size() <= baked::kNodeWidth);
@@ -22,6 +47,43 @@ void write_boxes(std::span<const TreeGridBox> boxes, baked::PackedNode& node) {
       node.hi[axis][child] = static_cast<uint8_t>((above(boxes[child].hi[axis]) + (1u << exponent) - 1) >> exponent);
     }
   }
+}
+
+TreeGridBox write_leaf_node(const LeafNode& leaves, std::span<const TreeGridBox> boxes, uint32_t cluster,
+                            uint8_t ray_classes, baked::PackedNode& node) {
+  node = {};
+  node.ray_classes = ray_classes;
+  node.first_triangle = static_cast<uint8_t>(leaves.first_triangle);
+  node.cluster = cluster;
+  node.children = leaves.triangles;
+  std::array<TreeGridBox, baked::kNodeWidth> of_leaves;
+  TreeGridBox whole = boxes[leaves.first_triangle];
+  uint32_t triangle = leaves.first_triangle;
+  for (uint32_t leaf = 0; leaf < leaves.leaf_count; ++leaf) {
+    of_leaves[leaf] = boxes[triangle];
+    for (const uint32_t end = triangle + leaves.triangles[leaf]; triangle < end; ++triangle)
+      of_leaves[leaf].extend(boxes[triangle]);
+    whole.extend(of_leaves[leaf]);
+  }
+  write_boxes(std::span(of_leaves).first(leaves.leaf_count), node);
+  return whole;
+}
+
+TreeGridBox write_inner_node(uint32_t first_child, uint32_t child_count, std::span<const baked::PackedNode> nodes,
+                             std::span<const TreeGridBox> boxes, baked::PackedNode& node) {
+  node = {};
+  node.first_child = first_child;
+  const std::span<const TreeGridBox> children = boxes.subspan(first_child, child_count);
+  TreeGridBox whole = children[0];
+  uint32_t classes = 0;
+  for (uint32_t child = 0; child < child_count; ++child) {
+    node.children[child] = baked::kInnerChild;
+    classes |= nodes[first_child + child].ray_classes;
+    whole.extend(children[child]);
+  }
+  node.ray_classes = static_cast<uint8_t>(classes & (baked::kCameraBelow | baked::kOcclusionBelow));
+  write_boxes(children, node);
+  return whole;
 }
 
 } // namespace packtrace

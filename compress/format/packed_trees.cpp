@@ -8,6 +8,7 @@
 #include "compress/bvh/wide_tree.h"
 #include "compress/format/node_writer.h"
 #include "compress/format/tree_grid.h"
+#include "compress/format/tree_validation.h"
 #include "pbrt_import/scene/error.h"
 
 namespace packtrace {
@@ -28,12 +29,6 @@ struct LeafNodes {
   std::vector<TreeGridBox> boxes;
 };
 
-uint8_t ray_classes(uint32_t material_class) {
-  return static_cast<uint8_t>(((material_class & 1u) == 0 ? baked::kCameraBelow : 0) |
-                              ((material_class & 2u) == 0 ? baked::kOcclusionBelow : 0) |
-                              ((material_class & baked::kMaskedClass) != 0 ? baked::kMaskedLeaves : 0));
-}
-
 /// Builds the leaf nodes of one cluster after the other.
 class LeafNodeBuilder {
 public:
@@ -44,55 +39,20 @@ public:
     const baked::GeometryRecord& geometry = sections_.geometries[cluster.geometry];
     const ClusterView view(geometry, sections_.clusters[cluster.number],
                            sections_.payload.data() + geometry.payload_offset);
-    find_triangle_boxes(view, TreeGridMap(tree_, geometry));
+    const std::span<const TreeGridBox> boxes = triangle_boxes(view, TreeGridMap(tree_, geometry), boxes_);
     leaf_nodes_.clear();
-    find_leaf_nodes(std::span(boxes_).first(view.triangle_count()), costs_, leaf_nodes_);
-    for (const LeafNode& leaves : leaf_nodes_) add_node(cluster, leaves, out);
+    find_leaf_nodes(boxes, costs_, leaf_nodes_);
+    for (const LeafNode& leaves : leaf_nodes_) {
+      out.nodes.push_back({});
+      out.boxes.push_back(write_leaf_node(leaves, boxes, cluster.number, cluster.ray_classes, out.nodes.back()));
+    }
   }
 
 private:
-  void find_triangle_boxes(const ClusterView& view, const TreeGridMap& map) {
-    std::array<Triangle, kMaxClusterTriangles> triangles;
-    std::array<TreeGridBox, kMaxClusterVertices> vertices;
-    decode_indices(view, 0, triangles);
-    for (uint32_t v = 0; v < view.vertex_count(); ++v) {
-      const LatticePoint q = view.lattice(v);
-      for (size_t axis = 0; axis < 3; ++axis) {
-        vertices[v].lo[axis] = static_cast<int32_t>(map.floor(q[axis], axis));
-        vertices[v].hi[axis] = static_cast<int32_t>(map.ceil(q[axis], axis));
-      }
-    }
-    for (uint32_t t = 0; t < view.triangle_count(); ++t) {
-      boxes_[t] = vertices[triangles[t].x];
-      boxes_[t].extend(vertices[triangles[t].y]);
-      boxes_[t].extend(vertices[triangles[t].z]);
-    }
-  }
-
-  void add_node(const TreeCluster& cluster, const LeafNode& leaves, LeafNodes& out) const {
-    baked::PackedNode node{};
-    node.ray_classes = cluster.ray_classes;
-    node.first_triangle = static_cast<uint8_t>(leaves.first_triangle);
-    node.cluster = cluster.number;
-    node.children = leaves.triangles;
-    std::array<TreeGridBox, baked::kNodeWidth> boxes;
-    TreeGridBox whole = boxes_[leaves.first_triangle];
-    uint32_t triangle = leaves.first_triangle;
-    for (uint32_t leaf = 0; leaf < leaves.leaf_count; ++leaf) {
-      boxes[leaf] = boxes_[triangle];
-      for (const uint32_t end = triangle + leaves.triangles[leaf]; triangle < end; ++triangle)
-        boxes[leaf].extend(boxes_[triangle]);
-      whole.extend(boxes[leaf]);
-    }
-    write_boxes(std::span(boxes).first(leaves.leaf_count), node);
-    out.nodes.push_back(node);
-    out.boxes.push_back(whole);
-  }
-
   const BakedSections& sections_;
   const TreeCosts& costs_;
   const baked::TreeRecord& tree_;
-  std::array<TreeGridBox, kMaxClusterTriangles> boxes_; // of the cluster's triangles
+  ClusterBoxes boxes_;
   std::vector<LeafNode> leaf_nodes_;
 };
 
@@ -104,7 +64,7 @@ public:
   };
 
   TreeBuilder(const BakedSections& sections, const TreeCosts& costs) : sections_(sections), costs_(costs) {
-    find_instances();
+    placed_ = sole_identity_instances(sections_);
   }
 
   PackedTrees run() {
@@ -129,24 +89,13 @@ public:
     return out;
   }
 
-  void find_instances() {
-    uses_.resize(sections_.geometries.size());
-    first_use_.resize(uses_.size());
-    for (uint32_t i = 0; i < sections_.instances.size(); ++i) {
-      const uint32_t geometry = sections_.instances[i].geometry;
-      if (uses_[geometry]++ == 0) first_use_[geometry] = i;
-    }
-  }
 
   bool may_join_world(uint32_t geometry) const {
-    constexpr std::array<float, 12> kIdentity{1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
-    return (sections_.geometries[geometry].flags & baked::kWorldSpace) != 0 && uses_[geometry] == 1 &&
-           sections_.instances[first_use_[geometry]].world_from_object == kIdentity;
+    return (sections_.geometries[geometry].flags & baked::kWorldSpace) != 0 && placed_[geometry] != baked::kNone;
   }
 
   /// Sorts the geometries with clusters into those of the world's tree and those with trees of their own.
   void find_world(std::vector<uint32_t>& world, std::vector<uint32_t>& others) const {
-    constexpr int32_t kMaxHalvings = 60;
     const auto& geometries = sections_.geometries;
     uint32_t mantissa = 0;
     int32_t coarsest = std::numeric_limits<int32_t>::min();
@@ -158,7 +107,7 @@ public:
     for (uint32_t i = 0; i < geometries.size(); ++i)
       if (geometries[i].cluster_count > 0) {
         const bool joins = may_join_world(i) && geometries[i].step_mantissa == mantissa &&
-                           coarsest - geometries[i].step_exponent <= kMaxHalvings;
+                           coarsest - geometries[i].step_exponent <= kMaxTreeStepDoublings / 2;
         (joins ? world : others).push_back(i);
       }
   }
@@ -181,7 +130,7 @@ public:
       const baked::GeometryRecord& geometry = sections_.geometries[g];
       auto next = static_cast<uint32_t>(geometry.first_cluster);
       for (uint32_t c = 0; c < geometry.class_clusters.size(); ++c) {
-        const uint8_t classes = ray_classes(c);
+        const uint8_t classes = ray_classes_of(c);
         const uint32_t end = next + geometry.class_clusters[c];
         if ((classes & (baked::kCameraBelow | baked::kOcclusionBelow)) != 0)
           for (uint32_t i = next; i < end; ++i) clusters.push_back({i, g, classes});
@@ -227,28 +176,11 @@ public:
         const uint32_t leaf = binary.order[binary.nodes[wide[i].source].first];
         tree.nodes[i] = leaves.nodes[leaf], whole[i] = leaves.boxes[leaf];
       } else {
-        whole[i] = make_inner(wide[i], tree.nodes, whole, tree.nodes[i]);
+        whole[i] = write_inner_node(wide[i].first_child, wide[i].child_count, tree.nodes, whole, tree.nodes[i]);
       }
     }
     tree.record.node_count = static_cast<uint32_t>(wide.size());
     tree.record.depth = depth_of(wide);
-  }
-
-  static TreeGridBox make_inner(const WideNode& wide, std::span<const baked::PackedNode> nodes,
-                                std::span<const TreeGridBox> whole, baked::PackedNode& out) {
-    out = {};
-    out.first_child = wide.first_child;
-    const std::span<const TreeGridBox> boxes = whole.subspan(wide.first_child, wide.child_count);
-    TreeGridBox box = boxes[0];
-    uint32_t classes = 0;
-    for (uint32_t child = 0; child < wide.child_count; ++child) {
-      out.children[child] = baked::kInnerChild;
-      classes |= nodes[wide.first_child + child].ray_classes;
-      box.extend(boxes[child]);
-    }
-    out.ray_classes = static_cast<uint8_t>(classes & (baked::kCameraBelow | baked::kOcclusionBelow));
-    write_boxes(boxes, out);
-    return box;
   }
 
   static uint32_t depth_of(std::span<const WideNode> wide) {
@@ -266,7 +198,7 @@ public:
 private:
   const BakedSections& sections_;
   const TreeCosts& costs_;
-  std::vector<uint32_t> uses_, first_use_; // instances of each geometry
+  std::vector<uint32_t> placed_; // by geometry: sole_identity_instances()
 };
 
 } // namespace

@@ -18,7 +18,7 @@ struct PackedTrees {
 
 /// Builds the trees of a file: one over the clusters of all world-space geometries, one for each other geometry with
 /// clusters. World-space geometry that the world's tree cannot hold has one of its own: if it has several instances, or
-/// one that is not placed by the identity, or a step that is not 2^-k times the coarsest one with k in 0..60. Clusters
+/// one that is not placed by the identity, or a step that is not 2^-k times the coarsest one with k in 0..30. Clusters
 /// that neither camera nor occlusion rays see are left out; a tree may be empty. On all threads; the result depends on
 /// the sections only.
 /// @param sections of a valid file; reads geometries, clusters, payload and instances only

@@ -9,11 +9,12 @@
 #include <xxhash.h>
 #include <zstd.h>
 
-#include "compress/format/baked_format.h"
+#include "compress/format/baked_file.h"
 #include "compress/format/bit_stream.h"
 #include "compress/format/normal_codec.h"
 #include "compress/format/page_decoder.h"
 #include "compress/format/position_grid.h"
+#include "compress/format/tree_topology.h"
 #include "compress/format/uv_codec.h"
 #include "pbrt_import/scene/error.h"
 
@@ -41,8 +42,13 @@ public:
     check_head();
     decode_pages();
     add_up_clusters();
-    form = {static_cast<PageCodec>(header_.codec), bytes_.size(), header_.page_count,
-            sizeof header_ + table_bytes() + head_.size() + tail_.size(), header_.stream_bytes};
+    decode_nodes();
+    form = {static_cast<PageCodec>(header_.codec),
+            bytes_.size(),
+            header_.page_count,
+            sizeof header_ + table_bytes() + head_.size() + tail_.size(),
+            nodes_.size(),
+            header_.stream_bytes};
     return std::move(resident_);
   }
 
@@ -70,13 +76,15 @@ private:
     if (header_.codec != static_cast<uint32_t>(PageCodec::kFast) &&
         header_.codec != static_cast<uint32_t>(PageCodec::kSmall))
       fail("codec");
-    if (header_.padding != decltype(header_.padding){}) fail("reserved header fields");
+    if (header_.node_form > baked::kNodesTopology) fail("node form");
+    if (header_.reserved != 0 || header_.padding != decltype(header_.padding){}) fail("reserved header fields");
   }
 
   /// Page records, head and tail, and where the pages lie.
   void read_table() {
     uint64_t left = bytes_.size() - sizeof header_;
-    for (const uint64_t part : {table_bytes(), header_.head_disk_bytes, header_.tail_disk_bytes}) {
+    for (const uint64_t part :
+         {table_bytes(), header_.head_disk_bytes, header_.tail_disk_bytes, header_.node_disk_bytes}) {
       if (part > left) fail("page table extent");
       left -= part;
     }
@@ -88,6 +96,7 @@ private:
     if (!pages_.empty()) std::memcpy(pages_.data(), at, static_cast<size_t>(table_bytes()));
     head_ = {at + table_bytes(), static_cast<size_t>(header_.head_disk_bytes)};
     tail_ = {head_.data() + head_.size(), static_cast<size_t>(header_.tail_disk_bytes)};
+    nodes_ = {tail_.data() + tail_.size(), static_cast<size_t>(header_.node_disk_bytes)};
     places_.reserve(pages_.size());
     uint64_t offset = end;
     for (size_t i = 0; i < pages_.size(); ++i) {
@@ -111,7 +120,12 @@ private:
       fail("head or tail size");
     payload_begin_ = align_up(header_.head_bytes + cluster_count_ * sizeof(baked::ClusterRecord));
     tail_begin_ = align_up(payload_begin_ + payload_bytes_ + kReadSlackBytes);
-    if (header_.resident_bytes != tail_begin_ + header_.tail_bytes) fail("resident size");
+    nodes_begin_ = tail_begin_ + header_.tail_bytes;
+    constexpr uint64_t kMaxNodes = uint64_t{1} << 40;
+    if (header_.tail_bytes % baked::kSectionAlignment != 0 || header_.node_count > kMaxNodes ||
+        (header_.node_count == 0) != nodes_.empty() || !ratio_ok(node_bytes(), nodes_.size()))
+      fail("tail or node size");
+    if (header_.resident_bytes != align_up(nodes_begin_ + node_bytes())) fail("resident size");
   }
 
   void unzip(std::span<const std::byte> from, uint64_t offset, uint64_t bytes, const char* what) {
@@ -136,8 +150,9 @@ private:
       const baked::GeometryRecord& g = geometries_[i];
       bool ok = g.first_cluster == clusters && g.payload_offset == payload &&
                 g.payload_bytes <= payload_bytes_ - payload && g.cluster_count <= cluster_count_ - clusters &&
-                g.anchor_shift < 32 && g.normal_encoding < kNormalFormats.size() &&
-                g.uv_encoding < kUvEncodingNames.size();
+                g.anchor_shift <= 26 && g.step_mantissa >= kMinStepMantissa && g.step_mantissa <= kMaxStepMantissa &&
+                g.step_exponent >= kMinStepExponent && g.step_exponent <= kMaxStepExponent &&
+                g.normal_encoding < kNormalFormats.size() && g.uv_encoding < kUvEncodingNames.size();
       for (const int64_t o : g.origin) ok &= o >= -kMaxLattice && o <= kMaxLattice;
       if (!ok) fail("geometry " + std::to_string(i));
       clusters += g.cluster_count, payload += g.payload_bytes;
@@ -174,6 +189,46 @@ private:
     if (damaged.load() != pages_.size()) fail("page " + std::to_string(damaged.load()));
   }
 
+  uint64_t node_bytes() const { return header_.node_count * sizeof(baked::PackedNode); }
+
+  /// Of the tail: nothing of it changes while nodes are made.
+  template <typename T>
+  std::span<const T> section(const baked::FileHeader& header, baked::Section number) const {
+    const baked::SectionRecord& record = header.sections[number];
+    if (record.offset % baked::kSectionAlignment != 0 || record.offset > nodes_begin_ ||
+        record.bytes > nodes_begin_ - record.offset)
+      fail("section " + std::to_string(number));
+    return {reinterpret_cast<const T*>(resident_.data() + record.offset),
+            static_cast<size_t>(record.bytes / sizeof(T))};
+  }
+
+  void decode_nodes() {
+    if (header_.node_count == 0) return;
+    if (header_.node_form == baked::kNodesWhole) {
+      unzip(nodes_, nodes_begin_, node_bytes(), "nodes");
+      return;
+    }
+    constexpr uint64_t kMostBytes = 14; // of a node's topology: its kind, eight sizes, a triangle and a cluster
+    const uint64_t size = ZSTD_getFrameContentSize(nodes_.data(), nodes_.size());
+    if (size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR || size > kMostBytes * header_.node_count ||
+        size / baked::kMaxDiskRatio > nodes_.size())
+      fail("nodes");
+    std::vector<uint8_t> topology(static_cast<size_t>(size));
+    const size_t got = ZSTD_decompress(topology.data(), topology.size(), nodes_.data(), nodes_.size());
+    baked::FileHeader header;
+    std::memcpy(&header, resident_.data(), sizeof header);
+    BakedSections sections;
+    sections.geometries = geometries_;
+    sections.clusters = clusters();
+    sections.payload = {reinterpret_cast<const uint8_t*>(resident_.data()) + payload_begin_,
+                        static_cast<size_t>(payload_bytes_) + kReadSlackBytes};
+    sections.instances = section<baked::InstanceRecord>(header, baked::kInstances);
+    sections.trees = section<baked::TreeRecord>(header, baked::kTrees);
+    const std::span<baked::PackedNode> nodes{reinterpret_cast<baked::PackedNode*>(resident_.data() + nodes_begin_),
+                                             static_cast<size_t>(header_.node_count)};
+    if (ZSTD_isError(got) != 0 || got != size || !restore_nodes(sections, topology, nodes)) fail("nodes");
+  }
+
   void add_up_clusters() {
     for (const baked::GeometryRecord& g : geometries_) {
       uint32_t triangles = 0, vertices = 0;
@@ -189,8 +244,8 @@ private:
   baked::PagedHeader header_{};
   std::vector<baked::PageRecord> pages_;
   std::vector<Place> places_;
-  std::span<const std::byte> head_, tail_;
-  uint64_t cluster_count_ = 0, payload_bytes_ = 0, payload_begin_ = 0, tail_begin_ = 0;
+  std::span<const std::byte> head_, tail_, nodes_;
+  uint64_t cluster_count_ = 0, payload_bytes_ = 0, payload_begin_ = 0, tail_begin_ = 0, nodes_begin_ = 0;
   std::vector<std::byte> resident_;
   std::span<const baked::GeometryRecord> geometries_;
 };

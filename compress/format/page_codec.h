@@ -26,8 +26,14 @@ std::optional<PageCodec> find_page_codec(std::string_view name);
 
 namespace baked {
 
+/// How nodes lie in a file of codec fast or small.
+enum NodeForm : uint32_t {
+  kNodesWhole,   ///< as they are
+  kNodesTopology ///< tree_topology.h: what the clusters do not say
+};
+
 /// What a file of codec fast or small begins with; magic, version and header_bytes lie as in FileHeader, whose size
-/// differs. Then: the pages' records, head, tail, and the pages, without gaps.
+/// differs. Then: the pages' records, head, tail, nodes, and the pages, without gaps.
 struct PagedHeader {
   std::array<uint8_t, 8> magic;
   uint32_t version;
@@ -38,16 +44,21 @@ struct PagedHeader {
   uint64_t resident_bytes;                         ///< of the file with codec none
   uint64_t head_bytes;                             ///< of that file before its cluster section
   uint64_t head_disk_bytes;                        ///< as one zstd frame
-  uint64_t tail_bytes;                             ///< of that file behind its payload section and its padding
+  uint64_t tail_bytes;                             ///< of that file behind its payload section up to its nodes
   uint64_t tail_disk_bytes;                        ///< as one zstd frame
   std::array<uint64_t, kPageStreams> stream_bytes; ///< of all pages; figures for people
-  std::array<uint64_t, 8> padding;
-  uint64_t table_hash;  ///< XXH3-64 of the page records, head and tail
+  uint64_t node_count;                             ///< records of the node section, the last one
+  uint64_t node_disk_bytes;                        ///< as one zstd frame; 0 without nodes
+  uint32_t node_form;                              ///< NodeForm
+  uint32_t reserved;
+  std::array<uint64_t, 5> padding;
+  uint64_t table_hash;  ///< XXH3-64 of the page records, head, tail and nodes
   uint64_t header_hash; ///< XXH3-64 of the header before this field
 };
 static_assert(std::is_trivially_copyable_v<PagedHeader> && sizeof(PagedHeader) == 192);
 static_assert(offsetof(PagedHeader, codec) == 24 && offsetof(PagedHeader, resident_bytes) == 32 &&
-              offsetof(PagedHeader, stream_bytes) == 72 && offsetof(PagedHeader, table_hash) == 176);
+              offsetof(PagedHeader, stream_bytes) == 72 && offsetof(PagedHeader, node_count) == 112 &&
+              offsetof(PagedHeader, table_hash) == 176);
 
 /// Consecutive clusters with their payload; clusters of one page may belong to several geometries.
 struct PageRecord {
@@ -73,6 +84,7 @@ struct DiskForm {
   uint64_t file_bytes = 0;
   uint32_t page_count = 0;
   uint64_t table_bytes = 0; ///< header, page records, head and tail
+  uint64_t node_bytes = 0;  ///< of trees
   std::array<uint64_t, kPageStreams> stream_bytes{};
 };
 

@@ -20,16 +20,15 @@ struct Range {
 
 using Box = std::array<Range, 3>;
 
-/// From the clusters' records alone, so up to twice as large as the clusters are.
 void extend(Box& box, const baked::GeometryRecord& geometry, std::span<const baked::ClusterRecord> clusters,
             double scale) {
-  for (const baked::ClusterRecord& cluster : clusters)
+  for (const baked::ClusterRecord& cluster : clusters) {
+    const LatticeBox part = box_of_record(geometry, cluster);
     for (size_t axis = 0; axis < 3; ++axis) {
-      const int64_t lo = geometry.origin[axis] + int64_t{cluster.anchor[axis]} * (int64_t{1} << geometry.anchor_shift);
-      const int64_t hi = lo + ((int64_t{1} << cluster.position_bits[axis]) - 1);
-      box[axis].lo = std::min(box[axis].lo, static_cast<double>(lo) * scale);
-      box[axis].hi = std::max(box[axis].hi, static_cast<double>(hi) * scale);
+      box[axis].lo = std::min(box[axis].lo, static_cast<double>(part.lo[axis]) * scale);
+      box[axis].hi = std::max(box[axis].hi, static_cast<double>(part.hi[axis]) * scale);
     }
+  }
 }
 
 } // namespace

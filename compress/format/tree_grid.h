@@ -10,11 +10,31 @@
 
 namespace packtrace {
 
-/// Steps of a geometry's lattice in a tree's: 2^k, k = -1000 .. 62.
+/// Steps of a tree and of its geometries differ by 2^this at most, either way.
+inline constexpr int32_t kMaxTreeStepDoublings = 60;
+
+/// Whole lattice points, both ends inside.
+struct LatticeBox {
+  LatticePoint lo, hi;
+};
+
+/// A box that holds a cluster's vertices, from its record alone: at most a power of two larger per axis.
+inline LatticeBox box_of_record(const baked::GeometryRecord& geometry, const baked::ClusterRecord& cluster) {
+  LatticeBox box;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    box.lo[axis] = geometry.origin[axis] + int64_t{cluster.anchor[axis]} * (int64_t{1} << geometry.anchor_shift);
+    box.hi[axis] = box.lo[axis] + ((int64_t{1} << cluster.position_bits[axis]) - 1);
+  }
+  return box;
+}
+
+/// From a geometry's lattice to a tree's grid. Results beyond +-2^61 are that, before the origin is subtracted.
 class TreeGridMap {
 public:
+  /// The steps' exponents differ by kMaxTreeStepDoublings at most; |lattice coordinate| <= 2^59, |origin| <= 2^60.
   TreeGridMap(const baked::TreeRecord& tree, const baked::GeometryRecord& geometry)
-      : origin_(tree.origin), shift_(geometry.step_exponent - tree.step_exponent) {}
+      : origin_(tree.origin), shift_(geometry.step_exponent - tree.step_exponent),
+        limit_((int64_t{1} << 61) >> (shift_ > 0 ? shift_ : 0)) {}
 
   /// The tree coordinate of a lattice coordinate, rounded down and up.
   int64_t floor(int64_t q, size_t axis) const { return scaled(q) - origin_[axis]; }
@@ -22,11 +42,12 @@ public:
 
 private:
   int64_t scaled(int64_t q) const {
-    if (shift_ >= 0) return static_cast<int64_t>(static_cast<uint64_t>(q) << (shift_ < 62 ? shift_ : 62));
-    return q >> (shift_ > -63 ? -shift_ : 63);
+    if (shift_ < 0) return q >> -shift_;
+    return (q < -limit_ ? -limit_ : q > limit_ ? limit_ : q) * (int64_t{1} << shift_);
   }
   std::array<int64_t, 3> origin_;
   int32_t shift_;
+  int64_t limit_;
 };
 
 /// The finest grid of a tree over some geometries that have one step_mantissa and steps that differ by 2^60 at most:

@@ -43,6 +43,7 @@ struct BakeOptions {
   std::string uvs = kAuto;
   std::optional<std::string> textures; ///< without one, what the purpose needs
   std::optional<double> texture_psnr;
+  std::string trees = "on";
   std::string lod = kLodUses[0];
   std::optional<uint32_t> lod_min_triangles, lod_levels;
   std::string resume;
@@ -85,6 +86,7 @@ BakeConfig make_config(const BakeOptions& options) {
   config.lod_min_triangles = options.lod_min_triangles.value_or(config.lod_min_triangles);
   config.lod_levels = options.lod_levels.value_or(config.lod_levels);
   config.resume = options.resume;
+  config.trees = options.trees == "on";
   config.codec = find_page_codec(options.codec).value(); // the option's check knows the names
   config.validate();
   return config;
@@ -259,6 +261,10 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
                   "when the file is written")
       ->type_name("DIR")
       ->group("Levels of detail");
+  verb.add_option("--trees", options->trees,
+                  "Whether the file holds trees over its clusters for the packed tracer, 1 to 2.5 bytes a triangle")
+      ->check(CLI::IsMember({"on", "off"}))
+      ->default_str(options->trees);
   verb.add_option(
           "--codec", options->codec,
           "Form on disk: none is mapped and traced as it is; fast and small are smaller, and decoded when opened, fast "

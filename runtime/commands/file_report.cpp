@@ -14,7 +14,7 @@ namespace {
 
 using Row = std::pair<const char*, uint64_t>;
 
-std::array<Row, 17> stream_rows(const StreamBytes& bytes) {
+std::array<Row, 18> stream_rows(const StreamBytes& bytes) {
   return {{{"indices", bytes.indices},
            {"positions", bytes.positions},
            {"normals", bytes.normals},
@@ -30,11 +30,12 @@ std::array<Row, 17> stream_rows(const StreamBytes& bytes) {
            {"strings", bytes.strings},
            {"requirement_records", bytes.requirement_records},
            {"lod_records", bytes.lod_records},
+           {"trees", bytes.trees},
            {"header_and_alignment", bytes.header_and_alignment},
            {"total", bytes.total}}};
 }
 
-std::array<std::pair<const char*, uint64_t>, kPageStreams + 1> disk_rows(const DiskForm& disk) {
+std::array<std::pair<const char*, uint64_t>, kPageStreams + 2> disk_rows(const DiskForm& disk) {
   const auto& bytes = disk.stream_bytes;
   const auto of = [&](PageStream stream) { return bytes[static_cast<size_t>(stream)]; };
   return {{{"topology", of(PageStream::kTopology)},
@@ -42,6 +43,7 @@ std::array<std::pair<const char*, uint64_t>, kPageStreams + 1> disk_rows(const D
            {"normals", of(PageStream::kNormals)},
            {"uvs", of(PageStream::kUvs)},
            {"cluster_records", of(PageStream::kRecords)},
+           {"trees", disk.node_bytes},
            {"tables", disk.table_bytes}}};
 }
 
@@ -129,6 +131,7 @@ nlohmann::json to_json(const FileSummary& s, bool by_geometry) {
       {"merged_vertices", s.bake.merged_vertices},
       {"requirements", requirements_json(s, by_geometry)},
       {"lod", lod_json(s, by_geometry)},
+      {"trees", {{"trees", s.trees}, {"nodes", s.nodes}, {"depth", s.tree_depth}}},
   };
 }
 
@@ -173,6 +176,10 @@ std::string to_text(const FileSummary& s, bool by_geometry) {
     if (bytes > 0)
       text += fmt::format(grouped(), "{:<22}{:>14L}{:>16.3f}\n", name, bytes,
                           triangles > 0 ? static_cast<double>(bytes) / triangles : 0.0);
+  if (s.trees > 0)
+    text += fmt::format(grouped(), "{:L} trees of {:L} nodes, up to {} deep\n", s.trees, s.nodes, s.tree_depth);
+  else
+    text += "no trees: tracing builds them\n";
   if (s.disk.codec != PageCodec::kNone) {
     text += "\n" + disk_text(s);
     for (const auto& [name, bytes] : disk_rows(s.disk))

@@ -249,11 +249,13 @@ TEST(FileSummary, StreamsAddUpToTheFile) {
   const StreamBytes& b = s.bytes;
   EXPECT_EQ(b.indices + b.positions + b.normals + b.uvs + b.payload_padding + b.cluster_records + b.geometry_records +
                 b.instance_records + b.material_records + b.masks + b.textures + b.cameras + b.strings +
-                b.requirement_records + b.header_and_alignment,
+                b.requirement_records + b.trees + b.header_and_alignment,
             b.total);
   EXPECT_GT(b.uvs, 0u);
   EXPECT_GT(b.normals, 0u);
   EXPECT_GT(b.textures, 0u);
+  EXPECT_EQ(b.trees, s.trees * sizeof(baked::TreeRecord) + s.nodes * sizeof(baked::PackedNode));
+  EXPECT_EQ(s.trees, 2u);
   ASSERT_EQ(s.textures.size(), 1u);
   EXPECT_EQ(s.textures[0].bytes, 16u);
   EXPECT_GT(s.textures[0].psnr_db, 20.0f);

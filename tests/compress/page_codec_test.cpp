@@ -71,9 +71,10 @@ std::vector<baked::PageRecord> pages_of(const Bytes& bytes) {
 void rehash(Bytes& bytes) {
   baked::PagedHeader header = header_of(bytes);
   const size_t table = size_t{header.page_count} * sizeof(baked::PageRecord);
-  const uint64_t head = sizeof header + table + header.head_disk_bytes + header.tail_disk_bytes;
+  const uint64_t head =
+      sizeof header + table + header.head_disk_bytes + header.tail_disk_bytes + header.node_disk_bytes;
   if (header.page_count < 1000 && header.head_disk_bytes < bytes.size() && header.tail_disk_bytes < bytes.size() &&
-      head <= bytes.size()) {
+      header.node_disk_bytes < bytes.size() && head <= bytes.size()) {
     auto pages = pages_of(bytes);
     size_t at = static_cast<size_t>(head);
     for (baked::PageRecord& page : pages) {
@@ -126,7 +127,7 @@ TEST_P(PageCodecs, FilesOfManyPagesAreSmallAndTheSameForAnyThreadCount) {
   EXPECT_GT(pages_of(baked.bytes).size(), 5u);
   EXPECT_EQ(baked.report.file.disk.codec, GetParam());
   EXPECT_EQ(baked.report.file.disk.file_bytes, baked.bytes.size());
-  uint64_t streams = baked.report.file.disk.table_bytes;
+  uint64_t streams = baked.report.file.disk.table_bytes + baked.report.file.disk.node_bytes;
   for (const uint64_t bytes : baked.report.file.disk.stream_bytes) streams += bytes;
   EXPECT_EQ(streams, baked.bytes.size());
   EXPECT_LT(baked.bytes.size(), baked.report.file.bytes.total / 2);

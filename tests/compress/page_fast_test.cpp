@@ -137,8 +137,8 @@ std::vector<Header> headers_of(const Scene& scene, BakeConfig config = {}) {
   std::memcpy(&file, disk.data(), sizeof file);
   std::vector<Header> headers;
   const std::byte* record_at = disk.data() + sizeof file;
-  const std::byte* page_at =
-      record_at + file.page_count * sizeof(baked::PageRecord) + file.head_disk_bytes + file.tail_disk_bytes;
+  const std::byte* page_at = record_at + file.page_count * sizeof(baked::PageRecord) + file.head_disk_bytes +
+                             file.tail_disk_bytes + file.node_disk_bytes;
   for (uint32_t i = 0; i < file.page_count; ++i, record_at += sizeof(baked::PageRecord)) {
     baked::PageRecord page;
     std::memcpy(&page, record_at, sizeof page);

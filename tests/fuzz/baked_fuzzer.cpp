@@ -36,8 +36,9 @@ void make_resident_hashes_right(std::span<std::byte> bytes) {
 void make_page_hashes_right(std::span<std::byte> bytes, baked::PagedHeader& header) {
   const uint64_t limit = bytes.size();
   const uint64_t table_bytes = uint64_t{header.page_count} * sizeof(baked::PageRecord);
-  if (header.head_disk_bytes > limit || header.tail_disk_bytes > limit) return;
-  const uint64_t data = sizeof header + table_bytes + header.head_disk_bytes + header.tail_disk_bytes;
+  if (header.head_disk_bytes > limit || header.tail_disk_bytes > limit || header.node_disk_bytes > limit) return;
+  const uint64_t data =
+      sizeof header + table_bytes + header.head_disk_bytes + header.tail_disk_bytes + header.node_disk_bytes;
   if (data > limit) return;
   std::byte* const table = bytes.data() + sizeof header;
   uint64_t at = data;

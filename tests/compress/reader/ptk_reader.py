@@ -91,13 +91,21 @@ LOD_LEVEL_RECORD = Record(
 LOD_GROUP = Record(("center", "3f"), ("radius", "f"), ("error", "f"), ("level", "I"))
 LOD_LINK = Record(("group", "I"), ("generating_group", "I"))
 
+TREE = Record(
+    ("first_node", "Q"), ("node_count", "I"), ("depth", "I"), ("origin", "3q"), ("step_mantissa", "I"),
+    ("step_exponent", "i"), ("geometry", "I"), ("reserved", "I"))
+NODE = Record(
+    ("origin", "3i"), ("exponents", "H"), ("ray_classes", "B"), ("first_triangle", "B"), ("first_child", "I"),
+    ("cluster", "I"), ("children", "8B"), ("lo", "24B"), ("hi", "24B"))
+INNER_CHILD = 255
+
 # In the order of the section table; None: bytes.
 SECTIONS = (
     ("geometries", GEOMETRY), ("clusters", CLUSTER), ("payload", None), ("materials", MATERIAL),
     ("instances", INSTANCE), ("masks", MASK), ("mask_words", Record(("word", "I"))), ("textures", TEXTURE),
     ("texture_bytes", None), ("cameras", CAMERA), ("strings", None), ("summary", SUMMARY),
     ("material_slots", Record(("material", "I"))), ("requirements", REQUIREMENT),
-    ("lod_levels", LOD_LEVEL_RECORD), ("lod_groups", LOD_GROUP), ("lod_links", LOD_LINK))
+    ("lod_levels", LOD_LEVEL_RECORD), ("lod_groups", LOD_GROUP), ("lod_links", LOD_LINK), ("trees", TREE), ("nodes", NODE))
 
 
 def index_bits(count):
@@ -442,6 +450,76 @@ class BakedFile:
         return mesh
 
 
+class TreeCheck:
+    """Walks the trees of a file: leaves hold each triangle that some ray sees once, boxes hold what lies below, and are
+    no larger than rounding makes them."""
+
+    def __init__(self, baked, meshes):
+        self.baked, self.meshes = baked, meshes
+        self.geometry_of, self.classes_of = [], []  # by cluster
+        for number, geometry in enumerate(baked.sections["geometries"]):
+            self.geometry_of += [number] * geometry["cluster_count"]
+            for material_class, count in enumerate(geometry["class_clusters"]):
+                # bits: seen by the camera, occludes, a mask must be looked up
+                self.classes_of += [(~material_class & 3) | (material_class & 4)] * count
+        self.leaves_of = [[0] * cluster["triangle_count"] for cluster in baked.sections["clusters"]]
+
+    def run(self):
+        trees = self.baked.sections["trees"]
+        own = {tree["geometry"] for tree in trees}
+        for tree in trees:
+            self.tree = tree
+            self.nodes = self.baked.sections["nodes"][tree["first_node"] : tree["first_node"] + tree["node_count"]]
+            self.members = {number for number in range(len(self.meshes))
+                            if number == tree["geometry"] or (tree["geometry"] == NONE and number not in own)}
+            if self.nodes and self.walk(0)[1] != tree["depth"]:
+                raise BadFile("a tree's depth is not what its record says")
+        for cluster, leaves in enumerate(self.leaves_of):
+            wanted = 1 if trees and self.classes_of[cluster] & 3 else 0
+            if any(count != wanted for count in leaves):
+                raise BadFile(f"triangles of cluster {cluster} are not in one leaf each")
+
+    def walk(self, number):
+        """The exact box below a node, and the levels of nodes from it down."""
+        node = self.nodes[number]
+        below, depth, classes = [], 0, 0
+        triangle = node["first_triangle"]
+        for slot, child in enumerate(node["children"]):
+            if child == INNER_CHILD:
+                box, levels = self.walk(node["first_child"] + len(below))
+                classes |= self.nodes[node["first_child"] + len(below)]["ray_classes"] & 3
+                depth = max(depth, levels)
+            elif child:
+                box = self.leaf_box(node["cluster"], triangle, child)
+                triangle += child
+                classes = self.classes_of[node["cluster"]]
+            else:
+                continue
+            below.append(box)
+            for axis in range(3):
+                unit = 1 << (node["exponents"] >> 5 * axis & 31)
+                lo, hi = (node["origin"][axis] + node[end][8 * axis + slot] * unit for end in ("lo", "hi"))
+                if not (lo <= box[0][axis] < lo + unit and hi - unit < box[1][axis] <= hi):
+                    raise BadFile(f"a box of node {number} is not that of what lies below")
+        if classes != node["ray_classes"]:
+            raise BadFile(f"the rays that see node {number} are not those of what lies below")
+        return [[pick(box[end][axis] for box in below) for axis in range(3)] for end, pick in ((0, min), (1, max))], depth + 1
+
+    def leaf_box(self, cluster, first, count):
+        number = self.geometry_of[cluster]
+        if number not in self.members:
+            raise BadFile("a leaf of another tree's geometry")
+        geometry, mesh = self.baked.sections["geometries"][number], self.meshes[number]
+        start = self.baked.sections["clusters"][cluster]["first_triangle"] + first
+        points = [mesh.lattice[corner] for triangle in mesh.triangles[start : start + count] for corner in triangle]
+        for triangle in range(first, first + count):
+            self.leaves_of[cluster][triangle] += 1
+        shift = geometry["step_exponent"] - self.tree["step_exponent"]
+        scale = (lambda q: q << shift) if shift >= 0 else (lambda q: q >> -shift)
+        return [[pick(sign * scale(sign * point[axis]) - self.tree["origin"][axis] for point in points) for axis in range(3)]
+                for pick, sign in ((min, 1), (max, -1))]  # rounded down and up
+
+
 class Differs(Exception):
     """What was decoded is not what the dump holds."""
 
@@ -537,6 +615,7 @@ def main():
             baked = BakedFile(file.read())
         meshes = [baked.decode(geometry) for geometry in baked.sections["geometries"]]
         baked.check_levels(meshes)
+        TreeCheck(baked, meshes).run()
         describe(baked, meshes)
         if arguments.expect:
             with open(arguments.expect, "rb") as file:

@@ -251,6 +251,23 @@ TEST_F(IndependentReader, DecodesLevelsOfDetailAndCutsThem) {
   EXPECT_EQ(read(), 3);
 }
 
+TEST_F(IndependentReader, SeesBoxesThatDoNotHoldTheirTriangles) {
+  write(test::scene_of(test::sphere_mesh(16)));
+  const BakedFile file = BakedFile::from_bytes(baked());
+  const std::span<const baked::PackedNode> nodes = file.sections().nodes;
+  ASSERT_GT(nodes.size(), 2u);
+  EXPECT_EQ(read(), 0);
+  baked::FileHeader header;
+  std::memcpy(&header, baked().data(), sizeof header);
+  for (const size_t node : {size_t{0}, nodes.size() - 1}) {
+    const size_t at = header.sections[baked::kNodes].offset + node * sizeof(baked::PackedNode);
+    std::byte& origin = baked()[at + offsetof(baked::PackedNode, origin)];
+    origin ^= std::byte{8};
+    EXPECT_EQ(read(), 3) << node;
+    origin ^= std::byte{8};
+  }
+}
+
 TEST_F(IndependentReader, RefusesFilesOfOtherCodecs) {
   BakeConfig config;
   config.codec = PageCodec::kSmall;
