@@ -89,7 +89,6 @@ public:
     return out;
   }
 
-
   bool may_join_world(uint32_t geometry) const {
     return (sections_.geometries[geometry].flags & baked::kWorldSpace) != 0 && placed_[geometry] != baked::kNone;
   }

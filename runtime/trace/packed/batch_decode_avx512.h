@@ -20,31 +20,32 @@ inline __m512i batch_vertices(const TraceCluster& cluster, const BatchStrips& ba
   const __m512i iota = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   const __m512i next = _mm512_add_epi32(iota, _mm512_set1_epi32(static_cast<int>(batch.first_fresh)));
   __m512i vertices = _mm512_maskz_expand_epi32(static_cast<__mmask16>(batch.fresh), next);
-  const uint64_t fields =
-      load64(cluster.bits + (batch.explicit_bit >> 3)) >> (batch.explicit_bit & 7u);
+  const uint64_t fields = load64(cluster.bits + (batch.explicit_bit >> 3)) >> (batch.explicit_bit & 7u);
   const __m128i shifts = _mm_cvtsi64_si128(static_cast<int64_t>(0x0706050403020100u * uint64_t{width}));
   const __m128i bytes = _mm_multishift_epi64_epi8(shifts, _mm_cvtsi64_si128(static_cast<int64_t>(fields)));
   const __m512i names = _mm512_and_si512(_mm512_cvtepu8_epi32(bytes), _mm512_set1_epi32((1 << width) - 1));
   vertices = _mm512_mask_expand_epi32(vertices, static_cast<__mmask16>(named), names);
   if (lead != 0)
     vertices = _mm512_mask_mov_epi32(
-        vertices, 3, _mm512_castsi128_si512(_mm_cvtsi64_si128(static_cast<int64_t>(batch.lead[0] | uint64_t{batch.lead[1]} << 32))));
+        vertices, 3,
+        _mm512_castsi128_si512(_mm_cvtsi64_si128(static_cast<int64_t>(batch.lead[0] | uint64_t{batch.lead[1]} << 32))));
   return vertices;
 }
 
 /// Positions of 16 vertices, along x, y and z.
 inline void batch_positions(const TraceCluster& cluster, __m512i vertices, uint32_t count, __m512 (&position)[3]) {
-  const uint32_t x_bits = cluster.position_bits[0], y_bits = cluster.position_bits[1], z_bits = cluster.position_bits[2];
-  const __m512i bit = _mm512_add_epi32(
-      _mm512_mullo_epi32(vertices, _mm512_set1_epi32(static_cast<int>(x_bits + y_bits + z_bits))),
-      _mm512_set1_epi32(cluster.position_bit));
+  const uint32_t x_bits = cluster.position_bits[0], y_bits = cluster.position_bits[1],
+                 z_bits = cluster.position_bits[2];
+  const __m512i bit =
+      _mm512_add_epi32(_mm512_mullo_epi32(vertices, _mm512_set1_epi32(static_cast<int>(x_bits + y_bits + z_bits))),
+                       _mm512_set1_epi32(cluster.position_bit));
   const __m512i byte = _mm512_srli_epi32(bit, 3), within = _mm512_and_si512(bit, _mm512_set1_epi32(7));
   const auto words = [&](__m256i at, __m256i shift) {
     return _mm512_srlv_epi64(_mm512_i32gather_epi64(at, cluster.bits, 1), _mm512_cvtepu32_epi64(shift));
   };
   const __m512i first = words(_mm512_castsi512_si256(byte), _mm512_castsi512_si256(within));
-  const __m512i second = count <= 8 ? first
-                                    : words(_mm512_extracti64x4_epi64(byte, 1), _mm512_extracti64x4_epi64(within, 1));
+  const __m512i second =
+      count <= 8 ? first : words(_mm512_extracti64x4_epi64(byte, 1), _mm512_extracti64x4_epi64(within, 1));
   const __m512i low = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
   const __m512 scale = _mm512_castsi512_ps(_mm512_set1_epi32((127 - cluster.down) << 23));
   const auto axis = [&](uint32_t number, uint32_t bits, uint32_t skipped) {
@@ -74,16 +75,15 @@ inline uint32_t decode_batch_avx512(const TraceCluster& cluster, uint32_t first,
   const __m256i a = highest(_mm256_andnot_si256(lefts, up_to));
   const __m256i b = highest(_mm256_and_si256(_mm256_or_si256(lefts, restarts), up_to));
   const __m256i ones = _mm256_popcnt_epi32(_mm256_and_si256(restarts, up_to));
-  const __m256i newest =
-      _mm256_add_epi32(_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7), _mm256_add_epi32(ones, ones));
+  const __m256i newest = _mm256_add_epi32(_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7), _mm256_add_epi32(ones, ones));
   const __m256i at_a = _mm256_sub_epi32(_mm256_permutevar8x32_epi32(newest, a), one),
                 at_b = _mm256_permutevar8x32_epi32(newest, b);
   const __m256i corner[3] = {_mm256_sub_epi32(at_a, _mm256_and_si256(_mm256_srlv_epi32(restarts, a), one)),
                              _mm256_sub_epi32(at_b, one), newest};
   for (uint32_t axis = 0; axis < 3; ++axis)
     for (uint32_t i = 0; i < 3; ++i)
-      _mm256_store_ps(out.vertex[axis][i], _mm512_castps512_ps256(_mm512_permutexvar_ps(
-                                               _mm512_castsi256_si512(corner[i]), position[axis])));
+      _mm256_store_ps(out.vertex[axis][i],
+                      _mm512_castps512_ps256(_mm512_permutexvar_ps(_mm512_castsi256_si512(corner[i]), position[axis])));
   return batch.count;
 }
 

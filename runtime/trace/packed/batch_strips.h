@@ -45,15 +45,15 @@ inline int32_t last_one(const uint8_t* bits, uint32_t bit, uint32_t count, uint6
 /// A batch's own corner list: its triangles begin a strip as it were, so the list's first three entries are the first
 /// triangle's corners, whatever strip it lies in. Bits from 0 on are for the batch's triangles, or the list's entries.
 struct BatchStrips {
-  uint32_t count;         ///< of triangles
-  uint32_t restarts;      ///< bit 0 set
-  uint32_t lefts;         ///< bit 0 clear
-  uint32_t corner_count;  ///< of the list, <= kBatchCorners
-  uint32_t lead_count;    ///< 2 where the first two entries are lead[], else 0
-  uint32_t lead[2];       ///< vertices
-  uint32_t fresh;         ///< the entries that are fresh, below lead_count 0
-  uint32_t first_fresh;   ///< the vertex of the first of them
-  uint32_t explicit_bit;  ///< where the vertices of the others begin
+  uint32_t count;        ///< of triangles
+  uint32_t restarts;     ///< bit 0 set
+  uint32_t lefts;        ///< bit 0 clear
+  uint32_t corner_count; ///< of the list, <= kBatchCorners
+  uint32_t lead_count;   ///< 2 where the first two entries are lead[], else 0
+  uint32_t lead[2];      ///< vertices
+  uint32_t fresh;        ///< the entries that are fresh, below lead_count 0
+  uint32_t first_fresh;  ///< the vertex of the first of them
+  uint32_t explicit_bit; ///< where the vertices of the others begin
 };
 
 inline uint32_t index_bits(const TraceCluster& cluster) { return uint32_t{cluster.flags} >> kIndexBitsShift; }

@@ -55,21 +55,28 @@ struct GroupBoxes {
   }
 };
 
-/// By child of a node: the rays that pass its box, as bits.
+/// Which of a node's boxes rays pass.
 template <typename Lanes>
 struct ChildRays {
-  uint64_t rays[baked::kNodeWidth] = {};
-
-  void add(const GroupBoxes<Lanes>& boxes, const RayGroup& group, uint32_t ray) {
-    using F = typename Lanes::F;
-    F begin = Lanes::set(group.limits[ray][0]), end = Lanes::set(group.tmax(ray));
-    for (uint32_t axis = 0; axis < 3; ++axis) {
-      const F inverse = Lanes::set(group.inverse[axis][ray]);
-      begin = Lanes::max(begin, Lanes::fma(boxes.near[axis], inverse, Lanes::set(group.bias[axis][ray][0])));
-      end = Lanes::min(end, Lanes::fma(boxes.far[axis], inverse, Lanes::set(-group.bias[axis][ray][1])));
+  /// @param out by child: those of `rays` that pass its box, as bits
+  /// @return the children that any passes, as bits
+  static uint32_t pass(const GroupBoxes<Lanes>& boxes, const RayGroup& group, uint64_t rays,
+                       uint64_t (&out)[baked::kNodeWidth]) {
+    typename Lanes::Masks masks;
+    for (; rays != 0; rays &= rays - 1) {
+      const auto ray = static_cast<uint32_t>(__builtin_ctzll(rays));
+      F begin = Lanes::set(group.limits[ray][0]), end = Lanes::set(group.tmax(ray));
+      for (uint32_t axis = 0; axis < 3; ++axis) {
+        const F inverse = Lanes::set(group.inverse[axis][ray]);
+        begin = Lanes::max(begin, Lanes::fma(boxes.near[axis], inverse, Lanes::set(group.bias[axis][ray][0])));
+        end = Lanes::min(end, Lanes::fma(boxes.far[axis], inverse, Lanes::set(-group.bias[axis][ray][1])));
+      }
+      masks.add_less_equal(begin, end, uint64_t{1} << ray);
     }
-    for (uint32_t hit = Lanes::less_equal(begin, end); hit != 0; hit &= hit - 1)
-      rays[__builtin_ctz(hit)] |= uint64_t{1} << ray;
+    masks.read(out);
+    uint32_t used = 0;
+    for (uint32_t child = 0; child < baked::kNodeWidth; ++child) used |= (out[child] != 0 ? 1u : 0u) << child;
+    return used;
   }
 
   /// Where a ray enters the boxes.
@@ -81,15 +88,8 @@ struct ChildRays {
     Lanes::store(t, Lanes::max(Lanes::max(at(0), at(1)), at(2)));
   }
 
-  /// @return the children that any ray passes, as bits
-  uint32_t read(uint64_t (&out)[baked::kNodeWidth]) const {
-    uint32_t used = 0;
-    for (uint32_t child = 0; child < baked::kNodeWidth; ++child) {
-      out[child] = rays[child];
-      used |= (rays[child] != 0 ? 1u : 0u) << child;
-    }
-    return used;
-  }
+private:
+  using F = typename Lanes::F;
 };
 
 } // namespace

@@ -28,7 +28,8 @@ struct Avx512GroupBoxes {
       const bool backward = ((octant >> axis) & 1u) != 0;
       const __m256 near = _mm256_load_ps(backward ? node.hi[axis] : node.lo[axis]);
       const __m256 far = _mm256_load_ps(backward ? node.lo[axis] : node.hi[axis]);
-      plane[axis] = negate_far(_mm512_permutex2var_ps(_mm512_castps256_ps512(near), pairs, _mm512_castps256_ps512(far)));
+      plane[axis] =
+          negate_far(_mm512_permutex2var_ps(_mm512_castps256_ps512(near), pairs, _mm512_castps256_ps512(far)));
     }
   }
 
@@ -40,10 +41,31 @@ private:
 };
 
 struct Avx512ChildRays {
-  __m512i rays = _mm512_setzero_si512();
+  static uint32_t pass(const Avx512GroupBoxes& boxes, const RayGroup& group, uint64_t rays,
+                       uint64_t (&out)[baked::kNodeWidth]) {
+    __m512i by_child = _mm512_setzero_si512();
+    for (; rays != 0; rays &= rays - 1) {
+      const auto ray = static_cast<uint32_t>(__builtin_ctzll(rays));
+      by_child = _mm512_mask_or_epi64(by_child, pass_boxes(boxes, group, ray), by_child,
+                                      _mm512_set1_epi64(static_cast<int64_t>(rays & (0 - rays))));
+    }
+    _mm512_storeu_si512(out, by_child);
+    return _mm512_test_epi64_mask(by_child, by_child);
+  }
 
-  void add(const Avx512GroupBoxes& boxes, const RayGroup& group, uint32_t ray) {
-    const auto pair = [](const float (&two)[2]) {
+  static void enter(const Avx512GroupBoxes& boxes, const RayGroup& group, uint32_t ray, float (&t)[baked::kNodeWidth]) {
+    const auto at = [&](uint32_t axis) {
+      return _mm512_fmadd_ps(boxes.plane[axis], _mm512_set1_ps(group.inverse[axis][ray]),
+                             _mm512_set1_ps(group.bias[axis][ray][0]));
+    };
+    const __m512 begin = _mm512_max_ps(_mm512_max_ps(at(0), at(1)), at(2));
+    _mm256_storeu_ps(t, _mm512_castps512_ps256(_mm512_permutexvar_ps(
+                            _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 0, 0, 0, 0, 0, 0, 0, 0), begin)));
+  }
+
+private:
+  static __mmask8 pass_boxes(const Avx512GroupBoxes& boxes, const RayGroup& group, uint32_t ray) {
+    const auto pair = [](const float(&two)[2]) {
       double both;
       __builtin_memcpy(&both, two, sizeof both);
       return _mm512_castpd_ps(_mm512_set1_pd(both));
@@ -55,24 +77,7 @@ struct Avx512ChildRays {
         _mm512_max_ps(_mm512_max_ps(parameter(0), parameter(1)), _mm512_max_ps(parameter(2), pair(group.limits[ray])));
     // begin <= end, that is begin + -end <= 0: the sign of a sum is exact. Both halves of 64 bits hold it.
     const __m512 sum = _mm512_add_ps(latest, _mm512_permute_ps(latest, 0xb1));
-    const __mmask8 hit = _mm512_cmple_epi64_mask(_mm512_castps_si512(sum), _mm512_setzero_si512());
-    rays = _mm512_mask_or_epi64(rays, hit, rays, _mm512_set1_epi64(static_cast<int64_t>(uint64_t{1} << ray)));
-  }
-
-  static void enter(const Avx512GroupBoxes& boxes, const RayGroup& group, uint32_t ray,
-                    float (&t)[baked::kNodeWidth]) {
-    const auto at = [&](uint32_t axis) {
-      return _mm512_fmadd_ps(boxes.plane[axis], _mm512_set1_ps(group.inverse[axis][ray]),
-                             _mm512_set1_ps(group.bias[axis][ray][0]));
-    };
-    const __m512 begin = _mm512_max_ps(_mm512_max_ps(at(0), at(1)), at(2));
-    _mm256_storeu_ps(t, _mm512_castps512_ps256(_mm512_permutexvar_ps(
-                            _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 0, 0, 0, 0, 0, 0, 0, 0), begin)));
-  }
-
-  uint32_t read(uint64_t (&out)[baked::kNodeWidth]) const {
-    _mm512_storeu_si512(out, rays);
-    return _mm512_test_epi64_mask(rays, rays);
+    return _mm512_cmple_epi64_mask(_mm512_castps_si512(sum), _mm512_setzero_si512());
   }
 };
 

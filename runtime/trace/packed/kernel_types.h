@@ -5,8 +5,8 @@
 
 #include "compress/format/packed_node.h"
 
-/// What the traversal kernels read and write. Plain data: kernels are compiled once per instruction set, so nothing here
-/// may bring inline functions along that the linker could take from the wrong one.
+/// What the traversal kernels read and write. Plain data: kernels are compiled once per instruction set, so nothing
+/// here may bring inline functions along that the linker could take from the wrong one.
 namespace packtrace::packed {
 
 /// Triangles that are decoded and tested at once.

@@ -11,6 +11,23 @@ namespace {
 struct Avx2Lanes {
   using F = __m256;
 
+  /// A word of bits for each lane.
+  struct Masks {
+    __m256i low = _mm256_setzero_si256(), high = _mm256_setzero_si256();
+
+    /// Adds a bit to the words of the lanes where a <= b.
+    void add_less_equal(F a, F b, uint64_t bit) {
+      const __m256i all = _mm256_castps_si256(_mm256_cmp_ps(a, b, _CMP_LE_OQ));
+      const __m256i bits = _mm256_set1_epi64x(static_cast<int64_t>(bit));
+      low = _mm256_or_si256(low, _mm256_and_si256(bits, _mm256_cvtepi32_epi64(_mm256_castsi256_si128(all))));
+      high = _mm256_or_si256(high, _mm256_and_si256(bits, _mm256_cvtepi32_epi64(_mm256_extracti128_si256(all, 1))));
+    }
+    void read(uint64_t (&out)[8]) const {
+      _mm256_storeu_si256(reinterpret_cast<__m256i*>(out), low);
+      _mm256_storeu_si256(reinterpret_cast<__m256i*>(out + 4), high);
+    }
+  };
+
   static F load(const float* p) { return _mm256_loadu_ps(p); }
   static void store(float* p, F a) { _mm256_storeu_ps(p, a); }
   static F load_bytes(const uint8_t* p) {

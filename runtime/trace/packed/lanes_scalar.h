@@ -11,6 +11,19 @@ struct ScalarLanes {
     float lane[8];
   };
 
+  /// A word of bits for each lane.
+  struct Masks {
+    uint64_t lane[8] = {};
+
+    /// Adds a bit to the words of the lanes where a <= b.
+    void add_less_equal(F a, F b, uint64_t bit) {
+      for (uint32_t i = 0; i < 8; ++i) lane[i] |= a.lane[i] <= b.lane[i] ? bit : 0;
+    }
+    void read(uint64_t (&out)[8]) const {
+      for (uint32_t i = 0; i < 8; ++i) out[i] = lane[i];
+    }
+  };
+
   template <typename Function>
   static F each(Function function) {
     F result;

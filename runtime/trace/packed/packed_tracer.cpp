@@ -21,10 +21,9 @@ namespace {
 
 static_assert(sizeof(Ray) == sizeof(packed::KernelRay) && offsetof(Ray, tfar) == offsetof(packed::KernelRay, tfar) &&
               offsetof(Ray, direction) == offsetof(packed::KernelRay, direction));
-static_assert(sizeof(RayHit) == sizeof(packed::KernelHit) && offsetof(RayHit, part) == offsetof(packed::KernelHit, cluster));
+static_assert(sizeof(RayHit) == sizeof(packed::KernelHit) &&
+              offsetof(RayHit, part) == offsetof(packed::KernelHit, cluster));
 static_assert(baked::kCameraBelow == kCameraRays && baked::kOcclusionBelow == kOcclusionRays);
-
-constexpr uint32_t kNoPlace = ~0u;
 
 const packed::KernelRay* kernel_rays(std::span<const Ray> rays) {
   return reinterpret_cast<const packed::KernelRay*>(rays.data());
@@ -76,7 +75,7 @@ TreeBox placed_box(const packed::TracePlacement& placement, const DAffine& unit_
   }
   // Rays in the grid are off by 2^-22 of the largest coordinate there, see grid_ray.h.
   const DVec3 pad(0x1p-20 * glm::max(glm::max(std::abs(centre.x) + half.x, std::abs(centre.y) + half.y),
-                                    std::abs(centre.z) + half.z));
+                                     std::abs(centre.z) + half.z));
   const DVec3 middle = transform_point(unit_from_grid, centre);
   const DVec3 reach = glm::abs(unit_from_grid[0]) * (half.x + pad.x) + glm::abs(unit_from_grid[1]) * (half.y + pad.y) +
                       glm::abs(unit_from_grid[2]) * (half.z + pad.z);
@@ -104,36 +103,38 @@ void place_top(std::span<const TreeBox> boxes, packed::KernelScene& scene) {
 } // namespace
 
 struct PackedTracer::Tables {
-  PackedTrees packed;
+  PackedTrees built; ///< where the file has no trees
+  std::span<const baked::TreeRecord> records;
+  std::span<const baked::PackedNode> nodes;
   std::vector<packed::TraceCluster> clusters;
   std::vector<packed::TraceTree> trees;
   std::vector<packed::TracePlacement> placements;
-  std::vector<TreeBox> boxes;            ///< of placements
-  std::vector<uint32_t> instance_of;     ///< by placement; kNoPlace: the world's
-  std::vector<uint32_t> tree_of;         ///< by the source's geometry, or kNoPlace
-  std::vector<uint32_t> grid_of;         ///< by the file's geometry: a tree whose grid its clusters are read in
-  std::vector<uint32_t> first_instance;  ///< by the file's geometry; that of a level's base
-  std::vector<Placement> surfaces;       ///< by instance
+  std::vector<TreeBox> boxes;           ///< of placements
+  std::vector<uint32_t> instance_of;    ///< by placement; baked::kNone: the world's
+  std::vector<uint32_t> tree_of;        ///< by the source's geometry, or baked::kNone
+  std::vector<uint32_t> grid_of;        ///< by the file's geometry: a tree whose grid its clusters are read in
+  std::vector<uint32_t> first_instance; ///< by the file's geometry; that of a level's base
+  std::vector<Placement> surfaces;      ///< by instance
   std::vector<packed::TopNode> top;
   packed::KernelScene scene{};
   BatchCacheOwner caches;
 
   void add_tree(uint32_t number) {
-    const baked::TreeRecord& record = packed.trees[number];
-    packed::TraceTree tree{packed.nodes.data() + record.first_node, 1.0f};
+    const baked::TreeRecord& record = records[number];
+    packed::TraceTree tree{nodes.data() + record.first_node, 1.0f};
     if (record.node_count > 0) {
       double lo[3], hi[3];
       root_box(tree.nodes[0], lo, hi);
       for (int axis = 0; axis < 3; ++axis)
-        tree.max_coordinate =
-            std::max({tree.max_coordinate, static_cast<float>(std::abs(lo[axis])), static_cast<float>(std::abs(hi[axis]))});
+        tree.max_coordinate = std::max(
+            {tree.max_coordinate, static_cast<float>(std::abs(lo[axis])), static_cast<float>(std::abs(hi[axis]))});
     }
     trees.push_back(tree);
   }
 
   /// @param number of a tree in whose grid they are read
   void add_clusters(const BakedFile& file, uint32_t number, uint32_t g) {
-    const baked::TreeRecord& tree = packed.trees[number];
+    const baked::TreeRecord& tree = records[number];
     const baked::GeometryRecord& geometry = file.geometries()[g];
     grid_of[g] = number;
     uint32_t next = 0;
@@ -153,10 +154,10 @@ PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, con
     : file_(file), source_(source), lod_(lod), kernels_(kernels_of(isa)), tables_(std::make_unique<Tables>()) {
   Tables& t = *tables_;
   t.clusters.resize(file.sections().clusters.size());
-  t.tree_of.assign(source.geometry_count(), kNoPlace);
-  t.grid_of.assign(file.geometries().size(), kNoPlace);
+  t.tree_of.assign(source.geometry_count(), baked::kNone);
+  t.grid_of.assign(file.geometries().size(), baked::kNone);
   lod != nullptr ? build_lod() : build_whole();
-  for (uint32_t i = 0; i < t.packed.trees.size(); ++i) t.add_tree(i);
+  for (uint32_t i = 0; i < t.records.size(); ++i) t.add_tree(i);
   find_first_instances();
   place();
   t.scene.clusters = t.clusters.data();
@@ -174,7 +175,7 @@ PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, con
     const auto& tracer = *static_cast<const PackedTracer*>(owner);
     const uint32_t g = tracer.geometry_of_cluster(cluster);
     const baked::GeometryRecord& geometry = tracer.file_.geometries()[g];
-    return decode_batch_exactly(tracer.tables_->packed.trees[tracer.tables_->grid_of[g]], geometry,
+    return decode_batch_exactly(tracer.tables_->records[tracer.tables_->grid_of[g]], geometry,
                                 tracer.file_.cluster(g, static_cast<uint32_t>(cluster - geometry.first_cluster)), first,
                                 count, out);
   };
@@ -189,23 +190,29 @@ PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, con
 
 PackedTracer::~PackedTracer() = default;
 
-/// Trees over all of level 0.
+/// Trees over all of level 0: the file's, if it holds any.
 void PackedTracer::build_whole() {
   Tables& t = *tables_;
-  BakedSections sections = file_.sections();
-  sections.geometries = sections.geometries.first(file_.base_geometry_count());
-  t.packed = build_packed_trees(sections);
-  uint32_t world = kNoPlace;
-  for (uint32_t i = 0; i < t.packed.trees.size(); ++i) {
-    const uint32_t g = t.packed.trees[i].geometry;
+  t.records = file_.sections().trees;
+  t.nodes = file_.sections().nodes;
+  if (t.records.empty()) {
+    BakedSections sections = file_.sections();
+    sections.geometries = sections.geometries.first(file_.base_geometry_count());
+    t.built = build_packed_trees(sections);
+    t.records = t.built.trees;
+    t.nodes = t.built.nodes;
+  }
+  uint32_t world = baked::kNone;
+  for (uint32_t i = 0; i < t.records.size(); ++i) {
+    const uint32_t g = t.records[i].geometry;
     if (g == baked::kWorldTree)
       world = i;
-    else
+    else if (g < t.tree_of.size()) // else a level of detail
       t.tree_of[g] = i;
   }
   for (uint32_t g = 0; g < t.tree_of.size(); ++g) {
     if (file_.geometries()[g].cluster_count == 0) continue;
-    if (t.tree_of[g] == kNoPlace) t.tree_of[g] = world;
+    if (t.tree_of[g] == baked::kNone) t.tree_of[g] = world;
     t.add_clusters(file_, t.tree_of[g], g);
   }
 }
@@ -216,7 +223,7 @@ void PackedTracer::build_lod() {
   const BakedSections& sections = file_.sections();
   const std::vector<uint8_t> joins = ChosenTreeBuilder::joins_world(sections);
   std::vector<ChosenClusters> chosen;
-  uint32_t world = kNoPlace;
+  uint32_t world = baked::kNone;
   const auto next_tree = [&](uint32_t geometry) {
     chosen.push_back({geometry, {}});
     return static_cast<uint32_t>(chosen.size()) - 1;
@@ -224,28 +231,30 @@ void PackedTracer::build_lod() {
   for (uint32_t b = 0; b < lod_->geometry_count(); ++b) {
     const uint32_t base = lod_->base_geometry(b);
     if (lod_->clusters(b).empty()) continue;
-    if (joins[base] != 0 && world == kNoPlace) world = next_tree(baked::kWorldTree);
+    if (joins[base] != 0 && world == baked::kNone) world = next_tree(baked::kWorldTree);
     const uint32_t tree = joins[base] != 0 ? world : next_tree(base);
     t.tree_of[b] = tree;
     for (const LodCluster& c : lod_->clusters(b))
       chosen[tree].clusters.push_back(
           static_cast<uint32_t>(file_.geometries()[c.geometry].first_cluster + c.cluster));
   }
-  if (world != kNoPlace) std::ranges::sort(chosen[world].clusters); // levels of all of them are behind all of level 0
+  if (world != baked::kNone) std::ranges::sort(chosen[world].clusters); // levels of all of them are behind all of level 0
   const Stopwatch making_clusters;
   const ChosenTreeBuilder builder(sections, chosen);
   lod_trees_.clusters_s = making_clusters.seconds();
   const Stopwatch building;
-  t.packed = builder.build();
+  t.built = builder.build();
+  t.records = t.built.trees;
+  t.nodes = t.built.nodes;
   lod_trees_.trees_s = building.seconds();
   for (uint32_t i = 0; i < chosen.size(); ++i) {
     const uint64_t leaves = builder.leaf_nodes(i);
     lod_trees_.trees.push_back({chosen[i].geometry, (leaves > 0 ? 2 * leaves - 1 : 0) * sizeof(baked::PackedNode),
-                                t.packed.trees[i].node_count * sizeof(baked::PackedNode)});
+                                t.records[i].node_count * sizeof(baked::PackedNode)});
   }
   for (uint32_t b = 0; b < lod_->geometry_count(); ++b) {
     const uint32_t base = lod_->base_geometry(b);
-    if (t.tree_of[b] == kNoPlace || t.grid_of[base] != kNoPlace) continue;
+    if (t.tree_of[b] == baked::kNone || t.grid_of[base] != baked::kNone) continue;
     t.add_clusters(file_, t.tree_of[b], base);
     for (const baked::LodLevelRecord& level : file_.lod(base).levels)
       if (level.level > 0) t.add_clusters(file_, t.tree_of[b], level.geometry);
@@ -255,7 +264,7 @@ void PackedTracer::build_lod() {
 void PackedTracer::find_first_instances() {
   Tables& t = *tables_;
   const std::span<const baked::InstanceRecord> instances = file_.instances();
-  t.first_instance.assign(file_.geometries().size(), kNoPlace);
+  t.first_instance.assign(file_.geometries().size(), baked::kNone);
   for (uint32_t i = static_cast<uint32_t>(instances.size()); i-- > 0;) t.first_instance[instances[i].geometry] = i;
   for (const baked::LodLevelRecord& level : file_.sections().lod_levels)
     t.first_instance[level.geometry] = t.first_instance[level.base];
@@ -275,7 +284,7 @@ Bounds PackedTracer::bounds_of(uint32_t geometry) const {
 /// The instance that a cluster of a placement is of.
 uint32_t PackedTracer::instance_of(uint32_t placement, uint32_t cluster) const {
   const uint32_t placed = tables_->instance_of[placement];
-  return placed != kNoPlace ? placed : tables_->first_instance[geometry_of_cluster(cluster)];
+  return placed != baked::kNone ? placed : tables_->first_instance[geometry_of_cluster(cluster)];
 }
 
 /// A cluster's triangle as the source numbers it.
@@ -295,25 +304,25 @@ void PackedTracer::place() {
   bool world_placed = false;
   for (uint32_t i = 0; i < instances.size(); ++i) {
     const uint32_t tree = t.tree_of[instances[i].geometry];
-    if (tree == kNoPlace) continue;
+    if (tree == baked::kNone) continue;
     const DAffine world_from_object(instances[i].world_from_object);
     const DAffine unit_from_grid =
-        compose(compose(space_.unit_from_outer(), world_from_object), outer_from_grid(t.packed.trees[tree]));
+        compose(compose(space_.unit_from_outer(), world_from_object), outer_from_grid(t.records[tree]));
     t.surfaces[i] = instanced_placement(i, world_from_object, unit_from_grid);
     // Rays move in doubles, and only what they become in the grid is rounded.
     t.surfaces[i].moved_linear = glm::dmat3(0.0);
     t.surfaces[i].moved_offset = DVec3(0.0);
-    const bool in_world = t.packed.trees[tree].geometry == baked::kWorldTree;
+    const bool in_world = t.records[tree].geometry == baked::kWorldTree;
     if (in_world && world_placed) continue;
     world_placed |= in_world;
-    add_placement(tree, in_world ? kNoPlace : i, unit_from_grid);
+    add_placement(tree, in_world ? baked::kNone : i, unit_from_grid);
   }
 }
 
-/// @param instance or kNoPlace for the world's tree
+/// @param instance or baked::kNone for the world's tree
 void PackedTracer::add_placement(uint32_t tree, uint32_t instance, const DAffine& unit_from_grid) {
   Tables& t = *tables_;
-  if (t.packed.trees[tree].node_count == 0) return;
+  if (t.records[tree].node_count == 0) return;
   const DAffine grid_from_unit = inverse(unit_from_grid);
   if (!invertible(unit_from_grid, grid_from_unit)) return flat_instances_.push_back(instance);
   packed::TracePlacement placement{};
@@ -362,15 +371,15 @@ void PackedTracer::count_any(std::span<const Ray> rays, uint32_t ray_class, std:
 HitSurface PackedTracer::resolve(const RayHit& hit) const {
   const Tables& t = *tables_;
   HitSurface surface;
-  const uint32_t g = geometry_of_cluster(hit.part), instance = instance_of(hit.placement, hit.part);
+  const uint32_t instance = instance_of(hit.placement, hit.part);
   surface.placement = &t.surfaces[instance];
   surface.geometry = source_.instances()[instance].geometry;
   surface.triangle = triangle_of(hit.part, instance, hit.triangle);
-  const baked::GeometryRecord& geometry = file_.geometries()[g];
   packed::DecodedBatch batch;
-  decode_batch_exactly(t.packed.trees[t.grid_of[g]], geometry,
-                       file_.cluster(g, static_cast<uint32_t>(hit.part - geometry.first_cluster)), hit.triangle, 1,
-                       batch);
+  if (const packed::TraceCluster& cluster = t.clusters[hit.part]; (cluster.flags & packed::kWide) == 0)
+    kernels_.decode(cluster, hit.triangle, 1, batch);
+  else
+    t.scene.decode_wide(this, hit.part, hit.triangle, 1, batch);
   for (int corner = 0; corner < 3; ++corner)
     for (int axis = 0; axis < 3; ++axis) surface.vertices[corner][axis] = batch.vertex[axis][corner][0];
   return surface;
@@ -379,7 +388,7 @@ HitSurface PackedTracer::resolve(const RayHit& hit) const {
 std::vector<ResidentPart> PackedTracer::resident() const {
   const Tables& t = *tables_;
   return {{"file", file_.file_bytes()},
-          {"nodes", t.packed.nodes.size() * sizeof(baked::PackedNode) + t.packed.trees.size() * sizeof(baked::TreeRecord)},
+          {"nodes built", t.built.nodes.size() * sizeof(baked::PackedNode)},
           {"cluster table", t.clusters.size() * sizeof(packed::TraceCluster)},
           {"placements", t.placements.size() * (sizeof(packed::TracePlacement) + sizeof(TreeBox) + sizeof(uint32_t)) +
                              t.surfaces.size() * sizeof(Placement) + t.top.size() * sizeof(packed::TopNode) +

@@ -10,7 +10,7 @@
 namespace packtrace {
 
 /// Traces a baked file as it is: triangles are decoded from the clusters' bits when rays reach them, boxes are those of
-/// the file's trees. docs/packed_bvh.md describes how.
+/// the file's trees, or of trees built here where it has none. docs/packed_bvh.md describes how.
 class PackedTracer final : public RayTracer {
 public:
   /// Keeps references: both must outlive the tracer.

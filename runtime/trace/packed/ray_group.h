@@ -15,7 +15,8 @@ constexpr uint32_t kGroup = 64;
 /// roundings in units of u = 2^-24, for a direction whose largest component is in [1, 2):
 ///  - A hit triangle's point lies off the ray: a vertex rounds to float (1 M), less the origin (2 M), sheared with a
 ///    rounded slope (2 M) in one rounding (4 M); it was an integer that rounded to float (1 M): at most 10 u M.
-///  - A plane's parameter p inv + b: the node's origin to float (1 M), its plane (1 M), inv's rounding (2 M, as b has the
+///  - A plane's parameter p inv + b: the node's origin to float (1 M), its plane (1 M), inv's rounding (2 M, as b has
+///  the
 ///    same one), b's product and pad (1 M each), the last rounding (2 M): 8 u M.
 ///  - A component below 2^-40 counts as 2^-40: within the reach of 4 M, 2^-38 M.
 /// So 19 u M suffice, and 24 are taken.
@@ -36,7 +37,7 @@ struct alignas(64) RayGroup {
   float limits[kGroup][2];  ///< hits lie above the first and not beyond - the second
   float inverse[3][kGroup]; ///< of the direction, never infinite
   float origin[3][kGroup];
-  float shear[3][kGroup]; ///< Woop's S
+  float shear[3][kGroup];   ///< Woop's S
   uint32_t axis[3][kGroup]; ///< Woop's k: x, y, z; z is the direction's largest component
   uint64_t backward[3];     ///< rays along which x, y, z decrease, as bits
   double t_begin[kGroup];   ///< unit-space t = (t here + t_begin) t_scale
@@ -56,7 +57,8 @@ inline float next_below(float x) { // x > 0
 
 constexpr uint32_t kBlock = 8; ///< rays that are set up at once
 
-// The compiler's own vectors, a lane for each ray of a block, so that all instruction sets get the same from one source.
+// The compiler's own vectors, a lane for each ray of a block, so that all instruction sets get the same from one
+// source.
 using Floats = float __attribute__((vector_size(4 * kBlock)));
 using Ints = int32_t __attribute__((vector_size(4 * kBlock)));
 using Doubles = double __attribute__((vector_size(8 * kBlock)));

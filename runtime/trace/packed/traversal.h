@@ -143,14 +143,12 @@ private:
     const TraceTree& tree = scene_.trees[place.tree];
     RayGroup group;
     rays = enter(place, tree.max_coordinate, unit_, rays, group);
-    by_octant(group, rays, [&](uint64_t together, uint32_t octant) {
-      trace_tree(placement, tree.nodes, group, together, octant);
-    });
+    by_octant(group, rays,
+              [&](uint64_t together, uint32_t octant) { trace_tree(placement, tree.nodes, group, together, octant); });
   }
 
   /// Through one placed tree, rays of one octant of it.
-  void trace_tree(uint32_t placement, const baked::PackedNode* nodes, RayGroup& group, uint64_t rays,
-                  uint32_t octant) {
+  void trace_tree(uint32_t placement, const baked::PackedNode* nodes, RayGroup& group, uint64_t rays, uint32_t octant) {
     Pending stack[baked::kMaxTreeDepth * (baked::kNodeWidth - 1) + 1];
     uint32_t size = 0;
     stack[size++] = {rays, 0, 0.0f};
@@ -173,26 +171,19 @@ private:
     }
   }
 
-  static typename Lanes::Children pass_boxes(const typename Lanes::Boxes& boxes, const RayGroup& group, uint64_t rays) {
-    typename Lanes::Children children;
-    for (; rays != 0; rays &= rays - 1) children.add(boxes, group, first_bit(rays));
-    return children;
-  }
-
   /// Pushes the children of a node that rays pass; of nearest hits, the one that the first ray enters first on top.
   template <typename Number>
   static void push_children(const typename Lanes::Boxes& boxes, const RayGroup& group, uint64_t rays, uint32_t slots,
                             Pending* stack, uint32_t& size, Number number) {
     uint64_t by_child[baked::kNodeWidth];
-    slots &= pass_boxes(boxes, group, rays).read(by_child);
+    slots &= Lanes::Children::pass(boxes, group, rays, by_child);
     float t[baked::kNodeWidth] = {};
-    if constexpr (!kAny) Lanes::Children::enter(boxes, group, first_bit(rays), t);
+    Lanes::Children::enter(boxes, group, first_bit(rays), t);
     const uint32_t begin = size;
     for (; slots != 0; slots &= slots - 1) {
       const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
       uint32_t at = size++;
-      if constexpr (!kAny)
-        for (; at > begin && stack[at - 1].t < t[slot]; --at) stack[at] = stack[at - 1];
+      for (; at > begin && stack[at - 1].t < t[slot]; --at) stack[at] = stack[at - 1];
       stack[at] = {by_child[slot], number(slot), t[slot]};
     }
   }
@@ -201,7 +192,7 @@ private:
                     const typename Lanes::Boxes& boxes, RayGroup& group, uint64_t rays) {
     if ((scene_.clusters[node.cluster].flags & ray_class_) == 0) return;
     uint64_t by_child[baked::kNodeWidth];
-    uint32_t slots = children.slots() & pass_boxes(boxes, group, rays).read(by_child);
+    uint32_t slots = children.slots() & Lanes::Children::pass(boxes, group, rays, by_child);
     const uint64_t begins = children.leaf_begins();
     for (; slots != 0; slots &= slots - 1) {
       const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
@@ -211,7 +202,8 @@ private:
     }
   }
 
-  void trace_leaf(uint32_t placement, uint32_t cluster, uint32_t first, uint32_t count, RayGroup& group, uint64_t rays) {
+  void trace_leaf(uint32_t placement, uint32_t cluster, uint32_t first, uint32_t count, RayGroup& group,
+                  uint64_t rays) {
     if constexpr (kCount) ++counters_->leaves, counters_->leaf_rays += count_ones(rays);
     while (count > 0) {
       const DecodedBatch& batch = decoded(cluster, first, count);

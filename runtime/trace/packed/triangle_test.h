@@ -4,11 +4,11 @@
 
 /// Eight triangles against a ray: Woop, Benthin, Wald, "Watertight ray/triangle intersection" (2013), with exact signs.
 ///
-/// Vertices move so that the ray starts at the origin and are sheared so that it runs along z: a vertex's x and y depend
-/// on the vertex and the ray only, so triangles that share it agree. What is decided then is whether the origin lies
-/// in the projected triangle, edges included, and that is decided exactly: the sign of an edge function p x q is taken
-/// from floats only where |p x q| is above its rounding error, and else from doubles, in which products of two floats
-/// are exact and their difference has the right sign.
+/// Vertices move so that the ray starts at the origin and are sheared so that it runs along z: a vertex's x and y
+/// depend on the vertex and the ray only, so triangles that share it agree. What is decided then is whether the origin
+/// lies in the projected triangle, edges included, and that is decided exactly: the sign of an edge function p x q is
+/// taken from floats only where |p x q| is above its rounding error, and else from doubles, in which products of two
+/// floats are exact and their difference has the right sign.
 ///
 /// So no ray passes a closed mesh. Move the origin by less than any given distance to a place on no projected edge:
 /// there the triangles in front and behind, those that project to nothing left out, cover it as the exact plane mesh
@@ -36,7 +36,8 @@ inline uint32_t test_exactly(uint32_t lanes, const float (&x)[3][kBatch], const 
     if ((u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0)) continue;
     const double sum = u + v + w;
     if (sum == 0.0) continue;
-    hits.t[i] = static_cast<float>((u * double{z[0][i]} + v * double{z[1][i]} + w * double{z[2][i]}) / sum * double{sz});
+    hits.t[i] =
+        static_cast<float>((u * double{z[0][i]} + v * double{z[1][i]} + w * double{z[2][i]}) / sum * double{sz});
     hits.u[i] = static_cast<float>(v / sum);
     hits.v[i] = static_cast<float>(w / sum);
     hit |= 1u << i;
@@ -69,14 +70,22 @@ inline uint32_t test_triangles(const DecodedBatch& batch, const RayGroup& group,
   const F error = Lanes::fma(Lanes::max(Lanes::max(Lanes::abs(u1), Lanes::abs(v1)), Lanes::abs(w1)),
                              Lanes::set(kEdgeError), Lanes::set(kSmallestEdge));
   const F below = Lanes::negate(error);
-  const uint32_t maybe =
-      (Lanes::less_equal(below, least) | Lanes::less_equal(most, error)) & ((1u << batch.count) - 1);
+  const uint32_t maybe = (Lanes::less_equal(below, least) | Lanes::less_equal(most, error)) & ((1u << batch.count) - 1);
   if (maybe == 0) return 0;
 
   uint32_t hit = maybe & (Lanes::less(error, least) | Lanes::less(most, below));
   const F over = Lanes::div(Lanes::set(1.0f), Lanes::add(Lanes::add(u, v), w));
-  const F depth = Lanes::fma(u, z[0], Lanes::fma(v, z[1], Lanes::mul(w, z[2])));
-  Lanes::store(hits.t, Lanes::mul(Lanes::mul(depth, over), Lanes::set(group.shear[2][ray])));
+  // From the plane rather than from the weights: what vertices have along an axis that the plane is perpendicular to is
+  // then all that counts, which is what ray offsets rely on.
+  const F px = relative(kx, 0), py = relative(ky, 0);
+  const F ex = Lanes::sub(relative(kx, 1), px), ey = Lanes::sub(relative(ky, 1), py), ez = Lanes::sub(z[1], z[0]);
+  const F fx = Lanes::sub(relative(kx, 2), px), fy = Lanes::sub(relative(ky, 2), py), fz = Lanes::sub(z[2], z[0]);
+  const F nx = Lanes::sub(Lanes::mul(ey, fz), Lanes::mul(ez, fy)),
+          ny = Lanes::sub(Lanes::mul(ez, fx), Lanes::mul(ex, fz)),
+          nz = Lanes::sub(Lanes::mul(ex, fy), Lanes::mul(ey, fx));
+  const F along = Lanes::fma(sx, nx, Lanes::fma(sy, ny, nz));
+  const F depth = Lanes::fma(px, nx, Lanes::fma(py, ny, Lanes::mul(z[0], nz)));
+  Lanes::store(hits.t, Lanes::mul(Lanes::div(depth, along), Lanes::set(group.shear[2][ray])));
   Lanes::store(hits.u, Lanes::mul(v, over));
   Lanes::store(hits.v, Lanes::mul(w, over));
   if (const uint32_t unsure = maybe & ~hit; unsure != 0) {

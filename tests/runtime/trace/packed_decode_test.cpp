@@ -77,8 +77,7 @@ TEST_P(PackedDecode, ReadsLooseTriangles) {
   EXPECT_GT(batches, 3000u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Isas, PackedDecode,
-                         testing::Values(PackedIsa::kScalar, PackedIsa::kAvx2, PackedIsa::kAvx512));
+INSTANTIATE_TEST_SUITE_P(Isas, PackedDecode, testing::Values(PackedIsa::kScalar, PackedIsa::kAvx2, PackedIsa::kAvx512));
 
 TEST(TraceCluster, LeavesWhatDoesNotFitToTheExactDecoder) {
   Scene scene;

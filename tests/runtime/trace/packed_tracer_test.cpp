@@ -22,7 +22,8 @@ using test::isas;
 using test::placed;
 using test::random_rays;
 
-/// World shapes and instances: turned, mirrored, squeezed, far apart, one of it masked, one not seen, one not occluding.
+/// World shapes and instances: turned, mirrored, squeezed, far apart, one of it masked, one not seen, one not
+/// occluding.
 Scene varied_scene() {
   Scene scene;
   add_shape(scene, test::quad({-8, 0, -8}, {0, 0, 16}, {16, 0, 0}));
@@ -142,8 +143,7 @@ TEST(PackedTracer, FindsWhatTryingAllTrianglesFinds) {
     corners.emplace_back();
     for (const Triangle& t : triangles)
       for (int i = 0; i < 3; ++i)
-        corners.back().push_back(
-            transform_point(DAffine(placed_geometry.world_from_object), DVec3(positions[t[i]])));
+        corners.back().push_back(transform_point(DAffine(placed_geometry.world_from_object), DVec3(positions[t[i]])));
   }
   std::vector<Ray> rays = random_rays(20000, baked.source.world_bounds(), tracer.space(), 9);
   for (size_t i = 0; i < rays.size(); i += 3) rays[i].tnear = 0.2f, rays[i].tfar = 0.6f;
@@ -179,8 +179,8 @@ TEST(PackedTracer, SaysWhatAHitIs) {
     const double size = UnitSpace::kHalfSize;
     for (int corner = 0; corner < 3; ++corner) {
       const DVec3 in_unit = transform_point(surface.placement->unit_from_surface, DVec3(surface.vertices[corner]));
-      const DVec3 in_world = transform_point(DAffine(instance.world_from_object),
-                                             DVec3(positions[triangles[surface.triangle][corner]]));
+      const DVec3 in_world =
+          transform_point(DAffine(instance.world_from_object), DVec3(positions[triangles[surface.triangle][corner]]));
       EXPECT_LT(glm::distance(in_unit, tracer.space().to_unit(in_world)), 1e-6 * size);
       point += in_unit * weights[corner];
     }
@@ -207,7 +207,8 @@ TEST(PackedTracer, RaysFromASurfaceDoNotHitIt) {
     if (!(glm::length(n) > 0.0)) continue;
     n = glm::normalize(n);
     if (glm::dot(n, DVec3(rays[i].direction)) > 0.0) n = -n;
-    const DVec3 p = transform_point(hit.placement->unit_from_surface, a + e * double{hits[i].u} + f * double{hits[i].v});
+    const DVec3 p =
+        transform_point(hit.placement->unit_from_surface, a + e * double{hits[i].u} + f * double{hits[i].v});
     const double offset = ray_offset(hit, tracer.space(), p, n);
     Ray ray;
     ray.origin = Vec3(p + n * offset);
