@@ -32,8 +32,8 @@ struct ChosenClusters {
 };
 
 /// Trees over choices of clusters, several of one geometry if need be. All trees of a geometry have one grid, which
-/// holds all its levels of detail, so nodes with leaves are made once for each cluster, whatever trees it is in; what is
-/// built for a tree is the nodes above them.
+/// holds all its levels of detail, so nodes with leaves are made once for each cluster, whatever trees it is in; what
+/// is built for a tree is the nodes above them.
 class ChosenTreeBuilder {
 public:
   /// Makes the nodes with leaves. @param sections of a valid file; must outlive it

@@ -76,8 +76,7 @@ void write_png_of(const std::filesystem::path& path, const RenderedImage& image,
   if (aov == "normal") return raw(normal_preview(image.size, image.normal));
   if (aov == "instance") return raw(id_preview(image.size, image.instance));
   if (aov == "lod") return raw(level_preview(image.size, image.lod, image.cluster, image.ao));
-  if (aov == "lod-error")
-    return raw(heat_map(image.size, image.lod_error, static_cast<float>(image.lod_error_px)));
+  if (aov == "lod-error") return raw(heat_map(image.size, image.lod_error, static_cast<float>(image.lod_error_px)));
   write_png(path, over_sky(image, aov == "albedo" ? image.albedo : image.shaded), PngTransfer::kSrgb);
 }
 

@@ -195,9 +195,10 @@ nlohmann::json detail_json(const ChosenDetail& detail, const RayTracer& tracer) 
       {"built_triangles", plan.built_triangles},
       {"built_clusters", plan.built_clusters},
       {"traced_triangles", plan.traced_triangles},
-      {"own_cuts", {{"builds", alone.builds},
-                    {"built_triangles", alone.built_triangles},
-                    {"traced_triangles", plan.own_triangles}}},
+      {"own_cuts",
+       {{"builds", alone.builds},
+        {"built_triangles", alone.built_triangles},
+        {"traced_triangles", plan.own_triangles}}},
       {"traced_ratio", ratio(static_cast<double>(plan.traced_triangles), static_cast<double>(plan.own_triangles))},
       {"categories", {{"lowest", counts[0]}, {"provider", counts[1]}, {"shares", counts[2]}, {"own", counts[3]}}},
       {"seconds", {{"load", detail.load_s}, {"plan", detail.plan_s}, {"clusters", detail.source_s}}},
@@ -224,15 +225,18 @@ std::string detail_text(const nlohmann::json& r) {
   const auto& own = r.at("own_cuts");
   const auto& categories = r.at("categories");
   const uint64_t builds = count(r.at("builds")), alone = count(own.at("builds"));
-  std::string text = fmt::format(
-      grouped(), "  detail    {} px, {}: {:L} built for {:L} instances ({:+.1f} % against {:L} alone)\n",
-      r.at("error_px").get<double>(), r.at("scheme").get<std::string>(), builds, count(r.at("instances")),
-      alone > 0 ? 100.0 * (static_cast<double>(builds) / static_cast<double>(alone) - 1.0) : 0.0, alone);
-  text += fmt::format(grouped(), "            {:L} triangles built, {:L} traced: {:.3f} times the instances' own cuts\n",
-                      count(r.at("built_triangles")), count(r.at("traced_triangles")), r.at("traced_ratio").get<double>());
-  text += fmt::format(grouped(), "            instances: {:L} coarsest, {:L} lend, {:L} share, {:L} have their own; {:L} outside the view\n",
-                      count(categories.at("lowest")), count(categories.at("provider")), count(categories.at("shares")),
-                      count(categories.at("own")), count(r.at("instances_outside_view")));
+  std::string text =
+      fmt::format(grouped(), "  detail    {} px, {}: {:L} built for {:L} instances ({:+.1f} % against {:L} alone)\n",
+                  r.at("error_px").get<double>(), r.at("scheme").get<std::string>(), builds, count(r.at("instances")),
+                  alone > 0 ? 100.0 * (static_cast<double>(builds) / static_cast<double>(alone) - 1.0) : 0.0, alone);
+  text +=
+      fmt::format(grouped(), "            {:L} triangles built, {:L} traced: {:.3f} times the instances' own cuts\n",
+                  count(r.at("built_triangles")), count(r.at("traced_triangles")), r.at("traced_ratio").get<double>());
+  text += fmt::format(
+      grouped(),
+      "            instances: {:L} coarsest, {:L} lend, {:L} share, {:L} have their own; {:L} outside the view\n",
+      count(categories.at("lowest")), count(categories.at("provider")), count(categories.at("shares")),
+      count(categories.at("own")), count(r.at("instances_outside_view")));
   text += fmt::format("            plan {:.1f} ms, lists of clusters {:.1f} ms", ms("plan"), ms("clusters"));
   if (r.contains("trees")) {
     const auto& trees = r.at("trees");

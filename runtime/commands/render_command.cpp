@@ -213,9 +213,9 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
 
   const Stopwatch building;
   progress.begin("bvh", 0);
-  const std::unique_ptr<RayTracer> tracer =
-      detail ? make_tracer(*detail->source, *loaded.baked, backend)
-             : make_tracer(source, loaded.baked ? &*loaded.baked : nullptr, backend);
+  const std::unique_ptr<RayTracer> tracer = detail
+                                                ? make_tracer(*detail->source, *loaded.baked, backend)
+                                                : make_tracer(source, loaded.baked ? &*loaded.baked : nullptr, backend);
   const double build_s = building.seconds();
   RenderedImage image = render_view(source, *tracer, camera, config, progress);
   image.timings.build_s = build_s;

@@ -38,8 +38,8 @@ Image heat_map(ImageSize size, std::span<const float> errors, float white = 1.0f
 /// Display colours of the maps above for one value in [0,1].
 Vec3 depth_color(float t);
 Vec3 heat_color(float t);
-/// Display colour of a level of detail: grey for 0, then red, orange, yellow, green, teal, blue, violet, and pink for all
-/// from 8 on.
+/// Display colour of a level of detail: grey for 0, then red, orange, yellow, green, teal, blue, violet, and pink for
+/// all from 8 on.
 Vec3 level_color(uint32_t level);
 /// Display colour of an id: hues far apart for neighbouring ids, lightness in three steps.
 Vec3 id_color(uint32_t id);

@@ -235,10 +235,10 @@ void PackedTracer::build_lod() {
     const uint32_t tree = joins[base] != 0 ? world : next_tree(base);
     t.tree_of[b] = tree;
     for (const LodCluster& c : lod_->clusters(b))
-      chosen[tree].clusters.push_back(
-          static_cast<uint32_t>(file_.geometries()[c.geometry].first_cluster + c.cluster));
+      chosen[tree].clusters.push_back(static_cast<uint32_t>(file_.geometries()[c.geometry].first_cluster + c.cluster));
   }
-  if (world != baked::kNone) std::ranges::sort(chosen[world].clusters); // levels of all of them are behind all of level 0
+  if (world != baked::kNone)
+    std::ranges::sort(chosen[world].clusters); // levels of all of them are behind all of level 0
   const Stopwatch making_clusters;
   const ChosenTreeBuilder builder(sections, chosen);
   lod_trees_.clusters_s = making_clusters.seconds();

@@ -24,7 +24,8 @@ Scene scene_of_spheres() {
   test::add_shape(scene, test::quad({-40, -1, -40}, {0, 0, 80}, {80, 0, 0}));
   test::add_shape(scene, test::sphere({3, 1, 0}, 1, 40));
   Mesh bumpy = test::sphere({0, 0, 0}, 1, 40);
-  for (Vec3& p : bumpy.positions) p *= 1.0f + 0.05f * std::sin(9.0f * p.x) * std::sin(8.0f * p.y) * std::sin(7.0f * p.z);
+  for (Vec3& p : bumpy.positions)
+    p *= 1.0f + 0.05f * std::sin(9.0f * p.x) * std::sin(8.0f * p.y) * std::sin(7.0f * p.z);
   test::add_object(scene, bumpy);
   for (const DVec3 scale : {DVec3(1), DVec3(-1, 0.7, 1), DVec3(0.5, 1.5, 0.5)})
     for (const double z : {-4.0, 3.0, 30.0})
@@ -115,8 +116,7 @@ TEST_F(LodSourceTest, NumbersTrianglesAsItDecodesThem) {
       for (uint32_t t = 0; t < view.triangle_count(); ++t) {
         ASSERT_EQ(detailed.source.triangle_number(b, number, t), c.first_triangle + t);
         const Triangle v = view.triangle(t), decoded = triangles[c.first_triangle + t];
-        for (int corner = 0; corner < 3; ++corner)
-          ASSERT_EQ(positions[decoded[corner]], view.position(v[corner]));
+        for (int corner = 0; corner < 3; ++corner) ASSERT_EQ(positions[decoded[corner]], view.position(v[corner]));
       }
     }
   }
@@ -151,8 +151,8 @@ TEST_F(LodSourceTest, LooksUpManyPlacesAsItDoesOne) {
 }
 
 TEST_F(LodSourceTest, IsTheSameForAllTracersAndAnyNumberOfThreads) {
-  for (const SharingScheme which : {SharingScheme::kPerInstance, SharingScheme::kOneProvider, SharingScheme::kLevels,
-                                    SharingScheme::kSteps}) {
+  for (const SharingScheme which :
+       {SharingScheme::kPerInstance, SharingScheme::kOneProvider, SharingScheme::kLevels, SharingScheme::kSteps}) {
     const Detailed detailed(baked_, camera_, 0.1, scheme(which));
     ASSERT_GE(detailed.plan.builds, 2u);
     const PackedTracer packed(baked_.file, detailed.source);
@@ -260,14 +260,14 @@ TEST_F(LodSourceTest, InstancesOutsideTheViewAreSeenByNoCameraRay) {
 
 TEST(LodView, APixelIsAsWideAsNeighbouringRaysAreApart) {
   Camera camera = front();
-  camera.world_from_camera = compose(camera.world_from_camera, DAffine(DVec3(2, 0, 0), DVec3(0, 2, 0), DVec3(0, 0, 2), DVec3(0)));
+  camera.world_from_camera =
+      compose(camera.world_from_camera, DAffine(DVec3(2, 0, 0), DVec3(0, 2, 0), DVec3(0, 0, 2), DVec3(0)));
   for (const Projection projection : {Projection::kPerspective, Projection::kOrthographic, Projection::kEnvironment}) {
     camera.projection = projection;
     const PrimaryCamera view(camera, {200, 100});
     const CameraRay a = view.ray(99, 49), b = view.ray(99, 50);
-    const double apart = projection == Projection::kOrthographic
-                             ? glm::length(a.origin - b.origin)
-                             : glm::length(a.direction - b.direction);
+    const double apart = projection == Projection::kOrthographic ? glm::length(a.origin - b.origin)
+                                                                 : glm::length(a.direction - b.direction);
     EXPECT_NEAR(view.pixel_spread(), apart, 1e-3 * apart);
     const DetailView from = detail_view(view, Bounds{DVec3(-9), DVec3(9)}, 1.0);
     const double distance = std::max(from.near, glm::length(a.origin - view.eye()) + 5.0);
