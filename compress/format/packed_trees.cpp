@@ -58,10 +58,16 @@ private:
 
 class TreeBuilder {
 public:
-  TreeBuilder(const BakedSections& sections, const TreeCosts& costs) : sections_(sections), costs_(costs) {}
+  struct Tree {
+    baked::TreeRecord record{};
+    std::vector<baked::PackedNode> nodes;
+  };
+
+  TreeBuilder(const BakedSections& sections, const TreeCosts& costs) : sections_(sections), costs_(costs) {
+    placed_ = sole_identity_instances(sections_);
+  }
 
   PackedTrees run() {
-    placed_ = sole_identity_instances(sections_);
     std::vector<uint32_t> world, others;
     find_world(world, others);
     const size_t first = world.empty() ? 0 : 1;
@@ -69,6 +75,10 @@ public:
     tbb::parallel_for(size_t{0}, trees.size(), [&](size_t i) {
       trees[i] = i < first ? build(baked::kWorldTree, world) : build(others[i - first], {&others[i - first], 1});
     });
+    return collect(trees);
+  }
+
+  static PackedTrees collect(std::span<Tree> trees) {
     PackedTrees out;
     for (Tree& tree : trees) {
       tree.record.first_node = out.nodes.size();
@@ -78,12 +88,6 @@ public:
     }
     return out;
   }
-
-private:
-  struct Tree {
-    baked::TreeRecord record{};
-    std::vector<baked::PackedNode> nodes;
-  };
 
   bool may_join_world(uint32_t geometry) const {
     return (sections_.geometries[geometry].flags & baked::kWorldSpace) != 0 && placed_[geometry] != baked::kNone;
@@ -190,6 +194,7 @@ private:
     return depth;
   }
 
+private:
   const BakedSections& sections_;
   const TreeCosts& costs_;
   std::vector<uint32_t> placed_; // by geometry: sole_identity_instances()
@@ -200,5 +205,117 @@ private:
 PackedTrees build_packed_trees(const BakedSections& sections, const TreeCosts& costs) {
   return TreeBuilder(sections, costs).run();
 }
+
+struct ChosenTreeBuilder::Tables {
+  /// The nodes with leaves of one grid's clusters: of the world, or of one geometry and its levels.
+  struct Grid {
+    baked::TreeRecord record{};
+    std::vector<TreeCluster> clusters; ///< those of any choice
+    LeafNodes leaves;
+  };
+  struct Run {
+    uint32_t first = 0, count = 0; ///< of its grid's leaves
+  };
+
+  const BakedSections& sections;
+  std::span<const ChosenClusters> chosen;
+  std::vector<Grid> grids;
+  std::vector<uint32_t> grid_of; ///< by choice
+  std::vector<Run> runs;         ///< by cluster
+
+  uint64_t leaf_nodes(size_t tree) const {
+    uint64_t count = 0;
+    for (const uint32_t cluster : chosen[tree].clusters) count += runs[cluster].count;
+    return count;
+  }
+
+  TreeBuilder::Tree build(size_t tree) const {
+    const Grid& grid = grids[grid_of[tree]];
+    const uint64_t count = leaf_nodes(tree);
+    LeafNodes leaves;
+    leaves.nodes.reserve(count), leaves.boxes.reserve(count);
+    for (const uint32_t cluster : chosen[tree].clusters)
+      for (uint32_t i = runs[cluster].first, end = i + runs[cluster].count; i < end; ++i) {
+        leaves.nodes.push_back(grid.leaves.nodes[i]);
+        leaves.boxes.push_back(grid.leaves.boxes[i]);
+      }
+    TreeBuilder::Tree out;
+    out.record = grid.record;
+    TreeBuilder::build_nodes(leaves, out);
+    return out;
+  }
+};
+
+ChosenTreeBuilder::ChosenTreeBuilder(const BakedSections& sections, std::span<const ChosenClusters> chosen,
+                                     const TreeCosts& costs)
+    : tables_(std::make_unique<Tables>(Tables{sections, chosen, {}, {}, {}})) {
+  Tables& t = *tables_;
+  const TreeBuilder builder(sections, costs);
+  std::vector<uint8_t> wanted(sections.clusters.size(), 0);
+  std::vector<std::vector<uint32_t>> with_levels(sections.geometries.size()); // by geometry
+  for (uint32_t g = 0; g < with_levels.size(); ++g)
+    if ((sections.geometries[g].flags & baked::kLodLevel) == 0) with_levels[g].push_back(g);
+  for (const baked::LodLevelRecord& level : sections.lod_levels)
+    if (level.level > 0) with_levels[level.base].push_back(level.geometry);
+  std::vector<uint32_t> grid_of_geometry(sections.geometries.size(), ~0u);
+  std::vector<std::vector<uint32_t>> geometries; // by grid
+  for (const ChosenClusters& choice : chosen) {
+    for (const uint32_t cluster : choice.clusters) wanted[cluster] = 1;
+    const bool world = choice.geometry == baked::kWorldTree;
+    if (!world && grid_of_geometry[choice.geometry] != ~0u) {
+      t.grid_of.push_back(grid_of_geometry[choice.geometry]);
+      continue;
+    }
+    t.grid_of.push_back(static_cast<uint32_t>(geometries.size()));
+    if (!world) {
+      grid_of_geometry[choice.geometry] = static_cast<uint32_t>(geometries.size());
+      geometries.push_back(with_levels[choice.geometry]);
+      continue;
+    }
+    std::vector<uint32_t>& all = geometries.emplace_back();
+    const std::vector<uint8_t> joins = joins_world(sections);
+    for (uint32_t g = 0; g < joins.size(); ++g)
+      if (joins[g] != 0) all.insert(all.end(), with_levels[g].begin(), with_levels[g].end());
+  }
+  t.grids.resize(geometries.size());
+  tbb::parallel_for(size_t{0}, geometries.size(), [&](size_t i) {
+    Tables::Grid& grid = t.grids[i];
+    std::vector<const baked::GeometryRecord*> records;
+    for (const uint32_t g : geometries[i])
+      if (sections.geometries[g].cluster_count > 0) records.push_back(&sections.geometries[g]);
+    if (records.empty()) return;
+    choose_tree_grid(records, sections.clusters, grid.record);
+    grid.clusters = builder.find_clusters(geometries[i]);
+    std::erase_if(grid.clusters, [&](const TreeCluster& cluster) { return wanted[cluster.number] == 0; });
+    grid.leaves = builder.build_leaf_nodes(grid.clusters, grid.record);
+  });
+  t.runs.resize(sections.clusters.size());
+  for (const Tables::Grid& grid : t.grids)
+    for (uint32_t i = 0; i < grid.leaves.nodes.size(); ++i) {
+      Tables::Run& run = t.runs[grid.leaves.nodes[i].cluster];
+      if (run.count++ == 0) run.first = i;
+    }
+}
+
+ChosenTreeBuilder::~ChosenTreeBuilder() = default;
+
+std::vector<uint8_t> ChosenTreeBuilder::joins_world(const BakedSections& sections) {
+  std::vector<uint32_t> world, others;
+  TreeBuilder(sections, TreeCosts{}).find_world(world, others);
+  std::vector<uint8_t> joins(sections.geometries.size(), 0);
+  for (const uint32_t g : world) joins[g] = 1;
+  return joins;
+}
+
+PackedTrees ChosenTreeBuilder::build() const {
+  std::vector<TreeBuilder::Tree> trees(tables_->chosen.size());
+  tbb::parallel_for(size_t{0}, trees.size(), [&](size_t i) {
+    trees[i] = tables_->build(i);
+    trees[i].record.geometry = tables_->chosen[i].geometry;
+  });
+  return TreeBuilder::collect(trees);
+}
+
+uint64_t ChosenTreeBuilder::leaf_nodes(size_t tree) const { return tables_->leaf_nodes(tree); }
 
 } // namespace packtrace

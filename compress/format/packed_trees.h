@@ -1,5 +1,7 @@
 #pragma once
 
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "compress/format/baked_file.h"
@@ -22,5 +24,38 @@ struct PackedTrees {
 /// @param sections of a valid file; reads geometries, clusters, payload and instances only
 /// Throws Error(kLimitExceeded) where a tree would have more than 2^30 nodes with leaves.
 PackedTrees build_packed_trees(const BakedSections& sections, const TreeCosts& costs = {});
+
+/// What one tree is wanted over: clusters of a geometry and its levels of detail, or of all world-space geometry.
+struct ChosenClusters {
+  uint32_t geometry = 0;          ///< as in TreeRecord; no level of another one
+  std::vector<uint32_t> clusters; ///< numbers in the cluster section, ascending
+};
+
+/// Trees over choices of clusters, several of one geometry if need be. All trees of a geometry have one grid, which
+/// holds all its levels of detail, so nodes with leaves are made once for each cluster, whatever trees it is in; what
+/// is built for a tree is the nodes above them.
+class ChosenTreeBuilder {
+public:
+  /// Makes the nodes with leaves. @param sections of a valid file; must outlive it
+  /// @param chosen must outlive it; geometry kWorldTree at most once, and only with geometries of joins_world()
+  ChosenTreeBuilder(const BakedSections& sections, std::span<const ChosenClusters> chosen, const TreeCosts& costs = {});
+  ~ChosenTreeBuilder();
+  ChosenTreeBuilder(const ChosenTreeBuilder&) = delete;
+  ChosenTreeBuilder& operator=(const ChosenTreeBuilder&) = delete;
+
+  /// By geometry, levels not counted: whether it is one of those of the world's tree.
+  static std::vector<uint8_t> joins_world(const BakedSections& sections);
+
+  /// One tree for each choice, in order. On all threads; the result depends on sections and choices only.
+  /// Throws as build_packed_trees().
+  PackedTrees build() const;
+
+  /// Nodes with leaves below a tree; it has fewer nodes above them.
+  uint64_t leaf_nodes(size_t tree) const;
+
+private:
+  struct Tables;
+  std::unique_ptr<Tables> tables_;
+};
 
 } // namespace packtrace

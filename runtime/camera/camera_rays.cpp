@@ -79,6 +79,15 @@ CameraRay PrimaryCamera::ray(uint32_t x, uint32_t y) const {
   return {transform_point(world_from_camera_, origin), glm::normalize(transform_vector(world_from_camera_, direction))};
 }
 
+double PrimaryCamera::pixel_spread() const {
+  const glm::dmat3 linear(world_from_camera_);
+  if (projection_ == Projection::kEnvironment) return std::min(2.0 * kPi / size_.width, kPi / size_.height);
+  const double width = std::abs(window_.y - window_.x) / size_.width;
+  const double height = std::abs(window_.w - window_.z) / size_.height;
+  const double depth = projection_ == Projection::kPerspective ? depth_scale_ : 1.0;
+  return std::min(glm::length(linear[0]) * width, glm::length(linear[1]) * height) / depth;
+}
+
 double PrimaryCamera::view_z(DVec3 world) const {
   if (projection_ == Projection::kEnvironment) return glm::length(world - world_from_camera_[3]);
   return transform_point(camera_from_world_, world).z * depth_scale_;

@@ -45,6 +45,13 @@ public:
   /// Depth of a world point as ProjectedPoint::view_z, negative behind the camera.
   double view_z(DVec3 world) const;
 
+  Projection projection() const { return projection_; }
+  /// Where rays start, in world space; orthographic: some of them.
+  DVec3 eye() const { return world_from_camera_[3]; }
+  /// World length that one pixel in the middle of the image covers at distance 1 from the eye; orthographic: at any.
+  /// Where pixels are not square, or the camera's transform distorts, the smaller one of both axes.
+  double pixel_spread() const;
+
   bool operator==(const PrimaryCamera&) const = default;
 
 private:

@@ -1,6 +1,7 @@
 #include "runtime/commands/image_outputs.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <span>
 
@@ -11,9 +12,14 @@
 namespace packtrace {
 namespace {
 
+/// What --aov all stands for.
+constexpr std::array kAlways{"ao", "ao_raw", "depth", "normal", "instance", "albedo", "shaded"};
+/// Only with levels of detail.
+constexpr std::array kOfDetail{"lod", "lod-error"};
+
 std::vector<std::string> chosen(const std::vector<std::string>& aovs, const std::string& otherwise) {
   std::vector<std::string> names = aovs.empty() ? std::vector{otherwise} : aovs;
-  if (std::find(names.begin(), names.end(), "all") != names.end()) return aov_names();
+  if (std::find(names.begin(), names.end(), "all") != names.end()) return {kAlways.begin(), kAlways.end()};
   for (const std::string& name : names) {
     if (std::find(aov_names().begin(), aov_names().end(), name) != aov_names().end()) continue;
     std::string known = "all";
@@ -38,6 +44,8 @@ Layer exr_layer(const RenderedImage& image, const std::string& aov) {
   if (aov == "depth") return {aov, {""}, std::span<const float>(image.depth)};
   if (aov == "normal") return {aov, xyz, floats_of(image.normal), true};
   if (aov == "instance") return {aov, {""}, std::span<const uint32_t>(image.instance)};
+  if (aov == "lod") return {aov, {""}, std::span<const uint32_t>(image.lod)};
+  if (aov == "lod-error") return {aov, {""}, std::span<const float>(image.lod_error)};
   if (aov == "albedo") return {aov, rgb, floats_of(image.albedo), true};
   return {aov, rgb, floats_of(image.shaded), true};
 }
@@ -67,13 +75,19 @@ void write_png_of(const std::filesystem::path& path, const RenderedImage& image,
   if (aov == "depth") return raw(depth_preview(image.size, image.depth));
   if (aov == "normal") return raw(normal_preview(image.size, image.normal));
   if (aov == "instance") return raw(id_preview(image.size, image.instance));
+  if (aov == "lod") return raw(level_preview(image.size, image.lod, image.cluster, image.ao));
+  if (aov == "lod-error") return raw(heat_map(image.size, image.lod_error, static_cast<float>(image.lod_error_px)));
   write_png(path, over_sky(image, aov == "albedo" ? image.albedo : image.shaded), PngTransfer::kSrgb);
 }
 
 } // namespace
 
 const std::vector<std::string>& aov_names() {
-  static const std::vector<std::string> kNames{"ao", "ao_raw", "depth", "normal", "instance", "albedo", "shaded"};
+  static const std::vector<std::string> kNames = [] {
+    std::vector<std::string> names(kAlways.begin(), kAlways.end());
+    names.insert(names.end(), kOfDetail.begin(), kOfDetail.end());
+    return names;
+  }();
   return kNames;
 }
 
@@ -115,6 +129,14 @@ void ImageOutputs::write(const RenderedImage& image, const ExrAttributes& attrib
     write_exr(entry.file->path(), image.size, layers, attributes);
   }
   for (const Entry& entry : entries_) entry.file->commit();
+}
+
+bool ImageOutputs::show_detail() const {
+  return std::ranges::any_of(entries_, [](const Entry& entry) {
+    return std::ranges::any_of(entry.aovs, [](const std::string& aov) {
+      return std::find(kOfDetail.begin(), kOfDetail.end(), aov) != kOfDetail.end();
+    });
+  });
 }
 
 std::vector<std::string> ImageOutputs::targets() const {

@@ -17,6 +17,7 @@
 #include "runtime/commands/image_outputs.h"
 #include "runtime/commands/json_output.h"
 #include "runtime/commands/loaded_scene.h"
+#include "runtime/commands/lod_render.h"
 #include "runtime/commands/process_usage.h"
 #include "runtime/commands/progress_display.h"
 #include "runtime/render/renderer.h"
@@ -44,6 +45,7 @@ struct RenderOptions {
   uint64_t seed = 0;
   std::string backend = "embree";
   std::optional<std::string> bvh;
+  LodOptions lod;
 };
 
 bool parse_number(std::string_view digits, uint32_t& value) {
@@ -121,13 +123,14 @@ double mean_of_valid(const std::vector<float>& ao) {
 double rate_m(uint64_t rays, double seconds) { return seconds > 0 ? static_cast<double>(rays) / seconds * 1e-6 : 0; }
 
 nlohmann::json report(const RenderOptions& options, const RenderConfig& config, const RenderedImage& image,
-                      const SceneSource& source, const RayTracer& tracer, const std::vector<std::string>& files) {
+                      const SceneSource& source, const RayTracer& tracer, const std::optional<ChosenDetail>& detail,
+                      const std::vector<std::string>& files) {
   const auto hits =
       std::count_if(image.instance.begin(), image.instance.end(), [](uint32_t i) { return i != kNoInstance; });
   const RenderTimings& t = image.timings;
   nlohmann::json parts;
   for (const ResidentPart& part : tracer.resident()) parts[std::string(part.name)] = part.bytes;
-  return {
+  nlohmann::json result = {
       {"verb", "render"},
       {"input", options.input},
       {"backend", tracer.name()},
@@ -154,6 +157,8 @@ nlohmann::json report(const RenderOptions& options, const RenderConfig& config, 
         {"parts", parts}}},
       {"peak_rss_bytes", peak_rss_bytes()},
   };
+  if (detail) result["lod"] = detail_json(*detail, tracer);
+  return result;
 }
 
 std::string resident_text(const nlohmann::json& resident) {
@@ -182,26 +187,37 @@ void print(const nlohmann::json& r) {
   if (r.at("denoise").get<bool>())
     fmt::print("  denoise   {:8.3f} s   {:.1f} ms a frame\n", seconds.at("denoise").get<double>(),
                seconds.at("denoise").get<double>() * 1e3 / frames);
+  if (r.contains("lod")) fmt::print("{}", detail_text(r.at("lod")));
   for (const auto& file : r.at("files")) fmt::print("wrote {}\n", file.get<std::string>());
 }
 
 int run(const RenderOptions& options, const GlobalOptions& globals) {
   const TracerConfig backend = tracer_config(options);
   if (!options.size.empty()) parse_size(options.size);
+  validate(options.lod);
   JsonOutput json(globals.json, globals.force);
   ImageOutputs outputs(options.outputs, options.aovs, globals.force); // before the work, like the above
+  if (outputs.show_detail() && !options.lod.error_px)
+    throw Error(ErrorKind::kUsage, "layers about levels of detail need --lod-error");
   ProgressDisplay display(globals);
   Progress progress(display.observer());
   const LoadedScene loaded = load_scene(options.input, options.scene, globals, progress, display);
   const Camera camera = choose_camera(*loaded.source, options, globals);
-  const RenderConfig config = make_config(*loaded.source, camera, options);
+  RenderConfig config = make_config(*loaded.source, camera, options);
+  std::optional<ChosenDetail> detail;
+  if (options.lod.error_px) {
+    detail.emplace(choose_detail(options.input, loaded, camera, config, options.lod));
+    if (outputs.show_detail()) config.lod_error_px = *options.lod.error_px;
+  }
+  const SceneSource& source = detail ? *detail->source : *loaded.source;
 
   const Stopwatch building;
   progress.begin("bvh", 0);
-  const std::unique_ptr<RayTracer> tracer =
-      make_tracer(*loaded.source, loaded.baked ? &*loaded.baked : nullptr, backend);
+  const std::unique_ptr<RayTracer> tracer = detail
+                                                ? make_tracer(*detail->source, *loaded.baked, backend)
+                                                : make_tracer(source, loaded.baked ? &*loaded.baked : nullptr, backend);
   const double build_s = building.seconds();
-  RenderedImage image = render_view(*loaded.source, *tracer, camera, config, progress);
+  RenderedImage image = render_view(source, *tracer, camera, config, progress);
   image.timings.build_s = build_s;
   display.finish();
 
@@ -209,7 +225,7 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
                         {"aoRadius", static_cast<double>(config.ao.radius)},
                         {"aoSpp", static_cast<int>(config.ao.spp)},
                         {"frames", static_cast<int>(config.frames)}});
-  const nlohmann::json result = report(options, config, image, *loaded.source, *tracer, outputs.targets());
+  const nlohmann::json result = report(options, config, image, source, *tracer, detail, outputs.targets());
   if (result.at("hit_pixels") == 0 && !globals.quiet)
     fmt::print(stderr, "{}: warning: this camera sees nothing of the scene; try --camera auto\n", options.input);
   if (json.wanted()) json.write(result);
@@ -231,7 +247,8 @@ void add_render_command(CLI::App& app, GlobalOptions& globals) {
       ->allow_extra_args(false);
   verb.add_option("--aov", options->aovs,
                   "Layers, separated by commas: ao, ao_raw, depth, normal, instance, albedo, shaded, or all "
-                  "(default: all in .exr, ao in .png). Several layers become NAME.LAYER.png")
+                  "(default: all in .exr, ao in .png). Several layers become NAME.LAYER.png. With "
+                  "--lod-error also lod, lod-error")
       ->delimiter(',')
       ->type_name("LAYERS");
   verb.add_option("--camera", options->camera,
@@ -262,10 +279,12 @@ void add_render_command(CLI::App& app, GlobalOptions& globals) {
   verb.add_flag(
       "--fast-edges", options->fast_edges,
       "Up to a fifth faster, but a few rays slip between triangles that touch; --bvh high needs it to pay off");
+  add_lod_options(verb, options->lod);
   add_scene_options(verb, options->scene);
   verb.footer("Examples:\n"
               "  packtrace render house.ptk -o house.png\n"
               "  packtrace render house.ptk -o house.png -o house.exr --aov all --supersample 2\n"
+              "  packtrace render forest.ptk -o forest.png --lod-error 1 --aov ao,lod\n"
               "  packtrace render scene.pbrt -o truth.exr --ground-truth --spp 1024");
 }
 

@@ -69,6 +69,13 @@ Vec3 heat_color(float t) {
   return glm::clamp(Vec3(level, level - 1.0f, level - 2.0f), 0.0f, 1.0f);
 }
 
+Vec3 level_color(uint32_t level) {
+  constexpr Vec3 kColors[] = {{0.72f, 0.72f, 0.72f}, {0.90f, 0.25f, 0.20f}, {0.95f, 0.55f, 0.15f},
+                              {0.95f, 0.85f, 0.25f}, {0.35f, 0.75f, 0.30f}, {0.15f, 0.70f, 0.65f},
+                              {0.25f, 0.45f, 0.90f}, {0.55f, 0.35f, 0.85f}, {0.90f, 0.45f, 0.75f}};
+  return kColors[std::min<size_t>(level, std::size(kColors) - 1)];
+}
+
 Vec3 id_color(uint32_t id) {
   // Steps of the golden ratio keep neighbouring ids apart in hue for any number of ids.
   const auto fraction = static_cast<float>(id * 0x9e3779b9u) * 0x1p-32f;
@@ -105,6 +112,16 @@ Image normal_preview(ImageSize size, std::span<const Vec3> normals, Vec3 missing
 
 Image id_preview(ImageSize size, std::span<const uint32_t> ids, Vec3 missing) {
   return paint(size, ids.size(), [&](size_t i) { return ids[i] != kNoInstance ? id_color(ids[i]) : missing; });
+}
+
+Image level_preview(ImageSize size, std::span<const uint32_t> levels, std::span<const uint32_t> clusters,
+                    std::span<const float> shade, Vec3 missing) {
+  assert(clusters.size() == levels.size() && shade.size() == levels.size());
+  return paint(size, levels.size(), [&](size_t i) {
+    if (shade[i] < 0.0f) return missing;
+    const float own = 0.82f + 0.06f * static_cast<float>((clusters[i] * 0x9e3779b9u) >> 30);
+    return level_color(levels[i]) * (own * (0.3f + 0.7f * srgb_from_linear(std::min(shade[i], 1.0f))));
+  });
 }
 
 Image heat_map(ImageSize size, std::span<const float> errors, float white) {

@@ -26,6 +26,11 @@ Image normal_preview(ImageSize size, std::span<const Vec3> normals, Vec3 missing
 /// One colour per id, the same in every picture; kNoInstance is missing.
 Image id_preview(ImageSize size, std::span<const uint32_t> ids, Vec3 missing = Vec3(0));
 
+/// One hue per level of detail (level_color()), darker where `shade` is low, and a little for every other cluster.
+/// Pixels with a negative shade are missing.
+Image level_preview(ImageSize size, std::span<const uint32_t> levels, std::span<const uint32_t> clusters,
+                    std::span<const float> shade, Vec3 missing = Vec3(0));
+
 /// Errors from black (0) over red and yellow to white (`white` and more). Negative and NaN count as 0.
 /// @param white in (0, infinity)
 Image heat_map(ImageSize size, std::span<const float> errors, float white = 1.0f);
@@ -33,6 +38,9 @@ Image heat_map(ImageSize size, std::span<const float> errors, float white = 1.0f
 /// Display colours of the maps above for one value in [0,1].
 Vec3 depth_color(float t);
 Vec3 heat_color(float t);
+/// Display colour of a level of detail: grey for 0, then red, orange, yellow, green, teal, blue, violet, and pink for
+/// all from 8 on.
+Vec3 level_color(uint32_t level);
 /// Display colour of an id: hues far apart for neighbouring ids, lightness in three steps.
 Vec3 id_color(uint32_t id);
 

@@ -6,6 +6,7 @@
 #include "pbrt_import/scene/error.h"
 #include "runtime/camera/camera_rays.h"
 #include "runtime/stopwatch.h"
+#include "runtime/trace/lod_view.h"
 #include "runtime/trace/primary_visibility.h"
 
 namespace packtrace {
@@ -83,6 +84,23 @@ void resolve(const SceneSource& source, const GBuffer& g, const std::vector<floa
   }
 }
 
+/// Which detail each pixel shows.
+void resolve_detail(const SceneSource& source, const PrimaryCamera& view, const GBuffer& g, uint32_t factor,
+                    RenderedImage& image) {
+  const size_t n = image.size.pixels();
+  image.lod.assign(n, 0), image.cluster.assign(n, 0), image.lod_error.assign(n, 0.0f);
+  for (uint32_t y = 0; y < g.size.height; ++y)
+    for (uint32_t x = 0; x < g.size.width; ++x) {
+      const size_t in = static_cast<size_t>(y) * g.size.width + x;
+      if (g.instance[in] == kNoInstance) continue;
+      const size_t out = static_cast<size_t>(y / factor) * image.size.width + x / factor;
+      const SurfaceDetail detail = source.detail_of(g.instance[in], g.triangle[in]);
+      const double error_px = error_in_pixels(view, DVec3(g.position[in]), static_cast<double>(detail.error_world));
+      image.lod_error[out] = std::max(image.lod_error[out], static_cast<float>(error_px));
+      image.lod[out] = detail.level, image.cluster[out] = detail.cluster;
+    }
+}
+
 } // namespace
 
 void validate(const RenderConfig& config) {
@@ -130,6 +148,8 @@ RenderedImage render_view(const SceneSource& source, const RayTracer& tracer, co
   }
   if (!config.denoise) ao = mean.result();
   resolve(source, g, ao, raw.ao, config.supersample, image);
+  image.lod_error_px = config.lod_error_px;
+  if (config.lod_error_px > 0.0) resolve_detail(source, view, g, config.supersample, image);
   return image;
 }
 

@@ -19,6 +19,8 @@ struct RenderConfig {
   uint32_t supersample = 1; ///< [1, 8]: traced and denoised at this multiple per axis, box-filtered at the end
   uint32_t frames = 32;     ///< [1, 65536]: each traces AoConfig::spp samples a pixel
   bool denoise = true;      ///< false: frames are averaged, nothing else
+  /// Above 0: fill the layers of RenderedImage about levels of detail. The error that was allowed, in traced pixels.
+  double lod_error_px = 0.0;
   AoConfig ao;
   DenoiserConfig denoiser;
 };
@@ -47,6 +49,10 @@ struct RenderedImage {
   std::vector<Vec3> albedo;    ///< linear sRGB
   std::vector<Vec3> shaded;    ///< albedo x ao, emitters as they are: the scene under an even sky, linear sRGB
   std::vector<uint32_t> instance;
+  std::vector<uint32_t> lod;     ///< level of detail, of the last sub-pixel that hits; with RenderConfig::lod_error_px
+  std::vector<uint32_t> cluster; ///< a number of the cluster there; the same
+  std::vector<float> lod_error;  ///< largest bound of the distance from level 0, in traced pixels; the same
+  double lod_error_px = 0.0;     ///< that was allowed
   RenderTimings timings;
   uint64_t ao_rays = 0;
   uint64_t primary_rays = 0;

@@ -14,6 +14,11 @@ std::unique_ptr<RayTracer> make_tracer(const SceneSource& source, const BakedFil
   return std::make_unique<EmbreeTracer>(source, config.embree);
 }
 
+std::unique_ptr<RayTracer> make_tracer(const LodSource& source, const BakedFile& file, const TracerConfig& config) {
+  if (config.backend == Backend::kPacked) return std::make_unique<PackedTracer>(file, source);
+  return std::make_unique<EmbreeTracer>(source, config.embree);
+}
+
 uint64_t resident_bytes(const RayTracer& tracer) {
   uint64_t bytes = 0;
   for (const ResidentPart& part : tracer.resident()) bytes += part.bytes;

@@ -7,6 +7,7 @@
 namespace packtrace {
 
 class BakedFile;
+class LodSource;
 
 enum class Backend : uint8_t {
   kEmbree, ///< decodes everything to float triangles
@@ -22,6 +23,9 @@ struct TracerConfig {
 /// @param file what source reads; null where it reads floats
 /// Throws Error(kUnsupported) for backend packed without a file, else as the backend's constructor.
 std::unique_ptr<RayTracer> make_tracer(const SceneSource& source, const BakedFile* file, const TracerConfig& config);
+
+/// The same at the detail of a plan.
+std::unique_ptr<RayTracer> make_tracer(const LodSource& source, const BakedFile& file, const TracerConfig& config);
 
 /// All of resident() together.
 uint64_t resident_bytes(const RayTracer& tracer);

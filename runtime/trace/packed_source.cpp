@@ -8,22 +8,10 @@
 #include "compress/format/cluster_codec.h"
 
 namespace packtrace {
-namespace {
-
-/// A triangle within its cluster.
-struct ClusterTriangle {
-  ClusterView cluster;
-  Triangle vertices;
-};
-
-ClusterTriangle find_triangle(const BakedFile& file, uint32_t geometry, uint32_t triangle) {
-  const ClusterView cluster = file.cluster(geometry, file.cluster_of_triangle(geometry, triangle));
-  return {cluster, cluster.triangle(triangle - cluster.record().first_triangle)};
-}
 
 std::optional<Vec3> interpolated_normal(const ClusterView& cluster, uint32_t triangle, Vec2 barycentrics) {
   if (!cluster.has_normals()) return std::nullopt;
-  const Triangle v = cluster.triangle(triangle - cluster.record().first_triangle);
+  const Triangle v = cluster.triangle(triangle);
   const Vec3 n = cluster.normal(v.x) * (1.0f - barycentrics.x - barycentrics.y) + cluster.normal(v.y) * barycentrics.x +
                  cluster.normal(v.z) * barycentrics.y;
   const float length = glm::length(n);
@@ -31,7 +19,12 @@ std::optional<Vec3> interpolated_normal(const ClusterView& cluster, uint32_t tri
   return n / length;
 }
 
-} // namespace
+Vec2 interpolated_uv(const ClusterView& cluster, uint32_t triangle, Vec2 barycentrics) {
+  if (!cluster.has_uvs()) return Vec2(0);
+  const Triangle v = cluster.triangle(triangle);
+  return cluster.uv(v.x) * (1.0f - barycentrics.x - barycentrics.y) + cluster.uv(v.y) * barycentrics.x +
+         cluster.uv(v.z) * barycentrics.y;
+}
 
 PackedSource::PackedSource(const BakedFile& file)
     : file_(file), materials_(file.materials()), cameras_(file.cameras()), world_bounds_(file.world_bounds()) {
@@ -65,8 +58,8 @@ uint32_t PackedSource::material_of(uint32_t instance, uint32_t triangle) const {
 }
 
 std::optional<Vec3> PackedSource::shading_normal(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const {
-  const uint32_t cluster = file_.cluster_of_triangle(geometry, triangle);
-  return interpolated_normal(file_.cluster(geometry, cluster), triangle, barycentrics);
+  const ClusterView cluster = file_.cluster(geometry, file_.cluster_of_triangle(geometry, triangle));
+  return interpolated_normal(cluster, triangle - cluster.record().first_triangle, barycentrics);
 }
 
 /// Finds and prepares a cluster only where it is not that of the place before.
@@ -81,17 +74,15 @@ void PackedSource::look_up(std::span<const SurfaceQuery> places, std::span<Surfa
       cluster.emplace(file_.cluster(geometry, file_.cluster_of_triangle(geometry, place.triangle)));
       first = cluster->record().first_triangle;
     }
-    const std::optional<Vec3> normal = interpolated_normal(*cluster, place.triangle, place.barycentrics);
+    const std::optional<Vec3> normal = interpolated_normal(*cluster, place.triangle - first, place.barycentrics);
     out[i] = {file_.instance_materials(place.instance)[cluster->material_slot()], normal.has_value(),
               normal.value_or(Vec3(0.0f))};
   }
 }
 
 Vec2 PackedSource::uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const {
-  const auto [cluster, v] = find_triangle(file_, geometry, triangle);
-  if (!cluster.has_uvs()) return Vec2(0);
-  return cluster.uv(v.x) * (1.0f - barycentrics.x - barycentrics.y) + cluster.uv(v.y) * barycentrics.x +
-         cluster.uv(v.z) * barycentrics.y;
+  const ClusterView cluster = file_.cluster(geometry, file_.cluster_of_triangle(geometry, triangle));
+  return interpolated_uv(cluster, triangle - cluster.record().first_triangle, barycentrics);
 }
 
 float PackedSource::position_error(uint32_t geometry) const {

@@ -7,6 +7,14 @@
 namespace packtrace {
 
 class BakedFile;
+class ClusterView;
+
+/// Interpolated vertex normal of unit length; none where the cluster has none or they cancel.
+/// @param triangle of the cluster @param barycentrics weights of its second and third vertex
+std::optional<Vec3> interpolated_normal(const ClusterView& cluster, uint32_t triangle, Vec2 barycentrics);
+
+/// Interpolated texture coordinates; (0,0) where the cluster has none.
+Vec2 interpolated_uv(const ClusterView& cluster, uint32_t triangle, Vec2 barycentrics);
 
 /// A baked file seen through SceneSource: everything but the tables below is read from the packed clusters when asked
 /// for. Triangle numbers follow the clusters' order, and so do vertices; those on cluster borders appear once for each

@@ -95,7 +95,7 @@ private:
     out_.view_z[pixel] = 0.0f;
     out_.position[pixel] = out_.geometric_normal[pixel] = out_.normal[pixel] = out_.albedo[pixel] = Vec3(0);
     out_.instance[pixel] = kNoInstance;
-    out_.material[pixel] = 0;
+    out_.triangle[pixel] = out_.material[pixel] = 0;
     out_.offset[pixel] = 0.0f;
     out_.motion_px[pixel] = Vec2(0);
   }
@@ -124,6 +124,7 @@ private:
     out_.normal[pixel] = shading_normal(attributes, placement, facing);
     out_.albedo[pixel] = surface_albedo(source_, hit.geometry, hit.triangle, attributes.material, barycentrics);
     out_.instance[pixel] = placement.instance;
+    out_.triangle[pixel] = hit.triangle;
     out_.material[pixel] = attributes.material;
     out_.offset[pixel] = static_cast<float>(ray_offset(hit, space_, unit_position, facing) * space_.inverse_scale());
     out_.motion_px[pixel] = motion(position, glm::dvec2(batch.x[i], batch.y[i]) + 0.5);

@@ -35,6 +35,13 @@ struct SurfaceAttributes {
   Vec3 normal{0.0f};
 };
 
+/// Which detail a triangle is of.
+struct SurfaceDetail {
+  uint32_t level = 0;       ///< of detail; 0: as the scene gave it
+  uint32_t cluster = 0;     ///< a number of the cluster that it is in
+  float error_world = 0.0f; ///< bound of how far it is from level 0, where the instance stretches most; world units
+};
+
 /// What tracing and shading need of a scene, whether it lies in a baked file (PackedSource) or in floats
 /// (FloatSource). Triangle numbers of a geometry are the order in which decode() lists them. All functions are const
 /// and may be called from several threads; per-hit functions do not allocate. Both sources number instances alike: the
@@ -67,6 +74,9 @@ public:
 
   /// Bound of |decoded - source| per axis in object units; 0 for floats. Ray offsets add to it (docs/accuracy.md).
   virtual float position_error(uint32_t geometry) const = 0;
+
+  /// @param triangle of the instance's geometry
+  virtual SurfaceDetail detail_of(uint32_t /*instance*/, uint32_t /*triangle*/) const { return {}; }
 
   virtual std::span<const PlacedGeometry> instances() const = 0;
   virtual std::span<const Material> materials() const = 0;

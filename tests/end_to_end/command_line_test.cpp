@@ -118,6 +118,96 @@ TEST(CommandLine, LevelsOfDetailAreReported) {
     EXPECT_EQ(bake(wrong).exit_code, 2) << wrong.back();
 }
 
+/// Many placements of a ball before a camera, with levels of detail.
+class BallsBench : public Workbench {
+public:
+  BallsBench() {
+    std::string text = "LookAt 0 2 -6  0 0 0  0 1 0\nCamera \"perspective\" \"float fov\" 40\n"
+                       "Film \"image\" \"integer xresolution\" 80 \"integer yresolution\" 48\nWorldBegin\n"
+                       "ObjectBegin \"ball\"\nShape \"sphere\"\nObjectEnd\n";
+    for (int i = 0; i < 30; ++i)
+      text += "AttributeBegin\nTranslate " + std::to_string(i % 5 * 3 - 6) + " -1 " + std::to_string(i / 5 * 9) +
+              "\nObjectInstance \"ball\"\nAttributeEnd\n";
+    write_text(scene(), text + "WorldEnd\n");
+  }
+  CommandResult render(const std::vector<std::string>& options) const {
+    std::vector<std::string> arguments{"render", baked(), "-o", *this / "x.png", "--force", "--frames", "1"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return run_packtrace(arguments);
+  }
+};
+
+TEST(CommandLine, DetailIsChosenByItsErrorInPixels) {
+  const BallsBench bench;
+  ASSERT_EQ(run_packtrace({"bake", bench.scene(), "-o", bench.baked(), "--lod", "instanced"}).exit_code, 0);
+  const std::string json = bench / "x.json";
+  const auto render = [&](std::vector<std::string> options) {
+    options.insert(options.end(), {"--json", json});
+    const CommandResult result = bench.render(options);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(read_text(json));
+  };
+  for (const char* backend : {"embree", "packed"}) {
+    EXPECT_FALSE(render({"--backend", backend}).contains("lod"));
+    const std::string whole = read_text(bench / "x.png");
+    const auto off = render({"--backend", backend, "--lod-error", "1", "--lod-scheme", "off"}).at("lod");
+    EXPECT_EQ(read_text(bench / "x.png"), whole);
+    uint64_t last = off.at("traced_triangles");
+    for (const char* error : {"0.05", "0.5", "4"}) {
+      const auto report = render({"--backend", backend, "--lod-error", error}).at("lod");
+      EXPECT_EQ(report.at("scheme"), "steps");
+      EXPECT_LT(report.at("traced_triangles"), last) << error;
+      last = report.at("traced_triangles");
+      EXPECT_LE(report.at("traced_ratio"), 1.25 + 1e-9);
+      EXPECT_LE(report.at("builds"), report.at("own_cuts").at("builds"));
+      uint64_t instances = 0;
+      for (const auto& [category, count] : report.at("categories").items()) instances += count.get<uint64_t>();
+      EXPECT_EQ(instances, 30u);
+      EXPECT_EQ(report.contains("trees"), std::string(backend) == "packed");
+    }
+    EXPECT_NE(read_text(bench / "x.png"), whole);
+  }
+}
+
+TEST(CommandLine, DetailLooksTheSameForAnyNumberOfThreads) {
+  const BallsBench bench;
+  ASSERT_EQ(run_packtrace({"bake", bench.scene(), "-o", bench.baked(), "--lod", "all"}).exit_code, 0);
+  for (const char* scheme : {"steps", "per-level", "one-provider", "per-instance"}) {
+    const auto pictures = [&](const char* threads) {
+      const CommandResult result = bench.render({"--backend", "packed", "--lod-error", "0.2", "--lod-scheme", scheme,
+                                                 "--aov", "ao,lod,lod-error", "--threads", threads});
+      EXPECT_EQ(result.exit_code, 0) << result.err;
+      EXPECT_NE(result.out.find(scheme), std::string::npos) << result.out;
+      return read_text(bench / "x.ao.png") + read_text(bench / "x.lod.png") + read_text(bench / "x.lod-error.png");
+    };
+    EXPECT_EQ(pictures("1"), pictures("4")) << scheme;
+  }
+}
+
+TEST(CommandLine, DetailThatCannotBeIsAUsageError) {
+  const BallsBench bench;
+  bench.bake(); // without levels
+  const CommandResult none = bench.render({"--lod-error", "1"});
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_NE(none.err.find("no levels of detail; bake it with --lod"), std::string::npos) << none.err;
+  EXPECT_EQ(run_packtrace({"render", bench.scene(), "-o", bench / "x.png", "--lod-error", "1"}).exit_code, 2);
+  for (const auto& wrong : std::vector<std::vector<std::string>>{{"--lod-error", "0"},
+                                                                 {"--lod-error", "-1"},
+                                                                 {"--lod-error", "nan"},
+                                                                 {"--lod-scheme", "steps"},
+                                                                 {"--lod-tolerance", "1"},
+                                                                 {"--lod-error", "1", "--lod-scheme", "some"},
+                                                                 {"--lod-error", "1", "--lod-traced-ratio", "0.5"},
+                                                                 {"--lod-error", "1", "--lod-culled-scale", "0"},
+                                                                 {"--lod-error", "1", "--lod-tolerance", "33"},
+                                                                 {"--aov", "lod"}}) {
+    const CommandResult result = bench.render(wrong);
+    EXPECT_EQ(result.exit_code, 2) << wrong.back();
+    EXPECT_EQ(result.err.find("internal"), std::string::npos) << result.err;
+  }
+  EXPECT_FALSE(fs::exists(bench / "x.png"));
+}
+
 TEST(CommandLine, NothingToDoIsAUsageError) { EXPECT_EQ(run_packtrace({}).exit_code, 2); }
 
 TEST(CommandLine, UnknownVerbIsAUsageErrorThatNamesIt) {

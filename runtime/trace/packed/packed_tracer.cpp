@@ -9,6 +9,7 @@
 #include "compress/format/position_grid.h"
 #include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/scene/error.h"
+#include "runtime/stopwatch.h"
 #include "runtime/trace/alpha_filter.h"
 #include "runtime/trace/packed/batch_cache.h"
 #include "runtime/trace/packed/top_tree.h"
@@ -110,19 +111,16 @@ struct PackedTracer::Tables {
   std::vector<packed::TracePlacement> placements;
   std::vector<TreeBox> boxes;           ///< of placements
   std::vector<uint32_t> instance_of;    ///< by placement; baked::kNone: the world's
-  std::vector<uint32_t> tree_of;        ///< by geometry, or baked::kNone
-  std::vector<uint32_t> first_instance; ///< by geometry
+  std::vector<uint32_t> tree_of;        ///< by the source's geometry, or baked::kNone
+  std::vector<uint32_t> grid_of;        ///< by the file's geometry: a tree whose grid its clusters are read in
+  std::vector<uint32_t> first_instance; ///< by the file's geometry; that of a level's base
   std::vector<Placement> surfaces;      ///< by instance
   std::vector<packed::TopNode> top;
   packed::KernelScene scene{};
   BatchCacheOwner caches;
 
-  void add_tree(const BakedFile& file, uint32_t number) {
+  void add_tree(uint32_t number) {
     const baked::TreeRecord& record = records[number];
-    const auto add = [&](uint32_t geometry) {
-      tree_of[geometry] = number;
-      add_clusters(file, record, geometry);
-    };
     packed::TraceTree tree{nodes.data() + record.first_node, 1.0f};
     if (record.node_count > 0) {
       double lo[3], hi[3];
@@ -132,16 +130,13 @@ struct PackedTracer::Tables {
             {tree.max_coordinate, static_cast<float>(std::abs(lo[axis])), static_cast<float>(std::abs(hi[axis]))});
     }
     trees.push_back(tree);
-    if (record.geometry != baked::kWorldTree) return add(record.geometry);
-    std::vector<uint8_t> own(tree_of.size(), 0);
-    for (const baked::TreeRecord& other : records)
-      if (other.geometry != baked::kWorldTree) own[other.geometry] = 1;
-    for (uint32_t g = 0; g < file.base_geometry_count(); ++g)
-      if (own[g] == 0 && file.geometries()[g].cluster_count > 0) add(g);
   }
 
-  void add_clusters(const BakedFile& file, const baked::TreeRecord& tree, uint32_t g) {
+  /// @param number of a tree in whose grid they are read
+  void add_clusters(const BakedFile& file, uint32_t number, uint32_t g) {
+    const baked::TreeRecord& tree = records[number];
     const baked::GeometryRecord& geometry = file.geometries()[g];
+    grid_of[g] = number;
     uint32_t next = 0;
     for (uint32_t c = 0; c < geometry.class_clusters.size(); ++c)
       for (const uint32_t end = next + geometry.class_clusters[c]; next < end; ++next)
@@ -150,18 +145,20 @@ struct PackedTracer::Tables {
 };
 
 PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa)
-    : file_(file), source_(source), kernels_(kernels_of(isa)), tables_(std::make_unique<Tables>()) {
+    : PackedTracer(file, source, nullptr, isa) {}
+
+PackedTracer::PackedTracer(const BakedFile& file, const LodSource& source, PackedIsa isa)
+    : PackedTracer(file, source, &source, isa) {}
+
+PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod, PackedIsa isa)
+    : file_(file), source_(source), lod_(lod), kernels_(kernels_of(isa)), tables_(std::make_unique<Tables>()) {
   Tables& t = *tables_;
-  t.records = file.sections().trees;
-  t.nodes = file.sections().nodes;
-  if (t.records.empty()) {
-    t.built = build_packed_trees(file.sections());
-    t.records = t.built.trees;
-    t.nodes = t.built.nodes;
-  }
   t.clusters.resize(file.sections().clusters.size());
-  t.tree_of.assign(file.geometries().size(), baked::kNone);
-  for (uint32_t i = 0; i < t.records.size(); ++i) t.add_tree(file, i);
+  t.tree_of.assign(source.geometry_count(), baked::kNone);
+  t.grid_of.assign(file.geometries().size(), baked::kNone);
+  lod != nullptr ? build_lod() : build_whole();
+  for (uint32_t i = 0; i < t.records.size(); ++i) t.add_tree(i);
+  find_first_instances();
   place();
   t.scene.clusters = t.clusters.data();
   t.scene.trees = t.trees.data();
@@ -178,34 +175,129 @@ PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, Pac
     const auto& tracer = *static_cast<const PackedTracer*>(owner);
     const uint32_t g = tracer.geometry_of_cluster(cluster);
     const baked::GeometryRecord& geometry = tracer.file_.geometries()[g];
-    return decode_batch_exactly(tracer.tables_->records[tracer.tables_->tree_of[g]], geometry,
+    return decode_batch_exactly(tracer.tables_->records[tracer.tables_->grid_of[g]], geometry,
                                 tracer.file_.cluster(g, static_cast<uint32_t>(cluster - geometry.first_cluster)), first,
                                 count, out);
   };
   t.scene.present = [](const void* owner, uint32_t placement, uint32_t cluster, uint32_t triangle, float u, float v,
                        uint32_t ray_class) {
     const auto& tracer = *static_cast<const PackedTracer*>(owner);
-    const uint32_t g = tracer.geometry_of_cluster(cluster), placed = tracer.tables_->instance_of[placement];
-    return surface_present(tracer.source_, placed == baked::kNone ? tracer.tables_->first_instance[g] : placed,
-                           tracer.file_.sections().clusters[cluster].first_triangle + triangle, Vec2(u, v),
+    const uint32_t instance = tracer.instance_of(placement, cluster);
+    return surface_present(tracer.source_, instance, tracer.triangle_of(cluster, instance, triangle), Vec2(u, v),
                            ray_class == kOcclusionRays);
   };
 }
 
 PackedTracer::~PackedTracer() = default;
 
+/// Trees over all of level 0: the file's, if it holds any.
+void PackedTracer::build_whole() {
+  Tables& t = *tables_;
+  t.records = file_.sections().trees;
+  t.nodes = file_.sections().nodes;
+  if (t.records.empty()) {
+    BakedSections sections = file_.sections();
+    sections.geometries = sections.geometries.first(file_.base_geometry_count());
+    t.built = build_packed_trees(sections);
+    t.records = t.built.trees;
+    t.nodes = t.built.nodes;
+  }
+  uint32_t world = baked::kNone;
+  for (uint32_t i = 0; i < t.records.size(); ++i) {
+    const uint32_t g = t.records[i].geometry;
+    if (g == baked::kWorldTree)
+      world = i;
+    else if (g < t.tree_of.size()) // else a level of detail
+      t.tree_of[g] = i;
+  }
+  for (uint32_t g = 0; g < t.tree_of.size(); ++g) {
+    if (file_.geometries()[g].cluster_count == 0) continue;
+    if (t.tree_of[g] == baked::kNone) t.tree_of[g] = world;
+    t.add_clusters(file_, t.tree_of[g], g);
+  }
+}
+
+/// Trees over the clusters of BLASes.
+void PackedTracer::build_lod() {
+  Tables& t = *tables_;
+  const BakedSections& sections = file_.sections();
+  const std::vector<uint8_t> joins = ChosenTreeBuilder::joins_world(sections);
+  std::vector<ChosenClusters> chosen;
+  uint32_t world = baked::kNone;
+  const auto next_tree = [&](uint32_t geometry) {
+    chosen.push_back({geometry, {}});
+    return static_cast<uint32_t>(chosen.size()) - 1;
+  };
+  for (uint32_t b = 0; b < lod_->geometry_count(); ++b) {
+    const uint32_t base = lod_->base_geometry(b);
+    if (lod_->clusters(b).empty()) continue;
+    if (joins[base] != 0 && world == baked::kNone) world = next_tree(baked::kWorldTree);
+    const uint32_t tree = joins[base] != 0 ? world : next_tree(base);
+    t.tree_of[b] = tree;
+    for (const LodCluster& c : lod_->clusters(b))
+      chosen[tree].clusters.push_back(static_cast<uint32_t>(file_.geometries()[c.geometry].first_cluster + c.cluster));
+  }
+  if (world != baked::kNone)
+    std::ranges::sort(chosen[world].clusters); // levels of all of them are behind all of level 0
+  const Stopwatch making_clusters;
+  const ChosenTreeBuilder builder(sections, chosen);
+  lod_trees_.clusters_s = making_clusters.seconds();
+  const Stopwatch building;
+  t.built = builder.build();
+  t.records = t.built.trees;
+  t.nodes = t.built.nodes;
+  lod_trees_.trees_s = building.seconds();
+  for (uint32_t i = 0; i < chosen.size(); ++i) {
+    const uint64_t leaves = builder.leaf_nodes(i);
+    lod_trees_.trees.push_back({chosen[i].geometry, (leaves > 0 ? 2 * leaves - 1 : 0) * sizeof(baked::PackedNode),
+                                t.records[i].node_count * sizeof(baked::PackedNode)});
+  }
+  for (uint32_t b = 0; b < lod_->geometry_count(); ++b) {
+    const uint32_t base = lod_->base_geometry(b);
+    if (t.tree_of[b] == baked::kNone || t.grid_of[base] != baked::kNone) continue;
+    t.add_clusters(file_, t.tree_of[b], base);
+    for (const baked::LodLevelRecord& level : file_.lod(base).levels)
+      if (level.level > 0) t.add_clusters(file_, t.tree_of[b], level.geometry);
+  }
+}
+
+void PackedTracer::find_first_instances() {
+  Tables& t = *tables_;
+  const std::span<const baked::InstanceRecord> instances = file_.instances();
+  t.first_instance.assign(file_.geometries().size(), baked::kNone);
+  for (uint32_t i = static_cast<uint32_t>(instances.size()); i-- > 0;) t.first_instance[instances[i].geometry] = i;
+  for (const baked::LodLevelRecord& level : file_.sections().lod_levels)
+    t.first_instance[level.geometry] = t.first_instance[level.base];
+}
+
+/// Object space; empty where there is nothing.
+Bounds PackedTracer::bounds_of(uint32_t geometry) const {
+  if (lod_ != nullptr) return lod_->bounds(geometry);
+  const baked::GeometryRecord& record = file_.geometries()[geometry];
+  Bounds bounds;
+  if (record.cluster_count == 0) return bounds;
+  bounds.extend(DVec3(record.bounds_lo[0], record.bounds_lo[1], record.bounds_lo[2]));
+  bounds.extend(DVec3(record.bounds_hi[0], record.bounds_hi[1], record.bounds_hi[2]));
+  return bounds;
+}
+
+/// The instance that a cluster of a placement is of.
+uint32_t PackedTracer::instance_of(uint32_t placement, uint32_t cluster) const {
+  const uint32_t placed = tables_->instance_of[placement];
+  return placed != baked::kNone ? placed : tables_->first_instance[geometry_of_cluster(cluster)];
+}
+
+/// A cluster's triangle as the source numbers it.
+uint32_t PackedTracer::triangle_of(uint32_t cluster, uint32_t instance, uint32_t triangle) const {
+  if (lod_ != nullptr) return lod_->triangle_number(lod_->instances()[instance].geometry, cluster, triangle);
+  return file_.sections().clusters[cluster].first_triangle + triangle;
+}
+
 void PackedTracer::place() {
   Tables& t = *tables_;
   const std::span<const PlacedGeometry> instances = source_.instances();
-  t.first_instance.assign(file_.geometries().size(), baked::kNone);
-  for (uint32_t i = static_cast<uint32_t>(instances.size()); i-- > 0;) t.first_instance[instances[i].geometry] = i;
-  std::vector<Bounds> bounds(file_.geometries().size());
-  for (size_t g = 0; g < bounds.size(); ++g) {
-    const baked::GeometryRecord& geometry = file_.geometries()[g];
-    if (geometry.cluster_count == 0) continue;
-    bounds[g].extend(DVec3(geometry.bounds_lo[0], geometry.bounds_lo[1], geometry.bounds_lo[2]));
-    bounds[g].extend(DVec3(geometry.bounds_hi[0], geometry.bounds_hi[1], geometry.bounds_hi[2]));
-  }
+  std::vector<Bounds> bounds;
+  for (uint32_t g = 0; g < source_.geometry_count(); ++g) bounds.push_back(bounds_of(g));
   space_ = UnitSpace(placed_bounds(source_, bounds));
 
   t.surfaces.resize(instances.size());
@@ -279,10 +371,10 @@ void PackedTracer::count_any(std::span<const Ray> rays, uint32_t ray_class, std:
 HitSurface PackedTracer::resolve(const RayHit& hit) const {
   const Tables& t = *tables_;
   HitSurface surface;
-  surface.geometry = geometry_of_cluster(hit.part);
-  surface.triangle = file_.sections().clusters[hit.part].first_triangle + hit.triangle;
-  const uint32_t instance = t.instance_of[hit.placement];
-  surface.placement = &t.surfaces[instance == baked::kNone ? t.first_instance[surface.geometry] : instance];
+  const uint32_t instance = instance_of(hit.placement, hit.part);
+  surface.placement = &t.surfaces[instance];
+  surface.geometry = source_.instances()[instance].geometry;
+  surface.triangle = triangle_of(hit.part, instance, hit.triangle);
   packed::DecodedBatch batch;
   if (const packed::TraceCluster& cluster = t.clusters[hit.part]; (cluster.flags & packed::kWide) == 0)
     kernels_.decode(cluster, hit.triangle, 1, batch);
@@ -300,7 +392,7 @@ std::vector<ResidentPart> PackedTracer::resident() const {
           {"cluster table", t.clusters.size() * sizeof(packed::TraceCluster)},
           {"placements", t.placements.size() * (sizeof(packed::TracePlacement) + sizeof(TreeBox) + sizeof(uint32_t)) +
                              t.surfaces.size() * sizeof(Placement) + t.top.size() * sizeof(packed::TopNode) +
-                             (t.tree_of.size() + t.first_instance.size()) * sizeof(uint32_t)},
+                             (t.tree_of.size() + t.grid_of.size() + t.first_instance.size()) * sizeof(uint32_t)},
           {"batch caches", BatchCacheOwner::bytes_of_all_threads()}};
 }
 

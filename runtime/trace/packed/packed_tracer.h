@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "compress/format/baked_file.h"
+#include "runtime/trace/lod_source.h"
 #include "runtime/trace/packed/isa.h"
 #include "runtime/trace/ray_tracer.h"
 
@@ -17,6 +18,9 @@ public:
   /// Throws Error(kUnsupported) for an instruction set that this machine lacks, Error(kInput) for transforms that are
   /// not finite.
   PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa = chosen_isa());
+  /// The same at the detail of a plan: a tree for each BLAS, but one for those of all world-space geometry, which have
+  /// one instance each.
+  PackedTracer(const BakedFile& file, const LodSource& source, PackedIsa isa = chosen_isa());
   ~PackedTracer() override;
   PackedTracer(const PackedTracer&) = delete;
   PackedTracer& operator=(const PackedTracer&) = delete;
@@ -35,6 +39,20 @@ public:
   /// Instances that no ray hits because their transform flattens them, or nearly so.
   std::span<const uint32_t> flat_instances() const { return flat_instances_; }
 
+  /// What building the trees of a LodSource took and takes.
+  struct LodTrees {
+    /// Of one tree: a BLAS, or all of the world's.
+    struct Bytes {
+      uint32_t geometry = 0;   ///< of the file, or baked::kWorldTree
+      uint64_t worst_case = 0; ///< known before it is built
+      uint64_t built = 0;
+    };
+    double clusters_s = 0.0; ///< nodes of clusters, which do not depend on the view
+    double trees_s = 0.0;    ///< nodes above them
+    std::vector<Bytes> trees;
+  };
+  const LodTrees& lod_trees() const { return lod_trees_; }
+
   /// The same queries on the calling thread, adding up what the kernels do. Slower.
   void count_closest(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits,
                      packed::KernelCounters& counters) const;
@@ -44,15 +62,24 @@ public:
 private:
   struct Tables;
 
+  PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod, PackedIsa isa);
+  void build_whole();
+  void build_lod();
+  void find_first_instances();
+  Bounds bounds_of(uint32_t geometry) const;
+  uint32_t triangle_of(uint32_t cluster, uint32_t instance, uint32_t triangle) const;
+  uint32_t instance_of(uint32_t placement, uint32_t cluster) const;
   void place();
   void add_placement(uint32_t tree, uint32_t instance, const DAffine& unit_from_grid);
   uint32_t geometry_of_cluster(uint32_t cluster) const;
 
   const BakedFile& file_;
   const SceneSource& source_;
+  const LodSource* const lod_; ///< source_, or null
   const packed::Kernels& kernels_;
   UnitSpace space_;
   std::vector<uint32_t> flat_instances_;
+  LodTrees lod_trees_;
   std::unique_ptr<Tables> tables_;
 };
 

@@ -92,5 +92,19 @@ TEST(FalseColor, HeatGrowsFromBlackToWhite) {
   EXPECT_EQ(color_at(map, 2), Vec3(1));
 }
 
+TEST(LevelPreview, ShowsLevelsByHueAndClustersByLightness) {
+  for (uint32_t a = 0; a < 9; ++a)
+    for (uint32_t b = 0; b < a; ++b) EXPECT_GT(glm::length(level_color(a) - level_color(b)), 0.15f) << a << ' ' << b;
+  EXPECT_EQ(level_color(8), level_color(40));
+  const std::vector<uint32_t> levels{1, 1, 1, 2}, clusters{7, 7, 8, 7};
+  const std::vector<float> shade{1.0f, -1.0f, 1.0f, 0.25f};
+  const Image image = level_preview({4, 1}, levels, clusters, shade, Vec3(0.25f, 0.5f, 0.75f));
+  const auto color = [&](size_t i) { return Vec3(image.data[3 * i], image.data[3 * i + 1], image.data[3 * i + 2]); };
+  EXPECT_EQ(color(1), Vec3(0.25f, 0.5f, 0.75f));
+  EXPECT_NE(color(0), color(2));
+  EXPECT_NEAR(color(0).x / color(0).y, color(2).x / color(2).y, 1e-4f); // one hue
+  EXPECT_LT(color(3).x, color(0).x);                                    // in the shade
+}
+
 } // namespace
 } // namespace packtrace

@@ -1,0 +1,249 @@
+#include "runtime/commands/lod_render.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "pbrt_import/scene/error.h"
+#include "runtime/commands/file_report.h"
+#include "runtime/lod/compaction.h"
+#include "runtime/stopwatch.h"
+#include "runtime/trace/lod_view.h"
+#include "runtime/trace/packed/packed_tracer.h"
+
+namespace packtrace {
+namespace {
+
+constexpr std::array<std::pair<const char*, SharingScheme>, 5> kSchemes{{{"steps", SharingScheme::kSteps},
+                                                                         {"per-level", SharingScheme::kLevels},
+                                                                         {"one-provider", SharingScheme::kOneProvider},
+                                                                         {"per-instance", SharingScheme::kPerInstance},
+                                                                         {"off", SharingScheme::kOff}}};
+
+SharingScheme scheme_of(const std::string& name) {
+  for (const auto& [known, scheme] : kSchemes)
+    if (name == known) return scheme;
+  throw Error(ErrorKind::kUsage,
+              "--lod-scheme " + name + ": there are steps, per-level, one-provider, per-instance and off");
+}
+
+const char* name_of(SharingScheme scheme) {
+  return std::ranges::find(kSchemes, scheme, &std::pair<const char*, SharingScheme>::second)->first;
+}
+
+SharingConfig sharing_config(const LodOptions& options) {
+  SharingConfig config;
+  if (options.scheme) config.scheme = scheme_of(*options.scheme);
+  if (options.traced_ratio) config.traced_ratio = *options.traced_ratio;
+  if (options.culled_scale) config.culled_error_scale = *options.culled_scale;
+  if (options.tolerance) config.tolerant_levels = *options.tolerance;
+  config.measure = true;
+  config.validate();
+  return config;
+}
+
+/// Takes built trees through BlasCompactor: what a device would hold that must allocate before it builds.
+class TreeMemory final : public BlasMemoryBackend {
+public:
+  explicit TreeMemory(const std::vector<PackedTracer::LodTrees::Bytes>& trees) : trees_(trees) {
+    CompactionConfig config;
+    BlasCompactor compactor(*this, config);
+    for (uint32_t i = 0; i < trees.size(); ++i) {
+      if (trees[i].built == 0) continue;
+      compactor.add(i, i);
+    }
+    for (uint32_t frame = 0; frame < 1 << 20; ++frame) {
+      compactor.begin_frame();
+      if (std::ranges::all_of(compactor.geometry_bytes(), [&](const auto& entry) {
+            return compactor.state_of(entry.first) == BlasMemoryState::kSettled;
+          }))
+        break;
+    }
+    for (uint32_t frame = 0; frame < config.frames_in_flight; ++frame) compactor.begin_frame(); // releases
+    resident = compactor.resident_bytes();
+    peak = compactor.peak_bytes();
+  }
+
+  BlasBuffer allocate(uint64_t) override { return ++next_; }
+  void release(BlasBuffer) override {}
+  uint64_t worst_case_bytes(uint32_t blas) override { return trees_[blas].worst_case; }
+  void record_build(uint32_t, BlasBuffer) override {}
+  uint64_t compacted_bytes(uint32_t blas) override { return trees_[blas].built; }
+  void record_copy(uint32_t, BlasBuffer, BlasBuffer) override {}
+
+  uint64_t resident = 0, peak = 0;
+
+private:
+  const std::vector<PackedTracer::LodTrees::Bytes>& trees_;
+  BlasBuffer next_ = 0;
+};
+
+/// A row for each geometry that has levels.
+nlohmann::json geometries_json(const ChosenDetail& detail) {
+  nlohmann::json rows = nlohmann::json::array();
+  std::vector<uint64_t> instances(detail.geometries->size(), 0), builds = instances, triangles = instances;
+  for (const LodInstance& instance : detail.instances) ++instances[instance.geometry];
+  for (const PlannedBlas& blas : detail.plan.blas) {
+    if (blas.kind == BlasKind::kLowest) continue;
+    ++builds[blas.geometry];
+    triangles[blas.geometry] += blas.triangles;
+  }
+  for (size_t g = 0; g < detail.geometries->size(); ++g) {
+    const size_t levels = (*detail.geometries)[g].levels().size();
+    if (levels < 2 || instances[g] == 0) continue;
+    const LevelHistogram& histogram = detail.plan.histograms[g];
+    const auto counts = [&](const auto& by_level) {
+      return std::vector<uint32_t>(by_level.begin(), by_level.begin() + static_cast<std::ptrdiff_t>(levels));
+    };
+    rows.push_back({{"geometry", g},
+                    {"levels", levels},
+                    {"instances", instances[g]},
+                    {"builds", builds[g]},
+                    {"built_triangles", triangles[g]},
+                    {"first_level", counts(histogram.starts)},
+                    {"last_level", counts(histogram.ends)}});
+  }
+  return rows;
+}
+
+double ratio(double a, double b) { return b > 0.0 ? a / b : 0.0; }
+
+} // namespace
+
+void add_lod_options(CLI::App& verb, LodOptions& options) {
+  constexpr const char* kGroup = "Levels of detail (of files baked with --lod)";
+  verb.add_option("--lod-error", options.error_px,
+                  "Choose coarser levels that lie at most so many pixels beside the finest, to either side; "
+                  "--supersample counts: pixels as traced")
+      ->type_name("PX")
+      ->group(kGroup);
+  verb.add_option("--lod-scheme", options.scheme,
+                  "Who gets which acceleration structure: steps (the default) and per-level share ones that do not "
+                  "depend on the view, one-provider lends one instance's, per-instance shares only the coarsest; off: "
+                  "level 0 for all")
+      ->type_name("NAME")
+      ->group(kGroup);
+  verb.add_option("--lod-traced-ratio", options.traced_ratio,
+                  "steps, per-level: build as few as possible while at most so many times the triangles of the "
+                  "instances' own cuts are traced (default 1.25; 0: each instance decides alone)")
+      ->type_name("R")
+      ->group(kGroup);
+  verb.add_option("--lod-tolerance", options.tolerance,
+                  "Let shared structures be up to N levels (or steps) too coarse (default 0)")
+      ->type_name("N")
+      ->group(kGroup);
+  verb.add_option("--lod-culled-scale", options.culled_scale,
+                  "How many times the error is allowed where the camera does not look (default 1)")
+      ->type_name("S")
+      ->group(kGroup);
+}
+
+void validate(const LodOptions& options) {
+  if (!options.error_px && (options.scheme || options.traced_ratio || options.culled_scale || options.tolerance))
+    throw Error(ErrorKind::kUsage, "--lod-scheme and the options about it count with --lod-error only");
+  if (options.error_px && !(*options.error_px > 0.0 && *options.error_px <= 1e9))
+    throw Error(ErrorKind::kUsage, fmt::format("--lod-error {}: give pixels above 0", *options.error_px));
+  sharing_config(options);
+}
+
+ChosenDetail choose_detail(const std::string& input, const LoadedScene& loaded, const Camera& camera,
+                           const RenderConfig& config, const LodOptions& options) {
+  if (!loaded.baked) throw Error(ErrorKind::kUsage, input + ": --lod-error is for .ptk files; bake it with --lod");
+  const BakedFile& file = *loaded.baked;
+  if (file.sections().lod_levels.empty())
+    throw Error(ErrorKind::kUsage, input + ": --lod-error: the file has no levels of detail; bake it with --lod");
+  const auto& source = dynamic_cast<const PackedSource&>(*loaded.source);
+  const PrimaryCamera view(camera, {config.size.width * config.supersample, config.size.height * config.supersample});
+  ChosenDetail detail;
+  detail.error_px = *options.error_px;
+  const Stopwatch loading;
+  detail.geometries = std::make_unique<const std::vector<LodGeometry>>(lod_geometries(file));
+  detail.instances = lod_instances(source);
+  detail.sharing = std::make_unique<LodSharing>(*detail.geometries, detail.instances, sharing_config(options));
+  detail.load_s = loading.seconds();
+
+  const DetailView from = detail_view(view, file.world_bounds(), detail.error_px);
+  const std::vector<uint8_t> outside = outside_view(view, *detail.geometries, detail.instances);
+  detail.outside = static_cast<size_t>(std::ranges::count(outside, 1));
+  const Stopwatch planning;
+  detail.sharing->plan(from, outside, detail.plan);
+  detail.plan_s = planning.seconds();
+  const Stopwatch listing;
+  detail.source = std::make_unique<LodSource>(file, source, *detail.sharing, detail.plan);
+  detail.source_s = listing.seconds();
+
+  SharingConfig alone = detail.sharing->config();
+  alone.scheme = SharingScheme::kPerInstance;
+  LodSharing(*detail.geometries, detail.instances, alone).plan(from, outside, detail.alone);
+  detail.alone.passed = {};
+  return detail;
+}
+
+nlohmann::json detail_json(const ChosenDetail& detail, const RayTracer& tracer) {
+  const LodPlan &plan = detail.plan, &alone = detail.alone;
+  const auto& counts = plan.category_counts;
+  nlohmann::json result = {
+      {"scheme", name_of(detail.sharing->config().scheme)},
+      {"error_px", detail.error_px},
+      {"instances", detail.instances.size()},
+      {"instances_outside_view", detail.outside},
+      {"builds", plan.builds},
+      {"references_saved", static_cast<int64_t>(alone.builds) - static_cast<int64_t>(plan.builds)},
+      {"built_triangles", plan.built_triangles},
+      {"built_clusters", plan.built_clusters},
+      {"traced_triangles", plan.traced_triangles},
+      {"own_cuts",
+       {{"builds", alone.builds},
+        {"built_triangles", alone.built_triangles},
+        {"traced_triangles", plan.own_triangles}}},
+      {"traced_ratio", ratio(static_cast<double>(plan.traced_triangles), static_cast<double>(plan.own_triangles))},
+      {"categories", {{"lowest", counts[0]}, {"provider", counts[1]}, {"shares", counts[2]}, {"own", counts[3]}}},
+      {"seconds", {{"load", detail.load_s}, {"plan", detail.plan_s}, {"clusters", detail.source_s}}},
+      {"geometries", geometries_json(detail)},
+  };
+  if (const auto* packed = dynamic_cast<const PackedTracer*>(&tracer)) {
+    const PackedTracer::LodTrees& trees = packed->lod_trees();
+    const TreeMemory memory(trees.trees);
+    uint64_t worst_case = 0;
+    for (const auto& tree : trees.trees) worst_case += tree.worst_case;
+    result["trees"] = {{"count", trees.trees.size()},
+                       {"worst_case_bytes", worst_case},
+                       {"resident_bytes", memory.resident},
+                       {"peak_bytes", memory.peak}};
+    result["seconds"]["cluster_nodes"] = trees.clusters_s;
+    result["seconds"]["trees"] = trees.trees_s;
+  }
+  return result;
+}
+
+std::string detail_text(const nlohmann::json& r) {
+  const auto count = [](const nlohmann::json& value) { return value.get<uint64_t>(); };
+  const auto ms = [&](const char* name) { return 1e3 * r.at("seconds").at(name).get<double>(); };
+  const auto& own = r.at("own_cuts");
+  const auto& categories = r.at("categories");
+  const uint64_t builds = count(r.at("builds")), alone = count(own.at("builds"));
+  std::string text =
+      fmt::format(grouped(), "  detail    {} px, {}: {:L} built for {:L} instances ({:+.1f} % against {:L} alone)\n",
+                  r.at("error_px").get<double>(), r.at("scheme").get<std::string>(), builds, count(r.at("instances")),
+                  alone > 0 ? 100.0 * (static_cast<double>(builds) / static_cast<double>(alone) - 1.0) : 0.0, alone);
+  text +=
+      fmt::format(grouped(), "            {:L} triangles built, {:L} traced: {:.3f} times the instances' own cuts\n",
+                  count(r.at("built_triangles")), count(r.at("traced_triangles")), r.at("traced_ratio").get<double>());
+  text += fmt::format(
+      grouped(),
+      "            instances: {:L} coarsest, {:L} lend, {:L} share, {:L} have their own; {:L} outside the view\n",
+      count(categories.at("lowest")), count(categories.at("provider")), count(categories.at("shares")),
+      count(categories.at("own")), count(r.at("instances_outside_view")));
+  text += fmt::format("            plan {:.1f} ms, lists of clusters {:.1f} ms", ms("plan"), ms("clusters"));
+  if (r.contains("trees")) {
+    const auto& trees = r.at("trees");
+    text += fmt::format(grouped(), ", {:L} trees {:.1f} ms, {:L} bytes of at most {:L}", count(trees.at("count")),
+                        ms("trees"), count(trees.at("resident_bytes")), count(trees.at("worst_case_bytes")));
+  }
+  return text + "\n";
+}
+
+} // namespace packtrace

@@ -1,0 +1,78 @@
+#include "runtime/trace/lod_view.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace packtrace {
+namespace {
+
+constexpr double kNearDiagonals = 1e-6;
+constexpr double kOrthographicReach = 1e6; // in diagonals and distances from the eye
+
+/// Points with dot(normal, p) > offset are on the outer side; normal of unit length.
+struct Plane {
+  DVec3 normal{0.0};
+  double offset = 0.0;
+};
+
+/// Through both rays.
+Plane side(const CameraRay& a, const CameraRay& b, DVec3 inside) {
+  Plane plane{glm::cross(a.direction, b.origin + b.direction - a.origin), 0.0};
+  const double length = glm::length(plane.normal);
+  if (!(length > 0.0)) return {DVec3(0.0), 0.0}; // an image one pixel wide: nothing is outside of this side
+  plane.normal /= length;
+  if (glm::dot(plane.normal, inside - a.origin) > 0.0) plane.normal = -plane.normal;
+  plane.offset = glm::dot(plane.normal, a.origin);
+  return plane;
+}
+
+std::vector<Plane> sides(const PrimaryCamera& camera) {
+  const uint32_t right = camera.size().width - 1, bottom = camera.size().height - 1;
+  const CameraRay corners[4] = {camera.ray(0, 0), camera.ray(right, 0), camera.ray(right, bottom),
+                                camera.ray(0, bottom)};
+  DVec3 inside(0.0);
+  for (const CameraRay& corner : corners) inside += 0.25 * (corner.origin + corner.direction);
+  std::vector<Plane> planes;
+  for (size_t i = 0; i < 4; ++i) planes.push_back(side(corners[i], corners[(i + 1) % 4], inside));
+  return planes;
+}
+
+} // namespace
+
+DetailView detail_view(const PrimaryCamera& camera, const Bounds& world, double error_px) {
+  const double diagonal = world.diagonal() > 0.0 ? world.diagonal() : 1.0;
+  double near = kNearDiagonals * diagonal, spread = camera.pixel_spread();
+  if (camera.projection() == Projection::kOrthographic) {
+    const double distance = world.empty() ? 0.0 : glm::length(world.centre() - camera.eye());
+    near = kOrthographicReach * (diagonal + distance);
+    spread /= near;
+  }
+  const double height = camera.size().height;
+  return make_detail_view(camera.eye(), near, 2.0 * std::atan(0.5 * height * spread), height, error_px);
+}
+
+double error_in_pixels(const PrimaryCamera& camera, DVec3 place_world, double error_world) {
+  if (error_world == 0.0) return 0.0;
+  const bool orthographic = camera.projection() == Projection::kOrthographic;
+  const double distance = orthographic ? 1.0 : glm::length(place_world - camera.eye());
+  return error_world / (camera.pixel_spread() * distance);
+}
+
+std::vector<uint8_t> outside_view(const PrimaryCamera& camera, std::span<const LodGeometry> geometries,
+                                  std::span<const LodInstance> instances) {
+  std::vector<uint8_t> outside(instances.size(), 0);
+  if (camera.projection() == Projection::kEnvironment) return outside;
+  const std::vector<Plane> planes = sides(camera);
+  for (size_t i = 0; i < instances.size(); ++i) {
+    const LodBall& ball = geometries[instances[i].geometry].ball();
+    const DVec3 center = transform_point(instances[i].world_from_object, ball.center);
+    const double radius = ball.radius * largest_stretch(instances[i].world_from_object);
+    outside[i] = std::ranges::any_of(planes, [&](const Plane& plane) {
+      const double slack = 1e-9 * (std::abs(plane.offset) + glm::length(center) + radius);
+      return glm::dot(plane.normal, center) - plane.offset > radius + slack;
+    });
+  }
+  return outside;
+}
+
+} // namespace packtrace
