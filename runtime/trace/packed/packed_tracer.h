@@ -35,6 +35,12 @@ public:
   /// Instances that no ray hits because their transform flattens them, or nearly so.
   std::span<const uint32_t> flat_instances() const { return flat_instances_; }
 
+  /// From now on leaf nodes are found by `search`, of the trees' inner nodes none is read. See packed::TreeSearch.
+  void search_trees(void (*search)(const void* searcher, const packed::TreeSearch&), const void* searcher);
+  /// By number, of the file or built here.
+  std::span<const baked::TreeRecord> tree_records() const;
+  std::span<const packed::TraceTree> trees() const;
+
   /// The same queries on the calling thread, adding up what the kernels do. Slower.
   void count_closest(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits,
                      packed::KernelCounters& counters) const;
