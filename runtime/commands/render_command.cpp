@@ -253,7 +253,8 @@ void add_render_command(CLI::App& app, GlobalOptions& globals) {
                   "Share of light bounced back by what a ray hits, 0..1 (default 0: off)")
       ->type_name("RHO");
   verb.add_option("--seed", options->seed, "Seed of the sample pattern (default 0)")->type_name("N");
-  verb.add_option("--backend", options->backend, "What traces the rays: embree (the default), packed or embree-clusters")
+  verb.add_option("--backend", options->backend,
+                  "What traces the rays: embree (the default), packed or embree-clusters")
       ->type_name("NAME");
   verb.add_option("--bvh,--bvh-quality", options->bvh,
                   "Embree's tree: medium (the default), or high (slower to build, faster to trace)")

@@ -18,7 +18,7 @@ namespace {
 /// all less than 80 u C. 256 are taken.
 constexpr double kBoxPad = 0x1p-16;
 
-/// The leaf nodes of one tree, by cluster.
+/// The leaf nodes of one tree, by cluster, and which of them are a user primitive.
 struct ClusterNodes {
   std::vector<uint32_t> nodes;  ///< numbers in the tree
   std::vector<uint32_t> begins; ///< into nodes, by primitive; and the end
@@ -31,15 +31,17 @@ struct ClusterNodes {
   uint64_t bytes() const { return (nodes.size() + begins.size()) * sizeof(uint32_t) + sizeof(ClusterNodes); }
 };
 
-ClusterNodes nodes_of(const packed::TraceTree& tree, uint32_t node_count) {
+ClusterNodes nodes_of(const packed::TraceTree& tree, uint32_t node_count, ClusterPrimitives primitives) {
   ClusterNodes out;
   out.tree = &tree;
   for (uint32_t i = 0; i < node_count; ++i)
     if (tree.nodes[i].has_leaves()) out.nodes.push_back(i);
   std::stable_sort(out.nodes.begin(), out.nodes.end(),
                    [&](uint32_t a, uint32_t b) { return tree.nodes[a].cluster < tree.nodes[b].cluster; });
+  const bool each = primitives == ClusterPrimitives::kLeafNodes;
   for (uint32_t i = 0; i < out.nodes.size(); ++i)
-    if (i == 0 || tree.nodes[out.nodes[i]].cluster != tree.nodes[out.nodes[i - 1]].cluster) out.begins.push_back(i);
+    if (each || i == 0 || tree.nodes[out.nodes[i]].cluster != tree.nodes[out.nodes[i - 1]].cluster)
+      out.begins.push_back(i);
   out.begins.push_back(static_cast<uint32_t>(out.nodes.size()));
   out.nodes.shrink_to_fit();
   out.begins.shrink_to_fit();
@@ -68,6 +70,9 @@ void cluster_bounds(const RTCBoundsFunctionArguments* args) {
   out.lower_x = below(lo[0] - pad), out.lower_y = below(lo[1] - pad), out.lower_z = below(lo[2] - pad);
   out.upper_x = above(hi[0] + pad), out.upper_y = above(hi[1] + pad), out.upper_z = above(hi[2] + pad);
 }
+
+/// Leaves know their ray classes.
+constexpr uint32_t kAllRays = ~0u;
 
 struct SearchQuery : EmbreeQuery {
   const packed::TreeSearch& search;
@@ -101,58 +106,36 @@ void intersect_cluster(const RTCIntersectFunctionNArguments* args) {
 }
 void occluded_cluster(const RTCOccludedFunctionNArguments* args) { visit_cluster(args, args->ray); }
 
-void set_ray(const packed::TreeSearch& search, uint32_t i, RTCRay& out) {
-  const packed::KernelRay& in = search.rays[i];
-  out.org_x = in.origin[0], out.org_y = in.origin[1], out.org_z = in.origin[2], out.tnear = in.tnear;
-  out.dir_x = in.direction[0], out.dir_y = in.direction[1], out.dir_z = in.direction[2], out.time = 0.0f;
-  out.tfar = in.tfar, out.mask = ~0u, out.id = search.number[i], out.flags = 0;
+static_assert(sizeof(Ray) == sizeof(packed::KernelRay) && offsetof(Ray, tfar) == offsetof(packed::KernelRay, tfar));
+
+std::span<const Ray> rays_of(const packed::TreeSearch& search) {
+  return {reinterpret_cast<const Ray*>(search.rays), search.count};
 }
 
-int mode() { static const int m = getenv("CLMODE") ? atoi(getenv("CLMODE")) : 0; return m; }
+/// As a stream with the coherent flag, as all of a search's rays are of one octant: Embree makes packets of it.
+void find_closest(RTCScene scene, const packed::TreeSearch& search) {
+  SearchQuery context(RTC_INTERSECT_CONTEXT_FLAG_COHERENT, search);
+  alignas(64) RTCRayHit stream[packed::TreeSearch::kMaxRays];
+  const std::span<const Ray> rays = rays_of(search);
+  for (uint32_t i = 0; i < search.count; ++i) {
+    set_ray(rays[i], kAllRays, stream[i]);
+    stream[i].ray.id = search.number[i];
+  }
+  rtcIntersect1M(scene, &context, stream, search.count, sizeof(RTCRayHit));
+}
 
-void search_scene(RTCScene scene, const packed::TreeSearch& search) {
-  const int how = mode();
-  SearchQuery context(how & 4 ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT, search);
-  if ((how & 3) == 0) {
-    if (search.any) {
-      alignas(64) RTCRay r[64];
-      for (uint32_t i = 0; i < search.count; ++i) set_ray(search, i, r[i]);
-      rtcOccluded1M(scene, &context, r, search.count, sizeof(RTCRay));
-    } else {
-      alignas(64) RTCRayHit r[64];
-      for (uint32_t i = 0; i < search.count; ++i) { set_ray(search, i, r[i].ray); r[i].hit.geomID = r[i].hit.instID[0] = RTC_INVALID_GEOMETRY_ID; }
-      rtcIntersect1M(scene, &context, r, search.count, sizeof(RTCRayHit));
-    }
-  } else if ((how & 3) == 1) {
-    for (uint32_t i = 0; i < search.count; ++i) {
-      if (search.any) {
-        alignas(16) RTCRay r;
-        set_ray(search, i, r);
-        if (r.tnear <= r.tfar) rtcOccluded1(scene, &context, &r);
-      } else {
-        alignas(16) RTCRayHit r;
-        set_ray(search, i, r.ray);
-        r.hit.geomID = r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-        if (r.ray.tnear <= r.ray.tfar) rtcIntersect1(scene, &context, &r);
-      }
-    }
-  } else {
-    alignas(64) int valid[16];
-    alignas(64) RTCRayHit16 p;
-    for (uint32_t first = 0; first < search.count; first += 16) {
-      for (uint32_t k = 0; k < 16; ++k) {
-        const uint32_t i = first + k < search.count ? first + k : first;
-        RTCRay r;
-        set_ray(search, i, r);
-        valid[k] = first + k < search.count && r.tnear <= r.tfar ? -1 : 0;
-        p.ray.org_x[k] = r.org_x; p.ray.org_y[k] = r.org_y; p.ray.org_z[k] = r.org_z; p.ray.tnear[k] = r.tnear;
-        p.ray.dir_x[k] = r.dir_x; p.ray.dir_y[k] = r.dir_y; p.ray.dir_z[k] = r.dir_z; p.ray.time[k] = 0;
-        p.ray.tfar[k] = r.tfar; p.ray.mask[k] = r.mask; p.ray.id[k] = r.id; p.ray.flags[k] = 0;
-      }
-      forget_hits(p.hit);
-      if (search.any) rtcOccluded16(valid, scene, &context, &p.ray);
-      else rtcIntersect16(valid, scene, &context, &p);
-    }
+/// Without the coherent flag, for EmbreeTracer's reason (embree_queries.cpp).
+void find_any(RTCScene scene, const packed::TreeSearch& search) {
+  SearchQuery context(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT, search);
+  RayPacket16 packet;
+  RTCRay16 lanes;
+  set_constants(kAllRays, lanes);
+  const std::span<const Ray> rays = rays_of(search);
+  for (uint32_t first = 0; first < search.count; first += RayPacket16::kRays) {
+    const uint32_t count = std::min<uint32_t>(RayPacket16::kRays, search.count - first);
+    packet.load(rays.subspan(first, count), lanes);
+    std::copy_n(search.number + first, count, lanes.id);
+    rtcOccluded16(packet.valid, scene, &context, &lanes);
   }
 }
 
@@ -169,10 +152,11 @@ struct EmbreeClusterTracer::Trees {
     device.check();
     rtcSetGeometryUserPrimitiveCount(geometry.get(), tree.primitive_count());
     rtcSetGeometryUserData(geometry.get(), &tree);
-    rtcSetGeometryBoundsFunction(geometry.get(), [](const auto* args) { cluster_bounds(args); }, nullptr);
+    rtcSetGeometryBoundsFunction(
+        geometry.get(), [](const auto* args) { cluster_bounds(args); }, nullptr);
     rtcSetGeometryIntersectFunction(geometry.get(), intersect_cluster);
     rtcSetGeometryOccludedFunction(geometry.get(), occluded_cluster);
-    rtcSetGeometryMask(geometry.get(), ~0u); // leaves know their ray classes
+    rtcSetGeometryMask(geometry.get(), kAllRays);
     rtcCommitGeometry(geometry.get());
     rtcAttachGeometry(scene.get(), geometry.get());
     rtcSetSceneProgressMonitorFunction(
@@ -183,20 +167,22 @@ struct EmbreeClusterTracer::Trees {
   }
 };
 
-EmbreeClusterTracer::EmbreeClusterTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa)
+EmbreeClusterTracer::EmbreeClusterTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa,
+                                         ClusterPrimitives primitives)
     : packed_(file, source, isa), trees_(std::make_unique<Trees>()) {
   if (rtcGetDeviceProperty(trees_->device.get(), RTC_DEVICE_PROPERTY_USER_GEOMETRY_SUPPORTED) == 0)
     throw Error(ErrorKind::kUnsupported, "this Embree was built without user geometry");
   const std::span<const packed::TraceTree> trees = packed_.trees();
   for (uint32_t i = 0; i < trees.size(); ++i)
-    trees_->nodes.push_back(nodes_of(trees[i], packed_.tree_records()[i].node_count));
+    trees_->nodes.push_back(nodes_of(trees[i], packed_.tree_records()[i].node_count, primitives));
   for (ClusterNodes& nodes : trees_->nodes) {
     Progress().check_cancelled();
     trees_->scenes.push_back(nodes.primitive_count() > 0 ? trees_->build(nodes) : nullptr);
   }
   packed_.search_trees(
       [](const void* searcher, const packed::TreeSearch& search) {
-        search_scene(static_cast<const Trees*>(searcher)->scenes[search.tree].get(), search);
+        const RTCScene scene = static_cast<const Trees*>(searcher)->scenes[search.tree].get();
+        search.any != 0 ? find_any(scene, search) : find_closest(scene, search);
       },
       trees_.get());
 }

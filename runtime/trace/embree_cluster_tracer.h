@@ -6,15 +6,23 @@
 
 namespace packtrace {
 
+/// What a user primitive of Embree's is.
+enum class ClusterPrimitives : uint8_t {
+  kClusters,  ///< smaller
+  kLeafNodes, ///< faster: a node of up to eight leaves, of which a cluster has a few
+};
+
 /// Traces a baked file's clusters as PackedTracer does, to the bit, but finds them with Embree: a tree of the file
-/// becomes a scene of user primitives, one for each cluster, and what Embree's callbacks get is handed to the packed
-/// kernels. Rays are moved into the tree's grid before Embree sees them, so instances need no Embree instances.
+/// becomes a scene of user primitives, one for each cluster or leaf node, and what Embree's callbacks get is handed to
+/// the packed kernels. Rays are moved into the tree's grid before Embree sees them, so instances need no Embree
+/// instances.
 class EmbreeClusterTracer final : public RayTracer {
 public:
   /// Keeps references: both must outlive the tracer.
   /// Throws as PackedTracer, Error(kUnsupported) for an Embree built without the needed features,
   /// Error(kLimitExceeded) if memory runs out, Error(kCancelled) after Progress::cancel().
-  EmbreeClusterTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa = chosen_isa());
+  EmbreeClusterTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa = chosen_isa(),
+                      ClusterPrimitives primitives = ClusterPrimitives::kClusters);
   ~EmbreeClusterTracer() override;
   EmbreeClusterTracer(const EmbreeClusterTracer&) = delete;
   EmbreeClusterTracer& operator=(const EmbreeClusterTracer&) = delete;

@@ -1,7 +1,6 @@
 #include "runtime/trace/make_tracer.h"
 
 #include "pbrt_import/scene/error.h"
-#include "runtime/trace/embree_cluster_tracer.h"
 #include "runtime/trace/packed/packed_tracer.h"
 
 namespace packtrace {
@@ -12,7 +11,7 @@ std::unique_ptr<RayTracer> make_tracer(const SceneSource& source, const BakedFil
       throw Error(ErrorKind::kUnsupported,
                   "backends packed and embree-clusters trace baked files only; bake the scene, or use embree");
     if (config.backend == Backend::kPacked) return std::make_unique<PackedTracer>(*file, source);
-    return std::make_unique<EmbreeClusterTracer>(*file, source);
+    return std::make_unique<EmbreeClusterTracer>(*file, source, chosen_isa(), config.cluster_primitives);
   }
   return std::make_unique<EmbreeTracer>(source, config.embree);
 }

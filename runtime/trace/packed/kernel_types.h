@@ -91,7 +91,8 @@ struct KernelRay {
   float tfar;
 };
 
-/// Rays on their way through one placed tree, for something else than its inner nodes to find the leaf nodes they reach.
+/// Rays on their way through one placed tree, for something else than its inner nodes to find the leaf nodes they
+/// reach.
 struct TreeSearch {
   static constexpr uint32_t kMaxRays = 64;
 
@@ -99,8 +100,9 @@ struct TreeSearch {
   uint32_t any; ///< 1: any hit will do, 0: the nearest is wanted
   uint32_t count;
   uint32_t number[kMaxRays]; ///< of each ray below, in the words of visit()
-  KernelRay rays[kMaxRays];  ///< in the tree's grid; reach 2^-22 of the largest coordinate, theirs or the tree's, farther
-  const float (*limits)[2];  ///< by number: the second is the negated tfar of now
+  KernelRay
+      rays[kMaxRays]; ///< in the tree's grid; reach 2^-22 of the largest coordinate, theirs or the tree's, farther
+  const float (*limits)[2]; ///< by number: the second is the negated tfar of now
   void* traversal;
   /// Tests the leaves of nodes of the tree against rays, given as bits; returns those that still look for a hit.
   uint64_t (*visit)(const TreeSearch& search, const uint32_t* nodes, uint32_t node_count, uint64_t rays);

@@ -36,11 +36,13 @@ TEST(EmbreeClusterTracer, FindsWhatPackedFindsToTheBit) {
   const BakedScene baked(test::varied_scene());
   for (const PackedIsa isa : test::isas()) {
     const PackedTracer packed(baked.file, baked.source, isa);
-    const EmbreeClusterTracer clusters(baked.file, baked.source, isa);
-    ASSERT_EQ(clusters.isa(), packed.isa());
     const std::vector<Ray> rays = random_rays(100000, {{-9, -1, -9}, {9, 6, 9}}, packed.space());
-    for (const uint32_t ray_class : {kCameraRays, kOcclusionRays})
-      EXPECT_GT(same_hits(clusters, packed, rays, ray_class), 15000u);
+    for (const ClusterPrimitives primitives : {ClusterPrimitives::kClusters, ClusterPrimitives::kLeafNodes}) {
+      const EmbreeClusterTracer clusters(baked.file, baked.source, isa, primitives);
+      ASSERT_EQ(clusters.isa(), packed.isa());
+      for (const uint32_t ray_class : {kCameraRays, kOcclusionRays})
+        EXPECT_GT(same_hits(clusters, packed, rays, ray_class), 15000u);
+    }
   }
 }
 

@@ -159,7 +159,7 @@ TEST(MakeTracer, PackedBackendsNeedAPackedFile) {
   const FloatSource source(scene);
   for (const Backend backend : {Backend::kPacked, Backend::kEmbreeClusters}) {
     try {
-      make_tracer(source, nullptr, {backend, {}});
+      make_tracer(source, nullptr, {backend, {}, {}});
       FAIL();
     } catch (const Error& error) {
       EXPECT_EQ(error.kind(), ErrorKind::kUnsupported);
