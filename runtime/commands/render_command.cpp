@@ -95,15 +95,14 @@ RenderConfig make_config(const SceneSource& source, const Camera& camera, const 
 
 TracerConfig tracer_config(const RenderOptions& options) {
   TracerConfig config;
-  if (options.backend == "packed") {
+  if (options.backend == "packed" || options.backend == "embree-clusters") {
     if (options.bvh || options.fast_edges)
-      throw Error(ErrorKind::kUsage,
-                  "--bvh and --fast-edges are about Embree; backend packed has its tree in the file");
-    config.backend = Backend::kPacked;
+      throw Error(ErrorKind::kUsage, "--bvh and --fast-edges are about Embree's own triangles, for backend embree");
+    config.backend = options.backend == "packed" ? Backend::kPacked : Backend::kEmbreeClusters;
   } else if (options.backend == "vulkan") {
-    throw Error(ErrorKind::kUnsupported, "--backend vulkan is not there yet; use embree or packed");
+    throw Error(ErrorKind::kUnsupported, "--backend vulkan is not there yet; use embree, packed or embree-clusters");
   } else if (options.backend != "embree") {
-    throw Error(ErrorKind::kUsage, "--backend " + options.backend + ": there are embree and packed");
+    throw Error(ErrorKind::kUsage, "--backend " + options.backend + ": there are embree, packed and embree-clusters");
   }
   const std::string quality = options.bvh.value_or("medium");
   if (quality != "medium" && quality != "high")
@@ -271,7 +270,8 @@ void add_render_command(CLI::App& app, GlobalOptions& globals) {
                   "Share of light bounced back by what a ray hits, 0..1 (default 0: off)")
       ->type_name("RHO");
   verb.add_option("--seed", options->seed, "Seed of the sample pattern (default 0)")->type_name("N");
-  verb.add_option("--backend", options->backend, "What traces the rays: embree (the default) or packed")
+  verb.add_option("--backend", options->backend,
+                  "What traces the rays: embree (the default), packed or embree-clusters")
       ->type_name("NAME");
   verb.add_option("--bvh,--bvh-quality", options->bvh,
                   "Embree's tree: medium (the default), or high (slower to build, faster to trace)")

@@ -6,10 +6,12 @@
 namespace packtrace {
 
 std::unique_ptr<RayTracer> make_tracer(const SceneSource& source, const BakedFile* file, const TracerConfig& config) {
-  if (config.backend == Backend::kPacked) {
+  if (config.backend != Backend::kEmbree) {
     if (file == nullptr)
-      throw Error(ErrorKind::kUnsupported, "backend packed traces baked files only; bake the scene, or use embree");
-    return std::make_unique<PackedTracer>(*file, source);
+      throw Error(ErrorKind::kUnsupported,
+                  "backends packed and embree-clusters trace baked files only; bake the scene, or use embree");
+    if (config.backend == Backend::kPacked) return std::make_unique<PackedTracer>(*file, source);
+    return std::make_unique<EmbreeClusterTracer>(*file, source, chosen_isa(), config.cluster_primitives);
   }
   return std::make_unique<EmbreeTracer>(source, config.embree);
 }

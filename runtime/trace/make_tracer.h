@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "runtime/trace/embree_cluster_tracer.h"
 #include "runtime/trace/embree_tracer.h"
 
 namespace packtrace {
@@ -10,18 +11,21 @@ class BakedFile;
 class LodSource;
 
 enum class Backend : uint8_t {
-  kEmbree, ///< decodes everything to float triangles
-  kPacked, ///< traces the packed clusters as they lie in a baked file
+  kEmbree,         ///< decodes everything to float triangles
+  kPacked,         ///< traces the packed clusters as they lie in a baked file
+  kEmbreeClusters, ///< the same, with Embree's trees over the clusters
 };
 
 struct TracerConfig {
   Backend backend = Backend::kEmbree;
   EmbreeConfig embree;
+  ClusterPrimitives cluster_primitives = ClusterPrimitives::kClusters; ///< of kEmbreeClusters
 };
 
 /// The one place that knows all backends. Keeps references: source and file must outlive the tracer.
 /// @param file what source reads; null where it reads floats
-/// Throws Error(kUnsupported) for backend packed without a file, else as the backend's constructor.
+/// Throws Error(kUnsupported) for backends packed and embree-clusters without a file, else as the backend's
+/// constructor.
 std::unique_ptr<RayTracer> make_tracer(const SceneSource& source, const BakedFile* file, const TracerConfig& config);
 
 /// The same at the detail of a plan.

@@ -97,7 +97,9 @@ Systems make_systems(const TraceInput& input) {
   }
   out.single = 0, out.packets = 1, out.truth = 3, out.truth_trees = 1;
   add_tracer(input, "embree", {}, out);
-  add_tracer(input, "packed", {Backend::kPacked, {}}, out);
+  add_tracer(input, "packed", {Backend::kPacked, {}, {}}, out);
+  add_tracer(input, "embree-clusters", {Backend::kEmbreeClusters, {}, {}}, out);
+  add_tracer(input, "embree-clusters, nodes", {Backend::kEmbreeClusters, {}, ClusterPrimitives::kLeafNodes}, out);
   return out;
 }
 

@@ -371,15 +371,21 @@ TEST(CommandLine, RenderNamesItsBackend) {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run_packtrace(arguments).exit_code;
   };
+  const auto check_report = [&](const char* backend) {
+    const auto report = nlohmann::json::parse(read_text(bench / "x.json"));
+    EXPECT_EQ(report.at("backend"), backend);
+    EXPECT_FALSE(report.at("isa").get<std::string>().empty());
+    uint64_t sum = 0;
+    for (const auto& [name, bytes] : report.at("resident_bytes").at("parts").items()) sum += bytes.get<uint64_t>();
+    EXPECT_EQ(report.at("resident_bytes").at("tracing"), sum);
+  };
   ASSERT_EQ(render({"--backend", "embree", "--bvh-quality", "high"}), 0);
-  const auto report = nlohmann::json::parse(read_text(bench / "x.json"));
-  EXPECT_EQ(report.at("backend"), "embree");
-  EXPECT_FALSE(report.at("isa").get<std::string>().empty());
-  uint64_t sum = 0;
-  for (const auto& [name, bytes] : report.at("resident_bytes").at("parts").items()) sum += bytes.get<uint64_t>();
-  EXPECT_EQ(report.at("resident_bytes").at("tracing"), sum);
+  check_report("embree");
+  ASSERT_EQ(render({"--backend", "embree-clusters"}), 0);
+  check_report("embree-clusters");
   EXPECT_EQ(render({"--backend", "fast"}), 2);
   EXPECT_EQ(render({"--backend", "packed", "--bvh", "high"}), 2);
+  EXPECT_EQ(render({"--backend", "embree-clusters", "--fast-edges"}), 2);
 }
 
 TEST(CommandLine, EveryTruncatedPrefixOfABakedFileIsRefused) {

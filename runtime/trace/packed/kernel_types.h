@@ -83,6 +83,31 @@ struct KernelCounters {
   uint64_t batches_decoded = 0, exact_triangles = 0;
 };
 
+/// As RayTracer's Ray, plain.
+struct KernelRay {
+  float origin[3];
+  float tnear;
+  float direction[3];
+  float tfar;
+};
+
+/// Rays on their way through one placed tree, for something else than its inner nodes to find the leaf nodes they
+/// reach.
+struct TreeSearch {
+  static constexpr uint32_t kMaxRays = 64;
+
+  uint32_t tree;
+  uint32_t any; ///< 1: any hit will do, 0: the nearest is wanted
+  uint32_t count;
+  uint32_t number[kMaxRays]; ///< of each ray below, in the words of visit()
+  KernelRay
+      rays[kMaxRays]; ///< in the tree's grid; reach 2^-22 of the largest coordinate, theirs or the tree's, farther
+  const float (*limits)[2]; ///< by number: the second is the negated tfar of now
+  void* traversal;
+  /// Tests the leaves of nodes of the tree against rays, given as bits; returns those that still look for a hit.
+  uint64_t (*visit)(const TreeSearch& search, const uint32_t* nodes, uint32_t node_count, uint64_t rays);
+};
+
 struct KernelScene {
   const TraceCluster* clusters; ///< by number in the cluster section
   const TraceTree* trees;
@@ -97,14 +122,9 @@ struct KernelScene {
   bool (*present)(const void* owner, uint32_t placement, uint32_t cluster, uint32_t triangle, float u, float v,
                   uint32_t ray_class);
   const void* owner;
-};
-
-/// As RayTracer's Ray, plain.
-struct KernelRay {
-  float origin[3];
-  float tnear;
-  float direction[3];
-  float tfar;
+  /// Not null: visits the leaf nodes that rays may reach, more than that if it likes, in the place of inner nodes.
+  void (*search_tree)(const void* searcher, const TreeSearch& search);
+  const void* searcher;
 };
 
 /// As RayTracer's RayHit, plain.

@@ -356,6 +356,15 @@ void PackedTracer::any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOr
                occluded.data(), nullptr);
 }
 
+void PackedTracer::search_trees(void (*search)(const void*, const packed::TreeSearch&), const void* searcher) {
+  tables_->scene.search_tree = search;
+  tables_->scene.searcher = searcher;
+}
+
+std::span<const baked::TreeRecord> PackedTracer::tree_records() const { return tables_->records; }
+
+std::span<const packed::TraceTree> PackedTracer::trees() const { return tables_->trees; }
+
 void PackedTracer::count_closest(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits,
                                  packed::KernelCounters& counters) const {
   kernels_.closest(tables_->scene, tables_->caches.of_this_thread(), kernel_rays(rays), rays.size(), ray_class,

@@ -53,6 +53,12 @@ public:
   };
   const LodTrees& lod_trees() const { return lod_trees_; }
 
+  /// From now on leaf nodes are found by `search`, of the trees' inner nodes none is read. See packed::TreeSearch.
+  void search_trees(void (*search)(const void* searcher, const packed::TreeSearch&), const void* searcher);
+  /// By number, of the file or built here.
+  std::span<const baked::TreeRecord> tree_records() const;
+  std::span<const packed::TraceTree> trees() const;
+
   /// The same queries on the calling thread, adding up what the kernels do. Slower.
   void count_closest(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits,
                      packed::KernelCounters& counters) const;

@@ -143,8 +143,55 @@ private:
     const TraceTree& tree = scene_.trees[place.tree];
     RayGroup group;
     rays = enter(place, tree.max_coordinate, unit_, rays, group);
-    by_octant(group, rays,
-              [&](uint64_t together, uint32_t octant) { trace_tree(placement, tree.nodes, group, together, octant); });
+    by_octant(group, rays, [&](uint64_t together, uint32_t octant) {
+      if (scene_.search_tree != nullptr)
+        search_tree(placement, tree.nodes, group, together, octant);
+      else
+        trace_tree(placement, tree.nodes, group, together, octant);
+    });
+  }
+
+  /// What visit_leaf_nodes() needs to know.
+  struct Search {
+    Traversal* self;
+    const baked::PackedNode* nodes;
+    RayGroup* group;
+    uint32_t placement, octant;
+  };
+
+  /// As trace_tree(), where leaf nodes are found by scene_.search_tree.
+  void search_tree(uint32_t placement, const baked::PackedNode* nodes, RayGroup& group, uint64_t rays,
+                   uint32_t octant) {
+    Search state{this, nodes, &group, placement, octant};
+    TreeSearch search;
+    search.tree = scene_.placements[placement].tree;
+    search.any = kAny ? 1 : 0;
+    search.count = 0;
+    search.limits = group.limits;
+    search.traversal = &state;
+    search.visit = visit_leaf_nodes;
+    for (uint64_t m = rays & alive_; m != 0; m &= m - 1) {
+      const uint32_t i = first_bit(m);
+      KernelRay& ray = search.rays[search.count];
+      search.number[search.count++] = i;
+      for (uint32_t axis = 0; axis < 3; ++axis)
+        ray.origin[axis] = group.origin[axis][i], ray.direction[axis] = 1.0f / group.inverse[axis][i];
+      ray.tnear = group.limits[i][0] > 0.0f ? group.limits[i][0] : 0.0f; // nothing lies behind an origin that moved
+      ray.tfar = group.tmax(i);
+    }
+    scene_.search_tree(scene_.searcher, search);
+  }
+
+  static uint64_t visit_leaf_nodes(const TreeSearch& search, const uint32_t* nodes, uint32_t node_count,
+                                   uint64_t rays) {
+    const Search& at = *static_cast<const Search*>(search.traversal);
+    for (uint32_t i = 0; i < node_count && (rays &= at.self->alive_) != 0; ++i) {
+      const baked::PackedNode& node = at.nodes[nodes[i]];
+      if constexpr (kCount) ++at.self->counters_->nodes, at.self->counters_->node_rays += count_ones(rays);
+      at.self->trace_leaves(at.placement, node, NodeChildren(node), typename Lanes::Boxes(node, at.octant), *at.group,
+                            rays);
+    }
+    return rays & at.self->alive_;
   }
 
   /// Through one placed tree, rays of one octant of it.

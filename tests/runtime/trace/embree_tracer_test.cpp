@@ -153,15 +153,17 @@ TEST(MakeTracer, KnowsEmbree) {
   EXPECT_EQ(resident_bytes(*tracer), sum);
 }
 
-TEST(MakeTracer, PackedNeedsAPackedFile) {
+TEST(MakeTracer, PackedBackendsNeedAPackedFile) {
   Scene scene;
   add_shape(scene, test::sphere({0, 0, 0}, 1, 8));
   const FloatSource source(scene);
-  try {
-    make_tracer(source, nullptr, {Backend::kPacked, {}});
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.kind(), ErrorKind::kUnsupported);
+  for (const Backend backend : {Backend::kPacked, Backend::kEmbreeClusters}) {
+    try {
+      make_tracer(source, nullptr, {backend, {}, {}});
+      FAIL();
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::kUnsupported);
+    }
   }
 }
 

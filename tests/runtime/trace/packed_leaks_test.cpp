@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "runtime/trace/embree_cluster_tracer.h"
 #include "tests/runtime/trace/packed_scenes.h"
 #include "tests/runtime/trace/test_scenes.h"
 
@@ -44,10 +45,11 @@ std::vector<Ray> rays_from_inside(const SceneSource& source, const UnitSpace& sp
   return rays;
 }
 
+template <typename Tracer = PackedTracer>
 size_t leaks(const Scene& scene, DVec3 inside, size_t count, PackedIsa isa) {
   constexpr size_t kAtOnce = 1000000;
   const BakedScene baked(scene);
-  const PackedTracer tracer(baked.file, baked.source, isa);
+  const Tracer tracer(baked.file, baked.source, isa);
   size_t missed = 0;
   for (uint32_t seed = 2; count > 0; ++seed) {
     const size_t now = std::min(count, kAtOnce);
@@ -105,6 +107,24 @@ TEST(PackedLeaks, NoneAtAnyScale) {
     test::add_shape(scene, test::sphere({0, 0, 0}, 1, 30), 0, test::placed({0, 0, 0}, DVec3(scale)));
     for (const PackedIsa isa : test::isas())
       EXPECT_EQ(leaks(scene, DVec3(0.1, 0.2, 0.3) * scale, 20000, isa), 0u) << scale;
+  }
+}
+
+TEST(EmbreeClusterLeaks, NoRayLeavesAClosedMesh) {
+  Scene scene;
+  test::add_shape(scene, test::sphere({0, 0, 0}, 1, 50));
+  EXPECT_EQ(leaks<EmbreeClusterTracer>(scene, {0.1, 0.2, -0.05}, 1000000, chosen_isa()), 0u);
+}
+
+TEST(EmbreeClusterLeaks, NoneFarAwayOrThroughInstancesOfAnyScale) {
+  Scene far;
+  test::add_shape(far, test::sphere({1000, 2000, -500}, 1, 40));
+  EXPECT_EQ(leaks<EmbreeClusterTracer>(far, {1000.1, 2000.2, -500}, 100000, chosen_isa()), 0u);
+  for (const DVec3 scale : {DVec3(-3, 0.02, 1), DVec3(1e-6, 1e-6, 2e-6), DVec3(1e30)}) {
+    Scene scene;
+    test::add_object(scene, test::sphere({0, 0, 0}, 1, 40));
+    scene.instances.push_back({0, Affine(test::placed({5, 6, 7}, scale, 33, {1, 2, 3}))});
+    EXPECT_EQ(leaks<EmbreeClusterTracer>(scene, {5, 6, 7}, 50000, chosen_isa()), 0u) << scale.x;
   }
 }
 

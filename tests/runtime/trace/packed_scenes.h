@@ -7,6 +7,7 @@
 #include "compress/format/baked_file.h"
 #include "runtime/trace/packed/packed_tracer.h"
 #include "runtime/trace/packed_source.h"
+#include "tests/runtime/trace/test_scenes.h"
 
 namespace packtrace::test {
 
@@ -64,6 +65,23 @@ inline std::vector<Ray> random_rays(size_t count, const Bounds& world, const Uni
     ray.origin = Vec3(a), ray.direction = Vec3(b - DVec3(ray.origin));
   }
   return rays;
+}
+
+/// World shapes and instances: turned, mirrored, squeezed, far apart, one of it masked, one not seen, one not
+/// occluding.
+inline Scene varied_scene() {
+  Scene scene;
+  add_shape(scene, quad({-8, 0, -8}, {0, 0, 16}, {16, 0, 0}));
+  add_shape(scene, quad({-4, 0, 4}, {8, 0, 0}, {0, 5, 0}), kAlphaMask);
+  scene.masks.push_back({64, 1, WrapMode::kRepeat, Vec2(4, 1), Vec2(0), {0u, ~0u}});
+  scene.materials[1].alpha_mask = 0;
+  add_shape(scene, sphere({3, 1, 0}, 1, 24), kTransmissive);
+  add_shape(scene, sphere({3, 4, 0}, 1, 24), kInvisible);
+  add_object(scene, sphere({0, 0, 0}, 1, 32));
+  for (const DVec3 scale : {DVec3(1), DVec3(-1, 0.7, 1), DVec3(0.5, 1.5, 0.5), DVec3(4, 0.01, -2)})
+    scene.instances.push_back({0, Affine(placed({-2.5 * scale.y, 1, 4 * scale.x - 4}, scale, 25))});
+  scene.instances.push_back({0, Affine(placed({3000, 20, -500}, DVec3(2), 70, {1, 1, 0}))});
+  return scene;
 }
 
 } // namespace packtrace::test

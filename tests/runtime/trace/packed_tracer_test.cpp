@@ -21,23 +21,7 @@ using test::closest;
 using test::isas;
 using test::placed;
 using test::random_rays;
-
-/// World shapes and instances: turned, mirrored, squeezed, far apart, one of it masked, one not seen, one not
-/// occluding.
-Scene varied_scene() {
-  Scene scene;
-  add_shape(scene, test::quad({-8, 0, -8}, {0, 0, 16}, {16, 0, 0}));
-  add_shape(scene, test::quad({-4, 0, 4}, {8, 0, 0}, {0, 5, 0}), kAlphaMask);
-  scene.masks.push_back({64, 1, WrapMode::kRepeat, Vec2(4, 1), Vec2(0), {0u, ~0u}});
-  scene.materials[1].alpha_mask = 0;
-  add_shape(scene, test::sphere({3, 1, 0}, 1, 24), kTransmissive);
-  add_shape(scene, test::sphere({3, 4, 0}, 1, 24), kInvisible);
-  add_object(scene, test::sphere({0, 0, 0}, 1, 32));
-  for (const DVec3 scale : {DVec3(1), DVec3(-1, 0.7, 1), DVec3(0.5, 1.5, 0.5), DVec3(4, 0.01, -2)})
-    scene.instances.push_back({0, Affine(placed({-2.5 * scale.y, 1, 4 * scale.x - 4}, scale, 25))});
-  scene.instances.push_back({0, Affine(placed({3000, 20, -500}, DVec3(2), 70, {1, 1, 0}))});
-  return scene;
-}
+using test::varied_scene;
 
 struct Difference {
   size_t hits = 0, yes_no = 0, distance = 0;
