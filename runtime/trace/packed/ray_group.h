@@ -31,6 +31,8 @@ struct alignas(64) UnitRays {
   float tmax[kGroup]; ///< inclusive: of a nearest hit, its t
 };
 
+struct Beam;
+
 /// One array per value; those of rays that are not in use are not set.
 struct alignas(64) RayGroup {
   float bias[3][kGroup][2]; ///< a near plane p is passed at p inverse + the first, a far one at p inverse - the second
@@ -42,6 +44,7 @@ struct alignas(64) RayGroup {
   uint64_t backward[3];     ///< rays along which x, y, z decrease, as bits
   double t_begin[kGroup];   ///< unit-space t = (t here + t_begin) t_scale
   double t_scale[kGroup];   ///< a power of two
+  Beam* beam = nullptr;     ///< that all its rays make, see beam.h
 
   void set_tmax(uint32_t i, float t) { limits[i][1] = -t; }
   float tmax(uint32_t i) const { return -limits[i][1]; }
