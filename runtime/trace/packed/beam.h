@@ -50,10 +50,14 @@ constexpr uint32_t kLeastBeam = 16, kLeastSideBySide = 12;
 inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam& beam) {
   if (static_cast<uint32_t>(__builtin_popcountll(rays)) < kLeastBeam) return false;
   const auto first = static_cast<uint32_t>(__builtin_ctzll(rays));
-  for (uint64_t m = rays; m != 0; m &= m - 1) {
-    const auto i = static_cast<uint32_t>(__builtin_ctzll(m));
-    for (uint32_t axis = 0; axis < 3; ++axis)
-      if (group.origin[axis][i] != group.origin[axis][first]) return false;
+  for (uint32_t at = 0; at < kGroup; at += kBlock) {
+    Ints same = Ints{} - 1;
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+      Floats origin;
+      read_block(origin, &group.origin[axis][at]);
+      same &= origin == group.origin[axis][first];
+    }
+    if ((static_cast<uint32_t>(rays >> at) & 0xffu & ~lane_bits(same)) != 0) return false;
   }
   for (const uint64_t backward : group.backward)
     if ((backward & rays) != 0 && (backward & rays) != rays) return false;

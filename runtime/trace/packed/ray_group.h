@@ -50,14 +50,6 @@ struct alignas(64) RayGroup {
   float tmax(uint32_t i) const { return -limits[i][1]; }
 };
 
-inline float next_below(float x) { // x > 0
-  uint32_t bits;
-  __builtin_memcpy(&bits, &x, sizeof bits);
-  --bits;
-  __builtin_memcpy(&x, &bits, sizeof x);
-  return x;
-}
-
 constexpr uint32_t kBlock = 8; ///< rays that are set up at once
 
 // The compiler's own vectors, a lane for each ray of a block, so that all instruction sets get the same from one
@@ -82,6 +74,40 @@ inline void keep_larger(Vector& a, const Vector& b) {
   a = a > b ? a : b;
 }
 
+/// Turns rows into columns.
+inline void transpose(Floats (&rows)[kBlock]) {
+  static_assert(kBlock == 8);
+  Floats mixed[kBlock];
+  for (uint32_t distance = 4; distance > 0; distance /= 2) { // swaps off-diagonal quarters, of quarters, of those
+    for (uint32_t i = 0; i < kBlock; ++i) mixed[i] = rows[i];
+    const Ints low = distance == 4   ? Ints{0, 1, 2, 3, 8, 9, 10, 11}
+                     : distance == 2 ? Ints{0, 1, 8, 9, 4, 5, 12, 13}
+                                     : Ints{0, 8, 2, 10, 4, 12, 6, 14};
+    const Ints high = low + static_cast<int32_t>(distance);
+    for (uint32_t i = 0; i < kBlock; ++i)
+      if ((i & distance) == 0) {
+        rows[i] = __builtin_shuffle(mixed[i], mixed[i + distance], low);
+        rows[i + distance] = __builtin_shuffle(mixed[i], mixed[i + distance], high);
+      }
+  }
+}
+
+/// Reads a block of rays.
+/// @param numbers of the rays
+inline void read_rays(const KernelRay* rays, const uint32_t (&numbers)[kBlock], uint32_t first, UnitRays& out) {
+  static_assert(sizeof(KernelRay) == sizeof(Floats) && offsetof(KernelRay, tnear) == 12 &&
+                offsetof(KernelRay, direction) == 16 && offsetof(KernelRay, tfar) == 28);
+  Floats values[kBlock];
+  for (uint32_t i = 0; i < kBlock; ++i) read_block(values[i], reinterpret_cast<const float*>(rays + numbers[i]));
+  transpose(values);
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    write_block(&out.origin[axis][first], values[axis]);
+    write_block(&out.direction[axis][first], values[4 + axis]);
+  }
+  write_block(&out.tnear[first], values[3]);
+  write_block(&out.tmax[first], reinterpret_cast<Floats>(reinterpret_cast<Ints>(values[7]) - 1)); // the float below
+}
+
 /// The lanes whose condition is all ones, as bits.
 template <typename Condition>
 inline uint32_t lane_bits(const Condition& condition) {
@@ -94,8 +120,8 @@ inline uint32_t lane_bits(const Condition& condition) {
 /// A block of rays in a tree's grid, in doubles.
 struct GridBlock {
   Doubles origin[3], direction[3];
-  Doubles power; ///< t here for one in unit space
-  Doubles begin; ///< that origins were moved by
+  Doubles power, scale; ///< t here for one in unit space, and 1 / that
+  Doubles begin;        ///< that origins were moved by
 };
 
 /// Moves rays into the grid and scales their directions so that the largest component is in [1, 2). Returns the lanes
@@ -123,8 +149,8 @@ inline uint32_t move_block(const TracePlacement& placement, const UnitRays& from
   exponent = exponent < 523 ? Longs{} + 523 : exponent;
   exponent = exponent > 1523 ? Longs{} + 1523 : exponent;
   block.power = reinterpret_cast<Doubles>(exponent << 52);
-  const Doubles scale = reinterpret_cast<Doubles>((2046 - exponent) << 52);
-  for (Doubles& component : block.direction) component *= scale;
+  block.scale = reinterpret_cast<Doubles>((2046 - exponent) << 52);
+  for (Doubles& component : block.direction) component *= block.scale;
   block.begin = Doubles{};
   return lane_bits((largest > 0.0) & (largest < 1e300) & (away < 1e300));
 }
@@ -173,7 +199,7 @@ inline void set_boxes(const GridBlock& block, const UnitRays& from, float max_co
   const Doubles t_max = __builtin_convertvector(tmax, Doubles) * block.power - block.begin;
   write_pairs(&group.limits[first], __builtin_convertvector(t_near, Floats), -__builtin_convertvector(t_max, Floats));
   write_block(&group.t_begin[first], block.begin);
-  write_block(&group.t_scale[first], 1.0 / block.power);
+  write_block(&group.t_scale[first], block.scale);
   for (uint32_t axis = 0; axis < 3; ++axis) {
     const Floats d = __builtin_convertvector(block.direction[axis], Floats), size = magnitude(d);
     const Floats over = 1.0f / (size > kSmallestDirection ? size : Floats{} + kSmallestDirection);
@@ -203,7 +229,9 @@ inline void set_shears(const GridBlock& block, uint32_t first, RayGroup& group) 
 }
 
 /// Moves rays into a tree's grid and sets them up. Returns those that may hit something.
+/// @tparam kTriangles whether rays meet triangles there
 /// @param rays as bits
+template <bool kTriangles>
 inline uint64_t enter(const TracePlacement& placement, float max_coordinate, const UnitRays& from, uint64_t rays,
                       RayGroup& group) {
   uint64_t entered = 0;
@@ -220,7 +248,7 @@ inline uint64_t enter(const TracePlacement& placement, float max_coordinate, con
     }
     entered |= uint64_t{usable} << first;
     set_boxes(block, from, max_coordinate, first, group);
-    set_shears(block, first, group);
+    if constexpr (kTriangles) set_shears(block, first, group);
   }
   return entered;
 }

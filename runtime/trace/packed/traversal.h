@@ -79,12 +79,10 @@ private:
   void trace_group(const uint32_t* numbers, uint32_t count) {
     numbers_ = numbers;
     alive_ = ~uint64_t{0} >> (kGroup - count);
-    for (uint32_t i = 0; i < ((count + kBlock - 1) & ~(kBlock - 1)); ++i) { // whole blocks
-      const KernelRay& ray = rays_[numbers[i < count ? i : 0]];
-      for (uint32_t axis = 0; axis < 3; ++axis)
-        unit_.origin[axis][i] = ray.origin[axis], unit_.direction[axis][i] = ray.direction[axis];
-      unit_.tnear[i] = ray.tnear;
-      unit_.tmax[i] = next_below(ray.tfar);
+    for (uint32_t first = 0; first < count; first += kBlock) {
+      uint32_t block[kBlock];
+      for (uint32_t i = 0; i < kBlock; ++i) block[i] = numbers[first + i < count ? first + i : 0];
+      read_rays(rays_, block, first, unit_);
     }
     if (scene_.top_nodes != nullptr)
       trace_top();
@@ -112,7 +110,7 @@ private:
   /// Through the tree over placements.
   void trace_top() {
     RayGroup group;
-    const uint64_t rays = enter(scene_.top, scene_.top_max_coordinate, unit_, alive_, group);
+    const uint64_t rays = enter<false>(scene_.top, scene_.top_max_coordinate, unit_, alive_, group);
     by_octant(group, rays, [&](uint64_t together, uint32_t octant) { trace_top(group, together, octant); });
   }
 
@@ -125,9 +123,10 @@ private:
       const uint64_t active = next.rays & alive_;
       if (active == 0) continue;
       if ((next.node & kTopLeaf) != 0) {
+        nearer_ = 0;
         trace_placement(next.node & ~kTopLeaf, active);
         if constexpr (!kAny)
-          for (uint64_t m = active; m != 0; m &= m - 1) {
+          for (uint64_t m = nearer_; m != 0; m &= m - 1) {
             const uint32_t i = first_bit(m);
             group.set_tmax(i, static_cast<float>(double{unit_.tmax[i]} / group.t_scale[i] - group.t_begin[i]));
           }
@@ -145,7 +144,7 @@ private:
     if constexpr (kCount) counters_->placements += count_ones(rays);
     const TraceTree& tree = scene_.trees[place.tree];
     RayGroup group;
-    rays = enter(place, tree.max_coordinate, unit_, rays, group);
+    rays = enter<true>(place, tree.max_coordinate, unit_, rays, group);
     Beam beam;
     if constexpr (!kAny)
       if (make_beam(group, tree.max_coordinate, rays, beam)) group.beam = &beam;
@@ -318,6 +317,7 @@ private:
       occluded_[numbers_[i]] = 1;
       alive_ &= ~(uint64_t{1} << i);
     } else {
+      nearer_ |= uint64_t{1} << i;
       group.set_tmax(i, t);
       if (group.beam != nullptr) group.beam->set_tmax(i, t);
       unit_.tmax[i] = static_cast<float>((double{t} + group.t_begin[i]) * group.t_scale[i]);
@@ -343,6 +343,7 @@ private:
   // Of the group that is being traced:
   const uint32_t* numbers_ = nullptr; ///< of its rays
   uint64_t alive_ = 0;                ///< rays that still look for a hit
+  uint64_t nearer_ = 0;               ///< rays whose nearest hit the placement being traced has
   UnitRays unit_;
 };
 
