@@ -1,6 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+
+#if defined(__AVX512F__)
+#include <immintrin.h>
+#endif
 
 #include "runtime/trace/packed/kernel_types.h"
 
@@ -56,9 +61,61 @@ constexpr uint32_t kBlock = 8; ///< rays that are set up at once
 // source.
 using Floats = float __attribute__((vector_size(4 * kBlock)));
 using Ints = int32_t __attribute__((vector_size(4 * kBlock)));
-using Doubles = double __attribute__((vector_size(8 * kBlock)));
-using Longs = int64_t __attribute__((vector_size(8 * kBlock)));
-using Bytes = int8_t __attribute__((vector_size(kBlock)));
+// Doubles take as many registers as they need: the compiler splits larger vectors into single numbers.
+#if defined(__AVX512F__)
+constexpr uint32_t kDoubleLanes = 8;
+#else
+constexpr uint32_t kDoubleLanes = 4;
+#endif
+using DoublePart = double __attribute__((vector_size(8 * kDoubleLanes)));
+using LongPart = int64_t __attribute__((vector_size(8 * kDoubleLanes)));
+using FloatPart = float __attribute__((vector_size(4 * kDoubleLanes)));
+constexpr uint32_t kDoubleParts = kBlock / kDoubleLanes;
+
+struct Doubles {
+  DoublePart part[kDoubleParts];
+
+  double get(uint32_t lane) const { return part[lane / kDoubleLanes][lane % kDoubleLanes]; }
+  void set(uint32_t lane, double value) { part[lane / kDoubleLanes][lane % kDoubleLanes] = value; }
+};
+
+template <typename Function>
+inline Doubles each_part(Function function) {
+  Doubles result;
+  for (uint32_t i = 0; i < kDoubleParts; ++i) result.part[i] = function(i);
+  return result;
+}
+inline Doubles operator+(const Doubles& a, const Doubles& b) {
+  return each_part([&](uint32_t i) { return a.part[i] + b.part[i]; });
+}
+inline Doubles operator-(const Doubles& a, const Doubles& b) {
+  return each_part([&](uint32_t i) { return a.part[i] - b.part[i]; });
+}
+inline Doubles operator*(const Doubles& a, const Doubles& b) {
+  return each_part([&](uint32_t i) { return a.part[i] * b.part[i]; });
+}
+inline Doubles operator*(double a, const Doubles& b) {
+  return each_part([&](uint32_t i) { return a * b.part[i]; });
+}
+inline Doubles operator+(const Doubles& a, double b) {
+  return each_part([&](uint32_t i) { return a.part[i] + b; });
+}
+
+inline Doubles to_doubles(const Floats& x) {
+  return each_part([&](uint32_t i) {
+    FloatPart part;
+    __builtin_memcpy(&part, reinterpret_cast<const char*>(&x) + i * sizeof part, sizeof part);
+    return __builtin_convertvector(part, DoublePart);
+  });
+}
+inline Floats to_floats(const Doubles& x) {
+  Floats result;
+  for (uint32_t i = 0; i < kDoubleParts; ++i) {
+    const FloatPart part = __builtin_convertvector(x.part[i], FloatPart);
+    __builtin_memcpy(reinterpret_cast<char*>(&result) + i * sizeof part, &part, sizeof part);
+  }
+  return result;
+}
 
 template <typename Vector, typename Element>
 inline void read_block(Vector& v, const Element* p) {
@@ -109,12 +166,32 @@ inline void read_rays(const KernelRay* rays, const uint32_t (&numbers)[kBlock], 
 }
 
 /// The lanes whose condition is all ones, as bits.
-template <typename Condition>
-inline uint32_t lane_bits(const Condition& condition) {
-  const Bytes bytes = __builtin_convertvector(condition, Bytes);
-  uint64_t word;
-  __builtin_memcpy(&word, &bytes, sizeof word);
-  return static_cast<uint32_t>(((word & 0x0101010101010101u) * 0x0102040810204080u) >> 56); // byte i adds bit 56 + i
+inline uint32_t lane_bits(const Ints& condition) {
+#if defined(__AVX2__)
+  return static_cast<uint32_t>(__builtin_ia32_movmskps256(reinterpret_cast<Floats>(condition)));
+#else
+  uint32_t bits = 0;
+  for (uint32_t i = 0; i < kBlock; ++i) bits |= (condition[i] != 0 ? 1u : 0u) << i;
+  return bits;
+#endif
+}
+
+/// The lanes in which low < x < high, as bits.
+inline uint32_t lanes_between(double low, const Doubles& x, double high) {
+  uint32_t bits = 0;
+  for (uint32_t i = 0; i < kDoubleParts; ++i) {
+    const LongPart inside = (x.part[i] > low) & (x.part[i] < high);
+#if defined(__AVX512F__)
+    bits = _mm512_movepi64_mask(reinterpret_cast<__m512i>(inside));
+#elif defined(__AVX2__)
+    bits |= static_cast<uint32_t>(__builtin_ia32_movmskpd256(reinterpret_cast<DoublePart>(inside)))
+            << (kDoubleLanes * i);
+#else
+    for (uint32_t lane = 0; lane < kDoubleLanes; ++lane)
+      bits |= (inside[lane] != 0 ? 1u : 0u) << (kDoubleLanes * i + lane);
+#endif
+  }
+  return bits;
 }
 
 /// A block of rays in a tree's grid, in doubles.
@@ -129,30 +206,39 @@ struct GridBlock {
 inline uint32_t move_block(const TracePlacement& placement, const UnitRays& from, uint32_t first, GridBlock& block,
                            Doubles& away) {
   constexpr int64_t kMagnitude = 0x7fffffffffffffff;
+  const auto keep_magnitude = [](Doubles& most, const Doubles& x) {
+    for (uint32_t i = 0; i < kDoubleParts; ++i)
+      keep_larger(most.part[i], reinterpret_cast<DoublePart>(reinterpret_cast<LongPart>(x.part[i]) & kMagnitude));
+  };
   const double* m = placement.grid_from_unit;
   Doubles origin[3], direction[3], largest{};
   away = Doubles{};
   for (uint32_t axis = 0; axis < 3; ++axis) {
     Floats in_unit;
     read_block(in_unit, &from.origin[axis][first]);
-    origin[axis] = __builtin_convertvector(in_unit, Doubles);
+    origin[axis] = to_doubles(in_unit);
     read_block(in_unit, &from.direction[axis][first]);
-    direction[axis] = __builtin_convertvector(in_unit, Doubles);
+    direction[axis] = to_doubles(in_unit);
   }
   for (uint32_t axis = 0; axis < 3; ++axis) {
     block.direction[axis] = m[axis] * direction[0] + m[3 + axis] * direction[1] + m[6 + axis] * direction[2];
     block.origin[axis] = m[axis] * origin[0] + m[3 + axis] * origin[1] + m[6 + axis] * origin[2] + m[9 + axis];
-    keep_larger(largest, reinterpret_cast<Doubles>(reinterpret_cast<Longs>(block.direction[axis]) & kMagnitude));
-    keep_larger(away, reinterpret_cast<Doubles>(reinterpret_cast<Longs>(block.origin[axis]) & kMagnitude));
+    keep_magnitude(largest, block.direction[axis]);
+    keep_magnitude(away, block.origin[axis]);
   }
-  Longs exponent = reinterpret_cast<Longs>(largest) >> 52;
-  exponent = exponent < 523 ? Longs{} + 523 : exponent;
-  exponent = exponent > 1523 ? Longs{} + 1523 : exponent;
-  block.power = reinterpret_cast<Doubles>(exponent << 52);
-  block.scale = reinterpret_cast<Doubles>((2046 - exponent) << 52);
-  for (Doubles& component : block.direction) component *= block.scale;
+  for (uint32_t i = 0; i < kDoubleParts; ++i) { // down to a power of two, whose inverse is one, too
+    constexpr int64_t kExponent = int64_t{2047} << 52, kLeast = int64_t{523} << 52, kMost = int64_t{1523} << 52;
+    DoublePart power = reinterpret_cast<DoublePart>(reinterpret_cast<LongPart>(largest.part[i]) & kExponent);
+    const DoublePart least = DoublePart{} + __builtin_bit_cast(double, kLeast),
+                     most = DoublePart{} + __builtin_bit_cast(double, kMost);
+    power = power < least ? least : power;
+    power = power > most ? most : power;
+    block.power.part[i] = power;
+    block.scale.part[i] = reinterpret_cast<DoublePart>((int64_t{2046} << 52) - reinterpret_cast<LongPart>(power));
+  }
+  for (Doubles& component : block.direction) component = component * block.scale;
   block.begin = Doubles{};
-  return lane_bits((largest > 0.0) & (largest < 1e300) & (away < 1e300));
+  return lanes_between(0.0, largest, 1e300) & lanes_between(-1.0, away, 1e300);
 }
 
 inline double larger(double a, double b) { return a > b ? a : b; }
@@ -162,7 +248,7 @@ inline double larger(double a, double b) { return a > b ? a : b; }
 inline bool approach(const TracePlacement& placement, double margin, GridBlock& block, uint32_t lane) {
   double begin = 0.0, end = 1e300;
   for (uint32_t i = 0; i < 3; ++i) {
-    const double origin = block.origin[i][lane], direction = block.direction[i][lane];
+    const double origin = block.origin[i].get(lane), direction = block.direction[i].get(lane);
     const double lo = placement.box_lo[i] - margin - origin, hi = placement.box_hi[i] + margin - origin;
     if (direction == 0.0) {
       if (lo > 0.0 || hi < 0.0) return false;
@@ -173,8 +259,9 @@ inline bool approach(const TracePlacement& placement, double margin, GridBlock& 
     end = end < (a < b ? b : a) ? end : (a < b ? b : a);
   }
   if (begin > end) return false;
-  for (uint32_t i = 0; i < 3; ++i) block.origin[i][lane] += begin * block.direction[i][lane];
-  block.begin[lane] = begin;
+  for (uint32_t i = 0; i < 3; ++i)
+    block.origin[i].set(lane, block.origin[i].get(lane) + begin * block.direction[i].get(lane));
+  block.begin.set(lane, begin);
   return true;
 }
 
@@ -189,19 +276,19 @@ inline void set_boxes(const GridBlock& block, const UnitRays& from, float max_co
                       RayGroup& group) {
   Floats origin[3], reach = Floats{} + max_coordinate, tnear, tmax;
   for (uint32_t axis = 0; axis < 3; ++axis) {
-    origin[axis] = __builtin_convertvector(block.origin[axis], Floats);
+    origin[axis] = to_floats(block.origin[axis]);
     keep_larger(reach, magnitude(origin[axis]));
     write_block(&group.origin[axis][first], origin[axis]);
   }
   read_block(tnear, &from.tnear[first]);
   read_block(tmax, &from.tmax[first]);
-  const Doubles t_near = __builtin_convertvector(tnear, Doubles) * block.power - block.begin;
-  const Doubles t_max = __builtin_convertvector(tmax, Doubles) * block.power - block.begin;
-  write_pairs(&group.limits[first], __builtin_convertvector(t_near, Floats), -__builtin_convertvector(t_max, Floats));
+  const Doubles t_near = to_doubles(tnear) * block.power - block.begin;
+  const Doubles t_max = to_doubles(tmax) * block.power - block.begin;
+  write_pairs(&group.limits[first], to_floats(t_near), -to_floats(t_max));
   write_block(&group.t_begin[first], block.begin);
   write_block(&group.t_scale[first], block.scale);
   for (uint32_t axis = 0; axis < 3; ++axis) {
-    const Floats d = __builtin_convertvector(block.direction[axis], Floats), size = magnitude(d);
+    const Floats d = to_floats(block.direction[axis]), size = magnitude(d);
     const Floats over = 1.0f / (size > kSmallestDirection ? size : Floats{} + kSmallestDirection);
     const Ints sign = reinterpret_cast<Ints>(d) & static_cast<int32_t>(0x80000000u);
     const Floats inverse = reinterpret_cast<Floats>(reinterpret_cast<Ints>(over) | sign);
@@ -213,9 +300,7 @@ inline void set_boxes(const GridBlock& block, const UnitRays& from, float max_co
 }
 
 inline void set_shears(const GridBlock& block, uint32_t first, RayGroup& group) {
-  const Floats x = __builtin_convertvector(block.direction[0], Floats),
-               y = __builtin_convertvector(block.direction[1], Floats),
-               z = __builtin_convertvector(block.direction[2], Floats);
+  const Floats x = to_floats(block.direction[0]), y = to_floats(block.direction[1]), z = to_floats(block.direction[2]);
   const Floats ax = magnitude(x), ay = magnitude(y), az = magnitude(z);
   const Ints by_z = (az >= ax) & (az >= ay), by_y = ~by_z & (ay >= ax);
   const Floats along = by_z ? z : by_y ? y : x;
@@ -242,7 +327,7 @@ inline uint64_t enter(const TracePlacement& placement, float max_coordinate, con
     GridBlock block;
     Doubles away;
     uint32_t usable = wanted & move_block(placement, from, first, block, away);
-    for (uint32_t far = usable & lane_bits(away > kFar * double{max_coordinate}); far != 0; far &= far - 1) {
+    for (uint32_t far = usable & lanes_between(kFar * double{max_coordinate}, away, 1e300); far != 0; far &= far - 1) {
       const auto lane = static_cast<uint32_t>(__builtin_ctz(far));
       if (!approach(placement, 0x1p-8 * double{max_coordinate}, block, lane)) usable &= ~(1u << lane);
     }
