@@ -82,6 +82,7 @@ struct Doubles {
 template <typename Function>
 inline Doubles each_part(Function function) {
   Doubles result;
+#pragma GCC unroll 2
   for (uint32_t i = 0; i < kDoubleParts; ++i) result.part[i] = function(i);
   return result;
 }
@@ -101,20 +102,20 @@ inline Doubles operator+(const Doubles& a, double b) {
   return each_part([&](uint32_t i) { return a.part[i] + b; });
 }
 
-inline Doubles to_doubles(const Floats& x) {
+inline Doubles read_doubles(const float* p) {
   return each_part([&](uint32_t i) {
     FloatPart part;
-    __builtin_memcpy(&part, reinterpret_cast<const char*>(&x) + i * sizeof part, sizeof part);
+    __builtin_memcpy(&part, p + i * kDoubleLanes, sizeof part);
     return __builtin_convertvector(part, DoublePart);
   });
 }
 inline Floats to_floats(const Doubles& x) {
-  Floats result;
-  for (uint32_t i = 0; i < kDoubleParts; ++i) {
-    const FloatPart part = __builtin_convertvector(x.part[i], FloatPart);
-    __builtin_memcpy(reinterpret_cast<char*>(&result) + i * sizeof part, &part, sizeof part);
-  }
-  return result;
+#if defined(__AVX512F__)
+  return __builtin_convertvector(x.part[0], Floats);
+#else
+  return __builtin_shufflevector(__builtin_convertvector(x.part[0], FloatPart),
+                                 __builtin_convertvector(x.part[1], FloatPart), 0, 1, 2, 3, 4, 5, 6, 7);
+#endif
 }
 
 template <typename Vector, typename Element>
@@ -214,11 +215,8 @@ inline uint32_t move_block(const TracePlacement& placement, const UnitRays& from
   Doubles origin[3], direction[3], largest{};
   away = Doubles{};
   for (uint32_t axis = 0; axis < 3; ++axis) {
-    Floats in_unit;
-    read_block(in_unit, &from.origin[axis][first]);
-    origin[axis] = to_doubles(in_unit);
-    read_block(in_unit, &from.direction[axis][first]);
-    direction[axis] = to_doubles(in_unit);
+    origin[axis] = read_doubles(&from.origin[axis][first]);
+    direction[axis] = read_doubles(&from.direction[axis][first]);
   }
   for (uint32_t axis = 0; axis < 3; ++axis) {
     block.direction[axis] = m[axis] * direction[0] + m[3 + axis] * direction[1] + m[6 + axis] * direction[2];
@@ -274,16 +272,14 @@ inline Floats magnitude(const Floats& x) { return reinterpret_cast<Floats>(reint
 
 inline void set_boxes(const GridBlock& block, const UnitRays& from, float max_coordinate, uint32_t first,
                       RayGroup& group) {
-  Floats origin[3], reach = Floats{} + max_coordinate, tnear, tmax;
+  Floats origin[3], reach = Floats{} + max_coordinate;
   for (uint32_t axis = 0; axis < 3; ++axis) {
     origin[axis] = to_floats(block.origin[axis]);
     keep_larger(reach, magnitude(origin[axis]));
     write_block(&group.origin[axis][first], origin[axis]);
   }
-  read_block(tnear, &from.tnear[first]);
-  read_block(tmax, &from.tmax[first]);
-  const Doubles t_near = to_doubles(tnear) * block.power - block.begin;
-  const Doubles t_max = to_doubles(tmax) * block.power - block.begin;
+  const Doubles t_near = read_doubles(&from.tnear[first]) * block.power - block.begin;
+  const Doubles t_max = read_doubles(&from.tmax[first]) * block.power - block.begin;
   write_pairs(&group.limits[first], to_floats(t_near), -to_floats(t_max));
   write_block(&group.t_begin[first], block.begin);
   write_block(&group.t_scale[first], block.scale);
