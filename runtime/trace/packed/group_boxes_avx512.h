@@ -2,7 +2,7 @@
 
 #include <immintrin.h>
 
-#include "runtime/trace/packed/group_boxes.h"
+#include "runtime/trace/packed/beam.h"
 
 /// The same with all planes of an axis in one register: each child's near plane and, negated, its far one, so that the
 /// larger parameter counts for both.
@@ -40,6 +40,45 @@ private:
   }
 };
 
+inline __m512 both(const float (&two)[2]) {
+  double pair;
+  __builtin_memcpy(&pair, two, sizeof pair);
+  return _mm512_castpd_ps(_mm512_set1_pd(pair));
+}
+
+/// By child, where pairs hold begin and -end: begin + -end <= 0. The sign of a sum is exact, and both halves of 64 bits
+/// hold it.
+inline __mmask8 begin_before_end(__m512 pairs) {
+  const __m512 sum = _mm512_add_ps(pairs, _mm512_permute_ps(pairs, 0xb1));
+  return _mm512_cmple_epi64_mask(_mm512_castps_si512(sum), _mm512_setzero_si512());
+}
+
+/// The first of each pair.
+inline __m256 firsts(__m512 pairs) {
+  return _mm512_castps512_ps256(
+      _mm512_permutexvar_ps(_mm512_castsi256_si512(_mm256_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14)), pairs));
+}
+
+/// As for GroupBoxes.
+inline uint32_t pass_beam(const Avx512GroupBoxes& boxes, const Beam& beam, float (&t)[baked::kNodeWidth]) {
+  __m512 latest = both(beam.limits);
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    const __m512 distance = _mm512_sub_ps(boxes.plane[axis], both(beam.origin[axis]));
+    latest = _mm512_max_ps(latest, _mm512_min_ps(_mm512_mul_ps(distance, _mm512_set1_ps(beam.inverse[axis][0])),
+                                                 _mm512_mul_ps(distance, _mm512_set1_ps(beam.inverse[axis][1]))));
+  }
+  _mm256_storeu_ps(t, firsts(latest));
+  return begin_before_end(latest);
+}
+
+inline void read_planes(const Avx512GroupBoxes& boxes, BoxPlanes& planes) {
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    const __m512 swapped = _mm512_permute_ps(boxes.plane[axis], 0xb1);
+    _mm256_storeu_ps(planes.near[axis], firsts(boxes.plane[axis]));
+    _mm256_storeu_ps(planes.far[axis], _mm256_xor_ps(firsts(swapped), _mm256_set1_ps(-0.0f)));
+  }
+}
+
 struct Avx512ChildRays {
   static uint32_t pass(const Avx512GroupBoxes& boxes, const RayGroup& group, uint64_t rays,
                        uint64_t (&out)[baked::kNodeWidth]) {
@@ -59,25 +98,17 @@ struct Avx512ChildRays {
                              _mm512_set1_ps(group.bias[axis][ray][0]));
     };
     const __m512 begin = _mm512_max_ps(_mm512_max_ps(at(0), at(1)), at(2));
-    _mm256_storeu_ps(t, _mm512_castps512_ps256(_mm512_permutexvar_ps(
-                            _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 0, 0, 0, 0, 0, 0, 0, 0), begin)));
+    _mm256_storeu_ps(t, firsts(begin));
   }
 
 private:
   static __mmask8 pass_boxes(const Avx512GroupBoxes& boxes, const RayGroup& group, uint32_t ray) {
-    const auto pair = [](const float(&two)[2]) {
-      double both;
-      __builtin_memcpy(&both, two, sizeof both);
-      return _mm512_castpd_ps(_mm512_set1_pd(both));
-    };
     const auto parameter = [&](uint32_t axis) {
-      return _mm512_fmadd_ps(boxes.plane[axis], _mm512_set1_ps(group.inverse[axis][ray]), pair(group.bias[axis][ray]));
+      return _mm512_fmadd_ps(boxes.plane[axis], _mm512_set1_ps(group.inverse[axis][ray]), both(group.bias[axis][ray]));
     };
     const __m512 latest =
-        _mm512_max_ps(_mm512_max_ps(parameter(0), parameter(1)), _mm512_max_ps(parameter(2), pair(group.limits[ray])));
-    // begin <= end, that is begin + -end <= 0: the sign of a sum is exact. Both halves of 64 bits hold it.
-    const __m512 sum = _mm512_add_ps(latest, _mm512_permute_ps(latest, 0xb1));
-    return _mm512_cmple_epi64_mask(_mm512_castps_si512(sum), _mm512_setzero_si512());
+        _mm512_max_ps(_mm512_max_ps(parameter(0), parameter(1)), _mm512_max_ps(parameter(2), both(group.limits[ray])));
+    return begin_before_end(latest);
   }
 };
 

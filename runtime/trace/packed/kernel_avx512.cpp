@@ -1,12 +1,14 @@
 #include "runtime/trace/packed/batch_decode_avx512.h"
 #include "runtime/trace/packed/group_boxes_avx512.h"
 #include "runtime/trace/packed/lanes_avx2.h"
+#include "runtime/trace/packed/lanes_avx512.h"
 #include "runtime/trace/packed/traversal.h"
 
 namespace packtrace::packed {
 namespace {
 
 struct Avx512Kernel : Avx2Lanes {
+  using Wide = Avx512Lanes;
   using Boxes = Avx512GroupBoxes;
   using Children = Avx512ChildRays;
 

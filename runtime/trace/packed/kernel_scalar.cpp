@@ -5,6 +5,7 @@ namespace packtrace::packed {
 namespace {
 
 struct ScalarKernel : ScalarLanes {
+  using Wide = ScalarLanes;
   using Boxes = GroupBoxes<ScalarLanes>;
   using Children = ChildRays<ScalarLanes>;
 

@@ -10,6 +10,7 @@ namespace {
 
 struct Avx2Lanes {
   using F = __m256;
+  static constexpr uint32_t kLanes = 8;
 
   /// A word of bits for each lane.
   struct Masks {

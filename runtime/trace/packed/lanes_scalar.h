@@ -7,6 +7,7 @@ namespace packtrace::packed {
 namespace {
 
 struct ScalarLanes {
+  static constexpr uint32_t kLanes = 8;
   struct F {
     float lane[8];
   };

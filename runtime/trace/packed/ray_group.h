@@ -1,6 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+
+#if defined(__AVX512F__)
+#include <immintrin.h>
+#endif
 
 #include "runtime/trace/packed/kernel_types.h"
 
@@ -31,6 +36,8 @@ struct alignas(64) UnitRays {
   float tmax[kGroup]; ///< inclusive: of a nearest hit, its t
 };
 
+struct Beam;
+
 /// One array per value; those of rays that are not in use are not set.
 struct alignas(64) RayGroup {
   float bias[3][kGroup][2]; ///< a near plane p is passed at p inverse + the first, a far one at p inverse - the second
@@ -42,18 +49,11 @@ struct alignas(64) RayGroup {
   uint64_t backward[3];     ///< rays along which x, y, z decrease, as bits
   double t_begin[kGroup];   ///< unit-space t = (t here + t_begin) t_scale
   double t_scale[kGroup];   ///< a power of two
+  Beam* beam = nullptr;     ///< that all its rays make, see beam.h
 
   void set_tmax(uint32_t i, float t) { limits[i][1] = -t; }
   float tmax(uint32_t i) const { return -limits[i][1]; }
 };
-
-inline float next_below(float x) { // x > 0
-  uint32_t bits;
-  __builtin_memcpy(&bits, &x, sizeof bits);
-  --bits;
-  __builtin_memcpy(&x, &bits, sizeof x);
-  return x;
-}
 
 constexpr uint32_t kBlock = 8; ///< rays that are set up at once
 
@@ -61,9 +61,62 @@ constexpr uint32_t kBlock = 8; ///< rays that are set up at once
 // source.
 using Floats = float __attribute__((vector_size(4 * kBlock)));
 using Ints = int32_t __attribute__((vector_size(4 * kBlock)));
-using Doubles = double __attribute__((vector_size(8 * kBlock)));
-using Longs = int64_t __attribute__((vector_size(8 * kBlock)));
-using Bytes = int8_t __attribute__((vector_size(kBlock)));
+// Doubles take as many registers as they need: the compiler splits larger vectors into single numbers.
+#if defined(__AVX512F__)
+constexpr uint32_t kDoubleLanes = 8;
+#else
+constexpr uint32_t kDoubleLanes = 4;
+#endif
+using DoublePart = double __attribute__((vector_size(8 * kDoubleLanes)));
+using LongPart = int64_t __attribute__((vector_size(8 * kDoubleLanes)));
+using FloatPart = float __attribute__((vector_size(4 * kDoubleLanes)));
+constexpr uint32_t kDoubleParts = kBlock / kDoubleLanes;
+
+struct Doubles {
+  DoublePart part[kDoubleParts];
+
+  double get(uint32_t lane) const { return part[lane / kDoubleLanes][lane % kDoubleLanes]; }
+  void set(uint32_t lane, double value) { part[lane / kDoubleLanes][lane % kDoubleLanes] = value; }
+};
+
+template <typename Function>
+inline Doubles each_part(Function function) {
+  Doubles result;
+#pragma GCC unroll 2
+  for (uint32_t i = 0; i < kDoubleParts; ++i) result.part[i] = function(i);
+  return result;
+}
+inline Doubles operator+(const Doubles& a, const Doubles& b) {
+  return each_part([&](uint32_t i) { return a.part[i] + b.part[i]; });
+}
+inline Doubles operator-(const Doubles& a, const Doubles& b) {
+  return each_part([&](uint32_t i) { return a.part[i] - b.part[i]; });
+}
+inline Doubles operator*(const Doubles& a, const Doubles& b) {
+  return each_part([&](uint32_t i) { return a.part[i] * b.part[i]; });
+}
+inline Doubles operator*(double a, const Doubles& b) {
+  return each_part([&](uint32_t i) { return a * b.part[i]; });
+}
+inline Doubles operator+(const Doubles& a, double b) {
+  return each_part([&](uint32_t i) { return a.part[i] + b; });
+}
+
+inline Doubles read_doubles(const float* p) {
+  return each_part([&](uint32_t i) {
+    FloatPart part;
+    __builtin_memcpy(&part, p + i * kDoubleLanes, sizeof part);
+    return __builtin_convertvector(part, DoublePart);
+  });
+}
+inline Floats to_floats(const Doubles& x) {
+#if defined(__AVX512F__)
+  return __builtin_convertvector(x.part[0], Floats);
+#else
+  return __builtin_shufflevector(__builtin_convertvector(x.part[0], FloatPart),
+                                 __builtin_convertvector(x.part[1], FloatPart), 0, 1, 2, 3, 4, 5, 6, 7);
+#endif
+}
 
 template <typename Vector, typename Element>
 inline void read_block(Vector& v, const Element* p) {
@@ -79,20 +132,74 @@ inline void keep_larger(Vector& a, const Vector& b) {
   a = a > b ? a : b;
 }
 
+/// Turns rows into columns.
+inline void transpose(Floats (&rows)[kBlock]) {
+  static_assert(kBlock == 8);
+  Floats mixed[kBlock];
+  for (uint32_t distance = 4; distance > 0; distance /= 2) { // swaps off-diagonal quarters, of quarters, of those
+    for (uint32_t i = 0; i < kBlock; ++i) mixed[i] = rows[i];
+    const Ints low = distance == 4   ? Ints{0, 1, 2, 3, 8, 9, 10, 11}
+                     : distance == 2 ? Ints{0, 1, 8, 9, 4, 5, 12, 13}
+                                     : Ints{0, 8, 2, 10, 4, 12, 6, 14};
+    const Ints high = low + static_cast<int32_t>(distance);
+    for (uint32_t i = 0; i < kBlock; ++i)
+      if ((i & distance) == 0) {
+        rows[i] = __builtin_shuffle(mixed[i], mixed[i + distance], low);
+        rows[i + distance] = __builtin_shuffle(mixed[i], mixed[i + distance], high);
+      }
+  }
+}
+
+/// Reads a block of rays.
+/// @param numbers of the rays
+inline void read_rays(const KernelRay* rays, const uint32_t (&numbers)[kBlock], uint32_t first, UnitRays& out) {
+  static_assert(sizeof(KernelRay) == sizeof(Floats) && offsetof(KernelRay, tnear) == 12 &&
+                offsetof(KernelRay, direction) == 16 && offsetof(KernelRay, tfar) == 28);
+  Floats values[kBlock];
+  for (uint32_t i = 0; i < kBlock; ++i) read_block(values[i], reinterpret_cast<const float*>(rays + numbers[i]));
+  transpose(values);
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    write_block(&out.origin[axis][first], values[axis]);
+    write_block(&out.direction[axis][first], values[4 + axis]);
+  }
+  write_block(&out.tnear[first], values[3]);
+  write_block(&out.tmax[first], reinterpret_cast<Floats>(reinterpret_cast<Ints>(values[7]) - 1)); // the float below
+}
+
 /// The lanes whose condition is all ones, as bits.
-template <typename Condition>
-inline uint32_t lane_bits(const Condition& condition) {
-  const Bytes bytes = __builtin_convertvector(condition, Bytes);
-  uint64_t word;
-  __builtin_memcpy(&word, &bytes, sizeof word);
-  return static_cast<uint32_t>(((word & 0x0101010101010101u) * 0x0102040810204080u) >> 56); // byte i adds bit 56 + i
+inline uint32_t lane_bits(const Ints& condition) {
+#if defined(__AVX2__)
+  return static_cast<uint32_t>(__builtin_ia32_movmskps256(reinterpret_cast<Floats>(condition)));
+#else
+  uint32_t bits = 0;
+  for (uint32_t i = 0; i < kBlock; ++i) bits |= (condition[i] != 0 ? 1u : 0u) << i;
+  return bits;
+#endif
+}
+
+/// The lanes in which low < x < high, as bits.
+inline uint32_t lanes_between(double low, const Doubles& x, double high) {
+  uint32_t bits = 0;
+  for (uint32_t i = 0; i < kDoubleParts; ++i) {
+    const LongPart inside = (x.part[i] > low) & (x.part[i] < high);
+#if defined(__AVX512F__)
+    bits = _mm512_movepi64_mask(reinterpret_cast<__m512i>(inside));
+#elif defined(__AVX2__)
+    bits |= static_cast<uint32_t>(__builtin_ia32_movmskpd256(reinterpret_cast<DoublePart>(inside)))
+            << (kDoubleLanes * i);
+#else
+    for (uint32_t lane = 0; lane < kDoubleLanes; ++lane)
+      bits |= (inside[lane] != 0 ? 1u : 0u) << (kDoubleLanes * i + lane);
+#endif
+  }
+  return bits;
 }
 
 /// A block of rays in a tree's grid, in doubles.
 struct GridBlock {
   Doubles origin[3], direction[3];
-  Doubles power; ///< t here for one in unit space
-  Doubles begin; ///< that origins were moved by
+  Doubles power, scale; ///< t here for one in unit space, and 1 / that
+  Doubles begin;        ///< that origins were moved by
 };
 
 /// Moves rays into the grid and scales their directions so that the largest component is in [1, 2). Returns the lanes
@@ -100,30 +207,36 @@ struct GridBlock {
 inline uint32_t move_block(const TracePlacement& placement, const UnitRays& from, uint32_t first, GridBlock& block,
                            Doubles& away) {
   constexpr int64_t kMagnitude = 0x7fffffffffffffff;
+  const auto keep_magnitude = [](Doubles& most, const Doubles& x) {
+    for (uint32_t i = 0; i < kDoubleParts; ++i)
+      keep_larger(most.part[i], reinterpret_cast<DoublePart>(reinterpret_cast<LongPart>(x.part[i]) & kMagnitude));
+  };
   const double* m = placement.grid_from_unit;
   Doubles origin[3], direction[3], largest{};
   away = Doubles{};
   for (uint32_t axis = 0; axis < 3; ++axis) {
-    Floats in_unit;
-    read_block(in_unit, &from.origin[axis][first]);
-    origin[axis] = __builtin_convertvector(in_unit, Doubles);
-    read_block(in_unit, &from.direction[axis][first]);
-    direction[axis] = __builtin_convertvector(in_unit, Doubles);
+    origin[axis] = read_doubles(&from.origin[axis][first]);
+    direction[axis] = read_doubles(&from.direction[axis][first]);
   }
   for (uint32_t axis = 0; axis < 3; ++axis) {
     block.direction[axis] = m[axis] * direction[0] + m[3 + axis] * direction[1] + m[6 + axis] * direction[2];
     block.origin[axis] = m[axis] * origin[0] + m[3 + axis] * origin[1] + m[6 + axis] * origin[2] + m[9 + axis];
-    keep_larger(largest, reinterpret_cast<Doubles>(reinterpret_cast<Longs>(block.direction[axis]) & kMagnitude));
-    keep_larger(away, reinterpret_cast<Doubles>(reinterpret_cast<Longs>(block.origin[axis]) & kMagnitude));
+    keep_magnitude(largest, block.direction[axis]);
+    keep_magnitude(away, block.origin[axis]);
   }
-  Longs exponent = reinterpret_cast<Longs>(largest) >> 52;
-  exponent = exponent < 523 ? Longs{} + 523 : exponent;
-  exponent = exponent > 1523 ? Longs{} + 1523 : exponent;
-  block.power = reinterpret_cast<Doubles>(exponent << 52);
-  const Doubles scale = reinterpret_cast<Doubles>((2046 - exponent) << 52);
-  for (Doubles& component : block.direction) component *= scale;
+  for (uint32_t i = 0; i < kDoubleParts; ++i) { // down to a power of two, whose inverse is one, too
+    constexpr int64_t kExponent = int64_t{2047} << 52, kLeast = int64_t{523} << 52, kMost = int64_t{1523} << 52;
+    DoublePart power = reinterpret_cast<DoublePart>(reinterpret_cast<LongPart>(largest.part[i]) & kExponent);
+    const DoublePart least = DoublePart{} + __builtin_bit_cast(double, kLeast),
+                     most = DoublePart{} + __builtin_bit_cast(double, kMost);
+    power = power < least ? least : power;
+    power = power > most ? most : power;
+    block.power.part[i] = power;
+    block.scale.part[i] = reinterpret_cast<DoublePart>((int64_t{2046} << 52) - reinterpret_cast<LongPart>(power));
+  }
+  for (Doubles& component : block.direction) component = component * block.scale;
   block.begin = Doubles{};
-  return lane_bits((largest > 0.0) & (largest < 1e300) & (away < 1e300));
+  return lanes_between(0.0, largest, 1e300) & lanes_between(-1.0, away, 1e300);
 }
 
 inline double larger(double a, double b) { return a > b ? a : b; }
@@ -133,7 +246,7 @@ inline double larger(double a, double b) { return a > b ? a : b; }
 inline bool approach(const TracePlacement& placement, double margin, GridBlock& block, uint32_t lane) {
   double begin = 0.0, end = 1e300;
   for (uint32_t i = 0; i < 3; ++i) {
-    const double origin = block.origin[i][lane], direction = block.direction[i][lane];
+    const double origin = block.origin[i].get(lane), direction = block.direction[i].get(lane);
     const double lo = placement.box_lo[i] - margin - origin, hi = placement.box_hi[i] + margin - origin;
     if (direction == 0.0) {
       if (lo > 0.0 || hi < 0.0) return false;
@@ -144,8 +257,9 @@ inline bool approach(const TracePlacement& placement, double margin, GridBlock& 
     end = end < (a < b ? b : a) ? end : (a < b ? b : a);
   }
   if (begin > end) return false;
-  for (uint32_t i = 0; i < 3; ++i) block.origin[i][lane] += begin * block.direction[i][lane];
-  block.begin[lane] = begin;
+  for (uint32_t i = 0; i < 3; ++i)
+    block.origin[i].set(lane, block.origin[i].get(lane) + begin * block.direction[i].get(lane));
+  block.begin.set(lane, begin);
   return true;
 }
 
@@ -158,21 +272,19 @@ inline Floats magnitude(const Floats& x) { return reinterpret_cast<Floats>(reint
 
 inline void set_boxes(const GridBlock& block, const UnitRays& from, float max_coordinate, uint32_t first,
                       RayGroup& group) {
-  Floats origin[3], reach = Floats{} + max_coordinate, tnear, tmax;
+  Floats origin[3], reach = Floats{} + max_coordinate;
   for (uint32_t axis = 0; axis < 3; ++axis) {
-    origin[axis] = __builtin_convertvector(block.origin[axis], Floats);
+    origin[axis] = to_floats(block.origin[axis]);
     keep_larger(reach, magnitude(origin[axis]));
     write_block(&group.origin[axis][first], origin[axis]);
   }
-  read_block(tnear, &from.tnear[first]);
-  read_block(tmax, &from.tmax[first]);
-  const Doubles t_near = __builtin_convertvector(tnear, Doubles) * block.power - block.begin;
-  const Doubles t_max = __builtin_convertvector(tmax, Doubles) * block.power - block.begin;
-  write_pairs(&group.limits[first], __builtin_convertvector(t_near, Floats), -__builtin_convertvector(t_max, Floats));
+  const Doubles t_near = read_doubles(&from.tnear[first]) * block.power - block.begin;
+  const Doubles t_max = read_doubles(&from.tmax[first]) * block.power - block.begin;
+  write_pairs(&group.limits[first], to_floats(t_near), -to_floats(t_max));
   write_block(&group.t_begin[first], block.begin);
-  write_block(&group.t_scale[first], 1.0 / block.power);
+  write_block(&group.t_scale[first], block.scale);
   for (uint32_t axis = 0; axis < 3; ++axis) {
-    const Floats d = __builtin_convertvector(block.direction[axis], Floats), size = magnitude(d);
+    const Floats d = to_floats(block.direction[axis]), size = magnitude(d);
     const Floats over = 1.0f / (size > kSmallestDirection ? size : Floats{} + kSmallestDirection);
     const Ints sign = reinterpret_cast<Ints>(d) & static_cast<int32_t>(0x80000000u);
     const Floats inverse = reinterpret_cast<Floats>(reinterpret_cast<Ints>(over) | sign);
@@ -184,9 +296,7 @@ inline void set_boxes(const GridBlock& block, const UnitRays& from, float max_co
 }
 
 inline void set_shears(const GridBlock& block, uint32_t first, RayGroup& group) {
-  const Floats x = __builtin_convertvector(block.direction[0], Floats),
-               y = __builtin_convertvector(block.direction[1], Floats),
-               z = __builtin_convertvector(block.direction[2], Floats);
+  const Floats x = to_floats(block.direction[0]), y = to_floats(block.direction[1]), z = to_floats(block.direction[2]);
   const Floats ax = magnitude(x), ay = magnitude(y), az = magnitude(z);
   const Ints by_z = (az >= ax) & (az >= ay), by_y = ~by_z & (ay >= ax);
   const Floats along = by_z ? z : by_y ? y : x;
@@ -200,7 +310,9 @@ inline void set_shears(const GridBlock& block, uint32_t first, RayGroup& group) 
 }
 
 /// Moves rays into a tree's grid and sets them up. Returns those that may hit something.
+/// @tparam kTriangles whether rays meet triangles there
 /// @param rays as bits
+template <bool kTriangles>
 inline uint64_t enter(const TracePlacement& placement, float max_coordinate, const UnitRays& from, uint64_t rays,
                       RayGroup& group) {
   uint64_t entered = 0;
@@ -211,13 +323,13 @@ inline uint64_t enter(const TracePlacement& placement, float max_coordinate, con
     GridBlock block;
     Doubles away;
     uint32_t usable = wanted & move_block(placement, from, first, block, away);
-    for (uint32_t far = usable & lane_bits(away > kFar * double{max_coordinate}); far != 0; far &= far - 1) {
+    for (uint32_t far = usable & lanes_between(kFar * double{max_coordinate}, away, 1e300); far != 0; far &= far - 1) {
       const auto lane = static_cast<uint32_t>(__builtin_ctz(far));
       if (!approach(placement, 0x1p-8 * double{max_coordinate}, block, lane)) usable &= ~(1u << lane);
     }
     entered |= uint64_t{usable} << first;
     set_boxes(block, from, max_coordinate, first, group);
-    set_shears(block, first, group);
+    if constexpr (kTriangles) set_shears(block, first, group);
   }
   return entered;
 }

@@ -1,8 +1,7 @@
 #pragma once
 
 #include "runtime/trace/packed/batch_decode.h"
-#include "runtime/trace/packed/group_boxes.h"
-#include "runtime/trace/packed/triangle_test.h"
+#include "runtime/trace/packed/beam.h"
 
 /// Groups of rays through trees of nodes. They come to a node together, as one word of bits, and leave for each child
 /// those that pass its box: a node is read and set up once for all of them, and nothing waits for the outcome of one
@@ -68,6 +67,10 @@ public:
   }
 
 private:
+  struct Place {
+    uint32_t placement, cluster, triangle;
+  };
+
   static uint32_t octant_of(const float (&v)[3]) {
     return (__builtin_signbit(v[0]) ? 1u : 0u) | (__builtin_signbit(v[1]) ? 2u : 0u) |
            (__builtin_signbit(v[2]) ? 4u : 0u);
@@ -76,12 +79,10 @@ private:
   void trace_group(const uint32_t* numbers, uint32_t count) {
     numbers_ = numbers;
     alive_ = ~uint64_t{0} >> (kGroup - count);
-    for (uint32_t i = 0; i < ((count + kBlock - 1) & ~(kBlock - 1)); ++i) { // whole blocks
-      const KernelRay& ray = rays_[numbers[i < count ? i : 0]];
-      for (uint32_t axis = 0; axis < 3; ++axis)
-        unit_.origin[axis][i] = ray.origin[axis], unit_.direction[axis][i] = ray.direction[axis];
-      unit_.tnear[i] = ray.tnear;
-      unit_.tmax[i] = next_below(ray.tfar);
+    for (uint32_t first = 0; first < count; first += kBlock) {
+      uint32_t block[kBlock];
+      for (uint32_t i = 0; i < kBlock; ++i) block[i] = numbers[first + i < count ? first + i : 0];
+      read_rays(rays_, block, first, unit_);
     }
     if (scene_.top_nodes != nullptr)
       trace_top();
@@ -109,7 +110,7 @@ private:
   /// Through the tree over placements.
   void trace_top() {
     RayGroup group;
-    const uint64_t rays = enter(scene_.top, scene_.top_max_coordinate, unit_, alive_, group);
+    const uint64_t rays = enter<false>(scene_.top, scene_.top_max_coordinate, unit_, alive_, group);
     by_octant(group, rays, [&](uint64_t together, uint32_t octant) { trace_top(group, together, octant); });
   }
 
@@ -122,9 +123,10 @@ private:
       const uint64_t active = next.rays & alive_;
       if (active == 0) continue;
       if ((next.node & kTopLeaf) != 0) {
+        nearer_ = 0;
         trace_placement(next.node & ~kTopLeaf, active);
         if constexpr (!kAny)
-          for (uint64_t m = active; m != 0; m &= m - 1) {
+          for (uint64_t m = nearer_; m != 0; m &= m - 1) {
             const uint32_t i = first_bit(m);
             group.set_tmax(i, static_cast<float>(double{unit_.tmax[i]} / group.t_scale[i] - group.t_begin[i]));
           }
@@ -142,7 +144,10 @@ private:
     if constexpr (kCount) counters_->placements += count_ones(rays);
     const TraceTree& tree = scene_.trees[place.tree];
     RayGroup group;
-    rays = enter(place, tree.max_coordinate, unit_, rays, group);
+    rays = enter<true>(place, tree.max_coordinate, unit_, rays, group);
+    Beam beam;
+    if constexpr (!kAny)
+      if (make_beam(group, tree.max_coordinate, rays, beam)) group.beam = &beam;
     by_octant(group, rays, [&](uint64_t together, uint32_t octant) {
       if (scene_.search_tree != nullptr)
         search_tree(placement, tree.nodes, group, together, octant);
@@ -202,7 +207,7 @@ private:
     while (size > 0) {
       const Pending next = stack[--size];
       const uint64_t active = next.rays & alive_;
-      if (active == 0) continue;
+      if (active == 0 || passed_by(group, next)) continue;
       const baked::PackedNode& node = nodes[next.node];
       if constexpr (kCount) ++counters_->nodes, counters_->node_rays += count_ones(active);
       if ((node.ray_classes & ray_class_) == 0) continue;
@@ -218,14 +223,36 @@ private:
     }
   }
 
+  /// Whether all of a beam's hits are nearer.
+  static bool passed_by(const RayGroup& group, const Pending& pending) {
+    if constexpr (kAny) return false;
+    return group.beam != nullptr && pending.t > -group.beam->limits[1];
+  }
+
+  /// Which of `slots` rays pass, and which do.
+  /// @param t where the first ray enters each child; of a beam, nowhere beyond where any does
+  static uint32_t pass(const typename Lanes::Boxes& boxes, const RayGroup& group, uint64_t rays, uint32_t slots,
+                       uint64_t (&by_child)[baked::kNodeWidth], float (&t)[baked::kNodeWidth]) {
+    if constexpr (!kAny)
+      if (group.beam != nullptr) {
+        slots &= pass_beam(boxes, *group.beam, t);
+        if (slots == 0) return 0;
+        if (count_ones(rays) < kLeastSideBySide) return slots & Lanes::Children::pass(boxes, group, rays, by_child);
+        BoxPlanes planes;
+        read_planes(boxes, planes);
+        return pass_each<typename Lanes::Wide>(planes, group, *group.beam, rays, slots, by_child);
+      }
+    Lanes::Children::enter(boxes, group, first_bit(rays), t);
+    return slots & Lanes::Children::pass(boxes, group, rays, by_child);
+  }
+
   /// Pushes the children of a node that rays pass; of nearest hits, the one that the first ray enters first on top.
   template <typename Number>
   static void push_children(const typename Lanes::Boxes& boxes, const RayGroup& group, uint64_t rays, uint32_t slots,
                             Pending* stack, uint32_t& size, Number number) {
     uint64_t by_child[baked::kNodeWidth];
-    slots &= Lanes::Children::pass(boxes, group, rays, by_child);
     float t[baked::kNodeWidth] = {};
-    Lanes::Children::enter(boxes, group, first_bit(rays), t);
+    slots = pass(boxes, group, rays, slots, by_child, t);
     const uint32_t begin = size;
     for (; slots != 0; slots &= slots - 1) {
       const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
@@ -239,7 +266,8 @@ private:
                     const typename Lanes::Boxes& boxes, RayGroup& group, uint64_t rays) {
     if ((scene_.clusters[node.cluster].flags & ray_class_) == 0) return;
     uint64_t by_child[baked::kNodeWidth];
-    uint32_t slots = children.slots() & Lanes::Children::pass(boxes, group, rays, by_child);
+    float t[baked::kNodeWidth];
+    uint32_t slots = pass(boxes, group, rays, children.slots(), by_child, t);
     const uint64_t begins = children.leaf_begins();
     for (; slots != 0; slots &= slots - 1) {
       const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
@@ -247,6 +275,8 @@ private:
         trace_leaf(placement, node.cluster, node.first_triangle + byte_of(begins, slot), byte_of(children.bytes, slot),
                    group, active);
     }
+    if constexpr (!kAny)
+      if (group.beam != nullptr && group.beam->stale) group.beam->update_limits();
   }
 
   void trace_leaf(uint32_t placement, uint32_t cluster, uint32_t first, uint32_t count, RayGroup& group,
@@ -255,18 +285,48 @@ private:
     while (count > 0) {
       const DecodedBatch& batch = decoded(cluster, first, count);
       if constexpr (kCount) counters_->triangles += count_ones(rays) * batch.count;
-      for (uint64_t m = rays; m != 0; m &= m - 1) {
-        const uint32_t i = first_bit(m);
-        BatchHits hits;
-        uint64_t exact = 0;
-        const uint32_t lanes = test_triangles<Lanes>(batch, group, i, hits, exact);
-        if constexpr (kCount) counters_->exact_triangles += exact;
-        if (lanes != 0) take_hits({placement, cluster, first}, i, hits, lanes, group);
-      }
+      const Place place{placement, cluster, first};
+      const bool beam = !kAny && group.beam != nullptr && group.beam->one_axis;
+      test_each(batch, place, group, beam ? test_side_by_side(batch, place, group, rays) : rays);
       rays &= alive_;
       first += batch.count;
       count -= batch.count;
     }
+  }
+
+  /// One ray after the other.
+  void test_each(const DecodedBatch& batch, const Place& place, RayGroup& group, uint64_t rays) {
+    for (uint64_t m = rays; m != 0; m &= m - 1) {
+      const uint32_t i = first_bit(m);
+      LaneHits<Lanes> hits;
+      uint64_t exact = 0;
+      const uint32_t lanes = test_triangles<Lanes>(batch, group, i, hits, exact);
+      if constexpr (kCount) counters_->exact_triangles += exact;
+      if (lanes != 0) take_hits(place, i, hits, lanes, group);
+    }
+  }
+
+  /// One triangle after the other, where enough rays fill a register. Returns the other rays.
+  uint64_t test_side_by_side(const DecodedBatch& batch, Place place, RayGroup& group, uint64_t rays) {
+    using Wide = typename Lanes::Wide;
+    const uint32_t begin = place.triangle;
+    for (uint32_t at = 0; at < kGroup; at += Wide::kLanes) {
+      const uint32_t wanted = lanes_at<Wide>(rays, at);
+      if (count_ones(wanted) < batch.count) continue;
+      rays &= ~(uint64_t{wanted} << at);
+      for (uint32_t triangle = 0; triangle < batch.count; ++triangle) {
+        LaneHits<Wide> hits;
+        uint64_t exact = 0;
+        uint32_t lanes = test_rays<Wide>(batch, triangle, group, *group.beam, at, wanted, hits, exact);
+        if constexpr (kCount) counters_->exact_triangles += exact;
+        place.triangle = begin + triangle;
+        for (; lanes != 0; lanes &= lanes - 1) {
+          const auto lane = static_cast<uint32_t>(__builtin_ctz(lanes));
+          take_hit(place, at + lane, hits.t[lane], hits.u[lane], hits.v[lane], group);
+        }
+      }
+    }
+    return rays;
   }
 
   const DecodedBatch& decoded(uint32_t cluster, uint32_t first, uint32_t count) {
@@ -283,32 +343,34 @@ private:
     return batch;
   }
 
-  struct Place {
-    uint32_t placement, cluster, triangle;
-  };
-
   /// Of ray i, in these lanes of a batch that begins at `place`.
-  void take_hits(Place place, uint32_t i, const BatchHits& hits, uint32_t lanes, RayGroup& group) {
-    const bool masked = (scene_.clusters[place.cluster].flags & kMasked) != 0;
+  void take_hits(Place place, uint32_t i, const LaneHits<Lanes>& hits, uint32_t lanes, RayGroup& group) {
     const uint32_t begin = place.triangle;
     for (; lanes != 0; lanes &= lanes - 1) {
       const auto lane = static_cast<uint32_t>(__builtin_ctz(lanes));
       place.triangle = begin + lane;
-      const float t = hits.t[lane];
-      if constexpr (!kAny)
-        if (t > group.tmax(i) || (t == group.tmax(i) && !precedes(place, hits_[numbers_[i]]))) continue;
-      if (masked && !scene_.present(scene_.owner, place.placement, place.cluster, place.triangle, hits.u[lane],
-                                    hits.v[lane], ray_class_))
-        continue;
-      if constexpr (kAny) {
-        occluded_[numbers_[i]] = 1;
-        alive_ &= ~(uint64_t{1} << i);
-        return;
-      }
-      group.set_tmax(i, t);
-      unit_.tmax[i] = static_cast<float>((double{t} + group.t_begin[i]) * group.t_scale[i]);
-      hits_[numbers_[i]] = {unit_.tmax[i], hits.u[lane], hits.v[lane], place.placement, place.cluster, place.triangle};
+      if (take_hit(place, i, hits.t[lane], hits.u[lane], hits.v[lane], group) && kAny) return;
     }
+  }
+
+  /// Of ray i, if it counts. Returns whether it does.
+  bool take_hit(const Place& place, uint32_t i, float t, float u, float v, RayGroup& group) {
+    if constexpr (!kAny)
+      if (t > group.tmax(i) || (t == group.tmax(i) && !precedes(place, hits_[numbers_[i]]))) return false;
+    if ((scene_.clusters[place.cluster].flags & kMasked) != 0 &&
+        !scene_.present(scene_.owner, place.placement, place.cluster, place.triangle, u, v, ray_class_))
+      return false;
+    if constexpr (kAny) {
+      occluded_[numbers_[i]] = 1;
+      alive_ &= ~(uint64_t{1} << i);
+    } else {
+      nearer_ |= uint64_t{1} << i;
+      group.set_tmax(i, t);
+      if (group.beam != nullptr) group.beam->set_tmax(i, t);
+      unit_.tmax[i] = static_cast<float>((double{t} + group.t_begin[i]) * group.t_scale[i]);
+      hits_[numbers_[i]] = {unit_.tmax[i], u, v, place.placement, place.cluster, place.triangle};
+    }
+    return true;
   }
 
   /// Of two hits at one place the one with the smaller numbers counts.
@@ -328,6 +390,7 @@ private:
   // Of the group that is being traced:
   const uint32_t* numbers_ = nullptr; ///< of its rays
   uint64_t alive_ = 0;                ///< rays that still look for a hit
+  uint64_t nearer_ = 0;               ///< rays whose nearest hit the placement being traced has
   UnitRays unit_;
 };
 

@@ -1,0 +1,208 @@
+#pragma once
+
+#include "runtime/trace/packed/group_boxes.h"
+#include "runtime/trace/packed/triangle_test.h"
+
+/// Rays from one place into one octant, as camera rays are. What they have in common decides about most boxes at once;
+/// the others, and triangles, are tested against a register of rays each. Which is right where neighbours agree.
+namespace packtrace::packed {
+namespace {
+
+/// By how much the planes of boxes are moved for a beam, in units of u M as for kBoxPad: the node's origin and its
+/// plane (1 M each), less the padded origin (1 M + 2 M), times a rounded inverse (2 M + 2 M), besides 10 u M of the
+/// triangle test.
+constexpr float kBeamPad = 28.0f * 0x1p-24f;
+
+struct alignas(64) Beam {
+  /// Of its rays, one array per value, so that a register is filled by one load. Lanes of other rays have no range.
+  float near_bias[3][kGroup], far_bias[3][kGroup], begin[kGroup], end[kGroup];
+  /// Of all: what near and negated far planes are less, inverse directions' least and most, and as RayGroup::limits.
+  float origin[3][2], inverse[3][2], limits[2];
+  uint64_t rays;
+  uint32_t axis[3]; ///< Woop's k
+  bool one_axis;    ///< that is every ray's
+  bool stale;       ///< limits are
+
+  void set_tmax(uint32_t i, float t) {
+    end[i] = t;
+    stale = true;
+  }
+
+  /// After set_tmax().
+  void update_limits() {
+    stale = false;
+    Floats most, some;
+    read_block(most, &end[0]);
+    for (uint32_t first = kBlock; first < kGroup; first += kBlock) {
+      read_block(some, &end[first]);
+      keep_larger(most, some);
+    }
+    limits[1] = -most[0];
+    for (uint32_t i = 1; i < kBlock; ++i) limits[1] = -most[i] < limits[1] ? -most[i] : limits[1];
+  }
+};
+
+/// Rays that make a beam worth its setup, and of those at a node, testing them side by side.
+constexpr uint32_t kLeastBeam = 16, kLeastSideBySide = 12;
+
+/// Makes a beam of all of a group's rays. False where they have no origin or octant in common, or are few.
+/// @param group lanes of other rays get values of one of `rays`
+inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam& beam) {
+  if (static_cast<uint32_t>(__builtin_popcountll(rays)) < kLeastBeam) return false;
+  const auto first = static_cast<uint32_t>(__builtin_ctzll(rays));
+  for (uint32_t at = 0; at < kGroup; at += kBlock) {
+    Ints same = Ints{} - 1;
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+      Floats origin;
+      read_block(origin, &group.origin[axis][at]);
+      same &= origin == group.origin[axis][first];
+    }
+    if ((static_cast<uint32_t>(rays >> at) & 0xffu & ~lane_bits(same)) != 0) return false;
+  }
+  for (const uint64_t backward : group.backward)
+    if ((backward & rays) != 0 && (backward & rays) != rays) return false;
+  beam.rays = rays;
+  for (uint64_t m = ~rays; m != 0; m &= m - 1) {
+    const auto i = static_cast<uint32_t>(__builtin_ctzll(m));
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+      group.inverse[axis][i] = group.inverse[axis][first];
+      group.shear[axis][i] = group.shear[axis][first];
+      group.axis[axis][i] = group.axis[axis][first];
+      for (uint32_t side = 0; side < 2; ++side) group.bias[axis][i][side] = group.bias[axis][first][side];
+    }
+    group.limits[i][0] = group.limits[i][1] = __builtin_inff();
+  }
+  const auto split = [](const float(&pairs)[kGroup][2], uint32_t at, Floats& a, Floats& b) {
+    Floats low, high;
+    read_block(low, &pairs[at][0]);
+    read_block(high, &pairs[at + 4][0]);
+    a = __builtin_shuffle(low, high, Ints{0, 2, 4, 6, 8, 10, 12, 14});
+    b = __builtin_shuffle(low, high, Ints{1, 3, 5, 7, 9, 11, 13, 15});
+  };
+  float reach = max_coordinate;
+  for (uint32_t axis = 0; axis < 3; ++axis) reach = __builtin_fmaxf(reach, __builtin_fabsf(group.origin[axis][first]));
+  Ints same = Ints{} - 1;
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    Floats least = Floats{} + group.inverse[axis][first], most = least;
+    beam.axis[axis] = group.axis[axis][first];
+    for (uint32_t at = 0; at < kGroup; at += kBlock) {
+      Floats inverse, near, far;
+      read_block(inverse, &group.inverse[axis][at]);
+      keep_larger(most, inverse);
+      least = inverse < least ? inverse : least;
+      split(group.bias[axis], at, near, far);
+      write_block(&beam.near_bias[axis][at], near);
+      write_block(&beam.far_bias[axis][at], -far);
+      Ints k;
+      read_block(k, &group.axis[axis][at]);
+      same &= k == static_cast<int32_t>(beam.axis[axis]);
+    }
+    beam.inverse[axis][0] = least[0], beam.inverse[axis][1] = most[0];
+    for (uint32_t i = 1; i < kBlock; ++i) {
+      beam.inverse[axis][0] = __builtin_fminf(beam.inverse[axis][0], least[i]);
+      beam.inverse[axis][1] = __builtin_fmaxf(beam.inverse[axis][1], most[i]);
+    }
+    const float pad = least[0] < 0.0f ? -kBeamPad * reach : kBeamPad * reach; // outwards is towards the rays' origin
+    beam.origin[axis][0] = group.origin[axis][first] + pad, beam.origin[axis][1] = -group.origin[axis][first] + pad;
+  }
+  beam.one_axis = lane_bits(same) == 0xffu;
+  Floats least = Floats{} + __builtin_inff();
+  for (uint32_t at = 0; at < kGroup; at += kBlock) {
+    Floats begin, end;
+    split(group.limits, at, begin, end);
+    write_block(&beam.begin[at], begin);
+    write_block(&beam.end[at], -end);
+    least = begin < least ? begin : least;
+  }
+  beam.limits[0] = least[0];
+  for (uint32_t i = 1; i < kBlock; ++i) beam.limits[0] = __builtin_fminf(beam.limits[0], least[i]);
+  beam.update_limits();
+  return true;
+}
+
+/// Which of a node's boxes a beam as a whole may pass, and where it enters them.
+template <typename Lanes>
+inline uint32_t pass_beam(const GroupBoxes<Lanes>& boxes, const Beam& beam, float (&t)[baked::kNodeWidth]) {
+  using F = typename Lanes::F;
+  F begin = Lanes::set(beam.limits[0]), end = Lanes::set(-beam.limits[1]);
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    const F near = Lanes::sub(boxes.near[axis], Lanes::set(beam.origin[axis][0])),
+            far = Lanes::add(boxes.far[axis], Lanes::set(beam.origin[axis][1]));
+    const F least = Lanes::set(beam.inverse[axis][0]), most = Lanes::set(beam.inverse[axis][1]);
+    begin = Lanes::max(begin, Lanes::min(Lanes::mul(near, least), Lanes::mul(near, most)));
+    end = Lanes::min(end, Lanes::max(Lanes::mul(far, least), Lanes::mul(far, most)));
+  }
+  Lanes::store(t, begin);
+  return Lanes::less_equal(begin, end);
+}
+
+/// A child's near and far planes.
+struct BoxPlanes {
+  float near[3][baked::kNodeWidth], far[3][baked::kNodeWidth];
+};
+
+template <typename Lanes>
+inline void read_planes(const GroupBoxes<Lanes>& boxes, BoxPlanes& planes) {
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    Lanes::store(planes.near[axis], boxes.near[axis]);
+    Lanes::store(planes.far[axis], boxes.far[axis]);
+  }
+}
+
+/// The lanes of a register that begins with bit `first` of a word.
+template <typename Wide>
+inline uint32_t lanes_at(uint64_t rays, uint32_t first) {
+  return static_cast<uint32_t>(rays >> first) & ((1u << Wide::kLanes) - 1);
+}
+
+/// By child in `slots`: those of `rays` that pass its box, as bits. Returns the children that any passes.
+template <typename Wide>
+inline uint32_t pass_each(const BoxPlanes& planes, const RayGroup& group, const Beam& beam, uint64_t rays,
+                          uint32_t slots, uint64_t (&out)[baked::kNodeWidth]) {
+  using F = typename Wide::F;
+  for (uint64_t& word : out) word = 0;
+  for (uint32_t at = 0; at < kGroup; at += Wide::kLanes) {
+    if (lanes_at<Wide>(rays, at) == 0) continue;
+    const F ray_begin = Wide::load(&beam.begin[at]), ray_end = Wide::load(&beam.end[at]);
+    F inverse[3], near_bias[3], far_bias[3];
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+      inverse[axis] = Wide::load(&group.inverse[axis][at]);
+      near_bias[axis] = Wide::load(&beam.near_bias[axis][at]);
+      far_bias[axis] = Wide::load(&beam.far_bias[axis][at]);
+    }
+    for (uint32_t m = slots; m != 0; m &= m - 1) {
+      const auto slot = static_cast<uint32_t>(__builtin_ctz(m));
+      F begin = ray_begin, end = ray_end;
+      for (uint32_t axis = 0; axis < 3; ++axis) {
+        begin = Wide::max(begin, Wide::fma(Wide::set(planes.near[axis][slot]), inverse[axis], near_bias[axis]));
+        end = Wide::min(end, Wide::fma(Wide::set(planes.far[axis][slot]), inverse[axis], far_bias[axis]));
+      }
+      out[slot] |= uint64_t{Wide::less_equal(begin, end)} << at;
+    }
+  }
+  uint32_t used = 0;
+  for (uint32_t m = slots; m != 0; m &= m - 1) {
+    const auto slot = static_cast<uint32_t>(__builtin_ctz(m));
+    out[slot] &= rays;
+    used |= (out[slot] != 0 ? 1u : 0u) << slot;
+  }
+  return used;
+}
+
+/// The rays from lane `at` on that hit one triangle of a batch, as bits from 0 on.
+template <typename Wide>
+inline uint32_t test_rays(const DecodedBatch& batch, uint32_t triangle, const RayGroup& group, const Beam& beam,
+                          uint32_t at, uint32_t wanted, LaneHits<Wide>& hits, uint64_t& exact_count) {
+  const auto first = static_cast<uint32_t>(__builtin_ctzll(beam.rays));
+  const auto relative = [&](uint32_t k, uint32_t corner) {
+    return Wide::set(batch.vertex[beam.axis[k]][corner][triangle] - group.origin[beam.axis[k]][first]);
+  };
+  const RayLanes<Wide> lanes{
+      {Wide::load(&group.shear[0][at]), Wide::load(&group.shear[1][at]), Wide::load(&group.shear[2][at])},
+      Wide::load(&beam.begin[at]),
+      Wide::load(&beam.end[at])};
+  return test_lanes<Wide>(relative, lanes, wanted, hits, exact_count);
+}
+
+} // namespace
+} // namespace packtrace::packed
