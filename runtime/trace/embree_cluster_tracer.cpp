@@ -152,8 +152,7 @@ struct EmbreeClusterTracer::Trees {
     device.check();
     rtcSetGeometryUserPrimitiveCount(geometry.get(), tree.primitive_count());
     rtcSetGeometryUserData(geometry.get(), &tree);
-    rtcSetGeometryBoundsFunction(
-        geometry.get(), [](const auto* args) { cluster_bounds(args); }, nullptr);
+    rtcSetGeometryBoundsFunction(geometry.get(), cluster_bounds, nullptr);
     rtcSetGeometryIntersectFunction(geometry.get(), intersect_cluster);
     rtcSetGeometryOccludedFunction(geometry.get(), occluded_cluster);
     rtcSetGeometryMask(geometry.get(), kAllRays);
