@@ -3,11 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#if defined(__AVX512F__)
-#include <immintrin.h>
-#endif
-
 #include "runtime/trace/packed/kernel_types.h"
+#include "runtime/trace/packed/ray_vectors.h"
 
 /// Rays in the coordinates of one tree, with what box and triangle tests need of them.
 namespace packtrace::packed {
@@ -55,101 +52,6 @@ struct alignas(64) RayGroup {
   float tmax(uint32_t i) const { return -limits[i][1]; }
 };
 
-constexpr uint32_t kBlock = 8; ///< rays that are set up at once
-
-// The compiler's own vectors, a lane for each ray of a block, so that all instruction sets get the same from one
-// source.
-using Floats = float __attribute__((vector_size(4 * kBlock)));
-using Ints = int32_t __attribute__((vector_size(4 * kBlock)));
-// Doubles take as many registers as they need: the compiler splits larger vectors into single numbers.
-#if defined(__AVX512F__)
-constexpr uint32_t kDoubleLanes = 8;
-#else
-constexpr uint32_t kDoubleLanes = 4;
-#endif
-using DoublePart = double __attribute__((vector_size(8 * kDoubleLanes)));
-using LongPart = int64_t __attribute__((vector_size(8 * kDoubleLanes)));
-using FloatPart = float __attribute__((vector_size(4 * kDoubleLanes)));
-constexpr uint32_t kDoubleParts = kBlock / kDoubleLanes;
-
-struct Doubles {
-  DoublePart part[kDoubleParts];
-
-  double get(uint32_t lane) const { return part[lane / kDoubleLanes][lane % kDoubleLanes]; }
-  void set(uint32_t lane, double value) { part[lane / kDoubleLanes][lane % kDoubleLanes] = value; }
-};
-
-template <typename Function>
-inline Doubles each_part(Function function) {
-  Doubles result;
-#pragma GCC unroll 2
-  for (uint32_t i = 0; i < kDoubleParts; ++i) result.part[i] = function(i);
-  return result;
-}
-inline Doubles operator+(const Doubles& a, const Doubles& b) {
-  return each_part([&](uint32_t i) { return a.part[i] + b.part[i]; });
-}
-inline Doubles operator-(const Doubles& a, const Doubles& b) {
-  return each_part([&](uint32_t i) { return a.part[i] - b.part[i]; });
-}
-inline Doubles operator*(const Doubles& a, const Doubles& b) {
-  return each_part([&](uint32_t i) { return a.part[i] * b.part[i]; });
-}
-inline Doubles operator*(double a, const Doubles& b) {
-  return each_part([&](uint32_t i) { return a * b.part[i]; });
-}
-inline Doubles operator+(const Doubles& a, double b) {
-  return each_part([&](uint32_t i) { return a.part[i] + b; });
-}
-
-inline Doubles read_doubles(const float* p) {
-  return each_part([&](uint32_t i) {
-    FloatPart part;
-    __builtin_memcpy(&part, p + i * kDoubleLanes, sizeof part);
-    return __builtin_convertvector(part, DoublePart);
-  });
-}
-inline Floats to_floats(const Doubles& x) {
-#if defined(__AVX512F__)
-  return __builtin_convertvector(x.part[0], Floats);
-#else
-  return __builtin_shufflevector(__builtin_convertvector(x.part[0], FloatPart),
-                                 __builtin_convertvector(x.part[1], FloatPart), 0, 1, 2, 3, 4, 5, 6, 7);
-#endif
-}
-
-template <typename Vector, typename Element>
-inline void read_block(Vector& v, const Element* p) {
-  __builtin_memcpy(&v, p, sizeof v);
-}
-template <typename Vector, typename Element>
-inline void write_block(Element* p, const Vector& v) {
-  __builtin_memcpy(p, &v, sizeof v);
-}
-
-template <typename Vector>
-inline void keep_larger(Vector& a, const Vector& b) {
-  a = a > b ? a : b;
-}
-
-/// Turns rows into columns.
-inline void transpose(Floats (&rows)[kBlock]) {
-  static_assert(kBlock == 8);
-  Floats mixed[kBlock];
-  for (uint32_t distance = 4; distance > 0; distance /= 2) { // swaps off-diagonal quarters, of quarters, of those
-    for (uint32_t i = 0; i < kBlock; ++i) mixed[i] = rows[i];
-    const Ints low = distance == 4   ? Ints{0, 1, 2, 3, 8, 9, 10, 11}
-                     : distance == 2 ? Ints{0, 1, 8, 9, 4, 5, 12, 13}
-                                     : Ints{0, 8, 2, 10, 4, 12, 6, 14};
-    const Ints high = low + static_cast<int32_t>(distance);
-    for (uint32_t i = 0; i < kBlock; ++i)
-      if ((i & distance) == 0) {
-        rows[i] = __builtin_shuffle(mixed[i], mixed[i + distance], low);
-        rows[i + distance] = __builtin_shuffle(mixed[i], mixed[i + distance], high);
-      }
-  }
-}
-
 /// Reads a block of rays.
 /// @param numbers of the rays
 inline void read_rays(const KernelRay* rays, const uint32_t (&numbers)[kBlock], uint32_t first, UnitRays& out) {
@@ -164,35 +66,6 @@ inline void read_rays(const KernelRay* rays, const uint32_t (&numbers)[kBlock], 
   }
   write_block(&out.tnear[first], values[3]);
   write_block(&out.tmax[first], reinterpret_cast<Floats>(reinterpret_cast<Ints>(values[7]) - 1)); // the float below
-}
-
-/// The lanes whose condition is all ones, as bits.
-inline uint32_t lane_bits(const Ints& condition) {
-#if defined(__AVX2__)
-  return static_cast<uint32_t>(__builtin_ia32_movmskps256(reinterpret_cast<Floats>(condition)));
-#else
-  uint32_t bits = 0;
-  for (uint32_t i = 0; i < kBlock; ++i) bits |= (condition[i] != 0 ? 1u : 0u) << i;
-  return bits;
-#endif
-}
-
-/// The lanes in which low < x < high, as bits.
-inline uint32_t lanes_between(double low, const Doubles& x, double high) {
-  uint32_t bits = 0;
-  for (uint32_t i = 0; i < kDoubleParts; ++i) {
-    const LongPart inside = (x.part[i] > low) & (x.part[i] < high);
-#if defined(__AVX512F__)
-    bits = _mm512_movepi64_mask(reinterpret_cast<__m512i>(inside));
-#elif defined(__AVX2__)
-    bits |= static_cast<uint32_t>(__builtin_ia32_movmskpd256(reinterpret_cast<DoublePart>(inside)))
-            << (kDoubleLanes * i);
-#else
-    for (uint32_t lane = 0; lane < kDoubleLanes; ++lane)
-      bits |= (inside[lane] != 0 ? 1u : 0u) << (kDoubleLanes * i + lane);
-#endif
-  }
-  return bits;
 }
 
 /// A block of rays in a tree's grid, in doubles.

@@ -1,5 +1,6 @@
 #include "runtime/trace/packed/packed_tracer.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include <gtest/gtest.h>
@@ -74,6 +75,44 @@ TEST(PackedTracer, FindsTheSameWithAllInstructionSets) {
     const PackedTracer tracer(baked.file, baked.source, isa);
     EXPECT_EQ(std::memcmp(closest(tracer, rays).data(), expected.data(), rays.size() * sizeof(RayHit)), 0);
     EXPECT_EQ(any(tracer, rays), occluded);
+  }
+}
+
+/// Rays from one place in a cone, by neighbours, as cameras send them; some with ranges, some along axes' planes.
+std::vector<Ray> cone(const UnitSpace& space, const DVec3& from, const DVec3& towards, double width) {
+  std::vector<Ray> rays;
+  for (int i = 0; i < 64 * 64; ++i) {
+    const int block = i / 16, within = i % 16;
+    const double x = (block % 16 * 4 + within % 4 - 32) * width / 32,
+                 y = (block / 16 * 4 + within / 4 - 32) * width / 32;
+    Ray ray;
+    ray.origin = Vec3(space.to_unit(from));
+    ray.direction = Vec3(towards + DVec3(x, y, -0.5 * x));
+    if (i % 7 == 0) ray.tnear = static_cast<float>(space.scale() * 4.0);
+    if (i % 5 == 0) ray.tfar = static_cast<float>(space.scale() * 9.0);
+    rays.push_back(ray);
+  }
+  return rays;
+}
+
+TEST(PackedTracer, BeamsFindWhatTheirRaysFind) {
+  const BakedScene baked(varied_scene());
+  for (const PackedIsa isa : isas()) {
+    const PackedTracer tracer(baked.file, baked.source, isa);
+    size_t hits = 0;
+    for (const DVec3& from : {DVec3(0, 2, -7), DVec3(-2.5, 1, 0), DVec3(6, 3, 6)})
+      for (const DVec3& towards : {DVec3(0, 0, 1), DVec3(-0.6, -0.2, -0.7), DVec3(0.5, -0.5, 0.5)})
+        for (const double width : {0.05, 0.5, 3.0}) {
+          const std::vector<Ray> rays = cone(tracer.space(), from, towards, width);
+          const std::vector<RayHit> together = closest(tracer, rays);
+          std::vector<RayHit> alone(rays.size());
+          for (size_t i = 0; i < rays.size(); ++i)
+            tracer.closest_hits({&rays[i], 1}, kCameraRays, RayOrder::kCoherent, {&alone[i], 1});
+          EXPECT_EQ(std::memcmp(together.data(), alone.data(), rays.size() * sizeof(RayHit)), 0) << tracer.isa();
+          hits += static_cast<size_t>(
+              std::count_if(alone.begin(), alone.end(), [](const RayHit& hit) { return hit.valid(); }));
+        }
+    EXPECT_GT(hits, 30000u);
   }
 }
 
