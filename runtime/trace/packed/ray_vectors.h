@@ -110,8 +110,10 @@ inline uint32_t lane_bits(const Ints& condition) {
 #if defined(__AVX2__)
   return static_cast<uint32_t>(__builtin_ia32_movmskps256(reinterpret_cast<Floats>(condition)));
 #else
+  int32_t lanes[kBlock]; // a vector's own subscripts confuse GCC 12's warnings under sanitizers
+  write_block(lanes, condition);
   uint32_t bits = 0;
-  for (uint32_t i = 0; i < kBlock; ++i) bits |= (condition[i] != 0 ? 1u : 0u) << i;
+  for (uint32_t i = 0; i < kBlock; ++i) bits |= (lanes[i] != 0 ? 1u : 0u) << i;
   return bits;
 #endif
 }
