@@ -43,7 +43,7 @@ struct RenderOptions {
   bool ao_falloff_off = false;
   float ao_interreflection = 0.0f;
   uint64_t seed = 0;
-  std::string backend = "embree";
+  std::optional<std::string> backend; ///< without one, what suits the input
   std::optional<std::string> bvh;
   LodOptions lod;
 };
@@ -93,17 +93,27 @@ RenderConfig make_config(const SceneSource& source, const Camera& camera, const 
   return config;
 }
 
-TracerConfig tracer_config(const RenderOptions& options) {
-  TracerConfig config;
-  if (options.backend == "packed" || options.backend == "embree-clusters") {
-    if (options.bvh || options.fast_edges)
-      throw Error(ErrorKind::kUsage, "--bvh and --fast-edges are about Embree's own triangles, for backend embree");
-    config.backend = options.backend == "packed" ? Backend::kPacked : Backend::kEmbreeClusters;
-  } else if (options.backend == "vulkan") {
+/// @param baked whether the input is a .ptk file
+Backend choose_backend(const RenderOptions& options, bool baked) {
+  const bool about_embree = options.bvh || options.fast_edges;
+  if (!options.backend) return baked && !about_embree ? Backend::kPacked : Backend::kEmbree;
+  const std::string& name = *options.backend;
+  if (name == "embree") return Backend::kEmbree;
+  if (name == "vulkan")
     throw Error(ErrorKind::kUnsupported, "--backend vulkan is not there yet; use embree, packed or embree-clusters");
-  } else if (options.backend != "embree") {
-    throw Error(ErrorKind::kUsage, "--backend " + options.backend + ": there are embree, packed and embree-clusters");
-  }
+  if (name != "packed" && name != "embree-clusters")
+    throw Error(ErrorKind::kUsage, "--backend " + name + ": there are embree, packed and embree-clusters");
+  if (about_embree)
+    throw Error(ErrorKind::kUsage, "--bvh and --fast-edges are about Embree's own triangles, for backend embree");
+  if (name == "packed") return Backend::kPacked;
+  if (options.lod.error_px)
+    throw Error(ErrorKind::kUsage, "--lod-error is for the backends packed and embree, not for embree-clusters");
+  return Backend::kEmbreeClusters;
+}
+
+TracerConfig tracer_config(const RenderOptions& options, bool baked) {
+  TracerConfig config;
+  config.backend = choose_backend(options, baked);
   const std::string quality = options.bvh.value_or("medium");
   if (quality != "medium" && quality != "high")
     throw Error(ErrorKind::kUsage, "--bvh " + quality + ": there are medium and high");
@@ -191,7 +201,7 @@ void print(const nlohmann::json& r) {
 }
 
 int run(const RenderOptions& options, const GlobalOptions& globals) {
-  const TracerConfig backend = tracer_config(options);
+  tracer_config(options, false); // complains before the work
   if (!options.size.empty()) parse_size(options.size);
   validate(options.lod);
   JsonOutput json(globals.json, globals.force);
@@ -210,6 +220,7 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   }
   const SceneSource& source = detail ? *detail->source : *loaded.source;
 
+  const TracerConfig backend = tracer_config(options, loaded.baked.has_value());
   const Stopwatch building;
   progress.begin("bvh", 0);
   const std::unique_ptr<RayTracer> tracer = detail
@@ -270,8 +281,10 @@ void add_render_command(CLI::App& app, GlobalOptions& globals) {
                   "Share of light bounced back by what a ray hits, 0..1 (default 0: off)")
       ->type_name("RHO");
   verb.add_option("--seed", options->seed, "Seed of the sample pattern (default 0)")->type_name("N");
-  verb.add_option("--backend", options->backend,
-                  "What traces the rays: embree (the default), packed or embree-clusters")
+  verb.add_option(
+          "--backend", options->backend,
+          "What traces the rays: packed (the clusters' own bytes; the default for .ptk files), embree (floats; the\n"
+          "default for .pbrt files) or embree-clusters (Embree's tree over packed clusters)")
       ->type_name("NAME");
   verb.add_option("--bvh,--bvh-quality", options->bvh,
                   "Embree's tree: medium (the default), or high (slower to build, faster to trace)")

@@ -379,6 +379,10 @@ TEST(CommandLine, RenderNamesItsBackend) {
     for (const auto& [name, bytes] : report.at("resident_bytes").at("parts").items()) sum += bytes.get<uint64_t>();
     EXPECT_EQ(report.at("resident_bytes").at("tracing"), sum);
   };
+  ASSERT_EQ(render({}), 0);
+  check_report("packed"); // what a .ptk file is made for
+  ASSERT_EQ(render({"--bvh", "high"}), 0);
+  check_report("embree"); // whose option that is
   ASSERT_EQ(render({"--backend", "embree", "--bvh-quality", "high"}), 0);
   check_report("embree");
   ASSERT_EQ(render({"--backend", "embree-clusters"}), 0);
@@ -386,6 +390,7 @@ TEST(CommandLine, RenderNamesItsBackend) {
   EXPECT_EQ(render({"--backend", "fast"}), 2);
   EXPECT_EQ(render({"--backend", "packed", "--bvh", "high"}), 2);
   EXPECT_EQ(render({"--backend", "embree-clusters", "--fast-edges"}), 2);
+  EXPECT_EQ(render({"--backend", "embree-clusters", "--lod-error", "1"}), 2);
 }
 
 TEST(CommandLine, EveryTruncatedPrefixOfABakedFileIsRefused) {
