@@ -110,7 +110,7 @@ inline uint32_t lane_bits(const Ints& condition) {
 #if defined(__AVX2__)
   return static_cast<uint32_t>(__builtin_ia32_movmskps256(reinterpret_cast<Floats>(condition)));
 #else
-  int32_t lanes[kBlock]; // a vector's own subscripts confuse GCC 12's warnings under sanitizers
+  int32_t lanes[kBlock]; // a vector's own subscripts go wrong in GCC 12 under sanitizers
   write_block(lanes, condition);
   uint32_t bits = 0;
   for (uint32_t i = 0; i < kBlock; ++i) bits |= (lanes[i] != 0 ? 1u : 0u) << i;
@@ -129,8 +129,10 @@ inline uint32_t lanes_between(double low, const Doubles& x, double high) {
     bits |= static_cast<uint32_t>(__builtin_ia32_movmskpd256(reinterpret_cast<DoublePart>(inside)))
             << (kDoubleLanes * i);
 #else
+    int64_t lanes[kDoubleLanes]; // as above
+    write_block(lanes, inside);
     for (uint32_t lane = 0; lane < kDoubleLanes; ++lane)
-      bits |= (inside[lane] != 0 ? 1u : 0u) << (kDoubleLanes * i + lane);
+      bits |= (lanes[lane] != 0 ? 1u : 0u) << (kDoubleLanes * i + lane);
 #endif
   }
   return bits;
