@@ -150,7 +150,7 @@ TEST(BakedFile, DamageWithRightHashesIsRefusedOrHarmless) {
       constexpr std::array<uint8_t, 6> kValues = {0, 1, 0x7f, 0x80, 0xff, 0xfe};
       bytes[at] = static_cast<std::byte>(random.bits() % 2 ? kValues[random.bits() % 6] : random.bits() & 0xffu);
     }
-    rehash(bytes);
+    rehash<baked::FileHeader>(bytes);
     try {
       const BakedFile file = BakedFile::from_bytes(bytes);
       read_all(file);
@@ -172,7 +172,7 @@ TEST(BakedFile, MessagesNameWhatAndWhere) {
   const size_t at = header.sections[baked::kInstances].offset + 3 * sizeof(baked::InstanceRecord) +
                     offsetof(baked::InstanceRecord, geometry);
   baked.bytes[at] = std::byte{200};
-  rehash(baked.bytes);
+  rehash<baked::FileHeader>(baked.bytes);
   std::string message;
   EXPECT_EQ(open_kind(baked.bytes, &message), ErrorKind::kInput);
   EXPECT_EQ(message, "memory: damaged baked file: instance 3: geometry");

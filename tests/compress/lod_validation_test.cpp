@@ -159,7 +159,7 @@ TEST_F(LodValidation, DamageWithRightHashesIsRefusedOrHarmless) {
     const baked::SectionRecord& section = header.sections[kSections[random.bits() % 4]];
     const size_t at = static_cast<size_t>(section.offset) + random.bits() % static_cast<size_t>(section.bytes);
     bytes[at] = random.bits() % 2 ? static_cast<std::byte>(random.bits() & 0xffu) : bytes[at] ^ std::byte{1};
-    rehash(bytes);
+    rehash<baked::FileHeader>(bytes);
     try {
       const BakedFile file = BakedFile::from_bytes(bytes);
       for (uint32_t g = 0; g < file.base_geometry_count(); ++g) {

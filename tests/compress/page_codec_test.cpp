@@ -7,12 +7,12 @@
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
-#include <xxhash.h>
 
 #include "compress/bake/page_encoder.h"
 #include "compress/format/file_summary.h"
 #include "compress/format/page_decoder.h"
 #include "pbrt_import/scene/error.h"
+#include "tests/compress/file_hashes.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {
@@ -65,28 +65,6 @@ std::vector<baked::PageRecord> pages_of(const Bytes& bytes) {
   if (!pages.empty())
     std::memcpy(pages.data(), bytes.data() + sizeof(baked::PagedHeader), pages.size() * sizeof pages[0]);
   return pages;
-}
-
-/// Makes all hashes of the disk form right again where its sizes allow that.
-void rehash(Bytes& bytes) {
-  baked::PagedHeader header = header_of(bytes);
-  const size_t table = size_t{header.page_count} * sizeof(baked::PageRecord);
-  const uint64_t head =
-      sizeof header + table + header.head_disk_bytes + header.tail_disk_bytes + header.node_disk_bytes;
-  if (header.page_count < 1000 && header.head_disk_bytes < bytes.size() && header.tail_disk_bytes < bytes.size() &&
-      header.node_disk_bytes < bytes.size() && head <= bytes.size()) {
-    auto pages = pages_of(bytes);
-    size_t at = static_cast<size_t>(head);
-    for (baked::PageRecord& page : pages) {
-      if (page.disk_bytes > bytes.size() - at) break;
-      page.hash = XXH3_64bits(bytes.data() + at, page.disk_bytes);
-      at += page.disk_bytes;
-    }
-    if (table > 0) std::memcpy(bytes.data() + sizeof header, pages.data(), table);
-    header.table_hash = XXH3_64bits(bytes.data() + sizeof header, static_cast<size_t>(head) - sizeof header);
-  }
-  header.header_hash = XXH3_64bits(&header, offsetof(baked::PagedHeader, header_hash));
-  std::memcpy(bytes.data(), &header, sizeof header);
 }
 
 class PageCodecs : public testing::TestWithParam<PageCodec> {};
@@ -146,12 +124,7 @@ TEST_P(PageCodecs, WhatEncodersDoNotWriteIsStored) {
     const auto begin = static_cast<size_t>(view.bits() - reinterpret_cast<const uint8_t*>(file.bytes().data()));
     plain[begin + static_cast<size_t>(bits / 32 * 4 + 3)] |= std::byte{0x80};
   }
-  baked::FileHeader header;
-  std::memcpy(&header, plain.data(), sizeof header);
-  const XXH128_hash_t hash = XXH3_128bits(plain.data() + sizeof header, plain.size() - sizeof header);
-  header.content_hash = {hash.low64, hash.high64};
-  header.header_hash = XXH3_64bits(&header, offsetof(baked::FileHeader, header_hash));
-  std::memcpy(plain.data(), &header, sizeof header);
+  test::rehash<baked::FileHeader>(plain);
 
   const Bytes disk = encode_paged_file(BakedFile::from_bytes(plain), GetParam());
   EXPECT_EQ(pages_of(disk).at(0).form, static_cast<uint32_t>(PageCodec::kNone));
@@ -194,7 +167,7 @@ TEST_P(PageCodecs, DamageWithRightHashesIsRefusedOrHarmless) {
       constexpr std::array<uint8_t, 6> kValues = {0, 1, 0x7f, 0x80, 0xff, 0xfe};
       bytes[at] = static_cast<std::byte>(random.bits() % 2 ? kValues[random.bits() % 6] : random.bits() & 0xffu);
     }
-    rehash(bytes);
+    test::rehash_pages(bytes);
     try {
       // What decoding lets pass, the resident file's own content hash catches; without damage to the data it is equal.
       const BakedFile file = BakedFile::from_bytes(bytes);
@@ -216,7 +189,7 @@ TEST_P(PageCodecs, HugeClaimsAreRefusedBeforeMemoryIsTaken) {
     change(header, pages[0]);
     std::memcpy(bytes.data(), &header, sizeof header);
     std::memcpy(bytes.data() + sizeof header, pages.data(), pages.size() * sizeof pages[0]);
-    rehash(bytes);
+    test::rehash_pages(bytes);
     return open_kind(bytes) == ErrorKind::kInput;
   };
   constexpr uint64_t kHuge = uint64_t{1} << 62;

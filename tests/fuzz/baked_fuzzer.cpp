@@ -1,6 +1,6 @@
 // Baked files, resident and in disk form: decoding of pages, validation, and everything a reader can ask of a file that
-// passed it. Most changes to a file would only spoil its hashes, so each input is tried as it is, with the sizes and
-// hashes of header, table and pages made right, and with those of what its pages are decoded to made right, too.
+// passed it. Each input is tried as it is, with the sizes and hashes of header, table and pages made right, and with those
+// of what its pages are decoded to made right, too.
 
 #include <algorithm>
 #include <cmath>
@@ -8,61 +8,12 @@
 #include <span>
 #include <vector>
 
-#include <xxhash.h>
-
 #include "compress/format/baked_file.h"
 #include "compress/format/file_summary.h"
-#include "compress/format/page_codec.h"
-#include "pbrt_import/scene/error.h"
-#include "tests/fuzz/fuzz_target.h"
+#include "tests/fuzz/baked_input.h"
 
 namespace packtrace::fuzz {
 namespace {
-
-void make_resident_hashes_right(std::span<std::byte> bytes) {
-  baked::FileHeader header;
-  if (bytes.size() < sizeof header) return;
-  std::memcpy(&header, bytes.data(), sizeof header);
-  header.magic = baked::kMagic;
-  header.header_bytes = sizeof header;
-  header.file_bytes = bytes.size();
-  const XXH128_hash_t hash = XXH3_128bits(bytes.data() + sizeof header, bytes.size() - sizeof header);
-  header.content_hash = {hash.low64, hash.high64};
-  header.header_hash = XXH3_64bits(&header, offsetof(baked::FileHeader, header_hash));
-  std::memcpy(bytes.data(), &header, sizeof header);
-}
-
-/// Hashes of the pages where their sizes allow that, the last page ending with the file; then that of the table.
-void make_page_hashes_right(std::span<std::byte> bytes, baked::PagedHeader& header) {
-  const uint64_t limit = bytes.size();
-  const uint64_t table_bytes = uint64_t{header.page_count} * sizeof(baked::PageRecord);
-  if (header.head_disk_bytes > limit || header.tail_disk_bytes > limit || header.node_disk_bytes > limit) return;
-  const uint64_t data =
-      sizeof header + table_bytes + header.head_disk_bytes + header.tail_disk_bytes + header.node_disk_bytes;
-  if (data > limit) return;
-  std::byte* const table = bytes.data() + sizeof header;
-  uint64_t at = data;
-  for (uint32_t i = 0; i < header.page_count; ++i) {
-    baked::PageRecord page;
-    std::memcpy(&page, table + i * sizeof page, sizeof page);
-    if (i + 1 == header.page_count) page.disk_bytes = static_cast<uint32_t>(limit - at);
-    if (page.disk_bytes > limit - at) break;
-    page.hash = XXH3_64bits(bytes.data() + at, page.disk_bytes);
-    at += page.disk_bytes;
-    std::memcpy(table + i * sizeof page, &page, sizeof page);
-  }
-  header.table_hash = XXH3_64bits(table, static_cast<size_t>(data) - sizeof header);
-}
-
-void make_hashes_right(std::span<std::byte> bytes) {
-  baked::PagedHeader header;
-  if (!is_paged_file(bytes) || bytes.size() < sizeof header) return make_resident_hashes_right(bytes);
-  std::memcpy(&header, bytes.data(), sizeof header);
-  header.file_bytes = bytes.size();
-  make_page_hashes_right(bytes, header);
-  header.header_hash = XXH3_64bits(&header, offsetof(baked::PagedHeader, header_hash));
-  std::memcpy(bytes.data(), &header, sizeof header);
-}
 
 bool same_bits(const void* a, const void* b, size_t bytes) { return std::memcmp(a, b, bytes) == 0; }
 
@@ -133,6 +84,36 @@ void read_lod(const BakedFile& file, uint32_t geometry) {
   }
 }
 
+/// Every node but a tree's first is the child of one node, at most as deep as the record says; each triangle that some
+/// ray sees is in one leaf, of the tree of its geometry.
+void read_trees(const BakedFile& file) {
+  const BakedSections& sections = file.sections();
+  std::vector<std::vector<uint32_t>> leaves;
+  for (const baked::ClusterRecord& cluster : sections.clusters) leaves.emplace_back(cluster.triangle_count);
+  for (const baked::TreeRecord& tree : sections.trees) {
+    const auto nodes = sections.nodes.subspan(static_cast<size_t>(tree.first_node), tree.node_count);
+    std::vector<uint32_t> depth(nodes.size());
+    if (!depth.empty()) depth[0] = 1;
+    for (uint32_t n = 0; n < nodes.size(); ++n) {
+      require(depth[n] > 0 && depth[n] <= tree.depth && tree.depth <= baked::kMaxTreeDepth, "depth of a node");
+      uint32_t child = nodes[n].first_child, triangle = nodes[n].first_triangle;
+      for (const uint8_t kind : nodes[n].children)
+        if (kind == baked::kInnerChild) {
+          require(child > n && child < nodes.size() && depth[child] == 0, "child of a node");
+          depth[child++] = depth[n] + 1;
+        } else
+          for (uint32_t i = 0; i < kind; ++i) ++leaves.at(nodes[n].cluster).at(triangle++);
+    }
+  }
+  if (sections.trees.empty()) return;
+  for (uint32_t g = 0; g < file.geometries().size(); ++g) {
+    uint32_t c = static_cast<uint32_t>(file.geometries()[g].first_cluster);
+    for (uint32_t material_class = 0; material_class < 8; ++material_class)
+      for (uint32_t i = 0; i < file.geometries()[g].class_clusters[material_class]; ++i, ++c)
+        for (const uint32_t count : leaves[c]) require(count == ((material_class & 3) != 3), "leaf of a triangle");
+  }
+}
+
 void read_rest(const BakedFile& file) {
   for (uint32_t i = 0; i < file.instances().size(); ++i) {
     const Affine map = file.world_from_object(i);
@@ -160,21 +141,12 @@ void read_rest(const BakedFile& file) {
   require(summarize(file).bytes.total == file.file_bytes(), "summary of the file");
 }
 
-/// Calls read, which may refuse the file.
-template <class Read>
-void expect_read_or_refused(Read read) {
-  try {
-    read();
-  } catch (const Error& error) {
-    require(error.kind() == ErrorKind::kInput || error.kind() == ErrorKind::kUnsupported, "kind of error");
-  }
-}
-
 void read_baked(std::span<const std::byte> bytes) {
   expect_read_or_refused([&] {
     const BakedFile file = BakedFile::from_bytes(bytes);
     for (uint32_t g = 0; g < file.geometries().size(); ++g) read_geometry(file, g);
     for (uint32_t g = 0; g < file.base_geometry_count(); ++g) read_lod(file, g);
+    read_trees(file);
     read_rest(file);
   });
 }
@@ -184,7 +156,7 @@ void read_decoded_pages(std::span<const std::byte> bytes) {
   expect_read_or_refused([&] {
     DiskForm form;
     std::vector<std::byte> resident = expand_paged_file(bytes, "memory", form);
-    make_resident_hashes_right(resident);
+    repair_resident(resident);
     read_baked(resident);
   });
 }
@@ -197,7 +169,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const std::span bytes = std::as_bytes(std::span(data, size));
   read_baked(bytes);
   std::vector<std::byte> repaired(bytes.begin(), bytes.end());
-  make_hashes_right(repaired);
+  repair(repaired);
   read_baked(repaired);
   if (packtrace::is_paged_file(repaired)) read_decoded_pages(repaired);
   return 0;

@@ -1,4 +1,5 @@
-// Writes the baked forms of scenes of the import corpus, so that the baked corpus always has the current format.
+// Writes the baked forms of scenes of the import corpus, so that the baked corpus always has the current format: each
+// codec, with and without levels of detail, without trees; each encoding of normals and of textures where there are any.
 
 #include <cstdio>
 #include <exception>
@@ -16,7 +17,7 @@ namespace {
 
 using namespace packtrace;
 
-void bake_input(const std::filesystem::path& input, const std::filesystem::path& folder) {
+Scene read_scene(const std::filesystem::path& input) {
   std::ifstream in(input, std::ios::binary);
   const std::string text(std::istreambuf_iterator<char>(in), {});
   fuzz::SceneFilesFolder files;
@@ -25,29 +26,81 @@ void bake_input(const std::filesystem::path& input, const std::filesystem::path&
   options.tessellation_tolerance = 0.1; // small files make small changes matter
   Diagnostics diagnostics;
   Progress progress;
-  const ImportResult result = import_scene(files.write(text), options, diagnostics, progress);
-  const auto write = [&](PageCodec codec, LodUse lod, const std::string& ending) {
-    BakeConfig config;
-    config.lod = lod;
-    config.lod_min_triangles = 129; // of more than one cluster
-    config.purpose = baked::kShading;
-    config.textures = true;
-    config.codec = codec;
-    write_file_bytes(folder / (input.stem().string() + "." + ending),
-                     bake_to_bytes(result.scene, config, diagnostics, progress).bytes);
-  };
-  for (const PageCodec codec : {PageCodec::kNone, PageCodec::kFast, PageCodec::kSmall})
-    write(codec, LodUse::kOff, std::string(name_of(codec)));
-  write(PageCodec::kNone, LodUse::kAll, "lod");
+  return import_scene(files.write(text), options, diagnostics, progress).scene;
 }
+
+/// Writes FOLDER/NAME.ending files of one scene.
+class CorpusWriter {
+public:
+  CorpusWriter(const Scene& scene, std::filesystem::path stem) : scene_(scene), stem_(std::move(stem)) {
+    config_.lod_min_triangles = 129; // of more than one cluster
+    config_.purpose = baked::kShading;
+    config_.textures = true;
+  }
+
+  void write_all() const {
+    for (const PageCodec codec : {PageCodec::kNone, PageCodec::kFast, PageCodec::kSmall}) {
+      BakeConfig config = config_;
+      config.codec = codec;
+      write(config, std::string(name_of(codec)));
+      config.lod = LodUse::kAll;
+      write(config, std::string(name_of(codec)) + ".lod");
+    }
+    BakeConfig config = config_;
+    config.trees = false;
+    write(config, "treeless");
+    if (!scene_.textures.empty()) write_texture_codecs();
+    if (has_normals()) write_normal_encodings();
+  }
+
+private:
+  void write(const BakeConfig& config, const std::string& ending) const {
+    Diagnostics diagnostics;
+    Progress progress;
+    write_file_bytes(stem_.string() + "." + ending, bake_to_bytes(scene_, config, diagnostics, progress).bytes);
+  }
+
+  void write_texture_codecs() const {
+    for (size_t codec = 0; codec < kTextureCodecNames.size(); ++codec) {
+      BakeConfig config = config_;
+      config.texture_codec = static_cast<TextureCodec>(codec);
+      write(config, std::string(kTextureCodecNames[codec]));
+    }
+  }
+
+  void write_normal_encodings() const {
+    for (size_t encoding = 0; encoding < kNormalFormats.size(); ++encoding) {
+      BakeConfig config = config_;
+      config.normals = static_cast<NormalEncoding>(encoding);
+      config.keep_normals = true;
+      config.codec = encoding % 2 == 0 ? PageCodec::kFast : PageCodec::kSmall;
+      write(config, std::string(kNormalFormats[encoding].name));
+    }
+  }
+
+  bool has_normals() const {
+    for (const Mesh& mesh : scene_.meshes)
+      if (!mesh.normals.empty()) return true;
+    return false;
+  }
+
+  const Scene& scene_;
+  std::filesystem::path stem_;
+  BakeConfig config_;
+};
 
 } // namespace
 
 int main(int count, char** arguments) {
   try {
     if (count < 3) throw std::runtime_error("usage: make_baked_corpus FOLDER INPUT...");
-    std::filesystem::create_directories(arguments[1]);
-    for (int i = 2; i < count; ++i) bake_input(arguments[i], arguments[1]);
+    const std::filesystem::path folder = arguments[1];
+    std::filesystem::create_directories(folder);
+    for (int i = 2; i < count; ++i) {
+      const std::filesystem::path input = arguments[i];
+      const Scene scene = read_scene(input);
+      CorpusWriter(scene, folder / input.stem()).write_all();
+    }
     return 0;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());

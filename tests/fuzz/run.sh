@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Runs one fuzz target for a while, from the kept corpus and from what earlier runs found.
-# Usage: tests/fuzz/run.sh TARGET SECONDS [LIBFUZZER OPTION...]      TARGET: tokenizer import ply image baked
+# Usage: tests/fuzz/run.sh TARGET SECONDS [LIBFUZZER OPTION...]      TARGET: tokenizer import ply image baked trace
 # Prints executions, executions per second, coverage (edges and features) and corpus size as libFuzzer counts them.
 # Exit code 1: there is a finding, whose input is in build/fuzz/findings/TARGET. BUILD names another build folder.
 set -euo pipefail
@@ -21,7 +21,7 @@ log=$findings/log
 
 status=0
 UBSAN_OPTIONS=print_stacktrace=1 "$build/bin/packtrace_${target}_fuzzer" \
-  -max_total_time="$seconds" -timeout=5 -rss_limit_mb=1024 -max_len=8192 -print_final_stats=1 \
+  -max_total_time="$seconds" -timeout=5 -rss_limit_mb=1024 -max_len=16384 -print_final_stats=1 \
   -artifact_prefix="$findings/" "$@" "$grown" "${arguments[@]}" >"$log" 2>&1 || status=1
 grep -E '^(stat::|==|SUMMARY|finding:|artifact)|ERROR|runtime error|terminate called|what\(\)' "$log" || true
 grep -E '^#[0-9]+.* cov: ' "$log" | tail -n 1

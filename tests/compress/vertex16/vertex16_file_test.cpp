@@ -3,11 +3,11 @@
 #include <cstring>
 
 #include <gtest/gtest.h>
-#include <xxhash.h>
 
 #include "compress/bake/vertex16_export.h"
 #include "compress/format/texture_codec.h"
 #include "pbrt_import/scene/error.h"
+#include "tests/compress/file_hashes.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {
@@ -39,14 +39,6 @@ ErrorKind refusal(std::span<const std::byte> bytes) {
     return error.kind();
   }
   return ErrorKind::kCancelled;
-}
-
-void rehash(std::vector<std::byte>& bytes) {
-  const XXH128_hash_t hash = XXH3_128bits(bytes.data() + sizeof(Header), bytes.size() - sizeof(Header));
-  const std::array<uint64_t, 2> content = {hash.low64, hash.high64};
-  std::memcpy(bytes.data() + offsetof(Header, content_hash), content.data(), sizeof content);
-  const uint64_t header = XXH3_64bits(bytes.data(), offsetof(Header, header_hash));
-  std::memcpy(bytes.data() + offsetof(Header, header_hash), &header, sizeof header);
 }
 
 TEST(Vertex16File, EveryTruncatedPrefixAndTrailingBytesAreRefused) {
@@ -102,7 +94,7 @@ TEST(Vertex16File, DamageWithRightHashesIsRefusedOrHarmless) {
       constexpr std::array<uint8_t, 6> kValues = {0, 1, 0x7f, 0x80, 0xff, 0xfe};
       bytes[at] = static_cast<std::byte>(random.bits() % 2 ? kValues[random.bits() % 6] : random.bits() & 0xffu);
     }
-    rehash(bytes);
+    test::rehash<Header>(bytes);
     try {
       read_all(vertex16::validate(bytes, "test"));
       ++accepted;

@@ -1,0 +1,82 @@
+"""Compares what was decoded with a dump."""
+
+import array
+import sys
+
+from ptk.records import LOD_LEVEL
+from ptk.textures import read_texels
+
+
+class Differs(Exception):
+    """What was decoded is not what the dump holds."""
+
+
+class Dump:
+    """Takes arrays off a dump, little-endian and without gaps."""
+
+    def __init__(self, data):
+        self.data, self.at = data, 0
+
+    def take(self, code, count):
+        values = array.array(code)
+        size = count * values.itemsize
+        if self.at + size > len(self.data):
+            raise Differs("the dump is too short")
+        values.frombytes(self.data[self.at : self.at + size])
+        if sys.byteorder == "big":
+            values.byteswap()
+        self.at += size
+        return values
+
+
+def flat(tuples):
+    return [value for item in tuples for value in item]
+
+
+def require_equal(what, ours, theirs):
+    if len(ours) != len(theirs):
+        raise Differs(f"{what}: {len(ours)} values instead of {len(theirs)}")
+    for number, (a, b) in enumerate(zip(ours, theirs)):
+        if a != b:
+            raise Differs(f"{what}: value {number} is {a!r} instead of {b!r}")
+
+
+def compare(baked, meshes, dump):
+    """A dump: geometries (u32); for each vertices, triangles (u32), then lattice (3 i64 a vertex), positions, normals
+    (3 floats a vertex), uvs (2 floats), triangles (3 u32 each), material slots (u32 a triangle); instances (u32); for each
+    12 floats, a geometry (u32) and its materials by slot (u32 each); of all textures the texels (3 u8 each); for each
+    geometry that is no level itself the number of its levels (u32) and, where there are any, a threshold (float) and the cut for it: clusters
+    (u32), for each a geometry and a cluster of it (u32). All must be equal."""
+    require_equal("geometries", [len(meshes)], dump.take("I", 1))
+    for number, mesh in enumerate(meshes):
+        vertices, triangles = len(mesh.lattice), len(mesh.triangles)
+        what = f"geometry {number}: "
+        require_equal(what + "counts", [vertices, triangles], dump.take("I", 2))
+        require_equal(what + "lattice", flat(mesh.lattice), dump.take("q", 3 * vertices))
+        require_equal(what + "positions", flat(mesh.positions), dump.take("f", 3 * vertices))
+        require_equal(what + "normals", flat(mesh.normals), dump.take("f", 3 * vertices))
+        require_equal(what + "uvs", flat(mesh.uvs), dump.take("f", 2 * vertices))
+        require_equal(what + "triangles", flat(mesh.triangles), dump.take("I", 3 * triangles))
+        require_equal(what + "slots", mesh.slots, dump.take("I", triangles))
+    instances = baked.sections["instances"]
+    require_equal("instances", [len(instances)], dump.take("I", 1))
+    for number, instance in enumerate(instances):
+        require_equal(f"instance {number}", instance["world_from_object"], dump.take("f", 12))
+        require_equal(f"instance {number}", [instance["geometry"]], dump.take("I", 1))
+        materials = baked.instance_materials(instance)
+        require_equal(f"instance {number}: materials", materials, dump.take("I", len(materials)))
+    for number, texture in enumerate(baked.sections["textures"]):
+        texels = read_texels(texture, baked.sections["texture_bytes"][texture["first_byte"] :])
+        require_equal(f"texture {number}", texels, list(dump.take("B", 3 * texture["width"] * texture["height"])))
+    bases = [number for number, g in enumerate(baked.sections["geometries"]) if not g["flags"] & LOD_LEVEL]
+    for number in bases:
+        (levels,) = dump.take("I", 1)
+        require_equal(f"geometry {number}: levels", [len(baked.levels(number))], [levels])
+        if levels == 0:
+            continue
+        (threshold,) = dump.take("f", 1)
+        chosen = baked.cut(number, threshold)
+        require_equal(f"geometry {number}: cut", [len(chosen)], dump.take("I", 1))
+        require_equal(f"geometry {number}: cut", flat(chosen), dump.take("I", 2 * len(chosen)))
+    if dump.at != len(dump.data):
+        raise Differs("the dump holds more than the file")
