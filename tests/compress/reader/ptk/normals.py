@@ -16,11 +16,30 @@ class NormalEncoding:
     y_codes: int
 
     def decode(self, chart, x, y):
+        return getattr(self, "decode_" + self.family)(*self.canonical(chart, x, y))
+
+    def canonical(self, chart, x, y):
+        """The chart that holds the normal, and codes in their range."""
         if self.family == "axis":
             chart, x, y = self.fold(chart, x, y)
         chart = min(chart, self.charts - 1)
-        x, y = min(max(x, 0), self.x_codes - 1), min(max(y, 0), self.y_codes - 1)
-        return getattr(self, "decode_" + self.family)(chart, x, y)
+        return chart, min(max(x, 0), self.x_codes - 1), min(max(y, 0), self.y_codes - 1)
+
+    def code(self, chart, x, y):
+        return (chart * self.x_codes + x) * self.y_codes + y
+
+    def unfold(self, normal, chart):
+        """The inverse of fold(): the same around the face `chart`, or None where it is no neighbour."""
+        face, x, y = normal
+        if face == chart:
+            return normal
+        if self.family != "axis" or face // 2 == chart // 2:
+            return None
+        codes, along_x = self.x_codes, face // 2 == (chart // 2 + 1) % 3
+        height = y if along_x else x
+        distance = height if chart & 1 else codes - 1 - height
+        beyond = -1 - distance if face & 1 else codes + distance
+        return (chart, beyond, x) if along_x else (chart, y, beyond)
 
     def fold(self, chart, x, y):
         """From the cross of a face and its neighbours to the face that holds the normal."""

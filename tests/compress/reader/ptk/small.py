@@ -1,5 +1,244 @@
 """Pages of codec small."""
 
+from dataclasses import dataclass, field
+
+from ptk.canonical import pack
+from ptk.normal_guess import guess_normal, sum_of_face_normals
+from ptk.normals import NORMAL_ENCODINGS
+from ptk.rans import Values
+from ptk.records import BadFile
+
+RIGHT, LEFT, RESTART = 0, 1, 2
+NEW, FIRST_GUESS, SECOND_GUESS, OF_CLUSTER, OF_PAGE, CREASE = range(6)
+FULL = 128
+MAX_SPAN = 19
+
+
+@dataclass
+class Point:
+    """A place of the page. Border edges, newest first: those that begin here as (end, third corner), and the begins of
+    those that end here."""
+
+    place: tuple
+    outward: list = field(default_factory=list)
+    inward: list = field(default_factory=list)
+    cluster: int = -1  # the last one with a vertex here
+    vertex: int = 0  # the newest of that cluster's
+    normals: list = field(default_factory=list)  # the last two different ones, newest first
+
+    def ends(self):
+        return [end for end, _ in self.outward]
+
+
+@dataclass
+class Vertex:
+    point: int
+    before: tuple  # earlier corners, as vertices, of the triangle that brought it
+
+
+@dataclass
+class SmallCluster:
+    """What a cluster's values say; canonical.pack() makes record and streams of it."""
+
+    slot: int = 0
+    has_normals: int = 0
+    has_uvs: int = 0
+    triangle_count: int = FULL
+    chart: int = 0  # that normals are unfolded around; the number of charts: each has one
+    has_palette: int = 0
+    turns: list = field(default_factory=list)
+    corners: list = field(default_factory=list)  # one or three per triangle: (vertex, whether it is fresh)
+    triangles: list = field(default_factory=list)
+    places: list = field(default_factory=list)
+    normals: list = field(default_factory=list)  # (chart, x, y)
+    uvs: list = field(default_factory=list)
+
+
+def first_but(ends, other):
+    """The newest, or the one before it where that is `other`; None where there is none."""
+    newest, before = (ends + [None, None])[:2]
+    return newest if newest != other else before
+
+
+class PageDecoder:
+    def __init__(self, page):
+        self.values = Values(page)
+        self.points = []
+        self.number = 0
+        self.last = SmallCluster()
+        self.recent_new = (0, 0)  # whether the corner before the last, and the last, were new points
+        self.spans = [MAX_SPAN] * 3
+
+    def cluster(self, encoding):
+        self.encoding = encoding
+        self.c = SmallCluster()
+        self.vertices = []
+        self.header()
+        self.triangles()
+        self.c.places = [self.points[vertex.point].place for vertex in self.vertices]
+        if self.c.has_normals:
+            self.normals()
+        if self.c.has_uvs:
+            self.uvs()
+        self.last = self.c
+        self.number += 1
+        return self.c
+
+    def header(self):
+        c, values = self.c, self.values
+        c.slot = self.last.slot if values.flag("slot") else values.field(32)
+        c.has_normals = values.flag("normals", self.last.has_normals)
+        c.has_uvs = values.flag("uvs", self.last.has_uvs)
+        if not values.flag("full"):
+            c.triangle_count = 1 + values.field(7)
+        if c.has_normals:
+            c.chart = values.symbol("chart")
+            c.has_palette = values.flag("palette")
+
+    def triangles(self):
+        c = self.c
+        t, before = (), 0  # corners as vertices; the point of the corner before
+        recent = RESTART, RESTART
+        for i in range(c.triangle_count):
+            turn = RESTART
+            if i > 0:
+                a, b, last = (self.vertices[v].point for v in t)
+                open_right, open_left = last in self.points[b].ends(), a in self.points[last].ends()
+                turn = min(self.values.symbol("turn", c.has_normals, recent, open_right, open_left), RESTART)
+            c.turns.append(turn)
+            recent = recent[1], turn
+            if turn == RESTART:
+                t = self.first_triangle(before)
+            else:
+                p, q, o = (t[0], t[2], t[1]) if turn == LEFT else (t[2], t[1], t[0])
+                model = "strip", self.recent_new, turn == c.turns[-2]
+                t = p, q, self.third(p, q, self.vertices[o].point, self.vertices[o].point, model)
+            before = self.vertices[t[2]].point
+            c.triangles.append(t)
+            self.close_edges([self.vertices[v].point for v in t])
+
+    def first_triangle(self, before):
+        guesses, basis = (None, None), ()
+        if self.points:
+            guesses, basis = self.ends_at(before), (before,)
+        a = self.corner(guesses, basis, (), ("first", 0), 1)
+        p = self.vertices[a].point
+        b = self.corner(self.ends_at(p), (p,), (a,), ("first", 1), 2)
+        q = self.vertices[b].point
+        apex = next((third for end, third in self.points[q].outward if end == p), None)
+        return a, b, self.third(a, b, apex, p if apex is None else apex, ("first", 2), kind=3)
+
+    def ends_at(self, point):
+        """Begin of the newest border edge into a point, end of the newest one out of it."""
+        return first_but(self.points[point].inward, None), first_but(self.points[point].ends(), None)
+
+    def third(self, a, b, opposite, origin, model, kind=0):
+        p, q = self.vertices[a].point, self.vertices[b].point
+        guesses = first_but(self.points[q].inward, opposite), first_but(self.points[p].ends(), opposite)
+        return self.corner(guesses, (p, q, origin), (a, b), model, kind)
+
+    def corner(self, guesses, basis, before, model, kind):
+        """@return its vertex"""
+        values = self.values
+        state = tuple(self.state_of(guess) for guess in guesses)
+        if guesses[0] == guesses[1]:
+            state = state[0], "same"
+        naming = values.symbol(*model, state)
+        self.recent_new = self.recent_new[1], int(naming == NEW)
+        fresh = True
+        if naming == NEW:
+            point = self.new_point(basis)
+        elif naming in (FIRST_GUESS, SECOND_GUESS):
+            point = guesses[naming - FIRST_GUESS]
+            if self.points[point].cluster == self.number:
+                version = values.symbol("version")
+                fresh = version > 1
+                vertex = self.points[point].vertex if version == 0 else None
+                if version == 1:
+                    vertex = len(self.vertices) - 1 - values.magnitude("version back")
+        elif naming in (OF_CLUSTER, CREASE):
+            vertex = len(self.vertices) - 1 - values.magnitude("back", kind)
+            point = self.vertices[vertex].point
+            fresh = naming == CREASE
+        elif naming == OF_PAGE:
+            point = len(self.points) - 1 - values.magnitude("page back")
+        else:
+            raise BadFile("a corner without a name")
+        if fresh:
+            vertex = len(self.vertices)
+            self.vertices.append(Vertex(point, before))
+            self.points[point].cluster, self.points[point].vertex = self.number, vertex
+        self.c.corners.append((vertex, fresh))
+        return vertex
+
+    def state_of(self, guess):
+        if guess is None:
+            return "none"
+        return "here" if self.points[guess].cluster == self.number else "elsewhere"
+
+    def new_point(self, basis):
+        guess = (0, 0, 0)
+        if len(basis) == 1:
+            guess = self.points[basis[0]].place
+        if len(basis) == 3:
+            columns = list(zip(*(self.points[i].place for i in basis)))
+            guess = [p + q - o for p, q, o in columns]
+            self.spans = [min((max(column) - min(column)).bit_length(), MAX_SPAN) for column in columns]
+        place, surprise = [], 0
+        for g, span in zip(guess, self.spans):
+            off = self.values.difference("position", span, surprise)
+            place.append(g + off)
+            width = (~off if off < 0 else off).bit_length()
+            surprise = 0 if width == 0 else 1 if width + 2 < span else 2
+        self.points.append(Point(tuple(place)))
+        return len(self.points) - 1
+
+    def close_edges(self, t):
+        for begin, end, third in ((t[0], t[1], t[2]), (t[1], t[2], t[0]), (t[2], t[0], t[1])):
+            a, b = self.points[begin], self.points[end]
+            if end in a.inward and begin in b.ends():
+                a.inward.remove(end)
+                del b.outward[b.ends().index(begin)]
+            else:
+                a.outward = [(end, third)] + a.outward[:1]
+                b.inward = [begin] + b.inward[:1]
+
+    def normals(self):
+        c = self.c
+        sums = sum_of_face_normals(c.places, c.triangles)
+        last = 0
+        for number, vertex in enumerate(self.vertices):
+            point = self.points[vertex.point]
+            known = len(point.normals)
+            offered = list(dict.fromkeys(point.normals + [c.normals[v] for v in vertex.before]))
+            choice = self.values.symbol("normal", last, known, len(offered) - known)
+            last = 2 if choice > known else min(choice, 2)
+            normal = offered[choice - 1] if choice else self.coded_normal(guess_normal(self.encoding, sums[number]))
+            c.normals.append(normal)
+            if choice == 0 or choice > known or choice == 2:
+                point.normals = [normal] + point.normals[:1]
+
+    def coded_normal(self, guess):
+        chart, x, y = guess
+        values = self.values
+        if self.encoding.charts > 1 and values.flag("seam"):
+            chart = values.field(3)
+        dx = values.difference("normal x")
+        dy = values.difference("normal y", min((~dx if dx < 0 else dx).bit_length(), 15))
+        return self.encoding.canonical(chart, x + dx, y + dy)
+
+    def uvs(self):
+        last = 0, 0
+        for vertex in self.vertices:
+            base = self.c.uvs[vertex.before[0]] if vertex.before else last
+            last = tuple(b + self.values.difference("uv", axis) for axis, b in enumerate(base))
+            self.c.uvs.append(last)
+
 
 def decode_page(page, geometries):
-    raise NotImplementedError
+    """@param geometries of each cluster"""
+    decoder = PageDecoder(page)
+    clusters = [pack(decoder.cluster(NORMAL_ENCODINGS[geometry["normal_encoding"]]), geometry) for geometry in geometries]
+    if not decoder.values.whole():
+        raise BadFile("a page does not use up its bytes")
+    return clusters
