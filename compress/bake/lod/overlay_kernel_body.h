@@ -107,11 +107,11 @@ struct Sides4 {
   const auto at = [&](int i) __attribute__((always_inline))->const LanesIn& {
     return *reinterpret_cast<const LanesIn*>(from[i]);
   };
-  const Mask low = {0, 4, 2, 6}, high = {1, 5, 3, 7}, front = {0, 1, 4, 5}, back = {2, 3, 6, 7};
-  const Lanes a = __builtin_shuffle(at(0), at(1), low), b = __builtin_shuffle(at(0), at(1), high);
-  const Lanes c = __builtin_shuffle(at(2), at(3), low), d = __builtin_shuffle(at(2), at(3), high);
-  out.l0 = __builtin_shuffle(a, c, front), out.l1 = __builtin_shuffle(b, d, front);
-  out.l2 = __builtin_shuffle(a, c, back), out.height = __builtin_shuffle(b, d, back);
+  const Lanes v0 = at(0), v1 = at(1), v2 = at(2), v3 = at(3);
+  const Lanes a = __builtin_shufflevector(v0, v1, 0, 4, 2, 6), b = __builtin_shufflevector(v0, v1, 1, 5, 3, 7);
+  const Lanes c = __builtin_shufflevector(v2, v3, 0, 4, 2, 6), d = __builtin_shufflevector(v2, v3, 1, 5, 3, 7);
+  out.l0 = __builtin_shufflevector(a, c, 0, 1, 4, 5), out.l1 = __builtin_shufflevector(b, d, 0, 1, 4, 5);
+  out.l2 = __builtin_shufflevector(a, c, 2, 3, 6, 7), out.height = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
 
 [[gnu::always_inline]] inline uint32_t outside_of(const OverlayTask& task, uint32_t point) {

@@ -76,8 +76,8 @@ inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam
     Floats low, high;
     read_block(low, &pairs[at][0]);
     read_block(high, &pairs[at + 4][0]);
-    a = __builtin_shuffle(low, high, Ints{0, 2, 4, 6, 8, 10, 12, 14});
-    b = __builtin_shuffle(low, high, Ints{1, 3, 5, 7, 9, 11, 13, 15});
+    a = __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14);
+    b = __builtin_shufflevector(low, high, 1, 3, 5, 7, 9, 11, 13, 15);
   };
   float reach = max_coordinate;
   for (uint32_t axis = 0; axis < 3; ++axis) reach = __builtin_fmaxf(reach, __builtin_fabsf(group.origin[axis][first]));

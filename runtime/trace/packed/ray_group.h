@@ -137,8 +137,8 @@ inline bool approach(const TracePlacement& placement, double margin, GridBlock& 
 }
 
 inline void write_pairs(float (*out)[2], const Floats& a, const Floats& b) {
-  write_block(&out[0][0], __builtin_shuffle(a, b, Ints{0, 8, 1, 9, 2, 10, 3, 11}));
-  write_block(&out[4][0], __builtin_shuffle(a, b, Ints{4, 12, 5, 13, 6, 14, 7, 15}));
+  write_block(&out[0][0], __builtin_shufflevector(a, b, 0, 8, 1, 9, 2, 10, 3, 11));
+  write_block(&out[4][0], __builtin_shufflevector(a, b, 4, 12, 5, 13, 6, 14, 7, 15));
 }
 
 inline Floats magnitude(const Floats& x) { return reinterpret_cast<Floats>(reinterpret_cast<Ints>(x) & 0x7fffffff); }

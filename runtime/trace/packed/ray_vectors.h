@@ -87,22 +87,23 @@ inline void keep_larger(Vector& a, const Vector& b) {
   a = a > b ? a : b;
 }
 
+/// Of rows that are kDistance apart, swaps the off-diagonal parts.
+template <int kDistance, int... kLow>
+inline void swap_parts(Floats (&rows)[kBlock]) {
+  for (uint32_t i = 0; i < kBlock; ++i)
+    if ((i & kDistance) == 0) {
+      const Floats a = rows[i], b = rows[i + kDistance];
+      rows[i] = __builtin_shufflevector(a, b, kLow...);
+      rows[i + kDistance] = __builtin_shufflevector(a, b, (kLow + kDistance)...);
+    }
+}
+
 /// Turns rows into columns.
 inline void transpose(Floats (&rows)[kBlock]) {
   static_assert(kBlock == 8);
-  Floats mixed[kBlock];
-  for (uint32_t distance = 4; distance > 0; distance /= 2) { // swaps off-diagonal quarters, of quarters, of those
-    for (uint32_t i = 0; i < kBlock; ++i) mixed[i] = rows[i];
-    const Ints low = distance == 4   ? Ints{0, 1, 2, 3, 8, 9, 10, 11}
-                     : distance == 2 ? Ints{0, 1, 8, 9, 4, 5, 12, 13}
-                                     : Ints{0, 8, 2, 10, 4, 12, 6, 14};
-    const Ints high = low + static_cast<int32_t>(distance);
-    for (uint32_t i = 0; i < kBlock; ++i)
-      if ((i & distance) == 0) {
-        rows[i] = __builtin_shuffle(mixed[i], mixed[i + distance], low);
-        rows[i + distance] = __builtin_shuffle(mixed[i], mixed[i + distance], high);
-      }
-  }
+  swap_parts<4, 0, 1, 2, 3, 8, 9, 10, 11>(rows); // of quarters, of those, of those
+  swap_parts<2, 0, 1, 8, 9, 4, 5, 12, 13>(rows);
+  swap_parts<1, 0, 8, 2, 10, 4, 12, 6, 14>(rows);
 }
 
 /// The lanes whose condition is all ones, as bits.
