@@ -12,14 +12,21 @@ has no XXH3.
 
 import argparse
 import array
+import struct
 import sys
 import zlib
+
+sys.dont_write_bytecode = True  # nothing but the sources in their folder
 
 from ptk.checks import TreeCheck, check_levels
 from ptk.disk import expand, is_disk_form
 from ptk.dump import Differs, Dump, compare, flat
 from ptk.records import SECTIONS, BadFile
 from ptk.resident import BakedFile
+
+
+# Damage also shows as numbers that lead nowhere.
+NOT_A_FILE = (BadFile, OSError, ArithmeticError, LookupError, StopIteration, TypeError, ValueError, struct.error)
 
 
 def describe(baked, meshes):
@@ -54,7 +61,7 @@ def main():
         if arguments.expect:
             with open(arguments.expect, "rb") as file:
                 compare(baked, meshes, Dump(file.read()))
-    except (BadFile, OSError) as problem:
+    except NOT_A_FILE as problem:
         print(f"{arguments.file}: {problem}", file=sys.stderr)
         return 3
     except Differs as problem:
