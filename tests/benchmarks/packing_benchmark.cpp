@@ -119,8 +119,9 @@ Json measure_streams(const Mesh& mesh, PackedStreams streams, const std::vector<
   codecs.push_back(meshopt_codec(kZstdLevel));
   codecs.push_back(draco_codec());
   for (const PageCodec codec : {PageCodec::kNone, PageCodec::kFast, PageCodec::kSmall}) {
-    codecs.push_back(packtrace_codec(false, codec));
-    if (streams == PackedStreams::kAll && !mesh.uvs.empty()) codecs.push_back(packtrace_codec(true, codec));
+    codecs.push_back(packtrace_codec({codec, false, false}));
+    if (streams == PackedStreams::kPositions) codecs.push_back(packtrace_codec({codec, false, true}));
+    if (streams == PackedStreams::kAll && !mesh.uvs.empty()) codecs.push_back(packtrace_codec({codec, true, false}));
   }
   Json rows = Json::array();
   for (const PackingPrecision& precision : precisions)

@@ -60,9 +60,13 @@ std::unique_ptr<PackingCodec> meshopt_codec(int zstd_level);
 /// Draco's edgebreaker, compression level 10, explicit quantisation at the step; normals of 12, uvs of 14 bits.
 std::unique_ptr<PackingCodec> draco_codec();
 
-/// This project's file. Texture coordinates are kept as for a mask of 1024 x 1024 texels over [0,1]^2 if asked for,
-/// else dropped as for any scene without masks.
-std::unique_ptr<PackingCodec> packtrace_codec(bool keep_uvs, PageCodec codec);
+/// What this project's file is to hold.
+struct PacktraceFile {
+  PageCodec codec = PageCodec::kNone;
+  bool keep_uvs = false; ///< as for a mask of 1024 x 1024 texels over [0,1]^2, else none, as for any scene without masks
+  bool trees = false;    ///< for tracing; no other codec here has any
+};
+std::unique_ptr<PackingCodec> packtrace_codec(const PacktraceFile& wanted);
 
 /// Angle between two directions, degrees.
 double angle_degrees(Vec3 a, Vec3 b);

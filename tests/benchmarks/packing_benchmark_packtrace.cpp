@@ -31,21 +31,23 @@ Scene one_shape_scene(const Mesh& mesh, bool keep_uvs) {
 
 class PacktraceCodec : public PackingCodec {
 public:
-  PacktraceCodec(bool keep_uvs, PageCodec codec) : keep_uvs_(keep_uvs), codec_(codec) {}
+  explicit PacktraceCodec(const PacktraceFile& wanted) : wanted_(wanted) {}
 
   std::string name() const override {
-    return "packtrace, codec " + std::string(name_of(codec_)) + (keep_uvs_ ? ", uvs kept" : "");
+    return "packtrace, codec " + std::string(name_of(wanted_.codec)) + (wanted_.keep_uvs ? ", uvs kept" : "") +
+           (wanted_.trees ? ", with trees" : "");
   }
 
   size_t encode(const Mesh& mesh, const PackingPrecision& precision) override {
     BakeConfig config;
     config.precision_kind = PrecisionKind::kAbsolute;
     config.precision = precision.step;
-    config.codec = codec_;
+    config.codec = wanted_.codec;
+    config.trees = wanted_.trees;
     Diagnostics diagnostics;
     Progress progress;
     file_.reset();
-    baked_ = bake_to_bytes(one_shape_scene(mesh, keep_uvs_), config, diagnostics, progress);
+    baked_ = bake_to_bytes(one_shape_scene(mesh, wanted_.keep_uvs), config, diagnostics, progress);
     return baked_.bytes.size();
   }
 
@@ -56,7 +58,7 @@ public:
     const baked::GeometryRecord& geometry = file_->geometries()[0];
     decoded_.positions.resize(geometry.vertex_count);
     decoded_.normals.resize(geometry.vertex_count);
-    decoded_.uvs.resize(keep_uvs_ ? geometry.vertex_count : 0);
+    decoded_.uvs.resize(wanted_.keep_uvs ? geometry.vertex_count : 0);
     decoded_.triangles.resize(geometry.triangle_count);
     size_t vertex = 0, triangle = 0;
     for (uint32_t c = 0; c < geometry.cluster_count; ++c) {
@@ -77,14 +79,13 @@ public:
       errors.normal_max_degrees = baked_.report.max_normal_error_degrees;
       errors.normal_mean_degrees = baked_.report.mean_normal_error_degrees;
     }
-    if (keep_uvs_) errors.uv = baked_.report.max_uv_error;
+    if (wanted_.keep_uvs) errors.uv = baked_.report.max_uv_error;
     errors.lost_triangles = source.triangles.size() - decoded_.triangles.size();
     return errors;
   }
 
 private:
-  bool keep_uvs_;
-  PageCodec codec_;
+  PacktraceFile wanted_;
   BakedScene baked_;
   std::optional<BakedFile> file_;
   PlainMesh decoded_;
@@ -92,8 +93,8 @@ private:
 
 } // namespace
 
-std::unique_ptr<PackingCodec> packtrace_codec(bool keep_uvs, PageCodec codec) {
-  return std::make_unique<PacktraceCodec>(keep_uvs, codec);
+std::unique_ptr<PackingCodec> packtrace_codec(const PacktraceFile& wanted) {
+  return std::make_unique<PacktraceCodec>(wanted);
 }
 
 } // namespace packtrace
