@@ -137,11 +137,6 @@ Part part_of(const tinygltf::Model& model, const tinygltf::Primitive& primitive)
 
 using Face = std::array<LatticePoint, 3>;
 
-Face face_of(Face face) {
-  std::rotate(face.begin(), std::min_element(face.begin(), face.end()), face.end()); // keeps the winding
-  return face;
-}
-
 double step_of(const BakedFile& file, uint32_t geometry) {
   const baked::GeometryRecord& record = file.geometries()[geometry];
   return PositionGrid{record.step_mantissa, record.step_exponent}.step();
@@ -153,7 +148,7 @@ std::multiset<Face> faces_of(const BakedFile& file, uint32_t geometry) {
     const ClusterView view = file.cluster(geometry, c);
     for (uint32_t i = 0; i < view.triangle_count(); ++i) {
       const Triangle t = view.triangle(i);
-      faces.insert(face_of({view.lattice(t.x), view.lattice(t.y), view.lattice(t.z)}));
+      faces.insert(test::face_of<LatticePoint>({view.lattice(t.x), view.lattice(t.y), view.lattice(t.z)}));
     }
   }
   return faces;
@@ -172,33 +167,16 @@ std::multiset<Face> faces_of(const tinygltf::Model& model, const tinygltf::Mesh&
           face[static_cast<size_t>(corner)][static_cast<size_t>(axis)] = std::llround(steps);
           EXPECT_LT(std::abs(steps - std::round(steps)), 0.05);
         }
-      faces.insert(face_of(face));
+      faces.insert(test::face_of(face));
     }
   }
   return faces;
 }
 
-/// Flat and smooth parts, a masked and a textured material, an object placed twice with a mirror.
-Scene mixed_scene() {
-  Scene scene = test::scene_of(test::sphere_mesh(20));
-  AlphaMask mask;
-  mask.width = 64, mask.height = 32;
-  mask.uv_scale = Vec2(2.0f), mask.uv_offset = Vec2(0.25f);
-  mask.words.assign(2 * 32, 0x0f0f0f0fu);
-  scene.masks.push_back(mask);
-  scene.materials.push_back({"leaf", kAlphaMask, Vec3(0.5f), 0, kNoMask});
-  test::add_shape(scene, test::grid_mesh(40, 0.3f, true), test::translation({-3, 2, 1}), 1);
-  test::add_shape(scene, test::soup_mesh(300, 4));
-  scene.meshes.push_back(test::sphere_mesh(9));
-  scene.objects.push_back({"ball", {Shape{3, 0, false, DAffine(1.0)}, Shape{1, 1, true, test::scaling({2, 2, -2})}}});
-  for (const double x : {5.0, -5.0}) scene.instances.push_back({0, Affine(test::translation({x, 5, 5}))});
-  return scene;
-}
-
 class GltfCodecs : public testing::TestWithParam<bool> {};
 
 TEST_P(GltfCodecs, EveryTriangleStaysOnTheLattice) {
-  const BakedScene baked = test::bake(mixed_scene());
+  const BakedScene baked = test::bake(test::mixed_scene());
   const BakedFile file = BakedFile::from_bytes(baked.bytes);
   GltfConfig config;
   config.draco = GetParam();
@@ -221,7 +199,7 @@ INSTANTIATE_TEST_SUITE_P(All, GltfCodecs, testing::Bool());
 TEST(GltfExport, NormalsAndTextureCoordinatesAreWithinTheirBits) {
   BakeConfig bake;
   bake.keep_uvs = true;
-  const BakedScene baked = test::bake(mixed_scene(), bake);
+  const BakedScene baked = test::bake(test::mixed_scene(), bake);
   const BakedFile file = BakedFile::from_bytes(baked.bytes);
   const tinygltf::Model exact = parse(export_of(file, plain())), coded = parse(export_of(file));
   size_t normals = 0, uvs = 0;
@@ -275,7 +253,7 @@ TEST(GltfExport, WorldSpaceNeighboursDecodeToTheSameBits) {
 }
 
 TEST(GltfExport, MaterialsHaveMasksAndFlags) {
-  const BakedScene baked = test::bake(mixed_scene());
+  const BakedScene baked = test::bake(test::mixed_scene());
   const tinygltf::Model model = parse(export_of(BakedFile::from_bytes(baked.bytes)));
   const auto leaf =
       std::find_if(model.materials.begin(), model.materials.end(), [](const auto& m) { return m.name == "leaf"; });
@@ -298,7 +276,7 @@ TEST(GltfExport, MaterialsHaveMasksAndFlags) {
 }
 
 TEST(GltfExport, CamerasSeeTheSame) {
-  Scene scene = mixed_scene();
+  Scene scene = test::mixed_scene();
   Camera camera;
   camera.world_from_camera = *look_at({3, 4, -9}, {0.5, 0, 0}, {0, 1, 0});
   camera.fov_degrees = 50.0;
@@ -379,7 +357,7 @@ TEST(GltfExport, EmptyScenesAreFiles) {
 }
 
 TEST(GltfExport, BytesDoNotDependOnThreads) {
-  const BakedScene baked = test::bake(mixed_scene());
+  const BakedScene baked = test::bake(test::mixed_scene());
   const BakedFile file = BakedFile::from_bytes(baked.bytes);
   const GltfExport many = export_of(file);
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);

@@ -102,6 +102,26 @@ Scene scene_of(Mesh mesh, const DAffine& world_from_mesh) {
   return scene;
 }
 
+AlphaMask striped_mask() {
+  AlphaMask mask;
+  mask.width = 64, mask.height = 32;
+  mask.words.assign(2 * 32, 0x0f0f0f0fu);
+  return mask;
+}
+
+Scene mixed_scene() {
+  Scene scene = scene_of(sphere_mesh(20));
+  scene.masks.push_back(striped_mask());
+  scene.masks[0].uv_scale = Vec2(2.0f), scene.masks[0].uv_offset = Vec2(0.25f);
+  scene.materials.push_back({"leaf", kAlphaMask, Vec3(0.5f), 0, kNoMask});
+  add_shape(scene, grid_mesh(40, 0.3f, true), translation({-3, 2, 1}), 1);
+  add_shape(scene, soup_mesh(300, 4));
+  scene.meshes.push_back(sphere_mesh(9));
+  scene.objects.push_back({"ball", {Shape{3, 0, false, DAffine(1.0)}, Shape{1, 1, true, scaling({2, 2, -2})}}});
+  for (const double x : {5.0, -5.0}) scene.instances.push_back({0, Affine(translation({x, 5, 5}))});
+  return scene;
+}
+
 BakedScene bake(const Scene& scene, const BakeConfig& config) {
   Diagnostics diagnostics;
   Progress progress;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -34,6 +36,19 @@ DAffine scaling(DVec3 by);
 /// Adds the mesh as a world shape with its own material.
 Scene scene_of(Mesh mesh, const DAffine& world_from_mesh = DAffine(1.0));
 void add_shape(Scene& scene, Mesh mesh, const DAffine& world_from_mesh = DAffine(1.0), uint32_t material = 0);
+
+/// 64 x 32 texels in stripes of four.
+AlphaMask striped_mask();
+
+/// Flat and smooth parts, a material with a mask at scaled texture coordinates, an object placed twice, in part mirrored.
+Scene mixed_scene();
+
+/// The triangle from its least corner on, so that the same winding gives the same face.
+template <typename Corner>
+std::array<Corner, 3> face_of(std::array<Corner, 3> corners) {
+  std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end()), corners.end());
+  return corners;
+}
 
 /// Bakes with diagnostics thrown away.
 BakedScene bake(const Scene& scene, const BakeConfig& config = {});

@@ -6,10 +6,11 @@
 #include <cstring>
 #include <random>
 
-#include <zlib.h>
+#include <gtest/gtest.h>
 
 #include "pbrt_import/number.h"
 #include "pbrt_import/scene/error.h"
+#include "tests/pbrt_import/damaged_files.h"
 #include "tests/pbrt_import/scene_folder.h"
 
 namespace packtrace {
@@ -242,29 +243,15 @@ TEST(Escapes, KnownOnesAreReplacedOthersKept) {
   EXPECT_TRUE(unknown);
 }
 
-std::string gzipped(std::string_view text) {
-  z_stream z{};
-  EXPECT_EQ(deflateInit2(&z, 6, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY), Z_OK);
-  std::string packed(deflateBound(&z, static_cast<uLong>(text.size())) + 64, '\0');
-  z.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(text.data()));
-  z.avail_in = static_cast<uInt>(text.size());
-  z.next_out = reinterpret_cast<Bytef*>(packed.data());
-  z.avail_out = static_cast<uInt>(packed.size());
-  EXPECT_EQ(deflate(&z, Z_FINISH), Z_STREAM_END);
-  packed.resize(z.total_out);
-  deflateEnd(&z);
-  return packed;
-}
-
 TEST(InputFile, GzipMembersAreInflated) {
   const SceneFolder folder;
-  EXPECT_EQ(listing(open(folder, gzipped("Scale 1 ") + gzipped("2 3"))),
+  EXPECT_EQ(listing(open(folder, gzip("Scale 1 ") + gzip("2 3"))),
             "w:Scale@1:1 w:1@1:7 w:2@1:9 w:3@1:11 end@1:12 ");
 }
 
 TEST(InputFile, EveryTruncatedGzipIsAnError) {
   const SceneFolder folder;
-  const std::string packed = gzipped("Scale 1 2 3\nTranslate 4 5 6\n");
+  const std::string packed = gzip("Scale 1 2 3\nTranslate 4 5 6\n");
   for (size_t size = 2; size < packed.size(); ++size)
     EXPECT_THROW(listing(open(folder, packed.substr(0, size))), Error) << size;
   EXPECT_NO_THROW(listing(open(folder, packed)));
@@ -272,7 +259,7 @@ TEST(InputFile, EveryTruncatedGzipIsAnError) {
 
 TEST(InputFile, GzipBombsStopAtTheLimit) {
   const SceneFolder folder;
-  const std::filesystem::path file = folder.write("bomb", gzipped(std::string(1 << 20, ' ')));
+  const std::filesystem::path file = folder.write("bomb", gzip(std::string(1 << 20, ' ')));
   try {
     read_whole_file(file, 1000);
     FAIL() << "accepted";

@@ -232,10 +232,7 @@ TEST(LodFile, StoredErrorsAndSpheresAreNotSmallerThanTheBuilders) {
 /// Two materials of different classes, one with texture coordinates, and normals; twice in the scene.
 Scene mixed_scene() {
   Scene scene = scene_of(torus_mesh(24, 16));
-  AlphaMask mask;
-  mask.width = 64, mask.height = 32;
-  mask.words.assign(2 * 32, 0x0f0f0f0fu);
-  scene.masks.push_back(mask);
+  scene.masks.push_back(striped_mask());
   scene.materials.push_back({"leaf", kAlphaMask, Vec3(0.5f), 0, kNoMask});
   scene.meshes.push_back(grid_mesh(40, 0.3f, true));
   scene.meshes.push_back(half_faceted(torus_mesh(40, 30)));

@@ -168,10 +168,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, IndependentReaderOfAssets,
 /// Normals of every direction, few different normals, texture coordinates, single triangles, instances.
 Scene scene_of_every_stream() {
   Scene scene = test::scene_of(test::sphere_mesh(30));
-  AlphaMask mask;
-  mask.width = 64, mask.height = 32;
-  mask.words.assign(2 * 32, 0x0f0f0f0fu);
-  scene.masks.push_back(mask);
+  scene.masks.push_back(test::striped_mask());
   scene.materials.push_back({"leaf", kAlphaMask, Vec3(0.5f), 0, kNoMask});
   test::add_shape(scene, test::grid_mesh(40, 0.3f, true), test::translation({-3, 2, 1}), 1);
   Mesh faceted = test::grid_mesh(20, 0.4f);

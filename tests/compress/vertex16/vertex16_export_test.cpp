@@ -25,30 +25,8 @@ Vertex16Export export_of(const BakedFile& file) {
   return export_vertex16(file, progress);
 }
 
-/// Masks, flat and smooth parts, several materials, an object placed twice.
-Scene mixed_scene() {
-  Scene scene = test::scene_of(test::sphere_mesh(20));
-  AlphaMask mask;
-  mask.width = 64, mask.height = 32;
-  mask.words.assign(2 * 32, 0x0f0f0f0fu);
-  scene.masks.push_back(mask);
-  scene.materials.push_back({"leaf", kAlphaMask, Vec3(0.5f), 0, kNoMask});
-  test::add_shape(scene, test::grid_mesh(40, 0.3f, true), test::translation({-3, 2, 1}), 1);
-  test::add_shape(scene, test::soup_mesh(300, 4));
-  scene.meshes.push_back(test::sphere_mesh(9));
-  scene.objects.push_back({"ball", {Shape{3, 0, false, DAffine(1.0)}, Shape{1, 1, true, test::scaling({2, 2, -2})}}});
-  for (const double x : {5.0, -5.0}) scene.instances.push_back({0, Affine(test::translation({x, 5, 5}))});
-  return scene;
-}
-
 using Corner = std::tuple<float, float, float, float, float, float, float, float>;
 using Face = std::array<Corner, 3>;
-
-/// The triangle from its least corner on, so that the same winding gives the same face.
-Face face_of(std::array<Corner, 3> corners) {
-  std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end()), corners.end());
-  return corners;
-}
 
 /// All triangles of a geometry by material slot, as the baked file decodes them.
 std::multiset<std::pair<uint32_t, Face>> faces_of(const BakedFile& file, uint32_t geometry) {
@@ -63,7 +41,7 @@ std::multiset<std::pair<uint32_t, Face>> faces_of(const BakedFile& file, uint32_
         const Vec2 uv = view.has_uvs() ? view.uv(v) : Vec2(0.0f);
         corners[static_cast<size_t>(corner)] = {p.x, p.y, p.z, n.x, n.y, n.z, uv.x, uv.y};
       }
-      faces.insert({view.material_slot(), face_of(corners)});
+      faces.insert({view.material_slot(), test::face_of(corners)});
     }
   }
   return faces;
@@ -82,7 +60,7 @@ std::multiset<std::pair<uint32_t, Face>> faces_of(const Sections& s, uint32_t ge
         const Vec2 uv = vertex16::vertex16_uv(v, s.geometries[geometry].frame);
         corners[corner] = {p.x, p.y, p.z, n.x, n.y, n.z, uv.x, uv.y};
       }
-      faces.insert({draw.material_slot, face_of(corners)});
+      faces.insert({draw.material_slot, test::face_of(corners)});
     }
   }
   return faces;
@@ -91,7 +69,7 @@ std::multiset<std::pair<uint32_t, Face>> faces_of(const Sections& s, uint32_t ge
 TEST(Vertex16Export, HoldsTheSameTrianglesBitForBit) {
   BakeConfig config;
   config.normals = NormalEncoding::kAxis24;
-  const BakedFile file = BakedFile::from_bytes(test::bake(mixed_scene(), config).bytes);
+  const BakedFile file = BakedFile::from_bytes(test::bake(test::mixed_scene(), config).bytes);
   const Vertex16Export exported = export_of(file);
   const Sections s = vertex16::validate(exported.bytes, "test");
   ASSERT_EQ(s.geometries.size(), file.geometries().size());
@@ -119,14 +97,14 @@ TEST(Vertex16Export, HoldsTheSameTrianglesBitForBit) {
 TEST(Vertex16Export, LeavesOutLevelsOfDetail) {
   BakeConfig config;
   config.lod = LodUse::kAll;
-  const BakedFile without = BakedFile::from_bytes(test::bake(mixed_scene()).bytes);
-  const BakedFile with = BakedFile::from_bytes(test::bake(mixed_scene(), config).bytes);
+  const BakedFile without = BakedFile::from_bytes(test::bake(test::mixed_scene()).bytes);
+  const BakedFile with = BakedFile::from_bytes(test::bake(test::mixed_scene(), config).bytes);
   ASSERT_GT(with.geometries().size(), without.geometries().size());
   EXPECT_EQ(export_of(with).bytes, export_of(without).bytes);
 }
 
 TEST(Vertex16Export, VerticesAreDistinctAndDrawsMerged) {
-  const BakedFile file = BakedFile::from_bytes(test::bake(mixed_scene()).bytes);
+  const BakedFile file = BakedFile::from_bytes(test::bake(test::mixed_scene()).bytes);
   const Vertex16Export exported = export_of(file);
   const Sections s = vertex16::validate(exported.bytes, "test");
   for (const vertex16::GeometryRecord& g : s.geometries) {
@@ -149,7 +127,7 @@ TEST(Vertex16Export, OtherNormalsAreReencodedWithinTheCodesError) {
   for (const NormalEncoding encoding : {NormalEncoding::kOct32, NormalEncoding::kZsign32, NormalEncoding::kAxis16}) {
     BakeConfig config;
     config.normals = encoding;
-    const Vertex16Export exported = export_of(BakedFile::from_bytes(test::bake(mixed_scene(), config).bytes));
+    const Vertex16Export exported = export_of(BakedFile::from_bytes(test::bake(test::mixed_scene(), config).bytes));
     EXPECT_GT(exported.report.max_normal_error_degrees, 0.005);
     EXPECT_LE(exported.report.max_normal_error_degrees, format_of(NormalEncoding::kAxis24).max_error_degrees);
   }
@@ -197,7 +175,7 @@ TEST(Vertex16Export, ShiftIsTheLeastThatFits) {
 }
 
 TEST(Vertex16Export, ChartsAreMovedToTheFirstTileWhereTexturesRepeat) {
-  Scene scene = mixed_scene();
+  Scene scene = test::mixed_scene();
   Mesh& leaf = scene.meshes[1];
   for (Vec2& uv : leaf.uvs) uv += Vec2(500.0f, -300.0f);
   scene.masks[0].uv_scale = {2.0f, 1.0f};
@@ -282,7 +260,7 @@ TEST(Vertex16Export, SlotsTakeTheMaterialsOfAllInstances) {
 }
 
 TEST(Vertex16Export, BytesDoNotDependOnThreads) {
-  const BakedFile file = BakedFile::from_bytes(test::bake(mixed_scene()).bytes);
+  const BakedFile file = BakedFile::from_bytes(test::bake(test::mixed_scene()).bytes);
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
   const std::vector<std::byte> alone = export_of(file).bytes;
   const tbb::global_control many(tbb::global_control::max_allowed_parallelism, 8);

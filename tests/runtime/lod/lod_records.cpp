@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
+
+#include "compress/bake/lod/lod_encoder.h"
 
 namespace packtrace::test {
 namespace {
@@ -28,23 +31,11 @@ DVec3 random_point(Random& random, double half_size) {
 } // namespace
 
 LodRecords records_of(const BuiltLod& built) {
-  LodRecords out;
-  const double step = built.geometry.grid.step();
-  const auto up = [](double v) { return std::nextafter(static_cast<float>(v), kInfinite); };
-  for (const LodGroup& g : built.lod.groups) {
-    baked::LodGroupRecord record{};
-    for (size_t axis = 0; axis < 3; ++axis)
-      record.center[axis] = static_cast<float>(
-          (static_cast<double>(built.geometry.origin[axis]) + g.sphere.center[static_cast<int>(axis)]) * step);
-    record.radius = up(g.sphere.radius * step * (1.0 + 1e-6));
-    record.error = g.terminal ? kInfinite : up(g.error * step);
-    record.level = g.level;
-    out.groups.push_back(record);
-  }
-  for (const LodCluster& c : built.lod.clusters) {
-    out.links.push_back({c.group, c.generating_group});
-    out.cluster_triangles.push_back(c.range.triangle_count);
-  }
+  QuantizedGeometry geometry = built.geometry;
+  ClusterLod lod = built.lod;
+  EncodedLod encoded = encode_lod(geometry, lod);
+  LodRecords out{std::move(encoded.groups), std::move(encoded.links), {}};
+  for (const LodCluster& c : built.lod.clusters) out.cluster_triangles.push_back(c.range.triangle_count);
   return out;
 }
 

@@ -19,7 +19,7 @@ struct LodRecords {
   LodGeometry geometry() const { return {groups, links, cluster_triangles}; }
 };
 
-/// Of levels that were built, in object units.
+/// Of two and more levels that were built, of one material slot: else files order clusters anew.
 LodRecords records_of(const BuiltLod& built);
 
 /// A tree of groups that no mesh has: random errors and balls, each holding those below, some groups terminal.

@@ -1,0 +1,150 @@
+#include <filesystem>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/end_to_end/workbench.h"
+
+namespace packtrace::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST(CommandLine, RequirementsAreExplainedInSentencesAndAsData) {
+  const Workbench bench;
+  write_text(bench / "textured.pbrt", R"(WorldBegin
+Texture "checks" "spectrum" "checkerboard"
+Material "matte" "texture Kd" "checks"
+Shape "trianglemesh" "integer indices" [0 1 2 0 2 3] "point P" [0 0 0  1 0 0  1 1 0.3  0 1 0] "float uv" [0 0 1 0 1 1 0 1]
+WorldEnd
+)");
+  const std::string file = bench / "textured.ptk";
+  const CommandResult ao = run_packtrace({"bake", bench / "textured.pbrt", "-o", file, "-v"});
+  ASSERT_EQ(ao.exit_code, 0) << ao.err;
+  for (const char* sentence :
+       {"required for ao:", "uv dropped: no masked material, 2 triangles of 1 geometries, 32 bytes of source saved",
+        "normals: the source has none, 2 triangles of 1 geometries",
+        "materials: 1 of 1 in use, at most 1 in one geometry (0 bits); flags in use: albedo texture (1 of 12 bits), ao "
+        "looks at: none",
+        "triangles 2   instances 1   materials 1; normals: the source has none; uv dropped"})
+    EXPECT_NE(ao.out.find(sentence), std::string::npos) << sentence << "\n" << ao.out;
+
+  const CommandResult shading =
+      run_packtrace({"bake", bench / "textured.pbrt", "-o", file, "-q", "--force", "--for", "shading"});
+  ASSERT_EQ(shading.exit_code, 0) << shading.err;
+  const CommandResult info = run_packtrace({"info", file, "-v", "--json", "-"});
+  const auto requirements = nlohmann::json::parse(info.out).at("requirements");
+  EXPECT_EQ(requirements.at("for"), "shading");
+  EXPECT_EQ(requirements.at("streams").at(1).at("reason"), "texture");
+  EXPECT_EQ(requirements.at("streams").at(1).at("source_bytes"), 32);
+  EXPECT_GT(requirements.at("streams").at(1).at("stored_bytes"), 0);
+  EXPECT_EQ(requirements.at("geometries").at(0).at("reasons").at("uv"), nlohmann::json({"texture"}));
+  EXPECT_FALSE(nlohmann::json::parse(run_packtrace({"info", file, "--json", "-"}).out)
+                   .at("requirements")
+                   .contains("geometries"));
+  EXPECT_NE(run_packtrace({"info", file}).out.find("uv kept: textures look them up, 2 triangles"), std::string::npos);
+
+  EXPECT_EQ(run_packtrace({"bake", bench.scene(), "--dry-run", "--for", "beauty"}).exit_code, 2);
+  EXPECT_EQ(run_packtrace({"bake", bench.scene(), "--dry-run", "--keep", "uv,colours"}).exit_code, 2);
+}
+
+TEST(CommandLine, LevelsOfDetailAreReported) {
+  const Workbench bench;
+  write_text(bench / "ball.pbrt", "WorldBegin\nObjectBegin \"ball\"\nShape \"sphere\"\nObjectEnd\n"
+                                  "ObjectInstance \"ball\"\nTranslate 3 0 0\nObjectInstance \"ball\"\n"
+                                  "Translate 3 0 0\nShape \"paraboloid\"\nWorldEnd\n");
+  const std::string file = bench / "ball.ptk";
+  const auto bake = [&](std::vector<std::string> options) {
+    std::vector<std::string> arguments{"bake", bench / "ball.pbrt", "-o", file, "--force"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return run_packtrace(arguments);
+  };
+  const CommandResult instanced = bake({"--lod", "instanced", "--lod-levels", "3"});
+  ASSERT_EQ(instanced.exit_code, 0) << instanced.err;
+  EXPECT_NE(instanced.out.find("3 levels of detail of 1 geometries: "), std::string::npos) << instanced.out;
+  const auto lod = nlohmann::json::parse(run_packtrace({"info", file, "-v", "--json", "-"}).out).at("lod");
+  ASSERT_EQ(lod.at("levels").size(), 4u);
+  EXPECT_EQ(lod.at("geometries"), 1);
+  EXPECT_EQ(lod.at("by_geometry").at(0).at("name"), "ball");
+  EXPECT_EQ(lod.at("levels").at(0).at("max_error"), 0.0);
+  EXPECT_GT(lod.at("levels").at(3).at("max_error"), lod.at("levels").at(1).at("max_error"));
+  EXPECT_LT(lod.at("levels").at(1).at("triangles"), 0.6 * lod.at("triangles").get<double>());
+  EXPECT_NE(run_packtrace({"info", file}).out.find("levels of detail of 1 geometries"), std::string::npos);
+
+  ASSERT_EQ(bake({"--lod", "all"}).exit_code, 0);
+  EXPECT_EQ(nlohmann::json::parse(run_packtrace({"info", file, "--json", "-"}).out).at("lod").at("geometries"), 2);
+  ASSERT_EQ(bake({"--lod", "all", "--lod-min-triangles", "1000000"}).exit_code, 0);
+  EXPECT_TRUE(nlohmann::json::parse(run_packtrace({"info", file, "--json", "-"}).out).at("lod").is_null());
+
+  for (const auto& wrong : std::vector<std::vector<std::string>>{{"--lod", "some"},
+                                                                 {"--lod-levels", "3"},
+                                                                 {"--lod-min-triangles", "3"},
+                                                                 {"--resume", "x"},
+                                                                 {"--lod", "all", "--lod-levels", "0"},
+                                                                 {"--lod", "all", "--lod-levels", "32"}})
+    EXPECT_EQ(bake(wrong).exit_code, 2) << wrong.back();
+}
+
+TEST(CommandLine, ExistingOutputIsKeptWithoutForce) {
+  const Workbench bench;
+  bench.bake();
+  write_text(bench.baked(), "mine");
+  const CommandResult refused = run_packtrace({"bake", bench.scene(), "-o", bench.baked()});
+  EXPECT_EQ(refused.exit_code, 6);
+  EXPECT_NE(refused.err.find("--force"), std::string::npos) << refused.err;
+  EXPECT_EQ(read_text(bench.baked()), "mine");
+  EXPECT_EQ(run_packtrace({"bake", bench.scene(), "-o", bench.baked(), "--force"}).exit_code, 0);
+  EXPECT_NE(read_text(bench.baked()), "mine");
+}
+
+TEST(CommandLine, TheInputIsNeverOverwritten) {
+  const Workbench bench;
+  EXPECT_EQ(run_packtrace({"bake", bench.scene(), "-o", bench.scene(), "--force"}).exit_code, 2);
+  EXPECT_EQ(read_text(bench.scene()), small_scene_text());
+}
+
+TEST(CommandLine, AnEmptySceneSaysWhy) {
+  const Workbench bench;
+  std::string text = small_scene_text();
+  for (size_t at = text.find("Shape"); at != std::string::npos; at = text.find("Shape", at + 40))
+    text.insert(text.find('\n', at), " \"float alpha\" [0]");
+  write_text(bench / "clear.pbrt", text);
+  const CommandResult result = run_packtrace({"bake", bench / "clear.pbrt", "-o", bench.baked()});
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_NE(result.err.find("note:"), std::string::npos) << result.err;
+}
+
+TEST(CommandLine, MissingMeshIsOneLocatedErrorAndTheRestIsBaked) {
+  const Workbench bench;
+  std::string text = small_scene_text();
+  text.insert(text.find("WorldEnd"), "Shape \"plymesh\" \"string filename\" [\"gone.ply\"]\n");
+  write_text(bench / "holes.pbrt", text);
+  const CommandResult result =
+      run_packtrace({"bake", bench / "holes.pbrt", "-o", bench / "holes.ptk", "--json", bench / "holes.json"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.err.find("holes.pbrt:8:"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("gone.ply"), std::string::npos) << result.err;
+  EXPECT_EQ(nlohmann::json::parse(read_text(bench / "holes.json")).at("triangles").get<int>(), 4);
+  EXPECT_EQ(run_packtrace({"bake", bench / "holes.pbrt", "-o", bench / "strict.ptk", "--strict"}).exit_code, 3);
+  EXPECT_FALSE(fs::exists(bench / "strict.ptk"));
+}
+
+TEST(CommandLine, TheBakedFileIsTheSameForAnyThreadCount) {
+  const Workbench bench;
+  for (const char* threads : {"1", "2", "5"})
+    ASSERT_EQ(run_packtrace({"bake", bench.scene(), "-o", bench / threads, "--threads", threads, "-q"}).exit_code, 0);
+  EXPECT_EQ(read_text(bench / "1"), read_text(bench / "2"));
+  EXPECT_EQ(read_text(bench / "1"), read_text(bench / "5"));
+}
+
+TEST(CommandLine, DryRunReportsAndWritesNothing) {
+  const Workbench bench;
+  const CommandResult result = run_packtrace({"bake", bench.scene(), "-o", bench.baked(), "--dry-run", "--json", "-"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(nlohmann::json::parse(result.out).at("triangles").get<int>(), 4);
+  EXPECT_FALSE(fs::exists(bench.baked()));
+}
+
+} // namespace
+} // namespace packtrace::test
