@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "compress/format/baked_file.h"
+#include "runtime/trace/lod_source.h"
 #include "runtime/trace/packed/packed_tracer.h"
 #include "runtime/trace/packed_source.h"
 #include "tests/fuzz/baked_input.h"
@@ -16,8 +17,7 @@ namespace {
 
 constexpr size_t kRays = 48; // a group of 16 neighbours, and others that have less in common
 
-/// From within and around the scene, some through vertices of its first clusters, the last ones without direction or
-/// without an interval.
+/// From within and around the scene, the last ones without direction or without an interval.
 std::vector<Ray> rays_through(const UnitSpace& space, const Bounds& world) {
   const DVec3 lo = world.empty() ? DVec3(-1) : space.to_unit(DVec3(world.lo));
   const DVec3 hi = world.empty() ? DVec3(1) : space.to_unit(DVec3(world.hi));
@@ -40,7 +40,9 @@ std::vector<Ray> rays_through(const UnitSpace& space, const Bounds& world) {
   return rays;
 }
 
-void trace(const BakedFile& file, const PackedSource& source, PackedIsa isa) {
+/// @param Source PackedSource or LodSource
+template <class Source>
+void trace(const BakedFile& file, const Source& source, PackedIsa isa) {
   const PackedTracer tracer(file, source, isa);
   const std::vector<Ray> rays = rays_through(tracer.space(), source.world_bounds());
   std::vector<RayHit> hits(rays.size());
@@ -59,8 +61,29 @@ void trace(const BakedFile& file, const PackedSource& source, PackedIsa isa) {
         require(surface.triangle < source.counts(surface.geometry).triangles, "triangle of a hit");
         require(source.material_of(surface.placement->instance, surface.triangle) < source.materials().size(), "material");
         (void)source.shading_normal(surface.geometry, surface.triangle, Vec2(hits[i].u, hits[i].v));
+        (void)source.detail_of(surface.placement->instance, surface.triangle);
       }
     }
+}
+
+template <class Source>
+void trace(const BakedFile& file, const Source& source) {
+  for (const PackedIsa isa : {PackedIsa::kScalar, PackedIsa::kAvx2, PackedIsa::kAvx512})
+    if (isa_supported(isa)) trace(file, source, isa);
+}
+
+/// At details at which some groups pass and others do not.
+void trace_levels(const BakedFile& file, const PackedSource& source) {
+  const Bounds world = source.world_bounds();
+  const double size = world.empty() ? 0.0 : glm::length(DVec3(world.hi) - DVec3(world.lo));
+  if (file.sections().lod_levels.empty() || !std::isfinite(size) || size <= 0.0) return;
+  const std::vector<LodGeometry> geometries = lod_geometries(file);
+  const std::vector<LodInstance> instances = lod_instances(source);
+  LodSharing sharing(geometries, instances, {});
+  for (const double error_per_distance : {1e-3, 1e-1}) {
+    const LodPlan plan = sharing.plan({DVec3(world.hi) + DVec3(size), size * 1e-6, error_per_distance});
+    trace(file, LodSource(file, source, sharing, plan));
+  }
 }
 
 } // namespace
@@ -74,8 +97,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   fuzz::expect_read_or_refused([&] {
     const BakedFile file = BakedFile::from_bytes(repaired);
     const PackedSource source(file);
-    for (const PackedIsa isa : {PackedIsa::kScalar, PackedIsa::kAvx2, PackedIsa::kAvx512})
-      if (isa_supported(isa)) fuzz::trace(file, source, isa);
+    fuzz::trace(file, source);
+    fuzz::trace_levels(file, source);
   });
   return 0;
 }
