@@ -149,12 +149,6 @@ inline void read_planes(const GroupBoxes<Lanes>& boxes, BoxPlanes& planes) {
   }
 }
 
-/// The lanes of a register that begins with bit `first` of a word.
-template <typename Wide>
-inline uint32_t lanes_at(uint64_t rays, uint32_t first) {
-  return static_cast<uint32_t>(rays >> first) & ((1u << Wide::kLanes) - 1);
-}
-
 /// By child in `slots`: those of `rays` that pass its box, as bits. Returns the children that any passes.
 template <typename Wide>
 inline uint32_t pass_each(const BoxPlanes& planes, const RayGroup& group, const Beam& beam, uint64_t rays,
@@ -187,21 +181,6 @@ inline uint32_t pass_each(const BoxPlanes& planes, const RayGroup& group, const 
     used |= (out[slot] != 0 ? 1u : 0u) << slot;
   }
   return used;
-}
-
-/// The rays from lane `at` on that hit one triangle of a batch, as bits from 0 on.
-template <typename Wide>
-inline uint32_t test_rays(const DecodedBatch& batch, uint32_t triangle, const RayGroup& group, const Beam& beam,
-                          uint32_t at, uint32_t wanted, LaneHits<Wide>& hits, uint64_t& exact_count) {
-  const auto first = static_cast<uint32_t>(__builtin_ctzll(beam.rays));
-  const auto relative = [&](uint32_t k, uint32_t corner) {
-    return Wide::set(batch.vertex[beam.axis[k]][corner][triangle] - group.origin[beam.axis[k]][first]);
-  };
-  const RayLanes<Wide> lanes{
-      {Wide::load(&group.shear[0][at]), Wide::load(&group.shear[1][at]), Wide::load(&group.shear[2][at])},
-      Wide::load(&beam.begin[at]),
-      Wide::load(&beam.end[at])};
-  return test_lanes<Wide>(relative, lanes, wanted, hits, exact_count);
 }
 
 } // namespace

@@ -39,7 +39,8 @@ struct Beam;
 struct alignas(64) RayGroup {
   float bias[3][kGroup][2]; ///< a near plane p is passed at p inverse + the first, a far one at p inverse - the second
   float limits[kGroup][2];  ///< hits lie above the first and not beyond - the second
-  float inverse[3][kGroup]; ///< of the direction, never infinite
+  float begin[kGroup], end[kGroup]; ///< the same in arrays of their own
+  float inverse[3][kGroup];         ///< of the direction, never infinite
   float origin[3][kGroup];
   float shear[3][kGroup];   ///< Woop's S
   uint32_t axis[3][kGroup]; ///< Woop's k: x, y, z; z is the direction's largest component
@@ -48,8 +49,11 @@ struct alignas(64) RayGroup {
   double t_scale[kGroup];   ///< a power of two
   Beam* beam = nullptr;     ///< that all its rays make, see beam.h
 
-  void set_tmax(uint32_t i, float t) { limits[i][1] = -t; }
-  float tmax(uint32_t i) const { return -limits[i][1]; }
+  void set_tmax(uint32_t i, float t) {
+    limits[i][1] = -t;
+    end[i] = t;
+  }
+  float tmax(uint32_t i) const { return end[i]; }
 };
 
 /// Reads a block of rays.
@@ -153,7 +157,10 @@ inline void set_boxes(const GridBlock& block, const UnitRays& from, float max_co
   }
   const Doubles t_near = read_doubles(&from.tnear[first]) * block.power - block.begin;
   const Doubles t_max = read_doubles(&from.tmax[first]) * block.power - block.begin;
-  write_pairs(&group.limits[first], to_floats(t_near), -to_floats(t_max));
+  const Floats begin = to_floats(t_near), end = to_floats(t_max);
+  write_pairs(&group.limits[first], begin, -end);
+  write_block(&group.begin[first], begin);
+  write_block(&group.end[first], end);
   write_block(&group.t_begin[first], block.begin);
   write_block(&group.t_scale[first], block.scale);
   for (uint32_t axis = 0; axis < 3; ++axis) {

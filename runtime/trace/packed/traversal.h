@@ -88,6 +88,8 @@ private:
       trace_top();
     else if (scene_.placement_count > 0)
       trace_placement(0, alive_);
+    if constexpr (kAny)
+      for (uint32_t i = 0; i < count; ++i) occluded_[numbers[i]] = ((alive_ >> i) & 1u) ^ 1u;
   }
 
   /// Calls visit(rays, octant) for the rays of each octant.
@@ -286,38 +288,74 @@ private:
       const DecodedBatch& batch = decoded(cluster, first, count);
       if constexpr (kCount) counters_->triangles += count_ones(rays) * batch.count;
       const Place place{placement, cluster, first};
-      const bool beam = !kAny && group.beam != nullptr && group.beam->one_axis;
-      test_each(batch, place, group, beam ? test_side_by_side(batch, place, group, rays) : rays);
+      const BatchNormals normals = batch_normals<Lanes>(batch);
+      if (kAny && (scene_.clusters[cluster].flags & kMasked) == 0)
+        meet(batch, normals, group, rays);
+      else
+        test_each(batch, normals, place, group, test_side_by_side(batch, normals, place, group, rays));
       rays &= alive_;
       first += batch.count;
       count -= batch.count;
     }
   }
 
+  /// Woop's axes of the rays in some lanes. False where they differ.
+  template <typename Wide>
+  static bool same_axes(const RayGroup& group, uint32_t at, uint32_t wanted, uint32_t (&axis)[3]) {
+    const uint32_t first = at + static_cast<uint32_t>(__builtin_ctz(wanted));
+    for (uint32_t k = 0; k < 3; ++k) axis[k] = group.axis[k][first];
+    return (Wide::equal(&group.axis[2][at], axis[2]) & wanted) == wanted;
+  }
+
+  /// Of any hits that need no look into a mask: nothing depends on what came of one ray.
+  void meet(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group, uint64_t rays) {
+    using Wide = typename Lanes::Wide;
+    uint64_t hit = 0, exact = 0;
+    for (uint32_t at = 0; at < kGroup; at += Wide::kLanes) {
+      const uint32_t wanted = lanes_at<Wide>(rays, at);
+      uint32_t axis[3];
+      if (count_ones(wanted) < batch.count || !same_axes<Wide>(group, at, wanted, axis)) continue;
+      rays &= ~(uint64_t{wanted} << at);
+      LaneHits<Wide> hits;
+      for (uint32_t triangle = 0; triangle < batch.count; ++triangle)
+        hit |= uint64_t{test_rays<Wide, false>(batch, normals, triangle, group, axis, at, wanted, hits, exact)} << at;
+    }
+    LaneHits<Lanes> hits;
+    for (uint64_t m = rays; m != 0; m &= m - 1) {
+      const uint32_t lanes = test_triangles<Lanes, false>(batch, normals, group, first_bit(m), hits, exact);
+      hit |= lanes != 0 ? m & (0 - m) : 0;
+    }
+    if constexpr (kCount) counters_->exact_triangles += exact;
+    alive_ &= ~hit;
+  }
+
   /// One ray after the other.
-  void test_each(const DecodedBatch& batch, const Place& place, RayGroup& group, uint64_t rays) {
+  void test_each(const DecodedBatch& batch, const BatchNormals& normals, const Place& place, RayGroup& group,
+                 uint64_t rays) {
     for (uint64_t m = rays; m != 0; m &= m - 1) {
       const uint32_t i = first_bit(m);
       LaneHits<Lanes> hits;
       uint64_t exact = 0;
-      const uint32_t lanes = test_triangles<Lanes>(batch, group, i, hits, exact);
+      const uint32_t lanes = test_triangles<Lanes, true>(batch, normals, group, i, hits, exact);
       if constexpr (kCount) counters_->exact_triangles += exact;
       if (lanes != 0) take_hits(place, i, hits, lanes, group);
     }
   }
 
   /// One triangle after the other, where enough rays fill a register. Returns the other rays.
-  uint64_t test_side_by_side(const DecodedBatch& batch, Place place, RayGroup& group, uint64_t rays) {
+  uint64_t test_side_by_side(const DecodedBatch& batch, const BatchNormals& normals, Place place, RayGroup& group,
+                             uint64_t rays) {
     using Wide = typename Lanes::Wide;
     const uint32_t begin = place.triangle;
     for (uint32_t at = 0; at < kGroup; at += Wide::kLanes) {
       const uint32_t wanted = lanes_at<Wide>(rays, at);
-      if (count_ones(wanted) < batch.count) continue;
+      uint32_t axis[3];
+      if (count_ones(wanted) < batch.count || !same_axes<Wide>(group, at, wanted, axis)) continue;
       rays &= ~(uint64_t{wanted} << at);
       for (uint32_t triangle = 0; triangle < batch.count; ++triangle) {
         LaneHits<Wide> hits;
         uint64_t exact = 0;
-        uint32_t lanes = test_rays<Wide>(batch, triangle, group, *group.beam, at, wanted, hits, exact);
+        uint32_t lanes = test_rays<Wide, true>(batch, normals, triangle, group, axis, at, wanted, hits, exact);
         if constexpr (kCount) counters_->exact_triangles += exact;
         place.triangle = begin + triangle;
         for (; lanes != 0; lanes &= lanes - 1) {
@@ -361,7 +399,6 @@ private:
         !scene_.present(scene_.owner, place.placement, place.cluster, place.triangle, u, v, ray_class_))
       return false;
     if constexpr (kAny) {
-      occluded_[numbers_[i]] = 1;
       alive_ &= ~(uint64_t{1} << i);
     } else {
       nearer_ |= uint64_t{1} << i;
