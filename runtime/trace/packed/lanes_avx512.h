@@ -15,6 +15,11 @@ struct Avx512Lanes {
   static F load(const float* p) { return _mm512_loadu_ps(p); }
   static void store(float* p, F a) { _mm512_storeu_ps(p, a); }
   static F set(float x) { return _mm512_set1_ps(x); }
+  /// Eight numbers in both halves, and one of two numbers in each.
+  static F twice(const float* p) { return _mm512_broadcast_f32x8(_mm256_loadu_ps(p)); }
+  static F two(const float* p, uint32_t a, uint32_t b) {
+    return _mm512_mask_broadcastss_ps(_mm512_set1_ps(p[a]), 0xff00, _mm_load_ss(p + b));
+  }
   static F add(F a, F b) { return _mm512_add_ps(a, b); }
   static F sub(F a, F b) { return _mm512_sub_ps(a, b); }
   static F mul(F a, F b) { return _mm512_mul_ps(a, b); }

@@ -44,6 +44,7 @@ struct alignas(64) RayGroup {
   float origin[3][kGroup];
   float shear[3][kGroup];   ///< Woop's S
   uint32_t axis[3][kGroup]; ///< Woop's k: x, y, z; z is the direction's largest component
+  uint64_t major[3];        ///< rays whose k begins with x, y, z, as bits
   uint64_t backward[3];     ///< rays along which x, y, z decrease, as bits
   double t_begin[kGroup];   ///< unit-space t = (t here + t_begin) t_scale
   double t_scale[kGroup];   ///< a power of two
@@ -181,6 +182,9 @@ inline void set_shears(const GridBlock& block, uint32_t first, RayGroup& group) 
   const Ints by_z = (az >= ax) & (az >= ay), by_y = ~by_z & (ay >= ax);
   const Floats along = by_z ? z : by_y ? y : x;
   const Ints zero{};
+  group.major[0] |= uint64_t{lane_bits(by_z)} << first;
+  group.major[1] |= uint64_t{lane_bits(~by_z & ~by_y)} << first;
+  group.major[2] |= uint64_t{lane_bits(by_y)} << first;
   write_block(&group.axis[0][first], by_z ? zero : by_y ? zero + 2 : zero + 1);
   write_block(&group.axis[1][first], by_z ? zero + 1 : by_y ? zero : zero + 2);
   write_block(&group.axis[2][first], by_z ? zero + 2 : by_y ? zero + 1 : zero);
@@ -197,6 +201,7 @@ inline uint64_t enter(const TracePlacement& placement, float max_coordinate, con
                       RayGroup& group) {
   uint64_t entered = 0;
   for (uint64_t& backward : group.backward) backward = 0;
+  for (uint64_t& major : group.major) major = 0;
   for (uint32_t first = 0; first < kGroup; first += kBlock) {
     const auto wanted = static_cast<uint32_t>(rays >> first) & 0xffu;
     if (wanted == 0) continue;

@@ -320,6 +320,22 @@ private:
       for (uint32_t triangle = 0; triangle < batch.count; ++triangle)
         hit |= uint64_t{test_rays<Wide, false>(batch, normals, triangle, group, axis, at, wanted, hits, exact)} << at;
     }
+    if constexpr (Wide::kLanes == 16) {
+      const uint32_t wanted = ((1u << batch.count) - 1) * 0x101u;
+      for (uint32_t k = 0; k < 3; ++k) {
+        uint64_t m = rays & group.major[k];
+        if ((m & (m - 1)) == 0) continue;
+        const BatchPairs<Wide> pairs(batch, normals, k);
+        do {
+          const uint64_t rest = m & (m - 1);
+          const uint32_t lanes = pairs.test(group, first_bit(m), first_bit(rest), wanted, exact);
+          hit |= (lanes & 0xffu) != 0 ? m & (0 - m) : 0;
+          hit |= (lanes >> 8) != 0 ? rest & (0 - rest) : 0;
+          m = rest & (rest - 1);
+        } while ((m & (m - 1)) != 0);
+        rays = (rays & ~group.major[k]) | m;
+      }
+    }
     LaneHits<Lanes> hits;
     for (uint64_t m = rays; m != 0; m &= m - 1) {
       const uint32_t lanes = test_triangles<Lanes, false>(batch, normals, group, first_bit(m), hits, exact);

@@ -149,6 +149,34 @@ inline uint32_t test_triangles(const DecodedBatch& batch, const BatchNormals& no
   return test_lanes<Lanes, kWeights>(relative, normal, lanes, (1u << batch.count) - 1, hits, exact_count);
 }
 
+/// Twice the triangles of a batch, in registers of 16 lanes, with the axes of rays whose k begins with k[0].
+template <typename Pair>
+struct BatchPairs {
+  typename Pair::F vertex[3][3], normal[3];
+  uint32_t k[3];
+
+  BatchPairs(const DecodedBatch& batch, const BatchNormals& normals, uint32_t first)
+      : k{first, first == 2 ? 0 : first + 1, first == 0 ? 2 : first - 1} {
+    for (uint32_t i = 0; i < 3; ++i) {
+      normal[i] = Pair::twice(normals.normal[k[i]]);
+      for (uint32_t corner = 0; corner < 3; ++corner) vertex[i][corner] = Pair::twice(batch.vertex[k[i]][corner]);
+    }
+  }
+
+  /// The lanes in which two rays hit, eight each.
+  uint32_t test(const RayGroup& group, uint32_t a, uint32_t b, uint32_t wanted, uint64_t& exact_count) const {
+    const typename Pair::F origin[3] = {Pair::two(group.origin[k[0]], a, b), Pair::two(group.origin[k[1]], a, b),
+                                        Pair::two(group.origin[k[2]], a, b)};
+    const RayLanes<Pair> lanes{
+        {Pair::two(group.shear[0], a, b), Pair::two(group.shear[1], a, b), Pair::two(group.shear[2], a, b)},
+        Pair::two(group.begin, a, b),
+        Pair::two(group.end, a, b)};
+    LaneHits<Pair> hits;
+    return test_lanes<Pair, false>([&](uint32_t i, uint32_t corner) { return Pair::sub(vertex[i][corner], origin[i]); },
+                                   [&](uint32_t i) { return normal[i]; }, lanes, wanted, hits, exact_count);
+  }
+};
+
 /// The lanes of a register that begins with bit `first` of a word.
 template <typename Wide>
 inline uint32_t lanes_at(uint64_t rays, uint32_t first) {
