@@ -290,9 +290,10 @@ private:
       const Place place{placement, cluster, first};
       const BatchNormals normals = batch_normals<Lanes>(batch);
       if (kAny && (scene_.clusters[cluster].flags & kMasked) == 0)
-        meet(batch, normals, group, rays);
+        alive_ &= ~meet(batch, normals, group, rays);
       else
-        test_each(batch, normals, place, group, test_side_by_side(batch, normals, place, group, rays));
+        test_each(batch, normals, place, group,
+                  meet(batch, normals, group, test_side_by_side(batch, normals, place, group, rays)));
       rays &= alive_;
       first += batch.count;
       count -= batch.count;
@@ -308,7 +309,7 @@ private:
   }
 
   /// Of any hits that need no look into a mask: nothing depends on what came of one ray.
-  void meet(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group, uint64_t rays) {
+  uint64_t meet(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group, uint64_t rays) {
     using Wide = typename Lanes::Wide;
     uint64_t hit = 0, exact = 0;
     for (uint32_t at = 0; at < kGroup; at += Wide::kLanes) {
@@ -342,7 +343,7 @@ private:
       hit |= lanes != 0 ? m & (0 - m) : 0;
     }
     if constexpr (kCount) counters_->exact_triangles += exact;
-    alive_ &= ~hit;
+    return hit;
   }
 
   /// One ray after the other.

@@ -114,6 +114,8 @@ inline uint32_t test_lanes(Relative relative, Normal normal, const RayLanes<Lane
   const F below = Lanes::negate(error);
   const uint32_t inside = (Lanes::less(error, least) | Lanes::less(most, below)) & wanted;
   const uint32_t unsure = (Lanes::less_equal(below, least) | Lanes::less_equal(most, error)) & wanted & ~inside;
+  if constexpr (kWeights)
+    if ((inside | unsure) == 0) return 0;
   const F along = Lanes::fma(sx, normal(0), Lanes::fma(sy, normal(1), normal(2)));
   F t = Lanes::mul(Lanes::div(depth, along), rays.shear[2]);
   uint32_t hit = inside & Lanes::less(rays.begin, t) & Lanes::less_equal(t, rays.end);
