@@ -1,7 +1,7 @@
 #pragma once
 
 #include "runtime/trace/packed/group_boxes.h"
-#include "runtime/trace/packed/triangle_test.h"
+#include "runtime/trace/packed/leaf_tests.h"
 
 /// Rays from one place into one octant, as camera rays are. What they have in common decides about most boxes at once;
 /// the others, and triangles, are tested against a register of rays each. Which is right where neighbours agree.

@@ -176,7 +176,8 @@ inline bool unit_block(const UnitRays& from, uint32_t first, uint32_t wanted, fl
     keep_larger(largest, magnitude(out.direction[axis]));
     keep_larger(away, magnitude(out.origin[axis]));
   }
-  const Ints usable = (largest > 0x1p-100f) & (largest < 0x1p100f) & (away <= static_cast<float>(kFar) * max_coordinate);
+  const Ints usable =
+      (largest > 0x1p-100f) & (largest < 0x1p100f) & (away <= static_cast<float>(kFar) * max_coordinate);
   if ((lane_bits(usable) & wanted) != wanted) return false;
   const Ints power = reinterpret_cast<Ints>(largest) & 0x7f800000; // down to a power of two
   scale = reinterpret_cast<Floats>((254 << 23) - power);

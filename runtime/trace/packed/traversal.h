@@ -2,6 +2,7 @@
 
 #include "runtime/trace/packed/batch_decode.h"
 #include "runtime/trace/packed/beam.h"
+#include "runtime/trace/packed/leaf_tests.h"
 
 /// Groups of rays through trees of nodes. They come to a node together, as one word of bits, and leave for each child
 /// those that pass its box: a node is read and set up once for all of them, and nothing waits for the outcome of one
@@ -25,8 +26,6 @@ struct NodeChildren {
 };
 
 inline uint32_t byte_of(uint64_t word, uint32_t slot) { return static_cast<uint32_t>(word >> (8 * slot)) & 0xffu; }
-
-inline uint32_t first_bit(uint64_t word) { return static_cast<uint32_t>(__builtin_ctzll(word)); }
 
 struct Pending {
   uint64_t rays; ///< as bits
@@ -289,61 +288,19 @@ private:
       if constexpr (kCount) counters_->triangles += count_ones(rays) * batch.count;
       const Place place{placement, cluster, first};
       const BatchNormals normals = batch_normals<Lanes>(batch);
-      if (kAny && (scene_.clusters[cluster].flags & kMasked) == 0)
-        alive_ &= ~meet(batch, normals, group, rays);
-      else
+      uint64_t exact = 0;
+      if (kAny && (scene_.clusters[cluster].flags & kMasked) == 0) {
+        alive_ &= ~rays_that_hit<Lanes>(batch, normals, group, rays, exact);
+      } else {
+        const uint64_t others = test_side_by_side(batch, normals, place, group, rays);
         test_each(batch, normals, place, group,
-                  meet(batch, normals, group, test_side_by_side(batch, normals, place, group, rays)));
+                  kPairs<Lanes> ? rays_that_hit<Lanes>(batch, normals, group, others, exact) : others);
+      }
+      if constexpr (kCount) counters_->exact_triangles += exact;
       rays &= alive_;
       first += batch.count;
       count -= batch.count;
     }
-  }
-
-  /// Woop's axes of the rays in some lanes. False where they differ.
-  template <typename Wide>
-  static bool same_axes(const RayGroup& group, uint32_t at, uint32_t wanted, uint32_t (&axis)[3]) {
-    const uint32_t first = at + static_cast<uint32_t>(__builtin_ctz(wanted));
-    for (uint32_t k = 0; k < 3; ++k) axis[k] = group.axis[k][first];
-    return (Wide::equal(&group.axis[2][at], axis[2]) & wanted) == wanted;
-  }
-
-  /// Of any hits that need no look into a mask: nothing depends on what came of one ray.
-  uint64_t meet(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group, uint64_t rays) {
-    using Wide = typename Lanes::Wide;
-    uint64_t hit = 0, exact = 0;
-    for (uint32_t at = 0; at < kGroup; at += Wide::kLanes) {
-      const uint32_t wanted = lanes_at<Wide>(rays, at);
-      uint32_t axis[3];
-      if (count_ones(wanted) < batch.count || !same_axes<Wide>(group, at, wanted, axis)) continue;
-      rays &= ~(uint64_t{wanted} << at);
-      LaneHits<Wide> hits;
-      for (uint32_t triangle = 0; triangle < batch.count; ++triangle)
-        hit |= uint64_t{test_rays<Wide, false>(batch, normals, triangle, group, axis, at, wanted, hits, exact)} << at;
-    }
-    if constexpr (Wide::kLanes == 16) {
-      const uint32_t wanted = ((1u << batch.count) - 1) * 0x101u;
-      for (uint32_t k = 0; k < 3; ++k) {
-        uint64_t m = rays & group.major[k];
-        if ((m & (m - 1)) == 0) continue;
-        const BatchPairs<Wide> pairs(batch, normals, k);
-        do {
-          const uint64_t rest = m & (m - 1);
-          const uint32_t lanes = pairs.test(group, first_bit(m), first_bit(rest), wanted, exact);
-          hit |= (lanes & 0xffu) != 0 ? m & (0 - m) : 0;
-          hit |= (lanes >> 8) != 0 ? rest & (0 - rest) : 0;
-          m = rest & (rest - 1);
-        } while ((m & (m - 1)) != 0);
-        rays = (rays & ~group.major[k]) | m;
-      }
-    }
-    LaneHits<Lanes> hits;
-    for (uint64_t m = rays; m != 0; m &= m - 1) {
-      const uint32_t lanes = test_triangles<Lanes, false>(batch, normals, group, first_bit(m), hits, exact);
-      hit |= lanes != 0 ? m & (0 - m) : 0;
-    }
-    if constexpr (kCount) counters_->exact_triangles += exact;
-    return hit;
   }
 
   /// One ray after the other.
