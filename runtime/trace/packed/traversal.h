@@ -277,7 +277,7 @@ private:
                    group, active);
     }
     if constexpr (!kAny)
-      if (group.beam != nullptr && group.beam->stale) group.beam->update_limits();
+      if (group.beam != nullptr && group.beam->stale) group.beam->update_limits(group);
   }
 
   void trace_leaf(uint32_t placement, uint32_t cluster, uint32_t first, uint32_t count, RayGroup& group,
@@ -377,7 +377,7 @@ private:
     } else {
       nearer_ |= uint64_t{1} << i;
       group.set_tmax(i, t);
-      if (group.beam != nullptr) group.beam->set_tmax(i, t);
+      if (group.beam != nullptr) group.beam->stale = true;
       unit_.tmax[i] = static_cast<float>((double{t} + group.t_begin[i]) * group.t_scale[i]);
       hits_[numbers_[i]] = {unit_.tmax[i], u, v, place.placement, place.cluster, place.triangle};
     }

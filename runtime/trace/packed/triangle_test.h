@@ -17,7 +17,7 @@
 namespace packtrace::packed {
 namespace {
 
-/// Far above the 2^-23 that three roundings need: weights of hits near edges become exact enough, too.
+/// Far above the 2^-24 that two roundings need: weights of hits near edges become exact enough, too.
 constexpr float kEdgeError = 0x1p-18f;
 constexpr float kSmallestEdge = 0x1p-100f; ///< products below may have lost bits to underflow
 
