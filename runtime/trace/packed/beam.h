@@ -1,7 +1,7 @@
 #pragma once
 
 #include "runtime/trace/packed/group_boxes.h"
-#include "runtime/trace/packed/triangle_test.h"
+#include "runtime/trace/packed/leaf_tests.h"
 
 /// Rays from one place into one octant, as camera rays are. What they have in common decides about most boxes at once;
 /// the others, and triangles, are tested against a register of rays each. Which is right where neighbours agree.
@@ -14,27 +14,19 @@ namespace {
 constexpr float kBeamPad = 28.0f * 0x1p-24f;
 
 struct alignas(64) Beam {
-  /// Of its rays, one array per value, so that a register is filled by one load. Lanes of other rays have no range.
-  float near_bias[3][kGroup], far_bias[3][kGroup], begin[kGroup], end[kGroup];
+  /// Of its rays, one array per value, so that a register is filled by one load.
+  float near_bias[3][kGroup], far_bias[3][kGroup];
   /// Of all: what near and negated far planes are less, inverse directions' least and most, and as RayGroup::limits.
   float origin[3][2], inverse[3][2], limits[2];
-  uint64_t rays;
-  uint32_t axis[3]; ///< Woop's k
-  bool one_axis;    ///< that is every ray's
-  bool stale;       ///< limits are
+  bool stale; ///< limits are
 
-  void set_tmax(uint32_t i, float t) {
-    end[i] = t;
-    stale = true;
-  }
-
-  /// After set_tmax().
-  void update_limits() {
+  /// After RayGroup::set_tmax().
+  void update_limits(const RayGroup& group) {
     stale = false;
     Floats most, some;
-    read_block(most, &end[0]);
+    read_block(most, &group.end[0]);
     for (uint32_t first = kBlock; first < kGroup; first += kBlock) {
-      read_block(some, &end[first]);
+      read_block(some, &group.end[first]);
       keep_larger(most, some);
     }
     limits[1] = -most[0];
@@ -61,16 +53,14 @@ inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam
   }
   for (const uint64_t backward : group.backward)
     if ((backward & rays) != 0 && (backward & rays) != rays) return false;
-  beam.rays = rays;
   for (uint64_t m = ~rays; m != 0; m &= m - 1) {
     const auto i = static_cast<uint32_t>(__builtin_ctzll(m));
     for (uint32_t axis = 0; axis < 3; ++axis) {
       group.inverse[axis][i] = group.inverse[axis][first];
-      group.shear[axis][i] = group.shear[axis][first];
-      group.axis[axis][i] = group.axis[axis][first];
       for (uint32_t side = 0; side < 2; ++side) group.bias[axis][i][side] = group.bias[axis][first][side];
     }
-    group.limits[i][0] = group.limits[i][1] = __builtin_inff();
+    group.limits[i][0] = group.limits[i][1] = group.begin[i] = __builtin_inff();
+    group.end[i] = -__builtin_inff();
   }
   const auto split = [](const float(&pairs)[kGroup][2], uint32_t at, Floats& a, Floats& b) {
     Floats low, high;
@@ -81,10 +71,8 @@ inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam
   };
   float reach = max_coordinate;
   for (uint32_t axis = 0; axis < 3; ++axis) reach = __builtin_fmaxf(reach, __builtin_fabsf(group.origin[axis][first]));
-  Ints same = Ints{} - 1;
   for (uint32_t axis = 0; axis < 3; ++axis) {
     Floats least = Floats{} + group.inverse[axis][first], most = least;
-    beam.axis[axis] = group.axis[axis][first];
     for (uint32_t at = 0; at < kGroup; at += kBlock) {
       Floats inverse, near, far;
       read_block(inverse, &group.inverse[axis][at]);
@@ -93,9 +81,6 @@ inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam
       split(group.bias[axis], at, near, far);
       write_block(&beam.near_bias[axis][at], near);
       write_block(&beam.far_bias[axis][at], -far);
-      Ints k;
-      read_block(k, &group.axis[axis][at]);
-      same &= k == static_cast<int32_t>(beam.axis[axis]);
     }
     beam.inverse[axis][0] = least[0], beam.inverse[axis][1] = most[0];
     for (uint32_t i = 1; i < kBlock; ++i) {
@@ -105,18 +90,15 @@ inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam
     const float pad = least[0] < 0.0f ? -kBeamPad * reach : kBeamPad * reach; // outwards is towards the rays' origin
     beam.origin[axis][0] = group.origin[axis][first] + pad, beam.origin[axis][1] = -group.origin[axis][first] + pad;
   }
-  beam.one_axis = lane_bits(same) == 0xffu;
-  Floats least = Floats{} + __builtin_inff();
-  for (uint32_t at = 0; at < kGroup; at += kBlock) {
-    Floats begin, end;
-    split(group.limits, at, begin, end);
-    write_block(&beam.begin[at], begin);
-    write_block(&beam.end[at], -end);
+  Floats least, begin;
+  read_block(least, &group.begin[0]);
+  for (uint32_t at = kBlock; at < kGroup; at += kBlock) {
+    read_block(begin, &group.begin[at]);
     least = begin < least ? begin : least;
   }
   beam.limits[0] = least[0];
   for (uint32_t i = 1; i < kBlock; ++i) beam.limits[0] = __builtin_fminf(beam.limits[0], least[i]);
-  beam.update_limits();
+  beam.update_limits(group);
   return true;
 }
 
@@ -149,12 +131,6 @@ inline void read_planes(const GroupBoxes<Lanes>& boxes, BoxPlanes& planes) {
   }
 }
 
-/// The lanes of a register that begins with bit `first` of a word.
-template <typename Wide>
-inline uint32_t lanes_at(uint64_t rays, uint32_t first) {
-  return static_cast<uint32_t>(rays >> first) & ((1u << Wide::kLanes) - 1);
-}
-
 /// By child in `slots`: those of `rays` that pass its box, as bits. Returns the children that any passes.
 template <typename Wide>
 inline uint32_t pass_each(const BoxPlanes& planes, const RayGroup& group, const Beam& beam, uint64_t rays,
@@ -163,7 +139,7 @@ inline uint32_t pass_each(const BoxPlanes& planes, const RayGroup& group, const 
   for (uint64_t& word : out) word = 0;
   for (uint32_t at = 0; at < kGroup; at += Wide::kLanes) {
     if (lanes_at<Wide>(rays, at) == 0) continue;
-    const F ray_begin = Wide::load(&beam.begin[at]), ray_end = Wide::load(&beam.end[at]);
+    const F ray_begin = Wide::load(&group.begin[at]), ray_end = Wide::load(&group.end[at]);
     F inverse[3], near_bias[3], far_bias[3];
     for (uint32_t axis = 0; axis < 3; ++axis) {
       inverse[axis] = Wide::load(&group.inverse[axis][at]);
@@ -187,21 +163,6 @@ inline uint32_t pass_each(const BoxPlanes& planes, const RayGroup& group, const 
     used |= (out[slot] != 0 ? 1u : 0u) << slot;
   }
   return used;
-}
-
-/// The rays from lane `at` on that hit one triangle of a batch, as bits from 0 on.
-template <typename Wide>
-inline uint32_t test_rays(const DecodedBatch& batch, uint32_t triangle, const RayGroup& group, const Beam& beam,
-                          uint32_t at, uint32_t wanted, LaneHits<Wide>& hits, uint64_t& exact_count) {
-  const auto first = static_cast<uint32_t>(__builtin_ctzll(beam.rays));
-  const auto relative = [&](uint32_t k, uint32_t corner) {
-    return Wide::set(batch.vertex[beam.axis[k]][corner][triangle] - group.origin[beam.axis[k]][first]);
-  };
-  const RayLanes<Wide> lanes{
-      {Wide::load(&group.shear[0][at]), Wide::load(&group.shear[1][at]), Wide::load(&group.shear[2][at])},
-      Wide::load(&beam.begin[at]),
-      Wide::load(&beam.end[at])};
-  return test_lanes<Wide>(relative, lanes, wanted, hits, exact_count);
 }
 
 } // namespace

@@ -79,6 +79,15 @@ inline void read_planes(const Avx512GroupBoxes& boxes, BoxPlanes& planes) {
   }
 }
 
+/// Each bit of a word.
+struct BitTable {
+  uint64_t bit[64];
+  constexpr BitTable() : bit{} {
+    for (uint32_t i = 0; i < 64; ++i) bit[i] = uint64_t{1} << i;
+  }
+};
+alignas(64) constexpr BitTable kBits;
+
 struct Avx512ChildRays {
   static uint32_t pass(const Avx512GroupBoxes& boxes, const RayGroup& group, uint64_t rays,
                        uint64_t (&out)[baked::kNodeWidth]) {
@@ -86,7 +95,7 @@ struct Avx512ChildRays {
     for (; rays != 0; rays &= rays - 1) {
       const auto ray = static_cast<uint32_t>(__builtin_ctzll(rays));
       by_child = _mm512_mask_or_epi64(by_child, pass_boxes(boxes, group, ray), by_child,
-                                      _mm512_set1_epi64(static_cast<int64_t>(rays & (0 - rays))));
+                                      _mm512_set1_epi64(static_cast<int64_t>(kBits.bit[ray])));
     }
     _mm512_storeu_si512(out, by_child);
     return _mm512_test_epi64_mask(by_child, by_child);

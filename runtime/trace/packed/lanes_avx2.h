@@ -42,10 +42,20 @@ struct Avx2Lanes {
   /// a b + c and c - a b, rounded once
   static F fma(F a, F b, F c) { return _mm256_fmadd_ps(a, b, c); }
   static F fnma(F a, F b, F c) { return _mm256_fnmadd_ps(a, b, c); }
+  /// a b - c, rounded once
+  static F fms(F a, F b, F c) { return _mm256_fmsub_ps(a, b, c); }
   static F min(F a, F b) { return _mm256_min_ps(a, b); }
   static F max(F a, F b) { return _mm256_max_ps(a, b); }
   static F abs(F a) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), a); }
+  /// The larger magnitude.
+  static F largest(F a, F b) { return max(abs(a), abs(b)); }
   static F negate(F a) { return _mm256_xor_ps(_mm256_set1_ps(-0.0f), a); }
+  /// The lanes of eight numbers that are x, as bits.
+  static uint32_t equal(const uint32_t* p, uint32_t x) {
+    const __m256i all = _mm256_cmpeq_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)),
+                                           _mm256_set1_epi32(static_cast<int32_t>(x)));
+    return bits(_mm256_castsi256_ps(all));
+  }
   static uint32_t less(F a, F b) { return bits(_mm256_cmp_ps(a, b, _CMP_LT_OQ)); }
   static uint32_t less_equal(F a, F b) { return bits(_mm256_cmp_ps(a, b, _CMP_LE_OQ)); }
 

@@ -69,6 +69,10 @@ struct ScalarLanes {
   static F fnma(F a, F b, F c) {
     return each([&](uint32_t i) { return __builtin_fmaf(-a.lane[i], b.lane[i], c.lane[i]); });
   }
+  /// a b - c, rounded once
+  static F fms(F a, F b, F c) {
+    return each([&](uint32_t i) { return __builtin_fmaf(a.lane[i], b.lane[i], -c.lane[i]); });
+  }
   static F min(F a, F b) {
     return each([&](uint32_t i) { return a.lane[i] < b.lane[i] ? a.lane[i] : b.lane[i]; });
   }
@@ -78,8 +82,14 @@ struct ScalarLanes {
   static F abs(F a) {
     return each([&](uint32_t i) { return __builtin_fabsf(a.lane[i]); });
   }
+  /// The larger magnitude.
+  static F largest(F a, F b) { return max(abs(a), abs(b)); }
   static F negate(F a) {
     return each([&](uint32_t i) { return -a.lane[i]; });
+  }
+  /// The lanes of eight numbers that are x, as bits.
+  static uint32_t equal(const uint32_t* p, uint32_t x) {
+    return bits([&](uint32_t i) { return p[i] == x; });
   }
   static uint32_t less(F a, F b) {
     return bits([&](uint32_t i) { return a.lane[i] < b.lane[i]; });

@@ -39,17 +39,22 @@ struct Beam;
 struct alignas(64) RayGroup {
   float bias[3][kGroup][2]; ///< a near plane p is passed at p inverse + the first, a far one at p inverse - the second
   float limits[kGroup][2];  ///< hits lie above the first and not beyond - the second
-  float inverse[3][kGroup]; ///< of the direction, never infinite
+  float begin[kGroup], end[kGroup]; ///< the same in arrays of their own
+  float inverse[3][kGroup];         ///< of the direction, never infinite
   float origin[3][kGroup];
   float shear[3][kGroup];   ///< Woop's S
   uint32_t axis[3][kGroup]; ///< Woop's k: x, y, z; z is the direction's largest component
+  uint64_t major[3];        ///< rays whose k begins with x, y, z, as bits
   uint64_t backward[3];     ///< rays along which x, y, z decrease, as bits
   double t_begin[kGroup];   ///< unit-space t = (t here + t_begin) t_scale
   double t_scale[kGroup];   ///< a power of two
   Beam* beam = nullptr;     ///< that all its rays make, see beam.h
 
-  void set_tmax(uint32_t i, float t) { limits[i][1] = -t; }
-  float tmax(uint32_t i) const { return -limits[i][1]; }
+  void set_tmax(uint32_t i, float t) {
+    limits[i][1] = -t;
+    end[i] = t;
+  }
+  float tmax(uint32_t i) const { return end[i]; }
 };
 
 /// Reads a block of rays.
@@ -143,37 +148,78 @@ inline void write_pairs(float (*out)[2], const Floats& a, const Floats& b) {
 
 inline Floats magnitude(const Floats& x) { return reinterpret_cast<Floats>(reinterpret_cast<Ints>(x) & 0x7fffffff); }
 
-inline void set_boxes(const GridBlock& block, const UnitRays& from, float max_coordinate, uint32_t first,
-                      RayGroup& group) {
-  Floats origin[3], reach = Floats{} + max_coordinate;
+/// A block of rays in a tree's grid as box and triangle tests take them.
+struct RayBlock {
+  Floats origin[3], direction[3], begin, end;
+};
+
+inline RayBlock ray_block(const GridBlock& block, const UnitRays& from, uint32_t first) {
+  RayBlock out;
   for (uint32_t axis = 0; axis < 3; ++axis) {
-    origin[axis] = to_floats(block.origin[axis]);
-    keep_larger(reach, magnitude(origin[axis]));
-    write_block(&group.origin[axis][first], origin[axis]);
+    out.origin[axis] = to_floats(block.origin[axis]);
+    out.direction[axis] = to_floats(block.direction[axis]);
   }
-  const Doubles t_near = read_doubles(&from.tnear[first]) * block.power - block.begin;
-  const Doubles t_max = read_doubles(&from.tmax[first]) * block.power - block.begin;
-  write_pairs(&group.limits[first], to_floats(t_near), -to_floats(t_max));
-  write_block(&group.t_begin[first], block.begin);
-  write_block(&group.t_scale[first], block.scale);
+  out.begin = to_floats(read_doubles(&from.tnear[first]) * block.power - block.begin);
+  out.end = to_floats(read_doubles(&from.tmax[first]) * block.power - block.begin);
+  return out;
+}
+
+/// What the two above make of rays where the grid is unit space, without doubles. False where it cannot, as origins are
+/// far away or directions of extreme lengths.
+/// @param wanted lanes that matter
+inline bool unit_block(const UnitRays& from, uint32_t first, uint32_t wanted, float max_coordinate, RayBlock& out,
+                       Floats& scale) {
+  Floats largest{}, away{};
   for (uint32_t axis = 0; axis < 3; ++axis) {
-    const Floats d = to_floats(block.direction[axis]), size = magnitude(d);
+    read_block(out.origin[axis], &from.origin[axis][first]);
+    read_block(out.direction[axis], &from.direction[axis][first]);
+    keep_larger(largest, magnitude(out.direction[axis]));
+    keep_larger(away, magnitude(out.origin[axis]));
+  }
+  const Ints usable =
+      (largest > 0x1p-100f) & (largest < 0x1p100f) & (away <= static_cast<float>(kFar) * max_coordinate);
+  if ((lane_bits(usable) & wanted) != wanted) return false;
+  const Ints power = reinterpret_cast<Ints>(largest) & 0x7f800000; // down to a power of two
+  scale = reinterpret_cast<Floats>((254 << 23) - power);
+  for (Floats& component : out.direction) component = component * scale;
+  Floats tnear, tmax;
+  read_block(tnear, &from.tnear[first]);
+  read_block(tmax, &from.tmax[first]);
+  out.begin = tnear * reinterpret_cast<Floats>(power);
+  out.end = tmax * reinterpret_cast<Floats>(power);
+  return true;
+}
+
+inline void set_boxes(const RayBlock& block, float max_coordinate, uint32_t first, RayGroup& group) {
+  Floats reach = Floats{} + max_coordinate;
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    keep_larger(reach, magnitude(block.origin[axis]));
+    write_block(&group.origin[axis][first], block.origin[axis]);
+  }
+  write_pairs(&group.limits[first], block.begin, -block.end);
+  write_block(&group.begin[first], block.begin);
+  write_block(&group.end[first], block.end);
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    const Floats d = block.direction[axis], size = magnitude(d);
     const Floats over = 1.0f / (size > kSmallestDirection ? size : Floats{} + kSmallestDirection);
     const Ints sign = reinterpret_cast<Ints>(d) & static_cast<int32_t>(0x80000000u);
     const Floats inverse = reinterpret_cast<Floats>(reinterpret_cast<Ints>(over) | sign);
-    const Floats back = origin[axis] * inverse, away = kBoxPad * reach * over;
+    const Floats back = block.origin[axis] * inverse, away = kBoxPad * reach * over;
     write_block(&group.inverse[axis][first], inverse);
     write_pairs(&group.bias[axis][first], -back - away, back - away);
     group.backward[axis] |= uint64_t{lane_bits(inverse < 0.0f)} << first;
   }
 }
 
-inline void set_shears(const GridBlock& block, uint32_t first, RayGroup& group) {
-  const Floats x = to_floats(block.direction[0]), y = to_floats(block.direction[1]), z = to_floats(block.direction[2]);
+inline void set_shears(const RayBlock& block, uint32_t first, RayGroup& group) {
+  const Floats x = block.direction[0], y = block.direction[1], z = block.direction[2];
   const Floats ax = magnitude(x), ay = magnitude(y), az = magnitude(z);
   const Ints by_z = (az >= ax) & (az >= ay), by_y = ~by_z & (ay >= ax);
   const Floats along = by_z ? z : by_y ? y : x;
   const Ints zero{};
+  group.major[0] |= uint64_t{lane_bits(by_z)} << first;
+  group.major[1] |= uint64_t{lane_bits(~by_z & ~by_y)} << first;
+  group.major[2] |= uint64_t{lane_bits(by_y)} << first;
   write_block(&group.axis[0][first], by_z ? zero : by_y ? zero + 2 : zero + 1);
   write_block(&group.axis[1][first], by_z ? zero + 1 : by_y ? zero : zero + 2);
   write_block(&group.axis[2][first], by_z ? zero + 2 : by_y ? zero + 1 : zero);
@@ -183,16 +229,25 @@ inline void set_shears(const GridBlock& block, uint32_t first, RayGroup& group) 
 }
 
 /// Moves rays into a tree's grid and sets them up. Returns those that may hit something.
-/// @tparam kTriangles whether rays meet triangles there
+/// @tparam kTriangles whether rays meet triangles there; else the grid is unit space
 /// @param rays as bits
 template <bool kTriangles>
 inline uint64_t enter(const TracePlacement& placement, float max_coordinate, const UnitRays& from, uint64_t rays,
                       RayGroup& group) {
   uint64_t entered = 0;
   for (uint64_t& backward : group.backward) backward = 0;
+  for (uint64_t& major : group.major) major = 0;
   for (uint32_t first = 0; first < kGroup; first += kBlock) {
     const auto wanted = static_cast<uint32_t>(rays >> first) & 0xffu;
     if (wanted == 0) continue;
+    RayBlock rays_here;
+    if (Floats scale; !kTriangles && unit_block(from, first, wanted, max_coordinate, rays_here, scale)) {
+      entered |= uint64_t{wanted} << first;
+      write_block(&group.t_begin[first], Doubles{});
+      write_block(&group.t_scale[first], to_doubles(scale));
+      set_boxes(rays_here, max_coordinate, first, group);
+      continue;
+    }
     GridBlock block;
     Doubles away;
     uint32_t usable = wanted & move_block(placement, from, first, block, away);
@@ -201,8 +256,11 @@ inline uint64_t enter(const TracePlacement& placement, float max_coordinate, con
       if (!approach(placement, 0x1p-8 * double{max_coordinate}, block, lane)) usable &= ~(1u << lane);
     }
     entered |= uint64_t{usable} << first;
-    set_boxes(block, from, max_coordinate, first, group);
-    if constexpr (kTriangles) set_shears(block, first, group);
+    write_block(&group.t_begin[first], block.begin);
+    write_block(&group.t_scale[first], block.scale);
+    rays_here = ray_block(block, from, first);
+    set_boxes(rays_here, max_coordinate, first, group);
+    if constexpr (kTriangles) set_shears(rays_here, first, group);
   }
   return entered;
 }

@@ -64,6 +64,11 @@ inline Doubles read_doubles(const float* p) {
     return __builtin_convertvector(part, DoublePart);
   });
 }
+inline Doubles to_doubles(const Floats& x) {
+  float lanes[kBlock];
+  __builtin_memcpy(lanes, &x, sizeof lanes);
+  return read_doubles(lanes);
+}
 inline Floats to_floats(const Doubles& x) {
 #if defined(__AVX512F__)
   return __builtin_convertvector(x.part[0], Floats);

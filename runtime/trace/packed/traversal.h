@@ -2,6 +2,7 @@
 
 #include "runtime/trace/packed/batch_decode.h"
 #include "runtime/trace/packed/beam.h"
+#include "runtime/trace/packed/leaf_tests.h"
 
 /// Groups of rays through trees of nodes. They come to a node together, as one word of bits, and leave for each child
 /// those that pass its box: a node is read and set up once for all of them, and nothing waits for the outcome of one
@@ -25,8 +26,6 @@ struct NodeChildren {
 };
 
 inline uint32_t byte_of(uint64_t word, uint32_t slot) { return static_cast<uint32_t>(word >> (8 * slot)) & 0xffu; }
-
-inline uint32_t first_bit(uint64_t word) { return static_cast<uint32_t>(__builtin_ctzll(word)); }
 
 struct Pending {
   uint64_t rays; ///< as bits
@@ -88,6 +87,8 @@ private:
       trace_top();
     else if (scene_.placement_count > 0)
       trace_placement(0, alive_);
+    if constexpr (kAny)
+      for (uint32_t i = 0; i < count; ++i) occluded_[numbers[i]] = ((alive_ >> i) & 1u) ^ 1u;
   }
 
   /// Calls visit(rays, octant) for the rays of each octant.
@@ -276,7 +277,7 @@ private:
                    group, active);
     }
     if constexpr (!kAny)
-      if (group.beam != nullptr && group.beam->stale) group.beam->update_limits();
+      if (group.beam != nullptr && group.beam->stale) group.beam->update_limits(group);
   }
 
   void trace_leaf(uint32_t placement, uint32_t cluster, uint32_t first, uint32_t count, RayGroup& group,
@@ -286,8 +287,16 @@ private:
       const DecodedBatch& batch = decoded(cluster, first, count);
       if constexpr (kCount) counters_->triangles += count_ones(rays) * batch.count;
       const Place place{placement, cluster, first};
-      const bool beam = !kAny && group.beam != nullptr && group.beam->one_axis;
-      test_each(batch, place, group, beam ? test_side_by_side(batch, place, group, rays) : rays);
+      const BatchNormals normals = batch_normals<Lanes>(batch);
+      uint64_t exact = 0;
+      if (kAny && (scene_.clusters[cluster].flags & kMasked) == 0) {
+        alive_ &= ~rays_that_hit<Lanes>(batch, normals, group, rays, exact);
+      } else {
+        const uint64_t others = test_side_by_side(batch, normals, place, group, rays);
+        test_each(batch, normals, place, group,
+                  kPairs<Lanes> ? rays_that_hit<Lanes>(batch, normals, group, others, exact) : others);
+      }
+      if constexpr (kCount) counters_->exact_triangles += exact;
       rays &= alive_;
       first += batch.count;
       count -= batch.count;
@@ -295,29 +304,32 @@ private:
   }
 
   /// One ray after the other.
-  void test_each(const DecodedBatch& batch, const Place& place, RayGroup& group, uint64_t rays) {
+  void test_each(const DecodedBatch& batch, const BatchNormals& normals, const Place& place, RayGroup& group,
+                 uint64_t rays) {
     for (uint64_t m = rays; m != 0; m &= m - 1) {
       const uint32_t i = first_bit(m);
       LaneHits<Lanes> hits;
       uint64_t exact = 0;
-      const uint32_t lanes = test_triangles<Lanes>(batch, group, i, hits, exact);
+      const uint32_t lanes = test_triangles<Lanes, true>(batch, normals, group, i, hits, exact);
       if constexpr (kCount) counters_->exact_triangles += exact;
       if (lanes != 0) take_hits(place, i, hits, lanes, group);
     }
   }
 
   /// One triangle after the other, where enough rays fill a register. Returns the other rays.
-  uint64_t test_side_by_side(const DecodedBatch& batch, Place place, RayGroup& group, uint64_t rays) {
+  uint64_t test_side_by_side(const DecodedBatch& batch, const BatchNormals& normals, Place place, RayGroup& group,
+                             uint64_t rays) {
     using Wide = typename Lanes::Wide;
     const uint32_t begin = place.triangle;
     for (uint32_t at = 0; at < kGroup; at += Wide::kLanes) {
       const uint32_t wanted = lanes_at<Wide>(rays, at);
-      if (count_ones(wanted) < batch.count) continue;
+      uint32_t axis[3];
+      if (count_ones(wanted) < batch.count || !same_axes<Wide>(group, at, wanted, axis)) continue;
       rays &= ~(uint64_t{wanted} << at);
       for (uint32_t triangle = 0; triangle < batch.count; ++triangle) {
         LaneHits<Wide> hits;
         uint64_t exact = 0;
-        uint32_t lanes = test_rays<Wide>(batch, triangle, group, *group.beam, at, wanted, hits, exact);
+        uint32_t lanes = test_rays<Wide, true>(batch, normals, triangle, group, axis, at, wanted, hits, exact);
         if constexpr (kCount) counters_->exact_triangles += exact;
         place.triangle = begin + triangle;
         for (; lanes != 0; lanes &= lanes - 1) {
@@ -361,12 +373,11 @@ private:
         !scene_.present(scene_.owner, place.placement, place.cluster, place.triangle, u, v, ray_class_))
       return false;
     if constexpr (kAny) {
-      occluded_[numbers_[i]] = 1;
       alive_ &= ~(uint64_t{1} << i);
     } else {
       nearer_ |= uint64_t{1} << i;
       group.set_tmax(i, t);
-      if (group.beam != nullptr) group.beam->set_tmax(i, t);
+      if (group.beam != nullptr) group.beam->stale = true;
       unit_.tmax[i] = static_cast<float>((double{t} + group.t_begin[i]) * group.t_scale[i]);
       hits_[numbers_[i]] = {unit_.tmax[i], u, v, place.placement, place.cluster, place.triangle};
     }

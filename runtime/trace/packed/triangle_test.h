@@ -17,7 +17,7 @@
 namespace packtrace::packed {
 namespace {
 
-/// Far above the 2^-23 that three roundings need: weights of hits near edges become exact enough, too.
+/// Far above the 2^-24 that two roundings need: weights of hits near edges become exact enough, too.
 constexpr float kEdgeError = 0x1p-18f;
 constexpr float kSmallestEdge = 0x1p-100f; ///< products below may have lost bits to underflow
 
@@ -63,68 +63,76 @@ struct RayLanes {
   typename Lanes::F shear[3], begin, end; ///< hits lie in (begin, end]
 };
 
-/// The lanes in which a ray hits a triangle, as bits.
-/// @param relative (k, corner): the corner's coordinate along Woop's axis k less the origin's
-/// @param wanted lanes, as bits
-/// @param exact_count counts lanes that took doubles
-template <typename Lanes, typename Relative>
-inline uint32_t test_lanes(Relative relative, const RayLanes<Lanes>& rays, uint32_t wanted, LaneHits<Lanes>& hits,
-                           uint64_t& exact_count) {
-  using F = typename Lanes::F;
-  const F sx = rays.shear[0], sy = rays.shear[1];
-  F x[3], y[3], z[3];
-  for (uint32_t corner = 0; corner < 3; ++corner) {
-    z[corner] = relative(2, corner);
-    x[corner] = Lanes::fnma(sx, z[corner], relative(0, corner));
-    y[corner] = Lanes::fnma(sy, z[corner], relative(1, corner));
-  }
-  const F u1 = Lanes::mul(x[2], y[1]), v1 = Lanes::mul(x[0], y[2]), w1 = Lanes::mul(x[1], y[0]);
-  const F u = Lanes::sub(u1, Lanes::mul(y[2], x[1])), v = Lanes::sub(v1, Lanes::mul(y[0], x[2])),
-          w = Lanes::sub(w1, Lanes::mul(y[1], x[0]));
-  const F least = Lanes::min(Lanes::min(u, v), w), most = Lanes::max(Lanes::max(u, v), w);
-  // |p q' - q p'| is off by at most 2^-23 of the larger product, which is at most |p q'| + |result| (1 + 2^-22).
-  const F error = Lanes::fma(Lanes::max(Lanes::max(Lanes::abs(u1), Lanes::abs(v1)), Lanes::abs(w1)),
-                             Lanes::set(kEdgeError), Lanes::set(kSmallestEdge));
-  const F below = Lanes::negate(error);
-  const uint32_t maybe = (Lanes::less_equal(below, least) | Lanes::less_equal(most, error)) & wanted;
-  if (maybe == 0) return 0;
+/// Of a batch's triangles, as far as no ray matters.
+struct BatchNormals {
+  alignas(64) float normal[3][kBatch]; ///< [axis][triangle]
+};
 
-  uint32_t hit = maybe & (Lanes::less(error, least) | Lanes::less(most, below));
-  const F over = Lanes::div(Lanes::set(1.0f), Lanes::add(Lanes::add(u, v), w));
-  // From the plane rather than from the weights: what vertices have along an axis that the plane is perpendicular to is
-  // then all that counts, which is what ray offsets rely on.
-  const F px = relative(0, 0), py = relative(1, 0);
-  const F ex = Lanes::sub(relative(0, 1), px), ey = Lanes::sub(relative(1, 1), py), ez = Lanes::sub(z[1], z[0]);
-  const F fx = Lanes::sub(relative(0, 2), px), fy = Lanes::sub(relative(1, 2), py), fz = Lanes::sub(z[2], z[0]);
-  const F nx = Lanes::sub(Lanes::mul(ey, fz), Lanes::mul(ez, fy)),
-          ny = Lanes::sub(Lanes::mul(ez, fx), Lanes::mul(ex, fz)),
-          nz = Lanes::sub(Lanes::mul(ex, fy), Lanes::mul(ey, fx));
-  const F along = Lanes::fma(sx, nx, Lanes::fma(sy, ny, nz));
-  const F depth = Lanes::fma(px, nx, Lanes::fma(py, ny, Lanes::mul(z[0], nz)));
-  Lanes::store(hits.t, Lanes::mul(Lanes::div(depth, along), rays.shear[2]));
-  Lanes::store(hits.u, Lanes::mul(v, over));
-  Lanes::store(hits.v, Lanes::mul(w, over));
-  if (const uint32_t unsure = maybe & ~hit; unsure != 0) {
-    exact_count += static_cast<uint64_t>(__builtin_popcount(unsure));
-    hit |= test_exactly<Lanes>(unsure, x, y, z, rays.shear[2], hits);
+template <typename Lanes>
+inline BatchNormals batch_normals(const DecodedBatch& batch) {
+  using F = typename Lanes::F;
+  F e[3], f[3];
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    const F a = Lanes::load(batch.vertex[axis][0]);
+    e[axis] = Lanes::sub(Lanes::load(batch.vertex[axis][1]), a);
+    f[axis] = Lanes::sub(Lanes::load(batch.vertex[axis][2]), a);
   }
-  const F t = Lanes::load(hits.t);
-  return hit & Lanes::less(rays.begin, t) & Lanes::less_equal(t, rays.end);
+  BatchNormals out;
+  Lanes::store(out.normal[0], Lanes::sub(Lanes::mul(e[1], f[2]), Lanes::mul(e[2], f[1])));
+  Lanes::store(out.normal[1], Lanes::sub(Lanes::mul(e[2], f[0]), Lanes::mul(e[0], f[2])));
+  Lanes::store(out.normal[2], Lanes::sub(Lanes::mul(e[0], f[1]), Lanes::mul(e[1], f[0])));
+  return out;
 }
 
-/// The triangles of a batch that a ray hits, as bits.
-template <typename Lanes>
-inline uint32_t test_triangles(const DecodedBatch& batch, const RayGroup& group, uint32_t ray, LaneHits<Lanes>& hits,
-                               uint64_t& exact_count) {
-  const uint32_t axis[3] = {group.axis[0][ray], group.axis[1][ray], group.axis[2][ray]};
-  const auto relative = [&](uint32_t k, uint32_t corner) {
-    return Lanes::sub(Lanes::load(batch.vertex[axis[k]][corner]), Lanes::set(group.origin[axis[k]][ray]));
-  };
-  const RayLanes<Lanes> lanes{
-      {Lanes::set(group.shear[0][ray]), Lanes::set(group.shear[1][ray]), Lanes::set(group.shear[2][ray])},
-      Lanes::set(group.limits[ray][0]),
-      Lanes::set(group.tmax(ray))};
-  return test_lanes<Lanes>(relative, lanes, (1u << batch.count) - 1, hits, exact_count);
+/// The lanes in which a ray hits a triangle, as bits. Without a branch that often goes either way until one does.
+/// @tparam kWeights whether hits are filled; else only which lanes hit is wanted
+/// @param relative (k, corner): the corner's coordinate along Woop's axis k less the origin's
+/// @param normal (k): of the triangle's plane, along Woop's axis k
+/// @param wanted lanes, as bits
+/// @param exact_count counts lanes that took doubles
+template <typename Lanes, bool kWeights, typename Relative, typename Normal>
+inline uint32_t test_lanes(Relative relative, Normal normal, const RayLanes<Lanes>& rays, uint32_t wanted,
+                           LaneHits<Lanes>& hits, uint64_t& exact_count) {
+  using F = typename Lanes::F;
+  const F sx = rays.shear[0], sy = rays.shear[1];
+  // t comes from the plane rather than from the weights: what vertices have along an axis that the plane is
+  // perpendicular to is then all that counts, which is what ray offsets rely on.
+  F x[3], y[3], z[3], depth = Lanes::set(0.0f);
+  for (uint32_t corner = 0; corner < 3; ++corner) {
+    const F p = relative(0, corner), q = relative(1, corner);
+    z[corner] = relative(2, corner);
+    if (corner == 0) depth = Lanes::fma(p, normal(0), Lanes::fma(q, normal(1), Lanes::mul(z[0], normal(2))));
+    x[corner] = Lanes::fnma(sx, z[corner], p);
+    y[corner] = Lanes::fnma(sy, z[corner], q);
+  }
+  const F u2 = Lanes::mul(y[2], x[1]), v2 = Lanes::mul(y[0], x[2]), w2 = Lanes::mul(y[1], x[0]);
+  const F u = Lanes::fms(x[2], y[1], u2), v = Lanes::fms(x[0], y[2], v2), w = Lanes::fms(x[1], y[0], w2);
+  const F least = Lanes::min(Lanes::min(u, v), w), most = Lanes::max(Lanes::max(u, v), w);
+  // p q' - q p' is off by at most 2^-24 (|q p'| + |result|), so its sign is right where it is larger than the error.
+  const F error =
+      Lanes::fma(Lanes::largest(Lanes::largest(u2, v2), w2), Lanes::set(kEdgeError), Lanes::set(kSmallestEdge));
+  const F below = Lanes::negate(error);
+  const uint32_t inside = (Lanes::less(error, least) | Lanes::less(most, below)) & wanted;
+  const uint32_t unsure = (Lanes::less_equal(below, least) | Lanes::less_equal(most, error)) & wanted & ~inside;
+  if constexpr (kWeights)
+    if ((inside | unsure) == 0) return 0;
+  const F along = Lanes::fma(sx, normal(0), Lanes::fma(sy, normal(1), normal(2)));
+  F t = Lanes::mul(Lanes::div(depth, along), rays.shear[2]);
+  uint32_t hit = inside & Lanes::less(rays.begin, t) & Lanes::less_equal(t, rays.end);
+  if constexpr (kWeights) {
+    if ((hit | unsure) == 0) return 0;
+    const F over = Lanes::div(Lanes::set(1.0f), Lanes::add(Lanes::add(u, v), w));
+    Lanes::store(hits.u, Lanes::mul(v, over));
+    Lanes::store(hits.v, Lanes::mul(w, over));
+    Lanes::store(hits.t, t);
+  }
+  if (unsure != 0) {
+    exact_count += static_cast<uint64_t>(__builtin_popcount(unsure));
+    const uint32_t exactly = test_exactly<Lanes>(unsure, x, y, z, rays.shear[2], hits);
+    t = Lanes::load(hits.t);
+    hit |= exactly & Lanes::less(rays.begin, t) & Lanes::less_equal(t, rays.end);
+  }
+  return hit;
 }
 
 } // namespace

@@ -70,6 +70,7 @@ size_t leaks(const Scene& scene, DVec3 inside, size_t count, PackedIsa isa) {
     const size_t now = std::min(count, kAtOnce);
     const std::vector<Ray> rays = rays_from_inside(baked.source, tracer.space(), inside, now, seed);
     for (const uint8_t hit : any(tracer, rays)) missed += hit == 0;
+    for (const RayHit& hit : closest(tracer, rays)) missed += !hit.valid();
     for (const RayHit& hit : closest(tracer, beams(rays))) missed += !hit.valid();
     count -= now;
   }
