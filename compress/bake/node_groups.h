@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "compress/bake/quantized_geometry.h"
-#include "compress/bvh/box_tree.h"
 #include "compress/format/leaf_nodes.h"
 
 namespace packtrace {
@@ -21,8 +20,7 @@ public:
   std::span<const uint32_t> ends() const { return ends_; }           ///< of groups
 
 private:
-  std::vector<TreeBox> boxes_;
-  std::vector<TreeGridBox> grid_boxes_, ordered_;
+  std::vector<TreeGridBox> boxes_;
   std::vector<LeafNode> nodes_;
   std::vector<Triangle> triangles_;
   std::vector<uint32_t> ends_;
