@@ -21,10 +21,7 @@ QuadVector cross(const QuadVector& a, const QuadVector& b) {
 }
 Quad dot(const QuadVector& a, const QuadVector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 QuadVector quad(DVec3 v) { return {v.x, v.y, v.z}; }
-
-double origin_ulp(const Ray& ray) {
-  return kUlp * double{std::max({std::abs(ray.origin.x), std::abs(ray.origin.y), std::abs(ray.origin.z)})};
-}
+double length(const QuadVector& v) { return std::sqrt(static_cast<double>(dot(v, v))); }
 
 /// The nearest t of candidates that are hit in (begin, end); infinity: none.
 double nearest(std::span<const ExactHit> candidates, double begin, double end) {
@@ -34,17 +31,30 @@ double nearest(std::span<const ExactHit> candidates, double begin, double end) {
   return least;
 }
 
+/// Named by rounding: an ulp of where the ray is then.
+constexpr double kAsideUlps = 4.0;
+bool nearly_hit(const Ray& ray, const ExactHit& hit) {
+  const DVec3 place = glm::abs(DVec3(ray.origin) + DVec3(ray.direction) * hit.t);
+  const double ulp = std::max(origin_ulp(ray), kUlp * std::max({place.x, place.y, place.z}));
+  return hit.hit || hit.aside <= kAsideUlps * ulp;
+}
+
 /// The ray's end, moved by as much as t may be off.
 double moved_end(const Ray& ray, double sign) {
   return std::isinf(ray.tfar) ? double{ray.tfar} : ray.tfar + sign * t_tolerance(ray, ray.tfar);
 }
 
-/// The nearest hit that nobody may miss, and the nearest that one may find.
+/// The nearest hit that nobody may miss.
 double surely(const Ray& ray, std::span<const ExactHit> candidates) {
   return nearest(candidates, ray.tnear + t_tolerance(ray, ray.tnear), moved_end(ray, -1.0));
 }
-double possibly(const Ray& ray, std::span<const ExactHit> candidates) {
-  return nearest(candidates, ray.tnear - t_tolerance(ray, ray.tnear), moved_end(ray, 1.0));
+
+/// Whether one may say that there is a hit.
+bool possibly(const Ray& ray, std::span<const ExactHit> candidates) {
+  const double begin = ray.tnear - t_tolerance(ray, ray.tnear), end = moved_end(ray, 1.0);
+  return std::any_of(candidates.begin(), candidates.end(), [&](const ExactHit& candidate) {
+    return candidate.t > begin && candidate.t < end && nearly_hit(ray, candidate);
+  });
 }
 
 /// The distinct triangles that systems name for one ray.
@@ -75,11 +85,28 @@ ExactHit exact_hit(const Ray& ray, const ExactTriangle& triangle) {
   const QuadVector a = quad(triangle[0]) - origin, b = quad(triangle[1]) - origin, c = quad(triangle[2]) - origin;
   const QuadVector normal = cross(b - a, c - a);
   const Quad along = dot(d, normal);
-  if (along == 0) return {};
-  const Quad u = dot(d, cross(c, b)), v = dot(d, cross(a, c)), w = dot(d, cross(b, a));
-  const bool hit = (u >= 0 && v >= 0 && w >= 0) || (u <= 0 && v <= 0 && w <= 0);
-  const auto length = std::sqrt(static_cast<double>(dot(normal, normal)));
-  return {hit, static_cast<double>(dot(a, normal) / along), std::abs(static_cast<double>(along)) / length};
+  ExactHit out;
+  out.aside = std::numeric_limits<double>::infinity();
+  if (along == 0) return out;
+  out.t = static_cast<double>(dot(a, normal) / along);
+  out.height = std::abs(static_cast<double>(along)) / length(normal);
+  // How far outside each edge, in the sense in which the ray goes through the plane.
+  const Quad sign = along < 0 ? 1 : -1;
+  out.aside = 0.0;
+  out.hit = true;
+  const std::array<const QuadVector*, 4> corners{&a, &b, &c, &a};
+  for (size_t i = 0; i < 3; ++i) {
+    const Quad outside = sign * dot(d, cross(*corners[i], *corners[i + 1]));
+    if (!(outside > 0)) continue;
+    out.hit = false;
+    const double distance = static_cast<double>(outside) / length(cross(d, *corners[i + 1] - *corners[i]));
+    out.aside = std::max(out.aside, distance); // infinite along the edge
+  }
+  return out;
+}
+
+double origin_ulp(const Ray& ray) {
+  return kUlp * double{std::max({std::abs(ray.origin.x), std::abs(ray.origin.y), std::abs(ray.origin.z)})};
 }
 
 double t_tolerance(const Ray& ray, double t) {
@@ -88,7 +115,7 @@ double t_tolerance(const Ray& ray, double t) {
 }
 
 void HitVerdicts::add(const HitVerdicts& other) {
-  missed += other.missed, unfounded += other.unfounded, farther += other.farther, beside += other.beside,
+  missed += other.missed, wrong += other.wrong, farther += other.farther, beside += other.beside,
       t_off += other.t_off;
   worst_t = std::max(worst_t, other.worst_t), worst_ulps = std::max(worst_ulps, other.worst_ulps);
 }
@@ -101,16 +128,16 @@ void judge_closest(const Ray& ray, std::span<const ExactHit> candidates, const s
     return;
   }
   const ExactHit& named = candidates[answer->candidate];
-  if (!named.hit) {
-    const double possible = possibly(ray, candidates);
-    if (!std::isfinite(possible))
-      ++out.unfounded;
-    else
-      ++(std::abs(answer->t - possible) <= t_tolerance(ray, possible) ? out.beside : out.farther);
+  if (!nearly_hit(ray, named)) {
+    ++out.wrong;
     return;
   }
   if (named.t > sure + t_tolerance(ray, sure)) {
     ++out.farther;
+    return;
+  }
+  if (!named.hit) {
+    ++out.beside;
     return;
   }
   const double error = std::abs(answer->t - named.t);
@@ -123,7 +150,7 @@ void judge_any(const Ray& ray, std::span<const ExactHit> candidates, bool occlud
   if (!occluded)
     out.missed += std::isfinite(surely(ray, candidates));
   else
-    out.unfounded += !std::isfinite(possibly(ray, candidates));
+    out.wrong += !possibly(ray, candidates);
 }
 
 ExactTriangles::ExactTriangles(const BakedFile& file, const UnitSpace& space) : file_(file) {

@@ -20,23 +20,27 @@ struct ExactHit {
   bool hit = false;    ///< within the triangle, edges included, before or behind the origin; not if along its plane
   double t = 0.0;      ///< of the plane, in lengths of the direction; 0 where the ray runs along it
   double height = 0.0; ///< what an error of 1 in t is off the plane
+  double aside = 0.0;  ///< how far the ray's line is from that of the edge that it passes farthest outside; 0: hit
 };
 ExactHit exact_hit(const Ray& ray, const ExactTriangle& triangle);
+
+/// 2^-23 of the largest coordinate of a ray's origin, in which distances off it are given.
+double origin_ulp(const Ray& ray);
 
 /// By how much t may be off before it counts: 1e-4 of it and a way of 4 ulp of the ray's origin.
 double t_tolerance(const Ray& ray, double t);
 
 /// What systems said of rays, sorted by what is true of the triangles that any of them names.
 struct HitVerdicts {
-  uint64_t missed = 0;    ///< no hit, though a triangle is hit
-  uint64_t unfounded = 0; ///< a hit, though none is
-  uint64_t farther = 0;   ///< a triangle beyond the nearest one
-  uint64_t beside = 0;    ///< a triangle that the ray passes, at the t of the one that it hits
-  uint64_t t_off = 0;     ///< the right triangle, at a t that is off
-  double worst_t = 0.0;   ///< relative error of t where the right triangle is named
-  double worst_ulps = 0.0; ///< there, how far the hit is off the triangle's plane, in 2^-23 of the origin's largest coordinate
+  uint64_t missed = 0;  ///< no hit, though a triangle is hit
+  uint64_t wrong = 0;   ///< a triangle that is not hit, by more than rounding, or any hit where nothing near is hit
+  uint64_t farther = 0; ///< a triangle beyond the nearest one
+  uint64_t beside = 0;  ///< a triangle that the ray passes outside by rounding: up to 4 ulp
+  uint64_t t_off = 0;   ///< the right triangle, at a t that is off
+  double worst_t = 0.0; ///< relative error of t where the right triangle is named
+  double worst_ulps = 0.0; ///< there, how far the hit is off the triangle's plane; ulp as in origin_ulp()
 
-  uint64_t wrong() const { return missed + unfounded + farther + beside + t_off; }
+  uint64_t all() const { return missed + wrong + farther + beside + t_off; }
   void add(const HitVerdicts& other);
 };
 

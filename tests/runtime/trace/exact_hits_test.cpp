@@ -29,16 +29,18 @@ HitVerdicts verdict(std::optional<NamedHit> answer, const std::vector<ExactHit>&
 }
 
 TEST(ExactHit, MeetsPlanesWhereTheyAre) {
-  const auto [hit, t, height] = exact_hit(kUp, at_height(1.0));
-  EXPECT_TRUE(hit);
-  EXPECT_EQ(t, 2.0);
-  EXPECT_EQ(height, 1.0);
+  const ExactHit straight = exact_hit(kUp, at_height(1.0));
+  EXPECT_TRUE(straight.hit);
+  EXPECT_EQ(straight.t, 2.0);
+  EXPECT_EQ(straight.height, 1.0);
+  EXPECT_EQ(straight.aside, 0.0);
   const ExactHit turned = exact_hit(kUp, {DVec3(0, 0, 1), DVec3(0, 1, 1), DVec3(1, 0, 1)});
   EXPECT_TRUE(turned.hit);
   EXPECT_EQ(turned.t, 2.0);
   const ExactHit beside = exact_hit(kUp, at_height(1.0, 2.0));
   EXPECT_FALSE(beside.hit);
   EXPECT_EQ(beside.t, 2.0);
+  EXPECT_EQ(beside.aside, 1.75); // of the edge x = 2
   EXPECT_FALSE(exact_hit(kUp, {DVec3(0, 0, 0), DVec3(1, 1, 0), DVec3(1, 1, 1)}).hit); // runs along it
   EXPECT_FALSE(exact_hit(kUp, {DVec3(0, 0, 1), DVec3(1, 1, 1), DVec3(1, 1, 1)}).hit); // no area
 }
@@ -66,51 +68,54 @@ TEST(ExactHit, DecidesSidesOfEdges) {
 }
 
 TEST(HitVerdicts, RightHitsAreNotWrong) {
-  EXPECT_EQ(verdict(NamedHit{0, 2.0}).wrong(), 0u);
-  EXPECT_EQ(verdict(NamedHit{0, 2.0001}).wrong(), 0u);
-  EXPECT_EQ(verdict(std::nullopt, {}).wrong(), 0u);
-  EXPECT_EQ(verdict(std::nullopt, {candidates()[2]}).wrong(), 0u);
+  EXPECT_EQ(verdict(NamedHit{0, 2.0}).all(), 0u);
+  EXPECT_EQ(verdict(NamedHit{0, 2.0001}).all(), 0u);
+  EXPECT_EQ(verdict(std::nullopt, {}).all(), 0u);
+  EXPECT_EQ(verdict(std::nullopt, {candidates()[2]}).all(), 0u);
 }
 
 TEST(HitVerdicts, SortWhatIsWrong) {
   const HitVerdicts missed = verdict(std::nullopt);
   EXPECT_EQ(missed.missed, 1u);
+  const HitVerdicts wrong = verdict(NamedHit{2, 2.0});
+  EXPECT_EQ(wrong.wrong, 1u);
   const HitVerdicts unfounded = verdict(NamedHit{0, 2.0}, {candidates()[2]});
-  EXPECT_EQ(unfounded.unfounded, 1u);
+  EXPECT_EQ(unfounded.wrong, 1u);
   const HitVerdicts farther = verdict(NamedHit{1, 4.0});
   EXPECT_EQ(farther.farther, 1u);
-  const HitVerdicts beside = verdict(NamedHit{2, 2.0});
+  const HitVerdicts beside = verdict(NamedHit{1, 2.0}, {candidates()[0], exact_hit(kUp, at_height(1.0, 0.25 + 0x1p-22))});
   EXPECT_EQ(beside.beside, 1u);
-  const HitVerdicts nowhere = verdict(NamedHit{2, 3.0});
-  EXPECT_EQ(nowhere.farther, 1u);
+  const HitVerdicts far_aside =
+      verdict(NamedHit{1, 2.0}, {candidates()[0], exact_hit(kUp, at_height(1.0, 0.25 + 0x1p-20))});
+  EXPECT_EQ(far_aside.wrong, 1u);
   const HitVerdicts off = verdict(NamedHit{0, 2.01});
   EXPECT_EQ(off.t_off, 1u);
   EXPECT_NEAR(off.worst_t, 0.005, 1e-9);
   EXPECT_NEAR(off.worst_ulps, 0.01 / 0x1p-23, 1e-3);
   EXPECT_EQ(verdict(NamedHit{0, std::numeric_limits<double>::quiet_NaN()}).t_off, 1u);
-  for (const HitVerdicts& one : {missed, unfounded, farther, beside, nowhere, off}) EXPECT_EQ(one.wrong(), 1u);
+  for (const HitVerdicts& one : {missed, wrong, unfounded, farther, beside, far_aside, off}) EXPECT_EQ(one.all(), 1u);
 }
 
 TEST(HitVerdicts, EndsOfRaysMayRound) {
   Ray ray = kUp;
   ray.tfar = 2.0f;
-  EXPECT_EQ(verdict(std::nullopt, candidates(ray), ray).wrong(), 0u);
-  EXPECT_EQ(verdict(NamedHit{0, 2.0}, candidates(ray), ray).wrong(), 0u);
+  EXPECT_EQ(verdict(std::nullopt, candidates(ray), ray).all(), 0u);
+  EXPECT_EQ(verdict(NamedHit{0, 2.0}, candidates(ray), ray).all(), 0u);
   ray.tfar = 2.01f;
   EXPECT_EQ(verdict(std::nullopt, candidates(ray), ray).missed, 1u);
   ray.tnear = 2.0f, ray.tfar = 100.0f;
-  EXPECT_EQ(verdict(NamedHit{1, 4.0}, candidates(ray), ray).wrong(), 0u);
+  EXPECT_EQ(verdict(NamedHit{1, 4.0}, candidates(ray), ray).all(), 0u);
 }
 
 TEST(HitVerdicts, AnyHits) {
   HitVerdicts out;
   judge_any(kUp, candidates(), true, out);
   judge_any(kUp, {}, false, out);
-  EXPECT_EQ(out.wrong(), 0u);
+  EXPECT_EQ(out.all(), 0u);
   judge_any(kUp, candidates(), false, out);
   EXPECT_EQ(out.missed, 1u);
   judge_any(kUp, {}, true, out);
-  EXPECT_EQ(out.unfounded, 1u);
+  EXPECT_EQ(out.wrong, 1u);
 }
 
 /// A tracer whose hits a test may change.
@@ -137,12 +142,12 @@ TEST(HitVerdicts, FindWhatIsWrongWithASystem) {
   const std::vector<SystemHits> systems{{&tracer, right, {}}, {&tracer, wrong, {}}};
   const std::vector<HitVerdicts> verdicts = judge(rays, triangles, systems);
   ASSERT_EQ(verdicts.size(), 2u);
-  EXPECT_EQ(verdicts[0].wrong(), 0u);
+  EXPECT_EQ(verdicts[0].all(), 0u);
   EXPECT_GT(verdicts[0].worst_ulps, 0.0);
   EXPECT_LT(verdicts[0].worst_ulps, 20.0);
   EXPECT_EQ(verdicts[1].missed, 1u);
   EXPECT_EQ(verdicts[1].t_off, 1u);
-  EXPECT_EQ(verdicts[1].wrong(), 2u);
+  EXPECT_EQ(verdicts[1].all(), 2u);
 }
 
 } // namespace
