@@ -1,7 +1,9 @@
 #include "compress/bake/node_groups.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cstring>
 #include <limits>
 
 #include "compress/format/index_codec.h"
@@ -12,21 +14,53 @@ namespace {
 
 constexpr uint32_t kCoordinateBits = 24; ///< whole numbers below 2^24, which floats hold
 
+/// The smallest box of whole coordinates below 2^kCoordinateBits that holds each of some points, on a coarser lattice
+/// where they lie farther apart.
+class PointBoxes {
+public:
+  explicit PointBoxes(std::span<const LatticePoint> points) {
+    LatticePoint lo = points[0], hi = points[0];
+    for (const LatticePoint& p : points)
+      for (size_t axis = 0; axis < 3; ++axis) lo[axis] = std::min(lo[axis], p[axis]), hi[axis] = std::max(hi[axis], p[axis]);
+    uint64_t extent = 0;
+    for (size_t axis = 0; axis < 3; ++axis) extent = std::max(extent, static_cast<uint64_t>(hi[axis] - lo[axis]));
+    const auto bits = static_cast<uint32_t>(std::bit_width(extent));
+    const uint32_t shift = bits > kCoordinateBits ? bits - kCoordinateBits : 0;
+    for (size_t i = 0; i < points.size(); ++i) {
+      TreeGridBox box;
+      for (size_t axis = 0; axis < 3; ++axis)
+        box.lo[axis] = box.hi[axis] = static_cast<int32_t>((points[i][axis] - lo[axis]) >> shift);
+      boxes_[i] = FloatBox::of(box);
+    }
+  }
+  FloatBox of(const Triangle& triangle) const {
+    FloatBox box = boxes_[triangle.x];
+    box.extend(boxes_[triangle.y]);
+    box.extend(boxes_[triangle.z]);
+    return box;
+  }
+
+private:
+  std::array<FloatBox, kMaxClusterVertices> boxes_;
+};
+
 /// A tree over boxes in any order: each run is split where the surface area heuristic says, of all splits along an
 /// axis by the boxes' centres.
 class SweepTree {
 public:
-  /// @param boxes 1..128, coordinates 0 .. 2^24 - 1
-  explicit SweepTree(std::span<const TreeGridBox> boxes) {
-    const auto count = static_cast<uint32_t>(boxes.size());
-    std::array<uint32_t, kMaxClusterTriangles> keys;
-    static_assert(kCoordinateBits + 1 + std::bit_width(kMaxClusterTriangles - 1) <= 32);
-    for (uint32_t i = 0; i < count; ++i) boxes_[i] = FloatBox::of(boxes[i]);
+  /// @param triangles 1..128
+  SweepTree(const PointBoxes& points, std::span<const Triangle> triangles) {
+    const auto count = static_cast<uint32_t>(triangles.size());
+    std::array<std::array<int32_t, 4>, kMaxClusterTriangles> centres; // doubled
+    for (uint32_t i = 0; i < count; ++i) {
+      boxes_[i] = points.of(triangles[i]);
+      const Int4 centre = __builtin_convertvector(boxes_[i].hi, Int4) - __builtin_convertvector(boxes_[i].minus_lo, Int4);
+      std::memcpy(centres[i].data(), &centre, sizeof centre);
+    }
     for (size_t axis = 0; axis < 3; ++axis) {
-      for (uint32_t i = 0; i < count; ++i)
-        keys[i] = static_cast<uint32_t>(boxes[i].lo[axis] + boxes[i].hi[axis]) * kMaxClusterTriangles + i;
-      std::sort(keys.begin(), keys.begin() + count);
-      for (uint32_t i = 0; i < count; ++i) order_[axis][i] = static_cast<uint8_t>(keys[i] % kMaxClusterTriangles);
+      std::array<uint32_t, kMaxClusterTriangles> along;
+      for (uint32_t i = 0; i < count; ++i) along[i] = static_cast<uint32_t>(centres[i][axis]);
+      sort(std::span(along).first(count), order_[axis]);
     }
     build(0, count);
   }
@@ -35,6 +69,19 @@ public:
   std::span<const uint8_t> order() const { return std::span(order_[0]).first(nodes_[0].count); }
 
 private:
+  /// The order of places along an axis, by their highest bits; equal ones in their order.
+  static void sort(std::span<const uint32_t> places, std::array<uint8_t, kMaxClusterTriangles>& order) {
+    constexpr uint32_t kBits = 8;
+    uint32_t most = 0;
+    for (const uint32_t place : places) most = std::max(most, place);
+    const auto bits = static_cast<uint32_t>(std::bit_width(most));
+    const uint32_t shift = bits > kBits ? bits - kBits : 0;
+    std::array<uint8_t, (1u << kBits) + 1> begin{};
+    for (const uint32_t place : places) ++begin[(place >> shift) + 1];
+    for (size_t i = 1; i < begin.size(); ++i) begin[i] = static_cast<uint8_t>(begin[i] + begin[i - 1]);
+    for (uint32_t i = 0; i < places.size(); ++i) order[begin[places[i] >> shift]++] = static_cast<uint8_t>(i);
+  }
+
   void build(uint32_t first, uint32_t count) {
     const uint32_t number = size_++;
     RunNode& node = nodes_[number];
@@ -101,34 +148,8 @@ private:
 
 } // namespace
 
-void NodeGroups::find(const QuantizedGeometry& geometry, std::span<const Triangle> triangles) {
-  LatticePoint lo, hi;
-  lo.fill(std::numeric_limits<int64_t>::max()), hi.fill(std::numeric_limits<int64_t>::min());
-  const auto position = [&](uint32_t vertex) -> const LatticePoint& {
-    return geometry.positions[geometry.vertices[vertex].position];
-  };
-  for (const Triangle& t : triangles)
-    for (int corner = 0; corner < 3; ++corner)
-      for (size_t axis = 0; axis < 3; ++axis) {
-        lo[axis] = std::min(lo[axis], position(t[corner])[axis]);
-        hi[axis] = std::max(hi[axis], position(t[corner])[axis]);
-      }
-  uint64_t extent = 0;
-  for (size_t axis = 0; axis < 3; ++axis) extent = std::max(extent, static_cast<uint64_t>(hi[axis] - lo[axis]));
-  const uint32_t bits = static_cast<uint32_t>(std::bit_width(extent));
-  const uint32_t shift = bits > kCoordinateBits ? bits - kCoordinateBits : 0; // coarser where the cluster is larger
-
-  boxes_.clear();
-  for (const Triangle& t : triangles) {
-    TreeGridBox& box = boxes_.emplace_back();
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const auto [least, most] = std::minmax({position(t.x)[axis], position(t.y)[axis], position(t.z)[axis]});
-      box.lo[axis] = static_cast<int32_t>((least - lo[axis]) >> shift);
-      box.hi[axis] = static_cast<int32_t>((most - lo[axis]) >> shift);
-    }
-  }
-
-  SweepTree tree(boxes_);
+void NodeGroups::find(std::span<const LatticePoint> positions, std::span<const Triangle> triangles) {
+  SweepTree tree(PointBoxes(positions), triangles);
   triangles_.clear(), ends_.clear(), nodes_.clear();
   for (const uint32_t i : tree.order()) triangles_.push_back(triangles[i]);
   choose_leaf_nodes(tree.nodes(), {}, nodes_);

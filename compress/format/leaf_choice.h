@@ -10,6 +10,7 @@
 namespace packtrace {
 
 using Float4 = float __attribute__((vector_size(16)));
+using Int4 = int32_t __attribute__((vector_size(16)));
 
 inline Float4 max_of(Float4 a, Float4 b) { return a > b ? a : b; }
 
@@ -33,7 +34,6 @@ struct FloatBox {
 
 /// Half the surface of a box, in the first lane.
 inline Float4 half_area(const FloatBox& box) {
-  using Int4 = int32_t __attribute__((vector_size(16)));
   const Float4 size = box.hi + box.minus_lo;
   const Float4 faces = size * __builtin_shuffle(size, Int4{1, 2, 0, 3});
   return faces + __builtin_shuffle(faces, Int4{1, 0, 3, 2}) + __builtin_shuffle(faces, Int4{2, 3, 0, 1});
