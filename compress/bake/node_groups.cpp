@@ -21,7 +21,8 @@ public:
   explicit PointBoxes(std::span<const LatticePoint> points) {
     LatticePoint lo = points[0], hi = points[0];
     for (const LatticePoint& p : points)
-      for (size_t axis = 0; axis < 3; ++axis) lo[axis] = std::min(lo[axis], p[axis]), hi[axis] = std::max(hi[axis], p[axis]);
+      for (size_t axis = 0; axis < 3; ++axis)
+        lo[axis] = std::min(lo[axis], p[axis]), hi[axis] = std::max(hi[axis], p[axis]);
     uint64_t extent = 0;
     for (size_t axis = 0; axis < 3; ++axis) extent = std::max(extent, static_cast<uint64_t>(hi[axis] - lo[axis]));
     const auto bits = static_cast<uint32_t>(std::bit_width(extent));
@@ -54,7 +55,8 @@ public:
     std::array<std::array<int32_t, 4>, kMaxClusterTriangles> centres; // doubled
     for (uint32_t i = 0; i < count; ++i) {
       boxes_[i] = points.of(triangles[i]);
-      const Int4 centre = __builtin_convertvector(boxes_[i].hi, Int4) - __builtin_convertvector(boxes_[i].minus_lo, Int4);
+      const Int4 centre =
+          __builtin_convertvector(boxes_[i].hi, Int4) - __builtin_convertvector(boxes_[i].minus_lo, Int4);
       std::memcpy(centres[i].data(), &centre, sizeof centre);
     }
     for (size_t axis = 0; axis < 3; ++axis) {

@@ -52,17 +52,19 @@ struct RunSplit {
   uint32_t left;
 
   void improve(float other, uint32_t at, uint32_t count) {
-    const auto off_middle = [count](uint32_t split) { return split > count - split ? 2 * split - count : count - 2 * split; };
+    const auto off_middle = [count](uint32_t split) {
+      return split > count - split ? 2 * split - count : count - 2 * split;
+    };
     if (other < cost || (other == cost && off_middle(at) < off_middle(left))) cost = other, left = at;
   }
 };
 
 /// A node of a binary tree over runs of a cluster's triangles, in preorder: the left child is the next node.
 struct RunNode {
-  float area;                                ///< half the surface of its box
-  uint8_t first, count, right;               ///< triangles; the right child's number
-  bool is_node;                              ///< rather than nodes on both sides
-  float node_cost;                           ///< as one node or several
+  float area;                                     ///< half the surface of its box
+  uint8_t first, count, right;                    ///< triangles; the right child's number
+  bool is_node;                                   ///< rather than nodes on both sides
+  float node_cost;                                ///< as one node or several
   alignas(16) float leaf_cost[baked::kNodeWidth]; ///< as i leaves at most, in [i - 1]
 };
 

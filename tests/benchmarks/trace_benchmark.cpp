@@ -201,9 +201,10 @@ std::vector<std::vector<HitVerdicts>> judge_phases(const TraceInput& input, cons
 /// Who is right where systems disagree.
 Json compare_with_exact_hits(const TraceInput& input, const Systems& systems) {
   const std::vector<std::vector<HitVerdicts>> verdicts = judge_phases(input, systems);
-  fmt::print("\nagainst exact hits: missed / wrong / farther / beside / t off; largest error of t, relative, and in ulp off "
-             "the plane\n\n| system | call | primary | ao any | ao closest | primary | ao closest |\n"
-             "|---|---|---|---|---|---|---|\n");
+  fmt::print(
+      "\nagainst exact hits: missed / wrong / farther / beside / t off; largest error of t, relative, and in ulp off "
+      "the plane\n\n| system | call | primary | ao any | ao closest | primary | ao closest |\n"
+      "|---|---|---|---|---|---|---|\n");
   Json json = Json::array();
   for (size_t s = 0; s < systems.rows.size(); ++s) {
     const System& row = systems.rows[s];
@@ -215,8 +216,11 @@ Json compare_with_exact_hits(const TraceInput& input, const Systems& systems) {
       Json of_phase{{"phase", rays.name}, {"missed", v.missed}, {"wrong", v.wrong}};
       counts += fmt::format(" {} / {}", v.missed, v.wrong);
       if (!rays.any) {
-        of_phase.update(Json{{"farther", v.farther}, {"beside", v.beside}, {"t_off", v.t_off},
-                             {"worst_relative_t", v.worst_t}, {"worst_ulps_off_plane", v.worst_ulps}});
+        of_phase.update(Json{{"farther", v.farther},
+                             {"beside", v.beside},
+                             {"t_off", v.t_off},
+                             {"worst_relative_t", v.worst_t},
+                             {"worst_ulps_off_plane", v.worst_ulps}});
         counts += fmt::format(" / {} / {} / {}", v.farther, v.beside, v.t_off);
         errors += fmt::format(" {:.2g}, {:.1f} |", v.worst_t, v.worst_ulps);
       }

@@ -115,8 +115,7 @@ double t_tolerance(const Ray& ray, double t) {
 }
 
 void HitVerdicts::add(const HitVerdicts& other) {
-  missed += other.missed, wrong += other.wrong, farther += other.farther, beside += other.beside,
-      t_off += other.t_off;
+  missed += other.missed, wrong += other.wrong, farther += other.farther, beside += other.beside, t_off += other.t_off;
   worst_t = std::max(worst_t, other.worst_t), worst_ulps = std::max(worst_ulps, other.worst_ulps);
 }
 
@@ -181,8 +180,8 @@ std::vector<HitVerdicts> judge(std::span<const Ray> rays, const ExactTriangles& 
         if (systems[s].hits.empty() || !systems[s].hits[i].valid()) continue;
         const RayHit& hit = systems[s].hits[i];
         const HitSurface surface = systems[s].tracer->resolve(hit);
-        answers[s] = NamedHit{candidates.add(surface.placement->instance, surface.triangle),
-                              double{hit.t} * systems[s].t_scale};
+        answers[s] =
+            NamedHit{candidates.add(surface.placement->instance, surface.triangle), double{hit.t} * systems[s].t_scale};
       }
       for (size_t s = 0; s < systems.size(); ++s) {
         if (!systems[s].any.empty())

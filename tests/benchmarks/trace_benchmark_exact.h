@@ -32,12 +32,12 @@ double t_tolerance(const Ray& ray, double t);
 
 /// What systems said of rays, sorted by what is true of the triangles that any of them names.
 struct HitVerdicts {
-  uint64_t missed = 0;  ///< no hit, though a triangle is hit
-  uint64_t wrong = 0;   ///< a triangle that is not hit, by more than rounding, or any hit where nothing near is hit
-  uint64_t farther = 0; ///< a triangle beyond the nearest one
-  uint64_t beside = 0;  ///< a triangle that the ray passes outside by rounding: up to 4 ulp
-  uint64_t t_off = 0;   ///< the right triangle, at a t that is off
-  double worst_t = 0.0; ///< relative error of t where the right triangle is named
+  uint64_t missed = 0;     ///< no hit, though a triangle is hit
+  uint64_t wrong = 0;      ///< a triangle that is not hit, by more than rounding, or any hit where nothing near is hit
+  uint64_t farther = 0;    ///< a triangle beyond the nearest one
+  uint64_t beside = 0;     ///< a triangle that the ray passes outside by rounding: up to 4 ulp
+  uint64_t t_off = 0;      ///< the right triangle, at a t that is off
+  double worst_t = 0.0;    ///< relative error of t where the right triangle is named
   double worst_ulps = 0.0; ///< there, how far the hit is off the triangle's plane; ulp as in origin_ulp()
 
   uint64_t all() const { return missed + wrong + farther + beside + t_off; }
@@ -71,9 +71,9 @@ private:
 /// Hits of some rays by one system.
 struct SystemHits {
   const RayTracer* tracer;
-  std::span<const RayHit> hits;   ///< empty: it was asked for any hit
-  std::span<const uint8_t> any;   ///< then: its answers
-  double t_scale = 1.0;           ///< what one of its lengths is in the rays' space
+  std::span<const RayHit> hits; ///< empty: it was asked for any hit
+  std::span<const uint8_t> any; ///< then: its answers
+  double t_scale = 1.0;         ///< what one of its lengths is in the rays' space
 };
 
 /// Verdicts for each system. Candidates are what those with hits name.

@@ -54,7 +54,8 @@ Scene load_trace_scene(const std::string& name, const TraceInputOptions& options
     scenegen::generate_forest(config, {folder.path(), true});
     return import(folder.path() / "forest.pbrt");
   }
-  if (fs::path(name).extension() == ".ptk") throw Error(ErrorKind::kUsage, name + ": a scene is needed, not a baked one");
+  if (fs::path(name).extension() == ".ptk")
+    throw Error(ErrorKind::kUsage, name + ": a scene is needed, not a baked one");
   return import(name);
 }
 

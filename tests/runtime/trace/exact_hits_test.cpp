@@ -40,7 +40,7 @@ TEST(ExactHit, MeetsPlanesWhereTheyAre) {
   const ExactHit beside = exact_hit(kUp, at_height(1.0, 2.0));
   EXPECT_FALSE(beside.hit);
   EXPECT_EQ(beside.t, 2.0);
-  EXPECT_EQ(beside.aside, 1.75); // of the edge x = 2
+  EXPECT_EQ(beside.aside, 1.75);                                                      // of the edge x = 2
   EXPECT_FALSE(exact_hit(kUp, {DVec3(0, 0, 0), DVec3(1, 1, 0), DVec3(1, 1, 1)}).hit); // runs along it
   EXPECT_FALSE(exact_hit(kUp, {DVec3(0, 0, 1), DVec3(1, 1, 1), DVec3(1, 1, 1)}).hit); // no area
 }
@@ -83,7 +83,8 @@ TEST(HitVerdicts, SortWhatIsWrong) {
   EXPECT_EQ(unfounded.wrong, 1u);
   const HitVerdicts farther = verdict(NamedHit{1, 4.0});
   EXPECT_EQ(farther.farther, 1u);
-  const HitVerdicts beside = verdict(NamedHit{1, 2.0}, {candidates()[0], exact_hit(kUp, at_height(1.0, 0.25 + 0x1p-22))});
+  const HitVerdicts beside =
+      verdict(NamedHit{1, 2.0}, {candidates()[0], exact_hit(kUp, at_height(1.0, 0.25 + 0x1p-22))});
   EXPECT_EQ(beside.beside, 1u);
   const HitVerdicts far_aside =
       verdict(NamedHit{1, 2.0}, {candidates()[0], exact_hit(kUp, at_height(1.0, 0.25 + 0x1p-20))});
@@ -126,8 +127,7 @@ TEST(HitVerdicts, FindWhatIsWrongWithASystem) {
   scene.instances.push_back({0, Affine(test::placed({3, 0, 0}, {1, 0.5, 2}, 30))});
   const test::BakedScene baked(scene);
   const PackedTracer tracer(baked.file, baked.source);
-  const std::vector<Ray> rays =
-      test::random_rays(2000, baked.file.world_bounds(), tracer.space());
+  const std::vector<Ray> rays = test::random_rays(2000, baked.file.world_bounds(), tracer.space());
   const std::vector<RayHit> right = test::closest(tracer, rays);
   std::vector<RayHit> wrong = right;
   uint32_t hits = 0;
