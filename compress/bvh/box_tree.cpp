@@ -42,7 +42,8 @@ struct BinAxis {
 /// Splits runs of boxes.
 class Splitter {
 public:
-  explicit Splitter(std::span<const TreeBox> boxes) : boxes_(boxes) {}
+  /// @param unit boxes that cost as much as one, once there is one: a leaf
+  explicit Splitter(std::span<const TreeBox> boxes, uint32_t unit = 1) : boxes_(boxes), unit_(unit) {}
 
   /// The boxes' centres' box, and what holds them all.
   TreeBox measure(std::span<const uint32_t> order, TreeBox& whole) const {
@@ -105,13 +106,13 @@ private:
     TreeBox box = empty_box();
     for (uint32_t b = bins.bins, n = 0; b-- > 1;) {
       if (counts[b] > 0) box.extend(boxes[b]), n += counts[b];
-      right_cost[b] = n > 0 ? box.half_area() * n : -1.0;
+      right_cost[b] = n > 0 ? box.half_area() * units(n) : -1.0;
     }
     box = empty_box();
     for (uint32_t b = 1, n = 0; b < bins.bins; ++b) {
       if (counts[b - 1] > 0) box.extend(boxes[b - 1]), n += counts[b - 1];
       if (n == 0 || right_cost[b] < 0.0) continue;
-      const double cost = box.half_area() * n + right_cost[b];
+      const double cost = box.half_area() * units(n) + right_cost[b];
       if (cost < best.cost) best = {cost, axis, b};
     }
   }
@@ -126,7 +127,10 @@ private:
                      [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
   }
 
+  double units(uint32_t count) const { return unit_ == 1 ? count : (count + unit_ - 1) / unit_; }
+
   std::span<const TreeBox> boxes_;
+  const uint32_t unit_;
 };
 
 class Builder {
@@ -183,7 +187,7 @@ std::vector<uint32_t> cut_boxes(std::span<const TreeBox> boxes, uint32_t max_cou
   std::vector<uint32_t> ends;
   std::vector<Run> waiting;
   if (!boxes.empty()) waiting.push_back({0, static_cast<uint32_t>(boxes.size()), kDefaultTreeDepth});
-  const Splitter splitter(boxes);
+  const Splitter splitter(boxes, max_count);
   while (!waiting.empty()) {
     const Run run = waiting.back();
     waiting.pop_back();
