@@ -11,8 +11,8 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kMaxBins = 16;
-constexpr uint32_t kParallelCount = 2048; // smaller subtrees are built by one thread
+constexpr uint32_t kUsualBins = 16, kMaxBins = 64; // more where a cut must fill leaves
+constexpr uint32_t kParallelCount = 2048;          // smaller subtrees are built by one thread
 
 TreeBox empty_box() {
   constexpr float kInf = std::numeric_limits<float>::infinity();
@@ -69,7 +69,7 @@ public:
     if (!must_halve) {
       std::array<BinAxis, 3> axes;
       for (size_t axis = 0; axis < 3; ++axis) {
-        axes[axis].bins = std::min(kMaxBins, 2 * count);
+        axes[axis].bins = std::min(unit_ == 1 ? kUsualBins : kMaxBins, 2 * count);
         axes[axis].low = 2.0 * centres.lo[axis];
         const double extent = 2.0 * (double{centres.hi[axis]} - centres.lo[axis]);
         axes[axis].scale = extent > 0.0 ? axes[axis].bins / extent : 0.0;
@@ -95,14 +95,15 @@ private:
 
   void find_split(std::span<const uint32_t> order, const BinAxis& bins, size_t axis, Split& best) const {
     std::array<TreeBox, kMaxBins> boxes;
-    std::array<uint32_t, kMaxBins> counts{};
+    std::array<uint32_t, kMaxBins> counts;
+    std::fill_n(counts.begin(), bins.bins, 0u);
     for (uint32_t b = 0; b < bins.bins; ++b) boxes[b] = empty_box();
     for (const uint32_t i : order) {
       const uint32_t b = bins(rounded_centre(boxes_[i], axis));
       boxes[b].extend(boxes_[i]);
       ++counts[b];
     }
-    std::array<double, kMaxBins> right_cost{}; // of bins b and above
+    std::array<double, kMaxBins> right_cost; // of bins b and above, b > 0
     TreeBox box = empty_box();
     for (uint32_t b = bins.bins, n = 0; b-- > 1;) {
       if (counts[b] > 0) box.extend(boxes[b]), n += counts[b];
