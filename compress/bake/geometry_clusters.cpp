@@ -7,7 +7,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
-#include "compress/bake/clusterize.h"
+#include "compress/bake/cluster_cutter.h"
 #include "compress/bake/morton.h"
 #include "compress/bake/weld_table.h"
 #include "compress/format/baked_format.h"
@@ -50,27 +50,24 @@ private:
 
 /// Clusters of the sorted triangles of a chunk, which their `order` counts.
 Clusters split_chunk(const QuantizedGeometry& geometry, std::span<const SortKey> keys) {
-  Renumbering vertex_numbers(3 * keys.size()), point_numbers(3 * keys.size());
-  std::vector<Triangle> vertices, points;
-  std::vector<DVec3> centroids;
-  vertices.reserve(keys.size()), points.reserve(keys.size()), centroids.reserve(keys.size());
+  Renumbering vertex_numbers(3 * keys.size());
+  std::vector<Triangle> vertices;
+  std::vector<TreeBox> boxes;
+  vertices.reserve(keys.size()), boxes.reserve(keys.size());
   for (const SortKey& key : keys) {
     const Triangle& t = geometry.triangles[key.triangle];
-    Triangle vertex{}, point{};
-    DVec3 sum(0.0);
+    Triangle vertex{};
     for (int corner = 0; corner < 3; ++corner) {
       vertex[corner] = vertex_numbers(t[corner]);
-      const uint32_t position = geometry.vertices[t[corner]].position;
-      point[corner] = point_numbers(position);
-      for (int axis = 0; axis < 3; ++axis) {
-        const auto i = static_cast<size_t>(axis);
-        sum[axis] += static_cast<double>(geometry.positions[position][i] - geometry.origin[i]);
-      }
+      const LatticePoint& position = geometry.positions[geometry.vertices[t[corner]].position];
+      TreeBox point;
+      for (size_t axis = 0; axis < 3; ++axis)
+        point.lo[axis] = point.hi[axis] = static_cast<float>(position[axis] - geometry.origin[axis]);
+      corner == 0 ? boxes.push_back(point) : boxes.back().extend(point);
     }
-    vertices.push_back(vertex), points.push_back(point), centroids.push_back(sum);
+    vertices.push_back(vertex);
   }
-  return clusterize({vertices, points, centroids, static_cast<uint32_t>(vertex_numbers.values.size()),
-                     static_cast<uint32_t>(point_numbers.values.size())});
+  return cut_clusters(boxes, vertices, static_cast<uint32_t>(vertex_numbers.values.size()));
 }
 
 /// Rank of each kind: slots, which are ordered by class, so that classes are contiguous.

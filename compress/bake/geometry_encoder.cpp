@@ -70,18 +70,22 @@ private:
     const TriangleKind& kind = geometry_.kinds[cluster.kind];
     VertexNumbers numbers;
     std::vector<Triangle> local_triangles;
-    groups_.find(geometry_, std::span(all_.triangles).subspan(cluster.first_triangle, cluster.triangle_count));
-    for (const Triangle& t : groups_.triangles())
-      local_triangles.emplace_back(numbers(t.x), numbers(t.y), numbers(t.z));
+    for (const Triangle& t : std::span(all_.triangles).subspan(cluster.first_triangle, cluster.triangle_count)) {
+      const uint32_t x = numbers(t.x), y = numbers(t.y), z = numbers(t.z); // in this order
+      local_triangles.emplace_back(x, y, z);
+    }
     const std::span<const uint32_t> used = numbers.values();
-    const Strips strips = find_strips(local_triangles, static_cast<uint32_t>(used.size()), groups_.ends());
+    std::vector<LatticePoint> places;
+    for (const uint32_t vertex : used) places.push_back(geometry_.positions[geometry_.vertices[vertex].position]);
+    groups_.find(places, local_triangles);
+    const Strips strips = find_strips(groups_.triangles(), static_cast<uint32_t>(used.size()), groups_.ends());
 
     std::vector<LatticePoint> positions;
     std::vector<uint32_t> codes;
     std::vector<UvLattice> uvs;
     for (const uint32_t local : strips.vertex_order) {
       const QuantizedVertex& v = geometry_.vertices[used[local]];
-      positions.push_back(geometry_.positions[v.position]);
+      positions.push_back(places[local]);
       if (!kind.flat) codes.push_back(v.normal_code);
       if (kind.uvs) uvs.push_back(v.uv);
     }
@@ -93,7 +97,7 @@ private:
 
     for (const uint32_t local : strips.vertex_order) expected_vertices_.push_back(used[local]);
     for (const uint32_t triangle : strips.triangle_order) {
-      const Triangle& t = local_triangles[triangle];
+      const Triangle& t = groups_.triangles()[triangle];
       expected_triangles_.emplace_back(used[t.x], used[t.y], used[t.z]);
     }
   }

@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "compress/bake/quantized_geometry.h"
-#include "compress/bvh/box_tree.h"
 #include "compress/format/leaf_nodes.h"
+#include "compress/format/position_grid.h"
+#include "pbrt_import/scene/math.h"
 
 namespace packtrace {
 
@@ -14,15 +14,14 @@ namespace packtrace {
 /// build_packed_trees() would make of them, had strips no say in their order.
 class NodeGroups {
 public:
-  /// @param triangles of a cluster, into geometry.vertices
-  void find(const QuantizedGeometry& geometry, std::span<const Triangle> triangles);
+  /// @param positions of a cluster's vertices, on the lattice; 1..256
+  /// @param triangles 1..128, into positions
+  void find(std::span<const LatticePoint> positions, std::span<const Triangle> triangles);
 
   std::span<const Triangle> triangles() const { return triangles_; } ///< group after group
   std::span<const uint32_t> ends() const { return ends_; }           ///< of groups
 
 private:
-  std::vector<TreeBox> boxes_;
-  std::vector<TreeGridBox> grid_boxes_, ordered_;
   std::vector<LeafNode> nodes_;
   std::vector<Triangle> triangles_;
   std::vector<uint32_t> ends_;

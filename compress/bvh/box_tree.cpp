@@ -11,8 +11,8 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kMaxBins = 16;
-constexpr uint32_t kParallelCount = 2048; // smaller subtrees are built by one thread
+constexpr uint32_t kUsualBins = 16, kMaxBins = 64; // more where a cut must fill leaves
+constexpr uint32_t kParallelCount = 2048;          // smaller subtrees are built by one thread
 
 TreeBox empty_box() {
   constexpr float kInf = std::numeric_limits<float>::infinity();
@@ -39,39 +39,27 @@ struct BinAxis {
   }
 };
 
-class Builder {
+/// Splits runs of boxes.
+class Splitter {
 public:
-  Builder(std::span<const TreeBox> boxes, BoxTree& tree) : boxes_(boxes), tree_(tree) {}
+  /// @param unit boxes that cost as much as one, once there is one: a leaf
+  explicit Splitter(std::span<const TreeBox> boxes, uint32_t unit = 1) : boxes_(boxes), unit_(unit) {}
 
-  /// Builds the subtree at `node` over order[first .. first + count), of at most `levels` levels.
-  void build(uint32_t node, uint32_t first, uint32_t count, uint32_t levels) {
-    BoxTreeNode& out = tree_.nodes[node];
-    out.first = first, out.count = count, out.right = 0;
-    const std::span<uint32_t> order = std::span(tree_.order).subspan(first, count);
-    out.box = empty_box();
+  /// The boxes' centres' box, and what holds them all.
+  TreeBox measure(std::span<const uint32_t> order, TreeBox& whole) const {
+    whole = empty_box();
     TreeBox centres = empty_box();
     for (const uint32_t i : order) {
       const TreeBox& box = boxes_[i];
-      out.box.extend(box);
+      whole.extend(box);
       for (size_t axis = 0; axis < 3; ++axis) {
         const auto place = static_cast<float>(0.5 * centre(box, axis));
         centres.lo[axis] = std::min(centres.lo[axis], place), centres.hi[axis] = std::max(centres.hi[axis], place);
       }
     }
-    if (count == 1) return;
-    const uint32_t left = split(order, centres, levels);
-    const uint32_t right = out.right = node + 2 * left;
-    const auto build_left = [=, this] { build(node + 1, first, left, levels - 1); };
-    const auto build_right = [=, this] { build(right, first + left, count - left, levels - 1); };
-    if (count >= kParallelCount) {
-      tbb::parallel_invoke(build_left, build_right);
-    } else {
-      build_left();
-      build_right();
-    }
+    return centres;
   }
 
-private:
   /// Sorts the boxes to the left and right; how many are on the left, 1 .. count - 1.
   uint32_t split(std::span<uint32_t> order, const TreeBox& centres, uint32_t levels) const {
     const auto count = static_cast<uint32_t>(order.size());
@@ -81,7 +69,7 @@ private:
     if (!must_halve) {
       std::array<BinAxis, 3> axes;
       for (size_t axis = 0; axis < 3; ++axis) {
-        axes[axis].bins = std::min(kMaxBins, 2 * count);
+        axes[axis].bins = std::min(unit_ == 1 ? kUsualBins : kMaxBins, 2 * count);
         axes[axis].low = 2.0 * centres.lo[axis];
         const double extent = 2.0 * (double{centres.hi[axis]} - centres.lo[axis]);
         axes[axis].scale = extent > 0.0 ? axes[axis].bins / extent : 0.0;
@@ -100,30 +88,32 @@ private:
     return count / 2;
   }
 
+private:
   static double rounded_centre(const TreeBox& box, size_t axis) {
     return 2.0 * double{static_cast<float>(0.5 * centre(box, axis))};
   }
 
   void find_split(std::span<const uint32_t> order, const BinAxis& bins, size_t axis, Split& best) const {
     std::array<TreeBox, kMaxBins> boxes;
-    std::array<uint32_t, kMaxBins> counts{};
+    std::array<uint32_t, kMaxBins> counts;
+    std::fill_n(counts.begin(), bins.bins, 0u);
     for (uint32_t b = 0; b < bins.bins; ++b) boxes[b] = empty_box();
     for (const uint32_t i : order) {
       const uint32_t b = bins(rounded_centre(boxes_[i], axis));
       boxes[b].extend(boxes_[i]);
       ++counts[b];
     }
-    std::array<double, kMaxBins> right_cost{}; // of bins b and above
+    std::array<double, kMaxBins> right_cost; // of bins b and above, b > 0
     TreeBox box = empty_box();
     for (uint32_t b = bins.bins, n = 0; b-- > 1;) {
       if (counts[b] > 0) box.extend(boxes[b]), n += counts[b];
-      right_cost[b] = n > 0 ? box.half_area() * n : -1.0;
+      right_cost[b] = n > 0 ? box.half_area() * units(n) : -1.0;
     }
     box = empty_box();
     for (uint32_t b = 1, n = 0; b < bins.bins; ++b) {
       if (counts[b - 1] > 0) box.extend(boxes[b - 1]), n += counts[b - 1];
       if (n == 0 || right_cost[b] < 0.0) continue;
-      const double cost = box.half_area() * n + right_cost[b];
+      const double cost = box.half_area() * units(n) + right_cost[b];
       if (cost < best.cost) best = {cost, axis, b};
     }
   }
@@ -138,10 +128,45 @@ private:
                      [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
   }
 
+  double units(uint32_t count) const { return unit_ == 1 ? count : (count + unit_ - 1) / unit_; }
+
   std::span<const TreeBox> boxes_;
+  const uint32_t unit_;
+};
+
+class Builder {
+public:
+  Builder(std::span<const TreeBox> boxes, BoxTree& tree) : splitter_(boxes), tree_(tree) {}
+
+  /// Builds the subtree at `node` over order[first .. first + count), of at most `levels` levels.
+  void build(uint32_t node, uint32_t first, uint32_t count, uint32_t levels) {
+    BoxTreeNode& out = tree_.nodes[node];
+    out.first = first, out.count = count, out.right = 0;
+    const std::span<uint32_t> order = std::span(tree_.order).subspan(first, count);
+    const TreeBox centres = splitter_.measure(order, out.box);
+    if (count == 1) return;
+    const uint32_t left = splitter_.split(order, centres, levels);
+    const uint32_t right = out.right = node + 2 * left;
+    const auto build_left = [=, this] { build(node + 1, first, left, levels - 1); };
+    const auto build_right = [=, this] { build(right, first + left, count - left, levels - 1); };
+    if (count >= kParallelCount) {
+      tbb::parallel_invoke(build_left, build_right);
+    } else {
+      build_left();
+      build_right();
+    }
+  }
+
+private:
+  const Splitter splitter_;
   BoxTree& tree_;
 };
 
+std::vector<uint32_t> counted(size_t count) {
+  std::vector<uint32_t> order(count);
+  for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+  return order;
+}
 } // namespace
 
 BoxTree build_box_tree(std::span<const TreeBox> boxes, uint32_t max_depth) {
@@ -149,10 +174,36 @@ BoxTree build_box_tree(std::span<const TreeBox> boxes, uint32_t max_depth) {
   BoxTree tree;
   if (boxes.empty()) return tree;
   tree.nodes.resize(2 * boxes.size() - 1);
-  tree.order.resize(boxes.size());
-  for (uint32_t i = 0; i < tree.order.size(); ++i) tree.order[i] = i;
+  tree.order = counted(boxes.size());
   Builder(boxes, tree).build(0, 0, static_cast<uint32_t>(boxes.size()), max_depth);
   return tree;
+}
+
+std::vector<uint32_t> cut_boxes(std::span<const TreeBox> boxes, uint32_t max_count, std::vector<uint32_t>& order) {
+  assert(boxes.size() <= uint64_t{1} << 31 && max_count > 0);
+  struct Run {
+    uint32_t first, count, levels;
+  };
+  order = counted(boxes.size());
+  std::vector<uint32_t> ends;
+  std::vector<Run> waiting;
+  if (!boxes.empty()) waiting.push_back({0, static_cast<uint32_t>(boxes.size()), kDefaultTreeDepth});
+  const Splitter splitter(boxes, max_count);
+  while (!waiting.empty()) {
+    const Run run = waiting.back();
+    waiting.pop_back();
+    if (run.count <= max_count) {
+      ends.push_back(run.first + run.count);
+      continue;
+    }
+    const std::span<uint32_t> numbers = std::span(order).subspan(run.first, run.count);
+    TreeBox whole;
+    const TreeBox centres = splitter.measure(numbers, whole);
+    const uint32_t left = splitter.split(numbers, centres, run.levels);
+    waiting.push_back({run.first + left, run.count - left, run.levels - 1});
+    waiting.push_back({run.first, left, run.levels - 1});
+  }
+  return ends;
 }
 
 } // namespace packtrace

@@ -37,12 +37,19 @@ struct BoxTree {
   std::vector<uint32_t> order; ///< numbers of the boxes, from left to right
 };
 
+inline constexpr uint32_t kDefaultTreeDepth = 40;
+
 /// Splits by the surface area heuristic over bins of the boxes' centres, and in half where that finds nothing or the
 /// tree would become deeper than max_depth. Time O(n log n) but for boxes of exponentially growing size, where it is
 /// O(n max_depth); on all threads; the result depends on the boxes only.
 /// Source: Wald, "On fast construction of SAH-based bounding volume hierarchies" (2007).
 /// @param boxes at most 2^31
 /// @param max_depth levels of nodes, 33 or more, so that any number of boxes fits
-BoxTree build_box_tree(std::span<const TreeBox> boxes, uint32_t max_depth = 40);
+BoxTree build_box_tree(std::span<const TreeBox> boxes, uint32_t max_depth = kDefaultTreeDepth);
+
+/// The largest subtrees of that tree that have at most `max_count` boxes, and nothing below them.
+/// @param order set to the boxes' numbers from left to right
+/// @return where the subtrees end in it, ascending
+std::vector<uint32_t> cut_boxes(std::span<const TreeBox> boxes, uint32_t max_count, std::vector<uint32_t>& order);
 
 } // namespace packtrace

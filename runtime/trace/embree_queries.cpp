@@ -32,8 +32,6 @@ const EmbreeTracer::Attachment& EmbreeTracer::attachment_of(uint32_t instance, u
   return attachments_[instance != RTC_INVALID_GEOMETRY_ID ? instance : geometry];
 }
 
-/// @param geometry RTC_INVALID_GEOMETRY_ID where there is no hit
-/// @param instance RTC_INVALID_GEOMETRY_ID for hits outside Embree instances
 RayHit EmbreeTracer::hit_of(float t, float u, float v, uint32_t instance, uint32_t geometry, uint32_t primitive) const {
   if (geometry == RTC_INVALID_GEOMETRY_ID) return {};
   const Attachment& attachment = attachment_of(instance, geometry);

@@ -60,6 +60,10 @@ public:
 
   /// For Embree's own queries, with rays in space() and a ray class as their mask; benchmarks compare them.
   RTCSceneTy* handle() const;
+  /// What such a query's result is, by Embree's numbers.
+  /// @param geometry RTC_INVALID_GEOMETRY_ID where there is no hit
+  /// @param instance RTC_INVALID_GEOMETRY_ID for hits outside Embree instances
+  RayHit hit_of(float t, float u, float v, uint32_t instance, uint32_t geometry, uint32_t primitive) const;
 
 private:
   struct Part;
@@ -87,7 +91,6 @@ private:
   const Attachment& attachment_of(uint32_t instance, uint32_t geometry) const;
   void closest_packets(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits) const;
   void closest_streams(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits) const;
-  RayHit hit_of(float t, float u, float v, uint32_t instance, uint32_t geometry, uint32_t primitive) const;
 
   const SceneSource& source_;
   EmbreeConfig config_;

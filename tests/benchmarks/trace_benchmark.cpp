@@ -1,7 +1,6 @@
 // The same recorded rays through every tracer there is, and through Embree in all its ways: docs/tracing.md.
 
 #include <algorithm>
-#include <charconv>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -19,8 +18,10 @@
 #include "tests/benchmarks/benchmark_main.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"
 #include "tests/benchmarks/trace_benchmark_embree.h"
+#include "tests/benchmarks/trace_benchmark_exact.h"
 #include "tests/benchmarks/trace_benchmark_inputs.h"
 #include "tests/benchmarks/trace_benchmark_rays.h"
+#include "tests/benchmarks/trace_benchmark_scales.h"
 
 namespace packtrace {
 namespace {
@@ -38,6 +39,8 @@ struct Options {
   uint32_t repeats = 5;
   bool cpu_clock = false;
   std::optional<double> max_mismatches;
+  std::vector<double> scales;
+  bool growth = false;
   std::vector<std::string> names;
 };
 
@@ -103,16 +106,6 @@ Systems make_systems(const TraceInput& input) {
   return out;
 }
 
-Camera choose_camera(const SceneSource& source, const Options& options) {
-  if (options.camera == "auto" || (options.camera == "0" && source.cameras().empty()))
-    return framing_camera(source.world_bounds(), options.size);
-  uint32_t index = 0;
-  const char* const end = options.camera.data() + options.camera.size();
-  if (std::from_chars(options.camera.data(), end, index).ptr != end || index >= source.cameras().size())
-    throw Error(ErrorKind::kUsage, "--camera " + options.camera + ": there is no such camera");
-  return source.cameras()[index];
-}
-
 double median(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   return values.empty() ? 0.0 : values[values.size() / 2];
@@ -171,6 +164,76 @@ void print_row(const Json& row) {
              wrong);
 }
 
+/// What any-hit rays meet, named by one system.
+std::vector<RayHit> nearest_hits(const RecordedRays& rays, const RayTracer& tracer) {
+  RecordedRays closest = rays;
+  closest.any = false;
+  RayResults results;
+  replay(closest, tracer, results, false);
+  return std::move(results.hits);
+}
+
+/// Verdicts on all rows, by phase.
+std::vector<std::vector<HitVerdicts>> judge_phases(const TraceInput& input, const Systems& systems) {
+  const System& truth = systems.rows[systems.truth];
+  const ExactTriangles triangles(input.file, truth.tracer->space());
+  std::vector<std::vector<HitVerdicts>> verdicts;
+  for (size_t phase = 0; phase < truth.rays->size(); ++phase) {
+    const RecordedRays& rays = (*truth.rays)[phase];
+    std::vector<SystemHits> all;
+    std::vector<std::vector<RayHit>> nearest; // only named
+    nearest.reserve(systems.rows.size());
+    for (const System& row : systems.rows)
+      all.push_back({row.tracer.get(), row.results[phase].hits, row.results[phase].occluded,
+                     truth.tracer->space().scale() / row.tracer->space().scale()});
+    if (rays.any)
+      for (const System& row : systems.rows)
+        if (&row == &truth || row.call == kRayTracer) {
+          nearest.push_back(nearest_hits((*row.rays)[phase], *row.tracer));
+          all.push_back({row.tracer.get(), nearest.back(), {}, 1.0});
+        }
+    verdicts.push_back(judge(rays.rays, triangles, all));
+    verdicts.back().resize(systems.rows.size());
+  }
+  return verdicts;
+}
+
+/// Who is right where systems disagree.
+Json compare_with_exact_hits(const TraceInput& input, const Systems& systems) {
+  const std::vector<std::vector<HitVerdicts>> verdicts = judge_phases(input, systems);
+  fmt::print(
+      "\nagainst exact hits: missed / wrong / farther / beside / t off; largest error of t, relative, and in ulp off "
+      "the plane\n\n| system | call | primary | ao any | ao closest | primary | ao closest |\n"
+      "|---|---|---|---|---|---|---|\n");
+  Json json = Json::array();
+  for (size_t s = 0; s < systems.rows.size(); ++s) {
+    const System& row = systems.rows[s];
+    Json out{{"system", row.name}, {"call", row.call}};
+    std::string counts, errors;
+    for (size_t phase = 0; phase < verdicts.size(); ++phase) {
+      const HitVerdicts& v = verdicts[phase][s];
+      const RecordedRays& rays = (*row.rays)[phase];
+      Json of_phase{{"phase", rays.name}, {"missed", v.missed}, {"wrong", v.wrong}};
+      counts += fmt::format(" {} / {}", v.missed, v.wrong);
+      if (!rays.any) {
+        of_phase.update(Json{{"farther", v.farther},
+                             {"beside", v.beside},
+                             {"t_off", v.t_off},
+                             {"worst_relative_t", v.worst_t},
+                             {"worst_ulps_off_plane", v.worst_ulps}});
+        counts += fmt::format(" / {} / {} / {}", v.farther, v.beside, v.t_off);
+        errors += fmt::format(" {:.2g}, {:.1f} |", v.worst_t, v.worst_ulps);
+      }
+      counts += " |";
+      out["phases"].push_back(std::move(of_phase));
+    }
+    fmt::print("| {} | {} |{}{}\n", row.name, row.call, counts, errors);
+    json.push_back(std::move(out));
+  }
+  std::fflush(stdout);
+  return json;
+}
+
 /// The renderer's passes with each tracer that it can use.
 Json measure_passes(const TraceInput& input, const Systems& systems, const PrimaryCamera& camera, float radius,
                     uint32_t threads, const Options& options) {
@@ -221,16 +284,11 @@ void check_mismatches(const Json& rows, const Systems& systems, double most) {
 Json measure_input(const std::string& name, const Options& options) {
   const std::unique_ptr<TraceInput> input = load_trace_input(name, options.inputs);
   Systems systems = make_systems(*input);
-  const float radius = default_ao_radius(input->source.world_bounds());
   const RayTracer& recorder = *systems.trees[systems.truth_trees];
-  PrimaryCamera camera(choose_camera(input->source, options), options.size);
-  std::vector<RecordedRays> recorded = record_frame(input->source, recorder, camera, radius);
-  if (recorded[1].count() == 0 && options.camera == "0") { // it looks past the scene
-    camera = PrimaryCamera(framing_camera(input->source.world_bounds(), options.size), options.size);
-    recorded = record_frame(input->source, recorder, camera, radius);
-  }
-  if (recorded[1].count() == 0) throw Error(ErrorKind::kInput, name + ": the camera sees nothing");
-  const auto frame = std::make_shared<const std::vector<RecordedRays>>(std::move(recorded));
+  RecordedFrame recorded = record_frame(input->source, recorder, options.camera, options.size);
+  const PrimaryCamera& camera = recorded.camera;
+  const float radius = recorded.ao_radius;
+  const auto frame = std::make_shared<const std::vector<RecordedRays>>(std::move(recorded.phases));
   for (System& row : systems.rows) {
     const bool same = row.tracer->space() == recorder.space();
     row.rays =
@@ -258,6 +316,7 @@ Json measure_input(const std::string& name, const Options& options) {
       json["rows"].push_back(row_json(*input, systems, row, threads));
       print_row(json["rows"].back());
     }
+    if (!json.contains("exact")) json["exact"] = compare_with_exact_hits(*input, systems); // the same for all threads
     for (Json& pass : measure_passes(*input, systems, camera, radius, threads, options))
       json["passes"].push_back(std::move(pass));
   }
@@ -289,6 +348,13 @@ int run(int argc, char** argv) {
                "CPU time of all threads divided by their number, not wall time: for machines that do other things");
   app.add_option("--max-mismatches", options.max_mismatches,
                  "fail if watertight systems differ from Embree robust in more than this share of a phase's rays");
+  app.add_option("--scales", options.scales,
+                 "instead: bakes the inputs (no .ptk files) at these scales and counts hits that are not those at 1")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::Range(1e-30, 1e30));
+  app.add_flag("--growth", options.growth,
+               "instead: times the input mesh against one of a sixteenth of its triangles, one thread");
   app.add_option("--json", options.json_file, "writes all figures here");
   app.add_option("INPUT", options.names,
                  "house, spaceship, bunny, killeroo, town; mesh and forest, which are generated; .ptk and .pbrt files "
@@ -307,7 +373,15 @@ int run(int argc, char** argv) {
   if (!options.json_file.empty()) out.open(options.json_file);
   Json json = describe_machine();
   json["clock"] = options.cpu_clock ? "cpu" : "wall";
-  for (const std::string& name : options.names) json["inputs"].push_back(measure_input(name, options));
+  if (options.growth)
+    json["growth"] = measure_growth(options.inputs, options.camera, options.size, options.repeats, options.cpu_clock);
+  for (const std::string& name : options.names) {
+    if (options.growth) break;
+    if (options.scales.empty())
+      json["inputs"].push_back(measure_input(name, options));
+    else
+      json["scales"].push_back(measure_scales(name, options.inputs, options.camera, options.size, options.scales));
+  }
   json["load_average_after"] = describe_machine()["load_average"];
   fmt::print("\n{}, load average {:.1f} before, {:.1f} after\n", json["cpu"].get<std::string>(),
              json["load_average"].get<double>(), json["load_average_after"].get<double>());

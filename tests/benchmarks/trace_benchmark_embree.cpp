@@ -19,8 +19,10 @@ struct Query {
   }
 };
 
-RayHit hit_of(float t, float u, float v, uint32_t geometry) {
-  return geometry == RTC_INVALID_GEOMETRY_ID ? RayHit{} : RayHit{t, u, v, 0, 0, 0};
+/// Embree's numbers as they are: looking up what they stand for is not what is measured.
+RayHit hit_of(float t, float u, float v, uint32_t instance, uint32_t geometry, uint32_t primitive) {
+  static_assert(RTC_INVALID_GEOMETRY_ID == ~0u); // + 1 is 0, a valid placement
+  return geometry == RTC_INVALID_GEOMETRY_ID ? RayHit{} : RayHit{t, u, v, instance + 1, geometry, primitive};
 }
 bool is_gap(const Ray& ray) { return !(ray.tnear <= ray.tfar); }
 
@@ -32,7 +34,7 @@ void closest_single(const Query& q, std::span<RayHit> hits) {
     if (is_gap(q.rays[i])) continue;
     set_ray(q.rays[i], q.ray_class, ray);
     rtcIntersect1(q.scene, &context, &ray);
-    hits[i] = hit_of(ray.ray.tfar, ray.hit.u, ray.hit.v, ray.hit.geomID);
+    hits[i] = hit_of(ray.ray.tfar, ray.hit.u, ray.hit.v, ray.hit.instID[0], ray.hit.geomID, ray.hit.primID);
   }
 }
 
@@ -59,7 +61,8 @@ void closest_packets(const Query& q, std::span<RayHit> hits) {
     forget_hits(lanes.hit);
     rtcIntersect16(packet.valid, q.scene, &context, &lanes);
     for (size_t i = 0; i < count; ++i)
-      hits[first + i] = hit_of(lanes.ray.tfar[i], lanes.hit.u[i], lanes.hit.v[i], lanes.hit.geomID[i]);
+      hits[first + i] = hit_of(lanes.ray.tfar[i], lanes.hit.u[i], lanes.hit.v[i], lanes.hit.instID[0][i],
+                               lanes.hit.geomID[i], lanes.hit.primID[i]);
   }
 }
 
@@ -83,8 +86,10 @@ void closest_stream(const Query& q, std::span<RayHit> hits) {
     const size_t count = std::min(kStream, q.rays.size() - first);
     for (size_t i = 0; i < count; ++i) set_ray(q.rays[first + i], q.ray_class, stream[i]);
     rtcIntersect1M(q.scene, &context, stream, static_cast<unsigned>(count), sizeof(RTCRayHit));
-    for (size_t i = 0; i < count; ++i)
-      hits[first + i] = hit_of(stream[i].ray.tfar, stream[i].hit.u, stream[i].hit.v, stream[i].hit.geomID);
+    for (size_t i = 0; i < count; ++i) {
+      const RTCHit& hit = stream[i].hit;
+      hits[first + i] = hit_of(stream[i].ray.tfar, hit.u, hit.v, hit.instID[0], hit.geomID, hit.primID);
+    }
   }
 }
 
@@ -105,7 +110,9 @@ public:
   std::string_view name() const override { return tracer_.name(); }
   std::string_view isa() const override { return tracer_.isa(); }
   const UnitSpace& space() const override { return tracer_.space(); }
-  HitSurface resolve(const RayHit&) const override { return {}; }
+  HitSurface resolve(const RayHit& hit) const override {
+    return tracer_.resolve(tracer_.hit_of(hit.t, hit.u, hit.v, hit.placement - 1, hit.part, hit.triangle));
+  }
   std::vector<ResidentPart> resident() const override { return tracer_.resident(); }
 
   void closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,

@@ -14,7 +14,7 @@ enum class EmbreeCall {
 };
 
 /// Traces the trees of an EmbreeTracer by one kind of call, whatever the order of rays; Embree's coherent or incoherent
-/// flag is set as the order says. A hit's placement only says that there is one; it cannot be resolved.
+/// flag is set as the order says.
 /// @param tracer outlives the result
 std::unique_ptr<RayTracer> direct_embree(const EmbreeTracer& tracer, EmbreeCall call);
 

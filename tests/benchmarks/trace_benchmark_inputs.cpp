@@ -6,17 +6,17 @@
 #include "assets/generator/forest.h"
 #include "compress/bake/bake_scene.h"
 #include "pbrt_import/import_scene.h"
+#include "pbrt_import/scene/error.h"
 
 namespace packtrace {
 namespace {
 
 namespace fs = std::filesystem;
 
-BakedFile bake(const fs::path& scene_file) {
+Scene import(const fs::path& scene_file) {
   Diagnostics diagnostics;
   Progress progress;
-  const Scene scene = import_scene(scene_file, {}, diagnostics, progress).scene;
-  return BakedFile::from_bytes(bake_to_bytes(scene, {}, diagnostics, progress).bytes, scene_file.string());
+  return import_scene(scene_file, {}, diagnostics, progress).scene;
 }
 
 /// A folder that goes when this does.
@@ -35,27 +35,35 @@ private:
   fs::path path_;
 };
 
-BakedFile find(const std::string& name, const TraceInputOptions& options) {
-  if (name == "town") return bake(fs::path(PACKTRACE_SOURCE_DIR) / "assets/town/town.pbrt");
-  if (name == "killeroo") return bake(options.scenes / name / "killeroo-simple.pbrt");
-  if (name == "house" || name == "spaceship" || name == "bunny") return bake(options.scenes / name / "scene.pbrt");
+} // namespace
+
+Scene load_trace_scene(const std::string& name, const TraceInputOptions& options) {
+  if (name == "town") return import(fs::path(PACKTRACE_SOURCE_DIR) / "assets/town/town.pbrt");
+  if (name == "killeroo") return import(options.scenes / name / "killeroo-simple.pbrt");
+  if (name == "house" || name == "spaceship" || name == "bunny") return import(options.scenes / name / "scene.pbrt");
   const TemporaryFolder folder;
   if (name == "mesh") {
     scenegen::DisplacedMeshConfig config;
     config.triangles = options.mesh_triangles;
     scenegen::generate_displaced_mesh(config, {folder.path(), true});
-    return bake(folder.path() / "mesh.pbrt");
+    return import(folder.path() / "mesh.pbrt");
   }
   if (name == "forest") {
     scenegen::ForestConfig config;
     config.instances = options.forest_instances;
     scenegen::generate_forest(config, {folder.path(), true});
-    return bake(folder.path() / "forest.pbrt");
+    return import(folder.path() / "forest.pbrt");
   }
-  return fs::path(name).extension() == ".ptk" ? BakedFile::open(name) : bake(name);
+  if (fs::path(name).extension() == ".ptk")
+    throw Error(ErrorKind::kUsage, name + ": a scene is needed, not a baked one");
+  return import(name);
 }
 
-} // namespace
+BakedFile bake_trace_scene(const Scene& scene, const std::string& name) {
+  Diagnostics diagnostics;
+  Progress progress;
+  return BakedFile::from_bytes(bake_to_bytes(scene, {}, diagnostics, progress).bytes, name);
+}
 
 uint64_t TraceInput::unique_triangles() const {
   uint64_t triangles = 0;
@@ -72,7 +80,9 @@ uint64_t TraceInput::placed_triangles() const {
 std::unique_ptr<TraceInput> load_trace_input(const std::string& name, const TraceInputOptions& options) {
   const fs::path path(name);
   const std::string shown = path.has_extension() ? path.stem().string() : name;
-  return std::make_unique<TraceInput>(shown, find(name, options));
+  return std::make_unique<TraceInput>(shown, path.extension() == ".ptk"
+                                                 ? BakedFile::open(path)
+                                                 : bake_trace_scene(load_trace_scene(name, options), name));
 }
 
 } // namespace packtrace

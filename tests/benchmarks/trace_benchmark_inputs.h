@@ -5,6 +5,7 @@
 #include <string>
 
 #include "compress/format/baked_file.h"
+#include "pbrt_import/scene/scene.h"
 #include "runtime/trace/packed_source.h"
 
 namespace packtrace {
@@ -30,6 +31,12 @@ struct TraceInput {
   uint64_t unique_triangles() const;
   uint64_t placed_triangles() const;
 };
+
+/// A scene to be baked, by name as below; not of a .ptk file. Throws as import_scene(), and Error(kUsage).
+Scene load_trace_scene(const std::string& name, const TraceInputOptions& options);
+
+/// Bakes with the defaults. Throws as bake_to_bytes().
+BakedFile bake_trace_scene(const Scene& scene, const std::string& name);
 
 /// By name: house, spaceship, bunny, killeroo, town (in assets), mesh (generated, of unique triangles), forest
 /// (generated, of instances); anything else is the path of a .ptk or .pbrt file. What is not packed is baked with the

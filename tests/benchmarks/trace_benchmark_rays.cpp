@@ -1,6 +1,7 @@
 #include "tests/benchmarks/trace_benchmark_rays.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <ctime>
 #include <limits>
@@ -8,8 +9,10 @@
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 
+#include "pbrt_import/scene/error.h"
 #include "runtime/stopwatch.h"
 #include "runtime/trace/primary_visibility.h"
+#include "tests/benchmarks/trace_benchmark_exact.h"
 
 namespace packtrace {
 namespace {
@@ -60,24 +63,25 @@ private:
   RecordedRays& out_;
 };
 
-/// Distances are known to a few roundings of where the ray starts, however near the hit is.
 bool differ(const Ray& ray, const RayHit& a, const RayHit& b, double t_scale) {
-  constexpr double kTolerance = 1e-4, kUlps = 4.0 * 0x1p-23;
   if (a.valid() != b.valid()) return true;
   if (!a.valid()) return false;
   const double ta = double(a.t), tb = double(b.t) * t_scale;
-  const Vec3 start = glm::abs(ray.origin);
-  return std::abs(ta - tb) > kTolerance * std::max(ta, tb) + kUlps * std::max({start.x, start.y, start.z});
+  return std::abs(ta - tb) > t_tolerance(ray, std::max(ta, tb));
 }
 
-} // namespace
-
-uint64_t RecordedRays::count() const {
-  return static_cast<uint64_t>(std::count_if(rays.begin(), rays.end(), [](const Ray& ray) { return !is_gap(ray); }));
+Camera choose_camera(const SceneSource& source, const std::string& camera, ImageSize size) {
+  if (camera == "auto" || (camera == "0" && source.cameras().empty()))
+    return framing_camera(source.world_bounds(), size);
+  uint32_t index = 0;
+  const char* const end = camera.data() + camera.size();
+  if (std::from_chars(camera.data(), end, index).ptr != end || index >= source.cameras().size())
+    throw Error(ErrorKind::kUsage, "--camera " + camera + ": there is no such camera");
+  return source.cameras()[index];
 }
 
-std::vector<RecordedRays> record_frame(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& camera,
-                                       float ao_radius) {
+std::vector<RecordedRays> record_phases(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& camera,
+                                        float ao_radius) {
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1); // so that tiles are in order
   std::vector<RecordedRays> frame(3);
   frame[0].name = "primary", frame[1].name = "ao any", frame[2].name = "ao closest";
@@ -91,6 +95,25 @@ std::vector<RecordedRays> record_frame(const SceneSource& source, const RayTrace
     config.falloff = falloff;
     trace_ao(source, RecordingTracer(tracer, frame[falloff ? 2 : 1]), gbuffer, config, 0, ao, progress);
   }
+  return frame;
+}
+
+} // namespace
+
+uint64_t RecordedRays::count() const {
+  return static_cast<uint64_t>(std::count_if(rays.begin(), rays.end(), [](const Ray& ray) { return !is_gap(ray); }));
+}
+
+RecordedFrame record_frame(const SceneSource& source, const RayTracer& tracer, const std::string& camera,
+                           ImageSize size) {
+  RecordedFrame frame{
+      PrimaryCamera(choose_camera(source, camera, size), size), default_ao_radius(source.world_bounds()), {}};
+  frame.phases = record_phases(source, tracer, frame.camera, frame.ao_radius);
+  if (frame.phases[1].count() == 0 && camera == "0") { // it looks past the scene
+    frame.camera = PrimaryCamera(framing_camera(source.world_bounds(), size), size);
+    frame.phases = record_phases(source, tracer, frame.camera, frame.ao_radius);
+  }
+  if (frame.phases[1].count() == 0) throw Error(ErrorKind::kInput, "the camera sees nothing");
   return frame;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -22,10 +23,19 @@ struct RecordedRays {
   uint64_t count() const;
 };
 
-/// The rays of one frame: "primary"; "ao any", without falloff; "ao closest", with it.
+/// One frame of a scene.
+struct RecordedFrame {
+  PrimaryCamera camera;
+  float ao_radius = 0.0f;
+  std::vector<RecordedRays> phases; ///< "primary"; "ao any", without falloff; "ao closest", with it
+};
+
+/// Records the rays of one frame.
 /// @param tracer of the source; its space is that of the rays
-std::vector<RecordedRays> record_frame(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& camera,
-                                       float ao_radius);
+/// @param camera number, or "auto"; that instead of camera 0 where it sees nothing
+/// Throws Error(kUsage) for a camera that is not there, Error(kInput) where it sees nothing.
+RecordedFrame record_frame(const SceneSource& source, const RayTracer& tracer, const std::string& camera,
+                           ImageSize size);
 
 /// Seconds that the renderer's passes over the same frame take, by phase: rays, what makes them and what is made of
 /// their hits. The least of `repeats`.
@@ -45,8 +55,7 @@ struct RayResults {
 /// @return seconds of wall time, or of CPU time of all threads
 double replay(const RecordedRays& recorded, const RayTracer& tracer, RayResults& results, bool cpu_clock);
 
-/// Rays of which two tracers disagree: whether there is a hit, or in t by more than 1e-4 of it and 4 ulp of the
-/// ray's origin.
+/// Rays of which two tracers disagree: whether there is a hit, or in t by more than t_tolerance().
 /// @param t_scale what a length of b is in a's space
 uint64_t mismatches(const RecordedRays& recorded, const RayResults& a, const RayResults& b, double t_scale);
 

@@ -1,10 +1,12 @@
 #include "compress/bake/clusterize.h"
 
 #include <algorithm>
+#include <limits>
 #include <set>
 
 #include <gtest/gtest.h>
 
+#include "compress/bake/cluster_cutter.h"
 #include "compress/format/index_codec.h"
 #include "tests/compress/test_scenes.h"
 
@@ -17,6 +19,35 @@ Clusters run(const Mesh& mesh) {
     centroids.emplace_back(DVec3(mesh.positions[t.x]) + DVec3(mesh.positions[t.y]) + DVec3(mesh.positions[t.z]));
   const auto vertices = static_cast<uint32_t>(mesh.positions.size());
   return clusterize({mesh.triangles, mesh.triangles, centroids, vertices, vertices});
+}
+
+Clusters cut(const Mesh& mesh) {
+  std::vector<TreeBox> boxes;
+  for (const Triangle& t : mesh.triangles) {
+    constexpr float kInf = std::numeric_limits<float>::infinity();
+    TreeBox box{{kInf, kInf, kInf}, {-kInf, -kInf, -kInf}};
+    for (int corner = 0; corner < 3; ++corner) {
+      const Vec3 p = mesh.positions[t[corner]];
+      box.extend({{p.x, p.y, p.z}, {p.x, p.y, p.z}});
+    }
+    boxes.push_back(box);
+  }
+  return cut_clusters(boxes, mesh.triangles, static_cast<uint32_t>(mesh.positions.size()));
+}
+
+/// Of the clusters' boxes, in x and y.
+double covered_area(const Mesh& mesh, const Clusters& clusters) {
+  double area = 0.0;
+  uint32_t begin = 0;
+  for (const uint32_t end : clusters.ends) {
+    Bounds box;
+    for (uint32_t i = begin; i < end; ++i)
+      for (int corner = 0; corner < 3; ++corner)
+        box.extend(DVec3(mesh.positions[mesh.triangles[clusters.order[i]][corner]]));
+    area += box.extent().x * box.extent().y;
+    begin = end;
+  }
+  return area;
 }
 
 void expect_valid(const Mesh& mesh, const Clusters& clusters) {
@@ -50,18 +81,7 @@ TEST(Clusterize, ClustersAreNinetyPercentFull) {
 
 TEST(Clusterize, ClustersAreCompact) {
   const Mesh mesh = test::grid_mesh(100);
-  const Clusters clusters = run(mesh);
-  double area = 0.0;
-  uint32_t begin = 0;
-  for (const uint32_t end : clusters.ends) {
-    Bounds box;
-    for (uint32_t i = begin; i < end; ++i)
-      for (int corner = 0; corner < 3; ++corner)
-        box.extend(DVec3(mesh.positions[mesh.triangles[clusters.order[i]][corner]]));
-    area += box.extent().x * box.extent().y;
-    begin = end;
-  }
-  EXPECT_LT(area, 2.5); // boxes of perfect squares would cover the unit square exactly once
+  EXPECT_LT(covered_area(mesh, run(mesh)), 2.5); // boxes of perfect squares would cover the unit square exactly once
 }
 
 TEST(Clusterize, EdgesOfManyTrianglesAreNoTrouble) {
@@ -73,6 +93,39 @@ TEST(Clusterize, EdgesOfManyTrianglesAreNoTrouble) {
   }
   fan.triangles.emplace_back(7, 7, 7);
   expect_valid(fan, run(fan));
+}
+
+TEST(CutClusters, EveryTriangleIsInOneClusterWithinTheLimits) {
+  for (const Mesh& mesh : {test::grid_mesh(1), test::grid_mesh(8), test::grid_mesh(60), test::sphere_mesh(40)})
+    expect_valid(mesh, cut(mesh));
+  expect_valid({}, cut({}));
+}
+
+/// Three vertices a triangle: 85 fill a cluster, so parts must be cut, and neighbours not joined.
+TEST(CutClusters, KeepsTheLimitOfVertices) {
+  Mesh loose;
+  for (uint32_t i = 0; i < 1000; ++i) {
+    const auto x = static_cast<float>(i % 37), y = static_cast<float>(i / 37);
+    for (const Vec3& corner : {Vec3(x, y, 0), Vec3(x + 0.5f, y, 0), Vec3(x, y + 0.5f, 0)})
+      loose.positions.push_back(corner);
+    loose.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+  }
+  const Clusters clusters = cut(loose);
+  expect_valid(loose, clusters);
+  EXPECT_LT(clusters.ends.size(), 1000u / 85 * 3);
+  Mesh same = loose; // nothing for a heuristic to go by
+  for (size_t i = 0; i < same.positions.size(); ++i) same.positions[i] = same.positions[i % 3];
+  expect_valid(same, cut(same));
+}
+
+TEST(CutClusters, ClustersAreMoreThanHalfFull) {
+  for (const Mesh& mesh : {test::grid_mesh(100), test::sphere_mesh(70)})
+    EXPECT_GE(static_cast<double>(mesh.triangles.size()) / static_cast<double>(cut(mesh).ends.size()), 70.0);
+}
+
+TEST(CutClusters, ClustersAreCompact) {
+  const Mesh mesh = test::grid_mesh(100);
+  EXPECT_LT(covered_area(mesh, cut(mesh)), 1.5);
 }
 
 } // namespace

@@ -34,9 +34,9 @@ protected:
 TEST_F(RealScene, HouseKeepsItsTrianglesInFewBytes) {
   const BakedScene baked = test::bake(load("house/scene.pbrt"));
   EXPECT_EQ(baked.report.file.triangles, 1571178u);
-  EXPECT_LT(baked.report.file.bytes_per_triangle, 8.1);                            // 7.99, 2.20 of them trees
+  EXPECT_LT(baked.report.file.bytes_per_triangle, 7.8);                            // 7.72, 2.1 of them trees
   EXPECT_LT(static_cast<double>(baked.report.file.bytes.indices), 0.78 * 1571178); // 0.763; u8 x 3 takes 3
-  EXPECT_GT(baked.report.file.triangles_per_cluster, 115.0);
+  EXPECT_GT(baked.report.file.triangles_per_cluster, 110.0); // 112.2, cut from a tree: fewer bytes than 125.6 grown
   EXPECT_LE(baked.report.max_position_error, baked.report.world_step * 0.5 + 1e-6);
   EXPECT_LE(baked.report.max_normal_error_degrees, 0.04);
 }

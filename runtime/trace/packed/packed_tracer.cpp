@@ -384,11 +384,12 @@ HitSurface PackedTracer::resolve(const RayHit& hit) const {
   surface.placement = &t.surfaces[instance];
   surface.geometry = source_.instances()[instance].geometry;
   surface.triangle = triangle_of(hit.part, instance, hit.triangle);
+  if (const packed::TraceCluster& cluster = t.clusters[hit.part]; (cluster.flags & packed::kWide) == 0) {
+    decode_vertices(cluster, hit.triangle, surface.vertices);
+    return surface;
+  }
   packed::DecodedBatch batch;
-  if (const packed::TraceCluster& cluster = t.clusters[hit.part]; (cluster.flags & packed::kWide) == 0)
-    kernels_.decode(cluster, hit.triangle, 1, batch);
-  else
-    t.scene.decode_wide(this, hit.part, hit.triangle, 1, batch);
+  t.scene.decode_wide(this, hit.part, hit.triangle, 1, batch);
   for (int corner = 0; corner < 3; ++corner)
     for (int axis = 0; axis < 3; ++axis) surface.vertices[corner][axis] = batch.vertex[axis][corner][0];
   return surface;

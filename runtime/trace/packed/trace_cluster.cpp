@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "compress/format/bit_stream.h"
+#include "runtime/trace/packed/batch_decode.h"
 
 namespace packtrace {
 namespace {
@@ -78,15 +79,44 @@ uint32_t decode_batch_exactly(const baked::TreeRecord& tree, const baked::Geomet
                               const ClusterView& cluster, uint32_t first, uint32_t count, packed::DecodedBatch& out) {
   count = std::min(count, packed::kBatch);
   const Shifts by = shifts(tree, geometry);
-  for (uint32_t i = 0; i < packed::kBatch; ++i) {
-    const Triangle triangle = cluster.triangle(first + (i < count ? i : 0));
+  for (uint32_t i = 0; i < count; ++i) {
+    const Triangle triangle = cluster.triangle(first + i);
     for (int corner = 0; corner < 3; ++corner) {
       const LatticePoint q = cluster.lattice(triangle[corner]);
       for (size_t axis = 0; axis < 3; ++axis)
         out.vertex[axis][corner][i] = tree_coordinate(q[axis], tree.origin[axis], by);
     }
   }
+  for (auto& axis : out.vertex)
+    for (auto& lanes : axis) std::fill(lanes + count, lanes + packed::kBatch, lanes[0]);
   return count;
+}
+
+void decode_vertices(const packed::TraceCluster& cluster, uint32_t triangle, Vec3 (&vertices)[3]) {
+  packed::BatchStrips batch;
+  packed::read_strips(cluster, triangle, 1, batch);
+  uint32_t fresh = batch.first_fresh, explicit_bit = batch.explicit_bit;
+  const uint32_t width = packed::index_bits(cluster);
+  const auto& widths = cluster.position_bits;
+  const uint32_t stride = uint32_t{widths[0]} + widths[1] + widths[2];
+  const float scale = packed::power_of_two(cluster.down);
+  for (uint32_t corner = 0; corner < 3; ++corner) { // the batch's list is the triangle's corners
+    uint32_t vertex = 0;
+    if (corner < batch.lead_count)
+      vertex = batch.lead[corner];
+    else if (((batch.fresh >> corner) & 1u) != 0)
+      vertex = fresh++;
+    else
+      vertex = static_cast<uint32_t>(packed::field(cluster.bits, explicit_bit, width)), explicit_bit += width;
+    uint64_t fields = packed::field(cluster.bits, cluster.position_bit + vertex * stride, stride);
+    for (int axis = 0; axis < 3; ++axis) {
+      const uint32_t bits = widths[axis];
+      const auto value = static_cast<uint32_t>(fields & ((uint64_t{1} << bits) - 1)) << cluster.up;
+      fields >>= bits;
+      vertices[corner][axis] =
+          static_cast<float>(static_cast<int32_t>(static_cast<uint32_t>(cluster.base[axis]) + value)) * scale;
+    }
+  }
 }
 
 } // namespace packtrace

@@ -10,7 +10,8 @@
 namespace packtrace {
 namespace {
 
-/// Decodes every run of up to 16 triangles of every cluster in batches, and counts those that differ.
+/// Decodes every run of up to 16 triangles of every cluster in batches, and its first triangle alone, and counts those
+/// that differ.
 size_t wrong_batches(const BakedFile& file, const packed::Kernels& kernels, size_t& batches) {
   const PackedTrees trees = build_packed_trees(file.sections());
   size_t wrong = 0;
@@ -27,6 +28,11 @@ size_t wrong_batches(const BakedFile& file, const packed::Kernels& kernels, size
           const uint32_t got = kernels.decode(cluster, first, count, decoded);
           decode_batch_exactly(tree, geometry, view, first, got, expected);
           bool same = got >= 1 && got <= std::min(count, packed::kBatch) && decoded.count == got;
+          Vec3 vertices[3];
+          decode_vertices(cluster, first, vertices);
+          for (int axis = 0; axis < 3; ++axis)
+            for (int corner = 0; corner < 3; ++corner)
+              same &= vertices[corner][axis] == expected.vertex[axis][corner][0];
           for (uint32_t i = 0; i < got; ++i)
             for (uint32_t axis = 0; axis < 3; ++axis)
               for (uint32_t corner = 0; corner < 3; ++corner)

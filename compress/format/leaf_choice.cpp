@@ -1,0 +1,104 @@
+#include "compress/format/leaf_choice.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace packtrace {
+namespace {
+
+constexpr uint32_t kWidth = baked::kNodeWidth;
+constexpr float kTypical = 64.0f; // triangles of a node
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+class Chooser {
+public:
+  Chooser(std::span<RunNode> nodes, const TreeCosts& costs)
+      : nodes_(nodes), costs_(costs),
+        extra_(static_cast<float>(costs.extra_node) * nodes[0].area * kTypical / static_cast<float>(nodes[0].count)) {
+    for (size_t i = nodes.size(); i-- > 0;) choose(nodes[i]);
+  }
+
+  void emit(std::vector<LeafNode>& out, uint32_t number = 0) const {
+    const RunNode& node = nodes_[number];
+    if (node.is_node) {
+      out.push_back({node.first, 0, {}});
+      emit_leaves(number, kWidth, out.back());
+    } else {
+      emit(out, number + 1);
+      emit(out, node.right);
+    }
+  }
+
+private:
+  /// The children of `node` have been chosen.
+  void choose(RunNode& node) const {
+    const bool may_be_leaf = node.count <= costs_.max_leaf_triangles;
+    const auto batches = static_cast<float>((node.count + kWidth - 1) / kWidth);
+    std::fill_n(node.leaf_cost, kWidth, may_be_leaf ? node.area * (leaf_ + batch_ * batches) : kInfinity);
+    float as_nodes = kInfinity;
+    if (node.count > 1) {
+      const RunNode &left = (&node)[1], &right = nodes_[node.right];
+      join(left, right, node);
+      as_nodes = left.node_cost + right.node_cost + extra_;
+    }
+    const float as_node = node.area * node_ + node.leaf_cost[kWidth - 1];
+    node.is_node = node.count == 1 || as_node <= as_nodes;
+    node.node_cost = node.is_node ? as_node : as_nodes;
+  }
+
+  /// The best i leaves of both sides together, for all i side by side: k on the left, i - k on the right.
+  static void join(const RunNode& left, const RunNode& right, RunNode& out) {
+    alignas(16) float of_right[2 * kWidth]; // [kWidth + i - 1]: as i leaves
+    std::fill_n(of_right, kWidth, kInfinity);
+    std::copy_n(right.leaf_cost, kWidth, of_right + kWidth);
+    Float4 low = load(out.leaf_cost), high = load(out.leaf_cost + 4);
+    for (uint32_t k = 1; k < kWidth; ++k) {
+      const float on_left = left.leaf_cost[k - 1];
+      const float* on_right = of_right + kWidth - k;
+      low = min_of(low, on_left + load(on_right));
+      high = min_of(high, on_left + load(on_right + 4));
+    }
+    std::memcpy(out.leaf_cost, &low, sizeof low);
+    std::memcpy(out.leaf_cost + 4, &high, sizeof high);
+  }
+
+  static Float4 load(const float* lanes) {
+    Float4 out;
+    std::memcpy(&out, lanes, sizeof out);
+    return out;
+  }
+  static Float4 min_of(Float4 a, Float4 b) { return a < b ? a : b; }
+
+  /// Leaves of the left child in the best `slots` of both; 0: one leaf is as good.
+  uint32_t leaves_on_left(const RunNode& node, uint32_t slots) const {
+    if (node.count == 1 || node.leaf_cost[slots - 1] == node.leaf_cost[0]) return 0;
+    const RunNode &left = (&node)[1], &right = nodes_[node.right];
+    uint32_t k = 1;
+    while (left.leaf_cost[k - 1] + right.leaf_cost[slots - k - 1] != node.leaf_cost[slots - 1]) ++k;
+    return k;
+  }
+
+  void emit_leaves(uint32_t number, uint32_t slots, LeafNode& out) const {
+    const RunNode& node = nodes_[number];
+    if (const uint32_t on_left = leaves_on_left(node, slots); on_left > 0) {
+      emit_leaves(number + 1, on_left, out);
+      emit_leaves(node.right, slots - on_left, out);
+    } else {
+      out.triangles[out.leaf_count++] = node.count;
+    }
+  }
+
+  std::span<RunNode> nodes_;
+  const TreeCosts& costs_;
+  const float extra_; ///< of one more node
+  const float node_ = static_cast<float>(costs_.node), leaf_ = static_cast<float>(costs_.leaf),
+              batch_ = static_cast<float>(costs_.batch);
+};
+
+} // namespace
+
+void choose_leaf_nodes(std::span<RunNode> nodes, const TreeCosts& costs, std::vector<LeafNode>& out) {
+  Chooser(nodes, costs).emit(out);
+}
+
+} // namespace packtrace
