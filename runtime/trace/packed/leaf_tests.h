@@ -81,6 +81,9 @@ inline uint32_t test_rays(const DecodedBatch& batch, const BatchNormals& normals
 template <typename Lanes>
 constexpr bool kPairs = Lanes::Wide::kLanes == 2 * kBatch;
 
+/// Rays of nearest hits that come to a leaf, of which those that hit are better found first.
+constexpr uint32_t kLeastTestedTwice = 4;
+
 /// Woop's axes of the rays in some lanes. False where they differ.
 template <typename Wide>
 inline bool same_axes(const RayGroup& group, uint32_t at, uint32_t wanted, uint32_t (&axis)[3]) {

@@ -293,8 +293,9 @@ private:
         alive_ &= ~rays_that_hit<Lanes>(batch, normals, group, rays, exact);
       } else {
         const uint64_t others = test_side_by_side(batch, normals, place, group, rays);
+        const bool many = kPairs<Lanes> && count_ones(others) >= kLeastTestedTwice;
         test_each(batch, normals, place, group,
-                  kPairs<Lanes> ? rays_that_hit<Lanes>(batch, normals, group, others, exact) : others);
+                  many ? rays_that_hit<Lanes>(batch, normals, group, others, exact) : others);
       }
       if constexpr (kCount) counters_->exact_triangles += exact;
       rays &= alive_;
