@@ -2,12 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "compress/format/packed_trees.h"
 #include "runtime/trace/lod_view.h"
 #include "runtime/trace/primary_visibility.h"
 #include "tests/runtime/trace/packed_scenes.h"
@@ -274,25 +272,6 @@ TEST(LodView, APixelIsAsWideAsNeighbouringRaysAreApart) {
     const double allowed = from.error_per_distance * distance;
     EXPECT_NEAR(error_in_pixels(view, a.origin + 5.0 * a.direction, allowed), 1.0, 0.02);
   }
-}
-
-TEST(ChosenTreeBuilder, OfAllClustersBuildsWhatTheWholeFileGets) {
-  const test::BakedScene baked(scene_of_spheres());
-  const BakedSections& sections = baked.file.sections();
-  const std::vector<uint8_t> joins = ChosenTreeBuilder::joins_world(sections);
-  std::vector<ChosenClusters> chosen{{baked::kWorldTree, {}}};
-  for (uint32_t g = 0; g < joins.size(); ++g) {
-    if (joins[g] == 0) chosen.push_back({g, {}});
-    std::vector<uint32_t>& clusters = (joins[g] != 0 ? chosen.front() : chosen.back()).clusters;
-    for (uint32_t c = 0; c < sections.geometries[g].cluster_count; ++c)
-      clusters.push_back(static_cast<uint32_t>(sections.geometries[g].first_cluster + c));
-  }
-  const PackedTrees expected = build_packed_trees(sections), built = ChosenTreeBuilder(sections, chosen).build();
-  ASSERT_GE(expected.trees.size(), 2u);
-  ASSERT_EQ(built.trees.size(), expected.trees.size());
-  ASSERT_EQ(built.nodes.size(), expected.nodes.size());
-  EXPECT_EQ(std::memcmp(built.trees.data(), expected.trees.data(), built.trees.size() * sizeof(baked::TreeRecord)), 0);
-  EXPECT_EQ(std::memcmp(built.nodes.data(), expected.nodes.data(), built.nodes.size() * sizeof(baked::PackedNode)), 0);
 }
 
 } // namespace
