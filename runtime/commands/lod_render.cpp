@@ -30,6 +30,11 @@ SharingScheme scheme_of(const std::string& name) {
               "--lod-scheme " + name + ": there are steps, per-level, one-provider, per-instance and off");
 }
 
+void require_one_of(const char* option, const std::optional<std::string>& value, const char* a, const char* b) {
+  if (value && *value != a && *value != b)
+    throw Error(ErrorKind::kUsage, fmt::format("{} {}: there are {} and {}", option, *value, a, b));
+}
+
 const char* name_of(SharingScheme scheme) {
   return std::ranges::find(kSchemes, scheme, &std::pair<const char*, SharingScheme>::second)->first;
 }
@@ -136,25 +141,44 @@ void add_lod_options(CLI::App& verb, LodOptions& options) {
       ->type_name("N")
       ->group(kGroup);
   verb.add_option("--lod-culled-scale", options.culled_scale,
-                  "How many times the error is allowed where the camera does not look (default 1)")
+                  "How many times the error is allowed for instances that --lod-cull names (default 1)")
       ->type_name("S")
+      ->group(kGroup);
+  verb.add_option("--lod-cull", options.cull,
+                  "Which instances --lod-culled-scale is about: frustum, outside of what the camera looks at (the "
+                  "default); visible, those that no pixel shows, with --lod-rays occlusion")
+      ->type_name("NAME")
+      ->group(kGroup);
+  verb.add_option("--lod-rays", options.rays,
+                  "Which rays meet coarser levels: all (the default), or occlusion: the camera sees level 0, so that "
+                  "what thin and touching parts show stays")
+      ->type_name("NAME")
       ->group(kGroup);
 }
 
 void validate(const LodOptions& options) {
-  if (!options.error_px && (options.scheme || options.traced_ratio || options.culled_scale || options.tolerance))
+  if (!options.error_px && (options.scheme || options.traced_ratio || options.culled_scale || options.tolerance ||
+                            options.rays || options.cull))
     throw Error(ErrorKind::kUsage, "--lod-scheme and the options about it count with --lod-error only");
   if (options.error_px && !(*options.error_px > 0.0 && *options.error_px <= 1e9))
     throw Error(ErrorKind::kUsage, fmt::format("--lod-error {}: give pixels above 0", *options.error_px));
+  require_one_of("--lod-rays", options.rays, "all", "occlusion");
+  require_one_of("--lod-cull", options.cull, "frustum", "visible");
+  if (options.cull == "visible" && !options.only_occlusion())
+    throw Error(ErrorKind::kUsage, "--lod-cull visible needs --lod-rays occlusion: what is visible is known only "
+                                   "where camera rays come first");
   sharing_config(options);
 }
 
-ChosenDetail choose_detail(const std::string& input, const LoadedScene& loaded, const Camera& camera,
-                           const RenderConfig& config, const LodOptions& options) {
+void require_levels(const std::string& input, const LoadedScene& loaded) {
   if (!loaded.baked) throw Error(ErrorKind::kUsage, input + ": --lod-error is for .ptk files; bake it with --lod");
-  const BakedFile& file = *loaded.baked;
-  if (file.sections().lod_levels.empty())
+  if (loaded.baked->sections().lod_levels.empty())
     throw Error(ErrorKind::kUsage, input + ": --lod-error: the file has no levels of detail; bake it with --lod");
+}
+
+ChosenDetail choose_detail(const LoadedScene& loaded, const Camera& camera,
+                           const RenderConfig& config, const LodOptions& options, const GBuffer* seen) {
+  const BakedFile& file = *loaded.baked;
   const auto& source = dynamic_cast<const PackedSource&>(*loaded.source);
   const PrimaryCamera view(camera, {config.size.width * config.supersample, config.size.height * config.supersample});
   ChosenDetail detail;
@@ -166,10 +190,12 @@ ChosenDetail choose_detail(const std::string& input, const LoadedScene& loaded, 
   detail.load_s = loading.seconds();
 
   const DetailView from = detail_view(view, file.world_bounds(), detail.error_px);
-  const std::vector<uint8_t> outside = outside_view(view, *detail.geometries, detail.instances);
-  detail.outside = static_cast<size_t>(std::ranges::count(outside, 1));
+  const std::vector<uint8_t> culled = options.cull == "visible"
+                                          ? not_in_image(*seen, detail.instances.size())
+                                          : outside_view(view, *detail.geometries, detail.instances);
+  detail.culled = static_cast<size_t>(std::ranges::count(culled, 1));
   const Stopwatch planning;
-  detail.sharing->plan(from, outside, detail.plan);
+  detail.sharing->plan(from, culled, detail.plan);
   detail.plan_s = planning.seconds();
   const Stopwatch listing;
   detail.source = std::make_unique<LodSource>(file, source, *detail.sharing, detail.plan);
@@ -177,7 +203,7 @@ ChosenDetail choose_detail(const std::string& input, const LoadedScene& loaded, 
 
   SharingConfig alone = detail.sharing->config();
   alone.scheme = SharingScheme::kPerInstance;
-  LodSharing(*detail.geometries, detail.instances, alone).plan(from, outside, detail.alone);
+  LodSharing(*detail.geometries, detail.instances, alone).plan(from, culled, detail.alone);
   detail.alone.passed = {};
   return detail;
 }
@@ -189,7 +215,7 @@ nlohmann::json detail_json(const ChosenDetail& detail, const RayTracer& tracer) 
       {"scheme", name_of(detail.sharing->config().scheme)},
       {"error_px", detail.error_px},
       {"instances", detail.instances.size()},
-      {"instances_outside_view", detail.outside},
+      {"instances_culled", detail.culled},
       {"builds", plan.builds},
       {"references_saved", static_cast<int64_t>(alone.builds) - static_cast<int64_t>(plan.builds)},
       {"built_triangles", plan.built_triangles},
@@ -234,9 +260,9 @@ std::string detail_text(const nlohmann::json& r) {
                   count(r.at("built_triangles")), count(r.at("traced_triangles")), r.at("traced_ratio").get<double>());
   text += fmt::format(
       grouped(),
-      "            instances: {:L} coarsest, {:L} lend, {:L} share, {:L} have their own; {:L} outside the view\n",
+      "            instances: {:L} coarsest, {:L} lend, {:L} share, {:L} have their own; {:L} culled\n",
       count(categories.at("lowest")), count(categories.at("provider")), count(categories.at("shares")),
-      count(categories.at("own")), count(r.at("instances_outside_view")));
+      count(categories.at("own")), count(r.at("instances_culled")));
   text += fmt::format("            plan {:.1f} ms, lists of clusters {:.1f} ms", ms("plan"), ms("clusters"));
   if (r.contains("trees")) {
     const auto& trees = r.at("trees");
