@@ -35,8 +35,8 @@ StoredLeafNodes::StoredLeafNodes(const BakedSections& sections)
   const std::span<const baked::PackedNode> nodes = sections.nodes;
   if (nodes.size() > std::numeric_limits<uint32_t>::max()) return;
   for (uint32_t i = 0; i < sections.trees.size(); ++i)
-    for (const baked::PackedNode& node : nodes.subspan(static_cast<size_t>(sections.trees[i].first_node),
-                                                       sections.trees[i].node_count)) {
+    for (const baked::PackedNode& node :
+         nodes.subspan(static_cast<size_t>(sections.trees[i].first_node), sections.trees[i].node_count)) {
       if (!node.has_leaves()) continue;
       tree_of_[node.cluster] = i;
       ++first_[node.cluster + 1];

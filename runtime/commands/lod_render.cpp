@@ -176,8 +176,8 @@ void require_levels(const std::string& input, const LoadedScene& loaded) {
     throw Error(ErrorKind::kUsage, input + ": --lod-error: the file has no levels of detail; bake it with --lod");
 }
 
-ChosenDetail choose_detail(const LoadedScene& loaded, const Camera& camera,
-                           const RenderConfig& config, const LodOptions& options, const GBuffer* seen) {
+ChosenDetail choose_detail(const LoadedScene& loaded, const Camera& camera, const RenderConfig& config,
+                           const LodOptions& options, const GBuffer* seen) {
   const BakedFile& file = *loaded.baked;
   const auto& source = dynamic_cast<const PackedSource&>(*loaded.source);
   const PrimaryCamera view(camera, {config.size.width * config.supersample, config.size.height * config.supersample});
@@ -258,11 +258,10 @@ std::string detail_text(const nlohmann::json& r) {
   text +=
       fmt::format(grouped(), "            {:L} triangles built, {:L} traced: {:.3f} times the instances' own cuts\n",
                   count(r.at("built_triangles")), count(r.at("traced_triangles")), r.at("traced_ratio").get<double>());
-  text += fmt::format(
-      grouped(),
-      "            instances: {:L} coarsest, {:L} lend, {:L} share, {:L} have their own; {:L} culled\n",
-      count(categories.at("lowest")), count(categories.at("provider")), count(categories.at("shares")),
-      count(categories.at("own")), count(r.at("instances_culled")));
+  text += fmt::format(grouped(),
+                      "            instances: {:L} coarsest, {:L} lend, {:L} share, {:L} have their own; {:L} culled\n",
+                      count(categories.at("lowest")), count(categories.at("provider")), count(categories.at("shares")),
+                      count(categories.at("own")), count(r.at("instances_culled")));
   text += fmt::format("            plan {:.1f} ms, lists of clusters {:.1f} ms", ms("plan"), ms("clusters"));
   if (r.contains("trees")) {
     const auto& trees = r.at("trees");

@@ -135,7 +135,7 @@ double rate_m(uint64_t rays, double seconds) { return seconds > 0 ? static_cast<
 
 /// Bytes by name. The file and the threads' caches are those of all tracers.
 nlohmann::json resident_parts(std::span<const RayTracer* const> tracers) {
-  nlohmann::json parts;
+  nlohmann::json parts = nlohmann::json::object();
   for (const RayTracer* tracer : tracers)
     for (const ResidentPart& part : tracer->resident()) {
       const std::string name(part.name);

@@ -160,8 +160,8 @@ TEST(NodeMove, HoldsWhatWasThereAndLittleMore) {
       for (uint32_t axis = 0; axis < 3; ++axis)
         for (uint32_t child = 0; child < 8 && node.children[child] != 0; ++child) {
           const auto moved = [&](uint8_t end) {
-            const auto p = static_cast<double>(from.origin[axis] + node.origin[axis] +
-                                               (int64_t{end} << node.exponent(axis)));
+            const auto p =
+                static_cast<double>(from.origin[axis] + node.origin[axis] + (int64_t{end} << node.exponent(axis)));
             return std::ldexp(p, doublings) - static_cast<double>(to.origin[axis]);
           };
           const double lo = moved(node.lo[axis][child]), hi = moved(node.hi[axis][child]);

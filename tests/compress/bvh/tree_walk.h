@@ -29,7 +29,8 @@ public:
   /// @param looseness in steps of a node's boxes, that rounding may make them larger than what they hold
   TreeWalk(const BakedFile& file, const baked::TreeRecord& tree, std::span<const baked::PackedNode> all,
            double looseness = 1.0)
-      : file_(file), tree_(tree), looseness_(looseness), nodes_(all.subspan(static_cast<size_t>(tree.first_node), tree.node_count)) {
+      : file_(file), tree_(tree), looseness_(looseness),
+        nodes_(all.subspan(static_cast<size_t>(tree.first_node), tree.node_count)) {
     for (uint32_t g = 0; g < file.geometries().size(); ++g)
       for (uint32_t c = 0; c < file.clusters(g).size(); ++c) geometry_of_.push_back(g);
     seen_.resize(file.sections().clusters.size());
