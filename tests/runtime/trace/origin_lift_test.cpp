@@ -51,7 +51,7 @@ protected:
     Progress progress;
     if (lift) lift_origins(tracer, camera_, 1.0, g, progress);
     AoConfig config;
-    config.radius = 5.0f;
+    config.radius = 20.0f;
     config.falloff = false;
     AoFrame ao;
     trace_ao(source, tracer, g, config, 0, ao, progress);
