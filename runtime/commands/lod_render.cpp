@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <utility>
 
 #include <fmt/format.h>
@@ -53,23 +54,26 @@ SharingConfig sharing_config(const LodOptions& options) {
 /// Takes built trees through BlasCompactor: what a device would hold that must allocate before it builds.
 class TreeMemory final : public BlasMemoryBackend {
 public:
-  explicit TreeMemory(const std::vector<PackedTracer::LodTrees::Bytes>& trees) : trees_(trees) {
+  /// @param base_of a geometry of the trees: the file's
+  template <typename BaseOf>
+  TreeMemory(const std::vector<TreeBytes>& trees, const BaseOf& base_of) : trees_(trees) {
     CompactionConfig config;
     BlasCompactor compactor(*this, config);
+    std::vector<uint32_t> moving;
     for (uint32_t i = 0; i < trees.size(); ++i) {
+      worst_case += trees[i].worst_case;
       if (trees[i].built == 0) continue;
-      compactor.add(i, i);
+      compactor.add(i, base_of(trees[i].geometry));
+      moving.push_back(i);
     }
-    for (uint32_t frame = 0; frame < 1 << 20; ++frame) {
+    while (!moving.empty()) { // each frame settles some, or measures
       compactor.begin_frame();
-      if (std::ranges::all_of(compactor.geometry_bytes(), [&](const auto& entry) {
-            return compactor.state_of(entry.first) == BlasMemoryState::kSettled;
-          }))
-        break;
+      std::erase_if(moving, [&](uint32_t i) { return compactor.state_of(i) == BlasMemoryState::kSettled; });
     }
     for (uint32_t frame = 0; frame < config.frames_in_flight; ++frame) compactor.begin_frame(); // releases
     resident = compactor.resident_bytes();
     peak = compactor.peak_bytes();
+    by_geometry = compactor.geometry_bytes();
   }
 
   BlasBuffer allocate(uint64_t) override { return ++next_; }
@@ -79,10 +83,11 @@ public:
   uint64_t compacted_bytes(uint32_t blas) override { return trees_[blas].built; }
   void record_copy(uint32_t, BlasBuffer, BlasBuffer) override {}
 
-  uint64_t resident = 0, peak = 0;
+  uint64_t worst_case = 0, resident = 0, peak = 0;
+  std::map<uint32_t, GeometryBytes> by_geometry; ///< kNoGeometry: the world
 
 private:
-  const std::vector<PackedTracer::LodTrees::Bytes>& trees_;
+  const std::vector<TreeBytes>& trees_;
   BlasBuffer next_ = 0;
 };
 
@@ -112,6 +117,22 @@ nlohmann::json geometries_json(const ChosenDetail& detail) {
                     {"last_level", counts(histogram.ends)}});
   }
   return rows;
+}
+
+nlohmann::json trees_json(const ChosenDetail& detail, const RayTracer& tracer) {
+  const std::vector<TreeBytes> trees = tracer.tree_bytes();
+  const TreeMemory memory(
+      trees, [&](uint32_t blas) { return blas == kNoGeometry ? kNoGeometry : detail.source->base_geometry(blas); });
+  nlohmann::json rows = nlohmann::json::array();
+  for (const auto& [geometry, bytes] : memory.by_geometry)
+    rows.push_back({{"geometry", geometry == kNoGeometry ? nlohmann::json() : nlohmann::json(geometry)},
+                    {"worst_case_bytes", bytes.worst_case},
+                    {"resident_bytes", bytes.now}});
+  return {{"count", trees.size()},
+          {"worst_case_bytes", memory.worst_case},
+          {"resident_bytes", memory.resident},
+          {"peak_bytes", memory.peak},
+          {"geometries", rows}};
 }
 
 double ratio(double a, double b) { return b > 0.0 ? a / b : 0.0; }
@@ -230,17 +251,10 @@ nlohmann::json detail_json(const ChosenDetail& detail, const RayTracer& tracer) 
       {"seconds", {{"load", detail.load_s}, {"plan", detail.plan_s}, {"clusters", detail.source_s}}},
       {"geometries", geometries_json(detail)},
   };
+  result["trees"] = trees_json(detail, tracer);
   if (const auto* packed = dynamic_cast<const PackedTracer*>(&tracer)) {
-    const PackedTracer::LodTrees& trees = packed->lod_trees();
-    const TreeMemory memory(trees.trees);
-    uint64_t worst_case = 0;
-    for (const auto& tree : trees.trees) worst_case += tree.worst_case;
-    result["trees"] = {{"count", trees.trees.size()},
-                       {"worst_case_bytes", worst_case},
-                       {"resident_bytes", memory.resident},
-                       {"peak_bytes", memory.peak}};
-    result["seconds"]["cluster_nodes"] = trees.clusters_s;
-    result["seconds"]["trees"] = trees.trees_s;
+    result["seconds"]["cluster_nodes"] = packed->lod_trees().clusters_s;
+    result["seconds"]["trees"] = packed->lod_trees().trees_s;
   }
   return result;
 }
@@ -263,12 +277,10 @@ std::string detail_text(const nlohmann::json& r) {
                       count(categories.at("lowest")), count(categories.at("provider")), count(categories.at("shares")),
                       count(categories.at("own")), count(r.at("instances_culled")));
   text += fmt::format("            plan {:.1f} ms, lists of clusters {:.1f} ms", ms("plan"), ms("clusters"));
-  if (r.contains("trees")) {
-    const auto& trees = r.at("trees");
-    text += fmt::format(grouped(), ", {:L} trees {:.1f} ms, {:L} bytes of at most {:L}", count(trees.at("count")),
-                        ms("trees"), count(trees.at("resident_bytes")), count(trees.at("worst_case_bytes")));
-  }
-  return text + "\n";
+  if (r.at("seconds").contains("trees")) text += fmt::format(", nodes above clusters {:.1f} ms", ms("trees"));
+  const auto& trees = r.at("trees");
+  return text + fmt::format(grouped(), "; {:L} trees, {:L} bytes of at most {:L}\n", count(trees.at("count")),
+                            count(trees.at("resident_bytes")), count(trees.at("worst_case_bytes")));
 }
 
 } // namespace packtrace

@@ -163,7 +163,12 @@ TEST(CommandLine, DetailIsChosenByItsErrorInPixels) {
       uint64_t instances = 0;
       for (const auto& [category, count] : report.at("categories").items()) instances += count.get<uint64_t>();
       EXPECT_EQ(instances, 30u);
-      EXPECT_EQ(report.contains("trees"), std::string(backend) == "packed");
+      const auto& trees = report.at("trees");
+      EXPECT_GT(trees.at("resident_bytes"), 0u);
+      EXPECT_GE(trees.at("worst_case_bytes"), trees.at("resident_bytes"));
+      uint64_t resident = 0;
+      for (const auto& row : trees.at("geometries")) resident += row.at("resident_bytes").get<uint64_t>();
+      EXPECT_EQ(trees.at("resident_bytes"), resident);
     }
     EXPECT_NE(read_text(bench / "x.png"), whole);
   }
