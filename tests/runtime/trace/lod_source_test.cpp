@@ -6,7 +6,9 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include "pbrt_import/scene/error.h"
 #include "runtime/trace/lod_view.h"
+#include "runtime/trace/make_tracer.h"
 #include "runtime/trace/primary_visibility.h"
 #include "tests/runtime/trace/packed_scenes.h"
 #include "tests/runtime/trace/test_scenes.h"
@@ -174,6 +176,25 @@ TEST_F(LodSourceTest, IsTheSameForAllTracersAndAnyNumberOfThreads) {
       EXPECT_LE(alone.lod_trees().trees[i].built, alone.lod_trees().trees[i].worst_case);
     }
   }
+}
+
+TEST_F(LodSourceTest, TracersTellWhatTheirTreesTake) {
+  const Detailed detailed(baked_, camera_, 0.1, {});
+  TracerConfig config;
+  for (const Backend backend : {Backend::kEmbree, Backend::kPacked}) {
+    config.backend = backend;
+    const auto tracer = make_tracer(detailed.source, baked_.file, config);
+    const std::vector<TreeBytes> trees = tracer->tree_bytes();
+    EXPECT_EQ(std::ranges::count(trees, kNoGeometry, &TreeBytes::geometry), 1);
+    EXPECT_GT(trees.size(), 2u);
+    for (const TreeBytes& tree : trees) {
+      EXPECT_TRUE(tree.geometry == kNoGeometry || tree.geometry < detailed.source.geometry_count());
+      EXPECT_GT(tree.built, 0u);
+      EXPECT_GE(tree.worst_case, tree.built);
+    }
+  }
+  config.backend = Backend::kEmbreeClusters;
+  EXPECT_THROW(make_tracer(detailed.source, baked_.file, config), Error);
 }
 
 double distance_to_triangle(DVec3 p, DVec3 a, DVec3 b, DVec3 c) {
