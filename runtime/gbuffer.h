@@ -32,6 +32,7 @@ struct GBuffer {
   std::vector<uint32_t> instance;     ///< SceneSource::instances() index
   std::vector<uint32_t> triangle;     ///< of the instance's geometry
   std::vector<uint32_t> material;     ///< SceneSource::materials() index
+  std::vector<uint8_t> back_face;     ///< 1 where the traced triangle's own normal points away from the camera
   std::vector<float> offset;          ///< ray-origin offset along the geometric normal, world units (docs/accuracy.md)
   /// Pixels to subtract from this pixel's centre to find the same surface point in the previous frame (x right, y
   /// down).
@@ -42,7 +43,7 @@ struct GBuffer {
     const size_t n = new_size.pixels();
     view_z.assign(n, 0.0f), position.assign(n, Vec3(0)), geometric_normal.assign(n, Vec3(0));
     normal.assign(n, Vec3(0)), albedo.assign(n, Vec3(0)), instance.assign(n, kNoInstance);
-    triangle.assign(n, 0), material.assign(n, 0), offset.assign(n, 0.0f), motion_px.assign(n, Vec2(0));
+    triangle.assign(n, 0), material.assign(n, 0), back_face.assign(n, 0), offset.assign(n, 0.0f), motion_px.assign(n, Vec2(0));
   }
 };
 

@@ -168,6 +168,14 @@ std::vector<Camera> BakedFile::cameras() const {
   return result;
 }
 
+Bounds object_bounds(const baked::GeometryRecord& geometry) {
+  Bounds bounds;
+  if (geometry.cluster_count == 0) return bounds;
+  bounds.extend(DVec3(geometry.bounds_lo[0], geometry.bounds_lo[1], geometry.bounds_lo[2]));
+  bounds.extend(DVec3(geometry.bounds_hi[0], geometry.bounds_hi[1], geometry.bounds_hi[2]));
+  return bounds;
+}
+
 Bounds BakedFile::world_bounds() const {
   const baked::SummaryRecord& s = summary();
   Bounds bounds;

@@ -104,6 +104,9 @@ private:
   BakedSections sections_;
 };
 
+/// Of the decoded vertices; object space. Empty where there are no clusters.
+Bounds object_bounds(const baked::GeometryRecord& geometry);
+
 /// By geometry: where the runs of material slots of its instances begin, ascending, each once.
 std::vector<std::vector<uint32_t>> material_runs(const BakedSections& sections);
 

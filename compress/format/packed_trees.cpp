@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 
 #include "compress/bvh/wide_tree.h"
 #include "compress/format/node_writer.h"
+#include "compress/format/stored_nodes.h"
 #include "compress/format/tree_grid.h"
 #include "compress/format/tree_validation.h"
 #include "pbrt_import/scene/error.h"
@@ -34,6 +37,23 @@ class LeafNodeBuilder {
 public:
   LeafNodeBuilder(const BakedSections& sections, const TreeCosts& costs, const baked::TreeRecord& tree)
       : sections_(sections), costs_(costs), tree_(tree) {}
+
+  /// Those that the file has, if it has any that will do.
+  void find(const TreeCluster& cluster, const StoredLeafNodes& stored, LeafNodes& out) {
+    const size_t before = out.nodes.size();
+    const std::span<const uint32_t> numbers = stored.of_cluster(cluster.number);
+    if (numbers.empty()) return add(cluster, out);
+    const NodeMove move(sections_.trees[stored.tree_of_cluster(cluster.number)], tree_);
+    for (const uint32_t number : numbers) {
+      out.nodes.push_back({});
+      if (const std::optional<TreeGridBox> box = move.move(sections_.nodes[number], out.nodes.back())) {
+        out.boxes.push_back(*box);
+        continue;
+      }
+      out.nodes.resize(before), out.boxes.resize(before);
+      return add(cluster, out);
+    }
+  }
 
   void add(const TreeCluster& cluster, LeafNodes& out) {
     const baked::GeometryRecord& geometry = sections_.geometries[cluster.geometry];
@@ -139,13 +159,16 @@ public:
     return clusters;
   }
 
-  LeafNodes build_leaf_nodes(std::span<const TreeCluster> clusters, const baked::TreeRecord& tree) const {
+  /// @param stored takes what it has from there
+  LeafNodes build_leaf_nodes(std::span<const TreeCluster> clusters, const baked::TreeRecord& tree,
+                             const StoredLeafNodes* stored = nullptr) const {
     const size_t chunks = (clusters.size() + kChunkClusters - 1) / kChunkClusters;
     std::vector<LeafNodes> of_chunk(chunks);
     tbb::parallel_for(size_t{0}, chunks, [&](size_t i) {
       LeafNodeBuilder builder(sections_, costs_, tree);
       const size_t first = i * kChunkClusters, count = std::min(kChunkClusters, clusters.size() - first);
-      for (const TreeCluster& cluster : clusters.subspan(first, count)) builder.add(cluster, of_chunk[i]);
+      for (const TreeCluster& cluster : clusters.subspan(first, count))
+        stored != nullptr ? builder.find(cluster, *stored, of_chunk[i]) : builder.add(cluster, of_chunk[i]);
     });
     LeafNodes all;
     for (LeafNodes& chunk : of_chunk) {
@@ -219,6 +242,7 @@ struct ChosenTreeBuilder::Tables {
 
   const BakedSections& sections;
   std::span<const ChosenClusters> chosen;
+  StoredLeafNodes stored;
   std::vector<Grid> grids;
   std::vector<uint32_t> grid_of; ///< by choice
   std::vector<Run> runs;         ///< by cluster
@@ -229,7 +253,32 @@ struct ChosenTreeBuilder::Tables {
     return count;
   }
 
+  /// The tree of the file that holds these clusters and no others, in another place; none if there is no such tree.
+  std::optional<TreeBuilder::Tree> stored_tree(size_t tree) const {
+    uint32_t number = baked::kNone;
+    uint64_t count = 0;
+    for (const uint32_t cluster : chosen[tree].clusters) {
+      const size_t nodes = stored.of_cluster(cluster).size();
+      if (nodes == 0) continue;
+      if (number == baked::kNone) number = stored.tree_of_cluster(cluster);
+      if (number != stored.tree_of_cluster(cluster)) return std::nullopt;
+      count += nodes;
+    }
+    if (number == baked::kNone || count != stored.count_of_tree(number)) return std::nullopt;
+    const baked::TreeRecord& from = sections.trees[number];
+    TreeBuilder::Tree out;
+    out.record = grids[grid_of[tree]].record;
+    out.record.node_count = from.node_count, out.record.depth = from.depth;
+    out.nodes.resize(from.node_count);
+    const NodeMove move(from, out.record);
+    if (!move.exact()) return std::nullopt;
+    for (uint32_t i = 0; i < from.node_count; ++i)
+      if (!move.move(sections.nodes[static_cast<size_t>(from.first_node) + i], out.nodes[i])) return std::nullopt;
+    return out;
+  }
+
   TreeBuilder::Tree build(size_t tree) const {
+    if (std::optional<TreeBuilder::Tree> whole = stored_tree(tree)) return std::move(*whole);
     const Grid& grid = grids[grid_of[tree]];
     const uint64_t count = leaf_nodes(tree);
     LeafNodes leaves;
@@ -246,10 +295,10 @@ struct ChosenTreeBuilder::Tables {
   }
 };
 
-ChosenTreeBuilder::ChosenTreeBuilder(const BakedSections& sections, std::span<const ChosenClusters> chosen,
-                                     const TreeCosts& costs)
-    : tables_(std::make_unique<Tables>(Tables{sections, chosen, {}, {}, {}})) {
+ChosenTreeBuilder::ChosenTreeBuilder(const BakedSections& sections, std::span<const ChosenClusters> chosen)
+    : tables_(std::make_unique<Tables>(Tables{sections, chosen, StoredLeafNodes(sections), {}, {}, {}})) {
   Tables& t = *tables_;
+  const TreeCosts costs;
   const TreeBuilder builder(sections, costs);
   std::vector<uint8_t> wanted(sections.clusters.size(), 0);
   std::vector<std::vector<uint32_t>> with_levels(sections.geometries.size()); // by geometry
@@ -287,7 +336,7 @@ ChosenTreeBuilder::ChosenTreeBuilder(const BakedSections& sections, std::span<co
     choose_tree_grid(records, sections.clusters, grid.record);
     grid.clusters = builder.find_clusters(geometries[i]);
     std::erase_if(grid.clusters, [&](const TreeCluster& cluster) { return wanted[cluster.number] == 0; });
-    grid.leaves = builder.build_leaf_nodes(grid.clusters, grid.record);
+    grid.leaves = builder.build_leaf_nodes(grid.clusters, grid.record, &t.stored);
   });
   t.runs.resize(sections.clusters.size());
   for (const Tables::Grid& grid : t.grids)

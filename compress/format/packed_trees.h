@@ -32,13 +32,14 @@ struct ChosenClusters {
 };
 
 /// Trees over choices of clusters, several of one geometry if need be. All trees of a geometry have one grid, which
-/// holds all its levels of detail, so nodes with leaves are made once for each cluster, whatever trees it is in; what
-/// is built for a tree is the nodes above them.
+/// holds all its levels of detail. Nodes with leaves are those of the file's trees, taken into that grid, or are made
+/// once for each cluster where it has none; what is built for a tree is the nodes above them. A choice of all that a
+/// tree of the file holds is that tree, if its grid has the same step.
 class ChosenTreeBuilder {
 public:
-  /// Makes the nodes with leaves. @param sections of a valid file; must outlive it
+  /// Finds or makes the nodes with leaves. @param sections of a valid file; must outlive it
   /// @param chosen must outlive it; geometry kWorldTree at most once, and only with geometries of joins_world()
-  ChosenTreeBuilder(const BakedSections& sections, std::span<const ChosenClusters> chosen, const TreeCosts& costs = {});
+  ChosenTreeBuilder(const BakedSections& sections, std::span<const ChosenClusters> chosen);
   ~ChosenTreeBuilder();
   ChosenTreeBuilder(const ChosenTreeBuilder&) = delete;
   ChosenTreeBuilder& operator=(const ChosenTreeBuilder&) = delete;

@@ -33,7 +33,10 @@ class TreeGridMap {
 public:
   /// The steps' exponents differ by kMaxTreeStepDoublings at most; |lattice coordinate| <= 2^59, |origin| <= 2^60.
   TreeGridMap(const baked::TreeRecord& tree, const baked::GeometryRecord& geometry)
-      : origin_(tree.origin), shift_(geometry.step_exponent - tree.step_exponent),
+      : TreeGridMap(tree, geometry.step_exponent) {}
+  /// From any lattice of the tree's mantissa.
+  TreeGridMap(const baked::TreeRecord& tree, int32_t step_exponent)
+      : origin_(tree.origin), shift_(step_exponent - tree.step_exponent),
         limit_((int64_t{1} << 61) >> (shift_ > 0 ? shift_ : 0)) {}
 
   /// The tree coordinate of a lattice coordinate, rounded down and up.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <utility>
 
 #include <fmt/format.h>
@@ -30,6 +31,11 @@ SharingScheme scheme_of(const std::string& name) {
               "--lod-scheme " + name + ": there are steps, per-level, one-provider, per-instance and off");
 }
 
+void require_one_of(const char* option, const std::optional<std::string>& value, const char* a, const char* b) {
+  if (value && *value != a && *value != b)
+    throw Error(ErrorKind::kUsage, fmt::format("{} {}: there are {} and {}", option, *value, a, b));
+}
+
 const char* name_of(SharingScheme scheme) {
   return std::ranges::find(kSchemes, scheme, &std::pair<const char*, SharingScheme>::second)->first;
 }
@@ -48,23 +54,26 @@ SharingConfig sharing_config(const LodOptions& options) {
 /// Takes built trees through BlasCompactor: what a device would hold that must allocate before it builds.
 class TreeMemory final : public BlasMemoryBackend {
 public:
-  explicit TreeMemory(const std::vector<PackedTracer::LodTrees::Bytes>& trees) : trees_(trees) {
+  /// @param base_of a geometry of the trees: the file's
+  template <typename BaseOf>
+  TreeMemory(const std::vector<TreeBytes>& trees, const BaseOf& base_of) : trees_(trees) {
     CompactionConfig config;
     BlasCompactor compactor(*this, config);
+    std::vector<uint32_t> moving;
     for (uint32_t i = 0; i < trees.size(); ++i) {
+      worst_case += trees[i].worst_case;
       if (trees[i].built == 0) continue;
-      compactor.add(i, i);
+      compactor.add(i, base_of(trees[i].geometry));
+      moving.push_back(i);
     }
-    for (uint32_t frame = 0; frame < 1 << 20; ++frame) {
+    while (!moving.empty()) { // each frame settles some, or measures
       compactor.begin_frame();
-      if (std::ranges::all_of(compactor.geometry_bytes(), [&](const auto& entry) {
-            return compactor.state_of(entry.first) == BlasMemoryState::kSettled;
-          }))
-        break;
+      std::erase_if(moving, [&](uint32_t i) { return compactor.state_of(i) == BlasMemoryState::kSettled; });
     }
     for (uint32_t frame = 0; frame < config.frames_in_flight; ++frame) compactor.begin_frame(); // releases
     resident = compactor.resident_bytes();
     peak = compactor.peak_bytes();
+    by_geometry = compactor.geometry_bytes();
   }
 
   BlasBuffer allocate(uint64_t) override { return ++next_; }
@@ -74,10 +83,11 @@ public:
   uint64_t compacted_bytes(uint32_t blas) override { return trees_[blas].built; }
   void record_copy(uint32_t, BlasBuffer, BlasBuffer) override {}
 
-  uint64_t resident = 0, peak = 0;
+  uint64_t worst_case = 0, resident = 0, peak = 0;
+  std::map<uint32_t, GeometryBytes> by_geometry; ///< kNoGeometry: the world
 
 private:
-  const std::vector<PackedTracer::LodTrees::Bytes>& trees_;
+  const std::vector<TreeBytes>& trees_;
   BlasBuffer next_ = 0;
 };
 
@@ -109,6 +119,22 @@ nlohmann::json geometries_json(const ChosenDetail& detail) {
   return rows;
 }
 
+nlohmann::json trees_json(const ChosenDetail& detail, const RayTracer& tracer) {
+  const std::vector<TreeBytes> trees = tracer.tree_bytes();
+  const TreeMemory memory(
+      trees, [&](uint32_t blas) { return blas == kNoGeometry ? kNoGeometry : detail.source->base_geometry(blas); });
+  nlohmann::json rows = nlohmann::json::array();
+  for (const auto& [geometry, bytes] : memory.by_geometry)
+    rows.push_back({{"geometry", geometry == kNoGeometry ? nlohmann::json() : nlohmann::json(geometry)},
+                    {"worst_case_bytes", bytes.worst_case},
+                    {"resident_bytes", bytes.now}});
+  return {{"count", trees.size()},
+          {"worst_case_bytes", memory.worst_case},
+          {"resident_bytes", memory.resident},
+          {"peak_bytes", memory.peak},
+          {"geometries", rows}};
+}
+
 double ratio(double a, double b) { return b > 0.0 ? a / b : 0.0; }
 
 } // namespace
@@ -136,25 +162,44 @@ void add_lod_options(CLI::App& verb, LodOptions& options) {
       ->type_name("N")
       ->group(kGroup);
   verb.add_option("--lod-culled-scale", options.culled_scale,
-                  "How many times the error is allowed where the camera does not look (default 1)")
+                  "How many times the error is allowed for instances that --lod-cull names (default 1)")
       ->type_name("S")
+      ->group(kGroup);
+  verb.add_option("--lod-cull", options.cull,
+                  "Which instances --lod-culled-scale is about: frustum, outside of what the camera looks at (the "
+                  "default); visible, those that no pixel shows, with --lod-rays occlusion")
+      ->type_name("NAME")
+      ->group(kGroup);
+  verb.add_option("--lod-rays", options.rays,
+                  "Which rays meet coarser levels: all (the default), or occlusion: the camera sees level 0, so that "
+                  "what thin and touching parts show stays")
+      ->type_name("NAME")
       ->group(kGroup);
 }
 
 void validate(const LodOptions& options) {
-  if (!options.error_px && (options.scheme || options.traced_ratio || options.culled_scale || options.tolerance))
+  if (!options.error_px && (options.scheme || options.traced_ratio || options.culled_scale || options.tolerance ||
+                            options.rays || options.cull))
     throw Error(ErrorKind::kUsage, "--lod-scheme and the options about it count with --lod-error only");
   if (options.error_px && !(*options.error_px > 0.0 && *options.error_px <= 1e9))
     throw Error(ErrorKind::kUsage, fmt::format("--lod-error {}: give pixels above 0", *options.error_px));
+  require_one_of("--lod-rays", options.rays, "all", "occlusion");
+  require_one_of("--lod-cull", options.cull, "frustum", "visible");
+  if (options.cull == "visible" && !options.only_occlusion())
+    throw Error(ErrorKind::kUsage, "--lod-cull visible needs --lod-rays occlusion: what is visible is known only "
+                                   "where camera rays come first");
   sharing_config(options);
 }
 
-ChosenDetail choose_detail(const std::string& input, const LoadedScene& loaded, const Camera& camera,
-                           const RenderConfig& config, const LodOptions& options) {
+void require_levels(const std::string& input, const LoadedScene& loaded) {
   if (!loaded.baked) throw Error(ErrorKind::kUsage, input + ": --lod-error is for .ptk files; bake it with --lod");
-  const BakedFile& file = *loaded.baked;
-  if (file.sections().lod_levels.empty())
+  if (loaded.baked->sections().lod_levels.empty())
     throw Error(ErrorKind::kUsage, input + ": --lod-error: the file has no levels of detail; bake it with --lod");
+}
+
+ChosenDetail choose_detail(const LoadedScene& loaded, const Camera& camera, const RenderConfig& config,
+                           const LodOptions& options, const GBuffer* seen) {
+  const BakedFile& file = *loaded.baked;
   const auto& source = dynamic_cast<const PackedSource&>(*loaded.source);
   const PrimaryCamera view(camera, {config.size.width * config.supersample, config.size.height * config.supersample});
   ChosenDetail detail;
@@ -166,10 +211,12 @@ ChosenDetail choose_detail(const std::string& input, const LoadedScene& loaded, 
   detail.load_s = loading.seconds();
 
   const DetailView from = detail_view(view, file.world_bounds(), detail.error_px);
-  const std::vector<uint8_t> outside = outside_view(view, *detail.geometries, detail.instances);
-  detail.outside = static_cast<size_t>(std::ranges::count(outside, 1));
+  const std::vector<uint8_t> culled = options.cull == "visible"
+                                          ? not_in_image(*seen, detail.instances.size())
+                                          : outside_view(view, *detail.geometries, detail.instances);
+  detail.culled = static_cast<size_t>(std::ranges::count(culled, 1));
   const Stopwatch planning;
-  detail.sharing->plan(from, outside, detail.plan);
+  detail.sharing->plan(from, culled, detail.plan);
   detail.plan_s = planning.seconds();
   const Stopwatch listing;
   detail.source = std::make_unique<LodSource>(file, source, *detail.sharing, detail.plan);
@@ -177,7 +224,7 @@ ChosenDetail choose_detail(const std::string& input, const LoadedScene& loaded, 
 
   SharingConfig alone = detail.sharing->config();
   alone.scheme = SharingScheme::kPerInstance;
-  LodSharing(*detail.geometries, detail.instances, alone).plan(from, outside, detail.alone);
+  LodSharing(*detail.geometries, detail.instances, alone).plan(from, culled, detail.alone);
   detail.alone.passed = {};
   return detail;
 }
@@ -189,7 +236,7 @@ nlohmann::json detail_json(const ChosenDetail& detail, const RayTracer& tracer) 
       {"scheme", name_of(detail.sharing->config().scheme)},
       {"error_px", detail.error_px},
       {"instances", detail.instances.size()},
-      {"instances_outside_view", detail.outside},
+      {"instances_culled", detail.culled},
       {"builds", plan.builds},
       {"references_saved", static_cast<int64_t>(alone.builds) - static_cast<int64_t>(plan.builds)},
       {"built_triangles", plan.built_triangles},
@@ -204,17 +251,10 @@ nlohmann::json detail_json(const ChosenDetail& detail, const RayTracer& tracer) 
       {"seconds", {{"load", detail.load_s}, {"plan", detail.plan_s}, {"clusters", detail.source_s}}},
       {"geometries", geometries_json(detail)},
   };
+  result["trees"] = trees_json(detail, tracer);
   if (const auto* packed = dynamic_cast<const PackedTracer*>(&tracer)) {
-    const PackedTracer::LodTrees& trees = packed->lod_trees();
-    const TreeMemory memory(trees.trees);
-    uint64_t worst_case = 0;
-    for (const auto& tree : trees.trees) worst_case += tree.worst_case;
-    result["trees"] = {{"count", trees.trees.size()},
-                       {"worst_case_bytes", worst_case},
-                       {"resident_bytes", memory.resident},
-                       {"peak_bytes", memory.peak}};
-    result["seconds"]["cluster_nodes"] = trees.clusters_s;
-    result["seconds"]["trees"] = trees.trees_s;
+    result["seconds"]["cluster_nodes"] = packed->lod_trees().clusters_s;
+    result["seconds"]["trees"] = packed->lod_trees().trees_s;
   }
   return result;
 }
@@ -232,18 +272,15 @@ std::string detail_text(const nlohmann::json& r) {
   text +=
       fmt::format(grouped(), "            {:L} triangles built, {:L} traced: {:.3f} times the instances' own cuts\n",
                   count(r.at("built_triangles")), count(r.at("traced_triangles")), r.at("traced_ratio").get<double>());
-  text += fmt::format(
-      grouped(),
-      "            instances: {:L} coarsest, {:L} lend, {:L} share, {:L} have their own; {:L} outside the view\n",
-      count(categories.at("lowest")), count(categories.at("provider")), count(categories.at("shares")),
-      count(categories.at("own")), count(r.at("instances_outside_view")));
+  text += fmt::format(grouped(),
+                      "            instances: {:L} coarsest, {:L} lend, {:L} share, {:L} have their own; {:L} culled\n",
+                      count(categories.at("lowest")), count(categories.at("provider")), count(categories.at("shares")),
+                      count(categories.at("own")), count(r.at("instances_culled")));
   text += fmt::format("            plan {:.1f} ms, lists of clusters {:.1f} ms", ms("plan"), ms("clusters"));
-  if (r.contains("trees")) {
-    const auto& trees = r.at("trees");
-    text += fmt::format(grouped(), ", {:L} trees {:.1f} ms, {:L} bytes of at most {:L}", count(trees.at("count")),
-                        ms("trees"), count(trees.at("resident_bytes")), count(trees.at("worst_case_bytes")));
-  }
-  return text + "\n";
+  if (r.at("seconds").contains("trees")) text += fmt::format(", nodes above clusters {:.1f} ms", ms("trees"));
+  const auto& trees = r.at("trees");
+  return text + fmt::format(grouped(), "; {:L} trees, {:L} bytes of at most {:L}\n", count(trees.at("count")),
+                            count(trees.at("resident_bytes")), count(trees.at("worst_case_bytes")));
 }
 
 } // namespace packtrace

@@ -20,6 +20,10 @@ struct LodOptions {
   std::optional<std::string> scheme;
   std::optional<double> traced_ratio, culled_scale;
   std::optional<uint32_t> tolerance;
+  std::optional<std::string> rays, cull;
+
+  /// Whether camera rays meet level 0.
+  bool only_occlusion() const { return rays == "occlusion"; }
 };
 
 /// Adds --lod-error and what goes with it to a verb; options must outlive it.
@@ -36,14 +40,18 @@ struct ChosenDetail {
   LodPlan plan, alone; ///< alone: a cut for each instance, which plans are measured against
   std::unique_ptr<LodSource> source;
   double error_px = 0.0;
-  size_t outside = 0; ///< instances that the camera does not see directly
+  size_t culled = 0; ///< instances that the camera does not see directly
   double load_s = 0.0, plan_s = 0.0, source_s = 0.0;
 };
 
-/// Throws Error(kUsage) for a .pbrt scene or a file without levels of detail, else like LodSharing and PrimaryCamera.
+/// Throws Error(kUsage) for a .pbrt scene or a file without levels of detail.
 /// @param input names the file in errors
-ChosenDetail choose_detail(const std::string& input, const LoadedScene& loaded, const Camera& camera,
-                           const RenderConfig& config, const LodOptions& options);
+void require_levels(const std::string& input, const LoadedScene& loaded);
+
+/// Throws like LodSharing and PrimaryCamera. @param loaded has levels
+/// @param seen what camera rays met; null before they are traced
+ChosenDetail choose_detail(const LoadedScene& loaded, const Camera& camera,
+                           const RenderConfig& config, const LodOptions& options, const GBuffer* seen);
 
 /// As `render --json` writes it (docs/json_output.md).
 nlohmann::json detail_json(const ChosenDetail& detail, const RayTracer& tracer);

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -131,14 +133,32 @@ double mean_of_valid(const std::vector<float>& ao) {
 
 double rate_m(uint64_t rays, double seconds) { return seconds > 0 ? static_cast<double>(rays) / seconds * 1e-6 : 0; }
 
+/// Bytes by name. The file and the threads' caches are those of all tracers.
+nlohmann::json resident_parts(std::span<const RayTracer* const> tracers) {
+  nlohmann::json parts = nlohmann::json::object();
+  for (const RayTracer* tracer : tracers)
+    for (const ResidentPart& part : tracer->resident()) {
+      const std::string name(part.name);
+      const bool shared = name == "file" || name == "batch caches";
+      parts[name] = part.bytes + (shared ? 0 : parts.value(name, uint64_t{0}));
+    }
+  return parts;
+}
+
+uint64_t sum_of(const nlohmann::json& parts) {
+  uint64_t bytes = 0;
+  for (const auto& [name, part] : parts.items()) bytes += part.get<uint64_t>();
+  return bytes;
+}
+
 nlohmann::json report(const RenderOptions& options, const RenderConfig& config, const RenderedImage& image,
-                      const SceneSource& source, const RayTracer& tracer, const std::optional<ChosenDetail>& detail,
-                      const std::vector<std::string>& files) {
+                      const SceneSource& source, std::span<const RayTracer* const> tracers,
+                      const std::optional<ChosenDetail>& detail, const std::vector<std::string>& files) {
+  const RayTracer& tracer = *tracers.back();
   const auto hits =
       std::count_if(image.instance.begin(), image.instance.end(), [](uint32_t i) { return i != kNoInstance; });
   const RenderTimings& t = image.timings;
-  nlohmann::json parts;
-  for (const ResidentPart& part : tracer.resident()) parts[std::string(part.name)] = part.bytes;
+  const nlohmann::json parts = resident_parts(tracers);
   nlohmann::json result = {
       {"verb", "render"},
       {"input", options.input},
@@ -161,7 +181,7 @@ nlohmann::json report(const RenderOptions& options, const RenderConfig& config, 
       {"seconds", {{"bvh", t.build_s}, {"primary", t.primary_s}, {"ao", t.ao_s}, {"denoise", t.denoise_s}}},
       {"resident_bytes",
        {{"source", source.resident_bytes()},
-        {"tracing", resident_bytes(tracer)},
+        {"tracing", sum_of(parts)},
         {"bvh", parts.value("bvh", uint64_t{0})},
         {"parts", parts}}},
       {"peak_rss_bytes", peak_rss_bytes()},
@@ -200,6 +220,45 @@ void print(const nlohmann::json& r) {
   for (const auto& file : r.at("files")) fmt::print("wrote {}\n", file.get<std::string>());
 }
 
+/// A picture and what it was traced with.
+struct Traced {
+  std::optional<ChosenDetail> detail;
+  std::vector<std::unique_ptr<RayTracer>> tracers; ///< what the camera sees, then what only occlusion rays meet
+  RenderedImage image;
+};
+
+Traced trace(const RenderOptions& options, const LoadedScene& loaded, const Camera& camera, RenderConfig config,
+             const TracerConfig& backend, bool show_detail, Progress& progress) {
+  Traced traced;
+  double build_s = 0.0;
+  const auto build = [&](const auto& make) {
+    const Stopwatch building;
+    traced.tracers.push_back(make());
+    build_s += building.seconds();
+  };
+  const auto choose = [&](const GBuffer* seen) {
+    traced.detail.emplace(choose_detail(loaded, camera, config, options.lod, seen));
+    build([&] { return make_tracer(*traced.detail->source, *loaded.baked, backend); });
+  };
+  progress.begin("bvh", 0);
+  if (options.lod.error_px && !options.lod.only_occlusion()) {
+    choose(nullptr);
+    if (show_detail) config.lod_error_px = *options.lod.error_px;
+    traced.image = render_view(*traced.detail->source, *traced.tracers[0], camera, config, progress);
+  } else {
+    build([&] { return make_tracer(*loaded.source, loaded.baked ? &*loaded.baked : nullptr, backend); });
+    ChooseOccluders occluders;
+    if (options.lod.only_occlusion())
+      occluders = [&](const GBuffer& seen, const PrimaryCamera&) {
+        choose(&seen);
+        return Occluders{traced.detail->source.get(), traced.tracers[1].get(), *options.lod.error_px};
+      };
+    traced.image = render_view(*loaded.source, *traced.tracers[0], camera, config, progress, occluders);
+  }
+  traced.image.timings.build_s = build_s;
+  return traced;
+}
+
 int run(const RenderOptions& options, const GlobalOptions& globals) {
   tracer_config(options, false); // complains before the work
   if (!options.size.empty()) parse_size(options.size);
@@ -208,34 +267,27 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   ImageOutputs outputs(options.outputs, options.aovs, globals.force); // before the work, like the above
   if (outputs.show_detail() && !options.lod.error_px)
     throw Error(ErrorKind::kUsage, "layers about levels of detail need --lod-error");
+  if (outputs.show_detail() && options.lod.only_occlusion())
+    throw Error(ErrorKind::kUsage, "with --lod-rays occlusion all that is seen is level 0: no layers about detail");
   ProgressDisplay display(globals);
   Progress progress(display.observer());
   const LoadedScene loaded = load_scene(options.input, options.scene, globals, progress, display);
+  if (options.lod.error_px) require_levels(options.input, loaded);
   const Camera camera = choose_camera(*loaded.source, options, globals);
-  RenderConfig config = make_config(*loaded.source, camera, options);
-  std::optional<ChosenDetail> detail;
-  if (options.lod.error_px) {
-    detail.emplace(choose_detail(options.input, loaded, camera, config, options.lod));
-    if (outputs.show_detail()) config.lod_error_px = *options.lod.error_px;
-  }
-  const SceneSource& source = detail ? *detail->source : *loaded.source;
-
+  const RenderConfig config = make_config(*loaded.source, camera, options);
   const TracerConfig backend = tracer_config(options, loaded.baked.has_value());
-  const Stopwatch building;
-  progress.begin("bvh", 0);
-  const std::unique_ptr<RayTracer> tracer = detail
-                                                ? make_tracer(*detail->source, *loaded.baked, backend)
-                                                : make_tracer(source, loaded.baked ? &*loaded.baked : nullptr, backend);
-  const double build_s = building.seconds();
-  RenderedImage image = render_view(source, *tracer, camera, config, progress);
-  image.timings.build_s = build_s;
+  const Traced traced = trace(options, loaded, camera, config, backend, outputs.show_detail(), progress);
   display.finish();
+  const RenderedImage& image = traced.image;
 
   outputs.write(image, {{"comments", std::string("packtrace render")},
                         {"aoRadius", static_cast<double>(config.ao.radius)},
                         {"aoSpp", static_cast<int>(config.ao.spp)},
                         {"frames", static_cast<int>(config.frames)}});
-  const nlohmann::json result = report(options, config, image, source, *tracer, detail, outputs.targets());
+  std::vector<const RayTracer*> tracers;
+  for (const std::unique_ptr<RayTracer>& tracer : traced.tracers) tracers.push_back(tracer.get());
+  const SceneSource& source = traced.detail ? *traced.detail->source : *loaded.source;
+  const nlohmann::json result = report(options, config, image, source, tracers, traced.detail, outputs.targets());
   if (result.at("hit_pixels") == 0 && !globals.quiet)
     fmt::print(stderr, "{}: warning: this camera sees nothing of the scene; try --camera auto\n", options.input);
   if (json.wanted()) json.write(result);

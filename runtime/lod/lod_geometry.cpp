@@ -57,7 +57,7 @@ void LodGeometry::check_groups(std::span<const baked::LodGroupRecord> groups) {
   for (const baked::LodGroupRecord& g : groups) {
     if (g.level != level && g.level != level + 1) reject("groups are not level by level");
     level = g.level;
-    if (level >= kMaxRuntimeLodLevels) reject("more than 32 levels");
+    if (level >= baked::kMaxLodLevels) reject("more than 32 levels");
     for (const float c : g.center)
       if (!std::isfinite(c)) reject("a group's center is not finite");
     if (!(g.radius >= 0.0f) || std::isinf(g.radius)) reject("a group's radius is not finite");

@@ -9,7 +9,6 @@
 
 namespace packtrace {
 
-inline constexpr uint32_t kMaxRuntimeLodLevels = 32;
 inline constexpr uint32_t kNoRank = ~0u;
 
 /// A ball in object space.

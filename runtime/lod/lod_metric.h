@@ -90,7 +90,7 @@ struct BallDistance {
 };
 inline BallDistance ball_distance(const DetailView& view, const InstanceBall& ball) {
   // More slack than any group has, whatever its level.
-  constexpr double kSlacks = kMaxRuntimeLodLevels + 2.0;
+  constexpr double kSlacks = baked::kMaxLodLevels + 2.0;
   return {glm::length(ball.center - view.eye), kSlacks * InstanceMetric::rounding_slack(ball.extent, view)};
 }
 

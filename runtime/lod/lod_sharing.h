@@ -46,11 +46,11 @@ enum class InstanceCategory : uint8_t {
 
 /// How many instances of one geometry can start and end at each level.
 struct LevelHistogram {
-  std::array<uint32_t, kMaxRuntimeLodLevels> starts{}; ///< by LodRange::min
-  std::array<uint32_t, kMaxRuntimeLodLevels> ends{};   ///< by LodRange::max
+  std::array<uint32_t, baked::kMaxLodLevels> starts{}; ///< by LodRange::min
+  std::array<uint32_t, baked::kMaxLodLevels> ends{};   ///< by LodRange::max
   /// Of those that end there: the largest of min << 27 | instance, so the one nearest to that level, and of several the
   /// same one each time. 0 if none.
-  std::array<uint32_t, kMaxRuntimeLodLevels> provider{};
+  std::array<uint32_t, baked::kMaxLodLevels> provider{};
 };
 
 /// Which BLASes there should be for a view, and who uses which.

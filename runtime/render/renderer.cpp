@@ -7,6 +7,7 @@
 #include "runtime/camera/camera_rays.h"
 #include "runtime/stopwatch.h"
 #include "runtime/trace/lod_view.h"
+#include "runtime/trace/origin_lift.h"
 #include "runtime/trace/primary_visibility.h"
 
 namespace packtrace {
@@ -114,7 +115,7 @@ void validate(const RenderConfig& config) {
 }
 
 RenderedImage render_view(const SceneSource& source, const RayTracer& tracer, const Camera& camera,
-                          const RenderConfig& config, Progress& progress) {
+                          const RenderConfig& config, Progress& progress, const ChooseOccluders& choose_occluders) {
   validate(config);
   RenderedImage image;
   image.size = config.size;
@@ -130,6 +131,13 @@ RenderedImage render_view(const SceneSource& source, const RayTracer& tracer, co
       std::count_if(g.instance.begin(), g.instance.end(), [](uint32_t id) { return id != kNoInstance; }));
   image.ao_rays = hit_pixels * config.ao.spp * config.frames;
 
+  Occluders occluders{&source, &tracer, 0.0};
+  if (choose_occluders) {
+    occluders = choose_occluders(g, view);
+    const Stopwatch lifting;
+    lift_origins(*occluders.tracer, view, occluders.error_px, g, progress);
+    image.timings.ao_s += lifting.seconds();
+  }
   AoFrame raw;
   AoDenoiser denoiser(config.denoiser);
   FrameMean mean;
@@ -137,7 +145,7 @@ RenderedImage render_view(const SceneSource& source, const RayTracer& tracer, co
   progress.begin("ambient occlusion", config.frames * static_cast<uint64_t>(g.size.pixels()));
   for (uint32_t frame = 0; frame < config.frames; ++frame) {
     const Stopwatch tracing;
-    trace_ao(source, tracer, g, config.ao, frame, raw, progress);
+    trace_ao(*occluders.source, *occluders.tracer, g, config.ao, frame, raw, progress);
     image.timings.ao_s += tracing.seconds();
     const Stopwatch denoising;
     if (!config.denoise)

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
 #include "pbrt_import/scene/progress.h"
 #include "runtime/ao/ao_integrator.h"
+#include "runtime/camera/camera_rays.h"
 #include "runtime/denoise/denoiser.h"
 #include "runtime/gbuffer.h"
 #include "runtime/trace/ray_tracer.h"
@@ -58,10 +60,21 @@ struct RenderedImage {
   uint64_t primary_rays = 0;
 };
 
+/// What occlusion rays meet where that is coarser than what the camera sees; of the same instances.
+struct Occluders {
+  const SceneSource* source = nullptr;
+  const RayTracer* tracer = nullptr; ///< built from source
+  double error_px = 0.0;             ///< that surfaces may lie beside those that the camera sees; traced pixels
+};
+
+/// Called once, with what the camera sees. What it returns must live until render_view() is done.
+using ChooseOccluders = std::function<Occluders(const GBuffer& seen, const PrimaryCamera& view)>;
+
 /// Renders one camera. tracer must have been built from source.
 /// The image depends on its arguments alone, not on the number of threads.
-/// Throws Error(kUsage) for a config out of range, Error(kCancelled).
+/// @param choose_occluders none: occlusion rays meet what camera rays do
+/// Throws Error(kUsage) for a config out of range, Error(kCancelled), and what choose_occluders throws.
 RenderedImage render_view(const SceneSource& source, const RayTracer& tracer, const Camera& camera,
-                          const RenderConfig& config, Progress& progress);
+                          const RenderConfig& config, Progress& progress, const ChooseOccluders& choose_occluders = {});
 
 } // namespace packtrace

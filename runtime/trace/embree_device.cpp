@@ -33,7 +33,11 @@ void EmbreeDevice::on_error(void* self, RTCError code, const char* text) {
 }
 
 bool EmbreeDevice::on_memory(void* self, ssize_t bytes, bool) {
-  static_cast<EmbreeDevice*>(self)->bytes_.fetch_add(bytes, std::memory_order_relaxed);
+  auto& device = *static_cast<EmbreeDevice*>(self);
+  const int64_t now = device.bytes_.fetch_add(bytes, std::memory_order_relaxed) + bytes;
+  int64_t peak = device.peak_.load(std::memory_order_relaxed);
+  while (peak < now && !device.peak_.compare_exchange_weak(peak, now, std::memory_order_relaxed)) {
+  }
   return true;
 }
 

@@ -36,12 +36,15 @@ public:
 
   /// Bytes allocated now.
   uint64_t bytes() const { return static_cast<uint64_t>(bytes_.load(std::memory_order_relaxed)); }
+  /// The most that were since start_peak().
+  uint64_t peak_bytes() const { return static_cast<uint64_t>(peak_.load(std::memory_order_relaxed)); }
+  void start_peak() { peak_.store(bytes_.load(std::memory_order_relaxed), std::memory_order_relaxed); }
 
 private:
   static void on_error(void* self, RTCError code, const char* text);
   static bool on_memory(void* self, ssize_t bytes, bool post);
 
-  std::atomic<int64_t> bytes_{0};
+  std::atomic<int64_t> bytes_{0}, peak_{0};
   std::mutex mutex_;
   RTCError code_ = RTC_ERROR_NONE; ///< the first since check()
   std::string text_;

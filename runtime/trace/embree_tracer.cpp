@@ -233,8 +233,16 @@ void EmbreeTracer::attach() {
   device.top = device.new_scene(config_);
   device.surface_scenes.resize(surfaces_.size());
   for (uint32_t p = 0; p < placements_.size(); ++p) attach_surface(p, surface_of_placement_[p]);
-  rtcCommitScene(device.top.get());
-  device.embree.check();
+  commit(device.top.get(), kNoGeometry);
+}
+
+void EmbreeTracer::commit(RTCSceneTy* scene, uint32_t geometry) {
+  EmbreeDevice& embree = device_->embree;
+  const uint64_t before = embree.bytes();
+  embree.start_peak();
+  rtcCommitScene(scene);
+  embree.check();
+  tree_bytes_.push_back({geometry, embree.peak_bytes() - before, embree.bytes() - std::min(before, embree.bytes())});
 }
 
 void EmbreeTracer::attach_surface(uint32_t placement, uint32_t surface_index) {
@@ -255,8 +263,7 @@ void EmbreeTracer::attach_surface(uint32_t placement, uint32_t surface_index) {
     child = device.new_scene(config_);
     for (uint32_t i = 0; i < surface.part_count; ++i)
       device.attach_part(child.get(), parts_[surface.first_part + i], surface); // ids count up from 0
-    rtcCommitScene(child.get());
-    device.embree.check();
+    commit(child.get(), surface.geometry);
   }
   uint32_t ray_mask = 0;
   for (uint32_t i = 0; i < surface.part_count; ++i)

@@ -58,6 +58,9 @@ public:
   /// "bvh": what Embree holds; "vertices" and "indices", which it reads; "tables".
   std::vector<ResidentPart> resident() const override;
 
+  /// What Embree held while it committed each scene, and after: measured, so it may change a little from run to run.
+  std::vector<TreeBytes> tree_bytes() const override { return tree_bytes_; }
+
   /// For Embree's own queries, with rays in space() and a ray class as their mask; benchmarks compare them.
   RTCSceneTy* handle() const;
   /// What such a query's result is, by Embree's numbers.
@@ -87,6 +90,7 @@ private:
   uint32_t add_surface(uint32_t instance, const Decoded& decoded, const DAffine& surface_from_object);
   void split_parts(uint32_t surface, const std::vector<Triangle>& triangles, uint32_t instance);
   void attach();
+  void commit(RTCSceneTy* scene, uint32_t geometry);
   void attach_surface(uint32_t placement, uint32_t surface);
   const Attachment& attachment_of(uint32_t instance, uint32_t geometry) const;
   void closest_packets(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits) const;
@@ -99,6 +103,7 @@ private:
   std::vector<Part> parts_;
   std::vector<Placement> placements_;
   std::vector<uint32_t> surface_of_placement_;
+  std::vector<TreeBytes> tree_bytes_;
   std::vector<Attachment> attachments_; ///< by geometry id in the top scene
   std::unique_ptr<Device> device_;      ///< last: Embree lets go of the buffers above first
 };

@@ -7,6 +7,7 @@
 
 #include "compress/format/cluster_codec.h"
 #include "pbrt_import/scene/error.h"
+#include "runtime/trace/cluster_look_up.h"
 
 namespace packtrace {
 namespace {
@@ -20,14 +21,10 @@ LodGeometry without_levels(const BakedFile& file, uint32_t geometry) {
   if (triangles.empty()) {
     triangles.push_back(0);
   } else {
-    const baked::GeometryRecord& record = file.geometries()[geometry];
-    DVec3 lo, hi;
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto i = static_cast<size_t>(axis);
-      lo[axis] = static_cast<double>(record.bounds_lo[i]), hi[axis] = static_cast<double>(record.bounds_hi[i]);
-      group.center[i] = static_cast<float>(0.5 * (lo[axis] + hi[axis]));
-    }
-    group.radius = static_cast<float>(glm::length(hi - lo)) * 0.51f;
+    const Bounds box = object_bounds(file.geometries()[geometry]);
+    const DVec3 center = box.centre();
+    for (int axis = 0; axis < 3; ++axis) group.center[static_cast<size_t>(axis)] = static_cast<float>(center[axis]);
+    group.radius = static_cast<float>(box.diagonal()) * 0.51f;
   }
   const std::vector<baked::LodLinkRecord> links(triangles.size(), {0, baked::kNoLodGroup});
   return {{&group, 1}, links, triangles};
@@ -139,22 +136,12 @@ std::optional<Vec3> LodSource::shading_normal(uint32_t blas, uint32_t triangle, 
   return interpolated_normal(view(c), triangle - c.first_triangle, barycentrics);
 }
 
-/// Finds and prepares a cluster only where it is not that of the place before.
 void LodSource::look_up(std::span<const SurfaceQuery> places, std::span<SurfaceAttributes> out) const {
-  std::optional<ClusterView> cluster;
-  uint32_t blas = 0, first = 0;
-  for (size_t i = 0; i < places.size(); ++i) {
-    const SurfaceQuery& place = places[i];
-    const uint32_t own = instances_[place.instance].geometry;
-    if (!cluster || own != blas || place.triangle - first >= cluster->triangle_count()) {
-      const LodCluster& c = find(blas = own, place.triangle);
-      cluster.emplace(view(c));
-      first = c.first_triangle;
-    }
-    const std::optional<Vec3> normal = interpolated_normal(*cluster, place.triangle - first, place.barycentrics);
-    out[i] = {file_.instance_materials(place.instance)[cluster->material_slot()], normal.has_value(),
-              normal.value_or(Vec3(0.0f))};
-  }
+  look_up_in_clusters(file_, instances_, places, out, [&](uint32_t blas, uint32_t triangle, uint32_t& first) {
+    const LodCluster& c = find(blas, triangle);
+    first = c.first_triangle;
+    return view(c);
+  });
 }
 
 Vec2 LodSource::uv(uint32_t blas, uint32_t triangle, Vec2 barycentrics) const {
@@ -173,9 +160,7 @@ Bounds LodSource::bounds(uint32_t blas) const {
   uint32_t last = ~0u;
   for (const LodCluster& c : clusters(blas)) {
     if (c.geometry == last) continue;
-    const baked::GeometryRecord& record = file_.geometries()[last = c.geometry];
-    all.extend(DVec3(record.bounds_lo[0], record.bounds_lo[1], record.bounds_lo[2]));
-    all.extend(DVec3(record.bounds_hi[0], record.bounds_hi[1], record.bounds_hi[2]));
+    all.extend(object_bounds(file_.geometries()[last = c.geometry]));
   }
   return all;
 }

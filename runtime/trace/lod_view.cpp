@@ -51,11 +51,13 @@ DetailView detail_view(const PrimaryCamera& camera, const Bounds& world, double 
   return make_detail_view(camera.eye(), near, 2.0 * std::atan(0.5 * height * spread), height, error_px);
 }
 
-double error_in_pixels(const PrimaryCamera& camera, DVec3 place_world, double error_world) {
-  if (error_world == 0.0) return 0.0;
+double pixel_width(const PrimaryCamera& camera, DVec3 place_world) {
   const bool orthographic = camera.projection() == Projection::kOrthographic;
-  const double distance = orthographic ? 1.0 : glm::length(place_world - camera.eye());
-  return error_world / (camera.pixel_spread() * distance);
+  return camera.pixel_spread() * (orthographic ? 1.0 : glm::length(place_world - camera.eye()));
+}
+
+double error_in_pixels(const PrimaryCamera& camera, DVec3 place_world, double error_world) {
+  return error_world == 0.0 ? 0.0 : error_world / pixel_width(camera, place_world);
 }
 
 std::vector<uint8_t> outside_view(const PrimaryCamera& camera, std::span<const LodGeometry> geometries,
@@ -73,6 +75,13 @@ std::vector<uint8_t> outside_view(const PrimaryCamera& camera, std::span<const L
     });
   }
   return outside;
+}
+
+std::vector<uint8_t> not_in_image(const GBuffer& gbuffer, size_t count) {
+  std::vector<uint8_t> unseen(count, 1);
+  for (const uint32_t instance : gbuffer.instance)
+    if (instance != kNoInstance) unseen[instance] = 0;
+  return unseen;
 }
 
 } // namespace packtrace

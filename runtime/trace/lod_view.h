@@ -6,6 +6,7 @@
 
 #include "pbrt_import/scene/bounds.h"
 #include "runtime/camera/camera_rays.h"
+#include "runtime/gbuffer.h"
 #include "runtime/lod/lod_sharing.h"
 
 namespace packtrace {
@@ -17,6 +18,9 @@ namespace packtrace {
 /// Throws Error(kUsage) for an error out of range.
 DetailView detail_view(const PrimaryCamera& camera, const Bounds& world, double error_px);
 
+/// How wide a pixel is at a place, in the middle of the image; world units, as detail_view() has it.
+double pixel_width(const PrimaryCamera& camera, DVec3 place_world);
+
 /// How many pixels an error at a place is wide, in the middle of the image; as detail_view() has it.
 double error_in_pixels(const PrimaryCamera& camera, DVec3 place_world, double error_world);
 
@@ -24,5 +28,9 @@ double error_in_pixels(const PrimaryCamera& camera, DVec3 place_world, double er
 /// it. Environment cameras see everything.
 std::vector<uint8_t> outside_view(const PrimaryCamera& camera, std::span<const LodGeometry> geometries,
                                   std::span<const LodInstance> instances);
+
+/// A byte an instance: 1 where no pixel shows it.
+/// @param count of instances
+std::vector<uint8_t> not_in_image(const GBuffer& gbuffer, size_t count);
 
 } // namespace packtrace

@@ -17,6 +17,8 @@ std::unique_ptr<RayTracer> make_tracer(const SceneSource& source, const BakedFil
 }
 
 std::unique_ptr<RayTracer> make_tracer(const LodSource& source, const BakedFile& file, const TracerConfig& config) {
+  if (config.backend == Backend::kEmbreeClusters)
+    throw Error(ErrorKind::kUnsupported, "backend embree-clusters traces level 0 only; use packed or embree");
   if (config.backend == Backend::kPacked) return std::make_unique<PackedTracer>(file, source);
   return std::make_unique<EmbreeTracer>(source, config.embree);
 }

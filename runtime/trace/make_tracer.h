@@ -28,7 +28,7 @@ struct TracerConfig {
 /// constructor.
 std::unique_ptr<RayTracer> make_tracer(const SceneSource& source, const BakedFile* file, const TracerConfig& config);
 
-/// The same at the detail of a plan.
+/// The same at the detail of a plan. Throws Error(kUnsupported) for embree-clusters, else as the backend's constructor.
 std::unique_ptr<RayTracer> make_tracer(const LodSource& source, const BakedFile& file, const TracerConfig& config);
 
 /// All of resident() together.

@@ -6,6 +6,7 @@
 
 #include "compress/format/baked_file.h"
 #include "compress/format/cluster_codec.h"
+#include "runtime/trace/cluster_look_up.h"
 
 namespace packtrace {
 
@@ -62,22 +63,12 @@ std::optional<Vec3> PackedSource::shading_normal(uint32_t geometry, uint32_t tri
   return interpolated_normal(cluster, triangle - cluster.record().first_triangle, barycentrics);
 }
 
-/// Finds and prepares a cluster only where it is not that of the place before.
 void PackedSource::look_up(std::span<const SurfaceQuery> places, std::span<SurfaceAttributes> out) const {
-  std::optional<ClusterView> cluster;
-  uint32_t geometry = 0, first = 0;
-  for (size_t i = 0; i < places.size(); ++i) {
-    const SurfaceQuery& place = places[i];
-    const uint32_t own_geometry = instances_[place.instance].geometry;
-    if (!cluster || own_geometry != geometry || place.triangle - first >= cluster->triangle_count()) {
-      geometry = own_geometry;
-      cluster.emplace(file_.cluster(geometry, file_.cluster_of_triangle(geometry, place.triangle)));
-      first = cluster->record().first_triangle;
-    }
-    const std::optional<Vec3> normal = interpolated_normal(*cluster, place.triangle - first, place.barycentrics);
-    out[i] = {file_.instance_materials(place.instance)[cluster->material_slot()], normal.has_value(),
-              normal.value_or(Vec3(0.0f))};
-  }
+  look_up_in_clusters(file_, instances_, places, out, [&](uint32_t geometry, uint32_t triangle, uint32_t& first) {
+    const ClusterView cluster = file_.cluster(geometry, file_.cluster_of_triangle(geometry, triangle));
+    first = cluster.record().first_triangle;
+    return cluster;
+  });
 }
 
 Vec2 PackedSource::uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const {

@@ -96,6 +96,7 @@ private:
     out_.position[pixel] = out_.geometric_normal[pixel] = out_.normal[pixel] = out_.albedo[pixel] = Vec3(0);
     out_.instance[pixel] = kNoInstance;
     out_.triangle[pixel] = out_.material[pixel] = 0;
+    out_.back_face[pixel] = 0;
     out_.offset[pixel] = 0.0f;
     out_.motion_px[pixel] = Vec2(0);
   }
@@ -112,7 +113,8 @@ private:
     const DVec3 cross = glm::cross(e1, e2);
 
     const bool placed = placement.instanced;
-    const DVec3 facing = facing_normal(placed ? placement.surface_normal * cross : cross, ray.direction);
+    const DVec3 own_normal = placed ? placement.surface_normal * cross : cross;
+    const DVec3 facing = facing_normal(own_normal, ray.direction);
     const DVec3 interpolated = v0 + e1 * double(barycentrics.x) + e2 * double(barycentrics.y);
     const DVec3 from_barycentrics = placed ? transform_point(placement.unit_from_surface, interpolated) : interpolated;
     const DVec3 unit_position = on_ray(ray, from_barycentrics, facing);
@@ -126,6 +128,7 @@ private:
     out_.instance[pixel] = placement.instance;
     out_.triangle[pixel] = hit.triangle;
     out_.material[pixel] = attributes.material;
+    out_.back_face[pixel] = glm::dot(own_normal, facing) < 0.0;
     out_.offset[pixel] = static_cast<float>(ray_offset(hit, space_, unit_position, facing) * space_.inverse_scale());
     out_.motion_px[pixel] = motion(position, glm::dvec2(batch.x[i], batch.y[i]) + 0.5);
   }

@@ -64,10 +64,19 @@ struct HitSurface {
   Vec3 vertices[3]{};    ///< in the surface's coordinates, as the tracer saw them
 };
 
+inline constexpr uint32_t kNoGeometry = ~0u;
+
 /// Bytes that stay in memory for tracing, by what they hold.
 struct ResidentPart {
   std::string_view name;
   uint64_t bytes = 0;
+};
+
+/// Memory of one tree of a scene, or of all that lies in the world together.
+struct TreeBytes {
+  uint32_t geometry = kNoGeometry; ///< of the source; kNoGeometry: of the world
+  uint64_t worst_case = 0;         ///< that building it takes, or may take
+  uint64_t built = 0;
 };
 
 /// A scene made ready for ray queries: a tracing backend. All functions are const and may run on several threads.
@@ -94,6 +103,9 @@ public:
 
   /// All that tracing keeps in memory, geometry included where the tracer reads it.
   virtual std::vector<ResidentPart> resident() const = 0;
+
+  /// Of trees built here, as far as the backend knows.
+  virtual std::vector<TreeBytes> tree_bytes() const { return {}; }
 };
 
 } // namespace packtrace

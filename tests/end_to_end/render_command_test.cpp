@@ -56,9 +56,40 @@ TEST(CommandLine, DetailIsChosenByItsErrorInPixels) {
       uint64_t instances = 0;
       for (const auto& [category, count] : report.at("categories").items()) instances += count.get<uint64_t>();
       EXPECT_EQ(instances, 30u);
-      EXPECT_EQ(report.contains("trees"), std::string(backend) == "packed");
+      const auto& trees = report.at("trees");
+      EXPECT_GT(trees.at("resident_bytes"), 0u);
+      EXPECT_GE(trees.at("worst_case_bytes"), trees.at("resident_bytes"));
+      uint64_t resident = 0;
+      for (const auto& row : trees.at("geometries")) resident += row.at("resident_bytes").get<uint64_t>();
+      EXPECT_EQ(trees.at("resident_bytes"), resident);
     }
     EXPECT_NE(read_text(bench / "x.png"), whole);
+  }
+}
+
+TEST(CommandLine, DetailForOcclusionRaysLeavesWhatTheCameraSees) {
+  const BallsBench bench;
+  ASSERT_EQ(run_packtrace({"bake", bench.scene(), "-o", bench.baked(), "--lod", "all"}).exit_code, 0);
+  const auto render = [&](std::vector<std::string> options) {
+    options.insert(options.end(), {"--no-denoise", "--spp", "16", "--aov", "ao,depth", "--json", bench / "x.json"});
+    const CommandResult result = bench.render(options);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(read_text(bench / "x.json"));
+  };
+  for (const char* backend : {"embree", "packed"}) {
+    const double mean = render({"--backend", backend}).at("mean_ao");
+    const std::string depth = read_text(bench / "x.depth.png"), ao = read_text(bench / "x.ao.png");
+    const auto coarse = render({"--backend", backend, "--lod-error", "1", "--lod-rays", "occlusion"});
+    EXPECT_EQ(read_text(bench / "x.depth.png"), depth);
+    EXPECT_NE(read_text(bench / "x.ao.png"), ao);
+    EXPECT_NEAR(coarse.at("mean_ao"), mean, 0.01);
+    EXPECT_LT(coarse.at("lod").at("traced_triangles"),
+              render({"--backend", backend, "--lod-error", "0.1"}).at("lod").at("traced_triangles"));
+    const auto culled = render({"--backend", backend, "--lod-error", "1", "--lod-rays", "occlusion", "--lod-cull",
+                                "visible", "--lod-culled-scale", "8"});
+    EXPECT_EQ(read_text(bench / "x.depth.png"), depth);
+    EXPECT_GT(culled.at("lod").at("instances_culled"), coarse.at("lod").at("instances_culled"));
+    EXPECT_LT(culled.at("lod").at("instances_culled"), 30u);
   }
 }
 
@@ -84,16 +115,22 @@ TEST(CommandLine, DetailThatCannotBeIsAUsageError) {
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_NE(none.err.find("no levels of detail; bake it with --lod"), std::string::npos) << none.err;
   EXPECT_EQ(run_packtrace({"render", bench.scene(), "-o", bench / "x.png", "--lod-error", "1"}).exit_code, 2);
-  for (const auto& wrong : std::vector<std::vector<std::string>>{{"--lod-error", "0"},
-                                                                 {"--lod-error", "-1"},
-                                                                 {"--lod-error", "nan"},
-                                                                 {"--lod-scheme", "steps"},
-                                                                 {"--lod-tolerance", "1"},
-                                                                 {"--lod-error", "1", "--lod-scheme", "some"},
-                                                                 {"--lod-error", "1", "--lod-traced-ratio", "0.5"},
-                                                                 {"--lod-error", "1", "--lod-culled-scale", "0"},
-                                                                 {"--lod-error", "1", "--lod-tolerance", "33"},
-                                                                 {"--aov", "lod"}}) {
+  for (const auto& wrong :
+       std::vector<std::vector<std::string>>{{"--lod-error", "0"},
+                                             {"--lod-error", "-1"},
+                                             {"--lod-error", "nan"},
+                                             {"--lod-scheme", "steps"},
+                                             {"--lod-tolerance", "1"},
+                                             {"--lod-error", "1", "--lod-scheme", "some"},
+                                             {"--lod-error", "1", "--lod-traced-ratio", "0.5"},
+                                             {"--lod-error", "1", "--lod-culled-scale", "0"},
+                                             {"--lod-error", "1", "--lod-tolerance", "33"},
+                                             {"--lod-rays", "occlusion"},
+                                             {"--lod-error", "1", "--lod-rays", "camera"},
+                                             {"--lod-error", "1", "--lod-cull", "some"},
+                                             {"--lod-error", "1", "--lod-cull", "visible"},
+                                             {"--lod-error", "1", "--lod-rays", "occlusion", "--aov", "lod"},
+                                             {"--aov", "lod"}}) {
     const CommandResult result = bench.render(wrong);
     EXPECT_EQ(result.exit_code, 2) << wrong.back();
     EXPECT_EQ(result.err.find("internal"), std::string::npos) << result.err;

@@ -223,16 +223,18 @@ void PackedTracer::build_lod() {
   const BakedSections& sections = file_.sections();
   const std::vector<uint8_t> joins = ChosenTreeBuilder::joins_world(sections);
   std::vector<ChosenClusters> chosen;
+  std::vector<uint32_t> blas_of; // by choice
   uint32_t world = baked::kNone;
-  const auto next_tree = [&](uint32_t geometry) {
+  const auto next_tree = [&](uint32_t geometry, uint32_t blas) {
     chosen.push_back({geometry, {}});
+    blas_of.push_back(blas);
     return static_cast<uint32_t>(chosen.size()) - 1;
   };
   for (uint32_t b = 0; b < lod_->geometry_count(); ++b) {
     const uint32_t base = lod_->base_geometry(b);
     if (lod_->clusters(b).empty()) continue;
-    if (joins[base] != 0 && world == baked::kNone) world = next_tree(baked::kWorldTree);
-    const uint32_t tree = joins[base] != 0 ? world : next_tree(base);
+    if (joins[base] != 0 && world == baked::kNone) world = next_tree(baked::kWorldTree, kNoGeometry);
+    const uint32_t tree = joins[base] != 0 ? world : next_tree(base, b);
     t.tree_of[b] = tree;
     for (const LodCluster& c : lod_->clusters(b))
       chosen[tree].clusters.push_back(static_cast<uint32_t>(file_.geometries()[c.geometry].first_cluster + c.cluster));
@@ -249,7 +251,7 @@ void PackedTracer::build_lod() {
   lod_trees_.trees_s = building.seconds();
   for (uint32_t i = 0; i < chosen.size(); ++i) {
     const uint64_t leaves = builder.leaf_nodes(i);
-    lod_trees_.trees.push_back({chosen[i].geometry, (leaves > 0 ? 2 * leaves - 1 : 0) * sizeof(baked::PackedNode),
+    lod_trees_.trees.push_back({blas_of[i], (leaves > 0 ? 2 * leaves - 1 : 0) * sizeof(baked::PackedNode),
                                 t.records[i].node_count * sizeof(baked::PackedNode)});
   }
   for (uint32_t b = 0; b < lod_->geometry_count(); ++b) {
@@ -273,12 +275,7 @@ void PackedTracer::find_first_instances() {
 /// Object space; empty where there is nothing.
 Bounds PackedTracer::bounds_of(uint32_t geometry) const {
   if (lod_ != nullptr) return lod_->bounds(geometry);
-  const baked::GeometryRecord& record = file_.geometries()[geometry];
-  Bounds bounds;
-  if (record.cluster_count == 0) return bounds;
-  bounds.extend(DVec3(record.bounds_lo[0], record.bounds_lo[1], record.bounds_lo[2]));
-  bounds.extend(DVec3(record.bounds_hi[0], record.bounds_hi[1], record.bounds_hi[2]));
-  return bounds;
+  return object_bounds(file_.geometries()[geometry]);
 }
 
 /// The instance that a cluster of a placement is of.

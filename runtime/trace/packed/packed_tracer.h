@@ -35,21 +35,16 @@ public:
                 std::span<uint8_t> occluded) const override;
   HitSurface resolve(const RayHit& hit) const override;
   std::vector<ResidentPart> resident() const override;
+  std::vector<TreeBytes> tree_bytes() const override { return lod_trees_.trees; }
 
   /// Instances that no ray hits because their transform flattens them, or nearly so.
   std::span<const uint32_t> flat_instances() const { return flat_instances_; }
 
   /// What building the trees of a LodSource took and takes.
   struct LodTrees {
-    /// Of one tree: a BLAS, or all of the world's.
-    struct Bytes {
-      uint32_t geometry = 0;   ///< of the file, or baked::kWorldTree
-      uint64_t worst_case = 0; ///< known before it is built
-      uint64_t built = 0;
-    };
-    double clusters_s = 0.0; ///< nodes of clusters, which do not depend on the view
-    double trees_s = 0.0;    ///< nodes above them
-    std::vector<Bytes> trees;
+    double clusters_s = 0.0;      ///< nodes of clusters, which do not depend on the view
+    double trees_s = 0.0;         ///< nodes above them
+    std::vector<TreeBytes> trees; ///< worst cases are known before they are built
   };
   const LodTrees& lod_trees() const { return lod_trees_; }
 

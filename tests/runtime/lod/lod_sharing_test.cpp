@@ -252,7 +252,7 @@ TEST(LodSharing, IsTheSameForAnyNumberOfThreads) {
     }
     std::vector<uint32_t> starts(7), ends(7);
     for (size_t g = 0; g < 7; ++g)
-      for (uint32_t level = 0; level < kMaxRuntimeLodLevels; ++level) {
+      for (uint32_t level = 0; level < baked::kMaxLodLevels; ++level) {
         const LevelHistogram& h = plans[0].histograms[g];
         starts[g] += h.starts[level];
         ends[g] += h.ends[level];

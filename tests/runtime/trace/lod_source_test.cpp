@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "compress/format/packed_trees.h"
+#include "pbrt_import/scene/error.h"
 #include "runtime/trace/lod_view.h"
+#include "runtime/trace/make_tracer.h"
 #include "runtime/trace/primary_visibility.h"
 #include "tests/runtime/trace/packed_scenes.h"
 #include "tests/runtime/trace/test_scenes.h"
@@ -178,6 +178,25 @@ TEST_F(LodSourceTest, IsTheSameForAllTracersAndAnyNumberOfThreads) {
   }
 }
 
+TEST_F(LodSourceTest, TracersTellWhatTheirTreesTake) {
+  const Detailed detailed(baked_, camera_, 0.1, {});
+  TracerConfig config;
+  for (const Backend backend : {Backend::kEmbree, Backend::kPacked}) {
+    config.backend = backend;
+    const auto tracer = make_tracer(detailed.source, baked_.file, config);
+    const std::vector<TreeBytes> trees = tracer->tree_bytes();
+    EXPECT_EQ(std::ranges::count(trees, kNoGeometry, &TreeBytes::geometry), 1);
+    EXPECT_GT(trees.size(), 2u);
+    for (const TreeBytes& tree : trees) {
+      EXPECT_TRUE(tree.geometry == kNoGeometry || tree.geometry < detailed.source.geometry_count());
+      EXPECT_GT(tree.built, 0u);
+      EXPECT_GE(tree.worst_case, tree.built);
+    }
+  }
+  config.backend = Backend::kEmbreeClusters;
+  EXPECT_THROW(make_tracer(detailed.source, baked_.file, config), Error);
+}
+
 double distance_to_triangle(DVec3 p, DVec3 a, DVec3 b, DVec3 c) {
   const auto to_segment = [&](DVec3 from, DVec3 to) {
     const DVec3 along = to - from;
@@ -274,25 +293,6 @@ TEST(LodView, APixelIsAsWideAsNeighbouringRaysAreApart) {
     const double allowed = from.error_per_distance * distance;
     EXPECT_NEAR(error_in_pixels(view, a.origin + 5.0 * a.direction, allowed), 1.0, 0.02);
   }
-}
-
-TEST(ChosenTreeBuilder, OfAllClustersBuildsWhatTheWholeFileGets) {
-  const test::BakedScene baked(scene_of_spheres());
-  const BakedSections& sections = baked.file.sections();
-  const std::vector<uint8_t> joins = ChosenTreeBuilder::joins_world(sections);
-  std::vector<ChosenClusters> chosen{{baked::kWorldTree, {}}};
-  for (uint32_t g = 0; g < joins.size(); ++g) {
-    if (joins[g] == 0) chosen.push_back({g, {}});
-    std::vector<uint32_t>& clusters = (joins[g] != 0 ? chosen.front() : chosen.back()).clusters;
-    for (uint32_t c = 0; c < sections.geometries[g].cluster_count; ++c)
-      clusters.push_back(static_cast<uint32_t>(sections.geometries[g].first_cluster + c));
-  }
-  const PackedTrees expected = build_packed_trees(sections), built = ChosenTreeBuilder(sections, chosen).build();
-  ASSERT_GE(expected.trees.size(), 2u);
-  ASSERT_EQ(built.trees.size(), expected.trees.size());
-  ASSERT_EQ(built.nodes.size(), expected.nodes.size());
-  EXPECT_EQ(std::memcmp(built.trees.data(), expected.trees.data(), built.trees.size() * sizeof(baked::TreeRecord)), 0);
-  EXPECT_EQ(std::memcmp(built.nodes.data(), expected.nodes.data(), built.nodes.size() * sizeof(baked::PackedNode)), 0);
 }
 
 } // namespace

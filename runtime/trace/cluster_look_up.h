@@ -1,0 +1,31 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "compress/format/baked_file.h"
+#include "compress/format/cluster_codec.h"
+#include "runtime/trace/packed_source.h"
+
+namespace packtrace {
+
+/// SceneSource::look_up() of a source over a file's clusters. Finds and prepares a cluster only where it is not that of
+/// the place before.
+/// @param find (geometry of the source, triangle of it, out: the cluster's first triangle) -> ClusterView
+template <typename Find>
+void look_up_in_clusters(const BakedFile& file, std::span<const PlacedGeometry> instances,
+                         std::span<const SurfaceQuery> places, std::span<SurfaceAttributes> out, const Find& find) {
+  std::optional<ClusterView> cluster;
+  uint32_t geometry = 0, first = 0;
+  for (size_t i = 0; i < places.size(); ++i) {
+    const SurfaceQuery& place = places[i];
+    const uint32_t own = instances[place.instance].geometry;
+    if (!cluster || own != geometry || place.triangle - first >= cluster->triangle_count())
+      cluster.emplace(find(geometry = own, place.triangle, first));
+    const std::optional<Vec3> normal = interpolated_normal(*cluster, place.triangle - first, place.barycentrics);
+    out[i] = {file.instance_materials(place.instance)[cluster->material_slot()], normal.has_value(),
+              normal.value_or(Vec3(0.0f))};
+  }
+}
+
+} // namespace packtrace
