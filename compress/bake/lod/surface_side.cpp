@@ -11,6 +11,8 @@ constexpr size_t kLargeFan = 48; // triangles around a point
 } // namespace
 
 void SurfaceSide::link() {
+  if (!first_.empty()) return;
+  stamp_.resize(surface_.triangles.size());
   const auto for_each = [&](const auto& visit) {
     for (uint32_t i = 0; i < corner_points_.size(); ++i) {
       const Triangle& t = corner_points_[i];

@@ -15,18 +15,23 @@ class SurfaceSide {
 public:
   template <typename PointOf>
   SurfaceSide(const OverlaySurface& surface, const PointOf& point_of)
-      : surface_(surface), overlay_(surface), stamp_(surface.triangles.size()) {
+      : surface_(surface), overlay_(surface) {
     corner_points_.reserve(surface.triangles.size());
     for (const LodTriangle& t : surface.triangles)
       corner_points_.emplace_back(point_of(t.points.x), point_of(t.points.y), point_of(t.points.z));
-    link();
   }
+  void link(); ///< before anything is asked about what is around points
 
   const OverlaySurface& surface() const { return surface_; }
   Overlay& overlay() { return overlay_; }
   const Triangle& corner_points(uint32_t triangle) const { return corner_points_[triangle]; }
   std::array<DVec3, 3> corners(uint32_t triangle) const {
     return {surface_.corner(triangle, 0), surface_.corner(triangle, 1), surface_.corner(triangle, 2)};
+  }
+
+  /// The triangles with that corner.
+  std::span<const uint32_t> around(uint32_t point) const {
+    return std::span(fans_).subspan(first_[point], first_[point + 1] - first_[point]);
   }
 
   // What another triangle is measured against: a set of triangles of this side.
@@ -39,10 +44,7 @@ public:
   }
 
 private:
-  void link();
-  std::span<const uint32_t> fan(uint32_t point) const {
-    return std::span(fans_).subspan(first_[point], first_[point + 1] - first_[point]);
-  }
+  std::span<const uint32_t> fan(uint32_t point) const { return around(point); }
   void add_large_fan(std::span<const uint32_t> fan, const Triangle& corners, int corner);
   void add(uint32_t triangle) {
     if (stamp_[triangle] != stamp_value_) stamp_[triangle] = stamp_value_, candidates_.push_back(triangle);
