@@ -42,6 +42,7 @@ public:
 
   ClusterLod run(const GeometryClusters& base) {
     take_base(base);
+    lines_ = LineCover(base.triangles, lod_.vertices, lod_.positions.size());
     locked_for_ever_.assign(lod_.positions.size(), 0);
     std::vector<uint32_t> active(lod_.clusters.size());
     for (uint32_t i = 0; i < active.size(); ++i) active[i] = i;
@@ -151,7 +152,7 @@ private:
 
   SimplifiedGroup simplify_group(const std::vector<uint32_t>& members) const {
     LodGroupInput input{g_,     lod_.positions,  lod_.vertices, lod_.triangles, {}, triangle_errors_, seam_of_kind_,
-                        owner_, locked_for_ever_};
+                        owner_, locked_for_ever_, lines_};
     for (const uint32_t number : members) input.clusters.push_back(&lod_.clusters[number]);
     SimplifiedGroup result = packtrace::simplify_group(input);
     if (static_cast<double>(result.triangles.size()) > kWorthwhile * static_cast<double>(result.source_triangles))
@@ -179,6 +180,8 @@ private:
             locked_for_ever_[lod_.vertices[lod_.triangles[c.range.first_triangle + i][corner]].position] = 1;
     }
     group.sphere = enclose(spheres);
+    // Everything lies in the ball: nothing is further off than it is wide.
+    if (!group.terminal) group.error = std::min(group.error, 2.0 * group.sphere.radius);
   }
 
   /// New positions, vertices, triangles and clusters of all groups, in their order.
@@ -224,6 +227,7 @@ private:
   std::vector<LodSphere> cluster_spheres_; ///< of level 0: their own; else that of the generating group
   std::vector<double> triangle_errors_;
   std::vector<uint32_t> owner_;
+  LineCover lines_;
   std::vector<uint8_t> locked_for_ever_; ///< positions of terminal groups
 };
 

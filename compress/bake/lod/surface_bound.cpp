@@ -192,6 +192,17 @@ private:
     after_.widen();
     look_along_facing(t, bound);
     if (enough(bound, had(t))) return accept(t);
+    refine_over_after(t, bound, false);
+    if (!enough(bound, had(t))) {
+      after_.gather_within(p, bound);
+      refine_over_after(t, bound, true);
+    }
+    accept(t);
+  }
+
+  /// @param all whether the candidates are all that matter: then what the corners' distance proves holds for others too
+  void refine_over_after(uint32_t t, double& bound, bool all) {
+    const Corners p = before_.corners(t);
     // It is not below this, as far as the candidates go.
     const double before = proven_, least = stated(farthest_corner(p), had(t));
     proven_ = std::max(proven_, least);
@@ -204,8 +215,7 @@ private:
           });
       if (refined < bound) std::swap(best_, refined_), bound = refined;
     }
-    proven_ = std::max(before, std::min(least, stated(bound, had(t))));
-    accept(t);
+    proven_ = all ? std::max(before, std::min(least, stated(bound, had(t)))) : before;
   }
 
   /// Keeps the better of best_ and what is seen from where the candidates face.
@@ -246,7 +256,7 @@ private:
     const double near = refine_over_before(s);
     if (near > std::max(largest_, kSlack * proven_)) {
       std::swap(refined_, second_);
-      before_.widen();
+      before_.gather_within(after_.corners(s), near);
       if (refine_over_before(s) >= near) std::swap(refined_, second_);
     }
     for (const OverlayPiece& piece : refined_) note(s, piece.distance, had(piece.triangle));

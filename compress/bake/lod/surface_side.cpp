@@ -62,6 +62,18 @@ void SurfaceSide::widen() {
         for (const uint32_t t : around) add(t);
 }
 
+void SurfaceSide::gather_within(const std::array<DVec3, 3>& triangle, double distance) {
+  candidates_.clear();
+  const DVec3 lo = glm::min(glm::min(triangle[0], triangle[1]), triangle[2]) - distance;
+  const DVec3 hi = glm::max(glm::max(triangle[0], triangle[1]), triangle[2]) + distance;
+  for (uint32_t t = 0; t < corner_points_.size(); ++t) {
+    const DVec3 &a = surface_.corner(t, 0), &b = surface_.corner(t, 1), &c = surface_.corner(t, 2);
+    const DVec3 least = glm::min(glm::min(a, b), c), most = glm::max(glm::max(a, b), c);
+    if (least.x <= hi.x && least.y <= hi.y && least.z <= hi.z && most.x >= lo.x && most.y >= lo.y && most.z >= lo.z)
+      candidates_.push_back(t);
+  }
+}
+
 void SurfaceSide::gather_near(DVec3 point) {
   constexpr size_t kTried = 16;
   std::vector<std::pair<double, uint32_t>> near(corner_points_.size());

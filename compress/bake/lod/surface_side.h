@@ -39,6 +39,8 @@ public:
   void gather(const Triangle& corners); ///< those around three points
   void widen();                         ///< one ring more
   void gather_near(DVec3 point);        ///< a few more: those with corners near it
+  /// All that may be nearer to a triangle than that, and more.
+  void gather_within(const std::array<DVec3, 3>& triangle, double distance);
   bool lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::vector<OverlayPiece>& pieces) {
     return overlay_.lay(triangle, direction, candidates_, pieces);
   }
