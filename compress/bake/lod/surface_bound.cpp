@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kSeen = 0.02;       // of a new triangle's area may be met by no old one
 constexpr double kInflation = 1.001; // of what was measured, for all roundings
-constexpr uint8_t kBack = 2;          // covered, but from behind
+constexpr uint8_t kBack = 2;         // covered, but from behind
 constexpr double kFine = 0.5;        // steps; distances below need no work
 constexpr double kSlack = 1.1;       // how much larger than it must be the error of a group may be stated to save work
 
@@ -291,8 +291,8 @@ private:
   SimplifyMesh& m_;
   SurfaceSide before_, after_;
   SurfaceWalk walk_;
-  std::vector<double> errors_; ///< of triangles after
-  std::vector<double> seen_;   ///< share of each triangle after that was met
+  std::vector<double> errors_;   ///< of triangles after
+  std::vector<double> seen_;     ///< share of each triangle after that was met
   std::vector<uint8_t> covered_; ///< per triangle after: images of those before cover it
   std::vector<uint8_t> mapped_;  ///< per triangle before: what is said of it holds for its image
   std::vector<uint8_t> unchanged_;

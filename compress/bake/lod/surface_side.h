@@ -14,8 +14,7 @@ namespace packtrace {
 class SurfaceSide {
 public:
   template <typename PointOf>
-  SurfaceSide(const OverlaySurface& surface, const PointOf& point_of)
-      : surface_(surface), overlay_(surface) {
+  SurfaceSide(const OverlaySurface& surface, const PointOf& point_of) : surface_(surface), overlay_(surface) {
     corner_points_.reserve(surface.triangles.size());
     for (const LodTriangle& t : surface.triangles)
       corner_points_.emplace_back(point_of(t.points.x), point_of(t.points.y), point_of(t.points.z));

@@ -8,8 +8,8 @@
 namespace packtrace {
 namespace {
 
-constexpr int kMostSteps = 32;   // triangles on one way, or around one point
-constexpr double kSteep = 0.05;  // sine; planes through an edge and a direction nearer to it than that are none
+constexpr int kMostSteps = 32;  // triangles on one way, or around one point
+constexpr double kSteep = 0.05; // sine; planes through an edge and a direction nearer to it than that are none
 
 } // namespace
 
@@ -137,7 +137,8 @@ void SurfaceWalk::find_place(uint32_t before, Place& out) {
     // It is straight above the point.
     const DVec3 d = to - from;
     out.distance2 = glm::dot(d, d);
-    if (const DVec3 left = glm::cross(up, d); glm::dot(left, left) <= kSteep * kSteep * glm::dot(up, up) * out.distance2)
+    if (const DVec3 left = glm::cross(up, d);
+        glm::dot(left, left) <= kSteep * kSteep * glm::dot(up, up) * out.distance2)
       out.state = Place::State::kPoint;
     return;
   }
@@ -277,8 +278,7 @@ bool SurfaceWalk::follow(Outline& outline, const Triangle& p, const uint32_t* ed
     }
     const Place& end = places_[b];
     const DVec3& corner = outline.corners[static_cast<size_t>(next)];
-    last.distance2 =
-        std::max(last.distance2, distance2<look>(outline, last.triangle, corner, end.at, end.distance2));
+    last.distance2 = std::max(last.distance2, distance2<look>(outline, last.triangle, corner, end.at, end.distance2));
     if (end.state != Place::State::kPoint) continue;
     // Around a corner that is a point after, inside the triangle before.
     while (last.triangle != starts[next]) {
@@ -391,9 +391,12 @@ bool SurfaceWalk::lay(uint32_t triangle, std::vector<OverlayPiece>& pieces) {
 
 bool SurfaceWalk::lay(uint32_t triangle, Look look, std::vector<OverlayPiece>& pieces) {
   switch (look) {
-  case Look::kCloser: return lay<Look::kCloser>(triangle, pieces);
-  case Look::kShares: return lay<Look::kShares>(triangle, pieces);
-  default: return lay<Look::kAtImages>(triangle, pieces);
+  case Look::kCloser:
+    return lay<Look::kCloser>(triangle, pieces);
+  case Look::kShares:
+    return lay<Look::kShares>(triangle, pieces);
+  default:
+    return lay<Look::kAtImages>(triangle, pieces);
   }
 }
 

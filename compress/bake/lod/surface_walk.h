@@ -20,12 +20,16 @@ public:
   SurfaceWalk(const OverlaySurface& before, const SurfaceSide& after, const SimplifyMesh& mesh);
 
   /// How distances of pieces are measured.
-  enum class Look : uint8_t { kAtImages, kCloser, kShares }; ///< from a point to its image; to the nearest point; the
-                                                             ///< first and shares too
+  enum class Look : uint8_t {
+    kAtImages,
+    kCloser,
+    kShares
+  }; ///< from a point to its image; to the nearest point; the
+     ///< first and shares too
 
   /// Appends the triangles after onto which a triangle before is mapped (some more than once) with how far its part
-  /// there is from it at most, both ways; shares are 0 unless looked for. False, and nothing appended, where a corner or an edge
-  /// has no image, or its outline goes around two points and more.
+  /// there is from it at most, both ways; shares are 0 unless looked for. False, and nothing appended, where a corner
+  /// or an edge has no image, or its outline goes around two points and more.
   bool lay(uint32_t triangle, Look look, std::vector<OverlayPiece>& pieces);
 
   const DVec3& area_normal(uint32_t after) const { return normals_[after]; }
@@ -127,9 +131,9 @@ private:
   std::vector<Way> ways_;
   std::vector<Crossing> crossings_;
   std::vector<uint32_t> side_of_edge_; ///< per edge: a corner after where it begins, or kNone
-  std::vector<uint32_t> neighbours_; ///< per corner after: the triangle across the side to the next one
-  std::vector<DVec3> normals_;       ///< per triangle after, twice its area long
-  std::vector<DVec3> facing_;        ///< per point after: the sum around it
+  std::vector<uint32_t> neighbours_;   ///< per corner after: the triangle across the side to the next one
+  std::vector<DVec3> normals_;         ///< per triangle after, twice its area long
+  std::vector<DVec3> facing_;          ///< per point after: the sum around it
   Outline outline_;
 };
 
