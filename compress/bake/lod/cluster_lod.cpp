@@ -62,6 +62,9 @@ private:
     cluster_spheres_.resize(lod_.clusters.size());
     tbb::parallel_for(size_t{0}, lod_.clusters.size(),
                       [&](size_t i) { cluster_spheres_[i] = bound(lod_.clusters[i]); });
+    DVec3 lo(std::numeric_limits<double>::infinity()), hi(-lo);
+    for (uint32_t i = 0; i < lod_.positions.size(); ++i) lo = glm::min(lo, point(i)), hi = glm::max(hi, point(i));
+    diagonal_ = glm::length(hi - lo);
   }
 
   DVec3 point(uint32_t position) const {
@@ -180,8 +183,8 @@ private:
             locked_for_ever_[lod_.vertices[lod_.triangles[c.range.first_triangle + i][corner]].position] = 1;
     }
     group.sphere = enclose(spheres);
-    // Everything lies in the ball: nothing is further off than it is wide.
-    if (!group.terminal) group.error = std::min(group.error, 2.0 * group.sphere.radius);
+    // Everything lies in the ball, and in the geometry's box: nothing is further off than they are wide.
+    if (!group.terminal) group.error = std::min({group.error, 2.0 * group.sphere.radius, diagonal_});
   }
 
   /// New positions, vertices, triangles and clusters of all groups, in their order.
@@ -224,6 +227,7 @@ private:
   const uint32_t max_levels_;
   ClusterLod lod_;
   std::vector<uint32_t> seam_of_kind_;
+  double diagonal_ = 0.0; ///< of the geometry's box, which nothing leaves
   std::vector<LodSphere> cluster_spheres_; ///< of level 0: their own; else that of the generating group
   std::vector<double> triangle_errors_;
   std::vector<uint32_t> owner_;
