@@ -63,7 +63,11 @@ private:
     tbb::parallel_for(size_t{0}, lod_.clusters.size(),
                       [&](size_t i) { cluster_spheres_[i] = bound(lod_.clusters[i]); });
     DVec3 lo(std::numeric_limits<double>::infinity()), hi(-lo);
-    for (uint32_t i = 0; i < lod_.positions.size(); ++i) lo = glm::min(lo, point(i)), hi = glm::max(hi, point(i));
+    for (const Triangle& t : base.triangles)
+      for (int i = 0; i < 3; ++i) {
+        const DVec3 p = point(lod_.vertices[t[i]].position);
+        lo = glm::min(lo, p), hi = glm::max(hi, p);
+      }
     diagonal_ = glm::length(hi - lo);
   }
 
