@@ -158,7 +158,7 @@ private:
   }
 
   SimplifiedGroup simplify_group(const std::vector<uint32_t>& members) const {
-    LodGroupInput input{g_,     lod_.positions,  lod_.vertices, lod_.triangles, {}, triangle_errors_, seam_of_kind_,
+    LodGroupInput input{g_,     lod_.positions,   lod_.vertices, lod_.triangles, {}, triangle_errors_, seam_of_kind_,
                         owner_, locked_for_ever_, lines_};
     for (const uint32_t number : members) input.clusters.push_back(&lod_.clusters[number]);
     SimplifiedGroup result = packtrace::simplify_group(input);
@@ -231,7 +231,7 @@ private:
   const uint32_t max_levels_;
   ClusterLod lod_;
   std::vector<uint32_t> seam_of_kind_;
-  double diagonal_ = 0.0; ///< of the geometry's box, which nothing leaves
+  double diagonal_ = 0.0;                  ///< of the geometry's box, which nothing leaves
   std::vector<LodSphere> cluster_spheres_; ///< of level 0: their own; else that of the generating group
   std::vector<double> triangle_errors_;
   std::vector<uint32_t> owner_;
