@@ -87,12 +87,71 @@ void append_points(const ClusterLod& lod, const LodCluster& cluster, std::vector
 struct Distance {
   double rms = 0.0, max = 0.0;
 };
-Distance between(const BareMesh& a, const SurfaceDistance& to_a, const BareMesh& b, size_t samples) {
-  const SurfaceDistance to_b(b.positions, b.triangles);
+Distance between(const BareMesh& a, const SurfaceDistance& to_a, const BareMesh& b, const SurfaceDistance& to_b,
+                 size_t samples) {
   const DistanceStats from_a = surface_distance(a.positions, a.triangles, to_b, samples);
   const DistanceStats from_b = surface_distance(b.positions, b.triangles, to_a, samples);
   return {std::max(from_a.rms, from_b.rms), std::max(from_a.max, from_b.max)};
 }
+
+/// What was made from each group, and the level 0 that it stands for.
+class GroupSurfaces {
+public:
+  explicit GroupSurfaces(const ClusterLod& lod) : lod_(lod), made_(lod.groups.size()), base_(lod.groups.size()) {
+    std::vector<std::vector<uint32_t>> below(lod.groups.size());
+    for (uint32_t i = 0; i < lod.clusters.size(); ++i) {
+      const LodCluster& c = lod.clusters[i];
+      if (c.generating_group == kNoGroup) {
+        base_[c.group].push_back(i);
+      } else {
+        made_[c.generating_group].push_back(i);
+        below[c.group].push_back(c.generating_group);
+      }
+    }
+    for (size_t i = 0; i < base_.size(); ++i) { // level by level
+      make_unique(below[i]);
+      for (const uint32_t group : below[i]) base_[i].insert(base_[i].end(), base_[group].begin(), base_[group].end());
+      make_unique(base_[i]);
+    }
+  }
+
+  /// Stated to measured error of each group that made some of the level, and has a measurable one: what was made from
+  /// the whole of level 0, and clusters of level 0 that no other group there stands for from the whole level.
+  std::vector<double> ratios(uint32_t level, const std::vector<DVec3>& points, const SurfaceDistance& to_base,
+                             const SurfaceDistance& to_level) const {
+    constexpr size_t kSamples = 3000; // a group
+    std::vector<uint32_t> sharers(lod_.clusters.size());
+    for_each_group(level, [&](uint32_t group) {
+      for (const uint32_t cluster : base_[group]) ++sharers[cluster];
+    });
+    std::vector<double> result;
+    for_each_group(level, [&](uint32_t group) {
+      std::vector<Triangle> made, base;
+      for (const uint32_t cluster : made_[group]) append_points(lod_, lod_.clusters[cluster], made);
+      for (const uint32_t cluster : base_[group])
+        if (sharers[cluster] == 1) append_points(lod_, lod_.clusters[cluster], base);
+      const double measured = std::max(surface_distance(points, made, to_base, kSamples).max,
+                                       surface_distance(points, base, to_level, kSamples).max);
+      if (measured > 0.0) result.push_back(lod_.groups[group].error / measured);
+    });
+    return result;
+  }
+
+private:
+  static void make_unique(std::vector<uint32_t>& numbers) {
+    std::sort(numbers.begin(), numbers.end());
+    numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+  }
+
+  template <typename Visit>
+  void for_each_group(uint32_t level, const Visit& visit) const {
+    for (uint32_t i = 0; i < lod_.groups.size(); ++i)
+      if (lod_.groups[i].level + 1 == level && !lod_.groups[i].terminal) visit(i);
+  }
+
+  const ClusterLod& lod_;
+  std::vector<std::vector<uint32_t>> made_, base_; ///< clusters, per group
+};
 
 Json measure_levels(const test::BuiltLod& built, const Options& options) {
   const ClusterLod& lod = built.lod;
@@ -105,10 +164,11 @@ Json measure_levels(const test::BuiltLod& built, const Options& options) {
   const double size = diagonal(base.positions);
 
   Json levels = Json::array();
+  const GroupSurfaces groups(lod);
   double stated = 0.0; // of all that this level is made of
   fmt::print(
       "\n| level | triangles | clusters | terminal groups | stated error, median / largest (% of diagonal) | measured "
-      "rms / largest | stated : measured |\n|---|---|---|---|---|---|---|\n");
+      "rms / largest | stated : measured, all / median group |\n|---|---|---|---|---|---|---|\n");
   for (uint32_t level = 0; level < lod.level_count; ++level) {
     level_mesh.triangles.clear();
     uint64_t clusters = 0, terminal = 0;
@@ -121,17 +181,20 @@ Json measure_levels(const test::BuiltLod& built, const Options& options) {
       if (g.level + 1 == level && !g.terminal) errors.push_back(g.error);
     }
     for (const double e : errors) stated = std::max(stated, e);
-    const Distance d = level == 0 ? Distance{} : between(base, to_base, level_mesh, options.samples);
-    fmt::print("| {} | {} | {} | {} | {:.4f} / {:.4f} | {:.4f} / {:.4f} | {:.2f} |\n", level,
+    const SurfaceDistance to_level(level_mesh.positions, level_mesh.triangles);
+    const Distance d = level == 0 ? Distance{} : between(base, to_base, level_mesh, to_level, options.samples);
+    const double ratio = median(groups.ratios(level, base.positions, to_base, to_level));
+    fmt::print("| {} | {} | {} | {} | {:.4f} / {:.4f} | {:.4f} / {:.4f} | {:.2f} / {:.2f} |\n", level,
                level_mesh.triangles.size(), clusters, terminal, 100 * median(errors) / size, 100 * stated / size,
-               100 * d.rms / size, 100 * d.max / size, d.max > 0.0 ? stated / d.max : 1.0);
+               100 * d.rms / size, 100 * d.max / size, d.max > 0.0 ? stated / d.max : 1.0, ratio);
     levels.push_back({{"triangles", level_mesh.triangles.size()},
                       {"clusters", clusters},
                       {"terminal_groups", terminal},
                       {"median_stated_error", median(errors) / size},
                       {"stated_error", stated / size},
                       {"measured_rms", d.rms / size},
-                      {"measured_max", d.max / size}});
+                      {"measured_max", d.max / size},
+                      {"median_group_stated_to_measured", ratio}});
   }
   return levels;
 }
@@ -161,7 +224,8 @@ Json measure_simplifiers(const test::BuiltLod& built, const Options& options) {
         fmt::print("| {} | {} % | does not take the mesh | | | |\n", s.name, 100 * kept);
         continue;
       }
-      const Distance d = between(base, to_base, r.mesh, options.samples);
+      const Distance d =
+          between(base, to_base, r.mesh, SurfaceDistance(r.mesh.positions, r.mesh.triangles), options.samples);
       const double speed = static_cast<double>(base.triangles.size()) / r.seconds * 1e-6;
       fmt::print("| {} | {} % | {}{} | {:.5f} | {:.4f} | {:.2f} |\n", s.name, 100 * kept, r.mesh.triangles.size(),
                  r.lost_triangles > 0 ? fmt::format(" ({} not taken)", r.lost_triangles) : "", 100 * d.rms / size,

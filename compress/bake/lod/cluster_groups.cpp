@@ -10,6 +10,7 @@
 #include <tbb/parallel_sort.h>
 
 #include "compress/bake/morton.h"
+#include "compress/bake/weld_table.h"
 
 namespace packtrace {
 namespace {
@@ -26,19 +27,30 @@ struct BorderEdge {
 uint32_t begin_of(std::span<const uint32_t> ends, uint32_t i) { return i == 0 ? 0 : ends[i - 1]; }
 
 void append_border(const ClusterRuns& clusters, uint32_t cluster, std::vector<BorderEdge>& out) {
-  std::vector<std::pair<uint32_t, uint32_t>> edges;
-  for (uint32_t i = begin_of(clusters.ends, cluster); i < clusters.ends[cluster]; ++i) {
+  struct Edge {
+    uint32_t a, b, uses;
+  };
+  const uint32_t begin = begin_of(clusters.ends, cluster), end = clusters.ends[cluster];
+  std::vector<Edge> edges;
+  edges.reserve(3 * size_t{end - begin});
+  WeldTable table(3 * size_t{end - begin});
+  for (uint32_t i = begin; i < end; ++i) {
     const Triangle& t = clusters.points[i];
     for (int k = 0; k < 3; ++k) {
-      const uint32_t p = t[k], q = t[(k + 1) % 3];
-      if (p != q) edges.emplace_back(std::min(p, q), std::max(p, q));
+      const uint32_t a = std::min(t[k], t[(k + 1) % 3]), b = std::max(t[k], t[(k + 1) % 3]);
+      if (a == b) continue;
+      const auto next = static_cast<uint32_t>(edges.size());
+      const uint32_t edge = table.find_or_add(mix_words((uint64_t{a} << 32) | b, 0), next, [&](uint32_t other) {
+        return edges[other].a == a && edges[other].b == b;
+      });
+      if (edge == next)
+        edges.push_back({a, b, 1});
+      else
+        ++edges[edge].uses;
     }
   }
-  std::sort(edges.begin(), edges.end());
-  for (size_t i = 0, next; i < edges.size(); i = next) {
-    for (next = i + 1; next < edges.size() && edges[next] == edges[i];) ++next;
-    if (next == i + 1) out.push_back({edges[i].first, edges[i].second, cluster});
-  }
+  for (const Edge& e : edges)
+    if (e.uses == 1) out.push_back({e.a, e.b, cluster});
 }
 
 std::vector<BorderEdge> border_edges(const ClusterRuns& clusters) {

@@ -42,6 +42,7 @@ public:
 
   ClusterLod run(const GeometryClusters& base) {
     take_base(base);
+    lines_ = LineCover(base.triangles, lod_.vertices, lod_.positions.size());
     locked_for_ever_.assign(lod_.positions.size(), 0);
     std::vector<uint32_t> active(lod_.clusters.size());
     for (uint32_t i = 0; i < active.size(); ++i) active[i] = i;
@@ -61,6 +62,13 @@ private:
     cluster_spheres_.resize(lod_.clusters.size());
     tbb::parallel_for(size_t{0}, lod_.clusters.size(),
                       [&](size_t i) { cluster_spheres_[i] = bound(lod_.clusters[i]); });
+    DVec3 lo(std::numeric_limits<double>::infinity()), hi(-lo);
+    for (const Triangle& t : base.triangles)
+      for (int i = 0; i < 3; ++i) {
+        const DVec3 p = point(lod_.vertices[t[i]].position);
+        lo = glm::min(lo, p), hi = glm::max(hi, p);
+      }
+    diagonal_ = glm::length(hi - lo);
   }
 
   DVec3 point(uint32_t position) const {
@@ -150,8 +158,8 @@ private:
   }
 
   SimplifiedGroup simplify_group(const std::vector<uint32_t>& members) const {
-    LodGroupInput input{g_,     lod_.positions,  lod_.vertices, lod_.triangles, {}, triangle_errors_, seam_of_kind_,
-                        owner_, locked_for_ever_};
+    LodGroupInput input{g_,     lod_.positions,   lod_.vertices, lod_.triangles, {}, triangle_errors_, seam_of_kind_,
+                        owner_, locked_for_ever_, lines_};
     for (const uint32_t number : members) input.clusters.push_back(&lod_.clusters[number]);
     SimplifiedGroup result = packtrace::simplify_group(input);
     if (static_cast<double>(result.triangles.size()) > kWorthwhile * static_cast<double>(result.source_triangles))
@@ -179,6 +187,8 @@ private:
             locked_for_ever_[lod_.vertices[lod_.triangles[c.range.first_triangle + i][corner]].position] = 1;
     }
     group.sphere = enclose(spheres);
+    // Everything lies in the ball, and in the geometry's box: nothing is further off than they are wide.
+    if (!group.terminal) group.error = std::min({group.error, 2.0 * group.sphere.radius, diagonal_});
   }
 
   /// New positions, vertices, triangles and clusters of all groups, in their order.
@@ -221,9 +231,11 @@ private:
   const uint32_t max_levels_;
   ClusterLod lod_;
   std::vector<uint32_t> seam_of_kind_;
+  double diagonal_ = 0.0;                  ///< of the geometry's box, which nothing leaves
   std::vector<LodSphere> cluster_spheres_; ///< of level 0: their own; else that of the generating group
   std::vector<double> triangle_errors_;
   std::vector<uint32_t> owner_;
+  LineCover lines_;
   std::vector<uint8_t> locked_for_ever_; ///< positions of terminal groups
 };
 

@@ -71,12 +71,19 @@ private:
           if (!plain) t.wedges[corner] = local(wedge_table, wedge_vertices, v[corner]);
         }
         const bool line = t.points.x == t.points.y || t.points.y == t.points.z || t.points.z == t.points.x;
-        (line ? lines_ : mesh_.triangles).push_back(t);
+        if (!line)
+          mesh_.triangles.push_back(t);
+        else if (!in_.lines.holds(points_of(v)))
+          lines_.push_back(t);
       }
     }
     for (const uint32_t vertex : wedge_vertices)
       mesh_.wedges.push_back({DVec3(decode_normal(encoding_, in_.vertices[vertex].normal_code)), vertex});
     place_points();
+  }
+
+  Triangle points_of(const Triangle& v) const {
+    return {in_.vertices[v.x].position, in_.vertices[v.y].position, in_.vertices[v.z].position};
   }
 
   /// Coordinates from about the middle of the group, so that they are small.

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "compress/bake/lod/cluster_lod.h"
+#include "compress/bake/lod/line_cover.h"
 
 namespace packtrace {
 
@@ -28,6 +29,7 @@ struct LodGroupInput {
   std::span<const uint32_t> seam_of_kind;
   std::span<const uint32_t> owner;          ///< per position; kShared ones stay
   std::span<const uint8_t> locked_for_ever; ///< per position; those stay too
+  const LineCover& lines;
 };
 
 /// What a group became.
@@ -43,7 +45,8 @@ struct SimplifiedGroup {
 };
 
 /// Halves the triangles of a group as far as its locked positions allow, and splits the result into clusters.
-/// Triangles with two corners in one place are left out; the lines that they were count as surface of the group.
+/// Triangles with two corners in one place are left out; the lines that they were count as surface of the group, unless
+/// they are sides of other triangles.
 SimplifiedGroup simplify_group(const LodGroupInput& input);
 
 } // namespace packtrace

@@ -66,6 +66,9 @@ public:
       retry_rejected();
     }
     compact();
+    for (uint32_t e = 0; e < same_edge_.size(); ++e) same_edge_[e] = edge_root(e);
+    m_.side_edges = std::move(side_edge_);
+    m_.edge_became = std::move(same_edge_);
     for (uint32_t i = 0; i < merged_into_.size(); ++i) m_.stands_for[i] = root(i);
   }
 

@@ -33,6 +33,10 @@ struct SimplifyMesh {
   std::vector<uint8_t> moved;       ///< result, per point
   std::vector<uint32_t> stands_for; ///< result, per point: the one that it became
   std::vector<uint32_t> source;     ///< result, per triangle: its number before
+  /// Result, per corner of the triangles before: the edge from there to the next corner, numbered from 0 without gaps;
+  /// the same for all triangles at an edge. None where nothing was to be done.
+  std::vector<uint32_t> side_edges;
+  std::vector<uint32_t> edge_became; ///< result, per edge: the one that it became
 };
 
 struct SimplifyConfig {

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "compress/bake/lod/surface_side.h"
+#include "compress/bake/lod/surface_walk.h"
 #include "compress/bake/lod/triangle_refiner.h"
 
 namespace packtrace {
@@ -13,6 +14,7 @@ namespace {
 
 constexpr double kSeen = 0.02;       // of a new triangle's area may be met by no old one
 constexpr double kInflation = 1.001; // of what was measured, for all roundings
+constexpr uint8_t kBack = 2;         // covered, but from behind
 constexpr double kFine = 0.5;        // steps; distances below need no work
 constexpr double kSlack = 1.1;       // how much larger than it must be the error of a group may be stated to save work
 
@@ -29,11 +31,15 @@ class Measurer {
 public:
   Measurer(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh)
       : m_(mesh), before_({points, triangles}, [&](uint32_t p) { return mesh.stands_for[p]; }),
-        after_({mesh.points, mesh.triangles}, [](uint32_t p) { return p; }), errors_(mesh.triangles.size()),
-        seen_(mesh.triangles.size()), unchanged_(triangles.size()) {}
+        after_({mesh.points, mesh.triangles}, [](uint32_t p) { return p; }), walk_(before_.surface(), after_, mesh),
+        errors_(mesh.triangles.size()), seen_(mesh.triangles.size()), covered_(mesh.triangles.size()),
+        mapped_(triangles.size()), unchanged_(triangles.size()) {}
 
   void run() {
+    after_.link();
     find_unchanged();
+    pieces_.reserve(7 * unchanged_.size());
+    laid_.reserve(unchanged_.size());
     for (uint32_t t = 0; t < unchanged_.size(); ++t)
       if (unchanged_[t] == 0) lay_over_after(t);
     settle();
@@ -43,7 +49,7 @@ public:
       measure_harder(t, std::numeric_limits<double>::infinity());
     }
     for (uint32_t s = 0; s < errors_.size(); ++s)
-      if (seen_[s] < 1.0 - kSeen) lay_over_before(s);
+      if (covered_[s] != 1 && seen_[s] < 1.0 - kSeen) lay_over_before(s);
     for (size_t s = 0; s < errors_.size(); ++s) m_.triangles[s].error = errors_[s];
   }
 
@@ -67,18 +73,21 @@ private:
       const uint32_t t = m_.source[s];
       if (now != before_.surface().triangles[t].points || m_.moved[now.x] + m_.moved[now.y] + m_.moved[now.z] != 0)
         continue;
-      unchanged_[t] = 1;
+      unchanged_[t] = mapped_[t] = 1;
       seen_[s] = 1.0;
       note(s, 0.0, had(t));
     }
   }
 
   void lay_over_after(uint32_t t) {
-    after_.gather(before_.corner_points(t));
     const auto first = static_cast<uint32_t>(pieces_.size());
-    if (!after_.lay(before_.corners(t), before_.surface().area_normal(t), pieces_)) {
-      not_covered_.push_back(t);
-      return;
+    mapped_[t] = walk_.lay(t, SurfaceWalk::Look::kAtImages, pieces_);
+    if (mapped_[t] == 0) {
+      after_.gather(before_.corner_points(t));
+      if (!after_.lay(before_.corners(t), before_.surface().area_normal(t), pieces_)) {
+        not_covered_.push_back(t);
+        return;
+      }
     }
     double largest = 0.0;
     for (size_t i = first; i < pieces_.size(); ++i) largest = std::max(largest, pieces_[i].distance);
@@ -93,6 +102,8 @@ private:
       std::pop_heap(laid_.begin(), laid_.end());
       const uint32_t t = laid_.back().triangle;
       laid_.pop_back();
+      if (look_closer_at_image(t)) continue;
+      mapped_[t] = 0;
       after_.gather(before_.corner_points(t));
       best_.clear();
       after_.lay(before_.corners(t), before_.surface().area_normal(t), best_);
@@ -102,12 +113,55 @@ private:
       else
         measure_harder(t, distance);
     }
-    for (const Laid& laid : laid_)
-      for (uint32_t i = 0; i < laid.count; ++i) {
-        const OverlayPiece& piece = pieces_[laid.first + i];
-        note(piece.triangle, piece.distance, had(laid.triangle));
-        seen_[piece.triangle] += piece.share;
-      }
+    for (const Laid& laid : laid_) accept(laid);
+    for (const Laid& laid : looked_) accept(laid);
+    walk_.find_borders(mapped_, covered_);
+    for (const Laid& laid : laid_) add_shares(laid);
+    for (const Laid& laid : looked_) add_shares(laid);
+  }
+
+  /// What images cover, each seen from the side that it faces, needs no measuring of its own.
+  void accept(const Laid& laid) {
+    const bool mapped = mapped_[laid.triangle] != 0;
+    const DVec3 normal = mapped ? before_.surface().area_normal(laid.triangle) : DVec3(0.0);
+    const double had = this->had(laid.triangle);
+    for (const OverlayPiece& piece : std::span(pieces_).subspan(laid.first, laid.count)) {
+      note(piece.triangle, piece.distance, had);
+      seen_[piece.triangle] += piece.share;
+      if (!mapped) continue;
+      uint8_t& covered = covered_[piece.triangle];
+      if (!(glm::dot(normal, walk_.area_normal(piece.triangle)) > 0.0))
+        covered = kBack;
+      else if (covered == 0)
+        covered = 1;
+    }
+  }
+
+  /// Where borders cross, the area says what images cover.
+  void add_shares(const Laid& laid) {
+    if (mapped_[laid.triangle] == 0) return;
+    const auto pieces = std::span(pieces_).subspan(laid.first, laid.count);
+    if (std::all_of(pieces.begin(), pieces.end(), [&](const OverlayPiece& p) { return covered_[p.triangle] == 1; }))
+      return;
+    best_.clear();
+    walk_.lay(laid.triangle, SurfaceWalk::Look::kShares, best_);
+    for (const OverlayPiece& piece : best_) seen_[piece.triangle] += piece.share;
+  }
+
+  /// Images may be far from what they are images of where the surface is steep; the nearest point is what counts.
+  bool look_closer_at_image(uint32_t t) {
+    if (mapped_[t] == 0) return false;
+    const auto first = static_cast<uint32_t>(pieces_.size());
+    walk_.lay(t, SurfaceWalk::Look::kCloser, pieces_);
+    double largest = 0.0;
+    for (size_t i = first; i < pieces_.size(); ++i) largest = std::max(largest, pieces_[i].distance);
+    if (!enough(largest, had(t))) {
+      pieces_.resize(first);
+      return false;
+    }
+    largest_ = std::max(largest_, stated(largest, had(t)));
+    looked_.push_back({stated(largest, had(t)), t, first, static_cast<uint32_t>(pieces_.size() - first)});
+    return true;
   }
 
   /// Straight up may be far where the surface is steep; the nearest point is what counts. Returns the largest of best_.
@@ -138,6 +192,17 @@ private:
     after_.widen();
     look_along_facing(t, bound);
     if (enough(bound, had(t))) return accept(t);
+    refine_over_after(t, bound, false);
+    if (!enough(bound, had(t))) {
+      after_.gather_within(p, bound);
+      refine_over_after(t, bound, true);
+    }
+    accept(t);
+  }
+
+  /// @param all whether the candidates are all that matter: then what the corners' distance proves holds for others too
+  void refine_over_after(uint32_t t, double& bound, bool all) {
+    const Corners p = before_.corners(t);
     // It is not below this, as far as the candidates go.
     const double before = proven_, least = stated(farthest_corner(p), had(t));
     proven_ = std::max(proven_, least);
@@ -150,8 +215,7 @@ private:
           });
       if (refined < bound) std::swap(best_, refined_), bound = refined;
     }
-    proven_ = std::max(before, std::min(least, stated(bound, had(t))));
-    accept(t);
+    proven_ = all ? std::max(before, std::min(least, stated(bound, had(t)))) : before;
   }
 
   /// Keeps the better of best_ and what is seen from where the candidates face.
@@ -184,6 +248,7 @@ private:
 
   /// A triangle after of which the ones before saw too little: it is measured itself.
   void lay_over_before(uint32_t s) {
+    before_.link();
     before_.gather(after_.corner_points(s));
     if (fits_over_before(s)) return;
     before_.widen();
@@ -191,7 +256,7 @@ private:
     const double near = refine_over_before(s);
     if (near > std::max(largest_, kSlack * proven_)) {
       std::swap(refined_, second_);
-      before_.widen();
+      before_.gather_within(after_.corners(s), near);
       if (refine_over_before(s) >= near) std::swap(refined_, second_);
     }
     for (const OverlayPiece& piece : refined_) note(s, piece.distance, had(piece.triangle));
@@ -225,11 +290,14 @@ private:
 
   SimplifyMesh& m_;
   SurfaceSide before_, after_;
-  std::vector<double> errors_; ///< of triangles after
-  std::vector<double> seen_;   ///< share of each triangle after that was met
+  SurfaceWalk walk_;
+  std::vector<double> errors_;   ///< of triangles after
+  std::vector<double> seen_;     ///< share of each triangle after that was met
+  std::vector<uint8_t> covered_; ///< per triangle after: images of those before cover it
+  std::vector<uint8_t> mapped_;  ///< per triangle before: what is said of it holds for its image
   std::vector<uint8_t> unchanged_;
   std::vector<OverlayPiece> pieces_;
-  std::vector<Laid> laid_;
+  std::vector<Laid> laid_, looked_;
   std::vector<uint32_t> not_covered_;
   std::vector<OverlayPiece> best_, second_, refined_; ///< of the triangle at hand
   TriangleRefiner refiner_;

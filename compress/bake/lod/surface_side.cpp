@@ -11,6 +11,8 @@ constexpr size_t kLargeFan = 48; // triangles around a point
 } // namespace
 
 void SurfaceSide::link() {
+  if (!first_.empty()) return;
+  stamp_.resize(surface_.triangles.size());
   const auto for_each = [&](const auto& visit) {
     for (uint32_t i = 0; i < corner_points_.size(); ++i) {
       const Triangle& t = corner_points_[i];
@@ -58,6 +60,18 @@ void SurfaceSide::widen() {
     for (int k = 0; k < 3; ++k)
       if (const auto around = fan(corner_points_[candidates_[i]][k]); around.size() <= kLargeFan)
         for (const uint32_t t : around) add(t);
+}
+
+void SurfaceSide::gather_within(const std::array<DVec3, 3>& triangle, double distance) {
+  candidates_.clear();
+  const DVec3 lo = glm::min(glm::min(triangle[0], triangle[1]), triangle[2]) - distance;
+  const DVec3 hi = glm::max(glm::max(triangle[0], triangle[1]), triangle[2]) + distance;
+  for (uint32_t t = 0; t < corner_points_.size(); ++t) {
+    const DVec3 &a = surface_.corner(t, 0), &b = surface_.corner(t, 1), &c = surface_.corner(t, 2);
+    const DVec3 least = glm::min(glm::min(a, b), c), most = glm::max(glm::max(a, b), c);
+    if (least.x <= hi.x && least.y <= hi.y && least.z <= hi.z && most.x >= lo.x && most.y >= lo.y && most.z >= lo.z)
+      candidates_.push_back(t);
+  }
 }
 
 void SurfaceSide::gather_near(DVec3 point) {

@@ -14,13 +14,12 @@ namespace packtrace {
 class SurfaceSide {
 public:
   template <typename PointOf>
-  SurfaceSide(const OverlaySurface& surface, const PointOf& point_of)
-      : surface_(surface), overlay_(surface), stamp_(surface.triangles.size()) {
+  SurfaceSide(const OverlaySurface& surface, const PointOf& point_of) : surface_(surface), overlay_(surface) {
     corner_points_.reserve(surface.triangles.size());
     for (const LodTriangle& t : surface.triangles)
       corner_points_.emplace_back(point_of(t.points.x), point_of(t.points.y), point_of(t.points.z));
-    link();
   }
+  void link(); ///< before anything is asked about what is around points
 
   const OverlaySurface& surface() const { return surface_; }
   Overlay& overlay() { return overlay_; }
@@ -29,20 +28,24 @@ public:
     return {surface_.corner(triangle, 0), surface_.corner(triangle, 1), surface_.corner(triangle, 2)};
   }
 
+  /// The triangles with that corner.
+  std::span<const uint32_t> around(uint32_t point) const {
+    return std::span(fans_).subspan(first_[point], first_[point + 1] - first_[point]);
+  }
+
   // What another triangle is measured against: a set of triangles of this side.
   std::span<const uint32_t> candidates() const { return candidates_; }
   void gather(const Triangle& corners); ///< those around three points
   void widen();                         ///< one ring more
   void gather_near(DVec3 point);        ///< a few more: those with corners near it
+  /// All that may be nearer to a triangle than that, and more.
+  void gather_within(const std::array<DVec3, 3>& triangle, double distance);
   bool lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::vector<OverlayPiece>& pieces) {
     return overlay_.lay(triangle, direction, candidates_, pieces);
   }
 
 private:
-  void link();
-  std::span<const uint32_t> fan(uint32_t point) const {
-    return std::span(fans_).subspan(first_[point], first_[point + 1] - first_[point]);
-  }
+  std::span<const uint32_t> fan(uint32_t point) const { return around(point); }
   void add_large_fan(std::span<const uint32_t> fan, const Triangle& corners, int corner);
   void add(uint32_t triangle) {
     if (stamp_[triangle] != stamp_value_) stamp_[triangle] = stamp_value_, candidates_.push_back(triangle);

@@ -57,11 +57,14 @@ double OverlaySurface::distance(DVec3 p, uint32_t triangle) const {
   return glm::length(p - nearest_point(p, corner(triangle, 0), corner(triangle, 1), corner(triangle, 2)));
 }
 
-Overlay::Overlay(const OverlaySurface& surface)
-    : surface_(surface), projected_(surface.points.size()), outside_(surface.points.size()),
-      stamps_(surface.points.size()) {
-  corners_.reserve(3 * surface.triangles.size());
-  for (const LodTriangle& t : surface.triangles)
+Overlay::Overlay(const OverlaySurface& surface) : surface_(surface) {}
+
+void Overlay::prepare() {
+  projected_.resize(surface_.points.size());
+  outside_.resize(surface_.points.size());
+  stamps_.resize(surface_.points.size());
+  corners_.reserve(3 * surface_.triangles.size());
+  for (const LodTriangle& t : surface_.triangles)
     for (int i = 0; i < 3; ++i) corners_.push_back(t.points[i]);
   task_.corners = corners_.data();
   task_.projected = projected_.data();
@@ -74,6 +77,7 @@ bool Overlay::lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::sp
   static const OverlayKernel kernel = pick_kernel();
   const double length = glm::length(direction);
   if (!(length > 0.0) || candidates.empty()) return false;
+  if (corners_.empty()) prepare();
   const DVec3 z = direction / length;
   triangle_ = triangle, direction_ = z;
   const DVec3 normal = glm::cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);

@@ -37,6 +37,8 @@ public:
   double nearest_distance(const OverlayPiece& piece) const;
 
 private:
+  void prepare(); ///< on first use: most overlays are never asked
+
   OverlaySurface surface_;
   std::vector<uint32_t> corners_;
   std::vector<OverlayPoint> projected_;

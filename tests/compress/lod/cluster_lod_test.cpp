@@ -97,6 +97,9 @@ TEST_P(ClusterLodOf, ErrorsGrowAndSpheresHoldWhatIsBelow) {
   for (const LodCluster& c : lod_.clusters) {
     const LodGroup& group = lod_.groups[c.group];
     EXPECT_EQ(group.terminal, std::isinf(group.error));
+    if (!group.terminal) {
+      EXPECT_LE(group.error, 2.0 * group.sphere.radius);
+    }
     if (c.generating_group == kNoGroup) {
       for (uint32_t i = 0; i < c.range.triangle_count; ++i)
         for (int corner = 0; corner < 3; ++corner) {

@@ -1,0 +1,116 @@
+// Where simplify() moved a surface: its image on the new one, and what counts as surface.
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+#include "compress/bake/lod/line_cover.h"
+#include "compress/bake/lod/surface_walk.h"
+#include "compress/bake/lod/triangle_distance.h"
+#include "tests/compress/test_scenes.h"
+
+namespace packtrace::test {
+namespace {
+
+/// A bumpy square with a locked border, simplified to a part of its triangles.
+struct Simplified {
+  explicit Simplified(double kept) {
+    constexpr uint32_t kCells = 14;
+    Random random(5);
+    for (uint32_t y = 0; y <= kCells; ++y)
+      for (uint32_t x = 0; x <= kCells; ++x) {
+        mesh.points.emplace_back(100.0 * x, 100.0 * y, std::round(random.uniform(-40, 40)));
+        mesh.locked.push_back(x == 0 || y == 0 || x == kCells || y == kCells);
+      }
+    for (uint32_t y = 0; y < kCells; ++y)
+      for (uint32_t x = 0; x < kCells; ++x) {
+        const uint32_t a = y * (kCells + 1) + x, b = a + kCells + 1;
+        mesh.triangles.push_back({Triangle(a, a + 1, b + 1), Triangle(Wedge::kNone), 0, 0.0});
+        mesh.triangles.push_back({Triangle(a, b + 1, b), Triangle(Wedge::kNone), 0, 0.0});
+      }
+    points = mesh.points, triangles = mesh.triangles;
+    const std::vector<uint32_t> seams{0};
+    simplify(mesh, {static_cast<uint32_t>(kept * static_cast<double>(triangles.size())), seams, false});
+  }
+
+  std::vector<DVec3> points; ///< before
+  std::vector<LodTriangle> triangles;
+  SimplifyMesh mesh;
+};
+
+class SurfaceWalkOf : public testing::TestWithParam<double> {
+protected:
+  SurfaceWalkOf() { after_.link(); }
+
+  /// The distance of a point from all of the surface after.
+  double distance(const DVec3& p) const {
+    double least = 1e300;
+    for (uint32_t s = 0; s < s_.mesh.triangles.size(); ++s) least = std::min(least, after_.surface().distance(p, s));
+    return least;
+  }
+
+  const Simplified s_{GetParam()};
+  SurfaceSide after_{{s_.mesh.points, s_.mesh.triangles}, [](uint32_t p) { return p; }};
+  SurfaceWalk walk_{{s_.points, s_.triangles}, after_, s_.mesh};
+};
+
+TEST_P(SurfaceWalkOf, BoundsTheDistanceOfEveryTriangle) {
+  size_t mapped = 0;
+  for (uint32_t t = 0; t < s_.triangles.size(); ++t) {
+    std::vector<OverlayPiece> pieces, closer;
+    if (!walk_.lay(t, SurfaceWalk::Look::kAtImages, pieces)) continue;
+    ++mapped;
+    ASSERT_TRUE(walk_.lay(t, SurfaceWalk::Look::kCloser, closer));
+    const auto largest = [](const std::vector<OverlayPiece>& of) {
+      double result = 0.0;
+      for (const OverlayPiece& piece : of) result = std::max(result, piece.distance);
+      return result;
+    };
+    EXPECT_LE(largest(closer), largest(pieces));
+    const Triangle& p = s_.triangles[t].points;
+    for (int i = 0; i <= 8; ++i)
+      for (int k = 0; i + k <= 8; ++k) {
+        const DVec3 at = (static_cast<double>(i) * s_.points[p.x] + static_cast<double>(k) * s_.points[p.y] +
+                          static_cast<double>(8 - i - k) * s_.points[p.z]) /
+                         8.0;
+        EXPECT_LE(distance(at), largest(closer) + 1e-9) << "triangle " << t;
+      }
+  }
+  EXPECT_GT(mapped, s_.triangles.size() / 2);
+}
+
+TEST_P(SurfaceWalkOf, ImagesCoverTrianglesAfterOnceAwayFromBorders) {
+  std::vector<double> shares(s_.mesh.triangles.size());
+  std::vector<uint8_t> mapped(s_.triangles.size()), covered(s_.mesh.triangles.size(), 1);
+  for (uint32_t t = 0; t < s_.triangles.size(); ++t) {
+    std::vector<OverlayPiece> pieces;
+    mapped[t] = walk_.lay(t, SurfaceWalk::Look::kShares, pieces);
+    for (const OverlayPiece& piece : pieces) shares[piece.triangle] += piece.share;
+  }
+  walk_.find_borders(mapped, covered);
+  size_t whole = 0;
+  for (size_t s = 0; s < shares.size(); ++s) {
+    if (covered[s] == 0 || shares[s] == 0.0) continue;
+    EXPECT_NEAR(shares[s], 1.0, 1e-9) << "triangle " << s;
+    ++whole;
+  }
+  EXPECT_GT(whole, shares.size() / 4);
+}
+
+INSTANTIATE_TEST_SUITE_P(Kept, SurfaceWalkOf, testing::Values(0.9, 0.5, 0.25));
+
+TEST(LineCover, HoldsSidesOfTrianglesOnly) {
+  std::vector<QuantizedVertex> vertices;
+  for (uint32_t i = 0; i < 6; ++i) vertices.push_back({i, 0, {}});
+  const std::vector<Triangle> triangles{{0, 1, 2}, {0, 1, 1}, {2, 0, 2}, {0, 3, 3}, {3, 4, 3}, {1, 1, 1}, {5, 5, 5}};
+  const LineCover cover(triangles, vertices, 6);
+  EXPECT_TRUE(cover.holds({0, 1, 1}));
+  EXPECT_TRUE(cover.holds({2, 0, 2}));
+  EXPECT_TRUE(cover.holds({1, 1, 1}));
+  EXPECT_FALSE(cover.holds({0, 3, 3})); // to a point away from it
+  EXPECT_FALSE(cover.holds({3, 4, 3})); // alone
+  EXPECT_FALSE(cover.holds({5, 5, 5}));
+}
+
+} // namespace
+} // namespace packtrace::test
