@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <limits>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -65,6 +66,7 @@ public:
 
   bool run() {
     s_.nodes = nodes_; // their number is checked with the records
+    if (nodes_.size() > std::numeric_limits<uint32_t>::max()) return false; // such trees are stored whole
     if (!clusters_ok() || find_tree_record_fault(s_, members_)) return false;
     TopologyReader reader(topology_, nodes_.size());
     if (!reader.valid()) return false;
