@@ -24,18 +24,22 @@ using Long2 = uint64_t __attribute__((vector_size(16)));
 
 void place_vertices(const VertexFields& fields, Box* boxes) {
   const uint64_t x = fields.widths[0], y = fields.widths[1], z = fields.widths[2], one = 1;
-  const Long4 shifts = {0, x, x + y, 0}, masks = {(one << x) - 1, (one << y) - 1, (one << z) - 1, 0};
+  const Long4 masks = {(one << x) - 1, (one << y) - 1, (one << z) - 1, 0};
   const auto b = fields.base;
   const Uint8 flip = {0, 0, 0, 0, ~0u, ~0u, ~0u, 0}; // -v = ~v + 1
   const auto base = [&](int axis) { return static_cast<uint32_t>(b[axis]); };
   const Uint8 add = {base(0), base(1), base(2), 0, 1 - base(0), 1 - base(1), 1 - base(2), 0};
+  Long4 shifts[8]; // by the field's bit in its byte; below 64 even for fields of no bits
+  for (uint64_t i = 0; i < 8; ++i) shifts[i] = Long4{i, y == 0 ? 0 : i + x, z == 0 ? 0 : i + x + y, 0};
+  const uint8_t* const bits = fields.bits;
   const uint64_t stride = x + y + z;
+  const uint32_t count = fields.count, shift = fields.shift;
   uint64_t bit = fields.first_bit;
-  for (uint32_t v = 0; v < fields.count; ++v, bit += stride) {
-    const uint64_t word = load(fields.bits + (bit >> 3)) >> (bit & 7u);
-    const Long4 field = (Long4{word, word, word, word} >> shifts) & masks;
+  for (uint32_t v = 0; v < count; ++v, bit += stride) {
+    const uint64_t word = load(bits + (bit >> 3));
+    const Long4 field = (Long4{word, word, word, word} >> shifts[bit & 7u]) & masks;
     const auto both = __builtin_shuffle(reinterpret_cast<Uint8>(field), Uint8{0, 2, 4, 6, 0, 2, 4, 6});
-    lanes(boxes[v]) = reinterpret_cast<Int8>(((both << fields.shift) ^ flip) + add);
+    lanes(boxes[v]) = reinterpret_cast<Int8>(((both << shift) ^ flip) + add);
   }
 }
 
@@ -107,7 +111,15 @@ void box_leaves(const Box* boxes, const uint8_t* vertices, const LeafCorners* le
         const uint64_t beyond = ~uint64_t{0} << (8 * left);
         eight = (eight & ~beyond) | (uint64_t{vertices[c]} * 0x0101010101010101 & beyond);
       }
-      for (uint32_t k = 0; k < 8; ++k, eight >>= 8) extend(box, lanes(boxes[eight & 255u]));
+      Int8 other = lanes(boxes[eight & 255u]); // two minima side by side
+      extend(box, lanes(boxes[(eight >> 8) & 255u]));
+      extend(other, lanes(boxes[(eight >> 16) & 255u]));
+      extend(box, lanes(boxes[(eight >> 24) & 255u]));
+      extend(other, lanes(boxes[(eight >> 32) & 255u]));
+      extend(box, lanes(boxes[(eight >> 40) & 255u]));
+      extend(other, lanes(boxes[(eight >> 48) & 255u]));
+      extend(box, lanes(boxes[eight >> 56]));
+      extend(box, other);
     }
     lanes(out[i]) = box;
   }
@@ -131,13 +143,16 @@ void pack_children(const Box* children, uint32_t count, NodeBoxes& node, Box& wh
   const auto down = [&](uint32_t axis) { return 0 - static_cast<uint32_t>(whole.lo[axis]); };
   const Uint8 flip = {0, 0, 0, 0, ~0u, ~0u, ~0u, ~0u}, add = {down(0), down(1), down(2), 0, ups[0], ups[1], ups[2], 1};
   const Uint8 shifts = {exponents[0], exponents[1], exponents[2], 0, exponents[0], exponents[1], exponents[2], 0};
-  Uint8 halves[2] = {};
-  for (uint32_t child = 0; child < count; ++child) {
-    const auto box = reinterpret_cast<Uint8>(lanes(children[child]));
-    halves[child >> 2] |= (((box ^ flip) + add) >> shifts) << (8 * (child & 3u));
-  }
   uint32_t bytes[2][8];
-  __builtin_memcpy(bytes, halves, sizeof bytes);
+  for (uint32_t half = 0; half < 2; ++half) {
+    Uint8 four = {};
+    const uint32_t first = 4 * half, end = count < first + 4 ? count : first + 4;
+    for (uint32_t child = first; child < end; ++child) {
+      const auto box = reinterpret_cast<Uint8>(lanes(children[child]));
+      four |= (((box ^ flip) + add) >> shifts) << (8 * (child - first));
+    }
+    __builtin_memcpy(bytes[half], &four, sizeof four);
+  }
   const uint64_t unused = count < 8 ? ~uint64_t{0} << (8 * count) : 0;
   for (uint32_t axis = 0; axis < 3; ++axis) {
     node.lo[axis] = (bytes[0][axis] | uint64_t{bytes[1][axis]} << 32) | unused;
