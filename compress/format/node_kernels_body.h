@@ -78,14 +78,14 @@ constexpr ByteTable kBytes;
 
 void number_corners(const CornerBits& corners, uint8_t* vertices) {
   uint8_t named[384 + kSpareIds]; // 16 readable behind any
-  spread_fields(corners.bits, corners.explicit_bit, corners.index_bits, corners.corner_count - corners.vertex_count,
-                named);
+  const uint8_t* const bits = corners.bits; // bytes that are written may lie anywhere, as far as the compiler knows
+  const uint32_t corner_count = corners.corner_count, fresh_bit = corners.fresh_bit;
+  spread_fields(bits, corners.explicit_bit, corners.index_bits, corner_count - corners.vertex_count, named);
   constexpr uint64_t kIota = 0x0706050403020100, kEach = 0x0101010101010101;
   uint32_t used = 0;
-  for (uint32_t c = 0; c < corners.corner_count; c += 8) {
-    const uint64_t bit = corners.fresh_bit + uint64_t{c};
-    const uint32_t left = corners.corner_count - c;
-    const auto byte = static_cast<uint8_t>((load(corners.bits + (bit >> 3)) >> (bit & 7u)) &
+  for (uint32_t c = 0; c < corner_count; c += 8) {
+    const uint32_t bit = fresh_bit + c, left = corner_count - c;
+    const auto byte = static_cast<uint8_t>((load(bits + (bit >> 3)) >> (bit & 7u)) &
                                            (left < 8 ? (1u << left) - 1 : 255u));
     const uint64_t below = kBytes.below[byte];
     Bytes16 from;
