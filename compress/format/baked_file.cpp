@@ -19,7 +19,7 @@ DiskForm resident_form(std::span<const std::byte> bytes) {
 BakedFile::BakedFile(std::unique_ptr<MappedFile> map, std::vector<std::byte> owned, std::span<const std::byte> bytes,
                      const DiskForm& disk, const std::string& name)
     : map_(std::move(map)), owned_(std::move(owned)), bytes_(bytes), disk_(disk),
-      sections_(validate_baked_file(bytes, name)) {}
+      sections_(validate_baked_file(bytes, name, disk.clusters_checked)) {}
 
 BakedFile::BakedFile(BakedFile&&) noexcept = default;
 BakedFile& BakedFile::operator=(BakedFile&&) noexcept = default;

@@ -112,6 +112,8 @@ std::vector<std::vector<uint32_t>> material_runs(const BakedSections& sections);
 
 /// Validates a whole file image and returns its sections; what BakedFile does when it opens.
 /// @param bytes 8-byte aligned
-BakedSections validate_baked_file(std::span<const std::byte> bytes, const std::string& name);
+/// @param clusters_checked find_cluster_fault() has found none in any of them, see DiskForm
+BakedSections validate_baked_file(std::span<const std::byte> bytes, const std::string& name,
+                                  bool clusters_checked = false);
 
 } // namespace packtrace

@@ -48,7 +48,8 @@ public:
             header_.page_count,
             sizeof header_ + table_bytes() + head_.size() + tail_.size(),
             nodes_.size(),
-            header_.stream_bytes};
+            header_.stream_bytes,
+            clusters_checked_};
     return std::move(resident_);
   }
 
@@ -227,6 +228,13 @@ private:
     const std::span<baked::PackedNode> nodes{reinterpret_cast<baked::PackedNode*>(resident_.data() + nodes_begin_),
                                              static_cast<size_t>(header_.node_count)};
     if (ZSTD_isError(got) != 0 || got != size || !restore_nodes(sections, topology, nodes)) fail("nodes");
+    // Those sections are where the pages were decoded to, unless the file lies.
+    const auto lies_at = [&](baked::Section number, uint64_t offset, uint64_t bytes) {
+      return header.sections[number].offset == offset && header.sections[number].bytes == bytes;
+    };
+    clusters_checked_ = lies_at(baked::kClusters, header_.head_bytes, cluster_count_ * sizeof(baked::ClusterRecord)) &&
+                        lies_at(baked::kPayload, payload_begin_, payload_bytes_ + kReadSlackBytes) &&
+                        lies_at(baked::kNodes, nodes_begin_, node_bytes());
   }
 
   void add_up_clusters() {
@@ -246,6 +254,7 @@ private:
   std::vector<Place> places_;
   std::span<const std::byte> head_, tail_, nodes_;
   uint64_t cluster_count_ = 0, payload_bytes_ = 0, payload_begin_ = 0, tail_begin_ = 0, nodes_begin_ = 0;
+  bool clusters_checked_ = false;
   std::vector<std::byte> resident_;
   std::span<const baked::GeometryRecord> geometries_;
 };

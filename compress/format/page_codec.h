@@ -86,6 +86,9 @@ struct DiskForm {
   uint64_t table_bytes = 0; ///< header, page records, head and tail
   uint64_t node_bytes = 0;  ///< of trees
   std::array<uint64_t, kPageStreams> stream_bytes{};
+  /// The nodes were restored, which relies on what validation checks of each cluster: find_cluster_fault() saw all
+  /// clusters as they lie in the resident file's sections, and they were not written to since.
+  bool clusters_checked = false;
 };
 
 /// Whether the bytes begin like a file of codec fast or small.

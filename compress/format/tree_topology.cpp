@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <atomic>
+#include <limits>
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include "compress/format/node_writer.h"
+#include "compress/format/leaf_restorer.h"
 #include "compress/format/tree_validation.h"
 
 namespace packtrace {
@@ -64,6 +66,7 @@ public:
 
   bool run() {
     s_.nodes = nodes_; // their number is checked with the records
+    if (nodes_.size() > std::numeric_limits<uint32_t>::max()) return false; // such trees are stored whole
     if (!clusters_ok() || find_tree_record_fault(s_, members_)) return false;
     TopologyReader reader(topology_, nodes_.size());
     if (!reader.valid()) return false;
@@ -130,48 +133,54 @@ private:
     return end <= s_.clusters[pending.cluster].triangle_count;
   }
 
+  /// By cluster, as each is decoded once.
   void make_leaf_nodes() {
-    std::stable_sort(pending_.begin(), pending_.end(),
-                     [](const Pending& a, const Pending& b) { return a.cluster < b.cluster; });
-    constexpr size_t kRun = 256;
-    tbb::parallel_for(size_t{0}, (pending_.size() + kRun - 1) / kRun, [&](size_t run) {
-      const size_t begin = run * kRun, end = std::min(begin + kRun, pending_.size());
-      for (size_t i = begin, next = i; i < end; i = next) {
-        while (next < end && pending_[next].cluster == pending_[i].cluster) ++next;
-        make_leaf_nodes(pending_[i].cluster, std::span(pending_).subspan(i, next - i));
-      }
+    std::vector<uint32_t> ends(s_.clusters.size() + 1, 0); // of a cluster's nodes, after sorting
+    for (const Pending& one : pending_) ++ends[one.cluster + 1];
+    for (size_t c = 1; c < ends.size(); ++c) ends[c] += ends[c - 1];
+    std::vector<uint32_t> order(pending_.size());
+    for (uint32_t i = 0; i < pending_.size(); ++i) order[ends[pending_[i].cluster]++] = i;
+    constexpr size_t kGrain = 32;
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, s_.clusters.size(), kGrain), [&](const auto& range) {
+      LeafRestorer restorer;
+      for (size_t c = range.begin(); c < range.end(); ++c)
+        if (const uint32_t begin = c == 0 ? 0 : ends[c - 1]; begin < ends[c])
+          make_leaf_nodes(restorer, static_cast<uint32_t>(c), std::span(order).subspan(begin, ends[c] - begin));
     });
   }
 
-  void make_leaf_nodes(uint32_t cluster, std::span<const Pending> pending) {
-    const baked::TreeRecord& tree = s_.trees[members_.tree_of[cluster]];
+  void make_leaf_nodes(LeafRestorer& restorer, uint32_t cluster, std::span<const uint32_t> numbers) {
     const auto geometry = std::upper_bound(
         s_.geometries.begin(), s_.geometries.end(), cluster,
         [](uint64_t number, const baked::GeometryRecord& g) { return number < g.first_cluster + g.cluster_count; });
-    ClusterBoxes room;
-    const std::span<const TreeGridBox> boxes =
-        triangle_boxes({*geometry, s_.clusters[cluster], s_.payload.data() + geometry->payload_offset},
-                       TreeGridMap(tree, *geometry), room);
-    for (const Pending& one : pending)
-      boxes_[one.node] = write_leaf_node(one.leaves, boxes, cluster, members_.ray_classes[cluster], nodes_[one.node]);
+    restorer.begin(*geometry, s_.trees[members_.tree_of[cluster]],
+                   {*geometry, s_.clusters[cluster], s_.payload.data() + geometry->payload_offset});
+    for (const uint32_t number : numbers) {
+      const Pending& one = pending_[number];
+      boxes_[one.node] = restorer.write(one.leaves, cluster, members_.ray_classes[cluster], nodes_[one.node]);
+    }
   }
 
   /// From the last one up, as children lie behind their parents.
   void make_inner_nodes() {
+    const node_kernels::Kernels& kernels = node_kernels::kernels();
     for (const baked::TreeRecord& tree : s_.trees) {
       const auto begin = static_cast<size_t>(tree.first_node);
       const std::span<baked::PackedNode> nodes = nodes_.subspan(begin, tree.node_count);
-      const std::span<TreeGridBox> boxes = std::span(boxes_).subspan(begin, tree.node_count);
-      for (size_t i = nodes.size(); i-- > 0;)
-        if (const uint8_t kind = topology_[begin + i]; kind >= kInner)
-          boxes[i] = write_inner_node(nodes[i].first_child, kind - kInner, nodes, boxes, nodes[i]);
+      const std::span<node_kernels::Box> boxes = std::span(boxes_).subspan(begin, tree.node_count);
+      for (size_t i = nodes.size(); i-- > 0;) {
+        const uint8_t kind = topology_[begin + i];
+        if (kind < kInner) continue;
+        const uint32_t first = nodes[i].first_child, count = kind - kInner;
+        boxes[i] = restore_inner_node(kernels, first, nodes.subspan(first, count), boxes.subspan(first, count), nodes[i]);
+      }
     }
   }
 
   BakedSections s_;
   std::span<const uint8_t> topology_;
   std::span<baked::PackedNode> nodes_;
-  std::vector<TreeGridBox> boxes_; // of what lies below each node
+  std::vector<node_kernels::Box> boxes_; // of what lies below each node
   TreeMembers members_;
   std::vector<Pending> pending_;
 };

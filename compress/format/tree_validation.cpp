@@ -10,6 +10,7 @@ namespace {
 
 constexpr uint8_t kSeen = baked::kCameraBelow | baked::kOcclusionBelow;
 constexpr int64_t kMaxOrigin = int64_t{1} << 60;
+constexpr uint64_t kEach = 0x0101010101010101, kTops = 0x80 * kEach; // of a node's eight slots
 
 /// A cluster's triangles.
 struct TriangleSet {
@@ -138,36 +139,41 @@ private:
 
   const char* check_node(uint32_t number, uint32_t tree) {
     const baked::PackedNode& node = nodes_[number];
-    uint32_t used = 0;
-    while (used < baked::kNodeWidth && node.children[used] != baked::kNoChild) ++used;
+    const uint64_t children = bytes_of(node.children);
+    const uint64_t empty = (children - kEach) & ~children & kTops; // the lowest one is that of the first empty slot
+    const uint32_t used = empty == 0 ? baked::kNodeWidth : static_cast<uint32_t>(std::countr_zero(empty)) / 8;
     if (used == 0) return "no children";
     if (const char* what = check_boxes(node, used)) return what;
     return node.has_leaves() ? check_leaves(node, used, tree) : check_children(node, used, number);
   }
 
+  static uint64_t bytes_of(const std::array<uint8_t, baked::kNodeWidth>& slots) {
+    return std::bit_cast<uint64_t>(slots);
+  }
+
   static const char* check_boxes(const baked::PackedNode& node, uint32_t used) {
     if ((node.exponents >> 15) != 0) return "exponents";
+    const uint64_t unused = used < baked::kNodeWidth ? ~uint64_t{0} << (8 * used) : 0;
     for (uint32_t axis = 0; axis < 3; ++axis) {
       const uint32_t exponent = node.exponent(axis);
       if (exponent > 23) return "exponents";
       if (node.origin[axis] < -baked::kMaxTreeCoordinate || node.origin[axis] > baked::kMaxTreeCoordinate)
         return "origin";
-      uint32_t highest = 0;
-      for (uint32_t slot = 0; slot < baked::kNodeWidth; ++slot) {
-        const uint8_t lo = node.lo[axis][slot], hi = node.hi[axis][slot];
-        if (slot < used ? lo > hi : lo != 255 || hi != 0) return "boxes";
-        highest = std::max<uint32_t>(highest, hi);
-      }
+      const uint64_t lo = bytes_of(node.lo[axis]), hi = bytes_of(node.hi[axis]);
+      const uint64_t low_bits_fit = (hi | kTops) - (lo & ~kTops); // in each byte's highest bit
+      const uint64_t fits = (hi & ~lo) | (~(hi ^ lo) & low_bits_fit);
+      if (((fits | unused) & kTops) != kTops || (lo & unused) != unused || (hi & unused) != 0) return "boxes";
       // Rounding up reaches up to one unit past the vertices.
-      if (node.origin[axis] + (int64_t{highest} << exponent) >= baked::kMaxTreeCoordinate + (int64_t{1} << exponent))
+      const int64_t end = baked::kMaxTreeCoordinate + (int64_t{1} << exponent);
+      if (node.origin[axis] + (int64_t{255} << exponent) >= end &&
+          node.origin[axis] + (int64_t{*std::ranges::max_element(node.hi[axis])} << exponent) >= end)
         return "boxes";
     }
     return nullptr;
   }
 
   const char* check_children(const baked::PackedNode& node, uint32_t used, uint32_t number) {
-    for (uint32_t slot = 0; slot < baked::kNodeWidth; ++slot)
-      if (node.children[slot] != (slot < used ? baked::kInnerChild : baked::kNoChild)) return "children";
+    if (bytes_of(node.children) != ~uint64_t{0} >> (64 - 8 * used)) return "children";
     if (node.cluster != 0 || node.first_triangle != 0) return "children";
     if (node.first_child <= number || node.first_child >= nodes_.size() || used > nodes_.size() - node.first_child)
       return "child numbers";
@@ -185,12 +191,10 @@ private:
     if (node.first_child != 0) return "child numbers";
     if (node.cluster >= s_.clusters.size() || members_.tree_of[node.cluster] != tree) return "cluster";
     if (node.ray_classes != members_.ray_classes[node.cluster] || (node.ray_classes & kSeen) == 0) return "ray classes";
-    uint32_t triangles = 0;
-    for (uint32_t slot = 0; slot < baked::kNodeWidth; ++slot) {
-      if (slot < used ? node.children[slot] > baked::kMaxLeafTriangles : node.children[slot] != baked::kNoChild)
-        return "leaves";
-      triangles += node.children[slot];
-    }
+    const uint64_t sizes = bytes_of(node.children); // bytes from 17 on reach the highest bit
+    if (((sizes | (sizes + (127 - baked::kMaxLeafTriangles) * kEach)) & kTops) != 0) return "leaves";
+    if (used < baked::kNodeWidth && sizes >> (8 * used) != 0) return "leaves";
+    const auto triangles = static_cast<uint32_t>(sizes * kEach >> 56); // at most 128
     if (node.first_triangle + triangles > s_.clusters[node.cluster].triangle_count) return "leaves";
     return covered_[node.cluster].add(node.first_triangle, triangles) ? nullptr : "triangles of two leaves";
   }
