@@ -38,8 +38,12 @@ void LeafRestorer::place_vertices(const baked::GeometryRecord& geometry, const b
     // The whole box lies within the coordinates, so that fields have less than 31 bits, or none and any shift will do.
     const LatticePoint lo = box_of_record(geometry, cluster.record()).lo;
     const auto base = [&](size_t axis) { return static_cast<int32_t>(map.floor(lo[axis], axis)); };
-    kernels_.place_vertices({cluster.bits(), cluster.layout().total_bits(), cluster.vertex_count(), {x, y, z},
-                             {base(0), base(1), base(2)}, static_cast<uint32_t>(std::min(doublings, 31))},
+    kernels_.place_vertices({cluster.bits(),
+                             cluster.layout().total_bits(),
+                             cluster.vertex_count(),
+                             {x, y, z},
+                             {base(0), base(1), base(2)},
+                             static_cast<uint32_t>(std::min(doublings, 31))},
                             boxes_.data());
     return;
   }
@@ -79,8 +83,8 @@ node_kernels::LeafCorners LeafRestorer::corners_of(uint32_t begin, uint32_t end)
   const bool is_left = ((left_[word] >> bit) & 1u) != 0;
   const uint64_t flip = is_left ? ~uint64_t{0} : 0, up_to = ~uint64_t{0} >> (63 - bit);
   const uint64_t here = (left_[word] ^ flip) & up_to, below = word != 0 ? left_[0] ^ flip : 0;
-  const int32_t turn = here != 0 ? static_cast<int32_t>(64 * word + 63) - std::countl_zero(here)
-                                 : 63 - std::countl_zero(below);
+  const int32_t turn =
+      here != 0 ? static_cast<int32_t>(64 * word + 63) - std::countl_zero(here) : 63 - std::countl_zero(below);
   const uint32_t strip_begin = strip_begins_[strips - 1];
   const uint32_t newest = strip_begin + 2 * strips; // of the strip's first triangle
   const uint32_t kept = turn > static_cast<int32_t>(strip_begin)

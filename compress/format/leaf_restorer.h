@@ -32,10 +32,10 @@ private:
   node_kernels::LeafCorners corners_of(uint32_t begin, uint32_t end) const;
 
   const node_kernels::Kernels& kernels_;
-  std::array<uint64_t, 2> restart_, left_;                            ///< bits of the cluster's triangles
-  std::array<uint8_t, 2 * kMaxClusterTriangles + 1> strips_before_;   ///< by triangle: strips that begin before it
-  std::array<uint8_t, kMaxClusterTriangles> strip_begins_;            ///< by strip: its first triangle
-  std::array<node_kernels::Box, kMaxClusterVertices> boxes_;          ///< by vertex
+  std::array<uint64_t, 2> restart_, left_;                          ///< bits of the cluster's triangles
+  std::array<uint8_t, 2 * kMaxClusterTriangles + 1> strips_before_; ///< by triangle: strips that begin before it
+  std::array<uint8_t, kMaxClusterTriangles> strip_begins_;          ///< by strip: its first triangle
+  std::array<node_kernels::Box, kMaxClusterVertices> boxes_;        ///< by vertex
   std::array<uint8_t, kMaxClusterCorners + node_kernels::kSpareIds> vertices_; ///< by corner
 };
 

@@ -31,7 +31,8 @@ struct CornerBits {
   uint32_t index_bits; ///< 0..8
 };
 
-/// Corners that a leaf's triangles bring, [begin, end), and two more: those that its first triangle keeps, or any of its own.
+/// Corners that a leaf's triangles bring, [begin, end), and two more: those that its first triangle keeps, or any of
+/// its own.
 struct LeafCorners {
   uint16_t begin, end;
   uint16_t kept[2];

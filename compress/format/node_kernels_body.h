@@ -77,7 +77,7 @@ constexpr ByteTable kBytes;
 }
 
 void number_corners(const CornerBits& corners, uint8_t* vertices) {
-  uint8_t named[384 + kSpareIds]; // 16 readable behind any
+  uint8_t named[384 + kSpareIds];           // 16 readable behind any
   const uint8_t* const bits = corners.bits; // bytes that are written may lie anywhere, as far as the compiler knows
   const uint32_t corner_count = corners.corner_count, fresh_bit = corners.fresh_bit;
   spread_fields(bits, corners.explicit_bit, corners.index_bits, corner_count - corners.vertex_count, named);
@@ -85,8 +85,8 @@ void number_corners(const CornerBits& corners, uint8_t* vertices) {
   uint32_t used = 0;
   for (uint32_t c = 0; c < corner_count; c += 8) {
     const uint32_t bit = fresh_bit + c, left = corner_count - c;
-    const auto byte = static_cast<uint8_t>((load(bits + (bit >> 3)) >> (bit & 7u)) &
-                                           (left < 8 ? (1u << left) - 1 : 255u));
+    const auto byte =
+        static_cast<uint8_t>((load(bits + (bit >> 3)) >> (bit & 7u)) & (left < 8 ? (1u << left) - 1 : 255u));
     const uint64_t below = kBytes.below[byte];
     Bytes16 from;
     __builtin_memcpy(&from, named + (c - used), sizeof from);

@@ -65,7 +65,7 @@ public:
       : s_(sections), topology_(topology), nodes_(nodes), boxes_(nodes.size()) {}
 
   bool run() {
-    s_.nodes = nodes_; // their number is checked with the records
+    s_.nodes = nodes_;                                                      // their number is checked with the records
     if (nodes_.size() > std::numeric_limits<uint32_t>::max()) return false; // such trees are stored whole
     if (!clusters_ok() || find_tree_record_fault(s_, members_)) return false;
     TopologyReader reader(topology_, nodes_.size());
@@ -172,7 +172,8 @@ private:
         const uint8_t kind = topology_[begin + i];
         if (kind < kInner) continue;
         const uint32_t first = nodes[i].first_child, count = kind - kInner;
-        boxes[i] = restore_inner_node(kernels, first, nodes.subspan(first, count), boxes.subspan(first, count), nodes[i]);
+        boxes[i] =
+            restore_inner_node(kernels, first, nodes.subspan(first, count), boxes.subspan(first, count), nodes[i]);
       }
     }
   }
