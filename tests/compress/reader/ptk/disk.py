@@ -5,7 +5,7 @@ import struct
 from ptk import fast, small
 from ptk.nodes import restore_nodes
 from ptk.normals import NORMAL_ENCODINGS
-from ptk.records import CLUSTER, GEOMETRY, MAGIC, SECTIONS, VERSION, BadFile, Record
+from ptk.records import CLUSTER, GEOMETRY, MAGIC, SECTIONS, VERSION, BadFile, Cursor, Record
 from ptk.zstd import GROWTH, decompress
 
 HEADER = Record(
@@ -15,19 +15,6 @@ HEADER = Record(
 PAGE = Record(("hash", "Q"), ("disk_bytes", "I"), ("payload_bytes", "I"), ("clusters", "I"), ("form", "I"))
 PAGE_DECODERS = {1: fast.decode_page, 2: small.decode_page}
 SECTION_NAMES = [name for name, _ in SECTIONS]
-
-
-class Parts:
-    """Takes the parts of a file one after the other."""
-
-    def __init__(self, data, at):
-        self.data, self.at = data, at
-
-    def take(self, size):
-        if self.at + size > len(self.data):
-            raise BadFile("the file is too short")
-        self.at += size
-        return self.data[self.at - size : self.at]
 
 
 def section_place(resident, name):
@@ -76,7 +63,7 @@ def expand(data):
         raise BadFile("the header's sizes or codec are none")
     if header["resident_bytes"] > GROWTH * len(data):
         raise BadFile("a resident file of more bytes than a file may ask for")
-    parts = Parts(data, HEADER.layout.size)
+    parts = Cursor(data, HEADER.layout.size)
     pages = PAGE.read_all(parts.take(header["page_count"] * PAGE.layout.size))
     head = decompress(parts.take(header["head"][1]), header["head"][0])
     tail = decompress(parts.take(header["tail"][1]), header["tail"][0])

@@ -4,7 +4,7 @@ import struct
 
 from ptk.normals import NORMAL_ENCODINGS
 from ptk.payload import PageCluster
-from ptk.records import HAS_NORMALS, HAS_UVS, BadFile, Bits, Record, index_bits, unzigzag
+from ptk.records import HAS_NORMALS, HAS_UVS, BadFile, Bits, Cursor, Record, index_bits, unzigzag
 from ptk.zstd import decompress
 
 PART_COUNT = 9
@@ -23,17 +23,8 @@ def signed(number, bits):
     return number - (1 << bits) if number >> bits - 1 else number
 
 
-class Cursor:
-    """A part, read from its begin to its end."""
-
-    def __init__(self, data):
-        self.data, self.at = data, 0
-
-    def take(self, count):
-        if self.at + count > len(self.data):
-            raise BadFile("a part of a page is too short")
-        self.at += count
-        return self.data[self.at - count : self.at]
+class PartCursor(Cursor):
+    """A part of a page, read from its begin to its end."""
 
     def take_bits(self, count):
         """From a whole byte on."""
@@ -47,7 +38,7 @@ def read_parts(page):
     parts = []
     for size, disk_size in zip(sizes[::2], sizes[1::2]):
         data = page[at : at + disk_size]
-        parts.append(Cursor(data if size == disk_size else decompress(data, size)))
+        parts.append(PartCursor(data if size == disk_size else decompress(data, size)))
         at += disk_size
     if at != len(page):
         raise BadFile("a page is not as long as its parts")

@@ -15,6 +15,19 @@ class BadFile(Exception):
     """The file is not what the format's description says."""
 
 
+class Cursor:
+    """Takes bytes one after the other."""
+
+    def __init__(self, data, at=0):
+        self.data, self.at = data, at
+
+    def take(self, count):
+        if self.at + count > len(self.data):
+            raise BadFile("a file or a part of it is too short")
+        self.at += count
+        return self.data[self.at - count : self.at]
+
+
 class Record:
     """A record of fixed size; fields are (name, struct letters), several letters give a tuple."""
 
