@@ -5,6 +5,8 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <mutex>
+#include <set>
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -34,6 +36,32 @@ void forget(const char* path) {
     const char* expected = path;
     if (slot.compare_exchange_strong(expected, nullptr)) return;
   }
+}
+
+/// Targets of files that are neither committed nor gone, so that no two of them are the same.
+class Claims {
+public:
+  /// @return false where another file has claimed it
+  bool add(const fs::path& target) {
+    const std::scoped_lock lock(mutex_);
+    return targets_.insert(target).second;
+  }
+  void remove(const fs::path& target) {
+    const std::scoped_lock lock(mutex_);
+    targets_.erase(target);
+  }
+
+private:
+  std::mutex mutex_;
+  std::set<fs::path> targets_;
+};
+Claims claims;
+
+/// One name for all ways to write it.
+fs::path claim_of(const fs::path& target) {
+  std::error_code error;
+  const fs::path canonical = fs::weakly_canonical(fs::absolute(target, error), error);
+  return error ? target : canonical;
 }
 
 [[noreturn]] void fail(const fs::path& path, const std::string& what) {
@@ -100,12 +128,19 @@ OutputFile::OutputFile(fs::path target, bool force) : target_(std::move(target))
   if (!target_.has_filename()) fail(target_, "is a folder");
   target_ = resolve(target_);
   check_target(target_, force_);
-  temporary_ = create_temporary(target_);
+  if (!claims.add(claim_of(target_))) throw Error(ErrorKind::kUsage, target_.string() + ": is named for two outputs");
+  try {
+    temporary_ = create_temporary(target_);
+  } catch (...) {
+    claims.remove(claim_of(target_));
+    throw;
+  }
   remember(temporary_.c_str());
 }
 
 OutputFile::~OutputFile() {
   if (committed_) return;
+  claims.remove(claim_of(target_));
   forget(temporary_.c_str());
   std::error_code ignored;
   fs::remove(temporary_, ignored);
@@ -118,6 +153,7 @@ void OutputFile::commit() {
   if (error == EEXIST) fail(target_, "appeared while it was being made; --force replaces it");
   if (error != 0) fail(target_, std::string("cannot be put in place: ") + std::strerror(error));
   forget(temporary_.c_str());
+  claims.remove(claim_of(target_));
   committed_ = true;
 }
 
