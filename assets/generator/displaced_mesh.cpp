@@ -49,7 +49,7 @@ public:
   uint64_t vertex_count() const { return around_ * across_; }
   uint64_t triangle_count() const { return 2 * vertex_count(); }
 
-  void write(OutputFile& file) const {
+  void write(BufferedFile& file) const {
     write_ply_header(file, {vertex_count(), triangle_count(), true, false, false});
     const uint64_t batch = std::max<uint64_t>(1, (1u << 18) / across_);
     std::vector<Vertex> vertices;
@@ -102,7 +102,7 @@ SceneTotals generate_displaced_mesh(const DisplacedMeshConfig& config, const Out
   writer.model("plain", plain);
   writer.world_shape("plain");
   const Ring ring(config);
-  OutputFile file(output.folder / "geometry/ring.ply", output.overwrite);
+  BufferedFile file(output.folder / "geometry/ring.ply", output.overwrite);
   ring.write(file);
   file.close();
   writer.world_file("geometry/ring.ply", "rock", ring.triangle_count());

@@ -44,9 +44,9 @@ void generate_leaf_mask(const OutputConfig& output) {
       texels.push_back(inside(x, y) ? 255 : 0);
     }
   }
-  OutputFile file(output.folder / "leaf.png", output.overwrite);
+  BufferedFile file(output.folder / "leaf.png", output.overwrite);
   const auto sink = [](void* context, void* bytes, int size) {
-    static_cast<OutputFile*>(context)->write({static_cast<const char*>(bytes), static_cast<size_t>(size)});
+    static_cast<BufferedFile*>(context)->write({static_cast<const char*>(bytes), static_cast<size_t>(size)});
   };
   stbi_write_png_to_func(sink, &file, kWidth, kHeight, 1, texels.data(), kWidth);
   file.close();

@@ -15,7 +15,7 @@ namespace {
 
 /// Writes 3 or 4 vertex numbers as one face.
 template <typename Index>
-void write_face(OutputFile& file, std::initializer_list<uint32_t> vertices) {
+void write_face(BufferedFile& file, std::initializer_list<uint32_t> vertices) {
   char record[1 + 4 * sizeof(Index)];
   size_t size = 0;
   record[size++] = static_cast<char>(vertices.size());
@@ -32,7 +32,7 @@ bool makes_quad(std::span<const Triangle> triangles, size_t i) {
 }
 
 template <typename Index>
-void write_faces(OutputFile& file, std::span<const Triangle> triangles) {
+void write_faces(BufferedFile& file, std::span<const Triangle> triangles) {
   for (size_t i = 0; i < triangles.size(); ++i) {
     const Triangle& t = triangles[i];
     if (makes_quad(triangles, i))
@@ -44,7 +44,7 @@ void write_faces(OutputFile& file, std::span<const Triangle> triangles) {
 
 } // namespace
 
-void write_ply_header(OutputFile& file, const PlyLayout& layout) {
+void write_ply_header(BufferedFile& file, const PlyLayout& layout) {
   file.write("ply\nformat binary_little_endian 1.0\ncomment packtrace_scenegen\n");
   file.write(
       fmt::format("element vertex {}\nproperty float x\nproperty float y\nproperty float z\n", layout.vertex_count));
@@ -54,9 +54,9 @@ void write_ply_header(OutputFile& file, const PlyLayout& layout) {
                          layout.short_indices ? "ushort" : "int"));
 }
 
-void write_ply_triangle(OutputFile& file, const Triangle& t) { write_face<uint32_t>(file, {t.x, t.y, t.z}); }
+void write_ply_triangle(BufferedFile& file, const Triangle& t) { write_face<uint32_t>(file, {t.x, t.y, t.z}); }
 
-void write_ply(OutputFile& file, const Mesh& mesh) {
+void write_ply(BufferedFile& file, const Mesh& mesh) {
   PlyLayout layout{mesh.positions.size(), 0, !mesh.normals.empty(), !mesh.uvs.empty(), mesh.positions.size() <= 65536};
   for (size_t i = 0; i < mesh.triangles.size(); ++i, ++layout.face_count) i += makes_quad(mesh.triangles, i) ? 1 : 0;
   write_ply_header(file, layout);

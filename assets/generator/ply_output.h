@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "assets/generator/output_file.h"
+#include "assets/generator/buffered_file.h"
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace::scenegen {
@@ -18,10 +18,10 @@ struct PlyLayout {
 
 /// Begins a binary little-endian PLY of float x y z [nx ny nz] [u v] vertices and faces. The caller then writes each
 /// vertex's floats and each triangle.
-void write_ply_header(OutputFile& file, const PlyLayout& layout);
-void write_ply_triangle(OutputFile& file, const Triangle& triangle); ///< of 32-bit indices
+void write_ply_header(BufferedFile& file, const PlyLayout& layout);
+void write_ply_triangle(BufferedFile& file, const Triangle& triangle); ///< of 32-bit indices
 
 /// A whole mesh, small: 16-bit indices where they suffice, and neighbouring triangles (a,b,c) (a,c,d) as one quad.
-void write_ply(OutputFile& file, const Mesh& mesh);
+void write_ply(BufferedFile& file, const Mesh& mesh);
 
 } // namespace packtrace::scenegen

@@ -51,7 +51,7 @@ const SceneWriter::StoredModel& SceneWriter::written_model(std::string_view name
   for (const ModelPart& part : stored.model.parts()) {
     if (part.mesh.triangles.empty()) continue;
     const std::string file_name = fmt::format("geometry/{}_{}.ply", name, stored.parts.size());
-    OutputFile file(config_.folder / file_name, config_.overwrite);
+    BufferedFile file(config_.folder / file_name, config_.overwrite);
     write_ply(file, part.mesh);
     file.close();
     stored.parts.push_back({file_name, part.material});

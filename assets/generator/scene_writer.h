@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "assets/generator/buffered_file.h"
 #include "assets/generator/model.h"
-#include "assets/generator/output_file.h"
 
 namespace packtrace::scenegen {
 
@@ -83,7 +83,7 @@ private:
 
   OutputConfig config_;
   std::string name_;
-  OutputFile main_, objects_, instances_;
+  BufferedFile main_, objects_, instances_;
   std::map<std::string, StoredModel, std::less<>> models_;
   std::map<std::string, StoredObject, std::less<>> object_names_;
   SceneTotals totals_;

@@ -1,7 +1,9 @@
 #include <cmath>
+#include <csignal>
 #include <functional>
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <tbb/global_control.h>
 
 #include "assets/generator/displaced_mesh.h"
@@ -11,7 +13,8 @@
 #include "assets/generator/placement.h"
 #include "assets/generator/town.h"
 #include "pbrt_import/scene/error.h"
-#include "tests/assets/test_folder.h"
+#include "tests/assets/folder_content.h"
+#include "tests/temporary_folder.h"
 
 namespace packtrace::scenegen {
 namespace {
@@ -38,12 +41,12 @@ std::map<std::string, std::string> generate_all(const std::filesystem::path& fol
 }
 
 TEST(Generators, SameSeedGivesTheSameBytes) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   EXPECT_TRUE(same_files(generate_all(folder / "a", 42), generate_all(folder / "b", 42)));
 }
 
 TEST(Generators, AnotherSeedGivesAnotherScene) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const auto a = generate_all(folder / "a", 42), b = generate_all(folder / "b", 43);
   for (const char* name : {"town/town_instances.pbrt", "forest/forest_instances.pbrt", "mesh/geometry/ring.ply",
                            "extreme/extreme_instances.pbrt"}) {
@@ -52,7 +55,7 @@ TEST(Generators, AnotherSeedGivesAnotherScene) {
 }
 
 TEST(Generators, ThreadCountDoesNotShow) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   for (const size_t threads : {1, 4}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     generate_displaced_mesh({3, 900'000}, {folder / std::to_string(threads), false});
@@ -61,7 +64,7 @@ TEST(Generators, ThreadCountDoesNotShow) {
 }
 
 TEST(CommittedScenes, AreWhatTheGeneratorWritesToday) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   generate_town({}, {folder / "town", false});
   generate_extreme({}, {folder / "extreme", false});
   generate_leaf_mask({folder / "leaf", false});
@@ -74,18 +77,18 @@ TEST(CommittedScenes, TownIsSmallAndFull) {
   uint64_t bytes = 0;
   for (const auto& [name, content] : files_under(kAssets / "town")) bytes += content.size();
   EXPECT_LE(bytes, 3u << 20);
-  const TestFolder folder;
+  const TemporaryFolder folder;
   EXPECT_GE(generate_town({}, {folder / "town", false}).instances, 3000u);
 }
 
 TEST(Generators, TownPlacesAsManyInstancesAsAsked) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const SceneTotals totals = generate_town({7, 20'000}, {folder / "town", false});
   EXPECT_EQ(totals.instances, 20'000u);
 }
 
 TEST(Generators, ForestReachesItsTriangleCountWithinOneTree) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const SceneTotals totals = generate_forest({1, 3'000'000, 0}, {folder / "forest", false});
   EXPECT_GE(totals.placed_triangles, 3'000'000u);
   EXPECT_LT(totals.placed_triangles, 3'000'000u + 100'000u);
@@ -93,7 +96,7 @@ TEST(Generators, ForestReachesItsTriangleCountWithinOneTree) {
 }
 
 TEST(Generators, MeshHasAtLeastTheTrianglesAsked) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   for (const uint64_t wanted : {100u, 12'345u, 500'000u}) {
     const SceneTotals totals = generate_displaced_mesh({1, wanted}, {folder / std::to_string(wanted), false});
     EXPECT_GE(totals.unique_triangles, wanted);
@@ -102,7 +105,7 @@ TEST(Generators, MeshHasAtLeastTheTrianglesAsked) {
 }
 
 TEST(Generators, OptionsOutOfRangeAreRejectedBeforeAnythingIsWritten) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const OutputConfig output{folder / "out", false};
   EXPECT_EQ(kind_of_error([&] { generate_town({1, 2999}, output); }), ErrorKind::kUsage);
   EXPECT_EQ(kind_of_error([&] { generate_forest({1, 99'999, 0}, output); }), ErrorKind::kUsage);
@@ -111,8 +114,8 @@ TEST(Generators, OptionsOutOfRangeAreRejectedBeforeAnythingIsWritten) {
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));
 }
 
-TEST(OutputFile, ExistingFilesStayUnlessForced) {
-  const TestFolder folder;
+TEST(BufferedFile, ExistingFilesStayUnlessForced) {
+  const TemporaryFolder folder;
   const OutputConfig gentle{folder / "x", false}, forced{folder / "x", true};
   generate_extreme({1}, gentle);
   const auto first = files_under(folder / "x");
@@ -123,25 +126,31 @@ TEST(OutputFile, ExistingFilesStayUnlessForced) {
   EXPECT_FALSE(same_files(first, files_under(folder / "x")));
 }
 
-TEST(OutputFile, WhatIsNotClosedLeavesNothing) {
-  const TestFolder folder;
+TEST(BufferedFile, WhatIsNotClosedLeavesNothing) {
+  const TemporaryFolder folder;
   {
-    OutputFile file(folder / "a.txt", false);
+    BufferedFile file(folder / "a.txt", false);
     file.write("half");
   }
   EXPECT_TRUE(files_under(folder / "").empty());
 }
 
-TEST(OutputFile, AFullDiskIsAnError) {
-  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
-  const TestFolder folder;
-  std::filesystem::create_symlink("/dev/full", folder / "full.txt.part");
+TEST(BufferedFile, AFullDiskIsAnError) {
+  const TemporaryFolder folder;
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto old_handler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{1u << 20, before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
   EXPECT_EQ(kind_of_error([&] {
-              OutputFile file(folder / "full.txt", false);
+              BufferedFile file(folder / "full.txt", false);
               file.write(std::string(3u << 20, 'x'));
               file.close();
             }),
             ErrorKind::kIo);
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, old_handler);
+  EXPECT_EQ(folder.files(), 0u);
 }
 
 TEST(Placement, SineAndCosineAgreeWithTheLibraryOverTheStatedRange) {

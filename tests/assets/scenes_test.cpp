@@ -8,7 +8,8 @@
 #include "assets/generator/forest.h"
 #include "assets/generator/town.h"
 #include "pbrt_import/import_scene.h"
-#include "tests/assets/test_folder.h"
+#include "tests/assets/folder_content.h"
+#include "tests/temporary_folder.h"
 
 namespace packtrace::scenegen {
 namespace {
@@ -75,7 +76,7 @@ TEST(CommittedScenes, ExtremeKeepsItsSmallestAndItsLargest) {
 }
 
 TEST(Generators, TheImporterFindsWhatWasWritten) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   const SceneTotals town = generate_town({5, 4000}, {folder / "town", false});
   const Scene town_scene = import_quietly(folder / "town/town.pbrt").scene;
   EXPECT_EQ(town_scene.instances.size(), town.instances);
@@ -87,7 +88,7 @@ TEST(Generators, TheImporterFindsWhatWasWritten) {
 }
 
 TEST(Generators, TreesStandOnTheGround) {
-  const TestFolder folder;
+  const TemporaryFolder folder;
   generate_forest({5, 1'000'000, 0}, {folder / "forest", false});
   const Scene scene = import_quietly(folder / "forest/forest.pbrt").scene;
   const Mesh& ground = scene.meshes[scene.shapes.at(0).mesh];

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "assets/generator/output_file.h"
+#include "assets/generator/buffered_file.h"
 #include "assets/generator/ply_output.h"
 #include "assets/generator/random.h"
 #include "pbrt_import/scene/error.h"
@@ -17,7 +17,7 @@ namespace packtrace {
 namespace {
 
 namespace fs = std::filesystem;
-using scenegen::OutputFile;
+using scenegen::BufferedFile;
 using scenegen::Random;
 
 constexpr uint64_t kGeneratorVersion = 1; ///< part of the folders' names: raise it whenever bytes change
@@ -57,7 +57,7 @@ struct Grid {
 
 /// Calls write(index, text) for each index, and hands text to the file.
 template <class Write>
-void write_each(OutputFile& file, uint64_t count, Write write) {
+void write_each(BufferedFile& file, uint64_t count, Write write) {
   std::string text;
   for (uint64_t i = 0; i < count; ++i) {
     text.clear();
@@ -67,7 +67,7 @@ void write_each(OutputFile& file, uint64_t count, Write write) {
 }
 
 /// A trianglemesh with normals and uv, floats with the nine digits that identify them.
-void write_mesh(OutputFile& file, const Grid& grid) {
+void write_mesh(BufferedFile& file, const Grid& grid) {
   file.write("Shape \"trianglemesh\" \"integer indices\" [\n");
   write_each(file, grid.triangle_count(), [&](uint32_t i, auto out) {
     const Triangle t = grid.triangle(i);
@@ -89,9 +89,9 @@ void write_mesh(OutputFile& file, const Grid& grid) {
 constexpr std::string_view kMainFile = "scene.pbrt";
 
 /// The main file: what stands before the first shape, and the end.
-class SceneFile : public OutputFile {
+class SceneFile : public BufferedFile {
 public:
-  explicit SceneFile(const fs::path& folder) : OutputFile(folder / kMainFile, true) {
+  explicit SceneFile(const fs::path& folder) : BufferedFile(folder / kMainFile, true) {
     write("LookAt 0 5 -10 0 0 0 0 1 0\nCamera \"perspective\" \"float fov\" 45\nWorldBegin\n");
   }
   void end() {
@@ -159,7 +159,7 @@ Counts write_instances(const fs::path& folder, double scale) {
 }
 
 void write_ply_grid(const fs::path& path, const Grid& grid) {
-  OutputFile file(path, true);
+  BufferedFile file(path, true);
   scenegen::write_ply_header(file, {grid.vertex_count(), grid.triangle_count(), true, true});
   for (uint32_t v = 0; v < grid.vertex_count(); ++v) {
     file.write_value(grid.position(v));
@@ -222,7 +222,7 @@ Counts write_includes(const fs::path& folder, double scale) {
   SceneFile file(folder);
   for (uint64_t i = 0; i < count; ++i) {
     const std::string name = fmt::format("part{:04}.pbrt", i);
-    OutputFile part(folder / name, true);
+    BufferedFile part(folder / name, true);
     part.write(fmt::format("AttributeBegin\nTranslate {} 0 0\n{}AttributeEnd\n", i, kTriangle));
     part.close();
     file.write(fmt::format("Include \"{}\"\n", name));
@@ -281,7 +281,7 @@ ImportInput make_input(std::string_view name, const fs::path& folder, double sca
   Counts counts;
   if (!(std::ifstream(counts_file) >> counts.triangles >> counts.instances)) {
     counts = recipe->write(own, scale);
-    OutputFile file(counts_file, true);
+    BufferedFile file(counts_file, true);
     file.write(fmt::format("{} {}\n", counts.triangles, counts.instances));
     file.close();
   }

@@ -8,11 +8,11 @@
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include "pbrt_import/scene/error.h"
 #include "pbrt_import/scene/file_bytes.h"
 #include "tests/compress/test_scenes.h"
+#include "tests/temporary_folder.h"
 
 namespace packtrace {
 namespace {
@@ -21,19 +21,12 @@ namespace fs = std::filesystem;
 
 class BakeOutput : public testing::Test {
 protected:
-  BakeOutput()
-      : folder_(fs::temp_directory_path() / ("packtrace_writer_" + std::to_string(::getpid()) + "_" +
-                                             testing::UnitTest::GetInstance()->current_test_info()->name())) {
-    fs::create_directories(folder_);
-  }
-  ~BakeOutput() override { fs::remove_all(folder_); }
-
   static std::string content(const fs::path& path) {
     std::ifstream file(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), {}};
   }
   static std::span<const std::byte> bytes(const std::string& text) { return std::as_bytes(std::span(text)); }
-  size_t files() const { return static_cast<size_t>(std::distance(fs::directory_iterator(folder_), {})); }
+  size_t files() const { return folder_.files(); }
   static ErrorKind kind_of(const auto& call) {
     try {
       call();
@@ -44,7 +37,7 @@ protected:
     return ErrorKind::kCancelled;
   }
 
-  fs::path folder_;
+  const TemporaryFolder folder_;
 };
 
 TEST_F(BakeOutput, AWriteThatFailsHalfWayLeavesTheOldFileAlone) {
@@ -85,7 +78,7 @@ TEST_F(BakeOutput, ABakedFileOpensFromDisk) {
   EXPECT_EQ(file.file_bytes(), fs::file_size(folder_ / "a.ptk"));
   EXPECT_EQ(report.file.triangles, scene.meshes[0].triangles.size());
   EXPECT_EQ(kind_of([&] { BakedFile::open(folder_ / "none.ptk"); }), ErrorKind::kInput);
-  EXPECT_EQ(kind_of([&] { BakedFile::open(folder_); }), ErrorKind::kInput);
+  EXPECT_EQ(kind_of([&] { BakedFile::open(folder_.path()); }), ErrorKind::kInput);
 }
 
 } // namespace

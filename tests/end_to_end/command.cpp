@@ -10,17 +10,6 @@
 
 namespace packtrace::test {
 
-TemporaryDirectory::TemporaryDirectory() {
-  std::string pattern = (std::filesystem::temp_directory_path() / "packtrace_test_XXXXXX").string();
-  if (!mkdtemp(pattern.data())) throw std::runtime_error("cannot make a temporary directory");
-  path_ = pattern;
-}
-
-TemporaryDirectory::~TemporaryDirectory() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-}
-
 std::string read_text(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
@@ -31,7 +20,7 @@ void write_text(const std::filesystem::path& file, const std::string& text) {
 }
 
 CommandResult run_packtrace(const std::vector<std::string>& arguments) {
-  const TemporaryDirectory streams;
+  const TemporaryFolder streams;
   const std::string out = streams / "out", err = streams / "err";
   std::vector<char*> argv;
   std::string program = PACKTRACE_BINARY;

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/temporary_folder.h"
+
 namespace packtrace::test {
 
 struct CommandResult {
@@ -14,20 +16,6 @@ struct CommandResult {
 
 /// Runs the packtrace program under test with these arguments, no shell between.
 CommandResult run_packtrace(const std::vector<std::string>& arguments);
-
-/// A fresh directory under the system's temporary one, removed with its contents at the end of scope.
-class TemporaryDirectory {
-public:
-  TemporaryDirectory();
-  ~TemporaryDirectory();
-  TemporaryDirectory(const TemporaryDirectory&) = delete;
-  TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-
-private:
-  std::filesystem::path path_;
-};
 
 std::string read_text(const std::filesystem::path& file);
 void write_text(const std::filesystem::path& file, const std::string& text);

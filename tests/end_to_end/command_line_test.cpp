@@ -48,7 +48,7 @@ TEST(CommandLine, OptionOutOfRangeIsAUsageErrorAndWritesNothing) {
 }
 
 TEST(CommandLine, MissingInputIsAnInputErrorThatNamesTheFile) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   for (const char* name : {"none.pbrt", "none.ptk"}) {
     for (const char* verb : {"info", "render", "bake"}) {
       std::vector<std::string> arguments = {verb, directory / name};

@@ -234,7 +234,7 @@ TEST(CommandLine, RenderNamesItsBackend) {
 }
 
 TEST(CommandLine, TexturesOfTheFileLookLikeThoseOfTheScene) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   const std::string scene = PACKTRACE_SOURCE_DIR "/assets/textured/textured.pbrt", baked = directory / "t.ptk";
   const auto render = [&](const std::string& from, const std::string& to) {
     return run_packtrace({"render", from, "-o", to, "--aov", "albedo", "--frames", "1", "--size", "160x90", "--force"})

@@ -38,7 +38,7 @@ protected:
     return nlohmann::json::parse(result.out, nullptr, false);
   }
 
-  TemporaryDirectory directory_;
+  TemporaryFolder directory_;
   std::string scene_ = directory_ / "scene.pbrt";
   std::string baked_ = directory_ / "scene.ptk";
   std::string image_ = directory_ / "image.png";

@@ -72,7 +72,7 @@ protected:
     return run_packtrace(arguments);
   }
 
-  TemporaryDirectory directory_;
+  TemporaryFolder directory_;
   json limits_, packed_against_float_, report_;
   std::string size_;
   CommandResult bake_;

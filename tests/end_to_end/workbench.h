@@ -11,7 +11,8 @@ namespace packtrace::test {
 
 /// Files and folders in a directory.
 inline size_t file_count(const std::filesystem::path& directory) {
-  return static_cast<size_t>(std::distance(std::filesystem::directory_iterator(directory), std::filesystem::directory_iterator()));
+  return static_cast<size_t>(
+      std::distance(std::filesystem::directory_iterator(directory), std::filesystem::directory_iterator()));
 }
 
 /// A directory with the small scene in it and, on request, its baked file.
@@ -28,7 +29,7 @@ public:
   }
 
 private:
-  TemporaryDirectory directory_;
+  TemporaryFolder directory_;
 };
 
 } // namespace packtrace::test

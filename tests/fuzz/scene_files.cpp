@@ -4,8 +4,6 @@
 #include <fstream>
 #include <stdexcept>
 
-#include <unistd.h>
-
 namespace packtrace::fuzz {
 namespace {
 
@@ -16,6 +14,11 @@ bool is_name(std::string_view text) {
   constexpr size_t kMaxName = 64;
   return !text.empty() && text.size() <= kMaxName && text.find_first_not_of(kLetters) == std::string_view::npos &&
          text.find_first_not_of('.') != std::string_view::npos;
+}
+
+std::filesystem::path memory_folder() {
+  const std::filesystem::path memory = "/dev/shm";
+  return std::filesystem::is_directory(memory) ? memory : std::filesystem::temp_directory_path();
 }
 
 } // namespace
@@ -37,25 +40,13 @@ std::vector<SceneFile> split_scene(std::string_view text) {
   return files;
 }
 
-SceneFilesFolder::SceneFilesFolder() {
-  namespace fs = std::filesystem;
-  const fs::path memory = "/dev/shm";
-  std::string path =
-      ((fs::is_directory(memory) ? memory : fs::temp_directory_path()) / "packtrace_fuzz_XXXXXX").string();
-  if (!::mkdtemp(path.data())) throw std::runtime_error("cannot make " + path);
-  path_ = path;
-}
-
-SceneFilesFolder::~SceneFilesFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-}
+SceneFilesFolder::SceneFilesFolder() : folder_(memory_folder()) {}
 
 std::filesystem::path SceneFilesFolder::write(std::string_view text) {
   for (const auto& file : files_) std::filesystem::remove(file);
   files_.clear();
   for (const SceneFile& file : split_scene(text)) {
-    files_.push_back(path_ / file.name);
+    files_.push_back(folder_ / std::string(file.name));
     std::ofstream out(files_.back(), std::ios::binary);
     out.write(file.content.data(), static_cast<std::streamsize>(file.content.size()));
     if (!out.flush()) throw std::runtime_error("cannot write " + files_.back().string());

@@ -5,6 +5,8 @@
 #include <string_view>
 #include <vector>
 
+#include "tests/temporary_folder.h"
+
 namespace packtrace::fuzz {
 
 /// One text that stands for a scene of several files: the main file goes up to the first line "#file NAME", each such
@@ -23,15 +25,12 @@ std::vector<SceneFile> split_scene(std::string_view text);
 class SceneFilesFolder {
 public:
   SceneFilesFolder();
-  ~SceneFilesFolder();
-  SceneFilesFolder(const SceneFilesFolder&) = delete;
-  SceneFilesFolder& operator=(const SceneFilesFolder&) = delete;
 
   /// Replaces the folder's files. @return the main file
   std::filesystem::path write(std::string_view text);
 
 private:
-  std::filesystem::path path_;
+  TemporaryFolder folder_;
   std::vector<std::filesystem::path> files_;
 };
 

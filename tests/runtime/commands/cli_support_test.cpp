@@ -15,7 +15,7 @@
 #include "pbrt_import/scene/error.h"
 #include "pbrt_import/scene/output_file.h"
 #include "pbrt_import/scene/progress.h"
-#include "tests/runtime/image/temporary_folder.h"
+#include "tests/temporary_folder.h"
 
 namespace packtrace {
 namespace {

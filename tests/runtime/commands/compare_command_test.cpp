@@ -11,7 +11,7 @@
 #include "runtime/image/exr.h"
 #include "runtime/image/png.h"
 #include "tests/runtime/image/image_test_support.h"
-#include "tests/runtime/image/temporary_folder.h"
+#include "tests/temporary_folder.h"
 
 namespace packtrace {
 namespace {

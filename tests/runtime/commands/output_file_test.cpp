@@ -9,7 +9,7 @@
 #include "pbrt_import/scene/file_bytes.h"
 #include "runtime/commands/json_output.h"
 #include "tests/runtime/image/image_test_support.h"
-#include "tests/runtime/image/temporary_folder.h"
+#include "tests/temporary_folder.h"
 
 namespace packtrace {
 namespace {
@@ -53,6 +53,20 @@ TEST(OutputFile, ReplacesOnlyWithForce) {
   write_text(file.path(), "new");
   file.commit();
   EXPECT_EQ(read_text(folder / "a.txt"), "new");
+}
+
+TEST(OutputFile, TwoCannotHaveOneTarget) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "sub");
+  std::filesystem::create_symlink(folder / "a.txt", folder / "link.txt");
+  {
+    const OutputFile first(folder / "a.txt", true);
+    for (const char* name : {"a.txt", "./a.txt", "sub/../a.txt", "link.txt"})
+      EXPECT_EQ(error_kind_of([&] { OutputFile(folder / name, true); }), ErrorKind::kUsage) << name;
+    const OutputFile other(folder / "sub/a.txt", true);
+  }
+  OutputFile(folder / "a.txt", false).commit();
+  OutputFile(folder / "a.txt", true).commit();
 }
 
 TEST(OutputFile, DoesNotReplaceWhatAppearedMeanwhile) {

@@ -8,7 +8,7 @@
 
 #include "pbrt_import/scene/file_bytes.h"
 #include "tests/runtime/image/image_test_support.h"
-#include "tests/runtime/image/temporary_folder.h"
+#include "tests/temporary_folder.h"
 
 namespace packtrace {
 namespace {

@@ -1,25 +1,28 @@
 #pragma once
 
 #include <filesystem>
+#include <iterator>
 #include <string>
+#include <system_error>
 
-#include <gtest/gtest.h>
-#include <unistd.h>
+#include <cerrno>
+#include <stdlib.h>
 
 namespace packtrace {
 
-/// An empty folder for one test, removed with all that is in it.
+/// A new, empty folder that only this object knows; it goes with all that is in it when the object does.
 class TemporaryFolder {
 public:
-  TemporaryFolder() {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    path_ = std::filesystem::temp_directory_path() /
-            ("packtrace-" + std::string(test->test_suite_name()) + "-" + test->name() + "-" + std::to_string(getpid()));
-    std::filesystem::remove_all(path_);
-    std::filesystem::create_directories(path_);
+  /// @throws std::filesystem::filesystem_error where none can be made
+  explicit TemporaryFolder(const std::filesystem::path& parent = std::filesystem::temp_directory_path()) {
+    std::string name = (parent / "packtrace_XXXXXX").string();
+    if (!::mkdtemp(name.data()))
+      throw std::filesystem::filesystem_error("cannot make a folder", name,
+                                              std::error_code(errno, std::generic_category()));
+    path_ = name;
   }
   ~TemporaryFolder() {
-    std::error_code ignored;
+    std::error_code ignored; // nothing is lost if files stay
     std::filesystem::remove_all(path_, ignored);
   }
   TemporaryFolder(const TemporaryFolder&) = delete;

@@ -1,23 +1,21 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <string_view>
 #include <vector>
 
+#include "pbrt_import/scene/output_file.h"
+
 namespace packtrace::scenegen {
 
-/// A file under way: written through a buffer to a temporary name beside its own, given its name by close().
-/// One that is not closed leaves nothing behind. Every function throws Error(kIo) if the disk refuses.
-class OutputFile {
+/// An OutputFile that is written through a buffer, in missing folders too, and gets its name by close(). One that is
+/// not closed leaves no file behind. Every function throws Error(kIo) if the disk refuses.
+class BufferedFile {
 public:
-  /// Makes missing folders. Throws Error(kIo) if the file exists and overwrite is false.
-  OutputFile(std::filesystem::path path, bool overwrite);
-  ~OutputFile();
-  OutputFile(const OutputFile&) = delete;
-  OutputFile& operator=(const OutputFile&) = delete;
+  /// Throws Error(kIo) if the file exists and overwrite is false.
+  BufferedFile(const std::filesystem::path& path, bool overwrite);
 
   void write(std::string_view bytes);
   /// The object's bytes as they lie in memory.
@@ -34,10 +32,9 @@ private:
   void flush();
   [[noreturn]] void fail(std::string_view action) const;
 
-  std::filesystem::path path_, temporary_;
+  OutputFile output_;
   std::unique_ptr<std::FILE, CloseFile> file_;
   std::vector<char> buffer_;
-  bool closed_ = false;
 };
 
 } // namespace packtrace::scenegen
