@@ -11,11 +11,11 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <unistd.h>
 
 #include "pbrt_import/scene/error.h"
 #include "tests/benchmarks/benchmark_main.h"
 #include "tests/benchmarks/import_timing.h"
+#include "tests/temporary_folder.h"
 
 namespace packtrace {
 namespace {
@@ -248,26 +248,6 @@ ImportInput find_input(const std::string& name, const Options& options) {
   return make_input(name, options.folder, options.scale);
 }
 
-/// Removed with everything in it at the end.
-class TemporaryFolder {
-public:
-  TemporaryFolder() {
-    std::string name = (fs::temp_directory_path() / "import_benchmark_XXXXXX").string();
-    if (!::mkdtemp(name.data())) throw Error(ErrorKind::kIo, name + ": cannot make the folder");
-    path_ = name;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored; // nothing is lost if files stay
-    fs::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const fs::path& path() const { return path_; }
-
-private:
-  fs::path path_;
-};
-
 Json measure_all(const Options& options) {
   double load = 0;
   getloadavg(&load, 1);
@@ -319,15 +299,9 @@ int run(int argc, char** argv) {
   if (options.inputs.empty()) options.inputs.assign(input_names().begin(), input_names().end());
   std::optional<TemporaryFolder> temporary;
   if (options.folder.empty()) options.folder = temporary.emplace().path();
-  std::ofstream out;
-  if (!options.json_file.empty()) out.open(options.json_file);
-  const auto require_written = [&] {
-    if (!out) throw Error(ErrorKind::kIo, options.json_file.string() + ": cannot write");
-  };
-  require_written(); // before the minutes that follow
+  FiguresFile figures(options.json_file);
   const Json json = measure_all(options);
-  if (out.is_open()) out << json.dump(2) << std::endl;
-  require_written();
+  figures.write(json);
   return 0;
 }
 

@@ -5,7 +5,6 @@
 #include <chrono>
 #include <ctime>
 #include <filesystem>
-#include <fstream>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -32,12 +31,11 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 struct Options {
-  fs::path scenes, json_file;
-  uint64_t generated_triangles = 500'000;
+  PackingInputs inputs;
+  fs::path json_file;
   size_t samples = 500'000;
   bool simplifiers = true;
   bool levels = true;
-  std::vector<std::string> inputs;
 };
 
 struct Times {
@@ -266,33 +264,23 @@ int run(int argc, char** argv) {
   Options options;
   CLI::App app{"Builds levels of detail and measures them, and simplifies with this project and others; see "
                "docs/cluster_lod.md."};
-  app.add_option("--scenes", options.scenes, "holds bunny, spaceship and house")->envname("PACKTRACE_SCENES");
-  app.add_option("--generated-triangles", options.generated_triangles, "of the generated mesh")->capture_default_str();
+  options.inputs.add_to(app);
   app.add_option("--samples", options.samples, "points at which surfaces are compared, each way")
       ->capture_default_str();
   app.add_flag("!--levels-only", options.simplifiers, "leaves the other programs' simplifiers out");
   app.add_flag("!--times-only", options.levels, "only builds, and measures no distance");
   app.add_option("--json", options.json_file, "writes all figures here");
-  app.add_option("INPUT", options.inputs, "which; all if none is named")
-      ->check(CLI::IsMember({"bunny", "spaceship", "house", "generated"}));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorKind::kUsage);
   }
-  if (options.inputs.empty()) {
-    options.inputs = {"generated"};
-    if (!options.scenes.empty()) options.inputs.insert(options.inputs.begin(), {"bunny", "spaceship", "house"});
-  }
-  std::ofstream out;
-  if (!options.json_file.empty()) out.open(options.json_file);
-  if (!out) throw Error(ErrorKind::kIo, options.json_file.string() + ": cannot write");
+  options.inputs.choose();
+  FiguresFile figures(options.json_file);
   Json json = describe_machine();
-  for (const std::string& name : options.inputs)
-    json["inputs"].push_back(measure_input(
-        name, weld_positions(find_packing_input(name, options.scenes, options.generated_triangles).mesh), options));
-  if (out.is_open()) out << json.dump(2) << std::endl;
-  if (!out) throw Error(ErrorKind::kIo, options.json_file.string() + ": cannot write");
+  for (const std::string& name : options.inputs.names)
+    json["inputs"].push_back(measure_input(name, weld_positions(options.inputs.find(name).mesh), options));
+  figures.write(json);
   for (const Json& input : json["inputs"])
     for (const Json& level : input.value("levels", Json::array()))
       if (level["measured_max"].get<double>() > level["stated_error"].get<double>() * (1.0 + 1e-6) + 1e-9)

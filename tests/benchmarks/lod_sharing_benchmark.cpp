@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -263,9 +262,7 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorKind::kUsage);
   }
-  std::ofstream out;
-  if (!options.json_file.empty()) out.open(options.json_file);
-  if (!out) throw Error(ErrorKind::kIo, options.json_file.string() + ": cannot write");
+  FiguresFile figures(options.json_file);
   Json json = describe_machine();
   const auto meshes = build_meshes(options);
   const auto count = [&](uint32_t instances) { return std::max(1u, static_cast<uint32_t>(options.scale * instances)); };
@@ -285,8 +282,7 @@ int run(int argc, char** argv) {
   json["scenes"].push_back(
       run_scene({"58,000 instances of 500 geometries, +-30 diagonals", count(58'000), 500, 30.0, 1.0}, many, options));
   if (options.growth > 0) json["growth"] = run_growth(many, options);
-  if (out.is_open()) out << json.dump(2) << std::endl;
-  if (!out) throw Error(ErrorKind::kIo, options.json_file.string() + ": cannot write");
+  figures.write(json);
   for (const Json& scene : json["scenes"])
     for (const Json& row : scene["schemes"])
       if (row["under_detailed"].get<uint64_t>() > 0)

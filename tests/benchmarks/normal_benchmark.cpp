@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -199,14 +198,11 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorKind::kUsage);
   }
+  FiguresFile figures(json_file);
   Json json = describe_machine();
   json["directions"] = count;
   const bool kept = measure_all(count, json);
-  if (!json_file.empty()) {
-    std::ofstream out(json_file);
-    out << json.dump(2) << std::endl;
-    if (!out) throw Error(ErrorKind::kIo, json_file.string() + ": cannot write");
-  }
+  figures.write(json);
   if (!kept) throw Error(ErrorKind::kLimitExceeded, "an error is larger than its format promises");
   return 0;
 }

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <memory>
 #include <string>
@@ -31,11 +30,10 @@ constexpr double kEdgeFraction = 1.0 / 128.0;
 constexpr double kPositionCodes = (1 << 14) - 1;
 
 struct Options {
-  fs::path scenes, json_file;
-  uint64_t generated_triangles = 500'000;
+  PackingInputs inputs;
+  fs::path json_file;
   double seconds = 0.5;
   std::string codec; ///< part of the names of those to measure
-  std::vector<std::string> inputs;
 };
 
 /// Least CPU time of one call, all of it in this thread: called again until `budget_s` are used up, at least once.
@@ -175,39 +173,27 @@ Json measure_input(const PackingInput& input, const Options& options) {
 int run(int argc, char** argv) {
   Options options;
   CLI::App app{"Packs meshes with this project and with others, for the same error; see docs/packing_benchmark.md."};
-  app.add_option("--scenes", options.scenes, "holds bunny, spaceship and house")->envname("PACKTRACE_SCENES");
-  app.add_option("--generated-triangles", options.generated_triangles, "of the generated mesh")->capture_default_str();
+  options.inputs.add_to(app);
   app.add_option("--seconds", options.seconds, "of CPU time for the repeats of each step; the least counts")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   app.add_option("--codec", options.codec, "only codecs with this in their names");
   app.add_option("--json", options.json_file, "writes all figures here");
-  app.add_option("INPUT", options.inputs, "which; all if none is named")
-      ->check(CLI::IsMember({"bunny", "spaceship", "house", "generated"}));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorKind::kUsage);
   }
-  if (options.inputs.empty()) {
-    options.inputs = {"generated"};
-    if (!options.scenes.empty()) options.inputs.insert(options.inputs.begin(), {"bunny", "spaceship", "house"});
-  }
-  std::ofstream out;
-  if (!options.json_file.empty()) out.open(options.json_file);
-  const auto require_written = [&] {
-    if (!out) throw Error(ErrorKind::kIo, options.json_file.string() + ": cannot write");
-  };
-  require_written(); // before the minutes that follow
+  options.inputs.choose();
+  FiguresFile figures(options.json_file);
 
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
   Json json = describe_machine();
   fmt::print("{}, load average {:.1f}; commit {}; CPU time of one thread\n", json["cpu"].get<std::string>(),
              json["load_average"].get<double>(), json["commit"].get<std::string>());
-  for (const std::string& name : options.inputs)
-    json["inputs"].push_back(measure_input(find_packing_input(name, options.scenes, options.generated_triangles), options));
-  if (out.is_open()) out << json.dump(2) << std::endl;
-  require_written();
+  for (const std::string& name : options.inputs.names)
+    json["inputs"].push_back(measure_input(options.inputs.find(name), options));
+  figures.write(json);
   const bool closed = std::all_of(json["inputs"].begin(), json["inputs"].end(),
                                   [](const Json& input) { return input["cracks"]["lost_triangles"] == 0; });
   return closed ? 0 : static_cast<int>(ErrorKind::kLimitExceeded);

@@ -7,10 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include <unistd.h>
-
 #include "assets/generator/displaced_mesh.h"
 #include "pbrt_import/import_scene.h"
+#include "tests/temporary_folder.h"
 
 namespace packtrace {
 namespace {
@@ -60,6 +59,28 @@ struct BitHash {
   }
 };
 
+/// @param largest_only leaves out all shapes but the one of most triangles, such as a plane that a scan stands on
+PackingInput load_packing_input(const std::string& name, const std::filesystem::path& main_file, bool largest_only) {
+  Diagnostics diagnostics;
+  Progress progress;
+  PackingInput input{name, import_scene(main_file, {}, diagnostics, progress).scene, {}};
+  std::vector<Shape>& shapes = input.scene.shapes;
+  if (largest_only && !shapes.empty()) {
+    const auto size = [&](const Shape& shape) { return input.scene.meshes[shape.mesh].triangles.size(); };
+    shapes = {*std::max_element(shapes.begin(), shapes.end(),
+                                [&](const Shape& a, const Shape& b) { return size(a) < size(b); })};
+  }
+  input.mesh = merge_world(input.scene);
+  return input;
+}
+
+PackingInput generated_packing_input(uint64_t triangles, const std::filesystem::path& folder) {
+  scenegen::DisplacedMeshConfig config;
+  config.triangles = triangles;
+  scenegen::generate_displaced_mesh(config, {folder, true});
+  return load_packing_input("generated", folder / "mesh.pbrt", false);
+}
+
 } // namespace
 
 Mesh merge_world(const Scene& scene) {
@@ -89,35 +110,24 @@ Mesh weld_positions(const Mesh& mesh) {
   return out;
 }
 
-PackingInput load_packing_input(const std::string& name, const std::filesystem::path& main_file, bool largest_only) {
-  Diagnostics diagnostics;
-  Progress progress;
-  PackingInput input{name, import_scene(main_file, {}, diagnostics, progress).scene, {}};
-  std::vector<Shape>& shapes = input.scene.shapes;
-  if (largest_only && !shapes.empty()) {
-    const auto size = [&](const Shape& shape) { return input.scene.meshes[shape.mesh].triangles.size(); };
-    shapes = {*std::max_element(shapes.begin(), shapes.end(),
-                                [&](const Shape& a, const Shape& b) { return size(a) < size(b); })};
-  }
-  input.mesh = merge_world(input.scene);
-  return input;
-}
-
-PackingInput generated_packing_input(uint64_t triangles, const std::filesystem::path& folder) {
-  scenegen::DisplacedMeshConfig config;
-  config.triangles = triangles;
-  scenegen::generate_displaced_mesh(config, {folder, true});
-  return load_packing_input("generated", folder / "mesh.pbrt");
-}
-
 PackingInput find_packing_input(const std::string& name, const std::filesystem::path& scenes,
                                 uint64_t generated_triangles) {
   if (name != "generated") return load_packing_input(name, scenes / name / "scene.pbrt", name == "bunny");
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / ("packtrace_benchmark_" + std::to_string(::getpid()));
-  PackingInput input = generated_packing_input(generated_triangles, folder);
-  std::filesystem::remove_all(folder);
-  return input;
+  const TemporaryFolder folder;
+  return generated_packing_input(generated_triangles, folder.path());
+}
+
+void PackingInputs::add_to(CLI::App& app) {
+  app.add_option("--scenes", scenes, "holds bunny, spaceship and house")->envname("PACKTRACE_SCENES");
+  app.add_option("--generated-triangles", generated_triangles, "of the generated mesh")->capture_default_str();
+  app.add_option("INPUT", names, "which; all if none is named")
+      ->check(CLI::IsMember({"bunny", "spaceship", "house", "generated"}));
+}
+
+void PackingInputs::choose() {
+  if (!names.empty()) return;
+  names = {"generated"};
+  if (!scenes.empty()) names.insert(names.begin(), {"bunny", "spaceship", "house"});
 }
 
 double median_edge(const Mesh& mesh) {

@@ -3,6 +3,9 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
 
 #include "pbrt_import/scene/scene.h"
 
@@ -28,17 +31,22 @@ Mesh merge_world(const Scene& scene);
 /// Only positions and triangles, vertices with equal positions merged; triangles that lose a corner by it are kept.
 Mesh weld_positions(const Mesh& mesh);
 
-/// Imports a scene and merges its world. Throws as import_scene() does.
-/// @param largest_only leaves out all shapes but the one of most triangles, such as a plane that a scan stands on
-PackingInput load_packing_input(const std::string& name, const std::filesystem::path& main_file,
-                                bool largest_only = false);
-
-/// A ring of eroded rock with vertex normals (packtrace_scenegen's displaced mesh), written to `folder` and read back.
-PackingInput generated_packing_input(uint64_t triangles, const std::filesystem::path& folder);
-
-/// By name: "generated", or a folder of `scenes`; of the bunny without the plane below it.
+/// By name: "generated" (packtrace_scenegen's displaced mesh: a ring of eroded rock with vertex normals), or a folder
+/// of `scenes`; of the bunny without the plane below it. The scene's world is merged. Throws as import_scene() does.
 PackingInput find_packing_input(const std::string& name, const std::filesystem::path& scenes,
                                 uint64_t generated_triangles);
+
+/// Which meshes a benchmark takes, from its command line.
+struct PackingInputs {
+  std::filesystem::path scenes;
+  uint64_t generated_triangles = 500'000;
+  std::vector<std::string> names;
+
+  void add_to(CLI::App& app);
+  /// After parsing: all that there are where none was named.
+  void choose();
+  PackingInput find(const std::string& name) const { return find_packing_input(name, scenes, generated_triangles); }
+};
 
 /// Median length of the triangles' edges, those of length 0 left out; 0 if there are none.
 double median_edge(const Mesh& mesh);

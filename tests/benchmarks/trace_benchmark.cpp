@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <vector>
 
@@ -369,8 +368,7 @@ int run(int argc, char** argv) {
     if (!options.inputs.scenes.empty())
       options.names.insert(options.names.begin(), {"house", "spaceship", "bunny", "killeroo"});
   }
-  std::ofstream out;
-  if (!options.json_file.empty()) out.open(options.json_file);
+  FiguresFile figures(options.json_file);
   Json json = describe_machine();
   json["clock"] = options.cpu_clock ? "cpu" : "wall";
   if (options.growth)
@@ -385,8 +383,7 @@ int run(int argc, char** argv) {
   json["load_average_after"] = describe_machine()["load_average"];
   fmt::print("\n{}, load average {:.1f} before, {:.1f} after\n", json["cpu"].get<std::string>(),
              json["load_average"].get<double>(), json["load_average_after"].get<double>());
-  if (out.is_open()) out << json.dump(2) << std::endl;
-  if (!out) throw Error(ErrorKind::kIo, options.json_file.string() + ": cannot write");
+  figures.write(json);
   return 0;
 }
 

@@ -1,12 +1,11 @@
 #include "tests/benchmarks/trace_benchmark_inputs.h"
 
-#include <unistd.h>
-
 #include "assets/generator/displaced_mesh.h"
 #include "assets/generator/forest.h"
 #include "compress/bake/bake_scene.h"
 #include "pbrt_import/import_scene.h"
 #include "pbrt_import/scene/error.h"
+#include "tests/temporary_folder.h"
 
 namespace packtrace {
 namespace {
@@ -18,22 +17,6 @@ Scene import(const fs::path& scene_file) {
   Progress progress;
   return import_scene(scene_file, {}, diagnostics, progress).scene;
 }
-
-/// A folder that goes when this does.
-class TemporaryFolder {
-public:
-  TemporaryFolder() : path_(fs::temp_directory_path() / ("trace_benchmark." + std::to_string(::getpid()))) {}
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const fs::path& path() const { return path_; }
-
-private:
-  fs::path path_;
-};
 
 } // namespace
 
