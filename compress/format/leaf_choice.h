@@ -35,8 +35,8 @@ struct FloatBox {
 /// Half the surface of a box, in the first lane.
 inline Float4 half_area(const FloatBox& box) {
   const Float4 size = box.hi + box.minus_lo;
-  const Float4 faces = size * __builtin_shuffle(size, Int4{1, 2, 0, 3});
-  return faces + __builtin_shuffle(faces, Int4{1, 0, 3, 2}) + __builtin_shuffle(faces, Int4{2, 3, 0, 1});
+  const Float4 faces = size * __builtin_shufflevector(size, size, 1, 2, 0, 3);
+  return faces + __builtin_shufflevector(faces, faces, 1, 0, 3, 2) + __builtin_shufflevector(faces, faces, 2, 3, 0, 1);
 }
 
 /// The first lane. Through memory, as GCC 12 reads lanes of vectors wrongly under sanitizers.

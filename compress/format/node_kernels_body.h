@@ -22,6 +22,21 @@ using Long2 = uint64_t __attribute__((vector_size(16)));
   return word;
 }
 
+/// The byte of `from` that each byte of `which` names, modulo 16.
+[[gnu::always_inline]] inline Bytes16 pick_bytes(const Bytes16& from, const Bytes16& which) {
+#ifdef __clang__ // shuffles by constants only
+  uint8_t source[16], picked[16];
+  __builtin_memcpy(source, &from, sizeof source);
+  __builtin_memcpy(picked, &which, sizeof picked);
+  for (uint8_t& byte : picked) byte = source[byte & 15u];
+  Bytes16 out;
+  __builtin_memcpy(&out, picked, sizeof out);
+  return out;
+#else
+  return __builtin_shuffle(from, which);
+#endif
+}
+
 void place_vertices(const VertexFields& fields, Box* boxes) {
   const uint64_t x = fields.widths[0], y = fields.widths[1], z = fields.widths[2], one = 1;
   const Long4 masks = {(one << x) - 1, (one << y) - 1, (one << z) - 1, 0};
@@ -38,7 +53,8 @@ void place_vertices(const VertexFields& fields, Box* boxes) {
   for (uint32_t v = 0; v < count; ++v, bit += stride) {
     const uint64_t word = load(bits + (bit >> 3));
     const Long4 field = (Long4{word, word, word, word} >> shifts[bit & 7u]) & masks;
-    const auto both = __builtin_shuffle(reinterpret_cast<Uint8>(field), Uint8{0, 2, 4, 6, 0, 2, 4, 6});
+    const auto halves = reinterpret_cast<Uint8>(field),
+               both = __builtin_shufflevector(halves, halves, 0, 2, 4, 6, 0, 2, 4, 6);
     lanes(boxes[v]) = reinterpret_cast<Int8>(((both << shift) ^ flip) + add);
   }
 }
@@ -90,7 +106,7 @@ void number_corners(const CornerBits& corners, uint8_t* vertices) {
     const uint64_t below = kBytes.below[byte];
     Bytes16 from;
     __builtin_memcpy(&from, named + (c - used), sizeof from);
-    const Bytes16 picked = __builtin_shuffle(from, reinterpret_cast<Bytes16>(Long2{kIota - below, 0}));
+    const Bytes16 picked = pick_bytes(from, reinterpret_cast<Bytes16>(Long2{kIota - below, 0}));
     uint64_t taken;
     __builtin_memcpy(&taken, &picked, sizeof taken); // no subscript, which GCC 12 gets wrong under its sanitizers
     const uint64_t set = kBytes.set[byte], fresh = (below + (used & 127u) * kEach) ^ ((used & 128u) * kEach);
