@@ -22,24 +22,31 @@ using Corners = std::array<DVec3, 3>;
 
 /// A triangle before whose image is known, or that lies over those after: pieces_[first .. first + count).
 struct Laid {
-  double stated; ///< what it makes the error at least
   uint32_t triangle;
+  bool settled = false; ///< something better is known than what it says
   TriangleImages::Image image;
-  bool operator<(const Laid& o) const { return stated != o.stated ? stated < o.stated : triangle > o.triangle; }
+};
+
+/// What a triangle makes the error at least, as far as laid_[index] knows.
+struct Claim {
+  double stated;
+  uint32_t index;
+  bool operator<(const Claim& o) const { return stated != o.stated ? stated < o.stated : index > o.index; }
 };
 
 class Measurer {
 public:
   Measurer(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh)
-      : m_(mesh), before_({points, triangles}, [&](uint32_t p) { return mesh.stands_for[p]; }),
-        after_({mesh.points, mesh.triangles}, [](uint32_t p) { return p; }), walk_(before_.surface(), after_, mesh),
-        images_(walk_, mesh), errors_(mesh.triangles.size()), seen_(mesh.triangles.size()),
-        covered_(mesh.triangles.size()), mapped_(triangles.size()), unchanged_(triangles.size()) {}
+      : m_(mesh), before_({points, triangles}, mesh.stands_for), after_({mesh.points, mesh.triangles}),
+        walk_(before_.surface(), after_, mesh), images_(walk_, mesh), errors_(mesh.triangles.size()),
+        seen_(mesh.triangles.size()), covered_(mesh.triangles.size()), mapped_(triangles.size()),
+        unchanged_(triangles.size()) {}
 
   void run() {
     after_.link();
     find_unchanged();
     laid_.reserve(unchanged_.size());
+    claims_.reserve(unchanged_.size());
     for (uint32_t t = 0; t < unchanged_.size(); ++t)
       if (unchanged_[t] == 0) lay_over_after(t);
     settle();
@@ -81,7 +88,7 @@ private:
   }
 
   void lay_over_after(uint32_t t) {
-    Laid laid{0.0, t, {}};
+    Laid laid{t, false, {}};
     mapped_[t] = images_.find(t, laid.image);
     if (mapped_[t] == 0) {
       after_.gather(before_.corner_points(t));
@@ -93,7 +100,8 @@ private:
       laid.image.count = static_cast<uint32_t>(pieces_.size()) - laid.image.first;
       laid.image.distance = largest_of(laid);
     }
-    laid.stated = laid.image.distance <= kFine ? 0.0 : stated(laid.image.distance, had(t));
+    if (laid.image.distance > kFine)
+      claims_.push_back({stated(laid.image.distance, had(t)), static_cast<uint32_t>(laid_.size())});
     laid_.push_back(laid);
   }
 
@@ -109,11 +117,12 @@ private:
 
   /// The worst first: what they really are leaves most others as they are.
   void settle() {
-    std::make_heap(laid_.begin(), laid_.end());
-    while (!laid_.empty() && laid_.front().stated > std::max(largest_, kSlack * proven_)) {
-      std::pop_heap(laid_.begin(), laid_.end());
-      const Laid laid = laid_.back();
-      laid_.pop_back();
+    std::make_heap(claims_.begin(), claims_.end());
+    while (!claims_.empty() && claims_.front().stated > std::max(largest_, kSlack * proven_)) {
+      std::pop_heap(claims_.begin(), claims_.end());
+      Laid& laid = laid_[claims_.back().index];
+      claims_.pop_back();
+      laid.settled = true;
       const uint32_t t = laid.triangle;
       if (look_closer_at_image(laid)) continue;
       mapped_[t] = 0;
@@ -130,44 +139,40 @@ private:
     point_had_.assign(before_.surface().points.size(), -1.0);
     for (const Laid& laid : laid_)
       if (mapped_[laid.triangle] != 0)
-        accept_image(laid);
-      else
+        see_image(laid);
+      else if (!laid.settled)
         accept(pieces_of(laid), laid.triangle);
     accept_ways();
     for (const double error : errors_) largest_ = std::max(largest_, error);
     images_.find_covered(mapped_, covered_);
-    for (const Laid& laid : laid_) add_shares(laid);
-    for (const Laid& laid : looked_) add_shares(laid);
+    for (const Laid& laid : laid_)
+      if (mapped_[laid.triangle] != 0) add_shares(laid);
   }
 
   /// Where borders cross, the area says what images cover.
   void add_shares(const Laid& laid) {
-    if (mapped_[laid.triangle] == 0) return;
     const auto met = images_.met(laid.image);
     if (std::any_of(met.begin(), met.end(), [&](uint32_t s) { return (covered_[s] & TriangleImages::kWhole) == 0; }))
       images_.add_shares(laid.triangle, seen_);
   }
 
-  /// What happens inside; ways and corners are shared with neighbours. What images cover, each seen from the side that
-  /// it faces, needs no measuring of its own.
-  void accept_image(const Laid& laid) {
+  /// What images cover, each seen from the side that it faces, needs no measuring of its own. Distances inside are
+  /// noted here; ways and corners are shared with neighbours.
+  void see_image(const Laid& laid) {
     const uint32_t t = laid.triangle;
-    const double had = this->had(t), inside = stated(laid.image.inside, had);
-    see_image(laid);
-    for (const uint32_t s : images_.met(laid.image)) errors_[s] = std::max(errors_[s], inside);
     const Triangle& p = before_.surface().triangles[t].points;
+    const std::span<const DVec3> points = before_.surface().points;
+    const DVec3 normal = glm::cross(points[p.y] - points[p.x], points[p.z] - points[p.x]);
+    const double had = this->had(t), inside = laid.settled ? 0.0 : stated(laid.image.inside, had);
+    for (const uint32_t s : images_.met(laid.image)) {
+      covered_[s] |= glm::dot(normal, walk_.area_normal(s)) > 0.0 ? TriangleImages::kFront : TriangleImages::kBack;
+      errors_[s] = std::max(errors_[s], inside);
+    }
+    if (laid.settled) return;
     for (int i = 0; i < 3; ++i) {
       double& of_edge = edge_had_[m_.side_edges[3 * size_t{t} + static_cast<size_t>(i)]];
       of_edge = std::max(of_edge, had);
       point_had_[p[i]] = std::max(point_had_[p[i]], had);
-    }
-  }
-
-  void see_image(const Laid& laid) {
-    const DVec3 normal = before_.surface().area_normal(laid.triangle);
-    for (const uint32_t s : images_.met(laid.image)) {
-      const bool facing = glm::dot(normal, walk_.area_normal(s)) > 0.0;
-      covered_[s] |= facing ? TriangleImages::kFront : TriangleImages::kBack;
     }
   }
 
@@ -205,9 +210,7 @@ private:
     double largest = 0.0;
     for (const OverlayPiece& piece : best_) largest = std::max(largest, piece.distance);
     if (!enough(largest, had(t))) return false;
-    see_image(laid);
     accept(t);
-    looked_.push_back(laid);
     return true;
   }
 
@@ -347,7 +350,8 @@ private:
   std::vector<uint8_t> mapped_;  ///< per triangle before: what is said of it holds for its image
   std::vector<uint8_t> unchanged_;
   std::vector<OverlayPiece> pieces_;
-  std::vector<Laid> laid_, looked_;
+  std::vector<Laid> laid_;
+  std::vector<Claim> claims_;                ///< a heap
   std::vector<double> edge_had_, point_had_; ///< the largest that accepted images at it had, or negative
   std::vector<uint32_t> not_covered_;
   std::vector<OverlayPiece> best_, second_, refined_; ///< of the triangle at hand

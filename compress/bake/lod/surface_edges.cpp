@@ -23,20 +23,25 @@ struct EdgeUse {
 
 class EdgeFinder {
 public:
-  EdgeFinder(const SimplifyMesh& mesh, const SimplifyConfig& config) : m_(mesh), config_(config) {}
+  EdgeFinder(const SimplifyMesh& mesh, const SimplifyConfig& config)
+      : m_(mesh), config_(config), many_seams_(!mesh.wedges.empty()), stay_(mesh.points.size()),
+        first_(mesh.points.size(), kNone) {
+    for (const LodTriangle& t : mesh.triangles) many_seams_ |= t.kind != mesh.triangles[0].kind;
+  }
 
   SurfaceEdges run() {
+    const size_t count = m_.triangles.size();
     out_.points.resize(m_.points.size());
-    quadrics_.resize(m_.points.size());
-    stay_.resize(m_.points.size());
-    out_.area_normals.reserve(m_.triangles.size());
-    out_.side_edge.reserve(3 * m_.triangles.size());
-    out_.ends.reserve(2 * m_.triangles.size());
-    uses_.reserve(2 * m_.triangles.size());
-    first_.assign(m_.points.size(), kNone);
-    for (uint32_t t = 0; t < m_.triangles.size(); ++t) {
-      add_plane(m_.triangles[t].points);
-      add_sides(t);
+    out_.area_normals.resize(count);
+    out_.side_edge.resize(3 * count);
+    out_.ends.reserve(2 * count);
+    uses_.reserve(2 * count);
+    for (uint32_t t = 0; t < count; ++t) {
+      add_plane(t);
+      const Triangle& p = m_.triangles[t].points;
+      out_.side_edge[3 * t] = find_edge(p.x, p.y, t);
+      out_.side_edge[3 * t + 1] = find_edge(p.y, p.z, t);
+      out_.side_edge[3 * t + 2] = find_edge(p.z, p.x, t);
     }
     add_edge_planes();
     for (size_t i = 0; i < m_.points.size(); ++i) finish_point(i);
@@ -44,39 +49,45 @@ public:
   }
 
 private:
-  void add_plane(const Triangle& t) {
+  void add(const Quadric& q, uint32_t point) {
+    static_assert(sizeof(Quadric) == sizeof(CollapsePoint::quadric));
+    double* sum = out_.points[point].quadric;
+    const double* from = &q.xx;
+    for (size_t i = 0; i < std::size(CollapsePoint{}.quadric); ++i) sum[i] += from[i];
+  }
+
+  void add_plane(uint32_t triangle) {
+    const Triangle& t = m_.triangles[triangle].points;
     const DVec3 a = m_.points[t.x], n = glm::cross(m_.points[t.y] - a, m_.points[t.z] - a);
-    out_.area_normals.push_back(n);
+    out_.area_normals[triangle] = n;
     const double area = glm::length(n);
     if (!(area > 0.0)) return;
     Quadric q;
     q.add_plane(n / area, a, area);
-    for (int i = 0; i < 3; ++i) quadrics_[t[i]].add(q), stay_[t[i]] += kStayWeight * area;
+    for (const uint32_t p : {t.x, t.y, t.z}) add(q, p), stay_[p] += kStayWeight * area;
   }
 
-  void add_sides(uint32_t triangle) {
-    const Triangle& t = m_.triangles[triangle].points;
-    for (int i = 0; i < 3; ++i) {
-      const uint32_t p = t[i], q = t[i == 2 ? 0 : i + 1], a = std::min(p, q), b = std::max(p, q);
-      uint32_t found = first_[a];
-      while (found != kNone && out_.ends[found].b != b) found = uses_[found].next;
-      if (found == kNone) {
-        found = static_cast<uint32_t>(uses_.size());
-        uses_.push_back({std::exchange(first_[a], found), triangle});
-        out_.ends.push_back({a, b});
-      } else {
-        join(found, triangle);
-      }
-      out_.side_edge.push_back(found);
+  uint32_t find_edge(uint32_t p, uint32_t q, uint32_t triangle) {
+    const uint32_t a = std::min(p, q), b = std::max(p, q);
+    uint32_t found = first_[a];
+    while (found != kNone && out_.ends[found].b != b) found = uses_[found].next;
+    if (found == kNone) {
+      found = static_cast<uint32_t>(uses_.size());
+      uses_.push_back({std::exchange(first_[a], found), triangle});
+      out_.ends.push_back({a, b});
+    } else {
+      uses_[found].alone = false;
+      if (many_seams_) join(found, triangle);
     }
+    return found;
   }
 
+  /// What changes at the edge, from its first triangle to this one.
   void join(uint32_t edge, uint32_t triangle) {
     EdgeUse& e = uses_[edge];
     const LodTriangle &s = m_.triangles[e.triangle], &t = m_.triangles[triangle];
-    e.alone = false;
     e.seam |= config_.seam_of_kind[s.kind] != config_.seam_of_kind[t.kind];
-    if (s.kind != t.kind || m_.wedges.empty()) return;
+    if (s.kind != t.kind) return;
     const auto wedge_at = [](const LodTriangle& of, uint32_t point) {
       for (int i = 0; i < 3; ++i)
         if (of.points[i] == point) return of.wedges[i];
@@ -105,26 +116,26 @@ private:
     if (!(length > 0.0)) return;
     Quadric q;
     q.add_plane(side / length, m_.points[a], weight * glm::dot(along, along));
-    quadrics_[a].add(q);
-    quadrics_[b].add(q);
+    add(q, a);
+    add(q, b);
   }
 
   void finish_point(size_t i) {
-    static_assert(sizeof(Quadric) == sizeof(CollapsePoint::quadric));
     CollapsePoint& out = out_.points[i];
-    quadrics_[i].add_point(m_.points[i], stay_[i]);
-    std::copy_n(&quadrics_[i].xx, std::size(out.quadric), out.quadric);
+    Quadric stay;
+    stay.add_point(m_.points[i], stay_[i]);
+    add(stay, static_cast<uint32_t>(i));
     for (int axis = 0; axis < 3; ++axis) out.at[axis] = m_.points[i][axis];
     if (m_.locked[i] != 0) out.held += kLocked;
   }
 
   const SimplifyMesh& m_;
   const SimplifyConfig& config_;
+  bool many_seams_;             ///< there are wedges, or kinds of triangles
+  std::vector<double> stay_;    ///< per point: the weight of the point itself
+  std::vector<uint32_t> first_; ///< per point: the last edge of which it is the lower one
+  std::vector<EdgeUse> uses_;   ///< per edge
   SurfaceEdges out_;
-  std::vector<Quadric> quadrics_; ///< per point
-  std::vector<double> stay_;      ///< per point: the weight of the point itself
-  std::vector<EdgeUse> uses_;     ///< per edge
-  std::vector<uint32_t> first_;   ///< per point: the last edge of which it is the lower one
 };
 
 } // namespace

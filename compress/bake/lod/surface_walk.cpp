@@ -1,14 +1,15 @@
 #include "compress/bake/lod/surface_walk.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "compress/bake/lod/triangle_distance.h"
 
 namespace packtrace {
 namespace {
 
-constexpr int kMostSteps = 32;  // triangles on one way, or around one point
-constexpr double kSteep = 0.05; // sine; planes through an edge and a direction nearer to it than that are none
+constexpr uint32_t kMostSteps = 32; // triangles on one way, or around one point
+constexpr double kSteep = 0.05;     // sine; planes through an edge and a direction nearer to it than that are none
 
 uint32_t next_corner(uint32_t corner) { return (corner & ~3u) | (9u >> (2 * (corner & 3u)) & 3u); }
 uint32_t last_corner(uint32_t corner) { return (corner & ~3u) | (18u >> (2 * (corner & 3u)) & 3u); }
@@ -30,8 +31,6 @@ SurfaceWalk::SurfaceWalk(const OverlaySurface& before, const SurfaceSide& after,
   }
   if (mesh.side_edges.empty()) return;
   pair_sides();
-  into_.reserve(3 * before.triangles.size());
-  crossings_.reserve(3 * before.triangles.size());
 }
 
 // ---- the surface after
@@ -72,11 +71,11 @@ inline bool SurfaceWalk::leave_point(const Slice& slice, uint32_t from, Exit& ou
   for (const uint32_t t : after_.around(from)) {
     const uint32_t* p = &corner_points_[4 * size_t{t}];
     const uint32_t corner = p[0] == from ? 1u : p[1] == from ? 2u : 0u;
-    out.right = point(p[corner]);
-    out.side_right = slice.side(out.right);
+    out.right = &point(p[corner]);
+    out.side_right = slice.side(*out.right);
     if (!(out.side_right < 0.0)) continue;
-    out.left = point(p[corner == 2 ? 0 : corner + 1]);
-    out.side_left = slice.side(out.left);
+    out.left = &point(p[corner == 2 ? 0 : corner + 1]);
+    out.side_left = slice.side(*out.left);
     if (out.side_left < 0.0) continue;
     out.corner = 4 * t + corner;
     return true;
@@ -86,8 +85,8 @@ inline bool SurfaceWalk::leave_point(const Slice& slice, uint32_t from, Exit& ou
 
 inline bool SurfaceWalk::leave_triangle(const Slice& slice, uint32_t triangle, Exit& out) const {
   const uint32_t* p = &corner_points_[4 * size_t{triangle}];
-  const DVec3 points[3] = {point(p[0]), point(p[1]), point(p[2])};
-  const double sides[3] = {slice.side(points[0]), slice.side(points[1]), slice.side(points[2])};
+  const DVec3* points[3] = {&point(p[0]), &point(p[1]), &point(p[2])};
+  const double sides[3] = {slice.side(*points[0]), slice.side(*points[1]), slice.side(*points[2])};
   for (uint32_t i = 0; i < 3; ++i) {
     const uint32_t next = i == 2 ? 0 : i + 1;
     if (!(sides[i] < 0.0) || sides[next] < 0.0) continue;
@@ -102,9 +101,9 @@ inline void SurfaceWalk::enter(const Slice& slice, uint32_t corner, Exit& exit) 
   const DVec3& next = point(point_at(last_corner(corner)));
   const double side = slice.side(next);
   if (side < 0.0)
-    exit.corner = last_corner(corner), exit.right = next, exit.side_right = side;
+    exit.corner = last_corner(corner), exit.right = &next, exit.side_right = side;
   else
-    exit.corner = next_corner(corner), exit.left = next, exit.side_left = side;
+    exit.corner = next_corner(corner), exit.left = &next, exit.side_left = side;
 }
 
 /// From the point that it became as far as it is away from it.
@@ -126,15 +125,15 @@ void SurfaceWalk::find_place(uint32_t before, Place& out) const {
       out.state = Place::State::kPoint;
     return;
   }
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (uint32_t step = 0; step < kMostSteps; ++step) {
     const double t = exit.side_right / (exit.side_right - exit.side_left);
-    const DVec3 crossing = exit.right + t * (exit.left - exit.right);
+    const DVec3 crossing = *exit.right + t * (*exit.left - *exit.right);
     if (glm::dot(crossing - slice.from, slice.along) >= 1.0) {
       const uint32_t triangle = exit.corner / 4;
       const DVec3& normal = normals_[triangle];
       const double slope = glm::dot(normal, up), up2 = glm::dot(up, up);
       if (!(slope > 0.0) || slope * slope < kSteep * kSteep * glm::dot(normal, normal) * up2) return;
-      const double height = glm::dot(normal, exit.right - to) / slope;
+      const double height = glm::dot(normal, *exit.right - to) / slope;
       out.at = to + height * up, out.distance2 = height * height * up2;
       out.number = triangle, out.state = Place::State::kTriangle;
       return;
@@ -147,7 +146,7 @@ void SurfaceWalk::find_place(uint32_t before, Place& out) const {
 
 void SurfaceWalk::find_way(uint32_t edge, uint32_t a, uint32_t b, Way& out) {
   out.state = Way::State::kNowhere;
-  out.first = static_cast<uint32_t>(into_.size());
+  out.first = static_cast<uint32_t>(crossing_count_);
   const Place &from = place(a), &goal = place(b);
   if (from.state == Place::State::kNowhere || goal.state == Place::State::kNowhere) return;
   if (from.state == Place::State::kPoint && goal.state == Place::State::kPoint) {
@@ -167,18 +166,28 @@ void SurfaceWalk::find_way(uint32_t edge, uint32_t a, uint32_t b, Way& out) {
                                            : leave_triangle(slice, from.number, exit)))
     return;
   out.start = exit.corner / 4;
+  make_room();
   if (cross(slice, exit, goal)) out.state = Way::State::kAcross;
-  out.count = static_cast<uint32_t>(into_.size()) - out.first;
+  out.count = static_cast<uint32_t>(crossing_count_) - out.first;
   for (uint32_t i = 0; i < out.count; ++i) out.distance2 = std::max(out.distance2, crossings_[out.first + i].distance2);
+}
+
+/// For the crossings of one way more.
+inline void SurfaceWalk::make_room() {
+  if (crossing_count_ + kMostSteps <= crossing_room_) return;
+  crossing_room_ = std::max(2 * crossing_room_, 2 * ways_.size() + kMostSteps);
+  auto larger = std::make_unique_for_overwrite<Crossing[]>(crossing_room_);
+  std::copy_n(crossings_.get(), crossing_count_, larger.get());
+  crossings_ = std::move(larger);
 }
 
 /// Goes on from triangle to triangle until it is at the goal. False where it does not get there.
 inline bool SurfaceWalk::cross(const Slice& slice, Exit& exit, const Place& goal) {
   const bool to_point = goal.state == Place::State::kPoint;
   double last = 0.0;
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (uint32_t step = 0; step < kMostSteps; ++step) {
     const double t = exit.side_right / (exit.side_right - exit.side_left);
-    const DVec3 crossing = exit.right + t * (exit.left - exit.right);
+    const DVec3 crossing = *exit.right + t * (*exit.left - *exit.right);
     const double on = glm::dot(crossing - slice.from, slice.along);
     if (on > 1.0 && step_aside(exit.corner / 4, goal, slice.from + slice.direction)) return true;
     last = std::clamp(on, last, 1.0);

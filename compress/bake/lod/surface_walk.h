@@ -1,7 +1,7 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -28,9 +28,11 @@ public:
   };
   /// Where a way goes from one triangle after into the next.
   struct Crossing {
-    DVec3 at;
+    double at[3];
     double on;        ///< 0 to 1: its place on the edge before
     double distance2; ///< of both
+    uint32_t into;    ///< the triangle that it enters
+    DVec3 point() const { return {at[0], at[1], at[2]}; }
   };
   /// From the lower point of an edge before to the higher one. kAcross: begins in triangle `start` and enters others
   /// at its crossings. kAlong: it is an edge after, with triangle `start` to the left and `right` to the right.
@@ -58,7 +60,7 @@ public:
   /// Of all edges; those that nobody asked for are not known.
   std::span<const Way> ways() const { return ways_; }
   const Crossing& crossing(uint32_t i) const { return crossings_[i]; }
-  uint32_t into(uint32_t i) const { return into_[i]; } ///< the triangle that crossing i enters
+  uint32_t into(uint32_t i) const { return crossings_[i].into; }
 
   const DVec3& area_normal(uint32_t after) const { return normals_[after]; }
   const DVec3& point(uint32_t after) const { return mesh_.points[after]; }
@@ -82,17 +84,18 @@ private:
   /// The plane in which a way lies, upright on the edge.
   struct Slice {
     DVec3 from, direction, left, along;
-    double offset;
+    double offset; ///< of `from`, towards the left
     double side(const DVec3& p) const { return glm::dot(left, p) - offset; }
   };
   /// Where a way leaves a triangle: through the side that begins at `corner`, from its right end to its left one.
   struct Exit {
     uint32_t corner;
-    DVec3 right, left;
+    const DVec3 *right, *left;
     double side_right, side_left;
   };
 
   void pair_sides();
+  void make_room();
   bool make_slice(const DVec3& from, const DVec3& to, const DVec3& up, Slice& out) const;
   bool leave_point(const Slice& slice, uint32_t point, Exit& out) const;
   bool leave_triangle(const Slice& slice, uint32_t triangle, Exit& out) const;
@@ -103,7 +106,7 @@ private:
   bool find_along(uint32_t edge, uint32_t from, uint32_t to, Way& out) const;
   bool step_aside(uint32_t triangle, const Place& goal, const DVec3& end);
   void add(uint32_t into, const DVec3& at, double on, double distance2) {
-    into_.push_back(into), crossings_.push_back({at, on, distance2});
+    crossings_[crossing_count_++] = {{at.x, at.y, at.z}, on, distance2, into};
   }
   bool at(uint32_t triangle, const Place& goal) const {
     return goal.state == Place::State::kPoint ? has(triangle, goal.number) : triangle == goal.number;
@@ -114,8 +117,8 @@ private:
   const SimplifyMesh& mesh_;
   std::vector<Place> places_;
   std::vector<Way> ways_;
-  std::vector<uint32_t> into_; ///< per crossing
-  std::vector<Crossing> crossings_;
+  std::unique_ptr<Crossing[]> crossings_;
+  size_t crossing_count_ = 0, crossing_room_ = 0;
   std::vector<uint32_t> side_of_edge_;             ///< per edge after: a corner where it begins, or kNone
   std::vector<uint32_t> corner_points_, opposite_; ///< per corner: its point; where the side back begins, or kNone
   std::vector<DVec3> normals_;                     ///< per triangle after, twice its area long

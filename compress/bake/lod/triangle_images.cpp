@@ -62,11 +62,10 @@ bool TriangleImages::follow(uint32_t triangle, Visitor& visitor) {
 /// Whether the outline's image bounds a disk around one point at most. First what it goes into and comes back from is
 /// cut off: both ends of a straight cut lie in both triangles. What then is left of it goes around a point.
 /// @param inside set to that point, or kNone
-bool TriangleImages::contract(const Word& outline, uint32_t& inside) const {
+bool TriangleImages::contract(std::span<const uint32_t> outline, uint32_t& inside) const {
   std::array<uint32_t, kMost> word;
   size_t begin = 0, end = 0;
-  for (uint32_t i = 0; i < outline.count; ++i) {
-    const uint32_t t = outline.triangles[i];
+  for (const uint32_t t : outline) {
     if (end >= 1 && word[end - 1] == t) continue;
     if (end >= 2 && word[end - 2] == t)
       --end;
@@ -106,25 +105,26 @@ double TriangleImages::distance2_from(uint32_t triangle, const DVec3& point) con
 
 bool TriangleImages::find(uint32_t triangle, Image& out) {
   if (3 * size_t{triangle} >= mesh_.side_edges.size()) return false;
+  if (met_count_ + kMost > met_.size()) met_.resize(2 * met_.size());
   struct Collector {
-    Word word;
-    void begin(uint32_t t) { word.triangles[word.count++] = t; }
+    uint32_t* triangles;
+    uint32_t count = 0;
+    void begin(uint32_t t) { triangles[count++] = t; }
     void cross(uint32_t, uint32_t t) { begin(t); }
     void corner(int) {}
     void turn(uint32_t t, int) { begin(t); }
-  } outline;
+  } outline{&met_[met_count_]};
   uint32_t inside = kNone;
   if (!follow(triangle, outline)) return false;
-  const Word& word = outline.word;
-  if (word.count > 2 && !contract(word, inside)) return false;
+  if (outline.count > 2 && !contract({outline.triangles, outline.count}, inside)) return false;
   const Triangle& p = points(triangle);
   const uint32_t* edge = edges(triangle);
   double distance2 = 0.0, inside2 = 0.0;
   for (int i = 0; i < 3; ++i)
-    distance2 = std::max({distance2, walk_.ways()[edge[i]].distance2, walk_.place(p[i]).distance2});
+    distance2 = std::max(distance2, std::max(walk_.ways()[edge[i]].distance2, walk_.place(p[i]).distance2));
   if (inside != kNone) inside2 = distance2_from(triangle, walk_.point(inside));
-  out = {std::sqrt(std::max(distance2, inside2)), std::sqrt(inside2), static_cast<uint32_t>(met_.size()), word.count};
-  met_.insert(met_.end(), word.triangles.begin(), word.triangles.begin() + word.count);
+  out = {std::sqrt(std::max(distance2, inside2)), std::sqrt(inside2), met_count_, outline.count};
+  met_count_ += outline.count;
   return true;
 }
 
@@ -174,14 +174,14 @@ void TriangleImages::look_closer(uint32_t triangle, std::vector<OverlayPiece>& p
       const uint32_t a = p[side], b = p[side == 2 ? 0 : side + 1];
       const DVec3 &low = images.walk_.before().points[std::min(a, b)],
                   &high = images.walk_.before().points[std::max(a, b)];
-      point = low + c.on * (high - low), image = c.at, of_both = c.distance2;
+      point = low + c.on * (high - low), image = c.point(), of_both = c.distance2;
       measure();
       begin(into);
       measure();
     }
   } outline{*this, triangle, {}, {}, {}, {}, 0.0};
   uint32_t inside = kNone;
-  if (!follow(triangle, outline) || (outline.word.count > 2 && !contract(outline.word, inside))) return;
+  if (!follow(triangle, outline) || (outline.word.count > 2 && !contract(outline.word.view(), inside))) return;
   const double inside2 = inside == kNone ? 0.0 : distance2_from(triangle, walk_.point(inside));
   for (uint32_t i = 0; i < outline.word.count; ++i)
     pieces.push_back({outline.word.triangles[i], std::sqrt(std::max(outline.distances2[i], inside2)), 0.0});
@@ -221,14 +221,14 @@ void TriangleImages::add_shares(uint32_t triangle, std::span<double> shares) {
       corner(i);
     }
     void cross(uint32_t crossing, uint32_t into) {
-      add(images.walk_.crossing(crossing).at);
+      add(images.walk_.crossing(crossing).point());
       begin(into);
-      add(images.walk_.crossing(crossing).at);
+      add(images.walk_.crossing(crossing).point());
     }
   } collector{*this, triangle, {}};
   outline_.intervals.clear(), outline_.points.clear();
   uint32_t inside = kNone;
-  if (!follow(triangle, collector) || (collector.word.count > 2 && !contract(collector.word, inside))) return;
+  if (!follow(triangle, collector) || (collector.word.count > 2 && !contract(collector.word.view(), inside))) return;
   const auto count = static_cast<uint32_t>(outline_.intervals.size());
   outline_.intervals.push_back({kNone, static_cast<uint32_t>(outline_.points.size())});
   const DVec3 reference = inside == kNone ? outline_.points[0] : walk_.point(inside);

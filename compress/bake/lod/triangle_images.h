@@ -23,9 +23,8 @@ public:
   };
 
   /// Both must outlive it.
-  TriangleImages(SurfaceWalk& walk, const SimplifyMesh& mesh) : walk_(walk), mesh_(mesh) {
-    met_.reserve(5 * walk.before().triangles.size());
-  }
+  TriangleImages(SurfaceWalk& walk, const SimplifyMesh& mesh)
+      : walk_(walk), mesh_(mesh), met_(4 * walk.before().triangles.size() + kMost) {}
 
   /// False, and nothing changed, where a corner or a side has no image, or the outline goes around two points and more.
   bool find(uint32_t triangle, Image& out);
@@ -57,6 +56,7 @@ private:
   struct Word {
     uint32_t count = 0;
     std::array<uint32_t, kMost> triangles;
+    std::span<const uint32_t> view() const { return std::span(triangles).first(count); }
   };
 
   /// The outline's image within one triangle after: points[first_point .. that of the next).
@@ -72,14 +72,15 @@ private:
   double area(uint32_t interval, const DVec3& reference) const;
   template <typename Visitor>
   bool follow(uint32_t triangle, Visitor& visitor);
-  bool contract(const Word& outline, uint32_t& inside) const;
+  bool contract(std::span<const uint32_t> outline, uint32_t& inside) const;
   double distance2_from(uint32_t triangle, const DVec3& point) const;
   const Triangle& points(uint32_t before) const { return walk_.before().triangles[before].points; }
   const uint32_t* edges(uint32_t before) const { return &mesh_.side_edges[3 * size_t{before}]; }
 
   SurfaceWalk& walk_;
   const SimplifyMesh& mesh_;
-  std::vector<uint32_t> met_;
+  std::vector<uint32_t> met_; ///< with room for one outline more
+  uint32_t met_count_ = 0;
   Outline outline_; ///< of the triangle at hand, where shares are looked for
 };
 

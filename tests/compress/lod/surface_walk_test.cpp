@@ -51,7 +51,7 @@ protected:
   }
 
   const Simplified s_{GetParam()};
-  SurfaceSide after_{{s_.mesh.points, s_.mesh.triangles}, [](uint32_t p) { return p; }};
+  SurfaceSide after_{{s_.mesh.points, s_.mesh.triangles}};
   SurfaceWalk walk_{{s_.points, s_.triangles}, after_, s_.mesh};
   TriangleImages images_{walk_, s_.mesh};
 };
