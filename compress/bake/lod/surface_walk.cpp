@@ -203,7 +203,7 @@ inline bool SurfaceWalk::cross(const Slice& slice, Exit& exit, const Place& goal
 
 /// The edge is still there.
 bool SurfaceWalk::find_along(uint32_t edge, uint32_t from, uint32_t to, Way& out) const {
-  const uint32_t side = side_of_edge_[mesh_.edge_became[edge]];
+  const uint32_t side = side_along(edge);
   if (side == kNone) return false;
   const uint32_t begin = point_at(side), end = point_at(next_corner(side));
   const bool forward = begin == from && end == to;

@@ -77,6 +77,8 @@ public:
     const uint32_t* p = &corner_points_[4 * size_t{triangle}];
     return beyond(4 * triangle + (p[0] == from ? 0u : p[1] == from ? 1u : 2u));
   }
+  /// A corner where the edge after begins that an edge before became, or kNone.
+  uint32_t side_along(uint32_t edge) const { return side_of_edge_[mesh_.edge_became[edge]]; }
   const OverlaySurface& before() const { return before_; }
   const SurfaceSide& after() const { return after_; }
 

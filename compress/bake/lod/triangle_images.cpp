@@ -254,12 +254,12 @@ void TriangleImages::mark_borders(std::span<const uint8_t> mapped, std::span<uin
   for (uint32_t e = 0; e < ways.size(); ++e) {
     const Way& w = ways[e];
     if (balance[e] == 0) continue;
-    if (w.state == Way::State::kAlong) {
-      for (const uint32_t t : {w.start, w.right})
-        if (t != kNone) covered[t] |= kBordered;
-    } else if (w.state == Way::State::kAcross) {
+    if (w.state == Way::State::kAcross) {
       covered[w.start] |= kCrossed;
       for (uint32_t k = 0; k < w.count; ++k) covered[walk_.into(w.first + k)] |= kCrossed;
+    } else if (const uint32_t side = walk_.side_along(e); side != kNone) {
+      covered[side / 4] |= kBordered;
+      if (const uint32_t other = walk_.beyond(side); other != kNone) covered[other] |= kBordered;
     }
   }
 }
