@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
+#include <utility>
 
-#include "compress/bake/weld_table.h"
 #include "compress/format/index_codec.h"
 
 namespace packtrace {
@@ -13,37 +14,119 @@ constexpr uint32_t kNone = ~0u;
 constexpr uint32_t kWellFilled = kMaxClusterTriangles * 9 / 10;
 
 /// Up to three triangles across each triangle's edges; an edge has at most one partner.
-std::vector<std::array<uint32_t, 3>> find_neighbours(std::span<const Triangle> points) {
+std::vector<std::array<uint32_t, 3>> find_neighbours(std::span<const Triangle> points, uint32_t point_count) {
+  struct Edge {
+    uint32_t high, next; ///< its higher point; the edge before of the same lower point
+    uint32_t open;       ///< the side that waits for a partner
+  };
   std::vector<std::array<uint32_t, 3>> neighbours(points.size(), {kNone, kNone, kNone});
-  std::vector<uint32_t> open(3 * points.size()); // edge number -> the half edge that waits for a partner
-  std::vector<uint64_t> keys;
-  keys.reserve(open.size());
-  WeldTable edges(open.size());
-  for (uint32_t half = 0; half < open.size(); ++half) {
-    const Triangle& t = points[half / 3];
-    const uint32_t a = t[static_cast<int>(half % 3)], b = t[static_cast<int>((half + 1) % 3)];
-    if (a == b) continue;
-    const uint64_t key = (uint64_t{std::min(a, b)} << 32) | std::max(a, b);
-    const auto next = static_cast<uint32_t>(keys.size());
-    const uint32_t edge =
-        edges.find_or_add(mix_words(key, 0), next, [&](uint32_t other) { return keys[other] == key; });
-    if (edge == next) keys.push_back(key), open[edge] = kNone;
-    if (open[edge] == kNone) {
-      open[edge] = half;
-    } else {
-      neighbours[half / 3][half % 3] = open[edge] / 3;
-      neighbours[open[edge] / 3][open[edge] % 3] = half / 3;
-      open[edge] = kNone;
+  std::vector<Edge> edges;
+  edges.reserve(2 * points.size());
+  std::vector<uint32_t> first(point_count, kNone);
+  for (uint32_t t = 0; t < points.size(); ++t)
+    for (uint32_t i = 0; i < 3; ++i) {
+      const uint32_t p = points[t][static_cast<int>(i)], q = points[t][i == 2 ? 0 : static_cast<int>(i + 1)];
+      if (p == q) continue;
+      const uint32_t low = std::min(p, q), high = std::max(p, q), side = 4 * t + i;
+      uint32_t found = first[low];
+      while (found != kNone && edges[found].high != high) found = edges[found].next;
+      if (found == kNone) {
+        edges.push_back({high, std::exchange(first[low], static_cast<uint32_t>(edges.size())), side});
+      } else if (uint32_t& open = edges[found].open; open == kNone) {
+        open = side;
+      } else {
+        neighbours[t][i] = open / 4;
+        neighbours[open / 4][open % 4] = t;
+        open = kNone;
+      }
     }
-  }
   return neighbours;
 }
+
+/// Triangles that a cluster may take next, side by side: each step looks at all of them.
+class Frontier {
+public:
+  uint32_t size() const { return count_; }
+  uint32_t triangle(uint32_t place) const { return triangle_[place]; }
+  uint32_t added(uint32_t place) const { return added_[place]; }
+  void clear() { count_ = 0; }
+
+  /// @param added vertices that the cluster does not have yet
+  /// @param open neighbours that no cluster has yet
+  void add(uint32_t triangle, const Triangle& vertices, const DVec3& centroid, uint32_t added, uint32_t open) {
+    const uint32_t place = count_++;
+    triangle_[place] = triangle, added_[place] = added, open_[place] = open;
+    for (size_t i = 0; i < 3; ++i)
+      vertices_[i][place] = vertices[static_cast<int>(i)], centroid_[i][place] = centroid[static_cast<int>(i)];
+    weigh(place);
+  }
+
+  /// The last one comes to its place.
+  void remove(uint32_t place) {
+    --count_;
+    triangle_[place] = triangle_[count_], added_[place] = added_[count_], open_[place] = open_[count_];
+    for (size_t i = 0; i < 3; ++i)
+      vertices_[i][place] = vertices_[i][count_], centroid_[i][place] = centroid_[i][count_];
+    weight_[place] = weight_[count_];
+  }
+
+  void set_open(uint32_t place, uint32_t open) {
+    open_[place] = open;
+    if (open == 0) weigh(place);
+  }
+
+  /// The cluster has the vertex now.
+  void have(uint32_t vertex) {
+    for (uint32_t i = 0; i < count_; ++i)
+      if (vertices_[0][i] == vertex || vertices_[1][i] == vertex || vertices_[2][i] == vertex) --added_[i], weigh(i);
+  }
+
+  double score(uint32_t place, const DVec3& centre) const {
+    const DVec3 d = DVec3(centroid_[0][place], centroid_[1][place], centroid_[2][place]) - centre;
+    return glm::dot(d, d) * weight_[place];
+  }
+
+  /// The place of the least score, the first of several; there is one.
+  uint32_t best(const DVec3& centre) {
+    using Lanes = double __attribute__((vector_size(16)));
+    using Places = int64_t __attribute__((vector_size(16)));
+    if (count_ % 2 != 0) weight_[count_] = std::numeric_limits<double>::infinity(), centroid_[0][count_] = centre.x + 1;
+    Lanes best = {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+    Places at = {}, place = {0, 1};
+    const auto load = [](const double* from) { return *reinterpret_cast<const Lanes*>(from); };
+    for (uint32_t i = 0; i < count_; i += 2) {
+      const Lanes x = load(&centroid_[0][i]) - centre.x, y = load(&centroid_[1][i]) - centre.y,
+                  z = load(&centroid_[2][i]) - centre.z;
+      const Lanes score = (x * x + y * y + z * z) * load(&weight_[i]);
+      const Places less = score < best;
+      best = less ? score : best;
+      at = less ? place : at;
+      place += 2;
+    }
+    const bool second = best[1] < best[0] || (best[1] == best[0] && at[1] < at[0]);
+    return static_cast<uint32_t>(second ? at[1] : at[0]);
+  }
+
+private:
+  static constexpr size_t kMost = 3 * kMaxClusterTriangles + 2; ///< each triangle adds up to three
+
+  /// Left behind, a triangle without open neighbours would become a cluster's lone piece.
+  void weigh(uint32_t place) {
+    weight_[place] = (1.0 + added_[place]) * (added_[place] == 0 || open_[place] == 0 ? 0.125 : 1.0);
+  }
+
+  uint32_t count_ = 0;
+  std::array<uint32_t, kMost> triangle_, added_, open_;
+  std::array<std::array<uint32_t, kMost>, 3> vertices_;
+  alignas(16) std::array<std::array<double, kMost>, 3> centroid_;
+  alignas(16) std::array<double, kMost> weight_; ///< of squared distances
+};
 
 class Grower {
 public:
   explicit Grower(const ClusterizeInput& input)
-      : input_(input), neighbours_(find_neighbours(input.points)), taken_(input.vertices.size()),
-        waits_in_(input.vertices.size(), kNone), vertex_in_(input.vertex_count, kNone) {
+      : input_(input), neighbours_(find_neighbours(input.points, input.point_count)), taken_(input.vertices.size()),
+        place_(input.vertices.size(), kNone), vertex_in_(input.vertex_count, kNone) {
     result_.order.reserve(input.vertices.size());
   }
 
@@ -59,20 +142,21 @@ public:
 
 private:
   void grow() {
-    frontier_.clear();
     size_ = 0, vertices_ = 0;
     sum_ = DVec3(0.0);
     take(cursor_);
     while (size_ < kMaxClusterTriangles) {
       uint32_t next = pick();
       if (next == kNone) {
-        if (size_ >= kWellFilled) return;
+        if (size_ >= kWellFilled) break;
         while (cursor_ < taken_.size() && taken_[cursor_]) ++cursor_;
-        if (cursor_ == taken_.size() || vertices_ + new_vertices(cursor_) > kMaxClusterVertices) return;
+        if (cursor_ == taken_.size() || vertices_ + new_vertices(cursor_) > kMaxClusterVertices) break;
         next = cursor_;
       }
       take(next);
     }
+    for (uint32_t i = 0; i < frontier_.size(); ++i) place_[frontier_.triangle(i)] = kNone;
+    frontier_.clear();
   }
 
   uint32_t new_vertices(uint32_t triangle) const {
@@ -83,53 +167,55 @@ private:
   }
 
   void take(uint32_t triangle) {
+    if (const uint32_t place = place_[triangle]; place != kNone) {
+      frontier_.remove(place);
+      if (place < frontier_.size()) place_[frontier_.triangle(place)] = place;
+      place_[triangle] = kNone;
+    }
     taken_[triangle] = 1;
     result_.order.push_back(triangle);
-    vertices_ += new_vertices(triangle);
-    const Triangle& t = input_.vertices[triangle];
-    vertex_in_[t.x] = vertex_in_[t.y] = vertex_in_[t.z] = cluster_;
+    for (int i = 0; i < 3; ++i) {
+      const uint32_t vertex = input_.vertices[triangle][i];
+      if (vertex_in_[vertex] == cluster_) continue;
+      vertex_in_[vertex] = cluster_, ++vertices_;
+      frontier_.have(vertex);
+    }
     sum_ += input_.centroids[triangle];
     ++size_;
     for (const uint32_t n : neighbours_[triangle])
-      if (n != kNone && !taken_[n] && waits_in_[n] != cluster_) {
-        waits_in_[n] = cluster_;
-        frontier_.push_back(n);
-      }
+      if (n != kNone && !taken_[n]) see(n);
   }
 
-  /// Whether every neighbour is taken or about to be: left behind it would become a cluster's lone piece.
-  bool enclosed(uint32_t triangle) const {
-    for (const uint32_t n : neighbours_[triangle])
-      if (n != kNone && !taken_[n]) return false;
-    return true;
+  /// A neighbour of the triangle just taken.
+  void see(uint32_t triangle) {
+    uint32_t open = 0;
+    for (const uint32_t n : neighbours_[triangle]) open += n != kNone && !taken_[n];
+    if (place_[triangle] != kNone) return frontier_.set_open(place_[triangle], open);
+    place_[triangle] = frontier_.size();
+    frontier_.add(triangle, input_.vertices[triangle], input_.centroids[triangle], new_vertices(triangle), open);
   }
 
-  /// The best triangle of the frontier, or kNone. Drops those taken since they were added.
+  /// The best triangle of the frontier, or kNone.
   uint32_t pick() {
+    if (frontier_.size() == 0) return kNone;
     const DVec3 centre = sum_ / static_cast<double>(size_);
+    if (vertices_ + 3 <= kMaxClusterVertices) return frontier_.triangle(frontier_.best(centre));
     uint32_t best = kNone;
     double best_score = 0.0;
-    size_t kept = 0;
-    for (size_t i = 0; i < frontier_.size(); ++i) {
-      const uint32_t triangle = frontier_[i];
-      if (taken_[triangle]) continue;
-      frontier_[kept++] = triangle;
-      const uint32_t added = new_vertices(triangle);
-      if (vertices_ + added > kMaxClusterVertices) continue;
-      const DVec3 d = input_.centroids[triangle] - centre;
-      double score = glm::dot(d, d) * (1.0 + added);
-      if (added == 0 || enclosed(triangle)) score *= 0.125;
-      if (best == kNone || score < best_score) best = triangle, best_score = score;
+    for (uint32_t i = 0; i < frontier_.size(); ++i) {
+      if (vertices_ + frontier_.added(i) > kMaxClusterVertices) continue;
+      const double score = frontier_.score(i, centre);
+      if (best == kNone || score < best_score) best = frontier_.triangle(i), best_score = score;
     }
-    frontier_.resize(kept);
     return best;
   }
 
   const ClusterizeInput& input_;
   std::vector<std::array<uint32_t, 3>> neighbours_;
   std::vector<uint8_t> taken_;
-  std::vector<uint32_t> waits_in_, vertex_in_; // last cluster whose frontier, or vertices, it was in
-  std::vector<uint32_t> frontier_;
+  std::vector<uint32_t> place_;     ///< in the frontier, or kNone
+  std::vector<uint32_t> vertex_in_; ///< the last cluster that has it
+  Frontier frontier_;
   uint32_t cluster_ = 0, cursor_ = 0, size_ = 0, vertices_ = 0;
   DVec3 sum_{0.0};
   Clusters result_;

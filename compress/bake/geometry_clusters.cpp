@@ -9,7 +9,7 @@
 
 #include "compress/bake/cluster_cutter.h"
 #include "compress/bake/morton.h"
-#include "compress/bake/weld_table.h"
+#include "compress/bake/renumbering.h"
 #include "compress/format/baked_format.h"
 
 namespace packtrace {
@@ -31,26 +31,9 @@ struct Chunk {
   uint32_t begin = 0, end = 0; ///< of the sorted triangles
 };
 
-/// Numbers the values of a chunk 0, 1, ...; the numbers of other chunks' values do not matter to it.
-class Renumbering {
-public:
-  explicit Renumbering(size_t capacity) : table_(capacity) {}
-  uint32_t operator()(uint32_t value) {
-    const auto next = static_cast<uint32_t>(values.size());
-    const uint32_t number =
-        table_.find_or_add(mix_words(value, 0), next, [&](uint32_t other) { return values[other] == value; });
-    if (number == next) values.push_back(value);
-    return number;
-  }
-  std::vector<uint32_t> values;
-
-private:
-  WeldTable table_;
-};
-
 /// Clusters of the sorted triangles of a chunk, which their `order` counts.
 Clusters split_chunk(const QuantizedGeometry& geometry, std::span<const SortKey> keys) {
-  Renumbering vertex_numbers(3 * keys.size());
+  Renumbering vertex_numbers(keys.size());
   std::vector<Triangle> vertices;
   std::vector<TreeBox> boxes;
   vertices.reserve(keys.size()), boxes.reserve(keys.size());

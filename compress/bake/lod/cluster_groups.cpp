@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <numeric>
 #include <tuple>
 
@@ -10,7 +11,6 @@
 #include <tbb/parallel_sort.h>
 
 #include "compress/bake/morton.h"
-#include "compress/bake/weld_table.h"
 
 namespace packtrace {
 namespace {
@@ -26,40 +26,57 @@ struct BorderEdge {
 
 uint32_t begin_of(std::span<const uint32_t> ends, uint32_t i) { return i == 0 ? 0 : ends[i - 1]; }
 
-void append_border(const ClusterRuns& clusters, uint32_t cluster, std::vector<BorderEdge>& out) {
+/// Finds the borders of one cluster after another.
+class BorderFinder {
+public:
+  explicit BorderFinder(const ClusterRuns& clusters) : clusters_(clusters) {}
+
+  void append(uint32_t cluster, std::vector<BorderEdge>& out) {
+    const uint32_t begin = begin_of(clusters_.ends, cluster), end = clusters_.ends[cluster];
+    const size_t room = std::bit_ceil(6 * size_t{end - begin} + 2);
+    if (slots_.size() < room) slots_.assign(room, {});
+    found_.clear();
+    for (uint32_t i = begin; i < end; ++i) {
+      const Triangle& t = clusters_.points[i];
+      for (int k = 0; k < 3; ++k) add(t[k], t[k == 2 ? 0 : k + 1], cluster);
+    }
+    for (const uint32_t slot : found_)
+      if (const Edge& e = slots_[slot]; e.once) out.push_back({e.a, e.b, cluster});
+  }
+
+private:
   struct Edge {
-    uint32_t a, b, uses;
+    uint32_t a = 0, b = 0, cluster = kNone; ///< empty where it is another cluster's
+    bool once = true;
   };
-  const uint32_t begin = begin_of(clusters.ends, cluster), end = clusters.ends[cluster];
-  std::vector<Edge> edges;
-  edges.reserve(3 * size_t{end - begin});
-  WeldTable table(3 * size_t{end - begin});
-  for (uint32_t i = begin; i < end; ++i) {
-    const Triangle& t = clusters.points[i];
-    for (int k = 0; k < 3; ++k) {
-      const uint32_t a = std::min(t[k], t[(k + 1) % 3]), b = std::max(t[k], t[(k + 1) % 3]);
-      if (a == b) continue;
-      const auto next = static_cast<uint32_t>(edges.size());
-      const uint32_t edge = table.find_or_add(mix_words((uint64_t{a} << 32) | b, 0), next, [&](uint32_t other) {
-        return edges[other].a == a && edges[other].b == b;
-      });
-      if (edge == next)
-        edges.push_back({a, b, 1});
-      else
-        ++edges[edge].uses;
+
+  void add(uint32_t p, uint32_t q, uint32_t cluster) {
+    if (p == q) return;
+    const uint32_t a = std::min(p, q), b = std::max(p, q);
+    const size_t mask = slots_.size() - 1;
+    size_t slot = ((a * uint64_t{0x9e3779b97f4a7c15u}) ^ (b * uint64_t{0xd6e8feb86659fd93u})) >> 32 & mask;
+    while (slots_[slot].cluster == cluster && (slots_[slot].a != a || slots_[slot].b != b)) slot = (slot + 1) & mask;
+    if (slots_[slot].cluster == cluster) {
+      slots_[slot].once = false;
+    } else {
+      slots_[slot] = {a, b, cluster, true};
+      found_.push_back(static_cast<uint32_t>(slot));
     }
   }
-  for (const Edge& e : edges)
-    if (e.uses == 1) out.push_back({e.a, e.b, cluster});
-}
+
+  const ClusterRuns& clusters_;
+  std::vector<Edge> slots_;
+  std::vector<uint32_t> found_; ///< slots of the cluster at hand
+};
 
 std::vector<BorderEdge> border_edges(const ClusterRuns& clusters) {
   constexpr size_t kBatch = 64;
   const size_t count = clusters.ends.size(), batches = (count + kBatch - 1) / kBatch;
   std::vector<std::vector<BorderEdge>> found(batches);
   tbb::parallel_for(size_t{0}, batches, [&](size_t batch) {
+    BorderFinder finder(clusters);
     for (size_t i = batch * kBatch; i < std::min(count, (batch + 1) * kBatch); ++i)
-      append_border(clusters, static_cast<uint32_t>(i), found[batch]);
+      finder.append(static_cast<uint32_t>(i), found[batch]);
   });
   std::vector<BorderEdge> edges;
   for (const auto& part : found) edges.insert(edges.end(), part.begin(), part.end());

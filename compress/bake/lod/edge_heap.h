@@ -30,11 +30,14 @@ public:
     if (!keys_.empty()) sink(0, last);
   }
 
-  /// Gives the top another cost. Returns whether it still is the top.
-  bool change_top(double cost) {
-    const uint64_t changed = key(cost, top());
-    sink(0, changed);
-    return keys_.front() == changed;
+  /// Those at the first places: the top, and some that may come soon.
+  static constexpr size_t kNear = 7;
+  size_t near_count() const { return std::min(kNear, keys_.size()); }
+  uint32_t near(size_t place) const { return static_cast<uint32_t>(keys_[place]); }
+  /// Gives one of them another cost; without order until near_changed() is called.
+  void change_near(size_t place, double cost) { keys_[place] = key(cost, near(place)); }
+  void near_changed() {
+    for (size_t i = near_count(); i-- > 0;) sink(i, keys_[i]);
   }
 
 private:

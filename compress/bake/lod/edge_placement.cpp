@@ -2,6 +2,9 @@
 
 namespace packtrace {
 
-void place_edges(EdgeBatch& batch) { place_four(batch); }
+void place_edges(const CollapsePoint* points, const PlacementRules& rules, const EdgeEnds* edges, uint64_t count,
+                 EdgePlacement* out) {
+  place_all(points, rules, edges, count, out);
+}
 
 } // namespace packtrace

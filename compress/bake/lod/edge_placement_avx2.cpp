@@ -5,7 +5,10 @@
 
 namespace packtrace::avx2 {
 
-void place_edges(EdgeBatch& batch) { place_four(batch); }
+void place_edges(const CollapsePoint* points, const PlacementRules& rules, const EdgeEnds* edges, uint64_t count,
+                 EdgePlacement* out) {
+  place_all(points, rules, edges, count, out);
+}
 
 } // namespace packtrace::avx2
 

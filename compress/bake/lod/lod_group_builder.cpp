@@ -10,6 +10,7 @@
 #include "compress/bake/lod/simplify.h"
 #include "compress/bake/lod/surface_bound.h"
 #include "compress/bake/morton.h"
+#include "compress/bake/renumbering.h"
 #include "compress/bake/weld_table.h"
 #include "compress/format/normal_codec.h"
 
@@ -46,18 +47,9 @@ private:
     return static_cast<uint32_t>(kWorthwhile * static_cast<double>(out_.source_triangles));
   }
 
-  /// A number for each value, 0, 1, ... in the order they come.
-  uint32_t local(WeldTable& table, std::vector<uint32_t>& values, uint32_t value) {
-    const auto next = static_cast<uint32_t>(values.size());
-    const uint32_t number =
-        table.find_or_add(mix_words(value, 0), next, [&](uint32_t other) { return values[other] == value; });
-    if (number == next) values.push_back(value);
-    return number;
-  }
-
   void gather() {
-    WeldTable point_table(3 * out_.source_triangles), wedge_table(3 * out_.source_triangles);
-    std::vector<uint32_t> wedge_vertices;
+    Renumbering point_numbers(out_.source_triangles), wedge_numbers(out_.source_triangles);
+    mesh_.triangles.reserve(out_.source_triangles);
     for (size_t i = 0; i < in_.clusters.size(); ++i) {
       const LodCluster& c = *in_.clusters[i];
       const TriangleKind& kind = in_.geometry.kinds[c.range.kind];
@@ -67,8 +59,8 @@ private:
         const Triangle& v = in_.triangles[c.range.first_triangle + k];
         LodTriangle t{{}, Triangle(Wedge::kNone), c.range.kind, in_.errors[c.range.first_triangle + k]};
         for (int corner = 0; corner < 3; ++corner) {
-          t.points[corner] = local(point_table, positions_, in_.vertices[v[corner]].position);
-          if (!plain) t.wedges[corner] = local(wedge_table, wedge_vertices, v[corner]);
+          t.points[corner] = point_numbers(in_.vertices[v[corner]].position);
+          if (!plain) t.wedges[corner] = wedge_numbers(v[corner]);
         }
         const bool line = t.points.x == t.points.y || t.points.y == t.points.z || t.points.z == t.points.x;
         if (!line)
@@ -77,7 +69,8 @@ private:
           lines_.push_back(t);
       }
     }
-    for (const uint32_t vertex : wedge_vertices)
+    positions_ = std::move(point_numbers.values);
+    for (const uint32_t vertex : wedge_numbers.values)
       mesh_.wedges.push_back({DVec3(decode_normal(encoding_, in_.vertices[vertex].normal_code)), vertex});
     place_points();
   }
@@ -103,8 +96,16 @@ private:
     }
   }
 
-  /// The vertex of a corner: an old one where nothing changed, else a new one.
+  /// The vertex of a corner, which mostly is that of the triangle's neighbours too.
   uint32_t vertex_number(uint32_t point, uint32_t wedge, const TriangleKind& kind) {
+    KnownVertex& known = known_vertices_[wedge == Wedge::kNone ? point : mesh_.points.size() + wedge];
+    if (known.point != point || known.wedge != wedge || known.flat != kind.flat)
+      known = {point, wedge, find_vertex(point, wedge, kind), kind.flat};
+    return known.vertex;
+  }
+
+  /// An old one where nothing changed, else a new one.
+  uint32_t find_vertex(uint32_t point, uint32_t wedge, const TriangleKind& kind) {
     QuantizedVertex v{position_number(point), 0, {}};
     if (wedge != Wedge::kNone) {
       const Wedge& w = mesh_.wedges[wedge];
@@ -140,6 +141,8 @@ private:
   void number_vertices() {
     WeldTable table(3 * mesh_.triangles.size());
     vertex_table_ = &table;
+    known_vertices_.resize(mesh_.points.size() + mesh_.wedges.size());
+    vertices_.reserve(mesh_.triangles.size());
     new_position_.assign(mesh_.points.size(), Wedge::kNone);
     for (const LodTriangle& t : mesh_.triangles) {
       Triangle v{};
@@ -177,18 +180,17 @@ private:
   }
 
   void split_kind(uint32_t kind, const std::vector<uint32_t>& triangles) {
-    std::vector<uint32_t> numbers;
-    WeldTable table(3 * triangles.size());
+    Renumbering numbers(triangles.size());
     std::vector<Triangle> vertices, points;
     std::vector<DVec3> centroids;
     for (const uint32_t triangle : triangles) {
       Triangle v{};
-      for (int corner = 0; corner < 3; ++corner) v[corner] = local(table, numbers, vertices_[triangle][corner]);
+      for (int corner = 0; corner < 3; ++corner) v[corner] = numbers(vertices_[triangle][corner]);
       vertices.push_back(v);
       points.push_back(mesh_.triangles[triangle].points);
       centroids.push_back(corner_sum(triangle));
     }
-    const Clusters clusters = clusterize({vertices, points, centroids, static_cast<uint32_t>(numbers.size()),
+    const Clusters clusters = clusterize({vertices, points, centroids, static_cast<uint32_t>(numbers.values.size()),
                                           static_cast<uint32_t>(mesh_.points.size())});
     const auto before = static_cast<uint32_t>(out_.triangles.size());
     for (const uint32_t member : clusters.order) {
@@ -199,6 +201,12 @@ private:
       out_.cluster_ends.push_back(before + end), out_.cluster_kinds.push_back(kind);
   }
 
+  /// The vertex that a point's corners without wedge have, or those of a wedge.
+  struct KnownVertex {
+    uint32_t point = Wedge::kNone, wedge = 0, vertex = 0;
+    bool flat = false;
+  };
+
   const LodGroupInput& in_;
   NormalEncoding encoding_;
   SimplifiedGroup out_;
@@ -206,9 +214,10 @@ private:
   std::vector<LodTriangle> lines_; // triangles with two corners in one place
   LatticePoint center_{};
   bool keep_points_ = false;
-  std::vector<uint32_t> positions_;    // of each point
-  std::vector<uint32_t> new_position_; // of each point that moved
-  std::vector<Triangle> vertices_;     // of each triangle that is left
+  std::vector<uint32_t> positions_;         // of each point
+  std::vector<uint32_t> new_position_;      // of each point that moved
+  std::vector<Triangle> vertices_;          // of each triangle that is left
+  std::vector<KnownVertex> known_vertices_; // by point, then by wedge
   WeldTable* vertex_table_ = nullptr;
 };
 

@@ -7,6 +7,7 @@
 
 #include "compress/bake/lod/surface_side.h"
 #include "compress/bake/lod/surface_walk.h"
+#include "compress/bake/lod/triangle_images.h"
 #include "compress/bake/lod/triangle_refiner.h"
 
 namespace packtrace {
@@ -14,32 +15,38 @@ namespace {
 
 constexpr double kSeen = 0.02;       // of a new triangle's area may be met by no old one
 constexpr double kInflation = 1.001; // of what was measured, for all roundings
-constexpr uint8_t kBack = 2;         // covered, but from behind
 constexpr double kFine = 0.5;        // steps; distances below need no work
 constexpr double kSlack = 1.1;       // how much larger than it must be the error of a group may be stated to save work
 
 using Corners = std::array<DVec3, 3>;
 
-/// A triangle before that lies over those after: pieces_[first .. first + count).
+/// A triangle before whose image is known, or that lies over those after: pieces_[first .. first + count).
 struct Laid {
-  double stated; ///< what it makes the error at least
-  uint32_t triangle, first, count;
-  bool operator<(const Laid& o) const { return stated != o.stated ? stated < o.stated : triangle > o.triangle; }
+  uint32_t triangle;
+  bool settled = false; ///< something better is known than what it says
+  TriangleImages::Image image;
+};
+
+/// What a triangle makes the error at least, as far as laid_[index] knows.
+struct Claim {
+  double stated;
+  uint32_t index;
+  bool operator<(const Claim& o) const { return stated != o.stated ? stated < o.stated : index > o.index; }
 };
 
 class Measurer {
 public:
   Measurer(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh)
-      : m_(mesh), before_({points, triangles}, [&](uint32_t p) { return mesh.stands_for[p]; }),
-        after_({mesh.points, mesh.triangles}, [](uint32_t p) { return p; }), walk_(before_.surface(), after_, mesh),
-        errors_(mesh.triangles.size()), seen_(mesh.triangles.size()), covered_(mesh.triangles.size()),
-        mapped_(triangles.size()), unchanged_(triangles.size()) {}
+      : m_(mesh), before_({points, triangles}, mesh.stands_for), after_({mesh.points, mesh.triangles}),
+        walk_(before_.surface(), after_, mesh), images_(walk_, mesh), errors_(mesh.triangles.size()),
+        seen_(mesh.triangles.size()), covered_(mesh.triangles.size()), mapped_(triangles.size()),
+        unchanged_(triangles.size()) {}
 
   void run() {
     after_.link();
     find_unchanged();
-    pieces_.reserve(7 * unchanged_.size());
     laid_.reserve(unchanged_.size());
+    claims_.reserve(unchanged_.size());
     for (uint32_t t = 0; t < unchanged_.size(); ++t)
       if (unchanged_[t] == 0) lay_over_after(t);
     settle();
@@ -49,7 +56,7 @@ public:
       measure_harder(t, std::numeric_limits<double>::infinity());
     }
     for (uint32_t s = 0; s < errors_.size(); ++s)
-      if (covered_[s] != 1 && seen_[s] < 1.0 - kSeen) lay_over_before(s);
+      if ((covered_[s] & TriangleImages::kWhole) == 0 && seen_[s] < 1.0 - kSeen) lay_over_before(s);
     for (size_t s = 0; s < errors_.size(); ++s) m_.triangles[s].error = errors_[s];
   }
 
@@ -74,35 +81,50 @@ private:
       if (now != before_.surface().triangles[t].points || m_.moved[now.x] + m_.moved[now.y] + m_.moved[now.z] != 0)
         continue;
       unchanged_[t] = mapped_[t] = 1;
+      covered_[s] = TriangleImages::kFront;
       seen_[s] = 1.0;
       note(s, 0.0, had(t));
     }
   }
 
   void lay_over_after(uint32_t t) {
-    const auto first = static_cast<uint32_t>(pieces_.size());
-    mapped_[t] = walk_.lay(t, SurfaceWalk::Look::kAtImages, pieces_);
+    Laid laid{t, false, {}};
+    mapped_[t] = images_.find(t, laid.image);
     if (mapped_[t] == 0) {
       after_.gather(before_.corner_points(t));
+      laid.image.first = static_cast<uint32_t>(pieces_.size());
       if (!after_.lay(before_.corners(t), before_.surface().area_normal(t), pieces_)) {
         not_covered_.push_back(t);
         return;
       }
+      laid.image.count = static_cast<uint32_t>(pieces_.size()) - laid.image.first;
+      laid.image.distance = largest_of(laid);
     }
+    if (laid.image.distance > kFine)
+      claims_.push_back({stated(laid.image.distance, had(t)), static_cast<uint32_t>(laid_.size())});
+    laid_.push_back(laid);
+  }
+
+  std::span<const OverlayPiece> pieces_of(const Laid& laid) const {
+    return std::span(pieces_).subspan(laid.image.first, laid.image.count);
+  }
+
+  double largest_of(const Laid& laid) const {
     double largest = 0.0;
-    for (size_t i = first; i < pieces_.size(); ++i) largest = std::max(largest, pieces_[i].distance);
-    laid_.push_back(
-        {largest <= kFine ? 0.0 : stated(largest, had(t)), t, first, static_cast<uint32_t>(pieces_.size() - first)});
+    for (const OverlayPiece& piece : pieces_of(laid)) largest = std::max(largest, piece.distance);
+    return largest;
   }
 
   /// The worst first: what they really are leaves most others as they are.
   void settle() {
-    std::make_heap(laid_.begin(), laid_.end());
-    while (!laid_.empty() && laid_.front().stated > std::max(largest_, kSlack * proven_)) {
-      std::pop_heap(laid_.begin(), laid_.end());
-      const uint32_t t = laid_.back().triangle;
-      laid_.pop_back();
-      if (look_closer_at_image(t)) continue;
+    std::make_heap(claims_.begin(), claims_.end());
+    while (!claims_.empty() && claims_.front().stated > std::max(largest_, kSlack * proven_)) {
+      std::pop_heap(claims_.begin(), claims_.end());
+      Laid& laid = laid_[claims_.back().index];
+      claims_.pop_back();
+      laid.settled = true;
+      const uint32_t t = laid.triangle;
+      if (look_closer_at_image(laid)) continue;
       mapped_[t] = 0;
       after_.gather(before_.corner_points(t));
       best_.clear();
@@ -113,54 +135,82 @@ private:
       else
         measure_harder(t, distance);
     }
-    for (const Laid& laid : laid_) accept(laid);
-    for (const Laid& laid : looked_) accept(laid);
-    walk_.find_borders(mapped_, covered_);
-    for (const Laid& laid : laid_) add_shares(laid);
-    for (const Laid& laid : looked_) add_shares(laid);
-  }
-
-  /// What images cover, each seen from the side that it faces, needs no measuring of its own.
-  void accept(const Laid& laid) {
-    const bool mapped = mapped_[laid.triangle] != 0;
-    const DVec3 normal = mapped ? before_.surface().area_normal(laid.triangle) : DVec3(0.0);
-    const double had = this->had(laid.triangle);
-    for (const OverlayPiece& piece : std::span(pieces_).subspan(laid.first, laid.count)) {
-      note(piece.triangle, piece.distance, had);
-      seen_[piece.triangle] += piece.share;
-      if (!mapped) continue;
-      uint8_t& covered = covered_[piece.triangle];
-      if (!(glm::dot(normal, walk_.area_normal(piece.triangle)) > 0.0))
-        covered = kBack;
-      else if (covered == 0)
-        covered = 1;
-    }
+    edge_had_.assign(walk_.ways().size(), -1.0);
+    point_had_.assign(before_.surface().points.size(), -1.0);
+    for (const Laid& laid : laid_)
+      if (mapped_[laid.triangle] != 0)
+        see_image(laid);
+      else if (!laid.settled)
+        accept(pieces_of(laid), laid.triangle);
+    accept_ways();
+    for (const double error : errors_) largest_ = std::max(largest_, error);
+    images_.find_covered(mapped_, covered_);
+    for (const Laid& laid : laid_)
+      if (mapped_[laid.triangle] != 0) add_shares(laid);
   }
 
   /// Where borders cross, the area says what images cover.
   void add_shares(const Laid& laid) {
-    if (mapped_[laid.triangle] == 0) return;
-    const auto pieces = std::span(pieces_).subspan(laid.first, laid.count);
-    if (std::all_of(pieces.begin(), pieces.end(), [&](const OverlayPiece& p) { return covered_[p.triangle] == 1; }))
-      return;
-    best_.clear();
-    walk_.lay(laid.triangle, SurfaceWalk::Look::kShares, best_);
-    for (const OverlayPiece& piece : best_) seen_[piece.triangle] += piece.share;
+    const auto met = images_.met(laid.image);
+    if (std::any_of(met.begin(), met.end(), [&](uint32_t s) { return (covered_[s] & TriangleImages::kWhole) == 0; }))
+      images_.add_shares(laid.triangle, seen_);
+  }
+
+  /// What images cover, each seen from the side that it faces, needs no measuring of its own. Distances inside are
+  /// noted here; ways and corners are shared with neighbours.
+  void see_image(const Laid& laid) {
+    const uint32_t t = laid.triangle;
+    const Triangle& p = before_.surface().triangles[t].points;
+    const std::span<const DVec3> points = before_.surface().points;
+    const DVec3 normal = glm::cross(points[p.y] - points[p.x], points[p.z] - points[p.x]);
+    const double had = this->had(t), inside = laid.settled ? 0.0 : stated(laid.image.inside, had);
+    for (const uint32_t s : images_.met(laid.image)) {
+      covered_[s] |= glm::dot(normal, walk_.area_normal(s)) > 0.0 ? TriangleImages::kFront : TriangleImages::kBack;
+      errors_[s] = std::max(errors_[s], inside);
+    }
+    if (laid.settled) return;
+    for (int i = 0; i < 3; ++i) {
+      double& of_edge = edge_had_[m_.side_edges[3 * size_t{t} + static_cast<size_t>(i)]];
+      of_edge = std::max(of_edge, had);
+      point_had_[p[i]] = std::max(point_had_[p[i]], had);
+    }
+  }
+
+  /// The distances at crossings and corners of images, for the triangles after on both sides.
+  void accept_ways() {
+    for (uint32_t e = 0; e < edge_had_.size(); ++e) {
+      const SurfaceWalk::Way& way = walk_.ways()[e];
+      if (edge_had_[e] < 0.0 || way.state != SurfaceWalk::Way::State::kAcross) continue;
+      uint32_t from = way.start;
+      for (uint32_t k = way.first; k < way.first + way.count; ++k) {
+        const double error = stated(std::sqrt(walk_.crossing(k).distance2), edge_had_[e]);
+        const uint32_t into = walk_.into(k);
+        errors_[from] = std::max(errors_[from], error);
+        errors_[into] = std::max(errors_[into], error);
+        from = into;
+      }
+    }
+    for (uint32_t p = 0; p < point_had_.size(); ++p) {
+      if (point_had_[p] < 0.0) continue;
+      const SurfaceWalk::Place& place = walk_.place(p);
+      const double error = stated(std::sqrt(place.distance2), point_had_[p]);
+      if (place.state == SurfaceWalk::Place::State::kTriangle)
+        errors_[place.number] = std::max(errors_[place.number], error);
+      else if (place.distance2 > 0.0)
+        for (const uint32_t s : after_.around(place.number)) errors_[s] = std::max(errors_[s], error);
+    }
   }
 
   /// Images may be far from what they are images of where the surface is steep; the nearest point is what counts.
-  bool look_closer_at_image(uint32_t t) {
+  bool look_closer_at_image(const Laid& laid) {
+    const uint32_t t = laid.triangle;
     if (mapped_[t] == 0) return false;
-    const auto first = static_cast<uint32_t>(pieces_.size());
-    walk_.lay(t, SurfaceWalk::Look::kCloser, pieces_);
+    best_.clear();
+    images_.look_closer(t, best_);
     double largest = 0.0;
-    for (size_t i = first; i < pieces_.size(); ++i) largest = std::max(largest, pieces_[i].distance);
-    if (!enough(largest, had(t))) {
-      pieces_.resize(first);
-      return false;
-    }
-    largest_ = std::max(largest_, stated(largest, had(t)));
-    looked_.push_back({stated(largest, had(t)), t, first, static_cast<uint32_t>(pieces_.size() - first)});
+    for (const OverlayPiece& piece : best_) largest = std::max(largest, piece.distance);
+    if (!enough(largest, had(t))) return false;
+    accept(t);
     return true;
   }
 
@@ -174,8 +224,10 @@ private:
     return largest;
   }
 
-  void accept(uint32_t t) {
-    for (const OverlayPiece& piece : best_) {
+  void accept(uint32_t t) { accept(best_, t); }
+
+  void accept(std::span<const OverlayPiece> pieces, uint32_t t) {
+    for (const OverlayPiece& piece : pieces) {
       note(piece.triangle, piece.distance, had(t));
       seen_[piece.triangle] += piece.share;
     }
@@ -291,13 +343,16 @@ private:
   SimplifyMesh& m_;
   SurfaceSide before_, after_;
   SurfaceWalk walk_;
+  TriangleImages images_;
   std::vector<double> errors_;   ///< of triangles after
   std::vector<double> seen_;     ///< share of each triangle after that was met
-  std::vector<uint8_t> covered_; ///< per triangle after: images of those before cover it
+  std::vector<uint8_t> covered_; ///< per triangle after: bits of TriangleImages
   std::vector<uint8_t> mapped_;  ///< per triangle before: what is said of it holds for its image
   std::vector<uint8_t> unchanged_;
   std::vector<OverlayPiece> pieces_;
-  std::vector<Laid> laid_, looked_;
+  std::vector<Laid> laid_;
+  std::vector<Claim> claims_;                ///< a heap
+  std::vector<double> edge_had_, point_had_; ///< the largest that accepted images at it had, or negative
   std::vector<uint32_t> not_covered_;
   std::vector<OverlayPiece> best_, second_, refined_; ///< of the triangle at hand
   TriangleRefiner refiner_;

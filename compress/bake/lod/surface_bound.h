@@ -11,10 +11,9 @@ namespace packtrace {
 /// error of one after, and every point of a triangle after within its error of the surface before, plus what the
 /// triangles before it already had. So errors stay distances to the original surface, however often this is done.
 ///
-/// Each triangle before is laid over those after that its corners became part of: the distance of its points from one
-/// of them is convex, so it is largest at the corners of the pieces into which their outlines cut it. What is covered
-/// by none, at borders that moved and in folds, is cut finer and measured alike. Source: Jonathan Cohen, Dinesh Manocha
-/// and Marc Olano, Simplifying Polygonal Models Using Successive Mappings, 1997 (the idea of overlaying both surfaces).
+/// Each triangle before is mapped onto those after (TriangleImages), or laid over those that its corners became part
+/// of: the distance of its points from one of them is convex, so it is largest at the corners of the pieces into which
+/// their outlines cut it. What is covered by none, at borders that moved and in folds, is cut finer and measured alike.
 /// @param points, triangles before; mesh.points and mesh.stands_for number the same points. Behind those that
 /// simplify() had there may be more, whose corners need not be distinct.
 void bound_errors(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh);

@@ -14,8 +14,8 @@ void SurfaceSide::link() {
   if (!first_.empty()) return;
   stamp_.resize(surface_.triangles.size());
   const auto for_each = [&](const auto& visit) {
-    for (uint32_t i = 0; i < corner_points_.size(); ++i) {
-      const Triangle& t = corner_points_[i];
+    for (uint32_t i = 0; i < surface_.triangles.size(); ++i) {
+      const Triangle t = corner_points(i);
       visit(t.x, i);
       if (t.y != t.x) visit(t.y, i);
       if (t.z != t.x && t.z != t.y) visit(t.z, i);
@@ -45,9 +45,8 @@ void SurfaceSide::gather(const Triangle& corners) {
 void SurfaceSide::add_large_fan(std::span<const uint32_t> fan, const Triangle& corners, int corner) {
   size_t added = 0;
   for (size_t k = 0; k < fan.size() && added < kLargeFan; ++k)
-    for (int i = 0; i < 3; ++i)
-      if (const uint32_t p = corner_points_[fan[k]][i];
-          p != corners[corner] && (p == corners.x || p == corners.y || p == corners.z)) {
+    for (const Triangle around = corner_points(fan[k]); const uint32_t p : {around.x, around.y, around.z})
+      if (p != corners[corner] && (p == corners.x || p == corners.y || p == corners.z)) {
         add(fan[k]), ++added;
         break;
       }
@@ -58,7 +57,7 @@ void SurfaceSide::widen() {
   const size_t count = candidates_.size();
   for (size_t i = 0; i < count; ++i)
     for (int k = 0; k < 3; ++k)
-      if (const auto around = fan(corner_points_[candidates_[i]][k]); around.size() <= kLargeFan)
+      if (const auto around = fan(corner_points(candidates_[i])[k]); around.size() <= kLargeFan)
         for (const uint32_t t : around) add(t);
 }
 
@@ -66,7 +65,7 @@ void SurfaceSide::gather_within(const std::array<DVec3, 3>& triangle, double dis
   candidates_.clear();
   const DVec3 lo = glm::min(glm::min(triangle[0], triangle[1]), triangle[2]) - distance;
   const DVec3 hi = glm::max(glm::max(triangle[0], triangle[1]), triangle[2]) + distance;
-  for (uint32_t t = 0; t < corner_points_.size(); ++t) {
+  for (uint32_t t = 0; t < surface_.triangles.size(); ++t) {
     const DVec3 &a = surface_.corner(t, 0), &b = surface_.corner(t, 1), &c = surface_.corner(t, 2);
     const DVec3 least = glm::min(glm::min(a, b), c), most = glm::max(glm::max(a, b), c);
     if (least.x <= hi.x && least.y <= hi.y && least.z <= hi.z && most.x >= lo.x && most.y >= lo.y && most.z >= lo.z)
@@ -76,7 +75,7 @@ void SurfaceSide::gather_within(const std::array<DVec3, 3>& triangle, double dis
 
 void SurfaceSide::gather_near(DVec3 point) {
   constexpr size_t kTried = 16;
-  std::vector<std::pair<double, uint32_t>> near(corner_points_.size());
+  std::vector<std::pair<double, uint32_t>> near(surface_.triangles.size());
   for (uint32_t t = 0; t < near.size(); ++t) {
     const DVec3 d = surface_.corner(t, 0) - point;
     near[t] = {glm::dot(d, d), t};

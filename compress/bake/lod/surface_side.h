@@ -13,17 +13,17 @@ namespace packtrace {
 /// as what they became.
 class SurfaceSide {
 public:
-  template <typename PointOf>
-  SurfaceSide(const OverlaySurface& surface, const PointOf& point_of) : surface_(surface), overlay_(surface) {
-    corner_points_.reserve(surface.triangles.size());
-    for (const LodTriangle& t : surface.triangles)
-      corner_points_.emplace_back(point_of(t.points.x), point_of(t.points.y), point_of(t.points.z));
-  }
+  /// @param became per point: its number after; none: they are points after
+  explicit SurfaceSide(const OverlaySurface& surface, std::span<const uint32_t> became = {})
+      : surface_(surface), became_(became), overlay_(surface) {}
   void link(); ///< before anything is asked about what is around points
 
   const OverlaySurface& surface() const { return surface_; }
   Overlay& overlay() { return overlay_; }
-  const Triangle& corner_points(uint32_t triangle) const { return corner_points_[triangle]; }
+  Triangle corner_points(uint32_t triangle) const {
+    const Triangle& t = surface_.triangles[triangle].points;
+    return became_.empty() ? t : Triangle(became_[t.x], became_[t.y], became_[t.z]);
+  }
   std::array<DVec3, 3> corners(uint32_t triangle) const {
     return {surface_.corner(triangle, 0), surface_.corner(triangle, 1), surface_.corner(triangle, 2)};
   }
@@ -52,8 +52,8 @@ private:
   }
 
   OverlaySurface surface_;
+  std::span<const uint32_t> became_;
   Overlay overlay_;
-  std::vector<Triangle> corner_points_;
   std::vector<uint32_t> first_, fans_; ///< triangles around points
   std::vector<uint32_t> stamp_, candidates_;
   uint32_t stamp_value_ = 0;

@@ -166,60 +166,84 @@ TEST(EdgeHeap, GivesEdgesByCostThenNumber) {
     heap.pop();
   }
   EXPECT_TRUE(heap.empty());
-  for (uint32_t i = 0; i < 3; ++i) heap.add(i, i);
-  heap.sort();
-  EXPECT_TRUE(heap.change_top(0.5));
-  EXPECT_FALSE(heap.change_top(1.5));
-  EXPECT_EQ(heap.top(), 1u);
 }
 
-EdgeBatch random_batch(Random& random) {
-  EdgeBatch batch{};
-  for (int lane = 0; lane < 4; ++lane) {
-    for (int plane = 0; plane < 5; ++plane) { // a sum of squared distances to planes
-      const double n[4] = {random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-9, 9)};
-      for (int i = 0, k = 0; i < 3; ++i)
-        for (int l = i; l < 3; ++l) batch.quadric[k++][lane] += n[i] * n[l];
-      for (int i = 0; i < 3; ++i) batch.quadric[6 + i][lane] += n[i] * n[3];
-      batch.quadric[9][lane] += n[3] * n[3];
-    }
-    for (int axis = 0; axis < 3; ++axis) {
-      batch.a[axis][lane] = std::round(random.uniform(-20, 20));
-      batch.b[axis][lane] = std::round(random.uniform(-20, 20));
-      batch.lo[axis] = -30.0, batch.hi[axis] = 30.0;
-    }
-    batch.keep[lane] = static_cast<double>(random.bits() % 3);
+TEST(EdgeHeap, OrdersEdgesWhoseCostsChange) {
+  EdgeHeap heap;
+  for (uint32_t i = 0; i < 40; ++i) heap.add(i, i);
+  heap.sort();
+  ASSERT_EQ(heap.near_count(), EdgeHeap::kNear);
+  std::vector<float> cost(40);
+  for (uint32_t i = 0; i < cost.size(); ++i) cost[i] = static_cast<float>(i);
+  for (size_t place = 0; place < heap.near_count(); ++place) { // some dearer, some cheaper
+    cost[heap.near(place)] = place % 2 == 0 ? 20.5f + static_cast<float>(place) : 0.25f;
+    heap.change_near(place, cost[heap.near(place)]);
   }
-  return batch;
+  heap.near_changed();
+  for (float last = 0.0f; !heap.empty(); heap.pop()) {
+    EXPECT_GE(cost[heap.top()], last);
+    last = cost[heap.top()];
+  }
 }
+
+/// Edges between points of random quadrics, some of them held.
+struct PlacementTask {
+  explicit PlacementTask(Random& random) {
+    for (CollapsePoint& p : points) {
+      p = {};
+      for (int plane = 0; plane < 5; ++plane) { // a sum of squared distances to planes
+        const double n[4] = {random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1),
+                             random.uniform(-9, 9)};
+        for (int i = 0, k = 0; i < 3; ++i)
+          for (int l = i; l < 3; ++l) p.quadric[k++] += n[i] * n[l];
+        for (int i = 0; i < 3; ++i) p.quadric[6 + i] += n[i] * n[3];
+        p.quadric[9] += n[3] * n[3];
+      }
+      for (double& x : p.at) x = std::round(random.uniform(-20, 20));
+      p.held = static_cast<double>(random.bits() % 4);
+    }
+    for (int axis = 0; axis < 3; ++axis) rules.lo[axis] = -30.0, rules.hi[axis] = 30.0;
+    for (EdgeEnds& e : edges) e = {random.bits() % 4, 4 + random.bits() % 4};
+  }
+  void run(PlacementKernel kernel) { kernel(points.data(), rules, edges.data(), edges.size(), placed.data()); }
+
+  std::array<CollapsePoint, 8> points;
+  PlacementRules rules{};
+  std::array<EdgeEnds, 6> edges{}; // more than four, and not a multiple
+  std::array<EdgePlacement, 6> placed{};
+};
 
 TEST(EdgePlacement, IsNoWorseThanTheEnds) {
   Random random(9);
   for (int repeat = 0; repeat < 300; ++repeat) {
-    EdgeBatch batch = random_batch(random);
-    batch.ends_only = repeat % 3 == 0;
-    place_edges(batch);
-    for (int lane = 0; lane < 4; ++lane) {
-      const auto cost = [&](const double(*p)[4]) {
-        const double x = p[0][lane], y = p[1][lane], z = p[2][lane];
-        const auto q = [&](int i) { return batch.quadric[i][lane]; };
-        return x * x * q(0) + 2 * x * y * q(1) + 2 * x * z * q(2) + y * y * q(3) + 2 * y * z * q(4) + z * z * q(5) +
-               2 * (x * q(6) + y * q(7) + z * q(8)) + q(9);
+    PlacementTask task(random);
+    task.rules.ends_only = repeat % 3 == 0;
+    task.run(place_edges);
+    for (size_t e = 0; e < task.edges.size(); ++e) {
+      const CollapsePoint &a = task.points[task.edges[e].a], &b = task.points[task.edges[e].b];
+      const EdgePlacement& placed = task.placed[e];
+      const auto cost = [&](const double* p) {
+        const auto q = [&](int i) { return a.quadric[i] + b.quadric[i]; };
+        return p[0] * p[0] * q(0) + 2 * p[0] * p[1] * q(1) + 2 * p[0] * p[2] * q(2) + p[1] * p[1] * q(3) +
+               2 * p[1] * p[2] * q(4) + p[2] * p[2] * q(5) + 2 * (p[0] * q(6) + p[1] * q(7) + p[2] * q(8)) + q(9);
       };
-      EXPECT_NEAR(batch.cost[lane], cost(batch.point), 1e-8);
-      if (batch.keep[lane] != 2.0) {
-        EXPECT_LE(batch.cost[lane], cost(batch.a) + 1e-8);
-      }
-      if (batch.keep[lane] != 1.0) {
-        EXPECT_LE(batch.cost[lane], cost(batch.b) + 1e-8);
-      }
-      for (int axis = 0; axis < 3; ++axis) {
-        EXPECT_EQ(batch.point[axis][lane], std::round(batch.point[axis][lane]));
-        if (batch.keep[lane] == 1.0) {
-          EXPECT_EQ(batch.point[axis][lane], batch.a[axis][lane]);
-        }
-        if (batch.keep[lane] == 2.0) {
-          EXPECT_EQ(batch.point[axis][lane], batch.b[axis][lane]);
+      const auto is_at = [&](const CollapsePoint& p) {
+        return placed.at[0] == p.at[0] && placed.at[1] == p.at[1] && placed.at[2] == p.at[2];
+      };
+      EXPECT_NEAR(placed.cost, cost(placed.at), 1e-8);
+      for (const double x : placed.at) EXPECT_EQ(x, std::round(x));
+      // What is held more stays; of two that are locked nothing is asked.
+      if (a.held >= kLocked || (b.held < kLocked && a.held > b.held)) {
+        EXPECT_TRUE(is_at(a));
+        EXPECT_EQ(placed.along, 0.0);
+      } else if (b.held > a.held) {
+        EXPECT_TRUE(is_at(b));
+        EXPECT_EQ(placed.along, 1.0);
+      } else {
+        EXPECT_LE(placed.cost, cost(a.at) + 1e-8);
+        EXPECT_LE(placed.cost, cost(b.at) + 1e-8);
+        if (task.rules.ends_only) {
+          EXPECT_TRUE(is_at(a) || is_at(b));
         }
       }
     }
@@ -240,11 +264,9 @@ TEST(LodKernels, GiveTheSameBitsOnEveryProcessor) {
         block.ab[axis][lane] = random.uniform(-9, 9), block.ac[axis][lane] = random.uniform(-9, 9);
       }
   for (int repeat = 0; repeat < 200; ++repeat) {
-    EdgeBatch edges = random_batch(random), same_edges = edges;
-    place_edges(edges), avx2::place_edges(same_edges);
-    EXPECT_EQ(std::memcmp(edges.point, same_edges.point, sizeof edges.point), 0);
-    EXPECT_EQ(std::memcmp(edges.cost, same_edges.cost, sizeof edges.cost), 0);
-    EXPECT_EQ(std::memcmp(edges.along, same_edges.along, sizeof edges.along), 0);
+    PlacementTask edges(random), same_edges = edges;
+    edges.run(place_edges), same_edges.run(avx2::place_edges);
+    EXPECT_EQ(std::memcmp(edges.placed.data(), same_edges.placed.data(), sizeof edges.placed), 0);
 
     const DVec3 p = random_point(random);
     std::array<double, 20> far{}, same_far{};

@@ -1,0 +1,147 @@
+#include "compress/bake/lod/surface_edges.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "compress/bake/lod/quadric.h"
+
+namespace packtrace {
+namespace {
+
+constexpr uint32_t kNone = ~0u;
+constexpr double kBorderWeight = 8.0;  // of border planes against the triangles' own
+constexpr double kSeamWeight = 2.0;    // where the material changes
+constexpr double kCreaseWeight = 0.25; // where normals or texture coordinates change
+constexpr double kStayWeight = 1e-4; // of the point itself: where all is flat, short edges go first and none gets long
+
+/// An edge while more triangles at it are looked for.
+struct EdgeUse {
+  uint32_t next;     ///< edge of the same lower point
+  uint32_t triangle; ///< the first that has it
+  bool alone = true, seam = false, crease = false;
+};
+
+class EdgeFinder {
+public:
+  EdgeFinder(const SimplifyMesh& mesh, const SimplifyConfig& config)
+      : m_(mesh), config_(config), many_seams_(!mesh.wedges.empty()), stay_(mesh.points.size()),
+        first_(mesh.points.size(), kNone) {
+    for (const LodTriangle& t : mesh.triangles) many_seams_ |= t.kind != mesh.triangles[0].kind;
+  }
+
+  SurfaceEdges run() {
+    const size_t count = m_.triangles.size();
+    out_.points.resize(m_.points.size());
+    out_.area_normals.resize(count);
+    out_.side_edge.resize(3 * count);
+    out_.ends.reserve(2 * count);
+    uses_.reserve(2 * count);
+    for (uint32_t t = 0; t < count; ++t) {
+      add_plane(t);
+      const Triangle& p = m_.triangles[t].points;
+      out_.side_edge[3 * t] = find_edge(p.x, p.y, t);
+      out_.side_edge[3 * t + 1] = find_edge(p.y, p.z, t);
+      out_.side_edge[3 * t + 2] = find_edge(p.z, p.x, t);
+    }
+    add_edge_planes();
+    for (size_t i = 0; i < m_.points.size(); ++i) finish_point(i);
+    return std::move(out_);
+  }
+
+private:
+  void add(const Quadric& q, uint32_t point) {
+    static_assert(sizeof(Quadric) == sizeof(CollapsePoint::quadric));
+    double* sum = out_.points[point].quadric;
+    const double* from = &q.xx;
+    for (size_t i = 0; i < std::size(CollapsePoint{}.quadric); ++i) sum[i] += from[i];
+  }
+
+  void add_plane(uint32_t triangle) {
+    const Triangle& t = m_.triangles[triangle].points;
+    const DVec3 a = m_.points[t.x], n = glm::cross(m_.points[t.y] - a, m_.points[t.z] - a);
+    out_.area_normals[triangle] = n;
+    const double area = glm::length(n);
+    if (!(area > 0.0)) return;
+    Quadric q;
+    q.add_plane(n / area, a, area);
+    for (const uint32_t p : {t.x, t.y, t.z}) add(q, p), stay_[p] += kStayWeight * area;
+  }
+
+  uint32_t find_edge(uint32_t p, uint32_t q, uint32_t triangle) {
+    const uint32_t a = std::min(p, q), b = std::max(p, q);
+    uint32_t found = first_[a];
+    while (found != kNone && out_.ends[found].b != b) found = uses_[found].next;
+    if (found == kNone) {
+      found = static_cast<uint32_t>(uses_.size());
+      uses_.push_back({std::exchange(first_[a], found), triangle});
+      out_.ends.push_back({a, b});
+    } else {
+      uses_[found].alone = false;
+      if (many_seams_) join(found, triangle);
+    }
+    return found;
+  }
+
+  /// What changes at the edge, from its first triangle to this one.
+  void join(uint32_t edge, uint32_t triangle) {
+    EdgeUse& e = uses_[edge];
+    const LodTriangle &s = m_.triangles[e.triangle], &t = m_.triangles[triangle];
+    e.seam |= config_.seam_of_kind[s.kind] != config_.seam_of_kind[t.kind];
+    if (s.kind != t.kind) return;
+    const auto wedge_at = [](const LodTriangle& of, uint32_t point) {
+      for (int i = 0; i < 3; ++i)
+        if (of.points[i] == point) return of.wedges[i];
+      return Wedge::kNone;
+    };
+    const auto [a, b] = out_.ends[edge];
+    e.crease |= wedge_at(s, a) != wedge_at(t, a) || wedge_at(s, b) != wedge_at(t, b);
+  }
+
+  void add_edge_planes() {
+    for (uint32_t i = 0; i < uses_.size(); ++i) {
+      const EdgeUse& e = uses_[i];
+      const auto [a, b] = out_.ends[i];
+      if (e.alone) out_.points[a].held = out_.points[b].held = kOnBorder;
+      const double weight = e.alone ? kBorderWeight : e.seam ? kSeamWeight : e.crease ? kCreaseWeight : 0.0;
+      if (weight > 0.0) add_edge_plane(i, weight);
+    }
+  }
+
+  /// A plane through the edge, upright on its triangle.
+  void add_edge_plane(uint32_t edge, double weight) {
+    const auto [a, b] = out_.ends[edge];
+    const DVec3 along = m_.points[b] - m_.points[a];
+    const DVec3 side = glm::cross(along, out_.area_normals[uses_[edge].triangle]);
+    const double length = glm::length(side);
+    if (!(length > 0.0)) return;
+    Quadric q;
+    q.add_plane(side / length, m_.points[a], weight * glm::dot(along, along));
+    add(q, a);
+    add(q, b);
+  }
+
+  void finish_point(size_t i) {
+    CollapsePoint& out = out_.points[i];
+    Quadric stay;
+    stay.add_point(m_.points[i], stay_[i]);
+    add(stay, static_cast<uint32_t>(i));
+    for (int axis = 0; axis < 3; ++axis) out.at[axis] = m_.points[i][axis];
+    if (m_.locked[i] != 0) out.held += kLocked;
+  }
+
+  const SimplifyMesh& m_;
+  const SimplifyConfig& config_;
+  bool many_seams_;             ///< there are wedges, or kinds of triangles
+  std::vector<double> stay_;    ///< per point: the weight of the point itself
+  std::vector<uint32_t> first_; ///< per point: the last edge of which it is the lower one
+  std::vector<EdgeUse> uses_;   ///< per edge
+  SurfaceEdges out_;
+};
+
+} // namespace
+
+SurfaceEdges find_surface_edges(const SimplifyMesh& mesh, const SimplifyConfig& config) {
+  return EdgeFinder(mesh, config).run();
+}
+
+} // namespace packtrace

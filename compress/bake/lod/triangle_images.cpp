@@ -1,0 +1,296 @@
+#include "compress/bake/lod/triangle_images.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "compress/bake/lod/triangle_distance.h"
+
+namespace packtrace {
+namespace {
+
+using Place = SurfaceWalk::Place;
+using Way = SurfaceWalk::Way;
+
+} // namespace
+
+/// Follows the outline's image through triangles after. False where it is not all there, or too long.
+/// @param visitor told in order: begin(after), then corner(0), cross(crossing, into), corner(1), ... corner(0) again;
+/// turn(after, i) where it goes on around corner i
+template <typename Visitor>
+bool TriangleImages::follow(uint32_t triangle, Visitor& visitor) {
+  const Triangle& p = points(triangle);
+  const uint32_t* edge = edges(triangle);
+  const Way* ways[3];
+  uint32_t starts[3];
+  for (int i = 0; i < 3; ++i) {
+    const uint32_t a = p[i], b = p[i == 2 ? 0 : i + 1];
+    const Way& w = walk_.way(edge[i], a, b);
+    if (w.state == Way::State::kNowhere) return false;
+    ways[i] = &w;
+    if (a < b || (w.state == Way::State::kAcross && w.count == 0))
+      starts[i] = w.start;
+    else
+      starts[i] = w.state == Way::State::kAlong ? w.right : walk_.into(w.first + w.count - 1);
+    if (starts[i] == kNone) return false;
+  }
+  uint32_t steps = 1, last = starts[0];
+  visitor.begin(last);
+  visitor.corner(0);
+  for (int side = 0; side < 3; ++side) {
+    const int next = side == 2 ? 0 : side + 1;
+    const Way& w = *ways[side];
+    if (steps + w.count + 1 > kMost) return false;
+    steps += w.count;
+    if (p[side] < p[next])
+      for (uint32_t k = 0; k < w.count; ++k) visitor.cross(w.first + k, last = walk_.into(w.first + k));
+    else
+      for (uint32_t k = w.count; k-- > 0;)
+        visitor.cross(w.first + k, last = k == 0 ? w.start : walk_.into(w.first + k - 1));
+    visitor.corner(next);
+    const Place& end = walk_.place(p[next]);
+    if (end.state != Place::State::kPoint) continue;
+    // Around a corner that is a point after, inside the triangle before.
+    while (last != starts[next]) {
+      last = walk_.across(last, end.number);
+      if (last == kNone || ++steps == kMost) return false;
+      visitor.turn(last, next);
+    }
+  }
+  return true;
+}
+
+/// Whether the outline's image bounds a disk around one point at most. First what it goes into and comes back from is
+/// cut off: both ends of a straight cut lie in both triangles. What then is left of it goes around a point.
+/// @param inside set to that point, or kNone
+bool TriangleImages::contract(std::span<const uint32_t> outline, uint32_t& inside) const {
+  std::array<uint32_t, kMost> word;
+  size_t begin = 0, end = 0;
+  for (const uint32_t t : outline) {
+    if (end >= 1 && word[end - 1] == t) continue;
+    if (end >= 2 && word[end - 2] == t)
+      --end;
+    else
+      word[end++] = t;
+  }
+  for (bool changed = true; changed && end - begin > 2;) {
+    changed = true;
+    if (word[begin] == word[end - 1])
+      --end;
+    else if (word[begin] == word[end - 2])
+      end -= 2;
+    else if (word[begin + 1] == word[end - 1])
+      begin += 2;
+    else
+      changed = false;
+  }
+  inside = kNone;
+  if (end - begin <= 2) return true;
+  for (uint32_t i = 0; i < 3; ++i) {
+    const uint32_t point = walk_.point_at(4 * word[begin] + i);
+    size_t k = begin + 1;
+    while (k < end && walk_.has(word[k], point)) ++k;
+    if (k < end) continue;
+    inside = point;
+    return true;
+  }
+  return false;
+}
+
+double TriangleImages::distance2_from(uint32_t triangle, const DVec3& point) const {
+  const OverlaySurface& before = walk_.before();
+  const DVec3 d =
+      point - nearest_point(point, before.corner(triangle, 0), before.corner(triangle, 1), before.corner(triangle, 2));
+  return glm::dot(d, d);
+}
+
+bool TriangleImages::find(uint32_t triangle, Image& out) {
+  if (3 * size_t{triangle} >= mesh_.side_edges.size()) return false;
+  if (met_count_ + kMost > met_.size()) met_.resize(2 * met_.size());
+  struct Collector {
+    uint32_t* triangles;
+    uint32_t count = 0;
+    void begin(uint32_t t) { triangles[count++] = t; }
+    void cross(uint32_t, uint32_t t) { begin(t); }
+    void corner(int) {}
+    void turn(uint32_t t, int) { begin(t); }
+  } outline{&met_[met_count_]};
+  uint32_t inside = kNone;
+  if (!follow(triangle, outline)) return false;
+  if (outline.count > 2 && !contract({outline.triangles, outline.count}, inside)) return false;
+  const Triangle& p = points(triangle);
+  const uint32_t* edge = edges(triangle);
+  double distance2 = 0.0, inside2 = 0.0;
+  for (int i = 0; i < 3; ++i)
+    distance2 = std::max(distance2, std::max(walk_.ways()[edge[i]].distance2, walk_.place(p[i]).distance2));
+  if (inside != kNone) inside2 = distance2_from(triangle, walk_.point(inside));
+  out = {std::sqrt(std::max(distance2, inside2)), std::sqrt(inside2), met_count_, outline.count};
+  met_count_ += outline.count;
+  return true;
+}
+
+void TriangleImages::look_closer(uint32_t triangle, std::vector<OverlayPiece>& pieces) {
+  struct Measurer {
+    TriangleImages& images;
+    uint32_t before;
+    Word word;
+    std::array<double, kMost> distances2;
+    DVec3 point; ///< where it was last, before and after
+    DVec3 image;
+    double of_both;
+
+    void begin(uint32_t after) {
+      word.triangles[word.count] = after;
+      distances2[word.count++] = 0.0;
+    }
+    /// Takes the last point into account for the triangle at hand.
+    void measure() {
+      const Triangle& t = images.mesh_.triangles[word.triangles[word.count - 1]].points;
+      const SurfaceWalk& walk = images.walk_;
+      const DVec3 there = point - nearest_point(point, walk.point(t.x), walk.point(t.y), walk.point(t.z));
+      const double larger2 = std::max(glm::dot(there, there), images.distance2_from(before, image));
+      distances2[word.count - 1] = std::max(distances2[word.count - 1], std::min(of_both, larger2));
+    }
+    void take_place(int i) {
+      const uint32_t number = images.points(before)[i];
+      const Place& place = images.walk_.place(number);
+      point = images.walk_.before().points[number], image = place.at, of_both = place.distance2;
+    }
+    void corner(int i) {
+      take_place(i);
+      measure();
+    }
+    void turn(uint32_t after, int i) {
+      take_place(i);
+      begin(after);
+      measure();
+    }
+    void cross(uint32_t crossing, uint32_t into) {
+      const SurfaceWalk::Crossing& c = images.walk_.crossing(crossing);
+      const Triangle& p = images.points(before);
+      const uint32_t* edge = images.edges(before);
+      int side = 0; // whose way it is part of
+      for (; side < 2; ++side)
+        if (const Way& w = images.walk_.ways()[edge[side]]; crossing - w.first < w.count) break;
+      const uint32_t a = p[side], b = p[side == 2 ? 0 : side + 1];
+      const DVec3 &low = images.walk_.before().points[std::min(a, b)],
+                  &high = images.walk_.before().points[std::max(a, b)];
+      point = low + c.on * (high - low), image = c.point(), of_both = c.distance2;
+      measure();
+      begin(into);
+      measure();
+    }
+  } outline{*this, triangle, {}, {}, {}, {}, 0.0};
+  uint32_t inside = kNone;
+  if (!follow(triangle, outline) || (outline.word.count > 2 && !contract(outline.word.view(), inside))) return;
+  const double inside2 = inside == kNone ? 0.0 : distance2_from(triangle, walk_.point(inside));
+  for (uint32_t i = 0; i < outline.word.count; ++i)
+    pieces.push_back({outline.word.triangles[i], std::sqrt(std::max(outline.distances2[i], inside2)), 0.0});
+}
+
+/// Twice the area of the image in an interval's triangle, along its normal, as far as the interval contributes to it;
+/// times twice the triangle's area.
+/// @param reference the point inside, if there is one, else any point
+double TriangleImages::area(uint32_t interval, const DVec3& reference) const {
+  const auto count = static_cast<uint32_t>(outline_.intervals.size() - 1);
+  const auto at = [&](uint32_t i) -> const Interval& { return outline_.intervals[i % count]; };
+  const uint32_t triangle = at(interval).triangle, end = outline_.intervals[interval + 1].first_point;
+  DVec3 sum(0.0);
+  for (uint32_t i = at(interval).first_point; i + 1 < end; ++i)
+    sum += glm::cross(outline_.points[i] - reference, outline_.points[i + 1] - reference);
+  uint32_t next = interval + 1;
+  while (at(next).triangle != triangle) ++next;
+  // Back through the side where it left: straight along it.
+  if (next == interval + 1 || at(interval + 1).triangle == at(next - 1).triangle)
+    sum += glm::cross(outline_.points[end - 1] - reference, outline_.points[at(next).first_point] - reference);
+  return glm::dot(sum, walk_.area_normal(triangle));
+}
+
+void TriangleImages::add_shares(uint32_t triangle, std::span<double> shares) {
+  struct Collector {
+    TriangleImages& images;
+    uint32_t before;
+    Word word;
+    void begin(uint32_t after) {
+      word.triangles[word.count++] = after;
+      images.outline_.intervals.push_back({after, static_cast<uint32_t>(images.outline_.points.size())});
+    }
+    void add(const DVec3& point) { images.outline_.points.push_back(point); }
+    void corner(int i) { add(images.walk_.place(images.points(before)[i]).at); }
+    void turn(uint32_t after, int i) {
+      begin(after);
+      corner(i);
+    }
+    void cross(uint32_t crossing, uint32_t into) {
+      add(images.walk_.crossing(crossing).point());
+      begin(into);
+      add(images.walk_.crossing(crossing).point());
+    }
+  } collector{*this, triangle, {}};
+  outline_.intervals.clear(), outline_.points.clear();
+  uint32_t inside = kNone;
+  if (!follow(triangle, collector) || (collector.word.count > 2 && !contract(collector.word.view(), inside))) return;
+  const auto count = static_cast<uint32_t>(outline_.intervals.size());
+  outline_.intervals.push_back({kNone, static_cast<uint32_t>(outline_.points.size())});
+  const DVec3 reference = inside == kNone ? outline_.points[0] : walk_.point(inside);
+  for (uint32_t i = 0; i < count; ++i) {
+    const uint32_t s = outline_.intervals[i].triangle;
+    const DVec3& n = walk_.area_normal(s);
+    shares[s] += area(i, reference) / glm::dot(n, n);
+  }
+}
+
+/// Marks triangles after that borders of images cross or go along.
+void TriangleImages::mark_borders(std::span<const uint8_t> mapped, std::span<uint8_t> covered) const {
+  const std::span<const Way> ways = walk_.ways();
+  std::vector<int32_t> balance(ways.size());
+  for (uint32_t t = 0; 3 * size_t{t} < mesh_.side_edges.size(); ++t) {
+    if (mapped[t] == 0) continue;
+    const Triangle& p = points(t);
+    const uint32_t* edge = edges(t);
+    balance[edge[0]] += p.x < p.y ? 1 : -1;
+    balance[edge[1]] += p.y < p.z ? 1 : -1;
+    balance[edge[2]] += p.z < p.x ? 1 : -1;
+  }
+  for (uint32_t e = 0; e < ways.size(); ++e) {
+    const Way& w = ways[e];
+    if (balance[e] == 0) continue;
+    if (w.state == Way::State::kAcross) {
+      covered[w.start] |= kCrossed;
+      for (uint32_t k = 0; k < w.count; ++k) covered[walk_.into(w.first + k)] |= kCrossed;
+    } else if (const uint32_t side = walk_.side_along(e); side != kNone) {
+      covered[side / 4] |= kBordered;
+      if (const uint32_t other = walk_.beyond(side); other != kNone) covered[other] |= kBordered;
+    }
+  }
+}
+
+void TriangleImages::find_covered(std::span<const uint8_t> mapped, std::span<uint8_t> covered) const {
+  constexpr uint8_t kStop = kCrossed | kBordered, kMet = kFront | kBack;
+  mark_borders(mapped, covered);
+  bool all = true;
+  for (uint8_t& c : covered) {
+    if ((c & ~kBordered) == kFront) c |= kWhole;
+    all &= (c & (kWhole | kCrossed)) != 0;
+  }
+  if (all) return;
+  std::vector<uint8_t> reached(covered.size());
+  std::vector<uint32_t> part;
+  for (uint32_t first = 0; first < covered.size(); ++first) {
+    if (reached[first] != 0 || (covered[first] & (kStop | kWhole)) != 0) continue;
+    part.assign(1, first);
+    reached[first] = 1;
+    size_t front = 0;
+    for (size_t i = 0; i < part.size(); ++i) {
+      front += (covered[part[i]] & kWhole) != 0;
+      for (uint32_t corner = 4 * part[i]; corner < 4 * part[i] + 3; ++corner)
+        if (const uint32_t next = walk_.beyond(corner);
+            next != kNone && reached[next] == 0 && (covered[next] & kStop) == 0)
+          reached[next] = 1, part.push_back(next);
+    }
+    if (2 * front <= part.size()) continue;
+    for (const uint32_t t : part)
+      if ((covered[t] & kMet) != 0) covered[t] |= kWhole;
+  }
+}
+
+} // namespace packtrace
