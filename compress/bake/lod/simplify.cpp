@@ -21,6 +21,8 @@ constexpr double kCreaseWeight = 0.25; // where normals or texture coordinates c
 constexpr double kStayWeight = 1e-4; // of the point itself: where all is flat, short edges go first and none gets long
 constexpr double kLargestTurn = 0.2; // cosine; a triangle may turn by less than that in one collapse
 
+constexpr double kRetryShare = 0.75; // of the triangles left: then rejected edges are tried again
+
 /// Which point an edge becomes.
 struct Placement {
   DVec3 point;
@@ -61,7 +63,9 @@ public:
     fill_heap();
     while (live_ > config_.target_triangles && !heap_.empty()) {
       const size_t before = live_;
-      drain_heap();
+      // Edges that could not go may, once what is around them has changed.
+      const auto next = static_cast<size_t>(kRetryShare * static_cast<double>(live_));
+      drain_heap(std::max<size_t>(config_.target_triangles, next));
       if (live_ == before) break;
       retry_rejected();
     }
@@ -177,13 +181,37 @@ private:
     for (const LodTriangle& t : m_.triangles) {
       const DVec3 n = area_normal(t.points);
       const double area = glm::length(n);
-      if (!(area > 0.0)) continue;
+      if (!(area > 0.0)) {
+        add_line(t.points);
+        continue;
+      }
       Quadric q;
       q.add_plane(n / area, m_.points[t.points.x], area);
       for (int i = 0; i < 3; ++i) {
         quadrics_[t.points[i]].add(q);
         quadrics_[t.points[i]].add_point(m_.points[t.points[i]], kStayWeight * area);
       }
+    }
+  }
+
+  /// A triangle whose corners lie in a line has no plane: its corners stay near the line, and its ends near where they
+  /// are.
+  void add_line(const Triangle& points) {
+    int first = 0; // of its longest side, which is all of it
+    double longest = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      const DVec3 side = m_.points[points[(i + 1) % 3]] - m_.points[points[i]];
+      if (const double length2 = glm::dot(side, side); length2 > longest) longest = length2, first = i;
+    }
+    const uint32_t a = points[first], b = points[(first + 1) % 3];
+    const DVec3 along = (m_.points[b] - m_.points[a]) / std::sqrt(longest);
+    Quadric line;
+    line.add_line(along, m_.points[a], longest);
+    for (int i = 0; i < 3; ++i) quadrics_[points[i]].add(line);
+    for (const uint32_t end : {a, b}) {
+      Quadric plane;
+      plane.add_plane(along, m_.points[end], longest);
+      quadrics_[end].add(plane);
     }
   }
 
@@ -253,8 +281,8 @@ private:
     heap_.sort();
   }
 
-  void drain_heap() {
-    while (live_ > config_.target_triangles && !heap_.empty()) {
+  void drain_heap(size_t triangles) {
+    while (live_ > triangles && !heap_.empty()) {
       const uint32_t edge = heap_.top();
       Edge& e = edges_[edge];
       const uint32_t a = root(e.a), b = root(e.b);
