@@ -32,12 +32,13 @@ public:
   Measurer(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh)
       : m_(mesh), before_({points, triangles}, [&](uint32_t p) { return mesh.stands_for[p]; }),
         after_({mesh.points, mesh.triangles}, [](uint32_t p) { return p; }), walk_(before_.surface(), after_, mesh),
-        errors_(mesh.triangles.size()), seen_(mesh.triangles.size()), covered_(mesh.triangles.size()),
-        mapped_(triangles.size()), unchanged_(triangles.size()) {}
+        errors_(mesh.triangles.size()), bounds_(triangles.size()), seen_(mesh.triangles.size()),
+        covered_(mesh.triangles.size()), mapped_(triangles.size()), unchanged_(triangles.size()) {}
 
-  void run() {
+  SurfaceLinks run() {
     after_.link();
     find_unchanged();
+    links_.reserve(4 * unchanged_.size());
     pieces_.reserve(7 * unchanged_.size());
     laid_.reserve(unchanged_.size());
     for (uint32_t t = 0; t < unchanged_.size(); ++t)
@@ -51,15 +52,24 @@ public:
     for (uint32_t s = 0; s < errors_.size(); ++s)
       if (covered_[s] != 1 && seen_[s] < 1.0 - kSeen) lay_over_before(s);
     for (size_t s = 0; s < errors_.size(); ++s) m_.triangles[s].error = errors_[s];
+    return {std::move(links_), std::move(bounds_)};
   }
 
 private:
   double had(uint32_t before) const { return before_.surface().triangles[before].error; }
   static double stated(double distance, double had) { return distance * kInflation + had; }
 
-  void note(uint32_t after, double distance, double had) {
-    errors_[after] = std::max(errors_[after], stated(distance, had));
+  /// A part of the triangle after is within the distance of one before.
+  void note_after(uint32_t after, uint32_t before, double distance) {
+    errors_[after] = std::max(errors_[after], stated(distance, had(before)));
     largest_ = std::max(largest_, errors_[after]);
+    if (links_.empty() || links_.back() != SurfaceLink{before, after}) links_.push_back({before, after});
+  }
+
+  /// A part of each is within the distance of the other.
+  void note(uint32_t after, uint32_t before, double distance) {
+    note_after(after, before, distance);
+    bounds_[before] = std::max(bounds_[before], stated(distance, had(before)));
   }
 
   /// A group is as far off as its worst part: what is hardly worse needs no closer look.
@@ -75,7 +85,7 @@ private:
         continue;
       unchanged_[t] = mapped_[t] = 1;
       seen_[s] = 1.0;
-      note(s, 0.0, had(t));
+      note(s, t, 0.0);
     }
   }
 
@@ -124,9 +134,8 @@ private:
   void accept(const Laid& laid) {
     const bool mapped = mapped_[laid.triangle] != 0;
     const DVec3 normal = mapped ? before_.surface().area_normal(laid.triangle) : DVec3(0.0);
-    const double had = this->had(laid.triangle);
     for (const OverlayPiece& piece : std::span(pieces_).subspan(laid.first, laid.count)) {
-      note(piece.triangle, piece.distance, had);
+      note(piece.triangle, laid.triangle, piece.distance);
       seen_[piece.triangle] += piece.share;
       if (!mapped) continue;
       uint8_t& covered = covered_[piece.triangle];
@@ -176,7 +185,7 @@ private:
 
   void accept(uint32_t t) {
     for (const OverlayPiece& piece : best_) {
-      note(piece.triangle, piece.distance, had(t));
+      note(piece.triangle, t, piece.distance);
       seen_[piece.triangle] += piece.share;
     }
   }
@@ -259,7 +268,7 @@ private:
       before_.gather_within(after_.corners(s), near);
       if (refine_over_before(s) >= near) std::swap(refined_, second_);
     }
-    for (const OverlayPiece& piece : refined_) note(s, piece.distance, had(piece.triangle));
+    for (const OverlayPiece& piece : refined_) note_after(s, piece.triangle, piece.distance);
   }
 
   /// Returns the largest error that refined_ would make.
@@ -284,14 +293,16 @@ private:
         piece.distance = before_.overlay().nearest_distance(piece);
         if (!enough(piece.distance, had(piece.triangle))) return false;
       }
-    for (const OverlayPiece& piece : best_) note(s, piece.distance, had(piece.triangle));
+    for (const OverlayPiece& piece : best_) note_after(s, piece.triangle, piece.distance);
     return true;
   }
 
   SimplifyMesh& m_;
   SurfaceSide before_, after_;
   SurfaceWalk walk_;
-  std::vector<double> errors_;   ///< of triangles after
+  std::vector<double> errors_; ///< of triangles after
+  std::vector<double> bounds_; ///< of triangles before
+  std::vector<SurfaceLink> links_;
   std::vector<double> seen_;     ///< share of each triangle after that was met
   std::vector<uint8_t> covered_; ///< per triangle after: images of those before cover it
   std::vector<uint8_t> mapped_;  ///< per triangle before: what is said of it holds for its image
@@ -309,8 +320,8 @@ private:
 
 } // namespace
 
-void bound_errors(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh) {
-  Measurer(points, triangles, mesh).run();
+SurfaceLinks bound_errors(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh) {
+  return Measurer(points, triangles, mesh).run();
 }
 
 } // namespace packtrace
