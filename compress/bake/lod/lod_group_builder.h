@@ -16,7 +16,7 @@ inline constexpr uint32_t kNewNumber = 1u << 31;
 inline constexpr uint32_t kShared = ~0u - 1;
 
 /// Share of its triangles that a group is to keep.
-inline constexpr double kKept = 0.5;
+inline constexpr double kKept = 0.47;
 /// Groups that keep more of their triangles are left as they are.
 inline constexpr double kWorthwhile = 0.85;
 
