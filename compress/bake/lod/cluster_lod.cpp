@@ -58,6 +58,7 @@ private:
     lod_.triangles.reserve(2 * base.triangles.size());
     lod_.triangles = base.triangles;
     triangle_errors_.assign(base.triangles.size(), 0.0);
+    history_ = TriangleHistory(static_cast<uint32_t>(base.triangles.size()));
     for (const ClusterRange& range : base.clusters) lod_.clusters.push_back({range, 0, kNoGroup, kNoGroup});
     cluster_spheres_.resize(lod_.clusters.size());
     tbb::parallel_for(size_t{0}, lod_.clusters.size(),
@@ -158,9 +159,15 @@ private:
   }
 
   SimplifiedGroup simplify_group(const std::vector<uint32_t>& members) const {
-    LodGroupInput input{g_,     lod_.positions,   lod_.vertices, lod_.triangles, {}, triangle_errors_, seam_of_kind_,
-                        owner_, locked_for_ever_, lines_};
-    for (const uint32_t number : members) input.clusters.push_back(&lod_.clusters[number]);
+    LodGroupInput input{g_,     {lod_.positions, lod_.vertices, lod_.triangles, triangle_errors_, history_},
+                        {},     seam_of_kind_,
+                        owner_, locked_for_ever_,
+                        lines_};
+    for (const uint32_t number : members) {
+      const LodCluster& c = lod_.clusters[number];
+      input.clusters.push_back(&c);
+      if (c.generating_group != kNoGroup) input.floor = std::max(input.floor, lod_.groups[c.generating_group].error);
+    }
     SimplifiedGroup result = packtrace::simplify_group(input);
     if (static_cast<double>(result.triangles.size()) > kWorthwhile * static_cast<double>(result.source_triangles))
       result = {};
@@ -194,6 +201,7 @@ private:
   /// New positions, vertices, triangles and clusters of all groups, in their order.
   std::vector<uint32_t> append(uint32_t level, uint32_t first_group, const std::vector<SimplifiedGroup>& results) {
     std::vector<uint32_t> added;
+    history_.begin_level();
     for (size_t i = 0; i < results.size(); ++i) {
       const SimplifiedGroup& r = results[i];
       const uint32_t group = first_group + static_cast<uint32_t>(i);
@@ -211,6 +219,7 @@ private:
         lod_.triangles.push_back(t);
       }
       triangle_errors_.insert(triangle_errors_.end(), r.errors.begin(), r.errors.end());
+      history_.append(r.below_ends, r.below);
       uint32_t begin = 0;
       for (size_t c = 0; c < r.cluster_ends.size(); ++c) {
         added.push_back(static_cast<uint32_t>(lod_.clusters.size()));
@@ -234,6 +243,7 @@ private:
   double diagonal_ = 0.0;                  ///< of the geometry's box, which nothing leaves
   std::vector<LodSphere> cluster_spheres_; ///< of level 0: their own; else that of the generating group
   std::vector<double> triangle_errors_;
+  TriangleHistory history_;
   std::vector<uint32_t> owner_;
   LineCover lines_;
   std::vector<uint8_t> locked_for_ever_; ///< positions of terminal groups

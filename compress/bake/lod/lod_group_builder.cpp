@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <tuple>
+#include <utility>
 
 #include "compress/bake/clusterize.h"
+#include "compress/bake/lod/direct_bound.h"
 #include "compress/bake/lod/loose_pieces.h"
 #include "compress/bake/lod/simplify.h"
 #include "compress/bake/lod/surface_bound.h"
@@ -26,25 +29,58 @@ public:
   SimplifiedGroup run() {
     gather();
     SimplifyConfig config;
-    config.target_triangles = static_cast<uint32_t>(out_.source_triangles / 2);
+    config.target_triangles = share_of_triangles(kKept);
     config.seam_of_kind = in_.seam_of_kind;
     config.keep_points = keep_points_;
     const std::vector<DVec3> points = mesh_.points;
     std::vector<LodTriangle> triangles = mesh_.triangles;
     triangles.insert(triangles.end(), lines_.begin(), lines_.end());
     simplify(mesh_, config);
-    bound_errors(points, triangles, mesh_);
-    if (mesh_.triangles.size() > config.target_triangles)
-      drop_loose_pieces(mesh_, {config.target_triangles, worthwhile_triangles()});
+    numbers_.insert(numbers_.end(), line_numbers_.begin(), line_numbers_.end());
+    links_ = bound_errors(points, triangles, mesh_);
+    if (mesh_.triangles.size() > config.target_triangles) drop_pieces(config.target_triangles);
+    bound_directly({in_.levels, center_, points, triangles, numbers_, in_.floor, dropped_}, mesh_, links_);
     for (const LodTriangle& t : mesh_.triangles) out_.error = std::max(out_.error, t.error);
     number_vertices();
     split();
+    list_below();
     return std::move(out_);
   }
 
 private:
-  uint32_t worthwhile_triangles() const {
-    return static_cast<uint32_t>(kWorthwhile * static_cast<double>(out_.source_triangles));
+  void drop_pieces(uint32_t target) {
+    std::vector<double> errors;
+    for (const LodTriangle& t : mesh_.triangles) errors.push_back(t.error);
+    const std::vector<TriangleStand> stands = drop_loose_pieces(mesh_, {target, share_of_triangles(kWorthwhile)});
+    for (SurfaceLink& link : links_.links) {
+      const TriangleStand& stand = stands[link.after];
+      link.after = stand.triangle;
+      double& bound = links_.bounds[link.before];
+      dropped_ |= stand.dropped;
+      if (stand.dropped) bound = std::max(bound, mesh_.triangles[stand.triangle].error);
+    }
+    // Nothing that is left is further from what it stood for than before.
+    for (size_t i = 0; i < stands.size(); ++i)
+      if (!stands[i].dropped) mesh_.triangles[stands[i].triangle].error = errors[i];
+  }
+
+  /// Which triangles of the group those that are left may stand for.
+  void list_below() {
+    std::vector<uint32_t> ends(mesh_.triangles.size() + 1), found(links_.links.size());
+    for (const SurfaceLink& link : links_.links) ++ends[link.after + 1];
+    std::partial_sum(ends.begin(), ends.end(), ends.begin());
+    std::vector<uint32_t> next(ends.begin(), ends.end() - 1);
+    for (const SurfaceLink& link : links_.links) found[next[link.after]++] = link.before;
+    std::vector<uint32_t> last(numbers_.size(), Wedge::kNone); // triangle after whose list each is in
+    for (const uint32_t s : order_) {
+      for (uint32_t i = ends[s]; i < ends[s + 1]; ++i)
+        if (std::exchange(last[found[i]], s) != s) out_.below.push_back(numbers_[found[i]]);
+      out_.below_ends.push_back(static_cast<uint32_t>(out_.below.size()));
+    }
+  }
+
+  uint32_t share_of_triangles(double share) const {
+    return static_cast<uint32_t>(share * static_cast<double>(out_.source_triangles));
   }
 
   void gather() {
@@ -56,27 +92,27 @@ private:
       keep_points_ |= kind.uvs;
       const bool plain = kind.flat && !kind.uvs;
       for (uint32_t k = 0; k < c.range.triangle_count; ++k) {
-        const Triangle& v = in_.triangles[c.range.first_triangle + k];
-        LodTriangle t{{}, Triangle(Wedge::kNone), c.range.kind, in_.errors[c.range.first_triangle + k]};
+        const Triangle& v = in_.levels.triangles[c.range.first_triangle + k];
+        LodTriangle t{{}, Triangle(Wedge::kNone), c.range.kind, in_.levels.errors[c.range.first_triangle + k]};
         for (int corner = 0; corner < 3; ++corner) {
-          t.points[corner] = point_numbers(in_.vertices[v[corner]].position);
+          t.points[corner] = point_numbers(in_.levels.vertices[v[corner]].position);
           if (!plain) t.wedges[corner] = wedge_numbers(v[corner]);
         }
         const bool line = t.points.x == t.points.y || t.points.y == t.points.z || t.points.z == t.points.x;
         if (!line)
-          mesh_.triangles.push_back(t);
+          mesh_.triangles.push_back(t), numbers_.push_back(c.range.first_triangle + k);
         else if (!in_.lines.holds(points_of(v)))
-          lines_.push_back(t);
+          lines_.push_back(t), line_numbers_.push_back(c.range.first_triangle + k);
       }
     }
     positions_ = std::move(point_numbers.values);
     for (const uint32_t vertex : wedge_numbers.values)
-      mesh_.wedges.push_back({DVec3(decode_normal(encoding_, in_.vertices[vertex].normal_code)), vertex});
+      mesh_.wedges.push_back({DVec3(decode_normal(encoding_, in_.levels.vertices[vertex].normal_code)), vertex});
     place_points();
   }
 
   Triangle points_of(const Triangle& v) const {
-    return {in_.vertices[v.x].position, in_.vertices[v.y].position, in_.vertices[v.z].position};
+    return {in_.levels.vertices[v.x].position, in_.levels.vertices[v.y].position, in_.levels.vertices[v.z].position};
   }
 
   /// Coordinates from about the middle of the group, so that they are small.
@@ -84,13 +120,13 @@ private:
     for (size_t axis = 0; axis < 3; ++axis) {
       int64_t lo = std::numeric_limits<int64_t>::max(), hi = std::numeric_limits<int64_t>::min();
       for (const uint32_t p : positions_)
-        lo = std::min(lo, in_.positions[p][axis]), hi = std::max(hi, in_.positions[p][axis]);
+        lo = std::min(lo, in_.levels.positions[p][axis]), hi = std::max(hi, in_.levels.positions[p][axis]);
       center_[axis] = lo + (hi - lo) / 2;
     }
     for (const uint32_t p : positions_) {
       DVec3 d;
       for (size_t axis = 0; axis < 3; ++axis)
-        d[static_cast<int>(axis)] = static_cast<double>(in_.positions[p][axis] - center_[axis]);
+        d[static_cast<int>(axis)] = static_cast<double>(in_.levels.positions[p][axis] - center_[axis]);
       mesh_.points.push_back(d);
       mesh_.locked.push_back(in_.owner[p] == kShared || in_.locked_for_ever[p] != 0);
     }
@@ -110,7 +146,7 @@ private:
     if (wedge != Wedge::kNone) {
       const Wedge& w = mesh_.wedges[wedge];
       if (w.source != Wedge::kNone) {
-        const QuantizedVertex& source = in_.vertices[w.source];
+        const QuantizedVertex& source = in_.levels.vertices[w.source];
         if (source.position == v.position) return w.source;
         v.normal_code = source.normal_code, v.uv = source.uv;
       } else if (!kind.flat) {
@@ -196,6 +232,7 @@ private:
     for (const uint32_t member : clusters.order) {
       out_.triangles.push_back(vertices_[triangles[member]]);
       out_.errors.push_back(mesh_.triangles[triangles[member]].error);
+      order_.push_back(triangles[member]);
     }
     for (const uint32_t end : clusters.ends)
       out_.cluster_ends.push_back(before + end), out_.cluster_kinds.push_back(kind);
@@ -211,9 +248,12 @@ private:
   NormalEncoding encoding_;
   SimplifiedGroup out_;
   SimplifyMesh mesh_;
-  std::vector<LodTriangle> lines_; // triangles with two corners in one place
+  std::vector<LodTriangle> lines_;               // triangles with two corners in one place
+  std::vector<uint32_t> numbers_, line_numbers_; // of triangles before, and of lines
+  SurfaceLinks links_;
+  std::vector<uint32_t> order_; // of triangles that are left
   LatticePoint center_{};
-  bool keep_points_ = false;
+  bool keep_points_ = false, dropped_ = false;
   std::vector<uint32_t> positions_;         // of each point
   std::vector<uint32_t> new_position_;      // of each point that moved
   std::vector<Triangle> vertices_;          // of each triangle that is left

@@ -6,6 +6,7 @@
 
 #include "compress/bake/lod/cluster_lod.h"
 #include "compress/bake/lod/line_cover.h"
+#include "compress/bake/lod/triangle_history.h"
 
 namespace packtrace {
 
@@ -14,6 +15,8 @@ inline constexpr uint32_t kNewNumber = 1u << 31;
 /// LodGroupInput::owner of positions that several groups have.
 inline constexpr uint32_t kShared = ~0u - 1;
 
+/// Share of its triangles that a group is to keep.
+inline constexpr double kKept = 0.47;
 /// Groups that keep more of their triangles are left as they are.
 inline constexpr double kWorthwhile = 0.85;
 
@@ -21,15 +24,13 @@ inline constexpr double kWorthwhile = 0.85;
 /// parallel.
 struct LodGroupInput {
   const QuantizedGeometry& geometry;
-  std::span<const LatticePoint> positions;
-  std::span<const QuantizedVertex> vertices;
-  std::span<const Triangle> triangles;
+  LevelTriangles levels;
   std::vector<const LodCluster*> clusters;
-  std::span<const double> errors; ///< per triangle: of its surface
   std::span<const uint32_t> seam_of_kind;
   std::span<const uint32_t> owner;          ///< per position; kShared ones stay
   std::span<const uint8_t> locked_for_ever; ///< per position; those stay too
   const LineCover& lines;
+  double floor = 0.0; ///< the error is not below, whatever is measured
 };
 
 /// What a group became.
@@ -40,11 +41,12 @@ struct SimplifiedGroup {
   std::vector<QuantizedVertex> new_vertices; ///< numbered from kNewNumber
   std::vector<Triangle> triangles;           ///< vertices, cluster by cluster
   std::vector<double> errors;                ///< of each
+  std::vector<uint32_t> below_ends, below;   ///< of each: triangles of the group that it may stand for
   std::vector<uint32_t> cluster_ends;
   std::vector<uint32_t> cluster_kinds;
 };
 
-/// Halves the triangles of a group as far as its locked positions allow, and splits the result into clusters.
+/// Reduces the triangles of a group to kKept as far as its locked positions allow, and splits the result into clusters.
 /// Triangles with two corners in one place are left out; the lines that they were count as surface of the group, unless
 /// they are sides of other triangles.
 SimplifiedGroup simplify_group(const LodGroupInput& input);

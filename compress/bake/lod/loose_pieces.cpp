@@ -32,9 +32,15 @@ class Dropper {
 public:
   explicit Dropper(SimplifyMesh& mesh) : m_(mesh) {}
 
-  void run(const DropTargets& targets) {
+  std::vector<TriangleStand> run(const DropTargets& targets) {
     find_pieces();
-    if (pieces_.size() < 2) return;
+    stand_of_.assign(pieces_.size(), kNone);
+    if (pieces_.size() > 1) drop_some(targets);
+    return remove_dropped();
+  }
+
+private:
+  void drop_some(const DropTargets& targets) {
     size_t live = m_.triangles.size();
     double dear = 0.0;
     for (const Piece& piece : pieces_) dear = std::max(dear, kFewTimes * piece.error);
@@ -59,15 +65,14 @@ public:
         live -= pieces_[i].triangles.size();
       }
     }
-    remove_dropped();
   }
 
-private:
   void drop(uint32_t piece, const Stand& stand) {
     LodTriangle& t = m_.triangles[stand.triangle];
     t.error = std::max(t.error, pieces_[piece].error + stand.distance);
     pieces_[stand.piece].error = std::max(pieces_[stand.piece].error, t.error);
     pieces_[piece].dropped = true;
+    stand_of_[piece] = stand.triangle;
   }
 
   void find_pieces() {
@@ -136,22 +141,35 @@ private:
     return best;
   }
 
-  void remove_dropped() {
-    std::vector<uint8_t> gone(m_.triangles.size());
-    for (const Piece& piece : pieces_)
-      for (const uint32_t triangle : piece.triangles) gone[triangle] = piece.dropped;
-    size_t kept = 0;
-    for (size_t i = 0; i < m_.triangles.size(); ++i)
-      if (gone[i] == 0) m_.triangles[kept++] = m_.triangles[i];
+  std::vector<TriangleStand> remove_dropped() {
+    std::vector<uint32_t> piece_of(m_.triangles.size());
+    for (uint32_t i = 0; i < pieces_.size(); ++i)
+      for (const uint32_t triangle : pieces_[i].triangles) piece_of[triangle] = i;
+    std::vector<TriangleStand> stands(m_.triangles.size());
+    uint32_t kept = 0;
+    for (size_t i = 0; i < stands.size(); ++i) {
+      stands[i].dropped = pieces_[piece_of[i]].dropped;
+      if (!stands[i].dropped) stands[i].triangle = kept, m_.triangles[kept++] = m_.triangles[i];
+    }
     m_.triangles.resize(kept);
+    for (size_t i = 0; i < stands.size(); ++i) {
+      if (!stands[i].dropped) continue;
+      auto stand = static_cast<uint32_t>(i);
+      while (stands[stand].dropped) stand = stand_of_[piece_of[stand]]; // that may have gone later
+      stands[i].triangle = stands[stand].triangle;
+    }
+    return stands;
   }
 
   SimplifyMesh& m_;
   std::vector<Piece> pieces_;
+  std::vector<uint32_t> stand_of_; ///< per piece that is dropped: a triangle
 };
 
 } // namespace
 
-void drop_loose_pieces(SimplifyMesh& mesh, const DropTargets& targets) { Dropper(mesh).run(targets); }
+std::vector<TriangleStand> drop_loose_pieces(SimplifyMesh& mesh, const DropTargets& targets) {
+  return Dropper(mesh).run(targets);
+}
 
 } // namespace packtrace

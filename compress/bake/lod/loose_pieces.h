@@ -2,6 +2,8 @@
 
 #include <cstdint>
 
+#include <vector>
+
 #include "compress/bake/lod/simplify.h"
 
 namespace packtrace {
@@ -14,9 +16,16 @@ struct DropTargets {
   uint32_t at_any_cost = 0;
 };
 
+/// What stands for a triangle that there was: itself, or, where it was dropped, one near it. Numbers of those left.
+struct TriangleStand {
+  uint32_t triangle = 0;
+  bool dropped = false;
+};
+
 /// Drops pieces of the mesh that hang together with nothing else and have no locked point, those first that lie nearest
 /// to what is left; one piece always stays. The error of a triangle near each dropped piece grows to hold for it too.
+/// Returns what stands for each triangle that there was.
 /// Time grows with the square of the number of pieces.
-void drop_loose_pieces(SimplifyMesh& mesh, const DropTargets& targets);
+std::vector<TriangleStand> drop_loose_pieces(SimplifyMesh& mesh, const DropTargets& targets);
 
 } // namespace packtrace

@@ -18,6 +18,12 @@ struct Quadric {
     bx += w.x * d, by += w.y * d, bz += w.z * d, c += weight * d * d;
   }
 
+  /// The line through `point` along the unit vector d.
+  void add_line(DVec3 d, DVec3 point, double weight) {
+    add_point(point, weight);
+    add_plane(d, point, -weight); // what is left is across the line
+  }
+
   /// The point itself: keeps what is placed near it.
   void add_point(DVec3 point, double weight) {
     xx += weight, yy += weight, zz += weight;

@@ -15,6 +15,7 @@ namespace {
 
 constexpr uint32_t kNone = ~0u;
 constexpr double kLargestTurn = 0.2; // cosine; a triangle may turn by less than that in one collapse
+constexpr double kRetryShare = 0.75; // of the triangles left: then rejected edges are tried again
 
 PlacementKernel pick_placement_kernel() {
 #if defined(__x86_64__)
@@ -35,7 +36,9 @@ public:
     start();
     while (live_ > config_.target_triangles && !heap_.empty()) {
       const size_t before = live_;
-      drain_heap();
+      // Edges that could not go may, once what is around them has changed.
+      const auto next = static_cast<size_t>(kRetryShare * static_cast<double>(live_));
+      drain_heap(std::max<size_t>(config_.target_triangles, next));
       if (live_ == before) break;
       retry_rejected();
     }
@@ -107,8 +110,8 @@ private:
     return edge_stamp_[edge] != stamp_[e.a] + stamp_[e.b];
   }
 
-  void drain_heap() {
-    while (live_ > config_.target_triangles && !heap_.empty()) {
+  void drain_heap(size_t triangles) {
+    while (live_ > triangles && !heap_.empty()) {
       const uint32_t edge = heap_.top();
       if (!follow(edge)) {
         heap_.pop();

@@ -39,12 +39,13 @@ public:
   Measurer(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh)
       : m_(mesh), before_({points, triangles}, mesh.stands_for), after_({mesh.points, mesh.triangles}),
         walk_(before_.surface(), after_, mesh), images_(walk_, mesh), errors_(mesh.triangles.size()),
-        seen_(mesh.triangles.size()), covered_(mesh.triangles.size()), mapped_(triangles.size()),
-        unchanged_(triangles.size()) {}
+        bounds_(triangles.size()), seen_(mesh.triangles.size()), covered_(mesh.triangles.size()),
+        mapped_(triangles.size()), unchanged_(triangles.size()) {}
 
-  void run() {
+  SurfaceLinks run() {
     after_.link();
     find_unchanged();
+    links_.reserve(4 * unchanged_.size());
     laid_.reserve(unchanged_.size());
     claims_.reserve(unchanged_.size());
     for (uint32_t t = 0; t < unchanged_.size(); ++t)
@@ -58,15 +59,28 @@ public:
     for (uint32_t s = 0; s < errors_.size(); ++s)
       if ((covered_[s] & TriangleImages::kWhole) == 0 && seen_[s] < 1.0 - kSeen) lay_over_before(s);
     for (size_t s = 0; s < errors_.size(); ++s) m_.triangles[s].error = errors_[s];
+    return {std::move(links_), std::move(bounds_)};
   }
 
 private:
   double had(uint32_t before) const { return before_.surface().triangles[before].error; }
   static double stated(double distance, double had) { return distance * kInflation + had; }
 
-  void note(uint32_t after, double distance, double had) {
-    errors_[after] = std::max(errors_[after], stated(distance, had));
+  /// A part of the triangle after is within the distance of one before.
+  void note_after(uint32_t after, uint32_t before, double distance) {
+    errors_[after] = std::max(errors_[after], stated(distance, had(before)));
     largest_ = std::max(largest_, errors_[after]);
+    link(before, after);
+  }
+
+  void link(uint32_t before, uint32_t after) {
+    if (links_.empty() || links_.back() != SurfaceLink{before, after}) links_.push_back({before, after});
+  }
+
+  /// A part of each is within the distance of the other.
+  void note(uint32_t after, uint32_t before, double distance) {
+    note_after(after, before, distance);
+    bounds_[before] = std::max(bounds_[before], stated(distance, had(before)));
   }
 
   /// A group is as far off as its worst part: what is hardly worse needs no closer look.
@@ -83,7 +97,7 @@ private:
       unchanged_[t] = mapped_[t] = 1;
       covered_[s] = TriangleImages::kFront;
       seen_[s] = 1.0;
-      note(s, 0.0, had(t));
+      note(s, t, 0.0);
     }
   }
 
@@ -167,8 +181,10 @@ private:
     for (const uint32_t s : images_.met(laid.image)) {
       covered_[s] |= glm::dot(normal, walk_.area_normal(s)) > 0.0 ? TriangleImages::kFront : TriangleImages::kBack;
       errors_[s] = std::max(errors_[s], inside);
+      if (!laid.settled) link(t, s);
     }
     if (laid.settled) return;
+    bounds_[t] = std::max(bounds_[t], stated(laid.image.distance, had));
     for (int i = 0; i < 3; ++i) {
       double& of_edge = edge_had_[m_.side_edges[3 * size_t{t} + static_cast<size_t>(i)]];
       of_edge = std::max(of_edge, had);
@@ -228,7 +244,7 @@ private:
 
   void accept(std::span<const OverlayPiece> pieces, uint32_t t) {
     for (const OverlayPiece& piece : pieces) {
-      note(piece.triangle, piece.distance, had(t));
+      note(piece.triangle, t, piece.distance);
       seen_[piece.triangle] += piece.share;
     }
   }
@@ -311,7 +327,7 @@ private:
       before_.gather_within(after_.corners(s), near);
       if (refine_over_before(s) >= near) std::swap(refined_, second_);
     }
-    for (const OverlayPiece& piece : refined_) note(s, piece.distance, had(piece.triangle));
+    for (const OverlayPiece& piece : refined_) note_after(s, piece.triangle, piece.distance);
   }
 
   /// Returns the largest error that refined_ would make.
@@ -336,7 +352,7 @@ private:
         piece.distance = before_.overlay().nearest_distance(piece);
         if (!enough(piece.distance, had(piece.triangle))) return false;
       }
-    for (const OverlayPiece& piece : best_) note(s, piece.distance, had(piece.triangle));
+    for (const OverlayPiece& piece : best_) note_after(s, piece.triangle, piece.distance);
     return true;
   }
 
@@ -344,7 +360,9 @@ private:
   SurfaceSide before_, after_;
   SurfaceWalk walk_;
   TriangleImages images_;
-  std::vector<double> errors_;   ///< of triangles after
+  std::vector<double> errors_; ///< of triangles after
+  std::vector<double> bounds_; ///< of triangles before
+  std::vector<SurfaceLink> links_;
   std::vector<double> seen_;     ///< share of each triangle after that was met
   std::vector<uint8_t> covered_; ///< per triangle after: bits of TriangleImages
   std::vector<uint8_t> mapped_;  ///< per triangle before: what is said of it holds for its image
@@ -364,8 +382,8 @@ private:
 
 } // namespace
 
-void bound_errors(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh) {
-  Measurer(points, triangles, mesh).run();
+SurfaceLinks bound_errors(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh) {
+  return Measurer(points, triangles, mesh).run();
 }
 
 } // namespace packtrace

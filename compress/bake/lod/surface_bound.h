@@ -7,6 +7,19 @@
 
 namespace packtrace {
 
+/// A triangle before, part of which is found at a triangle after.
+struct SurfaceLink {
+  uint32_t before, after;
+  bool operator==(const SurfaceLink&) const = default;
+};
+
+/// Where everything before is found after.
+struct SurfaceLinks {
+  std::vector<SurfaceLink> links; ///< some more than once
+  /// Per triangle before: how far at most what it stands for is from the triangles after that it is linked to.
+  std::vector<double> bounds;
+};
+
 /// Sets the errors of the triangles that are left after simplify(): every point of a triangle before is within the
 /// error of one after, and every point of a triangle after within its error of the surface before, plus what the
 /// triangles before it already had. So errors stay distances to the original surface, however often this is done.
@@ -16,6 +29,6 @@ namespace packtrace {
 /// their outlines cut it. What is covered by none, at borders that moved and in folds, is cut finer and measured alike.
 /// @param points, triangles before; mesh.points and mesh.stands_for number the same points. Behind those that
 /// simplify() had there may be more, whose corners need not be distinct.
-void bound_errors(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh);
+SurfaceLinks bound_errors(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh);
 
 } // namespace packtrace

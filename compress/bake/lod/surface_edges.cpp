@@ -1,6 +1,7 @@
 #include "compress/bake/lod/surface_edges.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "compress/bake/lod/quadric.h"
@@ -61,10 +62,31 @@ private:
     const DVec3 a = m_.points[t.x], n = glm::cross(m_.points[t.y] - a, m_.points[t.z] - a);
     out_.area_normals[triangle] = n;
     const double area = glm::length(n);
-    if (!(area > 0.0)) return;
+    if (!(area > 0.0)) return add_line(t);
     Quadric q;
     q.add_plane(n / area, a, area);
     for (const uint32_t p : {t.x, t.y, t.z}) add(q, p), stay_[p] += kStayWeight * area;
+  }
+
+  /// A triangle whose corners lie in a line has no plane: its corners stay near the line, and its ends near where they
+  /// are.
+  void add_line(const Triangle& points) {
+    int first = 0; // of its longest side, which is all of it
+    double longest = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      const DVec3 side = m_.points[points[(i + 1) % 3]] - m_.points[points[i]];
+      if (const double length2 = glm::dot(side, side); length2 > longest) longest = length2, first = i;
+    }
+    const uint32_t a = points[first], b = points[(first + 1) % 3];
+    const DVec3 along = (m_.points[b] - m_.points[a]) / std::sqrt(longest);
+    Quadric line;
+    line.add_line(along, m_.points[a], longest);
+    for (int i = 0; i < 3; ++i) add(line, points[i]);
+    for (const uint32_t end : {a, b}) {
+      Quadric plane;
+      plane.add_plane(along, m_.points[end], longest);
+      add(plane, end);
+    }
   }
 
   uint32_t find_edge(uint32_t p, uint32_t q, uint32_t triangle) {

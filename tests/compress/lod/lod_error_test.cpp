@@ -1,6 +1,7 @@
 // That the errors of levels of detail are never below what is measured.
 
 #include <algorithm>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -13,9 +14,9 @@ namespace {
 /// What the measurement may round up.
 double with_rounding(double error) { return error * (1.0 + 1e-6) + 1e-6; }
 
-class LodErrorOf : public testing::TestWithParam<NamedMesh> {
-protected:
-  LodErrorOf() {
+class LodSurfaces {
+public:
+  explicit LodSurfaces(BuiltLod built) : built_(std::move(built)) {
     for (const LatticePoint& q : built_.lod.positions) {
       DVec3 p;
       for (size_t axis = 0; axis < 3; ++axis)
@@ -23,6 +24,8 @@ protected:
       points_.push_back(p);
     }
   }
+
+  const ClusterLod& lod() const { return built_.lod; }
 
   std::vector<Triangle> triangles_of(const std::vector<uint32_t>& clusters) const {
     std::vector<Triangle> result;
@@ -42,8 +45,14 @@ protected:
     return std::max(surface_distance(points_, a, to_b, samples).max, surface_distance(points_, b, to_a, samples).max);
   }
 
-  const BuiltLod built_ = build_lod(GetParam().make());
+protected:
+  const BuiltLod built_;
   std::vector<DVec3> points_;
+};
+
+class LodErrorOf : public LodSurfaces, public testing::TestWithParam<NamedMesh> {
+protected:
+  LodErrorOf() : LodSurfaces(build_lod(GetParam().make())) {}
 };
 
 /// The other way round says nothing: what a group was made from reaches further than the group.
@@ -80,6 +89,20 @@ TEST_P(LodErrorOf, IsNotBelowTheDistanceOfCuts) {
     for (const LodGroup& group : lod.groups)
       if (group.level == level && !group.terminal) threshold = std::max(threshold, group.error);
     EXPECT_LE(two_sided(base, triangles_of(cut_clusters(lod, threshold)), 4000), with_rounding(threshold));
+  }
+}
+
+/// Errors of levels in turn add up to more.
+TEST(LodError, OfCoarseLevelsIsNotFarAboveTheDistance) {
+  const LodSurfaces surfaces(build_lod(torus_mesh(200, 120)));
+  const ClusterLod& lod = surfaces.lod();
+  const std::vector<Triangle> base = surfaces.triangles_of(cut_clusters(lod, 0.0));
+  for (uint32_t level = 0; level + 1 < lod.level_count; ++level) {
+    double threshold = 0.0;
+    for (const LodGroup& group : lod.groups)
+      if (group.level == level && !group.terminal) threshold = std::max(threshold, group.error);
+    const double measured = surfaces.two_sided(base, surfaces.triangles_of(cut_clusters(lod, threshold)), 4000);
+    EXPECT_LE(threshold, 2.0 * measured) << "level " << level + 1;
   }
 }
 

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "compress/bake/lod/loose_pieces.h"
+#include "compress/bake/lod/quadric.h"
 #include "compress/bake/lod/surface_bound.h"
 #include "compress/bake/lod/triangle_distance.h"
 #include "tests/compress/lod/lod_meshes.h"
@@ -81,6 +82,50 @@ TEST(Simplify, AFlatPlaneStaysFlatAndWhole) {
                                    mesh.points[t.points.z] - mesh.points[t.points.x]));
   }
   EXPECT_DOUBLE_EQ(area, 2.0 * 3200.0 * 3200.0);
+}
+
+/// The sides of a polygon, each of triangles whose three corners lie in a line.
+TEST(Simplify, LinesOfThreePointsKeepTheirShape) {
+  constexpr uint32_t kSides = 16, kCut = 8;
+  constexpr double kRadius = 1e5;
+  SimplifyMesh mesh;
+  const auto corner = [](uint32_t i) {
+    const double angle = 2.0 * M_PI * i / kSides;
+    return static_cast<double>(kCut) * glm::round(kRadius / kCut * DVec3(std::cos(angle), std::sin(angle), 0.0));
+  };
+  for (uint32_t side = 0; side < kSides; ++side)
+    for (uint32_t i = 0; i < kCut; ++i) {
+      const uint32_t first = side * kCut + i;
+      mesh.points.push_back(corner(side) + (corner(side + 1) - corner(side)) * (i / static_cast<double>(kCut)));
+      if (i + 2 <= kCut)
+        mesh.triangles.push_back(
+            {Triangle(first, first + 1, (first + 2) % (kSides * kCut)), Triangle(Wedge::kNone), 0, 0.0});
+    }
+  mesh.locked.assign(mesh.points.size(), 0);
+  const std::vector<DVec3> points = mesh.points;
+  simplify(mesh, to(static_cast<uint32_t>(mesh.triangles.size() / 2)));
+  double farthest = 0.0;
+  for (const DVec3& p : points) {
+    double nearest = kRadius;
+    for (const LodTriangle& t : mesh.triangles)
+      nearest = std::min(nearest, glm::length(p - nearest_point(p, mesh.points[t.points.x], mesh.points[t.points.y],
+                                                                mesh.points[t.points.z])));
+    farthest = std::max(farthest, nearest);
+  }
+  EXPECT_LT(farthest, 0.02 * kRadius);
+}
+
+TEST(Quadric, OfALineIsTheSquaredDistanceFromIt) {
+  const DVec3 along = glm::normalize(DVec3(1.0, 2.0, -2.0)), from(3.0, -1.0, 5.0);
+  Quadric q;
+  q.add_line(along, from, 2.5);
+  for (const DVec3 p : {DVec3(0.0), DVec3(7.0, 1.0, 2.0), from + 4.0 * along}) {
+    const double value = q.xx * p.x * p.x + q.yy * p.y * p.y + q.zz * p.z * p.z +
+                         2.0 * (q.xy * p.x * p.y + q.xz * p.x * p.z + q.yz * p.y * p.z) +
+                         2.0 * (q.bx * p.x + q.by * p.y + q.bz * p.z) + q.c;
+    const DVec3 off = glm::cross(p - from, along);
+    EXPECT_NEAR(value, 2.5 * glm::dot(off, off), 1e-9);
+  }
 }
 
 TEST(Simplify, MaterialSeamsStay) {

@@ -1,0 +1,355 @@
+#include "compress/bake/lod/direct_bound.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "compress/bake/lod/surface_side.h"
+#include "compress/bake/lod/triangle_refiner.h"
+#include "compress/bake/lod/triangle_set.h"
+
+namespace packtrace {
+namespace {
+
+using Corners = std::array<DVec3, 3>;
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr double kInflation = 1.001; // of what was measured, for all roundings
+constexpr double kRounding = 1e-3;   // steps; of what is cut away
+constexpr double kSlack = 1.25;      // a smaller gain than that is not looked for
+constexpr size_t kFewOf = 8;         // how many triangles one is measured of, at most: where many are, little is gained
+
+/// Convex, in a plane.
+struct Polygon {
+  std::array<DVec3, 10> corners;
+  size_t count = 0;
+};
+
+/// Keeps what is not further along `direction` than `limit`.
+Polygon cut(const Polygon& in, DVec3 direction, double limit) {
+  Polygon out;
+  for (size_t k = 0; k < in.count; ++k) {
+    const DVec3 &p = in.corners[k == 0 ? in.count - 1 : k - 1], &q = in.corners[k];
+    const double last = limit - glm::dot(direction, p), next = limit - glm::dot(direction, q);
+    if ((last < 0.0) != (next < 0.0) && out.count < out.corners.size())
+      out.corners[out.count++] = p + (last / (last - next)) * (q - p);
+    if (next >= 0.0 && out.count < out.corners.size()) out.corners[out.count++] = q;
+  }
+  return out;
+}
+
+/// What a triangle stands for lies near it.
+class Neighbourhood {
+public:
+  explicit Neighbourhood(const Corners& c) {
+    const DVec3 normal = glm::cross(c[1] - c[0], c[2] - c[0]);
+    const double area = glm::length(normal);
+    if (!(area > 0.0)) return;
+    add(normal / area, c[0]), add(-normal / area, c[0]);
+    for (size_t i = 0; i < 3; ++i) {
+      const DVec3 outwards = glm::cross(c[(i + 1) % 3] - c[i], normal);
+      const double length = glm::length(outwards);
+      if (length > 0.0) add(outwards / length, c[i]);
+    }
+  }
+
+  /// The part of a triangle that may be nearer than that.
+  Polygon part_within(const Corners& triangle, double distance) const {
+    const double reach = distance + kRounding;
+    Polygon polygon{{triangle[0], triangle[1], triangle[2]}, 3};
+    for (size_t i = 0; i < count_ && polygon.count > 0; ++i) polygon = cut(polygon, directions_[i], limits_[i] + reach);
+    return polygon;
+  }
+
+private:
+  void add(DVec3 direction, DVec3 point) {
+    directions_[count_] = direction, limits_[count_++] = glm::dot(direction, point);
+  }
+  std::array<DVec3, 5> directions_{};
+  std::array<double, 5> limits_{};
+  size_t count_ = 0;
+};
+
+class Tightener {
+public:
+  Tightener(const DirectBoundInput& input, SimplifyMesh& mesh, SurfaceLinks& links)
+      : in_(input), m_(mesh), links_(links), after_({mesh.points, mesh.triangles}),
+        largest_(input.floor) {
+    after_.link();
+  }
+
+  void run() {
+    fill_heap();
+    size_t left = (in_.triangles.size() + m_.triangles.size()) / kFewOf;
+    while (!heap_.empty() && heap_.front().first > kSlack * largest_ && left-- > 0) {
+      std::pop_heap(heap_.begin(), heap_.end());
+      const auto [stated, number] = heap_.back();
+      heap_.pop_back();
+      const bool is_before = number < in_.triangles.size();
+      const uint32_t t = is_before ? number : number - static_cast<uint32_t>(in_.triangles.size());
+      double& bound = is_before ? links_.bounds[t] : m_.triangles[t].error;
+      bound = std::min(stated, is_before ? measure_before(t, stated) : measure_after(t, stated));
+      largest_ = std::max(largest_, bound);
+    }
+    links_.links.insert(links_.links.end(), found_.begin(), found_.end());
+  }
+
+private:
+  void fill_heap() {
+    for (uint32_t t = 0; t < in_.triangles.size(); ++t) heap_.emplace_back(links_.bounds[t], t);
+    for (uint32_t s = 0; s < m_.triangles.size(); ++s)
+      heap_.emplace_back(m_.triangles[s].error, static_cast<uint32_t>(in_.triangles.size()) + s);
+    std::erase_if(heap_, [&](const auto& entry) { return entry.first <= kSlack * largest_; });
+    std::make_heap(heap_.begin(), heap_.end());
+  }
+
+  /// Lists of triangles before that each triangle after is linked to.
+  void link_after() {
+    first_.assign(m_.triangles.size() + 1, 0u);
+    for (const SurfaceLink& link : links_.links) ++first_[link.after];
+    uint32_t sum = 0;
+    for (uint32_t& first : first_) sum += first, first = sum;
+    before_.resize(links_.links.size());
+    for (const SurfaceLink& link : links_.links) before_[--first_[link.after]] = link.before;
+  }
+
+  DVec3 point(uint32_t vertex) const {
+    const LatticePoint& q = in_.levels.positions[in_.levels.vertices[vertex].position];
+    DVec3 p;
+    for (size_t axis = 0; axis < 3; ++axis) p[static_cast<int>(axis)] = static_cast<double>(q[axis] - in_.center[axis]);
+    return p;
+  }
+
+  Corners corners_of(uint32_t number) const {
+    const Triangle& t = in_.levels.triangles[number];
+    return {point(t.x), point(t.y), point(t.z)};
+  }
+
+  Corners corners_before(uint32_t t) const {
+    const Triangle& p = in_.triangles[t].points;
+    return {in_.points[p.x], in_.points[p.y], in_.points[p.z]};
+  }
+
+  /// Replaces numbers_ by those of the level below that they go back to and that reach into the box. False, and nothing
+  /// done, where they go back no further.
+  bool go_back(const DVec3& lo, const DVec3& hi) {
+    next_numbers_.clear();
+    for (const uint32_t number : numbers_) {
+      const std::span<const uint32_t> below = in_.levels.history.below(number);
+      next_numbers_.insert(next_numbers_.end(), below.begin(), below.end());
+    }
+    if (next_numbers_.empty()) return false;
+    std::sort(next_numbers_.begin(), next_numbers_.end());
+    next_numbers_.erase(std::unique(next_numbers_.begin(), next_numbers_.end()), next_numbers_.end());
+    numbers_.clear();
+    for (const uint32_t number : next_numbers_) {
+      const Corners c = corners_of(number);
+      const double error = in_.levels.errors[number] + kRounding;
+      const DVec3 least = glm::min(glm::min(c[0], c[1]), c[2]) - error;
+      const DVec3 most = glm::max(glm::max(c[0], c[1]), c[2]) + error;
+      if (least.x <= hi.x && least.y <= hi.y && least.z <= hi.z && most.x >= lo.x && most.y >= lo.y && most.z >= lo.z)
+        numbers_.push_back(number);
+    }
+    return true;
+  }
+
+  // ---- from below to the surface after
+
+  /// Goes back for what is too far from there only.
+  double measure_before(uint32_t t, double stated) {
+    const Corners corners = corners_before(t);
+    const Neighbourhood near(corners);
+    const double had = in_.triangles[t].error;
+    const DVec3 lo = glm::min(glm::min(corners[0], corners[1]), corners[2]) - had;
+    const DVec3 hi = glm::max(glm::max(corners[0], corners[1]), corners[2]) + had;
+    gather_after(t);
+    double largest = 0.0, worst = 0.0; // of what is near enough, and of the rest
+    pieces_.clear(), worst_pieces_.clear();
+    numbers_.assign(1, in_.numbers[t]);
+    for (uint32_t depth = 0; depth < TriangleHistory::kDepth && (go_back(lo, hi) || depth == 0); ++depth) {
+      worst = 0.0, worst_pieces_.clear();
+      size_t kept = 0;
+      for (const uint32_t below : numbers_) {
+        const size_t before = worst_pieces_.size();
+        const double bound = measure_below(t, near, below, depth, stated);
+        if (bound <= largest_) {
+          largest = std::max(largest, bound);
+          pieces_.insert(pieces_.end(), worst_pieces_.begin() + static_cast<std::ptrdiff_t>(before),
+                         worst_pieces_.end());
+          worst_pieces_.resize(before);
+        } else {
+          worst = std::max(worst, bound);
+          numbers_[kept++] = below;
+        }
+      }
+      numbers_.resize(kept);
+      if (kept == 0) break;
+    }
+    if (worst >= stated) return stated;
+    pieces_.insert(pieces_.end(), worst_pieces_.begin(), worst_pieces_.end());
+    for (const uint32_t s : pieces_) found_.push_back({t, s});
+    return std::max(largest, worst);
+  }
+
+  /// What one of the group stands for of one below. Adds what it is measured against to worst_pieces_.
+  double measure_below(uint32_t t, const Neighbourhood& near, uint32_t below, uint32_t depth, double stated) {
+    const double error = in_.levels.errors[below], enough = (largest_ - error) / kInflation;
+    const Corners corners = corners_of(below);
+    if (const auto [s, distance] = nearest_to_all(corners); distance <= enough) {
+      worst_pieces_.push_back(s);
+      return distance * kInflation + error;
+    }
+    const bool last = depth + 1 == TriangleHistory::kDepth || in_.levels.history.below(below).empty();
+    const Polygon part = near.part_within(corners, in_.triangles[t].error + error);
+    double largest = 0.0;
+    for (size_t i = 2; i < part.count && largest < stated; ++i) {
+      const Corners corners_part{part.corners[0], part.corners[i - 1], part.corners[i]};
+      double distance = measure_part(corners_part, enough, kInfinite);
+      if (distance > enough && last) {
+        after_.gather_within(corners_part, std::min(distance, (stated - error) / kInflation));
+        distance = measure_part(corners_part, enough, distance);
+        gather_after(t);
+      }
+      largest = std::max(largest, distance * kInflation + error);
+    }
+    return largest;
+  }
+
+  /// What is around the points that the corners of one of the group became.
+  void gather_after(uint32_t t) {
+    const Triangle& p = in_.triangles[t].points;
+    after_.gather({m_.stands_for[p.x], m_.stands_for[p.y], m_.stands_for[p.z]});
+    set_.clear();
+    for (const uint32_t s : after_.candidates()) set_.add(after_.surface(), s);
+  }
+
+  /// The triangle after that is nearest to all of it, and how far at most.
+  std::pair<uint32_t, double> nearest_to_all(const Corners& corners) {
+    if (set_.empty()) return {0, kInfinite};
+    for (size_t k = 0; k < 3; ++k) set_.distances(corners[k], distances_[k]);
+    double best = kInfinite;
+    size_t where = 0;
+    for (size_t i = 0; i < set_.size(); ++i)
+      if (const double d = std::max({distances_[0][i], distances_[1][i], distances_[2][i]}); d < best)
+        best = d, where = i;
+    return {set_.number(where), best};
+  }
+
+  /// How far a triangle is from the surface after, as far as the candidates go.
+  /// @param known that it is not further
+  double measure_part(const Corners& part, double enough, double known) {
+    best_.clear();
+    double best = known;
+    lay(after_, part, enough, best);
+    if (best > enough) refine(after_, part, enough, best);
+    for (const auto& [s, d] : best_) worst_pieces_.push_back(s);
+    return best;
+  }
+
+  /// Replaces best_ where it finds a smaller bound.
+  void lay(SurfaceSide& side, const Corners& triangle, double enough, double& best) {
+    overlay_.clear();
+    const DVec3 normal = glm::cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
+    if (!side.lay(triangle, normal, overlay_)) return;
+    double largest = 0.0;
+    tried_.clear();
+    for (OverlayPiece& piece : overlay_) {
+      if (piece.distance > enough) piece.distance = side.overlay().nearest_distance(piece);
+      largest = std::max(largest, piece.distance);
+      tried_.emplace_back(piece.triangle, piece.distance);
+    }
+    if (largest < best) std::swap(best_, tried_), best = largest;
+  }
+
+  /// The same, cutting the triangle in four.
+  void refine(SurfaceSide& side, const Corners& triangle, double enough, double& best) {
+    tried_.clear();
+    const double d = refiner_.run(
+        triangle, side, [&](double distance, uint32_t) { return distance <= enough; },
+        [&](uint32_t s, double distance) { tried_.emplace_back(s, distance); });
+    if (d < best) std::swap(best_, tried_), best = d;
+  }
+
+  // ---- from the surface after to below
+
+  /// Goes back as far as that makes it smaller and no further than needed.
+  double measure_after(uint32_t s, double stated) {
+    if (first_.empty()) link_after();
+    const Corners corners = after_.corners(s);
+    const DVec3 lo = glm::min(glm::min(corners[0], corners[1]), corners[2]) - stated;
+    const DVec3 hi = glm::max(glm::max(corners[0], corners[1]), corners[2]) + stated;
+    numbers_.clear();
+    for (uint32_t i = first_[s]; i < first_[s + 1]; ++i) numbers_.push_back(in_.numbers[before_[i]]);
+    double bound = stated;
+    for (uint32_t depth = 0; depth < TriangleHistory::kDepth && bound > largest_ && go_back(lo, hi); ++depth)
+      bound = std::min(bound, measure_over_below(corners, stated));
+    return bound;
+  }
+
+  double measure_over_below(const Corners& corners, double stated) {
+    below_points_.clear(), below_.clear();
+    for (const uint32_t number : numbers_) {
+      const auto first = static_cast<uint32_t>(below_points_.size());
+      for (const DVec3& corner : corners_of(number)) below_points_.push_back(corner);
+      below_.push_back({Triangle(first, first + 1, first + 2), {}, 0, in_.levels.errors[number]});
+    }
+    if (below_.empty()) return stated;
+    SurfaceSide side({below_points_, below_});
+    side.gather_within(corners, stated);
+    best_.clear();
+    double distance = kInfinite;
+    lay(side, corners, (largest_ - least_error()) / kInflation, distance);
+    const double laid = worst(distance);
+    if (laid <= largest_) return laid;
+    tried_.clear();
+    distance = refiner_.run(
+        corners, side, [&](double d, uint32_t t) { return d * kInflation + below_[t].error <= largest_; },
+        [&](uint32_t t, double d) { tried_.emplace_back(t, d); });
+    std::swap(best_, tried_);
+    return std::min(laid, worst(distance));
+  }
+
+  double least_error() const {
+    double least = kInfinite;
+    for (const LodTriangle& t : below_) least = std::min(least, t.error);
+    return least;
+  }
+
+  /// Of best_, with what triangles below already have.
+  double worst(double measured) const {
+    if (measured == kInfinite) return kInfinite;
+    double largest = 0.0;
+    for (const auto& [t, distance] : best_) largest = std::max(largest, distance * kInflation + below_[t].error);
+    return largest;
+  }
+
+  const DirectBoundInput& in_;
+  SimplifyMesh& m_;
+  SurfaceLinks& links_;
+  SurfaceSide after_;
+  double largest_;                                ///< the group's error is at least this
+  std::vector<std::pair<double, uint32_t>> heap_; ///< triangles before, then those after
+  std::vector<uint32_t> first_, before_;          ///< lists per triangle after
+  std::vector<SurfaceLink> found_;
+  std::vector<uint32_t> numbers_, next_numbers_, pieces_, worst_pieces_;
+  TriangleSet set_; ///< the candidates after
+  std::array<std::vector<double>, 3> distances_;
+  std::vector<OverlayPiece> overlay_;
+  std::vector<std::pair<uint32_t, double>> best_, tried_;
+  std::vector<DVec3> below_points_;
+  std::vector<LodTriangle> below_;
+  TriangleRefiner refiner_;
+};
+
+} // namespace
+
+void bound_directly(const DirectBoundInput& input, SimplifyMesh& mesh, SurfaceLinks& links) {
+  const auto below = [&](uint32_t number) { return !input.levels.history.below(number).empty(); };
+  if (input.dropped || std::any_of(input.numbers.begin(), input.numbers.end(), below))
+    Tightener(input, mesh, links).run();
+  for (const SurfaceLink& link : links.links)
+    mesh.triangles[link.after].error = std::max(mesh.triangles[link.after].error, links.bounds[link.before]);
+}
+
+} // namespace packtrace
