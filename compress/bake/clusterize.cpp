@@ -61,13 +61,15 @@ public:
     weigh(place);
   }
 
-  /// The last one comes to its place.
+  /// Those behind it move up: of equal scores the first to come goes first.
   void remove(uint32_t place) {
     --count_;
-    triangle_[place] = triangle_[count_], added_[place] = added_[count_], open_[place] = open_[count_];
-    for (size_t i = 0; i < 3; ++i)
-      vertices_[i][place] = vertices_[i][count_], centroid_[i][place] = centroid_[i][count_];
-    weight_[place] = weight_[count_];
+    for (uint32_t i = place; i < count_; ++i) {
+      triangle_[i] = triangle_[i + 1], added_[i] = added_[i + 1], open_[i] = open_[i + 1];
+      for (auto& vertex : vertices_) vertex[i] = vertex[i + 1];
+      for (auto& coordinate : centroid_) coordinate[i] = coordinate[i + 1];
+      weight_[i] = weight_[i + 1];
+    }
   }
 
   void set_open(uint32_t place, uint32_t open) {
@@ -169,7 +171,7 @@ private:
   void take(uint32_t triangle) {
     if (const uint32_t place = place_[triangle]; place != kNone) {
       frontier_.remove(place);
-      if (place < frontier_.size()) place_[frontier_.triangle(place)] = place;
+      for (uint32_t i = place; i < frontier_.size(); ++i) place_[frontier_.triangle(i)] = i;
       place_[triangle] = kNone;
     }
     taken_[triangle] = 1;
