@@ -18,7 +18,8 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kInflation = 1.001; // of what was measured, for all roundings
 constexpr double kRounding = 1e-3;   // steps; of what is cut away
 constexpr double kSlack = 1.25;      // a smaller gain than that is not looked for
-constexpr size_t kFewOf = 8;         // how many triangles one is measured of, at most: where many are, little is gained
+// So many triangles are measured at most, or one of so many: where more are too far off, little is gained.
+constexpr size_t kFew = 512, kFewOf = 8;
 
 /// Convex, in a plane.
 struct Polygon {
@@ -81,7 +82,7 @@ public:
 
   void run() {
     fill_heap();
-    size_t left = (in_.triangles.size() + m_.triangles.size()) / kFewOf;
+    size_t left = std::max(kFew, (in_.triangles.size() + m_.triangles.size()) / kFewOf);
     while (!heap_.empty() && heap_.front().first > kSlack * largest_ && left-- > 0) {
       std::pop_heap(heap_.begin(), heap_.end());
       const auto [stated, number] = heap_.back();
