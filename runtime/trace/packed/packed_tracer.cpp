@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <optional>
 
 #include "compress/bvh/box_tree.h"
 #include "compress/format/packed_trees.h"
@@ -14,6 +15,7 @@
 #include "runtime/trace/packed/batch_cache.h"
 #include "runtime/trace/packed/top_tree.h"
 #include "runtime/trace/packed/trace_cluster.h"
+#include "runtime/trace/packed/tree_hull.h"
 #include "runtime/trace/placement.h"
 
 namespace packtrace {
@@ -52,42 +54,6 @@ bool invertible(const DAffine& to_from, const DAffine& from_to) {
   return norm(to_from) * norm(from_to) <= kMaxCondition && is_finite(from_to[3]); // false for NaN
 }
 
-/// The root's box, in the tree's grid.
-void root_box(const baked::PackedNode& root, double (&lo)[3], double (&hi)[3]) {
-  for (uint32_t axis = 0; axis < 3; ++axis) {
-    uint32_t least = 255, most = 0;
-    for (uint32_t child = 0; child < baked::kNodeWidth && root.children[child] != baked::kNoChild; ++child) {
-      least = std::min<uint32_t>(least, root.lo[axis][child]);
-      most = std::max<uint32_t>(most, root.hi[axis][child]);
-    }
-    const double unit = std::ldexp(1.0, static_cast<int>(root.exponent(axis)));
-    lo[axis] = root.origin[axis] + least * unit;
-    hi[axis] = root.origin[axis] + most * unit;
-  }
-}
-
-/// In unit space, a little larger than what may be hit.
-TreeBox placed_box(const packed::TracePlacement& placement, const DAffine& unit_from_grid) {
-  DVec3 centre, half;
-  for (int axis = 0; axis < 3; ++axis) {
-    centre[axis] = 0.5 * (placement.box_lo[axis] + placement.box_hi[axis]);
-    half[axis] = 0.5 * (placement.box_hi[axis] - placement.box_lo[axis]);
-  }
-  // Rays in the grid are off by 2^-22 of the largest coordinate there, see grid_ray.h.
-  const DVec3 pad(0x1p-20 * glm::max(glm::max(std::abs(centre.x) + half.x, std::abs(centre.y) + half.y),
-                                     std::abs(centre.z) + half.z));
-  const DVec3 middle = transform_point(unit_from_grid, centre);
-  const DVec3 reach = glm::abs(unit_from_grid[0]) * (half.x + pad.x) + glm::abs(unit_from_grid[1]) * (half.y + pad.y) +
-                      glm::abs(unit_from_grid[2]) * (half.z + pad.z);
-  TreeBox box;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto i = static_cast<size_t>(axis);
-    box.lo[i] = std::nextafter(static_cast<float>(middle[axis] - reach[axis]), -INFINITY);
-    box.hi[i] = std::nextafter(static_cast<float>(middle[axis] + reach[axis]), INFINITY);
-  }
-  return box;
-}
-
 /// Sets up the tree over placements as something placed in unit space itself.
 void place_top(std::span<const TreeBox> boxes, packed::KernelScene& scene) {
   TreeBox all = boxes[0];
@@ -108,6 +74,7 @@ struct PackedTracer::Tables {
   std::span<const baked::PackedNode> nodes;
   std::vector<packed::TraceCluster> clusters;
   std::vector<packed::TraceTree> trees;
+  std::vector<std::optional<TreeHull>> hulls; ///< by tree, of those with nodes; until all is placed
   std::vector<packed::TracePlacement> placements;
   std::vector<TreeBox> boxes;           ///< of placements
   std::vector<uint32_t> instance_of;    ///< by placement; baked::kNone: the world's
@@ -123,11 +90,10 @@ struct PackedTracer::Tables {
     const baked::TreeRecord& record = records[number];
     packed::TraceTree tree{nodes.data() + record.first_node, 1.0f};
     if (record.node_count > 0) {
-      double lo[3], hi[3];
-      root_box(tree.nodes[0], lo, hi);
-      for (int axis = 0; axis < 3; ++axis)
-        tree.max_coordinate = std::max(
-            {tree.max_coordinate, static_cast<float>(std::abs(lo[axis])), static_cast<float>(std::abs(hi[axis]))});
+      hulls[number].emplace(tree.nodes);
+      const DVec3 far = glm::max(glm::abs(hulls[number]->lo()), glm::abs(hulls[number]->hi()));
+      tree.max_coordinate =
+          std::max({1.0f, static_cast<float>(far.x), static_cast<float>(far.y), static_cast<float>(far.z)});
     }
     trees.push_back(tree);
   }
@@ -157,9 +123,11 @@ PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, con
   t.tree_of.assign(source.geometry_count(), baked::kNone);
   t.grid_of.assign(file.geometries().size(), baked::kNone);
   lod != nullptr ? build_lod() : build_whole();
+  t.hulls.resize(t.records.size());
   for (uint32_t i = 0; i < t.records.size(); ++i) t.add_tree(i);
   find_first_instances();
   place();
+  t.hulls = {};
   t.scene.clusters = t.clusters.data();
   t.scene.trees = t.trees.data();
   t.scene.placements = t.placements.data();
@@ -325,10 +293,12 @@ void PackedTracer::add_placement(uint32_t tree, uint32_t instance, const DAffine
   packed::TracePlacement placement{};
   for (int column = 0; column < 4; ++column)
     for (int axis = 0; axis < 3; ++axis) placement.grid_from_unit[3 * column + axis] = grid_from_unit[column][axis];
-  root_box(t.trees[tree].nodes[0], placement.box_lo, placement.box_hi);
+  const TreeHull& hull = *t.hulls[tree];
+  for (int axis = 0; axis < 3; ++axis)
+    placement.box_lo[axis] = hull.lo()[axis], placement.box_hi[axis] = hull.hi()[axis];
   placement.tree = tree;
   placement.ray_classes = t.trees[tree].nodes[0].ray_classes;
-  t.boxes.push_back(placed_box(placement, unit_from_grid));
+  t.boxes.push_back(hull.placed(unit_from_grid));
   t.placements.push_back(placement);
   t.instance_of.push_back(instance);
 }
