@@ -54,11 +54,17 @@ bool invertible(const DAffine& to_from, const DAffine& from_to) {
   return norm(to_from) * norm(from_to) <= kMaxCondition && is_finite(from_to[3]); // false for NaN
 }
 
+/// Whether it does no more than scale and move.
+bool is_aligned(const DAffine& m) {
+  return m[0].y == 0.0 && m[0].z == 0.0 && m[1].x == 0.0 && m[1].z == 0.0 && m[2].x == 0.0 && m[2].y == 0.0;
+}
+
 /// Sets up the tree over placements as something placed in unit space itself.
 void place_top(std::span<const TreeBox> boxes, packed::KernelScene& scene) {
   TreeBox all = boxes[0];
   for (const TreeBox& box : boxes) all.extend(box);
   scene.top = {};
+  scene.top.aligned = 1;
   for (size_t axis = 0; axis < 3; ++axis) {
     scene.top.grid_from_unit[3 * axis + axis] = 1.0;
     scene.top.box_lo[axis] = all.lo[axis], scene.top.box_hi[axis] = all.hi[axis];
@@ -297,6 +303,7 @@ void PackedTracer::add_placement(uint32_t tree, uint32_t instance, const DAffine
   for (int axis = 0; axis < 3; ++axis)
     placement.box_lo[axis] = hull.lo()[axis], placement.box_hi[axis] = hull.hi()[axis];
   placement.tree = tree;
+  placement.aligned = is_aligned(grid_from_unit) ? 1 : 0;
   placement.ray_classes = t.trees[tree].nodes[0].ray_classes;
   t.boxes.push_back(hull.placed(unit_from_grid));
   t.placements.push_back(placement);

@@ -2,6 +2,7 @@
 
 #include "runtime/trace/packed/batch_decode.h"
 #include "runtime/trace/packed/beam.h"
+#include "runtime/trace/packed/enter.h"
 #include "runtime/trace/packed/leaf_tests.h"
 
 /// Groups of rays through trees of nodes. They come to a node together, as one word of bits, and leave for each child
@@ -48,6 +49,7 @@ public:
     uint32_t numbers[8][kGroup], sizes[8] = {};
     for (size_t i = 0; i < count; ++i) {
       const auto number = static_cast<uint32_t>(i);
+      __builtin_prefetch(rays_ + i + 96);
       if constexpr (kCount) ++counters_->rays;
       if constexpr (kAny)
         occluded_[i] = 0;
@@ -111,7 +113,7 @@ private:
   /// Through the tree over placements.
   void trace_top() {
     RayGroup group;
-    const uint64_t rays = enter<false>(scene_.top, scene_.top_max_coordinate, unit_, alive_, group);
+    const uint64_t rays = enter<false, !kAny>(scene_.top, scene_.top_max_coordinate, unit_, alive_, group);
     by_octant(group, rays, [&](uint64_t together, uint32_t octant) { trace_top(group, together, octant); });
   }
 
@@ -145,7 +147,7 @@ private:
     if constexpr (kCount) counters_->placements += count_ones(rays);
     const TraceTree& tree = scene_.trees[place.tree];
     RayGroup group;
-    rays = enter<true>(place, tree.max_coordinate, unit_, rays, group);
+    rays = enter<true, !kAny>(place, tree.max_coordinate, unit_, rays, group);
     Beam beam;
     if constexpr (!kAny)
       if (make_beam(group, tree.max_coordinate, rays, beam)) group.beam = &beam;
@@ -290,12 +292,12 @@ private:
       const BatchNormals normals = batch_normals<Lanes>(batch);
       uint64_t exact = 0;
       if (kAny && (scene_.clusters[cluster].flags & kMasked) == 0) {
-        alive_ &= ~rays_that_hit<Lanes>(batch, normals, group, rays, exact);
+        alive_ &= ~rays_that_hit<Lanes, !kAny>(batch, normals, group, rays, exact);
       } else {
         const uint64_t others = test_side_by_side(batch, normals, place, group, rays);
         const bool many = kPairs<Lanes> && count_ones(others) >= kLeastTestedTwice;
         test_each(batch, normals, place, group,
-                  many ? rays_that_hit<Lanes>(batch, normals, group, others, exact) : others);
+                  many ? rays_that_hit<Lanes, !kAny>(batch, normals, group, others, exact) : others);
       }
       if constexpr (kCount) counters_->exact_triangles += exact;
       rays &= alive_;
@@ -311,7 +313,7 @@ private:
       const uint32_t i = first_bit(m);
       LaneHits<Lanes> hits;
       uint64_t exact = 0;
-      const uint32_t lanes = test_triangles<Lanes, true>(batch, normals, group, i, hits, exact);
+      const uint32_t lanes = test_triangles<Lanes, true, !kAny>(batch, normals, group, i, hits, exact);
       if constexpr (kCount) counters_->exact_triangles += exact;
       if (lanes != 0) take_hits(place, i, hits, lanes, group);
     }
@@ -330,7 +332,7 @@ private:
       for (uint32_t triangle = 0; triangle < batch.count; ++triangle) {
         LaneHits<Wide> hits;
         uint64_t exact = 0;
-        uint32_t lanes = test_rays<Wide, true>(batch, normals, triangle, group, axis, at, wanted, hits, exact);
+        uint32_t lanes = test_rays<Wide, true, !kAny>(batch, normals, triangle, group, axis, at, wanted, hits, exact);
         if constexpr (kCount) counters_->exact_triangles += exact;
         place.triangle = begin + triangle;
         for (; lanes != 0; lanes &= lanes - 1) {
