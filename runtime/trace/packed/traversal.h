@@ -34,6 +34,9 @@ struct Pending {
   float t; ///< where the first of them enters; only for order
 };
 
+/// How far ahead rays are fetched while others are sorted.
+constexpr uintptr_t kBytesAhead = 96 * sizeof(KernelRay);
+
 /// Any hits (kAny) or nearest hits of one ray class in one scene, on one thread.
 template <typename Lanes, bool kAny, bool kCount>
 class Traversal {
@@ -49,7 +52,7 @@ public:
     uint32_t numbers[8][kGroup], sizes[8] = {};
     for (size_t i = 0; i < count; ++i) {
       const auto number = static_cast<uint32_t>(i);
-      __builtin_prefetch(rays_ + i + 96);
+      __builtin_prefetch(reinterpret_cast<const void*>(reinterpret_cast<uintptr_t>(rays_ + i) + kBytesAhead));
       if constexpr (kCount) ++counters_->rays;
       if constexpr (kAny)
         occluded_[i] = 0;
