@@ -4,29 +4,14 @@
 #include "runtime/trace/packed/beam.h"
 #include "runtime/trace/packed/enter.h"
 #include "runtime/trace/packed/leaf_tests.h"
+#include "runtime/trace/packed/node_children.h"
+#include "runtime/trace/packed/outside_search.h"
 
 /// Groups of rays through trees of nodes. They come to a node together, as one word of bits, and leave for each child
 /// those that pass its box: a node is read and set up once for all of them, and nothing waits for the outcome of one
 /// ray's test. Idea: Barringer, Akenine-Moeller, "Dynamic ray stream traversal" (2014).
 namespace packtrace::packed {
 namespace {
-
-/// PackedNode::children as one number.
-struct NodeChildren {
-  uint64_t bytes;
-
-  explicit NodeChildren(const baked::PackedNode& node) {
-    __builtin_memcpy(&bytes, reinterpret_cast<const uint8_t*>(&node) + offsetof(baked::PackedNode, children),
-                     sizeof bytes);
-  }
-  bool leaves() const { return (bytes & 0xffu) != baked::kInnerChild; }
-  /// Slots in use, which come first.
-  uint32_t slots() const { return bytes == 0 ? 0u : 0xffu >> (static_cast<uint32_t>(__builtin_clzll(bytes)) / 8); }
-  /// Byte i: triangles in the leaves of slots below i; at most 128.
-  uint64_t leaf_begins() const { return bytes * 0x0101010101010100u; }
-};
-
-inline uint32_t byte_of(uint64_t word, uint32_t slot) { return static_cast<uint32_t>(word >> (8 * slot)) & 0xffu; }
 
 struct Pending {
   uint64_t rays; ///< as bits
@@ -41,6 +26,9 @@ constexpr uintptr_t kBytesAhead = 96 * sizeof(KernelRay);
 template <typename Lanes, bool kAny, bool kCount>
 class Traversal {
 public:
+  using Kernel = Lanes;
+  static constexpr bool kAnyHit = kAny;
+
   /// @param occluded or hits, one for each ray
   Traversal(const KernelScene& scene, BatchCache& cache, const KernelRay* rays, uint32_t ray_class, uint8_t* occluded,
             KernelHit* hits, KernelCounters* counters)
@@ -71,6 +59,8 @@ public:
   }
 
 private:
+  friend struct OutsideSearch<Traversal>;
+
   struct Place {
     uint32_t placement, cluster, triangle;
   };
@@ -156,53 +146,10 @@ private:
       if (make_beam(group, tree.max_coordinate, rays, beam)) group.beam = &beam;
     by_octant(group, rays, [&](uint64_t together, uint32_t octant) {
       if (scene_.search_tree != nullptr)
-        search_tree(placement, tree.nodes, group, together, octant);
+        OutsideSearch<Traversal>::run(*this, placement, tree.nodes, group, together, octant);
       else
         trace_tree(placement, tree.nodes, group, together, octant);
     });
-  }
-
-  /// What visit_leaf_nodes() needs to know.
-  struct Search {
-    Traversal* self;
-    const baked::PackedNode* nodes;
-    RayGroup* group;
-    uint32_t placement, octant;
-  };
-
-  /// As trace_tree(), where leaf nodes are found by scene_.search_tree.
-  void search_tree(uint32_t placement, const baked::PackedNode* nodes, RayGroup& group, uint64_t rays,
-                   uint32_t octant) {
-    Search state{this, nodes, &group, placement, octant};
-    TreeSearch search;
-    search.tree = scene_.placements[placement].tree;
-    search.any = kAny ? 1 : 0;
-    search.count = 0;
-    search.limits = group.limits;
-    search.traversal = &state;
-    search.visit = visit_leaf_nodes;
-    for (uint64_t m = rays & alive_; m != 0; m &= m - 1) {
-      const uint32_t i = first_bit(m);
-      KernelRay& ray = search.rays[search.count];
-      search.number[search.count++] = i;
-      for (uint32_t axis = 0; axis < 3; ++axis)
-        ray.origin[axis] = group.origin[axis][i], ray.direction[axis] = 1.0f / group.inverse[axis][i];
-      ray.tnear = group.limits[i][0] > 0.0f ? group.limits[i][0] : 0.0f; // nothing lies behind an origin that moved
-      ray.tfar = group.tmax(i);
-    }
-    scene_.search_tree(scene_.searcher, search);
-  }
-
-  static uint64_t visit_leaf_nodes(const TreeSearch& search, const uint32_t* nodes, uint32_t node_count,
-                                   uint64_t rays) {
-    const Search& at = *static_cast<const Search*>(search.traversal);
-    for (uint32_t i = 0; i < node_count && (rays &= at.self->alive_) != 0; ++i) {
-      const baked::PackedNode& node = at.nodes[nodes[i]];
-      if constexpr (kCount) ++at.self->counters_->nodes, at.self->counters_->node_rays += count_ones(rays);
-      at.self->trace_leaves(at.placement, node, NodeChildren(node), typename Lanes::Boxes(node, at.octant), *at.group,
-                            rays);
-    }
-    return rays & at.self->alive_;
   }
 
   /// Through one placed tree, rays of one octant of it.
@@ -215,7 +162,7 @@ private:
       const uint64_t active = next.rays & alive_;
       if (active == 0 || passed_by(group, next)) continue;
       const baked::PackedNode& node = nodes[next.node];
-      if constexpr (kCount) ++counters_->nodes, counters_->node_rays += count_ones(active);
+      count_node(active);
       if ((node.ray_classes & ray_class_) == 0) continue;
       const NodeChildren children(node);
       const typename Lanes::Boxes boxes(node, octant);
@@ -227,6 +174,10 @@ private:
           return node.first_child + slot;
         });
     }
+  }
+
+  void count_node(uint64_t rays) {
+    if constexpr (kCount) ++counters_->nodes, counters_->node_rays += count_ones(rays);
   }
 
   /// Whether all of a beam's hits are nearer.
