@@ -139,8 +139,7 @@ nlohmann::json resident_parts(std::span<const RayTracer* const> tracers) {
   for (const RayTracer* tracer : tracers)
     for (const ResidentPart& part : tracer->resident()) {
       const std::string name(part.name);
-      const bool shared = name == "file" || name == "batch caches";
-      parts[name] = part.bytes + (shared ? 0 : parts.value(name, uint64_t{0}));
+      parts[name] = part.bytes + (part.shared ? 0 : parts.value(name, uint64_t{0}));
     }
   return parts;
 }

@@ -70,6 +70,7 @@ inline constexpr uint32_t kNoGeometry = ~0u;
 struct ResidentPart {
   std::string_view name;
   uint64_t bytes = 0;
+  bool shared = false; ///< with all other tracers of the same scene, which name the same bytes
 };
 
 /// Memory of one tree of a scene, or of all that lies in the world together.

@@ -29,8 +29,7 @@ struct alignas(64) Beam {
       read_block(some, &group.end[first]);
       keep_larger(most, some);
     }
-    limits[1] = -most[0];
-    for (uint32_t i = 1; i < kBlock; ++i) limits[1] = -most[i] < limits[1] ? -most[i] : limits[1];
+    limits[1] = -largest_lane(most);
   }
 };
 
@@ -49,7 +48,7 @@ inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam
       read_block(origin, &group.origin[axis][at]);
       same &= origin == group.origin[axis][first];
     }
-    if ((static_cast<uint32_t>(rays >> at) & 0xffu & ~lane_bits(same)) != 0) return false;
+    if ((static_cast<uint32_t>(rays >> at) & kBlockLanes & ~lane_bits(same)) != 0) return false;
   }
   for (const uint64_t backward : group.backward)
     if ((backward & rays) != 0 && (backward & rays) != rays) return false;
@@ -62,13 +61,6 @@ inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam
     group.limits[i][0] = group.limits[i][1] = group.begin[i] = __builtin_inff();
     group.end[i] = -__builtin_inff();
   }
-  const auto split = [](const float(&pairs)[kGroup][2], uint32_t at, Floats& a, Floats& b) {
-    Floats low, high;
-    read_block(low, &pairs[at][0]);
-    read_block(high, &pairs[at + 4][0]);
-    a = __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14);
-    b = __builtin_shufflevector(low, high, 1, 3, 5, 7, 9, 11, 13, 15);
-  };
   float reach = max_coordinate;
   for (uint32_t axis = 0; axis < 3; ++axis) reach = __builtin_fmaxf(reach, __builtin_fabsf(group.origin[axis][first]));
   for (uint32_t axis = 0; axis < 3; ++axis) {
@@ -78,15 +70,11 @@ inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam
       read_block(inverse, &group.inverse[axis][at]);
       keep_larger(most, inverse);
       least = inverse < least ? inverse : least;
-      split(group.bias[axis], at, near, far);
+      read_pairs(&group.bias[axis][at], near, far);
       write_block(&beam.near_bias[axis][at], near);
       write_block(&beam.far_bias[axis][at], -far);
     }
-    beam.inverse[axis][0] = least[0], beam.inverse[axis][1] = most[0];
-    for (uint32_t i = 1; i < kBlock; ++i) {
-      beam.inverse[axis][0] = __builtin_fminf(beam.inverse[axis][0], least[i]);
-      beam.inverse[axis][1] = __builtin_fmaxf(beam.inverse[axis][1], most[i]);
-    }
+    beam.inverse[axis][0] = -largest_lane(-least), beam.inverse[axis][1] = largest_lane(most);
     const float pad = least[0] < 0.0f ? -kBeamPad * reach : kBeamPad * reach; // outwards is towards the rays' origin
     beam.origin[axis][0] = group.origin[axis][first] + pad, beam.origin[axis][1] = -group.origin[axis][first] + pad;
   }
@@ -96,8 +84,7 @@ inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam
     read_block(begin, &group.begin[at]);
     least = begin < least ? begin : least;
   }
-  beam.limits[0] = least[0];
-  for (uint32_t i = 1; i < kBlock; ++i) beam.limits[0] = __builtin_fminf(beam.limits[0], least[i]);
+  beam.limits[0] = -largest_lane(-least);
   beam.update_limits(group);
   return true;
 }

@@ -61,7 +61,8 @@ struct TracePlacement {
   double box_lo[3];          ///< of the tree, in its grid
   double box_hi[3];
   uint32_t tree;
-  uint32_t ray_classes;
+  uint16_t ray_classes;
+  uint16_t aligned; ///< 1: the grid's axes are those of unit space, all else in the first three columns is 0
 };
 
 /// Of the tree over placements. Children: kTopLeaf + placement, or a node after this one.

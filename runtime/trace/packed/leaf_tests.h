@@ -11,7 +11,7 @@ namespace {
 inline uint32_t first_bit(uint64_t word) { return static_cast<uint32_t>(__builtin_ctzll(word)); }
 
 /// The triangles of a batch that a ray hits, as bits.
-template <typename Lanes, bool kWeights>
+template <typename Lanes, bool kWeights, bool kRest>
 inline uint32_t test_triangles(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group,
                                uint32_t ray, LaneHits<Lanes>& hits, uint64_t& exact_count) {
   const uint32_t axis[3] = {group.axis[0][ray], group.axis[1][ray], group.axis[2][ray]};
@@ -19,15 +19,16 @@ inline uint32_t test_triangles(const DecodedBatch& batch, const BatchNormals& no
     return Lanes::sub(Lanes::load(batch.vertex[axis[k]][corner]), Lanes::set(group.origin[axis[k]][ray]));
   };
   const auto normal = [&](uint32_t k) { return Lanes::load(normals.normal[axis[k]]); };
+  const auto rest = [&](uint32_t k) { return Lanes::set(group.rest[axis[k]][ray]); };
   const RayLanes<Lanes> lanes{
       {Lanes::set(group.shear[0][ray]), Lanes::set(group.shear[1][ray]), Lanes::set(group.shear[2][ray])},
       Lanes::set(group.begin[ray]),
       Lanes::set(group.end[ray])};
-  return test_lanes<Lanes, kWeights>(relative, normal, lanes, (1u << batch.count) - 1, hits, exact_count);
+  return test_lanes<Lanes, kWeights, kRest>(relative, normal, rest, lanes, (1u << batch.count) - 1, hits, exact_count);
 }
 
 /// Twice the triangles of a batch, in registers of 16 lanes, with the axes of rays whose k begins with k[0].
-template <typename Pair>
+template <typename Pair, bool kRest>
 struct BatchPairs {
   typename Pair::F vertex[3][3], normal[3];
   uint32_t k[3];
@@ -49,8 +50,10 @@ struct BatchPairs {
         Pair::two(group.begin, a, b),
         Pair::two(group.end, a, b)};
     LaneHits<Pair> hits;
-    return test_lanes<Pair, false>([&](uint32_t i, uint32_t corner) { return Pair::sub(vertex[i][corner], origin[i]); },
-                                   [&](uint32_t i) { return normal[i]; }, lanes, wanted, hits, exact_count);
+    return test_lanes<Pair, false, kRest>(
+        [&](uint32_t i, uint32_t corner) { return Pair::sub(vertex[i][corner], origin[i]); },
+        [&](uint32_t i) { return normal[i]; }, [&](uint32_t i) { return Pair::two(group.rest[k[i]], a, b); }, lanes,
+        wanted, hits, exact_count);
   }
 };
 
@@ -62,7 +65,7 @@ inline uint32_t lanes_at(uint64_t rays, uint32_t first) {
 
 /// The rays from lane `at` on that hit one triangle of a batch, as bits from 0 on.
 /// @param axis Woop's k, of all that are wanted
-template <typename Wide, bool kWeights>
+template <typename Wide, bool kWeights, bool kRest>
 inline uint32_t test_rays(const DecodedBatch& batch, const BatchNormals& normals, uint32_t triangle,
                           const RayGroup& group, const uint32_t (&axis)[3], uint32_t at, uint32_t wanted,
                           LaneHits<Wide>& hits, uint64_t& exact_count) {
@@ -70,11 +73,12 @@ inline uint32_t test_rays(const DecodedBatch& batch, const BatchNormals& normals
     return Wide::sub(Wide::set(batch.vertex[axis[k]][corner][triangle]), Wide::load(&group.origin[axis[k]][at]));
   };
   const auto normal = [&](uint32_t k) { return Wide::set(normals.normal[axis[k]][triangle]); };
+  const auto rest = [&](uint32_t k) { return Wide::load(&group.rest[axis[k]][at]); };
   const RayLanes<Wide> lanes{
       {Wide::load(&group.shear[0][at]), Wide::load(&group.shear[1][at]), Wide::load(&group.shear[2][at])},
       Wide::load(&group.begin[at]),
       Wide::load(&group.end[at])};
-  return test_lanes<Wide, kWeights>(relative, normal, lanes, wanted, hits, exact_count);
+  return test_lanes<Wide, kWeights, kRest>(relative, normal, rest, lanes, wanted, hits, exact_count);
 }
 
 /// Whether two rays fill a register.
@@ -94,7 +98,7 @@ inline bool same_axes(const RayGroup& group, uint32_t at, uint32_t wanted, uint3
 
 /// Of `rays`, as bits, those that hit a triangle of a batch; nothing depends on what came of one of them.
 /// @param exact counts lanes that took doubles
-template <typename Lanes>
+template <typename Lanes, bool kRest>
 inline uint64_t rays_that_hit(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group,
                               uint64_t rays, uint64_t& exact) {
   using Wide = typename Lanes::Wide;
@@ -106,14 +110,15 @@ inline uint64_t rays_that_hit(const DecodedBatch& batch, const BatchNormals& nor
     rays &= ~(uint64_t{wanted} << at);
     LaneHits<Wide> hits;
     for (uint32_t triangle = 0; triangle < batch.count; ++triangle)
-      hit |= uint64_t{test_rays<Wide, false>(batch, normals, triangle, group, axis, at, wanted, hits, exact)} << at;
+      hit |= uint64_t{test_rays<Wide, false, kRest>(batch, normals, triangle, group, axis, at, wanted, hits, exact)}
+             << at;
   }
   if constexpr (kPairs<Lanes>) {
     const uint32_t wanted = ((1u << batch.count) - 1) * 0x101u;
     for (uint32_t k = 0; k < 3; ++k) {
       uint64_t m = rays & group.major[k];
       if ((m & (m - 1)) == 0) continue; // no two
-      const BatchPairs<Wide> pairs(batch, normals, k);
+      const BatchPairs<Wide, kRest> pairs(batch, normals, k);
       do {
         const uint64_t rest = m & (m - 1);
         const uint32_t lanes = pairs.test(group, first_bit(m), first_bit(rest), wanted, exact);
@@ -126,7 +131,7 @@ inline uint64_t rays_that_hit(const DecodedBatch& batch, const BatchNormals& nor
   }
   LaneHits<Lanes> hits;
   for (uint64_t m = rays; m != 0; m &= m - 1) {
-    const uint32_t lanes = test_triangles<Lanes, false>(batch, normals, group, first_bit(m), hits, exact);
+    const uint32_t lanes = test_triangles<Lanes, false, kRest>(batch, normals, group, first_bit(m), hits, exact);
     hit |= lanes != 0 ? m & (0 - m) : 0;
   }
   return hit;

@@ -5,11 +5,9 @@
 #include <cmath>
 
 #include "compress/bvh/box_tree.h"
-#include "compress/format/packed_trees.h"
 #include "compress/format/position_grid.h"
 #include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/scene/error.h"
-#include "runtime/stopwatch.h"
 #include "runtime/trace/alpha_filter.h"
 #include "runtime/trace/packed/batch_cache.h"
 #include "runtime/trace/packed/top_tree.h"
@@ -30,12 +28,6 @@ const packed::KernelRay* kernel_rays(std::span<const Ray> rays) {
 }
 packed::KernelHit* kernel_hits(std::span<RayHit> hits) { return reinterpret_cast<packed::KernelHit*>(hits.data()); }
 
-uint8_t ray_classes(uint32_t material_class) {
-  return static_cast<uint8_t>(((material_class & 1u) == 0 ? baked::kCameraBelow : 0) |
-                              ((material_class & 2u) == 0 ? baked::kOcclusionBelow : 0) |
-                              ((material_class & baked::kMaskedClass) != 0 ? baked::kMaskedLeaves : 0));
-}
-
 DAffine outer_from_grid(const baked::TreeRecord& tree) {
   const double step = PositionGrid{tree.step_mantissa, tree.step_exponent}.step();
   const DVec3 origin(static_cast<double>(tree.origin[0]), static_cast<double>(tree.origin[1]),
@@ -52,40 +44,9 @@ bool invertible(const DAffine& to_from, const DAffine& from_to) {
   return norm(to_from) * norm(from_to) <= kMaxCondition && is_finite(from_to[3]); // false for NaN
 }
 
-/// The root's box, in the tree's grid.
-void root_box(const baked::PackedNode& root, double (&lo)[3], double (&hi)[3]) {
-  for (uint32_t axis = 0; axis < 3; ++axis) {
-    uint32_t least = 255, most = 0;
-    for (uint32_t child = 0; child < baked::kNodeWidth && root.children[child] != baked::kNoChild; ++child) {
-      least = std::min<uint32_t>(least, root.lo[axis][child]);
-      most = std::max<uint32_t>(most, root.hi[axis][child]);
-    }
-    const double unit = std::ldexp(1.0, static_cast<int>(root.exponent(axis)));
-    lo[axis] = root.origin[axis] + least * unit;
-    hi[axis] = root.origin[axis] + most * unit;
-  }
-}
-
-/// In unit space, a little larger than what may be hit.
-TreeBox placed_box(const packed::TracePlacement& placement, const DAffine& unit_from_grid) {
-  DVec3 centre, half;
-  for (int axis = 0; axis < 3; ++axis) {
-    centre[axis] = 0.5 * (placement.box_lo[axis] + placement.box_hi[axis]);
-    half[axis] = 0.5 * (placement.box_hi[axis] - placement.box_lo[axis]);
-  }
-  // Rays in the grid are off by 2^-22 of the largest coordinate there, see grid_ray.h.
-  const DVec3 pad(0x1p-20 * glm::max(glm::max(std::abs(centre.x) + half.x, std::abs(centre.y) + half.y),
-                                     std::abs(centre.z) + half.z));
-  const DVec3 middle = transform_point(unit_from_grid, centre);
-  const DVec3 reach = glm::abs(unit_from_grid[0]) * (half.x + pad.x) + glm::abs(unit_from_grid[1]) * (half.y + pad.y) +
-                      glm::abs(unit_from_grid[2]) * (half.z + pad.z);
-  TreeBox box;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto i = static_cast<size_t>(axis);
-    box.lo[i] = std::nextafter(static_cast<float>(middle[axis] - reach[axis]), -INFINITY);
-    box.hi[i] = std::nextafter(static_cast<float>(middle[axis] + reach[axis]), INFINITY);
-  }
-  return box;
+/// Whether it does no more than scale and move.
+bool is_aligned(const DAffine& m) {
+  return m[0].y == 0.0 && m[0].z == 0.0 && m[1].x == 0.0 && m[1].z == 0.0 && m[2].x == 0.0 && m[2].y == 0.0;
 }
 
 /// Sets up the tree over placements as something placed in unit space itself.
@@ -93,6 +54,7 @@ void place_top(std::span<const TreeBox> boxes, packed::KernelScene& scene) {
   TreeBox all = boxes[0];
   for (const TreeBox& box : boxes) all.extend(box);
   scene.top = {};
+  scene.top.aligned = 1;
   for (size_t axis = 0; axis < 3; ++axis) {
     scene.top.grid_from_unit[3 * axis + axis] = 1.0;
     scene.top.box_lo[axis] = all.lo[axis], scene.top.box_hi[axis] = all.hi[axis];
@@ -102,46 +64,15 @@ void place_top(std::span<const TreeBox> boxes, packed::KernelScene& scene) {
 
 } // namespace
 
-struct PackedTracer::Tables {
-  PackedTrees built; ///< where the file has no trees
-  std::span<const baked::TreeRecord> records;
-  std::span<const baked::PackedNode> nodes;
-  std::vector<packed::TraceCluster> clusters;
-  std::vector<packed::TraceTree> trees;
+struct PackedTracer::Tables : TracedTrees {
   std::vector<packed::TracePlacement> placements;
   std::vector<TreeBox> boxes;           ///< of placements
   std::vector<uint32_t> instance_of;    ///< by placement; baked::kNone: the world's
-  std::vector<uint32_t> tree_of;        ///< by the source's geometry, or baked::kNone
-  std::vector<uint32_t> grid_of;        ///< by the file's geometry: a tree whose grid its clusters are read in
   std::vector<uint32_t> first_instance; ///< by the file's geometry; that of a level's base
   std::vector<Placement> surfaces;      ///< by instance
   std::vector<packed::TopNode> top;
   packed::KernelScene scene{};
   BatchCacheOwner caches;
-
-  void add_tree(uint32_t number) {
-    const baked::TreeRecord& record = records[number];
-    packed::TraceTree tree{nodes.data() + record.first_node, 1.0f};
-    if (record.node_count > 0) {
-      double lo[3], hi[3];
-      root_box(tree.nodes[0], lo, hi);
-      for (int axis = 0; axis < 3; ++axis)
-        tree.max_coordinate = std::max(
-            {tree.max_coordinate, static_cast<float>(std::abs(lo[axis])), static_cast<float>(std::abs(hi[axis]))});
-    }
-    trees.push_back(tree);
-  }
-
-  /// @param number of a tree in whose grid they are read
-  void add_clusters(const BakedFile& file, uint32_t number, uint32_t g) {
-    const baked::TreeRecord& tree = records[number];
-    const baked::GeometryRecord& geometry = file.geometries()[g];
-    grid_of[g] = number;
-    uint32_t next = 0;
-    for (uint32_t c = 0; c < geometry.class_clusters.size(); ++c)
-      for (const uint32_t end = next + geometry.class_clusters[c]; next < end; ++next)
-        clusters[geometry.first_cluster + next] = trace_cluster(tree, geometry, file.cluster(g, next), ray_classes(c));
-  }
 };
 
 PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa)
@@ -153,13 +84,10 @@ PackedTracer::PackedTracer(const BakedFile& file, const LodSource& source, Packe
 PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod, PackedIsa isa)
     : file_(file), source_(source), lod_(lod), kernels_(kernels_of(isa)), tables_(std::make_unique<Tables>()) {
   Tables& t = *tables_;
-  t.clusters.resize(file.sections().clusters.size());
-  t.tree_of.assign(source.geometry_count(), baked::kNone);
-  t.grid_of.assign(file.geometries().size(), baked::kNone);
-  lod != nullptr ? build_lod() : build_whole();
-  for (uint32_t i = 0; i < t.records.size(); ++i) t.add_tree(i);
+  static_cast<TracedTrees&>(t) = lod != nullptr ? chosen_trees(file, *lod, lod_trees_) : whole_trees(file);
   find_first_instances();
   place();
+  t.hulls = {};
   t.scene.clusters = t.clusters.data();
   t.scene.trees = t.trees.data();
   t.scene.placements = t.placements.data();
@@ -189,79 +117,6 @@ PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, con
 }
 
 PackedTracer::~PackedTracer() = default;
-
-/// Trees over all of level 0: the file's, if it holds any.
-void PackedTracer::build_whole() {
-  Tables& t = *tables_;
-  t.records = file_.sections().trees;
-  t.nodes = file_.sections().nodes;
-  if (t.records.empty()) {
-    BakedSections sections = file_.sections();
-    sections.geometries = sections.geometries.first(file_.base_geometry_count());
-    t.built = build_packed_trees(sections);
-    t.records = t.built.trees;
-    t.nodes = t.built.nodes;
-  }
-  uint32_t world = baked::kNone;
-  for (uint32_t i = 0; i < t.records.size(); ++i) {
-    const uint32_t g = t.records[i].geometry;
-    if (g == baked::kWorldTree)
-      world = i;
-    else if (g < t.tree_of.size()) // else a level of detail
-      t.tree_of[g] = i;
-  }
-  for (uint32_t g = 0; g < t.tree_of.size(); ++g) {
-    if (file_.geometries()[g].cluster_count == 0) continue;
-    if (t.tree_of[g] == baked::kNone) t.tree_of[g] = world;
-    t.add_clusters(file_, t.tree_of[g], g);
-  }
-}
-
-/// Trees over the clusters of BLASes.
-void PackedTracer::build_lod() {
-  Tables& t = *tables_;
-  const BakedSections& sections = file_.sections();
-  const std::vector<uint8_t> joins = ChosenTreeBuilder::joins_world(sections);
-  std::vector<ChosenClusters> chosen;
-  std::vector<uint32_t> blas_of; // by choice
-  uint32_t world = baked::kNone;
-  const auto next_tree = [&](uint32_t geometry, uint32_t blas) {
-    chosen.push_back({geometry, {}});
-    blas_of.push_back(blas);
-    return static_cast<uint32_t>(chosen.size()) - 1;
-  };
-  for (uint32_t b = 0; b < lod_->geometry_count(); ++b) {
-    const uint32_t base = lod_->base_geometry(b);
-    if (lod_->clusters(b).empty()) continue;
-    if (joins[base] != 0 && world == baked::kNone) world = next_tree(baked::kWorldTree, kNoGeometry);
-    const uint32_t tree = joins[base] != 0 ? world : next_tree(base, b);
-    t.tree_of[b] = tree;
-    for (const LodCluster& c : lod_->clusters(b))
-      chosen[tree].clusters.push_back(static_cast<uint32_t>(file_.geometries()[c.geometry].first_cluster + c.cluster));
-  }
-  if (world != baked::kNone)
-    std::ranges::sort(chosen[world].clusters); // levels of all of them are behind all of level 0
-  const Stopwatch making_clusters;
-  const ChosenTreeBuilder builder(sections, chosen);
-  lod_trees_.clusters_s = making_clusters.seconds();
-  const Stopwatch building;
-  t.built = builder.build();
-  t.records = t.built.trees;
-  t.nodes = t.built.nodes;
-  lod_trees_.trees_s = building.seconds();
-  for (uint32_t i = 0; i < chosen.size(); ++i) {
-    const uint64_t leaves = builder.leaf_nodes(i);
-    lod_trees_.trees.push_back({blas_of[i], (leaves > 0 ? 2 * leaves - 1 : 0) * sizeof(baked::PackedNode),
-                                t.records[i].node_count * sizeof(baked::PackedNode)});
-  }
-  for (uint32_t b = 0; b < lod_->geometry_count(); ++b) {
-    const uint32_t base = lod_->base_geometry(b);
-    if (t.tree_of[b] == baked::kNone || t.grid_of[base] != baked::kNone) continue;
-    t.add_clusters(file_, t.tree_of[b], base);
-    for (const baked::LodLevelRecord& level : file_.lod(base).levels)
-      if (level.level > 0) t.add_clusters(file_, t.tree_of[b], level.geometry);
-  }
-}
 
 void PackedTracer::find_first_instances() {
   Tables& t = *tables_;
@@ -325,10 +180,13 @@ void PackedTracer::add_placement(uint32_t tree, uint32_t instance, const DAffine
   packed::TracePlacement placement{};
   for (int column = 0; column < 4; ++column)
     for (int axis = 0; axis < 3; ++axis) placement.grid_from_unit[3 * column + axis] = grid_from_unit[column][axis];
-  root_box(t.trees[tree].nodes[0], placement.box_lo, placement.box_hi);
+  const TreeHull& hull = *t.hulls[tree];
+  for (int axis = 0; axis < 3; ++axis)
+    placement.box_lo[axis] = hull.lo()[axis], placement.box_hi[axis] = hull.hi()[axis];
   placement.tree = tree;
+  placement.aligned = is_aligned(grid_from_unit) ? 1 : 0;
   placement.ray_classes = t.trees[tree].nodes[0].ray_classes;
-  t.boxes.push_back(placed_box(placement, unit_from_grid));
+  t.boxes.push_back(hull.placed(unit_from_grid));
   t.placements.push_back(placement);
   t.instance_of.push_back(instance);
 }
@@ -394,13 +252,13 @@ HitSurface PackedTracer::resolve(const RayHit& hit) const {
 
 std::vector<ResidentPart> PackedTracer::resident() const {
   const Tables& t = *tables_;
-  return {{"file", file_.file_bytes()},
+  return {{"file", file_.file_bytes(), true},
           {"nodes built", t.built.nodes.size() * sizeof(baked::PackedNode)},
           {"cluster table", t.clusters.size() * sizeof(packed::TraceCluster)},
           {"placements", t.placements.size() * (sizeof(packed::TracePlacement) + sizeof(TreeBox) + sizeof(uint32_t)) +
                              t.surfaces.size() * sizeof(Placement) + t.top.size() * sizeof(packed::TopNode) +
                              (t.tree_of.size() + t.grid_of.size() + t.first_instance.size()) * sizeof(uint32_t)},
-          {"batch caches", BatchCacheOwner::bytes_of_all_threads()}};
+          {"batch caches", BatchCacheOwner::bytes_of_all_threads(), true}};
 }
 
 } // namespace packtrace

@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "compress/format/baked_file.h"
-#include "runtime/trace/lod_source.h"
 #include "runtime/trace/packed/isa.h"
+#include "runtime/trace/packed/traced_trees.h"
 #include "runtime/trace/ray_tracer.h"
 
 namespace packtrace {
@@ -40,12 +40,7 @@ public:
   /// Instances that no ray hits because their transform flattens them, or nearly so.
   std::span<const uint32_t> flat_instances() const { return flat_instances_; }
 
-  /// What building the trees of a LodSource took and takes.
-  struct LodTrees {
-    double clusters_s = 0.0;      ///< nodes of clusters, which do not depend on the view
-    double trees_s = 0.0;         ///< nodes above them
-    std::vector<TreeBytes> trees; ///< worst cases are known before they are built
-  };
+  /// Of a LodSource.
   const LodTrees& lod_trees() const { return lod_trees_; }
 
   /// From now on leaf nodes are found by `search`, of the trees' inner nodes none is read. See packed::TreeSearch.
@@ -64,8 +59,6 @@ private:
   struct Tables;
 
   PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod, PackedIsa isa);
-  void build_whole();
-  void build_lod();
   void find_first_instances();
   Bounds bounds_of(uint32_t geometry) const;
   uint32_t triangle_of(uint32_t cluster, uint32_t instance, uint32_t triangle) const;

@@ -10,73 +10,23 @@
 namespace packtrace::packed {
 namespace {
 
-constexpr uint32_t kBlock = 8; ///< rays that are set up at once
-
 // The compiler's own vectors, a lane for each ray of a block, so that all instruction sets get the same from one
-// source.
-using Floats = float __attribute__((vector_size(4 * kBlock)));
-using Ints = int32_t __attribute__((vector_size(4 * kBlock)));
-// Doubles take as many registers as they need: the compiler splits larger vectors into single numbers.
+// source. It splits vectors larger than its registers into single numbers, so doubles are half a block.
 #if defined(__AVX512F__)
+constexpr uint32_t kBlock = 16; ///< rays that are set up at once
 constexpr uint32_t kDoubleLanes = 8;
 #else
+constexpr uint32_t kBlock = 8;
 constexpr uint32_t kDoubleLanes = 4;
 #endif
-using DoublePart = double __attribute__((vector_size(8 * kDoubleLanes)));
-using LongPart = int64_t __attribute__((vector_size(8 * kDoubleLanes)));
-using FloatPart = float __attribute__((vector_size(4 * kDoubleLanes)));
-constexpr uint32_t kDoubleParts = kBlock / kDoubleLanes;
-
-struct Doubles {
-  DoublePart part[kDoubleParts];
-
-  double get(uint32_t lane) const { return part[lane / kDoubleLanes][lane % kDoubleLanes]; }
-  void set(uint32_t lane, double value) { part[lane / kDoubleLanes][lane % kDoubleLanes] = value; }
-};
-
-template <typename Function>
-inline Doubles each_part(Function function) {
-  Doubles result;
-#pragma GCC unroll 2
-  for (uint32_t i = 0; i < kDoubleParts; ++i) result.part[i] = function(i);
-  return result;
-}
-inline Doubles operator+(const Doubles& a, const Doubles& b) {
-  return each_part([&](uint32_t i) { return a.part[i] + b.part[i]; });
-}
-inline Doubles operator-(const Doubles& a, const Doubles& b) {
-  return each_part([&](uint32_t i) { return a.part[i] - b.part[i]; });
-}
-inline Doubles operator*(const Doubles& a, const Doubles& b) {
-  return each_part([&](uint32_t i) { return a.part[i] * b.part[i]; });
-}
-inline Doubles operator*(double a, const Doubles& b) {
-  return each_part([&](uint32_t i) { return a * b.part[i]; });
-}
-inline Doubles operator+(const Doubles& a, double b) {
-  return each_part([&](uint32_t i) { return a.part[i] + b; });
-}
-
-inline Doubles read_doubles(const float* p) {
-  return each_part([&](uint32_t i) {
-    FloatPart part;
-    __builtin_memcpy(&part, p + i * kDoubleLanes, sizeof part);
-    return __builtin_convertvector(part, DoublePart);
-  });
-}
-inline Doubles to_doubles(const Floats& x) {
-  float lanes[kBlock];
-  __builtin_memcpy(lanes, &x, sizeof lanes);
-  return read_doubles(lanes);
-}
-inline Floats to_floats(const Doubles& x) {
-#if defined(__AVX512F__)
-  return __builtin_convertvector(x.part[0], Floats);
-#else
-  return __builtin_shufflevector(__builtin_convertvector(x.part[0], FloatPart),
-                                 __builtin_convertvector(x.part[1], FloatPart), 0, 1, 2, 3, 4, 5, 6, 7);
-#endif
-}
+constexpr uint32_t kBlockLanes = (1u << kBlock) - 1; ///< as bits
+using Floats = float __attribute__((vector_size(4 * kBlock)));
+using Ints = int32_t __attribute__((vector_size(4 * kBlock)));
+// Half a block.
+using Doubles = double __attribute__((vector_size(8 * kDoubleLanes)));
+using Longs = int64_t __attribute__((vector_size(8 * kDoubleLanes)));
+using HalfFloats = float __attribute__((vector_size(4 * kDoubleLanes)));
+static_assert(kBlock == 2 * kDoubleLanes);
 
 template <typename Vector, typename Element>
 inline void read_block(Vector& v, const Element* p) {
@@ -92,28 +42,115 @@ inline void keep_larger(Vector& a, const Vector& b) {
   a = a > b ? a : b;
 }
 
+// GCC 12 converts eight numbers as twice four.
+inline Doubles to_doubles(const HalfFloats& x) {
+#if defined(__AVX512F__)
+  return _mm512_cvtps_pd(x);
+#else
+  return __builtin_convertvector(x, Doubles);
+#endif
+}
+inline HalfFloats to_floats(const Doubles& x) {
+#if defined(__AVX512F__)
+  return _mm512_cvtpd_ps(x);
+#else
+  return __builtin_convertvector(x, HalfFloats);
+#endif
+}
+inline Doubles read_doubles(const float* p) {
+  HalfFloats half;
+  read_block(half, p);
+  return to_doubles(half);
+}
+inline Floats join(const HalfFloats& low, const HalfFloats& high) {
+#if defined(__AVX512F__)
+  return __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+#else
+  return __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
+#endif
+}
+
+inline float largest_lane(const Floats& x) {
+#if defined(__AVX512F__)
+  return _mm512_reduce_max_ps(x);
+#else
+  float lanes[kBlock];
+  write_block(lanes, x);
+  float most = lanes[0];
+  for (uint32_t i = 1; i < kBlock; ++i) most = lanes[i] > most ? lanes[i] : most;
+  return most;
+#endif
+}
+
+/// Reads eight floats of each of a block's rays as rows: row i is ray i and, where two fit, ray i + 8.
+inline void read_rows(const float* const (&rays)[kBlock], Floats (&rows)[8]) {
+  for (uint32_t i = 0; i < 8; ++i) {
+#if defined(__AVX512F__)
+    HalfFloats low, high;
+    read_block(low, rays[i]);
+    read_block(high, rays[i + 8]);
+    rows[i] = join(low, high);
+#else
+    read_block(rows[i], rays[i]);
+#endif
+  }
+}
+
 /// Of rows that are kDistance apart, swaps the off-diagonal parts.
 template <int kDistance, int... kLow>
-inline void swap_parts(Floats (&rows)[kBlock]) {
-  for (uint32_t i = 0; i < kBlock; ++i)
+inline void swap_parts(Floats (&rows)[8]) {
+  for (uint32_t i = 0; i < 8; ++i)
     if ((i & kDistance) == 0) {
       const Floats a = rows[i], b = rows[i + kDistance];
+#if defined(__AVX512F__)
+      constexpr auto lane = [](int k) { return k < 8 ? k : k + 8; }; // of a, or of b behind it
+      rows[i] = __builtin_shufflevector(a, b, lane(kLow)..., lane(kLow) + 8 ...);
+      rows[i + kDistance] = __builtin_shufflevector(a, b, lane(kLow) + kDistance..., lane(kLow) + kDistance + 8 ...);
+#else
       rows[i] = __builtin_shufflevector(a, b, kLow...);
       rows[i + kDistance] = __builtin_shufflevector(a, b, (kLow + kDistance)...);
+#endif
     }
 }
 
-/// Turns rows into columns.
-inline void transpose(Floats (&rows)[kBlock]) {
-  static_assert(kBlock == 8);
+/// Turns such rows into columns, a lane for each ray.
+inline void transpose(Floats (&rows)[8]) {
   swap_parts<4, 0, 1, 2, 3, 8, 9, 10, 11>(rows); // of quarters, of those, of those
   swap_parts<2, 0, 1, 8, 9, 4, 5, 12, 13>(rows);
   swap_parts<1, 0, 8, 2, 10, 4, 12, 6, 14>(rows);
 }
 
+/// Pairs (a, b), as many as there are lanes.
+inline void write_pairs(float (*out)[2], const Floats& a, const Floats& b) {
+#if defined(__AVX512F__)
+  write_block(&out[0][0], __builtin_shufflevector(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23));
+  write_block(&out[8][0], __builtin_shufflevector(a, b, 8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31));
+#else
+  write_block(&out[0][0], __builtin_shufflevector(a, b, 0, 8, 1, 9, 2, 10, 3, 11));
+  write_block(&out[4][0], __builtin_shufflevector(a, b, 4, 12, 5, 13, 6, 14, 7, 15));
+#endif
+}
+/// The reverse.
+inline void read_pairs(const float (*pairs)[2], Floats& a, Floats& b) {
+  Floats low, high;
+  read_block(low, &pairs[0][0]);
+  read_block(high, &pairs[kBlock / 2][0]);
+#if defined(__AVX512F__)
+  a = __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+  b = __builtin_shufflevector(low, high, 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+#else
+  a = __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14);
+  b = __builtin_shufflevector(low, high, 1, 3, 5, 7, 9, 11, 13, 15);
+#endif
+}
+
+inline Floats magnitude(const Floats& x) { return reinterpret_cast<Floats>(reinterpret_cast<Ints>(x) & 0x7fffffff); }
+
 /// The lanes whose condition is all ones, as bits.
 inline uint32_t lane_bits(const Ints& condition) {
-#if defined(__AVX2__)
+#if defined(__AVX512F__)
+  return _mm512_movepi32_mask(reinterpret_cast<__m512i>(condition));
+#elif defined(__AVX2__)
   return static_cast<uint32_t>(__builtin_ia32_movmskps256(reinterpret_cast<Floats>(condition)));
 #else
   int32_t lanes[kBlock]; // a vector's own subscripts go wrong in GCC 12 under sanitizers
@@ -126,22 +163,18 @@ inline uint32_t lane_bits(const Ints& condition) {
 
 /// The lanes in which low < x < high, as bits.
 inline uint32_t lanes_between(double low, const Doubles& x, double high) {
-  uint32_t bits = 0;
-  for (uint32_t i = 0; i < kDoubleParts; ++i) {
-    const LongPart inside = (x.part[i] > low) & (x.part[i] < high);
+  const Longs inside = (x > low) & (x < high);
 #if defined(__AVX512F__)
-    bits = _mm512_movepi64_mask(reinterpret_cast<__m512i>(inside));
+  return _mm512_movepi64_mask(reinterpret_cast<__m512i>(inside));
 #elif defined(__AVX2__)
-    bits |= static_cast<uint32_t>(__builtin_ia32_movmskpd256(reinterpret_cast<DoublePart>(inside)))
-            << (kDoubleLanes * i);
+  return static_cast<uint32_t>(__builtin_ia32_movmskpd256(reinterpret_cast<Doubles>(inside)));
 #else
-    int64_t lanes[kDoubleLanes]; // as above
-    write_block(lanes, inside);
-    for (uint32_t lane = 0; lane < kDoubleLanes; ++lane)
-      bits |= (lanes[lane] != 0 ? 1u : 0u) << (kDoubleLanes * i + lane);
-#endif
-  }
+  int64_t lanes[kDoubleLanes]; // as above
+  write_block(lanes, inside);
+  uint32_t bits = 0;
+  for (uint32_t i = 0; i < kDoubleLanes; ++i) bits |= (lanes[i] != 0 ? 1u : 0u) << i;
   return bits;
+#endif
 }
 
 } // namespace

@@ -2,7 +2,10 @@
 
 #include "runtime/trace/packed/batch_decode.h"
 #include "runtime/trace/packed/beam.h"
+#include "runtime/trace/packed/enter.h"
 #include "runtime/trace/packed/leaf_tests.h"
+#include "runtime/trace/packed/node_children.h"
+#include "runtime/trace/packed/outside_search.h"
 
 /// Groups of rays through trees of nodes. They come to a node together, as one word of bits, and leave for each child
 /// those that pass its box: a node is read and set up once for all of them, and nothing waits for the outcome of one
@@ -10,33 +13,22 @@
 namespace packtrace::packed {
 namespace {
 
-/// PackedNode::children as one number.
-struct NodeChildren {
-  uint64_t bytes;
-
-  explicit NodeChildren(const baked::PackedNode& node) {
-    __builtin_memcpy(&bytes, reinterpret_cast<const uint8_t*>(&node) + offsetof(baked::PackedNode, children),
-                     sizeof bytes);
-  }
-  bool leaves() const { return (bytes & 0xffu) != baked::kInnerChild; }
-  /// Slots in use, which come first.
-  uint32_t slots() const { return bytes == 0 ? 0u : 0xffu >> (static_cast<uint32_t>(__builtin_clzll(bytes)) / 8); }
-  /// Byte i: triangles in the leaves of slots below i; at most 128.
-  uint64_t leaf_begins() const { return bytes * 0x0101010101010100u; }
-};
-
-inline uint32_t byte_of(uint64_t word, uint32_t slot) { return static_cast<uint32_t>(word >> (8 * slot)) & 0xffu; }
-
 struct Pending {
   uint64_t rays; ///< as bits
   uint32_t node;
   float t; ///< where the first of them enters; only for order
 };
 
+/// How far ahead rays are fetched while others are sorted.
+constexpr uintptr_t kBytesAhead = 96 * sizeof(KernelRay);
+
 /// Any hits (kAny) or nearest hits of one ray class in one scene, on one thread.
 template <typename Lanes, bool kAny, bool kCount>
 class Traversal {
 public:
+  using Kernel = Lanes;
+  static constexpr bool kAnyHit = kAny;
+
   /// @param occluded or hits, one for each ray
   Traversal(const KernelScene& scene, BatchCache& cache, const KernelRay* rays, uint32_t ray_class, uint8_t* occluded,
             KernelHit* hits, KernelCounters* counters)
@@ -48,6 +40,7 @@ public:
     uint32_t numbers[8][kGroup], sizes[8] = {};
     for (size_t i = 0; i < count; ++i) {
       const auto number = static_cast<uint32_t>(i);
+      __builtin_prefetch(reinterpret_cast<const void*>(reinterpret_cast<uintptr_t>(rays_ + i) + kBytesAhead));
       if constexpr (kCount) ++counters_->rays;
       if constexpr (kAny)
         occluded_[i] = 0;
@@ -66,6 +59,8 @@ public:
   }
 
 private:
+  friend struct OutsideSearch<Traversal>;
+
   struct Place {
     uint32_t placement, cluster, triangle;
   };
@@ -111,7 +106,7 @@ private:
   /// Through the tree over placements.
   void trace_top() {
     RayGroup group;
-    const uint64_t rays = enter<false>(scene_.top, scene_.top_max_coordinate, unit_, alive_, group);
+    const uint64_t rays = enter<false, !kAny>(scene_.top, scene_.top_max_coordinate, unit_, alive_, group);
     by_octant(group, rays, [&](uint64_t together, uint32_t octant) { trace_top(group, together, octant); });
   }
 
@@ -145,59 +140,16 @@ private:
     if constexpr (kCount) counters_->placements += count_ones(rays);
     const TraceTree& tree = scene_.trees[place.tree];
     RayGroup group;
-    rays = enter<true>(place, tree.max_coordinate, unit_, rays, group);
+    rays = enter<true, !kAny>(place, tree.max_coordinate, unit_, rays, group);
     Beam beam;
     if constexpr (!kAny)
       if (make_beam(group, tree.max_coordinate, rays, beam)) group.beam = &beam;
     by_octant(group, rays, [&](uint64_t together, uint32_t octant) {
       if (scene_.search_tree != nullptr)
-        search_tree(placement, tree.nodes, group, together, octant);
+        OutsideSearch<Traversal>::run(*this, placement, tree.nodes, group, together, octant);
       else
         trace_tree(placement, tree.nodes, group, together, octant);
     });
-  }
-
-  /// What visit_leaf_nodes() needs to know.
-  struct Search {
-    Traversal* self;
-    const baked::PackedNode* nodes;
-    RayGroup* group;
-    uint32_t placement, octant;
-  };
-
-  /// As trace_tree(), where leaf nodes are found by scene_.search_tree.
-  void search_tree(uint32_t placement, const baked::PackedNode* nodes, RayGroup& group, uint64_t rays,
-                   uint32_t octant) {
-    Search state{this, nodes, &group, placement, octant};
-    TreeSearch search;
-    search.tree = scene_.placements[placement].tree;
-    search.any = kAny ? 1 : 0;
-    search.count = 0;
-    search.limits = group.limits;
-    search.traversal = &state;
-    search.visit = visit_leaf_nodes;
-    for (uint64_t m = rays & alive_; m != 0; m &= m - 1) {
-      const uint32_t i = first_bit(m);
-      KernelRay& ray = search.rays[search.count];
-      search.number[search.count++] = i;
-      for (uint32_t axis = 0; axis < 3; ++axis)
-        ray.origin[axis] = group.origin[axis][i], ray.direction[axis] = 1.0f / group.inverse[axis][i];
-      ray.tnear = group.limits[i][0] > 0.0f ? group.limits[i][0] : 0.0f; // nothing lies behind an origin that moved
-      ray.tfar = group.tmax(i);
-    }
-    scene_.search_tree(scene_.searcher, search);
-  }
-
-  static uint64_t visit_leaf_nodes(const TreeSearch& search, const uint32_t* nodes, uint32_t node_count,
-                                   uint64_t rays) {
-    const Search& at = *static_cast<const Search*>(search.traversal);
-    for (uint32_t i = 0; i < node_count && (rays &= at.self->alive_) != 0; ++i) {
-      const baked::PackedNode& node = at.nodes[nodes[i]];
-      if constexpr (kCount) ++at.self->counters_->nodes, at.self->counters_->node_rays += count_ones(rays);
-      at.self->trace_leaves(at.placement, node, NodeChildren(node), typename Lanes::Boxes(node, at.octant), *at.group,
-                            rays);
-    }
-    return rays & at.self->alive_;
   }
 
   /// Through one placed tree, rays of one octant of it.
@@ -210,7 +162,7 @@ private:
       const uint64_t active = next.rays & alive_;
       if (active == 0 || passed_by(group, next)) continue;
       const baked::PackedNode& node = nodes[next.node];
-      if constexpr (kCount) ++counters_->nodes, counters_->node_rays += count_ones(active);
+      count_node(active);
       if ((node.ray_classes & ray_class_) == 0) continue;
       const NodeChildren children(node);
       const typename Lanes::Boxes boxes(node, octant);
@@ -222,6 +174,10 @@ private:
           return node.first_child + slot;
         });
     }
+  }
+
+  void count_node(uint64_t rays) {
+    if constexpr (kCount) ++counters_->nodes, counters_->node_rays += count_ones(rays);
   }
 
   /// Whether all of a beam's hits are nearer.
@@ -290,12 +246,12 @@ private:
       const BatchNormals normals = batch_normals<Lanes>(batch);
       uint64_t exact = 0;
       if (kAny && (scene_.clusters[cluster].flags & kMasked) == 0) {
-        alive_ &= ~rays_that_hit<Lanes>(batch, normals, group, rays, exact);
+        alive_ &= ~rays_that_hit<Lanes, !kAny>(batch, normals, group, rays, exact);
       } else {
         const uint64_t others = test_side_by_side(batch, normals, place, group, rays);
         const bool many = kPairs<Lanes> && count_ones(others) >= kLeastTestedTwice;
         test_each(batch, normals, place, group,
-                  many ? rays_that_hit<Lanes>(batch, normals, group, others, exact) : others);
+                  many ? rays_that_hit<Lanes, !kAny>(batch, normals, group, others, exact) : others);
       }
       if constexpr (kCount) counters_->exact_triangles += exact;
       rays &= alive_;
@@ -311,7 +267,7 @@ private:
       const uint32_t i = first_bit(m);
       LaneHits<Lanes> hits;
       uint64_t exact = 0;
-      const uint32_t lanes = test_triangles<Lanes, true>(batch, normals, group, i, hits, exact);
+      const uint32_t lanes = test_triangles<Lanes, true, !kAny>(batch, normals, group, i, hits, exact);
       if constexpr (kCount) counters_->exact_triangles += exact;
       if (lanes != 0) take_hits(place, i, hits, lanes, group);
     }
@@ -330,7 +286,7 @@ private:
       for (uint32_t triangle = 0; triangle < batch.count; ++triangle) {
         LaneHits<Wide> hits;
         uint64_t exact = 0;
-        uint32_t lanes = test_rays<Wide, true>(batch, normals, triangle, group, axis, at, wanted, hits, exact);
+        uint32_t lanes = test_rays<Wide, true, !kAny>(batch, normals, triangle, group, axis, at, wanted, hits, exact);
         if constexpr (kCount) counters_->exact_triangles += exact;
         place.triangle = begin + triangle;
         for (; lanes != 0; lanes &= lanes - 1) {

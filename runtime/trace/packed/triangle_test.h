@@ -28,17 +28,21 @@ struct LaneHits {
 };
 
 /// The lanes whose signs floats do not settle. Returns those of `lanes` that hit at all, with their t, u and v.
-/// @param x, y, z of corners, sz: stored lanes
+/// @param x, y, z of corners, sz: lanes
+/// @param nearer, along: the plane is nearer / along sz nearer than from the origin of x, y and z
 template <typename Lanes>
 inline uint32_t test_exactly(uint32_t lanes, const typename Lanes::F (&x)[3], const typename Lanes::F (&y)[3],
-                             const typename Lanes::F (&z)[3], typename Lanes::F sz, LaneHits<Lanes>& hits) {
-  float stored[10][Lanes::kLanes];
+                             const typename Lanes::F (&z)[3], typename Lanes::F sz, typename Lanes::F nearer,
+                             typename Lanes::F along, LaneHits<Lanes>& hits) {
+  float stored[12][Lanes::kLanes];
   for (uint32_t corner = 0; corner < 3; ++corner) {
     Lanes::store(stored[corner], x[corner]);
     Lanes::store(stored[3 + corner], y[corner]);
     Lanes::store(stored[6 + corner], z[corner]);
   }
   Lanes::store(stored[9], sz);
+  Lanes::store(stored[10], nearer);
+  Lanes::store(stored[11], along);
   uint32_t hit = 0;
   for (; lanes != 0; lanes &= lanes - 1) {
     const auto i = static_cast<uint32_t>(__builtin_ctz(lanes));
@@ -48,8 +52,15 @@ inline uint32_t test_exactly(uint32_t lanes, const typename Lanes::F (&x)[3], co
     if ((u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0)) continue;
     const double sum = u + v + w;
     if (sum == 0.0) continue;
-    hits.t[i] = static_cast<float>((u * double{stored[6][i]} + v * double{stored[7][i]} + w * double{stored[8][i]}) /
-                                   sum * double{stored[9][i]});
+    const double az = stored[6][i], bz = stored[7][i], cz = stored[8][i];
+    double depth = (u * az + v * bz + w * cz) / sum;
+    if (stored[11][i] != 0.0f) { // a plane nearly along the ray may say anything, but not what is beyond its corners
+      const double least = __builtin_fmin(az, __builtin_fmin(bz, cz)),
+                   most = __builtin_fmax(az, __builtin_fmax(bz, cz));
+      depth -= double{stored[10][i]} / stored[11][i];
+      depth = depth < least ? least : depth > most ? most : depth;
+    }
+    hits.t[i] = static_cast<float>(depth * double{stored[9][i]});
     hits.u[i] = static_cast<float>(v / sum);
     hits.v[i] = static_cast<float>(w / sum);
     hit |= 1u << i;
@@ -86,17 +97,20 @@ inline BatchNormals batch_normals(const DecodedBatch& batch) {
 
 /// The lanes in which a ray hits a triangle, as bits. Without a branch that often goes either way until one does.
 /// @tparam kWeights whether hits are filled; else only which lanes hit is wanted
+/// @tparam kRest whether planes are met from origins as they were before they were rounded
 /// @param relative (k, corner): the corner's coordinate along Woop's axis k less the origin's
 /// @param normal (k): of the triangle's plane, along Woop's axis k
+/// @param rest (k): what rounding took from the origin, along Woop's axis k
 /// @param wanted lanes, as bits
 /// @param exact_count counts lanes that took doubles
-template <typename Lanes, bool kWeights, typename Relative, typename Normal>
-inline uint32_t test_lanes(Relative relative, Normal normal, const RayLanes<Lanes>& rays, uint32_t wanted,
+template <typename Lanes, bool kWeights, bool kRest, typename Relative, typename Normal, typename Rest>
+inline uint32_t test_lanes(Relative relative, Normal normal, Rest rest, const RayLanes<Lanes>& rays, uint32_t wanted,
                            LaneHits<Lanes>& hits, uint64_t& exact_count) {
   using F = typename Lanes::F;
   const F sx = rays.shear[0], sy = rays.shear[1];
   // t comes from the plane rather than from the weights: what vertices have along an axis that the plane is
-  // perpendicular to is then all that counts, which is what ray offsets rely on.
+  // perpendicular to is then all that counts, which is what ray offsets rely on. Where t is wanted, what rounding took
+  // from the origin counts, too: along a grazing ray it is many times what it is along the normal.
   F x[3], y[3], z[3], depth = Lanes::set(0.0f);
   for (uint32_t corner = 0; corner < 3; ++corner) {
     const F p = relative(0, corner), q = relative(1, corner);
@@ -116,6 +130,11 @@ inline uint32_t test_lanes(Relative relative, Normal normal, const RayLanes<Lane
   const uint32_t unsure = (Lanes::less_equal(below, least) | Lanes::less_equal(most, error)) & wanted & ~inside;
   if constexpr (kWeights)
     if ((inside | unsure) == 0) return 0;
+  F nearer = Lanes::set(0.0f);
+  if constexpr (kRest) {
+    nearer = Lanes::fma(rest(0), normal(0), Lanes::fma(rest(1), normal(1), Lanes::mul(rest(2), normal(2))));
+    depth = Lanes::sub(depth, nearer);
+  }
   const F along = Lanes::fma(sx, normal(0), Lanes::fma(sy, normal(1), normal(2)));
   F t = Lanes::mul(Lanes::div(depth, along), rays.shear[2]);
   uint32_t hit = inside & Lanes::less(rays.begin, t) & Lanes::less_equal(t, rays.end);
@@ -128,7 +147,7 @@ inline uint32_t test_lanes(Relative relative, Normal normal, const RayLanes<Lane
   }
   if (unsure != 0) {
     exact_count += static_cast<uint64_t>(__builtin_popcount(unsure));
-    const uint32_t exactly = test_exactly<Lanes>(unsure, x, y, z, rays.shear[2], hits);
+    const uint32_t exactly = test_exactly<Lanes>(unsure, x, y, z, rays.shear[2], nearer, along, hits);
     t = Lanes::load(hits.t);
     hit |= exactly & Lanes::less(rays.begin, t) & Lanes::less_equal(t, rays.end);
   }

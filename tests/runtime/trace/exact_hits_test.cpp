@@ -150,5 +150,83 @@ TEST(HitVerdicts, FindWhatIsWrongWithASystem) {
   EXPECT_EQ(verdicts[1].all(), 2u);
 }
 
+/// A hilly floor whose triangles are small beside its coordinates.
+Mesh hills() {
+  constexpr int kCells = 120;
+  Mesh mesh;
+  for (int z = 0; z <= kCells; ++z)
+    for (int x = 0; x <= kCells; ++x)
+      mesh.positions.emplace_back(1.3 * x - 30.0, 0.4 * std::sin(0.7 * x) * std::cos(0.9 * z), 1.1 * z + 50.0);
+  for (uint32_t z = 0; z < kCells; ++z)
+    for (uint32_t x = 0; x < kCells; ++x) {
+      const uint32_t a = z * (kCells + 1) + x, b = a + kCells + 1;
+      mesh.triangles.insert(mesh.triangles.end(), {{a, b, a + 1}, {b, b + 1, a + 1}});
+    }
+  return mesh;
+}
+
+/// Rays that start a few ulp of their origin above a triangle and come down on its plane after half an edge.
+std::vector<Ray> grazing_rays(const SceneSource& source, const ExactTriangles& triangles, size_t count) {
+  std::mt19937 generator(3);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  std::vector<Ray> rays;
+  while (rays.size() < count) {
+    const auto instance = static_cast<uint32_t>(generator() % source.instances().size());
+    const uint64_t all = source.counts(source.instances()[instance].geometry).triangles;
+    const ExactTriangle t = triangles(instance, static_cast<uint32_t>(generator() % all));
+    const DVec3 a = t[0], e = t[1] - a, f = t[2] - a, n = glm::normalize(glm::cross(e, f));
+    const DVec3 start = a + 0.3 * unit(generator) * e + 0.3 * unit(generator) * f;
+    const DVec3 stop = a + 0.5 * unit(generator) * e + 0.5 * unit(generator) * f;
+    Ray ray;
+    ray.origin = Vec3(start);
+    const double height = (2.0 + 6.0 * unit(generator)) * origin_ulp(ray);
+    ray.origin = Vec3(start + n * height);
+    ray.direction = Vec3(stop - DVec3(ray.origin));
+    rays.push_back(ray);
+  }
+  return rays;
+}
+
+/// Of the right triangles: how far a hit is off their plane, in 2^-24 of the way there and the triangle's size.
+double worst_height(const PackedTracer& tracer, const ExactTriangles& triangles, std::span<const Ray> rays) {
+  const std::vector<RayHit> hits = test::closest(tracer, rays);
+  double worst = 0.0;
+  size_t right = 0;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    if (!hits[i].valid()) continue;
+    const HitSurface surface = tracer.resolve(hits[i]);
+    const ExactTriangle t = triangles(surface.placement->instance, surface.triangle);
+    const ExactHit exact = exact_hit(rays[i], t);
+    if (!exact.hit) continue;
+    ++right;
+    const double way = std::abs(exact.t) * glm::length(DVec3(rays[i].direction));
+    const double size = way + glm::distance(t[0], t[1]) + glm::distance(t[0], t[2]);
+    worst = std::max(worst, std::abs(double{hits[i].t} - exact.t) * exact.height / (0x1p-24 * size));
+  }
+  EXPECT_GT(right, rays.size() / 2);
+  return worst;
+}
+
+/// What rounding takes from a ray's origin in a tree's grid is an ulp of its coordinates, far more than this.
+TEST(NearestHits, AreOnTheirPlanesWhereRaysGraze) {
+  for (const bool instanced : {false, true}) {
+    Scene scene;
+    if (instanced) {
+      test::add_object(scene, hills());
+      scene.instances.push_back({0, Affine(test::placed({5, 6, 7}, {1, 1.3, -0.8}, 33, {1, 2, 3}))});
+      scene.instances.push_back({0, Affine(test::placed({-300, 6, 7}, DVec3(1), 80))});
+    } else {
+      test::add_shape(scene, hills());
+    }
+    const test::BakedScene baked(scene);
+    for (const PackedIsa isa : test::isas()) {
+      const PackedTracer tracer(baked.file, baked.source, isa);
+      const ExactTriangles triangles(baked.file, tracer.space());
+      const std::vector<Ray> rays = grazing_rays(baked.source, triangles, 20000);
+      EXPECT_LT(worst_height(tracer, triangles, rays), 2.0) << tracer.isa() << ", instanced " << instanced;
+    }
+  }
+}
+
 } // namespace
 } // namespace packtrace

@@ -7,6 +7,7 @@
 #include <tbb/parallel_for.h>
 
 #include "runtime/trace/embree_tracer.h"
+#include "runtime/trace/packed/tree_hull.h"
 #include "runtime/trace/ray_offset.h"
 #include "tests/runtime/trace/packed_scenes.h"
 #include "tests/runtime/trace/test_scenes.h"
@@ -290,6 +291,38 @@ TEST(PackedTracer, NamesInstancesThatAreFlat) {
   const PackedTracer tracer(baked.file, baked.source);
   ASSERT_EQ(tracer.flat_instances().size(), 1u);
   EXPECT_EQ(tracer.flat_instances()[0], 1u);
+}
+
+TEST(TreeHull, IsCloserThanTheTurnedRootsBoxAndHoldsAllThatIsHit) {
+  Scene scene;
+  add_object(scene, test::sphere({0, 0, 0}, 1, 60));
+  scene.instances.push_back({0, Affine(placed({0, 0, 0}))});
+  const BakedScene baked(scene);
+  const PackedTracer tracer(baked.file, baked.source);
+  const TreeHull hull(tracer.trees()[0].nodes);
+  const DAffine turned = placed({5, 6, 7}, {1, -2, 0.5}, 45, {1, 1, 0});
+  const TreeBox box = hull.placed(turned);
+  DVec3 lo(std::numeric_limits<double>::infinity()), hi = -lo; // of the root's corners
+  for (int corner = 0; corner < 8; ++corner) {
+    const DVec3 at((corner & 1) != 0 ? hull.hi().x : hull.lo().x, (corner & 2) != 0 ? hull.hi().y : hull.lo().y,
+                   (corner & 4) != 0 ? hull.hi().z : hull.lo().z);
+    lo = glm::min(lo, transform_point(turned, at)), hi = glm::max(hi, transform_point(turned, at));
+  }
+  const DVec3 size = hi - lo;
+  EXPECT_LT(box.half_area(), 0.75 * (size.x * size.y + size.y * size.z + size.z * size.x));
+  size_t vertices = 0;
+  for (const RayHit& hit : closest(tracer, random_rays(5000, baked.source.world_bounds(), tracer.space(), 4))) {
+    if (!hit.valid()) continue;
+    for (const Vec3& vertex : tracer.resolve(hit).vertices) {
+      const DVec3 at = transform_point(turned, DVec3(vertex));
+      ++vertices;
+      for (int axis = 0; axis < 3; ++axis) {
+        EXPECT_GE(at[axis], double{box.lo[static_cast<size_t>(axis)]});
+        EXPECT_LE(at[axis], double{box.hi[static_cast<size_t>(axis)]});
+      }
+    }
+  }
+  EXPECT_GT(vertices, 3000u);
 }
 
 TEST(PackedTracer, TracesManyInstances) {

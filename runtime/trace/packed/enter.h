@@ -1,0 +1,218 @@
+#pragma once
+
+#include "runtime/trace/packed/ray_group.h"
+
+/// How rays come from unit space into the grid of a tree that is placed there.
+namespace packtrace::packed {
+namespace {
+
+/// Origins farther from the tree's zero than its largest coordinate times this are moved along the ray.
+constexpr double kFar = 4.0;
+
+/// Half a block of rays in a tree's grid.
+struct GridRays {
+  Doubles origin[3], direction[3]; ///< the direction's largest component is in [1, 2)
+  Doubles power, scale;            ///< t here for one in unit space, and 1 / that
+  Doubles begin;                   ///< that origins were moved by
+};
+
+inline double larger(double a, double b) { return a > b ? a : b; }
+
+/// Moves the origin of a ray that starts far from the tree to just before its box, where floats are finer. False where
+/// the ray passes the box by.
+inline bool approach(const TracePlacement& placement, double margin, double (&origin)[3], const double (&direction)[3],
+                     double& moved_by) {
+  double begin = 0.0, end = 1e300;
+  for (uint32_t i = 0; i < 3; ++i) {
+    const double lo = placement.box_lo[i] - margin - origin[i], hi = placement.box_hi[i] + margin - origin[i];
+    if (direction[i] == 0.0) {
+      if (lo > 0.0 || hi < 0.0) return false;
+      continue;
+    }
+    const double a = lo / direction[i], b = hi / direction[i];
+    begin = larger(begin, a < b ? a : b);
+    end = end < (a < b ? b : a) ? end : (a < b ? b : a);
+  }
+  if (begin > end) return false;
+  for (uint32_t i = 0; i < 3; ++i) origin[i] += begin * direction[i];
+  moved_by = begin;
+  return true;
+}
+
+/// The same of some lanes. Returns those that do not pass the box by.
+/// @param far lanes, as bits
+inline uint32_t approach(const TracePlacement& placement, double margin, uint32_t far, GridRays& rays) {
+  double origins[3][kDoubleLanes], directions[3][kDoubleLanes], begins[kDoubleLanes];
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    write_block(origins[axis], rays.origin[axis]);
+    write_block(directions[axis], rays.direction[axis]);
+  }
+  write_block(begins, rays.begin);
+  uint32_t near = 0;
+  for (; far != 0; far &= far - 1) {
+    const auto lane = static_cast<uint32_t>(__builtin_ctz(far));
+    double origin[3] = {origins[0][lane], origins[1][lane], origins[2][lane]};
+    const double direction[3] = {directions[0][lane], directions[1][lane], directions[2][lane]};
+    if (!approach(placement, margin, origin, direction, begins[lane])) continue;
+    for (uint32_t axis = 0; axis < 3; ++axis) origins[axis][lane] = origin[axis];
+    near |= 1u << lane;
+  }
+  for (uint32_t axis = 0; axis < 3; ++axis) read_block(rays.origin[axis], origins[axis]);
+  read_block(rays.begin, begins);
+  return near;
+}
+
+/// Moves half a block into the grid. Returns the lanes of `wanted` that have a direction and coordinates of any use.
+/// @tparam kAligned the grid's axes are those of unit space
+template <bool kAligned>
+inline uint32_t move_rays(const TracePlacement& placement, float max_coordinate, const UnitRays& from, uint32_t first,
+                          uint32_t wanted, GridRays& out) {
+  constexpr int64_t kMagnitude = 0x7fffffffffffffff;
+  const auto keep_magnitude = [](Doubles& most, const Doubles& x) {
+    keep_larger(most, reinterpret_cast<Doubles>(reinterpret_cast<Longs>(x) & kMagnitude));
+  };
+  const double* m = placement.grid_from_unit;
+  Doubles origin[3], direction[3], largest{}, away{};
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    origin[axis] = read_doubles(&from.origin[axis][first]);
+    direction[axis] = read_doubles(&from.direction[axis][first]);
+  }
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    const auto turned = [&](const Doubles(&v)[3]) {
+      if constexpr (kAligned) return m[4 * axis] * v[axis];
+      return m[axis] * v[0] + m[3 + axis] * v[1] + m[6 + axis] * v[2];
+    };
+    out.direction[axis] = turned(direction);
+    out.origin[axis] = turned(origin) + m[9 + axis];
+    keep_magnitude(largest, out.direction[axis]);
+    keep_magnitude(away, out.origin[axis]);
+  }
+  constexpr int64_t kExponent = int64_t{2047} << 52, kLeast = int64_t{523} << 52, kMost = int64_t{1523} << 52;
+  const Doubles least = Doubles{} + __builtin_bit_cast(double, kLeast),
+                most = Doubles{} + __builtin_bit_cast(double, kMost);
+  Doubles power = reinterpret_cast<Doubles>(reinterpret_cast<Longs>(largest) & kExponent); // whose inverse is one, too
+  power = power < least ? least : power;
+  power = power > most ? most : power;
+  out.power = power;
+  out.scale = reinterpret_cast<Doubles>((int64_t{2046} << 52) - reinterpret_cast<Longs>(power));
+  for (Doubles& component : out.direction) component = component * out.scale;
+  out.begin = Doubles{};
+  const uint32_t usable = wanted & lanes_between(0.0, largest, 1e300) & lanes_between(-1.0, away, 1e300);
+  const uint32_t far = usable & lanes_between(kFar * double{max_coordinate}, away, 1e300);
+  if (far == 0) return usable;
+  return (usable & ~far) | approach(placement, 0x1p-8 * double{max_coordinate}, far, out);
+}
+
+/// Half a block as floats.
+struct GridFloats {
+  HalfFloats origin[3], direction[3], begin, end;
+};
+
+inline GridFloats to_floats(const GridRays& rays, const UnitRays& from, uint32_t first) {
+  GridFloats out;
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    out.origin[axis] = to_floats(rays.origin[axis]);
+    out.direction[axis] = to_floats(rays.direction[axis]);
+  }
+  out.begin = to_floats(read_doubles(&from.tnear[first]) * rays.power - rays.begin);
+  out.end = to_floats(read_doubles(&from.tmax[first]) * rays.power - rays.begin);
+  return out;
+}
+
+inline RayBlock join(const GridFloats& low, const GridFloats& high) {
+  RayBlock out;
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    out.origin[axis] = join(low.origin[axis], high.origin[axis]);
+    out.direction[axis] = join(low.direction[axis], high.direction[axis]);
+  }
+  out.begin = join(low.begin, high.begin);
+  out.end = join(low.end, high.end);
+  return out;
+}
+
+/// Moves a block of rays into a tree's grid. Returns the lanes of `wanted` that may hit something.
+/// @tparam kNearest whether nearest hits are wanted, for which t must be right and is needed in unit space
+template <bool kAligned, bool kNearest>
+inline uint32_t move_block(const TracePlacement& placement, float max_coordinate, const UnitRays& from, uint32_t first,
+                           uint32_t wanted, RayBlock& out, RayGroup& group) {
+  uint32_t usable = 0;
+  const auto half = [&](uint32_t at) {
+    GridRays rays;
+    usable |= move_rays<kAligned>(placement, max_coordinate, from, first + at, wanted >> at, rays) << at;
+    const GridFloats rounded = to_floats(rays, from, first + at);
+    if constexpr (kNearest) {
+      for (uint32_t axis = 0; axis < 3; ++axis)
+        write_block(&group.rest[axis][first + at], to_floats(rays.origin[axis] - to_doubles(rounded.origin[axis])));
+      write_block(&group.t_begin[first + at], rays.begin);
+      write_block(&group.t_scale[first + at], rays.scale);
+    }
+    return rounded;
+  };
+  const GridFloats low = half(0), high = half(kDoubleLanes);
+  out = join(low, high);
+  return usable & wanted;
+}
+
+/// The same where the grid is unit space, without doubles. False where it cannot, as origins are far away or directions
+/// of extreme lengths.
+/// @param wanted lanes that matter
+template <bool kNearest>
+inline bool unit_block(const UnitRays& from, uint32_t first, uint32_t wanted, float max_coordinate, RayBlock& out,
+                       RayGroup& group) {
+  Floats largest{}, away{};
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    read_block(out.origin[axis], &from.origin[axis][first]);
+    read_block(out.direction[axis], &from.direction[axis][first]);
+    keep_larger(largest, magnitude(out.direction[axis]));
+    keep_larger(away, magnitude(out.origin[axis]));
+  }
+  const Ints usable =
+      (largest > 0x1p-100f) & (largest < 0x1p100f) & (away <= static_cast<float>(kFar) * max_coordinate);
+  if ((lane_bits(usable) & wanted) != wanted) return false;
+  const Ints power = reinterpret_cast<Ints>(largest) & 0x7f800000; // down to a power of two
+  const Floats scale = reinterpret_cast<Floats>((254 << 23) - power);
+  for (Floats& component : out.direction) component = component * scale;
+  Floats tnear, tmax;
+  read_block(tnear, &from.tnear[first]);
+  read_block(tmax, &from.tmax[first]);
+  out.begin = tnear * reinterpret_cast<Floats>(power);
+  out.end = tmax * reinterpret_cast<Floats>(power);
+  if constexpr (kNearest) {
+    float scales[kBlock];
+    write_block(scales, scale);
+    for (uint32_t at = 0; at < kBlock; at += kDoubleLanes) {
+      write_block(&group.t_begin[first + at], Doubles{});
+      write_block(&group.t_scale[first + at], read_doubles(scales + at));
+    }
+  }
+  return true;
+}
+
+/// Moves rays into a tree's grid and sets them up. Returns those that may hit something.
+/// @tparam kTriangles whether rays meet triangles there; else the grid is unit space
+/// @tparam kNearest whether nearest hits are wanted, for which t must be right and is needed in unit space
+/// @param rays as bits
+template <bool kTriangles, bool kNearest>
+inline uint64_t enter(const TracePlacement& placement, float max_coordinate, const UnitRays& from, uint64_t rays,
+                      RayGroup& group) {
+  uint64_t entered = 0;
+  for (uint64_t& backward : group.backward) backward = 0;
+  for (uint64_t& major : group.major) major = 0;
+  for (uint32_t first = 0; first < kGroup; first += kBlock) {
+    const auto wanted = static_cast<uint32_t>(rays >> first) & kBlockLanes;
+    if (wanted == 0) continue;
+    RayBlock block;
+    uint32_t usable = wanted;
+    if (kTriangles || !unit_block<kNearest>(from, first, wanted, max_coordinate, block, group))
+      usable = placement.aligned != 0
+                   ? move_block<true, kNearest>(placement, max_coordinate, from, first, wanted, block, group)
+                   : move_block<false, kNearest>(placement, max_coordinate, from, first, wanted, block, group);
+    entered |= uint64_t{usable} << first;
+    set_boxes(block, max_coordinate, first, group);
+    if constexpr (kTriangles) set_shears(block, first, group);
+  }
+  return entered;
+}
+
+} // namespace
+} // namespace packtrace::packed

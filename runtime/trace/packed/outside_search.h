@@ -1,0 +1,60 @@
+#pragma once
+
+#include "runtime/trace/packed/leaf_tests.h"
+#include "runtime/trace/packed/node_children.h"
+
+/// Rays through a placed tree whose leaf nodes are found by KernelScene::search_tree instead of its inner nodes.
+namespace packtrace::packed {
+namespace {
+
+/// @tparam Traversal that tests the leaves
+template <typename Traversal>
+struct OutsideSearch {
+  using Lanes = typename Traversal::Kernel;
+
+  /// As Traversal::trace_tree().
+  static void run(Traversal& self, uint32_t placement, const baked::PackedNode* nodes, RayGroup& group, uint64_t rays,
+                  uint32_t octant) {
+    const KernelScene& scene = self.scene_;
+    OutsideSearch state{&self, nodes, &group, placement, octant};
+    TreeSearch search;
+    search.tree = scene.placements[placement].tree;
+    search.any = Traversal::kAnyHit ? 1 : 0;
+    search.count = 0;
+    search.limits = group.limits;
+    search.traversal = &state;
+    search.visit = visit_leaf_nodes;
+    for (uint64_t m = rays & self.alive_; m != 0; m &= m - 1) {
+      const uint32_t i = first_bit(m);
+      KernelRay& ray = search.rays[search.count];
+      search.number[search.count++] = i;
+      for (uint32_t axis = 0; axis < 3; ++axis)
+        ray.origin[axis] = group.origin[axis][i], ray.direction[axis] = 1.0f / group.inverse[axis][i];
+      ray.tnear = group.limits[i][0] > 0.0f ? group.limits[i][0] : 0.0f; // nothing lies behind an origin that moved
+      ray.tfar = group.tmax(i);
+    }
+    scene.search_tree(scene.searcher, search);
+  }
+
+  Traversal* self;
+  const baked::PackedNode* nodes;
+  RayGroup* group;
+  uint32_t placement, octant;
+
+private:
+  static uint64_t visit_leaf_nodes(const TreeSearch& search, const uint32_t* nodes, uint32_t node_count,
+                                   uint64_t rays) {
+    const OutsideSearch& at = *static_cast<const OutsideSearch*>(search.traversal);
+    Traversal& self = *at.self;
+    for (uint32_t i = 0; i < node_count && (rays &= self.alive_) != 0; ++i) {
+      const baked::PackedNode& node = at.nodes[nodes[i]];
+      self.count_node(rays);
+      self.trace_leaves(at.placement, node, NodeChildren(node), typename Lanes::Boxes(node, at.octant), *at.group,
+                        rays);
+    }
+    return rays & self.alive_;
+  }
+};
+
+} // namespace
+} // namespace packtrace::packed

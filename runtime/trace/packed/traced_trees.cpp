@@ -1,0 +1,131 @@
+#include "runtime/trace/packed/traced_trees.h"
+
+#include <algorithm>
+
+#include "runtime/stopwatch.h"
+#include "runtime/trace/packed/trace_cluster.h"
+
+namespace packtrace {
+namespace {
+
+uint8_t ray_classes(uint32_t material_class) {
+  return static_cast<uint8_t>(((material_class & 1u) == 0 ? baked::kCameraBelow : 0) |
+                              ((material_class & 2u) == 0 ? baked::kOcclusionBelow : 0) |
+                              ((material_class & baked::kMaskedClass) != 0 ? baked::kMaskedLeaves : 0));
+}
+
+void add_tree(TracedTrees& t, uint32_t number) {
+  const baked::TreeRecord& record = t.records[number];
+  packed::TraceTree tree{t.nodes.data() + record.first_node, 1.0f};
+  if (record.node_count > 0) {
+    t.hulls[number].emplace(tree.nodes);
+    const DVec3 far = glm::max(glm::abs(t.hulls[number]->lo()), glm::abs(t.hulls[number]->hi()));
+    tree.max_coordinate =
+        std::max({1.0f, static_cast<float>(far.x), static_cast<float>(far.y), static_cast<float>(far.z)});
+  }
+  t.trees.push_back(tree);
+}
+
+/// @param number of a tree in whose grid they are read
+void add_clusters(TracedTrees& t, const BakedFile& file, uint32_t number, uint32_t g) {
+  const baked::TreeRecord& tree = t.records[number];
+  const baked::GeometryRecord& geometry = file.geometries()[g];
+  t.grid_of[g] = number;
+  uint32_t next = 0;
+  for (uint32_t c = 0; c < geometry.class_clusters.size(); ++c)
+    for (const uint32_t end = next + geometry.class_clusters[c]; next < end; ++next)
+      t.clusters[geometry.first_cluster + next] = trace_cluster(tree, geometry, file.cluster(g, next), ray_classes(c));
+}
+
+/// Room for what is numbered by geometry or cluster.
+TracedTrees make_room(const BakedFile& file, uint32_t geometry_count) {
+  TracedTrees t;
+  t.clusters.resize(file.sections().clusters.size());
+  t.tree_of.assign(geometry_count, baked::kNone);
+  t.grid_of.assign(file.geometries().size(), baked::kNone);
+  return t;
+}
+
+void add_trees(TracedTrees& t) {
+  t.hulls.resize(t.records.size());
+  for (uint32_t i = 0; i < t.records.size(); ++i) add_tree(t, i);
+}
+
+} // namespace
+
+TracedTrees whole_trees(const BakedFile& file) {
+  TracedTrees t = make_room(file, file.base_geometry_count());
+  t.records = file.sections().trees;
+  t.nodes = file.sections().nodes;
+  if (t.records.empty()) {
+    BakedSections sections = file.sections();
+    sections.geometries = sections.geometries.first(file.base_geometry_count());
+    t.built = build_packed_trees(sections);
+    t.records = t.built.trees;
+    t.nodes = t.built.nodes;
+  }
+  uint32_t world = baked::kNone;
+  for (uint32_t i = 0; i < t.records.size(); ++i) {
+    const uint32_t g = t.records[i].geometry;
+    if (g == baked::kWorldTree)
+      world = i;
+    else if (g < t.tree_of.size()) // else a level of detail
+      t.tree_of[g] = i;
+  }
+  for (uint32_t g = 0; g < t.tree_of.size(); ++g) {
+    if (file.geometries()[g].cluster_count == 0) continue;
+    if (t.tree_of[g] == baked::kNone) t.tree_of[g] = world;
+    add_clusters(t, file, t.tree_of[g], g);
+  }
+  add_trees(t);
+  return t;
+}
+
+TracedTrees chosen_trees(const BakedFile& file, const LodSource& source, LodTrees& cost) {
+  TracedTrees t = make_room(file, source.geometry_count());
+  const BakedSections& sections = file.sections();
+  const std::vector<uint8_t> joins = ChosenTreeBuilder::joins_world(sections);
+  std::vector<ChosenClusters> chosen;
+  std::vector<uint32_t> blas_of; // by choice
+  uint32_t world = baked::kNone;
+  const auto next_tree = [&](uint32_t geometry, uint32_t blas) {
+    chosen.push_back({geometry, {}});
+    blas_of.push_back(blas);
+    return static_cast<uint32_t>(chosen.size()) - 1;
+  };
+  for (uint32_t b = 0; b < source.geometry_count(); ++b) {
+    const uint32_t base = source.base_geometry(b);
+    if (source.clusters(b).empty()) continue;
+    if (joins[base] != 0 && world == baked::kNone) world = next_tree(baked::kWorldTree, kNoGeometry);
+    const uint32_t tree = joins[base] != 0 ? world : next_tree(base, b);
+    t.tree_of[b] = tree;
+    for (const LodCluster& c : source.clusters(b))
+      chosen[tree].clusters.push_back(static_cast<uint32_t>(file.geometries()[c.geometry].first_cluster + c.cluster));
+  }
+  if (world != baked::kNone)
+    std::ranges::sort(chosen[world].clusters); // levels of all of them are behind all of level 0
+  const Stopwatch making_clusters;
+  const ChosenTreeBuilder builder(sections, chosen);
+  cost.clusters_s = making_clusters.seconds();
+  const Stopwatch building;
+  t.built = builder.build();
+  t.records = t.built.trees;
+  t.nodes = t.built.nodes;
+  cost.trees_s = building.seconds();
+  for (uint32_t i = 0; i < chosen.size(); ++i) {
+    const uint64_t leaves = builder.leaf_nodes(i);
+    cost.trees.push_back({blas_of[i], (leaves > 0 ? 2 * leaves - 1 : 0) * sizeof(baked::PackedNode),
+                          t.records[i].node_count * sizeof(baked::PackedNode)});
+  }
+  for (uint32_t b = 0; b < source.geometry_count(); ++b) {
+    const uint32_t base = source.base_geometry(b);
+    if (t.tree_of[b] == baked::kNone || t.grid_of[base] != baked::kNone) continue;
+    add_clusters(t, file, t.tree_of[b], base);
+    for (const baked::LodLevelRecord& level : file.lod(base).levels)
+      if (level.level > 0) add_clusters(t, file, t.tree_of[b], level.geometry);
+  }
+  add_trees(t);
+  return t;
+}
+
+} // namespace packtrace

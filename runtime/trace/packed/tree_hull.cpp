@@ -1,0 +1,73 @@
+#include "runtime/trace/packed/tree_hull.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace packtrace {
+namespace {
+
+/// Boxes at most, of children or grandchildren of the root.
+constexpr size_t kMostBoxes = size_t{baked::kNodeWidth} * baked::kNodeWidth;
+
+struct Child {
+  DVec3 lo, hi;
+  uint32_t node; ///< 0: a leaf
+};
+
+std::vector<Child> children(const baked::PackedNode& node) {
+  std::vector<Child> result;
+  for (uint32_t slot = 0; slot < baked::kNodeWidth && node.children[slot] != baked::kNoChild; ++slot) {
+    Child child;
+    child.node = node.has_leaves() ? 0 : node.first_child + slot;
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+      const double unit = std::ldexp(1.0, static_cast<int>(node.exponent(axis)));
+      child.lo[static_cast<int>(axis)] = node.origin[axis] + node.lo[axis][slot] * unit;
+      child.hi[static_cast<int>(axis)] = node.origin[axis] + node.hi[axis][slot] * unit;
+    }
+    result.push_back(child);
+  }
+  return result;
+}
+
+} // namespace
+
+TreeHull::TreeHull(const baked::PackedNode* nodes)
+    : lo_(std::numeric_limits<double>::infinity()), hi_(-std::numeric_limits<double>::infinity()) {
+  for (const Child& child : children(nodes[0])) {
+    lo_ = glm::min(lo_, child.lo), hi_ = glm::max(hi_, child.hi);
+    const std::vector<Child> boxes = child.node == 0 ? std::vector{child} : children(nodes[child.node]);
+    for (const Child& box : boxes)
+      for (int axis = 0; axis < 3; ++axis) {
+        centre_[axis].push_back(0.5 * (box.lo[axis] + box.hi[axis]));
+        half_[axis].push_back(0.5 * (box.hi[axis] - box.lo[axis]));
+      }
+  }
+}
+
+TreeBox TreeHull::placed(const DAffine& unit_from_grid) const {
+  // Rays in the grid are off by 2^-22 of the largest coordinate there, see ray_group.h.
+  const DVec3 far = glm::max(glm::abs(lo_), glm::abs(hi_));
+  const double pad = 0x1p-20 * std::max({far.x, far.y, far.z});
+  TreeBox box;
+  for (int axis = 0; axis < 3; ++axis) {
+    const DVec3 row(unit_from_grid[0][axis], unit_from_grid[1][axis], unit_from_grid[2][axis]), size = glm::abs(row);
+    double lo[2], hi[2]; // of every other box: numbers that do not wait for each other
+    std::fill_n(lo, 2, std::numeric_limits<double>::infinity());
+    std::fill_n(hi, 2, -std::numeric_limits<double>::infinity());
+    for (size_t i = 0; i < centre_[0].size(); ++i) {
+      const double middle = row.x * centre_[0][i] + row.y * centre_[1][i] + row.z * centre_[2][i];
+      const double reach = size.x * half_[0][i] + size.y * half_[1][i] + size.z * half_[2][i];
+      lo[i & 1] = std::min(lo[i & 1], middle - reach);
+      hi[i & 1] = std::max(hi[i & 1], middle + reach);
+    }
+    const double offset = unit_from_grid[3][axis], beyond = pad * (size.x + size.y + size.z);
+    box.lo[static_cast<size_t>(axis)] =
+        std::nextafter(static_cast<float>(offset + std::min(lo[0], lo[1]) - beyond), -INFINITY);
+    box.hi[static_cast<size_t>(axis)] =
+        std::nextafter(static_cast<float>(offset + std::max(hi[0], hi[1]) + beyond), INFINITY);
+  }
+  return box;
+}
+
+} // namespace packtrace
