@@ -35,6 +35,11 @@ struct alignas(64) UnitRays {
 
 struct Beam;
 
+/// What a triangle test needs of a ray, side by side: its origin along Woop's k, and its shears.
+struct alignas(32) TestRay {
+  float origin[3], begin, shear[3], end;
+};
+
 /// One array per value; those of rays that are not in use are not set.
 struct alignas(64) RayGroup {
   float bias[3][kGroup][2]; ///< a near plane p is passed at p inverse + the first, a far one at p inverse - the second
@@ -48,11 +53,13 @@ struct alignas(64) RayGroup {
   uint64_t backward[3];     ///< rays along which x, y, z decrease, as bits
   double t_begin[kGroup];   ///< unit-space t = (t here + t_begin) t_scale
   double t_scale[kGroup];   ///< a power of two
-  Beam* beam = nullptr;     ///< that all its rays make, see beam.h
+  TestRay tests[kGroup];
+  Beam* beam = nullptr; ///< that all its rays make, see beam.h
 
   void set_tmax(uint32_t i, float t) {
     limits[i][1] = -t;
     end[i] = t;
+    tests[i].end = t;
   }
   float tmax(uint32_t i) const { return end[i]; }
 };

@@ -149,6 +149,7 @@ private:
     const TraceTree& tree = scene_.trees[place.tree];
     RayGroup group;
     rays = enter<true>(place, tree.max_coordinate, unit_, rays, group);
+    set_tests(group, rays);
     Beam beam;
     if constexpr (!kAny)
       if (make_beam(group, tree.max_coordinate, rays, beam)) group.beam = &beam;
@@ -307,7 +308,7 @@ private:
         alive_ &= ~rays_that_hit<Lanes>(batch, normals, group, rays, exact);
       } else {
         const uint64_t others = test_side_by_side(batch, normals, place, group, rays);
-        const bool many = kPairs<Lanes> && count_ones(others) >= kLeastTestedTwice;
+        const bool many = Lanes::Wide::kLanes > kBatch && count_ones(others) >= kLeastTestedTwice;
         test_each(batch, normals, place, group,
                   many ? rays_that_hit<Lanes>(batch, normals, group, others, exact) : others);
       }
@@ -325,7 +326,7 @@ private:
       const uint32_t i = first_bit(m);
       LaneHits<Lanes> hits;
       uint64_t exact = 0;
-      const uint32_t lanes = test_triangles<Lanes, true>(batch, normals, group, i, hits, exact);
+      const uint32_t lanes = test_triangles<Lanes>(batch, normals, group, i, hits, exact);
       if constexpr (kCount) counters_->exact_triangles += exact;
       if (lanes != 0) take_hits(place, i, hits, lanes, group);
     }
@@ -344,7 +345,7 @@ private:
       for (uint32_t triangle = 0; triangle < batch.count; ++triangle) {
         LaneHits<Wide> hits;
         uint64_t exact = 0;
-        uint32_t lanes = test_rays<Wide, true>(batch, normals, triangle, group, axis, at, wanted, hits, exact);
+        uint32_t lanes = test_rays<Wide>(batch, normals, triangle, group, axis, at, wanted, hits, exact);
         if constexpr (kCount) counters_->exact_triangles += exact;
         place.triangle = begin + triangle;
         for (; lanes != 0; lanes &= lanes - 1) {
