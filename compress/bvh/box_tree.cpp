@@ -11,7 +11,7 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kUsualBins = 16, kMaxBins = 64; // more where a cut must fill leaves
+constexpr uint32_t kMaxBins = 64;
 constexpr uint32_t kParallelCount = 2048;          // smaller subtrees are built by one thread
 
 TreeBox empty_box() {
@@ -69,7 +69,7 @@ public:
     if (!must_halve) {
       std::array<BinAxis, 3> axes;
       for (size_t axis = 0; axis < 3; ++axis) {
-        axes[axis].bins = std::min(unit_ == 1 ? kUsualBins : kMaxBins, 2 * count);
+        axes[axis].bins = std::min(kMaxBins, 2 * count);
         axes[axis].low = 2.0 * centres.lo[axis];
         const double extent = 2.0 * (double{centres.hi[axis]} - centres.lo[axis]);
         axes[axis].scale = extent > 0.0 ? axes[axis].bins / extent : 0.0;

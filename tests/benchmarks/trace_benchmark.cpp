@@ -121,11 +121,13 @@ double median_ratio(const std::vector<double>& reference, const std::vector<doub
 void measure(Systems& systems, uint32_t threads, uint32_t repeats, bool cpu_clock) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
   for (System& row : systems.rows) row.seconds.assign(row.rays->size(), {});
-  for (uint32_t repeat = 0; repeat <= repeats; ++repeat) // the first warms up
+  for (uint32_t repeat = 0; repeat < repeats; ++repeat)
     for (size_t phase = 0; phase < systems.rows.front().rays->size(); ++phase)
       for (System& row : systems.rows) {
+        // Once untimed: else only systems whose neighbour reads the same trees would find them cached.
+        replay((*row.rays)[phase], *row.tracer, row.results[phase], cpu_clock);
         const double seconds = replay((*row.rays)[phase], *row.tracer, row.results[phase], cpu_clock);
-        if (repeat > 0) row.seconds[phase].push_back(cpu_clock ? seconds / threads : seconds);
+        row.seconds[phase].push_back(cpu_clock ? seconds / threads : seconds);
       }
 }
 

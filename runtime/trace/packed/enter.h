@@ -209,7 +209,7 @@ inline uint64_t enter(const TracePlacement& placement, float max_coordinate, con
                    : move_block<false, kNearest>(placement, max_coordinate, from, first, wanted, block, group);
     entered |= uint64_t{usable} << first;
     set_boxes(block, max_coordinate, first, group);
-    if constexpr (kTriangles) set_shears(block, first, group);
+    if constexpr (kTriangles) set_shears<kNearest>(block, first, group);
   }
   return entered;
 }

@@ -35,6 +35,21 @@ struct Avx2Lanes {
     return _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))));
   }
   static F set(float x) { return _mm256_set1_ps(x); }
+  /// kCount numbers, 8 or 4, as often as there is room for.
+  template <uint32_t kCount>
+  static F repeat(const float* p) {
+    if constexpr (kCount == 8) return load(p);
+    return _mm256_broadcast_ps(reinterpret_cast<const __m128*>(p));
+  }
+  /// Of records of floats the four from number kFirst on: each number of each record kCount times.
+  template <uint32_t kCount, uint32_t kFirst, typename Record>
+  static void spread(const Record* const (&records)[kLanes / kCount], F (&out)[4]) {
+    const auto four = [&](uint32_t i) { return reinterpret_cast<const __m128*>(records[i]) + kFirst / 4; };
+    F all = _mm256_broadcast_ps(four(0));
+    if constexpr (kCount == 4) all = _mm256_insertf128_ps(all, *four(1), 1);
+    out[0] = _mm256_permute_ps(all, 0x00), out[1] = _mm256_permute_ps(all, 0x55);
+    out[2] = _mm256_permute_ps(all, 0xaa), out[3] = _mm256_permute_ps(all, 0xff);
+  }
   static F add(F a, F b) { return _mm256_add_ps(a, b); }
   static F sub(F a, F b) { return _mm256_sub_ps(a, b); }
   static F mul(F a, F b) { return _mm256_mul_ps(a, b); }

@@ -15,10 +15,26 @@ struct Avx512Lanes {
   static F load(const float* p) { return _mm512_loadu_ps(p); }
   static void store(float* p, F a) { _mm512_storeu_ps(p, a); }
   static F set(float x) { return _mm512_set1_ps(x); }
-  /// Eight numbers in both halves, and one of two numbers in each.
-  static F twice(const float* p) { return _mm512_broadcast_f32x8(_mm256_loadu_ps(p)); }
-  static F two(const float* p, uint32_t a, uint32_t b) {
-    return _mm512_mask_broadcastss_ps(_mm512_set1_ps(p[a]), 0xff00, _mm_load_ss(p + b));
+  /// kCount numbers, 8 or 4, as often as there is room for.
+  template <uint32_t kCount>
+  static F repeat(const float* p) {
+    if constexpr (kCount == 8) return _mm512_broadcast_f32x8(_mm256_loadu_ps(p));
+    return _mm512_broadcast_f32x4(_mm_loadu_ps(p));
+  }
+  /// Of records of floats the four from number kFirst on: each number of each record kCount times.
+  template <uint32_t kCount, uint32_t kFirst, typename Record>
+  static void spread(const Record* const (&records)[kLanes / kCount], F (&out)[4]) {
+    const auto four = [&](uint32_t i) { return reinterpret_cast<const __m128*>(records[i]) + kFirst / 4; };
+    F all;
+    if constexpr (kCount == 8) {
+      all = _mm512_insertf32x8(_mm512_castps256_ps512(_mm256_broadcast_ps(four(0))), _mm256_broadcast_ps(four(1)), 1);
+    } else {
+      const __m256 low = _mm256_insertf128_ps(_mm256_castps128_ps256(*four(0)), *four(1), 1);
+      const __m256 high = _mm256_insertf128_ps(_mm256_castps128_ps256(*four(2)), *four(3), 1);
+      all = _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
+    }
+    out[0] = _mm512_permute_ps(all, 0x00), out[1] = _mm512_permute_ps(all, 0x55);
+    out[2] = _mm512_permute_ps(all, 0xaa), out[3] = _mm512_permute_ps(all, 0xff);
   }
   static F add(F a, F b) { return _mm512_add_ps(a, b); }
   static F sub(F a, F b) { return _mm512_sub_ps(a, b); }

@@ -50,6 +50,17 @@ struct ScalarLanes {
   static F set(float x) {
     return each([&](uint32_t) { return x; });
   }
+  /// kCount numbers, 8 or 4, as often as there is room for.
+  template <uint32_t kCount>
+  static F repeat(const float* p) {
+    return each([&](uint32_t i) { return p[i % kCount]; });
+  }
+  /// Of records of floats the four from number kFirst on: each number of each record kCount times.
+  template <uint32_t kCount, uint32_t kFirst, typename Record>
+  static void spread(const Record* const (&records)[kLanes / kCount], F (&out)[4]) {
+    for (uint32_t n = 0; n < 4; ++n)
+      out[n] = each([&](uint32_t i) { return reinterpret_cast<const float*>(records[i / kCount])[kFirst + n]; });
+  }
   static F add(F a, F b) {
     return each([&](uint32_t i) { return a.lane[i] + b.lane[i]; });
   }

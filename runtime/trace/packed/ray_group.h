@@ -34,6 +34,15 @@ struct alignas(64) UnitRays {
 
 struct Beam;
 
+/// What a triangle test needs of a ray, side by side: its origin along Woop's k, and its shears.
+struct alignas(32) TestRay {
+  float origin[3], begin, shear[3], end;
+};
+/// What rounding took from the origin, along Woop's k.
+struct alignas(16) TestRest {
+  float along[3], unused;
+};
+
 /// One array per value; those of rays that are not in use are not set.
 struct alignas(64) RayGroup {
   float bias[3][kGroup][2]; ///< a near plane p is passed at p inverse + the first, a far one at p inverse - the second
@@ -50,10 +59,14 @@ struct alignas(64) RayGroup {
   double t_begin[kGroup]; ///< unit-space t = (t here + t_begin) t_scale
   double t_scale[kGroup]; ///< a power of two
   Beam* beam = nullptr;   ///< that all its rays make, see beam.h
+  // For leaves:
+  TestRay tests[kGroup];
+  TestRest rests[kGroup]; ///< of nearest hits only
 
   void set_tmax(uint32_t i, float t) {
     limits[i][1] = -t;
     end[i] = t;
+    tests[i].end = t;
   }
   float tmax(uint32_t i) const { return end[i]; }
 };
@@ -102,11 +115,17 @@ inline void set_boxes(const RayBlock& block, float max_coordinate, uint32_t firs
   }
 }
 
+/// @tparam kNearest whether group.rest is set, which counts then
+template <bool kNearest>
 inline void set_shears(const RayBlock& block, uint32_t first, RayGroup& group) {
   const Floats x = block.direction[0], y = block.direction[1], z = block.direction[2];
   const Floats ax = magnitude(x), ay = magnitude(y), az = magnitude(z);
   const Ints by_z = (az >= ax) & (az >= ay), by_y = ~by_z & (ay >= ax);
-  const Floats along = by_z ? z : by_y ? y : x;
+  const auto along_k = [&](const Floats(&v)[3], Floats(&rows)[8]) {
+    rows[0] = by_z ? v[0] : by_y ? v[2] : v[1];
+    rows[1] = by_z ? v[1] : by_y ? v[0] : v[2];
+    rows[2] = by_z ? v[2] : by_y ? v[1] : v[0];
+  };
   const Ints zero{};
   group.major[0] |= uint64_t{lane_bits(by_z)} << first;
   group.major[1] |= uint64_t{lane_bits(~by_z & ~by_y)} << first;
@@ -114,9 +133,22 @@ inline void set_shears(const RayBlock& block, uint32_t first, RayGroup& group) {
   write_block(&group.axis[0][first], by_z ? zero : by_y ? zero + 2 : zero + 1);
   write_block(&group.axis[1][first], by_z ? zero + 1 : by_y ? zero : zero + 2);
   write_block(&group.axis[2][first], by_z ? zero + 2 : by_y ? zero + 1 : zero);
-  write_block(&group.shear[0][first], (by_z ? x : by_y ? z : y) / along);
-  write_block(&group.shear[1][first], (by_z ? y : by_y ? x : z) / along);
-  write_block(&group.shear[2][first], 1.0f / along);
+  Floats rows[8];
+  along_k(block.direction, rows);
+  const Floats along = rows[2];
+  rows[4] = rows[0] / along, rows[5] = rows[1] / along, rows[6] = 1.0f / along;
+  for (uint32_t axis = 0; axis < 3; ++axis) write_block(&group.shear[axis][first], rows[4 + axis]);
+  along_k(block.origin, rows);
+  rows[3] = block.begin, rows[7] = block.end;
+  transpose(rows);
+  write_rows(rows, &group.tests[first]);
+  if constexpr (kNearest) {
+    Floats rest[3], rests[8]{};
+    for (uint32_t axis = 0; axis < 3; ++axis) read_block(rest[axis], &group.rest[axis][first]);
+    along_k(rest, rests);
+    transpose(rests);
+    write_rows(rests, &group.rests[first]);
+  }
 }
 
 } // namespace

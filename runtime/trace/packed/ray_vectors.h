@@ -120,6 +120,18 @@ inline void transpose(Floats (&rows)[8]) {
   swap_parts<1, 0, 8, 2, 10, 4, 12, 6, 14>(rows);
 }
 
+/// The reverse of read_rows(), of as many floats as records have.
+template <typename Record>
+inline void write_rows(const Floats (&rows)[8], Record* records) {
+  for (uint32_t i = 0; i < 8; ++i) {
+#if defined(__AVX512F__)
+    const HalfFloats high = __builtin_shufflevector(rows[i], rows[i], 8, 9, 10, 11, 12, 13, 14, 15);
+    __builtin_memcpy(&records[i + 8], &high, sizeof(Record));
+#endif
+    __builtin_memcpy(&records[i], &rows[i], sizeof(Record));
+  }
+}
+
 /// Pairs (a, b), as many as there are lanes.
 inline void write_pairs(float (*out)[2], const Floats& a, const Floats& b) {
 #if defined(__AVX512F__)

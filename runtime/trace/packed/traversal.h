@@ -13,6 +13,9 @@
 namespace packtrace::packed {
 namespace {
 
+/// Cache lines from a cluster's first bits on: most of the 400 to 500 bytes that clusters have without normals.
+constexpr uint32_t kPrefetchedLines = 7;
+
 struct Pending {
   uint64_t rays; ///< as bits
   uint32_t node;
@@ -199,17 +202,26 @@ private:
         read_planes(boxes, planes);
         return pass_each<typename Lanes::Wide>(planes, group, *group.beam, rays, slots, by_child);
       }
-    Lanes::Children::enter(boxes, group, first_bit(rays), t);
+    if constexpr (!kAny) Lanes::Children::enter(boxes, group, first_bit(rays), t);
     return slots & Lanes::Children::pass(boxes, group, rays, by_child);
   }
 
-  /// Pushes the children of a node that rays pass; of nearest hits, the one that the first ray enters first on top.
+  /// Pushes the children of a node that rays pass; of nearest hits, the one that the first ray enters first on top, of
+  /// any hits the first in the tree's own order.
   template <typename Number>
   static void push_children(const typename Lanes::Boxes& boxes, const RayGroup& group, uint64_t rays, uint32_t slots,
                             Pending* stack, uint32_t& size, Number number) {
     uint64_t by_child[baked::kNodeWidth];
     float t[baked::kNodeWidth] = {};
     slots = pass(boxes, group, rays, slots, by_child, t);
+    if constexpr (kAny) {
+      while (slots != 0) {
+        const uint32_t slot = 31u - static_cast<uint32_t>(__builtin_clz(slots));
+        slots &= ~(1u << slot);
+        stack[size++] = {by_child[slot], number(slot), 0.0f};
+      }
+      return;
+    }
     const uint32_t begin = size;
     for (; slots != 0; slots &= slots - 1) {
       const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
@@ -221,6 +233,8 @@ private:
 
   void trace_leaves(uint32_t placement, const baked::PackedNode& node, NodeChildren children,
                     const typename Lanes::Boxes& boxes, RayGroup& group, uint64_t rays) {
+    const uint8_t* const bits = scene_.clusters[node.cluster].bits; // decoding waits for them longer than it takes
+    for (uint32_t line = 0; line < kPrefetchedLines; ++line) __builtin_prefetch(bits + 64 * line);
     if ((scene_.clusters[node.cluster].flags & ray_class_) == 0) return;
     uint64_t by_child[baked::kNodeWidth];
     float t[baked::kNodeWidth];
@@ -249,7 +263,7 @@ private:
         alive_ &= ~rays_that_hit<Lanes, !kAny>(batch, normals, group, rays, exact);
       } else {
         const uint64_t others = test_side_by_side(batch, normals, place, group, rays);
-        const bool many = kPairs<Lanes> && count_ones(others) >= kLeastTestedTwice;
+        const bool many = Lanes::Wide::kLanes > kBatch && count_ones(others) >= kLeastTestedTwice;
         test_each(batch, normals, place, group,
                   many ? rays_that_hit<Lanes, !kAny>(batch, normals, group, others, exact) : others);
       }
@@ -267,7 +281,7 @@ private:
       const uint32_t i = first_bit(m);
       LaneHits<Lanes> hits;
       uint64_t exact = 0;
-      const uint32_t lanes = test_triangles<Lanes, true, !kAny>(batch, normals, group, i, hits, exact);
+      const uint32_t lanes = test_triangles<Lanes, !kAny>(batch, normals, group, i, hits, exact);
       if constexpr (kCount) counters_->exact_triangles += exact;
       if (lanes != 0) take_hits(place, i, hits, lanes, group);
     }
@@ -286,7 +300,7 @@ private:
       for (uint32_t triangle = 0; triangle < batch.count; ++triangle) {
         LaneHits<Wide> hits;
         uint64_t exact = 0;
-        uint32_t lanes = test_rays<Wide, true, !kAny>(batch, normals, triangle, group, axis, at, wanted, hits, exact);
+        uint32_t lanes = test_rays<Wide, !kAny>(batch, normals, triangle, group, axis, at, wanted, hits, exact);
         if constexpr (kCount) counters_->exact_triangles += exact;
         place.triangle = begin + triangle;
         for (; lanes != 0; lanes &= lanes - 1) {
