@@ -12,7 +12,7 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kMaxBins = 64;
-constexpr uint32_t kParallelCount = 2048;          // smaller subtrees are built by one thread
+constexpr uint32_t kParallelCount = 2048; // smaller subtrees are built by one thread
 
 TreeBox empty_box() {
   constexpr float kInf = std::numeric_limits<float>::infinity();

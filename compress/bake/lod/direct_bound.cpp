@@ -75,8 +75,7 @@ private:
 class Tightener {
 public:
   Tightener(const DirectBoundInput& input, SimplifyMesh& mesh, SurfaceLinks& links)
-      : in_(input), m_(mesh), links_(links), after_({mesh.points, mesh.triangles}),
-        largest_(input.floor) {
+      : in_(input), m_(mesh), links_(links), after_({mesh.points, mesh.triangles}), largest_(input.floor) {
     after_.link();
   }
 
