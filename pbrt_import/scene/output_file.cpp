@@ -128,7 +128,8 @@ OutputFile::OutputFile(fs::path target, bool force) : target_(std::move(target))
   if (!target_.has_filename()) fail(target_, "is a folder");
   target_ = resolve(target_);
   check_target(target_, force_);
-  if (!claims.add(claim_of(target_))) throw Error(ErrorKind::kUsage, target_.string() + ": is named for two outputs");
+  if (!claims.add(claim_of(target_)))
+    throw Error(ErrorKind::kUsage, target_.string() + ": two outputs would go to this file");
   try {
     temporary_ = create_temporary(target_);
   } catch (...) {

@@ -92,12 +92,7 @@ const std::vector<std::string>& aov_names() {
 }
 
 void ImageOutputs::add(const std::filesystem::path& target, bool force, bool exr, std::vector<std::string> aovs) {
-  auto file = std::make_unique<OutputFile>(target, force);
-  for (const Entry& entry : entries_)
-    if (std::filesystem::absolute(entry.file->target()).lexically_normal() ==
-        std::filesystem::absolute(file->target()).lexically_normal())
-      throw Error(ErrorKind::kUsage, target.string() + ": two outputs would go to this file");
-  entries_.push_back({std::move(file), exr, std::move(aovs)});
+  entries_.push_back({std::make_unique<OutputFile>(target, force), exr, std::move(aovs)});
 }
 
 ImageOutputs::ImageOutputs(const std::vector<std::string>& files, const std::vector<std::string>& aovs, bool force) {

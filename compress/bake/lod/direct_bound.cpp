@@ -20,6 +20,7 @@ constexpr double kRounding = 1e-3;   // steps; of what is cut away
 constexpr double kSlack = 1.25;      // a smaller gain than that is not looked for
 // So many triangles are measured at most, or one of so many: where more are too far off, little is gained.
 constexpr size_t kFew = 512, kFewOf = 8;
+constexpr size_t kWork = 400; // distances and the like for each triangle of a group, at most
 
 /// Convex, in a plane.
 struct Polygon {
@@ -82,7 +83,7 @@ public:
   void run() {
     fill_heap();
     size_t left = std::max(kFew, (in_.triangles.size() + m_.triangles.size()) / kFewOf);
-    while (!heap_.empty() && heap_.front().first > kSlack * largest_ && left-- > 0) {
+    while (!heap_.empty() && heap_.front().first > kSlack * largest_ && left-- > 0 && !spent()) {
       std::pop_heap(heap_.begin(), heap_.end());
       const auto [stated, number] = heap_.back();
       heap_.pop_back();
@@ -96,6 +97,9 @@ public:
   }
 
 private:
+  /// Whether no more is looked at: where everything is near everything, as in a soup, little would come of much work.
+  bool spent() const { return work_ + refiner_.work() > kWork * (in_.triangles.size() + m_.triangles.size()); }
+
   void fill_heap() {
     for (uint32_t t = 0; t < in_.triangles.size(); ++t) heap_.emplace_back(links_.bounds[t], t);
     for (uint32_t s = 0; s < m_.triangles.size(); ++s)
@@ -151,6 +155,7 @@ private:
       if (least.x <= hi.x && least.y <= hi.y && least.z <= hi.z && most.x >= lo.x && most.y >= lo.y && most.z >= lo.z)
         numbers_.push_back(number);
     }
+    work_ += next_numbers_.size();
     return true;
   }
 
@@ -171,6 +176,7 @@ private:
       worst = 0.0, worst_pieces_.clear();
       size_t kept = 0;
       for (const uint32_t below : numbers_) {
+        if (spent()) return stated;
         const size_t before = worst_pieces_.size();
         const double bound = measure_below(t, near, below, depth, stated);
         if (bound <= largest_) {
@@ -208,6 +214,7 @@ private:
       double distance = measure_part(corners_part, enough, kInfinite);
       if (distance > enough && last) {
         after_.gather_within(corners_part, std::min(distance, (stated - error) / kInflation));
+        work_ += m_.triangles.size();
         distance = measure_part(corners_part, enough, distance);
         gather_after(t);
       }
@@ -228,6 +235,7 @@ private:
   std::pair<uint32_t, double> nearest_to_all(const Corners& corners) {
     if (set_.empty()) return {0, kInfinite};
     for (size_t k = 0; k < 3; ++k) set_.distances(corners[k], distances_[k]);
+    work_ += 3 * set_.size();
     double best = kInfinite;
     size_t where = 0;
     for (size_t i = 0; i < set_.size(); ++i)
@@ -250,6 +258,7 @@ private:
   /// Replaces best_ where it finds a smaller bound.
   void lay(SurfaceSide& side, const Corners& triangle, double enough, double& best) {
     overlay_.clear();
+    work_ += side.candidates().size();
     const DVec3 normal = glm::cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
     if (!side.lay(triangle, normal, overlay_)) return;
     double largest = 0.0;
@@ -282,7 +291,8 @@ private:
     numbers_.clear();
     for (uint32_t i = first_[s]; i < first_[s + 1]; ++i) numbers_.push_back(in_.numbers[before_[i]]);
     double bound = stated;
-    for (uint32_t depth = 0; depth < TriangleHistory::kDepth && bound > largest_ && go_back(lo, hi); ++depth)
+    for (uint32_t depth = 0; depth < TriangleHistory::kDepth && bound > largest_ && !spent() && go_back(lo, hi);
+         ++depth)
       bound = std::min(bound, measure_over_below(corners, stated));
     return bound;
   }
@@ -340,6 +350,7 @@ private:
   std::vector<DVec3> below_points_;
   std::vector<LodTriangle> below_;
   TriangleRefiner refiner_;
+  size_t work_ = 0; ///< distances and triangles looked at, besides those of refiner_
 };
 
 } // namespace

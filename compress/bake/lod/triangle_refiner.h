@@ -25,9 +25,13 @@ public:
     top.among.clear();
     for (const uint32_t t : side.candidates()) top.among.add(side.surface(), t);
     for (size_t k = 0; k < 3; ++k) top.points[k] = triangle[k], top.among.distances(triangle[k], top.distances[k]);
+    work_ += 3 * top.among.size();
     cut(0, {0, 1, 2}, enough, noted);
     return largest_;
   }
+
+  /// How many distances of triangles all runs took so far.
+  size_t work() const { return work_; }
 
 private:
   static constexpr size_t kMaxCuts = 5;
@@ -90,10 +94,12 @@ private:
       for (size_t k = 0; k < 3; ++k) to.distances[k].push_back(from.distances[corners[k]][i]);
     }
     for (size_t k = 3; k < 6; ++k) to.among.distances(to.points[k], to.distances[k]);
+    work_ += from.among.size() + 3 * to.among.size();
   }
 
   std::array<Level, kMaxCuts + 1> levels_;
   double largest_ = 0.0;
+  size_t work_ = 0;
 };
 
 } // namespace packtrace

@@ -58,6 +58,7 @@ TEST(OutputFile, ReplacesOnlyWithForce) {
 TEST(OutputFile, TwoCannotHaveOneTarget) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "sub");
+  write_text(folder / "a.txt", "old");
   std::filesystem::create_symlink(folder / "a.txt", folder / "link.txt");
   {
     const OutputFile first(folder / "a.txt", true);
@@ -65,7 +66,7 @@ TEST(OutputFile, TwoCannotHaveOneTarget) {
       EXPECT_EQ(error_kind_of([&] { OutputFile(folder / name, true); }), ErrorKind::kUsage) << name;
     const OutputFile other(folder / "sub/a.txt", true);
   }
-  OutputFile(folder / "a.txt", false).commit();
+  OutputFile(folder / "a.txt", true).commit();
   OutputFile(folder / "a.txt", true).commit();
 }
 
