@@ -51,8 +51,12 @@ public:
     bool on_request = false;
     for (const GeometryPart& part : plan_.parts) {
       const Mesh& mesh = scene_.meshes[part.mesh];
+      if (mesh.triangles.empty()) { // where all are, there are no slots
+        needs.parts.emplace_back();
+        continue;
+      }
       SlotNeeds& slot = slots_[part.slot];
-      needs.parts.push_back(mesh.triangles.empty() ? PartNeeds{} : needs_of(mesh, slot));
+      needs.parts.push_back(needs_of(mesh, slot));
       const PartNeeds& part_needs = needs.parts.back();
       if (!part_needs.store_uvs()) continue;
       largest = glm::max(largest, max_abs_uv(mesh));
