@@ -108,16 +108,6 @@ private:
     std::make_heap(heap_.begin(), heap_.end());
   }
 
-  /// Lists of triangles before that each triangle after is linked to.
-  void link_after() {
-    first_.assign(m_.triangles.size() + 1, 0u);
-    for (const SurfaceLink& link : links_.links) ++first_[link.after];
-    uint32_t sum = 0;
-    for (uint32_t& first : first_) sum += first, first = sum;
-    before_.resize(links_.links.size());
-    for (const SurfaceLink& link : links_.links) before_[--first_[link.after]] = link.before;
-  }
-
   DVec3 point(uint32_t vertex) const {
     const LatticePoint& q = in_.levels.positions[in_.levels.vertices[vertex].position];
     DVec3 p;
@@ -284,12 +274,12 @@ private:
 
   /// Goes back as far as that makes it smaller and no further than needed.
   double measure_after(uint32_t s, double stated) {
-    if (first_.empty()) link_after();
+    if (linked_.ends.empty()) linked_ = links_.by_after(m_.triangles.size());
     const Corners corners = after_.corners(s);
     const DVec3 lo = glm::min(glm::min(corners[0], corners[1]), corners[2]) - stated;
     const DVec3 hi = glm::max(glm::max(corners[0], corners[1]), corners[2]) + stated;
     numbers_.clear();
-    for (uint32_t i = first_[s]; i < first_[s + 1]; ++i) numbers_.push_back(in_.numbers[before_[i]]);
+    for (uint32_t i = linked_.ends[s]; i < linked_.ends[s + 1]; ++i) numbers_.push_back(in_.numbers[linked_.before[i]]);
     double bound = stated;
     for (uint32_t depth = 0; depth < TriangleHistory::kDepth && bound > largest_ && !spent() && go_back(lo, hi);
          ++depth)
@@ -340,7 +330,7 @@ private:
   SurfaceSide after_;
   double largest_;                                ///< the group's error is at least this
   std::vector<std::pair<double, uint32_t>> heap_; ///< triangles before, then those after
-  std::vector<uint32_t> first_, before_;          ///< lists per triangle after
+  LinkLists linked_;                              ///< when it is needed
   std::vector<SurfaceLink> found_;
   std::vector<uint32_t> numbers_, next_numbers_, pieces_, worst_pieces_;
   TriangleSet set_; ///< the candidates after

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -66,11 +65,7 @@ private:
 
   /// Which triangles of the group those that are left may stand for.
   void list_below() {
-    std::vector<uint32_t> ends(mesh_.triangles.size() + 1), found(links_.links.size());
-    for (const SurfaceLink& link : links_.links) ++ends[link.after + 1];
-    std::partial_sum(ends.begin(), ends.end(), ends.begin());
-    std::vector<uint32_t> next(ends.begin(), ends.end() - 1);
-    for (const SurfaceLink& link : links_.links) found[next[link.after]++] = link.before;
+    const auto [ends, found] = links_.by_after(mesh_.triangles.size());
     std::vector<uint32_t> last(numbers_.size(), Wedge::kNone); // triangle after whose list each is in
     for (const uint32_t s : order_) {
       for (uint32_t i = ends[s]; i < ends[s + 1]; ++i)

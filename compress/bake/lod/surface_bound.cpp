@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "compress/bake/lod/surface_side.h"
 #include "compress/bake/lod/surface_walk.h"
@@ -381,6 +382,15 @@ private:
 };
 
 } // namespace
+
+LinkLists SurfaceLinks::by_after(size_t count) const {
+  LinkLists lists{std::vector<uint32_t>(count + 1), std::vector<uint32_t>(links.size())};
+  for (const SurfaceLink& link : links) ++lists.ends[link.after + 1];
+  std::partial_sum(lists.ends.begin(), lists.ends.end(), lists.ends.begin());
+  std::vector<uint32_t> next(lists.ends.begin(), lists.ends.end() - 1);
+  for (const SurfaceLink& link : links) lists.before[next[link.after]++] = link.before;
+  return lists;
+}
 
 SurfaceLinks bound_errors(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh) {
   return Measurer(points, triangles, mesh).run();

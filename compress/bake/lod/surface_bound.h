@@ -13,8 +13,16 @@ struct SurfaceLink {
   bool operator==(const SurfaceLink&) const = default;
 };
 
+/// Of each triangle after those before that are linked to it: before[ends[s] .. ends[s + 1]), some more than once.
+struct LinkLists {
+  std::vector<uint32_t> ends, before;
+};
+
 /// Where everything before is found after.
 struct SurfaceLinks {
+  /// @param count triangles after
+  LinkLists by_after(size_t count) const;
+
   std::vector<SurfaceLink> links; ///< some more than once
   /// Per triangle before: how far at most what it stands for is from the triangles after that it is linked to.
   std::vector<double> bounds;
