@@ -128,13 +128,11 @@ OutputFile::OutputFile(fs::path target, bool force) : target_(std::move(target))
   if (!target_.has_filename()) fail(target_, "is a folder");
   target_ = resolve(target_);
   check_target(target_, force_);
-  if (!claims.add(claim_of(target_)))
+  temporary_ = create_temporary(target_);
+  if (!claims.add(claim_of(target_))) {
+    std::error_code ignored;
+    fs::remove(temporary_, ignored);
     throw Error(ErrorKind::kUsage, target_.string() + ": two outputs would go to this file");
-  try {
-    temporary_ = create_temporary(target_);
-  } catch (...) {
-    claims.remove(claim_of(target_));
-    throw;
   }
   remember(temporary_.c_str());
 }

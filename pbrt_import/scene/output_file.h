@@ -13,8 +13,8 @@ public:
   /// leads to.
   /// @param force an existing target may be replaced
   /// Throws Error(kIo) where the target exists and force is not set, is not a regular file, or its folder is missing
-  /// or cannot be written to; Error(kUsage) for an empty name, and for
-  /// the target of another OutputFile that is not committed yet.
+  /// or cannot be written to; Error(kUsage) for an empty name, and for the target of another OutputFile that is not
+  /// committed yet.
   OutputFile(std::filesystem::path target, bool force);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
