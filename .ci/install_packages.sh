@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Installs the Debian 12 packages that building and testing need. Does nothing where all are there already.
+# Installs the Debian 12 packages that building and testing need, and those named besides. Does nothing where all are there already.
+# Usage: .ci/install_packages.sh [PACKAGE ...]
 set -euo pipefail
 
 packages=(
@@ -10,6 +11,7 @@ packages=(
   glslang-tools spirv-tools libvulkan-dev mesa-vulkan-drivers # the GLSL of vertex16 is compiled and run on the CPU
   libdraco-dev libtinygltf-dev # glTF export
   libmeshoptimizer-dev # what the packing benchmark compares with
+  "$@"
 )
 
 missing=()
