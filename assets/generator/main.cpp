@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "assets/generator/asteroids.h"
 #include "assets/generator/displaced_mesh.h"
 #include "assets/generator/extreme.h"
 #include "assets/generator/forest.h"
@@ -21,6 +22,7 @@ int run(int argc, char** argv) {
   OutputConfig output;
   TownConfig town;
   ForestConfig forest;
+  AsteroidsConfig asteroids;
   DisplacedMeshConfig mesh;
   ExtremeConfig extreme;
   std::function<SceneTotals()> generate;
@@ -45,6 +47,13 @@ int run(int argc, char** argv) {
   CLI::Option* triangles = verb->add_option("--triangles", forest.triangles, "placed, at least [100000, 1e11]");
   triangles->capture_default_str();
   verb->add_option("--instances", forest.instances, "this many plants instead [100, 50000000]")->excludes(triangles);
+
+  verb = add_verb("asteroids", "many geometries, each instanced near and far",
+                  [&] { return generate_asteroids(asteroids, output); });
+  add_seed(verb, asteroids.seed);
+  verb->add_option("--geometries", asteroids.geometries, "of about 4000 triangles each [1, 5000]")
+      ->capture_default_str();
+  verb->add_option("--instances", asteroids.instances, "at least one of each [1, 50000000]")->capture_default_str();
 
   verb = add_verb("mesh", "one unique displaced mesh", [&] { return generate_displaced_mesh(mesh, output); });
   verb->alias("grid");

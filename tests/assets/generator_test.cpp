@@ -6,6 +6,7 @@
 #include <sys/resource.h>
 #include <tbb/global_control.h>
 
+#include "assets/generator/asteroids.h"
 #include "assets/generator/displaced_mesh.h"
 #include "assets/generator/extreme.h"
 #include "assets/generator/forest.h"
@@ -36,6 +37,7 @@ std::map<std::string, std::string> generate_all(const std::filesystem::path& fol
   generate_forest({seed, 200'000, 0}, {folder / "forest", false});
   generate_displaced_mesh({seed, 40'000}, {folder / "mesh", false});
   generate_extreme({seed}, {folder / "extreme", false});
+  generate_asteroids({seed, 5, 300}, {folder / "asteroids", false});
   generate_leaf_mask({folder / "leaf", false});
   return files_under(folder);
 }
@@ -49,7 +51,7 @@ TEST(Generators, AnotherSeedGivesAnotherScene) {
   const TemporaryFolder folder;
   const auto a = generate_all(folder / "a", 42), b = generate_all(folder / "b", 43);
   for (const char* name : {"town/town_instances.pbrt", "forest/forest_instances.pbrt", "mesh/geometry/ring.ply",
-                           "extreme/extreme_instances.pbrt"}) {
+                           "extreme/extreme_instances.pbrt", "asteroids/asteroids_instances.pbrt"}) {
     EXPECT_NE(a.at(name), b.at(name)) << name;
   }
 }
@@ -95,6 +97,14 @@ TEST(Generators, ForestReachesItsTriangleCountWithinOneTree) {
   EXPECT_EQ(generate_forest({1, 3'000'000, 777}, {folder / "counted", false}).instances, 777u);
 }
 
+TEST(Generators, AsteroidsAreAsManyAsAskedAndEachOfThemIsPlaced) {
+  const TemporaryFolder folder;
+  const SceneTotals totals = generate_asteroids({2, 7, 400}, {folder / "asteroids", false});
+  EXPECT_EQ(totals.instances, 400u);
+  EXPECT_EQ(totals.unique_triangles, 7u * 3'888u);
+  EXPECT_EQ(totals.placed_triangles, 400u * 3'888u);
+}
+
 TEST(Generators, MeshHasAtLeastTheTrianglesAsked) {
   const TemporaryFolder folder;
   for (const uint64_t wanted : {100u, 12'345u, 500'000u}) {
@@ -111,6 +121,9 @@ TEST(Generators, OptionsOutOfRangeAreRejectedBeforeAnythingIsWritten) {
   EXPECT_EQ(kind_of_error([&] { generate_forest({1, 99'999, 0}, output); }), ErrorKind::kUsage);
   EXPECT_EQ(kind_of_error([&] { generate_forest({1, 1'000'000, 50'000'001}, output); }), ErrorKind::kUsage);
   EXPECT_EQ(kind_of_error([&] { generate_displaced_mesh({1, 2'000'000'001}, output); }), ErrorKind::kUsage);
+  EXPECT_EQ(kind_of_error([&] { generate_asteroids({1, 0, 10}, output); }), ErrorKind::kUsage);
+  EXPECT_EQ(kind_of_error([&] { generate_asteroids({1, 11, 10}, output); }), ErrorKind::kUsage);
+  EXPECT_EQ(kind_of_error([&] { generate_asteroids({1, 5'001, 10'000}, output); }), ErrorKind::kUsage);
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));
 }
 

@@ -1,0 +1,88 @@
+#include "assets/generator/asteroids.h"
+
+#include <algorithm>
+#include <iterator>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "assets/generator/noise.h"
+#include "assets/generator/placement.h"
+#include "assets/generator/primitives.h"
+#include "pbrt_import/scene/error.h"
+
+namespace packtrace::scenegen {
+namespace {
+
+constexpr uint32_t kCells = 18;      ///< 6 * 18^2 quads a rock
+constexpr double kSpacing = 5.4;     ///< metres: the edge of the cube that each rock has for itself
+constexpr double kClearAround = 2.5; ///< metres about the eye without rocks
+constexpr const char* kPaints[] = {"basalt", "slate", "clay", "ochre"};
+constexpr const char* kComment = "# Rocks of many shapes about the camera, as many as the generator is asked for.\n"
+                                 "# To be seen: dented rocks of four colours in all directions, near and far. Made by "
+                                 "packtrace_scenegen asteroids.\n\n";
+
+/// A lump of noise with a dent or two, longer than wide.
+Model make_asteroid(uint64_t seed, uint64_t number) {
+  Random random(seed, 400 + number);
+  const double lumps = random.uniform(1.2, 2.4), roughness = random.uniform(0.2, 0.45);
+  const uint64_t noise_seed = random.bits();
+  struct Dent {
+    DVec3 towards;
+    double cosine, depth;
+  };
+  Dent dents[2];
+  for (Dent& dent : dents) dent = {random_direction(random), random.uniform(0.75, 0.95), random.uniform(0.05, 0.25)};
+  const DVec3 shape{random.uniform(0.7, 1.3), random.uniform(0.6, 1.0), random.uniform(0.6, 1.0)};
+  Model model;
+  add_blob(model.smooth(kPaints[number % std::size(kPaints)]), scaling(shape), kCells, [&](DVec3 direction) {
+    double radius = 1.0 + roughness * fractal_noise(direction * lumps, noise_seed, 5);
+    for (const Dent& dent : dents)
+      radius -= dent.depth * smooth_step(dent.cosine, 1.0, glm::dot(direction, dent.towards));
+    return std::max(radius, 0.3);
+  });
+  model.finish();
+  return model;
+}
+
+/// Any rotation, from three turns: uniform enough for rocks.
+DAffine tumbled(Random& random) {
+  const double x = random.uniform(0.0, 2.0 * kPi), y = random.uniform(0.0, 2.0 * kPi),
+               z = random.uniform(0.0, 2.0 * kPi);
+  return compose(rotation_x(x), compose(rotation_y(y), rotation_z(z)));
+}
+
+} // namespace
+
+SceneTotals generate_asteroids(const AsteroidsConfig& config, const OutputConfig& output) {
+  if (config.geometries < 1 || config.geometries > 5'000) {
+    throw Error(ErrorKind::kUsage, fmt::format("--geometries {}: asteroids take 1 to 5000", config.geometries));
+  }
+  if (config.instances < config.geometries || config.instances > 50'000'000) {
+    throw Error(ErrorKind::kUsage, fmt::format("--instances {}: asteroids take {} (one of each) to 50000000",
+                                               config.instances, config.geometries));
+  }
+  const ViewConfig view{{0, 0, 0}, {0.3, 0.1, 1.0}, 60.0, 960, 540};
+  SceneWriter writer(output, "asteroids", kComment, view);
+  const Vec3 albedo[] = {{0.22f, 0.22f, 0.24f}, {0.35f, 0.38f, 0.42f}, {0.55f, 0.38f, 0.28f}, {0.62f, 0.52f, 0.30f}};
+  for (size_t i = 0; i < std::size(kPaints); ++i) writer.material(kPaints[i], albedo[i]);
+
+  Random random(config.seed, 401'000'000);
+  uint64_t side = 1;
+  while (side * side * side < config.instances) ++side;
+  const double half = 0.5 * kSpacing * static_cast<double>(side);
+  for (uint64_t i = 0; i < config.instances; ++i) {
+    const std::string name = fmt::format("rock_{}", i % config.geometries);
+    if (i < config.geometries)
+      writer.object(name, make_asteroid(config.seed, i)); // goes to disk with its first instance
+    DVec3 place(0.0);
+    do {
+      for (int axis = 0; axis < 3; ++axis) place[axis] = random.uniform(-half, half);
+    } while (glm::dot(place, place) < kClearAround * kClearAround);
+    const DAffine turned = compose(tumbled(random), scaling(DVec3(random.uniform(0.4, 1.3))));
+    writer.instance(name, compose(translation(place), turned));
+  }
+  return writer.finish();
+}
+
+} // namespace packtrace::scenegen
