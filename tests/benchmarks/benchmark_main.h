@@ -2,36 +2,36 @@
 
 #include <exception>
 #include <filesystem>
-#include <fstream>
+#include <optional>
+#include <span>
+#include <string>
 
 #include <fmt/format.h>
 
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/file_bytes.h"
+#include "pbrt_import/scene/output_file.h"
 
 namespace packtrace {
 
-/// Where `--json` writes a benchmark's figures.
+/// Where `--json` writes a benchmark's figures: whole or not at all, in the place of what was there.
 class FiguresFile {
 public:
   /// @param file none if empty
-  /// @throws Error of kind kIo at once, not after the minutes that measuring takes
-  explicit FiguresFile(const std::filesystem::path& file) : file_(file) {
-    if (!file_.empty()) out_.open(file_);
-    require_written();
+  /// @throws Error like OutputFile, at once and not after the minutes that measuring takes
+  explicit FiguresFile(const std::filesystem::path& file) {
+    if (!file.empty()) file_.emplace(file, true);
   }
   template <class Json>
   void write(const Json& figures) {
-    if (out_.is_open()) out_ << figures.dump(2) << std::endl;
-    require_written();
+    if (!file_) return;
+    const std::string text = figures.dump(2) + "\n";
+    write_file_bytes(file_->path(), std::as_bytes(std::span(text)));
+    file_->commit();
   }
 
 private:
-  void require_written() const {
-    if (!out_) throw Error(ErrorKind::kIo, file_.string() + ": cannot write");
-  }
-
-  std::filesystem::path file_;
-  std::ofstream out_;
+  std::optional<OutputFile> file_;
 };
 
 /// main() of a benchmark: run(argc, argv), its errors to stderr behind the name.
