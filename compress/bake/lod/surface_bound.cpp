@@ -250,17 +250,11 @@ private:
     }
   }
 
-  /// Seen from where the new surface faces, slivers and small dents lie flatter; and it may reach further. What no
-  /// overlay bounds well is cut.
+  /// What no overlay bounds well is cut.
   /// @param bound of best_
   void measure_harder(uint32_t t, double bound) {
     const Corners p = before_.corners(t);
     if (after_.candidates().empty()) after_.gather_near(p[0]); // a line that hung together with nothing
-    look_along_facing(t, bound);
-    if (enough(bound, had(t))) return accept(t);
-    after_.widen();
-    look_along_facing(t, bound);
-    if (enough(bound, had(t))) return accept(t);
     refine_over_after(t, bound, false);
     if (!enough(bound, had(t))) {
       after_.gather_within(p, bound);
@@ -287,20 +281,6 @@ private:
     proven_ = all ? std::max(before, std::min(least, stated(bound, had(t)))) : before;
   }
 
-  /// Keeps the better of best_ and what is seen from where the candidates face.
-  void look_along_facing(uint32_t t, double& bound) {
-    DVec3 facing(0.0);
-    for (const uint32_t s : after_.candidates()) facing += after_.surface().area_normal(s);
-    std::swap(best_, second_);
-    best_.clear();
-    if (after_.lay(before_.corners(t), facing, best_))
-      if (const double distance = look_closer(after_, t); distance < bound) {
-        bound = distance;
-        return;
-      }
-    std::swap(best_, second_);
-  }
-
   /// The distance of the corner that is farthest from all candidates.
   double farthest_corner(const Corners& triangle) {
     set_.clear();
@@ -320,13 +300,11 @@ private:
     before_.link();
     before_.gather(after_.corner_points(s));
     if (fits_over_before(s)) return;
-    before_.widen();
-    if (fits_over_before(s)) return;
     const double near = refine_over_before(s);
     if (near > std::max(largest_, kSlack * proven_)) {
-      std::swap(refined_, second_);
+      std::swap(refined_, best_);
       before_.gather_within(after_.corners(s), near);
-      if (refine_over_before(s) >= near) std::swap(refined_, second_);
+      if (refine_over_before(s) >= near) std::swap(refined_, best_);
     }
     for (const OverlayPiece& piece : refined_) note_after(s, piece.triangle, piece.distance);
   }
@@ -373,7 +351,7 @@ private:
   std::vector<Claim> claims_;                ///< a heap
   std::vector<double> edge_had_, point_had_; ///< the largest that accepted images at it had, or negative
   std::vector<uint32_t> not_covered_;
-  std::vector<OverlayPiece> best_, second_, refined_; ///< of the triangle at hand
+  std::vector<OverlayPiece> best_, refined_; ///< of the triangle at hand
   TriangleRefiner refiner_;
   TriangleSet set_;
   std::vector<double> distances_;

@@ -53,14 +53,6 @@ void SurfaceSide::add_large_fan(std::span<const uint32_t> fan, const Triangle& c
   for (size_t k = 0; k < kLargeFan && added == 0; ++k) add(fan[k]);
 }
 
-void SurfaceSide::widen() {
-  const size_t count = candidates_.size();
-  for (size_t i = 0; i < count; ++i)
-    for (int k = 0; k < 3; ++k)
-      if (const auto around = fan(corner_points(candidates_[i])[k]); around.size() <= kLargeFan)
-        for (const uint32_t t : around) add(t);
-}
-
 void SurfaceSide::gather_within(const std::array<DVec3, 3>& triangle, double distance) {
   candidates_.clear();
   const DVec3 lo = glm::min(glm::min(triangle[0], triangle[1]), triangle[2]) - distance;

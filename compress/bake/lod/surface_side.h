@@ -36,7 +36,6 @@ public:
   // What another triangle is measured against: a set of triangles of this side.
   std::span<const uint32_t> candidates() const { return candidates_; }
   void gather(const Triangle& corners); ///< those around three points
-  void widen();                         ///< one ring more
   void gather_near(DVec3 point);        ///< a few more: those with corners near it
   /// All that may be nearer to a triangle than that, and more.
   void gather_within(const std::array<DVec3, 3>& triangle, double distance);
