@@ -15,19 +15,31 @@ namespace packtrace {
 /// much smaller: the distance from one triangle is convex, so the three corners bound it for all of it.
 class TriangleRefiner {
 public:
-  /// Measures against the candidates of `side`. Returns the largest bound; infinite without candidates.
+  /// Empty, for those that the next run() is to measure against.
+  TriangleSet& begin() {
+    levels_[0].among.clear();
+    return levels_[0].among;
+  }
+
+  /// Measures against those added since begin(). Returns the largest bound; infinite without any.
   /// @param enough (distance, candidate): whether a bound needs to be no smaller
   /// @param noted (candidate, distance): a part of the triangle is that far from it
   template <typename Enough, typename Noted>
-  double run(const std::array<DVec3, 3>& triangle, const SurfaceSide& side, const Enough& enough, const Noted& noted) {
-    largest_ = side.candidates().empty() ? std::numeric_limits<double>::infinity() : 0.0;
+  double run(const std::array<DVec3, 3>& triangle, const Enough& enough, const Noted& noted) {
     Level& top = levels_[0];
-    top.among.clear();
-    for (const uint32_t t : side.candidates()) top.among.add(side.surface(), t);
+    largest_ = top.among.empty() ? std::numeric_limits<double>::infinity() : 0.0;
     for (size_t k = 0; k < 3; ++k) top.points[k] = triangle[k], top.among.distances(triangle[k], top.distances[k]);
     work_ += 3 * top.among.size();
     cut(0, {0, 1, 2}, enough, noted);
     return largest_;
+  }
+
+  /// The same, against the candidates of `side`.
+  template <typename Enough, typename Noted>
+  double run(const std::array<DVec3, 3>& triangle, const SurfaceSide& side, const Enough& enough, const Noted& noted) {
+    TriangleSet& among = begin();
+    for (const uint32_t t : side.candidates()) among.add(side.surface(), t);
+    return run(triangle, enough, noted);
   }
 
   /// How many distances of triangles all runs took so far.

@@ -19,11 +19,10 @@ TriangleBlock& TriangleSet::next_block(uint32_t number, size_t& lane) {
   return blocks_.back();
 }
 
-void TriangleSet::add(const OverlaySurface& surface, uint32_t triangle) {
+void TriangleSet::add(const std::array<DVec3, 3>& corners, uint32_t number) {
   size_t lane = 0;
-  TriangleBlock& block = next_block(triangle, lane);
-  const DVec3 &a = surface.corner(triangle, 0), ab = surface.corner(triangle, 1) - a,
-              ac = surface.corner(triangle, 2) - a;
+  TriangleBlock& block = next_block(number, lane);
+  const DVec3 &a = corners[0], ab = corners[1] - a, ac = corners[2] - a;
   for (int axis = 0; axis < 3; ++axis)
     block.a[axis][lane] = a[axis], block.ab[axis][lane] = ab[axis], block.ac[axis][lane] = ac[axis];
 }
@@ -39,10 +38,9 @@ void TriangleSet::add(const TriangleSet& other, size_t i) {
   }
 }
 
-void TriangleSet::distances(const DVec3& point, std::vector<double>& out) const {
+void TriangleSet::distances(const DVec3& point, double* out) const {
   static const DistanceKernel kernel = pick_kernel();
-  out.resize(4 * blocks_.size());
-  kernel(&point.x, blocks_.data(), blocks_.size(), out.data());
+  kernel(&point.x, blocks_.data(), blocks_.size(), out);
 }
 
 } // namespace packtrace

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -13,7 +14,10 @@ namespace packtrace {
 class TriangleSet {
 public:
   void clear() { numbers_.clear(), blocks_.clear(); }
-  void add(const OverlaySurface& surface, uint32_t triangle);
+  void add(const OverlaySurface& surface, uint32_t triangle) {
+    add({surface.corner(triangle, 0), surface.corner(triangle, 1), surface.corner(triangle, 2)}, triangle);
+  }
+  void add(const std::array<DVec3, 3>& corners, uint32_t number);
   /// Adds triangle i of another set.
   void add(const TriangleSet& other, size_t i);
 
@@ -22,7 +26,13 @@ public:
   uint32_t number(size_t i) const { return numbers_[i]; }
 
   /// The first size() of the result: how far the point is from each.
-  void distances(const DVec3& point, std::vector<double>& out) const;
+  void distances(const DVec3& point, std::vector<double>& out) const {
+    out.resize(padded_size());
+    distances(point, out.data());
+  }
+  /// The same, with room for padded_size().
+  void distances(const DVec3& point, double* out) const;
+  size_t padded_size() const { return 4 * blocks_.size(); }
 
 private:
   TriangleBlock& next_block(uint32_t number, size_t& lane);
