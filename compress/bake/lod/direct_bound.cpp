@@ -224,11 +224,8 @@ private:
     const Triangle& t = in_.levels.triangles[below];
     const size_t rows[3] = {find_distances(t.x), find_distances(t.y), find_distances(t.z)};
     const double *from_a = &distances_[rows[0]], *from_b = &distances_[rows[1]], *from_c = &distances_[rows[2]];
-    double best = kInfinite;
-    size_t where = 0;
-    for (size_t i = 0; i < set_.size(); ++i)
-      if (const double d = std::max({from_a[i], from_b[i], from_c[i]}); d < best) best = d, where = i;
-    return {set_.number(where), best};
+    const NearestTriangle nearest = set_.nearest(from_a, from_b, from_c);
+    return {set_.number(nearest.place), nearest.distance};
   }
 
   /// Where in distances_ those of a vertex below from set_ begin. Triangles below have most vertices in common.

@@ -123,8 +123,14 @@ bool TriangleImages::find(uint32_t triangle, Image& out) {
   for (int i = 0; i < 3; ++i)
     distance2 = std::max(distance2, std::max(walk_.ways()[edge[i]].distance2, walk_.place(p[i]).distance2));
   if (inside != kNone) inside2 = distance2_from(triangle, walk_.point(inside));
-  out = {std::sqrt(std::max(distance2, inside2)), std::sqrt(inside2), met_count_, outline.count};
-  met_count_ += outline.count;
+  uint32_t different = 0;
+  for (uint32_t i = 0; i < outline.count; ++i) {
+    const uint32_t met = outline.triangles[i];
+    if (std::find(outline.triangles, outline.triangles + different, met) == outline.triangles + different)
+      outline.triangles[different++] = met;
+  }
+  out = {std::sqrt(std::max(distance2, inside2)), std::sqrt(inside2), met_count_, different};
+  met_count_ += different;
   return true;
 }
 

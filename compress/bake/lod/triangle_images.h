@@ -14,7 +14,7 @@ class TriangleImages {
 public:
   static constexpr uint32_t kNone = SurfaceWalk::kNone;
 
-  /// The image of a triangle: the triangles after that its outline meets, met(first, count), some more than once.
+  /// The image of a triangle: the triangles after that its outline meets, met(first, count).
   /// Where they go around a point after, that is inside.
   struct Image {
     double distance; ///< of both is at most that

@@ -10,6 +10,13 @@
 
 namespace packtrace {
 
+/// The triangle of a set that is nearest to all of another one.
+struct NearestTriangle {
+  size_t place = 0;      ///< the first of several
+  double distance = 0.0; ///< at most, of all of it
+  double least = 0.0;    ///< some point of it is at least that far from all triangles of the set
+};
+
 /// Numbered triangles of a surface that points are measured against, four at a time.
 class TriangleSet {
 public:
@@ -33,6 +40,10 @@ public:
   /// The same, with room for padded_size().
   void distances(const DVec3& point, double* out) const;
   size_t padded_size() const { return 4 * blocks_.size(); }
+  static constexpr double kFar = 1e150; ///< or more: what is behind size() there
+
+  /// @param a, b, c distances() of three corners
+  NearestTriangle nearest(const double* a, const double* b, const double* c) const;
 
 private:
   TriangleBlock& next_block(uint32_t number, size_t& lane);
