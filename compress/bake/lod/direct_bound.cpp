@@ -233,7 +233,9 @@ private:
     const size_t first = vertices_(vertex) * set_.padded_size();
     if (first == distances_.size()) {
       distances_.resize(first + set_.padded_size());
-      set_.distances(point(vertex), &distances_[first]);
+      const DVec3 at = point(vertex);
+      double* row = &distances_[first];
+      set_.distances({&at, 1}, {&row, 1});
       work_ += set_.size();
     }
     return first;
@@ -269,8 +271,10 @@ private:
   /// The same, cutting the triangle in four.
   void refine(const Corners& triangle, double enough, double& best) {
     tried_.clear();
+    refiner_.begin(after_);
+    refiner_.measure_corners(triangle);
     const double d = refiner_.run(
-        triangle, after_, [&](double distance, uint32_t) { return distance <= enough; },
+        [&](double distance, uint32_t) { return distance <= enough; },
         [&](uint32_t s, double distance) { tried_.emplace_back(s, distance); });
     if (d < best) std::swap(best_, tried_), best = d;
   }
@@ -299,8 +303,9 @@ private:
       return distance * kInflation + in_.levels.errors[number];
     };
     double largest = numbers_.empty() ? kInfinite : 0.0;
+    refiner_.measure_corners(corners);
     refiner_.run(
-        corners, [&](double distance, uint32_t number) { return stated(distance, number) <= largest_; },
+        [&](double distance, uint32_t number) { return stated(distance, number) <= largest_; },
         [&](uint32_t number, double distance) { largest = std::max(largest, stated(distance, number)); });
     return largest;
   }

@@ -265,34 +265,20 @@ private:
 
   /// @param all whether the candidates are all that matter: then what the corners' distance proves holds for others too
   void refine_over_after(uint32_t t, double& bound, bool all) {
-    const Corners p = before_.corners(t);
+    refiner_.begin(after_);
     // It is not below this, as far as the candidates go.
-    const double before = proven_, least = stated(farthest_corner(p), had(t));
+    const double before = proven_, least = stated(refiner_.measure_corners(before_.corners(t)), had(t));
     proven_ = std::max(proven_, least);
     if (!enough(bound, had(t))) {
       refined_.clear();
       const double refined = refiner_.run(
-          p, after_, [&](double distance, uint32_t) { return enough(distance, had(t)); },
+          [&](double distance, uint32_t) { return enough(distance, had(t)); },
           [&](uint32_t s, double distance) {
             refined_.push_back({s, distance, 0.0});
           });
       if (refined < bound) std::swap(best_, refined_), bound = refined;
     }
     proven_ = all ? std::max(before, std::min(least, stated(bound, had(t)))) : before;
-  }
-
-  /// The distance of the corner that is farthest from all candidates.
-  double farthest_corner(const Corners& triangle) {
-    set_.clear();
-    for (const uint32_t s : after_.candidates()) set_.add(after_.surface(), s);
-    double farthest = 0.0;
-    for (const DVec3& corner : triangle) {
-      set_.distances(corner, distances_);
-      if (!set_.empty())
-        farthest = std::max(farthest, *std::min_element(distances_.begin(),
-                                                        distances_.begin() + static_cast<std::ptrdiff_t>(set_.size())));
-    }
-    return farthest;
   }
 
   /// A triangle after of which the ones before saw too little: it is measured itself.
@@ -313,8 +299,10 @@ private:
   double refine_over_before(uint32_t s) {
     double largest = 0.0;
     refined_.clear();
+    refiner_.begin(before_);
+    refiner_.measure_corners(after_.corners(s));
     refiner_.run(
-        after_.corners(s), before_, [&](double distance, uint32_t t) { return enough(distance, had(t)); },
+        [&](double distance, uint32_t t) { return enough(distance, had(t)); },
         [&](uint32_t t, double distance) {
           refined_.push_back({t, distance, 0.0});
           largest = std::max(largest, stated(distance, had(t)));
@@ -353,8 +341,6 @@ private:
   std::vector<uint32_t> not_covered_;
   std::vector<OverlayPiece> best_, refined_; ///< of the triangle at hand
   TriangleRefiner refiner_;
-  TriangleSet set_;
-  std::vector<double> distances_;
   double largest_ = 0.0; ///< the group's error is at least this, as noted
   double proven_ = 0.0;  ///< some triangle's error cannot be below, as far as its candidates go
 };

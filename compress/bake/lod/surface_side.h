@@ -50,8 +50,14 @@ private:
     if (stamp_[triangle] != stamp_value_) stamp_[triangle] = stamp_value_, candidates_.push_back(triangle);
   }
 
+  /// What holds a triangle.
+  struct Box {
+    DVec3 lo, hi;
+  };
+
   OverlaySurface surface_;
   std::span<const uint32_t> became_;
+  std::vector<Box> boxes_; ///< when they are needed
   Overlay overlay_;
   std::vector<uint32_t> first_, fans_; ///< triangles around points
   std::vector<uint32_t> stamp_, candidates_;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "compress/bake/lod/surface_side.h"
@@ -15,31 +16,36 @@ namespace packtrace {
 /// much smaller: the distance from one triangle is convex, so the three corners bound it for all of it.
 class TriangleRefiner {
 public:
-  /// Empty, for those that the next run() is to measure against.
+  /// Empty, for those that the next triangle is to be measured against.
   TriangleSet& begin() {
     levels_[0].kept.clear();
     return levels_[0].kept;
   }
 
-  /// Measures against those added since begin(). Returns the largest bound; infinite without any.
+  /// Begins with the candidates of `side`.
+  void begin(const SurfaceSide& side) {
+    TriangleSet& among = begin();
+    for (const uint32_t t : side.candidates()) among.add(side.surface(), t);
+  }
+
+  /// The triangle's corner that is farthest from those added since begin(); 0 without any.
+  double measure_corners(const std::array<DVec3, 3>& triangle) {
+    Level& top = levels_[0];
+    top.among = &top.kept;
+    for (size_t k = 0; k < 3; ++k) top.points[k] = triangle[k];
+    measure(top, 0);
+    return top.kept.empty() ? 0.0 : top.kept.nearest(top.distances[0], top.distances[1], top.distances[2]).least;
+  }
+
+  /// Returns the largest bound of the triangle of measure_corners(); infinite without any to measure against.
   /// @param enough (distance, candidate): whether a bound needs to be no smaller
   /// @param noted (candidate, distance): a part of the triangle is that far from it
   template <typename Enough, typename Noted>
-  double run(const std::array<DVec3, 3>& triangle, const Enough& enough, const Noted& noted) {
-    Level& top = levels_[0];
-    top.among = &top.kept;
-    largest_ = top.kept.empty() ? std::numeric_limits<double>::infinity() : 0.0;
-    for (size_t k = 0; k < 3; ++k) top.points[k] = triangle[k], measure(top, k);
+  double run(const Enough& enough, const Noted& noted) {
+    if (levels_[0].kept.empty()) return std::numeric_limits<double>::infinity();
+    largest_ = 0.0;
     cut(0, {0, 1, 2}, enough, noted);
     return largest_;
-  }
-
-  /// The same, against the candidates of `side`.
-  template <typename Enough, typename Noted>
-  double run(const std::array<DVec3, 3>& triangle, const SurfaceSide& side, const Enough& enough, const Noted& noted) {
-    TriangleSet& among = begin();
-    for (const uint32_t t : side.candidates()) among.add(side.surface(), t);
-    return run(triangle, enough, noted);
   }
 
   /// How many distances of triangles all runs took so far.
@@ -58,16 +64,21 @@ private:
     std::array<std::vector<double>, 6> measured; ///< what distances of this level's own are
   };
 
-  void measure(Level& level, size_t point) {
-    level.among->distances(level.points[point], level.measured[point]);
-    work_ += level.among->size();
-    level.distances[point] = level.measured[point].data();
+  /// Three points from `first` on.
+  void measure(Level& level, size_t first) {
+    std::array<double*, 3> rows;
+    for (size_t k = 0; k < 3; ++k) {
+      std::vector<double>& row = level.measured[first + k];
+      if (row.size() < level.among->padded_size()) row.resize(level.among->padded_size());
+      level.distances[first + k] = rows[k] = row.data();
+    }
+    level.among->distances(std::span(level.points).subspan(first, 3), rows);
+    work_ += 3 * level.among->size();
   }
 
   template <typename Enough, typename Noted>
   void cut(size_t depth, const std::array<size_t, 3>& corners, const Enough& enough, const Noted& noted) {
     const Level& level = levels_[depth];
-    if (level.among->empty()) return;
     const NearestTriangle nearest =
         level.among->nearest(level.distances[corners[0]], level.distances[corners[1]], level.distances[corners[2]]);
     const double good = kGoodEnough * nearest.least;
@@ -103,7 +114,7 @@ private:
     work_ += from.among->size();
     to.among = from.among;
     if (2 * near_.size() <= from.among->size()) keep_near(*from.among, to);
-    for (size_t k = 3; k < 6; ++k) measure(to, k);
+    measure(to, 3);
   }
 
   void keep_near(const TriangleSet& from, Level& to) {
@@ -112,7 +123,7 @@ private:
     to.among = &to.kept;
     for (size_t k = 0; k < 3; ++k) {
       std::vector<double>& kept = to.measured[k];
-      kept.assign(to.kept.padded_size(), TriangleSet::kFar);
+      kept.assign(to.kept.padded_size(), std::numeric_limits<double>::infinity());
       for (size_t i = 0; i < near_.size(); ++i) kept[i] = to.distances[k][near_[i]];
       to.distances[k] = kept.data();
     }
