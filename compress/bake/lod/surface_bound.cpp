@@ -168,7 +168,7 @@ private:
   void add_shares(const Laid& laid) {
     const auto met = images_.met(laid.image);
     if (std::any_of(met.begin(), met.end(), [&](uint32_t s) { return (covered_[s] & TriangleImages::kWhole) == 0; }))
-      images_.add_shares(laid.triangle, seen_);
+      images_.add_shares(laid.triangle, laid.image, covered_, seen_);
   }
 
   /// What images cover, each seen from the side that it faces, needs no measuring of its own. Distances inside are
@@ -223,7 +223,7 @@ private:
     const uint32_t t = laid.triangle;
     if (mapped_[t] == 0) return false;
     best_.clear();
-    images_.look_closer(t, best_);
+    images_.look_closer(t, laid.image, best_);
     double largest = 0.0;
     for (const OverlayPiece& piece : best_) largest = std::max(largest, piece.distance);
     if (!enough(largest, had(t))) return false;

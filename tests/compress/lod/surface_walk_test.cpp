@@ -63,7 +63,7 @@ TEST_P(TriangleImagesOf, BoundsTheDistanceOfEveryTriangle) {
     if (!images_.find(t, image)) continue;
     ++mapped;
     std::vector<OverlayPiece> pieces;
-    images_.look_closer(t, pieces);
+    images_.look_closer(t, image, pieces);
     ASSERT_FALSE(pieces.empty());
     double closer = 0.0;
     for (const OverlayPiece& piece : pieces) closer = std::max(closer, piece.distance);
@@ -83,12 +83,13 @@ TEST_P(TriangleImagesOf, BoundsTheDistanceOfEveryTriangle) {
 
 TEST_P(TriangleImagesOf, CoverTrianglesAfterOnceAwayFromBorders) {
   std::vector<double> shares(s_.mesh.triangles.size());
+  const std::vector<uint8_t> none_known(shares.size());
   std::vector<uint8_t> mapped(s_.triangles.size()), covered(s_.mesh.triangles.size());
   for (uint32_t t = 0; t < s_.triangles.size(); ++t) {
     TriangleImages::Image image{};
     mapped[t] = t % 40 != 0 && images_.find(t, image); // some are left out
     if (mapped[t] == 0) continue;
-    images_.add_shares(t, shares);
+    images_.add_shares(t, image, none_known, shares);
     const OverlaySurface before{s_.points, s_.triangles};
     for (const uint32_t s : images_.met(image))
       covered[s] |=
