@@ -273,9 +273,8 @@ private:
     tried_.clear();
     refiner_.begin(after_);
     refiner_.measure_corners(triangle);
-    const double d = refiner_.run(
-        [&](double distance, uint32_t) { return distance <= enough; },
-        [&](uint32_t s, double distance) { tried_.emplace_back(s, distance); });
+    const double d = refiner_.run([&](double distance, uint32_t) { return distance <= enough; },
+                                  [&](uint32_t s, double distance) { tried_.emplace_back(s, distance); });
     if (d < best) std::swap(best_, tried_), best = d;
   }
 
@@ -304,9 +303,8 @@ private:
     };
     double largest = numbers_.empty() ? kInfinite : 0.0;
     refiner_.measure_corners(corners);
-    refiner_.run(
-        [&](double distance, uint32_t number) { return stated(distance, number) <= largest_; },
-        [&](uint32_t number, double distance) { largest = std::max(largest, stated(distance, number)); });
+    refiner_.run([&](double distance, uint32_t number) { return stated(distance, number) <= largest_; },
+                 [&](uint32_t number, double distance) { largest = std::max(largest, stated(distance, number)); });
     return largest;
   }
 
@@ -319,10 +317,10 @@ private:
   LinkLists linked_;                              ///< when it is needed
   std::vector<SurfaceLink> found_;
   std::vector<uint32_t> numbers_, pieces_, worst_pieces_;
-  Renumbering below_{512}; ///< triangles of the level below
-  TriangleSet set_;                 ///< the candidates after of the triangle before at hand
-  Renumbering vertices_{512};       ///< below, of which distances_ are known
-  std::vector<double> distances_;   ///< set_.padded_size() for each of these
+  Renumbering below_{512};        ///< triangles of the level below
+  TriangleSet set_;               ///< the candidates after of the triangle before at hand
+  Renumbering vertices_{512};     ///< below, of which distances_ are known
+  std::vector<double> distances_; ///< set_.padded_size() for each of these
   std::vector<OverlayPiece> overlay_;
   std::vector<std::pair<uint32_t, double>> best_, tried_;
   TriangleRefiner refiner_;

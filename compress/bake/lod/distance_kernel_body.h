@@ -1,5 +1,5 @@
-// The bodies of triangle_distances() and nearest_triangle(), for each instruction set: same operations in the same order, so the same bits. No
-// other header's functions may be compiled for AVX2.
+// The bodies of triangle_distances() and nearest_triangle(), for each instruction set: same operations in the same
+// order, so the same bits. No other header's functions may be compiled for AVX2.
 
 #include "compress/bake/lod/distance_kernel.h"
 

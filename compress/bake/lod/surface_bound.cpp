@@ -143,8 +143,8 @@ private:
       mapped_[t] = 0;
       after_.gather(before_.corner_points(t));
       best_.clear();
-      after_.lay(before_.corners(t), before_.surface().area_normal(t), best_);
-      const double distance = look_closer(after_, t);
+      const bool once = after_.lay(before_.corners(t), before_.surface().area_normal(t), best_);
+      const double distance = once ? look_closer(t) : std::numeric_limits<double>::infinity();
       if (enough(distance, had(t)))
         accept(t);
       else
@@ -232,10 +232,10 @@ private:
   }
 
   /// Straight up may be far where the surface is steep; the nearest point is what counts. Returns the largest of best_.
-  double look_closer(SurfaceSide& side, uint32_t t) {
+  double look_closer(uint32_t t) {
     double largest = 0.0;
     for (OverlayPiece& piece : best_) {
-      if (!enough(piece.distance, had(t))) piece.distance = side.overlay().nearest_distance(piece);
+      if (!enough(piece.distance, had(t))) piece.distance = after_.overlay().nearest_distance(piece);
       largest = std::max(largest, piece.distance);
     }
     return largest;
@@ -271,11 +271,10 @@ private:
     proven_ = std::max(proven_, least);
     if (!enough(bound, had(t))) {
       refined_.clear();
-      const double refined = refiner_.run(
-          [&](double distance, uint32_t) { return enough(distance, had(t)); },
-          [&](uint32_t s, double distance) {
-            refined_.push_back({s, distance, 0.0});
-          });
+      const double refined = refiner_.run([&](double distance, uint32_t) { return enough(distance, had(t)); },
+                                          [&](uint32_t s, double distance) {
+                                            refined_.push_back({s, distance, 0.0});
+                                          });
       if (refined < bound) std::swap(best_, refined_), bound = refined;
     }
     proven_ = all ? std::max(before, std::min(least, stated(bound, had(t)))) : before;
@@ -295,18 +294,17 @@ private:
     for (const OverlayPiece& piece : refined_) note_after(s, piece.triangle, piece.distance);
   }
 
-  /// Returns the largest error that refined_ would make.
+  /// Returns the largest error that refined_ would make; infinite where nothing is near.
   double refine_over_before(uint32_t s) {
-    double largest = 0.0;
+    double largest = before_.candidates().empty() ? std::numeric_limits<double>::infinity() : 0.0;
     refined_.clear();
     refiner_.begin(before_);
     refiner_.measure_corners(after_.corners(s));
-    refiner_.run(
-        [&](double distance, uint32_t t) { return enough(distance, had(t)); },
-        [&](uint32_t t, double distance) {
-          refined_.push_back({t, distance, 0.0});
-          largest = std::max(largest, stated(distance, had(t)));
-        });
+    refiner_.run([&](double distance, uint32_t t) { return enough(distance, had(t)); },
+                 [&](uint32_t t, double distance) {
+                   refined_.push_back({t, distance, 0.0});
+                   largest = std::max(largest, stated(distance, had(t)));
+                 });
     return largest;
   }
 

@@ -63,8 +63,8 @@ void SurfaceSide::gather_within(const std::array<DVec3, 3>& triangle, double dis
   const DVec3 lo = glm::min(glm::min(triangle[0], triangle[1]), triangle[2]) - distance;
   const DVec3 hi = glm::max(glm::max(triangle[0], triangle[1]), triangle[2]) + distance;
   for (uint32_t t = 0; t < boxes_.size(); ++t)
-    if (const auto& [least, most] = boxes_[t]; least.x <= hi.x && most.x >= lo.x && least.y <= hi.y &&
-                                               most.y >= lo.y && least.z <= hi.z && most.z >= lo.z)
+    if (const auto& [least, most] = boxes_[t];
+        least.x <= hi.x && most.x >= lo.x && least.y <= hi.y && most.y >= lo.y && least.z <= hi.z && most.z >= lo.z)
       candidates_.push_back(t);
 }
 

@@ -53,7 +53,7 @@ public:
 
 private:
   static constexpr size_t kMaxCuts = 5;
-  static constexpr double kGoodEnough = 1.1;  // of what cutting could still gain
+  static constexpr double kGoodEnough = 1.1; // of what cutting could still gain
 
   /// What a triangle is cut into: its corners and the middles of its sides, with their distances.
   struct Level {

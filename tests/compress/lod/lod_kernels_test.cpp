@@ -101,8 +101,7 @@ TEST(TriangleSet, DistancesAreThoseOfTheNearestPoints) {
     for (const TriangleSet* set : {&all, &odd}) {
       const Rows rows(*set, points);
       for (size_t k = 0; k < points.size(); ++k) {
-        for (size_t i = 0; i < set->size(); ++i)
-          EXPECT_NEAR(rows.row(k)[i], expected(points[k], set->number(i)), 1e-9);
+        for (size_t i = 0; i < set->size(); ++i) EXPECT_NEAR(rows.row(k)[i], expected(points[k], set->number(i)), 1e-9);
         for (size_t i = set->size(); i < set->padded_size(); ++i) EXPECT_GE(rows.row(k)[i], 1e100);
       }
     }
