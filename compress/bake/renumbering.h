@@ -21,6 +21,12 @@ public:
     return recent;
   }
 
+  /// Time goes with the number of values, whatever there was room for.
+  void clear() {
+    for (; !values.empty(); values.pop_back()) slots_[slot_of(values.back())] = kEmpty; // the last of its run
+    recent_.fill(kEmpty);
+  }
+
   std::vector<uint32_t> values; ///< by number
 
 private:

@@ -9,6 +9,7 @@
 #include "compress/bake/lod/surface_side.h"
 #include "compress/bake/lod/triangle_refiner.h"
 #include "compress/bake/lod/triangle_set.h"
+#include "compress/bake/renumbering.h"
 
 namespace packtrace {
 namespace {
@@ -128,16 +129,12 @@ private:
   /// Replaces numbers_ by those of the level below that they go back to and that reach into the box. False, and nothing
   /// done, where they go back no further.
   bool go_back(const DVec3& lo, const DVec3& hi) {
-    next_numbers_.clear();
-    for (const uint32_t number : numbers_) {
-      const std::span<const uint32_t> below = in_.levels.history.below(number);
-      next_numbers_.insert(next_numbers_.end(), below.begin(), below.end());
-    }
-    if (next_numbers_.empty()) return false;
-    std::sort(next_numbers_.begin(), next_numbers_.end());
-    next_numbers_.erase(std::unique(next_numbers_.begin(), next_numbers_.end()), next_numbers_.end());
+    below_.clear();
+    for (const uint32_t number : numbers_)
+      for (const uint32_t below : in_.levels.history.below(number)) below_(below);
+    if (below_.values.empty()) return false;
     numbers_.clear();
-    for (const uint32_t number : next_numbers_) {
+    for (const uint32_t number : below_.values) {
       const Corners c = corners_of(number);
       const double error = in_.levels.errors[number] + kRounding;
       const DVec3 least = glm::min(glm::min(c[0], c[1]), c[2]) - error;
@@ -145,7 +142,7 @@ private:
       if (least.x <= hi.x && least.y <= hi.y && least.z <= hi.z && most.x >= lo.x && most.y >= lo.y && most.z >= lo.z)
         numbers_.push_back(number);
     }
-    work_ += next_numbers_.size();
+    work_ += below_.values.size();
     return true;
   }
 
@@ -159,6 +156,8 @@ private:
     const DVec3 lo = glm::min(glm::min(corners[0], corners[1]), corners[2]) - had;
     const DVec3 hi = glm::max(glm::max(corners[0], corners[1]), corners[2]) + had;
     gather_after(t);
+    set_.clear(), vertices_.clear(), distances_.clear();
+    for (const uint32_t s : after_.candidates()) set_.add(after_.surface(), s);
     double largest = 0.0, worst = 0.0; // of what is near enough, and of the rest
     pieces_.clear(), worst_pieces_.clear();
     numbers_.assign(1, in_.numbers[t]);
@@ -192,7 +191,7 @@ private:
   double measure_below(uint32_t t, const Neighbourhood& near, uint32_t below, uint32_t depth, double stated) {
     const double error = in_.levels.errors[below], enough = (largest_ - error) / kInflation;
     const Corners corners = corners_of(below);
-    if (const auto [s, distance] = nearest_to_all(corners); distance <= enough) {
+    if (const auto [s, distance] = nearest_to_all(below); distance <= enough) {
       worst_pieces_.push_back(s);
       return distance * kInflation + error;
     }
@@ -217,21 +216,29 @@ private:
   void gather_after(uint32_t t) {
     const Triangle& p = in_.triangles[t].points;
     after_.gather({m_.stands_for[p.x], m_.stands_for[p.y], m_.stands_for[p.z]});
-    set_.clear();
-    for (const uint32_t s : after_.candidates()) set_.add(after_.surface(), s);
   }
 
-  /// The triangle after that is nearest to all of it, and how far at most.
-  std::pair<uint32_t, double> nearest_to_all(const Corners& corners) {
+  /// The triangle of set_ that is nearest to all of one below, and how far at most.
+  std::pair<uint32_t, double> nearest_to_all(uint32_t below) {
     if (set_.empty()) return {0, kInfinite};
-    for (size_t k = 0; k < 3; ++k) set_.distances(corners[k], distances_[k]);
-    work_ += 3 * set_.size();
-    double best = kInfinite;
-    size_t where = 0;
-    for (size_t i = 0; i < set_.size(); ++i)
-      if (const double d = std::max({distances_[0][i], distances_[1][i], distances_[2][i]}); d < best)
-        best = d, where = i;
-    return {set_.number(where), best};
+    const Triangle& t = in_.levels.triangles[below];
+    const size_t rows[3] = {find_distances(t.x), find_distances(t.y), find_distances(t.z)};
+    const double *from_a = &distances_[rows[0]], *from_b = &distances_[rows[1]], *from_c = &distances_[rows[2]];
+    const NearestTriangle nearest = set_.nearest(from_a, from_b, from_c);
+    return {set_.number(nearest.place), nearest.distance};
+  }
+
+  /// Where in distances_ those of a vertex below from set_ begin. Triangles below have most vertices in common.
+  size_t find_distances(uint32_t vertex) {
+    const size_t first = vertices_(vertex) * set_.padded_size();
+    if (first == distances_.size()) {
+      distances_.resize(first + set_.padded_size());
+      const DVec3 at = point(vertex);
+      double* row = &distances_[first];
+      set_.distances({&at, 1}, {&row, 1});
+      work_ += set_.size();
+    }
+    return first;
   }
 
   /// How far a triangle is from the surface after, as far as the candidates go.
@@ -239,22 +246,22 @@ private:
   double measure_part(const Corners& part, double enough, double known) {
     best_.clear();
     double best = known;
-    lay(after_, part, enough, best);
-    if (best > enough) refine(after_, part, enough, best);
+    lay(part, enough, best);
+    if (best > enough) refine(part, enough, best);
     for (const auto& [s, d] : best_) worst_pieces_.push_back(s);
     return best;
   }
 
   /// Replaces best_ where it finds a smaller bound.
-  void lay(SurfaceSide& side, const Corners& triangle, double enough, double& best) {
+  void lay(const Corners& triangle, double enough, double& best) {
     overlay_.clear();
-    work_ += side.candidates().size();
+    work_ += after_.candidates().size();
     const DVec3 normal = glm::cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
-    if (!side.lay(triangle, normal, overlay_)) return;
+    if (!after_.lay(triangle, normal, overlay_)) return;
     double largest = 0.0;
     tried_.clear();
     for (OverlayPiece& piece : overlay_) {
-      if (piece.distance > enough) piece.distance = side.overlay().nearest_distance(piece);
+      if (piece.distance > enough) piece.distance = after_.overlay().nearest_distance(piece);
       largest = std::max(largest, piece.distance);
       tried_.emplace_back(piece.triangle, piece.distance);
     }
@@ -262,11 +269,12 @@ private:
   }
 
   /// The same, cutting the triangle in four.
-  void refine(SurfaceSide& side, const Corners& triangle, double enough, double& best) {
+  void refine(const Corners& triangle, double enough, double& best) {
     tried_.clear();
-    const double d = refiner_.run(
-        triangle, side, [&](double distance, uint32_t) { return distance <= enough; },
-        [&](uint32_t s, double distance) { tried_.emplace_back(s, distance); });
+    refiner_.begin(after_);
+    refiner_.measure_corners(triangle);
+    const double d = refiner_.run([&](double distance, uint32_t) { return distance <= enough; },
+                                  [&](uint32_t s, double distance) { tried_.emplace_back(s, distance); });
     if (d < best) std::swap(best_, tried_), best = d;
   }
 
@@ -283,44 +291,20 @@ private:
     double bound = stated;
     for (uint32_t depth = 0; depth < TriangleHistory::kDepth && bound > largest_ && !spent() && go_back(lo, hi);
          ++depth)
-      bound = std::min(bound, measure_over_below(corners, stated));
+      bound = std::min(bound, measure_over_below(corners));
     return bound;
   }
 
-  double measure_over_below(const Corners& corners, double stated) {
-    below_points_.clear(), below_.clear();
-    for (const uint32_t number : numbers_) {
-      const auto first = static_cast<uint32_t>(below_points_.size());
-      for (const DVec3& corner : corners_of(number)) below_points_.push_back(corner);
-      below_.push_back({Triangle(first, first + 1, first + 2), {}, 0, in_.levels.errors[number]});
-    }
-    if (below_.empty()) return stated;
-    SurfaceSide side({below_points_, below_});
-    side.gather_within(corners, stated);
-    best_.clear();
-    double distance = kInfinite;
-    lay(side, corners, (largest_ - least_error()) / kInflation, distance);
-    const double laid = worst(distance);
-    if (laid <= largest_) return laid;
-    tried_.clear();
-    distance = refiner_.run(
-        corners, side, [&](double d, uint32_t t) { return d * kInflation + below_[t].error <= largest_; },
-        [&](uint32_t t, double d) { tried_.emplace_back(t, d); });
-    std::swap(best_, tried_);
-    return std::min(laid, worst(distance));
-  }
-
-  double least_error() const {
-    double least = kInfinite;
-    for (const LodTriangle& t : below_) least = std::min(least, t.error);
-    return least;
-  }
-
-  /// Of best_, with what triangles below already have.
-  double worst(double measured) const {
-    if (measured == kInfinite) return kInfinite;
-    double largest = 0.0;
-    for (const auto& [t, distance] : best_) largest = std::max(largest, distance * kInflation + below_[t].error);
+  double measure_over_below(const Corners& corners) {
+    TriangleSet& below = refiner_.begin();
+    for (const uint32_t number : numbers_) below.add(corners_of(number), number);
+    const auto stated = [&](double distance, uint32_t number) {
+      return distance * kInflation + in_.levels.errors[number];
+    };
+    double largest = numbers_.empty() ? kInfinite : 0.0;
+    refiner_.measure_corners(corners);
+    refiner_.run([&](double distance, uint32_t number) { return stated(distance, number) <= largest_; },
+                 [&](uint32_t number, double distance) { largest = std::max(largest, stated(distance, number)); });
     return largest;
   }
 
@@ -332,13 +316,13 @@ private:
   std::vector<std::pair<double, uint32_t>> heap_; ///< triangles before, then those after
   LinkLists linked_;                              ///< when it is needed
   std::vector<SurfaceLink> found_;
-  std::vector<uint32_t> numbers_, next_numbers_, pieces_, worst_pieces_;
-  TriangleSet set_; ///< the candidates after
-  std::array<std::vector<double>, 3> distances_;
+  std::vector<uint32_t> numbers_, pieces_, worst_pieces_;
+  Renumbering below_{512};        ///< triangles of the level below
+  TriangleSet set_;               ///< the candidates after of the triangle before at hand
+  Renumbering vertices_{512};     ///< below, of which distances_ are known
+  std::vector<double> distances_; ///< set_.padded_size() for each of these
   std::vector<OverlayPiece> overlay_;
   std::vector<std::pair<uint32_t, double>> best_, tried_;
-  std::vector<DVec3> below_points_;
-  std::vector<LodTriangle> below_;
   TriangleRefiner refiner_;
   size_t work_ = 0; ///< distances and triangles looked at, besides those of refiner_
 };

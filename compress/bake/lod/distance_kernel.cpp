@@ -2,8 +2,13 @@
 
 namespace packtrace {
 
-void triangle_distances(const double* point, const TriangleBlock* blocks, uint64_t count, double* distances) {
-  distances_to(point, blocks, count, distances);
+void triangle_distances(const double* points, uint64_t point_count, const TriangleBlock* blocks, uint64_t count,
+                        double* const* distances) {
+  distances_to(points, point_count, blocks, count, distances);
+}
+
+NearestTriangle nearest_triangle(const double* a, const double* b, const double* c, uint64_t count) {
+  return nearest_of(a, b, c, count);
 }
 
 } // namespace packtrace

@@ -1,5 +1,5 @@
-// The body of triangle_distances(), for each instruction set: same operations in the same order, so the same bits. No
-// other header's functions may be compiled for AVX2.
+// The bodies of triangle_distances() and nearest_triangle(), for each instruction set: same operations in the same
+// order, so the same bits. No other header's functions may be compiled for AVX2.
 
 #include "compress/bake/lod/distance_kernel.h"
 
@@ -17,12 +17,11 @@ struct Vector4 {
 }
 
 /// The least of `least` and the squared distance of p, from one end of a segment, from the segment; `along` is p's
-/// product with it, length2 its own.
+/// product with it over its squared length.
 [[gnu::always_inline]] inline void to_segment(const Vector4& p, const Vector4& segment, const Lanes& along,
-                                              const Lanes& length2, Lanes& least) {
+                                              Lanes& least) {
   const Lanes zero = {}, one = zero + 1.0;
-  Lanes t = along / (length2 > zero ? length2 : one);
-  t = t > zero ? t : zero;
+  Lanes t = along > zero ? along : zero;
   t = t < one ? t : one;
   const Vector4 d = {p.x - t * segment.x, p.y - t * segment.y, p.z - t * segment.z};
   Lanes distance2;
@@ -30,37 +29,90 @@ struct Vector4 {
   least = distance2 < least ? distance2 : least;
 }
 
-[[gnu::always_inline]] inline void distances_to_block(const double* point, const TriangleBlock& block, double* out) {
-  using Stored = double __attribute__((vector_size(32), may_alias));
+using Stored = double __attribute__((vector_size(32), may_alias, aligned(8)));
+
+[[gnu::always_inline]] inline void distances_to_block(const double* points, uint64_t point_count,
+                                                      const TriangleBlock& block, double* const* out, uint64_t at) {
   const auto in = [](const double* from) __attribute__((always_inline))->const Stored& {
     return *reinterpret_cast<const Stored*>(from);
   };
-  const Lanes zero = {};
+  const Lanes zero = {}, one = zero + 1.0;
   const Vector4 ab = {in(block.ab[0]), in(block.ab[1]), in(block.ab[2])};
   const Vector4 ac = {in(block.ac[0]), in(block.ac[1]), in(block.ac[2])};
-  const Vector4 ap = {point[0] - in(block.a[0]), point[1] - in(block.a[1]), point[2] - in(block.a[2])};
-  const Vector4 bc = {ac.x - ab.x, ac.y - ab.y, ac.z - ab.z}, bp = {ap.x - ab.x, ap.y - ab.y, ap.z - ab.z};
-  Lanes d00, d01, d11, p0, p1, dbc, pbc;
-  dot(ab, ab, d00), dot(ab, ac, d01), dot(ac, ac, d11);
-  dot(ap, ab, p0), dot(ap, ac, p1), dot(bc, bc, dbc), dot(bp, bc, pbc);
-  Lanes distance2 = zero + __builtin_inf();
-  to_segment(ap, ab, p0, d00, distance2);
-  to_segment(ap, ac, p1, d11, distance2);
-  to_segment(bp, bc, pbc, dbc, distance2);
-  // Over the plane, p = a + v (b - a) + w (c - a): the foot is the nearest point where it lies inside.
-  const Lanes area2 = d00 * d11 - d01 * d01, v = d11 * p0 - d01 * p1, w = d00 * p1 - d01 * p0;
-  const auto inside = (v >= zero) & (w >= zero) & (v + w <= area2) & (area2 > 1e-12 * d00 * d11);
-  const Lanes scale = 1.0 / (area2 > zero ? area2 : zero + 1.0), s = v * scale, t = w * scale;
-  const Vector4 d = {ap.x - s * ab.x - t * ac.x, ap.y - s * ab.y - t * ac.y, ap.z - s * ab.z - t * ac.z};
-  Lanes plane2;
-  dot(d, d, plane2);
-  distance2 = inside ? plane2 : distance2;
-  for (int lane = 0; lane < 4; ++lane) out[lane] = __builtin_sqrt(distance2[lane]);
+  const Vector4 bc = {ac.x - ab.x, ac.y - ab.y, ac.z - ab.z};
+  Lanes d00, d01, d11, dbc;
+  dot(ab, ab, d00), dot(ab, ac, d01), dot(ac, ac, d11), dot(bc, bc, dbc);
+  const Lanes area2 = d00 * d11 - d01 * d01, flat = 1e-12 * d00 * d11;
+  const Lanes over_ab = one / (d00 > zero ? d00 : one), over_ac = one / (d11 > zero ? d11 : one);
+  const Lanes over_bc = one / (dbc > zero ? dbc : one), scale = one / (area2 > zero ? area2 : one);
+  for (uint64_t i = 0; i < point_count; ++i) {
+    const double* point = points + 3 * i;
+    const Vector4 ap = {point[0] - in(block.a[0]), point[1] - in(block.a[1]), point[2] - in(block.a[2])};
+    const Vector4 bp = {ap.x - ab.x, ap.y - ab.y, ap.z - ab.z};
+    Lanes p0, p1, pbc;
+    dot(ap, ab, p0), dot(ap, ac, p1), dot(bp, bc, pbc);
+    Lanes distance2 = zero + __builtin_inf();
+    to_segment(ap, ab, p0 * over_ab, distance2);
+    to_segment(ap, ac, p1 * over_ac, distance2);
+    to_segment(bp, bc, pbc * over_bc, distance2);
+    // Over the plane, p = a + v (b - a) + w (c - a): the foot is the nearest point where it lies inside.
+    const Lanes v = d11 * p0 - d01 * p1, w = d00 * p1 - d01 * p0;
+    const auto inside = (v >= zero) & (w >= zero) & (v + w <= area2) & (area2 > flat);
+    const Lanes s = v * scale, t = w * scale;
+    const Vector4 d = {ap.x - s * ab.x - t * ac.x, ap.y - s * ab.y - t * ac.y, ap.z - s * ab.z - t * ac.z};
+    Lanes plane2;
+    dot(d, d, plane2);
+    distance2 = inside ? plane2 : distance2;
+    for (uint64_t lane = 0; lane < 4; ++lane) out[i][at + lane] = __builtin_sqrt(distance2[lane]);
+  }
 }
 
-[[gnu::always_inline]] inline void distances_to(const double* point, const TriangleBlock* blocks, uint64_t count,
-                                                double* distances) {
-  for (uint64_t i = 0; i < count; ++i) distances_to_block(point, blocks[i], distances + 4 * i);
+[[gnu::always_inline]] inline void distances_to(const double* points, uint64_t point_count, const TriangleBlock* blocks,
+                                                uint64_t count, double* const* distances) {
+  for (uint64_t i = 0; i < count; ++i) distances_to_block(points, point_count, blocks[i], distances, 4 * i);
+}
+
+[[gnu::always_inline]] inline double least_of(const double* lanes) {
+  double least = lanes[0];
+  for (int lane = 1; lane < 4; ++lane) least = lanes[lane] < least ? lanes[lane] : least;
+  return least;
+}
+
+[[gnu::always_inline]] inline NearestTriangle nearest_of(const double* a, const double* b, const double* c,
+                                                         uint64_t count) {
+  using Places = int64_t __attribute__((vector_size(32)));
+  using StoredPlaces = int64_t __attribute__((vector_size(32), may_alias, aligned(8)));
+  const auto in = [](const double* from) __attribute__((always_inline))->const Stored& {
+    return *reinterpret_cast<const Stored*>(from);
+  };
+  const Lanes far = Lanes{} + __builtin_inf();
+  Lanes nearest_a = far, nearest_b = far, nearest_c = far, best = far;
+  Places at = {}, place = {0, 1, 2, 3};
+  for (uint64_t i = 0; i < 4 * count; i += 4, place += 4) {
+    const Lanes from_a = in(a + i), from_b = in(b + i), from_c = in(c + i);
+    nearest_a = from_a < nearest_a ? from_a : nearest_a;
+    nearest_b = from_b < nearest_b ? from_b : nearest_b;
+    nearest_c = from_c < nearest_c ? from_c : nearest_c;
+    Lanes largest = from_a > from_b ? from_a : from_b;
+    largest = largest > from_c ? largest : from_c;
+    const Places less = largest < best;
+    best = less ? largest : best;
+    at = less ? place : at;
+  }
+  double bests[4], least[3][4];
+  int64_t places[4];
+  *reinterpret_cast<Stored*>(bests) = best, *reinterpret_cast<StoredPlaces*>(places) = at;
+  *reinterpret_cast<Stored*>(least[0]) = nearest_a, *reinterpret_cast<Stored*>(least[1]) = nearest_b;
+  *reinterpret_cast<Stored*>(least[2]) = nearest_c;
+  int lane = 0;
+  for (int i = 1; i < 4; ++i)
+    if (bests[i] < bests[lane] || (bests[i] == bests[lane] && places[i] < places[lane])) lane = i;
+  NearestTriangle result = {static_cast<uint64_t>(places[lane]), bests[lane], 0.0};
+  for (const auto& corner : least) {
+    const double l = least_of(corner);
+    result.least = l > result.least ? l : result.least;
+  }
+  return result;
 }
 
 } // namespace

@@ -143,8 +143,8 @@ private:
       mapped_[t] = 0;
       after_.gather(before_.corner_points(t));
       best_.clear();
-      after_.lay(before_.corners(t), before_.surface().area_normal(t), best_);
-      const double distance = look_closer(after_, t);
+      const bool once = after_.lay(before_.corners(t), before_.surface().area_normal(t), best_);
+      const double distance = once ? look_closer(t) : std::numeric_limits<double>::infinity();
       if (enough(distance, had(t)))
         accept(t);
       else
@@ -168,7 +168,7 @@ private:
   void add_shares(const Laid& laid) {
     const auto met = images_.met(laid.image);
     if (std::any_of(met.begin(), met.end(), [&](uint32_t s) { return (covered_[s] & TriangleImages::kWhole) == 0; }))
-      images_.add_shares(laid.triangle, seen_);
+      images_.add_shares(laid.triangle, laid.image, covered_, seen_);
   }
 
   /// What images cover, each seen from the side that it faces, needs no measuring of its own. Distances inside are
@@ -223,7 +223,7 @@ private:
     const uint32_t t = laid.triangle;
     if (mapped_[t] == 0) return false;
     best_.clear();
-    images_.look_closer(t, best_);
+    images_.look_closer(t, laid.image, best_);
     double largest = 0.0;
     for (const OverlayPiece& piece : best_) largest = std::max(largest, piece.distance);
     if (!enough(largest, had(t))) return false;
@@ -232,10 +232,10 @@ private:
   }
 
   /// Straight up may be far where the surface is steep; the nearest point is what counts. Returns the largest of best_.
-  double look_closer(SurfaceSide& side, uint32_t t) {
+  double look_closer(uint32_t t) {
     double largest = 0.0;
     for (OverlayPiece& piece : best_) {
-      if (!enough(piece.distance, had(t))) piece.distance = side.overlay().nearest_distance(piece);
+      if (!enough(piece.distance, had(t))) piece.distance = after_.overlay().nearest_distance(piece);
       largest = std::max(largest, piece.distance);
     }
     return largest;
@@ -250,17 +250,11 @@ private:
     }
   }
 
-  /// Seen from where the new surface faces, slivers and small dents lie flatter; and it may reach further. What no
-  /// overlay bounds well is cut.
+  /// What no overlay bounds well is cut.
   /// @param bound of best_
   void measure_harder(uint32_t t, double bound) {
     const Corners p = before_.corners(t);
     if (after_.candidates().empty()) after_.gather_near(p[0]); // a line that hung together with nothing
-    look_along_facing(t, bound);
-    if (enough(bound, had(t))) return accept(t);
-    after_.widen();
-    look_along_facing(t, bound);
-    if (enough(bound, had(t))) return accept(t);
     refine_over_after(t, bound, false);
     if (!enough(bound, had(t))) {
       after_.gather_within(p, bound);
@@ -271,48 +265,19 @@ private:
 
   /// @param all whether the candidates are all that matter: then what the corners' distance proves holds for others too
   void refine_over_after(uint32_t t, double& bound, bool all) {
-    const Corners p = before_.corners(t);
+    refiner_.begin(after_);
     // It is not below this, as far as the candidates go.
-    const double before = proven_, least = stated(farthest_corner(p), had(t));
+    const double before = proven_, least = stated(refiner_.measure_corners(before_.corners(t)), had(t));
     proven_ = std::max(proven_, least);
     if (!enough(bound, had(t))) {
       refined_.clear();
-      const double refined = refiner_.run(
-          p, after_, [&](double distance, uint32_t) { return enough(distance, had(t)); },
-          [&](uint32_t s, double distance) {
-            refined_.push_back({s, distance, 0.0});
-          });
+      const double refined = refiner_.run([&](double distance, uint32_t) { return enough(distance, had(t)); },
+                                          [&](uint32_t s, double distance) {
+                                            refined_.push_back({s, distance, 0.0});
+                                          });
       if (refined < bound) std::swap(best_, refined_), bound = refined;
     }
     proven_ = all ? std::max(before, std::min(least, stated(bound, had(t)))) : before;
-  }
-
-  /// Keeps the better of best_ and what is seen from where the candidates face.
-  void look_along_facing(uint32_t t, double& bound) {
-    DVec3 facing(0.0);
-    for (const uint32_t s : after_.candidates()) facing += after_.surface().area_normal(s);
-    std::swap(best_, second_);
-    best_.clear();
-    if (after_.lay(before_.corners(t), facing, best_))
-      if (const double distance = look_closer(after_, t); distance < bound) {
-        bound = distance;
-        return;
-      }
-    std::swap(best_, second_);
-  }
-
-  /// The distance of the corner that is farthest from all candidates.
-  double farthest_corner(const Corners& triangle) {
-    set_.clear();
-    for (const uint32_t s : after_.candidates()) set_.add(after_.surface(), s);
-    double farthest = 0.0;
-    for (const DVec3& corner : triangle) {
-      set_.distances(corner, distances_);
-      if (!set_.empty())
-        farthest = std::max(farthest, *std::min_element(distances_.begin(),
-                                                        distances_.begin() + static_cast<std::ptrdiff_t>(set_.size())));
-    }
-    return farthest;
   }
 
   /// A triangle after of which the ones before saw too little: it is measured itself.
@@ -320,27 +285,26 @@ private:
     before_.link();
     before_.gather(after_.corner_points(s));
     if (fits_over_before(s)) return;
-    before_.widen();
-    if (fits_over_before(s)) return;
     const double near = refine_over_before(s);
     if (near > std::max(largest_, kSlack * proven_)) {
-      std::swap(refined_, second_);
+      std::swap(refined_, best_);
       before_.gather_within(after_.corners(s), near);
-      if (refine_over_before(s) >= near) std::swap(refined_, second_);
+      if (refine_over_before(s) >= near) std::swap(refined_, best_);
     }
     for (const OverlayPiece& piece : refined_) note_after(s, piece.triangle, piece.distance);
   }
 
-  /// Returns the largest error that refined_ would make.
+  /// Returns the largest error that refined_ would make; infinite where nothing is near.
   double refine_over_before(uint32_t s) {
-    double largest = 0.0;
+    double largest = before_.candidates().empty() ? std::numeric_limits<double>::infinity() : 0.0;
     refined_.clear();
-    refiner_.run(
-        after_.corners(s), before_, [&](double distance, uint32_t t) { return enough(distance, had(t)); },
-        [&](uint32_t t, double distance) {
-          refined_.push_back({t, distance, 0.0});
-          largest = std::max(largest, stated(distance, had(t)));
-        });
+    refiner_.begin(before_);
+    refiner_.measure_corners(after_.corners(s));
+    refiner_.run([&](double distance, uint32_t t) { return enough(distance, had(t)); },
+                 [&](uint32_t t, double distance) {
+                   refined_.push_back({t, distance, 0.0});
+                   largest = std::max(largest, stated(distance, had(t)));
+                 });
     return largest;
   }
 
@@ -373,10 +337,8 @@ private:
   std::vector<Claim> claims_;                ///< a heap
   std::vector<double> edge_had_, point_had_; ///< the largest that accepted images at it had, or negative
   std::vector<uint32_t> not_covered_;
-  std::vector<OverlayPiece> best_, second_, refined_; ///< of the triangle at hand
+  std::vector<OverlayPiece> best_, refined_; ///< of the triangle at hand
   TriangleRefiner refiner_;
-  TriangleSet set_;
-  std::vector<double> distances_;
   double largest_ = 0.0; ///< the group's error is at least this, as noted
   double proven_ = 0.0;  ///< some triangle's error cannot be below, as far as its candidates go
 };

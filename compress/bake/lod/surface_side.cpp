@@ -53,24 +53,19 @@ void SurfaceSide::add_large_fan(std::span<const uint32_t> fan, const Triangle& c
   for (size_t k = 0; k < kLargeFan && added == 0; ++k) add(fan[k]);
 }
 
-void SurfaceSide::widen() {
-  const size_t count = candidates_.size();
-  for (size_t i = 0; i < count; ++i)
-    for (int k = 0; k < 3; ++k)
-      if (const auto around = fan(corner_points(candidates_[i])[k]); around.size() <= kLargeFan)
-        for (const uint32_t t : around) add(t);
-}
-
 void SurfaceSide::gather_within(const std::array<DVec3, 3>& triangle, double distance) {
   candidates_.clear();
+  if (boxes_.empty())
+    for (uint32_t t = 0; t < surface_.triangles.size(); ++t) {
+      const DVec3 &a = surface_.corner(t, 0), &b = surface_.corner(t, 1), &c = surface_.corner(t, 2);
+      boxes_.push_back({glm::min(glm::min(a, b), c), glm::max(glm::max(a, b), c)});
+    }
   const DVec3 lo = glm::min(glm::min(triangle[0], triangle[1]), triangle[2]) - distance;
   const DVec3 hi = glm::max(glm::max(triangle[0], triangle[1]), triangle[2]) + distance;
-  for (uint32_t t = 0; t < surface_.triangles.size(); ++t) {
-    const DVec3 &a = surface_.corner(t, 0), &b = surface_.corner(t, 1), &c = surface_.corner(t, 2);
-    const DVec3 least = glm::min(glm::min(a, b), c), most = glm::max(glm::max(a, b), c);
-    if (least.x <= hi.x && least.y <= hi.y && least.z <= hi.z && most.x >= lo.x && most.y >= lo.y && most.z >= lo.z)
+  for (uint32_t t = 0; t < boxes_.size(); ++t)
+    if (const auto& [least, most] = boxes_[t];
+        least.x <= hi.x && most.x >= lo.x && least.y <= hi.y && most.y >= lo.y && least.z <= hi.z && most.z >= lo.z)
       candidates_.push_back(t);
-  }
 }
 
 void SurfaceSide::gather_near(DVec3 point) {

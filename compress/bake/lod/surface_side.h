@@ -36,7 +36,6 @@ public:
   // What another triangle is measured against: a set of triangles of this side.
   std::span<const uint32_t> candidates() const { return candidates_; }
   void gather(const Triangle& corners); ///< those around three points
-  void widen();                         ///< one ring more
   void gather_near(DVec3 point);        ///< a few more: those with corners near it
   /// All that may be nearer to a triangle than that, and more.
   void gather_within(const std::array<DVec3, 3>& triangle, double distance);
@@ -51,8 +50,14 @@ private:
     if (stamp_[triangle] != stamp_value_) stamp_[triangle] = stamp_value_, candidates_.push_back(triangle);
   }
 
+  /// What holds a triangle.
+  struct Box {
+    DVec3 lo, hi;
+  };
+
   OverlaySurface surface_;
   std::span<const uint32_t> became_;
+  std::vector<Box> boxes_; ///< when they are needed
   Overlay overlay_;
   std::vector<uint32_t> first_, fans_; ///< triangles around points
   std::vector<uint32_t> stamp_, candidates_;

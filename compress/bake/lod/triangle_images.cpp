@@ -123,12 +123,18 @@ bool TriangleImages::find(uint32_t triangle, Image& out) {
   for (int i = 0; i < 3; ++i)
     distance2 = std::max(distance2, std::max(walk_.ways()[edge[i]].distance2, walk_.place(p[i]).distance2));
   if (inside != kNone) inside2 = distance2_from(triangle, walk_.point(inside));
-  out = {std::sqrt(std::max(distance2, inside2)), std::sqrt(inside2), met_count_, outline.count};
-  met_count_ += outline.count;
+  uint32_t different = 0;
+  for (uint32_t i = 0; i < outline.count; ++i) {
+    const uint32_t met = outline.triangles[i];
+    if (std::find(outline.triangles, outline.triangles + different, met) == outline.triangles + different)
+      outline.triangles[different++] = met;
+  }
+  out = {std::sqrt(std::max(distance2, inside2)), std::sqrt(inside2), met_count_, different, inside};
+  met_count_ += different;
   return true;
 }
 
-void TriangleImages::look_closer(uint32_t triangle, std::vector<OverlayPiece>& pieces) {
+void TriangleImages::look_closer(uint32_t triangle, const Image& image, std::vector<OverlayPiece>& pieces) {
   struct Measurer {
     TriangleImages& images;
     uint32_t before;
@@ -180,9 +186,8 @@ void TriangleImages::look_closer(uint32_t triangle, std::vector<OverlayPiece>& p
       measure();
     }
   } outline{*this, triangle, {}, {}, {}, {}, 0.0};
-  uint32_t inside = kNone;
-  if (!follow(triangle, outline) || (outline.word.count > 2 && !contract(outline.word.view(), inside))) return;
-  const double inside2 = inside == kNone ? 0.0 : distance2_from(triangle, walk_.point(inside));
+  follow(triangle, outline);
+  const double inside2 = image.point == kNone ? 0.0 : distance2_from(triangle, walk_.point(image.point));
   for (uint32_t i = 0; i < outline.word.count; ++i)
     pieces.push_back({outline.word.triangles[i], std::sqrt(std::max(outline.distances2[i], inside2)), 0.0});
 }
@@ -205,13 +210,12 @@ double TriangleImages::area(uint32_t interval, const DVec3& reference) const {
   return glm::dot(sum, walk_.area_normal(triangle));
 }
 
-void TriangleImages::add_shares(uint32_t triangle, std::span<double> shares) {
+void TriangleImages::add_shares(uint32_t triangle, const Image& image, std::span<const uint8_t> covered,
+                                std::span<double> shares) {
   struct Collector {
     TriangleImages& images;
     uint32_t before;
-    Word word;
     void begin(uint32_t after) {
-      word.triangles[word.count++] = after;
       images.outline_.intervals.push_back({after, static_cast<uint32_t>(images.outline_.points.size())});
     }
     void add(const DVec3& point) { images.outline_.points.push_back(point); }
@@ -225,15 +229,15 @@ void TriangleImages::add_shares(uint32_t triangle, std::span<double> shares) {
       begin(into);
       add(images.walk_.crossing(crossing).point());
     }
-  } collector{*this, triangle, {}};
+  } collector{*this, triangle};
   outline_.intervals.clear(), outline_.points.clear();
-  uint32_t inside = kNone;
-  if (!follow(triangle, collector) || (collector.word.count > 2 && !contract(collector.word.view(), inside))) return;
+  follow(triangle, collector);
   const auto count = static_cast<uint32_t>(outline_.intervals.size());
   outline_.intervals.push_back({kNone, static_cast<uint32_t>(outline_.points.size())});
-  const DVec3 reference = inside == kNone ? outline_.points[0] : walk_.point(inside);
+  const DVec3 reference = image.point == kNone ? outline_.points[0] : walk_.point(image.point);
   for (uint32_t i = 0; i < count; ++i) {
     const uint32_t s = outline_.intervals[i].triangle;
+    if ((covered[s] & kWhole) != 0) continue;
     const DVec3& n = walk_.area_normal(s);
     shares[s] += area(i, reference) / glm::dot(n, n);
   }

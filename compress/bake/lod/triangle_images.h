@@ -14,12 +14,13 @@ class TriangleImages {
 public:
   static constexpr uint32_t kNone = SurfaceWalk::kNone;
 
-  /// The image of a triangle: the triangles after that its outline meets, met(first, count), some more than once.
+  /// The image of a triangle: the triangles after that its outline meets, met(first, count).
   /// Where they go around a point after, that is inside.
   struct Image {
     double distance; ///< of both is at most that
     double inside;   ///< how far the point inside is from the triangle; 0 if there is none
     uint32_t first, count;
+    uint32_t point; ///< the point inside, or kNone
   };
 
   /// Both must outlive it.
@@ -31,12 +32,13 @@ public:
   std::span<const uint32_t> met(const Image& image) const { return std::span(met_).subspan(image.first, image.count); }
 
   /// Appends the triangles after that the image meets with how far its part there is from the nearest points at most,
-  /// both ways; find() was true of it.
-  void look_closer(uint32_t triangle, std::vector<OverlayPiece>& pieces);
+  /// both ways.
+  void look_closer(uint32_t triangle, const Image& image, std::vector<OverlayPiece>& pieces);
 
-  /// Adds to `shares`, per triangle after, how much of it the image covers; find() was true of the triangle. What is
-  /// seen from behind is negative.
-  void add_shares(uint32_t triangle, std::span<double> shares);
+  /// Adds to `shares`, per triangle after that is not kWhole, how much of it the image covers. What is seen from behind
+  /// is negative.
+  /// @param covered as find_covered() left it
+  void add_shares(uint32_t triangle, const Image& image, std::span<const uint8_t> covered, std::span<double> shares);
 
   /// Bits of what is known of a triangle after: the sides that images are seen from; whether borders of images cross
   /// it or go along it; whether images cover it.

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "compress/bake/lod/surface_side.h"
@@ -15,17 +16,34 @@ namespace packtrace {
 /// much smaller: the distance from one triangle is convex, so the three corners bound it for all of it.
 class TriangleRefiner {
 public:
-  /// Measures against the candidates of `side`. Returns the largest bound; infinite without candidates.
+  /// Empty, for those that the next triangle is to be measured against.
+  TriangleSet& begin() {
+    levels_[0].kept.clear();
+    return levels_[0].kept;
+  }
+
+  /// Begins with the candidates of `side`.
+  void begin(const SurfaceSide& side) {
+    TriangleSet& among = begin();
+    for (const uint32_t t : side.candidates()) among.add(side.surface(), t);
+  }
+
+  /// The triangle's corner that is farthest from those added since begin(); 0 without any.
+  double measure_corners(const std::array<DVec3, 3>& triangle) {
+    Level& top = levels_[0];
+    top.among = &top.kept;
+    for (size_t k = 0; k < 3; ++k) top.points[k] = triangle[k];
+    measure(top, 0);
+    return top.kept.empty() ? 0.0 : top.kept.nearest(top.distances[0], top.distances[1], top.distances[2]).least;
+  }
+
+  /// Returns the largest bound of the triangle of measure_corners(); infinite without any to measure against.
   /// @param enough (distance, candidate): whether a bound needs to be no smaller
   /// @param noted (candidate, distance): a part of the triangle is that far from it
   template <typename Enough, typename Noted>
-  double run(const std::array<DVec3, 3>& triangle, const SurfaceSide& side, const Enough& enough, const Noted& noted) {
-    largest_ = side.candidates().empty() ? std::numeric_limits<double>::infinity() : 0.0;
-    Level& top = levels_[0];
-    top.among.clear();
-    for (const uint32_t t : side.candidates()) top.among.add(side.surface(), t);
-    for (size_t k = 0; k < 3; ++k) top.points[k] = triangle[k], top.among.distances(triangle[k], top.distances[k]);
-    work_ += 3 * top.among.size();
+  double run(const Enough& enough, const Noted& noted) {
+    if (levels_[0].kept.empty()) return std::numeric_limits<double>::infinity();
+    largest_ = 0.0;
     cut(0, {0, 1, 2}, enough, noted);
     return largest_;
   }
@@ -35,69 +53,84 @@ public:
 
 private:
   static constexpr size_t kMaxCuts = 5;
-  static constexpr double kGoodEnough = 1.25; // of what cutting could still gain
+  static constexpr double kGoodEnough = 1.1; // of what cutting could still gain
 
   /// What a triangle is cut into: its corners and the middles of its sides, with their distances.
   struct Level {
-    TriangleSet among;
+    const TriangleSet* among; ///< kept, or that of a level above
     std::array<DVec3, 6> points;
-    std::array<std::vector<double>, 6> distances; ///< of each point from each of `among`
+    std::array<const double*, 6> distances; ///< of each point from each of `among`; padded
+    TriangleSet kept;
+    std::array<std::vector<double>, 6> measured; ///< what distances of this level's own are
   };
+
+  /// Three points from `first` on.
+  void measure(Level& level, size_t first) {
+    std::array<double*, 3> rows;
+    for (size_t k = 0; k < 3; ++k) {
+      std::vector<double>& row = level.measured[first + k];
+      if (row.size() < level.among->padded_size()) row.resize(level.among->padded_size());
+      level.distances[first + k] = rows[k] = row.data();
+    }
+    level.among->distances(std::span(level.points).subspan(first, 3), rows);
+    work_ += 3 * level.among->size();
+  }
 
   template <typename Enough, typename Noted>
   void cut(size_t depth, const std::array<size_t, 3>& corners, const Enough& enough, const Noted& noted) {
     const Level& level = levels_[depth];
-    if (level.among.empty()) return;
-    constexpr double kFar = std::numeric_limits<double>::infinity();
-    double best = kFar;
-    std::array<double, 3> nearest{kFar, kFar, kFar};
-    size_t where = 0;
-    for (size_t i = 0; i < level.among.size(); ++i) {
-      double largest = 0.0;
-      for (size_t k = 0; k < 3; ++k) {
-        const double d = level.distances[corners[k]][i];
-        nearest[k] = std::min(nearest[k], d), largest = std::max(largest, d);
-      }
-      if (largest < best) best = largest, where = i;
-    }
-    const double good = kGoodEnough * std::max({nearest[0], nearest[1], nearest[2]});
-    if (depth == kMaxCuts || best <= good || enough(best, level.among.number(where))) {
-      largest_ = std::max(largest_, best);
-      noted(level.among.number(where), best);
+    const NearestTriangle nearest =
+        level.among->nearest(level.distances[corners[0]], level.distances[corners[1]], level.distances[corners[2]]);
+    const double good = kGoodEnough * nearest.least;
+    const uint32_t number = level.among->number(nearest.place);
+    if (depth == kMaxCuts || nearest.distance <= good || enough(nearest.distance, number)) {
+      largest_ = std::max(largest_, nearest.distance);
+      noted(number, nearest.distance);
       return;
     }
-    divide(depth, corners, where, good, enough);
+    divide(depth, corners, nearest.place, good, enough);
     for (const std::array<size_t, 3>& part : {std::array<size_t, 3>{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}})
       cut(depth + 1, part, enough, noted);
   }
 
-  /// Sets up the next level: what is too far from the triangle serves none of its parts.
+  /// Sets up the next level: what is too far from the triangle serves none of its parts, and is left out where it is
+  /// much.
   template <typename Enough>
   void divide(size_t depth, const std::array<size_t, 3>& corners, size_t where, double good, const Enough& enough) {
     const Level& from = levels_[depth];
     Level& to = levels_[depth + 1];
     std::array<double, 3> reach{}; // of the triangle from each corner
-    for (size_t k = 0; k < 3; ++k) {
-      to.points[k] = from.points[corners[k]];
-      to.distances[k].clear();
-    }
-    to.among.clear();
+    for (size_t k = 0; k < 3; ++k) to.points[k] = from.points[corners[k]], to.distances[k] = from.distances[corners[k]];
     for (size_t k = 0; k < 3; ++k) to.points[3 + k] = 0.5 * (to.points[k] + to.points[(k + 1) % 3]);
     for (size_t k = 0; k < 3; ++k)
       reach[k] = std::max(glm::length(to.points[(k + 1) % 3] - to.points[k]),
                           glm::length(to.points[(k + 2) % 3] - to.points[k]));
-    for (size_t i = 0; i < from.among.size(); ++i) {
-      double least = 0.0;
-      for (size_t k = 0; k < 3; ++k) least = std::max(least, from.distances[corners[k]][i] - reach[k]);
-      if (i != where && least > good && !enough(least, from.among.number(i))) continue;
-      to.among.add(from.among, i);
-      for (size_t k = 0; k < 3; ++k) to.distances[k].push_back(from.distances[corners[k]][i]);
+    near_.clear();
+    for (uint32_t i = 0; i < from.among->size(); ++i) {
+      const double least =
+          std::max({to.distances[0][i] - reach[0], to.distances[1][i] - reach[1], to.distances[2][i] - reach[2]});
+      if (i == where || least <= good || enough(least, from.among->number(i))) near_.push_back(i);
     }
-    for (size_t k = 3; k < 6; ++k) to.among.distances(to.points[k], to.distances[k]);
-    work_ += from.among.size() + 3 * to.among.size();
+    work_ += from.among->size();
+    to.among = from.among;
+    if (2 * near_.size() <= from.among->size()) keep_near(*from.among, to);
+    measure(to, 3);
+  }
+
+  void keep_near(const TriangleSet& from, Level& to) {
+    to.kept.clear();
+    for (const uint32_t i : near_) to.kept.add(from, i);
+    to.among = &to.kept;
+    for (size_t k = 0; k < 3; ++k) {
+      std::vector<double>& kept = to.measured[k];
+      kept.assign(to.kept.padded_size(), std::numeric_limits<double>::infinity());
+      for (size_t i = 0; i < near_.size(); ++i) kept[i] = to.distances[k][near_[i]];
+      to.distances[k] = kept.data();
+    }
   }
 
   std::array<Level, kMaxCuts + 1> levels_;
+  std::vector<uint32_t> near_;
   double largest_ = 0.0;
   size_t work_ = 0;
 };

@@ -3,27 +3,38 @@
 namespace packtrace {
 namespace {
 
-DistanceKernel pick_kernel() {
+constexpr double kFar = 1e150; // its square is finite
+
+DistanceKernel pick_distance_kernel() {
 #if defined(__x86_64__)
   if (__builtin_cpu_supports("avx2")) return avx2::triangle_distances;
 #endif
   return triangle_distances;
 }
 
+NearestKernel pick_nearest_kernel() {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx2")) return avx2::nearest_triangle;
+#endif
+  return nearest_triangle;
+}
+
 } // namespace
 
 TriangleBlock& TriangleSet::next_block(uint32_t number, size_t& lane) {
   lane = numbers_.size() % 4;
-  if (lane == 0) blocks_.emplace_back();
+  if (lane == 0) {
+    blocks_.emplace_back();
+    for (double& x : blocks_.back().a[0]) x = kFar;
+  }
   numbers_.push_back(number);
   return blocks_.back();
 }
 
-void TriangleSet::add(const OverlaySurface& surface, uint32_t triangle) {
+void TriangleSet::add(const std::array<DVec3, 3>& corners, uint32_t number) {
   size_t lane = 0;
-  TriangleBlock& block = next_block(triangle, lane);
-  const DVec3 &a = surface.corner(triangle, 0), ab = surface.corner(triangle, 1) - a,
-              ac = surface.corner(triangle, 2) - a;
+  TriangleBlock& block = next_block(number, lane);
+  const DVec3 &a = corners[0], ab = corners[1] - a, ac = corners[2] - a;
   for (int axis = 0; axis < 3; ++axis)
     block.a[axis][lane] = a[axis], block.ab[axis][lane] = ab[axis], block.ac[axis][lane] = ac[axis];
 }
@@ -39,10 +50,14 @@ void TriangleSet::add(const TriangleSet& other, size_t i) {
   }
 }
 
-void TriangleSet::distances(const DVec3& point, std::vector<double>& out) const {
-  static const DistanceKernel kernel = pick_kernel();
-  out.resize(4 * blocks_.size());
-  kernel(&point.x, blocks_.data(), blocks_.size(), out.data());
+void TriangleSet::distances(std::span<const DVec3> points, std::span<double* const> rows) const {
+  static const DistanceKernel kernel = pick_distance_kernel();
+  kernel(&points[0].x, points.size(), blocks_.data(), blocks_.size(), rows.data());
+}
+
+NearestTriangle TriangleSet::nearest(const double* a, const double* b, const double* c) const {
+  static const NearestKernel kernel = pick_nearest_kernel();
+  return kernel(a, b, c, blocks_.size());
 }
 
 } // namespace packtrace

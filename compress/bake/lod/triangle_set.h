@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "compress/bake/lod/distance_kernel.h"
@@ -13,7 +15,10 @@ namespace packtrace {
 class TriangleSet {
 public:
   void clear() { numbers_.clear(), blocks_.clear(); }
-  void add(const OverlaySurface& surface, uint32_t triangle);
+  void add(const OverlaySurface& surface, uint32_t triangle) {
+    add({surface.corner(triangle, 0), surface.corner(triangle, 1), surface.corner(triangle, 2)}, triangle);
+  }
+  void add(const std::array<DVec3, 3>& corners, uint32_t number);
   /// Adds triangle i of another set.
   void add(const TriangleSet& other, size_t i);
 
@@ -21,8 +26,12 @@ public:
   bool empty() const { return numbers_.empty(); }
   uint32_t number(size_t i) const { return numbers_[i]; }
 
-  /// The first size() of the result: how far the point is from each.
-  void distances(const DVec3& point, std::vector<double>& out) const;
+  /// How far points are from each, a row for each point: its first size() entries, of padded_size(); then what is far.
+  void distances(std::span<const DVec3> points, std::span<double* const> rows) const;
+  size_t padded_size() const { return 4 * blocks_.size(); }
+
+  /// @param a, b, c distances() of the corners of a triangle; the set is not empty
+  NearestTriangle nearest(const double* a, const double* b, const double* c) const;
 
 private:
   TriangleBlock& next_block(uint32_t number, size_t& lane);

@@ -1,7 +1,11 @@
 // What measures and places four triangles or edges at once.
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -9,6 +13,7 @@
 #include "compress/bake/lod/edge_placement.h"
 #include "compress/bake/lod/triangle_distance.h"
 #include "compress/bake/lod/triangle_overlay.h"
+#include "compress/bake/lod/triangle_refiner.h"
 #include "compress/bake/lod/triangle_set.h"
 #include "tests/compress/test_scenes.h"
 
@@ -63,6 +68,22 @@ Surface random_triangles(uint32_t count, uint32_t seed) {
   return s;
 }
 
+/// Distances of points from a set.
+class Rows {
+public:
+  Rows(const TriangleSet& set, const std::vector<DVec3>& points)
+      : width_(set.padded_size()), values_(points.size() * width_) {
+    std::vector<double*> rows;
+    for (size_t k = 0; k < points.size(); ++k) rows.push_back(&values_[k * width_]);
+    set.distances(points, rows);
+  }
+  const double* row(size_t point) const { return &values_[point * width_]; }
+
+private:
+  size_t width_;
+  std::vector<double> values_;
+};
+
 TEST(TriangleSet, DistancesAreThoseOfTheNearestPoints) {
   const Surface s = random_triangles(101, 1);
   TriangleSet all, odd;
@@ -71,18 +92,69 @@ TEST(TriangleSet, DistancesAreThoseOfTheNearestPoints) {
   ASSERT_EQ(all.size(), 101u);
   ASSERT_EQ(odd.size(), 50u);
   Random random(2);
-  std::vector<double> distances;
   for (int repeat = 0; repeat < 100; ++repeat) {
-    const DVec3 p = 1.5 * random_point(random);
-    const auto expected = [&](uint32_t t) {
+    const std::vector<DVec3> points = {1.5 * random_point(random), random_point(random)};
+    const auto expected = [&](DVec3 p, uint32_t t) {
       const std::array<DVec3, 3> c = s.corners(t);
       return glm::length(p - nearest_point(p, c[0], c[1], c[2]));
     };
-    all.distances(p, distances);
-    for (size_t i = 0; i < all.size(); ++i) EXPECT_NEAR(distances[i], expected(all.number(i)), 1e-9);
-    odd.distances(p, distances);
-    for (size_t i = 0; i < odd.size(); ++i) EXPECT_NEAR(distances[i], expected(odd.number(i)), 1e-9);
+    for (const TriangleSet* set : {&all, &odd}) {
+      const Rows rows(*set, points);
+      for (size_t k = 0; k < points.size(); ++k) {
+        for (size_t i = 0; i < set->size(); ++i) EXPECT_NEAR(rows.row(k)[i], expected(points[k], set->number(i)), 1e-9);
+        for (size_t i = set->size(); i < set->padded_size(); ++i) EXPECT_GE(rows.row(k)[i], 1e100);
+      }
+    }
   }
+}
+
+TEST(TriangleSet, TheNearestIsTheFirstOfWhichNoCornerIsFartherThanOfOthers) {
+  Random random(12);
+  for (uint32_t count = 1; count < 40; ++count) {
+    const Surface s = random_triangles(count, count);
+    TriangleSet set;
+    for (int twice = 0; twice < 2; ++twice)
+      for (const uint32_t t : s.all()) set.add(s.view(), t);
+    const Rows rows(set, {random_point(random), random_point(random), random_point(random)});
+    const NearestTriangle nearest = set.nearest(rows.row(0), rows.row(1), rows.row(2));
+    std::array<double, 3> least{1e300, 1e300, 1e300};
+    std::pair<double, uint64_t> best{1e300, 0};
+    for (size_t i = 0; i < set.size(); ++i) {
+      for (size_t k = 0; k < 3; ++k) least[k] = std::min(least[k], rows.row(k)[i]);
+      best = std::min(best, {std::max({rows.row(0)[i], rows.row(1)[i], rows.row(2)[i]}), i});
+    }
+    EXPECT_LT(best.second, count); // all are there twice
+    EXPECT_EQ(nearest.place, best.second);
+    EXPECT_EQ(nearest.distance, best.first);
+    EXPECT_EQ(nearest.least, *std::max_element(least.begin(), least.end()));
+  }
+}
+
+TEST(TriangleRefiner, BoundsTheDistanceOfEveryPoint) {
+  const Surface coarse = bumpy_square(6, 10.0f, 13), fine = bumpy_square(9, 10.0f, 14);
+  TriangleRefiner refiner;
+  for (const double enough : {0.0, 6.0})
+    for (size_t t = 0; t < fine.triangles.size(); ++t) {
+      const std::array<DVec3, 3> p = fine.corners(t);
+      TriangleSet& among = refiner.begin();
+      for (const uint32_t s : coarse.all()) among.add(coarse.view(), s);
+      const double farthest = refiner.measure_corners(p);
+      double noted = 0.0;
+      const double bound = refiner.run([&](double distance, uint32_t) { return distance <= enough; },
+                                       [&](uint32_t, double distance) { noted = std::max(noted, distance); });
+      double sampled = 0.0;
+      for (int i = 0; i <= 12; ++i)
+        for (int k = 0; k <= 12 - i; ++k) {
+          const DVec3 q = p[0] + (i / 12.0) * (p[1] - p[0]) + (k / 12.0) * (p[2] - p[0]);
+          double distance = 1e300;
+          for (const uint32_t s : coarse.all()) distance = std::min(distance, coarse.view().distance(q, s));
+          sampled = std::max(sampled, distance);
+        }
+      EXPECT_EQ(bound, noted);
+      EXPECT_LE(farthest, sampled + 1e-9);
+      EXPECT_LE(sampled, bound + 1e-9);
+      EXPECT_LE(bound, std::max(enough, 1.6 * sampled)); // cutting ends at a quarter above what it could still gain
+    }
 }
 
 TEST(Overlay, PiecesBoundTheDistanceOfTheTriangle) {
@@ -268,11 +340,16 @@ TEST(LodKernels, GiveTheSameBitsOnEveryProcessor) {
     edges.run(place_edges), same_edges.run(avx2::place_edges);
     EXPECT_EQ(std::memcmp(edges.placed.data(), same_edges.placed.data(), sizeof edges.placed), 0);
 
-    const DVec3 p = random_point(random);
-    std::array<double, 20> far{}, same_far{};
-    triangle_distances(&p.x, blocks.data(), blocks.size(), far.data());
-    avx2::triangle_distances(&p.x, blocks.data(), blocks.size(), same_far.data());
+    const std::array<DVec3, 3> points{random_point(random), random_point(random), random_point(random)};
+    std::array<std::array<double, 20>, 3> far{}, same_far{};
+    const auto rows = [](auto& of) { return std::array<double*, 3>{of[0].data(), of[1].data(), of[2].data()}; };
+    triangle_distances(&points[0].x, points.size(), blocks.data(), blocks.size(), rows(far).data());
+    avx2::triangle_distances(&points[0].x, points.size(), blocks.data(), blocks.size(), rows(same_far).data());
     EXPECT_EQ(std::memcmp(far.data(), same_far.data(), sizeof far), 0);
+    const NearestTriangle nearest = nearest_triangle(far[0].data(), far[1].data(), far[2].data(), blocks.size());
+    const NearestTriangle same_nearest =
+        avx2::nearest_triangle(far[0].data(), far[1].data(), far[2].data(), blocks.size());
+    EXPECT_EQ(std::memcmp(&nearest, &same_nearest, sizeof nearest), 0);
 
     const auto lay = [&](OverlayKernel kernel, std::vector<OverlayPiece>& pieces) {
       std::vector<OverlayPoint> projected(s.points.size());

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "compress/bake/lod/line_cover.h"
+#include "compress/bake/lod/surface_bound.h"
 #include "compress/bake/lod/surface_walk.h"
 #include "compress/bake/lod/triangle_distance.h"
 #include "compress/bake/lod/triangle_images.h"
@@ -15,12 +16,13 @@ namespace {
 
 /// A bumpy square with a locked border, simplified to a part of its triangles.
 struct Simplified {
-  explicit Simplified(double kept) {
+  /// @param steepness of the bumps
+  explicit Simplified(double kept, double steepness = 1.0) {
     constexpr uint32_t kCells = 14;
     Random random(5);
     for (uint32_t y = 0; y <= kCells; ++y)
       for (uint32_t x = 0; x <= kCells; ++x) {
-        mesh.points.emplace_back(100.0 * x, 100.0 * y, std::round(random.uniform(-40, 40)));
+        mesh.points.emplace_back(100.0 * x, 100.0 * y, std::round(steepness * random.uniform(-40, 40)));
         mesh.locked.push_back(x == 0 || y == 0 || x == kCells || y == kCells);
       }
     for (uint32_t y = 0; y < kCells; ++y)
@@ -63,7 +65,7 @@ TEST_P(TriangleImagesOf, BoundsTheDistanceOfEveryTriangle) {
     if (!images_.find(t, image)) continue;
     ++mapped;
     std::vector<OverlayPiece> pieces;
-    images_.look_closer(t, pieces);
+    images_.look_closer(t, image, pieces);
     ASSERT_FALSE(pieces.empty());
     double closer = 0.0;
     for (const OverlayPiece& piece : pieces) closer = std::max(closer, piece.distance);
@@ -83,12 +85,13 @@ TEST_P(TriangleImagesOf, BoundsTheDistanceOfEveryTriangle) {
 
 TEST_P(TriangleImagesOf, CoverTrianglesAfterOnceAwayFromBorders) {
   std::vector<double> shares(s_.mesh.triangles.size());
+  const std::vector<uint8_t> none_known(shares.size());
   std::vector<uint8_t> mapped(s_.triangles.size()), covered(s_.mesh.triangles.size());
   for (uint32_t t = 0; t < s_.triangles.size(); ++t) {
     TriangleImages::Image image{};
     mapped[t] = t % 40 != 0 && images_.find(t, image); // some are left out
     if (mapped[t] == 0) continue;
-    images_.add_shares(t, shares);
+    images_.add_shares(t, image, none_known, shares);
     const OverlaySurface before{s_.points, s_.triangles};
     for (const uint32_t s : images_.met(image))
       covered[s] |=
@@ -107,6 +110,27 @@ TEST_P(TriangleImagesOf, CoverTrianglesAfterOnceAwayFromBorders) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Kept, TriangleImagesOf, testing::Values(0.9, 0.5, 0.25));
+
+TEST(SurfaceBound, EveryTriangleBeforeIsWithinItsBound) {
+  for (const double steepness : {1.0, 8.0, 40.0})
+    for (const double kept : {0.6, 0.4, 0.2}) {
+      Simplified s(kept, steepness);
+      const SurfaceLinks links = bound_errors(s.points, s.triangles, s.mesh);
+      std::vector<uint8_t> linked(s.triangles.size());
+      for (const SurfaceLink& link : links.links) linked[link.before] = 1;
+      const OverlaySurface after{s.mesh.points, s.mesh.triangles};
+      for (uint32_t t = 0; t < s.triangles.size(); ++t) {
+        EXPECT_TRUE(linked[t]) << "triangle " << t;
+        const Triangle& p = s.triangles[t].points;
+        for (const DVec3& at :
+             {s.points[p.x], s.points[p.y], s.points[p.z], (s.points[p.x] + s.points[p.y] + s.points[p.z]) / 3.0}) {
+          double least = 1e300;
+          for (uint32_t k = 0; k < s.mesh.triangles.size(); ++k) least = std::min(least, after.distance(at, k));
+          EXPECT_LE(least, links.bounds[t] + 1e-9) << "triangle " << t << ", " << steepness << ", " << kept;
+        }
+      }
+    }
+}
 
 TEST(LineCover, HoldsSidesOfTrianglesOnly) {
   std::vector<QuantizedVertex> vertices;
