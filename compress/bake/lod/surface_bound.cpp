@@ -143,8 +143,9 @@ private:
       mapped_[t] = 0;
       after_.gather(before_.corner_points(t));
       best_.clear();
-      after_.lay(before_.corners(t), before_.surface().area_normal(t), best_);
-      const double distance = look_closer(after_, t);
+      // Not all of it may lie over those after, though its image does.
+      const bool lies = after_.lay(before_.corners(t), before_.surface().area_normal(t), best_);
+      const double distance = lies ? look_closer(after_, t) : std::numeric_limits<double>::infinity();
       if (enough(distance, had(t)))
         accept(t);
       else
