@@ -70,7 +70,7 @@ struct BakeConfig {
   bool trees = true; ///< whether the file holds trees over its clusters, or they are built when it is traced
 
   LodUse lod = LodUse::kOff;
-  uint32_t lod_min_triangles = 512; ///< geometries of fewer get no levels
+  uint32_t lod_min_triangles = 128; ///< geometries of fewer get no levels
   uint32_t lod_levels = 31;         ///< above the source's, at most; 1..31
 
   /// A folder for finished levels of detail, which an interrupted bake finds there when it is started again; bake_scene()

@@ -250,7 +250,7 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
       ->default_str(options->lod)
       ->group("Levels of detail");
   verb.add_option("--lod-min-triangles", options->lod_min_triangles,
-                  "Geometries of fewer triangles get no levels (default 512)")
+                  "Geometries of fewer triangles get no levels (default 128)")
       ->type_name("N")
       ->group("Levels of detail");
   verb.add_option("--lod-levels", options->lod_levels, "Coarser levels at most, 1..31 (default 31)")

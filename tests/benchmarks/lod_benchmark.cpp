@@ -5,6 +5,7 @@
 #include <chrono>
 #include <ctime>
 #include <filesystem>
+#include <limits>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -166,6 +167,28 @@ private:
   std::vector<double> measured_;                   ///< per group
 };
 
+/// How many triangles a cut has that allows so much error: what users pay for it.
+uint64_t cut_triangles(const ClusterLod& lod, double error) {
+  uint64_t count = 0;
+  for (const uint32_t c : test::cut_clusters(lod, error)) count += lod.clusters[c].range.triangle_count;
+  return count;
+}
+
+Json measure_cuts(const ClusterLod& lod, double size) {
+  Json cuts = Json::array();
+  const auto all = static_cast<double>(cut_triangles(lod, 0.0));
+  fmt::print("\nCuts, triangles by the error allowed (% of diagonal):");
+  for (const double percent : {0.03, 0.1, 0.3, 1.0, 3.0, 10.0}) {
+    const uint64_t triangles = cut_triangles(lod, percent / 100 * size);
+    fmt::print(" {}: {} ({:.2f} %)", percent, triangles, 100 * static_cast<double>(triangles) / all);
+    cuts.push_back({{"error", percent / 100}, {"triangles", triangles}});
+  }
+  const uint64_t coarsest = cut_triangles(lod, std::numeric_limits<double>::max());
+  fmt::print(" any: {} ({:.3f} %)\n", coarsest, 100 * static_cast<double>(coarsest) / all);
+  cuts.push_back({{"error", nullptr}, {"triangles", coarsest}});
+  return cuts;
+}
+
 Json measure_levels(const test::BuiltLod& built, const Options& options) {
   const ClusterLod& lod = built.lod;
   BareMesh base, level_mesh;
@@ -178,6 +201,7 @@ Json measure_levels(const test::BuiltLod& built, const Options& options) {
 
   Json levels = Json::array();
   GroupSurfaces groups(lod);
+  std::vector<double> all_ratios, all_ratios_to_largest;
   double stated = 0.0; // of all that this level is made of
   fmt::print(
       "\n| level | triangles | clusters | terminal groups | stated error, median / largest (% of diagonal) | measured "
@@ -197,8 +221,11 @@ Json measure_levels(const test::BuiltLod& built, const Options& options) {
     for (const double e : errors) stated = std::max(stated, e);
     const SurfaceDistance to_level(level_mesh.positions, level_mesh.triangles);
     const Distance d = level == 0 ? Distance{} : between(base, to_base, level_mesh, to_level, options.samples);
-    const double ratio = median(groups.ratios(level, base.positions, to_base, to_level));
-    const double ratio_to_largest = median(groups.ratios_to_largest(level));
+    const std::vector<double> ratios = groups.ratios(level, base.positions, to_base, to_level);
+    const std::vector<double> ratios_to_largest = groups.ratios_to_largest(level);
+    const double ratio = median(ratios), ratio_to_largest = median(ratios_to_largest);
+    all_ratios.insert(all_ratios.end(), ratios.begin(), ratios.end());
+    all_ratios_to_largest.insert(all_ratios_to_largest.end(), ratios_to_largest.begin(), ratios_to_largest.end());
     fmt::print("| {} | {} | {} | {} | {:.4f} / {:.4f} | {:.4f} / {:.4f} | {:.2f} / {:.2f} / {:.2f} |\n", level,
                level_mesh.triangles.size(), clusters, terminal, 100 * median(errors) / size, 100 * stated / size,
                100 * d.rms / size, 100 * d.max / size, d.max > 0.0 ? stated / d.max : 1.0, ratio, ratio_to_largest);
@@ -212,7 +239,12 @@ Json measure_levels(const test::BuiltLod& built, const Options& options) {
                       {"median_group_stated_to_measured", ratio},
                       {"median_group_stated_to_largest_measured_below", ratio_to_largest}});
   }
-  return levels;
+  fmt::print("\nStated : measured, median of all {} groups: {:.2f}, largest below counted {:.2f}\n", all_ratios.size(),
+             median(all_ratios), median(all_ratios_to_largest));
+  return {{"levels", std::move(levels)},
+          {"groups_stated_to_measured", median(all_ratios)},
+          {"groups_stated_to_largest_measured_below", median(all_ratios_to_largest)},
+          {"cuts", measure_cuts(lod, size)}};
 }
 
 Json measure_simplifiers(const test::BuiltLod& built, const Options& options) {
@@ -273,7 +305,7 @@ Json measure_input(const std::string& name, const Mesh& mesh, const Options& opt
                triangles / times.cpu * 1e-6);
     json["build"].push_back({{"threads", threads}, {"wall_s", times.wall}, {"cpu_s", times.cpu}});
   }
-  if (options.levels) json["levels"] = measure_levels(built, options);
+  if (options.levels) json.update(measure_levels(built, options));
   if (options.levels && options.simplifiers) json["simplifiers"] = measure_simplifiers(built, options);
   return json;
 }

@@ -16,6 +16,11 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kNone = ~0u;
+constexpr double kKept = 0.47; // of the triangles, by one level
+// The last few hundred triangles go faster: each level has records of its own, which would take more than its clusters.
+constexpr uint64_t kFewTriangles = 512;
+constexpr double kKeptOfFew = 0.25;
+constexpr uint64_t kCoarsest = 16; // levels of so few triangles have none above them
 constexpr double kInflation = 1.0 + 1e-6; // of spheres around spheres: more than roundings can shrink them
 
 double distance(DVec3 a, DVec3 b) { return glm::length(a - b); }
@@ -99,14 +104,15 @@ private:
     const auto first_group = static_cast<uint32_t>(lod_.groups.size());
     lod_.groups.resize(first_group + members.size());
     std::vector<SimplifiedGroup> results(members.size());
-    // A single cluster is the coarsest that there can be; and the last level has nothing above it.
-    if (active.size() > 1 && level + 1 < max_levels_) {
+    uint64_t all = 0;
+    for (const uint32_t number : active) all += lod_.clusters[number].range.triangle_count;
+    if (all > kCoarsest && level + 1 < max_levels_) {
       mark_owners(members);
       tbb::parallel_for(size_t{0}, members.size(), [&](size_t i) {
         progress_.check_cancelled();
         uint64_t triangles = 0;
         for (const uint32_t member : members[i]) triangles += lod_.clusters[member].range.triangle_count;
-        results[i] = simplify_group(members[i]);
+        results[i] = simplify_group(members[i], all > kFewTriangles ? kKept : kKeptOfFew);
         progress_.advance(triangles);
       });
     }
@@ -158,11 +164,11 @@ private:
     });
   }
 
-  SimplifiedGroup simplify_group(const std::vector<uint32_t>& members) const {
+  SimplifiedGroup simplify_group(const std::vector<uint32_t>& members, double kept) const {
     LodGroupInput input{g_,     {lod_.positions, lod_.vertices, lod_.triangles, triangle_errors_, history_},
                         {},     seam_of_kind_,
                         owner_, locked_for_ever_,
-                        lines_};
+                        lines_, kept};
     for (const uint32_t number : members) {
       const LodCluster& c = lod_.clusters[number];
       input.clusters.push_back(&c);

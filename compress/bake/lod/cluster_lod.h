@@ -48,7 +48,7 @@ struct ClusterLod {
   uint32_t level_count = 0;
 };
 
-/// Builds coarser levels until one cluster is left, nothing that can be simplified, or max_levels. Any triangles will do.
+/// Builds coarser levels until 16 triangles are left, nothing that can be simplified, or max_levels. Any triangles will do.
 /// Same result for any thread count. Throws Error(kCancelled), Error(kLimitExceeded).
 /// @param base the geometry's clusters
 /// @param progress advances by triangles of all levels but the last: up to about twice those of level 0

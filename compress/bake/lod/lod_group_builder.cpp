@@ -28,7 +28,7 @@ public:
   SimplifiedGroup run() {
     gather();
     SimplifyConfig config;
-    config.target_triangles = share_of_triangles(kKept);
+    config.target_triangles = share_of_triangles(in_.kept);
     config.seam_of_kind = in_.seam_of_kind;
     config.keep_points = keep_points_;
     const std::vector<DVec3> points = mesh_.points;

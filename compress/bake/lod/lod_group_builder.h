@@ -15,8 +15,6 @@ inline constexpr uint32_t kNewNumber = 1u << 31;
 /// LodGroupInput::owner of positions that several groups have.
 inline constexpr uint32_t kShared = ~0u - 1;
 
-/// Share of its triangles that a group is to keep.
-inline constexpr double kKept = 0.47;
 /// Groups that keep more of their triangles are left as they are.
 inline constexpr double kWorthwhile = 0.85;
 
@@ -30,6 +28,7 @@ struct LodGroupInput {
   std::span<const uint32_t> owner;          ///< per position; kShared ones stay
   std::span<const uint8_t> locked_for_ever; ///< per position; those stay too
   const LineCover& lines;
+  double kept = 0.5;  ///< share of the triangles that the group is to keep
   double floor = 0.0; ///< the error is not below, whatever is measured
 };
 
@@ -46,7 +45,7 @@ struct SimplifiedGroup {
   std::vector<uint32_t> cluster_kinds;
 };
 
-/// Reduces the triangles of a group to kKept as far as its locked positions allow, and splits the result into clusters.
+/// Reduces the triangles of a group to the share asked for as far as its locked positions allow, and splits the result into clusters.
 /// Triangles with two corners in one place are left out; the lines that they were count as surface of the group, unless
 /// they are sides of other triangles.
 SimplifiedGroup simplify_group(const LodGroupInput& input);

@@ -39,7 +39,7 @@ public:
       // Edges that could not go may, once what is around them has changed.
       const auto next = static_cast<size_t>(kRetryShare * static_cast<double>(live_));
       drain_heap(std::max<size_t>(config_.target_triangles, next));
-      if (live_ == before) break;
+      if (live_ == before && std::exchange(may_tear_, true)) break;
       retry_rejected();
     }
     compact();
@@ -60,7 +60,6 @@ private:
     count_up(wedge_into_, m_.wedges.size());
     count_up(same_edge_, surface_.ends.size());
     stamp_.assign(m_.points.size(), 0);
-    mark_.assign(m_.points.size(), 0);
     edge_stamp_.assign(surface_.ends.size(), 0);
     DVec3 lo(std::numeric_limits<double>::infinity()), hi(-lo);
     for (const DVec3& p : m_.points) lo = glm::min(lo, p), hi = glm::max(hi, p);
@@ -168,51 +167,48 @@ private:
     const EdgeEnds e = surface_.ends[edge];
     const EdgePlacement& p = placements_[edge];
     const DVec3 point(p.at[0], p.at[1], p.at[2]);
-    // Two border points across the inside: the surface would be pinched.
-    if (!gather_star(e.a, e.b) ||
-        (on_border(surface_.points[e.a].held) && on_border(surface_.points[e.b].held) && removed_.size() != 1) ||
-        turns_over(point))
+    if (!gather_star(e.a, e.b) || (!may_tear_ && tears(e.a, e.b)) || turns_over(point))
       rejected_.push_back(edge);
     else
       collapse(e.a, e.b, point, p.along);
   }
 
-  /// The triangles around a and b. False where the collapse would leave no triangle there, or fold the surface.
+  /// The triangles around a and b. False where the collapse would leave no triangle there. Afterwards the surface may
+  /// touch itself: a neighbour of both need not be a corner of a triangle at the edge.
   bool gather_star(uint32_t a, uint32_t b) {
     star_.clear();
     removed_.clear();
-    mark_value_ += 4;
-    const uint32_t of_a = mark_value_ + 1, of_removed = mark_value_ + 2, of_both = mark_value_ + 3;
-    size_t common = 0, third = 0;
-    const auto mark_third = [&](uint32_t point) {
-      third += mark_[point] != of_removed;
-      mark_[point] = of_removed;
+    const auto gather = [&](uint32_t at, uint32_t other, bool is_first) {
+      corners_.for_each(at, [&](uint32_t corner) {
+        const uint32_t next = corners_.point(CornerLists::next_corner(corner));
+        const uint32_t last = corners_.point(CornerLists::last_corner(corner));
+        if (next != other && last != other)
+          star_.push_back({corner / 4, next, last, {}});
+        else if (is_first)
+          removed_.push_back(corner / 4);
+      });
     };
-    corners_.for_each(a, [&](uint32_t corner) {
-      const uint32_t next = corners_.point(CornerLists::next_corner(corner));
-      const uint32_t last = corners_.point(CornerLists::last_corner(corner));
-      if (next == b || last == b) {
-        removed_.push_back(corner / 4);
-        mark_third(next == b ? last : next);
-      } else {
-        star_.push_back({corner / 4, next, last, {}});
-        mark_[next] = std::max(mark_[next], of_a);
-        mark_[last] = std::max(mark_[last], of_a);
+    gather(a, b, true);
+    gather(b, a, false);
+    return !star_.empty() && !removed_.empty();
+  }
+
+  /// Whether a triangle would vanish that is all there is between its third point and the edge: what it stands for
+  /// would be missing there, and the quadrics do not know. Only where nothing else can go such triangles may.
+  bool tears(uint32_t a, uint32_t b) {
+    for (const uint32_t triangle : removed_)
+      for (uint32_t corner = 4 * triangle; corner < 4 * triangle + 3; ++corner) {
+        const uint32_t point = corners_.point(corner);
+        if (point == a || point == b) continue;
+        bool held = false;
+        corners_.for_each(point, [&](uint32_t other) {
+          const uint32_t next = corners_.point(CornerLists::next_corner(other));
+          const uint32_t last = corners_.point(CornerLists::last_corner(other));
+          held |= (next == a || last == a) != (next == b || last == b);
+        });
+        if (!held) return true;
       }
-    });
-    const auto count_common = [&](uint32_t point) {
-      if (mark_[point] < of_a || mark_[point] == of_both) return;
-      ++common, mark_[point] = of_both;
-    };
-    corners_.for_each(b, [&](uint32_t corner) {
-      const uint32_t next = corners_.point(CornerLists::next_corner(corner));
-      const uint32_t last = corners_.point(CornerLists::last_corner(corner));
-      if (next != a && last != a) star_.push_back({corner / 4, next, last, {}});
-      if (next != a) count_common(next);
-      if (last != a) count_common(last);
-    });
-    // Neighbours of both are just the third corners of the triangles at the edge: else the surface would touch itself.
-    return !star_.empty() && !removed_.empty() && common == third;
+    return false;
   }
 
   /// Whether a triangle would, with both ends at the point.
@@ -319,6 +315,7 @@ private:
   SurfaceEdges surface_; ///< ends become what they were merged into; side_edge stays, follow same_edge_
   PlacementRules rules_{};
   size_t live_ = 0;
+  bool may_tear_ = false;
   std::vector<uint32_t> merged_into_, wedge_into_;
   std::vector<uint32_t> same_edge_;  ///< edges that became one
   std::vector<uint32_t> stamp_;      ///< per point: how much happened to it
@@ -326,8 +323,6 @@ private:
   std::vector<EdgePlacement> placements_;
   EdgeHeap heap_;
   std::vector<uint32_t> rejected_;
-  std::vector<uint32_t> mark_; ///< per point
-  uint32_t mark_value_ = 0;
   std::vector<StarTriangle> star_;
   std::vector<uint32_t> removed_; ///< triangles with both ends
 };

@@ -47,7 +47,8 @@ struct SimplifyConfig {
 
 /// Collapses edges, those first that change the surface least, until `target_triangles` are left or nothing more can
 /// go. Locked points and the edges between them stay, so that the triangles' signed boundary there is the same before
-/// and after, whatever they look like (non-manifold, duplicates, soup). No connected piece vanishes.
+/// and after, whatever they look like (non-manifold, duplicates, soup). No connected piece vanishes; holes through a
+/// piece may close, and it may come to touch itself.
 /// Errors of the triangles are not touched: bound_errors() is for that.
 /// Depends on its input only. Time n log n in the number of triangles, if no point has very many.
 void simplify(SimplifyMesh& mesh, const SimplifyConfig& config);

@@ -143,6 +143,7 @@ private:
       mapped_[t] = 0;
       after_.gather(before_.corner_points(t));
       best_.clear();
+      // Not all of it may lie over those after, though its image does.
       const bool once = after_.lay(before_.corners(t), before_.surface().area_normal(t), best_);
       const double distance = once ? look_closer(t) : std::numeric_limits<double>::infinity();
       if (enough(distance, had(t)))

@@ -164,6 +164,18 @@ TEST(ClusterLod, EveryLevelHasLittleLessThanHalfOfTheOneBelow) {
   EXPECT_LE(level_triangles(lod, lod.level_count - 1), 128u);
 }
 
+TEST(ClusterLod, OneClusterIsSimplifiedOn) {
+  const BuiltLod built = build_lod(torus_mesh(12, 5)); // 120 triangles, of one cluster
+  ASSERT_EQ(level_triangles(built.lod, 0), 120u);
+  EXPECT_GT(built.lod.level_count, 1u);
+  EXPECT_LE(level_triangles(built.lod, built.lod.level_count - 1), 16u);
+}
+
+TEST(ClusterLod, TheCoarsestLevelOfAFileOfPartsIsSmall) {
+  const BuiltLod built = build_lod(tetrahedra_mesh(2000, 4));
+  EXPECT_LE(level_triangles(built.lod, built.lod.level_count - 1), 80u); // 1 %
+}
+
 TEST(ClusterLod, SeamsOfNormalsDoNotHinderIt) {
   const ClusterLod lod = build_lod(half_faceted(torus_mesh(200, 120))).lod;
   EXPECT_LE(level_triangles(lod, 3), 8000u); // of 48,000

@@ -1,12 +1,14 @@
 // That the errors of levels of detail are never below what is measured.
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <gtest/gtest.h>
 
 #include "tests/compress/lod/lod_meshes.h"
 #include "tests/compress/lod/surface_distance.h"
+#include "tests/compress/test_scenes.h"
 
 namespace packtrace::test {
 namespace {
@@ -103,6 +105,31 @@ TEST(LodError, OfCoarseLevelsIsNotFarAboveTheDistance) {
       if (group.level == level && !group.terminal) threshold = std::max(threshold, group.error);
     const double measured = surfaces.two_sided(base, surfaces.triangles_of(cut_clusters(lod, threshold)), 4000);
     EXPECT_LE(threshold, 2.0 * measured) << "level " << level + 1;
+  }
+}
+
+/// Bodies with long horns, down to a few triangles: images there are far from what lies above them.
+TEST(LodError, OfTheLastTrianglesIsNotBelowTheDistance) {
+  Random random(11);
+  for (int body = 0; body < 30; ++body) {
+    Mesh mesh = sphere_mesh(20);
+    for (int horn = 0; horn < 6; ++horn) {
+      const DVec3 at = glm::normalize(DVec3(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)));
+      const double length = random.uniform(0.5, 3.0);
+      for (Vec3& p : mesh.positions) {
+        const double off = glm::length(glm::normalize(DVec3(p)) - at);
+        p *= static_cast<float>(1.0 + length * std::exp(-20.0 * off * off));
+      }
+    }
+    const LodSurfaces surfaces(build_lod(mesh));
+    const ClusterLod& lod = surfaces.lod();
+    const std::vector<Triangle> base = surfaces.triangles_of(cut_clusters(lod, 0.0));
+    for (const LodGroup& group : lod.groups) {
+      if (group.terminal) continue;
+      EXPECT_LE(surfaces.two_sided(base, surfaces.triangles_of(cut_clusters(lod, group.error)), 2000),
+                with_rounding(group.error))
+          << "body " << body << ", group of level " << group.level;
+    }
   }
 }
 

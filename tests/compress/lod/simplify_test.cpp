@@ -1,6 +1,10 @@
 #include "compress/bake/lod/simplify.h"
 
+#include <array>
 #include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -84,6 +88,19 @@ TEST(Simplify, AFlatPlaneStaysFlatAndWhole) {
   EXPECT_DOUBLE_EQ(area, 2.0 * 3200.0 * 3200.0);
 }
 
+/// How far the farthest point is from the surface of the mesh.
+double farthest_from(const std::vector<DVec3>& points, const SimplifyMesh& mesh) {
+  double farthest = 0.0;
+  for (const DVec3& p : points) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const LodTriangle& t : mesh.triangles)
+      nearest = std::min(nearest, glm::length(p - nearest_point(p, mesh.points[t.points.x], mesh.points[t.points.y],
+                                                                mesh.points[t.points.z])));
+    farthest = std::max(farthest, nearest);
+  }
+  return farthest;
+}
+
 /// The sides of a polygon, each of triangles whose three corners lie in a line.
 TEST(Simplify, LinesOfThreePointsKeepTheirShape) {
   constexpr uint32_t kSides = 16, kCut = 8;
@@ -104,15 +121,67 @@ TEST(Simplify, LinesOfThreePointsKeepTheirShape) {
   mesh.locked.assign(mesh.points.size(), 0);
   const std::vector<DVec3> points = mesh.points;
   simplify(mesh, to(static_cast<uint32_t>(mesh.triangles.size() / 2)));
-  double farthest = 0.0;
-  for (const DVec3& p : points) {
-    double nearest = kRadius;
-    for (const LodTriangle& t : mesh.triangles)
-      nearest = std::min(nearest, glm::length(p - nearest_point(p, mesh.points[t.points.x], mesh.points[t.points.y],
-                                                                mesh.points[t.points.z])));
-    farthest = std::max(farthest, nearest);
+  EXPECT_LT(farthest_from(points, mesh), 0.02 * kRadius);
+}
+
+/// A closed surface around the x axis, of rings between two ends.
+SimplifyMesh turned(const std::vector<std::pair<double, double>>& x_and_radius, uint32_t around) {
+  SimplifyMesh mesh;
+  for (const auto& [x, radius] : x_and_radius)
+    for (uint32_t i = 0; i < around; ++i) {
+      const double angle = 2.0 * M_PI * i / around;
+      mesh.points.push_back(glm::round(DVec3(x, radius * std::cos(angle), radius * std::sin(angle))));
+    }
+  const auto rings = static_cast<uint32_t>(x_and_radius.size());
+  const auto add = [&](uint32_t a, uint32_t b, uint32_t c) {
+    mesh.triangles.push_back({Triangle(a, b, c), Triangle(Wedge::kNone), 0, 0.0});
+  };
+  for (uint32_t ring = 0; ring + 1 < rings; ++ring)
+    for (uint32_t i = 0; i < around; ++i) {
+      const uint32_t a = ring * around + i, b = ring * around + (i + 1) % around;
+      add(a, a + around, b), add(b, a + around, b + around);
+    }
+  for (uint32_t i = 2; i < around; ++i) {
+    const uint32_t last = (rings - 1) * around;
+    add(0, i - 1, i), add(last, last + i, last + i - 1);
   }
-  EXPECT_LT(farthest, 0.02 * kRadius);
+  mesh.locked.assign(mesh.points.size(), 0);
+  return mesh;
+}
+
+TEST(Simplify, AHoleMayClose) {
+  SimplifyMesh mesh = whole_number_mesh(torus_mesh(60, 24), 1e5);
+  simplify(mesh, to(8)); // a torus takes 14
+  EXPECT_LE(mesh.triangles.size(), 8u);
+}
+
+TEST(Simplify, AThinBridgeStays) {
+  std::vector<std::pair<double, double>> rings; // two balls and a rod between them
+  constexpr double kBall = 3000.0, kRod = 20.0, kLength = 40000.0;
+  for (int i = 1; i < 20; ++i)
+    rings.emplace_back(-kBall * std::cos(M_PI * i / 20), std::max(kRod, kBall * std::sin(M_PI * i / 20)));
+  for (int i = 1; i < 40; ++i) rings.emplace_back(kBall + (kLength - 2.0 * kBall) * i / 40, kRod);
+  for (int i = 1; i < 20; ++i)
+    rings.emplace_back(kLength - kBall * std::cos(M_PI * i / 20), std::max(kRod, kBall * std::sin(M_PI * i / 20)));
+  SimplifyMesh mesh = turned(rings, 12);
+  const std::vector<DVec3> points = mesh.points;
+  simplify(mesh, to(40));
+  EXPECT_LE(mesh.triangles.size(), 40u);
+  EXPECT_LT(farthest_from(points, mesh), 0.5 * kBall);
+}
+
+/// Triangles that hang together at points only: each is all there is between its corners.
+TEST(Simplify, AChainOfTrianglesGetsShorter) {
+  SimplifyMesh mesh;
+  for (uint32_t i = 0; i < 64; ++i) {
+    mesh.points.emplace_back(100.0 * i, 0.0, 0.0);
+    mesh.points.emplace_back(100.0 * i + 50.0, 80.0, 0.0);
+    mesh.triangles.push_back({Triangle(2 * i, 2 * i + 2, 2 * i + 1), Triangle(Wedge::kNone), 0, 0.0});
+  }
+  mesh.points.emplace_back(6400.0, 0.0, 0.0);
+  mesh.locked.assign(mesh.points.size(), 0);
+  simplify(mesh, to(32));
+  EXPECT_LE(mesh.triangles.size(), 32u);
 }
 
 TEST(Quadric, OfALineIsTheSquaredDistanceFromIt) {
