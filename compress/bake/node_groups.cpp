@@ -154,7 +154,8 @@ void NodeGroups::find(std::span<const LatticePoint> positions, std::span<const T
   SweepTree tree(PointBoxes(positions), triangles);
   triangles_.clear(), ends_.clear(), nodes_.clear();
   for (const uint32_t i : tree.order()) triangles_.push_back(triangles[i]);
-  choose_leaf_nodes(tree.nodes(), {}, nodes_);
+  const RunNode& root = tree.nodes()[0];
+  choose_leaf_nodes(tree.nodes(), {}, typical_node_area(root.area, root.count), nodes_);
   for (const LeafNode& node : nodes_)
     if (node.first_triangle > 0) ends_.push_back(node.first_triangle);
   ends_.push_back(static_cast<uint32_t>(triangles.size()));
