@@ -9,6 +9,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "compress/bvh/reinsertion.h"
 #include "compress/bvh/wide_tree.h"
 #include "compress/format/node_writer.h"
 #include "compress/format/stored_nodes.h"
@@ -217,7 +218,8 @@ public:
       for (size_t axis = 0; axis < 3; ++axis)
         out.lo[axis] = static_cast<float>(box.lo[axis]), out.hi[axis] = static_cast<float>(box.hi[axis]);
     }
-    const BoxTree binary = build_box_tree(boxes, baked::kMaxTreeDepth);
+    BoxTree binary = build_box_tree(boxes, baked::kMaxTreeDepth);
+    reinsert_subtrees(binary, baked::kMaxTreeDepth);
     const std::vector<WideNode> wide = collapse_box_tree(binary);
     tree.nodes.resize(wide.size());
     std::vector<TreeGridBox> whole(wide.size());
