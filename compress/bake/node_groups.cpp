@@ -12,7 +12,7 @@
 namespace packtrace {
 namespace {
 
-constexpr double kExtraGroup = 0.5;       ///< as TreeCosts::extra_node: strips, too, end where groups do
+constexpr double kExtraGroup = 0.5;      ///< as TreeCosts::extra_node: strips, too, end where groups do
 constexpr uint32_t kCoordinateBits = 24; ///< whole numbers below 2^24, which floats hold
 
 /// The smallest box of whole coordinates below 2^kCoordinateBits that holds each of some points, on a coarser lattice

@@ -113,7 +113,7 @@ private:
       if (gain > best_gain) best = place, best_gain = gain;
     };
     uint32_t from = node, above = nodes_[node].parent;
-    float gain = nodes_[above].area; // it goes, as its other child takes its place
+    float gain = nodes_[above].area;          // it goes, as its other child takes its place
     TreeBox rest = nodes_[sibling(node)].box; // of what stays below `above`
     while (true) {
       size_t size = 0;

@@ -23,9 +23,9 @@ struct TreeGridBox {
 
 /// What a ray's visit costs, on one scale; the surface area heuristic weighs them by the boxes' areas.
 struct TreeCosts {
-  double node = 1.0;  ///< a node: up to eight boxes
-  double leaf = 1.0;  ///< finding a leaf's place in its stream
-  double batch = 1.0; ///< decoding and testing up to eight triangles of a leaf
+  double node = 1.0;        ///< a node: up to eight boxes
+  double leaf = 1.0;        ///< finding a leaf's place in its stream
+  double batch = 1.0;       ///< decoding and testing up to eight triangles of a leaf
   double extra_node = 0.35; ///< one more node, in those above, in memory and so on: in visits of a node of typical area
   uint32_t max_leaf_triangles = baked::kMaxLeafTriangles;
 };

@@ -176,8 +176,8 @@ public:
       const LatticeBox box = box_of_record(geometry, cluster);
       std::array<double, 3> size;
       for (size_t axis = 0; axis < 3; ++axis)
-        size[axis] = std::ldexp(static_cast<double>(box.hi[axis] - box.lo[axis]),
-                                geometry.step_exponent - tree.step_exponent);
+        size[axis] =
+            std::ldexp(static_cast<double>(box.hi[axis] - box.lo[axis]), geometry.step_exponent - tree.step_exponent);
       const double half_area = size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
       areas.push_back(typical_node_area(kOfRecord * half_area, cluster.triangle_count));
     }

@@ -43,8 +43,13 @@ TEST(Reinsertion, FindsTheOneMoveThatATreeNeeds) {
   BoxTree tree;
   tree.order = {0, 1, 2, 3};
   const auto leaf = [&](uint32_t box) { return BoxTreeNode{boxes[box], box, 1, 0}; };
-  tree.nodes = {{{{0, 0, 0}, {10, 1, 2}}, 0, 4, 4}, {{{0, 0, 0}, {10, 1, 1}}, 0, 2, 3}, leaf(0), leaf(1),
-                {{{0, 0, 1}, {10, 1, 2}}, 2, 2, 6}, leaf(2), leaf(3)};
+  tree.nodes = {{{{0, 0, 0}, {10, 1, 2}}, 0, 4, 4},
+                {{{0, 0, 0}, {10, 1, 1}}, 0, 2, 3},
+                leaf(0),
+                leaf(1),
+                {{{0, 0, 1}, {10, 1, 2}}, 2, 2, 6},
+                leaf(2),
+                leaf(3)};
   ASSERT_EQ(check_tree(tree, boxes), 3u);
   reinsert_subtrees(tree);
   EXPECT_EQ(check_tree(tree, boxes), 3u);
@@ -92,8 +97,9 @@ TEST(Reinsertion, EndsOnEqualAndExtremeBoxes) {
   const std::vector<TreeBox> huge(5000, TreeBox{{-kMax, -kMax, -kMax}, {kMax, kMax, kMax}});
   std::vector<TreeBox> mixed = huge;
   mixed.insert(mixed.end(), points.begin(), points.end());
-  for (const std::vector<TreeBox>& boxes : {std::vector<TreeBox>{}, std::vector(1, points[0]), std::vector(2, points[0]),
-                                            std::vector(3, points[0]), points, huge, mixed}) {
+  for (const std::vector<TreeBox>& boxes :
+       {std::vector<TreeBox>{}, std::vector(1, points[0]), std::vector(2, points[0]), std::vector(3, points[0]), points,
+        huge, mixed}) {
     BoxTree tree = build_box_tree(boxes);
     reinsert_subtrees(tree);
     if (!boxes.empty()) {
