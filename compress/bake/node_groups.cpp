@@ -12,6 +12,7 @@
 namespace packtrace {
 namespace {
 
+constexpr double kExtraGroup = 0.5;      ///< as TreeCosts::extra_node: strips, too, end where groups do
 constexpr uint32_t kCoordinateBits = 24; ///< whole numbers below 2^24, which floats hold
 
 /// The smallest box of whole coordinates below 2^kCoordinateBits that holds each of some points, on a coarser lattice
@@ -154,7 +155,10 @@ void NodeGroups::find(std::span<const LatticePoint> positions, std::span<const T
   SweepTree tree(PointBoxes(positions), triangles);
   triangles_.clear(), ends_.clear(), nodes_.clear();
   for (const uint32_t i : tree.order()) triangles_.push_back(triangles[i]);
-  choose_leaf_nodes(tree.nodes(), {}, nodes_);
+  const RunNode& root = tree.nodes()[0];
+  TreeCosts costs;
+  costs.extra_node = kExtraGroup;
+  choose_leaf_nodes(tree.nodes(), costs, typical_node_area(root.area, root.count), nodes_);
   for (const LeafNode& node : nodes_)
     if (node.first_triangle > 0) ends_.push_back(node.first_triangle);
   ends_.push_back(static_cast<uint32_t>(triangles.size()));

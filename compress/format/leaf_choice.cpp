@@ -7,14 +7,12 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kWidth = baked::kNodeWidth;
-constexpr float kTypical = 64.0f; // triangles of a node
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 class Chooser {
 public:
-  Chooser(std::span<RunNode> nodes, const TreeCosts& costs)
-      : nodes_(nodes), costs_(costs),
-        extra_(static_cast<float>(costs.extra_node) * nodes[0].area * kTypical / static_cast<float>(nodes[0].count)) {
+  Chooser(std::span<RunNode> nodes, const TreeCosts& costs, double typical_area)
+      : nodes_(nodes), costs_(costs), extra_(static_cast<float>(costs.extra_node * typical_area)) {
     for (size_t i = nodes.size(); i-- > 0;) choose(nodes[i]);
   }
 
@@ -97,8 +95,9 @@ private:
 
 } // namespace
 
-void choose_leaf_nodes(std::span<RunNode> nodes, const TreeCosts& costs, std::vector<LeafNode>& out) {
-  Chooser(nodes, costs).emit(out);
+void choose_leaf_nodes(std::span<RunNode> nodes, const TreeCosts& costs, double typical_area,
+                       std::vector<LeafNode>& out) {
+  Chooser(nodes, costs, typical_area).emit(out);
 }
 
 } // namespace packtrace

@@ -70,7 +70,9 @@ struct RunNode {
 
 /// Cuts the triangles below nodes[0] into leaves, and those into nodes, at the least cost that cuts of this tree allow.
 /// @param nodes with area, first, count and right; the rest is set
+/// @param typical_area see find_leaf_nodes()
 /// @param out appended to
-void choose_leaf_nodes(std::span<RunNode> nodes, const TreeCosts& costs, std::vector<LeafNode>& out);
+void choose_leaf_nodes(std::span<RunNode> nodes, const TreeCosts& costs, double typical_area,
+                       std::vector<LeafNode>& out);
 
 } // namespace packtrace

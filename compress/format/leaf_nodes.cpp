@@ -49,10 +49,11 @@ private:
 
 } // namespace
 
-void find_leaf_nodes(std::span<const TreeGridBox> boxes, const TreeCosts& costs, std::vector<LeafNode>& nodes) {
+void find_leaf_nodes(std::span<const TreeGridBox> boxes, const TreeCosts& costs, double typical_area,
+                     std::vector<LeafNode>& nodes) {
   assert(!boxes.empty() && boxes.size() <= kMaxClusterTriangles);
   RunTree tree(boxes);
-  choose_leaf_nodes(tree.nodes(), costs, nodes);
+  choose_leaf_nodes(tree.nodes(), costs, typical_area, nodes);
 }
 
 } // namespace packtrace

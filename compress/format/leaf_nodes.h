@@ -23,13 +23,18 @@ struct TreeGridBox {
 
 /// What a ray's visit costs, on one scale; the surface area heuristic weighs them by the boxes' areas.
 struct TreeCosts {
-  double node = 1.0;  ///< a node: up to eight boxes
-  double leaf = 1.0;  ///< finding a leaf's place in its stream
-  double batch = 1.0; ///< decoding and testing up to eight triangles of a leaf
-  double extra_node =
-      0.5; ///< what one more node below costs in those above, in memory, and so on: for a typical node's area
+  double node = 1.0;        ///< a node: up to eight boxes
+  double leaf = 1.0;        ///< finding a leaf's place in its stream
+  double batch = 1.0;       ///< decoding and testing up to eight triangles of a leaf
+  double extra_node = 0.35; ///< one more node, in those above, in memory and so on: in visits of a node of typical area
   uint32_t max_leaf_triangles = baked::kMaxLeafTriangles;
 };
+
+/// The area of nodes of usual size that a cluster's triangles could be cut into.
+inline double typical_node_area(double cluster_half_area, uint32_t triangle_count) {
+  constexpr double kTypical = 64.0; // triangles of a node
+  return cluster_half_area * kTypical / triangle_count;
+}
 
 /// Leaves that make up one node, in the order of the stream.
 struct LeafNode {
@@ -41,7 +46,9 @@ struct LeafNode {
 /// Cuts a cluster's triangles, in their order in its stream, into leaves, and those into nodes: the best that choices
 /// in a binary tree over that order give, whose splits follow the surface area heuristic.
 /// @param boxes of the triangles, 1..128
+/// @param typical_area what TreeCosts::extra_node counts in, half the surface of a box
 /// @param nodes appended to
-void find_leaf_nodes(std::span<const TreeGridBox> boxes, const TreeCosts& costs, std::vector<LeafNode>& nodes);
+void find_leaf_nodes(std::span<const TreeGridBox> boxes, const TreeCosts& costs, double typical_area,
+                     std::vector<LeafNode>& nodes);
 
 } // namespace packtrace

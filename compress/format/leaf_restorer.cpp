@@ -2,23 +2,11 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
 
 #include "compress/format/bit_stream.h"
+#include "compress/format/node_writer.h"
 
 namespace packtrace {
-namespace {
-
-void set_boxes(const node_kernels::NodeBoxes& boxes, baked::PackedNode& node) {
-  static_assert(sizeof node.lo == sizeof boxes.lo && sizeof node.hi == sizeof boxes.hi);
-  std::memcpy(node.origin.data(), boxes.origin, sizeof boxes.origin);
-  node.exponents = static_cast<uint16_t>(boxes.exponents);
-  std::memcpy(node.lo.data(), boxes.lo, sizeof boxes.lo);
-  std::memcpy(node.hi.data(), boxes.hi, sizeof boxes.hi);
-}
-
-} // namespace
-
 void LeafRestorer::begin(const baked::GeometryRecord& geometry, const baked::TreeRecord& tree,
                          const ClusterView& cluster) {
   const IndexLayout& layout = cluster.layout();

@@ -2,6 +2,7 @@
 
 #include <cassert>
 #include <cstddef>
+#include <cstring>
 
 namespace packtrace {
 
@@ -29,24 +30,25 @@ std::span<const TreeGridBox> triangle_boxes(const ClusterView& cluster, const Tr
   return std::span(room).first(cluster.triangle_count());
 }
 
+void set_boxes(const node_kernels::NodeBoxes& boxes, baked::PackedNode& node) {
+  static_assert(sizeof node.lo == sizeof boxes.lo && sizeof node.hi == sizeof boxes.hi);
+  std::memcpy(node.origin.data(), boxes.origin, sizeof boxes.origin);
+  node.exponents = static_cast<uint16_t>(boxes.exponents);
+  std::memcpy(node.lo.data(), boxes.lo, sizeof boxes.lo);
+  std::memcpy(node.hi.data(), boxes.hi, sizeof boxes.hi);
+}
+
 void write_boxes(std::span<const TreeGridBox> boxes, baked::PackedNode& node) {
   assert(!boxes.empty() && boxes.size() <= baked::kNodeWidth);
-  TreeGridBox whole = boxes[0];
-  for (const TreeGridBox& box : boxes) whole.extend(box);
-  node.origin = whole.lo;
-  node.exponents = 0;
-  for (uint32_t axis = 0; axis < 3; ++axis) {
-    const auto above = [&](int32_t p) { return static_cast<uint32_t>(int64_t{p} - whole.lo[axis]); };
-    uint32_t exponent = 0;
-    while (above(whole.hi[axis]) > 255u << exponent) ++exponent; // at most 23
-    node.exponents = static_cast<uint16_t>(node.exponents | exponent << (5 * axis));
-    node.lo[axis].fill(255);
-    node.hi[axis].fill(0);
-    for (size_t child = 0; child < boxes.size(); ++child) {
-      node.lo[axis][child] = static_cast<uint8_t>(above(boxes[child].lo[axis]) >> exponent);
-      node.hi[axis][child] = static_cast<uint8_t>((above(boxes[child].hi[axis]) + (1u << exponent) - 1) >> exponent);
-    }
+  std::array<node_kernels::Box, baked::kNodeWidth> children;
+  for (size_t i = 0; i < boxes.size(); ++i) {
+    const auto& [lo, hi] = boxes[i];
+    children[i] = {{lo[0], lo[1], lo[2], 0}, {-hi[0], -hi[1], -hi[2], 0}};
   }
+  node_kernels::NodeBoxes packed;
+  node_kernels::Box whole;
+  node_kernels::kernels().pack_children(children.data(), static_cast<uint32_t>(boxes.size()), packed, whole);
+  set_boxes(packed, node);
 }
 
 TreeGridBox write_leaf_node(const LeafNode& leaves, std::span<const TreeGridBox> boxes, uint32_t cluster,

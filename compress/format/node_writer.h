@@ -5,6 +5,7 @@
 
 #include "compress/format/cluster_codec.h"
 #include "compress/format/leaf_nodes.h"
+#include "compress/format/node_kernels.h"
 #include "compress/format/packed_node.h"
 #include "compress/format/tree_grid.h"
 
@@ -17,7 +18,10 @@ using ClusterBoxes = std::array<TreeGridBox, kMaxClusterTriangles>;
 /// record was chosen or checked so.
 std::span<const TreeGridBox> triangle_boxes(const ClusterView& cluster, const TreeGridMap& map, ClusterBoxes& room);
 
-/// Sets a node's origin, exponents and children's boxes: the smallest exponents, each box rounded outwards.
+/// Sets a node's origin, exponents and children's boxes to those that were packed.
+void set_boxes(const node_kernels::NodeBoxes& boxes, baked::PackedNode& node);
+
+/// Packs a node's origin, exponents and children's boxes: the smallest exponents, each box rounded outwards.
 /// @param boxes 1..8, of children in the order of slots; coordinates within +-kMaxTreeCoordinate
 void write_boxes(std::span<const TreeGridBox> boxes, baked::PackedNode& node);
 

@@ -1,12 +1,15 @@
 #include "compress/format/packed_trees.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <utility>
 
 #include <tbb/parallel_for.h>
 
+#include "compress/bvh/reinsertion.h"
 #include "compress/bvh/wide_tree.h"
 #include "compress/format/node_writer.h"
 #include "compress/format/stored_nodes.h"
@@ -35,8 +38,9 @@ struct LeafNodes {
 /// Builds the leaf nodes of one cluster after the other.
 class LeafNodeBuilder {
 public:
-  LeafNodeBuilder(const BakedSections& sections, const TreeCosts& costs, const baked::TreeRecord& tree)
-      : sections_(sections), costs_(costs), tree_(tree) {}
+  LeafNodeBuilder(const BakedSections& sections, const TreeCosts& costs, const baked::TreeRecord& tree,
+                  double typical_area)
+      : sections_(sections), costs_(costs), tree_(tree), typical_area_(typical_area) {}
 
   /// Those that the file has, if it has any that will do.
   void find(const TreeCluster& cluster, const StoredLeafNodes& stored, LeafNodes& out) {
@@ -61,7 +65,7 @@ public:
                            sections_.payload.data() + geometry.payload_offset);
     const std::span<const TreeGridBox> boxes = triangle_boxes(view, TreeGridMap(tree_, geometry), boxes_);
     leaf_nodes_.clear();
-    find_leaf_nodes(boxes, costs_, leaf_nodes_);
+    find_leaf_nodes(boxes, costs_, typical_area_, leaf_nodes_);
     for (const LeafNode& leaves : leaf_nodes_) {
       out.nodes.push_back({});
       out.boxes.push_back(write_leaf_node(leaves, boxes, cluster.number, cluster.ray_classes, out.nodes.back()));
@@ -72,6 +76,7 @@ private:
   const BakedSections& sections_;
   const TreeCosts& costs_;
   const baked::TreeRecord& tree_;
+  const double typical_area_;
   ClusterBoxes boxes_;
   std::vector<LeafNode> leaf_nodes_;
 };
@@ -159,13 +164,37 @@ public:
     return clusters;
   }
 
+  /// Of the nodes with leaves of a tree: what those of nine in ten clusters stay below. One for all, so that nodes are
+  /// spent where they save most; the few clusters of large triangles are cut the finest.
+  double find_typical_area(std::span<const TreeCluster> clusters, const baked::TreeRecord& tree) const {
+    constexpr double kOfRecord = 0.5; // boxes of records have about twice the area
+    std::vector<double> areas;
+    areas.reserve(clusters.size());
+    for (const TreeCluster& of : clusters) {
+      const baked::GeometryRecord& geometry = sections_.geometries[of.geometry];
+      const baked::ClusterRecord& cluster = sections_.clusters[of.number];
+      const LatticeBox box = box_of_record(geometry, cluster);
+      std::array<double, 3> size;
+      for (size_t axis = 0; axis < 3; ++axis)
+        size[axis] =
+            std::ldexp(static_cast<double>(box.hi[axis] - box.lo[axis]), geometry.step_exponent - tree.step_exponent);
+      const double half_area = size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
+      areas.push_back(typical_node_area(kOfRecord * half_area, cluster.triangle_count));
+    }
+    if (areas.empty()) return 0.0;
+    const auto at = areas.begin() + static_cast<ptrdiff_t>((areas.size() - 1) * 9 / 10);
+    std::nth_element(areas.begin(), at, areas.end());
+    return *at;
+  }
+
   /// @param stored takes what it has from there
   LeafNodes build_leaf_nodes(std::span<const TreeCluster> clusters, const baked::TreeRecord& tree,
                              const StoredLeafNodes* stored = nullptr) const {
     const size_t chunks = (clusters.size() + kChunkClusters - 1) / kChunkClusters;
     std::vector<LeafNodes> of_chunk(chunks);
+    const double typical_area = find_typical_area(clusters, tree);
     tbb::parallel_for(size_t{0}, chunks, [&](size_t i) {
-      LeafNodeBuilder builder(sections_, costs_, tree);
+      LeafNodeBuilder builder(sections_, costs_, tree, typical_area);
       const size_t first = i * kChunkClusters, count = std::min(kChunkClusters, clusters.size() - first);
       for (const TreeCluster& cluster : clusters.subspan(first, count))
         stored != nullptr ? builder.find(cluster, *stored, of_chunk[i]) : builder.add(cluster, of_chunk[i]);
@@ -189,7 +218,8 @@ public:
       for (size_t axis = 0; axis < 3; ++axis)
         out.lo[axis] = static_cast<float>(box.lo[axis]), out.hi[axis] = static_cast<float>(box.hi[axis]);
     }
-    const BoxTree binary = build_box_tree(boxes, baked::kMaxTreeDepth);
+    BoxTree binary = build_box_tree(boxes, baked::kMaxTreeDepth);
+    reinsert_subtrees(binary, baked::kMaxTreeDepth);
     const std::vector<WideNode> wide = collapse_box_tree(binary);
     tree.nodes.resize(wide.size());
     std::vector<TreeGridBox> whole(wide.size());

@@ -16,6 +16,7 @@
 #include "runtime/trace/make_tracer.h"
 #include "tests/benchmarks/benchmark_main.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"
+#include "tests/benchmarks/trace_benchmark_counts.h"
 #include "tests/benchmarks/trace_benchmark_embree.h"
 #include "tests/benchmarks/trace_benchmark_exact.h"
 #include "tests/benchmarks/trace_benchmark_inputs.h"
@@ -317,6 +318,8 @@ Json measure_input(const std::string& name, const Options& options) {
       json["rows"].push_back(row_json(*input, systems, row, threads));
       print_row(json["rows"].back());
     }
+    for (const System& row : systems.rows)
+      if (row.name == "packed" && !json.contains("work")) json["work"] = count_work(*row.rays, *row.tracer);
     if (!json.contains("exact")) json["exact"] = compare_with_exact_hits(*input, systems); // the same for all threads
     for (Json& pass : measure_passes(*input, systems, camera, radius, threads, options))
       json["passes"].push_back(std::move(pass));

@@ -168,15 +168,20 @@ private:
       count_node(active);
       if ((node.ray_classes & ray_class_) == 0) continue;
       const NodeChildren children(node);
+      if (!children.leaves()) prefetch_siblings(nodes + node.first_child);
       const typename Lanes::Boxes boxes(node, octant);
       if (children.leaves())
         trace_leaves(placement, node, children, boxes, group, active);
       else
-        push_children(boxes, group, active, children.slots(), stack, size, [&](uint32_t slot) {
-          __builtin_prefetch(nodes + node.first_child + slot);
-          return node.first_child + slot;
-        });
+        push_children(boxes, group, active, children.slots(), stack, size,
+                      [&](uint32_t slot) { return node.first_child + slot; });
     }
+  }
+
+  /// All children of a node, whichever rays pass: the first one is read right after the boxes were tested.
+  static void prefetch_siblings(const baked::PackedNode* first) {
+    const auto begin = reinterpret_cast<uintptr_t>(first), end = begin + baked::kNodeWidth * sizeof *first;
+    for (uintptr_t line = begin; line < end; line += 64) __builtin_prefetch(reinterpret_cast<const void*>(line));
   }
 
   void count_node(uint64_t rays) {

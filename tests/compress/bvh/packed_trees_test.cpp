@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "compress/format/leaf_nodes.h"
+#include "compress/format/leaf_choice.h"
 #include "compress/format/node_writer.h"
 #include "compress/format/packed_trees.h"
 #include "tests/compress/bvh/tree_walk.h"
@@ -62,6 +62,20 @@ TEST(PackedTrees, WorldSpaceGeometryHasOneTree) {
   uint64_t triangles = 0;
   for (const baked::ClusterRecord& cluster : file.sections().clusters) triangles += cluster.triangle_count;
   EXPECT_LE(built.nodes.size(), triangles / 20); // 4 bytes a triangle
+}
+
+TEST(PackedTrees, LargeTrianglesAmongSmallOnesGetNodesOfFew) {
+  Scene scene = test::scene_of(test::grid_mesh(8, 0.3f));
+  test::add_shape(scene, test::sphere_mesh(60, 0.01f));
+  const PackedTrees built = check(bake_file(scene));
+  uint32_t large = 0, nodes = 0;
+  for (const PackedNode& node : built.nodes) {
+    if (!node.has_leaves() || node.cluster > 0) continue;
+    ++nodes;
+    for (const uint8_t count : node.children) large += count;
+  }
+  ASSERT_EQ(large, 128u);
+  EXPECT_GE(nodes, 20u) << nodes << ", and not two or three, as there are in clusters of usual size";
 }
 
 TEST(PackedTrees, InstancedGeometryHasTreesOfItsOwn) {
@@ -163,7 +177,9 @@ TEST(LeafNodes, EveryTriangleIsInOneLeafInOrder) {
           box.hi[axis] = flat ? 5 : box.lo[axis] + static_cast<int32_t>(random.uniform(0.0f, 300.0f));
         }
       std::vector<LeafNode> nodes;
-      find_leaf_nodes(boxes, {}, nodes);
+      TreeGridBox whole = boxes[0];
+      for (const TreeGridBox& box : boxes) whole.extend(box);
+      find_leaf_nodes(boxes, {}, typical_node_area(first_lane(half_area(FloatBox::of(whole))), count), nodes);
       uint32_t next = 0;
       for (const LeafNode& node : nodes) {
         EXPECT_EQ(node.first_triangle, next);
