@@ -202,6 +202,10 @@ uint32_t PackedTracer::geometry_of_cluster(uint32_t cluster) const {
   return static_cast<uint32_t>(next - geometries.begin() - 1);
 }
 
+uint32_t PackedTracer::rays_together() const {
+  return tables_->stream_depth > 0 ? packed::kStreamRays : RayTracer::rays_together();
+}
+
 void PackedTracer::closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder, std::span<RayHit> hits) const {
   assert(hits.size() == rays.size());
   kernels_.closest(tables_->scene, tables_->of_this_thread(), kernel_rays(rays), rays.size(), ray_class,
