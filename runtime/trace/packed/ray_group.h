@@ -83,7 +83,8 @@ struct alignas(64) RayGroup : BoxRays {
 
 /// Reads a block of rays.
 /// @param numbers of the rays
-inline void read_rays(const KernelRay* rays, const uint32_t (&numbers)[kBlock], uint32_t first, UnitRays& out) {
+[[gnu::always_inline]] inline void read_rays(const KernelRay* rays, const uint32_t (&numbers)[kBlock], uint32_t first,
+                                             UnitRays& out) {
   static_assert(sizeof(KernelRay) == 32 && offsetof(KernelRay, tnear) == 12 && offsetof(KernelRay, direction) == 16 &&
                 offsetof(KernelRay, tfar) == 28);
   const float* from[kBlock];
