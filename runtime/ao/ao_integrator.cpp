@@ -11,6 +11,7 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kTilePixels = kTileSize * kTileSize;
+constexpr uint32_t kMostTogether = 4; ///< samples of a tile that are handed on in one call, at most
 
 /// What hits at each distance do to a sample; see AoConfig.
 class Coefficient {
@@ -75,17 +76,24 @@ public:
   template <typename Result>
   void trace_tile(const Tile& tile, const Progress& progress) const {
     ShadingPoint points[kTilePixels];
-    alignas(64) Ray rays[kTilePixels];
+    alignas(64) Ray rays[kMostTogether * kTilePixels];
     const uint32_t count = gather(tile, points, rays);
     if (count == 0) return;
-    Result results[kTilePixels];
+    const uint32_t together =
+        std::clamp(tracer_.rays_together() / kTilePixels, 1u, std::min(config_.spp, kMostTogether));
+    for (uint32_t s = 1; s < together; ++s) std::copy_n(rays, count, rays + s * count);
+    Result results[kMostTogether * kTilePixels];
     double visibility[kTilePixels] = {}, distance[kTilePixels] = {};
-    for (uint32_t s = 0; s < config_.spp; ++s) {
+    for (uint32_t first = 0; first < config_.spp; first += together) {
       progress.check_cancelled(); // a tile of 65,536 samples takes minutes
-      const PixelSampler::Number number = sampler_.number(first_sample_ + s);
-      for (uint32_t i = 0; i < count; ++i) rays[i].direction = direction(points[i], number);
-      query(std::span(rays, count), std::span(results, count));
-      for (uint32_t i = 0; i < count; ++i) accumulate(results[i], visibility[i], distance[i]);
+      const uint32_t samples = std::min(together, config_.spp - first);
+      for (uint32_t s = 0; s < samples; ++s) {
+        const PixelSampler::Number number = sampler_.number(first_sample_ + first + s);
+        for (uint32_t i = 0; i < count; ++i) rays[s * count + i].direction = direction(points[i], number);
+      }
+      query(std::span(rays, samples * count), std::span(results, samples * count));
+      for (uint32_t s = 0; s < samples; ++s)
+        for (uint32_t i = 0; i < count; ++i) accumulate(results[s * count + i], visibility[i], distance[i]);
     }
     const double per_sample = 1.0 / config_.spp;
     for (uint32_t i = 0; i < count; ++i) {

@@ -90,6 +90,10 @@ public:
   virtual std::string_view isa() const { return "portable"; }
   virtual const UnitSpace& space() const = 0;
 
+  /// About how many incoherent rays a call should have, where the caller has as many: fewer stay in nearer caches, more
+  /// find company.
+  virtual uint32_t rays_together() const { return 1024; }
+
   /// The nearest hit of each ray in (tnear, tfar). hits.size() == rays.size().
   /// @param ray_class one bit: which surfaces count, and which mask is looked up
   virtual void closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,

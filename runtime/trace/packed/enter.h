@@ -65,8 +65,8 @@ inline uint32_t approach(const TracePlacement& placement, double margin, uint32_
 /// Moves half a block into the grid. Returns the lanes of `wanted` that have a direction and coordinates of any use.
 /// @tparam kAligned the grid's axes are those of unit space
 template <bool kAligned>
-inline uint32_t move_rays(const TracePlacement& placement, float max_coordinate, const UnitRays& from, uint32_t first,
-                          uint32_t wanted, GridRays& out) {
+[[gnu::always_inline]] inline uint32_t move_rays(const TracePlacement& placement, float max_coordinate,
+                                                 const UnitRays& from, uint32_t first, uint32_t wanted, GridRays& out) {
   constexpr int64_t kMagnitude = 0x7fffffffffffffff;
   const auto keep_magnitude = [](Doubles& most, const Doubles& x) {
     keep_larger(most, reinterpret_cast<Doubles>(reinterpret_cast<Longs>(x) & kMagnitude));
@@ -132,17 +132,18 @@ inline RayBlock join(const GridFloats& low, const GridFloats& high) {
 
 /// Moves a block of rays into a tree's grid. Returns the lanes of `wanted` that may hit something.
 /// @tparam kNearest whether nearest hits are wanted, for which t must be right and is needed in unit space
-template <bool kAligned, bool kNearest>
+template <bool kAligned, bool kNearest, typename Group>
 inline uint32_t move_block(const TracePlacement& placement, float max_coordinate, const UnitRays& from, uint32_t first,
-                           uint32_t wanted, RayBlock& out, RayGroup& group) {
+                           uint32_t wanted, RayBlock& out, Group& group) {
   uint32_t usable = 0;
   const auto half = [&](uint32_t at) {
     GridRays rays;
     usable |= move_rays<kAligned>(placement, max_coordinate, from, first + at, wanted >> at, rays) << at;
     const GridFloats rounded = to_floats(rays, from, first + at);
-    if constexpr (kNearest) {
+    if constexpr (kNearest && Group::kTriangles)
       for (uint32_t axis = 0; axis < 3; ++axis)
         write_block(&group.rest[axis][first + at], to_floats(rays.origin[axis] - to_doubles(rounded.origin[axis])));
+    if constexpr (kNearest) {
       write_block(&group.t_begin[first + at], rays.begin);
       write_block(&group.t_scale[first + at], rays.scale);
     }
@@ -158,7 +159,7 @@ inline uint32_t move_block(const TracePlacement& placement, float max_coordinate
 /// @param wanted lanes that matter
 template <bool kNearest>
 inline bool unit_block(const UnitRays& from, uint32_t first, uint32_t wanted, float max_coordinate, RayBlock& out,
-                       RayGroup& group) {
+                       BoxRays& group) {
   Floats largest{}, away{};
   for (uint32_t axis = 0; axis < 3; ++axis) {
     read_block(out.origin[axis], &from.origin[axis][first]);
@@ -189,27 +190,28 @@ inline bool unit_block(const UnitRays& from, uint32_t first, uint32_t wanted, fl
 }
 
 /// Moves rays into a tree's grid and sets them up. Returns those that may hit something.
-/// @tparam kTriangles whether rays meet triangles there; else the grid is unit space
 /// @tparam kNearest whether nearest hits are wanted, for which t must be right and is needed in unit space
 /// @param rays as bits
-template <bool kTriangles, bool kNearest>
+/// @param group RayGroup, or BoxRays where the grid is unit space
+template <bool kNearest, typename Group>
 inline uint64_t enter(const TracePlacement& placement, float max_coordinate, const UnitRays& from, uint64_t rays,
-                      RayGroup& group) {
+                      Group& group) {
   uint64_t entered = 0;
   for (uint64_t& backward : group.backward) backward = 0;
-  for (uint64_t& major : group.major) major = 0;
+  if constexpr (Group::kTriangles)
+    for (uint64_t& major : group.major) major = 0;
   for (uint32_t first = 0; first < kGroup; first += kBlock) {
     const auto wanted = static_cast<uint32_t>(rays >> first) & kBlockLanes;
     if (wanted == 0) continue;
     RayBlock block;
     uint32_t usable = wanted;
-    if (kTriangles || !unit_block<kNearest>(from, first, wanted, max_coordinate, block, group))
+    if (Group::kTriangles || !unit_block<kNearest>(from, first, wanted, max_coordinate, block, group))
       usable = placement.aligned != 0
                    ? move_block<true, kNearest>(placement, max_coordinate, from, first, wanted, block, group)
                    : move_block<false, kNearest>(placement, max_coordinate, from, first, wanted, block, group);
     entered |= uint64_t{usable} << first;
     set_boxes(block, max_coordinate, first, group);
-    if constexpr (kTriangles) set_shears<kNearest>(block, first, group);
+    if constexpr (Group::kTriangles) set_shears<kNearest>(block, first, group);
   }
   return entered;
 }

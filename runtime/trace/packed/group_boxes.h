@@ -60,8 +60,8 @@ template <typename Lanes>
 struct ChildRays {
   /// @param out by child: those of `rays` that pass its box, as bits
   /// @return the children that any passes, as bits
-  static uint32_t pass(const GroupBoxes<Lanes>& boxes, const RayGroup& group, uint64_t rays,
-                       uint64_t (&out)[baked::kNodeWidth]) {
+  [[gnu::always_inline]] static uint32_t pass(const GroupBoxes<Lanes>& boxes, const BoxRays& group, uint64_t rays,
+                                              uint64_t (&out)[baked::kNodeWidth]) {
     typename Lanes::Masks masks;
     for (; rays != 0; rays &= rays - 1) {
       const auto ray = static_cast<uint32_t>(__builtin_ctzll(rays));
@@ -80,8 +80,7 @@ struct ChildRays {
   }
 
   /// Where a ray enters the boxes.
-  static void enter(const GroupBoxes<Lanes>& boxes, const RayGroup& group, uint32_t ray,
-                    float (&t)[baked::kNodeWidth]) {
+  static void enter(const GroupBoxes<Lanes>& boxes, const BoxRays& group, uint32_t ray, float (&t)[baked::kNodeWidth]) {
     const auto at = [&](uint32_t axis) {
       return Lanes::fma(boxes.near[axis], Lanes::set(group.inverse[axis][ray]), Lanes::set(group.bias[axis][ray][0]));
     };

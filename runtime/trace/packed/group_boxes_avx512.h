@@ -12,7 +12,7 @@ namespace {
 struct Avx512GroupBoxes {
   __m512 plane[3];
 
-  Avx512GroupBoxes(const baked::PackedNode& node, uint32_t octant) {
+  [[gnu::always_inline]] Avx512GroupBoxes(const baked::PackedNode& node, uint32_t octant) {
     for (uint32_t axis = 0; axis < 3; ++axis) {
       const NodeAxis at(node, axis, ((octant >> axis) & 1u) != 0);
       const __m128i near = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(at.near));
@@ -22,7 +22,7 @@ struct Avx512GroupBoxes {
     }
   }
 
-  Avx512GroupBoxes(const TopNode& node, uint32_t octant) {
+  [[gnu::always_inline]] Avx512GroupBoxes(const TopNode& node, uint32_t octant) {
     const __m512i pairs = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
     for (uint32_t axis = 0; axis < 3; ++axis) {
       const bool backward = ((octant >> axis) & 1u) != 0;
@@ -89,8 +89,8 @@ struct BitTable {
 alignas(64) constexpr BitTable kBits;
 
 struct Avx512ChildRays {
-  static uint32_t pass(const Avx512GroupBoxes& boxes, const RayGroup& group, uint64_t rays,
-                       uint64_t (&out)[baked::kNodeWidth]) {
+  [[gnu::always_inline]] static uint32_t pass(const Avx512GroupBoxes& boxes, const BoxRays& group, uint64_t rays,
+                                              uint64_t (&out)[baked::kNodeWidth]) {
     __m512i by_child = _mm512_setzero_si512();
     for (; rays != 0; rays &= rays - 1) {
       const auto ray = static_cast<uint32_t>(__builtin_ctzll(rays));
@@ -101,7 +101,7 @@ struct Avx512ChildRays {
     return _mm512_test_epi64_mask(by_child, by_child);
   }
 
-  static void enter(const Avx512GroupBoxes& boxes, const RayGroup& group, uint32_t ray, float (&t)[baked::kNodeWidth]) {
+  static void enter(const Avx512GroupBoxes& boxes, const BoxRays& group, uint32_t ray, float (&t)[baked::kNodeWidth]) {
     const auto at = [&](uint32_t axis) {
       return _mm512_fmadd_ps(boxes.plane[axis], _mm512_set1_ps(group.inverse[axis][ray]),
                              _mm512_set1_ps(group.bias[axis][ray][0]));
@@ -111,7 +111,7 @@ struct Avx512ChildRays {
   }
 
 private:
-  static __mmask8 pass_boxes(const Avx512GroupBoxes& boxes, const RayGroup& group, uint32_t ray) {
+  static __mmask8 pass_boxes(const Avx512GroupBoxes& boxes, const BoxRays& group, uint32_t ray) {
     const auto parameter = [&](uint32_t axis) {
       return _mm512_fmadd_ps(boxes.plane[axis], _mm512_set1_ps(group.inverse[axis][ray]), both(group.bias[axis][ray]));
     };

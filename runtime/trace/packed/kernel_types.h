@@ -44,10 +44,27 @@ struct alignas(64) DecodedBatch {
 };
 static_assert(sizeof(DecodedBatch) == 320);
 
-/// Decoded batches that were needed lately: each has one place where it may lie. One per thread.
+/// Decoded batches that were needed lately: each has one place where it may lie.
 struct BatchCache {
   DecodedBatch* entries;
   uint32_t hash_shift; ///< 32 - log2(number of entries)
+};
+
+// Rays that go through the tree over placements together (placement_stream.h).
+inline constexpr uint32_t kStreamRays = 4096; ///< at most
+inline constexpr uint32_t kLeastStream = 512;
+inline constexpr uint32_t kStreamGroups = kStreamRays / 64 + 7; ///< of 64, by octant
+inline constexpr size_t kStreamGroupBytes = 4224, kStreamPartBytes = 16, kStreamAlignment = 64;
+
+/// @param top_depth levels of nodes over placements
+constexpr size_t stream_bytes(uint32_t top_depth) {
+  return kStreamGroups * (kStreamGroupBytes + (1 + size_t{top_depth} * baked::kNodeWidth) * kStreamPartBytes);
+}
+
+/// What a thread keeps.
+struct ThreadMemory {
+  BatchCache batches;
+  void* stream; ///< stream_bytes() of the scene's tree, aligned to kStreamAlignment; null: groups are traced alone
 };
 
 struct TraceTree {
@@ -137,9 +154,9 @@ struct KernelHit {
 /// One instruction set's functions.
 struct Kernels {
   const char* isa;
-  void (*closest)(const KernelScene& scene, BatchCache& cache, const KernelRay* rays, size_t count, uint32_t ray_class,
-                  KernelHit* hits, KernelCounters* counters);
-  void (*any)(const KernelScene& scene, BatchCache& cache, const KernelRay* rays, size_t count, uint32_t ray_class,
+  void (*closest)(const KernelScene& scene, ThreadMemory& memory, const KernelRay* rays, size_t count,
+                  uint32_t ray_class, KernelHit* hits, KernelCounters* counters);
+  void (*any)(const KernelScene& scene, ThreadMemory& memory, const KernelRay* rays, size_t count, uint32_t ray_class,
               uint8_t* occluded, KernelCounters* counters);
   /// For tests: decodes up to kBatch triangles and returns how many.
   uint32_t (*decode)(const TraceCluster& cluster, uint32_t first, uint32_t count, DecodedBatch& out);

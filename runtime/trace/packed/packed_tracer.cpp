@@ -9,7 +9,7 @@
 #include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/scene/error.h"
 #include "runtime/trace/alpha_filter.h"
-#include "runtime/trace/packed/batch_cache.h"
+#include "runtime/trace/packed/thread_memory.h"
 #include "runtime/trace/packed/top_tree.h"
 #include "runtime/trace/packed/trace_cluster.h"
 #include "runtime/trace/placement.h"
@@ -72,7 +72,10 @@ struct PackedTracer::Tables : TracedTrees {
   std::vector<Placement> surfaces;      ///< by instance
   std::vector<packed::TopNode> top;
   packed::KernelScene scene{};
-  BatchCacheOwner caches;
+  uint32_t stream_depth = 0; ///< of top, where rays go through it together
+  ThreadMemoryOwner memory;
+
+  packed::ThreadMemory& of_this_thread() const { return memory.of_this_thread(stream_depth); }
 };
 
 PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa)
@@ -95,6 +98,7 @@ PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, con
   if (t.placements.size() > 1) {
     t.top = build_top_tree(t.boxes);
     t.scene.top_nodes = t.top.data();
+    if (t.top.size() > 1) t.stream_depth = top_tree_depth(t.top);
     place_top(t.boxes, t.scene);
   }
   t.scene.owner = this;
@@ -198,17 +202,21 @@ uint32_t PackedTracer::geometry_of_cluster(uint32_t cluster) const {
   return static_cast<uint32_t>(next - geometries.begin() - 1);
 }
 
+uint32_t PackedTracer::rays_together() const {
+  return tables_->stream_depth > 0 ? packed::kStreamRays : RayTracer::rays_together();
+}
+
 void PackedTracer::closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder, std::span<RayHit> hits) const {
   assert(hits.size() == rays.size());
-  kernels_.closest(tables_->scene, tables_->caches.of_this_thread(), kernel_rays(rays), rays.size(), ray_class,
+  kernels_.closest(tables_->scene, tables_->of_this_thread(), kernel_rays(rays), rays.size(), ray_class,
                    kernel_hits(hits), nullptr);
 }
 
 void PackedTracer::any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder,
                             std::span<uint8_t> occluded) const {
   assert(occluded.size() == rays.size());
-  kernels_.any(tables_->scene, tables_->caches.of_this_thread(), kernel_rays(rays), rays.size(), ray_class,
-               occluded.data(), nullptr);
+  kernels_.any(tables_->scene, tables_->of_this_thread(), kernel_rays(rays), rays.size(), ray_class, occluded.data(),
+               nullptr);
 }
 
 void PackedTracer::search_trees(void (*search)(const void*, const packed::TreeSearch&), const void* searcher) {
@@ -222,14 +230,14 @@ std::span<const packed::TraceTree> PackedTracer::trees() const { return tables_-
 
 void PackedTracer::count_closest(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits,
                                  packed::KernelCounters& counters) const {
-  kernels_.closest(tables_->scene, tables_->caches.of_this_thread(), kernel_rays(rays), rays.size(), ray_class,
+  kernels_.closest(tables_->scene, tables_->of_this_thread(), kernel_rays(rays), rays.size(), ray_class,
                    kernel_hits(hits), &counters);
 }
 
 void PackedTracer::count_any(std::span<const Ray> rays, uint32_t ray_class, std::span<uint8_t> occluded,
                              packed::KernelCounters& counters) const {
-  kernels_.any(tables_->scene, tables_->caches.of_this_thread(), kernel_rays(rays), rays.size(), ray_class,
-               occluded.data(), &counters);
+  kernels_.any(tables_->scene, tables_->of_this_thread(), kernel_rays(rays), rays.size(), ray_class, occluded.data(),
+               &counters);
 }
 
 HitSurface PackedTracer::resolve(const RayHit& hit) const {
@@ -258,7 +266,7 @@ std::vector<ResidentPart> PackedTracer::resident() const {
           {"placements", t.placements.size() * (sizeof(packed::TracePlacement) + sizeof(TreeBox) + sizeof(uint32_t)) +
                              t.surfaces.size() * sizeof(Placement) + t.top.size() * sizeof(packed::TopNode) +
                              (t.tree_of.size() + t.grid_of.size() + t.first_instance.size()) * sizeof(uint32_t)},
-          {"batch caches", BatchCacheOwner::bytes_of_all_threads(), true}};
+          {"batch caches", ThreadMemoryOwner::bytes_of_all_threads(), true}};
 }
 
 } // namespace packtrace

@@ -28,6 +28,7 @@ public:
   std::string_view name() const override { return "packed"; }
   std::string_view isa() const override { return kernels_.isa; }
   const UnitSpace& space() const override { return space_; }
+  uint32_t rays_together() const override;
 
   void closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
                     std::span<RayHit> hits) const override;

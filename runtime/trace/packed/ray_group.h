@@ -43,22 +43,33 @@ struct alignas(16) TestRest {
   float along[3], unused;
 };
 
-/// One array per value; those of rays that are not in use are not set.
-struct alignas(64) RayGroup {
+/// What box tests need of rays. One array per value; those of rays that are not in use are not set.
+struct alignas(64) BoxRays {
+  static constexpr bool kTriangles = false;
   float bias[3][kGroup][2]; ///< a near plane p is passed at p inverse + the first, a far one at p inverse - the second
   float limits[kGroup][2];  ///< hits lie above the first and not beyond - the second
-  float begin[kGroup], end[kGroup]; ///< the same in arrays of their own
-  float inverse[3][kGroup];         ///< of the direction, never infinite
+  float inverse[3][kGroup]; ///< of the direction, never infinite
+  uint64_t backward[3];     ///< rays along which x, y, z decrease, as bits
+  // Of nearest hits only:
+  double t_begin[kGroup]; ///< unit-space t = (t here + t_begin) t_scale
+  double t_scale[kGroup]; ///< a power of two
+
+  void set_tmax(uint32_t i, float t) { limits[i][1] = -t; }
+  void set_unit_tmax(uint32_t i, float t) { set_tmax(i, static_cast<float>(double{t} / t_scale[i] - t_begin[i])); }
+  float tmax(uint32_t i) const { return -limits[i][1]; }
+};
+
+/// The same with what triangle tests need.
+struct alignas(64) RayGroup : BoxRays {
+  static constexpr bool kTriangles = true;
+  float begin[kGroup], end[kGroup]; ///< limits in arrays of their own
   float origin[3][kGroup];
   float shear[3][kGroup];   ///< Woop's S
   uint32_t axis[3][kGroup]; ///< Woop's k: x, y, z; z is the direction's largest component
   uint64_t major[3];        ///< rays whose k begins with x, y, z, as bits
-  uint64_t backward[3];     ///< rays along which x, y, z decrease, as bits
   // Of nearest hits only:
-  float rest[3][kGroup];  ///< what rounding to floats took from the origin
-  double t_begin[kGroup]; ///< unit-space t = (t here + t_begin) t_scale
-  double t_scale[kGroup]; ///< a power of two
-  Beam* beam = nullptr;   ///< that all its rays make, see beam.h
+  float rest[3][kGroup]; ///< what rounding to floats took from the origin
+  Beam* beam = nullptr;  ///< that all its rays make, see beam.h
   // For leaves:
   TestRay tests[kGroup];
   TestRest rests[kGroup]; ///< of nearest hits only
@@ -68,12 +79,12 @@ struct alignas(64) RayGroup {
     end[i] = t;
     tests[i].end = t;
   }
-  float tmax(uint32_t i) const { return end[i]; }
 };
 
 /// Reads a block of rays.
 /// @param numbers of the rays
-inline void read_rays(const KernelRay* rays, const uint32_t (&numbers)[kBlock], uint32_t first, UnitRays& out) {
+[[gnu::always_inline]] inline void read_rays(const KernelRay* rays, const uint32_t (&numbers)[kBlock], uint32_t first,
+                                             UnitRays& out) {
   static_assert(sizeof(KernelRay) == 32 && offsetof(KernelRay, tnear) == 12 && offsetof(KernelRay, direction) == 16 &&
                 offsetof(KernelRay, tfar) == 28);
   const float* from[kBlock];
@@ -94,15 +105,11 @@ struct RayBlock {
   Floats origin[3], direction[3], begin, end;
 };
 
-inline void set_boxes(const RayBlock& block, float max_coordinate, uint32_t first, RayGroup& group) {
+[[gnu::always_inline]] inline void set_boxes(const RayBlock& block, float max_coordinate, uint32_t first,
+                                             BoxRays& group) {
   Floats reach = Floats{} + max_coordinate;
-  for (uint32_t axis = 0; axis < 3; ++axis) {
-    keep_larger(reach, magnitude(block.origin[axis]));
-    write_block(&group.origin[axis][first], block.origin[axis]);
-  }
+  for (uint32_t axis = 0; axis < 3; ++axis) keep_larger(reach, magnitude(block.origin[axis]));
   write_pairs(&group.limits[first], block.begin, -block.end);
-  write_block(&group.begin[first], block.begin);
-  write_block(&group.end[first], block.end);
   for (uint32_t axis = 0; axis < 3; ++axis) {
     const Floats d = block.direction[axis], size = magnitude(d);
     const Floats over = 1.0f / (size > kSmallestDirection ? size : Floats{} + kSmallestDirection);
@@ -118,6 +125,9 @@ inline void set_boxes(const RayBlock& block, float max_coordinate, uint32_t firs
 /// @tparam kNearest whether group.rest is set, which counts then
 template <bool kNearest>
 inline void set_shears(const RayBlock& block, uint32_t first, RayGroup& group) {
+  write_block(&group.begin[first], block.begin);
+  write_block(&group.end[first], block.end);
+  for (uint32_t axis = 0; axis < 3; ++axis) write_block(&group.origin[axis][first], block.origin[axis]);
   const Floats x = block.direction[0], y = block.direction[1], z = block.direction[2];
   const Floats ax = magnitude(x), ay = magnitude(y), az = magnitude(z);
   const Ints by_z = (az >= ax) & (az >= ay), by_y = ~by_z & (ay >= ax);

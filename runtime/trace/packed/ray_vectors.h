@@ -114,7 +114,7 @@ inline void swap_parts(Floats (&rows)[8]) {
 }
 
 /// Turns such rows into columns, a lane for each ray.
-inline void transpose(Floats (&rows)[8]) {
+[[gnu::always_inline]] inline void transpose(Floats (&rows)[8]) {
   swap_parts<4, 0, 1, 2, 3, 8, 9, 10, 11>(rows); // of quarters, of those, of those
   swap_parts<2, 0, 1, 8, 9, 4, 5, 12, 13>(rows);
   swap_parts<1, 0, 8, 2, 10, 4, 12, 6, 14>(rows);

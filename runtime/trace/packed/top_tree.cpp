@@ -1,5 +1,8 @@
 #include "runtime/trace/packed/top_tree.h"
 
+#include <algorithm>
+#include <bit>
+
 #include "compress/bvh/wide_tree.h"
 
 namespace packtrace {
@@ -35,6 +38,15 @@ std::vector<packed::TopNode> build_top_tree(std::span<const TreeBox> boxes) {
     }
   }
   return nodes;
+}
+
+uint32_t top_tree_depth(std::span<const packed::TopNode> nodes) {
+  std::vector<uint8_t> levels(nodes.size(), 1); // down to a node; children come after theirs
+  for (size_t i = 0; i < nodes.size(); ++i)
+    for (uint32_t slots = nodes[i].slots; slots != 0; slots &= slots - 1)
+      if (const uint32_t child = nodes[i].child[std::countr_zero(slots)]; (child & packed::kTopLeaf) == 0)
+        levels[child] = static_cast<uint8_t>(levels[i] + 1);
+  return *std::ranges::max_element(levels);
 }
 
 } // namespace packtrace

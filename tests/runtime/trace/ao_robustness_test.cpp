@@ -172,6 +172,56 @@ TEST(AoFrames, FramesOfOneSampleAreOneFrameOfMany) {
   for (size_t i = 0; i < sum.size(); ++i) EXPECT_FLOAT_EQ(whole.ao[i], static_cast<float>(sum[i] / 32));
 }
 
+/// Wants as many rays together as it is told, and remembers the most that it got.
+class CrowdTracer final : public RayTracer {
+public:
+  CrowdTracer(const RayTracer& tracer, uint32_t rays) : tracer_(tracer), rays_(rays) {}
+  std::string_view name() const override { return tracer_.name(); }
+  const UnitSpace& space() const override { return tracer_.space(); }
+  uint32_t rays_together() const override { return rays_; }
+  HitSurface resolve(const RayHit& hit) const override { return tracer_.resolve(hit); }
+  std::vector<ResidentPart> resident() const override { return tracer_.resident(); }
+  void closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
+                    std::span<RayHit> hits) const override {
+    most_ = std::max(most_, rays.size());
+    tracer_.closest_hits(rays, ray_class, order, hits);
+  }
+  void any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
+                std::span<uint8_t> occluded) const override {
+    most_ = std::max(most_, rays.size());
+    tracer_.any_hits(rays, ray_class, order, occluded);
+  }
+  size_t most() const { return most_; }
+
+private:
+  const RayTracer& tracer_;
+  const uint32_t rays_;
+  mutable size_t most_ = 0;
+};
+
+TEST(AoFrames, SamplesThatAreTracedTogetherGiveTheSameBytes) {
+  Scene scene = roofed(0);
+  add_shape(scene, quad({0.5f, 0, -5}, {0, 0, 10}, {0, 0.8f, 0}));
+  const FloatSource source(scene);
+  const EmbreeTracer embree(source, {});
+  const GBuffer gbuffer = test::point_gbuffer({0, 0, 0}, {0, 1, 0}, 1e-5f);
+  Progress progress;
+  for (const bool falloff : {false, true}) {
+    AoConfig config = visibility(1.5f, 7); // 7 = 4 + 3
+    config.falloff = falloff;
+    AoFrame apart, together;
+    const CrowdTracer few(embree, 1), many(embree, 1u << 20);
+    trace_ao(source, few, gbuffer, config, 2, apart, progress);
+    trace_ao(source, many, gbuffer, config, 2, together, progress);
+    EXPECT_EQ(few.most(), gbuffer.size.pixels());
+    EXPECT_EQ(many.most(), 4 * gbuffer.size.pixels());
+    EXPECT_EQ(std::memcmp(apart.ao.data(), together.ao.data(), apart.ao.size() * sizeof(float)), 0);
+    EXPECT_EQ(apart.hit_distance, together.hit_distance);
+    EXPECT_GT(apart.ao[0], 0.0f);
+    EXPECT_LT(apart.ao[0], 1.0f);
+  }
+}
+
 TEST(AoFrames, MissesAreInvalidEvenOverOldContents) {
   const Scene scene = roofed(0);
   const FloatSource source(scene);

@@ -84,4 +84,18 @@ inline Scene varied_scene() {
   return scene;
 }
 
+/// The same among many small instances in each other's way, turned, mirrored and squeezed.
+inline Scene thicket_scene() {
+  Scene scene = varied_scene();
+  std::mt19937 generator(11);
+  std::uniform_real_distribution<double> along(0.0, 1.0);
+  for (int i = 0; i < 200; ++i) {
+    const double x = 12.0 * along(generator) - 6.0, y = 3.0 * along(generator), z = 12.0 * along(generator) - 6.0;
+    const double size = 0.2 + along(generator), side = i % 3 == 0 ? -1.0 : 1.0;
+    scene.instances.push_back(
+        {0, Affine(placed({x, y, z}, {side * size, 0.5 * size, size}, 360.0 * along(generator), {x, 1, z}))});
+  }
+  return scene;
+}
+
 } // namespace packtrace::test

@@ -23,6 +23,7 @@ using test::closest;
 using test::isas;
 using test::placed;
 using test::random_rays;
+using test::thicket_scene;
 using test::varied_scene;
 
 struct Difference {
@@ -114,6 +115,39 @@ TEST(PackedTracer, BeamsFindWhatTheirRaysFind) {
               std::count_if(alone.begin(), alone.end(), [](const RayHit& hit) { return hit.valid(); }));
         }
     EXPECT_GT(hits, 30000u);
+  }
+}
+
+TEST(PackedTracer, RaysAmongManyInstancesFindTogetherWhatTheyFindAlone) {
+  const BakedScene baked(thicket_scene());
+  const PackedTracer alone(baked.file, baked.source, PackedIsa::kScalar);
+  std::vector<Ray> rays = random_rays(10000, {{-6, 0, -6}, {6, 4, 6}}, alone.space(), 8);
+  for (size_t i = 0; i < rays.size(); i += 3) rays[i].tnear = 0.2f, rays[i].tfar = i % 2 == 0 ? 0.6f : 0.1f;
+  for (const uint32_t ray_class : {kCameraRays, kOcclusionRays}) {
+    std::vector<RayHit> hits(rays.size());
+    std::vector<uint8_t> occluded(rays.size());
+    size_t hit = 0;
+    for (size_t i = 0; i < rays.size(); ++i) {
+      alone.closest_hits({&rays[i], 1}, ray_class, RayOrder::kIncoherent, {&hits[i], 1});
+      alone.any_hits({&rays[i], 1}, ray_class, RayOrder::kIncoherent, {&occluded[i], 1});
+      ASSERT_EQ(occluded[i] != 0, hits[i].valid());
+      hit += hits[i].valid();
+    }
+    EXPECT_GT(hit, 3000u);
+    EXPECT_LT(hit, 8000u);
+    for (const PackedIsa isa : isas()) {
+      const PackedTracer together(baked.file, baked.source, isa);
+      EXPECT_EQ(std::memcmp(closest(together, rays, ray_class).data(), hits.data(), rays.size() * sizeof(RayHit)), 0);
+      EXPECT_EQ(any(together, rays, ray_class), occluded);
+      packed::KernelCounters all, portions; // they share visits only if they do go together
+      std::vector<uint8_t> counted(rays.size());
+      together.count_any(rays, ray_class, counted, all);
+      EXPECT_EQ(counted, occluded);
+      for (size_t at = 0; at < rays.size(); at += 250)
+        together.count_any({&rays[at], 250}, ray_class, {&counted[at], 250}, portions);
+      EXPECT_EQ(counted, occluded);
+      EXPECT_LT(2 * all.nodes, portions.nodes);
+    }
   }
 }
 

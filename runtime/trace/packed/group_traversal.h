@@ -1,0 +1,377 @@
+#pragma once
+
+#include "runtime/trace/packed/batch_decode.h"
+#include "runtime/trace/packed/beam.h"
+#include "runtime/trace/packed/enter.h"
+#include "runtime/trace/packed/leaf_tests.h"
+#include "runtime/trace/packed/node_children.h"
+#include "runtime/trace/packed/outside_search.h"
+
+/// Groups of rays through trees of nodes. They come to a node together, as one word of bits, and leave for each child
+/// those that pass its box: a node is read and set up once for all of them, and nothing waits for the outcome of one
+/// ray's test. Idea: Barringer, Akenine-Moeller, "Dynamic ray stream traversal" (2014).
+namespace packtrace::packed {
+namespace {
+
+/// Cache lines from a cluster's first bits on: most of the 400 to 500 bytes that clusters have without normals.
+constexpr uint32_t kPrefetchedLines = 7;
+
+struct Pending {
+  uint64_t rays; ///< as bits
+  uint32_t node;
+  float t; ///< where the first of them enters; only for order
+};
+
+/// Any hits (kAny) or nearest hits of one ray class in one scene, on one thread: a group of rays at a time.
+template <typename Lanes, bool kAny, bool kCount>
+class GroupTraversal {
+public:
+  using Kernel = Lanes;
+  static constexpr bool kAnyHit = kAny;
+
+  /// @param hits of nearest hits, one for each ray, placement ~0 where there is none yet
+  GroupTraversal(const KernelScene& scene, BatchCache& cache, const KernelRay* rays, uint32_t ray_class,
+                 KernelHit* hits, KernelCounters* counters)
+      : scene_(scene), cache_(cache), rays_(rays), ray_class_(ray_class), hits_(hits), counters_(counters) {}
+
+  /// The group that is traced from now on.
+  /// @param numbers of 1 to kGroup rays, kept
+  void take(const uint32_t* numbers, uint32_t count) {
+    numbers_ = numbers;
+    alive_ = ~uint64_t{0} >> (kGroup - count);
+    for (uint32_t first = 0; first < count; first += kBlock) {
+      uint32_t block[kBlock];
+      for (uint32_t i = 0; i < kBlock; ++i) block[i] = numbers[first + i < count ? first + i : 0];
+      read_rays(rays_, block, first, unit_);
+    }
+  }
+
+  /// The same with the hits that its rays have.
+  void take_again(const uint32_t* numbers, uint32_t count) {
+    take(numbers, count);
+    if constexpr (!kAny)
+      for (uint32_t i = 0; i < count; ++i)
+        if (const KernelHit& hit = hits_[numbers[i]]; hit.placement != ~0u) unit_.tmax[i] = hit.t;
+  }
+
+  /// Traces the group through the whole scene.
+  void trace() {
+    if (scene_.top_nodes != nullptr)
+      trace_top();
+    else if (scene_.placement_count > 0)
+      trace_placement(0, alive_);
+  }
+
+  /// Traces the group through one placement.
+  void trace(uint32_t placement) {
+    nearer_ = 0;
+    trace_placement(placement, alive_);
+  }
+
+  const UnitRays& unit() const { return unit_; }
+  /// The rays that still look for a hit, as bits.
+  uint64_t alive() const { return alive_; }
+  /// The rays whose nearest hit the placement traced last has, as bits.
+  uint64_t nearer() const { return nearer_; }
+
+private:
+  friend struct OutsideSearch<GroupTraversal>;
+
+  struct Place {
+    uint32_t placement, cluster, triangle;
+  };
+
+  /// Calls visit(rays, octant) for the rays of each octant.
+  template <typename Visit>
+  static void by_octant(const BoxRays& group, uint64_t rays, Visit visit) {
+    while (rays != 0) {
+      const uint32_t first = first_bit(rays);
+      uint64_t together = rays;
+      uint32_t octant = 0;
+      for (uint32_t axis = 0; axis < 3; ++axis) {
+        const uint64_t backward = (group.backward[axis] >> first) & 1u;
+        together &= group.backward[axis] ^ (backward - 1); // those whose bit is the same
+        octant |= static_cast<uint32_t>(backward) << axis;
+      }
+      visit(together, octant);
+      rays &= ~together;
+    }
+  }
+
+  /// Through the tree over placements.
+  void trace_top() {
+    BoxRays group;
+    const uint64_t rays = enter<!kAny>(scene_.top, scene_.top_max_coordinate, unit_, alive_, group);
+    by_octant(group, rays, [&](uint64_t together, uint32_t octant) { trace_top(group, together, octant); });
+  }
+
+  void trace_top(BoxRays& group, uint64_t rays, uint32_t octant) {
+    Pending stack[kMaxTopDepth * (baked::kNodeWidth - 1) + 1];
+    uint32_t size = 0;
+    stack[size++] = {rays, 0, 0.0f};
+    while (size > 0) {
+      const Pending next = stack[--size];
+      const uint64_t active = next.rays & alive_;
+      if (active == 0) continue;
+      if ((next.node & kTopLeaf) != 0) {
+        nearer_ = 0;
+        trace_placement(next.node & ~kTopLeaf, active);
+        if constexpr (!kAny)
+          for (uint64_t m = nearer_; m != 0; m &= m - 1) {
+            const uint32_t i = first_bit(m);
+            group.set_unit_tmax(i, unit_.tmax[i]);
+          }
+        continue;
+      }
+      const TopNode& node = scene_.top_nodes[next.node];
+      push_children(typename Lanes::Boxes(node, octant), group, active, node.slots, stack, size,
+                    [&](uint32_t slot) { return node.child[slot]; });
+    }
+  }
+
+  void trace_placement(uint32_t placement, uint64_t rays) {
+    const TracePlacement& place = scene_.placements[placement];
+    if ((place.ray_classes & ray_class_) == 0) return;
+    if constexpr (kCount) counters_->placements += count_ones(rays);
+    const TraceTree& tree = scene_.trees[place.tree];
+    RayGroup group;
+    rays = enter<!kAny>(place, tree.max_coordinate, unit_, rays, group);
+    Beam beam;
+    if constexpr (!kAny)
+      if (make_beam(group, tree.max_coordinate, rays, beam)) group.beam = &beam;
+    by_octant(group, rays, [&](uint64_t together, uint32_t octant) {
+      if (scene_.search_tree != nullptr)
+        OutsideSearch<GroupTraversal>::run(*this, placement, tree.nodes, group, together, octant);
+      else
+        trace_tree(placement, tree.nodes, group, together, octant);
+    });
+  }
+
+  /// Through one placed tree, rays of one octant of it.
+  void trace_tree(uint32_t placement, const baked::PackedNode* nodes, RayGroup& group, uint64_t rays, uint32_t octant) {
+    Pending stack[baked::kMaxTreeDepth * (baked::kNodeWidth - 1) + 1];
+    uint32_t size = 0;
+    stack[size++] = {rays, 0, 0.0f};
+    while (size > 0) {
+      const Pending next = stack[--size];
+      const uint64_t active = next.rays & alive_;
+      if (active == 0 || passed_by(group, next)) continue;
+      const baked::PackedNode& node = nodes[next.node];
+      count_node(active);
+      if ((node.ray_classes & ray_class_) == 0) continue;
+      const NodeChildren children(node);
+      if (!children.leaves()) prefetch_siblings(nodes + node.first_child);
+      const typename Lanes::Boxes boxes(node, octant);
+      if (children.leaves())
+        trace_leaves(placement, node, children, boxes, group, active);
+      else
+        push_children(boxes, group, active, children.slots(), stack, size,
+                      [&](uint32_t slot) { return node.first_child + slot; });
+    }
+  }
+
+  /// All children of a node, whichever rays pass: the first one is read right after the boxes were tested.
+  static void prefetch_siblings(const baked::PackedNode* first) {
+    const auto begin = reinterpret_cast<uintptr_t>(first), end = begin + baked::kNodeWidth * sizeof *first;
+    for (uintptr_t line = begin; line < end; line += 64) __builtin_prefetch(reinterpret_cast<const void*>(line));
+  }
+
+  void count_node(uint64_t rays) {
+    if constexpr (kCount) ++counters_->nodes, counters_->node_rays += count_ones(rays);
+  }
+
+  /// Whether all of a beam's hits are nearer.
+  static bool passed_by(const RayGroup& group, const Pending& pending) {
+    if constexpr (kAny) return false;
+    return group.beam != nullptr && pending.t > -group.beam->limits[1];
+  }
+
+  /// Which of `slots` rays pass, and which do.
+  /// @param t where the first ray enters each child; of a beam, nowhere beyond where any does
+  template <typename Group>
+  static uint32_t pass(const typename Lanes::Boxes& boxes, const Group& group, uint64_t rays, uint32_t slots,
+                       uint64_t (&by_child)[baked::kNodeWidth], float (&t)[baked::kNodeWidth]) {
+    if constexpr (!kAny && Group::kTriangles)
+      if (group.beam != nullptr) {
+        slots &= pass_beam(boxes, *group.beam, t);
+        if (slots == 0) return 0;
+        if (count_ones(rays) < kLeastSideBySide) return slots & Lanes::Children::pass(boxes, group, rays, by_child);
+        BoxPlanes planes;
+        read_planes(boxes, planes);
+        return pass_each<typename Lanes::Wide>(planes, group, *group.beam, rays, slots, by_child);
+      }
+    if constexpr (!kAny) Lanes::Children::enter(boxes, group, first_bit(rays), t);
+    return slots & Lanes::Children::pass(boxes, group, rays, by_child);
+  }
+
+  /// Pushes the children of a node that rays pass; of nearest hits, the one that the first ray enters first on top, of
+  /// any hits the first in the tree's own order.
+  template <typename Group, typename Number>
+  static void push_children(const typename Lanes::Boxes& boxes, const Group& group, uint64_t rays, uint32_t slots,
+                            Pending* stack, uint32_t& size, Number number) {
+    uint64_t by_child[baked::kNodeWidth];
+    float t[baked::kNodeWidth] = {};
+    slots = pass(boxes, group, rays, slots, by_child, t);
+    if constexpr (kAny) {
+      while (slots != 0) {
+        const uint32_t slot = 31u - static_cast<uint32_t>(__builtin_clz(slots));
+        slots &= ~(1u << slot);
+        stack[size++] = {by_child[slot], number(slot), 0.0f};
+      }
+      return;
+    }
+    const uint32_t begin = size;
+    for (; slots != 0; slots &= slots - 1) {
+      const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
+      uint32_t at = size++;
+      for (; at > begin && stack[at - 1].t < t[slot]; --at) stack[at] = stack[at - 1];
+      stack[at] = {by_child[slot], number(slot), t[slot]};
+    }
+  }
+
+  void trace_leaves(uint32_t placement, const baked::PackedNode& node, NodeChildren children,
+                    const typename Lanes::Boxes& boxes, RayGroup& group, uint64_t rays) {
+    const uint8_t* const bits = scene_.clusters[node.cluster].bits; // decoding waits for them longer than it takes
+    for (uint32_t line = 0; line < kPrefetchedLines; ++line) __builtin_prefetch(bits + 64 * line);
+    if ((scene_.clusters[node.cluster].flags & ray_class_) == 0) return;
+    uint64_t by_child[baked::kNodeWidth];
+    float t[baked::kNodeWidth];
+    uint32_t slots = pass(boxes, group, rays, children.slots(), by_child, t);
+    const uint64_t begins = children.leaf_begins();
+    for (; slots != 0; slots &= slots - 1) {
+      const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
+      if (const uint64_t active = by_child[slot] & alive_; active != 0)
+        trace_leaf(placement, node.cluster, node.first_triangle + byte_of(begins, slot), byte_of(children.bytes, slot),
+                   group, active);
+    }
+    if constexpr (!kAny)
+      if (group.beam != nullptr && group.beam->stale) group.beam->update_limits(group);
+  }
+
+  void trace_leaf(uint32_t placement, uint32_t cluster, uint32_t first, uint32_t count, RayGroup& group,
+                  uint64_t rays) {
+    if constexpr (kCount) ++counters_->leaves, counters_->leaf_rays += count_ones(rays);
+    while (count > 0) {
+      const DecodedBatch& batch = decoded(cluster, first, count);
+      if constexpr (kCount) counters_->triangles += count_ones(rays) * batch.count;
+      const Place place{placement, cluster, first};
+      const BatchNormals normals = batch_normals<Lanes>(batch);
+      uint64_t exact = 0;
+      if (kAny && (scene_.clusters[cluster].flags & kMasked) == 0) {
+        alive_ &= ~rays_that_hit<Lanes, !kAny>(batch, normals, group, rays, exact);
+      } else {
+        const uint64_t others = test_side_by_side(batch, normals, place, group, rays);
+        const bool many = Lanes::Wide::kLanes > kBatch && count_ones(others) >= kLeastTestedTwice;
+        test_each(batch, normals, place, group,
+                  many ? rays_that_hit<Lanes, !kAny>(batch, normals, group, others, exact) : others);
+      }
+      if constexpr (kCount) counters_->exact_triangles += exact;
+      rays &= alive_;
+      first += batch.count;
+      count -= batch.count;
+    }
+  }
+
+  /// One ray after the other.
+  void test_each(const DecodedBatch& batch, const BatchNormals& normals, const Place& place, RayGroup& group,
+                 uint64_t rays) {
+    for (uint64_t m = rays; m != 0; m &= m - 1) {
+      const uint32_t i = first_bit(m);
+      LaneHits<Lanes> hits;
+      uint64_t exact = 0;
+      const uint32_t lanes = test_triangles<Lanes, !kAny>(batch, normals, group, i, hits, exact);
+      if constexpr (kCount) counters_->exact_triangles += exact;
+      if (lanes != 0) take_hits(place, i, hits, lanes, group);
+    }
+  }
+
+  /// One triangle after the other, where enough rays fill a register. Returns the other rays.
+  uint64_t test_side_by_side(const DecodedBatch& batch, const BatchNormals& normals, Place place, RayGroup& group,
+                             uint64_t rays) {
+    using Wide = typename Lanes::Wide;
+    const uint32_t begin = place.triangle;
+    for (uint32_t at = 0; at < kGroup; at += Wide::kLanes) {
+      const uint32_t wanted = lanes_at<Wide>(rays, at);
+      uint32_t axis[3];
+      if (count_ones(wanted) < batch.count || !same_axes<Wide>(group, at, wanted, axis)) continue;
+      rays &= ~(uint64_t{wanted} << at);
+      for (uint32_t triangle = 0; triangle < batch.count; ++triangle) {
+        LaneHits<Wide> hits;
+        uint64_t exact = 0;
+        uint32_t lanes = test_rays<Wide, !kAny>(batch, normals, triangle, group, axis, at, wanted, hits, exact);
+        if constexpr (kCount) counters_->exact_triangles += exact;
+        place.triangle = begin + triangle;
+        for (; lanes != 0; lanes &= lanes - 1) {
+          const auto lane = static_cast<uint32_t>(__builtin_ctz(lanes));
+          take_hit(place, at + lane, hits.t[lane], hits.u[lane], hits.v[lane], group);
+        }
+      }
+    }
+    return rays;
+  }
+
+  const DecodedBatch& decoded(uint32_t cluster, uint32_t first, uint32_t count) {
+    const uint64_t tag = (uint64_t{cluster} << 8 | first) + 1;
+    const auto hash = static_cast<uint32_t>(tag) * 0x9e3779b1u;
+    DecodedBatch& batch = cache_.entries[hash >> cache_.hash_shift];
+    if (batch.tag != tag) {
+      if constexpr (kCount) ++counters_->batches_decoded;
+      const TraceCluster& packed = scene_.clusters[cluster];
+      batch.tag = tag;
+      batch.count = (packed.flags & kWide) == 0 ? Lanes::decode(packed, first, count, batch)
+                                                : scene_.decode_wide(scene_.owner, cluster, first, count, batch);
+    }
+    return batch;
+  }
+
+  /// Of ray i, in these lanes of a batch that begins at `place`.
+  void take_hits(Place place, uint32_t i, const LaneHits<Lanes>& hits, uint32_t lanes, RayGroup& group) {
+    const uint32_t begin = place.triangle;
+    for (; lanes != 0; lanes &= lanes - 1) {
+      const auto lane = static_cast<uint32_t>(__builtin_ctz(lanes));
+      place.triangle = begin + lane;
+      if (take_hit(place, i, hits.t[lane], hits.u[lane], hits.v[lane], group) && kAny) return;
+    }
+  }
+
+  /// Of ray i, if it counts. Returns whether it does.
+  bool take_hit(const Place& place, uint32_t i, float t, float u, float v, RayGroup& group) {
+    if constexpr (!kAny)
+      if (t > group.tmax(i) || (t == group.tmax(i) && !precedes(place, hits_[numbers_[i]]))) return false;
+    if ((scene_.clusters[place.cluster].flags & kMasked) != 0 &&
+        !scene_.present(scene_.owner, place.placement, place.cluster, place.triangle, u, v, ray_class_))
+      return false;
+    if constexpr (kAny) {
+      alive_ &= ~(uint64_t{1} << i);
+    } else {
+      nearer_ |= uint64_t{1} << i;
+      group.set_tmax(i, t);
+      if (group.beam != nullptr) group.beam->stale = true;
+      unit_.tmax[i] = static_cast<float>((double{t} + group.t_begin[i]) * group.t_scale[i]);
+      hits_[numbers_[i]] = {unit_.tmax[i], u, v, place.placement, place.cluster, place.triangle};
+    }
+    return true;
+  }
+
+  /// Of two hits at one place the one with the smaller numbers counts.
+  static bool precedes(const Place& place, const KernelHit& hit) {
+    if (hit.placement != place.placement) return place.placement < hit.placement; // as all are than no hit's
+    if (hit.cluster != place.cluster) return place.cluster < hit.cluster;
+    return place.triangle < hit.triangle;
+  }
+
+  const KernelScene& scene_;
+  BatchCache& cache_;
+  const KernelRay* const rays_;
+  const uint32_t ray_class_;
+  KernelHit* const hits_;
+  KernelCounters* const counters_;
+  // Of the group that is traced:
+  const uint32_t* numbers_ = nullptr; ///< of its rays
+  uint64_t alive_ = 0;                ///< rays that still look for a hit
+  uint64_t nearer_ = 0;               ///< rays whose nearest hit the placement traced last has
+  UnitRays unit_;
+};
+
+} // namespace
+} // namespace packtrace::packed
