@@ -147,7 +147,7 @@ private:
   }
 
   void trace(uint32_t placement, Gathered& gathered) {
-    uint32_t numbers[kGroup];
+    uint32_t numbers[kGroup] = {};
     for (uint32_t i = 0; i < gathered.count; ++i)
       numbers[i] = groups_[gathered.rays[i] / kGroup].numbers[gathered.rays[i] % kGroup];
     traversal_.take_again(numbers, gathered.count);
