@@ -49,17 +49,16 @@ public:
   }
 
   /// Puts the nodes into an order again. @param from what it was made of
-  BoxTree ordered(const BoxTree& from, uint32_t max_depth, bool& too_deep) const {
+  BoxTree ordered(const BoxTree& from) const {
     struct Waiting {
-      uint32_t node, right_of, level;
+      uint32_t node, right_of;
     };
     BoxTree out;
     out.nodes.reserve(nodes_.size()), out.order.reserve(from.order.size());
-    std::vector<Waiting> waiting{{0, kNone, 1}};
+    std::vector<Waiting> waiting{{0, kNone}};
     while (!waiting.empty()) {
       const Waiting next = waiting.back();
       waiting.pop_back();
-      too_deep |= next.level > max_depth;
       const auto number = static_cast<uint32_t>(out.nodes.size());
       if (next.right_of != kNone) out.nodes[next.right_of].right = number;
       out.nodes.push_back({nodes_[next.node].box, static_cast<uint32_t>(out.order.size()), 1, 0});
@@ -68,8 +67,8 @@ public:
         out.order.push_back(from.order[from.nodes[next.node].first]);
         continue;
       }
-      waiting.push_back({right, number, next.level + 1});
-      waiting.push_back({left, kNone, next.level + 1});
+      waiting.push_back({right, number});
+      waiting.push_back({left, kNone});
     }
     for (size_t i = out.nodes.size(); i-- > 0;)
       if (const uint32_t right = out.nodes[i].right; right != 0)
@@ -150,7 +149,8 @@ private:
     nodes_[parent].children = {place, node};
     nodes_[place].parent = parent;
     refit(left);
-    refit(parent);
+    fit(parent);
+    refit(nodes_[parent].parent);
   }
 
   /// Puts `node` in the place of `old`.
@@ -161,12 +161,17 @@ private:
     nodes_[node].parent = parent;
   }
 
+  /// Those above a node whose box changed, until one stays.
   void refit(uint32_t node) {
-    for (; node != kNone; node = nodes_[node].parent) {
-      const auto [left, right] = nodes_[node].children;
-      nodes_[node].box = joined(nodes_[left].box, nodes_[right].box);
-      nodes_[node].area = area(nodes_[node].box);
-    }
+    while (node != kNone && fit(node)) node = nodes_[node].parent;
+  }
+
+  /// Returns whether the node's box changed.
+  bool fit(uint32_t node) {
+    const auto [left, right] = nodes_[node].children;
+    const TreeBox before = std::exchange(nodes_[node].box, joined(nodes_[left].box, nodes_[right].box));
+    nodes_[node].area = area(nodes_[node].box);
+    return nodes_[node].box.lo != before.lo || nodes_[node].box.hi != before.hi;
   }
 
   std::vector<Node> nodes_;
@@ -175,15 +180,12 @@ private:
 
 } // namespace
 
-void reinsert_subtrees(BoxTree& tree, uint32_t max_depth, const ReinsertionConfig& config) {
+void reinsert_subtrees(BoxTree& tree, const ReinsertionConfig& config) {
   if (tree.nodes.empty()) return;
   LooseTree loose(tree);
   bool changed = false;
   for (uint32_t pass = 0; pass < config.passes && loose.reinsert(config); ++pass) changed = true;
-  if (!changed) return;
-  bool too_deep = false;
-  BoxTree ordered = loose.ordered(tree, max_depth, too_deep);
-  if (!too_deep) tree = std::move(ordered);
+  if (changed) tree = loose.ordered(tree);
 }
 
 } // namespace packtrace

@@ -14,11 +14,11 @@ struct ReinsertionConfig {
 };
 
 /// Takes subtrees out and puts each in where the sum of the inner nodes' areas becomes the least, the largest first, so
-/// that boxes of very different size come to lie at levels of their own, which no split of all boxes does. On the
-/// calling thread; time O(n), beyond the work that `config` allows. A tree that would get more than `max_depth` levels
-/// stays as it was. Source: Bittner, Hapala, Havran, "Fast insertion-based optimization of bounding volume
-/// hierarchies" (2013); the search is that of Meister, Bittner, "Parallel reinsertion for bounding volume hierarchy
-/// optimization" (2018).
-void reinsert_subtrees(BoxTree& tree, uint32_t max_depth = kDefaultTreeDepth, const ReinsertionConfig& config = {});
+/// that boxes of very different size come to lie at levels of their own, which no split of all boxes does: boxes that
+/// lie one in the other become a chain, as deep as there are boxes. On the calling thread; time O(n), and for each
+/// place that a subtree is moved to, the levels above it whose boxes change. Source: Bittner, Hapala, Havran, "Fast
+/// insertion-based optimization of bounding volume hierarchies" (2013); the search is that of Meister, Bittner,
+/// "Parallel reinsertion for bounding volume hierarchy optimization" (2018).
+void reinsert_subtrees(BoxTree& tree, const ReinsertionConfig& config = {});
 
 } // namespace packtrace

@@ -1,5 +1,6 @@
 #include "compress/bvh/wide_tree.h"
 
+#include <algorithm>
 #include <array>
 
 namespace packtrace {
@@ -77,11 +78,36 @@ private:
   double scale_ = 0.0;
 };
 
+uint32_t depth_of(std::span<const WideNode> nodes) {
+  if (nodes.empty()) return 0;
+  uint32_t depth = 0;
+  std::vector<uint32_t> level(nodes.size());
+  level[0] = 1;
+  for (size_t i = 0; i < nodes.size(); ++i) {
+    depth = std::max(depth, level[i]);
+    for (uint32_t child = 0; child < nodes[i].child_count; ++child) level[nodes[i].first_child + child] = level[i] + 1;
+  }
+  return depth;
+}
+
 } // namespace
 
 std::vector<WideNode> collapse_box_tree(const BoxTree& tree) {
   if (tree.nodes.empty()) return {};
   return Collapser(tree).run();
+}
+
+WideTree build_wide_tree(std::span<const TreeBox> boxes, uint32_t max_depth, const ReinsertionConfig& config) {
+  WideTree tree;
+  const auto build = [&](const ReinsertionConfig& moves) {
+    tree.binary = build_box_tree(boxes, max_depth);
+    reinsert_subtrees(tree.binary, moves);
+    tree.nodes = collapse_box_tree(tree.binary);
+    tree.depth = depth_of(tree.nodes);
+  };
+  build(config);
+  if (tree.depth > max_depth) build({.passes = 0});
+  return tree;
 }
 
 } // namespace packtrace

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "compress/bvh/box_tree.h"
+#include "compress/bvh/reinsertion.h"
 
 namespace packtrace {
 
@@ -21,5 +22,17 @@ struct WideNode {
 /// Ylitie, Karras, Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs" (2017),
 /// section 3.1, with leaves of one box.
 std::vector<WideNode> collapse_box_tree(const BoxTree& tree);
+
+/// A wide tree over boxes.
+struct WideTree {
+  BoxTree binary;              ///< what it was collapsed from
+  std::vector<WideNode> nodes; ///< none for no boxes
+  uint32_t depth = 0;          ///< levels of nodes
+};
+
+/// Splits boxes (build_box_tree()), moves subtrees (reinsert_subtrees()), and collapses what comes of it. Where moved
+/// subtrees would make the tree deeper than max_depth, they stay.
+/// @param max_depth levels of nodes, 33 or more
+WideTree build_wide_tree(std::span<const TreeBox> boxes, uint32_t max_depth, const ReinsertionConfig& config = {});
 
 } // namespace packtrace

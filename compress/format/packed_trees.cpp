@@ -9,7 +9,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include "compress/bvh/reinsertion.h"
 #include "compress/bvh/wide_tree.h"
 #include "compress/format/node_writer.h"
 #include "compress/format/stored_nodes.h"
@@ -143,7 +142,7 @@ public:
     for (const uint32_t g : geometries) records.push_back(&sections_.geometries[g]);
     choose_tree_grid(records, sections_.clusters, tree.record);
     const std::vector<TreeCluster> clusters = find_clusters(geometries);
-    build_nodes(build_leaf_nodes(clusters, tree.record), tree);
+    build_nodes(build_leaf_nodes(clusters, tree.record, find_typical_area(clusters, tree.record)), tree);
     return tree;
   }
 
@@ -188,11 +187,10 @@ public:
   }
 
   /// @param stored takes what it has from there
-  LeafNodes build_leaf_nodes(std::span<const TreeCluster> clusters, const baked::TreeRecord& tree,
+  LeafNodes build_leaf_nodes(std::span<const TreeCluster> clusters, const baked::TreeRecord& tree, double typical_area,
                              const StoredLeafNodes* stored = nullptr) const {
     const size_t chunks = (clusters.size() + kChunkClusters - 1) / kChunkClusters;
     std::vector<LeafNodes> of_chunk(chunks);
-    const double typical_area = find_typical_area(clusters, tree);
     tbb::parallel_for(size_t{0}, chunks, [&](size_t i) {
       LeafNodeBuilder builder(sections_, costs_, tree, typical_area);
       const size_t first = i * kChunkClusters, count = std::min(kChunkClusters, clusters.size() - first);
@@ -218,33 +216,20 @@ public:
       for (size_t axis = 0; axis < 3; ++axis)
         out.lo[axis] = static_cast<float>(box.lo[axis]), out.hi[axis] = static_cast<float>(box.hi[axis]);
     }
-    BoxTree binary = build_box_tree(boxes, baked::kMaxTreeDepth);
-    reinsert_subtrees(binary, baked::kMaxTreeDepth);
-    const std::vector<WideNode> wide = collapse_box_tree(binary);
+    const WideTree built = build_wide_tree(boxes, baked::kMaxTreeDepth);
+    const std::vector<WideNode>& wide = built.nodes;
     tree.nodes.resize(wide.size());
     std::vector<TreeGridBox> whole(wide.size());
     for (size_t i = wide.size(); i-- > 0;) {
       if (wide[i].child_count == 0) {
-        const uint32_t leaf = binary.order[binary.nodes[wide[i].source].first];
+        const uint32_t leaf = built.binary.order[built.binary.nodes[wide[i].source].first];
         tree.nodes[i] = leaves.nodes[leaf], whole[i] = leaves.boxes[leaf];
       } else {
         whole[i] = write_inner_node(wide[i].first_child, wide[i].child_count, tree.nodes, whole, tree.nodes[i]);
       }
     }
     tree.record.node_count = static_cast<uint32_t>(wide.size());
-    tree.record.depth = depth_of(wide);
-  }
-
-  static uint32_t depth_of(std::span<const WideNode> wide) {
-    uint32_t depth = 0;
-    std::vector<uint8_t> level(wide.size());
-    for (size_t i = 0; i < wide.size(); ++i) {
-      if (i == 0) level[i] = 1;
-      depth = std::max<uint32_t>(depth, level[i]);
-      for (uint32_t child = 0; child < wide[i].child_count; ++child)
-        level[wide[i].first_child + child] = static_cast<uint8_t>(level[i] + 1);
-    }
-    return depth;
+    tree.record.depth = built.depth;
   }
 
 private:
@@ -365,8 +350,11 @@ ChosenTreeBuilder::ChosenTreeBuilder(const BakedSections& sections, std::span<co
     if (records.empty()) return;
     choose_tree_grid(records, sections.clusters, grid.record);
     grid.clusters = builder.find_clusters(geometries[i]);
+    // Of all clusters, so that nodes do not depend on the choice; with stored nodes only those that do not fit are
+    // made.
+    const double typical_area = t.stored.empty() ? builder.find_typical_area(grid.clusters, grid.record) : 0.0;
     std::erase_if(grid.clusters, [&](const TreeCluster& cluster) { return wanted[cluster.number] == 0; });
-    grid.leaves = builder.build_leaf_nodes(grid.clusters, grid.record, &t.stored);
+    grid.leaves = builder.build_leaf_nodes(grid.clusters, grid.record, typical_area, &t.stored);
   });
   t.runs.resize(sections.clusters.size());
   for (const Tables::Grid& grid : t.grids)

@@ -16,6 +16,7 @@ public:
   /// @param sections of a valid file; must outlive it
   explicit StoredLeafNodes(const BakedSections& sections);
 
+  bool empty() const { return nodes_.empty(); }
   /// Numbers in the node section, in the order of the cluster's stream. None where no ray sees the cluster.
   /// @param cluster in the cluster section
   std::span<const uint32_t> of_cluster(uint32_t cluster) const;
