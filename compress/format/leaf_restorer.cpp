@@ -96,11 +96,7 @@ node_kernels::Box LeafRestorer::write(const LeafNode& leaves, uint32_t cluster, 
   node_kernels::Box whole;
   kernels_.pack_children(boxes.data(), leaves.leaf_count, packed, whole);
   set_boxes(packed, node);
-  node.ray_classes = ray_classes;
-  node.first_triangle = static_cast<uint8_t>(leaves.first_triangle);
-  node.first_child = 0;
-  node.cluster = cluster;
-  node.children = leaves.triangles;
+  set_leaves(leaves, cluster, ray_classes, node);
   return whole;
 }
 
@@ -111,16 +107,7 @@ node_kernels::Box restore_inner_node(const node_kernels::Kernels& kernels, uint3
   node_kernels::Box whole;
   kernels.pack_children(boxes.data(), static_cast<uint32_t>(children.size()), packed, whole);
   set_boxes(packed, node);
-  uint32_t classes = 0;
-  node.children.fill(baked::kNoChild);
-  for (size_t child = 0; child < children.size(); ++child) {
-    node.children[child] = baked::kInnerChild;
-    classes |= children[child].ray_classes;
-  }
-  node.ray_classes = static_cast<uint8_t>(classes & (baked::kCameraBelow | baked::kOcclusionBelow));
-  node.first_triangle = 0;
-  node.first_child = first_child;
-  node.cluster = 0;
+  set_children(first_child, children, node);
   return whole;
 }
 

@@ -38,7 +38,28 @@ void set_boxes(const node_kernels::NodeBoxes& boxes, baked::PackedNode& node) {
   std::memcpy(node.hi.data(), boxes.hi, sizeof boxes.hi);
 }
 
-void write_boxes(std::span<const TreeGridBox> boxes, baked::PackedNode& node) {
+void set_leaves(const LeafNode& leaves, uint32_t cluster, uint8_t ray_classes, baked::PackedNode& node) {
+  node.ray_classes = ray_classes;
+  node.first_triangle = static_cast<uint8_t>(leaves.first_triangle);
+  node.first_child = 0;
+  node.cluster = cluster;
+  node.children = leaves.triangles;
+}
+
+void set_children(uint32_t first_child, std::span<const baked::PackedNode> children, baked::PackedNode& node) {
+  uint32_t classes = 0;
+  node.children.fill(baked::kNoChild);
+  for (size_t child = 0; child < children.size(); ++child) {
+    node.children[child] = baked::kInnerChild;
+    classes |= children[child].ray_classes;
+  }
+  node.ray_classes = static_cast<uint8_t>(classes & (baked::kCameraBelow | baked::kOcclusionBelow));
+  node.first_triangle = 0;
+  node.first_child = first_child;
+  node.cluster = 0;
+}
+
+TreeGridBox write_boxes(std::span<const TreeGridBox> boxes, baked::PackedNode& node) {
   assert(!boxes.empty() && boxes.size() <= baked::kNodeWidth);
   std::array<node_kernels::Box, baked::kNodeWidth> children;
   for (size_t i = 0; i < boxes.size(); ++i) {
@@ -49,43 +70,26 @@ void write_boxes(std::span<const TreeGridBox> boxes, baked::PackedNode& node) {
   node_kernels::Box whole;
   node_kernels::kernels().pack_children(children.data(), static_cast<uint32_t>(boxes.size()), packed, whole);
   set_boxes(packed, node);
+  return {{whole.lo[0], whole.lo[1], whole.lo[2]}, {-whole.minus_hi[0], -whole.minus_hi[1], -whole.minus_hi[2]}};
 }
 
 TreeGridBox write_leaf_node(const LeafNode& leaves, std::span<const TreeGridBox> boxes, uint32_t cluster,
                             uint8_t ray_classes, baked::PackedNode& node) {
-  node = {};
-  node.ray_classes = ray_classes;
-  node.first_triangle = static_cast<uint8_t>(leaves.first_triangle);
-  node.cluster = cluster;
-  node.children = leaves.triangles;
   std::array<TreeGridBox, baked::kNodeWidth> of_leaves;
-  TreeGridBox whole = boxes[leaves.first_triangle];
   uint32_t triangle = leaves.first_triangle;
   for (uint32_t leaf = 0; leaf < leaves.leaf_count; ++leaf) {
     of_leaves[leaf] = boxes[triangle];
     for (const uint32_t end = triangle + leaves.triangles[leaf]; triangle < end; ++triangle)
       of_leaves[leaf].extend(boxes[triangle]);
-    whole.extend(of_leaves[leaf]);
   }
-  write_boxes(std::span(of_leaves).first(leaves.leaf_count), node);
-  return whole;
+  set_leaves(leaves, cluster, ray_classes, node);
+  return write_boxes(std::span(of_leaves).first(leaves.leaf_count), node);
 }
 
 TreeGridBox write_inner_node(uint32_t first_child, uint32_t child_count, std::span<const baked::PackedNode> nodes,
                              std::span<const TreeGridBox> boxes, baked::PackedNode& node) {
-  node = {};
-  node.first_child = first_child;
-  const std::span<const TreeGridBox> children = boxes.subspan(first_child, child_count);
-  TreeGridBox whole = children[0];
-  uint32_t classes = 0;
-  for (uint32_t child = 0; child < child_count; ++child) {
-    node.children[child] = baked::kInnerChild;
-    classes |= nodes[first_child + child].ray_classes;
-    whole.extend(children[child]);
-  }
-  node.ray_classes = static_cast<uint8_t>(classes & (baked::kCameraBelow | baked::kOcclusionBelow));
-  write_boxes(children, node);
-  return whole;
+  set_children(first_child, nodes.subspan(first_child, child_count), node);
+  return write_boxes(boxes.subspan(first_child, child_count), node);
 }
 
 } // namespace packtrace

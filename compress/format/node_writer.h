@@ -21,9 +21,16 @@ std::span<const TreeGridBox> triangle_boxes(const ClusterView& cluster, const Tr
 /// Sets a node's origin, exponents and children's boxes to those that were packed.
 void set_boxes(const node_kernels::NodeBoxes& boxes, baked::PackedNode& node);
 
-/// Packs a node's origin, exponents and children's boxes: the smallest exponents, each box rounded outwards.
+/// Sets all else of a node with leaves.
+void set_leaves(const LeafNode& leaves, uint32_t cluster, uint8_t ray_classes, baked::PackedNode& node);
+
+/// Sets all else of a node of nodes, which are made already.
+void set_children(uint32_t first_child, std::span<const baked::PackedNode> children, baked::PackedNode& node);
+
+/// Packs a node's origin, exponents and children's boxes: the smallest exponents, each box rounded outwards. Returns
+/// the box of all.
 /// @param boxes 1..8, of children in the order of slots; coordinates within +-kMaxTreeCoordinate
-void write_boxes(std::span<const TreeGridBox> boxes, baked::PackedNode& node);
+TreeGridBox write_boxes(std::span<const TreeGridBox> boxes, baked::PackedNode& node);
 
 /// Makes a node with leaves. Returns the box of all.
 /// @param boxes of the cluster's triangles
