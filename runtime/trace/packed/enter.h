@@ -108,14 +108,20 @@ struct GridFloats {
   HalfFloats origin[3], direction[3], begin, end;
 };
 
-inline GridFloats to_floats(const GridRays& rays, const UnitRays& from, uint32_t first) {
+/// @tparam kNearest as move_block()
+template <bool kNearest>
+[[gnu::always_inline]] inline GridFloats to_floats(const GridRays& rays, const UnitRays& from, uint32_t first) {
   GridFloats out;
   for (uint32_t axis = 0; axis < 3; ++axis) {
     out.origin[axis] = to_floats(rays.origin[axis]);
     out.direction[axis] = to_floats(rays.direction[axis]);
   }
   out.begin = to_floats(read_doubles(&from.tnear[first]) * rays.power - rays.begin);
-  out.end = to_floats(read_doubles(&from.tmax[first]) * rays.power - rays.begin);
+  const Doubles end = read_doubles(&from.tmax[first]) * rays.power;
+  if constexpr (kNearest) // as t_of()
+    out.end = to_floats(end - rays.begin + (rays.begin != 0.0 ? kUnitRounding * end : Doubles{}));
+  else
+    out.end = to_floats(end - rays.begin);
   return out;
 }
 
@@ -139,7 +145,7 @@ inline uint32_t move_block(const TracePlacement& placement, float max_coordinate
   const auto half = [&](uint32_t at) {
     GridRays rays;
     usable |= move_rays<kAligned>(placement, max_coordinate, from, first + at, wanted >> at, rays) << at;
-    const GridFloats rounded = to_floats(rays, from, first + at);
+    const GridFloats rounded = to_floats<kNearest>(rays, from, first + at);
     if constexpr (kNearest && Group::kTriangles)
       for (uint32_t axis = 0; axis < 3; ++axis)
         write_block(&group.rest[axis][first + at], to_floats(rays.origin[axis] - to_doubles(rounded.origin[axis])));

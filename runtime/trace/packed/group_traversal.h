@@ -119,7 +119,7 @@ private:
         if constexpr (!kAny)
           for (uint64_t m = nearer_; m != 0; m &= m - 1) {
             const uint32_t i = first_bit(m);
-            group.set_unit_tmax(i, unit_.tmax[i]);
+            group.set_tmax(i, group.t_of(i, unit_.tmax[i]));
           }
         continue;
       }
@@ -334,10 +334,14 @@ private:
     }
   }
 
-  /// Of ray i, if it counts. Returns whether it does.
+  /// Of ray i, if it counts. Returns whether it does. Hits are compared by their t in unit space, so that what counts
+  /// does not depend on which placement comes first.
   bool take_hit(const Place& place, uint32_t i, float t, float u, float v, RayGroup& group) {
-    if constexpr (!kAny)
-      if (t > group.tmax(i) || (t == group.tmax(i) && !precedes(place, hits_[numbers_[i]]))) return false;
+    float unit_t = 0.0f;
+    if constexpr (!kAny) {
+      unit_t = group.unit_t(i, t);
+      if (unit_t > unit_.tmax[i] || (unit_t == unit_.tmax[i] && !precedes(place, hits_[numbers_[i]]))) return false;
+    }
     if ((scene_.clusters[place.cluster].flags & kMasked) != 0 &&
         !scene_.present(scene_.owner, place.placement, place.cluster, place.triangle, u, v, ray_class_))
       return false;
@@ -345,10 +349,10 @@ private:
       alive_ &= ~(uint64_t{1} << i);
     } else {
       nearer_ |= uint64_t{1} << i;
-      group.set_tmax(i, t);
+      group.set_tmax(i, group.t_of(i, unit_t));
       if (group.beam != nullptr) group.beam->stale = true;
-      unit_.tmax[i] = static_cast<float>((double{t} + group.t_begin[i]) * group.t_scale[i]);
-      hits_[numbers_[i]] = {unit_.tmax[i], u, v, place.placement, place.cluster, place.triangle};
+      unit_.tmax[i] = unit_t;
+      hits_[numbers_[i]] = {unit_t, u, v, place.placement, place.cluster, place.triangle};
     }
     return true;
   }

@@ -29,11 +29,13 @@ template <typename Lanes, bool kAny, bool kCount>
 class PlacementStream {
 public:
   /// @param groups traces those that are made here
+  /// @param memory ThreadMemory::stream; null if nothing is added
   /// @param occluded of any hits, one for each ray: set to 1
   PlacementStream(const KernelScene& scene, GroupTraversal<Lanes, kAny, kCount>& groups, void* memory,
                   const KernelRay* rays, uint32_t ray_class, uint8_t* occluded)
       : scene_(scene), traversal_(groups), rays_(rays), ray_class_(ray_class), occluded_(occluded),
-        groups_(static_cast<StreamGroup*>(memory)), parts_(reinterpret_cast<StreamPart*>(groups_ + kStreamGroups)) {}
+        groups_(static_cast<StreamGroup*>(memory)),
+        parts_(memory != nullptr ? reinterpret_cast<StreamPart*>(groups_ + kStreamGroups) : nullptr) {}
 
   /// Adds rays of one octant to the portion.
   void add(const uint32_t* numbers, uint32_t count, uint32_t octant) {
@@ -49,8 +51,11 @@ public:
   void trace() {
     Visit stack[kMaxTopDepth * (baked::kNodeWidth - 1) + 1];
     uint32_t size = 0;
-    for (uint32_t g = 0; g < group_count_; ++g) parts_[g] = {groups_[g].alive, g};
-    stack[size++] = {parts_, parts_ + group_count_, group_count_, 0, 0.0f};
+    uint32_t part_count = 0;
+    for (uint32_t octant = 0; octant < 8; ++octant) // so that a node's boxes are set up once for each
+      for (uint32_t g = 0; g < group_count_; ++g)
+        if (groups_[g].octant == octant) parts_[part_count++] = {groups_[g].alive, g};
+    stack[size++] = {parts_, parts_ + part_count, part_count, 0, 0.0f};
     while (size > 0) {
       const Visit next = stack[--size];
       if ((next.node & kTopLeaf) != 0)
@@ -159,7 +164,7 @@ private:
       if constexpr (kAny)
         group.alive &= ~(uint64_t{1} << bit), occluded_[numbers[i]] = 1;
       else
-        group.boxes.set_unit_tmax(bit, traversal_.unit().tmax[i]);
+        group.boxes.set_tmax(bit, group.boxes.t_of(bit, traversal_.unit().tmax[i]));
     }
     gathered.count = 0;
   }

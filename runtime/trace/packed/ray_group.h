@@ -26,6 +26,9 @@ constexpr uint32_t kGroup = 64;
 constexpr float kBoxPad = 24.0f * 0x1p-24f;
 constexpr float kSmallestDirection = 0x1p-40f;
 
+/// Of t: what rounding t to a float in unit space takes at most (2^-24), and rounding it in a grid as well.
+constexpr double kUnitRounding = 0x1p-23;
+
 /// Rays as they come, in unit space.
 struct alignas(64) UnitRays {
   float origin[3][kGroup], direction[3][kGroup], tnear[kGroup];
@@ -54,8 +57,13 @@ struct alignas(64) BoxRays {
   double t_begin[kGroup]; ///< unit-space t = (t here + t_begin) t_scale
   double t_scale[kGroup]; ///< a power of two
 
+  float unit_t(uint32_t i, float t) const { return static_cast<float>((double{t} + t_begin[i]) * t_scale[i]); }
+  /// Not below any t that is `unit_t` in unit space, which several are where origins were moved.
+  float t_of(uint32_t i, float unit_t) const {
+    const double t = double{unit_t} / t_scale[i];
+    return static_cast<float>(t - t_begin[i] + (t_begin[i] != 0.0 ? kUnitRounding * t : 0.0));
+  }
   void set_tmax(uint32_t i, float t) { limits[i][1] = -t; }
-  void set_unit_tmax(uint32_t i, float t) { set_tmax(i, static_cast<float>(double{t} / t_scale[i] - t_begin[i])); }
   float tmax(uint32_t i) const { return -limits[i][1]; }
 };
 

@@ -22,6 +22,7 @@ using test::BakedScene;
 using test::closest;
 using test::isas;
 using test::placed;
+using test::quad;
 using test::random_rays;
 using test::thicket_scene;
 using test::varied_scene;
@@ -147,6 +148,84 @@ TEST(PackedTracer, RaysAmongManyInstancesFindTogetherWhatTheyFindAlone) {
         together.count_any({&rays[at], 250}, ray_class, {&counted[at], 250}, portions);
       EXPECT_EQ(counted, occluded);
       EXPECT_LT(2 * all.nodes, portions.nodes);
+    }
+  }
+}
+
+TEST(PackedTracer, RaysOfAllOctantsFillAPortion) {
+  const BakedScene baked(thicket_scene());
+  const PackedTracer tracer(baked.file, baked.source);
+  std::vector<Ray> rays = random_rays(4096, {{-6, 0, -6}, {6, 4, 6}}, tracer.space(), 9);
+  for (uint32_t i = 0; i < rays.size(); ++i) // groups of 64, as many as there can be: all but seven of one octant
+    for (int axis = 0; axis < 3; ++axis)
+      rays[i].direction[axis] =
+          std::copysign(rays[i].direction[axis], i % 512 == 511 && (i / 512 >> axis & 1u) != 0 ? -1.0f : 1.0f);
+  const std::vector<RayHit> together = closest(tracer, rays);
+  const std::vector<uint8_t> occluded = any(tracer, rays, kCameraRays);
+  size_t hits = 0;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    RayHit hit;
+    tracer.closest_hits({&rays[i], 1}, kCameraRays, RayOrder::kIncoherent, {&hit, 1});
+    ASSERT_EQ(std::memcmp(&hit, &together[i], sizeof hit), 0) << i;
+    ASSERT_EQ(hit.valid(), occluded[i] != 0) << i;
+    hits += hit.valid();
+  }
+  EXPECT_GT(hits, 500u);
+}
+
+TEST(PackedTracer, TracersOfMoreAndLessDeepTreesTakeTurnsOnAThread) {
+  Scene few = varied_scene(); // nine placements: two levels
+  for (int i = 0; i < 3; ++i) few.instances.push_back({0, Affine(placed({i, 2, -i}, DVec3(0.5), 10 * i))});
+  const BakedScene shallow(few), deep(thicket_scene());
+  for (const BakedScene* scene : {&shallow, &deep, &shallow, &deep}) {
+    const PackedTracer tracer(scene->file, scene->source);
+    const std::vector<Ray> rays = random_rays(2000, {{-6, 0, -6}, {6, 4, 6}}, tracer.space(), 10);
+    const std::vector<RayHit> together = closest(tracer, rays);
+    for (size_t i = 0; i < rays.size(); i += 20) {
+      RayHit hit;
+      tracer.closest_hits({&rays[i], 1}, kCameraRays, RayOrder::kIncoherent, {&hit, 1});
+      ASSERT_EQ(std::memcmp(&hit, &together[i], sizeof hit), 0) << i;
+    }
+  }
+}
+
+/// Instances whose faces lie in one plane, with boxes that rays enter in another order.
+Scene coinciding_scene() {
+  Scene scene;
+  for (const float depth : {0.5f, 2.0f, -1.0f}) {
+    Mesh mesh = quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0});
+    const Mesh fin = quad({depth, -1, 0}, {0, 0.5f, 0}, {0, 0, depth});
+    for (const auto& triangle : fin.triangles)
+      mesh.triangles.push_back(triangle + static_cast<uint32_t>(mesh.positions.size()));
+    mesh.positions.insert(mesh.positions.end(), fin.positions.begin(), fin.positions.end());
+    add_object(scene, mesh);
+  }
+  for (uint32_t i = 0; i < 24; ++i)
+    scene.instances.push_back({i % 3, Affine(placed({0.11 * i, 0.07 * (i % 5), 0}, DVec3(1 + i % 2), 0))});
+  return scene;
+}
+
+TEST(PackedTracer, OfCoincidingSurfacesTheSameIsHitHoweverRaysCome) {
+  const BakedScene baked(coinciding_scene());
+  for (const PackedIsa isa : isas()) {
+    const PackedTracer tracer(baked.file, baked.source, isa);
+    std::mt19937 generator(3);
+    std::uniform_real_distribution<double> along(-0.8, 2.5);
+    std::vector<Ray> rays(4000);
+    for (Ray& ray : rays) { // from so far away that origins are moved to the trees
+      const DVec3 to = tracer.space().to_unit({along(generator), along(generator), 0});
+      const DVec3 from = tracer.space().to_unit({9 * along(generator), 9 * along(generator), 100});
+      ray.origin = Vec3(from), ray.direction = Vec3(to - from);
+    }
+    const std::vector<RayHit> together = closest(tracer, rays);
+    EXPECT_GT(std::ranges::count_if(together, [](const RayHit& hit) { return hit.valid(); }), 2500);
+    for (const size_t portion : {1u, 7u, 300u}) {
+      std::vector<RayHit> hits(rays.size());
+      for (size_t at = 0; at < rays.size(); at += portion) {
+        const size_t count = std::min(portion, rays.size() - at);
+        tracer.closest_hits({&rays[at], count}, kCameraRays, RayOrder::kCoherent, {&hits[at], count});
+      }
+      EXPECT_EQ(std::memcmp(hits.data(), together.data(), rays.size() * sizeof(RayHit)), 0) << tracer.isa() << portion;
     }
   }
 }
