@@ -15,14 +15,15 @@
 namespace packtrace::fuzz {
 namespace {
 
-constexpr size_t kRays = 48; // a group of 16 neighbours, and others that have less in common
+constexpr uint32_t kRays = 48;      // a group of 16 neighbours, and others that have less in common
+constexpr uint32_t kManyRays = 600; // go through a tree over placements together
 
 /// From within and around the scene, the last ones without direction or without an interval.
-std::vector<Ray> rays_through(const UnitSpace& space, const Bounds& world) {
+std::vector<Ray> rays_through(const UnitSpace& space, const Bounds& world, uint32_t count) {
   const DVec3 lo = world.empty() ? DVec3(-1) : space.to_unit(DVec3(world.lo));
   const DVec3 hi = world.empty() ? DVec3(1) : space.to_unit(DVec3(world.hi));
-  std::vector<Ray> rays(kRays);
-  for (uint32_t i = 0; i < kRays; ++i) {
+  std::vector<Ray> rays(count);
+  for (uint32_t i = 0; i < count; ++i) {
     const auto at = [&](uint32_t salt) {
       DVec3 weights;
       for (uint32_t axis = 0; axis < 3; ++axis)
@@ -35,8 +36,8 @@ std::vector<Ray> rays_through(const UnitSpace& space, const Bounds& world) {
     rays[i].origin = Vec3(from), rays[i].direction = Vec3(to - from);
     if (i % 5 == 4) rays[i].direction[static_cast<int>(i % 3)] = 0.0f; // along a plane
   }
-  rays[kRays - 2].direction = Vec3(0.0f);
-  rays[kRays - 1].tfar = -1.0f;
+  rays[count - 2].direction = Vec3(0.0f);
+  rays[count - 1].tfar = -1.0f;
   return rays;
 }
 
@@ -44,7 +45,8 @@ std::vector<Ray> rays_through(const UnitSpace& space, const Bounds& world) {
 template <class Source>
 void trace(const BakedFile& file, const Source& source, PackedIsa isa) {
   const PackedTracer tracer(file, source, isa);
-  const std::vector<Ray> rays = rays_through(tracer.space(), source.world_bounds());
+  const bool many = file.instances().size() > baked::kNodeWidth;
+  const std::vector<Ray> rays = rays_through(tracer.space(), source.world_bounds(), many ? kManyRays : kRays);
   std::vector<RayHit> hits(rays.size());
   std::vector<uint8_t> occluded(rays.size());
   for (const uint32_t ray_class : {kCameraRays, kOcclusionRays})
@@ -59,7 +61,8 @@ void trace(const BakedFile& file, const Source& source, PackedIsa isa) {
         require(surface.placement && surface.placement->instance < source.instances().size(), "instance of a hit");
         require(source.instances()[surface.placement->instance].geometry == surface.geometry, "geometry of a hit");
         require(surface.triangle < source.counts(surface.geometry).triangles, "triangle of a hit");
-        require(source.material_of(surface.placement->instance, surface.triangle) < source.materials().size(), "material");
+        require(source.material_of(surface.placement->instance, surface.triangle) < source.materials().size(),
+                "material");
         (void)source.shading_normal(surface.geometry, surface.triangle, Vec2(hits[i].u, hits[i].v));
         (void)source.detail_of(surface.placement->instance, surface.triangle);
       }
