@@ -32,21 +32,22 @@ nlohmann::ordered_json count_work(std::span<const RecordedRays> rays, const RayT
   const auto* const packed = dynamic_cast<const PackedTracer*>(&tracer);
   nlohmann::ordered_json phases = nlohmann::ordered_json::array();
   if (packed == nullptr) return phases;
-  fmt::print("\nwork per ray, packed: nodes tested, nodes unpacked, leaves, triangles, batches decoded\n");
+  fmt::print("\nwork per ray, packed: placements, nodes tested, nodes unpacked, leaves, triangles, batches decoded\n");
   for (const RecordedRays& phase : rays) {
     const packed::KernelCounters counters = count(phase, *packed);
     const auto ray_count = static_cast<double>(phase.count());
     const auto per_ray = [&](uint64_t number) { return static_cast<double>(number) / ray_count; };
     phases.push_back({{"phase", phase.name},
+                      {"placements", per_ray(counters.placements)},
                       {"nodes", per_ray(counters.node_rays)},
                       {"unpacked", per_ray(counters.nodes)},
                       {"leaves", per_ray(counters.leaf_rays)},
                       {"triangles", per_ray(counters.triangles)},
                       {"batches_decoded", per_ray(counters.batches_decoded)},
                       {"exact_triangles", per_ray(counters.exact_triangles)}});
-    fmt::print("{}: {:.2f}, {:.2f}, {:.2f}, {:.1f}, {:.3f}\n", phase.name, per_ray(counters.node_rays),
-               per_ray(counters.nodes), per_ray(counters.leaf_rays), per_ray(counters.triangles),
-               per_ray(counters.batches_decoded));
+    fmt::print("{}: {:.2f}, {:.2f}, {:.2f}, {:.2f}, {:.1f}, {:.3f}\n", phase.name, per_ray(counters.placements),
+               per_ray(counters.node_rays), per_ray(counters.nodes), per_ray(counters.leaf_rays),
+               per_ray(counters.triangles), per_ray(counters.batches_decoded));
   }
   std::fflush(stdout);
   return phases;

@@ -10,7 +10,7 @@
 
 namespace packtrace {
 
-/// Rays as the renderer hands them to a tracer, span by span.
+/// Rays as the renderer hands them to a tracer that wants no more than 1,024 together, span by span.
 struct RecordedRays {
   std::string_view name;
   uint32_t ray_class = 0;
