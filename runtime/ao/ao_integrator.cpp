@@ -75,14 +75,24 @@ public:
   /// Needs RayHit for distances, a byte otherwise.
   template <typename Result>
   void trace_tile(const Tile& tile, const Progress& progress) const {
-    ShadingPoint points[kTilePixels];
-    alignas(64) Ray rays[kMostTogether * kTilePixels];
-    const uint32_t count = gather(tile, points, rays);
-    if (count == 0) return;
     const uint32_t together =
         std::clamp(tracer_.rays_together() / kTilePixels, 1u, std::min(config_.spp, kMostTogether));
+    if (together == 1)
+      trace_samples<Result, 1>(tile, together, progress);
+    else
+      trace_samples<Result, kMostTogether>(tile, together, progress);
+  }
+
+private:
+  /// @param together samples in one call, kRoom at most
+  template <typename Result, uint32_t kRoom>
+  void trace_samples(const Tile& tile, uint32_t together, const Progress& progress) const {
+    ShadingPoint points[kTilePixels];
+    alignas(64) Ray rays[kRoom * kTilePixels];
+    const uint32_t count = gather(tile, points, rays);
+    if (count == 0) return;
     for (uint32_t s = 1; s < together; ++s) std::copy_n(rays, count, rays + s * count);
-    Result results[kMostTogether * kTilePixels];
+    Result results[kRoom * kTilePixels];
     double visibility[kTilePixels] = {}, distance[kTilePixels] = {};
     for (uint32_t first = 0; first < config_.spp; first += together) {
       progress.check_cancelled(); // a tile of 65,536 samples takes minutes
@@ -102,7 +112,6 @@ public:
     }
   }
 
-private:
   /// Collects a tile's hits, 4 x 4 pixels at a time so that neighbouring rays share cache lines of the tree, and
   /// marks its misses.
   uint32_t gather(const Tile& tile, ShadingPoint* points, Ray* rays) const {

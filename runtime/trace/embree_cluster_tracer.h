@@ -40,6 +40,7 @@ public:
                 std::span<uint8_t> occluded) const override {
     packed_.any_hits(rays, ray_class, order, occluded);
   }
+  uint32_t rays_together() const override { return packed_.rays_together(); }
   HitSurface resolve(const RayHit& hit) const override { return packed_.resolve(hit); }
 
   /// PackedTracer's, "bvh": what Embree holds, and "cluster nodes": which nodes are a cluster's.

@@ -56,15 +56,10 @@ inline constexpr uint32_t kLeastStream = 512;
 inline constexpr uint32_t kStreamGroups = kStreamRays / 64 + 7; ///< of 64, by octant
 inline constexpr size_t kStreamGroupBytes = 4224, kStreamPartBytes = 16, kStreamAlignment = 64;
 
-/// @param top_depth levels of nodes over placements
-constexpr size_t stream_bytes(uint32_t top_depth) {
-  return kStreamGroups * (kStreamGroupBytes + (1 + size_t{top_depth} * baked::kNodeWidth) * kStreamPartBytes);
-}
-
 /// What a thread keeps.
 struct ThreadMemory {
   BatchCache batches;
-  void* stream; ///< stream_bytes() of the scene's tree, aligned to kStreamAlignment; null: groups are traced alone
+  void* stream; ///< room for a tree of the scene's depth, aligned to kStreamAlignment; null: groups are traced alone
 };
 
 struct TraceTree {
@@ -84,7 +79,7 @@ struct TracePlacement {
 
 /// Of the tree over placements. Children: kTopLeaf + placement, or a node after this one.
 struct alignas(64) TopNode {
-  float lo[3][baked::kNodeWidth]; ///< unit space, rounded outwards; lo > hi where there is no child
+  float lo[3][baked::kNodeWidth]; ///< unit space, rounded outwards; anything where there is no child
   float hi[3][baked::kNodeWidth];
   uint32_t child[baked::kNodeWidth];
   uint32_t slots; ///< in use, as bits

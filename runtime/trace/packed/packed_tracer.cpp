@@ -266,7 +266,7 @@ std::vector<ResidentPart> PackedTracer::resident() const {
           {"placements", t.placements.size() * (sizeof(packed::TracePlacement) + sizeof(TreeBox) + sizeof(uint32_t)) +
                              t.surfaces.size() * sizeof(Placement) + t.top.size() * sizeof(packed::TopNode) +
                              (t.tree_of.size() + t.grid_of.size() + t.first_instance.size()) * sizeof(uint32_t)},
-          {"batch caches", ThreadMemoryOwner::bytes_of_all_threads(), true}};
+          {"thread memory", ThreadMemoryOwner::bytes_of_all_threads(), true}};
 }
 
 } // namespace packtrace

@@ -10,6 +10,12 @@ namespace {
 constexpr uint32_t kEntryBits = 10; // 320 KiB: a third of a common second-level cache
 constexpr uint64_t kBatchBytes = uint64_t{sizeof(packed::DecodedBatch)} << kEntryBits;
 
+/// @param top_depth levels of nodes over placements
+constexpr size_t stream_bytes(uint32_t top_depth) {
+  using namespace packed;
+  return kStreamGroups * (kStreamGroupBytes + (1 + size_t{top_depth} * baked::kNodeWidth) * kStreamPartBytes);
+}
+
 struct alignas(packed::kStreamAlignment) StreamBlock {
   std::byte bytes[packed::kStreamAlignment];
 };
@@ -26,10 +32,10 @@ struct Memory {
   ~Memory() { all_bytes -= kBatchBytes + stream.size() * sizeof(StreamBlock); }
 
   void make_room(uint32_t top_depth) {
-    const size_t blocks = packed::stream_bytes(top_depth) / sizeof(StreamBlock) + 1;
-    if (blocks <= stream.size()) return;
-    all_bytes += (blocks - stream.size()) * sizeof(StreamBlock);
+    const size_t blocks = stream_bytes(top_depth) / sizeof(StreamBlock) + 1, before = stream.size();
+    if (blocks <= before) return;
     stream.resize(blocks);
+    all_bytes += (blocks - before) * sizeof(StreamBlock);
   }
 };
 
@@ -41,10 +47,10 @@ packed::ThreadMemory& ThreadMemoryOwner::of_this_thread(uint32_t top_depth) cons
   thread_local Memory memory;
   if (memory.owner != number_) {
     for (packed::DecodedBatch& entry : memory.batches) entry.tag = 0;
-    if (top_depth > 0) memory.make_room(top_depth);
-    memory.view.stream = top_depth > 0 ? memory.stream.data() : nullptr;
     memory.owner = number_;
   }
+  if (top_depth > 0) memory.make_room(top_depth);
+  memory.view.stream = top_depth > 0 ? memory.stream.data() : nullptr;
   return memory.view;
 }
 

@@ -19,6 +19,7 @@ public:
   /// @param top_depth levels of nodes over placements that rays go through together; 0: none
   packed::ThreadMemory& of_this_thread(uint32_t top_depth) const;
 
+  /// What all threads that live keep, for whichever owner.
   static uint64_t bytes_of_all_threads();
 
 private:

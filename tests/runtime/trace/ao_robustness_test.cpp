@@ -8,6 +8,7 @@
 
 #include "pbrt_import/scene/error.h"
 #include "runtime/trace/float_source.h"
+#include "tests/runtime/trace/packed_scenes.h"
 #include "tests/runtime/trace/test_scenes.h"
 
 namespace packtrace {
@@ -219,6 +220,27 @@ TEST(AoFrames, SamplesThatAreTracedTogetherGiveTheSameBytes) {
     EXPECT_EQ(apart.hit_distance, together.hit_distance);
     EXPECT_GT(apart.ao[0], 0.0f);
     EXPECT_LT(apart.ao[0], 1.0f);
+  }
+}
+
+TEST(AoFrames, SamplesThatThePackedTracerTakesTogetherGiveTheSameBytes) {
+  const Scene scene = test::thicket_scene();
+  const test::BakedScene baked(scene);
+  const PackedTracer packed(baked.file, baked.source);
+  const CrowdTracer one(packed, 1), all(packed, packed.rays_together());
+  AoConfig config = visibility(1.5f, 5); // 5 = 4 + 1
+  const GBuffer gbuffer = render(scene, camera_at({0, 6, -9}, {0, 1, 0}), {40, 40}, config).gbuffer;
+  Progress progress;
+  for (const bool falloff : {false, true}) {
+    config.falloff = falloff;
+    AoFrame apart, together;
+    trace_ao(baked.source, one, gbuffer, config, 0, apart, progress);
+    trace_ao(baked.source, all, gbuffer, config, 0, together, progress);
+    EXPECT_LE(one.most(), 1024u);
+    EXPECT_GT(all.most(), 2048u);
+    EXPECT_EQ(std::memcmp(apart.ao.data(), together.ao.data(), apart.ao.size() * sizeof(float)), 0);
+    EXPECT_EQ(apart.hit_distance, together.hit_distance);
+    EXPECT_NE(std::ranges::min(apart.ao), std::ranges::max(apart.ao));
   }
 }
 
