@@ -34,6 +34,9 @@ struct LeafNodes {
   std::vector<TreeGridBox> boxes;
 };
 
+/// Trees of a plan last as long as a view: all moves would take ten times as long as what else their nodes take.
+constexpr ReinsertionConfig kMovesOfPlans{.passes = 1, .subtrees = 1 << 10, .search = 64};
+
 /// Builds the leaf nodes of one cluster after the other.
 class LeafNodeBuilder {
 public:
@@ -142,7 +145,7 @@ public:
     for (const uint32_t g : geometries) records.push_back(&sections_.geometries[g]);
     choose_tree_grid(records, sections_.clusters, tree.record);
     const std::vector<TreeCluster> clusters = find_clusters(geometries);
-    build_nodes(build_leaf_nodes(clusters, tree.record, find_typical_area(clusters, tree.record)), tree);
+    build_nodes(build_leaf_nodes(clusters, tree.record, find_typical_area(clusters, tree.record)), {}, tree);
     return tree;
   }
 
@@ -206,7 +209,7 @@ public:
     return all;
   }
 
-  static void build_nodes(const LeafNodes& leaves, Tree& tree) {
+  static void build_nodes(const LeafNodes& leaves, const ReinsertionConfig& moves, Tree& tree) {
     if (leaves.nodes.size() > uint64_t{1} << 30)
       throw Error(ErrorKind::kLimitExceeded, "a tree has more than 2^30 nodes with leaves");
     std::vector<TreeBox> boxes;
@@ -216,7 +219,7 @@ public:
       for (size_t axis = 0; axis < 3; ++axis)
         out.lo[axis] = static_cast<float>(box.lo[axis]), out.hi[axis] = static_cast<float>(box.hi[axis]);
     }
-    const WideTree built = build_wide_tree(boxes, baked::kMaxTreeDepth);
+    const WideTree built = build_wide_tree(boxes, baked::kMaxTreeDepth, moves);
     const std::vector<WideNode>& wide = built.nodes;
     tree.nodes.resize(wide.size());
     std::vector<TreeGridBox> whole(wide.size());
@@ -305,7 +308,7 @@ struct ChosenTreeBuilder::Tables {
       }
     TreeBuilder::Tree out;
     out.record = grid.record;
-    TreeBuilder::build_nodes(leaves, out);
+    TreeBuilder::build_nodes(leaves, kMovesOfPlans, out);
     return out;
   }
 };
