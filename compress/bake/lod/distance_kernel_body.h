@@ -29,16 +29,18 @@ struct Vector4 {
   least = distance2 < least ? distance2 : least;
 }
 
-using Stored = double __attribute__((vector_size(32), may_alias, aligned(8)));
+[[gnu::always_inline]] inline Vector4 load(const double (&rows)[3][4]) {
+  Vector4 out;
+  __builtin_memcpy(&out.x, rows[0], sizeof out.x);
+  __builtin_memcpy(&out.y, rows[1], sizeof out.y);
+  __builtin_memcpy(&out.z, rows[2], sizeof out.z);
+  return out;
+}
 
 [[gnu::always_inline]] inline void distances_to_block(const double* points, uint64_t point_count,
                                                       const TriangleBlock& block, double* const* out, uint64_t at) {
-  const auto in = [](const double* from) __attribute__((always_inline))->const Stored& {
-    return *reinterpret_cast<const Stored*>(from);
-  };
   const Lanes zero = {}, one = zero + 1.0;
-  const Vector4 ab = {in(block.ab[0]), in(block.ab[1]), in(block.ab[2])};
-  const Vector4 ac = {in(block.ac[0]), in(block.ac[1]), in(block.ac[2])};
+  const Vector4 a = load(block.a), ab = load(block.ab), ac = load(block.ac);
   const Vector4 bc = {ac.x - ab.x, ac.y - ab.y, ac.z - ab.z};
   Lanes d00, d01, d11, dbc;
   dot(ab, ab, d00), dot(ab, ac, d01), dot(ac, ac, d11), dot(bc, bc, dbc);
@@ -47,7 +49,7 @@ using Stored = double __attribute__((vector_size(32), may_alias, aligned(8)));
   const Lanes over_bc = one / (dbc > zero ? dbc : one), scale = one / (area2 > zero ? area2 : one);
   for (uint64_t i = 0; i < point_count; ++i) {
     const double* point = points + 3 * i;
-    const Vector4 ap = {point[0] - in(block.a[0]), point[1] - in(block.a[1]), point[2] - in(block.a[2])};
+    const Vector4 ap = {point[0] - a.x, point[1] - a.y, point[2] - a.z};
     const Vector4 bp = {ap.x - ab.x, ap.y - ab.y, ap.z - ab.z};
     Lanes p0, p1, pbc;
     dot(ap, ab, p0), dot(ap, ac, p1), dot(bp, bc, pbc);
@@ -81,15 +83,14 @@ using Stored = double __attribute__((vector_size(32), may_alias, aligned(8)));
 [[gnu::always_inline]] inline NearestTriangle nearest_of(const double* a, const double* b, const double* c,
                                                          uint64_t count) {
   using Places = int64_t __attribute__((vector_size(32)));
-  using StoredPlaces = int64_t __attribute__((vector_size(32), may_alias, aligned(8)));
-  const auto in = [](const double* from) __attribute__((always_inline))->const Stored& {
-    return *reinterpret_cast<const Stored*>(from);
-  };
   const Lanes far = Lanes{} + __builtin_inf();
   Lanes nearest_a = far, nearest_b = far, nearest_c = far, best = far;
   Places at = {}, place = {0, 1, 2, 3};
   for (uint64_t i = 0; i < 4 * count; i += 4, place += 4) {
-    const Lanes from_a = in(a + i), from_b = in(b + i), from_c = in(c + i);
+    Lanes from_a, from_b, from_c;
+    __builtin_memcpy(&from_a, a + i, sizeof from_a);
+    __builtin_memcpy(&from_b, b + i, sizeof from_b);
+    __builtin_memcpy(&from_c, c + i, sizeof from_c);
     nearest_a = from_a < nearest_a ? from_a : nearest_a;
     nearest_b = from_b < nearest_b ? from_b : nearest_b;
     nearest_c = from_c < nearest_c ? from_c : nearest_c;
@@ -101,9 +102,9 @@ using Stored = double __attribute__((vector_size(32), may_alias, aligned(8)));
   }
   double bests[4], least[3][4];
   int64_t places[4];
-  *reinterpret_cast<Stored*>(bests) = best, *reinterpret_cast<StoredPlaces*>(places) = at;
-  *reinterpret_cast<Stored*>(least[0]) = nearest_a, *reinterpret_cast<Stored*>(least[1]) = nearest_b;
-  *reinterpret_cast<Stored*>(least[2]) = nearest_c;
+  __builtin_memcpy(bests, &best, sizeof best), __builtin_memcpy(places, &at, sizeof at);
+  __builtin_memcpy(least[0], &nearest_a, sizeof best), __builtin_memcpy(least[1], &nearest_b, sizeof best);
+  __builtin_memcpy(least[2], &nearest_c, sizeof best);
   int lane = 0;
   for (int i = 1; i < 4; ++i)
     if (bests[i] < bests[lane] || (bests[i] == bests[lane] && places[i] < places[lane])) lane = i;
