@@ -69,6 +69,8 @@ ImportResult import_scene(const std::filesystem::path& main_file, const ImportOp
   result.statistics.files_read += source.files_opened();
   result.statistics.bytes_read += source.bytes_read();
   reporter.finish();
+  for (const Severity severity : {Severity::kNote, Severity::kWarning, Severity::kError})
+    result.statistics.problems[static_cast<size_t>(severity)] = diagnostics.count(severity);
   if (options.strict) require_clean(diagnostics);
   return result;
 }

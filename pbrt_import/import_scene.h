@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -43,6 +44,7 @@ struct ImportStatistics {
   uint64_t animated_shapes = 0;              ///< in the scene, those of objects once
   uint64_t animated_instances = 0;
   uint64_t animated_cameras = 0;
+  std::array<uint64_t, 3> problems{};      ///< reported, by Severity
   std::map<std::string, uint64_t> ignored; ///< features met that nothing is made of, docs/json_output.md names them
 };
 

@@ -30,25 +30,6 @@ constexpr std::pair<std::string_view, ParameterType> kTypeNames[] = {
     {"normal3", ParameterType::kNormal},
 };
 
-char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; }
-
-/// Twice the edit distance, letters that differ in case only counting 1; stops caring above the names' own lengths.
-size_t doubled_distance(std::string_view a, std::string_view b) {
-  std::vector<size_t> row(b.size() + 1);
-  for (size_t j = 0; j <= b.size(); ++j) row[j] = 2 * j;
-  for (size_t i = 1; i <= a.size(); ++i) {
-    size_t diagonal = row[0];
-    row[0] = 2 * i;
-    for (size_t j = 1; j <= b.size(); ++j) {
-      const size_t change = a[i - 1] == b[j - 1] ? 0 : lower(a[i - 1]) == lower(b[j - 1]) ? 1 : 2;
-      const size_t best = std::min({row[j] + 2, row[j - 1] + 2, diagonal + change});
-      diagonal = row[j];
-      row[j] = best;
-    }
-  }
-  return row[b.size()];
-}
-
 const Parameter* single_value(const ParameterList& list, std::string_view name, ParameterType type, size_t values) {
   const Parameter* const parameter = list.find(name, {type});
   if (!parameter) return nullptr;
@@ -74,7 +55,8 @@ std::string_view to_string(ParameterType type) {
 
 std::string_view closest_parameter_type(std::string_view name) {
   std::array<std::string_view, std::size(kTypeNames)> names;
-  std::transform(std::begin(kTypeNames), std::end(kTypeNames), names.begin(), [](const auto& entry) { return entry.first; });
+  std::transform(std::begin(kTypeNames), std::end(kTypeNames), names.begin(),
+                 [](const auto& entry) { return entry.first; });
   return closest_name(name, names);
 }
 
@@ -170,20 +152,6 @@ bool ParameterList::was_asked(std::string_view name) const {
 }
 
 std::string_view ParameterList::suggestion(std::string_view name) const { return closest_name(name, asked_); }
-
-std::string_view closest_name(std::string_view name, std::span<const std::string_view> candidates) {
-  constexpr size_t kLongestName = 64;
-  if (name.empty() || name.size() > kLongestName) return {};
-  std::string_view best;
-  // Two edits, but no more than a third of the name: "Ks" is no misspelling of "Kd". A difference in case always is.
-  size_t best_distance = 2 * std::min<size_t>(2, name.size() / 3) + 2;
-  for (const std::string_view candidate : candidates) {
-    if (candidate == name || candidate.size() > name.size() + 2 || name.size() > candidate.size() + 2) continue;
-    if (const size_t distance = doubled_distance(name, candidate); distance < best_distance)
-      best = candidate, best_distance = distance;
-  }
-  return best;
-}
 
 std::string did_you_mean(std::string_view suggestion) {
   return suggestion.empty() ? std::string() : "; did you mean " + in_quotes(suggestion) + "?";

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pbrt_import/number_array.h"
+#include "pbrt_import/scene/closest_name.h"
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {
@@ -107,9 +108,6 @@ private:
   uint32_t types_ = 0;                          ///< bit_of() all of them
   mutable std::vector<std::string_view> asked_; ///< literals, some of them often
 };
-
-/// The candidate within two edits of name that needs fewest; empty if none. Case differences count half an edit.
-std::string_view closest_name(std::string_view name, std::span<const std::string_view> candidates);
 
 /// `; did you mean "x"?` or nothing.
 std::string did_you_mean(std::string_view suggestion);

@@ -116,7 +116,8 @@ nlohmann::json report(const BakeOptions& options, const BakeReport& baked, const
                     {"shapes", imported.shapes},
                     {"shapes_skipped", imported.shapes_skipped},
                     {"textures_found", imported.textures_found},
-                    {"textures_missing", imported.textures_missing}};
+                    {"textures_missing", imported.textures_missing},
+                    {"problems", problems_json(imported)}};
   json["dropped_streams"] = dropped_streams_json(baked.file);
   json["warnings"] = baked.warnings;
   return json;
@@ -152,21 +153,22 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   fmt::print("{}: import {:.3f} s, bake {:.3f} s, peak memory {:.0f} MiB\n",
              options.dry_run ? "dry run" : options.output, import_s, bake_s,
              static_cast<double>(peak_rss_bytes()) / (1 << 20));
-  fmt::print(
-      "{}",
-      fmt::format(
-          grouped(),
-          "{:L} triangles in {:L} bytes: {:.3f} bytes a triangle; position error {:.3g}, normal error {:.4f} degrees\n",
-          baked.file.triangles, baked.file.bytes.total, baked.file.bytes_per_triangle, baked.max_position_error,
-          baked.max_normal_error_degrees));
+  fmt::print("{}", fmt::format(grouped(),
+                               "{:L} triangles in {:L} bytes: {:.3f} bytes a triangle; position error {:.3g}, {}\n",
+                               baked.file.triangles, baked.file.bytes.total, baked.file.bytes_per_triangle,
+                               baked.max_position_error,
+                               baked.file.normals.empty()
+                                   ? std::string("no normals stored")
+                                   : fmt::format("normal error {:.4f} degrees", baked.max_normal_error_degrees)));
   fmt::print("{}", disk_text(baked.file));
   if (const LodTable& lod = baked.file.lod.all; !lod.levels.empty())
-    fmt::print("{}", fmt::format(grouped(),
-                                 "{} levels of detail of {:L} geometries: {:.3f} bytes for each of their {:L} triangles\n",
-                                 lod.levels.size() - 1, baked.lod_geometries, lod.bytes_per_triangle(),
-                                 lod.base_triangles()));
+    fmt::print(
+        "{}", fmt::format(grouped(),
+                          "{} levels of detail of {:L} geometries: {:.3f} bytes for each of their {:L} triangles\n",
+                          lod.levels.size() - 1, baked.lod_geometries, lod.bytes_per_triangle(), lod.base_triangles()));
   if (baked.resumed_geometries > 0)
-    fmt::print("{}", fmt::format(grouped(), "levels of {:L} geometries were there from before\n", baked.resumed_geometries));
+    fmt::print("{}",
+               fmt::format(grouped(), "levels of {:L} geometries were there from before\n", baked.resumed_geometries));
   if (baked.instanced_shapes > 0)
     fmt::print("{}", fmt::format(grouped(), "{:L} shapes outside objects share geometry, on grids of its own\n",
                                  baked.instanced_shapes));
@@ -187,7 +189,8 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   CLI::App& verb = add_verb(app, globals, "bake", "Import a pbrt-v3 scene and pack it into a .ptk file",
                             [options, &globals] { return run(*options, globals); });
   verb.add_option("SCENE", options->input, "A pbrt-v3 scene")->required();
-  verb.add_option("-o,--output", options->output, "The .ptk file to write")->type_name("FILE");
+  verb.add_option("-o,--output", options->output, "The .ptk file to write; required but for --dry-run")
+      ->type_name("FILE");
   const auto add_precision = [&](const char* name, auto& value, const char* type, const char* description) {
     return verb.add_option(name, value, description)->type_name(type)->group("Precision of positions, at most one of");
   };
@@ -256,9 +259,10 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   verb.add_option("--lod-levels", options->lod_levels, "Coarser levels at most, 1..31 (default 31)")
       ->type_name("N")
       ->group("Levels of detail");
-  verb.add_option("--resume", options->resume,
-                  "A folder for levels that are done: an interrupted bake, started again, takes them from there; removed "
-                  "when the file is written")
+  verb.add_option(
+          "--resume", options->resume,
+          "A folder for levels that are done: an interrupted bake, started again, takes them from there; removed "
+          "when the file is written")
       ->type_name("DIR")
       ->group("Levels of detail");
   verb.add_option("--trees", options->trees,
@@ -268,7 +272,7 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   verb.add_option(
           "--codec", options->codec,
           "Form on disk: none is mapped and traced as it is; fast and small are smaller, and decoded when opened, fast "
-          "some eight times as quickly")
+          "four to five times as quickly")
       ->check(CLI::IsMember({std::string(name_of(PageCodec::kNone)), std::string(name_of(PageCodec::kFast)),
                              std::string(name_of(PageCodec::kSmall))}))
       ->default_str(std::string(name_of(PageCodec::kNone)));
@@ -278,7 +282,8 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
       "Shapes outside objects lie on one grid, so meshes that touch stay closed; shapes that share a mesh are stored "
       "once,\n"
       "on a grid of its own. The error that was measured against the source is printed, stored in the file, and never\n"
-      "above half a step per axis and the rounding to floats. What was left out, and why, is printed; -v says it of each geometry.\n"
+      "above half a step per axis and the rounding to floats. What was left out, and why, is printed; -v says it of "
+      "each geometry.\n"
       "Examples:\n"
       "  packtrace bake house.pbrt -o house.ptk\n"
       "  packtrace bake house.pbrt -o small.ptk --precision 1e-4 --json report.json");

@@ -1,16 +1,19 @@
 #include "runtime/commands/cli_support.h"
 
+#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 #include <new>
 #include <optional>
 #include <string_view>
 #include <system_error>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <tbb/global_control.h>
 #include <unistd.h>
 
+#include "pbrt_import/scene/closest_name.h"
 #include "pbrt_import/scene/error.h"
 #include "pbrt_import/scene/output_file.h"
 #include "pbrt_import/scene/progress.h"
@@ -59,6 +62,22 @@ int fail(const std::string& message, int exit_code) {
   return exit_code;
 }
 
+/// What is wrong with the command line; of an option that is not there, which one is most like it.
+std::string message_of(const CLI::ParseError& error, const CLI::App& app) {
+  const auto verbs = app.get_subcommands();
+  const std::vector<std::string> left = verbs.empty() ? std::vector<std::string>{} : verbs.front()->remaining();
+  if (dynamic_cast<const CLI::ExtrasError*>(&error) == nullptr || left.empty()) return error.what();
+  const auto given = std::ranges::find_if(left, [](const std::string& word) { return word.starts_with("-"); });
+  if (given == left.end()) return left.front() + ": one argument too many";
+  const std::string name = given->substr(0, given->find('='));
+  std::vector<std::string> names;
+  for (const CLI::Option* option : verbs.front()->get_options())
+    for (const std::string& known : option->get_lnames()) names.push_back("--" + known);
+  const std::vector<std::string_view> known(names.begin(), names.end());
+  const std::string nearest(closest_name(name, known));
+  return name + ": no such option" + (nearest.empty() ? "" : "; did you mean " + nearest + "?");
+}
+
 int parse(CLI::App& app, int argc, const char* const* argv) {
   try {
     app.parse(argc, argv);
@@ -67,19 +86,21 @@ int parse(CLI::App& app, int argc, const char* const* argv) {
     app.exit(success);
     return 0;
   } catch (const CLI::ParseError& error) {
-    app.exit(error);
-    return static_cast<int>(ErrorKind::kUsage);
+    const auto verbs = app.get_subcommands();
+    const std::string command = "packtrace" + (verbs.empty() ? "" : " " + verbs.front()->get_name());
+    return fail(message_of(error, app) + " (" + command + " --help explains)", static_cast<int>(ErrorKind::kUsage));
   }
 }
 
-/// CLI11 says "a subcommand is required" for a verb that it does not know; this names it.
+/// CLI11 says "a subcommand is required" for no verb, or one that it does not know; this names it.
 std::optional<std::string> unknown_verb(const CLI::App& app, int argc, const char* const* argv) {
-  if (argc < 2 || argv[1][0] == '-') return std::nullopt;
   std::string known;
   for (const CLI::App* verb : app.get_subcommands({})) {
-    if (verb->get_name() == argv[1]) return std::nullopt;
+    if (argc >= 2 && verb->get_name() == argv[1]) return std::nullopt;
     if (!verb->get_group().empty()) known += (known.empty() ? "" : ", ") + verb->get_name();
   }
+  if (argc < 2) return "a verb is needed: " + known + " (packtrace --help explains)";
+  if (argv[1][0] == '-') return std::nullopt;
   return "unknown verb '" + std::string(argv[1]) + "'; there are " + known;
 }
 

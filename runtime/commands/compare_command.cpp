@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -208,6 +209,8 @@ void print_notes(const ImagePair& pair, const GlobalOptions& globals) {
 }
 
 int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
+  if (!options.diff.empty() && std::filesystem::path(options.diff).extension() != ".png")
+    throw Error(ErrorKind::kUsage, "--diff " + options.diff + ": the picture is a .png");
   JsonOutput json(globals.json, globals.force);
   std::optional<OutputFile> diff;
   if (!options.diff.empty()) diff.emplace(options.diff, globals.force);
@@ -227,7 +230,10 @@ int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
 
   const std::vector<Check> checks = check_limits(options, pair, values);
   if (!globals.quiet && !json.to_stdout()) print_results(pair, values, checks);
-  if (diff) diff->commit();
+  if (diff) {
+    diff->commit();
+    if (!globals.quiet && !json.to_stdout()) fmt::print("wrote {}\n", options.diff);
+  }
   json.write(to_json(options, pair, values, checks));
   for (const Check& check : checks)
     if (!check.passed)
@@ -253,8 +259,8 @@ void add_compare_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<CompareOptions>();
   CLI::App& verb = add_verb(app, globals, "compare", "Measure how different two images are",
                             [options, &globals] { return run_compare(*options, globals); });
-  verb.add_option("test", options->test, "PNG (read as sRGB) or EXR")->required();
-  verb.add_option("reference", options->reference, "The image to compare with")->required();
+  verb.add_option("TEST", options->test, "PNG (read as sRGB) or EXR")->required();
+  verb.add_option("REFERENCE", options->reference, "The image to compare with")->required();
   verb.add_option("--layer", options->layer, "EXR layer (default: ao, else colours, else the only one)");
   verb.add_option("--metric", options->metrics, "Metrics to compute: all, rmse, mae, psnr, ssim, flip")
       ->delimiter(',')
@@ -266,22 +272,31 @@ void add_compare_command(CLI::App& app, GlobalOptions& globals) {
 
   const std::string group = "Limits: exit code 5 beyond them";
   constexpr double kHuge = 1e30;
-  verb.add_option("--max-rmse", options->limits[0])->check(number_in(0.0, kHuge))->group(group);
-  verb.add_option("--max-mae", options->limits[1])->check(number_in(0.0, kHuge))->group(group);
-  verb.add_option("--min-psnr", options->limits[2], "dB")->check(number_in(-kHuge, kHuge))->group(group);
-  verb.add_option("--min-ssim", options->limits[3])->check(number_in(-1.0, 1.0))->group(group);
-  verb.add_option("--max-flip", options->limits[4])->check(number_in(0.0, 1.0))->group(group);
+  verb.add_option("--max-rmse", options->limits[0], "Root of the mean squared error")
+      ->check(number_in(0.0, kHuge))
+      ->group(group);
+  verb.add_option("--max-mae", options->limits[1], "Mean absolute error")->check(number_in(0.0, kHuge))->group(group);
+  verb.add_option("--min-psnr", options->limits[2], "Peak signal to noise, dB")
+      ->check(number_in(-kHuge, kHuge))
+      ->group(group);
+  verb.add_option("--min-ssim", options->limits[3], "Structural similarity, 1 for the same")
+      ->check(number_in(-1.0, 1.0))
+      ->group(group);
+  verb.add_option("--max-flip", options->limits[4], "FLIP, 0 for the same")->check(number_in(0.0, 1.0))->group(group);
   verb.add_option("--max-mismatch", options->max_mismatch, "Fraction of pixels with a value in only one image")
       ->check(number_in(0.0, 1.0))
       ->group(group);
 
-  verb.add_option("--diff", options->diff, "Write a PNG of the errors: black, red, yellow, white");
+  verb.add_option("--diff", options->diff, "Write a .png of the errors: black, red, yellow, white")->type_name("FILE");
   verb.add_option("--diff-metric", options->diff_metric, "Whose error per pixel to show")
       ->check(CLI::IsMember({"rmse", "mae", "psnr", "ssim", "flip"}))
       ->capture_default_str();
   verb.add_option("--diff-white", options->diff_white, "Error shown as white")
       ->check(number_in(1e-6, 1e6))
       ->capture_default_str();
+  verb.footer("Examples:\n"
+              "  packtrace compare test.exr truth.exr --layer ao --min-psnr 34\n"
+              "  packtrace compare test.png truth.png --diff errors.png");
 }
 
 } // namespace packtrace

@@ -16,6 +16,7 @@
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/file_report.h"
 #include "runtime/commands/json_output.h"
+#include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/process_usage.h"
 #include "runtime/commands/progress_display.h"
 
@@ -29,6 +30,7 @@ struct ExportOptions {
   std::string layout; ///< empty: by the output's extension
   std::string codec = kDraco;
   GltfConfig gltf;
+  bool for_gltf = false; ///< an option was given that only glTF has
 };
 
 /// Bytes to be written and what is said about them.
@@ -42,7 +44,7 @@ nlohmann::json to_json(const ExportOptions& options, const Vertex16Report& r) {
   return {{"verb", "export"},
           {"input", options.input},
           {"output", options.output},
-          {"layout", options.layout},
+          {"layout", kVertex16},
           {"geometries", r.geometries},
           {"draws", r.draws},
           {"instances", r.instances},
@@ -121,12 +123,17 @@ std::string layout_of(const ExportOptions& options) {
   if (extension == ".gltf")
     throw Error(ErrorKind::kUsage, options.output + ": glTF is written as one binary file, .glb");
   if (!options.layout.empty()) return options.layout;
-  return extension == ".glb" ? kGltf : kVertex16;
+  if (extension == ".glb") return kGltf;
+  if (extension == ".v16") return kVertex16;
+  throw Error(ErrorKind::kUsage, options.output + ": give it the ending .glb or .v16, or say --layout");
 }
 
-Exported export_file(const ExportOptions& options, Progress& progress) {
+Exported export_file(const ExportOptions& options, const std::string& layout, Progress& progress) {
+  if (!is_baked_file(options.input))
+    throw Error(ErrorKind::kInput,
+                options.input + ": not a packtrace baked file; make one with packtrace bake SCENE.pbrt -o FILE.ptk");
   const BakedFile file = BakedFile::open(options.input);
-  if (layout_of(options) == kGltf) {
+  if (layout == kGltf) {
     GltfConfig config = options.gltf;
     config.draco = options.codec == kDraco;
     GltfExport result = export_gltf(file, config, progress);
@@ -140,11 +147,14 @@ int run(const ExportOptions& options, const GlobalOptions& globals) {
   std::error_code not_there;
   if (std::filesystem::equivalent(options.input, options.output, not_there))
     throw Error(ErrorKind::kUsage, options.output + ": the output is the input");
+  const std::string layout = layout_of(options);
+  if (layout == kVertex16 && options.for_gltf)
+    throw Error(ErrorKind::kUsage, "--codec, --level, --normal-bits and --uv-bits are for --layout gltf");
   JsonOutput json(globals.json, globals.force);
   OutputFile output(options.output, globals.force);
   ProgressDisplay display(globals);
   Progress progress(display.observer());
-  const Exported result = export_file(options, progress);
+  const Exported result = export_file(options, layout, progress);
   write_file_bytes(output.path(), result.bytes);
   output.commit();
   display.finish();
@@ -160,29 +170,34 @@ void add_export_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<ExportOptions>();
   CLI::App& verb = add_verb(app, globals, "export", "Write a .ptk file in a form that other programs read",
                             [options, &globals] { return run(*options, globals); });
+  const auto of_gltf = [options](const std::string&) { options->for_gltf = true; };
   verb.add_option("FILE", options->input, "A .ptk file")->required();
   verb.add_option("-o,--output", options->output, "The file to write")->type_name("FILE")->required();
   verb.add_option("--layout", options->layout,
                   "vertex16: 16 bytes a vertex, 16- or 32-bit indices; gltf: one binary glTF 2.0 file with materials,\n"
-                  "instances, textures and cameras. Default: gltf for .glb, else vertex16")
+                  "instances, textures and cameras. Default: gltf for .glb, vertex16 for .v16")
       ->check(CLI::IsMember({kVertex16, kGltf}));
   verb.add_option("--codec", options->codec, "gltf: draco compresses (KHR_draco_mesh_compression), none stores floats")
       ->check(CLI::IsMember({kDraco, kNone}))
+      ->each(of_gltf)
       ->capture_default_str();
   verb.add_option("--level", options->gltf.codec.level, "draco: 0 fastest to 10 smallest")
       ->check(CLI::Range(0, 10))
+      ->each(of_gltf)
       ->capture_default_str();
   verb.add_option("--normal-bits", options->gltf.codec.normal_bits, "draco: bits of normals, 2 to 30")
       ->check(CLI::Range(2, 30))
+      ->each(of_gltf)
       ->capture_default_str();
   verb.add_option("--uv-bits", options->gltf.codec.uv_bits, "draco: bits of texture coordinates, 1 to 30")
       ->check(CLI::Range(1, 30))
+      ->each(of_gltf)
       ->capture_default_str();
   verb.footer(
       "vertex16 packs position 3x21, normal 24, tangent 1+8 and uv 2x16 bits. docs/vertex16.md lays out the file,\n"
       "compress/format/vertex16.glsl and vertex16_decode.h decode it. glTF positions stay on the file's lattice.\n"
       "Examples:\n"
-      "  packtrace export house.ptk -o house.v16 --layout vertex16\n"
+      "  packtrace export house.ptk -o house.v16\n"
       "  packtrace export house.ptk -o house.glb --level 10");
 }
 

@@ -12,14 +12,16 @@
 namespace packtrace {
 namespace {
 
-/// What --aov all stands for.
 constexpr std::array kAlways{"ao", "ao_raw", "depth", "normal", "instance", "albedo", "shaded"};
 /// Only with levels of detail.
 constexpr std::array kOfDetail{"lod", "lod-error"};
 
-std::vector<std::string> chosen(const std::vector<std::string>& aovs, const std::string& otherwise) {
+std::vector<std::string> chosen(const std::vector<std::string>& aovs, const std::string& otherwise, bool detail) {
   std::vector<std::string> names = aovs.empty() ? std::vector{otherwise} : aovs;
-  if (std::find(names.begin(), names.end(), "all") != names.end()) return {kAlways.begin(), kAlways.end()};
+  if (std::find(names.begin(), names.end(), "all") != names.end()) {
+    if (detail) return aov_names();
+    return {kAlways.begin(), kAlways.end()};
+  }
   for (const std::string& name : names) {
     if (std::find(aov_names().begin(), aov_names().end(), name) != aov_names().end()) continue;
     std::string known = "all";
@@ -95,13 +97,14 @@ void ImageOutputs::add(const std::filesystem::path& target, bool force, bool exr
   entries_.push_back({std::make_unique<OutputFile>(target, force), exr, std::move(aovs)});
 }
 
-ImageOutputs::ImageOutputs(const std::vector<std::string>& files, const std::vector<std::string>& aovs, bool force) {
+ImageOutputs::ImageOutputs(const std::vector<std::string>& files, const std::vector<std::string>& aovs, bool detail,
+                           bool force) {
   for (const std::string& name : files) {
     const std::filesystem::path path(name);
     if (path.extension() == ".exr") {
-      add(path, force, true, chosen(aovs, "all"));
+      add(path, force, true, chosen(aovs, "all", detail));
     } else if (path.extension() == ".png") {
-      const std::vector<std::string> layers = chosen(aovs, "ao");
+      const std::vector<std::string> layers = chosen(aovs, "ao", detail);
       for (const std::string& aov : layers) {
         std::filesystem::path target = path;
         if (layers.size() > 1) target.replace_extension("." + aov + ".png");

@@ -21,10 +21,11 @@ class ImageOutputs {
 public:
   /// @param files ending in .exr (one file of all chosen layers) or .png (one file a layer: NAME.png for a single
   ///   layer, NAME.LAYER.png for several)
-  /// @param aovs layers from aov_names(), or "all", which leaves those about levels of detail out; empty: all for .exr
-  /// and "ao" for .png Throws Error(kUsage) for other endings and layer names, and for two outputs to one file;
-  /// otherwise like OutputFile.
-  ImageOutputs(const std::vector<std::string>& files, const std::vector<std::string>& aovs, bool force);
+  /// @param aovs layers from aov_names(), or "all"; empty: all for .exr and "ao" for .png
+  /// @param detail whether levels of detail are seen: "all" holds the layers about them
+  /// Throws Error(kUsage) for other endings and layer names, and for two outputs to one file; otherwise like
+  /// OutputFile.
+  ImageOutputs(const std::vector<std::string>& files, const std::vector<std::string>& aovs, bool detail, bool force);
 
   /// Throws Error(kIo).
   void write(const RenderedImage& image, const ExrAttributes& attributes);

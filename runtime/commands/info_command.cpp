@@ -82,6 +82,7 @@ nlohmann::json to_json(const ImportResult& imported, uint32_t world) {
         {"instances", statistics.animated_instances},
         {"cameras", statistics.animated_cameras}}},
       {"ignored", statistics.ignored},
+      {"problems", problems_json(statistics)},
       {"directives", statistics.directives},
       {"files", statistics.files_read},
       {"file_bytes", statistics.bytes_read},

@@ -4,8 +4,10 @@
 #include <array>
 #include <cstdint>
 #include <fstream>
+#include <string_view>
 
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include "pbrt_import/scene/error.h"
 #include "runtime/trace/float_source.h"
@@ -42,9 +44,35 @@ void require_no_scene_choice(const std::filesystem::path& file, const SceneOptio
                                        " is for .pbrt scenes; a .ptk file holds one world at one time, chosen by bake");
 }
 
+namespace {
+
+/// Refuses what is plainly another kind of file, whose bytes would be reported one by one.
+void require_scene_text(const std::filesystem::path& file) {
+  if (is_baked_file(file))
+    throw Error(ErrorKind::kInput, file.string() + ": a baked file already; give the .pbrt scene that it was made of");
+  std::array<char, 512> start{};
+  std::ifstream in(file, std::ios::binary);
+  in.read(start.data(), static_cast<std::streamsize>(start.size()));
+  const std::string_view text(start.data(), static_cast<size_t>(in.gcount()));
+  if (text.starts_with("ply\n") || text.starts_with("ply\r"))
+    throw Error(ErrorKind::kInput,
+                file.string() + ": a PLY mesh, not a scene; name it in a .pbrt file with Shape \"plymesh\"");
+  if (text.find('\0') != std::string_view::npos)
+    throw Error(ErrorKind::kInput, file.string() + ": not a text file, so no pbrt-v3 scene");
+}
+
+} // namespace
+
+nlohmann::json problems_json(const ImportStatistics& statistics) {
+  const auto count = [&](Severity severity) { return statistics.problems[static_cast<size_t>(severity)]; };
+  return {
+      {"notes", count(Severity::kNote)}, {"warnings", count(Severity::kWarning)}, {"errors", count(Severity::kError)}};
+}
+
 ImportResult import_for_command(const std::filesystem::path& file, const SceneOptions& scene_options,
                                 const GlobalOptions& globals, Progress& progress, ProgressDisplay& display,
                                 bool keep_textures) {
+  require_scene_text(file);
   Diagnostics diagnostics;
   ImportOptions options;
   options.strict = scene_options.strict;

@@ -5,6 +5,8 @@
 #include <optional>
 #include <string>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "compress/format/baked_file.h"
 #include "pbrt_import/import_scene.h"
 #include "pbrt_import/scene/progress.h"
@@ -37,6 +39,9 @@ void require_no_scene_choice(const std::filesystem::path& file, const SceneOptio
 ImportResult import_for_command(const std::filesystem::path& file, const SceneOptions& scene_options,
                                 const GlobalOptions& globals, Progress& progress, ProgressDisplay& display,
                                 bool keep_textures = false);
+
+/// How many problems an import reported: {notes, warnings, errors}.
+nlohmann::json problems_json(const ImportStatistics& statistics);
 
 /// A scene on disk, packed or not, ready to be traced.
 struct LoadedScene {

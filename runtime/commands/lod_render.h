@@ -50,8 +50,8 @@ void require_levels(const std::string& input, const LoadedScene& loaded);
 
 /// Throws like LodSharing and PrimaryCamera. @param loaded has levels
 /// @param seen what camera rays met; null before they are traced
-ChosenDetail choose_detail(const LoadedScene& loaded, const Camera& camera,
-                           const RenderConfig& config, const LodOptions& options, const GBuffer* seen);
+ChosenDetail choose_detail(const LoadedScene& loaded, const Camera& camera, const RenderConfig& config,
+                           const LodOptions& options, const GBuffer* seen);
 
 /// As `render --json` writes it (docs/json_output.md).
 nlohmann::json detail_json(const ChosenDetail& detail, const RayTracer& tracer);

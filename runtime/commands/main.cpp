@@ -30,8 +30,11 @@ int main(int argc, char** argv) {
   CLI::App app("packtrace: compact, ray-traceable assets from pbrt-v3 scenes, and ambient occlusion traced over them",
                "packtrace");
   app.set_version_flag("--version", PACKTRACE_VERSION);
-  app.footer("packtrace VERB --help explains a verb.\n"
-             "Exit codes: 0 ok, 2 usage, 3 input, 4 unsupported, 5 accuracy or limit exceeded, 6 I/O, 7 cancelled.");
+  app.footer("packtrace VERB --help explains a verb. Of any scene:\n"
+             "  packtrace bake scene.pbrt -o scene.ptk\n"
+             "  packtrace render scene.ptk -o scene.png\n"
+             "Exit codes: 0 ok, 1 internal error, 2 usage, 3 input, 4 unsupported, 5 accuracy or limit exceeded, 6 "
+             "I/O, 7 cancelled.");
   packtrace::GlobalOptions globals;
   packtrace::add_bake_command(app, globals);
   packtrace::add_info_command(app, globals);

@@ -263,10 +263,11 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   if (!options.size.empty()) parse_size(options.size);
   validate(options.lod);
   JsonOutput json(globals.json, globals.force);
-  ImageOutputs outputs(options.outputs, options.aovs, globals.force); // before the work, like the above
+  const bool sees_levels = options.lod.error_px && !options.lod.only_occlusion();
+  ImageOutputs outputs(options.outputs, options.aovs, sees_levels, globals.force); // before the work, like the above
   if (outputs.show_detail() && !options.lod.error_px)
     throw Error(ErrorKind::kUsage, "layers about levels of detail need --lod-error");
-  if (outputs.show_detail() && options.lod.only_occlusion())
+  if (outputs.show_detail() && !sees_levels)
     throw Error(ErrorKind::kUsage, "with --lod-rays occlusion all that is seen is level 0: no layers about detail");
   ProgressDisplay display(globals);
   Progress progress(display.observer());
@@ -306,10 +307,11 @@ void add_render_command(CLI::App& app, GlobalOptions& globals) {
       ->required()
       ->type_name("FILE")
       ->allow_extra_args(false);
-  verb.add_option("--aov", options->aovs,
-                  "Layers, separated by commas: ao, ao_raw, depth, normal, instance, albedo, shaded, or all "
-                  "(default: all in .exr, ao in .png). Several layers become NAME.LAYER.png. With "
-                  "--lod-error also lod, lod-error")
+  verb.add_option(
+          "--aov", options->aovs,
+          "Layers, separated by commas: ao (denoised), ao_raw (the last frame as traced), depth, normal, instance, "
+          "albedo, shaded (albedo times ao), with --lod-error also lod and lod-error, or all (default: all "
+          "in .exr, ao in .png). Several layers become NAME.LAYER.png")
       ->delimiter(',')
       ->type_name("LAYERS");
   verb.add_option("--camera", options->camera,
@@ -337,12 +339,14 @@ void add_render_command(CLI::App& app, GlobalOptions& globals) {
           "What traces the rays: packed (the clusters' own bytes; the default for .ptk files), embree (floats; the\n"
           "default for .pbrt files) or embree-clusters (Embree's tree over packed clusters)")
       ->type_name("NAME");
-  verb.add_option("--bvh,--bvh-quality", options->bvh,
-                  "Embree's tree: medium (the default), or high (slower to build, faster to trace)")
+  verb.add_option(
+          "--bvh,--bvh-quality", options->bvh,
+          "Embree's tree, and --backend embree: medium (the default), or high (slower to build, faster to trace)")
       ->type_name("QUALITY");
   verb.add_flag(
       "--fast-edges", options->fast_edges,
-      "Up to a fifth faster, but a few rays slip between triangles that touch; --bvh high needs it to pay off");
+      "--backend embree up to a fifth faster, but a few rays slip between triangles that touch; --bvh high needs it "
+      "to pay off");
   add_lod_options(verb, options->lod);
   add_scene_options(verb, options->scene);
   verb.footer("Examples:\n"

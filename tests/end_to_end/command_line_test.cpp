@@ -1,6 +1,8 @@
 // What holds for all verbs: exit codes, options and promises about files, tried on the program itself.
 
+#include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -26,6 +28,31 @@ TEST(CommandLine, UnknownVerbIsAUsageErrorThatNamesIt) {
   const CommandResult result = run_packtrace({"polish", "x"});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_NE(result.err.find("polish"), std::string::npos) << result.err;
+}
+
+TEST(CommandLine, UnknownOptionIsAUsageErrorThatNamesTheNearestOne) {
+  const CommandResult result = run_packtrace({"render", "x.ptk", "-o", "x.png", "--suprsample=2"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("packtrace: error: --suprsample: no such option; did you mean --supersample?"),
+            std::string::npos)
+      << result.err;
+  EXPECT_NE(run_packtrace({"info", "x.ptk", "y.ptk"}).err.find("y.ptk: one argument too many"), std::string::npos);
+}
+
+TEST(CommandLine, OtherFilesThanScenesAreNamedForWhatTheyAre) {
+  const Workbench bench;
+  ASSERT_EQ(run_packtrace({"bake", bench.scene(), "-o", bench.baked(), "-q"}).exit_code, 0);
+  const fs::path mesh = bench.path() / "mesh.ply", binary = bench.path() / "picture.png";
+  std::ofstream(mesh) << "ply\nformat ascii 1.0\n";
+  std::ofstream(binary) << "\x89PNG" << '\0';
+  for (const auto& [file, kind] :
+       {std::pair{bench.baked(), "a baked file already"}, std::pair{mesh.string(), "a PLY mesh"},
+        std::pair{binary.string(), "not a text file"}}) {
+    const CommandResult result = run_packtrace({"bake", file, "-o", (bench.path() / "out.ptk").string()});
+    EXPECT_EQ(result.exit_code, 3);
+    EXPECT_NE(result.err.find(kind), std::string::npos) << result.err;
+    EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
+  }
 }
 
 TEST(CommandLine, PlannedVerbSaysThatItIsNotThereYet) {

@@ -23,8 +23,8 @@ status=0
 UBSAN_OPTIONS=print_stacktrace=1 "$build/bin/packtrace_${target}_fuzzer" \
   -max_total_time="$seconds" -timeout=5 -rss_limit_mb=1024 -max_len=16384 -print_final_stats=1 \
   -artifact_prefix="$findings/" "$@" "$grown" "${arguments[@]}" >"$log" 2>&1 || status=1
-grep -E '^(stat::|==|SUMMARY|finding:|artifact)|ERROR|runtime error|terminate called|what\(\)' "$log" || true
-grep -E '^#[0-9]+.* cov: ' "$log" | tail -n 1
+grep -aE '^(stat::|==|SUMMARY|finding:|artifact)|ERROR|runtime error|terminate called|what\(\)' "$log" || true
+grep -aE '^#[0-9]+.* cov: ' "$log" | tail -n 1
 echo "corpus: $(find "$grown" -type f | wc -l) inputs in $grown"
 [ $status -eq 0 ] || echo "FINDING: see $log and $findings"
 exit $status

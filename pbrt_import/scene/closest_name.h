@@ -1,0 +1,11 @@
+#pragma once
+
+#include <span>
+#include <string_view>
+
+namespace packtrace {
+
+/// The candidate within two edits of name that needs fewest; empty if none. Case differences count half an edit.
+std::string_view closest_name(std::string_view name, std::span<const std::string_view> candidates);
+
+} // namespace packtrace
