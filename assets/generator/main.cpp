@@ -60,7 +60,7 @@ int run(int argc, char** argv) {
   add_seed(verb, mesh.seed);
   verb->add_option("--triangles", mesh.triangles, "at least [100, 2000000000]")->capture_default_str();
 
-  verb = add_verb("extreme", "sizes from 1e-6 to 1e7 side by side", [&] { return generate_extreme(extreme, output); });
+  verb = add_verb("extreme", "sizes from 1e-6 to 1e6 side by side", [&] { return generate_extreme(extreme, output); });
   add_seed(verb, extreme.seed);
 
   add_verb("leaf", "the alpha mask of assets/room's plant", [&] {
