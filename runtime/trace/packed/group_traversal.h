@@ -118,7 +118,7 @@ private:
       if (active == 0) continue;
       if ((next.node & kTopLeaf) != 0) {
         nearer_ = 0;
-        trace_placement(next.node & ~kTopLeaf, active);
+        trace_placement(next.node & ~kTopLeaf, reach_parts(next.node & ~kTopLeaf, group, active, octant));
         if constexpr (!kAny)
           for (uint64_t m = nearer_; m != 0; m &= m - 1) {
             const uint32_t i = first_bit(m);
@@ -132,9 +132,20 @@ private:
     }
   }
 
+  /// Those of `rays` that come to a placement's parts.
+  uint64_t reach_parts(uint32_t placement, const SideBySideRays& group, uint64_t rays, uint32_t octant) const {
+    if (scene_.parts == nullptr) return rays;
+    const TopNode& parts = scene_.parts[placement];
+    uint64_t by_part[baked::kNodeWidth], reaching = 0;
+    float t[baked::kNodeWidth];
+    uint32_t slots = pass(typename Lanes::Boxes(parts, octant), group, rays, parts.slots, by_part, t);
+    for (; slots != 0; slots &= slots - 1) reaching |= by_part[__builtin_ctz(slots)];
+    return reaching;
+  }
+
   void trace_placement(uint32_t placement, uint64_t rays) {
     const TracePlacement& place = scene_.placements[placement];
-    if ((place.ray_classes & ray_class_) == 0) return;
+    if (rays == 0 || (place.ray_classes & ray_class_) == 0) return;
     if constexpr (kCount) counters_->placements += count_ones(rays);
     const TraceTree& tree = scene_.trees[place.tree];
     RayGroup group;
