@@ -203,6 +203,8 @@ template <bool kNearest, typename Group>
 inline uint64_t enter(const TracePlacement& placement, float max_coordinate, const UnitRays& from, uint64_t rays,
                       Group& group) {
   uint64_t entered = 0;
+  const bool find_reach = Group::kSideBySide && static_cast<uint32_t>(__builtin_popcountll(rays)) >= kLeastSideBySide &&
+                          !(kNearest && from.one_origin);
   ReachFinder reach(max_coordinate);
   for (uint64_t& backward : group.backward) backward = 0;
   if constexpr (Group::kTriangles)
@@ -219,11 +221,11 @@ inline uint64_t enter(const TracePlacement& placement, float max_coordinate, con
     entered |= uint64_t{usable} << first;
     set_boxes(block, max_coordinate, first, group);
     if constexpr (Group::kSideBySide)
-      if (!kNearest || !from.one_origin) reach.template add<kNearest>(block, usable);
+      if (find_reach) reach.template add<kNearest>(block, usable);
     if constexpr (Group::kTriangles) set_shears<kNearest>(block, first, group);
   }
   if constexpr (Group::kSideBySide) {
-    if (!kNearest || !from.one_origin)
+    if (find_reach)
       reach.read(group.reach);
     else
       group.reach = kEverywhere;

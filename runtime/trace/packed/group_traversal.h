@@ -213,20 +213,22 @@ private:
         if (count_ones(rays) < kLeastSideBySide) return slots & Lanes::Children::pass(boxes, group, rays, by_child);
         return pass_side_by_side(boxes, group, rays, slots, by_child);
       }
+    if (kAny && count_ones(rays) < kLeastSideBySide) return slots & Lanes::Children::pass(boxes, group, rays, by_child);
     return pass_apart(boxes, group, rays, slots, by_child, t);
   }
 
-  /// The same of rays that are no beam. On its own, as the compiler makes both slower if they are one function.
+  /// The same of rays that are no beam. On its own, as the compiler makes beams slower if they are one function.
   template <typename Group>
   [[gnu::noinline]] static uint32_t pass_apart(const typename Lanes::Boxes& boxes, const Group& group, uint64_t rays,
                                                uint32_t slots, uint64_t (&by_child)[baked::kNodeWidth],
                                                float (&t)[baked::kNodeWidth]) {
-    if (count_ones(rays) >= kLeastSideBySide) {
+    const bool many = count_ones(rays) >= kLeastSideBySide;
+    if (many) {
       slots &= pass_reach(boxes, group.reach);
       if (slots == 0) return 0;
     }
     if constexpr (!kAny) Lanes::Children::enter(boxes, group, first_bit(rays), t);
-    if (pays_side_by_side<typename Lanes::Wide>(rays, slots))
+    if (many && pays_side_by_side<typename Lanes::Wide>(rays, slots))
       return pass_side_by_side(boxes, group, rays, slots, by_child);
     return slots & Lanes::Children::pass(boxes, group, rays, by_child);
   }

@@ -12,6 +12,8 @@ namespace {
 
 /// Rays that are traced together: as many as a word has bits.
 constexpr uint32_t kGroup = 64;
+/// Rays at a node that make it worth while to look at them together first.
+constexpr uint32_t kLeastSideBySide = 12;
 
 /// Box planes are moved outwards by this times M, the largest coordinate among the ray's origin and the tree. All
 /// roundings in units of u = 2^-24, for a direction whose largest component is in [1, 2):

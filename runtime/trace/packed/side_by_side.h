@@ -7,9 +7,6 @@
 namespace packtrace::packed {
 namespace {
 
-/// Rays at a node that make it worth while to look at them together first.
-constexpr uint32_t kLeastSideBySide = 12;
-
 /// The lanes of a register that begins with bit `first` of a word.
 template <typename Wide>
 inline uint32_t lanes_at(uint64_t rays, uint32_t first) {
