@@ -50,7 +50,7 @@ inline void keep_larger(Vector& a, const Vector& b) {
   alignas(32) constexpr int32_t kLaneBits[kBlock] = {1, 2, 4, 8, 16, 32, 64, 128};
   Ints bits;
   read_block(bits, kLaneBits);
-  a = ((bits & static_cast<int32_t>(lanes)) != 0) & (b > a) ? b : a;
+  a = (((bits & static_cast<int32_t>(lanes)) != 0) & (b > a)) ? b : a;
 #endif
 }
 
