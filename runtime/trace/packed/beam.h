@@ -1,7 +1,6 @@
 #pragma once
 
-#include "runtime/trace/packed/group_boxes.h"
-#include "runtime/trace/packed/leaf_tests.h"
+#include "runtime/trace/packed/side_by_side.h"
 
 /// Rays from one place into one octant, as camera rays are. What they have in common decides about most boxes at once;
 /// the others, and triangles, are tested against a register of rays each. Which is right where neighbours agree.
@@ -14,8 +13,6 @@ namespace {
 constexpr float kBeamPad = 28.0f * 0x1p-24f;
 
 struct alignas(64) Beam {
-  /// Of its rays, one array per value, so that a register is filled by one load.
-  float near_bias[3][kGroup], far_bias[3][kGroup];
   /// Of all: what near and negated far planes are less, inverse directions' least and most, and as RayGroup::limits.
   float origin[3][2], inverse[3][2], limits[2];
   bool stale; ///< limits are
@@ -33,8 +30,7 @@ struct alignas(64) Beam {
   }
 };
 
-/// Rays that make a beam worth its setup, and of those at a node, testing them side by side.
-constexpr uint32_t kLeastBeam = 16, kLeastSideBySide = 12;
+constexpr uint32_t kLeastBeam = 16; ///< rays that make a beam worth its setup
 
 /// Makes a beam of all of a group's rays. False where they have no origin or octant in common, or are few.
 /// @param group lanes of other rays get values of one of `rays`
@@ -56,9 +52,9 @@ inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam
     const auto i = static_cast<uint32_t>(__builtin_ctzll(m));
     for (uint32_t axis = 0; axis < 3; ++axis) {
       group.inverse[axis][i] = group.inverse[axis][first];
-      for (uint32_t side = 0; side < 2; ++side) group.bias[axis][i][side] = group.bias[axis][first][side];
+      group.near_bias[axis][i] = group.near_bias[axis][first], group.far_bias[axis][i] = group.far_bias[axis][first];
     }
-    group.limits[i][0] = group.limits[i][1] = group.begin[i] = __builtin_inff();
+    group.begin[i] = __builtin_inff();
     group.end[i] = -__builtin_inff();
   }
   float reach = max_coordinate;
@@ -66,13 +62,10 @@ inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam
   for (uint32_t axis = 0; axis < 3; ++axis) {
     Floats least = Floats{} + group.inverse[axis][first], most = least;
     for (uint32_t at = 0; at < kGroup; at += kBlock) {
-      Floats inverse, near, far;
+      Floats inverse;
       read_block(inverse, &group.inverse[axis][at]);
       keep_larger(most, inverse);
       least = inverse < least ? inverse : least;
-      read_pairs(&group.bias[axis][at], near, far);
-      write_block(&beam.near_bias[axis][at], near);
-      write_block(&beam.far_bias[axis][at], -far);
     }
     beam.inverse[axis][0] = -largest_lane(-least), beam.inverse[axis][1] = largest_lane(most);
     const float pad = least[0] < 0.0f ? -kBeamPad * reach : kBeamPad * reach; // outwards is towards the rays' origin
@@ -103,53 +96,6 @@ inline uint32_t pass_beam(const GroupBoxes<Lanes>& boxes, const Beam& beam, floa
   }
   Lanes::store(t, begin);
   return Lanes::less_equal(begin, end);
-}
-
-/// A child's near and far planes.
-struct BoxPlanes {
-  float near[3][baked::kNodeWidth], far[3][baked::kNodeWidth];
-};
-
-template <typename Lanes>
-inline void read_planes(const GroupBoxes<Lanes>& boxes, BoxPlanes& planes) {
-  for (uint32_t axis = 0; axis < 3; ++axis) {
-    Lanes::store(planes.near[axis], boxes.near[axis]);
-    Lanes::store(planes.far[axis], boxes.far[axis]);
-  }
-}
-
-/// By child in `slots`: those of `rays` that pass its box, as bits. Returns the children that any passes.
-template <typename Wide>
-inline uint32_t pass_each(const BoxPlanes& planes, const RayGroup& group, const Beam& beam, uint64_t rays,
-                          uint32_t slots, uint64_t (&out)[baked::kNodeWidth]) {
-  using F = typename Wide::F;
-  for (uint64_t& word : out) word = 0;
-  for (uint32_t at = 0; at < kGroup; at += Wide::kLanes) {
-    if (lanes_at<Wide>(rays, at) == 0) continue;
-    const F ray_begin = Wide::load(&group.begin[at]), ray_end = Wide::load(&group.end[at]);
-    F inverse[3], near_bias[3], far_bias[3];
-    for (uint32_t axis = 0; axis < 3; ++axis) {
-      inverse[axis] = Wide::load(&group.inverse[axis][at]);
-      near_bias[axis] = Wide::load(&beam.near_bias[axis][at]);
-      far_bias[axis] = Wide::load(&beam.far_bias[axis][at]);
-    }
-    for (uint32_t m = slots; m != 0; m &= m - 1) {
-      const auto slot = static_cast<uint32_t>(__builtin_ctz(m));
-      F begin = ray_begin, end = ray_end;
-      for (uint32_t axis = 0; axis < 3; ++axis) {
-        begin = Wide::max(begin, Wide::fma(Wide::set(planes.near[axis][slot]), inverse[axis], near_bias[axis]));
-        end = Wide::min(end, Wide::fma(Wide::set(planes.far[axis][slot]), inverse[axis], far_bias[axis]));
-      }
-      out[slot] |= uint64_t{Wide::less_equal(begin, end)} << at;
-    }
-  }
-  uint32_t used = 0;
-  for (uint32_t m = slots; m != 0; m &= m - 1) {
-    const auto slot = static_cast<uint32_t>(__builtin_ctz(m));
-    out[slot] &= rays;
-    used |= (out[slot] != 0 ? 1u : 0u) << slot;
-  }
-  return used;
 }
 
 } // namespace

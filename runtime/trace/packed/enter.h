@@ -1,6 +1,6 @@
 #pragma once
 
-#include "runtime/trace/packed/ray_group.h"
+#include "runtime/trace/packed/reach.h"
 
 /// How rays come from unit space into the grid of a tree that is placed there.
 namespace packtrace::packed {
@@ -198,11 +198,14 @@ inline bool unit_block(const UnitRays& from, uint32_t first, uint32_t wanted, fl
 /// Moves rays into a tree's grid and sets them up. Returns those that may hit something.
 /// @tparam kNearest whether nearest hits are wanted, for which t must be right and is needed in unit space
 /// @param rays as bits
-/// @param group RayGroup, or BoxRays where the grid is unit space
+/// @param group RayGroup, or another where the grid is unit space
 template <bool kNearest, typename Group>
 inline uint64_t enter(const TracePlacement& placement, float max_coordinate, const UnitRays& from, uint64_t rays,
                       Group& group) {
   uint64_t entered = 0;
+  const bool find_reach = Group::kSideBySide && static_cast<uint32_t>(__builtin_popcountll(rays)) >= kLeastSideBySide &&
+                          !(kNearest && from.one_origin);
+  ReachFinder reach(max_coordinate);
   for (uint64_t& backward : group.backward) backward = 0;
   if constexpr (Group::kTriangles)
     for (uint64_t& major : group.major) major = 0;
@@ -217,7 +220,15 @@ inline uint64_t enter(const TracePlacement& placement, float max_coordinate, con
                    : move_block<false, kNearest>(placement, max_coordinate, from, first, wanted, block, group);
     entered |= uint64_t{usable} << first;
     set_boxes(block, max_coordinate, first, group);
+    if constexpr (Group::kSideBySide)
+      if (find_reach) reach.template add<kNearest>(block, usable);
     if constexpr (Group::kTriangles) set_shears<kNearest>(block, first, group);
+  }
+  if constexpr (Group::kSideBySide) {
+    if (find_reach)
+      reach.read(group.reach);
+    else
+      group.reach = kEverywhere;
   }
   return entered;
 }

@@ -3,6 +3,7 @@
 #include <immintrin.h>
 
 #include "runtime/trace/packed/beam.h"
+#include "runtime/trace/packed/reach.h"
 
 /// The same with all planes of an axis in one register: each child's near plane and, negated, its far one, so that the
 /// larger parameter counts for both.
@@ -57,6 +58,16 @@ inline __mmask8 begin_before_end(__m512 pairs) {
 inline __m256 firsts(__m512 pairs) {
   return _mm512_castps512_ps256(
       _mm512_permutexvar_ps(_mm512_castsi256_si512(_mm256_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14)), pairs));
+}
+
+/// As for GroupBoxes.
+inline uint32_t pass_reach(const Avx512GroupBoxes& boxes, const Reach& reach) {
+  const auto beyond = [&](uint32_t axis) {
+    return _mm512_fmadd_ps(boxes.plane[axis], _mm512_set1_ps(reach.sign[axis]), both(reach.shift[axis]));
+  };
+  const __m512 most = _mm512_max_ps(_mm512_max_ps(beyond(0), beyond(1)), beyond(2));
+  const __m512 most_of_pair = _mm512_max_ps(most, _mm512_permute_ps(most, 0xb1));
+  return _mm512_cmple_epi64_mask(_mm512_castps_si512(most_of_pair), _mm512_setzero_si512());
 }
 
 /// As for GroupBoxes.

@@ -6,6 +6,7 @@
 #include "runtime/trace/packed/leaf_tests.h"
 #include "runtime/trace/packed/node_children.h"
 #include "runtime/trace/packed/outside_search.h"
+#include "runtime/trace/packed/reach.h"
 
 /// Groups of rays through trees of nodes. They come to a node together, as one word of bits, and leave for each child
 /// those that pass its box: a node is read and set up once for all of them, and nothing waits for the outcome of one
@@ -44,6 +45,7 @@ public:
       for (uint32_t i = 0; i < kBlock; ++i) block[i] = numbers[first + i < count ? first + i : 0];
       read_rays(rays_, block, first, unit_);
     }
+    if constexpr (!kAny) unit_.one_origin = start_at_one_place(unit_, count);
   }
 
   /// The same with the hits that its rays have.
@@ -100,12 +102,13 @@ private:
 
   /// Through the tree over placements.
   void trace_top() {
-    BoxRays group;
+    SideBySideRays group;
     const uint64_t rays = enter<!kAny>(scene_.top, scene_.top_max_coordinate, unit_, alive_, group);
     by_octant(group, rays, [&](uint64_t together, uint32_t octant) { trace_top(group, together, octant); });
   }
 
-  void trace_top(BoxRays& group, uint64_t rays, uint32_t octant) {
+  void trace_top(SideBySideRays& group, uint64_t rays, uint32_t octant) {
+    group.reach.set_octant(octant);
     Pending stack[kMaxTopDepth * (baked::kNodeWidth - 1) + 1];
     uint32_t size = 0;
     stack[size++] = {rays, 0, 0.0f};
@@ -115,7 +118,7 @@ private:
       if (active == 0) continue;
       if ((next.node & kTopLeaf) != 0) {
         nearer_ = 0;
-        trace_placement(next.node & ~kTopLeaf, active);
+        trace_placement(next.node & ~kTopLeaf, reach_parts(next.node & ~kTopLeaf, group, active, octant));
         if constexpr (!kAny)
           for (uint64_t m = nearer_; m != 0; m &= m - 1) {
             const uint32_t i = first_bit(m);
@@ -129,17 +132,29 @@ private:
     }
   }
 
+  /// Those of `rays` that come to a placement's parts.
+  uint64_t reach_parts(uint32_t placement, const SideBySideRays& group, uint64_t rays, uint32_t octant) const {
+    if (scene_.parts == nullptr) return rays;
+    const TopNode& parts = scene_.parts[placement];
+    uint64_t by_part[baked::kNodeWidth], reaching = 0;
+    float t[baked::kNodeWidth];
+    uint32_t slots = pass(typename Lanes::Boxes(parts, octant), group, rays, parts.slots, by_part, t);
+    for (; slots != 0; slots &= slots - 1) reaching |= by_part[__builtin_ctz(slots)];
+    return reaching;
+  }
+
   void trace_placement(uint32_t placement, uint64_t rays) {
     const TracePlacement& place = scene_.placements[placement];
-    if ((place.ray_classes & ray_class_) == 0) return;
+    if (rays == 0 || (place.ray_classes & ray_class_) == 0) return;
     if constexpr (kCount) counters_->placements += count_ones(rays);
     const TraceTree& tree = scene_.trees[place.tree];
     RayGroup group;
     rays = enter<!kAny>(place, tree.max_coordinate, unit_, rays, group);
     Beam beam;
     if constexpr (!kAny)
-      if (make_beam(group, tree.max_coordinate, rays, beam)) group.beam = &beam;
+      if (unit_.one_origin && make_beam(group, tree.max_coordinate, rays, beam)) group.beam = &beam;
     by_octant(group, rays, [&](uint64_t together, uint32_t octant) {
+      group.reach.set_octant(octant);
       if (scene_.search_tree != nullptr)
         OutsideSearch<GroupTraversal>::run(*this, placement, tree.nodes, group, together, octant);
       else
@@ -196,12 +211,35 @@ private:
         slots &= pass_beam(boxes, *group.beam, t);
         if (slots == 0) return 0;
         if (count_ones(rays) < kLeastSideBySide) return slots & Lanes::Children::pass(boxes, group, rays, by_child);
-        BoxPlanes planes;
-        read_planes(boxes, planes);
-        return pass_each<typename Lanes::Wide>(planes, group, *group.beam, rays, slots, by_child);
+        return pass_side_by_side(boxes, group, rays, slots, by_child);
       }
+    if (kAny && count_ones(rays) < kLeastSideBySide) return slots & Lanes::Children::pass(boxes, group, rays, by_child);
+    return pass_apart(boxes, group, rays, slots, by_child, t);
+  }
+
+  /// The same of rays that are no beam. On its own, as the compiler makes beams slower if they are one function.
+  template <typename Group>
+  [[gnu::noinline]] static uint32_t pass_apart(const typename Lanes::Boxes& boxes, const Group& group, uint64_t rays,
+                                               uint32_t slots, uint64_t (&by_child)[baked::kNodeWidth],
+                                               float (&t)[baked::kNodeWidth]) {
+    const bool many = count_ones(rays) >= kLeastSideBySide;
+    if (many) {
+      slots &= pass_reach(boxes, group.reach);
+      if (slots == 0) return 0;
+    }
     if constexpr (!kAny) Lanes::Children::enter(boxes, group, first_bit(rays), t);
+    if (many && pays_side_by_side<typename Lanes::Wide>(rays, slots))
+      return pass_side_by_side(boxes, group, rays, slots, by_child);
     return slots & Lanes::Children::pass(boxes, group, rays, by_child);
+  }
+
+  template <typename Group>
+  [[gnu::always_inline]] static uint32_t pass_side_by_side(const typename Lanes::Boxes& boxes, const Group& group,
+                                                           uint64_t rays, uint32_t slots,
+                                                           uint64_t (&by_child)[baked::kNodeWidth]) {
+    BoxPlanes planes;
+    read_planes(boxes, planes);
+    return pass_each<typename Lanes::Wide>(planes, group, rays, slots, by_child);
   }
 
   /// Pushes the children of a node that rays pass; of nearest hits, the one that the first ray enters first on top, of

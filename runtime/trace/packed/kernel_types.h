@@ -138,6 +138,9 @@ struct KernelScene {
   /// Not null: visits the leaf nodes that rays may reach, more than that if it likes, in the place of inner nodes.
   void (*search_tree)(const void* searcher, const TreeSearch& search);
   const void* searcher;
+  /// By placement: boxes around parts of its tree, for rays to be tested against before they are moved into its grid;
+  /// null: they are not.
+  const TopNode* parts;
 };
 
 /// As RayTracer's RayHit, plain.

@@ -90,12 +90,6 @@ inline uint64_t test_few(const DecodedBatch& batch, const BatchNormals& normals,
   return hit;
 }
 
-/// The lanes of a register that begins with bit `first` of a word.
-template <typename Wide>
-inline uint32_t lanes_at(uint64_t rays, uint32_t first) {
-  return static_cast<uint32_t>(rays >> first) & ((1u << Wide::kLanes) - 1);
-}
-
 /// The rays from lane `at` on that hit one triangle of a batch, as bits from 0 on.
 /// @param axis Woop's k, of all that are wanted
 template <typename Wide, bool kRest>

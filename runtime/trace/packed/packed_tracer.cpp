@@ -49,12 +49,17 @@ bool is_aligned(const DAffine& m) {
   return m[0].y == 0.0 && m[0].z == 0.0 && m[1].x == 0.0 && m[1].z == 0.0 && m[2].x == 0.0 && m[2].y == 0.0;
 }
 
+/// Placements at most that are looked for by the boxes of their parts.
+constexpr size_t kMostWithParts = baked::kNodeWidth;
+
 /// Sets up the tree over placements as something placed in unit space itself.
-void place_top(std::span<const TreeBox> boxes, packed::KernelScene& scene) {
+/// @param max_coordinate at least that of all grids whose axes are those of unit space, there
+void place_top(std::span<const TreeBox> boxes, float max_coordinate, packed::KernelScene& scene) {
   TreeBox all = boxes[0];
   for (const TreeBox& box : boxes) all.extend(box);
   scene.top = {};
   scene.top.aligned = 1;
+  scene.top_max_coordinate = max_coordinate;
   for (size_t axis = 0; axis < 3; ++axis) {
     scene.top.grid_from_unit[3 * axis + axis] = 1.0;
     scene.top.box_lo[axis] = all.lo[axis], scene.top.box_hi[axis] = all.hi[axis];
@@ -71,8 +76,10 @@ struct PackedTracer::Tables : TracedTrees {
   std::vector<uint32_t> first_instance; ///< by the file's geometry; that of a level's base
   std::vector<Placement> surfaces;      ///< by instance
   std::vector<packed::TopNode> top;
+  std::vector<packed::TopNode> parts; ///< by placement, where there are no more than kMostWithParts
   packed::KernelScene scene{};
-  uint32_t stream_depth = 0; ///< of top, where rays go through it together
+  float aligned_max_coordinate = 0.0f; ///< of placed trees whose axes are those of unit space, there
+  uint32_t stream_depth = 0;           ///< of top, where rays go through it together
   ThreadMemoryOwner memory;
 
   packed::ThreadMemory& of_this_thread() const { return memory.of_this_thread(stream_depth); }
@@ -99,7 +106,8 @@ PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, con
     t.top = build_top_tree(t.boxes);
     t.scene.top_nodes = t.top.data();
     if (t.top.size() > 1) t.stream_depth = top_tree_depth(t.top);
-    place_top(t.boxes, t.scene);
+    if (t.placements.size() <= kMostWithParts) t.scene.parts = t.parts.data();
+    place_top(t.boxes, t.aligned_max_coordinate, t.scene);
   }
   t.scene.owner = this;
   t.scene.decode_wide = [](const void* owner, uint32_t cluster, uint32_t first, uint32_t count,
@@ -189,8 +197,15 @@ void PackedTracer::add_placement(uint32_t tree, uint32_t instance, const DAffine
     placement.box_lo[axis] = hull.lo()[axis], placement.box_hi[axis] = hull.hi()[axis];
   placement.tree = tree;
   placement.aligned = is_aligned(grid_from_unit) ? 1 : 0;
+  if (placement.aligned != 0)
+    for (int axis = 0; axis < 3; ++axis)
+      t.aligned_max_coordinate =
+          std::max(t.aligned_max_coordinate,
+                   static_cast<float>(t.trees[tree].max_coordinate * std::abs(unit_from_grid[axis][axis])));
   placement.ray_classes = t.trees[tree].nodes[0].ray_classes;
   t.boxes.push_back(hull.placed(unit_from_grid));
+  if (t.parts.size() < kMostWithParts)
+    t.parts.push_back(top_node(hull.placed_parts(unit_from_grid, placement.aligned != 0)));
   t.placements.push_back(placement);
   t.instance_of.push_back(instance);
 }
@@ -264,7 +279,8 @@ std::vector<ResidentPart> PackedTracer::resident() const {
           {"nodes built", t.built.nodes.size() * sizeof(baked::PackedNode)},
           {"cluster table", t.clusters.size() * sizeof(packed::TraceCluster)},
           {"placements", t.placements.size() * (sizeof(packed::TracePlacement) + sizeof(TreeBox) + sizeof(uint32_t)) +
-                             t.surfaces.size() * sizeof(Placement) + t.top.size() * sizeof(packed::TopNode) +
+                             t.surfaces.size() * sizeof(Placement) +
+                             (t.top.size() + t.parts.size()) * sizeof(packed::TopNode) +
                              (t.tree_of.size() + t.grid_of.size() + t.first_instance.size()) * sizeof(uint32_t)},
           {"thread memory", ThreadMemoryOwner::bytes_of_all_threads(), true}};
 }

@@ -12,6 +12,8 @@ namespace {
 
 /// Rays that are traced together: as many as a word has bits.
 constexpr uint32_t kGroup = 64;
+/// Rays at a node that make it worth while to look at them together first.
+constexpr uint32_t kLeastSideBySide = 12;
 
 /// Box planes are moved outwards by this times M, the largest coordinate among the ray's origin and the tree. All
 /// roundings in units of u = 2^-24, for a direction whose largest component is in [1, 2):
@@ -33,9 +35,27 @@ constexpr double kUnitRounding = 0x1p-23;
 struct alignas(64) UnitRays {
   float origin[3][kGroup], direction[3][kGroup], tnear[kGroup];
   float tmax[kGroup]; ///< inclusive: of a nearest hit, its t
+  bool one_origin;    ///< of nearest hits: all start at one place, as camera rays do
 };
 
 struct Beam;
+
+/// The box of all places where rays may hit something, for a node's boxes to be compared with: see reach.h.
+struct Reach {
+  float lo[3], hi[3];
+  // Along the octant of set_octant():
+  float sign[3];     ///< of directions
+  float shift[3][2]; ///< rays reach a near plane p if sign p + the first <= 0, a far one if the second - sign p <= 0
+
+  void set_octant(uint32_t octant) {
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+      const bool backward = ((octant >> axis) & 1u) != 0;
+      sign[axis] = backward ? -1.0f : 1.0f;
+      shift[axis][0] = backward ? lo[axis] : -hi[axis];
+      shift[axis][1] = backward ? -hi[axis] : lo[axis];
+    }
+  }
+};
 
 /// What a triangle test needs of a ray, side by side: its origin along Woop's k, and its shears.
 struct alignas(32) TestRay {
@@ -46,9 +66,14 @@ struct alignas(16) TestRest {
   float along[3], unused;
 };
 
+constexpr Reach kEverywhere{{-__builtin_inff(), -__builtin_inff(), -__builtin_inff()},
+                            {__builtin_inff(), __builtin_inff(), __builtin_inff()},
+                            {},
+                            {}};
+
 /// What box tests need of rays. One array per value; those of rays that are not in use are not set.
 struct alignas(64) BoxRays {
-  static constexpr bool kTriangles = false;
+  static constexpr bool kTriangles = false, kSideBySide = false;
   float bias[3][kGroup][2]; ///< a near plane p is passed at p inverse + the first, a far one at p inverse - the second
   float limits[kGroup][2];  ///< hits lie above the first and not beyond - the second
   float inverse[3][kGroup]; ///< of the direction, never infinite
@@ -67,10 +92,22 @@ struct alignas(64) BoxRays {
   float tmax(uint32_t i) const { return -limits[i][1]; }
 };
 
+/// The same for many rays at a node, which are tested side by side.
+struct alignas(64) SideBySideRays : BoxRays {
+  static constexpr bool kSideBySide = true;
+  float near_bias[3][kGroup], far_bias[3][kGroup]; ///< bias in arrays of their own, the second negated
+  float begin[kGroup], end[kGroup];                ///< limits, the same
+  Reach reach;
+
+  void set_tmax(uint32_t i, float t) {
+    BoxRays::set_tmax(i, t);
+    end[i] = t;
+  }
+};
+
 /// The same with what triangle tests need.
-struct alignas(64) RayGroup : BoxRays {
+struct alignas(64) RayGroup : SideBySideRays {
   static constexpr bool kTriangles = true;
-  float begin[kGroup], end[kGroup]; ///< limits in arrays of their own
   float origin[3][kGroup];
   float shear[3][kGroup];   ///< Woop's S
   uint32_t axis[3][kGroup]; ///< Woop's k: x, y, z; z is the direction's largest component
@@ -83,8 +120,7 @@ struct alignas(64) RayGroup : BoxRays {
   TestRest rests[kGroup]; ///< of nearest hits only
 
   void set_tmax(uint32_t i, float t) {
-    limits[i][1] = -t;
-    end[i] = t;
+    SideBySideRays::set_tmax(i, t);
     tests[i].end = t;
   }
 };
@@ -108,16 +144,33 @@ struct alignas(64) RayGroup : BoxRays {
   write_block(&out.tmax[first], reinterpret_cast<Floats>(reinterpret_cast<Ints>(values[7]) - 1)); // the float below
 }
 
+/// Whether the first rays of a group do. Blocks are full: see read_rays().
+inline bool start_at_one_place(const UnitRays& rays, uint32_t count) {
+  Ints same = Ints{} - 1;
+  for (uint32_t first = 0; first < count; first += kBlock)
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+      Floats origin;
+      read_block(origin, &rays.origin[axis][first]);
+      same &= origin == rays.origin[axis][0];
+    }
+  return lane_bits(same) == kBlockLanes;
+}
+
 /// A block of rays in a tree's grid as box and triangle tests take them.
 struct RayBlock {
   Floats origin[3], direction[3], begin, end;
 };
 
+template <typename Group>
 [[gnu::always_inline]] inline void set_boxes(const RayBlock& block, float max_coordinate, uint32_t first,
-                                             BoxRays& group) {
+                                             Group& group) {
   Floats reach = Floats{} + max_coordinate;
   for (uint32_t axis = 0; axis < 3; ++axis) keep_larger(reach, magnitude(block.origin[axis]));
   write_pairs(&group.limits[first], block.begin, -block.end);
+  if constexpr (Group::kSideBySide) {
+    write_block(&group.begin[first], block.begin);
+    write_block(&group.end[first], block.end);
+  }
   for (uint32_t axis = 0; axis < 3; ++axis) {
     const Floats d = block.direction[axis], size = magnitude(d);
     const Floats over = 1.0f / (size > kSmallestDirection ? size : Floats{} + kSmallestDirection);
@@ -126,6 +179,10 @@ struct RayBlock {
     const Floats back = block.origin[axis] * inverse, away = kBoxPad * reach * over;
     write_block(&group.inverse[axis][first], inverse);
     write_pairs(&group.bias[axis][first], -back - away, back - away);
+    if constexpr (Group::kSideBySide) {
+      write_block(&group.near_bias[axis][first], -back - away);
+      write_block(&group.far_bias[axis][first], away - back);
+    }
     group.backward[axis] |= uint64_t{lane_bits(inverse < 0.0f)} << first;
   }
 }
@@ -133,8 +190,6 @@ struct RayBlock {
 /// @tparam kNearest whether group.rest is set, which counts then
 template <bool kNearest>
 inline void set_shears(const RayBlock& block, uint32_t first, RayGroup& group) {
-  write_block(&group.begin[first], block.begin);
-  write_block(&group.end[first], block.end);
   for (uint32_t axis = 0; axis < 3; ++axis) write_block(&group.origin[axis][first], block.origin[axis]);
   const Floats x = block.direction[0], y = block.direction[1], z = block.direction[2];
   const Floats ax = magnitude(x), ay = magnitude(y), az = magnitude(z);

@@ -42,6 +42,18 @@ inline void keep_larger(Vector& a, const Vector& b) {
   a = a > b ? a : b;
 }
 
+/// The same in some lanes, given as bits.
+[[gnu::always_inline]] inline void keep_larger(Floats& a, uint32_t lanes, const Floats& b) {
+#if defined(__AVX512F__)
+  a = _mm512_mask_max_ps(a, static_cast<__mmask16>(lanes), b, a);
+#else
+  alignas(32) constexpr int32_t kLaneBits[kBlock] = {1, 2, 4, 8, 16, 32, 64, 128};
+  Ints bits;
+  read_block(bits, kLaneBits);
+  a = (((bits & static_cast<int32_t>(lanes)) != 0) & (b > a)) ? b : a;
+#endif
+}
+
 // GCC 12 converts eight numbers as twice four.
 inline Doubles to_doubles(const HalfFloats& x) {
 #if defined(__AVX512F__)
@@ -132,6 +144,18 @@ inline void write_rows(const Floats (&rows)[8], Record* records) {
   }
 }
 
+/// The largest lane of each of eight vectors.
+inline void largest_lanes(const Floats (&vectors)[8], float (&out)[8]) {
+  Floats rows[8];
+  for (uint32_t i = 0; i < 8; ++i) rows[i] = vectors[i];
+  transpose(rows);
+  for (uint32_t step = 4; step > 0; step /= 2)
+    for (uint32_t i = 0; i < step; ++i) keep_larger(rows[i], rows[i + step]);
+  float lanes[kBlock]; // of each vector one, or one in each half
+  write_block(lanes, rows[0]);
+  for (uint32_t i = 0; i < 8; ++i) out[i] = lanes[i] > lanes[kBlock - 8 + i] ? lanes[i] : lanes[kBlock - 8 + i];
+}
+
 /// Pairs (a, b), as many as there are lanes.
 inline void write_pairs(float (*out)[2], const Floats& a, const Floats& b) {
 #if defined(__AVX512F__)
@@ -140,19 +164,6 @@ inline void write_pairs(float (*out)[2], const Floats& a, const Floats& b) {
 #else
   write_block(&out[0][0], __builtin_shufflevector(a, b, 0, 8, 1, 9, 2, 10, 3, 11));
   write_block(&out[4][0], __builtin_shufflevector(a, b, 4, 12, 5, 13, 6, 14, 7, 15));
-#endif
-}
-/// The reverse.
-inline void read_pairs(const float (*pairs)[2], Floats& a, Floats& b) {
-  Floats low, high;
-  read_block(low, &pairs[0][0]);
-  read_block(high, &pairs[kBlock / 2][0]);
-#if defined(__AVX512F__)
-  a = __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
-  b = __builtin_shufflevector(low, high, 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
-#else
-  a = __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14);
-  b = __builtin_shufflevector(low, high, 1, 3, 5, 7, 9, 11, 13, 15);
 #endif
 }
 

@@ -24,11 +24,7 @@ std::vector<packed::TopNode> build_top_tree(std::span<const TreeBox> boxes) {
   std::vector<uint32_t> place(wide.size());
   for (size_t i = 0; i < wide.size(); ++i)
     if (wide[i].child_count > 0) place[i] = static_cast<uint32_t>(nodes.size()), nodes.emplace_back();
-  if (nodes.empty()) { // one box
-    nodes.emplace_back();
-    set_child(nodes[0], 0, boxes[0], packed::kTopLeaf);
-    return nodes;
-  }
+  if (nodes.empty()) return {top_node(boxes)}; // one box
   for (size_t i = 0; i < wide.size(); ++i) {
     for (uint32_t slot = 0; slot < wide[i].child_count; ++slot) {
       const WideNode& child = wide[wide[i].first_child + slot];
@@ -38,6 +34,12 @@ std::vector<packed::TopNode> build_top_tree(std::span<const TreeBox> boxes) {
     }
   }
   return nodes;
+}
+
+packed::TopNode top_node(std::span<const TreeBox> boxes) {
+  packed::TopNode node{};
+  for (uint32_t slot = 0; slot < boxes.size(); ++slot) set_child(node, slot, boxes[slot], packed::kTopLeaf + slot);
+  return node;
 }
 
 uint32_t top_tree_depth(std::span<const packed::TopNode> nodes) {

@@ -12,6 +12,9 @@ namespace packtrace {
 /// @param boxes 1 .. 2^31 - 1
 std::vector<packed::TopNode> build_top_tree(std::span<const TreeBox> boxes);
 
+/// One node over up to eight boxes; children are kTopLeaf + number of the box.
+packed::TopNode top_node(std::span<const TreeBox> boxes);
+
 /// Levels of nodes, at most kMaxTopDepth.
 uint32_t top_tree_depth(std::span<const packed::TopNode> nodes);
 

@@ -42,20 +42,38 @@ TreeHull::TreeHull(const baked::PackedNode* nodes)
         centre_[axis].push_back(0.5 * (box.lo[axis] + box.hi[axis]));
         half_[axis].push_back(0.5 * (box.hi[axis] - box.lo[axis]));
       }
+    ends_.push_back(centre_[0].size());
   }
 }
 
-TreeBox TreeHull::placed(const DAffine& unit_from_grid) const {
+double TreeHull::pad() const {
   // Rays in the grid are off by 2^-22 of the largest coordinate there, see ray_group.h.
   const DVec3 far = glm::max(glm::abs(lo_), glm::abs(hi_));
-  const double pad = 0x1p-20 * std::max({far.x, far.y, far.z});
+  return 0x1p-20 * std::max({far.x, far.y, far.z});
+}
+
+TreeBox TreeHull::placed(const DAffine& unit_from_grid) const {
+  return placed(unit_from_grid, pad(), 0, centre_[0].size());
+}
+
+std::vector<TreeBox> TreeHull::placed_parts(const DAffine& unit_from_grid, bool aligned) const {
+  std::vector<TreeBox> parts;
+  size_t begin = 0;
+  for (const size_t end : ends_) {
+    parts.push_back(placed(unit_from_grid, aligned ? 0.0 : pad(), begin, end));
+    begin = end;
+  }
+  return parts;
+}
+
+TreeBox TreeHull::placed(const DAffine& unit_from_grid, double pad, size_t begin, size_t end) const {
   TreeBox box;
   for (int axis = 0; axis < 3; ++axis) {
     const DVec3 row(unit_from_grid[0][axis], unit_from_grid[1][axis], unit_from_grid[2][axis]), size = glm::abs(row);
     double lo[2], hi[2]; // of every other box: numbers that do not wait for each other
     std::fill_n(lo, 2, std::numeric_limits<double>::infinity());
     std::fill_n(hi, 2, -std::numeric_limits<double>::infinity());
-    for (size_t i = 0; i < centre_[0].size(); ++i) {
+    for (size_t i = begin; i < end; ++i) {
       const double middle = row.x * centre_[0][i] + row.y * centre_[1][i] + row.z * centre_[2][i];
       const double reach = size.x * half_[0][i] + size.y * half_[1][i] + size.z * half_[2][i];
       lo[i & 1] = std::min(lo[i & 1], middle - reach);

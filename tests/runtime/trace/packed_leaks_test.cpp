@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 
 #include <gtest/gtest.h>
@@ -101,6 +102,85 @@ TEST(PackedLeaks, NoneFromTheMiddleWhereEdgesAlign) {
   Scene scene; // rays along its axis meet the poles, where dozens of edges meet
   test::add_shape(scene, test::sphere({0, 0, 0}, 1, 24));
   for (const PackedIsa isa : test::isas()) EXPECT_EQ(leaks(scene, {0, 0, 0}, 100000, isa), 0u);
+}
+
+/// A closed cube around the origin, each side of cells x cells quads.
+Mesh cube(float half, int cells) {
+  Mesh mesh;
+  const auto corner = [&](int side, int i, int j) {
+    Vec3 p(half);
+    p[side / 2] = side % 2 == 0 ? -half : half;
+    p[(side / 2 + 1) % 3] = half * static_cast<float>(2 * i - cells) / static_cast<float>(cells);
+    p[(side / 2 + 2) % 3] = half * static_cast<float>(2 * j - cells) / static_cast<float>(cells);
+    mesh.positions.push_back(p);
+    return static_cast<uint32_t>(mesh.positions.size() - 1);
+  };
+  for (int side = 0; side < 6; ++side)
+    for (int i = 0; i < cells; ++i)
+      for (int j = 0; j < cells; ++j) {
+        const uint32_t a = corner(side, i, j), b = corner(side, i + 1, j), c = corner(side, i + 1, j + 1),
+                       d = corner(side, i, j + 1);
+        mesh.triangles.emplace_back(a, b, c), mesh.triangles.emplace_back(a, c, d);
+      }
+  return mesh;
+}
+
+/// From a few ulp inside a cube's sides, many in a row from one of them, along it, into it or away from it to places of
+/// others, vertices and edges among them: all must hit.
+std::vector<Ray> rays_from_sides(const UnitSpace& space, const DAffine& world_from_cube, double half, int cells,
+                                 double ulps, size_t count) {
+  std::mt19937 generator(3);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  const auto in_unit = [&](DVec3 p) { return space.to_unit(transform_point(world_from_cube, p)); };
+  std::vector<Ray> rays(count);
+  for (size_t i = 0; i < count; ++i) {
+    const int axis = static_cast<int>(i / 256 % 3), other = (axis + 1 + static_cast<int>(i % 2)) % 3;
+    const double inwards = i / 768 % 2 == 0 ? 1.0 : -1.0;
+    DVec3 from(unit(generator), unit(generator), unit(generator)),
+        to(unit(generator), unit(generator), unit(generator));
+    from *= 0.9;
+    from[axis] = -inwards * (1.0 - ulps * 0x1p-23);
+    if (i % 4 < 2) to[other] = unit(generator) < 0.0 ? -1.0 : 1.0;
+    if (i % 4 >= 2) to[axis] = inwards;
+    if (i % 8 == 0) to[axis] = from[axis]; // along the side
+    if (i % 8 == 4) to[axis] = from[axis] + inwards * 1e-6;
+    if (i % 8 == 6) to[axis] = -1.1 * inwards; // into the side
+    for (int k = 0; k < 3 && i % 16 > 10; ++k) // edges and vertices
+      if (k != axis && (i % 16 > 13 || k == other)) to[k] = std::round(to[k] * cells / 2) * 2 / cells;
+    rays[i].origin = Vec3(in_unit(from * half));
+    rays[i].direction = Vec3(in_unit(to * half) - DVec3(rays[i].origin));
+    if (i % 3 == 0) rays[i].tfar = 1.0f + 1e-4f;
+  }
+  return rays;
+}
+
+TEST(PackedLeaks, NoneFromBesideTheSidesOfACube) {
+  constexpr size_t kRays = 50000;
+  constexpr int kCells = 8;
+  const Mesh mesh = cube(1, kCells);
+  for (const bool instanced : {false, true})
+    for (const DVec3 at : {DVec3(0), DVec3(-1, 1, -1), DVec3(3, -5, 4)}) {
+      Scene scene;
+      const DAffine world_from_cube =
+          instanced ? test::placed(at, {2, 1, 0.5}, 33, {1, 2, 3}) : test::placed(at, DVec3(1));
+      if (instanced) {
+        test::add_object(scene, mesh);
+        scene.instances.push_back({0, Affine(world_from_cube)});
+        test::add_shape(scene, test::quad({-9, -9, -9}, {18, 0, 0}, {0, 18, 0}));
+      } else {
+        test::add_shape(scene, mesh, 0, world_from_cube);
+      }
+      const BakedScene baked(scene);
+      const double ulps = instanced ? 400 : 3 * (1 + std::max({std::abs(at.x), std::abs(at.y), std::abs(at.z)}));
+      for (const PackedIsa isa : test::isas()) {
+        const PackedTracer tracer(baked.file, baked.source, isa);
+        const std::vector<Ray> rays = rays_from_sides(tracer.space(), world_from_cube, 1, kCells, ulps, kRays);
+        EXPECT_EQ(std::ranges::count(any(tracer, rays), 0), 0) << at.x;
+        size_t missed = 0;
+        for (const RayHit& hit : closest(tracer, rays)) missed += !hit.valid();
+        EXPECT_EQ(missed, 0u) << at.x;
+      }
+    }
 }
 
 TEST(PackedLeaks, NoneFarFromTheOrigin) {

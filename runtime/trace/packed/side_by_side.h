@@ -1,0 +1,73 @@
+#pragma once
+
+#include "runtime/trace/packed/group_boxes.h"
+
+/// Each box of a node against a register of neighbouring rays, in the place of each ray against eight boxes: the same
+/// arithmetic in other lanes.
+namespace packtrace::packed {
+namespace {
+
+/// The lanes of a register that begins with bit `first` of a word.
+template <typename Wide>
+inline uint32_t lanes_at(uint64_t rays, uint32_t first) {
+  return static_cast<uint32_t>(rays >> first) & ((1u << Wide::kLanes) - 1);
+}
+
+/// Whether few registers of rays are to be tested against few boxes, for rays that are.
+template <typename Wide>
+inline bool pays_side_by_side(uint64_t rays, uint32_t slots) {
+  uint32_t registers = 0;
+  for (uint32_t at = 0; at < kGroup; at += Wide::kLanes) registers += lanes_at<Wide>(rays, at) != 0 ? 1 : 0;
+  return 3 * registers * static_cast<uint32_t>(__builtin_popcount(slots)) <
+         2 * static_cast<uint32_t>(__builtin_popcountll(rays));
+}
+
+/// A child's near and far planes.
+struct BoxPlanes {
+  float near[3][baked::kNodeWidth], far[3][baked::kNodeWidth];
+};
+
+template <typename Lanes>
+inline void read_planes(const GroupBoxes<Lanes>& boxes, BoxPlanes& planes) {
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    Lanes::store(planes.near[axis], boxes.near[axis]);
+    Lanes::store(planes.far[axis], boxes.far[axis]);
+  }
+}
+
+/// By child in `slots`: those of `rays` that pass its box, as bits. Returns the children that any passes.
+template <typename Wide>
+[[gnu::always_inline]] inline uint32_t pass_each(const BoxPlanes& planes, const SideBySideRays& group, uint64_t rays,
+                                                 uint32_t slots, uint64_t (&out)[baked::kNodeWidth]) {
+  using F = typename Wide::F;
+  for (uint64_t& word : out) word = 0;
+  for (uint32_t at = 0; at < kGroup; at += Wide::kLanes) {
+    if (lanes_at<Wide>(rays, at) == 0) continue;
+    const F ray_begin = Wide::load(&group.begin[at]), ray_end = Wide::load(&group.end[at]);
+    F inverse[3], near_bias[3], far_bias[3];
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+      inverse[axis] = Wide::load(&group.inverse[axis][at]);
+      near_bias[axis] = Wide::load(&group.near_bias[axis][at]);
+      far_bias[axis] = Wide::load(&group.far_bias[axis][at]);
+    }
+    for (uint32_t m = slots; m != 0; m &= m - 1) {
+      const auto slot = static_cast<uint32_t>(__builtin_ctz(m));
+      F begin = ray_begin, end = ray_end;
+      for (uint32_t axis = 0; axis < 3; ++axis) {
+        begin = Wide::max(begin, Wide::fma(Wide::set(planes.near[axis][slot]), inverse[axis], near_bias[axis]));
+        end = Wide::min(end, Wide::fma(Wide::set(planes.far[axis][slot]), inverse[axis], far_bias[axis]));
+      }
+      out[slot] |= uint64_t{Wide::less_equal(begin, end)} << at;
+    }
+  }
+  uint32_t used = 0;
+  for (uint32_t m = slots; m != 0; m &= m - 1) {
+    const auto slot = static_cast<uint32_t>(__builtin_ctz(m));
+    out[slot] &= rays;
+    used |= (out[slot] != 0 ? 1u : 0u) << slot;
+  }
+  return used;
+}
+
+} // namespace
+} // namespace packtrace::packed
