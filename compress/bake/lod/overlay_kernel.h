@@ -24,11 +24,12 @@ struct OverlayTask {
   uint32_t* outside;       ///< then: bit i: coordinate i is not above 0
   uint32_t* stamps;
   uint32_t stamp;
+  double enough; ///< no more is looked for once the triangle is covered that often
   double origin[3];
   OverlayPoint from_x, from_y, from_z; ///< coordinates' slopes; those of the origin are 1, 0, 0, 0
 };
 
-/// Lays the triangle over the candidates until it is covered; those that face away are as if they were not there.
+/// Lays the triangle over the candidates until they are enough; those that face away are as if they were not there.
 /// Writes as many pieces as it returns, one per candidate at most, and how often they cover the triangle, on average.
 using OverlayKernel = uint32_t (*)(const OverlayTask& task, const uint32_t* candidates, uint32_t count,
                                    OverlayPiece* pieces, double* covered);

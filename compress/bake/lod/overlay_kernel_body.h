@@ -167,7 +167,7 @@ struct Sides4 {
         sum += area[lane];
       }
     filled = 0;
-    if (sum >= 1.0 - kTiny) break;
+    if (sum >= task.enough) break;
   }
   *covered = sum;
   return found;

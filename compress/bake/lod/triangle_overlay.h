@@ -28,9 +28,9 @@ class Overlay {
 public:
   explicit Overlay(const OverlaySurface& surface);
 
-  /// Appends the pieces to `pieces` and returns true where the candidates cover the triangle just once: where their
-  /// areas say so, and each side that goes through its inside is one of two of them, so that how often they cover it is
-  /// the same everywhere. `pieces` is as it was else. Triangles of the surface that face away are as if they were not
+  /// Appends the pieces to `pieces` and returns true where the candidates are known to cover the triangle: where each
+  /// of their sides that goes through its inside is one of two, so that they cover all of it equally often, and their
+  /// areas say how often. `pieces` is as it was else. Triangles of the surface that face away are as if they were not
   /// there.
   /// @param direction any length; false where the triangle is seen nearly from its side
   bool lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::span<const uint32_t> candidates,
@@ -42,6 +42,7 @@ public:
 private:
   void prepare(); ///< on first use: most overlays are never asked
   bool hang_together(std::span<const OverlayPiece> pieces);
+  bool has_layers();
 
   OverlaySurface surface_;
   std::vector<uint32_t> corners_;

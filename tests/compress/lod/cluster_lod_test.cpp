@@ -189,6 +189,18 @@ TEST(ClusterLod, APlaneHasNoErrorThatMatters) {
     } // steps
 }
 
+TEST(ClusterLod, SheetsOfSeveralLayersKeepTheirOutline) {
+  for (const bool other_side : {false, true})
+    for (const float cut : {0.1f, 0.5f}) {
+      const BuiltLod built = build_lod(twice(chamfered_sheet(cut), other_side));
+      const double width = built.lod.groups[0].sphere.radius;
+      for (const LodGroup& group : built.lod.groups)
+        if (!group.terminal && group.level < 3) {
+          EXPECT_LT(group.error, 0.02 * width) << "level " << group.level;
+        }
+    }
+}
+
 TEST(ClusterLod, SameForAnyThreadCount) {
   const Mesh mesh = half_faceted(torus_mesh(150, 90));
   const auto with_threads = [&](size_t threads) {

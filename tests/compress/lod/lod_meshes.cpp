@@ -68,34 +68,6 @@ Mesh tetrahedra_mesh(uint32_t count, uint32_t seed) {
   return mesh;
 }
 
-namespace {
-
-/// Every triangle twice: seen from the same side, or from both.
-Mesh twice(Mesh mesh, bool other_side) {
-  const std::vector<Triangle> once = mesh.triangles;
-  for (const Triangle& t : once) mesh.triangles.push_back(other_side ? Triangle(t.x, t.z, t.y) : t);
-  return mesh;
-}
-
-/// Triangles that share corners only, each with the next.
-Mesh vertex_chain() {
-  Random random(11);
-  Mesh mesh;
-  Vec3 at(0.0f);
-  const auto step = [&] { return Vec3(random.uniform(-0.1f, 1), random.uniform(-1, 1), random.uniform(-1, 1)); };
-  mesh.positions.push_back(at);
-  for (uint32_t i = 0; i < 3000; ++i) {
-    const Vec3 next = at + step();
-    mesh.positions.push_back(at + 0.5f * step());
-    mesh.positions.push_back(next);
-    mesh.triangles.emplace_back(2 * i, 2 * i + 1, 2 * i + 2);
-    at = next;
-  }
-  return mesh;
-}
-
-/// A flat square of cells whose four outer corners are cut off, by so much of a cell. Both points of a corner become
-/// one at almost no cost; what juts out then is a small part of a large triangle.
 Mesh chamfered_sheet(float cut) {
   constexpr int kCells = 12;
   Mesh mesh;
@@ -128,6 +100,31 @@ Mesh chamfered_sheet(float cut) {
       for (size_t k = 2; k < cell.size(); ++k)
         mesh.triangles.emplace_back(number(cell[0]), number(cell[k - 1]), number(cell[k]));
     }
+  return mesh;
+}
+
+Mesh twice(Mesh mesh, bool other_side) {
+  const std::vector<Triangle> once = mesh.triangles;
+  for (const Triangle& t : once) mesh.triangles.push_back(other_side ? Triangle(t.x, t.z, t.y) : t);
+  return mesh;
+}
+
+namespace {
+
+/// Triangles that share corners only, each with the next.
+Mesh vertex_chain() {
+  Random random(11);
+  Mesh mesh;
+  Vec3 at(0.0f);
+  const auto step = [&] { return Vec3(random.uniform(-0.1f, 1), random.uniform(-1, 1), random.uniform(-1, 1)); };
+  mesh.positions.push_back(at);
+  for (uint32_t i = 0; i < 3000; ++i) {
+    const Vec3 next = at + step();
+    mesh.positions.push_back(at + 0.5f * step());
+    mesh.positions.push_back(next);
+    mesh.triangles.emplace_back(2 * i, 2 * i + 1, 2 * i + 2);
+    at = next;
+  }
   return mesh;
 }
 
