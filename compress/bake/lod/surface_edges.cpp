@@ -13,7 +13,7 @@ constexpr uint32_t kNone = ~0u;
 constexpr double kBorderWeight = 8.0;  // of border planes against the triangles' own
 constexpr double kSeamWeight = 2.0;    // where the material changes
 constexpr double kCreaseWeight = 0.25; // where normals or texture coordinates change
-constexpr double kFolded = 0.99;       // cosine between layers of a sheet, at least
+constexpr double kFolded = 0.9999;      // cosine between layers of a sheet, at least
 constexpr double kStayWeight = 1e-4; // of the point itself: where all is flat, short edges go first and none gets long
 
 /// An edge while more triangles at it are looked for.
@@ -79,6 +79,7 @@ private:
       const DVec3 side = m_.points[points[(i + 1) % 3]] - m_.points[points[i]];
       if (const double length2 = glm::dot(side, side); length2 > longest) longest = length2, first = i;
     }
+    if (!(longest > 0.0)) return; // new points may coincide
     const uint32_t a = points[first], b = points[(first + 1) % 3];
     const DVec3 along = (m_.points[b] - m_.points[a]) / std::sqrt(longest);
     Quadric line;

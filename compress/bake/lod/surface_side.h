@@ -47,7 +47,6 @@ public:
   }
 
 private:
-  std::span<const uint32_t> fan(uint32_t point) const { return around(point); }
   void add_large_fan(std::span<const uint32_t> fan, const Triangle& corners, int corner);
 
   /// What holds a triangle.

@@ -153,7 +153,7 @@ TEST(TriangleRefiner, BoundsTheDistanceOfEveryPoint) {
       EXPECT_EQ(bound, noted);
       EXPECT_LE(farthest, sampled + 1e-9);
       EXPECT_LE(sampled, bound + 1e-9);
-      EXPECT_LE(bound, std::max(enough, 1.6 * sampled)); // cutting ends at a quarter above what it could still gain
+      EXPECT_LE(bound, std::max(enough, 1.15 * sampled)); // cutting ends at a tenth above what it could still gain
     }
 }
 
