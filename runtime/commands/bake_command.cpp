@@ -247,7 +247,7 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
       ->type_name("DB")
       ->group("Textures");
   verb.add_option("--lod", options->lod,
-                  "Levels of detail, each of about half the triangles of the one below: instanced makes them of "
+                  "Levels of detail, each of less than half the triangles of the one below: instanced makes them of "
                   "geometries with more than one instance")
       ->check(CLI::IsMember(std::vector<std::string>(kLodUses.begin(), kLodUses.end())))
       ->default_str(options->lod)

@@ -134,9 +134,12 @@ public:
                                        surface_distance(points, base, to_level, kSamples).max);
       measured_[group] = measured;
       if (measured > 0.0) result.push_back(lod_.groups[group].error / measured);
+      excess_ = std::max(excess_, measured - lod_.groups[group].error * (1.0 + 1e-6));
     });
     return result;
   }
+  /// How far some group is further off than it says, at most; lattice steps.
+  double excess() const { return excess_; }
 
   /// The same against the largest error measured of each group and all below it, which it must not be below. Of levels
   /// in turn, after ratios().
@@ -165,6 +168,7 @@ private:
   std::vector<std::vector<uint32_t>> made_, base_; ///< clusters, per group
   std::vector<std::vector<uint32_t>> below_;       ///< groups, per group
   std::vector<double> measured_;                   ///< per group
+  double excess_ = 0.0;
 };
 
 /// How many triangles a cut has that allows so much error: what users pay for it.
@@ -242,6 +246,7 @@ Json measure_levels(const test::BuiltLod& built, const Options& options) {
   fmt::print("\nStated : measured, median of all {} groups: {:.2f}, largest below counted {:.2f}\n", all_ratios.size(),
              median(all_ratios), median(all_ratios_to_largest));
   return {{"levels", std::move(levels)},
+          {"largest_group_excess", groups.excess() / size},
           {"groups_stated_to_measured", median(all_ratios)},
           {"groups_stated_to_largest_measured_below", median(all_ratios_to_largest)},
           {"cuts", measure_cuts(lod, size)}};
@@ -331,11 +336,15 @@ int run(int argc, char** argv) {
   for (const std::string& name : options.inputs.names)
     json["inputs"].push_back(measure_input(name, weld_positions(options.inputs.find(name).mesh), options));
   figures.write(json);
-  for (const Json& input : json["inputs"])
+  for (const Json& input : json["inputs"]) {
+    if (input.value("largest_group_excess", 0.0) > 1e-9)
+      throw Error(ErrorKind::kLimitExceeded,
+                  input["name"].get<std::string>() + ": a group is further from the source than it says");
     for (const Json& level : input.value("levels", Json::array()))
       if (level["measured_max"].get<double>() > level["stated_error"].get<double>() * (1.0 + 1e-6) + 1e-9)
         throw Error(ErrorKind::kLimitExceeded,
                     input["name"].get<std::string>() + ": a level is further from the source than it says");
+  }
   return 0;
 }
 

@@ -33,7 +33,7 @@ Scene read_scene(const std::filesystem::path& input) {
 class CorpusWriter {
 public:
   CorpusWriter(const Scene& scene, std::filesystem::path stem) : scene_(scene), stem_(std::move(stem)) {
-    config_.lod_min_triangles = 129; // of more than one cluster
+    config_.lod_min_triangles = 48; // of one cluster, too
     config_.purpose = baked::kShading;
     config_.textures = true;
   }

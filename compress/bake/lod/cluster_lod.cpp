@@ -20,7 +20,7 @@ constexpr double kKept = 0.47; // of the triangles, by one level
 // The last few hundred triangles go faster: each level has records of its own, which would take more than its clusters.
 constexpr uint64_t kFewTriangles = 512;
 constexpr double kKeptOfFew = 0.25;
-constexpr uint64_t kCoarsest = 16; // levels of so few triangles have none above them
+constexpr uint64_t kCoarsest = 16;        // levels of so few triangles have none above them
 constexpr double kInflation = 1.0 + 1e-6; // of spheres around spheres: more than roundings can shrink them
 
 double distance(DVec3 a, DVec3 b) { return glm::length(a - b); }
@@ -77,10 +77,11 @@ private:
     diagonal_ = glm::length(hi - lo);
   }
 
-  DVec3 point(uint32_t position) const {
+  DVec3 point(uint32_t position) const { return point(lod_.positions[position]); }
+  DVec3 point(const LatticePoint& position) const {
     DVec3 p;
     for (size_t axis = 0; axis < 3; ++axis)
-      p[static_cast<int>(axis)] = static_cast<double>(lod_.positions[position][axis] - g_.origin[axis]);
+      p[static_cast<int>(axis)] = static_cast<double>(position[axis] - g_.origin[axis]);
     return p;
   }
 
@@ -200,8 +201,11 @@ private:
             locked_for_ever_[lod_.vertices[lod_.triangles[c.range.first_triangle + i][corner]].position] = 1;
     }
     group.sphere = enclose(spheres);
+    if (group.terminal) return;
     // Everything lies in the ball, and in the geometry's box: nothing is further off than they are wide.
-    if (!group.terminal) group.error = std::min({group.error, 2.0 * group.sphere.radius, diagonal_});
+    for (const LatticePoint& p : result.new_positions)
+      group.sphere.radius = std::max(group.sphere.radius, kInflation * distance(group.sphere.center, point(p)));
+    group.error = std::min({group.error, 2.0 * group.sphere.radius, diagonal_});
   }
 
   /// New positions, vertices, triangles and clusters of all groups, in their order.

@@ -34,7 +34,7 @@ struct LodGroup {
   /// Of what was made from it, in lattice steps: no point of that surface is further than this from the part of level 0
   /// that it stands for, nor the other way round. At least as large as that of every group below. Infinite if terminal.
   double error = 0.0;
-  LodSphere sphere; ///< holds the spheres of all groups below, and so everything it was ever made from
+  LodSphere sphere; ///< holds what was made from it and the spheres of all groups below: all that it was ever made from
 };
 
 /// The levels of one geometry. A cut takes, for some threshold, each cluster whose group's error is above it and whose

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "compress/bake/lod/stated_error.h"
 #include "compress/bake/lod/surface_side.h"
 #include "compress/bake/lod/triangle_refiner.h"
 #include "compress/bake/lod/triangle_set.h"
@@ -16,9 +17,8 @@ namespace {
 
 using Corners = std::array<DVec3, 3>;
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-constexpr double kInflation = 1.001; // of what was measured, for all roundings
-constexpr double kRounding = 1e-3;   // steps; of what is cut away
-constexpr double kSlack = 1.25;      // a smaller gain than that is not looked for
+constexpr double kRounding = 1e-3; // steps; of what is cut away
+constexpr double kSlack = 1.25;    // a smaller gain than that is not looked for
 // So many triangles are measured at most, or one of so many: where more are too far off, little is gained.
 constexpr size_t kFew = 512, kFewOf = 8;
 constexpr size_t kWork = 400; // distances and the like for each triangle of a group, at most
@@ -189,11 +189,11 @@ private:
 
   /// What one of the group stands for of one below. Adds what it is measured against to worst_pieces_.
   double measure_below(uint32_t t, const Neighbourhood& near, uint32_t below, uint32_t depth, double stated) {
-    const double error = in_.levels.errors[below], enough = (largest_ - error) / kInflation;
+    const double error = in_.levels.errors[below], enough = (largest_ - error) / kErrorInflation;
     const Corners corners = corners_of(below);
     if (const auto [s, distance] = nearest_to_all(below); distance <= enough) {
       worst_pieces_.push_back(s);
-      return distance * kInflation + error;
+      return stated_error(distance, error);
     }
     const bool last = depth + 1 == TriangleHistory::kDepth || in_.levels.history.below(below).empty();
     const Polygon part = near.part_within(corners, in_.triangles[t].error + error);
@@ -202,12 +202,12 @@ private:
       const Corners corners_part{part.corners[0], part.corners[i - 1], part.corners[i]};
       double distance = measure_part(corners_part, enough, kInfinite);
       if (distance > enough && last) {
-        after_.gather_within(corners_part, std::min(distance, (stated - error) / kInflation));
+        after_.gather_within(corners_part, std::min(distance, (stated - error) / kErrorInflation));
         work_ += m_.triangles.size();
         distance = measure_part(corners_part, enough, distance);
         gather_after(t);
       }
-      largest = std::max(largest, distance * kInflation + error);
+      largest = std::max(largest, stated_error(distance, error));
     }
     return largest;
   }
@@ -299,7 +299,7 @@ private:
     TriangleSet& below = refiner_.begin();
     for (const uint32_t number : numbers_) below.add(corners_of(number), number);
     const auto stated = [&](double distance, uint32_t number) {
-      return distance * kInflation + in_.levels.errors[number];
+      return stated_error(distance, in_.levels.errors[number]);
     };
     double largest = numbers_.empty() ? kInfinite : 0.0;
     refiner_.measure_corners(corners);

@@ -13,7 +13,7 @@ struct alignas(32) TriangleBlock {
 struct NearestTriangle {
   uint64_t place;  ///< the first of several
   double distance; ///< at most, of all of it
-  double least;    ///< some point of it is at least that far from all of them
+  double least;    ///< some corner of it is that far from all of them: those still looked at
 };
 
 /// Distances of points from the nearest points of 4 * `count` triangles, a row for each point. Triangles without area

@@ -13,7 +13,6 @@ namespace packtrace {
 class EdgeHeap {
 public:
   bool empty() const { return keys_.empty(); }
-  size_t size() const { return keys_.size(); }
   uint32_t top() const { return static_cast<uint32_t>(keys_.front()); }
   void reserve(size_t count) { keys_.reserve(count); }
 

@@ -69,7 +69,7 @@ private:
     record.radius = round_up((group.sphere.radius * step_ + off) * kFloatRoundings);
     for (const uint32_t number : members) {
       const LodCluster& cluster = lod_.clusters[number];
-      // New points may lie a little outside what they were made from.
+      // Decoded points may lie a little outside.
       record.radius = std::max(record.radius, round_up((reach(cluster, record) + decoding_error_) * kFloatRoundings));
       if (cluster.generating_group == kNoGroup) continue;
       const baked::LodGroupRecord& inner = done[cluster.generating_group];

@@ -28,7 +28,7 @@ struct LodGroupInput {
   std::span<const uint32_t> owner;          ///< per position; kShared ones stay
   std::span<const uint8_t> locked_for_ever; ///< per position; those stay too
   const LineCover& lines;
-  double kept = 0.5;  ///< share of the triangles that the group is to keep
+  double kept;        ///< share of the triangles that the group is to keep
   double floor = 0.0; ///< the error is not below, whatever is measured
 };
 
@@ -45,9 +45,9 @@ struct SimplifiedGroup {
   std::vector<uint32_t> cluster_kinds;
 };
 
-/// Reduces the triangles of a group to the share asked for as far as its locked positions allow, and splits the result into clusters.
-/// Triangles with two corners in one place are left out; the lines that they were count as surface of the group, unless
-/// they are sides of other triangles.
+/// Reduces the triangles of a group to the share asked for as far as its locked positions allow, and splits the result
+/// into clusters. Triangles with two corners in one place are left out; the lines that they were count as surface of
+/// the group, unless they are sides of other triangles.
 SimplifiedGroup simplify_group(const LodGroupInput& input);
 
 } // namespace packtrace

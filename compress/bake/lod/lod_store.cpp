@@ -21,7 +21,7 @@ namespace packtrace {
 namespace {
 
 /// To be raised with every change of what builder or encoder make of the same geometry.
-constexpr uint32_t kRevision = 6;
+constexpr uint32_t kRevision = 7;
 constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'K', 'L', 'O', 'D', '\n', 0};
 constexpr const char* kExtension = ".ptklod";
 

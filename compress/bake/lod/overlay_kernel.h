@@ -7,8 +7,8 @@ namespace packtrace {
 /// Where the triangle that is laid over a surface meets one triangle of it.
 struct OverlayPiece {
   uint32_t triangle;
-  double distance; ///< every point of the one there is within this of the other, and the other way round
-  double share;    ///< of the area of the surface's triangle
+  uint32_t inner_sides; ///< bit i: its side from corner i goes through the inside of the triangle laid over it
+  double distance;      ///< every point of the one there is within this of the other, and the other way round
 };
 
 /// A point seen from a triangle: barycentric coordinates in its plane, and how far above it along the direction.
@@ -24,12 +24,13 @@ struct OverlayTask {
   uint32_t* outside;       ///< then: bit i: coordinate i is not above 0
   uint32_t* stamps;
   uint32_t stamp;
+  double enough; ///< no more is looked for once the triangle is covered that often
   double origin[3];
   OverlayPoint from_x, from_y, from_z; ///< coordinates' slopes; those of the origin are 1, 0, 0, 0
 };
 
-/// Lays the triangle over the candidates until it is covered; those that face away are as if they were not there.
-/// Writes as many pieces as it returns, one per candidate at most, and the share of the triangle that they cover.
+/// Lays the triangle over the candidates until they are enough; those that face away are as if they were not there.
+/// Writes as many pieces as it returns, one per candidate at most, and how often they cover the triangle, on average.
 using OverlayKernel = uint32_t (*)(const OverlayTask& task, const uint32_t* candidates, uint32_t count,
                                    OverlayPiece* pieces, double* covered);
 
@@ -39,7 +40,5 @@ namespace avx2 {
 uint32_t overlay_kernel(const OverlayTask& task, const uint32_t* candidates, uint32_t count, OverlayPiece* pieces,
                         double* covered);
 }
-
-inline constexpr double kOverlayCovered = 1e-6; ///< of the triangle's area may be left over: roundings
 
 } // namespace packtrace

@@ -34,6 +34,7 @@ struct Corner4 {
 };
 
 /// Adds what a side of the piece contributes to its area, and takes its ends into account for its height.
+/// @param counts whether it contributes
 [[gnu::always_inline]] inline void add_side(const Span4& span, const Mask& counts, const Lanes& x, const Lanes& y,
                                             const Lanes& h, const Lanes& dx, const Lanes& dy, const Lanes& dh,
                                             Lanes& area, Lanes& height) {
@@ -48,7 +49,9 @@ struct Corner4 {
 }
 
 /// The side from p to q of a triangle of the surface, cut by the three lines of the one laid over it.
-[[gnu::always_inline]] inline void surface_side(const Corner4& p, const Corner4& q, Lanes& area, Lanes& height) {
+/// @param inner set to whether it goes through the inside of that one
+[[gnu::always_inline]] inline void surface_side(const Corner4& p, const Corner4& q, Lanes& area, Lanes& height,
+                                                Mask& inner) {
   const Lanes zero = {};
   Span4 span = {zero, zero + 1.0};
   clip(span, p.l0, q.l0);
@@ -57,7 +60,9 @@ struct Corner4 {
   // On one of the lines: the side there counts, this does not.
   const Mask on =
       ((p.l0 == zero) & (q.l0 == zero)) | ((p.l1 == zero) & (q.l1 == zero)) | ((p.l2 == zero) & (q.l2 == zero));
-  add_side(span, ~on, p.l1, p.l2, p.height, q.l1 - p.l1, q.l2 - p.l2, q.height - p.height, area, height);
+  const Lanes d1 = q.l1 - p.l1, d2 = q.l2 - p.l2;
+  add_side(span, ~on, p.l1, p.l2, p.height, d1, d2, q.height - p.height, area, height);
+  inner = ~on & ((span.hi - span.lo) * ((d1 < zero ? -d1 : d1) + (d2 < zero ? -d2 : d2)) > zero + kOnLine);
 }
 
 /// Which side of p -> q the triangle's corners are on: (0, 0), (1, 0), (0, 1) in l1, l2.
@@ -74,14 +79,16 @@ struct Sides4 {
 
 /// Four triangles of the surface at once.
 [[gnu::always_inline]] inline void meet(const Corner4& a, const Corner4& b, const Corner4& c, Lanes& area,
-                                        Lanes& height, Lanes& facing) {
+                                        Lanes& height, Lanes& facing, Mask& inner) {
   const Lanes zero = {}, one = zero + 1.0;
   const Mask all = zero == zero;
   facing = (b.l1 - a.l1) * (c.l2 - a.l2) - (b.l2 - a.l2) * (c.l1 - a.l1);
   area = height = zero;
-  surface_side(a, b, area, height);
-  surface_side(b, c, area, height);
-  surface_side(c, a, area, height);
+  Mask inner_ab, inner_bc, inner_ca;
+  surface_side(a, b, area, height, inner_ab);
+  surface_side(b, c, area, height, inner_bc);
+  surface_side(c, a, area, height, inner_ca);
+  inner = (inner_ab & 1) | (inner_bc & 2) | (inner_ca & 4);
 
   const Lanes tolerance = kOnLine + 1e-14 * (facing < zero ? -facing : facing);
   Sides4 ab, bc, ca;
@@ -152,14 +159,15 @@ struct Sides4 {
     Corner4 a, b, c;
     load(corners[0], a), load(corners[1], b), load(corners[2], c);
     Lanes area, height, facing;
-    meet(a, b, c, area, height, facing);
+    Mask inner;
+    meet(a, b, c, area, height, facing, inner);
     for (uint32_t lane = 0; lane < filled; ++lane)
       if (facing[lane] > 0.0 && area[lane] > kTiny) {
-        pieces[found++] = {waiting[lane], height[lane], area[lane] / facing[lane]};
+        pieces[found++] = {waiting[lane], static_cast<uint32_t>(inner[lane]), height[lane]};
         sum += area[lane];
       }
     filled = 0;
-    if (sum >= 1.0 - kOverlayCovered) break;
+    if (sum >= task.enough) break;
   }
   *covered = sum;
   return found;

@@ -6,18 +6,16 @@
 #include <limits>
 #include <numeric>
 
+#include "compress/bake/lod/image_cover.h"
+#include "compress/bake/lod/stated_error.h"
 #include "compress/bake/lod/surface_side.h"
 #include "compress/bake/lod/surface_walk.h"
 #include "compress/bake/lod/triangle_images.h"
 #include "compress/bake/lod/triangle_refiner.h"
+#include "compress/bake/lod/uncovered_bound.h"
 
 namespace packtrace {
 namespace {
-
-constexpr double kSeen = 0.02;       // of a new triangle's area may be met by no old one
-constexpr double kInflation = 1.001; // of what was measured, for all roundings
-constexpr double kFine = 0.5;        // steps; distances below need no work
-constexpr double kSlack = 1.1;       // how much larger than it must be the error of a group may be stated to save work
 
 using Corners = std::array<DVec3, 3>;
 
@@ -39,9 +37,9 @@ class Measurer {
 public:
   Measurer(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh)
       : m_(mesh), before_({points, triangles}, mesh.stands_for), after_({mesh.points, mesh.triangles}),
-        walk_(before_.surface(), after_, mesh), images_(walk_, mesh), errors_(mesh.triangles.size()),
-        bounds_(triangles.size()), seen_(mesh.triangles.size()), covered_(mesh.triangles.size()),
-        mapped_(triangles.size()), unchanged_(triangles.size()) {}
+        walk_(before_.surface(), after_, mesh), images_(walk_, mesh), cover_(walk_, images_, mesh),
+        errors_(mesh.triangles.size()), bounds_(triangles.size()), mapped_(triangles.size()),
+        unchanged_(triangles.size()) {}
 
   SurfaceLinks run() {
     after_.link();
@@ -57,20 +55,18 @@ public:
       after_.gather(before_.corner_points(t));
       measure_harder(t, std::numeric_limits<double>::infinity());
     }
-    for (uint32_t s = 0; s < errors_.size(); ++s)
-      if ((covered_[s] & TriangleImages::kWhole) == 0 && seen_[s] < 1.0 - kSeen) lay_over_before(s);
+    measure_uncovered();
     for (size_t s = 0; s < errors_.size(); ++s) m_.triangles[s].error = errors_[s];
     return {std::move(links_), std::move(bounds_)};
   }
 
 private:
   double had(uint32_t before) const { return before_.surface().triangles[before].error; }
-  static double stated(double distance, double had) { return distance * kInflation + had; }
 
   /// A part of the triangle after is within the distance of one before.
   void note_after(uint32_t after, uint32_t before, double distance) {
-    errors_[after] = std::max(errors_[after], stated(distance, had(before)));
-    largest_ = std::max(largest_, errors_[after]);
+    errors_[after] = std::max(errors_[after], stated_error(distance, had(before)));
+    error_.largest = std::max(error_.largest, errors_[after]);
     link(before, after);
   }
 
@@ -81,12 +77,7 @@ private:
   /// A part of each is within the distance of the other.
   void note(uint32_t after, uint32_t before, double distance) {
     note_after(after, before, distance);
-    bounds_[before] = std::max(bounds_[before], stated(distance, had(before)));
-  }
-
-  /// A group is as far off as its worst part: what is hardly worse needs no closer look.
-  bool enough(double distance, double had) const {
-    return distance <= kFine || stated(distance, had) <= std::max(largest_, kSlack * proven_);
+    bounds_[before] = std::max(bounds_[before], stated_error(distance, had(before)));
   }
 
   void find_unchanged() {
@@ -96,8 +87,6 @@ private:
       if (now != before_.surface().triangles[t].points || m_.moved[now.x] + m_.moved[now.y] + m_.moved[now.z] != 0)
         continue;
       unchanged_[t] = mapped_[t] = 1;
-      covered_[s] = TriangleImages::kFront;
-      seen_[s] = 1.0;
       note(s, t, 0.0);
     }
   }
@@ -115,8 +104,8 @@ private:
       laid.image.count = static_cast<uint32_t>(pieces_.size()) - laid.image.first;
       laid.image.distance = largest_of(laid);
     }
-    if (laid.image.distance > kFine)
-      claims_.push_back({stated(laid.image.distance, had(t)), static_cast<uint32_t>(laid_.size())});
+    if (laid.image.distance > GroupError::kFine)
+      claims_.push_back({stated_error(laid.image.distance, had(t)), static_cast<uint32_t>(laid_.size())});
     laid_.push_back(laid);
   }
 
@@ -133,7 +122,7 @@ private:
   /// The worst first: what they really are leaves most others as they are.
   void settle() {
     std::make_heap(claims_.begin(), claims_.end());
-    while (!claims_.empty() && claims_.front().stated > std::max(largest_, kSlack * proven_)) {
+    while (!claims_.empty() && claims_.front().stated > error_.limit()) {
       std::pop_heap(claims_.begin(), claims_.end());
       Laid& laid = laid_[claims_.back().index];
       claims_.pop_back();
@@ -146,47 +135,35 @@ private:
       // Not all of it may lie over those after, though its image does.
       const bool once = after_.lay(before_.corners(t), before_.surface().area_normal(t), best_);
       const double distance = once ? look_closer(t) : std::numeric_limits<double>::infinity();
-      if (enough(distance, had(t)))
+      if (error_.enough(distance, had(t)))
         accept(t);
       else
         measure_harder(t, distance);
     }
     edge_had_.assign(walk_.ways().size(), -1.0);
     point_had_.assign(before_.surface().points.size(), -1.0);
-    for (const Laid& laid : laid_)
+    for (const Laid& laid : laid_) {
+      if (laid.settled) continue;
       if (mapped_[laid.triangle] != 0)
         see_image(laid);
-      else if (!laid.settled)
+      else
         accept(pieces_of(laid), laid.triangle);
+    }
     accept_ways();
-    for (const double error : errors_) largest_ = std::max(largest_, error);
-    images_.find_covered(mapped_, covered_);
-    for (const Laid& laid : laid_)
-      if (mapped_[laid.triangle] != 0) add_shares(laid);
+    for (const double error : errors_) error_.largest = std::max(error_.largest, error);
   }
 
-  /// Where borders cross, the area says what images cover.
-  void add_shares(const Laid& laid) {
-    const auto met = images_.met(laid.image);
-    if (std::any_of(met.begin(), met.end(), [&](uint32_t s) { return (covered_[s] & TriangleImages::kWhole) == 0; }))
-      images_.add_shares(laid.triangle, laid.image, covered_, seen_);
-  }
-
-  /// What images cover, each seen from the side that it faces, needs no measuring of its own. Distances inside are
-  /// noted here; ways and corners are shared with neighbours.
+  /// What images cover needs no measuring of its own. Distances inside are noted here; ways and corners are shared with
+  /// neighbours.
   void see_image(const Laid& laid) {
     const uint32_t t = laid.triangle;
     const Triangle& p = before_.surface().triangles[t].points;
-    const std::span<const DVec3> points = before_.surface().points;
-    const DVec3 normal = glm::cross(points[p.y] - points[p.x], points[p.z] - points[p.x]);
-    const double had = this->had(t), inside = laid.settled ? 0.0 : stated(laid.image.inside, had);
+    const double had = this->had(t), inside = stated_error(laid.image.inside, had);
     for (const uint32_t s : images_.met(laid.image)) {
-      covered_[s] |= glm::dot(normal, walk_.area_normal(s)) > 0.0 ? TriangleImages::kFront : TriangleImages::kBack;
       errors_[s] = std::max(errors_[s], inside);
-      if (!laid.settled) link(t, s);
+      link(t, s);
     }
-    if (laid.settled) return;
-    bounds_[t] = std::max(bounds_[t], stated(laid.image.distance, had));
+    bounds_[t] = std::max(bounds_[t], stated_error(laid.image.distance, had));
     for (int i = 0; i < 3; ++i) {
       double& of_edge = edge_had_[m_.side_edges[3 * size_t{t} + static_cast<size_t>(i)]];
       of_edge = std::max(of_edge, had);
@@ -201,7 +178,7 @@ private:
       if (edge_had_[e] < 0.0 || way.state != SurfaceWalk::Way::State::kAcross) continue;
       uint32_t from = way.start;
       for (uint32_t k = way.first; k < way.first + way.count; ++k) {
-        const double error = stated(std::sqrt(walk_.crossing(k).distance2), edge_had_[e]);
+        const double error = stated_error(std::sqrt(walk_.crossing(k).distance2), edge_had_[e]);
         const uint32_t into = walk_.into(k);
         errors_[from] = std::max(errors_[from], error);
         errors_[into] = std::max(errors_[into], error);
@@ -211,7 +188,7 @@ private:
     for (uint32_t p = 0; p < point_had_.size(); ++p) {
       if (point_had_[p] < 0.0) continue;
       const SurfaceWalk::Place& place = walk_.place(p);
-      const double error = stated(std::sqrt(place.distance2), point_had_[p]);
+      const double error = stated_error(std::sqrt(place.distance2), point_had_[p]);
       if (place.state == SurfaceWalk::Place::State::kTriangle)
         errors_[place.number] = std::max(errors_[place.number], error);
       else if (place.distance2 > 0.0)
@@ -227,7 +204,7 @@ private:
     images_.look_closer(t, laid.image, best_);
     double largest = 0.0;
     for (const OverlayPiece& piece : best_) largest = std::max(largest, piece.distance);
-    if (!enough(largest, had(t))) return false;
+    if (!error_.enough(largest, had(t))) return false;
     accept(t);
     return true;
   }
@@ -236,7 +213,7 @@ private:
   double look_closer(uint32_t t) {
     double largest = 0.0;
     for (OverlayPiece& piece : best_) {
-      if (!enough(piece.distance, had(t))) piece.distance = after_.overlay().nearest_distance(piece);
+      if (!error_.enough(piece.distance, had(t))) piece.distance = after_.overlay().nearest_distance(piece);
       largest = std::max(largest, piece.distance);
     }
     return largest;
@@ -245,10 +222,7 @@ private:
   void accept(uint32_t t) { accept(best_, t); }
 
   void accept(std::span<const OverlayPiece> pieces, uint32_t t) {
-    for (const OverlayPiece& piece : pieces) {
-      note(piece.triangle, t, piece.distance);
-      seen_[piece.triangle] += piece.share;
-    }
+    for (const OverlayPiece& piece : pieces) note(piece.triangle, t, piece.distance);
   }
 
   /// What no overlay bounds well is cut.
@@ -257,7 +231,7 @@ private:
     const Corners p = before_.corners(t);
     if (after_.candidates().empty()) after_.gather_near(p[0]); // a line that hung together with nothing
     refine_over_after(t, bound, false);
-    if (!enough(bound, had(t))) {
+    if (!error_.enough(bound, had(t))) {
       after_.gather_within(p, bound);
       refine_over_after(t, bound, true);
     }
@@ -268,70 +242,58 @@ private:
   void refine_over_after(uint32_t t, double& bound, bool all) {
     refiner_.begin(after_);
     // It is not below this, as far as the candidates go.
-    const double before = proven_, least = stated(refiner_.measure_corners(before_.corners(t)), had(t));
-    proven_ = std::max(proven_, least);
-    if (!enough(bound, had(t))) {
+    const double before = error_.proven, least = stated_error(refiner_.measure_corners(before_.corners(t)), had(t));
+    error_.proven = std::max(error_.proven, least);
+    if (!error_.enough(bound, had(t))) {
       refined_.clear();
-      const double refined = refiner_.run([&](double distance, uint32_t) { return enough(distance, had(t)); },
+      const double refined = refiner_.run([&](double distance, uint32_t) { return error_.enough(distance, had(t)); },
                                           [&](uint32_t s, double distance) {
-                                            refined_.push_back({s, distance, 0.0});
+                                            refined_.push_back({s, 0, distance});
                                           });
       if (refined < bound) std::swap(best_, refined_), bound = refined;
     }
-    proven_ = all ? std::max(before, std::min(least, stated(bound, had(t)))) : before;
+    error_.proven = all ? std::max(before, std::min(least, stated_error(bound, had(t)))) : before;
   }
 
-  /// A triangle after of which the ones before saw too little: it is measured itself.
-  void lay_over_before(uint32_t s) {
-    before_.link();
-    before_.gather(after_.corner_points(s));
-    if (fits_over_before(s)) return;
-    const double near = refine_over_before(s);
-    if (near > std::max(largest_, kSlack * proven_)) {
-      std::swap(refined_, best_);
-      before_.gather_within(after_.corners(s), near);
-      if (refine_over_before(s) >= near) std::swap(refined_, best_);
+  // ---- what images do not cover
+
+  void find_covered() {
+    cover_.begin(mapped_);
+    for (const Laid& laid : laid_)
+      if (mapped_[laid.triangle] != 0) cover_.add(laid.triangle, laid.image);
+    for (uint32_t s = 0; s < errors_.size(); ++s)
+      if (unchanged_[m_.source[s]] != 0) cover_.add_unchanged(s);
+  }
+
+  /// Triangles after that images are not known to cover are measured themselves.
+  void measure_uncovered() {
+    find_covered();
+    std::vector<SurfaceLink> found;
+    for (const SurfaceLink& link : links_)
+      if (!cover_.whole(link.after)) found.push_back(link);
+    std::stable_sort(found.begin(), found.end(),
+                     [](const SurfaceLink& a, const SurfaceLink& b) { return a.after < b.after; });
+    UncoveredBound uncovered(before_, after_, error_, refiner_);
+    std::vector<uint32_t> befores;
+    size_t i = 0;
+    for (uint32_t s = 0; s < errors_.size(); ++s) {
+      if (cover_.whole(s)) continue;
+      before_.link();
+      for (befores.clear(); i < found.size() && found[i].after == s; ++i) befores.push_back(found[i].before);
+      uncovered.measure(s, befores);
     }
-    for (const OverlayPiece& piece : refined_) note_after(s, piece.triangle, piece.distance);
-  }
-
-  /// Returns the largest error that refined_ would make; infinite where nothing is near.
-  double refine_over_before(uint32_t s) {
-    double largest = before_.candidates().empty() ? std::numeric_limits<double>::infinity() : 0.0;
-    refined_.clear();
-    refiner_.begin(before_);
-    refiner_.measure_corners(after_.corners(s));
-    refiner_.run([&](double distance, uint32_t t) { return enough(distance, had(t)); },
-                 [&](uint32_t t, double distance) {
-                   refined_.push_back({t, distance, 0.0});
-                   largest = std::max(largest, stated(distance, had(t)));
-                 });
-    return largest;
-  }
-
-  /// Notes the distances where they are small enough.
-  bool fits_over_before(uint32_t s) {
-    best_.clear();
-    if (!before_.lay(after_.corners(s), after_.surface().area_normal(s), best_)) return false;
-    for (OverlayPiece& piece : best_)
-      if (!enough(piece.distance, had(piece.triangle))) {
-        piece.distance = before_.overlay().nearest_distance(piece);
-        if (!enough(piece.distance, had(piece.triangle))) return false;
-      }
-    for (const OverlayPiece& piece : best_) note_after(s, piece.triangle, piece.distance);
-    return true;
+    for (const PartDistance& part : uncovered.finish()) note_after(part.after, part.before, part.distance);
   }
 
   SimplifyMesh& m_;
   SurfaceSide before_, after_;
   SurfaceWalk walk_;
   TriangleImages images_;
+  ImageCover cover_;
   std::vector<double> errors_; ///< of triangles after
   std::vector<double> bounds_; ///< of triangles before
   std::vector<SurfaceLink> links_;
-  std::vector<double> seen_;     ///< share of each triangle after that was met
-  std::vector<uint8_t> covered_; ///< per triangle after: bits of TriangleImages
-  std::vector<uint8_t> mapped_;  ///< per triangle before: what is said of it holds for its image
+  std::vector<uint8_t> mapped_; ///< per triangle before: what is said of it holds for its image
   std::vector<uint8_t> unchanged_;
   std::vector<OverlayPiece> pieces_;
   std::vector<Laid> laid_;
@@ -340,8 +302,7 @@ private:
   std::vector<uint32_t> not_covered_;
   std::vector<OverlayPiece> best_, refined_; ///< of the triangle at hand
   TriangleRefiner refiner_;
-  double largest_ = 0.0; ///< the group's error is at least this, as noted
-  double proven_ = 0.0;  ///< some triangle's error cannot be below, as far as its candidates go
+  GroupError error_;
 };
 
 } // namespace

@@ -34,7 +34,8 @@ struct SurfaceLinks {
 ///
 /// Each triangle before is mapped onto those after (TriangleImages), or laid over those that its corners became part
 /// of: the distance of its points from one of them is convex, so it is largest at the corners of the pieces into which
-/// their outlines cut it. What is covered by none, at borders that moved and in folds, is cut finer and measured alike.
+/// their outlines cut it. What that leaves out, at borders that moved and in folds, is cut finer. Triangles after that
+/// images are not known to cover (ImageCover) are measured alike.
 /// @param points, triangles before; mesh.points and mesh.stands_for number the same points. Behind those that
 /// simplify() had there may be more, whose corners need not be distinct.
 SurfaceLinks bound_errors(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh);

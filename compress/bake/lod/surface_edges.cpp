@@ -13,13 +13,15 @@ constexpr uint32_t kNone = ~0u;
 constexpr double kBorderWeight = 8.0;  // of border planes against the triangles' own
 constexpr double kSeamWeight = 2.0;    // where the material changes
 constexpr double kCreaseWeight = 0.25; // where normals or texture coordinates change
+constexpr double kFolded = 0.9999;      // cosine between layers of a sheet, at least
 constexpr double kStayWeight = 1e-4; // of the point itself: where all is flat, short edges go first and none gets long
 
 /// An edge while more triangles at it are looked for.
 struct EdgeUse {
   uint32_t next;     ///< edge of the same lower point
   uint32_t triangle; ///< the first that has it
-  bool alone = true, seam = false, crease = false;
+  bool forward;      ///< that one has it from its lower point
+  bool border = true, seam = false, crease = false;
 };
 
 class EdgeFinder {
@@ -77,6 +79,7 @@ private:
       const DVec3 side = m_.points[points[(i + 1) % 3]] - m_.points[points[i]];
       if (const double length2 = glm::dot(side, side); length2 > longest) longest = length2, first = i;
     }
+    if (!(longest > 0.0)) return; // new points may coincide
     const uint32_t a = points[first], b = points[(first + 1) % 3];
     const DVec3 along = (m_.points[b] - m_.points[a]) / std::sqrt(longest);
     Quadric line;
@@ -95,13 +98,22 @@ private:
     while (found != kNone && out_.ends[found].b != b) found = uses_[found].next;
     if (found == kNone) {
       found = static_cast<uint32_t>(uses_.size());
-      uses_.push_back({std::exchange(first_[a], found), triangle});
+      uses_.push_back({std::exchange(first_[a], found), triangle, p == a});
       out_.ends.push_back({a, b});
     } else {
-      uses_[found].alone = false;
+      uses_[found].border = uses_[found].border && folds_back(uses_[found], triangle, p == a);
       if (many_seams_) join(found, triangle);
     }
     return found;
+  }
+
+  /// Whether the triangle lies on the side of the edge where its first one lies, as in a sheet of two layers: the
+  /// surface ends there all the same.
+  bool folds_back(const EdgeUse& edge, uint32_t triangle, bool forward) const {
+    const DVec3 &m = out_.area_normals[edge.triangle], &n = out_.area_normals[triangle];
+    const double dot = glm::dot(m, n);
+    if ((dot > 0.0) != (edge.forward == forward)) return false;
+    return dot * dot > kFolded * kFolded * glm::dot(m, m) * glm::dot(n, n);
   }
 
   /// What changes at the edge, from its first triangle to this one.
@@ -123,8 +135,8 @@ private:
     for (uint32_t i = 0; i < uses_.size(); ++i) {
       const EdgeUse& e = uses_[i];
       const auto [a, b] = out_.ends[i];
-      if (e.alone) out_.points[a].held = out_.points[b].held = kOnBorder;
-      const double weight = e.alone ? kBorderWeight : e.seam ? kSeamWeight : e.crease ? kCreaseWeight : 0.0;
+      if (e.border) out_.points[a].held = out_.points[b].held = kOnBorder;
+      const double weight = e.border ? kBorderWeight : e.seam ? kSeamWeight : e.crease ? kCreaseWeight : 0.0;
       if (weight > 0.0) add_edge_plane(i, weight);
     }
   }

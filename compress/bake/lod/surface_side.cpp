@@ -33,11 +33,11 @@ void SurfaceSide::gather(const Triangle& corners) {
   candidates_.clear();
   ++stamp_value_;
   for (int i = 0; i < 3; ++i) {
-    const std::span<const uint32_t> around = fan(corners[i]);
-    if (around.size() > kLargeFan)
-      add_large_fan(around, corners, i);
+    const std::span<const uint32_t> fan = around(corners[i]);
+    if (fan.size() > kLargeFan)
+      add_large_fan(fan, corners, i);
     else
-      for (const uint32_t t : around) add(t);
+      for (const uint32_t t : fan) add(t);
   }
 }
 

@@ -36,7 +36,10 @@ public:
   // What another triangle is measured against: a set of triangles of this side.
   std::span<const uint32_t> candidates() const { return candidates_; }
   void gather(const Triangle& corners); ///< those around three points
-  void gather_near(DVec3 point);        ///< a few more: those with corners near it
+  void add(uint32_t triangle) {         ///< one more, after gather(); if it is not there yet
+    if (stamp_[triangle] != stamp_value_) stamp_[triangle] = stamp_value_, candidates_.push_back(triangle);
+  }
+  void gather_near(DVec3 point); ///< a few more: those with corners near it
   /// All that may be nearer to a triangle than that, and more.
   void gather_within(const std::array<DVec3, 3>& triangle, double distance);
   bool lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::vector<OverlayPiece>& pieces) {
@@ -44,11 +47,7 @@ public:
   }
 
 private:
-  std::span<const uint32_t> fan(uint32_t point) const { return around(point); }
   void add_large_fan(std::span<const uint32_t> fan, const Triangle& corners, int corner);
-  void add(uint32_t triangle) {
-    if (stamp_[triangle] != stamp_value_) stamp_[triangle] = stamp_value_, candidates_.push_back(triangle);
-  }
 
   /// What holds a triangle.
   struct Box {

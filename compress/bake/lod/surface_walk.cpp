@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "compress/bake/lod/corner_lists.h"
 #include "compress/bake/lod/triangle_distance.h"
 
 namespace packtrace {
@@ -11,8 +12,8 @@ namespace {
 constexpr uint32_t kMostSteps = 32; // triangles on one way, or around one point
 constexpr double kSteep = 0.05;     // sine; planes through an edge and a direction nearer to it than that are none
 
-uint32_t next_corner(uint32_t corner) { return (corner & ~3u) | (9u >> (2 * (corner & 3u)) & 3u); }
-uint32_t last_corner(uint32_t corner) { return (corner & ~3u) | (18u >> (2 * (corner & 3u)) & 3u); }
+uint32_t next_corner(uint32_t corner) { return CornerLists::next_corner(corner); }
+uint32_t last_corner(uint32_t corner) { return CornerLists::last_corner(corner); }
 
 } // namespace
 

@@ -70,6 +70,8 @@ public:
     const uint32_t* p = &corner_points_[4 * size_t{triangle}];
     return p[0] == point || p[1] == point || p[2] == point;
   }
+  /// The corner where the side back begins, in the triangle across the side that begins at that corner; or kNone.
+  uint32_t opposite(uint32_t corner) const { return opposite_[corner]; }
   /// The triangle across the side that begins at that corner, or kNone.
   uint32_t beyond(uint32_t corner) const { return opposite_[corner] == kNone ? kNone : opposite_[corner] / 4; }
   /// The triangle across the side that begins at that point, or kNone.
@@ -80,7 +82,6 @@ public:
   /// A corner where the edge after begins that an edge before became, or kNone.
   uint32_t side_along(uint32_t edge) const { return side_of_edge_[mesh_.edge_became[edge]]; }
   const OverlaySurface& before() const { return before_; }
-  const SurfaceSide& after() const { return after_; }
 
 private:
   /// The plane in which a way lies, upright on the edge.

@@ -9,7 +9,8 @@
 
 namespace packtrace {
 
-/// Which triangles of the level below each triangle of a coarser level stands for: all that part of may be found there.
+/// Which triangles of the level below each triangle of a coarser level stands for: all those of which part may be found
+/// there.
 /// Only the last few levels are kept.
 class TriangleHistory {
 public:

@@ -189,7 +189,7 @@ void TriangleImages::look_closer(uint32_t triangle, const Image& image, std::vec
   follow(triangle, outline);
   const double inside2 = image.point == kNone ? 0.0 : distance2_from(triangle, walk_.point(image.point));
   for (uint32_t i = 0; i < outline.word.count; ++i)
-    pieces.push_back({outline.word.triangles[i], std::sqrt(std::max(outline.distances2[i], inside2)), 0.0});
+    pieces.push_back({outline.word.triangles[i], 0, std::sqrt(std::max(outline.distances2[i], inside2))});
 }
 
 /// Twice the area of the image in an interval's triangle, along its normal, as far as the interval contributes to it;
@@ -210,7 +210,7 @@ double TriangleImages::area(uint32_t interval, const DVec3& reference) const {
   return glm::dot(sum, walk_.area_normal(triangle));
 }
 
-void TriangleImages::add_shares(uint32_t triangle, const Image& image, std::span<const uint8_t> covered,
+void TriangleImages::add_shares(uint32_t triangle, const Image& image, std::span<const uint8_t> wanted,
                                 std::span<double> shares) {
   struct Collector {
     TriangleImages& images;
@@ -237,63 +237,9 @@ void TriangleImages::add_shares(uint32_t triangle, const Image& image, std::span
   const DVec3 reference = image.point == kNone ? outline_.points[0] : walk_.point(image.point);
   for (uint32_t i = 0; i < count; ++i) {
     const uint32_t s = outline_.intervals[i].triangle;
-    if ((covered[s] & kWhole) != 0) continue;
+    if (wanted[s] == 0) continue;
     const DVec3& n = walk_.area_normal(s);
     shares[s] += area(i, reference) / glm::dot(n, n);
-  }
-}
-
-/// Marks triangles after that borders of images cross or go along.
-void TriangleImages::mark_borders(std::span<const uint8_t> mapped, std::span<uint8_t> covered) const {
-  const std::span<const Way> ways = walk_.ways();
-  std::vector<int32_t> balance(ways.size());
-  for (uint32_t t = 0; 3 * size_t{t} < mesh_.side_edges.size(); ++t) {
-    if (mapped[t] == 0) continue;
-    const Triangle& p = points(t);
-    const uint32_t* edge = edges(t);
-    balance[edge[0]] += p.x < p.y ? 1 : -1;
-    balance[edge[1]] += p.y < p.z ? 1 : -1;
-    balance[edge[2]] += p.z < p.x ? 1 : -1;
-  }
-  for (uint32_t e = 0; e < ways.size(); ++e) {
-    const Way& w = ways[e];
-    if (balance[e] == 0) continue;
-    if (w.state == Way::State::kAcross) {
-      covered[w.start] |= kCrossed;
-      for (uint32_t k = 0; k < w.count; ++k) covered[walk_.into(w.first + k)] |= kCrossed;
-    } else if (const uint32_t side = walk_.side_along(e); side != kNone) {
-      covered[side / 4] |= kBordered;
-      if (const uint32_t other = walk_.beyond(side); other != kNone) covered[other] |= kBordered;
-    }
-  }
-}
-
-void TriangleImages::find_covered(std::span<const uint8_t> mapped, std::span<uint8_t> covered) const {
-  constexpr uint8_t kStop = kCrossed | kBordered, kMet = kFront | kBack;
-  mark_borders(mapped, covered);
-  bool all = true;
-  for (uint8_t& c : covered) {
-    if ((c & ~kBordered) == kFront) c |= kWhole;
-    all &= (c & (kWhole | kCrossed)) != 0;
-  }
-  if (all) return;
-  std::vector<uint8_t> reached(covered.size());
-  std::vector<uint32_t> part;
-  for (uint32_t first = 0; first < covered.size(); ++first) {
-    if (reached[first] != 0 || (covered[first] & (kStop | kWhole)) != 0) continue;
-    part.assign(1, first);
-    reached[first] = 1;
-    size_t front = 0;
-    for (size_t i = 0; i < part.size(); ++i) {
-      front += (covered[part[i]] & kWhole) != 0;
-      for (uint32_t corner = 4 * part[i]; corner < 4 * part[i] + 3; ++corner)
-        if (const uint32_t next = walk_.beyond(corner);
-            next != kNone && reached[next] == 0 && (covered[next] & kStop) == 0)
-          reached[next] = 1, part.push_back(next);
-    }
-    if (2 * front <= part.size()) continue;
-    for (const uint32_t t : part)
-      if ((covered[t] & kMet) != 0) covered[t] |= kWhole;
   }
 }
 

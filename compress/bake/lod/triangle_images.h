@@ -33,23 +33,13 @@ public:
 
   /// Appends the triangles after that the image meets with how far its part there is from the nearest points at most,
   /// both ways.
+  /// @param triangle find() was true of it
   void look_closer(uint32_t triangle, const Image& image, std::vector<OverlayPiece>& pieces);
 
-  /// Adds to `shares`, per triangle after that is not kWhole, how much of it the image covers. What is seen from behind
-  /// is negative.
-  /// @param covered as find_covered() left it
-  void add_shares(uint32_t triangle, const Image& image, std::span<const uint8_t> covered, std::span<double> shares);
-
-  /// Bits of what is known of a triangle after: the sides that images are seen from; whether borders of images cross
-  /// it or go along it; whether images cover it.
-  enum : uint8_t { kFront = 1, kBack = 2, kCrossed = 4, kBordered = 8, kWhole = 16 };
-
-  /// Which triangles after the images of some triangles before cover. How often images cover a place, those from behind
-  /// counted against the others, changes at their borders only; so a part of the surface that no border crosses or
-  /// bounds is covered if most of its triangles are seen from the front alone.
-  /// @param mapped per triangle before: find() was true of it, or it is itself one of those after
-  /// @param covered per triangle after: kFront, kBack; the others are added
-  void find_covered(std::span<const uint8_t> mapped, std::span<uint8_t> covered) const;
+  /// Adds to `shares`, per triangle after that is wanted, how much of it the image covers. What is seen from behind is
+  /// negative.
+  /// @param triangle find() was true of it
+  void add_shares(uint32_t triangle, const Image& image, std::span<const uint8_t> wanted, std::span<double> shares);
 
 private:
   static constexpr uint32_t kMost = 64; ///< triangles after; longer outlines are none
@@ -58,7 +48,6 @@ private:
   struct Word {
     uint32_t count = 0;
     std::array<uint32_t, kMost> triangles;
-    std::span<const uint32_t> view() const { return std::span(triangles).first(count); }
   };
 
   /// The outline's image within one triangle after: points[first_point .. that of the next).
@@ -70,7 +59,6 @@ private:
     std::vector<DVec3> points;
   };
 
-  void mark_borders(std::span<const uint8_t> mapped, std::span<uint8_t> covered) const;
   double area(uint32_t interval, const DVec3& reference) const;
   template <typename Visitor>
   bool follow(uint32_t triangle, Visitor& visitor);

@@ -2,13 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "compress/bake/lod/triangle_distance.h"
 
 namespace packtrace {
 namespace {
 
-constexpr double kSteep = 0.05; // cosine; what is steeper is not seen from there
+constexpr double kSteep = 0.05;       // cosine; what is steeper is not seen from there
+constexpr double kRounding = 1e-6;    // of how often a triangle is covered, which is a whole number
+constexpr double kOnce = 1.0 - 1e-12; // then mostly all of it is
 static_assert(sizeof(DVec3) == 3 * sizeof(double));
 
 OverlayKernel pick_kernel() {
@@ -96,12 +99,45 @@ bool Overlay::lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::sp
   ++task_.stamp;
 
   if (found_.size() < candidates.size()) found_.resize(candidates.size());
+  task_.enough = kOnce;
   double covered = 0.0;
-  const uint32_t count =
-      kernel(task_, candidates.data(), static_cast<uint32_t>(candidates.size()), found_.data(), &covered);
-  const bool once = covered >= 1.0 - kOverlayCovered && covered <= 1.0 + kOverlayCovered;
-  if (once) pieces.insert(pieces.end(), found_.begin(), found_.begin() + count);
-  return once;
+  const auto find = [&] {
+    return kernel(task_, candidates.data(), static_cast<uint32_t>(candidates.size()), found_.data(), &covered);
+  };
+  uint32_t count = find();
+  if (covered < 1.0 - kRounding) return false;
+  bool together = hang_together(std::span(found_).first(count));
+  if (!together && covered >= kOnce && has_layers()) {
+    task_.enough = std::numeric_limits<double>::infinity();
+    count = find();
+    together = hang_together(std::span(found_).first(count));
+  }
+  if (!together || std::abs(covered - std::round(covered)) > kRounding) return false;
+  pieces.insert(pieces.end(), found_.begin(), found_.begin() + count);
+  return true;
+}
+
+/// Whether no side that goes through the inside is a border of the pieces.
+bool Overlay::hang_together(std::span<const OverlayPiece> pieces) {
+  open_sides_.clear();
+  for (const OverlayPiece& piece : pieces)
+    for (uint32_t i = 0; i < 3; ++i) {
+      if ((piece.inner_sides >> i & 1) == 0) continue;
+      const uint32_t* points = &corners_[size_t{3} * piece.triangle];
+      const uint32_t from = points[i], to = points[i == 2 ? 0 : i + 1];
+      const auto back = std::find(open_sides_.begin(), open_sides_.end(), std::pair(to, from));
+      if (back == open_sides_.end())
+        open_sides_.emplace_back(from, to);
+      else
+        *back = open_sides_.back(), open_sides_.pop_back();
+    }
+  return open_sides_.empty();
+}
+
+/// Whether some triangle that has an open side is there twice.
+bool Overlay::has_layers() {
+  std::sort(open_sides_.begin(), open_sides_.end());
+  return std::adjacent_find(open_sides_.begin(), open_sides_.end()) != open_sides_.end();
 }
 
 double Overlay::nearest_distance(const OverlayPiece& piece) const {

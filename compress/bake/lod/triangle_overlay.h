@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "compress/bake/lod/overlay_kernel.h"
@@ -27,8 +28,10 @@ class Overlay {
 public:
   explicit Overlay(const OverlaySurface& surface);
 
-  /// Appends the pieces to `pieces` and returns true where the candidates cover the triangle just once. `pieces` is as
-  /// it was else. Triangles of the surface that face away are as if they were not there.
+  /// Appends the pieces to `pieces` and returns true where the candidates are known to cover the triangle: where each
+  /// of their sides that goes through its inside is one of two, so that they cover all of it equally often, and their
+  /// areas say how often. `pieces` is as it was else. Triangles of the surface that face away are as if they were not
+  /// there.
   /// @param direction any length; false where the triangle is seen nearly from its side
   bool lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::span<const uint32_t> candidates,
            std::vector<OverlayPiece>& pieces);
@@ -38,12 +41,15 @@ public:
 
 private:
   void prepare(); ///< on first use: most overlays are never asked
+  bool hang_together(std::span<const OverlayPiece> pieces);
+  bool has_layers();
 
   OverlaySurface surface_;
   std::vector<uint32_t> corners_;
   std::vector<OverlayPoint> projected_;
   std::vector<uint32_t> outside_, stamps_;
   std::vector<OverlayPiece> found_; ///< what the kernel wrote
+  std::vector<std::pair<uint32_t, uint32_t>> open_sides_;
   OverlayTask task_{};
   std::array<DVec3, 3> triangle_{};
   DVec3 direction_{};

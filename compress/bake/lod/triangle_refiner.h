@@ -28,7 +28,7 @@ public:
     for (const uint32_t t : side.candidates()) among.add(side.surface(), t);
   }
 
-  /// The triangle's corner that is farthest from those added since begin(); 0 without any.
+  /// How far the triangle's farthest corner is from those added since begin(); 0 without any.
   double measure_corners(const std::array<DVec3, 3>& triangle) {
     Level& top = levels_[0];
     top.among = &top.kept;

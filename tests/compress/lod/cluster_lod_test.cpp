@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <set>
+#include <tuple>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -100,18 +101,17 @@ TEST_P(ClusterLodOf, ErrorsGrowAndSpheresHoldWhatIsBelow) {
     if (!group.terminal) {
       EXPECT_LE(group.error, 2.0 * group.sphere.radius);
     }
-    if (c.generating_group == kNoGroup) {
-      for (uint32_t i = 0; i < c.range.triangle_count; ++i)
-        for (int corner = 0; corner < 3; ++corner) {
-          const LatticePoint& q =
-              lod_.positions[lod_.vertices[lod_.triangles[c.range.first_triangle + i][corner]].position];
-          DVec3 p;
-          for (size_t axis = 0; axis < 3; ++axis)
-            p[static_cast<int>(axis)] = static_cast<double>(q[axis] - built_.geometry.origin[axis]);
-          EXPECT_LE(glm::length(p - group.sphere.center), group.sphere.radius);
-        }
-      continue;
-    }
+    const LodSphere& made_in = (c.generating_group == kNoGroup ? group : lod_.groups[c.generating_group]).sphere;
+    for (uint32_t i = 0; i < c.range.triangle_count; ++i)
+      for (int corner = 0; corner < 3; ++corner) {
+        const LatticePoint& q =
+            lod_.positions[lod_.vertices[lod_.triangles[c.range.first_triangle + i][corner]].position];
+        DVec3 p;
+        for (size_t axis = 0; axis < 3; ++axis)
+          p[static_cast<int>(axis)] = static_cast<double>(q[axis] - built_.geometry.origin[axis]);
+        EXPECT_LE(glm::length(p - made_in.center), made_in.radius);
+      }
+    if (c.generating_group == kNoGroup) continue;
     const LodGroup& below = lod_.groups[c.generating_group];
     EXPECT_GE(group.error, below.error);
     EXPECT_LT(glm::length(group.sphere.center - below.sphere.center) + below.sphere.radius, group.sphere.radius);
@@ -171,7 +171,7 @@ TEST(ClusterLod, OneClusterIsSimplifiedOn) {
   EXPECT_LE(level_triangles(built.lod, built.lod.level_count - 1), 16u);
 }
 
-TEST(ClusterLod, TheCoarsestLevelOfAFileOfPartsIsSmall) {
+TEST(ClusterLod, TheCoarsestLevelOfLoosePiecesIsSmall) {
   const BuiltLod built = build_lod(tetrahedra_mesh(2000, 4));
   EXPECT_LE(level_triangles(built.lod, built.lod.level_count - 1), 80u); // 1 %
 }
@@ -189,6 +189,18 @@ TEST(ClusterLod, APlaneHasNoErrorThatMatters) {
     } // steps
 }
 
+TEST(ClusterLod, SheetsOfSeveralLayersKeepTheirOutline) {
+  for (const bool other_side : {false, true})
+    for (const float cut : {0.1f, 0.5f}) {
+      const BuiltLod built = build_lod(twice(chamfered_sheet(cut), other_side));
+      const double width = built.lod.groups[0].sphere.radius;
+      for (const LodGroup& group : built.lod.groups)
+        if (!group.terminal && group.level < 2) {
+          EXPECT_LT(group.error, 0.02 * width) << "level " << group.level;
+        }
+    }
+}
+
 TEST(ClusterLod, SameForAnyThreadCount) {
   const Mesh mesh = half_faceted(torus_mesh(150, 90));
   const auto with_threads = [&](size_t threads) {
@@ -199,8 +211,17 @@ TEST(ClusterLod, SameForAnyThreadCount) {
   EXPECT_EQ(one.positions, four.positions);
   EXPECT_EQ(one.vertices, four.vertices);
   EXPECT_EQ(one.triangles, four.triangles);
+  ASSERT_EQ(one.clusters.size(), four.clusters.size());
+  for (size_t i = 0; i < one.clusters.size(); ++i) {
+    const LodCluster &a = one.clusters[i], &b = four.clusters[i];
+    EXPECT_EQ(std::tie(a.range.first_triangle, a.range.triangle_count, a.range.kind, a.level, a.group),
+              std::tie(b.range.first_triangle, b.range.triangle_count, b.range.kind, b.level, b.group));
+    EXPECT_EQ(a.generating_group, b.generating_group);
+  }
   ASSERT_EQ(one.groups.size(), four.groups.size());
   for (size_t i = 0; i < one.groups.size(); ++i) {
+    EXPECT_EQ(one.groups[i].level, four.groups[i].level);
+    EXPECT_EQ(one.groups[i].terminal, four.groups[i].terminal);
     EXPECT_EQ(one.groups[i].error, four.groups[i].error);
     EXPECT_EQ(one.groups[i].sphere.center, four.groups[i].sphere.center);
     EXPECT_EQ(one.groups[i].sphere.radius, four.groups[i].sphere.radius);

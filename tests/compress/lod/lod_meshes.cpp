@@ -1,6 +1,7 @@
 #include "tests/compress/lod/lod_meshes.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <map>
@@ -67,16 +68,48 @@ Mesh tetrahedra_mesh(uint32_t count, uint32_t seed) {
   return mesh;
 }
 
-namespace {
-
-/// Every edge twice in both directions.
-Mesh two_sided_sheet() {
-  Mesh mesh = torus_mesh(48, 32);
-  const auto count = static_cast<uint32_t>(mesh.triangles.size());
-  for (uint32_t i = 0; i < count; ++i)
-    mesh.triangles.emplace_back(mesh.triangles[i].x, mesh.triangles[i].z, mesh.triangles[i].y);
+Mesh chamfered_sheet(float cut) {
+  constexpr int kCells = 12;
+  Mesh mesh;
+  std::map<std::pair<float, float>, uint32_t> numbers;
+  const auto number = [&](Vec2 p) {
+    const auto [at, is_new] = numbers.try_emplace({p.x, p.y}, static_cast<uint32_t>(mesh.positions.size()));
+    if (is_new) mesh.positions.push_back(Vec3(p, 0.0f) / static_cast<float>(kCells));
+    return at->second;
+  };
+  const auto is_inner = [](float x) { return x > 0.0f && x < static_cast<float>(kCells); };
+  constexpr std::array<std::pair<int, int>, 4> kCorners = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
+  for (int y = 0; y < kCells; ++y)
+    for (int x = 0; x < kCells; ++x) {
+      const auto corner = [&](size_t k) {
+        return Vec2(static_cast<float>(x + kCorners[k % 4].first), static_cast<float>(y + kCorners[k % 4].second));
+      };
+      std::vector<Vec2> cell;
+      size_t inner = 0; // of which all triangles of the cell are
+      for (size_t k = 0; k < 4; ++k) {
+        const Vec2 p = corner(k);
+        if (std::fmod(p.x, static_cast<float>(kCells)) + std::fmod(p.y, static_cast<float>(kCells)) > 0.0f) {
+          if (is_inner(p.x) && is_inner(p.y)) inner = cell.size();
+          cell.push_back(p);
+        } else {
+          cell.push_back(p + cut * (corner(k + 3) - p));
+          cell.push_back(p + cut * (corner(k + 1) - p));
+        }
+      }
+      std::rotate(cell.begin(), cell.begin() + static_cast<std::ptrdiff_t>(inner), cell.end());
+      for (size_t k = 2; k < cell.size(); ++k)
+        mesh.triangles.emplace_back(number(cell[0]), number(cell[k - 1]), number(cell[k]));
+    }
   return mesh;
 }
+
+Mesh twice(Mesh mesh, bool other_side) {
+  const std::vector<Triangle> once = mesh.triangles;
+  for (const Triangle& t : once) mesh.triangles.push_back(other_side ? Triangle(t.x, t.z, t.y) : t);
+  return mesh;
+}
+
+namespace {
 
 /// Triangles that share corners only, each with the next.
 Mesh vertex_chain() {
@@ -101,22 +134,13 @@ Mesh rough_two_sided_sheet() {
   Mesh mesh = grid_mesh(60);
   for (Vec3& p : mesh.positions) p.z += random.uniform(0.0f, 0.02f);
   std::erase_if(mesh.triangles, [&](const Triangle&) { return random.uniform(0, 1) < 0.1f; });
-  const std::vector<Triangle> front = mesh.triangles;
-  for (const Triangle& t : front) mesh.triangles.emplace_back(t.x, t.z, t.y);
-  return mesh;
+  return twice(mesh, true);
 }
 
 /// Not manifold: every piece hangs on the same point.
 Mesh tetrahedra_on_one_point() {
   Mesh mesh = tetrahedra_mesh(1500, 3);
   for (size_t i = 0; i < mesh.positions.size(); i += 4) mesh.positions[i] = Vec3(0.0f);
-  return mesh;
-}
-
-Mesh every_triangle_twice() {
-  Mesh mesh = grid_mesh(50, 0.05f);
-  const std::vector<Triangle> once = mesh.triangles;
-  mesh.triangles.insert(mesh.triangles.end(), once.begin(), once.end());
   return mesh;
 }
 
@@ -163,15 +187,20 @@ std::vector<NamedMesh> stress_meshes() {
       {"torus", [] { return torus_mesh(96, 64); }, true},
       {"half faceted torus", [] { return half_faceted(torus_mesh(96, 64)); }, true},
       {"2000 tetrahedra", [] { return tetrahedra_mesh(2000, 1); }, true},
-      {"two sided sheet", two_sided_sheet, true},
+      {"two sided sheet", [] { return twice(torus_mesh(48, 32), true); }, true},
       {"tetrahedra on one point", tetrahedra_on_one_point, true},
       {"vertex chain", vertex_chain, false},
       {"rough two sided sheet", rough_two_sided_sheet, true},
       {"sphere", [] { return sphere_mesh(80); }, false}, // open by a hair at its seam, where roundings differ
       {"bumped plane with a border", [] { return grid_mesh(80, 0.05f, true); }, false},
       {"flat plane", [] { return grid_mesh(70); }, false},
+      {"sheet with small chamfers", [] { return chamfered_sheet(0.05f); }, false},
+      {"sheet with chamfers", [] { return chamfered_sheet(0.1f); }, false},
+      {"sheet with large chamfers", [] { return chamfered_sheet(0.3f); }, false},
+      {"paper", [] { return twice(chamfered_sheet(0.5f), true); }, true},
+      {"paper twice", [] { return twice(chamfered_sheet(0.5f), false); }, false},
       {"soup", [] { return soup_mesh(6000, 7); }, false},
-      {"every triangle twice", every_triangle_twice, false},
+      {"every triangle twice", [] { return twice(grid_mesh(50, 0.05f), false); }, false},
       {"triangles without area", without_area, false},
       {"lines among triangles", lines_among_triangles, false},
       {"3000 triangles around an edge", triangles_around_an_edge, false},

@@ -18,6 +18,13 @@ Mesh half_faceted(const Mesh& mesh);
 /// Closed tetrahedra at random in [-1,1]^3.
 Mesh tetrahedra_mesh(uint32_t count, uint32_t seed);
 
+/// A flat square of 12 x 12 cells whose four outer corners are cut off, by so much of a cell. Both points of a corner
+/// become one at almost no cost; what juts out then is a small part of a large triangle.
+Mesh chamfered_sheet(float cut);
+
+/// Every triangle twice: seen from the same side, or from both.
+Mesh twice(Mesh mesh, bool other_side);
+
 /// Meshes that levels must survive.
 struct NamedMesh {
   std::string name;

@@ -1,0 +1,118 @@
+#include "compress/bake/lod/uncovered_bound.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace packtrace {
+namespace {
+
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr uint32_t kMostCuts = 3; // before the refiner's own
+// Distances for each triangle before and after, at most: where everything is near everything, little comes of more.
+constexpr size_t kWork = 100;
+
+} // namespace
+
+bool UncoveredBound::spent() const {
+  return refiner_.work() > kWork * (before_.surface().triangles.size() + after_.surface().triangles.size());
+}
+
+void UncoveredBound::measure(uint32_t triangle, std::span<const uint32_t> found) {
+  before_.gather(after_.corner_points(triangle));
+  for (const uint32_t t : found) before_.add(t);
+  const size_t first = parts_.size();
+  double least = 0.0;
+  const double stated = measure_part(triangle, after_.corners(triangle), least);
+  claims_.push_back({stated, triangle, first, parts_.size() - first});
+}
+
+std::vector<PartDistance> UncoveredBound::finish() {
+  std::sort(claims_.rbegin(), claims_.rend());
+  std::vector<PartDistance> result;
+  for (const Claim& claim : claims_) {
+    size_t first = claim.first, count = claim.count;
+    double stated = claim.stated;
+    if (stated > error_.limit()) {
+      const Corners corners = after_.corners(claim.triangle);
+      before_.gather_within(corners, stated);
+      const size_t begin = parts_.size();
+      const double closer = look_closer(claim.triangle, corners, stated, 0);
+      if (closer < stated) stated = closer, first = begin, count = parts_.size() - begin;
+    }
+    error_.largest = std::max(error_.largest, stated);
+    const auto from = parts_.begin() + static_cast<std::ptrdiff_t>(first);
+    result.insert(result.end(), from, from + static_cast<std::ptrdiff_t>(count));
+  }
+  return result;
+}
+
+/// Cuts the part in four as long as that may make it less. Adds to parts_ what bounds it, and returns the error that
+/// makes.
+/// @param known what it is not above
+double UncoveredBound::look_closer(uint32_t triangle, const Corners& part, double known, uint32_t depth) {
+  const size_t begin = parts_.size();
+  double least = 0.0;
+  const double stated = measure_part(triangle, part, least);
+  error_.proven = std::max(error_.proven, least);
+  double largest = 0.0; // of the distances
+  for (size_t i = begin; i < parts_.size(); ++i) largest = std::max(largest, parts_[i].distance);
+  if (depth == kMostCuts || stated <= error_.limit() || largest <= GroupError::kSlack * least || spent()) return stated;
+  const size_t end = parts_.size();
+  const Corners middles{0.5 * (part[0] + part[1]), 0.5 * (part[1] + part[2]), 0.5 * (part[2] + part[0])};
+  double closer = 0.0;
+  for (const Corners& quarter : {Corners{part[0], middles[0], middles[2]}, Corners{middles[0], part[1], middles[1]},
+                                 Corners{middles[2], middles[1], part[2]}, Corners{middles[0], middles[1], middles[2]}})
+    if (closer < std::min(stated, known))
+      closer = std::max(closer, look_closer(triangle, quarter, std::min(stated, known), depth + 1));
+  const auto at = [&](size_t i) { return parts_.begin() + static_cast<std::ptrdiff_t>(i); };
+  if (closer >= stated) {
+    parts_.erase(at(end), parts_.end());
+    return stated;
+  }
+  parts_.erase(at(begin), at(end));
+  return closer;
+}
+
+/// Adds to parts_ what bounds a part of the triangle, by the candidates, and returns the error that makes.
+/// @param least set to how far it is at least from all of them
+double UncoveredBound::measure_part(uint32_t triangle, const Corners& part, double& least) {
+  double by_laying = kInfinite;
+  if (lay(part, by_laying) && by_laying <= error_.limit()) {
+    for (const OverlayPiece& piece : laid_) parts_.push_back({triangle, piece.triangle, piece.distance});
+    return by_laying;
+  }
+  refiner_.begin(before_);
+  least = refiner_.measure_corners(part);
+  const double by_cutting = refine();
+  for (const OverlayPiece& piece : by_laying < by_cutting ? laid_ : refined_)
+    parts_.push_back({triangle, piece.triangle, piece.distance});
+  return std::min(by_laying, by_cutting);
+}
+
+/// False where that says nothing.
+bool UncoveredBound::lay(const Corners& part, double& stated) {
+  laid_.clear();
+  const DVec3 normal = glm::cross(part[1] - part[0], part[2] - part[0]);
+  if (!before_.lay(part, normal, laid_)) return false;
+  stated = 0.0;
+  for (OverlayPiece& piece : laid_) {
+    const double had = this->had(piece.triangle);
+    if (!error_.enough(piece.distance, had)) piece.distance = before_.overlay().nearest_distance(piece);
+    stated = std::max(stated, stated_error(piece.distance, had));
+  }
+  return true;
+}
+
+/// The part of measure_corners().
+double UncoveredBound::refine() {
+  refined_.clear();
+  double stated = before_.candidates().empty() ? kInfinite : 0.0;
+  refiner_.run([&](double distance, uint32_t t) { return error_.enough(distance, had(t)); },
+               [&](uint32_t t, double distance) {
+                 refined_.push_back({t, 0, distance});
+                 stated = std::max(stated, stated_error(distance, had(t)));
+               });
+  return stated;
+}
+
+} // namespace packtrace
