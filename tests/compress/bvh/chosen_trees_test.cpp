@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <set>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -74,8 +76,28 @@ TEST(ChosenTrees, OfAllClustersAreThoseOfTheWholeFile) {
   const PackedTrees expected = build_packed_trees(file.sections());
   ASSERT_EQ(expected.trees.size(), 2u);
   EXPECT_TRUE(same(ChosenTreeBuilder(file.sections(), chosen).build(), expected));
+}
+
+/// The bytes of all nodes with leaves.
+std::multiset<std::string> leaf_nodes_of(const PackedTrees& trees) {
+  std::multiset<std::string> nodes;
+  for (const baked::PackedNode& node : trees.nodes)
+    if (node.has_leaves()) nodes.emplace(reinterpret_cast<const char*>(&node), sizeof node);
+  return nodes;
+}
+
+TEST(ChosenTrees, NodesOfAFileWithoutTreesDoNotDependOnTheChoice) {
+  const BakedFile file = BakedFile::from_bytes(test::bake(scene_of_levels(), {}).bytes);
   const BakedSections none = without_trees(file.sections());
-  EXPECT_TRUE(same(ChosenTreeBuilder(none, chosen).build(), expected));
+  const std::multiset<std::string> expected = leaf_nodes_of(build_packed_trees(file.sections()));
+  const auto nodes_of = [&](const auto& take) {
+    return leaf_nodes_of(ChosenTreeBuilder(none, choose(file, take)).build());
+  };
+  EXPECT_EQ(nodes_of([](uint32_t, uint32_t) { return true; }), expected);
+  const std::multiset<std::string> some = nodes_of([](uint32_t, uint32_t cluster) { return cluster % 3 == 0; });
+  EXPECT_GT(some.size(), 4u);
+  EXPECT_LT(some.size(), expected.size());
+  EXPECT_TRUE(std::ranges::includes(expected, some));
 }
 
 TEST(ChosenTrees, HoldEachTriangleOnceWhereverTheirNodesComeFrom) {
