@@ -226,7 +226,7 @@ inline uint64_t enter(const TracePlacement& placement, float max_coordinate, con
   }
   if constexpr (Group::kSideBySide) {
     if (find_reach)
-      reach.read(group.reach);
+      reach.read(Group::kTriangles ? 0.0f : kUnitFlat * max_coordinate, group.reach);
     else
       group.reach = kEverywhere;
   }

@@ -62,8 +62,14 @@ inline __m256 firsts(__m512 pairs) {
 
 /// As for GroupBoxes.
 inline uint32_t pass_reach(const Avx512GroupBoxes& boxes, const Reach& reach) {
+  const __m512 most_pad = both(reach.pad);
   const auto beyond = [&](uint32_t axis) {
-    return _mm512_fmadd_ps(boxes.plane[axis], _mm512_set1_ps(reach.sign[axis]), both(reach.shift[axis]));
+    const __m512 plane = boxes.plane[axis], sign = _mm512_set1_ps(reach.sign[axis]);
+    const __m512 less = _mm512_mul_ps(_mm512_add_ps(plane, _mm512_permute_ps(plane, 0xb1)), sign); // by the extent
+    const __m512 extent = _mm512_sub_ps(_mm512_set1_ps(-reach.flat), less);
+    const __m512 pad =
+        _mm512_min_ps(_mm512_max_ps(_mm512_mul_ps(extent, _mm512_set1_ps(kAnyExtent)), _mm512_setzero_ps()), most_pad);
+    return _mm512_fmadd_ps(plane, sign, _mm512_sub_ps(both(reach.shift[axis]), pad));
   };
   const __m512 most = _mm512_max_ps(_mm512_max_ps(beyond(0), beyond(1)), beyond(2));
   const __m512 most_of_pair = _mm512_max_ps(most, _mm512_permute_ps(most, 0xb1));

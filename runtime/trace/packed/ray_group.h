@@ -43,6 +43,8 @@ struct Beam;
 /// The box of all places where rays may hit something, for a node's boxes to be compared with: see reach.h.
 struct Reach {
   float lo[3], hi[3];
+  float flat;   ///< extents up to this count as none
+  float pad[2]; ///< 0, and what boxes with an extent are nearer to where rays start than it says
   // Along the octant of set_octant():
   float sign[3];     ///< of directions
   float shift[3][2]; ///< rays reach a near plane p if sign p + the first <= 0, a far one if the second - sign p <= 0
@@ -68,6 +70,8 @@ struct alignas(16) TestRest {
 
 constexpr Reach kEverywhere{{-__builtin_inff(), -__builtin_inff(), -__builtin_inff()},
                             {__builtin_inff(), __builtin_inff(), __builtin_inff()},
+                            0.0f,
+                            {},
                             {},
                             {}};
 

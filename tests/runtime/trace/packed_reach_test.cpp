@@ -1,0 +1,103 @@
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "runtime/trace/packed/enter.h"
+#include "runtime/trace/packed/lanes_scalar.h"
+#include "runtime/trace/packed/leaf_tests.h"
+
+namespace packtrace::packed {
+namespace {
+
+constexpr float kMost = 0x1p20f; ///< the largest coordinate
+constexpr double kUlp = 0x1p-24 * double{kMost};
+
+TracePlacement whole_grid() {
+  TracePlacement placement{};
+  for (size_t axis = 0; axis < 3; ++axis)
+    placement.grid_from_unit[4 * axis] = 1, placement.box_lo[axis] = -kMost, placement.box_hi[axis] = kMost;
+  placement.aligned = 1;
+  return placement;
+}
+
+struct Box {
+  float lo[3], hi[3];
+};
+
+TopNode node_of(std::initializer_list<Box> boxes) {
+  TopNode node{};
+  uint32_t slot = 0;
+  for (const Box& box : boxes) {
+    for (size_t axis = 0; axis < 3; ++axis) node.lo[axis][slot] = box.lo[axis], node.hi[axis][slot] = box.hi[axis];
+    node.slots |= 1u << slot++;
+  }
+  return node;
+}
+
+/// 64 rays from x just above 0, a little over y = 0, down and towards larger x.
+UnitRays rays_beside_an_edge(std::mt19937& generator, double height) {
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  UnitRays rays{};
+  for (uint32_t i = 0; i < kGroup; ++i) {
+    rays.origin[0][i] = static_cast<float>(kUlp * std::exp(-12 * unit(generator)));
+    rays.origin[1][i] = static_cast<float>(height * kUlp * (0.2 + 0.8 * unit(generator)));
+    rays.origin[2][i] = static_cast<float>((unit(generator) - 0.5) * double{kMost} / 2);
+    rays.direction[0][i] = static_cast<float>(std::exp(-8 * unit(generator)));
+    rays.direction[1][i] = static_cast<float>(-0.3 - 0.7 * unit(generator));
+    rays.direction[2][i] = 1.0f;
+    rays.tmax[i] = 3e38f;
+  }
+  return rays;
+}
+constexpr uint32_t kDown = 2; ///< the octant of their directions
+
+TEST(Reach, HoldsBoxesWithAnExtentThatEndAPadBeforeRaysStart) {
+  std::mt19937 generator(1);
+  RayGroup group;
+  enter<false>(whole_grid(), kMost, rays_beside_an_edge(generator, 4), ~uint64_t{0}, group);
+  group.reach.set_octant(kDown);
+  const TopNode node = node_of({{{-kMost, 0, -kMost}, {0, 0, kMost}},               // beside the edge
+                                {{0, 0, -kMost}, {0, kMost, kMost}},                // a wall there, which they leave
+                                {{-kMost, 0, -kMost}, {-0.001f * kMost, 0, kMost}}, // farther than a pad
+                                {{0, -kMost, -kMost}, {kMost, 0, kMost}}});         // below them
+  EXPECT_EQ(pass_reach(GroupBoxes<ScalarLanes>(node, kDown), group.reach) & node.slots, 0b1001u);
+}
+
+TEST(Reach, HoldsWhatTheTriangleTestAcceptsBesideIt) {
+  // A ground of two halves, each with a box; their common edge is where rounding decides.
+  const float corners[4][3][3] = {{{0, 0, -kMost}, {0, 0, kMost}, {-kMost, 0, -kMost}},
+                                  {{0, 0, -kMost}, {kMost, 0, kMost}, {0, 0, kMost}},
+                                  {{0, 0, kMost}, {-kMost, 0, kMost}, {-kMost, 0, -kMost}},
+                                  {{0, 0, -kMost}, {kMost, 0, -kMost}, {kMost, 0, kMost}}};
+  constexpr uint32_t kLeft = 0b0101;
+  DecodedBatch batch{};
+  batch.count = 4;
+  for (uint32_t lane = 0; lane < kBatch; ++lane)
+    for (uint32_t corner = 0; corner < 3; ++corner)
+      for (uint32_t axis = 0; axis < 3; ++axis) batch.vertex[axis][corner][lane] = corners[lane & 3][corner][axis];
+  const BatchNormals normals = batch_normals<ScalarLanes>(batch);
+  const TopNode node = node_of({{{-kMost, 0, -kMost}, {0, 0, kMost}}, {{0, 0, -kMost}, {kMost, 0, kMost}}});
+  const GroupBoxes<ScalarLanes> boxes(node, kDown);
+  std::mt19937 generator(2);
+  uint32_t only_left = 0;
+  for (uint32_t turn = 0; turn < 2000; ++turn) {
+    RayGroup group;
+    const uint64_t entered = enter<false>(whole_grid(), kMost, rays_beside_an_edge(generator, 2), ~uint64_t{0}, group);
+    group.reach.set_octant(kDown);
+    const uint32_t slots = pass_reach(boxes, group.reach);
+    for (uint64_t rays = entered; rays != 0; rays &= rays - 1) {
+      LaneHits<ScalarLanes> hits;
+      uint64_t exact = 0;
+      const uint32_t hit =
+          test_triangles<ScalarLanes, false>(batch, normals, group, first_bit(rays), hits, exact) & 15u;
+      only_left += hit != 0 && (hit & ~kLeft) == 0;
+      ASSERT_TRUE((hit & kLeft) == 0 || (slots & 1u) != 0);
+      ASSERT_TRUE((hit & ~kLeft) == 0 || (slots & 2u) != 0);
+    }
+  }
+  EXPECT_GT(only_left, 0u) << "no ray was one for rounding to decide";
+}
+
+} // namespace
+} // namespace packtrace::packed
