@@ -353,8 +353,7 @@ ChosenTreeBuilder::ChosenTreeBuilder(const BakedSections& sections, std::span<co
     if (records.empty()) return;
     choose_tree_grid(records, sections.clusters, grid.record);
     grid.clusters = builder.find_clusters(geometries[i]);
-    // Of all clusters, so that nodes do not depend on the choice; with stored nodes only those that do not fit are
-    // made.
+    // Of all clusters, so that nodes do not depend on the choice. Of stored nodes only those that do not fit are made.
     const double typical_area = t.stored.empty() ? builder.find_typical_area(grid.clusters, grid.record) : 0.0;
     std::erase_if(grid.clusters, [&](const TreeCluster& cluster) { return wanted[cluster.number] == 0; });
     grid.leaves = builder.build_leaf_nodes(grid.clusters, grid.record, typical_area, &t.stored);

@@ -48,10 +48,11 @@ namespace {
 
 /// Refuses what is plainly another kind of file, whose bytes would be reported one by one.
 void require_scene_text(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return; // the import says why
   if (is_baked_file(file))
     throw Error(ErrorKind::kInput, file.string() + ": a baked file already; give the .pbrt scene that it was made of");
   std::array<char, 512> start{};
-  std::ifstream in(file, std::ios::binary);
   in.read(start.data(), static_cast<std::streamsize>(start.size()));
   const std::string_view text(start.data(), static_cast<size_t>(in.gcount()));
   if (text.starts_with("ply\n") || text.starts_with("ply\r"))

@@ -83,6 +83,7 @@ TEST(CommandLine, MissingInputIsAnInputErrorThatNamesTheFile) {
       const CommandResult result = run_packtrace(arguments);
       EXPECT_EQ(result.exit_code, 3) << verb << ' ' << name << '\n' << result.err;
       EXPECT_NE(result.err.find(name), std::string::npos) << result.err;
+      EXPECT_EQ(result.err.find("baked file"), std::string::npos) << result.err;
     }
   }
   EXPECT_EQ(file_count(directory.path()), 0u);
