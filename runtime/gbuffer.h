@@ -4,16 +4,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "pbrt_import/scene/image_size.h"
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {
-
-struct ImageSize {
-  uint32_t width = 0;  ///< pixels
-  uint32_t height = 0; ///< pixels
-  size_t pixels() const { return static_cast<size_t>(width) * height; }
-  bool operator==(const ImageSize&) const = default;
-};
 
 inline constexpr uint32_t kNoInstance = ~0u;
 
@@ -43,7 +37,8 @@ struct GBuffer {
     const size_t n = new_size.pixels();
     view_z.assign(n, 0.0f), position.assign(n, Vec3(0)), geometric_normal.assign(n, Vec3(0));
     normal.assign(n, Vec3(0)), albedo.assign(n, Vec3(0)), instance.assign(n, kNoInstance);
-    triangle.assign(n, 0), material.assign(n, 0), back_face.assign(n, 0), offset.assign(n, 0.0f), motion_px.assign(n, Vec2(0));
+    triangle.assign(n, 0), material.assign(n, 0), back_face.assign(n, 0), offset.assign(n, 0.0f),
+        motion_px.assign(n, Vec2(0));
   }
 };
 

@@ -13,8 +13,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "pbrt_import/scene/camera_rays.h"
 #include "pbrt_import/scene/error.h"
-#include "runtime/camera/camera_rays.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/image_outputs.h"
 #include "runtime/commands/json_output.h"

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <string>
 
+#include "pbrt_import/scene/camera_rays.h"
 #include "pbrt_import/scene/error.h"
-#include "runtime/camera/camera_rays.h"
 #include "runtime/stopwatch.h"
 #include "runtime/trace/lod_view.h"
 #include "runtime/trace/origin_lift.h"

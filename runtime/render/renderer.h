@@ -5,9 +5,9 @@
 #include <optional>
 #include <vector>
 
+#include "pbrt_import/scene/camera_rays.h"
 #include "pbrt_import/scene/progress.h"
 #include "runtime/ao/ao_integrator.h"
-#include "runtime/camera/camera_rays.h"
 #include "runtime/denoise/denoiser.h"
 #include "runtime/gbuffer.h"
 #include "runtime/trace/ray_tracer.h"

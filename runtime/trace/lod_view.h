@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "pbrt_import/scene/bounds.h"
-#include "runtime/camera/camera_rays.h"
+#include "pbrt_import/scene/camera_rays.h"
 #include "runtime/gbuffer.h"
 #include "runtime/lod/lod_sharing.h"
 

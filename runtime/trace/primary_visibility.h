@@ -1,7 +1,7 @@
 #pragma once
 
+#include "pbrt_import/scene/camera_rays.h"
 #include "pbrt_import/scene/progress.h"
-#include "runtime/camera/camera_rays.h"
 #include "runtime/gbuffer.h"
 #include "runtime/trace/ray_tracer.h"
 

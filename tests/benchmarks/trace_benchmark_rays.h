@@ -4,8 +4,8 @@
 #include <string_view>
 #include <vector>
 
+#include "pbrt_import/scene/camera_rays.h"
 #include "runtime/ao/ao_integrator.h"
-#include "runtime/camera/camera_rays.h"
 #include "runtime/trace/ray_tracer.h"
 
 namespace packtrace {

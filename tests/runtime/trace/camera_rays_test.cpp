@@ -1,4 +1,4 @@
-#include "runtime/camera/camera_rays.h"
+#include "pbrt_import/scene/camera_rays.h"
 
 #include <cmath>
 #include <numbers>

@@ -5,7 +5,7 @@
 
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "runtime/camera/camera_rays.h"
+#include "pbrt_import/scene/camera_rays.h"
 #include "runtime/trace/float_source.h"
 #include "runtime/trace/primary_visibility.h"
 

@@ -3,8 +3,8 @@
 #include <optional>
 
 #include "pbrt_import/scene/bounds.h"
+#include "pbrt_import/scene/image_size.h"
 #include "pbrt_import/scene/scene.h"
-#include "runtime/gbuffer.h"
 
 namespace packtrace {
 
