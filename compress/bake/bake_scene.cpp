@@ -14,6 +14,7 @@
 #include "compress/bake/geometry_plan.h"
 #include "compress/bake/lod/lod_encoder.h"
 #include "compress/bake/lod/lod_store.h"
+#include "compress/bake/lod/shared_borders.h"
 #include "compress/bake/nested_grids.h"
 #include "compress/bake/page_encoder.h"
 #include "compress/bake/requirement_table.h"
@@ -203,6 +204,7 @@ private:
 
   void pack() {
     lod_wanted_ = choose_lod();
+    find_shared_borders();
     if (!config_.resume.empty()) store_.emplace(config_.resume);
     uint64_t triangles = 0;
     for (size_t i = 0; i < packed_.size(); ++i) triangles += (lod_wanted_[i] != 0 ? 1 + kLodWork : 1) * triangles_of(i);
@@ -212,6 +214,25 @@ private:
       packed_[i] = pack_one(i);
       progress_.advance(packed_[i].encoded.triangle_count);
     });
+  }
+
+  /// World-space geometries touch at borders that levels of all of them must leave as they are.
+  void find_shared_borders() {
+    std::vector<size_t> world;
+    bool wanted = false;
+    for (size_t i = 0; i < packed_.size(); ++i)
+      if (plan_.geometries[i].world_space && !plan_.geometries[i].parts.empty())
+        world.push_back(i), wanted |= lod_wanted_[i] != 0;
+    if (!wanted || world.size() < 2) return;
+    progress_.begin("finding shared borders", world.size());
+    SharedBorderFinder finder(world.size());
+    tbb::parallel_for(size_t{0}, world.size(), [&](size_t i) {
+      progress_.check_cancelled();
+      const GeometryPlan& plan = plan_.geometries[world[i]];
+      finder.add(i, quantize(world[i], {std::vector<PartNeeds>(plan.parts.size()), {}, {}, true}));
+      progress_.advance();
+    });
+    shared_borders_ = finder.finish();
   }
 
   uint64_t triangles_of(size_t geometry) const {
@@ -247,33 +268,41 @@ private:
     needs.infer_normals = false;
     if (mixed)
       if (Draft other = pack_with(index, needs); other.packed.bytes() < draft.packed.bytes()) draft = std::move(other);
-    if (lod_wanted_[index] != 0) draft.packed.lod = find_or_build_lod(draft.quantized, draft.clusters);
+    if (lod_wanted_[index] != 0) {
+      LodLimits limits{config_.lod_levels + 1, {}};
+      if (plan_.geometries[index].world_space) limits.locked = shared_borders_.locks(draft.quantized);
+      draft.packed.lod = find_or_build_lod(draft.quantized, draft.clusters, limits);
+    }
     return std::move(draft.packed);
   }
 
   /// @param geometry is used up
-  EncodedLod find_or_build_lod(QuantizedGeometry& geometry, const GeometryClusters& clusters) {
-    const uint32_t max_levels = config_.lod_levels + 1;
-    const LodKey key = store_ ? lod_key(geometry, clusters, max_levels) : LodKey{};
+  EncodedLod find_or_build_lod(QuantizedGeometry& geometry, const GeometryClusters& clusters, const LodLimits& limits) {
+    const LodKey key = store_ ? lod_key(geometry, clusters, limits) : LodKey{};
     if (store_)
       if (std::optional<EncodedLod> found = store_->find(key)) {
         ++resumed_;
         progress_.advance(kLodWork * clusters.triangles.size());
         return std::move(*found);
       }
-    ClusterLod lod = build_cluster_lod(geometry, clusters, progress_, max_levels);
+    ClusterLod lod = build_cluster_lod(geometry, clusters, progress_, limits);
     EncodedLod encoded = encode_lod(geometry, lod);
     // Where another geometry failed or all was cancelled, inner loops return with their work undone.
     if (store_ && !tbb::is_current_task_group_canceling()) store_->keep(key, encoded);
     return encoded;
   }
 
+  QuantizedGeometry quantize(size_t index, const GeometryNeeds& needs) const {
+    const GeometryMeasure& measure = measures_[index];
+    return quantize_geometry(scene_, plan_.geometries[index], needs, config_, grids_[index], measure.max_abs(),
+                             measure.bounds.lo, measure.bounds.hi);
+  }
+
   Draft pack_with(size_t index, const GeometryNeeds& needs) const {
     const GeometryPlan& plan = plan_.geometries[index];
     const GeometryMeasure& measure = measures_[index];
     Draft draft;
-    draft.quantized = quantize_geometry(scene_, plan, needs, config_, grids_[index], measure.max_abs(),
-                                        measure.bounds.lo, measure.bounds.hi);
+    draft.quantized = quantize(index, needs);
     const QuantizedGeometry& q = draft.quantized;
     draft.clusters = split_geometry(q);
     draft.packed = {record_of(plan, q, position_error_bound(q.grid.step(), measure.max_abs())),
@@ -399,6 +428,7 @@ private:
   std::vector<PositionGrid> grids_;
   std::vector<Packed> packed_;
   std::vector<uint8_t> lod_wanted_; // by geometry
+  SharedBorders shared_borders_;
   std::optional<LodStore> store_;
   std::atomic<uint64_t> resumed_{0};
   std::vector<EncodedTexture> textures_; // as in the scene; empty where they are not kept

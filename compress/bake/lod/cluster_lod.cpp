@@ -38,8 +38,8 @@ LodSphere enclose(std::span<const LodSphere> spheres) {
 
 class LodBuilder {
 public:
-  LodBuilder(const QuantizedGeometry& geometry, Progress& progress, uint32_t max_levels)
-      : g_(geometry), progress_(progress), max_levels_(max_levels) {
+  LodBuilder(const QuantizedGeometry& geometry, Progress& progress, const LodLimits& limits)
+      : g_(geometry), progress_(progress), max_levels_(limits.max_levels), locked_for_ever_(limits.locked) {
     lod_.positions = geometry.positions;
     lod_.vertices = geometry.vertices;
     for (const TriangleKind& kind : geometry.kinds) seam_of_kind_.push_back(kind.slot);
@@ -48,7 +48,7 @@ public:
   ClusterLod run(const GeometryClusters& base) {
     take_base(base);
     lines_ = LineCover(base.triangles, lod_.vertices, lod_.positions.size());
-    locked_for_ever_.assign(lod_.positions.size(), 0);
+    locked_for_ever_.resize(lod_.positions.size(), 0);
     std::vector<uint32_t> active(lod_.clusters.size());
     for (uint32_t i = 0; i < active.size(); ++i) active[i] = i;
     for (uint32_t level = 0; !active.empty(); ++level) {
@@ -256,14 +256,14 @@ private:
   TriangleHistory history_;
   std::vector<uint32_t> owner_;
   LineCover lines_;
-  std::vector<uint8_t> locked_for_ever_; ///< positions of terminal groups
+  std::vector<uint8_t> locked_for_ever_; ///< positions of terminal groups, and those that LodLimits names
 };
 
 } // namespace
 
 ClusterLod build_cluster_lod(const QuantizedGeometry& geometry, const GeometryClusters& base, Progress& progress,
-                             uint32_t max_levels) {
-  return LodBuilder(geometry, progress, max_levels).run(base);
+                             const LodLimits& limits) {
+  return LodBuilder(geometry, progress, limits).run(base);
 }
 
 uint64_t level_triangles(const ClusterLod& lod, uint32_t level) {

@@ -48,13 +48,20 @@ struct ClusterLod {
   uint32_t level_count = 0;
 };
 
-/// Builds coarser levels until 16 triangles are left, nothing that can be simplified, or max_levels. Any triangles will do.
+/// What limits the levels of a geometry, besides its triangles.
+struct LodLimits {
+  uint32_t max_levels = baked::kMaxLodLevels; ///< 1..baked::kMaxLodLevels, level 0 counted
+  /// Per position of the geometry: 1 where no level may move it (SharedBorders). Empty: all may move.
+  std::vector<uint8_t> locked;
+};
+
+/// Builds coarser levels until 16 triangles are left, nothing that can be simplified, or max_levels. Any triangles will
+/// do. Locked positions and the edges between them are the same in every cut.
 /// Same result for any thread count. Throws Error(kCancelled), Error(kLimitExceeded).
 /// @param base the geometry's clusters
 /// @param progress advances by triangles of all levels but the last: up to about twice those of level 0
-/// @param max_levels 1..baked::kMaxLodLevels, level 0 counted
 ClusterLod build_cluster_lod(const QuantizedGeometry& geometry, const GeometryClusters& base, Progress& progress,
-                             uint32_t max_levels = baked::kMaxLodLevels);
+                             const LodLimits& limits = {});
 
 /// Triangles of the discrete level: its clusters, and those of terminal groups below it.
 uint64_t level_triangles(const ClusterLod& lod, uint32_t level);

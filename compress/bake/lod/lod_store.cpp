@@ -21,7 +21,7 @@ namespace packtrace {
 namespace {
 
 /// To be raised with every change of what builder or encoder make of the same geometry.
-constexpr uint32_t kRevision = 7;
+constexpr uint32_t kRevision = 8;
 constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'K', 'L', 'O', 'D', '\n', 0};
 constexpr const char* kExtension = ".ptklod";
 
@@ -144,13 +144,14 @@ std::optional<EncodedLod> decode(std::span<const std::byte> bytes, const LodKey&
 
 } // namespace
 
-LodKey lod_key(const QuantizedGeometry& g, const GeometryClusters& base, uint32_t max_levels) {
+LodKey lod_key(const QuantizedGeometry& g, const GeometryClusters& base, const LodLimits& limits) {
   Hasher hash;
-  for (const uint64_t number : {uint64_t{max_levels}, uint64_t{g.grid.mantissa}, static_cast<uint64_t>(g.grid.exponent),
-                                static_cast<uint64_t>(g.normal_encoding), static_cast<uint64_t>(g.uv_encoding),
-                                static_cast<uint64_t>(g.uv_exponent[0]), static_cast<uint64_t>(g.uv_exponent[1]),
-                                static_cast<uint64_t>(g.origin[0]), static_cast<uint64_t>(g.origin[1]),
-                                static_cast<uint64_t>(g.origin[2]), uint64_t{g.anchor_shift}})
+  for (const uint64_t number :
+       {uint64_t{limits.max_levels}, uint64_t{g.grid.mantissa}, static_cast<uint64_t>(g.grid.exponent),
+        static_cast<uint64_t>(g.normal_encoding), static_cast<uint64_t>(g.uv_encoding),
+        static_cast<uint64_t>(g.uv_exponent[0]), static_cast<uint64_t>(g.uv_exponent[1]),
+        static_cast<uint64_t>(g.origin[0]), static_cast<uint64_t>(g.origin[1]), static_cast<uint64_t>(g.origin[2]),
+        uint64_t{g.anchor_shift}})
     hash.add_number(number);
   hash.add(g.positions);
   hash.add(g.vertices);
@@ -159,6 +160,7 @@ LodKey lod_key(const QuantizedGeometry& g, const GeometryClusters& base, uint32_
   hash.add(g.slot_class);
   hash.add(base.triangles);
   hash.add(base.clusters);
+  hash.add(limits.locked);
   return hash.result();
 }
 

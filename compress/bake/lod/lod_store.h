@@ -9,10 +9,10 @@
 
 namespace packtrace {
 
-/// What levels of detail follow from: XXH3-128 of a geometry on its lattice, its clusters and the number of levels.
+/// What levels of detail follow from: XXH3-128 of a geometry on its lattice, its clusters and the limits of its levels.
 using LodKey = std::array<uint64_t, 2>;
-/// @param max_levels as build_cluster_lod() takes it
-LodKey lod_key(const QuantizedGeometry& geometry, const GeometryClusters& base, uint32_t max_levels);
+/// @param limits as build_cluster_lod() takes them
+LodKey lod_key(const QuantizedGeometry& geometry, const GeometryClusters& base, const LodLimits& limits);
 
 /// Levels of detail that are finished, one file for each geometry, so that an interrupted bake can go on with them. For
 /// one program and one machine: files of other versions, and damaged ones, are as if they were not there. Every

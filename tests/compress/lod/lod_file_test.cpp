@@ -30,39 +30,6 @@ BakeConfig lod_config(LodUse use = LodUse::kAll, uint32_t min_triangles = 1) {
   return config;
 }
 
-/// Levels as the builder has them, but of what a file holds: decoded lattice points; errors and spheres as stored, in
-/// object units.
-ClusterLod read_lod(const BakedFile& file, uint32_t geometry) {
-  const LodView view = file.lod(geometry);
-  ClusterLod lod;
-  lod.level_count = static_cast<uint32_t>(view.levels.size());
-  for (const baked::LodGroupRecord& g : view.groups)
-    lod.groups.push_back(
-        {g.level, std::isinf(g.error), g.error, {DVec3(g.center[0], g.center[1], g.center[2]), g.radius}});
-  std::map<LatticePoint, uint32_t> numbers;
-  for (uint32_t level = 0; level < lod.level_count; ++level) {
-    const uint32_t of_level = view.levels[level].geometry;
-    for (uint32_t c = 0; c < file.clusters(of_level).size(); ++c) {
-      const ClusterView cluster = file.cluster(of_level, c);
-      const baked::LodLinkRecord& link = view.links_of(level)[c];
-      const auto first_vertex = static_cast<uint32_t>(lod.vertices.size());
-      lod.clusters.push_back({{static_cast<uint32_t>(lod.triangles.size()), cluster.triangle_count(), 0},
-                              level,
-                              link.group,
-                              link.generating_group});
-      for (uint32_t v = 0; v < cluster.vertex_count(); ++v) {
-        const auto next = static_cast<uint32_t>(lod.positions.size());
-        const auto [at, added] = numbers.emplace(cluster.lattice(v), next);
-        if (added) lod.positions.push_back(at->first);
-        lod.vertices.push_back({at->second, 0, {}});
-      }
-      for (uint32_t i = 0; i < cluster.triangle_count(); ++i)
-        lod.triangles.push_back(cluster.triangle(i) + first_vertex);
-    }
-  }
-  return lod;
-}
-
 /// Object-space positions of ClusterLod::positions, as decoded.
 std::vector<DVec3> decoded_positions(const BakedFile& file, uint32_t geometry, const ClusterLod& lod) {
   const baked::GeometryRecord& g = file.geometries()[geometry];
@@ -381,8 +348,8 @@ TEST(LodFile, AnInterruptedBakeLeavesNoHalfMadeLevels) {
 TEST(LodFile, DamagedLevelsOfAnInterruptedBakeAreMadeAgain) {
   const SceneFolder folder;
   BuiltLod built = build_lod(torus_mesh(24, 16));
-  const LodKey key = lod_key(built.geometry, built.base, 9);
-  EXPECT_NE(key, lod_key(built.geometry, built.base, 8));
+  const LodKey key = lod_key(built.geometry, built.base, {9, {}});
+  EXPECT_NE(key, lod_key(built.geometry, built.base, {8, {}}));
   const EncodedLod lod = encode_lod(built.geometry, built.lod);
   const LodStore store(folder.path());
   EXPECT_FALSE(store.find(key));

@@ -238,6 +238,37 @@ BuiltLod build_lod(const Mesh& mesh) {
   return result;
 }
 
+ClusterLod read_lod(const BakedFile& file, uint32_t geometry) {
+  const LodView view = file.lod(geometry);
+  ClusterLod lod;
+  lod.level_count = static_cast<uint32_t>(view.levels.size());
+  for (const baked::LodGroupRecord& g : view.groups)
+    lod.groups.push_back(
+        {g.level, std::isinf(g.error), g.error, {DVec3(g.center[0], g.center[1], g.center[2]), g.radius}});
+  std::map<LatticePoint, uint32_t> numbers;
+  for (uint32_t level = 0; level < lod.level_count; ++level) {
+    const uint32_t of_level = view.levels[level].geometry;
+    for (uint32_t c = 0; c < file.clusters(of_level).size(); ++c) {
+      const ClusterView cluster = file.cluster(of_level, c);
+      const baked::LodLinkRecord& link = view.links_of(level)[c];
+      const auto first_vertex = static_cast<uint32_t>(lod.vertices.size());
+      lod.clusters.push_back({{static_cast<uint32_t>(lod.triangles.size()), cluster.triangle_count(), 0},
+                              level,
+                              link.group,
+                              link.generating_group});
+      for (uint32_t v = 0; v < cluster.vertex_count(); ++v) {
+        const auto next = static_cast<uint32_t>(lod.positions.size());
+        const auto [at, added] = numbers.emplace(cluster.lattice(v), next);
+        if (added) lod.positions.push_back(at->first);
+        lod.vertices.push_back({at->second, 0, {}});
+      }
+      for (uint32_t i = 0; i < cluster.triangle_count(); ++i)
+        lod.triangles.push_back(cluster.triangle(i) + first_vertex);
+    }
+  }
+  return lod;
+}
+
 std::vector<double> thresholds(const ClusterLod& lod) {
   std::set<double> values{0.0};
   for (const LodGroup& group : lod.groups)

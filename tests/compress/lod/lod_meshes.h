@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "compress/bake/lod/cluster_lod.h"
+#include "compress/format/baked_file.h"
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace::test {
@@ -45,6 +46,10 @@ struct BuiltLod {
   ClusterLod lod;
 };
 BuiltLod build_lod(const Mesh& mesh);
+
+/// Levels as the builder has them, but of what a file holds: decoded lattice points; errors and spheres as stored, in
+/// object units.
+ClusterLod read_lod(const BakedFile& file, uint32_t geometry);
 
 /// 0, every error there is, and the nearest values on both sides of it. Ascending.
 std::vector<double> thresholds(const ClusterLod& lod);
