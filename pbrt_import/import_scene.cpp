@@ -6,7 +6,7 @@
 #include "pbrt_import/file_names.h"
 #include "pbrt_import/parser.h"
 #include "pbrt_import/reporter.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/file_error.h"
 #include "pbrt_import/scene_builder.h"
 #include "pbrt_import/source_stack.h"
 
@@ -33,9 +33,9 @@ void require_clean(const Diagnostics& diagnostics) {
   if (problems == 0) return;
   for (const Diagnostic& diagnostic : diagnostics.entries()) {
     if (diagnostic.severity == Severity::kNote) continue;
-    const std::string place = to_string(diagnostic.location);
-    throw Error(ErrorKind::kInput, (place.empty() ? std::string() : place + ": ") + diagnostic.message + " (" +
-                                       std::to_string(problems) + " problems in all, not accepted in strict mode)");
+    throw FileError(ErrorKind::kInput, diagnostic.location,
+                    diagnostic.message + " (" + std::to_string(problems) +
+                        " problems in all, not accepted in strict mode)");
   }
 }
 

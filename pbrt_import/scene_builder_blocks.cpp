@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "pbrt_import/large_pages.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/file_error.h"
 #include "pbrt_import/scene_builder.h"
 #include "pbrt_import/tokenizer.h"
 
@@ -61,7 +61,8 @@ void SceneBuilder::close(BlockKind kind, const Directive& directive) {
     const Block& block = top();
     const BlockKind closed = block.kind;
     if (closed != kind)
-      reporter_.error(directive.place, std::string(end_keyword(kind)) + " closes the " + std::string(begin_keyword(closed)) + " at " +
+      reporter_.error(directive.place, std::string(end_keyword(kind)) + " closes the " +
+                                           std::string(begin_keyword(closed)) + " at " +
                                            to_string(reporter_.locate(block.place)) + ", which has no " +
                                            std::string(end_keyword(closed)) + " before it");
     state_.close_block();
@@ -108,8 +109,9 @@ void SceneBuilder::add_instance(const Directive& directive) {
                                                 "; objects cannot hold instances");
   const std::optional<uint32_t> found = object_names_.find(name);
   if (!found)
-    return reporter_.error(directive.place, "no object " + in_quotes(name) + "; the instance is skipped" +
-                                                did_you_mean(object_names_.closest(name, [](uint32_t) { return true; })));
+    return reporter_.error(directive.place,
+                           "no object " + in_quotes(name) + "; the instance is skipped" +
+                               did_you_mean(object_names_.closest(name, [](uint32_t) { return true; })));
   const Placement placement = place(directive, "instance");
   const Affine world_from_object(placement.map);
   if (!is_invertible(DAffine(world_from_object)))
@@ -146,8 +148,8 @@ void SceneBuilder::settle_time() {
 void SceneBuilder::check_worlds(const Place& end) {
   const uint64_t worlds = statistics_.worlds;
   if (options_.world > std::max<uint64_t>(worlds, 1))
-    throw Error(ErrorKind::kInput, to_string(reporter_.locate({end.file, 0, 0})) + ": there is no world " +
-                                       std::to_string(options_.world) + ": the file has " + std::to_string(worlds));
+    throw FileError(ErrorKind::kInput, reporter_.locate({end.file, 0, 0}),
+                    "there is no world " + std::to_string(options_.world) + ": the file has " + std::to_string(worlds));
   if (worlds == 0) return settle_time();
   if (worlds > 1)
     reporter_.note(end, "the file has " + std::to_string(worlds) + " worlds; world " + std::to_string(options_.world) +

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/file_error.h"
 
 namespace packtrace {
 namespace {
@@ -25,7 +25,7 @@ SourceStack::SourceStack(const std::filesystem::path& main_file, const SourceLim
     const uint32_t number = files_.add(main_file.string(), {});
     files_open_.push_back({Tokenizer(InputFile(main_file, limits_.max_file_bytes)), number, 0});
   } catch (const Error& error) {
-    throw Error(error.kind(), main_file.string() + ": " + error.what());
+    throw FileError(error.kind(), main_file, error.what());
   }
   opened_ = 1;
 }

@@ -10,7 +10,7 @@
 #include "compress/format/bit_stream.h"
 #include "compress/format/lod_validation.h"
 #include "compress/format/tree_validation.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/file_error.h"
 
 namespace packtrace {
 namespace {
@@ -42,7 +42,7 @@ public:
 
 private:
   [[noreturn]] void fail(const std::string& what) const {
-    throw Error(ErrorKind::kInput, name_ + ": damaged baked file: " + what);
+    throw FileError(ErrorKind::kInput, name_, "damaged baked file: " + what);
   }
   [[noreturn]] void fail(const char* section, uint64_t record, std::string_view what) const {
     fail(std::string(section) + " " + std::to_string(record) + ": " + std::string(what));
@@ -52,14 +52,15 @@ private:
     if (bytes_.size() < sizeof(baked::FileHeader)) {
       if (bytes_.size() < baked::kMagic.size() ||
           std::memcmp(bytes_.data(), baked::kMagic.data(), baked::kMagic.size()) != 0)
-        throw Error(ErrorKind::kInput, name_ + ": not a packtrace baked file");
+        throw FileError(ErrorKind::kInput, name_, "not a packtrace baked file");
       fail("truncated header");
     }
     std::memcpy(&header_, bytes_.data(), sizeof header_);
-    if (header_.magic != baked::kMagic) throw Error(ErrorKind::kInput, name_ + ": not a packtrace baked file");
+    if (header_.magic != baked::kMagic) throw FileError(ErrorKind::kInput, name_, "not a packtrace baked file");
     if (header_.version != baked::kVersion)
-      throw Error(ErrorKind::kUnsupported, name_ + ": baked file version " + std::to_string(header_.version) +
-                                               ", this program reads version " + std::to_string(baked::kVersion));
+      throw FileError(ErrorKind::kUnsupported, name_,
+                      "baked file version " + std::to_string(header_.version) + ", this program reads version " +
+                          std::to_string(baked::kVersion));
     if (header_.header_hash != XXH3_64bits(bytes_.data(), offsetof(baked::FileHeader, header_hash)))
       fail("header hash does not match");
     if (header_.header_bytes != sizeof header_) fail("header size");
@@ -133,7 +134,8 @@ private:
   /// Texts do not share bytes, so that all names together are no larger than the section.
   bool text_ok(baked::StringRef ref) {
     text_bytes_ += ref.bytes;
-    return text_bytes_ <= sections_.strings.size() && ref.offset <= sections_.strings.size() && ref.bytes <= sections_.strings.size() - ref.offset;
+    return text_bytes_ <= sections_.strings.size() && ref.offset <= sections_.strings.size() &&
+           ref.bytes <= sections_.strings.size() - ref.offset;
   }
 
   void check_materials_and_masks() {
@@ -300,10 +302,12 @@ private:
   /// Levels of detail have their base's material slots.
   void check_lod_levels() {
     if (const auto fault = find_lod_level_fault(sections_)) fail(fault->section, fault->record, fault->what);
-    for (const baked::LodLevelRecord& level : sections_.lod_levels) first_slots_[level.geometry] = first_slots_[level.base];
+    for (const baked::LodLevelRecord& level : sections_.lod_levels)
+      first_slots_[level.geometry] = first_slots_[level.base];
   }
 
-  /// The runs of slots of one geometry are equal or apart, so that going through all of them takes no longer than the file.
+  /// The runs of slots of one geometry are equal or apart, so that going through all of them takes no longer than the
+  /// file.
   void check_runs() const {
     std::vector<std::pair<uint32_t, uint32_t>> runs; // geometry, first slot
     for (const baked::InstanceRecord& instance : sections_.instances)
@@ -361,7 +365,7 @@ private:
   bool clusters_checked_;
   baked::FileHeader header_{};
   BakedSections sections_;
-  std::vector<uint32_t> class_ends_;  // by material slot
+  std::vector<uint32_t> class_ends_; // by material slot
   uint64_t text_bytes_ = 0;
   std::vector<uint32_t> first_slots_; // by geometry: of its first instance; the others have the same classes
 };

@@ -9,7 +9,7 @@
 #include "compress/format/section_file.h"
 #include "compress/format/texture_codec.h"
 #include "pbrt_import/scene/alpha_mask.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/file_error.h"
 
 namespace packtrace::vertex16 {
 namespace {
@@ -29,7 +29,7 @@ public:
 
 private:
   [[noreturn]] void fail(const std::string& what) const {
-    throw Error(ErrorKind::kInput, name_ + ": damaged vertex16 file: " + what);
+    throw FileError(ErrorKind::kInput, name_, "damaged vertex16 file: " + what);
   }
   void require(bool ok, const char* what, uint64_t record) const {
     if (!ok) fail(what + (" " + std::to_string(record)));
@@ -37,12 +37,13 @@ private:
 
   void check_header() {
     if (bytes_.size() < kMagic.size() || std::memcmp(bytes_.data(), kMagic.data(), kMagic.size()) != 0)
-      throw Error(ErrorKind::kInput, name_ + ": not a vertex16 file");
+      throw FileError(ErrorKind::kInput, name_, "not a vertex16 file");
     if (bytes_.size() < sizeof header_) fail("truncated header");
     std::memcpy(&header_, bytes_.data(), sizeof header_);
     if (header_.version != kVersion)
-      throw Error(ErrorKind::kUnsupported, name_ + ": vertex16 file version " + std::to_string(header_.version) +
-                                               ", this program reads version " + std::to_string(kVersion));
+      throw FileError(ErrorKind::kUnsupported, name_,
+                      "vertex16 file version " + std::to_string(header_.version) + ", this program reads version " +
+                          std::to_string(kVersion));
     if (header_.header_hash != XXH3_64bits(bytes_.data(), offsetof(Header, header_hash)))
       fail("header hash does not match");
     if (header_.header_bytes != sizeof header_ || header_.file_bytes != bytes_.size() ||

@@ -14,9 +14,9 @@
 #include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/ImfXdr.h>
 
-#include "pbrt_import/scene/error.h"
 #include "pbrt_import/scene/exr_header.h"
 #include "pbrt_import/scene/file_bytes.h"
+#include "pbrt_import/scene/file_error.h"
 #include "runtime/image/exr.h"
 
 namespace packtrace {
@@ -31,7 +31,7 @@ constexpr uint64_t kMaxRatio = 2048;
 constexpr uint64_t kFreeBytes = uint64_t{64} << 20;
 
 [[noreturn]] void fail(std::string_view name, const std::string& what, ErrorKind kind = ErrorKind::kInput) {
-  throw Error(kind, std::string(name) + ": " + what);
+  throw FileError(kind, std::string(name), what);
 }
 
 class MemoryReader : public Imf::IStream {

@@ -13,8 +13,8 @@
 #define STBI_WRITE_NO_STDIO
 #include <stb/stb_image_write.h>
 
-#include "pbrt_import/scene/error.h"
 #include "pbrt_import/scene/file_bytes.h"
+#include "pbrt_import/scene/file_error.h"
 #include "pbrt_import/scene/png_chunks.h"
 
 namespace packtrace {
@@ -85,12 +85,13 @@ void write_png(const std::filesystem::path& path, const Image& image, PngTransfe
 }
 
 Image decode_png(std::span<const std::byte> bytes, std::string_view name, PngTransfer transfer) {
-  if (bytes.size() > kMaxImageSamples) throw Error(ErrorKind::kInput, std::string(name) + ": file is too large");
+  if (bytes.size() > kMaxImageSamples) throw FileError(ErrorKind::kInput, std::string(name), "file is too large");
   const PngHeader header = check_png_chunks(bytes, PngChecksums::kVerify, complaint_about(name));
   const ImageSize size{header.width, header.height};
   if (size.width > kMaxImageSide || size.height > kMaxImageSide || size.pixels() > kMaxImageSamples / 4)
-    throw Error(ErrorKind::kInput, std::string(name) + ": image of " + std::to_string(size.width) + " x " +
-                                       std::to_string(size.height) + " pixels is too large");
+    throw FileError(ErrorKind::kInput, std::string(name),
+                    "image of " + std::to_string(size.width) + " x " + std::to_string(size.height) +
+                        " pixels is too large");
   const auto* memory = reinterpret_cast<const stbi_uc*>(bytes.data());
   const int memory_bytes = static_cast<int>(bytes.size());
   int width = 0, height = 0, channels = 0;

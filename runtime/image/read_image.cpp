@@ -5,8 +5,8 @@
 #include <initializer_list>
 #include <vector>
 
-#include "pbrt_import/scene/error.h"
 #include "pbrt_import/scene/file_bytes.h"
+#include "pbrt_import/scene/file_error.h"
 #include "runtime/image/exr.h"
 #include "runtime/image/png.h"
 
@@ -21,7 +21,7 @@ LoadedImage read_image(const std::filesystem::path& path, std::string_view layer
   };
   if (starts_with({0x89, 'P', 'N', 'G'})) {
     if (!layer.empty() && layer != "ao")
-      throw Error(ErrorKind::kInput, name + ": a PNG file has no layer \"" + std::string(layer) + "\"");
+      throw FileError(ErrorKind::kInput, name, "a PNG file has no layer \"" + std::string(layer) + "\"");
     LoadedImage loaded{decode_png(bytes, name), {}};
     loaded.alpha = loaded.image.channels % 2 == 0;
     return loaded;
@@ -32,7 +32,7 @@ LoadedImage read_image(const std::filesystem::path& path, std::string_view layer
     const bool alpha = chosen.channels.size() > 1 && last.substr(last.rfind('.') + 1) == "A";
     return {decode_exr(bytes, name, chosen.name), chosen.name, alpha};
   }
-  throw Error(ErrorKind::kInput, name + ": neither a PNG nor an EXR file");
+  throw FileError(ErrorKind::kInput, name, "neither a PNG nor an EXR file");
 }
 
 } // namespace packtrace
