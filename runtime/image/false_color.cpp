@@ -4,7 +4,6 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
-#include <utility>
 #include <vector>
 
 namespace packtrace {
@@ -23,20 +22,6 @@ Image paint(ImageSize size, size_t values, Function color) {
 }
 
 bool has_depth(float depth) { return depth > 0.0f && std::isfinite(depth); }
-
-/// Logarithms of the 1st and 99th percentile of the depths that are there.
-std::pair<float, float> log_depth_range(std::span<const float> depths) {
-  std::vector<float> sorted;
-  std::copy_if(depths.begin(), depths.end(), std::back_inserter(sorted), has_depth);
-  if (sorted.empty()) return {0.0f, 0.0f};
-  const auto percentile = [&](size_t percent) {
-    const auto nth = sorted.begin() + static_cast<ptrdiff_t>((sorted.size() - 1) * percent / 100);
-    std::nth_element(sorted.begin(), nth, sorted.end());
-    return std::log(*nth);
-  };
-  const float lo = percentile(1);
-  return {lo, percentile(99)};
-}
 
 /// Linear sRGB of an OKLab colour given by lightness, chroma and hue (radians). Source: B. Ottosson, "A perceptual
 /// color space for image processing", 2020.
@@ -96,12 +81,28 @@ Image ao_preview(ImageSize size, std::span<const float> ao, Vec3 missing) {
                [&](size_t i) { return ao[i] >= 0.0f ? Vec3(srgb_from_linear(std::min(ao[i], 1.0f))) : missing; });
 }
 
+DepthRange depth_preview_range(std::span<const float> depth) {
+  std::vector<float> sorted;
+  std::copy_if(depth.begin(), depth.end(), std::back_inserter(sorted), has_depth);
+  if (sorted.empty()) return {};
+  const auto percentile = [&](size_t percent) {
+    const auto nth = sorted.begin() + static_cast<ptrdiff_t>((sorted.size() - 1) * percent / 100);
+    std::nth_element(sorted.begin(), nth, sorted.end());
+    return *nth;
+  };
+  const float nearest = percentile(1);
+  return {nearest, percentile(99)};
+}
+
+Vec3 depth_preview_color(float t) { return depth_color(0.95f - 0.85f * t); } // not down to black, which may be missing
+
 Image depth_preview(ImageSize size, std::span<const float> depth, Vec3 missing) {
-  const auto [lo, hi] = log_depth_range(depth);
-  return paint(size, depth.size(), [&, lo = lo, hi = hi](size_t i) {
+  const DepthRange range = depth_preview_range(depth);
+  const float lo = std::log(range.nearest), hi = std::log(range.farthest);
+  return paint(size, depth.size(), [&](size_t i) {
     if (!has_depth(depth[i])) return missing;
     const float t = hi > lo ? std::clamp((std::log(depth[i]) - lo) / (hi - lo), 0.0f, 1.0f) : 0.5f;
-    return depth_color(0.95f - 0.85f * t); // not down to black, which may stand for missing
+    return depth_preview_color(t);
   });
 }
 

@@ -20,6 +20,15 @@ Image ao_preview(ImageSize size, std::span<const float> ao, Vec3 missing = Vec3(
 /// so that a single far pixel does not darken the rest. Other depths (0) are missing.
 Image depth_preview(ImageSize size, std::span<const float> depth, Vec3 missing = Vec3(0));
 
+/// The depths between which depth_preview() tells colours apart: its percentiles. Both are 0 where there is no depth.
+struct DepthRange {
+  float nearest = 0.0f, farthest = 0.0f;
+};
+DepthRange depth_preview_range(std::span<const float> depth);
+
+/// The colour of depth_preview() at t of the way between the logarithms of the nearest and the farthest depth.
+Vec3 depth_preview_color(float t);
+
 /// Directions as 0.5 + 0.5 n; zero vectors are missing.
 Image normal_preview(ImageSize size, std::span<const Vec3> normals, Vec3 missing = Vec3(0));
 
