@@ -1,10 +1,18 @@
 #!/usr/bin/env bash
 # From a fresh Debian 12 to a denoised ambient-occlusion picture of a real pbrt-v3 scene, traced over packed data.
-# Usage: ./quickstart.sh [SCENE.pbrt]      (default: assets/town/town.pbrt)
+# Usage: quickstart.sh [SCENE.pbrt]      (default: assets/town/town.pbrt). Results are in build/quickstart/ beside this script.
 set -euo pipefail
-cd "$(dirname "$0")"
+root=$(CDPATH='' cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
+case ${1:-} in
+  -h | --help) sed -n '2,3s/^# //p' "$root/quickstart.sh"; exit 0 ;;
+  -*) echo "quickstart.sh: no such option: $1" >&2; exit 2 ;;
+esac
+[ $# -le 1 ] || { echo "quickstart.sh: one scene at a time, but there are $#" >&2; exit 2; }
+scene=${1:-$root/assets/town/town.pbrt}
+[ -f "$scene" ] || { echo "quickstart.sh: no such scene: $scene" >&2; exit 3; }
+scene=$(CDPATH='' cd -- "$(dirname -- "$scene")" && pwd)/$(basename -- "$scene") # whoever calls stands elsewhere
+cd -- "$root"
 started=$SECONDS
-scene=${1:-assets/town/town.pbrt}
 out=build/quickstart
 packtrace=build/release/bin/packtrace
 
@@ -22,7 +30,7 @@ echo "== 4/4 Trace and denoise"
 echo
 "$packtrace" info "$out/scene.ptk"
 echo
-echo "Done in $((SECONDS - started)) s:"
+echo "Done in $((SECONDS - started)) s; in $root:"
 echo "  $out/picture.shaded.png   denoised ambient occlusion times albedo"
 echo "  $out/picture.ao.png       the ambient occlusion alone; beside it depth, normals, instances, albedo"
 echo "  $out/layers.exr           all layers in floats"
