@@ -154,7 +154,7 @@ bool ParameterList::was_asked(std::string_view name) const {
 std::string_view ParameterList::suggestion(std::string_view name) const { return closest_name(name, asked_); }
 
 std::string did_you_mean(std::string_view suggestion) {
-  return suggestion.empty() ? std::string() : "; did you mean " + in_quotes(suggestion) + "?";
+  return did_you_mean_text(suggestion.empty() ? std::string() : in_quotes(suggestion));
 }
 
 } // namespace packtrace

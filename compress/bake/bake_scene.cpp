@@ -450,8 +450,12 @@ BakeReport bake_scene(const Scene& scene, const BakeConfig& config, const std::f
   progress.begin("writing the file", 0);
   write_file_bytes(file.path(), baked.bytes);
   file.commit();
-  if (!config.resume.empty()) LodStore(config.resume).clear();
+  forget_resumed_levels(config);
   return std::move(baked.report);
+}
+
+void forget_resumed_levels(const BakeConfig& config) {
+  if (!config.resume.empty()) LodStore(config.resume).clear();
 }
 
 } // namespace packtrace

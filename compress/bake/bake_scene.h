@@ -59,4 +59,7 @@ BakedScene bake_to_bytes(const Scene& scene, const BakeConfig& config, Diagnosti
 BakeReport bake_scene(const Scene& scene, const BakeConfig& config, const std::filesystem::path& output, bool force,
                       Diagnostics& diagnostics, Progress& progress);
 
+/// Removes what an interrupted bake left in config.resume for the next one: the file is written. Throws Error(kIo).
+void forget_resumed_levels(const BakeConfig& config);
+
 } // namespace packtrace

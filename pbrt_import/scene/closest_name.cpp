@@ -41,4 +41,8 @@ std::string_view closest_name(std::string_view name, std::span<const std::string
   return best;
 }
 
+std::string did_you_mean_text(std::string_view shown) {
+  return shown.empty() ? std::string() : "; did you mean " + std::string(shown) + "?";
+}
+
 } // namespace packtrace

@@ -14,10 +14,12 @@
 
 #include "compress/bake/bake_scene.h"
 #include "pbrt_import/scene/error.h"
+#include "runtime/commands/binary_output.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/file_report.h"
 #include "runtime/commands/json_output.h"
 #include "runtime/commands/loaded_scene.h"
+#include "runtime/commands/option_checks.h"
 #include "runtime/commands/process_usage.h"
 #include "runtime/commands/progress_display.h"
 #include "runtime/commands/requirement_report.h"
@@ -31,6 +33,7 @@ constexpr std::array<const char*, baked::kPurposeCount> kPurposes{"ao", "shading
 constexpr const char* kKeepNormals = "normals";
 constexpr const char* kKeepUvs = "uv";
 constexpr std::array<const char*, 3> kLodUses{"off", "instanced", "all"}; // by LodUse
+constexpr const char* kLodAlone = kLodUses[2];                            // for --lod without a value
 
 struct BakeOptions {
   std::string input, output;
@@ -81,8 +84,7 @@ BakeConfig make_config(const BakeOptions& options) {
   if (options.texture_psnr) config.min_texture_psnr_db = *options.texture_psnr;
   config.lod = static_cast<LodUse>(std::find(kLodUses.begin(), kLodUses.end(), options.lod) - kLodUses.begin());
   if (config.lod == LodUse::kOff && (options.lod_min_triangles || options.lod_levels || !options.resume.empty()))
-    throw Error(ErrorKind::kUsage,
-                "--lod-min-triangles, --lod-levels and --resume are of no use without --lod instanced or all");
+    throw Error(ErrorKind::kUsage, "--lod-min-triangles, --lod-levels and --resume are of no use without --lod");
   config.lod_min_triangles = options.lod_min_triangles.value_or(config.lod_min_triangles);
   config.lod_levels = options.lod_levels.value_or(config.lod_levels);
   config.resume = options.resume;
@@ -123,14 +125,31 @@ nlohmann::json report(const BakeOptions& options, const BakeReport& baked, const
   return json;
 }
 
+/// How to come by the kind of file that the output's ending names.
+std::string advice_for(const BakeOptions& options) {
+  const std::filesystem::path output(options.output);
+  const std::string baked = std::filesystem::path(output).replace_extension(".ptk").string(),
+                    ending = ending_of(output);
+  const char* verb = nullptr;
+  if (ending == ".glb" || ending == ".gltf" || ending == ".v16") verb = "export";
+  if (ending == ".png" || ending == ".exr") verb = "render";
+  if (!verb) return "give it the ending .ptk: -o " + shell_word(baked);
+  const std::string wanted =
+      ending == ".gltf" ? std::filesystem::path(output).replace_extension(".glb").string() : options.output;
+  return fmt::format("bake to {}, then packtrace {} {} -o {}", shell_word(baked), verb, shell_word(baked),
+                     shell_word(wanted));
+}
+
 int run(const BakeOptions& options, const GlobalOptions& globals) {
   const BakeConfig config = make_config(options);
-  if (options.output.empty() && !options.dry_run)
-    throw Error(ErrorKind::kUsage, "bake needs -o OUT.ptk, or --dry-run to write nothing");
+  if (options.output.empty() && !options.dry_run) fail_without_output("bake", options.input, ".ptk");
+  refuse_foreign_ending(options.output, {".ptk"}, "bake", advice_for(options));
   std::error_code not_there;
   if (std::filesystem::equivalent(options.input, options.output, not_there))
     throw Error(ErrorKind::kUsage, options.output + ": the output is the input");
   JsonOutput json(globals.json, globals.force);
+  std::optional<BinaryOutput> output;
+  if (!options.dry_run) output.emplace(options.output, globals.force, json);
   ProgressDisplay display(globals);
   Progress progress(display.observer());
 
@@ -141,44 +160,50 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
 
   Diagnostics diagnostics;
   const Stopwatch baking;
-  const BakeReport baked =
-      options.dry_run ? bake_to_bytes(imported.scene, config, diagnostics, progress).report
-                      : bake_scene(imported.scene, config, options.output, globals.force, diagnostics, progress);
+  BakedScene scene = bake_to_bytes(imported.scene, config, diagnostics, progress);
+  if (output) {
+    progress.begin("writing the file", 0);
+    output->write(scene.bytes);
+    forget_resumed_levels(config);
+  }
+  const BakeReport& baked = scene.report;
   const double bake_s = baking.seconds();
   display.finish();
   report_diagnostics(diagnostics, globals);
 
   if (json.wanted()) json.write(report(options, baked, imported.statistics, import_s, bake_s, globals.verbosity > 0));
   if (json.to_stdout() || globals.quiet) return 0;
-  fmt::print("{}: import {:.3f} s, bake {:.3f} s, peak memory {:.0f} MiB\n",
-             options.dry_run ? "dry run" : options.output, import_s, bake_s,
-             static_cast<double>(peak_rss_bytes()) / (1 << 20));
-  fmt::print("{}", fmt::format(grouped(),
-                               "{:L} triangles in {:L} bytes: {:.3f} bytes a triangle; position error {:.3g}, {}\n",
-                               baked.file.triangles, baked.file.bytes.total, baked.file.bytes_per_triangle,
-                               baked.max_position_error,
-                               baked.file.normals.empty()
-                                   ? std::string("no normals stored")
-                                   : fmt::format("normal error {:.4f} degrees", baked.max_normal_error_degrees)));
-  fmt::print("{}", disk_text(baked.file));
+  std::FILE* const text = output ? output->text_stream() : stdout;
+  fmt::print(text, "{}: import {:.3f} s, bake {:.3f} s, peak memory {:.0f} MiB\n", output ? output->name() : "dry run",
+             import_s, bake_s, static_cast<double>(peak_rss_bytes()) / (1 << 20));
+  fmt::print(
+      text, "{}",
+      fmt::format(grouped(), "{:L} triangles in {:L} bytes: {:.3f} bytes a triangle; position error {:.3g}, {}\n",
+                  baked.file.triangles, baked.file.bytes.total, baked.file.bytes_per_triangle, baked.max_position_error,
+                  baked.file.normals.empty()
+                      ? std::string("no normals stored")
+                      : fmt::format("normal error {:.4f} degrees", baked.max_normal_error_degrees)));
+  fmt::print(text, "{}", disk_text(baked.file));
   if (const LodTable& lod = baked.file.lod.all; !lod.levels.empty())
-    fmt::print(
-        "{}", fmt::format(grouped(),
-                          "{} levels of detail of {:L} geometries: {:.3f} bytes for each of their {:L} triangles\n",
-                          lod.levels.size() - 1, baked.lod_geometries, lod.bytes_per_triangle(), lod.base_triangles()));
+    fmt::print(text, "{}",
+               fmt::format(
+                   grouped(), "{} levels of detail of {:L} geometries: {:.3f} bytes for each of their {:L} triangles\n",
+                   lod.levels.size() - 1, baked.lod_geometries, lod.bytes_per_triangle(), lod.base_triangles()));
   if (baked.resumed_geometries > 0)
-    fmt::print("{}",
+    fmt::print(text, "{}",
                fmt::format(grouped(), "levels of {:L} geometries were there from before\n", baked.resumed_geometries));
   if (baked.instanced_shapes > 0)
-    fmt::print("{}", fmt::format(grouped(), "{:L} shapes outside objects share geometry, on grids of its own\n",
-                                 baked.instanced_shapes));
+    fmt::print(text, "{}",
+               fmt::format(grouped(), "{:L} shapes outside objects share geometry, on grids of its own\n",
+                           baked.instanced_shapes));
   if (baked.nested_geometries > 0)
-    fmt::print("{}", fmt::format(grouped(), "{:L} geometries have finer steps, as they are small beside the scene's\n",
-                                 baked.nested_geometries));
+    fmt::print(text, "{}",
+               fmt::format(grouped(), "{:L} geometries have finer steps, as they are small beside the scene's\n",
+                           baked.nested_geometries));
   if (baked.left_out > 0)
-    fmt::print("{}", fmt::format(grouped(), "{:L} shapes and instances are left out\n", baked.left_out));
-  fmt::print("{}", dropped_streams_text(baked.file));
-  if (globals.verbosity > 0) fmt::print("\n{}", to_text(baked.file, true));
+    fmt::print(text, "{}", fmt::format(grouped(), "{:L} shapes and instances are left out\n", baked.left_out));
+  fmt::print(text, "{}", dropped_streams_text(baked.file));
+  if (globals.verbosity > 0) fmt::print(text, "\n{}", to_text(baked.file, true));
   return 0;
 }
 
@@ -189,8 +214,8 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   CLI::App& verb = add_verb(app, globals, "bake", "Import a pbrt-v3 scene and pack it into a .ptk file",
                             [options, &globals] { return run(*options, globals); });
   verb.add_option("SCENE", options->input, "A pbrt-v3 scene")->required();
-  verb.add_option("-o,--output", options->output, "The .ptk file to write; required but for --dry-run")
-      ->type_name("FILE");
+  add_output_option(verb, options->output,
+                    "The .ptk file to write, or - for standard output; required but for --dry-run");
   const auto add_precision = [&](const char* name, auto& value, const char* type, const char* description) {
     return verb.add_option(name, value, description)->type_name(type)->group("Precision of positions, at most one of");
   };
@@ -207,7 +232,7 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   for (const NormalFormat& format : kNormalFormats) encodings.emplace_back(format.name);
   verb.add_option("--normals", options->normals,
                   "Encoding of normals; auto: axis16, axis24 or axis32 by --normal-error")
-      ->check(CLI::IsMember(encodings))
+      ->check(one_of(encodings))
       ->default_str(kAuto)
       ->group("Normals");
   verb.add_option(
@@ -219,21 +244,21 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   verb.add_option("--for", options->purpose,
                   "What the file is to be good for; what that does not need is left out. shading also keeps textures "
                   "of materials, and the texture coordinates that they and normal maps need")
-      ->check(CLI::IsMember(std::vector<std::string>(kPurposes.begin(), kPurposes.end())))
+      ->check(one_of(std::vector<std::string>(kPurposes.begin(), kPurposes.end())))
       ->default_str(options->purpose)
       ->group("What is kept");
   verb.add_option("--keep", options->keep, "Streams to keep everywhere, needed or not: uv, normals")
       ->delimiter(',')
-      ->check(CLI::IsMember({std::string(kKeepUvs), std::string(kKeepNormals)}))
+      ->check(one_of({kKeepUvs, kKeepNormals}))
       ->type_name("STREAMS")
       ->group("What is kept");
   verb.add_option(
           "--uvs", options->uvs,
           "Texture coordinates: auto keeps 1/32 texel wherever they lie; unorm16 (steps of 1/65535) and fp16 are "
           "for compatibility")
-      ->check(CLI::IsMember(
-          std::vector<std::string>{kAuto, std::string(kUvEncodingNames[static_cast<size_t>(UvEncoding::kUnorm16)]),
-                                   std::string(kUvEncodingNames[static_cast<size_t>(UvEncoding::kFp16)])}))
+      ->check(one_of(std::vector<std::string>{kAuto,
+                                              std::string(kUvEncodingNames[static_cast<size_t>(UvEncoding::kUnorm16)]),
+                                              std::string(kUvEncodingNames[static_cast<size_t>(UvEncoding::kFp16)])}))
       ->default_str(kAuto)
       ->group("Texture coordinates");
   std::vector<std::string> texture_codecs{kNoTextures, kAuto};
@@ -241,16 +266,19 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   verb.add_option("--textures", options->textures,
                   "Textures of materials: none leaves their average; auto takes for each the smallest codec that "
                   "--texture-psnr allows (default auto with --for shading, else none)")
-      ->check(CLI::IsMember(texture_codecs))
+      ->check(one_of(texture_codecs))
       ->group("Textures");
   verb.add_option("--texture-psnr", options->texture_psnr, "What auto keeps, 10..100 dB of sRGB values (default 34)")
       ->type_name("DB")
       ->group("Textures");
-  verb.add_option("--lod", options->lod,
-                  "Levels of detail, each of less than half the triangles of the one below: instanced makes them of "
-                  "geometries with more than one instance")
-      ->check(CLI::IsMember(std::vector<std::string>(kLodUses.begin(), kLodUses.end())))
-      ->default_str(options->lod)
+  verb.add_option(
+          "--lod", options->lod,
+          "Levels of detail, each of less than half the triangles of the one below: all geometries get them, or "
+          "instanced ones only, that is those with more than one instance; --lod alone is --lod all (default "
+          "off)")
+      ->check(one_of(std::vector<std::string>(kLodUses.begin(), kLodUses.end())))
+      ->expected(0, 1)
+      ->default_str(kLodAlone)
       ->group("Levels of detail");
   verb.add_option("--lod-min-triangles", options->lod_min_triangles,
                   "Geometries of fewer triangles get no levels (default 128)")
@@ -267,14 +295,14 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
       ->group("Levels of detail");
   verb.add_option("--trees", options->trees,
                   "Whether the file holds trees over its clusters for the packed tracer, 1 to 2.5 bytes a triangle")
-      ->check(CLI::IsMember({"on", "off"}))
+      ->check(one_of({"on", "off"}))
       ->default_str(options->trees);
   verb.add_option(
           "--codec", options->codec,
           "Form on disk: none is mapped and traced as it is; fast and small are smaller, and decoded when opened, fast "
           "four to five times as quickly")
-      ->check(CLI::IsMember({std::string(name_of(PageCodec::kNone)), std::string(name_of(PageCodec::kFast)),
-                             std::string(name_of(PageCodec::kSmall))}))
+      ->check(one_of({std::string(name_of(PageCodec::kNone)), std::string(name_of(PageCodec::kFast)),
+                      std::string(name_of(PageCodec::kSmall))}))
       ->default_str(std::string(name_of(PageCodec::kNone)));
   verb.add_flag("--dry-run", options->dry_run, "Do everything but write the file");
   add_scene_options(verb, options->scene);
@@ -286,6 +314,8 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
       "each geometry.\n"
       "Examples:\n"
       "  packtrace bake house.pbrt -o house.ptk\n"
+      "  packtrace bake forest.pbrt -o forest.ptk --lod --codec small\n"
+      "  packtrace bake house.pbrt -o - | ssh host 'cat > house.ptk'\n"
       "  packtrace bake house.pbrt -o small.ptk --precision 1e-4 --json report.json");
 }
 

@@ -1,22 +1,26 @@
 #include "runtime/commands/cli_support.h"
 
 #include <algorithm>
+#include <charconv>
 #include <csignal>
 #include <cstdlib>
 #include <new>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <system_error>
-#include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
 #include <unistd.h>
 
-#include "pbrt_import/scene/closest_name.h"
-#include "pbrt_import/scene/error.h"
 #include "pbrt_import/scene/output_file.h"
 #include "pbrt_import/scene/progress.h"
+#include "runtime/commands/arguments.h"
+#include "runtime/commands/command_line.h"
+#include "runtime/commands/json_output.h"
 
 namespace packtrace {
 
@@ -24,6 +28,7 @@ namespace {
 
 constexpr int kInternalError = 1;
 constexpr uint32_t kMaxThreads = 1024;
+constexpr const char* kThreadsVariable = "PACKTRACE_THREADS";
 
 /// ANSI colour per severity.
 const char* color_of(Severity severity) {
@@ -55,53 +60,68 @@ std::string painted(const Diagnostic& diagnostic) {
   return text;
 }
 
-int fail(const std::string& message, int exit_code) {
+int print_failure(const std::string& message, int exit_code) {
   const bool color = wants_color(stderr);
   const std::string text = std::string("packtrace: ") + (color ? "\x1b[31merror:\x1b[0m " : "error: ") + message + "\n";
   std::fwrite(text.data(), 1, text.size(), stderr);
   return exit_code;
 }
 
-/// What is wrong with the command line; of an option that is not there, which one is most like it.
-std::string message_of(const CLI::ParseError& error, const CLI::App& app) {
-  const auto verbs = app.get_subcommands();
-  const std::vector<std::string> left = verbs.empty() ? std::vector<std::string>{} : verbs.front()->remaining();
-  if (dynamic_cast<const CLI::ExtrasError*>(&error) == nullptr || left.empty()) return error.what();
-  const auto given = std::ranges::find_if(left, [](const std::string& word) { return word.starts_with("-"); });
-  if (given == left.end()) return left.front() + ": one argument too many";
-  const std::string name = given->substr(0, given->find('='));
-  std::vector<std::string> names;
-  for (const CLI::Option* option : verbs.front()->get_options())
-    for (const std::string& known : option->get_lnames()) names.push_back("--" + known);
-  const std::vector<std::string_view> known(names.begin(), names.end());
-  const std::string nearest(closest_name(name, known));
-  return name + ": no such option" + (nearest.empty() ? "" : "; did you mean " + nearest + "?");
+/// What is still buffered would otherwise be lost without a word, for example on a full disk.
+void flush_output() {
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+    throw Error(ErrorKind::kIo, "cannot write to standard output");
 }
 
-int parse(CLI::App& app, int argc, const char* const* argv) {
+/// Parses the words and runs their verb. Returns its exit code.
+int run_words(CLI::App& app, GlobalOptions& globals, std::span<const char* const> words) {
+  int code = 0;
+  if (parse_command_line(app, words)) {
+    std::optional<tbb::global_control> limit;
+    if (const uint32_t threads = thread_limit(globals); threads > 0)
+      limit.emplace(tbb::global_control::max_allowed_parallelism, threads);
+    code = globals.action();
+  }
+  flush_output();
+  return code;
+}
+
+/// Writes a failure to where --json goes. A file that is there stays unless --force was given, like any other output.
+void write_failure(CLI::App& app, const GlobalOptions& globals, std::span<const char* const> words,
+                   nlohmann::json error) {
+  // Where the words could not be parsed, no option has its value.
+  const std::string destination = globals.json.empty() ? value_in_words(words, "--json") : globals.json;
+  if (destination.empty()) return;
+  const bool force =
+      globals.force || std::ranges::any_of(words, [](std::string_view word) { return word == "--force"; });
+  const std::string verb = verb_in_words(app, words), message = error.at("message");
   try {
-    app.parse(argc, argv);
-    return 0;
-  } catch (const CLI::Success& success) { // --help, --version
-    app.exit(success);
-    return 0;
-  } catch (const CLI::ParseError& error) {
-    const auto verbs = app.get_subcommands();
-    const std::string command = "packtrace" + (verbs.empty() ? "" : " " + verbs.front()->get_name());
-    return fail(message_of(error, app) + " (" + command + " --help explains)", static_cast<int>(ErrorKind::kUsage));
+    JsonOutput(destination, force)
+        .write({{"verb", verb.empty() ? nlohmann::json() : nlohmann::json(verb)}, {"error", std::move(error)}});
+  } catch (const Error& second) {
+    if (second.what() != message) print_failure(second.what(), second.exit_code());
   }
 }
 
-/// CLI11 says "a subcommand is required" for no verb, or one that it does not know; this names it.
-std::optional<std::string> unknown_verb(const CLI::App& app, int argc, const char* const* argv) {
-  std::string known;
-  for (const CLI::App* verb : app.get_subcommands({})) {
-    if (argc >= 2 && verb->get_name() == argv[1]) return std::nullopt;
-    if (!verb->get_group().empty()) known += (known.empty() ? "" : ", ") + verb->get_name();
-  }
-  if (argc < 2) return "a verb is needed: " + known + " (packtrace --help explains)";
-  if (argv[1][0] == '-') return std::nullopt;
-  return "unknown verb '" + std::string(argv[1]) + "'; there are " + known;
+void add_options_of_every_verb(CLI::App& app, GlobalOptions& globals) {
+  constexpr const char* kGroup = "Options of every verb";
+  app.add_flag("-q,--quiet", globals.quiet, "Print errors only")->group(kGroup);
+  app.add_flag_function(
+         "-v,--verbose", [&globals](int64_t count) { globals.verbosity += static_cast<int>(count); },
+         "Print more; may be repeated")
+      ->group(kGroup);
+  app.add_option("--json", globals.json, "Write results, or the error, as JSON to FILE, or to standard output for -")
+      ->type_name("FILE")
+      ->take_last()
+      ->group(kGroup);
+  app.add_flag("--force", globals.force, "Replace existing files")->group(kGroup);
+  app.add_option("--threads", globals.threads,
+                 fmt::format("Use N threads, 1..{} (default: the environment variable {}, else all)", kMaxThreads,
+                             kThreadsVariable))
+      ->check(CLI::Range(1u, kMaxThreads))
+      ->type_name("N")
+      ->take_last()
+      ->group(kGroup);
 }
 
 extern "C" void on_interrupt(int) {
@@ -113,45 +133,51 @@ extern "C" void on_interrupt(int) {
 
 } // namespace
 
+void add_global_options(CLI::App& app, GlobalOptions& globals) { add_options_of_every_verb(app, globals); }
+
 CLI::App& add_verb(CLI::App& app, GlobalOptions& globals, const std::string& name, const std::string& description,
                    std::function<int()> action) {
-  CLI::App& verb = *app.add_subcommand(name, description);
+  CLI::App& verb = *app.add_subcommand(name, description)->group("Verbs");
   verb.callback([&globals, action = std::move(action)] { globals.action = action; });
-  constexpr const char* kGroup = "Options of every verb";
-  verb.add_flag("-q,--quiet", globals.quiet, "Print errors only")->group(kGroup);
-  verb.add_flag("-v,--verbose", globals.verbosity, "Print more; may be repeated")->group(kGroup);
-  verb.add_option("--json", globals.json, "Write results as JSON to FILE, or to standard output for -")
-      ->type_name("FILE")
-      ->group(kGroup);
-  verb.add_flag("--force", globals.force, "Replace existing files")->group(kGroup);
-  verb.add_option("--threads", globals.threads, "Use N threads (default: all)")
-      ->check(CLI::Range(1u, kMaxThreads))
-      ->type_name("N")
-      ->group(kGroup);
+  verb.option_defaults()->take_last(); // as scripts and aliases expect that append to a command
+  add_options_of_every_verb(verb, globals);
   return verb;
 }
 
 int run_verbs(CLI::App& app, GlobalOptions& globals, int argc, const char* const* argv) {
-  if (const auto problem = unknown_verb(app, argc, argv)) return fail(*problem, static_cast<int>(ErrorKind::kUsage));
-  app.require_subcommand(1);
-  if (const int code = parse(app, argc, argv); code != 0 || !globals.action) return code;
+  const std::span words(argv, static_cast<size_t>(std::max(argc, 0)));
+  const std::span behind_name = words.subspan(std::min<size_t>(1, words.size()));
+  const auto fail = [&](const nlohmann::json& error) {
+    print_failure(error.at("message"), error.at("exit_code"));
+    write_failure(app, globals, behind_name, error);
+    return error.at("exit_code").get<int>();
+  };
   try {
-    std::optional<tbb::global_control> limit;
-    if (globals.threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, globals.threads);
-    const int code = globals.action();
-    // What is still buffered would otherwise be lost without a word, for example on a full disk.
-    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
-      throw Error(ErrorKind::kIo, "cannot write to standard output");
-    return code;
+    return run_words(app, globals, behind_name);
   } catch (const Error& error) {
-    return fail(error.what(), error.exit_code());
+    return fail(error_json(error));
   } catch (const std::bad_alloc&) {
-    return fail("not enough memory", static_cast<int>(ErrorKind::kLimitExceeded));
+    return fail(error_json("limit_exceeded", static_cast<int>(ErrorKind::kLimitExceeded), "not enough memory"));
   } catch (const std::system_error& error) { // of std::filesystem, or fmt::print on a full disk
-    return fail(error.what(), static_cast<int>(ErrorKind::kIo));
+    return fail(error_json("io", static_cast<int>(ErrorKind::kIo), error.what()));
   } catch (const std::exception& error) {
-    return fail(std::string("internal: ") + error.what(), kInternalError);
+    return fail(error_json("internal", kInternalError, std::string("internal: ") + error.what()));
   }
+}
+
+int report_error(const Error& error) { return print_failure(error.what(), error.exit_code()); }
+
+uint32_t thread_limit(const GlobalOptions& globals) {
+  if (globals.threads > 0) return globals.threads;
+  const char* variable = std::getenv(kThreadsVariable);
+  const std::string_view text = variable ? variable : "";
+  if (text.empty()) return 0;
+  uint32_t threads = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), threads);
+  if (error != std::errc() || end != text.data() + text.size() || threads < 1 || threads > kMaxThreads)
+    throw Error(ErrorKind::kUsage, fmt::format("{} is '{}'; give a number of threads from 1 to {}, or unset it",
+                                               kThreadsVariable, text, kMaxThreads));
+  return threads;
 }
 
 void install_interrupt_handlers() {

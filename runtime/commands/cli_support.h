@@ -6,6 +6,7 @@
 #include <string>
 
 #include "pbrt_import/scene/diagnostics.h"
+#include "pbrt_import/scene/error.h"
 
 namespace CLI {
 class App;
@@ -19,9 +20,12 @@ struct GlobalOptions {
   int verbosity = 0;           ///< how often -v was given; 1 shows notes
   std::string json;            ///< where results go as JSON: a file, "-" for standard output, empty for nowhere
   bool force = false;          ///< existing files may be replaced
-  uint32_t threads = 0;        ///< 0: as many as the machine has
+  uint32_t threads = 0;        ///< 0: PACKTRACE_THREADS, or as many as the machine has
   std::function<int()> action; ///< of the verb on the command line; returns the exit code
 };
+
+/// Adds the options of every verb to the program itself, so that they may stand before the verb too.
+void add_global_options(CLI::App& app, GlobalOptions& globals);
 
 /// Adds a verb that takes the global options too. A command's file offers
 ///   void add_NAME_command(CLI::App& app, GlobalOptions& globals);
@@ -31,8 +35,15 @@ CLI::App& add_verb(CLI::App& app, GlobalOptions& globals, const std::string& nam
 
 /// Parses the command line, limits the threads, and runs the verb: main() returns the result. Errors are printed to
 /// standard error and become exit codes: those of Error, 2 for the command line, 5 for lack of memory, 6 for the file
-/// system, 1 for what should not happen.
+/// system, 1 for what should not happen. With --json they are written there too (docs/json_output.md).
 int run_verbs(CLI::App& app, GlobalOptions& globals, int argc, const char* const* argv);
+
+/// Prints an error as run_verbs() does, for verbs that go on or have written their JSON. Returns its exit code.
+int report_error(const Error& error);
+
+/// How many threads may work: --threads, else the environment variable PACKTRACE_THREADS, else 0 for as many as the
+/// machine has. Throws Error(kUsage) where the variable is no number of threads.
+uint32_t thread_limit(const GlobalOptions& globals);
 
 /// Makes SIGINT and SIGTERM stop the work cooperatively (Progress::cancel()). The second one ends the process at once
 /// with exit code 7, after removing unfinished output files.

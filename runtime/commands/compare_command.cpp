@@ -19,6 +19,7 @@
 #include "pbrt_import/scene/output_file.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/json_output.h"
+#include "runtime/commands/option_checks.h"
 #include "runtime/image/false_color.h"
 #include "runtime/image/metrics.h"
 #include "runtime/image/png.h"
@@ -209,7 +210,7 @@ void print_notes(const ImagePair& pair, const GlobalOptions& globals) {
 }
 
 int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
-  if (!options.diff.empty() && std::filesystem::path(options.diff).extension() != ".png")
+  if (!options.diff.empty() && ending_of(options.diff) != ".png")
     throw Error(ErrorKind::kUsage, "--diff " + options.diff + ": the picture is a .png");
   JsonOutput json(globals.json, globals.force);
   std::optional<OutputFile> diff;
@@ -234,23 +235,17 @@ int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
     diff->commit();
     if (!globals.quiet && !json.to_stdout()) fmt::print("wrote {}\n", options.diff);
   }
-  json.write(to_json(options, pair, values, checks));
-  for (const Check& check : checks)
-    if (!check.passed)
-      throw Error(ErrorKind::kLimitExceeded,
-                  fmt::format("{} is {:.6g}, beyond its limit {:.6g}", check.name, check.value, check.limit));
-  return 0;
-}
-
-/// A finite number in [lo, hi]; unlike CLI::Range it refuses NaN.
-CLI::Validator number_in(double lo, double hi) {
-  return CLI::Validator(
-      [lo, hi](std::string& text) -> std::string {
-        double value = 0.0;
-        if (CLI::detail::lexical_cast(text, value) && value >= lo && value <= hi) return {};
-        return fmt::format("{} is not a number in [{}, {}]", text, lo, hi);
-      },
-      fmt::format("[{}, {}]", lo, hi));
+  nlohmann::json document = to_json(options, pair, values, checks);
+  const auto exceeded = std::ranges::find(checks, false, &Check::passed);
+  if (exceeded == checks.end()) {
+    json.write(document);
+    return 0;
+  }
+  const Error error(ErrorKind::kLimitExceeded, fmt::format("{} is {:.6g}, beyond its limit {:.6g}", exceeded->name,
+                                                           exceeded->value, exceeded->limit));
+  document["error"] = error_json(error); // beside what was measured
+  json.write(document);
+  return report_error(error);
 }
 
 } // namespace
@@ -264,7 +259,7 @@ void add_compare_command(CLI::App& app, GlobalOptions& globals) {
   verb.add_option("--layer", options->layer, "EXR layer (default: ao, else colours, else the only one)");
   verb.add_option("--metric", options->metrics, "Metrics to compute: all, rmse, mae, psnr, ssim, flip")
       ->delimiter(',')
-      ->check(CLI::IsMember({"all", "rmse", "mae", "psnr", "ssim", "flip"}))
+      ->check(one_of({"all", "rmse", "mae", "psnr", "ssim", "flip"}))
       ->default_str("all");
   verb.add_option("--ppd", options->pixels_per_degree, "FLIP: pixels per degree of visual angle")
       ->check(number_in(1e-3, 1000.0))
@@ -289,7 +284,7 @@ void add_compare_command(CLI::App& app, GlobalOptions& globals) {
 
   verb.add_option("--diff", options->diff, "Write a .png of the errors: black, red, yellow, white")->type_name("FILE");
   verb.add_option("--diff-metric", options->diff_metric, "Whose error per pixel to show")
-      ->check(CLI::IsMember({"rmse", "mae", "psnr", "ssim", "flip"}))
+      ->check(one_of({"rmse", "mae", "psnr", "ssim", "flip"}))
       ->capture_default_str();
   verb.add_option("--diff-white", options->diff_white, "Error shown as white")
       ->check(number_in(1e-6, 1e6))

@@ -10,13 +10,13 @@
 
 #include "compress/bake/vertex16_export.h"
 #include "compress/exchange/gltf_export.h"
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/file_bytes.h"
-#include "pbrt_import/scene/output_file.h"
+#include "pbrt_import/scene/file_error.h"
+#include "runtime/commands/binary_output.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/file_report.h"
 #include "runtime/commands/json_output.h"
 #include "runtime/commands/loaded_scene.h"
+#include "runtime/commands/option_checks.h"
 #include "runtime/commands/process_usage.h"
 #include "runtime/commands/progress_display.h"
 
@@ -119,19 +119,26 @@ std::string to_text(const ExportOptions& options, const GltfReport& r) {
 
 /// The layout asked for, or that of the output's extension.
 std::string layout_of(const ExportOptions& options) {
-  const std::string extension = std::filesystem::path(options.output).extension().string();
-  if (extension == ".gltf")
-    throw Error(ErrorKind::kUsage, options.output + ": glTF is written as one binary file, .glb");
-  if (!options.layout.empty()) return options.layout;
-  if (extension == ".glb") return kGltf;
-  if (extension == ".v16") return kVertex16;
-  throw Error(ErrorKind::kUsage, options.output + ": give it the ending .glb or .v16, or say --layout");
+  const std::string ending = ending_of(options.output);
+  if (ending == ".gltf") throw FileError(ErrorKind::kUsage, options.output, "glTF is written as one binary file, .glb");
+  const std::string layout = !options.layout.empty() ? options.layout
+                             : ending == ".glb"      ? kGltf
+                             : ending == ".v16"      ? kVertex16
+                                                     : "";
+  refuse_foreign_ending(options.output, {".glb", ".v16"}, "export", {});
+  if (layout.empty() && options.output == "-")
+    throw Error(ErrorKind::kUsage, "-o - has no ending to tell the layout; say --layout gltf or --layout vertex16");
+  if (layout.empty())
+    throw FileError(ErrorKind::kUsage, options.output, "give it the ending .glb or .v16, or say --layout");
+  if ((ending == ".glb" && layout != kGltf) || (ending == ".v16" && layout != kVertex16))
+    throw FileError(ErrorKind::kUsage, options.output, "the ending is not that of --layout " + layout);
+  return layout;
 }
 
 Exported export_file(const ExportOptions& options, const std::string& layout, Progress& progress) {
   if (!is_baked_file(options.input))
-    throw Error(ErrorKind::kInput,
-                options.input + ": not a packtrace baked file; make one with packtrace bake SCENE.pbrt -o FILE.ptk");
+    throw FileError(ErrorKind::kInput, options.input,
+                    "not a packtrace baked file; make one with packtrace bake SCENE.pbrt -o FILE.ptk");
   const BakedFile file = BakedFile::open(options.input);
   if (layout == kGltf) {
     GltfConfig config = options.gltf;
@@ -144,23 +151,23 @@ Exported export_file(const ExportOptions& options, const std::string& layout, Pr
 }
 
 int run(const ExportOptions& options, const GlobalOptions& globals) {
+  if (options.output.empty()) fail_without_output("export", options.input, ".glb");
   std::error_code not_there;
   if (std::filesystem::equivalent(options.input, options.output, not_there))
-    throw Error(ErrorKind::kUsage, options.output + ": the output is the input");
+    throw FileError(ErrorKind::kUsage, options.output, "the output is the input");
   const std::string layout = layout_of(options);
   if (layout == kVertex16 && options.for_gltf)
     throw Error(ErrorKind::kUsage, "--codec, --level, --normal-bits and --uv-bits are for --layout gltf");
   JsonOutput json(globals.json, globals.force);
-  OutputFile output(options.output, globals.force);
+  BinaryOutput output(options.output, globals.force, json);
   ProgressDisplay display(globals);
   Progress progress(display.observer());
   const Exported result = export_file(options, layout, progress);
-  write_file_bytes(output.path(), result.bytes);
-  output.commit();
+  output.write(result.bytes);
   display.finish();
   if (json.wanted()) json.write(result.json);
   if (json.to_stdout() || globals.quiet) return 0;
-  fmt::print("{}", result.text);
+  fmt::print(output.text_stream(), "{}", result.text);
   return 0;
 }
 
@@ -172,13 +179,13 @@ void add_export_command(CLI::App& app, GlobalOptions& globals) {
                             [options, &globals] { return run(*options, globals); });
   const auto of_gltf = [options](const std::string&) { options->for_gltf = true; };
   verb.add_option("FILE", options->input, "A .ptk file")->required();
-  verb.add_option("-o,--output", options->output, "The file to write")->type_name("FILE")->required();
+  add_output_option(verb, options->output, "The file to write, or - for standard output with --layout (required)");
   verb.add_option("--layout", options->layout,
                   "vertex16: 16 bytes a vertex, 16- or 32-bit indices; gltf: one binary glTF 2.0 file with materials,\n"
                   "instances, textures and cameras. Default: gltf for .glb, vertex16 for .v16")
-      ->check(CLI::IsMember({kVertex16, kGltf}));
+      ->check(one_of({kVertex16, kGltf}));
   verb.add_option("--codec", options->codec, "gltf: draco compresses (KHR_draco_mesh_compression), none stores floats")
-      ->check(CLI::IsMember({kDraco, kNone}))
+      ->check(one_of({kDraco, kNone}))
       ->each(of_gltf)
       ->capture_default_str();
   verb.add_option("--level", options->gltf.codec.level, "draco: 0 fastest to 10 smallest")
@@ -198,7 +205,8 @@ void add_export_command(CLI::App& app, GlobalOptions& globals) {
       "compress/format/vertex16.glsl and vertex16_decode.h decode it. glTF positions stay on the file's lattice.\n"
       "Examples:\n"
       "  packtrace export house.ptk -o house.v16\n"
-      "  packtrace export house.ptk -o house.glb --level 10");
+      "  packtrace export house.ptk -o house.glb --level 10\n"
+      "  packtrace export house.ptk -o - --layout gltf | gltf_viewer /dev/stdin");
 }
 
 } // namespace packtrace

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <span>
+#include <utility>
 
 #include "pbrt_import/scene/error.h"
-#include "runtime/image/false_color.h"
+#include "pbrt_import/scene/file_bytes.h"
+#include "runtime/commands/binary_output.h"
+#include "runtime/commands/option_checks.h"
 #include "runtime/image/png.h"
 
 namespace packtrace {
@@ -52,34 +54,24 @@ Layer exr_layer(const RenderedImage& image, const std::string& aov) {
   return {aov, rgb, floats_of(image.shaded), true};
 }
 
-/// Linear colour behind everything: a soft sky, lighter towards the bottom of the picture.
-Vec3 sky(uint32_t y, uint32_t height) {
-  const float t = (static_cast<float>(y) + 0.5f) / static_cast<float>(height);
-  return glm::mix(Vec3(0.30f, 0.50f, 0.78f), Vec3(0.86f, 0.90f, 0.93f), std::pow(t, 0.8f));
-}
-
-Image over_sky(const RenderedImage& image, const std::vector<Vec3>& color) {
-  Image result(image.size, 3);
-  for (uint32_t y = 0; y < image.size.height; ++y) {
-    for (uint32_t x = 0; x < image.size.width; ++x) {
-      const size_t i = size_t{y} * image.size.width + x;
-      const Vec3 mixed = glm::mix(sky(y, image.size.height), color[i], image.coverage[i]);
-      std::copy_n(&mixed.x, 3, result.pixel(x, y).begin());
+/// Names of files, of which several may stand in one word: "x.png,x.exr". A comma inside of a name stays one.
+std::vector<std::string> separate_files(const std::vector<std::string>& words) {
+  std::vector<std::string> files;
+  for (const std::string& word : words) {
+    std::vector<std::string> parts;
+    for (size_t start = 0; start <= word.size();) {
+      const size_t comma = std::min(word.find(',', start), word.size());
+      parts.push_back(word.substr(start, comma - start));
+      start = comma + 1;
     }
+    const bool all_images = std::ranges::all_of(
+        parts, [](const std::string& part) { return ending_of(part) == ".png" || ending_of(part) == ".exr"; });
+    if (all_images)
+      files.insert(files.end(), parts.begin(), parts.end());
+    else
+      files.push_back(word);
   }
-  return result;
-}
-
-void write_png_of(const std::filesystem::path& path, const RenderedImage& image, const std::string& aov) {
-  const auto raw = [&](const Image& preview) { write_png(path, preview, PngTransfer::kRaw); };
-  if (aov == "ao") return raw(ao_preview(image.size, image.ao, Vec3(1)));
-  if (aov == "ao_raw") return raw(ao_preview(image.size, image.ao_raw, Vec3(1)));
-  if (aov == "depth") return raw(depth_preview(image.size, image.depth));
-  if (aov == "normal") return raw(normal_preview(image.size, image.normal));
-  if (aov == "instance") return raw(id_preview(image.size, image.instance));
-  if (aov == "lod") return raw(level_preview(image.size, image.lod, image.cluster, image.ao));
-  if (aov == "lod-error") return raw(heat_map(image.size, image.lod_error, static_cast<float>(image.lod_error_px)));
-  write_png(path, over_sky(image, aov == "albedo" ? image.albedo : image.shaded), PngTransfer::kSrgb);
+  return files;
 }
 
 } // namespace
@@ -94,20 +86,23 @@ const std::vector<std::string>& aov_names() {
 }
 
 void ImageOutputs::add(const std::filesystem::path& target, bool force, bool exr, std::vector<std::string> aovs) {
-  entries_.push_back({std::make_unique<OutputFile>(target, force), exr, std::move(aovs)});
+  entries_.push_back({target == "-" ? nullptr : std::make_unique<OutputFile>(target, force), exr, std::move(aovs)});
 }
 
 ImageOutputs::ImageOutputs(const std::vector<std::string>& files, const std::vector<std::string>& aovs, bool detail,
-                           bool force) {
-  for (const std::string& name : files) {
+                           bool force, const PreviewStyle& style)
+    : style_(style) {
+  for (const std::string& name : separate_files(files)) {
     const std::filesystem::path path(name);
-    if (path.extension() == ".exr") {
+    if (name == "-") {
+      add_standard_output(chosen(aovs, "ao", detail));
+    } else if (ending_of(path) == ".exr") {
       add(path, force, true, chosen(aovs, "all", detail));
-    } else if (path.extension() == ".png") {
+    } else if (ending_of(path) == ".png") {
       const std::vector<std::string> layers = chosen(aovs, "ao", detail);
       for (const std::string& aov : layers) {
         std::filesystem::path target = path;
-        if (layers.size() > 1) target.replace_extension("." + aov + ".png");
+        if (layers.size() > 1) target.replace_extension("." + aov + path.extension().string());
         add(target, force, false, {aov});
       }
     } else {
@@ -116,17 +111,31 @@ ImageOutputs::ImageOutputs(const std::vector<std::string>& files, const std::vec
   }
 }
 
+void ImageOutputs::add_standard_output(std::vector<std::string> aovs) {
+  if (std::exchange(to_stdout_, true)) throw Error(ErrorKind::kUsage, "-o - was given twice");
+  if (aovs.size() > 1)
+    throw Error(ErrorKind::kUsage, "-o - writes one PNG to standard output, so --aov can name one layer only");
+  refuse_terminal("a PNG");
+  add("-", false, false, std::move(aovs));
+}
+
 void ImageOutputs::write(const RenderedImage& image, const ExrAttributes& attributes) {
   for (const Entry& entry : entries_) {
     if (!entry.exr) {
-      write_png_of(entry.file->path(), image, entry.aovs.front());
+      const std::vector<std::byte> png =
+          encode_png(layer_preview(image, entry.aovs.front(), style_), PngTransfer::kRaw);
+      if (entry.file)
+        write_file_bytes(entry.file->path(), png);
+      else
+        write_standard_output(png);
       continue;
     }
     std::vector<Layer> layers;
     for (const std::string& aov : entry.aovs) layers.push_back(exr_layer(image, aov));
     write_exr(entry.file->path(), image.size, layers, attributes);
   }
-  for (const Entry& entry : entries_) entry.file->commit();
+  for (const Entry& entry : entries_)
+    if (entry.file) entry.file->commit();
 }
 
 bool ImageOutputs::show_detail() const {
@@ -139,7 +148,7 @@ bool ImageOutputs::show_detail() const {
 
 std::vector<std::string> ImageOutputs::targets() const {
   std::vector<std::string> names;
-  for (const Entry& entry : entries_) names.push_back(entry.file->target().string());
+  for (const Entry& entry : entries_) names.push_back(entry.file ? entry.file->target().string() : "-");
   return names;
 }
 

@@ -6,11 +6,13 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "pbrt_import/scene/error.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/file_report.h"
 #include "runtime/commands/json_output.h"
@@ -21,7 +23,7 @@ namespace packtrace {
 namespace {
 
 struct InfoOptions {
-  std::string input;
+  std::vector<std::string> inputs;
   SceneOptions scene;
 };
 
@@ -126,38 +128,100 @@ std::string to_text(const ImportResult& imported, uint32_t world) {
   return text;
 }
 
-int run(const InfoOptions& options, const GlobalOptions& globals) {
+/// What is said of one file.
+struct FileInfo {
+  nlohmann::json json;
+  std::string text;
+  std::string row; ///< of the table for several files
+};
+
+std::string table_row(const std::string& file, uint64_t triangles, uint64_t placed, uint64_t bytes,
+                      const std::string& error) {
+  const double per = triangles > 0 ? static_cast<double>(bytes) / static_cast<double>(triangles) : 0.0;
+  return fmt::format(grouped(), "{:>14L}{:>14L}{:>15L}{:>10.2f}{:>12}  {}\n", triangles, placed, bytes, per, error,
+                     file);
+}
+
+std::string table_heading() {
+  return fmt::format("{:>14}{:>14}{:>15}{:>10}{:>12}  {}\n", "triangles", "placed", "bytes", "a tri.", "pos. error",
+                     "file");
+}
+
+FileInfo info_of(const std::string& input, const InfoOptions& options, const GlobalOptions& globals, Progress& progress,
+                 ProgressDisplay& display) {
+  FileInfo info;
+  if (is_baked_file(input)) {
+    require_no_scene_choice(input, options.scene);
+    const FileSummary summary = summarize(BakedFile::open(input));
+    info.json = to_json(summary, globals.verbosity > 0);
+    info.text = to_text(summary, globals.verbosity > 0);
+    info.row = table_row(input, summary.triangles, summary.placed_triangles, summary.disk.file_bytes,
+                         fmt::format("{:.3g}", summary.max_position_error));
+  } else {
+    const ImportResult imported = import_for_command(input, options.scene, globals, progress, display);
+    info.json = to_json(imported, options.scene.world);
+    info.text = to_text(imported, options.scene.world);
+    info.row = table_row(input, unique_triangle_count(imported.scene), placed_triangle_count(imported.scene),
+                         imported.statistics.bytes_read, "");
+  }
+  info.json["verb"] = "info";
+  info.json["input"] = input;
+  return info;
+}
+
+int run_one(const InfoOptions& options, const GlobalOptions& globals) {
   JsonOutput json(globals.json, globals.force);
   ProgressDisplay display(globals);
   Progress progress(display.observer());
-  nlohmann::json document;
-  std::string text;
-  if (is_baked_file(options.input)) {
-    require_no_scene_choice(options.input, options.scene);
-    const FileSummary summary = summarize(BakedFile::open(options.input));
-    document = to_json(summary, globals.verbosity > 0);
-    text = to_text(summary, globals.verbosity > 0);
-  } else {
-    const ImportResult imported = import_for_command(options.input, options.scene, globals, progress, display);
-    document = to_json(imported, options.scene.world);
-    text = to_text(imported, options.scene.world);
-  }
-  document["verb"] = "info";
-  document["input"] = options.input;
-  if (json.wanted()) json.write(document);
-  if (!json.to_stdout() && !globals.quiet) fmt::print("{}", text);
+  const FileInfo info = info_of(options.inputs.front(), options, globals, progress, display);
+  if (json.wanted()) json.write(info.json);
+  if (!json.to_stdout() && !globals.quiet) fmt::print("{}", info.text);
   return 0;
+}
+
+/// A line of a table for each file, or with -v all of each. A file that cannot be read is reported and left out; the
+/// first such decides the exit code.
+int run_several(const InfoOptions& options, const GlobalOptions& globals) {
+  JsonOutput json(globals.json, globals.force);
+  nlohmann::json documents = nlohmann::json::array();
+  const bool shown = !json.to_stdout() && !globals.quiet, in_full = globals.verbosity > 0;
+  int code = 0;
+  if (shown && !in_full) fmt::print("{}", table_heading());
+  for (const std::string& input : options.inputs) {
+    ProgressDisplay display(globals);
+    Progress progress(display.observer());
+    try {
+      FileInfo info = info_of(input, options, globals, progress, display);
+      if (shown) fmt::print("{}", in_full ? fmt::format("== {}\n{}\n", input, info.text) : info.row);
+      documents.push_back(std::move(info.json));
+    } catch (const Error& error) {
+      if (error.kind() == ErrorKind::kCancelled || error.kind() == ErrorKind::kUsage) throw;
+      display.finish();
+      std::fflush(stdout); // so that the two streams are in order
+      report_error(error);
+      if (code == 0) code = error.exit_code();
+      documents.push_back({{"verb", "info"}, {"input", input}, {"error", error_json(error)}});
+    }
+  }
+  if (json.wanted()) json.write(documents);
+  return code;
 }
 
 } // namespace
 
 void add_info_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<InfoOptions>();
-  CLI::App& verb = add_verb(app, globals, "info", "Say what a .ptk file or a .pbrt scene holds",
-                            [options, &globals] { return run(*options, globals); });
-  verb.add_option("FILE", options->input, "A .ptk file or a .pbrt scene")->required();
+  CLI::App& verb = add_verb(app, globals, "info", "Say what .ptk files and .pbrt scenes hold", [options, &globals] {
+    return options->inputs.size() == 1 ? run_one(*options, globals) : run_several(*options, globals);
+  });
+  verb.add_option("FILE", options->inputs,
+                  "A .ptk file or a .pbrt scene; of several a table is printed, or with -v all")
+      ->required();
   add_scene_options(verb, options->scene);
-  verb.footer("Example:\n  packtrace info house.ptk --json -");
+  verb.footer("Examples:\n"
+              "  packtrace info house.ptk\n"
+              "  packtrace info *.ptk\n"
+              "  packtrace info house.ptk --json - | jq .bytes_per_triangle");
 }
 
 } // namespace packtrace

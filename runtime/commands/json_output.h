@@ -5,6 +5,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "pbrt_import/scene/error.h"
 #include "pbrt_import/scene/output_file.h"
 
 namespace packtrace {
@@ -13,7 +14,7 @@ namespace packtrace {
 class JsonOutput {
 public:
   /// @param destination a file, "-" for standard output, empty for nowhere
-  /// Throws like OutputFile.
+  /// Throws like OutputFile, and Error(kUsage) for endings of other formats: `--json room.ptk`.
   JsonOutput(const std::string& destination, bool force);
 
   /// Something is to be written.
@@ -29,5 +30,11 @@ private:
   std::optional<OutputFile> file_;
   bool to_stdout_ = false;
 };
+
+/// What the "error" key holds (docs/json_output.md).
+nlohmann::json error_json(const Error& error);
+
+/// The same of a failure that has no Error: "internal", or lack of memory.
+nlohmann::json error_json(const std::string& kind, int exit_code, const std::string& message);
 
 } // namespace packtrace

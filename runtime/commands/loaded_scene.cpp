@@ -9,14 +9,15 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/file_error.h"
+#include "runtime/commands/option_checks.h"
 #include "runtime/trace/float_source.h"
 #include "runtime/trace/packed_source.h"
 
 namespace packtrace {
 
 bool is_baked_file(const std::filesystem::path& file) {
-  if (file.extension() == ".ptk") return true;
+  if (ending_of(file) == ".ptk") return true;
   std::array<char, baked::kMagic.size()> start{};
   std::ifstream in(file, std::ios::binary);
   in.read(start.data(), static_cast<std::streamsize>(start.size()));
@@ -40,8 +41,9 @@ void add_scene_options(CLI::App& verb, SceneOptions& options) {
 void require_no_scene_choice(const std::filesystem::path& file, const SceneOptions& options) {
   const char* const option = options.time ? "--time" : options.world != 1 ? "--world" : nullptr;
   if (option)
-    throw Error(ErrorKind::kUsage, file.string() + ": " + option +
-                                       " is for .pbrt scenes; a .ptk file holds one world at one time, chosen by bake");
+    throw FileError(ErrorKind::kUsage, file,
+                    std::string(option) +
+                        " is for .pbrt scenes; a .ptk file holds one world at one time, chosen by bake");
 }
 
 namespace {
@@ -51,15 +53,14 @@ void require_scene_text(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) return; // the import says why
   if (is_baked_file(file))
-    throw Error(ErrorKind::kInput, file.string() + ": a baked file already; give the .pbrt scene that it was made of");
+    throw FileError(ErrorKind::kInput, file, "a baked file already; give the .pbrt scene that it was made of");
   std::array<char, 512> start{};
   in.read(start.data(), static_cast<std::streamsize>(start.size()));
   const std::string_view text(start.data(), static_cast<size_t>(in.gcount()));
   if (text.starts_with("ply\n") || text.starts_with("ply\r"))
-    throw Error(ErrorKind::kInput,
-                file.string() + ": a PLY mesh, not a scene; name it in a .pbrt file with Shape \"plymesh\"");
+    throw FileError(ErrorKind::kInput, file, "a PLY mesh, not a scene; name it in a .pbrt file with Shape \"plymesh\"");
   if (text.find('\0') != std::string_view::npos)
-    throw Error(ErrorKind::kInput, file.string() + ": not a text file, so no pbrt-v3 scene");
+    throw FileError(ErrorKind::kInput, file, "not a text file, so no pbrt-v3 scene");
 }
 
 } // namespace
@@ -93,7 +94,7 @@ ImportResult import_for_command(const std::filesystem::path& file, const SceneOp
   GlobalOptions shown = globals;
   if (empty) shown.verbosity = std::max(shown.verbosity, 1); // notes may say why
   report_diagnostics(diagnostics, shown);
-  if (empty) throw Error(ErrorKind::kInput, file.string() + ": the scene has no triangles to work with");
+  if (empty) throw FileError(ErrorKind::kInput, file, "the scene has no triangles to work with");
   return result;
 }
 

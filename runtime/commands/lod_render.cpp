@@ -10,6 +10,7 @@
 
 #include "pbrt_import/scene/error.h"
 #include "runtime/commands/file_report.h"
+#include "runtime/commands/option_checks.h"
 #include "runtime/lod/compaction.h"
 #include "runtime/stopwatch.h"
 #include "runtime/trace/lod_view.h"
@@ -24,16 +25,9 @@ constexpr std::array<std::pair<const char*, SharingScheme>, 5> kSchemes{{{"steps
                                                                          {"per-instance", SharingScheme::kPerInstance},
                                                                          {"off", SharingScheme::kOff}}};
 
+/// @param name of kSchemes: the option's check knows them
 SharingScheme scheme_of(const std::string& name) {
-  for (const auto& [known, scheme] : kSchemes)
-    if (name == known) return scheme;
-  throw Error(ErrorKind::kUsage,
-              "--lod-scheme " + name + ": there are steps, per-level, one-provider, per-instance and off");
-}
-
-void require_one_of(const char* option, const std::optional<std::string>& value, const char* a, const char* b) {
-  if (value && *value != a && *value != b)
-    throw Error(ErrorKind::kUsage, fmt::format("{} {}: there are {} and {}", option, *value, a, b));
+  return std::ranges::find(kSchemes, name, &std::pair<const char*, SharingScheme>::first)->second;
 }
 
 const char* name_of(SharingScheme scheme) {
@@ -140,6 +134,8 @@ double ratio(double a, double b) { return b > 0.0 ? a / b : 0.0; }
 } // namespace
 
 void add_lod_options(CLI::App& verb, LodOptions& options) {
+  std::vector<std::string> schemes;
+  for (const auto& [name, scheme] : kSchemes) schemes.emplace_back(name);
   constexpr const char* kGroup = "Levels of detail (of files baked with --lod)";
   verb.add_option("--lod-error", options.error_px,
                   "Choose coarser levels that lie at most so many pixels beside the finest, to either side; "
@@ -150,7 +146,7 @@ void add_lod_options(CLI::App& verb, LodOptions& options) {
                   "Who gets which acceleration structure: steps (the default) and per-level share ones that do not "
                   "depend on the view, one-provider lends one instance's, per-instance shares only the coarsest; off: "
                   "level 0 for all")
-      ->type_name("NAME")
+      ->check(one_of(schemes))
       ->group(kGroup);
   verb.add_option("--lod-traced-ratio", options.traced_ratio,
                   "steps, per-level: build as few as possible while at most so many times the triangles of the "
@@ -168,12 +164,12 @@ void add_lod_options(CLI::App& verb, LodOptions& options) {
   verb.add_option("--lod-cull", options.cull,
                   "Which instances --lod-culled-scale is about: frustum, outside of what the camera looks at (the "
                   "default); visible, those that no pixel shows, with --lod-rays occlusion")
-      ->type_name("NAME")
+      ->check(one_of({"frustum", "visible"}))
       ->group(kGroup);
   verb.add_option("--lod-rays", options.rays,
                   "Which rays meet coarser levels: all (the default), or occlusion: the camera sees level 0, so that "
                   "what thin and touching parts show stays")
-      ->type_name("NAME")
+      ->check(one_of({"all", "occlusion"}))
       ->group(kGroup);
 }
 
@@ -183,8 +179,6 @@ void validate(const LodOptions& options) {
     throw Error(ErrorKind::kUsage, "--lod-scheme and the options about it count with --lod-error only");
   if (options.error_px && !(*options.error_px > 0.0 && *options.error_px <= 1e9))
     throw Error(ErrorKind::kUsage, fmt::format("--lod-error {}: give pixels above 0", *options.error_px));
-  require_one_of("--lod-rays", options.rays, "all", "occlusion");
-  require_one_of("--lod-cull", options.cull, "frustum", "visible");
   if (options.cull == "visible" && !options.only_occlusion())
     throw Error(ErrorKind::kUsage, "--lod-cull visible needs --lod-rays occlusion: what is visible is known only "
                                    "where camera rays come first");

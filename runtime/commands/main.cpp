@@ -1,3 +1,4 @@
+#include <memory>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -7,6 +8,8 @@
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/compare_command.h"
 #include "runtime/commands/export_command.h"
+#include "runtime/commands/help_commands.h"
+#include "runtime/commands/help_formatter.h"
 #include "runtime/commands/info_command.h"
 #include "runtime/commands/render_command.h"
 
@@ -29,18 +32,22 @@ int main(int argc, char** argv) {
   packtrace::install_interrupt_handlers();
   CLI::App app("packtrace: compact, ray-traceable assets from pbrt-v3 scenes, and ambient occlusion traced over them",
                "packtrace");
-  app.set_version_flag("--version", PACKTRACE_VERSION);
-  app.footer("packtrace VERB --help explains a verb. Of any scene:\n"
+  const std::string version = "packtrace " PACKTRACE_VERSION;
+  app.set_version_flag("-V,--version", version, "Print the version and exit");
+  app.formatter(std::make_shared<packtrace::HelpFormatter>());
+  app.footer("packtrace help VERB explains a verb. For any scene:\n"
              "  packtrace bake scene.pbrt -o scene.ptk\n"
              "  packtrace render scene.ptk -o scene.png\n"
              "Exit codes: 0 ok, 1 internal error, 2 usage, 3 input, 4 unsupported, 5 accuracy or limit exceeded, 6 "
              "I/O, 7 cancelled.");
   packtrace::GlobalOptions globals;
+  packtrace::add_global_options(app, globals);
   packtrace::add_bake_command(app, globals);
   packtrace::add_info_command(app, globals);
   packtrace::add_render_command(app, globals);
   packtrace::add_compare_command(app, globals);
   packtrace::add_export_command(app, globals);
   for (const char* verb : {"measure", "view"}) add_planned_verb(app, globals, verb);
+  packtrace::add_help_commands(app, globals, version);
   return packtrace::run_verbs(app, globals, argc, argv);
 }

@@ -15,13 +15,16 @@
 
 #include "pbrt_import/scene/camera_rays.h"
 #include "pbrt_import/scene/error.h"
+#include "runtime/commands/binary_output.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/image_outputs.h"
 #include "runtime/commands/json_output.h"
 #include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/lod_render.h"
+#include "runtime/commands/option_checks.h"
 #include "runtime/commands/process_usage.h"
 #include "runtime/commands/progress_display.h"
+#include "runtime/commands/render_choices.h"
 #include "runtime/render/renderer.h"
 #include "runtime/stopwatch.h"
 #include "runtime/trace/make_tracer.h"
@@ -37,6 +40,8 @@ struct RenderOptions {
   std::vector<std::string> outputs, aovs;
   std::string camera = "0"; ///< number, or "auto"
   std::string size;
+  std::optional<std::string> background; ///< of .png files; without one, what suits the layer
+  bool no_legend = false;
   uint32_t supersample = 1;
   std::optional<uint32_t> spp, frames;
   bool ground_truth = false, no_denoise = false, fast_edges = false;
@@ -57,7 +62,7 @@ bool parse_number(std::string_view digits, uint32_t& value) {
 
 ImageSize parse_size(const std::string& text) {
   ImageSize size;
-  const size_t cross = text.find('x');
+  const size_t cross = text.find_first_of("xX,");
   if (cross == std::string::npos || !parse_number(std::string_view(text).substr(0, cross), size.width) ||
       !parse_number(std::string_view(text).substr(cross + 1), size.height))
     throw Error(ErrorKind::kUsage, "--size " + text + ": write WIDTHxHEIGHT, for example 1280x720");
@@ -77,6 +82,31 @@ Camera choose_camera(const SceneSource& source, const RenderOptions& options, co
                                                cameras.size() == 1 ? "" : "s"));
   if (!globals.quiet) fmt::print(stderr, "{}: warning: no camera; framing the scene's bounds\n", options.input);
   return framing_camera(source.world_bounds(), size);
+}
+
+/// Why a render is as it is, for -v. The camera and the rest have been chosen by the functions beside this one.
+RenderChoices reasons(const SceneSource& source, const Camera& camera, const RenderOptions& options, bool baked,
+                      const GlobalOptions& globals) {
+  const size_t cameras = source.cameras().size();
+  RenderChoices choices;
+  choices.camera = camera;
+  choices.camera_reason = options.camera == "auto" ? "--camera auto, which frames all of the scene"
+                          : cameras == 0
+                              ? "the scene has none, so all of it is framed"
+                              : fmt::format("number {} of the scene's {}, from 0{}", options.camera, cameras,
+                                            options.camera == "0" && cameras > 1 ? "; --camera takes another" : "");
+  choices.size_reason = options.size.empty() ? (cameras > 0 ? "the camera's film" : "the default") : "--size";
+  choices.radius_reason = options.ao_radius ? "--ao-radius"
+                                            : fmt::format("10 % of the scene's diagonal, {:.5g}",
+                                                          glm::length(source.world_bounds().extent()));
+  choices.backend_reason = options.backend                     ? "--backend"
+                           : !baked                            ? "floats of a .pbrt scene"
+                           : options.bvh || options.fast_edges ? "--bvh and --fast-edges are Embree's"
+                                                               : "a .ptk file's clusters are traced as they are";
+  choices.threads_reason = globals.threads > 0         ? "--threads"
+                           : thread_limit(globals) > 0 ? "PACKTRACE_THREADS"
+                                                       : "all that the machine has";
+  return choices;
 }
 
 RenderConfig make_config(const SceneSource& source, const Camera& camera, const RenderOptions& options) {
@@ -99,12 +129,8 @@ RenderConfig make_config(const SceneSource& source, const Camera& camera, const 
 Backend choose_backend(const RenderOptions& options, bool baked) {
   const bool about_embree = options.bvh || options.fast_edges;
   if (!options.backend) return baked && !about_embree ? Backend::kPacked : Backend::kEmbree;
-  const std::string& name = *options.backend;
+  const std::string& name = *options.backend; // one of those that the option's check knows
   if (name == "embree") return Backend::kEmbree;
-  if (name == "vulkan")
-    throw Error(ErrorKind::kUnsupported, "--backend vulkan is not there yet; use embree, packed or embree-clusters");
-  if (name != "packed" && name != "embree-clusters")
-    throw Error(ErrorKind::kUsage, "--backend " + name + ": there are embree, packed and embree-clusters");
   if (about_embree)
     throw Error(ErrorKind::kUsage, "--bvh and --fast-edges are about Embree's own triangles, for backend embree");
   if (name == "packed") return Backend::kPacked;
@@ -117,8 +143,6 @@ TracerConfig tracer_config(const RenderOptions& options, bool baked) {
   TracerConfig config;
   config.backend = choose_backend(options, baked);
   const std::string quality = options.bvh.value_or("medium");
-  if (quality != "medium" && quality != "high")
-    throw Error(ErrorKind::kUsage, "--bvh " + quality + ": there are medium and high");
   config.embree = {quality == "high" ? BvhQuality::kHigh : BvhQuality::kMedium, !options.fast_edges};
   return config;
 }
@@ -200,23 +224,23 @@ std::string resident_text(const nlohmann::json& resident) {
   return text + ")";
 }
 
-void print(const nlohmann::json& r) {
+void print(std::FILE* stream, const nlohmann::json& r) {
   const auto& seconds = r.at("seconds");
   const auto frames = r.at("frames").get<double>();
-  fmt::print("{}x{} pixels, {} frame{} of {} spp, mean ao {:.4f}\n", r.at("width").get<int>(),
+  fmt::print(stream, "{}x{} pixels, {} frame{} of {} spp, mean ao {:.4f}\n", r.at("width").get<int>(),
              r.at("height").get<int>(), r.at("frames").get<int>(), frames == 1 ? "" : "s", r.at("spp").get<int>(),
              r.at("mean_ao").get<double>());
-  fmt::print("  bvh       {:8.3f} s   {}, {}; {} resident\n", seconds.at("bvh").get<double>(),
+  fmt::print(stream, "  bvh       {:8.3f} s   {}, {}; {} resident\n", seconds.at("bvh").get<double>(),
              r.at("backend").get<std::string>(), r.at("isa").get<std::string>(), resident_text(r.at("resident_bytes")));
-  fmt::print("  primary   {:8.3f} s   {:.1f} Mrays/s\n", seconds.at("primary").get<double>(),
+  fmt::print(stream, "  primary   {:8.3f} s   {:.1f} Mrays/s\n", seconds.at("primary").get<double>(),
              r.at("mrays_per_s").at("primary").get<double>());
-  fmt::print("  ao        {:8.3f} s   {:.1f} Mrays/s\n", seconds.at("ao").get<double>(),
+  fmt::print(stream, "  ao        {:8.3f} s   {:.1f} Mrays/s\n", seconds.at("ao").get<double>(),
              r.at("mrays_per_s").at("ao").get<double>());
   if (r.at("denoise").get<bool>())
-    fmt::print("  denoise   {:8.3f} s   {:.1f} ms a frame\n", seconds.at("denoise").get<double>(),
+    fmt::print(stream, "  denoise   {:8.3f} s   {:.1f} ms a frame\n", seconds.at("denoise").get<double>(),
                seconds.at("denoise").get<double>() * 1e3 / frames);
-  if (r.contains("lod")) fmt::print("{}", detail_text(r.at("lod")));
-  for (const auto& file : r.at("files")) fmt::print("wrote {}\n", file.get<std::string>());
+  if (r.contains("lod")) fmt::print(stream, "{}", detail_text(r.at("lod")));
+  for (const auto& file : r.at("files")) fmt::print(stream, "wrote {}\n", file.get<std::string>());
 }
 
 /// A picture and what it was traced with.
@@ -258,20 +282,34 @@ Traced trace(const RenderOptions& options, const LoadedScene& loaded, const Came
   return traced;
 }
 
+PreviewStyle preview_style(const RenderOptions& options) {
+  PreviewStyle style;
+  if (options.background) style.background = parse_background(*options.background);
+  style.legend = !options.no_legend;
+  return style;
+}
+
 int run(const RenderOptions& options, const GlobalOptions& globals) {
+  if (options.outputs.empty()) fail_without_output("render", options.input, ".png");
   tracer_config(options, false); // complains before the work
   if (!options.size.empty()) parse_size(options.size);
   validate(options.lod);
   JsonOutput json(globals.json, globals.force);
   const bool sees_levels = options.lod.error_px && !options.lod.only_occlusion();
-  ImageOutputs outputs(options.outputs, options.aovs, sees_levels, globals.force); // before the work, like the above
+  ImageOutputs outputs(options.outputs, options.aovs, sees_levels, globals.force,
+                       preview_style(options)); // before the work, like the above
+  if (outputs.to_stdout() && json.to_stdout())
+    throw Error(ErrorKind::kUsage, "-o - and --json - would both go to standard output; give one of them a file");
   if (outputs.show_detail() && !options.lod.error_px)
     throw Error(ErrorKind::kUsage, "layers about levels of detail need --lod-error");
   if (outputs.show_detail() && !sees_levels)
     throw Error(ErrorKind::kUsage, "with --lod-rays occlusion all that is seen is level 0: no layers about detail");
   ProgressDisplay display(globals);
   Progress progress(display.observer());
+  FileTimings timings;
+  const Stopwatch loading;
   const LoadedScene loaded = load_scene(options.input, options.scene, globals, progress, display);
+  timings.load_s = loading.seconds();
   if (options.lod.error_px) require_levels(options.input, loaded);
   const Camera camera = choose_camera(*loaded.source, options, globals);
   const RenderConfig config = make_config(*loaded.source, camera, options);
@@ -280,18 +318,28 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   display.finish();
   const RenderedImage& image = traced.image;
 
+  const Stopwatch writing;
   outputs.write(image, {{"comments", std::string("packtrace render")},
                         {"aoRadius", static_cast<double>(config.ao.radius)},
                         {"aoSpp", static_cast<int>(config.ao.spp)},
                         {"frames", static_cast<int>(config.frames)}});
+  timings.write_s = writing.seconds();
   std::vector<const RayTracer*> tracers;
   for (const std::unique_ptr<RayTracer>& tracer : traced.tracers) tracers.push_back(tracer.get());
   const SceneSource& source = traced.detail ? *traced.detail->source : *loaded.source;
-  const nlohmann::json result = report(options, config, image, source, tracers, traced.detail, outputs.targets());
+  nlohmann::json result = report(options, config, image, source, tracers, traced.detail, outputs.targets());
+  result["seconds"]["load"] = timings.load_s;
+  result["seconds"]["write"] = timings.write_s;
   if (result.at("hit_pixels") == 0 && !globals.quiet)
     fmt::print(stderr, "{}: warning: this camera sees nothing of the scene; try --camera auto\n", options.input);
   if (json.wanted()) json.write(result);
-  if (!json.to_stdout() && !globals.quiet) print(result);
+  if (json.to_stdout() || globals.quiet) return 0;
+  std::FILE* const text = outputs.to_stdout() ? stderr : stdout;
+  print(text, result);
+  if (globals.verbosity > 0)
+    fmt::print(text, "{}",
+               choices_text(reasons(*loaded.source, camera, options, loaded.baked.has_value(), globals), config, loaded,
+                            *tracers.front(), timings));
   return 0;
 }
 
@@ -303,8 +351,9 @@ void add_render_command(CLI::App& app, GlobalOptions& globals) {
                             [options, &globals] { return run(*options, globals); });
   verb.add_option("FILE", options->input, "A .ptk file, or a .pbrt scene to be traced in floats without packing")
       ->required();
-  verb.add_option("-o,--output", options->outputs, "Image to write, .exr or .png; may be repeated")
-      ->required()
+  verb.add_option("-o,--output", options->outputs,
+                  "Image to write, .exr or .png (required); may be repeated, or a list separated by commas; - is a PNG "
+                  "on standard output")
       ->type_name("FILE")
       ->allow_extra_args(false);
   verb.add_option(
@@ -317,7 +366,15 @@ void add_render_command(CLI::App& app, GlobalOptions& globals) {
   verb.add_option("--camera", options->camera,
                   "Which of the scene's cameras, from 0 (the default); auto frames all of the scene")
       ->type_name("I|auto");
-  verb.add_option("--size", options->size, "Image size (default: the scene's film)")->type_name("WxH");
+  verb.add_option("--size", options->size, "Image size, for example 1280x720 (default: the scene's film)")
+      ->type_name("WxH");
+  verb.add_option("--background", options->background,
+                  "What .png files show where nothing is hit: a colour as rrggbb in hexadecimal digits or by its name, "
+                  "transparent, or sky (default: light grey, which no surface has; sky behind albedo and shaded). .exr "
+                  "files keep their values")
+      ->type_name("COLOR");
+  verb.add_flag("--no-legend", options->no_legend,
+                "Leave out the strip of numbers below the .png files of depth, lod and lod-error");
   verb.add_option("--supersample", options->supersample,
                   "Trace at N times the size per axis and filter down (default 1)")
       ->type_name("N");
@@ -338,11 +395,11 @@ void add_render_command(CLI::App& app, GlobalOptions& globals) {
           "--backend", options->backend,
           "What traces the rays: packed (the clusters' own bytes; the default for .ptk files), embree (floats; the\n"
           "default for .pbrt files) or embree-clusters (Embree's tree over packed clusters)")
-      ->type_name("NAME");
+      ->check(one_of({"packed", "embree", "embree-clusters"}));
   verb.add_option(
           "--bvh,--bvh-quality", options->bvh,
           "Embree's tree, and --backend embree: medium (the default), or high (slower to build, faster to trace)")
-      ->type_name("QUALITY");
+      ->check(one_of({"medium", "high"}));
   verb.add_flag(
       "--fast-edges", options->fast_edges,
       "--backend embree up to a fifth faster, but a few rays slip between triangles that touch; --bvh high needs it "
@@ -351,7 +408,8 @@ void add_render_command(CLI::App& app, GlobalOptions& globals) {
   add_scene_options(verb, options->scene);
   verb.footer("Examples:\n"
               "  packtrace render house.ptk -o house.png\n"
-              "  packtrace render house.ptk -o house.png -o house.exr --aov all --supersample 2\n"
+              "  packtrace render house.ptk -o house.png,house.exr --aov all --supersample 2\n"
+              "  packtrace render house.ptk -o - --background transparent | display\n"
               "  packtrace render forest.ptk -o forest.png --lod-error 1 --aov ao,lod\n"
               "  packtrace render scene.pbrt -o truth.exr --ground-truth --spp 1024");
 }

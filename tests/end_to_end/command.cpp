@@ -19,14 +19,14 @@ void write_text(const std::filesystem::path& file, const std::string& text) {
   std::ofstream(file, std::ios::binary) << text;
 }
 
-CommandResult run_packtrace(const std::vector<std::string>& arguments) {
+CommandResult run_program(const std::string& program, const std::vector<std::string>& arguments,
+                          const std::vector<std::string>& environment, const std::filesystem::path& folder) {
   const TemporaryFolder streams;
   const std::string out = streams / "out", err = streams / "err";
+  std::vector<std::string> words{program}, variables = environment;
+  words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
-  std::string program = PACKTRACE_BINARY;
-  argv.push_back(program.data());
-  std::vector<std::string> copies = arguments;
-  for (std::string& argument : copies) argv.push_back(argument.data());
+  for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
 
   const pid_t child = fork();
@@ -36,7 +36,9 @@ CommandResult run_packtrace(const std::vector<std::string>& arguments) {
     const int out_fd = open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
     const int err_fd = open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
     dup2(in_fd, 0), dup2(out_fd, 1), dup2(err_fd, 2);
-    execv(program.c_str(), argv.data());
+    for (std::string& variable : variables) putenv(variable.data());
+    if (!folder.empty() && chdir(folder.c_str()) != 0) _exit(126);
+    execvp(program.c_str(), argv.data());
     _exit(127);
   }
   int status = 0;
@@ -46,6 +48,11 @@ CommandResult run_packtrace(const std::vector<std::string>& arguments) {
   result.out = read_text(out);
   result.err = read_text(err);
   return result;
+}
+
+CommandResult run_packtrace(const std::vector<std::string>& arguments, const std::vector<std::string>& environment,
+                            const std::filesystem::path& folder) {
+  return run_program(PACKTRACE_BINARY, arguments, environment, folder);
 }
 
 std::string small_scene_text() {

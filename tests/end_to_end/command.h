@@ -14,8 +14,16 @@ struct CommandResult {
   std::string err; ///< standard error
 };
 
-/// Runs the packtrace program under test with these arguments, no shell between.
-CommandResult run_packtrace(const std::vector<std::string>& arguments);
+/// Runs a program with these arguments, no shell between and nothing on its standard input.
+/// @param program a path, or a name to be found as a shell finds it
+/// @param environment "NAME=value", added to this process's own
+/// @param folder to run in; empty: this process's
+CommandResult run_program(const std::string& program, const std::vector<std::string>& arguments,
+                          const std::vector<std::string>& environment = {}, const std::filesystem::path& folder = {});
+
+/// run_program() of the packtrace program under test.
+CommandResult run_packtrace(const std::vector<std::string>& arguments, const std::vector<std::string>& environment = {},
+                            const std::filesystem::path& folder = {});
 
 std::string read_text(const std::filesystem::path& file);
 void write_text(const std::filesystem::path& file, const std::string& text);

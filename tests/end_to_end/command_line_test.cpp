@@ -36,7 +36,7 @@ TEST(CommandLine, UnknownOptionIsAUsageErrorThatNamesTheNearestOne) {
   EXPECT_NE(result.err.find("packtrace: error: --suprsample: no such option; did you mean --supersample?"),
             std::string::npos)
       << result.err;
-  EXPECT_NE(run_packtrace({"info", "x.ptk", "y.ptk"}).err.find("y.ptk: one argument too many"), std::string::npos);
+  EXPECT_NE(run_packtrace({"bake", "x.pbrt", "y.pbrt"}).err.find("y.pbrt: one argument too many"), std::string::npos);
 }
 
 TEST(CommandLine, OtherFilesThanScenesAreNamedForWhatTheyAre) {
@@ -79,7 +79,8 @@ TEST(CommandLine, MissingInputIsAnInputErrorThatNamesTheFile) {
   for (const char* name : {"none.pbrt", "none.ptk"}) {
     for (const char* verb : {"info", "render", "bake"}) {
       std::vector<std::string> arguments = {verb, directory / name};
-      if (arguments[0] != "info") arguments.insert(arguments.end(), {"-o", directory / "out.png"});
+      if (arguments[0] != "info")
+        arguments.insert(arguments.end(), {"-o", directory / (arguments[0] == "bake" ? "out.ptk" : "out.png")});
       const CommandResult result = run_packtrace(arguments);
       EXPECT_EQ(result.exit_code, 3) << verb << ' ' << name << '\n' << result.err;
       EXPECT_NE(result.err.find(name), std::string::npos) << result.err;

@@ -1,0 +1,50 @@
+#include "runtime/commands/binary_output.h"
+
+#include <cstdio>
+#include <filesystem>
+
+#include <unistd.h>
+
+#include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/file_bytes.h"
+#include "runtime/commands/option_checks.h"
+
+namespace packtrace {
+
+BinaryOutput::BinaryOutput(const std::string& target, bool force, const JsonOutput& json) {
+  if (target != "-") {
+    file_.emplace(target, force);
+    return;
+  }
+  if (json.to_stdout())
+    throw Error(ErrorKind::kUsage, "-o - and --json - would both go to standard output; give one of them a file");
+  refuse_terminal("a binary file");
+}
+
+void BinaryOutput::write(std::span<const std::byte> bytes) {
+  if (file_) {
+    write_file_bytes(file_->path(), bytes);
+    file_->commit();
+  } else {
+    write_standard_output(bytes);
+  }
+}
+
+void write_standard_output(std::span<const std::byte> bytes) {
+  if (std::fwrite(bytes.data(), 1, bytes.size(), stdout) != bytes.size() || std::fflush(stdout) != 0)
+    throw Error(ErrorKind::kIo, "cannot write to standard output");
+}
+
+void refuse_terminal(const std::string& what) {
+  if (isatty(STDOUT_FILENO) != 0)
+    throw Error(ErrorKind::kUsage,
+                "-o - would write " + what + " to the terminal; redirect standard output, or give a file");
+}
+
+void fail_without_output(const std::string& verb, const std::string& input, const std::string& ending) {
+  const std::string output = std::filesystem::path(input).stem().string() + ending;
+  throw Error(ErrorKind::kUsage, verb + " needs -o FILE, for example: packtrace " + verb + " " + shell_word(input) +
+                                     " -o " + shell_word(output));
+}
+
+} // namespace packtrace

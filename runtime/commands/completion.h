@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "runtime/commands/option_list.h"
+
+namespace packtrace {
+
+/// The shells that completion_script() knows.
+const std::vector<std::string>& completion_shells();
+
+/// A script for bash, zsh or fish that completes verbs, options, their values and files.
+/// Throws Error(kUsage) for other shells.
+std::string completion_script(const ProgramEntry& program, std::string_view shell);
+
+} // namespace packtrace

@@ -1,0 +1,61 @@
+#include "runtime/commands/help_commands.h"
+
+#include <functional>
+#include <memory>
+#include <utility>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "runtime/commands/cli_support.h"
+#include "runtime/commands/completion.h"
+#include "runtime/commands/man_page.h"
+#include "runtime/commands/option_checks.h"
+#include "runtime/commands/option_list.h"
+
+namespace packtrace {
+namespace {
+
+/// A verb without the options that only make sense for work on files.
+CLI::App& add_plain_verb(CLI::App& app, GlobalOptions& globals, const char* name, const char* description,
+                         std::function<void()> print) {
+  CLI::App& verb = *app.add_subcommand(name, description)->group("About packtrace");
+  verb.callback([&globals, print = std::move(print)] {
+    globals.action = [print] {
+      print();
+      return 0;
+    };
+  });
+  return verb;
+}
+
+} // namespace
+
+void add_help_commands(CLI::App& app, GlobalOptions& globals, const std::string& version) {
+  const auto topic = std::make_shared<std::string>(), shell = std::make_shared<std::string>();
+  CLI::App& help = add_plain_verb(app, globals, "help", "Explain packtrace, or one of its verbs", [&app, topic] {
+    fmt::print("{}", topic->empty() ? app.help() : find_verb(app, *topic)->help(app.get_name()));
+  });
+  add_plain_verb(app, globals, "version", "Print the version", [version] { fmt::print("{}\n", version); });
+  CLI::App& completion =
+      add_plain_verb(app, globals, "completion", "Print a script that completes packtrace's options in a shell",
+                     [&app, shell] { fmt::print("{}", completion_script(list_options(app), *shell)); });
+  completion.add_option("SHELL", *shell, "The shell")->required()->check(one_of(completion_shells()));
+  completion.footer("Examples:\n"
+                    "  packtrace completion bash > ~/.local/share/bash-completion/completions/packtrace\n"
+                    "  packtrace completion zsh > \"${fpath[1]}/_packtrace\"\n"
+                    "  packtrace completion fish > ~/.config/fish/completions/packtrace.fish\n"
+                    "or for this shell alone:\n"
+                    "  source <(packtrace completion bash)");
+  add_plain_verb(app, globals, "man", "Print the manual page",
+                 [&app, version] { fmt::print("{}", man_page(list_options(app), version)); })
+      .footer("Examples:\n"
+              "  packtrace man | man -l -\n"
+              "  packtrace man > ~/.local/share/man/man1/packtrace.1");
+  std::vector<std::string> verbs;
+  for (const CLI::App* verb : app.get_subcommands([](CLI::App* known) { return !known->get_group().empty(); }))
+    verbs.push_back(verb->get_name());
+  help.add_option("VERB", *topic, "The verb to explain")->check(one_of(verbs));
+}
+
+} // namespace packtrace

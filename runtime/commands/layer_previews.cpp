@@ -1,0 +1,75 @@
+#include "runtime/commands/layer_previews.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "runtime/image/false_color.h"
+#include "runtime/image/legend.h"
+
+namespace packtrace {
+namespace {
+
+/// Linear colours with the sRGB transfer.
+Image display_picture(ImageSize size, const std::vector<Vec3>& linear) {
+  Image picture(size, 3);
+  for (size_t i = 0; i < linear.size(); ++i)
+    for (int k = 0; k < 3; ++k)
+      picture.data[3 * i + static_cast<size_t>(k)] = srgb_from_linear(std::clamp(linear[i][k], 0.0f, 1.0f));
+  return picture;
+}
+
+/// A layer without what stands behind it.
+Image plain_preview(const RenderedImage& image, const std::string& aov) {
+  if (aov == "ao") return ao_preview(image.size, image.ao);
+  if (aov == "ao_raw") return ao_preview(image.size, image.ao_raw);
+  if (aov == "depth") return depth_preview(image.size, image.depth);
+  if (aov == "normal") return normal_preview(image.size, image.normal);
+  if (aov == "instance") return id_preview(image.size, image.instance);
+  if (aov == "lod") return level_preview(image.size, image.lod, image.cluster, image.ao);
+  if (aov == "lod-error") return heat_map(image.size, image.lod_error, static_cast<float>(image.lod_error_px));
+  return display_picture(image.size, aov == "albedo" ? image.albedo : image.shaded);
+}
+
+Legend depth_legend(const RenderedImage& image) {
+  const DepthRange range = depth_preview_range(image.depth);
+  const double ratio =
+      range.nearest > 0.0f ? static_cast<double>(range.farthest) / static_cast<double>(range.nearest) : 1;
+  return {"depth, scene units", depth_preview_color, even_ticks([&](float t) {
+            return static_cast<double>(range.nearest) * std::pow(ratio, static_cast<double>(t));
+          })};
+}
+
+Legend level_legend(const RenderedImage& image) {
+  uint32_t coarsest = 0;
+  for (size_t i = 0; i < image.lod.size(); ++i)
+    if (image.coverage[i] > 0.0f) coarsest = std::max(coarsest, image.lod[i]);
+  constexpr uint32_t kLastColor = 8; // of level_color()
+  std::vector<std::pair<Vec3, std::string>> bands;
+  for (uint32_t level = 0; level <= std::min(coarsest, kLastColor); ++level)
+    bands.emplace_back(level_color(level), level < kLastColor ? std::to_string(level) : "8+");
+  return banded_legend("level of detail, 0 is the finest", bands);
+}
+
+Legend error_legend(const RenderedImage& image) {
+  return {"bound of the error, pixels", heat_color,
+          even_ticks([&](float t) { return image.lod_error_px * static_cast<double>(t); })};
+}
+
+} // namespace
+
+Image layer_preview(const RenderedImage& image, const std::string& aov, const PreviewStyle& style) {
+  const bool picture = aov == "albedo" || aov == "shaded";
+  const Background usual =
+      picture ? Background{Background::Kind::kSky, Vec3(0)} : Background{Background::Kind::kColor, kDefaultBackground};
+  Image preview = over_background(plain_preview(image, aov), image.coverage, style.background.value_or(usual));
+  if (!style.legend) return preview;
+  if (aov == "depth") return with_legend(preview, depth_legend(image));
+  if (aov == "lod") return with_legend(preview, level_legend(image));
+  if (aov == "lod-error") return with_legend(preview, error_legend(image));
+  return preview;
+}
+
+} // namespace packtrace

@@ -1,0 +1,134 @@
+// What shells complete and the manual page says, against what --help lists.
+
+#include <cstdlib>
+#include <regex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/end_to_end/workbench.h"
+
+namespace packtrace::test {
+namespace {
+
+const std::vector<std::string> kVerbs{"bake", "info",    "render",     "compare", "export",
+                                      "help", "version", "completion", "man"};
+
+/// Short and long options that a verb's help lists at the start of a line.
+std::set<std::string> options_of(const std::string& verb) {
+  const std::string help = run_packtrace({verb, "--help"}).out;
+  std::set<std::string> options;
+  const std::regex line("\n  (-[^ ]+)"), name("--?[a-zA-Z][a-zA-Z0-9-]*");
+  for (std::sregex_iterator found(help.begin(), help.end(), line), end; found != end; ++found) {
+    const std::string names = (*found)[1];
+    for (std::sregex_iterator option(names.begin(), names.end(), name); option != end; ++option)
+      options.insert(option->str());
+  }
+  EXPECT_TRUE(options.contains("--help")) << help;
+  return options;
+}
+
+bool is_installed(const std::string& program) {
+  return run_program("sh", {"-c", "command -v " + program}).exit_code == 0;
+}
+
+/// The part of a text from one marker to another.
+std::string between(const std::string& text, const std::string& from, const std::string& to) {
+  const size_t begin = text.find(from);
+  if (begin == std::string::npos) return {};
+  return text.substr(begin, text.find(to, begin + from.size()) - begin);
+}
+
+TEST(Completion, BashKnowsEachOptionOfEachVerb) {
+  const std::string script = run_packtrace({"completion", "bash"}).out;
+  for (const std::string& verb : kVerbs) {
+    const std::string part = between(script, "\n    " + verb + ")\n", "fi ;;\n");
+    for (const std::string& option : options_of(verb))
+      EXPECT_TRUE(std::regex_search(part, std::regex("[\" ]" + option + "[\" ]"))) << verb << ' ' << option;
+  }
+}
+
+TEST(Completion, ZshKnowsEachOptionOfEachVerb) {
+  const std::string script = run_packtrace({"completion", "zsh"}).out;
+  for (const std::string& verb : kVerbs) {
+    const std::string part = between(script, "\n      " + verb + ") _arguments", " ;;\n");
+    for (const std::string& option : options_of(verb))
+      EXPECT_TRUE(std::regex_search(part, std::regex("'\\*?" + option + "[+=-]*\\["))) << verb << ' ' << option;
+  }
+}
+
+TEST(Completion, FishKnowsEachOptionOfEachVerb) {
+  const std::string script = run_packtrace({"completion", "fish"}).out;
+  for (const std::string& verb : kVerbs)
+    for (const std::string& option : options_of(verb)) {
+      const std::string flag = option.starts_with("--") ? " -l " + option.substr(2) : " -s " + option.substr(1);
+      EXPECT_TRUE(std::regex_search(script, std::regex("seen_subcommand_from " + verb + "'[^\n]*" + flag + "[ \n]")))
+          << verb << ' ' << option;
+    }
+}
+
+TEST(Completion, TheManualPageHasEachOptionOfEachVerb) {
+  std::string page = run_packtrace({"man"}).out;
+  page = std::regex_replace(page, std::regex("\\\\-"), "-");
+  for (const std::string& verb : kVerbs) {
+    const std::string part = between(page, ".SS " + verb + "\n", ".SS ") + between(page, ".SH OPTIONS", ".SH VERBS");
+    for (const std::string& option : options_of(verb))
+      EXPECT_NE(part.find("\\fB" + option + "\\fR"), std::string::npos) << verb << ' ' << option;
+  }
+}
+
+TEST(Completion, ScriptsAndPageAreAcceptedByWhatReadsThem) {
+  const TemporaryFolder folder;
+  for (const char* shell : {"bash", "zsh", "fish"}) {
+    const std::string script = folder / shell;
+    write_text(script, run_packtrace({"completion", shell}).out);
+    if (!is_installed(shell)) continue;
+    const CommandResult checked = run_program(shell, {"-n", script});
+    EXPECT_EQ(checked.exit_code, 0) << shell << ": " << checked.err;
+    EXPECT_EQ(checked.err, "") << shell;
+  }
+  const std::string page = folder / "packtrace.1";
+  write_text(page, run_packtrace({"man"}).out);
+  if (is_installed("mandoc")) {
+    const CommandResult checked = run_program("mandoc", {"-T", "lint", "-W", "warning", page});
+    EXPECT_EQ(checked.exit_code, 0) << checked.out << checked.err;
+  }
+  if (is_installed("groff")) {
+    const CommandResult checked = run_program("groff", {"-man", "-ww", "-z", page});
+    EXPECT_EQ(checked.exit_code, 0);
+    EXPECT_EQ(checked.err, "");
+  }
+}
+
+/// What bash offers for the last of the words.
+std::string bash_offers(const std::string& words, const std::filesystem::path& folder) {
+  const std::string script = R"(
+    source <("$0" completion bash)
+    COMP_WORDS=()" + words + R"()
+    COMP_CWORD=$((${#COMP_WORDS[@]} - 1))
+    _packtrace
+    printf '%s\n' "${COMPREPLY[@]}")";
+  return run_program("bash", {"-c", script, PACKTRACE_BINARY}, {}, folder).out;
+}
+
+TEST(Completion, BashOffersVerbsValuesAndFiles) {
+  const Workbench bench;
+  EXPECT_EQ(bash_offers("packtrace ren", bench.path()), "render\n");
+  EXPECT_EQ(bash_offers("packtrace -q exp", bench.path()), "export\n");
+  EXPECT_EQ(bash_offers("packtrace bake --cod", bench.path()), "--codec\n");
+  EXPECT_EQ(bash_offers("packtrace bake --codec s", bench.path()), "small\n");
+  EXPECT_EQ(bash_offers("packtrace bake --codec = f", bench.path()), "fast\n");
+  EXPECT_EQ(bash_offers("packtrace bake sm", bench.path()), "small.pbrt\n");
+  EXPECT_EQ(bash_offers("packtrace completion z", bench.path()), "zsh\n");
+  EXPECT_EQ(bash_offers("packtrace render --frames 1", bench.path()), "\n") << "any number";
+}
+
+TEST(Completion, UnknownShellsAreRefused) {
+  EXPECT_EQ(run_packtrace({"completion"}).exit_code, 2);
+  EXPECT_EQ(run_packtrace({"completion", "tcsh"}).exit_code, 2);
+}
+
+} // namespace
+} // namespace packtrace::test
