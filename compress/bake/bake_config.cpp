@@ -5,13 +5,15 @@
 #include <limits>
 #include <string>
 
+#include "compress/bake/angle.h"
 #include "pbrt_import/scene/error.h"
 
 namespace packtrace {
 
 namespace {
 
-constexpr double kMaxFlatDegrees = 0.1;
+constexpr double kMaxFlatDegrees = 0.1;     // where an error is stated
+constexpr double kShareOfTilt = 1.0 / 12.0; // of the angle that a step makes over an edge
 
 void require(bool ok, const char* what, const char* range) {
   if (!ok) throw Error(ErrorKind::kUsage, std::string(what) + " out of range: " + range);
@@ -40,18 +42,25 @@ void validate_precision(PrecisionKind kind, double precision) {
 void BakeConfig::validate() const {
   validate_precision(precision_kind, precision);
   require(purpose < baked::kPurposeCount, "purpose", "ao or shading");
-  require(normal_error_degrees >= 0.0025 && normal_error_degrees <= 10.0, "normal error",
-          "degrees must be .0025 .. 10");
+  if (normal_error_degrees)
+    require(*normal_error_degrees >= 0.0025 && *normal_error_degrees <= 10.0, "normal error",
+            "degrees must be 0.0025 .. 10");
   if (textures && purpose != baked::kShading)
     throw Error(ErrorKind::kUsage, "textures are for shading; for ambient occlusion nothing looks at them");
   require(min_texture_psnr_db >= 10.0 && min_texture_psnr_db <= 100.0, "texture PSNR", "dB must be 10 .. 100");
   require(lod_levels >= 1 && lod_levels < baked::kMaxLodLevels, "levels of detail", "1 .. 31");
 }
 
-double BakeConfig::max_normal_error_degrees() const {
-  return normals ? format_of(*normals).max_error_degrees : normal_error_degrees;
+NormalLimits BakeConfig::normal_limits(double step_per_edge) const {
+  const auto stated = [](double error) { return NormalLimits{error, std::min(kMaxFlatDegrees, error)}; };
+  if (normals) return stated(format_of(*normals).max_error_degrees);
+  if (normal_error_degrees) return stated(*normal_error_degrees);
+  NormalLimits limits = stated(kDefaultNormalError);
+  if (step_per_edge > kRoughEdge) {
+    const double deserved = std::atan(step_per_edge) * kDegreesPerRadian * kShareOfTilt;
+    limits = {std::max(limits.error_degrees, deserved), std::max(limits.flat_degrees, deserved)};
+  }
+  return limits;
 }
-
-double BakeConfig::flat_degrees() const { return std::min(kMaxFlatDegrees, max_normal_error_degrees()); }
 
 } // namespace packtrace

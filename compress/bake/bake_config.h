@@ -28,6 +28,19 @@ enum class LodUse : uint32_t {
   kAll
 };
 
+/// Steps of more than this fraction of an edge show: surfaces look rough.
+inline constexpr double kRoughEdge = 1.0 / 8.0;
+
+/// In degrees; what axis24 keeps for every direction. Shading from such normals differs by less than a thousandth.
+inline constexpr double kDefaultNormalError = 0.04;
+
+/// What the normals of one geometry may lose.
+struct NormalLimits {
+  double error_degrees = kDefaultNormalError; ///< largest angle between a normal of the source and what is decoded
+  /// Triangles whose three normals are all this close to the decoded face's normal, or to its opposite, store none.
+  double flat_degrees = kDefaultNormalError;
+};
+
 /// Everything a user can choose about a bake.
 struct BakeConfig {
   PrecisionKind precision_kind = PrecisionKind::kEdgeFraction;
@@ -36,16 +49,17 @@ struct BakeConfig {
   double precision = 1.0 / 128.0;
 
   /// Of every geometry; without one, each geometry gets the axis encoding of the fewest bits whose largest error,
-  /// measured over its own normals, is at most normal_error_degrees.
+  /// measured over its own normals, is within its normal_limits().
   std::optional<NormalEncoding> normals;
-  /// What axis24 keeps for every direction: shading from such normals differs by less than a thousandth. .0025 .. 10;
-  /// without meaning where `normals` is given.
-  double normal_error_degrees = 0.04;
+  /// Largest angle that a choice of encodings allows, .0025 .. 10 degrees; without one normal_limits() says it. Without
+  /// meaning where `normals` is given.
+  std::optional<double> normal_error_degrees;
 
-  /// The largest angle between a normal of the source and what is decoded.
-  double max_normal_error_degrees() const;
-  /// Triangles whose three normals are all this close to the decoded face's normal, or to its opposite, store none.
-  double flat_degrees() const;
+  /// Limits for a geometry's normals. A stated encoding or error is kept as it is. Else the error is
+  /// kDefaultNormalError, and where the step is above kRoughEdge of the median edge a twelfth of the angle that a step
+  /// makes over that edge, if that is more: there faces tilt by several degrees.
+  /// @param step_per_edge the grid's step over the geometry's median edge; infinite where that is 0
+  NormalLimits normal_limits(double step_per_edge) const;
 
   /// What the file is to be good for: streams that it does not need are left out.
   baked::Purpose purpose = baked::kAo;
@@ -73,8 +87,8 @@ struct BakeConfig {
   uint32_t lod_min_triangles = 128; ///< geometries of fewer get no levels
   uint32_t lod_levels = 31;         ///< above the source's, at most; 1..31
 
-  /// A folder for finished levels of detail, which an interrupted bake finds there when it is started again; bake_scene()
-  /// removes them in the end. Empty: none. Changes no byte of the file.
+  /// A folder for finished levels of detail, which an interrupted bake finds there when it is started again;
+  /// bake_scene() removes them in the end. Empty: none. Changes no byte of the file.
   std::filesystem::path resume;
 
   /// Throws Error(kUsage) if a value is out of its range. Nothing is ever clamped.

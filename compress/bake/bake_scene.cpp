@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <optional>
 
 #include <tbb/parallel_for.h>
@@ -15,6 +16,7 @@
 #include "compress/bake/lod/lod_encoder.h"
 #include "compress/bake/lod/lod_store.h"
 #include "compress/bake/lod/shared_borders.h"
+#include "compress/bake/material_runs.h"
 #include "compress/bake/nested_grids.h"
 #include "compress/bake/page_encoder.h"
 #include "compress/bake/requirement_table.h"
@@ -32,8 +34,18 @@ namespace {
 /// Triangles that building levels of a geometry works through, as a multiple of its own: every level has half.
 constexpr uint64_t kLodWork = 2;
 
+/// Of the source's area: collapsed triangles of more are worth a warning.
+constexpr double kVisibleAreaShare = 1e-3;
+
 double mean_normal_error(const QuantizeStats& stats) {
   return stats.normal_count > 0 ? stats.normal_error_sum / static_cast<double>(stats.normal_count) : 0.0;
+}
+
+/// About the factor by which an instance scales areas: exact where it stretches all directions alike.
+double area_scale(const baked::InstanceRecord& instance) {
+  const auto& m = instance.world_from_object;
+  const DVec3 x(m[0], m[1], m[2]), y(m[3], m[4], m[5]), z(m[6], m[7], m[8]);
+  return std::pow(std::abs(glm::dot(glm::cross(x, y), z)), 2.0 / 3.0);
 }
 
 class Baker {
@@ -65,6 +77,7 @@ private:
     baked::GeometryRecord record{};
     EncodedGeometry encoded;
     QuantizeStats stats;
+    std::vector<uint32_t> slots; ///< of the plan that have triangles left
     GeometryNeeds needs;
     EncodedLod lod;
 
@@ -73,6 +86,7 @@ private:
 
   std::vector<std::byte> assemble() {
     progress_.begin("assembling the file", 0);
+    close_slots();
     FileSections sections(scene_, textures_);
     RequirementTable requirements;
     for (size_t i = 0; i < packed_.size(); ++i) {
@@ -95,6 +109,13 @@ private:
     }
     add_up();
     return sections.assemble(summary(sections));
+  }
+
+  /// Takes slots without triangles out of the plan, as the packed geometries have none.
+  void close_slots() {
+    std::vector<std::vector<uint32_t>> left;
+    for (Packed& packed : packed_) left.push_back(std::move(packed.slots));
+    close_material_slots(plan_, left);
   }
 
   void measure() {
@@ -122,7 +143,7 @@ private:
       grids_[i].exponent -= static_cast<int32_t>(halvings[i]);
       report_.nested_geometries += halvings[i] > 0;
       const double step = grids_[i].step();
-      coarse += measures_[i].median_edge > 0.0 && step > measures_[i].median_edge / 8.0;
+      coarse += measures_[i].median_edge > 0.0 && step > measures_[i].median_edge * kRoughEdge;
       far += measures_[i].max_abs() * 0x1p-23 > step;
     }
     if (coarse > 0)
@@ -212,7 +233,7 @@ private:
     tbb::parallel_for(size_t{0}, packed_.size(), [&](size_t i) {
       progress_.check_cancelled();
       packed_[i] = pack_one(i);
-      progress_.advance(packed_[i].encoded.triangle_count);
+      progress_.advance(triangles_of(i));
     });
   }
 
@@ -268,7 +289,7 @@ private:
     needs.infer_normals = false;
     if (mixed)
       if (Draft other = pack_with(index, needs); other.packed.bytes() < draft.packed.bytes()) draft = std::move(other);
-    if (lod_wanted_[index] != 0) {
+    if (lod_wanted_[index] != 0 && draft.quantized.triangles.size() >= config_.lod_min_triangles) {
       LodLimits limits{config_.lod_levels + 1, {}};
       if (plan_.geometries[index].world_space) limits.locked = shared_borders_.locks(draft.quantized);
       draft.packed.lod = find_or_build_lod(draft.quantized, draft.clusters, limits);
@@ -293,9 +314,7 @@ private:
   }
 
   QuantizedGeometry quantize(size_t index, const GeometryNeeds& needs) const {
-    const GeometryMeasure& measure = measures_[index];
-    return quantize_geometry(scene_, plan_.geometries[index], needs, config_, grids_[index], measure.max_abs(),
-                             measure.bounds.lo, measure.bounds.hi);
+    return quantize_geometry(scene_, plan_.geometries[index], needs, config_, grids_[index], measures_[index]);
   }
 
   Draft pack_with(size_t index, const GeometryNeeds& needs) const {
@@ -308,6 +327,7 @@ private:
     draft.packed = {record_of(plan, q, position_error_bound(q.grid.step(), measure.max_abs())),
                     encode_geometry(q, draft.clusters),
                     q.stats,
+                    q.slots,
                     needs,
                     {}};
     return draft;
@@ -328,7 +348,7 @@ private:
     record.mean_normal_error_degrees = static_cast<float>(mean_normal_error(q.stats));
     record.max_uv_error = static_cast<float>(q.stats.max_uv_error);
     record.flags = plan.world_space ? baked::kWorldSpace : 0;
-    record.slot_count = static_cast<uint32_t>(plan.slot_class.size());
+    record.slot_count = static_cast<uint32_t>(q.slot_class.size());
     return record;
   }
 
@@ -355,6 +375,9 @@ private:
       report_.source_vertices += s.source_vertices;
       report_.merged_vertices += s.source_vertices - std::min(s.distinct_vertices, s.source_vertices);
       report_.collapsed_triangles += s.collapsed_triangles;
+      report_.coinciding_triangles += s.coinciding_triangles;
+      report_.vanished_geometries += s.collapsed_triangles > 0 &&
+                                     std::all_of(s.left.begin(), s.left.end(), [](uint64_t left) { return left == 0; });
       report_.max_position_error = std::max(report_.max_position_error, s.max_position_error);
       report_.max_normal_error_degrees = std::max(report_.max_normal_error_degrees, s.max_normal_error_degrees);
       report_.max_uv_error = std::max(report_.max_uv_error, s.max_uv_error);
@@ -380,12 +403,26 @@ private:
     if (coarse_uvs > 0)
       warn("texture coordinates of " + std::to_string(coarse_uvs) + " geometries are up to " +
            brief(report_.max_uv_error_texels) + " texels off; without an encoding of your own they stay within 1/32");
-    if (report_.collapsed_triangles > 0)
-      warn(std::to_string(report_.collapsed_triangles) +
-           " triangles are smaller than the grid's step and have no area");
+    add_up_areas();
     if (plan_.unused_objects > 0)
       warn(std::to_string(plan_.unused_objects) + " objects with " + std::to_string(plan_.unused_triangles) +
            " triangles are never instanced and not stored");
+  }
+
+  void add_up_areas() {
+    for (const baked::InstanceRecord& instance : plan_.instances) {
+      const QuantizeStats& stats = packed_[instance.geometry].stats;
+      const double scale = area_scale(instance);
+      report_.source_area += scale * stats.source_area;
+      report_.collapsed_area += scale * stats.collapsed_area;
+    }
+    if (report_.collapsed_area > kVisibleAreaShare * report_.source_area)
+      warn(std::to_string(report_.collapsed_triangles) + " triangles with " +
+           brief(100.0 * report_.collapsed_area / report_.source_area) +
+           " % of the area are too small or thin for the grid's step and are left out; a finer precision keeps them");
+    if (report_.vanished_geometries > 0)
+      warn("nothing is left of " + std::to_string(report_.vanished_geometries) +
+           " geometries, as all of their triangles are too small or thin for the grid's step");
   }
 
   baked::SummaryRecord summary(const FileSections& sections) const {
@@ -407,6 +444,9 @@ private:
       s.world_step_mantissa = world_grid_.mantissa, s.world_step_exponent = world_grid_.exponent;
     const ClusterView::StreamBits& bits = sections.stream_bits();
     s.left_out = report_.left_out;
+    s.coinciding_triangles = report_.coinciding_triangles;
+    s.source_area = report_.source_area;
+    s.collapsed_area = report_.collapsed_area;
     s.stream_bits = {bits.indices, bits.positions, bits.normals, bits.uvs};
     return s;
   }

@@ -17,15 +17,19 @@ namespace packtrace {
 /// What a bake did. `file` is what summarize() says of the written file.
 struct BakeReport {
   FileSummary file;
-  uint64_t source_triangles = 0;    ///< of the scene, unused objects included
-  uint64_t source_vertices = 0;     ///< of what is stored
-  uint64_t merged_vertices = 0;     ///< equal after quantisation to another one of their geometry
-  uint64_t collapsed_triangles = 0; ///< kept, though two of their corners fell on one lattice point
-  uint64_t shared_shapes = 0;       ///< shapes outside objects that use another's geometry
-  uint64_t instanced_shapes = 0;    ///< shapes outside objects that lie on a grid of their own as they share a geometry
-  uint64_t touching_instances = 0;  ///< on grids of their own, in boxes that touch other geometry's
-  uint64_t shared_objects = 0;      ///< objects that use another's geometry
-  uint64_t unused_objects = 0;      ///< never instanced; not stored
+  uint64_t source_triangles = 0;     ///< of the scene, unused objects included
+  uint64_t source_vertices = 0;      ///< of what is stored
+  uint64_t merged_vertices = 0;      ///< equal after quantisation to another one of their geometry
+  uint64_t collapsed_triangles = 0;  ///< left out, as they have no area on their grid
+  uint64_t coinciding_triangles = 0; ///< left out, as quantisation made them equal to another one
+  uint64_t vanished_geometries = 0;  ///< of which no triangle is left
+  double source_area = 0.0;        ///< of all placed triangles, world units squared; where an instance stretches, about
+  double collapsed_area = 0.0;     ///< of collapsed_triangles, in the source, likewise
+  uint64_t shared_shapes = 0;      ///< shapes outside objects that use another's geometry
+  uint64_t instanced_shapes = 0;   ///< shapes outside objects that lie on a grid of their own as they share a geometry
+  uint64_t touching_instances = 0; ///< on grids of their own, in boxes that touch other geometry's
+  uint64_t shared_objects = 0;     ///< objects that use another's geometry
+  uint64_t unused_objects = 0;     ///< never instanced; not stored
   uint64_t unused_triangles = 0;
   uint64_t left_out = 0;   ///< shapes and instances that leave the float range; each is in the diagnostics
   double world_step = 0.0; ///< 0: no world-space geometry

@@ -15,9 +15,8 @@
 namespace packtrace {
 namespace {
 
-constexpr double kRoughEdge = 1.0 / 8.0; // steps of more than this fraction of an edge show
-constexpr double kRoughFactor = 16.0;    // the same, of what was asked for
-constexpr double kFloatStep = 0x1p-23;   // finer than floats are at the same coordinate: no use
+constexpr double kRoughFactor = 16.0;  // steps so much above what was asked for show, too
+constexpr double kFloatStep = 0x1p-23; // finer than floats are at the same coordinate: no use
 constexpr double kMaxHalvings = 1000.0;
 constexpr double kMaxSteps = 0x1p50; // coordinates stay well inside the lattice
 

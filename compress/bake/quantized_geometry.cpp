@@ -12,7 +12,9 @@
 
 #include "compress/bake/angle.h"
 #include "compress/bake/brief.h"
+#include "compress/bake/coinciding_triangles.h"
 #include "compress/bake/weld_table.h"
+#include "compress/bake/welded_surface.h"
 #include "compress/format/normal_codec.h"
 #include "pbrt_import/scene/error.h"
 
@@ -61,16 +63,18 @@ DVec3 safe_normalize(DVec3 v) {
 class Quantizer {
 public:
   Quantizer(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs, const BakeConfig& config,
-            const PositionGrid& grid)
-      : scene_(scene), plan_(plan), needs_(needs), config_(config), step_(grid.step()),
-        position_table_(count_vertices()), vertex_table_(2 * count_vertices()) {
+            const PositionGrid& grid, const GeometryMeasure& measure)
+      : scene_(scene), plan_(plan), needs_(needs), config_(config), source_(scene, plan), measure_(measure),
+        step_(grid.step()), limits_(config.normal_limits(step_ / measure.median_edge)),
+        vertex_table_(2 * count_vertices()) {
     out_.grid = grid;
-    out_.slot_class = plan.slot_class;
     out_.uv_encoding = config.uvs.value_or(UvEncoding::kLattice);
     if (out_.uv_encoding == UvEncoding::kLattice) out_.uv_exponent = needs.uv_exponent;
   }
 
-  QuantizedGeometry run(double max_abs, DVec3 lowest, DVec3 highest) {
+  QuantizedGeometry run() {
+    const double max_abs = measure_.max_abs();
+    const DVec3 lowest = measure_.bounds.lo, highest = measure_.bounds.hi;
     check_limits(max_abs);
     for (int axis = 0; axis < 3 && lowest[axis] <= highest[axis]; ++axis) {
       // Quantisation is monotone, so the box's corners become the smallest and largest coordinates.
@@ -79,16 +83,30 @@ public:
       const auto bits = static_cast<uint32_t>(std::bit_width(static_cast<uint64_t>(hi - lo)));
       out_.anchor_shift = std::max(out_.anchor_shift, bits > 31 ? bits - 31 : 0u);
     }
-    std::vector<Work> parts;
-    for (size_t i = 0; i < plan_.parts.size(); ++i) parts.push_back(quantize_part(plan_.parts[i], needs_.parts[i]));
+    std::vector<LatticePart> lattice;
+    for (const GeometryPart& part : plan_.parts) lattice.push_back(place_on_lattice(part));
+    surface_ = weld_surface(scene_, plan_, lattice);
+    std::vector<Work> parts(plan_.parts.size());
+    size_t first_triangle = 0;
+    for (size_t i = 0; i < parts.size(); ++i) {
+      parts[i] = quantize_part(i, std::move(lattice[i]), first_triangle);
+      first_triangle += parts[i].triangles.size();
+    }
     out_.normal_encoding = config_.normals ? *config_.normals : choose_normal_encoding(parts);
-    for (size_t i = 0; i < plan_.parts.size(); ++i) {
+    CoincidingTriangles coinciding(source_, count_merged());
+    for (size_t i = 0; i < parts.size(); ++i) {
       encode_normals(parts[i]);
-      weld(plan_.parts[i], needs_.parts[i], parts[i]);
+      weld(i, parts[i], coinciding);
       parts[i] = {};
     }
+    out_.positions = std::move(surface_.positions);
+    close_slots();
+    out_.stats.collapsed_triangles = surface_.collapsed_count;
+    out_.stats.source_area = surface_.source_area;
+    out_.stats.collapsed_area = surface_.collapsed_area;
+    out_.stats.left = std::move(surface_.left);
     require_bound("position error", out_.stats.max_position_error, position_error_bound(step_, max_abs));
-    require_bound("normal error in degrees", out_.stats.max_normal_error_degrees, config_.max_normal_error_degrees());
+    require_bound("normal error in degrees", out_.stats.max_normal_error_degrees, limits_.error_degrees);
     out_.stats.distinct_vertices = out_.vertices.size();
     return std::move(out_);
   }
@@ -129,6 +147,7 @@ private:
   /// Everything about a part that is in hand, by source vertex or triangle.
   struct Work {
     std::vector<LatticePoint> lattice;
+    size_t first_triangle = 0;   ///< in surface_
     std::vector<DVec3> normals;  ///< unit or empty
     std::vector<uint8_t> smooth; ///< per normal: some triangle that is not flat has it
     std::vector<uint32_t> codes;
@@ -137,35 +156,46 @@ private:
     std::vector<uint8_t> flat;
   };
 
-  Work quantize_part(const GeometryPart& part, const PartNeeds& needs) {
+  LatticePart place_on_lattice(const GeometryPart& part) {
+    const Mesh& mesh = scene_.meshes[part.mesh];
+    LatticePart result;
+    quantize_positions(part, mesh, result.points);
+    result.triangles = mesh.triangles;
+    if (part.flip)
+      for (Triangle& t : result.triangles) std::swap(t.y, t.z);
+    out_.stats.source_vertices += mesh.positions.size();
+    return result;
+  }
+
+  Work quantize_part(size_t number, LatticePart&& lattice, size_t first_triangle) {
+    const GeometryPart& part = plan_.parts[number];
+    const PartNeeds& needs = needs_.parts[number];
     const Mesh& mesh = scene_.meshes[part.mesh];
     Work work;
-    quantize_positions(part, mesh, work);
-    work.triangles = mesh.triangles;
-    if (part.flip)
-      for (Triangle& t : work.triangles) std::swap(t.y, t.z);
+    work.lattice = std::move(lattice.points);
+    work.triangles = std::move(lattice.triangles);
+    work.first_triangle = first_triangle;
     work.flat.assign(work.triangles.size(), 1);
     if (needs.store_normals())
       quantize_normals(part, mesh, work, needs.normals != baked::kOnRequest && needs_.infer_normals);
     if (needs.store_uvs()) quantize_uvs(mesh, work);
-    out_.stats.source_vertices += mesh.positions.size();
     return work;
   }
 
-  void quantize_positions(const GeometryPart& part, const Mesh& mesh, Work& work) {
-    work.lattice.resize(mesh.positions.size());
+  void quantize_positions(const GeometryPart& part, const Mesh& mesh, std::vector<LatticePoint>& lattice) {
+    lattice.resize(mesh.positions.size());
     const ErrorStats errors = accumulate_errors(mesh.positions.size(), [&](size_t i, ErrorStats& stats) {
       const DVec3 p = transform_point(part.geometry_from_mesh, DVec3(mesh.positions[i]));
       for (int axis = 0; axis < 3; ++axis) {
         const int64_t q = to_lattice(p[axis], step_);
-        work.lattice[i][static_cast<size_t>(axis)] = q;
+        lattice[i][static_cast<size_t>(axis)] = q;
         stats.add(std::abs(static_cast<double>(from_lattice(q, step_)) - p[axis]));
       }
     });
     out_.stats.max_position_error = std::max(out_.stats.max_position_error, errors.max);
   }
 
-  /// Unit normal of the decoded triangle; zero where it collapsed.
+  /// Unit normal of the decoded triangle; zero where it has no area.
   static DVec3 face_normal(const Work& work, const Triangle& t) {
     const LatticePoint &a = work.lattice[t.x], &b = work.lattice[t.y], &c = work.lattice[t.z];
     DVec3 ab, ac;
@@ -198,7 +228,8 @@ private:
       work.flat.assign(work.triangles.size(), 0);
     work.smooth.assign(work.normals.size(), 0);
     for (size_t i = 0; i < work.triangles.size(); ++i)
-      for (int corner = 0; corner < 3 && work.flat[i] == 0; ++corner) work.smooth[work.triangles[i][corner]] = 1;
+      for (int corner = 0; corner < 3 && work.flat[i] == 0 && stays(work, i); ++corner)
+        work.smooth[work.triangles[i][corner]] = 1;
     if (infer)
       out_.stats.inferred_normals +=
           static_cast<uint64_t>(std::count(work.smooth.begin(), work.smooth.end(), uint8_t{0}));
@@ -207,7 +238,7 @@ private:
   /// Triangles whose normals are the face's.
   void find_flat_triangles(Work& work) {
     // A little less, so that rounding never lifts a measured angle above it.
-    const double flat_chord = 2.0 * std::sin(config_.flat_degrees() / kDegreesPerRadian * 0.5) * (1.0 - 1e-9);
+    const double flat_chord = 2.0 * std::sin(limits_.flat_degrees / kDegreesPerRadian * 0.5) * (1.0 - 1e-9);
     const auto near = [&](const Triangle& t, DVec3 n) {
       for (int corner = 0; corner < 3; ++corner) {
         const DVec3 d = work.normals[t[corner]] - n;
@@ -216,6 +247,7 @@ private:
       return true;
     };
     const ErrorStats flat_errors = accumulate_errors(work.triangles.size(), [&](size_t i, ErrorStats& stats) {
+      if (!stays(work, i)) return;
       const Triangle& t = work.triangles[i];
       const DVec3 n = face_normal(work, t);
       // Tracing turns normals to the side that is seen, so either side of the face will do.
@@ -238,7 +270,7 @@ private:
     return angle_degrees(normal, glm::normalize(DVec3(decode_normal(encoding, code))));
   }
 
-  /// The first of the axis family whose largest error is within config's; the last where there is none.
+  /// The first of the axis family whose largest error is within the limit; the last where there is none.
   NormalEncoding choose_normal_encoding(const std::vector<Work>& parts) const {
     for (const NormalEncoding encoding : {NormalEncoding::kAxis16, NormalEncoding::kAxis24})
       if (std::all_of(parts.begin(), parts.end(), [&](const Work& part) { return keeps_error(encoding, part); }))
@@ -250,8 +282,7 @@ private:
     std::atomic<bool> kept{true};
     for_each(work.normals.size(), [&](size_t i) {
       if (work.smooth[i] == 0 || !kept.load(std::memory_order_relaxed)) return;
-      if (encoding_error(encoding, work.normals[i], encode_normal(encoding, work.normals[i])) >
-          config_.normal_error_degrees)
+      if (encoding_error(encoding, work.normals[i], encode_normal(encoding, work.normals[i])) > limits_.error_degrees)
         kept.store(false, std::memory_order_relaxed);
     });
     return kept;
@@ -301,14 +332,21 @@ private:
     return *code;
   }
 
-  uint32_t weld_position(const LatticePoint& p) {
-    const uint64_t hash =
-        mix_words(static_cast<uint64_t>(p[0]), static_cast<uint64_t>(p[1]), static_cast<uint64_t>(p[2]));
-    const auto next = static_cast<uint32_t>(out_.positions.size());
-    const uint32_t number =
-        position_table_.find_or_add(hash, next, [&](uint32_t other) { return out_.positions[other] == p; });
-    if (number == next) out_.positions.push_back(p);
-    return number;
+  /// Whether a triangle of the part has not collapsed.
+  bool stays(const Work& work, size_t triangle) const {
+    return surface_.collapsed[work.first_triangle + triangle] == 0;
+  }
+
+  bool at_merged(const Triangle& corners) const {
+    return surface_.merged[corners.x] != 0 || surface_.merged[corners.y] != 0 || surface_.merged[corners.z] != 0;
+  }
+
+  /// Triangles that may coincide with another one.
+  size_t count_merged() const {
+    size_t count = 0;
+    for (size_t i = 0; i < surface_.corners.size(); ++i)
+      count += surface_.collapsed[i] == 0 && at_merged(surface_.corners[i]);
+    return count;
   }
 
   uint32_t weld_vertex(const QuantizedVertex& v) {
@@ -326,48 +364,70 @@ private:
     return static_cast<uint32_t>(std::find(out_.kinds.begin(), out_.kinds.end(), kind) - out_.kinds.begin());
   }
 
-  void weld(const GeometryPart& part, const PartNeeds& needs, const Work& work) {
+  /// Gives the part's triangles vertices, those that stay and coincide with no other.
+  void weld(size_t part, const Work& work, CoincidingTriangles& coinciding) {
     constexpr uint32_t kUnset = ~0u;
-    std::vector<uint32_t> position_of(work.lattice.size(), kUnset);
+    const bool uvs = needs_.parts[part].store_uvs();
     std::array<std::vector<uint32_t>, 2> vertex_of; // smooth, flat
     for (auto& numbers : vertex_of) numbers.assign(work.lattice.size(), kUnset);
     std::array<uint32_t, 2> kinds{kUnset, kUnset};
     for (size_t i = 0; i < work.triangles.size(); ++i) {
+      if (!stays(work, i)) continue;
       const uint8_t flat = work.flat[i];
-      if (kinds[flat] == kUnset) kinds[flat] = kind_number({part.slot, flat != 0, needs.store_uvs()});
+      if (kinds[flat] == kUnset) kinds[flat] = kind_number({plan_.parts[part].slot, flat != 0, uvs});
+      const Triangle& corners = surface_.corners[work.first_triangle + i];
       Triangle t{};
       for (int corner = 0; corner < 3; ++corner) {
         const uint32_t source = work.triangles[i][corner];
         uint32_t& number = vertex_of[flat][source];
-        if (number == kUnset) {
-          if (position_of[source] == kUnset) position_of[source] = weld_position(work.lattice[source]);
-          number = weld_vertex({position_of[source], flat != 0 ? 0u : work.codes[source],
+        if (number == kUnset)
+          number = weld_vertex({corners[corner], flat != 0 ? 0u : work.codes[source],
                                 work.uvs.empty() ? UvLattice{} : work.uvs[source]});
-        }
         t[corner] = number;
       }
-      const uint32_t a = out_.vertices[t.x].position, b = out_.vertices[t.y].position, c = out_.vertices[t.z].position;
-      out_.stats.collapsed_triangles += a == b || b == c || c == a;
+      if (at_merged(corners) && coinciding.repeats(t, kinds[flat], {static_cast<uint32_t>(part), work.triangles[i]})) {
+        ++out_.stats.coinciding_triangles;
+        --surface_.left[part];
+        out_.stats.flat_triangles -= flat != 0 && !work.normals.empty();
+        continue;
+      }
       out_.triangles.push_back(t);
       out_.kind_of.push_back(kinds[flat]);
     }
+  }
+
+  /// Renumbers material slots without those that have no triangle left.
+  void close_slots() {
+    std::vector<uint32_t> number_of(plan_.slot_class.size());
+    for (const TriangleKind& kind : out_.kinds) number_of[kind.slot] = 1;
+    for (uint32_t slot = 0; slot < number_of.size(); ++slot) {
+      if (number_of[slot] == 0) continue;
+      number_of[slot] = static_cast<uint32_t>(out_.slots.size());
+      out_.slots.push_back(slot);
+      out_.slot_class.push_back(plan_.slot_class[slot]);
+    }
+    for (TriangleKind& kind : out_.kinds) kind.slot = number_of[kind.slot];
   }
 
   const Scene& scene_;
   const GeometryPlan& plan_;
   const GeometryNeeds& needs_;
   const BakeConfig& config_;
+  const SourcePoints source_;
+  const GeometryMeasure& measure_;
   double step_;
-  WeldTable position_table_, vertex_table_;
+  NormalLimits limits_;
+  WeldTable vertex_table_;
+  WeldedSurface surface_;
   QuantizedGeometry out_;
 };
 
 } // namespace
 
 QuantizedGeometry quantize_geometry(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs,
-                                    const BakeConfig& config, const PositionGrid& grid, double max_abs, DVec3 lowest,
-                                    DVec3 highest) {
-  return Quantizer(scene, plan, needs, config, grid).run(max_abs, lowest, highest);
+                                    const BakeConfig& config, const PositionGrid& grid,
+                                    const GeometryMeasure& measure) {
+  return Quantizer(scene, plan, needs, config, grid, measure).run();
 }
 
 } // namespace packtrace

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "compress/bake/bake_config.h"
+#include "compress/bake/geometry_measure.h"
 #include "compress/bake/geometry_plan.h"
 #include "compress/bake/requirements.h"
 #include "compress/format/position_grid.h"
@@ -32,12 +33,16 @@ struct TriangleKind {
 struct QuantizeStats {
   uint64_t source_vertices = 0;
   uint64_t distinct_vertices = 0;
-  uint64_t collapsed_triangles = 0; ///< two corners fell on one lattice point
-  uint64_t flat_triangles = 0;      ///< whose meshes have normals that need not be stored
-  uint64_t inferred_normals = 0;    ///< of the source that only such triangles have
-  uint64_t repaired_normals = 0;    ///< were zero, or became so under a flattening transform
-  uint64_t replaced_uvs = 0;        ///< were not finite
-  double max_position_error = 0.0;  ///< largest axis
+  uint64_t collapsed_triangles = 0;  ///< have no area on the lattice and are left out (find_collapsed())
+  uint64_t coinciding_triangles = 0; ///< are left out as they became equal to another one (CoincidingTriangles)
+  double source_area = 0.0;          ///< of all triangles of the source, geometry space
+  double collapsed_area = 0.0;       ///< in the source, of collapsed ones
+  std::vector<uint64_t> left;        ///< triangles by part, without those left out
+  uint64_t flat_triangles = 0;       ///< whose meshes have normals that need not be stored
+  uint64_t inferred_normals = 0;     ///< of the source that only such triangles have
+  uint64_t repaired_normals = 0;     ///< were zero, or became so under a flattening transform
+  uint64_t replaced_uvs = 0;         ///< were not finite
+  double max_position_error = 0.0;   ///< largest axis
   double max_normal_error_degrees = 0.0;
   double normal_error_sum = 0.0;    ///< degrees
   uint64_t normal_count = 0;        ///< in normal_error_sum
@@ -58,16 +63,17 @@ struct QuantizedGeometry {
   std::vector<Triangle> triangles;  ///< into vertices
   std::vector<TriangleKind> kinds;  ///< distinct
   std::vector<uint32_t> kind_of;    ///< per triangle, into kinds
+  std::vector<uint32_t> slots;      ///< of the plan that have triangles left: one for each slot here
   std::vector<uint32_t> slot_class; ///< material class by slot, ascending
 
   QuantizeStats stats;
 };
 
 /// Throws Error(kLimitExceeded) where the lattice is too large for its limit, or a measured error exceeds
-/// position_error_bound() or config.max_normal_error_degrees(), or a texture coordinate is beyond config.uvs;
+/// position_error_bound() or config.normal_limits(), or a texture coordinate is beyond config.uvs;
 /// Error(kInput) for normals that are not finite.
+/// @param measure of the plan's geometry (measure_geometry())
 QuantizedGeometry quantize_geometry(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs,
-                                    const BakeConfig& config, const PositionGrid& grid, double max_abs, DVec3 lowest,
-                                    DVec3 highest);
+                                    const BakeConfig& config, const PositionGrid& grid, const GeometryMeasure& measure);
 
 } // namespace packtrace

@@ -19,9 +19,9 @@ Uses uses_of(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& 
   for (size_t i = 0; i < plan.parts.size(); ++i) {
     const Mesh& mesh = scene.meshes[plan.parts[i].mesh];
     const PartNeeds& part = needs.parts[i];
-    add(baked::kNormals, part.normals, mesh.triangles.size(), mesh.normals.size() * sizeof(Vec3));
-    add(baked::kUvs, part.uvs, mesh.triangles.size(), mesh.uvs.size() * sizeof(Vec2));
-    add(baked::kTangents, part.tangents, mesh.triangles.size(), 0);
+    add(baked::kNormals, part.normals, stats.left[i], mesh.normals.size() * sizeof(Vec3));
+    add(baked::kUvs, part.uvs, stats.left[i], mesh.uvs.size() * sizeof(Vec2));
+    add(baked::kTangents, part.tangents, stats.left[i], 0);
   }
   Use& smooth = uses[baked::kNormals][baked::kForShading];
   const Use inferred{stats.flat_triangles, stats.inferred_normals * sizeof(Vec3)};

@@ -9,12 +9,12 @@
 #include "compress/format/packed_node.h"
 #include "pbrt_import/scene/material_flags.h"
 
-/// What lies in a .ptk file, version 4; docs/baked_format.md says it in words. Little-endian; every section starts at a
+/// What lies in a .ptk file, version 5; docs/baked_format.md says it in words. Little-endian; every section starts at a
 /// multiple of 64 bytes; bytes that no field or section owns are zero.
 namespace packtrace::baked {
 
 inline constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'K', 0x89, '\r', '\n', 0x1a, 0};
-inline constexpr uint32_t kVersion = 4;
+inline constexpr uint32_t kVersion = 5;
 inline constexpr size_t kSectionAlignment = 64;
 inline constexpr uint32_t kNone = ~0u;
 
@@ -218,7 +218,7 @@ struct SummaryRecord {
   uint64_t unused_triangles;  ///< of objects that are never instanced; not stored
   uint64_t source_vertices;
   uint64_t merged_vertices;
-  uint64_t collapsed_triangles;    ///< two corners fell on one lattice point; kept
+  uint64_t collapsed_triangles;    ///< have no area on the lattice; not stored
   std::array<double, 3> bounds_lo; ///< world, of the decoded instances
   std::array<double, 3> bounds_hi;
   double precision_value;
@@ -228,6 +228,9 @@ struct SummaryRecord {
   uint32_t purpose;                    ///< Purpose; bits kKeepShift + Stream: all of it was to be kept
   std::array<uint64_t, 4> stream_bits; ///< payload: indices, positions, normals, uvs
   uint64_t left_out;                   ///< shapes and instances that leave the float range; not stored
+  uint64_t coinciding_triangles;       ///< became equal to another one by quantisation; not stored
+  double source_area;                  ///< of all placed triangles before quantisation, world units squared, about
+  double collapsed_area;               ///< of collapsed_triangles, likewise
 };
 
 template <typename T>
@@ -254,7 +257,8 @@ static_assert(kIsPod<TextureRecord> && sizeof(TextureRecord) == 56 && offsetof(T
 static_assert(kIsPod<CameraRecord> && sizeof(CameraRecord) == 160 && offsetof(CameraRecord, projection) == 136);
 static_assert(kIsPod<RequirementRecord> && sizeof(RequirementRecord) == 40);
 static_assert(kAllRequirements == 0xffffff);
-static_assert(kIsPod<SummaryRecord> && sizeof(SummaryRecord) == 160 && offsetof(SummaryRecord, stream_bits) == 120);
+static_assert(kIsPod<SummaryRecord> && sizeof(SummaryRecord) == 184 && offsetof(SummaryRecord, stream_bits) == 120 &&
+              offsetof(SummaryRecord, coinciding_triangles) == 160);
 
 /// sizeof the records of each section.
 inline constexpr std::array<uint32_t, kSectionCount> kRecordBytes = {sizeof(GeometryRecord),

@@ -358,6 +358,8 @@ private:
       fail("summary");
     for (size_t axis = 0; axis < 3; ++axis)
       if (std::isnan(s.bounds_lo[axis]) || std::isnan(s.bounds_hi[axis])) fail("summary bounds");
+    for (const double area : {s.source_area, s.collapsed_area})
+      if (!(area >= 0.0 && std::isfinite(area))) fail("summary areas");
   }
 
   std::span<const std::byte> bytes_;

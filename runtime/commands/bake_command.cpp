@@ -69,7 +69,7 @@ BakeConfig make_config(const BakeOptions& options) {
   if (config.normals && options.normal_error)
     throw Error(ErrorKind::kUsage,
                 "--normal-error chooses an encoding; it is of no use with --normals " + options.normals);
-  if (options.normal_error) config.normal_error_degrees = *options.normal_error;
+  config.normal_error_degrees = options.normal_error;
   config.purpose = options.purpose == kPurposes[baked::kShading] ? baked::kShading : baked::kAo;
   for (const std::string& stream : options.keep) (stream == kKeepUvs ? config.keep_uvs : config.keep_normals) = true;
   config.strict = options.scene.strict;
@@ -176,14 +176,11 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   std::FILE* const text = output ? output->text_stream() : stdout;
   fmt::print(text, "{}: import {:.3f} s, bake {:.3f} s, peak memory {:.0f} MiB\n", output ? output->name() : "dry run",
              import_s, bake_s, static_cast<double>(peak_rss_bytes()) / (1 << 20));
-  fmt::print(
-      text, "{}",
-      fmt::format(grouped(), "{:L} triangles in {:L} bytes: {:.3f} bytes a triangle; position error {:.3g}, {}\n",
-                  baked.file.triangles, baked.file.bytes.total, baked.file.bytes_per_triangle, baked.max_position_error,
-                  baked.file.normals.empty()
-                      ? std::string("no normals stored")
-                      : fmt::format("normal error {:.4f} degrees", baked.max_normal_error_degrees)));
-  fmt::print(text, "{}", disk_text(baked.file));
+  fmt::print(text, "{}", size_text(baked.file));
+  fmt::print(text, "position error {:.3g}, {}\n", baked.max_position_error,
+             baked.file.normals.empty() ? std::string("no normals stored")
+                                        : fmt::format("normal error {:.4f} degrees", baked.max_normal_error_degrees));
+  fmt::print(text, "{}", collapsed_text(baked.file));
   if (const LodTable& lod = baked.file.lod.all; !lod.levels.empty())
     fmt::print(text, "{}",
                fmt::format(
@@ -231,14 +228,15 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   std::vector<std::string> encodings{kAuto};
   for (const NormalFormat& format : kNormalFormats) encodings.emplace_back(format.name);
   verb.add_option("--normals", options->normals,
-                  "Encoding of normals; auto: axis16, axis24 or axis32 by --normal-error")
+                  "Encoding of normals; auto: axis16, axis24 or axis32 by --normal-error, for each geometry")
       ->check(one_of(encodings))
       ->default_str(kAuto)
       ->group("Normals");
   verb.add_option(
           "--normal-error", options->normal_error,
-          "Largest angle that auto allows between a normal and the decoded one, .0025..10 degrees (default .04: "
-          "what 24 bits keep for every direction)")
+          "Largest angle that auto allows between a normal and the decoded one, 0.0025..10 degrees (default 0.04, "
+          "which 24 bits keep for every direction; where the grid's step is above an eighth of the median edge, a "
+          "twelfth of the angle that a step makes over that edge)")
       ->type_name("DEGREES")
       ->group("Normals");
   verb.add_option("--for", options->purpose,

@@ -128,11 +128,37 @@ nlohmann::json to_json(const FileSummary& s, bool by_geometry) {
       {"dropped_triangles", s.bake.dropped_triangles},
       {"unused_triangles", s.bake.unused_triangles},
       {"collapsed_triangles", s.bake.collapsed_triangles},
+      {"coinciding_triangles", s.bake.coinciding_triangles},
+      {"source_area", s.bake.source_area},
+      {"collapsed_area", s.bake.collapsed_area},
       {"merged_vertices", s.bake.merged_vertices},
       {"requirements", requirements_json(s, by_geometry)},
       {"lod", lod_json(s, by_geometry)},
       {"trees", {{"trees", s.trees}, {"nodes", s.nodes}, {"depth", s.tree_depth}}},
   };
+}
+
+std::string size_text(const FileSummary& s) {
+  const auto bytes_each = [&](uint64_t bytes) {
+    return s.triangles > 0 ? static_cast<double>(bytes) / static_cast<double>(s.triangles) : 0.0;
+  };
+  const uint64_t on_disk = s.disk.file_bytes, resident = s.bytes.total;
+  if (s.disk.codec == PageCodec::kNone)
+    return fmt::format(grouped(), "{:L} triangles; {:L} bytes, {:.3f} a triangle, in the file and resident\n",
+                       s.triangles, resident, bytes_each(resident));
+  return fmt::format(grouped(),
+                     "{:L} triangles; file: {:L} bytes, {:.3f} a triangle, codec {}; resident: {:L} bytes, {:.3f} a "
+                     "triangle\n",
+                     s.triangles, on_disk, bytes_each(on_disk), name_of(s.disk.codec), resident, bytes_each(resident));
+}
+
+std::string collapsed_text(const FileSummary& s) {
+  if (s.bake.collapsed_triangles + s.bake.coinciding_triangles == 0) return {};
+  const double share = s.bake.source_area > 0.0 ? s.bake.collapsed_area / s.bake.source_area : 0.0;
+  return fmt::format(grouped(),
+                     "left out, as the grid is too coarse for them: {:L} triangles without area on it ({:.3g} % of the "
+                     "source's area), {:L} equal to others\n",
+                     s.bake.collapsed_triangles, 100.0 * share, s.bake.coinciding_triangles);
 }
 
 std::string disk_text(const FileSummary& s) {
@@ -157,7 +183,8 @@ std::string to_text(const FileSummary& s, bool by_geometry) {
     text += fmt::format("   grid step {:.4g}{}{}", s.grids.front().grid.step(),
                         s.grids.front().world_space ? " (world)" : "",
                         s.grids.size() > 1 ? fmt::format(" and {} more", s.grids.size() - 1) : std::string());
-  text += fmt::format("\nmeasured error: position {:.4g} (bound {:.4g})   normal {:.4f} degrees\n\n",
+  text += "\n" + collapsed_text(s);
+  text += fmt::format("measured error: position {:.4g} (bound {:.4g})   normal {:.4f} degrees\n\n",
                       s.max_position_error, s.max_position_error_bound, s.max_normal_error_degrees);
   for (const NormalUse& use : s.normals)
     text += fmt::format(grouped(), "normals {}: {:L} geometries, {:L} vertices, error {:.4f} degrees\n",

@@ -56,16 +56,36 @@ TEST(BakeConfig, NormalErrorsOutOfRangeAreRefusedNotClamped) {
   }
   // The promise can be kept for all normals at the lowest and at the default error.
   EXPECT_LE(format_of(NormalEncoding::kAxis32).max_error_degrees, 0.0025);
-  EXPECT_LE(format_of(NormalEncoding::kAxis24).max_error_degrees, BakeConfig{}.normal_error_degrees);
+  EXPECT_LE(format_of(NormalEncoding::kAxis24).max_error_degrees, kDefaultNormalError);
 }
 
-TEST(BakeConfig, AStatedEncodingPromisesItsOwnError) {
-  BakeConfig config;
-  EXPECT_EQ(config.max_normal_error_degrees(), 0.04);
-  EXPECT_EQ(config.flat_degrees(), 0.04);
-  config.normals = NormalEncoding::kZsign32;
-  EXPECT_EQ(config.max_normal_error_degrees(), format_of(NormalEncoding::kZsign32).max_error_degrees);
-  EXPECT_EQ(config.flat_degrees(), 0.1);
+TEST(BakeConfig, AStatedEncodingOrErrorIsPromisedAtEveryStep) {
+  BakeConfig stated_error, encoding;
+  stated_error.normal_error_degrees = 0.02;
+  encoding.normals = NormalEncoding::kZsign32;
+  for (const double step_per_edge : {1.0 / 128.0, 1.0, std::numeric_limits<double>::infinity()}) {
+    EXPECT_EQ(stated_error.normal_limits(step_per_edge).error_degrees, 0.02);
+    EXPECT_EQ(stated_error.normal_limits(step_per_edge).flat_degrees, 0.02);
+    EXPECT_EQ(encoding.normal_limits(step_per_edge).error_degrees,
+              format_of(NormalEncoding::kZsign32).max_error_degrees);
+    EXPECT_EQ(encoding.normal_limits(step_per_edge).flat_degrees, 0.1);
+  }
+}
+
+TEST(BakeConfig, NormalsOfRoughSurfacesMayLoseMore) {
+  const BakeConfig config;
+  for (const double fine : {0.0, 1.0 / 128.0, kRoughEdge}) {
+    EXPECT_EQ(config.normal_limits(fine).error_degrees, kDefaultNormalError);
+    EXPECT_EQ(config.normal_limits(fine).flat_degrees, kDefaultNormalError);
+  }
+  EXPECT_NEAR(config.normal_limits(1.0).error_degrees, 45.0 / 12.0, 1e-9); // a step over an edge is 45 degrees
+  EXPECT_NEAR(config.normal_limits(1.0).flat_degrees, 45.0 / 12.0, 1e-9);
+  double last = 0.0;
+  for (double step_per_edge = 0.01; step_per_edge < 100.0; step_per_edge *= 1.1) {
+    EXPECT_GE(config.normal_limits(step_per_edge).error_degrees, last);
+    last = config.normal_limits(step_per_edge).error_degrees;
+  }
+  EXPECT_LE(config.normal_limits(std::numeric_limits<double>::infinity()).error_degrees, 7.5);
 }
 
 } // namespace

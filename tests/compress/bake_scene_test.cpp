@@ -171,15 +171,5 @@ TEST(BakeScene, ClustersOfAMaterialClassAreContiguous) {
   EXPECT_GT(g.class_clusters[4], 0u); // masked
 }
 
-TEST(BakeScene, CollapsedTrianglesAreKeptAndCounted) {
-  Mesh mesh = test::grid_mesh(10);
-  mesh.positions.emplace_back(0.5f, 0.5f, 1.0f);
-  mesh.positions.emplace_back(0.5f, 0.5f, 1.00001f);
-  mesh.triangles.emplace_back(0, 121, 122);
-  const BakedScene baked = bake(scene_of(mesh));
-  EXPECT_EQ(baked.report.collapsed_triangles, 1u);
-  EXPECT_EQ(baked.report.file.triangles, 201u);
-}
-
 } // namespace
 } // namespace packtrace

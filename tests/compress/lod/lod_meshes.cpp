@@ -229,9 +229,9 @@ BuiltLod build_lod(const Mesh& mesh) {
   measure.bounds = measure_geometry(scene, plan.geometries[0], edges);
   measure.median_edge = edges.median();
   BuiltLod result;
-  result.geometry = quantize_geometry(
-      scene, plan.geometries[0], analyse_requirements(scene, plan, plan.geometries[0], config), config,
-      choose_grid(config, measure, 1.0), measure.max_abs(), measure.bounds.lo, measure.bounds.hi);
+  result.geometry =
+      quantize_geometry(scene, plan.geometries[0], analyse_requirements(scene, plan, plan.geometries[0], config),
+                        config, choose_grid(config, measure, 1.0), measure);
   result.base = split_geometry(result.geometry);
   Progress progress;
   result.lod = build_cluster_lod(result.geometry, result.base, progress);

@@ -62,9 +62,9 @@ std::vector<Ray> beams(std::span<const Ray> rays) {
 }
 
 template <typename Tracer = PackedTracer>
-size_t leaks(const Scene& scene, DVec3 inside, size_t count, PackedIsa isa) {
+size_t leaks(const Scene& scene, DVec3 inside, size_t count, PackedIsa isa, const BakeConfig& config = {}) {
   constexpr size_t kAtOnce = 1000000;
-  const BakedScene baked(scene);
+  const BakedScene baked(scene, config);
   const Tracer tracer(baked.file, baked.source, isa);
   size_t missed = 0;
   for (uint32_t seed = 2; count > 0; ++seed) {
@@ -232,6 +232,56 @@ TEST(PackedLeaks, NoneBesideDegenerateTriangles) {
   for (uint32_t i = 0; i + 7 < count; i += 7) mesh.triangles.emplace_back(i, i + 3, i);
   test::add_shape(scene, mesh);
   for (const PackedIsa isa : test::isas()) EXPECT_EQ(leaks(scene, {0.1, 0, 0.1}, 100000, isa), 0u);
+}
+
+/// A closed sphere on a lattice of steps of 1/1024 that has three points on one line within many of its edges: the
+/// triangle on one side has the whole edge, on the other side two have half of it each. Slivers without area lie
+/// between them, or are missing.
+Mesh sphere_of_split_edges(bool slivers) {
+  constexpr float kSteps = 1024.0f;
+  Mesh mesh = test::sphere({0, 0, 0}, 1, 24);
+  mesh.normals.clear();
+  for (Vec3& p : mesh.positions) p = 2.0f * glm::round(p * kSteps * 0.5f) / kSteps; // so that middles are on it too
+  const std::vector<Triangle> whole = mesh.triangles;
+  mesh.triangles.clear();
+  for (size_t i = 0; i < whole.size(); ++i) {
+    const Triangle& t = whole[i];
+    const Vec3 middle = 0.5f * (mesh.positions[t.x] + mesh.positions[t.z]);
+    if (i % 3 != 0 || middle == mesh.positions[t.x]) {
+      mesh.triangles.push_back(t);
+      continue;
+    }
+    const auto m = static_cast<uint32_t>(mesh.positions.size());
+    mesh.positions.push_back(middle);
+    mesh.triangles.emplace_back(t.x, t.y, m), mesh.triangles.emplace_back(m, t.y, t.z);
+    if (slivers) mesh.triangles.emplace_back(t.x, m, t.z);
+  }
+  return mesh;
+}
+
+TEST(PackedLeaks, NoneBesideSliversThatJoinALongEdgeToShortOnes) {
+  BakeConfig config;
+  config.precision_kind = PrecisionKind::kAbsolute;
+  config.precision = 1.0 / 1024.0;
+  Scene with, without;
+  test::add_shape(with, sphere_of_split_edges(true));
+  test::add_shape(without, sphere_of_split_edges(false));
+  for (const PackedIsa isa : test::isas()) {
+    EXPECT_EQ(leaks(with, {0.1, 0.2, -0.05}, 200000, isa, config), 0u);
+    EXPECT_GT(leaks(without, {0.1, 0.2, -0.05}, 200000, isa, config), 0u); // so the slivers do something
+  }
+}
+
+TEST(PackedLeaks, NoneAtAnyNumberOfPositionBits) {
+  Scene scene;
+  test::add_shape(scene, test::sphere({0, 0, 0}, 1, 50));
+  for (const int bits : {3, 5, 6, 8, 10, 12}) {
+    BakeConfig config;
+    config.precision_kind = PrecisionKind::kPositionBits;
+    config.precision = bits;
+    for (const PackedIsa isa : test::isas())
+      EXPECT_EQ(leaks(scene, {0.1, 0.2, -0.05}, 100000, isa, config), 0u) << bits;
+  }
 }
 
 TEST(PackedLeaks, OneTriangleIsHitInsideAndOnItsEdges) {
