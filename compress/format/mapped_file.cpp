@@ -7,7 +7,7 @@
 #include <system_error>
 #include <unistd.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/file_error.h"
 
 namespace packtrace {
 namespace {
@@ -23,7 +23,7 @@ struct Descriptor {
 };
 
 [[noreturn]] void fail(ErrorKind kind, const std::filesystem::path& path, int code) {
-  throw Error(kind, path.string() + ": " + std::generic_category().message(code));
+  throw FileError(kind, path, std::generic_category().message(code));
 }
 
 } // namespace
@@ -34,7 +34,7 @@ MappedFile::MappedFile(const std::filesystem::path& path) {
   if (file.fd < 0) fail(errno == ENOENT || errno == ENOTDIR ? ErrorKind::kInput : ErrorKind::kIo, path, errno);
   struct stat status {};
   if (::fstat(file.fd, &status) != 0) fail(ErrorKind::kIo, path, errno);
-  if (!S_ISREG(status.st_mode)) throw Error(ErrorKind::kInput, path.string() + ": not a regular file");
+  if (!S_ISREG(status.st_mode)) throw FileError(ErrorKind::kInput, path, "not a regular file");
   const auto size = static_cast<size_t>(status.st_size);
   if (size == 0) return; // mmap refuses it; the reader reports it as truncated
   void* address = ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file.fd, 0);

@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/file_error.h"
 
 namespace packtrace {
 
@@ -30,8 +30,8 @@ std::vector<std::byte> read_file_bytes(const std::filesystem::path& path) {
   // Size first: opening a pipe or a device could block for ever.
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) throw Error(ErrorKind::kInput, path.string() + ": no such file");
-  if (!std::filesystem::is_regular_file(status)) throw Error(ErrorKind::kInput, path.string() + ": not a regular file");
+  if (!std::filesystem::exists(status)) throw FileError(ErrorKind::kInput, path, "no such file");
+  if (!std::filesystem::is_regular_file(status)) throw FileError(ErrorKind::kInput, path, "not a regular file");
   const uint64_t size = std::filesystem::file_size(path, error);
   if (error) throw Error(ErrorKind::kInput, path.string() + ": cannot read: " + error.message());
   if (size > kMaxFileBytes) throw Error(ErrorKind::kInput, path.string() + ": larger than 4 GiB");

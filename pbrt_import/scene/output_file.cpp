@@ -11,7 +11,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/file_error.h"
 
 namespace packtrace {
 
@@ -65,7 +65,7 @@ fs::path claim_of(const fs::path& target) {
 }
 
 [[noreturn]] void fail(const fs::path& path, const std::string& what) {
-  throw Error(ErrorKind::kIo, path.string() + ": " + what);
+  throw FileError(ErrorKind::kIo, path, what);
 }
 
 void check_target(const fs::path& target, bool force) {
