@@ -12,7 +12,8 @@ if [ -z "${PACKTRACE_SCENES:-}" ] && [ -d ../shared/scenes ]; then
   export PACKTRACE_SCENES
 fi
 echo "== Debian packages"
-bash .ci/install_packages.sh clang-19 # whether the fuzz preset's compiler takes the kernels is a test
+# Whether the fuzz preset's compiler takes the kernels is a test, and whether shells and man take what is made for them.
+bash .ci/install_packages.sh clang-19 zsh fish mandoc groff-base
 export CTEST_PARALLEL_LEVEL=${CTEST_PARALLEL_LEVEL:-$(nproc)}
 for preset in "${presets[@]}"; do
   echo "== Build ($preset)"

@@ -67,8 +67,7 @@ std::string groups_of(const VerbEntry& verb, const std::set<std::string>& told) 
 
 /// The end of a verb's help: sentences flow, indented lines are examples.
 std::string footer_of(const std::string& footer) {
-  if (footer.empty()) return {};
-  std::string text = ".PP\n";
+  std::string text;
   bool example = false;
   for (const std::string& line : CLI::detail::split(footer, '\n')) {
     const bool indented = line.starts_with("  ");
@@ -81,7 +80,7 @@ std::string footer_of(const std::string& footer) {
 
 std::string usage_of(const VerbEntry& verb) {
   std::string usage = "\\fBpacktrace " + roff(verb.name) + "\\fR";
-  if (!verb.options.empty()) usage += " [\\fIOPTIONS\\fR]";
+  if (verb.options.size() > 1) usage += " [\\fIOPTIONS\\fR]"; // more than --help
   for (const OptionEntry& positional : verb.positionals) {
     const std::string name = "\\fI" + roff(positional.value_name) + "\\fR" + (positional.repeatable ? " ..." : "");
     usage += positional.required ? " " + name : " [" + name + "]";
@@ -95,7 +94,8 @@ std::string man_page(const ProgramEntry& program, const std::string& version) {
   std::string page = fmt::format(".TH PACKTRACE 1 \"\" \"packtrace {}\" \"User Commands\"\n", roff(version));
   const std::string& title = program.program.description; // "packtrace: what it is"
   page += ".SH NAME\npacktrace \\- " + roff(title.substr(title.find(": ") + 2)) + "\n.SH SYNOPSIS\n";
-  for (const VerbEntry& verb : program.verbs) page += usage_of(verb) + "\n.br\n";
+  for (const VerbEntry& verb : program.verbs)
+    page += (&verb == &program.verbs.front() ? "" : ".br\n") + usage_of(verb) + "\n";
   page += ".SH DESCRIPTION\n" + footer_of(program.program.footer);
   page +=
       ".SH OPTIONS\nThese may stand before the verb or behind it. Of an option that is given twice the last counts, "
@@ -109,7 +109,8 @@ std::string man_page(const ProgramEntry& program, const std::string& version) {
     page += ".SS " + roff(verb.name) + "\n" + usage_of(verb) + "\n.PP\n" + flowing(verb.description) + ".\n";
     for (const OptionEntry& positional : verb.positionals)
       page += ".TP\n" + heading_of(positional) + "\n" + flowing(positional.description) + "\n";
-    page += groups_of(verb, told) + footer_of(verb.footer);
+    page += groups_of(verb, told);
+    if (!verb.footer.empty()) page += ".PP\n" + footer_of(verb.footer);
   }
   return page + ".SH ENVIRONMENT\n"
                 ".TP\n\\fBPACKTRACE_THREADS\\fR\nNumber of threads where \\fB\\-\\-threads\\fR is not given.\n"

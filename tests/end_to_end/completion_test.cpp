@@ -79,27 +79,37 @@ TEST(Completion, TheManualPageHasEachOptionOfEachVerb) {
   }
 }
 
-TEST(Completion, ScriptsAndPageAreAcceptedByWhatReadsThem) {
+/// Shells, by what reads their scripts.
+class CompletionScript : public testing::TestWithParam<const char*> {};
+
+TEST_P(CompletionScript, IsAcceptedByItsShell) {
+  const std::string shell = GetParam();
+  if (!is_installed(shell)) GTEST_SKIP() << shell << " is not installed";
   const TemporaryFolder folder;
-  for (const char* shell : {"bash", "zsh", "fish"}) {
-    const std::string script = folder / shell;
-    write_text(script, run_packtrace({"completion", shell}).out);
-    if (!is_installed(shell)) continue;
-    const CommandResult checked = run_program(shell, {"-n", script});
-    EXPECT_EQ(checked.exit_code, 0) << shell << ": " << checked.err;
-    EXPECT_EQ(checked.err, "") << shell;
-  }
-  const std::string page = folder / "packtrace.1";
-  write_text(page, run_packtrace({"man"}).out);
-  if (is_installed("mandoc")) {
-    const CommandResult checked = run_program("mandoc", {"-T", "lint", "-W", "warning", page});
-    EXPECT_EQ(checked.exit_code, 0) << checked.out << checked.err;
-  }
-  if (is_installed("groff")) {
-    const CommandResult checked = run_program("groff", {"-man", "-ww", "-z", page});
-    EXPECT_EQ(checked.exit_code, 0);
-    EXPECT_EQ(checked.err, "");
-  }
+  write_text(folder / "script", run_packtrace({"completion", shell}).out);
+  const CommandResult checked = run_program(shell, {"-n", folder / "script"});
+  EXPECT_EQ(checked.exit_code, 0);
+  EXPECT_EQ(checked.err, "");
+}
+
+INSTANTIATE_TEST_SUITE_P(Shells, CompletionScript, testing::Values("bash", "zsh", "fish"));
+
+TEST(Completion, TheManualPageIsAcceptedByMandoc) {
+  if (!is_installed("mandoc")) GTEST_SKIP() << "mandoc is not installed";
+  const TemporaryFolder folder;
+  write_text(folder / "packtrace.1", run_packtrace({"man"}).out);
+  const CommandResult checked = run_program("mandoc", {"-T", "lint", "-W", "warning", folder / "packtrace.1"});
+  // A date would be that of the build, and the page not the same for the same program.
+  EXPECT_EQ(std::regex_replace(checked.out, std::regex(".*missing date.*\n"), ""), "");
+}
+
+TEST(Completion, TheManualPageIsAcceptedByGroff) {
+  if (!is_installed("groff")) GTEST_SKIP() << "groff is not installed";
+  const TemporaryFolder folder;
+  write_text(folder / "packtrace.1", run_packtrace({"man"}).out);
+  const CommandResult checked = run_program("groff", {"-man", "-ww", "-z", folder / "packtrace.1"});
+  EXPECT_EQ(checked.exit_code, 0);
+  EXPECT_EQ(checked.err, "");
 }
 
 /// What bash offers for the last of the words.
