@@ -61,6 +61,7 @@ private:
   bool has_next() const { return next_ < words_.size(); }
 
   void add_other(const std::string& word) {
+    if (word.empty()) throw Error(ErrorKind::kUsage, "an argument is empty, where a verb or a file is expected");
     if (app_->get_parent() == nullptr)
       if (CLI::App* verb = find_verb(*app_, word)) app_ = verb;
     plain_.push_back(word);
@@ -85,7 +86,8 @@ private:
 
   void add_value(const CLI::Option& option, const std::string& name) {
     std::string value = take();
-    if (value == "--" || option_of(*app_, value) != nullptr)
+    const bool is_verb = app_->get_parent() == nullptr && find_verb(*app_, value) != nullptr;
+    if (value == "--" || is_verb || option_of(*app_, value) != nullptr)
       throw Error(ErrorKind::kUsage, name + " needs a value, but " + value + " follows; " + name +
                                          (name.starts_with("--") ? "=" : " ./") + value + " if that is its value");
     if (value_name(option) == kSize && is_number(value) && has_next() && is_number(words_[next_]))

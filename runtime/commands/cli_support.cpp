@@ -21,6 +21,7 @@
 #include "runtime/commands/arguments.h"
 #include "runtime/commands/command_line.h"
 #include "runtime/commands/json_output.h"
+#include "runtime/commands/option_checks.h"
 
 namespace packtrace {
 
@@ -91,7 +92,7 @@ void write_failure(CLI::App& app, const GlobalOptions& globals, std::span<const 
                    nlohmann::json error) {
   // Where the words could not be parsed, no option has its value.
   const std::string destination = globals.json.empty() ? value_in_words(words, "--json") : globals.json;
-  if (destination.empty()) return;
+  if (destination.empty() || find_verb(app, destination)) return; // "--json info": the name was forgotten
   const bool force =
       globals.force || std::ranges::any_of(words, [](std::string_view word) { return word == "--force"; });
   const std::string verb = verb_in_words(app, words), message = error.at("message");

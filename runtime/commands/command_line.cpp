@@ -82,9 +82,11 @@ void require_verb(CLI::App& app, const std::vector<std::string>& words) {
 std::string message_of(const CLI::ParseError& error, CLI::App& verb) {
   const std::string text = error.what();
   if (dynamic_cast<const CLI::ExtrasError*>(&error)) {
-    const std::vector<std::string> left = verb.remaining();
-    const auto given = std::ranges::find_if(left, [](const std::string& word) { return word.starts_with("-"); });
-    if (given != left.end()) return no_such_option(verb, *given);
+    std::vector<std::string> left = verb.remaining();
+    const auto mark = std::ranges::find(left, "--"); // what follows it is no option, whatever it looks like
+    const auto given = std::find_if(left.begin(), mark, [](const std::string& word) { return word.starts_with("-"); });
+    if (given != mark) return no_such_option(verb, *given);
+    std::erase(left, "--");
     if (!left.empty()) return left.front() + ": one argument too many";
   }
   if (dynamic_cast<const CLI::ConversionError*>(&error)) {

@@ -19,7 +19,7 @@ namespace {
 /// A verb without the options that only make sense for work on files.
 CLI::App& add_plain_verb(CLI::App& app, GlobalOptions& globals, const char* name, const char* description,
                          std::function<void()> print) {
-  CLI::App& verb = *app.add_subcommand(name, description)->group("About packtrace");
+  CLI::App& verb = *app.add_subcommand(name, description)->group("About packtrace")->footer("");
   verb.callback([&globals, print = std::move(print)] {
     globals.action = [print] {
       print();
@@ -34,7 +34,10 @@ CLI::App& add_plain_verb(CLI::App& app, GlobalOptions& globals, const char* name
 void add_help_commands(CLI::App& app, GlobalOptions& globals, const std::string& version) {
   const auto topic = std::make_shared<std::string>(), shell = std::make_shared<std::string>();
   CLI::App& help = add_plain_verb(app, globals, "help", "Explain packtrace, or one of its verbs", [&app, topic] {
-    fmt::print("{}", topic->empty() ? app.help() : find_verb(app, *topic)->help(app.get_name()));
+    // App::help() is about the verb that was parsed, which is this one.
+    const CLI::App& explained = topic->empty() ? app : *find_verb(app, *topic);
+    const std::string name = topic->empty() ? app.get_name() : app.get_name() + " " + *topic;
+    fmt::print("{}", app.get_formatter()->make_help(&explained, name, CLI::AppFormatMode::Normal));
   });
   add_plain_verb(app, globals, "version", "Print the version", [version] { fmt::print("{}\n", version); });
   CLI::App& completion =

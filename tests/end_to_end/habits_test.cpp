@@ -78,7 +78,10 @@ TEST(Habits, OptionsOfEveryVerbMayStandBeforeIt) {
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_TRUE(nlohmann::json::parse(result.out).at("requirements").contains("geometries")) << "-v counts";
   EXPECT_EQ(run_packtrace({"--threads=0", "info", bench.scene()}).exit_code, 2);
-  EXPECT_EQ(run_packtrace({"--json", "info", bench.scene()}).exit_code, 2) << "a verb is needed, 'info' is the file";
+  const CommandResult forgotten = run_packtrace({"--json", "info", bench.scene()}, {}, bench.path());
+  EXPECT_EQ(forgotten.exit_code, 2);
+  EXPECT_TRUE(contains(forgotten.err, "--json needs a value, but info follows")) << forgotten.err;
+  EXPECT_FALSE(fs::exists(bench / "info"));
 }
 
 TEST(Habits, HelpAndVersionAreVerbsToo) {
@@ -132,8 +135,7 @@ TEST(Habits, LevelsOfDetailNeedNoValue) {
   const Workbench bench;
   write_text(bench.scene(), "WorldBegin\nShape \"sphere\"\nWorldEnd\n");
   const auto levels = [&](std::vector<std::string> words) {
-    words.insert(words.begin(), "bake");
-    words.insert(words.end(), {"--json", "-", "--force", "-o", bench.baked()});
+    words.insert(words.begin(), {"bake", "--json", "-", "--force", "-o", bench.baked()});
     const CommandResult result = run_packtrace(words);
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return result.exit_code == 0 && !nlohmann::json::parse(result.out).at("lod").is_null();
@@ -189,6 +191,14 @@ TEST(Habits, SizesAreTakenInEveryWayPeopleWriteThem) {
   const CommandResult wrong = run_packtrace({"render", bench.scene(), "-o", bench / "y.png", "--size", "14"});
   EXPECT_EQ(wrong.exit_code, 2);
   EXPECT_TRUE(contains(wrong.err, "1280x720")) << wrong.err;
+}
+
+TEST(Habits, AnEmptyWordIsNoFile) { // an unset variable in quotes
+  for (const auto& words : std::vector<std::vector<std::string>>{{""}, {"info", ""}, {"compare", "a.png", ""}}) {
+    const CommandResult result = run_packtrace(words);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_TRUE(contains(result.err, "argument is empty")) << result.err;
+  }
 }
 
 TEST(Habits, NumbersThatAreNoneAreNamed) {

@@ -45,10 +45,9 @@ TEST(Preview, NothingIsToldFromAnOpenSurface) {
 
 TEST(Preview, TheBackgroundCanBeChosen) {
   const Workbench bench;
-  for (const char* name : {"#ff8000", "ff8000", "FF8000", "#f80"}) {
-    const Image picture = rendered(bench, {"--background", name});
-    expect_color(picture, {1, name[3] == '0' ? 136.0f / 255 : 128.0f / 255, 0});
-  }
+  for (const char* name : {"#ff8000", "ff8000", "FF8000"})
+    expect_color(rendered(bench, {"--background", name}), {1, 128.0f / 255, 0});
+  expect_color(rendered(bench, {"--background", "#f80"}), {1, 136.0f / 255, 0});
   expect_color(rendered(bench, {"--background", "Black"}), {0, 0, 0});
   expect_color(rendered(bench, {"--background", "white", "--aov", "shaded"}), {1, 1, 1});
   const Image clear = rendered(bench, {"--background", "transparent", "--supersample", "2"});
