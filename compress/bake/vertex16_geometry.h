@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "compress/format/baked_file.h"
+#include "compress/format/lattice_box.h"
 #include "compress/format/vertex16_format.h"
 
 namespace packtrace {
@@ -17,10 +18,7 @@ struct Vertex16Geometry {
   std::vector<vertex16::DrawRecord> draws;
 };
 
-/// Smallest and largest lattice coordinates of a geometry.
-struct LatticeBox {
-  LatticePoint lo{}, hi{};
-};
+/// Of all vertices of the geometry.
 LatticeBox lattice_box(const BakedFile& file, uint32_t geometry);
 
 /// The nearest multiple of 2^shift, divided by it; halves go up.

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "compress/format/baked_format.h"
+#include "compress/format/lattice_box.h"
 #include "compress/format/packed_node.h"
 #include "compress/format/position_grid.h"
 
@@ -12,11 +13,6 @@ namespace packtrace {
 
 /// Steps of a tree and of its geometries differ by 2^this at most, either way.
 inline constexpr int32_t kMaxTreeStepDoublings = 60;
-
-/// Whole lattice points, both ends inside.
-struct LatticeBox {
-  LatticePoint lo, hi;
-};
 
 /// A box that holds a cluster's vertices, from its record alone: at most a power of two larger per axis.
 inline LatticeBox box_of_record(const baked::GeometryRecord& geometry, const baked::ClusterRecord& cluster) {

@@ -14,15 +14,15 @@ namespace {
 
 /// What an observer sees of one image.
 struct Seen {
-  std::array<Plane, 3> color; ///< L, a, b with the Hunt adjustment, of the filtered image
-  Plane edges;                ///< strength of edges and points in the unfiltered one
-  Plane points;
+  std::array<ImagePlane, 3> color; ///< L, a, b with the Hunt adjustment, of the filtered image
+  ImagePlane edges;                ///< strength of edges and points in the unfiltered one
+  ImagePlane points;
 };
 
 /// Y, Cx, Cz of the image clamped to [0,1].
-std::array<Plane, 3> opponent_planes(const Image& image, std::span<const uint8_t> valid) {
-  std::array<Plane, 3> planes;
-  for (Plane& plane : planes) plane.resize(image.size.pixels());
+std::array<ImagePlane, 3> opponent_planes(const Image& image, std::span<const uint8_t> valid) {
+  std::array<ImagePlane, 3> planes;
+  for (ImagePlane& plane : planes) plane.resize(image.size.pixels());
   for_each_row(image.size, [&](uint32_t y) {
     for (size_t i = size_t{y} * image.size.width; i < (size_t{y} + 1) * image.size.width; ++i) {
       DVec3 rgb(0.0);
@@ -36,20 +36,20 @@ std::array<Plane, 3> opponent_planes(const Image& image, std::span<const uint8_t
   return planes;
 }
 
-Plane filter_contrast(const Plane& plane, ImageSize size, const std::vector<CsfTerm>& terms) {
-  Plane sum(plane.size(), 0.0);
+ImagePlane filter_contrast(const ImagePlane& plane, ImageSize size, const std::vector<CsfTerm>& terms) {
+  ImagePlane sum(plane.size(), 0.0);
   for (const CsfTerm& term : terms) {
-    const Plane filtered = filter_columns(filter_rows(plane, size, term.kernel), size, term.kernel);
+    const ImagePlane filtered = filter_columns(filter_rows(plane, size, term.kernel), size, term.kernel);
     for (size_t i = 0; i < sum.size(); ++i) sum[i] += term.share * filtered[i];
   }
   return sum;
 }
 
 /// Length per pixel of the vector of a detector along x and along y.
-Plane detect(const Plane& smooth_rows, const Plane& smooth_columns, ImageSize size,
-             const std::vector<double>& detector) {
-  Plane strength = filter_rows(smooth_columns, size, detector);
-  const Plane along_y = filter_columns(smooth_rows, size, detector);
+ImagePlane detect(const ImagePlane& smooth_rows, const ImagePlane& smooth_columns, ImageSize size,
+                  const std::vector<double>& detector) {
+  ImagePlane strength = filter_rows(smooth_columns, size, detector);
+  const ImagePlane along_y = filter_columns(smooth_rows, size, detector);
   for (size_t i = 0; i < strength.size(); ++i)
     strength[i] = std::sqrt(strength[i] * strength[i] + along_y[i] * along_y[i]);
   return strength;
@@ -57,14 +57,14 @@ Plane detect(const Plane& smooth_rows, const Plane& smooth_columns, ImageSize si
 
 Seen see(const Image& image, std::span<const uint8_t> valid, double pixels_per_degree) {
   const ImageSize size = image.size;
-  std::array<Plane, 3> opponent = opponent_planes(image, valid);
+  std::array<ImagePlane, 3> opponent = opponent_planes(image, valid);
 
   Seen seen;
-  Plane luminance = opponent[0];
+  ImagePlane luminance = opponent[0];
   for (double& value : luminance) value = (value + 16.0) / 116.0;
   const FeatureKernels kernels = feature_kernels(pixels_per_degree);
-  const Plane rows = filter_rows(luminance, size, kernels.smooth);
-  const Plane columns = filter_columns(luminance, size, kernels.smooth);
+  const ImagePlane rows = filter_rows(luminance, size, kernels.smooth);
+  const ImagePlane columns = filter_columns(luminance, size, kernels.smooth);
   seen.edges = detect(rows, columns, size, kernels.edge);
   seen.points = detect(rows, columns, size, kernels.point);
 

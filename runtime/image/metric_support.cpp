@@ -71,12 +71,12 @@ Image map_over(ImageSize size, std::span<const uint8_t> valid, const std::functi
   return map;
 }
 
-Plane filter_rows(const Plane& in, ImageSize size, std::span<const double> kernel) {
-  Plane out(in.size());
+ImagePlane filter_rows(const ImagePlane& in, ImageSize size, std::span<const double> kernel) {
+  ImagePlane out(in.size());
   const size_t radius = kernel.size() / 2, width = size.width;
   for_each_row(size, [&](uint32_t y) {
     const auto row = in.begin() + static_cast<ptrdiff_t>(y * width);
-    Plane padded(width + 2 * radius);
+    ImagePlane padded(width + 2 * radius);
     std::fill_n(padded.begin(), radius, row[0]);
     std::copy_n(row, width, padded.begin() + static_cast<ptrdiff_t>(radius));
     std::fill_n(padded.end() - static_cast<ptrdiff_t>(radius), radius, row[static_cast<ptrdiff_t>(width) - 1]);
@@ -87,8 +87,8 @@ Plane filter_rows(const Plane& in, ImageSize size, std::span<const double> kerne
   return out;
 }
 
-Plane filter_columns(const Plane& in, ImageSize size, std::span<const double> kernel) {
-  Plane out(in.size());
+ImagePlane filter_columns(const ImagePlane& in, ImageSize size, std::span<const double> kernel) {
+  ImagePlane out(in.size());
   const ptrdiff_t radius = static_cast<ptrdiff_t>(kernel.size() / 2), last = ptrdiff_t{size.height} - 1;
   for_each_row(size, [&](uint32_t y) {
     double* target = out.data() + size_t{y} * size.width;

@@ -10,7 +10,7 @@
 namespace packtrace {
 
 /// One value per pixel, rows top to bottom.
-using Plane = std::vector<double>;
+using ImagePlane = std::vector<double>;
 
 /// Calls row(y) for each row from several threads.
 void for_each_row(ImageSize size, const std::function<void(uint32_t y)>& row);
@@ -26,9 +26,9 @@ double mean_over(ImageSize size, std::span<const uint8_t> valid, const std::func
 Image map_over(ImageSize size, std::span<const uint8_t> valid, const std::function<double(size_t)>& value);
 
 /// result(x,y) = sum over k in [-r,r] of kernel[k + r] * in(clamp(x + k), y) for a kernel of 2r + 1 weights.
-Plane filter_rows(const Plane& in, ImageSize size, std::span<const double> kernel);
+ImagePlane filter_rows(const ImagePlane& in, ImageSize size, std::span<const double> kernel);
 /// The same along y.
-Plane filter_columns(const Plane& in, ImageSize size, std::span<const double> kernel);
+ImagePlane filter_columns(const ImagePlane& in, ImageSize size, std::span<const double> kernel);
 
 inline bool counts(std::span<const uint8_t> valid, size_t pixel) { return valid.empty() || valid[pixel] != 0; }
 

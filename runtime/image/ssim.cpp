@@ -31,8 +31,8 @@ public:
   }
 
   template <class Function>
-  Plane operator()(Function value) const {
-    Plane mean = filter(value);
+  ImagePlane operator()(Function value) const {
+    ImagePlane mean = filter(value);
     if (!weight_.empty())
       for (size_t i = 0; i < mean.size(); ++i) mean[i] = weight_[i] > 0.0 ? mean[i] / weight_[i] : 0.0;
     return mean;
@@ -40,8 +40,8 @@ public:
 
 private:
   template <class Function>
-  Plane filter(Function value) const {
-    Plane plane(size_.pixels());
+  ImagePlane filter(Function value) const {
+    ImagePlane plane(size_.pixels());
     for (size_t i = 0; i < plane.size(); ++i) plane[i] = counts(valid_, i) ? value(i) : 0.0;
     return filter_columns(filter_rows(plane, size_, window_), size_, window_);
   }
@@ -49,17 +49,17 @@ private:
   ImageSize size_;
   std::span<const uint8_t> valid_;
   std::array<double, kSsimWindow> window_;
-  Plane weight_;
+  ImagePlane weight_;
 };
 
 /// Adds one channel's SSIM to each pixel of sum.
-void add_channel(const Image& test, const Image& reference, uint32_t channel, const WindowMean& mean, Plane& sum) {
+void add_channel(const Image& test, const Image& reference, uint32_t channel, const WindowMean& mean, ImagePlane& sum) {
   const auto x = [&](size_t i) { return double{test.data[i * test.channels + channel]}; };
   const auto y = [&](size_t i) { return double{reference.data[i * reference.channels + channel]}; };
-  const Plane mx = mean(x), my = mean(y);
-  const Plane mxx = mean([&](size_t i) { return x(i) * x(i); });
-  const Plane myy = mean([&](size_t i) { return y(i) * y(i); });
-  const Plane mxy = mean([&](size_t i) { return x(i) * y(i); });
+  const ImagePlane mx = mean(x), my = mean(y);
+  const ImagePlane mxx = mean([&](size_t i) { return x(i) * x(i); });
+  const ImagePlane myy = mean([&](size_t i) { return y(i) * y(i); });
+  const ImagePlane mxy = mean([&](size_t i) { return x(i) * y(i); });
   for (size_t i = 0; i < sum.size(); ++i) {
     const double xx = mx[i] * mx[i], yy = my[i] * my[i], xy = mx[i] * my[i];
     sum[i] += (xy + xy + kC1) * (2.0 * (mxy[i] - xy) + kC2) / ((xx + yy + kC1) * ((mxx[i] - xx) + (myy[i] - yy) + kC2));
@@ -81,7 +81,7 @@ Metric ssim(const Image& test, const Image& reference, const MetricOptions& opti
   if (!any) throw Error(ErrorKind::kInput, "SSIM needs at least one window of 11 x 11 pixels around a valid pixel");
 
   const WindowMean mean(size, options.valid);
-  Plane similarity(size.pixels(), 0.0);
+  ImagePlane similarity(size.pixels(), 0.0);
   for (uint32_t c = 0; c < test.channels; ++c) add_channel(test, reference, c, mean, similarity);
   for (double& value : similarity) value /= test.channels;
 

@@ -104,53 +104,53 @@ GeometryCounts LodSource::counts(uint32_t blas) const { return {blas_[blas].vert
 
 void LodSource::decode(uint32_t blas, std::span<Vec3> positions, std::span<Triangle> triangles) const {
   assert(positions.size() == blas_[blas].vertices && triangles.size() == blas_[blas].triangles);
-  for (const LodCluster& c : clusters(blas)) {
+  for (const BlasCluster& c : clusters(blas)) {
     const ClusterView cluster = view(c);
     decode_positions(cluster, positions.subspan(c.first_vertex, cluster.vertex_count()));
     decode_indices(cluster, c.first_vertex, triangles.subspan(c.first_triangle, cluster.triangle_count()));
   }
 }
 
-const LodCluster& LodSource::find(uint32_t blas, uint32_t triangle) const {
-  const std::span<const LodCluster> all = clusters(blas);
+const BlasCluster& LodSource::find(uint32_t blas, uint32_t triangle) const {
+  const std::span<const BlasCluster> all = clusters(blas);
   const auto next = std::upper_bound(all.begin(), all.end(), triangle,
-                                     [](uint32_t t, const LodCluster& c) { return t < c.first_triangle; });
+                                     [](uint32_t t, const BlasCluster& c) { return t < c.first_triangle; });
   return *(next - 1);
 }
 
 uint32_t LodSource::triangle_number(uint32_t blas, uint32_t cluster, uint32_t triangle) const {
-  const std::span<const LodCluster> all = clusters(blas);
-  const auto found = std::lower_bound(all.begin(), all.end(), cluster, [&](const LodCluster& c, uint32_t number) {
+  const std::span<const BlasCluster> all = clusters(blas);
+  const auto found = std::lower_bound(all.begin(), all.end(), cluster, [&](const BlasCluster& c, uint32_t number) {
     return file_.geometries()[c.geometry].first_cluster + c.cluster < number;
   });
   return found->first_triangle + triangle;
 }
 
 uint32_t LodSource::material_of(uint32_t instance, uint32_t triangle) const {
-  const LodCluster& c = find(instances_[instance].geometry, triangle);
+  const BlasCluster& c = find(instances_[instance].geometry, triangle);
   return file_.instance_materials(instance)[file_.clusters(c.geometry)[c.cluster].material_slot];
 }
 
 std::optional<Vec3> LodSource::shading_normal(uint32_t blas, uint32_t triangle, Vec2 barycentrics) const {
-  const LodCluster& c = find(blas, triangle);
+  const BlasCluster& c = find(blas, triangle);
   return interpolated_normal(view(c), triangle - c.first_triangle, barycentrics);
 }
 
 void LodSource::look_up(std::span<const SurfaceQuery> places, std::span<SurfaceAttributes> out) const {
   look_up_in_clusters(file_, instances_, places, out, [&](uint32_t blas, uint32_t triangle, uint32_t& first) {
-    const LodCluster& c = find(blas, triangle);
+    const BlasCluster& c = find(blas, triangle);
     first = c.first_triangle;
     return view(c);
   });
 }
 
 Vec2 LodSource::uv(uint32_t blas, uint32_t triangle, Vec2 barycentrics) const {
-  const LodCluster& c = find(blas, triangle);
+  const BlasCluster& c = find(blas, triangle);
   return interpolated_uv(view(c), triangle - c.first_triangle, barycentrics);
 }
 
 SurfaceDetail LodSource::detail_of(uint32_t instance, uint32_t triangle) const {
-  const LodCluster& c = find(instances_[instance].geometry, triangle);
+  const BlasCluster& c = find(instances_[instance].geometry, triangle);
   return {c.level, static_cast<uint32_t>(file_.geometries()[c.geometry].first_cluster + c.cluster),
           static_cast<float>(c.error * stretch_[instance])};
 }
@@ -158,7 +158,7 @@ SurfaceDetail LodSource::detail_of(uint32_t instance, uint32_t triangle) const {
 Bounds LodSource::bounds(uint32_t blas) const {
   Bounds all;
   uint32_t last = ~0u;
-  for (const LodCluster& c : clusters(blas)) {
+  for (const BlasCluster& c : clusters(blas)) {
     if (c.geometry == last) continue;
     all.extend(object_bounds(file_.geometries()[last = c.geometry]));
   }
@@ -166,7 +166,7 @@ Bounds LodSource::bounds(uint32_t blas) const {
 }
 
 uint64_t LodSource::resident_bytes() const {
-  return source_.resident_bytes() + blas_.size() * sizeof(Blas) + clusters_.size() * sizeof(LodCluster) +
+  return source_.resident_bytes() + blas_.size() * sizeof(Blas) + clusters_.size() * sizeof(BlasCluster) +
          instances_.size() * (sizeof(PlacedGeometry) + sizeof(double));
 }
 

@@ -18,7 +18,7 @@ std::vector<LodGeometry> lod_geometries(const BakedFile& file);
 std::vector<LodInstance> lod_instances(const SceneSource& source);
 
 /// A cluster of a BLAS.
-struct LodCluster {
+struct BlasCluster {
   uint32_t geometry = 0; ///< of the file: the BLAS's geometry, or one of its levels
   uint32_t cluster = 0;  ///< of that geometry
   uint32_t level = 0;
@@ -61,7 +61,7 @@ public:
 
   /// The file's geometry that a BLAS is of.
   uint32_t base_geometry(uint32_t blas) const { return blas_[blas].geometry; }
-  std::span<const LodCluster> clusters(uint32_t blas) const {
+  std::span<const BlasCluster> clusters(uint32_t blas) const {
     return std::span(clusters_).subspan(blas_[blas].first_cluster, blas_[blas].cluster_count);
   }
   /// The box of all levels that the BLAS has clusters of; object space.
@@ -77,13 +77,13 @@ private:
   };
 
   void add_blas(const LodGeometry& geometry, uint32_t number, std::span<const uint64_t> passed);
-  const LodCluster& find(uint32_t blas, uint32_t triangle) const;
-  ClusterView view(const LodCluster& cluster) const { return file_.cluster(cluster.geometry, cluster.cluster); }
+  const BlasCluster& find(uint32_t blas, uint32_t triangle) const;
+  ClusterView view(const BlasCluster& cluster) const { return file_.cluster(cluster.geometry, cluster.cluster); }
 
   const BakedFile& file_;
   const PackedSource& source_;
   std::vector<Blas> blas_;
-  std::vector<LodCluster> clusters_;
+  std::vector<BlasCluster> clusters_;
   std::vector<PlacedGeometry> instances_;
   std::vector<double> stretch_; ///< by instance
 };

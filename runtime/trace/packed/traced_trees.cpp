@@ -99,7 +99,7 @@ TracedTrees chosen_trees(const BakedFile& file, const LodSource& source, LodTree
     if (joins[base] != 0 && world == baked::kNone) world = next_tree(baked::kWorldTree, kNoGeometry);
     const uint32_t tree = joins[base] != 0 ? world : next_tree(base, b);
     t.tree_of[b] = tree;
-    for (const LodCluster& c : source.clusters(b))
+    for (const BlasCluster& c : source.clusters(b))
       chosen[tree].clusters.push_back(static_cast<uint32_t>(file.geometries()[c.geometry].first_cluster + c.cluster));
   }
   if (world != baked::kNone)

@@ -108,7 +108,7 @@ TEST_F(LodSourceTest, NumbersTrianglesAsItDecodesThem) {
     std::vector<Vec3> positions(counts.vertices);
     std::vector<Triangle> triangles(counts.triangles);
     detailed.source.decode(b, positions, triangles);
-    for (const LodCluster& c : detailed.source.clusters(b)) {
+    for (const BlasCluster& c : detailed.source.clusters(b)) {
       const ClusterView view = baked_.file.cluster(c.geometry, c.cluster);
       const auto number = static_cast<uint32_t>(baked_.file.geometries()[c.geometry].first_cluster + c.cluster);
       coarse += c.level > 0;

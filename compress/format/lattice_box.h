@@ -1,0 +1,12 @@
+#pragma once
+
+#include "compress/format/position_grid.h"
+
+namespace packtrace {
+
+/// Smallest and largest lattice coordinates of something; both ends are inside.
+struct LatticeBox {
+  LatticePoint lo{}, hi{};
+};
+
+} // namespace packtrace
