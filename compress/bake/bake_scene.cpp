@@ -21,7 +21,6 @@
 #include "compress/bake/page_encoder.h"
 #include "compress/bake/requirement_table.h"
 #include "compress/bake/scene_measure.h"
-#include "compress/bake/touching_boxes.h"
 #include "compress/format/baked_image.h"
 #include "compress/format/bit_stream.h"
 #include "pbrt_import/scene/error.h"
@@ -67,7 +66,9 @@ public:
       result.bytes = encode_paged_file(BakedFile::borrow_bytes(result.bytes, "bake result"), config_.codec);
     }
     // Reading back what was written is part of the bake: nothing leaves it that a reader would refuse.
-    report_.file = summarize(BakedFile::borrow_bytes(result.bytes, "bake result"));
+    const BakedFile file = BakedFile::borrow_bytes(result.bytes, "bake result");
+    report_.file = summarize(file);
+    measure_seams(file);
     result.report = std::move(report_);
     return result;
   }
@@ -154,35 +155,32 @@ private:
            " geometries lie so far from the origin that float positions are coarser than the step of their grid");
   }
 
-  /// Leaves out what leaves the range of floats, and looks for instances that may open seams, as their grid is not that
-  /// of what lies beside them.
+  /// Leaves out what leaves the range of floats.
   void place_instances() {
-    std::vector<Bounds> boxes(plan_.instances.size());
-    std::vector<uint8_t> own_grid(boxes.size());
     std::vector<uint32_t> uses(plan_.geometries.size());
-    uint64_t instances = 0;
-    for (size_t i = 0; i < boxes.size(); ++i) {
-      baked::InstanceRecord& instance = plan_.instances[i];
+    for (baked::InstanceRecord& instance : plan_.instances) {
       if (instance.geometry == baked::kNone) continue;
       const uint32_t geometry = instance.geometry;
-      const Bounds& bounds = measures_[geometry].bounds;
-      if (const Bounds box = placed_box(instance, bounds); !box.empty() && !within_float_range(box)) {
+      if (const Bounds box = placed_box(instance, measures_[geometry].bounds);
+          !box.empty() && !within_float_range(box)) {
         plan_.left_out.push_back(beyond_float_range("an instance of " + plan_.geometries[geometry].name, box));
         instance.geometry = baked::kNone;
         continue;
       }
-      boxes[i] = placed_box(instance, grown(bounds, grids_[geometry].step()));
-      own_grid[i] = !plan_.geometries[geometry].world_space;
-      instances += own_grid[i];
       ++uses[geometry];
     }
     report_left_out(uses);
-    if (instances == 0) return;
-    report_.touching_instances = count_touching(boxes, own_grid);
-    if (report_.touching_instances > 0)
-      warn("instanced geometry keeps a grid of its own: the boxes of " + std::to_string(report_.touching_instances) +
-           " of " + std::to_string(instances) +
-           " instances touch other geometry, where seams may open by half a step of both grids");
+  }
+
+  /// Looks for instances whose grid is not that of what lies beside them.
+  void measure_seams(const BakedFile& file) {
+    report_.seams = InstanceSeams(file).summary();
+    const SeamSummary& seams = report_.seams;
+    if (seams.touching > 0)
+      warn("instanced geometry keeps a grid of its own: the boxes of " + std::to_string(seams.touching) + " of " +
+           std::to_string(seams.instances) + " instances touch other geometry, where seams may gape by up to " +
+           brief(seams.largest_gap) + ", half a step of both grids" +
+           (report_.lod_geometries > 0 ? ", and in coarser levels by the errors of both" : ""));
   }
 
   /// Gives what is left out an empty geometry, and empties geometries that nothing places any more.
@@ -201,11 +199,6 @@ private:
     measures_.emplace_back(), grids_.emplace_back(), packed_.emplace_back();
     for (baked::InstanceRecord& instance : plan_.instances)
       if (instance.geometry == baked::kNone) instance = {{1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, empty, 0};
-  }
-
-  static Bounds grown(Bounds box, double by) {
-    if (!box.empty()) box.lo -= by, box.hi += by;
-    return box;
   }
 
   void encode_textures() {
@@ -292,16 +285,19 @@ private:
     if (lod_wanted_[index] != 0 && draft.quantized.triangles.size() >= config_.lod_min_triangles) {
       LodLimits limits{config_.lod_levels + 1, {}};
       if (plan_.geometries[index].world_space) limits.locked = shared_borders_.locks(draft.quantized);
-      draft.packed.lod = find_or_build_lod(draft.quantized, draft.clusters, limits);
+      draft.packed.lod = find_or_build_lod(draft, limits);
     }
     return std::move(draft.packed);
   }
 
-  /// @param geometry is used up
-  EncodedLod find_or_build_lod(QuantizedGeometry& geometry, const GeometryClusters& clusters, const LodLimits& limits) {
+  /// @param draft its quantised geometry is used up
+  EncodedLod find_or_build_lod(Draft& draft, const LodLimits& limits) {
+    QuantizedGeometry& geometry = draft.quantized;
+    const GeometryClusters& clusters = draft.clusters;
     const LodKey key = store_ ? lod_key(geometry, clusters, limits) : LodKey{};
     if (store_)
-      if (std::optional<EncodedLod> found = store_->find(key)) {
+      if (std::optional<EncodedLod> found =
+              store_->find(key, {draft.packed.record, draft.packed.encoded, geometry.slot_class, limits.max_levels})) {
         ++resumed_;
         progress_.advance(kLodWork * clusters.triangles.size());
         return std::move(*found);
@@ -490,12 +486,18 @@ BakeReport bake_scene(const Scene& scene, const BakeConfig& config, const std::f
   progress.begin("writing the file", 0);
   write_file_bytes(file.path(), baked.bytes);
   file.commit();
-  forget_resumed_levels(config);
+  forget_resumed_levels(config, baked.report, diagnostics);
   return std::move(baked.report);
 }
 
-void forget_resumed_levels(const BakeConfig& config) {
-  if (!config.resume.empty()) LodStore(config.resume).clear();
+void forget_resumed_levels(const BakeConfig& config, BakeReport& report, Diagnostics& diagnostics) {
+  if (config.resume.empty()) return;
+  try {
+    LodStore(config.resume).clear();
+  } catch (const Error& error) {
+    report.warnings.push_back(std::string("levels of an interrupted bake stay: ") + error.what());
+    diagnostics.report(Severity::kWarning, {}, report.warnings.back());
+  }
 }
 
 } // namespace packtrace

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "compress/bake/bake_config.h"
+#include "compress/bake/seam_gaps.h"
 #include "compress/format/file_summary.h"
 #include "pbrt_import/scene/diagnostics.h"
 #include "pbrt_import/scene/progress.h"
@@ -23,13 +24,13 @@ struct BakeReport {
   uint64_t collapsed_triangles = 0;  ///< left out, as they have no area on their grid
   uint64_t coinciding_triangles = 0; ///< left out, as quantisation made them equal to another one
   uint64_t vanished_geometries = 0;  ///< of which no triangle is left
-  double source_area = 0.0;        ///< of all placed triangles, world units squared; where an instance stretches, about
-  double collapsed_area = 0.0;     ///< of collapsed_triangles, in the source, likewise
-  uint64_t shared_shapes = 0;      ///< shapes outside objects that use another's geometry
-  uint64_t instanced_shapes = 0;   ///< shapes outside objects that lie on a grid of their own as they share a geometry
-  uint64_t touching_instances = 0; ///< on grids of their own, in boxes that touch other geometry's
-  uint64_t shared_objects = 0;     ///< objects that use another's geometry
-  uint64_t unused_objects = 0;     ///< never instanced; not stored
+  double source_area = 0.0;      ///< of all placed triangles, world units squared; where an instance stretches, about
+  double collapsed_area = 0.0;   ///< of collapsed_triangles, in the source, likewise
+  uint64_t shared_shapes = 0;    ///< shapes outside objects that use another's geometry
+  uint64_t instanced_shapes = 0; ///< shapes outside objects that lie on a grid of their own as they share a geometry
+  SeamSummary seams;             ///< of instances on grids of their own
+  uint64_t shared_objects = 0;   ///< objects that use another's geometry
+  uint64_t unused_objects = 0;   ///< never instanced; not stored
   uint64_t unused_triangles = 0;
   uint64_t left_out = 0;   ///< shapes and instances that leave the float range; each is in the diagnostics
   double world_step = 0.0; ///< 0: no world-space geometry
@@ -63,7 +64,8 @@ BakedScene bake_to_bytes(const Scene& scene, const BakeConfig& config, Diagnosti
 BakeReport bake_scene(const Scene& scene, const BakeConfig& config, const std::filesystem::path& output, bool force,
                       Diagnostics& diagnostics, Progress& progress);
 
-/// Removes what an interrupted bake left in config.resume for the next one: the file is written. Throws Error(kIo).
-void forget_resumed_levels(const BakeConfig& config);
+/// Removes what an interrupted bake left in config.resume for the next one: the file is written. What cannot be removed
+/// is therefore no error but a warning.
+void forget_resumed_levels(const BakeConfig& config, BakeReport& report, Diagnostics& diagnostics);
 
 } // namespace packtrace

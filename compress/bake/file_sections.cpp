@@ -4,7 +4,6 @@
 #include <limits>
 
 #include "compress/format/baked_image.h"
-#include "compress/format/bit_stream.h"
 #include "pbrt_import/scene/error.h"
 
 namespace packtrace {
@@ -146,7 +145,7 @@ void FileSections::add_lod(uint32_t base, const EncodedLod& lod) {
 
 void FileSections::append(baked::GeometryRecord& record, const EncodedGeometry& encoded) {
   record.first_cluster = clusters_.size();
-  record.payload_offset = payload_.size();
+  record.payload_offset = payload_.size() - kReadSlackBytes;
   record.payload_bytes = encoded.payload.size();
   record.cluster_count = static_cast<uint32_t>(encoded.clusters.size());
   record.triangle_count = encoded.triangle_count;
@@ -156,26 +155,28 @@ void FileSections::append(baked::GeometryRecord& record, const EncodedGeometry& 
   record.class_clusters = encoded.class_clusters;
   geometries_.push_back(record);
   clusters_.insert(clusters_.end(), encoded.clusters.begin(), encoded.clusters.end());
-  payload_.insert(payload_.end(), encoded.payload.begin(), encoded.payload.end());
+  payload_.insert(payload_.end() - kReadSlackBytes, encoded.payload.begin(), encoded.payload.end());
   stream_bits_.indices += encoded.stream_bits.indices;
   stream_bits_.positions += encoded.stream_bits.positions;
   stream_bits_.normals += encoded.stream_bits.normals;
   stream_bits_.uvs += encoded.stream_bits.uvs;
 }
 
-void FileSections::build_trees() {
-  payload_.resize(payload_.size() + kReadSlackBytes);
+BakedSections FileSections::without_trees() const {
   BakedSections sections;
   sections.geometries = geometries_;
   sections.clusters = clusters_;
   sections.payload = payload_;
   sections.instances = instances_;
-  trees_ = build_packed_trees(sections);
-  payload_.resize(payload_.size() - kReadSlackBytes);
+  sections.lod_levels = lod_levels_;
+  sections.lod_groups = lod_groups_;
+  sections.lod_links = lod_links_;
+  return sections;
 }
 
+void FileSections::build_trees() { trees_ = build_packed_trees(without_trees()); }
+
 std::vector<std::byte> FileSections::assemble(const baked::SummaryRecord& summary) {
-  payload_.resize(payload_.size() + kReadSlackBytes);
   return assemble_baked_file({geometries_,
                               clusters_,
                               payload_,

@@ -9,6 +9,7 @@
 #include "compress/bake/lod/lod_encoder.h"
 #include "compress/bake/texture_encoder.h"
 #include "compress/format/baked_format.h"
+#include "compress/format/bit_stream.h"
 #include "compress/format/packed_trees.h"
 #include "pbrt_import/scene/scene.h"
 
@@ -35,6 +36,9 @@ public:
   const std::vector<baked::GeometryRecord>& geometries() const { return geometries_; }
   const ClusterView::StreamBits& stream_bits() const { return stream_bits_; }
 
+  /// Geometries, clusters, payload, instances and levels of detail as added so far. Valid until something is added.
+  BakedSections without_trees() const;
+
   /// Makes the trees of what was added. Throws as build_packed_trees().
   void build_trees();
 
@@ -51,7 +55,7 @@ private:
 
   std::vector<baked::GeometryRecord> geometries_;
   std::vector<baked::ClusterRecord> clusters_;
-  std::vector<uint8_t> payload_;
+  std::vector<uint8_t> payload_ = std::vector<uint8_t>(kReadSlackBytes); ///< ends with these zero bytes
   std::vector<baked::MaterialRecord> materials_;
   std::vector<baked::InstanceRecord> instances_;
   std::vector<baked::MaskRecord> masks_;

@@ -1,11 +1,9 @@
 #include "compress/bake/touching_boxes.h"
 
 #include <algorithm>
-#include <functional>
-#include <vector>
+#include <limits>
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
+#include <tbb/parallel_for.h>
 
 namespace packtrace {
 namespace {
@@ -22,26 +20,32 @@ bool overlap(const Bounds& a, const Bounds& b) {
 /// of node n is n + 1.
 class BoxTree {
 public:
-  explicit BoxTree(std::span<const Bounds> boxes) : boxes_(boxes) {
+  BoxTree(std::span<const Bounds> boxes, std::span<const double> sizes) : boxes_(boxes), sizes_(sizes) {
     for (uint32_t i = 0; i < boxes.size(); ++i)
       if (!boxes[i].empty()) order_.push_back(i);
     if (!order_.empty()) build(0, order_.size());
   }
 
-  bool touches_another(uint32_t box) const { return !boxes_[box].empty() && find(0, box); }
+  double smallest_touching(uint32_t box) const {
+    double smallest = std::numeric_limits<double>::infinity();
+    if (!boxes_[box].empty()) find_smallest(0, box, smallest);
+    return smallest;
+  }
 
 private:
   struct Node {
     Bounds bounds;
-    size_t begin = 0, end = 0, right = 0; ///< of order_; right == 0: a leaf
+    size_t begin = 0, end = 0, right = 0;                      ///< of order_; right == 0: a leaf
+    double smallest = std::numeric_limits<double>::infinity(); ///< size
   };
 
   size_t build(size_t begin, size_t end) {
     const size_t number = nodes_.size();
-    nodes_.push_back({{}, begin, end, 0});
+    nodes_.push_back({{}, begin, end});
     Bounds bounds, centres;
     for (size_t i = begin; i < end; ++i) bounds.extend(boxes_[order_[i]]), centres.extend(boxes_[order_[i]].centre());
     nodes_[number].bounds = bounds;
+    for (size_t i = begin; i < end; ++i) nodes_[number].smallest = std::min(nodes_[number].smallest, sizes_[order_[i]]);
     if (end - begin <= kLeafBoxes) return number;
     const DVec3 extent = centres.extent();
     const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
@@ -56,32 +60,34 @@ private:
     return number;
   }
 
-  bool find(size_t number, uint32_t box) const {
+  void find_smallest(size_t number, uint32_t box, double& smallest) const {
     const Node& node = nodes_[number];
-    if (!overlap(node.bounds, boxes_[box])) return false;
-    if (node.right != 0) return find(number + 1, box) || find(node.right, box);
+    if (node.smallest >= smallest || !overlap(node.bounds, boxes_[box])) return;
+    if (node.right != 0) {
+      const bool left_first = nodes_[number + 1].smallest <= nodes_[node.right].smallest;
+      find_smallest(left_first ? number + 1 : node.right, box, smallest);
+      find_smallest(left_first ? node.right : number + 1, box, smallest);
+      return;
+    }
     for (size_t i = node.begin; i < node.end; ++i)
-      if (order_[i] != box && overlap(boxes_[order_[i]], boxes_[box])) return true;
-    return false;
+      if (order_[i] != box && sizes_[order_[i]] < smallest && overlap(boxes_[order_[i]], boxes_[box]))
+        smallest = sizes_[order_[i]];
   }
 
   std::span<const Bounds> boxes_;
+  std::span<const double> sizes_;
   std::vector<uint32_t> order_;
   std::vector<Node> nodes_;
 };
 
 } // namespace
 
-uint64_t count_touching(std::span<const Bounds> boxes, std::span<const uint8_t> wanted) {
-  const BoxTree tree(boxes);
-  return tbb::parallel_reduce(
-      tbb::blocked_range<size_t>(0, boxes.size(), 256), uint64_t{0},
-      [&](const tbb::blocked_range<size_t>& range, uint64_t count) {
-        for (size_t i = range.begin(); i < range.end(); ++i)
-          count += wanted[i] != 0 && tree.touches_another(static_cast<uint32_t>(i));
-        return count;
-      },
-      std::plus<>());
+std::vector<double> smallest_touching(std::span<const Bounds> boxes, std::span<const double> sizes,
+                                      std::span<const uint32_t> asked) {
+  const BoxTree tree(boxes, sizes);
+  std::vector<double> result(asked.size());
+  tbb::parallel_for(size_t{0}, asked.size(), [&](size_t i) { result[i] = tree.smallest_touching(asked[i]); });
+  return result;
 }
 
 } // namespace packtrace

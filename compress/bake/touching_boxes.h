@@ -2,13 +2,15 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "pbrt_import/scene/bounds.h"
 
 namespace packtrace {
 
-/// How many of the boxes with wanted[i] != 0 touch or overlap any other box, wanted or not. Empty boxes touch nothing.
-/// Takes O(n log n) unless many boxes overlap in one axis only.
-uint64_t count_touching(std::span<const Bounds> boxes, std::span<const uint8_t> wanted);
+/// For each of the boxes that are asked about: the least size of any other box that touches or overlaps it, infinity
+/// where there is none. Empty boxes touch nothing. Takes O(n log n) unless many boxes overlap in one axis only.
+std::vector<double> smallest_touching(std::span<const Bounds> boxes, std::span<const double> sizes,
+                                      std::span<const uint32_t> asked);
 
 } // namespace packtrace

@@ -8,6 +8,7 @@
 
 #include "compress/format/baked_file.h"
 #include "compress/format/bit_stream.h"
+#include "compress/format/cluster_validation.h"
 #include "compress/format/lod_validation.h"
 #include "compress/format/tree_validation.h"
 #include "pbrt_import/scene/file_error.h"
@@ -247,34 +248,13 @@ private:
   }
 
   void check_clusters(size_t geometry, const baked::GeometryRecord& g) {
-    uint64_t triangles = 0, vertices = 0, of_class = 0;
-    uint32_t material_class = 0;
-    const uint8_t* payload = sections_.payload.data() + g.payload_offset;
-    for (uint32_t i = 0; i < g.cluster_count; ++i) {
-      const uint64_t number = g.first_cluster + i;
-      const baked::ClusterRecord& c = sections_.clusters[static_cast<size_t>(number)];
-      if (c.material_slot >= g.slot_count) fail("cluster", number, "material slot");
-      for (; material_class < 8 && of_class == g.class_clusters[material_class]; of_class = 0) ++material_class;
-      const uint32_t of_cluster = class_of_slot(first_slots_[geometry] + c.material_slot);
-      if (of_cluster != material_class) fail("cluster", number, "material class order");
-      ++of_class;
-      if (c.first_triangle != triangles || c.first_vertex != vertices)
-        fail("cluster", number, "first triangle or vertex");
-      if (!clusters_checked_)
-        if (const auto fault = find_cluster_fault(g, c, payload, g.payload_bytes)) fail("cluster", number, *fault);
-      if ((of_cluster & baked::kMaskedClass) != 0 && (c.flags & baked::kClusterHasUvs) == 0)
-        fail("cluster", number, "masked material without texture coordinates");
-      triangles += c.triangle_count;
-      vertices += c.vertex_count;
-    }
-    if (triangles != g.triangle_count || vertices != g.vertex_count) fail("geometry", geometry, "totals");
-    uint64_t classes = 0;
-    for (const uint32_t count : g.class_clusters) classes += count;
-    if (classes != g.cluster_count) fail("geometry", geometry, "material class counts");
-    for (size_t axis = 0; axis < 3; ++axis)
-      if (g.cluster_count > 0 && !(std::isfinite(g.bounds_lo[axis]) && std::isfinite(g.bounds_hi[axis]) &&
-                                   g.bounds_lo[axis] <= g.bounds_hi[axis]))
-        fail("geometry", geometry, "bounds");
+    const auto clusters = sections_.clusters.subspan(static_cast<size_t>(g.first_cluster), g.cluster_count);
+    const auto class_in_first = [&](uint32_t slot) { return class_of_slot(first_slots_[geometry] + slot); };
+    const auto fault = find_cluster_list_fault(g, clusters, sections_.payload.data() + g.payload_offset, class_in_first,
+                                               clusters_checked_);
+    if (!fault) return;
+    if (fault->cluster) fail("cluster", g.first_cluster + *fault->cluster, fault->what);
+    fail("geometry", geometry, fault->what);
   }
 
   void check_instances() {

@@ -23,6 +23,7 @@
 #include "runtime/commands/process_usage.h"
 #include "runtime/commands/progress_display.h"
 #include "runtime/commands/requirement_report.h"
+#include "runtime/commands/seam_report.h"
 #include "runtime/stopwatch.h"
 
 namespace packtrace {
@@ -105,7 +106,7 @@ nlohmann::json report(const BakeOptions& options, const BakeReport& baked, const
   json["mean_normal_error_degrees"] = baked.mean_normal_error_degrees;
   json["shared_shapes"] = baked.shared_shapes;
   json["instanced_shapes"] = baked.instanced_shapes;
-  json["touching_instances"] = baked.touching_instances;
+  json["seams"] = seams_json(baked.seams);
   json["shared_objects"] = baked.shared_objects;
   json["unused_objects"] = baked.unused_objects;
   json["left_out"] = baked.left_out;
@@ -164,7 +165,7 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   if (output) {
     progress.begin("writing the file", 0);
     output->write(scene.bytes);
-    forget_resumed_levels(config);
+    forget_resumed_levels(config, scene.report, diagnostics);
   }
   const BakeReport& baked = scene.report;
   const double bake_s = baking.seconds();

@@ -18,6 +18,7 @@
 #include "runtime/commands/json_output.h"
 #include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/progress_display.h"
+#include "runtime/commands/seam_report.h"
 
 namespace packtrace {
 namespace {
@@ -152,9 +153,12 @@ FileInfo info_of(const std::string& input, const InfoOptions& options, const Glo
   FileInfo info;
   if (is_baked_file(input)) {
     require_no_scene_choice(input, options.scene);
-    const FileSummary summary = summarize(BakedFile::open(input));
+    const BakedFile file = BakedFile::open(input);
+    const FileSummary summary = summarize(file);
+    const SeamSummary seams = InstanceSeams(file).summary();
     info.json = to_json(summary, globals.verbosity > 0);
-    info.text = to_text(summary, globals.verbosity > 0);
+    info.json["seams"] = seams_json(seams);
+    info.text = to_text(summary, globals.verbosity > 0) + seams_text(seams);
     info.row = table_row(input, summary.triangles, summary.placed_triangles, summary.disk.file_bytes,
                          fmt::format("{:.3g}", summary.max_position_error));
   } else {

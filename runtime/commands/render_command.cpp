@@ -25,6 +25,7 @@
 #include "runtime/commands/process_usage.h"
 #include "runtime/commands/progress_display.h"
 #include "runtime/commands/render_choices.h"
+#include "runtime/commands/seam_report.h"
 #include "runtime/render/renderer.h"
 #include "runtime/stopwatch.h"
 #include "runtime/trace/make_tracer.h"
@@ -240,6 +241,7 @@ void print(std::FILE* stream, const nlohmann::json& r) {
     fmt::print(stream, "  denoise   {:8.3f} s   {:.1f} ms a frame\n", seconds.at("denoise").get<double>(),
                seconds.at("denoise").get<double>() * 1e3 / frames);
   if (r.contains("lod")) fmt::print(stream, "{}", detail_text(r.at("lod")));
+  if (r.contains("seams")) fmt::print(stream, "{}", visible_seams_text(r.at("seams")));
   for (const auto& file : r.at("files")) fmt::print(stream, "wrote {}\n", file.get<std::string>());
 }
 
@@ -330,6 +332,12 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   nlohmann::json result = report(options, config, image, source, tracers, traced.detail, outputs.targets());
   result["seconds"]["load"] = timings.load_s;
   result["seconds"]["write"] = timings.write_s;
+  if (loaded.baked) {
+    const PrimaryCamera traced_pixels(
+        camera, {config.size.width * config.supersample, config.size.height * config.supersample});
+    result["seams"] =
+        visible_seams_json(InstanceSeams(*loaded.baked), image, traced_pixels, sees_levels ? &*traced.detail : nullptr);
+  }
   if (result.at("hit_pixels") == 0 && !globals.quiet)
     fmt::print(stderr, "{}: warning: this camera sees nothing of the scene; try --camera auto\n", options.input);
   if (json.wanted()) json.write(result);

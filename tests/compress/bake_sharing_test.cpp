@@ -85,7 +85,7 @@ TEST(BakeScene, ShapesOfOneMeshShareItHoweverSmall) {
   EXPECT_EQ(materials_of(file, 999), std::vector{999u});
   EXPECT_EQ(materials_of(file, 1000), std::vector{7u});
   EXPECT_EQ(file.world_from_object(999)[3], Vec3(2997, 0, 0));
-  EXPECT_EQ(baked.report.touching_instances, 0u);
+  EXPECT_EQ(baked.report.seams.touching, 0u);
   EXPECT_TRUE(baked.report.warnings.empty());
   EXPECT_LT(baked.bytes.size(), 1001 * (sizeof(baked::InstanceRecord) + 4 + sizeof(baked::MaterialRecord)) + 4096);
 }
@@ -121,11 +121,11 @@ TEST(BakeScene, InstancesOnGridsOfTheirOwnThatTouchAreCounted) {
   for (const double x : {0.0, 2.0, 9.0}) scene.shapes.emplace_back(0, 0, false, test::translation({x, 0, 0}));
   const BakeReport report = bake(scene).report;
   EXPECT_EQ(report.instanced_shapes, 3u);
-  EXPECT_EQ(report.touching_instances, 2u);
+  EXPECT_EQ(report.seams.touching, 2u);
   ASSERT_EQ(report.warnings.size(), 1u);
   EXPECT_NE(report.warnings[0].find("the boxes of 2 of 3 instances touch"), std::string::npos) << report.warnings[0];
   test::add_shape(scene, test::grid_mesh(2), test::translation({8.5, 0, 0}));
-  EXPECT_EQ(bake(scene).report.touching_instances, 3u);
+  EXPECT_EQ(bake(scene).report.seams.touching, 3u);
 }
 
 TEST(BakeScene, ObjectsThatDifferInMaterialShareAGeometry) {

@@ -1,5 +1,7 @@
 #include "compress/bake/touching_boxes.h"
 
+#include <algorithm>
+#include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -15,29 +17,37 @@ Bounds box(DVec3 lo, DVec3 hi) {
   return bounds;
 }
 
-TEST(TouchingBoxes, CountsLikeComparingAllPairs) {
+constexpr double kNone = std::numeric_limits<double>::infinity();
+
+TEST(TouchingBoxes, TheSmallestIsThatOfAllPairs) {
   test::Random random(3);
   for (const uint32_t count : {0u, 1u, 2u, 7u, 300u}) {
     std::vector<Bounds> boxes;
-    std::vector<uint8_t> wanted;
+    std::vector<double> sizes;
+    std::vector<uint32_t> asked;
     for (uint32_t i = 0; i < count; ++i) {
       const DVec3 at(random.uniform(0, 10), random.uniform(0, 10), random.uniform(0, 10));
       boxes.push_back(i % 11 == 5 ? Bounds{} : box(at, at + DVec3(random.uniform(0, 1))));
-      wanted.push_back(i % 3 != 0);
+      sizes.push_back(random.uniform(-5, 5));
+      if (i % 3 != 0) asked.push_back(i);
     }
-    uint64_t expected = 0;
-    for (size_t i = 0; i < boxes.size(); ++i) {
-      bool touches = false;
+    const std::vector<double> smallest = smallest_touching(boxes, sizes, asked);
+    ASSERT_EQ(smallest.size(), asked.size());
+    uint32_t touching = 0;
+    for (size_t k = 0; k < asked.size(); ++k) {
+      const size_t i = asked[k];
+      double expected = kNone;
       for (size_t j = 0; j < boxes.size(); ++j)
-        if (i != j && !boxes[i].empty() && !boxes[j].empty())
-          touches |= glm::all(glm::lessThanEqual(boxes[i].lo, boxes[j].hi)) &&
-                     glm::all(glm::lessThanEqual(boxes[j].lo, boxes[i].hi));
-      expected += wanted[i] != 0 && touches;
+        if (i != j && !boxes[i].empty() && !boxes[j].empty() &&
+            glm::all(glm::lessThanEqual(boxes[i].lo, boxes[j].hi)) &&
+            glm::all(glm::lessThanEqual(boxes[j].lo, boxes[i].hi)))
+          expected = std::min(expected, sizes[j]);
+      EXPECT_EQ(smallest[k], expected);
+      touching += expected != kNone;
     }
-    EXPECT_EQ(count_touching(boxes, wanted), expected) << count;
     if (count == 300) {
-      EXPECT_GT(expected, 20u);
-      EXPECT_LT(expected, 180u);
+      EXPECT_GT(touching, 20u);
+      EXPECT_LT(touching, 180u);
     }
   }
 }
@@ -46,8 +56,8 @@ TEST(TouchingBoxes, FacesThatMeetTouchAndEqualBoxesDo) {
   const std::vector<Bounds> boxes = {box({0, 0, 0}, {1, 1, 1}), box({1, 0, 0}, {2, 1, 1}),
                                      box({2.001, 0, 0}, {3, 1, 1}), box({5, 5, 5}, {5, 5, 5}),
                                      box({5, 5, 5}, {5, 5, 5})};
-  EXPECT_EQ(count_touching(boxes, std::vector<uint8_t>(5, 1)), 4u);
-  EXPECT_EQ(count_touching(boxes, std::vector<uint8_t>{0, 1, 1, 0, 1}), 2u);
+  EXPECT_EQ(smallest_touching(boxes, std::vector<double>{1, 2, 3, 4, 5}, std::vector<uint32_t>{0, 1, 2, 3, 4}),
+            (std::vector<double>{2, 1, kNone, 5, 4}));
 }
 
 } // namespace

@@ -67,6 +67,40 @@ TEST(CommandLine, DetailIsChosenByItsErrorInPixels) {
   }
 }
 
+/// The town's houses stand on its ground, each on a grid of its own.
+TEST(CommandLine, SeamsOfInstancesAreStatedAndSaidWhereTheyShow) {
+  const TemporaryFolder folder;
+  const std::string file = folder / "town.ptk", json = folder / "x.json";
+  const std::string scene = std::string(PACKTRACE_SOURCE_DIR) + "/assets/town/town.pbrt";
+  CommandResult result = run_packtrace({"bake", scene, "-o", file, "--lod", "all", "--json", json});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto baked = nlohmann::json::parse(read_text(json)).at("seams");
+  EXPECT_GT(baked.at("touching"), 5000u);
+  EXPECT_GT(baked.at("largest_gap"), 0.0);
+  EXPECT_NE(result.err.find("seams may gape by up to"), std::string::npos) << result.err;
+  result = run_packtrace({"info", file, "--json", json});
+  EXPECT_EQ(nlohmann::json::parse(read_text(json)).at("seams"), baked);
+  EXPECT_NE(result.out.find("seams gape by"), std::string::npos) << result.out;
+  const auto render = [&](std::vector<std::string> options) {
+    options.insert(options.begin(), {"render", file, "-o", folder / "x.png", "--size", "320x180", "--frames", "1",
+                                     "--no-denoise", "--force", "--json", json});
+    result = run_packtrace(options);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(read_text(json)).at("seams");
+  };
+  const auto whole = render({});
+  EXPECT_GT(whole.at("visible"), 100u);
+  EXPECT_EQ(whole.at("of_detail_px"), 0.0);
+  EXPECT_LT(whole.at("largest_px"), 0.5);
+  EXPECT_EQ(result.out.find("seams"), std::string::npos) << result.out;
+  const auto coarse = render({"--lod-error", "2"});
+  EXPECT_GT(coarse.at("of_detail_px"), 0.5);
+  EXPECT_LE(coarse.at("of_detail_px"), 4.0); // both sides
+  EXPECT_GT(coarse.at("above_half_a_pixel"), 0u);
+  EXPECT_NE(result.out.find("seams     may gape by"), std::string::npos) << result.out;
+  EXPECT_EQ(render({"--lod-error", "2", "--lod-rays", "occlusion"}), whole);
+}
+
 TEST(CommandLine, DetailForOcclusionRaysLeavesWhatTheCameraSees) {
   const BallsBench bench;
   ASSERT_EQ(run_packtrace({"bake", bench.scene(), "-o", bench.baked(), "--lod", "all"}).exit_code, 0);

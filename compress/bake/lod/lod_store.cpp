@@ -123,7 +123,8 @@ std::optional<EncodedLod> decode(std::span<const std::byte> bytes, const LodKey&
     return std::nullopt;
   size_t cluster = 0, byte = 0;
   for (const StoredLevel& level : levels) {
-    if (level.cluster_count > clusters.size() - cluster || level.payload_bytes > payload.size() - byte)
+    if (level.cluster_count > clusters.size() - cluster || level.payload_bytes > payload.size() - byte ||
+        level.reserved != 0)
       return std::nullopt;
     EncodedGeometry e;
     const auto first = clusters.begin() + static_cast<std::ptrdiff_t>(cluster);
@@ -176,11 +177,13 @@ std::filesystem::path LodStore::path_of(const LodKey& key) const {
   return folder_ / (name.data() + std::string(kExtension));
 }
 
-std::optional<EncodedLod> LodStore::find(const LodKey& key) const {
+std::optional<EncodedLod> LodStore::find(const LodKey& key, const LodBase& base) const {
   std::error_code not_there;
   if (!std::filesystem::is_regular_file(path_of(key), not_there)) return std::nullopt;
   try {
-    return decode(read_file_bytes(path_of(key)), key);
+    std::optional<EncodedLod> lod = decode(read_file_bytes(path_of(key)), key);
+    if (lod && find_stored_lod_fault(*lod, base)) return std::nullopt;
+    return lod;
   } catch (const Error&) {
     return std::nullopt; // cannot be read: to be made again
   }
@@ -210,11 +213,20 @@ void LodStore::keep(const LodKey& key, const EncodedLod& lod) const {
 void LodStore::clear() const {
   std::error_code error;
   std::vector<std::filesystem::path> ours;
-  for (const auto& entry : std::filesystem::directory_iterator(folder_, error))
-    if (entry.path().extension() == kExtension) ours.push_back(entry.path());
-  for (const std::filesystem::path& path : ours) std::filesystem::remove(path, error);
+  for (std::filesystem::directory_iterator at(folder_, error), end; !error && at != end; at.increment(error))
+    if (at->path().extension() == kExtension) ours.push_back(at->path());
   if (error) throw Error(ErrorKind::kIo, folder_.string() + ": " + error.message());
+  std::string first;
+  size_t left = 0;
+  for (const std::filesystem::path& path : ours) {
+    std::filesystem::remove(path, error);
+    if (error && left++ == 0) first = path.string() + ": " + error.message();
+  }
+  if (left > 1) first += ", and " + std::to_string(left - 1) + " more";
+  if (left > 0) throw Error(ErrorKind::kIo, "cannot remove " + first);
   std::filesystem::remove(folder_, error); // where something else is in it, it stays
+  if (error && error != std::errc::directory_not_empty)
+    throw Error(ErrorKind::kIo, "cannot remove " + folder_.string() + ": " + error.message());
 }
 
 } // namespace packtrace

@@ -345,35 +345,6 @@ TEST(LodFile, AnInterruptedBakeLeavesNoHalfMadeLevels) {
   EXPECT_GT(resumed, 0u);
 }
 
-TEST(LodFile, DamagedLevelsOfAnInterruptedBakeAreMadeAgain) {
-  const SceneFolder folder;
-  BuiltLod built = build_lod(torus_mesh(24, 16));
-  const LodKey key = lod_key(built.geometry, built.base, {9, {}});
-  EXPECT_NE(key, lod_key(built.geometry, built.base, {8, {}}));
-  const EncodedLod lod = encode_lod(built.geometry, built.lod);
-  const LodStore store(folder.path());
-  EXPECT_FALSE(store.find(key));
-  store.keep(key, lod);
-  const std::optional<EncodedLod> found = store.find(key);
-  ASSERT_TRUE(found);
-  ASSERT_EQ(found->levels.size(), lod.levels.size());
-  EXPECT_EQ(found->levels.back().encoded.payload, lod.levels.back().encoded.payload);
-  const std::filesystem::path path = std::filesystem::directory_iterator(folder.path())->path();
-  const std::vector<std::byte> good = read_file_bytes(path);
-  const auto is_found = [&](std::span<const std::byte> bytes) {
-    write_file_bytes(path, bytes);
-    return store.find(key).has_value();
-  };
-  for (size_t size = 0; size < good.size(); size += 1 + size / 64) EXPECT_FALSE(is_found(std::span(good).first(size)));
-  std::vector<std::byte> damaged = good;
-  for (size_t i = 0; i < good.size(); i += 1 + i / 64) {
-    damaged[i] ^= std::byte{4};
-    EXPECT_FALSE(is_found(damaged)) << i;
-    damaged[i] = good[i];
-  }
-  EXPECT_TRUE(is_found(good));
-}
-
 TEST(LodFile, SummaryCountsLevelsAndTheirBytes) {
   const BakedFile file = BakedFile::from_bytes(bake(mixed_scene(), lod_config()).bytes);
   const FileSummary s = summarize(file);
