@@ -1,14 +1,12 @@
 #include "pbrt_import/ply.h"
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
 
-#include "pbrt_import/number.h"
 #include "pbrt_import/ply_header.h"
+#include "pbrt_import/ply_source.h"
 #include "pbrt_import/scene/error.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
 #include "pbrt_import/tokenizer.h"
@@ -16,158 +14,15 @@
 namespace packtrace {
 namespace {
 
-static_assert(std::endian::native == std::endian::little);
+using ply::AsciiSource, ply::BinarySource, ply::fail_at, ply::load, ply::visit_type;
+
+constexpr std::string_view kVertices = "vertex", kFaces = "face", kStrips = "tristrips";
+bool is_read(const PlyElement& element) {
+  return element.count > 0 && (element.name == kVertices || element.name == kFaces || element.name == kStrips);
+}
 
 constexpr uint32_t kBadIndex = ~0u;                  // out of range for every mesh: dropped and counted with the others
 constexpr uint64_t kMaxVertices = uint64_t{1} << 31; // so that negative indices are out of range once unsigned
-
-template <class T>
-T byte_swapped(T value) {
-  auto bytes = std::bit_cast<std::array<std::byte, sizeof(T)>>(value);
-  std::reverse(bytes.begin(), bytes.end());
-  return std::bit_cast<T>(bytes);
-}
-
-template <class T, bool kSwap>
-T load(const std::byte* from) {
-  T value;
-  std::memcpy(&value, from, sizeof value);
-  return kSwap ? byte_swapped(value) : value;
-}
-
-/// Calls visitor.template operator()<T>() with the C++ type of a PLY type.
-template <class Visitor>
-auto visit_type(PlyType type, Visitor&& visitor) {
-  switch (type) {
-  case PlyType::kInt8:
-    return visitor.template operator()<int8_t>();
-  case PlyType::kUint8:
-    return visitor.template operator()<uint8_t>();
-  case PlyType::kInt16:
-    return visitor.template operator()<int16_t>();
-  case PlyType::kUint16:
-    return visitor.template operator()<uint16_t>();
-  case PlyType::kInt32:
-    return visitor.template operator()<int32_t>();
-  case PlyType::kUint32:
-    return visitor.template operator()<uint32_t>();
-  case PlyType::kFloat32:
-    return visitor.template operator()<float>();
-  case PlyType::kFloat64:
-    break;
-  }
-  return visitor.template operator()<double>();
-}
-
-/// Where the body is being read, and for messages, what.
-struct Position {
-  const PlyElement* element = nullptr;
-  uint64_t row = 0;
-};
-
-[[noreturn]] void fail_at(const Position& at, const std::string& problem) {
-  throw Error(ErrorKind::kInput, problem + " (in element " + in_quotes(at.element->name) + ", row " +
-                                     std::to_string(at.row) + " of " + std::to_string(at.element->count) + ")");
-}
-
-/// The values of a binary body, one by one.
-template <bool kSwap>
-class BinarySource {
-public:
-  static constexpr bool kBinary = true;
-  static constexpr bool kSwapped = kSwap;
-  explicit BinarySource(std::span<const std::byte> body) : next_(body.data()), end_(body.data() + body.size()) {}
-
-  uint64_t remaining() const { return static_cast<uint64_t>(end_ - next_); }
-  uint64_t min_row_size(const PlyElement& element) const { return element.fixed_row_bytes(); }
-  uint64_t min_item_size(PlyType type) const { return byte_size(type); }
-
-  double number(PlyType type) {
-    const std::byte* const from = take(byte_size(type));
-    return visit_type(type, [&]<class T>() { return static_cast<double>(load<T, kSwap>(from)); });
-  }
-  float real(PlyType type) { return static_cast<float>(number(type)); }
-  void skip(PlyType type, uint64_t count) { take(byte_size(type) * count); } // count <= remaining(): no overflow
-
-  /// The next size bytes, which are then behind.
-  const std::byte* take(uint64_t size) {
-    if (size > remaining()) fail_at(at, "the file is truncated");
-    const std::byte* const from = next_;
-    next_ += size;
-    return from;
-  }
-
-  Position at;
-
-private:
-  const std::byte* next_;
-  const std::byte* end_;
-};
-
-/// The words of an ASCII body. Line ends mean nothing more than blanks, as in the usual readers.
-class AsciiSource {
-public:
-  static constexpr bool kBinary = false;
-  explicit AsciiSource(std::span<const std::byte> bytes, size_t body_offset)
-      : begin_(reinterpret_cast<const char*>(bytes.data())), next_(begin_ + body_offset), end_(begin_ + bytes.size()) {}
-
-  uint64_t remaining() const { return static_cast<uint64_t>(end_ - next_) + 1; } // the last word needs no blank
-  uint64_t min_row_size(const PlyElement& element) const { return 2 * uint64_t{element.properties.size()}; }
-  uint64_t min_item_size(PlyType) const { return 2; }
-
-  double number(PlyType type) {
-    skip_blanks();
-    int32_t integer = 0;
-    if (type < PlyType::kFloat32 && can_scan()) {
-      if (const char* const after = scan_integer(next_, integer)) {
-        next_ = after;
-        return integer;
-      }
-    }
-    return parse<double>();
-  }
-  float real(PlyType) {
-    skip_blanks();
-    float value = 0.0f;
-    if (can_scan()) {
-      if (const char* const after = scan_float(next_, value)) {
-        next_ = after;
-        return value;
-      }
-    }
-    return parse<float>();
-  }
-  void skip(PlyType type, uint64_t count) {
-    for (uint64_t i = 0; i < count; ++i) number(type);
-  }
-
-  Position at;
-
-private:
-  static bool is_blank(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
-  bool can_scan() const { return static_cast<size_t>(end_ - next_) >= kScannerReach; }
-  void skip_blanks() {
-    while (next_ != end_ && is_blank(*next_)) ++next_;
-  }
-
-  template <class T>
-  T parse() {
-    const char* const word_end = std::find_if(next_, end_, is_blank);
-    const std::string_view word(next_, static_cast<size_t>(word_end - next_));
-    if (word.empty()) fail_at(at, "the file is truncated");
-    const NumberText<T> result = parse_number<T>(word);
-    if (result.used != word.size()) {
-      const auto line = std::count(begin_, next_, '\n') + 1;
-      fail_at(at, "line " + std::to_string(line) + ": expected a number, found " + in_quotes(word));
-    }
-    next_ = word_end;
-    return result.value;
-  }
-
-  const char* begin_;
-  const char* next_;
-  const char* end_;
-};
 
 /// Throws if the file is too short for the rows an element claims, so that allocating them is safe.
 template <class Source>
@@ -366,16 +221,65 @@ uint64_t read_triangle_run(BinarySource<kSwap>& source, uint64_t max_count, std:
   return count;
 }
 
+/// Which property of faces or strips lists their vertices.
+size_t index_list_of(const PlyElement& element) {
+  auto found = element.find("vertex_indices", true);
+  if (!found) found = element.find("vertex_index", true);
+  if (!found)
+    throw Error(ErrorKind::kInput, std::string(element.name == kFaces ? "the faces have" : "the strips have") +
+                                       " no list vertex_indices or vertex_index");
+  return *found;
+}
+
+/// Reads one list of strips, each of which ends with -1 or the list, and appends their triangles, every second one
+/// turned round. A repeated index only leads on to another place. Returns how many strips have fewer than three
+/// corners.
+template <class Source>
+uint64_t read_strip_list(Source& source, const PlyProperty& property, std::vector<Triangle>& triangles) {
+  const double restart = property.type == PlyType::kUint32 ? 4294967295.0 : -1.0;
+  const uint64_t length = read_list_length(source, property);
+  uint64_t too_short = 0, corners = 0; // of the current strip
+  uint32_t a = 0, b = 0;
+  const auto end_strip = [&] { too_short += corners > 0 && corners < 3, corners = 0; };
+  for (uint64_t i = 0; i < length; ++i) {
+    const double value = source.number(property.type);
+    if (value == restart) {
+      end_strip();
+      continue;
+    }
+    const uint32_t c = to_index(value);
+    if (corners >= 2 && a != b && b != c && a != c)
+      triangles.push_back(corners % 2 == 0 ? Triangle{a, b, c} : Triangle{b, a, c});
+    a = b, b = c, ++corners;
+  }
+  end_strip();
+  return too_short;
+}
+
+template <class Source>
+void read_strips(Source& source, const PlyElement& element, Mesh& mesh, const ReportFn& report) {
+  check_row_count(source, element);
+  const size_t indices = index_list_of(element);
+  uint64_t too_short = 0;
+  for (uint64_t& row = source.at.row; row < element.count; ++row)
+    for (size_t i = 0; i < element.properties.size(); ++i)
+      if (i == indices)
+        too_short += read_strip_list(source, element.properties[i], mesh.triangles);
+      else
+        skip_property(source, element.properties[i]);
+  if (too_short != 0 && report)
+    report(Severity::kWarning, 0, std::to_string(too_short) + " strips have fewer than three corners: ignored");
+}
+
 template <class Source>
 void read_faces(Source& source, const PlyElement& element, Mesh& mesh, const ReportFn& report) {
   check_row_count(source, element);
-  auto found = element.find("vertex_indices", true);
-  if (!found) found = element.find("vertex_index", true);
-  if (!found) throw Error(ErrorKind::kInput, "the faces have no list vertex_indices or vertex_index");
-  const PlyProperty& indices = element.properties[*found];
+  const size_t index_list = index_list_of(element);
+  const PlyProperty& indices = element.properties[index_list];
   const uint64_t triangle_size =
       source.min_row_size(element) + 3 * source.min_item_size(indices.type); // the estimate must not trust the count
-  mesh.triangles.reserve(static_cast<size_t>(std::min(element.count, source.remaining() / triangle_size)));
+  mesh.triangles.reserve(mesh.triangles.size() +
+                         static_cast<size_t>(std::min(element.count, source.remaining() / triangle_size)));
   const bool is_simple = element.properties.size() == 1 && byte_size(*indices.length_type) == 1 &&
                          (indices.type == PlyType::kInt32 || indices.type == PlyType::kUint32);
   uint64_t too_short = 0;
@@ -385,7 +289,7 @@ void read_faces(Source& source, const PlyElement& element, Mesh& mesh, const Rep
       if (row == element.count) break;
     }
     for (size_t i = 0; i < element.properties.size(); ++i) {
-      if (i != *found)
+      if (i != index_list)
         skip_property(source, element.properties[i]);
       else if (!read_polygon(source, indices, mesh.triangles))
         ++too_short;
@@ -399,33 +303,37 @@ void read_faces(Source& source, const PlyElement& element, Mesh& mesh, const Rep
 template <class Source>
 PlyMesh read_body(Source source, const PlyHeader& header, const ReportFn& report) {
   PlyMesh result;
-  int wanted = 2;
+  size_t wanted = 0;
+  for (const PlyElement& element : header.elements) wanted += is_read(element);
   for (const PlyElement& element : header.elements) {
     if (wanted == 0) break;
-    if (element.name == "vertex") {
-      read_vertices(source, element, result.mesh);
-      --wanted;
-    } else if (element.name == "face") {
-      read_faces(source, element, result.mesh, report);
-      --wanted;
-    } else {
+    wanted -= is_read(element);
+    if (!is_read(element))
       skip_element(source, element);
-    }
+    else if (element.name == kVertices)
+      read_vertices(source, element, result.mesh);
+    else if (element.name == kFaces)
+      read_faces(source, element, result.mesh, report);
+    else
+      read_strips(source, element, result.mesh, report);
   }
   result.dropped_triangles = drop_bad_triangles(result.mesh, report);
   return result;
 }
 
-/// Exactly one vertex and one face element, both with rows.
+/// One element of vertices and one of faces or of strips, or one of each, and rows of both kinds.
 void check_elements(const PlyHeader& header) {
-  for (const char* const name : {"vertex", "face"}) {
+  const auto rows = [&](std::string_view name) {
     const auto is_named = [&](const PlyElement& e) { return e.name == name; };
-    const auto count = std::count_if(header.elements.begin(), header.elements.end(), is_named);
-    if (count > 1) throw Error(ErrorKind::kInput, "more than one element '" + std::string(name) + "'");
-    if (count == 0 || header.find(name)->count == 0)
-      throw Error(ErrorKind::kInput, "no " + std::string(name == std::string_view("vertex") ? "vertices" : "faces"));
-  }
-  if (header.find("vertex")->count >= kMaxVertices)
+    if (std::count_if(header.elements.begin(), header.elements.end(), is_named) > 1)
+      throw Error(ErrorKind::kInput, "more than one element '" + std::string(name) + "'");
+    const PlyElement* const element = header.find(name);
+    return element ? element->count : 0;
+  };
+  if (rows(kVertices) == 0) throw Error(ErrorKind::kInput, "no vertices");
+  const uint64_t face_rows = rows(kFaces), strip_rows = rows(kStrips); // both are to be looked at
+  if (face_rows == 0 && strip_rows == 0) throw Error(ErrorKind::kInput, "no faces");
+  if (header.find(kVertices)->count >= kMaxVertices)
     throw Error(ErrorKind::kInput, "more than " + std::to_string(kMaxVertices - 1) +
                                        " vertices claimed: the file is damaged or too large");
 }

@@ -17,7 +17,8 @@ struct PlyMesh {
 
 /// Reads a PLY 1.0 file (ASCII, little- or big-endian binary) the way pbrt-v3's plymesh shape does: vertices x y z,
 /// optional nx ny nz, optional u v | s t | texture_u texture_v | texture_s texture_t, and polygons vertex_indices or
-/// vertex_index, which become fans (0,1,2), (0,2,3), ... . Everything else is skipped. No reference to bytes is kept.
+/// vertex_index, which become fans (0,1,2), (0,2,3), ... . Unlike pbrt-v3 it reads triangle strips too, the lists of an
+/// element "tristrips" with -1 between two strips. Everything else is skipped. No reference to bytes is kept.
 /// @param bytes the whole file; memory used is bounded by a small multiple of its size
 /// Throws Error(kInput), message without a file name, if the file is malformed, truncated or without vertices or faces.
 /// Source: Greg Turk, The PLY Polygon File Format, 1994.

@@ -136,6 +136,64 @@ TEST(Ply, EveryFormatAndTypeGivesTheSameMesh) {
   }
 }
 
+/// Eight corners, the number of which is in x, and lists of strips.
+std::string strips(Format format, const std::string& index,
+                   std::initializer_list<std::initializer_list<double>> lists) {
+  Writer writer(format);
+  writer.line("element vertex 8").line("property float x").line("property float y").line("property float z");
+  writer.line("element tristrips " + std::to_string(lists.size()));
+  writer.line("property list int " + index + " vertex_indices").line("end_header");
+  for (int i = 0; i < 8; ++i) writer.row("float", {double(i), double(i % 2), 0});
+  for (const auto& list : lists) writer.list("int", index, list);
+  return writer.text();
+}
+
+TEST(Ply, StripsTurnEverySecondTriangleAndStartAnewAtMinusOne) {
+  const std::vector<Triangle> expected{{0, 1, 2}, {2, 1, 3}, {2, 3, 4}, {5, 6, 7}, {1, 2, 3}};
+  for (const Format format : kFormats) {
+    for (const char* const index : {"int", "short", "char", "uint", "float"}) {
+      const double restart = index == std::string("uint") ? 4294967295.0 : -1.0;
+      const PlyMesh ply =
+          read(strips(format, index, {{0, 1, 2, 3, 4, restart, 5, 6, 7, restart, restart}, {1, 2, 3}, {}}));
+      EXPECT_EQ(ply.mesh.triangles, expected) << index;
+      EXPECT_EQ(ply.dropped_triangles, 0u);
+    }
+  }
+}
+
+TEST(Ply, StripsMayRepeatAnIndexToGoOnElsewhere) {
+  Reports reports;
+  const PlyMesh ply = read(strips(Format::kLittle, "int", {{0, 1, 2, 2, 5, 5, 6, 7}}), &reports);
+  EXPECT_EQ(ply.mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {4, 3, 5}})); // without corners 3 and 4
+  EXPECT_EQ(reports.messages, std::vector<std::string>{});
+}
+
+TEST(Ply, BadStripsAreCounted) {
+  Reports reports;
+  const PlyMesh ply = read(strips(Format::kAscii, "int", {{0, 1, 2, 99, 3, -2, 4}, {1, 2, -1, 3}, {-1}}), &reports);
+  EXPECT_EQ(ply.mesh.triangles, (std::vector<Triangle>{{0, 1, 2}}));
+  EXPECT_EQ(ply.dropped_triangles, 4u);
+  ASSERT_EQ(reports.messages.size(), 2u);
+  EXPECT_EQ(reports.messages[0], "2 strips have fewer than three corners: ignored");
+}
+
+TEST(Ply, FacesAndStripsAreAddedUp) {
+  const std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+      "element tristrips 1\nproperty list int int vertex_index\nproperty uchar group\n"
+      "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+      "0 0 0 1 0 0 0 1 0 1 1 0\n4 0 1 2 3 7\n3 3 2 0\n";
+  EXPECT_EQ(read(text).mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {2, 1, 3}, {3, 2, 0}}));
+}
+
+TEST(Ply, EveryTruncationOfStripsIsRefused) {
+  for (const Format format : {Format::kLittle, Format::kBig}) {
+    const std::string whole = strips(format, "int", {{0, 1, 2, 3}, {4, 5, 6}});
+    for (size_t size = 0; size < whole.size(); ++size) EXPECT_NE(error_of(whole.substr(0, size)), "") << size;
+  }
+  EXPECT_EQ(error_of(strips(Format::kAscii, "int", {})), "no faces");
+}
+
 TEST(Ply, ReadsFixedBytes) {
   static constexpr unsigned char kBody[] = {
       0x00, 0x00, 0x80, 0x3f, 0x00, 0x00, 0x00, 0xc0, 0x00, 0x00, 0x40, 0x40, // 1 -2 3
