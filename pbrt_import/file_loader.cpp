@@ -122,16 +122,10 @@ void FileLoader::report_ply(const PlyFile& file) {
 }
 
 void FileLoader::report_image(const ImageRequest& image, const Outcome& outcome) {
-  const uint64_t bad_pixels = image.summary.not_finite_pixels;
-  if (outcome.error.empty() && bad_pixels == 0) return;
   reporter_.set_sequence(image.sequence);
   const std::string file = "texture file " + in_quotes(image.path.string(), kMaxShownPath) + ": ";
-  if (!outcome.error.empty())
-    reporter_.error(image.place, file + outcome.error + "; it counts as white");
-  else
-    reporter_.warning(image.place, file + (bad_pixels == 1 ? "1 pixel is not finite; it counts as black"
-                                                           : std::to_string(bad_pixels) +
-                                                                 " pixels are not finite; they count as black"));
+  if (!outcome.error.empty()) reporter_.error(image.place, file + outcome.error + "; it counts as white");
+  for (const std::string& problem : image.summary.problems) reporter_.warning(image.place, file + problem);
 }
 
 } // namespace packtrace

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -16,9 +17,8 @@
 #define STB_IMAGE_IMPLEMENTATION
 #define STBI_NO_STDIO
 #define STBI_NO_LINEAR
-// What it decodes beyond these, JPEG above all, reads and writes outside of its buffers where files are damaged.
+// What it decodes beyond that, JPEG above all, reads and writes outside of its buffers where files are damaged.
 #define STBI_ONLY_PNG
-#define STBI_ONLY_TGA
 #include <stb/stb_image.h>
 
 #include "pbrt_import/number.h"
@@ -27,6 +27,7 @@
 #include "pbrt_import/scene/error.h"
 #include "pbrt_import/scene/exr_header.h"
 #include "pbrt_import/scene/png_chunks.h"
+#include "pbrt_import/tga.h"
 
 namespace packtrace {
 namespace {
@@ -37,6 +38,16 @@ constexpr const char* kDamaged = "damaged image: ";
 constexpr const char* kTruncated = "damaged image: the file is truncated";
 
 constexpr uint64_t kMostPixelsPerByte = 1u << 16; // PNG reaches 8256; EXR's DWAB compression has chunks of 96 bytes
+
+constexpr const char *kNotInPalette = "has a colour that the palette lacks; it counts as black",
+                     *kNotInPaletteMany = "have colours that the palette lacks; they count as black";
+
+/// Adds a problem that so many pixels have, if any.
+void add_problem(ImageSummary& summary, uint64_t pixels, std::string_view of_one, std::string_view of_more) {
+  if (pixels == 0) return;
+  const std::string subject = pixels == 1 ? "1 pixel " : std::to_string(pixels) + " pixels ";
+  summary.problems.push_back(subject + std::string(pixels == 1 ? of_one : of_more));
+}
 
 /// Takes pixels one after the other, rows from the top.
 class Summarizer {
@@ -52,14 +63,19 @@ public:
 
   void add(uint32_t x, uint32_t y, Vec3 pixel) {
     if (!is_finite(pixel)) {
-      ++summary_.not_finite_pixels;
+      ++not_finite_pixels_;
       return;
+    }
+    const bool nonzero = pixel.x != 0.0f || pixel.y != 0.0f || pixel.z != 0.0f;
+    if (pixel.x < 0.0f || pixel.y < 0.0f || pixel.z < 0.0f) {
+      ++negative_pixels_;
+      pixel = glm::max(pixel, Vec3(0.0f));
     }
     row_ += DVec3(pixel);
     if (want_colours_)
       for (size_t c = 0; c < 3; ++c)
         summary_.rgb[(static_cast<size_t>(y) * width_ + x) * 3 + c] = srgb8_of_linear(pixel[static_cast<int>(c)]);
-    if (want_mask_ && (pixel.x != 0.0f || pixel.y != 0.0f || pixel.z != 0.0f))
+    if (want_mask_ && nonzero)
       summary_.nonzero[static_cast<size_t>(y) * AlphaMask::row_words(width_) + x / 32] |= 1u << (x % 32);
   }
 
@@ -71,11 +87,16 @@ public:
 
   ImageSummary finish() {
     summary_.average = Vec3(total_ / (static_cast<double>(summary_.width) * summary_.height));
+    add_problem(summary_, not_finite_pixels_, "is not finite; it counts as black",
+                "are not finite; they count as black");
+    add_problem(summary_, negative_pixels_, "has a negative value, which counts as 0",
+                "have negative values, which count as 0");
     return std::move(summary_);
   }
 
 private:
   ImageSummary summary_;
+  uint64_t not_finite_pixels_ = 0, negative_pixels_ = 0;
   uint32_t width_;
   bool want_mask_, want_colours_;
   DVec3 row_{0.0}, total_{0.0};
@@ -114,93 +135,91 @@ ImageSummary summarize(const T* pixels, int width, int height, ImageWants wants,
   return summarizer.finish();
 }
 
-/// Bytes in memory as stb_image reads them, which takes whatever is behind the end of some formats as zeros.
-class StbStream {
-public:
-  explicit StbStream(std::span<const std::byte> bytes) : bytes_(bytes) {}
-  static stbi_io_callbacks callbacks() {
-    return {[](void* self, char* to, int size) { return static_cast<StbStream*>(self)->read(to, size); },
-            [](void* self, int count) { static_cast<StbStream*>(self)->skip(count); },
-            [](void* self) { return static_cast<StbStream*>(self)->at_end() ? 1 : 0; }};
-  }
-
-  /// More was asked for than there is.
-  bool truncated() const { return truncated_; }
-
-private:
-  int read(char* to, int size) {
-    const auto wanted = static_cast<size_t>(std::max(size, 0));
-    const size_t count = std::min(wanted, bytes_.size() - position_);
-    if (count > 0) std::memcpy(to, bytes_.data() + position_, count);
-    position_ += count;
-    // The first destination is stb_image's own buffer, which it fills with what there is; all others want every byte.
-    if (!buffer_) buffer_ = to;
-    if (to == buffer_ ? count == 0 : count < wanted) truncated_ = true;
-    return static_cast<int>(count);
-  }
-  void skip(int count) {
-    const auto left = static_cast<int64_t>(bytes_.size() - position_), at = static_cast<int64_t>(position_);
-    position_ += static_cast<size_t>(std::clamp<int64_t>(count, -at, left));
-  }
-  bool at_end() const { return position_ == bytes_.size(); }
-
-  std::span<const std::byte> bytes_;
-  size_t position_ = 0;
-  const char* buffer_ = nullptr;
-  bool truncated_ = false;
-};
-
-/// What is known of an image before stb_image decodes it.
-struct StoredImage {
-  uint32_t width = 0, height = 0;
-  uint32_t bits_per_sample = 8;
-};
-
-/// @param bytes whose header has been read
-ImageSummary decode_stb(std::span<const std::byte> bytes, const StoredImage& image, bool decode_srgb, ImageWants wants,
-                        uint64_t max_bytes) {
-  // stb_image holds up to two copies, of four channels at most.
-  const uint64_t pixel_bytes = image.bits_per_sample > 8 ? 16 : 8;
-  check_size(image.width, image.height, pixel_bytes, bytes.size(), max_bytes);
-  int width = 0, height = 0, channels = 0;
-  const auto load = [&](auto decode) {
-    StbStream stream(bytes);
-    const stbi_io_callbacks callbacks = StbStream::callbacks();
-    auto* const pixels = decode(&callbacks, &stream, &width, &height, &channels, 3);
-    std::unique_ptr<std::remove_pointer_t<decltype(pixels)>, StbFree> owner(pixels);
-    if (stream.truncated()) fail(kTruncated);
-    if (!owner) fail(std::string(kDamaged) + stbi_failure_reason());
-    return owner;
-  };
-  if (image.bits_per_sample > 8) {
-    const auto pixels = load(stbi_load_16_from_callbacks);
-    return summarize(pixels.get(), width, height, wants, [&](stbi_us v) {
-      return decode_srgb ? linear_from_srgb(static_cast<float>(v) / 65535.0f) : static_cast<float>(v) / 65535.0f;
-    });
-  }
-  const auto pixels = load(stbi_load_from_callbacks);
+/// What 8-bit values stand for, in linear RGB.
+std::array<float, 256> linear_of_bytes(bool decode_srgb) {
   std::array<float, 256> linear{};
   for (size_t i = 0; i < linear.size(); ++i) {
     const float v = static_cast<float>(i) / 255.0f;
     linear[i] = decode_srgb ? linear_from_srgb(v) : v;
   }
-  return summarize(pixels.get(), width, height, wants, [&](stbi_uc v) { return linear[v]; });
+  return linear;
 }
 
-/// PNG, or TGA, which has no mark of its own: what nothing else claims.
-ImageSummary read_stb(std::span<const std::byte> bytes, bool is_png, bool decode_srgb, ImageWants wants,
-                      uint64_t max_bytes) {
-  if (bytes.size() > static_cast<size_t>(INT32_MAX)) fail("the image file exceeds 2 GiB");
-  if (is_png) {
-    const PngHeader header = check_png_chunks(bytes, PngChecksums::kIgnore, kDamaged);
-    return decode_stb(bytes, {header.width, header.height, header.bits_per_sample}, decode_srgb, wants, max_bytes);
+/// stb_image's pixels of a PNG file whose chunks have been checked.
+template <class Sample>
+std::unique_ptr<Sample, StbFree> decode_png(std::span<const std::byte> bytes, int channels,
+                                            Sample* (*load)(const stbi_uc*, int, int*, int*, int*, int)) {
+  int width = 0, height = 0, stored_channels = 0;
+  std::unique_ptr<Sample, StbFree> pixels(load(reinterpret_cast<const stbi_uc*>(bytes.data()),
+                                               static_cast<int>(bytes.size()), &width, &height, &stored_channels,
+                                               channels));
+  if (!pixels) fail(std::string(kDamaged) + stbi_failure_reason());
+  return pixels;
+}
+
+ImageSummary read_palette_png(std::span<const std::byte> bytes, const PngHeader& header, bool decode_srgb,
+                              ImageWants wants) {
+  const PngPalette palette = png_palette(bytes, kDamaged);
+  const auto grey = decode_png(palette.indices_as_grey, 1, stbi_load_from_memory);
+  const std::array<float, 256> linear = linear_of_bytes(decode_srgb);
+  Summarizer summarizer(header.width, header.height, wants);
+  uint64_t out_of_range = 0;
+  const stbi_uc* pixel = grey.get();
+  for (uint32_t y = 0; y < header.height; ++y) {
+    for (uint32_t x = 0; x < header.width; ++x) {
+      const size_t index = *pixel++ / palette.grey_step;
+      out_of_range += index >= palette.colours.size();
+      const std::array<uint8_t, 3> colour =
+          index < palette.colours.size() ? palette.colours[index] : std::array<uint8_t, 3>{};
+      summarizer.add(x, y, {linear[colour[0]], linear[colour[1]], linear[colour[2]]});
+    }
+    summarizer.end_row();
   }
-  const auto* const data = reinterpret_cast<const stbi_uc*>(bytes.data());
-  int width = 0, height = 0, channels = 0;
-  if (!stbi_info_from_memory(data, static_cast<int>(bytes.size()), &width, &height, &channels))
-    fail("not an image in a known format (PNG, TGA, EXR, PFM, HDR)");
-  return decode_stb(bytes, {static_cast<uint32_t>(width), static_cast<uint32_t>(height)}, decode_srgb, wants,
-                    max_bytes);
+  ImageSummary summary = summarizer.finish();
+  add_problem(summary, out_of_range, kNotInPalette, kNotInPaletteMany);
+  return summary;
+}
+
+ImageSummary read_png(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants, uint64_t max_bytes) {
+  if (bytes.size() > static_cast<size_t>(INT32_MAX)) fail("the image file exceeds 2 GiB");
+  const PngHeader header = check_png_chunks(bytes, PngChecksums::kCount, kDamaged);
+  // stb_image holds up to two copies, of four channels at most.
+  check_size(header.width, header.height, header.bits_per_sample > 8 ? 16 : 8, bytes.size(), max_bytes);
+  const int width = static_cast<int>(header.width), height = static_cast<int>(header.height);
+  ImageSummary summary;
+  if (header.palette) {
+    summary = read_palette_png(bytes, header, decode_srgb, wants);
+  } else if (header.bits_per_sample > 8) {
+    const auto pixels = decode_png(bytes, 3, stbi_load_16_from_memory);
+    summary = summarize(pixels.get(), width, height, wants, [&](stbi_us v) {
+      return decode_srgb ? linear_from_srgb(static_cast<float>(v) / 65535.0f) : static_cast<float>(v) / 65535.0f;
+    });
+  } else {
+    const auto pixels = decode_png(bytes, 3, stbi_load_from_memory);
+    const std::array<float, 256> linear = linear_of_bytes(decode_srgb);
+    summary = summarize(pixels.get(), width, height, wants, [&](stbi_uc v) { return linear[v]; });
+  }
+  if (header.wrong_checksums > 0)
+    summary.problems.push_back(header.wrong_checksums == 1
+                                   ? std::string("a chunk has a wrong checksum; the image may be damaged")
+                                   : std::to_string(header.wrong_checksums) +
+                                         " chunks have wrong checksums; the image may be damaged");
+  return summary;
+}
+
+/// A format without a mark of its own: what nothing else claims.
+ImageSummary read_tga(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants, uint64_t max_bytes) {
+  const std::optional<TgaHeader> header = parse_tga_header(bytes);
+  if (!header) fail("not an image in a known format (PNG, TGA, EXR, PFM, HDR)");
+  check_size(header->width, header->height, 3, bytes.size(), max_bytes);
+  const TgaPixels pixels = decode_tga(bytes, *header);
+  const std::array<float, 256> linear = linear_of_bytes(decode_srgb);
+  ImageSummary summary = summarize(pixels.rgb.data(), static_cast<int>(header->width), static_cast<int>(header->height),
+                                   wants, [&](uint8_t v) { return linear[v]; });
+  add_problem(summary, pixels.pixels_out_of_range, kNotInPalette, kNotInPaletteMany);
+  add_problem(summary, pixels.surplus_pixels, "of the last run lies beyond the image's end; it is ignored",
+              "of the last run lie beyond the image's end; they are ignored");
+  return summary;
 }
 
 ImageSummary read_hdr(std::span<const std::byte> bytes, ImageWants wants, uint64_t max_bytes) {
@@ -352,7 +371,8 @@ ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, Imag
   if (text.starts_with("#?")) return read_hdr(bytes, wants, max_bytes);
   if (const std::string_view name = other_format(text); !name.empty())
     fail("images in " + std::string(name) + " format are not read, only PNG, TGA, EXR, PFM and HDR");
-  return read_stb(bytes, text.starts_with("\x89PNG"), decode_srgb, wants, max_bytes);
+  return text.starts_with("\x89PNG") ? read_png(bytes, decode_srgb, wants, max_bytes)
+                                     : read_tga(bytes, decode_srgb, wants, max_bytes);
 }
 
 } // namespace packtrace

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -12,12 +13,12 @@ namespace packtrace {
 
 /// What the importer keeps of a texture image.
 struct ImageSummary {
-  uint32_t width = 0;  ///< pixels
-  uint32_t height = 0; ///< pixels
-  Vec3 average{0.0f};  ///< linear RGB; pixels that are not finite count as 0
-  uint64_t not_finite_pixels = 0;
-  std::vector<uint8_t> rgb;      ///< AlbedoTexture's layout, clamped to [0, 1]; empty if not wanted or too large
-  std::vector<uint32_t> nonzero; ///< AlphaMask's layout: bit set where luminance is not 0
+  uint32_t width = 0;                ///< pixels
+  uint32_t height = 0;               ///< pixels
+  Vec3 average{0.0f};                ///< linear RGB; values that are negative or not finite count as 0
+  std::vector<std::string> problems; ///< what is wrong with the file, though it can be read
+  std::vector<uint8_t> rgb;          ///< AlbedoTexture's layout, clamped to [0, 1]; empty if not wanted or too large
+  std::vector<uint32_t> nonzero;     ///< AlphaMask's layout: bit set where luminance is not 0
 };
 
 /// What to keep of an image besides its size and average.
@@ -29,7 +30,7 @@ struct ImageWants {
 /// Images of more texels are known by their average only.
 inline constexpr uint64_t kMostTextureTexels = uint64_t{1} << 26;
 
-/// Reads PNG and TGA (stb_image), OpenEXR, PFM, which are pbrt's formats, and HDR; alpha channels are ignored, as pbrt
+/// Reads PNG, TGA, OpenEXR, PFM, which are pbrt's formats, and HDR; alpha channels are ignored, as pbrt
 /// does. Other formats are refused by name: pbrt does not read them either.
 /// @param bytes the whole file
 /// @param decode_srgb whether integer formats are sRGB-encoded

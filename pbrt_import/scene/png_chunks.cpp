@@ -14,6 +14,7 @@ namespace {
 
 constexpr std::string_view kSignature = "\x89PNG\r\n\x1a\n";
 constexpr size_t kChunkBytes = 12; // length, type, checksum
+constexpr uint32_t kPaletteColours = 3, kGreyColours = 0;
 constexpr uint64_t kDeflateRatio = 1032;
 /// What data may unpack to beyond what the header asks for: other readers ignore surplus too, but a few bytes must not
 /// demand gigabytes.
@@ -60,6 +61,7 @@ public:
     const std::string_view text(reinterpret_cast<const char*>(bytes_.data()), bytes_.size());
     if (!text.starts_with(kSignature)) damaged("its first bytes are not those of a PNG file");
     PngHeader header;
+    uint64_t wrong_checksums = 0;
     std::string_view type;
     for (size_t at = kSignature.size(); type != "IEND";) {
       if (bytes_.size() - at < kChunkBytes) damaged("the file is truncated");
@@ -67,14 +69,17 @@ public:
       if (length > bytes_.size() - at - kChunkBytes) damaged("the file is truncated");
       type = text.substr(at + 4, 4);
       const std::span<const std::byte> data = bytes_.subspan(at + 8, length);
-      if (checksums == PngChecksums::kVerify && checksum(at + 4, length + 4) != read_be32(bytes_, at + 8 + length))
-        damaged("wrong checksum");
+      if (checksum(at + 4, length + 4) != read_be32(bytes_, at + 8 + length)) {
+        if (checksums == PngChecksums::kVerify) damaged("wrong checksum");
+        ++wrong_checksums;
+      }
       if ((at == kSignature.size()) != (type == "IHDR")) damaged("the header chunk is not where it belongs");
       if (type == "IHDR") header = read_header(data);
       if (type == "IDAT") add(data);
       at += kChunkBytes + length;
     }
     check_amount(unpacked_bytes(header));
+    header.wrong_checksums = wrong_checksums;
     return header;
   }
 
@@ -96,6 +101,7 @@ private:
     if (header.width > INT32_MAX || header.height > INT32_MAX) damaged("impossible size");
     constexpr uint32_t kChannels[7] = {1, 0, 3, 1, 2, 0, 4}; // grey, RGB, palette, grey with alpha, RGBA
     header.channels = color_type < 7 ? kChannels[color_type] : 0;
+    header.palette = color_type == kPaletteColours;
     if (header.channels == 0) damaged("unknown kind of colours");
     const uint32_t bits = header.bits_per_sample;
     const bool fits = color_type == 0 ? bits <= 16 : color_type == 3 ? bits <= 8 : bits == 8 || bits == 16;
@@ -149,6 +155,33 @@ private:
 };
 
 } // namespace
+
+PngPalette png_palette(std::span<const std::byte> bytes, const std::string& complaint) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  PngPalette result;
+  result.indices_as_grey.assign(bytes.begin(), bytes.end());
+  std::string_view type;
+  for (size_t at = kSignature.size(); type != "IEND";) {
+    const size_t length = read_be32(bytes, at), data = at + 8;
+    type = text.substr(at + 4, 4);
+    if (type == "IHDR") {
+      result.indices_as_grey[data + 9] = std::byte{kGreyColours};
+      constexpr uint32_t kHighest = 255;
+      result.grey_step = kHighest / ((1u << std::to_integer<uint32_t>(bytes[data + 8])) - 1);
+    } else if (type == "PLTE") {
+      result.colours.resize(length / 3);
+      if (length % 3 != 0 || length == 0 || length > 256 * 3)
+        throw Error(ErrorKind::kInput, complaint + "wrong palette size");
+      std::memcpy(result.colours.data(), bytes.data() + data, length);
+    } else if (type == "tRNS") { // of another size for grey images; decoders skip what they do not know
+      std::memcpy(result.indices_as_grey.data() + at + 4, "tRNs", 4);
+    } else if (type == "IDAT" && result.colours.empty()) {
+      throw Error(ErrorKind::kInput, complaint + "no palette before the image data");
+    }
+    at += kChunkBytes + length;
+  }
+  return result;
+}
 
 PngHeader check_png_chunks(std::span<const std::byte> bytes, PngChecksums checksums, const std::string& complaint) {
   return Checker(bytes, complaint).check(checksums);

@@ -84,6 +84,18 @@ void write_png(const std::filesystem::path& path, const Image& image, PngTransfe
   write_file_bytes(path, encode_png(image, transfer));
 }
 
+/// stb_image takes whatever memory holds for colours that a palette lacks.
+void check_palette(std::span<const std::byte> bytes, std::string_view name) {
+  const PngPalette palette = png_palette(bytes, complaint_about(name));
+  int width = 0, height = 0, channels = 0;
+  const Malloced<stbi_uc> grey(stbi_load_from_memory(reinterpret_cast<const stbi_uc*>(palette.indices_as_grey.data()),
+                                                     static_cast<int>(bytes.size()), &width, &height, &channels, 1));
+  if (!grey) return; // the decoder finds the same
+  const std::span<const stbi_uc> indices(grey.get(), static_cast<size_t>(width) * static_cast<size_t>(height));
+  if (std::ranges::any_of(indices, [&](stbi_uc v) { return v / palette.grey_step >= palette.colours.size(); }))
+    throw Error(ErrorKind::kInput, complaint_about(name) + "pixels have colours that the palette lacks");
+}
+
 Image decode_png(std::span<const std::byte> bytes, std::string_view name, PngTransfer transfer) {
   if (bytes.size() > kMaxImageSamples) throw FileError(ErrorKind::kInput, std::string(name), "file is too large");
   const PngHeader header = check_png_chunks(bytes, PngChecksums::kVerify, complaint_about(name));
@@ -92,6 +104,7 @@ Image decode_png(std::span<const std::byte> bytes, std::string_view name, PngTra
     throw FileError(ErrorKind::kInput, std::string(name),
                     "image of " + std::to_string(size.width) + " x " + std::to_string(size.height) +
                         " pixels is too large");
+  if (header.palette) check_palette(bytes, name);
   const auto* memory = reinterpret_cast<const stbi_uc*>(bytes.data());
   const int memory_bytes = static_cast<int>(bytes.size());
   int width = 0, height = 0, channels = 0;

@@ -116,12 +116,12 @@ std::vector<HostileCase> images() {
       image_case("PngWithDamagedPixels", "a.png", flipped(good_png(), 41),
                  R"(scene.pbrt:2:1: error: texture file "a.png": damaged image: bad zlib header; it counts as white
 )"),
-      image_case("PngOfTooFewRows", "a.png", png(100, 100, 8, std::string(10, '\0')),
-                 R"(scene.pbrt:2:1: error: texture file "a.png": damaged image: too little data for its size; it counts as white
-)"),
       image_case(
-          "PngOfNoPixels", "a.png", png(0, 0, 8, ""),
-          R"(scene.pbrt:2:1: error: texture file "a.png": damaged image: it has no pixels; it counts as white
+          "PngOfTooFewRows", "a.png", png(100, 100, 8, std::string(10, '\0')),
+          R"(scene.pbrt:2:1: error: texture file "a.png": damaged image: too little data for its size; it counts as white
+)"),
+      image_case("PngOfNoPixels", "a.png", png(0, 0, 8, ""),
+                 R"(scene.pbrt:2:1: error: texture file "a.png": damaged image: it has no pixels; it counts as white
 )"),
       image_case(
           "PngOfTrillionsOfPixels", "a.png", png(1 << 24, 1 << 24, 8, ""),
@@ -145,7 +145,7 @@ std::vector<HostileCase> images() {
 )"),
       image_case(
           "TgaOfBillionsOfPixels", "a.tga", tga(65'535, 65'535, 0),
-          R"(scene.pbrt:2:1: error: texture file "a.tga": decoding its 65535 x 65535 pixels needs too much memory; it counts as white
+          R"(scene.pbrt:2:1: error: texture file "a.tga": damaged image: its 18 bytes cannot hold the 65535 x 65535 pixels it claims; it counts as white
 )"),
       image_case(
           "TgaOfMillionsOfPixels", "a.tga", tga(20'000, 20'000, 0),
@@ -238,9 +238,8 @@ std::vector<HostileCase> images() {
           "ExrOfMillionsOfColumns", "a.exr", exr_with_corner(16'000'000, 3),
           R"(scene.pbrt:2:1: error: texture file "a.exr": damaged image: its 351 bytes cannot hold the 16000001 x 4 pixels it claims; it counts as white
 )"),
-      image_case(
-          "ExrOfNoRows", "a.exr", exr_with_corner(3, -1),
-          R"(scene.pbrt:2:1: error: texture file "a.exr": the image has no pixels; it counts as white
+      image_case("ExrOfNoRows", "a.exr", exr_with_corner(3, -1),
+                 R"(scene.pbrt:2:1: error: texture file "a.exr": the image has no pixels; it counts as white
 )"),
       {"ImageMissing",
        world("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"gone.png\""),
@@ -329,9 +328,8 @@ TEST(HostileFiles, LargeAlphaImagesWithManyNodesAreApproximated) {
 
 TEST(HostileFiles, EveryTruncationOfAnImageIsAnError) {
   const SceneFolder folder;
-  for (const auto& [name, content] : {std::pair<std::string, std::string>{"a.png", good_png()},
-                                      {"a.tga", tga(3, 2, 6)},
-                                      {"a.exr", exr()}}) {
+  for (const auto& [name, content] :
+       {std::pair<std::string, std::string>{"a.png", good_png()}, {"a.tga", tga(3, 2, 6)}, {"a.exr", exr()}}) {
     for (size_t size = 0; size < content.size(); size += name == "a.exr" ? 7 : 1) {
       folder.write(name, content.substr(0, size));
       const Imported imported =

@@ -3,6 +3,7 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -163,6 +164,44 @@ TEST(PngImage, DataThatUnpackWithoutEndAreRefused) {
   EXPECT_EQ(complaint(png(4, 4, 8, kGrey, std::string(1 << 20, '\0'))), "");
 }
 
+/// What is wrong with a file that can be read.
+std::vector<std::string> problems(const std::string& file) { return read(file, true).problems; }
+using Problems = std::vector<std::string>;
+
+TEST(PngImage, WrongChecksumsAreReported) {
+  std::string file = png(2, 1, 8, kGrey, "\0\x40\x80"s);
+  EXPECT_EQ(problems(file), Problems{});
+  file[file.size() - 1] ^= 1;
+  EXPECT_EQ(problems(file), Problems{"a chunk has a wrong checksum; the image may be damaged"});
+  expect_average(file, Vec3(0x60 / 255.0f));
+  file[8 + 8 + 13] ^= 1; // of the header
+  EXPECT_EQ(problems(file), Problems{"2 chunks have wrong checksums; the image may be damaged"});
+}
+
+TEST(PngImage, ColoursBeyondThePaletteAreBlackAndReported) {
+  const Vec3 half_orange(0.5f, 0x40 / 255.0f, 0.0f);
+  for (const int bits : {2, 4, 8}) {
+    const std::string pixels = bits == 2 ? "\0\x70"s : bits == 4 ? "\0\x13"s : "\0\1\3"s; // colours 1 and 3 of two
+    EXPECT_EQ(problems(png(2, 1, bits, kPalette, pixels)),
+              Problems{"1 pixel has a colour that the palette lacks; it counts as black"});
+    expect_average(png(2, 1, bits, kPalette, pixels), half_orange);
+  }
+  EXPECT_EQ(problems(png(3, 1, 8, kPalette, "\0\1\2\xff"s)),
+            Problems{"2 pixels have colours that the palette lacks; they count as black"});
+}
+
+TEST(PngImage, PalettesOfEveryDepthAreRead) {
+  for (const int bits : {1, 2, 4, 8}) // two pixels of colours 0 and 1
+    expect_average(png(2, 1, bits, kPalette,
+                       '\0' + (bits == 8 ? "\0\1"s : std::string(1, static_cast<char>(1 << (8 - 2 * bits))))),
+                   {0.5f, 0x40 / 255.0f, 0.0f});
+  const std::string header = png_header(1, 1, 8, kPalette), data = chunk("IDAT", zlib_stream("\0\0"s)),
+                    end = chunk("IEND", "");
+  EXPECT_EQ(complaint(header + data + end), "damaged image: no palette before the image data");
+  EXPECT_EQ(complaint(header + chunk("PLTE", "\1\2") + data + end), "damaged image: wrong palette size");
+  expect_average(header + chunk("PLTE", "\xff\xff\xff") + chunk("tRNS", "\0"s) + data + end, Vec3(1.0f));
+}
+
 TEST(PngImage, DamageIsSurvived) {
   expect_robust(png(3, 2, 8, kRgb, std::string(20, '\2')));
   expect_robust(png(9, 9, 16, kRgba, std::string(1000, '\1'), 1));
@@ -186,6 +225,38 @@ TEST(TgaImage, EveryKindIsRead) {
   expect_average(tga(3, 2, 1, 8, "\x10\x30"), Vec3(0x20 / 255.0f));
   expect_average(tga(10, 200, 1, 24, "\xff\x10\x20\x30\xc7\x10\x20\x30"), colour);
   expect_average(tga(1, 2, 1, 8, "\1\1", "\x01\x02\x03\x10\x20\x30"), colour);
+}
+
+TEST(TgaImage, PixelsComeInEveryOrderAndDepth) {
+  const auto first_red = [](const std::string& file) {
+    return read_image(std::as_bytes(std::span(file)), true, ImageWants{false, true}, kBudget).rgb;
+  };
+  std::string file = tga(2, 2, 2, 24, "\0\0\x01\0\0\x02\0\0\x03\0\0\x04"s); // red 1 to 4
+  const auto reds = [&] {
+    const std::vector<uint8_t> rgb = first_red(file);
+    return std::vector<int>{rgb[0], rgb[3], rgb[6], rgb[9]};
+  };
+  EXPECT_EQ(reds(), (std::vector<int>{1, 2, 3, 4}));
+  file[17] = 0x00; // from the bottom left
+  EXPECT_EQ(reds(), (std::vector<int>{3, 4, 1, 2}));
+  file[17] = 0x10; // from the bottom right
+  EXPECT_EQ(reds(), (std::vector<int>{4, 3, 2, 1}));
+  expect_average(tga(2, 1, 1, 16, "\xe0\x7f"s), {1.0f, 1.0f, 0.0f});
+  expect_average(tga(3, 1, 1, 16, "\x40\x07"s), Vec3(0x40 / 255.0f));
+  expect_average(tga(9, 3, 1, 16, "\x82\1\0"s, "\x01\x02\x03\x10\x20\x30"),
+                 {0x30 / 255.0f, 0x20 / 255.0f, 0x10 / 255.0f});
+}
+
+TEST(TgaImage, WhatDoesNotFitIsReported) {
+  EXPECT_EQ(problems(tga(10, 3, 1, 24, "\x82\x10\x20\x30")), Problems{});
+  EXPECT_EQ(problems(tga(10, 2, 1, 24, "\x82\x10\x20\x30")),
+            Problems{"1 pixel of the last run lies beyond the image's end; it is ignored"});
+  EXPECT_EQ(problems(tga(10, 1, 1, 24, "\xff\x10\x20\x30")),
+            Problems{"127 pixels of the last run lie beyond the image's end; they are ignored"});
+  EXPECT_EQ(problems(tga(1, 3, 1, 8, "\1\2\xff"s, "\x01\x02\x03\x10\x20\x30")),
+            Problems{"2 pixels have colours that the palette lacks; they count as black"});
+  EXPECT_EQ(problems(tga(9, 3, 1, 8, "\x82\2"s, "\x01\x02\x03\x10\x20\x30")),
+            Problems{"3 pixels have colours that the palette lacks; they count as black"});
 }
 
 TEST(TgaImage, DamageIsSurvived) {
@@ -271,6 +342,16 @@ TEST(PfmImage, ColoursAndGreyAreRead) {
   expect_average("PF\n1 1\n-1.0\n" + samples, {0.25f, 0.5f, 1.0f});
   expect_average("Pf\n3 1\n-1.0\n" + samples, Vec3(1.75f / 3.0f));
   expect_robust("PF\n1 1\n-1.0\n" + samples);
+}
+
+TEST(PfmImage, NegativeValuesCountAsZeroAndAreReported) {
+  const float values[] = {0.5f, -1.0f, 0.25f, 0.5f, 1.0f, 0.25f, 0.0f, -0.0f, 0.0f};
+  const std::string file = "PF\n3 1\n-1.0\n" + std::string(reinterpret_cast<const char*>(values), sizeof values);
+  expect_average(file, {1.0f / 3.0f, 1.0f / 3.0f, 0.5f / 3.0f});
+  EXPECT_EQ(problems(file), Problems{"1 pixel has a negative value, which counts as 0"});
+  const float grey[] = {-1.0f, -2.0f, std::numeric_limits<float>::quiet_NaN()};
+  EXPECT_EQ(problems("Pf\n3 1\n-1.0\n" + std::string(reinterpret_cast<const char*>(grey), sizeof grey)),
+            (Problems{"1 pixel is not finite; it counts as black", "2 pixels have negative values, which count as 0"}));
 }
 
 // EXR
