@@ -71,7 +71,7 @@ void CameraCollector::add_camera(const Directive& directive, const TransformPair
                     realistic ? "realistic cameras are not supported; a perspective camera of 45 degrees stands for it"
                               : "unknown camera " + in_quotes(kind) + "; it is left out" +
                                     did_you_mean(closest_name(kind, kCameras)));
-    if (!realistic) return;
+    if (!realistic) return leave_out();
     ++ignored_["realistic_cameras"];
     camera.fov_degrees = 45.0;
     constexpr std::string_view kLens[] = {"lensfile", "aperturediameter", "focusdistance", "simpleweighting"};
@@ -97,9 +97,15 @@ void CameraCollector::add_camera(const Directive& directive, const TransformPair
   // The inverse of what is only invertible by the rounding of a flattening map may not be invertible itself.
   if (!is_invertible(camera_from_world.start) || !is_invertible(inverse(camera_from_world.start))) {
     reporter.error(directive.place, "the camera's transform has no inverse; the camera is left out");
-    return;
+    return leave_out();
   }
-  entry.world_from_camera = {inverse(camera_from_world.start), inverse(camera_from_world.end)};
+  if (!camera_from_world.known) {
+    reporter.error(directive.place, "a transform before the camera is ignored, so that nobody knows where it stands; "
+                                    "the camera is left out");
+    return leave_out();
+  }
+  entry.world_from_camera.start = inverse(camera_from_world.start);
+  entry.world_from_camera.end = inverse(camera_from_world.end);
   camera.world_from_camera = entry.world_from_camera.start;
   entries_.push_back(std::move(entry));
 }

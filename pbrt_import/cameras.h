@@ -20,9 +20,14 @@ public:
   /// @param ignored counts what the camera has and renders do without, as ImportStatistics::ignored
   explicit CameraCollector(std::map<std::string, uint64_t>& ignored) : ignored_(ignored) {}
 
-  /// @param camera_from_world the current transforms. Reports problems; a camera without an inverse is left out.
+  /// @param camera_from_world the current transforms. Reports problems; a camera is left out if they have no inverse or
+  ///   are not known: it would show something else than what was asked for.
   void add_camera(const Directive& directive, const TransformPair& camera_from_world, Reporter& reporter);
   void add_film(const Directive& directive, Reporter& reporter);
+
+  /// Counts a camera that cannot be used; add_camera() does so by itself.
+  void leave_out() { ++left_out_; }
+  uint64_t left_out() const { return left_out_; }
 
   /// When the shutter of the camera that pbrt renders with opens; 0 without cameras.
   double shutter_open() const { return entries_.empty() ? 0.0 : entries_.back().camera.shutter_open; }
@@ -67,6 +72,7 @@ private:
 
   std::map<std::string, uint64_t>& ignored_;
   std::vector<Entry> entries_;
+  uint64_t left_out_ = 0;
   Film last_film_;
 };
 

@@ -19,7 +19,19 @@ bool file_exists(const std::filesystem::path& path) {
 FileNames::FileNames(std::filesystem::path folder, bool allow_outside)
     : folder_(std::move(folder)), allow_outside_(allow_outside) {}
 
-std::filesystem::path FileNames::resolve(std::string_view raw, const Place& place, Reporter& reporter) const {
+void FileNames::mention(std::string_view raw) {
+  bool unknown_escape = false;
+  if (const std::string name = unescape(raw, unknown_escape); !name.empty())
+    named_.insert((folder_ / name).lexically_normal().string());
+}
+
+std::vector<std::filesystem::path> FileNames::take_named() {
+  std::vector<std::filesystem::path> paths;
+  while (!named_.empty()) paths.emplace_back(std::move(named_.extract(named_.begin()).value()));
+  return paths;
+}
+
+std::filesystem::path FileNames::resolve(std::string_view raw, const Place& place, Reporter& reporter) {
   bool unknown_escape = false;
   const std::string name = unescape(raw, unknown_escape);
   if (name.empty()) {
@@ -50,6 +62,7 @@ std::filesystem::path FileNames::resolve(std::string_view raw, const Place& plac
       return {};
     }
   }
+  named_.insert(path.string());
   return path;
 }
 

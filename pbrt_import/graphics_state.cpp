@@ -52,6 +52,7 @@ void GraphicsState::concatenate(const DAffine& map) {
 void GraphicsState::set_transform(const DAffine& map) {
   if (active_ & 1) transform_.start = map;
   if (active_ & 2) transform_.end = map;
+  if (active_ == 3) transform_.known = true;
 }
 
 void GraphicsState::set_transform(const TransformPair& pair) { transform_ = pair; }

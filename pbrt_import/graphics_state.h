@@ -41,6 +41,7 @@ private:
 struct TransformPair {
   DAffine start{1.0};
   DAffine end{1.0};
+  bool known = true; ///< false: a directive that should have changed it was ignored
 };
 
 /// What AttributeBegin saves, names apart.
@@ -82,6 +83,8 @@ public:
   void set_transform(const DAffine& map);
   void set_transform(const TransformPair& pair);
   void reset_transform();
+  /// A directive that should have changed the transform is ignored.
+  void lose_transform() { transform_.known = false; }
   /// Bit 0: start, bit 1: end.
   void set_active(uint8_t bits) { active_ = bits, animated_ = true; }
 

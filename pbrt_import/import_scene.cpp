@@ -21,7 +21,7 @@ void check_options(const ImportOptions& options) {
   require(options.max_included_files >= 1, "max_included_files must be at least 1");
   require(options.max_nesting >= 1, "max_nesting must be at least 1");
   require(options.memory_budget_bytes >= 1, "memory_budget_bytes must be at least 1");
-  require(options.world >= 1, "worlds are numbered from 1");
+  require(!options.world || *options.world >= 1, "worlds are numbered from 1");
   require(!options.time || std::isfinite(*options.time), "the time must be finite");
   require(options.tessellation_tolerance >= 1e-6 && options.tessellation_tolerance <= 0.5,
           "tessellation_tolerance must lie within [1e-6, 0.5]");
@@ -51,7 +51,7 @@ ImportResult import_scene(const std::filesystem::path& main_file, const ImportOp
   std::error_code error;
   const uint64_t main_bytes = std::filesystem::file_size(main_file, error);
   progress.begin("reading scene", error ? 0 : main_bytes);
-  const FileNames file_names(main_file.parent_path(), options.allow_files_outside_scene_folder);
+  FileNames file_names(main_file.parent_path(), options.allow_files_outside_scene_folder);
   Parser parser(source, file_names, reporter);
   SceneBuilder builder(options, file_names, reporter, progress);
   Directive directive;
@@ -66,6 +66,7 @@ ImportResult import_scene(const std::filesystem::path& main_file, const ImportOp
   }
   reporter.next_directive(); // what is missing at the end comes after everything else
   ImportResult result = builder.finish(source.place(), progress);
+  result.files.push_back(main_file);
   result.statistics.files_read += source.files_opened();
   result.statistics.bytes_read += source.bytes_read();
   reporter.finish();

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "pbrt_import/scene/diagnostics.h"
 #include "pbrt_import/scene/progress.h"
@@ -22,8 +23,9 @@ struct ImportOptions {
   double tessellation_tolerance = 1e-3;         ///< relative to the curved shape's radius, within [1e-6, 0.5]
   bool allow_files_outside_scene_folder = true; ///< exporters write "../textures/x.png"
   bool keep_textures = false;                   ///< fill Scene::textures; else materials have averages only
-  uint32_t world = 1;                           ///< which WorldBegin ... WorldEnd with its options, from 1
-  std::optional<double> time;                   ///< when to look at what moves; none: as the camera's shutter opens
+  /// Which WorldBegin ... WorldEnd with its options, from 1. None: the first, with a warning where there are more.
+  std::optional<uint32_t> world;
+  std::optional<double> time; ///< when to look at what moves; none: as the camera's shutter opens
 };
 
 /// What an import read, for reports.
@@ -44,6 +46,7 @@ struct ImportStatistics {
   uint64_t animated_shapes = 0;              ///< in the scene, those of objects once
   uint64_t animated_instances = 0;
   uint64_t animated_cameras = 0;
+  uint64_t cameras_left_out = 0;           ///< not in the scene because of an error in them or in their transform
   std::array<uint64_t, 3> problems{};      ///< reported, by Severity
   std::map<std::string, uint64_t> ignored; ///< features met that nothing is made of, docs/json_output.md names them
 };
@@ -51,6 +54,7 @@ struct ImportStatistics {
 struct ImportResult {
   Scene scene;
   ImportStatistics statistics;
+  std::vector<std::filesystem::path> files; ///< that the scene is made of: all it names, read or not, in no order
 };
 
 /// Reads a pbrt-v3 scene with everything it includes. Problems are reported to diagnostics, each with its place, and

@@ -64,17 +64,25 @@ std::string describe(const Parameter& parameter) {
   return in_quotes(std::string(to_string(parameter.type)) + ' ' + parameter.name);
 }
 
-void ParameterList::keep() {
-  constexpr size_t kLinearSearch = 32; // longer lists are hostile or wrong: last wins through find() going backwards
+const Parameter* ParameterList::keep() {
+  constexpr size_t kLinearSearch = 32;
   Parameter& last = parameters_.back();
   types_ |= bit_of(last.type);
-  if (parameters_.size() > kLinearSearch + 1) return;
-  for (Parameter& existing : std::span(parameters_).first(parameters_.size() - 1))
-    if (existing.type == last.type && existing.name == last.name) {
-      existing = std::move(last);
-      parameters_.pop_back();
-      return;
-    }
+  Parameter* same = nullptr;
+  if (parameters_.size() <= kLinearSearch + 1) {
+    for (Parameter& existing : std::span(parameters_).first(parameters_.size() - 1))
+      if (existing.type == last.type && existing.name == last.name) same = &existing;
+  } else { // no scene needs so many, but hostile ones have them
+    const auto key = [](const Parameter& parameter) { return static_cast<char>(parameter.type) + parameter.name; };
+    if (index_.empty())
+      for (size_t i = 0; i + 1 < parameters_.size(); ++i) index_.emplace(key(parameters_[i]), i);
+    const auto [found, inserted] = index_.try_emplace(key(last), parameters_.size() - 1);
+    if (!inserted) same = &parameters_[found->second];
+  }
+  if (!same) return nullptr;
+  *same = std::move(last);
+  parameters_.pop_back();
+  return same;
 }
 
 const Parameter* ParameterList::find_type_in(uint32_t type_bits, std::string_view name) const {
@@ -86,6 +94,13 @@ const Parameter* ParameterList::find_type_in(uint32_t type_bits, std::string_vie
       return &*it;
     }
   return nullptr;
+}
+
+const Parameter* ParameterList::peek(std::string_view name, ParameterType type) const {
+  if ((types_ & bit_of(type)) == 0) return nullptr;
+  const auto found = std::find_if(parameters_.begin(), parameters_.end(),
+                                  [&](const Parameter& p) { return p.type == type && p.name == name; });
+  return found == parameters_.end() ? nullptr : &*found;
 }
 
 float ParameterList::get_float(std::string_view name, float fallback) const {

@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
 
 #include "pbrt_import/number_array.h"
@@ -62,11 +63,17 @@ std::string describe(const Parameter& parameter);
 /// it as used; what stays unused is a mistake in the scene worth reporting.
 class ParameterList {
 public:
-  /// A new parameter to be filled in; then keep() or drop() it.
+  /// A new parameter to be filled in as last(); then keep() or drop() it.
   Parameter& append() { return parameters_.emplace_back(); }
-  void keep();
+  Parameter& last() { return parameters_.back(); }
+  /// It replaces one of the same name and type, if there is one.
+  /// @return null, or where it is now instead of the one before it
+  const Parameter* keep();
   void drop() { parameters_.pop_back(); }
-  void clear() { parameters_.clear(), asked_.clear(), types_ = 0; }
+  void clear() {
+    parameters_.clear(), asked_.clear(), types_ = 0;
+    if (!index_.empty()) index_ = {}; // with its buckets
+  }
   bool empty() const { return parameters_.empty(); }
   std::span<const Parameter> all() const { return parameters_; }
 
@@ -76,6 +83,9 @@ public:
     for (const ParameterType type : types) bits |= bit_of(type);
     return find_type_in(bits, name);
   }
+
+  /// The same, but for one type and without marking it as used.
+  const Parameter* peek(std::string_view name, ParameterType type) const;
 
   /// First value of a parameter with exactly one value, else the fallback.
   float get_float(std::string_view name, float fallback) const;
@@ -105,8 +115,9 @@ private:
   const Parameter* find_type_in(uint32_t type_bits, std::string_view name) const;
 
   std::vector<Parameter> parameters_;
-  uint32_t types_ = 0;                          ///< bit_of() all of them
-  mutable std::vector<std::string_view> asked_; ///< literals, some of them often
+  std::unordered_map<std::string, size_t> index_; ///< into parameters_ by type and name, where there are many
+  uint32_t types_ = 0;                            ///< bit_of() all of them
+  mutable std::vector<std::string_view> asked_;   ///< literals, some of them often
 };
 
 /// `; did you mean "x"?` or nothing.

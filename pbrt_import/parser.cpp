@@ -4,19 +4,11 @@
 #include <cmath>
 #include <limits>
 #include <type_traits>
+#include <utility>
 
 #include "pbrt_import/number.h"
 
 namespace packtrace {
-
-struct DirectiveInfo {
-  std::string_view keyword;
-  DirectiveKind kind;
-  uint8_t numbers = 0;
-  uint8_t names = 0;
-  bool parameters = false;
-};
-
 namespace {
 
 using K = DirectiveKind;
@@ -45,81 +37,9 @@ std::string describe(const Token& token) {
   return {};
 }
 
-constexpr DirectiveInfo kInfos[] = {
-    {"Accelerator", K::kAccelerator, 0, 1, true},
-    {"ActiveTransform", K::kActiveTransform, 0, 1, false},
-    {"AreaLightSource", K::kAreaLightSource, 0, 1, true},
-    {"AttributeBegin", K::kAttributeBegin},
-    {"AttributeEnd", K::kAttributeEnd},
-    {"Camera", K::kCamera, 0, 1, true},
-    {"ConcatTransform", K::kConcatTransform, 16},
-    {"CoordSysTransform", K::kCoordSysTransform, 0, 1, false},
-    {"CoordinateSystem", K::kCoordinateSystem, 0, 1, false},
-    {"Film", K::kFilm, 0, 1, true},
-    {"Identity", K::kIdentity},
-    {"Include", K::kInclude, 0, 1, false},
-    {"Integrator", K::kIntegrator, 0, 1, true},
-    {"LightSource", K::kLightSource, 0, 1, true},
-    {"LookAt", K::kLookAt, 9},
-    {"MakeNamedMaterial", K::kMakeNamedMaterial, 0, 1, true},
-    {"MakeNamedMedium", K::kMakeNamedMedium, 0, 1, true},
-    {"Material", K::kMaterial, 0, 1, true},
-    {"MediumInterface", K::kMediumInterface, 0, 2, false},
-    {"NamedMaterial", K::kNamedMaterial, 0, 1, false},
-    {"ObjectBegin", K::kObjectBegin, 0, 1, false},
-    {"ObjectEnd", K::kObjectEnd},
-    {"ObjectInstance", K::kObjectInstance, 0, 1, false},
-    {"PixelFilter", K::kPixelFilter, 0, 1, true},
-    {"ReverseOrientation", K::kReverseOrientation},
-    {"Rotate", K::kRotate, 4},
-    {"Sampler", K::kSampler, 0, 1, true},
-    {"Scale", K::kScale, 3},
-    {"Shape", K::kShape, 0, 1, true},
-    {"Texture", K::kTexture, 0, 3, true},
-    {"Transform", K::kTransform, 16},
-    {"TransformBegin", K::kTransformBegin},
-    {"TransformEnd", K::kTransformEnd},
-    {"TransformTimes", K::kTransformTimes, 2},
-    {"Translate", K::kTranslate, 3},
-    {"WorldBegin", K::kWorldBegin},
-    {"WorldEnd", K::kWorldEnd},
-};
-static_assert(std::size(kInfos) == 37);
-
-constexpr size_t kSlots = 128;
-
-/// Few collisions among the keywords, and independent of a word's length.
-constexpr size_t slot_of(std::string_view word) {
-  const auto letter = [&](size_t i) { return static_cast<size_t>(static_cast<unsigned char>(word[i])); };
-  return (letter(0) * 5 + letter(word.size() / 2) * 11 + letter(word.size() - 1) * 3 + word.size() * 17) % kSlots;
+bool is_directive(const Token& token) {
+  return token.kind == TokenKind::kWord && find_directive(token.text) != nullptr;
 }
-
-/// Open addressing: index into kInfos plus one, 0 where free.
-constexpr std::array<uint8_t, kSlots> make_slots() {
-  std::array<uint8_t, kSlots> slots{};
-  for (size_t i = 0; i < std::size(kInfos); ++i) {
-    size_t slot = slot_of(kInfos[i].keyword);
-    while (slots[slot] != 0) slot = (slot + 1) % kSlots;
-    slots[slot] = static_cast<uint8_t>(i + 1);
-  }
-  return slots;
-}
-
-const DirectiveInfo* find_info(std::string_view keyword) {
-  static constexpr std::array<uint8_t, kSlots> kSlotTable = make_slots();
-  if (keyword.empty()) return nullptr;
-  for (size_t slot = slot_of(keyword); kSlotTable[slot] != 0; slot = (slot + 1) % kSlots)
-    if (kInfos[kSlotTable[slot] - 1].keyword == keyword) return &kInfos[kSlotTable[slot] - 1];
-  return nullptr;
-}
-
-std::string_view closest_directive(std::string_view word) {
-  std::vector<std::string_view> keywords;
-  for (const DirectiveInfo& info : kInfos) keywords.push_back(info.keyword);
-  return closest_name(word, keywords);
-}
-
-bool is_directive(const Token& token) { return token.kind == TokenKind::kWord && find_info(token.text) != nullptr; }
 
 bool is_letter(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'); }
 
@@ -128,6 +48,10 @@ bool is_number(const Token& token) {
   if (token.kind != TokenKind::kWord) return false;
   const size_t used = parse_number<double>(token.text).used;
   return used == token.text.size() || (used > 0 && !is_letter(token.text[0]));
+}
+
+std::string unknown_directive(const Token& token) {
+  return "unknown directive " + describe(token) + did_you_mean(closest_directive(token.text));
 }
 
 bool is_numeric(ParameterType type) {
@@ -158,6 +82,33 @@ NumberText<T> parse_word(std::string_view word) {
   return number;
 }
 
+/// What a parameter's declaration holds; empty where it has fewer words.
+struct DeclaredWords {
+  std::string_view type, name, more;
+};
+
+DeclaredWords split_declaration(std::string_view text) {
+  const auto is_gap = [](char c) { return c == ' ' || c == '\t'; };
+  const auto* p = text.begin();
+  const auto word = [&] {
+    p = std::find_if_not(p, text.end(), is_gap);
+    const auto* const start = p;
+    p = std::find_if(p, text.end(), is_gap);
+    return std::string_view(start, p);
+  };
+  DeclaredWords words;
+  words.type = word();
+  words.name = word();
+  words.more = word();
+  return words;
+}
+
+/// Whether a string is a parameter's declaration rather than a value.
+bool declares(std::string_view text) {
+  const DeclaredWords words = split_declaration(text);
+  return parameter_type(words.type) && !words.name.empty() && words.more.empty();
+}
+
 /// Components per value: values come in multiples of it.
 size_t components(ParameterType type) {
   switch (type) {
@@ -183,14 +134,13 @@ bool Parser::next(Directive& directive) {
   while (true) {
     const Token& token = source_.peek();
     if (token.kind == TokenKind::kEnd) return false;
-    const DirectiveInfo* const info = token.kind == TokenKind::kWord ? find_info(token.text) : nullptr;
+    const DirectiveInfo* const info = token.kind == TokenKind::kWord ? find_directive(token.text) : nullptr;
     if (!info) {
       const bool number = is_number(token);
       const bool word = token.kind == TokenKind::kWord && !number;
-      std::string message = word     ? "unknown directive " + describe(token)
+      std::string message = word     ? unknown_directive(token)
                             : number ? "expected a directive, found the number " + describe(token)
                                      : "expected a directive, found " + describe(token);
-      if (word) message += did_you_mean(closest_directive(token.text));
       if (token.kind != TokenKind::kBadByte) reporter_.error(source_.place(), std::move(message));
       const uint32_t line = token.line;
       source_.consume();
@@ -205,12 +155,10 @@ bool Parser::next(Directive& directive) {
     directive.damaged = false;
     directive.parameters.clear();
     source_.consume();
-    const uint64_t cut_before = source_.cut_strings();
-    const bool readable = read_arguments(*info, directive);
-    if (source_.cut_strings() != cut_before) directive.damaged = true;
-    if (!readable) {
+    if (!read_arguments(*info, directive)) {
       skip_to_directive(directive.place.line);
-      continue;
+      if (info->kind == K::kInclude) continue;
+      directive.damaged = true;
     }
     if (info->kind != K::kInclude) return true;
     const std::filesystem::path path = file_names_.resolve(include_name_, directive.place, reporter_);
@@ -223,7 +171,7 @@ bool Parser::read_arguments(const DirectiveInfo& info, Directive& directive) {
   if (info.kind == K::kActiveTransform) {
     const Token& token = source_.peek();
     if (token.kind != TokenKind::kWord) {
-      report_unexpected("All, StartTime or EndTime after ActiveTransform");
+      report_unexpected("All, StartTime or EndTime after ActiveTransform", "; it is ignored");
       return false;
     }
     directive.names[directive.name_count++] = std::string(token.text);
@@ -231,7 +179,7 @@ bool Parser::read_arguments(const DirectiveInfo& info, Directive& directive) {
     return true;
   }
   if (!read_directive_names(info, directive)) return false;
-  if (info.parameters) read_parameters(directive);
+  if (info.parameters) read_parameters(directive.parameters);
   return true;
 }
 
@@ -262,7 +210,8 @@ bool Parser::read_directive_names(const DirectiveInfo& info, Directive& directiv
     const Token& token = source_.peek();
     if (token.kind != TokenKind::kString) {
       if (info.kind == K::kMediumInterface && directive.name_count == 1) return true;
-      report_unexpected("a quoted name after " + std::string(info.keyword));
+      const std::string keyword(info.keyword);
+      report_unexpected("a quoted name after " + keyword, "; " + keyword + " is ignored");
       if (token.kind == TokenKind::kWord && !is_directive(token)) source_.consume(); // reported
       return false;
     }
@@ -277,13 +226,14 @@ bool Parser::read_directive_names(const DirectiveInfo& info, Directive& directiv
   return true;
 }
 
-void Parser::report_unexpected(const std::string& expected) {
+/// What is there instead of what was expected.
+/// @param consequence ends the message, such as "; it is ignored"
+void Parser::report_unexpected(const std::string& expected, const std::string& consequence) {
   const Token& token = source_.peek();
-  if (token.kind == TokenKind::kBadByte) return; // reported already
-  if (token.kind == TokenKind::kUnterminatedString)
-    reporter_.error(source_.place(), "string without its closing quote: " + in_quotes(token.text));
-  else
-    reporter_.error(source_.place(), "expected " + expected + ", found " + describe(token));
+  const bool unterminated = token.kind == TokenKind::kUnterminatedString;
+  reporter_.error(source_.place(), (unterminated ? "string without its closing quote: " + in_quotes(token.text)
+                                                 : "expected " + expected + ", found " + describe(token)) +
+                                       consequence);
 }
 
 /// To what is a directive, or stands where one would and may be meant to be one: a word in front of a line behind line.
@@ -329,54 +279,91 @@ void Parser::read_number_run(Values& values) {
   while (take_number(values));
 }
 
-void Parser::read_parameters(Directive& directive) {
-  while (source_.peek().kind == TokenKind::kString) {
-    Parameter& parameter = directive.parameters.append();
-    parameter.place = source_.place();
-    const bool declared = read_declaration(source_.peek().text, parameter);
-    source_.consume();
-    if (!declared) skip_value();
-    if (declared && read_values(parameter)) {
-      cut_excess(parameter);
-      directive.parameters.keep();
+/// Everything up to the next directive. What is malformed costs the parameter that it belongs to, and no other.
+void Parser::read_parameters(ParameterList& list) {
+  while (true) {
+    if (misread_) {
+      Parameter& parameter = list.append();
+      parameter.place = misread_->place;
+      const bool declared = read_declaration(std::exchange(misread_, std::nullopt)->text, parameter);
+      read_value_of_last(list, declared);
+      continue;
+    }
+    const Token& token = source_.peek();
+    if (token.kind == TokenKind::kEnd || is_directive(token)) return;
+    if (token.kind == TokenKind::kString) {
+      Parameter& parameter = list.append();
+      parameter.place = source_.place();
+      const bool declared = read_declaration(token.text, parameter);
+      source_.consume();
+      read_value_of_last(list, declared);
+    } else if (token.kind == TokenKind::kWord && !is_number(token)) {
+      if (!skip_stray_word()) return;
     } else {
-      directive.parameters.drop();
-      directive.damaged = true;
+      skip_stray_value(list);
     }
   }
-  if (source_.peek().kind == TokenKind::kWord || source_.peek().kind == TokenKind::kEnd) return;
-  report_unexpected("a parameter or a directive");
-  directive.damaged = true;
-  const uint32_t line = source_.place().line;
+}
+
+/// The value of the parameter that was appended last; without a value that can be used the parameter goes.
+/// @param declared whether its type and name are known
+void Parser::read_value_of_last(ParameterList& list, bool declared) {
+  if (!declared) skip_value();
+  if (!declared || !read_values(list.last())) return list.drop();
+  cut_excess(list.last());
+  if (const Parameter* const again = list.keep())
+    reporter_.warning(again->place, "parameter " + describe(*again) + " is given again; the last one counts");
+}
+
+/// A word among parameters: a stray one if they go on behind it, else a misspelled directive, which takes its arguments
+/// with it.
+/// @return whether parameters go on behind it
+bool Parser::skip_stray_word() {
+  const Place place = source_.place();
+  const std::string stray = "expected a parameter or a directive, found " + describe(source_.peek());
+  const std::string unknown = unknown_directive(source_.peek());
   source_.consume();
-  skip_to_directive(line);
+  const Token& next = source_.peek();
+  const bool goes_on = next.kind == TokenKind::kString && declares(next.text);
+  reporter_.error(place, goes_on ? stray + "; it is ignored" : unknown);
+  if (!goes_on) skip_to_directive(place.line);
+  return goes_on;
+}
+
+/// What no parameter begins with: a value, a bracket, half a string.
+void Parser::skip_stray_value(const ParameterList& list) {
+  const std::string after = list.empty() ? "" : " after " + describe(list.all().back());
+  const Token& token = source_.peek();
+  const bool array = token.kind == TokenKind::kOpen, number = token.kind == TokenKind::kWord;
+  const bool declaration = token.kind == TokenKind::kUnterminatedString;
+  if (number)
+    reporter_.error(source_.place(), "expected a parameter or a directive" + after + ", found the number " +
+                                         describe(token) + "; numbers are ignored here");
+  else if (token.kind != TokenKind::kBadByte)
+    report_unexpected("a parameter or a directive" + after, "; it is ignored");
+  if (array) return skip_value();
+  do source_.consume();
+  while (number && is_number(source_.peek()));
+  if (declaration) skip_value();
 }
 
 bool Parser::read_declaration(std::string_view text, Parameter& parameter) {
-  const auto is_gap = [](char c) { return c == ' ' || c == '\t'; };
-  const auto* p = text.begin();
-  const auto word = [&] {
-    p = std::find_if_not(p, text.end(), is_gap);
-    const auto* const start = p;
-    p = std::find_if(p, text.end(), is_gap);
-    return std::string_view(start, p);
-  };
-  const std::string_view type_name = word();
-  const std::string_view name = word();
-  const std::string_view more = word();
-  const std::optional<ParameterType> type = parameter_type(type_name);
-  if (type && !name.empty()) {
+  const DeclaredWords words = split_declaration(text);
+  const std::optional<ParameterType> type = parameter_type(words.type);
+  if (type && !words.name.empty()) {
     parameter.type = *type;
-    parameter.name = std::string(name);
-    if (!more.empty())
+    parameter.name = std::string(words.name);
+    if (!words.more.empty())
       reporter_.warning(parameter.place, in_quotes(text) + " has more than a type and a name; the rest is ignored");
     return true;
   }
-  if (!type && !name.empty())
-    reporter_.error(parameter.place, "unknown parameter type " + in_quotes(type_name) + " in " + in_quotes(text) +
-                                             did_you_mean(closest_parameter_type(type_name)));
+  if (!type && !words.name.empty())
+    reporter_.error(parameter.place, "unknown parameter type " + in_quotes(words.type) + " in " + in_quotes(text) +
+                                         "; the parameter is ignored" +
+                                         did_you_mean(closest_parameter_type(words.type)));
   else
-    reporter_.error(parameter.place, "a parameter is declared as \"type name\", found " + in_quotes(text));
+    reporter_.error(parameter.place,
+                    "a parameter is declared as \"type name\", found " + in_quotes(text) + "; it is ignored");
   return false;
 }
 
@@ -384,12 +371,23 @@ bool Parser::read_declaration(std::string_view text, Parameter& parameter) {
 void Parser::skip_value() {
   const TokenKind kind = source_.peek().kind;
   if (kind == TokenKind::kOpen) {
-    while (source_.peek().kind != TokenKind::kClose && source_.peek().kind != TokenKind::kEnd &&
-           !is_directive(source_.peek()))
-      source_.consume();
-    if (source_.peek().kind == TokenKind::kClose) source_.consume();
-  } else if (kind == TokenKind::kString || (kind == TokenKind::kWord && !is_directive(source_.peek()))) {
     source_.consume();
+    skip_array_rest();
+  } else if (kind == TokenKind::kString ? !declares(source_.peek().text)
+                                        : kind == TokenKind::kWord && !is_directive(source_.peek())) {
+    source_.consume();
+  }
+}
+
+/// Skips to behind the array's "]", or to what shows that there is none: a directive, or the next parameter.
+void Parser::skip_array_rest() {
+  while (true) {
+    const Token& token = source_.peek();
+    if (token.kind == TokenKind::kEnd || is_directive(token)) return;
+    if (token.kind == TokenKind::kString && declares(token.text)) return;
+    const bool closed = token.kind == TokenKind::kClose;
+    source_.consume();
+    if (closed) return;
   }
 }
 
@@ -398,19 +396,33 @@ bool Parser::read_values(Parameter& parameter) {
 }
 
 bool Parser::read_single(Parameter& parameter) {
+  const Place place = source_.place();
   const bool taken = parameter.type == ParameterType::kInteger ? take_number(parameter.integers)
                      : parameter.type == ParameterType::kBool  ? take_bool(parameter)
                      : is_numeric(parameter.type)              ? take_number(parameter.floats) || take_string(parameter)
                                                                : take_string(parameter);
   if (!taken) {
-    report_unexpected("a value for parameter " + in_quotes(parameter.name));
-    if (!is_directive(source_.peek()) && source_.peek().kind != TokenKind::kEnd) source_.consume();
+    const Token& token = source_.peek();
+    report_unexpected("a value for parameter " + in_quotes(parameter.name), "; the parameter is ignored");
+    const bool next_parameter = token.kind == TokenKind::kString && declares(token.text);
+    if (!next_parameter && !is_directive(token) && token.kind != TokenKind::kEnd) source_.consume();
+    return false;
   }
-  return taken;
+  if (parameter.strings.empty() || !declares(parameter.strings[0])) return true;
+  // The value is missing where what was taken for it has a value of its own.
+  const Token& next = source_.peek();
+  const bool has_value =
+      next.kind == TokenKind::kOpen || is_number(next) || (next.kind == TokenKind::kString && !declares(next.text));
+  if (!has_value) return true;
+  misread_ = Declaration{std::move(parameter.strings[0]), place};
+  reporter_.error(place, "expected a value for parameter " + in_quotes(parameter.name) + ", found the parameter " +
+                             in_quotes(misread_->text) + "; the parameter is ignored");
+  return false;
 }
 
 bool Parser::read_array(Parameter& parameter) {
   const Place open = source_.place();
+  Place last = open;
   source_.consume();
   while (true) {
     if (parameter.type == ParameterType::kInteger)
@@ -422,18 +434,25 @@ bool Parser::read_array(Parameter& parameter) {
       source_.consume();
       return true;
     }
-    if (token.kind == TokenKind::kEnd || is_directive(token)) {
+    const auto runs_into = [&](const std::string& what) {
       reporter_.error(open, "\"[\" without its \"]\": the values of parameter " + in_quotes(parameter.name) +
-                                " run into " + describe(token));
+                                " run into " + what + "; the parameter is ignored");
       return false;
+    };
+    if (token.kind == TokenKind::kEnd || is_directive(token)) return runs_into(describe(token));
+    const bool text = parameter.type == ParameterType::kString || parameter.type == ParameterType::kTexture;
+    if (!text && token.kind == TokenKind::kString && declares(token.text)) return runs_into(describe(token));
+    if (text && !parameter.strings.empty() && (token.kind == TokenKind::kOpen || is_number(token)) &&
+        declares(parameter.strings.back())) { // what has values of its own was no string of the array
+      misread_ = Declaration{std::move(parameter.strings.back()), last};
+      return runs_into("the parameter " + in_quotes(misread_->text));
     }
+    last = source_.place();
     if (parameter.type == ParameterType::kBool ? take_bool(parameter) : take_string(parameter)) continue;
     report_unexpected(std::string(is_numeric(parameter.type) ? "a number" : "a string") + " or \"]\" in parameter " +
-                      in_quotes(parameter.name));
-    while (source_.peek().kind != TokenKind::kClose && source_.peek().kind != TokenKind::kEnd &&
-           !is_directive(source_.peek()))
-      source_.consume();
-    if (source_.peek().kind == TokenKind::kClose) source_.consume();
+                          in_quotes(parameter.name),
+                      "; the parameter is ignored");
+    skip_array_rest();
     return false;
   }
 }
@@ -441,7 +460,7 @@ bool Parser::read_array(Parameter& parameter) {
 bool Parser::take_string(Parameter& parameter) {
   const Token& token = source_.peek();
   if (token.kind != TokenKind::kString) return false;
-  if (is_numeric(parameter.type) && parameter.type != ParameterType::kSpectrum) return false;
+  if (is_numeric(parameter.type) && (parameter.type != ParameterType::kSpectrum || declares(token.text))) return false;
   parameter.strings.emplace_back(token.text);
   source_.consume();
   return true;
@@ -451,7 +470,7 @@ bool Parser::take_bool(Parameter& parameter) {
   const Token& token = source_.peek();
   if (token.kind != TokenKind::kString && token.kind != TokenKind::kWord) return false;
   if (token.text != "true" && token.text != "false") {
-    if (token.kind == TokenKind::kWord) return false;
+    if (token.kind == TokenKind::kWord || declares(token.text)) return false;
     reporter_.warning(source_.place(), in_quotes(token.text) + " is neither \"true\" nor \"false\"; read as false");
   }
   parameter.integers.push_back(token.text == "true");

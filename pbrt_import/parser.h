@@ -2,55 +2,17 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "pbrt_import/directive_info.h"
 #include "pbrt_import/file_names.h"
 #include "pbrt_import/parameters.h"
 #include "pbrt_import/source_stack.h"
 
 namespace packtrace {
-
-enum class DirectiveKind : uint8_t {
-  kAccelerator,
-  kActiveTransform,
-  kAreaLightSource,
-  kAttributeBegin,
-  kAttributeEnd,
-  kCamera,
-  kConcatTransform,
-  kCoordSysTransform,
-  kCoordinateSystem,
-  kFilm,
-  kIdentity,
-  kInclude, ///< never leaves the parser
-  kIntegrator,
-  kLightSource,
-  kLookAt,
-  kMakeNamedMaterial,
-  kMakeNamedMedium,
-  kMaterial,
-  kMediumInterface,
-  kNamedMaterial,
-  kObjectBegin,
-  kObjectEnd,
-  kObjectInstance,
-  kPixelFilter,
-  kReverseOrientation,
-  kRotate,
-  kSampler,
-  kScale,
-  kShape,
-  kTexture,
-  kTransform,
-  kTransformBegin,
-  kTransformEnd,
-  kTransformTimes,
-  kTranslate,
-  kWorldBegin,
-  kWorldEnd,
-};
 
 /// One directive with all that belongs to it. Numbers and names are as many as the kind takes (MediumInterface: one or
 /// two names; ActiveTransform: its word is names[0]).
@@ -62,16 +24,14 @@ struct Directive {
   std::array<std::string, 3> names; ///< escapes replaced
   uint32_t name_count = 0;
   ParameterList parameters;
-  bool damaged = false; ///< a parameter was left out because of an error already reported
+  bool damaged = false; ///< its numbers or names could not be read, which was reported: nothing but its kind counts
 };
 
-struct DirectiveInfo; ///< what a keyword takes
-
-/// Reads directives one after the other and follows Include. What is malformed is reported and skipped, up to the next
-/// directive at worst.
+/// Reads directives one after the other and follows Include. What is malformed is reported and costs as little as
+/// possible: a parameter, or a directive that cannot do without its names or numbers.
 class Parser {
 public:
-  Parser(SourceStack& source, const FileNames& file_names, Reporter& reporter)
+  Parser(SourceStack& source, FileNames& file_names, Reporter& reporter)
       : source_(source), file_names_(file_names), reporter_(reporter) {}
 
   /// False at the end of the main file. directive is reused: spans into its parameters end here.
@@ -81,7 +41,15 @@ private:
   bool read_arguments(const DirectiveInfo& info, Directive& directive);
   bool read_directive_numbers(const DirectiveInfo& info, Directive& directive);
   bool read_directive_names(const DirectiveInfo& info, Directive& directive);
-  void read_parameters(Directive& directive);
+  /// The string that declares a parameter.
+  struct Declaration {
+    std::string text;
+    Place place;
+  };
+  void read_parameters(ParameterList& list);
+  void read_value_of_last(ParameterList& list, bool declared);
+  bool skip_stray_word();
+  void skip_stray_value(const ParameterList& list);
   bool read_declaration(std::string_view text, Parameter& parameter);
   bool read_values(Parameter& parameter);
   bool read_array(Parameter& parameter);
@@ -94,14 +62,16 @@ private:
   template <class Values>
   bool take_number(Values& values);
   void skip_value();
+  void skip_array_rest();
   void skip_to_directive(uint32_t line);
-  void report_unexpected(const std::string& expected);
+  void report_unexpected(const std::string& expected, const std::string& consequence);
 
   SourceStack& source_;
-  const FileNames& file_names_;
+  FileNames& file_names_;
   Reporter& reporter_;
-  std::vector<double> numbers_; ///< scratch
-  std::string include_name_;    ///< escapes untouched
+  std::vector<double> numbers_;        ///< scratch
+  std::string include_name_;           ///< escapes untouched
+  std::optional<Declaration> misread_; ///< taken for the value of the parameter before it
 };
 
 } // namespace packtrace

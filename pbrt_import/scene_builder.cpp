@@ -18,21 +18,20 @@ enum class Section : uint8_t { kAnywhere, kOptions, kWorld };
 
 constexpr auto kSections = [] {
   std::array<Section, static_cast<size_t>(K::kWorldEnd) + 1> sections{};
-  for (const K kind : {K::kAccelerator, K::kCamera, K::kFilm, K::kIntegrator, K::kPixelFilter, K::kSampler,
-                       K::kTransformTimes})
+  for (const K kind :
+       {K::kAccelerator, K::kCamera, K::kFilm, K::kIntegrator, K::kPixelFilter, K::kSampler, K::kTransformTimes})
     sections[static_cast<size_t>(kind)] = Section::kOptions;
-  for (const K kind : {K::kAttributeBegin, K::kAttributeEnd, K::kTransformBegin, K::kTransformEnd, K::kObjectBegin,
-                       K::kObjectEnd, K::kObjectInstance, K::kTexture, K::kMaterial, K::kMakeNamedMaterial,
-                       K::kNamedMaterial, K::kLightSource, K::kAreaLightSource, K::kShape, K::kReverseOrientation,
-                       K::kWorldEnd})
+  for (const K kind :
+       {K::kAttributeBegin, K::kAttributeEnd, K::kTransformBegin, K::kTransformEnd, K::kObjectBegin, K::kObjectEnd,
+        K::kObjectInstance, K::kTexture, K::kMaterial, K::kMakeNamedMaterial, K::kNamedMaterial, K::kLightSource,
+        K::kAreaLightSource, K::kShape, K::kReverseOrientation, K::kWorldEnd})
     sections[static_cast<size_t>(kind)] = Section::kWorld;
   return sections;
 }();
 
 } // namespace
 
-SceneBuilder::SceneBuilder(const ImportOptions& options, const FileNames& file_names, Reporter& reporter,
-                           Progress& progress)
+SceneBuilder::SceneBuilder(const ImportOptions& options, FileNames& file_names, Reporter& reporter, Progress& progress)
     : options_(options), file_names_(file_names), reporter_(reporter), loader_(options, reporter),
       check_cancelled_([&progress] { progress.check_cancelled(); }),
       mesh_queue_(options.tessellation_tolerance, check_cancelled_) {}
@@ -58,7 +57,43 @@ void SceneBuilder::handle(Directive& directive) {
   if (directive.kind == K::kWorldEnd) return end_world(directive.place);
   if (phase_ == Phase::kOptions && statistics_.worlds > 0 && !options_behind_world_)
     options_behind_world_ = directive.place;
-  if (reading()) carry_out(directive);
+  if (!reading()) return;
+  if (directive.damaged)
+    skip_damaged(directive);
+  else
+    carry_out(directive);
+}
+
+/// What follows from a directive that the parser could not make sense of, and has reported.
+void SceneBuilder::skip_damaged(Directive& directive) {
+  switch (directive.kind) {
+  case K::kTranslate:
+  case K::kScale:
+  case K::kRotate:
+  case K::kLookAt:
+  case K::kTransform:
+  case K::kConcatTransform:
+  case K::kCoordSysTransform:
+    return state_.lose_transform();
+  case K::kCamera:
+    return cameras_.leave_out();
+  case K::kObjectBegin: // its shapes do not belong to the world
+    directive.names[0].clear();
+    return begin_object(directive);
+  case K::kShape:
+    ++statistics_.shapes["unknown"];
+    ++statistics_.shapes_skipped;
+    return;
+  default:
+    return;
+  }
+}
+
+/// Files that belong to the scene though nothing is made of them.
+void SceneBuilder::mention_files(const Directive& directive) {
+  for (const std::string_view name : {"mapname", "lensfile", "bsdffile", "filename"})
+    if (const Parameter* const file = directive.parameters.peek(name, ParameterType::kString))
+      for (const std::string& raw : file->strings) file_names_.mention(raw);
 }
 
 void SceneBuilder::carry_out(Directive& directive) {
@@ -91,20 +126,25 @@ void SceneBuilder::carry_out(Directive& directive) {
   case K::kCoordSysTransform:
     return handle_coordinate_system(directive);
   case K::kCamera:
-    define_coordinate_system("camera", {inverse(state_.transform().start), inverse(state_.transform().end)});
+    mention_files(directive);
+    define_coordinate_system(
+        "camera", {inverse(state_.transform().start), inverse(state_.transform().end), state_.transform().known});
     return cameras_.add_camera(directive, state_.transform(), reporter_);
   case K::kFilm:
     return cameras_.add_film(directive, reporter_);
   case K::kTexture:
+    mention_files(directive);
     return handle_texture(directive);
   case K::kMaterial:
   case K::kMakeNamedMaterial:
+    mention_files(directive);
     return handle_material(directive);
   case K::kNamedMaterial:
     return handle_named_material(directive);
   case K::kAreaLightSource:
     return handle_area_light(directive);
   case K::kLightSource:
+    mention_files(directive);
     ++statistics_.light_sources;
     ++statistics_.ignored["light_sources"];
     return;
@@ -167,7 +207,10 @@ void SceneBuilder::handle_transform(const Directive& directive) {
   }
   if (!numbers_finite(count)) problem = "a number is not finite", map.reset();
   if (map && !is_finite(*map)) problem = "its numbers are out of range", map.reset();
-  if (!map) return reporter_.error(directive.place, std::string(directive.keyword) + " is ignored: " + problem);
+  if (!map) {
+    state_.lose_transform();
+    return reporter_.error(directive.place, std::string(directive.keyword) + " is ignored: " + problem);
+  }
   if (directive.kind == K::kIdentity || directive.kind == K::kTransform)
     state_.set_transform(*map);
   else
@@ -179,9 +222,8 @@ void SceneBuilder::handle_active_transform(const Directive& directive) {
   constexpr std::string_view kWhich[] = {"All", "StartTime", "EndTime"};
   const uint8_t bits = which == "All" ? 3 : which == "StartTime" ? 1 : which == "EndTime" ? 2 : 0;
   if (bits == 0)
-    return reporter_.error(directive.place,
-                           "ActiveTransform takes All, StartTime or EndTime, found " + in_quotes(which) +
-                               did_you_mean(closest_name(which, kWhich)));
+    return reporter_.error(directive.place, "ActiveTransform takes All, StartTime or EndTime, found " +
+                                                in_quotes(which) + did_you_mean(closest_name(which, kWhich)));
   state_.set_active(bits);
 }
 
@@ -189,9 +231,12 @@ void SceneBuilder::handle_coordinate_system(const Directive& directive) {
   const std::string& name = directive.names[0];
   if (directive.kind == K::kCoordinateSystem) return define_coordinate_system(name, state_.transform());
   const std::optional<uint32_t> found = coordinate_system_names_.find(name);
-  if (!found)
-    return reporter_.error(directive.place, "no coordinate system " + in_quotes(name) + "; the transform stays" +
-                                                 did_you_mean(coordinate_system_names_.closest(name, [](uint32_t) { return true; })));
+  if (!found) {
+    state_.lose_transform();
+    return reporter_.error(directive.place,
+                           "no coordinate system " + in_quotes(name) + "; the transform stays" +
+                               did_you_mean(coordinate_system_names_.closest(name, [](uint32_t) { return true; })));
+  }
   state_.set_transform(coordinate_systems_[*found]);
 }
 

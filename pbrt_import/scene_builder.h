@@ -25,7 +25,7 @@ namespace packtrace {
 /// Carries out directives: keeps the graphics state and collects shapes, objects, instances and cameras.
 class SceneBuilder {
 public:
-  SceneBuilder(const ImportOptions& options, const FileNames& file_names, Reporter& reporter, Progress& progress);
+  SceneBuilder(const ImportOptions& options, FileNames& file_names, Reporter& reporter, Progress& progress);
 
   /// May take large arrays out of the directive's parameters.
   void handle(Directive& directive);
@@ -43,10 +43,13 @@ private:
     DAffine map{1.0};
     uint32_t animation = kNotAnimated; ///< into Scene::animations
   };
-  bool reading() const { return world_ == options_.world; }
+  uint32_t wanted_world() const { return options_.world.value_or(1); }
+  bool reading() const { return world_ == wanted_world(); }
 
   bool allowed_here(const Directive& directive);
   void carry_out(Directive& directive);
+  void skip_damaged(Directive& directive);
+  void mention_files(const Directive& directive);
   void handle_transform(const Directive& directive);
   void handle_active_transform(const Directive& directive);
   void handle_coordinate_system(const Directive& directive);
@@ -80,12 +83,13 @@ private:
   void take_queued_meshes();
   bool read_alpha(const Directive& directive, const TextureContext& context, MaterialUse& use);
 
+  void report_and_drop_unused_objects();
   void drop_unusable_shapes(const std::vector<uint32_t>& material_numbers, std::vector<Shape>& shapes);
 
   TextureContext context(const Place& place) { return {state_, file_names_, graph_, reporter_, place}; }
 
   const ImportOptions& options_;
-  const FileNames& file_names_;
+  FileNames& file_names_;
   Reporter& reporter_;
   Phase phase_ = Phase::kOptions;
   uint32_t world_ = 1; ///< number of the world that directives belong to, from its options to its WorldEnd
@@ -113,7 +117,7 @@ private:
   NameTable same_meshes_;                 ///< MeshJob::same_as
   std::vector<uint32_t> same_mesh_slots_; ///< in Scene::meshes, by number in same_meshes_
   std::string mesh_name_;                 ///< scratch
-  uint64_t mesh_bytes_ = 0; ///< of all meshes made from text, queued ones at most
+  uint64_t mesh_bytes_ = 0;               ///< of all meshes made from text, queued ones at most
   LargeHeapPages heap_pages_;
   MeshQueue mesh_queue_; ///< last: its tasks end before anything else does
 };

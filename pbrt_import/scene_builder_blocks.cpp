@@ -124,6 +124,9 @@ void SceneBuilder::add_instance(const Directive& directive) {
 
 SceneBuilder::Placement SceneBuilder::place(const Directive& directive, std::string_view thing) {
   const TransformPair& pair = state_.transform();
+  if (!pair.known)
+    reporter_.warning(directive.place,
+                      "this " + std::string(thing) + " may stand in a wrong place: a transform before it is ignored");
   if (!state_.animated()) return {pair.start, kNotAnimated};
   const std::optional<AnimatedTransform> keys = animate(pair.start, pair.end, transform_times_);
   if (!keys) {
@@ -147,13 +150,14 @@ void SceneBuilder::settle_time() {
 
 void SceneBuilder::check_worlds(const Place& end) {
   const uint64_t worlds = statistics_.worlds;
-  if (options_.world > std::max<uint64_t>(worlds, 1))
+  if (wanted_world() > std::max<uint64_t>(worlds, 1))
     throw FileError(ErrorKind::kInput, reporter_.locate({end.file, 0, 0}),
-                    "there is no world " + std::to_string(options_.world) + ": the file has " + std::to_string(worlds));
+                    "there is no world " + std::to_string(wanted_world()) + ": the file has " + std::to_string(worlds));
   if (worlds == 0) return settle_time();
   if (worlds > 1)
-    reporter_.note(end, "the file has " + std::to_string(worlds) + " worlds; world " + std::to_string(options_.world) +
-                            " is read");
+    reporter_.report(options_.world ? Severity::kNote : Severity::kWarning, end,
+                     "the file has " + std::to_string(worlds) + " worlds; only world " +
+                         std::to_string(wanted_world()) + " is read");
   if (phase_ != Phase::kOptions) return;
   phase_ = Phase::kDone;
   if (options_behind_world_)

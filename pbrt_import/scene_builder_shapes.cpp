@@ -21,12 +21,8 @@ void SceneBuilder::add_shape(Directive& directive) {
   shape.parent_from_mesh = placement.map;
   shape.animation = placement.animation;
   shape.reverse_orientation = state_.attributes.reverse_orientation;
-  bool usable = !directive.damaged; // else reported by the parser
-  if (usable && !is_invertible(shape.parent_from_mesh)) {
+  if (!is_invertible(shape.parent_from_mesh)) {
     reporter_.error(directive.place, "the shape's transform has no inverse (a scale of 0?); the shape is skipped");
-    usable = false;
-  }
-  if (!usable) {
     ++statistics_.shapes_skipped;
     return;
   }
@@ -206,6 +202,21 @@ void SceneBuilder::count_features() {
   if (bumps > 0) statistics_.ignored["bump_maps"] = static_cast<uint64_t>(bumps);
 }
 
+void SceneBuilder::report_and_drop_unused_objects() {
+  uint64_t count = 0;
+  uint32_t first = 0;
+  std::string name; // before objects are renumbered
+  drop_unused_objects(scene_, [&](uint32_t object) {
+    if (count++ > 0) return;
+    first = object;
+    name = in_quotes(scene_.objects[object].name);
+  });
+  if (count == 0) return;
+  reporter_.warning(object_places_[first],
+                    "object " + name + (count == 1 ? " is" : " and " + std::to_string(count - 1) + " more are") +
+                        " never instanced: left out");
+}
+
 ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
   check_worlds(end);
   report_media();
@@ -219,10 +230,7 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
   take_queued_meshes();
   reporter_.set_sequence(last_sequence);
   // What nothing shows is not worth reading its files.
-  drop_unused_objects(scene_, [&](uint32_t object) {
-    reporter_.note(object_places_[object],
-                   "object " + in_quotes(scene_.objects[object].name) + " is never instanced; it is left out");
-  });
+  report_and_drop_unused_objects();
   for_each_shape(scene_, [&](const Shape& shape) { loader_.require(shape.mesh); });
   materials_.require_images(options_.keep_textures);
   loader_.load(scene_.meshes, graph_.images(), progress, statistics_, scene_.dropped_triangles);
@@ -236,6 +244,7 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
     reporter_.note(end, absent == 1 ? "1 shape is left out: its alpha is 0 everywhere"
                                     : std::to_string(absent) + " shapes are left out: their alpha is 0 everywhere");
   scene_.cameras = cameras_.finish();
+  statistics_.cameras_left_out = cameras_.left_out();
   drop_unused_objects(scene_, [](uint32_t) {});
   drop_unused_parts(scene_);
   if (scene_.cameras.size() > 1)
@@ -243,7 +252,7 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
                    std::to_string(scene_.cameras.size()) + " cameras: the last one comes first, as pbrt uses that");
   statistics_.triangles = unique_triangle_count(scene_);
   count_features();
-  return {std::move(scene_), std::move(statistics_)};
+  return {std::move(scene_), std::move(statistics_), file_names_.take_named()};
 }
 
 } // namespace packtrace

@@ -55,7 +55,6 @@ void SourceStack::report_bad_byte() {
 
 void SourceStack::give_up(const std::string& why) {
   gave_up_ = true;
-  cut_strings_ += files_open_.back().tokenizer.in_string();
   reporter_.error(Place{files_open_.back().number, 0, 0}, why + "; the rest of the file is skipped");
 }
 

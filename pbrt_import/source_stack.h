@@ -43,8 +43,6 @@ public:
   void include(const std::filesystem::path& path, const Place& place);
 
   uint64_t files_opened() const { return opened_; }
-  /// Strings of which only a part could be read; the directive before them is damaged.
-  uint64_t cut_strings() const { return cut_strings_; }
   /// Content bytes consumed so far, all files together.
   uint64_t bytes_read() const;
 
@@ -65,7 +63,6 @@ private:
   Reporter& reporter_;
   std::vector<OpenFile> files_open_;
   uint64_t opened_ = 0;
-  uint64_t cut_strings_ = 0;
   uint64_t closed_bytes_ = 0;
   Token token_;
   bool peeked_ = false;

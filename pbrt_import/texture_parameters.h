@@ -15,7 +15,7 @@ namespace packtrace {
 /// What reading a texture, material or shape needs besides its parameters.
 struct TextureContext {
   const GraphicsState& state;
-  const FileNames& file_names;
+  FileNames& file_names;
   TextureGraph& graph;
   Reporter& reporter;
   Place place; ///< of the directive

@@ -7,6 +7,7 @@
 
 #include "pbrt_import/number.h"
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/printable.h"
 
 namespace packtrace {
 namespace {
@@ -188,30 +189,24 @@ Token Tokenizer::next() {
 }
 
 Token Tokenizer::read_string() {
-  in_string_ = true; // if refill() throws
-  const Token token = find_string_end();
-  in_string_ = false;
-  return token;
-}
-
-Token Tokenizer::find_string_end() {
-  size_t length = 1; // from position_, which refill() moves
+  constexpr uint32_t kMostBadBytes = 16; // more: no string, but something that is no text
+  size_t length = 1;                     // from position_, which refill() moves
+  size_t bad_at = 0;                     // the first bad byte, from there
+  uint32_t bad_bytes = 0;
+  const auto end = [&](TokenKind kind, size_t text_end, size_t next) {
+    const size_t start = position_ + (bad_bytes > 0 ? bad_at : 1);
+    if (bad_bytes > 0) token_column_ += static_cast<uint32_t>(bad_at);
+    position_ = next;
+    return bad_bytes > 0 ? make(TokenKind::kBadByte, start, start + 1) : make(kind, start, std::max(start, text_end));
+  };
   while (true) {
     if (position_ + length >= size_ && !refill()) break;
     length += count_plain_string_bytes(window_ + position_ + length);
     if (position_ + length >= size_) continue;
     const char c = window_[position_ + length];
-    if (c == '"') {
-      const size_t start = position_ + 1;
-      position_ += length + 1;
-      return make(TokenKind::kString, start, position_ - 1);
-    }
-    if (c == '\n' || c == '\r') break;
-    if (is_bad_byte(c)) {
-      token_column_ += static_cast<uint32_t>(length);
-      position_ += length + 1;
-      return make(TokenKind::kBadByte, position_ - 1, position_);
-    }
+    if (c == '"') return end(TokenKind::kString, position_ + length, position_ + length + 1);
+    if (c == '\n' || c == '\r' || bad_bytes == kMostBadBytes) break;
+    if (is_bad_byte(c) && bad_bytes++ == 0) bad_at = length;
     if (c == '\\') {
       if (position_ + length + 1 >= size_) refill();
       const char escaped = window_[position_ + length + 1];
@@ -219,9 +214,8 @@ Token Tokenizer::find_string_end() {
     }
     ++length;
   }
-  const size_t start = position_ + 1;
-  position_ = std::min(position_ + length, size_);
-  return make(TokenKind::kUnterminatedString, start, std::max(start, position_));
+  const size_t rest = std::min(position_ + length, size_);
+  return end(TokenKind::kUnterminatedString, rest, rest);
 }
 
 Token Tokenizer::read_word() {
@@ -254,38 +248,16 @@ std::string unescape(std::string_view raw, bool& unknown_escape) {
   return text;
 }
 
-namespace {
-
-/// Bytes of the UTF-8 character at the start of text, 0 if there is none. Overlong forms are not looked for: all that
-/// matters is what a terminal makes of it.
-size_t utf8_length(std::string_view text) {
-  const auto byte = static_cast<unsigned char>(text[0]);
-  const size_t length = byte < 0x80 ? 1 : byte >= 0xc2 && byte < 0xe0 ? 2 : (byte & 0xf0) == 0xe0 ? 3 : byte < 0xf5 ? 4 : 0;
-  if (length > text.size() || (byte >= 0x80 && byte < 0xc2)) return 0;
-  if (byte == 0xc2 && static_cast<unsigned char>(text[1]) < 0xa0) return 0; // control characters, too
-  const auto continues = [](char c) { return (static_cast<unsigned char>(c) & 0xc0) == 0x80; };
-  return std::all_of(text.begin() + 1, text.begin() + static_cast<std::ptrdiff_t>(length), continues) ? length : 0;
-}
-
-} // namespace
-
 std::string in_quotes(std::string_view text, size_t max_length) {
-  constexpr char kHex[] = "0123456789abcdef";
-  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf"; // nobody would see it
   std::string shown(1, '"');
   for (size_t i = 0; i < text.size();) {
     if (shown.size() > max_length) {
       shown += "...";
       break;
     }
-    const auto byte = static_cast<unsigned char>(text[i]);
-    size_t length = byte < 0x20 || byte == 0x7f ? 0 : utf8_length(text.substr(i));
-    if (text.substr(i).starts_with(kByteOrderMark)) length = 0;
-    if (length > 0)
-      shown += text.substr(i, length);
-    else
-      shown += {'\\', 'x', kHex[byte >> 4], kHex[byte & 15]};
-    i += std::max<size_t>(length, 1);
+    const size_t length = std::max<size_t>(printable_length(text.substr(i)), 1);
+    shown += printable(text.substr(i, length), "");
+    i += length;
   }
   shown += '"';
   return shown;

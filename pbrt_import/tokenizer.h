@@ -18,7 +18,7 @@ enum class TokenKind : uint8_t {
   kOpen,               ///< [
   kClose,              ///< ]
   kUnterminatedString, ///< text: what there was up to the end of the line
-  kBadByte,            ///< text: the one byte that no pbrt file has
+  kBadByte,            ///< text: a byte that no pbrt file has, the first one of the string that it is in
   kEnd,                ///< end of the file, again and again
 };
 
@@ -29,8 +29,8 @@ struct Token {
   uint32_t column = 0;   ///< in bytes, from 1
 };
 
-/// Splits one pbrt-v3 file into tokens in a single pass over a window of it: a block, or a copy of several where a token
-/// lies across them. Lines end with LF, CR LF or CR; a UTF-8 byte order mark is skipped.
+/// Splits one pbrt-v3 file into tokens in a single pass over a window of it: a block, or a copy of several where a
+/// token lies across them. Lines end with LF, CR LF or CR; a UTF-8 byte order mark is skipped.
 class Tokenizer {
 public:
   static constexpr size_t kDefaultWindow = 128 * 1024;
@@ -46,9 +46,6 @@ public:
   /// of int32_t whatever T is. Throws Error like InputFile::read.
   template <class T, class Take>
   void read_numbers(Take take);
-
-  /// After next() threw: whether that was within a string.
-  bool in_string() const { return in_string_; }
 
   /// Content bytes consumed.
   uint64_t consumed_bytes() const { return window_offset_ + position_; }
@@ -66,7 +63,6 @@ private:
   void skip_comment();
   void count_line_end(size_t at);
   Token read_string();
-  Token find_string_end();
   Token read_word();
   Token make(TokenKind kind, size_t start, size_t end) const;
   void check_encoding();
@@ -79,7 +75,6 @@ private:
   size_t size_ = 0;
   size_t position_ = 0;
   uint64_t window_offset_ = 0; ///< of window_[0] in the content
-  bool in_string_ = false;     ///< read_string() has not come to an end
   bool at_end_ = false;        ///< the file has nothing after the window
   uint32_t line_ = 1;
   uint64_t line_start_ = 0; ///< offset of the line's first byte in the content
@@ -91,7 +86,7 @@ private:
 /// @param unknown_escape set to true where a back-slash was kept
 std::string unescape(std::string_view raw, bool& unknown_escape);
 
-/// Text for messages, in double quotes: unprintable bytes as \xNN, cut after max_length characters.
+/// Text for messages, in double quotes: bytes that are not printable() as \xNN, cut after max_length bytes.
 inline constexpr size_t kMaxShownPath = 4096;
 std::string in_quotes(std::string_view text, size_t max_length = 60);
 

@@ -31,9 +31,20 @@ std::string to_string(const Diagnostic& diagnostic) {
   if (!text.empty()) text += ": ";
   text += std::string(to_string(diagnostic.severity)) + ": " + diagnostic.message;
   if (diagnostic.count > 1) text += " (" + std::to_string(diagnostic.count) + " times, first here)";
+  // Of a long chain the ends say most: what included the file, and where it began.
+  constexpr size_t kShownAtEachEnd = 4;
+  std::vector<const SourceLocation*> chain;
   for (const SourceFile* file = diagnostic.location.file.get(); file && file->included_from.file;
        file = file->included_from.file.get())
-    text += "\n  included from " + to_string(file->included_from);
+    chain.push_back(&file->included_from);
+  const size_t hidden = chain.size() > 2 * kShownAtEachEnd + 1 ? chain.size() - 2 * kShownAtEachEnd : 0;
+  for (size_t i = 0; i < chain.size(); ++i) {
+    if (hidden > 0 && i == kShownAtEachEnd) {
+      text += "\n  ... and through " + std::to_string(hidden) + " more files";
+      i += hidden;
+    }
+    text += "\n  included from " + to_string(*chain[i]);
+  }
   return text;
 }
 

@@ -67,6 +67,57 @@ TEST(Cameras, BadValuesAreReported) {
   EXPECT_TRUE(imported.reported("unknown camera \"fisheye\""));
 }
 
+TEST(Cameras, ThoseBehindAnIgnoredTransformAreLeftOut) {
+  const SceneFolder folder;
+  for (const char* const ignored :
+       {"Transform [1 0 0 0  0 1 0 0  0 0 1 .5  0 0 4 1]", "ConcatTransform [1 0 0 0  0 1 0 0  0 0 1 0  0 0 4 0]",
+        "LookAt 0 0 1  0 0 1  0 1 0", "Rotate 90 0 0 0", "Translate nan 0 0", "Scale 1e400 1 1", "Translate 1 2",
+        "Transform [1 0 0 0  0 1 0 0  0 0 1 0  0 0 4]", "CoordSysTransform \"nowhere\"", "LookAt"}) {
+    const Imported imported = import_text(folder, std::string(ignored) + "\nCamera \"perspective\"\nWorldBegin" +
+                                                      std::string(kTriangle) + "WorldEnd");
+    EXPECT_TRUE(imported.scene.cameras.empty()) << ignored;
+    EXPECT_EQ(imported.statistics.cameras_left_out, 1u) << ignored;
+    EXPECT_TRUE(imported.reported("2:1: error: a transform before the camera is ignored")) << imported.text();
+    EXPECT_EQ(imported.scene.shapes.size(), 1u); // WorldBegin starts anew
+    EXPECT_FALSE(imported.reported("may stand in a wrong place")) << imported.text();
+  }
+}
+
+TEST(Cameras, TransformsThatStartAnewAreKnownAgain) {
+  const SceneFolder folder;
+  for (const char* const known :
+       {"Identity", "Transform [1 0 0 0  0 1 0 0  0 0 1 0  0 0 4 1]", "CoordSysTransform \"before\""}) {
+    const Imported imported = import_text(folder, "CoordinateSystem \"before\" Rotate 90 0 0 0 " + std::string(known) +
+                                                      " Camera \"perspective\" WorldBegin WorldEnd");
+    EXPECT_EQ(imported.scene.cameras.size(), 1u) << known;
+    EXPECT_EQ(imported.statistics.cameras_left_out, 0u) << known;
+  }
+  // A name keeps what was lost.
+  const Imported imported = import_text(folder, "Rotate 90 0 0 0 CoordinateSystem \"lost\" Identity CoordSysTransform "
+                                                "\"lost\" Camera \"perspective\" WorldBegin WorldEnd");
+  EXPECT_TRUE(imported.scene.cameras.empty());
+}
+
+TEST(Cameras, TheOthersStayWhereOneIsLeftOut) {
+  const SceneFolder folder;
+  const Imported imported = import_text(folder, "Camera \"perspective\" \"float fov\" 30 Rotate 90 0 0 0 Camera "
+                                                "\"perspective\" Camera \"fisheye\" Camera WorldBegin WorldEnd");
+  ASSERT_EQ(imported.scene.cameras.size(), 1u);
+  EXPECT_EQ(imported.scene.cameras[0].fov_degrees, 30.0);
+  EXPECT_EQ(imported.statistics.cameras_left_out, 3u);
+}
+
+TEST(Cameras, ShapesBehindAnIgnoredTransformStayWithAWarning) {
+  const SceneFolder folder;
+  const Imported imported = import_world(folder, "\nAttributeBegin Rotate 1 0 0 0" + std::string(kTriangle) +
+                                                     std::string(kTriangle) + "AttributeEnd" + std::string(kTriangle));
+  EXPECT_EQ(imported.scene.shapes.size(), 3u);
+  EXPECT_TRUE(
+      imported.reported("2:31: warning: this shape may stand in a wrong place: a transform before it is ignored "
+                        "(2 times, first here)"))
+      << imported.text();
+}
+
 TEST(Cameras, ScreenWindowBeatsTheAspectRatio) {
   const SceneFolder folder;
   const Imported imported =

@@ -100,22 +100,22 @@ a:3:1: error: unknown directive "Nonsense"
        {1, 1, 0, 0}},
       {"IncludeWithoutQuotes",
        world("Include a.pbrt"),
-       R"(scene.pbrt:2:9: error: expected a quoted name after Include, found "a.pbrt"
+       R"(scene.pbrt:2:9: error: expected a quoted name after Include, found "a.pbrt"; Include is ignored
 )",
        {1, 1, 0, 0}},
       {"IncludeEndsInAString",
        world("Include \"a\""),
-       R"(a:2:7: error: string without its closing quote: "sphere"
-  included from scene.pbrt:2:1
-)",
-       {1, 1, 0, 0},
-       {{"a", "\nShape \"sphere"}}},
-      {"IncludeEndsInAnArray",
-       world("Include \"a\""),
-       R"(a:1:31: error: "[" without its "]": the values of parameter "radius" run into "Shape"
+       R"(a:2:7: error: string without its closing quote: "sphere"; Shape is ignored
   included from scene.pbrt:2:1
 )",
        {1, 1, 1, 0},
+       {{"a", "\nShape \"sphere"}}},
+      {"IncludeEndsInAnArray",
+       world("Include \"a\""),
+       R"(a:1:31: error: "[" without its "]": the values of parameter "radius" run into "Shape"; the parameter is ignored
+  included from scene.pbrt:2:1
+)",
+       {2, 9801, 0, 0},
        {{"a", "Shape \"sphere\" \"float radius\" [ 2"}}},
       {"IncludeEndsInABlock",
        world("Include \"a\""),
@@ -177,10 +177,10 @@ a:4:48: error: byte 0x1D does not belong in a pbrt file
        world("Include \"a.gz\""),
        R"(a.gz: error: truncated gzip data; the rest of the file is skipped
   included from scene.pbrt:2:1
-a.gz:2:31: error: "[" without its "]": the values of parameter "radius" run into "Shape"
+a.gz:2:31: error: "[" without its "]": the values of parameter "radius" run into "Shape"; the parameter is ignored
   included from scene.pbrt:2:1
 )",
-       {2, 2, 1, 0},
+       {3, 9802, 0, 0},
        {{"a.gz",
          without_end(gzip(std::string(kTriangle) + "\nShape \"sphere\" \"float radius\" [ 2 ] Nonsense"), 15)}}},
       {"IncludeGzipDamaged",

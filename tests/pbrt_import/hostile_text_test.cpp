@@ -45,6 +45,7 @@ std::vector<HostileCase> encodings() {
        R"(scene.pbrt:2:1: error: unknown directive "Nonsense"
 scene.pbrt:4:1: error: Shape "spere" is skipped: unknown shape; did you mean "sphere"?
 scene.pbrt:6:4: error: Scale takes 3 numbers, found 1; it is ignored
+scene.pbrt:7:2: warning: this shape may stand in a wrong place: a transform before it is ignored
 )",
        {1, 1, 1, 0}},
       {"LinesEndInCr",
@@ -52,6 +53,7 @@ scene.pbrt:6:4: error: Scale takes 3 numbers, found 1; it is ignored
        R"(scene.pbrt:2:1: error: unknown directive "Nonsense"
 scene.pbrt:4:1: error: Shape "spere" is skipped: unknown shape; did you mean "sphere"?
 scene.pbrt:6:4: error: Scale takes 3 numbers, found 1; it is ignored
+scene.pbrt:7:2: warning: this shape may stand in a wrong place: a transform before it is ignored
 )",
        {1, 1, 1, 0}},
       {"LinesEndInCrThenLfCr",
@@ -94,13 +96,15 @@ scene.pbrt:2:4: error: byte 0x00 does not belong in a pbrt file; is this UTF-16 
       {"NulInsideAString",
        world("Material \"mat\0te\""s),
        R"(scene.pbrt:2:14: error: byte 0x00 does not belong in a pbrt file; is this UTF-16 text? save it as UTF-8
+scene.pbrt:2:14: error: expected a quoted name after Material, found a stray byte; Material is ignored
 )",
        {1, 1, 0, 0}},
       {"NulInsideAnArray",
        world("Shape \"sphere\" \"float radius\" [ 2 \0 ]"s),
        R"(scene.pbrt:2:35: error: byte 0x00 does not belong in a pbrt file; is this UTF-16 text? save it as UTF-8
+scene.pbrt:2:35: error: expected a number or "]" in parameter "radius", found a stray byte; the parameter is ignored
 )",
-       {1, 1, 1, 0}},
+       {2, 9801, 0, 0}},
       {"NulBehindTheEnd",
        world("") + std::string(3, '\0'),
        R"(scene.pbrt:5:1: error: byte 0x00 does not belong in a pbrt file; is this UTF-16 text? save it as UTF-8 (3 times, first here)
@@ -119,6 +123,7 @@ scene.pbrt:2:4: error: byte 0x00 does not belong in a pbrt file; is this UTF-16 
       {"EscapeSequenceInAName",
        world("Material \"\x1b[31mred\""),
        R"(scene.pbrt:2:11: error: byte 0x1B does not belong in a pbrt file
+scene.pbrt:2:11: error: expected a quoted name after Material, found a stray byte; Material is ignored
 )",
        {1, 1, 0, 0}},
       {"Latin1IsTakenAsItIs",
@@ -211,65 +216,66 @@ std::vector<HostileCase> tokens() {
   return {
       {"StringOpenInADirectivesName",
        world("Shape \"sphere"),
-       R"(scene.pbrt:2:7: error: string without its closing quote: "sphere"
-)",
-       {1, 1, 0, 0}},
-      {"StringOpenInADeclaration",
-       world("Shape \"sphere\" \"float radius 2"),
-       R"(scene.pbrt:2:16: error: string without its closing quote: "float radius 2"
+       R"(scene.pbrt:2:7: error: string without its closing quote: "sphere"; Shape is ignored
 )",
        {1, 1, 1, 0}},
+      {"StringOpenInADeclaration",
+       world("Shape \"sphere\" \"float radius 2"),
+       R"(scene.pbrt:2:16: error: string without its closing quote: "float radius 2"; it is ignored
+)",
+       {2, 9801, 0, 0}},
       {"StringOpenInAValue",
        world("Material \"matte\" \"string x\" \"abc"),
-       R"(scene.pbrt:2:29: error: string without its closing quote: "abc"
+       R"(scene.pbrt:2:29: error: string without its closing quote: "abc"; the parameter is ignored
 )",
        {1, 1, 0, 0}},
       {"StringOpenInAnArray",
        world("Shape \"plymesh\" \"string filename\" [ \"a.ply ]"),
-       R"(scene.pbrt:2:37: error: string without its closing quote: "a.ply ]"
+       R"(scene.pbrt:2:1: error: plymesh without a "string filename"; the shape is skipped
+scene.pbrt:2:37: error: string without its closing quote: "a.ply ]"; the parameter is ignored
 )",
        {1, 1, 1, 0}},
       {"StringOpenAtTheEndOfTheFile",
        "WorldBegin" + kTri + "Material \"",
-       R"(scene.pbrt:1:100: error: string without its closing quote: ""
+       R"(scene.pbrt:1:100: error: string without its closing quote: ""; Material is ignored
 scene.pbrt:1:101: warning: the file ends without WorldEnd
 )",
        {1, 1, 0, 0}},
       {"StringOpenInInclude",
        world("Include \"a.pbrt"),
-       R"(scene.pbrt:2:9: error: string without its closing quote: "a.pbrt"
+       R"(scene.pbrt:2:9: error: string without its closing quote: "a.pbrt"; Include is ignored
 )",
        {1, 1, 0, 0}},
       {"StringOpenInTexturesThirdName",
        world("Texture \"a\" \"float\" \"constant"),
-       R"(scene.pbrt:2:21: error: string without its closing quote: "constant"
+       R"(scene.pbrt:2:21: error: string without its closing quote: "constant"; Texture is ignored
 )",
        {1, 1, 0, 0}},
       {"StringWithALineEndInside",
        world("Material \"mat\nte\""),
-       R"(scene.pbrt:2:10: error: string without its closing quote: "mat"
+       R"(scene.pbrt:2:10: error: string without its closing quote: "mat"; Material is ignored
 scene.pbrt:3:1: error: unknown directive "te"
 )",
        {1, 1, 0, 0}},
       {"StringEndsInABackslash",
        world("Material \"matte\\\"\nIdentity"),
-       R"(scene.pbrt:2:10: error: string without its closing quote: "matte\""
+       R"(scene.pbrt:2:10: error: string without its closing quote: "matte\""; Material is ignored
 )",
        {1, 1, 0, 0}},
       {"ArrayOpenBeforeADirective",
        world("Shape \"sphere\" \"float radius\" [ 2\nIdentity"),
-       R"(scene.pbrt:2:31: error: "[" without its "]": the values of parameter "radius" run into "Identity"
+       R"(scene.pbrt:2:31: error: "[" without its "]": the values of parameter "radius" run into "Identity"; the parameter is ignored
 )",
-       {1, 1, 1, 0}},
+       {2, 9801, 0, 0}},
       {"ArrayOpenAtTheEndOfTheFile",
        "WorldBegin" + kTri + "\n\nShape \"sphere\" \"float radius\" [ 2",
-       R"(scene.pbrt:3:31: error: "[" without its "]": the values of parameter "radius" run into the end of the file
+       R"(scene.pbrt:3:31: error: "[" without its "]": the values of parameter "radius" run into the end of the file; the parameter is ignored
 scene.pbrt:3:34: warning: the file ends without WorldEnd
 )",
-       {1, 1, 1, 0}},
+       {2, 9801, 0, 0}},
       {"StringArrayOpenAtTheEndOfTheFile",
        "WorldBegin" + kTri + "\nMaterial \"matte\" \"string x\" [ \"a\" \"b\"",
-       R"(scene.pbrt:2:29: error: "[" without its "]": the values of parameter "x" run into the end of the file
+       R"(scene.pbrt:2:29: error: "[" without its "]": the values of parameter "x" run into the end of the file; the parameter is ignored
 scene.pbrt:2:38: warning: the file ends without WorldEnd
 )",
        {1, 1, 0, 0}},
@@ -286,10 +292,10 @@ scene.pbrt:1:112: warning: the file ends without WorldEnd
        {1, 1, 0, 0}},
       {"ArrayInsideAnArray",
        world("Shape \"sphere\" \"float radius\" [ [ 2 ] ]"),
-       R"(scene.pbrt:2:33: error: expected a number or "]" in parameter "radius", found "["
-scene.pbrt:2:39: error: expected a parameter or a directive, found "]"
+       R"(scene.pbrt:2:33: error: expected a number or "]" in parameter "radius", found "["; the parameter is ignored
+scene.pbrt:2:39: error: expected a parameter or a directive, found "]"; it is ignored
 )",
-       {1, 1, 1, 0}},
+       {2, 9801, 0, 0}},
       {"StrayClosingBracket",
        world("Identity ]"),
        R"(scene.pbrt:2:10: error: expected a directive, found "]"
@@ -356,11 +362,13 @@ scene.pbrt:2:20: warning: number "0x10" has other characters after it; they are 
 scene.pbrt:2:8: warning: number "0,0,0" has other characters after it; they are ignored
 scene.pbrt:2:14: warning: number "1,1,1" has other characters after it; they are ignored
 scene.pbrt:2:20: warning: number "0,1,0" has other characters after it; they are ignored
+scene.pbrt:3:2: warning: this shape may stand in a wrong place: a transform before it is ignored
 )",
        {1, 1, 0, 0}},
       {"NumbersWithTwoSigns",
        world("Translate --1 0 0"),
        R"(scene.pbrt:2:1: error: Translate takes 3 numbers, found 0; it is ignored
+scene.pbrt:3:2: warning: this shape may stand in a wrong place: a transform before it is ignored
 )",
        {1, 1, 0, 0}},
       {"NumbersWithADecimalComma",
@@ -371,29 +379,33 @@ scene.pbrt:2:20: warning: number "0,1,0" has other characters after it; they are
       {"FewerNumbers",
        world("Scale 2 2"),
        R"(scene.pbrt:2:1: error: Scale takes 3 numbers, found 2; it is ignored
+scene.pbrt:3:2: warning: this shape may stand in a wrong place: a transform before it is ignored
 )",
        {1, 1, 0, 0}},
       {"MoreNumbers",
        world("Translate 1 2 3 4"),
        R"(scene.pbrt:2:1: error: Translate takes 3 numbers, found 4; it is ignored
+scene.pbrt:3:2: warning: this shape may stand in a wrong place: a transform before it is ignored
 )",
        {1, 1, 0, 0}},
       {"BracketsWithinNumbers",
        world("Rotate 90 [ 0 0 1 ]"),
        R"(scene.pbrt:2:1: error: Rotate takes 4 numbers, found 1; it is ignored
+scene.pbrt:3:2: warning: this shape may stand in a wrong place: a transform before it is ignored
 )",
        {1, 1, 0, 0}},
       {"FifteenOfSixteenNumbers",
        world("Transform [ 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 ]"),
        R"(scene.pbrt:2:1: error: Transform takes 16 numbers, found 15; it is ignored
+scene.pbrt:3:2: warning: this shape may stand in a wrong place: a transform before it is ignored
 )",
        {1, 1, 0, 0}},
       {"EndsAfterShape",
        "WorldBegin" + kTri + "Shape",
-       R"(scene.pbrt:1:96: error: expected a quoted name after Shape, found the end of the file
+       R"(scene.pbrt:1:96: error: expected a quoted name after Shape, found the end of the file; Shape is ignored
 scene.pbrt:1:96: warning: the file ends without WorldEnd
 )",
-       {1, 1, 0, 0}},
+       {1, 1, 1, 0}},
       {"EndsWithinNumbers",
        "WorldBegin" + kTri + "Translate 1 2",
        R"(scene.pbrt:1:91: error: Translate takes 3 numbers, found 2; it is ignored
@@ -402,28 +414,28 @@ scene.pbrt:1:104: warning: the file ends without WorldEnd
        {1, 1, 0, 0}},
       {"EndsAfterOneOfThreeNames",
        "WorldBegin" + kTri + "Texture \"a\"",
-       R"(scene.pbrt:1:102: error: expected a quoted name after Texture, found the end of the file
+       R"(scene.pbrt:1:102: error: expected a quoted name after Texture, found the end of the file; Texture is ignored
 scene.pbrt:1:102: warning: the file ends without WorldEnd
 )",
        {1, 1, 0, 0}},
       {"EndsAfterInclude",
        "WorldBegin" + kTri + "Include",
-       R"(scene.pbrt:1:98: error: expected a quoted name after Include, found the end of the file
+       R"(scene.pbrt:1:98: error: expected a quoted name after Include, found the end of the file; Include is ignored
 scene.pbrt:1:98: warning: the file ends without WorldEnd
 )",
        {1, 1, 0, 0}},
       {"EndsAfterActiveTransform",
        "WorldBegin" + kTri + "ActiveTransform",
-       R"(scene.pbrt:1:106: error: expected All, StartTime or EndTime after ActiveTransform, found the end of the file
+       R"(scene.pbrt:1:106: error: expected All, StartTime or EndTime after ActiveTransform, found the end of the file; it is ignored
 scene.pbrt:1:106: warning: the file ends without WorldEnd
 )",
        {1, 1, 0, 0}},
       {"EndsAfterADeclaration",
        "WorldBegin" + kTri + "Shape \"sphere\" \"float radius\"",
-       R"(scene.pbrt:1:120: error: expected a value for parameter "radius", found the end of the file
+       R"(scene.pbrt:1:120: error: expected a value for parameter "radius", found the end of the file; the parameter is ignored
 scene.pbrt:1:120: warning: the file ends without WorldEnd
 )",
-       {1, 1, 1, 0}},
+       {2, 9801, 0, 0}},
   };
 }
 
@@ -431,54 +443,55 @@ std::vector<HostileCase> parameters() {
   return {
       {"DeclarationWithoutName",
        world("Shape \"sphere\" \"float\" 2"),
-       R"(scene.pbrt:2:16: error: a parameter is declared as "type name", found "float"
+       R"(scene.pbrt:2:16: error: a parameter is declared as "type name", found "float"; it is ignored
 )",
-       {1, 1, 1, 0}},
+       {2, 9801, 0, 0}},
       {"DeclarationEmpty",
        world("Shape \"sphere\" \"\" 2"),
-       R"(scene.pbrt:2:16: error: a parameter is declared as "type name", found ""
+       R"(scene.pbrt:2:16: error: a parameter is declared as "type name", found ""; it is ignored
 )",
-       {1, 1, 1, 0}},
+       {2, 9801, 0, 0}},
       {"DeclarationWithoutSpace",
        world("Shape \"sphere\" \"floatradius\" 2"),
-       R"(scene.pbrt:2:16: error: a parameter is declared as "type name", found "floatradius"
+       R"(scene.pbrt:2:16: error: a parameter is declared as "type name", found "floatradius"; it is ignored
 )",
-       {1, 1, 1, 0}},
+       {2, 9801, 0, 0}},
       {"DeclarationWithExtraSpaces", world(kTri + "\" \t float \t alpha \" 1"), "", {2, 2, 0, 0}},
       {"UnknownParameterType",
        world("Shape \"sphere\" \"flaot radius\" 2"),
-       R"(scene.pbrt:2:16: error: unknown parameter type "flaot" in "flaot radius"
+       R"(scene.pbrt:2:16: error: unknown parameter type "flaot" in "flaot radius"; the parameter is ignored
 )",
-       {1, 1, 1, 0}},
+       {2, 9801, 0, 0}},
       {"ParameterTypesMisspelled",
        world(kTri + "\"flot alpha\" 1 \"Float alpha\" 1 \"texure alpha\" \"t\"\n\"Normal N\" [0 0 1] "
                     "\"intger i\" 1 \"spectrm Kd\" [1 1]\n\"strings s\" [\"a\"] \"colour Kd\" [1 1 1]"),
-       R"(scene.pbrt:2:81: error: unknown parameter type "flot" in "flot alpha"; did you mean "float"?
-scene.pbrt:2:96: error: unknown parameter type "Float" in "Float alpha"; did you mean "float"?
-scene.pbrt:2:112: error: unknown parameter type "texure" in "texure alpha"; did you mean "texture"?
-scene.pbrt:3:1: error: unknown parameter type "Normal" in "Normal N"; did you mean "normal"?
-scene.pbrt:3:20: error: unknown parameter type "intger" in "intger i"; did you mean "integer"?
-scene.pbrt:3:33: error: unknown parameter type "spectrm" in "spectrm Kd"; did you mean "spectrum"?
-scene.pbrt:4:1: error: unknown parameter type "strings" in "strings s"; did you mean "string"?
-scene.pbrt:4:19: error: unknown parameter type "colour" in "colour Kd"; did you mean "color"?
+       R"(scene.pbrt:2:81: error: unknown parameter type "flot" in "flot alpha"; the parameter is ignored; did you mean "float"?
+scene.pbrt:2:96: error: unknown parameter type "Float" in "Float alpha"; the parameter is ignored; did you mean "float"?
+scene.pbrt:2:112: error: unknown parameter type "texure" in "texure alpha"; the parameter is ignored; did you mean "texture"?
+scene.pbrt:3:1: error: unknown parameter type "Normal" in "Normal N"; the parameter is ignored; did you mean "normal"?
+scene.pbrt:3:20: error: unknown parameter type "intger" in "intger i"; the parameter is ignored; did you mean "integer"?
+scene.pbrt:3:33: error: unknown parameter type "spectrm" in "spectrm Kd"; the parameter is ignored; did you mean "spectrum"?
+scene.pbrt:4:1: error: unknown parameter type "strings" in "strings s"; the parameter is ignored; did you mean "string"?
+scene.pbrt:4:19: error: unknown parameter type "colour" in "colour Kd"; the parameter is ignored; did you mean "color"?
 )",
-       {1, 1, 1, 0}},
+       {2, 2, 0, 0}},
       {"DeclarationWithThreeWords",
        world(kTri + "\"float alpha beta\" 0.5\n\"float \talpha  beta gamma\" 0.5"),
        R"(scene.pbrt:2:81: warning: "float alpha beta" has more than a type and a name; the rest is ignored
 scene.pbrt:3:1: warning: "float \x09alpha  beta gamma" has more than a type and a name; the rest is ignored
+scene.pbrt:3:1: warning: parameter "float alpha" is given again; the last one counts
 )",
        {2, 2, 0, 0}},
       {"DeclarationOfUnknownTypeWithThreeWords",
        world("Shape \"sphere\" \"my float radius\" 2"),
-       R"(scene.pbrt:2:16: error: unknown parameter type "my" in "my float radius"
+       R"(scene.pbrt:2:16: error: unknown parameter type "my" in "my float radius"; the parameter is ignored
 )",
-       {1, 1, 1, 0}},
+       {2, 9801, 0, 0}},
       {"UnknownParameterTypeWithArray",
        world("Shape \"sphere\" \"quaternion q\" [ 1 2 3 4 ] \"float radius\" 2"),
-       R"(scene.pbrt:2:16: error: unknown parameter type "quaternion" in "quaternion q"
+       R"(scene.pbrt:2:16: error: unknown parameter type "quaternion" in "quaternion q"; the parameter is ignored
 )",
-       {1, 1, 1, 0}},
+       {2, 9801, 0, 0}},
       {"BoolThatIsNeither",
        world("AreaLightSource \"diffuse\" \"bool twosided\" \"yes\""),
        R"(scene.pbrt:2:43: warning: "yes" is neither "true" nor "false"; read as false
@@ -486,25 +499,26 @@ scene.pbrt:3:1: warning: "float \x09alpha  beta gamma" has more than a type and 
        {1, 1, 0, 0}},
       {"BoolAsNumber",
        world("AreaLightSource \"diffuse\" \"bool twosided\" 1"),
-       R"(scene.pbrt:2:43: error: expected a value for parameter "twosided", found "1"
+       R"(scene.pbrt:2:43: error: expected a value for parameter "twosided", found "1"; the parameter is ignored
 )",
        {1, 1, 0, 0}},
       {"BoolWithoutQuotes", world("AreaLightSource \"diffuse\" \"bool twosided\" true"), "", {1, 1, 0, 0}},
       {"StringForAFloat",
        world("Shape \"sphere\" \"float radius\" \"2\""),
-       R"(scene.pbrt:2:31: error: expected a value for parameter "radius", found the string "2"
+       R"(scene.pbrt:2:31: error: expected a value for parameter "radius", found the string "2"; the parameter is ignored
 )",
-       {1, 1, 1, 0}},
+       {2, 9801, 0, 0}},
       {"NumberForAString",
        world("Shape \"plymesh\" \"string filename\" 7"),
-       R"(scene.pbrt:2:35: error: expected a value for parameter "filename", found "7"
+       R"(scene.pbrt:2:1: error: plymesh without a "string filename"; the shape is skipped
+scene.pbrt:2:35: error: expected a value for parameter "filename", found "7"; the parameter is ignored
 )",
        {1, 1, 1, 0}},
       {"MixedArray",
        world("Shape \"sphere\" \"float radius\" [ 1 \"two\" ]"),
-       R"(scene.pbrt:2:35: error: expected a number or "]" in parameter "radius", found the string "two"
+       R"(scene.pbrt:2:35: error: expected a number or "]" in parameter "radius", found the string "two"; the parameter is ignored
 )",
-       {1, 1, 1, 0}},
+       {2, 9801, 0, 0}},
       {"FractionForAnInteger",
        world("Shape \"loopsubdiv\" \"integer levels\" 1.5 \"integer indices\" [0 1 2] \"point P\" [0 0 0 1 0 0 0 1 0]"),
        R"(scene.pbrt:2:37: warning: integer expected, found "1.5"; the fraction is cut off
@@ -522,13 +536,13 @@ scene.pbrt:3:1: warning: "float \x09alpha  beta gamma" has more than a type and 
        {2, 2, 0, 0}},
       {"ValueMissing",
        world("Shape \"sphere\" \"float radius\" \"float zmin\" 0"),
-       R"(scene.pbrt:2:31: error: expected a value for parameter "radius", found the string "float zmin"
-scene.pbrt:2:44: error: expected a directive, found the number "0"
+       R"(scene.pbrt:2:31: error: expected a value for parameter "radius", found the string "float zmin"; the parameter is ignored
 )",
-       {1, 1, 1, 0}},
+       {2, 4901, 0, 0}},
       {"SameParameterTwice",
        world("Shape \"sphere\" \"float radius\" 2 \"float radius\" -1"),
        R"(scene.pbrt:2:1: error: Shape "sphere" is skipped: the sphere's radius is not positive
+scene.pbrt:2:33: warning: parameter "float radius" is given again; the last one counts
 )",
        {1, 1, 1, 0}},
       {"MisspelledParameter",
@@ -544,6 +558,173 @@ scene.pbrt:3:1: warning: parameter "float shadowalhpa" is not used; did you mean
 scene.pbrt:2:99: warning: parameter "point N" is ignored: it has the wrong type or number of values here
 )",
        {2, 2, 0, 0}},
+  };
+}
+
+/// One bad parameter costs itself: the shape and its other parameters stay. Radius 1 is the default.
+std::vector<HostileCase> lost_parameters() {
+  return {
+      {"TypeUnknownOfOneAmongMany",
+       world("Shape \"trianglemesh\" \"integer indices\" [0 1 2] \"foo bar\" [1 \"x\" 2] \"point P\" [0 0 0 1 0 0 0 1 "
+             "0]"),
+       R"(scene.pbrt:2:48: error: unknown parameter type "foo" in "foo bar"; the parameter is ignored
+)",
+       {2, 2, 0, 0}},
+      {"StringAmongTheNumbersOfN",
+       world(kTri + "\"normal N\" [0 0 1 \"0\" 0 1] \"float alpha\" 1"),
+       R"(scene.pbrt:2:99: error: expected a number or "]" in parameter "N", found the string "0"; the parameter is ignored
+)",
+       {2, 2, 0, 0}},
+      {"StringAmongTheIndices",
+       world("Shape \"trianglemesh\" \"integer indices\" [0 \"1\" 2] \"point P\" [0 0 0 1 0 0 0 1 0]"),
+       R"(scene.pbrt:2:1: error: Shape "trianglemesh" is skipped: no "integer indices"
+scene.pbrt:2:43: error: expected a number or "]" in parameter "indices", found the string "1"; the parameter is ignored
+)",
+       {1, 1, 1, 0}},
+      {"StringAmongThePoints",
+       world("Shape \"trianglemesh\" \"integer indices\" [0 1 2] \"point P\" [0 0 0 \"x\" 1 0 0 0 1 0]"),
+       R"(scene.pbrt:2:1: error: Shape "trianglemesh" is skipped: no "point P"
+scene.pbrt:2:65: error: expected a number or "]" in parameter "P", found the string "x"; the parameter is ignored
+)",
+       {1, 1, 1, 0}},
+      {"UnterminatedListBeforeAParameter",
+       world(kTri + "\"normal N\" [0 0 1 0 0 1 \"float alpha\" 0"),
+       R"(scene.pbrt:2:92: error: "[" without its "]": the values of parameter "N" run into the string "float alpha"; the parameter is ignored
+scene.pbrt:5:1: note: 1 shape is left out: its alpha is 0 everywhere
+)",
+       {1, 1, 0, 0}},
+      {"UnterminatedListOfStringsBeforeAParameter",
+       world("Shape \"plymesh\" \"string x\" [\"a\" \"b\" \"float alpha\" [0]"),
+       R"(scene.pbrt:2:28: error: "[" without its "]": the values of parameter "x" run into the parameter "float alpha"; the parameter is ignored
+scene.pbrt:5:1: note: 1 shape is left out: its alpha is 0 everywhere
+)",
+       {1, 1, 0, 0}},
+      {"UnterminatedListOfUnknownType",
+       world(kTri + "\"foo bar\" [1 2 \"float alpha\" 0"),
+       R"(scene.pbrt:2:81: error: unknown parameter type "foo" in "foo bar"; the parameter is ignored
+scene.pbrt:5:1: note: 1 shape is left out: its alpha is 0 everywhere
+)",
+       {1, 1, 0, 0}},
+      {"UnterminatedListOfBools",
+       world("AreaLightSource \"diffuse\" \"bool twosided\" [\"true\" \"rgb L\" [0 0 0]"),
+       R"(scene.pbrt:2:43: error: "[" without its "]": the values of parameter "twosided" run into the string "rgb L"; the parameter is ignored
+)",
+       {1, 1, 0, 0}},
+      {"ValuesMissingOfEveryType",
+       world(
+           kTri +
+           "\"integer i\" \"float f\" \"bool b\" \"rgb c\" \"spectrum s\" \"point p\" \"string t\" \"float alpha\" 0"),
+       R"(scene.pbrt:2:93: error: expected a value for parameter "i", found the string "float f"; the parameter is ignored
+scene.pbrt:2:103: error: expected a value for parameter "f", found the string "bool b"; the parameter is ignored
+scene.pbrt:2:112: error: expected a value for parameter "b", found the string "rgb c"; the parameter is ignored
+scene.pbrt:2:120: error: expected a value for parameter "c", found the string "spectrum s"; the parameter is ignored
+scene.pbrt:2:133: error: expected a value for parameter "s", found the string "point p"; the parameter is ignored
+scene.pbrt:2:143: error: expected a value for parameter "p", found the string "string t"; the parameter is ignored
+scene.pbrt:2:154: error: expected a value for parameter "t", found the parameter "float alpha"; the parameter is ignored
+scene.pbrt:5:1: note: 1 shape is left out: its alpha is 0 everywhere
+)",
+       {1, 1, 0, 0}},
+      {"ValueMissingOfATexture",
+       world(kTri + "\"texture Kd\" \"float alpha\" [0]"),
+       R"(scene.pbrt:2:94: error: expected a value for parameter "Kd", found the parameter "float alpha"; the parameter is ignored
+scene.pbrt:5:1: note: 1 shape is left out: its alpha is 0 everywhere
+)",
+       {1, 1, 0, 0}},
+      {"ValueThatReadsLikeADeclaration",
+       world("Texture \"float noise\" \"float\" \"constant\" \"float value\" 0\n" + kTri +
+             "\"texture alpha\" \"float noise\" \"float shadowalpha\" 1"),
+       R"(scene.pbrt:6:1: note: 1 shape is left out: its alpha is 0 everywhere
+)",
+       {1, 1, 0, 0}},
+      {"NumbersWithoutBrackets",
+       world(kTri + "\"normal N\" 0 0 1 \"float alpha\" 0"),
+       R"(scene.pbrt:2:81: warning: parameter "normal N" takes values in groups of 3, found 1; the last 1 are ignored
+scene.pbrt:2:94: error: expected a parameter or a directive after "normal N", found the number "0"; numbers are ignored here
+scene.pbrt:5:1: note: 1 shape is left out: its alpha is 0 everywhere
+)",
+       {1, 1, 0, 0}},
+      {"ListsWithoutAParameter",
+       world("Shape \"sphere\" [1 2] \"float radius\" [0] [3 \"x\"] ]"),
+       R"(scene.pbrt:2:1: error: Shape "sphere" is skipped: the sphere's radius is not positive
+scene.pbrt:2:16: error: expected a parameter or a directive, found "["; it is ignored
+scene.pbrt:2:41: error: expected a parameter or a directive after "float radius", found "["; it is ignored
+scene.pbrt:2:49: error: expected a parameter or a directive after "float radius", found "]"; it is ignored
+)",
+       {1, 1, 1, 0}},
+      {"WordsAmongParameters",
+       world(kTri + "oops \"float alpha\" yes \"normal N\" [ 1 up 0 ] \"float alpha\" 0"),
+       R"(scene.pbrt:2:81: error: expected a parameter or a directive, found "oops"; it is ignored
+scene.pbrt:2:100: error: expected a value for parameter "alpha", found "yes"; the parameter is ignored
+scene.pbrt:2:119: error: expected a number or "]" in parameter "N", found "up"; the parameter is ignored
+scene.pbrt:5:1: note: 1 shape is left out: its alpha is 0 everywhere
+)",
+       {1, 1, 0, 0}},
+      {"MisspelledDirectiveBehindParameters",
+       world(
+           "Shape \"sphere\" \"float radius\" 2 Shpe \"disk\" \"float radius\" -1\nShape \"disk\" \"float radius\" -1"),
+       R"(scene.pbrt:2:33: error: unknown directive "Shpe"; did you mean "Shape"?
+scene.pbrt:3:1: error: Shape "disk" is skipped: the disk's radius is not positive
+)",
+       {2, 9801, 1, 0}},
+      {"BadBytesInAndBetweenParameters",
+       world(kTri +
+             "\1 \"float alpha\" \2 \"normal N\" [0 \3 1] \"string s\" \"a\4b\5\" \"flo\6at x\" 1 \"float alpha\" 0"),
+       R"(scene.pbrt:2:81: error: byte 0x01 does not belong in a pbrt file
+scene.pbrt:2:97: error: byte 0x02 does not belong in a pbrt file
+scene.pbrt:2:97: error: expected a value for parameter "alpha", found a stray byte; the parameter is ignored
+scene.pbrt:2:113: error: byte 0x03 does not belong in a pbrt file
+scene.pbrt:2:113: error: expected a number or "]" in parameter "N", found a stray byte; the parameter is ignored
+scene.pbrt:2:131: error: byte 0x04 does not belong in a pbrt file
+scene.pbrt:2:131: error: expected a value for parameter "s", found a stray byte; the parameter is ignored
+scene.pbrt:2:140: error: byte 0x06 does not belong in a pbrt file
+scene.pbrt:2:147: error: expected a parameter or a directive after "point P", found the number "1"; numbers are ignored here
+scene.pbrt:5:1: note: 1 shape is left out: its alpha is 0 everywhere
+)",
+       {1, 1, 0, 0}},
+      {"EveryDirectiveNamesWhatItLoses",
+       "Camera \"perspective\" \"float fov\" \"wide\"\nFilm \"image\" \"integer xresolution\" [8 \"x\"]\n"
+       "Sampler \"halton\" \"intger pixelsamples\" 4\nIntegrator \"path\" \"integer maxdepth\"\nPixelFilter \"box\" "
+       "\"float xwidth\" [\n"
+       "Accelerator \"bvh\" \"bool x\" 1\n" +
+           world(
+               "Material \"matte\" \"rgb Kd\" [1 0 \"0\"]\nTexture \"t\" \"float\" \"constant\" \"float value\" true\n"
+               "LightSource \"point\" \"blackbody I\" \"hot\"\nAreaLightSource \"diffuse\" \"rgb L\" (1 1 1)\n"
+               "MakeNamedMaterial \"m\" \"string type\" 5\nMakeNamedMedium \"fog\" \"rgb sigma_a\" [\nMediumInterface "
+               "\"fog\""),
+       R"(scene.pbrt:1:34: error: expected a value for parameter "fov", found the string "wide"; the parameter is ignored
+scene.pbrt:2:39: error: expected a number or "]" in parameter "xresolution", found the string "x"; the parameter is ignored
+scene.pbrt:3:18: error: unknown parameter type "intger" in "intger pixelsamples"; the parameter is ignored; did you mean "integer"?
+scene.pbrt:5:1: error: expected a value for parameter "maxdepth", found "PixelFilter"; the parameter is ignored
+scene.pbrt:5:34: error: "[" without its "]": the values of parameter "xwidth" run into "Accelerator"; the parameter is ignored
+scene.pbrt:6:28: error: expected a value for parameter "x", found "1"; the parameter is ignored
+scene.pbrt:8:32: error: expected a number or "]" in parameter "Kd", found the string "0"; the parameter is ignored
+scene.pbrt:9:46: error: expected a value for parameter "value", found "true"; the parameter is ignored
+scene.pbrt:10:35: error: expected a value for parameter "I", found the string "hot"; the parameter is ignored
+scene.pbrt:11:35: error: expected a value for parameter "L", found "(1"; the parameter is ignored
+scene.pbrt:11:38: error: expected a parameter or a directive, found the number "1"; numbers are ignored here
+scene.pbrt:12:1: error: MakeNamedMaterial "m" has no "string type"; matte is used
+scene.pbrt:12:37: error: expected a value for parameter "type", found "5"; the parameter is ignored
+scene.pbrt:13:37: error: "[" without its "]": the values of parameter "sigma_a" run into "MediumInterface"; the parameter is ignored
+)",
+       {1, 1, 0, 0}},
+      {"ParameterGivenManyTimes",
+       world(kTri + repeated("\"float alpha\" 1\n", 20'000) + "\"texture alpha\" \"t\""),
+       R"(scene.pbrt:3:1: warning: parameter "float alpha" is given again; the last one counts (19999 times, first here)
+scene.pbrt:20001:1: warning: parameter "float alpha" is ignored: it has the wrong type or number of values here
+scene.pbrt:20002:1: error: no float texture "t" for parameter "texture alpha"
+)",
+       {2, 2, 0, 0}},
+      {"DirectivesWithoutTheirNames",
+       world("Shape 5 \"float radius\" 1\nMaterial\nObjectBegin" + kTri + "ObjectEnd\nObjectInstance\nShape \"a\1b\""),
+       R"(scene.pbrt:2:7: error: expected a quoted name after Shape, found "5"; Shape is ignored
+scene.pbrt:4:1: error: expected a quoted name after Material, found "ObjectBegin"; Material is ignored
+scene.pbrt:4:13: error: expected a quoted name after ObjectBegin, found "Shape"; ObjectBegin is ignored
+scene.pbrt:6:1: error: expected a quoted name after ObjectInstance, found "Shape"; ObjectInstance is ignored
+scene.pbrt:6:9: error: byte 0x01 does not belong in a pbrt file
+scene.pbrt:6:9: error: expected a quoted name after Shape, found a stray byte; Shape is ignored
+scene.pbrt:4:1: warning: object "" is never instanced: left out
+)",
+       {1, 1, 2, 0}},
   };
 }
 
@@ -615,7 +796,7 @@ scene.pbrt:5:1: error: ObjectEnd without ObjectBegin
        R"(scene.pbrt:2:1: warning: AttributeBegin without its AttributeEnd before the world ends at scene.pbrt:4:1
 scene.pbrt:2:16: warning: TransformBegin without its TransformEnd before the world ends at scene.pbrt:4:1
 scene.pbrt:3:1: warning: ObjectBegin without its ObjectEnd before the world ends at scene.pbrt:4:1
-scene.pbrt:3:1: note: object "o" is never instanced; it is left out
+scene.pbrt:3:1: warning: object "o" is never instanced: left out
 )",
        {0, 0, 0, 0}},
       {"ObjectInAnObject",
@@ -634,7 +815,7 @@ scene.pbrt:7:1: error: no object "b"; the instance is skipped
        world("ObjectBegin \"a\"" + tri + "ObjectEnd\nObjectBegin \"b\"\nObjectInstance \"a\"" + tri +
              "ObjectEnd\nObjectInstance \"b\""),
        R"(scene.pbrt:4:1: error: ObjectInstance "a" inside object "b"; objects cannot hold instances
-scene.pbrt:2:1: note: object "a" is never instanced; it is left out
+scene.pbrt:2:1: warning: object "a" is never instanced: left out
 )",
        {2, 2, 0, 0}},
       {"InstanceOfNothing",
@@ -645,13 +826,13 @@ scene.pbrt:2:1: note: object "a" is never instanced; it is left out
       {"InstanceBeforeItsObject",
        world("ObjectInstance \"a\"\nObjectBegin \"a\"" + tri + "ObjectEnd"),
        R"(scene.pbrt:2:1: error: no object "a"; the instance is skipped
-scene.pbrt:3:1: note: object "a" is never instanced; it is left out
+scene.pbrt:3:1: warning: object "a" is never instanced: left out
 )",
        {1, 1, 0, 0}},
       {"InstanceMisspelled",
        world("ObjectBegin \"Tree1\"" + tri + "ObjectEnd ObjectInstance \"tree1\""),
        R"(scene.pbrt:2:110: error: no object "tree1"; the instance is skipped; did you mean "Tree1"?
-scene.pbrt:2:1: note: object "Tree1" is never instanced; it is left out
+scene.pbrt:2:1: warning: object "Tree1" is never instanced: left out
 )",
        {1, 1, 0, 0}},
       {"ObjectTwice",
@@ -680,7 +861,7 @@ scene.pbrt:2:1: note: object "Tree1" is never instanced; it is left out
        world(repeated("ObjectBegin \"a\"\n", 100'000) + kTri + repeated("ObjectEnd\n", 100'000)),
        R"(scene.pbrt:3:1: error: ObjectBegin "a" inside object "a"; its shapes belong to the outer object (65535 times, first here)
 scene.pbrt:65538:1: error: blocks are nested more than 65536 deep; deeper ones do not keep the state apart (34464 times, first here)
-scene.pbrt:2:1: note: object "a" is never instanced; it is left out
+scene.pbrt:2:1: warning: object "a" is never instanced: left out
 )",
        {1, 1, 0, 0}},
       {"SixtyThousandBlocksNeverClosed",
@@ -724,12 +905,12 @@ scene.pbrt:7:3: error: unknown directive "shpe"; did you mean "Shape"?
        world("Scale 1\nTrnslate 1 0 0\nShape\nTrnslte 1 0 0\nIdentity"),
        R"(scene.pbrt:2:1: error: Scale takes 3 numbers, found 1; it is ignored
 scene.pbrt:3:1: error: unknown directive "Trnslate"; did you mean "Translate"?
-scene.pbrt:5:1: error: expected a quoted name after Shape, found "Trnslte"
+scene.pbrt:5:1: error: expected a quoted name after Shape, found "Trnslte"; Shape is ignored
 )",
-       {1, 1, 0, 0}},
+       {1, 1, 1, 0}},
       {"ActiveTransformInQuotes",
        world("ActiveTransform \"All\""),
-       R"(scene.pbrt:2:17: error: expected All, StartTime or EndTime after ActiveTransform, found the string "All"
+       R"(scene.pbrt:2:17: error: expected All, StartTime or EndTime after ActiveTransform, found the string "All"; it is ignored
 )",
        {1, 1, 0, 0}},
       {"ActiveTransformSometimes",
@@ -751,21 +932,23 @@ scene.pbrt:4:1: error: ActiveTransform takes All, StartTime or EndTime, found "E
        R"(scene.pbrt:4:1: error: no coordinate system "sun1"; the transform stays; did you mean "Sun1"?
 scene.pbrt:5:1: error: no coordinate system "camra"; the transform stays; did you mean "camera"?
 scene.pbrt:6:1: error: no coordinate system "World"; the transform stays; did you mean "world"?
+scene.pbrt:7:2: warning: this shape may stand in a wrong place: a transform before it is ignored
 )",
        {1, 1, 0, 0}},
       {"CoordinateSystemUndefined",
        world("CoordSysTransform \"nowhere\""),
        R"(scene.pbrt:2:1: error: no coordinate system "nowhere"; the transform stays
+scene.pbrt:3:2: warning: this shape may stand in a wrong place: a transform before it is ignored
 )",
        {1, 1, 0, 0}},
       {"NameWithoutQuotes",
        world("Shape sphere"),
-       R"(scene.pbrt:2:7: error: expected a quoted name after Shape, found "sphere"
+       R"(scene.pbrt:2:7: error: expected a quoted name after Shape, found "sphere"; Shape is ignored
 )",
-       {1, 1, 0, 0}},
+       {1, 1, 1, 0}},
       {"MediumInterfaceWithoutNames",
        world("MediumInterface"),
-       R"(scene.pbrt:3:2: error: expected a quoted name after MediumInterface, found "Shape"
+       R"(scene.pbrt:3:2: error: expected a quoted name after MediumInterface, found "Shape"; MediumInterface is ignored
 )",
        {1, 1, 0, 0}},
   };
@@ -814,8 +997,19 @@ TEST(HostileSizes, MillionParametersOnOneDirective) {
 TEST(HostileSizes, SameParameterAMillionTimes) {
   const SceneFolder folder;
   const Timed large = timed_import(folder, world(kTri + repeated("\"float alpha\" 0 ", 999'999) + "\"float alpha\" 1"));
-  EXPECT_EQ(large.imported.text(), "");
+  EXPECT_EQ(
+      without_folder(large.imported.text(), folder),
+      "scene.pbrt:2:97: warning: parameter \"float alpha\" is given again; the last one counts (999999 times, first "
+      "here)\n");
   EXPECT_EQ(kept_of(large.imported), (Kept{2, 2, 0, 0}));
+}
+
+TEST(HostileSizes, TwentyThousandObjectsThatAreNeverInstanced) {
+  const SceneFolder folder;
+  const Imported imported = import_world(
+      folder, listed(20'000, [](int i) { return numbered("ObjectBegin \"o", i) + "\"" + kTri + "ObjectEnd\n"; }));
+  EXPECT_EQ(without_folder(imported.text(), folder),
+            "scene.pbrt:1:12: warning: object \"o0\" and 19999 more are never instanced: left out\n");
 }
 
 TEST(HostileSizes, HundredThousandUnknownDirectives) {
@@ -936,9 +1130,11 @@ TEST(HostileLocales, DecimalCommasChangeNothing) {
   EXPECT_EQ(placed(imported.scene.shapes[0], imported.scene, 1), DVec3(1.5, 0, 0));
 }
 
-const bool kRegistered =
-    register_cases("HostileEncodings", encodings(), __FILE__) && register_cases("HostileTokens", tokens(), __FILE__) &&
-    register_cases("HostileParameters", parameters(), __FILE__) && register_cases("HostileBlocks", blocks(), __FILE__);
+const bool kRegistered = register_cases("HostileEncodings", encodings(), __FILE__) &&
+                         register_cases("HostileTokens", tokens(), __FILE__) &&
+                         register_cases("HostileParameters", parameters(), __FILE__) &&
+                         register_cases("HostileLostParameters", lost_parameters(), __FILE__) &&
+                         register_cases("HostileBlocks", blocks(), __FILE__);
 
 } // namespace
 } // namespace packtrace

@@ -112,7 +112,7 @@ TEST(Objects, UnusedOnesAreLeftOutAndTheirFilesNotRead) {
       folder, "ObjectBegin \"a\" " + ply_shape("gone.ply") + " ObjectEnd ObjectBegin \"b\"" + std::string(kTriangle) +
                   "ObjectEnd ObjectInstance \"b\" ObjectBegin \"empty\" ObjectEnd ObjectInstance \"empty\"");
   EXPECT_EQ(imported.count(Severity::kError), 0u) << imported.text();
-  EXPECT_TRUE(imported.reported("note: object \"a\" is never instanced"));
+  EXPECT_TRUE(imported.reported("warning: object \"a\" is never instanced"));
   ASSERT_EQ(imported.scene.objects.size(), 1u);
   EXPECT_EQ(imported.scene.objects[0].name, "b");
   ASSERT_EQ(imported.scene.instances.size(), 1u);

@@ -30,9 +30,10 @@ TEST(Shapes, SphereLimitsFollowTheRadius) {
 
 TEST(Shapes, EqualQuadricsShareAMesh) {
   const SceneFolder folder;
-  const Imported imported = import_world(folder, "Shape \"sphere\" Translate 9 0 0 Shape \"sphere\" \"float radius\" 2.5 "
-                                                 "Shape \"sphere\" \"float zmax\" .5 Shape \"disk\" Shape \"disk\" "
-                                                 "Shape \"disk\" \"float height\" 1");
+  const Imported imported =
+      import_world(folder, "Shape \"sphere\" Translate 9 0 0 Shape \"sphere\" \"float radius\" 2.5 "
+                           "Shape \"sphere\" \"float zmax\" .5 Shape \"disk\" Shape \"disk\" "
+                           "Shape \"disk\" \"float height\" 1");
   ASSERT_EQ(imported.scene.shapes.size(), 6u) << imported.text();
   const auto mesh = [&](size_t shape) { return imported.scene.shapes[shape].mesh; };
   EXPECT_EQ(mesh(0), mesh(1)); // whole spheres differ in scale only
@@ -191,11 +192,11 @@ TEST(Shapes, UnusedParametersAreReportedWithAHint) {
   EXPECT_TRUE(imported.reported("warning: parameter \"integer radius\" is ignored: it has the wrong type"));
 }
 
-TEST(Shapes, DamagedDirectivesMakeNoShape) {
+TEST(Shapes, OneBadParameterCostsItselfOnly) {
   const SceneFolder folder;
   const Imported imported =
       import_world(folder, "Shape \"sphere\" \"float radius\" [ oops ]\n" + std::string(kTriangle));
-  EXPECT_EQ(imported.scene.shapes.size(), 1u);
+  EXPECT_EQ(imported.scene.shapes.size(), 2u);
   EXPECT_EQ(imported.count(Severity::kError), 1u) << imported.text();
 }
 

@@ -24,7 +24,7 @@ protected:
     Diagnostics diagnostics;
     Reporter reporter(files, diagnostics);
     SourceStack source(folder_.write("scene.pbrt", text), limits, files, reporter);
-    const FileNames names(folder_.path(), true);
+    FileNames names(folder_.path(), true);
     Parser parser(source, names, reporter);
     std::vector<Copy> all;
     Directive directive;
@@ -109,8 +109,11 @@ TEST_F(ParserTest, TrailingCommasAreIgnoredWithAWarning) {
 
 TEST_F(ParserTest, WrongNumberOfNumbersDropsTheDirectiveOnly) {
   const auto all = parse("Scale 1 2\nTranslate 1 2 3 4\nIdentity");
-  ASSERT_EQ(all.size(), 1u);
-  EXPECT_EQ(all[0].kind, K::kIdentity);
+  ASSERT_EQ(all.size(), 3u);
+  EXPECT_TRUE(all[0].damaged);
+  EXPECT_TRUE(all[1].damaged);
+  EXPECT_EQ(all[2].kind, K::kIdentity);
+  EXPECT_FALSE(all[2].damaged);
   EXPECT_EQ(messages_, "scene.pbrt:1:1: error: Scale takes 3 numbers, found 2; it is ignored\n"
                        "scene.pbrt:2:1: error: Translate takes 3 numbers, found 4; it is ignored\n");
 }
@@ -124,29 +127,30 @@ TEST_F(ParserTest, UnknownDirectiveIsNamedAndSkipped) {
 TEST_F(ParserTest, UnterminatedArrayIsBlamedOnItsBracket) {
   const auto all = parse("Shape \"sphere\"\nShape \"trianglemesh\" \"point P\" [ 1 2 3\nIdentity");
   ASSERT_EQ(all.size(), 3u);
-  EXPECT_FALSE(all[0].damaged);
-  EXPECT_TRUE(all[1].damaged);
+  EXPECT_FALSE(all[1].damaged);
+  EXPECT_TRUE(all[1].parameters.empty());
   EXPECT_EQ(messages_, "scene.pbrt:2:32: error: \"[\" without its \"]\": the values of parameter \"P\" run into "
-                       "\"Identity\"\n");
+                       "\"Identity\"; the parameter is ignored\n");
   parse("Shape \"trianglemesh\" \"point P\" [ 1 2 3\n\n\n");
   EXPECT_EQ(messages_,
             "scene.pbrt:1:32: error: \"[\" without its \"]\": the values of parameter \"P\" run into the end of "
-            "the file\n");
+            "the file; the parameter is ignored\n");
 }
 
 TEST_F(ParserTest, UnterminatedStringIsBlamedOnItsQuote) {
   const auto all = parse("Shape \"sphere\" \"float radius\n 2\nIdentity");
   ASSERT_EQ(all.size(), 2u);
-  EXPECT_TRUE(all[0].damaged);
-  EXPECT_EQ(messages_, "scene.pbrt:1:16: error: string without its closing quote: \"float radius\"\n");
+  EXPECT_TRUE(all[0].parameters.empty());
+  EXPECT_EQ(messages_, "scene.pbrt:1:16: error: string without its closing quote: \"float radius\"; it is ignored\n");
 }
 
 TEST_F(ParserTest, WordsAmongNumbersAreNamed) {
   const auto all = parse("Shape \"s\" \"float x\" [1 two 3] \"float y\" 4\nIdentity");
   ASSERT_EQ(all.size(), 2u);
-  EXPECT_TRUE(all[0].damaged);
+  EXPECT_EQ(all[0].parameters.all().size(), 1u);
   EXPECT_EQ(all[0].parameters.get_float("y", 0), 4);
-  EXPECT_EQ(messages_, "scene.pbrt:1:24: error: expected a number or \"]\" in parameter \"x\", found \"two\"\n");
+  EXPECT_EQ(messages_, "scene.pbrt:1:24: error: expected a number or \"]\" in parameter \"x\", found \"two\"; the "
+                       "parameter is ignored\n");
 }
 
 TEST_F(ParserTest, UndeclaredTypesAreNamed) {

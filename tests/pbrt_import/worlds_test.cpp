@@ -34,8 +34,14 @@ TEST(Worlds, TheFirstIsReadUnlessSaidOtherwise) {
   EXPECT_EQ(imported.scene.cameras[0].fov_degrees, 30.0);
   EXPECT_EQ(imported.scene.cameras[0].width_px, 11u);
   EXPECT_EQ(imported.statistics.worlds, 2u);
-  EXPECT_TRUE(imported.reported("note: the file has 2 worlds; world 1 is read"));
+  EXPECT_TRUE(imported.reported("warning: the file has 2 worlds; only world 1 is read"));
   EXPECT_EQ(imported.diagnostics.size(), 1u) << imported.text();
+}
+
+TEST(Worlds, OneThatWasChosenIsNoCauseForAWarning) {
+  const SceneFolder folder;
+  const Imported imported = import_text(folder, two_worlds(), world(1));
+  EXPECT_TRUE(imported.reported("note: the file has 2 worlds; only world 1 is read")) << imported.text();
 }
 
 TEST(Worlds, EachStartsAfresh) {

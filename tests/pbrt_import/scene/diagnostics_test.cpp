@@ -1,5 +1,7 @@
 #include "pbrt_import/scene/diagnostics.h"
 
+#include <algorithm>
+#include <string>
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -18,6 +20,23 @@ TEST(Diagnostics, TextHasPlaceSeverityAndIncludeChain) {
   diagnostics.report(Severity::kError, at(included, 3, 9), "bad radius");
   ASSERT_EQ(diagnostics.entries().size(), 1u);
   EXPECT_EQ(to_string(diagnostics.entries()[0]), "geometry.pbrt:3:9: error: bad radius\n  included from main.pbrt:7:1");
+}
+
+/// How an error looks in the last of so many files, each included by the one before it.
+std::string text_of_chain(int files) {
+  SourceLocation place;
+  for (int i = 0; i < files; ++i)
+    place = {std::make_shared<const SourceFile>(SourceFile{"f" + std::to_string(i), place}), 1, 1};
+  return to_string(Diagnostic{Severity::kError, place, "bad", 1});
+}
+
+TEST(Diagnostics, LongIncludeChainsAreShortenedInTheMiddle) {
+  const auto lines = [](const std::string& text) { return std::count(text.begin(), text.end(), '\n') + 1; };
+  EXPECT_EQ(lines(text_of_chain(10)), 10);
+  EXPECT_EQ(text_of_chain(64), "f63:1:1: error: bad\n  included from f62:1:1\n  included from f61:1:1\n"
+                               "  included from f60:1:1\n  included from f59:1:1\n  ... and through 55 more files\n"
+                               "  included from f3:1:1\n  included from f2:1:1\n  included from f1:1:1\n"
+                               "  included from f0:1:1");
 }
 
 TEST(Diagnostics, RepeatsAreCountedAndTheFirstPlaceIsKept) {
