@@ -484,7 +484,7 @@ BakeReport bake_scene(const Scene& scene, const BakeConfig& config, const std::f
   OutputFile file(output, force);
   BakedScene baked = bake_to_bytes(scene, config, diagnostics, progress);
   progress.begin("writing the file", 0);
-  write_file_bytes(file.path(), baked.bytes);
+  file.write([&](const std::filesystem::path& path) { write_file_bytes(path, baked.bytes); });
   file.commit();
   forget_resumed_levels(config, baked.report, diagnostics);
   return std::move(baked.report);

@@ -15,6 +15,7 @@
 #include "compress/exchange/gltf_materials.h"
 #include "compress/exchange/plain_primitives.h"
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/printable.h"
 
 namespace packtrace {
 namespace {
@@ -217,7 +218,7 @@ private:
         meshes_.try_emplace({instance.geometry, instance.first_slot}, static_cast<int>(model_.meshes.size()));
     if (!added) return place->second;
     tinygltf::Mesh mesh;
-    mesh.name = file_.text(file_.geometries()[instance.geometry].name);
+    mesh.name = to_utf8(file_.text(file_.geometries()[instance.geometry].name));
     for (const Template& part : templates_[instance.geometry]) {
       mesh.primitives.push_back(part.primitive);
       mesh.primitives.back().material =
@@ -238,7 +239,7 @@ private:
       return;
     }
     tinygltf::Camera out;
-    out.name = camera.film_name;
+    out.name = to_utf8(camera.film_name);
     const double aspect = double(camera.width_px) / double(camera.height_px);
     glm::dvec2 half(std::max(aspect, 1.0), std::max(1.0 / aspect, 1.0)); // of the screen; a shifted one is centred
     if (camera.screen_window)

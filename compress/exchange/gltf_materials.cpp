@@ -14,6 +14,7 @@
 
 #include "pbrt_import/scene/error.h"
 #include "pbrt_import/scene/material_flags.h"
+#include "pbrt_import/scene/printable.h"
 
 namespace packtrace {
 namespace {
@@ -58,7 +59,7 @@ void GltfMaterials::add_all() {
 
 void GltfMaterials::add(const baked::MaterialRecord& record) {
   tinygltf::Material material;
-  material.name = file_.text(record.name);
+  material.name = to_utf8(file_.text(record.name));
   material.doubleSided = true; // as pbrt's surfaces are
   tinygltf::PbrMetallicRoughness& surface = material.pbrMetallicRoughness;
   surface.baseColorFactor = {record.albedo[0], record.albedo[1], record.albedo[2], 1.0};

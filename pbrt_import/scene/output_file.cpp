@@ -50,9 +50,13 @@ public:
     const std::scoped_lock lock(mutex_);
     targets_.erase(target);
   }
+  std::set<fs::path> targets() const {
+    const std::scoped_lock lock(mutex_);
+    return targets_;
+  }
 
 private:
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::set<fs::path> targets_;
 };
 Claims claims;
@@ -145,6 +149,21 @@ OutputFile::~OutputFile() {
   fs::remove(temporary_, ignored);
 }
 
+void OutputFile::write(const std::function<void(const fs::path&)>& work) const {
+  try {
+    work(temporary_);
+  } catch (const Error& error) {
+    const std::string mine = temporary_.string(), shown = target_.string();
+    std::string message = error.what();
+    const bool about_mine = message.starts_with(mine + ": ");
+    if (about_mine) message.erase(0, mine.size() + 2);
+    for (size_t at = message.find(mine); at != message.npos; at = message.find(mine, at + shown.size()))
+      message.replace(at, mine.size(), shown);
+    if (about_mine) throw FileError(error.kind(), target_, message);
+    throw Error(error.kind(), message);
+  }
+}
+
 void OutputFile::commit() {
   flush_to_disk(temporary_, target_);
   const int error = force_ ? (std::rename(temporary_.c_str(), target_.c_str()) == 0 ? 0 : errno)
@@ -154,6 +173,18 @@ void OutputFile::commit() {
   forget(temporary_.c_str());
   claims.remove(claim_of(target_));
   committed_ = true;
+}
+
+void refuse_to_replace(const std::vector<fs::path>& inputs, const fs::path& target) {
+  std::error_code not_there;
+  if (!fs::exists(target, not_there)) return;
+  for (const fs::path& input : inputs)
+    if (fs::equivalent(input, target, not_there))
+      throw FileError(ErrorKind::kUsage, target, "this file is read, so it cannot be the output");
+}
+
+void refuse_to_replace(const std::vector<fs::path>& inputs) {
+  for (const fs::path& target : claims.targets()) refuse_to_replace(inputs, target);
 }
 
 void remove_unfinished_output() noexcept {

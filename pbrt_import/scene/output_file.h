@@ -1,7 +1,8 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
+#include <functional>
+#include <vector>
 
 namespace packtrace {
 
@@ -24,6 +25,9 @@ public:
   const std::filesystem::path& path() const { return temporary_; }
   const std::filesystem::path& target() const { return target_; }
 
+  /// Runs work(path()). Where it throws an Error whose message names that path, the target's name stands there instead.
+  void write(const std::function<void(const std::filesystem::path& path)>& work) const;
+
   /// Puts the file in its place. Throws Error(kIo) where that fails, or where a target appeared meanwhile and force was
   /// not set.
   void commit();
@@ -34,6 +38,11 @@ private:
   bool force_ = false;
   bool committed_ = false;
 };
+
+/// Throws Error(kUsage) if target is one of the files that a command reads, under whatever name. Without a target: any
+/// of the OutputFiles of the process that are not committed.
+void refuse_to_replace(const std::vector<std::filesystem::path>& inputs, const std::filesystem::path& target);
+void refuse_to_replace(const std::vector<std::filesystem::path>& inputs);
 
 /// Removes the temporary files of all OutputFiles of the process that are not committed. Async-signal-safe.
 void remove_unfinished_output() noexcept;

@@ -118,6 +118,7 @@ nlohmann::json report(const BakeOptions& options, const BakeReport& baked, const
                     {"bytes", imported.bytes_read},
                     {"shapes", imported.shapes},
                     {"shapes_skipped", imported.shapes_skipped},
+                    {"cameras_left_out", imported.cameras_left_out},
                     {"textures_found", imported.textures_found},
                     {"textures_missing", imported.textures_missing},
                     {"problems", problems_json(imported)}};
@@ -145,9 +146,6 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   const BakeConfig config = make_config(options);
   if (options.output.empty() && !options.dry_run) fail_without_output("bake", options.input, ".ptk");
   refuse_foreign_ending(options.output, {".ptk"}, "bake", advice_for(options));
-  std::error_code not_there;
-  if (std::filesystem::equivalent(options.input, options.output, not_there))
-    throw Error(ErrorKind::kUsage, options.output + ": the output is the input");
   JsonOutput json(globals.json, globals.force);
   std::optional<BinaryOutput> output;
   if (!options.dry_run) output.emplace(options.output, globals.force, json);
@@ -158,6 +156,7 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   const ImportResult imported =
       import_for_command(options.input, options.scene, globals, progress, display, config.textures);
   const double import_s = importing.seconds();
+  refuse_to_replace(imported.files, options.output);
 
   Diagnostics diagnostics;
   const Stopwatch baking;
@@ -175,8 +174,10 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   if (json.wanted()) json.write(report(options, baked, imported.statistics, import_s, bake_s, globals.verbosity > 0));
   if (json.to_stdout() || globals.quiet) return 0;
   std::FILE* const text = output ? output->text_stream() : stdout;
-  fmt::print(text, "{}: import {:.3f} s, bake {:.3f} s, peak memory {:.0f} MiB\n", output ? output->name() : "dry run",
-             import_s, bake_s, static_cast<double>(peak_rss_bytes()) / (1 << 20));
+  print_printable(fmt::format("{}: import {:.3f} s, bake {:.3f} s, peak memory {:.0f} MiB\n",
+                              output ? output->name() : "dry run", import_s, bake_s,
+                              static_cast<double>(peak_rss_bytes()) / (1 << 20)),
+                  text);
   fmt::print(text, "{}", size_text(baked.file));
   fmt::print(text, "position error {:.3g}, {}\n", baked.max_position_error,
              baked.file.normals.empty() ? std::string("no normals stored")
@@ -201,7 +202,8 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   if (baked.left_out > 0)
     fmt::print(text, "{}", fmt::format(grouped(), "{:L} shapes and instances are left out\n", baked.left_out));
   fmt::print(text, "{}", dropped_streams_text(baked.file));
-  if (globals.verbosity > 0) fmt::print(text, "\n{}", to_text(baked.file, true));
+  fmt::print(text, "{}", left_out_cameras_text(imported));
+  if (globals.verbosity > 0) print_printable("\n" + to_text(baked.file, true), text);
   return 0;
 }
 

@@ -23,7 +23,7 @@ BinaryOutput::BinaryOutput(const std::string& target, bool force, const JsonOutp
 
 void BinaryOutput::write(std::span<const std::byte> bytes) {
   if (file_) {
-    write_file_bytes(file_->path(), bytes);
+    file_->write([&](const std::filesystem::path& path) { write_file_bytes(path, bytes); });
     file_->commit();
   } else {
     write_standard_output(bytes);

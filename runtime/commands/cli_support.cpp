@@ -4,6 +4,8 @@
 #include <charconv>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <new>
 #include <optional>
 #include <span>
@@ -17,6 +19,7 @@
 #include <unistd.h>
 
 #include "pbrt_import/scene/output_file.h"
+#include "pbrt_import/scene/printable.h"
 #include "pbrt_import/scene/progress.h"
 #include "runtime/commands/arguments.h"
 #include "runtime/commands/command_line.h"
@@ -51,10 +54,10 @@ bool is_shown(Severity severity, const GlobalOptions& globals) {
 
 /// The message with its "error:" in colour.
 std::string painted(const Diagnostic& diagnostic) {
-  std::string text = to_string(diagnostic);
+  std::string text = printable(to_string(diagnostic));
   // The place may contain anything, so skip it before looking for the word.
   const std::string word = std::string(to_string(diagnostic.severity)) + ":";
-  if (const size_t at = text.find(word, to_string(diagnostic.location).size()); at != std::string::npos) {
+  if (const size_t at = text.find(word, printable(to_string(diagnostic.location)).size()); at != std::string::npos) {
     text.insert(at + word.size(), "\x1b[0m");
     text.insert(at, color_of(diagnostic.severity));
   }
@@ -63,7 +66,8 @@ std::string painted(const Diagnostic& diagnostic) {
 
 int print_failure(const std::string& message, int exit_code) {
   const bool color = wants_color(stderr);
-  const std::string text = std::string("packtrace: ") + (color ? "\x1b[31merror:\x1b[0m " : "error: ") + message + "\n";
+  const std::string text =
+      std::string("packtrace: ") + (color ? "\x1b[31merror:\x1b[0m " : "error: ") + printable(message) + "\n";
   std::fwrite(text.data(), 1, text.size(), stderr);
   return exit_code;
 }
@@ -87,12 +91,26 @@ int run_words(CLI::App& app, GlobalOptions& globals, std::span<const char* const
   return code;
 }
 
+/// Whether an error may be written there: where there is nothing yet, or results. What is no JSON may be a file of the
+/// scene that could not be read.
+bool may_take_error(const std::string& destination) {
+  std::error_code unknown;
+  if (destination == "-" || !std::filesystem::is_regular_file(destination, unknown)) return true;
+  std::ifstream file(destination);
+  char first = 0;
+  return !(file >> first) || first == '{' || first == '[';
+}
+
 /// Writes a failure to where --json goes. A file that is there stays unless --force was given, like any other output.
 void write_failure(CLI::App& app, const GlobalOptions& globals, std::span<const char* const> words,
                    nlohmann::json error) {
   // Where the words could not be parsed, no option has its value.
   const std::string destination = globals.json.empty() ? value_in_words(words, "--json") : globals.json;
   if (destination.empty() || find_verb(app, destination)) return; // "--json info": the name was forgotten
+  if (!may_take_error(destination)) {
+    print_failure(destination + ": holds something else than JSON, so the error is not written there", 0);
+    return;
+  }
   const bool force =
       globals.force || std::ranges::any_of(words, [](std::string_view word) { return word == "--force"; });
   const std::string verb = verb_in_words(app, words), message = error.at("message");
@@ -200,6 +218,11 @@ bool wants_color(std::FILE* stream) {
   return is_terminal(stream) && !(no_color && *no_color);
 }
 
+void print_printable(std::string_view text, std::FILE* stream) {
+  const std::string shown = printable(text);
+  std::fwrite(shown.data(), 1, shown.size(), stream);
+}
+
 std::string format_diagnostics(const Diagnostics& diagnostics, const GlobalOptions& globals, bool color) {
   std::string text;
   size_t shown = 0, hidden = 0;
@@ -210,7 +233,7 @@ std::string format_diagnostics(const Diagnostics& diagnostics, const GlobalOptio
       continue;
     }
     ++shown;
-    text += (color ? painted(diagnostic) : to_string(diagnostic)) + "\n";
+    text += (color ? painted(diagnostic) : printable(to_string(diagnostic))) + "\n";
   }
   if (hidden > 0) text += "... and " + std::to_string(hidden) + " more problems (-v shows all)\n";
   return text;

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <functional>
 #include <string>
+#include <string_view>
 
 #include "pbrt_import/scene/diagnostics.h"
 #include "pbrt_import/scene/error.h"
@@ -53,6 +54,10 @@ void install_interrupt_handlers();
 bool is_terminal(std::FILE* stream);
 /// is_terminal(), and NO_COLOR is unset or empty.
 bool wants_color(std::FILE* stream);
+
+/// Text for people, as printable() shows it: names from scenes and of files may hold anything. A failure to write shows
+/// when the verb ends.
+void print_printable(std::string_view text, std::FILE* stream = stdout);
 
 /// The problems found, one after the other, each ending in a newline. Errors always; warnings unless quiet; notes
 /// with -v. Without -v at most kMaxShownProblems, then a line that counts the rest.

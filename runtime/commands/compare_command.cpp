@@ -216,6 +216,7 @@ int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
   std::optional<OutputFile> diff;
   if (!options.diff.empty()) diff.emplace(options.diff, globals.force);
 
+  refuse_to_replace({options.test, options.reference});
   const ImagePair pair = load_pair(options);
   print_notes(pair, globals);
   const std::array<bool, 5> wanted = wanted_metrics(options, pair.test);
@@ -226,14 +227,16 @@ int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
     const Metric metric = compute(i, pair, options, shown);
     values[i] = metric.value;
     if (shown)
-      write_png(diff->path(), heat_map(pair.test.size, metric.error_map.data, options.diff_white), PngTransfer::kRaw);
+      diff->write([&](const std::filesystem::path& path) {
+        write_png(path, heat_map(pair.test.size, metric.error_map.data, options.diff_white), PngTransfer::kRaw);
+      });
   }
 
   const std::vector<Check> checks = check_limits(options, pair, values);
   if (!globals.quiet && !json.to_stdout()) print_results(pair, values, checks);
   if (diff) {
     diff->commit();
-    if (!globals.quiet && !json.to_stdout()) fmt::print("wrote {}\n", options.diff);
+    if (!globals.quiet && !json.to_stdout()) print_printable("wrote " + options.diff + "\n");
   }
   nlohmann::json document = to_json(options, pair, values, checks);
   const auto exceeded = std::ranges::find(checks, false, &Check::passed);

@@ -152,14 +152,12 @@ Exported export_file(const ExportOptions& options, const std::string& layout, Pr
 
 int run(const ExportOptions& options, const GlobalOptions& globals) {
   if (options.output.empty()) fail_without_output("export", options.input, ".glb");
-  std::error_code not_there;
-  if (std::filesystem::equivalent(options.input, options.output, not_there))
-    throw FileError(ErrorKind::kUsage, options.output, "the output is the input");
   const std::string layout = layout_of(options);
   if (layout == kVertex16 && options.for_gltf)
     throw Error(ErrorKind::kUsage, "--codec, --level, --normal-bits and --uv-bits are for --layout gltf");
   JsonOutput json(globals.json, globals.force);
   BinaryOutput output(options.output, globals.force, json);
+  refuse_to_replace({options.input});
   ProgressDisplay display(globals);
   Progress progress(display.observer());
   const Exported result = export_file(options, layout, progress);
@@ -167,7 +165,7 @@ int run(const ExportOptions& options, const GlobalOptions& globals) {
   display.finish();
   if (json.wanted()) json.write(result.json);
   if (json.to_stdout() || globals.quiet) return 0;
-  fmt::print(output.text_stream(), "{}", result.text);
+  print_printable(result.text, output.text_stream());
   return 0;
 }
 

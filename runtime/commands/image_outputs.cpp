@@ -121,18 +121,17 @@ void ImageOutputs::add_standard_output(std::vector<std::string> aovs) {
 
 void ImageOutputs::write(const RenderedImage& image, const ExrAttributes& attributes) {
   for (const Entry& entry : entries_) {
-    if (!entry.exr) {
-      const std::vector<std::byte> png =
-          encode_png(layer_preview(image, entry.aovs.front(), style_), PngTransfer::kRaw);
-      if (entry.file)
-        write_file_bytes(entry.file->path(), png);
-      else
-        write_standard_output(png);
+    if (!entry.file) {
+      write_standard_output(encode_png(layer_preview(image, entry.aovs.front(), style_), PngTransfer::kRaw));
       continue;
     }
-    std::vector<Layer> layers;
-    for (const std::string& aov : entry.aovs) layers.push_back(exr_layer(image, aov));
-    write_exr(entry.file->path(), image.size, layers, attributes);
+    entry.file->write([&](const std::filesystem::path& path) {
+      if (!entry.exr)
+        return write_file_bytes(path, encode_png(layer_preview(image, entry.aovs.front(), style_), PngTransfer::kRaw));
+      std::vector<Layer> layers;
+      for (const std::string& aov : entry.aovs) layers.push_back(exr_layer(image, aov));
+      write_exr(path, image.size, layers, attributes);
+    });
   }
   for (const Entry& entry : entries_)
     if (entry.file) entry.file->commit();

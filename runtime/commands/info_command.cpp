@@ -72,6 +72,7 @@ nlohmann::json to_json(const ImportResult& imported, uint32_t world) {
       {"materials_by_kind", statistics.materials},
       {"masks", scene.masks.size()},
       {"cameras", scene.cameras.size()},
+      {"cameras_left_out", statistics.cameras_left_out},
       {"camera_list", std::move(cameras)},
       {"area_lights", statistics.area_lights},
       {"light_sources", statistics.light_sources},
@@ -121,6 +122,7 @@ std::string to_text(const ImportResult& imported, uint32_t world) {
   for (const Camera& camera : scene.cameras)
     text += fmt::format("camera   {} {}x{} \"{}\"{}\n", name_of(camera.projection), camera.width_px, camera.height_px,
                         camera.film_name, camera.animation == kNotAnimated ? "" : "   animated");
+  text += left_out_cameras_text(imported);
   if (s.worlds > 1) text += fmt::format("world {} of {}\n", world, s.worlds);
   if (s.animated_shapes + s.animated_instances + s.animated_cameras > 0)
     text += fmt::format(grouped(), "animated   shapes {:L}   instances {:L}   cameras {:L}   (shown as at time {})\n",
@@ -153,6 +155,7 @@ FileInfo info_of(const std::string& input, const InfoOptions& options, const Glo
   FileInfo info;
   if (is_baked_file(input)) {
     require_no_scene_choice(input, options.scene);
+    refuse_to_replace({input});
     const BakedFile file = BakedFile::open(input);
     const FileSummary summary = summarize(file);
     const SeamSummary seams = InstanceSeams(file).summary();
@@ -163,8 +166,8 @@ FileInfo info_of(const std::string& input, const InfoOptions& options, const Glo
                          fmt::format("{:.3g}", summary.max_position_error));
   } else {
     const ImportResult imported = import_for_command(input, options.scene, globals, progress, display);
-    info.json = to_json(imported, options.scene.world);
-    info.text = to_text(imported, options.scene.world);
+    info.json = to_json(imported, options.scene.world.value_or(1));
+    info.text = to_text(imported, options.scene.world.value_or(1));
     info.row = table_row(input, unique_triangle_count(imported.scene), placed_triangle_count(imported.scene),
                          imported.statistics.bytes_read, "");
   }
@@ -179,7 +182,7 @@ int run_one(const InfoOptions& options, const GlobalOptions& globals) {
   Progress progress(display.observer());
   const FileInfo info = info_of(options.inputs.front(), options, globals, progress, display);
   if (json.wanted()) json.write(info.json);
-  if (!json.to_stdout() && !globals.quiet) fmt::print("{}", info.text);
+  if (!json.to_stdout() && !globals.quiet) print_printable(info.text);
   return 0;
 }
 
@@ -196,7 +199,7 @@ int run_several(const InfoOptions& options, const GlobalOptions& globals) {
     Progress progress(display.observer());
     try {
       FileInfo info = info_of(input, options, globals, progress, display);
-      if (shown) fmt::print("{}", in_full ? fmt::format("== {}\n{}\n", input, info.text) : info.row);
+      if (shown) print_printable(in_full ? fmt::format("== {}\n{}\n", input, info.text) : info.row);
       documents.push_back(std::move(info.json));
     } catch (const Error& error) {
       if (error.kind() == ErrorKind::kCancelled || error.kind() == ErrorKind::kUsage) throw;

@@ -44,7 +44,7 @@ void JsonOutput::write(const nlohmann::json& document) {
   if (!wanted()) return;
   const std::string text = document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   if (file_) {
-    write_file_bytes(file_->path(), std::as_bytes(std::span(text)));
+    file_->write([&](const std::filesystem::path& path) { write_file_bytes(path, std::as_bytes(std::span(text))); });
     file_->commit();
   } else if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0) {
     throw Error(ErrorKind::kIo, "cannot write JSON to standard output");

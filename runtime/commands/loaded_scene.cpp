@@ -7,9 +7,12 @@
 #include <string_view>
 
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "pbrt_import/input_file.h"
 #include "pbrt_import/scene/file_error.h"
+#include "pbrt_import/scene/output_file.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/trace/float_source.h"
 #include "runtime/trace/packed_source.h"
@@ -39,7 +42,7 @@ void add_scene_options(CLI::App& verb, SceneOptions& options) {
 }
 
 void require_no_scene_choice(const std::filesystem::path& file, const SceneOptions& options) {
-  const char* const option = options.time ? "--time" : options.world != 1 ? "--world" : nullptr;
+  const char* const option = options.time ? "--time" : options.world.value_or(1) != 1 ? "--world" : nullptr;
   if (option)
     throw FileError(ErrorKind::kUsage, file,
                     std::string(option) +
@@ -50,13 +53,16 @@ namespace {
 
 /// Refuses what is plainly another kind of file, whose bytes would be reported one by one.
 void require_scene_text(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) return; // the import says why
+  std::array<char, 512> start{};
+  size_t size = 0;
+  try {
+    size = InputFile(file, start.size()).read(start); // inflated where it is compressed
+  } catch (const Error&) {
+    return; // the import says why
+  }
+  const std::string_view text(start.data(), size);
   if (is_baked_file(file))
     throw FileError(ErrorKind::kInput, file, "a baked file already; give the .pbrt scene that it was made of");
-  std::array<char, 512> start{};
-  in.read(start.data(), static_cast<std::streamsize>(start.size()));
-  const std::string_view text(start.data(), static_cast<size_t>(in.gcount()));
   if (text.starts_with("ply\n") || text.starts_with("ply\r"))
     throw FileError(ErrorKind::kInput, file, "a PLY mesh, not a scene; name it in a .pbrt file with Shape \"plymesh\"");
   if (text.find('\0') != std::string_view::npos)
@@ -64,6 +70,14 @@ void require_scene_text(const std::filesystem::path& file) {
 }
 
 } // namespace
+
+std::string left_out_cameras_text(const ImportResult& imported) {
+  const uint64_t left_out = imported.statistics.cameras_left_out;
+  if (left_out == 0) return {};
+  return fmt::format("{} camera{} left out, as the errors above say; {}\n", left_out, left_out == 1 ? " is" : "s are",
+                     imported.scene.cameras.empty() ? "without one, render frames the whole scene"
+                                                    : "camera 0 is the last of the others");
+}
 
 nlohmann::json problems_json(const ImportStatistics& statistics) {
   const auto count = [&](Severity severity) { return statistics.problems[static_cast<size_t>(severity)]; };
@@ -90,6 +104,7 @@ ImportResult import_for_command(const std::filesystem::path& file, const SceneOp
     throw;
   }
   display.finish();
+  refuse_to_replace(result.files);
   const bool empty = placed_triangle_count(result.scene) == 0;
   GlobalOptions shown = globals;
   if (empty) shown.verbosity = std::max(shown.verbosity, 1); // notes may say why
@@ -103,6 +118,7 @@ LoadedScene load_scene(const std::filesystem::path& file, const SceneOptions& sc
   LoadedScene loaded;
   if (is_baked_file(file)) {
     require_no_scene_choice(file, scene_options);
+    refuse_to_replace({file});
     loaded.baked.emplace(BakedFile::open(file));
     loaded.source = std::make_unique<PackedSource>(*loaded.baked);
   } else {

@@ -22,7 +22,7 @@ bool is_baked_file(const std::filesystem::path& file);
 /// How verbs read a pbrt scene; as in ImportOptions.
 struct SceneOptions {
   bool strict = false;
-  uint32_t world = 1;
+  std::optional<uint32_t> world;
   std::optional<double> time;
 };
 
@@ -32,13 +32,17 @@ void add_scene_options(CLI::App& verb, SceneOptions& options);
 /// Throws Error(kUsage) where options ask for what only a .pbrt scene has: a baked file holds one world at one time.
 void require_no_scene_choice(const std::filesystem::path& file, const SceneOptions& options);
 
-/// Imports a pbrt file, prints its diagnostics, and refuses scenes without triangles.
+/// Imports a pbrt file, prints its diagnostics, and refuses scenes without triangles, and outputs in the place of files
+/// that the scene is made of.
 /// @param keep_textures as in ImportOptions
 /// Throws Error(kInput) where the file cannot be read, lacks the world asked for, nothing is left of it, or strict is
-/// set and there was a problem.
+/// set and there was a problem; Error(kUsage) like refuse_to_replace().
 ImportResult import_for_command(const std::filesystem::path& file, const SceneOptions& scene_options,
                                 const GlobalOptions& globals, Progress& progress, ProgressDisplay& display,
                                 bool keep_textures = false);
+
+/// A line on cameras that the scene has and the import could not use; empty if there are none.
+std::string left_out_cameras_text(const ImportResult& imported);
 
 /// How many problems an import reported: {notes, warnings, errors}.
 nlohmann::json problems_json(const ImportStatistics& statistics);

@@ -39,7 +39,7 @@ constexpr uint32_t kGroundTruthSpp = 1024;
 struct RenderOptions {
   std::string input;
   std::vector<std::string> outputs, aovs;
-  std::string camera = "0"; ///< number, or "auto"
+  std::optional<std::string> camera; ///< number, or "auto"; without one camera 0, if it sees anything
   std::string size;
   std::optional<std::string> background; ///< of .png files; without one, what suits the layer
   bool no_legend = false;
@@ -70,32 +70,52 @@ ImageSize parse_size(const std::string& text) {
   return size;
 }
 
-Camera choose_camera(const SceneSource& source, const RenderOptions& options, const GlobalOptions& globals) {
+/// Which camera a render is of, and why.
+struct ChosenCamera {
+  Camera camera;
+  std::optional<uint32_t> index; ///< among the scene's; none: it frames all of the scene
+  std::string reason;            ///< of framing the scene without being asked to
+};
+
+ChosenCamera choose_camera(const SceneSource& source, const RenderOptions& options, const GlobalOptions& globals) {
   const std::span<const Camera> cameras = source.cameras();
   const ImageSize size = options.size.empty() ? kDefaultSize : parse_size(options.size);
-  if (options.camera == "auto") return framing_camera(source.world_bounds(), size);
+  const std::string name = options.camera.value_or("0");
+  if (name == "auto") return {framing_camera(source.world_bounds(), size), std::nullopt, {}};
   uint32_t index = 0;
-  if (!parse_number(options.camera, index))
-    throw Error(ErrorKind::kUsage, "--camera " + options.camera + ": give a number from 0, or auto");
-  if (index < cameras.size()) return cameras[index];
+  if (!parse_number(name, index))
+    throw Error(ErrorKind::kUsage, "--camera " + name + ": give a number from 0, or auto");
+  if (index < cameras.size()) return {cameras[index], index, {}};
   if (index > 0)
     throw Error(ErrorKind::kUsage, fmt::format("--camera {}: the scene has {} camera{}", index, cameras.size(),
                                                cameras.size() == 1 ? "" : "s"));
-  if (!globals.quiet) fmt::print(stderr, "{}: warning: no camera; framing the scene's bounds\n", options.input);
-  return framing_camera(source.world_bounds(), size);
+  if (!globals.quiet) print_printable(options.input + ": warning: no camera; framing the scene's bounds\n", stderr);
+  return {framing_camera(source.world_bounds(), size), std::nullopt, "the scene has no camera"};
+}
+
+/// What is shown instead of a camera that sees nothing of the scene.
+ChosenCamera frame_instead(const ChosenCamera& blind, const SceneSource& source, ImageSize size,
+                           const RenderOptions& options, const GlobalOptions& globals) {
+  ChosenCamera framing{framing_camera(source.world_bounds(), size), std::nullopt,
+                       fmt::format("camera {} sees nothing", blind.index.value())};
+  if (!globals.quiet)
+    print_printable(fmt::format("{}: warning: {} of the scene; framing its bounds (--camera {} keeps the camera)\n",
+                                options.input, framing.reason, *blind.index),
+                    stderr);
+  return framing;
 }
 
 /// Why a render is as it is, for -v. The camera and the rest have been chosen by the functions beside this one.
-RenderChoices reasons(const SceneSource& source, const Camera& camera, const RenderOptions& options, bool baked,
+RenderChoices reasons(const SceneSource& source, const ChosenCamera& camera, const RenderOptions& options, bool baked,
                       const GlobalOptions& globals) {
   const size_t cameras = source.cameras().size();
   RenderChoices choices;
-  choices.camera = camera;
+  choices.camera = camera.camera;
   choices.camera_reason = options.camera == "auto" ? "--camera auto, which frames all of the scene"
-                          : cameras == 0
-                              ? "the scene has none, so all of it is framed"
-                              : fmt::format("number {} of the scene's {}, from 0{}", options.camera, cameras,
-                                            options.camera == "0" && cameras > 1 ? "; --camera takes another" : "");
+                          : !camera.reason.empty()
+                              ? camera.reason + ", so all of it is framed"
+                              : fmt::format("number {} of the scene's {}, from 0{}", camera.index.value_or(0), cameras,
+                                            camera.index == 0u && cameras > 1 ? "; --camera takes another" : "");
   choices.size_reason = options.size.empty() ? (cameras > 0 ? "the camera's film" : "the default") : "--size";
   choices.radius_reason = options.ao_radius ? "--ao-radius"
                                             : fmt::format("10 % of the scene's diagonal, {:.5g}",
@@ -176,7 +196,7 @@ uint64_t sum_of(const nlohmann::json& parts) {
 }
 
 nlohmann::json report(const RenderOptions& options, const RenderConfig& config, const RenderedImage& image,
-                      const SceneSource& source, std::span<const RayTracer* const> tracers,
+                      const SceneSource& source, std::span<const RayTracer* const> tracers, const ChosenCamera& camera,
                       const std::optional<ChosenDetail>& detail, const std::vector<std::string>& files) {
   const RayTracer& tracer = *tracers.back();
   const auto hits =
@@ -189,6 +209,10 @@ nlohmann::json report(const RenderOptions& options, const RenderConfig& config, 
       {"backend", tracer.name()},
       {"isa", tracer.isa()},
       {"files", files},
+      {"camera",
+       {{"index", camera.index ? nlohmann::json(*camera.index) : nlohmann::json()},
+        {"frames_scene", !camera.index},
+        {"reason", camera.reason.empty() ? nlohmann::json() : nlohmann::json(camera.reason)}}},
       {"width", image.size.width},
       {"height", image.size.height},
       {"supersample", config.supersample},
@@ -242,19 +266,23 @@ void print(std::FILE* stream, const nlohmann::json& r) {
                seconds.at("denoise").get<double>() * 1e3 / frames);
   if (r.contains("lod")) fmt::print(stream, "{}", detail_text(r.at("lod")));
   if (r.contains("seams")) fmt::print(stream, "{}", visible_seams_text(r.at("seams")));
-  for (const auto& file : r.at("files")) fmt::print(stream, "wrote {}\n", file.get<std::string>());
+  if (const auto& reason = r.at("camera").at("reason"); !reason.is_null())
+    fmt::print(stream, "{}: the picture frames the whole scene\n", reason.get<std::string>());
+  for (const auto& file : r.at("files")) print_printable("wrote " + file.get<std::string>() + "\n", stream);
 }
 
 /// A picture and what it was traced with.
 struct Traced {
+  ChosenCamera camera;
   std::optional<ChosenDetail> detail;
   std::vector<std::unique_ptr<RayTracer>> tracers; ///< what the camera sees, then what only occlusion rays meet
   RenderedImage image;
 };
 
-Traced trace(const RenderOptions& options, const LoadedScene& loaded, const Camera& camera, RenderConfig config,
-             const TracerConfig& backend, bool show_detail, Progress& progress) {
+Traced trace(const RenderOptions& options, const GlobalOptions& globals, const LoadedScene& loaded, RenderConfig config,
+             ChosenCamera chosen, const TracerConfig& backend, bool show_detail, Progress& progress) {
   Traced traced;
+  traced.camera = std::move(chosen);
   double build_s = 0.0;
   const auto build = [&](const auto& make) {
     const Stopwatch building;
@@ -262,23 +290,34 @@ Traced trace(const RenderOptions& options, const LoadedScene& loaded, const Came
     build_s += building.seconds();
   };
   const auto choose = [&](const GBuffer* seen) {
-    traced.detail.emplace(choose_detail(loaded, camera, config, options.lod, seen));
+    traced.detail.emplace(choose_detail(loaded, traced.camera.camera, config, options.lod, seen));
     build([&] { return make_tracer(*traced.detail->source, *loaded.baked, backend); });
   };
-  progress.begin("bvh", 0);
-  if (options.lod.error_px && !options.lod.only_occlusion()) {
-    choose(nullptr);
-    if (show_detail) config.lod_error_px = *options.lod.error_px;
-    traced.image = render_view(*traced.detail->source, *traced.tracers[0], camera, config, progress);
-  } else {
-    build([&] { return make_tracer(*loaded.source, loaded.baked ? &*loaded.baked : nullptr, backend); });
-    ChooseOccluders occluders;
-    if (options.lod.only_occlusion())
-      occluders = [&](const GBuffer& seen, const PrimaryCamera&) {
-        choose(&seen);
-        return Occluders{traced.detail->source.get(), traced.tracers[1].get(), *options.lod.error_px};
-      };
-    traced.image = render_view(*loaded.source, *traced.tracers[0], camera, config, progress, occluders);
+  ChooseOccluders occluders;
+  if (options.lod.only_occlusion())
+    occluders = [&](const GBuffer& seen, const PrimaryCamera&) {
+      choose(&seen);
+      return Occluders{traced.detail->source.get(), traced.tracers[1].get(), *options.lod.error_px};
+    };
+  const bool sees_levels = options.lod.error_px && !options.lod.only_occlusion();
+  if (sees_levels && show_detail) config.lod_error_px = *options.lod.error_px;
+  const auto render = [&] {
+    progress.begin("bvh", 0);
+    if (sees_levels) { // those that this camera needs
+      traced.tracers.clear();
+      choose(nullptr);
+    } else if (traced.tracers.empty()) {
+      build([&] { return make_tracer(*loaded.source, loaded.baked ? &*loaded.baked : nullptr, backend); });
+    }
+    const SceneSource& source = sees_levels ? *traced.detail->source : *loaded.source;
+    traced.image = render_view(source, *traced.tracers[0], traced.camera.camera, config, progress, occluders);
+  };
+  config.only_if_seen = !options.camera && traced.camera.index;
+  render();
+  if (!traced.image.seen && config.only_if_seen) {
+    traced.camera = frame_instead(traced.camera, *loaded.source, config.size, options, globals);
+    config.only_if_seen = false;
+    render();
   }
   traced.image.timings.build_s = build_s;
   return traced;
@@ -313,10 +352,11 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   const LoadedScene loaded = load_scene(options.input, options.scene, globals, progress, display);
   timings.load_s = loading.seconds();
   if (options.lod.error_px) require_levels(options.input, loaded);
-  const Camera camera = choose_camera(*loaded.source, options, globals);
-  const RenderConfig config = make_config(*loaded.source, camera, options);
+  ChosenCamera camera = choose_camera(*loaded.source, options, globals);
+  const RenderConfig config = make_config(*loaded.source, camera.camera, options);
   const TracerConfig backend = tracer_config(options, loaded.baked.has_value());
-  const Traced traced = trace(options, loaded, camera, config, backend, outputs.show_detail(), progress);
+  const Traced traced =
+      trace(options, globals, loaded, config, std::move(camera), backend, outputs.show_detail(), progress);
   display.finish();
   const RenderedImage& image = traced.image;
 
@@ -329,25 +369,26 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   std::vector<const RayTracer*> tracers;
   for (const std::unique_ptr<RayTracer>& tracer : traced.tracers) tracers.push_back(tracer.get());
   const SceneSource& source = traced.detail ? *traced.detail->source : *loaded.source;
-  nlohmann::json result = report(options, config, image, source, tracers, traced.detail, outputs.targets());
+  nlohmann::json result =
+      report(options, config, image, source, tracers, traced.camera, traced.detail, outputs.targets());
   result["seconds"]["load"] = timings.load_s;
   result["seconds"]["write"] = timings.write_s;
   if (loaded.baked) {
     const PrimaryCamera traced_pixels(
-        camera, {config.size.width * config.supersample, config.size.height * config.supersample});
+        traced.camera.camera, {config.size.width * config.supersample, config.size.height * config.supersample});
     result["seams"] =
         visible_seams_json(InstanceSeams(*loaded.baked), image, traced_pixels, sees_levels ? &*traced.detail : nullptr);
   }
-  if (result.at("hit_pixels") == 0 && !globals.quiet)
-    fmt::print(stderr, "{}: warning: this camera sees nothing of the scene; try --camera auto\n", options.input);
+  if (!image.seen && !globals.quiet)
+    print_printable(options.input + ": warning: this camera sees nothing of the scene; try --camera auto\n", stderr);
   if (json.wanted()) json.write(result);
   if (json.to_stdout() || globals.quiet) return 0;
   std::FILE* const text = outputs.to_stdout() ? stderr : stdout;
   print(text, result);
   if (globals.verbosity > 0)
     fmt::print(text, "{}",
-               choices_text(reasons(*loaded.source, camera, options, loaded.baked.has_value(), globals), config, loaded,
-                            *tracers.front(), timings));
+               choices_text(reasons(*loaded.source, traced.camera, options, loaded.baked.has_value(), globals), config,
+                            loaded, *tracers.front(), timings));
   return 0;
 }
 
@@ -371,8 +412,10 @@ void add_render_command(CLI::App& app, GlobalOptions& globals) {
           "in .exr, ao in .png). Several layers become NAME.LAYER.png")
       ->delimiter(',')
       ->type_name("LAYERS");
-  verb.add_option("--camera", options->camera,
-                  "Which of the scene's cameras, from 0 (the default); auto frames all of the scene")
+  verb.add_option(
+          "--camera", options->camera,
+          "Which of the scene's cameras, from 0; auto frames all of the scene (default: 0, or auto where there is "
+          "none or it sees nothing)")
       ->type_name("I|auto");
   verb.add_option("--size", options->size, "Image size, for example 1280x720 (default: the scene's film)")
       ->type_name("WxH");

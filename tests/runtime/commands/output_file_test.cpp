@@ -55,6 +55,38 @@ TEST(OutputFile, ReplacesOnlyWithForce) {
   EXPECT_EQ(read_text(folder / "a.txt"), "new");
 }
 
+TEST(OutputFile, ErrorsNameTheTargetAndNotTheTemporaryFile) {
+  const TemporaryFolder folder;
+  const OutputFile file(folder / "a.txt", false);
+  try {
+    file.write([](const std::filesystem::path& path) {
+      throw Error(ErrorKind::kIo, path.string() + ": cannot write: disk full (" + path.string() + ")");
+    });
+    FAIL();
+  } catch (const Error& error) {
+    const std::string target = folder / "a.txt";
+    EXPECT_EQ(error.what(), target + ": cannot write: disk full (" + target + ")");
+    EXPECT_EQ(error.kind(), ErrorKind::kIo);
+  }
+}
+
+TEST(OutputFile, CannotReplaceWhatIsRead) {
+  const TemporaryFolder folder;
+  for (const char* const name : {"a.ply", "b.ply"}) write_text(folder / name, "mesh");
+  std::filesystem::create_hard_link(folder / "a.ply", folder / "hard.png");
+  std::filesystem::create_symlink(folder / "a.ply", folder / "soft.png");
+  const std::vector<std::filesystem::path> inputs{folder / "missing.ply", folder / "a.ply"};
+  for (const char* const name : {"a.ply", "./a.ply", "hard.png", "soft.png"}) {
+    EXPECT_EQ(error_kind_of([&] { refuse_to_replace(inputs, folder / name); }), ErrorKind::kUsage) << name;
+    const OutputFile file(folder / name, true);
+    EXPECT_EQ(error_kind_of([&] { refuse_to_replace(inputs); }), ErrorKind::kUsage) << name;
+  }
+  for (const char* const name : {"b.ply", "new.ply", "missing.ply"}) {
+    const OutputFile file(folder / name, true);
+    EXPECT_NO_THROW(refuse_to_replace(inputs)) << name;
+  }
+}
+
 TEST(OutputFile, TwoCannotHaveOneTarget) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "sub");
