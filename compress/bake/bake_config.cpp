@@ -23,6 +23,7 @@ void validate_precision(PrecisionKind kind, double precision) {
   constexpr const char* kWhat = "precision";
   switch (kind) {
   case PrecisionKind::kEdgeFraction:
+  case PrecisionKind::kPicture:
     return require(precision >= 1e-9 && precision <= 1.0, kWhat, "a fraction of the median edge must be 1e-9 .. 1");
   case PrecisionKind::kDiagonalFraction:
     return require(precision >= 1e-12 && precision <= 0.1, kWhat, "a fraction of the diagonal must be 1e-12 .. 0.1");

@@ -13,11 +13,11 @@
 #include "compress/bake/geometry_encoder.h"
 #include "compress/bake/geometry_measure.h"
 #include "compress/bake/geometry_plan.h"
+#include "compress/bake/grid_choice.h"
 #include "compress/bake/lod/lod_encoder.h"
 #include "compress/bake/lod/lod_store.h"
 #include "compress/bake/lod/shared_borders.h"
 #include "compress/bake/material_runs.h"
-#include "compress/bake/nested_grids.h"
 #include "compress/bake/page_encoder.h"
 #include "compress/bake/requirement_table.h"
 #include "compress/bake/scene_measure.h"
@@ -121,31 +121,29 @@ private:
 
   void measure() {
     progress_.begin("measuring geometry", plan_.geometries.size());
-    SceneMeasure measure = measure_scene(scene_, plan_, progress_);
-    measures_ = std::move(measure.geometries);
-    world_ = measure.world;
-    has_world_space_ = measure.has_world_space;
+    measure_ = measure_scene(scene_, plan_, progress_);
   }
 
   void choose_grids() {
-    if (has_world_space_) {
-      world_grid_ = choose_grid(config_, world_, 1.0);
+    GridChoice choice = packtrace::choose_grids(scene_, plan_, measure_, config_, progress_);
+    grids_ = std::move(choice.grids);
+    report_.nested_geometries = choice.nested_geometries;
+    report_.finer_geometries = choice.finer_geometries;
+    for (const Shortfall& s : choice.shortfalls)
+      report_.promise.push_back({plan_.geometries[s.geometry].name, std::string(name_of(s.bound)), s.wanted, s.step,
+                                 world_scale(plan_.geometries[s.geometry]), s.float_limit});
+    if (measure_.has_world_space) {
+      world_grid_ = choice.world;
       report_.world_step = world_grid_.step();
-      report_.world_median_edge = world_.median_edge;
+      report_.world_median_edge = measure_.world.median_edge;
     }
-    const std::vector<uint32_t> halvings = has_world_space_
-                                               ? nest_grids(scene_, plan_, measures_, config_, world_grid_.step())
-                                               : std::vector<uint32_t>(plan_.geometries.size());
     uint64_t coarse = 0, far = 0;
     for (size_t i = 0; i < grids_.size(); ++i) {
-      const GeometryPlan& plan = plan_.geometries[i];
-      if (measures_[i].bounds.empty()) continue; // nothing to quantise: the default grid
-      grids_[i] = plan.world_space ? world_grid_ : choose_grid(config_, measures_[i], plan.max_stretch);
-      grids_[i].exponent -= static_cast<int32_t>(halvings[i]);
-      report_.nested_geometries += halvings[i] > 0;
-      const double step = grids_[i].step();
-      coarse += measures_[i].median_edge > 0.0 && step > measures_[i].median_edge * kRoughEdge;
-      far += measures_[i].max_abs() * 0x1p-23 > step;
+      const GeometryMeasure& measure = measure_.geometries[i];
+      if (measure.bounds.empty()) continue;
+      const double step = grids_[i].grid.step();
+      coarse += measure.median_edge > 0.0 && step > measure.median_edge * kRoughEdge;
+      far += measure.float_step() > step;
     }
     if (coarse > 0)
       warn(std::to_string(coarse) + " of " + std::to_string(grids_.size()) +
@@ -161,7 +159,7 @@ private:
     for (baked::InstanceRecord& instance : plan_.instances) {
       if (instance.geometry == baked::kNone) continue;
       const uint32_t geometry = instance.geometry;
-      if (const Bounds box = placed_box(instance, measures_[geometry].bounds);
+      if (const Bounds box = placed_box(instance, measure_.geometries[geometry].bounds);
           !box.empty() && !within_float_range(box)) {
         plan_.left_out.push_back(beyond_float_range("an instance of " + plan_.geometries[geometry].name, box));
         instance.geometry = baked::kNone;
@@ -192,11 +190,11 @@ private:
     for (size_t i = 0; i < uses.size(); ++i)
       if (uses[i] == 0) {
         plan_.geometries[i] = {plan_.geometries[i].name, {}, {}, {}, plan_.geometries[i].world_space, 1.0};
-        measures_[i] = {};
+        measure_.geometries[i] = {};
       }
     const auto empty = static_cast<uint32_t>(plan_.geometries.size());
     plan_.geometries.push_back({"left out", {}, {}, {}, false, 1.0});
-    measures_.emplace_back(), grids_.emplace_back(), packed_.emplace_back();
+    measure_.geometries.emplace_back(), grids_.emplace_back(), packed_.emplace_back();
     for (baked::InstanceRecord& instance : plan_.instances)
       if (instance.geometry == baked::kNone) instance = {{1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, empty, 0};
   }
@@ -310,17 +308,18 @@ private:
   }
 
   QuantizedGeometry quantize(size_t index, const GeometryNeeds& needs) const {
-    return quantize_geometry(scene_, plan_.geometries[index], needs, config_, grids_[index], measures_[index]);
+    return quantize_geometry(scene_, plan_.geometries[index], needs, config_, grids_[index],
+                             measure_.geometries[index]);
   }
 
   Draft pack_with(size_t index, const GeometryNeeds& needs) const {
     const GeometryPlan& plan = plan_.geometries[index];
-    const GeometryMeasure& measure = measures_[index];
+    const GeometryMeasure& measure = measure_.geometries[index];
     Draft draft;
     draft.quantized = quantize(index, needs);
     const QuantizedGeometry& q = draft.quantized;
     draft.clusters = split_geometry(q);
-    draft.packed = {record_of(plan, q, position_error_bound(q.grid.step(), measure.max_abs())),
+    draft.packed = {record_of(plan, q, position_error_bound(grids_[index].coarsest_step(), measure.max_abs())),
                     encode_geometry(q, draft.clusters),
                     q.stats,
                     q.slots,
@@ -432,7 +431,8 @@ private:
     const Bounds bounds = placed_bounds(sections);
     s.bounds_lo = {bounds.lo.x, bounds.lo.y, bounds.lo.z};
     s.bounds_hi = {bounds.hi.x, bounds.hi.y, bounds.hi.z};
-    s.precision_kind = static_cast<uint32_t>(config_.precision_kind);
+    const PrecisionKind kind = config_.precision_kind;
+    s.precision_kind = static_cast<uint32_t>(kind == PrecisionKind::kPicture ? PrecisionKind::kEdgeFraction : kind);
     s.precision_value = config_.precision;
     s.purpose = config_.purpose | (uint32_t{config_.keep_normals} << (baked::kKeepShift + baked::kNormals)) |
                 (uint32_t{config_.keep_uvs} << (baked::kKeepShift + baked::kUvs));
@@ -457,11 +457,9 @@ private:
   Diagnostics& diagnostics_;
   Progress& progress_;
   ScenePlan plan_;
-  std::vector<GeometryMeasure> measures_;
-  GeometryMeasure world_;
-  bool has_world_space_ = false;
+  SceneMeasure measure_;
   PositionGrid world_grid_;
-  std::vector<PositionGrid> grids_;
+  std::vector<GeometryGrid> grids_;
   std::vector<Packed> packed_;
   std::vector<uint8_t> lod_wanted_; // by geometry
   SharedBorders shared_borders_;

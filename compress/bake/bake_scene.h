@@ -15,6 +15,17 @@
 
 namespace packtrace {
 
+/// A geometry whose pictures may differ from the source's by more than the default precision promises
+/// (PrecisionKind::kPicture). Steps are in units of the geometry's space.
+struct BrokenPromise {
+  std::string name;    ///< of the geometry
+  std::string bound;   ///< what is not kept: height, pixel, contact or outline (PictureBound)
+  double wanted = 0.0; ///< the step that would keep it
+  double step = 0.0;
+  double scale = 1.0;       ///< of its largest instance: wanted x scale is a step in world units
+  bool float_limit = false; ///< the step is as fine as floats are where the geometry lies
+};
+
 /// What a bake did. `file` is what summarize() says of the written file.
 struct BakeReport {
   FileSummary file;
@@ -35,8 +46,10 @@ struct BakeReport {
   uint64_t left_out = 0;   ///< shapes and instances that leave the float range; each is in the diagnostics
   double world_step = 0.0; ///< 0: no world-space geometry
   double world_median_edge = 0.0;
-  uint64_t nested_geometries = 0;  ///< in world space on a finer grid than the scene's, as they are so small
-  double max_position_error = 0.0; ///< measured against the source, largest axis, object units
+  uint64_t nested_geometries = 0;     ///< in world space on a finer grid than the scene's, as they are so small
+  uint64_t finer_geometries = 0;      ///< with finer steps than the median edge asks for, as pictures need them
+  std::vector<BrokenPromise> promise; ///< what the default precision would keep; empty: pictures are as promised
+  double max_position_error = 0.0;    ///< measured against the source, largest axis, object units
   double max_normal_error_degrees = 0.0, mean_normal_error_degrees = 0.0;
   double max_uv_error = 0.0;
   double max_uv_error_texels = 0.0;  ///< of the finest texture that the same geometry looks up

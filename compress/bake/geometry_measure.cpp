@@ -59,6 +59,15 @@ double GeometryMeasure::max_abs() const {
   return std::max({m.x, m.y, m.z});
 }
 
+double GeometryMeasure::float_step() const {
+  if (bounds.empty()) return 0.0;
+  const DVec3 largest = glm::max(glm::abs(bounds.lo), glm::abs(bounds.hi));
+  double least = 0.0;
+  for (int axis = 0; axis < 3; ++axis)
+    if (largest[axis] > 0.0 && (least == 0.0 || largest[axis] < least)) least = largest[axis];
+  return least * 0x1p-24;
+}
+
 Bounds measure_geometry(const Scene& scene, const GeometryPlan& plan, LengthHistogram& edges) {
   Bounds bounds;
   std::vector<DVec3> points;
@@ -90,6 +99,7 @@ PositionGrid choose_grid(const BakeConfig& config, const GeometryMeasure& measur
   double step = 0.0;
   switch (config.precision_kind) {
   case PrecisionKind::kEdgeFraction:
+  case PrecisionKind::kPicture:
     step = measure.median_edge * config.precision;
     break;
   case PrecisionKind::kDiagonalFraction:

@@ -39,6 +39,9 @@ struct GeometryMeasure {
   double median_edge = 0.0;
 
   double max_abs() const; ///< largest |coordinate|; 0 where empty
+  /// Half the spacing of floats or more, along the axis where it is least: on a lattice of this step the largest
+  /// coordinates decode to the floats that they were. 0 where empty or all at 0.
+  double float_step() const;
 };
 
 /// Box of the geometry; its edge lengths are added to `edges`.

@@ -2,29 +2,18 @@
 
 #include <algorithm>
 #include <atomic>
-#include <bit>
 #include <cmath>
-#include <numeric>
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
-
-#include "compress/bake/weld_table.h"
-#include "compress/format/position_grid.h"
 
 namespace packtrace {
 namespace {
 
 constexpr double kRoughFactor = 16.0;  // steps so much above what was asked for show, too
 constexpr double kFloatStep = 0x1p-23; // finer than floats are at the same coordinate: no use
-constexpr double kMaxHalvings = 1000.0;
-constexpr double kMaxSteps = 0x1p50; // coordinates stay well inside the lattice
-
-/// Positions are compared as floats: what the source has as one point may differ in the last bits of doubles.
-uint64_t position_key(DVec3 p) {
-  const auto bits = [](double x) { return uint64_t{std::bit_cast<uint32_t>(static_cast<float>(x) + 0.0f)}; };
-  return mix_words(bits(p.x), bits(p.y), bits(p.z));
-}
+constexpr double kMaxHalvings = 60.0;  // shifts of lattice coordinates
+constexpr double kMaxSteps = 0x1p50;   // coordinates stay well inside the lattice
 
 template <typename PerPosition>
 void for_each_position(const Scene& scene, const GeometryPlan& plan, const PerPosition& per_position) {
@@ -33,38 +22,35 @@ void for_each_position(const Scene& scene, const GeometryPlan& plan, const PerPo
       per_position(transform_point(part.geometry_from_mesh, DVec3(p)));
 }
 
-class Nesting {
+/// Positions of world-space geometry on finer grids than the scene's, and the coarsest grid that each is on.
+class PositionSharing {
 public:
-  Nesting(const Scene& scene, const ScenePlan& plan, std::span<const GeometryMeasure> measures, double precision,
-          double world_step)
-      : scene_(scene), plan_(plan), measures_(measures), precision_(precision), world_step_(world_step),
-        halvings_(plan.geometries.size()), group_(plan.geometries.size()) {
-    std::iota(group_.begin(), group_.end(), 0u);
-  }
+  PositionSharing(const Scene& scene, const ScenePlan& plan, std::span<const GeometryMeasure> measures,
+                  std::span<const uint32_t> halvings)
+      : scene_(scene), plan_(plan), measures_(measures), halvings_(halvings) {}
 
-  std::vector<uint32_t> run() {
-    for (uint32_t g = 0; g < halvings_.size(); ++g) {
-      halvings_[g] = wanted_halvings(g);
-      if (halvings_[g] > 0) small_.push_back(g);
-    }
-    if (small_.empty()) return std::move(halvings_);
+  std::vector<std::vector<SharedPosition>> run() {
+    std::vector<std::vector<SharedPosition>> shared(halvings_.size());
     gather_positions();
-    join_small_ones();
-    find_tied_ones();
-    settle();
-    return std::move(halvings_);
+    if (keys_.empty()) return shared;
+    find_coarse_users();
+    for (size_t begin = 0, end = 0; begin < keys_.size(); begin = end) {
+      uint32_t least = halvings_[keys_[begin].geometry];
+      for (end = begin; end < keys_.size() && keys_[end].position == keys_[begin].position; ++end) {
+        least = std::min(least, halvings_[keys_[end].geometry]);
+        if (on_scene_grid_[end] != 0) least = 0;
+      }
+      for (size_t i = begin; i < end; ++i) {
+        const uint32_t shift = halvings_[keys_[i].geometry] - least;
+        std::vector<SharedPosition>& mine = shared[keys_[i].geometry];
+        if (shift > 0 && (mine.empty() || mine.back().key != keys_[i].position))
+          mine.push_back({keys_[i].position, shift});
+      }
+    }
+    return shared;
   }
 
 private:
-  uint32_t wanted_halvings(uint32_t g) const {
-    const GeometryMeasure& measure = measures_[g];
-    if (!plan_.geometries[g].world_space || measure.bounds.empty() || !(measure.median_edge > 0.0)) return 0;
-    if (world_step_ <= std::max(kRoughFactor * precision_, kRoughEdge) * measure.median_edge) return 0;
-    const double wanted = std::ceil(std::log2(world_step_ / (precision_ * measure.median_edge)));
-    const double useful = std::floor(std::log2(world_step_ / (measure.max_abs() * kFloatStep)));
-    return static_cast<uint32_t>(std::clamp(std::min(wanted, useful), 0.0, kMaxHalvings));
-  }
-
   struct Key {
     uint64_t position;
     uint32_t geometry;
@@ -74,24 +60,13 @@ private:
   };
 
   void gather_positions() {
-    for (const uint32_t g : small_) {
+    for (uint32_t g = 0; g < halvings_.size(); ++g) {
+      if (halvings_[g] == 0) continue;
       bounds_.extend(measures_[g].bounds);
       for_each_position(scene_, plan_.geometries[g], [&](DVec3 p) { keys_.push_back({position_key(p), g}); });
     }
     tbb::parallel_sort(keys_.begin(), keys_.end());
-  }
-
-  uint32_t find(uint32_t g) {
-    while (group_[g] != g) g = group_[g] = group_[group_[g]];
-    return g;
-  }
-
-  void join_small_ones() {
-    for (size_t i = 1; i < keys_.size(); ++i)
-      if (keys_[i].position == keys_[i - 1].position) {
-        const uint32_t a = find(keys_[i].geometry), b = find(keys_[i - 1].geometry);
-        group_[std::max(a, b)] = std::min(a, b);
-      }
+    on_scene_grid_.assign(keys_.size(), 0);
   }
 
   bool may_touch(const Bounds& box) const {
@@ -100,54 +75,59 @@ private:
     return true;
   }
 
-  /// Small geometries with a position of one that is not small.
-  void find_tied_ones() {
-    tied_.assign(halvings_.size(), 0);
+  /// Marks the first key of each position that geometry on the scene's own grid has too.
+  void find_coarse_users() {
     tbb::parallel_for(size_t{0}, halvings_.size(), [&](size_t g) {
       if (halvings_[g] > 0 || !plan_.geometries[g].world_space || !may_touch(measures_[g].bounds)) return;
       for_each_position(scene_, plan_.geometries[g], [&](DVec3 p) {
         const uint64_t key = position_key(p);
         const auto found = std::lower_bound(keys_.begin(), keys_.end(), Key{key, 0});
         if (found != keys_.end() && found->position == key)
-          std::atomic_ref(tied_[found->geometry]).store(1, std::memory_order_relaxed);
+          std::atomic_ref(on_scene_grid_[static_cast<size_t>(found - keys_.begin())])
+              .store(1, std::memory_order_relaxed);
       });
     });
-  }
-
-  /// A group is tied as a whole, and its members have one step.
-  void settle() {
-    std::vector<uint32_t> of_group(halvings_.size());
-    std::vector<uint8_t> kept(halvings_.size());
-    for (const uint32_t g : small_) {
-      const uint32_t group = find(g);
-      of_group[group] = std::max(of_group[group], halvings_[g]);
-      kept[group] |= tied_[g];
-    }
-    for (const uint32_t g : small_) {
-      const double step = std::ldexp(world_step_, -static_cast<int>(of_group[find(g)]));
-      kept[find(g)] |= measures_[g].max_abs() > kMaxSteps * step || step < exp2_exact(kMinStepExponent + 4);
-    }
-    for (const uint32_t g : small_) halvings_[g] = kept[find(g)] != 0 ? 0 : of_group[find(g)];
   }
 
   const Scene& scene_;
   const ScenePlan& plan_;
   const std::span<const GeometryMeasure> measures_;
-  const double precision_, world_step_;
-  std::vector<uint32_t> halvings_; // by geometry; first those wanted
-  std::vector<uint32_t> group_;    // by geometry: another one of its group, in the end the smallest
-  std::vector<uint8_t> tied_;      // by geometry
-  std::vector<uint32_t> small_;
-  std::vector<Key> keys_; // of all positions of small geometries, sorted
-  Bounds bounds_;         // theirs
+  const std::span<const uint32_t> halvings_;
+  std::vector<Key> keys_;              // of all positions of geometry on finer grids, sorted
+  std::vector<uint8_t> on_scene_grid_; // by key
+  Bounds bounds_;                      // of geometry on finer grids
 };
 
 } // namespace
 
-std::vector<uint32_t> nest_grids(const Scene& scene, const ScenePlan& plan, std::span<const GeometryMeasure> measures,
-                                 const BakeConfig& config, double world_step) {
-  if (config.precision_kind != PrecisionKind::kEdgeFraction) return std::vector<uint32_t>(plan.geometries.size());
-  return Nesting(scene, plan, measures, config.precision, world_step).run();
+uint32_t max_halvings(const GeometryMeasure& measure, double world_step, double finest) {
+  const double largest = measure.max_abs();
+  if (!(largest > 0.0)) return 0;
+  const double by_floats = std::log2(world_step / finest);
+  const double by_lattice = std::log2(world_step / largest * kMaxSteps);
+  const double by_exponent = std::log2(world_step) - (kMinStepExponent + 4);
+  return static_cast<uint32_t>(
+      std::clamp(std::floor(std::min({by_floats, by_lattice, by_exponent})), 0.0, kMaxHalvings));
+}
+
+std::vector<uint32_t> halvings_of_small_things(const ScenePlan& plan, std::span<const GeometryMeasure> measures,
+                                               double precision, double world_step) {
+  std::vector<uint32_t> halvings(plan.geometries.size());
+  for (size_t g = 0; g < halvings.size(); ++g) {
+    const GeometryMeasure& measure = measures[g];
+    if (!plan.geometries[g].world_space || measure.bounds.empty() || !(measure.median_edge > 0.0)) continue;
+    if (world_step <= std::max(kRoughFactor * precision, kRoughEdge) * measure.median_edge) continue;
+    const double wanted = std::ceil(std::log2(world_step / (precision * measure.median_edge)));
+    halvings[g] = static_cast<uint32_t>(
+        std::min(wanted, static_cast<double>(max_halvings(measure, world_step, measure.max_abs() * kFloatStep))));
+  }
+  return halvings;
+}
+
+std::vector<std::vector<SharedPosition>> find_shared_positions(const Scene& scene, const ScenePlan& plan,
+                                                               std::span<const GeometryMeasure> measures,
+                                                               std::span<const uint32_t> halvings) {
+  return PositionSharing(scene, plan, measures, halvings).run();
 }
 
 } // namespace packtrace

@@ -63,11 +63,11 @@ DVec3 safe_normalize(DVec3 v) {
 class Quantizer {
 public:
   Quantizer(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs, const BakeConfig& config,
-            const PositionGrid& grid, const GeometryMeasure& measure)
+            const GeometryGrid& grid, const GeometryMeasure& measure)
       : scene_(scene), plan_(plan), needs_(needs), config_(config), source_(scene, plan), measure_(measure),
-        step_(grid.step()), limits_(config.normal_limits(step_ / measure.median_edge)),
+        grid_(grid), step_(grid.grid.step()), limits_(config.normal_limits(step_ / measure.median_edge)),
         vertex_table_(2 * count_vertices()) {
-    out_.grid = grid;
+    out_.grid = grid.grid;
     out_.uv_encoding = config.uvs.value_or(UvEncoding::kLattice);
     if (out_.uv_encoding == UvEncoding::kLattice) out_.uv_exponent = needs.uv_exponent;
   }
@@ -77,8 +77,7 @@ public:
     const DVec3 lowest = measure_.bounds.lo, highest = measure_.bounds.hi;
     check_limits(max_abs);
     for (int axis = 0; axis < 3 && lowest[axis] <= highest[axis]; ++axis) {
-      // Quantisation is monotone, so the box's corners become the smallest and largest coordinates.
-      const int64_t lo = to_lattice(lowest[axis], step_), hi = to_lattice(highest[axis], step_);
+      const int64_t lo = grid_.lowest(lowest[axis]), hi = grid_.highest(highest[axis]);
       out_.origin[static_cast<size_t>(axis)] = lo;
       const auto bits = static_cast<uint32_t>(std::bit_width(static_cast<uint64_t>(hi - lo)));
       out_.anchor_shift = std::max(out_.anchor_shift, bits > 31 ? bits - 31 : 0u);
@@ -105,7 +104,8 @@ public:
     out_.stats.source_area = surface_.source_area;
     out_.stats.collapsed_area = surface_.collapsed_area;
     out_.stats.left = std::move(surface_.left);
-    require_bound("position error", out_.stats.max_position_error, position_error_bound(step_, max_abs));
+    require_bound("position error", out_.stats.max_position_error,
+                  position_error_bound(grid_.coarsest_step(), max_abs));
     require_bound("normal error in degrees", out_.stats.max_normal_error_degrees, limits_.error_degrees);
     out_.stats.distinct_vertices = out_.vertices.size();
     return std::move(out_);
@@ -186,11 +186,9 @@ private:
     lattice.resize(mesh.positions.size());
     const ErrorStats errors = accumulate_errors(mesh.positions.size(), [&](size_t i, ErrorStats& stats) {
       const DVec3 p = transform_point(part.geometry_from_mesh, DVec3(mesh.positions[i]));
-      for (int axis = 0; axis < 3; ++axis) {
-        const int64_t q = to_lattice(p[axis], step_);
-        lattice[i][static_cast<size_t>(axis)] = q;
-        stats.add(std::abs(static_cast<double>(from_lattice(q, step_)) - p[axis]));
-      }
+      lattice[i] = grid_.round(p);
+      for (int axis = 0; axis < 3; ++axis)
+        stats.add(std::abs(static_cast<double>(from_lattice(lattice[i][static_cast<size_t>(axis)], step_)) - p[axis]));
     });
     out_.stats.max_position_error = std::max(out_.stats.max_position_error, errors.max);
   }
@@ -415,6 +413,7 @@ private:
   const BakeConfig& config_;
   const SourcePoints source_;
   const GeometryMeasure& measure_;
+  const GeometryGrid& grid_;
   double step_;
   NormalLimits limits_;
   WeldTable vertex_table_;
@@ -425,7 +424,7 @@ private:
 } // namespace
 
 QuantizedGeometry quantize_geometry(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs,
-                                    const BakeConfig& config, const PositionGrid& grid,
+                                    const BakeConfig& config, const GeometryGrid& grid,
                                     const GeometryMeasure& measure) {
   return Quantizer(scene, plan, needs, config, grid, measure).run();
 }

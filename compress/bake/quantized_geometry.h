@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "compress/bake/bake_config.h"
+#include "compress/bake/geometry_grid.h"
 #include "compress/bake/geometry_measure.h"
 #include "compress/bake/geometry_plan.h"
 #include "compress/bake/requirements.h"
-#include "compress/format/position_grid.h"
 #include "compress/format/uv_codec.h"
 
 namespace packtrace {
@@ -74,6 +74,6 @@ struct QuantizedGeometry {
 /// Error(kInput) for normals that are not finite.
 /// @param measure of the plan's geometry (measure_geometry())
 QuantizedGeometry quantize_geometry(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs,
-                                    const BakeConfig& config, const PositionGrid& grid, const GeometryMeasure& measure);
+                                    const BakeConfig& config, const GeometryGrid& grid, const GeometryMeasure& measure);
 
 } // namespace packtrace

@@ -61,9 +61,13 @@ SceneMeasure measure_scene(const Scene& scene, const ScenePlan& plan, Progress& 
   return result;
 }
 
-Bounds placed_box(const baked::InstanceRecord& instance, const Bounds& box) {
+DAffine placement_of(const baked::InstanceRecord& instance) {
   const auto& m = instance.world_from_object;
-  return transform_bounds(DAffine(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]), box);
+  return DAffine(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9], m[10], m[11]);
+}
+
+Bounds placed_box(const baked::InstanceRecord& instance, const Bounds& box) {
+  return transform_bounds(placement_of(instance), box);
 }
 
 } // namespace packtrace

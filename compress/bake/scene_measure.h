@@ -18,6 +18,8 @@ struct SceneMeasure {
 /// Advances `progress` by one for each geometry. Throws like measure_geometry().
 SceneMeasure measure_scene(const Scene& scene, const ScenePlan& plan, Progress& progress);
 
+DAffine placement_of(const baked::InstanceRecord& instance);
+
 /// Box of an instance, from that of its geometry.
 Bounds placed_box(const baked::InstanceRecord& instance, const Bounds& box);
 

@@ -42,6 +42,11 @@ public:
   /// (behind a perspective camera or on its plane, at the eye); points outside the image are returned as they are.
   std::optional<ProjectedPoint> project(DVec3 world) const;
 
+  /// (x w, y w, w) for the pixel (x, y) that a world point appears at: linear in the point, so half-spaces of the
+  /// frustum are tests of its sign, also behind the camera, where w <= 0. Orthographic: w = 1. Not for environment
+  /// cameras.
+  DVec3 homogeneous_pixel(DVec3 world) const;
+
   /// Depth of a world point as ProjectedPoint::view_z, negative behind the camera.
   double view_z(DVec3 world) const;
 

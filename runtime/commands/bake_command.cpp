@@ -95,6 +95,38 @@ BakeConfig make_config(const BakeOptions& options) {
   return config;
 }
 
+nlohmann::json promise_json(const BakeReport& baked) {
+  nlohmann::json geometries = nlohmann::json::array();
+  for (const BrokenPromise& g : baked.promise)
+    geometries.push_back({{"name", g.name}, {"bound", g.bound}, {"wanted", g.wanted}, {"step", g.step}});
+  return {{"kept", baked.promise.empty()}, {"geometries", geometries}};
+}
+
+/// What is lost, and which option keeps it; empty where pictures are as promised.
+std::string promise_text(const BakeReport& baked, bool chosen) {
+  constexpr size_t kMaxShown = 3;
+  if (baked.promise.empty()) return {};
+  std::vector<BrokenPromise> worst = baked.promise;
+  std::stable_sort(worst.begin(), worst.end(), [](const BrokenPromise& a, const BrokenPromise& b) {
+    return a.step / a.wanted > b.step / b.wanted;
+  });
+  std::string text = fmt::format("warning: ambient occlusion may differ more than promised: {} of {} geometries\n",
+                                 worst.size(), baked.file.geometries);
+  double step = 0.0; // of the world
+  for (size_t i = 0; i < worst.size(); ++i) {
+    const BrokenPromise& g = worst[i];
+    if (!g.float_limit && (step == 0.0 || g.wanted * g.scale < step)) step = g.wanted * g.scale;
+    if (i < kMaxShown)
+      text += fmt::format("  {}: step {:.3g}{}; wanted {:.2g} ({})\n", g.name, g.step,
+                          g.float_limit ? ", as floats are no finer there" : "", g.wanted, g.bound);
+  }
+  if (worst.size() > kMaxShown) text += fmt::format("  and {} more; --json names them\n", worst.size() - kMaxShown);
+  if (step > 0.0)
+    text += chosen ? std::string("  without a precision option the bake chooses steps that keep it\n")
+                   : fmt::format("  --precision-abs {:.2g} keeps it, for more bytes\n", step);
+  return text;
+}
+
 nlohmann::json report(const BakeOptions& options, const BakeReport& baked, const ImportStatistics& imported,
                       double import_s, double bake_s, bool by_geometry) {
   nlohmann::json json = to_json(baked.file, by_geometry);
@@ -112,6 +144,8 @@ nlohmann::json report(const BakeOptions& options, const BakeReport& baked, const
   json["left_out"] = baked.left_out;
   json["resumed_geometries"] = baked.resumed_geometries;
   json["nested_geometries"] = baked.nested_geometries;
+  json["finer_geometries"] = baked.finer_geometries;
+  json["promise"] = promise_json(baked);
   json["median_edge"] = baked.world_median_edge;
   json["import"] = {{"directives", imported.directives},
                     {"files", imported.files_read},
@@ -172,7 +206,11 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   report_diagnostics(diagnostics, globals);
 
   if (json.wanted()) json.write(report(options, baked, imported.statistics, import_s, bake_s, globals.verbosity > 0));
-  if (json.to_stdout() || globals.quiet) return 0;
+  const std::string promise = promise_text(baked, config.precision_kind != PrecisionKind::kPicture);
+  if (json.to_stdout() || globals.quiet) {
+    print_printable(promise, stderr);
+    return 0;
+  }
   std::FILE* const text = output ? output->text_stream() : stdout;
   print_printable(fmt::format("{}: import {:.3f} s, bake {:.3f} s, peak memory {:.0f} MiB\n",
                               output ? output->name() : "dry run", import_s, bake_s,
@@ -199,11 +237,18 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
     fmt::print(text, "{}",
                fmt::format(grouped(), "{:L} geometries have finer steps, as they are small beside the scene's\n",
                            baked.nested_geometries));
+  if (baked.finer_geometries > 0)
+    fmt::print(text, "{}",
+               fmt::format(grouped(),
+                           "{:L} geometries have finer steps, as their triangles are thin or seen from near\n",
+                           baked.finer_geometries));
   if (baked.left_out > 0)
     fmt::print(text, "{}", fmt::format(grouped(), "{:L} shapes and instances are left out\n", baked.left_out));
   fmt::print(text, "{}", dropped_streams_text(baked.file));
   fmt::print(text, "{}", left_out_cameras_text(imported));
   if (globals.verbosity > 0) print_printable("\n" + to_text(baked.file, true), text);
+  std::fflush(text);
+  print_printable(promise, stderr);
   return 0;
 }
 
@@ -220,8 +265,10 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
     return verb.add_option(name, value, description)->type_name(type)->group("Precision of positions, at most one of");
   };
   const std::array<CLI::Option*, 4> precisions{
-      add_precision("--precision-edge", options->precision_edge, "F",
-                    "Grid step as a fraction of the median edge length (default 1/128)"),
+      add_precision(
+          "--precision-edge", options->precision_edge, "F",
+          "Grid step as a fraction of the median edge length. Without one of these options it is 1/128 of it, and "
+          "finer where thin triangles, contacts or near views need it"),
       add_precision("--precision", options->precision, "REL", "Grid step as a fraction of the diagonal"),
       add_precision("--precision-abs", options->precision_abs, "UNITS", "Grid step in world units"),
       add_precision("--position-bits", options->position_bits, "N", "Bits over the longest side, 1..40")};
@@ -312,7 +359,8 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
       "once,\n"
       "on a grid of its own. The error that was measured against the source is printed, stored in the file, and never\n"
       "above half a step per axis and the rounding to floats. What was left out, and why, is printed; -v says it of "
-      "each geometry.\n"
+      "each geometry. Without a precision option steps are as fine as pictures from the scene's cameras need; what is\n"
+      "lost beyond that is said in the last lines.\n"
       "Examples:\n"
       "  packtrace bake house.pbrt -o house.ptk\n"
       "  packtrace bake forest.pbrt -o forest.ptk --lod --codec small\n"

@@ -1,5 +1,6 @@
 #include <filesystem>
 #include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -144,6 +145,55 @@ TEST(CommandLine, DryRunReportsAndWritesNothing) {
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(nlohmann::json::parse(result.out).at("triangles").get<int>(), 4);
   EXPECT_FALSE(fs::exists(bench.baked()));
+}
+
+/// Two balls on a floor 1000 units wide, which the median edge of the floor says nothing about.
+std::string balls_on_a_floor() {
+  return "LookAt 6 3 -8  0 0 0  0 1 0\nCamera \"perspective\" \"float fov\" [45]\nWorldBegin\n"
+         "Shape \"trianglemesh\" \"integer indices\" [0 1 2 0 2 3]"
+         " \"point P\" [-500 -1 -500  -500 -1 500  500 -1 500  500 -1 -500]\n"
+         "ObjectBegin \"ball\"\nShape \"sphere\"\nObjectEnd\n"
+         "Translate -1.2 0 0\nObjectInstance \"ball\"\nTranslate 2.4 0 0\nObjectInstance \"ball\"\nWorldEnd\n";
+}
+
+TEST(CommandLine, TheDefaultPrecisionKeepsThePicture) {
+  const Workbench bench;
+  const std::string scene = bench / "balls.pbrt", file = bench / "balls.ptk";
+  write_text(scene, balls_on_a_floor());
+  const CommandResult bake = run_packtrace({"bake", scene, "-o", file, "--json", bench / "bake.json"});
+  ASSERT_EQ(bake.exit_code, 0) << bake.err;
+  EXPECT_EQ(bake.err.find("differ more than promised"), std::string::npos) << bake.err;
+  const nlohmann::json report = nlohmann::json::parse(read_text(bench / "bake.json"));
+  EXPECT_TRUE(report.at("promise").at("kept").get<bool>());
+  EXPECT_GE(report.at("finer_geometries").get<int>(), 1);
+  for (const auto& [input, image] : {std::pair{scene, "float.exr"}, {file, "packed.exr"}}) {
+    const CommandResult render = run_packtrace({"render", input, "-o", bench / image, "--ground-truth", "--spp", "64",
+                                                "--size", "160x90", "--seed", "1", "--aov", "ao", "-q"});
+    ASSERT_EQ(render.exit_code, 0) << render.err;
+  }
+  const CommandResult compare =
+      run_packtrace({"compare", bench / "float.exr", bench / "packed.exr", "--layer", "ao", "--json", "-"});
+  const nlohmann::json difference = nlohmann::json::parse(compare.out);
+  EXPECT_LE(difference.at("metrics").at("mae").get<double>(), 0.005);
+  EXPECT_LE(difference.at("mismatched_pixels").get<double>(), 0.001 * 160 * 90);
+}
+
+TEST(CommandLine, WhatAPrecisionLosesIsSaidInTheLastLines) {
+  const Workbench bench;
+  const std::string scene = bench / "balls.pbrt";
+  write_text(scene, balls_on_a_floor());
+  const CommandResult bake =
+      run_packtrace({"bake", scene, "-o", bench / "balls.ptk", "--precision-abs", "3", "--json", bench / "bake.json"});
+  ASSERT_EQ(bake.exit_code, 0) << bake.err;
+  const size_t said = bake.err.find("warning: ambient occlusion may differ more than promised: ");
+  ASSERT_NE(said, std::string::npos) << bake.err;
+  EXPECT_EQ(bake.err.find("warning", said + 1), std::string::npos) << "it is not last: " << bake.err;
+  EXPECT_NE(bake.err.find("without a precision option the bake chooses steps that keep it", said), std::string::npos);
+  const nlohmann::json promise = nlohmann::json::parse(read_text(bench / "bake.json")).at("promise");
+  EXPECT_FALSE(promise.at("kept").get<bool>());
+  ASSERT_FALSE(promise.at("geometries").empty());
+  for (const nlohmann::json& geometry : promise.at("geometries"))
+    EXPECT_LT(geometry.at("wanted").get<double>(), geometry.at("step").get<double>()) << geometry;
 }
 
 } // namespace

@@ -231,7 +231,7 @@ BuiltLod build_lod(const Mesh& mesh) {
   BuiltLod result;
   result.geometry =
       quantize_geometry(scene, plan.geometries[0], analyse_requirements(scene, plan, plan.geometries[0], config),
-                        config, choose_grid(config, measure, 1.0), measure);
+                        config, GeometryGrid{choose_grid(config, measure, 1.0), {}}, measure);
   result.base = split_geometry(result.geometry);
   Progress progress;
   result.lod = build_cluster_lod(result.geometry, result.base, progress);

@@ -219,7 +219,7 @@ QuantizedGeometry on_grid(const Mesh& mesh, const PositionGrid& grid) {
   measure.bounds = measure_geometry(scene, plan.geometries[0], edges);
   const BakeConfig config;
   return quantize_geometry(scene, plan.geometries[0], analyse_requirements(scene, plan, plan.geometries[0], config),
-                           config, grid, measure);
+                           config, GeometryGrid{grid, {}}, measure);
 }
 
 std::vector<std::vector<uint8_t>> locks_of(const std::vector<QuantizedGeometry>& geometries) {

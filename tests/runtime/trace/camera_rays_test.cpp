@@ -33,6 +33,11 @@ void expect_projects_back(const Camera& camera, ImageSize size, double distance)
     ASSERT_TRUE(point.has_value());
     EXPECT_NEAR(point->pixel.x, x + 0.5, 1e-6);
     EXPECT_NEAR(point->pixel.y, y + 0.5, 1e-6);
+    if (camera.projection == Projection::kEnvironment) continue;
+    const DVec3 homogeneous = primary.homogeneous_pixel(ray.origin + ray.direction * distance);
+    EXPECT_GT(homogeneous.z, 0.0);
+    EXPECT_NEAR(homogeneous.x / homogeneous.z, point->pixel.x, 1e-6);
+    EXPECT_NEAR(homogeneous.y / homogeneous.z, point->pixel.y, 1e-6);
   }
 }
 

@@ -1,0 +1,215 @@
+#include "compress/bake/grid_choice.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+
+#include "compress/bake/grid_check.h"
+#include "compress/bake/nested_grids.h"
+
+namespace packtrace {
+namespace {
+
+constexpr int kMaxRefinements = 3;
+
+// What the check allows.
+constexpr double kMaxCollapsed = 0.001; // share of the image
+constexpr double kMinTilting = 0.01;    // share of the image below which tilts do not count
+constexpr double kMaxMeanTiltDegrees = 1.0;
+constexpr double kMaxTiltDegrees = 5.0;     // at 99 % of the pixels
+constexpr double kMaxPassedPixels = 0.0045; // share of the covered pixels whose centre an outline moves past
+constexpr double kBoundSlack = 2.0;         // factor that bounds on moved positions may be exceeded by
+
+class GridChooser {
+public:
+  GridChooser(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure, const BakeConfig& config,
+              Progress& progress)
+      : scene_(scene), plan_(plan), measure_(measure), config_(config), progress_(progress),
+        checks_(plan.geometries.size()) {
+    out_.grids.resize(plan.geometries.size());
+    out_.halvings.resize(plan.geometries.size());
+  }
+
+  GridChoice run() {
+    begin();
+    progress_.begin("choosing grids", out_.grids.size());
+    views_ = look_at_scene(scene_, plan_, measure_, progress_);
+    const std::vector<WantedStep> wanted = bound_steps(plan_, measure_, views_, steps());
+    const std::vector<double> first = steps();
+    if (may_refine())
+      for (size_t g = 0; g < wanted.size(); ++g) refine_to(g, wanted[g].step);
+    share_and_check();
+    for (int i = 0; may_refine() && i < kMaxRefinements && refine_failing(); ++i) share_and_check();
+    for (size_t g = 0; g < first.size(); ++g) out_.finer_geometries += out_.grids[g].grid.step() < first[g];
+    report(wanted);
+    return std::move(out_);
+  }
+
+private:
+  bool may_refine() const { return config_.precision_kind == PrecisionKind::kPicture; }
+  bool is_empty(size_t g) const { return measure_.geometries[g].bounds.empty(); }
+
+  /// The grids that the config asks for, small things included.
+  void begin() {
+    if (measure_.has_world_space) out_.world = choose_grid(config_, measure_.world, 1.0);
+    if (measure_.has_world_space && (may_refine() || config_.precision_kind == PrecisionKind::kEdgeFraction))
+      out_.halvings = halvings_of_small_things(plan_, measure_.geometries, config_.precision, out_.world.step());
+    for (size_t g = 0; g < out_.grids.size(); ++g) {
+      if (is_empty(g)) continue; // nothing to quantise: the default grid
+      const GeometryPlan& plan = plan_.geometries[g];
+      PositionGrid& grid = out_.grids[g].grid;
+      grid = plan.world_space ? out_.world : choose_grid(config_, measure_.geometries[g], plan.max_stretch);
+      grid.exponent -= static_cast<int32_t>(out_.halvings[g]);
+      out_.nested_geometries += out_.halvings[g] > 0;
+    }
+  }
+
+  std::vector<double> steps() const {
+    std::vector<double> steps;
+    for (const GeometryGrid& grid : out_.grids) steps.push_back(grid.grid.step());
+    return steps;
+  }
+
+  /// Makes the step about `step` and finer than it was, unless floats are no finer. @return whether it became finer
+  bool refine_to(size_t g, double step) {
+    PositionGrid& grid = out_.grids[g].grid;
+    if (is_empty(g) || !(step < grid.step())) return false;
+    const GeometryMeasure& measure = measure_.geometries[g];
+    const PositionGrid before = grid;
+    if (plan_.geometries[g].world_space) {
+      const double wanted = std::max(std::round(std::log2(out_.world.step() / step)), 1.0 + out_.halvings[g]);
+      const uint32_t most = max_halvings(measure, out_.world.step(), measure.float_step());
+      const auto halvings = static_cast<uint32_t>(std::min(wanted, static_cast<double>(most)));
+      if (halvings <= out_.halvings[g]) return false;
+      out_.halvings[g] = halvings;
+      grid = out_.world;
+      grid.exponent -= static_cast<int32_t>(halvings);
+    } else if (const double finest = finest_step(measure); finest < grid.step()) {
+      grid = choose_position_grid(std::max(step, finest));
+    }
+    return grid.step() < before.step();
+  }
+
+  /// For geometry with a grid of its own.
+  static double finest_step(const GeometryMeasure& measure) {
+    return std::max(measure.float_step(), measure.max_abs() * 0x1p-50);
+  }
+
+  /// Positions that geometry on several grids has, and what becomes of the samples.
+  void share_and_check() {
+    std::vector<std::vector<SharedPosition>> shared =
+        find_shared_positions(scene_, plan_, measure_.geometries, out_.halvings);
+    for (size_t g = 0; g < shared.size(); ++g) out_.grids[g].shared = std::move(shared[g]);
+    tbb::parallel_for(size_t{0}, checks_.size(), [&](size_t g) { checks_[g] = check_grid(views_[g], out_.grids[g]); });
+  }
+
+  bool tilts(size_t g) const {
+    const GridCheck& check = checks_[g];
+    if (check.collapsed > kMaxCollapsed) return true;
+    return views_[g].best.coverage() >= kMinTilting &&
+           (check.mean_tilt_degrees > kMaxMeanTiltDegrees || check.tilt_degrees > kMaxTiltDegrees);
+  }
+
+  /// Share of the pixels that a geometry covers whose centre some outline moves past. A strip of height h that is
+  /// displaced by a quarter of the step (the mean over directions) changes step / (2 h) of its area; projection makes
+  /// lengths pi / 4 and areas 1 / 2 on average, so the share is some 3/4 of step / h for strips whose edges are all
+  /// outline.
+  double passed_pixels(size_t g) const {
+    const GeometryView& view = views_[g];
+    if (!(view.best.height > 0.0)) return 0.0;
+    const double step = effective_step(g) * world_scale(plan_.geometries[g]);
+    return std::min(0.75 * view.outline_share * step / view.best.height, 1.0);
+  }
+
+  /// Geometry whose outlines move too far, where those of all together do.
+  std::vector<uint8_t> find_moved_outlines() const {
+    std::vector<uint8_t> moved(views_.size());
+    double covered = 0.0, passed = 0.0;
+    for (size_t g = 0; g < views_.size(); ++g) {
+      covered += views_[g].best.pixels;
+      passed += views_[g].best.pixels * passed_pixels(g);
+    }
+    for (size_t g = 0; g < views_.size() && passed > kMaxPassedPixels * covered; ++g)
+      moved[g] = passed_pixels(g) > kMaxPassedPixels;
+    return moved;
+  }
+
+  /// Where the check fails, halves the step; also that of coarser geometry which the failing one shares positions with.
+  bool refine_failing() {
+    std::vector<uint8_t> failing = find_moved_outlines();
+    bool shared = false, refined = false;
+    for (size_t g = 0; g < failing.size(); ++g) {
+      failing[g] |= tilts(g);
+      shared |= failing[g] != 0 && !out_.grids[g].shared.empty();
+    }
+    if (shared) spread_to_sharing(failing);
+    for (size_t g = 0; g < failing.size(); ++g)
+      if (failing[g] != 0) refined |= refine_to(g, out_.grids[g].grid.step() / 2.0);
+    return refined;
+  }
+
+  /// Adds the geometry that failing geometry shares positions with and that is on coarser grids.
+  void spread_to_sharing(std::vector<uint8_t>& failing) const {
+    std::vector<uint64_t> keys;
+    for (size_t g = 0; g < failing.size(); ++g)
+      if (failing[g] != 0)
+        for (const SharedPosition& position : out_.grids[g].shared) keys.push_back(position.key);
+    std::sort(keys.begin(), keys.end());
+    tbb::parallel_for(size_t{0}, failing.size(), [&](size_t g) {
+      if (failing[g] != 0 || !plan_.geometries[g].world_space) return;
+      for (const GeometryPart& part : plan_.geometries[g].parts)
+        for (const Vec3 p : scene_.meshes[part.mesh].positions)
+          if (std::binary_search(keys.begin(), keys.end(),
+                                 position_key(transform_point(part.geometry_from_mesh, DVec3(p))))) {
+            failing[g] = 1;
+            return;
+          }
+    });
+  }
+
+  /// Where positions fall on the lattice, or near it, they move less than its step says.
+  double effective_step(size_t g) const { return std::min(out_.grids[g].grid.step(), 2.0 * checks_[g].moved); }
+
+  void report(std::span<const WantedStep> wanted) {
+    const std::vector<uint8_t> outlines = find_moved_outlines();
+    for (size_t g = 0; g < views_.size(); ++g) {
+      const double step = effective_step(g);
+      Shortfall shortfall{static_cast<uint32_t>(g), PictureBound::kNone, 0.0, out_.grids[g].grid.step(), false};
+      if (tilts(g)) {
+        const double tilt =
+            std::max(checks_[g].mean_tilt_degrees / kMaxMeanTiltDegrees, checks_[g].tilt_degrees / kMaxTiltDegrees);
+        shortfall.bound = PictureBound::kHeight;
+        shortfall.wanted = std::min(wanted[g].step, shortfall.step / std::max(2.0, tilt));
+      } else if (outlines[g] != 0) {
+        shortfall.bound = PictureBound::kOutline;
+        shortfall.wanted = std::min(wanted[g].step, shortfall.step * kMaxPassedPixels / passed_pixels(g));
+      } else if (views_[g].best.coverage() >= kSeen && step > kBoundSlack * wanted[g].limit) {
+        shortfall.bound = wanted[g].bound;
+        shortfall.wanted = wanted[g].step;
+      }
+      if (shortfall.bound == PictureBound::kNone || !(step > 0.0)) continue;
+      const GeometryMeasure& measure = measure_.geometries[g];
+      shortfall.float_limit = shortfall.step <= 2.0 * std::max(measure.float_step(), finest_step(measure));
+      out_.shortfalls.push_back(shortfall);
+    }
+  }
+
+  const Scene& scene_;
+  const ScenePlan& plan_;
+  const SceneMeasure& measure_;
+  const BakeConfig& config_;
+  Progress& progress_;
+  std::vector<GeometryView> views_;
+  std::vector<GridCheck> checks_; // by geometry
+  GridChoice out_;
+};
+
+} // namespace
+
+GridChoice choose_grids(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure,
+                        const BakeConfig& config, Progress& progress) {
+  return GridChooser(scene, plan, measure, config, progress).run();
+}
+
+} // namespace packtrace

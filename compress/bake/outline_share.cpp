@@ -1,0 +1,88 @@
+#include "compress/bake/outline_share.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numbers>
+#include <tuple>
+#include <vector>
+
+#include "compress/bake/angle.h"
+#include "compress/bake/geometry_grid.h"
+#include "compress/bake/surface_sample.h"
+
+namespace packtrace {
+namespace {
+
+constexpr uint64_t kStars = 1024; // positions whose edges are looked at, about
+
+/// An edge of a triangle, at a chosen position.
+struct StarEdge {
+  uint64_t centre, end; ///< position_key()
+  bool outgoing;        ///< the triangle runs through it from the centre
+  double length;
+  DVec3 normal; ///< unit
+};
+
+class Stars {
+public:
+  explicit Stars(uint64_t vertices) : mask_(std::bit_ceil((vertices + kStars - 1) / kStars) - 1) {}
+
+  void add(const Mesh& mesh, const GeometryPart& part) {
+    std::vector<uint8_t> chosen(mesh.positions.size());
+    const auto place = [&](uint32_t v) { return transform_point(part.geometry_from_mesh, DVec3(mesh.positions[v])); };
+    for (uint32_t v = 0; v < chosen.size(); ++v) chosen[v] = (position_key(place(v)) & mask_) == 0;
+    for (const Triangle& t : mesh.triangles) {
+      if (!(chosen[t.x] || chosen[t.y] || chosen[t.z])) continue;
+      const DTriangle corners{place(t.x), place(t.y), place(t.z)};
+      const DVec3 cross = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
+      if (!(glm::length(cross) > 0.0)) continue;
+      const DVec3 normal = glm::normalize(cross) * (part.flip ? -1.0 : 1.0);
+      for (size_t i = 0; i < 3; ++i) {
+        if (!chosen[t[static_cast<int>(i)]]) continue;
+        add_edge(corners[i], corners[(i + 1) % 3], !part.flip, normal);
+        add_edge(corners[i], corners[(i + 2) % 3], part.flip, normal);
+      }
+    }
+  }
+
+  double share() {
+    std::sort(edges_.begin(), edges_.end(), [](const StarEdge& a, const StarEdge& b) {
+      return std::tie(a.centre, a.end, a.outgoing) < std::tie(b.centre, b.end, b.outgoing);
+    });
+    double outline = 0.0, all = 0.0;
+    for (size_t begin = 0, end = 0; begin < edges_.size(); begin = end) {
+      const StarEdge& first = edges_[begin];
+      while (end < edges_.size() && edges_[end].centre == first.centre && edges_[end].end == first.end) ++end;
+      double share = 1.0;
+      if (end - begin > 1) {
+        const StarEdge& last = edges_[end - 1]; // the other way round where both are wound alike
+        share = angle_degrees(first.normal, first.outgoing != last.outgoing ? last.normal : -last.normal) / 180.0;
+      }
+      outline += share * first.length;
+      all += first.length;
+    }
+    return all > 0.0 ? outline / all : 0.0;
+  }
+
+private:
+  void add_edge(DVec3 centre, DVec3 end, bool outgoing, DVec3 normal) {
+    edges_.push_back({position_key(centre), position_key(end), outgoing, glm::distance(centre, end), normal});
+  }
+
+  uint64_t mask_;
+  std::vector<StarEdge> edges_;
+};
+
+} // namespace
+
+double outline_share(const Scene& scene, const GeometryPlan& plan) {
+  uint64_t vertices = 0;
+  for (const GeometryPart& part : plan.parts) vertices += scene.meshes[part.mesh].positions.size();
+  if (vertices == 0) return 0.0;
+  Stars stars(vertices);
+  for (const GeometryPart& part : plan.parts) stars.add(scene.meshes[part.mesh], part);
+  return stars.share();
+}
+
+} // namespace packtrace

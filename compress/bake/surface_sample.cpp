@@ -1,0 +1,69 @@
+#include "compress/bake/surface_sample.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace packtrace {
+namespace {
+
+constexpr uint64_t kMaxLookedAt = uint64_t{1} << 20;
+
+/// Every stride-th triangle of the geometry that has area.
+template <typename PerTriangle>
+void for_each_triangle(const Scene& scene, const GeometryPlan& plan, uint64_t stride, const PerTriangle& per_triangle) {
+  uint64_t skip = stride / 2;
+  for (const GeometryPart& part : plan.parts) {
+    const Mesh& mesh = scene.meshes[part.mesh];
+    uint64_t i = skip;
+    for (; i < mesh.triangles.size(); i += stride) {
+      const Triangle& t = mesh.triangles[i];
+      DTriangle corners;
+      for (size_t corner = 0; corner < 3; ++corner)
+        corners[corner] = transform_point(part.geometry_from_mesh, DVec3(mesh.positions[t[static_cast<int>(corner)]]));
+      if (const double area = area_of(corners); area > 0.0) per_triangle(corners, area);
+    }
+    skip = i - mesh.triangles.size();
+  }
+}
+
+} // namespace
+
+double area_of(const DTriangle& t) { return 0.5 * glm::length(glm::cross(t[1] - t[0], t[2] - t[0])); }
+
+double longest_edge_of(const DTriangle& t) {
+  return std::max({glm::distance(t[0], t[1]), glm::distance(t[1], t[2]), glm::distance(t[2], t[0])});
+}
+
+double height_of(const DTriangle& t) {
+  const double edge = longest_edge_of(t);
+  return edge > 0.0 ? 2.0 * area_of(t) / edge : 0.0;
+}
+
+std::vector<SampleTriangle> sample_surface(const Scene& scene, const GeometryPlan& plan, size_t max_count) {
+  uint64_t triangles = 0;
+  for (const GeometryPart& part : plan.parts) triangles += scene.meshes[part.mesh].triangles.size();
+  std::vector<SampleTriangle> sample;
+  if (triangles <= max_count) {
+    sample.reserve(triangles);
+    for_each_triangle(scene, plan, 1, [&](const DTriangle& t, double) { sample.push_back({t, 1.0}); });
+    return sample;
+  }
+  const uint64_t stride = (triangles + kMaxLookedAt - 1) / kMaxLookedAt;
+  double total_area = 0.0, count = 0.0;
+  for_each_triangle(scene, plan, stride, [&](const DTriangle&, double area) { total_area += area, count += 1.0; });
+  // Triangle i has the measure m_i = (area_i / total + 1 / count) / 2, all together 1; the sample lies at equal
+  // distances along the running sum. A triangle that n of the marks fall on counts n / (m_i marks).
+  const auto marks = static_cast<double>(max_count);
+  double end = 0.5 / marks; // measured from the next mark
+  for_each_triangle(scene, plan, stride, [&](const DTriangle& t, double area) {
+    const double measure = 0.5 * (area / total_area + 1.0 / count);
+    end += measure;
+    const double hits = std::floor(end * marks);
+    if (hits < 1.0) return;
+    end -= hits / marks;
+    sample.push_back({t, static_cast<double>(stride) * hits / (measure * marks)});
+  });
+  return sample;
+}
+
+} // namespace packtrace
