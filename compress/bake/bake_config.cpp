@@ -5,15 +5,13 @@
 #include <limits>
 #include <string>
 
-#include "compress/bake/angle.h"
 #include "pbrt_import/scene/error.h"
 
 namespace packtrace {
 
 namespace {
 
-constexpr double kMaxFlatDegrees = 0.1;     // where an error is stated
-constexpr double kShareOfTilt = 1.0 / 12.0; // of the angle that a step makes over an edge
+constexpr double kMaxFlatDegrees = 0.1; // where an error is stated
 
 void require(bool ok, const char* what, const char* range) {
   if (!ok) throw Error(ErrorKind::kUsage, std::string(what) + " out of range: " + range);
@@ -56,12 +54,9 @@ NormalLimits BakeConfig::normal_limits(double step_per_edge) const {
   const auto stated = [](double error) { return NormalLimits{error, std::min(kMaxFlatDegrees, error)}; };
   if (normals) return stated(format_of(*normals).max_error_degrees);
   if (normal_error_degrees) return stated(*normal_error_degrees);
-  NormalLimits limits = stated(kDefaultNormalError);
-  if (step_per_edge > kRoughEdge) {
-    const double deserved = std::atan(step_per_edge) * kDegreesPerRadian * kShareOfTilt;
-    limits = {std::max(limits.error_degrees, deserved), std::max(limits.flat_degrees, deserved)};
-  }
-  return limits;
+  const double tilt = std::atan(step_per_edge) / std::atan(kDefaultEdgeFraction);
+  const double error = kDefaultNormalError * std::max(tilt, 1.0);
+  return {error, error};
 }
 
 } // namespace packtrace

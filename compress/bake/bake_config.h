@@ -35,6 +35,10 @@ enum class LodUse : uint32_t {
 /// Steps of more than this fraction of an edge show: surfaces look rough.
 inline constexpr double kRoughEdge = 1.0 / 8.0;
 
+/// The default step as a fraction of the median edge: positions move by at most 1/256 of a typical edge per axis, face
+/// normals of typical triangles by less than half a degree.
+inline constexpr double kDefaultEdgeFraction = 1.0 / 128.0;
+
 /// In degrees; what axis24 keeps for every direction. Shading from such normals differs by less than a thousandth.
 inline constexpr double kDefaultNormalError = 0.04;
 
@@ -48,21 +52,19 @@ struct NormalLimits {
 /// Everything a user can choose about a bake.
 struct BakeConfig {
   PrecisionKind precision_kind = PrecisionKind::kPicture;
-  /// 1/128 of the median edge: positions move by at most 1/256 of a typical edge per axis, face normals of typical
-  /// triangles by less than half a degree.
-  double precision = 1.0 / 128.0;
+  double precision = kDefaultEdgeFraction;
 
-  /// Of every geometry; without one, each geometry gets the axis encoding of the fewest bits whose largest error,
-  /// measured over its own normals, is within its normal_limits().
+  /// Of every geometry; without one, each geometry gets of axis16, oct20, axis24 and axis32 that of the fewest bits
+  /// whose largest error, measured over its own normals, is within its normal_limits().
   std::optional<NormalEncoding> normals;
   /// Largest angle that a choice of encodings allows, .0025 .. 10 degrees; without one normal_limits() says it. Without
   /// meaning where `normals` is given.
   std::optional<double> normal_error_degrees;
 
-  /// Limits for a geometry's normals. A stated encoding or error is kept as it is. Else the error is
-  /// kDefaultNormalError, and where the step is above kRoughEdge of the median edge a twelfth of the angle that a step
-  /// makes over that edge, if that is more: there faces tilt by several degrees.
-  /// @param step_per_edge the grid's step over the geometry's median edge; infinite where that is 0
+  /// Limits for a geometry's normals. A stated encoding or error is kept as it is. Else normals lose as much beside the
+  /// tilt of faces as they do at the default precision: kDefaultNormalError times the angle that a step makes over a
+  /// typical edge, atan(step_per_edge), over that angle at kDefaultEdgeFraction; never less than kDefaultNormalError.
+  /// @param step_per_edge the grid's step over a typical edge of the geometry; infinite where that is 0
   NormalLimits normal_limits(double step_per_edge) const;
 
   /// What the file is to be good for: streams that it does not need are left out.

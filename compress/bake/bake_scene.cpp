@@ -308,8 +308,12 @@ private:
   }
 
   QuantizedGeometry quantize(size_t index, const GeometryNeeds& needs) const {
-    return quantize_geometry(scene_, plan_.geometries[index], needs, config_, grids_[index],
-                             measure_.geometries[index]);
+    GeometryMeasure measure = measure_.geometries[index];
+    // The scene's step follows its own median edge: small meshes beside others keep the normals that they deserve
+    // there.
+    if (plan_.geometries[index].world_space)
+      measure.median_edge = std::max(measure.median_edge, measure_.world.median_edge);
+    return quantize_geometry(scene_, plan_.geometries[index], needs, config_, grids_[index], measure);
   }
 
   Draft pack_with(size_t index, const GeometryNeeds& needs) const {

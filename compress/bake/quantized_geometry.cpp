@@ -268,9 +268,9 @@ private:
     return angle_degrees(normal, glm::normalize(DVec3(decode_normal(encoding, code))));
   }
 
-  /// The first of the axis family whose largest error is within the limit; the last where there is none.
+  /// Of the fewest bits whose largest error is within the limit; the last where there is none.
   NormalEncoding choose_normal_encoding(const std::vector<Work>& parts) const {
-    for (const NormalEncoding encoding : {NormalEncoding::kAxis16, NormalEncoding::kAxis24})
+    for (const NormalEncoding encoding : {NormalEncoding::kAxis16, NormalEncoding::kOct20, NormalEncoding::kAxis24})
       if (std::all_of(parts.begin(), parts.end(), [&](const Work& part) { return keeps_error(encoding, part); }))
         return encoding;
     return NormalEncoding::kAxis32;
@@ -356,6 +356,28 @@ private:
     return number;
   }
 
+  /// Of vertices that fell on one point, later ones take the normal of an earlier one where that is within the
+  /// limit: coarse lattices would have many normals at a point that differ by less than its faces tilt.
+  uint32_t weld_smooth_vertex(QuantizedVertex v, DVec3 normal) {
+    constexpr uint32_t kUnset = ~0u;
+    if (smooth_at_.empty()) smooth_at_.assign(surface_.positions.size(), kUnset);
+    constexpr uint32_t kMostCompared = 32; // of thousands at one point, too
+    uint32_t compared = 0;
+    for (uint32_t i = smooth_at_[v.position]; i != kUnset && compared < kMostCompared;
+         i = smooth_vertices_[i].next, ++compared) {
+      const QuantizedVertex& other = out_.vertices[smooth_vertices_[i].vertex];
+      const double error = encoding_error(out_.normal_encoding, normal, other.normal_code);
+      if (other.uv != v.uv || error > limits_.error_degrees) continue;
+      out_.stats.normal_error_sum += error - encoding_error(out_.normal_encoding, normal, v.normal_code);
+      out_.stats.max_normal_error_degrees = std::max(out_.stats.max_normal_error_degrees, error);
+      return smooth_vertices_[i].vertex;
+    }
+    const uint32_t number = weld_vertex(v);
+    smooth_vertices_.push_back({number, smooth_at_[v.position]});
+    smooth_at_[v.position] = static_cast<uint32_t>(smooth_vertices_.size() - 1);
+    return number;
+  }
+
   uint32_t kind_number(const TriangleKind& kind) {
     const auto found = std::find(out_.kinds.begin(), out_.kinds.end(), kind);
     if (found == out_.kinds.end()) out_.kinds.push_back(kind);
@@ -378,9 +400,12 @@ private:
       for (int corner = 0; corner < 3; ++corner) {
         const uint32_t source = work.triangles[i][corner];
         uint32_t& number = vertex_of[flat][source];
-        if (number == kUnset)
-          number = weld_vertex({corners[corner], flat != 0 ? 0u : work.codes[source],
-                                work.uvs.empty() ? UvLattice{} : work.uvs[source]});
+        if (number == kUnset) {
+          QuantizedVertex v{corners[corner], 0, work.uvs.empty() ? UvLattice{} : work.uvs[source]};
+          if (flat == 0) v.normal_code = work.codes[source];
+          number = flat == 0 && surface_.merged[v.position] != 0 ? weld_smooth_vertex(v, work.normals[source])
+                                                                 : weld_vertex(v);
+        }
         t[corner] = number;
       }
       if (at_merged(corners) && coinciding.repeats(t, kinds[flat], {static_cast<uint32_t>(part), work.triangles[i]})) {
@@ -418,6 +443,11 @@ private:
   NormalLimits limits_;
   WeldTable vertex_table_;
   WeldedSurface surface_;
+  struct SmoothVertex {
+    uint32_t vertex, next; ///< next: another one of the same position, a place in smooth_vertices_
+  };
+  std::vector<SmoothVertex> smooth_vertices_; // at merged positions
+  std::vector<uint32_t> smooth_at_;           // per position: the last of its smooth_vertices_
   QuantizedGeometry out_;
 };
 

@@ -72,7 +72,7 @@ struct QuantizedGeometry {
 /// Throws Error(kLimitExceeded) where the lattice is too large for its limit, or a measured error exceeds
 /// position_error_bound() or config.normal_limits(), or a texture coordinate is beyond config.uvs;
 /// Error(kInput) for normals that are not finite.
-/// @param measure of the plan's geometry (measure_geometry())
+/// @param measure of the plan's geometry (measure_geometry()); its median edge is the one that normal_limits() asks for
 QuantizedGeometry quantize_geometry(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs,
                                     const BakeConfig& config, const GeometryGrid& grid, const GeometryMeasure& measure);
 

@@ -278,15 +278,14 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   std::vector<std::string> encodings{kAuto};
   for (const NormalFormat& format : kNormalFormats) encodings.emplace_back(format.name);
   verb.add_option("--normals", options->normals,
-                  "Encoding of normals; auto: axis16, axis24 or axis32 by --normal-error, for each geometry")
+                  "Encoding of normals; auto: for each geometry axis16, oct20, axis24 or axis32, by --normal-error")
       ->check(one_of(encodings))
       ->default_str(kAuto)
       ->group("Normals");
-  verb.add_option(
-          "--normal-error", options->normal_error,
-          "Largest angle that auto allows between a normal and the decoded one, 0.0025..10 degrees (default 0.04, "
-          "which 24 bits keep for every direction; where the grid's step is above an eighth of the median edge, a "
-          "twelfth of the angle that a step makes over that edge)")
+  verb.add_option("--normal-error", options->normal_error,
+                  "Largest angle that auto allows between a normal and the decoded one, 0.0025..10 degrees (default "
+                  "0.04; where the "
+                  "grid is coarser than the default, more in proportion to the angle that a step makes over an edge)")
       ->type_name("DEGREES")
       ->group("Normals");
   verb.add_option("--for", options->purpose,

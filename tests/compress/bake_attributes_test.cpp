@@ -52,7 +52,8 @@ TEST(BakeScene, AutoTakesTheFewestBitsThatKeepTheError) {
   };
   const Mesh sphere = test::sphere_mesh(30);
   EXPECT_EQ(chosen(sphere, 1.0), NormalEncoding::kAxis16);
-  EXPECT_EQ(chosen(sphere, 0.5), NormalEncoding::kAxis24);
+  EXPECT_EQ(chosen(sphere, 0.5), NormalEncoding::kOct20);
+  EXPECT_EQ(chosen(sphere, 0.1), NormalEncoding::kAxis24);
   EXPECT_EQ(chosen(sphere, 0.04), NormalEncoding::kAxis24);
   EXPECT_EQ(chosen(sphere, 0.01), NormalEncoding::kAxis32);
   EXPECT_EQ(chosen(sphere, 0.0025), NormalEncoding::kAxis32);
@@ -60,6 +61,36 @@ TEST(BakeScene, AutoTakesTheFewestBitsThatKeepTheError) {
   for (size_t i = 0; i < bent.positions.size(); ++i)
     bent.normals.push_back(i % 2 == 0 ? Vec3(1, 0, 0) : Vec3(0, -1, 0));
   EXPECT_EQ(chosen(bent, 0.0025), NormalEncoding::kAxis16);
+}
+
+TEST(BakeScene, CoarseGridsTakeCoarseNormals) {
+  const auto chosen = [](double edge_fraction, std::optional<double> error_degrees) {
+    BakeConfig config = test::precision(PrecisionKind::kEdgeFraction, edge_fraction);
+    config.normal_error_degrees = error_degrees;
+    const BakeReport report = bake(scene_of(test::sphere_mesh(30)), config).report;
+    EXPECT_LE(report.max_normal_error_degrees, config.normal_limits(edge_fraction).error_degrees);
+    return report.file.normals.at(0).encoding;
+  };
+  EXPECT_EQ(chosen(kDefaultEdgeFraction, std::nullopt), NormalEncoding::kAxis24);
+  EXPECT_EQ(chosen(1.0 / 20.0, std::nullopt), NormalEncoding::kOct20);
+  EXPECT_EQ(chosen(1.0 / 4.0, std::nullopt), NormalEncoding::kAxis16);
+  EXPECT_EQ(chosen(1.0 / 4.0, 0.04), NormalEncoding::kAxis24); // as was asked for
+}
+
+TEST(BakeScene, VerticesThatFallTogetherShareANormalWithinTheLimit) {
+  const auto vertices_per_triangle = [](std::optional<double> error_degrees) {
+    BakeConfig config = test::precision(PrecisionKind::kPositionBits, 6);
+    config.normal_error_degrees = error_degrees;
+    const BakedScene baked = bake(scene_of(test::sphere_mesh(60)), config);
+    EXPECT_GT(baked.report.max_normal_error_degrees, 0.0);
+    EXPECT_GE(baked.report.max_normal_error_degrees, baked.report.mean_normal_error_degrees);
+    if (error_degrees) {
+      EXPECT_LE(baked.report.max_normal_error_degrees, *error_degrees);
+    }
+    return static_cast<double>(baked.report.file.vertices) / static_cast<double>(baked.report.file.triangles);
+  };
+  EXPECT_LT(vertices_per_triangle(std::nullopt), 0.9);
+  EXPECT_GT(vertices_per_triangle(0.04), 1.1 * vertices_per_triangle(std::nullopt));
 }
 
 TEST(BakeScene, EveryPartOfAGeometryHasItsEncoding) {

@@ -185,16 +185,27 @@ TEST(CollapsedTriangles, LevelsAreBuiltOfWhatIsLeft) {
   EXPECT_EQ(bake(scene_of(test::sphere_mesh(60)), config).report.lod_geometries, 0u);
 }
 
+/// The mesh with its vertices off by up to a fraction of its first edge: no lattice fits it better than others.
+Mesh shaken(Mesh mesh, float fraction) {
+  test::Random random(7);
+  const float by = fraction * glm::length(mesh.positions[mesh.triangles[0].y] - mesh.positions[mesh.triangles[0].x]);
+  for (Vec3& p : mesh.positions)
+    for (int axis = 0; axis < 3; ++axis) p[axis] += random.uniform(-by, by);
+  return mesh;
+}
+
 TEST(CollapsedTriangles, FewerBitsMakeSmallerFiles) {
-  Mesh sphere = test::sphere_mesh(40), bumps = test::grid_mesh(48, 0.1f, true);
-  for (const auto& mesh : {sphere, bumps, test::grid_mesh(48), test::soup_mesh(3000, 5), thin_tube(0.02), plates()})
+  for (const auto& [name, mesh] : {std::pair("sphere", shaken(test::sphere_mesh(60), 0.2f)),
+                                   {"bumps", shaken(test::grid_mesh(64, 0.1f, true), 0.2f)},
+                                   {"plane", shaken(test::grid_mesh(64), 0.2f)},
+                                   {"soup", test::soup_mesh(3000, 5)}})
     for (const PageCodec codec : {PageCodec::kNone, PageCodec::kFast, PageCodec::kSmall}) {
       size_t last = 0;
       for (int bits = 6; bits <= 24; bits += 2) {
         BakeConfig config = precision(PrecisionKind::kPositionBits, bits);
         config.codec = codec;
         const size_t bytes = bake(scene_of(mesh), config).bytes.size();
-        EXPECT_GE(bytes, last) << mesh.name << ", " << name_of(codec) << ", " << bits << " bits";
+        EXPECT_GE(bytes, last) << name << ", " << name_of(codec) << ", " << bits << " bits";
         last = bytes;
       }
     }
