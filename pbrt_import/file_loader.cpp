@@ -1,8 +1,9 @@
 #include "pbrt_import/file_loader.h"
 
 #include <algorithm>
-#include <atomic>
+#include <limits>
 #include <memory>
+#include <mutex>
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
@@ -15,6 +16,12 @@
 #include "pbrt_import/tokenizer.h"
 
 namespace packtrace {
+namespace {
+
+constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max() / 2; // but the memory budget
+
+} // namespace
+
 uint32_t FileLoader::request_ply(const std::filesystem::path& path, const Place& place, uint32_t slot) {
   const auto [it, inserted] = ply_by_path_.try_emplace(path.string(), static_cast<uint32_t>(plys_.size()));
   if (inserted) {
@@ -33,26 +40,33 @@ void FileLoader::require(uint32_t slot) {
 void FileLoader::read_ply_file(PlyFile& file, Mesh& mesh) const {
   Outcome& outcome = file.outcome;
   outcome.error = problem_of([&] {
-    const std::vector<std::byte> bytes = read_whole_file(file.path, options_.memory_budget_bytes);
+    MemoryReservation content(options_.memory);
+    outcome.memory = MemoryReservation(options_.memory);
+    const std::vector<std::byte> bytes = read_whole_file(file.path, kNoLimit, &content);
     outcome.bytes = bytes.size();
-    PlyMesh ply = read_ply(bytes, [&](Severity severity, uint32_t line, std::string message) {
+    const ReportFn report = [&](Severity severity, uint32_t line, std::string message) {
       outcome.reports.push_back({severity, line, std::move(message)});
-    });
+    };
+    PlyMesh ply = read_ply(bytes, report, &outcome.memory);
     outcome.dropped_triangles = ply.dropped_triangles;
     if (ply.mesh.triangles.empty()) throw Error(ErrorKind::kInput, "no triangle is left");
     mesh = std::move(ply.mesh);
     mesh.name = file.path.filename().string();
   });
+  outcome.memory.resize(bytes_of(mesh), "its mesh");
 }
 
 FileLoader::Outcome FileLoader::read_image_file(ImageRequest& image) const {
   Outcome outcome;
   outcome.error = problem_of([&] {
-    const std::vector<std::byte> bytes = read_whole_file(image.path, options_.memory_budget_bytes);
+    MemoryReservation content(options_.memory);
+    outcome.memory = MemoryReservation(options_.memory);
+    const std::vector<std::byte> bytes = read_whole_file(image.path, kNoLimit, &content);
     outcome.bytes = bytes.size();
     image.summary =
-        read_image(bytes, image.decode_srgb, {image.want_mask, image.want_colours}, options_.memory_budget_bytes);
+        read_image(bytes, image.decode_srgb, {image.want_mask, image.want_colours}, outcome.memory);
   });
+  outcome.memory.resize(bytes_of(image.summary), "its pixels");
   image.missing = !outcome.error.empty();
   return outcome;
 }
@@ -67,28 +81,28 @@ void FileLoader::load(std::vector<Mesh>& meshes, std::vector<ImageRequest>& imag
     if (image.needed && !image.missing) wanted_images.push_back(&image);
   std::vector<Outcome> image_outcomes(wanted_images.size());
   const size_t count = wanted_images.size() + wanted_plys.size();
-  std::atomic<uint64_t> mesh_bytes{0}, colour_bytes{0};
-  for (const Mesh& mesh : meshes) mesh_bytes += bytes_of(mesh);
   tbb::enumerable_thread_specific<LargeHeapPages> heap_pages;
   progress.begin("reading meshes and images", count);
+  std::mutex problem_mutex;
+  const auto with_file = [&](const std::filesystem::path& path, const Place& place, const auto& work) {
+    try {
+      work();
+    } catch (const MemoryError& error) {
+      const std::scoped_lock lock(problem_mutex); // locate() may remember something
+      throw MemoryError(reporter_.locate(place), in_quotes(path.string(), kMaxShownPath) + ": " + error.what());
+    }
+  };
   tbb::parallel_for(size_t{0}, count, [&](size_t i) {
     if (i < wanted_images.size()) { // images first: one may take longer than many meshes
-      image_outcomes[i] = read_image_file(*wanted_images[i]);
-      const uint64_t bytes = wanted_images[i]->summary.rgb.size();
-      if (colour_bytes.fetch_add(bytes) + bytes > options_.memory_budget_bytes)
-        throw Error(ErrorKind::kLimitExceeded, "all textures together exceed the memory budget of " +
-                                                   std::to_string(options_.memory_budget_bytes) + " bytes");
+      ImageRequest& image = *wanted_images[i];
+      with_file(image.path, image.place, [&] { image_outcomes[i] = read_image_file(image); });
     } else {
       PlyFile& file = *wanted_plys[i - wanted_images.size()];
       std::error_code unknown; // found out when it is read
       const uint64_t stored_bytes = std::filesystem::file_size(file.path, unknown);
       if (!unknown) heap_pages.local().about_to_allocate(2 * stored_bytes);
-      read_ply_file(file, meshes[file.slot]);
-      // Leaving out those beyond the limit would leave out others in each run.
-      const uint64_t bytes = bytes_of(meshes[file.slot]);
-      if (mesh_bytes.fetch_add(bytes) + bytes > options_.memory_budget_bytes)
-        throw Error(ErrorKind::kLimitExceeded, "all meshes together exceed the memory budget of " +
-                                                   std::to_string(options_.memory_budget_bytes) + " bytes");
+      // Leaving out those beyond the budget would leave out others in each run.
+      with_file(file.path, file.uses.front().place, [&] { read_ply_file(file, meshes[file.slot]); });
     }
     progress.advance();
   });
@@ -104,6 +118,9 @@ void FileLoader::load(std::vector<Mesh>& meshes, std::vector<ImageRequest>& imag
     if (!file->outcome.error.empty()) statistics.shapes_skipped += file->uses.size();
     dropped_triangles += file->outcome.dropped_triangles;
   }
+  for (PlyFile* const file : wanted_plys) memory_.merge(std::move(file->outcome.memory));
+  // Of images most is done with once textures are made of them.
+  for (size_t i = 0; i < wanted_images.size(); ++i) wanted_images[i]->memory = std::move(image_outcomes[i].memory);
 }
 
 void FileLoader::report_ply(const PlyFile& file) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "pbrt_import/import_scene.h"
@@ -27,10 +28,12 @@ public:
   void require(uint32_t slot);
 
   /// Reads all files that are needed into meshes and images. A mesh that cannot be read stays empty and is reported
-  /// for each shape that asked for it. Throws Error(kCancelled), and Error(kLimitExceeded) once all meshes together
-  /// exceed the memory budget.
+  /// for each shape that asked for it. Throws Error(kCancelled), and MemoryError where there is not enough for all.
   void load(std::vector<Mesh>& meshes, std::vector<ImageRequest>& images, Progress& progress,
             ImportStatistics& statistics, uint64_t& dropped_triangles);
+
+  /// What the meshes take that load() read.
+  MemoryReservation take_memory() { return std::move(memory_); }
 
 private:
   struct Report {
@@ -43,6 +46,7 @@ private:
     std::string error; ///< empty: all is well
     uint64_t bytes = 0;
     uint64_t dropped_triangles = 0;
+    MemoryReservation memory; ///< for what was made of the file
   };
   struct PlyUse {
     Place place;
@@ -66,6 +70,7 @@ private:
   std::vector<PlyFile> plys_;
   std::unordered_map<std::string, uint32_t> ply_by_path_;
   std::unordered_map<uint32_t, uint32_t> ply_by_slot_;
+  MemoryReservation memory_; ///< of meshes
 };
 
 } // namespace packtrace

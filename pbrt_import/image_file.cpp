@@ -102,17 +102,27 @@ private:
   DVec3 row_{0.0}, total_{0.0};
 };
 
-/// @param stored_bytes of the file
-void check_size(uint64_t width, uint64_t height, uint64_t bytes_per_pixel, uint64_t stored_bytes, uint64_t max_bytes) {
-  if (width == 0 || height == 0) fail("the image has no pixels");
-  constexpr uint64_t kMaxSide = 1u << 24;
-  if (width > kMaxSide || height > kMaxSide || width * height > max_bytes / bytes_per_pixel)
-    throw Error(ErrorKind::kLimitExceeded, "decoding its " + std::to_string(width) + " x " + std::to_string(height) +
-                                               " pixels needs too much memory");
-  if (width * height / kMostPixelsPerByte > stored_bytes)
-    fail("damaged image: its " + std::to_string(stored_bytes) + " bytes cannot hold the " + std::to_string(width) +
-         " x " + std::to_string(height) + " pixels it claims");
-}
+/// The size that a header claims, checked before anything is allocated.
+struct ClaimedSize {
+  uint64_t width = 0, height = 0;
+  uint64_t pixels_per_byte = kMostPixelsPerByte; ///< that the format can store at most
+
+  std::string text() const { return std::to_string(width) + " x " + std::to_string(height); }
+
+  /// @param working_bytes that decoding takes besides what is kept of the image
+  void check(uint64_t stored_bytes, uint64_t working_bytes, ImageWants wants, MemoryReservation& memory) const {
+    if (width == 0 || height == 0) fail("the image has no pixels");
+    constexpr uint64_t kMaxSide = 1u << 24;
+    if (width > kMaxSide || height > kMaxSide) fail("an image of " + text() + " pixels is not read");
+    const uint64_t pixels = width * height;
+    if (pixels / pixels_per_byte > stored_bytes)
+      fail("damaged image: its " + std::to_string(stored_bytes) + " bytes cannot hold the " + text() +
+           " pixels it claims");
+    const uint64_t kept = (wants.colours && pixels <= kMostTextureTexels ? 3 * pixels : 0) +
+                          (wants.mask ? AlphaMask::row_words(static_cast<uint32_t>(width)) * height * 4 : 0);
+    memory.cover(working_bytes + kept, "decoding its " + text() + " pixels");
+  }
+};
 
 /// Source: IEC 61966-2-1.
 float linear_from_srgb(float v) {
@@ -180,11 +190,12 @@ ImageSummary read_palette_png(std::span<const std::byte> bytes, const PngHeader&
   return summary;
 }
 
-ImageSummary read_png(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants, uint64_t max_bytes) {
+ImageSummary read_png(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants, MemoryReservation& memory) {
   if (bytes.size() > static_cast<size_t>(INT32_MAX)) fail("the image file exceeds 2 GiB");
   const PngHeader header = check_png_chunks(bytes, PngChecksums::kCount, kDamaged);
   // stb_image holds up to two copies, of four channels at most.
-  check_size(header.width, header.height, header.bits_per_sample > 8 ? 16 : 8, bytes.size(), max_bytes);
+  const ClaimedSize size{header.width, header.height};
+  size.check(bytes.size(), size.width * size.height * (header.bits_per_sample > 8 ? 16 : 8), wants, memory);
   const int width = static_cast<int>(header.width), height = static_cast<int>(header.height);
   ImageSummary summary;
   if (header.palette) {
@@ -208,10 +219,12 @@ ImageSummary read_png(std::span<const std::byte> bytes, bool decode_srgb, ImageW
 }
 
 /// A format without a mark of its own: what nothing else claims.
-ImageSummary read_tga(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants, uint64_t max_bytes) {
+ImageSummary read_tga(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants, MemoryReservation& memory) {
   const std::optional<TgaHeader> header = parse_tga_header(bytes);
   if (!header) fail("not an image in a known format (PNG, TGA, EXR, PFM, HDR)");
-  check_size(header->width, header->height, 3, bytes.size(), max_bytes);
+  constexpr uint64_t kPixelsPerByte = 64; // a run of 128 takes two bytes at least
+  const ClaimedSize size{header->width, header->height, kPixelsPerByte};
+  size.check(bytes.size(), size.width * size.height * 3, wants, memory);
   const TgaPixels pixels = decode_tga(bytes, *header);
   const std::array<float, 256> linear = linear_of_bytes(decode_srgb);
   ImageSummary summary = summarize(pixels.rgb.data(), static_cast<int>(header->width), static_cast<int>(header->height),
@@ -222,9 +235,10 @@ ImageSummary read_tga(std::span<const std::byte> bytes, bool decode_srgb, ImageW
   return summary;
 }
 
-ImageSummary read_hdr(std::span<const std::byte> bytes, ImageWants wants, uint64_t max_bytes) {
+ImageSummary read_hdr(std::span<const std::byte> bytes, ImageWants wants, MemoryReservation& memory) {
   RadianceReader reader(bytes);
-  check_size(reader.width(), reader.height(), 12, bytes.size(), max_bytes);
+  const ClaimedSize size{reader.width(), reader.height()};
+  size.check(bytes.size(), size.width * 2 * sizeof(Vec3), wants, memory); // a row
   Summarizer summarizer(reader.width(), reader.height(), wants);
   for (uint32_t y = 0; y < reader.height(); ++y) {
     const std::span<const Vec3> row = reader.read_row();
@@ -258,22 +272,21 @@ private:
 };
 
 /// Before OpenEXR, which allocates first, gets to see the file.
-void check_exr(std::span<const std::byte> bytes, uint64_t max_bytes) {
+void check_exr(std::span<const std::byte> bytes, ImageWants wants, MemoryReservation& memory) {
   if (const std::string_view why = unsupported_exr_kind(bytes); !why.empty()) fail(std::string(why));
   const ExrHeader header = scan_exr_header(bytes, kDamaged);
-  check_size(header.width(), header.height(), sizeof(Imf::Rgba), bytes.size(), max_bytes);
   // OpenEXR keeps a few blocks, packed and unpacked.
-  constexpr uint64_t kBlockCopies = 4, kFreeBytes = 64u << 20;
+  constexpr uint64_t kBlockCopies = 4, kFreeBytes = 64u << 20, kRows = 64;
   const uint64_t block = header.block_bytes();
-  if (block > max_bytes / kBlockCopies)
-    throw Error(ErrorKind::kLimitExceeded,
-                "decoding its blocks of " + std::to_string(block) + " bytes needs too much memory");
   if (block > kFreeBytes && block / kMostPixelsPerByte > bytes.size())
     fail("damaged image: its " + std::to_string(bytes.size()) + " bytes cannot hold the blocks it claims");
+  const uint64_t blocks = block > UINT64_MAX / (2 * kBlockCopies) ? UINT64_MAX / 2 : block * kBlockCopies;
+  const ClaimedSize size{header.width(), header.height()};
+  size.check(bytes.size(), blocks + size.width * kRows * sizeof(Imf::Rgba), wants, memory);
 }
 
-ImageSummary read_exr(std::span<const std::byte> bytes, ImageWants wants, uint64_t max_bytes) {
-  check_exr(bytes, max_bytes);
+ImageSummary read_exr(std::span<const std::byte> bytes, ImageWants wants, MemoryReservation& memory) {
+  check_exr(bytes, wants, memory);
   try {
     MemoryStream stream(bytes);
     Imf::RgbaInputFile file(stream, 1);
@@ -309,7 +322,7 @@ ImageSummary read_exr(std::span<const std::byte> bytes, ImageWants wants, uint64
 }
 
 /// Portable float map: "PF" or "Pf", width, height, scale (negative: little-endian), then rows from the bottom.
-ImageSummary read_pfm(std::span<const std::byte> bytes, ImageWants wants, uint64_t max_bytes) {
+ImageSummary read_pfm(std::span<const std::byte> bytes, ImageWants wants, MemoryReservation& memory) {
   std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   const size_t channels = text[1] == 'F' ? 3 : 1;
   text.remove_prefix(2);
@@ -327,7 +340,7 @@ ImageSummary read_pfm(std::span<const std::byte> bytes, ImageWants wants, uint64
     fail("damaged PFM header: width and height must be whole numbers from 1 to 16777216");
   if (!std::isfinite(header[2]) || header[2] == 0.0) fail("damaged PFM header: the scale must be finite and not 0");
   const auto width = static_cast<uint32_t>(header[0]), height = static_cast<uint32_t>(header[1]);
-  check_size(width, height, 12, bytes.size(), max_bytes);
+  ClaimedSize{width, height, 1}.check(bytes.size(), 0, wants, memory);
   const size_t row_bytes = static_cast<size_t>(width) * channels * 4;
   if (text.size() / row_bytes < height) fail(kTruncated);
   const bool swap = header[2] > 0.0;
@@ -364,15 +377,16 @@ std::string_view other_format(std::string_view file) {
 
 } // namespace
 
-ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants, uint64_t max_bytes) {
+ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants,
+                        MemoryReservation& memory) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  if (text.starts_with("\x76\x2f\x31\x01")) return read_exr(bytes, wants, max_bytes);
-  if (text.starts_with("PF") || text.starts_with("Pf")) return read_pfm(bytes, wants, max_bytes);
-  if (text.starts_with("#?")) return read_hdr(bytes, wants, max_bytes);
+  if (text.starts_with("\x76\x2f\x31\x01")) return read_exr(bytes, wants, memory);
+  if (text.starts_with("PF") || text.starts_with("Pf")) return read_pfm(bytes, wants, memory);
+  if (text.starts_with("#?")) return read_hdr(bytes, wants, memory);
   if (const std::string_view name = other_format(text); !name.empty())
     fail("images in " + std::string(name) + " format are not read, only PNG, TGA, EXR, PFM and HDR");
-  return text.starts_with("\x89PNG") ? read_png(bytes, decode_srgb, wants, max_bytes)
-                                     : read_tga(bytes, decode_srgb, wants, max_bytes);
+  return text.starts_with("\x89PNG") ? read_png(bytes, decode_srgb, wants, memory)
+                                     : read_tga(bytes, decode_srgb, wants, memory);
 }
 
 } // namespace packtrace

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pbrt_import/scene/math.h"
+#include "pbrt_import/scene/memory_budget.h"
 
 namespace packtrace {
 
@@ -34,12 +35,19 @@ inline constexpr uint64_t kMostTextureTexels = uint64_t{1} << 26;
 /// does. Other formats are refused by name: pbrt does not read them either.
 /// @param bytes the whole file
 /// @param decode_srgb whether integer formats are sRGB-encoded
-/// @param max_bytes for the decoded pixels
-/// Throws Error(kInput), message without a file name, if it is none of these or damaged, Error(kLimitExceeded) if
-/// decoding would take more than max_bytes.
-ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants, uint64_t max_bytes);
+/// @param memory grows by what this takes, before it is taken
+/// Throws Error(kInput), message without a file name, if it is none of these or damaged, or has more than 2^24 pixels
+/// along a side; MemoryError.
+ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants,
+                        MemoryReservation& memory);
 inline ImageSummary read_image(std::span<const std::byte> bytes, bool decode_srgb, bool want_mask, uint64_t max_bytes) {
-  return read_image(bytes, decode_srgb, ImageWants{want_mask, false}, max_bytes);
+  MemoryReservation memory{MemoryBudget(max_bytes)};
+  return read_image(bytes, decode_srgb, ImageWants{want_mask, false}, memory);
+}
+
+/// Memory that a summary's arrays take.
+inline uint64_t bytes_of(const ImageSummary& summary) {
+  return summary.rgb.size() + summary.nonzero.size() * sizeof(uint32_t);
 }
 
 } // namespace packtrace

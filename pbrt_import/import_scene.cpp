@@ -5,6 +5,7 @@
 
 #include "pbrt_import/file_names.h"
 #include "pbrt_import/parser.h"
+#include "pbrt_import/problem_text.h"
 #include "pbrt_import/reporter.h"
 #include "pbrt_import/scene/file_error.h"
 #include "pbrt_import/scene_builder.h"
@@ -20,7 +21,7 @@ void check_options(const ImportOptions& options) {
   require(options.max_include_depth >= 1, "max_include_depth must be at least 1");
   require(options.max_included_files >= 1, "max_included_files must be at least 1");
   require(options.max_nesting >= 1, "max_nesting must be at least 1");
-  require(options.memory_budget_bytes >= 1, "memory_budget_bytes must be at least 1");
+  require(options.max_file_bytes >= 1, "max_file_bytes must be at least 1");
   require(!options.world || *options.world >= 1, "worlds are numbered from 1");
   require(!options.time || std::isfinite(*options.time), "the time must be finite");
   require(options.tessellation_tolerance >= 1e-6 && options.tessellation_tolerance <= 0.5,
@@ -46,19 +47,22 @@ ImportResult import_scene(const std::filesystem::path& main_file, const ImportOp
   check_options(options);
   SourceFiles files;
   Reporter reporter(files, diagnostics);
-  const SourceLimits limits{options.max_include_depth, options.max_included_files, options.memory_budget_bytes};
+  const SourceLimits limits{options.max_include_depth, options.max_included_files, options.max_file_bytes};
   SourceStack source(main_file, limits, files, reporter);
   std::error_code error;
   const uint64_t main_bytes = std::filesystem::file_size(main_file, error);
   progress.begin("reading scene", error ? 0 : main_bytes);
   FileNames file_names(main_file.parent_path(), options.allow_files_outside_scene_folder);
-  Parser parser(source, file_names, reporter);
+  Parser parser(source, file_names, reporter, options.memory);
   SceneBuilder builder(options, file_names, reporter, progress);
   Directive directive;
   constexpr uint64_t kProgressStep = 1024; // directives
   uint64_t reported_bytes = 0;
-  for (uint64_t count = 0; parser.next(directive); ++count) {
-    builder.handle(directive);
+  const auto next = [&] {
+    return with_place(reporter, [&] { return source.place(); }, [&] { return parser.next(directive); });
+  };
+  for (uint64_t count = 0; next(); ++count) {
+    with_place(reporter, [&] { return directive.place; }, [&] { builder.handle(directive); });
     if (count % kProgressStep != 0) continue;
     const uint64_t bytes = source.bytes_read();
     progress.advance(bytes - reported_bytes);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "pbrt_import/scene/diagnostics.h"
+#include "pbrt_import/scene/memory_budget.h"
 #include "pbrt_import/scene/progress.h"
 #include "pbrt_import/scene/scene.h"
 
@@ -16,7 +17,8 @@ namespace packtrace {
 
 struct ImportOptions {
   bool strict = false;                          ///< any warning or error fails the import, once all are reported
-  uint64_t memory_budget_bytes = 16ull << 30;   ///< for one file's content, all meshes together, all textures
+  MemoryBudget memory = MemoryBudget();         ///< for all that the scene takes while it is read and afterwards
+  uint64_t max_file_bytes = 16ull << 30;        ///< content of one file of text, after inflating
   uint32_t max_include_depth = 64;              ///< files open at once
   uint64_t max_included_files = 1'000'000;      ///< opened in all
   uint32_t max_nesting = 1u << 16;              ///< open Attribute, Transform and Object blocks
@@ -55,6 +57,7 @@ struct ImportResult {
   Scene scene;
   ImportStatistics statistics;
   std::vector<std::filesystem::path> files; ///< that the scene is made of: all it names, read or not, in no order
+  MemoryReservation memory; ///< of the scene; to be kept as long as it
 };
 
 /// Reads a pbrt-v3 scene with everything it includes. Problems are reported to diagnostics, each with its place, and
@@ -69,9 +72,8 @@ struct ImportResult {
 /// that are never instanced, and materials, masks and meshes that nothing uses, are left out.
 ///
 /// Throws Error(kUsage) if an option is out of range, Error(kInput) if the main file cannot be read at all or has no
-/// world of that number, Error(kInput) if options.strict and a warning or an error was reported, Error(kLimitExceeded)
-/// if the meshes of PLY files, or the colours of all textures, exceed memory_budget_bytes together, Error(kCancelled)
-/// on cancellation.
+/// world of that number, Error(kInput) if options.strict and a warning or an error was reported, MemoryError, "PLACE:
+/// ...", where the scene needs more than options.memory, Error(kCancelled) on cancellation.
 ImportResult import_scene(const std::filesystem::path& main_file, const ImportOptions& options,
                           Diagnostics& diagnostics, Progress& progress);
 

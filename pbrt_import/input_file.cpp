@@ -1,37 +1,22 @@
 #include "pbrt_import/input_file.h"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <limits>
 #include <string>
 
-#include <fcntl.h>
-#include <sys/stat.h>
 #include <unistd.h>
 #include <zlib.h>
 
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/regular_file.h"
 
 namespace packtrace {
 namespace {
 
 [[noreturn]] void fail(const std::string& what) { throw Error(ErrorKind::kInput, what); }
-
-/// Owns a file descriptor.
-class Descriptor {
-public:
-  explicit Descriptor(int value) : value_(value) {}
-  ~Descriptor() {
-    if (value_ >= 0) ::close(value_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return value_; }
-
-private:
-  int value_;
-};
 
 /// Owns a zlib inflate stream.
 class Inflater {
@@ -54,11 +39,7 @@ constexpr size_t kCompressedChunk = 64 * 1024;
 } // namespace
 
 struct InputFile::State {
-  explicit State(int descriptor) : file(descriptor) {}
-  Descriptor file;
-  dev_t device = 0;
-  ino_t inode = 0;
-  uint64_t stored_bytes = 0;
+  RegularFile file;
   uint64_t max_bytes = 0;
   uint64_t delivered_bytes = 0;
   std::unique_ptr<Inflater> inflater; ///< null: plain file
@@ -81,7 +62,7 @@ struct InputFile::State {
   }
 
   size_t read_plain(char* to, size_t size) {
-    return read_fully(to, size, [&](char* p, size_t n, size_t) { return ::read(file.get(), p, n); });
+    return read_fully(to, size, [&](char* p, size_t n, size_t) { return ::read(file.descriptor.get(), p, n); });
   }
 
   /// True if there is compressed input to work on.
@@ -128,20 +109,11 @@ struct InputFile::State {
 };
 
 InputFile::InputFile(const std::filesystem::path& path, uint64_t max_bytes) {
-  // Non-blocking, so that opening a FIFO without a writer cannot hang.
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (descriptor < 0) fail(errno == ENOENT ? "no such file" : std::string("cannot open: ") + std::strerror(errno));
-  state_ = std::make_unique<State>(descriptor);
-  struct stat info {};
-  if (::fstat(descriptor, &info) != 0) fail(std::string("cannot examine: ") + std::strerror(errno));
-  if (S_ISDIR(info.st_mode)) fail("is a directory, not a file");
-  if (!S_ISREG(info.st_mode)) fail("is not a regular file");
-  state_->device = info.st_dev;
-  state_->inode = info.st_ino;
-  state_->stored_bytes = static_cast<uint64_t>(info.st_size);
+  state_ = std::make_unique<State>();
+  state_->file = open_regular_file(path);
   state_->max_bytes = max_bytes;
   unsigned char magic[2] = {};
-  const ssize_t n = ::pread(descriptor, magic, sizeof magic, 0);
+  const ssize_t n = ::pread(state_->file.descriptor.get(), magic, sizeof magic, 0);
   if (n == 2 && magic[0] == 0x1f && magic[1] == 0x8b) {
     state_->inflater = std::make_unique<Inflater>();
     state_->compressed.resize(kCompressedChunk);
@@ -162,28 +134,44 @@ size_t InputFile::read(std::span<char> buffer) {
 
 size_t InputFile::read_at(uint64_t offset, std::span<char> buffer) const {
   const size_t got = State::read_fully(buffer.data(), buffer.size(), [&](char* p, size_t n, size_t done) {
-    return ::pread(state_->file.get(), p, n, static_cast<off_t>(offset + done));
+    return ::pread(state_->file.descriptor.get(), p, n, static_cast<off_t>(offset + done));
   });
   state_->check_limit(offset + got);
   return got;
 }
 
-uint64_t InputFile::stored_bytes() const { return state_->stored_bytes; }
+uint64_t InputFile::stored_bytes() const { return state_->file.bytes; }
 bool InputFile::compressed() const { return state_->inflater != nullptr; }
 bool InputFile::same_file(const InputFile& other) const {
-  return state_->device == other.state_->device && state_->inode == other.state_->inode;
+  return state_->file.device == other.state_->file.device && state_->file.inode == other.state_->file.inode;
 }
 
-std::vector<std::byte> read_whole_file(const std::filesystem::path& path, uint64_t max_bytes) {
+uint64_t InputFile::claimed_bytes() const {
+  constexpr uint64_t kMostPerByte = 1032; // what deflate makes of nothing but repetition
+  std::array<unsigned char, 4> last{};
+  const uint64_t stored = stored_bytes();
+  if (!compressed() || stored < last.size() ||
+      ::pread(state_->file.descriptor.get(), last.data(), last.size(), static_cast<off_t>(stored - last.size())) != 4)
+    return 0;
+  const uint64_t claimed = last[0] | (last[1] << 8) | (last[2] << 16) | (uint64_t{last[3]} << 24);
+  return claimed / kMostPerByte <= stored ? claimed : 0;
+}
+
+std::vector<std::byte> read_whole_file(const std::filesystem::path& path, uint64_t max_bytes,
+                                       MemoryReservation* memory) {
   InputFile file(path, max_bytes);
   if (file.stored_bytes() > max_bytes)
     throw Error(ErrorKind::kLimitExceeded, "file of " + std::to_string(file.stored_bytes()) +
                                                " bytes exceeds the limit of " + std::to_string(max_bytes) + " bytes");
+  const auto reserve = [&](uint64_t bytes) {
+    if (memory) memory->cover(bytes, "its content");
+  };
   std::vector<std::byte> content;
-  // One byte more than expected, so that the end of an unchanged plain file shows in a single read.
-  size_t room = static_cast<size_t>(file.stored_bytes()) + 1;
+  // One byte more than expected, so that the end of an unchanged file shows in a single read.
+  size_t room = static_cast<size_t>(std::min(std::max(file.stored_bytes(), file.claimed_bytes()), max_bytes)) + 1;
   size_t size = 0;
   while (true) {
+    reserve(size == 0 ? room : 2 * size + room); // while it moves, there are two of it
     content.resize(size + room);
     const size_t got = file.read({reinterpret_cast<char*>(content.data()) + size, room});
     size += got;
@@ -192,7 +180,7 @@ std::vector<std::byte> read_whole_file(const std::filesystem::path& path, uint64
       break;
     }
     // One byte more than allowed is enough to find out.
-    room = static_cast<size_t>(std::min<uint64_t>(std::max<size_t>(size, kCompressedChunk), max_bytes - size + 1));
+    room = static_cast<size_t>(std::min<uint64_t>(std::max<size_t>(size / 2, kCompressedChunk), max_bytes - size + 1));
   }
   content.resize(size);
   return content;

@@ -7,6 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "pbrt_import/scene/memory_budget.h"
+
 namespace packtrace {
 
 /// Sequential reader of one regular file; files that start with gzip's magic bytes are inflated on the way.
@@ -30,6 +32,9 @@ public:
   /// Bytes on disk.
   uint64_t stored_bytes() const;
   bool compressed() const;
+  /// What gzip says of the length of the content, in its last four bytes: right for files of one member below 4 GiB,
+  /// else, or where it cannot be, 0.
+  uint64_t claimed_bytes() const;
 
   /// True where both are the same file on disk, whatever their names.
   bool same_file(const InputFile& other) const;
@@ -39,7 +44,10 @@ private:
   std::unique_ptr<State> state_;
 };
 
-/// The whole content, inflated if need be. Throws like InputFile.
-std::vector<std::byte> read_whole_file(const std::filesystem::path& path, uint64_t max_bytes);
+/// The whole content, inflated if need be.
+/// @param memory grows by what this takes, before it is taken; null: nobody counts
+/// Throws like InputFile, and MemoryError.
+std::vector<std::byte> read_whole_file(const std::filesystem::path& path, uint64_t max_bytes,
+                                       MemoryReservation* memory = nullptr);
 
 } // namespace packtrace

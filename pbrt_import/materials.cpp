@@ -188,7 +188,7 @@ uint32_t MaterialLibrary::define(const Directive& directive, const TextureContex
     kind = "matte";
   }
   const uint32_t number = add(kind, named ? directive.names[0] : kind.empty() ? "none" : kind, parameters);
-  definitions_[number].parameters = directive.parameters;
+  definitions_[number].parameters = std::make_shared<const ParameterList>(directive.parameters);
   report_unused(directive.parameters, context.reporter);
   return number;
 }
@@ -239,10 +239,12 @@ uint32_t MaterialLibrary::with_shape_parameters(uint32_t base, const ParameterLi
     return !parameter.used && std::find(names.begin(), names.end(), parameter.name) != names.end();
   });
   if (!overrides) return base;
-  const ParameterList base_parameters = definitions_[base].parameters; // definitions_ grows below
+  // A copy: looking parameters up leaves its marks on the list.
+  const std::shared_ptr<const ParameterList> shared = definitions_[base].parameters; // definitions_ grows below
+  const ParameterList base_parameters = shared ? *shared : ParameterList();
   const uint32_t number =
       add(definitions_[base].kind, definitions_[base].recipe.name, TextureParameters(context, shape, &base_parameters));
-  definitions_[number].parameters = base_parameters;
+  definitions_[number].parameters = shared;
   return number;
 }
 
@@ -282,20 +284,23 @@ Vec3 MaterialLibrary::albedo_of(const Definition& definition, Reporter& reporter
   return inside;
 }
 
-uint32_t MaterialLibrary::texture_of(const Definition& definition, Scene& scene, uint64_t texture_bytes,
+uint32_t MaterialLibrary::texture_of(const Definition& definition, Scene& scene, MemoryReservation& memory,
                                      Reporter& reporter) {
   if (!colours_ || (definition.recipe.flags & kAlbedoTexture) == 0) return kNoTexture;
   const auto [it, inserted] = texture_of_node_.try_emplace(definition.recipe.albedo, kNoTexture);
   if (!inserted) return it->second;
-  const uint64_t left = texture_bytes - std::min(texture_bytes, texture_bytes_used_);
-  std::optional<AlbedoTexture> texture = graph_.albedo_texture(definition.recipe.albedo, left);
+  const uint64_t before = memory.bytes();
+  std::optional<AlbedoTexture> texture = graph_.albedo_texture(definition.recipe.albedo, memory);
   if (!texture) return kNoTexture;
   if (texture->rgb.empty()) {
     reporter.note(definition.place, "texture " + in_quotes(texture->name) +
-                                        ": all textures together exceed the memory budget; its average is used");
+                                        ": working out all textures takes too long; its average is used");
     return kNoTexture;
   }
-  return it->second = add_texture(scene.textures, std::move(*texture));
+  const size_t count = scene.textures.size();
+  it->second = add_texture(scene.textures, std::move(*texture));
+  if (scene.textures.size() == count) memory.resize(before, ""); // there was an equal one
+  return it->second;
 }
 
 uint32_t MaterialLibrary::add_texture(std::vector<AlbedoTexture>& textures, AlbedoTexture texture) {
@@ -319,12 +324,11 @@ uint32_t MaterialLibrary::add_texture(std::vector<AlbedoTexture>& textures, Albe
   }
   const auto number = static_cast<uint32_t>(textures.size());
   textures_by_hash_.emplace(hash, number);
-  texture_bytes_used_ += texture.rgb.size();
   textures.push_back(std::move(texture));
   return number;
 }
 
-std::vector<uint32_t> MaterialLibrary::resolve(Scene& scene, uint64_t texture_bytes, Reporter& reporter) {
+std::vector<uint32_t> MaterialLibrary::resolve(Scene& scene, MemoryReservation& memory, Reporter& reporter) {
   std::vector<Material>& materials = scene.materials;
   std::vector<AlphaMask>& masks = scene.masks;
   std::map<Node, std::pair<TextureGraph::MaskKind, uint32_t>> mask_of_node;
@@ -350,7 +354,7 @@ std::vector<uint32_t> MaterialLibrary::resolve(Scene& scene, uint64_t texture_by
   for (const MaterialUse& use : uses_) {
     const MaterialRecipe& recipe = definitions_[use.recipe].recipe;
     Material material{recipe.name, recipe.flags, albedo_of(definitions_[use.recipe], reporter), kNoMask, kNoMask};
-    material.albedo_texture = texture_of(definitions_[use.recipe], scene, texture_bytes, reporter);
+    material.albedo_texture = texture_of(definitions_[use.recipe], scene, memory, reporter);
     if (use.area_light != kNone) material.flags |= use.area_light == 1 ? kEmissive | kEmitsBothSides : kEmissive;
     if (use.alpha != kNone) {
       const auto [kind, mask] = mask_of(use.alpha);

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <tuple>
 #include <unordered_map>
@@ -54,27 +55,27 @@ public:
 
   /// Makes a scene material of each use(), equal ones once, with the masks they need, and the textures if their images
   /// were required with colours. Call once images are read.
-  /// @param texture_bytes for all textures together; what exceeds it is left as an average, with a note
+  /// @param memory grows by the textures
+  /// Throws MemoryError.
   /// @return for each use its index in scene.materials
-  std::vector<uint32_t> resolve(Scene& scene, uint64_t texture_bytes, Reporter& reporter);
+  std::vector<uint32_t> resolve(Scene& scene, MemoryReservation& memory, Reporter& reporter);
 
 private:
   struct Definition {
     std::string kind;
-    ParameterList parameters;
+    std::shared_ptr<const ParameterList> parameters; ///< also of those that shapes make of it; null: none
     MaterialRecipe recipe;
     Place place; ///< of the directive that made it: a material's, or a shape's that overrides parameters
   };
   uint32_t add(std::string kind, std::string name, const TextureParameters& parameters);
   Vec3 albedo_of(const Definition& definition, Reporter& reporter);
-  uint32_t texture_of(const Definition& definition, Scene& scene, uint64_t texture_bytes, Reporter& reporter);
+  uint32_t texture_of(const Definition& definition, Scene& scene, MemoryReservation& memory, Reporter& reporter);
   uint32_t add_texture(std::vector<AlbedoTexture>& textures, AlbedoTexture texture);
 
   TextureGraph& graph_;
   bool colours_ = false;
   std::map<TextureGraph::Node, uint32_t> texture_of_node_; ///< kNoTexture: none
   std::unordered_multimap<size_t, uint32_t> textures_by_hash_;
-  uint64_t texture_bytes_used_ = 0;
   std::vector<Definition> definitions_;
   std::vector<uint32_t> plain_uses_;            ///< by recipe, without alpha and light; kNone: not used yet
   std::map<MaterialUse, uint32_t> use_numbers_; ///< of the others

@@ -3,17 +3,19 @@
 #include <tbb/task_arena.h>
 
 #include "pbrt_import/problem_text.h"
+#include "pbrt_import/scene/memory_budget.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
 
 namespace packtrace {
 
-MadeMesh run_job(MeshJob& job, double tessellation_tolerance, const CheckCancelledFn& check_cancelled) {
+MadeMesh run_job(MeshJob& job, double tessellation_tolerance, const CheckCancelledFn& check_cancelled,
+                 MemoryReservation* memory) try {
   MadeMesh made;
   const ReportFn report = [&](Severity severity, uint32_t, std::string message) {
     made.reports.emplace_back(severity, std::move(message));
   };
   made.problem = problem_of([&] {
-    ShapeContext context{tessellation_tolerance, report, check_cancelled, 0};
+    ShapeContext context{tessellation_tolerance, report, check_cancelled, 0, memory};
     if (job.make) {
       made.mesh = job.make(context);
     } else {
@@ -23,6 +25,11 @@ MadeMesh run_job(MeshJob& job, double tessellation_tolerance, const CheckCancell
     made.dropped_triangles = context.dropped_triangles;
     if (made.mesh.triangles.empty()) throw Error(ErrorKind::kInput, "no triangle is left");
   });
+  if (memory) memory->resize(bytes_of(made.mesh), "the shape");
+  return made;
+} catch (const MemoryError& error) {
+  MadeMesh made;
+  made.memory_problem = error.what();
   return made;
 }
 
@@ -41,7 +48,7 @@ void MeshQueue::add(Entry entry) {
   Entry& queued = entries_.back();
   pending_bytes_ += queued.job.bytes_at_most;
   const auto work = [this, &queued] {
-    queued.made = run_job(queued.job, tolerance_, check_cancelled_);
+    queued.made = run_job(queued.job, tolerance_, check_cancelled_, &queued.memory);
     queued.job.make = nullptr;
   };
   if (tbb::this_task_arena::max_concurrency() == 1) return work();

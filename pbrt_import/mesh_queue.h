@@ -22,11 +22,14 @@ struct MadeMesh {
   std::string problem; ///< empty: mesh has triangles
   std::vector<std::pair<Severity, std::string>> reports;
   uint64_t dropped_triangles = 0;
+  std::string memory_problem; ///< not empty: it needs more memory than there may be
 };
 
 /// Throws what check_cancelled throws.
 /// @param job its mesh is taken out
-MadeMesh run_job(MeshJob& job, double tessellation_tolerance, const CheckCancelledFn& check_cancelled);
+/// @param memory becomes that of the mesh; null: nobody counts
+MadeMesh run_job(MeshJob& job, double tessellation_tolerance, const CheckCancelledFn& check_cancelled,
+                 MemoryReservation* memory = nullptr);
 
 /// Makes meshes on all threads while the scene's text is still being read.
 class MeshQueue {
@@ -38,6 +41,7 @@ public:
     Place place;
     uint64_t sequence = 0; ///< Reporter's
     uint32_t slot = 0;     ///< in Scene::meshes
+    MemoryReservation memory; ///< for the mesh
     MadeMesh made;
   };
 

@@ -31,6 +31,8 @@ std::string describe(const Token& token) {
     return "a string without its closing quote";
   case TokenKind::kBadByte:
     return "a stray byte";
+  case TokenKind::kTooLong:
+    return "a word or string of more than " + memory_text(kMaxTokenBytes);
   case TokenKind::kEnd:
     return "the end of the file";
   }
@@ -154,6 +156,9 @@ bool Parser::next(Directive& directive) {
     directive.name_count = 0;
     directive.damaged = false;
     directive.parameters.clear();
+    directive.memory = MemoryReservation(memory_);
+    directive_ = &directive;
+    value_bytes_ = 0;
     source_.consume();
     if (!read_arguments(*info, directive)) {
       skip_to_directive(directive.place.line);
@@ -257,6 +262,7 @@ bool Parser::take_number(Values& values) {
   if (number.used < token.text.size())
     reporter_.warning(source_.place(),
                       "number " + describe(token) + " has other characters after it; they are ignored");
+  count_value(sizeof(T));
   if constexpr (std::is_same_v<T, int32_t>) {
     if (!(number.value >= std::numeric_limits<int32_t>::min() && number.value <= std::numeric_limits<int32_t>::max()))
       reporter_.warning(source_.place(), "integer " + describe(token) + " does not fit in 32 bits");
@@ -275,14 +281,25 @@ bool Parser::take_number(Values& values) {
 
 template <class Values>
 void Parser::read_number_run(Values& values) {
-  do source_.read_numbers<typename Values::value_type>([&](auto numbers) { append(values, numbers); });
+  const auto take = [&](auto numbers) {
+    count_value(numbers.size() * sizeof(typename Values::value_type));
+    append(values, numbers);
+  };
+  do source_.read_numbers<typename Values::value_type>(take);
   while (take_number(values));
+}
+
+void Parser::reserve_values() {
+  constexpr uint64_t kStep = 1u << 20; // asking for each number would take longer than reading it
+  directive_->memory.cover(value_bytes_ + kStep, "what the directive's parameters hold");
 }
 
 /// Everything up to the next directive. What is malformed costs the parameter that it belongs to, and no other.
 void Parser::read_parameters(ParameterList& list) {
+  constexpr uint64_t kParameterBytes = 2 * sizeof(Parameter); // lists double as they grow
   while (true) {
     if (misread_) {
+      count_value(kParameterBytes + misread_->text.size());
       Parameter& parameter = list.append();
       parameter.place = misread_->place;
       const bool declared = read_declaration(std::exchange(misread_, std::nullopt)->text, parameter);
@@ -292,6 +309,7 @@ void Parser::read_parameters(ParameterList& list) {
     const Token& token = source_.peek();
     if (token.kind == TokenKind::kEnd || is_directive(token)) return;
     if (token.kind == TokenKind::kString) {
+      count_value(kParameterBytes + token.text.size());
       Parameter& parameter = list.append();
       parameter.place = source_.place();
       const bool declared = read_declaration(token.text, parameter);
@@ -461,6 +479,7 @@ bool Parser::take_string(Parameter& parameter) {
   const Token& token = source_.peek();
   if (token.kind != TokenKind::kString) return false;
   if (is_numeric(parameter.type) && (parameter.type != ParameterType::kSpectrum || declares(token.text))) return false;
+  count_value(2 * sizeof(std::string) + token.text.size());
   parameter.strings.emplace_back(token.text);
   source_.consume();
   return true;

@@ -10,6 +10,7 @@
 #include "pbrt_import/directive_info.h"
 #include "pbrt_import/file_names.h"
 #include "pbrt_import/parameters.h"
+#include "pbrt_import/scene/memory_budget.h"
 #include "pbrt_import/source_stack.h"
 
 namespace packtrace {
@@ -24,6 +25,7 @@ struct Directive {
   std::array<std::string, 3> names; ///< escapes replaced
   uint32_t name_count = 0;
   ParameterList parameters;
+  MemoryReservation memory; ///< of the parameters, where they are many
   bool damaged = false; ///< its numbers or names could not be read, which was reported: nothing but its kind counts
 };
 
@@ -31,10 +33,11 @@ struct Directive {
 /// possible: a parameter, or a directive that cannot do without its names or numbers.
 class Parser {
 public:
-  Parser(SourceStack& source, FileNames& file_names, Reporter& reporter)
-      : source_(source), file_names_(file_names), reporter_(reporter) {}
+  /// @param memory for the parameters of directives
+  Parser(SourceStack& source, FileNames& file_names, Reporter& reporter, const MemoryBudget& memory = MemoryBudget())
+      : source_(source), file_names_(file_names), reporter_(reporter), memory_(memory) {}
 
-  /// False at the end of the main file. directive is reused: spans into its parameters end here.
+  /// False at the end of the main file. directive is reused: spans into its parameters end here. Throws MemoryError.
   bool next(Directive& directive);
 
 private:
@@ -65,6 +68,13 @@ private:
   void skip_array_rest();
   void skip_to_directive(uint32_t line);
   void report_unexpected(const std::string& expected, const std::string& consequence);
+  /// Call before a value of the directive is kept.
+  void count_value(uint64_t bytes) {
+    constexpr uint64_t kFree = 1u << 20; // most directives need no more
+    value_bytes_ += bytes;
+    if (value_bytes_ > kFree && value_bytes_ > directive_->memory.bytes()) reserve_values();
+  }
+  void reserve_values();
 
   SourceStack& source_;
   FileNames& file_names_;
@@ -72,6 +82,9 @@ private:
   std::vector<double> numbers_;        ///< scratch
   std::string include_name_;           ///< escapes untouched
   std::optional<Declaration> misread_; ///< taken for the value of the parameter before it
+  MemoryBudget memory_;
+  Directive* directive_ = nullptr; ///< the one being read
+  uint64_t value_bytes_ = 0;       ///< of its parameters
 };
 
 } // namespace packtrace

@@ -24,6 +24,30 @@ bool is_read(const PlyElement& element) {
 constexpr uint32_t kBadIndex = ~0u;                  // out of range for every mesh: dropped and counted with the others
 constexpr uint64_t kMaxVertices = uint64_t{1} << 31; // so that negative indices are out of range once unsigned
 
+/// Accounts for what the mesh takes, ahead of taking it.
+class MeshMemory {
+public:
+  explicit MeshMemory(MemoryReservation* memory) : memory_(memory) {}
+
+  void add(uint64_t bytes) {
+    bytes_ += bytes;
+    if (memory_) memory_->cover(bytes_, "its mesh");
+  }
+  /// Makes room for more triangles.
+  void reserve(std::vector<Triangle>& triangles, uint64_t more) {
+    const uint64_t old = triangles.capacity(), needed = triangles.size() + more;
+    if (needed <= old) return;
+    const uint64_t larger = std::max(needed, old + old / 2);
+    add(larger * sizeof(Triangle)); // beside the old ones, while they move
+    triangles.reserve(static_cast<size_t>(larger));
+    bytes_ -= old * sizeof(Triangle);
+  }
+
+private:
+  MemoryReservation* memory_;
+  uint64_t bytes_ = 0;
+};
+
 /// Throws if the file is too short for the rows an element claims, so that allocating them is safe.
 template <class Source>
 void check_row_count(Source& source, const PlyElement& element) {
@@ -82,7 +106,7 @@ bool find_attribute(const PlyElement& element, const std::array<std::string_view
 }
 
 /// Allocates the attributes that the file has; the caller has checked the count.
-std::vector<Attribute> allocate_attributes(const PlyElement& element, Mesh& mesh) {
+std::vector<Attribute> allocate_attributes(const PlyElement& element, Mesh& mesh, MeshMemory& memory) {
   using Names3 = std::array<std::string_view, 3>;
   using Names2 = std::array<std::string_view, 2>;
   const auto count = static_cast<size_t>(element.count);
@@ -90,16 +114,19 @@ std::vector<Attribute> allocate_attributes(const PlyElement& element, Mesh& mesh
   Attribute attribute;
   if (!find_attribute(element, Names3{"x", "y", "z"}, attribute))
     throw Error(ErrorKind::kInput, "the vertices have no x, y and z");
+  memory.add(element.count * (sizeof(Vec3) + 1)); // 1: drop_bad_triangles()
   mesh.positions.resize(count);
   attribute.destination = &mesh.positions[0].x;
   attributes.push_back(attribute);
   if (find_attribute(element, Names3{"nx", "ny", "nz"}, attribute)) {
+    memory.add(element.count * sizeof(Vec3));
     mesh.normals.resize(count);
     attribute.destination = &mesh.normals[0].x;
     attributes.push_back(attribute);
   }
   for (const Names2& names : {Names2{"u", "v"}, {"s", "t"}, {"texture_u", "texture_v"}, {"texture_s", "texture_t"}}) {
     if (!find_attribute(element, names, attribute)) continue;
+    memory.add(element.count * sizeof(Vec2));
     mesh.uvs.resize(count);
     attribute.destination = &mesh.uvs[0].x;
     attributes.push_back(attribute);
@@ -173,9 +200,9 @@ void read_vertex_table(BinarySource<kSwap>& source, const PlyElement& element,
 }
 
 template <class Source>
-void read_vertices(Source& source, const PlyElement& element, Mesh& mesh) {
+void read_vertices(Source& source, const PlyElement& element, Mesh& mesh, MeshMemory& memory) {
   check_row_count(source, element);
-  const std::vector<Attribute> attributes = allocate_attributes(element, mesh);
+  const std::vector<Attribute> attributes = allocate_attributes(element, mesh, memory);
   if constexpr (Source::kBinary) {
     if (!element.has_lists()) return read_vertex_table(source, element, attributes);
   }
@@ -190,12 +217,13 @@ uint32_t to_index(double value) {
 
 /// Reads one face's list of indices and appends its fan. Returns false if it has fewer than three corners.
 template <class Source>
-bool read_polygon(Source& source, const PlyProperty& property, std::vector<Triangle>& triangles) {
+bool read_polygon(Source& source, const PlyProperty& property, std::vector<Triangle>& triangles, MeshMemory& memory) {
   const uint64_t length = read_list_length(source, property);
   if (length < 3) {
     source.skip(property.type, length);
     return false;
   }
+  memory.reserve(triangles, length - 2);
   const uint32_t first = to_index(source.number(property.type));
   uint32_t previous = to_index(source.number(property.type));
   for (uint64_t i = 2; i < length; ++i) {
@@ -209,9 +237,11 @@ bool read_polygon(Source& source, const PlyProperty& property, std::vector<Trian
 /// The common layout: faces that are nothing but a list with a one-byte length and four-byte indices. Reads triangles
 /// up to the first other polygon and returns how many.
 template <bool kSwap>
-uint64_t read_triangle_run(BinarySource<kSwap>& source, uint64_t max_count, std::vector<Triangle>& triangles) {
-  constexpr uint64_t kRowBytes = 13;
-  const uint64_t limit = std::min(max_count, source.remaining() / kRowBytes);
+uint64_t read_triangle_run(BinarySource<kSwap>& source, uint64_t max_count, std::vector<Triangle>& triangles,
+                           MeshMemory& memory) {
+  constexpr uint64_t kRowBytes = 13, kMostAtOnce = 1u << 16;
+  const uint64_t limit = std::min({max_count, source.remaining() / kRowBytes, kMostAtOnce});
+  memory.reserve(triangles, limit);
   const std::byte* const table = source.take(0);
   uint64_t count = 0;
   for (const std::byte* row = table; count < limit && row[0] == std::byte{3}; ++count, row += kRowBytes)
@@ -235,9 +265,11 @@ size_t index_list_of(const PlyElement& element) {
 /// turned round. A repeated index only leads on to another place. Returns how many strips have fewer than three
 /// corners.
 template <class Source>
-uint64_t read_strip_list(Source& source, const PlyProperty& property, std::vector<Triangle>& triangles) {
+uint64_t read_strip_list(Source& source, const PlyProperty& property, std::vector<Triangle>& triangles,
+                         MeshMemory& memory) {
   const double restart = property.type == PlyType::kUint32 ? 4294967295.0 : -1.0;
   const uint64_t length = read_list_length(source, property);
+  memory.reserve(triangles, length);
   uint64_t too_short = 0, corners = 0; // of the current strip
   uint32_t a = 0, b = 0;
   const auto end_strip = [&] { too_short += corners > 0 && corners < 3, corners = 0; };
@@ -257,14 +289,14 @@ uint64_t read_strip_list(Source& source, const PlyProperty& property, std::vecto
 }
 
 template <class Source>
-void read_strips(Source& source, const PlyElement& element, Mesh& mesh, const ReportFn& report) {
+void read_strips(Source& source, const PlyElement& element, Mesh& mesh, const ReportFn& report, MeshMemory& memory) {
   check_row_count(source, element);
   const size_t indices = index_list_of(element);
   uint64_t too_short = 0;
   for (uint64_t& row = source.at.row; row < element.count; ++row)
     for (size_t i = 0; i < element.properties.size(); ++i)
       if (i == indices)
-        too_short += read_strip_list(source, element.properties[i], mesh.triangles);
+        too_short += read_strip_list(source, element.properties[i], mesh.triangles, memory);
       else
         skip_property(source, element.properties[i]);
   if (too_short != 0 && report)
@@ -272,26 +304,27 @@ void read_strips(Source& source, const PlyElement& element, Mesh& mesh, const Re
 }
 
 template <class Source>
-void read_faces(Source& source, const PlyElement& element, Mesh& mesh, const ReportFn& report) {
+void read_faces(Source& source, const PlyElement& element, Mesh& mesh, const ReportFn& report, MeshMemory& memory) {
   check_row_count(source, element);
   const size_t index_list = index_list_of(element);
   const PlyProperty& indices = element.properties[index_list];
   const uint64_t triangle_size =
       source.min_row_size(element) + 3 * source.min_item_size(indices.type); // the estimate must not trust the count
-  mesh.triangles.reserve(mesh.triangles.size() +
-                         static_cast<size_t>(std::min(element.count, source.remaining() / triangle_size)));
+  memory.reserve(mesh.triangles, std::min(element.count, source.remaining() / triangle_size));
   const bool is_simple = element.properties.size() == 1 && byte_size(*indices.length_type) == 1 &&
                          (indices.type == PlyType::kInt32 || indices.type == PlyType::kUint32);
   uint64_t too_short = 0;
   for (uint64_t& row = source.at.row; row < element.count;) {
     if constexpr (Source::kBinary) {
-      if (is_simple) row += read_triangle_run(source, element.count - row, mesh.triangles);
+      const uint64_t run = is_simple ? read_triangle_run(source, element.count - row, mesh.triangles, memory) : 0;
+      row += run;
       if (row == element.count) break;
+      if (run > 0) continue;
     }
     for (size_t i = 0; i < element.properties.size(); ++i) {
       if (i != index_list)
         skip_property(source, element.properties[i]);
-      else if (!read_polygon(source, indices, mesh.triangles))
+      else if (!read_polygon(source, indices, mesh.triangles, memory))
         ++too_short;
     }
     ++row;
@@ -301,7 +334,7 @@ void read_faces(Source& source, const PlyElement& element, Mesh& mesh, const Rep
 }
 
 template <class Source>
-PlyMesh read_body(Source source, const PlyHeader& header, const ReportFn& report) {
+PlyMesh read_body(Source source, const PlyHeader& header, const ReportFn& report, MeshMemory memory) {
   PlyMesh result;
   size_t wanted = 0;
   for (const PlyElement& element : header.elements) wanted += is_read(element);
@@ -311,11 +344,11 @@ PlyMesh read_body(Source source, const PlyHeader& header, const ReportFn& report
     if (!is_read(element))
       skip_element(source, element);
     else if (element.name == kVertices)
-      read_vertices(source, element, result.mesh);
+      read_vertices(source, element, result.mesh, memory);
     else if (element.name == kFaces)
-      read_faces(source, element, result.mesh, report);
+      read_faces(source, element, result.mesh, report, memory);
     else
-      read_strips(source, element, result.mesh, report);
+      read_strips(source, element, result.mesh, report, memory);
   }
   result.dropped_triangles = drop_bad_triangles(result.mesh, report);
   return result;
@@ -340,18 +373,18 @@ void check_elements(const PlyHeader& header) {
 
 } // namespace
 
-PlyMesh read_ply(std::span<const std::byte> bytes, const ReportFn& report) {
+PlyMesh read_ply(std::span<const std::byte> bytes, const ReportFn& report, MemoryReservation* memory) {
   const PlyHeader header = parse_ply_header(bytes);
   check_elements(header);
   switch (header.format) {
   case PlyFormat::kAscii:
-    return read_body(AsciiSource(bytes, header.body_offset), header, report);
+    return read_body(AsciiSource(bytes, header.body_offset), header, report, MeshMemory(memory));
   case PlyFormat::kBigEndian:
-    return read_body(BinarySource<true>(bytes.subspan(header.body_offset)), header, report);
+    return read_body(BinarySource<true>(bytes.subspan(header.body_offset)), header, report, MeshMemory(memory));
   case PlyFormat::kLittleEndian:
     break;
   }
-  return read_body(BinarySource<false>(bytes.subspan(header.body_offset)), header, report);
+  return read_body(BinarySource<false>(bytes.subspan(header.body_offset)), header, report, MeshMemory(memory));
 }
 
 } // namespace packtrace

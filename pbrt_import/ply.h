@@ -20,8 +20,9 @@ struct PlyMesh {
 /// vertex_index, which become fans (0,1,2), (0,2,3), ... . Unlike pbrt-v3 it reads triangle strips too, the lists of an
 /// element "tristrips" with -1 between two strips. Everything else is skipped. No reference to bytes is kept.
 /// @param bytes the whole file; memory used is bounded by a small multiple of its size
-/// Throws Error(kInput), message without a file name, if the file is malformed, truncated or without vertices or faces.
+/// @param memory grows by what this takes, before it is taken; null: nobody counts
+/// Throws MemoryError, Error(kInput), message without a file name, if the file is malformed, truncated or without vertices or faces.
 /// Source: Greg Turk, The PLY Polygon File Format, 1994.
-PlyMesh read_ply(std::span<const std::byte> bytes, const ReportFn& report);
+PlyMesh read_ply(std::span<const std::byte> bytes, const ReportFn& report, MemoryReservation* memory = nullptr);
 
 } // namespace packtrace

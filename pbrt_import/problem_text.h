@@ -4,24 +4,39 @@
 #include <stdexcept>
 #include <string>
 
+#include "pbrt_import/reporter.h"
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/memory_budget.h"
 
 namespace packtrace {
 
 /// Runs work on one file or shape; what goes wrong with it becomes the text of its problem, empty if nothing does.
-/// Throws Error(kCancelled) on.
+/// Throws Error(kCancelled) on, and MemoryError, which lack of memory becomes.
 template <class Work>
 std::string problem_of(Work work) {
   try {
     work();
     return {};
+  } catch (const MemoryError&) {
+    throw;
   } catch (const Error& error) {
     if (error.kind() == ErrorKind::kCancelled) throw;
     return error.what();
   } catch (const std::bad_alloc&) {
-    return "not enough memory";
+    throw MemoryError(kNoMemory);
   } catch (const std::length_error&) {
-    return "not enough memory";
+    throw MemoryError(kNoMemory);
+  }
+}
+
+/// Runs work; where it throws MemoryError, says where in the text that was.
+/// @param place of what work is about
+template <class Place, class Work>
+auto with_place(const Reporter& reporter, Place place, Work work) {
+  try {
+    return work();
+  } catch (const MemoryError& error) {
+    throw MemoryError(reporter.locate(place()), error.what());
   }
 }
 

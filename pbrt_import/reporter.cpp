@@ -7,14 +7,25 @@
 
 namespace packtrace {
 
-uint32_t SourceFiles::add(std::string path, SourceLocation included_from) {
-  files_.push_back(std::make_shared<SourceFile>(SourceFile{std::move(path), std::move(included_from)}));
+uint32_t SourceFiles::add(const std::string& path, std::optional<Place> included_from) {
+  const auto [number, inserted] = path_numbers_.try_emplace(path, static_cast<uint32_t>(paths_.size()));
+  if (inserted) paths_.push_back(path);
+  files_.push_back({number->second, included_from.value_or(Place{kMainFile, 0, 0})});
   return static_cast<uint32_t>(files_.size() - 1);
+}
+
+std::shared_ptr<const SourceFile> SourceFiles::source_file(uint32_t file) const {
+  if (const auto found = located_.find(file); found != located_.end()) return found->second;
+  const File& f = files_[file];
+  // As deep as files may include each other.
+  auto made = std::make_shared<const SourceFile>(SourceFile{paths_[f.path], locate(f.included_from)});
+  located_.emplace(file, made);
+  return made;
 }
 
 SourceLocation SourceFiles::locate(const Place& place) const {
   if (place.file >= files_.size()) return {};
-  return {files_[place.file], place.line, place.column};
+  return {source_file(place.file), place.line, place.column};
 }
 
 void Reporter::report(Severity severity, const Place& place, std::string message) {

@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
+#include <unordered_map>
 #include <unordered_set>
 #include <vector>
 
@@ -15,12 +17,23 @@ namespace packtrace {
 class SourceFiles {
 public:
   /// Adds a file; its number is what Place::file holds.
-  uint32_t add(std::string path, SourceLocation included_from);
+  /// @param included_from nothing for the main file
+  uint32_t add(const std::string& path, std::optional<Place> included_from);
   SourceLocation locate(const Place& place) const;
   size_t size() const { return files_.size(); }
 
 private:
-  std::vector<std::shared_ptr<const SourceFile>> files_;
+  struct File {
+    uint32_t path = 0; ///< into paths_
+    Place included_from;
+  };
+  std::shared_ptr<const SourceFile> source_file(uint32_t file) const;
+
+  static constexpr uint32_t kMainFile = ~0u; ///< File::included_from.file of one that nothing includes
+  std::vector<File> files_; ///< there may be many, of few names
+  std::vector<std::string> paths_;
+  std::unordered_map<std::string, uint32_t> path_numbers_;
+  mutable std::unordered_map<uint32_t, std::shared_ptr<const SourceFile>> located_; ///< those that something is said of
 };
 
 /// Reports problems in the order of the source text, to one thread's Diagnostics. A file that holds nothing but

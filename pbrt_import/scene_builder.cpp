@@ -34,6 +34,7 @@ constexpr auto kSections = [] {
 SceneBuilder::SceneBuilder(const ImportOptions& options, FileNames& file_names, Reporter& reporter, Progress& progress)
     : options_(options), file_names_(file_names), reporter_(reporter), loader_(options, reporter),
       check_cancelled_([&progress] { progress.check_cancelled(); }),
+      mesh_memory_(options.memory), kept_memory_(options.memory),
       mesh_queue_(options.tessellation_tolerance, check_cancelled_) {}
 
 bool SceneBuilder::allowed_here(const Directive& directive) {
@@ -58,6 +59,7 @@ void SceneBuilder::handle(Directive& directive) {
   if (phase_ == Phase::kOptions && statistics_.worlds > 0 && !options_behind_world_)
     options_behind_world_ = directive.place;
   if (!reading()) return;
+  count_kept(directive);
   if (directive.damaged)
     skip_damaged(directive);
   else
@@ -94,6 +96,39 @@ void SceneBuilder::mention_files(const Directive& directive) {
   for (const std::string_view name : {"mapname", "lensfile", "bsdffile", "filename"})
     if (const Parameter* const file = directive.parameters.peek(name, ParameterType::kString))
       for (const std::string& raw : file->strings) file_names_.mention(raw);
+}
+
+/// Accounts for what stays of a directive besides large meshes. About: there are small things in many tables.
+void SceneBuilder::count_kept(const Directive& directive) {
+  uint64_t bytes = 0;
+  switch (directive.kind) {
+  case K::kShape:
+  case K::kTexture:
+    bytes = 512;
+    break;
+  case K::kMaterial:
+  case K::kMakeNamedMaterial: // keep their parameters
+    bytes = 512 + directive.memory.bytes();
+    for (const Parameter& parameter : directive.parameters.all())
+      bytes += sizeof parameter + parameter.floats.size() * sizeof(float);
+    break;
+  case K::kAttributeBegin:
+  case K::kTransformBegin:
+  case K::kObjectBegin:
+  case K::kObjectInstance:
+  case K::kCoordinateSystem:
+  case K::kCamera:
+  case K::kMakeNamedMedium:
+  case K::kMediumInterface:
+    bytes = 384;
+    break;
+  default:
+    return;
+  }
+  for (uint32_t i = 0; i < directive.name_count; ++i) bytes += directive.names[i].size();
+  kept_bytes_ += bytes;
+  constexpr uint64_t kStep = 1u << 20;
+  if (kept_bytes_ > kept_memory_.bytes() + kStep) kept_memory_.resize(kept_bytes_, "what the scene's text describes");
 }
 
 void SceneBuilder::carry_out(Directive& directive) {

@@ -78,6 +78,7 @@ private:
   bool make_ply_mesh(const Directive& directive, Shape& shape);
   bool make_inline_mesh(Directive& directive, Shape& shape);
   bool make_or_queue(MeshQueue::Entry&& entry);
+  void count_kept(const Directive& directive);
   bool skip_shape(std::string_view kind, const Place& place, const std::string& problem);
   bool report_mesh(MeshQueue::Entry& entry);
   void take_queued_meshes();
@@ -117,7 +118,9 @@ private:
   NameTable same_meshes_;                 ///< MeshJob::same_as
   std::vector<uint32_t> same_mesh_slots_; ///< in Scene::meshes, by number in same_meshes_
   std::string mesh_name_;                 ///< scratch
-  uint64_t mesh_bytes_ = 0;               ///< of all meshes made from text, queued ones at most
+  MemoryReservation mesh_memory_; ///< of meshes made from text and worth asking for one by one
+  MemoryReservation kept_memory_; ///< of all else that stays of directives, much of little things
+  uint64_t kept_bytes_ = 0;
   LargeHeapPages heap_pages_;
   MeshQueue mesh_queue_; ///< last: its tasks end before anything else does
 };

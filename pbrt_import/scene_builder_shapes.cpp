@@ -104,6 +104,7 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
   entry.sequence = reporter_.sequence();
   entry.slot = static_cast<uint32_t>(scene_.meshes.size());
   const std::string problem = problem_of([&] { entry.job = kind->read(directive.parameters, report); });
+  directive.memory.release(); // what was large moved into the job
   if (!problem.empty()) return skip_shape(name, directive.place, problem);
   if (entry.job.scale != 1.0) {
     shape.parent_from_mesh = compose(shape.parent_from_mesh, scaling(DVec3(entry.job.scale)));
@@ -130,22 +131,22 @@ bool SceneBuilder::make_or_queue(MeshQueue::Entry&& entry) {
   constexpr uint64_t kWorthATask = 32 * 1024;
   constexpr uint64_t kLeast = 128; // its name, and what blocks are rounded up to
   heap_pages_.about_to_allocate(entry.job.bytes_at_most + kLeast);
-  const uint64_t bytes_left = options_.memory_budget_bytes - mesh_bytes_;
-  if (entry.job.bytes_at_most >= kWorthATask && entry.job.bytes_at_most <= bytes_left) {
-    mesh_bytes_ += entry.job.bytes_at_most;
+  const bool small = entry.job.bytes_at_most > 0 && entry.job.bytes_at_most < kWorthATask;
+  if (!small) {
+    entry.memory = MemoryReservation(options_.memory);
+    entry.memory.resize(std::max(entry.job.bytes_at_most, entry.job.bytes_at_least), "the shape");
+  }
+  if (entry.job.bytes_at_most >= kWorthATask) {
     reserve_one_more(scene_.meshes);
     scene_.meshes.emplace_back();
     mesh_queue_.add(std::move(entry));
     return true;
   }
-  if (entry.job.bytes_at_least <= bytes_left)
-    entry.made = run_job(entry.job, options_.tessellation_tolerance, check_cancelled_);
-  const uint64_t bytes = std::max(bytes_of(entry.made.mesh), entry.job.bytes_at_least);
-  if (entry.made.problem.empty() && bytes > bytes_left)
-    entry.made.problem =
-        "all meshes together exceed the memory budget of " + std::to_string(options_.memory_budget_bytes) + " bytes";
+  entry.made = run_job(entry.job, options_.tessellation_tolerance, check_cancelled_, small ? nullptr : &entry.memory);
+  if (!entry.made.memory_problem.empty()) throw MemoryError(entry.made.memory_problem);
   if (!report_mesh(entry)) return false;
-  mesh_bytes_ += bytes_of(entry.made.mesh);
+  if (small) kept_bytes_ += bytes_of(entry.made.mesh);
+  mesh_memory_.merge(std::move(entry.memory));
   reserve_one_more(scene_.meshes);
   scene_.meshes.push_back(std::move(entry.made.mesh));
   return true;
@@ -169,6 +170,9 @@ bool SceneBuilder::report_mesh(MeshQueue::Entry& entry) {
 /// Waits for the meshes that were made meanwhile. One that could not be made stays empty.
 void SceneBuilder::take_queued_meshes() {
   mesh_queue_.finish([&](MeshQueue::Entry& entry) {
+    if (!entry.made.memory_problem.empty())
+      throw MemoryError(reporter_.locate(entry.place), entry.made.memory_problem);
+    mesh_memory_.merge(std::move(entry.memory));
     reporter_.set_sequence(entry.sequence);
     if (report_mesh(entry))
       scene_.meshes[entry.slot] = std::move(entry.made.mesh);
@@ -237,7 +241,9 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
   reporter_.set_sequence(last_sequence);
   for (const ImageRequest& image : graph_.images())
     ++(image.missing ? statistics_.textures_missing : statistics_.textures_found);
-  const std::vector<uint32_t> material_numbers = materials_.resolve(scene_, options_.memory_budget_bytes, reporter_);
+  MemoryReservation texture_memory(options_.memory);
+  const std::vector<uint32_t> material_numbers = with_place(
+      reporter_, [&] { return end; }, [&] { return materials_.resolve(scene_, texture_memory, reporter_); });
   drop_unusable_shapes(material_numbers, scene_.shapes);
   for (Object& object : scene_.objects) drop_unusable_shapes(material_numbers, object.shapes);
   if (const uint64_t absent = statistics_.shapes_absent; absent > 0)
@@ -252,7 +258,11 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
                    std::to_string(scene_.cameras.size()) + " cameras: the last one comes first, as pbrt uses that");
   statistics_.triangles = unique_triangle_count(scene_);
   count_features();
-  return {std::move(scene_), std::move(statistics_), file_names_.take_named()};
+  MemoryReservation memory = std::move(mesh_memory_);
+  memory.merge(std::move(kept_memory_));
+  memory.merge(loader_.take_memory());
+  memory.merge(std::move(texture_memory));
+  return {std::move(scene_), std::move(statistics_), file_names_.take_named(), std::move(memory)};
 }
 
 } // namespace packtrace

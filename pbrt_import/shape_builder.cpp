@@ -92,10 +92,10 @@ MeshJob read_triangle_mesh(ParameterList& parameters, const ReportFn& report) {
 
 /// A job for a quadric, which is small enough a description to find equal ones by.
 template <class Quadric>
-MeshJob quadric_job(std::string_view kind, const Quadric& quadric, Mesh (*tessellate)(const Quadric&, double)) {
+MeshJob quadric_job(std::string_view kind, const Quadric& quadric, Mesh (*tessellate)(const Quadric&, double, MemoryReservation*)) {
   static_assert(std::is_trivially_copyable_v<Quadric> && sizeof(Quadric) % sizeof(float) == 0);
   MeshJob job;
-  job.make = [=](ShapeContext& context) { return tessellate(quadric, context.tessellation_tolerance); };
+  job.make = [=](ShapeContext& context) { return tessellate(quadric, context.tessellation_tolerance, context.memory); };
   job.same_as = kind;
   job.same_as.append(reinterpret_cast<const char*>(&quadric), sizeof quadric);
   return job;
@@ -176,7 +176,7 @@ MeshJob read_loop_subdivision(ParameterList& parameters, const ReportFn& report)
   }
   job.make = [levels, triangles = std::move(triangles), points = std::move(points)](ShapeContext& context) {
     return subdivide_loop(points, triangles, levels, context.report, &context.dropped_triangles,
-                          context.check_cancelled);
+                          context.check_cancelled, context.memory);
   };
   return job;
 }
@@ -201,10 +201,10 @@ MeshJob read_curve(ParameterList& parameters, const ReportFn& report) {
     report(Severity::kWarning, 0, "normals are for ribbons only; they are ignored");
   MeshJob job;
   job.make = [curve, points = parameters.take_vectors("P", ParameterType::kPoint3),
-              normals = std::move(normals)](ShapeContext&) mutable {
+              normals = std::move(normals)](ShapeContext& context) mutable {
     curve.points = points;
     curve.normals = normals;
-    return tessellate_curve(curve);
+    return tessellate_curve(curve, context.memory);
   };
   return job;
 }
@@ -236,7 +236,8 @@ MeshJob read_nurbs(ParameterList& parameters, const ReportFn& report) {
     nurbs.u_knots = u_knots;
     nurbs.v_knots = v_knots;
     nurbs.control_points = points;
-    return tessellate_nurbs(nurbs, context.tessellation_tolerance, context.report, context.check_cancelled);
+    return tessellate_nurbs(nurbs, context.tessellation_tolerance, context.report, context.check_cancelled,
+                            context.memory);
   };
   return job;
 }

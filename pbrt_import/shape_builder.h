@@ -17,6 +17,7 @@ struct ShapeContext {
   const ReportFn& report;
   const CheckCancelledFn& check_cancelled;
   uint64_t dropped_triangles = 0; ///< added to
+  MemoryReservation* memory = nullptr; ///< for the mesh and what making it takes; null: nobody counts
 };
 
 /// All that is needed to make the triangles of a shape, in the shape's own space.

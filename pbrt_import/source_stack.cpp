@@ -22,7 +22,7 @@ SourceStack::SourceStack(const std::filesystem::path& main_file, const SourceLim
                          Reporter& reporter)
     : limits_(limits), files_(files), reporter_(reporter) {
   try {
-    const uint32_t number = files_.add(main_file.string(), {});
+    const uint32_t number = files_.add(main_file.string(), std::nullopt);
     files_open_.push_back({Tokenizer(InputFile(main_file, limits_.max_file_bytes)), number, 0});
   } catch (const Error& error) {
     throw FileError(error.kind(), main_file, error.what());
@@ -76,7 +76,7 @@ void SourceStack::include(const std::filesystem::path& path, const Place& place)
       if (open.tokenizer.file().same_file(file)) throw Error(ErrorKind::kInput, "the file includes itself");
     constexpr size_t kIncludeWindow = 64 * 1024;
     Tokenizer tokenizer(std::move(file), kIncludeWindow);
-    files_open_.push_back({std::move(tokenizer), files_.add(path.string(), files_.locate(place)), 0});
+    files_open_.push_back({std::move(tokenizer), files_.add(path.string(), place), 0});
     ++opened_;
   } catch (const Error& error) {
     reporter_.error(place, "cannot include " + name + ": " + error.what());

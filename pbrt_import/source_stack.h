@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pbrt_import/reporter.h"
+#include "pbrt_import/scene/memory_budget.h"
 #include "pbrt_import/tokenizer.h"
 
 namespace packtrace {
@@ -74,6 +75,8 @@ void SourceStack::guarded(Work work) {
   if (gave_up_) return;
   try {
     work(files_open_.back().tokenizer);
+  } catch (const MemoryError&) {
+    throw;
   } catch (const std::runtime_error& error) {
     give_up(error.what());
   }

@@ -312,7 +312,7 @@ Vec3 TextureGraph::colour(Node node, glm::dvec2 uv, std::span<const Vec3> operan
   return data.value;
 }
 
-std::optional<AlbedoTexture> TextureGraph::albedo_texture(Node node, uint64_t most_bytes) {
+std::optional<AlbedoTexture> TextureGraph::albedo_texture(Node node, MemoryReservation& memory) {
   average(node); // those of all nodes up to it
   const std::vector<Node> order = reachable(node);
   const NodeData *layout = nullptr, *board = nullptr; // as in alpha_mask()
@@ -339,7 +339,8 @@ std::optional<AlbedoTexture> TextureGraph::albedo_texture(Node node, uint64_t mo
   constexpr uint64_t kMostEvaluations = uint64_t{1} << 28; // seconds, where nodes and texels multiply to minutes
   if (order.size() > kMostNodes || texels > kMostTextureTexels || texels > kMostEvaluations / order.size())
     return std::nullopt;
-  if (3 * texels > most_bytes || texels * order.size() > evaluations_left_) return texture;
+  if (texels * order.size() > evaluations_left_) return texture;
+  memory.resize(memory.bytes() + 3 * texels, "the textures of materials");
   if (order.size() == 1 && nodes_[node].value == Vec3(1.0f)) {
     texture.rgb = images_[layout->a].summary.rgb;
     return texture;

@@ -34,6 +34,7 @@ struct ImageRequest {
   bool want_colours = false;
   bool missing = false; ///< no such file, or unreadable: counts as 1 everywhere, as in pbrt
   ImageSummary summary; ///< filled in by whoever reads the files
+  MemoryReservation memory; ///< of the summary
 };
 
 /// All textures of a scene as expressions over constants and images. A node only refers to nodes made before it. Values
@@ -83,8 +84,10 @@ public:
 
   /// The colours over uv, sampled at the texels of the widest image; nothing where uv does not change them, where an
   /// image's colours were not kept, or there are more than kMostTextureTexels. What has no uv counts with its average.
-  /// Without texels where those would take more than most_bytes, or all textures so far too many evaluations.
-  std::optional<AlbedoTexture> albedo_texture(Node node, uint64_t most_bytes);
+  /// Without texels where all textures so far took too many evaluations.
+  /// @param memory grows by the texels
+  /// Throws MemoryError.
+  std::optional<AlbedoTexture> albedo_texture(Node node, MemoryReservation& memory);
 
 private:
   uint64_t evaluations_left_ = uint64_t{1} << 32; ///< of nodes at texels, for the textures of a scene

@@ -193,13 +193,19 @@ Token Tokenizer::read_string() {
   size_t length = 1;                     // from position_, which refill() moves
   size_t bad_at = 0;                     // the first bad byte, from there
   uint32_t bad_bytes = 0;
+  bool too_long = false;
   const auto end = [&](TokenKind kind, size_t text_end, size_t next) {
+    if (too_long || length > kMaxTokenBytes) {
+      position_ = next;
+      return make(TokenKind::kTooLong, next, next);
+    }
     const size_t start = position_ + (bad_bytes > 0 ? bad_at : 1);
     if (bad_bytes > 0) token_column_ += static_cast<uint32_t>(bad_at);
     position_ = next;
     return bad_bytes > 0 ? make(TokenKind::kBadByte, start, start + 1) : make(kind, start, std::max(start, text_end));
   };
   while (true) {
+    if (length > kMaxTokenBytes) cut(length), too_long = true;
     if (position_ + length >= size_ && !refill()) break;
     length += count_plain_string_bytes(window_ + position_ + length);
     if (position_ + length >= size_) continue;
@@ -218,9 +224,16 @@ Token Tokenizer::read_string() {
   return end(TokenKind::kUnterminatedString, rest, rest);
 }
 
+void Tokenizer::cut(size_t& length) {
+  position_ = std::min(position_ + length, size_);
+  length = 0;
+}
+
 Token Tokenizer::read_word() {
   size_t length = 1;
+  bool too_long = false;
   while (true) {
+    if (length > kMaxTokenBytes) cut(length), too_long = true;
     if (position_ + length >= size_ && !refill()) break;
     if (position_ + length >= size_) continue;
     length += count_word_bytes(window_ + position_ + length);
@@ -228,6 +241,7 @@ Token Tokenizer::read_word() {
   }
   const size_t start = position_;
   position_ += length;
+  if (too_long || length > kMaxTokenBytes) return make(TokenKind::kTooLong, position_, position_);
   return make(TokenKind::kWord, start, position_);
 }
 

@@ -19,8 +19,12 @@ enum class TokenKind : uint8_t {
   kClose,              ///< ]
   kUnterminatedString, ///< text: what there was up to the end of the line
   kBadByte,            ///< text: a byte that no pbrt file has, the first one of the string that it is in
+  kTooLong,            ///< a word or string of more than kMaxTokenBytes; no text
   kEnd,                ///< end of the file, again and again
 };
+
+/// No name, number or path has as many bytes.
+inline constexpr size_t kMaxTokenBytes = size_t{1} << 20;
 
 struct Token {
   TokenKind kind = TokenKind::kEnd;
@@ -64,6 +68,8 @@ private:
   void count_line_end(size_t at);
   Token read_string();
   Token read_word();
+  /// Moves over the first length bytes of a token that is longer than tokens may be.
+  void cut(size_t& length);
   Token make(TokenKind kind, size_t start, size_t end) const;
   void check_encoding();
 

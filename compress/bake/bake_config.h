@@ -9,6 +9,7 @@
 #include "compress/format/page_codec.h"
 #include "compress/format/texture_codec.h"
 #include "compress/format/uv_codec.h"
+#include "pbrt_import/scene/memory_budget.h"
 
 namespace packtrace {
 
@@ -96,6 +97,9 @@ struct BakeConfig {
   /// A folder for finished levels of detail, which an interrupted bake finds there when it is started again;
   /// bake_scene() removes them in the end. Empty: none. Changes no byte of the file.
   std::filesystem::path resume;
+
+  /// For the geometry on its grid, clusters, levels and the file. Changes no byte of it.
+  MemoryBudget memory = MemoryBudget();
 
   /// Throws Error(kUsage) if a value is out of its range. Nothing is ever clamped.
   void validate() const;

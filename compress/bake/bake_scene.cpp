@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
+#include <numeric>
 #include <optional>
 
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 #include <tbb/task_group.h>
 
 #include "compress/bake/brief.h"
@@ -24,7 +27,6 @@
 #include "compress/format/baked_image.h"
 #include "compress/format/bit_stream.h"
 #include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/file_bytes.h"
 #include "pbrt_import/scene/output_file.h"
 
 namespace packtrace {
@@ -216,6 +218,7 @@ private:
 
   void pack() {
     lod_wanted_ = choose_lod();
+    reserve_memory();
     find_shared_borders();
     if (!config_.resume.empty()) store_.emplace(config_.resume);
     uint64_t triangles = 0;
@@ -245,6 +248,23 @@ private:
       progress_.advance();
     });
     shared_borders_ = finder.finish();
+  }
+
+  /// Before anything large is allocated. All geometries stay packed, as many as there are threads are being packed, and
+  /// the trees and the file are made of all of them. Measured on large meshes, and rounded up.
+  void reserve_memory() {
+    constexpr uint64_t kPackedBytes = 48, kWorkingBytes = 144, kLodWorkingBytes = 192; // per triangle
+    uint64_t triangles = 0;
+    std::vector<uint64_t> working;
+    for (size_t i = 0; i < packed_.size(); ++i) {
+      triangles += (lod_wanted_[i] != 0 ? 2 : 1) * triangles_of(i);
+      working.push_back(triangles_of(i) * (lod_wanted_[i] != 0 ? kLodWorkingBytes : kWorkingBytes));
+    }
+    const auto threads = static_cast<size_t>(tbb::this_task_arena::max_concurrency());
+    const auto largest = working.begin() + static_cast<std::ptrdiff_t>(std::min(threads, working.size()));
+    std::partial_sort(working.begin(), largest, working.end(), std::greater<>());
+    const uint64_t bytes = std::accumulate(working.begin(), largest, triangles * kPackedBytes);
+    memory_.resize(bytes, "packing " + std::to_string(unique_triangle_count(scene_)) + " triangles");
   }
 
   uint64_t triangles_of(size_t geometry) const {
@@ -467,6 +487,7 @@ private:
   std::vector<Packed> packed_;
   std::vector<uint8_t> lod_wanted_; // by geometry
   SharedBorders shared_borders_;
+  MemoryReservation memory_{config_.memory};
   std::optional<LodStore> store_;
   std::atomic<uint64_t> resumed_{0};
   std::vector<EncodedTexture> textures_; // as in the scene; empty where they are not kept
@@ -486,7 +507,7 @@ BakeReport bake_scene(const Scene& scene, const BakeConfig& config, const std::f
   OutputFile file(output, force);
   BakedScene baked = bake_to_bytes(scene, config, diagnostics, progress);
   progress.begin("writing the file", 0);
-  file.write([&](const std::filesystem::path& path) { write_file_bytes(path, baked.bytes); });
+  file.write(baked.bytes);
   file.commit();
   forget_resumed_levels(config, baked.report, diagnostics);
   return std::move(baked.report);

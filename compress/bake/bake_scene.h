@@ -66,7 +66,7 @@ struct BakedScene {
 /// Packs a scene. The bytes depend on scene and config only, not on thread count or time.
 /// Shapes and instances that leave the range of floats where they are placed are left out and reported as errors in the
 /// diagnostics; their instance numbers stay, of an empty geometry.
-/// Throws Error(kUsage) for a config out of range, Error(kInput) for scenes that break the rules of scene.h, or where
+/// Throws MemoryError where packing may need more than config.memory; Error(kUsage) for a config out of range, Error(kInput) for scenes that break the rules of scene.h, or where
 /// something would be left out and config is strict,
 /// Error(kLimitExceeded) where a limit of the format or the promised accuracy cannot be met, Error(kCancelled),
 /// Error(kIo) where config.resume cannot be used.

@@ -17,6 +17,7 @@
 #include "compress/format/page_decoder.h"
 #include "compress/format/page_model.h"
 #include "compress/format/tree_topology.h"
+#include "compress/format/zstd_context.h"
 #include "pbrt_import/scene/error.h"
 
 namespace packtrace {
@@ -167,7 +168,7 @@ private:
   const BakedSections& sections_;
   PageCodec codec_;
   std::unique_ptr<ClusterValues> values_ = std::make_unique<ClusterValues>();
-  std::unique_ptr<ZSTD_CCtx, size_t (*)(ZSTD_CCtx*)> zstd_{ZSTD_createCCtx(), &ZSTD_freeCCtx};
+  ZstdEncoder zstd_ = make_zstd_encoder();
   PageDecoder decoder_;
 };
 
@@ -217,7 +218,7 @@ std::vector<std::byte> encode_paged_file(const BakedFile& file, PageCodec codec)
   };
   const size_t head_end = offset_of(sections.clusters.data());
   const size_t tail_begin = offset_of(sections.materials.data());
-  const std::unique_ptr<ZSTD_CCtx, size_t (*)(ZSTD_CCtx*)> zstd{ZSTD_createCCtx(), &ZSTD_freeCCtx};
+  const ZstdEncoder zstd = make_zstd_encoder();
   Bytes head = zip(zstd.get(), {resident, head_end});
   const size_t tail_end = offset_of(sections.nodes.data());
   Bytes tail = zip(zstd.get(), {resident + tail_begin, tail_end - tail_begin});

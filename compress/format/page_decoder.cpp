@@ -12,6 +12,7 @@
 #include "compress/format/page_fast_decoder.h"
 #include "compress/format/page_model.h"
 #include "compress/format/page_readers.h"
+#include "compress/format/zstd_context.h"
 
 namespace packtrace {
 namespace {
@@ -53,7 +54,7 @@ struct PageDecoder::Scratch {
   ClusterValues values;
   ClusterPacker packer;
   std::vector<uint8_t> bytes;
-  std::unique_ptr<ZSTD_DCtx, size_t (*)(ZSTD_DCtx*)> zstd{ZSTD_createDCtx(), &ZSTD_freeDCtx};
+  ZstdDecoder zstd = make_zstd_decoder();
 
   /// Codec small: the size of the bit fields, these, and the words of the symbols.
   bool begin_small(std::span<const uint8_t> page) {

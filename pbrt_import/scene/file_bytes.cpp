@@ -7,13 +7,15 @@
 #include <memory>
 #include <string>
 
+#include <unistd.h>
+
 #include "pbrt_import/scene/file_error.h"
+#include "pbrt_import/scene/memory_budget.h"
+#include "pbrt_import/scene/regular_file.h"
 
 namespace packtrace {
 
 namespace {
-
-constexpr uint64_t kMaxFileBytes = uint64_t{1} << 32;
 
 struct CloseFile {
   void operator()(std::FILE* file) const { std::fclose(file); }
@@ -26,21 +28,22 @@ std::string reason(const std::filesystem::path& path, const char* what, int erro
 
 } // namespace
 
-std::vector<std::byte> read_file_bytes(const std::filesystem::path& path) {
-  // Size first: opening a pipe or a device could block for ever.
-  std::error_code error;
-  const std::filesystem::file_status status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) throw FileError(ErrorKind::kInput, path, "no such file");
-  if (!std::filesystem::is_regular_file(status)) throw FileError(ErrorKind::kInput, path, "not a regular file");
-  const uint64_t size = std::filesystem::file_size(path, error);
-  if (error) throw Error(ErrorKind::kInput, path.string() + ": cannot read: " + error.message());
-  if (size > kMaxFileBytes) throw Error(ErrorKind::kInput, path.string() + ": larger than 4 GiB");
-
-  const File file(std::fopen(path.c_str(), "rb"));
-  if (!file) throw Error(ErrorKind::kInput, reason(path, "cannot open", errno));
-  std::vector<std::byte> bytes(size);
-  if (std::fread(bytes.data(), 1, bytes.size(), file.get()) != bytes.size())
-    throw Error(ErrorKind::kInput, path.string() + ": cannot read all of it");
+std::vector<std::byte> read_file_bytes(const std::filesystem::path& path, uint64_t max_bytes) {
+  RegularFile file;
+  try {
+    file = open_regular_file(path);
+  } catch (const Error& error) {
+    throw FileError(error.kind(), path, error.what());
+  }
+  if (file.bytes > max_bytes) throw FileError(ErrorKind::kInput, path, "larger than " + memory_text(max_bytes));
+  std::vector<std::byte> bytes(static_cast<size_t>(file.bytes));
+  for (size_t done = 0; done < bytes.size();) {
+    const ssize_t n = ::read(file.descriptor.get(), bytes.data() + done, bytes.size() - done);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) throw Error(ErrorKind::kInput, reason(path, "cannot read", errno));
+    if (n == 0) throw Error(ErrorKind::kInput, path.string() + ": cannot read all of it");
+    done += static_cast<size_t>(n);
+  }
   return bytes;
 }
 

@@ -3,12 +3,19 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <charconv>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <mutex>
+#include <optional>
 #include <set>
+#include <string_view>
 
 #include <fcntl.h>
+#include <sys/file.h>
+#include <sys/sendfile.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "pbrt_import/scene/file_error.h"
@@ -55,9 +62,15 @@ public:
     return targets_;
   }
 
+  /// @return true for the first file in a folder
+  bool add_folder(const fs::path& folder) {
+    const std::scoped_lock lock(mutex_);
+    return folders_.insert(folder).second;
+  }
+
 private:
   mutable std::mutex mutex_;
-  std::set<fs::path> targets_;
+  std::set<fs::path> targets_, folders_;
 };
 Claims claims;
 
@@ -67,6 +80,9 @@ fs::path claim_of(const fs::path& target) {
   const fs::path canonical = fs::weakly_canonical(fs::absolute(target, error), error);
   return error ? target : canonical;
 }
+
+/// The name by which an open file can be opened again, and linked.
+std::string name_of(const Descriptor& file) { return "/proc/self/fd/" + std::to_string(file.get()); }
 
 [[noreturn]] void fail(const fs::path& path, const std::string& what) {
   throw FileError(ErrorKind::kIo, path, what);
@@ -90,30 +106,57 @@ fs::path resolve(const fs::path& target) {
   return resolved;
 }
 
-/// A new empty file with a name that nobody else has.
-fs::path create_temporary(const fs::path& target) {
+constexpr std::string_view kPrefix = ".packtrace-", kSuffix = ".tmp";
+
+fs::path folder_of(const fs::path& target) { return target.has_parent_path() ? target.parent_path() : fs::path("."); }
+
+/// A name for a temporary file, another one with each call.
+fs::path temporary_name(const fs::path& folder) {
   static std::atomic<uint64_t> number{0};
-  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
-  for (int attempt = 0; attempt < 1000; ++attempt) {
-    fs::path path = folder / (".packtrace-" + std::to_string(getpid()) + "-" + std::to_string(++number) + ".tmp");
-    const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (file >= 0) {
-      close(file);
-      return path;
+  std::string name(kPrefix);
+  name.append(std::to_string(getpid())).append("-").append(std::to_string(++number)).append(kSuffix);
+  return folder / name;
+}
+
+/// The process whose temporary file this is; nothing where it is not the name of one.
+std::optional<pid_t> owner_of(std::string_view name) {
+  if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix)) return std::nullopt;
+  name.remove_prefix(kPrefix.size());
+  pid_t owner = 0;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), owner);
+  if (error != std::errc() || owner <= 0 || *end != '-') return std::nullopt;
+  return owner;
+}
+
+constexpr int kMostAttempts = 1000;
+
+/// A file without a name; nothing where the file system has none, or /proc, through which it gets one, is not there.
+Descriptor create_nameless(const fs::path& folder) {
+  Descriptor file(open(folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, 0666));
+  if (file.valid() && access(name_of(file).c_str(), W_OK) != 0) return Descriptor();
+  return file;
+}
+
+/// A new empty file with a name that nobody else has, locked so that remove_stale_output() knows that it is in use.
+Descriptor create_named(const fs::path& folder, const fs::path& target, fs::path& name) {
+  for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
+    name = temporary_name(folder);
+    Descriptor file(open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+    if (!file.valid()) {
+      if (errno != EEXIST) fail(target, std::string("cannot write there: ") + std::strerror(errno));
+      continue;
     }
-    if (errno != EEXIST) fail(target, std::string("cannot write there: ") + std::strerror(errno));
+    flock(file.get(), LOCK_EX); // file systems without locks keep the process number in the name
+    struct stat info {};
+    if (fstat(file.get(), &info) == 0 && info.st_nlink > 0) return file; // else it was taken for a stale one
   }
   fail(target, "cannot find a free temporary name");
 }
 
 /// On disk before it gets its name: after a crash the name stands for the old file or for all of the new one.
-void flush_to_disk(const fs::path& file, const fs::path& target) {
-  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  const bool flushed =
-      descriptor >= 0 && (fsync(descriptor) == 0 || errno == EINVAL); // EINVAL: not for this file system
-  const int error = errno;
-  if (descriptor >= 0) close(descriptor);
-  if (!flushed) fail(target, std::string("cannot be written to disk: ") + std::strerror(error));
+void flush_to_disk(const Descriptor& file, const fs::path& target) {
+  if (fsync(file.get()) == 0 || errno == EINVAL) return; // EINVAL: not for this file system
+  fail(target, std::string("cannot be written to disk: ") + std::strerror(errno));
 }
 
 /// Renames without replacing, where the file system can do that in one step.
@@ -132,47 +175,90 @@ OutputFile::OutputFile(fs::path target, bool force) : target_(std::move(target))
   if (!target_.has_filename()) fail(target_, "is a folder");
   target_ = resolve(target_);
   check_target(target_, force_);
-  temporary_ = create_temporary(target_);
+  const fs::path folder = folder_of(target_);
+  if (claims.add_folder(folder)) remove_stale_output(folder);
+  descriptor_ = create_nameless(folder);
+  if (!descriptor_.valid()) descriptor_ = create_named(folder, target_, temporary_);
+  path_ = temporary_.empty() ? fs::path(name_of(descriptor_)) : temporary_;
   if (!claims.add(claim_of(target_))) {
     std::error_code ignored;
-    fs::remove(temporary_, ignored);
+    if (!temporary_.empty()) fs::remove(temporary_, ignored);
     throw Error(ErrorKind::kUsage, target_.string() + ": two outputs would go to this file");
   }
-  remember(temporary_.c_str());
+  if (!temporary_.empty()) remember(temporary_.c_str());
 }
 
 OutputFile::~OutputFile() {
   if (committed_) return;
   claims.remove(claim_of(target_));
+  if (temporary_.empty()) return;
   forget(temporary_.c_str());
   std::error_code ignored;
   fs::remove(temporary_, ignored);
 }
 
-void OutputFile::write(const std::function<void(const fs::path&)>& work) const {
-  try {
-    work(temporary_);
-  } catch (const Error& error) {
-    const std::string mine = temporary_.string(), shown = target_.string();
-    std::string message = error.what();
-    const bool about_mine = message.starts_with(mine + ": ");
-    if (about_mine) message.erase(0, mine.size() + 2);
-    for (size_t at = message.find(mine); at != message.npos; at = message.find(mine, at + shown.size()))
-      message.replace(at, mine.size(), shown);
-    if (about_mine) throw FileError(error.kind(), target_, message);
-    throw Error(error.kind(), message);
+void OutputFile::write(std::span<const std::byte> bytes) {
+  int error = ftruncate(descriptor_.get(), 0) == 0 ? 0 : errno;
+  for (size_t done = 0; done < bytes.size() && error == 0;) {
+    const ssize_t n = pwrite(descriptor_.get(), bytes.data() + done, bytes.size() - done, static_cast<off_t>(done));
+    if (n >= 0) done += static_cast<size_t>(n);
+    if (n < 0 && errno != EINTR) error = errno;
   }
+  if (error == EFBIG) fail(target_, "cannot write: larger than files may be here (see ulimit -f)");
+  if (error != 0) fail(target_, std::string("cannot write: ") + std::strerror(error));
+}
+
+/// Gives a nameless file a temporary name, under which it can replace another one.
+void OutputFile::give_name() {
+  const fs::path folder = folder_of(target_);
+  for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
+    temporary_ = temporary_name(folder);
+    remember(temporary_.c_str());
+    flock(descriptor_.get(), LOCK_EX);
+    if (linkat(AT_FDCWD, path_.c_str(), AT_FDCWD, temporary_.c_str(), AT_SYMLINK_FOLLOW) == 0) return;
+    const int error = errno;
+    forget(temporary_.c_str());
+    temporary_.clear();
+    if (error != EEXIST) return copy_to_named();
+  }
+  fail(target_, "cannot find a free temporary name");
+}
+
+/// For file systems that make nameless files and then do not link them.
+void OutputFile::copy_to_named() {
+  fs::path name;
+  Descriptor copy = create_named(folder_of(target_), target_, name);
+  temporary_ = std::move(name);
+  remember(temporary_.c_str());
+  off_t offset = 0;
+  ssize_t n = 0;
+  do n = sendfile(copy.get(), descriptor_.get(), &offset, size_t{1} << 30);
+  while (n > 0 || (n < 0 && errno == EINTR));
+  if (n < 0) fail(target_, std::string("cannot be put in place: ") + std::strerror(errno));
+  descriptor_ = std::move(copy);
+  flush_to_disk(descriptor_, target_);
+}
+
+/// @return 0 or what errno was
+int OutputFile::put_in_place() {
+  if (temporary_.empty() && !force_) {
+    if (linkat(AT_FDCWD, path_.c_str(), AT_FDCWD, target_.c_str(), AT_SYMLINK_FOLLOW) == 0) return 0;
+    if (errno == EEXIST) return EEXIST;
+  }
+  if (temporary_.empty()) give_name();
+  if (!force_) return rename_if_free(temporary_, target_);
+  return std::rename(temporary_.c_str(), target_.c_str()) == 0 ? 0 : errno;
 }
 
 void OutputFile::commit() {
-  flush_to_disk(temporary_, target_);
-  const int error = force_ ? (std::rename(temporary_.c_str(), target_.c_str()) == 0 ? 0 : errno)
-                           : rename_if_free(temporary_, target_);
+  flush_to_disk(descriptor_, target_);
+  const int error = put_in_place();
   if (error == EEXIST) fail(target_, "appeared while it was being made; --force replaces it");
   if (error != 0) fail(target_, std::string("cannot be put in place: ") + std::strerror(error));
-  forget(temporary_.c_str());
+  if (!temporary_.empty()) forget(temporary_.c_str());
   claims.remove(claim_of(target_));
   committed_ = true;
+  descriptor_ = Descriptor(); // and with it the lock
 }
 
 void refuse_to_replace(const std::vector<fs::path>& inputs, const fs::path& target) {
@@ -190,6 +276,21 @@ void refuse_to_replace(const std::vector<fs::path>& inputs) {
 void remove_unfinished_output() noexcept {
   for (auto& slot : unfinished_paths)
     if (const char* path = slot.load()) unlink(path);
+}
+
+void remove_stale_output(const fs::path& folder) noexcept {
+  try {
+    std::error_code error;
+    for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+      const std::optional<pid_t> owner = owner_of(entry->path().filename().native());
+      if (!owner || kill(*owner, 0) == 0 || errno != ESRCH) continue;
+      // Whoever runs elsewhere, on another machine or in a container with process numbers of its own, holds the lock.
+      const Descriptor file(open(entry->path().c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+      if (file.valid() && flock(file.get(), LOCK_EX | LOCK_NB) == 0) unlink(entry->path().c_str());
+    }
+  } catch (const std::exception&) {
+    // They stay, and harm nobody.
+  }
 }
 
 } // namespace packtrace

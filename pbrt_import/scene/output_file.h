@@ -1,17 +1,23 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
-#include <functional>
+#include <span>
 #include <vector>
+
+#include "pbrt_import/scene/regular_file.h"
 
 namespace packtrace {
 
-/// A file that appears whole or not at all: the caller writes to path(), and commit() renames it to the target. Until
-/// then the target is untouched, and the destructor removes what was written.
+/// A file that appears whole or not at all: the caller writes to path(), or calls write(), and commit() puts the file
+/// in the place of the target. Until then the target is untouched.
+///
+/// Where the file system can, the file has no name before commit(), so nothing is left of it however the process ends.
+/// Elsewhere it is a temporary file in the target's folder, which the destructor removes; what a killed process left
+/// there is removed by the next OutputFile in that folder.
 class OutputFile {
 public:
-  /// Makes an empty temporary file in the target's folder. A target that is a symbolic link stands for the file it
-  /// leads to.
+  /// A target that is a symbolic link stands for the file it leads to.
   /// @param force an existing target may be replaced
   /// Throws Error(kIo) where the target exists and force is not set, is not a regular file, or its folder is missing
   /// or cannot be written to; Error(kUsage) for an empty name, and for the target of another OutputFile that is not
@@ -22,19 +28,25 @@ public:
   OutputFile& operator=(const OutputFile&) = delete;
 
   /// Where to write. It has a name of its own, so writers must not judge the format by it.
-  const std::filesystem::path& path() const { return temporary_; }
+  const std::filesystem::path& path() const { return path_; }
   const std::filesystem::path& target() const { return target_; }
 
-  /// Runs work(path()). Where it throws an Error whose message names that path, the target's name stands there instead.
-  void write(const std::function<void(const std::filesystem::path& path)>& work) const;
+  /// Replaces the content. Throws Error(kIo), which names the target, where that fails.
+  void write(std::span<const std::byte> bytes);
 
   /// Puts the file in its place. Throws Error(kIo) where that fails, or where a target appeared meanwhile and force was
   /// not set.
   void commit();
 
 private:
+  void give_name();
+  void copy_to_named();
+  int put_in_place();
+
   std::filesystem::path target_;
-  std::filesystem::path temporary_;
+  Descriptor descriptor_;
+  std::filesystem::path path_;
+  std::filesystem::path temporary_; ///< its name in the target's folder; empty while it has none
   bool force_ = false;
   bool committed_ = false;
 };
@@ -46,5 +58,8 @@ void refuse_to_replace(const std::vector<std::filesystem::path>& inputs);
 
 /// Removes the temporary files of all OutputFiles of the process that are not committed. Async-signal-safe.
 void remove_unfinished_output() noexcept;
+
+/// Removes temporary files that processes which have ended left in a folder. Does nothing where it cannot.
+void remove_stale_output(const std::filesystem::path& folder) noexcept;
 
 } // namespace packtrace

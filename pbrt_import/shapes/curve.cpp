@@ -9,6 +9,7 @@
 
 #include "pbrt_import/scene/error.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
+#include "pbrt_import/shapes/report.h"
 
 namespace packtrace {
 namespace {
@@ -16,6 +17,8 @@ namespace {
 using Bezier = std::array<DVec3, 4>;
 constexpr uint32_t kSides = 8; // a side's sagitta is 1 - cos(pi / 8) = 7.6% of the radius, within width / 20
 constexpr size_t kMaxStations = (size_t{1} << 24) / (kSides + 1);
+// Of the mesh: a row of vertices and two triangles for each of them.
+constexpr uint64_t kBytesPerStation = (kSides + 1) * (2 * sizeof(Vec3) + sizeof(Vec2) + 2 * sizeof(Triangle));
 
 [[noreturn]] void fail(const std::string& problem) { throw Error(ErrorKind::kInput, problem); }
 
@@ -103,11 +106,12 @@ DVec3 unit(Vec3 v) {
 /// Walks along the segments and puts a station wherever a cross-section is needed.
 class StationMaker {
 public:
-  StationMaker(const CurveParameters& curve, std::span<const Bezier> segments)
+  StationMaker(const CurveParameters& curve, std::span<const Bezier> segments, MemoryReservation* memory)
       : curve_(curve), segment_count_(static_cast<double>(segments.size())), tolerance_(centre_tolerance(curve)) {
     uint64_t count = 1;
     for (const Bezier& b : segments) count += piece_count(b, tolerance_);
     if (count > kMaxStations) fail_too_many();
+    reserve_for_shape(memory, count * (sizeof(Station) + kBytesPerStation));
     stations_.reserve(count);
     for (size_t s = 0; s < segments.size(); ++s) add_segment(segments[s], s);
   }
@@ -243,7 +247,7 @@ Mesh make_ribbon(const std::vector<Station>& stations) {
 
 } // namespace
 
-Mesh tessellate_curve(const CurveParameters& curve) {
+Mesh tessellate_curve(const CurveParameters& curve, MemoryReservation* memory) {
   for (const Vec3& p : curve.points)
     if (!is_finite(p)) fail("a control point of the curve is not finite");
   if (!std::isfinite(curve.width0) || !std::isfinite(curve.width1) || curve.width0 < 0.0f || curve.width1 < 0.0f)
@@ -254,7 +258,8 @@ Mesh tessellate_curve(const CurveParameters& curve) {
   if (ribbon && curve.normals.size() != segments.size() + 1)
     fail("a ribbon of " + std::to_string(segments.size()) + " segments needs one normal more than segments, not " +
          std::to_string(curve.normals.size()));
-  std::vector<Station> stations = StationMaker(curve, segments).take();
+  std::vector<Station> stations = StationMaker(curve, segments, memory).take();
+  reserve_for_shape(memory, stations.size() * (sizeof(Station) + 2 * kBytesPerStation)); // vectors double as they grow
   Mesh mesh = ribbon ? make_ribbon(stations) : make_tube(std::move(stations));
   for (const Vec3& p : mesh.positions)
     if (!is_finite(p)) fail("the curve leaves the range of single precision");

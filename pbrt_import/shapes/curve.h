@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <span>
 
+#include "pbrt_import/scene/memory_budget.h"
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace {
@@ -31,6 +32,7 @@ struct CurveParameters {
 /// out. Throws Error(kInput) if counts do not fit, a value is not finite, a width is negative or there is nothing to
 /// draw, Error(kLimitExceeded) if the width asks for more than 2^24 vertices. Source for the frames: Wenping Wang, Bert
 /// Juettler, Dayue Zheng and Yang Liu, Computation of Rotation Minimizing Frames, 2008.
-Mesh tessellate_curve(const CurveParameters& curve);
+/// @param memory grows by what this takes, before it is taken; null: nobody counts. Throws MemoryError.
+Mesh tessellate_curve(const CurveParameters& curve, MemoryReservation* memory = nullptr);
 
 } // namespace packtrace

@@ -23,6 +23,11 @@ constexpr uint32_t kMaxSegmentsPerSpan = 128;
 
 [[noreturn]] void fail(const std::string& problem) { throw Error(ErrorKind::kInput, problem); }
 
+[[noreturn]] void fail_too_many() {
+  throw Error(ErrorKind::kLimitExceeded,
+              "the nurbs surface asks for more than " + std::to_string(kMaxVertices) + " vertices");
+}
+
 std::string two_digits(double value) {
   std::ostringstream stream;
   stream.imbue(std::locale::classic());
@@ -161,11 +166,18 @@ std::vector<double> grid_lines(const Axis& axis, uint32_t segments) {
   for (const double knot : axis.knots)
     if (knot > stops.back() && knot < axis.end) stops.push_back(knot);
   stops.push_back(axis.end);
+  if ((stops.size() - 1) * segments > kMaxVertices) fail_too_many();
   std::vector<double> lines{axis.begin};
+  lines.reserve((stops.size() - 1) * segments + 1);
   for (size_t i = 0; i + 1 < stops.size(); ++i)
     for (uint32_t k = 1; k <= segments; ++k)
       lines.push_back(k == segments ? stops[i + 1] : stops[i] + (stops[i + 1] - stops[i]) * k / segments);
   return lines;
+}
+
+/// @param doubled whether segments are cut in two
+uint64_t line_count(const std::vector<double>& lines, bool doubled) {
+  return doubled ? 2 * uint64_t{lines.size()} - 1 : lines.size();
 }
 
 struct Grid {
@@ -221,9 +233,7 @@ Grid refine(const Axis& u, const Axis& v, const Surface& surface, double relativ
   // Four segments to begin with, so that an inflection in the middle of a span does not look straight.
   uint32_t u_segments = u.order > 2 ? 4 : 1, v_segments = v.order > 2 ? 4 : 1;
   Grid grid{grid_lines(u, u_segments), grid_lines(v, v_segments)};
-  if (grid.vertex_count() > kMaxVertices)
-    throw Error(ErrorKind::kLimitExceeded,
-                "the nurbs surface asks for more than " + std::to_string(kMaxVertices) + " vertices");
+  if (grid.vertex_count() > kMaxVertices) fail_too_many();
   while (true) {
     const Deviation deviation = measure(grid, surface, check_cancelled);
     if (deviation.tolerance() <= relative_tolerance) return grid;
@@ -234,8 +244,10 @@ Grid refine(const Axis& u, const Axis& v, const Surface& surface, double relativ
     refine_v = refine_v && v_segments < kMaxSegmentsPerSpan;
     u_segments *= refine_u ? 2 : 1;
     v_segments *= refine_v ? 2 : 1;
-    Grid finer{grid_lines(u, u_segments), grid_lines(v, v_segments)};
-    if (finer.vertex_count() > kMaxVertices || finer.vertex_count() == grid.vertex_count()) {
+    const bool too_many = line_count(grid.u, refine_u) * line_count(grid.v, refine_v) > kMaxVertices;
+    Grid finer;
+    if (!too_many) finer = {grid_lines(u, u_segments), grid_lines(v, v_segments)};
+    if (too_many || finer.vertex_count() == grid.vertex_count()) {
       if (report)
         report(Severity::kWarning, 0,
                "the surface is followed to within " + two_digits(deviation.tolerance()) +
@@ -282,7 +294,7 @@ Mesh mesh_of(const Grid& grid, const Surface& surface, const CheckCancelledFn& c
 } // namespace
 
 Mesh tessellate_nurbs(const NurbsParameters& nurbs, double relative_tolerance, const ReportFn& report,
-                      const CheckCancelledFn& check_cancelled) {
+                      const CheckCancelledFn& check_cancelled, MemoryReservation* memory) {
   if (!(relative_tolerance >= 1e-6 && relative_tolerance <= 0.5))
     fail("the tessellation tolerance is not within [1e-6, 0.5]");
   const Axis u = make_axis("u", nurbs.nu, nurbs.u_order, nurbs.u_knots, nurbs.u0, nurbs.u1);
@@ -293,7 +305,10 @@ Mesh tessellate_nurbs(const NurbsParameters& nurbs, double relative_tolerance, c
   for (const glm::vec4& p : nurbs.control_points)
     if (!is_finite(Vec3(p)) || !std::isfinite(p.w)) fail("a control point is not finite");
   const Surface surface(u, v, nurbs.control_points);
-  return mesh_of(refine(u, v, surface, relative_tolerance, report, check_cancelled), surface, check_cancelled);
+  const Grid grid = refine(u, v, surface, relative_tolerance, report, check_cancelled);
+  const uint64_t triangle_bytes = 2 * 2 * sizeof(Triangle); // the vector of triangles doubles as it grows
+  reserve_for_shape(memory, grid.vertex_count() * (2 * sizeof(Vec3) + sizeof(Vec2) + triangle_bytes));
+  return mesh_of(grid, surface, check_cancelled);
 }
 
 } // namespace packtrace

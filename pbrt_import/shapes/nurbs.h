@@ -31,7 +31,8 @@ struct NurbsParameters {
 /// or the surface runs through infinity (its weight changes sign), Error(kLimitExceeded) if the knots alone ask for
 /// more than 2^24 vertices, and whatever check_cancelled throws. Source: Carl de Boor, A Practical Guide to Splines,
 /// 1978, chapter 10.
+/// @param memory grows by what this takes, before it is taken; null: nobody counts. Throws MemoryError.
 Mesh tessellate_nurbs(const NurbsParameters& nurbs, double relative_tolerance, const ReportFn& report = {},
-                      const CheckCancelledFn& check_cancelled = {});
+                      const CheckCancelledFn& check_cancelled = {}, MemoryReservation* memory = nullptr);
 
 } // namespace packtrace

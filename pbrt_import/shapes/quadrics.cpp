@@ -11,6 +11,7 @@
 
 #include "pbrt_import/scene/error.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
+#include "pbrt_import/shapes/report.h"
 
 namespace packtrace {
 namespace {
@@ -160,7 +161,9 @@ private:
   bool row_is_pole_ = false;
 };
 
-Mesh sweep_profile(const Sweep& sweep, const std::vector<ProfilePoint>& profile) {
+Mesh sweep_profile(const Sweep& sweep, const std::vector<ProfilePoint>& profile, MemoryReservation* memory) {
+  const uint64_t vertices = (sweep.segments() + uint64_t{1}) * profile.size();
+  reserve_for_shape(memory, vertices * (2 * sizeof(Vec3) + sizeof(Vec2) + 2 * sizeof(Triangle)));
   SweptMesh swept(sweep, profile.size());
   for (const ProfilePoint& point : profile) swept.add_row(point);
   return swept.take();
@@ -184,7 +187,7 @@ std::vector<double> parabola_radii(double r_begin, double r_end, double k, doubl
 
 } // namespace
 
-Mesh tessellate_sphere(const SphereParameters& sphere, double relative_tolerance) {
+Mesh tessellate_sphere(const SphereParameters& sphere, double relative_tolerance, MemoryReservation* memory) {
   require_tolerance(relative_tolerance);
   require_finite({sphere.radius, sphere.z_min, sphere.z_max});
   const double radius = sphere.radius;
@@ -209,10 +212,10 @@ Mesh tessellate_sphere(const SphereParameters& sphere, double relative_tolerance
     }
     profile[i] = {position, position, v};
   }
-  return sweep_profile(sweep, profile);
+  return sweep_profile(sweep, profile, memory);
 }
 
-Mesh tessellate_cylinder(const CylinderParameters& cylinder, double relative_tolerance) {
+Mesh tessellate_cylinder(const CylinderParameters& cylinder, double relative_tolerance, MemoryReservation* memory) {
   require_tolerance(relative_tolerance);
   require_finite({cylinder.radius, cylinder.z_min, cylinder.z_max});
   require(cylinder.radius > 0.0f, "the cylinder's radius is not positive");
@@ -220,10 +223,10 @@ Mesh tessellate_cylinder(const CylinderParameters& cylinder, double relative_tol
   const Sweep sweep = make_sweep(cylinder.phi_max, relative_tolerance);
   const auto [low, high] = std::minmax({double{cylinder.z_min}, double{cylinder.z_max}});
   const double radius = cylinder.radius;
-  return sweep_profile(sweep, {{{radius, 0, low}, {1, 0, 0}, 0.0}, {{radius, 0, high}, {1, 0, 0}, 1.0}});
+  return sweep_profile(sweep, {{{radius, 0, low}, {1, 0, 0}, 0.0}, {{radius, 0, high}, {1, 0, 0}, 1.0}}, memory);
 }
 
-Mesh tessellate_disk(const DiskParameters& disk, double relative_tolerance) {
+Mesh tessellate_disk(const DiskParameters& disk, double relative_tolerance, MemoryReservation* memory) {
   require_tolerance(relative_tolerance);
   require_finite({disk.height, disk.radius, disk.inner_radius});
   require(disk.radius > 0.0f, "the disk's radius is not positive");
@@ -232,10 +235,10 @@ Mesh tessellate_disk(const DiskParameters& disk, double relative_tolerance) {
   const Sweep sweep = make_sweep(disk.phi_max, relative_tolerance);
   const double height = disk.height;
   return sweep_profile(sweep,
-                       {{{disk.radius, 0, height}, {0, 0, 1}, 0.0}, {{disk.inner_radius, 0, height}, {0, 0, 1}, 1.0}});
+                       {{{disk.radius, 0, height}, {0, 0, 1}, 0.0}, {{disk.inner_radius, 0, height}, {0, 0, 1}, 1.0}}, memory);
 }
 
-Mesh tessellate_cone(const ConeParameters& cone, double relative_tolerance) {
+Mesh tessellate_cone(const ConeParameters& cone, double relative_tolerance, MemoryReservation* memory) {
   require_tolerance(relative_tolerance);
   require_finite({cone.radius, cone.height});
   require(cone.radius > 0.0f, "the cone's radius is not positive");
@@ -243,10 +246,10 @@ Mesh tessellate_cone(const ConeParameters& cone, double relative_tolerance) {
   const Sweep sweep = make_sweep(cone.phi_max, relative_tolerance);
   const double radius = cone.radius, height = cone.height;
   const DVec3 normal(height, 0.0, radius);
-  return sweep_profile(sweep, {{{radius, 0, 0}, normal, 0.0}, {{0, 0, height}, normal, 1.0}});
+  return sweep_profile(sweep, {{{radius, 0, 0}, normal, 0.0}, {{0, 0, height}, normal, 1.0}}, memory);
 }
 
-Mesh tessellate_paraboloid(const ParaboloidParameters& paraboloid, double relative_tolerance) {
+Mesh tessellate_paraboloid(const ParaboloidParameters& paraboloid, double relative_tolerance, MemoryReservation* memory) {
   require_tolerance(relative_tolerance);
   require_finite({paraboloid.radius, paraboloid.z_min, paraboloid.z_max});
   require(paraboloid.radius > 0.0f, "the paraboloid's radius is not positive");
@@ -267,10 +270,10 @@ Mesh tessellate_paraboloid(const ParaboloidParameters& paraboloid, double relati
     // dp/du is along +y and dp/dv along (1, 0, 2 k r) / (2 k r), which for k < 0 points towards smaller r.
     profile.push_back({{r, 0, z}, {2.0 * std::abs(k) * r, 0.0, k > 0.0 ? -1.0 : 1.0}, (z - z_min) / (z_max - z_min)});
   }
-  return sweep_profile(sweep, profile);
+  return sweep_profile(sweep, profile, memory);
 }
 
-Mesh tessellate_hyperboloid(const HyperboloidParameters& hyperboloid, double relative_tolerance) {
+Mesh tessellate_hyperboloid(const HyperboloidParameters& hyperboloid, double relative_tolerance, MemoryReservation* memory) {
   require_tolerance(relative_tolerance);
   DVec3 p1(hyperboloid.p1), p2(hyperboloid.p2);
   require(is_finite(p1) && is_finite(p2), "a parameter is not finite");
@@ -292,7 +295,7 @@ Mesh tessellate_hyperboloid(const HyperboloidParameters& hyperboloid, double rel
     std::vector<ProfilePoint> profile;
     if (v > 0.0) profile.insert(profile.end(), {{p1, facing(q1), 0.0}, {apex, facing(q1), v}});
     if (v < 1.0) profile.insert(profile.end(), {{apex, facing(q2), v}, {p2, facing(q2), 1.0}});
-    return sweep_profile(sweep, profile);
+    return sweep_profile(sweep, profile, memory);
   }
   // Cells between two rulings are saddles: a diagonal leaves them by at most a quarter of their ends' relative turn.
   const auto rows = static_cast<uint32_t>(
@@ -303,7 +306,7 @@ Mesh tessellate_hyperboloid(const HyperboloidParameters& hyperboloid, double rel
     const DVec3 p = i == rows ? p2 : p1 + v * along;
     profile[i] = {p, facing(glm::dvec2(p)), v};
   }
-  return sweep_profile(sweep, profile);
+  return sweep_profile(sweep, profile, memory);
 }
 
 } // namespace packtrace

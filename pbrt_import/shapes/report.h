@@ -5,6 +5,7 @@
 #include <string>
 
 #include "pbrt_import/scene/diagnostics.h"
+#include "pbrt_import/scene/memory_budget.h"
 
 namespace packtrace {
 
@@ -14,5 +15,10 @@ using ReportFn = std::function<void(Severity severity, uint32_t line, std::strin
 
 /// Called now and then by shapes that may take long; throws to stop them, usually Error(kCancelled). May be empty.
 using CheckCancelledFn = std::function<void()>;
+
+/// Makes room in a shape's reservation ahead of an allocation, where somebody counts. Throws MemoryError.
+inline void reserve_for_shape(MemoryReservation* memory, uint64_t bytes) {
+  if (memory) memory->cover(bytes, "the shape");
+}
 
 } // namespace packtrace

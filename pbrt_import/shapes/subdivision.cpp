@@ -293,6 +293,14 @@ Level control_level(std::span<const Vec3> points, std::span<const Triangle> tria
   return level;
 }
 
+/// What a level takes, and what is made of it: another one, or the mesh. Closed surfaces have half as many points as
+/// triangles, a triangle alone three.
+uint64_t bytes_while_working(uint64_t triangles, uint64_t points) {
+  constexpr uint64_t kHalfEdge = 2 * sizeof(uint32_t);
+  constexpr uint64_t kPoint = 2 * sizeof(DVec3) + 2 * sizeof(Vec3) + sizeof(uint32_t) + 1; // smooth() and limit_normals()
+  return triangles * (3 * kHalfEdge + sizeof(Triangle)) + points * kPoint;
+}
+
 void check_budget(uint64_t triangle_count, uint32_t levels) {
   bool fits = triangle_count <= kMaxSubdividedTriangles;
   for (uint32_t i = 0; fits && i < levels && triangle_count != 0; ++i) {
@@ -307,8 +315,12 @@ void check_budget(uint64_t triangle_count, uint32_t levels) {
 } // namespace
 
 Mesh subdivide_loop(std::span<const Vec3> points, std::span<const Triangle> triangles, uint32_t levels,
-                    const ReportFn& report, uint64_t* dropped_triangles, const CheckCancelledFn& check_cancelled) {
+                    const ReportFn& report, uint64_t* dropped_triangles, const CheckCancelledFn& check_cancelled,
+                    MemoryReservation* memory) {
   check_budget(triangles.size(), levels);
+  // Each level has four triangles for one, and a point more for each edge: three for two triangles at least.
+  const uint64_t finest = triangles.empty() ? 0 : static_cast<uint64_t>(triangles.size()) << (2 * levels);
+  reserve_for_shape(memory, bytes_while_working(finest, finest / 2 + points.size()));
   Level level = control_level(points, triangles, report, dropped_triangles);
   if (level.start.empty()) return {};
   for (uint32_t i = 0; i < levels; ++i) {
@@ -317,8 +329,10 @@ Mesh subdivide_loop(std::span<const Vec3> points, std::span<const Triangle> tria
   }
   Mesh mesh;
   mesh.normals = limit_normals(level);
-  const std::vector<DVec3> limit = smooth(level, limit_weight, kLimitBoundaryWeight);
-  mesh.positions.assign(limit.begin(), limit.end());
+  level.points = smooth(level, limit_weight, kLimitBoundaryWeight);
+  level.opposite = {};
+  mesh.positions.assign(level.points.begin(), level.points.end());
+  level.points = {};
   mesh.triangles.reserve(level.start.size() / 3);
   for (size_t h = 0; h < level.start.size(); h += 3)
     mesh.triangles.emplace_back(level.start[h], level.start[h + 1], level.start[h + 2]);

@@ -20,12 +20,13 @@ inline constexpr uint64_t kMaxSubdividedTriangles = uint64_t{1} << 26;
 /// the surface is cut there as if it had a boundary (reported); no triangle is lost.
 /// @param points control points; @param triangles indices into them
 /// @param dropped_triangles the number of dropped ones is added to it; may be null
-/// Throws Error(kLimitExceeded), before allocating, if the result would exceed kMaxSubdividedTriangles, and whatever
+/// @param memory grows by what each level takes, before it is taken; null: nobody counts
+/// Throws MemoryError; Error(kLimitExceeded), before allocating, if the result would exceed kMaxSubdividedTriangles, and whatever
 /// check_cancelled throws.
 /// Source: Charles Loop, Smooth Subdivision Surfaces Based on Triangles, 1987; weights as in Physically Based
 /// Rendering, 3rd edition, 2016, section 3.8.
 Mesh subdivide_loop(std::span<const Vec3> points, std::span<const Triangle> triangles, uint32_t levels,
                     const ReportFn& report, uint64_t* dropped_triangles = nullptr,
-                    const CheckCancelledFn& check_cancelled = {});
+                    const CheckCancelledFn& check_cancelled = {}, MemoryReservation* memory = nullptr);
 
 } // namespace packtrace

@@ -177,7 +177,8 @@ std::string advice_for(const BakeOptions& options) {
 }
 
 int run(const BakeOptions& options, const GlobalOptions& globals) {
-  const BakeConfig config = make_config(options);
+  BakeConfig config = make_config(options);
+  config.memory = globals.memory;
   if (options.output.empty() && !options.dry_run) fail_without_output("bake", options.input, ".ptk");
   refuse_foreign_ending(options.output, {".ptk"}, "bake", advice_for(options));
   JsonOutput json(globals.json, globals.force);
@@ -194,7 +195,13 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
 
   Diagnostics diagnostics;
   const Stopwatch baking;
-  BakedScene scene = bake_to_bytes(imported.scene, config, diagnostics, progress);
+  BakedScene scene = [&] {
+    try {
+      return bake_to_bytes(imported.scene, config, diagnostics, progress);
+    } catch (const MemoryError& error) {
+      throw MemoryError(options.input, error.what());
+    }
+  }();
   if (output) {
     progress.begin("writing the file", 0);
     output->write(scene.bytes);

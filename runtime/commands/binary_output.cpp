@@ -6,7 +6,6 @@
 #include <unistd.h>
 
 #include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/file_bytes.h"
 #include "runtime/commands/option_checks.h"
 
 namespace packtrace {
@@ -23,7 +22,7 @@ BinaryOutput::BinaryOutput(const std::string& target, bool force, const JsonOutp
 
 void BinaryOutput::write(std::span<const std::byte> bytes) {
   if (file_) {
-    file_->write([&](const std::filesystem::path& path) { write_file_bytes(path, bytes); });
+    file_->write(bytes);
     file_->commit();
   } else {
     write_standard_output(bytes);

@@ -141,6 +141,20 @@ void add_options_of_every_verb(CLI::App& app, GlobalOptions& globals) {
       ->type_name("N")
       ->take_last()
       ->group(kGroup);
+  app.add_option_function<std::string>(
+         "--max-memory",
+         [&globals](const std::string& text) {
+           try {
+             globals.memory = MemoryBudget(parse_memory_size(text, machine_memory()));
+           } catch (const Error& error) {
+             throw CLI::ValidationError("--max-memory", error.what());
+           }
+         },
+         "Memory that the input may take: bytes, 512M, 8G, or 50% of the machine's (the default). Input that needs "
+         "more ends with exit code 3")
+      ->type_name("SIZE")
+      ->take_last()
+      ->group(kGroup);
 }
 
 extern "C" void on_interrupt(int) {
@@ -176,7 +190,7 @@ int run_verbs(CLI::App& app, GlobalOptions& globals, int argc, const char* const
   } catch (const Error& error) {
     return fail(error_json(error));
   } catch (const std::bad_alloc&) {
-    return fail(error_json("limit_exceeded", static_cast<int>(ErrorKind::kLimitExceeded), "not enough memory"));
+    return fail(error_json(MemoryError(kNoMemory)));
   } catch (const std::system_error& error) { // of std::filesystem, or fmt::print on a full disk
     return fail(error_json("io", static_cast<int>(ErrorKind::kIo), error.what()));
   } catch (const std::exception& error) {
@@ -206,6 +220,8 @@ void install_interrupt_handlers() {
   action.sa_flags = SA_RESTART;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  // Writing beyond a limit of file sizes fails with EFBIG instead, which is reported like a full disk.
+  std::signal(SIGXFSZ, SIG_IGN);
 }
 
 bool is_terminal(std::FILE* stream) {

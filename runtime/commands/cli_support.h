@@ -8,6 +8,7 @@
 
 #include "pbrt_import/scene/diagnostics.h"
 #include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/memory_budget.h"
 
 namespace CLI {
 class App;
@@ -22,6 +23,7 @@ struct GlobalOptions {
   std::string json;            ///< where results go as JSON: a file, "-" for standard output, empty for nowhere
   bool force = false;          ///< existing files may be replaced
   uint32_t threads = 0;        ///< 0: PACKTRACE_THREADS, or as many as the machine has
+  MemoryBudget memory = MemoryBudget(); ///< for all that the input decides the size of
   std::function<int()> action; ///< of the verb on the command line; returns the exit code
 };
 
@@ -35,7 +37,7 @@ CLI::App& add_verb(CLI::App& app, GlobalOptions& globals, const std::string& nam
                    std::function<int()> action);
 
 /// Parses the command line, limits the threads, and runs the verb: main() returns the result. Errors are printed to
-/// standard error and become exit codes: those of Error, 2 for the command line, 5 for lack of memory, 6 for the file
+/// standard error and become exit codes: those of Error, 2 for the command line, 3 for lack of memory, 6 for the file
 /// system, 1 for what should not happen. With --json they are written there too (docs/json_output.md).
 int run_verbs(CLI::App& app, GlobalOptions& globals, int argc, const char* const* argv);
 
@@ -47,7 +49,8 @@ int report_error(const Error& error);
 uint32_t thread_limit(const GlobalOptions& globals);
 
 /// Makes SIGINT and SIGTERM stop the work cooperatively (Progress::cancel()). The second one ends the process at once
-/// with exit code 7, after removing unfinished output files.
+/// with exit code 7, after removing unfinished output files. SIGXFSZ is ignored: what writes beyond a limit of file
+/// sizes gets an error.
 void install_interrupt_handlers();
 
 /// True where colours and cursor movements are welcome: a terminal, TERM is not "dumb".

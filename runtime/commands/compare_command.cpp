@@ -227,9 +227,7 @@ int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
     const Metric metric = compute(i, pair, options, shown);
     values[i] = metric.value;
     if (shown)
-      diff->write([&](const std::filesystem::path& path) {
-        write_png(path, heat_map(pair.test.size, metric.error_map.data, options.diff_white), PngTransfer::kRaw);
-      });
+      diff->write(encode_png(heat_map(pair.test.size, metric.error_map.data, options.diff_white), PngTransfer::kRaw));
   }
 
   const std::vector<Check> checks = check_limits(options, pair, values);

@@ -135,10 +135,12 @@ std::string layout_of(const ExportOptions& options) {
   return layout;
 }
 
-Exported export_file(const ExportOptions& options, const std::string& layout, Progress& progress) {
+Exported export_file(const ExportOptions& options, const std::string& layout, const MemoryBudget& budget,
+                     Progress& progress) {
   if (!is_baked_file(options.input))
     throw FileError(ErrorKind::kInput, options.input,
                     "not a packtrace baked file; make one with packtrace bake SCENE.pbrt -o FILE.ptk");
+  const MemoryReservation memory = reserve_decoded(options.input, budget);
   const BakedFile file = BakedFile::open(options.input);
   if (layout == kGltf) {
     GltfConfig config = options.gltf;
@@ -160,7 +162,7 @@ int run(const ExportOptions& options, const GlobalOptions& globals) {
   refuse_to_replace({options.input});
   ProgressDisplay display(globals);
   Progress progress(display.observer());
-  const Exported result = export_file(options, layout, progress);
+  const Exported result = export_file(options, layout, globals.memory, progress);
   output.write(result.bytes);
   display.finish();
   if (json.wanted()) json.write(result.json);

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/file_bytes.h"
 #include "runtime/commands/binary_output.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/image/png.h"
@@ -121,17 +120,18 @@ void ImageOutputs::add_standard_output(std::vector<std::string> aovs) {
 
 void ImageOutputs::write(const RenderedImage& image, const ExrAttributes& attributes) {
   for (const Entry& entry : entries_) {
-    if (!entry.file) {
-      write_standard_output(encode_png(layer_preview(image, entry.aovs.front(), style_), PngTransfer::kRaw));
+    if (!entry.exr) {
+      const std::vector<std::byte> png =
+          encode_png(layer_preview(image, entry.aovs.front(), style_), PngTransfer::kRaw);
+      if (entry.file)
+        entry.file->write(png);
+      else
+        write_standard_output(png);
       continue;
     }
-    entry.file->write([&](const std::filesystem::path& path) {
-      if (!entry.exr)
-        return write_file_bytes(path, encode_png(layer_preview(image, entry.aovs.front(), style_), PngTransfer::kRaw));
-      std::vector<Layer> layers;
-      for (const std::string& aov : entry.aovs) layers.push_back(exr_layer(image, aov));
-      write_exr(path, image.size, layers, attributes);
-    });
+    std::vector<Layer> layers;
+    for (const std::string& aov : entry.aovs) layers.push_back(exr_layer(image, aov));
+    entry.file->write(encode_exr(image.size, layers, attributes));
   }
   for (const Entry& entry : entries_)
     if (entry.file) entry.file->commit();

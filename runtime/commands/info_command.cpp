@@ -156,6 +156,7 @@ FileInfo info_of(const std::string& input, const InfoOptions& options, const Glo
   if (is_baked_file(input)) {
     require_no_scene_choice(input, options.scene);
     refuse_to_replace({input});
+    const MemoryReservation memory = reserve_decoded(input, globals.memory);
     const BakedFile file = BakedFile::open(input);
     const FileSummary summary = summarize(file);
     const SeamSummary seams = InstanceSeams(file).summary();

@@ -5,7 +5,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pbrt_import/scene/file_bytes.h"
 #include "pbrt_import/scene/file_error.h"
 #include "runtime/commands/option_checks.h"
 
@@ -44,7 +43,7 @@ void JsonOutput::write(const nlohmann::json& document) {
   if (!wanted()) return;
   const std::string text = document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   if (file_) {
-    file_->write([&](const std::filesystem::path& path) { write_file_bytes(path, std::as_bytes(std::span(text))); });
+    file_->write(std::as_bytes(std::span(text)));
     file_->commit();
   } else if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0) {
     throw Error(ErrorKind::kIo, "cannot write JSON to standard output");

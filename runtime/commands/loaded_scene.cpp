@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <fstream>
+#include <cstring>
+#include <span>
 #include <string_view>
 
 #include <CLI/CLI.hpp>
@@ -11,8 +12,10 @@
 #include <nlohmann/json.hpp>
 
 #include "pbrt_import/input_file.h"
+#include "pbrt_import/scene/file_bytes.h"
 #include "pbrt_import/scene/file_error.h"
 #include "pbrt_import/scene/output_file.h"
+#include "pbrt_import/scene/regular_file.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/trace/float_source.h"
 #include "runtime/trace/packed_source.h"
@@ -21,11 +24,23 @@ namespace packtrace {
 
 bool is_baked_file(const std::filesystem::path& file) {
   if (ending_of(file) == ".ptk") return true;
-  std::array<char, baked::kMagic.size()> start{};
-  std::ifstream in(file, std::ios::binary);
-  in.read(start.data(), static_cast<std::streamsize>(start.size()));
-  return in && std::equal(start.begin(), start.end(), baked::kMagic.begin(),
-                          [](char a, uint8_t b) { return static_cast<uint8_t>(a) == b; });
+  const std::string start = read_file_start(file, baked::kMagic.size());
+  return std::equal(start.begin(), start.end(), baked::kMagic.begin(), baked::kMagic.end(),
+                    [](char a, uint8_t b) { return static_cast<uint8_t>(a) == b; });
+}
+
+MemoryReservation reserve_decoded(const std::filesystem::path& file, const MemoryBudget& budget) {
+  baked::PagedHeader header;
+  const std::string start = read_file_start(file, sizeof header);
+  MemoryReservation memory(budget);
+  if (start.size() < sizeof header || !is_paged_file(std::as_bytes(std::span(start)))) return memory;
+  std::memcpy(&header, start.data(), sizeof header);
+  try {
+    memory.resize(header.resident_bytes, "what the file is decoded to");
+  } catch (const MemoryError& error) {
+    throw MemoryError(file, error.what());
+  }
+  return memory;
 }
 
 void add_scene_options(CLI::App& verb, SceneOptions& options) {
@@ -65,7 +80,7 @@ void require_scene_text(const std::filesystem::path& file) {
     throw FileError(ErrorKind::kInput, file, "a baked file already; give the .pbrt scene that it was made of");
   if (text.starts_with("ply\n") || text.starts_with("ply\r"))
     throw FileError(ErrorKind::kInput, file, "a PLY mesh, not a scene; name it in a .pbrt file with Shape \"plymesh\"");
-  if (text.find('\0') != std::string_view::npos)
+  if (text.find('\0') != std::string::npos)
     throw FileError(ErrorKind::kInput, file, "not a text file, so no pbrt-v3 scene");
 }
 
@@ -95,6 +110,7 @@ ImportResult import_for_command(const std::filesystem::path& file, const SceneOp
   options.world = scene_options.world;
   options.time = scene_options.time;
   options.keep_textures = keep_textures;
+  options.memory = globals.memory;
   ImportResult result;
   try {
     result = import_scene(file, options, diagnostics, progress);
@@ -113,17 +129,35 @@ ImportResult import_for_command(const std::filesystem::path& file, const SceneOp
   return result;
 }
 
+void LoadedScene::copy_file(const std::filesystem::path& file, const MemoryBudget& budget) {
+  std::error_code unknown; // what is wrong with the file is said when it is read
+  const uint64_t bytes = std::filesystem::file_size(file, unknown);
+  try {
+    memory.merge(MemoryReservation(budget, unknown ? 0 : bytes, "a private copy"));
+  } catch (const MemoryError& error) {
+    throw MemoryError(file, error.what());
+  }
+  copy = read_file_bytes(file, unknown ? 0 : bytes);
+  baked.emplace(BakedFile::borrow_bytes(copy, file.string()));
+}
+
 LoadedScene load_scene(const std::filesystem::path& file, const SceneOptions& scene_options,
-                       const GlobalOptions& globals, Progress& progress, ProgressDisplay& display) {
+                       const GlobalOptions& globals, Progress& progress, ProgressDisplay& display,
+                       bool private_copy) {
   LoadedScene loaded;
   if (is_baked_file(file)) {
     require_no_scene_choice(file, scene_options);
     refuse_to_replace({file});
-    loaded.baked.emplace(BakedFile::open(file));
+    loaded.memory = reserve_decoded(file, globals.memory);
+    if (private_copy)
+      loaded.copy_file(file, globals.memory);
+    else
+      loaded.baked.emplace(BakedFile::open(file));
     loaded.source = std::make_unique<PackedSource>(*loaded.baked);
   } else {
-    loaded.imported =
-        std::make_unique<Scene>(import_for_command(file, scene_options, globals, progress, display, true).scene);
+    ImportResult imported = import_for_command(file, scene_options, globals, progress, display, true);
+    loaded.imported = std::make_unique<Scene>(std::move(imported.scene));
+    loaded.memory = std::move(imported.memory);
     loaded.source = std::make_unique<FloatSource>(*loaded.imported);
   }
   return loaded;

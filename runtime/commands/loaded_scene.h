@@ -19,6 +19,9 @@ namespace packtrace {
 /// True for .ptk files: by the name, or by the first bytes where the name says something else.
 bool is_baked_file(const std::filesystem::path& file);
 
+/// Memory for what a .ptk of codec fast or small is decoded to, as far as its header can be read. Throws MemoryError.
+MemoryReservation reserve_decoded(const std::filesystem::path& file, const MemoryBudget& budget);
+
 /// How verbs read a pbrt scene; as in ImportOptions.
 struct SceneOptions {
   bool strict = false;
@@ -49,13 +52,20 @@ nlohmann::json problems_json(const ImportStatistics& statistics);
 
 /// A scene on disk, packed or not, ready to be traced.
 struct LoadedScene {
+  std::vector<std::byte> copy;         ///< of the file, where baked is to be over that
   std::optional<BakedFile> baked;      ///< of a .ptk
   std::unique_ptr<Scene> imported;     ///< of a .pbrt
   std::unique_ptr<SceneSource> source; ///< over one of the two
+  MemoryReservation memory;            ///< of what is held in memory
+
+  /// Reads a .ptk into copy and puts baked over that.
+  void copy_file(const std::filesystem::path& file, const MemoryBudget& budget);
 };
 
-/// Throws like BakedFile::open(), require_no_scene_choice() and import_for_command().
+/// @param private_copy read a .ptk into memory instead of mapping it
+/// Throws like BakedFile::open(), reserve_decoded(), require_no_scene_choice() and import_for_command().
 LoadedScene load_scene(const std::filesystem::path& file, const SceneOptions& scene_options,
-                       const GlobalOptions& globals, Progress& progress, ProgressDisplay& display);
+                       const GlobalOptions& globals, Progress& progress, ProgressDisplay& display,
+                       bool private_copy = false);
 
 } // namespace packtrace

@@ -43,6 +43,7 @@ struct RenderOptions {
   std::string size;
   std::optional<std::string> background; ///< of .png files; without one, what suits the layer
   bool no_legend = false;
+  bool private_copy = false;
   uint32_t supersample = 1;
   std::optional<uint32_t> spp, frames;
   bool ground_truth = false, no_denoise = false, fast_edges = false;
@@ -144,6 +145,20 @@ RenderConfig make_config(const SceneSource& source, const Camera& camera, const 
   validate(config);
   validate(config.ao);
   return config;
+}
+
+/// For the layers of a view, the G-buffer's and the denoiser's, about. Sizes may come from the scene's film.
+MemoryReservation reserve_picture(const RenderOptions& options, const RenderConfig& config,
+                                  const MemoryBudget& budget) {
+  constexpr double kPixelBytes = 320.0, kMost = 0x1p62;
+  const double side = config.supersample;
+  const double bytes = kPixelBytes * side * side * static_cast<double>(config.size.width) * config.size.height;
+  try {
+    return MemoryReservation(budget, static_cast<uint64_t>(std::min(kMost, bytes)),
+                             fmt::format("a picture of {} x {} pixels", config.size.width, config.size.height));
+  } catch (const MemoryError& error) {
+    throw MemoryError(options.input, error.what());
+  }
 }
 
 /// @param baked whether the input is a .ptk file
@@ -349,11 +364,12 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   Progress progress(display.observer());
   FileTimings timings;
   const Stopwatch loading;
-  const LoadedScene loaded = load_scene(options.input, options.scene, globals, progress, display);
+  const LoadedScene loaded = load_scene(options.input, options.scene, globals, progress, display, options.private_copy);
   timings.load_s = loading.seconds();
   if (options.lod.error_px) require_levels(options.input, loaded);
   ChosenCamera camera = choose_camera(*loaded.source, options, globals);
   const RenderConfig config = make_config(*loaded.source, camera.camera, options);
+  const MemoryReservation pixels = reserve_picture(options, config, globals.memory);
   const TracerConfig backend = tracer_config(options, loaded.baked.has_value());
   const Traced traced =
       trace(options, globals, loaded, config, std::move(camera), backend, outputs.show_detail(), progress);
@@ -441,6 +457,8 @@ void add_render_command(CLI::App& app, GlobalOptions& globals) {
   verb.add_option("--ao-interreflection", options->ao_interreflection,
                   "Share of light bounced back by what a ray hits, 0..1 (default 0: off)")
       ->type_name("RHO");
+  verb.add_flag("--private-copy", options->private_copy,
+                "Read a .ptk into memory instead of mapping it: it may then change, or go, while it is rendered");
   verb.add_option("--seed", options->seed, "Seed of the sample pattern (default 0)")->type_name("N");
   verb.add_option(
           "--backend", options->backend,

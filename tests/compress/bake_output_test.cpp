@@ -69,6 +69,20 @@ TEST_F(BakeOutput, TheOutputIsCheckedBeforeTheSceneIsBaked) {
   EXPECT_EQ(files(), 1u);
 }
 
+TEST_F(BakeOutput, PackingAsksForMemoryFirst) {
+  Diagnostics diagnostics;
+  Progress progress;
+  const Scene scene = test::scene_of(test::sphere_mesh(40));
+  BakeConfig config;
+  config.memory = MemoryBudget(1000);
+  EXPECT_THROW(bake_scene(scene, config, folder_ / "a.ptk", false, diagnostics, progress), MemoryError);
+  EXPECT_EQ(files(), 0u);
+  EXPECT_EQ(config.memory.used(), 0u);
+  config.memory = MemoryBudget(64 << 20);
+  bake_scene(scene, config, folder_ / "a.ptk", false, diagnostics, progress);
+  EXPECT_EQ(config.memory.used(), 0u);
+}
+
 TEST_F(BakeOutput, ABakedFileOpensFromDisk) {
   Diagnostics diagnostics;
   Progress progress;

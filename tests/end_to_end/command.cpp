@@ -20,7 +20,8 @@ void write_text(const std::filesystem::path& file, const std::string& text) {
 }
 
 CommandResult run_program(const std::string& program, const std::vector<std::string>& arguments,
-                          const std::vector<std::string>& environment, const std::filesystem::path& folder) {
+                          const std::vector<std::string>& environment, const std::filesystem::path& folder,
+                          const std::function<void()>& prepare) {
   const TemporaryFolder streams;
   const std::string out = streams / "out", err = streams / "err";
   std::vector<std::string> words{program}, variables = environment;
@@ -38,6 +39,7 @@ CommandResult run_program(const std::string& program, const std::vector<std::str
     dup2(in_fd, 0), dup2(out_fd, 1), dup2(err_fd, 2);
     for (std::string& variable : variables) putenv(variable.data());
     if (!folder.empty() && chdir(folder.c_str()) != 0) _exit(126);
+    if (prepare) prepare();
     execvp(program.c_str(), argv.data());
     _exit(127);
   }
@@ -53,6 +55,10 @@ CommandResult run_program(const std::string& program, const std::vector<std::str
 CommandResult run_packtrace(const std::vector<std::string>& arguments, const std::vector<std::string>& environment,
                             const std::filesystem::path& folder) {
   return run_program(PACKTRACE_BINARY, arguments, environment, folder);
+}
+
+CommandResult run_packtrace(const std::vector<std::string>& arguments, const std::function<void()>& prepare) {
+  return run_program(PACKTRACE_BINARY, arguments, {}, {}, prepare);
 }
 
 std::string small_scene_text() {

@@ -19,7 +19,7 @@ namespace {
 
 ImportOptions small_limits() {
   ImportOptions options;
-  options.memory_budget_bytes = 16u << 20;
+  options.memory = MemoryBudget(16u << 20);
   options.max_include_depth = 4;
   options.max_included_files = 16;
   options.max_nesting = 32;

@@ -34,7 +34,7 @@ ImportOptions confined() {
 }
 ImportOptions budget(uint64_t bytes) {
   ImportOptions options;
-  options.memory_budget_bytes = bytes;
+  options.max_file_bytes = bytes;
   return options;
 }
 
@@ -291,7 +291,7 @@ std::vector<HostileCase> file_names() {
                R"(scene.pbrt:2:1: error: plymesh "/nonexistent/a.ply": no such file; the shape is skipped
 )"),
       ply_case("PlyNameOfADevice", "/dev/zero",
-               R"(scene.pbrt:2:1: error: plymesh "/dev/zero": is not a regular file; the shape is skipped
+               R"(scene.pbrt:2:1: error: plymesh "/dev/zero": is a device, not a file; the shape is skipped
 )"),
       ply_case("PlyNameOfWindows", "C:\\\\models\\\\a.ply",
                R"(scene.pbrt:2:1: error: plymesh "C:\models\a.ply": no such file; the shape is skipped
@@ -422,10 +422,12 @@ TEST(HostileFiles, FifosAreNotWaitedFor) {
                                 "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"fifo\"\n"
                                 "Material \"matte\" \"spectrum Kd\" \"fifo\""));
   EXPECT_EQ(without_folder(imported.text(), folder),
-            "scene.pbrt:2:1: error: cannot include \"fifo\": is not a regular file\n"
-            "scene.pbrt:3:1: error: plymesh \"fifo\": is not a regular file; the shape is skipped\n"
+            "scene.pbrt:2:1: error: cannot include \"fifo\": is a pipe, not a file; save what it delivers in a file first\n"
+            "scene.pbrt:3:1: error: plymesh \"fifo\": is a pipe, not a file; save what it delivers in a file first; the "
+            "shape is skipped\n"
             "scene.pbrt:4:32: error: texture file \"fifo\" is not a regular file; it counts as white\n"
-            "scene.pbrt:5:18: error: cannot read spectrum file \"fifo\": is not a regular file\n");
+            "scene.pbrt:5:18: error: cannot read spectrum file \"fifo\": is a pipe, not a file; save what it delivers in "
+            "a file first\n");
   EXPECT_EQ(imported.scene.shapes.size(), 1u);
 }
 
@@ -478,9 +480,9 @@ std::string refusal_of(const std::filesystem::path& main_file) {
 TEST(HostileFiles, MainFileMustBeAFile) {
   const SceneFolder folder;
   make_fifo(folder, "fifo");
-  EXPECT_EQ(without_folder(refusal_of(folder.path() / "fifo"), folder), "fifo: is not a regular file");
+  EXPECT_EQ(without_folder(refusal_of(folder.path() / "fifo"), folder), "fifo: is a pipe, not a file; save what it delivers in a file first");
   EXPECT_EQ(without_folder(refusal_of(folder.path() / ""), folder), ": is a directory, not a file");
-  EXPECT_EQ(refusal_of("/dev/zero"), "/dev/zero: is not a regular file");
+  EXPECT_EQ(refusal_of("/dev/zero"), "/dev/zero: is a device, not a file");
   EXPECT_EQ(refusal_of(""), ": no such file");
   EXPECT_EQ(without_folder(refusal_of(folder.path() / std::string(300, 'x')), folder),
             std::string(300, 'x') + ": cannot open: File name too long");

@@ -200,7 +200,7 @@ std::vector<HostileCase> images() {
 )"),
       image_case(
           "PfmOfBillionsOfPixels", "a.pfm", pfm("PF\n16777216 16777216\n-1\n", {1, 1, 1}),
-          R"(scene.pbrt:2:1: error: texture file "a.pfm": decoding its 16777216 x 16777216 pixels needs too much memory; it counts as white
+          R"(scene.pbrt:2:1: error: texture file "a.pfm": damaged image: its 36 bytes cannot hold the 16777216 x 16777216 pixels it claims; it counts as white
 )"),
       image_case(
           "PfmScaleZero", "a.pfm", pfm("PF\n1 1\n0\n", {1, 1, 1}),

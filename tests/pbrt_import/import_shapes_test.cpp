@@ -203,13 +203,21 @@ TEST(Shapes, OneBadParameterCostsItselfOnly) {
 TEST(Shapes, MemoryBudgetIsKept) {
   const SceneFolder folder;
   ImportOptions options;
-  options.memory_budget_bytes = 1000;
-  const Imported imported =
-      import_world(folder, std::string(kTriangle) + "\nShape \"sphere\"\n" + std::string(kTriangle), options);
-  EXPECT_EQ(imported.scene.shapes.size(), 2u);
-  EXPECT_TRUE(
-      imported.reported("Shape \"sphere\" is skipped: all meshes together exceed the memory budget of 1000 bytes"))
-      << imported.text();
+  const std::string text = std::string(kTriangle) + "\nShape \"sphere\"\n" + std::string(kTriangle);
+  options.memory = MemoryBudget(1 << 20);
+  EXPECT_EQ(import_world(folder, text, options).scene.shapes.size(), 3u);
+  EXPECT_EQ(options.memory.used(), 0u);
+  options.memory = MemoryBudget(1000);
+  try {
+    (void)import_world(folder, text, options);
+    ADD_FAILURE() << "accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::kInput);
+    const std::string message = error.what();
+    EXPECT_NE(message.find("scene.pbrt:"), std::string::npos) << message;
+    EXPECT_NE(message.find(":1: the shape needs "), std::string::npos) << message;
+    EXPECT_NE(message.find(" of memory, of 1000 bytes left; --max-memory raises it"), std::string::npos) << message;
+  }
 }
 
 // PLY files
@@ -247,15 +255,15 @@ TEST(PlyShapes, MemoryBudgetHoldsForAllOfThemTogether) {
     text += "Shape \"plymesh\" \"string filename\" \"" + numbered("a", i) + "\"\n";
   }
   ImportOptions options;
-  options.memory_budget_bytes = 3 * (3 * sizeof(Vec3) + 100 * sizeof(Triangle));
+  options.memory = MemoryBudget(100'000);
   EXPECT_EQ(import_world(folder, text, options).scene.shapes.size(), 3u);
-  --options.memory_budget_bytes;
+  options.memory = MemoryBudget(3 * (3 * sizeof(Vec3) + 100 * sizeof(Triangle)));
   try {
     (void)import_world(folder, text, options);
     ADD_FAILURE() << "accepted";
   } catch (const Error& error) {
-    EXPECT_EQ(error.kind(), ErrorKind::kLimitExceeded);
-    EXPECT_STREQ(error.what(), "all meshes together exceed the memory budget of 3707 bytes");
+    EXPECT_EQ(error.kind(), ErrorKind::kInput);
+    EXPECT_NE(std::string(error.what()).find("left; --max-memory raises it"), std::string::npos) << error.what();
   }
 }
 

@@ -420,17 +420,19 @@ TEST(AlbedoTextures, TogetherStayWithinTheBudget) {
              "Material \"matte\" \"texture Kd\" \"" + name + "\"\n" + std::string(kTriangle) + "\n";
   }
   folder.write("three.pbrt", "WorldBegin\n" + world + "\nWorldEnd\n");
+  const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1); // one image after the other
   const auto textures = [&](uint64_t budget, bool keep) {
     ImportOptions options;
     options.keep_textures = keep;
-    options.memory_budget_bytes = budget;
+    options.memory = MemoryBudget(budget);
     Diagnostics diagnostics;
     Progress progress;
     return import_scene(folder.path() / "three.pbrt", options, diagnostics, progress).scene.textures.size();
   };
-  EXPECT_EQ(textures(9000, true), 3u);
-  EXPECT_EQ(textures(8999, false), 0u);
-  EXPECT_THROW(textures(8999, true), Error);
+  // Content and decoding take 10,000 bytes at a time, colours of the images 9000 and the textures 9000.
+  EXPECT_EQ(textures(20'000, true), 3u);
+  EXPECT_EQ(textures(15'000, false), 0u);
+  EXPECT_THROW(textures(15'000, true), MemoryError);
 }
 
 } // namespace

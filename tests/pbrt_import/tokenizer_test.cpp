@@ -22,7 +22,7 @@ Tokenizer open(const SceneFolder& folder, std::string_view text, size_t window =
 
 /// Tokens as "kind:text@line:column", separated by spaces.
 std::string listing(Tokenizer tokenizer) {
-  constexpr const char* kKinds[] = {"w", "s", "[", "]", "u", "b", "end"};
+  constexpr const char* kKinds[] = {"w", "s", "[", "]", "u", "b", "l", "end"};
   std::string all;
   while (true) {
     const Token token = tokenizer.next();
@@ -267,6 +267,20 @@ TEST(InputFile, GzipBombsStopAtTheLimit) {
     EXPECT_EQ(error.kind(), ErrorKind::kLimitExceeded);
   }
   EXPECT_EQ(read_whole_file(file, 1 << 20).size(), size_t{1} << 20);
+}
+
+TEST(Tokenizer, TokensLongerThanAnyNameHaveNoText) {
+  const SceneFolder folder;
+  const std::string longest(kMaxTokenBytes - 2, 'a'), too_long(5 * kMaxTokenBytes, 'a');
+  EXPECT_EQ(listing(open(folder, "\"" + longest + "\" b")), "s:" + longest + "@1:1 w:b@1:" + std::to_string(longest.size() + 4) +
+                                                                 " end@1:" + std::to_string(longest.size() + 5) + " ");
+  for (const size_t window : {size_t{64}, Tokenizer::kDefaultWindow}) {
+    EXPECT_EQ(listing(open(folder, "\"" + too_long + "\"\nb", window)), "l@1:1 w:b@2:1 end@2:2 ");
+    EXPECT_EQ(listing(open(folder, too_long + "\nb", window)), "l@1:1 w:b@2:1 end@2:2 ");
+    EXPECT_EQ(listing(open(folder, "\"" + too_long + "\\\"\"\nb", window)), "l@1:1 w:b@2:1 end@2:2 ");
+    EXPECT_EQ(listing(open(folder, "\"" + too_long + "\nb", window)), "l@1:1 w:b@2:1 end@2:2 ");
+    EXPECT_EQ(listing(open(folder, too_long, window)).substr(0, 6), "l@1:1 ");
+  }
 }
 
 TEST(InputFile, OnlyRegularFilesAreRead) {

@@ -206,9 +206,7 @@ void LodStore::keep(const LodKey& key, const EncodedLod& lod) const {
       std::as_bytes(std::span(levels)), std::as_bytes(std::span(clusters)), std::as_bytes(std::span(payload)),
       std::as_bytes(std::span(lod.groups)), std::as_bytes(std::span(lod.links))};
   OutputFile file(path_of(key), true);
-  file.write([&](const std::filesystem::path& path) {
-    write_file_bytes(path, assemble_section_file(header, parts, kRecordBytes));
-  });
+  file.write(assemble_section_file(header, parts, kRecordBytes));
   file.commit();
 }
 

@@ -90,7 +90,7 @@ TEST(CliSupport, ErrorsBecomeExitCodesAndOneLine) {
     EXPECT_EQ(result.err, "packtrace: error: a.ptk: broken\n");
     EXPECT_EQ(result.out, "");
   }
-  EXPECT_EQ(run({"go"}, [](const GlobalOptions&) -> int { throw std::bad_alloc(); }).code, 5);
+  EXPECT_EQ(run({"go"}, [](const GlobalOptions&) -> int { throw std::bad_alloc(); }).code, 3);
   EXPECT_EQ(run({"go"}, [](const GlobalOptions&) -> int { throw std::logic_error("no"); }).code, 1);
   EXPECT_EQ(run({"go"}, [](const GlobalOptions&) { return 4; }).code, 4);
 }

@@ -1,10 +1,21 @@
 #include "pbrt_import/scene/output_file.h"
 
 #include <cmath>
+#include <csignal>
+#include <cstdlib>
 #include <limits>
+#include <span>
+#include <string>
+#include <vector>
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <sys/file.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "pbrt_import/scene/file_bytes.h"
 #include "runtime/commands/json_output.h"
@@ -39,7 +50,6 @@ TEST(OutputFile, LeavesNothingWhenAbandoned) {
   {
     const OutputFile file(folder / "a.txt", true);
     write_text(file.path(), "half");
-    EXPECT_EQ(folder.files(), 2u);
   }
   EXPECT_EQ(read_text(folder / "a.txt"), "old");
   EXPECT_EQ(folder.files(), 1u);
@@ -53,21 +63,6 @@ TEST(OutputFile, ReplacesOnlyWithForce) {
   write_text(file.path(), "new");
   file.commit();
   EXPECT_EQ(read_text(folder / "a.txt"), "new");
-}
-
-TEST(OutputFile, ErrorsNameTheTargetAndNotTheTemporaryFile) {
-  const TemporaryFolder folder;
-  const OutputFile file(folder / "a.txt", false);
-  try {
-    file.write([](const std::filesystem::path& path) {
-      throw Error(ErrorKind::kIo, path.string() + ": cannot write: disk full (" + path.string() + ")");
-    });
-    FAIL();
-  } catch (const Error& error) {
-    const std::string target = folder / "a.txt";
-    EXPECT_EQ(error.what(), target + ": cannot write: disk full (" + target + ")");
-    EXPECT_EQ(error.kind(), ErrorKind::kIo);
-  }
 }
 
 TEST(OutputFile, CannotReplaceWhatIsRead) {
@@ -142,10 +137,82 @@ TEST(OutputFile, UnfinishedFilesCanBeRemovedAtOnce) {
   OutputFile kept(folder / "kept", false);
   kept.commit();
   const OutputFile a(folder / "a", false), b(folder / "b", false);
-  EXPECT_EQ(folder.files(), 3u);
   remove_unfinished_output();
   EXPECT_EQ(folder.files(), 1u);
   EXPECT_TRUE(std::filesystem::exists(folder / "kept"));
+}
+
+TEST(OutputFile, KilledProcessesLeaveNothing) {
+  const TemporaryFolder folder;
+  for (const bool force : {false, true}) {
+    const pid_t child = fork();
+    if (child == 0) {
+      OutputFile file(folder / "a", force);
+      file.write(std::as_bytes(std::span("half", 4)));
+      std::raise(SIGKILL);
+    }
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    EXPECT_TRUE(WIFSIGNALED(status));
+    // At once, or else as soon as somebody writes there again.
+    remove_stale_output(folder.path());
+    EXPECT_EQ(folder.files(), 0u);
+  }
+}
+
+TEST(OutputFile, OnlyFilesOfDeadProcessesAreStale) {
+  const TemporaryFolder folder;
+  const pid_t child = fork();
+  if (child == 0) std::_Exit(0);
+  ASSERT_EQ(waitpid(child, nullptr, 0), child); // and so its number is free
+  const auto name = [&](pid_t owner, int number) {
+    return folder / (".packtrace-" + std::to_string(owner) + "-" + std::to_string(number) + ".tmp");
+  };
+  write_text(name(child, 1), "stale");
+  write_text(name(child, 2), "of a process in another container");
+  write_text(name(getpid(), 1), "in use");
+  write_text(folder / ".packtrace-x-1.tmp", "of somebody else");
+  write_text(folder / "notes.tmp", "of somebody else");
+  const Descriptor locked(open(name(child, 2).c_str(), O_RDONLY));
+  ASSERT_EQ(flock(locked.get(), LOCK_EX), 0);
+  remove_stale_output(folder.path());
+  EXPECT_FALSE(std::filesystem::exists(name(child, 1)));
+  EXPECT_EQ(folder.files(), 4u);
+}
+
+TEST(OutputFile, PermissionsAreThoseOfNewFiles) {
+  const TemporaryFolder folder;
+  const mode_t before = umask(0027);
+  for (const bool force : {false, true}) {
+    OutputFile file(folder / "a", force);
+    file.commit();
+    struct stat info {};
+    ASSERT_EQ(stat((folder / "a").c_str(), &info), 0);
+    EXPECT_EQ(info.st_mode & 0777u, 0640u) << force;
+  }
+  umask(before);
+  EXPECT_EQ(folder.files(), 1u);
+}
+
+TEST(OutputFile, FullDisksAreReportedByTheNameOfTheTarget) {
+  const TemporaryFolder folder;
+  const pid_t child = fork();
+  if (child == 0) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const struct rlimit limit { 10, 10 };
+    setrlimit(RLIMIT_FSIZE, &limit);
+    try {
+      OutputFile file(folder / "a", false);
+      file.write(std::vector<std::byte>(100));
+    } catch (const Error& error) {
+      const bool named = std::string(error.what()).starts_with((folder / "a").string() + ": cannot write");
+      std::_Exit(named ? error.exit_code() : 1);
+    }
+    std::_Exit(2);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_EQ(WEXITSTATUS(status), 6);
 }
 
 TEST(JsonOutput, WritesFilesThatParse) {

@@ -1,0 +1,105 @@
+// What the program does where input, memory or disk space end.
+
+#include <filesystem>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "tests/end_to_end/workbench.h"
+
+namespace packtrace::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Ends a process that hangs: 128 + SIGALRM.
+void end_soon() { ::alarm(60); }
+
+TEST(Limits, PipesAndDevicesAreRefusedAtOnce) {
+  const Workbench bench;
+  bench.bake();
+  for (const char* name : {"pipe.pbrt", "pipe.ptk", "pipe.png"}) ASSERT_EQ(::mkfifo((bench / name).c_str(), 0600), 0);
+  const std::string out = bench / "out.png";
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{"info", bench / "pipe.pbrt"},
+                                                    {"info", bench / "pipe.ptk"},
+                                                    {"info", "/dev/zero"},
+                                                    {"info", bench.path().string()},
+                                                    {"bake", bench / "pipe.pbrt", "-o", bench / "out.ptk"},
+                                                    {"bake", "/dev/zero", "-o", bench / "out.ptk"},
+                                                    {"render", bench / "pipe.pbrt", "-o", out},
+                                                    {"render", bench / "pipe.ptk", "-o", out},
+                                                    {"export", bench / "pipe.ptk", "-o", bench / "out.glb"},
+                                                    {"compare", bench / "pipe.png", bench / "pipe.png"}}) {
+    const CommandResult result = run_packtrace(arguments, end_soon);
+    EXPECT_EQ(result.exit_code, 3) << arguments[0] << ' ' << arguments[1] << '\n' << result.err;
+    EXPECT_NE(result.err.find(arguments[1] + ": is a "), std::string::npos) << result.err;
+  }
+  EXPECT_EQ(file_count(bench.path()), 5u);
+}
+
+TEST(Limits, FilesLargerThanTheLimitOfTheProcessAreAnIoErrorAndLeaveNothing) {
+  const Workbench bench;
+  write_text(bench / "ball.pbrt", "WorldBegin\nShape \"sphere\"\nWorldEnd\n");
+  const std::string out = bench / "out.ptk";
+  const auto small_files = [] {
+    const struct rlimit limit { 4096, 4096 };
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  };
+  const CommandResult result = run_packtrace({"bake", bench / "ball.pbrt", "-o", out}, small_files);
+  EXPECT_EQ(result.exit_code, 6) << result.err;
+  EXPECT_NE(result.err.find(out + ": cannot write: larger than files may be here"), std::string::npos) << result.err;
+  EXPECT_EQ(file_count(bench.path()), 2u);
+}
+
+TEST(Limits, InputBeyondTheMemoryBudgetIsAnInputErrorWithItsPlace) {
+  const Workbench bench;
+  const std::string scene = bench / "fine.pbrt", out = bench / "out.ptk";
+  write_text(scene, "WorldBegin\nShape \"loopsubdiv\" \"integer nlevels\" 8 \"integer indices\" [0 1 2]\n"
+                    "  \"point P\" [0 0 0 1 0 0 0 1 0]\nWorldEnd\n");
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{"info", scene},
+                                                    {"bake", scene, "-o", out},
+                                                    {"render", scene, "-o", bench / "a.png"}}) {
+    std::vector<std::string> limited = arguments;
+    limited.insert(limited.end(), {"--max-memory", "1M"});
+    const CommandResult result = run_packtrace(limited);
+    EXPECT_EQ(result.exit_code, 3) << result.err;
+    EXPECT_NE(result.err.find(scene + ":2:1: the shape needs "), std::string::npos) << result.err;
+    EXPECT_NE(result.err.find("; --max-memory raises it"), std::string::npos) << result.err;
+  }
+  EXPECT_EQ(run_packtrace({"info", scene, "--max-memory", "64M"}).exit_code, 0);
+  const CommandResult packing = run_packtrace({"bake", scene, "-o", out, "--max-memory", "12M"});
+  EXPECT_EQ(packing.exit_code, 3);
+  EXPECT_NE(packing.err.find("packing 65536 triangles needs "), std::string::npos) << packing.err;
+  EXPECT_EQ(file_count(bench.path()), 2u);
+  for (const char* size : {"much", "0", "-5", ""})
+    EXPECT_EQ(run_packtrace({"info", scene, std::string("--max-memory=") + size}).exit_code, 2) << size;
+}
+
+TEST(Limits, PicturesAndBakedFilesAskForMemoryToo) {
+  const Workbench bench;
+  ASSERT_EQ(run_packtrace({"bake", bench.scene(), "-o", bench.baked(), "-q", "--codec", "small"}).exit_code, 0);
+  const std::string out = bench / "out.png";
+  const CommandResult picture =
+      run_packtrace({"render", bench.baked(), "-o", out, "--size", "60000x60000", "--max-memory", "1G"}, end_soon);
+  EXPECT_EQ(picture.exit_code, 3);
+  EXPECT_NE(picture.err.find("a picture of 60000 x 60000 pixels needs "), std::string::npos) << picture.err;
+  const CommandResult decoded = run_packtrace({"info", bench.baked(), "--max-memory", "100"});
+  EXPECT_EQ(decoded.exit_code, 3);
+  EXPECT_NE(decoded.err.find(bench.baked() + ": what the file is decoded to needs "), std::string::npos) << decoded.err;
+}
+
+TEST(Limits, APrivateCopyIsRenderedLikeTheFile) {
+  const Workbench bench;
+  bench.bake();
+  const std::string a = bench / "a.exr", b = bench / "b.exr";
+  ASSERT_EQ(run_packtrace({"render", bench.baked(), "-o", a, "-q", "--frames", "2"}).exit_code, 0);
+  ASSERT_EQ(run_packtrace({"render", bench.baked(), "-o", b, "-q", "--frames", "2", "--private-copy"}).exit_code, 0);
+  EXPECT_EQ(read_text(a), read_text(b));
+}
+
+} // namespace
+} // namespace packtrace::test
