@@ -345,6 +345,14 @@ PreviewStyle preview_style(const RenderOptions& options) {
   return style;
 }
 
+/// @param count of instances that are not traced
+void warn_of_lines(const std::string& input, size_t count) {
+  if (count == 0) return;
+  print_printable(fmt::format("{}: warning: {} instance{} not traced: pressed onto a line or a point\n", input, count,
+                              count == 1 ? " is" : "s are"),
+                  stderr);
+}
+
 int run(const RenderOptions& options, const GlobalOptions& globals) {
   if (options.outputs.empty()) fail_without_output("render", options.input, ".png");
   tracer_config(options, false); // complains before the work
@@ -397,6 +405,7 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   }
   if (!image.seen && !globals.quiet)
     print_printable(options.input + ": warning: this camera sees nothing of the scene; try --camera auto\n", stderr);
+  if (!globals.quiet) warn_of_lines(options.input, tracers[0]->flat_instances().size());
   if (json.wanted()) json.write(result);
   if (json.to_stdout() || globals.quiet) return 0;
   std::FILE* const text = outputs.to_stdout() ? stderr : stdout;

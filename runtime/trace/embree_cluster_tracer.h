@@ -46,8 +46,7 @@ public:
   /// PackedTracer's, "bvh": what Embree holds, and "cluster nodes": which nodes are a cluster's.
   std::vector<ResidentPart> resident() const override;
 
-  /// Instances that no ray hits, as PackedTracer's.
-  std::span<const uint32_t> flat_instances() const { return packed_.flat_instances(); }
+  std::span<const uint32_t> flat_instances() const override { return packed_.flat_instances(); }
 
 private:
   struct Trees;

@@ -12,6 +12,24 @@ double norm(const glm::dmat3& m) {
   return std::sqrt(glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
 }
 
+/// Whether doubles can invert it well enough that rays meet surfaces where they are.
+bool is_invertible(const DAffine& to_from) {
+  constexpr double kMaxCondition = 1e9;
+  const DAffine from_to = inverse(to_from);
+  return norm(glm::dmat3(to_from)) * norm(glm::dmat3(from_to)) <= kMaxCondition &&
+         is_finite(DVec3(from_to[3])); // false for NaN
+}
+
+/// What is perpendicular to two of three vectors, of unit length: the best of the three choices. Zero if all are
+/// parallel.
+DVec3 perpendicular(DVec3 a, DVec3 b, DVec3 c) {
+  DVec3 best(0.0);
+  for (const DVec3 v : {glm::cross(a, b), glm::cross(b, c), glm::cross(c, a)})
+    if (glm::dot(v, v) > glm::dot(best, best)) best = v;
+  const double length = glm::length(best);
+  return length > 0.0 ? best / length : best;
+}
+
 glm::dmat3 absolute(const glm::dmat3& m) { return {glm::abs(m[0]), glm::abs(m[1]), glm::abs(m[2])}; }
 
 } // namespace
@@ -42,6 +60,21 @@ bool traceable_as_instance(const DAffine& unit_from_surface) {
   const glm::dmat3 inverted = glm::inverse(linear);
   const double forward = norm(linear), backward = norm(inverted);
   return forward <= kMaxNorm && backward <= kMaxNorm && forward * backward <= kMaxCondition; // false for NaN
+}
+
+std::optional<DAffine> invertible_placement(const DAffine& to_from) {
+  constexpr double kThickness = 1e-8;
+  if (is_invertible(to_from)) return to_from;
+  const glm::dmat3 linear(to_from), transposed = glm::transpose(linear);
+  const double size = norm(linear);
+  const glm::dmat3 columns = linear / size, rows = transposed / size; // products of two neither overflow nor vanish
+  const DVec3 plane_normal = perpendicular(columns[0], columns[1], columns[2]);
+  const DVec3 lost_direction = perpendicular(rows[0], rows[1], rows[2]);
+  const double side = glm::dot(plane_normal, linear * lost_direction) < 0.0 ? -1.0 : 1.0;
+  const glm::dmat3 thick = linear + glm::outerProduct(plane_normal * (side * kThickness * size), lost_direction);
+  const DAffine result(thick[0], thick[1], thick[2], to_from[3]);
+  if (!is_invertible(result)) return std::nullopt;
+  return result;
 }
 
 Bounds placed_bounds(const SceneSource& source, std::span<const Bounds> bounds) {

@@ -109,6 +109,9 @@ public:
   /// All that tracing keeps in memory, geometry included where the tracer reads it.
   virtual std::vector<ResidentPart> resident() const = 0;
 
+  /// Instances that no ray hits because their transform presses them onto a line or a point, or nearly so.
+  virtual std::span<const uint32_t> flat_instances() const { return {}; }
+
   /// Of trees built here, as far as the backend knows.
   virtual std::vector<TreeBytes> tree_bytes() const { return {}; }
 };

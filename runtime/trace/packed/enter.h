@@ -197,11 +197,12 @@ inline bool unit_block(const UnitRays& from, uint32_t first, uint32_t wanted, fl
 
 /// Moves rays into a tree's grid and sets them up. Returns those that may hit something.
 /// @tparam kNearest whether nearest hits are wanted, for which t must be right and is needed in unit space
+/// @param pad_coordinate boxes' planes are moved outwards as for this coordinate, or the origin's if that is larger
 /// @param rays as bits
 /// @param group RayGroup, or another where the grid is unit space
 template <bool kNearest, typename Group>
-inline uint64_t enter(const TracePlacement& placement, float max_coordinate, const UnitRays& from, uint64_t rays,
-                      Group& group) {
+inline uint64_t enter(const TracePlacement& placement, float max_coordinate, float pad_coordinate, const UnitRays& from,
+                      uint64_t rays, Group& group) {
   uint64_t entered = 0;
   const bool find_reach = Group::kSideBySide && static_cast<uint32_t>(__builtin_popcountll(rays)) >= kLeastSideBySide &&
                           !(kNearest && from.one_origin);
@@ -219,7 +220,7 @@ inline uint64_t enter(const TracePlacement& placement, float max_coordinate, con
                    ? move_block<true, kNearest>(placement, max_coordinate, from, first, wanted, block, group)
                    : move_block<false, kNearest>(placement, max_coordinate, from, first, wanted, block, group);
     entered |= uint64_t{usable} << first;
-    set_boxes(block, max_coordinate, first, group);
+    set_boxes(block, pad_coordinate, first, group);
     if constexpr (Group::kSideBySide)
       if (find_reach) reach.template add<kNearest>(block, usable);
     if constexpr (Group::kTriangles) set_shears<kNearest>(block, first, group);

@@ -103,7 +103,8 @@ private:
   /// Through the tree over placements.
   void trace_top() {
     SideBySideRays group;
-    const uint64_t rays = enter<!kAny>(scene_.top, scene_.top_max_coordinate, unit_, alive_, group);
+    const uint64_t rays =
+        enter<!kAny>(scene_.top, scene_.top_max_coordinate, scene_.top_pad_coordinate, unit_, alive_, group);
     by_octant(group, rays, [&](uint64_t together, uint32_t octant) { trace_top(group, together, octant); });
   }
 
@@ -148,8 +149,9 @@ private:
     if (rays == 0 || (place.ray_classes & ray_class_) == 0) return;
     if constexpr (kCount) counters_->placements += count_ones(rays);
     const TraceTree& tree = scene_.trees[place.tree];
+    exact_differences_ = tree.max_coordinate <= kExactDifferences;
     RayGroup group;
-    rays = enter<!kAny>(place, tree.max_coordinate, unit_, rays, group);
+    rays = enter<!kAny>(place, tree.max_coordinate, tree.max_coordinate, unit_, rays, group);
     Beam beam;
     if constexpr (!kAny)
       if (unit_.one_origin && make_beam(group, tree.max_coordinate, rays, beam)) group.beam = &beam;
@@ -293,7 +295,11 @@ private:
       const DecodedBatch& batch = decoded(cluster, first, count);
       if constexpr (kCount) counters_->triangles += count_ones(rays) * batch.count;
       const Place place{placement, cluster, first};
-      const BatchNormals normals = batch_normals<Lanes>(batch);
+      BatchNormals normals;
+      if (exact_differences_)
+        normals = batch_normals<Lanes>(batch);
+      else
+        batch_normals_of_large(batch, normals);
       uint64_t exact = 0;
       if (kAny && (scene_.clusters[cluster].flags & kMasked) == 0) {
         alive_ &= ~rays_that_hit<Lanes, !kAny>(batch, normals, group, rays, exact);
@@ -412,6 +418,7 @@ private:
   const uint32_t* numbers_ = nullptr; ///< of its rays
   uint64_t alive_ = 0;                ///< rays that still look for a hit
   uint64_t nearer_ = 0;               ///< rays whose nearest hit the placement traced last has
+  bool exact_differences_ = false;    ///< of vertices of the tree that is traced
   UnitRays unit_;
 };
 

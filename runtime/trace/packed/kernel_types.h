@@ -121,6 +121,9 @@ struct TreeSearch {
   uint64_t (*visit)(const TreeSearch& search, const uint32_t* nodes, uint32_t node_count, uint64_t rays);
 };
 
+/// Of the largest coordinate: 6 M kSmallestDirection, over kBoxPad.
+inline constexpr float kLeastTopPad = 0x1p-57f;
+
 struct KernelScene {
   const TraceCluster* clusters; ///< by number in the cluster section
   const TraceTree* trees;
@@ -129,6 +132,10 @@ struct KernelScene {
   uint32_t placement_count;
   TracePlacement top;       ///< of top_nodes, whose grid is unit space
   float top_max_coordinate; ///< of the boxes in top_nodes
+  /// M of kBoxPad there. Over more than eight placements it is kLeastTopPad of the largest coordinate, and the boxes
+  /// themselves are larger by 2^-20 of their planes' coordinates, the planes' share of the roundings: else one
+  /// placement far away would make all rays near the origin enter all others.
+  float top_pad_coordinate;
   /// Decodes triangles of a kWide cluster; returns how many.
   uint32_t (*decode_wide)(const void* owner, uint32_t cluster, uint32_t first, uint32_t count, DecodedBatch& out);
   /// Whether a masked triangle is there.

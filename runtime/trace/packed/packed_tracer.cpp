@@ -35,15 +35,6 @@ DAffine outer_from_grid(const baked::TreeRecord& tree) {
   return DAffine(DVec3(step, 0, 0), DVec3(0, step, 0), DVec3(0, 0, step), origin * step);
 }
 
-/// Whether doubles can invert it well enough that rays meet its surfaces where they are.
-bool invertible(const DAffine& to_from, const DAffine& from_to) {
-  constexpr double kMaxCondition = 1e9;
-  const auto norm = [](const DAffine& m) {
-    return std::sqrt(glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
-  };
-  return norm(to_from) * norm(from_to) <= kMaxCondition && is_finite(from_to[3]); // false for NaN
-}
-
 /// Whether it does no more than scale and move.
 bool is_aligned(const DAffine& m) {
   return m[0].y == 0.0 && m[0].z == 0.0 && m[1].x == 0.0 && m[1].z == 0.0 && m[2].x == 0.0 && m[2].y == 0.0;
@@ -52,6 +43,16 @@ bool is_aligned(const DAffine& m) {
 /// Placements at most that are looked for by the boxes of their parts.
 constexpr size_t kMostWithParts = baked::kNodeWidth;
 
+/// A box of the tree over many placements, larger by what rounding its planes may take: see packed::kLeastTopPad.
+TreeBox grown(TreeBox box) {
+  constexpr float kGrowth = 0x1p-20f;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    box.lo[axis] = std::nextafter(box.lo[axis] - kGrowth * std::abs(box.lo[axis]), -INFINITY);
+    box.hi[axis] = std::nextafter(box.hi[axis] + kGrowth * std::abs(box.hi[axis]), INFINITY);
+  }
+  return box;
+}
+
 /// Sets up the tree over placements as something placed in unit space itself.
 /// @param max_coordinate at least that of all grids whose axes are those of unit space, there
 void place_top(std::span<const TreeBox> boxes, float max_coordinate, packed::KernelScene& scene) {
@@ -59,12 +60,14 @@ void place_top(std::span<const TreeBox> boxes, float max_coordinate, packed::Ker
   for (const TreeBox& box : boxes) all.extend(box);
   scene.top = {};
   scene.top.aligned = 1;
+  const bool parts = boxes.size() <= kMostWithParts; // whose boxes are not larger than what they hold
   scene.top_max_coordinate = max_coordinate;
   for (size_t axis = 0; axis < 3; ++axis) {
     scene.top.grid_from_unit[3 * axis + axis] = 1.0;
     scene.top.box_lo[axis] = all.lo[axis], scene.top.box_hi[axis] = all.hi[axis];
     scene.top_max_coordinate = std::max({scene.top_max_coordinate, std::abs(all.lo[axis]), std::abs(all.hi[axis])});
   }
+  scene.top_pad_coordinate = (parts ? 1.0f : packed::kLeastTopPad) * scene.top_max_coordinate;
 }
 
 } // namespace
@@ -103,6 +106,7 @@ PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, con
   t.scene.placements = t.placements.data();
   t.scene.placement_count = static_cast<uint32_t>(t.placements.size());
   if (t.placements.size() > 1) {
+    if (t.placements.size() > kMostWithParts) std::ranges::transform(t.boxes, t.boxes.begin(), grown);
     t.top = build_top_tree(t.boxes);
     t.scene.top_nodes = t.top.data();
     if (t.top.size() > 1) t.stream_depth = top_tree_depth(t.top);
@@ -170,16 +174,20 @@ void PackedTracer::place() {
     const uint32_t tree = t.tree_of[instances[i].geometry];
     if (tree == baked::kNone) continue;
     const DAffine world_from_object(instances[i].world_from_object);
-    const DAffine unit_from_grid =
-        compose(compose(space_.unit_from_outer(), world_from_object), outer_from_grid(t.records[tree]));
-    t.surfaces[i] = instanced_placement(i, world_from_object, unit_from_grid);
+    const std::optional<DAffine> unit_from_grid = invertible_placement(
+        compose(compose(space_.unit_from_outer(), world_from_object), outer_from_grid(t.records[tree])));
+    if (!unit_from_grid) {
+      flat_instances_.push_back(i);
+      continue;
+    }
+    t.surfaces[i] = instanced_placement(i, world_from_object, *unit_from_grid);
     // Rays move in doubles, and only what they become in the grid is rounded.
     t.surfaces[i].moved_linear = glm::dmat3(0.0);
     t.surfaces[i].moved_offset = DVec3(0.0);
     const bool in_world = t.records[tree].geometry == baked::kWorldTree;
     if (in_world && world_placed) continue;
     world_placed |= in_world;
-    add_placement(tree, in_world ? baked::kNone : i, unit_from_grid);
+    add_placement(tree, in_world ? baked::kNone : i, *unit_from_grid);
   }
 }
 
@@ -188,7 +196,6 @@ void PackedTracer::add_placement(uint32_t tree, uint32_t instance, const DAffine
   Tables& t = *tables_;
   if (t.records[tree].node_count == 0) return;
   const DAffine grid_from_unit = inverse(unit_from_grid);
-  if (!invertible(unit_from_grid, grid_from_unit)) return flat_instances_.push_back(instance);
   packed::TracePlacement placement{};
   for (int column = 0; column < 4; ++column)
     for (int axis = 0; axis < 3; ++axis) placement.grid_from_unit[3 * column + axis] = grid_from_unit[column][axis];

@@ -38,8 +38,7 @@ public:
   std::vector<ResidentPart> resident() const override;
   std::vector<TreeBytes> tree_bytes() const override { return lod_trees_.trees; }
 
-  /// Instances that no ray hits because their transform flattens them, or nearly so.
-  std::span<const uint32_t> flat_instances() const { return flat_instances_; }
+  std::span<const uint32_t> flat_instances() const override { return flat_instances_; }
 
   /// Of a LodSource.
   const LodTrees& lod_trees() const { return lod_trees_; }

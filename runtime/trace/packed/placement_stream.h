@@ -43,8 +43,8 @@ public:
     for (uint32_t i = 0; i < count; ++i) group.numbers[i] = numbers[i];
     group.octant = octant;
     traversal_.take(numbers, count);
-    group.alive =
-        enter<!kAny>(scene_.top, scene_.top_max_coordinate, traversal_.unit(), traversal_.alive(), group.boxes);
+    group.alive = enter<!kAny>(scene_.top, scene_.top_max_coordinate, scene_.top_pad_coordinate, traversal_.unit(),
+                               traversal_.alive(), group.boxes);
   }
 
   /// Traces the portion and begins another.

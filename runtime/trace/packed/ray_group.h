@@ -23,10 +23,11 @@ constexpr uint32_t kLeastSideBySide = 12;
 ///  - A plane's parameter p inv + b: the node's origin to float (1 M), its plane (1 M), inv's rounding (2 M, as b has
 ///  the
 ///    same one), b's product and pad (1 M each), the last rounding (2 M): 8 u M.
-///  - A component below 2^-40 counts as 2^-40: within the reach of 4 M, 2^-38 M.
-/// So 20 u M suffice, and 24 are taken.
+///  - A component below 2^-80 counts as 2^-80, whose inverse times 12 M is a float: within the reach of 6 M, next to
+///    nothing.
+/// So 20 u M suffice, and 24 are taken. In the tree over many placements M is less: see KernelScene.
 constexpr float kBoxPad = 24.0f * 0x1p-24f;
-constexpr float kSmallestDirection = 0x1p-40f;
+constexpr float kSmallestDirection = 0x1p-80f;
 
 /// Of t: what rounding t to a float in unit space takes at most (2^-24), and rounding it in a grid as well.
 constexpr double kUnitRounding = 0x1p-23;
@@ -166,9 +167,9 @@ struct RayBlock {
 };
 
 template <typename Group>
-[[gnu::always_inline]] inline void set_boxes(const RayBlock& block, float max_coordinate, uint32_t first,
+[[gnu::always_inline]] inline void set_boxes(const RayBlock& block, float pad_coordinate, uint32_t first,
                                              Group& group) {
-  Floats reach = Floats{} + max_coordinate;
+  Floats reach = Floats{} + pad_coordinate;
   for (uint32_t axis = 0; axis < 3; ++axis) keep_larger(reach, magnitude(block.origin[axis]));
   write_pairs(&group.limits[first], block.begin, -block.end);
   if constexpr (Group::kSideBySide) {

@@ -27,12 +27,15 @@ struct LaneHits {
   alignas(64) float t[Lanes::kLanes], u[Lanes::kLanes], v[Lanes::kLanes];
 };
 
-/// The lanes whose signs floats do not settle. Returns those of `lanes` that hit at all, with their t, u and v.
+/// The lanes whose signs floats do not settle. Returns those of `lanes` that hit at all, with their t, u and v. t is
+/// the plane's, as for all other lanes: the weights of a large or thin triangle would move it along the ray by the
+/// rounding of the far corners. Where the ray is nearly parallel to the plane, t is kept within the range of the
+/// corners.
 /// @param x, y, z of corners, sz: lanes
-/// @param nearer, along: the plane is nearer / along sz nearer than from the origin of x, y and z
+/// @param depth, along: the ray meets the plane at z = depth / along
 template <typename Lanes>
 inline uint32_t test_exactly(uint32_t lanes, const typename Lanes::F (&x)[3], const typename Lanes::F (&y)[3],
-                             const typename Lanes::F (&z)[3], typename Lanes::F sz, typename Lanes::F nearer,
+                             const typename Lanes::F (&z)[3], typename Lanes::F sz, typename Lanes::F depth,
                              typename Lanes::F along, LaneHits<Lanes>& hits) {
   float stored[12][Lanes::kLanes];
   for (uint32_t corner = 0; corner < 3; ++corner) {
@@ -41,7 +44,7 @@ inline uint32_t test_exactly(uint32_t lanes, const typename Lanes::F (&x)[3], co
     Lanes::store(stored[6 + corner], z[corner]);
   }
   Lanes::store(stored[9], sz);
-  Lanes::store(stored[10], nearer);
+  Lanes::store(stored[10], depth);
   Lanes::store(stored[11], along);
   uint32_t hit = 0;
   for (; lanes != 0; lanes &= lanes - 1) {
@@ -53,14 +56,10 @@ inline uint32_t test_exactly(uint32_t lanes, const typename Lanes::F (&x)[3], co
     const double sum = u + v + w;
     if (sum == 0.0) continue;
     const double az = stored[6][i], bz = stored[7][i], cz = stored[8][i];
-    double depth = (u * az + v * bz + w * cz) / sum;
-    if (stored[11][i] != 0.0f) { // a plane nearly along the ray may say anything, but not what is beyond its corners
-      const double least = __builtin_fmin(az, __builtin_fmin(bz, cz)),
-                   most = __builtin_fmax(az, __builtin_fmax(bz, cz));
-      depth -= double{stored[10][i]} / stored[11][i];
-      depth = depth < least ? least : depth > most ? most : depth;
-    }
-    hits.t[i] = static_cast<float>(depth * double{stored[9][i]});
+    const double least = __builtin_fmin(az, __builtin_fmin(bz, cz)), most = __builtin_fmax(az, __builtin_fmax(bz, cz));
+    double at = stored[11][i] != 0.0f ? double{stored[10][i]} / stored[11][i] : (u * az + v * bz + w * cz) / sum;
+    at = at < least ? least : at > most ? most : at;
+    hits.t[i] = static_cast<float>(at * double{stored[9][i]});
     hits.u[i] = static_cast<float>(v / sum);
     hits.v[i] = static_cast<float>(w / sum);
     hit |= 1u << i;
@@ -79,6 +78,21 @@ struct BatchNormals {
   alignas(64) float normal[3][kBatch]; ///< [axis][triangle]
 };
 
+/// a b - c d with an error of 2^-23 of the result at most. Source: Jeannerod, Louvet, Muller, "Further analysis of
+/// Kahan's algorithm for the accurate computation of 2x2 determinants" (2013).
+template <typename Lanes>
+inline typename Lanes::F difference_of_products(typename Lanes::F a, typename Lanes::F b, typename Lanes::F c,
+                                                typename Lanes::F d) {
+  const typename Lanes::F cd = Lanes::mul(c, d);
+  return Lanes::add(Lanes::fms(a, b, cd), Lanes::fnma(c, d, cd));
+}
+
+/// Largest coordinate of a tree whose vertices have exact differences: they are whole numbers.
+constexpr float kExactDifferences = 0x1p23f;
+
+/// Normals of triangles whose vertices have exact differences, each component within 2^-23 of its value. Rounding the
+/// products would tilt a thin triangle's plane by up to 2^-24 of its length over its height, and rays that start above
+/// it would meet it far from where they started.
 template <typename Lanes>
 inline BatchNormals batch_normals(const DecodedBatch& batch) {
   using F = typename Lanes::F;
@@ -89,10 +103,25 @@ inline BatchNormals batch_normals(const DecodedBatch& batch) {
     f[axis] = Lanes::sub(Lanes::load(batch.vertex[axis][2]), a);
   }
   BatchNormals out;
-  Lanes::store(out.normal[0], Lanes::sub(Lanes::mul(e[1], f[2]), Lanes::mul(e[2], f[1])));
-  Lanes::store(out.normal[1], Lanes::sub(Lanes::mul(e[2], f[0]), Lanes::mul(e[0], f[2])));
-  Lanes::store(out.normal[2], Lanes::sub(Lanes::mul(e[0], f[1]), Lanes::mul(e[1], f[0])));
+  Lanes::store(out.normal[0], difference_of_products<Lanes>(e[1], f[2], e[2], f[1]));
+  Lanes::store(out.normal[1], difference_of_products<Lanes>(e[2], f[0], e[0], f[2]));
+  Lanes::store(out.normal[2], difference_of_products<Lanes>(e[0], f[1], e[1], f[0]));
   return out;
+}
+
+/// The same of any triangles, in doubles: their differences have up to 31 bits and the products cancel to 2^-53 of
+/// themselves.
+[[gnu::noinline]] inline void batch_normals_of_large(const DecodedBatch& batch, BatchNormals& out) {
+  for (uint32_t i = 0; i < kBatch; ++i) {
+    double e[3], f[3];
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+      const double a = batch.vertex[axis][0][i];
+      e[axis] = batch.vertex[axis][1][i] - a, f[axis] = batch.vertex[axis][2][i] - a;
+    }
+    out.normal[0][i] = static_cast<float>(e[1] * f[2] - e[2] * f[1]);
+    out.normal[1][i] = static_cast<float>(e[2] * f[0] - e[0] * f[2]);
+    out.normal[2][i] = static_cast<float>(e[0] * f[1] - e[1] * f[0]);
+  }
 }
 
 /// The lanes in which a ray hits a triangle, as bits. Without a branch that often goes either way until one does.
@@ -130,11 +159,9 @@ inline uint32_t test_lanes(Relative relative, Normal normal, Rest rest, const Ra
   const uint32_t unsure = (Lanes::less_equal(below, least) | Lanes::less_equal(most, error)) & wanted & ~inside;
   if constexpr (kWeights)
     if ((inside | unsure) == 0) return 0;
-  F nearer = Lanes::set(0.0f);
-  if constexpr (kRest) {
-    nearer = Lanes::fma(rest(0), normal(0), Lanes::fma(rest(1), normal(1), Lanes::mul(rest(2), normal(2))));
-    depth = Lanes::sub(depth, nearer);
-  }
+  if constexpr (kRest)
+    depth = Lanes::sub(depth,
+                       Lanes::fma(rest(0), normal(0), Lanes::fma(rest(1), normal(1), Lanes::mul(rest(2), normal(2)))));
   const F along = Lanes::fma(sx, normal(0), Lanes::fma(sy, normal(1), normal(2)));
   F t = Lanes::mul(Lanes::div(depth, along), rays.shear[2]);
   uint32_t hit = inside & Lanes::less(rays.begin, t) & Lanes::less_equal(t, rays.end);
@@ -147,7 +174,7 @@ inline uint32_t test_lanes(Relative relative, Normal normal, Rest rest, const Ra
   }
   if (unsure != 0) {
     exact_count += static_cast<uint64_t>(__builtin_popcount(unsure));
-    const uint32_t exactly = test_exactly<Lanes>(unsure, x, y, z, rays.shear[2], nearer, along, hits);
+    const uint32_t exactly = test_exactly<Lanes>(unsure, x, y, z, rays.shear[2], depth, along, hits);
     t = Lanes::load(hits.t);
     hit |= exactly & Lanes::less(rays.begin, t) & Lanes::less_equal(t, rays.end);
   }

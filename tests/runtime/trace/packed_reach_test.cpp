@@ -55,7 +55,7 @@ constexpr uint32_t kDown = 2; ///< the octant of their directions
 TEST(Reach, HoldsBoxesWithAnExtentThatEndAPadBeforeRaysStart) {
   std::mt19937 generator(1);
   RayGroup group;
-  enter<false>(whole_grid(), kMost, rays_beside_an_edge(generator, 4), ~uint64_t{0}, group);
+  enter<false>(whole_grid(), kMost, kMost, rays_beside_an_edge(generator, 4), ~uint64_t{0}, group);
   group.reach.set_octant(kDown);
   const TopNode node = node_of({{{-kMost, 0, -kMost}, {0, 0, kMost}},               // beside the edge
                                 {{0, 0, -kMost}, {0, kMost, kMost}},                // a wall there, which they leave
@@ -83,7 +83,8 @@ TEST(Reach, HoldsWhatTheTriangleTestAcceptsBesideIt) {
   uint32_t only_left = 0;
   for (uint32_t turn = 0; turn < 2000; ++turn) {
     RayGroup group;
-    const uint64_t entered = enter<false>(whole_grid(), kMost, rays_beside_an_edge(generator, 2), ~uint64_t{0}, group);
+    const uint64_t entered =
+        enter<false>(whole_grid(), kMost, kMost, rays_beside_an_edge(generator, 2), ~uint64_t{0}, group);
     group.reach.set_octant(kDown);
     const uint32_t slots = pass_reach(boxes, group.reach);
     for (uint64_t rays = entered; rays != 0; rays &= rays - 1) {

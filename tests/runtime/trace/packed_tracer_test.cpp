@@ -395,15 +395,55 @@ TEST(PackedTracer, KeepsToTheRangeOfT) {
   }
 }
 
-TEST(PackedTracer, NamesInstancesThatAreFlat) {
+/// Pressed flat, or nearly, along any direction; the others are moved aside so that each is seen.
+Scene flattened_scene() {
+  Scene scene;
+  add_object(scene, test::sphere({0, 0, 0}, 1, 24));
+  const DVec3 scales[] = {{1, 0, 1}, {1, 1e-15, 1}, {1, -1e-12, 0.5}, {1e-10, 2, 1}, {1, 1, 0}};
+  double x = 0.0;
+  for (const DVec3 scale : scales)
+    for (const double turn : {0.0, 40.0}) {
+      scene.instances.push_back({0, Affine(placed({x, 1, 2}, scale, turn, {1, 2, 3}))});
+      x += 5.0;
+    }
+  return scene;
+}
+
+TEST(PackedTracer, HitsInstancesThatArePressedFlat) {
+  const Scene scene = flattened_scene();
+  const BakedScene baked(scene);
+  const EmbreeTracer embree(baked.source, {});
+  const std::vector<Ray> rays = random_rays(20000, baked.source.world_bounds(), embree.space(), 3);
+  const std::vector<RayHit> expected = closest(embree, rays);
+  std::vector<uint32_t> hits(scene.instances.size());
+  for (const PackedIsa isa : isas()) {
+    const PackedTracer tracer(baked.file, baked.source, isa);
+    EXPECT_TRUE(tracer.flat_instances().empty());
+    ASSERT_EQ(tracer.space(), embree.space());
+    const std::vector<RayHit> found = closest(tracer, rays);
+    size_t differences = 0;
+    for (size_t i = 0; i < rays.size(); ++i) {
+      if (found[i].valid() != expected[i].valid()) ++differences;
+      if (!found[i].valid() || !expected[i].valid()) continue;
+      ++hits[tracer.resolve(found[i]).placement->instance];
+      if (std::abs(found[i].t - expected[i].t) > 1e-5f) ++differences;
+    }
+    EXPECT_LE(differences, 5u) << tracer.isa(); // past an outline
+  }
+  for (const uint32_t count : hits) EXPECT_GT(count, 10u);
+}
+
+TEST(PackedTracer, NamesInstancesThatArePressedOntoALine) {
   Scene scene;
   add_object(scene, test::sphere({0, 0, 0}, 1, 8));
   scene.instances.push_back({0, Affine(placed({0, 0, 0}))});
-  scene.instances.push_back({0, Affine(placed({4, 0, 0}, DVec3(1, 0, 1)))});
+  scene.instances.push_back({0, Affine(placed({4, 0, 0}, DVec3(1, 0, 0), 30, {1, 1, 1}))});
+  scene.instances.push_back({0, Affine(placed({4, 0, 0}, DVec3(0)))});
   const BakedScene baked(scene);
   const PackedTracer tracer(baked.file, baked.source);
-  ASSERT_EQ(tracer.flat_instances().size(), 1u);
+  ASSERT_EQ(tracer.flat_instances().size(), 2u);
   EXPECT_EQ(tracer.flat_instances()[0], 1u);
+  EXPECT_EQ(tracer.flat_instances()[1], 2u);
 }
 
 TEST(TreeHull, IsCloserThanTheTurnedRootsBoxAndHoldsAllThatIsHit) {

@@ -1,0 +1,169 @@
+// Scenes in which one thing is nothing like the others: it must not spoil what rays find of them, nor their speed.
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "runtime/trace/embree_cluster_tracer.h"
+#include "runtime/trace/float_source.h"
+#include "tests/runtime/trace/packed_scenes.h"
+
+namespace packtrace {
+namespace {
+
+using test::add_object;
+using test::add_shape;
+using test::placed;
+
+constexpr size_t kRays = 20000;
+
+size_t usual_count(const Scene& scene) { return scene.shapes.size() + scene.instances.size(); }
+
+/// Where rays are sent about.
+struct Region {
+  DVec3 lo, hi;
+};
+
+std::vector<Ray> rays_within(const Region& region, size_t count, const UnitSpace& space) {
+  std::mt19937 generator(9);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  const auto point = [&] {
+    const double x = unit(generator), y = unit(generator), z = unit(generator);
+    return space.to_unit(region.lo + (region.hi - region.lo) * DVec3(x, y, z));
+  };
+  std::vector<Ray> rays(count);
+  for (Ray& ray : rays) {
+    const DVec3 a = point(), b = point();
+    ray.origin = Vec3(a), ray.direction = Vec3(glm::normalize(b - DVec3(ray.origin)));
+  }
+  return rays;
+}
+
+/// That rays find of a scene with something odd in it what Embree finds without, but for a few past an outline, and
+/// beyond that nothing but what is odd.
+/// @param usual its instances come first in `scene`, too
+void expect_what_is_usual(const Scene& usual, const Scene& scene, const Region& region, size_t least_hits) {
+  const FloatSource floats(usual);
+  const EmbreeTracer embree(floats, {});
+  const std::vector<RayHit> expected = test::closest(embree, rays_within(region, kRays, embree.space()));
+  EXPECT_GE(static_cast<size_t>(std::ranges::count_if(expected, &RayHit::valid)), least_hits);
+  BakeConfig config;
+  config.precision = 1e-4;
+  const test::BakedScene baked(scene, config);
+  const double size = region.hi.x - region.lo.x;
+  const auto check = [&](const RayTracer& tracer) {
+    const std::vector<Ray> rays = rays_within(region, kRays, tracer.space());
+    const std::vector<RayHit> hits = test::closest(tracer, rays);
+    const std::vector<uint8_t> occluded = test::any(tracer, rays);
+    const auto way = [](const RayHit& hit, const RayTracer& of) { return double{hit.t} * of.space().inverse_scale(); };
+    size_t differences = 0;
+    for (size_t i = 0; i < rays.size(); ++i) {
+      bool same = hits[i].valid() == (occluded[i] != 0);
+      if (expected[i].valid())
+        same &= hits[i].valid() && std::abs(way(hits[i], tracer) - way(expected[i], embree)) <= 1e-3 * size;
+      else
+        same &= !hits[i].valid() || tracer.resolve(hits[i]).placement->instance >= usual_count(usual);
+      if (!same) ++differences;
+    }
+    EXPECT_LE(differences, kRays / 200) << tracer.name() << " " << tracer.isa();
+  };
+  for (const PackedIsa isa : test::isas()) check(PackedTracer(baked.file, baked.source, isa));
+  check(EmbreeClusterTracer(baked.file, baked.source));
+}
+
+/// 20 small spheres about the origin.
+void add_spheres(Scene& scene, double scale) {
+  const uint32_t object = add_object(scene, test::sphere({0, 0, 0}, 1, 16));
+  std::mt19937 generator(2);
+  std::uniform_real_distribution<double> unit(-5.0, 5.0);
+  for (int i = 0; i < 20; ++i) {
+    const double x = unit(generator), y = unit(generator), z = unit(generator);
+    const double side = i % 2 == 0 ? 1.0 : -1.0;
+    scene.instances.push_back(
+        {object, Affine(placed(DVec3(x, y, z) * scale, DVec3(side, 0.7, 1.0) * scale, 36.0 * i, {1, 2, 3}))});
+  }
+}
+
+constexpr Region about(double size) { return {DVec3(-size), DVec3(size)}; }
+
+Scene spheres() {
+  Scene scene;
+  add_spheres(scene, 1.0);
+  return scene;
+}
+
+/// @param size half its side; its diagonal runs below the middle
+Mesh floor_of(float size) { return test::quad({-size, 0, -size}, {0, 0, 2 * size}, {2 * size, 0, 0}); }
+
+TEST(ExtremeScenes, AFloorOfAnySizeLiesBelowWhatStandsOnIt) {
+  const auto standing_on = [](float size) {
+    Scene scene;
+    add_shape(scene, floor_of(size));
+    add_spheres(scene, 1e-3);
+    return scene;
+  };
+  for (const float size : {1e2f, 1e6f, 1e9f, 1e12f})
+    expect_what_is_usual(standing_on(10.0f), standing_on(size), about(6e-3), kRays / 2);
+}
+
+TEST(ExtremeScenes, AnInstanceFarAwayLeavesTheOthersWhereTheyAre) {
+  for (const float distance : {1e6f, 1e15f, 1e30f}) {
+    Scene scene = spheres();
+    scene.instances.push_back({0, Affine(placed(DVec3(distance, -distance, 0.5 * distance)))});
+    expect_what_is_usual(spheres(), scene, about(6.0), kRays / 4);
+  }
+}
+
+TEST(ExtremeScenes, TinyAndEnormousInstancesLieBesideOthers) {
+  for (const double scale : {1e-20, 1e-12, 1e12, 1e20}) {
+    Scene scene = spheres();
+    scene.instances.push_back({0, Affine(placed({1, 1, 1}, DVec3(scale), 50))});
+    expect_what_is_usual(spheres(), scene, about(6.0), kRays / 4);
+  }
+}
+
+TEST(ExtremeScenes, AGeometryOfAnySizeLiesBesideOthers) {
+  const auto above = [](float size) {
+    Scene scene = spheres();
+    scene.instances.push_back({add_object(scene, floor_of(size)), Affine(placed({0, -0.5, 0}))});
+    return scene;
+  };
+  expect_what_is_usual(spheres(), above(1e-30f), about(6.0), kRays / 4);
+  for (const float size : {1e15f, 1e30f}) expect_what_is_usual(above(1e4f), above(size), about(6.0), kRays / 2);
+}
+
+TEST(ExtremeScenes, ThingsWithoutAnExtentLieBesideOthers) {
+  Scene scene = spheres();
+  const uint32_t line = add_object(scene, test::quad({2, 2, 2}, {1, 1, 1}, {0, 0, 0}));
+  const uint32_t point = add_object(scene, test::quad({1, 1, 1}, {0, 0, 0}, {0, 0, 0}));
+  for (const uint32_t object : {line, point}) scene.instances.push_back({object, Affine(placed({3, 0, 0}))});
+  for (const DVec3 scale : {DVec3(1, 0, 1), DVec3(0, 0, 1), DVec3(0)})
+    scene.instances.push_back({0, Affine(placed({0, -50, 0}, scale))});
+  expect_what_is_usual(spheres(), scene, about(6.0), kRays / 4);
+}
+
+/// Placements that rays enter, each.
+double placements_entered(const Scene& scene, double size) {
+  const test::BakedScene baked(scene);
+  const PackedTracer tracer(baked.file, baked.source);
+  const std::vector<Ray> rays = rays_within(about(size), 5000, tracer.space());
+  std::vector<RayHit> hits(rays.size());
+  std::vector<uint8_t> occluded(rays.size());
+  packed::KernelCounters counters;
+  tracer.count_closest(rays, kCameraRays, hits, counters);
+  tracer.count_any(rays, kOcclusionRays, occluded, counters);
+  return static_cast<double>(counters.placements) / static_cast<double>(counters.rays);
+}
+
+TEST(ExtremeScenes, AnInstanceFarAwayDoesNotMakeRaysEnterAllOthers) {
+  Scene scene = test::thicket_scene();
+  const double before = placements_entered(scene, 6.0);
+  for (const double distance : {1e6, 1e9, 1e15}) {
+    Scene far = scene;
+    far.instances.push_back({0, Affine(placed({distance, 0, -distance}))});
+    EXPECT_LT(placements_entered(far, 6.0), 1.1 * before) << distance;
+  }
+}
+
+} // namespace
+} // namespace packtrace
