@@ -47,9 +47,11 @@ private:
   bool linear_ = false;
 };
 
-/// An orthonormal pair for a unit vector. Source: Duff et al., "Building an orthonormal basis, revisited" (2017).
+/// An orthonormal pair for a unit vector. Source: Duff et al., "Building an orthonormal basis, revisited" (2017), who
+/// switch at z = 0. Walls have z of +0, -0 or a rounding error there, which must not choose their samples.
 void make_basis(Vec3 n, Vec3& tangent, Vec3& bitangent) {
-  const float sign = std::copysign(1.0f, n.z);
+  constexpr float kSwitch = -0.4f; // sign + z is 0.6 at least
+  const float sign = n.z < kSwitch ? -1.0f : 1.0f;
   const float a = -1.0f / (sign + n.z), b = n.x * n.y * a;
   tangent = {1.0f + sign * n.x * n.x * a, sign * b, -sign * n.x};
   bitangent = {b, sign + n.y * n.y * a, -n.y};

@@ -48,6 +48,7 @@ void expect_what_is_usual(const Scene& usual, const Scene& scene, const Region& 
   const std::vector<RayHit> expected = test::closest(embree, rays_within(region, kRays, embree.space()));
   EXPECT_GE(static_cast<size_t>(std::ranges::count_if(expected, &RayHit::valid)), least_hits);
   BakeConfig config;
+  config.precision_kind = PrecisionKind::kEdgeFraction;
   config.precision = 1e-4;
   const test::BakedScene baked(scene, config);
   const double size = region.hi.x - region.lo.x;
