@@ -84,9 +84,9 @@ TEST(Limits, PicturesAndBakedFilesAskForMemoryToo) {
   ASSERT_EQ(run_packtrace({"bake", bench.scene(), "-o", bench.baked(), "-q", "--codec", "small"}).exit_code, 0);
   const std::string out = bench / "out.png";
   const CommandResult picture =
-      run_packtrace({"render", bench.baked(), "-o", out, "--size", "60000x60000", "--max-memory", "1G"}, end_soon);
+      run_packtrace({"render", bench.baked(), "-o", out, "--size", "16000x16000", "--max-memory", "1G"}, end_soon);
   EXPECT_EQ(picture.exit_code, 3);
-  EXPECT_NE(picture.err.find("a picture of 60000 x 60000 pixels needs "), std::string::npos) << picture.err;
+  EXPECT_NE(picture.err.find("a picture of 16000 x 16000 pixels needs "), std::string::npos) << picture.err;
   const CommandResult decoded = run_packtrace({"info", bench.baked(), "--max-memory", "100"});
   EXPECT_EQ(decoded.exit_code, 3);
   EXPECT_NE(decoded.err.find(bench.baked() + ": what the file is decoded to needs "), std::string::npos) << decoded.err;
