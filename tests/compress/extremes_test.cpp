@@ -57,6 +57,13 @@ std::vector<std::array<uint32_t, 3>> corner_sets(const std::vector<Triangle>& tr
   return sets;
 }
 
+/// Of the triangle over its longest edge; 0 where it has no area.
+double height(const Source& source, const std::array<uint32_t, 3>& triangle) {
+  const DVec3 a = source.positions[triangle[0]], b = source.positions[triangle[1]], c = source.positions[triangle[2]];
+  const double longest = std::max({glm::length(b - a), glm::length(c - b), glm::length(a - c)});
+  return longest > 0.0 ? glm::length(glm::cross((b - a) / longest, c - a)) : 0.0;
+}
+
 /// Finds source vertices by place.
 class SourceIndex {
 public:
@@ -86,6 +93,7 @@ private:
 
 /// Checks a geometry against its source: the bound it states is half a step and what floats add, every decoded vertex
 /// lies within the bound of a source vertex, and triangles connect the same vertices, as far as places tell them apart.
+/// Triangles may be missing that are so thin that they have no area on the lattice.
 void expect_holds(const BakedFile& file, uint32_t g, const Source& source, double flushed = 0.0) {
   const baked::GeometryRecord& record = file.geometries()[g];
   const double step = PositionGrid{record.step_mantissa, record.step_exponent}.step();
@@ -93,7 +101,13 @@ void expect_holds(const BakedFile& file, uint32_t g, const Source& source, doubl
   for (const DVec3 p : source.positions) max_abs = std::max({max_abs, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
   EXPECT_LE(record.position_error_bound, step / 2 + (max_abs + step) * (0x1p-24 + 0x1p-50) + 0x1p-149);
   EXPECT_LE(record.max_position_error, record.position_error_bound);
-  ASSERT_EQ(record.triangle_count, source.triangles.size());
+  const std::vector<std::array<uint32_t, 3>> expected = corner_sets(source.triangles);
+  const auto may_collapse = [&](const std::array<uint32_t, 3>& triangle) {
+    return height(source, triangle) <= 8.0 * record.position_error_bound;
+  };
+  ASSERT_LE(record.triangle_count, expected.size());
+  const auto thin = std::count_if(expected.begin(), expected.end(), may_collapse);
+  ASSERT_GE(record.triangle_count + static_cast<size_t>(thin), expected.size());
 
   const Decoded decoded = test::decode(file, g);
   const SourceIndex index(source);
@@ -110,7 +124,11 @@ void expect_holds(const BakedFile& file, uint32_t g, const Source& source, doubl
   if (!told_apart) return;
   std::vector<Triangle> triangles;
   for (const Triangle& t : decoded.triangles) triangles.emplace_back(vertex[t.x], vertex[t.y], vertex[t.z]);
-  EXPECT_EQ(corner_sets(triangles), corner_sets(source.triangles));
+  const std::vector<std::array<uint32_t, 3>> stored = corner_sets(triangles);
+  EXPECT_TRUE(std::includes(expected.begin(), expected.end(), stored.begin(), stored.end()));
+  std::vector<std::array<uint32_t, 3>> missing;
+  std::set_difference(expected.begin(), expected.end(), stored.begin(), stored.end(), std::back_inserter(missing));
+  EXPECT_TRUE(std::all_of(missing.begin(), missing.end(), may_collapse));
 }
 
 BakeConfig precision(PrecisionKind kind, double value) {
