@@ -229,7 +229,8 @@ TEST(TgaImage, EveryKindIsRead) {
 
 TEST(TgaImage, PixelsComeInEveryOrderAndDepth) {
   const auto first_red = [](const std::string& file) {
-    return read_image(std::as_bytes(std::span(file)), true, ImageWants{false, true}, kBudget).rgb;
+    MemoryReservation memory{MemoryBudget(kBudget)};
+    return read_image(std::as_bytes(std::span(file)), true, ImageWants{false, true}, memory).rgb;
   };
   std::string file = tga(2, 2, 2, 24, "\0\0\x01\0\0\x02\0\0\x03\0\0\x04"s); // red 1 to 4
   const auto reds = [&] {

@@ -1,5 +1,7 @@
 #include <cmath>
 
+#include <tbb/global_control.h>
+
 #include "pbrt_import/image_file.h"
 #include "pbrt_import/scene/error.h"
 #include "pbrt_import/spectrum.h"
