@@ -78,11 +78,12 @@ TEST(CommandLine, SeamsOfInstancesAreStatedAndSaidWhereTheyShow) {
   EXPECT_GT(baked.at("touching"), 5000u);
   EXPECT_GT(baked.at("largest_gap"), 0.0);
   EXPECT_NE(result.err.find("seams may gape by up to"), std::string::npos) << result.err;
-  result = run_packtrace({"info", file, "--json", json});
+  result = run_packtrace({"info", file, "--json", json, "--force"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(nlohmann::json::parse(read_text(json)).at("seams"), baked);
   EXPECT_NE(result.out.find("seams gape by"), std::string::npos) << result.out;
   const auto render = [&](std::vector<std::string> options) {
-    options.insert(options.begin(), {"render", file, "-o", folder / "x.png", "--size", "320x180", "--frames", "1",
+    options.insert(options.begin(), {"render", file, "-o", folder / "x.png", "--size", "160x90", "--frames", "1",
                                      "--no-denoise", "--force", "--json", json});
     result = run_packtrace(options);
     EXPECT_EQ(result.exit_code, 0) << result.err;

@@ -58,12 +58,17 @@ BakeConfig lod_config() {
   return config;
 }
 
+/// Levels of all geometries, on the finest of their nested lattices.
 std::vector<ClusterLod> bake_levels(const Scene& scene, const BakeConfig& config = lod_config()) {
   const BakedFile file = BakedFile::from_bytes(bake(scene, config).bytes);
+  const auto exponent = [&](uint32_t g) { return file.geometries()[g].step_exponent; };
+  int32_t finest = exponent(0);
+  for (uint32_t g = 1; g < file.base_geometry_count(); ++g) finest = std::min(finest, exponent(g));
   std::vector<ClusterLod> lods;
   for (uint32_t g = 0; g < file.base_geometry_count(); ++g) {
-    EXPECT_EQ(file.geometries()[g].step_exponent, file.geometries()[0].step_exponent);
     lods.push_back(read_lod(file, g));
+    for (LatticePoint& p : lods.back().positions)
+      for (int64_t& coordinate : p) coordinate *= int64_t{1} << (exponent(g) - finest);
   }
   return lods;
 }
