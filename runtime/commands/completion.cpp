@@ -72,7 +72,7 @@ std::string bash_verb(const VerbEntry& verb) {
   for (const OptionEntry& option : verb.options) {
     const std::vector<std::string> names = names_of(option);
     options.insert(options.end(), names.begin(), names.end());
-    if (option.value == ValueKind::kNone) continue;
+    if (option.value == ValueKind::kNoValue) continue;
     const std::string value = bash_value(option);
     arms += fmt::format("        {}) {}return ;;\n", fmt::join(names, "|"), value.empty() ? "" : value + "; ");
   }
@@ -118,7 +118,7 @@ std::string zsh_text(const std::string& text) {
 }
 
 std::string zsh_value(const OptionEntry& option) {
-  if (option.value == ValueKind::kNone) return {};
+  if (option.value == ValueKind::kNoValue) return {};
   const std::string start = (option.value_optional ? "::" : ":") + option.value_name + ":";
   switch (option.value) {
   case ValueKind::kChoice:
@@ -137,7 +137,7 @@ std::string zsh_arguments(const VerbEntry& verb) {
   for (const OptionEntry& option : verb.options)
     for (const std::string& name : names_of(option)) {
       // "=": the value may follow after an equals sign, or as a word of its own; the same for "+" and short names.
-      const char* joint = option.value == ValueKind::kNone ? "" : name.starts_with("--") ? "=" : "+";
+      const char* joint = option.value == ValueKind::kNoValue ? "" : name.starts_with("--") ? "=" : "+";
       if (option.value_optional) joint = "=-"; // only after "=": the next word may be the scene
       lines += " \\\n        " + quoted(fmt::format("{}{}{}[{}]{}", option.repeatable ? "*" : "", name, joint,
                                                     zsh_text(option.description), zsh_value(option)));
@@ -191,7 +191,7 @@ std::string fish_option(const OptionEntry& option, const std::string& condition)
   case ValueKind::kText:
     if (!option.value_optional) line += " -x";
     break;
-  case ValueKind::kNone:
+  case ValueKind::kNoValue:
     break;
   }
   return line + " -d " + fish_quoted(brief(option.description)) + "\n";

@@ -8,7 +8,7 @@ namespace packtrace {
 namespace {
 
 ValueKind kind_of(const OptionEntry& entry) {
-  if (entry.value_name.empty() && entry.choices.empty()) return ValueKind::kNone;
+  if (entry.value_name.empty() && entry.choices.empty()) return ValueKind::kNoValue;
   if (!entry.choices.empty()) return ValueKind::kChoice;
   if (entry.value_name == "DIR") return ValueKind::kFolder;
   const bool file = entry.value_name == "FILE" || entry.value_name == "SCENE" || entry.value_name == "TEST" ||

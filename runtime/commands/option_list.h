@@ -10,13 +10,13 @@ class App;
 namespace packtrace {
 
 /// What the value of an option, or a positional, is.
-enum class ValueKind { kNone, kText, kChoice, kFile, kFolder };
+enum class ValueKind { kNoValue, kText, kChoice, kFile, kFolder };
 
 /// An option or a positional as help, completion and the man page tell it.
 struct OptionEntry {
   std::vector<std::string> short_names, long_names; ///< with their dashes; both empty for positionals
   std::string value_name;                           ///< "FILE"; empty for flags
-  ValueKind value = ValueKind::kNone;
+  ValueKind value = ValueKind::kNoValue;
   std::vector<std::string> choices; ///< of kChoice
   bool value_optional = false;      ///< --lod beside --lod=all
   bool repeatable = false;          ///< may be given several times, and all of them count
