@@ -24,7 +24,7 @@ enum class TokenKind : uint8_t {
 };
 
 /// No name, number or path has as many bytes.
-inline constexpr size_t kMaxTokenBytes = size_t{1} << 20;
+inline constexpr size_t kMaxTokenBytes = size_t{2} << 20;
 
 struct Token {
   TokenKind kind = TokenKind::kEnd;

@@ -131,7 +131,7 @@ uint64_t parse_memory_size(std::string_view text, uint64_t all) {
   };
   double value = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed);
-  if (error != std::errc()) return fail();
+  if (error != std::errc() || !std::isfinite(value)) return fail(); // from_chars reads "inf" and "nan"
   const std::string_view unit(end, text.data() + text.size());
   if (unit == "%") {
     value *= static_cast<double>(all) / 100.0;

@@ -262,9 +262,11 @@ TEST(FileSummary, StreamsAddUpToTheFile) {
   EXPECT_EQ(s.shared_geometries, 1u);
   EXPECT_EQ(s.placed_triangles, 18u + 8u + 2u * 48u);
   EXPECT_EQ(s.triangles, 18u + 8u + 48u);
-  ASSERT_EQ(s.grids.size(), 2u);
-  EXPECT_TRUE(s.grids[0].world_space);
-  EXPECT_EQ(s.grids[0].geometries, 2u);
+  ASSERT_EQ(s.grids.size(), 3u); // two nested ones of world space, one of the object
+  for (size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(s.grids[i].world_space, i < 2);
+    EXPECT_EQ(s.grids[i].geometries, 1u);
+  }
   EXPECT_LE(s.max_position_error, s.max_position_error_bound);
 }
 

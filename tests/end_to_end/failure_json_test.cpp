@@ -77,6 +77,10 @@ TEST(FailureJson, AFileThatIsThereStaysWithoutForce) {
   write_text(bench / "mine.json", "mine");
   EXPECT_EQ(run_packtrace({"info", bench / "none.ptk", "--json", bench / "mine.json"}).exit_code, 6);
   EXPECT_EQ(read_text(bench / "mine.json"), "mine");
+  // Not even --force replaces what is no report: a mistyped name may be that of a mesh.
+  EXPECT_EQ(run_packtrace({"info", bench / "none.ptk", "--json", bench / "mine.json", "--force"}).exit_code, 3);
+  EXPECT_EQ(read_text(bench / "mine.json"), "mine");
+  write_text(bench / "mine.json", "{}");
   EXPECT_EQ(run_packtrace({"info", bench / "none.ptk", "--json", bench / "mine.json", "--force"}).exit_code, 3);
   EXPECT_EQ(nlohmann::json::parse(read_text(bench / "mine.json")).at("verb"), "info");
 }

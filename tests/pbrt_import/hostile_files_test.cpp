@@ -90,7 +90,7 @@ a:3:1: error: unknown directive "Nonsense"
        {1, 1, 0, 0}},
       {"IncludeDevice",
        world("Include \"/dev/null\""),
-       R"(scene.pbrt:2:1: error: cannot include "/dev/null": is not a regular file
+       R"(scene.pbrt:2:1: error: cannot include "/dev/null": is a device, not a file
 )",
        {1, 1, 0, 0}},
       {"IncludeNothing",

@@ -156,15 +156,17 @@ inline uint32_t test_lanes(Relative relative, Normal normal, Rest rest, const Ra
       Lanes::fma(Lanes::largest(Lanes::largest(u2, v2), w2), Lanes::set(kEdgeError), Lanes::set(kSmallestEdge));
   const F below = Lanes::negate(error);
   const uint32_t inside = (Lanes::less(error, least) | Lanes::less(most, below)) & wanted;
-  const uint32_t unsure = (Lanes::less_equal(below, least) | Lanes::less_equal(most, error)) & wanted & ~inside;
+  uint32_t unsure = (Lanes::less_equal(below, least) | Lanes::less_equal(most, error)) & wanted & ~inside;
   if constexpr (kWeights)
     if ((inside | unsure) == 0) return 0;
   if constexpr (kRest)
     depth = Lanes::sub(depth,
                        Lanes::fma(rest(0), normal(0), Lanes::fma(rest(1), normal(1), Lanes::mul(rest(2), normal(2)))));
-  const F along = Lanes::fma(sx, normal(0), Lanes::fma(sy, normal(1), normal(2)));
+  const F along = Lanes::fma(sx, normal(0), Lanes::fma(sy, normal(1), normal(2))), zero = Lanes::set(0.0f);
+  // Rounding the sheared corners may open a sliver that has no plane, or one that the ray runs along.
+  unsure |= inside & Lanes::less_equal(along, zero) & Lanes::less_equal(zero, along);
   F t = Lanes::mul(Lanes::div(depth, along), rays.shear[2]);
-  uint32_t hit = inside & Lanes::less(rays.begin, t) & Lanes::less_equal(t, rays.end);
+  uint32_t hit = inside & ~unsure & Lanes::less(rays.begin, t) & Lanes::less_equal(t, rays.end);
   if constexpr (kWeights) {
     if ((hit | unsure) == 0) return 0;
     const F over = Lanes::div(Lanes::set(1.0f), Lanes::add(Lanes::add(u, v), w));
