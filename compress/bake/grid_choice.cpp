@@ -101,7 +101,11 @@ private:
     std::vector<std::vector<SharedPosition>> shared =
         find_shared_positions(scene_, plan_, measure_.geometries, out_.halvings);
     for (size_t g = 0; g < shared.size(); ++g) out_.grids[g].shared = std::move(shared[g]);
-    tbb::parallel_for(size_t{0}, checks_.size(), [&](size_t g) { checks_[g] = check_grid(views_[g], out_.grids[g]); });
+    tbb::parallel_for(size_t{0}, checks_.size(), [&](size_t g) {
+      // What exceeds the lattice is refused when it is packed.
+      const bool fits = fits_lattice(measure_.geometries[g].max_abs(), out_.grids[g].grid.step());
+      checks_[g] = fits ? check_grid(views_[g], out_.grids[g]) : GridCheck{};
+    });
   }
 
   bool tilts(size_t g) const {

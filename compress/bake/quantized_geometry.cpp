@@ -127,7 +127,7 @@ private:
   }
 
   void check_limits(double max_abs) const {
-    if (max_abs / step_ < static_cast<double>(kMaxLattice) - 1.0) {
+    if (fits_lattice(max_abs, step_)) {
       if (std::isfinite(from_lattice(to_lattice(max_abs, step_), step_))) return;
       throw Error(ErrorKind::kLimitExceeded, plan_.name + ": coordinates up to " + brief(max_abs) +
                                                  " round to more than the largest float at a step of " + brief(step_) +

@@ -41,7 +41,12 @@ inline constexpr int64_t kMaxLattice = int64_t{1} << kMaxLatticeBits;
 /// Throws Error(kLimitExceeded) unless max_step is positive and within the exponent range.
 PositionGrid choose_position_grid(double max_step);
 
-/// Nearest lattice coordinate, ties to even. The caller has checked |p / step| < kMaxLattice.
+/// Whether all coordinates up to max_abs have a lattice coordinate.
+inline bool fits_lattice(double max_abs, double step) {
+  return max_abs / step < static_cast<double>(kMaxLattice) - 1.0;
+}
+
+/// Nearest lattice coordinate, ties to even. The caller has checked fits_lattice().
 inline int64_t to_lattice(double p, double step) { return std::llrint(p / step); }
 
 /// The position a lattice coordinate stands for. Monotone in `lattice`: all roundings are.

@@ -1,7 +1,9 @@
 #include "runtime/trace/embree_cluster_tracer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
 #include <utility>
 
 #include "compress/bvh/box_tree.h"
@@ -108,15 +110,19 @@ void occluded_cluster(const RTCOccludedFunctionNArguments* args) { visit_cluster
 
 static_assert(sizeof(Ray) == sizeof(packed::KernelRay) && offsetof(Ray, tfar) == offsetof(packed::KernelRay, tfar));
 
-std::span<const Ray> rays_of(const packed::TreeSearch& search) {
-  return {reinterpret_cast<const Ray*>(search.rays), search.count};
+using SearchRays = std::array<Ray, packed::TreeSearch::kMaxRays>;
+
+std::span<const Ray> copy_rays(const packed::TreeSearch& search, SearchRays& rays) {
+  std::memcpy(rays.data(), search.rays, search.count * sizeof(Ray));
+  return {rays.data(), search.count};
 }
 
 /// As a stream with the coherent flag, as all of a search's rays are of one octant: Embree makes packets of it.
 void find_closest(RTCScene scene, const packed::TreeSearch& search) {
   SearchQuery context(RTC_INTERSECT_CONTEXT_FLAG_COHERENT, search);
   alignas(64) RTCRayHit stream[packed::TreeSearch::kMaxRays];
-  const std::span<const Ray> rays = rays_of(search);
+  SearchRays copied;
+  const std::span<const Ray> rays = copy_rays(search, copied);
   for (uint32_t i = 0; i < search.count; ++i) {
     set_ray(rays[i], kAllRays, stream[i]);
     stream[i].ray.id = search.number[i];
@@ -130,7 +136,8 @@ void find_any(RTCScene scene, const packed::TreeSearch& search) {
   RayPacket16 packet;
   RTCRay16 lanes;
   set_constants(kAllRays, lanes);
-  const std::span<const Ray> rays = rays_of(search);
+  SearchRays copied;
+  const std::span<const Ray> rays = copy_rays(search, copied);
   for (uint32_t first = 0; first < search.count; first += RayPacket16::kRays) {
     const uint32_t count = std::min<uint32_t>(RayPacket16::kRays, search.count - first);
     packet.load(rays.subspan(first, count), lanes);

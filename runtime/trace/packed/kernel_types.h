@@ -96,8 +96,9 @@ struct KernelCounters {
   uint64_t batches_decoded = 0, exact_triangles = 0;
 };
 
-/// As RayTracer's Ray, plain.
-struct KernelRay {
+/// RayTracer's Ray with the same layout and without inline functions. Kernels read arrays of Ray through it, which
+/// may_alias makes well defined.
+struct [[gnu::may_alias]] KernelRay {
   float origin[3];
   float tnear;
   float direction[3];
@@ -150,8 +151,8 @@ struct KernelScene {
   const TopNode* parts;
 };
 
-/// As RayTracer's RayHit, plain.
-struct KernelHit {
+/// RayTracer's RayHit likewise.
+struct [[gnu::may_alias]] KernelHit {
   float t, u, v;
   uint32_t placement, cluster, triangle;
 };

@@ -18,9 +18,16 @@ namespace packtrace {
 namespace {
 
 static_assert(sizeof(Ray) == sizeof(packed::KernelRay) && offsetof(Ray, tfar) == offsetof(packed::KernelRay, tfar) &&
+              offsetof(Ray, origin) == offsetof(packed::KernelRay, origin) &&
+              offsetof(Ray, tnear) == offsetof(packed::KernelRay, tnear) &&
               offsetof(Ray, direction) == offsetof(packed::KernelRay, direction));
 static_assert(sizeof(RayHit) == sizeof(packed::KernelHit) &&
-              offsetof(RayHit, part) == offsetof(packed::KernelHit, cluster));
+              offsetof(RayHit, t) == offsetof(packed::KernelHit, t) &&
+              offsetof(RayHit, u) == offsetof(packed::KernelHit, u) &&
+              offsetof(RayHit, v) == offsetof(packed::KernelHit, v) &&
+              offsetof(RayHit, placement) == offsetof(packed::KernelHit, placement) &&
+              offsetof(RayHit, part) == offsetof(packed::KernelHit, cluster) &&
+              offsetof(RayHit, triangle) == offsetof(packed::KernelHit, triangle));
 static_assert(baked::kCameraBelow == kCameraRays && baked::kOcclusionBelow == kOcclusionRays);
 
 const packed::KernelRay* kernel_rays(std::span<const Ray> rays) {
