@@ -78,6 +78,7 @@ TEST_P(ClusterLodOf, EveryChainIsCutOnce) {
   std::vector<uint32_t> base;
   for (uint32_t i = 0; i < lod_.clusters.size(); ++i)
     if (lod_.clusters[i].level == 0) base.push_back(i);
+  if (base.empty()) GTEST_SKIP() << "no triangle has an area";
   for (int repeat = 0; repeat < 2000; ++repeat) {
     const double threshold = all[random.bits() % all.size()];
     uint32_t cluster = base[random.bits() % base.size()], selected = 0;
