@@ -29,8 +29,8 @@ std::string problem_of(Work work) {
   }
 }
 
-/// Runs work; where it throws MemoryError, says where in the text that was.
-/// @param place of what work is about
+/// Runs work and adds a file, line and column to a MemoryError that it throws.
+/// @param place returns the position of the directive or parameter that needed the memory; called only on failure
 template <class Place, class Work>
 auto with_place(const Reporter& reporter, Place place, Work work) {
   try {

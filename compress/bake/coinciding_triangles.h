@@ -8,9 +8,9 @@
 
 namespace packtrace {
 
-/// Finds triangles that quantisation made equal to an earlier one: same vertices, kind and winding, but apart in the
-/// source. What the source has twice is not found, nor is a triangle with the opposite winding: a thin sheet needs both
-/// of its sides to stay closed.
+/// Finds triangles that quantisation made equal to an earlier one. Equal triangles have the same vertices, kind and
+/// winding, and differ in the source. Duplicates in the source are kept. Triangles of opposite winding are kept as well:
+/// a thin sheet is closed only with both of its sides.
 class CoincidingTriangles {
 public:
   /// Where a triangle comes from.

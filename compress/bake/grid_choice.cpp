@@ -91,7 +91,7 @@ private:
     return grid.step() < before.step();
   }
 
-  /// For geometry with a grid of its own.
+  /// The finest useful step of a grid that no other geometry shares.
   static double finest_step(const GeometryMeasure& measure) {
     return std::max(measure.float_step(), measure.max_abs() * 0x1p-50);
   }
@@ -126,7 +126,7 @@ private:
     return std::min(0.75 * view.outline_share * step / view.best.height, 1.0);
   }
 
-  /// Geometry whose outlines move too far, where those of all together do.
+  /// Marks geometry whose outlines move too far. Marks none while the outlines of the whole scene move little enough.
   std::vector<uint8_t> find_moved_outlines() const {
     std::vector<uint8_t> moved(views_.size());
     double covered = 0.0, passed = 0.0;
@@ -194,7 +194,7 @@ private:
       }
       if (shortfall.bound == PictureBound::kNone || !(step > 0.0)) continue;
       const GeometryMeasure& measure = measure_.geometries[g];
-      shortfall.float_limit = shortfall.step <= 2.0 * std::max(measure.float_step(), finest_step(measure));
+      shortfall.float_limit = shortfall.step <= 2.0 * finest_step(measure);
       out_.shortfalls.push_back(shortfall);
     }
   }
