@@ -9,7 +9,7 @@
 namespace packtrace {
 
 /// Finds triangles that quantisation made equal to an earlier one. Equal triangles have the same vertices, kind and
-/// winding, and differ in the source. Duplicates in the source are kept. Triangles of opposite winding are kept as well:
+/// winding, and differ in the source. Duplicates in the source are kept. Triangles of opposite winding are kept, too:
 /// a thin sheet is closed only with both of its sides.
 class CoincidingTriangles {
 public:
