@@ -66,6 +66,7 @@ struct ImagePair {
   uint64_t compared = 0;      ///< pixels with a value in both
   uint64_t mismatched = 0;    ///< pixels with a value in only one
   bool alpha_ignored = false;
+  MemoryReservation memory; ///< of both images and of what metrics derive from them
 };
 
 void drop_alpha(LoadedImage& loaded) {
@@ -82,14 +83,19 @@ std::vector<uint8_t> valid_pixels(const LoadedImage& loaded) {
   return valid;
 }
 
-ImagePair load_pair(const CompareOptions& options) {
-  LoadedImage test = read_image(options.test, options.layer), reference = read_image(options.reference, options.layer);
+ImagePair load_pair(const CompareOptions& options, const MemoryBudget& budget) {
+  LoadedImage test = read_image(options.test, options.layer, budget);
+  LoadedImage reference = read_image(options.reference, options.layer, budget);
   if (test.image.size != reference.image.size)
     throw Error(ErrorKind::kInput,
                 fmt::format("images differ in size: {} is {} x {} pixels, {} is {} x {}", options.test,
                             test.image.size.width, test.image.size.height, options.reference,
                             reference.image.size.width, reference.image.size.height));
+  constexpr uint64_t kMetricBytesPerPixel = 64; // FLIP filters three channels of both images in floats
   ImagePair pair;
+  pair.memory = std::move(test.memory);
+  pair.memory.merge(std::move(reference.memory));
+  pair.memory.resize(pair.memory.bytes() + test.image.size.pixels() * kMetricBytesPerPixel, "comparing the images");
   pair.layer = test.layer;
   pair.alpha_ignored = test.alpha || reference.alpha;
   drop_alpha(test), drop_alpha(reference);
@@ -217,7 +223,7 @@ int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
   if (!options.diff.empty()) diff.emplace(options.diff, globals.force);
 
   refuse_to_replace({options.test, options.reference});
-  const ImagePair pair = load_pair(options);
+  const ImagePair pair = load_pair(options, globals.memory);
   print_notes(pair, globals);
   const std::array<bool, 5> wanted = wanted_metrics(options, pair.test);
   std::array<std::optional<double>, 5> values;

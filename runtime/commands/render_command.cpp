@@ -175,11 +175,11 @@ Backend choose_backend(const RenderOptions& options, bool baked) {
   return Backend::kEmbreeClusters;
 }
 
-TracerConfig tracer_config(const RenderOptions& options, bool baked) {
+TracerConfig tracer_config(const RenderOptions& options, const GlobalOptions& globals, bool baked) {
   TracerConfig config;
   config.backend = choose_backend(options, baked);
   const std::string quality = options.bvh.value_or("medium");
-  config.embree = {quality == "high" ? BvhQuality::kHigh : BvhQuality::kMedium, !options.fast_edges};
+  config.embree = {quality == "high" ? BvhQuality::kHigh : BvhQuality::kMedium, !options.fast_edges, false, globals.memory};
   return config;
 }
 
@@ -301,7 +301,11 @@ Traced trace(const RenderOptions& options, const GlobalOptions& globals, const L
   double build_s = 0.0;
   const auto build = [&](const auto& make) {
     const Stopwatch building;
-    traced.tracers.push_back(make());
+    try {
+      traced.tracers.push_back(make());
+    } catch (const MemoryError& error) {
+      throw MemoryError(options.input, error.what());
+    }
     build_s += building.seconds();
   };
   const auto choose = [&](const GBuffer* seen) {
@@ -355,7 +359,7 @@ void warn_of_lines(const std::string& input, size_t count) {
 
 int run(const RenderOptions& options, const GlobalOptions& globals) {
   if (options.outputs.empty()) fail_without_output("render", options.input, ".png");
-  tracer_config(options, false); // complains before the work
+  tracer_config(options, globals, false); // complains before the work
   if (!options.size.empty()) parse_size(options.size);
   validate(options.lod);
   JsonOutput json(globals.json, globals.force);
@@ -378,7 +382,7 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   ChosenCamera camera = choose_camera(*loaded.source, options, globals);
   const RenderConfig config = make_config(*loaded.source, camera.camera, options);
   const MemoryReservation pixels = reserve_picture(options, config, globals.memory);
-  const TracerConfig backend = tracer_config(options, loaded.baked.has_value());
+  const TracerConfig backend = tracer_config(options, globals, loaded.baked.has_value());
   const Traced traced =
       trace(options, globals, loaded, config, std::move(camera), backend, outputs.show_detail(), progress);
   display.finish();

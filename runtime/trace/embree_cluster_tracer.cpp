@@ -149,6 +149,8 @@ void find_any(RTCScene scene, const packed::TreeSearch& search) {
 } // namespace
 
 struct EmbreeClusterTracer::Trees {
+  explicit Trees(const std::optional<MemoryBudget>& memory) : device(memory) {}
+
   std::vector<ClusterNodes> nodes; ///< by tree
   EmbreeDevice device;
   std::vector<RtcPtr<RTCSceneTy>> scenes; ///< by tree; null where there is nothing to hit
@@ -174,8 +176,8 @@ struct EmbreeClusterTracer::Trees {
 };
 
 EmbreeClusterTracer::EmbreeClusterTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa,
-                                         ClusterPrimitives primitives)
-    : packed_(file, source, isa), trees_(std::make_unique<Trees>()) {
+                                         ClusterPrimitives primitives, const std::optional<MemoryBudget>& memory)
+    : packed_(file, source, isa), trees_(std::make_unique<Trees>(memory)) {
   if (rtcGetDeviceProperty(trees_->device.get(), RTC_DEVICE_PROPERTY_USER_GEOMETRY_SUPPORTED) == 0)
     throw Error(ErrorKind::kUnsupported, "this Embree was built without user geometry");
   const std::span<const packed::TraceTree> trees = packed_.trees();

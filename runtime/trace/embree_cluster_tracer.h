@@ -1,7 +1,9 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
+#include "pbrt_import/scene/memory_budget.h"
 #include "runtime/trace/packed/packed_tracer.h"
 
 namespace packtrace {
@@ -20,9 +22,11 @@ class EmbreeClusterTracer final : public RayTracer {
 public:
   /// Keeps references: both must outlive the tracer.
   /// Throws as PackedTracer, Error(kUnsupported) for an Embree built without the needed features,
-  /// Error(kLimitExceeded) if memory runs out, Error(kCancelled) after Progress::cancel().
+  /// MemoryError where the budget does not suffice for Embree's trees, Error(kLimitExceeded) where the system runs out
+  /// of memory, Error(kCancelled) after Progress::cancel().
   EmbreeClusterTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa = chosen_isa(),
-                      ClusterPrimitives primitives = ClusterPrimitives::kClusters);
+                      ClusterPrimitives primitives = ClusterPrimitives::kClusters,
+                      const std::optional<MemoryBudget>& memory = std::nullopt);
   ~EmbreeClusterTracer() override;
   EmbreeClusterTracer(const EmbreeClusterTracer&) = delete;
   EmbreeClusterTracer& operator=(const EmbreeClusterTracer&) = delete;

@@ -1,13 +1,15 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include <embree3/rtcore.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/memory_budget.h"
 
 namespace packtrace {
 
@@ -19,19 +21,21 @@ struct ReleaseRtc {
 template <typename T>
 using RtcPtr = std::unique_ptr<T, ReleaseRtc>;
 
-/// An Embree device that counts its memory and turns error codes into Error.
+/// An Embree device that counts its memory, keeps it within a budget, and turns error codes into Error.
 class EmbreeDevice {
 public:
+  /// Allocations beyond the budget fail, and check() says so.
   /// Throws Error(kUnsupported) if the device cannot be made or was built without ray masks, filter functions,
   /// ray streams or triangles.
-  EmbreeDevice();
+  explicit EmbreeDevice(const std::optional<MemoryBudget>& budget = std::nullopt);
   EmbreeDevice(const EmbreeDevice&) = delete;
   EmbreeDevice& operator=(const EmbreeDevice&) = delete;
 
   RTCDevice get() const { return device_.get(); }
 
-  /// Throws what was reported since the last call: Error(kLimitExceeded) for lack of memory, Error(kCancelled) for a
-  /// build that was stopped, else Error(kUnsupported).
+  /// Takes what the device holds now from the budget.
+  /// Throws what was reported since the last call: MemoryError for allocations beyond the budget, Error(kLimitExceeded)
+  /// where the system had no memory, Error(kCancelled) for a build that was stopped, else Error(kUnsupported).
   void check();
 
   /// Bytes allocated now.
@@ -41,10 +45,15 @@ public:
   void start_peak() { peak_.store(bytes_.load(std::memory_order_relaxed), std::memory_order_relaxed); }
 
 private:
+  void reserve();
   static void on_error(void* self, RTCError code, const char* text);
   static bool on_memory(void* self, ssize_t bytes, bool post);
 
   std::atomic<int64_t> bytes_{0}, peak_{0};
+  std::atomic<int64_t> max_bytes_{INT64_MAX}; ///< what the budget allowed at the last check()
+  std::atomic<bool> refused_{false};
+  std::optional<MemoryBudget> budget_;
+  MemoryReservation reserved_;
   std::mutex mutex_;
   RTCError code_ = RTC_ERROR_NONE; ///< the first since check()
   std::string text_;

@@ -66,6 +66,8 @@ struct EmbreeTracer::Part {
 
 /// The Embree objects, in the order in which they must not be destroyed.
 struct EmbreeTracer::Device {
+  explicit Device(const EmbreeConfig& config) : embree(config.memory) {}
+
   EmbreeDevice embree;
   std::vector<RtcPtr<RTCSceneTy>> surface_scenes; ///< of instanced surfaces, by surface; else null
   RtcPtr<RTCSceneTy> top;
@@ -138,13 +140,27 @@ struct EmbreeTracer::Decoded {
   }
 };
 
+namespace {
+
+uint64_t surface_bytes(const GeometryCounts& counts) {
+  return uint64_t{counts.vertices} * sizeof(Vec3) + uint64_t{counts.triangles} * (sizeof(Triangle) + sizeof(uint32_t));
+}
+
+} // namespace
+
 EmbreeTracer::EmbreeTracer(const SceneSource& source, EmbreeConfig config)
-    : source_(source), config_(config), device_(std::make_unique<Device>()) {
+    : source_(source), config_(config), device_(std::make_unique<Device>(config)) {
+  if (config.memory) memory_ = MemoryReservation(*config.memory);
   std::vector<Decoded> decoded(source.geometry_count());
   for (const PlacedGeometry& placed : source.instances()) {
     if (placed.geometry >= decoded.size()) throw Error(ErrorKind::kInput, "an instance has no geometry");
     ++decoded[placed.geometry].uses;
   }
+  uint64_t decoded_bytes = 0;
+  for (uint32_t g = 0; g < decoded.size(); ++g)
+    if (decoded[g].uses > 0) decoded_bytes += surface_bytes(source.counts(g));
+  MemoryReservation decoding = config.memory ? MemoryReservation(*config.memory) : MemoryReservation();
+  decoding.resize(decoded_bytes, "decoding the scene for Embree");
   tbb::parallel_for(uint32_t{0}, source.geometry_count(), [&](uint32_t g) {
     stop_if_cancelled();
     if (decoded[g].uses > 0 && source.counts(g).triangles > 0) decoded[g].read(source, g);
@@ -187,6 +203,8 @@ void EmbreeTracer::place(std::vector<Decoded>& decoded) {
 
 uint32_t EmbreeTracer::add_surface(uint32_t instance, const Decoded& decoded, const DAffine& surface_from_object) {
   const auto index = static_cast<uint32_t>(surfaces_.size());
+  memory_.resize(memory_.bytes() + surface_bytes(source_.counts(source_.instances()[instance].geometry)),
+                 "Embree's copy of the triangles");
   Surface& surface = surfaces_.emplace_back();
   surface.geometry = source_.instances()[instance].geometry;
   surface.positions.resize(decoded.positions.size() + kPaddingVertices, Vec3(0));

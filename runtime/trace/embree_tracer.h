@@ -1,9 +1,11 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "pbrt_import/scene/memory_budget.h"
 #include "runtime/trace/ray_tracer.h"
 
 struct RTCSceneTy;
@@ -21,6 +23,8 @@ struct EmbreeConfig {
   /// on finely tessellated surfaces and leaves a dot; tracing is up to a fifth faster then, and kHigh splits in space.
   bool robust = true;
   bool compact = false; ///< smaller and slower trees
+  /// Pays for vertices, indices and trees; no limit without one.
+  std::optional<MemoryBudget> memory;
 };
 
 /// Traces one SceneSource with Embree 3: float triangles decoded once, and Embree's trees over them.
@@ -37,9 +41,9 @@ struct EmbreeConfig {
 class EmbreeTracer final : public RayTracer {
 public:
   /// Keeps a reference: the source must outlive the tracer.
-  /// Throws Error(kInput) for positions or transforms that are not finite or indices out of range,
-  /// Error(kLimitExceeded) if memory runs out, Error(kUnsupported) for an Embree built without the needed features,
-  /// Error(kCancelled) after Progress::cancel().
+  /// Throws Error(kInput) for positions or transforms that are not finite or indices out of range, MemoryError where
+  /// the budget does not suffice, Error(kLimitExceeded) where the system runs out of memory, Error(kUnsupported) for an
+  /// Embree built without the needed features, Error(kCancelled) after Progress::cancel().
   EmbreeTracer(const SceneSource& source, EmbreeConfig config);
   ~EmbreeTracer() override;
   EmbreeTracer(const EmbreeTracer&) = delete;
@@ -99,6 +103,7 @@ private:
   const SceneSource& source_;
   EmbreeConfig config_;
   UnitSpace space_;
+  MemoryReservation memory_; ///< of surfaces and parts
   std::vector<Surface> surfaces_;
   std::vector<Part> parts_;
   std::vector<Placement> placements_;

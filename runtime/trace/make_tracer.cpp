@@ -11,7 +11,8 @@ std::unique_ptr<RayTracer> make_tracer(const SceneSource& source, const BakedFil
       throw Error(ErrorKind::kUnsupported,
                   "backends packed and embree-clusters trace baked files only; bake the scene, or use embree");
     if (config.backend == Backend::kPacked) return std::make_unique<PackedTracer>(*file, source);
-    return std::make_unique<EmbreeClusterTracer>(*file, source, chosen_isa(), config.cluster_primitives);
+    return std::make_unique<EmbreeClusterTracer>(*file, source, chosen_isa(), config.cluster_primitives,
+                                                 config.embree.memory);
   }
   return std::make_unique<EmbreeTracer>(source, config.embree);
 }

@@ -92,6 +92,47 @@ TEST(Limits, PicturesAndBakedFilesAskForMemoryToo) {
   EXPECT_NE(decoded.err.find(bench.baked() + ": what the file is decoded to needs "), std::string::npos) << decoded.err;
 }
 
+TEST(Limits, EmbreeAsksForMemoryToo) {
+  const Workbench bench;
+  const std::string scene = bench / "fine.pbrt", out = bench / "out.png";
+  write_text(scene, "WorldBegin\nShape \"loopsubdiv\" \"integer nlevels\" 8 \"integer indices\" [0 1 2]\n"
+                    "  \"point P\" [0 0 0 1 0 0 0 1 0]\nWorldEnd\n");
+  ASSERT_EQ(run_packtrace({"bake", scene, "-o", bench.baked(), "-q"}).exit_code, 0);
+  const auto render = [&](const char* backend, const char* memory) {
+    return run_packtrace({"render", bench.baked(), "-o", out, "-q", "--force", "--size", "8x8", "--backend", backend,
+                          "--max-memory", memory});
+  };
+  const CommandResult decoding = render("embree", "1M");
+  EXPECT_EQ(decoding.exit_code, 3);
+  EXPECT_NE(decoding.err.find(bench.baked() + ": decoding the scene for Embree needs "), std::string::npos)
+      << decoding.err;
+  for (const auto& [backend, memory] : {std::pair("embree", "4M"), {"embree-clusters", "100K"}}) {
+    const CommandResult building = render(backend, memory);
+    EXPECT_EQ(building.exit_code, 3);
+    EXPECT_NE(building.err.find(bench.baked() + ": Embree's trees need more than the "), std::string::npos)
+        << building.err;
+  }
+  for (const char* backend : {"embree", "embree-clusters", "packed"})
+    EXPECT_EQ(render(backend, "64M").exit_code, 0) << backend;
+}
+
+TEST(Limits, ComparedImagesAskForMemoryToo) {
+  const Workbench bench;
+  bench.bake();
+  const std::string png = bench / "a.png", exr = bench / "a.exr";
+  ASSERT_EQ(run_packtrace({"render", bench.baked(), "-o", png, "-o", exr, "-q", "--size", "512x512"}).exit_code, 0);
+  for (const std::string& image : {png, exr}) {
+    ASSERT_TRUE(fs::exists(image)) << image;
+    EXPECT_EQ(run_packtrace({"compare", image, image, "--max-memory", "64M"}).exit_code, 0);
+    const CommandResult large = run_packtrace({"compare", image, image, "--max-memory", "2M"});
+    EXPECT_EQ(large.exit_code, 3);
+    EXPECT_NE(large.err.find(image + ": the image needs "), std::string::npos) << large.err;
+    const CommandResult larger = run_packtrace({"compare", image, image, "--max-memory", "20M"});
+    EXPECT_EQ(larger.exit_code, 3);
+    EXPECT_NE(larger.err.find("comparing the images needs "), std::string::npos) << larger.err;
+  }
+}
+
 TEST(Limits, APrivateCopyIsRenderedLikeTheFile) {
   const Workbench bench;
   bench.bake();
