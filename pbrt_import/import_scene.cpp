@@ -3,13 +3,13 @@
 #include <cmath>
 #include <string>
 
-#include "pbrt_import/file_names.h"
-#include "pbrt_import/parser.h"
-#include "pbrt_import/problem_text.h"
-#include "pbrt_import/reporter.h"
-#include "pbrt_import/scene/file_error.h"
-#include "pbrt_import/scene_builder.h"
-#include "pbrt_import/source_stack.h"
+#include "pbrt_import/language/file_names.h"
+#include "pbrt_import/language/parser.h"
+#include "pbrt_import/text/problem_text.h"
+#include "pbrt_import/text/reporter.h"
+#include "pbrt_import/base/file_error.h"
+#include "pbrt_import/builder/scene_builder.h"
+#include "pbrt_import/text/source_stack.h"
 
 namespace packtrace {
 namespace {

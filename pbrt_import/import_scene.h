@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "pbrt_import/scene/diagnostics.h"
-#include "pbrt_import/scene/memory_budget.h"
-#include "pbrt_import/scene/progress.h"
+#include "pbrt_import/base/diagnostics.h"
+#include "pbrt_import/base/memory_budget.h"
+#include "pbrt_import/base/progress.h"
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <system_error>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace::scenegen {
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "pbrt_import/scene/output_file.h"
+#include "pbrt_import/base/output_file.h"
 
 namespace packtrace::scenegen {
 

@@ -11,7 +11,7 @@
 #include "assets/generator/placement.h"
 #include "assets/generator/ply_output.h"
 #include "assets/generator/primitives.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace::scenegen {
 namespace {

@@ -12,7 +12,7 @@
 #include "assets/generator/noise.h"
 #include "assets/generator/placement.h"
 #include "assets/generator/primitives.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace::scenegen {
 namespace {

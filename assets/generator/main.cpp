@@ -11,7 +11,7 @@
 #include "assets/generator/forest.h"
 #include "assets/generator/leaf_mask.h"
 #include "assets/generator/town.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace::scenegen {
 namespace {

@@ -10,7 +10,7 @@
 #include "assets/generator/placement.h"
 #include "assets/generator/town_objects.h"
 #include "assets/generator/town_terrain.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace::scenegen {
 namespace {

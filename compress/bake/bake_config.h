@@ -4,12 +4,12 @@
 #include <filesystem>
 #include <optional>
 
-#include "compress/format/baked_format.h"
-#include "compress/format/normal_codec.h"
-#include "compress/format/page_codec.h"
-#include "compress/format/texture_codec.h"
-#include "compress/format/uv_codec.h"
-#include "pbrt_import/scene/memory_budget.h"
+#include "compress/format/layout/baked_format.h"
+#include "compress/format/cluster/normal_codec.h"
+#include "compress/format/pages/page_codec.h"
+#include "compress/format/textures/texture_codec.h"
+#include "compress/format/cluster/uv_codec.h"
+#include "pbrt_import/base/memory_budget.h"
 
 namespace packtrace {
 

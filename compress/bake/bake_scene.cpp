@@ -11,23 +11,23 @@
 #include <tbb/task_arena.h>
 #include <tbb/task_group.h>
 
-#include "compress/bake/brief.h"
-#include "compress/bake/file_sections.h"
-#include "compress/bake/geometry_encoder.h"
-#include "compress/bake/geometry_measure.h"
-#include "compress/bake/geometry_plan.h"
-#include "compress/bake/grid_choice.h"
+#include "pbrt_import/base/brief.h"
+#include "compress/bake/write/file_sections.h"
+#include "compress/bake/clusters/geometry_encoder.h"
+#include "compress/bake/grid/geometry_measure.h"
+#include "compress/bake/plan/geometry_plan.h"
+#include "compress/bake/grid/grid_choice.h"
 #include "compress/bake/lod/lod_encoder.h"
-#include "compress/bake/lod/lod_store.h"
+#include "compress/bake/write/lod_store.h"
 #include "compress/bake/lod/shared_borders.h"
-#include "compress/bake/material_runs.h"
-#include "compress/bake/page_encoder.h"
-#include "compress/bake/requirement_table.h"
-#include "compress/bake/scene_measure.h"
-#include "compress/format/baked_image.h"
-#include "compress/format/bit_stream.h"
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/output_file.h"
+#include "compress/bake/plan/material_runs.h"
+#include "compress/format/pages/page_encoder.h"
+#include "compress/bake/write/requirement_table.h"
+#include "compress/bake/grid/scene_measure.h"
+#include "compress/format/file/baked_image.h"
+#include "compress/format/layout/bit_stream.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/output_file.h"
 
 namespace packtrace {
 namespace {

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "compress/bake/bake_config.h"
-#include "compress/bake/seam_gaps.h"
-#include "compress/format/file_summary.h"
-#include "pbrt_import/scene/diagnostics.h"
-#include "pbrt_import/scene/progress.h"
+#include "compress/bake/grid/seam_gaps.h"
+#include "compress/format/file/file_summary.h"
+#include "pbrt_import/base/diagnostics.h"
+#include "pbrt_import/base/progress.h"
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace {

@@ -1,4 +1,4 @@
-#include "pbrt_import/scene/closest_name.h"
+#include "pbrt_import/base/closest_name.h"
 
 #include <algorithm>
 #include <vector>

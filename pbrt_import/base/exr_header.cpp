@@ -1,4 +1,4 @@
-#include "pbrt_import/scene/exr_header.h"
+#include "pbrt_import/base/exr_header.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 #include <set>
 #include <utility>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

@@ -1,4 +1,4 @@
-#include "pbrt_import/scene/file_bytes.h"
+#include "pbrt_import/base/file_bytes.h"
 
 #include <cerrno>
 #include <cstdint>
@@ -9,9 +9,9 @@
 
 #include <unistd.h>
 
-#include "pbrt_import/scene/file_error.h"
-#include "pbrt_import/scene/memory_budget.h"
-#include "pbrt_import/scene/regular_file.h"
+#include "pbrt_import/base/file_error.h"
+#include "pbrt_import/base/memory_budget.h"
+#include "pbrt_import/base/regular_file.h"
 
 namespace packtrace {
 

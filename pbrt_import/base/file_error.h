@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <string>
 
-#include "pbrt_import/scene/diagnostics.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/diagnostics.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 

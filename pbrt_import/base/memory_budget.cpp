@@ -1,4 +1,4 @@
-#include "pbrt_import/scene/memory_budget.h"
+#include "pbrt_import/base/memory_budget.h"
 
 #include <algorithm>
 #include <array>

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "pbrt_import/scene/file_error.h"
+#include "pbrt_import/base/file_error.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "pbrt_import/scene/output_file.h"
+#include "pbrt_import/base/output_file.h"
 
 #include <array>
 #include <atomic>
@@ -18,7 +18,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "pbrt_import/scene/file_error.h"
+#include "pbrt_import/base/file_error.h"
 
 namespace packtrace {
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "pbrt_import/scene/regular_file.h"
+#include "pbrt_import/base/regular_file.h"
 
 namespace packtrace {
 

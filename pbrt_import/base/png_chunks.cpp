@@ -1,4 +1,4 @@
-#include "pbrt_import/scene/png_chunks.h"
+#include "pbrt_import/base/png_chunks.h"
 
 #include <algorithm>
 #include <cstring>
@@ -7,7 +7,7 @@
 
 #include <zlib.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

@@ -1,4 +1,4 @@
-#include "pbrt_import/scene/printable.h"
+#include "pbrt_import/base/printable.h"
 
 #include <algorithm>
 #include <cstdint>

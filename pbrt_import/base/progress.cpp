@@ -1,6 +1,6 @@
-#include "pbrt_import/scene/progress.h"
+#include "pbrt_import/base/progress.h"
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 

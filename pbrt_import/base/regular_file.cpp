@@ -1,4 +1,4 @@
-#include "pbrt_import/scene/regular_file.h"
+#include "pbrt_import/base/regular_file.h"
 
 #include <algorithm>
 #include <cerrno>
@@ -9,7 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

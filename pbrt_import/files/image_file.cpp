@@ -1,4 +1,4 @@
-#include "pbrt_import/image_file.h"
+#include "pbrt_import/files/image_file.h"
 
 #include <algorithm>
 #include <array>
@@ -21,13 +21,13 @@
 #define STBI_ONLY_PNG
 #include <stb/stb_image.h>
 
-#include "pbrt_import/number.h"
-#include "pbrt_import/radiance.h"
+#include "pbrt_import/text/number.h"
+#include "pbrt_import/files/radiance.h"
 #include "pbrt_import/scene/albedo_texture.h"
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/exr_header.h"
-#include "pbrt_import/scene/png_chunks.h"
-#include "pbrt_import/tga.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/exr_header.h"
+#include "pbrt_import/base/png_chunks.h"
+#include "pbrt_import/files/tga.h"
 
 namespace packtrace {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "pbrt_import/scene/math.h"
-#include "pbrt_import/scene/memory_budget.h"
+#include "pbrt_import/base/memory_budget.h"
 
 namespace packtrace {
 

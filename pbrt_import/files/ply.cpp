@@ -1,15 +1,15 @@
-#include "pbrt_import/ply.h"
+#include "pbrt_import/files/ply.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
 
-#include "pbrt_import/ply_header.h"
-#include "pbrt_import/ply_source.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/files/ply_header.h"
+#include "pbrt_import/files/ply_source.h"
+#include "pbrt_import/base/error.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
 namespace {

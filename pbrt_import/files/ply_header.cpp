@@ -1,12 +1,12 @@
-#include "pbrt_import/ply_header.h"
+#include "pbrt_import/files/ply_header.h"
 
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <utility>
 
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
 namespace {

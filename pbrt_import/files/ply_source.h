@@ -10,10 +10,10 @@
 #include <string>
 #include <string_view>
 
-#include "pbrt_import/number.h"
-#include "pbrt_import/ply_header.h"
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/text/number.h"
+#include "pbrt_import/files/ply_header.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/text/tokenizer.h"
 
 /// Where the values of a PLY file's body come from. BinarySource and AsciiSource have the same members, so that readers
 /// are templates over them.

@@ -1,4 +1,4 @@
-#include "pbrt_import/radiance.h"
+#include "pbrt_import/files/radiance.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
-#include "pbrt_import/number.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/text/number.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

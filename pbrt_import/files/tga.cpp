@@ -1,9 +1,9 @@
-#include "pbrt_import/tga.h"
+#include "pbrt_import/files/tga.h"
 
 #include <algorithm>
 #include <array>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

@@ -1,9 +1,9 @@
-#include "pbrt_import/cameras.h"
+#include "pbrt_import/language/cameras.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
 namespace {

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "pbrt_import/graphics_state.h"
-#include "pbrt_import/parser.h"
-#include "pbrt_import/reporter.h"
+#include "pbrt_import/language/graphics_state.h"
+#include "pbrt_import/language/parser.h"
+#include "pbrt_import/text/reporter.h"
 #include "pbrt_import/scene/scene.h"
-#include "pbrt_import/transforms.h"
+#include "pbrt_import/language/transforms.h"
 
 namespace packtrace {
 

@@ -1,10 +1,10 @@
-#include "pbrt_import/directive_info.h"
+#include "pbrt_import/language/directive_info.h"
 
 #include <array>
 #include <iterator>
 #include <vector>
 
-#include "pbrt_import/scene/closest_name.h"
+#include "pbrt_import/base/closest_name.h"
 
 namespace packtrace {
 namespace {

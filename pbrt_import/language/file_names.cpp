@@ -1,10 +1,10 @@
-#include "pbrt_import/file_names.h"
+#include "pbrt_import/language/file_names.h"
 
 #include <algorithm>
 #include <system_error>
 
-#include "pbrt_import/reporter.h"
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/text/reporter.h"
+#include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
 namespace {

@@ -6,7 +6,7 @@
 #include <unordered_set>
 #include <vector>
 
-#include "pbrt_import/parameters.h"
+#include "pbrt_import/language/parameters.h"
 
 namespace packtrace {
 

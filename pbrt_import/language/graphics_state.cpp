@@ -1,4 +1,4 @@
-#include "pbrt_import/graphics_state.h"
+#include "pbrt_import/language/graphics_state.h"
 
 #include <algorithm>
 #include <cassert>

@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "pbrt_import/name_table.h"
-#include "pbrt_import/parameters.h"
+#include "pbrt_import/language/name_table.h"
+#include "pbrt_import/language/parameters.h"
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {

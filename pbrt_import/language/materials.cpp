@@ -1,4 +1,4 @@
-#include "pbrt_import/materials.h"
+#include "pbrt_import/language/materials.h"
 
 #include <algorithm>
 #include <array>
@@ -6,8 +6,8 @@
 #include <span>
 #include <string_view>
 
-#include "pbrt_import/spectrum.h"
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/language/spectrum.h"
+#include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
 namespace {

@@ -8,10 +8,10 @@
 #include <unordered_map>
 #include <vector>
 
-#include "pbrt_import/graphics_state.h"
-#include "pbrt_import/parser.h"
+#include "pbrt_import/language/graphics_state.h"
+#include "pbrt_import/language/parser.h"
 #include "pbrt_import/scene/scene.h"
-#include "pbrt_import/texture_parameters.h"
+#include "pbrt_import/language/texture_parameters.h"
 
 namespace packtrace {
 

@@ -1,9 +1,9 @@
-#include "pbrt_import/name_table.h"
+#include "pbrt_import/language/name_table.h"
 
 #include <algorithm>
 #include <functional>
 
-#include "pbrt_import/parameters.h"
+#include "pbrt_import/language/parameters.h"
 
 namespace packtrace {
 namespace {

@@ -1,10 +1,10 @@
-#include "pbrt_import/parameters.h"
+#include "pbrt_import/language/parameters.h"
 
 #include <algorithm>
 #include <array>
 #include <utility>
 
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
 namespace {

@@ -8,8 +8,8 @@
 #include <unordered_map>
 #include <vector>
 
-#include "pbrt_import/number_array.h"
-#include "pbrt_import/scene/closest_name.h"
+#include "pbrt_import/text/number_array.h"
+#include "pbrt_import/base/closest_name.h"
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {

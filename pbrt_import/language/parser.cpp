@@ -1,4 +1,4 @@
-#include "pbrt_import/parser.h"
+#include "pbrt_import/language/parser.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "pbrt_import/number.h"
+#include "pbrt_import/text/number.h"
 
 namespace packtrace {
 namespace {

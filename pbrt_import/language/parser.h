@@ -7,11 +7,11 @@
 #include <string_view>
 #include <vector>
 
-#include "pbrt_import/directive_info.h"
-#include "pbrt_import/file_names.h"
-#include "pbrt_import/parameters.h"
-#include "pbrt_import/scene/memory_budget.h"
-#include "pbrt_import/source_stack.h"
+#include "pbrt_import/language/directive_info.h"
+#include "pbrt_import/language/file_names.h"
+#include "pbrt_import/language/parameters.h"
+#include "pbrt_import/base/memory_budget.h"
+#include "pbrt_import/text/source_stack.h"
 
 namespace packtrace {
 

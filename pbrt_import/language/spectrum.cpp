@@ -1,10 +1,10 @@
-#include "pbrt_import/spectrum.h"
+#include "pbrt_import/language/spectrum.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "pbrt_import/number.h"
+#include "pbrt_import/text/number.h"
 
 namespace packtrace {
 namespace {

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "pbrt_import/parameters.h"
+#include "pbrt_import/language/parameters.h"
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {

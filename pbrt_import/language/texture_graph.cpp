@@ -1,4 +1,4 @@
-#include "pbrt_import/texture_graph.h"
+#include "pbrt_import/language/texture_graph.h"
 
 #include <algorithm>
 #include <array>

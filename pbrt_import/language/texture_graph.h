@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "pbrt_import/image_file.h"
-#include "pbrt_import/parameters.h"
+#include "pbrt_import/files/image_file.h"
+#include "pbrt_import/language/parameters.h"
 #include "pbrt_import/scene/albedo_texture.h"
 
 namespace packtrace {

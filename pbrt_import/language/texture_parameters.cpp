@@ -1,12 +1,12 @@
-#include "pbrt_import/texture_parameters.h"
+#include "pbrt_import/language/texture_parameters.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "pbrt_import/input_file.h"
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/spectrum.h"
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/text/input_file.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/language/spectrum.h"
+#include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
 namespace {

@@ -4,11 +4,11 @@
 #include <span>
 #include <string_view>
 
-#include "pbrt_import/file_names.h"
-#include "pbrt_import/graphics_state.h"
-#include "pbrt_import/parameters.h"
-#include "pbrt_import/reporter.h"
-#include "pbrt_import/texture_graph.h"
+#include "pbrt_import/language/file_names.h"
+#include "pbrt_import/language/graphics_state.h"
+#include "pbrt_import/language/parameters.h"
+#include "pbrt_import/text/reporter.h"
+#include "pbrt_import/language/texture_graph.h"
 
 namespace packtrace {
 

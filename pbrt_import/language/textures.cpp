@@ -1,11 +1,11 @@
-#include "pbrt_import/textures.h"
+#include "pbrt_import/language/textures.h"
 
 #include <cmath>
 #include <numbers>
 #include <string>
 #include <vector>
 
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <optional>
 
-#include "pbrt_import/parser.h"
-#include "pbrt_import/texture_parameters.h"
+#include "pbrt_import/language/parser.h"
+#include "pbrt_import/language/texture_parameters.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "pbrt_import/transforms.h"
+#include "pbrt_import/language/transforms.h"
 
 #include <array>
 #include <charconv>

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
 #include "pbrt_import/shapes/report.h"
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <span>
 
-#include "pbrt_import/scene/memory_budget.h"
+#include "pbrt_import/base/memory_budget.h"
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "pbrt_import/scene/bounds.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
 
 namespace packtrace {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "pbrt_import/scene/memory_budget.h"
+#include "pbrt_import/base/memory_budget.h"
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace {

@@ -4,8 +4,8 @@
 #include <functional>
 #include <string>
 
-#include "pbrt_import/scene/diagnostics.h"
-#include "pbrt_import/scene/memory_budget.h"
+#include "pbrt_import/base/diagnostics.h"
+#include "pbrt_import/base/memory_budget.h"
 
 namespace packtrace {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
 
 namespace packtrace {

@@ -1,4 +1,4 @@
-#include "pbrt_import/input_file.h"
+#include "pbrt_import/text/input_file.h"
 
 #include <algorithm>
 #include <array>
@@ -10,8 +10,8 @@
 #include <unistd.h>
 #include <zlib.h>
 
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/regular_file.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/regular_file.h"
 
 namespace packtrace {
 namespace {

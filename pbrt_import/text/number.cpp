@@ -1,4 +1,4 @@
-#include "pbrt_import/number.h"
+#include "pbrt_import/text/number.h"
 
 #include <charconv>
 #include <limits>

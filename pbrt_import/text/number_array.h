@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "pbrt_import/large_pages.h"
+#include "pbrt_import/text/large_pages.h"
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {

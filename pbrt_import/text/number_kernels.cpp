@@ -1,4 +1,4 @@
-#include "pbrt_import/number_kernels.h"
+#include "pbrt_import/text/number_kernels.h"
 
 namespace packtrace {
 

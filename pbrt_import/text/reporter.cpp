@@ -1,9 +1,9 @@
-#include "pbrt_import/reporter.h"
+#include "pbrt_import/text/reporter.h"
 
 #include <algorithm>
 #include <utility>
 
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
 

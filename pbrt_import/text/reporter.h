@@ -8,8 +8,8 @@
 #include <unordered_set>
 #include <vector>
 
-#include "pbrt_import/parameters.h"
-#include "pbrt_import/scene/diagnostics.h"
+#include "pbrt_import/language/parameters.h"
+#include "pbrt_import/base/diagnostics.h"
 
 namespace packtrace {
 

@@ -1,8 +1,8 @@
-#include "pbrt_import/source_stack.h"
+#include "pbrt_import/text/source_stack.h"
 
 #include <algorithm>
 
-#include "pbrt_import/scene/file_error.h"
+#include "pbrt_import/base/file_error.h"
 
 namespace packtrace {
 namespace {

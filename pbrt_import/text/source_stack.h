@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "pbrt_import/reporter.h"
-#include "pbrt_import/scene/memory_budget.h"
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/text/reporter.h"
+#include "pbrt_import/base/memory_budget.h"
+#include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
 

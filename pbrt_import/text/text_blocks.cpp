@@ -1,4 +1,4 @@
-#include "pbrt_import/text_blocks.h"
+#include "pbrt_import/text/text_blocks.h"
 
 #include <algorithm>
 #include <cstring>
@@ -7,8 +7,8 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
-#include "pbrt_import/number.h"
-#include "pbrt_import/number_kernels.h"
+#include "pbrt_import/text/number.h"
+#include "pbrt_import/text/number_kernels.h"
 
 namespace packtrace {
 namespace {

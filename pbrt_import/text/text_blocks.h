@@ -9,7 +9,7 @@
 
 #include <tbb/task_group.h>
 
-#include "pbrt_import/input_file.h"
+#include "pbrt_import/text/input_file.h"
 
 namespace packtrace {
 

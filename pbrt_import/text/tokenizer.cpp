@@ -1,13 +1,13 @@
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/text/tokenizer.h"
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cstring>
 
-#include "pbrt_import/number.h"
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/printable.h"
+#include "pbrt_import/text/number.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/printable.h"
 
 namespace packtrace {
 namespace {

@@ -8,7 +8,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "pbrt_import/text_blocks.h"
+#include "pbrt_import/text/text_blocks.h"
 
 namespace packtrace {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <string>
 
-#include "pbrt_import/scene/error.h"
-#include "runtime/trace/tiles.h"
+#include "pbrt_import/base/error.h"
+#include "runtime/camera/tiles.h"
 
 namespace packtrace {
 namespace {

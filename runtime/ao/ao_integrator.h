@@ -2,9 +2,9 @@
 
 #include <cstdint>
 
-#include "pbrt_import/scene/progress.h"
+#include "pbrt_import/base/progress.h"
 #include "runtime/ao/sampler.h"
-#include "runtime/gbuffer.h"
+#include "runtime/camera/gbuffer.h"
 #include "runtime/trace/ray_tracer.h"
 
 namespace packtrace {

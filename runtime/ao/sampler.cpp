@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 
-#include "runtime/trace/tiles.h"
+#include "runtime/camera/tiles.h"
 
 namespace packtrace {
 namespace {

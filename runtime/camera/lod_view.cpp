@@ -1,4 +1,4 @@
-#include "runtime/trace/lod_view.h"
+#include "runtime/camera/lod_view.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,7 +6,7 @@
 
 #include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/scene/camera_rays.h"
-#include "runtime/gbuffer.h"
+#include "runtime/camera/gbuffer.h"
 #include "runtime/lod/lod_sharing.h"
 
 namespace packtrace {

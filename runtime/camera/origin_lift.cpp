@@ -1,7 +1,7 @@
-#include "runtime/trace/origin_lift.h"
+#include "runtime/camera/origin_lift.h"
 
-#include "runtime/trace/lod_view.h"
-#include "runtime/trace/tiles.h"
+#include "runtime/camera/lod_view.h"
+#include "runtime/camera/tiles.h"
 
 namespace packtrace {
 namespace {

@@ -1,8 +1,8 @@
 #pragma once
 
 #include "pbrt_import/scene/camera_rays.h"
-#include "pbrt_import/scene/progress.h"
-#include "runtime/gbuffer.h"
+#include "pbrt_import/base/progress.h"
+#include "runtime/camera/gbuffer.h"
 #include "runtime/trace/ray_tracer.h"
 
 namespace packtrace {

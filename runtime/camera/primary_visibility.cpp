@@ -1,11 +1,11 @@
-#include "runtime/trace/primary_visibility.h"
+#include "runtime/camera/primary_visibility.h"
 
 #include <algorithm>
 #include <limits>
 
-#include "runtime/trace/albedo_lookup.h"
+#include "runtime/trace/source/albedo_lookup.h"
 #include "runtime/trace/ray_offset.h"
-#include "runtime/trace/tiles.h"
+#include "runtime/camera/tiles.h"
 
 namespace packtrace {
 namespace {

@@ -1,4 +1,4 @@
-#include "runtime/trace/tiles.h"
+#include "runtime/camera/tiles.h"
 
 #include <algorithm>
 #include <vector>

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <functional>
 
-#include "pbrt_import/scene/progress.h"
-#include "runtime/gbuffer.h"
+#include "pbrt_import/base/progress.h"
+#include "runtime/camera/gbuffer.h"
 
 namespace packtrace {
 

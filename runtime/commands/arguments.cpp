@@ -6,8 +6,8 @@
 
 #include <CLI/CLI.hpp>
 
-#include "pbrt_import/scene/closest_name.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/closest_name.h"
+#include "pbrt_import/base/error.h"
 #include "runtime/commands/option_checks.h"
 
 namespace packtrace {

@@ -13,7 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "compress/bake/bake_scene.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "runtime/commands/binary_output.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/file_report.h"

@@ -5,7 +5,7 @@
 
 #include <unistd.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "runtime/commands/option_checks.h"
 
 namespace packtrace {

@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include "pbrt_import/scene/output_file.h"
+#include "pbrt_import/base/output_file.h"
 #include "runtime/commands/json_output.h"
 
 namespace packtrace {

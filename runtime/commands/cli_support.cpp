@@ -18,9 +18,9 @@
 #include <tbb/global_control.h>
 #include <unistd.h>
 
-#include "pbrt_import/scene/output_file.h"
-#include "pbrt_import/scene/printable.h"
-#include "pbrt_import/scene/progress.h"
+#include "pbrt_import/base/output_file.h"
+#include "pbrt_import/base/printable.h"
+#include "pbrt_import/base/progress.h"
 #include "runtime/commands/arguments.h"
 #include "runtime/commands/command_line.h"
 #include "runtime/commands/json_output.h"

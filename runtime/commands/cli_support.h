@@ -6,9 +6,9 @@
 #include <string>
 #include <string_view>
 
-#include "pbrt_import/scene/diagnostics.h"
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/memory_budget.h"
+#include "pbrt_import/base/diagnostics.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/memory_budget.h"
 
 namespace CLI {
 class App;

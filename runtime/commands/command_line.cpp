@@ -8,8 +8,8 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "pbrt_import/scene/closest_name.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/closest_name.h"
+#include "pbrt_import/base/error.h"
 #include "runtime/commands/arguments.h"
 #include "runtime/commands/option_checks.h"
 

@@ -15,8 +15,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/output_file.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/output_file.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/json_output.h"
 #include "runtime/commands/option_checks.h"

@@ -5,7 +5,7 @@
 #include <span>
 #include <utility>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "runtime/commands/binary_output.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/image/png.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "pbrt_import/scene/output_file.h"
+#include "pbrt_import/base/output_file.h"
 #include "runtime/commands/layer_previews.h"
 #include "runtime/image/exr.h"
 #include "runtime/render/renderer.h"

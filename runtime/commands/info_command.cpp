@@ -12,7 +12,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/file_report.h"
 #include "runtime/commands/json_output.h"

@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pbrt_import/scene/file_error.h"
+#include "pbrt_import/base/file_error.h"
 #include "runtime/commands/option_checks.h"
 
 namespace packtrace {

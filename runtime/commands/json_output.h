@@ -5,8 +5,8 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/output_file.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/output_file.h"
 
 namespace packtrace {
 

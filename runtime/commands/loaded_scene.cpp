@@ -11,14 +11,14 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "pbrt_import/input_file.h"
-#include "pbrt_import/scene/file_bytes.h"
-#include "pbrt_import/scene/file_error.h"
-#include "pbrt_import/scene/output_file.h"
-#include "pbrt_import/scene/regular_file.h"
+#include "pbrt_import/text/input_file.h"
+#include "pbrt_import/base/file_bytes.h"
+#include "pbrt_import/base/file_error.h"
+#include "pbrt_import/base/output_file.h"
+#include "pbrt_import/base/regular_file.h"
 #include "runtime/commands/option_checks.h"
-#include "runtime/trace/float_source.h"
-#include "runtime/trace/packed_source.h"
+#include "runtime/trace/source/float_source.h"
+#include "runtime/trace/source/packed_source.h"
 
 namespace packtrace {
 

@@ -7,12 +7,12 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "compress/format/baked_file.h"
+#include "compress/format/file/baked_file.h"
 #include "pbrt_import/import_scene.h"
-#include "pbrt_import/scene/progress.h"
+#include "pbrt_import/base/progress.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/progress_display.h"
-#include "runtime/trace/scene_source.h"
+#include "runtime/trace/source/scene_source.h"
 
 namespace packtrace {
 

@@ -8,13 +8,13 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "runtime/commands/file_report.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/lod/compaction.h"
 #include "runtime/stopwatch.h"
-#include "runtime/trace/lod_view.h"
-#include "runtime/trace/packed/packed_tracer.h"
+#include "runtime/camera/lod_view.h"
+#include "runtime/trace/packed/scene/packed_tracer.h"
 
 namespace packtrace {
 namespace {

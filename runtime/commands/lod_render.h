@@ -10,7 +10,7 @@
 
 #include "runtime/commands/loaded_scene.h"
 #include "runtime/render/renderer.h"
-#include "runtime/trace/lod_source.h"
+#include "runtime/trace/source/lod_source.h"
 
 namespace packtrace {
 

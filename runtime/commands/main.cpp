@@ -3,7 +3,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "runtime/commands/bake_command.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/compare_command.h"

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "pbrt_import/scene/progress.h"
+#include "pbrt_import/base/progress.h"
 
 namespace packtrace {
 

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
-#include "compress/format/file_summary.h"
+#include "compress/format/file/file_summary.h"
 #include "runtime/commands/file_report.h"
 #include "runtime/commands/process_usage.h"
 

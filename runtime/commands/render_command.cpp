@@ -14,7 +14,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pbrt_import/scene/camera_rays.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "runtime/commands/binary_output.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/image_outputs.h"

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "compress/format/file_summary.h"
+#include "compress/format/file/file_summary.h"
 
 namespace packtrace {
 

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "compress/bake/seam_gaps.h"
+#include "compress/bake/grid/seam_gaps.h"
 #include "pbrt_import/scene/camera_rays.h"
 #include "runtime/commands/lod_render.h"
 #include "runtime/render/renderer.h"

@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "runtime/denoise/depth_derivatives.h"
 #include "runtime/denoise/disocclusion_blur.h"
 #include "runtime/denoise/edge_blur.h"

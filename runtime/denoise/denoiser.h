@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "runtime/denoise/denoiser_config.h"
-#include "runtime/gbuffer.h"
+#include "runtime/camera/gbuffer.h"
 
 namespace packtrace {
 

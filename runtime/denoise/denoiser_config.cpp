@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

@@ -8,7 +8,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/partitioner.h>
 
-#include "runtime/gbuffer.h"
+#include "runtime/camera/gbuffer.h"
 
 namespace packtrace {
 

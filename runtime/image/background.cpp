@@ -9,8 +9,8 @@
 #include <optional>
 #include <utility>
 
-#include "pbrt_import/scene/closest_name.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/closest_name.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

@@ -14,9 +14,9 @@
 #include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/ImfXdr.h>
 
-#include "pbrt_import/scene/exr_header.h"
-#include "pbrt_import/scene/file_bytes.h"
-#include "pbrt_import/scene/file_error.h"
+#include "pbrt_import/base/exr_header.h"
+#include "pbrt_import/base/file_bytes.h"
+#include "pbrt_import/base/file_error.h"
 #include "runtime/image/exr.h"
 
 namespace packtrace {

@@ -14,8 +14,8 @@
 #include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfStringAttribute.h>
 
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/file_bytes.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/file_bytes.h"
 #include "runtime/image/exr.h"
 
 namespace packtrace {

@@ -4,7 +4,7 @@
 #include <numbers>
 #include <string>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "runtime/image/flip_stages.h"
 #include "runtime/image/metric_support.h"
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "runtime/gbuffer.h"
+#include "runtime/camera/gbuffer.h"
 
 namespace packtrace {
 

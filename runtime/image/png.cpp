@@ -13,9 +13,9 @@
 #define STBI_WRITE_NO_STDIO
 #include <stb/stb_image_write.h>
 
-#include "pbrt_import/scene/file_bytes.h"
-#include "pbrt_import/scene/file_error.h"
-#include "pbrt_import/scene/png_chunks.h"
+#include "pbrt_import/base/file_bytes.h"
+#include "pbrt_import/base/file_error.h"
+#include "pbrt_import/base/png_chunks.h"
 
 namespace packtrace {
 

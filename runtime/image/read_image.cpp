@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "pbrt_import/scene/file_bytes.h"
-#include "pbrt_import/scene/file_error.h"
+#include "pbrt_import/base/file_bytes.h"
+#include "pbrt_import/base/file_error.h"
 #include "runtime/image/exr.h"
 #include "runtime/image/png.h"
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "pbrt_import/scene/memory_budget.h"
+#include "pbrt_import/base/memory_budget.h"
 #include "runtime/image/image.h"
 
 namespace packtrace {

@@ -2,7 +2,7 @@
 #include <array>
 #include <cmath>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "runtime/image/metric_support.h"
 
 namespace packtrace {

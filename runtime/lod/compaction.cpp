@@ -4,7 +4,7 @@
 #include <cassert>
 #include <string>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <string>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/lod_format.h"
+#include "compress/format/layout/lod_format.h"
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

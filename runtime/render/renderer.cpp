@@ -4,11 +4,11 @@
 #include <string>
 
 #include "pbrt_import/scene/camera_rays.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "runtime/stopwatch.h"
-#include "runtime/trace/lod_view.h"
-#include "runtime/trace/origin_lift.h"
-#include "runtime/trace/primary_visibility.h"
+#include "runtime/camera/lod_view.h"
+#include "runtime/camera/origin_lift.h"
+#include "runtime/camera/primary_visibility.h"
 
 namespace packtrace {
 namespace {

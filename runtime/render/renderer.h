@@ -6,12 +6,12 @@
 #include <vector>
 
 #include "pbrt_import/scene/camera_rays.h"
-#include "pbrt_import/scene/progress.h"
+#include "pbrt_import/base/progress.h"
 #include "runtime/ao/ao_integrator.h"
 #include "runtime/denoise/denoiser.h"
-#include "runtime/gbuffer.h"
+#include "runtime/camera/gbuffer.h"
 #include "runtime/trace/ray_tracer.h"
-#include "runtime/trace/scene_source.h"
+#include "runtime/trace/source/scene_source.h"
 
 namespace packtrace {
 

@@ -1,7 +1,7 @@
 #include "runtime/trace/make_tracer.h"
 
-#include "pbrt_import/scene/error.h"
-#include "runtime/trace/packed/packed_tracer.h"
+#include "pbrt_import/base/error.h"
+#include "runtime/trace/packed/scene/packed_tracer.h"
 
 namespace packtrace {
 

@@ -2,8 +2,8 @@
 
 #include <memory>
 
-#include "runtime/trace/embree_cluster_tracer.h"
-#include "runtime/trace/embree_tracer.h"
+#include "runtime/trace/embree/embree_cluster_tracer.h"
+#include "runtime/trace/embree/embree_tracer.h"
 
 namespace packtrace {
 

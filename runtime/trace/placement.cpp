@@ -3,7 +3,7 @@
 #include <cmath>
 #include <string>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "runtime/trace/scene_source.h"
+#include "runtime/trace/source/scene_source.h"
 #include "runtime/trace/unit_space.h"
 
 namespace packtrace {

@@ -13,7 +13,7 @@
 #include "assets/generator/leaf_mask.h"
 #include "assets/generator/placement.h"
 #include "assets/generator/town.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "tests/assets/folder_content.h"
 #include "tests/temporary_folder.h"
 

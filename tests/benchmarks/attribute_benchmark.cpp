@@ -9,9 +9,9 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "compress/bake/texture_encoder.h"
-#include "compress/format/tangent_codec.h"
-#include "compress/format/uv_codec.h"
+#include "compress/format/textures/texture_encoder.h"
+#include "compress/format/cluster/tangent_codec.h"
+#include "compress/format/cluster/uv_codec.h"
 #include "pbrt_import/import_scene.h"
 
 /// Prints the tables of docs/accuracy.md: errors of texture coordinates, tangents and textures. Fails where a bound

@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/file_bytes.h"
-#include "pbrt_import/scene/output_file.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/file_bytes.h"
+#include "pbrt_import/base/output_file.h"
 
 namespace packtrace {
 

@@ -12,7 +12,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "tests/benchmarks/benchmark_main.h"
 #include "tests/benchmarks/import_timing.h"
 #include "tests/temporary_folder.h"

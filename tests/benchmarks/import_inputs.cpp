@@ -11,7 +11,7 @@
 #include "assets/generator/buffered_file.h"
 #include "assets/generator/ply_output.h"
 #include "assets/generator/random.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

@@ -19,8 +19,8 @@
 #include <unistd.h>
 
 #include "pbrt_import/import_scene.h"
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/file_bytes.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/file_bytes.h"
 
 namespace packtrace {
 namespace {

@@ -16,8 +16,8 @@
 #include <tbb/global_control.h>
 
 #include "compress/bake/lod/cluster_lod.h"
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/progress.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/progress.h"
 #include "tests/benchmarks/benchmark_main.h"
 #include "tests/benchmarks/lod_benchmark_simplifiers.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"

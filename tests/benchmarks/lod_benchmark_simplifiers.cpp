@@ -13,7 +13,7 @@
 #include <OpenMesh/Tools/Decimater/ModNormalFlippingT.hh>
 #include <OpenMesh/Tools/Decimater/ModQuadricT.hh>
 
-#include "compress/bake/lod/simplify.h"
+#include "compress/bake/lod/simplify/simplify.h"
 #include "tests/benchmarks/thread_cpu_time.h"
 
 namespace packtrace {

@@ -13,7 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "runtime/lod/blas_residency.h"
 #include "tests/benchmarks/benchmark_main.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"

@@ -16,8 +16,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include "compress/format/normal_codec.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/format/cluster/normal_codec.h"
+#include "pbrt_import/base/error.h"
 #include "runtime/stopwatch.h"
 #include "tests/benchmarks/benchmark_main.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "compress/format/page_codec.h"
+#include "compress/format/pages/page_codec.h"
 #include "pbrt_import/scene/scene.h"
 #include "tests/benchmarks/packing_benchmark_mesh.h"
 

@@ -9,7 +9,7 @@
 #include <draco/compression/expert_encode.h>
 #include <draco/mesh/mesh.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "tests/benchmarks/packing_benchmark_codecs.h"
 #include "tests/benchmarks/packing_benchmark_vertex.h"
 

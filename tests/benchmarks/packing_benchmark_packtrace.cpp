@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "compress/bake/bake_scene.h"
-#include "compress/format/baked_file.h"
+#include "compress/format/file/baked_file.h"
 #include "tests/benchmarks/packing_benchmark_codecs.h"
 #include "tests/benchmarks/packing_benchmark_vertex.h"
 

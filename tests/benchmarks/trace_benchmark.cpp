@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "runtime/stopwatch.h"
 #include "runtime/trace/make_tracer.h"
 #include "tests/benchmarks/benchmark_main.h"

@@ -5,7 +5,7 @@
 
 #include <fmt/core.h>
 
-#include "runtime/trace/packed/packed_tracer.h"
+#include "runtime/trace/packed/scene/packed_tracer.h"
 
 namespace packtrace {
 namespace {

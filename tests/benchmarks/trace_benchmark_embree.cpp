@@ -1,6 +1,6 @@
 #include "tests/benchmarks/trace_benchmark_embree.h"
 
-#include "runtime/trace/embree_rays.h"
+#include "runtime/trace/embree/embree_rays.h"
 #include "runtime/trace/flush_denormals.h"
 
 namespace packtrace {

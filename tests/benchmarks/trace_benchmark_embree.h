@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "runtime/trace/embree_tracer.h"
+#include "runtime/trace/embree/embree_tracer.h"
 
 namespace packtrace {
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/baked_file.h"
+#include "compress/format/file/baked_file.h"
 #include "runtime/trace/ray_tracer.h"
 
 namespace packtrace {

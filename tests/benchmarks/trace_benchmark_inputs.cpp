@@ -4,7 +4,7 @@
 #include "assets/generator/forest.h"
 #include "compress/bake/bake_scene.h"
 #include "pbrt_import/import_scene.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "tests/temporary_folder.h"
 
 namespace packtrace {

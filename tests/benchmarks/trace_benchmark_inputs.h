@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <string>
 
-#include "compress/format/baked_file.h"
+#include "compress/format/file/baked_file.h"
 #include "pbrt_import/scene/scene.h"
-#include "runtime/trace/packed_source.h"
+#include "runtime/trace/source/packed_source.h"
 
 namespace packtrace {
 

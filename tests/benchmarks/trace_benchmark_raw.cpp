@@ -1,7 +1,7 @@
 #include "tests/benchmarks/trace_benchmark_raw.h"
 
-#include "runtime/trace/embree_device.h"
-#include "runtime/trace/embree_rays.h"
+#include "runtime/trace/embree/embree_device.h"
+#include "runtime/trace/embree/embree_rays.h"
 #include "runtime/trace/flush_denormals.h"
 
 namespace packtrace {

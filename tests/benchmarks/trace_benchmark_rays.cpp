@@ -9,9 +9,9 @@
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "runtime/stopwatch.h"
-#include "runtime/trace/primary_visibility.h"
+#include "runtime/camera/primary_visibility.h"
 #include "tests/benchmarks/trace_benchmark_exact.h"
 
 namespace packtrace {

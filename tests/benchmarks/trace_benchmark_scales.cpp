@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "runtime/trace/make_tracer.h"
 #include "tests/benchmarks/trace_benchmark_embree.h"
 #include "tests/benchmarks/trace_benchmark_exact.h"

@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "runtime/gbuffer.h"
+#include "runtime/camera/gbuffer.h"
 #include "tests/benchmarks/trace_benchmark_inputs.h"
 
 namespace packtrace {

@@ -15,9 +15,9 @@
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
 
-#include "compress/format/baked_file.h"
-#include "compress/format/packed_trees.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/format/file/baked_file.h"
+#include "compress/format/trees/packed_trees.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

@@ -9,8 +9,8 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/file_bytes.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/file_bytes.h"
 #include "tests/compress/test_scenes.h"
 #include "tests/temporary_folder.h"
 

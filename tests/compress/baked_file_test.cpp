@@ -1,12 +1,12 @@
-#include "compress/format/baked_file.h"
+#include "compress/format/file/baked_file.h"
 
 #include <algorithm>
 #include <cstring>
 
 #include <gtest/gtest.h>
 
-#include "compress/format/file_summary.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/format/file/file_summary.h"
+#include "pbrt_import/base/error.h"
 #include "tests/compress/file_damage.h"
 #include "tests/compress/test_scenes.h"
 

@@ -1,4 +1,4 @@
-#include "compress/format/bit_stream.h"
+#include "compress/format/layout/bit_stream.h"
 
 #include <gtest/gtest.h>
 

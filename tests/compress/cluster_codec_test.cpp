@@ -1,11 +1,11 @@
-#include "compress/format/cluster_codec.h"
+#include "compress/format/cluster/cluster_codec.h"
 
 #include <cstring>
 
 #include <gtest/gtest.h>
 
-#include "compress/format/bit_stream.h"
-#include "compress/format/normal_codec.h"
+#include "compress/format/layout/bit_stream.h"
+#include "compress/format/cluster/normal_codec.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {

@@ -1,4 +1,4 @@
-#include "compress/bake/clusterize.h"
+#include "compress/bake/clusters/clusterize.h"
 
 #include <algorithm>
 #include <limits>
@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "compress/bake/cluster_cutter.h"
-#include "compress/format/index_codec.h"
+#include "compress/bake/clusters/cluster_cutter.h"
+#include "compress/format/cluster/index_codec.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {

@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "compress/bake/outline_share.h"
-#include "compress/bake/view_measure.h"
+#include "compress/bake/grid/outline_share.h"
+#include "compress/bake/grid/view_measure.h"
 #include "tests/compress/bake_checks.h"
 
 namespace packtrace {

@@ -16,8 +16,8 @@
 #include <xmmintrin.h>
 #endif
 
-#include "compress/format/position_grid.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/format/cluster/position_grid.h"
+#include "pbrt_import/base/error.h"
 #include "tests/compress/test_scenes.h"
 #include "tests/pbrt_import/scene_folder.h"
 

@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "compress/format/baked_file.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/format/file/baked_file.h"
+#include "pbrt_import/base/error.h"
 #include "tests/compress/file_hashes.h"
 
 namespace packtrace::test {

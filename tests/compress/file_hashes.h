@@ -7,7 +7,7 @@
 
 #include <xxhash.h>
 
-#include "compress/format/page_codec.h"
+#include "compress/format/pages/page_codec.h"
 
 namespace packtrace::test {
 

@@ -1,4 +1,4 @@
-#include "compress/exchange/gltf_export.h"
+#include "compress/exchange/gltf/gltf_export.h"
 
 #include <algorithm>
 #include <array>
@@ -14,7 +14,7 @@
 #include <tbb/global_control.h>
 #include <tiny_gltf.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {

@@ -1,10 +1,10 @@
-#include "compress/format/index_codec.h"
+#include "compress/format/cluster/index_codec.h"
 
 #include <algorithm>
 
 #include <gtest/gtest.h>
 
-#include "compress/format/bit_stream.h"
+#include "compress/format/layout/bit_stream.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {

@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "compress/format/baked_file.h"
-#include "compress/format/file_summary.h"
+#include "compress/format/file/baked_file.h"
+#include "compress/format/file/file_summary.h"
 #include "tests/compress/file_damage.h"
 #include "tests/compress/test_scenes.h"
 

@@ -1,4 +1,4 @@
-#include "compress/format/page_codec.h"
+#include "compress/format/pages/page_codec.h"
 
 #include <cstdlib>
 #include <cstring>
@@ -8,10 +8,10 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "compress/bake/page_encoder.h"
-#include "compress/format/file_summary.h"
-#include "compress/format/page_decoder.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/format/pages/page_encoder.h"
+#include "compress/format/file/file_summary.h"
+#include "compress/format/pages/page_decoder.h"
+#include "pbrt_import/base/error.h"
 #include "tests/compress/file_hashes.h"
 #include "tests/compress/test_scenes.h"
 

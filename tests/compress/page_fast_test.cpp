@@ -7,11 +7,11 @@
 #include <gtest/gtest.h>
 #include <zstd.h>
 
-#include "compress/bake/page_encoder.h"
-#include "compress/format/baked_file.h"
-#include "compress/format/page_codec.h"
-#include "compress/format/page_decoder.h"
-#include "compress/format/page_fast_kernels.h"
+#include "compress/format/pages/page_encoder.h"
+#include "compress/format/file/baked_file.h"
+#include "compress/format/pages/page_codec.h"
+#include "compress/format/pages/page_decoder.h"
+#include "compress/format/pages/page_fast_kernels.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {

@@ -1,8 +1,8 @@
-#include "compress/format/position_grid.h"
+#include "compress/format/cluster/position_grid.h"
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {

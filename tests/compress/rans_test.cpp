@@ -1,8 +1,8 @@
-#include "compress/format/rans.h"
+#include "compress/format/pages/rans.h"
 
 #include <gtest/gtest.h>
 
-#include "compress/bake/rans_writer.h"
+#include "compress/format/pages/rans_writer.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {

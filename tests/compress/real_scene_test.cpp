@@ -8,7 +8,7 @@
 #include <tbb/global_control.h>
 
 #include "compress/bake/bake_scene.h"
-#include "compress/bake/page_encoder.h"
+#include "compress/format/pages/page_encoder.h"
 #include "pbrt_import/import_scene.h"
 #include "tests/compress/test_scenes.h"
 

@@ -1,4 +1,4 @@
-#include "compress/bake/seam_gaps.h"
+#include "compress/bake/grid/seam_gaps.h"
 
 #include <algorithm>
 #include <limits>

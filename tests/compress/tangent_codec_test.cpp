@@ -1,4 +1,4 @@
-#include "compress/format/tangent_codec.h"
+#include "compress/format/cluster/tangent_codec.h"
 
 #include <algorithm>
 #include <cmath>

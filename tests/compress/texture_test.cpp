@@ -1,4 +1,4 @@
-#include "compress/format/texture_codec.h"
+#include "compress/format/textures/texture_codec.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "compress/bake/texture_encoder.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/format/textures/texture_encoder.h"
+#include "pbrt_import/base/error.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {

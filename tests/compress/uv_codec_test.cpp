@@ -1,4 +1,4 @@
-#include "compress/format/uv_codec.h"
+#include "compress/format/cluster/uv_codec.h"
 
 #include <cmath>
 #include <limits>

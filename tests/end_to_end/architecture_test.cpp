@@ -1,4 +1,4 @@
-// The layering of docs/architecture.md, checked from the include lines of the tree.
+// The rooms of docs/architecture.md and what each may include, checked from the include lines of the tree.
 
 #include <algorithm>
 #include <filesystem>
@@ -12,29 +12,98 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Layer {
+struct Room {
   std::string folder;
   std::vector<std::string> may_include; ///< folders, besides its own
 };
 
-// The most specific folder decides, so longer paths come first.
-const std::vector<Layer> kLayers = {
-    {"pbrt_import/scene/", {}},
-    {"pbrt_import/", {"pbrt_import/scene/"}},
-    {"compress/bvh/", {"pbrt_import/scene/"}},
-    {"compress/format/", {"compress/bvh/", "pbrt_import/scene/"}},
-    {"compress/bake/", {"compress/bvh/", "compress/format/", "pbrt_import/scene/"}},
-    {"compress/exchange/", {"compress/format/", "pbrt_import/scene/"}},
-    {"runtime/lod/", {"compress/format/", "pbrt_import/scene/"}},
-    {"runtime/commands/",
-     {"runtime/", "runtime/lod/", "compress/format/", "compress/bake/", "compress/exchange/", "pbrt_import/",
-      "pbrt_import/scene/"}},
-    {"runtime/", {"runtime/lod/", "compress/bvh/", "compress/format/", "pbrt_import/scene/"}},
+/// In the order of the pipeline.
+const std::vector<Room> kRooms = {
+    {"pbrt_import/base", {}},
+    {"pbrt_import/scene", {"pbrt_import/base"}},
+    {"pbrt_import/text", {"pbrt_import/base", "pbrt_import/scene", "pbrt_import/language"}},
+    {"pbrt_import/files", {"pbrt_import/base", "pbrt_import/scene", "pbrt_import/text", "pbrt_import/shapes"}},
+    {"pbrt_import/language", {"pbrt_import/base", "pbrt_import/scene", "pbrt_import/text", "pbrt_import/files"}},
+    {"pbrt_import/shapes", {"pbrt_import/base", "pbrt_import/scene"}},
+    {"pbrt_import/builder",
+     {"pbrt_import/base", "pbrt_import/scene", "pbrt_import/text", "pbrt_import/files", "pbrt_import/language",
+      "pbrt_import/shapes", "pbrt_import"}},
+    {"pbrt_import",
+     {"pbrt_import/base", "pbrt_import/scene", "pbrt_import/text", "pbrt_import/language", "pbrt_import/builder"}},
+    {"compress/format/layout", {"pbrt_import/scene"}},
+    {"compress/format/cluster", {"pbrt_import/base", "pbrt_import/scene", "compress/format/layout"}},
+    {"compress/format/textures", {"pbrt_import/scene", "compress/format/layout"}},
+    {"compress/format/trees",
+     {"pbrt_import/base", "pbrt_import/scene", "compress/format/layout", "compress/format/cluster",
+      "compress/format/file"}},
+    {"compress/format/pages",
+     {"pbrt_import/base", "compress/format/layout", "compress/format/cluster", "compress/format/trees",
+      "compress/format/file"}},
+    {"compress/format/file",
+     {"pbrt_import/base", "pbrt_import/scene", "compress/format/layout", "compress/format/cluster",
+      "compress/format/textures", "compress/format/trees", "compress/format/pages"}},
+    {"compress/bake/plan",
+     {"pbrt_import/base", "pbrt_import/scene", "compress/format/layout", "compress/format/cluster", "compress/bake"}},
+    {"compress/bake/grid",
+     {"pbrt_import/base", "pbrt_import/scene", "compress/format/cluster", "compress/format/file",
+      "compress/bake/plan", "compress/bake"}},
+    {"compress/bake/clusters",
+     {"pbrt_import/base", "pbrt_import/scene", "compress/format/layout", "compress/format/cluster",
+      "compress/format/trees", "compress/bake/plan", "compress/bake/grid", "compress/bake"}},
+    {"compress/bake/lod/simplify", {"pbrt_import/scene"}},
+    {"compress/bake/lod/bound", {"pbrt_import/scene", "compress/bake/clusters", "compress/bake/lod/simplify"}},
+    {"compress/bake/lod",
+     {"pbrt_import/base", "pbrt_import/scene", "compress/format/layout", "compress/format/cluster",
+      "compress/bake/clusters", "compress/bake/lod/simplify", "compress/bake/lod/bound"}},
+    {"compress/bake/write",
+     {"pbrt_import/base", "pbrt_import/scene", "compress/format/layout", "compress/format/cluster",
+      "compress/format/textures", "compress/format/trees", "compress/format/file", "compress/bake/plan",
+      "compress/bake/clusters", "compress/bake/lod"}},
+    {"compress/bake",
+     {"pbrt_import/base", "pbrt_import/scene", "compress/format/layout", "compress/format/cluster",
+      "compress/format/textures", "compress/format/pages", "compress/format/file", "compress/bake/plan",
+      "compress/bake/grid", "compress/bake/clusters", "compress/bake/lod", "compress/bake/write"}},
+    {"compress/exchange/gltf",
+     {"pbrt_import/base", "pbrt_import/scene", "compress/format/cluster", "compress/format/file"}},
+    {"compress/exchange/vertex16",
+     {"pbrt_import/base", "pbrt_import/scene", "compress/format/layout", "compress/format/cluster",
+      "compress/format/textures", "compress/format/file"}},
+    {"runtime/lod", {"pbrt_import/base", "pbrt_import/scene", "compress/format/layout"}},
+    {"runtime/trace/source",
+     {"pbrt_import/base", "pbrt_import/scene", "compress/format/cluster", "compress/format/textures",
+      "compress/format/file", "runtime/lod"}},
+    {"runtime/trace/packed/kernels", {"pbrt_import/base", "compress/format/layout"}},
+    {"runtime/trace/packed/traversal", {"runtime/trace/packed/kernels"}},
+    {"runtime/trace/packed/scene",
+     {"pbrt_import/base", "pbrt_import/scene", "compress/format/layout", "compress/format/cluster",
+      "compress/format/trees", "compress/format/file", "runtime/trace/source", "runtime/trace/packed/kernels",
+      "runtime/trace", "runtime"}},
+    {"runtime/trace/embree",
+     {"pbrt_import/base", "compress/format/trees", "runtime/trace/source", "runtime/trace/packed/scene",
+      "runtime/trace"}},
+    {"runtime/trace",
+     {"pbrt_import/base", "pbrt_import/scene", "runtime/trace/source", "runtime/trace/packed/scene",
+      "runtime/trace/embree"}},
+    {"runtime/camera",
+     {"pbrt_import/base", "pbrt_import/scene", "runtime/lod", "runtime/trace/source", "runtime/trace"}},
+    {"runtime/ao", {"pbrt_import/base", "pbrt_import/scene", "runtime/trace", "runtime/camera"}},
+    {"runtime/denoise", {"pbrt_import/base", "runtime/camera"}},
+    {"runtime/render",
+     {"pbrt_import/base", "pbrt_import/scene", "runtime/trace/source", "runtime/trace", "runtime/camera",
+      "runtime/ao", "runtime/denoise", "runtime"}},
+    {"runtime/image", {"pbrt_import/base", "pbrt_import/scene", "runtime/camera"}},
+    {"runtime", {}},
+    {"runtime/commands",
+     {"pbrt_import/base", "pbrt_import/scene", "pbrt_import/text", "pbrt_import", "compress/format/file",
+      "compress/bake/grid", "compress/bake", "compress/exchange/gltf", "compress/exchange/vertex16", "runtime/lod",
+      "runtime/trace/source", "runtime/trace/packed/scene", "runtime/trace", "runtime/camera", "runtime/render",
+      "runtime/image", "runtime"}},
 };
 
-const Layer* layer_of(const std::string& path) {
-  for (const Layer& layer : kLayers)
-    if (path.starts_with(layer.folder)) return &layer;
+const Room* room_of(const std::string& path) {
+  const std::string folder = fs::path(path).parent_path().generic_string();
+  for (const Room& room : kRooms)
+    if (folder == room.folder) return &room;
   return nullptr;
 }
 
@@ -51,11 +120,12 @@ std::vector<std::string> project_includes(const fs::path& file) {
 
 std::vector<std::string> broken_rules(const std::string& path, const std::vector<std::string>& includes) {
   std::vector<std::string> broken;
-  const Layer* from = layer_of(path);
+  const Room* from = room_of(path);
+  if (!from) return {path + " is in no room"};
   for (const std::string& include : includes) {
-    const Layer* to = layer_of(include);
+    const Room* to = room_of(include);
     if (!to) {
-      broken.push_back(path + " includes " + include + ", which is in no layer");
+      broken.push_back(path + " includes " + include + ", which is in no room");
     } else if (to != from &&
                std::find(from->may_include.begin(), from->may_include.end(), to->folder) == from->may_include.end()) {
       broken.push_back(path + " includes " + include);
@@ -81,9 +151,9 @@ TEST(Architecture, IncludesFollowTheDataFlow) {
 
 TEST(Architecture, TheCheckSeesABrokenRule) {
   EXPECT_EQ(broken_rules("compress/format/x.cpp", {"compress/bake/bake_scene.h"}).size(), 1u);
-  EXPECT_EQ(broken_rules("runtime/trace/x.cpp", {"pbrt_import/parser.h"}).size(), 1u);
+  EXPECT_EQ(broken_rules("runtime/trace/x.cpp", {"pbrt_import/language/parser.h"}).size(), 1u);
   EXPECT_EQ(broken_rules("runtime/trace/x.cpp", {"parser.h"}).size(), 1u);
-  EXPECT_TRUE(broken_rules("compress/bake/x.cpp", {"compress/format/baked_file.h", "compress/bake/y.h"}).empty());
+  EXPECT_TRUE(broken_rules("compress/bake/x.cpp", {"compress/format/file/baked_file.h", "compress/bake/y.h"}).empty());
 }
 
 } // namespace

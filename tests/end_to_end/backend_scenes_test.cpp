@@ -17,16 +17,16 @@
 #include <nlohmann/json.hpp>
 
 #include "compress/bake/bake_scene.h"
-#include "compress/format/baked_file.h"
+#include "compress/format/file/baked_file.h"
 #include "pbrt_import/import_scene.h"
 #include "pbrt_import/scene/camera_rays.h"
 #include "runtime/ao/ao_integrator.h"
-#include "runtime/trace/embree_cluster_tracer.h"
-#include "runtime/trace/embree_tracer.h"
-#include "runtime/trace/float_source.h"
-#include "runtime/trace/packed/packed_tracer.h"
-#include "runtime/trace/packed_source.h"
-#include "runtime/trace/primary_visibility.h"
+#include "runtime/trace/embree/embree_cluster_tracer.h"
+#include "runtime/trace/embree/embree_tracer.h"
+#include "runtime/trace/source/float_source.h"
+#include "runtime/trace/packed/scene/packed_tracer.h"
+#include "runtime/trace/source/packed_source.h"
+#include "runtime/camera/primary_visibility.h"
 
 namespace packtrace {
 namespace {

@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/baked_file.h"
-#include "compress/format/file_summary.h"
+#include "compress/format/file/baked_file.h"
+#include "compress/format/file/file_summary.h"
 #include "tests/fuzz/baked_input.h"
 
 namespace packtrace::fuzz {

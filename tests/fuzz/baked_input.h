@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/page_codec.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/format/pages/page_codec.h"
+#include "pbrt_import/base/error.h"
 #include "tests/compress/file_hashes.h"
 #include "tests/fuzz/fuzz_target.h"
 

@@ -9,7 +9,7 @@
 #include <tbb/task_arena.h>
 
 #include "pbrt_import/import_scene.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/scene_contract.h"
 #include "tests/fuzz/scene_files.h"

@@ -10,7 +10,7 @@
 
 #include "compress/bake/bake_scene.h"
 #include "pbrt_import/import_scene.h"
-#include "pbrt_import/scene/file_bytes.h"
+#include "pbrt_import/base/file_bytes.h"
 #include "tests/fuzz/scene_files.h"
 
 namespace {

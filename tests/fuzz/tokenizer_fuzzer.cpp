@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/text/tokenizer.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/memory_file.h"
 

@@ -6,10 +6,10 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/baked_file.h"
-#include "runtime/trace/lod_source.h"
-#include "runtime/trace/packed/packed_tracer.h"
-#include "runtime/trace/packed_source.h"
+#include "compress/format/file/baked_file.h"
+#include "runtime/trace/source/lod_source.h"
+#include "runtime/trace/packed/scene/packed_tracer.h"
+#include "runtime/trace/source/packed_source.h"
 #include "tests/fuzz/baked_input.h"
 
 namespace packtrace::fuzz {

@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "pbrt_import/scene/bounds.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

@@ -1,10 +1,10 @@
-#include "pbrt_import/graphics_state.h"
+#include "pbrt_import/language/graphics_state.h"
 
 #include <numbers>
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/transforms.h"
+#include "pbrt_import/language/transforms.h"
 
 namespace packtrace {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
 
 namespace packtrace {

@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "tests/pbrt_import/scene_folder.h"
 
 namespace packtrace {

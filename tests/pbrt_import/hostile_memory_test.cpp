@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/scene/memory_budget.h"
+#include "pbrt_import/base/memory_budget.h"
 #include "tests/pbrt_import/damaged_files.h"
 #include "tests/pbrt_import/hostile_case.h"
 

@@ -1,4 +1,4 @@
-#include "pbrt_import/image_file.h"
+#include "pbrt_import/files/image_file.h"
 
 #include <cstring>
 #include <fstream>
@@ -24,7 +24,7 @@
 #include <OpenEXR/ImfVecAttribute.h>
 #include <zlib.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "tests/pbrt_import/exr_stream.h"
 
 namespace packtrace {

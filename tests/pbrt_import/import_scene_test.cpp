@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <optional>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "tests/pbrt_import/scene_folder.h"
 
 namespace packtrace {

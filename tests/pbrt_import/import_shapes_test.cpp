@@ -2,8 +2,8 @@
 
 #include <oneapi/tbb/global_control.h>
 
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/transforms.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/language/transforms.h"
 #include "tests/pbrt_import/scene_folder.h"
 
 namespace packtrace {

@@ -1,4 +1,4 @@
-#include "pbrt_import/name_table.h"
+#include "pbrt_import/language/name_table.h"
 
 #include <string>
 

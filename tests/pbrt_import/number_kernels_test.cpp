@@ -1,4 +1,4 @@
-#include "pbrt_import/number_kernels.h"
+#include "pbrt_import/text/number_kernels.h"
 
 #include <algorithm>
 #include <bit>
@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/number.h"
+#include "pbrt_import/text/number.h"
 
 namespace packtrace {
 namespace {

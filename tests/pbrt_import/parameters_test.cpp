@@ -1,4 +1,4 @@
-#include "pbrt_import/parameters.h"
+#include "pbrt_import/language/parameters.h"
 
 #include <array>
 

@@ -1,8 +1,8 @@
-#include "pbrt_import/parser.h"
+#include "pbrt_import/language/parser.h"
 
 #include <memory>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "tests/pbrt_import/scene_folder.h"
 
 namespace packtrace {

@@ -1,4 +1,4 @@
-#include "pbrt_import/ply.h"
+#include "pbrt_import/files/ply.h"
 
 #include <algorithm>
 #include <array>
@@ -16,7 +16,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

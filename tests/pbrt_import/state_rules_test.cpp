@@ -1,5 +1,5 @@
 // What pbrt-v3's graphics state keeps apart, what it shares, and what it gives back.
-#include "pbrt_import/transforms.h"
+#include "pbrt_import/language/transforms.h"
 #include "tests/pbrt_import/scene_folder.h"
 
 namespace packtrace {

@@ -19,7 +19,7 @@
 #include <OpenMesh/Tools/Subdivider/Uniform/LoopT.hh>
 
 #include "pbrt_import/scene/bounds.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

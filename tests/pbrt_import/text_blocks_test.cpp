@@ -1,11 +1,11 @@
-#include "pbrt_import/text_blocks.h"
+#include "pbrt_import/text/text_blocks.h"
 
 #include <random>
 
 #include <oneapi/tbb/global_control.h>
 
-#include "pbrt_import/number.h"
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/text/number.h"
+#include "pbrt_import/text/tokenizer.h"
 #include "tests/pbrt_import/scene_folder.h"
 
 namespace packtrace {

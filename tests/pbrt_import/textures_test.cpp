@@ -2,10 +2,10 @@
 
 #include <tbb/global_control.h>
 
-#include "pbrt_import/image_file.h"
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/spectrum.h"
-#include "pbrt_import/texture_graph.h"
+#include "pbrt_import/files/image_file.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/language/spectrum.h"
+#include "pbrt_import/language/texture_graph.h"
 #include "tests/pbrt_import/scene_folder.h"
 
 namespace packtrace {

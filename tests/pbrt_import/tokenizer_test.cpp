@@ -1,4 +1,4 @@
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/text/tokenizer.h"
 
 #include <charconv>
 #include <clocale>
@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/number.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/text/number.h"
+#include "pbrt_import/base/error.h"
 #include "tests/pbrt_import/damaged_files.h"
 #include "tests/pbrt_import/scene_folder.h"
 

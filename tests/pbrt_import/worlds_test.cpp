@@ -1,5 +1,5 @@
 // Files with several worlds, of which one is read.
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "tests/pbrt_import/scene_folder.h"
 
 namespace packtrace {

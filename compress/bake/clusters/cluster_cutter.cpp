@@ -1,8 +1,8 @@
-#include "compress/bake/cluster_cutter.h"
+#include "compress/bake/clusters/cluster_cutter.h"
 
 #include <cassert>
 
-#include "compress/format/index_codec.h"
+#include "compress/format/cluster/index_codec.h"
 
 namespace packtrace {
 namespace {

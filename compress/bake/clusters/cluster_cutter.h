@@ -2,8 +2,8 @@
 
 #include <span>
 
-#include "compress/bake/clusterize.h"
-#include "compress/bvh/box_tree.h"
+#include "compress/bake/clusters/clusterize.h"
+#include "compress/format/trees/box_tree.h"
 
 namespace packtrace {
 

@@ -1,11 +1,11 @@
-#include "compress/bake/clusterize.h"
+#include "compress/bake/clusters/clusterize.h"
 
 #include <algorithm>
 #include <array>
 #include <limits>
 #include <utility>
 
-#include "compress/format/index_codec.h"
+#include "compress/format/cluster/index_codec.h"
 
 namespace packtrace {
 namespace {

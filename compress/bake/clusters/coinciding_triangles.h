@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "compress/bake/weld_table.h"
-#include "compress/bake/welded_surface.h"
+#include "pbrt_import/base/weld_table.h"
+#include "compress/bake/grid/welded_surface.h"
 
 namespace packtrace {
 

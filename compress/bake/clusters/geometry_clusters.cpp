@@ -1,4 +1,4 @@
-#include "compress/bake/geometry_clusters.h"
+#include "compress/bake/clusters/geometry_clusters.h"
 
 #include <algorithm>
 #include <bit>
@@ -7,10 +7,10 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
-#include "compress/bake/cluster_cutter.h"
-#include "compress/bake/morton.h"
-#include "compress/bake/renumbering.h"
-#include "compress/format/baked_format.h"
+#include "compress/bake/clusters/cluster_cutter.h"
+#include "compress/bake/clusters/morton.h"
+#include "compress/bake/clusters/renumbering.h"
+#include "compress/format/layout/baked_format.h"
 
 namespace packtrace {
 namespace {

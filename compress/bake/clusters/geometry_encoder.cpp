@@ -1,14 +1,14 @@
-#include "compress/bake/geometry_encoder.h"
+#include "compress/bake/clusters/geometry_encoder.h"
 
 #include <algorithm>
 #include <limits>
 
 #include <tbb/parallel_for.h>
 
-#include "compress/bake/node_groups.h"
-#include "compress/bake/weld_table.h"
-#include "compress/format/bit_stream.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/format/trees/node_groups.h"
+#include "pbrt_import/base/weld_table.h"
+#include "compress/format/layout/bit_stream.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "compress/bake/geometry_clusters.h"
-#include "compress/bake/quantized_geometry.h"
-#include "compress/format/baked_format.h"
-#include "compress/format/cluster_codec.h"
+#include "compress/bake/clusters/geometry_clusters.h"
+#include "compress/bake/clusters/quantized_geometry.h"
+#include "compress/format/layout/baked_format.h"
+#include "compress/format/cluster/cluster_codec.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "compress/bake/quantized_geometry.h"
+#include "compress/bake/clusters/quantized_geometry.h"
 
 #include <algorithm>
 #include <atomic>
@@ -10,13 +10,13 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
-#include "compress/bake/angle.h"
-#include "compress/bake/brief.h"
-#include "compress/bake/coinciding_triangles.h"
-#include "compress/bake/weld_table.h"
-#include "compress/bake/welded_surface.h"
-#include "compress/format/normal_codec.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/angle.h"
+#include "pbrt_import/base/brief.h"
+#include "compress/bake/clusters/coinciding_triangles.h"
+#include "pbrt_import/base/weld_table.h"
+#include "compress/bake/grid/welded_surface.h"
+#include "compress/format/cluster/normal_codec.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

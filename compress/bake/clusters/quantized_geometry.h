@@ -5,11 +5,11 @@
 #include <vector>
 
 #include "compress/bake/bake_config.h"
-#include "compress/bake/geometry_grid.h"
-#include "compress/bake/geometry_measure.h"
-#include "compress/bake/geometry_plan.h"
-#include "compress/bake/requirements.h"
-#include "compress/format/uv_codec.h"
+#include "compress/bake/grid/geometry_grid.h"
+#include "compress/bake/grid/geometry_measure.h"
+#include "compress/bake/plan/geometry_plan.h"
+#include "compress/bake/plan/requirements.h"
+#include "compress/format/cluster/uv_codec.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "compress/bake/collapsed_triangles.h"
+#include "compress/bake/grid/collapsed_triangles.h"
 
 #include <algorithm>
 #include <array>

@@ -1,9 +1,9 @@
-#include "compress/bake/geometry_grid.h"
+#include "compress/bake/grid/geometry_grid.h"
 
 #include <algorithm>
 #include <bit>
 
-#include "compress/bake/weld_table.h"
+#include "pbrt_import/base/weld_table.h"
 
 namespace packtrace {
 namespace {

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/position_grid.h"
+#include "compress/format/cluster/position_grid.h"
 
 namespace packtrace {
 

@@ -1,11 +1,11 @@
-#include "compress/bake/geometry_measure.h"
+#include "compress/bake/grid/geometry_measure.h"
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 

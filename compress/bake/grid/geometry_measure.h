@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "compress/bake/bake_config.h"
-#include "compress/bake/geometry_plan.h"
-#include "compress/format/position_grid.h"
+#include "compress/bake/plan/geometry_plan.h"
+#include "compress/format/cluster/position_grid.h"
 #include "pbrt_import/scene/bounds.h"
 
 namespace packtrace {

@@ -1,11 +1,11 @@
-#include "compress/bake/grid_check.h"
+#include "compress/bake/grid/grid_check.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
 
-#include "compress/bake/angle.h"
+#include "pbrt_import/scene/angle.h"
 
 namespace packtrace {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "compress/bake/geometry_grid.h"
-#include "compress/bake/picture_bounds.h"
+#include "compress/bake/grid/geometry_grid.h"
+#include "compress/bake/grid/picture_bounds.h"
 
 namespace packtrace {
 

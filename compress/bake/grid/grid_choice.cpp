@@ -1,12 +1,12 @@
-#include "compress/bake/grid_choice.h"
+#include "compress/bake/grid/grid_choice.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <tbb/parallel_for.h>
 
-#include "compress/bake/grid_check.h"
-#include "compress/bake/nested_grids.h"
+#include "compress/bake/grid/grid_check.h"
+#include "compress/bake/grid/nested_grids.h"
 
 namespace packtrace {
 namespace {

@@ -4,10 +4,10 @@
 #include <vector>
 
 #include "compress/bake/bake_config.h"
-#include "compress/bake/geometry_grid.h"
-#include "compress/bake/picture_bounds.h"
-#include "compress/bake/scene_measure.h"
-#include "pbrt_import/scene/progress.h"
+#include "compress/bake/grid/geometry_grid.h"
+#include "compress/bake/grid/picture_bounds.h"
+#include "compress/bake/grid/scene_measure.h"
+#include "pbrt_import/base/progress.h"
 
 namespace packtrace {
 

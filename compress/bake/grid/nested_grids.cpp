@@ -1,4 +1,4 @@
-#include "compress/bake/nested_grids.h"
+#include "compress/bake/grid/nested_grids.h"
 
 #include <algorithm>
 #include <atomic>

@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "compress/bake/geometry_grid.h"
-#include "compress/bake/geometry_measure.h"
-#include "compress/bake/geometry_plan.h"
+#include "compress/bake/grid/geometry_grid.h"
+#include "compress/bake/grid/geometry_measure.h"
+#include "compress/bake/plan/geometry_plan.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "compress/bake/outline_share.h"
+#include "compress/bake/grid/outline_share.h"
 
 #include <algorithm>
 #include <bit>
@@ -7,9 +7,9 @@
 #include <tuple>
 #include <vector>
 
-#include "compress/bake/angle.h"
-#include "compress/bake/geometry_grid.h"
-#include "compress/bake/surface_sample.h"
+#include "pbrt_import/scene/angle.h"
+#include "compress/bake/grid/geometry_grid.h"
+#include "compress/bake/grid/surface_sample.h"
 
 namespace packtrace {
 namespace {

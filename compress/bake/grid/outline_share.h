@@ -1,6 +1,6 @@
 #pragma once
 
-#include "compress/bake/geometry_plan.h"
+#include "compress/bake/plan/geometry_plan.h"
 
 namespace packtrace {
 

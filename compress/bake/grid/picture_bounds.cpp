@@ -1,4 +1,4 @@
-#include "compress/bake/picture_bounds.h"
+#include "compress/bake/grid/picture_bounds.h"
 
 #include <algorithm>
 #include <array>
@@ -7,9 +7,9 @@
 
 #include <tbb/parallel_for.h>
 
-#include "compress/bake/outline_share.h"
-#include "compress/bake/touching_boxes.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/bake/grid/outline_share.h"
+#include "compress/bake/grid/touching_boxes.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

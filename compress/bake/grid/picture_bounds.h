@@ -6,9 +6,9 @@
 #include <string_view>
 #include <vector>
 
-#include "compress/bake/scene_measure.h"
-#include "compress/bake/view_measure.h"
-#include "pbrt_import/scene/progress.h"
+#include "compress/bake/grid/scene_measure.h"
+#include "compress/bake/grid/view_measure.h"
+#include "pbrt_import/base/progress.h"
 
 namespace packtrace {
 

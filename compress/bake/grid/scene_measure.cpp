@@ -1,4 +1,4 @@
-#include "compress/bake/scene_measure.h"
+#include "compress/bake/grid/scene_measure.h"
 
 #include <cmath>
 

@@ -2,9 +2,9 @@
 
 #include <vector>
 
-#include "compress/bake/geometry_measure.h"
-#include "compress/bake/geometry_plan.h"
-#include "pbrt_import/scene/progress.h"
+#include "compress/bake/grid/geometry_measure.h"
+#include "compress/bake/plan/geometry_plan.h"
+#include "pbrt_import/base/progress.h"
 
 namespace packtrace {
 

@@ -1,10 +1,10 @@
-#include "compress/bake/seam_gaps.h"
+#include "compress/bake/grid/seam_gaps.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "compress/bake/scene_measure.h"
-#include "compress/bake/touching_boxes.h"
+#include "compress/bake/grid/scene_measure.h"
+#include "compress/bake/grid/touching_boxes.h"
 
 namespace packtrace {
 namespace {

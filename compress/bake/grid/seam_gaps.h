@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/baked_file.h"
+#include "compress/format/file/baked_file.h"
 
 namespace packtrace {
 

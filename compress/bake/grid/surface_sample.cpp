@@ -1,4 +1,4 @@
-#include "compress/bake/surface_sample.h"
+#include "compress/bake/grid/surface_sample.h"
 
 #include <algorithm>
 #include <cmath>

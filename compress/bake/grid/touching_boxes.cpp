@@ -1,4 +1,4 @@
-#include "compress/bake/touching_boxes.h"
+#include "compress/bake/grid/touching_boxes.h"
 
 #include <algorithm>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "compress/bake/view_measure.h"
+#include "compress/bake/grid/view_measure.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "compress/bake/scene_measure.h"
-#include "compress/bake/surface_sample.h"
+#include "compress/bake/grid/scene_measure.h"
+#include "compress/bake/grid/surface_sample.h"
 #include "pbrt_import/scene/camera_rays.h"
 
 namespace packtrace {

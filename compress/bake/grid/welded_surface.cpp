@@ -1,4 +1,4 @@
-#include "compress/bake/welded_surface.h"
+#include "compress/bake/grid/welded_surface.h"
 
 #include <functional>
 #include <utility>
@@ -6,8 +6,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
 
-#include "compress/bake/collapsed_triangles.h"
-#include "compress/bake/weld_table.h"
+#include "compress/bake/grid/collapsed_triangles.h"
+#include "pbrt_import/base/weld_table.h"
 
 namespace packtrace {
 namespace {

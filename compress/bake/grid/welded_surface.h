@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "compress/bake/geometry_plan.h"
-#include "compress/format/position_grid.h"
+#include "compress/bake/plan/geometry_plan.h"
+#include "compress/format/cluster/position_grid.h"
 
 namespace packtrace {
 

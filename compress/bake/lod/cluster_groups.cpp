@@ -10,7 +10,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
-#include "compress/bake/morton.h"
+#include "compress/bake/clusters/morton.h"
 
 namespace packtrace {
 namespace {

@@ -9,8 +9,8 @@
 
 #include "compress/bake/lod/cluster_groups.h"
 #include "compress/bake/lod/lod_group_builder.h"
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/progress.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/progress.h"
 
 namespace packtrace {
 namespace {

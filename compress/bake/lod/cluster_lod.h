@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "compress/bake/geometry_clusters.h"
-#include "compress/format/lod_format.h"
+#include "compress/bake/clusters/geometry_clusters.h"
+#include "compress/format/layout/lod_format.h"
 
 namespace packtrace {
 

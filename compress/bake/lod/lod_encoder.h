@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "compress/bake/geometry_encoder.h"
+#include "compress/bake/clusters/geometry_encoder.h"
 #include "compress/bake/lod/cluster_lod.h"
-#include "compress/format/lod_format.h"
+#include "compress/format/layout/lod_format.h"
 
 namespace packtrace {
 

@@ -6,15 +6,15 @@
 #include <tuple>
 #include <utility>
 
-#include "compress/bake/clusterize.h"
-#include "compress/bake/lod/direct_bound.h"
+#include "compress/bake/clusters/clusterize.h"
+#include "compress/bake/lod/bound/direct_bound.h"
 #include "compress/bake/lod/loose_pieces.h"
-#include "compress/bake/lod/simplify.h"
-#include "compress/bake/lod/surface_bound.h"
-#include "compress/bake/morton.h"
-#include "compress/bake/renumbering.h"
-#include "compress/bake/weld_table.h"
-#include "compress/format/normal_codec.h"
+#include "compress/bake/lod/simplify/simplify.h"
+#include "compress/bake/lod/bound/surface_bound.h"
+#include "compress/bake/clusters/morton.h"
+#include "compress/bake/clusters/renumbering.h"
+#include "pbrt_import/base/weld_table.h"
+#include "compress/format/cluster/normal_codec.h"
 
 namespace packtrace {
 namespace {

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "compress/bake/lod/cluster_lod.h"
-#include "compress/bake/lod/line_cover.h"
-#include "compress/bake/lod/triangle_history.h"
+#include "compress/bake/lod/bound/line_cover.h"
+#include "compress/bake/lod/bound/triangle_history.h"
 
 namespace packtrace {
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "compress/bake/lod/triangle_distance.h"
+#include "compress/bake/lod/bound/triangle_distance.h"
 
 namespace packtrace {
 namespace {

@@ -9,7 +9,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
-#include "compress/bake/weld_table.h"
+#include "pbrt_import/base/weld_table.h"
 
 namespace packtrace {
 namespace {

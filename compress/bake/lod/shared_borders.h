@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "compress/bake/quantized_geometry.h"
+#include "compress/bake/clusters/quantized_geometry.h"
 
 namespace packtrace {
 

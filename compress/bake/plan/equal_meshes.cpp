@@ -1,4 +1,4 @@
-#include "compress/bake/equal_meshes.h"
+#include "compress/bake/plan/equal_meshes.h"
 
 #include <array>
 #include <cstring>

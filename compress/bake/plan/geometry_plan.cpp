@@ -1,4 +1,4 @@
-#include "compress/bake/geometry_plan.h"
+#include "compress/bake/plan/geometry_plan.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,9 +11,9 @@
 
 #include <tbb/parallel_for.h>
 
-#include "compress/bake/brief.h"
-#include "compress/bake/equal_meshes.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/brief.h"
+#include "compress/bake/plan/equal_meshes.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

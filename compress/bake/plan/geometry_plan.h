@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "compress/format/baked_format.h"
+#include "compress/format/layout/baked_format.h"
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace {

@@ -1,4 +1,4 @@
-#include "compress/bake/material_runs.h"
+#include "compress/bake/plan/material_runs.h"
 
 #include <algorithm>
 #include <map>

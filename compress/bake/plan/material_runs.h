@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "compress/bake/geometry_plan.h"
+#include "compress/bake/plan/geometry_plan.h"
 
 namespace packtrace {
 

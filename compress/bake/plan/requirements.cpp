@@ -1,10 +1,10 @@
-#include "compress/bake/requirements.h"
+#include "compress/bake/plan/requirements.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "compress/format/uv_codec.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/format/cluster/uv_codec.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "compress/bake/bake_config.h"
-#include "compress/bake/geometry_plan.h"
+#include "compress/bake/plan/geometry_plan.h"
 
 namespace packtrace {
 

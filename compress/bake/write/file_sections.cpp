@@ -1,10 +1,10 @@
-#include "compress/bake/file_sections.h"
+#include "compress/bake/write/file_sections.h"
 
 #include <cmath>
 #include <limits>
 
-#include "compress/format/baked_image.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/format/file/baked_image.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

@@ -5,12 +5,12 @@
 #include <string_view>
 #include <vector>
 
-#include "compress/bake/geometry_encoder.h"
+#include "compress/bake/clusters/geometry_encoder.h"
 #include "compress/bake/lod/lod_encoder.h"
-#include "compress/bake/texture_encoder.h"
-#include "compress/format/baked_format.h"
-#include "compress/format/bit_stream.h"
-#include "compress/format/packed_trees.h"
+#include "compress/format/textures/texture_encoder.h"
+#include "compress/format/layout/baked_format.h"
+#include "compress/format/layout/bit_stream.h"
+#include "compress/format/trees/packed_trees.h"
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace {

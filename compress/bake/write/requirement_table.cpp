@@ -1,4 +1,4 @@
-#include "compress/bake/requirement_table.h"
+#include "compress/bake/write/requirement_table.h"
 
 namespace packtrace {
 namespace {

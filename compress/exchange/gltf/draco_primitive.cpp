@@ -1,4 +1,4 @@
-#include "compress/exchange/draco_primitive.h"
+#include "compress/exchange/gltf/draco_primitive.h"
 
 #include <algorithm>
 #include <cmath>

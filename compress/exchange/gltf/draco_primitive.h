@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "compress/exchange/plain_primitives.h"
+#include "compress/exchange/gltf/plain_primitives.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "compress/exchange/gltf_export.h"
+#include "compress/exchange/gltf/gltf_export.h"
 
 #include <algorithm>
 #include <bit>
@@ -12,10 +12,10 @@
 #include <tbb/parallel_for.h>
 #include <tiny_gltf.h>
 
-#include "compress/exchange/gltf_materials.h"
-#include "compress/exchange/plain_primitives.h"
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/printable.h"
+#include "compress/exchange/gltf/gltf_materials.h"
+#include "compress/exchange/gltf/plain_primitives.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/printable.h"
 
 namespace packtrace {
 namespace {

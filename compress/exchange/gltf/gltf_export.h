@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "compress/exchange/draco_primitive.h"
-#include "compress/format/baked_file.h"
-#include "pbrt_import/scene/progress.h"
+#include "compress/exchange/gltf/draco_primitive.h"
+#include "compress/format/file/baked_file.h"
+#include "pbrt_import/base/progress.h"
 
 namespace packtrace {
 

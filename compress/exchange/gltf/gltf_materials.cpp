@@ -1,4 +1,4 @@
-#include "compress/exchange/gltf_materials.h"
+#include "compress/exchange/gltf/gltf_materials.h"
 
 #include <algorithm>
 #include <cstring>
@@ -12,9 +12,9 @@
 #include <stb/stb_image_write.h>
 #pragma GCC diagnostic pop
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "pbrt_import/scene/material_flags.h"
-#include "pbrt_import/scene/printable.h"
+#include "pbrt_import/base/printable.h"
 
 namespace packtrace {
 namespace {

@@ -9,7 +9,7 @@
 
 #include <tiny_gltf.h>
 
-#include "compress/format/baked_file.h"
+#include "compress/format/file/baked_file.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "compress/exchange/plain_primitives.h"
+#include "compress/exchange/gltf/plain_primitives.h"
 
 #include <array>
 #include <bit>

@@ -1,13 +1,13 @@
-#include "compress/bake/vertex16_export.h"
+#include "compress/exchange/vertex16/vertex16_export.h"
 
 #include <algorithm>
 #include <limits>
 
 #include <tbb/parallel_for.h>
 
-#include "compress/bake/vertex16_geometry.h"
-#include "compress/format/vertex16_file.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/exchange/vertex16/vertex16_geometry.h"
+#include "compress/exchange/vertex16/vertex16_file.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

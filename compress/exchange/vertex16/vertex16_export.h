@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <vector>
 
-#include "compress/format/baked_file.h"
-#include "pbrt_import/scene/progress.h"
+#include "compress/format/file/baked_file.h"
+#include "pbrt_import/base/progress.h"
 
 namespace packtrace {
 

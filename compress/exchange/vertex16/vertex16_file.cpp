@@ -1,4 +1,4 @@
-#include "compress/format/vertex16_file.h"
+#include "compress/exchange/vertex16/vertex16_file.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,10 +6,10 @@
 
 #include <xxhash.h>
 
-#include "compress/format/section_file.h"
-#include "compress/format/texture_codec.h"
+#include "compress/format/layout/section_file.h"
+#include "compress/format/textures/texture_codec.h"
 #include "pbrt_import/scene/alpha_mask.h"
-#include "pbrt_import/scene/file_error.h"
+#include "pbrt_import/base/file_error.h"
 
 namespace packtrace::vertex16 {
 namespace {

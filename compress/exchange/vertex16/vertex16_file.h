@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "compress/format/vertex16_format.h"
+#include "compress/exchange/vertex16/vertex16_format.h"
 
 namespace packtrace::vertex16 {
 

@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "compress/format/baked_format.h"
-#include "compress/format/vertex16_decode.h"
+#include "compress/format/layout/baked_format.h"
+#include "compress/exchange/vertex16/vertex16_decode.h"
 
 /// What lies in a file of `export --layout vertex16`, version 1; docs/vertex16.md says it in words. Little-endian;
 /// every section starts at a multiple of 64 bytes; bytes that no field or section owns are zero.

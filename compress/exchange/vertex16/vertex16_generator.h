@@ -4,9 +4,9 @@
 
 namespace packtrace {
 
-/// Text of compress/format/vertex16.glsl.
+/// Text of compress/exchange/vertex16/vertex16.glsl.
 std::string vertex16_glsl();
-/// Text of compress/format/vertex16_decode.h. The functions are the GLSL ones, letter for letter, over GLM's types.
+/// Text of compress/exchange/vertex16/vertex16_decode.h. The functions are the GLSL ones, letter for letter, over GLM's types.
 std::string vertex16_cpp();
 
 } // namespace packtrace

@@ -2,7 +2,7 @@
 #include <fstream>
 #include <string>
 
-#include "compress/format/vertex16_generator.h"
+#include "compress/exchange/vertex16/vertex16_generator.h"
 
 /// Writes vertex16.glsl and vertex16_decode.h into a folder.
 int main(int argc, char** argv) {

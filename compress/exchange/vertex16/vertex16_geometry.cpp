@@ -1,4 +1,4 @@
-#include "compress/bake/vertex16_geometry.h"
+#include "compress/exchange/vertex16/vertex16_geometry.h"
 
 #include <algorithm>
 #include <bit>
@@ -7,11 +7,11 @@
 #include <numeric>
 #include <string>
 
-#include "compress/bake/angle.h"
-#include "compress/bake/weld_table.h"
-#include "compress/format/tangent_codec.h"
-#include "compress/format/vertex16_fields.h"
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/scene/angle.h"
+#include "pbrt_import/base/weld_table.h"
+#include "compress/format/cluster/tangent_codec.h"
+#include "compress/exchange/vertex16/vertex16_fields.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

@@ -1,11 +1,11 @@
-#include "compress/format/cluster_codec.h"
+#include "compress/format/cluster/cluster_codec.h"
 
 #include <algorithm>
 #include <cassert>
 #include <numeric>
 
-#include "compress/format/bit_stream.h"
-#include "compress/format/normal_kernels.h"
+#include "compress/format/layout/bit_stream.h"
+#include "compress/format/cluster/normal_kernels.h"
 
 namespace packtrace {
 namespace {

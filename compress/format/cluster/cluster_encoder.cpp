@@ -3,9 +3,9 @@
 #include <cassert>
 #include <limits>
 
-#include "compress/format/bit_stream.h"
-#include "compress/format/cluster_codec.h"
-#include "compress/format/normal_packing.h"
+#include "compress/format/layout/bit_stream.h"
+#include "compress/format/cluster/cluster_codec.h"
+#include "compress/format/cluster/normal_packing.h"
 
 namespace packtrace {
 namespace {

@@ -1,8 +1,8 @@
-#include "compress/format/cluster_validation.h"
+#include "compress/format/cluster/cluster_validation.h"
 
 #include <cmath>
 
-#include "compress/format/cluster_codec.h"
+#include "compress/format/cluster/cluster_codec.h"
 
 namespace packtrace {
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <string_view>
 
-#include "compress/format/baked_format.h"
+#include "compress/format/layout/baked_format.h"
 
 namespace packtrace {
 

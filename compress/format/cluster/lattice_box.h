@@ -1,6 +1,6 @@
 #pragma once
 
-#include "compress/format/position_grid.h"
+#include "compress/format/cluster/position_grid.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "compress/format/normal_codec.h"
+#include "compress/format/cluster/normal_codec.h"
 
 #include <algorithm>
 #include <cassert>

@@ -1,11 +1,11 @@
-#include "compress/format/normal_packing.h"
+#include "compress/format/cluster/normal_packing.h"
 
 #include <algorithm>
 #include <bit>
 #include <cassert>
 #include <limits>
 
-#include "compress/format/bit_stream.h"
+#include "compress/format/layout/bit_stream.h"
 
 namespace packtrace {
 namespace {

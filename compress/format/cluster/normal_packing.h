@@ -5,7 +5,7 @@
 #include <optional>
 #include <span>
 
-#include "compress/format/normal_codec.h"
+#include "compress/format/cluster/normal_codec.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "compress/format/index_codec.h"
+#include "compress/format/cluster/index_codec.h"
 
 #include <algorithm>
 #include <cassert>

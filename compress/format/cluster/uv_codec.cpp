@@ -1,9 +1,9 @@
-#include "compress/format/uv_codec.h"
+#include "compress/format/cluster/uv_codec.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "compress/format/position_grid.h"
+#include "compress/format/cluster/position_grid.h"
 
 namespace packtrace {
 namespace {

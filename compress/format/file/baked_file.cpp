@@ -1,9 +1,9 @@
-#include "compress/format/baked_file.h"
+#include "compress/format/file/baked_file.h"
 
 #include <algorithm>
 #include <cassert>
 
-#include "compress/format/mapped_file.h"
+#include "compress/format/file/mapped_file.h"
 
 namespace packtrace {
 namespace {

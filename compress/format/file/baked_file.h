@@ -7,10 +7,10 @@
 #include <string_view>
 #include <vector>
 
-#include "compress/format/baked_format.h"
-#include "compress/format/cluster_codec.h"
-#include "compress/format/page_codec.h"
-#include "compress/format/texture_codec.h"
+#include "compress/format/layout/baked_format.h"
+#include "compress/format/cluster/cluster_codec.h"
+#include "compress/format/pages/page_codec.h"
+#include "compress/format/textures/texture_codec.h"
 #include "pbrt_import/scene/alpha_mask.h"
 #include "pbrt_import/scene/scene.h"
 

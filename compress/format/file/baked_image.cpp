@@ -1,8 +1,8 @@
-#include "compress/format/baked_image.h"
+#include "compress/format/file/baked_image.h"
 
 #include <array>
 
-#include "compress/format/section_file.h"
+#include "compress/format/layout/section_file.h"
 
 namespace packtrace {
 

@@ -6,12 +6,12 @@
 
 #include <xxhash.h>
 
-#include "compress/format/baked_file.h"
-#include "compress/format/bit_stream.h"
-#include "compress/format/cluster_validation.h"
-#include "compress/format/lod_validation.h"
-#include "compress/format/tree_validation.h"
-#include "pbrt_import/scene/file_error.h"
+#include "compress/format/file/baked_file.h"
+#include "compress/format/layout/bit_stream.h"
+#include "compress/format/cluster/cluster_validation.h"
+#include "compress/format/file/lod_validation.h"
+#include "compress/format/trees/tree_validation.h"
+#include "pbrt_import/base/file_error.h"
 
 namespace packtrace {
 namespace {

@@ -1,4 +1,4 @@
-#include "compress/format/file_summary.h"
+#include "compress/format/file/file_summary.h"
 
 #include <algorithm>
 #include <cmath>

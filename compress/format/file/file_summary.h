@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "compress/format/baked_file.h"
-#include "compress/format/lod_summary.h"
+#include "compress/format/file/baked_file.h"
+#include "compress/format/file/lod_summary.h"
 
 namespace packtrace {
 

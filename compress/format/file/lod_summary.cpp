@@ -1,9 +1,9 @@
-#include "compress/format/lod_summary.h"
+#include "compress/format/file/lod_summary.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "compress/format/baked_file.h"
+#include "compress/format/file/baked_file.h"
 
 namespace packtrace {
 namespace {

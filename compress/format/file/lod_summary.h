@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "compress/format/cluster_codec.h"
+#include "compress/format/cluster/cluster_codec.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "compress/format/lod_validation.h"
+#include "compress/format/file/lod_validation.h"
 
 #include <algorithm>
 #include <cmath>

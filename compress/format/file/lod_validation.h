@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "compress/format/baked_file.h"
+#include "compress/format/file/baked_file.h"
 
 namespace packtrace {
 

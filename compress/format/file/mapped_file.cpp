@@ -1,4 +1,4 @@
-#include "compress/format/mapped_file.h"
+#include "compress/format/file/mapped_file.h"
 
 #include <cerrno>
 #include <string>
@@ -6,8 +6,8 @@
 
 #include <sys/mman.h>
 
-#include "pbrt_import/scene/file_error.h"
-#include "pbrt_import/scene/regular_file.h"
+#include "pbrt_import/base/file_error.h"
+#include "pbrt_import/base/regular_file.h"
 
 namespace packtrace {
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <type_traits>
 
-#include "compress/format/lod_format.h"
-#include "compress/format/packed_node.h"
+#include "compress/format/layout/lod_format.h"
+#include "compress/format/layout/packed_node.h"
 #include "pbrt_import/scene/material_flags.h"
 
 /// What lies in a .ptk file, version 5; docs/baked_format.md says it in words. Little-endian; every section starts at a

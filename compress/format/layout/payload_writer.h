@@ -4,7 +4,7 @@
 #include <cstring>
 #include <vector>
 
-#include "compress/format/bit_stream.h"
+#include "compress/format/layout/bit_stream.h"
 
 namespace packtrace {
 

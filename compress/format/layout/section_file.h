@@ -9,7 +9,7 @@
 
 #include <xxhash.h>
 
-#include "compress/format/baked_format.h"
+#include "compress/format/layout/baked_format.h"
 
 namespace packtrace {
 

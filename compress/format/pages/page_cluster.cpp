@@ -1,10 +1,10 @@
-#include "compress/format/page_cluster.h"
+#include "compress/format/pages/page_cluster.h"
 
 #include <algorithm>
 #include <bit>
 #include <limits>
 
-#include "compress/format/bit_stream.h"
+#include "compress/format/layout/bit_stream.h"
 
 namespace packtrace {
 namespace {

@@ -3,9 +3,9 @@
 #include <array>
 #include <cstdint>
 
-#include "compress/format/cluster_codec.h"
-#include "compress/format/normal_packing.h"
-#include "compress/format/payload_writer.h"
+#include "compress/format/cluster/cluster_codec.h"
+#include "compress/format/cluster/normal_packing.h"
+#include "compress/format/layout/payload_writer.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "compress/format/page_codec.h"
+#include "compress/format/pages/page_codec.h"
 
 #include <algorithm>
 #include <atomic>
@@ -9,14 +9,14 @@
 #include <xxhash.h>
 #include <zstd.h>
 
-#include "compress/format/baked_file.h"
-#include "compress/format/bit_stream.h"
-#include "compress/format/normal_codec.h"
-#include "compress/format/page_decoder.h"
-#include "compress/format/position_grid.h"
-#include "compress/format/tree_topology.h"
-#include "compress/format/uv_codec.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/format/file/baked_file.h"
+#include "compress/format/layout/bit_stream.h"
+#include "compress/format/cluster/normal_codec.h"
+#include "compress/format/pages/page_decoder.h"
+#include "compress/format/cluster/position_grid.h"
+#include "compress/format/trees/tree_topology.h"
+#include "compress/format/cluster/uv_codec.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

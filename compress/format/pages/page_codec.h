@@ -10,7 +10,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "compress/format/page_contexts.h"
+#include "compress/format/pages/page_contexts.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "compress/format/page_decoder.h"
+#include "compress/format/pages/page_decoder.h"
 
 #include <algorithm>
 #include <array>
@@ -8,11 +8,11 @@
 
 #include <zstd.h>
 
-#include "compress/format/page_cluster.h"
-#include "compress/format/page_fast_decoder.h"
-#include "compress/format/page_model.h"
-#include "compress/format/page_readers.h"
-#include "compress/format/zstd_context.h"
+#include "compress/format/pages/page_cluster.h"
+#include "compress/format/pages/page_fast_decoder.h"
+#include "compress/format/pages/page_model.h"
+#include "compress/format/pages/page_readers.h"
+#include "compress/format/pages/zstd_context.h"
 
 namespace packtrace {
 namespace {

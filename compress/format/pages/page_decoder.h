@@ -4,8 +4,8 @@
 #include <memory>
 #include <span>
 
-#include "compress/format/baked_format.h"
-#include "compress/format/page_codec.h"
+#include "compress/format/layout/baked_format.h"
+#include "compress/format/pages/page_codec.h"
 
 namespace packtrace {
 

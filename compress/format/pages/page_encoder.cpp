@@ -1,4 +1,4 @@
-#include "compress/bake/page_encoder.h"
+#include "compress/format/pages/page_encoder.h"
 
 #include <algorithm>
 #include <array>
@@ -10,15 +10,15 @@
 #include <xxhash.h>
 #include <zstd.h>
 
-#include "compress/bake/page_fast_encoder.h"
-#include "compress/bake/page_recorder.h"
-#include "compress/bake/rans_writer.h"
-#include "compress/format/page_cluster.h"
-#include "compress/format/page_decoder.h"
-#include "compress/format/page_model.h"
-#include "compress/format/tree_topology.h"
-#include "compress/format/zstd_context.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/format/pages/page_fast_encoder.h"
+#include "compress/format/pages/page_recorder.h"
+#include "compress/format/pages/rans_writer.h"
+#include "compress/format/pages/page_cluster.h"
+#include "compress/format/pages/page_decoder.h"
+#include "compress/format/pages/page_model.h"
+#include "compress/format/trees/tree_topology.h"
+#include "compress/format/pages/zstd_context.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

@@ -3,8 +3,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "compress/format/baked_file.h"
-#include "compress/format/page_codec.h"
+#include "compress/format/file/baked_file.h"
+#include "compress/format/pages/page_codec.h"
 
 namespace packtrace {
 

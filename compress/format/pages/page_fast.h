@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <type_traits>
 
-#include "compress/format/baked_format.h"
-#include "compress/format/bit_stream.h"
-#include "compress/format/index_codec.h"
-#include "compress/format/normal_codec.h"
+#include "compress/format/layout/baked_format.h"
+#include "compress/format/layout/bit_stream.h"
+#include "compress/format/cluster/index_codec.h"
+#include "compress/format/cluster/normal_codec.h"
 
 /// The disk form of pages of codec `fast`; docs/baked_format.md says it in words. What both directions share.
 ///

@@ -1,4 +1,4 @@
-#include "compress/format/page_fast_decoder.h"
+#include "compress/format/pages/page_fast_decoder.h"
 
 #include <algorithm>
 #include <bit>
@@ -6,8 +6,8 @@
 
 #include <zstd.h>
 
-#include "compress/format/page_codec.h"
-#include "compress/format/page_fast_kernels.h"
+#include "compress/format/pages/page_codec.h"
+#include "compress/format/pages/page_fast_kernels.h"
 
 namespace packtrace {
 

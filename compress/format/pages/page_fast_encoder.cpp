@@ -1,4 +1,4 @@
-#include "compress/bake/page_fast_encoder.h"
+#include "compress/format/pages/page_fast_encoder.h"
 
 #include <algorithm>
 #include <bit>
@@ -7,8 +7,8 @@
 
 #include <zstd.h>
 
-#include "compress/format/page_cluster.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/format/pages/page_cluster.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 

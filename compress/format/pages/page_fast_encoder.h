@@ -5,10 +5,10 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/bit_stream.h"
-#include "compress/format/cluster_codec.h"
-#include "compress/format/page_contexts.h"
-#include "compress/format/page_fast.h"
+#include "compress/format/layout/bit_stream.h"
+#include "compress/format/cluster/cluster_codec.h"
+#include "compress/format/pages/page_contexts.h"
+#include "compress/format/pages/page_fast.h"
 
 struct ZSTD_CCtx_s;
 

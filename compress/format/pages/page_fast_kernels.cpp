@@ -1,4 +1,4 @@
-#include "compress/format/page_fast_kernels.h"
+#include "compress/format/pages/page_fast_kernels.h"
 
 #include <algorithm>
 #include <bit>

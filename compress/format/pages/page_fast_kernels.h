@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "compress/format/index_codec.h"
-#include "compress/format/page_fast.h"
+#include "compress/format/cluster/index_codec.h"
+#include "compress/format/pages/page_fast.h"
 
 namespace packtrace::page_fast {
 

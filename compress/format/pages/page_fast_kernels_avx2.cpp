@@ -1,5 +1,5 @@
 // Compiled for AVX2: nothing here may be inline in a header, or other translation units could end up calling it.
-#include "compress/format/page_fast_kernels.h"
+#include "compress/format/pages/page_fast_kernels.h"
 
 #if defined(__x86_64__)
 

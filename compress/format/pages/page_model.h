@@ -7,9 +7,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "compress/format/page_cluster.h"
-#include "compress/format/page_contexts.h"
-#include "compress/format/page_normals.h"
+#include "compress/format/pages/page_cluster.h"
+#include "compress/format/pages/page_contexts.h"
+#include "compress/format/pages/page_normals.h"
 
 namespace packtrace {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "compress/format/normal_codec.h"
+#include "compress/format/cluster/normal_codec.h"
 
 namespace packtrace {
 

@@ -5,10 +5,10 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/bit_stream.h"
-#include "compress/format/page_contexts.h"
-#include "compress/format/position_grid.h"
-#include "compress/format/rans.h"
+#include "compress/format/layout/bit_stream.h"
+#include "compress/format/pages/page_contexts.h"
+#include "compress/format/cluster/position_grid.h"
+#include "compress/format/pages/rans.h"
 
 namespace packtrace {
 

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <vector>
 
-#include "compress/format/rans.h"
+#include "compress/format/pages/rans.h"
 
 namespace packtrace {
 

@@ -6,7 +6,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "compress/bake/texture_encoder.h"
+#include "compress/format/textures/texture_encoder.h"
 
 namespace packtrace {
 namespace {

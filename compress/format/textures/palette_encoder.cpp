@@ -4,7 +4,7 @@
 #include <queue>
 #include <vector>
 
-#include "compress/bake/texture_encoder.h"
+#include "compress/format/textures/texture_encoder.h"
 
 namespace packtrace {
 namespace {

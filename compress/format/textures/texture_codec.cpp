@@ -1,4 +1,4 @@
-#include "compress/format/texture_codec.h"
+#include "compress/format/textures/texture_codec.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "compress/bake/texture_encoder.h"
+#include "compress/format/textures/texture_encoder.h"
 
 #include <algorithm>
 #include <array>

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "compress/format/texture_codec.h"
+#include "compress/format/textures/texture_codec.h"
 #include "pbrt_import/scene/albedo_texture.h"
 
 namespace packtrace {

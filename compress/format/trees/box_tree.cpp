@@ -1,4 +1,4 @@
-#include "compress/bvh/box_tree.h"
+#include "compress/format/trees/box_tree.h"
 
 #include <algorithm>
 #include <bit>

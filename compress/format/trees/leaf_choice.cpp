@@ -1,4 +1,4 @@
-#include "compress/format/leaf_choice.h"
+#include "compress/format/trees/leaf_choice.h"
 
 #include <algorithm>
 #include <limits>

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/leaf_nodes.h"
+#include "compress/format/trees/leaf_nodes.h"
 
 namespace packtrace {
 

@@ -1,10 +1,10 @@
-#include "compress/format/leaf_nodes.h"
+#include "compress/format/trees/leaf_nodes.h"
 
 #include <cassert>
 #include <limits>
 
-#include "compress/format/index_codec.h"
-#include "compress/format/leaf_choice.h"
+#include "compress/format/cluster/index_codec.h"
+#include "compress/format/trees/leaf_choice.h"
 
 namespace packtrace {
 namespace {

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/packed_node.h"
+#include "compress/format/layout/packed_node.h"
 
 namespace packtrace {
 

@@ -1,10 +1,10 @@
-#include "compress/format/leaf_restorer.h"
+#include "compress/format/trees/leaf_restorer.h"
 
 #include <algorithm>
 #include <bit>
 
-#include "compress/format/bit_stream.h"
-#include "compress/format/node_writer.h"
+#include "compress/format/layout/bit_stream.h"
+#include "compress/format/trees/node_writer.h"
 
 namespace packtrace {
 void LeafRestorer::begin(const baked::GeometryRecord& geometry, const baked::TreeRecord& tree,

@@ -1,4 +1,4 @@
-#include "compress/bake/node_groups.h"
+#include "compress/format/trees/node_groups.h"
 
 #include <algorithm>
 #include <array>
@@ -6,8 +6,8 @@
 #include <cstring>
 #include <limits>
 
-#include "compress/format/index_codec.h"
-#include "compress/format/leaf_choice.h"
+#include "compress/format/cluster/index_codec.h"
+#include "compress/format/trees/leaf_choice.h"
 
 namespace packtrace {
 namespace {

@@ -1,4 +1,4 @@
-#include "compress/format/node_kernels_body.h"
+#include "compress/format/trees/node_kernels_body.h"
 
 namespace packtrace::node_kernels {
 

@@ -1,6 +1,6 @@
 // The kernels of node_kernels.h, for each instruction set. No other header's functions may be compiled for AVX2.
 
-#include "compress/format/node_kernels.h"
+#include "compress/format/trees/node_kernels.h"
 
 namespace packtrace::node_kernels {
 namespace {

@@ -1,4 +1,4 @@
-#include "compress/format/node_writer.h"
+#include "compress/format/trees/node_writer.h"
 
 #include <cassert>
 #include <cstddef>

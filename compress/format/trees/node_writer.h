@@ -3,11 +3,11 @@
 #include <array>
 #include <span>
 
-#include "compress/format/cluster_codec.h"
-#include "compress/format/leaf_nodes.h"
-#include "compress/format/node_kernels.h"
-#include "compress/format/packed_node.h"
-#include "compress/format/tree_grid.h"
+#include "compress/format/cluster/cluster_codec.h"
+#include "compress/format/trees/leaf_nodes.h"
+#include "compress/format/trees/node_kernels.h"
+#include "compress/format/layout/packed_node.h"
+#include "compress/format/trees/tree_grid.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "compress/format/packed_trees.h"
+#include "compress/format/trees/packed_trees.h"
 
 #include <algorithm>
 #include <array>
@@ -9,12 +9,12 @@
 
 #include <tbb/parallel_for.h>
 
-#include "compress/bvh/wide_tree.h"
-#include "compress/format/node_writer.h"
-#include "compress/format/stored_nodes.h"
-#include "compress/format/tree_grid.h"
-#include "compress/format/tree_validation.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/format/trees/wide_tree.h"
+#include "compress/format/trees/node_writer.h"
+#include "compress/format/trees/stored_nodes.h"
+#include "compress/format/trees/tree_grid.h"
+#include "compress/format/trees/tree_validation.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

@@ -1,4 +1,4 @@
-#include "compress/bvh/reinsertion.h"
+#include "compress/format/trees/reinsertion.h"
 
 #include <algorithm>
 #include <array>

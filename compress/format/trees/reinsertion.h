@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "compress/bvh/box_tree.h"
+#include "compress/format/trees/box_tree.h"
 
 namespace packtrace {
 

@@ -1,11 +1,11 @@
-#include "compress/format/stored_nodes.h"
+#include "compress/format/trees/stored_nodes.h"
 
 #include <algorithm>
 #include <array>
 #include <limits>
 
-#include "compress/format/node_writer.h"
-#include "compress/format/tree_grid.h"
+#include "compress/format/trees/node_writer.h"
+#include "compress/format/trees/tree_grid.h"
 
 namespace packtrace {
 namespace {

@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/baked_file.h"
-#include "compress/format/leaf_nodes.h"
-#include "compress/format/packed_node.h"
+#include "compress/format/file/baked_file.h"
+#include "compress/format/trees/leaf_nodes.h"
+#include "compress/format/layout/packed_node.h"
 
 namespace packtrace {
 

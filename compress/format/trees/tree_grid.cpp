@@ -1,4 +1,4 @@
-#include "compress/format/tree_grid.h"
+#include "compress/format/trees/tree_grid.h"
 
 #include <algorithm>
 #include <cmath>

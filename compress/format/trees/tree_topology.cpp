@@ -1,4 +1,4 @@
-#include "compress/format/tree_topology.h"
+#include "compress/format/trees/tree_topology.h"
 
 #include <algorithm>
 #include <atomic>
@@ -7,8 +7,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include "compress/format/leaf_restorer.h"
-#include "compress/format/tree_validation.h"
+#include "compress/format/trees/leaf_restorer.h"
+#include "compress/format/trees/tree_validation.h"
 
 namespace packtrace {
 namespace {

@@ -1,9 +1,9 @@
-#include "compress/format/tree_validation.h"
+#include "compress/format/trees/tree_validation.h"
 
 #include <algorithm>
 #include <bit>
 
-#include "compress/format/tree_grid.h"
+#include "compress/format/trees/tree_grid.h"
 
 namespace packtrace {
 namespace {

@@ -1,4 +1,4 @@
-#include "compress/bvh/wide_tree.h"
+#include "compress/format/trees/wide_tree.h"
 
 #include <algorithm>
 #include <array>

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "compress/bvh/box_tree.h"
-#include "compress/bvh/reinsertion.h"
+#include "compress/format/trees/box_tree.h"
+#include "compress/format/trees/reinsertion.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "runtime/trace/embree_cluster_tracer.h"
+#include "runtime/trace/embree/embree_cluster_tracer.h"
 
 #include <algorithm>
 #include <array>
@@ -6,10 +6,10 @@
 #include <cstring>
 #include <utility>
 
-#include "compress/bvh/box_tree.h"
-#include "pbrt_import/scene/progress.h"
-#include "runtime/trace/embree_device.h"
-#include "runtime/trace/embree_rays.h"
+#include "compress/format/trees/box_tree.h"
+#include "pbrt_import/base/progress.h"
+#include "runtime/trace/embree/embree_device.h"
+#include "runtime/trace/embree/embree_rays.h"
 
 namespace packtrace {
 namespace {

@@ -3,8 +3,8 @@
 #include <memory>
 #include <optional>
 
-#include "pbrt_import/scene/memory_budget.h"
-#include "runtime/trace/packed/packed_tracer.h"
+#include "pbrt_import/base/memory_budget.h"
+#include "runtime/trace/packed/scene/packed_tracer.h"
 
 namespace packtrace {
 

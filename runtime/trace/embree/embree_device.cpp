@@ -1,4 +1,4 @@
-#include "runtime/trace/embree_device.h"
+#include "runtime/trace/embree/embree_device.h"
 
 #include <algorithm>
 #include <utility>

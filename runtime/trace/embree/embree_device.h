@@ -9,7 +9,7 @@
 
 #include <embree3/rtcore.h>
 
-#include "pbrt_import/scene/memory_budget.h"
+#include "pbrt_import/base/memory_budget.h"
 
 namespace packtrace {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cassert>
 
-#include "runtime/trace/embree_rays.h"
-#include "runtime/trace/embree_tracer.h"
+#include "runtime/trace/embree/embree_rays.h"
+#include "runtime/trace/embree/embree_tracer.h"
 #include "runtime/trace/flush_denormals.h"
 
 namespace packtrace {

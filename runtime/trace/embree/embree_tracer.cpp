@@ -1,4 +1,4 @@
-#include "runtime/trace/embree_tracer.h"
+#include "runtime/trace/embree/embree_tracer.h"
 
 #include <algorithm>
 #include <array>
@@ -9,10 +9,10 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/progress.h"
-#include "runtime/trace/alpha_filter.h"
-#include "runtime/trace/embree_device.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/progress.h"
+#include "runtime/trace/source/alpha_filter.h"
+#include "runtime/trace/embree/embree_device.h"
 #include "runtime/trace/placement.h"
 
 namespace packtrace {

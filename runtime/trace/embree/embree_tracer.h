@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "pbrt_import/scene/memory_budget.h"
+#include "pbrt_import/base/memory_budget.h"
 #include "runtime/trace/ray_tracer.h"
 
 struct RTCSceneTy;

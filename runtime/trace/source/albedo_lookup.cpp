@@ -1,4 +1,4 @@
-#include "runtime/trace/albedo_lookup.h"
+#include "runtime/trace/source/albedo_lookup.h"
 
 namespace packtrace {
 

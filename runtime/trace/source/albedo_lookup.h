@@ -1,6 +1,6 @@
 #pragma once
 
-#include "runtime/trace/scene_source.h"
+#include "runtime/trace/source/scene_source.h"
 
 namespace packtrace {
 

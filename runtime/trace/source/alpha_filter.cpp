@@ -1,4 +1,4 @@
-#include "runtime/trace/alpha_filter.h"
+#include "runtime/trace/source/alpha_filter.h"
 
 namespace packtrace {
 

@@ -3,9 +3,9 @@
 #include <optional>
 #include <span>
 
-#include "compress/format/baked_file.h"
-#include "compress/format/cluster_codec.h"
-#include "runtime/trace/packed_source.h"
+#include "compress/format/file/baked_file.h"
+#include "compress/format/cluster/cluster_codec.h"
+#include "runtime/trace/source/packed_source.h"
 
 namespace packtrace {
 

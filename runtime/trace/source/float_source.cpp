@@ -1,4 +1,4 @@
-#include "runtime/trace/float_source.h"
+#include "runtime/trace/source/float_source.h"
 
 #include <algorithm>
 #include <cassert>
@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

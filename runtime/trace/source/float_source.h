@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "runtime/trace/scene_source.h"
+#include "runtime/trace/source/scene_source.h"
 
 namespace packtrace {
 

@@ -1,13 +1,13 @@
-#include "runtime/trace/lod_source.h"
+#include "runtime/trace/source/lod_source.h"
 
 #include <algorithm>
 #include <cassert>
 #include <limits>
 #include <string>
 
-#include "compress/format/cluster_codec.h"
-#include "pbrt_import/scene/error.h"
-#include "runtime/trace/cluster_look_up.h"
+#include "compress/format/cluster/cluster_codec.h"
+#include "pbrt_import/base/error.h"
+#include "runtime/trace/source/cluster_look_up.h"
 
 namespace packtrace {
 namespace {

@@ -3,9 +3,9 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/baked_file.h"
+#include "compress/format/file/baked_file.h"
 #include "runtime/lod/lod_sharing.h"
-#include "runtime/trace/packed_source.h"
+#include "runtime/trace/source/packed_source.h"
 
 namespace packtrace {
 

@@ -1,12 +1,12 @@
-#include "runtime/trace/packed_source.h"
+#include "runtime/trace/source/packed_source.h"
 
 #include <cassert>
 #include <cmath>
 #include <limits>
 
-#include "compress/format/baked_file.h"
-#include "compress/format/cluster_codec.h"
-#include "runtime/trace/cluster_look_up.h"
+#include "compress/format/file/baked_file.h"
+#include "compress/format/cluster/cluster_codec.h"
+#include "runtime/trace/source/cluster_look_up.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "runtime/trace/scene_source.h"
+#include "runtime/trace/source/scene_source.h"
 
 namespace packtrace {
 

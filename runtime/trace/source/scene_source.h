@@ -5,7 +5,7 @@
 #include <span>
 #include <string_view>
 
-#include "compress/format/texture_codec.h"
+#include "compress/format/textures/texture_codec.h"
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace {

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "compress/bvh/box_tree.h"
+#include "compress/format/trees/box_tree.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace::test {

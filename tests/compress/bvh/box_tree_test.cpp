@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "compress/bvh/wide_tree.h"
+#include "compress/format/trees/wide_tree.h"
 #include "tests/compress/bvh/box_checks.h"
 
 namespace packtrace {

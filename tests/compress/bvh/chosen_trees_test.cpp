@@ -8,9 +8,9 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "compress/format/node_writer.h"
-#include "compress/format/packed_trees.h"
-#include "compress/format/stored_nodes.h"
+#include "compress/format/trees/node_writer.h"
+#include "compress/format/trees/packed_trees.h"
+#include "compress/format/trees/stored_nodes.h"
 #include "tests/compress/bvh/tree_walk.h"
 #include "tests/compress/test_scenes.h"
 

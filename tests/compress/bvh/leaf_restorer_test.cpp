@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "compress/format/leaf_restorer.h"
-#include "compress/format/node_writer.h"
+#include "compress/format/trees/leaf_restorer.h"
+#include "compress/format/trees/node_writer.h"
 #include "tests/compress/file_damage.h"
 #include "tests/compress/test_scenes.h"
 

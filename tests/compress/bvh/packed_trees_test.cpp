@@ -6,9 +6,9 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "compress/format/leaf_choice.h"
-#include "compress/format/node_writer.h"
-#include "compress/format/packed_trees.h"
+#include "compress/format/trees/leaf_choice.h"
+#include "compress/format/trees/node_writer.h"
+#include "compress/format/trees/packed_trees.h"
 #include "tests/compress/bvh/tree_walk.h"
 #include "tests/compress/test_scenes.h"
 

@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "compress/bvh/reinsertion.h"
-#include "compress/bvh/wide_tree.h"
+#include "compress/format/trees/reinsertion.h"
+#include "compress/format/trees/wide_tree.h"
 #include "tests/compress/bvh/box_checks.h"
 
 namespace packtrace {

@@ -4,9 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include "compress/format/packed_trees.h"
-#include "compress/format/tree_topology.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/format/trees/packed_trees.h"
+#include "compress/format/trees/tree_topology.h"
+#include "pbrt_import/base/error.h"
 #include "tests/compress/file_damage.h"
 #include "tests/compress/test_scenes.h"
 

@@ -9,8 +9,8 @@
 
 #include <gtest/gtest.h>
 
-#include "compress/format/baked_file.h"
-#include "compress/format/packed_node.h"
+#include "compress/format/file/baked_file.h"
+#include "compress/format/layout/packed_node.h"
 
 namespace packtrace::test {
 

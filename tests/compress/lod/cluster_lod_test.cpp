@@ -9,8 +9,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "compress/bake/clusterize.h"
-#include "compress/format/index_codec.h"
+#include "compress/bake/clusters/clusterize.h"
+#include "compress/format/cluster/index_codec.h"
 #include "tests/compress/lod/lod_meshes.h"
 #include "tests/compress/test_scenes.h"
 

@@ -1,6 +1,6 @@
 // Errors that are measured against levels further down, where those of levels in turn add up.
 
-#include "compress/bake/lod/direct_bound.h"
+#include "compress/bake/lod/bound/direct_bound.h"
 
 #include <algorithm>
 #include <cmath>

@@ -10,11 +10,11 @@
 #include <tbb/global_control.h>
 
 #include "compress/bake/lod/lod_encoder.h"
-#include "compress/bake/lod/lod_store.h"
-#include "compress/format/baked_file.h"
-#include "compress/format/file_summary.h"
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/file_bytes.h"
+#include "compress/bake/write/lod_store.h"
+#include "compress/format/file/baked_file.h"
+#include "compress/format/file/file_summary.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/file_bytes.h"
 #include "tests/compress/lod/lod_meshes.h"
 #include "tests/compress/lod/surface_distance.h"
 #include "tests/compress/test_scenes.h"

@@ -9,12 +9,12 @@
 
 #include <gtest/gtest.h>
 
-#include "compress/bake/lod/edge_heap.h"
-#include "compress/bake/lod/edge_placement.h"
-#include "compress/bake/lod/triangle_distance.h"
-#include "compress/bake/lod/triangle_overlay.h"
-#include "compress/bake/lod/triangle_refiner.h"
-#include "compress/bake/lod/triangle_set.h"
+#include "compress/bake/lod/simplify/edge_heap.h"
+#include "compress/bake/lod/simplify/edge_placement.h"
+#include "compress/bake/lod/bound/triangle_distance.h"
+#include "compress/bake/lod/bound/triangle_overlay.h"
+#include "compress/bake/lod/bound/triangle_refiner.h"
+#include "compress/bake/lod/bound/triangle_set.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace::test {

@@ -7,9 +7,9 @@
 #include <map>
 #include <set>
 
-#include "compress/bake/geometry_measure.h"
-#include "compress/bake/requirements.h"
-#include "pbrt_import/scene/progress.h"
+#include "compress/bake/grid/geometry_measure.h"
+#include "compress/bake/plan/requirements.h"
+#include "pbrt_import/base/progress.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace::test {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "compress/bake/lod/cluster_lod.h"
-#include "compress/format/baked_file.h"
+#include "compress/format/file/baked_file.h"
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace::test {

@@ -1,6 +1,6 @@
 // Levels that an interrupted bake left: they may be damaged, or made by someone else.
 
-#include "compress/bake/lod/lod_store.h"
+#include "compress/bake/write/lod_store.h"
 
 #include <array>
 #include <cstring>
@@ -11,8 +11,8 @@
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/file_bytes.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/file_bytes.h"
 #include "tests/compress/file_hashes.h"
 #include "tests/compress/lod/lod_meshes.h"
 #include "tests/compress/test_scenes.h"

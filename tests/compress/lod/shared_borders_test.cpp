@@ -11,8 +11,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "compress/bake/geometry_measure.h"
-#include "compress/bake/requirements.h"
+#include "compress/bake/grid/geometry_measure.h"
+#include "compress/bake/plan/requirements.h"
 #include "tests/compress/lod/lod_meshes.h"
 #include "tests/compress/test_scenes.h"
 #include "tests/pbrt_import/scene_folder.h"

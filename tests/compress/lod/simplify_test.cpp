@@ -1,4 +1,4 @@
-#include "compress/bake/lod/simplify.h"
+#include "compress/bake/lod/simplify/simplify.h"
 
 #include <array>
 #include <cmath>
@@ -9,9 +9,9 @@
 #include <gtest/gtest.h>
 
 #include "compress/bake/lod/loose_pieces.h"
-#include "compress/bake/lod/quadric.h"
-#include "compress/bake/lod/surface_bound.h"
-#include "compress/bake/lod/triangle_distance.h"
+#include "compress/bake/lod/simplify/quadric.h"
+#include "compress/bake/lod/bound/surface_bound.h"
+#include "compress/bake/lod/bound/triangle_distance.h"
 #include "tests/compress/lod/lod_meshes.h"
 #include "tests/compress/test_scenes.h"
 

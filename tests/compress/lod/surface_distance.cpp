@@ -6,7 +6,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "compress/bake/lod/triangle_distance.h"
+#include "compress/bake/lod/bound/triangle_distance.h"
 
 namespace packtrace {
 namespace {

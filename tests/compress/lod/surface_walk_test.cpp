@@ -6,12 +6,12 @@
 
 #include <gtest/gtest.h>
 
-#include "compress/bake/lod/image_cover.h"
-#include "compress/bake/lod/line_cover.h"
-#include "compress/bake/lod/surface_bound.h"
-#include "compress/bake/lod/surface_walk.h"
-#include "compress/bake/lod/triangle_distance.h"
-#include "compress/bake/lod/triangle_images.h"
+#include "compress/bake/lod/bound/image_cover.h"
+#include "compress/bake/lod/bound/line_cover.h"
+#include "compress/bake/lod/bound/surface_bound.h"
+#include "compress/bake/lod/bound/surface_walk.h"
+#include "compress/bake/lod/bound/triangle_distance.h"
+#include "compress/bake/lod/bound/triangle_images.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace::test {

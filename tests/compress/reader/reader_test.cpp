@@ -9,10 +9,10 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
-#include "compress/bake/page_encoder.h"
-#include "compress/format/baked_file.h"
-#include "compress/format/page_codec.h"
-#include "pbrt_import/scene/file_bytes.h"
+#include "compress/format/pages/page_encoder.h"
+#include "compress/format/file/baked_file.h"
+#include "compress/format/pages/page_codec.h"
+#include "pbrt_import/base/file_bytes.h"
 #include "tests/compress/file_hashes.h"
 #include "tests/compress/test_scenes.h"
 #include "tests/pbrt_import/scene_folder.h"

@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 // Decodes vertices to 12 floats each: position, normal, uv, tangent with its sign.
-#include "compress/format/vertex16.glsl"
+#include "compress/exchange/vertex16/vertex16.glsl"
 
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) readonly buffer Vertices { uvec4 vertices[]; };

@@ -1,4 +1,4 @@
-#include "compress/bake/vertex16_export.h"
+#include "compress/exchange/vertex16/vertex16_export.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,9 +9,9 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "compress/bake/vertex16_geometry.h"
-#include "compress/format/vertex16_fields.h"
-#include "compress/format/vertex16_file.h"
+#include "compress/exchange/vertex16/vertex16_geometry.h"
+#include "compress/exchange/vertex16/vertex16_fields.h"
+#include "compress/exchange/vertex16/vertex16_file.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {

@@ -1,12 +1,12 @@
-#include "compress/format/vertex16_file.h"
+#include "compress/exchange/vertex16/vertex16_file.h"
 
 #include <cstring>
 
 #include <gtest/gtest.h>
 
-#include "compress/bake/vertex16_export.h"
-#include "compress/format/texture_codec.h"
-#include "pbrt_import/scene/error.h"
+#include "compress/exchange/vertex16/vertex16_export.h"
+#include "compress/format/textures/texture_codec.h"
+#include "pbrt_import/base/error.h"
 #include "tests/compress/file_hashes.h"
 #include "tests/compress/test_scenes.h"
 

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "compress/format/vertex16_decode.h"
+#include "compress/exchange/vertex16/vertex16_decode.h"
 #include "tests/compress/test_scenes.h"
 #include "tests/compress/vertex16/vulkan_compute.h"
 

@@ -1,4 +1,4 @@
-#include "pbrt_import/scene/diagnostics.h"
+#include "pbrt_import/base/diagnostics.h"
 
 #include <algorithm>
 #include <string>

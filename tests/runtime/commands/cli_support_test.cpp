@@ -12,9 +12,9 @@
 #include <tbb/global_control.h>
 #include <unistd.h>
 
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/output_file.h"
-#include "pbrt_import/scene/progress.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/output_file.h"
+#include "pbrt_import/base/progress.h"
 #include "tests/temporary_folder.h"
 
 namespace packtrace {

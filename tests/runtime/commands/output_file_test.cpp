@@ -1,4 +1,4 @@
-#include "pbrt_import/scene/output_file.h"
+#include "pbrt_import/base/output_file.h"
 
 #include <cmath>
 #include <csignal>
@@ -17,7 +17,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "pbrt_import/scene/file_bytes.h"
+#include "pbrt_import/base/file_bytes.h"
 #include "runtime/commands/json_output.h"
 #include "tests/runtime/image/image_test_support.h"
 #include "tests/temporary_folder.h"

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/scene/progress.h"
+#include "pbrt_import/base/progress.h"
 
 namespace packtrace {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {

@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "runtime/gbuffer.h"
+#include "runtime/camera/gbuffer.h"
 
 namespace packtrace::synthetic {
 

@@ -14,7 +14,7 @@
 #include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfTiledOutputFile.h>
 
-#include "pbrt_import/scene/file_bytes.h"
+#include "pbrt_import/base/file_bytes.h"
 #include "runtime/image/read_image.h"
 #include "tests/runtime/image/image_test_support.h"
 #include "tests/temporary_folder.h"

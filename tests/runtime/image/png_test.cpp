@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/scene/file_bytes.h"
+#include "pbrt_import/base/file_bytes.h"
 #include "tests/runtime/image/image_test_support.h"
 #include "tests/temporary_folder.h"
 

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {

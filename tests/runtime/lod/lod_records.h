@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "compress/format/lod_format.h"
+#include "compress/format/layout/lod_format.h"
 #include "runtime/lod/lod_sharing.h"
 #include "tests/compress/lod/lod_meshes.h"
 #include "tests/compress/test_scenes.h"

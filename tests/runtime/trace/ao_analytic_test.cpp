@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/scene/error.h"
-#include "runtime/trace/float_source.h"
+#include "pbrt_import/base/error.h"
+#include "runtime/trace/source/float_source.h"
 #include "tests/runtime/trace/test_scenes.h"
 
 namespace packtrace {

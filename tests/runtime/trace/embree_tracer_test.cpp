@@ -1,11 +1,11 @@
-#include "runtime/trace/embree_tracer.h"
+#include "runtime/trace/embree/embree_tracer.h"
 
 #include <numbers>
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/scene/error.h"
-#include "runtime/trace/float_source.h"
+#include "pbrt_import/base/error.h"
+#include "runtime/trace/source/float_source.h"
 #include "runtime/trace/make_tracer.h"
 #include "tests/runtime/trace/test_scenes.h"
 

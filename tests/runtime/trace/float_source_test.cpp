@@ -1,8 +1,8 @@
-#include "runtime/trace/float_source.h"
+#include "runtime/trace/source/float_source.h"
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "tests/runtime/trace/test_scenes.h"
 
 namespace packtrace {

@@ -1,4 +1,4 @@
-#include "runtime/trace/lod_source.h"
+#include "runtime/trace/source/lod_source.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,10 +6,10 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "pbrt_import/scene/error.h"
-#include "runtime/trace/lod_view.h"
+#include "pbrt_import/base/error.h"
+#include "runtime/camera/lod_view.h"
 #include "runtime/trace/make_tracer.h"
-#include "runtime/trace/primary_visibility.h"
+#include "runtime/camera/primary_visibility.h"
 #include "tests/runtime/trace/packed_scenes.h"
 #include "tests/runtime/trace/test_scenes.h"
 

@@ -1,13 +1,13 @@
-#include "runtime/trace/origin_lift.h"
+#include "runtime/camera/origin_lift.h"
 
 #include <algorithm>
 #include <numeric>
 
 #include <gtest/gtest.h>
 
-#include "runtime/trace/float_source.h"
-#include "runtime/trace/lod_view.h"
-#include "runtime/trace/primary_visibility.h"
+#include "runtime/trace/source/float_source.h"
+#include "runtime/camera/lod_view.h"
+#include "runtime/camera/primary_visibility.h"
 #include "tests/runtime/trace/test_scenes.h"
 
 namespace packtrace {

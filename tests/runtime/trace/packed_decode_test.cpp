@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "compress/format/packed_trees.h"
-#include "runtime/trace/packed/trace_cluster.h"
+#include "compress/format/trees/packed_trees.h"
+#include "runtime/trace/packed/scene/trace_cluster.h"
 #include "tests/runtime/trace/packed_scenes.h"
 #include "tests/runtime/trace/test_scenes.h"
 

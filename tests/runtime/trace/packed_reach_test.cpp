@@ -3,9 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include "runtime/trace/packed/enter.h"
-#include "runtime/trace/packed/lanes_scalar.h"
-#include "runtime/trace/packed/leaf_tests.h"
+#include "runtime/trace/packed/kernels/enter.h"
+#include "runtime/trace/packed/kernels/lanes_scalar.h"
+#include "runtime/trace/packed/kernels/leaf_tests.h"
 
 namespace packtrace::packed {
 namespace {

@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "compress/bake/bake_scene.h"
-#include "compress/format/baked_file.h"
-#include "runtime/trace/packed/packed_tracer.h"
-#include "runtime/trace/packed_source.h"
+#include "compress/format/file/baked_file.h"
+#include "runtime/trace/packed/scene/packed_tracer.h"
+#include "runtime/trace/source/packed_source.h"
 #include "tests/runtime/trace/test_scenes.h"
 
 namespace packtrace::test {

@@ -1,13 +1,13 @@
-#include "runtime/trace/packed_source.h"
+#include "runtime/trace/source/packed_source.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
 #include "compress/bake/bake_scene.h"
-#include "compress/format/baked_file.h"
-#include "runtime/trace/float_source.h"
-#include "runtime/trace/primary_visibility.h"
+#include "compress/format/file/baked_file.h"
+#include "runtime/trace/source/float_source.h"
+#include "runtime/camera/primary_visibility.h"
 #include "tests/runtime/trace/test_scenes.h"
 
 namespace packtrace {

@@ -1,4 +1,4 @@
-#include "runtime/trace/packed/packed_tracer.h"
+#include "runtime/trace/packed/scene/packed_tracer.h"
 
 #include <algorithm>
 #include <cstring>
@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
 
-#include "runtime/trace/embree_tracer.h"
-#include "runtime/trace/packed/tree_hull.h"
+#include "runtime/trace/embree/embree_tracer.h"
+#include "runtime/trace/packed/scene/tree_hull.h"
 #include "runtime/trace/ray_offset.h"
 #include "tests/runtime/trace/packed_scenes.h"
 #include "tests/runtime/trace/test_scenes.h"

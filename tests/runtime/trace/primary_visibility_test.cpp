@@ -1,4 +1,4 @@
-#include "runtime/trace/primary_visibility.h"
+#include "runtime/camera/primary_visibility.h"
 
 #include <cmath>
 #include <cstring>
@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "pbrt_import/scene/error.h"
-#include "runtime/trace/float_source.h"
+#include "pbrt_import/base/error.h"
+#include "runtime/trace/source/float_source.h"
 #include "runtime/trace/make_tracer.h"
 #include "tests/runtime/trace/test_scenes.h"
 

@@ -5,7 +5,7 @@
 
 #include "pbrt_import/scene/scene.h"
 #include "runtime/ao/ao_integrator.h"
-#include "runtime/trace/embree_tracer.h"
+#include "runtime/trace/embree/embree_tracer.h"
 
 namespace packtrace::test {
 

@@ -1,4 +1,4 @@
-#include "compress/bake/lod/direct_bound.h"
+#include "compress/bake/lod/bound/direct_bound.h"
 
 #include <algorithm>
 #include <array>
@@ -6,11 +6,11 @@
 #include <utility>
 #include <vector>
 
-#include "compress/bake/lod/stated_error.h"
-#include "compress/bake/lod/surface_side.h"
-#include "compress/bake/lod/triangle_refiner.h"
-#include "compress/bake/lod/triangle_set.h"
-#include "compress/bake/renumbering.h"
+#include "compress/bake/lod/bound/stated_error.h"
+#include "compress/bake/lod/bound/surface_side.h"
+#include "compress/bake/lod/bound/triangle_refiner.h"
+#include "compress/bake/lod/bound/triangle_set.h"
+#include "compress/bake/clusters/renumbering.h"
 
 namespace packtrace {
 namespace {

@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <span>
 
-#include "compress/bake/lod/simplify.h"
-#include "compress/bake/lod/surface_bound.h"
-#include "compress/bake/lod/triangle_history.h"
+#include "compress/bake/lod/simplify/simplify.h"
+#include "compress/bake/lod/bound/surface_bound.h"
+#include "compress/bake/lod/bound/triangle_history.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "compress/bake/lod/distance_kernel_body.h"
+#include "compress/bake/lod/bound/distance_kernel_body.h"
 
 namespace packtrace {
 

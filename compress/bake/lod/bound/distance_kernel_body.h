@@ -1,7 +1,7 @@
 // The bodies of triangle_distances() and nearest_triangle(), for each instruction set: same operations in the same
 // order, so the same bits. No other header's functions may be compiled for AVX2.
 
-#include "compress/bake/lod/distance_kernel.h"
+#include "compress/bake/lod/bound/distance_kernel.h"
 
 namespace packtrace {
 namespace {

@@ -1,4 +1,4 @@
-#include "compress/bake/lod/image_cover.h"
+#include "compress/bake/lod/bound/image_cover.h"
 
 #include <algorithm>
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "compress/bake/lod/triangle_images.h"
+#include "compress/bake/lod/bound/triangle_images.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "compress/bake/lod/line_cover.h"
+#include "compress/bake/lod/bound/line_cover.h"
 
 #include <algorithm>
 

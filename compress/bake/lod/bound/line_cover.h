@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "compress/bake/quantized_geometry.h"
+#include "compress/bake/clusters/quantized_geometry.h"
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {

@@ -1,4 +1,4 @@
-#include "compress/bake/lod/overlay_kernel_body.h"
+#include "compress/bake/lod/bound/overlay_kernel_body.h"
 
 namespace packtrace {
 

@@ -2,7 +2,7 @@
 // here but inlined code of the translation unit's own: no other header's functions may be compiled for AVX2.
 // NOLINTBEGIN(llvm-header-guard)
 
-#include "compress/bake/lod/overlay_kernel.h"
+#include "compress/bake/lod/bound/overlay_kernel.h"
 
 namespace packtrace {
 namespace {

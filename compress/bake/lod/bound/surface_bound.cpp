@@ -1,4 +1,4 @@
-#include "compress/bake/lod/surface_bound.h"
+#include "compress/bake/lod/bound/surface_bound.h"
 
 #include <algorithm>
 #include <array>
@@ -6,13 +6,13 @@
 #include <limits>
 #include <numeric>
 
-#include "compress/bake/lod/image_cover.h"
-#include "compress/bake/lod/stated_error.h"
-#include "compress/bake/lod/surface_side.h"
-#include "compress/bake/lod/surface_walk.h"
-#include "compress/bake/lod/triangle_images.h"
-#include "compress/bake/lod/triangle_refiner.h"
-#include "compress/bake/lod/uncovered_bound.h"
+#include "compress/bake/lod/bound/image_cover.h"
+#include "compress/bake/lod/bound/stated_error.h"
+#include "compress/bake/lod/bound/surface_side.h"
+#include "compress/bake/lod/bound/surface_walk.h"
+#include "compress/bake/lod/bound/triangle_images.h"
+#include "compress/bake/lod/bound/triangle_refiner.h"
+#include "compress/bake/lod/bound/uncovered_bound.h"
 
 namespace packtrace {
 namespace {

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "compress/bake/lod/simplify.h"
+#include "compress/bake/lod/simplify/simplify.h"
 
 namespace packtrace {
 

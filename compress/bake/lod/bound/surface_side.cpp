@@ -1,4 +1,4 @@
-#include "compress/bake/lod/surface_side.h"
+#include "compress/bake/lod/bound/surface_side.h"
 
 #include <algorithm>
 #include <numeric>

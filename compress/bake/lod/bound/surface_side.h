@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "compress/bake/lod/triangle_overlay.h"
+#include "compress/bake/lod/bound/triangle_overlay.h"
 
 namespace packtrace {
 

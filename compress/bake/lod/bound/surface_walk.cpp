@@ -1,10 +1,10 @@
-#include "compress/bake/lod/surface_walk.h"
+#include "compress/bake/lod/bound/surface_walk.h"
 
 #include <algorithm>
 #include <utility>
 
-#include "compress/bake/lod/corner_lists.h"
-#include "compress/bake/lod/triangle_distance.h"
+#include "compress/bake/lod/simplify/corner_lists.h"
+#include "compress/bake/lod/bound/triangle_distance.h"
 
 namespace packtrace {
 namespace {

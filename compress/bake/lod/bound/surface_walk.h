@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "compress/bake/lod/simplify.h"
-#include "compress/bake/lod/surface_side.h"
+#include "compress/bake/lod/simplify/simplify.h"
+#include "compress/bake/lod/bound/surface_side.h"
 
 namespace packtrace {
 

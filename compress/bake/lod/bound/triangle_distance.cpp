@@ -1,4 +1,4 @@
-#include "compress/bake/lod/triangle_distance.h"
+#include "compress/bake/lod/bound/triangle_distance.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "compress/bake/lod/triangle_history.h"
+#include "compress/bake/lod/bound/triangle_history.h"
 
 namespace packtrace {
 

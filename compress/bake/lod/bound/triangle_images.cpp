@@ -1,9 +1,9 @@
-#include "compress/bake/lod/triangle_images.h"
+#include "compress/bake/lod/bound/triangle_images.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "compress/bake/lod/triangle_distance.h"
+#include "compress/bake/lod/bound/triangle_distance.h"
 
 namespace packtrace {
 namespace {

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "compress/bake/lod/surface_walk.h"
+#include "compress/bake/lod/bound/surface_walk.h"
 
 namespace packtrace {
 

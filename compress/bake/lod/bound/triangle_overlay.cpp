@@ -1,10 +1,10 @@
-#include "compress/bake/lod/triangle_overlay.h"
+#include "compress/bake/lod/bound/triangle_overlay.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "compress/bake/lod/triangle_distance.h"
+#include "compress/bake/lod/bound/triangle_distance.h"
 
 namespace packtrace {
 namespace {

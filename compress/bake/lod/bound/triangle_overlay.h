@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "compress/bake/lod/overlay_kernel.h"
-#include "compress/bake/lod/simplify.h"
+#include "compress/bake/lod/bound/overlay_kernel.h"
+#include "compress/bake/lod/simplify/simplify.h"
 
 namespace packtrace {
 

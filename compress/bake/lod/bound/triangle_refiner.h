@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "compress/bake/lod/surface_side.h"
-#include "compress/bake/lod/triangle_set.h"
+#include "compress/bake/lod/bound/surface_side.h"
+#include "compress/bake/lod/bound/triangle_set.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "compress/bake/lod/triangle_set.h"
+#include "compress/bake/lod/bound/triangle_set.h"
 
 namespace packtrace {
 namespace {

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "compress/bake/lod/distance_kernel.h"
-#include "compress/bake/lod/triangle_overlay.h"
+#include "compress/bake/lod/bound/distance_kernel.h"
+#include "compress/bake/lod/bound/triangle_overlay.h"
 
 namespace packtrace {
 

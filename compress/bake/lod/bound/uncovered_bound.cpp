@@ -1,4 +1,4 @@
-#include "compress/bake/lod/uncovered_bound.h"
+#include "compress/bake/lod/bound/uncovered_bound.h"
 
 #include <algorithm>
 #include <limits>

@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "compress/bake/lod/stated_error.h"
-#include "compress/bake/lod/surface_side.h"
-#include "compress/bake/lod/triangle_refiner.h"
+#include "compress/bake/lod/bound/stated_error.h"
+#include "compress/bake/lod/bound/surface_side.h"
+#include "compress/bake/lod/bound/triangle_refiner.h"
 
 namespace packtrace {
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "compress/bake/lod/simplify.h"
+#include "compress/bake/lod/simplify/simplify.h"
 
 namespace packtrace {
 

@@ -1,4 +1,4 @@
-#include "compress/bake/lod/edge_placement_body.h"
+#include "compress/bake/lod/simplify/edge_placement_body.h"
 
 namespace packtrace {
 

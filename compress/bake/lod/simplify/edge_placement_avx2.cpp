@@ -1,7 +1,7 @@
 // Compiled for AVX2: nothing here may be inline in a header that others use, or they could end up calling it.
 #if defined(__x86_64__)
 
-#include "compress/bake/lod/edge_placement_body.h"
+#include "compress/bake/lod/simplify/edge_placement_body.h"
 
 namespace packtrace::avx2 {
 

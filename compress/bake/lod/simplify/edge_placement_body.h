@@ -1,7 +1,7 @@
 // Where edges collapse to, four at a time, for each instruction set: same operations in the same order, so the same
 // bits. No other header's functions may be compiled for AVX2.
 
-#include "compress/bake/lod/edge_placement.h"
+#include "compress/bake/lod/simplify/edge_placement.h"
 
 namespace packtrace {
 namespace {

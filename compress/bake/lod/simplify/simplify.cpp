@@ -1,4 +1,4 @@
-#include "compress/bake/lod/simplify.h"
+#include "compress/bake/lod/simplify/simplify.h"
 
 #include <algorithm>
 #include <array>
@@ -6,9 +6,9 @@
 #include <numeric>
 #include <utility>
 
-#include "compress/bake/lod/corner_lists.h"
-#include "compress/bake/lod/edge_heap.h"
-#include "compress/bake/lod/surface_edges.h"
+#include "compress/bake/lod/simplify/corner_lists.h"
+#include "compress/bake/lod/simplify/edge_heap.h"
+#include "compress/bake/lod/simplify/surface_edges.h"
 
 namespace packtrace {
 namespace {

@@ -1,10 +1,10 @@
-#include "compress/bake/lod/surface_edges.h"
+#include "compress/bake/lod/simplify/surface_edges.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "compress/bake/lod/quadric.h"
+#include "compress/bake/lod/simplify/quadric.h"
 
 namespace packtrace {
 namespace {

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "compress/bake/lod/edge_placement.h"
-#include "compress/bake/lod/simplify.h"
+#include "compress/bake/lod/simplify/edge_placement.h"
+#include "compress/bake/lod/simplify/simplify.h"
 
 namespace packtrace {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "runtime/trace/packed/batch_strips.h"
+#include "runtime/trace/packed/kernels/batch_strips.h"
 
 namespace packtrace::packed {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <immintrin.h>
 
-#include "runtime/trace/packed/batch_strips.h"
+#include "runtime/trace/packed/kernels/batch_strips.h"
 
 /// Decodes a batch in a handful of registers.
 namespace packtrace::packed {

@@ -2,9 +2,9 @@
 
 #include <cstdint>
 
-#include "runtime/trace/packed/kernel_types.h"
+#include "runtime/trace/packed/kernels/kernel_types.h"
 
-/// Which corners the triangles of a batch have, from the strips' bits (compress/format/index_codec.h), without a walk
+/// Which corners the triangles of a batch have, from the strips' bits (compress/format/cluster/index_codec.h), without a walk
 /// from triangle to triangle.
 namespace packtrace::packed {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "runtime/trace/packed/side_by_side.h"
+#include "runtime/trace/packed/kernels/side_by_side.h"
 
 /// Rays from one place into one octant, as camera rays are. What they have in common decides about most boxes at once;
 /// the others, and triangles, are tested against a register of rays each. Which is right where neighbours agree.

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "runtime/trace/packed/reach.h"
+#include "runtime/trace/packed/kernels/reach.h"
 
 /// How rays come from unit space into the grid of a tree that is placed there.
 namespace packtrace::packed {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "runtime/trace/packed/ray_group.h"
+#include "runtime/trace/packed/kernels/ray_group.h"
 
 /// A node's boxes against rays of one octant, with all of a node's work done once.
 namespace packtrace::packed {

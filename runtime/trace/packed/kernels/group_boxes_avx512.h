@@ -2,8 +2,8 @@
 
 #include <immintrin.h>
 
-#include "runtime/trace/packed/beam.h"
-#include "runtime/trace/packed/reach.h"
+#include "runtime/trace/packed/kernels/beam.h"
+#include "runtime/trace/packed/kernels/reach.h"
 
 /// The same with all planes of an axis in one register: each child's near plane and, negated, its far one, so that the
 /// larger parameter counts for both.

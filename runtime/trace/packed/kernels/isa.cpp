@@ -1,10 +1,10 @@
-#include "runtime/trace/packed/isa.h"
+#include "runtime/trace/packed/kernels/isa.h"
 
 #include <cstdlib>
 #include <string>
 #include <string_view>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 

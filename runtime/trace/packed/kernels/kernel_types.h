@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "compress/format/packed_node.h"
+#include "compress/format/layout/packed_node.h"
 
 /// What the traversal kernels read and write. Plain data: kernels are compiled once per instruction set, so nothing
 /// here may bring inline functions along that the linker could take from the wrong one.

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "runtime/trace/packed/batch_strips.h"
-#include "runtime/trace/packed/triangle_test.h"
+#include "runtime/trace/packed/kernels/batch_strips.h"
+#include "runtime/trace/packed/kernels/triangle_test.h"
 
 /// The triangles of a batch against the rays that come to their leaf: one ray and eight triangles in a register, as
 /// many rays as fit beside each other with eight or four triangles each, or a triangle and as many rays as there are

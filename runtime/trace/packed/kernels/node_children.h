@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "compress/format/packed_node.h"
+#include "compress/format/layout/packed_node.h"
 
 namespace packtrace::packed {
 namespace {

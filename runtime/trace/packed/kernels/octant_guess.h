@@ -1,6 +1,6 @@
 #pragma once
 
-#include "runtime/trace/packed/kernel_types.h"
+#include "runtime/trace/packed/kernels/kernel_types.h"
 
 namespace packtrace::packed {
 namespace {

@@ -3,8 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "runtime/trace/packed/kernel_types.h"
-#include "runtime/trace/packed/ray_vectors.h"
+#include "runtime/trace/packed/kernels/kernel_types.h"
+#include "runtime/trace/packed/kernels/ray_vectors.h"
 
 /// Rays in the coordinates of one tree, with what box and triangle tests need of them.
 namespace packtrace::packed {

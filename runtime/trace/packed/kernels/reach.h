@@ -1,6 +1,6 @@
 #pragma once
 
-#include "runtime/trace/packed/group_boxes.h"
+#include "runtime/trace/packed/kernels/group_boxes.h"
 
 /// What the rays of a group reach together. A node's boxes that lie outside are passed by none of them, and of those
 /// that are left, few of eight where many rays come, each is tested against a register of rays.

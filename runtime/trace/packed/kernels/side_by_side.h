@@ -1,6 +1,6 @@
 #pragma once
 
-#include "runtime/trace/packed/group_boxes.h"
+#include "runtime/trace/packed/kernels/group_boxes.h"
 
 /// Each box of a node against a register of neighbouring rays, in the place of each ray against eight boxes: the same
 /// arithmetic in other lanes.

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "runtime/trace/packed/ray_group.h"
+#include "runtime/trace/packed/kernels/ray_group.h"
 
 /// Eight triangles against a ray: Woop, Benthin, Wald, "Watertight ray/triangle intersection" (2013), with exact signs.
 ///

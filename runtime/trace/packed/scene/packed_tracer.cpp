@@ -1,17 +1,17 @@
-#include "runtime/trace/packed/packed_tracer.h"
+#include "runtime/trace/packed/scene/packed_tracer.h"
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 
-#include "compress/bvh/box_tree.h"
-#include "compress/format/position_grid.h"
+#include "compress/format/trees/box_tree.h"
+#include "compress/format/cluster/position_grid.h"
 #include "pbrt_import/scene/bounds.h"
-#include "pbrt_import/scene/error.h"
-#include "runtime/trace/alpha_filter.h"
-#include "runtime/trace/packed/thread_memory.h"
-#include "runtime/trace/packed/top_tree.h"
-#include "runtime/trace/packed/trace_cluster.h"
+#include "pbrt_import/base/error.h"
+#include "runtime/trace/source/alpha_filter.h"
+#include "runtime/trace/packed/scene/thread_memory.h"
+#include "runtime/trace/packed/scene/top_tree.h"
+#include "runtime/trace/packed/scene/trace_cluster.h"
 #include "runtime/trace/placement.h"
 
 namespace packtrace {

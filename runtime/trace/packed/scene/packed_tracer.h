@@ -2,9 +2,9 @@
 
 #include <memory>
 
-#include "compress/format/baked_file.h"
-#include "runtime/trace/packed/isa.h"
-#include "runtime/trace/packed/traced_trees.h"
+#include "compress/format/file/baked_file.h"
+#include "runtime/trace/packed/kernels/isa.h"
+#include "runtime/trace/packed/scene/traced_trees.h"
 #include "runtime/trace/ray_tracer.h"
 
 namespace packtrace {

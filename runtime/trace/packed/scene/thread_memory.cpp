@@ -1,4 +1,4 @@
-#include "runtime/trace/packed/thread_memory.h"
+#include "runtime/trace/packed/scene/thread_memory.h"
 
 #include <atomic>
 #include <cstddef>

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "runtime/trace/packed/kernel_types.h"
+#include "runtime/trace/packed/kernels/kernel_types.h"
 
 namespace packtrace {
 

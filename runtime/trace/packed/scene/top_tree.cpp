@@ -1,9 +1,9 @@
-#include "runtime/trace/packed/top_tree.h"
+#include "runtime/trace/packed/scene/top_tree.h"
 
 #include <algorithm>
 #include <bit>
 
-#include "compress/bvh/wide_tree.h"
+#include "compress/format/trees/wide_tree.h"
 
 namespace packtrace {
 namespace {

@@ -3,8 +3,8 @@
 #include <span>
 #include <vector>
 
-#include "compress/bvh/box_tree.h"
-#include "runtime/trace/packed/kernel_types.h"
+#include "compress/format/trees/box_tree.h"
+#include "runtime/trace/packed/kernels/kernel_types.h"
 
 namespace packtrace {
 

@@ -1,11 +1,11 @@
-#include "runtime/trace/packed/trace_cluster.h"
+#include "runtime/trace/packed/scene/trace_cluster.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "compress/format/bit_stream.h"
-#include "runtime/trace/packed/batch_decode.h"
+#include "compress/format/layout/bit_stream.h"
+#include "runtime/trace/packed/kernels/batch_decode.h"
 
 namespace packtrace {
 namespace {

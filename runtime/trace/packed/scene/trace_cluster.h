@@ -2,9 +2,9 @@
 
 #include <span>
 
-#include "compress/format/baked_file.h"
-#include "compress/format/packed_node.h"
-#include "runtime/trace/packed/kernel_types.h"
+#include "compress/format/file/baked_file.h"
+#include "compress/format/layout/packed_node.h"
+#include "runtime/trace/packed/kernels/kernel_types.h"
 
 namespace packtrace {
 

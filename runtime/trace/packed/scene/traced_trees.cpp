@@ -1,9 +1,9 @@
-#include "runtime/trace/packed/traced_trees.h"
+#include "runtime/trace/packed/scene/traced_trees.h"
 
 #include <algorithm>
 
 #include "runtime/stopwatch.h"
-#include "runtime/trace/packed/trace_cluster.h"
+#include "runtime/trace/packed/scene/trace_cluster.h"
 
 namespace packtrace {
 namespace {

@@ -4,11 +4,11 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/baked_file.h"
-#include "compress/format/packed_trees.h"
-#include "runtime/trace/lod_source.h"
-#include "runtime/trace/packed/kernel_types.h"
-#include "runtime/trace/packed/tree_hull.h"
+#include "compress/format/file/baked_file.h"
+#include "compress/format/trees/packed_trees.h"
+#include "runtime/trace/source/lod_source.h"
+#include "runtime/trace/packed/kernels/kernel_types.h"
+#include "runtime/trace/packed/scene/tree_hull.h"
 #include "runtime/trace/ray_tracer.h"
 
 namespace packtrace {

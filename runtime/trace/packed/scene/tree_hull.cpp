@@ -1,4 +1,4 @@
-#include "runtime/trace/packed/tree_hull.h"
+#include "runtime/trace/packed/scene/tree_hull.h"
 
 #include <algorithm>
 #include <cmath>

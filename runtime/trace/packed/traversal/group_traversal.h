@@ -1,12 +1,12 @@
 #pragma once
 
-#include "runtime/trace/packed/batch_decode.h"
-#include "runtime/trace/packed/beam.h"
-#include "runtime/trace/packed/enter.h"
-#include "runtime/trace/packed/leaf_tests.h"
-#include "runtime/trace/packed/node_children.h"
-#include "runtime/trace/packed/outside_search.h"
-#include "runtime/trace/packed/reach.h"
+#include "runtime/trace/packed/kernels/batch_decode.h"
+#include "runtime/trace/packed/kernels/beam.h"
+#include "runtime/trace/packed/kernels/enter.h"
+#include "runtime/trace/packed/kernels/leaf_tests.h"
+#include "runtime/trace/packed/kernels/node_children.h"
+#include "runtime/trace/packed/traversal/outside_search.h"
+#include "runtime/trace/packed/kernels/reach.h"
 
 /// Groups of rays through trees of nodes. They come to a node together, as one word of bits, and leave for each child
 /// those that pass its box: a node is read and set up once for all of them, and nothing waits for the outcome of one

@@ -1,8 +1,8 @@
-#include "runtime/trace/packed/batch_decode_avx512.h"
-#include "runtime/trace/packed/group_boxes_avx512.h"
-#include "runtime/trace/packed/lanes_avx2.h"
-#include "runtime/trace/packed/lanes_avx512.h"
-#include "runtime/trace/packed/traversal.h"
+#include "runtime/trace/packed/kernels/batch_decode_avx512.h"
+#include "runtime/trace/packed/kernels/group_boxes_avx512.h"
+#include "runtime/trace/packed/kernels/lanes_avx2.h"
+#include "runtime/trace/packed/kernels/lanes_avx512.h"
+#include "runtime/trace/packed/traversal/traversal.h"
 
 namespace packtrace::packed {
 namespace {

@@ -1,5 +1,5 @@
-#include "runtime/trace/packed/lanes_scalar.h"
-#include "runtime/trace/packed/traversal.h"
+#include "runtime/trace/packed/kernels/lanes_scalar.h"
+#include "runtime/trace/packed/traversal/traversal.h"
 
 namespace packtrace::packed {
 namespace {

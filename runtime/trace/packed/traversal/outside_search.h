@@ -1,7 +1,7 @@
 #pragma once
 
-#include "runtime/trace/packed/leaf_tests.h"
-#include "runtime/trace/packed/node_children.h"
+#include "runtime/trace/packed/kernels/leaf_tests.h"
+#include "runtime/trace/packed/kernels/node_children.h"
 
 /// Rays through a placed tree whose leaf nodes are found by KernelScene::search_tree instead of its inner nodes.
 namespace packtrace::packed {

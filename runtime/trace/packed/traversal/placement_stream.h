@@ -1,7 +1,7 @@
 #pragma once
 
-#include "runtime/trace/packed/group_traversal.h"
-#include "runtime/trace/packed/octant_guess.h"
+#include "runtime/trace/packed/traversal/group_traversal.h"
+#include "runtime/trace/packed/kernels/octant_guess.h"
 
 /// Many groups of rays through the tree over placements together, for scenes where few rays of a group come to the same
 /// placement: those that all groups send to one are grouped anew.

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "runtime/trace/packed/placement_stream.h"
+#include "runtime/trace/packed/traversal/placement_stream.h"
 
 /// The entry of each instruction set's kernels.
 namespace packtrace::packed {

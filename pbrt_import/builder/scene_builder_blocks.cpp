@@ -1,10 +1,10 @@
 // The part of SceneBuilder that keeps worlds, blocks, objects and instances.
 #include <algorithm>
 
-#include "pbrt_import/large_pages.h"
-#include "pbrt_import/scene/file_error.h"
-#include "pbrt_import/scene_builder.h"
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/text/large_pages.h"
+#include "pbrt_import/base/file_error.h"
+#include "pbrt_import/builder/scene_builder.h"
+#include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
 

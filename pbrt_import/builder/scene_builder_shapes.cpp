@@ -1,14 +1,14 @@
 // The part of SceneBuilder that turns Shape directives into shapes and, at the end, all of it into a Scene.
-#include "pbrt_import/scene_builder.h"
+#include "pbrt_import/builder/scene_builder.h"
 
 #include <algorithm>
 
-#include "pbrt_import/large_pages.h"
-#include "pbrt_import/problem_text.h"
-#include "pbrt_import/scene_pruning.h"
-#include "pbrt_import/shape_builder.h"
-#include "pbrt_import/tokenizer.h"
-#include "pbrt_import/transforms.h"
+#include "pbrt_import/text/large_pages.h"
+#include "pbrt_import/text/problem_text.h"
+#include "pbrt_import/builder/scene_pruning.h"
+#include "pbrt_import/builder/shape_builder.h"
+#include "pbrt_import/text/tokenizer.h"
+#include "pbrt_import/language/transforms.h"
 
 namespace packtrace {
 

@@ -1,8 +1,8 @@
-#include "compress/bake/lod/stored_lod_check.h"
+#include "compress/bake/write/stored_lod_check.h"
 
-#include "compress/bake/file_sections.h"
-#include "compress/format/cluster_validation.h"
-#include "compress/format/lod_validation.h"
+#include "compress/bake/write/file_sections.h"
+#include "compress/format/cluster/cluster_validation.h"
+#include "compress/format/file/lod_validation.h"
 
 namespace packtrace {
 namespace {

@@ -7,18 +7,18 @@
 #include <string_view>
 #include <vector>
 
-#include "pbrt_import/cameras.h"
-#include "pbrt_import/file_loader.h"
-#include "pbrt_import/file_names.h"
-#include "pbrt_import/graphics_state.h"
+#include "pbrt_import/language/cameras.h"
+#include "pbrt_import/builder/file_loader.h"
+#include "pbrt_import/language/file_names.h"
+#include "pbrt_import/language/graphics_state.h"
 #include "pbrt_import/import_scene.h"
-#include "pbrt_import/large_pages.h"
-#include "pbrt_import/materials.h"
-#include "pbrt_import/mesh_queue.h"
-#include "pbrt_import/parser.h"
-#include "pbrt_import/reporter.h"
-#include "pbrt_import/texture_graph.h"
-#include "pbrt_import/transforms.h"
+#include "pbrt_import/text/large_pages.h"
+#include "pbrt_import/language/materials.h"
+#include "pbrt_import/builder/mesh_queue.h"
+#include "pbrt_import/language/parser.h"
+#include "pbrt_import/text/reporter.h"
+#include "pbrt_import/language/texture_graph.h"
+#include "pbrt_import/language/transforms.h"
 
 namespace packtrace {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "pbrt_import/parameters.h"
+#include "pbrt_import/language/parameters.h"
 #include "pbrt_import/scene/scene.h"
 #include "pbrt_import/shapes/report.h"
 

@@ -1,12 +1,12 @@
-#include "pbrt_import/scene_builder.h"
+#include "pbrt_import/builder/scene_builder.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/textures.h"
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/language/textures.h"
+#include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
 namespace {

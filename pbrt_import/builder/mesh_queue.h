@@ -10,9 +10,9 @@
 
 #include <tbb/task_group.h>
 
-#include "pbrt_import/parameters.h"
-#include "pbrt_import/scene/diagnostics.h"
-#include "pbrt_import/shape_builder.h"
+#include "pbrt_import/language/parameters.h"
+#include "pbrt_import/base/diagnostics.h"
+#include "pbrt_import/builder/shape_builder.h"
 
 namespace packtrace {
 

@@ -1,9 +1,9 @@
-#include "pbrt_import/mesh_queue.h"
+#include "pbrt_import/builder/mesh_queue.h"
 
 #include <tbb/task_arena.h>
 
-#include "pbrt_import/problem_text.h"
-#include "pbrt_import/scene/memory_budget.h"
+#include "pbrt_import/text/problem_text.h"
+#include "pbrt_import/base/memory_budget.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
 
 namespace packtrace {

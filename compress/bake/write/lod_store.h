@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "compress/bake/lod/lod_encoder.h"
-#include "compress/bake/lod/stored_lod_check.h"
+#include "compress/bake/write/stored_lod_check.h"
 
 namespace packtrace {
 

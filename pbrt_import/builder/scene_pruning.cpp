@@ -1,4 +1,4 @@
-#include "pbrt_import/scene_pruning.h"
+#include "pbrt_import/builder/scene_pruning.h"
 
 #include <cstdint>
 #include <utility>

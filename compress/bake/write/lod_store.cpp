@@ -1,4 +1,4 @@
-#include "compress/bake/lod/lod_store.h"
+#include "compress/bake/write/lod_store.h"
 
 #include <cinttypes>
 #include <cstddef>
@@ -12,10 +12,10 @@
 
 #include <xxhash.h>
 
-#include "compress/format/section_file.h"
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/scene/file_bytes.h"
-#include "pbrt_import/scene/output_file.h"
+#include "compress/format/layout/section_file.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/base/file_bytes.h"
+#include "pbrt_import/base/output_file.h"
 
 namespace packtrace {
 namespace {

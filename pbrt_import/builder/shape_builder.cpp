@@ -1,4 +1,4 @@
-#include "pbrt_import/shape_builder.h"
+#include "pbrt_import/builder/shape_builder.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,14 +8,14 @@
 #include <string>
 #include <vector>
 
-#include "pbrt_import/scene/error.h"
+#include "pbrt_import/base/error.h"
 #include "pbrt_import/shapes/curve.h"
 #include "pbrt_import/shapes/heightfield.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
 #include "pbrt_import/shapes/nurbs.h"
 #include "pbrt_import/shapes/quadrics.h"
 #include "pbrt_import/shapes/subdivision.h"
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
 namespace {

@@ -1,4 +1,4 @@
-#include "pbrt_import/file_loader.h"
+#include "pbrt_import/builder/file_loader.h"
 
 #include <algorithm>
 #include <limits>
@@ -8,12 +8,12 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
-#include "pbrt_import/input_file.h"
-#include "pbrt_import/large_pages.h"
-#include "pbrt_import/ply.h"
-#include "pbrt_import/problem_text.h"
-#include "pbrt_import/scene/error.h"
-#include "pbrt_import/tokenizer.h"
+#include "pbrt_import/text/input_file.h"
+#include "pbrt_import/text/large_pages.h"
+#include "pbrt_import/files/ply.h"
+#include "pbrt_import/text/problem_text.h"
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
 namespace {
