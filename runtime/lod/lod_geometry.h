@@ -39,10 +39,10 @@ struct LodRanks {
 
 /// The LOD levels of one geometry, validated, with data for choosing detail.
 ///
-/// A group passes for a view if its coarser version is accurate enough. A cut is a set of passing groups that contains
-/// all groups below each of its groups; it consists of the clusters whose group does not pass and whose generating
-/// group passes or does not exist. All groups up to some error, which are the first ranks, always form a cut. Memory:
-/// about 70 bytes per group and 8 per cluster.
+/// A group passes for a view if its coarser version is accurate enough. A cut is given by its passing groups, which
+/// include all groups below each of them. Its clusters are those whose group does not pass and whose generating group
+/// passes or does not exist. All groups up to some error, which are the first ranks, always form a cut. Memory: about
+/// 70 bytes per group and 8 per cluster.
 class LodGeometry {
 public:
   /// Validates the records. Enlarges spheres that do not fully contain those of the groups below.

@@ -15,8 +15,8 @@ struct DetailView {
   double error_per_distance = 0.0; ///< allowed error per distance: the tangent of its angle
 };
 
-/// Converts pixels to a tangent; nothing else does. `error_px` is a radius: how far in pixels a surface may lie to
-/// either side of level 0, in the middle of the image. Towards the image's edges, the error in pixels is slightly
+/// The only place where pixels are converted to a tangent. `error_px` is a radius: how far in pixels a surface may lie
+/// to either side of level 0, in the middle of the image. Towards the image's edges, the error in pixels is slightly
 /// larger.
 ///   error_per_distance = error_px tan(fov_y / 2) / (height_px / 2)
 /// @param fov_y_rad full vertical field of view, in (0, pi)

@@ -24,7 +24,7 @@ public:
 
   /// Returns the first steps of the segments, ascending.
   /// @param room triangles that may be traced in addition
-  /// @param spent set to those that are
+  /// @param spent set to the triangles that are traced in addition
   std::vector<uint32_t> choose(uint64_t room, uint64_t& spent) {
     const size_t count = used_.size();
     if (count == 0) return {};
@@ -60,6 +60,7 @@ private:
   std::vector<uint64_t> count_{0}, triangles_{0}; ///< prefix sums
 };
 
+/// Chooses the steps to build and moves the users of all others to them.
 void leave_out_steps(std::span<const LodStep> steps, double limit, SharingBalance& balance) {
   balance.instead.resize(steps.size());
   std::iota(balance.instead.begin(), balance.instead.end(), 0u);

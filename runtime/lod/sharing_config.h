@@ -47,7 +47,7 @@ struct SharingConfig {
   /// Instances of a geometry with equal own cuts share one BLAS. Ignored for kPerInstance.
   bool share_equal_cuts = true;
 
-  /// Merges all own cuts of a geometry into one, in which the groups pass that pass in all of them. Leaves at most one
+  /// Merges all own cuts of a geometry into one: a group passes in it if it passes in all of them. Leaves at most one
   /// view-dependent BLAS per geometry, with more triangles.
   bool merge_own_cuts = false;
 

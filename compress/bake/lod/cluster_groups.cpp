@@ -138,6 +138,7 @@ std::vector<uint32_t> spatial_order(std::span<const DVec3> centers) {
   return order;
 }
 
+/// Grows groups one by one from clusters in Morton order, always adding the best neighbour.
 class Grouper {
 public:
   explicit Grouper(const ClusterRuns& clusters)

@@ -47,8 +47,8 @@ public:
     last_[point] = last;
   }
 
-  /// Appends all corners at `gone` to those at `kept`. Call for_each() for both points first: of removed triangles, the
-  /// lists may hold only those removed since.
+  /// Appends all corners at `gone` to those at `kept`. Corners of removed triangles may be among them until the next
+  /// for_each().
   void move_all(uint32_t gone, uint32_t kept) {
     if (first_[gone] == kNone) return;
     for (uint32_t corner = first_[gone]; corner != kNone; corner = next_[corner]) points_[corner] = kept;

@@ -74,6 +74,7 @@ private:
   size_t count_ = 0;
 };
 
+/// Implements bound_directly() for one group.
 class Tightener {
 public:
   Tightener(const DirectBoundInput& input, SimplifyMesh& mesh, SurfaceLinks& links)
@@ -126,8 +127,8 @@ private:
     return {in_.points[p.x], in_.points[p.y], in_.points[p.z]};
   }
 
-  /// Replaces numbers_ by the triangles one level below that they go back to, keeping those whose bounds, padded by
-  /// their error, overlap the box. Returns false and leaves numbers_ unchanged where no lower level is known.
+  /// Replaces numbers_ by the triangles one level below that they may stand for, keeping only triangles whose bounds,
+  /// padded by their error, overlap the box. Returns false and leaves numbers_ unchanged where no lower level is known.
   bool go_back(const DVec3& lo, const DVec3& hi) {
     below_.clear();
     for (const uint32_t number : numbers_)
@@ -296,6 +297,7 @@ private:
     return bound;
   }
 
+  /// Bounds a simplified triangle by subdivision against the triangles in numbers_.
   double measure_over_below(const Corners& corners) {
     TriangleSet& below = refiner_.begin();
     for (const uint32_t number : numbers_) below.add(corners_of(number), number);

@@ -25,9 +25,9 @@ struct DirectBoundInput {
 /// lower levels, in both directions, while that lowers the largest error.
 ///
 /// The part of the original surface that a source triangle stands for lies within the triangle's error on the
-/// lower-level triangles that it goes back to. Those are clipped to that neighbourhood and overlaid on the simplified
-/// surface. Simplified triangles are measured against all lower-level triangles that their linked source triangles go
-/// back to.
+/// lower-level triangles that it goes back to (TriangleHistory). These are clipped to that neighbourhood and overlaid
+/// on the simplified surface. Simplified triangles are measured against all lower-level triangles that their linked
+/// source triangles go back to.
 /// @param mesh the simplified mesh; its triangle errors are updated
 /// @param links from bound_errors(), with `after` numbering the triangles left in the mesh and bounds that include the
 /// errors of dropped pieces; more links are appended

@@ -47,8 +47,8 @@ struct SimplifiedGroup {
 };
 
 /// Simplifies a group to the given share of its triangles, as far as locked positions allow, and splits the result into
-/// clusters. Degenerate triangles are left out of the result; those that LineCover does not find count as source
-/// surface when errors are measured.
+/// clusters. Degenerate triangles are left out of the result; those not in LineCover count as source surface when
+/// errors are measured.
 SimplifiedGroup simplify_group(const LodGroupInput& input);
 
 } // namespace packtrace

@@ -13,7 +13,7 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kNone = ~0u;
-constexpr double kFewTimes = 3.0; // maximum cost of a piece, relative to the largest error before
+constexpr double kFewTimes = 3.0; // maximum cost of a piece, relative to the largest error of the input
 
 struct Piece {
   std::vector<uint32_t> triangles;
@@ -117,6 +117,7 @@ private:
     return std::sqrt(largest2);
   }
 
+  /// Finds the nearest triangle of the pieces with the nearest centres.
   Stand find_stand(uint32_t number) const {
     constexpr size_t kTried = 3; // number of pieces tried, those with the nearest centres
     std::array<std::pair<double, uint32_t>, kTried> nearest;

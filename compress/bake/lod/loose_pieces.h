@@ -11,13 +11,13 @@ namespace packtrace {
 /// When drop_loose_pieces() stops.
 struct DropTargets {
   uint32_t triangles = 0; ///< stops once this many triangles are left
-  /// Pieces that cost more than a few times the largest error before are dropped only while more triangles than this
+  /// Pieces that cost more than a few times the input's largest error are dropped only while more triangles than this
   /// are left. Other expensive pieces remain for coarser levels.
   uint32_t at_any_cost = 0;
 };
 
-/// What stands for a triangle after the drop: the triangle itself or, if it was dropped, one near it. Numbers triangles
-/// of the new mesh.
+/// What stands for a triangle after the drop: the triangle itself or, if it was dropped, one near it. Triangle numbers
+/// are those of the new mesh.
 struct TriangleStand {
   uint32_t triangle = 0;
   bool dropped = false;

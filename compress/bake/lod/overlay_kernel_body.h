@@ -122,6 +122,7 @@ struct Sides4 {
   out.l2 = __builtin_shufflevector(a, c, 2, 3, 6, 7), out.height = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
 
+/// Projects a point unless this task has done so, and returns its `outside` bits.
 [[gnu::always_inline]] inline uint32_t outside_of(const OverlayTask& task, uint32_t point) {
   if (task.stamps[point] == task.stamp) return task.outside[point];
   const double* p = task.points + uint64_t{3} * point;

@@ -94,7 +94,7 @@ private:
     return wedge;
   }
 
-  // ---- which edge goes next
+  // ---- order of collapses
 
   /// Updates an edge's ends to the points that they were merged into. Returns false if it can no longer collapse.
   bool follow(uint32_t edge) {

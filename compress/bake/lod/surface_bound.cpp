@@ -33,6 +33,7 @@ struct Claim {
   bool operator<(const Claim& o) const { return stated != o.stated ? stated < o.stated : index > o.index; }
 };
 
+/// Implements bound_errors() for one group.
 class Measurer {
 public:
   Measurer(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh)
@@ -80,6 +81,7 @@ private:
     bounds_[before] = std::max(bounds_[before], stated_error(distance, had(before)));
   }
 
+  /// Maps triangles that simplify() left unchanged to themselves.
   void find_unchanged() {
     for (uint32_t s = 0; s < errors_.size(); ++s) {
       const Triangle& now = m_.triangles[s].points;
@@ -91,6 +93,7 @@ private:
     }
   }
 
+  /// Finds the image of a source triangle or, without one, overlays it on the simplified surface.
   void lay_over_after(uint32_t t) {
     Laid laid{t, false, {}};
     mapped_[t] = images_.find(t, laid.image);

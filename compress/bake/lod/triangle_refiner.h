@@ -77,6 +77,7 @@ private:
     work_ += 3 * level.among->size();
   }
 
+  /// Bounds a part of the triangle, subdividing it while that helps. Calls noted() for the final parts.
   template <typename Enough, typename Noted>
   void cut(size_t depth, const std::array<size_t, 3>& corners, const Enough& enough, const Noted& noted) {
     const Level& level = levels_[depth];
