@@ -20,7 +20,7 @@ public:
   ImageCover(const SurfaceWalk& walk, TriangleImages& images, const SimplifyMesh& mesh)
       : walk_(walk), images_(images), mesh_(mesh) {}
 
-  /// Finds the parts.
+  /// Finds the parts of the simplified surface that no border crosses.
   /// @param mapped per source triangle: 1 if add() or add_unchanged() will be called for it
   void begin(std::span<const uint8_t> mapped);
   /// Adds the image of a mapped source triangle.

@@ -260,7 +260,7 @@ private:
     error_.proven = all ? std::max(before, std::min(least, stated_error(bound, had(t)))) : before;
   }
 
-  // ---- what images do not cover
+  // ---- simplified triangles that images do not cover
 
   void find_covered() {
     cover_.begin(mapped_);
