@@ -86,13 +86,13 @@ void BlasResidency::drop(BlasHandle handle) {
   frame_.dropped.push_back(handle);
 }
 
-/// What an instance uses whose BLAS is not there.
+/// The BLAS that an instance uses while its planned one is missing.
 BlasResidency::Substitute BlasResidency::substitute(const LodPlan& plan, uint32_t instance) const {
   const PlannedBlas& planned = plan.blas[plan.blas_of_instance[instance]];
   const double allowed = plan.allowed_error_of_instance[instance];
   const std::span<const LodStep> steps = sharing_.steps(planned.geometry);
   const BlasHandle* handles = &step_handles_[first_step_[planned.geometry]];
-  BlasHandle fine = kNoBlas, coarse = kNoBlas; // the coarsest that is fine enough, the finest that is not
+  BlasHandle fine = kNoBlas, coarse = kNoBlas; // coarsest that is fine enough, finest that is not
   const uint32_t coarsest = plan.step_of_instance[instance];
   for (uint32_t step = coarsest + 1; step-- > 0 && fine == kNoBlas;) fine = handles[step];
   for (uint32_t step = coarsest + 1; step < steps.size() && coarse == kNoBlas; ++step) coarse = handles[step];
@@ -125,7 +125,7 @@ void BlasResidency::build_missing(const LodPlan& plan) {
       residents_[wanted_[i]].last_used = number_;
     }
   }
-  if (triangles > config_.triangles_per_frame) { // not all: those first that are missed most
+  if (triangles > config_.triangles_per_frame) { // over budget: builds with the largest error ratio first
     std::vector<double> ratios(plan.blas.size(), 1.0);
     for (uint32_t i = 0; i < plan.blas_of_instance.size(); ++i)
       if (const uint32_t planned = plan.blas_of_instance[i]; wanted_[planned] == kNoBlas)
@@ -138,7 +138,7 @@ void BlasResidency::build_missing(const LodPlan& plan) {
   }
   for (const Missing& m : missing_) {
     const PlannedBlas& planned = plan.blas[m.planned];
-    const BlasHandle same = find(plan, planned); // cuts of two instances may be equal
+    const BlasHandle same = find(plan, planned); // own cuts of two instances may be equal
     const bool fits =
         frame_.built.empty() || (frame_.built_triangles <= config_.triangles_per_frame &&
                                  planned.triangles <= config_.triangles_per_frame - frame_.built_triangles);
@@ -183,7 +183,8 @@ const ResidencyFrame& BlasResidency::update(const LodPlan& plan) {
   if (plan.blas_of_instance.size() != previous_.size())
     throw Error(ErrorKind::kUsage, "residency of levels of detail: a plan for other instances");
   ++number_;
-  free_.insert(free_.end(), frame_.dropped.begin(), frame_.dropped.end()); // not in the frame that drops them
+  // handles are not reused in the frame that drops them
+  free_.insert(free_.end(), frame_.dropped.begin(), frame_.dropped.end());
   frame_.built.clear();
   frame_.dropped.clear();
   frame_.built_triangles = frame_.waiting_builds = frame_.waiting_instances = frame_.coarse_instances = 0;

@@ -36,7 +36,7 @@ BlasBuffer BlasCompactor::allocate(uint64_t bytes) {
 }
 
 void BlasCompactor::release_later(BlasBuffer buffer, uint64_t bytes) {
-  releases_.push_back({frame_ + config_.frames_in_flight, buffer, bytes}); // this frame may use it still
+  releases_.push_back({frame_ + config_.frames_in_flight, buffer, bytes}); // this frame may still use it
 }
 
 void BlasCompactor::begin_frame() {
@@ -56,7 +56,7 @@ void BlasCompactor::measure() {
     building_.pop_front();
     const auto at = entries_.find(blas);
     if (at == entries_.end() || at->second.built_frame != built || at->second.state != BlasMemoryState::kBuilding)
-      continue; // removed since
+      continue; // removed in the meantime
     Entry& e = at->second;
     e.compacted = backend_.compacted_bytes(blas);
     const double kept = (1.0 - config_.smallest_saving) * static_cast<double>(e.bytes);
@@ -72,7 +72,7 @@ void BlasCompactor::copy() {
     const auto [blas, built] = measured_.front();
     const auto at = entries_.find(blas);
     if (at == entries_.end() || at->second.built_frame != built || at->second.state != BlasMemoryState::kMeasured) {
-      measured_.pop_front(); // removed since
+      measured_.pop_front(); // removed in the meantime
       continue;
     }
     Entry& e = at->second;

@@ -48,7 +48,7 @@ CutCount count_cut(const LodGeometry& geometry, const InstanceMetric& metric, co
 
 namespace {
 
-/// Visits the ranks of the bits that are set, ascending.
+/// Calls visit(rank) for each set bit, ascending.
 template <typename Visit>
 void for_each_passed(std::span<const uint64_t> passed, const Visit& visit) {
   for (size_t word = 0; word < passed.size(); ++word)

@@ -12,7 +12,7 @@ namespace packtrace {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-constexpr double kInflation = 1.0 + 0x1p-40; // of balls around balls: more than rounding can take away
+constexpr double kInflation = 1.0 + 0x1p-40; // of bounding spheres, to cover rounding errors
 
 [[noreturn]] void reject(const std::string& why) { throw Error(ErrorKind::kInput, "levels of detail: " + why); }
 
@@ -20,7 +20,7 @@ bool terminal(const baked::LodGroupRecord& group) { return std::isinf(group.erro
 
 DVec3 center_of(const baked::LodGroupRecord& g) { return {g.center[0], g.center[1], g.center[2]}; }
 
-/// About the middle of the balls' box.
+/// A sphere around the spheres, centred in their bounding box.
 LodBall enclose(std::span<const LodBall> balls) {
   DVec3 lo(kInfinite), hi(-kInfinite);
   for (const LodBall& b : balls) lo = glm::min(lo, b.center - b.radius), hi = glm::max(hi, b.center + b.radius);
@@ -83,7 +83,7 @@ void LodGeometry::check_links(std::span<const baked::LodGroupRecord> groups) {
 
 void LodGeometry::enlarge_balls(std::span<const baked::LodGroupRecord> groups) {
   for (const baked::LodGroupRecord& g : groups) balls_.push_back({center_of(g), g.radius * kInflation});
-  // Links by level of their group, so that what is below is done.
+  // In order of level, so that the groups below are done first.
   std::vector<uint32_t> order(links_.size());
   std::iota(order.begin(), order.end(), 0u);
   std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
@@ -189,7 +189,7 @@ std::vector<LodStep> ratio_steps(const LodGeometry& geometry, double ratio) {
   const uint32_t count = geometry.rank_count();
   std::vector<LodStep> steps{step_of_prefix(geometry, geometry.ranks_up_to(0.0))};
   for (uint32_t passed = steps[0].passed; passed < count;) {
-    passed = geometry.ranks_up_to(geometry.ranks().error[passed]); // equal errors pass together
+    passed = geometry.ranks_up_to(geometry.ranks().error[passed]); // groups of equal error pass together
     const auto triangles = static_cast<double>(geometry.triangles_of_prefix(passed));
     if (passed == count || triangles * ratio <= static_cast<double>(steps.back().triangles))
       steps.push_back(step_of_prefix(geometry, passed));

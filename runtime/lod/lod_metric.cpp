@@ -7,11 +7,12 @@
 namespace packtrace {
 namespace {
 
-constexpr double kLargest = 1e100; // squares of coordinates stay finite
+constexpr double kLargest = 1e100; // keeps squares of coordinates finite
 constexpr double kSmallestStretch = 1e-300;
 
-/// Largest eigenvalue of a symmetric matrix that has none below 0, by its characteristic polynomial's trigonometric
-/// roots. Source: O. K. Smith, Eigenvalues of a symmetric 3 x 3 matrix, CACM 4(4), 1961.
+/// Largest eigenvalue of a positive semidefinite symmetric matrix, by the trigonometric solution of its characteristic
+/// polynomial.
+/// Source: O. K. Smith, Eigenvalues of a symmetric 3 x 3 matrix, CACM 4(4), 1961.
 double largest_eigenvalue(const glm::dmat3& a) {
   const double mean = (a[0][0] + a[1][1] + a[2][2]) / 3.0;
   const double off = a[1][0] * a[1][0] + a[2][0] * a[2][0] + a[2][1] * a[2][1];
@@ -47,7 +48,8 @@ double largest_stretch(const DAffine& world_from_object) {
       if (column < 3) largest = std::max(largest, value);
     }
   if (largest == 0.0) return kSmallestStretch;
-  const glm::dmat3 linear = glm::dmat3(world_from_object) / largest; // squares neither overflow nor vanish
+  // scaled so that squares neither overflow nor underflow
+  const glm::dmat3 linear = glm::dmat3(world_from_object) / largest;
   const double stretch = largest * std::sqrt(largest_eigenvalue(glm::transpose(linear) * linear));
   return std::max(kSmallestStretch, stretch * (1.0 + 1e-7));
 }

@@ -12,7 +12,7 @@ namespace {
 
 constexpr uint32_t kSlotsPerBlock = 512;
 constexpr uint32_t kNone = ~0u;
-constexpr uint32_t kOfProvider = ~0u; // of blas_of_slot_, until the provider's is known
+constexpr uint32_t kOfProvider = ~0u; // in blas_of_slot_, until the provider's BLAS is known
 
 } // namespace
 
@@ -87,7 +87,7 @@ LodSharing::Need LodSharing::need(const Frame& frame, const LodGeometry& geometr
   };
   evaluate();
   if (culled && config_.culled_coarser_levels > 0 && need.range.min < geometry.last_level()) {
-    // As if it might have the error of the discrete level that many levels up.
+    // Allows the error of the discrete level that many levels up.
     const uint32_t level = std::min(geometry.last_level(), need.range.min + config_.culled_coarser_levels);
     const double one = allowed_errors(near, 1.0, distance, ball.stretch, radius).near;
     need.error_per_distance = std::max(need.error_per_distance, geometry.levels()[level].error / one * (1.0 + 0x1p-30));
@@ -103,15 +103,15 @@ InstanceMetric LodSharing::metric(const Frame& frame, const LodGeometry& geometr
   return {view, transforms_[slot], slots_[slot].ball.stretch, geometry.reach()};
 }
 
-/// Shared or own, and which step, of schemes whose shared BLASes are steps. @param fine_step of what passes
-/// for sure; becomes the coarsest that has detail enough
+/// Chooses between a shared step and an own cut, for schemes whose shared BLASes are steps.
+/// @param fine_step coarsest step that passes for sure; set to the coarsest step that is fine enough
 void LodSharing::choose_step(const Frame& frame, uint32_t number, size_t slot, const Need& need, Choice& choice,
                              uint32_t& fine_step) const {
   const LodGeometry& geometry = geometries_[number];
   const std::span<const LodStep> steps = steps_[number];
   const auto last = static_cast<uint32_t>(steps.size()) - 1;
   choice.step = fine_step;
-  // Its own cut has no fewer triangles than what all groups that might pass leave.
+  // Lower bound of its own cut's triangles: those left if all undecided groups pass.
   choice.own_triangles =
       std::min(steps[choice.step].triangles, geometry.triangles_of_prefix(geometry.ranks_up_to(need.allowed.far)));
   if (choice.own_triangles < steps[choice.step].triangles) {
@@ -122,7 +122,7 @@ void LodSharing::choose_step(const Frame& frame, uint32_t number, size_t slot, c
   fine_step = choice.step;
   const uint32_t stride = config_.tolerant_levels + 1;
   choice.step += config_.tolerant_levels;
-  choice.step = choice.step >= last ? last : choice.step / stride * stride; // only every stride-th is built
+  choice.step = choice.step >= last ? last : choice.step / stride * stride; // only every stride-th step is built
   const auto shared = static_cast<double>(steps[choice.step].triangles);
   if (choice.step < last && (need.range.min + config_.shared_levels < geometry.levels().size() ||
                              shared > config_.own_cut_ratio * static_cast<double>(choice.own_triangles)))
@@ -211,7 +211,7 @@ void LodSharing::fill_histogram(uint32_t geometry, LevelHistogram& histogram) co
   }
 }
 
-/// Few builds within SharingConfig::traced_ratio.
+/// Reduces the number of builds within SharingConfig::traced_ratio.
 void LodSharing::balance(uint32_t geometry) {
   const std::span<const LodStep> steps = steps_[geometry];
   Part& part = parts_[geometry];
@@ -247,7 +247,7 @@ void LodSharing::add_steps(uint32_t geometry) {
     if (part.users[step] == 0) continue;
     const BlasKind kind = step + 1 == steps.size() ? BlasKind::kLowest : BlasKind::kStep;
     part.blas.push_back({geometry, kind, step, steps[step].clusters, steps[step].triangles, 0, part.users[step]});
-    part.users[step] = static_cast<uint32_t>(part.blas.size()) - 1; // from here on: where it is
+    part.users[step] = static_cast<uint32_t>(part.blas.size()) - 1; // from here on: index in part.blas
   }
   std::vector<bool> provided(part.blas.size());
   for (uint32_t slot = first_slot_[geometry]; slot < first_slot_[geometry + 1]; ++slot) {
@@ -261,7 +261,8 @@ void LodSharing::add_steps(uint32_t geometry) {
   }
 }
 
-/// The published scheme: from the finest level on, the first at which some instance ends lends to all that start there.
+/// The published scheme: the first level, from the finest, at which the range of some instance ends. That instance
+/// provides for all whose range starts there or coarser.
 /// @return the provider's slot, or kNone
 uint32_t LodSharing::choose_provider(uint32_t geometry, const LevelHistogram& histogram) {
   const auto level_count = static_cast<uint32_t>(geometries_[geometry].levels().size());
@@ -321,7 +322,7 @@ void LodSharing::add_own_cuts(const Frame& frame, uint32_t number) {
   }
 }
 
-/// Puts the geometries' parts one after the other.
+/// Concatenates the parts of all geometries.
 void LodSharing::collect(LodPlan& plan) {
   plan.blas.clear();
   plan.passed.clear();
@@ -341,7 +342,7 @@ void LodSharing::collect(LodPlan& plan) {
     }
     plan.passed.insert(plan.passed.end(), parts_[g].passed.begin(), parts_[g].passed.end());
   }
-  std::vector<std::array<uint64_t, 5>> counts(blocks_.size()); // by category, then own triangles
+  std::vector<std::array<uint64_t, 5>> counts(blocks_.size()); // per category, then own triangles
   tbb::parallel_for(size_t{0}, blocks_.size(), [&](size_t b) {
     counts[b] = {};
     for (uint32_t slot = blocks_[b].first; slot < blocks_[b].last; ++slot) {

@@ -11,7 +11,7 @@
 
 namespace packtrace {
 
-/// One placement of a geometry.
+/// An instance of a geometry.
 struct LodInstance {
   uint32_t geometry = 0;
   DAffine world_from_object{1.0};
@@ -20,65 +20,67 @@ struct LodInstance {
 inline constexpr uint32_t kMaxLodInstances = 1u << 27;
 
 enum class BlasKind : uint8_t {
-  kLowest, ///< the coarsest cut: every geometry has it from the start
-  kStep,   ///< a step of the geometry, whatever the view
+  kLowest, ///< the coarsest cut; every geometry has it from the start
+  kStep,   ///< a view-independent step of the geometry
   kOwn,    ///< a cut for this view
 };
 
-/// One bottom-level structure that a plan wants.
+/// A BLAS that a plan requires.
 struct PlannedBlas {
   uint32_t geometry = 0;
   BlasKind kind = BlasKind::kLowest;
-  uint32_t index = 0; ///< of LodSharing::steps(); kOwn: the first instance that uses it
+  uint32_t index = 0; ///< index in LodSharing::steps(); for kOwn, the first instance that uses it
   uint32_t clusters = 0;
   uint64_t triangles = 0;
-  uint64_t first_word = 0; ///< kOwn: of LodPlan::passed, cut_words() of them
-  uint32_t users = 0;      ///< instances
+  uint64_t first_word = 0; ///< kOwn: index in LodPlan::passed of its cut_words() words
+  uint32_t users = 0;      ///< number of instances
 };
 
-/// How an instance came to its BLAS.
+/// How an instance got its BLAS.
 enum class InstanceCategory : uint8_t {
-  kLowest,   ///< its coarsest cut will do
-  kProvider, ///< the first to use a BLAS that others may share
-  kShares,   ///< uses another's
-  kOwn,      ///< has a cut for itself
+  kLowest,   ///< the coarsest cut is fine enough
+  kProvider, ///< first to use a BLAS that others may share
+  kShares,   ///< uses another instance's BLAS
+  kOwn,      ///< has its own cut
 };
 
-/// How many instances of one geometry can start and end at each level.
+/// Histogram of the level ranges of one geometry's instances.
 struct LevelHistogram {
-  std::array<uint32_t, baked::kMaxLodLevels> starts{}; ///< by LodRange::min
-  std::array<uint32_t, baked::kMaxLodLevels> ends{};   ///< by LodRange::max
-  /// Of those that end there: the largest of min << 27 | instance, so the one nearest to that level, and of several the
-  /// same one each time. 0 if none.
+  std::array<uint32_t, baked::kMaxLodLevels> starts{}; ///< per level: instances with this LodRange::min
+  std::array<uint32_t, baked::kMaxLodLevels> ends{};   ///< per level: instances with this LodRange::max
+  /// Per level: the maximum of min << 27 | instance over the instances with this LodRange::max, so the one with the
+  /// largest min; ties are resolved the same way in every frame. 0 if there are none.
   std::array<uint32_t, baked::kMaxLodLevels> provider{};
 };
 
-/// Which BLASes there should be for a view, and who uses which.
+/// The BLASes needed for a view, and the BLAS of each instance.
 struct LodPlan {
-  std::vector<PlannedBlas> blas; ///< by geometry; of one: steps from fine to coarse, then own cuts by instance
-  std::vector<uint64_t> passed;  ///< of own cuts
+  /// sorted by geometry; within one, steps from fine to coarse, then own cuts by instance
+  std::vector<PlannedBlas> blas;
+  std::vector<uint64_t> passed; ///< bits of all own cuts
   std::vector<uint32_t> blas_of_instance;
   std::vector<InstanceCategory> category_of_instance;
   std::vector<double> allowed_error_of_instance; ///< all groups up to this error pass; object units
-  std::vector<uint32_t> step_of_instance;        ///< the coarsest one that has detail enough, used or not
-  std::vector<LevelHistogram> histograms;        ///< by geometry; with kOneProvider or SharingConfig::measure only
-  std::array<uint64_t, 4> category_counts{};     ///< by InstanceCategory
-  uint64_t builds = 0;                           ///< BLASes that are not kLowest
+  std::vector<uint32_t> step_of_instance;        ///< the coarsest step that is fine enough, used or not
+  std::vector<LevelHistogram> histograms;        ///< per geometry; only with kOneProvider or SharingConfig::measure
+  std::array<uint64_t, 4> category_counts{};     ///< per InstanceCategory
+  uint64_t builds = 0;                           ///< number of BLASes other than kLowest
   uint64_t built_triangles = 0, built_clusters = 0;
-  uint64_t traced_triangles = 0; ///< over instances, of the BLAS each uses
-  uint64_t own_triangles = 0;    ///< over instances, of the cut each would have alone; with SharingConfig::measure only
+  uint64_t traced_triangles = 0; ///< sum over instances, of the BLAS each uses
+  uint64_t own_triangles = 0;    ///< sum over instances, of each one's own cut; only with SharingConfig::measure
 };
 
-/// The groups that pass in a planned BLAS.
+/// The groups that pass in a planned BLAS, as cut_words() words.
 std::vector<uint64_t> passed_of_blas(const LodGeometry& geometry, std::span<const LodStep> steps, const LodPlan& plan,
                                      const PlannedBlas& blas);
 
-/// Chooses the detail of many instances, frame by frame. Same plan for any number of threads, and whatever came before.
+/// Chooses the detail of many instances per frame. The plan depends on neither the number of threads nor earlier
+/// frames.
 class LodSharing {
 public:
-  /// @param geometries must outlive it
-  /// Throws Error(kUsage) for a bad config, Error(kInput) for an instance of no geometry or with a transform that is
-  /// not finite, Error(kLimitExceeded) for kMaxLodInstances or more.
+  /// @param geometries must outlive this object
+  /// Throws Error(kUsage) for an invalid config, Error(kInput) for an instance without geometry or with a transform
+  /// that is not finite, and Error(kLimitExceeded) for kMaxLodInstances or more.
   LodSharing(std::span<const LodGeometry> geometries, std::span<const LodInstance> instances,
              const SharingConfig& config);
 
@@ -86,15 +88,16 @@ public:
   const SharingConfig& config() const { return config_; }
   std::span<const LodGeometry> geometries() const { return geometries_; }
   uint32_t geometry_of_instance(uint32_t instance) const { return geometry_of_instance_[instance]; }
-  /// Of a geometry, fine to coarse: of its levels, or with kSteps of ratios.
+  /// The shared steps of a geometry, fine to coarse: ratio_steps() with kSteps, level_steps() otherwise.
   std::span<const LodStep> steps(uint32_t geometry) const { return steps_[geometry]; }
 
-  /// Throws as the constructor. The number of the instance must be in range.
+  /// Throws as the constructor does. The instance number must be in range.
   void set_transform(uint32_t instance, const DAffine& world_from_object);
 
-  /// @param culled a byte an instance, not 0 for those without primary visibility; or empty
-  /// @param plan is overwritten; its memory is used again
-  /// Throws Error(kUsage) if `culled` has another size.
+  /// Plans one frame.
+  /// @param culled one byte per instance, nonzero if it has no primary visibility; or empty
+  /// @param plan overwritten; its memory is reused
+  /// Throws Error(kUsage) if `culled` has the wrong size.
   void plan(const DetailView& view, std::span<const uint8_t> culled, LodPlan& plan);
   LodPlan plan(const DetailView& view, std::span<const uint8_t> culled = {}) {
     LodPlan result;
@@ -107,33 +110,33 @@ private:
     uint32_t instance = 0;
     InstanceBall ball;
   };
-  /// What one instance may have in a view.
+  /// The detail that one instance needs in a view.
   struct Need {
     double error_per_distance = 0.0;
     AllowedErrors allowed;
     LodRange range;
   };
   struct Choice {
-    uint64_t own_triangles = 0; ///< of its own cut, or fewer where that does not matter
+    uint64_t own_triangles = 0; ///< of its own cut, or a sufficient lower bound
     uint32_t step = 0;
     uint8_t min_level = 0, max_level = 0;
     InstanceCategory category = InstanceCategory::kLowest;
   };
   struct Block {
-    uint32_t geometry, first, last; ///< slots
+    uint32_t geometry, first, last; ///< range of slots
   };
-  /// What one geometry adds to the plan.
+  /// One geometry's part of the plan.
   struct Part {
     std::vector<PlannedBlas> blas;
     std::vector<uint64_t> passed;
-    std::vector<uint32_t> users; ///< by step
+    std::vector<uint32_t> users; ///< per step
     std::vector<uint32_t> own;   ///< slots
     std::vector<OwnCutSaving> savings;
   };
   struct Frame {
     DetailView view;
     std::span<const uint8_t> culled;
-    bool ranges; ///< ends of ranges are asked for
+    bool ranges; ///< whether LodRange::max is needed
   };
 
   Need need(const Frame& frame, const LodGeometry& geometry, size_t slot) const;
@@ -152,14 +155,14 @@ private:
   std::span<const LodGeometry> geometries_;
   SharingConfig config_;
   std::vector<std::vector<LodStep>> steps_;
-  std::vector<Slot> slots_; ///< instances by geometry
+  std::vector<Slot> slots_; ///< instances sorted by geometry
   std::vector<DAffine> transforms_;
   std::vector<uint32_t> slot_of_instance_, geometry_of_instance_;
-  std::vector<uint32_t> first_slot_; ///< of each geometry, and the end
+  std::vector<uint32_t> first_slot_; ///< per geometry, plus an end marker
   std::vector<Block> blocks_;
-  // Of the plan being made.
+  // Of the current plan.
   std::vector<Choice> choices_;
-  std::vector<uint32_t> blas_of_slot_; ///< within its geometry's part
+  std::vector<uint32_t> blas_of_slot_; ///< index in its geometry's part
   std::vector<Part> parts_;
 };
 

@@ -6,14 +6,15 @@
 namespace packtrace {
 namespace {
 
-constexpr size_t kTries = 8; // numbers of own cuts tried beyond those that the limit asks for
+constexpr size_t kTries = 8; // numbers of own cuts tried beyond the smallest that meets the limit
 
-/// Which of the steps in use are built. Users of a step take the finest of the segment it is in, so by dynamic
-/// programming over ends of segments: the least triangles with one segment, two, ... until they are within the limit.
+/// Chooses which of the used steps are built. Steps are partitioned into segments whose users all take the finest step
+/// of the segment. Dynamic programming over segment ends finds the fewest triangles for one segment, two, ... until the
+/// limit is met.
 class StepChooser {
 public:
   StepChooser(std::span<const LodStep> steps, std::span<const uint32_t> users) : steps_(steps) {
-    for (uint32_t step = 0; step + 1 < steps.size(); ++step) { // the last needs no build
+    for (uint32_t step = 0; step + 1 < steps.size(); ++step) { // the last step needs no build
       if (users[step] == 0) continue;
       used_.push_back(step);
       count_.push_back(count_.back() + users[step]);
@@ -21,11 +22,13 @@ public:
     }
   }
 
-  /// First steps of the segments, ascending. @param room triangles that may be traced on top, at least 0
+  /// Returns the first steps of the segments, ascending.
+  /// @param room triangles that may be traced in addition
+  /// @param spent set to the triangles that are traced in addition
   std::vector<uint32_t> choose(uint64_t room, uint64_t& spent) {
     const size_t count = used_.size();
     if (count == 0) return {};
-    std::vector<uint64_t> extra(count + 1), before(count + 1); // by how many steps are covered
+    std::vector<uint64_t> extra(count + 1), before(count + 1); // per number of steps covered
     for (size_t end = 1; end <= count; ++end) extra[end] = cost(0, end);
     std::vector<std::vector<uint32_t>> first{std::vector<uint32_t>(count + 1)}; // of the last segment
     while (extra[count] > room) {
@@ -47,16 +50,17 @@ public:
   }
 
 private:
-  /// Triangles on top if the users of [begin, end) take the first of them.
+  /// Additional triangles if the users of used steps [begin, end) take the first of them.
   uint64_t cost(size_t begin, size_t end) const {
     return steps_[used_[begin]].triangles * (count_[end] - count_[begin]) - (triangles_[end] - triangles_[begin]);
   }
 
   std::span<const LodStep> steps_;
   std::vector<uint32_t> used_;
-  std::vector<uint64_t> count_{0}, triangles_{0}; ///< sums over those before
+  std::vector<uint64_t> count_{0}, triangles_{0}; ///< prefix sums
 };
 
+/// Chooses the steps to build and moves the users of all others to them.
 void leave_out_steps(std::span<const LodStep> steps, double limit, SharingBalance& balance) {
   balance.instead.resize(steps.size());
   std::iota(balance.instead.begin(), balance.instead.end(), 0u);

@@ -16,9 +16,9 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kNone = ~0u;
-constexpr uint32_t kFewClusters = kGroupTargetClusters / 3; // groups below that join another where they can
+constexpr uint32_t kFewClusters = kGroupTargetClusters / 3; // smaller groups join a neighbour if possible
 
-/// A side of a triangle on a cluster's border.
+/// A triangle side on the border of a cluster.
 struct BorderEdge {
   uint32_t a, b, cluster;
   bool operator<(const BorderEdge& o) const { return std::tie(a, b, cluster) < std::tie(o.a, o.b, o.cluster); }
@@ -26,7 +26,7 @@ struct BorderEdge {
 
 uint32_t begin_of(std::span<const uint32_t> ends, uint32_t i) { return i == 0 ? 0 : ends[i - 1]; }
 
-/// Finds the borders of one cluster after another.
+/// Finds the border edges of clusters, one cluster per append().
 class BorderFinder {
 public:
   explicit BorderFinder(const ClusterRuns& clusters) : clusters_(clusters) {}
@@ -46,7 +46,7 @@ public:
 
 private:
   struct Edge {
-    uint32_t a = 0, b = 0, cluster = kNone; ///< empty where it is another cluster's
+    uint32_t a = 0, b = 0, cluster = kNone; ///< slots of other clusters count as empty
     bool once = true;
   };
 
@@ -66,7 +66,7 @@ private:
 
   const ClusterRuns& clusters_;
   std::vector<Edge> slots_;
-  std::vector<uint32_t> found_; ///< slots of the cluster at hand
+  std::vector<uint32_t> found_; ///< slots of the current cluster
 };
 
 std::vector<BorderEdge> border_edges(const ClusterRuns& clusters) {
@@ -84,12 +84,12 @@ std::vector<BorderEdge> border_edges(const ClusterRuns& clusters) {
   return edges;
 }
 
-/// Neighbours of each cluster with the number of edges in common.
+/// The neighbours of each cluster, with the number of common edges.
 struct Adjacency {
   struct Link {
     uint32_t cluster, edges;
   };
-  std::vector<uint32_t> first; ///< of links, per cluster, and one more
+  std::vector<uint32_t> first; ///< per cluster: index of its first link; plus an end marker
   std::vector<Link> links;
   std::span<const Link> of(uint32_t cluster) const {
     return std::span(links).subspan(first[cluster], first[cluster + 1] - first[cluster]);
@@ -97,7 +97,7 @@ struct Adjacency {
 };
 
 Adjacency find_adjacency(const ClusterRuns& clusters) {
-  constexpr size_t kMostSharers = 8; // an edge of more clusters than that joins only the first of them
+  constexpr size_t kMostSharers = 8; // of edges with more clusters, only the first ones are linked
   const std::vector<BorderEdge> edges = border_edges(clusters);
   std::vector<std::pair<uint32_t, uint32_t>> pairs;
   for (size_t i = 0, next; i < edges.size(); i = next) {
@@ -138,6 +138,7 @@ std::vector<uint32_t> spatial_order(std::span<const DVec3> centers) {
   return order;
 }
 
+/// Grows groups one by one from clusters in Morton order, always adding the best neighbour.
 class Grouper {
 public:
   explicit Grouper(const ClusterRuns& clusters)
@@ -184,7 +185,7 @@ private:
     if (sizes_[group] < kFewClusters) join_neighbour(group);
   }
 
-  /// No member has a neighbour outside: nothing is lost by going on elsewhere.
+  /// Whether no member has a neighbour outside the group. Then the group can continue at any free cluster.
   bool isolated() const {
     return std::all_of(members_.begin(), members_.end(), [&](uint32_t cluster) {
       const auto links = adjacency_.of(cluster);
@@ -204,7 +205,7 @@ private:
     }
   }
 
-  /// The cluster whose border lies most within the group.
+  /// The frontier cluster with the largest share of its border in the group.
   uint32_t pick() {
     uint32_t best = kNone;
     double best_share = -1.0;
@@ -222,7 +223,7 @@ private:
     return best;
   }
 
-  /// A small group becomes part of the one it shares the longest border with, of those with room.
+  /// Merges a small group into the one with the longest common border, among those with room.
   void join_neighbour(uint32_t group) {
     std::vector<std::pair<uint32_t, uint32_t>> shared; // group, edges
     for (const uint32_t cluster : members_)
@@ -254,7 +255,7 @@ private:
 
   Adjacency adjacency_;
   std::vector<uint32_t> order_, group_of_, weight_, total_, sizes_;
-  std::vector<uint32_t> members_, frontier_; // of the group that grows
+  std::vector<uint32_t> members_, frontier_; // of the growing group
   size_t cursor_ = 0;
 };
 

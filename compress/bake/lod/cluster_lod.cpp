@@ -16,16 +16,17 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kNone = ~0u;
-constexpr double kKept = 0.47; // of the triangles, by one level
-// The last few hundred triangles go faster: each level has records of its own, which would take more than its clusters.
+constexpr double kKept = 0.47; // share of the triangles that a level keeps
+// The last few hundred triangles are reduced faster: each level adds records that would take more space than its
+// clusters.
 constexpr uint64_t kFewTriangles = 512;
 constexpr double kKeptOfFew = 0.25;
-constexpr uint64_t kCoarsest = 16;        // levels of so few triangles have none above them
-constexpr double kInflation = 1.0 + 1e-6; // of spheres around spheres: more than roundings can shrink them
+constexpr uint64_t kCoarsest = 16;        // levels with at most this many triangles are the last
+constexpr double kInflation = 1.0 + 1e-6; // of bounding spheres, to cover rounding errors
 
 double distance(DVec3 a, DVec3 b) { return glm::length(a - b); }
 
-/// A ball around balls: about the middle of their boxes.
+/// A sphere that contains all spheres, centred in their common bounding box.
 LodSphere enclose(std::span<const LodSphere> spheres) {
   DVec3 lo(std::numeric_limits<double>::infinity()), hi(-lo);
   for (const LodSphere& s : spheres) lo = glm::min(lo, s.center - s.radius), hi = glm::max(hi, s.center + s.radius);
@@ -99,7 +100,7 @@ private:
     return sphere;
   }
 
-  /// Groups the clusters and simplifies each group. Returns the new clusters.
+  /// Groups the active clusters and simplifies each group. Returns the new clusters.
   std::vector<uint32_t> build_level(uint32_t level, const std::vector<uint32_t>& active) {
     const std::vector<std::vector<uint32_t>> members = form_groups(active);
     const auto first_group = static_cast<uint32_t>(lod_.groups.size());
@@ -146,7 +147,7 @@ private:
     return {lod_.vertices[t.x].position, lod_.vertices[t.y].position, lod_.vertices[t.z].position};
   }
 
-  /// owner_ becomes each position's group, or kShared where there are several.
+  /// Sets owner_ to each position's group, or kShared if it belongs to several.
   void mark_owners(const std::vector<std::vector<uint32_t>>& members) {
     owner_.assign(lod_.positions.size(), kNone);
     tbb::parallel_for(size_t{0}, members.size(), [&](size_t group) {
@@ -187,7 +188,7 @@ private:
     group.level = level;
     group.terminal = result.triangles.empty();
     group.error = group.terminal ? std::numeric_limits<double>::infinity() : result.error;
-    for (const uint32_t member : members) // never less than below: cuts rely on it
+    for (const uint32_t member : members) // errors must not decrease from level to level, as cuts rely on it
       if (const uint32_t below = lod_.clusters[member].generating_group; below != kNoGroup)
         group.error = std::max(group.error, lod_.groups[below].error);
     std::vector<LodSphere> spheres;
@@ -202,13 +203,14 @@ private:
     }
     group.sphere = enclose(spheres);
     if (group.terminal) return;
-    // Everything lies in the ball, and in the geometry's box: nothing is further off than they are wide.
+    // The surface lies in the sphere and in the geometry's box, so their extents limit the error.
     for (const LatticePoint& p : result.new_positions)
       group.sphere.radius = std::max(group.sphere.radius, kInflation * distance(group.sphere.center, point(p)));
     group.error = std::min({group.error, 2.0 * group.sphere.radius, diagonal_});
   }
 
-  /// New positions, vertices, triangles and clusters of all groups, in their order.
+  /// Appends the new positions, vertices, triangles and clusters of all groups, in group order. Returns the new
+  /// clusters.
   std::vector<uint32_t> append(uint32_t level, uint32_t first_group, const std::vector<SimplifiedGroup>& results) {
     std::vector<uint32_t> added;
     history_.begin_level();
@@ -250,13 +252,13 @@ private:
   const uint32_t max_levels_;
   ClusterLod lod_;
   std::vector<uint32_t> seam_of_kind_;
-  double diagonal_ = 0.0;                  ///< of the geometry's box, which nothing leaves
-  std::vector<LodSphere> cluster_spheres_; ///< of level 0: their own; else that of the generating group
+  double diagonal_ = 0.0;                  ///< of the geometry's bounding box, which contains all levels
+  std::vector<LodSphere> cluster_spheres_; ///< the cluster's own at level 0, otherwise the generating group's
   std::vector<double> triangle_errors_;
   TriangleHistory history_;
   std::vector<uint32_t> owner_;
   LineCover lines_;
-  std::vector<uint8_t> locked_for_ever_; ///< positions of terminal groups, and those that LodLimits names
+  std::vector<uint8_t> locked_for_ever_; ///< positions of terminal groups and of LodLimits::locked
 };
 
 } // namespace

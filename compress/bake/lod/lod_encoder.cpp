@@ -9,11 +9,11 @@
 namespace packtrace {
 namespace {
 
-// More than the roundings of a few operations in double; where balls hold balls, more than those in float.
+// More than the rounding errors of a few operations in double; for nested spheres, also more than those in float.
 constexpr double kDoubleRoundings = 1.0 + 0x1p-48;
 constexpr double kFloatRoundings = 1.0 + 1e-6;
 
-/// The smallest float that is not below.
+/// The smallest float that is not less than `value`.
 float round_up(double value) {
   if (value > static_cast<double>(std::numeric_limits<float>::max())) return std::numeric_limits<float>::infinity();
   const auto nearest = static_cast<float>(value);
@@ -21,7 +21,7 @@ float round_up(double value) {
                                               : nearest;
 }
 
-/// How far a decoded point may lie from its lattice point, in object units: 0 where all coordinates are floats.
+/// Maximum distance of a decoded point from its lattice point, in object units: 0 if all coordinates are exact floats.
 double decoding_error(const std::vector<LatticePoint>& positions, const PositionGrid& grid) {
   constexpr double kHalfFloatUlp = 0x1p-24, kSmallestFloatHalf = 0x1p-150;
   int64_t largest = 0;
@@ -32,13 +32,13 @@ double decoding_error(const std::vector<LatticePoint>& positions, const Position
   return std::sqrt(3.0) * (per_axis + kSmallestFloatHalf) * kDoubleRoundings;
 }
 
-/// Errors and balls of groups in object units.
+/// Computes the errors and spheres of groups in object units.
 class GroupEncoder {
 public:
   GroupEncoder(const QuantizedGeometry& geometry, const ClusterLod& lod)
       : g_(geometry), lod_(lod), step_(geometry.grid.step()), decoding_error_(decoding_error(lod.positions, g_.grid)) {}
 
-  /// Level by level; false where something is beyond the range of floats.
+  /// Appends the records level by level. Returns false if a value exceeds the range of float.
   bool run(std::vector<baked::LodGroupRecord>& out) {
     std::vector<std::vector<uint32_t>> members(lod_.groups.size());
     for (uint32_t i = 0; i < lod_.clusters.size(); ++i) members[lod_.clusters[i].group].push_back(i);
@@ -57,9 +57,9 @@ private:
                                const std::vector<baked::LodGroupRecord>& done) const {
     baked::LodGroupRecord record{};
     record.level = group.level;
-    // Both surfaces are decoded: each is off by what decoding loses.
+    // The error is between two decoded surfaces, and decoding moves both.
     record.error = round_up((group.error * step_ + 2.0 * decoding_error_) * kDoubleRoundings);
-    double off = decoding_error_; // of the centre, by rounding it
+    double off = decoding_error_; // of the centre, from rounding it
     for (size_t axis = 0; axis < 3; ++axis) {
       const double center =
           (static_cast<double>(g_.origin[axis]) + group.sphere.center[static_cast<int>(axis)]) * step_;
@@ -69,7 +69,7 @@ private:
     record.radius = round_up((group.sphere.radius * step_ + off) * kFloatRoundings);
     for (const uint32_t number : members) {
       const LodCluster& cluster = lod_.clusters[number];
-      // Decoded points may lie a little outside.
+      // Decoded points may lie slightly outside.
       record.radius = std::max(record.radius, round_up((reach(cluster, record) + decoding_error_) * kFloatRoundings));
       if (cluster.generating_group == kNoGroup) continue;
       const baked::LodGroupRecord& inner = done[cluster.generating_group];
@@ -83,7 +83,7 @@ private:
   static DVec3 point(const baked::LodGroupRecord& g) { return DVec3(g.center[0], g.center[1], g.center[2]); }
   static double distance(const baked::LodGroupRecord& from, DVec3 to) { return glm::length(point(from) - to); }
 
-  /// How far the cluster's points are from a group's centre.
+  /// Maximum distance of the cluster's points from a group's centre.
   double reach(const LodCluster& cluster, const baked::LodGroupRecord& from) const {
     double furthest = 0.0;
     for (const Triangle& t :
@@ -101,7 +101,7 @@ private:
   double step_, decoding_error_;
 };
 
-/// A level's clusters by material slot, which classes follow, and then as they came.
+/// The clusters of a level, stably sorted by material slot, so that material classes are contiguous.
 std::vector<uint32_t> order_clusters(const QuantizedGeometry& geometry, const ClusterLod& lod, uint32_t begin,
                                      uint32_t end) {
   std::vector<uint32_t> order(end - begin);
@@ -134,7 +134,7 @@ EncodedLod encode_lod(QuantizedGeometry& geometry, ClusterLod& lod) {
     to.triangles = terminal;
     to.error = error;
     for (uint32_t i = begin; i < end; ++i) {
-      const LodCluster& c = lod.clusters[level == 0 ? i : order[i - begin]]; // level 0 is as it is stored
+      const LodCluster& c = lod.clusters[level == 0 ? i : order[i - begin]]; // level 0 keeps its stored order
       out.links.push_back({c.group, c.generating_group});
       if (level > 0) level_clusters.clusters.push_back(c.range);
       to.triangles += c.range.triangle_count;

@@ -9,25 +9,25 @@
 
 namespace packtrace {
 
-/// Levels of detail of one geometry as they go into a file.
+/// The LOD levels of one geometry as written to a file.
 struct EncodedLod {
   struct Level {
-    EncodedGeometry encoded; ///< empty at level 0: that is the geometry itself
-    uint64_t triangles = 0;  ///< of the discrete level
+    EncodedGeometry encoded; ///< empty at level 0, which is the geometry itself
+    uint64_t triangles = 0;  ///< in the discrete level
     uint32_t group_count = 0;
-    float error = 0.0f; ///< of the discrete level, object units
+    float error = 0.0f; ///< of the discrete level, in object units
   };
-  std::vector<Level> levels;                 ///< none, or two and more
+  std::vector<Level> levels;                 ///< empty, or at least two
   std::vector<baked::LodGroupRecord> groups; ///< level by level
   std::vector<baked::LodLinkRecord> links;   ///< level by level, cluster by cluster
 };
 
-/// Encodes levels on the geometry's own lattice. Errors and spheres are in object units and of what is decoded: they
-/// count what positions lose as floats, but not what they lost against the source on their way to level 0. The
-/// validator's rules hold: errors do not shrink and spheres hold those below, in float too. Empty where there is one
-/// level only, or where a sphere or an error is beyond the range of floats.
-/// @param geometry what `lod` was built of; its positions and vertices become the levels'
-/// @param lod is used up
+/// Encodes levels on the geometry's lattice. Errors and spheres are in object units, of the decoded surfaces: they
+/// include the rounding of positions to float, but not the quantisation error of level 0. The validator's rules hold,
+/// also in float: errors do not decrease, and spheres contain those of the groups below. Returns an empty result if
+/// there is only one level, or if a sphere or an error exceeds the range of float.
+/// @param geometry the geometry that `lod` was built from; receives the levels' positions and vertices
+/// @param lod is consumed
 EncodedLod encode_lod(QuantizedGeometry& geometry, ClusterLod& lod);
 
 } // namespace packtrace

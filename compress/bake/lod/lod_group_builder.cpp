@@ -58,15 +58,16 @@ private:
       dropped_ |= stand.dropped;
       if (stand.dropped) bound = std::max(bound, mesh_.triangles[stand.triangle].error);
     }
-    // Nothing that is left is further from what it stood for than before.
+    // Dropping pieces does not change the distance of the remaining triangles from what they stand for.
     for (size_t i = 0; i < stands.size(); ++i)
       if (!stands[i].dropped) mesh_.triangles[stands[i].triangle].error = errors[i];
   }
 
-  /// Which triangles of the group those that are left may stand for.
+  /// Lists, for each remaining triangle, the group's triangles that it may stand for.
   void list_below() {
     const auto [ends, found] = links_.by_after(mesh_.triangles.size());
-    std::vector<uint32_t> last(numbers_.size(), Wedge::kNone); // triangle after whose list each is in
+    // per source triangle: the last triangle whose list it was added to
+    std::vector<uint32_t> last(numbers_.size(), Wedge::kNone);
     for (const uint32_t s : order_) {
       for (uint32_t i = ends[s]; i < ends[s + 1]; ++i)
         if (std::exchange(last[found[i]], s) != s) out_.below.push_back(numbers_[found[i]]);
@@ -110,7 +111,7 @@ private:
     return {in_.levels.vertices[v.x].position, in_.levels.vertices[v.y].position, in_.levels.vertices[v.z].position};
   }
 
-  /// Coordinates from about the middle of the group, so that they are small.
+  /// Sets the points relative to the centre of the group, which keeps coordinates small.
   void place_points() {
     for (size_t axis = 0; axis < 3; ++axis) {
       int64_t lo = std::numeric_limits<int64_t>::max(), hi = std::numeric_limits<int64_t>::min();
@@ -127,7 +128,7 @@ private:
     }
   }
 
-  /// The vertex of a corner, which mostly is that of the triangle's neighbours too.
+  /// Number of a corner's vertex. The last result per point or wedge is cached: adjacent triangles mostly share it.
   uint32_t vertex_number(uint32_t point, uint32_t wedge, const TriangleKind& kind) {
     KnownVertex& known = known_vertices_[wedge == Wedge::kNone ? point : mesh_.points.size() + wedge];
     if (known.point != point || known.wedge != wedge || known.flat != kind.flat)
@@ -135,7 +136,7 @@ private:
     return known.vertex;
   }
 
-  /// An old one where nothing changed, else a new one.
+  /// Reuses the existing vertex if nothing changed, otherwise adds a new one.
   uint32_t find_vertex(uint32_t point, uint32_t wedge, const TriangleKind& kind) {
     QuantizedVertex v{position_number(point), 0, {}};
     if (wedge != Wedge::kNone) {
@@ -183,9 +184,9 @@ private:
     }
   }
 
-  /// Clusters of each kind's triangles, in an order that keeps neighbours close.
+  /// Splits the triangles of each kind into clusters, from triangles in Morton order.
   void split() {
-    std::vector<std::tuple<uint32_t, uint64_t, uint32_t>> keys; // kind, place, triangle
+    std::vector<std::tuple<uint32_t, uint64_t, uint32_t>> keys; // kind, Morton code, triangle
     DVec3 lo(std::numeric_limits<double>::infinity()), hi(-lo);
     for (const DVec3& p : mesh_.points) lo = glm::min(lo, p), hi = glm::max(hi, p);
     const double extent = std::max({hi.x - lo.x, hi.y - lo.y, hi.z - lo.z, 1.0});
@@ -233,7 +234,7 @@ private:
       out_.cluster_ends.push_back(before + end), out_.cluster_kinds.push_back(kind);
   }
 
-  /// The vertex that a point's corners without wedge have, or those of a wedge.
+  /// The last vertex found for a point, for corners without wedge, or for a wedge.
   struct KnownVertex {
     uint32_t point = Wedge::kNone, wedge = 0, vertex = 0;
     bool flat = false;
@@ -243,16 +244,16 @@ private:
   NormalEncoding encoding_;
   SimplifiedGroup out_;
   SimplifyMesh mesh_;
-  std::vector<LodTriangle> lines_;               // triangles with two corners in one place
-  std::vector<uint32_t> numbers_, line_numbers_; // of triangles before, and of lines
+  std::vector<LodTriangle> lines_;               // degenerate triangles that are part of the source surface
+  std::vector<uint32_t> numbers_, line_numbers_; // of the source triangles, and of lines_
   SurfaceLinks links_;
-  std::vector<uint32_t> order_; // of triangles that are left
+  std::vector<uint32_t> order_; // remaining triangles in output order
   LatticePoint center_{};
   bool keep_points_ = false, dropped_ = false;
-  std::vector<uint32_t> positions_;         // of each point
-  std::vector<uint32_t> new_position_;      // of each point that moved
-  std::vector<Triangle> vertices_;          // of each triangle that is left
-  std::vector<KnownVertex> known_vertices_; // by point, then by wedge
+  std::vector<uint32_t> positions_;         // per point
+  std::vector<uint32_t> new_position_;      // per moved point
+  std::vector<Triangle> vertices_;          // per remaining triangle
+  std::vector<KnownVertex> known_vertices_; // per point, then per wedge
   WeldTable* vertex_table_ = nullptr;
 };
 

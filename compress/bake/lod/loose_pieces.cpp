@@ -13,7 +13,7 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kNone = ~0u;
-constexpr double kFewTimes = 3.0; // the largest error there was: what a piece may cost
+constexpr double kFewTimes = 3.0; // maximum cost of a piece, relative to the largest error of the input
 
 struct Piece {
   std::vector<uint32_t> triangles;
@@ -22,7 +22,7 @@ struct Piece {
   bool locked = false, dropped = false;
 };
 
-/// Where a piece's surface would be found once it is dropped.
+/// The triangle nearest to a piece, which stands for it once the piece is dropped.
 struct Stand {
   double distance = std::numeric_limits<double>::infinity();
   uint32_t piece = kNone, triangle = kNone;
@@ -59,7 +59,7 @@ private:
         if (pieces_[i].dropped) continue;
         if (stands[i].piece == kNone || pieces_[stands[i].piece].dropped) stands[i] = find_stand(i);
         const Stand& stand = stands[i];
-        if (stand.piece == kNone) break; // the last one
+        if (stand.piece == kNone) break; // the last piece
         if (!any_cost && pieces_[i].error + stand.distance > dear) continue;
         drop(i, stand);
         live -= pieces_[i].triangles.size();
@@ -103,9 +103,8 @@ private:
     for (Piece& piece : pieces_) piece.center /= static_cast<double>(3 * piece.triangles.size());
   }
 
-  /// The largest distance of a piece's points from one triangle, which bounds that of all its surface: distance to a
-  /// convex set is convex.
-  /// Infinite where it is not below `limit`.
+  /// The maximum distance of a piece's points from one triangle. Distance from a convex set is convex, so the maximum
+  /// over the corners holds for the whole surface. Infinite if not below `limit`.
   double distance(const Piece& piece, const Triangle& to, double limit) const {
     double largest2 = 0.0;
     for (const uint32_t triangle : piece.triangles)
@@ -118,8 +117,9 @@ private:
     return std::sqrt(largest2);
   }
 
+  /// Finds the nearest triangle of the pieces with the nearest centres.
   Stand find_stand(uint32_t number) const {
-    constexpr size_t kTried = 3; // pieces with the nearest centres
+    constexpr size_t kTried = 3; // number of pieces tried, those with the nearest centres
     std::array<std::pair<double, uint32_t>, kTried> nearest;
     nearest.fill({std::numeric_limits<double>::infinity(), kNone});
     const Piece& piece = pieces_[number];
@@ -155,7 +155,7 @@ private:
     for (size_t i = 0; i < stands.size(); ++i) {
       if (!stands[i].dropped) continue;
       auto stand = static_cast<uint32_t>(i);
-      while (stands[stand].dropped) stand = stand_of_[piece_of[stand]]; // that may have gone later
+      while (stands[stand].dropped) stand = stand_of_[piece_of[stand]]; // that triangle may have been dropped later
       stands[i].triangle = stands[stand].triangle;
     }
     return stands;
@@ -163,7 +163,7 @@ private:
 
   SimplifyMesh& m_;
   std::vector<Piece> pieces_;
-  std::vector<uint32_t> stand_of_; ///< per piece that is dropped: a triangle
+  std::vector<uint32_t> stand_of_; ///< per dropped piece: the triangle that stands for it
 };
 
 } // namespace

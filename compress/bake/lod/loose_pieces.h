@@ -8,24 +8,24 @@
 
 namespace packtrace {
 
-/// How far drop_loose_pieces() goes.
+/// When drop_loose_pieces() stops.
 struct DropTargets {
-  uint32_t triangles = 0; ///< none goes once there are so few
-  /// Those go on until so few are left that cost more than a few times the largest error that there was. Then pieces
-  /// that stand alone wait for coarser levels.
+  uint32_t triangles = 0; ///< stops once this many triangles are left
+  /// Pieces that cost more than a few times the input's largest error are dropped only while more triangles than this
+  /// are left. Other expensive pieces remain for coarser levels.
   uint32_t at_any_cost = 0;
 };
 
-/// What stands for a triangle that there was: itself, or, where it was dropped, one near it. Numbers of those left.
+/// What stands for a triangle after the drop: the triangle itself or, if it was dropped, one near it. Triangle numbers
+/// are those of the new mesh.
 struct TriangleStand {
   uint32_t triangle = 0;
   bool dropped = false;
 };
 
-/// Drops pieces of the mesh that hang together with nothing else and have no locked point, those first that lie nearest
-/// to what is left; one piece always stays. The error of a triangle near each dropped piece grows to hold for it too.
-/// Returns what stands for each triangle that there was.
-/// Time grows with the square of the number of pieces.
+/// Drops connected pieces without locked points, in order of their distance from other pieces; at least one piece
+/// remains. The error of the triangle that stands for a piece grows to include the distance. Returns what stands for
+/// each triangle of the old mesh. Takes quadratic time in the number of pieces.
 std::vector<TriangleStand> drop_loose_pieces(SimplifyMesh& mesh, const DropTargets& targets);
 
 } // namespace packtrace

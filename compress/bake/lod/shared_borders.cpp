@@ -14,11 +14,11 @@
 namespace packtrace {
 namespace {
 
-constexpr double kFolded = 0.9999; // cosine between the layers of a sheet, at least
+constexpr double kFolded = 0.9999; // minimum cosine between the layers of a sheet
 constexpr size_t kGrain = 2048;
 
-/// The same for the same position, whatever the lattice: mantissa, exponent and coordinate of each axis in lowest
-/// terms.
+/// A hash that is equal for equal positions on any lattice: each coordinate is reduced to an odd mantissa and an
+/// exponent.
 uint64_t position_hash(const LatticePoint& p, const PositionGrid& grid) {
   std::array<uint64_t, 3> axes{};
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -30,7 +30,7 @@ uint64_t position_hash(const LatticePoint& p, const PositionGrid& grid) {
   return mix_words(axes[0], axes[1], axes[2]);
 }
 
-/// Which triangles are at each position.
+/// The triangles around each position.
 class Stars {
 public:
   explicit Stars(const QuantizedGeometry& geometry) : g_(geometry), ends_(geometry.positions.size() + 1) {
@@ -64,10 +64,10 @@ public:
   }
 
 private:
-  /// An edge between the position at hand and another.
+  /// An edge from the current position, in one triangle.
   struct Use {
     uint32_t end, triangle;
-    bool outwards; ///< the triangle has it in the direction towards `end`
+    bool outwards; ///< whether the triangle runs from the position to `end`
   };
 
   Triangle points_of(const Triangle& t) const {
@@ -88,7 +88,7 @@ private:
     return glm::cross(side(p.y), side(p.z));
   }
 
-  /// Whether two triangles that have an edge in opposite directions lie on the same side of it, as in a sheet of two
+  /// Whether two triangles with a common edge in opposite directions lie on the same side of it, as in a sheet of two
   /// layers.
   bool folds(uint32_t a, uint32_t b) const {
     const DVec3 m = area_normal(a), n = area_normal(b);
@@ -97,8 +97,8 @@ private:
   }
 
   const QuantizedGeometry& g_;
-  std::vector<uint32_t> ends_;      ///< per position and one more: where its triangles begin
-  std::vector<uint32_t> triangles_; ///< position by position
+  std::vector<uint32_t> ends_;      ///< per position: start of its triangles; plus an end marker
+  std::vector<uint32_t> triangles_; ///< sorted by position
 };
 
 template <typename PerPosition>
@@ -139,7 +139,7 @@ SharedBorders SharedBorderFinder::finish() {
   SharedBorders result;
   for (size_t i = 0, next; i < all.size(); i = next) {
     for (next = i + 1; next < all.size() && all[next] >> 1 == all[i] >> 1;) ++next;
-    // A border sorts behind what is inside.
+    // Border positions sort after interior ones.
     if (next - i > 1 && (all[next - 1] & 1) != 0) result.keys_.push_back(all[i] >> 1);
   }
   return result;

@@ -7,41 +7,42 @@
 
 namespace packtrace {
 
-/// Positions that several geometries have in common and that lie on a border of at least one of them. Levels of detail
-/// must not move them: each geometry is simplified on its own, and the seam between two would open.
+/// Positions that several geometries share and that lie on a border of at least one of them. LOD levels must not move
+/// them: geometries are simplified independently, so the seam between them would open.
 ///
-/// Positions are compared as the exact products lattice x step, so geometries on grids of different steps share the
+/// Positions are compared as exact products lattice x step, so geometries on grids with different steps share the
 /// positions that lie on both lattices.
 class SharedBorders {
 public:
   SharedBorders() = default;
 
   bool empty() const { return keys_.empty(); }
-  /// Per position of the geometry: 1 where it must stay. Empty where all may move.
+  /// Per position of the geometry: 1 if it must not move. Empty if all may move.
   std::vector<uint8_t> locks(const QuantizedGeometry& geometry) const;
 
 private:
   friend class SharedBorderFinder;
-  std::vector<uint64_t> keys_; ///< hashes of positions, ascending; a collision locks a position without need
+  std::vector<uint64_t> keys_; ///< sorted position hashes; a collision only locks a position unnecessarily
 };
 
-/// Collects the positions of one geometry after the other. Takes 8 bytes a position, and n log n time in all.
+/// Collects positions, geometry by geometry. Needs 8 bytes per position and n log n time in total.
 class SharedBorderFinder {
 public:
-  /// @param geometry_count add() takes numbers below it
+  /// @param geometry_count upper limit of the numbers passed to add()
   explicit SharedBorderFinder(size_t geometry_count) : keys_(geometry_count) {}
 
-  /// May be called on several threads for different geometries; once for each. Its positions are distinct.
+  /// Adds a geometry, once per number; its positions must be distinct. May be called concurrently for different
+  /// geometries.
   void add(size_t number, const QuantizedGeometry& geometry);
-  /// What is shared by the geometries added. Leaves the finder empty.
+  /// Returns what the added geometries share, and empties the finder.
   SharedBorders finish();
 
 private:
-  std::vector<std::vector<uint64_t>> keys_; ///< by geometry: hash of a position x 2, + 1 on a border
+  std::vector<std::vector<uint64_t>> keys_; ///< per geometry: position hash x 2, + 1 on a border
 };
 
-/// Per position: 1 on a border. An edge is inside where just two triangles have it, in opposite directions, and do not
-/// fold back onto each other; every other edge is a border. Triangles with two corners in one place have no edges.
+/// Per position: 1 on a border. An edge is interior if exactly two triangles have it, in opposite directions and not
+/// folded back onto each other; all others are borders. Degenerate triangles have no edges.
 std::vector<uint8_t> border_positions(const QuantizedGeometry& geometry);
 
 } // namespace packtrace

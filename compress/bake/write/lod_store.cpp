@@ -20,7 +20,7 @@
 namespace packtrace {
 namespace {
 
-/// To be raised with every change of what builder or encoder make of the same geometry.
+/// Increment with every change to what the builder or encoder produces for the same geometry.
 constexpr uint32_t kRevision = 8;
 constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'K', 'L', 'O', 'D', '\n', 0};
 constexpr const char* kExtension = ".ptklod";
@@ -29,7 +29,7 @@ enum Part : uint32_t { kLevels, kClusters, kPayload, kGroups, kLinks, kPartCount
 
 struct StoreHeader {
   std::array<uint8_t, 8> magic;
-  uint32_t version; ///< of files, and kRevision above
+  uint32_t version; ///< file format version and kRevision
   uint32_t header_bytes;
   uint64_t file_bytes;
   std::array<uint64_t, 2> content_hash;
@@ -56,7 +56,7 @@ constexpr std::array<uint32_t, kPartCount> kRecordBytes = {sizeof(StoredLevel), 
                                                            sizeof(baked::LodGroupRecord), sizeof(baked::LodLinkRecord)};
 constexpr uint32_t kStoreVersion = (baked::kVersion << 16) | kRevision;
 
-/// A hash of numbers and of hashes of arrays.
+/// Hashes numbers and hashes of arrays.
 class Hasher {
 public:
   template <class T>
@@ -91,7 +91,7 @@ StoredLevel stored(const EncodedLod::Level& level) {
           0};
 }
 
-/// Copies the records of a part; false where it does not lie in the file.
+/// Copies the records of a section. Returns false if it is not inside the file or has the wrong record size.
 template <class T>
 bool read_part(std::span<const std::byte> bytes, const baked::SectionRecord& part, std::vector<T>& out) {
   if (part.record_bytes != sizeof(T) || part.offset > bytes.size() || part.bytes > bytes.size() - part.offset ||
@@ -185,7 +185,7 @@ std::optional<EncodedLod> LodStore::find(const LodKey& key, const LodBase& base)
     if (lod && find_stored_lod_fault(*lod, base)) return std::nullopt;
     return lod;
   } catch (const Error&) {
-    return std::nullopt; // cannot be read: to be made again
+    return std::nullopt; // unreadable files are built again
   }
 }
 
@@ -224,7 +224,7 @@ void LodStore::clear() const {
   }
   if (left > 1) first += ", and " + std::to_string(left - 1) + " more";
   if (left > 0) throw Error(ErrorKind::kIo, "cannot remove " + first);
-  std::filesystem::remove(folder_, error); // where something else is in it, it stays
+  std::filesystem::remove(folder_, error); // stays if it contains other files
   if (error && error != std::errc::directory_not_empty)
     throw Error(ErrorKind::kIo, "cannot remove " + folder_.string() + ": " + error.message());
 }

@@ -10,26 +10,26 @@
 
 namespace packtrace {
 
-/// What levels of detail follow from: XXH3-128 of a geometry on its lattice, its clusters and the limits of its levels.
+/// Identifies the input of a LOD build: XXH3-128 of a geometry on its lattice, its clusters and the limits.
 using LodKey = std::array<uint64_t, 2>;
-/// @param limits as build_cluster_lod() takes them
+/// @param limits as passed to build_cluster_lod()
 LodKey lod_key(const QuantizedGeometry& geometry, const GeometryClusters& base, const LodLimits& limits);
 
-/// Levels of detail that are finished, one file for each geometry, so that an interrupted bake can go on with them. For
-/// one program and one machine: files of other versions, and damaged ones, are as if they were not there. Their hashes
-/// are no proof: what is read is checked as any file is. Every function but clear() may run on several threads.
+/// Stores finished LOD levels, one file per geometry, so that an interrupted bake can resume. Files are valid for one
+/// program version and one machine; files of other versions and damaged files are ignored. Hashes alone are not
+/// trusted: contents are checked like any input file. All functions but clear() may be called concurrently.
 class LodStore {
 public:
-  /// Makes the folder if it is missing. Throws Error(kIo) where that fails.
+  /// Creates the folder if it is missing. Throws Error(kIo) on failure.
   explicit LodStore(std::filesystem::path folder);
 
-  /// What was kept, if it can be read and is fit for a file.
-  /// @param base the geometry that the key is of
+  /// Returns the stored levels if they can be read and are valid.
+  /// @param base the geometry that the key belongs to
   std::optional<EncodedLod> find(const LodKey& key, const LodBase& base) const;
-  /// The file appears whole or not at all. Throws Error(kIo).
+  /// Writes the file atomically. Throws Error(kIo).
   void keep(const LodKey& key, const EncodedLod& lod) const;
-  /// Removes all such files, and the folder if nothing else is in it. Throws Error(kIo) that names the first file that
-  /// stays and how many there are; the others are removed.
+  /// Removes all files of the store, and the folder if it is empty then. Continues after failures; throws Error(kIo)
+  /// that names the first file left and the number of others.
   void clear() const;
 
 private:

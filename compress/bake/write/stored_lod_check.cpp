@@ -25,7 +25,7 @@ std::optional<std::string_view> find_level_fault(const EncodedLod& lod) {
 std::optional<std::string_view> find_stored_lod_fault(const EncodedLod& lod, const LodBase& base) {
   if (lod.levels.size() > base.max_levels) return "number of levels";
   if (const auto fault = find_level_fault(lod)) return fault;
-  // A file of this geometry alone is what the checks of files can read.
+  // The file checks need a file, so they get one with this geometry only.
   FileSections file(Scene{}, {});
   file.add_geometry(base.record, base.encoded, {});
   file.add_lod(0, lod);

@@ -9,15 +9,15 @@
 
 namespace packtrace {
 
-/// The geometry that levels of detail belong to, as it goes into the file.
+/// The geometry that LOD levels belong to, as written to the file.
 struct LodBase {
-  const baked::GeometryRecord& record; ///< without ranges, counts and bounds: those follow from `encoded`
+  const baked::GeometryRecord& record; ///< ranges, counts and bounds are not used; they follow from `encoded`
   const EncodedGeometry& encoded;
-  const std::vector<uint32_t>& slot_class; ///< material class by slot
+  const std::vector<uint32_t>& slot_class; ///< material class per slot
   uint32_t max_levels = baked::kMaxLodLevels;
 };
 
-/// What of the levels a reader of the file would refuse, or nothing. Relies on nothing: they may come from anywhere.
+/// Returns which part of the levels a file reader would reject, or nothing. The levels may come from an untrusted file.
 std::optional<std::string_view> find_stored_lod_fault(const EncodedLod& lod, const LodBase& base);
 
 } // namespace packtrace

@@ -17,7 +17,7 @@
 namespace packtrace::test {
 namespace {
 
-/// Clusters by the group that they were made from.
+/// Cluster numbers per generating group.
 std::vector<std::vector<uint32_t>> clusters_made_by(const ClusterLod& lod) {
   std::vector<std::vector<uint32_t>> made(lod.groups.size());
   for (uint32_t i = 0; i < lod.clusters.size(); ++i)
@@ -38,7 +38,7 @@ protected:
 };
 
 TEST_P(ClusterLodOf, KeepsItsLimits) {
-  ASSERT_EQ(lod_.clusters.empty(), built_.geometry.triangles.empty()); // none is left where none has an area
+  ASSERT_EQ(lod_.clusters.empty(), built_.geometry.triangles.empty()); // none are left if all triangles are degenerate
   EXPECT_LE(lod_.level_count, baked::kMaxLodLevels);
   for (const LodCluster& c : lod_.clusters) {
     EXPECT_GE(c.range.triangle_count, 1u);
@@ -132,7 +132,7 @@ TEST_P(ClusterLodOf, LevelsHoldTheTerminalGroupsBelow) {
 INSTANTIATE_TEST_SUITE_P(StressMeshes, ClusterLodOf, testing::ValuesIn(stress_meshes()),
                          [](const auto& tested) { return identifier(tested.param.name); });
 
-/// Real borders may be simplified; closed meshes have none.
+/// Open borders may be simplified; closed meshes have none.
 class ClosedClusterLodOf : public ClusterLodOf {};
 
 TEST_P(ClosedClusterLodOf, GroupsKeepTheirBorders) {
@@ -146,7 +146,7 @@ TEST_P(ClosedClusterLodOf, GroupsKeepTheirBorders) {
 TEST_P(ClosedClusterLodOf, EveryCutOfAClosedMeshIsClosed) {
   ASSERT_TRUE(boundary(lod_, cut_clusters(lod_, -0.0)).empty());
   std::vector<double> all = thresholds(lod_);
-  const size_t step = std::max<size_t>(all.size() / 200, 1); // every one of them where they are few
+  const size_t step = std::max<size_t>(all.size() / 200, 1); // all of them if there are few
   for (size_t i = 0; i < all.size(); i += step) {
     const std::vector<uint32_t> cut = cut_clusters(lod_, all[i]);
     EXPECT_FALSE(cut.empty());
@@ -166,7 +166,7 @@ TEST(ClusterLod, EveryLevelHasLittleLessThanHalfOfTheOneBelow) {
 }
 
 TEST(ClusterLod, OneClusterIsSimplifiedOn) {
-  const BuiltLod built = build_lod(torus_mesh(12, 5)); // 120 triangles, of one cluster
+  const BuiltLod built = build_lod(torus_mesh(12, 5)); // 120 triangles in one cluster
   ASSERT_EQ(level_triangles(built.lod, 0), 120u);
   EXPECT_GT(built.lod.level_count, 1u);
   EXPECT_LE(level_triangles(built.lod, built.lod.level_count - 1), 16u);

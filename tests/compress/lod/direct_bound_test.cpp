@@ -1,4 +1,4 @@
-// Errors that are measured against levels further down, where those of levels in turn add up.
+// Tests errors that are measured directly against lower levels instead of summed over levels.
 
 #include "compress/bake/lod/bound/direct_bound.h"
 
@@ -12,7 +12,8 @@
 namespace packtrace::test {
 namespace {
 
-/// A flat level 0, a level 1 that lies `height` above it, and what was made of that: `after_height` above level 0.
+/// A flat level 0, a level 1 at `height` above it, and a level 2 simplified from level 1 at `after_height` above level
+/// 0.
 struct Lift {
   static constexpr uint32_t kSide = 8;
   static constexpr int64_t kStep = 64;
@@ -43,7 +44,7 @@ struct Lift {
     mesh.triangles = before;
     for (LodTriangle& t : mesh.triangles) t.error = std::abs(after_height);
     links.bounds.assign(before.size(), std::abs(after_height));
-    // The worst few, as bound_errors() adds them up.
+    // A few triangles get the largest sum of errors, as bound_errors() states them.
     for (uint32_t i = 0; i < kWorst; ++i)
       mesh.triangles[7 * i].error = links.bounds[7 * i] = height + std::abs(after_height - height);
   }
@@ -111,7 +112,7 @@ TEST(DirectBound, HistoryForgetsWhatIsTooFarBack) {
     history.append(ends, below);
   }
   EXPECT_TRUE(history.below(9).empty());  // level 0
-  EXPECT_TRUE(history.below(10).empty()); // forgotten
+  EXPECT_TRUE(history.below(10).empty()); // no longer kept
   const auto first = history.below(12), second = history.below(13);
   EXPECT_EQ(std::vector<uint32_t>(first.begin(), first.end()), (std::vector<uint32_t>{1, 2}));
   EXPECT_EQ(std::vector<uint32_t>(second.begin(), second.end()), (std::vector<uint32_t>{7}));

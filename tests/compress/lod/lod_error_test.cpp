@@ -1,4 +1,4 @@
-// That the errors of levels of detail are never below what is measured.
+// Tests that stated LOD errors are never below measured distances.
 
 #include <algorithm>
 #include <cmath>
@@ -13,7 +13,7 @@
 namespace packtrace::test {
 namespace {
 
-/// What the measurement may round up.
+/// Allows for rounding in the measurement.
 double with_rounding(double error) { return error * (1.0 + 1e-6) + 1e-6; }
 
 class LodSurfaces {
@@ -57,10 +57,10 @@ protected:
   LodErrorOf() : LodSurfaces(build_lod(GetParam().make())) {}
 };
 
-/// The other way round says nothing: what a group was made from reaches further than the group.
+/// Tested in this direction only: the clusters of level 0 that a group was made from extend beyond the group.
 TEST_P(LodErrorOf, IsNotBelowTheDistanceOfEachGroupFromItsPartOfLevelZero) {
   const ClusterLod& lod = built_.lod;
-  // The clusters of level 0 that a group stands for.
+  // The level 0 clusters that each group stands for.
   std::vector<std::vector<uint32_t>> stands_for(lod.groups.size()), made(lod.groups.size());
   for (uint32_t i = 0; i < lod.clusters.size(); ++i) {
     const LodCluster& c = lod.clusters[i];
@@ -94,7 +94,7 @@ TEST_P(LodErrorOf, IsNotBelowTheDistanceOfCuts) {
   }
 }
 
-/// Errors of levels in turn add up to more.
+/// Guards against errors that only add up over levels.
 TEST(LodError, OfCoarseLevelsIsNotFarAboveTheDistance) {
   const LodSurfaces surfaces(build_lod(torus_mesh(200, 120)));
   const ClusterLod& lod = surfaces.lod();
@@ -108,7 +108,7 @@ TEST(LodError, OfCoarseLevelsIsNotFarAboveTheDistance) {
   }
 }
 
-/// Bodies with long horns, down to a few triangles: images there are far from what lies above them.
+/// Spheres with long spikes, down to a few triangles: images there are far from their preimages.
 TEST(LodError, OfTheLastTrianglesIsNotBelowTheDistance) {
   Random random(11);
   for (int body = 0; body < 30; ++body) {

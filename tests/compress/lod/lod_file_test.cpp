@@ -1,4 +1,4 @@
-// Levels of detail as they come back from files.
+// Tests LOD levels read back from files.
 
 #include <algorithm>
 #include <bit>
@@ -50,7 +50,7 @@ std::vector<Triangle> triangles_of(const ClusterLod& lod, const std::vector<uint
   return result;
 }
 
-/// Clusters of a level, and of terminal groups below it.
+/// Clusters of a level and of terminal groups below it.
 std::vector<uint32_t> discrete_level(const ClusterLod& lod, uint32_t level) {
   std::vector<uint32_t> clusters;
   for (uint32_t i = 0; i < lod.clusters.size(); ++i)
@@ -59,12 +59,12 @@ std::vector<uint32_t> discrete_level(const ClusterLod& lod, uint32_t level) {
   return clusters;
 }
 
-/// Fails where some decoded level is further from decoded level 0 than it says, or the other way round.
-/// @param slack of the measurement, object units
+/// Fails if a decoded level is further from decoded level 0 than its stated error, in either direction.
+/// @param slack tolerance of the measurement, object units
 void expect_honest_levels(const BakedFile& file, uint32_t geometry, double slack) {
   const ClusterLod lod = read_lod(file, geometry);
   std::vector<DVec3> points = decoded_positions(file, geometry, lod);
-  const DVec3 origin = points.front(); // so that floats of the measurement do not matter
+  const DVec3 origin = points.front(); // keeps float coordinates of the measurement small
   for (DVec3& p : points) p -= origin;
   const std::vector<Triangle> base = triangles_of(lod, discrete_level(lod, 0));
   const SurfaceDistance to_base(points, base);
@@ -110,7 +110,7 @@ TEST_P(LodFileOf, SpheresHoldThoseBelowInFloatToo) {
 }
 
 TEST_P(LodFileOf, ClosedMeshesHaveClosedCuts) {
-  if (!GetParam().closed) return; // nothing to see
+  if (!GetParam().closed) return; // the boundary test needs a closed mesh
   const ClusterLod lod = read_lod(file_, 0);
   ASSERT_TRUE(boundary(lod, cut_clusters(lod, -0.0)).empty());
   const std::vector<double> all = thresholds(lod);
@@ -164,7 +164,7 @@ TEST(LodFile, MeshesThatCannotBeSimplifiedHaveNoLevels) {
   }
 }
 
-/// Rotated and far from the origin decoded points leave the plane: without a share for that, errors are too small.
+/// Rotated and far from the origin, decoded points leave the plane; errors must include this.
 TEST(LodFile, ErrorsCountWhatFloatsLoseFarFromTheOrigin) {
   const DAffine turned(DVec3(0.36, 0.48, -0.8), DVec3(-0.8, 0.6, 0.0), DVec3(0.48, 0.64, 0.6), DVec3(3e4, -2e4, 1e4));
   const BakedFile file = BakedFile::from_bytes(bake(scene_of(grid_mesh(60), turned), lod_config()).bytes);
@@ -196,7 +196,7 @@ TEST(LodFile, StoredErrorsAndSpheresAreNotSmallerThanTheBuilders) {
   }
 }
 
-/// Two materials of different classes, one with texture coordinates, and normals; twice in the scene.
+/// Two materials of different classes, one with texture coordinates, and normals; each mesh is placed twice.
 Scene mixed_scene() {
   Scene scene = scene_of(torus_mesh(24, 16));
   scene.masks.push_back(striped_mask());
@@ -218,16 +218,16 @@ TEST(LodFile, LevelsKeepSlotsClassesAndStreams) {
     for (uint32_t c = 0; c < file.clusters(level.geometry).size(); ++c) {
       const ClusterView cluster = file.cluster(level.geometry, c);
       slots.insert(cluster.material_slot());
-      EXPECT_EQ(cluster.has_uvs(), cluster.material_slot() == 1); // the masked one
+      EXPECT_EQ(cluster.has_uvs(), cluster.material_slot() == 1); // the alpha-masked material
       EXPECT_TRUE(cluster.has_normals());
       for (uint32_t v = 0; v < cluster.vertex_count(); ++v) {
         EXPECT_NEAR(glm::length(cluster.normal(v)), 1.0f, 1e-5f);
         if (!cluster.has_uvs()) continue;
-        // Texture coordinates of the plane are where its points are.
+        // The plane's texture coordinates equal its positions.
         EXPECT_LT(glm::length(cluster.uv(v) - Vec2(cluster.position(v))), 0.01f);
       }
     }
-    // The last of 22 triangles has dropped the plane, which is nearer to the torus than it states as its error.
+    // The last level, of 22 triangles, has dropped the plane, which is nearer to the torus than the stated error.
     if (&level != &lod.levels.back()) {
       EXPECT_EQ(slots.size(), 2u) << "level " << level.level;
     }
@@ -238,7 +238,8 @@ TEST(LodFile, LevelsKeepSlotsClassesAndStreams) {
 TEST(LodFile, SaysWhichGeometriesGetLevels) {
   const auto with = [](LodUse use, uint32_t min_triangles) {
     const BakedFile file = BakedFile::from_bytes(bake(mixed_scene(), lod_config(use, min_triangles)).bytes);
-    return std::pair(!file.lod(0).levels.empty(), !file.lod(1).levels.empty()); // torus of 768, both of 5600
+    // torus with 768 triangles, both meshes with 5600
+    return std::pair(!file.lod(0).levels.empty(), !file.lod(1).levels.empty());
   };
   EXPECT_EQ(with(LodUse::kOff, 1), std::pair(false, false));
   EXPECT_EQ(with(LodUse::kInstanced, 1), std::pair(false, true));
@@ -322,7 +323,7 @@ TEST(LodFile, AnInterruptedBakeGoesOnWithWhatItHas) {
   EXPECT_FALSE(std::filesystem::exists(config.resume));
 }
 
-/// Wherever it is interrupted: what it leaves behind is whole.
+/// At any point of interruption, the files left behind are complete.
 TEST(LodFile, AnInterruptedBakeLeavesNoHalfMadeLevels) {
   const SceneFolder folder;
   Scene scene = mixed_scene();
@@ -382,7 +383,7 @@ TEST(LodFile, ThousandsOfTinyGeometriesGetNone) {
   EXPECT_EQ(file.sections().lod_levels.front().base, 2001u);
 }
 
-/// Lengths beyond floats have no levels, and do no harm.
+/// Sizes beyond the range of float get no levels, and the bake succeeds.
 TEST(LodFile, GeometryAtTheEndOfTheFloatRange) {
   for (const double size : {2e38, 1e-40}) {
     const BakedFile file =

@@ -1,4 +1,4 @@
-// What measures and places four triangles or edges at once.
+// Tests the kernels that measure and place four triangles or edges at once.
 
 #include <algorithm>
 #include <array>
@@ -24,7 +24,7 @@ DVec3 random_point(Random& random) {
   return 100.0 * DVec3(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1));
 }
 
-/// Points and triangles that an overlay can work on.
+/// A surface for overlays.
 struct Surface {
   std::vector<DVec3> points;
   std::vector<LodTriangle> triangles;
@@ -40,7 +40,7 @@ struct Surface {
   }
 };
 
-/// A square [0, 100]^2, `cells` cells wide, points moved up and down by up to `height`.
+/// A square [0, 100]^2 of cells x cells, with points displaced vertically by up to `height`.
 Surface bumpy_square(uint32_t cells, float height, uint32_t seed) {
   Random random(seed);
   Surface s;
@@ -68,7 +68,7 @@ Surface random_triangles(uint32_t count, uint32_t seed) {
   return s;
 }
 
-/// Distances of points from a set.
+/// Distances of points from the triangles of a set.
 class Rows {
 public:
   Rows(const TriangleSet& set, const std::vector<DVec3>& points)
@@ -123,7 +123,7 @@ TEST(TriangleSet, TheNearestIsTheFirstOfWhichNoCornerIsFartherThanOfOthers) {
       for (size_t k = 0; k < 3; ++k) least[k] = std::min(least[k], rows.row(k)[i]);
       best = std::min(best, {std::max({rows.row(0)[i], rows.row(1)[i], rows.row(2)[i]}), i});
     }
-    EXPECT_LT(best.second, count); // all are there twice
+    EXPECT_LT(best.second, count); // every triangle is in the set twice
     EXPECT_EQ(nearest.place, best.second);
     EXPECT_EQ(nearest.distance, best.first);
     EXPECT_EQ(nearest.least, *std::max_element(least.begin(), least.end()));
@@ -153,7 +153,7 @@ TEST(TriangleRefiner, BoundsTheDistanceOfEveryPoint) {
       EXPECT_EQ(bound, noted);
       EXPECT_LE(farthest, sampled + 1e-9);
       EXPECT_LE(sampled, bound + 1e-9);
-      EXPECT_LE(bound, std::max(enough, 1.15 * sampled)); // cutting ends at a tenth above what it could still gain
+      EXPECT_LE(bound, std::max(enough, 1.15 * sampled)); // refinement stops within 1.1 of the lower bound
     }
 }
 
@@ -214,8 +214,8 @@ TEST(Overlay, HolesAndSecondLayersAreNoCover) {
   for (const OverlayPiece& piece : whole) twice.push_back(piece.triangle);
   EXPECT_FALSE(overlay.lay(p, DVec3(0, 0, 1), twice, pieces));
   EXPECT_FALSE(overlay.lay(p, DVec3(0, 0, -1), s.all(), pieces)); // seen from behind
-  EXPECT_FALSE(overlay.lay(p, DVec3(1, 0, 0), s.all(), pieces));  // and from its side
-  EXPECT_EQ(pieces.size(), whole.size());                         // nothing was added
+  EXPECT_FALSE(overlay.lay(p, DVec3(1, 0, 0), s.all(), pieces));  // edge-on
+  EXPECT_EQ(pieces.size(), whole.size());                         // nothing was appended
 }
 
 TEST(Overlay, HalfCoveredTwiceIsNotCovered) {
@@ -227,7 +227,8 @@ TEST(Overlay, HalfCoveredTwiceIsNotCovered) {
     whole.triangles.push_back({t, Triangle(Wedge::kNone), 0, 0.0});
   const std::array<DVec3, 3> p{DVec3(0, 0, 0), DVec3(2, 0, 0), DVec3(0, 2, 0)};
   std::vector<OverlayPiece> pieces;
-  EXPECT_FALSE(Overlay(layers.view()).lay(p, DVec3(0, 0, 1), layers.all(), pieces)); // though areas add up to its own
+  // although the areas add up to the triangle's
+  EXPECT_FALSE(Overlay(layers.view()).lay(p, DVec3(0, 0, 1), layers.all(), pieces));
   EXPECT_TRUE(Overlay(whole.view()).lay(p, DVec3(0, 0, 1), whole.all(), pieces));
 }
 
@@ -257,7 +258,7 @@ TEST(EdgeHeap, OrdersEdgesWhoseCostsChange) {
   ASSERT_EQ(heap.near_count(), EdgeHeap::kNear);
   std::vector<float> cost(40);
   for (uint32_t i = 0; i < cost.size(); ++i) cost[i] = static_cast<float>(i);
-  for (size_t place = 0; place < heap.near_count(); ++place) { // some dearer, some cheaper
+  for (size_t place = 0; place < heap.near_count(); ++place) { // some costs go up, some down
     cost[heap.near(place)] = place % 2 == 0 ? 20.5f + static_cast<float>(place) : 0.25f;
     heap.change_near(place, cost[heap.near(place)]);
   }
@@ -268,12 +269,12 @@ TEST(EdgeHeap, OrdersEdgesWhoseCostsChange) {
   }
 }
 
-/// Edges between points of random quadrics, some of them held.
+/// Edges between points with random quadrics, some of them on borders or locked.
 struct PlacementTask {
   explicit PlacementTask(Random& random) {
     for (CollapsePoint& p : points) {
       p = {};
-      for (int plane = 0; plane < 5; ++plane) { // a sum of squared distances to planes
+      for (int plane = 0; plane < 5; ++plane) { // a sum of squared distances from planes
         const double n[4] = {random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1),
                              random.uniform(-9, 9)};
         for (int i = 0, k = 0; i < 3; ++i)
@@ -291,7 +292,7 @@ struct PlacementTask {
 
   std::array<CollapsePoint, 8> points;
   PlacementRules rules{};
-  std::array<EdgeEnds, 6> edges{}; // more than four, and not a multiple
+  std::array<EdgeEnds, 6> edges{}; // more than four, and not a multiple of four
   std::array<EdgePlacement, 6> placed{};
 };
 
@@ -314,7 +315,7 @@ TEST(EdgePlacement, IsNoWorseThanTheEnds) {
       };
       EXPECT_NEAR(placed.cost, cost(placed.at), 1e-8);
       for (const double x : placed.at) EXPECT_EQ(x, std::round(x));
-      // What is held more stays; of two that are locked nothing is asked.
+      // The end with the stronger constraint stays; edges between two locked points are not tested.
       if (a.held >= kLocked || (b.held < kLocked && a.held > b.held)) {
         EXPECT_TRUE(is_at(a));
         EXPECT_EQ(placed.along, 0.0);

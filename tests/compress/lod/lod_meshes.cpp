@@ -85,7 +85,7 @@ Mesh chamfered_sheet(float cut) {
         return Vec2(static_cast<float>(x + kCorners[k % 4].first), static_cast<float>(y + kCorners[k % 4].second));
       };
       std::vector<Vec2> cell;
-      size_t inner = 0; // of which all triangles of the cell are
+      size_t inner = 0; // the corner that all triangles of the cell share
       for (size_t k = 0; k < 4; ++k) {
         const Vec2 p = corner(k);
         if (std::fmod(p.x, static_cast<float>(kCells)) + std::fmod(p.y, static_cast<float>(kCells)) > 0.0f) {
@@ -111,7 +111,7 @@ Mesh twice(Mesh mesh, bool other_side) {
 
 namespace {
 
-/// Triangles that share corners only, each with the next.
+/// A chain of triangles in which each shares only a corner with the next.
 Mesh vertex_chain() {
   Random random(11);
   Mesh mesh;
@@ -137,21 +137,21 @@ Mesh rough_two_sided_sheet() {
   return twice(mesh, true);
 }
 
-/// Not manifold: every piece hangs on the same point.
+/// Non-manifold: all pieces share one point.
 Mesh tetrahedra_on_one_point() {
   Mesh mesh = tetrahedra_mesh(1500, 3);
   for (size_t i = 0; i < mesh.positions.size(); i += 4) mesh.positions[i] = Vec3(0.0f);
   return mesh;
 }
 
-/// Every triangle is a line.
+/// All triangles are degenerate.
 Mesh without_area() {
   Mesh mesh = grid_mesh(50);
   for (Vec3& p : mesh.positions) p.y = 0.25f;
   return mesh;
 }
 
-/// Triangles with two corners in one place: some between triangles, some alone in space.
+/// Triangles with two equal corners: some between other triangles, some isolated.
 Mesh lines_among_triangles() {
   Random random(13);
   Mesh mesh = grid_mesh(40, 0.05f);
@@ -191,7 +191,7 @@ std::vector<NamedMesh> stress_meshes() {
       {"tetrahedra on one point", tetrahedra_on_one_point, true},
       {"vertex chain", vertex_chain, false},
       {"rough two sided sheet", rough_two_sided_sheet, true},
-      {"sphere", [] { return sphere_mesh(80); }, false}, // open by a hair at its seam, where roundings differ
+      {"sphere", [] { return sphere_mesh(80); }, false}, // open at its seam, where rounding differs
       {"bumped plane with a border", [] { return grid_mesh(80, 0.05f, true); }, false},
       {"flat plane", [] { return grid_mesh(70); }, false},
       {"sheet with small chamfers", [] { return chamfered_sheet(0.05f); }, false},

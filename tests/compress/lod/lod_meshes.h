@@ -13,33 +13,33 @@ namespace packtrace::test {
 /// A closed torus without normals, all vertices shared.
 Mesh torus_mesh(uint32_t around, uint32_t across);
 
-/// The mesh with every second triangle's corners made its own, with normals of its own: seams everywhere.
+/// Gives every second triangle of the mesh its own corners with its own normals, so that there are seams everywhere.
 Mesh half_faceted(const Mesh& mesh);
 
-/// Closed tetrahedra at random in [-1,1]^3.
+/// Closed tetrahedra at random positions in [-1,1]^3.
 Mesh tetrahedra_mesh(uint32_t count, uint32_t seed);
 
-/// A flat square of 12 x 12 cells whose four outer corners are cut off, by so much of a cell. Both points of a corner
-/// become one at almost no cost; what juts out then is a small part of a large triangle.
+/// A flat square of 12 x 12 cells whose four outer corners are cut off by `cut` of a cell. Collapsing both points of
+/// such a corner costs almost nothing and leaves a small part of a large triangle sticking out.
 Mesh chamfered_sheet(float cut);
 
-/// Every triangle twice: seen from the same side, or from both.
+/// The mesh with every triangle doubled, facing the same or the other side.
 Mesh twice(Mesh mesh, bool other_side);
 
-/// Meshes that levels must survive.
+/// A mesh that the LOD builder must handle.
 struct NamedMesh {
   std::string name;
   Mesh (*make)();
   bool closed = false;
 };
-/// For gtest.
+/// For gtest messages.
 inline void PrintTo(const NamedMesh& mesh, std::ostream* out) { *out << mesh.name; }
 std::vector<NamedMesh> stress_meshes();
 std::vector<NamedMesh> closed_stress_meshes();
-/// A name for a test.
+/// Converts a mesh name to a test name.
 std::string identifier(std::string name);
 
-/// A mesh on its lattice with clusters and levels.
+/// A quantised mesh with its clusters and LOD levels.
 struct BuiltLod {
   QuantizedGeometry geometry;
   GeometryClusters base;
@@ -47,21 +47,21 @@ struct BuiltLod {
 };
 BuiltLod build_lod(const Mesh& mesh);
 
-/// Levels as the builder has them, but of what a file holds: decoded lattice points; errors and spheres as stored, in
-/// object units.
+/// Reads levels from a file in the builder's form: decoded lattice points; errors and spheres as stored, in object
+/// units.
 ClusterLod read_lod(const BakedFile& file, uint32_t geometry);
 
-/// 0, every error there is, and the nearest values on both sides of it. Ascending.
+/// 0, every error of a group, and the adjacent values on both sides of it. Ascending.
 std::vector<double> thresholds(const ClusterLod& lod);
 
-/// The clusters to take where errors up to `threshold` are allowed.
+/// The clusters of the cut that allows errors up to `threshold`.
 std::vector<uint32_t> cut_clusters(const ClusterLod& lod, double threshold);
 
-/// How often each directed edge of the triangles is there more than its opposite, by lattice point; only edges with a
-/// count other than 0. Empty for closed surfaces.
+/// Directed edges that occur more often than their opposites, by lattice point; only those with a nonzero count. Empty
+/// for closed surfaces.
 struct BoundaryEdge {
   LatticePoint a, b; ///< a < b
-  int64_t count;     ///< of a -> b less that of b -> a
+  int64_t count;     ///< of a -> b minus that of b -> a
   bool operator==(const BoundaryEdge&) const = default;
 };
 std::vector<BoundaryEdge> boundary(const ClusterLod& lod, const std::vector<uint32_t>& clusters);

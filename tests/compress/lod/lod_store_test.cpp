@@ -1,4 +1,4 @@
-// Levels that an interrupted bake left: they may be damaged, or made by someone else.
+// Tests levels stored by an interrupted bake, which may be damaged or forged.
 
 #include "compress/bake/write/lod_store.h"
 
@@ -21,7 +21,7 @@
 namespace packtrace::test {
 namespace {
 
-/// What a kept file begins with.
+/// The header of a stored file.
 struct StoreHeader {
   std::array<uint8_t, 8> magic;
   uint32_t version, header_bytes;
@@ -34,7 +34,7 @@ struct StoreHeader {
 };
 enum Part : size_t { kLevels, kClusters, kPayload, kGroups, kLinks };
 
-/// One geometry, and what a bake keeps of it.
+/// A geometry, and the file that a bake stores for it.
 class KeptLevels {
 public:
   KeptLevels() {
@@ -53,7 +53,7 @@ public:
   size_t offset(Part part, size_t byte = 0) const { return static_cast<size_t>(header_.sections[part].offset) + byte; }
   size_t bytes(Part part) const { return static_cast<size_t>(header_.sections[part].bytes); }
 
-  /// Bakes with these bytes in the folder, whose hashes are made right. It must not fail.
+  /// Bakes with these bytes in the folder, after making their hashes valid. Must not fail.
   BakedScene bake_with(std::vector<std::byte> kept) const {
     rehash<StoreHeader>(kept);
     return bake_with_exactly(kept);
@@ -63,7 +63,7 @@ public:
     return bake(scene_, config_);
   }
 
-  /// Whether a change is noticed: then the levels are made again.
+  /// Whether a change is detected, so that the levels are built again.
   template <typename T>
   bool refuses(Part part, size_t byte, T value) const {
     std::vector<std::byte> damaged = good_;
@@ -98,7 +98,7 @@ TEST(LodStore, DamagedLevelsAreMadeAgain) {
   }
 }
 
-/// Hashes are right, what they are of is not.
+/// The hashes are valid, the contents are not.
 TEST(LodStore, LevelsThatNoFileMayHoldAreMadeAgain) {
   const KeptLevels kept;
   const size_t cluster = 3 * sizeof(baked::ClusterRecord); // one of them
@@ -123,11 +123,11 @@ TEST(LodStore, LevelsThatNoFileMayHoldAreMadeAgain) {
   EXPECT_TRUE(kept.refuses(kLinks, offsetof(baked::LodLinkRecord, group), ~0u));
   EXPECT_TRUE(kept.refuses(kLinks, offsetof(baked::LodLinkRecord, generating_group), 0u));
   EXPECT_TRUE(kept.refuses(kLinks, kept.bytes(kLinks) - sizeof(uint32_t), ~0u));
-  // Of a level: triangles, bytes of the payload, bits of streams, counts, clusters by class, bounds, error.
+  // Fields of a level: triangles, payload bytes, stream bits, counts, clusters by class, bounds, error.
   constexpr size_t kLevelBytes = 128;
   for (const size_t level : {size_t{0}, kLevelBytes})
     for (size_t byte = 0; byte < kLevelBytes; byte += 4) {
-      if (level == 0 && byte >= 56 && byte < 120) continue; // counts and bounds of level 0 are the geometry's own
+      if (level == 0 && byte >= 56 && byte < 120) continue; // counts and bounds of level 0 are taken from the geometry
       EXPECT_TRUE(kept.refuses(kLevels, level + byte, 0x7fffffffu)) << "level " << level / kLevelBytes << ", " << byte;
     }
 }
@@ -139,18 +139,18 @@ TEST(LodStore, WhateverItHoldsABakeSucceeds) {
   constexpr uint32_t kRepeats = 300;
   for (uint32_t repeat = 0; repeat < kRepeats; ++repeat) {
     std::vector<std::byte> damaged = kept.good();
-    const size_t first = repeat % 4 == 0 ? 16 : sizeof(StoreHeader); // the header's counts as well
+    const size_t first = repeat % 4 == 0 ? 16 : sizeof(StoreHeader); // the header's counts too
     for (uint32_t change = 0; change < 1 + random.bits() % 4; ++change) {
       const size_t at = first + random.bits() % (damaged.size() - first);
       damaged[at] = static_cast<std::byte>(random.bits() % 3 == 0 ? 0xff : random.bits() % 256);
     }
-    const BakedScene after = kept.bake_with(std::move(damaged)); // reads back what it made
+    const BakedScene after = kept.bake_with(std::move(damaged)); // reads back the baked file
     made_again += after.report.resumed_geometries == 0;
     if (after.report.resumed_geometries == 0) {
       EXPECT_TRUE(after.bytes == kept.whole()) << repeat;
     }
   }
-  EXPECT_GT(made_again, kRepeats / 4); // of payloads most changes are other levels, as good as any
+  EXPECT_GT(made_again, kRepeats / 4); // most changes to the payload result in other valid levels
 }
 
 TEST(LodStore, ClearNamesWhatItCannotRemove) {
@@ -172,7 +172,7 @@ TEST(LodStore, ClearNamesWhatItCannotRemove) {
   }
   size_t left = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder.path() / "levels")) left += !entry.path().empty();
-  EXPECT_EQ(left, 2u); // the others are gone
+  EXPECT_EQ(left, 2u); // the others were removed
 }
 
 TEST(LodStore, LevelsThatStayDoNotSpoilTheFile) {

@@ -1,4 +1,4 @@
-// Geometries that touch: what level 0 has closed stays closed, whatever detail each of them has.
+// Tests geometries that touch: what is closed at level 0 stays closed for any combination of levels.
 
 #include "compress/bake/lod/shared_borders.h"
 
@@ -20,7 +20,7 @@
 namespace packtrace::test {
 namespace {
 
-/// The mesh in parts that share the points between them and nothing else: part_of(centroid) says which.
+/// Splits the mesh into parts that share only the points between them; part_of(centroid) returns the part.
 template <typename PartOf>
 std::vector<Mesh> split_mesh(const Mesh& mesh, const PartOf& part_of) {
   std::vector<Mesh> parts;
@@ -46,7 +46,7 @@ Scene scene_of_parts(const std::vector<Mesh>& parts) {
   return scene;
 }
 
-/// A torus in three parts: their borders run across, along and in saw teeth.
+/// A torus in three parts, with borders across it, along it and in saw teeth.
 std::vector<Mesh> torus_parts() {
   return split_mesh(torus_mesh(96, 64), [](Vec3 p) { return p.x < 0.0f ? 0u : p.z < 0.0f ? 1u : 2u; });
 }
@@ -58,7 +58,7 @@ BakeConfig lod_config() {
   return config;
 }
 
-/// Levels of all geometries, on the finest of their nested lattices.
+/// LOD levels of all geometries, on the finest of their nested lattices.
 std::vector<ClusterLod> bake_levels(const Scene& scene, const BakeConfig& config = lod_config()) {
   const BakedFile file = BakedFile::from_bytes(bake(scene, config).bytes);
   const auto exponent = [&](uint32_t g) { return file.geometries()[g].step_exponent; };
@@ -75,7 +75,7 @@ std::vector<ClusterLod> bake_levels(const Scene& scene, const BakeConfig& config
 
 using Chain = std::map<std::pair<LatticePoint, LatticePoint>, int64_t>;
 
-/// Adds the cut's boundary; edges that cancel go.
+/// Adds the boundary of a cut; edges that cancel are removed.
 void add_boundary(Chain& chain, const ClusterLod& lod, const std::vector<uint32_t>& cut) {
   for (const BoundaryEdge& edge : boundary(lod, cut)) {
     const auto at = chain.emplace(std::pair(edge.a, edge.b), 0).first;
@@ -83,7 +83,7 @@ void add_boundary(Chain& chain, const ClusterLod& lod, const std::vector<uint32_
   }
 }
 
-/// What a view from `eye` takes: a group passes where its error is at most `slope` times its distance.
+/// The cut of a view from `eye`: a group passes if its error is at most `slope` times its distance.
 std::vector<uint32_t> cut_from(const ClusterLod& lod, DVec3 eye, double slope) {
   const auto passes = [&](uint32_t number) {
     const LodGroup& group = lod.groups[number];
@@ -111,7 +111,7 @@ TEST(SharedBorders, AClosedSurfaceOfSeveralGeometriesIsClosedAtEveryPairOfLevels
   for (const ClusterLod& part : parts) ASSERT_GE(part.level_count, 4u);
   for (size_t a = 0; a < parts.size(); ++a)
     for (size_t b = a + 1; b < parts.size(); ++b) {
-      Chain rest; // the third part stays at level 0
+      Chain rest; // the third part remains at level 0
       add_boundary(rest, parts[3 - a - b], cut_clusters(parts[3 - a - b], 0.0));
       for (const double in_a : some_thresholds(parts[a], 12))
         for (const double in_b : some_thresholds(parts[b], 12)) {
@@ -137,7 +137,7 @@ TEST(SharedBorders, CutsOfAnyViewsAreClosedAcrossGeometries) {
   }
 }
 
-/// Where level 0 is open nothing is promised, but the border in common is the same edge by edge.
+/// Level 0 is open here, so the surface is not closed, but the common border is the same edge by edge.
 TEST(SharedBorders, TheSeamOfTwoOpenSheetsStaysAsItIs) {
   const std::vector<Mesh> meshes =
       split_mesh(grid_mesh(60, 0.05f), [](Vec3 p) { return p.x + 0.1f * std::sin(20.0f * p.y) < 0.5f ? 0u : 1u; });
@@ -160,10 +160,10 @@ TEST(SharedBorders, TheSeamOfTwoOpenSheetsStaysAsItIs) {
       }
       EXPECT_LE(chain.size(), whole[i].size());
     }
-  EXPECT_LT(level_triangles(parts[0], 2), level_triangles(parts[0], 0) / 3); // and the inside is simplified
+  EXPECT_LT(level_triangles(parts[0], 2), level_triangles(parts[0], 0) / 3); // the interior is simplified
 }
 
-/// A wall that stands on a floor: its border runs over points inside the floor.
+/// A wall that stands on a floor: its border runs over interior points of the floor.
 TEST(SharedBorders, ABorderOnTheInsideOfAnotherGeometryStays) {
   Mesh floor = grid_mesh(40), wall = grid_mesh(40);
   for (Vec3& p : wall.positions) p = Vec3(p.x, 0.5f, p.y);
@@ -207,7 +207,7 @@ TEST(SharedBorders, GeometriesWithoutLevelsOfTheirOwnKeepTheirNeighboursBorder) 
   }
 }
 
-/// Layers that lie on each other have all positions in common, and no border.
+/// Coincident layers have all positions in common but no border.
 TEST(SharedBorders, ClosedShellsInOnePlaceAreSimplified) {
   Mesh inner = torus_mesh(96, 64);
   for (Triangle& t : inner.triangles) std::swap(t.y, t.z);
@@ -236,7 +236,7 @@ std::vector<std::vector<uint8_t>> locks_of(const std::vector<QuantizedGeometry>&
   return locks;
 }
 
-/// Positions of the coarser lattice are positions of the finer one.
+/// Positions on the coarser lattice are also on the finer one.
 TEST(SharedBorders, AreFoundBetweenGridsOfDifferentSteps) {
   Mesh left = grid_mesh(16), right = left;
   for (Vec3& p : right.positions) p.x += 1.0f;
@@ -250,7 +250,7 @@ TEST(SharedBorders, AreFoundBetweenGridsOfDifferentSteps) {
       for (size_t p = 0; p < locks[i].size(); ++p) EXPECT_EQ(locks[i][p] != 0, geometries[i].positions[p][0] == seam);
     }
   }
-  // Another mantissa, another position: 9 steps of 8 are 8 steps of 9.
+  // With another mantissa, positions coincide only at multiples: 9 steps of 8 are 8 steps of 9.
   const auto locks = locks_of({on_grid(left, {8, -8}), on_grid(right, {9, -8})});
   for (const auto& of_one : locks) EXPECT_LT(std::ranges::count(of_one, 1), 17);
 }
@@ -271,7 +271,7 @@ TEST(SharedBorders, AGeometryAloneHasNone) {
 TEST(SharedBorders, SheetsOfTwoLayersHaveABorder) {
   const QuantizedGeometry sheet = on_grid(twice(grid_mesh(16), true), {8, -8});
   EXPECT_EQ(std::ranges::count(border_positions(sheet), 1), 289); // each edge has four triangles
-  Mesh folded; // two triangles that lie on each other, and are one closed surface
+  Mesh folded;                                                    // two coincident triangles that form a closed surface
   folded.positions = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0)};
   folded.triangles = {Triangle(0, 1, 2), Triangle(0, 2, 1)};
   EXPECT_EQ(std::ranges::count(border_positions(on_grid(folded, {8, -8})), 1), 3);
@@ -287,12 +287,12 @@ TEST(SharedBorders, SameBytesForAnyThreadCount) {
   EXPECT_TRUE(bytes(1) == bytes(4));
 }
 
-/// The same geometry in other company has other locks.
+/// The locks of a geometry depend on its neighbours.
 TEST(SharedBorders, LevelsOfAnInterruptedBakeAreNotTakenForOtherNeighbours) {
   const SceneFolder folder;
   const std::vector<Mesh> parts = torus_parts();
   BakeConfig config = lod_config();
-  config.precision_kind = PrecisionKind::kAbsolute; // the same grid for any scene
+  config.precision_kind = PrecisionKind::kAbsolute; // the same grid in any scene
   config.precision = 0.001;
   const std::vector<std::byte> alone = bake(scene_of_parts({parts[0]}), config).bytes;
   config.resume = folder.path() / "levels";

@@ -88,7 +88,7 @@ TEST(Simplify, AFlatPlaneStaysFlatAndWhole) {
   EXPECT_DOUBLE_EQ(area, 2.0 * 3200.0 * 3200.0);
 }
 
-/// How far the farthest point is from the surface of the mesh.
+/// Maximum distance of the points from the mesh's surface.
 double farthest_from(const std::vector<DVec3>& points, const SimplifyMesh& mesh) {
   double farthest = 0.0;
   for (const DVec3& p : points) {
@@ -101,7 +101,7 @@ double farthest_from(const std::vector<DVec3>& points, const SimplifyMesh& mesh)
   return farthest;
 }
 
-/// The sides of a polygon, each of triangles whose three corners lie in a line.
+/// The sides of a polygon, made of triangles with collinear corners.
 TEST(Simplify, LinesOfThreePointsKeepTheirShape) {
   constexpr uint32_t kSides = 16, kCut = 8;
   constexpr double kRadius = 1e5;
@@ -124,7 +124,7 @@ TEST(Simplify, LinesOfThreePointsKeepTheirShape) {
   EXPECT_LT(farthest_from(points, mesh), 0.02 * kRadius);
 }
 
-/// A closed surface around the x axis, of rings between two ends.
+/// A closed surface of revolution around the x axis, of rings between two end points.
 SimplifyMesh turned(const std::vector<std::pair<double, double>>& x_and_radius, uint32_t around) {
   SimplifyMesh mesh;
   for (const auto& [x, radius] : x_and_radius)
@@ -151,12 +151,12 @@ SimplifyMesh turned(const std::vector<std::pair<double, double>>& x_and_radius, 
 
 TEST(Simplify, AHoleMayClose) {
   SimplifyMesh mesh = whole_number_mesh(torus_mesh(60, 24), 1e5);
-  simplify(mesh, to(8)); // a torus takes 14
+  simplify(mesh, to(8)); // a torus needs 14
   EXPECT_LE(mesh.triangles.size(), 8u);
 }
 
 TEST(Simplify, AThinBridgeStays) {
-  std::vector<std::pair<double, double>> rings; // two balls and a rod between them
+  std::vector<std::pair<double, double>> rings; // two balls connected by a rod
   constexpr double kBall = 3000.0, kRod = 20.0, kLength = 40000.0;
   for (int i = 1; i < 20; ++i)
     rings.emplace_back(-kBall * std::cos(M_PI * i / 20), std::max(kRod, kBall * std::sin(M_PI * i / 20)));
@@ -170,7 +170,7 @@ TEST(Simplify, AThinBridgeStays) {
   EXPECT_LT(farthest_from(points, mesh), 0.5 * kBall);
 }
 
-/// Triangles that hang together at points only: each is all there is between its corners.
+/// Triangles connected at points only: each is the only connection between its corners.
 TEST(Simplify, AChainOfTrianglesGetsShorter) {
   SimplifyMesh mesh;
   for (uint32_t i = 0; i < 64; ++i) {
@@ -218,7 +218,7 @@ TEST(Simplify, MaterialSeamsStay) {
 TEST(Simplify, WedgesOfOnePointStayApart) {
   const Mesh faceted = half_faceted(torus_mesh(40, 20));
   SimplifyMesh mesh = whole_number_mesh(torus_mesh(40, 20), 1e5);
-  for (size_t i = 0; i < mesh.triangles.size(); ++i) { // each triangle with a normal of its own
+  for (size_t i = 0; i < mesh.triangles.size(); ++i) { // each triangle gets its own normal
     const auto wedge = static_cast<uint32_t>(mesh.wedges.size());
     mesh.wedges.push_back({glm::normalize(DVec3(faceted.normals[i % faceted.normals.size()])), wedge});
     mesh.triangles[i].wedges = Triangle(wedge);
@@ -233,7 +233,7 @@ TEST(Simplify, WedgesOfOnePointStayApart) {
 }
 
 TEST(LoosePieces, GoNearestFirstAndCountTheirDistance) {
-  SimplifyMesh mesh; // five small triangles along a line, at 0, 10, 30, 70, 150
+  SimplifyMesh mesh; // five small triangles on a line, at 0, 10, 30, 70, 150
   for (const double x : {0.0, 10.0, 30.0, 70.0, 150.0}) {
     const auto first = static_cast<uint32_t>(mesh.points.size());
     for (const DVec3& p : {DVec3(x, 0, 0), DVec3(x, 1, 0), DVec3(x, 0, 1)}) mesh.points.push_back(p);
@@ -251,7 +251,7 @@ TEST(LoosePieces, GoNearestFirstAndCountTheirDistance) {
 }
 
 TEST(LoosePieces, DearOnesStayIfEnoughGo) {
-  SimplifyMesh mesh; // pairs of triangles 1 apart, pairs 100 apart
+  SimplifyMesh mesh; // pairs of triangles at distance 1, pairs at distance 100
   for (int pair = 0; pair < 4; ++pair)
     for (const double x : {100.0 * pair, 100.0 * pair + 1.0}) {
       const auto first = static_cast<uint32_t>(mesh.points.size());
@@ -259,10 +259,10 @@ TEST(LoosePieces, DearOnesStayIfEnoughGo) {
       mesh.triangles.push_back({Triangle(first, first + 1, first + 2), Triangle(Wedge::kNone), 0, 0.5});
     }
   mesh.locked.assign(mesh.points.size(), 0);
-  drop_loose_pieces(mesh, {1, 6}); // those 1 away cost 1.5, which is three times the error that is there
+  drop_loose_pieces(mesh, {1, 6}); // pieces at distance 1 cost 1.5, which is three times the largest error
   ASSERT_EQ(mesh.triangles.size(), 4u);
   for (const LodTriangle& t : mesh.triangles) EXPECT_DOUBLE_EQ(t.error, 1.5);
-  drop_loose_pieces(mesh, {1, 3}); // now they must
+  drop_loose_pieces(mesh, {1, 3}); // target 3: expensive pieces must go too
   ASSERT_EQ(mesh.triangles.size(), 3u);
 }
 

@@ -26,7 +26,7 @@ bool visit(RTCPointQueryFunctionArguments* args) {
   const double distance2 = glm::dot(d, d);
   if (!(distance2 < query.best2)) return false;
   query.best2 = distance2;
-  // A little more, as boxes and queries are rounded to float.
+  // Slightly larger, as boxes and queries are rounded to float.
   args->query->radius = static_cast<float>(std::sqrt(distance2) * 1.000001);
   return true;
 }
@@ -83,7 +83,7 @@ DistanceStats surface_distance(std::span<const DVec3> from_positions, std::span<
     double largest = std::max({to(a), to(b), to(c)});
     const auto count = 1 + static_cast<size_t>(total > 0.0 ? areas[i] / total * static_cast<double>(samples) : 0.0);
     double sum2 = 0.0;
-    for (size_t k = 0; k < count; ++k) { // a lattice of the plane, folded into the triangle
+    for (size_t k = 0; k < count; ++k) { // a planar lattice folded into the triangle
       double u = std::fmod(0.5 + static_cast<double>(k) * 0.7548776662466927, 1.0);
       double v = std::fmod(0.25 + static_cast<double>(k) * 0.5698402909980532, 1.0);
       if (u + v > 1.0) u = 1.0 - u, v = 1.0 - v;

@@ -10,16 +10,16 @@
 
 namespace packtrace {
 
-/// A triangle mesh that answers how far points are from it.
+/// Computes distances of points from a triangle mesh.
 class SurfaceDistance {
 public:
-  /// Both spans must outlive it. Positions within the float range, at least one triangle.
+  /// @param positions, triangles must outlive this object; positions in float range, at least one triangle
   SurfaceDistance(std::span<const DVec3> positions, std::span<const Triangle> triangles);
   ~SurfaceDistance();
   SurfaceDistance(const SurfaceDistance&) = delete;
   SurfaceDistance& operator=(const SurfaceDistance&) = delete;
 
-  /// Distance of the nearest point of the mesh, in double from the triangle found.
+  /// Distance of the nearest point of the mesh, computed in double for the nearest triangle.
   double operator()(DVec3 point) const;
 
 private:
@@ -29,13 +29,13 @@ private:
   RTCScene scene_ = nullptr;
 };
 
-/// How far one surface is from another, over many points of it.
+/// The distance of one surface from another, over many sample points.
 struct DistanceStats {
   double rms = 0.0, max = 0.0;
 };
 
-/// From `from`, sampled at its corners and at about `samples` more points spread evenly over its area (the same ones
-/// each time), to the other.
+/// Samples `from` at its corners and at about `samples` more points, evenly over its area and the same in each call,
+/// and measures their distances from the other surface.
 DistanceStats surface_distance(std::span<const DVec3> from_positions, std::span<const Triangle> from_triangles,
                                const SurfaceDistance& to, size_t samples);
 

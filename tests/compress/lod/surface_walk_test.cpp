@@ -1,4 +1,4 @@
-// Where simplify() moved a surface: its image on the new one, and what counts as surface.
+// Tests the image of a source surface on the simplified one, and which degenerate triangles count as surface.
 
 #include <algorithm>
 #include <cmath>
@@ -17,10 +17,10 @@
 namespace packtrace::test {
 namespace {
 
-/// A bumpy square, simplified to a part of its triangles.
+/// A bumpy square, simplified to a share of its triangles.
 struct Simplified {
-  /// @param steepness of the bumps
-  /// @param ragged whether the border is not straight, and may move
+  /// @param steepness height factor of the bumps
+  /// @param ragged whether the border is irregular and may move
   explicit Simplified(double kept, double steepness = 1.0, bool ragged = false) {
     constexpr uint32_t kCells = 14;
     Random random(5);
@@ -43,7 +43,7 @@ struct Simplified {
     simplify(mesh, {static_cast<uint32_t>(kept * static_cast<double>(triangles.size())), seams, false});
   }
 
-  std::vector<DVec3> points; ///< before
+  std::vector<DVec3> points; ///< of the source surface
   std::vector<LodTriangle> triangles;
   SimplifyMesh mesh;
 };
@@ -52,7 +52,7 @@ class TriangleImagesOf : public testing::TestWithParam<double> {
 protected:
   TriangleImagesOf() { after_.link(); }
 
-  /// The distance of a point from all of the surface after.
+  /// Distance of a point from the whole simplified surface.
   double distance(const DVec3& p) const {
     double least = 1e300;
     for (uint32_t s = 0; s < s_.mesh.triangles.size(); ++s) least = std::min(least, after_.surface().distance(p, s));
@@ -96,7 +96,7 @@ TEST_P(TriangleImagesOf, CoverTrianglesAfterOnceAwayFromBorders) {
   std::vector<uint8_t> mapped(s_.triangles.size());
   std::vector<TriangleImages::Image> images(s_.triangles.size());
   for (uint32_t t = 0; t < s_.triangles.size(); ++t) {
-    mapped[t] = t % 40 != 0 && images_.find(t, images[t]); // some are left out
+    mapped[t] = t % 40 != 0 && images_.find(t, images[t]); // some are left out on purpose
     if (mapped[t] != 0) images_.add_shares(t, images[t], all, shares);
   }
   ImageCover cover(walk_, images_, s_.mesh);
@@ -119,7 +119,7 @@ TEST_P(TriangleImagesOf, CoverTrianglesAfterOnceAwayFromBorders) {
 
 INSTANTIATE_TEST_SUITE_P(Kept, TriangleImagesOf, testing::Values(0.9, 0.5, 0.25));
 
-/// Points of a triangle, its corners among them: the centres and corners of equal parts.
+/// Sample points of a triangle, including its corners: the corners and centres of equal parts.
 std::vector<DVec3> points_in(const DVec3& a, const DVec3& b, const DVec3& c, int parts) {
   std::vector<DVec3> points;
   for (int i = 0; i <= parts; ++i)
@@ -178,8 +178,8 @@ TEST(LineCover, HoldsSidesOfTrianglesOnly) {
   EXPECT_TRUE(cover.holds({0, 1, 1}));
   EXPECT_TRUE(cover.holds({2, 0, 2}));
   EXPECT_TRUE(cover.holds({1, 1, 1}));
-  EXPECT_FALSE(cover.holds({0, 3, 3})); // to a point away from it
-  EXPECT_FALSE(cover.holds({3, 4, 3})); // alone
+  EXPECT_FALSE(cover.holds({0, 3, 3})); // ends at a point outside all proper triangles
+  EXPECT_FALSE(cover.holds({3, 4, 3})); // isolated
   EXPECT_FALSE(cover.holds({5, 5, 5}));
 }
 

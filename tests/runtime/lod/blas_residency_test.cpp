@@ -14,7 +14,7 @@
 namespace packtrace {
 namespace {
 
-/// A few geometries all around, and a camera that flies through.
+/// A few geometries in all directions, and a camera that flies through them.
 class Flight : public testing::TestWithParam<SharingScheme> {
 protected:
   Flight() {
@@ -33,7 +33,7 @@ protected:
   SharingConfig config;
 };
 
-/// Everything about what an instance uses, whatever its handle.
+/// Identifies what an instance uses, independent of its handle.
 using Content = std::tuple<uint32_t, BlasKind, uint32_t, std::vector<uint64_t>>;
 Content content(const ResidentBlas& blas) { return {blas.geometry, blas.kind, blas.step, blas.passed}; }
 Content content(const LodSharing& sharing, const LodPlan& plan, const PlannedBlas& blas) {
@@ -41,7 +41,7 @@ Content content(const LodSharing& sharing, const LodPlan& plan, const PlannedBla
   return {blas.geometry, blas.kind, 0, passed_of_blas(sharing.geometries()[blas.geometry], {}, plan, blas)};
 }
 
-/// Follows builds and drops, as a renderer would.
+/// Tracks builds and drops, as a renderer would.
 class Follower {
 public:
   explicit Follower(size_t lowest) {
@@ -107,7 +107,7 @@ TEST_P(Flight, EndsInThePlanFromScratch) {
     for (uint32_t i = 0; i < instances.size(); ++i)
       EXPECT_EQ(content(residency.blas(last.blas_of_instance[i])),
                 content(fresh, expected, expected.blas[expected.blas_of_instance[i]]));
-    std::set<Content> needed; // and nothing else is kept: the coarsest and what is used
+    std::set<Content> needed; // only the coarsest cuts and what is used are kept
     for (uint32_t g = 0; g < geometries.size(); ++g)
       needed.insert({g, BlasKind::kLowest, static_cast<uint32_t>(fresh.steps(g).size()) - 1, {}});
     for (const PlannedBlas& blas : expected.blas) needed.insert(content(fresh, expected, blas));
@@ -129,10 +129,10 @@ TEST_P(Flight, AStillCameraChangesNothing) {
   }
 }
 
-/// While builds wait: whoever is not counted as coarse has detail enough everywhere, and nobody misses the error by
-/// more than what is said.
+/// While builds wait, instances that are not counted as coarse have enough detail everywhere, and no instance exceeds
+/// its error by more than the stated ratio.
 TEST_P(Flight, SaysHonestlyWhereDetailIsMissing) {
-  if (config.scheme == SharingScheme::kOff) return; // never coarse, never waits for detail
+  if (config.scheme == SharingScheme::kOff) return; // always level 0, so never coarse
   LodSharing sharing(geometries, instances, config);
   ResidencyConfig residency_config;
   residency_config.triangles_per_frame = 3'000;
@@ -159,13 +159,13 @@ TEST_P(Flight, SaysHonestlyWhereDetailIsMissing) {
       }
       coarse += !enough;
     }
-    EXPECT_LE(coarse, result.coarse_instances); // bounds by the whole ball may count too many
+    EXPECT_LE(coarse, result.coarse_instances); // bounds from the whole sphere may count more instances
     EXPECT_EQ(result.largest_error_ratio > 1.0, result.coarse_instances > 0);
     coarse_frames += coarse > 0;
     waiting += result.waiting_instances;
     coarse_then_fine = result.coarse_instances;
   }
-  EXPECT_GT(coarse_frames, 0u); // else the test says nothing
+  EXPECT_GT(coarse_frames, 0u); // otherwise nothing was tested
   EXPECT_GT(waiting, 0u);
   EXPECT_EQ(coarse_then_fine, 0u);
 }
@@ -189,7 +189,7 @@ TEST(BlasResidency, KeepsUnusedStepsAsLongAsItSays) {
   ASSERT_EQ(far.blas[0].kind, BlasKind::kLowest);
   ASSERT_EQ(residency.update(near).built.size(), 1u);
   for (int frame = 1; frame <= 5; ++frame) ASSERT_TRUE(residency.update(far).dropped.empty());
-  EXPECT_EQ(residency.update(near).built.size(), 0u); // it was still there
+  EXPECT_EQ(residency.update(near).built.size(), 0u); // was still resident
   for (int frame = 1; frame <= 5; ++frame) ASSERT_TRUE(residency.update(far).dropped.empty());
   EXPECT_EQ(residency.update(far).dropped.size(), 1u);
   EXPECT_EQ(residency.update(near).built.size(), 1u);

@@ -12,14 +12,14 @@
 namespace packtrace {
 namespace {
 
-/// Memory of a device that runs frames late, and notices what must not be.
+/// A device whose frames finish late, and which checks every memory access.
 class FakeDevice : public BlasMemoryBackend {
 public:
   explicit FakeDevice(uint32_t frames_in_flight) : in_flight_(frames_in_flight) {}
 
   void set_size(uint32_t blas, uint64_t worst_case, uint64_t compacted) { sizes_[blas] = {worst_case, compacted}; }
   void begin_frame() { ++frame_; }
-  /// A frame that traces it.
+  /// Records a frame that traces the buffer.
   void trace(BlasBuffer buffer) {
     ASSERT_TRUE(live_.contains(buffer)) << "traces memory that was released";
     ASSERT_TRUE(live_[buffer].filled) << "traces memory that nothing was built into";
@@ -72,8 +72,8 @@ private:
   std::map<uint32_t, uint64_t> built_;
 };
 
-/// Random builds and removals over many frames, then rest: memory is never touched when it must not be, the books are
-/// right, and everything ends compacted.
+/// Random builds and removals over many frames, then idle frames: memory is never accessed after release or before its
+/// build, the byte counts are right, and everything ends compacted.
 TEST(Compaction, RandomFramesEndCompactedAndNeverFreeWhatIsInFlight) {
   size_t copies = 0;
   for (uint32_t seed = 1; seed <= 60; ++seed) {
@@ -83,20 +83,20 @@ TEST(Compaction, RandomFramesEndCompactedAndNeverFreeWhatIsInFlight) {
     config.bytes_per_frame = seed % 3 == 0 ? 1 : seed % 3 == 1 ? 5000 : uint64_t{1} << 40;
     FakeDevice device(config.frames_in_flight);
     BlasCompactor compactor(device, config);
-    std::map<uint32_t, bool> live; // animated?
+    std::map<uint32_t, bool> live; // value: animated
     std::map<uint32_t, std::pair<uint64_t, uint64_t>> sizes;
     const auto frame = [&](bool busy) {
       device.begin_frame();
       device.take_copied();
       compactor.begin_frame();
       const uint64_t copied = device.take_copied();
-      EXPECT_LE(copied, std::max<uint64_t>(config.bytes_per_frame, 4400)); // one in any case
+      EXPECT_LE(copied, std::max<uint64_t>(config.bytes_per_frame, 4400)); // at least one is copied
       for (uint32_t k = 0; busy && k < random.bits() % 6; ++k) {
         const uint32_t blas = random.bits() % 40;
         if (live.contains(blas)) {
           compactor.remove(blas);
           live.erase(blas);
-          if (random.bits() % 2 == 0) continue; // else the number is used again in the same frame
+          if (random.bits() % 2 == 0) continue; // otherwise the number is reused in the same frame
         }
         const uint64_t worst = 1 + random.bits() % 4000, compacted = worst * (random.bits() % 110) / 100;
         device.set_size(blas, worst, compacted);
@@ -153,7 +153,7 @@ TEST(Compaction, GoesThroughItsStatesInFrames) {
     EXPECT_EQ(compactor.state_of(7), BlasMemoryState::kBuilding);
     EXPECT_EQ(compactor.buffer_of(7), source);
   }
-  begin(); // frame 4: frame 1 has run; measured and copied
+  begin(); // frame 4: frame 1 has finished; measured and copied
   EXPECT_EQ(compactor.state_of(7), BlasMemoryState::kSettled);
   EXPECT_NE(compactor.buffer_of(7), source);
   EXPECT_EQ(compactor.resident_bytes(), 1400u);
@@ -178,7 +178,7 @@ TEST(Compaction, CopiesWithinItsBudgetAndOneInAnyCase) {
   device.begin_frame();
   compactor.begin_frame();
   for (uint32_t blas = 0; blas < 7; ++blas) compactor.add(blas, 0);
-  for (const uint64_t copied : {200, 200, 200, 900, 0}) { // the last is over the budget by itself
+  for (const uint64_t copied : {200, 200, 200, 900, 0}) { // the fourth alone exceeds the budget
     device.begin_frame();
     compactor.begin_frame();
     EXPECT_EQ(device.take_copied(), copied);

@@ -14,7 +14,7 @@ namespace {
 
 using test::LodRecords;
 
-/// One instance of one geometry seen from somewhere.
+/// An instance of a geometry and a view.
 struct Case {
   const LodGeometry& geometry;
   DAffine transform;
@@ -39,7 +39,7 @@ struct Case {
   }
 };
 
-/// The definition: each cluster asks for its two groups.
+/// The cut by definition: tests both groups of each cluster.
 std::vector<uint32_t> brute_force(const Case& c) {
   const InstanceMetric metric = c.metric();
   const auto passes = [&](uint32_t group) {
@@ -55,7 +55,7 @@ std::vector<uint32_t> brute_force(const Case& c) {
   return clusters;
 }
 
-/// From the groups that nothing was made from downwards: stops where a group passes.
+/// The cut by traversal from the groups without coarser clusters downwards, stopping where a group passes.
 std::vector<uint32_t> traverse(const Case& c) {
   const InstanceMetric metric = c.metric();
   const std::span<const baked::LodLinkRecord> links = c.geometry.links();
@@ -66,7 +66,7 @@ std::vector<uint32_t> traverse(const Case& c) {
   }
   std::vector<bool> visited(members.size());
   std::vector<uint32_t> clusters;
-  const std::function<void(uint32_t)> visit = [&](uint32_t group) { // one that does not pass
+  const std::function<void(uint32_t)> visit = [&](uint32_t group) { // for groups that do not pass
     if (visited[group]) return;
     visited[group] = true;
     for (const uint32_t i : members[group]) {
@@ -78,12 +78,13 @@ std::vector<uint32_t> traverse(const Case& c) {
     }
   };
   for (uint32_t group = 0; group < members.size(); ++group)
-    if (c.geometry.rank_of_group(group) == kNoRank) visit(group); // terminal: the roots
+    if (c.geometry.rank_of_group(group) == kNoRank) visit(group); // terminal groups are the roots
   std::sort(clusters.begin(), clusters.end());
   return clusters;
 }
 
-/// From each cluster of level 0 up along the clusters made from its group, whichever of them is taken.
+/// Checks that every chain from a cluster of level 0, through any clusters made from its group, has one cluster in the
+/// cut.
 void expect_each_chain_cut_once(const LodGeometry& geometry, const std::vector<uint32_t>& cut) {
   const std::span<const baked::LodLinkRecord> links = geometry.links();
   std::vector<std::vector<uint32_t>> made;
@@ -94,7 +95,7 @@ void expect_each_chain_cut_once(const LodGeometry& geometry, const std::vector<u
       if (links[i].generating_group >= made.size()) made.resize(links[i].generating_group + 1);
       made[links[i].generating_group].push_back(i);
     }
-  // How many clusters of the cut lie above a cluster, itself included: the same along all chains.
+  // Number of clusters of the cut at or above each cluster; must be equal along all chains.
   std::vector<int> least(links.size(), -1), most(links.size(), -1);
   const std::function<void(uint32_t)> count = [&](uint32_t i) {
     if (least[i] >= 0) return;
@@ -115,7 +116,7 @@ void expect_each_chain_cut_once(const LodGeometry& geometry, const std::vector<u
     }
 }
 
-/// Eyes at random, inside the ball, on its surface, and where one group's threshold just passes.
+/// Eyes at random positions, inside the sphere, on its surface, and where one group just passes.
 std::vector<Case> cases_of(const LodGeometry& geometry, uint32_t count, uint32_t seed) {
   test::Random random(seed);
   std::vector<Case> cases;
@@ -169,7 +170,7 @@ TEST(LodCut, CutsEachChainOnce) {
     const LodGeometry geometry = test::random_records(50, seed).geometry();
     for (const Case& c : cases_of(geometry, 200, seed + 100))
       expect_each_chain_cut_once(geometry, clusters_of_cut(geometry, c.cut()));
-    std::vector<uint64_t> passed(cut_words(geometry)); // steps too
+    std::vector<uint64_t> passed(cut_words(geometry)); // also for steps
     for (const LodStep& step : ratio_steps(geometry, 1.1)) {
       set_prefix(passed, step.passed);
       expect_each_chain_cut_once(geometry, clusters_of_cut(geometry, passed));
@@ -177,7 +178,7 @@ TEST(LodCut, CutsEachChainOnce) {
   }
 }
 
-/// The range against actual cuts, for maps that are not uniform, sheared and mirrored.
+/// The range against actual cuts, with non-uniform, sheared and mirrored transforms.
 TEST(LodCut, StaysWithinTheRange) {
   size_t cases = 0, tight_min = 0, tight_max = 0;
   for (uint32_t seed = 1; seed <= 40; ++seed) {
@@ -200,7 +201,7 @@ TEST(LodCut, StaysWithinTheRange) {
     }
   }
   EXPECT_GE(cases, 20'000u);
-  EXPECT_GT(tight_min, cases / 2); // a range that says nothing would hold too
+  EXPECT_GT(tight_min, cases / 2); // the range must also be tight
   EXPECT_GT(tight_max, cases / 4);
 }
 

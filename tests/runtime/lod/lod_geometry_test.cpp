@@ -53,7 +53,7 @@ TEST(LodGeometry, LevelFactsAreThoseOfTheRecords) {
 
 TEST(LodGeometry, BallsHoldThoseBelowAndTheWholeHoldsAll) {
   LodRecords records = test::random_records(40, 3);
-  for (baked::LodGroupRecord& g : records.groups) g.radius *= 0.9f; // a file that does not keep its promise
+  for (baked::LodGroupRecord& g : records.groups) g.radius *= 0.9f; // spheres that do not contain those below
   const LodGeometry geometry = records.geometry();
   const LodRanks& ranks = geometry.ranks();
   const auto ball = [&](uint32_t rank) {

@@ -18,7 +18,7 @@ DVec3 random_direction(test::Random& random) {
   }
 }
 
-/// Largest |M v| over many directions, each improved by power iteration.
+/// Largest |M v| over random directions v, each improved by power iteration.
 double stretch_found(const DAffine& m, test::Random& random) {
   const glm::dmat3 linear(m);
   double largest = 0.0;
@@ -49,7 +49,7 @@ TEST(LodMetric, StretchOfEqualAndVanishingScales) {
     EXPECT_LE(largest_stretch(m), s * (1.0 + 1e-6));
   };
   expect(scale(3, 3, 3), 3);
-  expect(scale(-3, 3, 0.1), 3); // the two largest are equal
+  expect(scale(-3, 3, 0.1), 3); // the two largest singular values are equal
   expect(scale(0, 0, 1e-20), 1e-20);
   expect(scale(1e90, 1, 1), 1e90);
   EXPECT_GT(largest_stretch(scale(0, 0, 0)), 0.0);
@@ -57,7 +57,7 @@ TEST(LodMetric, StretchOfEqualAndVanishingScales) {
     EXPECT_THROW(largest_stretch(scale(1, bad, 1)), Error);
 }
 
-/// An error of so many pixels, seen face on at some distance in the middle of the image, is just allowed.
+/// An error of error_px pixels, seen face on in the middle of the image, is just allowed.
 TEST(LodMetric, ThresholdIsARadiusInPixels) {
   const double fov = 1.0, height = 1080.0, distance = 7.0;
   const DetailView view = make_detail_view(DVec3(0.0), 0.01, fov, height, 2.5);
@@ -77,11 +77,11 @@ TEST(LodMetric, InsideABallAndNearerThanTheNearPlaneTheNearPlaneCounts) {
   const DetailView view = make_detail_view(DVec3(0.5, 0, 0), 0.25, 1.0, 1000.0, 1.0);
   const InstanceMetric metric(view, DAffine(1.0), largest_stretch(DAffine(1.0)), 2.0);
   EXPECT_EQ(metric.distance(0, 0, 0, 1.0, 0), 0.25);   // the eye is inside
-  EXPECT_EQ(metric.distance(0.6, 0, 0, 0.0, 0), 0.25); // 0.1 away
+  EXPECT_EQ(metric.distance(0.6, 0, 0, 0.0, 0), 0.25); // at distance 0.1
   EXPECT_NEAR(metric.distance(3.5, 0, 0, 1.0, 0), 2.0, 1e-6);
 }
 
-/// No point of a ball is nearer than it says, whatever the transform.
+/// No point of a sphere is nearer than the distance, under any transform.
 TEST(LodMetric, DistanceIsALowerBoundUnderAnyTransform) {
   test::Random random(2);
   for (int i = 0; i < 3000; ++i) {
@@ -98,13 +98,13 @@ TEST(LodMetric, DistanceIsALowerBoundUnderAnyTransform) {
   }
 }
 
-/// Nested balls that touch, and equal errors: in floating point too, the upper one passes only if the lower does.
+/// Nested spheres that touch, with equal errors: the upper group passes only if the lower does, in floating point too.
 TEST(LodMetric, PassesNeverWithoutWhatIsBelow) {
   test::Random random(3);
   size_t upper_passes = 0, close = 0;
   for (int i = 0; i < 20000; ++i) {
     test::LodRecords records;
-    // Every other geometry is tiny and far from its origin, so that roundings are large for its size.
+    // Every second geometry is tiny and far from its origin, so that rounding errors are large relative to its size.
     const bool tiny = i % 2 != 0;
     const float size = tiny ? 1e-7f : 1.0f;
     const DVec3 low = tiny ? DVec3(3000.0f, size * random.uniform(-1, 1), 0.0) : random_direction(random);
@@ -112,20 +112,20 @@ TEST(LodMetric, PassesNeverWithoutWhatIsBelow) {
     const float radius = size * random.uniform(0.0f, 0.2f), error = random.uniform(0.001f, 0.002f);
     baked::LodGroupRecord below{{float(low.x), float(low.y), float(low.z)}, radius, error, 0}, above = below;
     above.level = 1;
-    above.center = {float(low.x + off.x), float(low.y + off.y), float(low.z + off.z)}; // the radius is made to fit
+    above.center = {float(low.x + off.x), float(low.y + off.y), float(low.z + off.z)}; // the radius is enlarged to fit
     records.groups = {below, above};
     records.links = {{0, baked::kNoLodGroup}, {1, 0}};
     records.cluster_triangles = {128, 64};
     const LodGeometry geometry = records.geometry();
     DAffine m = test::random_affine(random, i % 3 == 0 ? 1e6 : 10.0);
-    if (tiny) { // rotated and scaled only, so that the bound by the largest stretch is sharp
+    if (tiny) { // rotated and scaled only, so that the bound by the largest stretch is tight
       m[0] = glm::normalize(m[0]);
       m[1] = glm::normalize(m[1] - glm::dot(m[0], m[1]) * m[0]);
       m[2] = glm::cross(m[0], m[1]);
     }
     const double s = largest_stretch(m);
-    // The eye on the line through both centres, on the side where the balls touch: distances are equal but for
-    // roundings.
+    // The eye is on the line through both centres, on the side where the spheres touch: distances differ by rounding
+    // only.
     const DVec3 touching = transform_point(m, low - off * (5.0 * random.uniform(0, 1)));
     DetailView view = make_detail_view(touching, 1e-30, 1.0, 1000.0, 1.0);
     const InstanceMetric probe(view, m, s, geometry.reach());
@@ -133,7 +133,7 @@ TEST(LodMetric, PassesNeverWithoutWhatIsBelow) {
     const LodRanks& r = geometry.ranks();
     const double d =
         probe.distance(r.center_x[upper], r.center_y[upper], r.center_z[upper], r.radius[upper], r.level[upper]);
-    for (int k = -2; k <= 2; ++k) { // the threshold where it just passes, and the doubles beside it
+    for (int k = -2; k <= 2; ++k) { // the threshold at which it just passes, and adjacent doubles
       double t = r.error[upper] * s / d;
       for (int n = 0; n < std::abs(k); ++n) t = std::nextafter(t, k < 0 ? 0.0 : 1e300);
       view.error_per_distance = t;

@@ -42,7 +42,7 @@ LodRecords records_of(const BuiltLod& built) {
 LodRecords random_records(uint32_t finest, uint32_t seed) {
   Random random(seed);
   LodRecords out;
-  struct Made { // from a group of the level below
+  struct Made { // clusters made from a group of the level below
     uint32_t group;
     uint32_t clusters, triangles;
   };
@@ -71,9 +71,9 @@ LodRecords random_records(uint32_t finest, uint32_t seed) {
         }
     }
     for (size_t m = 0; m < below.size(); ++m) {
-      const auto to = static_cast<uint32_t>(m) % count; // each group has some
+      const auto to = static_cast<uint32_t>(m) % count; // each group gets some
       for (uint32_t k = 0; k < below[m].clusters; ++k) {
-        // Clusters of one group may go to several.
+        // Clusters made from one group may go to several groups.
         const uint32_t to_this = k == 0 ? to : (to + random.bits() % 2) % count;
         baked::LodGroupRecord& g = out.groups[first + to_this];
         const baked::LodGroupRecord& b = out.groups[below[m].group];

@@ -10,7 +10,7 @@
 
 namespace packtrace::test {
 
-/// Levels as a file holds them.
+/// LOD levels as stored in a file.
 struct LodRecords {
   std::vector<baked::LodGroupRecord> groups;
   std::vector<baked::LodLinkRecord> links;
@@ -19,20 +19,21 @@ struct LodRecords {
   LodGeometry geometry() const { return {groups, links, cluster_triangles}; }
 };
 
-/// Of two and more levels that were built, of one material slot: else files order clusters anew.
+/// Records of built levels. Needs at least two levels and a single material slot, as files reorder clusters by slot.
 LodRecords records_of(const BuiltLod& built);
 
-/// A tree of groups that no mesh has: random errors and balls, each holding those below, some groups terminal.
-/// Everything that the choice of detail reads of a geometry, for tests of many shapes.
-/// @param finest groups of level 0
+/// Records of a tree of groups without a mesh, for tests of many shapes: random errors and spheres, each containing
+/// those below, and some terminal groups. Contains everything that the choice of detail reads of a geometry.
+/// @param finest number of groups at level 0
 LodRecords random_records(uint32_t finest, uint32_t seed);
 
-/// Random affine map: rotated, scaled up to 24 : 1 along axes that are not those of the object, sheared, and every
-/// other one mirrored.
+/// Random affine map: rotated, scaled by up to 24 : 1 along axes other than the object's, sheared, and mirrored in half
+/// of the cases.
 DAffine random_affine(Random& random, double translation);
 
-/// Instances of random geometries at random in a box around 0.
-/// @param half_size of the box @param largest_scale scales are in [1, largest_scale], different by axis if above 1
+/// Instances of random geometries at random positions in a box around 0.
+/// @param half_size half the size of the box
+/// @param largest_scale scales are in [1, largest_scale], and differ by axis if it is above 1
 std::vector<LodInstance> random_instances(uint32_t count, uint32_t geometries, double half_size, double largest_scale,
                                           uint32_t seed);
 

@@ -23,7 +23,7 @@ std::vector<LodGeometry> some_geometries(uint32_t count) {
   return geometries;
 }
 
-/// Instances whose transforms shear, mirror and flatten, from within a few diagonals to far away.
+/// Instances with sheared, mirrored and flattened transforms, from within a few diagonals to far away.
 std::vector<LodInstance> wild_instances(uint32_t count, uint32_t geometries, uint32_t seed) {
   test::Random random(seed);
   std::vector<LodInstance> instances;
@@ -38,7 +38,7 @@ InstanceMetric metric_of(const LodGeometry& geometry, const LodInstance& instanc
   return {view, instance.world_from_object, largest_stretch(instance.world_from_object), geometry.reach()};
 }
 
-/// Its own cut, by the definition.
+/// The instance's own cut, by definition.
 std::vector<uint64_t> own_cut(const LodGeometry& geometry, const LodInstance& instance, const DetailView& view) {
   std::vector<uint64_t> passed(cut_words(geometry));
   const InstanceMetric metric = metric_of(geometry, instance, view);
@@ -58,8 +58,8 @@ uint32_t level_of_group(const LodGeometry& geometry, uint32_t group) {
   return level;
 }
 
-/// For each cluster of level 0, and so for each of its triangles: the level of the cut's cluster up a chain. Which of
-/// several chains depends on `turn`.
+/// For each cluster of level 0, and so for its triangles: the level of the cut's cluster on a chain upwards. `turn`
+/// selects one of several chains.
 std::vector<uint32_t> levels_of_triangles(const LodGeometry& geometry, std::span<const uint64_t> passed,
                                           uint32_t turn) {
   const std::span<const baked::LodLinkRecord> links = geometry.links();
@@ -80,7 +80,7 @@ std::vector<uint32_t> levels_of_triangles(const LodGeometry& geometry, std::span
   return levels;
 }
 
-/// Invariant: for every triangle of level 0, what an instance uses is of the level of its own cut or finer.
+/// For every triangle of level 0, an instance uses the level of its own cut or a finer one.
 TEST(LodSharing, StrictSchemesNeverGiveLessDetailThanTheOwnCut) {
   const std::vector<LodGeometry> geometries = some_geometries(6);
   const std::vector<LodInstance> instances = wild_instances(600, 6, 1);
@@ -140,7 +140,7 @@ TEST(LodSharing, PerInstanceGivesEachItsOwnCut) {
   EXPECT_EQ(plan.builds + plan.category_counts[0], instances.size());
 }
 
-/// What the plan counts is what it holds, and each BLAS of the size it says.
+/// The totals of a plan match its contents, and each BLAS has the stated size.
 TEST(LodSharing, PlansAddUp) {
   const std::vector<LodGeometry> geometries = some_geometries(5);
   const std::vector<LodInstance> instances = wild_instances(500, 5, 3);
@@ -193,7 +193,7 @@ TEST(LodSharing, TracedTrianglesStayWithinTheRatio) {
     }
 }
 
-/// Where the limit asks for own cuts, nobody goes without who would save more by one.
+/// If the limit requires own cuts, they go to the instances with the largest savings.
 TEST(LodSharing, OwnCutsGoToThoseThatSaveMost) {
   const std::vector<LodGeometry> geometries = some_geometries(4);
   const std::vector<LodInstance> instances = wild_instances(400, 4, 11);
@@ -232,10 +232,10 @@ TEST(LodSharing, SharesMoreTheMoreMayBeTraced) {
     EXPECT_LT(builds, before);
     before = builds;
   }
-  EXPECT_LE(before, geometries.size()); // anything goes: one each
+  EXPECT_LE(before, geometries.size()); // no limit: one build per geometry
 }
 
-/// Histograms are those of the ranges, and do not depend on threads; nor does anything else of the plan.
+/// Histograms match the ranges, and the plan does not depend on the number of threads.
 TEST(LodSharing, IsTheSameForAnyNumberOfThreads) {
   const std::vector<LodGeometry> geometries = some_geometries(7);
   const std::vector<LodInstance> instances = wild_instances(5000, 7, 5);
@@ -247,7 +247,7 @@ TEST(LodSharing, IsTheSameForAnyNumberOfThreads) {
     for (const size_t threads : {size_t{1}, size_t{2}, size_t{5}}) {
       const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
       LodSharing sharing(geometries, instances, config);
-      sharing.plan(view_from(DVec3(100.0))); // what came before does not count
+      sharing.plan(view_from(DVec3(100.0))); // earlier frames must not matter
       plans.push_back(sharing.plan(view_from(DVec3(0.5))));
     }
     std::vector<uint32_t> starts(7), ends(7);
@@ -280,14 +280,14 @@ TEST(LodSharing, IsTheSameForAnyNumberOfThreads) {
   }
 }
 
-/// Of instances that are alike the one with the highest number lends, each time.
+/// Of identical instances, the one with the highest number provides, in every frame.
 TEST(LodSharing, TheProviderIsStable) {
   const std::vector<LodGeometry> geometries = some_geometries(1);
   const std::vector<LodInstance> instances(50, {0, DAffine(DVec3(1, 0, 0), DVec3(0, 1, 0), DVec3(0, 0, 1), DVec3(8))});
   SharingConfig config;
   config.scheme = SharingScheme::kOneProvider;
   LodSharing sharing(geometries, instances, config);
-  double error_px = 0.01; // one for which the first and the last level are the same, and not the coarsest
+  double error_px = 0.01; // an error for which first and last level are the same, and not the coarsest
   LodPlan plan;
   do plan = sharing.plan(view_from(DVec3(0.0), error_px *= 1.2));
   while (plan.category_counts[static_cast<size_t>(InstanceCategory::kShares)] == 0 && error_px < 1e6);

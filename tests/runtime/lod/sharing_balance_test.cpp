@@ -18,8 +18,9 @@ std::vector<LodStep> halving_steps(size_t count) {
 }
 
 TEST(SharingBalance, LeavesOutWhatCostsLeast) {
-  const std::vector<LodStep> steps = halving_steps(4); // 16, 8, 4, 2 thousand
-  const std::vector<uint32_t> users{1, 5, 2, 100};     // left out: step 1 costs 40, step 2 costs 8 thousand
+  const std::vector<LodStep> steps = halving_steps(4); // 16, 8, 4, 2 thousand triangles
+  // omitting step 1 costs 40 thousand triangles, step 2 costs 8 thousand
+  const std::vector<uint32_t> users{1, 5, 2, 100};
   const uint64_t traced = 16'000 + 40'000 + 8'000 + 200'000;
   const auto run = [&](double limit) { return balance_builds(steps, users, traced, limit, {}); };
   EXPECT_EQ(run(static_cast<double>(traced)).builds, 3u);
@@ -28,7 +29,7 @@ TEST(SharingBalance, LeavesOutWhatCostsLeast) {
   EXPECT_EQ(one.instead, (std::vector<uint32_t>{0, 1, 1, 3}));
   EXPECT_EQ(one.users, (std::vector<uint32_t>{1, 7, 0, 100}));
   EXPECT_EQ(run(static_cast<double>(traced) + 63'999).builds, 2u);
-  const SharingBalance two = run(static_cast<double>(traced) + 64'000); // all of the 7 go to step 0
+  const SharingBalance two = run(static_cast<double>(traced) + 64'000); // all 7 users of steps 1 and 2 move to step 0
   EXPECT_EQ(two.builds, 1u);
   EXPECT_EQ(two.instead, (std::vector<uint32_t>{0, 0, 0, 3}));
   EXPECT_EQ(two.traced, traced + 64'000);
@@ -37,7 +38,7 @@ TEST(SharingBalance, LeavesOutWhatCostsLeast) {
 TEST(SharingBalance, OneOwnCutCanSaveSeveralSteps) {
   const std::vector<LodStep> steps = halving_steps(4);
   const std::vector<uint32_t> users{1, 1, 1, 0};
-  // Without the saving nothing can be left out; with it, the room lets both others take step 1.
+  // Without the saving no step can be omitted; with it, step 1 can serve both other users.
   const std::vector<OwnCutSaving> savings{{4'000, 0, 7}};
   const SharingBalance balance = balance_builds(steps, users, 28'000, 28'000.0, savings);
   EXPECT_EQ(balance.own_cuts, 1u);
@@ -80,7 +81,7 @@ TEST(SharingBalance, KeepsToTheLimitAndCountsRight) {
     }
     ASSERT_EQ(balance.users, moved);
     ASSERT_EQ(balance.traced, sum);
-    ASSERT_EQ(balance.users.back(), expected.back()); // the last is free
+    ASSERT_EQ(balance.users.back(), expected.back()); // the last step needs no build
     ASSERT_EQ(balance.builds,
               static_cast<size_t>(std::count_if(moved.begin(), moved.end() - 1, [](uint32_t u) { return u > 0; })));
     own += balance.own_cuts;
@@ -90,7 +91,7 @@ TEST(SharingBalance, KeepsToTheLimitAndCountsRight) {
   EXPECT_GT(left_out, 500u);
 }
 
-/// Against all subsets of steps.
+/// Compares with all subsets of steps.
 TEST(SharingBalance, BuildsTheFewestSteps) {
   test::Random random(2);
   size_t between = 0;

@@ -17,19 +17,19 @@ namespace {
 
 using Corners = std::array<DVec3, 3>;
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-constexpr double kRounding = 1e-3; // steps; of what is cut away
-constexpr double kSlack = 1.25;    // a smaller gain than that is not looked for
-// So many triangles are measured at most, or one of so many: where more are too far off, little is gained.
+constexpr double kRounding = 1e-3; // steps; tolerance when triangles are clipped
+constexpr double kSlack = 1.25;    // stops once the largest error left is within this factor of largest_
+// At most max(kFew, 1 / kFewOf of all triangles) are measured: if more have large errors, tightening them gains little.
 constexpr size_t kFew = 512, kFewOf = 8;
-constexpr size_t kWork = 400; // distances and the like for each triangle of a group, at most
+constexpr size_t kWork = 400; // maximum work per triangle of the group: distances and triangles looked at
 
-/// Convex, in a plane.
+/// A convex planar polygon.
 struct Polygon {
   std::array<DVec3, 10> corners;
   size_t count = 0;
 };
 
-/// Keeps what is not further along `direction` than `limit`.
+/// Clips the polygon to dot(direction, p) <= limit.
 Polygon cut(const Polygon& in, DVec3 direction, double limit) {
   Polygon out;
   for (size_t k = 0; k < in.count; ++k) {
@@ -42,7 +42,7 @@ Polygon cut(const Polygon& in, DVec3 direction, double limit) {
   return out;
 }
 
-/// What a triangle stands for lies near it.
+/// The region around a triangle that holds what the triangle stands for: bounded by its plane and its three sides.
 class Neighbourhood {
 public:
   explicit Neighbourhood(const Corners& c) {
@@ -57,7 +57,7 @@ public:
     }
   }
 
-  /// The part of a triangle that may be nearer than that.
+  /// Clips a triangle to a convex superset of the points within `distance` of this one.
   Polygon part_within(const Corners& triangle, double distance) const {
     const double reach = distance + kRounding;
     Polygon polygon{{triangle[0], triangle[1], triangle[2]}, 3};
@@ -74,6 +74,7 @@ private:
   size_t count_ = 0;
 };
 
+/// Implements bound_directly() for one group.
 class Tightener {
 public:
   Tightener(const DirectBoundInput& input, SimplifyMesh& mesh, SurfaceLinks& links)
@@ -98,7 +99,7 @@ public:
   }
 
 private:
-  /// Whether no more is looked at: where everything is near everything, as in a soup, little would come of much work.
+  /// Limits the work in soups: where every triangle is near all others, more measuring gains little.
   bool spent() const { return work_ + refiner_.work() > kWork * (in_.triangles.size() + m_.triangles.size()); }
 
   void fill_heap() {
@@ -126,8 +127,8 @@ private:
     return {in_.points[p.x], in_.points[p.y], in_.points[p.z]};
   }
 
-  /// Replaces numbers_ by those of the level below that they go back to and that reach into the box. False, and nothing
-  /// done, where they go back no further.
+  /// Replaces numbers_ by the triangles one level below that they may stand for, keeping only triangles whose bounds,
+  /// padded by their error, overlap the box. Returns false and leaves numbers_ unchanged where no lower level is known.
   bool go_back(const DVec3& lo, const DVec3& hi) {
     below_.clear();
     for (const uint32_t number : numbers_)
@@ -146,9 +147,9 @@ private:
     return true;
   }
 
-  // ---- from below to the surface after
+  // ---- from lower levels to the simplified surface
 
-  /// Goes back for what is too far from there only.
+  /// Bounds the error of a source triangle. Goes one level further back only for parts that are still too far off.
   double measure_before(uint32_t t, double stated) {
     const Corners corners = corners_before(t);
     const Neighbourhood near(corners);
@@ -158,7 +159,7 @@ private:
     gather_after(t);
     set_.clear(), vertices_.clear(), distances_.clear();
     for (const uint32_t s : after_.candidates()) set_.add(after_.surface(), s);
-    double largest = 0.0, worst = 0.0; // of what is near enough, and of the rest
+    double largest = 0.0, worst = 0.0; // of parts near enough, and of the others
     pieces_.clear(), worst_pieces_.clear();
     numbers_.assign(1, in_.numbers[t]);
     for (uint32_t depth = 0; depth < TriangleHistory::kDepth && (go_back(lo, hi) || depth == 0); ++depth) {
@@ -187,7 +188,8 @@ private:
     return std::max(largest, worst);
   }
 
-  /// What one of the group stands for of one below. Adds what it is measured against to worst_pieces_.
+  /// Bounds the error of the part of lower-level triangle `below` that source triangle t stands for. Appends the
+  /// simplified triangles that it was measured against to worst_pieces_.
   double measure_below(uint32_t t, const Neighbourhood& near, uint32_t below, uint32_t depth, double stated) {
     const double error = in_.levels.errors[below], enough = (largest_ - error) / kErrorInflation;
     const Corners corners = corners_of(below);
@@ -212,13 +214,13 @@ private:
     return largest;
   }
 
-  /// What is around the points that the corners of one of the group became.
+  /// Makes the simplified triangles around the points that t's corners became the candidates.
   void gather_after(uint32_t t) {
     const Triangle& p = in_.triangles[t].points;
     after_.gather({m_.stands_for[p.x], m_.stands_for[p.y], m_.stands_for[p.z]});
   }
 
-  /// The triangle of set_ that is nearest to all of one below, and how far at most.
+  /// The triangle of set_ whose largest distance from a lower-level triangle is smallest, and that distance.
   std::pair<uint32_t, double> nearest_to_all(uint32_t below) {
     if (set_.empty()) return {0, kInfinite};
     const Triangle& t = in_.levels.triangles[below];
@@ -228,7 +230,7 @@ private:
     return {set_.number(nearest.place), nearest.distance};
   }
 
-  /// Where in distances_ those of a vertex below from set_ begin. Triangles below have most vertices in common.
+  /// Index in distances_ of the row of a lower-level vertex. Cached, as neighbouring triangles share most vertices.
   size_t find_distances(uint32_t vertex) {
     const size_t first = vertices_(vertex) * set_.padded_size();
     if (first == distances_.size()) {
@@ -241,8 +243,8 @@ private:
     return first;
   }
 
-  /// How far a triangle is from the surface after, as far as the candidates go.
-  /// @param known that it is not further
+  /// Bounds how far a triangle lies from the candidates of the simplified surface.
+  /// @param known an upper bound that is already known
   double measure_part(const Corners& part, double enough, double known) {
     best_.clear();
     double best = known;
@@ -252,7 +254,7 @@ private:
     return best;
   }
 
-  /// Replaces best_ where it finds a smaller bound.
+  /// Bounds by an overlay; replaces best_ and `best` if that bound is smaller.
   void lay(const Corners& triangle, double enough, double& best) {
     overlay_.clear();
     work_ += after_.candidates().size();
@@ -268,7 +270,7 @@ private:
     if (largest < best) std::swap(best_, tried_), best = largest;
   }
 
-  /// The same, cutting the triangle in four.
+  /// Bounds by subdivision; replaces best_ and `best` if that bound is smaller.
   void refine(const Corners& triangle, double enough, double& best) {
     tried_.clear();
     refiner_.begin(after_);
@@ -278,9 +280,9 @@ private:
     if (d < best) std::swap(best_, tried_), best = d;
   }
 
-  // ---- from the surface after to below
+  // ---- from the simplified surface to lower levels
 
-  /// Goes back as far as that makes it smaller and no further than needed.
+  /// Bounds the error of a simplified triangle. Goes back level by level while the bound exceeds largest_.
   double measure_after(uint32_t s, double stated) {
     if (linked_.ends.empty()) linked_ = links_.by_after(m_.triangles.size());
     const Corners corners = after_.corners(s);
@@ -295,6 +297,7 @@ private:
     return bound;
   }
 
+  /// Bounds a simplified triangle by subdivision against the triangles in numbers_.
   double measure_over_below(const Corners& corners) {
     TriangleSet& below = refiner_.begin();
     for (const uint32_t number : numbers_) below.add(corners_of(number), number);
@@ -312,19 +315,19 @@ private:
   SimplifyMesh& m_;
   SurfaceLinks& links_;
   SurfaceSide after_;
-  double largest_;                                ///< the group's error is at least this
-  std::vector<std::pair<double, uint32_t>> heap_; ///< triangles before, then those after
-  LinkLists linked_;                              ///< when it is needed
+  double largest_;                                ///< lower bound of the group's error
+  std::vector<std::pair<double, uint32_t>> heap_; ///< error bounds; source triangles first, then simplified ones
+  LinkLists linked_;                              ///< set up on first use
   std::vector<SurfaceLink> found_;
   std::vector<uint32_t> numbers_, pieces_, worst_pieces_;
-  Renumbering below_{512};        ///< triangles of the level below
-  TriangleSet set_;               ///< the candidates after of the triangle before at hand
-  Renumbering vertices_{512};     ///< below, of which distances_ are known
-  std::vector<double> distances_; ///< set_.padded_size() for each of these
+  Renumbering below_{512};        ///< triangles one level below
+  TriangleSet set_;               ///< simplified triangles near the current source triangle
+  Renumbering vertices_{512};     ///< lower-level vertices with known distances_
+  std::vector<double> distances_; ///< set_.padded_size() entries per vertex
   std::vector<OverlayPiece> overlay_;
   std::vector<std::pair<uint32_t, double>> best_, tried_;
   TriangleRefiner refiner_;
-  size_t work_ = 0; ///< distances and triangles looked at, besides those of refiner_
+  size_t work_ = 0; ///< distances and triangles looked at, except those of refiner_
 };
 
 } // namespace

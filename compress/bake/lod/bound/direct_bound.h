@@ -9,25 +9,28 @@
 
 namespace packtrace {
 
-/// A group before simplify() and where it is found after.
+/// A group before simplify(), with what is needed to trace it back to lower levels.
 struct DirectBoundInput {
   const LevelTriangles& levels;
-  LatticePoint center; ///< of the group: where its coordinates begin
+  LatticePoint center; ///< origin of the group's coordinates
   std::span<const DVec3> points;
   std::span<const LodTriangle> triangles;
-  std::span<const uint32_t> numbers; ///< of those triangles among those of all levels
-  double floor = 0.0;                ///< the group's error need not be below
-  bool dropped = false;              ///< whether loose pieces were dropped
+  std::span<const uint32_t> numbers; ///< per triangle: its number in `levels`
+  double floor = 0.0;                ///< lower limit of the group's error
+  bool dropped = false;              ///< whether drop_loose_pieces() dropped any
 };
 
-/// Makes errors of the triangles after smaller where they follow from distances that add up over levels: the worst are
-/// measured against the triangles of a few levels below, both ways, as long as that makes the largest smaller.
+/// Tightens the errors of simplified triangles where distances of several levels add up to more than the true distance.
+/// The triangles with the largest errors are measured directly against the triangles of up to TriangleHistory::kDepth
+/// lower levels, in both directions, while that lowers the largest error.
 ///
-/// What a triangle of the group stands for lies on those triangles below that it goes back to, no further from it than
-/// its error: they are cut to that, and laid over the surface after. Triangles after are laid over those below that
-/// all triangles linked to them go back to.
-/// @param links as bound_errors() found them, in numbers of what is left of the mesh; bounds not below what errors say.
-/// Some more are added.
+/// The part of the original surface that a source triangle stands for lies within the triangle's error on the
+/// lower-level triangles that it goes back to (TriangleHistory). These are clipped to that neighbourhood and overlaid
+/// on the simplified surface. Simplified triangles are measured against all lower-level triangles that their linked
+/// source triangles go back to.
+/// @param mesh the simplified mesh; its triangle errors are updated
+/// @param links from bound_errors(), with `after` numbering the triangles left in the mesh and bounds that include the
+/// errors of dropped pieces; more links are appended
 void bound_directly(const DirectBoundInput& input, SimplifyMesh& mesh, SurfaceLinks& links);
 
 } // namespace packtrace

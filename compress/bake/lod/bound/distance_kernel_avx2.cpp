@@ -1,4 +1,5 @@
-// Compiled for AVX2: nothing here may be inline in a header that others use, or they could end up calling it.
+// Compiled for AVX2. Must not include headers with inline functions that other translation units use: the linker could
+// pick the AVX2 version for them.
 #if defined(__x86_64__)
 
 #include "compress/bake/lod/bound/distance_kernel_body.h"

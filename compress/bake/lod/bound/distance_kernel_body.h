@@ -1,5 +1,5 @@
-// The bodies of triangle_distances() and nearest_triangle(), for each instruction set: same operations in the same
-// order, so the same bits. No other header's functions may be compiled for AVX2.
+// The bodies of triangle_distances() and nearest_triangle(), compiled per instruction set with the same operations in
+// the same order, so results are bit-identical. No other header's functions may be compiled for AVX2.
 
 #include "compress/bake/lod/bound/distance_kernel.h"
 
@@ -16,8 +16,8 @@ struct Vector4 {
   out = a.x * b.x + a.y * b.y + a.z * b.z;
 }
 
-/// The least of `least` and the squared distance of p, from one end of a segment, from the segment; `along` is p's
-/// product with it over its squared length.
+/// Updates `least` with the squared distance from a segment that starts at the origin of p. `along` is dot(p, segment)
+/// / |segment|^2.
 [[gnu::always_inline]] inline void to_segment(const Vector4& p, const Vector4& segment, const Lanes& along,
                                               Lanes& least) {
   const Lanes zero = {}, one = zero + 1.0;
@@ -57,7 +57,8 @@ struct Vector4 {
     to_segment(ap, ab, p0 * over_ab, distance2);
     to_segment(ap, ac, p1 * over_ac, distance2);
     to_segment(bp, bc, pbc * over_bc, distance2);
-    // Over the plane, p = a + v (b - a) + w (c - a): the foot is the nearest point where it lies inside.
+    // Projects p to the plane as a + v (b - a) + w (c - a), scaled by area2. Inside the triangle, that is the nearest
+    // point.
     const Lanes v = d11 * p0 - d01 * p1, w = d00 * p1 - d01 * p0;
     const auto inside = (v >= zero) & (w >= zero) & (v + w <= area2) & (area2 > flat);
     const Lanes s = v * scale, t = w * scale;

@@ -27,7 +27,7 @@ void ImageCover::add(uint32_t triangle, const TriangleImages::Image& image) {
     images_.add_shares(triangle, image, is_seed_, shares_);
 }
 
-/// Marks what borders of images cross or go along.
+/// Marks the triangles that borders of the mapped images cross, and the sides that they run along.
 void ImageCover::mark_borders(std::span<const uint8_t> mapped) {
   using Way = SurfaceWalk::Way;
   const std::span<const Way> ways = walk_.ways();
@@ -53,7 +53,7 @@ void ImageCover::mark_borders(std::span<const uint8_t> mapped) {
   }
 }
 
-/// All that can be reached from a triangle without crossing a border.
+/// Collects all triangles that can be reached from `first` without crossing a border.
 void ImageCover::find_part(uint32_t first) {
   const auto number = static_cast<uint32_t>(seeds_.size());
   reached_.assign(1, first);

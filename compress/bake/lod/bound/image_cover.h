@@ -9,25 +9,25 @@
 
 namespace packtrace {
 
-/// Which triangles after are covered by images of triangles before. How often images cover a place, those seen from
-/// behind counted against the others, is a whole number that changes at their borders only. So it is the same
-/// everywhere in a part of the surface that no border crosses, and the areas of the images in one triangle of the part
-/// say it. Where it is not 0, no point is left out. Of triangles that borders cross nothing is known.
+/// Finds simplified triangles that are covered by images of source triangles. The number of images over a point, where
+/// images seen from behind count as -1, is an integer that changes only at borders of the images. So it is constant in
+/// each part of the surface that no border crosses, and follows from the image areas in one triangle of the part. Where
+/// it is not 0, every point of the part is covered. Nothing is known of triangles that borders cross.
 /// Source: degree of a map; e.g. Victor Guillemin and Alan Pollack, Differential Topology, 1974, 3.3.
 class ImageCover {
 public:
-  /// All must outlive it.
+  /// All arguments must outlive this object.
   ImageCover(const SurfaceWalk& walk, TriangleImages& images, const SimplifyMesh& mesh)
       : walk_(walk), images_(images), mesh_(mesh) {}
 
-  /// Finds the parts.
-  /// @param mapped per triangle before: it is among the images, or itself one of the triangles after
+  /// Finds the parts of the simplified surface that no border crosses.
+  /// @param mapped per source triangle: 1 if add() or add_unchanged() will be called for it
   void begin(std::span<const uint8_t> mapped);
-  /// Takes the image of a triangle before into account, each that is mapped.
+  /// Adds the image of a mapped source triangle.
   void add(uint32_t triangle, const TriangleImages::Image& image);
-  /// Takes a triangle after into account that was there before.
+  /// Adds a simplified triangle that is also a source triangle.
   void add_unchanged(uint32_t after) { shares_[after] += 1.0; }
-  /// Whether every point of the triangle after is on an image, once all are added.
+  /// Whether images cover the whole simplified triangle. Valid once all images are added.
   bool whole(uint32_t after) const { return part_[after] != kNone && std::abs(shares_[seeds_[part_[after]]]) > 0.5; }
 
 private:
@@ -39,10 +39,10 @@ private:
   const SurfaceWalk& walk_;
   TriangleImages& images_;
   const SimplifyMesh& mesh_;
-  std::vector<uint8_t> borders_; ///< per triangle after: kCrossed; bit i: a border goes along side i
-  std::vector<uint8_t> is_seed_; ///< per triangle after
-  std::vector<double> shares_;   ///< per triangle after, of seeds only: what is covered
-  std::vector<uint32_t> part_;   ///< per triangle after, or kNone
+  std::vector<uint8_t> borders_; ///< per simplified triangle: kCrossed, or bit i if a border runs along side i
+  std::vector<uint8_t> is_seed_; ///< per simplified triangle
+  std::vector<double> shares_;   ///< per simplified triangle, for seeds only: signed number of images over it
+  std::vector<uint32_t> part_;   ///< per simplified triangle, or kNone
   std::vector<uint32_t> seeds_;  ///< per part: its largest triangle
   std::vector<uint32_t> reached_;
 };

@@ -11,7 +11,7 @@ Side side(uint32_t a, uint32_t b) { return {std::min(a, b), std::max(a, b)}; }
 
 bool is_line(const Triangle& t) { return t.x == t.y || t.y == t.z || t.z == t.x; }
 
-/// Its ends, the same for a point.
+/// The ends of the segment; equal if all corners coincide.
 Side ends(const Triangle& line) { return line.x == line.y ? side(line.y, line.z) : side(line.x, line.y); }
 
 } // namespace

@@ -10,19 +10,21 @@
 
 namespace packtrace {
 
-/// Which triangles with two corners in one place, lines, are sides of triangles that are none: those are part of the
-/// surface anyway, and what becomes of it is measured there.
+/// Finds which degenerate triangles, with two corners at one position, coincide with a side or corner of a proper
+/// triangle. Those are part of the surface anyway and need no measurement of their own.
 class LineCover {
 public:
   LineCover() = default;
-  /// @param triangles of vertices
+  /// @param triangles vertex numbers
   LineCover(std::span<const Triangle> triangles, std::span<const QuantizedVertex> vertices, size_t position_count);
 
-  /// @param line positions of its corners, at least two of them the same
+  /// Whether a side or corner of a proper triangle covers the line.
+  /// @param line position numbers of its corners, at least two of them equal
   bool holds(const Triangle& line) const;
 
 private:
-  std::vector<std::pair<uint32_t, uint32_t>> sides_; ///< of lines, that are sides of triangles too; sorted
+  /// sides and corners of proper triangles that are lines too; sorted
+  std::vector<std::pair<uint32_t, uint32_t>> sides_;
 };
 
 } // namespace packtrace

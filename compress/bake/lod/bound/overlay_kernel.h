@@ -4,33 +4,34 @@
 
 namespace packtrace {
 
-/// Where the triangle that is laid over a surface meets one triangle of it.
+/// The overlap of the overlaid triangle with one surface triangle.
 struct OverlayPiece {
   uint32_t triangle;
-  uint32_t inner_sides; ///< bit i: its side from corner i goes through the inside of the triangle laid over it
-  double distance;      ///< every point of the one there is within this of the other, and the other way round
+  uint32_t inner_sides; ///< bit i: the side starting at corner i crosses the overlaid triangle's interior
+  double distance;      ///< maximum distance of points of either triangle there from the other
 };
 
-/// A point seen from a triangle: barycentric coordinates in its plane, and how far above it along the direction.
+/// A point relative to a triangle: barycentric coordinates in its plane, and the height above it along the direction.
 struct alignas(32) OverlayPoint {
   double l0, l1, l2, height;
 };
 
-/// What overlay kernels work on. Plain, as they are compiled for several processors.
+/// Input of overlay kernels. Plain data, as it is compiled for several instruction sets.
 struct OverlayTask {
-  const double* points;    ///< x, y, z of the surface's points
-  const uint32_t* corners; ///< three per triangle of the surface
-  OverlayPoint* projected; ///< per point, where its stamp is `stamp`
-  uint32_t* outside;       ///< then: bit i: coordinate i is not above 0
+  const double* points;    ///< x, y, z per surface point
+  const uint32_t* corners; ///< three per surface triangle
+  OverlayPoint* projected; ///< per point; valid where its stamp equals `stamp`
+  uint32_t* outside;       ///< as above; bit i: coordinate i is <= 0
   uint32_t* stamps;
   uint32_t stamp;
-  double enough; ///< no more is looked for once the triangle is covered that often
+  double enough; ///< stops once the triangle is covered this many times
   double origin[3];
-  OverlayPoint from_x, from_y, from_z; ///< coordinates' slopes; those of the origin are 1, 0, 0, 0
+  OverlayPoint from_x, from_y, from_z; ///< derivatives of the coordinates; the origin's are 1, 0, 0, 0
 };
 
-/// Lays the triangle over the candidates until they are enough; those that face away are as if they were not there.
-/// Writes as many pieces as it returns, one per candidate at most, and how often they cover the triangle, on average.
+/// Overlays the triangle on the candidates until `enough` is reached; ignores back-facing candidates. Writes at most
+/// one piece per candidate and returns the number of pieces.
+/// @param covered set to how often the pieces cover the triangle on average
 using OverlayKernel = uint32_t (*)(const OverlayTask& task, const uint32_t* candidates, uint32_t count,
                                    OverlayPiece* pieces, double* covered);
 

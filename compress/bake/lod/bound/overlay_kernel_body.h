@@ -1,5 +1,6 @@
-// The body of overlay_kernel(), for each instruction set: same operations in the same order, so the same bits. Nothing
-// here but inlined code of the translation unit's own: no other header's functions may be compiled for AVX2.
+// The body of overlay_kernel(), compiled per instruction set with the same operations in the same order, so results are
+// bit-identical. Uses only inlined functions of this translation unit: no other header's functions may be compiled for
+// AVX2.
 // NOLINTBEGIN(llvm-header-guard)
 
 #include "compress/bake/lod/bound/overlay_kernel.h"
@@ -9,21 +10,21 @@ namespace {
 
 using Lanes = double __attribute__((vector_size(32)));
 using Mask = int64_t __attribute__((vector_size(32)));
-using LanesIn = double __attribute__((vector_size(32), may_alias)); // where they are stored
+using LanesIn = double __attribute__((vector_size(32), may_alias)); // as stored in memory
 
-constexpr double kOnLine = 1e-9; // barycentric; what is nearer to a line counts as on it
-constexpr double kTiny = 1e-12;  // of the triangle's area; pieces below are none
+constexpr double kOnLine = 1e-9; // barycentric tolerance; smaller distances from a line count as 0
+constexpr double kTiny = 1e-12;  // fraction of the triangle's area; smaller pieces are dropped
 
-/// The part of four segments that lies in three half planes, as [lo, hi] of the way from one end to the other.
+/// Four segments clipped to three half-planes, as parameter ranges [lo, hi].
 struct Span4 {
   Lanes lo, hi;
 };
 
-/// @param d0, d1 the ends' distances from the line, inside positive
+/// @param d0, d1 signed distances of the ends from the line, inside positive
 [[gnu::always_inline]] inline void clip(Span4& span, const Lanes& d0, const Lanes& d1) {
   const Lanes zero = {}, none = zero + 2.0;
   const Mask out0 = d0 < zero, out1 = d1 < zero;
-  const Lanes at = d0 / (d0 - d1); // used only where the signs differ
+  const Lanes at = d0 / (d0 - d1); // used only if the signs differ
   const Lanes lo = out1 ? none : at;
   span.lo = (out0 & (lo > span.lo)) ? lo : span.lo;
   span.hi = (out1 & ~out0 & (at < span.hi)) ? at : span.hi;
@@ -33,8 +34,8 @@ struct Corner4 {
   Lanes l0, l1, l2, height;
 };
 
-/// Adds what a side of the piece contributes to its area, and takes its ends into account for its height.
-/// @param counts whether it contributes
+/// Adds one side's contribution to the area of the piece, and its ends to the maximum height.
+/// @param counts whether the side contributes to the area
 [[gnu::always_inline]] inline void add_side(const Span4& span, const Mask& counts, const Lanes& x, const Lanes& y,
                                             const Lanes& h, const Lanes& dx, const Lanes& dy, const Lanes& dh,
                                             Lanes& area, Lanes& height) {
@@ -48,8 +49,8 @@ struct Corner4 {
   height = (valid & (a0 > height)) ? a0 : height;
 }
 
-/// The side from p to q of a triangle of the surface, cut by the three lines of the one laid over it.
-/// @param inner set to whether it goes through the inside of that one
+/// Clips the side from p to q of a surface triangle to the overlaid triangle.
+/// @param inner set to whether the side crosses its interior
 [[gnu::always_inline]] inline void surface_side(const Corner4& p, const Corner4& q, Lanes& area, Lanes& height,
                                                 Mask& inner) {
   const Lanes zero = {};
@@ -57,7 +58,7 @@ struct Corner4 {
   clip(span, p.l0, q.l0);
   clip(span, p.l1, q.l1);
   clip(span, p.l2, q.l2);
-  // On one of the lines: the side there counts, this does not.
+  // A side on one of the lines does not count for the area: the overlaid triangle's own side does.
   const Mask on =
       ((p.l0 == zero) & (q.l0 == zero)) | ((p.l1 == zero) & (q.l1 == zero)) | ((p.l2 == zero) & (q.l2 == zero));
   const Lanes d1 = q.l1 - p.l1, d2 = q.l2 - p.l2;
@@ -65,7 +66,7 @@ struct Corner4 {
   inner = ~on & ((span.hi - span.lo) * ((d1 < zero ? -d1 : d1) + (d2 < zero ? -d2 : d2)) > zero + kOnLine);
 }
 
-/// Which side of p -> q the triangle's corners are on: (0, 0), (1, 0), (0, 1) in l1, l2.
+/// Signed distances of the overlaid triangle's corners from p -> q, 0 if on it: (0, 0), (1, 0), (0, 1) in l1, l2.
 struct Sides4 {
   Lanes at0, at1, at2;
 };
@@ -77,7 +78,7 @@ struct Sides4 {
   out.at2 = ((at2 < tolerance) & (at2 > -tolerance)) ? zero : at2;
 }
 
-/// Four triangles of the surface at once.
+/// Overlaps four surface triangles with the overlaid triangle.
 [[gnu::always_inline]] inline void meet(const Corner4& a, const Corner4& b, const Corner4& c, Lanes& area,
                                         Lanes& height, Lanes& facing, Mask& inner) {
   const Lanes zero = {}, one = zero + 1.0;
@@ -121,6 +122,7 @@ struct Sides4 {
   out.l2 = __builtin_shufflevector(a, c, 2, 3, 6, 7), out.height = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
 
+/// Projects a point unless this task has done so, and returns its `outside` bits.
 [[gnu::always_inline]] inline uint32_t outside_of(const OverlayTask& task, uint32_t point) {
   if (task.stamps[point] == task.stamp) return task.outside[point];
   const double* p = task.points + uint64_t{3} * point;

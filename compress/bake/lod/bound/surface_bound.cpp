@@ -19,20 +19,21 @@ namespace {
 
 using Corners = std::array<DVec3, 3>;
 
-/// A triangle before whose image is known, or that lies over those after: pieces_[first .. first + count).
+/// A source triangle with a known image, or with an overlay: pieces_[first .. first + count).
 struct Laid {
   uint32_t triangle;
-  bool settled = false; ///< something better is known than what it says
+  bool settled = false; ///< a tighter measurement replaces this one
   TriangleImages::Image image;
 };
 
-/// What a triangle makes the error at least, as far as laid_[index] knows.
+/// The error bound of laid_[index], which a closer look may lower.
 struct Claim {
   double stated;
   uint32_t index;
   bool operator<(const Claim& o) const { return stated != o.stated ? stated < o.stated : index > o.index; }
 };
 
+/// Implements bound_errors() for one group.
 class Measurer {
 public:
   Measurer(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh)
@@ -63,7 +64,7 @@ public:
 private:
   double had(uint32_t before) const { return before_.surface().triangles[before].error; }
 
-  /// A part of the triangle after is within the distance of one before.
+  /// Part of the simplified triangle lies within the distance of the source triangle.
   void note_after(uint32_t after, uint32_t before, double distance) {
     errors_[after] = std::max(errors_[after], stated_error(distance, had(before)));
     error_.largest = std::max(error_.largest, errors_[after]);
@@ -74,12 +75,13 @@ private:
     if (links_.empty() || links_.back() != SurfaceLink{before, after}) links_.push_back({before, after});
   }
 
-  /// A part of each is within the distance of the other.
+  /// Parts of both triangles lie within the distance of each other.
   void note(uint32_t after, uint32_t before, double distance) {
     note_after(after, before, distance);
     bounds_[before] = std::max(bounds_[before], stated_error(distance, had(before)));
   }
 
+  /// Maps triangles that simplify() left unchanged to themselves.
   void find_unchanged() {
     for (uint32_t s = 0; s < errors_.size(); ++s) {
       const Triangle& now = m_.triangles[s].points;
@@ -91,6 +93,7 @@ private:
     }
   }
 
+  /// Finds the image of a source triangle or, without one, overlays it on the simplified surface.
   void lay_over_after(uint32_t t) {
     Laid laid{t, false, {}};
     mapped_[t] = images_.find(t, laid.image);
@@ -119,7 +122,7 @@ private:
     return largest;
   }
 
-  /// The worst first: what they really are leaves most others as they are.
+  /// Tightens the largest bounds first: most others are then below the limit and stay as they are.
   void settle() {
     std::make_heap(claims_.begin(), claims_.end());
     while (!claims_.empty() && claims_.front().stated > error_.limit()) {
@@ -132,7 +135,7 @@ private:
       mapped_[t] = 0;
       after_.gather(before_.corner_points(t));
       best_.clear();
-      // Not all of it may lie over those after, though its image does.
+      // Even with an image, the triangle may not be covered by the candidates.
       const bool once = after_.lay(before_.corners(t), before_.surface().area_normal(t), best_);
       const double distance = once ? look_closer(t) : std::numeric_limits<double>::infinity();
       if (error_.enough(distance, had(t)))
@@ -153,8 +156,8 @@ private:
     for (const double error : errors_) error_.largest = std::max(error_.largest, error);
   }
 
-  /// What images cover needs no measuring of its own. Distances inside are noted here; ways and corners are shared with
-  /// neighbours.
+  /// Uses an image without further measurements. Records the distance inside it; accept_ways() handles sides and
+  /// corners, which neighbours share.
   void see_image(const Laid& laid) {
     const uint32_t t = laid.triangle;
     const Triangle& p = before_.surface().triangles[t].points;
@@ -171,7 +174,7 @@ private:
     }
   }
 
-  /// The distances at crossings and corners of images, for the triangles after on both sides.
+  /// Records the distances at path crossings and corner images, for the simplified triangles on both sides.
   void accept_ways() {
     for (uint32_t e = 0; e < edge_had_.size(); ++e) {
       const SurfaceWalk::Way& way = walk_.ways()[e];
@@ -196,7 +199,7 @@ private:
     }
   }
 
-  /// Images may be far from what they are images of where the surface is steep; the nearest point is what counts.
+  /// On steep parts an image may lie far from its preimage. Measures to the nearest points instead.
   bool look_closer_at_image(const Laid& laid) {
     const uint32_t t = laid.triangle;
     if (mapped_[t] == 0) return false;
@@ -209,7 +212,8 @@ private:
     return true;
   }
 
-  /// Straight up may be far where the surface is steep; the nearest point is what counts. Returns the largest of best_.
+  /// On steep parts the distance along the normal is too large. Measures to the nearest points instead. Returns the
+  /// largest distance in best_.
   double look_closer(uint32_t t) {
     double largest = 0.0;
     for (OverlayPiece& piece : best_) {
@@ -225,11 +229,11 @@ private:
     for (const OverlayPiece& piece : pieces) note(piece.triangle, t, piece.distance);
   }
 
-  /// What no overlay bounds well is cut.
-  /// @param bound of best_
+  /// Subdivides a triangle that overlays do not bound well.
+  /// @param bound largest distance in best_
   void measure_harder(uint32_t t, double bound) {
     const Corners p = before_.corners(t);
-    if (after_.candidates().empty()) after_.gather_near(p[0]); // a line that hung together with nothing
+    if (after_.candidates().empty()) after_.gather_near(p[0]); // a degenerate triangle without connected neighbours
     refine_over_after(t, bound, false);
     if (!error_.enough(bound, had(t))) {
       after_.gather_within(p, bound);
@@ -238,10 +242,11 @@ private:
     accept(t);
   }
 
-  /// @param all whether the candidates are all that matter: then what the corners' distance proves holds for others too
+  /// @param all whether the candidates include every triangle that may be near enough; only then the corner distances
+  /// are a valid lower bound
   void refine_over_after(uint32_t t, double& bound, bool all) {
     refiner_.begin(after_);
-    // It is not below this, as far as the candidates go.
+    // Lower bound of the error against the current candidates.
     const double before = error_.proven, least = stated_error(refiner_.measure_corners(before_.corners(t)), had(t));
     error_.proven = std::max(error_.proven, least);
     if (!error_.enough(bound, had(t))) {
@@ -255,7 +260,7 @@ private:
     error_.proven = all ? std::max(before, std::min(least, stated_error(bound, had(t)))) : before;
   }
 
-  // ---- what images do not cover
+  // ---- simplified triangles that images do not cover
 
   void find_covered() {
     cover_.begin(mapped_);
@@ -265,7 +270,7 @@ private:
       if (unchanged_[m_.source[s]] != 0) cover_.add_unchanged(s);
   }
 
-  /// Triangles after that images are not known to cover are measured themselves.
+  /// Measures simplified triangles that images are not known to cover against the source surface.
   void measure_uncovered() {
     find_covered();
     std::vector<SurfaceLink> found;
@@ -290,17 +295,18 @@ private:
   SurfaceWalk walk_;
   TriangleImages images_;
   ImageCover cover_;
-  std::vector<double> errors_; ///< of triangles after
-  std::vector<double> bounds_; ///< of triangles before
+  std::vector<double> errors_; ///< per simplified triangle
+  std::vector<double> bounds_; ///< per source triangle
   std::vector<SurfaceLink> links_;
-  std::vector<uint8_t> mapped_; ///< per triangle before: what is said of it holds for its image
+  std::vector<uint8_t> mapped_; ///< per source triangle: unchanged, or its image is used
   std::vector<uint8_t> unchanged_;
   std::vector<OverlayPiece> pieces_;
   std::vector<Laid> laid_;
-  std::vector<Claim> claims_;                ///< a heap
-  std::vector<double> edge_had_, point_had_; ///< the largest that accepted images at it had, or negative
+  std::vector<Claim> claims_; ///< a heap
+  /// largest inherited error of the accepted images at each edge and point; negative if none
+  std::vector<double> edge_had_, point_had_;
   std::vector<uint32_t> not_covered_;
-  std::vector<OverlayPiece> best_, refined_; ///< of the triangle at hand
+  std::vector<OverlayPiece> best_, refined_; ///< of the current triangle
   TriangleRefiner refiner_;
   GroupError error_;
 };

@@ -7,37 +7,40 @@
 
 namespace packtrace {
 
-/// A triangle before, part of which is found at a triangle after.
+/// A source triangle, part of which maps to a simplified triangle.
 struct SurfaceLink {
   uint32_t before, after;
   bool operator==(const SurfaceLink&) const = default;
 };
 
-/// Of each triangle after those before that are linked to it: before[ends[s] .. ends[s + 1]), some more than once.
+/// Source triangles linked to each simplified triangle s: before[ends[s] .. ends[s + 1]), possibly with duplicates.
 struct LinkLists {
   std::vector<uint32_t> ends, before;
 };
 
-/// Where everything before is found after.
+/// Where each source triangle lies on the simplified surface.
 struct SurfaceLinks {
-  /// @param count triangles after
+  /// @param count number of simplified triangles
   LinkLists by_after(size_t count) const;
 
-  std::vector<SurfaceLink> links; ///< some more than once
-  /// Per triangle before: how far at most what it stands for is from the triangles after that it is linked to.
+  std::vector<SurfaceLink> links; ///< may contain duplicates
+  /// Per source triangle: maximum distance of what it stands for from the simplified triangles that it is linked to.
   std::vector<double> bounds;
 };
 
-/// Sets the errors of the triangles that are left after simplify(): every point of a triangle before is within the
-/// error of one after, and every point of a triangle after within its error of the surface before, plus what the
-/// triangles before it already had. So errors stay distances to the original surface, however often this is done.
+/// Sets the errors of the triangles left after simplify(). Every point of a source triangle lies within the error of a
+/// linked simplified triangle, and every point of a simplified triangle within its error of the source surface. Each
+/// error includes the error that the source triangle already had, so errors remain two-sided distances to the original
+/// surface over any number of levels.
 ///
-/// Each triangle before is mapped onto those after (TriangleImages), or laid over those that its corners became part
-/// of: the distance of its points from one of them is convex, so it is largest at the corners of the pieces into which
-/// their outlines cut it. What that leaves out, at borders that moved and in folds, is cut finer. Triangles after that
-/// images are not known to cover (ImageCover) are measured alike.
-/// @param points, triangles before; mesh.points and mesh.stands_for number the same points. Behind those that
-/// simplify() had there may be more, whose corners need not be distinct.
+/// Each source triangle is mapped onto the simplified surface (TriangleImages) or overlaid on the triangles around the
+/// points that its corners became (Overlay). Distance from a triangle is convex, so it is largest at the corners of the
+/// pieces into which the outlines cut it. Triangles that neither method covers, at borders that moved and in folds, are
+/// subdivided. Simplified triangles that images are not known to cover (ImageCover) are measured against the source
+/// surface in the same ways.
+/// @param points, triangles source surface; mesh.points and mesh.stands_for use the same point numbers. Degenerate
+/// triangles, with equal corners, may follow the triangles that simplify() was given.
+/// @return links and bounds of the source triangles
 SurfaceLinks bound_errors(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh);
 
 } // namespace packtrace

@@ -41,7 +41,8 @@ void SurfaceSide::gather(const Triangle& corners) {
   }
 }
 
-/// Those that have another of the corners too, or else a few.
+/// Adds the triangles of the fan that have another of the corners too, up to kLargeFan; if there are none, its first
+/// ones.
 void SurfaceSide::add_large_fan(std::span<const uint32_t> fan, const Triangle& corners, int corner) {
   size_t added = 0;
   for (size_t k = 0; k < fan.size() && added < kLargeFan; ++k)

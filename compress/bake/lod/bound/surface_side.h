@@ -9,14 +9,14 @@
 
 namespace packtrace {
 
-/// A surface before or after, with what is around its points. Both use the numbers of points after: those before count
-/// as what they became.
+/// The source or the simplified surface, with the triangles around each point. Both sides use the point numbers of the
+/// simplified surface: a source point counts as the point that it became.
 class SurfaceSide {
 public:
-  /// @param became per point: its number after; none: they are points after
+  /// @param became per source point: its number on the simplified surface; empty if this is the simplified surface
   explicit SurfaceSide(const OverlaySurface& surface, std::span<const uint32_t> became = {})
       : surface_(surface), became_(became), overlay_(surface) {}
-  void link(); ///< before anything is asked about what is around points
+  void link(); ///< must be called before around(), gather() and add()
 
   const OverlaySurface& surface() const { return surface_; }
   Overlay& overlay() { return overlay_; }
@@ -28,19 +28,20 @@ public:
     return {surface_.corner(triangle, 0), surface_.corner(triangle, 1), surface_.corner(triangle, 2)};
   }
 
-  /// The triangles with that corner.
+  /// The triangles with a corner at that point.
   std::span<const uint32_t> around(uint32_t point) const {
     return std::span(fans_).subspan(first_[point], first_[point + 1] - first_[point]);
   }
 
-  // What another triangle is measured against: a set of triangles of this side.
+  // The candidates: triangles of this side that another triangle is measured against.
   std::span<const uint32_t> candidates() const { return candidates_; }
-  void gather(const Triangle& corners); ///< those around three points
-  void add(uint32_t triangle) {         ///< one more, after gather(); if it is not there yet
+  void gather(const Triangle& corners); ///< Makes the triangles around three points the candidates.
+  /// Adds one candidate after gather(), unless it is there already.
+  void add(uint32_t triangle) {
     if (stamp_[triangle] != stamp_value_) stamp_[triangle] = stamp_value_, candidates_.push_back(triangle);
   }
-  void gather_near(DVec3 point); ///< a few more: those with corners near it
-  /// All that may be nearer to a triangle than that, and more.
+  void gather_near(DVec3 point); ///< adds a few triangles near a point
+  /// Makes every triangle that may be within `distance` of `triangle` a candidate; conservative.
   void gather_within(const std::array<DVec3, 3>& triangle, double distance);
   bool lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::vector<OverlayPiece>& pieces) {
     return overlay_.lay(triangle, direction, candidates_, pieces);
@@ -49,16 +50,16 @@ public:
 private:
   void add_large_fan(std::span<const uint32_t> fan, const Triangle& corners, int corner);
 
-  /// What holds a triangle.
+  /// The bounds of a triangle.
   struct Box {
     DVec3 lo, hi;
   };
 
   OverlaySurface surface_;
   std::span<const uint32_t> became_;
-  std::vector<Box> boxes_; ///< when they are needed
+  std::vector<Box> boxes_; ///< computed on first use
   Overlay overlay_;
-  std::vector<uint32_t> first_, fans_; ///< triangles around points
+  std::vector<uint32_t> first_, fans_; ///< triangles around each point
   std::vector<uint32_t> stamp_, candidates_;
   uint32_t stamp_value_ = 0;
 };

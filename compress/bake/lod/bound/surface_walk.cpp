@@ -9,8 +9,9 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kMostSteps = 32; // triangles on one way, or around one point
-constexpr double kSteep = 0.05;     // sine; planes through an edge and a direction nearer to it than that are none
+constexpr uint32_t kMostSteps = 32; // maximum number of triangles on a path
+// minimum sine (edge to normal) of a slice; minimum cosine (normals) of an image's triangle
+constexpr double kSteep = 0.05;
 
 uint32_t next_corner(uint32_t corner) { return CornerLists::next_corner(corner); }
 uint32_t last_corner(uint32_t corner) { return CornerLists::last_corner(corner); }
@@ -34,9 +35,10 @@ SurfaceWalk::SurfaceWalk(const OverlaySurface& before, const SurfaceSide& after,
   pair_sides();
 }
 
-// ---- the surface after
+// ---- the simplified surface
 
-/// Pairs the sides of each edge. Edges of more than two triangles, or of two that face apart, have none.
+/// Pairs opposite half-edges. Edges with more than two triangles, or with two of inconsistent orientation, have no
+/// pairs.
 void SurfaceWalk::pair_sides() {
   constexpr uint32_t kMany = kNone - 1;
   std::vector<uint32_t> second(ways_.size(), kNone);
@@ -56,7 +58,7 @@ void SurfaceWalk::pair_sides() {
     if (const uint32_t a = side_of_edge_[edge], b = second[edge]; b < kMany) opposite_[a] = b, opposite_[b] = a;
 }
 
-// ---- ways
+// ---- paths
 
 inline bool SurfaceWalk::make_slice(const DVec3& from, const DVec3& to, const DVec3& up, Slice& out) const {
   out.from = from, out.direction = to - from;
@@ -97,7 +99,7 @@ inline bool SurfaceWalk::leave_triangle(const Slice& slice, uint32_t triangle, E
   return false;
 }
 
-/// Finds where the way leaves the triangle that it enters through the side that begins at `corner`.
+/// Finds where the path leaves the triangle that it enters through the side starting at `corner`.
 inline void SurfaceWalk::enter(const Slice& slice, uint32_t corner, Exit& exit) const {
   const DVec3& next = point(point_at(last_corner(corner)));
   const double side = slice.side(next);
@@ -107,7 +109,7 @@ inline void SurfaceWalk::enter(const Slice& slice, uint32_t corner, Exit& exit) 
     exit.corner = next_corner(corner), exit.left = &next, exit.side_left = side;
 }
 
-/// From the point that it became as far as it is away from it.
+/// Walks from the simplified point that `before` became to where `before` projects onto the surface along the normal.
 void SurfaceWalk::find_place(uint32_t before, Place& out) const {
   const uint32_t became = mesh_.stands_for[before];
   const DVec3 &from = point(became), &to = before_.points[before];
@@ -118,7 +120,7 @@ void SurfaceWalk::find_place(uint32_t before, Place& out) const {
   Slice slice;
   Exit exit;
   if (!make_slice(from, to, up, slice) || !leave_point(slice, became, exit)) {
-    // It is straight above the point.
+    // Directly above or below the point, the point is the image.
     const DVec3 d = to - from;
     out.distance2 = glm::dot(d, d);
     if (const DVec3 left = glm::cross(up, d);
@@ -173,7 +175,7 @@ void SurfaceWalk::find_way(uint32_t edge, uint32_t a, uint32_t b, Way& out) {
   for (uint32_t i = 0; i < out.count; ++i) out.distance2 = std::max(out.distance2, crossings_[out.first + i].distance2);
 }
 
-/// For the crossings of one way more.
+/// Reserves space for the crossings of one more path.
 inline void SurfaceWalk::make_room() {
   if (crossing_count_ + kMostSteps <= crossing_room_) return;
   crossing_room_ = std::max(2 * crossing_room_, 2 * ways_.size() + kMostSteps);
@@ -182,7 +184,7 @@ inline void SurfaceWalk::make_room() {
   crossings_ = std::move(larger);
 }
 
-/// Goes on from triangle to triangle until it is at the goal. False where it does not get there.
+/// Continues from triangle to triangle up to the goal. Returns false if it is not reached.
 inline bool SurfaceWalk::cross(const Slice& slice, Exit& exit, const Place& goal) {
   const bool to_point = goal.state == Place::State::kPoint;
   double last = 0.0;
@@ -202,7 +204,7 @@ inline bool SurfaceWalk::cross(const Slice& slice, Exit& exit, const Place& goal
   return false;
 }
 
-/// The edge is still there.
+/// If the source edge is still an edge of the simplified surface, the path follows it.
 bool SurfaceWalk::find_along(uint32_t edge, uint32_t from, uint32_t to, Way& out) const {
   const uint32_t side = side_along(edge);
   if (side == kNone) return false;
@@ -215,7 +217,8 @@ bool SurfaceWalk::find_along(uint32_t edge, uint32_t from, uint32_t to, Way& out
   return true;
 }
 
-/// The end lies in the next triangle, hardly beyond one of the other sides.
+/// Handles paths that end just beyond another side of `triangle`: if the goal is across that side, adds a crossing
+/// there.
 bool SurfaceWalk::step_aside(uint32_t triangle, const Place& goal, const DVec3& end) {
   for (uint32_t i = 0; i < 3; ++i) {
     const uint32_t side = 4 * triangle + i, other = opposite_[side];

@@ -10,32 +10,34 @@
 
 namespace packtrace {
 
-/// Where points and edges before are found on the surface after: every point before has a place there, and every edge a
-/// way over its triangles that all triangles at the edge share, so each crossing of two edges is computed once. The
-/// distances between crossings and what they are images of bound those of all points between: both are linear there.
+/// Maps the points and edges of the source surface onto the simplified surface. Each source point has an image (Place),
+/// and each source edge has a path across simplified triangles (Way). Triangles that share an edge share its path, so
+/// each crossing of a source edge and a simplified edge is computed once. Edge and path are linear between crossings,
+/// so the distances at the crossings bound those in between.
 /// Source: Jonathan Cohen, Dinesh Manocha and Marc Olano, Simplifying Polygonal Models Using Successive Mappings, 1997.
 class SurfaceWalk {
 public:
   static constexpr uint32_t kNone = ~0u;
 
-  /// At a point after, or in a triangle after.
+  /// The image of a source point: a simplified point (kPoint) or a position in a simplified triangle (kTriangle).
   struct Place {
     enum class State : uint8_t { kUnknown, kNowhere, kPoint, kTriangle };
     DVec3 at{};             ///< the image
-    double distance2 = 0.0; ///< of the point before and its image
+    double distance2 = 0.0; ///< squared distance of the source point and its image
     uint32_t number = kNone;
     State state = State::kUnknown;
   };
-  /// Where a way goes from one triangle after into the next.
+  /// Where a path goes from one simplified triangle into the next.
   struct Crossing {
     double at[3];
-    double on;        ///< 0 to 1: its place on the edge before
-    double distance2; ///< of both
-    uint32_t into;    ///< the triangle that it enters
+    double on;        ///< parameter on the source edge, 0 to 1
+    double distance2; ///< squared distance of the path and the edge here
+    uint32_t into;    ///< triangle that the path enters
     DVec3 point() const { return {at[0], at[1], at[2]}; }
   };
-  /// From the lower point of an edge before to the higher one. kAcross: begins in triangle `start` and enters others
-  /// at its crossings. kAlong: it is an edge after, with triangle `start` to the left and `right` to the right.
+  /// The path of a source edge, from its lower-numbered point to the higher one. kAcross: begins in triangle `start`
+  /// and enters further triangles at crossings first .. first + count. kAlong: follows a simplified edge with triangle
+  /// `start` on its left and `right` on its right.
   struct Way {
     enum class State : uint8_t { kUnknown, kNowhere, kAlong, kAcross };
     double distance2 = 0.0; ///< largest of its crossings
@@ -43,7 +45,7 @@ public:
     State state = State::kUnknown;
   };
 
-  /// All must outlive it. mesh.side_edges says which edges triangles before share.
+  /// All arguments must outlive this object. mesh.side_edges says which edges the source triangles share.
   SurfaceWalk(const OverlaySurface& before, const SurfaceSide& after, const SimplifyMesh& mesh);
 
   const Place& place(uint32_t before) {
@@ -51,46 +53,46 @@ public:
     if (p.state == Place::State::kUnknown) find_place(before, p);
     return p;
   }
-  /// @param edge from a to b or back
+  /// @param edge between points a and b, in either direction
   const Way& way(uint32_t edge, uint32_t a, uint32_t b) {
     Way& w = ways_[edge];
     if (w.state == Way::State::kUnknown) find_way(edge, a < b ? a : b, a < b ? b : a, w);
     return w;
   }
-  /// Of all edges; those that nobody asked for are not known.
+  /// Per edge; the state is kUnknown for edges that way() was not called for.
   std::span<const Way> ways() const { return ways_; }
   const Crossing& crossing(uint32_t i) const { return crossings_[i]; }
   uint32_t into(uint32_t i) const { return crossings_[i].into; }
 
   const DVec3& area_normal(uint32_t after) const { return normals_[after]; }
   const DVec3& point(uint32_t after) const { return mesh_.points[after]; }
-  /// The corner's point; corners are numbered 4 * triangle + 0, 1, 2.
+  /// The point of a corner; corners are numbered 4 * triangle + 0, 1, 2.
   uint32_t point_at(uint32_t corner) const { return corner_points_[corner]; }
   bool has(uint32_t triangle, uint32_t point) const {
     const uint32_t* p = &corner_points_[4 * size_t{triangle}];
     return p[0] == point || p[1] == point || p[2] == point;
   }
-  /// The corner where the side back begins, in the triangle across the side that begins at that corner; or kNone.
+  /// The corner where the opposite half-edge of the side starting at `corner` begins, or kNone.
   uint32_t opposite(uint32_t corner) const { return opposite_[corner]; }
-  /// The triangle across the side that begins at that corner, or kNone.
+  /// The triangle across the side starting at `corner`, or kNone.
   uint32_t beyond(uint32_t corner) const { return opposite_[corner] == kNone ? kNone : opposite_[corner] / 4; }
-  /// The triangle across the side that begins at that point, or kNone.
+  /// The triangle across the side of `triangle` starting at point `from`, or kNone.
   uint32_t across(uint32_t triangle, uint32_t from) const {
     const uint32_t* p = &corner_points_[4 * size_t{triangle}];
     return beyond(4 * triangle + (p[0] == from ? 0u : p[1] == from ? 1u : 2u));
   }
-  /// A corner where the edge after begins that an edge before became, or kNone.
+  /// A corner where the simplified edge that the source edge became begins, or kNone.
   uint32_t side_along(uint32_t edge) const { return side_of_edge_[mesh_.edge_became[edge]]; }
   const OverlaySurface& before() const { return before_; }
 
 private:
-  /// The plane in which a way lies, upright on the edge.
+  /// The plane through a source edge and the local surface normal; a path lies in it.
   struct Slice {
     DVec3 from, direction, left, along;
-    double offset; ///< of `from`, towards the left
+    double offset; ///< of `from` along `left`
     double side(const DVec3& p) const { return glm::dot(left, p) - offset; }
   };
-  /// Where a way leaves a triangle: through the side that begins at `corner`, from its right end to its left one.
+  /// Where a path leaves a triangle: through the side starting at `corner`, which runs from `right` to `left`.
   struct Exit {
     uint32_t corner;
     const DVec3 *right, *left;
@@ -122,10 +124,10 @@ private:
   std::vector<Way> ways_;
   std::unique_ptr<Crossing[]> crossings_;
   size_t crossing_count_ = 0, crossing_room_ = 0;
-  std::vector<uint32_t> side_of_edge_;             ///< per edge after: a corner where it begins, or kNone
-  std::vector<uint32_t> corner_points_, opposite_; ///< per corner: its point; where the side back begins, or kNone
-  std::vector<DVec3> normals_;                     ///< per triangle after, twice its area long
-  std::vector<DVec3> facing_;                      ///< per point after: the sum around it
+  std::vector<uint32_t> side_of_edge_;             ///< per simplified edge: a corner where it begins, or kNone
+  std::vector<uint32_t> corner_points_, opposite_; ///< per corner: its point, and its opposite half-edge or kNone
+  std::vector<DVec3> normals_;                     ///< per simplified triangle; length is twice its area
+  std::vector<DVec3> facing_;                      ///< per simplified point: sum of the area normals around it
 };
 
 } // namespace packtrace

@@ -12,8 +12,8 @@ DVec3 nearest_point(DVec3 p, DVec3 a, DVec3 b) {
 }
 
 DVec3 nearest_point(DVec3 p, DVec3 a, DVec3 b, DVec3 c) {
-  // Over the plane, p = a + v (b - a) + w (c - a): the foot is the nearest point where it lies inside. Else it is on
-  // one of the sides that p is beyond.
+  // Projects p to the plane as a + v (b - a) + w (c - a), scaled by area2. If the projection is inside the triangle, it
+  // is the nearest point; otherwise the nearest point is on a side that p lies beyond.
   const DVec3 ab = b - a, ac = c - a, ap = p - a;
   const double d00 = glm::dot(ab, ab), d01 = glm::dot(ab, ac), d11 = glm::dot(ac, ac);
   const double p0 = glm::dot(ap, ab), p1 = glm::dot(ap, ac);
@@ -21,7 +21,7 @@ DVec3 nearest_point(DVec3 p, DVec3 a, DVec3 b, DVec3 c) {
   const double v = d11 * p0 - d01 * p1, w = d00 * p1 - d01 * p0;
   if (area2 > 1e-12 * d00 * d11) {
     if (v >= 0.0 && w >= 0.0 && v + w <= area2) return a + (v / area2) * ab + (w / area2) * ac;
-    // Beyond one side only: it is the only one that p sees.
+    // p lies beyond one side only, so the nearest point is on it.
     if (v >= 0.0 && w >= 0.0) return nearest_point(p, b, c);
     if (v >= 0.0 && v + w <= area2) return nearest_point(p, a, b);
     if (w >= 0.0 && v + w <= area2) return nearest_point(p, a, c);

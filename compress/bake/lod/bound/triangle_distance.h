@@ -4,10 +4,10 @@
 
 namespace packtrace {
 
-/// The point of the triangle (a, b, c) nearest to p. Triangles without area are the segments that they are.
+/// The point of the triangle (a, b, c) nearest to p. Degenerate triangles count as segments.
 DVec3 nearest_point(DVec3 p, DVec3 a, DVec3 b, DVec3 c);
 
-/// The point of the segment nearest to p.
+/// The point of the segment (a, b) nearest to p.
 DVec3 nearest_point(DVec3 p, DVec3 a, DVec3 b);
 
 } // namespace packtrace

@@ -9,24 +9,23 @@
 
 namespace packtrace {
 
-/// Which triangles of the level below each triangle of a coarser level stands for: all those of which part may be found
-/// there.
-/// Only the last few levels are kept.
+/// Lists, for each triangle of a coarser level, the triangles one level below that it may stand for. Keeps the last
+/// kDepth levels only.
 class TriangleHistory {
 public:
-  /// How many levels back errors are measured.
+  /// Number of levels over which errors are measured directly.
   static constexpr uint32_t kDepth = 3;
 
   /// @param first_triangle number of the first triangle of level 1
   explicit TriangleHistory(uint32_t first_triangle = 0) : next_triangle_(first_triangle) {}
 
   void begin_level();
-  /// Triangles of the level begun, in order.
-  /// @param ends per triangle: of `below`
-  /// @param below numbers of triangles of the level below
+  /// Appends triangles to the current level, in order.
+  /// @param ends per triangle: end of its range in `below`
+  /// @param below triangle numbers of the level below
   void append(std::span<const uint32_t> ends, std::span<const uint32_t> below);
 
-  /// Empty for level 0 and for levels that are not kept.
+  /// Empty for level 0 and for levels that are no longer kept.
   std::span<const uint32_t> below(uint32_t triangle) const;
 
 private:
@@ -38,12 +37,12 @@ private:
   uint32_t next_triangle_;
 };
 
-/// The triangles of all levels so far.
+/// The triangles of all levels built so far.
 struct LevelTriangles {
   std::span<const LatticePoint> positions;
   std::span<const QuantizedVertex> vertices;
   std::span<const Triangle> triangles;
-  std::span<const double> errors; ///< per triangle: of its surface, lattice steps
+  std::span<const double> errors; ///< per triangle: error of its surface, lattice steps
   const TriangleHistory& history;
 };
 

@@ -13,9 +13,10 @@ using Way = SurfaceWalk::Way;
 
 } // namespace
 
-/// Follows the outline's image through triangles after. False where it is not all there, or too long.
-/// @param visitor told in order: begin(after), then corner(0), cross(crossing, into), corner(1), ... corner(0) again;
-/// turn(after, i) where it goes on around corner i
+/// Follows the image of the outline through simplified triangles. Returns false if part of it is missing or it is too
+/// long.
+/// @param visitor called in order: begin(triangle), corner(0), cross(crossing, into) ..., corner(1), ..., corner(0)
+/// again; turn(triangle, i) where the outline turns around corner i into another triangle
 template <typename Visitor>
 bool TriangleImages::follow(uint32_t triangle, Visitor& visitor) {
   const Triangle& p = points(triangle);
@@ -49,7 +50,8 @@ bool TriangleImages::follow(uint32_t triangle, Visitor& visitor) {
     visitor.corner(next);
     const Place& end = walk_.place(p[next]);
     if (end.state != Place::State::kPoint) continue;
-    // Around a corner that is a point after, inside the triangle before.
+    // If the corner's image is a simplified point, turns around it, inside the source triangle, to the start of the
+    // next side.
     while (last != starts[next]) {
       last = walk_.across(last, end.number);
       if (last == kNone || ++steps == kMost) return false;
@@ -59,9 +61,10 @@ bool TriangleImages::follow(uint32_t triangle, Visitor& visitor) {
   return true;
 }
 
-/// Whether the outline's image bounds a disk around one point at most. First what it goes into and comes back from is
-/// cut off: both ends of a straight cut lie in both triangles. What then is left of it goes around a point.
-/// @param inside set to that point, or kNone
+/// Whether the image of the outline bounds a disk with at most one simplified point inside. Detours into a triangle and
+/// back are removed first: the straight cut there has both ends in both triangles. The remaining triangles must form a
+/// fan.
+/// @param inside set to the interior point, or kNone
 bool TriangleImages::contract(std::span<const uint32_t> outline, uint32_t& inside) const {
   std::array<uint32_t, kMost> word;
   size_t begin = 0, end = 0;
@@ -140,7 +143,7 @@ void TriangleImages::look_closer(uint32_t triangle, const Image& image, std::vec
     uint32_t before;
     Word word;
     std::array<double, kMost> distances2;
-    DVec3 point; ///< where it was last, before and after
+    DVec3 point; ///< last position on the source outline; `image` is its image
     DVec3 image;
     double of_both;
 
@@ -148,7 +151,7 @@ void TriangleImages::look_closer(uint32_t triangle, const Image& image, std::vec
       word.triangles[word.count] = after;
       distances2[word.count++] = 0.0;
     }
-    /// Takes the last point into account for the triangle at hand.
+    /// Accounts for the last position in the current simplified triangle.
     void measure() {
       const Triangle& t = images.mesh_.triangles[word.triangles[word.count - 1]].points;
       const SurfaceWalk& walk = images.walk_;
@@ -174,7 +177,7 @@ void TriangleImages::look_closer(uint32_t triangle, const Image& image, std::vec
       const SurfaceWalk::Crossing& c = images.walk_.crossing(crossing);
       const Triangle& p = images.points(before);
       const uint32_t* edge = images.edges(before);
-      int side = 0; // whose way it is part of
+      int side = 0; // the side whose path has the crossing
       for (; side < 2; ++side)
         if (const Way& w = images.walk_.ways()[edge[side]]; crossing - w.first < w.count) break;
       const uint32_t a = p[side], b = p[side == 2 ? 0 : side + 1];
@@ -192,9 +195,9 @@ void TriangleImages::look_closer(uint32_t triangle, const Image& image, std::vec
     pieces.push_back({outline.word.triangles[i], 0, std::sqrt(std::max(outline.distances2[i], inside2))});
 }
 
-/// Twice the area of the image in an interval's triangle, along its normal, as far as the interval contributes to it;
-/// times twice the triangle's area.
-/// @param reference the point inside, if there is one, else any point
+/// The interval's contribution to the signed area of the image in its triangle, as (twice that area) x (twice the
+/// triangle's area).
+/// @param reference the interior point if there is one, otherwise any point
 double TriangleImages::area(uint32_t interval, const DVec3& reference) const {
   const auto count = static_cast<uint32_t>(outline_.intervals.size() - 1);
   const auto at = [&](uint32_t i) -> const Interval& { return outline_.intervals[i % count]; };
@@ -204,7 +207,7 @@ double TriangleImages::area(uint32_t interval, const DVec3& reference) const {
     sum += glm::cross(outline_.points[i] - reference, outline_.points[i + 1] - reference);
   uint32_t next = interval + 1;
   while (at(next).triangle != triangle) ++next;
-  // Back through the side where it left: straight along it.
+  // The outline comes back through the side where it left: closes the interval along that side.
   if (next == interval + 1 || at(interval + 1).triangle == at(next - 1).triangle)
     sum += glm::cross(outline_.points[end - 1] - reference, outline_.points[at(next).first_point] - reference);
   return glm::dot(sum, walk_.area_normal(triangle));

@@ -9,53 +9,54 @@
 
 namespace packtrace {
 
-/// Maps triangles before onto the surface after, continuously: the ways of its sides bound the image of each.
+/// Maps source triangles continuously onto the simplified surface: the paths of a triangle's sides bound its image.
 class TriangleImages {
 public:
   static constexpr uint32_t kNone = SurfaceWalk::kNone;
 
-  /// The image of a triangle: the triangles after that its outline meets, met(first, count).
-  /// Where they go around a point after, that is inside.
+  /// The image of a source triangle. Its outline crosses the simplified triangles met(image). If these form a fan
+  /// around a simplified point, that point is in the image's interior.
   struct Image {
-    double distance; ///< of both is at most that
-    double inside;   ///< how far the point inside is from the triangle; 0 if there is none
+    double distance; ///< maximum distance of any point from its image
+    double inside;   ///< distance of the interior point from the triangle; 0 without one
     uint32_t first, count;
-    uint32_t point; ///< the point inside, or kNone
+    uint32_t point; ///< the interior point, or kNone
   };
 
-  /// Both must outlive it.
+  /// Both arguments must outlive this object.
   TriangleImages(SurfaceWalk& walk, const SimplifyMesh& mesh)
       : walk_(walk), mesh_(mesh), met_(4 * walk.before().triangles.size() + kMost) {}
 
-  /// False, and nothing changed, where a corner or a side has no image, or the outline goes around two points and more.
+  /// Returns false, and changes nothing, if a corner or side has no image or the outline encloses more than one point.
   bool find(uint32_t triangle, Image& out);
   std::span<const uint32_t> met(const Image& image) const { return std::span(met_).subspan(image.first, image.count); }
 
-  /// Appends the triangles after that the image meets with how far its part there is from the nearest points at most,
-  /// both ways.
-  /// @param triangle find() was true of it
+  /// Appends one piece per simplified triangle that the outline crosses, with an upper bound of the distance there to
+  /// the nearest points, both ways.
+  /// @param triangle find() returned true for it
   void look_closer(uint32_t triangle, const Image& image, std::vector<OverlayPiece>& pieces);
 
-  /// Adds to `shares`, per triangle after that is wanted, how much of it the image covers. What is seen from behind is
-  /// negative.
-  /// @param triangle find() was true of it
+  /// Adds to `shares`, for each wanted simplified triangle, the fraction of its area that the image covers. Parts of
+  /// the image that are seen from behind count as negative.
+  /// @param triangle find() returned true for it
   void add_shares(uint32_t triangle, const Image& image, std::span<const uint8_t> wanted, std::span<double> shares);
 
 private:
-  static constexpr uint32_t kMost = 64; ///< triangles after; longer outlines are none
+  /// maximum number of simplified triangles on an outline; longer ones have no image
+  static constexpr uint32_t kMost = 64;
 
-  /// Triangles after, one after the other.
+  /// A sequence of adjacent simplified triangles.
   struct Word {
     uint32_t count = 0;
     std::array<uint32_t, kMost> triangles;
   };
 
-  /// The outline's image within one triangle after: points[first_point .. that of the next).
+  /// The part of an outline in one simplified triangle: points from first_point up to that of the next interval.
   struct Interval {
     uint32_t triangle, first_point;
   };
   struct Outline {
-    std::vector<Interval> intervals; ///< and one more
+    std::vector<Interval> intervals; ///< plus an end marker
     std::vector<DVec3> points;
   };
 
@@ -69,9 +70,9 @@ private:
 
   SurfaceWalk& walk_;
   const SimplifyMesh& mesh_;
-  std::vector<uint32_t> met_; ///< with room for one outline more
+  std::vector<uint32_t> met_; ///< with room for one more outline
   uint32_t met_count_ = 0;
-  Outline outline_; ///< of the triangle at hand, where shares are looked for
+  Outline outline_; ///< of the current triangle; used by add_shares()
 };
 
 } // namespace packtrace

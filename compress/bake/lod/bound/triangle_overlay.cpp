@@ -9,9 +9,9 @@
 namespace packtrace {
 namespace {
 
-constexpr double kSteep = 0.05;       // cosine; what is steeper is not seen from there
-constexpr double kRounding = 1e-6;    // of how often a triangle is covered, which is a whole number
-constexpr double kOnce = 1.0 - 1e-12; // then mostly all of it is
+constexpr double kSteep = 0.05;       // cosine; steeper triangles count as edge-on
+constexpr double kRounding = 1e-6;    // tolerance of the coverage, which is an integer
+constexpr double kOnce = 1.0 - 1e-12; // coverage at which the search stops: usually all of it is covered
 static_assert(sizeof(DVec3) == 3 * sizeof(double));
 
 OverlayKernel pick_kernel() {
@@ -21,11 +21,11 @@ OverlayKernel pick_kernel() {
   return overlay_kernel;
 }
 
-/// Slopes of the coordinates along one axis.
+/// Derivatives of the coordinates along one axis.
 OverlayPoint slopes(double l1, double l2, double height) { return {-(l1 + l2), l1, l2, height}; }
 
-/// A convex part of a triangle of the surface, in coordinates of the one laid over it. Six corners, or nine where
-/// roundings bend it.
+/// A convex part of a surface triangle, in coordinates of the triangle laid over it. Has at most six corners, or nine
+/// with rounding errors.
 struct Polygon {
   std::array<OverlayPoint, 9> corners;
   size_t count;
@@ -33,7 +33,7 @@ struct Polygon {
 
 double coordinate(const OverlayPoint& p, int i) { return i == 0 ? p.l0 : i == 1 ? p.l1 : p.l2; }
 
-/// Keeps where a coordinate is not negative.
+/// Clips to where coordinate i is not negative.
 Polygon cut(const Polygon& in, int i) {
   Polygon out{{}, 0};
   for (size_t k = 0; k < in.count; ++k) {
@@ -86,7 +86,7 @@ bool Overlay::lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::sp
   const DVec3 normal = glm::cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
   double seen = glm::dot(normal, z);
   if (!(std::abs(seen) > kSteep * glm::length(normal))) return false;
-  if (seen < 0.0) std::swap(triangle_[1], triangle_[2]), seen = -seen; // it is seen from behind
+  if (seen < 0.0) std::swap(triangle_[1], triangle_[2]), seen = -seen; // seen from behind
   const DVec3 e1 = triangle_[1] - triangle_[0], e2 = triangle_[2] - triangle_[0];
   // p = triangle_[0] + l1 e1 + l2 e2 + height z
   const double scale = 1.0 / seen;
@@ -117,7 +117,7 @@ bool Overlay::lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::sp
   return true;
 }
 
-/// Whether no side that goes through the inside is a border of the pieces.
+/// Whether no candidate side through the interior is a border of the pieces.
 bool Overlay::hang_together(std::span<const OverlayPiece> pieces) {
   open_sides_.clear();
   for (const OverlayPiece& piece : pieces)
@@ -134,7 +134,7 @@ bool Overlay::hang_together(std::span<const OverlayPiece> pieces) {
   return open_sides_.empty();
 }
 
-/// Whether some triangle that has an open side is there twice.
+/// Whether an open side occurs twice, as where the surface has several layers.
 bool Overlay::has_layers() {
   std::sort(open_sides_.begin(), open_sides_.end());
   return std::adjacent_find(open_sides_.begin(), open_sides_.end()) != open_sides_.end();

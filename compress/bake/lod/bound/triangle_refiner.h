@@ -12,23 +12,23 @@
 
 namespace packtrace {
 
-/// Bounds the distance of a triangle from the nearest of several, cutting it in four as long as that makes the bound
-/// much smaller: the distance from one triangle is convex, so the three corners bound it for all of it.
+/// Bounds the distance of a triangle from the nearest of several triangles. Distance from a triangle is convex, so its
+/// maximum is at a corner; the triangle is subdivided into four while that lowers the bound considerably.
 class TriangleRefiner {
 public:
-  /// Empty, for those that the next triangle is to be measured against.
+  /// Empties the set of triangles to measure against and returns it, for the caller to fill.
   TriangleSet& begin() {
     levels_[0].kept.clear();
     return levels_[0].kept;
   }
 
-  /// Begins with the candidates of `side`.
+  /// Measures against the candidates of `side`.
   void begin(const SurfaceSide& side) {
     TriangleSet& among = begin();
     for (const uint32_t t : side.candidates()) among.add(side.surface(), t);
   }
 
-  /// How far the triangle's farthest corner is from those added since begin(); 0 without any.
+  /// The largest distance of a corner of `triangle` from the triangles added since begin(); 0 if there are none.
   double measure_corners(const std::array<DVec3, 3>& triangle) {
     Level& top = levels_[0];
     top.among = &top.kept;
@@ -37,9 +37,10 @@ public:
     return top.kept.empty() ? 0.0 : top.kept.nearest(top.distances[0], top.distances[1], top.distances[2]).least;
   }
 
-  /// Returns the largest bound of the triangle of measure_corners(); infinite without any to measure against.
-  /// @param enough (distance, candidate): whether a bound needs to be no smaller
-  /// @param noted (candidate, distance): a part of the triangle is that far from it
+  /// Returns an upper bound for the triangle of measure_corners(); infinite if there is nothing to measure against.
+  /// @param enough (distance, candidate): whether that bound is small enough
+  /// @param noted (candidate, distance): called once per part of the triangle that lies within the distance of the
+  /// candidate
   template <typename Enough, typename Noted>
   double run(const Enough& enough, const Noted& noted) {
     if (levels_[0].kept.empty()) return std::numeric_limits<double>::infinity();
@@ -48,23 +49,23 @@ public:
     return largest_;
   }
 
-  /// How many distances of triangles all runs took so far.
+  /// Number of point-triangle distances in all runs so far.
   size_t work() const { return work_; }
 
 private:
   static constexpr size_t kMaxCuts = 5;
-  static constexpr double kGoodEnough = 1.1; // of what cutting could still gain
+  static constexpr double kGoodEnough = 1.1; // stops within this factor of the lower bound
 
-  /// What a triangle is cut into: its corners and the middles of its sides, with their distances.
+  /// One subdivision level: the corners of a part and the midpoints of its sides, with their distances.
   struct Level {
-    const TriangleSet* among; ///< kept, or that of a level above
+    const TriangleSet* among; ///< kept, or the set of a level above
     std::array<DVec3, 6> points;
-    std::array<const double*, 6> distances; ///< of each point from each of `among`; padded
+    std::array<const double*, 6> distances; ///< of each point from each triangle of `among`; padded
     TriangleSet kept;
-    std::array<std::vector<double>, 6> measured; ///< what distances of this level's own are
+    std::array<std::vector<double>, 6> measured; ///< distances computed at this level
   };
 
-  /// Three points from `first` on.
+  /// Measures three points, starting at `first`.
   void measure(Level& level, size_t first) {
     std::array<double*, 3> rows;
     for (size_t k = 0; k < 3; ++k) {
@@ -76,6 +77,7 @@ private:
     work_ += 3 * level.among->size();
   }
 
+  /// Bounds a part of the triangle, subdividing it while that helps. Calls noted() for the final parts.
   template <typename Enough, typename Noted>
   void cut(size_t depth, const std::array<size_t, 3>& corners, const Enough& enough, const Noted& noted) {
     const Level& level = levels_[depth];
@@ -93,13 +95,13 @@ private:
       cut(depth + 1, part, enough, noted);
   }
 
-  /// Sets up the next level: what is too far from the triangle serves none of its parts, and is left out where it is
-  /// much.
+  /// Sets up the next level. Triangles that are too far away cannot be nearest for any part; they are dropped from the
+  /// set if at least half of it goes.
   template <typename Enough>
   void divide(size_t depth, const std::array<size_t, 3>& corners, size_t where, double good, const Enough& enough) {
     const Level& from = levels_[depth];
     Level& to = levels_[depth + 1];
-    std::array<double, 3> reach{}; // of the triangle from each corner
+    std::array<double, 3> reach{}; // from each corner to the farthest point of the part
     for (size_t k = 0; k < 3; ++k) to.points[k] = from.points[corners[k]], to.distances[k] = from.distances[corners[k]];
     for (size_t k = 0; k < 3; ++k) to.points[3 + k] = 0.5 * (to.points[k] + to.points[(k + 1) % 3]);
     for (size_t k = 0; k < 3; ++k)

@@ -3,7 +3,7 @@
 namespace packtrace {
 namespace {
 
-constexpr double kFar = 1e150; // its square is finite
+constexpr double kFar = 1e150; // coordinate of padding; its square is finite
 
 DistanceKernel pick_distance_kernel() {
 #if defined(__x86_64__)

@@ -11,7 +11,7 @@
 
 namespace packtrace {
 
-/// Numbered triangles of a surface that points are measured against, four at a time.
+/// Numbered triangles that points are measured against, four per SIMD operation.
 class TriangleSet {
 public:
   void clear() { numbers_.clear(), blocks_.clear(); }
@@ -19,18 +19,20 @@ public:
     add({surface.corner(triangle, 0), surface.corner(triangle, 1), surface.corner(triangle, 2)}, triangle);
   }
   void add(const std::array<DVec3, 3>& corners, uint32_t number);
-  /// Adds triangle i of another set.
+  /// Adds triangle i of another set, with its number.
   void add(const TriangleSet& other, size_t i);
 
   size_t size() const { return numbers_.size(); }
   bool empty() const { return numbers_.empty(); }
   uint32_t number(size_t i) const { return numbers_[i]; }
 
-  /// How far points are from each, a row for each point: its first size() entries, of padded_size(); then what is far.
+  /// Distances of points from all triangles. Writes one row of padded_size() entries per point; entries from size() on
+  /// are padding with very large distances.
   void distances(std::span<const DVec3> points, std::span<double* const> rows) const;
   size_t padded_size() const { return 4 * blocks_.size(); }
 
-  /// @param a, b, c distances() of the corners of a triangle; the set is not empty
+  /// Finds the nearest triangle to a triangle with corners A, B, C. The set must not be empty.
+  /// @param a, b, c rows of distances() for A, B, C
   NearestTriangle nearest(const double* a, const double* b, const double* c) const;
 
 private:

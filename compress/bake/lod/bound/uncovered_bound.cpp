@@ -7,8 +7,9 @@ namespace packtrace {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-constexpr uint32_t kMostCuts = 3; // before the refiner's own
-// Distances for each triangle before and after, at most: where everything is near everything, little comes of more.
+constexpr uint32_t kMostCuts = 3; // subdivision levels here; the refiner adds its own
+// Maximum number of distances per triangle (source and simplified). Limits the time in soups, where every triangle is
+// near all others and more work gains little.
 constexpr size_t kWork = 100;
 
 } // namespace
@@ -46,15 +47,15 @@ std::vector<PartDistance> UncoveredBound::finish() {
   return result;
 }
 
-/// Cuts the part in four as long as that may make it less. Adds to parts_ what bounds it, and returns the error that
-/// makes.
-/// @param known what it is not above
+/// Subdivides the part into four while that can lower its bound. Appends the bounds to parts_ and returns the part's
+/// error bound.
+/// @param known an upper bound that is already known
 double UncoveredBound::look_closer(uint32_t triangle, const Corners& part, double known, uint32_t depth) {
   const size_t begin = parts_.size();
   double least = 0.0;
   const double stated = measure_part(triangle, part, least);
   error_.proven = std::max(error_.proven, least);
-  double largest = 0.0; // of the distances
+  double largest = 0.0; // largest distance in parts_
   for (size_t i = begin; i < parts_.size(); ++i) largest = std::max(largest, parts_[i].distance);
   if (depth == kMostCuts || stated <= error_.limit() || largest <= GroupError::kSlack * least || spent()) return stated;
   const size_t end = parts_.size();
@@ -73,8 +74,9 @@ double UncoveredBound::look_closer(uint32_t triangle, const Corners& part, doubl
   return closer;
 }
 
-/// Adds to parts_ what bounds a part of the triangle, by the candidates, and returns the error that makes.
-/// @param least set to how far it is at least from all of them
+/// Measures a part against the current candidates. Appends the bounds to parts_ and returns the part's error bound.
+/// @param least set to a lower bound of the part's largest distance from the candidates; unchanged if the overlay is
+/// enough
 double UncoveredBound::measure_part(uint32_t triangle, const Corners& part, double& least) {
   double by_laying = kInfinite;
   if (lay(part, by_laying) && by_laying <= error_.limit()) {
@@ -89,7 +91,7 @@ double UncoveredBound::measure_part(uint32_t triangle, const Corners& part, doub
   return std::min(by_laying, by_cutting);
 }
 
-/// False where that says nothing.
+/// Bounds the part by an overlay in laid_. Returns false if the candidates do not cover it.
 bool UncoveredBound::lay(const Corners& part, double& stated) {
   laid_.clear();
   const DVec3 normal = glm::cross(part[1] - part[0], part[2] - part[0]);
@@ -103,7 +105,7 @@ bool UncoveredBound::lay(const Corners& part, double& stated) {
   return true;
 }
 
-/// The part of measure_corners().
+/// Bounds the part that measure_corners() was called for by subdivision.
 double UncoveredBound::refine() {
   refined_.clear();
   double stated = before_.candidates().empty() ? kInfinite : 0.0;

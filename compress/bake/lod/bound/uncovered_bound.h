@@ -11,31 +11,32 @@
 
 namespace packtrace {
 
-/// A part of a triangle after is that far from a triangle before, at most.
+/// A part of a simplified triangle lies within `distance` of a source triangle.
 struct PartDistance {
   uint32_t after, before;
   double distance;
 };
 
-/// Measures triangles after against the surface before: those that nothing else bounds. First each is laid over the
-/// triangles before that are found at it, or cut; then those of which most is left to gain are cut further, and what is
-/// too far off is measured against all that may be near.
+/// Bounds the distance of simplified triangles from the source surface, for those that no image is known to cover
+/// (ImageCover). Each triangle is first overlaid on nearby source triangles, or subdivided if the overlay does not
+/// cover it. finish() then subdivides the triangles with the largest bounds further and measures them against every
+/// source triangle that may be near enough.
 class UncoveredBound {
 public:
-  /// @param before linked; all must outlive it
+  /// @param before, after, error, refiner must outlive this object; `before` must be linked
   UncoveredBound(SurfaceSide& before, const SurfaceSide& after, GroupError& error, TriangleRefiner& refiner)
       : before_(before), after_(after), error_(error), refiner_(refiner) {}
 
-  /// Measures all of a triangle.
-  /// @param found triangles before of which part may be there; some more than once
+  /// Bounds the distance of a whole simplified triangle.
+  /// @param found source triangles, parts of which may map to it; may contain duplicates
   void measure(uint32_t triangle, std::span<const uint32_t> found);
-  /// Looks closer at those that matter. Returns what bounds all triangles measured, part by part.
+  /// Tightens the bounds that determine the group's error. Returns bounds that together cover all measured triangles.
   std::vector<PartDistance> finish();
 
 private:
   using Corners = std::array<DVec3, 3>;
 
-  /// Of parts_[first .. first + count).
+  /// The error bound of a triangle; its parts are parts_[first .. first + count).
   struct Claim {
     double stated;
     uint32_t triangle;
@@ -56,7 +57,7 @@ private:
   TriangleRefiner& refiner_;
   std::vector<PartDistance> parts_;
   std::vector<Claim> claims_;
-  std::vector<OverlayPiece> laid_, refined_; ///< of the part at hand
+  std::vector<OverlayPiece> laid_, refined_; ///< bounds of the current part
 };
 
 } // namespace packtrace

@@ -8,8 +8,8 @@
 
 namespace packtrace {
 
-/// Which corners of triangles are at each point, while points become one and triangles go. Corners are numbered
-/// 4 * triangle + 0, 1, 2.
+/// Lists the triangle corners at each point while points are merged and triangles removed. Corner i of triangle t has
+/// the number 4 t + i.
 class CornerLists {
 public:
   static constexpr uint32_t kNone = ~0u;
@@ -32,7 +32,7 @@ public:
   bool alive(uint32_t triangle) const { return points_[4 * triangle + 3] == 0; }
   void remove(uint32_t triangle) { points_[4 * triangle + 3] = 1; }
 
-  /// visit(corner) for each corner at the point; those of triangles that are gone are unlinked.
+  /// Calls visit(corner) for each corner at the point and unlinks corners of removed triangles.
   template <typename Visit>
   void for_each(uint32_t point, const Visit& visit) {
     uint32_t* link = &first_[point];
@@ -47,8 +47,8 @@ public:
     last_[point] = last;
   }
 
-  /// All corners at `gone` come to `kept`, behind those there. Both lists hold no removed triangles but those removed
-  /// since for_each() went through them.
+  /// Appends all corners at `gone` to those at `kept`. Corners of removed triangles may be among them until the next
+  /// for_each().
   void move_all(uint32_t gone, uint32_t kept) {
     if (first_[gone] == kNone) return;
     for (uint32_t corner = first_[gone]; corner != kNone; corner = next_[corner]) points_[corner] = kept;
@@ -58,7 +58,7 @@ public:
   }
 
 private:
-  std::vector<uint32_t> points_; ///< per corner; the fourth entry of each triangle says that it is gone
+  std::vector<uint32_t> points_; ///< per corner; the fourth entry of a triangle is 1 once it is removed
   std::vector<uint32_t> next_;
   std::vector<uint32_t> first_, last_; ///< per point
 };

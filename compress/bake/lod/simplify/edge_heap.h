@@ -8,15 +8,14 @@
 
 namespace packtrace {
 
-/// Edges by what their collapse costs, the cheapest on top; those of equal cost by number. Costs are compared as
-/// floats.
+/// Binary min-heap of edges by collapse cost, compared as float. Edges of equal cost are ordered by number.
 class EdgeHeap {
 public:
   bool empty() const { return keys_.empty(); }
   uint32_t top() const { return static_cast<uint32_t>(keys_.front()); }
   void reserve(size_t count) { keys_.reserve(count); }
 
-  /// Without order, until sort() is called.
+  /// Appends without restoring the heap order; call sort() afterwards.
   /// @param cost not negative
   void add(double cost, uint32_t edge) { keys_.push_back(key(cost, edge)); }
   void sort() {
@@ -29,18 +28,18 @@ public:
     if (!keys_.empty()) sink(0, last);
   }
 
-  /// Those at the first places: the top, and some that may come soon.
+  /// The first kNear heap entries: the top and edges that are likely to follow soon.
   static constexpr size_t kNear = 7;
   size_t near_count() const { return std::min(kNear, keys_.size()); }
   uint32_t near(size_t place) const { return static_cast<uint32_t>(keys_[place]); }
-  /// Gives one of them another cost; without order until near_changed() is called.
+  /// Changes the cost of one of them without restoring the heap order; call near_changed() afterwards.
   void change_near(size_t place, double cost) { keys_[place] = key(cost, near(place)); }
   void near_changed() {
     for (size_t i = near_count(); i-- > 0;) sink(i, keys_[i]);
   }
 
 private:
-  /// Floats that are not negative are ordered as their bits are.
+  /// The bits of non-negative floats have the same order as their values.
   static uint64_t key(double cost, uint32_t edge) {
     constexpr double kLargest = std::numeric_limits<float>::max();
     const auto rounded = static_cast<float>(std::min(cost, kLargest));

@@ -1,5 +1,5 @@
-// Where edges collapse to, four at a time, for each instruction set: same operations in the same order, so the same
-// bits. No other header's functions may be compiled for AVX2.
+// Places edge collapses, four edges in SIMD lanes. Compiled per instruction set with the same operations in the same
+// order, so results are bit-identical. No other header's functions may be compiled for AVX2.
 
 #include "compress/bake/lod/simplify/edge_placement.h"
 
@@ -7,7 +7,7 @@ namespace packtrace {
 namespace {
 
 using Lanes = double __attribute__((vector_size(32)));
-using Row = double __attribute__((vector_size(32), may_alias, aligned(8))); // where lanes are stored
+using Row = double __attribute__((vector_size(32), may_alias, aligned(8))); // lanes as stored in memory
 
 struct Quadric4 {
   Lanes xx, xy, xz, yy, yz, zz, bx, by, bz, c;
@@ -17,13 +17,14 @@ struct Vec4 {
   Lanes x, y, z;
 };
 
+/// Half the gradient of q at p: A p + b.
 [[gnu::always_inline]] inline void slope(const Quadric4& q, const Vec4& p, Vec4& out) {
   out.x = q.xx * p.x + q.xy * p.y + q.xz * p.z + q.bx;
   out.y = q.xy * p.x + q.yy * p.y + q.yz * p.z + q.by;
   out.z = q.xz * p.x + q.yz * p.y + q.zz * p.z + q.bz;
 }
 
-/// Rounding may make it a little negative where it should be 0; never is here.
+/// The value of q at p, clamped to 0: rounding may make it slightly negative.
 [[gnu::always_inline]] inline void value(const Quadric4& q, const Vec4& p, Lanes& out) {
   const Lanes zero = {};
   Vec4 s;
@@ -32,12 +33,12 @@ struct Vec4 {
   out = v > zero ? v : zero;
 }
 
-/// Where it is least; along directions in which it hardly changes, close to p, which it replaces.
+/// Moves p to the minimum of q. Along directions of low curvature, p hardly moves.
 [[gnu::always_inline]] inline void minimise(const Quadric4& q, Vec4& p) {
   const Lanes zero = {}, one = zero + 1.0;
   const Lanes trace = q.xx + q.yy + q.zz;
-  const Lanes stay = 1e-4 * trace;              // less curved directions are left alone
-  const Lanes safe = trace > zero ? zero : one; // there is nothing at all
+  const Lanes stay = 1e-4 * trace;              // regularises directions of low curvature
+  const Lanes safe = trace > zero ? zero : one; // for quadrics that are 0
   // L D L^T = A + stay I
   const Lanes d0 = one / (q.xx + stay + safe), l10 = q.xy * d0, l20 = q.xz * d0;
   const Lanes d1 = one / (q.yy + stay + safe - l10 * q.xy), v = q.yz - l10 * q.xz, l21 = v * d1;
@@ -52,12 +53,12 @@ struct Vec4 {
 [[gnu::always_inline]] inline void to_box(const Lanes& lo, const Lanes& hi, Lanes& x) {
   x = x < lo ? lo : x;
   x = x > hi ? hi : x;
-  constexpr double kRound = 6755399441055744.0; // 1.5 * 2^52: adding it rounds to whole numbers
+  constexpr double kRound = 6755399441055744.0; // 1.5 * 2^52: adding it rounds to integers
   x = (x + kRound) - kRound;
 }
 
-/// The best of both ends and, where the edge may move, the least point near it.
-/// @param keep_a, keep_b that end stays where it is
+/// Chooses the best of both ends and, if neither end is fixed, the minimum near the edge.
+/// @param keep_a, keep_b whether that end must not move
 template <typename Mask>
 [[gnu::always_inline]] inline void place(const Quadric4& q, const Vec4& a, const Vec4& b, const Mask& keep_a,
                                          const Mask& keep_b, const PlacementRules& rules, Vec4& point, Lanes& cost,
@@ -100,7 +101,7 @@ template <typename Mask>
   v2 = __builtin_shufflevector(a, c, 2, 3, 6, 7), v3 = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
 
-/// Doubles 4 i to 4 i + 3 of a point: of its quadric, and at last where it is.
+/// Row i of a point: doubles 4 i to 4 i + 3. Rows 0 to 2 hold the quadric, row 3 the position and `held`.
 [[gnu::always_inline]] inline const Row& row(const CollapsePoint& point, int i) {
   return *reinterpret_cast<const Row*>(reinterpret_cast<const char*>(&point) + sizeof(Row) * static_cast<uint64_t>(i));
 }
@@ -124,7 +125,7 @@ template <typename Mask>
     Lanes bx = row(*b[0], 3), by = row(*b[1], 3), bz = row(*b[2], 3), held_b = row(*b[3], 3);
     transpose(ax, ay, az, held_a);
     transpose(bx, by, bz, held_b);
-    // What must not move stays; a border point does not leave the border for one inside.
+    // Locked points stay; a border point does not move to an interior one.
     const Lanes zero = {}, locked = zero + kLocked;
     const auto keep_a = (held_a >= locked) | ((held_b < locked) & (held_a > held_b));
     const auto keep_b = ~keep_a & ((held_b >= locked) | (held_b > held_a));

@@ -14,8 +14,8 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kNone = ~0u;
-constexpr double kLargestTurn = 0.2; // cosine; a triangle may turn by less than that in one collapse
-constexpr double kRetryShare = 0.75; // of the triangles left: then rejected edges are tried again
+constexpr double kLargestTurn = 0.2; // minimum cosine between a triangle's normals before and after a collapse
+constexpr double kRetryShare = 0.75; // share of the triangles left at which rejected edges are tried again
 
 PlacementKernel pick_placement_kernel() {
 #if defined(__x86_64__)
@@ -36,7 +36,7 @@ public:
     start();
     while (live_ > config_.target_triangles && !heap_.empty()) {
       const size_t before = live_;
-      // Edges that could not go may, once what is around them has changed.
+      // Rejected edges may collapse once their surroundings have changed.
       const auto next = static_cast<size_t>(kRetryShare * static_cast<double>(live_));
       drain_heap(std::max<size_t>(config_.target_triangles, next));
       if (live_ == before && std::exchange(may_tear_, true)) break;
@@ -94,16 +94,16 @@ private:
     return wedge;
   }
 
-  // ---- which edge goes next
+  // ---- order of collapses
 
-  /// Follows an edge's ends to what they became. False where it cannot collapse any more.
+  /// Updates an edge's ends to the points that they were merged into. Returns false if it can no longer collapse.
   bool follow(uint32_t edge) {
     EdgeEnds& e = surface_.ends[edge];
     e = {root(e.a), root(e.b)};
     return same_edge_[edge] == edge && e.a != e.b && (m_.locked[e.a] == 0 || m_.locked[e.b] == 0);
   }
 
-  /// Whether something happened around it since it was placed. It may have become dearer than others.
+  /// Whether a collapse nearby has changed the edge's cost since it was placed.
   bool is_stale(uint32_t edge) const {
     const EdgeEnds e = surface_.ends[edge];
     return edge_stamp_[edge] != stamp_[e.a] + stamp_[e.b];
@@ -123,7 +123,7 @@ private:
     }
   }
 
-  /// Places the top anew, and with it others that will be on top soon and need it too: four cost little more than one.
+  /// Recomputes the top edge together with stale edges near the top: four in SIMD lanes cost little more than one.
   void place_near() {
     constexpr size_t kLanes = 4;
     std::array<size_t, kLanes> places{};
@@ -157,10 +157,10 @@ private:
 
   // ---- one collapse
 
-  /// A triangle with one of both ends, and its other corners in order.
+  /// A triangle with one end of the edge; its other corners in order.
   struct StarTriangle {
     uint32_t triangle, next, last;
-    DVec3 area_normal; ///< as it will be
+    DVec3 area_normal; ///< after the collapse
   };
 
   void try_collapse(uint32_t edge) {
@@ -173,8 +173,8 @@ private:
       collapse(e.a, e.b, point, p.along);
   }
 
-  /// The triangles around a and b. False where the collapse would leave no triangle there. Afterwards the surface may
-  /// touch itself: a neighbour of both need not be a corner of a triangle at the edge.
+  /// Collects the triangles around a and b. Returns false if the collapse would leave none. A collapse may make the
+  /// surface touch itself: common neighbours of a and b need not share a triangle with the edge.
   bool gather_star(uint32_t a, uint32_t b) {
     star_.clear();
     removed_.clear();
@@ -193,8 +193,8 @@ private:
     return !star_.empty() && !removed_.empty();
   }
 
-  /// Whether a triangle would vanish that is all there is between its third point and the edge: what it stands for
-  /// would be missing there, and the quadrics do not know. Only where nothing else can go such triangles may.
+  /// Whether the collapse would remove the only triangle that connects its third point to the edge. The quadrics do not
+  /// measure what the surface loses there, so this is allowed only when no other edge can collapse.
   bool tears(uint32_t a, uint32_t b) {
     for (const uint32_t triangle : removed_)
       for (uint32_t corner = 4 * triangle; corner < 4 * triangle + 3; ++corner) {
@@ -211,13 +211,13 @@ private:
     return false;
   }
 
-  /// Whether a triangle would, with both ends at the point.
+  /// Whether moving both ends to `point` would fold over a triangle.
   bool turns_over(const DVec3& point) {
     for (StarTriangle& t : star_) {
       const DVec3& before = surface_.area_normals[t.triangle];
       t.area_normal = glm::cross(m_.points[t.next] - point, m_.points[t.last] - point);
       const double before2 = glm::dot(before, before), dot = glm::dot(before, t.area_normal);
-      if (!(before2 > 0.0)) continue; // had no side
+      if (!(before2 > 0.0)) continue; // degenerate, no normal
       if (!(dot > 0.0) || dot * dot < kLargestTurn * kLargestTurn * before2 * glm::dot(t.area_normal, t.area_normal))
         return true;
     }
@@ -226,7 +226,7 @@ private:
 
   void collapse(uint32_t a, uint32_t b, const DVec3& point, double along) {
     if (!m_.wedges.empty()) merge_wedges(a, b, along);
-    // The point of the corner lists that stays is the one that must not move, or a.
+    // Keeps the locked point, if one is locked; otherwise b if it stays in place, else a.
     const bool keep_b = m_.locked[b] != 0 || (m_.locked[a] == 0 && point == m_.points[b]);
     const uint32_t kept = keep_b ? b : a, gone = keep_b ? a : b;
     for (const uint32_t triangle : removed_) {
@@ -245,7 +245,7 @@ private:
     stamp_[kept] += stamp_[gone] + 1;
   }
 
-  /// The other two sides of a vanishing triangle become one.
+  /// Merges the two sides of a vanishing triangle that become one.
   void merge_edges(uint32_t triangle, uint32_t kept, uint32_t gone) {
     uint32_t of_kept = kNone, of_gone = kNone;
     for (uint32_t i = 0; i < 3; ++i) {
@@ -258,10 +258,10 @@ private:
     if (of_kept != of_gone) same_edge_[of_gone] = of_kept;
   }
 
-  /// Corners of a and b that a vanishing triangle joins become one wedge; the others keep theirs.
+  /// Merges the wedges of a and b that vanishing triangles connect; others stay.
   void merge_wedges(uint32_t a, uint32_t b, double along) {
     std::array<uint32_t, 4> done{};
-    size_t done_count = 0; // a seam that ends here goes on at one side only
+    size_t done_count = 0; // a seam that ends here continues on one side only
     const auto is_done = [&](uint32_t wedge) {
       return std::find(done.begin(), done.begin() + done_count, wedge) != done.begin() + done_count;
     };
@@ -312,19 +312,19 @@ private:
   SimplifyMesh& m_;
   const SimplifyConfig& config_;
   CornerLists corners_;
-  SurfaceEdges surface_; ///< ends become what they were merged into; side_edge stays, follow same_edge_
+  SurfaceEdges surface_; ///< `ends` are updated as points merge; side_edge is constant, see same_edge_
   PlacementRules rules_{};
   size_t live_ = 0;
   bool may_tear_ = false;
   std::vector<uint32_t> merged_into_, wedge_into_;
-  std::vector<uint32_t> same_edge_;  ///< edges that became one
-  std::vector<uint32_t> stamp_;      ///< per point: how much happened to it
-  std::vector<uint32_t> edge_stamp_; ///< per edge: that of its ends when it was placed
+  std::vector<uint32_t> same_edge_;  ///< per edge: the edge that it was merged into
+  std::vector<uint32_t> stamp_;      ///< per point: number of changes
+  std::vector<uint32_t> edge_stamp_; ///< per edge: sum of its ends' stamps when it was placed
   std::vector<EdgePlacement> placements_;
   EdgeHeap heap_;
   std::vector<uint32_t> rejected_;
   std::vector<StarTriangle> star_;
-  std::vector<uint32_t> removed_; ///< triangles with both ends
+  std::vector<uint32_t> removed_; ///< triangles that contain both ends
 };
 
 } // namespace

@@ -10,17 +10,18 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kNone = ~0u;
-constexpr double kBorderWeight = 8.0;  // of border planes against the triangles' own
-constexpr double kSeamWeight = 2.0;    // where the material changes
-constexpr double kCreaseWeight = 0.25; // where normals or texture coordinates change
-constexpr double kFolded = 0.9999;      // cosine between layers of a sheet, at least
-constexpr double kStayWeight = 1e-4; // of the point itself: where all is flat, short edges go first and none gets long
+constexpr double kBorderWeight = 8.0;  // of border planes, relative to triangle planes
+constexpr double kSeamWeight = 2.0;    // at material seams
+constexpr double kCreaseWeight = 0.25; // where normals or texture coordinates are discontinuous
+constexpr double kFolded = 0.9999;     // minimum cosine between the layers of a sheet
+// of the point's own position: on flat parts, collapses short edges first and avoids long triangles
+constexpr double kStayWeight = 1e-4;
 
-/// An edge while more triangles at it are looked for.
+/// An edge under construction.
 struct EdgeUse {
-  uint32_t next;     ///< edge of the same lower point
-  uint32_t triangle; ///< the first that has it
-  bool forward;      ///< that one has it from its lower point
+  uint32_t next;     ///< next edge with the same lower-numbered point
+  uint32_t triangle; ///< the first triangle at the edge
+  bool forward;      ///< whether that triangle runs from the lower-numbered point
   bool border = true, seam = false, crease = false;
 };
 
@@ -70,16 +71,16 @@ private:
     for (const uint32_t p : {t.x, t.y, t.z}) add(q, p), stay_[p] += kStayWeight * area;
   }
 
-  /// A triangle whose corners lie in a line has no plane: its corners stay near the line, and its ends near where they
-  /// are.
+  /// Adds quadrics for a triangle with collinear corners, which has no plane: keeps the corners near the line and its
+  /// ends near their positions.
   void add_line(const Triangle& points) {
-    int first = 0; // of its longest side, which is all of it
+    int first = 0; // start of the longest side
     double longest = 0.0;
     for (int i = 0; i < 3; ++i) {
       const DVec3 side = m_.points[points[(i + 1) % 3]] - m_.points[points[i]];
       if (const double length2 = glm::dot(side, side); length2 > longest) longest = length2, first = i;
     }
-    if (!(longest > 0.0)) return; // new points may coincide
+    if (!(longest > 0.0)) return; // positions of different points may coincide
     const uint32_t a = points[first], b = points[(first + 1) % 3];
     const DVec3 along = (m_.points[b] - m_.points[a]) / std::sqrt(longest);
     Quadric line;
@@ -107,8 +108,8 @@ private:
     return found;
   }
 
-  /// Whether the triangle lies on the side of the edge where its first one lies, as in a sheet of two layers: the
-  /// surface ends there all the same.
+  /// Whether the triangle lies on the same side of the edge as the edge's first triangle, as in a sheet of two layers.
+  /// Such an edge is a border of the sheet.
   bool folds_back(const EdgeUse& edge, uint32_t triangle, bool forward) const {
     const DVec3 &m = out_.area_normals[edge.triangle], &n = out_.area_normals[triangle];
     const double dot = glm::dot(m, n);
@@ -116,7 +117,7 @@ private:
     return dot * dot > kFolded * kFolded * glm::dot(m, m) * glm::dot(n, n);
   }
 
-  /// What changes at the edge, from its first triangle to this one.
+  /// Marks seams and creases between the edge's first triangle and this one.
   void join(uint32_t edge, uint32_t triangle) {
     EdgeUse& e = uses_[edge];
     const LodTriangle &s = m_.triangles[e.triangle], &t = m_.triangles[triangle];
@@ -141,7 +142,7 @@ private:
     }
   }
 
-  /// A plane through the edge, upright on its triangle.
+  /// Adds a plane through the edge, perpendicular to its first triangle.
   void add_edge_plane(uint32_t edge, double weight) {
     const auto [a, b] = out_.ends[edge];
     const DVec3 along = m_.points[b] - m_.points[a];
@@ -165,9 +166,9 @@ private:
 
   const SimplifyMesh& m_;
   const SimplifyConfig& config_;
-  bool many_seams_;             ///< there are wedges, or kinds of triangles
-  std::vector<double> stay_;    ///< per point: the weight of the point itself
-  std::vector<uint32_t> first_; ///< per point: the last edge of which it is the lower one
+  bool many_seams_;             ///< whether there are wedges or several triangle kinds
+  std::vector<double> stay_;    ///< per point: weight of its own position
+  std::vector<uint32_t> first_; ///< per point: the last edge with it as lower-numbered point
   std::vector<EdgeUse> uses_;   ///< per edge
   SurfaceEdges out_;
 };

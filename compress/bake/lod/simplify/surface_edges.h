@@ -8,16 +8,16 @@
 
 namespace packtrace {
 
-/// The edges of a surface, and what it costs its points to move.
+/// The edges of a surface and the quadrics of its points.
 struct SurfaceEdges {
   std::vector<EdgeEnds> ends;        ///< a < b
-  std::vector<uint32_t> side_edge;   ///< per 3 * triangle + corner: the edge from there to the next corner
-  std::vector<CollapsePoint> points; ///< quadrics of all that meets there
-  std::vector<DVec3> area_normals;   ///< per triangle, twice its area long
+  std::vector<uint32_t> side_edge;   ///< at 3 * triangle + corner: the edge from that corner to the next
+  std::vector<CollapsePoint> points; ///< with the sum of the quadrics around each point
+  std::vector<DVec3> area_normals;   ///< per triangle; length is twice its area
 };
 
-/// Edges are numbered in the order in which triangles' sides have them. Quadrics are those of triangles' planes,
-/// weighted by area, and of planes through borders and seams, upright on the surface.
+/// Finds the edges, numbered by first use in the triangles. Quadrics are sums of the triangles' planes, weighted by
+/// area, and of planes through borders and seams, perpendicular to the surface.
 SurfaceEdges find_surface_edges(const SimplifyMesh& mesh, const SimplifyConfig& config);
 
 } // namespace packtrace
