@@ -19,7 +19,7 @@ struct ReleaseRtc {
 template <typename T>
 using RtcPtr = std::unique_ptr<T, ReleaseRtc>;
 
-/// An Embree device that counts its memory and turns error codes into Error.
+/// An Embree device that tracks its memory and turns error codes into Error.
 class EmbreeDevice {
 public:
   /// Throws Error(kUnsupported) if the device cannot be made or was built without ray masks, filter functions,
@@ -30,13 +30,13 @@ public:
 
   RTCDevice get() const { return device_.get(); }
 
-  /// Throws what was reported since the last call: Error(kLimitExceeded) for lack of memory, Error(kCancelled) for a
-  /// build that was stopped, else Error(kUnsupported).
+  /// Throws the first error reported since the last call, if any: Error(kLimitExceeded) for lack of memory,
+  /// Error(kCancelled) for a build that was stopped, else Error(kUnsupported).
   void check();
 
-  /// Bytes allocated now.
+  /// Bytes currently allocated.
   uint64_t bytes() const { return static_cast<uint64_t>(bytes_.load(std::memory_order_relaxed)); }
-  /// The most that were since start_peak().
+  /// Maximum of bytes() since start_peak().
   uint64_t peak_bytes() const { return static_cast<uint64_t>(peak_.load(std::memory_order_relaxed)); }
   void start_peak() { peak_.store(bytes_.load(std::memory_order_relaxed), std::memory_order_relaxed); }
 
@@ -46,9 +46,9 @@ private:
 
   std::atomic<int64_t> bytes_{0}, peak_{0};
   std::mutex mutex_;
-  RTCError code_ = RTC_ERROR_NONE; ///< the first since check()
+  RTCError code_ = RTC_ERROR_NONE; ///< first error since check()
   std::string text_;
-  RtcPtr<RTCDeviceTy> device_; ///< last: its callbacks use the members above
+  RtcPtr<RTCDeviceTy> device_; ///< declared last: its callbacks use the members above
 };
 
 } // namespace packtrace
