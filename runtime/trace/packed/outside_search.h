@@ -30,7 +30,7 @@ struct OutsideSearch {
       search.number[search.count++] = i;
       for (uint32_t axis = 0; axis < 3; ++axis)
         ray.origin[axis] = group.origin[axis][i], ray.direction[axis] = 1.0f / within_limit(group.inverse[axis][i]);
-      // Where the origin was moved, tnear is negative; Embree needs tnear >= 0, and there is nothing to hit before the
+      // tnear may be negative if the origin was moved. Embree needs tnear >= 0, and there is nothing to hit before a
       // moved origin.
       ray.tnear = group.limits[i][0] > 0.0f ? group.limits[i][0] : 0.0f;
       ray.tfar = group.tmax(i);

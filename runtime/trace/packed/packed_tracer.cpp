@@ -21,7 +21,8 @@ static_assert(sizeof(Ray) == sizeof(packed::KernelRay) && offsetof(Ray, tfar) ==
               offsetof(Ray, origin) == offsetof(packed::KernelRay, origin) &&
               offsetof(Ray, tnear) == offsetof(packed::KernelRay, tnear) &&
               offsetof(Ray, direction) == offsetof(packed::KernelRay, direction));
-static_assert(sizeof(RayHit) == sizeof(packed::KernelHit) && offsetof(RayHit, t) == offsetof(packed::KernelHit, t) &&
+static_assert(sizeof(RayHit) == sizeof(packed::KernelHit) &&
+              offsetof(RayHit, t) == offsetof(packed::KernelHit, t) &&
               offsetof(RayHit, u) == offsetof(packed::KernelHit, u) &&
               offsetof(RayHit, v) == offsetof(packed::KernelHit, v) &&
               offsetof(RayHit, placement) == offsetof(packed::KernelHit, placement) &&

@@ -36,7 +36,7 @@ constexpr double kUnitRounding = 0x1p-23;
 /// The rays of a group in unit space, one array per value.
 struct alignas(64) UnitRays {
   float origin[3][kGroup], direction[3][kGroup], tnear[kGroup];
-  float tmax[kGroup]; ///< inclusive; the t of the nearest hit found so far
+  float tmax[kGroup]; ///< inclusive end: the float below tfar, or the t of the nearest hit so far
   bool one_origin;    ///< nearest hits only: all rays have the same origin, as camera rays do
 };
 
