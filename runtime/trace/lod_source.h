@@ -22,7 +22,7 @@ struct BlasCluster {
   uint32_t geometry = 0; ///< geometry of the file: the BLAS's own, or one of its coarser levels
   uint32_t cluster = 0;  ///< number in that geometry
   uint32_t level = 0;
-  uint32_t first_triangle = 0, first_vertex = 0; ///< of the BLAS
+  uint32_t first_triangle = 0, first_vertex = 0; ///< numbers in the BLAS
   float error = 0.0f;                            ///< error of the group that it was simplified from; object units
 };
 

@@ -75,8 +75,8 @@ struct ResidentPart {
 
 /// Memory of one tree of a scene.
 struct TreeBytes {
-  uint32_t geometry = kNoGeometry; ///< geometry of the source; kNoGeometry for the world tree or top tree
-  uint64_t worst_case = 0;         ///< bytes that building it takes at most
+  uint32_t geometry = kNoGeometry; ///< geometry of the source; kNoGeometry for the tree of the world
+  uint64_t worst_case = 0;         ///< bytes while it is built: measured peak or upper bound
   uint64_t built = 0;
 };
 

@@ -24,7 +24,7 @@ struct GeometryCounts {
 /// A point on a surface.
 struct SurfaceQuery {
   uint32_t instance = 0;
-  uint32_t triangle = 0; ///< of the instance's geometry
+  uint32_t triangle = 0; ///< number in the instance's geometry
   Vec2 barycentrics{0.0f};
 };
 
@@ -77,7 +77,7 @@ public:
   /// Bound of |decoded - source| per axis in object units; 0 for floats. See docs/accuracy.md.
   virtual float position_error(uint32_t geometry) const = 0;
 
-  /// @param triangle of the instance's geometry
+  /// @param triangle number in the instance's geometry
   virtual SurfaceDetail detail_of(uint32_t /*instance*/, uint32_t /*triangle*/) const { return {}; }
 
   virtual std::span<const PlacedGeometry> instances() const = 0;

@@ -24,7 +24,7 @@ inline constexpr uint32_t kIndexBitsShift = 4u; ///< from this bit on: bits per 
 /// A cluster as the kernels read it; computed once from its record and its geometry's.
 struct TraceCluster {
   const uint8_t* bits;      ///< the cluster's bit stream, which begins with its strips
-  int32_t base[3];          ///< coordinates of position field value 0, in steps of 2^-down tree grid steps
+  int32_t base[3];          ///< position of field value 0, in units of 2^-down grid steps of the tree
   uint16_t position_bit;    ///< first bit of the positions in `bits`
   uint8_t position_bits[3]; ///< field widths along x, y, z; their sum is at most 57
   uint8_t up, down;         ///< tree coordinate = (base + field 2^up) / 2^down; one of the two is 0
@@ -127,7 +127,8 @@ struct TreeSearch {
   uint64_t (*visit)(const TreeSearch& search, const uint32_t* nodes, uint32_t node_count, uint64_t rays);
 };
 
-/// Minimum of top_pad_coordinate, in units of the largest coordinate M: 6 M kSmallestDirection / kBoxPad.
+/// top_pad_coordinate of the tree over many placements, in units of the largest coordinate M. kBoxPad times it exceeds
+/// 6 M kSmallestDirection, by which clamping a direction component may move a ray.
 inline constexpr float kLeastTopPad = 0x1p-57f;
 
 struct KernelScene {

@@ -60,7 +60,7 @@ Mesh needles(double aspect, Random& random) {
 
 struct Places {
   bool instanced;
-  double aspect; ///< of needles
+  double aspect; ///< length over thickness of the needles
   double step;   ///< grid step, in units of their thickness
 };
 
