@@ -7,19 +7,19 @@ namespace packtrace {
 namespace {
 
 constexpr double kNearDiagonals = 1e-6;
-constexpr double kOrthographicReach = 1e6; // in diagonals and distances from the eye
+constexpr double kOrthographicReach = 1e6; // in units of the scene's diagonal plus its distance from the eye
 
-/// Points with dot(normal, p) > offset are on the outer side; normal of unit length.
+/// Points with dot(normal, p) > offset lie outside; the normal has unit length, or is 0 if all points are inside.
 struct Plane {
   DVec3 normal{0.0};
   double offset = 0.0;
 };
 
-/// Through both rays.
+/// Returns the plane through both rays, with `inside` on its inner side.
 Plane side(const CameraRay& a, const CameraRay& b, DVec3 inside) {
   Plane plane{glm::cross(a.direction, b.origin + b.direction - a.origin), 0.0};
   const double length = glm::length(plane.normal);
-  if (!(length > 0.0)) return {DVec3(0.0), 0.0}; // an image one pixel wide: nothing is outside of this side
+  if (!(length > 0.0)) return {DVec3(0.0), 0.0}; // The image is one pixel wide: no point is outside this plane.
   plane.normal /= length;
   if (glm::dot(plane.normal, inside - a.origin) > 0.0) plane.normal = -plane.normal;
   plane.offset = glm::dot(plane.normal, a.origin);

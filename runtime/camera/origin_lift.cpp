@@ -7,7 +7,8 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kTilePixels = kTileSize * kTileSize;
-/// Of the allowed error. Bounds are seldom reached; higher up it is more often another part of something thin.
+/// Length of the upward rays, as a fraction of the allowed error. Error bounds are seldom reached, and a hit farther up
+/// is more often another part of a thin object.
 constexpr double kReach = 0.5;
 
 class OriginLift {
@@ -36,7 +37,7 @@ public:
   }
 
 private:
-  /// Its t counts unit-space lengths.
+  /// Returns the ray from a pixel's point along its geometric normal; t is in unit-space lengths.
   Ray upwards(size_t pixel) const {
     const DVec3 position(g_.position[pixel]), normal(g_.geometric_normal[pixel]);
     const double reach = kReach * error_px_ * pixel_width(camera_, position) * coarse_.space().scale();

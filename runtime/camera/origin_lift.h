@@ -7,14 +7,15 @@
 
 namespace packtrace {
 
-/// Lets occlusion rays of points that the camera sees at one detail start in a scene of coarser detail: adds to the
-/// G-buffer's offsets where the coarse surface lies above the point. A ray goes up the geometric normal, as far as half
-/// the error that is allowed there; where what it meets first is the same instance from below, of the side that the
-/// camera sees, the point lies within and rays start above. What faces the point, or is of another instance, occludes
-/// it, and the point stays where it is.
-/// @param coarse what occlusion rays will be traced by, of the same instances
-/// @param error_px that coarse surfaces may lie beside those of the G-buffer; pixels of the camera
-/// @param gbuffer of the camera
+/// Adapts the offsets of a G-buffer rendered at one level of detail to occlusion rays that are traced against a coarser
+/// scene: where the coarse surface lies above a point, the point's offset is increased so that its rays start above
+/// that surface. To find such points, a ray is traced along the geometric normal, up to half the allowed error. If its
+/// first hit is on the same instance, from below with respect to the side that the camera sees, the point lies beneath
+/// the coarse surface. Any other hit, on a surface that faces the point or on another instance, is an occluder and
+/// leaves the offset as it is.
+/// @param coarse tracer that occlusion rays will use; it must have the same instances
+/// @param error_px allowed distance of coarse surfaces from those of the G-buffer, in pixels of the camera
+/// @param camera the camera of the G-buffer
 void lift_origins(const RayTracer& coarse, const PrimaryCamera& camera, double error_px, GBuffer& gbuffer,
                   Progress& progress);
 

@@ -10,20 +10,20 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kBlock = 4;                  ///< pixels per axis that neighbour in a span of coherent rays
-constexpr uint32_t kBatch = kTileSize * kBlock; ///< rays handed on together: few enough to stay in the nearest cache
+constexpr uint32_t kBlock = 4;                  ///< pixels per axis of a block of coherent rays
+constexpr uint32_t kBatch = kTileSize * kBlock; ///< rays per query: a row of blocks, small enough for the level-1 cache
 static_assert(kTileSize % kBlock == 0);
 
-/// The rays of a row of blocks. A block at the image's border has gaps: rays that can hit nothing.
+/// The rays of a row of blocks. Pixels of a block outside the image get rays that hit nothing (tfar < tnear).
 struct RayBatch {
   uint32_t count = 0;
   Ray rays[kBatch];
-  CameraRay exact[kBatch]; ///< the same in unit space, in double
+  CameraRay exact[kBatch]; ///< the same rays in unit space, in double
   uint32_t x[kBatch], y[kBatch];
   RayHit hits[kBatch];
   uint32_t hit_count = 0;
-  uint32_t hit_rays[kBatch];   ///< those that hit
-  HitSurface surfaces[kBatch]; ///< by number of the hit, as the rest
+  uint32_t hit_rays[kBatch];   ///< by hit: index of its ray
+  HitSurface surfaces[kBatch]; ///< by hit, as the arrays below
   SurfaceQuery places[kBatch];
   SurfaceAttributes attributes[kBatch];
 };
@@ -53,7 +53,7 @@ private:
     for (uint32_t h = 0; h < batch.hit_count; ++h) write_hit(h, batch);
   }
 
-  /// @param x, y may lie beyond the tile
+  /// @param x, y pixel; may lie outside the tile
   void add_ray(uint32_t x, uint32_t y, const Tile& tile, RayBatch& batch) const {
     const uint32_t i = batch.count++;
     batch.x[i] = x, batch.y[i] = y;
@@ -76,10 +76,10 @@ private:
                        Vec2(batch.hits[i].u, batch.hits[i].v)};
   }
 
-  /// Moves the origin of a ray that starts far away along the ray to just before the scene: floats keep what is seen
-  /// there sharp, and Embree takes origins up to 1.8e18 only. False, and a harmless ray, where it passes the scene by.
+  /// Moves the origin of a ray that starts far away to just before the scene: floats resolve the scene there, and
+  /// Embree accepts origins up to 1.8e18 only. Returns false, with a harmless ray, if the ray misses the scene.
   static bool approach(CameraRay& ray) {
-    constexpr double kNear = 4.0 * UnitSpace::kHalfSize; // the scene's box ends at sqrt(3) kHalfSize
+    constexpr double kNear = 4.0 * UnitSpace::kHalfSize; // the corners of the scene's box lie within sqrt(3) kHalfSize
     if (glm::dot(ray.origin, ray.origin) <= kNear * kNear) return true;
     const double closest = -glm::dot(ray.origin, ray.direction);
     const DVec3 point = ray.origin + ray.direction * closest;
@@ -133,8 +133,9 @@ private:
     out_.motion_px[pixel] = motion(position, glm::dvec2(batch.x[i], batch.y[i]) + 0.5);
   }
 
-  /// The point of the surface's plane on the ray. Barycentrics are floats: on a large triangle they stay on the plane
-  /// but stray from the pixel. Where the ray grazes the plane or leaves the triangle they are the better choice.
+  /// Returns the intersection of the ray with the surface's plane. Barycentrics are floats: on a large triangle the
+  /// point that they yield is on the plane but off the pixel's ray. Where the ray grazes the plane, or the intersection
+  /// is far from that point, that point is used.
   static DVec3 on_ray(const CameraRay& ray, DVec3 from_barycentrics, DVec3 normal) {
     constexpr double kMinCosine = 1e-3, kMaxMove = 0x1p-20 * UnitSpace::kHalfSize;
     const double cosine = glm::dot(normal, ray.direction);
@@ -145,7 +146,7 @@ private:
     return glm::dot(move, move) <= kMaxMove * kMaxMove ? point : from_barycentrics;
   }
 
-  /// Unit normal against the ray; the ray's own direction where the triangle has no area.
+  /// Returns the unit normal that faces the ray's origin; the reversed ray direction if the triangle has no area.
   static DVec3 facing_normal(DVec3 normal, DVec3 direction) {
     const double length = glm::length(normal);
     if (!(length > 0.0)) return -direction;

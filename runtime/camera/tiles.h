@@ -15,12 +15,12 @@ struct Tile {
   uint32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 };
 
-/// Calls work for every tile of an image, on all cores, neighbouring tiles close in time (Morton order).
-/// The tiles are the same for any number of threads. Each finished tile advances progress by its pixels.
-/// Throws what work throws, and Error(kCancelled).
+/// Calls `work` for every tile of an image on all cores, in Morton order so that neighbouring tiles are close in time.
+/// The tiles are the same for any number of threads. Each finished tile advances progress by its pixels. Throws what
+/// `work` throws, and Error(kCancelled).
 void for_each_tile(ImageSize size, Progress& progress, const std::function<void(const Tile&)>& work);
 
-/// The even bits of a Morton code: bit 2i of code to bit i.
+/// Extracts the even bits of a Morton code: bit 2i of code becomes bit i.
 constexpr uint32_t morton_even_bits(uint32_t code) {
   code &= 0x55555555u;
   code = (code | (code >> 1)) & 0x33333333u;
@@ -29,7 +29,7 @@ constexpr uint32_t morton_even_bits(uint32_t code) {
   return (code | (code >> 8)) & 0x0000ffffu;
 }
 
-/// The inverse for both axes: bits of x at even places, of y at odd ones.
+/// Interleaves bits into a Morton code: bits of x at even positions, of y at odd positions.
 constexpr uint32_t morton_code(uint32_t x, uint32_t y) {
   const auto spread = [](uint32_t v) {
     v &= 0xffffu;

@@ -4,7 +4,8 @@
 
 namespace packtrace {
 
-/// Sets flush-to-zero and denormals-are-zero for its lifetime on its thread, as ray queries want.
+/// Sets flush-to-zero and denormals-are-zero on the current thread during its lifetime; Embree recommends both for ray
+/// queries.
 class FlushDenormals {
 public:
   FlushDenormals() : saved_(_mm_getcsr()) { _mm_setcsr(saved_ | kFlushToZero | kDenormalsAreZero); }

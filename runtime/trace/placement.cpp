@@ -12,7 +12,7 @@ double norm(const glm::dmat3& m) {
   return std::sqrt(glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
 }
 
-/// Whether doubles can invert it well enough that rays meet surfaces where they are.
+/// Whether the transform can be inverted in doubles accurately enough for hits to lie on the surface.
 bool is_invertible(const DAffine& to_from) {
   constexpr double kMaxCondition = 1e9;
   const DAffine from_to = inverse(to_from);
@@ -20,8 +20,8 @@ bool is_invertible(const DAffine& to_from) {
          is_finite(DVec3(from_to[3])); // false for NaN
 }
 
-/// What is perpendicular to two of three vectors, of unit length: the best of the three choices. Zero if all are
-/// parallel.
+/// Returns the unit vector perpendicular to two of three vectors; of the three pairs it takes the one with the largest
+/// cross product. Zero if all three are parallel.
 DVec3 perpendicular(DVec3 a, DVec3 b, DVec3 c) {
   DVec3 best(0.0);
   for (const DVec3 v : {glm::cross(a, b), glm::cross(b, c), glm::cross(c, a)})
@@ -67,7 +67,8 @@ std::optional<DAffine> invertible_placement(const DAffine& to_from) {
   if (is_invertible(to_from)) return to_from;
   const glm::dmat3 linear(to_from), transposed = glm::transpose(linear);
   const double size = norm(linear);
-  const glm::dmat3 columns = linear / size, rows = transposed / size; // products of two neither overflow nor vanish
+  // Normalised, so that products of two neither overflow nor underflow.
+  const glm::dmat3 columns = linear / size, rows = transposed / size;
   const DVec3 plane_normal = perpendicular(columns[0], columns[1], columns[2]);
   const DVec3 lost_direction = perpendicular(rows[0], rows[1], rows[2]);
   const double side = glm::dot(plane_normal, linear * lost_direction) < 0.0 ? -1.0 : 1.0;

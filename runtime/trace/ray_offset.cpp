@@ -25,7 +25,8 @@ double ray_offset(const HitSurface& hit, const UnitSpace& space, DVec3 position,
     const Placement& placement = *hit.placement;
     const DVec3 moved = placement.moved_linear * glm::abs(position) + placement.moved_offset;
     const DVec3 in_surface = glm::max(moved, largest_vertex(hit));
-    // An error e in surface coordinates is L e in unit space, n . L e along the normal; n L is GLM's L^T n.
+    // An error e in surface coordinates is L e in unit space, and n . L e along the normal. In GLM, normal * L is L^T
+    // n.
     distance = glm::dot(glm::abs(normal * glm::dmat3(placement.unit_from_surface)), in_surface);
   }
   distance += glm::dot(glm::abs(normal), magnitude);

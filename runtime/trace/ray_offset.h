@@ -4,20 +4,20 @@
 
 namespace packtrace {
 
-/// How far a ray must start above a traced triangle so that it does not hit that triangle or its neighbours again.
-/// The origin lies on the decoded surface, so quantisation does not count; only what float arithmetic loses does: in
-/// the stored position, in moving the ray to unit space and into an instance, and in the tracer's plane test. Each loss
-/// is at most a few ulp of the coordinates involved, but only the share along the normal lifts a ray off its plane:
+/// Returns how far above a traced triangle a ray must start so that it does not hit that triangle or its neighbours
+/// again, in unit-space lengths. The origin lies on the decoded surface, so quantisation does not matter. What matters
+/// are the rounding errors of float arithmetic: of the stored position, of the transforms of the ray to unit space and
+/// into an instance, and of the tracer's plane test. Each error is at most a few ulp of the coordinates involved, but
+/// only its component along the normal lifts a ray off its plane:
 ///
 ///   offset = 4 eps (sum_i |n_i| m_i  +  d_surface)  +  eps max_i |p_i|,     eps = 2^-23 >= ulp(x) / x
 ///
-/// m_i: largest coordinate on axis i among the point (in the world and in unit space) and the triangle's vertices;
-/// d_surface, for instanced placements: the same sum in surface coordinates with m including |L| |p| + |t| of the
-/// inverse placement (L, t) times |L| |L^-1| for its rounding, as a distance along the normal. The last term keeps rays
-/// off axis-aligned planes through the origin, where the first is zero.
+/// m_i is the largest coordinate on axis i of the point (in the world and in unit space) and of the triangle's
+/// vertices. d_surface, for instanced placements, is the same sum in surface coordinates, as a distance along the
+/// normal; its m also includes |L| |p| + |t| of the inverse placement (L, t), times |L| |L^-1| for the rounding of the
+/// inverse. The last term keeps rays off axis-aligned planes through the origin, for which the first term is zero.
 /// @param position in unit space
 /// @param normal unit length, in unit space
-/// @return in unit-space lengths
 double ray_offset(const HitSurface& hit, const UnitSpace& space, DVec3 position, DVec3 normal);
 
 } // namespace packtrace

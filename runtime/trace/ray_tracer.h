@@ -12,11 +12,11 @@
 namespace packtrace {
 
 /// Ray classes, one bit of the ray mask each.
-inline constexpr uint32_t kCameraRays = 1u << 0;    ///< hit what camera_visible() says
-inline constexpr uint32_t kOcclusionRays = 1u << 1; ///< hit what occludes() says
+inline constexpr uint32_t kCameraRays = 1u << 0;    ///< hit surfaces that are camera_visible()
+inline constexpr uint32_t kOcclusionRays = 1u << 1; ///< hit surfaces that occlude (occludes())
 
-/// In the tracer's space(). Directions need not be unit length; t counts them. Where tfar < tnear there is nothing to
-/// hit: that is how a caller fills the gaps of a block of coherent rays.
+/// A ray in the tracer's space(). The direction need not have unit length; t is in multiples of it. A ray with tfar <
+/// tnear hits nothing; callers use such rays to fill the gaps of a block of coherent rays.
 struct Ray {
   Vec3 origin{0.0f};
   float tnear = 0.0f; ///< >= 0
@@ -26,7 +26,7 @@ struct Ray {
 
 inline constexpr uint32_t kNoHit = ~0u;
 
-/// What a ray met first. The numbers are the tracer's own: RayTracer::resolve() says what they stand for.
+/// The nearest hit of a ray. The numbers are internal to the tracer; RayTracer::resolve() translates them.
 struct RayHit {
   float t = std::numeric_limits<float>::infinity();
   float u = 0.0f, v = 0.0f; ///< weights of the triangle's second and third vertex
@@ -37,82 +37,83 @@ struct RayHit {
   bool valid() const { return placement != kNoHit; }
 };
 
-/// What callers know about the order of rays; results are the same for either.
+/// The order of rays as a hint; results do not depend on it.
 enum class RayOrder : uint8_t {
-  kCoherent,   ///< neighbours start and go nearly alike, 16 at a time: camera rays in blocks of 4 x 4 pixels
-  kIncoherent, ///< directions differ; origins of neighbours lie near each other
+  kCoherent,   ///< neighbours have similar origins and directions, 16 at a time: camera rays in blocks of 4 x 4 pixels
+  kIncoherent, ///< directions differ; neighbours have similar origins
 };
 
-/// A surface at its place.
+/// A placed surface.
 struct Placement {
-  uint32_t instance = 0;          ///< SceneSource::instances() index
+  uint32_t instance = 0;          ///< index into SceneSource::instances()
   bool instanced = false;         ///< the tracer transforms rays into the surface's own coordinates
   DAffine unit_from_surface{1.0}; ///< from the surface's coordinates to space()
-  glm::dmat3 surface_normal{1.0}; ///< the same for normals; results are not unit length
-  glm::dmat3 object_normal{1.0};  ///< from object space to space() for normals; results are not unit length
-  /// Instanced only: coordinates that arise in moving a unit-space point p into the surface are at most about
-  /// moved_linear |p| + moved_offset per axis, the rounding of the inverse included (see ray_offset.h).
+  glm::dmat3 surface_normal{1.0}; ///< the same for normals; results do not have unit length
+  glm::dmat3 object_normal{1.0};  ///< from object space to space() for normals; results do not have unit length
+  /// Instanced only: bounds of the coordinates that arise when a unit-space point p is transformed into the surface's
+  /// space, about moved_linear |p| + moved_offset per axis, including the rounding of the inverse (see ray_offset.h).
   glm::dmat3 moved_linear{0.0};
   DVec3 moved_offset{0.0};
 };
 
-/// What a hit stands for.
+/// The surface that was hit.
 struct HitSurface {
   const Placement* placement = nullptr;
   uint32_t geometry = 0;
-  uint32_t triangle = 0; ///< number in the geometry
-  Vec3 vertices[3]{};    ///< in the surface's coordinates, as the tracer saw them
+  uint32_t triangle = 0; ///< number in the geometry of the source
+  Vec3 vertices[3]{};    ///< in the surface's coordinates, as traced
 };
 
 inline constexpr uint32_t kNoGeometry = ~0u;
 
-/// Bytes that stay in memory for tracing, by what they hold.
+/// Memory that stays allocated for tracing, by purpose.
 struct ResidentPart {
   std::string_view name;
   uint64_t bytes = 0;
-  bool shared = false; ///< with all other tracers of the same scene, which name the same bytes
+  bool shared = false; ///< shared with all other tracers of the same scene, which report the same bytes
 };
 
-/// Memory of one tree of a scene, or of all that lies in the world together.
+/// Memory of one tree of a scene.
 struct TreeBytes {
-  uint32_t geometry = kNoGeometry; ///< of the source; kNoGeometry: of the world
-  uint64_t worst_case = 0;         ///< that building it takes, or may take
+  uint32_t geometry = kNoGeometry; ///< geometry of the source; kNoGeometry for the tree of the world
+  uint64_t worst_case = 0;         ///< bytes while it is built: measured peak or upper bound
   uint64_t built = 0;
 };
 
-/// A scene made ready for ray queries: a tracing backend. All functions are const and may run on several threads.
+/// A scene prepared for ray queries: a tracing backend. All functions are const and may run on several threads.
 class RayTracer {
 public:
   virtual ~RayTracer() = default;
 
   virtual std::string_view name() const = 0;
-  /// Instruction set of the kernels that run, such as avx2.
+  /// Instruction set of the kernels in use, such as avx2.
   virtual std::string_view isa() const { return "portable"; }
   virtual const UnitSpace& space() const = 0;
 
-  /// About how many incoherent rays a call should have, where the caller has as many: fewer stay in nearer caches, more
-  /// find company.
+  /// Preferred number of incoherent rays per call, if the caller has as many. Fewer rays stay in nearer caches; more
+  /// rays form larger groups.
   virtual uint32_t rays_together() const { return 1024; }
 
-  /// The nearest hit of each ray in (tnear, tfar). hits.size() == rays.size().
-  /// @param ray_class one bit: which surfaces count, and which mask is looked up
+  /// Finds the nearest hit of each ray in (tnear, tfar). hits.size() == rays.size().
+  /// @param ray_class one bit: selects the surfaces and the alpha mask that count
   virtual void closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
                             std::span<RayHit> hits) const = 0;
 
-  /// Whether each ray hits anything in (tnear, tfar): 1 or 0. occluded.size() == rays.size().
+  /// Writes for each ray whether it hits anything in (tnear, tfar): 1 or 0. occluded.size() == rays.size().
   virtual void any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
                         std::span<uint8_t> occluded) const = 0;
 
-  /// @param hit valid, of this tracer
+  /// Returns the surface that was hit.
+  /// @param hit a valid hit of this tracer
   virtual HitSurface resolve(const RayHit& hit) const = 0;
 
-  /// All that tracing keeps in memory, geometry included where the tracer reads it.
+  /// All memory that tracing keeps, including geometry if the tracer reads it.
   virtual std::vector<ResidentPart> resident() const = 0;
 
-  /// Instances that no ray hits because their transform presses them onto a line or a point, or nearly so.
+  /// Instances that cannot be hit because their transform maps them onto a line or a point, or nearly so.
   virtual std::span<const uint32_t> flat_instances() const { return {}; }
 
-  /// Of trees built here, as far as the backend knows.
+  /// Memory of the trees that the tracer built, as far as the backend reports it.
   virtual std::vector<TreeBytes> tree_bytes() const { return {}; }
 };
 

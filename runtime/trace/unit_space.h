@@ -8,19 +8,20 @@
 
 namespace packtrace {
 
-/// A uniform power-of-two scale, and a translation where it is free, that bring a box into [-kHalfSize, kHalfSize] on
-/// every axis. Tracing there keeps products of three lengths inside the float range for any scale of scene, and for
-/// things 1e-18 of its size in it: kHalfSize is large because floats that are too small become zero without notice.
-/// Both are exact for float coordinates: a box is moved along an axis only where no coordinate in it is more than
-/// twice another, so that subtracting its centre loses nothing (Sterbenz' lemma). Moving a box that holds the origin
-/// would round away small things near the origin of a large scene.
+/// A uniform power-of-two scale, and a translation where it is exact, that map a box into [-kHalfSize, kHalfSize] on
+/// every axis. Tracing in this space keeps products of three lengths within the float range for any scale of scene, and
+/// for objects of 1e-18 of its size; kHalfSize is large because floats underflow to zero without notice. Both maps are
+/// exact for float coordinates: a box is translated along an axis only if no coordinate in it is more than twice
+/// another, so that subtracting its centre is exact (Sterbenz' lemma). Translating a box that contains the origin would
+/// round away small objects near the origin of a large scene.
 class UnitSpace {
 public:
   static constexpr double kHalfSize = 0x1p20;
 
   UnitSpace() = default;
 
-  /// The space of a box. An empty box gives the identity; a box without extent away from the origin is only moved.
+  /// Chooses the space of a box. An empty box gives the identity; a box without extent away from the origin is only
+  /// translated.
   explicit UnitSpace(const Bounds& bounds) {
     if (bounds.empty()) return;
     double size = 0.0;
@@ -34,11 +35,11 @@ public:
   }
 
   DVec3 to_unit(DVec3 p) const { return (p - centre_) * scale_; }
-  DVec3 from_unit(DVec3 p) const { return p * inverse_scale_ + centre_; } // exact: a power of two
+  DVec3 from_unit(DVec3 p) const { return p * inverse_scale_ + centre_; } // The scale is exact: a power of two.
 
-  /// Unit lengths per outer length; a power of two.
+  /// Unit-space lengths per outer length; a power of two.
   double scale() const { return scale_; }
-  /// Outer lengths per unit length.
+  /// Outer lengths per unit-space length.
   double inverse_scale() const { return inverse_scale_; }
 
   bool operator==(const UnitSpace&) const = default;

@@ -14,16 +14,16 @@
 namespace packtrace {
 namespace {
 
-/// Boxes grow by this times the tree's largest coordinate C. Origins lie within 4 C (RayGroup's kFar), so with M = 4 C
-/// and u = 2^-24 hits lie at most 10 u M off their ray (RayGroup's kBoxPad says why). To that Embree adds a direction
-/// twice rounded, 2 u on at most 5 C, and its own reciprocal (3 u), product (1 u M) and difference (1 u) on as much: in
-/// all less than 80 u C. 256 are taken.
+/// Boxes grow by this times the tree's largest coordinate C. Origins lie within 4 C (kFar in enter.h). With M = 4 C and
+/// u = 2^-24, hits lie at most 10 u M off their ray (see kBoxPad in ray_group.h). Embree's box test adds, relative to
+/// distances of at most 5 C, a direction rounded twice (2 u), its own reciprocal (3 u), a product (1 u) and a
+/// difference (1 u). The sum is less than 80 u C, and 256 u C are taken.
 constexpr double kBoxPad = 0x1p-16;
 
-/// The leaf nodes of one tree, by cluster, and which of them are a user primitive.
+/// The leaf nodes of one tree, sorted by cluster, and their partition into user primitives.
 struct ClusterNodes {
-  std::vector<uint32_t> nodes;  ///< numbers in the tree
-  std::vector<uint32_t> begins; ///< into nodes, by primitive; and the end
+  std::vector<uint32_t> nodes;  ///< numbers of the tree's leaf nodes
+  std::vector<uint32_t> begins; ///< by primitive: its first element in nodes; followed by the end
   const packed::TraceTree* tree = nullptr;
 
   uint32_t primitive_count() const { return static_cast<uint32_t>(begins.size()) - 1; }
@@ -73,7 +73,7 @@ void cluster_bounds(const RTCBoundsFunctionArguments* args) {
   out.upper_x = above(hi[0] + pad), out.upper_y = above(hi[1] + pad), out.upper_z = above(hi[2] + pad);
 }
 
-/// Leaves know their ray classes.
+/// No rays are masked out by Embree: the kernels check the ray classes of clusters.
 constexpr uint32_t kAllRays = ~0u;
 
 struct SearchQuery : EmbreeQuery {
@@ -82,7 +82,8 @@ struct SearchQuery : EmbreeQuery {
   SearchQuery(RTCIntersectContextFlags order, const packed::TreeSearch& rays) : EmbreeQuery(order), search(rays) {}
 };
 
-/// Shows a cluster to the rays of a callback, whose ids are their numbers, and shortens those that hit.
+/// Tests the active rays of a callback against the leaf nodes of a primitive, and shortens the rays that hit. A ray's
+/// id is its number in the search.
 template <typename Arguments>
 void visit_cluster(const Arguments* args, RTCRayN* rays) {
   const packed::TreeSearch& search = static_cast<const SearchQuery*>(args->context)->search;
@@ -117,7 +118,7 @@ std::span<const Ray> copy_rays(const packed::TreeSearch& search, SearchRays& ray
   return {rays.data(), search.count};
 }
 
-/// As a stream with the coherent flag, as all of a search's rays are of one octant: Embree makes packets of it.
+/// Uses a stream with the coherent flag: all rays of a search have the same octant, so Embree forms packets.
 void find_closest(RTCScene scene, const packed::TreeSearch& search) {
   SearchQuery context(RTC_INTERSECT_CONTEXT_FLAG_COHERENT, search);
   alignas(64) RTCRayHit stream[packed::TreeSearch::kMaxRays];
@@ -130,7 +131,7 @@ void find_closest(RTCScene scene, const packed::TreeSearch& search) {
   rtcIntersect1M(scene, &context, stream, search.count, sizeof(RTCRayHit));
 }
 
-/// Without the coherent flag, for EmbreeTracer's reason (embree_queries.cpp).
+/// Does not set the coherent flag, because rtcOccluded16 may hang with it (see embree_queries.cpp).
 void find_any(RTCScene scene, const packed::TreeSearch& search) {
   SearchQuery context(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT, search);
   RayPacket16 packet;
@@ -153,7 +154,7 @@ struct EmbreeClusterTracer::Trees {
 
   std::vector<ClusterNodes> nodes; ///< by tree
   EmbreeDevice device;
-  std::vector<RtcPtr<RTCSceneTy>> scenes; ///< by tree; null where there is nothing to hit
+  std::vector<RtcPtr<RTCSceneTy>> scenes; ///< by tree; null for trees without clusters
 
   RtcPtr<RTCSceneTy> build(ClusterNodes& tree) {
     RtcPtr<RTCGeometryTy> geometry(rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_USER));

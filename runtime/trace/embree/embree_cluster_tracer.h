@@ -8,16 +8,16 @@
 
 namespace packtrace {
 
-/// What a user primitive of Embree's is.
+/// What one user primitive of Embree stands for.
 enum class ClusterPrimitives : uint8_t {
-  kClusters,  ///< smaller
-  kLeafNodes, ///< faster: a node of up to eight leaves, of which a cluster has a few
+  kClusters,  ///< a cluster: less memory
+  kLeafNodes, ///< a node of up to eight leaves, of which a cluster has a few: faster
 };
 
-/// Traces a baked file's clusters as PackedTracer does, to the bit, but finds them with Embree: a tree of the file
-/// becomes a scene of user primitives, one for each cluster or leaf node, and what Embree's callbacks get is handed to
-/// the packed kernels. Rays are moved into the tree's grid before Embree sees them, so instances need no Embree
-/// instances.
+/// Traces a baked file's clusters with the same bits as PackedTracer, but finds them with Embree: each tree of the file
+/// becomes an Embree scene of user primitives, one per cluster or leaf node. Embree's callbacks hand their rays to the
+/// packed kernels. Rays are transformed into the tree's grid before Embree sees them, so no Embree instances are
+/// needed.
 class EmbreeClusterTracer final : public RayTracer {
 public:
   /// Keeps references: both must outlive the tracer.
@@ -32,7 +32,7 @@ public:
   EmbreeClusterTracer& operator=(const EmbreeClusterTracer&) = delete;
 
   std::string_view name() const override { return "embree-clusters"; }
-  /// Of the kernels that decode and test triangles; Embree chooses its own for boxes.
+  /// Instruction set of the kernels that decode and test triangles. Embree chooses its own for boxes.
   std::string_view isa() const override { return packed_.isa(); }
   const UnitSpace& space() const override { return packed_.space(); }
 
@@ -47,7 +47,7 @@ public:
   uint32_t rays_together() const override { return packed_.rays_together(); }
   HitSurface resolve(const RayHit& hit) const override { return packed_.resolve(hit); }
 
-  /// PackedTracer's, "bvh": what Embree holds, and "cluster nodes": which nodes are a cluster's.
+  /// The parts of PackedTracer, "bvh" (Embree's trees) and "cluster nodes" (the leaf nodes of each primitive).
   std::vector<ResidentPart> resident() const override;
 
   std::span<const uint32_t> flat_instances() const override { return packed_.flat_instances(); }

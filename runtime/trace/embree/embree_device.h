@@ -38,9 +38,9 @@ public:
   /// where the system had no memory, Error(kCancelled) for a build that was stopped, else Error(kUnsupported).
   void check();
 
-  /// Bytes allocated now.
+  /// Bytes currently allocated.
   uint64_t bytes() const { return static_cast<uint64_t>(bytes_.load(std::memory_order_relaxed)); }
-  /// The most that were since start_peak().
+  /// Maximum of bytes() since start_peak().
   uint64_t peak_bytes() const { return static_cast<uint64_t>(peak_.load(std::memory_order_relaxed)); }
   void start_peak() { peak_.store(bytes_.load(std::memory_order_relaxed), std::memory_order_relaxed); }
 
@@ -55,9 +55,9 @@ private:
   std::optional<MemoryBudget> budget_;
   MemoryReservation reserved_;
   std::mutex mutex_;
-  RTCError code_ = RTC_ERROR_NONE; ///< the first since check()
+  RTCError code_ = RTC_ERROR_NONE; ///< first error since check()
   std::string text_;
-  RtcPtr<RTCDeviceTy> device_; ///< last: its callbacks use the members above
+  RtcPtr<RTCDeviceTy> device_; ///< declared last: its callbacks use the members above
 };
 
 } // namespace packtrace

@@ -1,4 +1,4 @@
-// The ray queries of EmbreeTracer: rays go to Embree in chunks on the stack.
+// The ray queries of EmbreeTracer. Rays are copied to Embree in chunks on the stack.
 
 #include <algorithm>
 #include <cassert>
@@ -11,9 +11,10 @@ namespace packtrace {
 namespace {
 
 constexpr size_t kPacket = RayPacket16::kRays;
-constexpr size_t kStream = 1024; ///< rays a stream call, as many as a tile has
+constexpr size_t kStream = 1024; ///< rays per stream call: the pixels of a tile
 
-/// Of coherent rays, too: Debian's Embree 3.13.5 was seen not to return from rtcOccluded16 with the coherent flag.
+/// Also used for coherent rays: rtcOccluded16 with the coherent flag was observed not to return in Debian's Embree
+/// 3.13.5.
 void occluded_streams(RTCScene scene, std::span<const Ray> rays, uint32_t ray_class, std::span<uint8_t> occluded) {
   EmbreeQuery context(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
   alignas(64) RTCRay stream[kStream];

@@ -11,7 +11,7 @@
 
 namespace packtrace {
 
-/// A query's context with one of Embree's notes on the order of rays.
+/// The context of a query, with Embree's flag for the order of rays.
 struct EmbreeQuery : RTCIntersectContext {
   explicit EmbreeQuery(RTCIntersectContextFlags order) {
     rtcInitIntersectContext(this);
@@ -33,12 +33,12 @@ inline void set_ray(const Ray& in, uint32_t ray_class, RTCRayHit& out) {
   out.hit.geomID = out.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
 }
 
-/// Moves up to 16 rays into Embree's lanes and says which there are.
+/// Transposes up to 16 rays into an Embree packet and marks the valid lanes.
 struct RayPacket16 {
   static constexpr size_t kRays = 16;
   alignas(64) int valid[kRays];
 
-  /// @param rays 1..16
+  /// @param rays 1 to 16 rays; a ray with tfar < tnear is not valid
   void load(std::span<const Ray> rays, RTCRay16& out) {
     constexpr size_t kRow = sizeof(Ray) / sizeof(float);
     alignas(64) Ray padded[kRays];
@@ -55,7 +55,7 @@ struct RayPacket16 {
   }
 
 private:
-  /// Four rows x y z w become columns.
+  /// Transposes four rows (x, y, z, w) into columns.
   static void store_columns(const float* rows, size_t stride, float* x, float* y, float* z, float* w) {
     __m128 a = _mm_loadu_ps(rows), b = _mm_loadu_ps(rows + stride), c = _mm_loadu_ps(rows + 2 * stride),
            d = _mm_loadu_ps(rows + 3 * stride);
@@ -64,7 +64,7 @@ private:
   }
 };
 
-/// What is the same for all packets of a query, and what Embree leaves alone.
+/// Sets the fields that are the same for all packets of a query and that Embree does not change.
 inline void set_constants(uint32_t ray_class, RTCRay16& ray) {
   std::fill_n(ray.time, RayPacket16::kRays, 0.0f);
   std::fill_n(ray.mask, RayPacket16::kRays, ray_class);

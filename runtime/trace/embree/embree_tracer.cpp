@@ -20,7 +20,8 @@ namespace {
 
 constexpr size_t kPaddingVertices = 2;
 
-// Combinations of camera_visible, occludes, needs_mask; the first two are the Embree geometry mask.
+// A class is a combination of camera_visible, occludes and needs_mask; the first two bits are also the Embree geometry
+// mask.
 constexpr uint32_t kMaskedClass = 1u << 2;
 constexpr uint32_t kClassCount = 8;
 
@@ -31,24 +32,24 @@ uint32_t material_class(MaterialFlags flags) {
 
 bool is_identity(const Affine& m) { return m == Affine(1.0f); }
 
-/// Building has no phases to show, but takes seconds.
+/// Building takes seconds but reports no phases, so cancellation is checked explicitly.
 void stop_if_cancelled() { Progress().check_cancelled(); }
 
 std::string geometry_label(uint32_t geometry) { return "geometry " + std::to_string(geometry); }
 
 } // namespace
 
-/// Triangles of one surface with the same class; the user data of one RTCGeometry.
+/// The triangles of one surface that have the same class; the user data of one RTCGeometry.
 struct EmbreeTracer::Part {
   const EmbreeTracer* tracer = nullptr;
   uint32_t surface = 0;
   uint32_t material_class = 0;
   std::vector<Triangle> triangles;
-  std::vector<uint32_t> source_triangles; ///< numbers in the geometry; empty: the same as here
+  std::vector<uint32_t> source_triangles; ///< by triangle: its number in the geometry; empty if that is the same
 
   uint32_t source_triangle(uint32_t i) const { return source_triangles.empty() ? i : source_triangles[i]; }
 
-  /// Embree filter function: rejects hits where the surface is absent.
+  /// Embree filter function: rejects hits where an alpha mask removes the surface.
   static void filter(const RTCFilterFunctionNArguments* args) {
     const auto& part = *static_cast<const Part*>(args->geometryUserPtr);
     for (uint32_t i = 0; i < args->N; ++i) {
@@ -64,12 +65,12 @@ struct EmbreeTracer::Part {
   }
 };
 
-/// The Embree objects, in the order in which they must not be destroyed.
+/// The Embree objects. The order matters: members are destroyed in reverse.
 struct EmbreeTracer::Device {
   explicit Device(const EmbreeConfig& config) : embree(config.memory) {}
 
   EmbreeDevice embree;
-  std::vector<RtcPtr<RTCSceneTy>> surface_scenes; ///< of instanced surfaces, by surface; else null
+  std::vector<RtcPtr<RTCSceneTy>> surface_scenes; ///< by surface; null unless the surface is instanced
   RtcPtr<RTCSceneTy> top;
 
   RtcPtr<RTCSceneTy> new_scene(const EmbreeConfig& config) {
@@ -118,14 +119,15 @@ struct EmbreeTracer::Device {
   }
 };
 
-/// A geometry as the source gives it.
+/// A geometry as decoded by the source.
 struct EmbreeTracer::Decoded {
   std::vector<Vec3> positions;
   std::vector<Triangle> triangles;
   Bounds bounds;
   uint32_t uses = 0;
 
-  /// Fills positions, triangles and bounds, and checks them.
+  /// Fills and checks positions, triangles and bounds. Throws Error(kInput) for positions that are not finite or
+  /// indices out of range.
   void read(const SceneSource& source, uint32_t geometry) {
     const GeometryCounts counts = source.counts(geometry);
     positions.resize(counts.vertices);
@@ -172,7 +174,7 @@ EmbreeTracer::EmbreeTracer(const SceneSource& source, EmbreeConfig config)
 
 EmbreeTracer::~EmbreeTracer() = default;
 
-/// Chooses the unit spaces and makes surfaces, their parts and placements.
+/// Chooses the unit spaces and creates surfaces, their parts and placements.
 void EmbreeTracer::place(std::vector<Decoded>& decoded) {
   const std::span<const PlacedGeometry> instances = source_.instances();
   std::vector<Bounds> bounds;
@@ -216,8 +218,8 @@ uint32_t EmbreeTracer::add_surface(uint32_t instance, const Decoded& decoded, co
   return index;
 }
 
-/// Sorts a surface's triangles into one part for each class of material; invisible ones go nowhere.
-/// @param instance any that places it: classes are the same in all of them
+/// Splits a surface's triangles into one part per class; invisible triangles are dropped.
+/// @param instance any instance of the geometry: classes are the same in all of them
 void EmbreeTracer::split_parts(uint32_t surface, const std::vector<Triangle>& triangles, uint32_t instance) {
   const std::span<const Material> materials = source_.materials();
   Surface& out = surfaces_[surface];
@@ -245,7 +247,7 @@ void EmbreeTracer::split_parts(uint32_t surface, const std::vector<Triangle>& tr
   }
 }
 
-/// Builds all trees.
+/// Attaches all surfaces to the top scene and builds all trees.
 void EmbreeTracer::attach() {
   Device& device = *device_;
   device.top = device.new_scene(config_);
@@ -280,7 +282,8 @@ void EmbreeTracer::attach_surface(uint32_t placement, uint32_t surface_index) {
   if (!child) {
     child = device.new_scene(config_);
     for (uint32_t i = 0; i < surface.part_count; ++i)
-      device.attach_part(child.get(), parts_[surface.first_part + i], surface); // ids count up from 0
+      // Embree's geometry ids count up from 0.
+      device.attach_part(child.get(), parts_[surface.first_part + i], surface);
     commit(child.get(), surface.geometry);
   }
   uint32_t ray_mask = 0;
@@ -292,7 +295,7 @@ void EmbreeTracer::attach_surface(uint32_t placement, uint32_t surface_index) {
 
 RTCSceneTy* EmbreeTracer::handle() const { return device_->top.get(); }
 
-/// Embree tells how wide its kernels are, not their names.
+/// Derives the instruction set from the ray widths that Embree supports; Embree does not report its name.
 std::string_view EmbreeTracer::isa() const {
   const auto wide = [&](RTCDeviceProperty property) { return rtcGetDeviceProperty(device_->embree.get(), property); };
   if (wide(RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)) return "avx512";

@@ -19,25 +19,26 @@ enum class BvhQuality : uint8_t {
 
 struct EmbreeConfig {
   BvhQuality quality = BvhQuality::kMedium;
-  /// Watertight: no ray passes between two triangles that share an edge. Without, about one camera ray in 40,000 does
-  /// on finely tessellated surfaces and leaves a dot; tracing is up to a fifth faster then, and kHigh splits in space.
+  /// Watertight: no ray passes between two triangles that share an edge. Without this flag about one camera ray in
+  /// 40,000 does on finely tessellated surfaces and leaves a dot. Tracing is then up to a fifth faster, and kHigh uses
+  /// spatial splits.
   bool robust = true;
   bool compact = false; ///< smaller and slower trees
   /// Pays for vertices, indices and trees; no limit without one.
   std::optional<MemoryBudget> memory;
 };
 
-/// Traces one SceneSource with Embree 3: float triangles decoded once, and Embree's trees over them.
+/// Traces a SceneSource with Embree 3: triangles are decoded to floats once, and Embree builds its trees over them.
 ///
-/// Coherent closest hits go as packets of 16 with Embree's coherent flag, all else as streams with the incoherent one:
-/// on each kind of ray the other flag costs a factor of two to four (docs/tracing.md).
+/// Coherent closest-hit rays are traced as packets of 16 with Embree's coherent flag, all others as streams with the
+/// incoherent flag. On each kind of ray the other flag costs a factor of two to four (docs/tracing.md).
 ///
-/// Rays live in a unit space (space()), a power-of-two scale and a translation away from the world, so that scenes of
-/// any scale between 1e-30 and 1e30 work. Geometries that are placed once and untransformed share it; all others have
-/// a unit space of their own and are Embree instances. Placements that float arithmetic cannot invert (flattening, or
-/// vastly smaller than the scene) are traced as moved copies instead.
-/// Per geometry there is one RTCGeometry for each combination of camera_visible, occludes and needs_mask, so ray
-/// masks decide about visibility and only masked triangles pay for a filter function.
+/// Rays are given in a unit space (space()), which differs from world space by a power-of-two scale and a translation,
+/// so scenes of any scale between 1e-30 and 1e30 work. Geometries that are placed once and untransformed lie in this
+/// space. All others have a unit space of their own and become Embree instances. Placements that float arithmetic
+/// cannot invert (flattening, or vastly smaller than the scene) are traced as transformed copies instead.
+/// Each geometry has one RTCGeometry per combination of camera_visible, occludes and needs_mask: ray masks decide about
+/// visibility, and only masked triangles need a filter function.
 class EmbreeTracer final : public RayTracer {
 public:
   /// Keeps a reference: the source must outlive the tracer.
@@ -59,16 +60,18 @@ public:
                 std::span<uint8_t> occluded) const override;
   HitSurface resolve(const RayHit& hit) const override;
 
-  /// "bvh": what Embree holds; "vertices" and "indices", which it reads; "tables".
+  /// "bvh" (memory of Embree's trees), "vertices" and "indices" (buffers that Embree reads), and "tables".
   std::vector<ResidentPart> resident() const override;
 
-  /// What Embree held while it committed each scene, and after: measured, so it may change a little from run to run.
+  /// Peak and final memory of Embree for each scene that it built. These are measured, so they may vary a little from
+  /// run to run.
   std::vector<TreeBytes> tree_bytes() const override { return tree_bytes_; }
 
-  /// For Embree's own queries, with rays in space() and a ray class as their mask; benchmarks compare them.
+  /// Embree's top scene, for queries with Embree's API: rays are in space() and have a ray class as their mask.
+  /// Benchmarks use it.
   RTCSceneTy* handle() const;
-  /// What such a query's result is, by Embree's numbers.
-  /// @param geometry RTC_INVALID_GEOMETRY_ID where there is no hit
+  /// Converts the result of such a query to a RayHit.
+  /// @param geometry RTC_INVALID_GEOMETRY_ID if there is no hit
   /// @param instance RTC_INVALID_GEOMETRY_ID for hits outside Embree instances
   RayHit hit_of(float t, float u, float v, uint32_t instance, uint32_t geometry, uint32_t primitive) const;
 
@@ -77,17 +80,17 @@ private:
   struct Device;
   struct Decoded;
 
-  /// The vertices of a geometry in the coordinates that Embree sees.
+  /// The vertices of a geometry in the coordinates in which Embree traces it.
   struct Surface {
     uint32_t geometry = 0;
-    std::vector<Vec3> positions; ///< and two more entries: Embree reads 16 bytes at a time
+    std::vector<Vec3> positions; ///< plus two padding entries: Embree reads 16 bytes at a time
     uint32_t first_part = 0;
     uint32_t part_count = 0;
   };
-  /// What a geometry of the top scene stands for.
+  /// The placement and part that a geometry of the top scene stands for.
   struct Attachment {
     uint32_t placement = 0;
-    uint32_t part = 0; ///< the first one of an Embree instance
+    uint32_t part = 0; ///< for an Embree instance: its first part
   };
 
   void place(std::vector<Decoded>& decoded);
@@ -110,7 +113,7 @@ private:
   std::vector<uint32_t> surface_of_placement_;
   std::vector<TreeBytes> tree_bytes_;
   std::vector<Attachment> attachments_; ///< by geometry id in the top scene
-  std::unique_ptr<Device> device_;      ///< last: Embree lets go of the buffers above first
+  std::unique_ptr<Device> device_;      ///< declared last: destroyed before the buffers above
 };
 
 } // namespace packtrace

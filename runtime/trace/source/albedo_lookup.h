@@ -4,8 +4,9 @@
 
 namespace packtrace {
 
-/// Linear colour of a hit: the material's texture there, or the material's albedo.
-/// @param material that of the triangle
+/// Returns the linear colour of a hit: the material's texture at the hit, or its constant albedo.
+/// @param material the triangle's material
+/// @param barycentrics weights of the triangle's second and third vertex
 Vec3 surface_albedo(const SceneSource& source, uint32_t geometry, uint32_t triangle, uint32_t material,
                     Vec2 barycentrics);
 

@@ -4,8 +4,9 @@
 
 namespace packtrace {
 
-/// False where a masked surface is absent for this kind of ray: kAlphaMask counts for all rays, kShadowAlphaMask for
-/// occlusion rays.
+/// Returns false if an alpha mask removes the surface at a hit. kAlphaMask applies to all rays, kShadowAlphaMask to
+/// occlusion rays only.
+/// @param barycentrics weights of the triangle's second and third vertex
 bool surface_present(const SceneSource& source, uint32_t instance, uint32_t triangle, Vec2 barycentrics,
                      bool occlusion_ray);
 

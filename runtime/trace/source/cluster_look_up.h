@@ -9,9 +9,9 @@
 
 namespace packtrace {
 
-/// SceneSource::look_up() of a source over a file's clusters. Finds and prepares a cluster only where it is not that of
-/// the place before.
-/// @param find (geometry of the source, triangle of it, out: the cluster's first triangle) -> ClusterView
+/// SceneSource::look_up() for sources over a baked file's clusters. A cluster is found and unpacked only if the
+/// previous place lies in a different one.
+/// @param find (geometry of the source, triangle in it, out: the cluster's first triangle) -> ClusterView
 template <typename Find>
 void look_up_in_clusters(const BakedFile& file, std::span<const PlacedGeometry> instances,
                          std::span<const SurfaceQuery> places, std::span<SurfaceAttributes> out, const Find& find) {

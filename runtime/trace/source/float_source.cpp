@@ -30,7 +30,7 @@ FloatSource::FloatSource(const Scene& scene) : scene_(scene) {
     require(instance.object < scene.objects.size(), "an instance refers to an object that does not exist");
     instances_.push_back({first_object + instance.object, instance.world_from_object});
   }
-  world_bounds_ = packtrace::world_bounds(scene); // relies on the references checked above
+  world_bounds_ = packtrace::world_bounds(scene); // The references were checked above.
 }
 
 void FloatSource::add_geometry(std::span<const Shape> shapes) {
@@ -79,7 +79,8 @@ void FloatSource::decode(uint32_t geometry, std::span<Vec3> positions, std::span
 const FloatSource::Part& FloatSource::part_of(uint32_t geometry, uint32_t triangle) const {
   const Geometry& g = geometries_[geometry];
   const auto first = parts_.begin() + g.first_part;
-  // Meshes without triangles share their first triangle with the next one; the last such part owns it.
+  // Meshes without triangles have the same first_triangle as the next mesh; the last part with that number owns the
+  // triangle.
   const auto next = std::upper_bound(first, first + g.part_count, triangle,
                                      [](uint32_t t, const Part& part) { return t < part.first_triangle; });
   return *(next - 1);
@@ -98,7 +99,7 @@ std::optional<Vec3> FloatSource::shading_normal(uint32_t geometry, uint32_t tria
                             DVec3(normals[v.y]) * double(barycentrics.x) + DVec3(normals[v.z]) * double(barycentrics.y);
   const DVec3 n = part.normal_from_mesh * mesh_normal;
   const double length = glm::length(n);
-  if (!(length > 0.0) || !std::isfinite(length)) return std::nullopt; // opposed vertex normals cancel
+  if (!(length > 0.0) || !std::isfinite(length)) return std::nullopt; // Opposite vertex normals cancel.
   return Vec3(n / length);
 }
 

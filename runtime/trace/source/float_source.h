@@ -6,11 +6,11 @@
 
 namespace packtrace {
 
-/// A Scene seen through SceneSource without packing. Geometries: each shape outside objects, moved to the world, then
-/// each object with its shapes moved to the object's space. Keeps a reference: the scene must outlive it.
-/// Transforms are applied in double and rounded to float once. Triangles whose transform mirrors, or whose shape
-/// reverses its orientation, are listed with their last two vertices swapped, so cross(p1 - p0, p2 - p0) of decoded
-/// positions is the geometric normal that pbrt defines.
+/// An unpacked Scene as a SceneSource. Its geometries are each shape outside objects, transformed to world space, then
+/// each object with its shapes transformed to object space. Keeps a reference: the scene must outlive it. Transforms
+/// are applied in double and rounded to float once. Triangles whose transform mirrors, or whose shape reverses its
+/// orientation, are listed with their last two vertices swapped, so cross(p1 - p0, p2 - p0) of decoded positions is the
+/// geometric normal that pbrt defines.
 class FloatSource final : public SceneSource {
 public:
   /// Throws Error(kLimitExceeded) if an object has 2^32 or more vertices or triangles, Error(kInput) for references
@@ -33,7 +33,7 @@ public:
   uint64_t resident_bytes() const override;
 
 private:
-  /// A mesh at its place in a geometry.
+  /// A mesh as a part of a geometry.
   struct Part {
     const Mesh* mesh = nullptr;
     DAffine geometry_from_mesh{1.0};
@@ -41,9 +41,9 @@ private:
     uint32_t material = 0;
     uint32_t first_triangle = 0; ///< in the geometry
     uint32_t first_vertex = 0;   ///< in the geometry
-    bool swapped = false;        ///< last two vertices of each triangle
+    bool swapped = false;        ///< whether the last two vertices of each triangle are swapped
 
-    /// Vertices in the mesh.
+    /// Returns a triangle's vertex numbers in the mesh.
     Triangle triangle(uint32_t triangle_in_mesh) const;
   };
   struct Geometry {

@@ -12,7 +12,7 @@
 namespace packtrace {
 namespace {
 
-/// Level 0 alone, as one group that nothing coarser was made from.
+/// Returns level 0 alone as one group that was never simplified.
 LodGeometry without_levels(const BakedFile& file, uint32_t geometry) {
   baked::LodGroupRecord group{};
   group.error = std::numeric_limits<float>::infinity();
@@ -77,11 +77,11 @@ void LodSource::add_blas(const LodGeometry& geometry, uint32_t number, std::span
   blas.first_cluster = clusters_.size();
   const LodView lod = file_.lod(number);
   uint64_t triangles = 0, vertices = 0;
-  uint32_t level = 0, first = 0; // of the level
-  uint32_t holder = number;      // the level's geometry
+  uint32_t level = 0, first = 0; // first: number of the first cluster of the level
+  uint32_t holder = number;      // the level's geometry in the file
   for (const uint32_t c : clusters_of_cut(geometry, passed)) {
     while (c - first >= file_.clusters(holder).size()) {
-      if (level + 1 >= lod.levels.size()) return blas_.push_back(blas); // a geometry of no clusters
+      if (level + 1 >= lod.levels.size()) return blas_.push_back(blas); // The geometry has no clusters.
       first += static_cast<uint32_t>(file_.clusters(holder).size());
       holder = lod.levels[++level].geometry;
     }

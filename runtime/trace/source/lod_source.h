@@ -9,35 +9,36 @@
 
 namespace packtrace {
 
-/// The levels of detail of a file's geometries, numbered as in the file: what LodSharing chooses from. Geometries
-/// without levels have level 0 only; those without clusters stand for a single cluster of no triangles.
-/// Throws Error(kInput) as LodGeometry's constructor.
+/// Returns the LOD hierarchies of a file's geometries, numbered as in the file, as input of LodSharing. A geometry
+/// without levels has level 0 only; one without clusters gets a single cluster of no triangles. Throws Error(kInput) as
+/// LodGeometry's constructor does.
 std::vector<LodGeometry> lod_geometries(const BakedFile& file);
 
-/// A source's instances, for LodSharing.
+/// Returns a source's instances as input of LodSharing.
 std::vector<LodInstance> lod_instances(const SceneSource& source);
 
 /// A cluster of a BLAS.
 struct BlasCluster {
-  uint32_t geometry = 0; ///< of the file: the BLAS's geometry, or one of its levels
-  uint32_t cluster = 0;  ///< of that geometry
+  uint32_t geometry = 0; ///< geometry of the file: the BLAS's own, or one of its coarser levels
+  uint32_t cluster = 0;  ///< number in that geometry
   uint32_t level = 0;
-  uint32_t first_triangle = 0, first_vertex = 0; ///< of the BLAS
-  float error = 0.0f;                            ///< of the group it was made from; object units
+  uint32_t first_triangle = 0, first_vertex = 0; ///< numbers in the BLAS
+  float error = 0.0f;                            ///< error of the group that it was simplified from; object units
 };
 
-/// A baked file at the detail of a plan: its geometries are the plan's BLASes, and instances are of the BLAS that they
-/// use. Triangles and vertices of a BLAS follow its clusters, level by level in the file's order, so a BLAS of all of
-/// level 0 is numbered as in PackedSource. Keeps references: file and source must outlive it; the plan need not.
+/// A baked file at the detail of a plan. Its geometries are the plan's BLASes, and each instance refers to the BLAS
+/// that the plan assigns to it. Triangles and vertices of a BLAS follow its clusters, level by level in the file's
+/// order, so a BLAS of all of level 0 is numbered as in PackedSource. Keeps references: file and source must outlive
+/// it; the plan need not.
 ///
-/// position_error() is that of the lattice alone. Rays start where the traced surface is, of whatever detail, so their
-/// offsets need not count how far that is from level 0 (docs/lod_runtime.md).
+/// position_error() is the quantisation error alone. Rays start on the traced surface, whatever its level, so their
+/// offsets need not include its distance from level 0 (docs/lod_runtime.md).
 class LodSource final : public SceneSource {
 public:
-  /// @param source of the same file
-  /// @param sharing of lod_geometries() and lod_instances() of it
-  /// @param plan of `sharing`
-  /// Throws Error(kLimitExceeded) where a BLAS has 2^32 triangles or vertices.
+  /// @param source a source of the same file
+  /// @param sharing made from lod_geometries() and lod_instances() of the file
+  /// @param plan a plan of `sharing`
+  /// Throws Error(kLimitExceeded) if a BLAS has 2^32 or more triangles or vertices.
   LodSource(const BakedFile& file, const PackedSource& source, const LodSharing& sharing, const LodPlan& plan);
 
   uint32_t geometry_count() const override { return static_cast<uint32_t>(blas_.size()); }
@@ -54,26 +55,27 @@ public:
   AlphaMaskView mask(uint32_t index) const override { return source_.mask(index); }
   TextureView texture(uint32_t index) const override { return source_.texture(index); }
   std::span<const Camera> cameras() const override { return source_.cameras(); }
-  /// Of level 0.
+  /// Bounds of LOD level 0.
   Bounds world_bounds() const override { return source_.world_bounds(); }
-  /// The file and the tables.
+  /// Bytes of the file and of the tables.
   uint64_t resident_bytes() const override;
 
-  /// The file's geometry that a BLAS is of.
+  /// The file's geometry that a BLAS was made from.
   uint32_t base_geometry(uint32_t blas) const { return blas_[blas].geometry; }
   std::span<const BlasCluster> clusters(uint32_t blas) const {
     return std::span(clusters_).subspan(blas_[blas].first_cluster, blas_[blas].cluster_count);
   }
-  /// The box of all levels that the BLAS has clusters of; object space.
+  /// Bounds, in object space, of all levels that the BLAS has clusters of.
   Bounds bounds(uint32_t blas) const;
-  /// A triangle's number in a BLAS. @param cluster in the file's cluster section; one of the BLAS's
+  /// Returns the number in a BLAS of a cluster's triangle.
+  /// @param cluster number in the file's cluster section; must be in the BLAS
   uint32_t triangle_number(uint32_t blas, uint32_t cluster, uint32_t triangle) const;
 
 private:
   struct Blas {
     uint32_t geometry = 0;
     uint32_t triangles = 0, vertices = 0;
-    size_t first_cluster = 0, cluster_count = 0; ///< of clusters_
+    size_t first_cluster = 0, cluster_count = 0; ///< range in clusters_
   };
 
   void add_blas(const LodGeometry& geometry, uint32_t number, std::span<const uint64_t> passed);

@@ -16,7 +16,7 @@ std::optional<Vec3> interpolated_normal(const ClusterView& cluster, uint32_t tri
   const Vec3 n = cluster.normal(v.x) * (1.0f - barycentrics.x - barycentrics.y) + cluster.normal(v.y) * barycentrics.x +
                  cluster.normal(v.z) * barycentrics.y;
   const float length = glm::length(n);
-  if (!(length > 0.0f)) return std::nullopt; // opposed vertex normals cancel
+  if (!(length > 0.0f)) return std::nullopt; // Opposite vertex normals cancel.
   return n / length;
 }
 

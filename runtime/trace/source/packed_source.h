@@ -9,16 +9,17 @@ namespace packtrace {
 class BakedFile;
 class ClusterView;
 
-/// Interpolated vertex normal of unit length; none where the cluster has none or they cancel.
-/// @param triangle of the cluster @param barycentrics weights of its second and third vertex
+/// Returns the interpolated vertex normal, unit length; none if the cluster has no normals or they cancel.
+/// @param triangle number in the cluster
+/// @param barycentrics weights of its second and third vertex
 std::optional<Vec3> interpolated_normal(const ClusterView& cluster, uint32_t triangle, Vec2 barycentrics);
 
-/// Interpolated texture coordinates; (0,0) where the cluster has none.
+/// Returns interpolated texture coordinates; (0,0) if the cluster has none.
 Vec2 interpolated_uv(const ClusterView& cluster, uint32_t triangle, Vec2 barycentrics);
 
-/// A baked file seen through SceneSource: everything but the tables below is read from the packed clusters when asked
-/// for. Triangle numbers follow the clusters' order, and so do vertices; those on cluster borders appear once for each
-/// cluster, with the same bits. Keeps a reference: the file must outlive it.
+/// A baked file as a SceneSource: everything but the tables below is read from the packed clusters on demand. Triangles
+/// and vertices are numbered in the order of clusters; a vertex on a cluster border appears once per cluster, with the
+/// same bits. Keeps a reference: the file must outlive it.
 class PackedSource final : public SceneSource {
 public:
   explicit PackedSource(const BakedFile& file);
@@ -38,7 +39,7 @@ public:
   std::span<const Camera> cameras() const override { return cameras_; }
   Bounds world_bounds() const override { return world_bounds_; }
 
-  /// The whole file, as it is mapped, and the tables.
+  /// Bytes of the whole mapped file and of the tables.
   uint64_t resident_bytes() const override;
 
 private:

@@ -10,7 +10,7 @@
 
 namespace packtrace {
 
-/// One placement of a geometry. Index in SceneSource::instances() is the instance id of images.
+/// One placement of a geometry. Its index in SceneSource::instances() is the instance id of images.
 struct PlacedGeometry {
   uint32_t geometry = 0;
   Affine world_from_object{1.0f};
@@ -21,31 +21,32 @@ struct GeometryCounts {
   uint32_t triangles = 0;
 };
 
-/// A place on a surface.
+/// A point on a surface.
 struct SurfaceQuery {
   uint32_t instance = 0;
-  uint32_t triangle = 0; ///< of the instance's geometry
+  uint32_t triangle = 0; ///< number in the instance's geometry
   Vec2 barycentrics{0.0f};
 };
 
-/// What SceneSource::material_of() and shading_normal() say of it.
+/// The results of SceneSource::material_of() and shading_normal() at a point.
 struct SurfaceAttributes {
   uint32_t material = 0;
   bool has_normal = false;
   Vec3 normal{0.0f};
 };
 
-/// Which detail a triangle is of.
+/// The level of detail of a triangle.
 struct SurfaceDetail {
-  uint32_t level = 0;       ///< of detail; 0: as the scene gave it
-  uint32_t cluster = 0;     ///< a number of the cluster that it is in
-  float error_world = 0.0f; ///< bound of how far it is from level 0, where the instance stretches most; world units
+  uint32_t level = 0;   ///< LOD level; 0: the source geometry
+  uint32_t cluster = 0; ///< number that identifies its cluster
+  /// Bound of its distance from level 0, times the largest stretch of the instance; world units.
+  float error_world = 0.0f;
 };
 
-/// What tracing and shading need of a scene, whether it lies in a baked file (PackedSource) or in floats
-/// (FloatSource). Triangle numbers of a geometry are the order in which decode() lists them. All functions are const
-/// and may be called from several threads; per-hit functions do not allocate. Both sources number instances alike: the
-/// scene's shapes outside objects in file order, then its object instances.
+/// A scene as tracing and shading need it, stored in a baked file (PackedSource) or in floats (FloatSource). Triangles
+/// of a geometry are numbered in the order of decode(). All functions are const and may be called from several threads;
+/// per-hit functions do not allocate. Both sources number instances alike: the scene's shapes outside objects in file
+/// order, then its object instances.
 class SceneSource {
 public:
   virtual ~SceneSource() = default;
@@ -53,40 +54,41 @@ public:
   virtual uint32_t geometry_count() const = 0;
   virtual GeometryCounts counts(uint32_t geometry) const = 0;
 
-  /// Object-space vertices and triangles; the spans have exactly the sizes of counts().
+  /// Writes object-space vertices and triangles; the spans have exactly the sizes of counts().
   virtual void decode(uint32_t geometry, std::span<Vec3> positions, std::span<Triangle> triangles) const = 0;
 
-  /// Into materials(). Instances of one geometry may have different materials, but each triangle's have one
+  /// Index into materials(). Instances of one geometry may have different materials, but a triangle has the same
   /// baked::material_class() in all of them.
-  /// @param triangle of the instance's geometry
+  /// @param triangle number in the instance's geometry
   virtual uint32_t material_of(uint32_t instance, uint32_t triangle) const = 0;
 
-  /// Interpolated vertex normal in object space, unit length; none where the surface is flat.
+  /// Interpolated vertex normal in object space, unit length; none if the surface is flat.
   /// @param barycentrics weights of the triangle's second and third vertex
   virtual std::optional<Vec3> shading_normal(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const = 0;
 
-  /// material_of() and shading_normal() of many places at once, which is faster where neighbours lie close together.
-  /// @param out of the same size
+  /// Evaluates material_of() and shading_normal() at many points; faster than single calls if neighbours lie close
+  /// together.
+  /// @param out as many elements as `places`
   virtual void look_up(std::span<const SurfaceQuery> places, std::span<SurfaceAttributes> out) const;
 
-  /// Interpolated texture coordinates; (0,0) where the geometry has none.
+  /// Interpolated texture coordinates; (0,0) if the geometry has none.
   virtual Vec2 uv(uint32_t geometry, uint32_t triangle, Vec2 barycentrics) const = 0;
 
-  /// Bound of |decoded - source| per axis in object units; 0 for floats. Ray offsets add to it (docs/accuracy.md).
+  /// Bound of |decoded - source| per axis in object units; 0 for floats. See docs/accuracy.md.
   virtual float position_error(uint32_t geometry) const = 0;
 
-  /// @param triangle of the instance's geometry
+  /// @param triangle number in the instance's geometry
   virtual SurfaceDetail detail_of(uint32_t /*instance*/, uint32_t /*triangle*/) const { return {}; }
 
   virtual std::span<const PlacedGeometry> instances() const = 0;
   virtual std::span<const Material> materials() const = 0;
   virtual AlphaMaskView mask(uint32_t index) const = 0;
-  /// Of Material::albedo_texture.
+  /// The texture of an index in Material::albedo_texture.
   virtual TextureView texture(uint32_t) const { return {}; }
   virtual std::span<const Camera> cameras() const = 0;
   virtual Bounds world_bounds() const = 0;
 
-  /// Bytes that stay resident for geometry besides what the tracing backend builds.
+  /// Bytes of geometry that stay resident, without those that the tracing backend builds.
   virtual uint64_t resident_bytes() const = 0;
 };
 

@@ -54,7 +54,8 @@ TEST(AoAnalytic, CornerOfInfiniteWallIsOneHalf) {
 }
 
 TEST(AoAnalytic, LongWallOfFiniteHeightMatchesItsFormFactor) {
-  // An element at distance a from an endless perpendicular strip of height h: F = (1 - a / sqrt(a^2 + h^2)) / 2.
+  // Form factor of an element at distance a from an infinite perpendicular strip of height h:
+  // F = (1 - a / sqrt(a^2 + h^2)) / 2.
   for (const auto& [a, h] : {std::pair{1.0f, 1.0f}, {3.0f, 1.0f}, {1.0f, 4.0f}}) {
     Scene scene;
     add_shape(scene, horizontal(0));
@@ -65,7 +66,7 @@ TEST(AoAnalytic, LongWallOfFiniteHeightMatchesItsFormFactor) {
 }
 
 TEST(AoAnalytic, ParallelPlatesWithinARadius) {
-  // cos^2 of a cosine-weighted direction is uniform, and the ceiling is nearer than R where cos > H / R.
+  // cos^2 of cosine-weighted directions is uniformly distributed, and the ceiling is within R where cos > H / R.
   Scene scene;
   add_shape(scene, horizontal(0));
   add_shape(scene, horizontal(2));
@@ -76,7 +77,8 @@ TEST(AoAnalytic, ParallelPlatesWithinARadius) {
   EXPECT_EQ(ao_at(scene, {0, 0, 0}, {0, 1, 0}, visibility(1.999f)), 1.0);
 }
 
-/// Mean of f(distance) over a plane at height h, by midpoints of the uniform cos^2.
+/// Mean of f(distance) over cosine-weighted directions to a plane at the given height, by the midpoint rule over the
+/// uniform cos^2.
 template <typename F>
 double plate_mean(double height, const F& f) {
   constexpr int kSteps = 200000;
@@ -104,10 +106,11 @@ TEST(AoAnalytic, ParallelPlatesWithFalloff) {
 
 TEST(AoAnalytic, ContinuousFalloffHasNoStepAtItsEnd) {
   Scene scene;
-  add_shape(scene, quad({-1, 0.999f, -1}, {0, 0, 2}, {2, 0, 0})); // small and just within reach of a narrow cone
+  // Small, and within the radius for a narrow cone of directions only.
+  add_shape(scene, quad({-1, 0.999f, -1}, {0, 0, 2}, {2, 0, 0}));
   AoConfig config = visibility(1);
   config.falloff = true;
-  config.lambda = 0.5f; // reaches the radius
+  config.lambda = 0.5f; // The falloff reaches the radius.
   const double continuous = ao_at(scene, {0, 0, 0}, {0, 1, 0}, config);
   config.continuous = false;
   EXPECT_LT(ao_at(scene, {0, 0, 0}, {0, 1, 0}, config), 1.0);
@@ -134,7 +137,7 @@ TEST(AoAnalytic, ClosedBoxIsZero) {
 }
 
 TEST(AoAnalytic, SphereAbovePlaneMatchesItsFormFactor) {
-  // A sphere wholly above the horizon: F = cos(theta) (r / d)^2.
+  // Form factor of a sphere entirely above the horizon: F = cos(theta) (r / d)^2.
   for (const float x : {0.0f, 2.0f, 5.0f}) {
     Scene scene;
     add_shape(scene, sphere({x, 3, 0}, 2, 100));
@@ -149,7 +152,7 @@ TEST(AoAnalytic, HitDistanceIsTheMeanWithMissesAtTheRadius) {
   add_shape(scene, horizontal(2));
   AoConfig config = visibility(8);
   config.falloff = true;
-  config.lambda = 0.5f; // sees to the radius
+  config.lambda = 0.5f; // The falloff reaches the radius.
   const FloatSource source(scene);
   const EmbreeTracer embree(source, {});
   Progress progress;
@@ -168,7 +171,7 @@ TEST(AoAnalytic, InterreflectionBrightensByTheSurfaceLuminance) {
   AoConfig config = visibility(1e9f);
   config.min_visibility = 0.2f;
   config.interreflection = 0.5f;
-  // Every direction hits, k = 0.2: k / (1 - 0.5 * 0.5 * 0.8).
+  // Every direction hits, so the visibility is k = 0.2: k / (1 - 0.5 * 0.5 * 0.8).
   EXPECT_NEAR(ao_at(scene, {0, 0, 0}, {0, 1, 0}, config), 0.2 / 0.8, 1e-3);
   scene.materials[1].albedo = Vec3(0.0f);
   EXPECT_NEAR(ao_at(scene, {0, 0, 0}, {0, 1, 0}, config), 0.2, 1e-3);

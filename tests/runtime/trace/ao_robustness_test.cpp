@@ -30,7 +30,7 @@ AoConfig visibility(float radius, uint32_t spp = 16) {
   return config;
 }
 
-/// Floor y = 0 and a ceiling y = 1 of some material over the origin.
+/// A floor at y = 0 and a ceiling at y = 1 whose material has the given flags.
 Scene roofed(MaterialFlags roof_flags) {
   Scene scene;
   add_shape(scene, quad({-1000, 0, -1000}, {0, 0, 2000}, {2000, 0, 0}));
@@ -49,7 +49,7 @@ TEST(AoVisibility, OnlyOccludingMaterialsOcclude) {
 }
 
 TEST(AoVisibility, MixedMaterialsOfOneInstancedObjectKeepTheirClasses) {
-  // Half of the roof is glass, half is not, in one object.
+  // One object whose roof is half glass and half opaque.
   Scene scene;
   const uint32_t object = add_object(scene, quad({-1000, 1, -1000}, {1000, 0, 0}, {0, 0, 2000}));
   add_object(scene, quad({0, 1, -1000}, {1000, 0, 0}, {0, 0, 2000}), kTransmissive);
@@ -59,11 +59,11 @@ TEST(AoVisibility, MixedMaterialsOfOneInstancedObjectKeepTheirClasses) {
   EXPECT_NEAR(ao_at(scene, {0, 0, 0}, {0, 1, 0}, visibility(1e6f, 256)), 0.5, 1e-3);
 }
 
-/// Stripes of half opaque, half absent texels, much finer than the roof is high.
+/// Stripes of opaque and absent texels, half each, much narrower than the height of the roof.
 AlphaMask stripes() { return {64, 1, WrapMode::kRepeat, Vec2(64000), Vec2(0), {0u, ~0u}}; }
 
 TEST(AoVisibility, AlphaMasksOpenTheRoofForTheirRays) {
-  // 1/2 but for the rims, which bilinear footprints make opaque.
+  // 1/2, except for the rims, which are opaque because of bilinear filtering.
   Scene scene = roofed(kAlphaMask);
   scene.masks.push_back(stripes());
   scene.materials[1].alpha_mask = 0;
@@ -72,7 +72,7 @@ TEST(AoVisibility, AlphaMasksOpenTheRoofForTheirRays) {
   scene.materials[1] = {"", kShadowAlphaMask, Vec3(0.5f), kNoMask, 0};
   EXPECT_EQ(ao_at(scene, {0, 0, 0}, {0, 1, 0}, visibility(1e6f, 256)), all_rays);
   AoConfig closest = visibility(1e6f, 256);
-  closest.interreflection = 1e-6f; // the closest-hit path
+  closest.interreflection = 1e-6f; // selects the closest-hit path
   EXPECT_NEAR(ao_at(scene, {0, 0, 0}, {0, 1, 0}, closest), all_rays, 1e-5);
 }
 
@@ -173,7 +173,7 @@ TEST(AoFrames, FramesOfOneSampleAreOneFrameOfMany) {
   for (size_t i = 0; i < sum.size(); ++i) EXPECT_FLOAT_EQ(whole.ao[i], static_cast<float>(sum[i] / 32));
 }
 
-/// Wants as many rays together as it is told, and remembers the most that it got.
+/// Forwards to a tracer with a given rays_together(), and records the largest number of rays per call.
 class CrowdTracer final : public RayTracer {
 public:
   CrowdTracer(const RayTracer& tracer, uint32_t rays) : tracer_(tracer), rays_(rays) {}
@@ -262,7 +262,7 @@ TEST(AoFrames, MissesAreInvalidEvenOverOldContents) {
   }
 }
 
-/// Cancellation is process-wide and has no way back: these run in processes of their own.
+/// Cancellation is process-wide and cannot be undone, so these tests run in processes of their own.
 TEST(AoFrames, CancellingStopsWithinATile) {
   struct Guard {
     static void run() {

@@ -52,14 +52,14 @@ TEST(PrimaryCamera, LooksAlongPositiveZWithYUpAndRasterYDown) {
 TEST(PrimaryCamera, FieldOfViewSpansTheShorterAxis) {
   const PrimaryCamera wide(perspective(90), {200, 100}), tall(perspective(90), {100, 200});
   const DVec3 w = wide.ray(199, 99).direction, t = tall.ray(99, 199).direction;
-  EXPECT_NEAR(-w.y / w.z, 0.99, 1e-12); // tan 45 degrees, half a pixel in
+  EXPECT_NEAR(-w.y / w.z, 0.99, 1e-12); // tan 45 degrees, half a pixel inside the border
   EXPECT_NEAR(w.x / w.z, 1.99, 1e-12);
   EXPECT_NEAR(t.x / t.z, 0.99, 1e-12);
   EXPECT_NEAR(-t.y / t.z, 1.99, 1e-12);
 }
 
 TEST(PrimaryCamera, LookAtDoesNotMirror) {
-  // Looking along +x from the origin with y up in pbrt's left-handed world: right is cross(y, x) = -z.
+  // The camera looks along +x from the origin with y up. In pbrt's left-handed world, right is cross(y, x) = -z.
   Camera camera = perspective(90);
   camera.world_from_camera = *look_at(DVec3(0), DVec3(1, 0, 0), DVec3(0, 2, 0));
   const PrimaryCamera primary(camera, {100, 100});
@@ -183,7 +183,7 @@ TEST(FramingCamera, SeesTheWholeBoxAtAnyScale) {
         widest = std::max({widest, from_centre.x, from_centre.y});
       }
       EXPECT_LT(widest, 0.5);
-      EXPECT_GT(widest, 0.4); // and fills it
+      EXPECT_GT(widest, 0.4); // The bounds nearly fill the image.
     }
 }
 

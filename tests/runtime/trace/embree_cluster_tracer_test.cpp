@@ -24,7 +24,7 @@ uint64_t part(const RayTracer& tracer, std::string_view name) {
   return 0;
 }
 
-/// Rays that `a` finds a hit for. Both must find the same, to the bit.
+/// Expects both tracers to find the same hits, bit for bit. Returns the number of rays that hit.
 size_t same_hits(const RayTracer& a, const RayTracer& b, std::span<const Ray> rays, uint32_t ray_class) {
   const std::vector<RayHit> of_a = closest(a, rays, ray_class), of_b = closest(b, rays, ray_class);
   EXPECT_EQ(std::memcmp(of_a.data(), of_b.data(), rays.size() * sizeof(RayHit)), 0);
@@ -46,7 +46,7 @@ TEST(EmbreeClusterTracer, FindsWhatPackedFindsToTheBit) {
   }
 }
 
-/// One tree, without a tree over placements; rays in the planes of axes and of box sides among them.
+/// A single tree without a tree over placements; some rays lie in planes of the axes and of box faces.
 TEST(EmbreeClusterTracer, FindsWhatPackedFindsAlongAxes) {
   Scene scene;
   test::add_shape(scene, test::sphere({0, 0, 0}, 1, 60));

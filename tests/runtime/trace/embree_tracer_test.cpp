@@ -15,7 +15,8 @@ namespace {
 using test::add_object;
 using test::add_shape;
 
-/// A sphere that only camera rays see, one that only occlusion rays see is not there: kNoShadow and kInvisible.
+/// A sphere that only camera rays hit (kNoShadow), one that only occlusion rays hit (kInvisible), and two instances of
+/// a box.
 Scene two_classes() {
   Scene scene;
   add_shape(scene, test::sphere({-2, 0, 0}, 1, 24), kNoShadow);
@@ -26,7 +27,7 @@ Scene two_classes() {
   return scene;
 }
 
-/// From in front of the scene through a square around it; some start inside things.
+/// Rays from a point in front of the scene, or inside it for every third ray, through a square around it.
 std::vector<Ray> fan(const UnitSpace& space, uint32_t side) {
   std::vector<Ray> rays;
   for (uint32_t i = 0; i < side * side; ++i) {
@@ -42,7 +43,7 @@ TEST(EmbreeTracer, OrderOfRaysChangesNoHit) {
   const Scene scene = two_classes();
   const FloatSource source(scene);
   const EmbreeTracer tracer(source, {});
-  const std::vector<Ray> rays = fan(tracer.space(), 45); // more than a stream, and no multiple of 16
+  const std::vector<Ray> rays = fan(tracer.space(), 45); // more rays than a stream holds, and not a multiple of 16
   for (const uint32_t ray_class : {kCameraRays, kOcclusionRays}) {
     std::vector<RayHit> coherent(rays.size()), incoherent(rays.size());
     std::vector<uint8_t> any_coherent(rays.size()), any_incoherent(rays.size());

@@ -9,14 +9,14 @@
 namespace packtrace {
 namespace {
 
-/// From below the origin of x and y through planes of constant z.
+/// A ray along +z that crosses planes of constant z.
 const Ray kUp{{0.25f, 0.25f, -1.0f}, 0.0f, {0.0f, 0.0f, 1.0f}, 100.0f};
 
 ExactTriangle at_height(double z, double x = 0.0) {
   return {DVec3(x, 0.0, z), DVec3(x + 1.0, 0.0, z), DVec3(x, 1.0, z)};
 }
 
-/// The near triangle, one farther away, and one beside the near one.
+/// The nearest triangle, one behind it, and one beside the nearest.
 std::vector<ExactHit> candidates(const Ray& ray = kUp) {
   return {exact_hit(ray, at_height(1.0)), exact_hit(ray, at_height(3.0)), exact_hit(ray, at_height(1.0, 2.0))};
 }
@@ -40,12 +40,13 @@ TEST(ExactHit, MeetsPlanesWhereTheyAre) {
   const ExactHit beside = exact_hit(kUp, at_height(1.0, 2.0));
   EXPECT_FALSE(beside.hit);
   EXPECT_EQ(beside.t, 2.0);
-  EXPECT_EQ(beside.aside, 1.75);                                                      // of the edge x = 2
-  EXPECT_FALSE(exact_hit(kUp, {DVec3(0, 0, 0), DVec3(1, 1, 0), DVec3(1, 1, 1)}).hit); // runs along it
-  EXPECT_FALSE(exact_hit(kUp, {DVec3(0, 0, 1), DVec3(1, 1, 1), DVec3(1, 1, 1)}).hit); // no area
+  EXPECT_EQ(beside.aside, 1.75); // distance from the edge x = 2
+  // The ray is parallel to the plane.
+  EXPECT_FALSE(exact_hit(kUp, {DVec3(0, 0, 0), DVec3(1, 1, 0), DVec3(1, 1, 1)}).hit);
+  EXPECT_FALSE(exact_hit(kUp, {DVec3(0, 0, 1), DVec3(1, 1, 1), DVec3(1, 1, 1)}).hit); // The triangle has no area.
 }
 
-/// A ray at 2^-20 of the plane: a height of 2^-30 is a t of 2^-10.
+/// The ray has a slope of 2^-20 to the plane, so a height of 2^-30 is a t of 2^-10.
 TEST(ExactHit, KeepsDigitsAtGrazingAngles) {
   const Ray grazing{{0.25f, 0.25f, 0x1p-30f}, 0.0f, {1.0f, 0.0f, -0x1p-20f}, 100.0f};
   const ExactHit hit = exact_hit(grazing, at_height(0.0));
@@ -56,12 +57,12 @@ TEST(ExactHit, KeepsDigitsAtGrazingAngles) {
 
 /// Doubles would round the edge functions to zero.
 TEST(ExactHit, DecidesSidesOfEdges) {
-  const float step = 0x1p-24f; // of a float below 1
+  const float step = 0x1p-24f; // ulp of floats just below 1
   const ExactTriangle triangle{DVec3(0, 0, 1), DVec3(1 - step, 1, 1), DVec3(0, 1, 1)};
   const auto through = [&](float x, float y) {
     return exact_hit({{x, y, 0.0f}, 0.0f, {0.0f, 0.0f, 1.0f}, 100.0f}, triangle).hit;
   };
-  EXPECT_TRUE(through(0.5f - 0.5f * step, 0.5f)); // on the edge
+  EXPECT_TRUE(through(0.5f - 0.5f * step, 0.5f)); // exactly on the edge
   EXPECT_FALSE(through(0.5f, 0.5f));
   EXPECT_FALSE(through(0.5f - 0.25f * step, 0.5f));
   EXPECT_TRUE(through(0.5f - 0.5f * step, 0.5f + 0.5f * step));
@@ -119,7 +120,7 @@ TEST(HitVerdicts, AnyHits) {
   EXPECT_EQ(out.wrong, 1u);
 }
 
-/// A tracer whose hits a test may change.
+/// Changes two hits of a tracer and expects judge() to report exactly those.
 TEST(HitVerdicts, FindWhatIsWrongWithASystem) {
   Scene scene;
   test::add_shape(scene, test::sphere({0, 0, 0}, 1, 24));
@@ -150,7 +151,7 @@ TEST(HitVerdicts, FindWhatIsWrongWithASystem) {
   EXPECT_EQ(verdicts[1].all(), 2u);
 }
 
-/// A hilly floor whose triangles are small beside its coordinates.
+/// A hilly floor whose triangles are small compared with their coordinates.
 Mesh hills() {
   constexpr int kCells = 120;
   Mesh mesh;
@@ -165,7 +166,7 @@ Mesh hills() {
   return mesh;
 }
 
-/// Rays that start a few ulp of their origin above a triangle and come down on its plane after half an edge.
+/// Rays that start a few ulp of their origin's coordinates above a triangle and reach its plane within half an edge.
 std::vector<Ray> grazing_rays(const SceneSource& source, const ExactTriangles& triangles, size_t count) {
   std::mt19937 generator(3);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
@@ -187,7 +188,8 @@ std::vector<Ray> grazing_rays(const SceneSource& source, const ExactTriangles& t
   return rays;
 }
 
-/// Of the right triangles: how far a hit is off their plane, in 2^-24 of the way there and the triangle's size.
+/// Largest distance of a hit from its triangle's plane, over hits of the right triangle, in units of 2^-24 of the sum
+/// of the distance travelled and the triangle's size.
 double worst_height(const PackedTracer& tracer, const ExactTriangles& triangles, std::span<const Ray> rays) {
   const std::vector<RayHit> hits = test::closest(tracer, rays);
   double worst = 0.0;
@@ -207,7 +209,8 @@ double worst_height(const PackedTracer& tracer, const ExactTriangles& triangles,
   return worst;
 }
 
-/// What rounding takes from a ray's origin in a tree's grid is an ulp of its coordinates, far more than this.
+/// The origin's rounding error in a tree's grid is an ulp of its coordinates, far more than the error that is allowed
+/// here.
 TEST(NearestHits, AreOnTheirPlanesWhereRaysGraze) {
   for (const bool instanced : {false, true}) {
     Scene scene;

@@ -1,4 +1,4 @@
-// Scenes in which one thing is nothing like the others: it must not spoil what rays find of them, nor their speed.
+// Scenes with one extreme object: it must not affect hits on the other objects, nor the speed of tracing them.
 
 #include <cmath>
 
@@ -19,7 +19,7 @@ constexpr size_t kRays = 20000;
 
 size_t usual_count(const Scene& scene) { return scene.shapes.size() + scene.instances.size(); }
 
-/// Where rays are sent about.
+/// The box within which rays start and end.
 struct Region {
   DVec3 lo, hi;
 };
@@ -39,9 +39,10 @@ std::vector<Ray> rays_within(const Region& region, size_t count, const UnitSpace
   return rays;
 }
 
-/// That rays find of a scene with something odd in it what Embree finds without, but for a few past an outline, and
-/// beyond that nothing but what is odd.
-/// @param usual its instances come first in `scene`, too
+/// Compares a scene with an extreme object with Embree's hits in the scene without it. Rays that Embree finds a hit for
+/// must have the same hit; the others must hit nothing or the extreme object. Up to 1 in 200 rays may differ, as rays
+/// that pass an outline do.
+/// @param usual scene without the extreme object; its instances come first in `scene`
 void expect_what_is_usual(const Scene& usual, const Scene& scene, const Region& region, size_t least_hits) {
   const FloatSource floats(usual);
   const EmbreeTracer embree(floats, {});
@@ -72,7 +73,7 @@ void expect_what_is_usual(const Scene& usual, const Scene& scene, const Region& 
   check(EmbreeClusterTracer(baked.file, baked.source));
 }
 
-/// 20 small spheres about the origin.
+/// 20 small spheres around the origin.
 void add_spheres(Scene& scene, double scale) {
   const uint32_t object = add_object(scene, test::sphere({0, 0, 0}, 1, 16));
   std::mt19937 generator(2);
@@ -93,7 +94,7 @@ Scene spheres() {
   return scene;
 }
 
-/// @param size half its side; its diagonal runs below the middle
+/// @param size half of the side; the diagonal passes below the middle of the scene
 Mesh floor_of(float size) { return test::quad({-size, 0, -size}, {0, 0, 2 * size}, {2 * size, 0, 0}); }
 
 TEST(ExtremeScenes, AFloorOfAnySizeLiesBelowWhatStandsOnIt) {
@@ -143,7 +144,7 @@ TEST(ExtremeScenes, ThingsWithoutAnExtentLieBesideOthers) {
   expect_what_is_usual(spheres(), scene, about(6.0), kRays / 4);
 }
 
-/// Placements that rays enter, each.
+/// Mean number of placements that a ray enters.
 double placements_entered(const Scene& scene, double size) {
   const test::BakedScene baked(scene);
   const PackedTracer tracer(baked.file, baked.source);

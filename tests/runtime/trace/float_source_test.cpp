@@ -37,7 +37,7 @@ TEST(FloatSource, ShapesComeFirstThenObjectsAndInstances) {
 }
 
 TEST(FloatSource, MirroringAndReversingKeepPbrtsGeometricNormal) {
-  const Mesh mesh = test::quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}); // normal +z
+  const Mesh mesh = test::quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}); // normal: +z
   for (const bool mirrored : {false, true})
     for (const bool reversed : {false, true}) {
       Scene scene;

@@ -18,7 +18,8 @@ namespace {
 
 constexpr ImageSize kSize{96, 64};
 
-/// A floor, an empty spot, a world sphere and a bumpy one placed near and far, mirrored, squeezed and out of sight.
+/// A floor, a sphere in world space, and instances of a bumpy sphere: near and far, mirrored, squeezed, and one out of
+/// sight.
 Scene scene_of_spheres() {
   Scene scene;
   test::add_shape(scene, test::quad({-40, -1, -40}, {0, 0, 80}, {80, 0, 0}));
@@ -36,7 +37,7 @@ Scene scene_of_spheres() {
 
 Camera front() { return test::camera_at({1, 3, -10}, {0, 1, 0}); }
 
-/// A scene at the detail of a view.
+/// A scene at the level of detail of a view.
 struct Detailed {
   Detailed(const test::BakedScene& baked, const PrimaryCamera& camera, double error_px, SharingConfig config)
       : geometries(lod_geometries(baked.file)), instances(lod_instances(baked.source)),
@@ -126,7 +127,7 @@ TEST_F(LodSourceTest, NumbersTrianglesAsItDecodesThem) {
 TEST_F(LodSourceTest, LooksUpManyPlacesAsItDoesOne) {
   const Detailed detailed(baked_, camera_, 0.1, {});
   const LodSource& source = detailed.source;
-  std::vector<SurfaceQuery> places; // back and forth between clusters and instances
+  std::vector<SurfaceQuery> places; // alternates between clusters and instances
   for (uint32_t n = 0; n < 3000; ++n) {
     const auto instance = n / 3 * 7 % static_cast<uint32_t>(source.instances().size());
     const uint32_t triangles = source.counts(source.instances()[instance].geometry).triangles;
@@ -139,7 +140,8 @@ TEST_F(LodSourceTest, LooksUpManyPlacesAsItDoesOne) {
     const SurfaceQuery& place = places[i];
     const uint32_t blas = source.instances()[place.instance].geometry;
     ASSERT_EQ(found[i].material, source.material_of(place.instance, place.triangle));
-    ASSERT_EQ(found[i].material, baked_.source.material_of(place.instance, 0)); // each geometry has one here
+    // Each geometry has a single material here.
+    ASSERT_EQ(found[i].material, baked_.source.material_of(place.instance, 0));
     const std::optional<Vec3> normal = source.shading_normal(blas, place.triangle, place.barycentrics);
     ASSERT_EQ(found[i].has_normal, normal.has_value());
     with_normal += found[i].has_normal;
@@ -165,7 +167,7 @@ TEST_F(LodSourceTest, IsTheSameForAllTracersAndAnyNumberOfThreads) {
                    std::abs(expected.view_z[i] - embree.view_z[i]) > 1e-3f * embree.view_z[i];
     }
     EXPECT_GT(hits, 2000u);
-    EXPECT_LE(different, 3u); // at edges
+    EXPECT_LE(different, 3u); // at silhouettes
     const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
     const Detailed again(baked_, camera_, 0.1, scheme(which));
     const PackedTracer alone(baked_.file, again.source);
@@ -213,7 +215,7 @@ double distance_to_triangle(DVec3 p, DVec3 a, DVec3 b, DVec3 c) {
   return nearest;
 }
 
-/// Corners of an instance's triangles in world space.
+/// World-space corners of an instance's triangles, three per triangle.
 std::vector<DVec3> corners_of(const SceneSource& source, uint32_t instance) {
   const PlacedGeometry& placed = source.instances()[instance];
   const GeometryCounts counts = source.counts(placed.geometry);
@@ -227,8 +229,8 @@ std::vector<DVec3> corners_of(const SceneSource& source, uint32_t instance) {
   return corners;
 }
 
-/// What is seen lies within the error of the other source's surface of the same instance, in pixels where it is seen.
-/// This holds at silhouettes too: it is about surfaces, not about what two images show at one pixel.
+/// Largest distance of visible points from the other source's surface of the same instance, in pixels at the point. The
+/// bound holds at silhouettes, too, because it compares surfaces, not two images at a pixel.
 double largest_distance_px(const GBuffer& seen, const SceneSource& other, const PrimaryCamera& camera) {
   std::vector<std::vector<DVec3>> corners(other.instances().size());
   double largest = 0.0;
@@ -246,7 +248,7 @@ double largest_distance_px(const GBuffer& seen, const SceneSource& other, const 
 }
 
 TEST_F(LodSourceTest, SurfacesStayWithinTheErrorInPixels) {
-  constexpr double kRounding = 1e-3; // of a pixel: positions are floats
+  constexpr double kRounding = 1e-3; // in pixels: positions are floats
   const GBuffer whole = primary(baked_.source, PackedTracer(baked_.file, baked_.source), camera_);
   for (const double error_px : {0.05, 0.2, 2.0})
     for (const SharingScheme which : {SharingScheme::kPerInstance, SharingScheme::kSteps}) {
@@ -254,7 +256,7 @@ TEST_F(LodSourceTest, SurfacesStayWithinTheErrorInPixels) {
       const GBuffer seen = primary(detailed.source, PackedTracer(baked_.file, detailed.source), camera_);
       const double there = largest_distance_px(seen, baked_.source, camera_);
       EXPECT_LE(there, error_px + kRounding);
-      EXPECT_GT(there, 0.02 * error_px); // something is coarser
+      EXPECT_GT(there, 0.02 * error_px); // Some surface is simplified.
       EXPECT_LE(largest_distance_px(whole, detailed.source, camera_), error_px + kRounding);
       for (size_t i = 0; i < seen.instance.size(); ++i) {
         if (seen.instance[i] == kNoInstance) continue;
@@ -273,7 +275,7 @@ TEST_F(LodSourceTest, InstancesOutsideTheViewAreSeenByNoCameraRay) {
     if (instance != kNoInstance) {
       EXPECT_EQ(outside[instance], 0) << instance;
     }
-  EXPECT_EQ(outside.back(), 1); // behind
+  EXPECT_EQ(outside.back(), 1); // behind the camera
   EXPECT_EQ(std::ranges::count(outside, 1), 1);
 }
 

@@ -14,14 +14,14 @@ namespace packtrace {
 namespace {
 
 constexpr ImageSize kSize{40, 24};
-constexpr float kHalf = 50.0f; // of the floors; far more than the camera sees
+constexpr float kHalf = 50.0f; // half the side of the floors: far more than the camera sees
 
 Mesh floor_at(float y, bool turned_over) {
   return turned_over ? test::quad({-kHalf, y, -kHalf}, {2 * kHalf, 0, 0}, {0, 0, 2 * kHalf})
                      : test::quad({-kHalf, y, -kHalf}, {0, 0, 2 * kHalf}, {2 * kHalf, 0, 0});
 }
 
-/// A floor at 0 and a second one out of sight; then each as it is in less detail.
+/// A scene of two floors, instances 0 and 1.
 Scene two_floors(const Mesh& first, const Mesh& second) {
   Scene scene;
   test::add_shape(scene, first);
@@ -31,7 +31,7 @@ Scene two_floors(const Mesh& first, const Mesh& second) {
 
 class OriginLiftTest : public testing::TestWithParam<double> {
 protected:
-  /// Height in pixels, towards the camera.
+  /// World-space height of a number of pixels, positive towards the camera.
   float height(double px) const { return static_cast<float>(GetParam() * px * pixel_width(camera_, DVec3(0))); }
 
   GBuffer seen() const {
@@ -43,7 +43,7 @@ protected:
     EXPECT_EQ(std::ranges::count(g.instance, 0u), std::ptrdiff_t(kSize.pixels()));
     return g;
   }
-  /// The mean AO where occlusion rays meet the coarse scene.
+  /// Mean AO of the visible floor with occlusion rays traced against the coarse scene.
   double ao_in(const Scene& coarse, bool lift) const {
     const FloatSource source(coarse);
     const EmbreeTracer tracer(source, {});
@@ -63,7 +63,7 @@ protected:
 };
 
 constexpr double kOpen = 1.0;
-constexpr double kClosed = 0.01; // rays that graze the surface above get farther than the AO radius
+constexpr double kClosed = 0.01; // Rays that graze the surface above travel farther than the AO radius.
 
 TEST_P(OriginLiftTest, RaysStartAboveTheCoarseSurface) {
   const Scene coarse = two_floors(floor_at(height(0.3), false), far_away());

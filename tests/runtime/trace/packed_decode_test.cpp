@@ -10,8 +10,8 @@
 namespace packtrace {
 namespace {
 
-/// Decodes every run of up to 16 triangles of every cluster in batches, and its first triangle alone, and counts those
-/// that differ.
+/// Decodes every run of up to 16 triangles of every cluster as batches, and the first triangle of each run alone.
+/// Returns the number of batches that differ from decode_batch_exactly().
 size_t wrong_batches(const BakedFile& file, const packed::Kernels& kernels, size_t& batches) {
   const PackedTrees trees = build_packed_trees(file.sections());
   size_t wrong = 0;
@@ -62,7 +62,7 @@ TEST_P(PackedDecode, ReadsEveryRunOfTriangles) {
 }
 
 TEST_P(PackedDecode, ReadsLooseTriangles) {
-  // No two share an edge, and many share vertices: strips of one triangle, explicit vertices everywhere.
+  // Random triangles over 60 vertices: mostly strips of one triangle, with many explicit vertex numbers.
   std::mt19937 generator(3);
   Mesh mesh;
   for (int i = 0; i < 60; ++i) {
@@ -90,7 +90,7 @@ TEST(TraceCluster, LeavesWhatDoesNotFitToTheExactDecoder) {
   test::add_shape(scene, test::sphere({0, 0, 0}, 1, 16));
   BakeConfig config;
   config.precision_kind = PrecisionKind::kAbsolute;
-  config.precision = 1e-8; // 28 bits and more per axis
+  config.precision = 1e-8; // 28 or more bits per axis
   const test::BakedScene baked(scene, config);
   const PackedTrees trees = build_packed_trees(baked.file.sections());
   const packed::TraceCluster cluster =
@@ -98,7 +98,7 @@ TEST(TraceCluster, LeavesWhatDoesNotFitToTheExactDecoder) {
   EXPECT_TRUE((cluster.flags & packed::kWide) != 0);
   for (const PackedIsa isa : test::isas()) {
     const PackedTracer tracer(baked.file, baked.source, isa);
-    Ray ray; // from the middle outwards
+    Ray ray; // from the centre outwards
     ray.direction = Vec3(0.3f, 0.5f, -0.2f);
     const RayHit hit = test::closest(tracer, {&ray, 1})[0];
     ASSERT_TRUE(hit.valid());

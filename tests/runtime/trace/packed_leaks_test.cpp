@@ -15,7 +15,8 @@ using test::any;
 using test::BakedScene;
 using test::closest;
 
-/// From inside a closed mesh to its vertices, points of its edges and others, and along the axes: all must hit.
+/// Rays from inside a closed mesh to its vertices, to points on its edges and elsewhere, and along the axes. All must
+/// hit.
 std::vector<Ray> rays_from_inside(const SceneSource& source, const UnitSpace& space, DVec3 inside, size_t count,
                                   uint32_t seed) {
   const PlacedGeometry& instance = source.instances()[0];
@@ -39,7 +40,7 @@ std::vector<Ray> rays_from_inside(const SceneSource& source, const UnitSpace& sp
     const DVec3 size = (corner(1) - corner(0)) * 0.01;
     ray.origin = Vec3(space.to_unit(inside) + (i % 8 < 4 ? DVec3(0.0) : size * v));
     ray.direction = Vec3(target - DVec3(ray.origin));
-    if (i % 4 == 3) { // parallel to a plane of axes
+    if (i % 4 == 3) { // parallel to a coordinate plane
       ray.direction[static_cast<int>(i / 4 % 3)] = 0.0f;
       if (ray.direction == Vec3(0)) ray.direction.x = 1.0f;
     }
@@ -48,7 +49,8 @@ std::vector<Ray> rays_from_inside(const SceneSource& source, const UnitSpace& sp
   return rays;
 }
 
-/// Those from one place, in an order in which most groups of them are beams of one major axis.
+/// Returns the rays with the same origin as the first, sorted by major axis, so that most groups form beams of one
+/// major axis.
 std::vector<Ray> beams(std::span<const Ray> rays) {
   std::vector<Ray> result;
   for (const Ray& ray : rays)
@@ -78,7 +80,7 @@ size_t leaks(const Scene& scene, DVec3 inside, size_t count, PackedIsa isa, cons
   return missed;
 }
 
-/// More rays than a test has time for: PACKTRACE_LEAK_RAYS=100000000.
+/// Number of rays of a long run, from the environment: PACKTRACE_LEAK_RAYS=100000000. 0 if not set.
 size_t long_run() {
   const char* count = std::getenv("PACKTRACE_LEAK_RAYS");
   return count == nullptr ? 0 : std::strtoull(count, nullptr, 10);
@@ -99,12 +101,12 @@ TEST(PackedLeaks, NoRayLeavesAClosedMesh) {
 }
 
 TEST(PackedLeaks, NoneFromTheMiddleWhereEdgesAlign) {
-  Scene scene; // rays along its axis meet the poles, where dozens of edges meet
+  Scene scene; // Rays along the axis of the sphere hit the poles, where dozens of edges meet.
   test::add_shape(scene, test::sphere({0, 0, 0}, 1, 24));
   for (const PackedIsa isa : test::isas()) EXPECT_EQ(leaks(scene, {0, 0, 0}, 100000, isa), 0u);
 }
 
-/// A closed cube around the origin, each side of cells x cells quads.
+/// A closed cube around the origin; each side has cells x cells quads.
 Mesh cube(float half, int cells) {
   Mesh mesh;
   const auto corner = [&](int side, int i, int j) {
@@ -125,8 +127,8 @@ Mesh cube(float half, int cells) {
   return mesh;
 }
 
-/// From a few ulp inside a cube's sides, many in a row from one of them, along it, into it or away from it to places of
-/// others, vertices and edges among them: all must hit.
+/// Rays that start a few ulp inside a side of a cube, many in a row from the same side. They run along it, into it or
+/// away from it, to points, vertices and edges of other sides. All must hit.
 std::vector<Ray> rays_from_sides(const UnitSpace& space, const DAffine& world_from_cube, double half, int cells,
                                  double ulps, size_t count) {
   std::mt19937 generator(3);
@@ -227,21 +229,22 @@ TEST(EmbreeClusterLeaks, NoneFarAwayOrThroughInstancesOfAnyScale) {
 
 TEST(PackedLeaks, NoneBesideDegenerateTriangles) {
   Scene scene;
-  Mesh mesh = test::sphere({0, 0, 0}, 1, 30); // its poles' cells are degenerate already
+  Mesh mesh = test::sphere({0, 0, 0}, 1, 30); // Cells at its poles have a collapsed edge already.
   const auto count = static_cast<uint32_t>(mesh.positions.size());
   for (uint32_t i = 0; i + 7 < count; i += 7) mesh.triangles.emplace_back(i, i + 3, i);
   test::add_shape(scene, mesh);
   for (const PackedIsa isa : test::isas()) EXPECT_EQ(leaks(scene, {0.1, 0, 0.1}, 100000, isa), 0u);
 }
 
-/// A closed sphere on a lattice of steps of 1/1024 that has three points on one line within many of its edges: the
-/// triangle on one side has the whole edge, on the other side two have half of it each. Slivers without area lie
-/// between them, or are missing.
+/// A closed sphere on a lattice of step 1/1024 in which many edges contain a third vertex: the triangle on one side has
+/// the whole edge, and two triangles on the other side have half of it each. Slivers of zero area lie between them, or
+/// are omitted.
 Mesh sphere_of_split_edges(bool slivers) {
   constexpr float kSteps = 1024.0f;
   Mesh mesh = test::sphere({0, 0, 0}, 1, 24);
   mesh.normals.clear();
-  for (Vec3& p : mesh.positions) p = 2.0f * glm::round(p * kSteps * 0.5f) / kSteps; // so that middles are on it too
+  // Multiples of two steps, so that midpoints of edges are on the lattice, too.
+  for (Vec3& p : mesh.positions) p = 2.0f * glm::round(p * kSteps * 0.5f) / kSteps;
   const std::vector<Triangle> whole = mesh.triangles;
   mesh.triangles.clear();
   for (size_t i = 0; i < whole.size(); ++i) {
@@ -268,7 +271,8 @@ TEST(PackedLeaks, NoneBesideSliversThatJoinALongEdgeToShortOnes) {
   test::add_shape(without, sphere_of_split_edges(false));
   for (const PackedIsa isa : test::isas()) {
     EXPECT_EQ(leaks(with, {0.1, 0.2, -0.05}, 200000, isa, config), 0u);
-    EXPECT_GT(leaks(without, {0.1, 0.2, -0.05}, 200000, isa, config), 0u); // so the slivers do something
+    // Without the slivers rays leak, so the test above is meaningful.
+    EXPECT_GT(leaks(without, {0.1, 0.2, -0.05}, 200000, isa, config), 0u);
   }
 }
 
@@ -294,7 +298,7 @@ TEST(PackedLeaks, OneTriangleIsHitInsideAndOnItsEdges) {
   for (const PackedIsa isa : test::isas()) {
     const PackedTracer tracer(baked.file, baked.source, isa);
     const auto hits = [&](double x, double y, float direction) {
-      Ray ray; // perpendicular: only the decision about x and y counts
+      Ray ray; // perpendicular to the triangles, so only the decision about x and y matters
       ray.origin = Vec3(tracer.space().to_unit({x, y, -double{direction}}));
       ray.direction = Vec3(0, 0, direction);
       return any(tracer, {&ray, 1})[0] != 0;

@@ -10,7 +10,7 @@
 namespace packtrace::packed {
 namespace {
 
-constexpr float kMost = 0x1p20f; ///< the largest coordinate
+constexpr float kMost = 0x1p20f; ///< largest coordinate
 constexpr double kUlp = 0x1p-24 * double{kMost};
 
 TracePlacement whole_grid() {
@@ -35,7 +35,7 @@ TopNode node_of(std::initializer_list<Box> boxes) {
   return node;
 }
 
-/// 64 rays from x just above 0, a little over y = 0, down and towards larger x.
+/// 64 rays that start just above x = 0 and y = 0 and go down, towards larger x.
 UnitRays rays_beside_an_edge(std::mt19937& generator, double height) {
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   UnitRays rays{};
@@ -50,7 +50,7 @@ UnitRays rays_beside_an_edge(std::mt19937& generator, double height) {
   }
   return rays;
 }
-constexpr uint32_t kDown = 2; ///< the octant of their directions
+constexpr uint32_t kDown = 2; ///< octant of their directions
 
 TEST(Reach, HoldsBoxesWithAnExtentThatEndAPadBeforeRaysStart) {
   std::mt19937 generator(1);
@@ -58,14 +58,14 @@ TEST(Reach, HoldsBoxesWithAnExtentThatEndAPadBeforeRaysStart) {
   enter<false>(whole_grid(), kMost, kMost, rays_beside_an_edge(generator, 4), ~uint64_t{0}, group);
   group.reach.set_octant(kDown);
   const TopNode node = node_of({{{-kMost, 0, -kMost}, {0, 0, kMost}},               // beside the edge
-                                {{0, 0, -kMost}, {0, kMost, kMost}},                // a wall there, which they leave
-                                {{-kMost, 0, -kMost}, {-0.001f * kMost, 0, kMost}}, // farther than a pad
-                                {{0, -kMost, -kMost}, {kMost, 0, kMost}}});         // below them
+                                {{0, 0, -kMost}, {0, kMost, kMost}},                // a wall at x = 0
+                                {{-kMost, 0, -kMost}, {-0.001f * kMost, 0, kMost}}, // farther away than the pad
+                                {{0, -kMost, -kMost}, {kMost, 0, kMost}}});         // below the rays
   EXPECT_EQ(pass_reach(GroupBoxes<ScalarLanes>(node, kDown), group.reach) & node.slots, 0b1001u);
 }
 
 TEST(Reach, HoldsWhatTheTriangleTestAcceptsBesideIt) {
-  // A ground of two halves, each with a box; their common edge is where rounding decides.
+  // A ground of two halves, each with its own box. At their common edge rounding decides which half is hit.
   const float corners[4][3][3] = {{{0, 0, -kMost}, {0, 0, kMost}, {-kMost, 0, -kMost}},
                                   {{0, 0, -kMost}, {kMost, 0, kMost}, {0, 0, kMost}},
                                   {{0, 0, kMost}, {-kMost, 0, kMost}, {-kMost, 0, -kMost}},

@@ -11,7 +11,7 @@
 
 namespace packtrace::test {
 
-/// A scene as baked, and what reads it.
+/// A baked scene and a source that reads it.
 struct BakedScene {
   explicit BakedScene(const Scene& scene, const BakeConfig& config = {}) : file(bake(scene, config)), source(file) {}
   BakedScene(const BakedScene&) = delete;
@@ -50,7 +50,8 @@ inline std::vector<uint8_t> any(const RayTracer& tracer, std::span<const Ray> ra
   return occluded;
 }
 
-/// Rays between random points of a box, a little larger than the scene's in unit space; t = 1 at the second point.
+/// Rays between random points of a box, which is enlarged by a quarter on every side. They are in unit space; t = 1 at
+/// the second point.
 inline std::vector<Ray> random_rays(size_t count, const Bounds& world, const UnitSpace& space, uint32_t seed = 1) {
   std::mt19937 generator(seed);
   std::uniform_real_distribution<double> along(-0.25, 1.25);
@@ -67,8 +68,8 @@ inline std::vector<Ray> random_rays(size_t count, const Bounds& world, const Uni
   return rays;
 }
 
-/// World shapes and instances: turned, mirrored, squeezed, far apart, one of it masked, one not seen, one not
-/// occluding.
+/// World shapes and instances: rotated, mirrored, squeezed and far apart. One shape is masked, one does not occlude and
+/// one is invisible.
 inline Scene varied_scene() {
   Scene scene;
   add_shape(scene, quad({-8, 0, -8}, {0, 0, 16}, {16, 0, 0}));
@@ -84,7 +85,7 @@ inline Scene varied_scene() {
   return scene;
 }
 
-/// The same among many small instances in each other's way, turned, mirrored and squeezed.
+/// The same scene with 200 small overlapping instances, which are rotated, mirrored and squeezed.
 inline Scene thicket_scene() {
   Scene scene = varied_scene();
   std::mt19937 generator(11);

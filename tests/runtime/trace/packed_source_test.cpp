@@ -22,7 +22,7 @@ BakedFile bake(const Scene& scene, BakeConfig config = {}) {
   return BakedFile::from_bytes(bake_to_bytes(scene, config, diagnostics, progress).bytes);
 }
 
-/// A floor, a masked screen, a glass sphere and three placements of a smooth one, one of them mirrored.
+/// A floor, a masked screen, a glass sphere and three instances of a smooth sphere, one of them mirrored.
 Scene varied_scene() {
   Scene scene;
   add_shape(scene, test::quad({-8, 0, -8}, {0, 0, 16}, {16, 0, 0}));
@@ -62,7 +62,7 @@ TEST(PackedSource, LooksUpManyPlacesAsItDoesOne) {
   const FloatSource floats(scene);
   for (const SceneSource* source :
        {static_cast<const SceneSource*>(&packed), static_cast<const SceneSource*>(&floats)}) {
-    std::vector<SurfaceQuery> places; // back and forth between clusters and instances
+    std::vector<SurfaceQuery> places; // alternates between clusters and instances
     for (uint32_t n = 0; n < 5000; ++n) {
       const auto instance = n / 3 * 7 % static_cast<uint32_t>(source->instances().size());
       const uint32_t triangles = source->counts(source->instances()[instance].geometry).triangles;
@@ -119,7 +119,7 @@ TEST(PackedSource, InstancesOfOneGeometryHaveMaterialsAndMasksOfTheirOwn) {
   scene.masks.push_back({32, 4, WrapMode::kRepeat, Vec2(1, 3), Vec2(0), {~0u, 0u, ~0u, 0u}});
   const auto mesh = static_cast<uint32_t>(scene.meshes.size());
   scene.meshes.push_back(test::sphere({0, 0, 0}, 1, 24));
-  for (uint32_t i = 0; i < 4; ++i) { // two plain ones, two with different masks
+  for (uint32_t i = 0; i < 4; ++i) { // two without masks, two with different masks
     Material material;
     material.albedo = Vec3(0.2f * static_cast<float>(i), 0.5f, 0.1f);
     if (i > 1) material.flags = kAlphaMask, material.alpha_mask = i - 2;
@@ -127,7 +127,7 @@ TEST(PackedSource, InstancesOfOneGeometryHaveMaterialsAndMasksOfTheirOwn) {
     scene.shapes.emplace_back(mesh, i + 1, false, test::placed({2.5 * i - 4, 1, 0}));
   }
   const BakedFile file = bake(scene);
-  ASSERT_EQ(file.geometries().size(), 3u); // the floor, the sphere without texture coordinates, the one with
+  ASSERT_EQ(file.geometries().size(), 3u); // floor, sphere without texture coordinates, sphere with them
   const Image a = render(PackedSource(file)), b = render(FloatSource(scene));
   uint32_t different = 0;
   std::array<uint32_t, 5> seen{};
@@ -142,7 +142,7 @@ TEST(PackedSource, InstancesOfOneGeometryHaveMaterialsAndMasksOfTheirOwn) {
     EXPECT_EQ(a.gbuffer.material[i], b.gbuffer.material[i]);
   }
   for (const uint32_t pixels : seen) EXPECT_GT(pixels, 100u);
-  EXPECT_LT(different, 150u); // silhouettes, also of the masks
+  EXPECT_LT(different, 150u); // silhouettes, including those of the masks
 }
 
 TEST(PackedSource, LevelsOfDetailAreNotTraced) {

@@ -29,7 +29,7 @@ using test::varied_scene;
 
 struct Difference {
   size_t hits = 0, yes_no = 0, distance = 0;
-  double worst = 0.0; ///< of the others, relative
+  double worst = 0.0; ///< largest relative difference of t among the other hits
 };
 
 Difference difference(const RayTracer& a, const RayTracer& b, std::span<const Ray> rays, uint32_t ray_class) {
@@ -62,7 +62,7 @@ TEST(PackedTracer, FindsWhatEmbreeFinds) {
   for (const uint32_t ray_class : {kCameraRays, kOcclusionRays}) {
     const Difference d = difference(packed, embree, rays, ray_class);
     EXPECT_GT(d.hits, 30000u);
-    EXPECT_LE(d.yes_no, 4u); // Embree's instances lie where float matrices put them, 3000 units from here
+    EXPECT_LE(d.yes_no, 4u); // Float matrices displace Embree's instances; one lies 3000 units away.
     EXPECT_LE(d.distance, 4u);
     EXPECT_LT(d.worst, 1e-3);
   }
@@ -81,7 +81,7 @@ TEST(PackedTracer, FindsTheSameWithAllInstructionSets) {
   }
 }
 
-/// Rays from one place in a cone, by neighbours, as cameras send them; some with ranges, some along axes' planes.
+/// Rays from one origin in a cone, ordered by blocks of neighbours as camera rays are. Some have a limited range of t.
 std::vector<Ray> cone(const UnitSpace& space, const DVec3& from, const DVec3& towards, double width) {
   std::vector<Ray> rays;
   for (int i = 0; i < 64 * 64; ++i) {
@@ -140,7 +140,7 @@ TEST(PackedTracer, RaysAmongManyInstancesFindTogetherWhatTheyFindAlone) {
       const PackedTracer together(baked.file, baked.source, isa);
       EXPECT_EQ(std::memcmp(closest(together, rays, ray_class).data(), hits.data(), rays.size() * sizeof(RayHit)), 0);
       EXPECT_EQ(any(together, rays, ray_class), occluded);
-      packed::KernelCounters all, portions; // they share visits only if they do go together
+      packed::KernelCounters all, portions; // Rays share node visits only if they are traced together.
       std::vector<uint8_t> counted(rays.size());
       together.count_any(rays, ray_class, counted, all);
       EXPECT_EQ(counted, occluded);
@@ -156,7 +156,7 @@ TEST(PackedTracer, RaysOfAllOctantsFillAPortion) {
   const BakedScene baked(thicket_scene());
   const PackedTracer tracer(baked.file, baked.source);
   std::vector<Ray> rays = random_rays(4096, {{-6, 0, -6}, {6, 4, 6}}, tracer.space(), 9);
-  for (uint32_t i = 0; i < rays.size(); ++i) // groups of 64, as many as there can be: all but seven of one octant
+  for (uint32_t i = 0; i < rays.size(); ++i) // the maximum number of groups of 64: all but seven have the same octant
     for (int axis = 0; axis < 3; ++axis)
       rays[i].direction[axis] =
           std::copysign(rays[i].direction[axis], i % 512 == 511 && (i / 512 >> axis & 1u) != 0 ? -1.0f : 1.0f);
@@ -174,7 +174,7 @@ TEST(PackedTracer, RaysOfAllOctantsFillAPortion) {
 }
 
 TEST(PackedTracer, TracersOfMoreAndLessDeepTreesTakeTurnsOnAThread) {
-  Scene few = varied_scene(); // nine placements: two levels
+  Scene few = varied_scene(); // nine placements: a tree of two levels
   for (int i = 0; i < 3; ++i) few.instances.push_back({0, Affine(placed({i, 2, -i}, DVec3(0.5), 10 * i))});
   const BakedScene shallow(few), deep(thicket_scene());
   for (const BakedScene* scene : {&shallow, &deep, &shallow, &deep}) {
@@ -189,7 +189,7 @@ TEST(PackedTracer, TracersOfMoreAndLessDeepTreesTakeTurnsOnAThread) {
   }
 }
 
-/// Instances whose faces lie in one plane, with boxes that rays enter in another order.
+/// Instances with coplanar overlapping faces, whose boxes rays enter in another order.
 Scene coinciding_scene() {
   Scene scene;
   for (const float depth : {0.5f, 2.0f, -1.0f}) {
@@ -212,7 +212,7 @@ TEST(PackedTracer, OfCoincidingSurfacesTheSameIsHitHoweverRaysCome) {
     std::mt19937 generator(3);
     std::uniform_real_distribution<double> along(-0.8, 2.5);
     std::vector<Ray> rays(4000);
-    for (Ray& ray : rays) { // from so far away that origins are moved to the trees
+    for (Ray& ray : rays) { // far enough away that origins are moved to the trees
       const DVec3 to = tracer.space().to_unit({along(generator), along(generator), 0});
       const DVec3 from = tracer.space().to_unit({9 * along(generator), 9 * along(generator), 100});
       ray.origin = Vec3(from), ray.direction = Vec3(to - from);
@@ -237,7 +237,7 @@ TEST(PackedTracer, FindsTheSameOnAllThreadsAndInAnyPortions) {
   const std::vector<RayHit> expected = closest(tracer, rays);
   std::vector<RayHit> hits(rays.size());
   tbb::parallel_for(size_t{0}, rays.size() / 50, [&](size_t portion) {
-    for (size_t at = portion * 50; at < portion * 50 + 50;) { // 1, 2, 3, ... at a time
+    for (size_t at = portion * 50; at < portion * 50 + 50;) { // 1, 2, 3, ... rays per call
       const size_t count = std::min(at % 50 + 1, portion * 50 + 50 - at);
       tracer.closest_hits({&rays[at], count}, kCameraRays, RayOrder::kCoherent, {&hits[at], count});
       at += count;
@@ -246,7 +246,7 @@ TEST(PackedTracer, FindsTheSameOnAllThreadsAndInAnyPortions) {
   EXPECT_EQ(std::memcmp(hits.data(), expected.data(), rays.size() * sizeof(RayHit)), 0);
 }
 
-/// The nearest triangle of all in doubles, by Cramer's rule in world space.
+/// Returns the t of the nearest hit, tested against all triangles in doubles by Cramer's rule in world space.
 double brute_force(const SceneSource& source, const std::vector<std::vector<DVec3>>& corners, const UnitSpace& space,
                    const Ray& ray) {
   const DVec3 o = space.from_unit(DVec3(ray.origin)), d = DVec3(ray.direction) / space.scale();
@@ -292,7 +292,7 @@ TEST(PackedTracer, FindsWhatTryingAllTrianglesFinds) {
     different += hits[i].valid() != std::isfinite(t) || (hits[i].valid() && std::abs(hits[i].t - t) > 1e-5);
   }
   EXPECT_GT(found, 3000u);
-  EXPECT_LE(different, 2u); // rays within rounding of an edge
+  EXPECT_LE(different, 2u); // rays so close to an edge that rounding decides
 }
 
 TEST(PackedTracer, SaysWhatAHitIs) {
@@ -329,7 +329,7 @@ TEST(PackedTracer, SaysWhatAHitIs) {
 
 TEST(PackedTracer, RaysFromASurfaceDoNotHitIt) {
   Scene scene = varied_scene();
-  scene.instances.pop_back(); // the far one makes units large
+  scene.instances.pop_back(); // The distant instance would make the unit of length large.
   const BakedScene baked(scene);
   const PackedTracer tracer(baked.file, baked.source);
   const std::vector<Ray> rays = random_rays(100000, {{-9, -1, -9}, {9, 6, 9}}, tracer.space(), 8);
@@ -350,7 +350,7 @@ TEST(PackedTracer, RaysFromASurfaceDoNotHitIt) {
     Ray ray;
     ray.origin = Vec3(p + n * offset);
     ray.direction = Vec3(n);
-    ray.tfar = static_cast<float>(8.0 * offset); // where only the surface itself could be
+    ray.tfar = static_cast<float>(8.0 * offset); // so short that only the surface itself can be hit
     leaving.push_back(ray);
     offsets.push_back(offset);
   }
@@ -374,7 +374,7 @@ TEST(PackedTracer, KeepsToTheRangeOfT) {
     ASSERT_TRUE(first.valid());
     EXPECT_NEAR(first.t, 2.0f, 1e-5f);
     Ray beyond = ray;
-    beyond.tnear = first.t; // open at both ends
+    beyond.tnear = first.t; // The range of t is open at both ends.
     EXPECT_NEAR(closest(tracer, {&beyond, 1})[0].t, 4.0f, 1e-5f);
     Ray before = ray;
     before.tfar = first.t;
@@ -395,7 +395,7 @@ TEST(PackedTracer, KeepsToTheRangeOfT) {
   }
 }
 
-/// Pressed flat, or nearly, along any direction; the others are moved aside so that each is seen.
+/// Instances that are flat, or nearly so, along various directions. Each is placed separately so that all are visible.
 Scene flattened_scene() {
   Scene scene;
   add_object(scene, test::sphere({0, 0, 0}, 1, 24));
@@ -428,7 +428,7 @@ TEST(PackedTracer, HitsInstancesThatArePressedFlat) {
       ++hits[tracer.resolve(found[i]).placement->instance];
       if (std::abs(found[i].t - expected[i].t) > 1e-5f) ++differences;
     }
-    EXPECT_LE(differences, 5u) << tracer.isa(); // past an outline
+    EXPECT_LE(differences, 5u) << tracer.isa(); // rays that pass close to an outline
   }
   for (const uint32_t count : hits) EXPECT_GT(count, 10u);
 }
@@ -455,7 +455,7 @@ TEST(TreeHull, IsCloserThanTheTurnedRootsBoxAndHoldsAllThatIsHit) {
   const TreeHull hull(tracer.trees()[0].nodes);
   const DAffine turned = placed({5, 6, 7}, {1, -2, 0.5}, 45, {1, 1, 0});
   const TreeBox box = hull.placed(turned);
-  DVec3 lo(std::numeric_limits<double>::infinity()), hi = -lo; // of the root's corners
+  DVec3 lo(std::numeric_limits<double>::infinity()), hi = -lo; // bounds of the transformed corners of the root's box
   for (int corner = 0; corner < 8; ++corner) {
     const DVec3 at((corner & 1) != 0 ? hull.hi().x : hull.lo().x, (corner & 2) != 0 ? hull.hi().y : hull.lo().y,
                    (corner & 4) != 0 ? hull.hi().z : hull.lo().z);

@@ -81,7 +81,7 @@ TEST(PrimaryVisibility, MissesAreClean) {
   const EmbreeTracer embree(source, {});
   const PrimaryCamera away(camera_at({0, 0, 0}, {0, 0, -1}), {8, 8});
   Progress progress;
-  trace_primary(source, embree, away, away, g, progress); // over old contents
+  trace_primary(source, embree, away, away, g, progress); // overwrites the previous contents
   GBuffer empty;
   empty.resize({8, 8});
   EXPECT_TRUE(same_bytes(g, empty));
@@ -132,7 +132,7 @@ TEST(PrimaryVisibility, CameraRaysPassInvisibleSurfacesOnly) {
 
 TEST(PrimaryVisibility, AlphaMaskLetsCameraRaysThroughAndShadowMaskDoesNot) {
   Scene scene = wall_scene(kAlphaMask, 6);
-  scene.masks.push_back({64, 1, WrapMode::kClamp, Vec2(1), Vec2(0), {0u, ~0u}}); // left half absent
+  scene.masks.push_back({64, 1, WrapMode::kClamp, Vec2(1), Vec2(0), {0u, ~0u}}); // The left half is absent.
   const Camera camera = camera_at({0, 0, 0}, {0, 0, 1}, 90);
   scene.materials[0].alpha_mask = 0;
   GBuffer g = trace(scene, camera, {8, 8});
@@ -168,7 +168,7 @@ TEST(PrimaryVisibility, InstancesMatchBakedGeometry) {
       EXPECT_GE(glm::dot(b.normal[i], b.geometric_normal[i]), 0.0f);
     }
     EXPECT_GE(hits, 100u);
-    EXPECT_LE(different, 2u); // silhouette
+    EXPECT_LE(different, 2u); // at the silhouette
   }
 }
 
@@ -192,7 +192,8 @@ TEST(PrimaryVisibility, FiftyThousandInstancesKeepTheirNumbers) {
     scene.instances.push_back({0, Affine(test::placed(DVec3(i % kSide, i / kSide, 0)))});
   Camera camera;
   camera.projection = Projection::kOrthographic;
-  camera.screen_window = glm::dvec4(-0.5, kSide - 0.5, kSide - 0.5, -0.5); // y up the index, row by row
+  // Flipped, so that y grows with the index: pixel i shows instance i.
+  camera.screen_window = glm::dvec4(-0.5, kSide - 0.5, kSide - 0.5, -0.5);
   camera.width_px = camera.height_px = kSide;
   camera.world_from_camera[3] = DVec3(0, 0, -10);
   const GBuffer g = trace(scene, camera, {kSide, kSide});
@@ -203,9 +204,11 @@ TEST(PrimaryVisibility, MotionLeadsToThePreviousPlace) {
   const Scene scene = wall_scene();
   const ImageSize size{40, 20};
   const PrimaryCamera previous(camera_at({0, 0, 0}, {0, 0, 1}, 90), size);
-  const PrimaryCamera now(camera_at({0.5, 0, 0}, {0.5, 0, 1}, 90), size); // half a unit right at depth 5
+  // Half a unit to the right; the wall is at depth 5.
+  const PrimaryCamera now(camera_at({0.5, 0, 0}, {0.5, 0, 1}, 90), size);
   const GBuffer g = trace(scene, now, previous);
-  // The wall is 10 units high in 20 pixels; a point of this frame's centre was one pixel further right.
+  // The image shows 10 units of the wall in 20 pixels; the point at the centre of a pixel was one pixel farther right
+  // in the previous image.
   for (const Vec2 motion : g.motion_px) {
     EXPECT_NEAR(motion.x, -1.0f, 1e-4f);
     EXPECT_NEAR(motion.y, 0.0f, 1e-4f);
@@ -223,7 +226,7 @@ TEST(PrimaryVisibility, SubPixelOffsetMovesTheSamples) {
   const Camera camera = camera_at({0, 0, 0}, {0, 0, 1}, 90);
   const PrimaryCamera plain(camera, size), shifted(camera, size, {0.25, 0.5});
   const GBuffer g = trace(wall_scene(), shifted, plain);
-  EXPECT_NEAR(g.motion_px[9].x, -0.25f, 1e-4f); // found a quarter pixel to the right in the unshifted image
+  EXPECT_NEAR(g.motion_px[9].x, -0.25f, 1e-4f); // The point is a quarter pixel farther right in the unshifted image.
   EXPECT_NEAR(g.motion_px[9].y, -0.5f, 1e-4f);
 }
 
@@ -297,7 +300,7 @@ TEST(EmbreeTracer, CountsItsBytes) {
 }
 
 TEST(PrimaryVisibility, NothingIsSeenThroughAClosedMesh) {
-  Scene scene; // small triangles far away, where float arithmetic is coarse
+  Scene scene; // small triangles far from the camera, where float arithmetic is coarse
   add_shape(scene, test::sphere({0, 0, 0}, 1, 150));
   add_shape(scene, quad({-100, -90, -100}, {200, 0, 0}, {0, 0, 200}));
   const Vec3 eye(60, 10, -20);
@@ -307,7 +310,7 @@ TEST(PrimaryVisibility, NothingIsSeenThroughAClosedMesh) {
     hits += g.instance[i] == 0;
     behind += g.instance[i] != 0 || glm::dot(g.position[i], glm::normalize(eye)) < 0.0f;
   }
-  EXPECT_GT(hits, 400000u); // the sphere fills the picture
+  EXPECT_GT(hits, 400000u); // The sphere fills most of the image.
   EXPECT_EQ(behind, 0u);
 }
 
@@ -316,7 +319,7 @@ TEST(PrimaryVisibility, TexturesAreLookedUpWhereTheRayHits) {
   scene.meshes[0].uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
   scene.textures.push_back({"halves", 2, 1, WrapMode::kClamp, Vec2(1), Vec2(0), {255, 0, 0, 0, 0, 255}});
   scene.materials[0].albedo_texture = 0;
-  const GBuffer g = trace(scene, camera_at({0, 0, 0}, {0, 0, 1}, 90.0), {64, 64}); // sees the wall from edge to edge
+  const GBuffer g = trace(scene, camera_at({0, 0, 0}, {0, 0, 1}, 90.0), {64, 64}); // shows the wall from edge to edge
   const size_t row = 32 * 64;
   EXPECT_EQ(g.albedo[row + 2], Vec3(1, 0, 0));
   EXPECT_EQ(g.albedo[row + 61], Vec3(0, 0, 1));

@@ -22,7 +22,7 @@ bool is_net(const std::vector<Vec2>& points) {
   return true;
 }
 
-/// Points of an aligned block of pixels over a run of samples.
+/// Points of an aligned block of pixels for consecutive samples.
 std::vector<Vec2> block_points(const PixelSampler& sampler, uint32_t x0, uint32_t y0, uint32_t size, uint64_t first,
                                uint64_t count) {
   std::vector<Vec2> points;
@@ -38,7 +38,8 @@ TEST(PixelSampler, EveryPixelIsANetOverTime) {
     const PixelSampler sampler(kind, 7);
     for (const uint64_t count : {2u, 4u, 8u, 16u, 32u, 64u, 256u, 1024u})
       EXPECT_TRUE(is_net(block_points(sampler, 13, 5, 1, 3 * count, count))) << count;
-    EXPECT_TRUE(is_net(block_points(sampler, 13, 5, 1, 65536 + 64, 64))); // past the sequence's end: scrambled anew
+    // Past the end of the sequence, where it is scrambled anew.
+    EXPECT_TRUE(is_net(block_points(sampler, 13, 5, 1, 65536 + 64, 64)));
   }
 }
 

@@ -1,5 +1,5 @@
-// Thin triangles of every direction, length and grid step: rays that start on one of them neither hit it again nor lose
-// what is below.
+// Thin triangles of every direction, length and grid step: rays that start on one neither hit it again nor miss the
+// surface below.
 
 #include <algorithm>
 #include <array>
@@ -19,7 +19,7 @@ namespace {
 
 using Random = std::mt19937;
 
-constexpr double kSpacing = 1.5; ///< of needles of length 1
+constexpr double kSpacing = 1.5; ///< distance between the centres of needles of length 1
 
 double uniform(Random& random, double lo, double hi) { return std::uniform_real_distribution(lo, hi)(random); }
 
@@ -31,7 +31,7 @@ DVec3 random_direction(Random& random) {
   }
 }
 
-/// A tetrahedron whose opposite edges lie `length` apart: convex however its corners are rounded.
+/// Adds a tetrahedron, two opposite edges of which are `length` apart. It is convex however its corners are rounded.
 void add_needle(Mesh& mesh, DVec3 centre, DVec3 direction, double length, double thickness, Random& random) {
   const DVec3 side = glm::normalize(glm::cross(direction, random_direction(random)));
   const DVec3 other = glm::cross(direction, side);
@@ -44,7 +44,7 @@ void add_needle(Mesh& mesh, DVec3 centre, DVec3 direction, double length, double
     mesh.triangles.push_back(t + Triangle(first));
 }
 
-/// Needles of length 1 along every direction, too far from each other to meet.
+/// Needles of length 1 in various directions, too far apart to intersect.
 Mesh needles(double aspect, Random& random) {
   Mesh mesh;
   const double d = 1.0 / std::sqrt(2.0), e = 1.0 / std::sqrt(3.0);
@@ -60,8 +60,8 @@ Mesh needles(double aspect, Random& random) {
 
 struct Places {
   bool instanced;
-  double aspect; ///< of needles
-  double step;   ///< of the grid, in their thickness
+  double aspect; ///< length over thickness of the needles
+  double step;   ///< grid step, in units of their thickness
 };
 
 Scene scene_of(const Places& places, Random& random) {
@@ -76,7 +76,7 @@ Scene scene_of(const Places& places, Random& random) {
   return scene;
 }
 
-/// A place on a surface, as the renderer finds it.
+/// A point on a surface, as the renderer computes it.
 struct Place {
   DVec3 position, normal; ///< world space
   double offset;
@@ -101,7 +101,8 @@ std::optional<Place> place_on(const RayTracer& tracer, DVec3 target, DVec3 from)
                ray_offset(hit, space, unit, normal) * space.inverse_scale()};
 }
 
-/// As ambient occlusion rays start. @param direction of unit length
+/// Returns a ray that starts as ambient occlusion rays do.
+/// @param direction unit length
 Ray start_at(const Place& place, DVec3 direction, double length, const UnitSpace& space) {
   Ray ray;
   ray.origin =
@@ -113,11 +114,11 @@ Ray start_at(const Place& place, DVec3 direction, double length, const UnitSpace
 
 struct Counts {
   size_t places = 0;
-  size_t up = 0, up_occluded = 0;   ///< rays away from the body, which meet nothing
-  size_t down = 0, down_missed = 0; ///< rays into the body, which meet it
+  size_t up = 0, up_occluded = 0;   ///< rays away from the body, which must hit nothing
+  size_t down = 0, down_missed = 0; ///< rays into the body, which must hit it
 };
 
-/// The triangles of a geometry and, of each, the middle of the needle that it belongs to.
+/// The triangles of a geometry and, for each, the centre of its needle.
 struct Surface {
   std::vector<std::array<DVec3, 3>> triangles;
   std::vector<DVec3> middles;
@@ -130,7 +131,8 @@ Surface surface_of(const SceneSource& source, uint32_t geometry) {
   source.decode(geometry, positions, triangles);
   Surface surface;
   using Cell = std::array<long, 3>;
-  std::map<Cell, std::pair<DVec3, double>> needles; // a corner is in three triangles of its own
+  // Each corner is in three triangles of its needle, so all corners have the same weight.
+  std::map<Cell, std::pair<DVec3, double>> needles;
   std::vector<Cell> cells;
   for (const Triangle& t : triangles) {
     surface.triangles.push_back({DVec3(positions[t.x]), DVec3(positions[t.y]), DVec3(positions[t.z])});
@@ -155,7 +157,7 @@ Counts trace_rays(const RayTracer& tracer, const SceneSource& source, double thi
       const DVec3 inwards = transform_point(world_from_object, surface.middles[t]) - p[0];
       DVec3 normal = glm::normalize(glm::cross(p[1] - p[0], p[2] - p[0]));
       if (glm::dot(normal, inwards) > 0.0) normal = -normal;
-      if (!(glm::dot(normal, inwards) < -0.1 * thickness)) continue; // hardly a volume
+      if (!(glm::dot(normal, inwards) < -0.1 * thickness)) continue; // The needle has almost no volume.
       for (int i = 0; i < 40; ++i) {
         const double a = uniform(random, 0, 1), b = uniform(random, 0, 1 - a);
         const DVec3 target = p[0] + (p[1] - p[0]) * a + (p[2] - p[0]) * b;
@@ -167,7 +169,7 @@ Counts trace_rays(const RayTracer& tracer, const SceneSource& source, double thi
           if (glm::dot(direction, place->normal) < 0.0) direction = -direction;
           up.push_back(start_at(*place, direction, 0.1, tracer.space()));
         }
-        // Where the body is much larger than what an origin is rounded by.
+        // Only where the body is much thicker than the origin's rounding error.
         if (place->offset < 0.01 * thickness)
           down.push_back(start_at(*place, -place->normal, 2.0 * thickness, tracer.space()));
       }
@@ -202,7 +204,7 @@ TEST_P(SliverRays, LeaveTheSurfaceThatTheyStartOn) {
     const Counts counts = trace_rays(*tracer, baked.source, thickness, rays);
     const std::string name = std::string(tracer->name()) + " " + std::string(tracer->isa());
     EXPECT_GT(counts.places, 500u) << name;
-    // Embree's own arithmetic, and bodies thinner than a float's ulp of where they lie, have a few near their edges.
+    // Embree's arithmetic occludes a few rays near edges; so do bodies thinner than a float's ulp at their position.
     const double share = tracer->name() == "embree" ? 1e-3 : places.aspect > 1e5 ? 1e-4 : 0.0;
     EXPECT_LE(static_cast<double>(counts.up_occluded), share * static_cast<double>(counts.up)) << name;
     EXPECT_LE(counts.down_missed, 2 + counts.down / 1000) << name << ", of " << counts.down;

@@ -12,7 +12,7 @@ Bounds box(DVec3 lo, DVec3 hi) {
   return bounds;
 }
 
-/// What is left of a point once it went through float coordinates in the space.
+/// Converts a point to float coordinates in the space and back.
 DVec3 through_floats(const UnitSpace& space, DVec3 p) { return space.from_unit(DVec3(Vec3(space.to_unit(p)))); }
 
 TEST(UnitSpace, CoordinatesStayWithinItsSize) {

@@ -12,7 +12,7 @@ inline float power_of_two(uint32_t negated_exponent) { // 2^-n
   return result;
 }
 
-/// Decodes as many of `count` triangles from `first` on as fit; returns how many. In portable code.
+/// Decodes triangles from `first` on, as many of `count` as fit into a batch; returns their number. Portable code.
 inline uint32_t decode_batch_scalar(const TraceCluster& cluster, uint32_t first, uint32_t count, DecodedBatch& out) {
   BatchStrips batch;
   read_strips(cluster, first, count, batch);

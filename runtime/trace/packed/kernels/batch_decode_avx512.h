@@ -4,15 +4,15 @@
 
 #include "runtime/trace/packed/kernels/batch_strips.h"
 
-/// Decodes a batch in a handful of registers.
+/// Decodes a batch in AVX-512 registers.
 namespace packtrace::packed {
 namespace {
 
-/// The vertices of a batch's corners. Lanes behind them are 0.
+/// Returns the vertex numbers of a batch's corners; unused lanes are 0.
 inline __m512i batch_vertices(const TraceCluster& cluster, const BatchStrips& batch) {
   const uint32_t all = (1u << batch.corner_count) - 1, lead = (1u << batch.lead_count) - 1;
   const uint32_t named = all & ~lead & ~batch.fresh, width = index_bits(cluster);
-  if (count_ones(uint64_t{named}) > 7) { // more than one 64-bit load holds
+  if (count_ones(uint64_t{named}) > 7) { // more explicit vertex numbers than one 64-bit load holds
     alignas(64) uint32_t vertex[kBatchCorners];
     batch_vertices(cluster, batch, vertex);
     return _mm512_load_si512(vertex);
@@ -32,7 +32,8 @@ inline __m512i batch_vertices(const TraceCluster& cluster, const BatchStrips& ba
   return vertices;
 }
 
-/// Positions of 16 vertices, along x, y and z.
+/// Computes the positions of up to 16 vertices in the tree's grid, one vector per axis.
+/// @param count number of vertices; lanes beyond it are arbitrary
 inline void batch_positions(const TraceCluster& cluster, __m512i vertices, uint32_t count, __m512 (&position)[3]) {
   const uint32_t x_bits = cluster.position_bits[0], y_bits = cluster.position_bits[1],
                  z_bits = cluster.position_bits[2];
@@ -61,7 +62,8 @@ inline void batch_positions(const TraceCluster& cluster, __m512i vertices, uint3
   axis(2, z_bits, x_bits + y_bits);
 }
 
-/// Decodes as many of `count` triangles from `first` on as fit; returns how many. See batch_triangle() for the corners.
+/// Decodes triangles from `first` on, as many of `count` as fit into a batch; returns their number. batch_triangle()
+/// explains how corners are found.
 inline uint32_t decode_batch_avx512(const TraceCluster& cluster, uint32_t first, uint32_t count, DecodedBatch& out) {
   BatchStrips batch;
   read_strips(cluster, first, count, batch);

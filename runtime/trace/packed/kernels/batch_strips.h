@@ -4,8 +4,8 @@
 
 #include "runtime/trace/packed/kernels/kernel_types.h"
 
-/// Which corners the triangles of a batch have, from the strips' bits (compress/format/cluster/index_codec.h), without a walk
-/// from triangle to triangle.
+/// Finds the corners of a batch's triangles from the bits of the cluster's strips (compress/format/cluster/index_codec.h),
+/// without walking from triangle to triangle.
 namespace packtrace::packed {
 namespace {
 
@@ -15,14 +15,14 @@ inline uint64_t load64(const uint8_t* p) {
   return word;
 }
 
-/// `count` bits from `bit` on; count <= 57.
+/// Reads `count` <= 57 bits from bit `bit` on.
 inline uint64_t field(const uint8_t* bits, uint32_t bit, uint32_t count) {
   return (load64(bits + (bit >> 3)) >> (bit & 7u)) & ((uint64_t{1} << count) - 1);
 }
 
 inline uint32_t count_ones(uint64_t word) { return static_cast<uint32_t>(__builtin_popcountll(word)); }
 
-/// Set bits of [bit, bit + count).
+/// Number of set bits in [bit, bit + count).
 inline uint32_t count_ones(const uint8_t* bits, uint32_t bit, uint32_t count) {
   const uint8_t* p = bits + (bit >> 3);
   uint32_t end = (bit & 7u) + count, ones = 0;
@@ -31,7 +31,8 @@ inline uint32_t count_ones(const uint8_t* bits, uint32_t bit, uint32_t count) {
   return ones + count_ones(word & ((uint64_t{1} << end) - 1));
 }
 
-/// The highest set bit of [bit, bit + count), as its distance from bit, or -1; of the zeros where `zeros` is all ones.
+/// Returns the offset from `bit` of the highest set bit in [bit, bit + count), or -1 if there is none. If `zeros` is
+/// all ones, it looks for a zero bit instead.
 inline int32_t last_one(const uint8_t* bits, uint32_t bit, uint32_t count, uint64_t zeros) {
   while (count > 0) {
     const uint32_t step = count < 57 ? count : 57;
@@ -42,23 +43,24 @@ inline int32_t last_one(const uint8_t* bits, uint32_t bit, uint32_t count, uint6
   return -1;
 }
 
-/// A batch's own corner list: its triangles begin a strip as it were, so the list's first three entries are the first
-/// triangle's corners, whatever strip it lies in. Bits from 0 on are for the batch's triangles, or the list's entries.
+/// A batch's own corner list. The list treats the batch's first triangle as the beginning of a strip, so its first
+/// three entries are that triangle's corners wherever the triangle lies in its strip. Bits of the masks, from bit 0 on,
+/// stand for the batch's triangles or for the list's entries.
 struct BatchStrips {
-  uint32_t count;        ///< of triangles
-  uint32_t restarts;     ///< bit 0 set
-  uint32_t lefts;        ///< bit 0 clear
-  uint32_t corner_count; ///< of the list, <= kBatchCorners
-  uint32_t lead_count;   ///< 2 where the first two entries are lead[], else 0
-  uint32_t lead[2];      ///< vertices
-  uint32_t fresh;        ///< the entries that are fresh, below lead_count 0
-  uint32_t first_fresh;  ///< the vertex of the first of them
-  uint32_t explicit_bit; ///< where the vertices of the others begin
+  uint32_t count;        ///< number of triangles
+  uint32_t restarts;     ///< triangles that begin a strip; bit 0 is set
+  uint32_t lefts;        ///< triangles reached by a left turn; bit 0 is clear
+  uint32_t corner_count; ///< number of entries of the list, <= kBatchCorners
+  uint32_t lead_count;   ///< 2 if the first two entries are lead[], else 0
+  uint32_t lead[2];      ///< vertex numbers of the first two entries
+  uint32_t fresh;        ///< entries that name a new vertex, counted up from first_fresh; bits below lead_count are 0
+  uint32_t first_fresh;  ///< vertex number of the first fresh entry
+  uint32_t explicit_bit; ///< first bit of the explicit vertex numbers of the other entries
 };
 
 inline uint32_t index_bits(const TraceCluster& cluster) { return uint32_t{cluster.flags} >> kIndexBitsShift; }
 
-/// The vertex of one corner of the cluster's list.
+/// Returns the vertex number of one entry of the cluster's corner list.
 inline uint32_t corner_vertex(const TraceCluster& cluster, uint32_t corner) {
   const uint32_t fresh_bit = 2u * cluster.triangle_count;
   const uint32_t rank = count_ones(cluster.bits, fresh_bit, corner);
@@ -68,24 +70,24 @@ inline uint32_t corner_vertex(const TraceCluster& cluster, uint32_t corner) {
       field(cluster.bits, explicit_bit + (corner - rank) * index_bits(cluster), index_bits(cluster)));
 }
 
-/// The first two corners of a triangle that a turn reached, the vertices of its strip's corners before it.
-/// @param corner of its newest vertex
+/// Returns the vertex numbers of the first two corners of a triangle that does not begin a strip.
+/// @param corner entry of the triangle's newest vertex in the cluster's corner list
 inline void lead_corners(const TraceCluster& cluster, uint32_t triangle, uint32_t corner, uint32_t lead[2]) {
   const uint8_t* bits = cluster.bits;
   const uint32_t left_bit = cluster.triangle_count;
-  const auto first = static_cast<uint32_t>(last_one(bits, 0, triangle + 1, 0)); // of the strip
+  const auto first = static_cast<uint32_t>(last_one(bits, 0, triangle + 1, 0)); // first triangle of the strip
   const bool left = field(bits, left_bit + triangle, 1) != 0;
-  // One of them is the corner before. The other was last replaced by the last turn the other way in this strip, by the
-  // corner before that turn's; without such a turn it is still the strip's own.
+  // One of the two corners is the previous entry. The other one was last replaced at the strip's last turn to the other
+  // side, by the entry before that turn's. Without such a turn it is one of the strip's first two corners.
   const int32_t turn = last_one(bits, left_bit + first + 1, triangle - first, left ? ~uint64_t{0} : 0);
-  const uint32_t first_corner = corner - (triangle - first); // of the strip's first triangle's newest vertex
+  const uint32_t first_corner = corner - (triangle - first); // entry of the newest vertex of the strip's first triangle
   const uint32_t kept = turn >= 0 ? first_corner + static_cast<uint32_t>(turn) : first_corner - (left ? 2u : 1u);
   const uint32_t vertex = corner_vertex(cluster, kept), previous = corner_vertex(cluster, corner - 1);
   lead[0] = left ? vertex : previous;
   lead[1] = left ? previous : vertex;
 }
 
-/// The batch that begins with triangle `first`: as many of `count` triangles as fit.
+/// Reads the batch that begins with triangle `first` and has as many of `count` triangles as fit.
 inline void read_strips(const TraceCluster& cluster, uint32_t first, uint32_t count, BatchStrips& batch) {
   const uint8_t* bits = cluster.bits;
   const uint32_t triangle_count = cluster.triangle_count;
@@ -101,7 +103,8 @@ inline void read_strips(const TraceCluster& cluster, uint32_t first, uint32_t co
   batch.corner_count = count + 2 * count_ones(restarts);
   batch.lead_count = begins ? 0 : 2;
 
-  uint32_t corner = first + 2 * count_ones(bits, 0, first); // of the list's first entry, or of the one behind the lead
+  // The cluster's entry of the list's first entry, or of the one after lead[].
+  uint32_t corner = first + 2 * count_ones(bits, 0, first);
   if (!begins) lead_corners(cluster, first, corner, batch.lead);
   const uint32_t fresh_bit = 2 * triangle_count;
   const uint32_t rank = count_ones(bits, fresh_bit, corner);
@@ -111,15 +114,15 @@ inline void read_strips(const TraceCluster& cluster, uint32_t first, uint32_t co
   batch.explicit_bit = fresh_bit + triangle_count + 2u * cluster.restart_count + (corner - rank) * index_bits(cluster);
 }
 
-/// Entries of the batch's corner list.
+/// A triangle's corners as entries of the batch's corner list.
 struct BatchTriangle {
   uint32_t corner[3];
 };
 
 inline uint32_t highest_bit(uint32_t word) { return 31u - static_cast<uint32_t>(__builtin_clz(word)); }
 
-/// The newest corner of triangle i is entry i + 2 restarts up to i; its first and second are the entries that the last
-/// turn to the right, or to the left, or the strip's begin put there.
+/// Returns the corners of triangle i. Its newest corner is entry i + 2 (restarts up to and including i). Its first
+/// corner was set by the last right turn and its second by the last left turn, or each by the beginning of the strip.
 inline BatchTriangle batch_triangle(const BatchStrips& batch, uint32_t i) {
   const uint32_t up_to = (2u << i) - 1;
   const auto newest = [&](uint32_t j) { return j + 2 * count_ones(batch.restarts & ((2u << j) - 1)); };
@@ -127,7 +130,7 @@ inline BatchTriangle batch_triangle(const BatchStrips& batch, uint32_t i) {
   return {{newest(a) - 1 - ((batch.restarts >> a) & 1u), newest(b) - 1, newest(i)}};
 }
 
-/// The vertex numbers of the batch's corners, and zeros behind them.
+/// Computes the vertex number of each corner of the batch; unused entries are 0.
 inline void batch_vertices(const TraceCluster& cluster, const BatchStrips& batch, uint32_t vertex[kBatchCorners]) {
   uint32_t fresh = batch.first_fresh, explicit_bit = batch.explicit_bit;
   const uint32_t width = index_bits(cluster);

@@ -2,22 +2,24 @@
 
 #include "runtime/trace/packed/kernels/side_by_side.h"
 
-/// Rays from one place into one octant, as camera rays are. What they have in common decides about most boxes at once;
-/// the others, and triangles, are tested against a register of rays each. Which is right where neighbours agree.
+/// A beam is a group of rays with a common origin and octant, such as camera rays. One conservative test of the whole
+/// beam culls most boxes. The remaining boxes, and triangles, are tested against a register of rays each, which pays
+/// off because neighbouring rays mostly agree.
 namespace packtrace::packed {
 namespace {
 
-/// By how much the planes of boxes are moved for a beam, in units of u M as for kBoxPad: the node's origin and its
-/// plane (1 M each), less the padded origin (1 M + 2 M), times a rounded inverse (2 M + 2 M), besides 10 u M of the
-/// triangle test.
+/// Box planes are moved outwards by this times M for a beam; kBoxPad explains the units: the node's origin and its
+/// plane (1 M each), the subtraction of the padded origin (1 M + 2 M), its product with a rounded inverse (2 M + 2 M),
+/// and 10 u M of the triangle test.
 constexpr float kBeamPad = 28.0f * 0x1p-24f;
 
 struct alignas(64) Beam {
-  /// Of all: what near and negated far planes are less, inverse directions' least and most, and as RayGroup::limits.
+  /// Bounds over all rays. origin: subtracted from near planes (first), added to far planes (second), pad included.
+  /// inverse: least and greatest reciprocal of the direction. limits: as RayGroup::limits.
   float origin[3][2], inverse[3][2], limits[2];
-  bool stale; ///< limits are
+  bool stale; ///< whether limits are outdated
 
-  /// After RayGroup::set_tmax().
+  /// Recomputes limits[1]; needed after RayGroup::set_tmax().
   void update_limits(const RayGroup& group) {
     stale = false;
     Floats most, some;
@@ -30,10 +32,10 @@ struct alignas(64) Beam {
   }
 };
 
-constexpr uint32_t kLeastBeam = 16; ///< rays that make a beam worth its setup
+constexpr uint32_t kLeastBeam = 16; ///< minimum number of rays for which a beam is worth its setup
 
-/// Makes a beam of all of a group's rays. False where they have no origin or octant in common, or are few.
-/// @param group lanes of other rays get values of one of `rays`
+/// Makes a beam of all rays of a group. Returns false if they have no common origin or octant, or are too few.
+/// @param group its lanes that are not in `rays` get values of one of `rays`, and an empty range of t
 inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam& beam) {
   if (static_cast<uint32_t>(__builtin_popcountll(rays)) < kLeastBeam) return false;
   const auto first = static_cast<uint32_t>(__builtin_ctzll(rays));
@@ -68,7 +70,8 @@ inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam
       least = inverse < least ? inverse : least;
     }
     beam.inverse[axis][0] = -largest_lane(-least), beam.inverse[axis][1] = largest_lane(most);
-    const float pad = least[0] < 0.0f ? -kBeamPad * reach : kBeamPad * reach; // outwards is towards the rays' origin
+    // Outwards: near planes move towards the rays' origin, far planes away from it.
+    const float pad = least[0] < 0.0f ? -kBeamPad * reach : kBeamPad * reach;
     beam.origin[axis][0] = group.origin[axis][first] + pad, beam.origin[axis][1] = -group.origin[axis][first] + pad;
   }
   Floats least, begin;
@@ -82,7 +85,8 @@ inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam
   return true;
 }
 
-/// Which of a node's boxes a beam as a whole may pass, and where it enters them.
+/// Returns the boxes of a node that some ray of the beam may pass, as a bit mask, and a lower bound of the t at which
+/// the beam enters each.
 template <typename Lanes>
 inline uint32_t pass_beam(const GroupBoxes<Lanes>& boxes, const Beam& beam, float (&t)[baked::kNodeWidth]) {
   using F = typename Lanes::F;

@@ -2,24 +2,25 @@
 
 #include "runtime/trace/packed/kernels/reach.h"
 
-/// How rays come from unit space into the grid of a tree that is placed there.
+/// Transforms rays from unit space into the grid of a placed tree.
 namespace packtrace::packed {
 namespace {
 
-/// Origins farther from the tree's zero than its largest coordinate times this are moved along the ray.
+/// An origin farther from the grid's zero than this many times the tree's largest coordinate is moved along its ray
+/// towards the tree.
 constexpr double kFar = 4.0;
 
-/// Half a block of rays in a tree's grid.
+/// Half a block of rays in a tree's grid, in doubles.
 struct GridRays {
   Doubles origin[3], direction[3]; ///< the direction's largest component is in [1, 2)
-  Doubles power, scale;            ///< t here for one in unit space, and 1 / that
-  Doubles begin;                   ///< that origins were moved by
+  Doubles power, scale;            ///< power: grid t per unit-space t, a power of two; scale: 1 / power
+  Doubles begin;                   ///< t by which the origins were moved along the rays
 };
 
 inline double larger(double a, double b) { return a > b ? a : b; }
 
-/// Moves the origin of a ray that starts far from the tree to just before its box, where floats are finer. False where
-/// the ray passes the box by.
+/// Moves the origin of a ray that starts far from the tree to where it enters the tree's box plus `margin`; floats are
+/// finer there. Returns false if the ray misses that box.
 inline bool approach(const TracePlacement& placement, double margin, double (&origin)[3], const double (&direction)[3],
                      double& moved_by) {
   double begin = 0.0, end = 1e300;
@@ -39,8 +40,8 @@ inline bool approach(const TracePlacement& placement, double margin, double (&or
   return true;
 }
 
-/// The same of some lanes. Returns those that do not pass the box by.
-/// @param far lanes, as bits
+/// Does the same for several lanes. Returns the lanes whose rays meet the box, as a bit mask.
+/// @param far bit mask of the lanes to move
 inline uint32_t approach(const TracePlacement& placement, double margin, uint32_t far, GridRays& rays) {
   double origins[3][kDoubleLanes], directions[3][kDoubleLanes], begins[kDoubleLanes];
   for (uint32_t axis = 0; axis < 3; ++axis) {
@@ -62,8 +63,10 @@ inline uint32_t approach(const TracePlacement& placement, double margin, uint32_
   return near;
 }
 
-/// Moves half a block into the grid. Returns the lanes of `wanted` that have a direction and coordinates of any use.
-/// @tparam kAligned the grid's axes are those of unit space
+/// Transforms half a block of rays into the grid. Returns the lanes of `wanted` that may hit something: their
+/// directions are nonzero, directions and origins are below 1e300 in magnitude, and origins far away have been moved to
+/// the tree's box.
+/// @tparam kAligned the grid's axes are those of unit space: the transform only scales and translates
 template <bool kAligned>
 [[gnu::always_inline]] inline uint32_t move_rays(const TracePlacement& placement, float max_coordinate,
                                                  const UnitRays& from, uint32_t first, uint32_t wanted, GridRays& out) {
@@ -90,7 +93,8 @@ template <bool kAligned>
   constexpr int64_t kExponent = int64_t{2047} << 52, kLeast = int64_t{523} << 52, kMost = int64_t{1523} << 52;
   const Doubles least = Doubles{} + __builtin_bit_cast(double, kLeast),
                 most = Doubles{} + __builtin_bit_cast(double, kMost);
-  Doubles power = reinterpret_cast<Doubles>(reinterpret_cast<Longs>(largest) & kExponent); // whose inverse is one, too
+  // Rounded down to a power of two; the limits 2^-500 and 2^500 keep its inverse one, too.
+  Doubles power = reinterpret_cast<Doubles>(reinterpret_cast<Longs>(largest) & kExponent);
   power = power < least ? least : power;
   power = power > most ? most : power;
   out.power = power;
@@ -103,12 +107,13 @@ template <bool kAligned>
   return (usable & ~far) | approach(placement, 0x1p-8 * double{max_coordinate}, far, out);
 }
 
-/// Half a block as floats.
+/// Half a block of rays, rounded to floats.
 struct GridFloats {
   HalfFloats origin[3], direction[3], begin, end;
 };
 
-/// @tparam kNearest as move_block()
+/// Rounds rays in the grid to floats.
+/// @tparam kNearest as for move_block()
 template <bool kNearest>
 [[gnu::always_inline]] inline GridFloats to_floats(const GridRays& rays, const UnitRays& from, uint32_t first) {
   GridFloats out;
@@ -118,7 +123,7 @@ template <bool kNearest>
   }
   out.begin = to_floats(read_doubles(&from.tnear[first]) * rays.power - rays.begin);
   const Doubles end = read_doubles(&from.tmax[first]) * rays.power;
-  if constexpr (kNearest) // as t_of()
+  if constexpr (kNearest) // Not rounded below the true end: see BoxRays::t_of().
     out.end = to_floats(end - rays.begin + (rays.begin != 0.0 ? kUnitRounding * end : Doubles{}));
   else
     out.end = to_floats(end - rays.begin);
@@ -136,8 +141,9 @@ inline RayBlock join(const GridFloats& low, const GridFloats& high) {
   return out;
 }
 
-/// Moves a block of rays into a tree's grid. Returns the lanes of `wanted` that may hit something.
-/// @tparam kNearest whether nearest hits are wanted, for which t must be right and is needed in unit space
+/// Transforms a block of rays into a tree's grid. Returns the lanes of `wanted` that may hit something.
+/// @tparam kNearest whether the query is for nearest hits; it then also keeps the rounding errors of the origins and
+/// the map from grid t to unit-space t
 template <bool kAligned, bool kNearest, typename Group>
 inline uint32_t move_block(const TracePlacement& placement, float max_coordinate, const UnitRays& from, uint32_t first,
                            uint32_t wanted, RayBlock& out, Group& group) {
@@ -160,9 +166,9 @@ inline uint32_t move_block(const TracePlacement& placement, float max_coordinate
   return usable & wanted;
 }
 
-/// The same where the grid is unit space, without doubles. False where it cannot, as origins are far away or directions
-/// of extreme lengths.
-/// @param wanted lanes that matter
+/// Does the same in floats alone, for a grid that is unit space itself. Returns false if a wanted ray starts too far
+/// away or has a direction of extreme length; the caller then uses move_block().
+/// @param wanted bit mask of the lanes that must be valid
 template <bool kNearest>
 inline bool unit_block(const UnitRays& from, uint32_t first, uint32_t wanted, float max_coordinate, RayBlock& out,
                        BoxRays& group) {
@@ -195,11 +201,13 @@ inline bool unit_block(const UnitRays& from, uint32_t first, uint32_t wanted, fl
   return true;
 }
 
-/// Moves rays into a tree's grid and sets them up. Returns those that may hit something.
-/// @tparam kNearest whether nearest hits are wanted, for which t must be right and is needed in unit space
-/// @param pad_coordinate boxes' planes are moved outwards as for this coordinate, or the origin's if that is larger
-/// @param rays as bits
-/// @param group RayGroup, or another where the grid is unit space
+/// Transforms rays into a tree's grid and prepares them for box and triangle tests. Returns the rays that may hit
+/// something, as a bit mask.
+/// @tparam kNearest as for move_block()
+/// @param pad_coordinate coordinate that the pad of box planes is computed from; a ray's own origin counts instead if
+/// its largest coordinate is larger
+/// @param rays bit mask of the rays to transform
+/// @param group a RayGroup, or BoxRays or SideBySideRays if the grid is unit space
 template <bool kNearest, typename Group>
 inline uint64_t enter(const TracePlacement& placement, float max_coordinate, float pad_coordinate, const UnitRays& from,
                       uint64_t rays, Group& group) {

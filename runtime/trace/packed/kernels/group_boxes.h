@@ -2,11 +2,11 @@
 
 #include "runtime/trace/packed/kernels/ray_group.h"
 
-/// A node's boxes against rays of one octant, with all of a node's work done once.
+/// Tests a node's boxes against rays of one octant; the node is unpacked once for all of them.
 namespace packtrace::packed {
 namespace {
 
-constexpr uint32_t kBoundBytes = 24; ///< of PackedNode::lo, and of hi behind it
+constexpr uint32_t kBoundBytes = 24; ///< size of PackedNode::lo, and of PackedNode::hi, which follows it
 
 inline float float_of_bits(uint32_t bits) {
   float x;
@@ -14,12 +14,12 @@ inline float float_of_bits(uint32_t bits) {
   return x;
 }
 
-/// A node's coordinates along an axis are origin + unit q.
+/// A node's planes along one axis: coordinate = origin + unit q for 8-bit q in near and far.
 struct NodeAxis {
   float origin, unit;
   const uint8_t *near, *far;
 
-  /// @param backward whether rays pass hi first
+  /// @param backward whether the rays move towards smaller coordinates: then near planes are in hi
   NodeAxis(const baked::PackedNode& node, uint32_t axis, bool backward) {
     const auto* bytes = reinterpret_cast<const uint8_t*>(&node);
     int32_t lattice;
@@ -32,7 +32,8 @@ struct NodeAxis {
   }
 };
 
-/// Near and far planes of a node's children, in the grid; which of lo and hi are near is the rays' octant's.
+/// Near and far planes of a node's children, in the tree's grid. The octant of the rays decides whether lo or hi is
+/// near.
 template <typename Lanes>
 struct GroupBoxes {
   typename Lanes::F near[3], far[3];
@@ -55,11 +56,11 @@ struct GroupBoxes {
   }
 };
 
-/// Which of a node's boxes rays pass.
+/// Ray/box tests with one child box per lane.
 template <typename Lanes>
 struct ChildRays {
-  /// @param out by child: those of `rays` that pass its box, as bits
-  /// @return the children that any passes, as bits
+  /// @param out by child: the rays of the bit mask `rays` that pass its box
+  /// @return the children that any ray passes, as a bit mask
   [[gnu::always_inline]] static uint32_t pass(const GroupBoxes<Lanes>& boxes, const BoxRays& group, uint64_t rays,
                                               uint64_t (&out)[baked::kNodeWidth]) {
     typename Lanes::Masks masks;
@@ -79,7 +80,7 @@ struct ChildRays {
     return used;
   }
 
-  /// Where a ray enters the boxes.
+  /// Computes the t at which a ray enters each box.
   static void enter(const GroupBoxes<Lanes>& boxes, const BoxRays& group, uint32_t ray, float (&t)[baked::kNodeWidth]) {
     const auto at = [&](uint32_t axis) {
       return Lanes::fma(boxes.near[axis], Lanes::set(group.inverse[axis][ray]), Lanes::set(group.bias[axis][ray][0]));

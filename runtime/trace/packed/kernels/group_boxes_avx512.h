@@ -5,8 +5,8 @@
 #include "runtime/trace/packed/kernels/beam.h"
 #include "runtime/trace/packed/kernels/reach.h"
 
-/// The same with all planes of an axis in one register: each child's near plane and, negated, its far one, so that the
-/// larger parameter counts for both.
+/// The tests of group_boxes.h with all planes of an axis in one register: per child the near plane and the negated far
+/// plane, so that a maximum narrows both ends of an interval.
 namespace packtrace::packed {
 namespace {
 
@@ -47,25 +47,25 @@ inline __m512 both(const float (&two)[2]) {
   return _mm512_castpd_ps(_mm512_set1_pd(pair));
 }
 
-/// By child, where pairs hold begin and -end: begin + -end <= 0. The sign of a sum is exact, and both halves of 64 bits
-/// hold it.
+/// Returns the children with begin <= end, as a bit mask; `pairs` holds begin and -end per child. The sign of the sum
+/// begin + -end is exact, and both halves of a 64-bit lane hold the sum.
 inline __mmask8 begin_before_end(__m512 pairs) {
   const __m512 sum = _mm512_add_ps(pairs, _mm512_permute_ps(pairs, 0xb1));
   return _mm512_cmple_epi64_mask(_mm512_castps_si512(sum), _mm512_setzero_si512());
 }
 
-/// The first of each pair.
+/// Returns the first element of each pair.
 inline __m256 firsts(__m512 pairs) {
   return _mm512_castps512_ps256(
       _mm512_permutexvar_ps(_mm512_castsi256_si512(_mm256_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14)), pairs));
 }
 
-/// As for GroupBoxes.
+/// See the overload for GroupBoxes.
 inline uint32_t pass_reach(const Avx512GroupBoxes& boxes, const Reach& reach) {
   const __m512 most_pad = both(reach.pad);
   const auto beyond = [&](uint32_t axis) {
     const __m512 plane = boxes.plane[axis], sign = _mm512_set1_ps(reach.sign[axis]);
-    const __m512 less = _mm512_mul_ps(_mm512_add_ps(plane, _mm512_permute_ps(plane, 0xb1)), sign); // by the extent
+    const __m512 less = _mm512_mul_ps(_mm512_add_ps(plane, _mm512_permute_ps(plane, 0xb1)), sign); // -extent
     const __m512 extent = _mm512_sub_ps(_mm512_set1_ps(-reach.flat), less);
     const __m512 pad =
         _mm512_min_ps(_mm512_max_ps(_mm512_mul_ps(extent, _mm512_set1_ps(kAnyExtent)), _mm512_setzero_ps()), most_pad);
@@ -76,7 +76,7 @@ inline uint32_t pass_reach(const Avx512GroupBoxes& boxes, const Reach& reach) {
   return _mm512_cmple_epi64_mask(_mm512_castps_si512(most_of_pair), _mm512_setzero_si512());
 }
 
-/// As for GroupBoxes.
+/// See the overload for GroupBoxes.
 inline uint32_t pass_beam(const Avx512GroupBoxes& boxes, const Beam& beam, float (&t)[baked::kNodeWidth]) {
   __m512 latest = both(beam.limits);
   for (uint32_t axis = 0; axis < 3; ++axis) {
@@ -96,7 +96,7 @@ inline void read_planes(const Avx512GroupBoxes& boxes, BoxPlanes& planes) {
   }
 }
 
-/// Each bit of a word.
+/// The 64 single-bit masks.
 struct BitTable {
   uint64_t bit[64];
   constexpr BitTable() : bit{} {

@@ -12,11 +12,11 @@ struct Avx2Lanes {
   using F = __m256;
   static constexpr uint32_t kLanes = 8;
 
-  /// A word of bits for each lane.
+  /// One 64-bit mask per lane.
   struct Masks {
     __m256i low = _mm256_setzero_si256(), high = _mm256_setzero_si256();
 
-    /// Adds a bit to the words of the lanes where a <= b.
+    /// Sets a bit in the masks of the lanes where a <= b.
     void add_less_equal(F a, F b, uint64_t bit) {
       const __m256i all = _mm256_castps_si256(_mm256_cmp_ps(a, b, _CMP_LE_OQ));
       const __m256i bits = _mm256_set1_epi64x(static_cast<int64_t>(bit));
@@ -35,13 +35,14 @@ struct Avx2Lanes {
     return _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))));
   }
   static F set(float x) { return _mm256_set1_ps(x); }
-  /// kCount numbers, 8 or 4, as often as there is room for.
+  /// Loads kCount (4 or 8) floats and repeats them to fill the register.
   template <uint32_t kCount>
   static F repeat(const float* p) {
     if constexpr (kCount == 8) return load(p);
     return _mm256_broadcast_ps(reinterpret_cast<const __m128*>(p));
   }
-  /// Of records of floats the four from number kFirst on: each number of each record kCount times.
+  /// Reads floats kFirst to kFirst + 3 of each record. out[n] holds float kFirst + n of each record, kCount times in a
+  /// row.
   template <uint32_t kCount, uint32_t kFirst, typename Record>
   static void spread(const Record* const (&records)[kLanes / kCount], F (&out)[4]) {
     const auto four = [&](uint32_t i) { return reinterpret_cast<const __m128*>(records[i]) + kFirst / 4; };
@@ -54,18 +55,18 @@ struct Avx2Lanes {
   static F sub(F a, F b) { return _mm256_sub_ps(a, b); }
   static F mul(F a, F b) { return _mm256_mul_ps(a, b); }
   static F div(F a, F b) { return _mm256_div_ps(a, b); }
-  /// a b + c and c - a b, rounded once
+  /// fma: a b + c, fnma: c - a b; rounded once.
   static F fma(F a, F b, F c) { return _mm256_fmadd_ps(a, b, c); }
   static F fnma(F a, F b, F c) { return _mm256_fnmadd_ps(a, b, c); }
-  /// a b - c, rounded once
+  /// a b - c, rounded once.
   static F fms(F a, F b, F c) { return _mm256_fmsub_ps(a, b, c); }
   static F min(F a, F b) { return _mm256_min_ps(a, b); }
   static F max(F a, F b) { return _mm256_max_ps(a, b); }
   static F abs(F a) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), a); }
-  /// The larger magnitude.
+  /// max(|a|, |b|).
   static F largest(F a, F b) { return max(abs(a), abs(b)); }
   static F negate(F a) { return _mm256_xor_ps(_mm256_set1_ps(-0.0f), a); }
-  /// The lanes of eight numbers that are x, as bits.
+  /// Returns the lanes in which eight integers equal x, as a bit mask.
   static uint32_t equal(const uint32_t* p, uint32_t x) {
     const __m256i all = _mm256_cmpeq_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)),
                                            _mm256_set1_epi32(static_cast<int32_t>(x)));

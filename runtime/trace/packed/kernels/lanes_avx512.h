@@ -4,7 +4,7 @@
 
 #include <immintrin.h>
 
-/// Sixteen lanes in one 512-bit register, for rays side by side.
+/// Sixteen lanes in one 512-bit register, for tests with several rays in a register.
 namespace packtrace::packed {
 namespace {
 
@@ -15,13 +15,14 @@ struct Avx512Lanes {
   static F load(const float* p) { return _mm512_loadu_ps(p); }
   static void store(float* p, F a) { _mm512_storeu_ps(p, a); }
   static F set(float x) { return _mm512_set1_ps(x); }
-  /// kCount numbers, 8 or 4, as often as there is room for.
+  /// Loads kCount (4 or 8) floats and repeats them to fill the register.
   template <uint32_t kCount>
   static F repeat(const float* p) {
     if constexpr (kCount == 8) return _mm512_broadcast_f32x8(_mm256_loadu_ps(p));
     return _mm512_broadcast_f32x4(_mm_loadu_ps(p));
   }
-  /// Of records of floats the four from number kFirst on: each number of each record kCount times.
+  /// Reads floats kFirst to kFirst + 3 of each record. out[n] holds float kFirst + n of each record, kCount times in a
+  /// row.
   template <uint32_t kCount, uint32_t kFirst, typename Record>
   static void spread(const Record* const (&records)[kLanes / kCount], F (&out)[4]) {
     const auto four = [&](uint32_t i) { return reinterpret_cast<const __m128*>(records[i]) + kFirst / 4; };
@@ -40,21 +41,21 @@ struct Avx512Lanes {
   static F sub(F a, F b) { return _mm512_sub_ps(a, b); }
   static F mul(F a, F b) { return _mm512_mul_ps(a, b); }
   static F div(F a, F b) { return _mm512_div_ps(a, b); }
-  /// a b + c and c - a b, rounded once
+  /// fma: a b + c, fnma: c - a b; rounded once.
   static F fma(F a, F b, F c) { return _mm512_fmadd_ps(a, b, c); }
   static F fnma(F a, F b, F c) { return _mm512_fnmadd_ps(a, b, c); }
-  /// a b - c, rounded once
+  /// a b - c, rounded once.
   static F fms(F a, F b, F c) { return _mm512_fmsub_ps(a, b, c); }
   static F min(F a, F b) { return _mm512_min_ps(a, b); }
   static F max(F a, F b) { return _mm512_max_ps(a, b); }
   static F abs(F a) { return _mm512_abs_ps(a); }
-  /// The larger magnitude.
+  /// max(|a|, |b|).
   static F largest(F a, F b) { return max(abs(a), abs(b)); }
   static F negate(F a) {
     return _mm512_castsi512_ps(
         _mm512_xor_si512(_mm512_castps_si512(a), _mm512_set1_epi32(static_cast<int32_t>(0x80000000u))));
   }
-  /// The lanes of 16 numbers that are x, as bits.
+  /// Returns the lanes in which 16 integers equal x, as a bit mask.
   static uint32_t equal(const uint32_t* p, uint32_t x) {
     return _mm512_cmpeq_epi32_mask(_mm512_loadu_si512(p), _mm512_set1_epi32(static_cast<int32_t>(x)));
   }

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-/// Eight lanes in portable C++: what the other instruction sets must agree with.
+/// Eight lanes in portable C++: the reference that the other instruction sets must match bit for bit.
 namespace packtrace::packed {
 namespace {
 
@@ -12,11 +12,11 @@ struct ScalarLanes {
     float lane[8];
   };
 
-  /// A word of bits for each lane.
+  /// One 64-bit mask per lane.
   struct Masks {
     uint64_t lane[8] = {};
 
-    /// Adds a bit to the words of the lanes where a <= b.
+    /// Sets a bit in the masks of the lanes where a <= b.
     void add_less_equal(F a, F b, uint64_t bit) {
       for (uint32_t i = 0; i < 8; ++i) lane[i] |= a.lane[i] <= b.lane[i] ? bit : 0;
     }
@@ -50,12 +50,13 @@ struct ScalarLanes {
   static F set(float x) {
     return each([&](uint32_t) { return x; });
   }
-  /// kCount numbers, 8 or 4, as often as there is room for.
+  /// Loads kCount (4 or 8) floats and repeats them to fill the register.
   template <uint32_t kCount>
   static F repeat(const float* p) {
     return each([&](uint32_t i) { return p[i % kCount]; });
   }
-  /// Of records of floats the four from number kFirst on: each number of each record kCount times.
+  /// Reads floats kFirst to kFirst + 3 of each record. out[n] holds float kFirst + n of each record, kCount times in a
+  /// row.
   template <uint32_t kCount, uint32_t kFirst, typename Record>
   static void spread(const Record* const (&records)[kLanes / kCount], F (&out)[4]) {
     for (uint32_t n = 0; n < 4; ++n)
@@ -73,14 +74,14 @@ struct ScalarLanes {
   static F div(F a, F b) {
     return each([&](uint32_t i) { return a.lane[i] / b.lane[i]; });
   }
-  /// a b + c and c - a b, rounded once
+  /// fma: a b + c, fnma: c - a b; rounded once.
   static F fma(F a, F b, F c) {
     return each([&](uint32_t i) { return __builtin_fmaf(a.lane[i], b.lane[i], c.lane[i]); });
   }
   static F fnma(F a, F b, F c) {
     return each([&](uint32_t i) { return __builtin_fmaf(-a.lane[i], b.lane[i], c.lane[i]); });
   }
-  /// a b - c, rounded once
+  /// a b - c, rounded once.
   static F fms(F a, F b, F c) {
     return each([&](uint32_t i) { return __builtin_fmaf(a.lane[i], b.lane[i], -c.lane[i]); });
   }
@@ -93,12 +94,12 @@ struct ScalarLanes {
   static F abs(F a) {
     return each([&](uint32_t i) { return __builtin_fabsf(a.lane[i]); });
   }
-  /// The larger magnitude.
+  /// max(|a|, |b|).
   static F largest(F a, F b) { return max(abs(a), abs(b)); }
   static F negate(F a) {
     return each([&](uint32_t i) { return -a.lane[i]; });
   }
-  /// The lanes of eight numbers that are x, as bits.
+  /// Returns the lanes in which eight integers equal x, as a bit mask.
   static uint32_t equal(const uint32_t* p, uint32_t x) {
     return bits([&](uint32_t i) { return p[i] == x; });
   }

@@ -3,15 +3,17 @@
 #include "runtime/trace/packed/kernels/batch_strips.h"
 #include "runtime/trace/packed/kernels/triangle_test.h"
 
-/// The triangles of a batch against the rays that come to their leaf: one ray and eight triangles in a register, as
-/// many rays as fit beside each other with eight or four triangles each, or a triangle and as many rays as there are
-/// lanes. All are the same arithmetic.
+/// Tests the triangles of a batch against the rays that reach its leaf, in one of three arrangements:
+///  - test_triangles(): one ray against eight triangles, one triangle per SIMD lane.
+///  - test_few(): several rays in one register, each against four or eight triangles.
+///  - test_rays(): one triangle against one ray per lane.
+/// All three perform the same arithmetic, so they return the same bits.
 namespace packtrace::packed {
 namespace {
 
 inline uint32_t first_bit(uint64_t word) { return static_cast<uint32_t>(__builtin_ctzll(word)); }
 
-/// The triangles of a batch that a ray hits, as bits.
+/// Returns the triangles of a batch that one ray hits, as a bit mask.
 template <typename Lanes, bool kRest>
 inline uint32_t test_triangles(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group,
                                uint32_t ray, LaneHits<Lanes>& hits, uint64_t& exact_count) {
@@ -28,8 +30,8 @@ inline uint32_t test_triangles(const DecodedBatch& batch, const BatchNormals& no
   return test_lanes<Lanes, true, kRest>(relative, normal, rest, lanes, (1u << batch.count) - 1, hits, exact_count);
 }
 
-/// The first kTriangles of a batch as often as there is room for in a register, with the axes of rays whose k begins
-/// with k0.
+/// The first kTriangles triangles of a batch, repeated until they fill a register. Coordinates are permuted to Woop's
+/// axes for rays whose kx is k0.
 template <typename Wide, uint32_t kTriangles, bool kRest>
 struct BatchLanes {
   static constexpr uint32_t kRays = Wide::kLanes / kTriangles;
@@ -44,10 +46,12 @@ struct BatchLanes {
     }
   }
 
-  /// The lanes in which rays hit, kTriangles each.
+  /// Tests kRays rays against the triangles and returns the lanes with a hit, as a bit mask. Ray i has the lanes from
+  /// kTriangles i on.
+  /// @param wanted bit mask of the lanes that hold a triangle
   uint32_t test(const TestRay* const (&rays)[kRays], const TestRest* const (&rests)[kRays], uint32_t wanted,
                 uint64_t& exact_count) const {
-    typename Wide::F origin[4], shear[4], rest[4]; // and begin, and end, and nothing
+    typename Wide::F origin[4], shear[4], rest[4]; // The fourth elements hold the rays' begin, their end and no value.
     if constexpr (kRest) Wide::template spread<kTriangles, 0>(rests, rest);
     Wide::template spread<kTriangles, 0>(rays, origin);
     Wide::template spread<kTriangles, 4>(rays, shear);
@@ -59,8 +63,8 @@ struct BatchLanes {
   }
 };
 
-/// Of `rays`, as bits, those that hit a triangle of a batch with at most kTriangles. The last ray fills the places of
-/// those that are missing.
+/// Returns the rays of the bit mask `rays` that hit a triangle of a batch of at most kTriangles triangles. If the last
+/// register is not full, its last ray is repeated.
 template <typename Wide, uint32_t kTriangles, bool kRest>
 inline uint64_t test_few(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group, uint64_t rays,
                          uint64_t& exact) {
@@ -78,7 +82,7 @@ inline uint64_t test_few(const DecodedBatch& batch, const BatchNormals& normals,
       const TestRay* few[kRays];
       const TestRest* rests[kRays];
       for (uint64_t i = 0, last = 0; i < kRays; ++i, m &= m - 1) {
-        last = m | (last & (0 - uint64_t{m == 0})); // without a branch, which would often be mispredicted
+        last = m | (last & (0 - uint64_t{m == 0})); // Branch-free, because a branch would often be mispredicted.
         number[i] = first_bit(last);
         few[i] = &group.tests[number[i]], rests[i] = &group.rests[number[i]];
       }
@@ -90,8 +94,9 @@ inline uint64_t test_few(const DecodedBatch& batch, const BatchNormals& normals,
   return hit;
 }
 
-/// The rays from lane `at` on that hit one triangle of a batch, as bits from 0 on.
-/// @param axis Woop's k, of all that are wanted
+/// Tests the rays at `at`, `at` + 1, ... of a group, one per lane, against one triangle of a batch. Returns the lanes
+/// with a hit, as a bit mask.
+/// @param axis Woop's (kx, ky, kz), which all wanted rays share
 template <typename Wide, bool kRest>
 inline uint32_t test_rays(const DecodedBatch& batch, const BatchNormals& normals, uint32_t triangle,
                           const RayGroup& group, const uint32_t (&axis)[3], uint32_t at, uint32_t wanted,
@@ -108,10 +113,11 @@ inline uint32_t test_rays(const DecodedBatch& batch, const BatchNormals& normals
   return test_lanes<Wide, true, kRest>(relative, normal, rest, lanes, wanted, hits, exact_count);
 }
 
-/// Rays of nearest hits that come to a leaf, of which those that hit are better found first.
+/// Minimum number of rays for which a leaf test that needs t, u and v first finds the rays that hit (rays_that_hit())
+/// and then computes the hits of those rays alone.
 constexpr uint32_t kLeastTestedTwice = 4;
 
-/// Woop's axes of the rays in some lanes. False where they differ.
+/// Reads Woop's (kx, ky, kz) of the wanted rays. Returns false if they differ between rays.
 template <typename Wide>
 inline bool same_axes(const RayGroup& group, uint32_t at, uint32_t wanted, uint32_t (&axis)[3]) {
   const uint32_t first = at + static_cast<uint32_t>(__builtin_ctz(wanted));
@@ -119,8 +125,9 @@ inline bool same_axes(const RayGroup& group, uint32_t at, uint32_t wanted, uint3
   return (Wide::equal(&group.axis[2][at], axis[2]) & wanted) == wanted;
 }
 
-/// Of `rays`, as bits, those that hit a triangle of a batch; nothing depends on what came of one of them.
-/// @param exact counts lanes that took doubles
+/// Returns the rays of the bit mask `rays` that hit a triangle of a batch. The test of one ray does not depend on the
+/// result of another.
+/// @param exact incremented by the number of lanes that were evaluated in doubles
 template <typename Lanes, bool kRest>
 inline uint64_t rays_that_hit(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group,
                               uint64_t rays, uint64_t& exact) {

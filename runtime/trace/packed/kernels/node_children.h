@@ -8,7 +8,7 @@
 namespace packtrace::packed {
 namespace {
 
-/// PackedNode::children as one number.
+/// PackedNode::children as one 64-bit integer; byte i is slot i.
 struct NodeChildren {
   uint64_t bytes;
 
@@ -17,9 +17,9 @@ struct NodeChildren {
                      sizeof bytes);
   }
   bool leaves() const { return (bytes & 0xffu) != baked::kInnerChild; }
-  /// Slots in use, which come first.
+  /// Bit mask of the slots in use; used slots come first.
   uint32_t slots() const { return bytes == 0 ? 0u : 0xffu >> (static_cast<uint32_t>(__builtin_clzll(bytes)) / 8); }
-  /// Byte i: triangles in the leaves of slots below i; at most 128.
+  /// Byte i of the result: number of triangles in the leaves of slots 0 to i - 1; at most 128.
   uint64_t leaf_begins() const { return bytes * 0x0101010101010100u; }
 };
 

@@ -5,7 +5,8 @@
 namespace packtrace::packed {
 namespace {
 
-/// The octant of a ray's direction in a placement's grid, but for rounding.
+/// Computes the octant of a ray's direction in a placement's grid in floats. The result may differ from that of the
+/// exact transform where a component is almost 0.
 class OctantGuess {
 public:
   explicit OctantGuess(const TracePlacement& placement) {

@@ -6,49 +6,50 @@
 #include "runtime/trace/packed/kernels/kernel_types.h"
 #include "runtime/trace/packed/kernels/ray_vectors.h"
 
-/// Rays in the coordinates of one tree, with what box and triangle tests need of them.
+/// Rays in the grid of one tree, with the data that box and triangle tests need.
 namespace packtrace::packed {
 namespace {
 
-/// Rays that are traced together: as many as a word has bits.
+/// Maximum number of rays in a group: the bits of a 64-bit mask.
 constexpr uint32_t kGroup = 64;
-/// Rays at a node that make it worth while to look at them together first.
+/// Minimum number of rays at a node for tests on the group as a whole (reach) and for testing rays side by side.
 constexpr uint32_t kLeastSideBySide = 12;
 
-/// Box planes are moved outwards by this times M, the largest coordinate among the ray's origin and the tree. All
-/// roundings in units of u = 2^-24, for a direction whose largest component is in [1, 2):
-///  - A hit triangle's point lies off the ray: a vertex rounds to float (1 M), less the origin (2 M), sheared with a
-///    rounded slope (2 M) in one rounding (4 M); it was an integer that rounded to float (1 M): at most 10 u M.
-///    Of nearest hits t counts from the origin as it was before it was rounded (1 M).
-///  - A plane's parameter p inv + b: the node's origin to float (1 M), its plane (1 M), inv's rounding (2 M, as b has
-///  the
-///    same one), b's product and pad (1 M each), the last rounding (2 M): 8 u M.
-///  - A component below 2^-80 counts as 2^-80, whose inverse times 12 M is a float: within the reach of 6 M, next to
-///    nothing.
-/// So 20 u M suffice, and 24 are taken. In the tree over many placements M is less: see KernelScene.
+/// Box planes are moved outwards by this times M, the largest coordinate of the ray's origin and the tree. It covers
+/// all roundings, here in units of u = 2^-24 for a direction whose largest component is in [1, 2):
+///  - A hit point may lie off the ray by at most 10 u M: the vertex is rounded to float (1 M), the origin is subtracted
+///    (2 M), the slope is rounded (2 M), and the shear is rounded once (4 M); boxes hold the vertex as the integer that
+///    it was (1 M). For nearest hits, t counts from the origin before it was rounded (1 M).
+///  - The parameter p inv + b of a plane p has an error of at most 8 u M: the node's origin is rounded to float (1 M)
+///    and so is the plane (1 M), inv is rounded (2 M, as b has the same factor), so are b's product and pad (1 M each)
+///    and the result (2 M).
+///  - A direction component below 2^-80 counts as 2^-80, whose inverse times 12 M is a finite float. Within 6 M of the
+///    origin the deviation is negligible.
+/// The sum is at most 20 u M, and 24 u M are taken. For the tree over many placements M is smaller: see
+/// KernelScene::top_pad_coordinate.
 constexpr float kBoxPad = 24.0f * 0x1p-24f;
 constexpr float kSmallestDirection = 0x1p-80f;
 
-/// Of t: what rounding t to a float in unit space takes at most (2^-24), and rounding it in a grid as well.
+/// Relative error bound of t: rounding to float in unit space (2^-24) and once more in a tree's grid (2^-24).
 constexpr double kUnitRounding = 0x1p-23;
 
-/// Rays as they come, in unit space.
+/// The rays of a group in unit space, one array per value.
 struct alignas(64) UnitRays {
   float origin[3][kGroup], direction[3][kGroup], tnear[kGroup];
-  float tmax[kGroup]; ///< inclusive: of a nearest hit, its t
-  bool one_origin;    ///< of nearest hits: all start at one place, as camera rays do
+  float tmax[kGroup]; ///< inclusive end: the float below tfar, or the t of the nearest hit so far
+  bool one_origin;    ///< nearest hits only: all rays have the same origin, as camera rays do
 };
 
 struct Beam;
 
-/// The box of all places where rays may hit something, for a node's boxes to be compared with: see reach.h.
+/// Bounding box of all points at which a group's rays may hit something, to compare a node's boxes with: see reach.h.
 struct Reach {
   float lo[3], hi[3];
-  float flat;   ///< extents up to this count as none
-  float pad[2]; ///< 0, and what boxes with an extent are nearer to where rays start than it says
-  // Along the octant of set_octant():
-  float sign[3];     ///< of directions
-  float shift[3][2]; ///< rays reach a near plane p if sign p + the first <= 0, a far one if the second - sign p <= 0
+  float flat;   ///< boxes whose extent along an axis is at most this are flat
+  float pad[2]; ///< 0, and the pad at the side where rays start, for boxes with an extent
+  // Set by set_octant():
+  float sign[3];     ///< of the directions, 1 or -1
+  float shift[3][2]; ///< rays reach a near plane p if sign p + shift[0] <= 0, a far plane p if shift[1] - sign p <= 0
 
   void set_octant(uint32_t octant) {
     for (uint32_t axis = 0; axis < 3; ++axis) {
@@ -60,11 +61,11 @@ struct Reach {
   }
 };
 
-/// What a triangle test needs of a ray, side by side: its origin along Woop's k, and its shears.
+/// One ray's data for triangle tests: its origin and shears along Woop's axes, and its range of t.
 struct alignas(32) TestRay {
   float origin[3], begin, shear[3], end;
 };
-/// What rounding took from the origin, along Woop's k.
+/// One ray's origin rounding error (exact minus rounded) along Woop's axes.
 struct alignas(16) TestRest {
   float along[3], unused;
 };
@@ -76,19 +77,20 @@ constexpr Reach kEverywhere{{-__builtin_inff(), -__builtin_inff(), -__builtin_in
                             {},
                             {}};
 
-/// What box tests need of rays. One array per value; those of rays that are not in use are not set.
+/// Ray data for box tests, one array per value. Elements of unused rays are not initialised.
 struct alignas(64) BoxRays {
   static constexpr bool kTriangles = false, kSideBySide = false;
-  float bias[3][kGroup][2]; ///< a near plane p is passed at p inverse + the first, a far one at p inverse - the second
-  float limits[kGroup][2];  ///< hits lie above the first and not beyond - the second
-  float inverse[3][kGroup]; ///< of the direction, never infinite
-  uint64_t backward[3];     ///< rays along which x, y, z decrease, as bits
-  // Of nearest hits only:
-  double t_begin[kGroup]; ///< unit-space t = (t here + t_begin) t_scale
+  /// A ray crosses a near plane p at t = p inverse + bias[0], a far plane at t = p inverse - bias[1].
+  float bias[3][kGroup][2];
+  float limits[kGroup][2];  ///< begin and -end: hits lie in (begin, end]
+  float inverse[3][kGroup]; ///< reciprocals of the direction, always finite
+  uint64_t backward[3];     ///< rays whose x, y, z decrease with t, as bit masks
+  // For nearest hits only:
+  double t_begin[kGroup]; ///< unit-space t = (grid t + t_begin) t_scale
   double t_scale[kGroup]; ///< a power of two
 
   float unit_t(uint32_t i, float t) const { return static_cast<float>((double{t} + t_begin[i]) * t_scale[i]); }
-  /// Not below any t that is `unit_t` in unit space, which several are where origins were moved.
+  /// Returns a grid t that is not below any grid t that maps to `unit_t`. Where the origin was moved, several do.
   float t_of(uint32_t i, float unit_t) const {
     const double t = double{unit_t} / t_scale[i];
     return static_cast<float>(t - t_begin[i] + (t_begin[i] != 0.0 ? kUnitRounding * t : 0.0));
@@ -97,11 +99,11 @@ struct alignas(64) BoxRays {
   float tmax(uint32_t i) const { return -limits[i][1]; }
 };
 
-/// The same for many rays at a node, which are tested side by side.
+/// Adds arrays for testing many rays at a node side by side, one per lane.
 struct alignas(64) SideBySideRays : BoxRays {
   static constexpr bool kSideBySide = true;
-  float near_bias[3][kGroup], far_bias[3][kGroup]; ///< bias in arrays of their own, the second negated
-  float begin[kGroup], end[kGroup];                ///< limits, the same
+  float near_bias[3][kGroup], far_bias[3][kGroup]; ///< bias[0] and -bias[1]
+  float begin[kGroup], end[kGroup];                ///< limits[0] and -limits[1]
   Reach reach;
 
   void set_tmax(uint32_t i, float t) {
@@ -110,19 +112,19 @@ struct alignas(64) SideBySideRays : BoxRays {
   }
 };
 
-/// The same with what triangle tests need.
+/// Adds the data for triangle tests.
 struct alignas(64) RayGroup : SideBySideRays {
   static constexpr bool kTriangles = true;
   float origin[3][kGroup];
-  float shear[3][kGroup];   ///< Woop's S
-  uint32_t axis[3][kGroup]; ///< Woop's k: x, y, z; z is the direction's largest component
-  uint64_t major[3];        ///< rays whose k begins with x, y, z, as bits
-  // Of nearest hits only:
-  float rest[3][kGroup]; ///< what rounding to floats took from the origin
-  Beam* beam = nullptr;  ///< that all its rays make, see beam.h
-  // For leaves:
+  float shear[3][kGroup];   ///< Woop's (Sx, Sy, Sz)
+  uint32_t axis[3][kGroup]; ///< Woop's (kx, ky, kz): axis numbers; kz is the axis of the direction's largest component
+  uint64_t major[3];        ///< rays whose kx is x, y, z, as bit masks
+  // For nearest hits only:
+  float rest[3][kGroup]; ///< the origin's rounding error: exact minus rounded
+  Beam* beam = nullptr;  ///< of all rays of the group, or null; see beam.h
+  // For leaf tests:
   TestRay tests[kGroup];
-  TestRest rests[kGroup]; ///< of nearest hits only
+  TestRest rests[kGroup]; ///< for nearest hits only
 
   void set_tmax(uint32_t i, float t) {
     SideBySideRays::set_tmax(i, t);
@@ -130,8 +132,8 @@ struct alignas(64) RayGroup : SideBySideRays {
   }
 };
 
-/// Reads a block of rays.
-/// @param numbers of the rays
+/// Reads a block of rays, starting at element `first` of `out`.
+/// @param numbers indices of the block's rays
 [[gnu::always_inline]] inline void read_rays(const KernelRay* rays, const uint32_t (&numbers)[kBlock], uint32_t first,
                                              UnitRays& out) {
   static_assert(sizeof(KernelRay) == 32 && offsetof(KernelRay, tnear) == 12 && offsetof(KernelRay, direction) == 16 &&
@@ -146,10 +148,11 @@ struct alignas(64) RayGroup : SideBySideRays {
     write_block(&out.direction[axis][first], values[4 + axis]);
   }
   write_block(&out.tnear[first], values[3]);
-  write_block(&out.tmax[first], reinterpret_cast<Floats>(reinterpret_cast<Ints>(values[7]) - 1)); // the float below
+  // The next smaller float: tfar itself is excluded.
+  write_block(&out.tmax[first], reinterpret_cast<Floats>(reinterpret_cast<Ints>(values[7]) - 1));
 }
 
-/// Whether the first rays of a group do. Blocks are full: see read_rays().
+/// Whether the first `count` rays of a group have the same origin. take() fills the rest of the last block with copies.
 inline bool start_at_one_place(const UnitRays& rays, uint32_t count) {
   Ints same = Ints{} - 1;
   for (uint32_t first = 0; first < count; first += kBlock)
@@ -161,11 +164,13 @@ inline bool start_at_one_place(const UnitRays& rays, uint32_t count) {
   return lane_bits(same) == kBlockLanes;
 }
 
-/// A block of rays in a tree's grid as box and triangle tests take them.
+/// A block of rays in a tree's grid, the input of set_boxes() and set_shears().
 struct RayBlock {
   Floats origin[3], direction[3], begin, end;
 };
 
+/// Writes the data for box tests of a block, starting at element `first` of the group.
+/// @param pad_coordinate minimum of kBoxPad's M
 template <typename Group>
 [[gnu::always_inline]] inline void set_boxes(const RayBlock& block, float pad_coordinate, uint32_t first,
                                              Group& group) {
@@ -192,7 +197,8 @@ template <typename Group>
   }
 }
 
-/// @tparam kNearest whether group.rest is set, which counts then
+/// Writes the data for triangle tests of a block, starting at element `first` of the group.
+/// @tparam kNearest whether group.rest is set and is to be copied to group.rests
 template <bool kNearest>
 inline void set_shears(const RayBlock& block, uint32_t first, RayGroup& group) {
   for (uint32_t axis = 0; axis < 3; ++axis) write_block(&group.origin[axis][first], block.origin[axis]);

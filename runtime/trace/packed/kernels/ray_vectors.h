@@ -6,23 +6,23 @@
 #include <immintrin.h>
 #endif
 
-/// Vectors with a lane for each ray of a block, for what is done to all rays before they are traced.
+/// Vectors with one lane per ray of a block, for the setup of rays before they are traced.
 namespace packtrace::packed {
 namespace {
 
-// The compiler's own vectors, a lane for each ray of a block, so that all instruction sets get the same from one
-// source. It splits vectors larger than its registers into single numbers, so doubles are half a block.
+// These are the compiler's vector extensions, so one source yields the same results on all instruction sets. GCC splits
+// vectors larger than its registers into scalars, so vectors of doubles hold half a block.
 #if defined(__AVX512F__)
-constexpr uint32_t kBlock = 16; ///< rays that are set up at once
+constexpr uint32_t kBlock = 16; ///< number of rays that are set up at once
 constexpr uint32_t kDoubleLanes = 8;
 #else
 constexpr uint32_t kBlock = 8;
 constexpr uint32_t kDoubleLanes = 4;
 #endif
-constexpr uint32_t kBlockLanes = (1u << kBlock) - 1; ///< as bits
+constexpr uint32_t kBlockLanes = (1u << kBlock) - 1; ///< bit mask of all lanes
 using Floats = float __attribute__((vector_size(4 * kBlock)));
 using Ints = int32_t __attribute__((vector_size(4 * kBlock)));
-// Half a block.
+// One lane per ray of half a block.
 using Doubles = double __attribute__((vector_size(8 * kDoubleLanes)));
 using Longs = int64_t __attribute__((vector_size(8 * kDoubleLanes)));
 using HalfFloats = float __attribute__((vector_size(4 * kDoubleLanes)));
@@ -42,7 +42,7 @@ inline void keep_larger(Vector& a, const Vector& b) {
   a = a > b ? a : b;
 }
 
-/// The same in some lanes, given as bits.
+/// Does the same in the lanes of a bit mask.
 [[gnu::always_inline]] inline void keep_larger(Floats& a, uint32_t lanes, const Floats& b) {
 #if defined(__AVX512F__)
   a = _mm512_mask_max_ps(a, static_cast<__mmask16>(lanes), b, a);
@@ -54,7 +54,7 @@ inline void keep_larger(Vector& a, const Vector& b) {
 #endif
 }
 
-// GCC 12 converts eight numbers as twice four.
+// For eight elements GCC 12 would emit two conversions of four.
 inline Doubles to_doubles(const HalfFloats& x) {
 #if defined(__AVX512F__)
   return _mm512_cvtps_pd(x);
@@ -94,7 +94,7 @@ inline float largest_lane(const Floats& x) {
 #endif
 }
 
-/// Reads eight floats of each of a block's rays as rows: row i is ray i and, where two fit, ray i + 8.
+/// Reads eight floats per ray of a block. Row i holds those of ray i and, in blocks of 16, of ray i + 8.
 inline void read_rows(const float* const (&rays)[kBlock], Floats (&rows)[8]) {
   for (uint32_t i = 0; i < 8; ++i) {
 #if defined(__AVX512F__)
@@ -108,14 +108,14 @@ inline void read_rows(const float* const (&rays)[kBlock], Floats (&rows)[8]) {
   }
 }
 
-/// Of rows that are kDistance apart, swaps the off-diagonal parts.
+/// For each pair of rows kDistance apart, swaps the off-diagonal blocks of kDistance columns.
 template <int kDistance, int... kLow>
 inline void swap_parts(Floats (&rows)[8]) {
   for (uint32_t i = 0; i < 8; ++i)
     if ((i & kDistance) == 0) {
       const Floats a = rows[i], b = rows[i + kDistance];
 #if defined(__AVX512F__)
-      constexpr auto lane = [](int k) { return k < 8 ? k : k + 8; }; // of a, or of b behind it
+      constexpr auto lane = [](int k) { return k < 8 ? k : k + 8; }; // index into a, or into b, which follows it
       rows[i] = __builtin_shufflevector(a, b, lane(kLow)..., lane(kLow) + 8 ...);
       rows[i + kDistance] = __builtin_shufflevector(a, b, lane(kLow) + kDistance..., lane(kLow) + kDistance + 8 ...);
 #else
@@ -125,14 +125,14 @@ inline void swap_parts(Floats (&rows)[8]) {
     }
 }
 
-/// Turns such rows into columns, a lane for each ray.
+/// Transposes the rows of read_rows() into one vector per value, with one lane per ray.
 [[gnu::always_inline]] inline void transpose(Floats (&rows)[8]) {
-  swap_parts<4, 0, 1, 2, 3, 8, 9, 10, 11>(rows); // of quarters, of those, of those
+  swap_parts<4, 0, 1, 2, 3, 8, 9, 10, 11>(rows); // swap 4 x 4 blocks, then 2 x 2, then single elements
   swap_parts<2, 0, 1, 8, 9, 4, 5, 12, 13>(rows);
   swap_parts<1, 0, 8, 2, 10, 4, 12, 6, 14>(rows);
 }
 
-/// The reverse of read_rows(), of as many floats as records have.
+/// The inverse of read_rows(); writes sizeof(Record) bytes per ray.
 template <typename Record>
 inline void write_rows(const Floats (&rows)[8], Record* records) {
   for (uint32_t i = 0; i < 8; ++i) {
@@ -144,19 +144,19 @@ inline void write_rows(const Floats (&rows)[8], Record* records) {
   }
 }
 
-/// The largest lane of each of eight vectors.
+/// Returns the largest lane of each of eight vectors.
 inline void largest_lanes(const Floats (&vectors)[8], float (&out)[8]) {
   Floats rows[8];
   for (uint32_t i = 0; i < 8; ++i) rows[i] = vectors[i];
   transpose(rows);
   for (uint32_t step = 4; step > 0; step /= 2)
     for (uint32_t i = 0; i < step; ++i) keep_larger(rows[i], rows[i + step]);
-  float lanes[kBlock]; // of each vector one, or one in each half
+  float lanes[kBlock]; // one lane per vector, or one per vector in each half
   write_block(lanes, rows[0]);
   for (uint32_t i = 0; i < 8; ++i) out[i] = lanes[i] > lanes[kBlock - 8 + i] ? lanes[i] : lanes[kBlock - 8 + i];
 }
 
-/// Pairs (a, b), as many as there are lanes.
+/// Writes one pair (a, b) per lane.
 inline void write_pairs(float (*out)[2], const Floats& a, const Floats& b) {
 #if defined(__AVX512F__)
   write_block(&out[0][0], __builtin_shufflevector(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23));
@@ -169,14 +169,14 @@ inline void write_pairs(float (*out)[2], const Floats& a, const Floats& b) {
 
 inline Floats magnitude(const Floats& x) { return reinterpret_cast<Floats>(reinterpret_cast<Ints>(x) & 0x7fffffff); }
 
-/// The lanes whose condition is all ones, as bits.
+/// Returns the lanes whose condition is true (all ones), as a bit mask.
 inline uint32_t lane_bits(const Ints& condition) {
 #if defined(__AVX512F__)
   return _mm512_movepi32_mask(reinterpret_cast<__m512i>(condition));
 #elif defined(__AVX2__)
   return static_cast<uint32_t>(__builtin_ia32_movmskps256(reinterpret_cast<Floats>(condition)));
 #else
-  int32_t lanes[kBlock]; // a vector's own subscripts go wrong in GCC 12 under sanitizers
+  int32_t lanes[kBlock]; // Subscripting a vector goes wrong in GCC 12 under sanitizers.
   write_block(lanes, condition);
   uint32_t bits = 0;
   for (uint32_t i = 0; i < kBlock; ++i) bits |= (lanes[i] != 0 ? 1u : 0u) << i;
@@ -184,7 +184,7 @@ inline uint32_t lane_bits(const Ints& condition) {
 #endif
 }
 
-/// The lanes in which low < x < high, as bits.
+/// Returns the lanes in which low < x < high, as a bit mask.
 inline uint32_t lanes_between(double low, const Doubles& x, double high) {
   const Longs inside = (x > low) & (x < high);
 #if defined(__AVX512F__)

@@ -2,45 +2,52 @@
 
 #include "runtime/trace/packed/kernels/group_boxes.h"
 
-/// What the rays of a group reach together. A node's boxes that lie outside are passed by none of them, and of those
-/// that are left, few of eight where many rays come, each is tested against a register of rays.
+/// The reach of a ray group is the bounding box of all points at which its rays may hit something. No ray of the group
+/// passes a box outside the reach, so one test of a node's eight boxes culls boxes for the whole group. Where many rays
+/// visit a node, few of its boxes remain, and each of them is tested against a register of rays.
 ///
-/// The box holds all that rays come to, and a pad for what the triangle test accepts beside it (kReachPad). Where rays
-/// start, boxes without an extent along that axis are compared without the pad. All that lies in such a box lies in one
-/// plane x = B along the axes, and a ray that starts at x > B and goes on along x, or across it, never comes there: the
-/// plane's normal has one component, so that t has the right sign whatever is rounded, and is not above 0. That matters
-/// where rays start beside a ground or a wall, of which they are off by less than the pad: none of them comes to it
-/// again. A box with an extent needs the pad there too. Its triangles lie behind, but where one shares an edge with a
-/// triangle that is hit, the rounded edge may give the ray to it. Parts of placements are
-/// as flat as their boxes in floats can be; where a ray comes to none of them, it hits nothing but for rounding.
+/// The reach spans the origins and ends of the rays and is padded by kReachPad, because the triangle test may accept
+/// hits slightly off the ray. There is one exception: at the side where the rays start, boxes that are flat along the
+/// axis are compared without the pad. All geometry in such a box lies in one plane x = B. A ray that starts at x > B
+/// and moves away from the plane or parallel to it never reaches the plane: its normal has one nonzero component, so t
+/// has the right sign whatever is rounded and is not above 0. This matters for rays that start just off a ground plane
+/// or a wall. Their distance to it is less than the pad, but they cannot hit it again.
+///
+/// Boxes with an extent keep the pad at that side as well. Their triangles lie behind the rays, but one of them may
+/// share an edge with a triangle that is hit, and rounding may attribute the hit to the triangle behind.
+///
+/// The boxes of a placement's parts (KernelScene::parts) are rounded outwards to floats, so they are never exactly
+/// flat; extents up to kUnitFlat M count as flat there. A ray that is culled by this rule could hit the placement
+/// through rounding only.
 namespace packtrace::packed {
 namespace {
 
-/// Rays end there at the latest, in units of the largest coordinate M: they start within 4 M of the grid's zero and go
-/// by 1 or more along an axis.
+/// Limit of t, in units of the largest coordinate M. Rays start within 4 M of the grid's zero and their largest
+/// direction component is at least 1, so they have left the tree by t = 5 M.
 constexpr float kReachEnd = 6.0f;
-/// The pad, times M: with u = 2^-24, 11 u 4 M for the triangle test of origins up to 4 M (see kBoxPad), and 40 u M for
-/// the three roundings of an end, 12 M away from a start of 4 M.
+/// The pad in units of M. With u = 2^-24, the triangle test needs 11 u 4 M for origins up to 4 M (see kBoxPad), and the
+/// three roundings of a ray's end, up to 12 M away from a start at 4 M, need 40 u M.
 constexpr float kReachPad = 96.0f * 0x1p-24f;
-/// Extents of boxes in unit space that are none but for rounding, times M.
+/// Extents of boxes in unit space that count as flat, in units of M. They come from rounding.
 constexpr float kUnitFlat = 0x1p-21f;
-/// What makes the least extent more than any pad.
+/// Scales any nonzero extent above every pad.
 constexpr float kAnyExtent = 0x1p100f;
-/// Up to here nodes' planes and vertices are whole numbers that floats hold.
+/// Up to this coordinate, node planes and vertices are integers that floats represent exactly.
 constexpr float kExactPlanes = 0x1p23f;
 
-/// Finds the reach of a group's rays.
+/// Computes the reach of a group's rays.
 class ReachFinder {
 public:
-  /// @param max_coordinate of the tree
+  /// @param max_coordinate largest absolute coordinate M of the tree
   explicit ReachFinder(float max_coordinate)
       : end_(kReachEnd * max_coordinate), pad_(kReachPad * max_coordinate),
         start_pad_(max_coordinate <= kExactPlanes ? 0.0f : pad_) {
     for (Floats& most : most_) most = Floats{} - __builtin_inff();
   }
 
-  /// @tparam kNearest whether t counts from the origin as it was before it was rounded
-  /// @param lanes that count, as bits
+  /// @tparam kNearest whether t counts from the origin before it was rounded to floats; the start is then less certain
+  /// by that rounding
+  /// @param lanes bit mask of the rays of the block to include
   template <bool kNearest>
   [[gnu::always_inline]] void add(const RayBlock& block, uint32_t lanes) {
     const Floats end = block.end < end_ ? block.end : Floats{} + end_;
@@ -54,7 +61,7 @@ public:
     }
   }
 
-  /// @param flat extents up to this count as none
+  /// @param flat largest extent that counts as flat
   void read(float flat, Reach& out) const {
     float most[8];
     const Floats all[8] = {most_[0], most_[1], most_[2], most_[3], most_[4], most_[5], most_[5], most_[5]};
@@ -70,10 +77,10 @@ private:
   }
 
   const float end_, pad_, start_pad_;
-  Floats most_[6]; ///< of -x, -y, -z, x, y, z
+  Floats most_[6]; ///< maxima of -x, -y, -z, x, y, z
 };
 
-/// Which of a node's boxes lie within reach, as bits.
+/// Returns the boxes of a node that overlap the reach, as a bit mask.
 template <typename Lanes>
 inline uint32_t pass_reach(const GroupBoxes<Lanes>& boxes, const Reach& reach) {
   using F = typename Lanes::F;

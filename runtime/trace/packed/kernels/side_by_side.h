@@ -2,18 +2,19 @@
 
 #include "runtime/trace/packed/kernels/group_boxes.h"
 
-/// Each box of a node against a register of neighbouring rays, in the place of each ray against eight boxes: the same
-/// arithmetic in other lanes.
+/// Tests each box of a node against a register of neighbouring rays, one ray per lane, instead of each ray against
+/// eight boxes. The arithmetic is the same in other lanes, so the results are the same bits.
 namespace packtrace::packed {
 namespace {
 
-/// The lanes of a register that begins with bit `first` of a word.
+/// Returns the bits of `rays` from bit `first` on that correspond to one register, as a lane mask.
 template <typename Wide>
 inline uint32_t lanes_at(uint64_t rays, uint32_t first) {
   return static_cast<uint32_t>(rays >> first) & ((1u << Wide::kLanes) - 1);
 }
 
-/// Whether few registers of rays are to be tested against few boxes, for rays that are.
+/// Whether testing rays in SIMD lanes beats testing boxes in lanes: registers of rays times boxes must be below two
+/// thirds of the number of rays.
 template <typename Wide>
 inline bool pays_side_by_side(uint64_t rays, uint32_t slots) {
   uint32_t registers = 0;
@@ -22,7 +23,7 @@ inline bool pays_side_by_side(uint64_t rays, uint32_t slots) {
          2 * static_cast<uint32_t>(__builtin_popcountll(rays));
 }
 
-/// A child's near and far planes.
+/// Near and far planes of a node's children.
 struct BoxPlanes {
   float near[3][baked::kNodeWidth], far[3][baked::kNodeWidth];
 };
@@ -35,7 +36,8 @@ inline void read_planes(const GroupBoxes<Lanes>& boxes, BoxPlanes& planes) {
   }
 }
 
-/// By child in `slots`: those of `rays` that pass its box, as bits. Returns the children that any passes.
+/// Tests the children of the bit mask `slots`. Returns the children that any ray passes, as a bit mask.
+/// @param out by child: the rays of the bit mask `rays` that pass its box; 0 for children not in `slots`
 template <typename Wide>
 [[gnu::always_inline]] inline uint32_t pass_each(const BoxPlanes& planes, const SideBySideRays& group, uint64_t rays,
                                                  uint32_t slots, uint64_t (&out)[baked::kNodeWidth]) {

@@ -2,37 +2,41 @@
 
 #include "runtime/trace/packed/kernels/ray_group.h"
 
-/// Eight triangles against a ray: Woop, Benthin, Wald, "Watertight ray/triangle intersection" (2013), with exact signs.
+/// Watertight ray/triangle test on SIMD lanes. Source: Woop, Benthin, Wald, "Watertight ray/triangle intersection"
+/// (2013); here the signs of edge functions are exact.
 ///
-/// Vertices move so that the ray starts at the origin and are sheared so that it runs along z: a vertex's x and y
-/// depend on the vertex and the ray only, so triangles that share it agree. What is decided then is whether the origin
-/// lies in the projected triangle, edges included, and that is decided exactly: the sign of an edge function p x q is
-/// taken from floats only where |p x q| is above its rounding error, and else from doubles, in which products of two
-/// floats are exact and their difference has the right sign.
+/// Vertices are translated so that the ray starts at the origin and sheared so that it runs along z. A vertex's sheared
+/// x and y depend on the vertex and the ray only, so triangles that share a vertex agree on them. What remains is to
+/// decide whether the origin lies in the projected triangle, edges included, and this is decided exactly: the sign of
+/// an edge function p x q is taken from floats only if |p x q| is above its rounding error. Otherwise it is evaluated
+/// in doubles, in which products of two floats are exact and their difference has the right sign.
 ///
-/// So no ray passes a closed mesh. Move the origin by less than any given distance to a place on no projected edge:
-/// there the triangles in front and behind, those that project to nothing left out, cover it as the exact plane mesh
-/// does. There are finitely many, so one of them covers places arbitrarily near the origin, and as triangles here are
-/// closed it covers the origin itself. That is also why triangles that project to nothing may be skipped.
+/// Therefore no ray passes through a closed mesh. Proof: move the origin by less than a given distance to a point on no
+/// projected edge. There the triangles in front and behind, without those of zero projected area, cover it as the exact
+/// plane mesh does. The number of triangles is finite, so one of them covers points arbitrarily near the origin; as
+/// triangles are closed, it covers the origin itself. For the same reason triangles of zero projected area may be
+/// skipped.
 namespace packtrace::packed {
 namespace {
 
-/// Far above the 2^-24 that two roundings need: weights of hits near edges become exact enough, too.
+/// Relative error bound of edge functions. Two roundings need only 2^-24; the larger bound keeps u and v of hits near
+/// edges accurate as well.
 constexpr float kEdgeError = 0x1p-18f;
-constexpr float kSmallestEdge = 0x1p-100f; ///< products below may have lost bits to underflow
+constexpr float kSmallestEdge = 0x1p-100f; ///< smaller products may have lost bits to underflow
 
-/// Of one lane each.
+/// Hits, one per lane.
 template <typename Lanes>
 struct LaneHits {
   alignas(64) float t[Lanes::kLanes], u[Lanes::kLanes], v[Lanes::kLanes];
 };
 
-/// The lanes whose signs floats do not settle. Returns those of `lanes` that hit at all, with their t, u and v. t is
-/// the plane's, as for all other lanes: the weights of a large or thin triangle would move it along the ray by the
-/// rounding of the far corners. Where the ray is nearly parallel to the plane, t is kept within the range of the
-/// corners.
-/// @param x, y, z of corners, sz: lanes
-/// @param depth, along: the ray meets the plane at z = depth / along
+/// Tests in doubles the lanes whose signs floats cannot decide. Returns the lanes that hit, as a bit mask, with their
+/// t, u and v. Here, too, t comes from the triangle's plane: weights of the corners of a large or thin triangle would
+/// move it along the ray by the corners' rounding errors. For rays nearly parallel to the plane, t is clamped to the
+/// range of the corners.
+/// @param lanes bit mask of the lanes to test
+/// @param x, y, z sheared corners; sz: Woop's Sz
+/// @param depth, along the ray meets the plane at z = depth / along
 template <typename Lanes>
 inline uint32_t test_exactly(uint32_t lanes, const typename Lanes::F (&x)[3], const typename Lanes::F (&y)[3],
                              const typename Lanes::F (&z)[3], typename Lanes::F sz, typename Lanes::F depth,
@@ -67,18 +71,18 @@ inline uint32_t test_exactly(uint32_t lanes, const typename Lanes::F (&x)[3], co
   return hit;
 }
 
-/// What a test needs of rays; lanes are triangles of one ray, or rays.
+/// Per-lane ray data of a test. Lanes hold either copies of one ray or different rays.
 template <typename Lanes>
 struct RayLanes {
   typename Lanes::F shear[3], begin, end; ///< hits lie in (begin, end]
 };
 
-/// Of a batch's triangles, as far as no ray matters.
+/// Unnormalised plane normals of a batch's triangles.
 struct BatchNormals {
   alignas(64) float normal[3][kBatch]; ///< [axis][triangle]
 };
 
-/// a b - c d with an error of 2^-23 of the result at most. Source: Jeannerod, Louvet, Muller, "Further analysis of
+/// Returns a b - c d with a relative error of at most 2^-23. Source: Jeannerod, Louvet, Muller, "Further analysis of
 /// Kahan's algorithm for the accurate computation of 2x2 determinants" (2013).
 template <typename Lanes>
 inline typename Lanes::F difference_of_products(typename Lanes::F a, typename Lanes::F b, typename Lanes::F c,
@@ -87,12 +91,12 @@ inline typename Lanes::F difference_of_products(typename Lanes::F a, typename La
   return Lanes::add(Lanes::fms(a, b, cd), Lanes::fnma(c, d, cd));
 }
 
-/// Largest coordinate of a tree whose vertices have exact differences: they are whole numbers.
+/// Up to this coordinate, differences of vertices are exact in floats, because vertices are integers.
 constexpr float kExactDifferences = 0x1p23f;
 
-/// Normals of triangles whose vertices have exact differences, each component within 2^-23 of its value. Rounding the
-/// products would tilt a thin triangle's plane by up to 2^-24 of its length over its height, and rays that start above
-/// it would meet it far from where they started.
+/// Returns plane normals of triangles whose vertex differences are exact in floats (kExactDifferences). The relative
+/// error per component is at most 2^-23. A plain float cross product would tilt a thin triangle's plane by up to 2^-24
+/// of its length over its height, and rays that start just above it would hit it far from their origins.
 template <typename Lanes>
 inline BatchNormals batch_normals(const DecodedBatch& batch) {
   using F = typename Lanes::F;
@@ -109,8 +113,8 @@ inline BatchNormals batch_normals(const DecodedBatch& batch) {
   return out;
 }
 
-/// The same of any triangles, in doubles: their differences have up to 31 bits and the products cancel to 2^-53 of
-/// themselves.
+/// Computes normals of arbitrary triangles in doubles: vertex differences have up to 31 bits, and the cross product has
+/// a rounding error of 2^-53 of its products.
 [[gnu::noinline]] inline void batch_normals_of_large(const DecodedBatch& batch, BatchNormals& out) {
   for (uint32_t i = 0; i < kBatch; ++i) {
     double e[3], f[3];
@@ -124,22 +128,22 @@ inline BatchNormals batch_normals(const DecodedBatch& batch) {
   }
 }
 
-/// The lanes in which a ray hits a triangle, as bits. Without a branch that often goes either way until one does.
-/// @tparam kWeights whether hits are filled; else only which lanes hit is wanted
-/// @tparam kRest whether planes are met from origins as they were before they were rounded
-/// @param relative (k, corner): the corner's coordinate along Woop's axis k less the origin's
-/// @param normal (k): of the triangle's plane, along Woop's axis k
-/// @param rest (k): what rounding took from the origin, along Woop's axis k
-/// @param wanted lanes, as bits
-/// @param exact_count counts lanes that took doubles
+/// Returns the lanes in which a ray hits a triangle, as a bit mask. Avoids unpredictable branches until a lane hits.
+/// @tparam kWeights whether hits are filled in; otherwise only the lanes are computed
+/// @tparam kRest whether t counts from the origin before it was rounded to floats
+/// @param relative (k, corner): the corner's coordinate along Woop's axis k minus the origin's
+/// @param normal (k): the plane normal along Woop's axis k
+/// @param rest (k): the origin's rounding error (exact minus rounded) along Woop's axis k
+/// @param wanted bit mask of the lanes to test
+/// @param exact_count incremented by the number of lanes that were evaluated in doubles
 template <typename Lanes, bool kWeights, bool kRest, typename Relative, typename Normal, typename Rest>
 inline uint32_t test_lanes(Relative relative, Normal normal, Rest rest, const RayLanes<Lanes>& rays, uint32_t wanted,
                            LaneHits<Lanes>& hits, uint64_t& exact_count) {
   using F = typename Lanes::F;
   const F sx = rays.shear[0], sy = rays.shear[1];
-  // t comes from the plane rather than from the weights: what vertices have along an axis that the plane is
-  // perpendicular to is then all that counts, which is what ray offsets rely on. Where t is wanted, what rounding took
-  // from the origin counts, too: along a grazing ray it is many times what it is along the normal.
+  // t comes from the plane rather than from the weights. On a plane perpendicular to an axis, only the coordinates
+  // along that axis then contribute, which ray offsets rely on. For nearest hits the origin's rounding error is taken
+  // into account: along a grazing ray it is magnified many times.
   F x[3], y[3], z[3], depth = Lanes::set(0.0f);
   for (uint32_t corner = 0; corner < 3; ++corner) {
     const F p = relative(0, corner), q = relative(1, corner);
@@ -151,7 +155,8 @@ inline uint32_t test_lanes(Relative relative, Normal normal, Rest rest, const Ra
   const F u2 = Lanes::mul(y[2], x[1]), v2 = Lanes::mul(y[0], x[2]), w2 = Lanes::mul(y[1], x[0]);
   const F u = Lanes::fms(x[2], y[1], u2), v = Lanes::fms(x[0], y[2], v2), w = Lanes::fms(x[1], y[0], w2);
   const F least = Lanes::min(Lanes::min(u, v), w), most = Lanes::max(Lanes::max(u, v), w);
-  // p q' - q p' is off by at most 2^-24 (|q p'| + |result|), so its sign is right where it is larger than the error.
+  // p q' - q p' has an error of at most 2^-24 (|q p'| + |result|), so its sign is right where its magnitude is above
+  // that error.
   const F error =
       Lanes::fma(Lanes::largest(Lanes::largest(u2, v2), w2), Lanes::set(kEdgeError), Lanes::set(kSmallestEdge));
   const F below = Lanes::negate(error);
@@ -163,7 +168,8 @@ inline uint32_t test_lanes(Relative relative, Normal normal, Rest rest, const Ra
     depth = Lanes::sub(depth,
                        Lanes::fma(rest(0), normal(0), Lanes::fma(rest(1), normal(1), Lanes::mul(rest(2), normal(2)))));
   const F along = Lanes::fma(sx, normal(0), Lanes::fma(sy, normal(1), normal(2))), zero = Lanes::set(0.0f);
-  // Rounding the sheared corners may open a sliver that has no plane, or one that the ray runs along.
+  // Rounding the sheared corners may give area to a sliver that has no plane or whose plane contains the ray's
+  // direction.
   unsure |= inside & Lanes::less_equal(along, zero) & Lanes::less_equal(zero, along);
   F t = Lanes::mul(Lanes::div(depth, along), rays.shear[2]);
   uint32_t hit = inside & ~unsure & Lanes::less(rays.begin, t) & Lanes::less_equal(t, rays.end);

@@ -42,15 +42,16 @@ DAffine outer_from_grid(const baked::TreeRecord& tree) {
   return DAffine(DVec3(step, 0, 0), DVec3(0, step, 0), DVec3(0, 0, step), origin * step);
 }
 
-/// Whether it does no more than scale and move.
+/// Whether the transform only scales along the axes and translates.
 bool is_aligned(const DAffine& m) {
   return m[0].y == 0.0 && m[0].z == 0.0 && m[1].x == 0.0 && m[1].z == 0.0 && m[2].x == 0.0 && m[2].y == 0.0;
 }
 
-/// Placements at most that are looked for by the boxes of their parts.
+/// Maximum number of placements for which rays are tested against the boxes of parts (KernelScene::parts).
 constexpr size_t kMostWithParts = baked::kNodeWidth;
 
-/// A box of the tree over many placements, larger by what rounding its planes may take: see packed::kLeastTopPad.
+/// Enlarges a box of the tree over many placements by the rounding errors of its planes: see
+/// packed::KernelScene::top_pad_coordinate.
 TreeBox grown(TreeBox box) {
   constexpr float kGrowth = 0x1p-20f;
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -60,14 +61,14 @@ TreeBox grown(TreeBox box) {
   return box;
 }
 
-/// Sets up the tree over placements as something placed in unit space itself.
-/// @param max_coordinate at least that of all grids whose axes are those of unit space, there
+/// Describes the tree over placements as a tree placed in unit space.
+/// @param max_coordinate largest coordinate, in unit space, of the grids of aligned placements
 void place_top(std::span<const TreeBox> boxes, float max_coordinate, packed::KernelScene& scene) {
   TreeBox all = boxes[0];
   for (const TreeBox& box : boxes) all.extend(box);
   scene.top = {};
   scene.top.aligned = 1;
-  const bool parts = boxes.size() <= kMostWithParts; // whose boxes are not larger than what they hold
+  const bool parts = boxes.size() <= kMostWithParts; // boxes are not enlarged then
   scene.top_max_coordinate = max_coordinate;
   for (size_t axis = 0; axis < 3; ++axis) {
     scene.top.grid_from_unit[3 * axis + axis] = 1.0;
@@ -81,15 +82,16 @@ void place_top(std::span<const TreeBox> boxes, float max_coordinate, packed::Ker
 
 struct PackedTracer::Tables : TracedTrees {
   std::vector<packed::TracePlacement> placements;
-  std::vector<TreeBox> boxes;           ///< of placements
-  std::vector<uint32_t> instance_of;    ///< by placement; baked::kNone: the world's
-  std::vector<uint32_t> first_instance; ///< by the file's geometry; that of a level's base
+  std::vector<TreeBox> boxes;           ///< by placement: its box in unit space
+  std::vector<uint32_t> instance_of;    ///< by placement; baked::kNone for the world tree
+  std::vector<uint32_t> first_instance; ///< by the file's geometry; a LOD level has that of its base geometry
   std::vector<Placement> surfaces;      ///< by instance
   std::vector<packed::TopNode> top;
-  std::vector<packed::TopNode> parts; ///< by placement, where there are no more than kMostWithParts
+  std::vector<packed::TopNode> parts; ///< by placement; used if there are at most kMostWithParts
   packed::KernelScene scene{};
-  float aligned_max_coordinate = 0.0f; ///< of placed trees whose axes are those of unit space, there
-  uint32_t stream_depth = 0;           ///< of top, where rays go through it together
+  /// Largest coordinate, in unit space, of the grids of aligned placements.
+  float aligned_max_coordinate = 0.0f;
+  uint32_t stream_depth = 0; ///< depth of top if rays traverse it as streams, else 0
   ThreadMemoryOwner memory;
 
   packed::ThreadMemory& of_this_thread() const { return memory.of_this_thread(stream_depth); }
@@ -150,19 +152,19 @@ void PackedTracer::find_first_instances() {
     t.first_instance[level.geometry] = t.first_instance[level.base];
 }
 
-/// Object space; empty where there is nothing.
+/// Bounds of a geometry in object space; empty if it has no triangles.
 Bounds PackedTracer::bounds_of(uint32_t geometry) const {
   if (lod_ != nullptr) return lod_->bounds(geometry);
   return object_bounds(file_.geometries()[geometry]);
 }
 
-/// The instance that a cluster of a placement is of.
+/// The instance that a cluster of a placement belongs to.
 uint32_t PackedTracer::instance_of(uint32_t placement, uint32_t cluster) const {
   const uint32_t placed = tables_->instance_of[placement];
   return placed != baked::kNone ? placed : tables_->first_instance[geometry_of_cluster(cluster)];
 }
 
-/// A cluster's triangle as the source numbers it.
+/// The source's number of a cluster's triangle.
 uint32_t PackedTracer::triangle_of(uint32_t cluster, uint32_t instance, uint32_t triangle) const {
   if (lod_ != nullptr) return lod_->triangle_number(lod_->instances()[instance].geometry, cluster, triangle);
   return file_.sections().clusters[cluster].first_triangle + triangle;
@@ -188,7 +190,7 @@ void PackedTracer::place() {
       continue;
     }
     t.surfaces[i] = instanced_placement(i, world_from_object, *unit_from_grid);
-    // Rays move in doubles, and only what they become in the grid is rounded.
+    // Rays are transformed in doubles and rounded once, in the grid.
     t.surfaces[i].moved_linear = glm::dmat3(0.0);
     t.surfaces[i].moved_offset = DVec3(0.0);
     const bool in_world = t.records[tree].geometry == baked::kWorldTree;
@@ -198,7 +200,7 @@ void PackedTracer::place() {
   }
 }
 
-/// @param instance or baked::kNone for the world's tree
+/// @param instance baked::kNone for the world tree
 void PackedTracer::add_placement(uint32_t tree, uint32_t instance, const DAffine& unit_from_grid) {
   Tables& t = *tables_;
   if (t.records[tree].node_count == 0) return;

@@ -9,17 +9,17 @@
 
 namespace packtrace {
 
-/// Traces a baked file as it is: triangles are decoded from the clusters' bits when rays reach them, boxes are those of
-/// the file's trees, or of trees built here where it has none. docs/packed_bvh.md describes how.
+/// Traces a baked file without unpacking it: triangles are decoded from the clusters' bits when rays reach them, and
+/// the boxes are those of the file's trees, or of trees built here if the file has none. See docs/packed_bvh.md.
 class PackedTracer final : public RayTracer {
 public:
   /// Keeps references: both must outlive the tracer.
-  /// @param source of the same file: instances, and masks on hits
+  /// @param source a source of the same file; provides instances and alpha masks
   /// Throws Error(kUnsupported) for an instruction set that this machine lacks, Error(kInput) for transforms that are
   /// not finite.
   PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa = chosen_isa());
-  /// The same at the detail of a plan: a tree for each BLAS, but one for those of all world-space geometry, which have
-  /// one instance each.
+  /// Does the same at the detail of a plan: builds one tree per BLAS, except that all world-space geometries, which
+  /// have one instance each, share one tree.
   PackedTracer(const BakedFile& file, const LodSource& source, PackedIsa isa = chosen_isa());
   ~PackedTracer() override;
   PackedTracer(const PackedTracer&) = delete;
@@ -40,16 +40,16 @@ public:
 
   std::span<const uint32_t> flat_instances() const override { return flat_instances_; }
 
-  /// Of a LodSource.
+  /// Build times and sizes of the trees; empty unless the source is a LodSource.
   const LodTrees& lod_trees() const { return lod_trees_; }
 
-  /// From now on leaf nodes are found by `search`, of the trees' inner nodes none is read. See packed::TreeSearch.
+  /// From now on `search` finds the leaf nodes, and the trees' inner nodes are not read. See packed::TreeSearch.
   void search_trees(void (*search)(const void* searcher, const packed::TreeSearch&), const void* searcher);
-  /// By number, of the file or built here.
+  /// The trees, the file's or built here, by number.
   std::span<const baked::TreeRecord> tree_records() const;
   std::span<const packed::TraceTree> trees() const;
 
-  /// The same queries on the calling thread, adding up what the kernels do. Slower.
+  /// closest_hits() and any_hits() with statistics, which are added to `counters`. Slower.
   void count_closest(std::span<const Ray> rays, uint32_t ray_class, std::span<RayHit> hits,
                      packed::KernelCounters& counters) const;
   void count_any(std::span<const Ray> rays, uint32_t ray_class, std::span<uint8_t> occluded,
@@ -69,7 +69,7 @@ private:
 
   const BakedFile& file_;
   const SceneSource& source_;
-  const LodSource* const lod_; ///< source_, or null
+  const LodSource* const lod_; ///< source_ if it is a LodSource, else null
   const packed::Kernels& kernels_;
   UnitSpace space_;
   std::vector<uint32_t> flat_instances_;

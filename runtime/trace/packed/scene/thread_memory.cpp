@@ -7,10 +7,11 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kEntryBits = 10; // 320 KiB: a third of a common second-level cache
+constexpr uint32_t kEntryBits = 10; // 320 KiB: a third of a common level-2 cache
 constexpr uint64_t kBatchBytes = uint64_t{sizeof(packed::DecodedBatch)} << kEntryBits;
 
-/// @param top_depth levels of nodes over placements
+/// Bytes that a PlacementStream needs.
+/// @param top_depth levels of nodes in the tree over placements
 constexpr size_t stream_bytes(uint32_t top_depth) {
   using namespace packed;
   return kStreamGroups * (kStreamGroupBytes + (1 + size_t{top_depth} * baked::kNodeWidth) * kStreamPartBytes);

@@ -6,20 +6,21 @@
 
 namespace packtrace {
 
-/// Who uses what threads keep for kernels: each thread has one cache of decoded batches, for whoever used it last, and
-/// room for streams of rays.
+/// A user, such as a tracer, of the memory that threads keep for kernels. Each thread has one cache of decoded batches,
+/// which belongs to the owner that used it last, and memory for streams of rays.
 class ThreadMemoryOwner {
 public:
   ThreadMemoryOwner();
   ThreadMemoryOwner(const ThreadMemoryOwner&) = delete;
   ThreadMemoryOwner& operator=(const ThreadMemoryOwner&) = delete;
 
-  /// The calling thread's, holding nothing that this owner did not put there. Valid until the thread ends, or asks for
-  /// another.
-  /// @param top_depth levels of nodes over placements that rays go through together; 0: none
+  /// Returns the calling thread's memory, whose cache holds batches of this owner only. Valid until the thread ends or
+  /// calls this function for another owner.
+  /// @param top_depth levels of nodes in the tree over placements, if rays traverse it as streams; 0: no memory for
+  /// streams
   packed::ThreadMemory& of_this_thread(uint32_t top_depth) const;
 
-  /// What all threads that live keep, for whichever owner.
+  /// Bytes that all live threads keep, for any owner.
   static uint64_t bytes_of_all_threads();
 
 private:

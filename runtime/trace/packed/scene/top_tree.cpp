@@ -24,7 +24,7 @@ std::vector<packed::TopNode> build_top_tree(std::span<const TreeBox> boxes) {
   std::vector<uint32_t> place(wide.size());
   for (size_t i = 0; i < wide.size(); ++i)
     if (wide[i].child_count > 0) place[i] = static_cast<uint32_t>(nodes.size()), nodes.emplace_back();
-  if (nodes.empty()) return {top_node(boxes)}; // one box
+  if (nodes.empty()) return {top_node(boxes)}; // a single box
   for (size_t i = 0; i < wide.size(); ++i) {
     for (uint32_t slot = 0; slot < wide[i].child_count; ++slot) {
       const WideNode& child = wide[wide[i].first_child + slot];
@@ -43,7 +43,8 @@ packed::TopNode top_node(std::span<const TreeBox> boxes) {
 }
 
 uint32_t top_tree_depth(std::span<const packed::TopNode> nodes) {
-  std::vector<uint8_t> levels(nodes.size(), 1); // down to a node; children come after theirs
+  // Levels from the root to each node; a child's number is greater than its parent's.
+  std::vector<uint8_t> levels(nodes.size(), 1);
   for (size_t i = 0; i < nodes.size(); ++i)
     for (uint32_t slots = nodes[i].slots; slots != 0; slots &= slots - 1)
       if (const uint32_t child = nodes[i].child[std::countr_zero(slots)]; (child & packed::kTopLeaf) == 0)

@@ -24,19 +24,20 @@ Shifts shifts(const baked::TreeRecord& tree, const baked::GeometryRecord& geomet
   return {static_cast<uint32_t>(std::clamp(up, 0, kMaxDown)), static_cast<uint32_t>(std::max(-up, 0))};
 }
 
-/// In 2^-down tree steps.
+/// Returns a tree coordinate in units of 2^-down tree grid steps.
 Int128 moved(int64_t q, int64_t origin, Shifts by) {
   return static_cast<Int128>(q) * (Int128{1} << by.up) - static_cast<Int128>(origin) * (Int128{1} << by.down);
 }
 
 float tree_coordinate(int64_t q, int64_t origin, Shifts by) {
   if (by.down <= kMaxDown) return std::ldexp(static_cast<float>(moved(q, origin, by)), -static_cast<int>(by.down));
-  // Below 2^-7 then, and so without effect on all but an origin of 0.
+  // The share of q is below 2^-7 then, too small to affect the result unless the origin is 0.
   if (origin != 0) return -static_cast<float>(origin);
   return std::ldexp(static_cast<float>(q), -static_cast<int>(by.down));
 }
 
-/// Whether its vertices are what kernels can read: 32-bit sums of fields that one 64-bit load holds.
+/// Whether kernels can read the cluster's vertices: coordinates fit into 32 bits, and one 64-bit load holds the fields
+/// of a vertex.
 bool is_plain(const baked::TreeRecord& tree, const baked::GeometryRecord& geometry, const ClusterView& cluster,
               Shifts by, int32_t (&base)[3]) {
   const auto& widths = cluster.record().position_bits;
@@ -100,7 +101,7 @@ void decode_vertices(const packed::TraceCluster& cluster, uint32_t triangle, Vec
   const auto& widths = cluster.position_bits;
   const uint32_t stride = uint32_t{widths[0]} + widths[1] + widths[2];
   const float scale = packed::power_of_two(cluster.down);
-  for (uint32_t corner = 0; corner < 3; ++corner) { // the batch's list is the triangle's corners
+  for (uint32_t corner = 0; corner < 3; ++corner) { // the batch's corner list is the triangle's corners
     uint32_t vertex = 0;
     if (corner < batch.lead_count)
       vertex = batch.lead[corner];

@@ -8,16 +8,16 @@
 
 namespace packtrace {
 
-/// A cluster as kernels read it.
-/// @param ray_classes baked::kCameraBelow and so on, for its material slot
+/// Returns a cluster as kernels read it.
+/// @param ray_classes ray classes of the cluster's material slot: baked::kCameraBelow, kOcclusionBelow, kMaskedLeaves
 packed::TraceCluster trace_cluster(const baked::TreeRecord& tree, const baked::GeometryRecord& geometry,
                                    const ClusterView& cluster, uint8_t ray_classes);
 
-/// The vertices of one triangle, in the tree's coordinates: the bits that kernels decode.
-/// @param cluster not packed::kWide
+/// Decodes the vertices of one triangle into the tree's grid, to the same bits as kernels do.
+/// @param cluster must not be packed::kWide
 void decode_vertices(const packed::TraceCluster& cluster, uint32_t triangle, Vec3 (&vertices)[3]);
 
-/// Decodes up to packed::kBatch triangles of any cluster, exactly rounded; returns how many.
+/// Decodes up to packed::kBatch triangles of any cluster, each coordinate rounded once; returns their number.
 uint32_t decode_batch_exactly(const baked::TreeRecord& tree, const baked::GeometryRecord& geometry,
                               const ClusterView& cluster, uint32_t first, uint32_t count, packed::DecodedBatch& out);
 

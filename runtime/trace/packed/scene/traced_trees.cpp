@@ -26,7 +26,8 @@ void add_tree(TracedTrees& t, uint32_t number) {
   t.trees.push_back(tree);
 }
 
-/// @param number of a tree in whose grid they are read
+/// Fills in the clusters of geometry g.
+/// @param number tree in whose grid the clusters are decoded
 void add_clusters(TracedTrees& t, const BakedFile& file, uint32_t number, uint32_t g) {
   const baked::TreeRecord& tree = t.records[number];
   const baked::GeometryRecord& geometry = file.geometries()[g];
@@ -37,7 +38,7 @@ void add_clusters(TracedTrees& t, const BakedFile& file, uint32_t number, uint32
       t.clusters[geometry.first_cluster + next] = trace_cluster(tree, geometry, file.cluster(g, next), ray_classes(c));
 }
 
-/// Room for what is numbered by geometry or cluster.
+/// Returns trees with the arrays that are indexed by geometry or cluster allocated.
 TracedTrees make_room(const BakedFile& file, uint32_t geometry_count) {
   TracedTrees t;
   t.clusters.resize(file.sections().clusters.size());
@@ -69,7 +70,7 @@ TracedTrees whole_trees(const BakedFile& file) {
     const uint32_t g = t.records[i].geometry;
     if (g == baked::kWorldTree)
       world = i;
-    else if (g < t.tree_of.size()) // else a level of detail
+    else if (g < t.tree_of.size()) // otherwise the tree of a coarser LOD level
       t.tree_of[g] = i;
   }
   for (uint32_t g = 0; g < t.tree_of.size(); ++g) {
@@ -86,7 +87,7 @@ TracedTrees chosen_trees(const BakedFile& file, const LodSource& source, LodTree
   const BakedSections& sections = file.sections();
   const std::vector<uint8_t> joins = ChosenTreeBuilder::joins_world(sections);
   std::vector<ChosenClusters> chosen;
-  std::vector<uint32_t> blas_of; // by choice
+  std::vector<uint32_t> blas_of; // by index in `chosen`
   uint32_t world = baked::kNone;
   const auto next_tree = [&](uint32_t geometry, uint32_t blas) {
     chosen.push_back({geometry, {}});
@@ -103,7 +104,8 @@ TracedTrees chosen_trees(const BakedFile& file, const LodSource& source, LodTree
       chosen[tree].clusters.push_back(static_cast<uint32_t>(file.geometries()[c.geometry].first_cluster + c.cluster));
   }
   if (world != baked::kNone)
-    std::ranges::sort(chosen[world].clusters); // levels of all of them are behind all of level 0
+    // The clusters of coarser levels follow those of level 0 of all geometries.
+    std::ranges::sort(chosen[world].clusters);
   const Stopwatch making_clusters;
   const ChosenTreeBuilder builder(sections, chosen);
   cost.clusters_s = making_clusters.seconds();

@@ -13,31 +13,32 @@
 
 namespace packtrace {
 
-/// The trees that rays go through, and the clusters in them as kernels read them.
+/// The trees that rays traverse, and the clusters in them as kernels read them.
 struct TracedTrees {
-  PackedTrees built; ///< where the file has no trees
+  PackedTrees built; ///< owns trees that were built here
   std::span<const baked::TreeRecord> records;
   std::span<const baked::PackedNode> nodes;
   std::vector<packed::TraceTree> trees;
-  std::vector<std::optional<TreeHull>> hulls; ///< by tree, of those with nodes; until all is placed
+  /// By tree, none for trees without nodes; kept until all trees are placed.
+  std::vector<std::optional<TreeHull>> hulls;
   std::vector<packed::TraceCluster> clusters; ///< by number in the cluster section
-  std::vector<uint32_t> tree_of;              ///< by the source's geometry, or baked::kNone
-  std::vector<uint32_t> grid_of;              ///< by the file's geometry: a tree whose grid its clusters are read in
+  std::vector<uint32_t> tree_of;              ///< by the source's geometry: number of its tree, or baked::kNone
+  std::vector<uint32_t> grid_of;              ///< by the file's geometry: tree in whose grid its clusters are decoded
 };
 
-/// What building the trees of a LodSource took and takes.
+/// Time and memory of building the trees of a LodSource.
 struct LodTrees {
-  double clusters_s = 0.0;      ///< nodes of clusters, which do not depend on the view
-  double trees_s = 0.0;         ///< nodes above them
-  std::vector<TreeBytes> trees; ///< worst cases are known before they are built
+  double clusters_s = 0.0;      ///< time to build the clusters' leaf nodes, which do not depend on the view
+  double trees_s = 0.0;         ///< time to build the nodes above them
+  std::vector<TreeBytes> trees; ///< worst cases are known before the trees are built
 };
 
-/// Trees over all of level 0: the file's, or built here if it holds none.
-/// @param file outlives the result
+/// Returns the trees over LOD level 0: the file's trees, or trees built here if it holds none.
+/// @param file must outlive the result
 TracedTrees whole_trees(const BakedFile& file);
 
-/// Trees over the clusters of a plan's BLASes, built here: one each, and one for all that lies in the world.
-/// @param file outlives the result
+/// Builds the trees over the clusters of a plan's BLASes: one per BLAS, and a single one for all world-space geometry.
+/// @param file must outlive the result
 TracedTrees chosen_trees(const BakedFile& file, const LodSource& source, LodTrees& cost);
 
 } // namespace packtrace

@@ -7,12 +7,12 @@
 namespace packtrace {
 namespace {
 
-/// Boxes at most, of children or grandchildren of the root.
+/// Maximum number of boxes: children or grandchildren of the root.
 constexpr size_t kMostBoxes = size_t{baked::kNodeWidth} * baked::kNodeWidth;
 
 struct Child {
   DVec3 lo, hi;
-  uint32_t node; ///< 0: a leaf
+  uint32_t node; ///< number of the node; 0 for a leaf
 };
 
 std::vector<Child> children(const baked::PackedNode& node) {
@@ -47,7 +47,7 @@ TreeHull::TreeHull(const baked::PackedNode* nodes)
 }
 
 double TreeHull::pad() const {
-  // Rays in the grid are off by 2^-22 of the largest coordinate there, see ray_group.h.
+  // Rays have errors of up to 2^-22 of the largest coordinate in the grid (ray_group.h); this is four times that.
   const DVec3 far = glm::max(glm::abs(lo_), glm::abs(hi_));
   return 0x1p-20 * std::max({far.x, far.y, far.z});
 }
@@ -70,7 +70,7 @@ TreeBox TreeHull::placed(const DAffine& unit_from_grid, double pad, size_t begin
   TreeBox box;
   for (int axis = 0; axis < 3; ++axis) {
     const DVec3 row(unit_from_grid[0][axis], unit_from_grid[1][axis], unit_from_grid[2][axis]), size = glm::abs(row);
-    double lo[2], hi[2]; // of every other box: numbers that do not wait for each other
+    double lo[2], hi[2]; // of even and odd boxes: two independent dependency chains
     std::fill_n(lo, 2, std::numeric_limits<double>::infinity());
     std::fill_n(hi, 2, -std::numeric_limits<double>::infinity());
     for (size_t i = begin; i < end; ++i) {

@@ -8,35 +8,38 @@
 #include "runtime/trace/packed/traversal/outside_search.h"
 #include "runtime/trace/packed/kernels/reach.h"
 
-/// Groups of rays through trees of nodes. They come to a node together, as one word of bits, and leave for each child
-/// those that pass its box: a node is read and set up once for all of them, and nothing waits for the outcome of one
-/// ray's test. Idea: Barringer, Akenine-Moeller, "Dynamic ray stream traversal" (2014).
+/// Traces groups of rays through the tree over placements and through placed trees. A group visits a node together, as
+/// a 64-bit mask of rays, and the node test yields a mask per child of the rays that pass its box. A node is read and
+/// unpacked once per group, and no ray's test waits for the result of another. Source of the idea: Barringer,
+/// Akenine-Moeller, "Dynamic ray stream traversal" (2014).
 namespace packtrace::packed {
 namespace {
 
-/// Cache lines from a cluster's first bits on: most of the 400 to 500 bytes that clusters have without normals.
+/// Number of cache lines of a cluster's bits to prefetch. They hold most of the 400 to 500 bytes of a cluster without
+/// normals.
 constexpr uint32_t kPrefetchedLines = 7;
 
+/// A stack entry: a node or placement, and the rays that are to visit it.
 struct Pending {
-  uint64_t rays; ///< as bits
+  uint64_t rays; ///< bit mask
   uint32_t node;
-  float t; ///< where the first of them enters; only for order
+  float t; ///< t at which the first of the rays, or the beam, enters the box; 0 for any hits
 };
 
-/// Any hits (kAny) or nearest hits of one ray class in one scene, on one thread: a group of rays at a time.
+/// Finds any hits (kAny) or nearest hits of one ray class in one scene, on one thread, group by group.
 template <typename Lanes, bool kAny, bool kCount>
 class GroupTraversal {
 public:
   using Kernel = Lanes;
   static constexpr bool kAnyHit = kAny;
 
-  /// @param hits of nearest hits, one for each ray, placement ~0 where there is none yet
+  /// @param hits for nearest hits: one per ray, with placement ~0 where there is no hit yet
   GroupTraversal(const KernelScene& scene, BatchCache& cache, const KernelRay* rays, uint32_t ray_class,
                  KernelHit* hits, KernelCounters* counters)
       : scene_(scene), cache_(cache), rays_(rays), ray_class_(ray_class), hits_(hits), counters_(counters) {}
 
-  /// The group that is traced from now on.
-  /// @param numbers of 1 to kGroup rays, kept
+  /// Makes the given rays the current group.
+  /// @param numbers indices of 1 to kGroup rays; must stay valid while the group is traced
   void take(const uint32_t* numbers, uint32_t count) {
     numbers_ = numbers;
     alive_ = ~uint64_t{0} >> (kGroup - count);
@@ -48,7 +51,7 @@ public:
     if constexpr (!kAny) unit_.one_origin = start_at_one_place(unit_, count);
   }
 
-  /// The same with the hits that its rays have.
+  /// Does the same, and keeps the hits found so far: each ray ends at its nearest hit.
   void take_again(const uint32_t* numbers, uint32_t count) {
     take(numbers, count);
     if constexpr (!kAny)
@@ -56,7 +59,7 @@ public:
         if (const KernelHit& hit = hits_[numbers[i]]; hit.placement != ~0u) unit_.tmax[i] = hit.t;
   }
 
-  /// Traces the group through the whole scene.
+  /// Traces the current group through the whole scene.
   void trace() {
     if (scene_.top_nodes != nullptr)
       trace_top();
@@ -64,16 +67,16 @@ public:
       trace_placement(0, alive_);
   }
 
-  /// Traces the group through one placement.
+  /// Traces the current group through one placement.
   void trace(uint32_t placement) {
     nearer_ = 0;
     trace_placement(placement, alive_);
   }
 
   const UnitRays& unit() const { return unit_; }
-  /// The rays that still look for a hit, as bits.
+  /// The rays that still look for a hit, as a bit mask.
   uint64_t alive() const { return alive_; }
-  /// The rays whose nearest hit the placement traced last has, as bits.
+  /// The rays whose nearest hit lies in the placement traced last, as a bit mask.
   uint64_t nearer() const { return nearer_; }
 
 private:
@@ -83,7 +86,7 @@ private:
     uint32_t placement, cluster, triangle;
   };
 
-  /// Calls visit(rays, octant) for the rays of each octant.
+  /// Partitions rays by the octant of their direction and calls visit(rays, octant) for each part.
   template <typename Visit>
   static void by_octant(const BoxRays& group, uint64_t rays, Visit visit) {
     while (rays != 0) {
@@ -92,7 +95,7 @@ private:
       uint32_t octant = 0;
       for (uint32_t axis = 0; axis < 3; ++axis) {
         const uint64_t backward = (group.backward[axis] >> first) & 1u;
-        together &= group.backward[axis] ^ (backward - 1); // those whose bit is the same
+        together &= group.backward[axis] ^ (backward - 1); // rays with the same sign as `first`
         octant |= static_cast<uint32_t>(backward) << axis;
       }
       visit(together, octant);
@@ -100,7 +103,7 @@ private:
     }
   }
 
-  /// Through the tree over placements.
+  /// Traces the current group through the tree over placements.
   void trace_top() {
     SideBySideRays group;
     const uint64_t rays =
@@ -133,7 +136,7 @@ private:
     }
   }
 
-  /// Those of `rays` that come to a placement's parts.
+  /// Returns the rays that pass the box of a part of the placement, or all rays if the scene has no parts.
   uint64_t reach_parts(uint32_t placement, const SideBySideRays& group, uint64_t rays, uint32_t octant) const {
     if (scene_.parts == nullptr) return rays;
     const TopNode& parts = scene_.parts[placement];
@@ -164,7 +167,7 @@ private:
     });
   }
 
-  /// Through one placed tree, rays of one octant of it.
+  /// Traces rays of one octant through a placed tree.
   void trace_tree(uint32_t placement, const baked::PackedNode* nodes, RayGroup& group, uint64_t rays, uint32_t octant) {
     Pending stack[baked::kMaxTreeDepth * (baked::kNodeWidth - 1) + 1];
     uint32_t size = 0;
@@ -187,7 +190,8 @@ private:
     }
   }
 
-  /// All children of a node, whichever rays pass: the first one is read right after the boxes were tested.
+  /// Prefetches all children of a node before it is known which of them rays pass: the first child is read right after
+  /// the boxes have been tested.
   static void prefetch_siblings(const baked::PackedNode* first) {
     const auto begin = reinterpret_cast<uintptr_t>(first), end = begin + baked::kNodeWidth * sizeof *first;
     for (uintptr_t line = begin; line < end; line += 64) __builtin_prefetch(reinterpret_cast<const void*>(line));
@@ -197,14 +201,15 @@ private:
     if constexpr (kCount) ++counters_->nodes, counters_->node_rays += count_ones(rays);
   }
 
-  /// Whether all of a beam's hits are nearer.
+  /// Whether a beam has no ray left that reaches this entry: all its nearest hits are in front of it.
   static bool passed_by(const RayGroup& group, const Pending& pending) {
     if constexpr (kAny) return false;
     return group.beam != nullptr && pending.t > -group.beam->limits[1];
   }
 
-  /// Which of `slots` rays pass, and which do.
-  /// @param t where the first ray enters each child; of a beam, nowhere beyond where any does
+  /// Tests rays against the children in the bit mask `slots`. Returns the children that any ray passes, as a bit mask.
+  /// @param by_child by child: the rays that pass its box
+  /// @param t for nearest hits: where the first ray enters each child; for a beam, a lower bound over its rays
   template <typename Group>
   static uint32_t pass(const typename Lanes::Boxes& boxes, const Group& group, uint64_t rays, uint32_t slots,
                        uint64_t (&by_child)[baked::kNodeWidth], float (&t)[baked::kNodeWidth]) {
@@ -219,7 +224,8 @@ private:
     return pass_apart(boxes, group, rays, slots, by_child, t);
   }
 
-  /// The same of rays that are no beam. On its own, as the compiler makes beams slower if they are one function.
+  /// Does the same for rays that form no beam. It is a function of its own because the compiler generates slower code
+  /// for beams if both are one function.
   template <typename Group>
   [[gnu::noinline]] static uint32_t pass_apart(const typename Lanes::Boxes& boxes, const Group& group, uint64_t rays,
                                                uint32_t slots, uint64_t (&by_child)[baked::kNodeWidth],
@@ -244,8 +250,8 @@ private:
     return pass_each<typename Lanes::Wide>(planes, group, rays, slots, by_child);
   }
 
-  /// Pushes the children of a node that rays pass; of nearest hits, the one that the first ray enters first on top, of
-  /// any hits the first in the tree's own order.
+  /// Pushes the children of a node that rays pass. For nearest hits the child that the first ray enters first ends on
+  /// top of the stack; for any hits, the first child in the tree's order.
   template <typename Group, typename Number>
   static void push_children(const typename Lanes::Boxes& boxes, const Group& group, uint64_t rays, uint32_t slots,
                             Pending* stack, uint32_t& size, Number number) {
@@ -271,7 +277,8 @@ private:
 
   void trace_leaves(uint32_t placement, const baked::PackedNode& node, NodeChildren children,
                     const typename Lanes::Boxes& boxes, RayGroup& group, uint64_t rays) {
-    const uint8_t* const bits = scene_.clusters[node.cluster].bits; // decoding waits for them longer than it takes
+    // Without the prefetch, decoding waits longer for them than it takes.
+    const uint8_t* const bits = scene_.clusters[node.cluster].bits;
     for (uint32_t line = 0; line < kPrefetchedLines; ++line) __builtin_prefetch(bits + 64 * line);
     if ((scene_.clusters[node.cluster].flags & ray_class_) == 0) return;
     uint64_t by_child[baked::kNodeWidth];
@@ -316,7 +323,7 @@ private:
     }
   }
 
-  /// One ray after the other.
+  /// Tests one ray after the other, each against all triangles of the batch.
   void test_each(const DecodedBatch& batch, const BatchNormals& normals, const Place& place, RayGroup& group,
                  uint64_t rays) {
     for (uint64_t m = rays; m != 0; m &= m - 1) {
@@ -329,7 +336,8 @@ private:
     }
   }
 
-  /// One triangle after the other, where enough rays fill a register. Returns the other rays.
+  /// Tests one triangle after the other against registers of rays, where a register has at least as many active rays as
+  /// the batch has triangles. Returns the remaining rays, as a bit mask.
   uint64_t test_side_by_side(const DecodedBatch& batch, const BatchNormals& normals, Place place, RayGroup& group,
                              uint64_t rays) {
     using Wide = typename Lanes::Wide;
@@ -368,7 +376,7 @@ private:
     return batch;
   }
 
-  /// Of ray i, in these lanes of a batch that begins at `place`.
+  /// Records the hits of ray i in the given lanes (triangles) of a batch that begins at `place`.
   void take_hits(Place place, uint32_t i, const LaneHits<Lanes>& hits, uint32_t lanes, RayGroup& group) {
     const uint32_t begin = place.triangle;
     for (; lanes != 0; lanes &= lanes - 1) {
@@ -378,8 +386,8 @@ private:
     }
   }
 
-  /// Of ray i, if it counts. Returns whether it does. Hits are compared by their t in unit space, so that what counts
-  /// does not depend on which placement comes first.
+  /// Records a hit of ray i and returns true if it counts: it is not masked out and, for nearest hits, is the nearest
+  /// so far. Hits are compared by their t in unit space, so the result does not depend on the order of placements.
   bool take_hit(const Place& place, uint32_t i, float t, float u, float v, RayGroup& group) {
     float unit_t = 0.0f;
     if constexpr (!kAny) {
@@ -401,9 +409,10 @@ private:
     return true;
   }
 
-  /// Of two hits at one place the one with the smaller numbers counts.
+  /// Of two hits with equal t, the one with the smaller numbers counts.
   static bool precedes(const Place& place, const KernelHit& hit) {
-    if (hit.placement != place.placement) return place.placement < hit.placement; // as all are than no hit's
+    // Every placement number is less than ~0, which means no hit.
+    if (hit.placement != place.placement) return place.placement < hit.placement;
     if (hit.cluster != place.cluster) return place.cluster < hit.cluster;
     return place.triangle < hit.triangle;
   }
@@ -414,11 +423,11 @@ private:
   const uint32_t ray_class_;
   KernelHit* const hits_;
   KernelCounters* const counters_;
-  // Of the group that is traced:
-  const uint32_t* numbers_ = nullptr; ///< of its rays
+  // State of the current group:
+  const uint32_t* numbers_ = nullptr; ///< indices of its rays
   uint64_t alive_ = 0;                ///< rays that still look for a hit
-  uint64_t nearer_ = 0;               ///< rays whose nearest hit the placement traced last has
-  bool exact_differences_ = false;    ///< of vertices of the tree that is traced
+  uint64_t nearer_ = 0;               ///< rays whose nearest hit lies in the placement traced last
+  bool exact_differences_ = false;    ///< whether vertex differences are exact in floats in the current tree
   UnitRays unit_;
 };
 

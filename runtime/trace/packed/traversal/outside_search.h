@@ -3,16 +3,16 @@
 #include "runtime/trace/packed/kernels/leaf_tests.h"
 #include "runtime/trace/packed/kernels/node_children.h"
 
-/// Rays through a placed tree whose leaf nodes are found by KernelScene::search_tree instead of its inner nodes.
+/// Traces rays through a placed tree whose leaf nodes are found by KernelScene::search_tree, without its inner nodes.
 namespace packtrace::packed {
 namespace {
 
-/// @tparam Traversal that tests the leaves
+/// @tparam Traversal the GroupTraversal that tests the leaves
 template <typename Traversal>
 struct OutsideSearch {
   using Lanes = typename Traversal::Kernel;
 
-  /// As Traversal::trace_tree().
+  /// See GroupTraversal::trace_tree().
   static void run(Traversal& self, uint32_t placement, const baked::PackedNode* nodes, RayGroup& group, uint64_t rays,
                   uint32_t octant) {
     const KernelScene& scene = self.scene_;
@@ -30,7 +30,9 @@ struct OutsideSearch {
       search.number[search.count++] = i;
       for (uint32_t axis = 0; axis < 3; ++axis)
         ray.origin[axis] = group.origin[axis][i], ray.direction[axis] = 1.0f / within_limit(group.inverse[axis][i]);
-      ray.tnear = group.limits[i][0] > 0.0f ? group.limits[i][0] : 0.0f; // nothing lies behind an origin that moved
+      // tnear may be negative if the origin was moved. Embree needs tnear >= 0, and there is nothing to hit before a
+      // moved origin.
+      ray.tnear = group.limits[i][0] > 0.0f ? group.limits[i][0] : 0.0f;
       ray.tfar = group.tmax(i);
     }
     scene.search_tree(scene.searcher, search);
@@ -42,7 +44,8 @@ struct OutsideSearch {
   uint32_t placement, octant;
 
 private:
-  /// Embree takes directions below 1e-18 for 0; here they are 2^-40 at least, 6 M 2^-40 of its boxes' pad.
+  /// Embree treats direction components below 1e-18 as 0. Components are therefore at least 2^-40 here, which moves a
+  /// ray by at most 6 M 2^-40; the pad of Embree's boxes covers that.
   static float within_limit(float inverse) {
     constexpr float kMost = 0x1p40f;
     return inverse > kMost ? kMost : inverse < -kMost ? -kMost : inverse;

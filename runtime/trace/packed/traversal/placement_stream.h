@@ -3,41 +3,41 @@
 #include "runtime/trace/packed/traversal/group_traversal.h"
 #include "runtime/trace/packed/kernels/octant_guess.h"
 
-/// Many groups of rays through the tree over placements together, for scenes where few rays of a group come to the same
-/// placement: those that all groups send to one are grouped anew.
+/// Traces many groups of rays through the tree over placements together. It is for scenes in which few rays of a group
+/// enter the same placement: the rays that all groups send to a placement are regrouped there.
 namespace packtrace::packed {
 namespace {
 
-/// A group of rays in the tree over placements.
+/// A group of rays of one octant in the tree over placements.
 struct StreamGroup {
   BoxRays boxes;
-  uint64_t alive;  ///< rays that still look for a hit, as bits
-  uint32_t octant; ///< of all of them
+  uint64_t alive;  ///< bit mask of the rays that still look for a hit
+  uint32_t octant; ///< of all its rays
   uint32_t numbers[kGroup];
 };
 static_assert(sizeof(StreamGroup) == kStreamGroupBytes && alignof(StreamGroup) <= kStreamAlignment);
 
-/// Rays of a group that come to a node.
+/// The rays of one group that are to visit a node.
 struct StreamPart {
-  uint64_t rays; ///< as bits
+  uint64_t rays; ///< bit mask
   uint32_t group;
 };
 static_assert(sizeof(StreamPart) == kStreamPartBytes);
 
-/// Any hits (kAny) or nearest hits: a portion of at most kStreamRays rays at a time.
+/// Finds any hits (kAny) or nearest hits for portions of at most kStreamRays rays.
 template <typename Lanes, bool kAny, bool kCount>
 class PlacementStream {
 public:
-  /// @param groups traces those that are made here
-  /// @param memory ThreadMemory::stream; null if nothing is added
-  /// @param occluded of any hits, one for each ray: set to 1
+  /// @param groups traces the groups that are formed at placements
+  /// @param memory ThreadMemory::stream; may be null if add() is not called
+  /// @param occluded for any hits: one element per ray, set to 1 where the ray hits
   PlacementStream(const KernelScene& scene, GroupTraversal<Lanes, kAny, kCount>& groups, void* memory,
                   const KernelRay* rays, uint32_t ray_class, uint8_t* occluded)
       : scene_(scene), traversal_(groups), rays_(rays), ray_class_(ray_class), occluded_(occluded),
         groups_(static_cast<StreamGroup*>(memory)),
         parts_(memory != nullptr ? reinterpret_cast<StreamPart*>(groups_ + kStreamGroups) : nullptr) {}
 
-  /// Adds rays of one octant to the portion.
+  /// Adds a group of rays of one octant to the portion.
   void add(const uint32_t* numbers, uint32_t count, uint32_t octant) {
     StreamGroup& group = groups_[group_count_++];
     for (uint32_t i = 0; i < count; ++i) group.numbers[i] = numbers[i];
@@ -47,12 +47,12 @@ public:
                                traversal_.alive(), group.boxes);
   }
 
-  /// Traces the portion and begins another.
+  /// Traces the portion and begins a new one.
   void trace() {
     Visit stack[kMaxTopDepth * (baked::kNodeWidth - 1) + 1];
     uint32_t size = 0;
     uint32_t part_count = 0;
-    for (uint32_t octant = 0; octant < 8; ++octant) // so that a node's boxes are set up once for each
+    for (uint32_t octant = 0; octant < 8; ++octant) // Sorted by octant, so a node's boxes are set up once per octant.
       for (uint32_t g = 0; g < group_count_; ++g)
         if (groups_[g].octant == octant) parts_[part_count++] = {groups_[g].alive, g};
     stack[size++] = {parts_, parts_ + part_count, part_count, 0, 0.0f};
@@ -69,14 +69,14 @@ public:
 private:
   struct Visit {
     const StreamPart* parts;
-    StreamPart* free; ///< behind the parts of all nodes that are still to be visited
+    StreamPart* free; ///< begin of unused memory, after the parts of all nodes on the stack
     uint32_t part_count;
     uint32_t node;  ///< or kTopLeaf + placement
-    float distance; ///< squared, of the box
+    float distance; ///< squared distance of the box from the first ray's origin
   };
 
-  /// Pushes the children that rays pass, on top the one nearest to where the first of them starts: what begins at one
-  /// place and ends nearby need not look farther, wherever it goes.
+  /// Pushes the children that rays pass; the child nearest to the first ray's origin ends on top. Rays that start at
+  /// one place and end nearby need not look farther, whatever their direction.
   void visit_node(const Visit& at, Visit* stack, uint32_t& size) {
     const TopNode& node = scene_.top_nodes[at.node];
     StreamPart* parts[baked::kNodeWidth];
@@ -113,7 +113,7 @@ private:
     }
   }
 
-  /// Squares of a point's distances from a node's boxes.
+  /// Computes the squared distances of a point from a node's boxes.
   static void distances(const TopNode& node, const float (&point)[3], float (&out)[baked::kNodeWidth]) {
     using F = typename Lanes::F;
     F sum = Lanes::set(0.0f);
@@ -126,10 +126,10 @@ private:
     Lanes::store(out, sum);
   }
 
-  /// Rays of one octant of a placement's grid, by their number in the portion.
+  /// Rays of one octant of a placement's grid.
   struct Gathered {
     uint32_t count = 0;
-    uint32_t rays[kGroup]; ///< kGroup group + bit
+    uint32_t rays[kGroup]; ///< kGroup * number of the StreamGroup + bit in it
   };
 
   void visit_placement(const Visit& at) {

@@ -2,18 +2,19 @@
 
 #include "runtime/trace/packed/traversal/placement_stream.h"
 
-/// The entry of each instruction set's kernels.
+/// Entry points of the kernels of an instruction set.
 namespace packtrace::packed {
 namespace {
 
-/// How far ahead rays are fetched while others are sorted.
+/// Distance at which rays are prefetched while others are sorted.
 constexpr uintptr_t kBytesAhead = 96 * sizeof(KernelRay);
 
-/// Sorts rays by octant into groups of neighbours and has them traced.
+/// Sorts rays by octant into groups of neighbours and traces the groups.
 template <typename Lanes, bool kAny, bool kCount>
 class Traversal {
 public:
-  /// @param occluded or hits, one for each ray
+  /// @param occluded for any hits: one element per ray; else null
+  /// @param hits for nearest hits: one element per ray; else null
   Traversal(const KernelScene& scene, ThreadMemory& memory, const KernelRay* rays, uint32_t ray_class,
             uint8_t* occluded, KernelHit* hits, KernelCounters* counters)
       : rays_(rays), occluded_(occluded), hits_(hits), counters_(counters), streams_(memory.stream != nullptr),
@@ -56,7 +57,7 @@ private:
            (__builtin_signbit(v[2]) ? 4u : 0u);
   }
 
-  /// Traces a group, or has it wait for others.
+  /// Traces a group, or adds it to the stream.
   void trace(const uint32_t* numbers, uint32_t count, uint32_t octant) {
     if (streams_) return stream_.add(numbers, count, octant);
     groups_.take(numbers, count);
@@ -83,7 +84,7 @@ void trace(const KernelScene& scene, ThreadMemory& memory, const KernelRay* rays
     Traversal<Lanes, kAny, false>(scene, memory, rays, ray_class, occluded, hits, counters).run(count);
 }
 
-/// The functions of one instruction set.
+/// Returns the kernels of one instruction set.
 template <typename Lanes>
 constexpr Kernels kernels_of(const char* isa) {
   return {isa,
