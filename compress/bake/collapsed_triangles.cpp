@@ -94,7 +94,7 @@ private:
 
   const std::span<const Triangle> triangles_;
   const std::span<const uint8_t> shapes_;
-  std::vector<uint8_t> at_sliver_;     // per point
+  std::vector<uint8_t> at_sliver_;     // per point: whether a sliver has it
   std::vector<uint32_t> slivers_;      // triangle numbers
   std::vector<uint32_t> joined_;       // per sliver: parent in the union-find forest of pieces
   std::vector<Edge> edges_;            // edges of slivers, ascending
