@@ -1,4 +1,4 @@
-// The layering of docs/architecture.md, checked from the include lines of the tree.
+// Checks the layering of docs/architecture.md against the include lines of the source files.
 
 #include <algorithm>
 #include <filesystem>
@@ -14,10 +14,10 @@ namespace fs = std::filesystem;
 
 struct Layer {
   std::string folder;
-  std::vector<std::string> may_include; ///< folders, besides its own
+  std::vector<std::string> may_include; ///< folders that it may include from, besides its own
 };
 
-// The most specific folder decides, so longer paths come first.
+// The first match decides, so longer paths come before shorter ones.
 const std::vector<Layer> kLayers = {
     {"pbrt_import/scene/", {}},
     {"pbrt_import/", {"pbrt_import/scene/"}},
