@@ -19,6 +19,7 @@ SinCos sin_cos(double angle_rad);
 
 /// Smooth step from 0 to 1 between the edges; constant outside.
 double smooth_step(double edge0, double edge1, double x);
+/// Linear interpolation: a at t = 0, b at t = 1.
 double mix(double a, double b, double t);
 
 DAffine translation(DVec3 offset);

@@ -18,6 +18,7 @@ public:
   /// Streams of one seed are independent, so additional draws in one part of a scene do not change the other parts.
   explicit constexpr Random(uint64_t seed, uint64_t stream = 0) : state_(hash_bits(seed ^ hash_bits(stream + kStep))) {}
 
+  /// Next 64 random bits.
   constexpr uint64_t bits() { return hash_bits(state_ += kStep); }
   /// Uniform in [0, 1), a multiple of 2^-53.
   constexpr double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
@@ -25,6 +26,7 @@ public:
   constexpr double uniform(double lo, double hi) { return lo + (hi - lo) * uniform(); }
   /// Uniform in [0, n); n > 0.
   constexpr uint32_t below(uint32_t n) { return static_cast<uint32_t>(((bits() >> 32) * n) >> 32); }
+  /// Returns true with the given probability.
   constexpr bool chance(double probability) { return uniform() < probability; }
 
 private:

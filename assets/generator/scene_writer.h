@@ -55,6 +55,7 @@ public:
   void object(std::string_view object_name, std::string_view model_name, const MaterialChoice& choice = {});
   /// Combines model() and object() under one name.
   void object(std::string_view object_name, Model model);
+  /// Writes an instance of an object, and the object before its first instance.
   void instance(std::string_view object_name, const DAffine& world_from_object);
   /// Places a stored model once in the world, without a transform.
   void world_shape(std::string_view model_name);

@@ -21,6 +21,7 @@ public:
 
   explicit TownTerrain(uint64_t seed) : seed_(seed) {}
 
+  /// Distance of the quay's edge from the origin, in metres.
   double quay_radius(double angle_rad) const;
   /// Inland distance at which a level begins; level kLevels is the open hillside.
   static constexpr double level_begin(uint32_t level) {
@@ -34,7 +35,9 @@ public:
   double height(double angle_rad, double inland, uint32_t level) const;
   /// Ground height at a position; the level follows from the position.
   double height(double angle_rad, double inland) const;
+  /// World position on the ground.
   DVec3 place(double angle_rad, double inland) const;
+  /// World position on the ground of the given level.
   DVec3 place(double angle_rad, double inland, uint32_t level) const;
 
   /// Ground mesh. Materials: "grass_a".."grass_c", "rock_a", "rock_b", "paving_a", "paving_b", "sand".

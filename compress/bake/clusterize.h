@@ -11,9 +11,8 @@ namespace packtrace {
 /// Triangles to split into clusters, ordered along a space-filling curve so that neighbours are close.
 struct ClusterizeInput {
   std::span<const Triangle> vertices; ///< per triangle: vertex numbers; limits the vertices of a cluster
-  std::span<const Triangle>
-      points; ///< per triangle: position numbers; triangles with a common edge of them are neighbours
-  std::span<const DVec3> centroids; ///< per triangle, in any scale
+  std::span<const Triangle> points;   ///< per triangle: position numbers; triangles that share an edge are neighbours
+  std::span<const DVec3> centroids;   ///< per triangle, in any scale
   uint32_t vertex_count = 0;
   uint32_t point_count = 0;
 };

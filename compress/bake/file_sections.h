@@ -28,12 +28,15 @@ public:
   /// Appends the LOD levels of a geometry. Call after all add_geometry() calls, in the order of the base geometries.
   void add_lod(uint32_t base, const EncodedLod& lod);
 
+  /// Sets all instances. Call before without_trees() and build_trees().
   void set_instances(std::vector<baked::InstanceRecord> instances) { instances_ = std::move(instances); }
 
   void set_material_slots(std::vector<uint32_t> slots) { material_slots_ = std::move(slots); }
   void set_requirements(std::vector<baked::RequirementRecord> rows) { requirements_ = std::move(rows); }
 
+  /// Records of all geometries added so far, including LOD levels.
   const std::vector<baked::GeometryRecord>& geometries() const { return geometries_; }
+  /// Sums of the bits of all added geometries.
   const ClusterView::StreamBits& stream_bits() const { return stream_bits_; }
 
   /// Geometries, clusters, payload, instances and LOD levels added so far. Valid until something is added.

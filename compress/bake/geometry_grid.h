@@ -28,9 +28,11 @@ struct GeometryGrid {
   PositionGrid grid;
   std::vector<SharedPosition> shared; ///< sorted by key
 
+  /// Rounds a position to this lattice, or to the coarser lattice of its entry in `shared`.
   LatticePoint round(DVec3 p) const;
   /// Step of the coarsest lattice that any position is rounded to.
   double coarsest_step() const { return grid.step() * exp2_exact(static_cast<int32_t>(max_shift())); }
+  /// Largest shift in `shared`; 0 if it is empty.
   uint32_t max_shift() const;
   /// lowest() is at most, and highest() at least, any lattice coordinate along an axis of positions in [lo, hi].
   int64_t lowest(double lo) const;

@@ -18,6 +18,7 @@ public:
 
   /// Zero lengths are not counted.
   void add_squared(double squared_length);
+  /// Adds the other histogram's lengths.
   void add(const LengthHistogram& other);
   /// Adds the other histogram's lengths times a positive factor, accurate to half a bin.
   void add_scaled(const LengthHistogram& other, double factor);

@@ -30,6 +30,7 @@ struct GeometryPlan {
   double max_stretch = 1.0;
 };
 
+/// Plan of all geometries and instances of a file.
 struct ScenePlan {
   std::vector<GeometryPlan> geometries;
   /// First the scene's shapes outside objects in order, then its object instances in order. The geometry is kNone for

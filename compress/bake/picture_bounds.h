@@ -20,6 +20,7 @@ enum class PictureBound : uint32_t {
   kContact, ///< objects sink into their support or hover above it
   kOutline, ///< outlines of many thin pieces move past pixel centres
 };
+/// Name of a bound for messages and JSON, for example "height".
 std::string_view name_of(PictureBound bound);
 
 /// Largest factor by which an instance scales lengths from geometry space to world space.

@@ -24,6 +24,7 @@ private:
   static bool is_needed(baked::Reason reason) { return reason > baked::kInferred; }
 };
 
+/// Which streams a geometry needs, and how precisely.
 struct GeometryNeeds {
   std::vector<PartNeeds> parts;          ///< in the order of the plan's parts
   std::array<int32_t, 2> uv_exponent{};  ///< 0 if no part needs UVs

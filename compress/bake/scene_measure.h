@@ -18,6 +18,7 @@ struct SceneMeasure {
 /// Measures all geometries. Advances `progress` by one per geometry. Throws like measure_geometry().
 SceneMeasure measure_scene(const Scene& scene, const ScenePlan& plan, Progress& progress);
 
+/// Returns world_from_object of an instance.
 DAffine placement_of(const baked::InstanceRecord& instance);
 
 /// World-space bounds of an instance, from the bounds of its geometry.

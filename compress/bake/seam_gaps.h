@@ -30,6 +30,7 @@ public:
   /// Per entry of touching(): upper bound of the width of its widest seam at LOD level 0, in world units. It is the sum
   /// of the position error bounds of both sides (half a step per axis plus float rounding) under their transforms.
   const std::vector<double>& gaps() const { return gaps_; }
+  /// Counts, and the largest of gaps().
   SeamSummary summary() const;
 
   /// Returns, per entry of touching(), the largest value of the other instances whose bounds it touches.

@@ -10,7 +10,9 @@ namespace packtrace {
 
 using DTriangle = std::array<DVec3, 3>; ///< corners
 
+/// Area of a triangle.
 double area_of(const DTriangle& t);
+/// Length of a triangle's longest edge.
 double longest_edge_of(const DTriangle& t);
 /// Distance of the longest edge from the opposite corner; 0 if the triangle has no area.
 double height_of(const DTriangle& t);

@@ -24,8 +24,12 @@ EncodedTexture encode_texture(const AlbedoTexture& texture, std::optional<Textur
 /// Returns 10 log10(255^2 / mean squared error) over all channels of all texels.
 double texture_psnr_db(const AlbedoTexture& texture, const TextureView& coded);
 
+/// Encodes with at most 256 colours: all colours of the texture if that suffices, otherwise variance cuts refined by
+/// Lloyd's algorithm.
 std::vector<uint8_t> encode_palette8(const AlbedoTexture& texture);
+/// Encodes with 2, 4 and 2 bits for red, green and blue, as levels between two values per channel.
 std::vector<uint8_t> encode_r2g4b2(const AlbedoTexture& texture);
+/// Encodes 4 x 4 blocks with two 5-6-5 endpoints and 2-bit indices.
 std::vector<uint8_t> encode_bc1(const AlbedoTexture& texture);
 
 } // namespace packtrace

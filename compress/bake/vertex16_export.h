@@ -22,6 +22,7 @@ struct Vertex16Report {
   double max_tangent_error_degrees = 0.0;
 };
 
+/// Result of an export.
 struct Vertex16Export {
   std::vector<std::byte> bytes; ///< the file; format in docs/vertex16.md
   Vertex16Report report;

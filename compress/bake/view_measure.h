@@ -32,6 +32,7 @@ public:
   /// @param pixel world-space size of a pixel at the piece
   /// @param height height of the triangle, world units
   void add(double pixels, double pixel, double height);
+  /// Returns the statistics of all pieces added so far.
   ViewStats stats() const;
 
 private:

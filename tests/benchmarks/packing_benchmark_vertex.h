@@ -30,6 +30,7 @@ struct PlainMesh {
   std::vector<Triangle> triangles;
 };
 
+/// Packs positions, normals and UVs of a mesh. Chooses 32-bit positions if the precision requires them.
 FixedVertices pack_vertices(const Mesh& mesh, const PackingPrecision& precision);
 /// Fills positions, normals and UVs from vertex bytes with the given layout.
 void unpack_vertices(const FixedVertices& layout, std::span<const std::byte> bytes, PlainMesh& out);
