@@ -8,7 +8,7 @@ namespace packtrace {
 /// Effect of a lattice on the sample of a geometry, weighted by the pixels that the sample covers.
 struct GridCheck {
   double collapsed = 0.0;         ///< fraction of the image covered by triangles that lose their area
-  double mean_tilt_degrees = 0.0; ///< angle between source and decoded facets, of those that keep an area
+  double mean_tilt_degrees = 0.0; ///< angle between source and decoded facets that keep an area
   double tilt_degrees = 0.0;      ///< 99 % quantile of that angle
   double moved = 0.0; ///< largest distance along an axis between decoded and source positions, both as floats
 };
