@@ -19,7 +19,7 @@ void add_triangle(Mesh& mesh, DVec3 a, DVec3 b, DVec3 c) {
 
 void add_quad(Mesh& mesh, uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
   const auto& p = mesh.positions;
-  // quads may degenerate to triangles; skips halves without area
+  // Quads may degenerate to triangles; skips halves without area.
   const auto add = [&](uint32_t i, uint32_t j, uint32_t k) {
     if (p[i] != p[j] && p[j] != p[k] && p[k] != p[i]) mesh.triangles.emplace_back(i, j, k);
   };
@@ -83,7 +83,7 @@ void add_tube(Mesh& mesh, std::span<const DVec3> path, std::span<const double> r
   DVec3 x = along(path[0], path[1] - path[0])[0];
   for (size_t i = 0; i < path.size(); ++i) {
     const DVec3 tangent = glm::normalize(path[i + 1 < path.size() ? i + 1 : i] - path[i > 0 ? i - 1 : 0]);
-    // transported along the path, so that the bar does not twist
+    // Transported along the path, so that the bar does not twist.
     x = glm::normalize(x - tangent * glm::dot(x, tangent));
     const DVec3 z = glm::cross(x, tangent);
     for (uint32_t k = 0; k < sides; ++k) {

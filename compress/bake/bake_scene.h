@@ -35,7 +35,7 @@ struct BakeReport {
   uint64_t collapsed_triangles = 0;  ///< left out because they have no area on their grid
   uint64_t coinciding_triangles = 0; ///< left out because quantisation made them equal to another triangle
   uint64_t vanished_geometries = 0;  ///< geometries that have no triangles left
-  /// area of all placed triangles, world units squared; an estimate for instances with nonuniform scale
+  /// Area of all placed triangles, world units squared; an estimate for instances with nonuniform scale.
   double source_area = 0.0;
   double collapsed_area = 0.0;   ///< source area of collapsed_triangles, with the same restriction
   uint64_t shared_shapes = 0;    ///< shapes outside objects that reuse the geometry of another shape
@@ -48,7 +48,7 @@ struct BakeReport {
   double world_step = 0.0; ///< 0: no world-space geometry
   double world_median_edge = 0.0;
   uint64_t nested_geometries = 0; ///< small world-space geometries on finer grids than the scene's
-  /// geometries whose steps are finer than the median edge requires, because images need it
+  /// Geometries whose steps are finer than the median edge requires, because images need it.
   uint64_t finer_geometries = 0;
   std::vector<BrokenPromise> promise; ///< geometries that may break the default precision's promise; empty if none does
   double max_position_error = 0.0;    ///< measured against the source, largest over the axes, object units

@@ -130,7 +130,7 @@ Fit fit_block(const Block& block) {
     if (fit.error >= best.error) break;
     best = fit;
   }
-  // a single colour that 5 and 6 bits cannot represent: interpolate
+  // A single colour that 5 and 6 bits cannot represent: interpolate.
   if (packed(best.a) == packed(best.b) && best.error > 0) {
     Endpoint a = best.a;
     for (size_t c = 0; c < 3; ++c) a[c] = std::min(a[c] + 1, kLargest[c]);

@@ -36,7 +36,7 @@ public:
     if (slivers_.empty()) return;
     gather_edges();
     find_neighbours();
-    // per piece: outline edges shared with triangles with area, capped at two
+    // Per piece: outline edges shared with triangles with area, capped at two.
     std::vector<uint8_t> borders(slivers_.size());
     for (size_t i = 0; i < edges_.size(); ++i)
       if (odd_[i] != 0 && has_neighbour_[i] != 0) {

@@ -58,7 +58,7 @@ private:
 
   std::vector<baked::GeometryRecord> geometries_;
   std::vector<baked::ClusterRecord> clusters_;
-  /// always ends with kReadSlackBytes zero bytes
+  /// Always ends with kReadSlackBytes zero bytes.
   std::vector<uint8_t> payload_ = std::vector<uint8_t>(kReadSlackBytes);
   std::vector<baked::MaterialRecord> materials_;
   std::vector<baked::InstanceRecord> instances_;

@@ -70,7 +70,7 @@ std::vector<SortKey> sort_triangles(const QuantizedGeometry& geometry, const std
   int64_t extent = 0;
   for (const LatticePoint& p : geometry.positions)
     for (size_t axis = 0; axis < 3; ++axis) extent = std::max(extent, p[axis] - geometry.origin[axis]);
-  // of the sum of three corners
+  // Bits of the sum of three corners.
   const auto bits = static_cast<uint32_t>(std::bit_width(static_cast<uint64_t>(extent) * 3));
   const uint32_t shift = bits > kMortonBits ? bits - kMortonBits : 0;
 

@@ -72,7 +72,7 @@ private:
     VertexNumbers numbers;
     std::vector<Triangle> local_triangles;
     for (const Triangle& t : std::span(all_.triangles).subspan(cluster.first_triangle, cluster.triangle_count)) {
-      // sequenced x, y, z: argument order is unspecified
+      // Sequenced x, y, z: argument order is unspecified.
       const uint32_t x = numbers(t.x), y = numbers(t.y), z = numbers(t.z);
       local_triangles.emplace_back(x, y, z);
     }

@@ -12,7 +12,7 @@ namespace packtrace {
 
 /// Clusters and bit streams of one geometry.
 struct EncodedGeometry {
-  /// ordered by material class; payload offsets, first triangles and first vertices are set
+  /// Ordered by material class; payload offsets, first triangles and first vertices are set.
   std::vector<baked::ClusterRecord> clusters;
   std::vector<uint8_t> payload; ///< size is a multiple of 4 bytes; no read slack
   std::array<uint32_t, 8> class_clusters{};

@@ -42,7 +42,7 @@ struct ScenePlan {
   uint64_t shared_objects = 0;          ///< objects that reuse another object's geometry
   uint64_t unused_objects = 0;          ///< never instanced, so not stored
   uint64_t unused_triangles = 0;        ///< triangles of the unused objects
-  /// messages: shapes and instances that exceed the float range where they are placed, and by how much
+  /// Messages about shapes and instances that exceed the float range where they are placed, and by how much.
   std::vector<std::string> left_out;
 };
 

@@ -12,7 +12,7 @@ void close_material_slots(ScenePlan& plan, std::span<const std::vector<uint32_t>
   if (all) return;
   std::vector<uint32_t> materials;
   std::map<std::vector<uint32_t>, uint32_t> first_of; // new run to its first slot
-  // geometry and old first slot to the new first slot
+  // Geometry and old first slot to the new first slot.
   std::map<std::pair<uint32_t, uint32_t>, uint32_t> first_of_instance;
   for (uint32_t i = 0; i < slots_left.size(); ++i) {
     GeometryPlan& geometry = plan.geometries[i];

@@ -143,7 +143,7 @@ private:
   }
 
   std::array<FloatBox, kMaxClusterTriangles> boxes_;
-  /// per axis: box numbers; each node's run is sorted by centres along the axis
+  /// Per axis: box numbers; each node's run is sorted by centres along the axis.
   std::array<std::array<uint8_t, kMaxClusterTriangles>, 3> order_;
   std::array<uint8_t, kMaxClusterTriangles> on_left_; ///< per box
   std::array<RunNode, 2 * kMaxClusterTriangles> nodes_;

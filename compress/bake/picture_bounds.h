@@ -34,7 +34,7 @@ struct GeometryView {
   /// Per sample triangle: pixels in `best` covered by the triangles that it represents.
   std::vector<double> sample_pixels;
   ViewStats best; ///< of the camera in which it covers most pixels
-  /// smallest ViewStats::pixel of the cameras in which it covers at least kSeen; otherwise that of `best`
+  /// Smallest ViewStats::pixel of the cameras in which it covers at least kSeen; otherwise that of `best`.
   double pixel = 0.0;
   double outline_share = 0.0; ///< outline_share() if it covers at least kSeen in some camera
 };
@@ -48,7 +48,7 @@ std::vector<GeometryView> look_at_scene(const Scene& scene, const ScenePlan& pla
 
 /// The step that a geometry needs if its current step exceeds a bound, in the geometry's own units.
 struct WantedStep {
-  /// a fixed fraction of the smallest exceeded limit, as a margin; infinity if none is exceeded
+  /// A fixed fraction of the smallest exceeded limit, as a margin; infinity if none is exceeded.
   double step = std::numeric_limits<double>::infinity();
   double limit = std::numeric_limits<double>::infinity(); ///< smallest exceeded limit of bounds kPixel and kContact
   PictureBound bound = PictureBound::kNone;               ///< the bound of `limit`: kPixel or kContact

@@ -34,12 +34,12 @@ struct QuantizeStats {
   uint64_t source_vertices = 0;
   uint64_t distinct_vertices = 0;
   uint64_t collapsed_triangles = 0; ///< have no area on the lattice and are left out (find_collapsed())
-  /// equal to another triangle after quantisation and left out (CoincidingTriangles)
+  /// Equal to another triangle after quantisation and left out (CoincidingTriangles).
   uint64_t coinciding_triangles = 0;
   double source_area = 0.0;    ///< of all source triangles, geometry space
   double collapsed_area = 0.0; ///< source area of the collapsed triangles
   std::vector<uint64_t> left;  ///< triangles per part, without those left out
-  /// whose source normals equal the face normal within the limit, so that they are not stored
+  /// Triangles whose source normals equal the face normal within the limit, so that they are not stored.
   uint64_t flat_triangles = 0;
   uint64_t inferred_normals = 0;   ///< source normals that no triangle needs except flat ones
   uint64_t repaired_normals = 0;   ///< were zero, or became zero under a flattening transform

@@ -23,7 +23,7 @@ public:
 
   /// Takes time proportional to the number of values, whatever the capacity.
   void clear() {
-    // removal in reverse order of insertion keeps all probe sequences intact
+    // Removal in reverse order of insertion keeps all probe sequences intact.
     for (; !values.empty(); values.pop_back()) slots_[slot_of(values.back())] = kEmpty;
     recent_.fill(kEmpty);
   }

@@ -31,7 +31,7 @@ Ramp fit_ramp(const std::array<uint64_t, 256>& counts, uint32_t levels) {
     for (size_t v = 0; v < 256; ++v) {
       double nearest = std::numeric_limits<double>::infinity();
       for (uint32_t level = 0; level <= levels; ++level) {
-        // rounds like the decoder
+        // Rounds like the decoder.
         const uint32_t decoded = (ramp.lo * (levels - level) + ramp.hi * level + levels / 2) / levels;
         const double d = std::abs(static_cast<double>(v) - decoded);
         if (d < nearest) nearest = d, ramp.level[v] = static_cast<uint8_t>(level);

@@ -18,7 +18,7 @@ inline constexpr ImageSize kPromisedSize{320, 180};
 struct ViewStats {
   double pixels = 0.0; ///< covered pixels; each overlapping surface counts
   double height = 0.0; ///< harmonic mean of triangle heights, weighted by pixels, world units; 0 if no pixel is covered
-  /// world-space size of a pixel at the surface: 2 % quantile over the pixels; 0 if no pixel is covered
+  /// World-space size of a pixel at the surface: 2 % quantile over the pixels; 0 if no pixel is covered.
   double pixel = 0.0;
 
   /// Fraction of the image that is covered, at most 1.

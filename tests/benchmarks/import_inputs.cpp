@@ -136,7 +136,7 @@ Counts write_one_mesh(const fs::path& folder, double scale) {
 Counts write_instances(const fs::path& folder, double scale) {
   constexpr uint32_t kObjects = 10;
   constexpr Grid kGrid{20, 25};
-  // the importer leaves out objects without a use
+  // The importer leaves out objects without a use.
   const uint64_t count = std::max<uint64_t>(scaled(200'000, scale), kObjects);
   SceneFile file(folder);
   for (uint32_t i = 0; i < kObjects; ++i) {

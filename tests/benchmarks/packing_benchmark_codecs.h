@@ -64,7 +64,7 @@ std::unique_ptr<PackingCodec> draco_codec();
 /// Options of this project's file.
 struct PacktraceFile {
   PageCodec codec = PageCodec::kNone;
-  /// keep UVs as for a mask of 1024 x 1024 texels over [0,1]^2; otherwise none, as in scenes without masks
+  /// Keep UVs as for a mask of 1024 x 1024 texels over [0,1]^2; otherwise none, as in scenes without masks.
   bool keep_uvs = false;
   bool trees = false; ///< store trees for tracing; no other codec here has them
 };

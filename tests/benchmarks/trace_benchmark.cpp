@@ -321,7 +321,7 @@ Json measure_input(const std::string& name, const Options& options) {
     }
     for (const System& row : systems.rows)
       if (row.name == "packed" && !json.contains("work")) json["work"] = count_work(*row.rays, *row.tracer);
-    // does not depend on the number of threads
+    // The same for every number of threads.
     if (!json.contains("exact")) json["exact"] = compare_with_exact_hits(*input, systems);
     for (Json& pass : measure_passes(*input, systems, camera, radius, threads, options))
       json["passes"].push_back(std::move(pass));

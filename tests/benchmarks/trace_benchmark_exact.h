@@ -17,7 +17,7 @@ using ExactTriangle = std::array<DVec3, 3>;
 /// Intersection of a ray and a triangle in quadruple precision. If the vertices are floats, signs of edge functions are
 /// exact.
 struct ExactHit {
-  /// the line hits the triangle or its edges, before or behind the origin; false if parallel to its plane
+  /// The line hits the triangle or its edges, before or behind the origin; false if parallel to its plane.
   bool hit = false;
   double t = 0.0;      ///< at the plane, in lengths of the direction; 0 if the ray is parallel to the plane
   double height = 0.0; ///< distance from the plane that an error of 1 in t causes
@@ -34,13 +34,13 @@ double t_tolerance(const Ray& ray, double t);
 /// Counts of one system's answers, classified with the exact hits of the triangles that any system reports.
 struct HitVerdicts {
   uint64_t missed = 0; ///< no hit, although a triangle is hit
-  /// a triangle missed by more than rounding, or an any-hit answer although no triangle is nearly hit
+  /// A triangle missed by more than rounding, or an any-hit answer although no triangle is nearly hit.
   uint64_t wrong = 0;
   uint64_t farther = 0; ///< a triangle behind the nearest one
   uint64_t beside = 0;  ///< a triangle that the ray misses by rounding only: up to 4 ulp
   uint64_t t_off = 0;   ///< the right triangle with a wrong t
   double worst_t = 0.0; ///< largest relative error of t for right triangles
-  /// for right triangles: largest distance of the hit from the triangle's plane, in units of origin_ulp()
+  /// For right triangles: largest distance of the hit from the triangle's plane, in units of origin_ulp().
   double worst_ulps = 0.0;
 
   uint64_t all() const { return missed + wrong + farther + beside + t_off; }

@@ -82,7 +82,7 @@ Camera choose_camera(const SceneSource& source, const std::string& camera, Image
 
 std::vector<RecordedRays> record_phases(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& camera,
                                         float ao_radius) {
-  // one thread keeps tiles in order
+  // One thread keeps tiles in order.
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
   std::vector<RecordedRays> frame(3);
   frame[0].name = "primary", frame[1].name = "ao any", frame[2].name = "ao closest";

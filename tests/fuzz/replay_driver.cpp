@@ -107,7 +107,7 @@ public:
     const auto size = static_cast<ssize_t>(input.size());
     if (::pwrite(file_, input.data(), input.size(), 0) != size || ::ftruncate(file_, size) != 0)
       throw std::runtime_error("cannot write " + path_.string());
-    // exact size, so that sanitizers detect reads past the end
+    // Exact size, so that sanitizers detect reads past the end.
     const auto exact = std::make_unique<uint8_t[]>(input.size());
     std::copy(input.begin(), input.end(), exact.get());
     ::alarm(timeout_);
