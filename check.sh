@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Sets everything up and runs every test and regression limit.
-# Usage: ./check.sh [PRESET ...]           (default: release, then the sanitizer build without whole scenes)
+# Installs dependencies, builds, and runs all tests with their regression limits.
+# Usage: ./check.sh [PRESET ...] (default: release, then asan without the tests on whole scenes)
 set -euo pipefail
 cd "$(dirname "$0")"
 started=$SECONDS
@@ -12,7 +12,7 @@ if [ -z "${PACKTRACE_SCENES:-}" ] && [ -d ../shared/scenes ]; then
   export PACKTRACE_SCENES
 fi
 echo "== Debian packages"
-# Whether the fuzz preset's compiler takes the kernels is a test, and whether shells and man take what is made for them.
+# Some tests need these: clang compiles the fuzz preset's kernels, and shells and man tools check the generated files.
 bash .ci/install_packages.sh clang-19 zsh fish mandoc groff-base
 export CTEST_PARALLEL_LEVEL=${CTEST_PARALLEL_LEVEL:-$(nproc)}
 for preset in "${presets[@]}"; do

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# From a fresh Debian 12 to a denoised ambient-occlusion picture of a real pbrt-v3 scene, traced over packed data.
+# Installs, builds and runs packtrace on Debian 12: traces a packed pbrt-v3 scene to a denoised ambient-occlusion image.
 # Usage: quickstart.sh [SCENE.pbrt]      (default: assets/town/town.pbrt). Results are in build/quickstart/ beside this script.
 set -euo pipefail
 root=$(CDPATH='' cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
@@ -10,7 +10,7 @@ esac
 [ $# -le 1 ] || { echo "quickstart.sh: one scene at a time, but there are $#" >&2; exit 2; }
 scene=${1:-$root/assets/town/town.pbrt}
 [ -f "$scene" ] || { echo "quickstart.sh: no such scene: $scene" >&2; exit 3; }
-scene=$(CDPATH='' cd -- "$(dirname -- "$scene")" && pwd)/$(basename -- "$scene") # whoever calls stands elsewhere
+scene=$(CDPATH='' cd -- "$(dirname -- "$scene")" && pwd)/$(basename -- "$scene") # the caller's folder may differ
 cd -- "$root"
 started=$SECONDS
 out=build/quickstart

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Installs the Debian 12 packages that building and testing need, and those named besides. Does nothing where all are there already.
+# Installs the Debian 12 packages for building and testing, and those named as arguments. Does nothing if all are
+# installed.
 # Usage: .ci/install_packages.sh [PACKAGE ...]
 set -euo pipefail
 
@@ -8,9 +9,9 @@ packages=(
   libtbb-dev libglm-dev libembree-dev libopenexr-dev libopenmesh-dev libxxhash-dev libzstd-dev libstb-dev zlib1g-dev
   libcli11-dev libfmt-dev nlohmann-json3-dev
   libgtest-dev libbenchmark-dev python3
-  glslang-tools spirv-tools libvulkan-dev mesa-vulkan-drivers # the GLSL of vertex16 is compiled and run on the CPU
+  glslang-tools spirv-tools libvulkan-dev mesa-vulkan-drivers # compile the GLSL of vertex16 and run it on the CPU
   libdraco-dev libtinygltf-dev # glTF export
-  libmeshoptimizer-dev # what the packing benchmark compares with
+  libmeshoptimizer-dev # compared with in the packing benchmark
   "$@"
 )
 

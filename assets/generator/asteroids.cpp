@@ -14,15 +14,15 @@
 namespace packtrace::scenegen {
 namespace {
 
-constexpr uint32_t kCells = 18;      ///< 6 * 18^2 quads a rock
-constexpr double kSpacing = 5.4;     ///< metres: the edge of the cube that each rock has for itself
-constexpr double kClearAround = 2.5; ///< metres about the eye without rocks
+constexpr uint32_t kCells = 18;      ///< 6 * 18^2 quads per rock
+constexpr double kSpacing = 5.4;     ///< metres: edge of the cube that each rock occupies on average
+constexpr double kClearAround = 2.5; ///< metres around the eye without rocks
 constexpr const char* kPaints[] = {"basalt", "slate", "clay", "ochre"};
 constexpr const char* kComment = "# Rocks of many shapes about the camera, as many as the generator is asked for.\n"
                                  "# To be seen: dented rocks of four colours in all directions, near and far. Made by "
                                  "packtrace_scenegen asteroids.\n\n";
 
-/// A lump of noise with a dent or two, longer than wide.
+/// An elongated lump of noise with one or two dents.
 Model make_asteroid(uint64_t seed, uint64_t number) {
   Random random(seed, 400 + number);
   const double lumps = random.uniform(1.2, 2.4), roughness = random.uniform(0.2, 0.45);
@@ -45,7 +45,7 @@ Model make_asteroid(uint64_t seed, uint64_t number) {
   return model;
 }
 
-/// Any rotation, from three turns: uniform enough for rocks.
+/// Random rotation from three angles; not exactly uniform, but sufficient for rocks.
 DAffine tumbled(Random& random) {
   const double x = random.uniform(0.0, 2.0 * kPi), y = random.uniform(0.0, 2.0 * kPi),
                z = random.uniform(0.0, 2.0 * kPi);
@@ -73,8 +73,7 @@ SceneTotals generate_asteroids(const AsteroidsConfig& config, const OutputConfig
   const double half = 0.5 * kSpacing * static_cast<double>(side);
   for (uint64_t i = 0; i < config.instances; ++i) {
     const std::string name = fmt::format("rock_{}", i % config.geometries);
-    if (i < config.geometries)
-      writer.object(name, make_asteroid(config.seed, i)); // goes to disk with its first instance
+    if (i < config.geometries) writer.object(name, make_asteroid(config.seed, i)); // written with its first instance
     DVec3 place(0.0);
     do {
       for (int axis = 0; axis < 3; ++axis) place[axis] = random.uniform(-half, half);

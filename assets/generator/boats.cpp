@@ -17,11 +17,11 @@ struct HullConfig {
   double half_width = 0.8;
   double freeboard = 0.5; ///< height of the side amidships
   double draught = 0.25;
-  double rise = 0.4;        ///< how much higher the bow is
-  double stern_width = 0.7; ///< as a part of the half width
+  double rise = 0.4;        ///< height of the bow above the side amidships
+  double stern_width = 0.7; ///< fraction of half_width
 };
 
-/// Points of the hull's surface: u in [0,1] from stern to bow, v in [0,1] from keel to sheer, side -1 or 1.
+/// Point of the hull's surface: u in [0,1] from stern to bow, v in [0,1] from keel to sheer, side -1 or 1.
 DVec3 hull_point(const HullConfig& c, double u, double v, double side, double thickness) {
   const double bow = u * u * u * u * u;
   const double fullness = mix(c.stern_width, 1.0, smooth_step(0.0, 0.5, u)) * (1.0 - bow);
@@ -90,7 +90,7 @@ void add_line(Model& model, DVec3 from, DVec3 to, double sag) {
   add_tube(model.smooth("rope"), path, radii, 3);
 }
 
-/// A sail that bellies to +x: a triangle subdivided, seen from both sides.
+/// A sail that bulges towards +x: a subdivided triangle, visible from both sides.
 void add_sail(Model& model, DVec3 tack, DVec3 clew, DVec3 head, double belly) {
   Mesh& mesh = model.smooth("sail");
   constexpr uint32_t kCells = 8;
@@ -147,7 +147,7 @@ Model make_fishing_boat(Random& random) {
     add_facade(cabin, f, k % 2 == 0 ? 1.7 : 1.8, 2.1,
                k % 2 == 0 ? std::span<const Opening>(front) : std::span<const Opening>(side));
   }
-  for (const ModelPart& part : cabin.parts()) { // its walls are painted planks, not masonry
+  for (const ModelPart& part : cabin.parts()) { // the wheelhouse walls are painted planks, not masonry
     Mesh& mesh = model.flat(part.material == "wall" ? "white" : part.material);
     const auto first = static_cast<uint32_t>(mesh.positions.size());
     mesh.positions.insert(mesh.positions.end(), part.mesh.positions.begin(), part.mesh.positions.end());

@@ -7,7 +7,7 @@
 
 namespace packtrace::scenegen {
 
-/// Boats afloat: water at y = 0, bow towards +z, keel below. Materials: "hull", "hull_low", "wood", "white", "glass",
+/// Floating boats: water at y = 0, bow towards +z, keel below. Materials: "hull", "hull_low", "wood", "white", "glass",
 /// "rope", "sail", "iron", "red".
 Model make_rowing_boat(Random& random);  ///< 4.2 m
 Model make_fishing_boat(Random& random); ///< 9 m, wheelhouse and mast

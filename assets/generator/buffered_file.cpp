@@ -13,7 +13,7 @@ namespace {
 
 constexpr size_t kBufferBytes = size_t{1} << 20;
 
-/// The same path, whose folder is there now.
+/// Creates the folder of a path if it is missing, and returns the path.
 const std::filesystem::path& with_folder(const std::filesystem::path& path) {
   std::error_code code;
   if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path(), code);

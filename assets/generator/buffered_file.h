@@ -10,15 +10,15 @@
 
 namespace packtrace::scenegen {
 
-/// An OutputFile that is written through a buffer, in missing folders too, and gets its name by close(). One that is
-/// not closed leaves no file behind. Every function throws Error(kIo) if the disk refuses.
+/// Buffered writer on top of OutputFile. Creates missing folders. The file gets its name in close(); without close(),
+/// no file remains. All functions throw Error(kIo) if an operation fails.
 class BufferedFile {
 public:
   /// Throws Error(kIo) if the file exists and overwrite is false.
   BufferedFile(const std::filesystem::path& path, bool overwrite);
 
   void write(std::string_view bytes);
-  /// The object's bytes as they lie in memory.
+  /// Writes the bytes of an object's memory representation.
   template <typename T>
   void write_value(const T& value) {
     write(std::string_view(reinterpret_cast<const char*>(&value), sizeof value));

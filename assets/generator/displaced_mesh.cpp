@@ -42,7 +42,7 @@ public:
     around_ =
         std::max<uint64_t>(5, static_cast<uint64_t>(std::ceil(std::sqrt(static_cast<double>(config.triangles) * 1.4))));
     across_ = std::max<uint64_t>(5, (config.triangles + 2 * around_ - 1) / (2 * around_));
-    // Detail down to about two cells: more would be noise, less would leave large meshes smooth.
+    // Detail down to about two cells: finer detail would be noise, coarser detail would leave large meshes smooth.
     octaves_ = 3;
     while (octaves_ < 12 && (1ull << (octaves_ + 3)) < across_) ++octaves_;
   }

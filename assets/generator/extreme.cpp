@@ -19,7 +19,7 @@ constexpr const char* kComment = "# Extremes of scale in one scene: a crumb of 1
                                  "the right, the mountain on the horizon.\n"
                                  "# Made by packtrace_scenegen extreme.\n\n";
 
-/// A card in the frame's xy square, stored twice back to back: two coincident faces, no volume.
+/// A rectangle in the frame's xy plane, stored twice back to back: two coincident faces without volume.
 Model make_slab() {
   Model model;
   Mesh& mesh = model.flat("slab");
@@ -28,7 +28,7 @@ Model make_slab() {
   return model;
 }
 
-/// A box squeezed to zero height: its top and bottom coincide, its sides are gone.
+/// A box squeezed to zero height: its top and bottom coincide and its sides have no area.
 Model make_flat_box() {
   Model model;
   add_box(model.flat("slab"), DAffine(1.0), {-1, 0, -1}, {1, 0, 1});
@@ -71,7 +71,7 @@ SceneTotals generate_extreme(const ExtremeConfig& config, const OutputConfig& ou
   writer.model("ground", ground);
   writer.world_shape("ground");
 
-  for (int i = 0; i < 24; ++i) { // crumbs about the origin, where floats are finest
+  for (int i = 0; i < 24; ++i) { // crumbs around the origin, where floats are finest
     const DVec3 at{random.uniform(-4e-6, 0.5e-6), 0.0, random.uniform(-1.5e-6, 4e-6)};
     writer.instance("boulder", stand_at(at, random.uniform(0.0, 6.0), random.uniform(0.4e-6, 1.2e-6)));
   }
@@ -84,7 +84,7 @@ SceneTotals generate_extreme(const ExtremeConfig& config, const OutputConfig& ou
   writer.instance("needles", stand_at({-0.6e-6, 0.0, -2.4e-6}, 0.0, 0.9e-6));
   writer.instance("mountain", stand_at({-3e5, -1e5, 1.6e6}, 0.7, 1e6));
   writer.instance("boulder", stand_at({7e5, 0.0, 1.4e6}, 2.0, 2e5));
-  for (int i = 0; i < 24; ++i) { // seen by nobody here, but in every bound
+  for (int i = 0; i < 24; ++i) { // outside the view, but inside the scene's bounds
     const DVec3 at{1e7 + random.uniform(-40.0, 40.0), random.uniform(0.0, 20.0), 1e7 + random.uniform(-40.0, 40.0)};
     writer.instance(i % 2 == 0 ? "boulder" : "needles",
                     stand_at(at, random.uniform(0.0, 6.0), random.uniform(1.0, 9.0)));

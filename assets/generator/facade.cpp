@@ -18,7 +18,7 @@ void add_panel(Mesh& mesh, const DAffine& frame, double x0, double y0, double x1
            transform_point(frame, {x1, y1, z}), transform_point(frame, {x1, y0, z}));
 }
 
-/// The wall between the openings: the grid of all their edges, without the cells inside one.
+/// The wall between the openings: the grid of all their edges, without the cells inside an opening.
 void add_wall(Mesh& mesh, const DAffine& frame, double width, double height, std::span<const Opening> openings) {
   std::vector<double> xs{0.0, width}, ys{0.0, height};
   for (const Opening& o : openings) xs.insert(xs.end(), {o.x0, o.x1}), ys.insert(ys.end(), {o.y0, o.y1});
@@ -110,7 +110,7 @@ void add_door(Model& model, const DAffine& f, const Opening& o) {
   add_box(stone, f, {o.x0 - 0.1, 0.12, -0.4}, {o.x1 + 0.1, o.y0, 0.0});
 }
 
-/// Half circle over the opening's sides, as a corner-to-corner strip; the wall above it is filled in.
+/// A half circle at the top of the opening, with its stones; the wall above it is filled in.
 void add_arch(Model& model, const DAffine& f, const Opening& o, double depth) {
   const double radius = (o.x1 - o.x0) * 0.5, centre = o.x0 + radius, spring = o.y1 - radius;
   Mesh& wall = model.flat("wall");
@@ -126,7 +126,7 @@ void add_arch(Model& model, const DAffine& f, const Opening& o, double depth) {
              on_circle(i + 1, radius, 0));
     add_quad(wall, on_circle(i, radius, 0), on_circle(i + 1, radius, 0), on_circle(i + 1, radius, depth),
              on_circle(i, radius, depth));
-    const double rim = radius + 0.2; // voussoirs stand proud of the wall
+    const double rim = radius + 0.2; // voussoirs protrude from the wall
     add_quad(stone, on_circle(i, radius, -0.06), on_circle(i, rim, -0.06), on_circle(i + 1, rim, -0.06),
              on_circle(i + 1, radius, -0.06));
     add_quad(stone, on_circle(i, rim, -0.06), on_circle(i, rim, 0), on_circle(i + 1, rim, 0),

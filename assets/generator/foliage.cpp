@@ -21,10 +21,10 @@ struct Foliage {
   std::string_view light, dark; ///< materials of the upper and the lower, inner leaves
   double length = 0.5;          ///< metres
   double width = 0.3;
-  double droop = 0.3; ///< how far tips hang, as a part of their length
+  double droop = 0.3; ///< drop of the tips as a fraction of the length
 };
 
-/// More leaves are smaller leaves: together they cover the same area.
+/// More leaves are smaller, so that together they cover the same area.
 Foliage refined(Foliage foliage, double detail) {
   const double size = detail > 1.0 ? 1.0 / std::sqrt(detail) : 1.0;
   foliage.length *= size, foliage.width *= size;
@@ -45,7 +45,7 @@ void add_leaf_towards(Model& model, const Foliage& foliage, DVec3 stalk, DVec3 o
            side * (foliage.width * 0.5 * size));
 }
 
-/// Leaves near the surface of one ellipsoid, dense at the top, light above and dark beneath.
+/// Leaves near the surface of an ellipsoid, dense at the top, light above and dark below.
 void cover(Model& model, const Crown& crown, const Foliage& foliage, uint32_t count, Random& random) {
   for (uint32_t i = 0; i < count; ++i) {
     DVec3 out = random_direction(random);
@@ -81,7 +81,7 @@ void add_limb(Model& model, DVec3 from, DVec3 to, double radius_from, double rad
   add_tube(model.smooth("bark"), path, radii, 6);
 }
 
-/// Trunk, one branch to each crown, and the leaves.
+/// A trunk, one branch per crown, and leaves.
 Model make_branched(DVec3 fork, double trunk_radius, std::span<const Crown> crowns, const Foliage& foliage,
                     uint32_t leaf_count, Random& random) {
   Model model;

@@ -5,8 +5,8 @@
 
 namespace packtrace::scenegen {
 
-/// Plants of real leaf geometry. Materials: "bark", "leaf_light", "leaf_dark", "cypress", "olive", "pine", "palm",
-/// "blossom". `detail` scales the leaf count: 1 suits a tree 100 pixels tall.
+/// Plants with real leaf geometry. Materials: "bark", "leaf_light", "leaf_dark", "cypress", "olive", "pine", "palm",
+/// "blossom". `detail` scales the number of leaves: 1 suits a tree that is 100 pixels tall.
 Model make_broadleaf(Random& random, double detail);     ///< about 6 m
 Model make_cypress(Random& random, double detail);       ///< about 8 m, narrow
 Model make_umbrella_pine(Random& random, double detail); ///< about 9 m

@@ -25,7 +25,7 @@ constexpr const char* kComment =
 struct Species {
   std::string name;
   uint64_t triangles = 0;
-  double weight = 0.0; ///< share of the cells
+  double weight = 0.0; ///< fraction of the cells
   double sink = 0.1;   ///< metres below ground
 };
 
@@ -50,7 +50,7 @@ public:
     const auto side = static_cast<uint64_t>(std::ceil(std::sqrt(wanted * 1.08))) + 4; // the path takes some cells
     write_ground(static_cast<double>(side) * kCell);
     uint64_t plants = 0, triangles = 0;
-    for (uint64_t row = 0;; ++row) { // as many rows as it takes
+    for (uint64_t row = 0;; ++row) { // until there are enough plants
       for (uint64_t column = 0; column < side; ++column) {
         const bool enough = config_.instances != 0 ? plants >= config_.instances : triangles >= config_.triangles;
         if (enough) return;
@@ -123,7 +123,7 @@ void ForestBuilder::write_ground(double extent) {
   writer_.world_shape("ground");
 }
 
-/// Fills one cell; returns the triangles placed, 0 on the path.
+/// Fills one cell. Returns the number of triangles placed, 0 on the path.
 uint64_t ForestBuilder::plant(uint64_t row, double column) {
   const double x = (column + random_.uniform(-0.35, 0.35)) * kCell;
   const double z = (static_cast<double>(row) + random_.uniform(-0.35, 0.35)) * kCell;

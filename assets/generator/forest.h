@@ -8,12 +8,12 @@ namespace packtrace::scenegen {
 
 struct ForestConfig {
   uint64_t seed = 11;
-  uint64_t triangles = 10'000'000; ///< placed, at least; [100000, 10^11]
-  uint64_t instances = 0;          ///< if not 0: this many plants instead; [100, 50000000]
+  uint64_t triangles = 10'000'000; ///< minimum number of placed triangles; [100000, 10^11]
+  uint64_t instances = 0;          ///< if not 0: number of plants, instead of `triangles`; [100, 50000000]
 };
 
-/// A clearing-lined forest of a few species, placed as often as asked: FOLDER/forest.pbrt. Memory does not grow with
-/// it. Throws Error(kUsage) out of range, Error(kIo) on disk trouble.
+/// Writes a forest of a few species, with a path: FOLDER/forest.pbrt. Memory does not grow with its size.
+/// Throws Error(kUsage) if config is out of range, Error(kIo) if writing fails.
 SceneTotals generate_forest(const ForestConfig& config, const OutputConfig& output);
 
 } // namespace packtrace::scenegen

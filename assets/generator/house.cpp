@@ -76,7 +76,7 @@ void add_balcony(Model& model, const HouseConfig& c) {
   }
 }
 
-/// Behind arches: a floor, a back wall with a door and darkness.
+/// The room behind the arches: a floor, a back wall with a door, and darkness.
 void add_arcade_room(Model& model, const HouseConfig& c) {
   const DAffine back = translation({-c.width / 2, 0, 2.0});
   const Opening doors[] = {{OpeningKind::kDoor, c.width * 0.25 - 0.5, 0.24, c.width * 0.25 + 0.5, 2.2, false},
@@ -113,7 +113,7 @@ void add_gable(Model& model, const DAffine& frame, double width, double depth, d
   const double rise = depth / 2 * s / c, length = (depth / 2 + kEaves) / c, overhang = 0.3;
   for (int k = 0; k < 2; ++k) {
     const DAffine turn = k == 0 ? kHere : compose(translation({width, 0, depth}), rotation_y(kPi));
-    // The slope's own y axis climbs: tilt the facade plane back.
+    // The facade plane tilted back, so that its y axis climbs the slope.
     const DAffine tilt = compose(translation({-overhang, -kEaves * s / c, -kEaves}), rotation_x(kPi / 2 - pitch_rad));
     add_slope(model, compose(frame, compose(turn, tilt)), width + 2 * overhang, length, 0.0, random);
     Mesh& wall = model.flat("wall");
@@ -125,7 +125,7 @@ void add_gable(Model& model, const DAffine& frame, double width, double depth, d
             transform_point(frame, {width + overhang, rise + 0.08, depth / 2}));
 }
 
-/// Four slopes to a short ridge along x (or to a point).
+/// Four slopes up to a short ridge along x, or to a point.
 void add_hip(Model& model, const DAffine& frame, double width, double depth, double pitch_rad, Random& random) {
   const auto [s, c] = sin_cos(pitch_rad);
   const double half = std::min(width, depth) / 2, rise = half * s / c, length = (half + kEaves) / c;
@@ -194,7 +194,7 @@ void add_walls(House& house, const HouseConfig& c, Random& random) {
   }
   Mesh& stone = model.flat("stone");
   add_box(stone, kHere, {x0 - 0.08, -kPlinthDepth, c.arcade ? 0.0 : -0.08}, {x1 + 0.08, 0.0, c.depth + 0.08});
-  if (!c.arcade) { // a skirting of stone, open where the door is not worth the trouble: the steps cover it
+  if (!c.arcade) { // stone skirting along both side walls
     add_box(stone, kHere, {x0 - 0.06, 0.0, 0.02}, {x0 + 0.02, 0.5, c.depth});
     add_box(stone, kHere, {x1 - 0.02, 0.0, 0.02}, {x1 + 0.06, 0.5, c.depth});
   }

@@ -10,12 +10,12 @@ namespace packtrace::scenegen {
 
 enum class RoofKind : uint32_t { kGable, kGableToFront, kHip, kTerrace };
 
-/// One house style. Sizes in metres.
+/// Style of a house. Sizes in metres.
 struct HouseConfig {
   double width = 6.0; ///< along the street
   double depth = 6.0;
   uint32_t floors = 2;
-  uint32_t columns = 3; ///< of windows
+  uint32_t columns = 3; ///< of windows per floor
   RoofKind roof = RoofKind::kGable;
   bool balcony = false; ///< on the top floor
   bool arcade = false;  ///< arches on the ground floor
@@ -23,13 +23,14 @@ struct HouseConfig {
 };
 
 inline constexpr double kFloorHeight = 2.9;
-inline constexpr double kPlinthDepth = 2.0; ///< how far foundations reach below y = 0
+inline constexpr double kPlinthDepth = 2.0; ///< depth of the foundations below y = 0
 
-/// A house with its door towards -z, centred on x = 0, from z = 0 back to z = depth. Materials of add_facade() and
+/// A house with its door towards -z, centred on x = 0, from z = 0 back to z = depth. Materials: those of add_facade()
+/// and add_tiles(), "wood" and "pot".
 /// add_tiles(), "wood" and "pot".
 struct House {
   Model model;
-  std::vector<DVec3> sills; ///< middles of the street-side window sills above the ground floor, for flower boxes
+  std::vector<DVec3> sills; ///< centres of the street-side window sills above the ground floor, for flower boxes
 };
 House make_house(const HouseConfig& config, Random& random);
 

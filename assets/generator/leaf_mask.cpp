@@ -20,13 +20,13 @@ namespace {
 
 constexpr int kWidth = 96, kHeight = 128;
 
-/// Inside the leaf, x across in [-1,1], y from stalk 0 to tip 1.
+/// Whether a point is inside the leaf; x across in [-1,1], y from 0 at the stalk to 1 at the tip.
 bool inside(double x, double y) {
   if (y < 0.12) return std::abs(x) < 0.035; // stalk
   const double t = (y - 0.12) / 0.86;
   if (t > 1.0) return false;
   const double lobes =
-      0.93 + 0.07 * sin_cos(2.0 * kPi * (5.0 * t - 0.55 * std::abs(x))).cos; // notches slant to the tip
+      0.93 + 0.07 * sin_cos(2.0 * kPi * (5.0 * t - 0.55 * std::abs(x))).cos; // notches slant towards the tip
   const double edge = 1.75 * std::sqrt(t) * (1.0 - t) * (1.25 - 0.25 * t) * lobes + 0.03 * (1.0 - t);
   if (std::abs(x) > edge) return false;
   const double rib = std::abs(x) / (edge + 1e-9);

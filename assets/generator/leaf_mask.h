@@ -4,8 +4,8 @@
 
 namespace packtrace::scenegen {
 
-/// Writes FOLDER/leaf.png: 96 x 128 texels of 8-bit grey, 255 inside a lobed, pierced leaf that points up, 0 outside.
-/// Throws Error(kIo) on disk trouble.
+/// Writes FOLDER/leaf.png: 96 x 128 texels of 8-bit grey, 255 inside a lobed leaf with holes that points up, 0 outside.
+/// Throws Error(kIo) if writing fails.
 void generate_leaf_mask(const OutputConfig& output);
 
 } // namespace packtrace::scenegen

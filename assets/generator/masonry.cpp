@@ -14,7 +14,7 @@ const DAffine kHere(1.0);
 constexpr double kHalf = kWallModule / 2;
 constexpr std::array<const char*, 4> kStones{"stone", "stone", "stone_b", "stone_c"};
 
-/// Courses of blocks of uneven length and relief, facing -z.
+/// Courses of blocks with uneven lengths and relief, facing -z.
 void add_courses(Model& model, double y0, double y1, double course, double block, double relief, Random& random) {
   const auto count = static_cast<uint32_t>(std::max(1.0, std::floor((y1 - y0) / course + 0.5)));
   for (uint32_t j = 0; j < count; ++j) {
@@ -63,7 +63,7 @@ Model make_stairs(uint32_t steps, double rise, double run, double width) {
             {half, (i + 1) * rise, (i + 1) * run + 0.1});
   }
   const double height = steps * rise, length = steps * run;
-  for (const double x : {-half - 0.28, half}) { // stringers, as parallelograms with a sloping top
+  for (const double x : {-half - 0.28, half}) { // side walls: parallelograms with sloping tops
     Mesh& mesh = model.flat("stone_b");
     const DVec3 corners[] = {
         {x, -0.6, -0.3}, {x, 0.75, -0.3}, {x, height + 0.75, length}, {x, height - 0.6, length + 0.1}};

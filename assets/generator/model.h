@@ -8,22 +8,22 @@
 
 namespace packtrace::scenegen {
 
-/// One mesh of one material.
+/// One mesh with one material.
 struct ModelPart {
   std::string material;
-  bool smooth = false; ///< vertices are shared across round surfaces and get averaged normals
+  bool smooth = false; ///< vertices are shared across rounded surfaces and get averaged normals
   Mesh mesh;
 };
 
-/// A thing to instance: meshes grouped by material, in metres, y up, standing on y = 0, its front towards -z.
+/// An object to instance: meshes grouped by material, in metres, y up, standing on y = 0, its front towards -z.
 class Model {
 public:
-  /// The faceted mesh of a material; created when first asked for. The reference stays good.
+  /// Returns the faceted mesh of a material; creates it at the first call. The reference stays valid.
   Mesh& flat(std::string_view material) { return part(material, false); }
-  /// The round mesh of a material.
+  /// Returns the smooth mesh of a material; creates it at the first call. The reference stays valid.
   Mesh& smooth(std::string_view material) { return part(material, true); }
 
-  /// Gives the smooth parts their vertex normals. Call once, after the last triangle.
+  /// Computes the vertex normals of the smooth parts. Call once, after the last triangle.
   void finish();
 
   const std::deque<ModelPart>& parts() const { return parts_; }

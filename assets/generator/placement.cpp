@@ -6,12 +6,12 @@
 namespace packtrace::scenegen {
 
 SinCos sin_cos(double angle_rad) {
-  // pi/2 in two parts keeps the reduced angle exact to 2^-80 over the stated range.
+  // pi/2 in two parts keeps the reduced angle accurate to 2^-80 over the stated range.
   constexpr double kHalfPiHigh = 0x1.921fb544p+0, kHalfPiLow = 0x1.0b4611a626331p-34;
   const double quarter = std::floor(angle_rad / (kPi / 2) + 0.5);
   const double x = (angle_rad - quarter * kHalfPiHigh) - quarter * kHalfPiLow;
   const double x2 = x * x;
-  double sine = 1.0, cosine = 1.0; // Taylor series in Horner form; |x| <= pi/4, so the first term left out is < 1e-16
+  double sine = 1.0, cosine = 1.0; // Taylor series in Horner form; |x| <= pi/4, so the first omitted term is < 1e-16
   for (int k = 8; k >= 1; --k) {
     sine = 1.0 - sine * x2 / ((2.0 * k) * (2.0 * k + 1.0));
     cosine = 1.0 - cosine * x2 / ((2.0 * k - 1.0) * (2.0 * k));

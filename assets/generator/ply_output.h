@@ -7,7 +7,7 @@
 
 namespace packtrace::scenegen {
 
-/// What a PLY header announces.
+/// Contents of a PLY header.
 struct PlyLayout {
   uint64_t vertex_count = 0;
   uint64_t face_count = 0;
@@ -16,12 +16,13 @@ struct PlyLayout {
   bool short_indices = false; ///< `list uchar ushort`, else `list uchar int`
 };
 
-/// Begins a binary little-endian PLY of float x y z [nx ny nz] [u v] vertices and faces. The caller then writes each
-/// vertex's floats and each triangle.
+/// Writes the header of a binary little-endian PLY file with float x y z [nx ny nz] [u v] vertices, and faces. The
+/// caller then writes the floats of each vertex and each triangle.
 void write_ply_header(BufferedFile& file, const PlyLayout& layout);
-void write_ply_triangle(BufferedFile& file, const Triangle& triangle); ///< of 32-bit indices
+void write_ply_triangle(BufferedFile& file, const Triangle& triangle); ///< with 32-bit indices
 
-/// A whole mesh, small: 16-bit indices where they suffice, and neighbouring triangles (a,b,c) (a,c,d) as one quad.
+/// Writes a whole mesh compactly: 16-bit indices if they suffice, and consecutive triangles (a,b,c) (a,c,d) as one
+/// quad.
 void write_ply(BufferedFile& file, const Mesh& mesh);
 
 } // namespace packtrace::scenegen

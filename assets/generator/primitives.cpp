@@ -19,7 +19,8 @@ void add_triangle(Mesh& mesh, DVec3 a, DVec3 b, DVec3 c) {
 
 void add_quad(Mesh& mesh, uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
   const auto& p = mesh.positions;
-  const auto add = [&](uint32_t i, uint32_t j, uint32_t k) { // quads may run to a point; what has no area stays out
+  // Quads may degenerate to triangles; skips halves without area.
+  const auto add = [&](uint32_t i, uint32_t j, uint32_t k) {
     if (p[i] != p[j] && p[j] != p[k] && p[k] != p[i]) mesh.triangles.emplace_back(i, j, k);
   };
   add(a, b, c);
@@ -82,7 +83,8 @@ void add_tube(Mesh& mesh, std::span<const DVec3> path, std::span<const double> r
   DVec3 x = along(path[0], path[1] - path[0])[0];
   for (size_t i = 0; i < path.size(); ++i) {
     const DVec3 tangent = glm::normalize(path[i + 1 < path.size() ? i + 1 : i] - path[i > 0 ? i - 1 : 0]);
-    x = glm::normalize(x - tangent * glm::dot(x, tangent)); // carried along the path, so the bar does not twist
+    // Transported along the path, so that the bar does not twist.
+    x = glm::normalize(x - tangent * glm::dot(x, tangent));
     const DVec3 z = glm::cross(x, tangent);
     for (uint32_t k = 0; k < sides; ++k) {
       const auto [s, c] = sin_cos(2.0 * kPi * k / sides);
@@ -110,7 +112,7 @@ void add_rod(Mesh& mesh, DVec3 from, DVec3 to, double radius, uint32_t sides) {
 }
 
 void add_blob(Mesh& mesh, const DAffine& frame, uint32_t cells, const std::function<double(DVec3)>& displacement) {
-  // A cube's surface as a (cells+1)^3 lattice with only its shell used: neighbouring faces share their edge vertices.
+  // The shell of a (cells+1)^3 lattice: neighbouring faces of the cube share their edge vertices.
   const uint32_t side = cells + 1;
   std::vector<uint32_t> index(static_cast<size_t>(side) * side * side, ~0u);
   const auto vertex = [&](glm::uvec3 c) {

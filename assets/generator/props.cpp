@@ -21,7 +21,7 @@ void add_flowers(Model& model, const DAffine& frame, DVec3 spread, int count, Ra
   }
 }
 
-/// A striped roof of cloth between a high back edge and a low front edge with a scalloped hem; faces -z.
+/// A striped cloth roof from a high back edge to a low front edge with a scalloped hem; faces -z.
 void add_awning(Model& model, const DAffine& f, double width, double depth, double drop, int stripes) {
   for (int i = 0; i < stripes; ++i) {
     Mesh& mesh = model.flat(i % 2 == 0 ? "canvas_a" : "canvas_b");
@@ -158,7 +158,7 @@ Model make_market_stall(Random& random) {
   add_awning(model, translation({-1.4, 2.65, 0.95}), 2.8, 2.1, 0.55, 8);
   add_box(model.flat("wood_dark"), kHere, {-1.2, 0.0, -0.6}, {1.2, 0.75, 0.6});
   static constexpr const char* kFruit[] = {"fruit_a", "fruit_b", "fruit_c"};
-  for (int box = 0; box < 3; ++box) { // trays tilted to the buyer, heaped with fruit
+  for (int box = 0; box < 3; ++box) { // trays tilted towards the buyer, heaped with fruit
     const DAffine f = compose(translation({-1.15 + 0.78 * box, 0.78, -0.62}), rotation_x(-0.3));
     add_box(model.flat("wood"), f, {0, 0, 0}, {0.72, 0.16, 1.15});
     for (int i = 0; i < 15; ++i) {
@@ -206,7 +206,7 @@ Model make_laundry(Random& random) {
     const double width = random.uniform(0.35, 0.7), length = random.uniform(0.5, 1.0),
                  blow = random.uniform(-0.2, 0.25);
     Mesh& mesh = model.flat(kCloth[random.below(4)]);
-    const auto cloth = [&](double u, double v) { // hangs from the line, blown at the hem
+    const auto cloth = [&](double u, double v) { // hangs from the line, blown outwards at the hem
       return DVec3(x + width * u, -0.1 - length * v, blow * v * v + 0.05 * v * sin_cos(9.0 * u).sin);
     };
     for (int i = 0; i < 4; ++i) {
@@ -225,7 +225,7 @@ Model make_fish_rack(Random& random) {
   Model model;
   for (const double x : {-1.5, 0.0, 1.5}) add_rod(model.smooth("wood"), {x, -0.3, 0}, {x, 1.9, 0}, 0.05, 6);
   add_rod(model.smooth("wood"), {-1.6, 1.85, 0}, {1.6, 1.85, 0}, 0.04, 6);
-  for (int i = 0; i < 16; ++i) { // the net: crossing cords with a few floats
+  for (int i = 0; i < 16; ++i) { // the net: crossing cords
     const double x = -1.5 + 0.2 * i;
     const double low = random.uniform(0.35, 0.6);
     add_rod(model.smooth("rope"), {x, 1.85, -0.03}, {x + 0.35 - 0.04 * i, low, -0.25}, 0.012, 3);

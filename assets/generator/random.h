@@ -11,19 +11,22 @@ constexpr uint64_t hash_bits(uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// A hashed counter: the same numbers on every machine, which the standard library's distributions do not promise.
+/// Random numbers from a hashed counter. They are equal on every machine; the standard library's distributions do not
+/// guarantee that.
 class Random {
 public:
-  /// Streams of one seed are independent of each other, so adding draws to one part of a scene leaves the others alone.
+  /// Streams of one seed are independent, so additional draws in one part of a scene do not change the other parts.
   explicit constexpr Random(uint64_t seed, uint64_t stream = 0) : state_(hash_bits(seed ^ hash_bits(stream + kStep))) {}
 
+  /// Next 64 random bits.
   constexpr uint64_t bits() { return hash_bits(state_ += kStep); }
-  /// In [0, 1), a multiple of 2^-53.
+  /// Uniform in [0, 1), a multiple of 2^-53.
   constexpr double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
-  /// In [lo, hi).
+  /// Uniform in [lo, hi).
   constexpr double uniform(double lo, double hi) { return lo + (hi - lo) * uniform(); }
-  /// In [0, n); n > 0.
+  /// Uniform in [0, n); n > 0.
   constexpr uint32_t below(uint32_t n) { return static_cast<uint32_t>(((bits() >> 32) * n) >> 32); }
+  /// Returns true with the given probability.
   constexpr bool chance(double probability) { return uniform() < probability; }
 
 private:

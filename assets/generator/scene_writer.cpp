@@ -81,7 +81,7 @@ void SceneWriter::instance(std::string_view object_name, const DAffine& m) {
     objects_.write("ObjectEnd\n");
     object.written = true;
   }
-  // Four significant digits move the far end of a 20 m object by a millimetre; places need more.
+  // Four significant digits move the far end of a 20 m object by a millimetre; positions need more.
   instances_.write(fmt::format("Transform [{:.4g} {:.4g} {:.4g} 0 {:.4g} {:.4g} {:.4g} 0 {:.4g} {:.4g} {:.4g} 0 "
                                "{:.6g} {:.6g} {:.6g} 1]ObjectInstance \"{}\"\n",
                                m[0].x, m[0].y, m[0].z, m[1].x, m[1].y, m[1].z, m[2].x, m[2].y, m[2].z, m[3].x, m[3].y,

@@ -13,7 +13,7 @@
 
 namespace packtrace::scenegen {
 
-/// Where a generator writes.
+/// Destination of a generator.
 struct OutputConfig {
   std::filesystem::path folder;
   bool overwrite = false;
@@ -23,44 +23,46 @@ struct OutputConfig {
 struct ViewConfig {
   DVec3 eye{0, 2, -10};
   DVec3 target{0, 0, 0};
-  double fov_degrees = 40.0; ///< across the shorter image axis
+  double fov_degrees = 40.0; ///< along the shorter image axis
   uint32_t width_px = 1280;
   uint32_t height_px = 720;
 };
 
-/// Which material takes the place of which: {"wall", "wall_rose"}.
+/// Material replacements, from the model's name to the object's: {"wall", "wall_rose"}.
 using MaterialChoice = std::map<std::string, std::string, std::less<>>;
 
-/// Counts of what went to disk.
+/// Statistics of the written scene.
 struct SceneTotals {
   uint64_t instances = 0;
-  uint64_t unique_triangles = 0; ///< those in PLY files
-  uint64_t placed_triangles = 0; ///< instances and world shapes
+  uint64_t unique_triangles = 0; ///< triangles in PLY files
+  uint64_t placed_triangles = 0; ///< triangles of all instances and world shapes
 };
 
 /// Writes a pbrt-v3 scene: FOLDER/NAME.pbrt, which includes NAME_objects.pbrt and NAME_instances.pbrt, and binary PLY
-/// files under FOLDER/geometry. Instances stream to disk. Every function throws Error(kIo) if the disk refuses.
+/// files under FOLDER/geometry. Instances are streamed to disk. All functions throw Error(kIo) if writing fails.
 class SceneWriter {
 public:
-  /// @param comment '#' lines for the head of the scene file: what is to be seen
+  /// @param comment '#' lines for the head of the scene file, describing the picture
   SceneWriter(const OutputConfig& config, std::string name, std::string_view comment, const ViewConfig& view);
 
-  /// Diffuse, linear sRGB in [0,1].
+  /// Adds a diffuse material; albedo in linear sRGB, [0,1].
   void material(std::string_view name, Vec3 albedo);
 
-  /// Remembers a finished model under a name; its meshes go to disk when something first shows it.
+  /// Stores a finished model under a name. Its meshes are written when it is first used.
   void model(std::string_view model_name, Model model);
-  /// A model under a name of its own, with other materials if chosen; ObjectBegin is written with its first instance.
+  /// Declares an object that uses a model, optionally with other materials. ObjectBegin is written with its first
+  /// instance.
   void object(std::string_view object_name, std::string_view model_name, const MaterialChoice& choice = {});
-  /// model() and object() in one.
+  /// Combines model() and object() under one name.
   void object(std::string_view object_name, Model model);
+  /// Writes an instance of an object, and the object before its first instance.
   void instance(std::string_view object_name, const DAffine& world_from_object);
-  /// A stored model placed once, in the world, as it is.
+  /// Places a stored model once in the world, without a transform.
   void world_shape(std::string_view model_name);
-  /// A PLY file under the folder that the caller wrote itself, placed once in the world.
+  /// Places a PLY file that the caller wrote once in the world; `file` is relative to the folder.
   void world_file(std::string_view file, std::string_view material, uint64_t triangle_count);
 
-  /// Ends and names all files.
+  /// Completes all files and gives them their names.
   SceneTotals finish();
 
 private:
@@ -68,7 +70,7 @@ private:
     std::string file, material;
   };
   struct StoredModel {
-    Model model; ///< emptied once written
+    Model model; ///< empty once written
     std::vector<PlyPart> parts;
     uint64_t triangle_count = 0;
     bool written = false;

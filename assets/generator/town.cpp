@@ -21,11 +21,11 @@ constexpr const char* kComment =
     "# Made by packtrace_scenegen town; pbrt-v3 renders it as it stands.\n\n";
 
 constexpr double kFirstAngle = radians(-22), kLastAngle = radians(90);
-constexpr double kStairSpacing = 30.0; ///< metres of street between two flights
+constexpr double kStairSpacing = 30.0; ///< metres of street between two flights of stairs
 
 const ViewConfig kView{{-22.0, 6.4, -42.0}, {-12.5, 13.0, 50.0}, 37.0, 1280, 720};
 
-/// Lays the town out, street by street, and writes every placement.
+/// Lays out the town street by street and writes every placement.
 class TownBuilder {
 public:
   TownBuilder(const TownConfig& config, SceneWriter& writer)
@@ -56,13 +56,13 @@ private:
     writer_.instance(object, stand_at(at, turn, scale));
     ++placed_;
   }
-  /// Something standing on the ground of a level.
+  /// Places an object on the ground of a level.
   void put_on(std::string_view object, double angle, double inland, uint32_t level, double turn, double scale = 1.0) {
     put(object, terrain_.place(angle, inland, level), turn, scale);
   }
   bool terraced(double angle, double inland) const { return terrain_.built(angle, inland) > 0.97; }
 
-  /// Whether a flight up from a level's street lies within `margin` metres of a place along the street.
+  /// Whether a flight of stairs from a level's street to the next level is within `margin` metres along the street.
   bool near_stairs(uint32_t level, double angle, double margin) const {
     const double radius = terrain_.quay_radius(angle) + TownTerrain::level_begin(level + 1);
     const double along_street = (angle - kFirstAngle) * radius + level * 11.0;
@@ -101,7 +101,7 @@ void TownBuilder::build_street(uint32_t level) {
     const double ahead = angle + 4.0 / radius;
     const bool room = terraced(angle, back - 2.0) && terraced(ahead, back - 2.0);
     const double wild = 0.06 + 0.045 * level;
-    if (!room) { // too narrow to build on: the terrace's ends are gardens
+    if (!room) { // too narrow for houses: gardens at the ends of the terrace
       if (terrain_.built(angle, back - 3.0) > 0.6) build_garden(level, angle);
       angle += 3.0 / radius;
     } else if (level + 1 < TownTerrain::kLevels && near_stairs(level, ahead, 5.5)) {
@@ -115,7 +115,7 @@ void TownBuilder::build_street(uint32_t level) {
   }
 }
 
-/// Returns the house's width; its left wall is at `angle`.
+/// Builds a house whose left wall is at `angle` and returns its width.
 double TownBuilder::build_house(uint32_t level, double angle) {
   uint32_t style_index = random_.below(static_cast<uint32_t>(objects_.houses.size()));
   if (style_index == last_style_) style_index = (style_index + 1) % static_cast<uint32_t>(objects_.houses.size());
@@ -133,7 +133,7 @@ double TownBuilder::build_house(uint32_t level, double angle) {
   return style.config.width;
 }
 
-/// Flowers at the windows, pots and barrels by the door, sometimes a washing line.
+/// Adds flowers at the windows, pots and barrels by the door, and sometimes a washing line.
 void TownBuilder::decorate(const HouseStyle& style, const DAffine& frame) {
   const auto add = [&](std::string_view object, DVec3 at, double turn, double scale) {
     writer_.instance(object, compose(frame, stand_at(at, turn, scale)));
@@ -178,7 +178,7 @@ void TownBuilder::build_stairs(uint32_t level) {
   const double top = TownTerrain::level_begin(level + 1);
   const auto last = static_cast<int>((kLastAngle - kFirstAngle) * 120.0 / kStairSpacing) + 1;
   for (int i = 0; i <= last; ++i) {
-    // The angle at which near_stairs() measures no offset; the radius depends on it, so walk to it.
+    // Finds the angle at which near_stairs() measures no offset, by fixed-point iteration, as the radius depends on it.
     double angle = 0.0;
     for (int step = 0; step < 12; ++step) {
       angle = kFirstAngle + (kStairSpacing * i - level * 11.0) / (terrain_.quay_radius(angle) + top);
@@ -196,7 +196,7 @@ void TownBuilder::build_stairs(uint32_t level) {
   }
 }
 
-/// Retaining walls under every terrace, and a parapet, railing or fence along its edge.
+/// Builds retaining walls under every terrace, and a parapet, railing or fence along its edge.
 void TownBuilder::build_edges() {
   for (uint32_t level = 0; level <= TownTerrain::kLevels; ++level) {
     const double edge = TownTerrain::level_begin(level);
@@ -208,7 +208,7 @@ void TownBuilder::build_edges() {
       if (terrain_.built(middle, edge) < 0.9) continue;
       const auto [s, c] = sin_cos(middle);
       const double r = terrain_.quay_radius(middle) + edge;
-      // The edge is not quite a circle: turn each piece along it (small angles).
+      // The edge is not exactly a circle, so each piece is turned along it (small angles).
       const double slope =
           (terrain_.quay_radius(middle + step / 2) - terrain_.quay_radius(middle - step / 2)) / kWallModule;
       const double turn = middle - slope;
@@ -251,7 +251,7 @@ void TownBuilder::build_quay() {
       put_on(any(objects_.tables), angle, 3.4, 0, turn);
     } else if (pick < 0.5) {
       put_on(any(objects_.stalls), angle, 3.0, 0, turn);
-    } else if (pick < 0.72) { // goods just landed
+    } else if (pick < 0.72) { // unloaded goods
       put_on(any(objects_.crates), angle, 1.8, 0, turn);
       put_on(any(objects_.crates), angle + 0.026, 1.9, 0, turn + 0.4);
       put(any(objects_.crates), terrain_.place(angle + 0.012, 1.85, 0) + DVec3(0, 0.8, 0), turn + 0.7);
@@ -273,7 +273,7 @@ void TownBuilder::build_pier() {
   const auto [ls, lc] = sin_cos(landing);
   const DVec3 to = DVec3(ls, 0, lc) * (terrain_.quay_radius(landing) + 0.5) + DVec3(0, TownTerrain::kQuayHeight, 0);
   const DVec3 way = glm::normalize(to - from), right(way.z, 0, -way.x);
-  const double turn = radians(21.0); // about the way's; things on a pier are never quite straight
+  const double turn = radians(21.0); // relative to the pier's direction; objects on a pier are never quite straight
   const auto pieces = static_cast<uint32_t>(glm::length(to - from) / kWallModule);
   const DAffine heading(right, DVec3(0, 1, 0), way, DVec3(0.0));
   for (uint32_t i = 0; i < pieces; ++i) {
@@ -296,7 +296,7 @@ void TownBuilder::build_pier() {
         put(any(objects_.racks), at + side, turn + kPi / 2, 0.9);
       }
     }
-    if (i % 5 == 3) { // boats tied up alongside, mostly on the harbour side
+    if (i % 5 == 3) { // boats moored alongside, mostly on the harbour side
       const DVec3 berth = at + right * (random_.chance(0.75) ? 3.3 : -3.3);
       put(any(objects_.rowing_boats), {berth.x, 0.0, berth.z}, turn + random_.uniform(-0.15, 0.15));
     }
@@ -368,7 +368,7 @@ void TownBuilder::put_plant(DVec3 at, double wildness) {
     put(any(objects_.cypresses), at, turn, size);
 }
 
-/// Trees on a coarse jittered grid; then the rest of the instances as undergrowth, so many that the total comes out.
+/// Places trees on a coarse jittered grid, then undergrowth until the total number of instances is reached.
 void TownBuilder::build_hillside() {
   const double from = radians(-40), to = radians(98), deepest = 205.0;
   const auto open_ground = [&](double angle, double inland, DVec3& at) {

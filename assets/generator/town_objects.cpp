@@ -63,7 +63,7 @@ const std::array<MaterialChoice, kHousePaints> kHouseColours{
     MaterialChoice{{"shutter", "shutter_red"}},
     MaterialChoice{{"wall", "wall_sky"}, {"shutter", "white"}}};
 
-/// Makes `count` variants, stores each as an object, and returns the names.
+/// Makes `count` variants, stores each as an object and returns their names.
 std::vector<std::string> variants(SceneWriter& writer, const char* name, uint32_t count, Random& random,
                                   const std::function<Model(Random&)>& make) {
   std::vector<std::string> names;
@@ -74,7 +74,7 @@ std::vector<std::string> variants(SceneWriter& writer, const char* name, uint32_
   return names;
 }
 
-/// One stored model under further material choices; returns the new names.
+/// Adds objects that use a stored model with other materials, one per choice; returns their names.
 std::vector<std::string> recoloured(SceneWriter& writer, const std::string& model,
                                     std::initializer_list<MaterialChoice> choices) {
   std::vector<std::string> names;
@@ -178,7 +178,7 @@ void write_props(SceneWriter& writer, TownObjects& objects, Random& random) {
 
 void write_town_materials(SceneWriter& writer) {
   for (const Paint& paint : kPaints) writer.material(paint.name, Vec3(paint.r, paint.g, paint.b));
-  for (int i = 0; i < TownTerrain::kSeaShades; ++i) { // green at the shore to blue in the offing
+  for (int i = 0; i < TownTerrain::kSeaShades; ++i) { // green at the shore to blue in the distance
     const float t = static_cast<float>(i) / (TownTerrain::kSeaShades - 1);
     const Vec3 shallow(0.30f, 0.68f, 0.64f), middle(0.09f, 0.44f, 0.52f), deep(0.05f, 0.27f, 0.43f);
     const Vec3 shade = t < 0.5f ? glm::mix(shallow, middle, 2.0f * t) : glm::mix(middle, deep, 2.0f * t - 1.0f);

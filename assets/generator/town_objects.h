@@ -9,7 +9,7 @@
 
 namespace packtrace::scenegen {
 
-inline constexpr uint32_t kHousePaints = 8; ///< objects of each house style: "house_STYLE_PAINT"
+inline constexpr uint32_t kHousePaints = 8; ///< objects per house style: "house_STYLE_PAINT"
 
 struct HouseStyle {
   std::string name;
@@ -17,7 +17,7 @@ struct HouseStyle {
   std::vector<DVec3> sills;
 };
 
-/// What can be placed in the town, by object name; each list holds variants of one thing.
+/// Names of the objects that can be placed in the town; each list holds variants of one kind of object.
 struct TownObjects {
   std::vector<HouseStyle> houses;
   std::vector<std::string> walls, quay, parapets, fences, piers, rocks, shore_rocks;
@@ -26,10 +26,10 @@ struct TownObjects {
       clouds;
 };
 
-/// Named materials of every town model, and those that objects swap in.
+/// Writes the materials of all town models, including those that objects substitute.
 void write_town_materials(SceneWriter& writer);
 
-/// Makes and stores all models but the ground. Single things are objects under the names "barrel", "rope_coil",
+/// Makes and stores all models except the ground. Objects without variants have the names "barrel", "rope_coil",
 /// "bollard", "lamp_post", "bench", "buoy", "stairs", "railing", "church", "lighthouse", "windmill", "sailing_boat".
 TownObjects write_town_objects(SceneWriter& writer, uint64_t seed);
 

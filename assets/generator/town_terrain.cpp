@@ -21,7 +21,7 @@ struct Station {
   uint32_t level = 0;
 };
 
-/// Rings of the ground mesh. Two stations share a place at each retaining wall: its foot and its top.
+/// Rings of the ground mesh. At each retaining wall, two stations share a position: its foot and its top.
 std::vector<Station> stations() {
   std::vector<Station> result{{-26, 0}, {-14, 0}, {-7, 0}, {-2.5, 0}, {-0.01, 0}};
   for (uint32_t level = 0; level < TownTerrain::kLevels; ++level) {
@@ -113,7 +113,7 @@ Model TownTerrain::make_ground() const {
     for (uint32_t i = 0; i < kColumns; ++i) {
       const size_t low = j * (kColumns + 1) + i, high = low + kColumns + 1;
       const DVec3 a = points[low], b = points[high], c = points[high + 1], d = points[low + 1];
-      if (std::max({a.y, b.y, c.y, d.y}) < -3.0) continue; // sea bed nobody sees
+      if (std::max({a.y, b.y, c.y, d.y}) < -3.0) continue; // invisible sea bed
       const DVec3 normal = glm::cross(c - a, d - b);
       const double angle = mix(kFirstAngle, kLastAngle, (i + 0.5) / kColumns);
       const double slope = std::abs(normal.y) / std::max(1e-9, glm::length(normal));

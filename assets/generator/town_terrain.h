@@ -7,8 +7,9 @@
 
 namespace packtrace::scenegen {
 
-/// The shape of the harbour town's hill: an amphitheatre of terraces around a bay whose middle is the origin. Places
-/// are (angle, inland): angle from +z towards +x in radians, metres inland from the quay's edge. Sea level is y = 0.
+/// Shape of the harbour town's hill: an amphitheatre of terraces around a bay centred on the origin. Positions are
+/// (angle, inland): the angle from +z towards +x in radians, and metres inland from the quay's edge. Sea level is y =
+/// 0.
 class TownTerrain {
 public:
   static constexpr uint32_t kLevels = 8; ///< level 0 is the quay
@@ -20,25 +21,28 @@ public:
 
   explicit TownTerrain(uint64_t seed) : seed_(seed) {}
 
+  /// Distance of the quay's edge from the origin, in metres.
   double quay_radius(double angle_rad) const;
-  /// Inland distance where a level begins; level kLevels is where the open hillside does.
+  /// Inland distance at which a level begins; level kLevels is the open hillside.
   static constexpr double level_begin(uint32_t level) {
     return level == 0 ? 0.0 : kQuayWidth + (level - 1) * kTerraceWidth;
   }
   static constexpr double level_height(uint32_t level) { return kQuayHeight + level * kRiser; }
 
-  /// 1 where the ground is terraced, 0 where it is nature's.
+  /// 1 where the ground is terraced, 0 where it is natural, and between in transitions.
   double built(double angle_rad, double inland) const;
-  /// Ground height on a level's side of its retaining wall.
+  /// Ground height at a position, taken as part of the given level (its side of the retaining wall).
   double height(double angle_rad, double inland, uint32_t level) const;
-  /// Ground height with the level found from the place.
+  /// Ground height at a position; the level follows from the position.
   double height(double angle_rad, double inland) const;
+  /// World position on the ground.
   DVec3 place(double angle_rad, double inland) const;
+  /// World position on the ground of the given level.
   DVec3 place(double angle_rad, double inland, uint32_t level) const;
 
   /// Ground mesh. Materials: "grass_a".."grass_c", "rock_a", "rock_b", "paving_a", "paving_b", "sand".
   Model make_ground() const;
-  /// Rippled sea around it, shallow to deep: "foam", "water_0", ... below kSeaShades.
+  /// Rippled sea around the ground, from shallow to deep. Materials: "foam", and "water_N" for N in [0, kSeaShades).
   Model make_sea() const;
   /// Two ranges of distant mountains: "mountain_a" (near), "mountain_b".
   Model make_mountains() const;

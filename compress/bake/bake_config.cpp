@@ -11,7 +11,7 @@ namespace packtrace {
 
 namespace {
 
-constexpr double kMaxFlatDegrees = 0.1; // where an error is stated
+constexpr double kMaxFlatDegrees = 0.1; // cap on NormalLimits::flat_degrees if an encoding or error is requested
 
 void require(bool ok, const char* what, const char* range) {
   if (!ok) throw Error(ErrorKind::kUsage, std::string(what) + " out of range: " + range);

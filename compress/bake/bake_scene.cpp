@@ -32,17 +32,18 @@
 namespace packtrace {
 namespace {
 
-/// Triangles that building levels of a geometry works through, as a multiple of its own: every level has half.
+/// Triangles processed to build a geometry's LOD levels, relative to its own number of triangles: each level has half
+/// as many as the one below.
 constexpr uint64_t kLodWork = 2;
 
-/// Of the source's area: collapsed triangles of more are worth a warning.
+/// A bake warns if collapsed triangles exceed this fraction of the source area.
 constexpr double kVisibleAreaShare = 1e-3;
 
 double mean_normal_error(const QuantizeStats& stats) {
   return stats.normal_count > 0 ? stats.normal_error_sum / static_cast<double>(stats.normal_count) : 0.0;
 }
 
-/// About the factor by which an instance scales areas: exact where it stretches all directions alike.
+/// Factor by which an instance scales areas, |det|^(2/3). Exact for uniform scale, otherwise an estimate.
 double area_scale(const baked::InstanceRecord& instance) {
   const auto& m = instance.world_from_object;
   const DVec3 x(m[0], m[1], m[2]), y(m[3], m[4], m[5]), z(m[6], m[7], m[8]);
@@ -67,7 +68,7 @@ public:
       progress_.begin("coding pages", 0);
       result.bytes = encode_paged_file(BakedFile::borrow_bytes(result.bytes, "bake result"), config_.codec);
     }
-    // Reading back what was written is part of the bake: nothing leaves it that a reader would refuse.
+    // Reads the result back before it leaves the bake, so that a bake never returns a file that the reader rejects.
     const BakedFile file = BakedFile::borrow_bytes(result.bytes, "bake result");
     report_.file = summarize(file);
     measure_seams(file);
@@ -80,7 +81,7 @@ private:
     baked::GeometryRecord record{};
     EncodedGeometry encoded;
     QuantizeStats stats;
-    std::vector<uint32_t> slots; ///< of the plan that have triangles left
+    std::vector<uint32_t> slots; ///< slots of the plan that still have triangles
     GeometryNeeds needs;
     EncodedLod lod;
 
@@ -114,7 +115,7 @@ private:
     return sections.assemble(summary(sections));
   }
 
-  /// Takes slots without triangles out of the plan, as the packed geometries have none.
+  /// Removes slots without triangles from the plan; the packed geometries do not have them.
   void close_slots() {
     std::vector<std::vector<uint32_t>> left;
     for (Packed& packed : packed_) left.push_back(std::move(packed.slots));
@@ -155,7 +156,7 @@ private:
            " geometries lie so far from the origin that float positions are coarser than the step of their grid");
   }
 
-  /// Leaves out what leaves the range of floats.
+  /// Leaves out instances that exceed the float range.
   void place_instances() {
     std::vector<uint32_t> uses(plan_.geometries.size());
     for (baked::InstanceRecord& instance : plan_.instances) {
@@ -172,7 +173,7 @@ private:
     report_left_out(uses);
   }
 
-  /// Looks for instances whose grid is not that of what lies beside them.
+  /// Finds instances that touch geometry on another grid and warns of the gaps that may open there.
   void measure_seams(const BakedFile& file) {
     report_.seams = InstanceSeams(file).summary();
     const SeamSummary& seams = report_.seams;
@@ -183,7 +184,7 @@ private:
            (report_.lod_geometries > 0 ? ", and in coarser levels by the errors of both" : ""));
   }
 
-  /// Gives what is left out an empty geometry, and empties geometries that nothing places any more.
+  /// Points left-out instances at an empty geometry, and empties geometries that no instance uses any more.
   void report_left_out(const std::vector<uint32_t>& uses) {
     report_.left_out = plan_.left_out.size();
     if (report_.left_out == 0) return;
@@ -231,7 +232,7 @@ private:
     });
   }
 
-  /// World-space geometries touch at borders that levels of all of them must leave as they are.
+  /// Finds the borders where world-space geometries touch. All LOD levels must keep these borders unchanged.
   void find_shared_borders() {
     std::vector<size_t> world;
     bool wanted = false;
@@ -250,8 +251,9 @@ private:
     shared_borders_ = finder.finish();
   }
 
-  /// Before anything large is allocated. All geometries stay packed, as many as there are threads are being packed, and
-  /// the trees and the file are made of all of them. Measured on large meshes, and rounded up.
+  /// Reserves memory before anything large is allocated: for all packed geometries and the trees and file made of them,
+  /// and for the working sets of the largest geometries, one per thread. Bytes per triangle were measured on large
+  /// meshes and rounded up.
   void reserve_memory() {
     constexpr uint64_t kPackedBytes = 48, kWorkingBytes = 144, kLodWorkingBytes = 192; // per triangle
     uint64_t triangles = 0;
@@ -274,7 +276,7 @@ private:
     return triangles;
   }
 
-  /// By geometry: whether it is to have levels of detail.
+  /// Returns, per geometry, whether it gets LOD levels.
   std::vector<uint8_t> choose_lod() const {
     std::vector<uint8_t> wanted(packed_.size());
     if (config_.lod == LodUse::kOff) return wanted;
@@ -285,7 +287,7 @@ private:
     return wanted;
   }
 
-  /// A geometry on its lattice and in clusters, and what it became.
+  /// A geometry as quantised, as clusters and as packed.
   struct Draft {
     QuantizedGeometry quantized;
     GeometryClusters clusters;
@@ -295,7 +297,8 @@ private:
   Packed pack_one(size_t index) {
     GeometryNeeds needs = analyse_requirements(scene_, plan_, plan_.geometries[index], config_);
     Draft draft = pack_with(index, needs);
-    // Flat triangles need clusters of their own. Where only some are flat, those may take more than the normals do.
+    // Flat triangles need clusters of their own. If only some triangles are flat, those clusters may cost more than the
+    // normals they save, so try both.
     const bool mixed = draft.packed.stats.flat_triangles > 0 && draft.packed.encoded.stream_bits.normals > 0;
     needs.infer_normals = false;
     if (mixed)
@@ -308,7 +311,7 @@ private:
     return std::move(draft.packed);
   }
 
-  /// @param draft its quantised geometry is used up
+  /// @param draft its quantised geometry is consumed
   EncodedLod find_or_build_lod(Draft& draft, const LodLimits& limits) {
     QuantizedGeometry& geometry = draft.quantized;
     const GeometryClusters& clusters = draft.clusters;
@@ -322,15 +325,15 @@ private:
       }
     ClusterLod lod = build_cluster_lod(geometry, clusters, progress_, limits);
     EncodedLod encoded = encode_lod(geometry, lod);
-    // Where another geometry failed or all was cancelled, inner loops return with their work undone.
+    // If another geometry failed or the bake was cancelled, inner loops return early with incomplete levels.
     if (store_ && !tbb::is_current_task_group_canceling()) store_->keep(key, encoded);
     return encoded;
   }
 
   QuantizedGeometry quantize(size_t index, const GeometryNeeds& needs) const {
     GeometryMeasure measure = measure_.geometries[index];
-    // The scene's step follows its own median edge: small meshes beside others keep the normals that they deserve
-    // there.
+    // The scene's step follows the scene's median edge. Small meshes use that edge if it is longer than their own;
+    // otherwise their short edges would loosen the limit on their normals.
     if (plan_.geometries[index].world_space)
       measure.median_edge = std::max(measure.median_edge, measure_.world.median_edge);
     return quantize_geometry(scene_, plan_.geometries[index], needs, config_, grids_[index], measure);
@@ -371,7 +374,7 @@ private:
     return record;
   }
 
-  /// Box of all instances, from the boxes of their geometries.
+  /// World-space bounds of all instances, from the bounds of their geometries.
   Bounds placed_bounds(const FileSections& sections) const {
     Bounds bounds;
     for (const baked::InstanceRecord& instance : plan_.instances) {
@@ -385,7 +388,7 @@ private:
     return bounds;
   }
 
-  /// Everything the report says of the scene as a whole.
+  /// Fills in the report's totals over the scene.
   void add_up() {
     QuantizeStats all;
     uint64_t coarse_uvs = 0;
@@ -485,12 +488,12 @@ private:
   PositionGrid world_grid_;
   std::vector<GeometryGrid> grids_;
   std::vector<Packed> packed_;
-  std::vector<uint8_t> lod_wanted_; // by geometry
+  std::vector<uint8_t> lod_wanted_; // per geometry
   SharedBorders shared_borders_;
   MemoryReservation memory_{config_.memory};
   std::optional<LodStore> store_;
   std::atomic<uint64_t> resumed_{0};
-  std::vector<EncodedTexture> textures_; // as in the scene; empty where they are not kept
+  std::vector<EncodedTexture> textures_; // in the scene's order; empty if textures are not stored
   BakeReport report_;
 };
 

@@ -14,8 +14,8 @@
 #include "compress/format/cluster/uv_codec.h"
 #include "pbrt_import/import_scene.h"
 
-/// Prints the tables of docs/accuracy.md: errors of texture coordinates, tangents and textures. Fails where a bound
-/// that the documentation states does not hold.
+/// Prints the tables of docs/accuracy.md: errors of texture coordinates, tangents and textures. Fails if a documented
+/// bound does not hold.
 namespace packtrace {
 namespace {
 
@@ -27,10 +27,11 @@ void expect(bool ok, const char* what) {
   g_kept = g_kept && ok;
 }
 
-using Generator = std::mt19937_64; // the same numbers with every library
+using Generator = std::mt19937_64; // same numbers with every standard library
 double uniform(Generator& g, double lo, double hi) { return lo + (hi - lo) * static_cast<double>(g() >> 11) * 0x1p-53; }
 
-/// Largest error in texels of 4096 over floats of magnitude up to `most`; infinite where some cannot be held.
+/// Largest error over floats of magnitude up to `most`, in texels of a 4096-texel texture; infinite if some cannot be
+/// encoded.
 double worst_uv(UvEncoding encoding, float most, size_t count) {
   Generator g(1);
   const int32_t exponent = choose_uv_exponent(static_cast<uint32_t>(kTexels), 1.0f, most);

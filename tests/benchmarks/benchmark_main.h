@@ -14,11 +14,11 @@
 
 namespace packtrace {
 
-/// Where `--json` writes a benchmark's figures: whole or not at all, in the place of what was there.
+/// Output file of `--json`. The figures are written completely or not at all, and replace an existing file.
 class FiguresFile {
 public:
-  /// @param file none if empty
-  /// @throws Error like OutputFile, at once and not after the minutes that measuring takes
+  /// @param file empty: no output
+  /// @throws Error like OutputFile; at construction, so that a bad path fails before minutes of measuring
   explicit FiguresFile(const std::filesystem::path& file) {
     if (!file.empty()) file_.emplace(file, true);
   }
@@ -34,7 +34,7 @@ private:
   std::optional<OutputFile> file_;
 };
 
-/// main() of a benchmark: run(argc, argv), its errors to stderr behind the name.
+/// Implements main() of a benchmark: calls run(argc, argv) and prints its errors to stderr after the name.
 /// @return the exit code
 template <class Run>
 int benchmark_main(const char* name, Run run, int argc, char** argv) {

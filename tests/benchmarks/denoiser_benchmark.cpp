@@ -8,7 +8,7 @@
 namespace packtrace {
 namespace {
 
-/// A floor, a wall and a ball in front of them, seen by a camera that may move sideways.
+/// A floor, a wall and a ball in front of them; the camera may move sideways.
 GBuffer make_room(ImageSize size, float motion) {
   GBuffer g;
   g.resize(size);
@@ -31,7 +31,7 @@ GBuffer make_room(ImageSize size, float motion) {
   return g;
 }
 
-/// Binary noise, p = 1/2.
+/// Binary noise with p = 1/2.
 AoFrame make_noise(ImageSize size, uint32_t seed) {
   AoFrame frame;
   frame.resize(size);
@@ -43,7 +43,8 @@ AoFrame make_noise(ImageSize size, uint32_t seed) {
   return frame;
 }
 
-/// Wall time of one frame of width x height, standing still or moving by a fraction of a pixel, with history warmed up.
+/// Wall time of one frame of width x height with a warm history; the camera stands still or moves by a fraction of a
+/// pixel.
 void BM_DenoiseFrame(benchmark::State& state) {
   const ImageSize size{static_cast<uint32_t>(state.range(0)), static_cast<uint32_t>(state.range(1))};
   const GBuffer gbuffer = make_room(size, state.range(2) != 0 ? 0.4f : 0.0f);

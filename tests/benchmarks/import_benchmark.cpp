@@ -31,17 +31,17 @@ struct Options {
   std::vector<std::string> inputs;
 };
 
-/// Figures from another machine, for the full size, with what they ask of this importer.
+/// Reference figures for the full size from another machine, and the targets for this importer.
 struct Anchor {
   std::string_view input;
   double parser_cpu_ms, parser_rss_mib; ///< the fastest public parser
   double reference_cpu_ms, reference_rss_mib;
-  double target_cpu_ms;        ///< on that machine
-  double target_rss_mib;       ///< the parser's where no other is stated
-  double target_scan_multiple; ///< speed over that of the from_chars scan; 0: none
-  double target_wall_ratio;    ///< of one to two threads; 0: none
+  double target_cpu_ms;        ///< on the reference machine
+  double target_rss_mib;       ///< the parser's figure unless another target is stated
+  double target_scan_multiple; ///< speed relative to the from_chars scan; 0: no target
+  double target_wall_ratio;    ///< wall time with one thread relative to two; 0: no target
 };
-constexpr double kAnchorScanMultiple = 0.65; ///< of the fastest public parser on `meshes`
+constexpr double kAnchorScanMultiple = 0.65; ///< speed of the fastest public parser relative to the scan, on `meshes`
 constexpr double kAnchorScanMbPerS = 199 / 0.446 / kAnchorScanMultiple;
 constexpr std::array kAnchors{
     Anchor{"meshes", 446, 94, 1963, 905, 446 / 1.5, 94, 1.5 * kAnchorScanMultiple, 1.8},
@@ -53,7 +53,7 @@ constexpr std::array kAnchors{
     Anchor{"includes", 97, 14, 36, 14, 20, 14, 0, 0},
 };
 
-/// Of some measurements.
+/// Spread of repeated measurements.
 struct Spread {
   double min = 0, median = 0, max = 0;
 };
@@ -74,16 +74,16 @@ struct InputFigures {
   struct Import {
     Spread cpu_ms, wall_ms, peak_rss_mib;
   };
-  std::array<Import, 2> threads; ///< one, two
+  std::array<Import, 2> threads; ///< with one and two threads
   Spread copy_ms, scan_ms, scan_wall_ms, two_thread_scan_wall_ms;
 
   double wall_ratio() const { return threads[0].wall_ms.min / threads[1].wall_ms.min; }
   double scan_wall_ratio() const { return scan_wall_ms.min / two_thread_scan_wall_ms.min; }
-  /// Speed over the scan's, in CPU time; without a scan (PLY): over the copy's.
+  /// CPU-time speed relative to the scan; for PLY files, which have no scan, relative to the copy.
   double calibration_multiple(bool binary) const { return (binary ? copy_ms : scan_ms).min / threads[0].cpu_ms.min; }
 };
 
-/// Takes the measurements in turn, so that a change of the machine's speed meets all of them.
+/// Interleaves the measurements, so that changes of the machine's speed affect all of them.
 InputFigures measure(const ImportInput& input, uint32_t repeats) {
   std::array<std::vector<ImportTiming>, 2> timings;
   std::vector<Calibration> calibrations;
@@ -131,7 +131,7 @@ Json describe(const ImportInput& input, const InputFigures& f) {
   return json;
 }
 
-/// The anchor beside the figures, and which targets hold.
+/// Returns the anchor, the figures and which targets hold.
 Json judge(const Anchor& anchor, const ImportInput& input, const InputFigures& f) {
   Json targets = Json::array();
   const auto at_most = [&](const char* what, double value, double limit) {
@@ -189,7 +189,7 @@ void print(const Json& result) {
   std::fflush(stdout);
 }
 
-/// The exponent b of CPU time = a * size^b, by least squares over the logarithms.
+/// Returns the exponent b of CPU time = a * size^b, by least squares over the logarithms.
 double exponent(const std::vector<std::pair<double, double>>& size_and_ms) {
   double sx = 0, sy = 0, sxx = 0, sxy = 0;
   const double n = static_cast<double>(size_and_ms.size());
@@ -232,7 +232,7 @@ std::string cpu_model() {
   return "unknown";
 }
 
-/// Of the source tree, where it is a checkout.
+/// Commit of the source tree if it is a checkout.
 std::string commit() {
   std::string text;
   if (std::FILE* pipe = ::popen("git -C " PACKTRACE_SOURCE_DIR " describe --always --dirty 2>/dev/null", "r")) {

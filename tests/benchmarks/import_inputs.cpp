@@ -20,13 +20,13 @@ namespace fs = std::filesystem;
 using scenegen::BufferedFile;
 using scenegen::Random;
 
-constexpr uint64_t kGeneratorVersion = 1; ///< part of the folders' names: raise it whenever bytes change
-constexpr uint64_t kUseSeed = 1'000'000;  ///< apart from those of the grids
+constexpr uint64_t kGeneratorVersion = 1; ///< part of the folders' names; raise it whenever the bytes change
+constexpr uint64_t kUseSeed = 1'000'000;  ///< distinct from the seeds of the grids
 
-/// A number in [0, count) for the i-th use, so that neighbouring uses name distant things.
+/// A number in [0, count) for the i-th use; neighbouring uses get distant numbers.
 uint64_t shuffled(uint32_t i, uint64_t count) { return i * uint64_t{7919} % count; }
 
-/// Vertices of a bumpy height field over columns x rows quads; triangle t belongs to quad t / 2.
+/// A bumpy height field of columns x rows quads; triangle t belongs to quad t / 2.
 struct Grid {
   uint32_t columns = 1, rows = 1;
   uint64_t seed = 0;
@@ -55,7 +55,7 @@ struct Grid {
   }
 };
 
-/// Calls write(index, text) for each index, and hands text to the file.
+/// Calls write(index, text) for each index and writes the text to the file.
 template <class Write>
 void write_each(BufferedFile& file, uint64_t count, Write write) {
   std::string text;
@@ -66,7 +66,7 @@ void write_each(BufferedFile& file, uint64_t count, Write write) {
   }
 }
 
-/// A trianglemesh with normals and uv, floats with the nine digits that identify them.
+/// Writes a trianglemesh with normals and UVs; floats have nine significant digits, which identify them.
 void write_mesh(BufferedFile& file, const Grid& grid) {
   file.write("Shape \"trianglemesh\" \"integer indices\" [\n");
   write_each(file, grid.triangle_count(), [&](uint32_t i, auto out) {
@@ -88,7 +88,7 @@ void write_mesh(BufferedFile& file, const Grid& grid) {
 
 constexpr std::string_view kMainFile = "scene.pbrt";
 
-/// The main file: what stands before the first shape, and the end.
+/// The main file, with the text before the first shape and at the end.
 class SceneFile : public BufferedFile {
 public:
   explicit SceneFile(const fs::path& folder) : BufferedFile(folder / kMainFile, true) {
@@ -103,7 +103,7 @@ public:
 constexpr std::string_view kTriangle = "Shape \"trianglemesh\" \"integer indices\" [0 1 2] "
                                        "\"point P\" [0 0 0 1 0 0 0 1 0]\n";
 
-/// What an import of an input must find.
+/// Counts that an import must find.
 struct Counts {
   uint64_t triangles = 0;
   uint64_t instances = 0;
@@ -136,7 +136,8 @@ Counts write_one_mesh(const fs::path& folder, double scale) {
 Counts write_instances(const fs::path& folder, double scale) {
   constexpr uint32_t kObjects = 10;
   constexpr Grid kGrid{20, 25};
-  const uint64_t count = std::max<uint64_t>(scaled(200'000, scale), kObjects); // an object without a use is left out
+  // The importer leaves out objects without a use.
+  const uint64_t count = std::max<uint64_t>(scaled(200'000, scale), kObjects);
   SceneFile file(folder);
   for (uint32_t i = 0; i < kObjects; ++i) {
     file.write(fmt::format("ObjectBegin \"tree_{}\"\n", i));
@@ -246,7 +247,7 @@ constexpr auto kNames = [] {
   return names;
 }();
 
-/// Finds the files that matter under the main file's folder: PLY where there is any, else scene text.
+/// Lists the relevant files in the main file's folder: PLY files if there are any, otherwise scene text.
 void list_files(ImportInput& input) {
   std::vector<fs::path> text;
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(input.main_file.parent_path())) {
@@ -277,7 +278,7 @@ ImportInput make_input(std::string_view name, const fs::path& folder, double sca
   if (recipe == kRecipes.end()) throw Error(ErrorKind::kUsage, fmt::format("no input is named {}", name));
   if (!(scale > 0 && scale <= 1)) throw Error(ErrorKind::kUsage, fmt::format("scale {} is not within (0, 1]", scale));
   const fs::path own = folder / fmt::format("{}-{}-v{}", name, scale, kGeneratorVersion);
-  const fs::path counts_file = own / "counts.txt"; // written last, so the rest is complete where it exists
+  const fs::path counts_file = own / "counts.txt"; // written last, so it implies that the rest is complete
   Counts counts;
   if (!(std::ifstream(counts_file) >> counts.triangles >> counts.instances)) {
     counts = recipe->write(own, scale);

@@ -42,7 +42,8 @@ double wall_ms(const Work& work) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// Calls work() in a child process and returns its result. What work throws goes to standard error, and Error(kInput)
+/// Calls work() in a child process and returns its result. If work() throws, prints the error to stderr and throws
+/// Error(kInput) here.
 /// is thrown here.
 template <class Work>
 auto in_child(const Work& work, rusage& usage) {
@@ -79,7 +80,7 @@ void require_found(const char* what, size_t found, const std::optional<uint64_t>
     throw Error(ErrorKind::kInput, fmt::format("{} {} were imported instead of {}", found, what, *expected));
 }
 
-/// Wall time of import_scene().
+/// Wall time of import_scene() in milliseconds.
 double import_ms(const ImportInput& input, uint32_t threads) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
   Diagnostics diagnostics;
@@ -88,7 +89,7 @@ double import_ms(const ImportInput& input, uint32_t threads) {
   const double elapsed_ms = wall_ms([&] { result = import_scene(input.main_file, {}, diagnostics, progress); });
   require_found("triangles", result.statistics.triangles, input.triangles);
   require_found("instances", result.scene.instances.size(), input.instances);
-  if (!input.triangles) return elapsed_ms; // a scene that may have faults
+  if (!input.triangles) return elapsed_ms; // an existing scene, which may have faults
   for (const Diagnostic& diagnostic : diagnostics.entries())
     if (diagnostic.severity != Severity::kNote) throw Error(ErrorKind::kInput, to_string(diagnostic));
   return elapsed_ms;
@@ -96,7 +97,7 @@ double import_ms(const ImportInput& input, uint32_t threads) {
 
 bool is_separator(char c) { return c == ' ' || c == '\n' || c == '\t' || c == '\r' || c == '[' || c == ']'; }
 
-/// The sum of all numbers, so that none can be left out.
+/// Parses all numbers and returns their sum, so that the compiler cannot remove the work.
 double scan_numbers(std::string_view text) {
   double sum = 0;
   const char* at = text.data();
@@ -116,11 +117,11 @@ double scan_numbers(std::string_view text) {
   return sum;
 }
 
-/// Results go here, so that the compiler cannot leave out the work for them.
+/// Receives results, so that the compiler cannot remove the work.
 volatile double sink;
 
 Calibration calibrate_text(const ImportInput& input) {
-  std::string text, copy(input.bytes, 'x'); // written to, so that its pages exist
+  std::string text, copy(input.bytes, 'x'); // filled, so that its pages are mapped
   text.reserve(input.bytes);
   for (const auto& file : input.files) {
     const std::vector<std::byte> bytes = read_file_bytes(file);

@@ -6,28 +6,30 @@
 
 namespace packtrace {
 
-/// What one import took.
+/// Time and memory of one import.
 struct ImportTiming {
-  double cpu_ms = 0;  ///< user and system, of the whole process that imported
+  double cpu_ms = 0;  ///< user and system time of the whole importing process
   double wall_ms = 0; ///< of import_scene()
   double peak_rss_mib = 0;
 };
 
-/// Imports in a child process of its own, so that neither memory nor heap carry over from one import to the next. The
-/// caller must not have started threads. Throws Error(kInput) if the import fails, or reports an error or other counts
-/// than an input has that states them, Error(kIo) if there can be no child.
+/// Imports in a child process, so that memory and heap state do not carry over between imports. The caller must not
+/// have started threads.
+/// Throws Error(kInput) if the import fails or if its counts differ from those that the input states; for an input with
+/// a stated triangle count, also if it reports a warning or an error. Throws Error(kIo) if no child process can be
+/// started.
 ImportTiming time_import(const ImportInput& input, uint32_t threads);
 
-/// What plain loops over the same bytes take, in CPU time where nothing else is said.
+/// Times of plain loops over the same bytes; CPU time unless stated otherwise.
 struct Calibration {
-  double copy_ms = 0; ///< memcpy from memory to memory; of PLY files: read() and memcpy
-  /// std::from_chars to float for each number, other tokens skipped. Of PLY files these are 0.
+  double copy_ms = 0; ///< memcpy from memory to memory; for PLY files read() and memcpy
+  /// std::from_chars to float for each number, skipping other tokens. These three are 0 for PLY files.
   double scan_ms = 0;
-  double scan_wall_ms = 0;            ///< wall time of that
-  double two_thread_scan_wall_ms = 0; ///< wall time with half of the text for each of two threads
+  double scan_wall_ms = 0;            ///< wall time of that scan
+  double two_thread_scan_wall_ms = 0; ///< wall time with half of the text per thread
 };
 
-/// Measures them in a child process, like time_import().
+/// Measures the times in a child process, like time_import().
 Calibration calibrate(const ImportInput& input);
 
 } // namespace packtrace

@@ -1,5 +1,5 @@
-// Levels of detail: how fast they are built, how far they are from the source and what is said of it, and the
-// simplifier beside meshoptimizer's and OpenMesh's: docs/cluster_lod.md.
+// Measures LOD levels: build time, stated and measured distance from the source, and the simplifier compared with
+// meshoptimizer's and OpenMesh's. Documented in docs/cluster_lod.md.
 
 #include <algorithm>
 #include <chrono>
@@ -82,7 +82,7 @@ void append_points(const ClusterLod& lod, const LodCluster& cluster, std::vector
   }
 }
 
-/// Both ways; lattice steps.
+/// Distance between two surfaces, in both directions; lattice steps.
 struct Distance {
   double rms = 0.0, max = 0.0;
 };
@@ -93,7 +93,7 @@ Distance between(const BareMesh& a, const SurfaceDistance& to_a, const BareMesh&
   return {std::max(from_a.rms, from_b.rms), std::max(from_a.max, from_b.max)};
 }
 
-/// What was made from each group, and the level 0 that it stands for.
+/// Per group, the clusters made from it and the level 0 clusters that it represents.
 class GroupSurfaces {
 public:
   explicit GroupSurfaces(const ClusterLod& lod)
@@ -108,18 +108,19 @@ public:
         below_[c.group].push_back(c.generating_group);
       }
     }
-    for (size_t i = 0; i < base_.size(); ++i) { // level by level
+    for (size_t i = 0; i < base_.size(); ++i) { // groups are ordered by level
       make_unique(below_[i]);
       for (const uint32_t group : below_[i]) base_[i].insert(base_[i].end(), base_[group].begin(), base_[group].end());
       make_unique(base_[i]);
     }
   }
 
-  /// Stated to measured error of each group that made some of the level, and has a measurable one: what was made from
-  /// the whole of level 0, and clusters of level 0 that no other group there stands for from the whole level.
+  /// Returns the ratio of stated to measured error of each group that made clusters of this level and whose measured
+  /// error is not 0. Measured are the distance of its clusters from the whole of level 0, and the distance from the
+  /// whole level of those level 0 clusters that no other group of the level represents.
   std::vector<double> ratios(uint32_t level, const std::vector<DVec3>& points, const SurfaceDistance& to_base,
                              const SurfaceDistance& to_level) {
-    constexpr size_t kSamples = 3000; // a group
+    constexpr size_t kSamples = 3000; // per group
     std::vector<uint32_t> sharers(lod_.clusters.size());
     for_each_group(level, [&](uint32_t group) {
       for (const uint32_t cluster : base_[group]) ++sharers[cluster];
@@ -138,11 +139,11 @@ public:
     });
     return result;
   }
-  /// How far some group is further off than it says, at most; lattice steps.
+  /// Largest amount by which a group's measured error exceeds its stated error; lattice steps.
   double excess() const { return excess_; }
 
-  /// The same against the largest error measured of each group and all below it, which it must not be below. Of levels
-  /// in turn, after ratios().
+  /// Like ratios(), against the largest measured error of a group and all groups below it; the stated error must not be
+  /// below that. Call for the levels in order, after ratios().
   std::vector<double> ratios_to_largest(uint32_t level) {
     std::vector<double> result;
     for_each_group(level, [&](uint32_t group) {
@@ -165,13 +166,13 @@ private:
   }
 
   const ClusterLod& lod_;
-  std::vector<std::vector<uint32_t>> made_, base_; ///< clusters, per group
-  std::vector<std::vector<uint32_t>> below_;       ///< groups, per group
+  std::vector<std::vector<uint32_t>> made_, base_; ///< cluster numbers, per group
+  std::vector<std::vector<uint32_t>> below_;       ///< group numbers, per group
   std::vector<double> measured_;                   ///< per group
   double excess_ = 0.0;
 };
 
-/// How many triangles a cut has that allows so much error: what users pay for it.
+/// Number of triangles of the cut for an error limit: the cost that users pay for it.
 uint64_t cut_triangles(const ClusterLod& lod, double error) {
   uint64_t count = 0;
   for (const uint32_t c : test::cut_clusters(lod, error)) count += lod.clusters[c].range.triangle_count;
@@ -206,7 +207,7 @@ Json measure_levels(const test::BuiltLod& built, const Options& options) {
   Json levels = Json::array();
   GroupSurfaces groups(lod);
   std::vector<double> all_ratios, all_ratios_to_largest;
-  double stated = 0.0; // of all that this level is made of
+  double stated = 0.0; // largest error of all groups up to this level
   fmt::print(
       "\n| level | triangles | clusters | terminal groups | stated error, median / largest (% of diagonal) | measured "
       "rms / largest | stated : measured, all / median group / the same, largest below counted "

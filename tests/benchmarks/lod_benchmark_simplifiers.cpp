@@ -25,18 +25,18 @@ struct Traits : OpenMesh::DefaultTraits {
 };
 using Mesh = OpenMesh::TriMesh_ArrayKernelT<Traits>;
 
-/// Returns how many triangles it did not take.
+/// Returns the number of triangles that OpenMesh rejected.
 uint64_t fill(const BareMesh& mesh, Mesh& out) {
   std::vector<Mesh::VertexHandle> vertices;
   for (const DVec3& p : mesh.positions) vertices.push_back(out.add_vertex(Mesh::Point(p.x, p.y, p.z)));
-  omerr().disable(); // a line for each face that it does not take
+  omerr().disable(); // it would print a line per rejected face
   uint64_t lost = 0;
   for (const Triangle& t : mesh.triangles)
     if (!out.add_face(vertices[t.x], vertices[t.y], vertices[t.z]).is_valid()) ++lost;
   return lost;
 }
 
-/// Debian's library ends the process for some meshes that are not manifold; so a child tries.
+/// Debian's library ends the process for some meshes that are not manifold, so this tries it in a child process.
 bool openmesh_takes(const BareMesh& mesh) {
   const pid_t child = ::fork();
   if (child == 0) {

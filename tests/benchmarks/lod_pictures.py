@@ -113,7 +113,7 @@ def schemes(bench):
     for _ in range(3):
         for (backend, name), reports in runs.items():
             if backend == "embree" and name == "off":
-                continue  # as none
+                continue  # same as "none"
             reports.append(bench.packtrace("render", file, "-o", bench.folder / "scheme.exr", "--frames", "1", "--spp", "2", "--no-denoise",
                                            "--aov", "ao", "--threads", "1", "--backend", backend, *options[name]))
 

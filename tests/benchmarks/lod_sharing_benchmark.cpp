@@ -1,4 +1,5 @@
-// Who shares whose BLAS: how many are built, what is traced for it, how long the choice takes: docs/lod_runtime.md.
+// Measures sharing of BLASes: how many are built, how many triangles are traced for it and how long planning takes.
+// Documented in docs/lod_runtime.md.
 
 #include <algorithm>
 #include <chrono>
@@ -58,12 +59,12 @@ struct SceneCase {
   double half_size, largest_scale;
 };
 
-/// Milliseconds of wall time and of this thread's CPU time.
+/// Wall time and CPU time of this thread, in milliseconds.
 struct Times {
   double wall = 1e30, cpu = 1e30;
 };
 
-/// The least of each.
+/// Minimum wall time and minimum CPU time.
 class LeastTimes {
 public:
   template <typename Call>
@@ -80,7 +81,7 @@ private:
   Times least_;
 };
 
-/// Geometries become of one diagonal, then each as large as the scene says.
+/// Instances whose geometries are normalised to a diagonal of 1 and then scaled as the scene says.
 std::vector<LodInstance> instances_of(const SceneCase& scene, std::span<const LodGeometry> geometries) {
   std::vector<LodInstance> instances =
       test::random_instances(scene.instances, scene.geometries, scene.half_size, scene.largest_scale, 1);
@@ -90,19 +91,19 @@ std::vector<LodInstance> instances_of(const SceneCase& scene, std::span<const Lo
   return instances;
 }
 
-/// 1 pixel at 1080p and 60 degrees.
+/// Error limit of 1 pixel at 1080p and 60 degrees.
 DetailView view_from(DVec3 eye) { return make_detail_view(eye, 0.01, std::numbers::pi / 3.0, 1080.0, 1.0); }
 
-/// A way through the scene, 0.05 diagonals a frame.
+/// Camera path through the scene, 0.05 diagonals per frame.
 DVec3 flight(uint32_t frame) {
   const double t = 0.05 * frame;
   return {t - 7.5, 2.0 * std::sin(0.3 * t), 1.5 * std::cos(0.4 * t)};
 }
 
-/// Instances whose BLAS is, somewhere, coarser than their own cut.
+/// Counts instances whose BLAS is coarser somewhere than their own cut.
 uint64_t count_under_detailed(const LodSharing& sharing, std::span<const LodInstance> instances, const LodPlan& plan,
                               const DetailView& view) {
-  std::vector<std::vector<uint64_t>> passed; // of each planned BLAS
+  std::vector<std::vector<uint64_t>> passed; // per planned BLAS
   for (const PlannedBlas& blas : plan.blas)
     passed.push_back(passed_of_blas(sharing.geometries()[blas.geometry], sharing.steps(blas.geometry), plan, blas));
   uint64_t count = 0;
@@ -118,23 +119,23 @@ uint64_t count_under_detailed(const LodSharing& sharing, std::span<const LodInst
   return count;
 }
 
-/// One plan, the camera moving.
+/// Time of one plan with a moving camera.
 Times time_plan(std::span<const LodGeometry> geometries, std::span<const LodInstance> instances,
                 const SharingConfig& config, uint32_t repeats, size_t threads) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
   LodSharing sharing(geometries, instances, config);
   LodPlan plan;
   LeastTimes times;
-  sharing.plan(view_from(flight(149)), {}, plan); // has memory to get
+  sharing.plan(view_from(flight(149)), {}, plan); // allocates memory
   for (uint32_t i = 0; i < repeats; ++i) times.time([&] { sharing.plan(view_from(flight(150 + i)), {}, plan); });
   return times.least();
 }
 
-/// Sums over the frames of a flight, but for the first, in which everything is built.
+/// Totals over the frames of a flight, without the first, in which everything is built.
 struct Flown {
   double update_ms = 0.0; ///< mean CPU time
   uint64_t builds = 0, triangles = 0, coarse_frames = 0;
-  uint64_t largest_triangles = 0; ///< of all BLASes that there were at a time
+  uint64_t largest_triangles = 0; ///< largest total of all BLASes alive at one time
 };
 
 Flown fly(std::span<const LodGeometry> geometries, std::span<const LodInstance> instances, const SharingConfig& config,
@@ -239,7 +240,7 @@ void parse(int argc, char** argv, CLI::App& app, Options& options) {
   app.parse(argc, argv);
 }
 
-/// Meshes that are built: the generated one, a torus with seams, and the bunny first where there is one.
+/// Meshes whose LOD levels are built: the bunny if available, the generated mesh, and a torus with seams.
 std::vector<std::pair<std::string, LodGeometry>> build_meshes(const Options& options) {
   std::vector<std::pair<std::string, LodGeometry>> meshes;
   const auto add = [&](const char* name, const Mesh& mesh) {
@@ -267,7 +268,7 @@ int run(int argc, char** argv) {
   const auto meshes = build_meshes(options);
   const auto count = [&](uint32_t instances) { return std::max(1u, static_cast<uint32_t>(options.scale * instances)); };
   for (const auto& [name, mesh] : meshes) {
-    if (name == "torus") continue; // only among the 500
+    if (name == "torus") continue; // used only among the 500 geometries
     for (const SceneCase& scene :
          {SceneCase{"2,000 instances, +-10 diagonals", count(2000), 1, 10.0, 1.0},
           SceneCase{"2,000 instances, +-40 diagonals", count(2000), 1, 40.0, 1.0},

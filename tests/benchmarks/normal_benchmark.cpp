@@ -1,4 +1,4 @@
-// The error and the speed of each encoding of normals: docs/accuracy.md.
+// Measures error and speed of each normal encoding; documented in docs/accuracy.md.
 
 #include <algorithm>
 #include <array>
@@ -30,7 +30,7 @@ using Json = nlohmann::ordered_json;
 constexpr double kDegreesPerRadian = 57.295779513082320877;
 constexpr double kTurn = 6.283185307179586477;
 
-/// The generator of each item, so that sets do not depend on threads or on their size.
+/// Random generator per item, so that sets do not depend on threads or on their size.
 /// Source: Steele, Lea, Flood, "Fast Splittable Pseudorandom Number Generators", 2014, the finaliser of SplitMix64.
 class ItemRandom {
 public:
@@ -44,13 +44,13 @@ public:
   }
   double unit() { return static_cast<double>(bits() >> 11) * 0x1p-53; } ///< [0, 1)
   double sign() { return (bits() >> 63) != 0 ? -1.0 : 1.0; }
-  double small() { return sign() * std::pow(10.0, -1.0 - 8.0 * unit()); } ///< +-1e-9 .. 1e-1, evenly by magnitude
+  double small() { return sign() * std::pow(10.0, -1.0 - 8.0 * unit()); } ///< +-1e-9..1e-1, uniform in the logarithm
 
 private:
   uint64_t state_;
 };
 
-/// Puts component 2 on any axis.
+/// Rotates the axes, so that component 2 becomes any axis.
 DVec3 turned(DVec3 v, uint64_t axis) {
   return axis % 3 == 0 ? v : axis % 3 == 1 ? DVec3(v.z, v.x, v.y) : DVec3(v.y, v.z, v.x);
 }
@@ -71,7 +71,7 @@ DVec3 near_diagonal(ItemRandom random) {
   return turned(v, random.bits() >> 33);
 }
 
-DVec3 near_equator(ItemRandom random) { // of any axis: also where the octahedron is folded
+DVec3 near_equator(ItemRandom random) { // the equator of any axis, including the folds of the octahedron
   const double phi = kTurn * random.unit();
   const DVec3 v(std::cos(phi), std::sin(phi), random.small());
   return turned(v, random.bits() >> 33);
@@ -82,7 +82,7 @@ DVec3 near_chart_border(ItemRandom random) { // two components equal, the third 
   return turned(v, random.bits() >> 33);
 }
 
-/// Between four neighbouring codes, where the nearest is far.
+/// A direction between four neighbouring codes, far from the nearest one.
 DVec3 between_codes(ItemRandom random, NormalEncoding encoding) {
   const NormalFormat& format = format_of(encoding);
   const auto corner = [&](uint32_t codes) { return static_cast<int32_t>(random.bits() % (codes - 2)); };
@@ -114,7 +114,7 @@ DVec3 direction(size_t set, uint64_t item, NormalEncoding encoding) {
 constexpr std::array<const char*, 6> kSets{"uniform",  "near axes",          "near diagonals",
                                            "equators", "near chart borders", "between codes"};
 
-/// By the chord, which keeps its digits where angles are small.
+/// Angle from the chord length, which stays accurate for small angles.
 double error_degrees(NormalEncoding encoding, DVec3 n) {
   n = glm::normalize(n);
   const DVec3 decoded = glm::normalize(DVec3(decode_normal(encoding, encode_normal(encoding, n))));
@@ -135,7 +135,7 @@ Json measure_errors(NormalEncoding encoding, size_t set, size_t count) {
   return {{"set", kSets[set]}, {"mean", sum / static_cast<double>(count)}, {"p99", p99}, {"max", max}};
 }
 
-/// Nanoseconds a normal, one thread, the least of many short runs.
+/// Nanoseconds per normal on one thread, the minimum of many short runs.
 Json measure_speed(NormalEncoding encoding) {
   constexpr size_t kCount = 1 << 13;
   std::vector<DVec3> normals(kCount);
@@ -155,13 +155,13 @@ Json measure_speed(NormalEncoding encoding) {
   const double encode_ns = least([&](size_t i) { codes[i] = encode_normal(encoding, normals[i]); });
   for (size_t i = 0; i < kCount; ++i) fields[i] = split_normal_code(encoding, codes[i]);
   const double decode_ns = least([&](size_t i) { decoded[i] = decode_normal(encoding, fields[i]); });
-  double check = 0.0; // uses the results, so that they are made
+  double check = 0.0; // uses the results, so that the compiler cannot remove the work
   for (size_t i = 0; i < kCount; ++i) check += glm::dot(DVec3(decoded[i]), normals[i]);
   if (!(check > 0.99 * static_cast<double>(kCount))) throw std::runtime_error("normals do not come back");
   return {{"encode_ns", encode_ns}, {"decode_ns", decode_ns}};
 }
 
-/// Whether every measured error is within what the format promises.
+/// Returns whether every measured error is within the format's bound.
 bool measure_all(size_t count, Json& json) {
   bool kept = true;
   fmt::print("{} directions a set; degrees: mean / 99 % / max\n{:<9}", count, "");

@@ -33,10 +33,10 @@ struct Options {
   PackingInputs inputs;
   fs::path json_file;
   double seconds = 0.5;
-  std::string codec; ///< part of the names of those to measure
+  std::string codec; ///< part of the names of the codecs to measure
 };
 
-/// Least CPU time of one call, all of it in this thread: called again until `budget_s` are used up, at least once.
+/// Minimum CPU time of a call in this thread, over repeated calls until `budget_s` is used up; at least one call.
 template <typename Call>
 double least_seconds(double budget_s, const Call& call) {
   double least = std::numeric_limits<double>::infinity(), total = 0.0;

@@ -33,7 +33,7 @@ std::span<const std::byte> bytes_of(const std::vector<Value>& values) {
   return std::as_bytes(std::span(values));
 }
 
-/// Bytes as they are, or through zstd.
+/// Bytes stored plainly or compressed with zstd.
 class Stream {
 public:
   void store(std::span<const std::byte> bytes, int zstd_level) {
@@ -45,7 +45,7 @@ public:
     plain_bytes_ = bytes.size();
   }
   size_t size() const { return stored_.size(); }
-  /// Valid until the next call.
+  /// The result is valid until the next call.
   std::span<const std::byte> load() {
     if (!compressed_) return stored_;
     plain_.resize(plain_bytes_);
@@ -153,7 +153,7 @@ public:
   }
 
 private:
-  /// Vertices in the order the indices first use them; those that none uses go.
+  /// Orders the vertices by first use in the indices and removes unused ones.
   void reorder(std::vector<uint32_t>& indices) {
     const size_t before = layout_.vertex_count;
     std::vector<uint32_t> remap(before);

@@ -24,7 +24,7 @@ struct PointHash {
   size_t operator()(const Point& p) const {
     uint64_t hash = 1;
     for (int axis = 0; axis < 3; ++axis) {
-      const double d = double{p[axis]} + 0.0; // -0 is 0
+      const double d = double{p[axis]} + 0.0; // turns -0 into 0
       uint64_t bits = 0;
       std::memcpy(&bits, &d, sizeof(bits));
       hash = mix(hash, bits);
@@ -33,7 +33,7 @@ struct PointHash {
   }
 };
 
-/// One number for three places, whatever corner comes first and whichever way they turn.
+/// A key of three positions, whatever the first corner and the winding.
 uint64_t triangle_key(const std::array<Vec3, 3>& corners) {
   std::array<uint64_t, 3> keys{};
   std::transform(corners.begin(), corners.end(), keys.begin(), PointHash<Vec3>());
@@ -41,10 +41,10 @@ uint64_t triangle_key(const std::array<Vec3, 3>& corners) {
   return mix(mix(keys[0], keys[1]), keys[2]);
 }
 
-/// How often each triangle is in the file but was not claimed yet.
+/// Per triangle key: occurrences in the file that no source triangle has claimed yet.
 using Census = std::unordered_map<uint64_t, int64_t>;
 
-/// Who holds a position.
+/// The users of a position: one or several.
 struct Holder {
   uint32_t first = 0;
   bool several = false;
@@ -73,7 +73,7 @@ private:
   struct Source {
     Holder shapes;
     bool cracked = false;
-    Vec3 own_box{0.0f}; ///< decoded from the first shape's own box
+    Vec3 own_box{0.0f}; ///< position decoded from a 16-bit box of the first shape
     bool own_box_differs = false;
   };
 
@@ -107,7 +107,7 @@ private:
     std::unordered_map<Vec3, Holder, PointHash<Vec3>> holders;
     std::vector<Vec3> positions;
     std::vector<Triangle> triangles;
-    uint32_t number = 0; // of the cluster within the file
+    uint32_t number = 0; // number of the cluster within the file
     for (uint32_t g = 0; g < file_.geometries().size(); ++g) {
       if ((file_.geometries()[g].flags & baked::kWorldSpace) == 0) continue;
       for (uint32_t c = 0; c < file_.geometries()[g].cluster_count; ++c, ++number) {

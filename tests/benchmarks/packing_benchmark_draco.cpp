@@ -45,7 +45,7 @@ public:
   }
   void decode() override { decoded_ = decode_from(buffer_); }
 
-  /// Draco reorders and merges vertices: a second, larger encoding with the vertex numbers tells which is which.
+  /// Draco reorders and merges vertices. A second, larger encoding that stores vertex numbers gives the correspondence.
   PackingErrors errors(const Mesh& source, const PackingPrecision& precision) override {
     draco::EncoderBuffer numbered;
     encode_to(source, precision, true, numbered);

@@ -4,8 +4,8 @@
 
 namespace packtrace {
 
-/// Where figures come from: "cpu" (model), "hardware_threads", "load_average" (over a minute), and "commit" of the
-/// source tree where it is a checkout, else "unknown".
+/// Describes the origin of figures: "cpu" (model), "hardware_threads", "load_average" (one minute), and "commit" of the
+/// source tree, or "unknown" if it is not a checkout.
 nlohmann::json describe_machine();
 
 } // namespace packtrace

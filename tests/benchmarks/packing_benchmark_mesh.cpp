@@ -59,7 +59,7 @@ struct BitHash {
   }
 };
 
-/// @param largest_only leaves out all shapes but the one of most triangles, such as a plane that a scan stands on
+/// @param largest_only keeps only the shape with the most triangles, for example to drop the plane below a scan
 PackingInput load_packing_input(const std::string& name, const std::filesystem::path& main_file, bool largest_only) {
   Diagnostics diagnostics;
   Progress progress;
@@ -98,7 +98,7 @@ Mesh weld_positions(const Mesh& mesh) {
   std::vector<uint32_t> welded;
   welded.reserve(mesh.positions.size());
   for (const Vec3 given : mesh.positions) {
-    const Vec3 p = given + 0.0f; // -0 is 0
+    const Vec3 p = given + 0.0f; // turns -0 into 0
     std::array<uint32_t, 3> bits{};
     std::memcpy(bits.data(), &p, sizeof(bits));
     const auto [entry, is_new] = numbers.try_emplace(bits, static_cast<uint32_t>(out.positions.size()));

@@ -10,14 +10,14 @@
 namespace packtrace {
 namespace {
 
-/// Texels across [0,1]^2 of the mask that makes a bake keep texture coordinates.
+/// Texels across [0,1]^2 of the mask that makes the bake keep texture coordinates.
 constexpr float kMaskTexels = 1024.0f;
 
 Scene one_shape_scene(const Mesh& mesh, bool keep_uvs) {
   Scene scene;
   scene.meshes.push_back(mesh);
   Material& material = scene.materials.emplace_back();
-  if (keep_uvs) { // one texel, repeated as often as a real mask has texels
+  if (keep_uvs) { // a mask of one texel, repeated kMaskTexels times
     material.flags = kAlphaMask;
     material.alpha_mask = 0;
     AlphaMask& mask = scene.masks.emplace_back();

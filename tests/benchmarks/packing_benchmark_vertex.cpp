@@ -10,8 +10,8 @@ namespace {
 
 constexpr float kMax16 = 65535.0f;
 
-/// Octahedral map, two signed 16-bit numbers. Source: Cigolle et al., A Survey of Efficient Representations for
-/// Independent Unit Vectors, JCGT 3(2), 2014.
+/// Octahedral map to two signed 16-bit numbers.
+/// Source: Cigolle et al., A Survey of Efficient Representations for Independent Unit Vectors, JCGT 3(2), 2014.
 std::array<int16_t, 2> encode_octahedral(Vec3 n) {
   const Vec3 p = n / (std::abs(n.x) + std::abs(n.y) + std::abs(n.z));
   Vec2 folded(p.x, p.y);

@@ -4,7 +4,7 @@
 
 namespace packtrace {
 
-/// CPU time that this thread has used.
+/// CPU time of this thread, in seconds.
 inline double thread_cpu_seconds() {
   timespec time{};
   ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);

@@ -1,4 +1,4 @@
-// The same recorded rays through every tracer there is, and through Embree in all its ways: docs/tracing.md.
+// Traces the same recorded rays with every tracer, and with each of Embree's interfaces; documented in docs/tracing.md.
 
 #include <algorithm>
 #include <cstdio>
@@ -28,12 +28,12 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kRayTracer = "RayTracer"; ///< the call of rows that the renderer can use
+constexpr const char* kRayTracer = "RayTracer"; ///< `call` of rows that the renderer can use
 
 struct Options {
   TraceInputOptions inputs;
   std::filesystem::path json_file;
-  std::string camera = "0"; ///< number, or "auto"
+  std::string camera = "0"; ///< camera number, or "auto"
   ImageSize size{960, 540};
   std::vector<uint32_t> threads{1, 2};
   uint32_t repeats = 5;
@@ -44,23 +44,23 @@ struct Options {
   std::vector<std::string> names;
 };
 
-/// One row of the tables.
+/// One row of the tables: a system that traces the rays.
 struct System {
   std::string name;
   std::string call;
   std::unique_ptr<RayTracer> tracer;
   double build_ms = 0.0;
-  bool watertight = false;                                    ///< --max-mismatches is for these
+  bool watertight = false;                                    ///< --max-mismatches applies to it
   std::shared_ptr<const std::vector<RecordedRays>> rays = {}; ///< in the tracer's space
   std::vector<RayResults> results = std::vector<RayResults>(3);
-  std::vector<std::vector<double>> seconds = {}; ///< by phase, one for each repeat
+  std::vector<std::vector<double>> seconds = {}; ///< per phase: one time per repeat
 };
 
-/// All that trace one input. The trees that rows share are first, and go last.
+/// All systems that trace one input. Rows share `trees`, so these are declared first and destroyed last.
 struct Systems {
   std::vector<std::unique_ptr<EmbreeTracer>> trees;
   std::vector<System> rows;
-  size_t single = 0, packets = 0; ///< rows of Embree's default that ratios refer to
+  size_t single = 0, packets = 0; ///< the rows of default Embree that ratios refer to
   size_t truth = 0;               ///< the row that mismatches are counted against
   size_t truth_trees = 0;
 };
@@ -111,21 +111,22 @@ double median(std::vector<double> values) {
   return values.empty() ? 0.0 : values[values.size() / 2];
 }
 
-/// Of the times of one phase, repeat by repeat: what was faster in the same moment.
+/// Median ratio of the times of one phase, paired by repeat: both were measured at about the same moment.
 double median_ratio(const std::vector<double>& reference, const std::vector<double>& seconds) {
   std::vector<double> ratios;
   for (size_t i = 0; i < seconds.size(); ++i) ratios.push_back(reference[i] / seconds[i]);
   return median(ratios);
 }
 
-/// Fills seconds and results of all rows, in turn.
+/// Measures all rows in turn, filling their seconds and results.
 void measure(Systems& systems, uint32_t threads, uint32_t repeats, bool cpu_clock) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
   for (System& row : systems.rows) row.seconds.assign(row.rays->size(), {});
   for (uint32_t repeat = 0; repeat < repeats; ++repeat)
     for (size_t phase = 0; phase < systems.rows.front().rays->size(); ++phase)
       for (System& row : systems.rows) {
-        // Once untimed: else only systems whose neighbour reads the same trees would find them cached.
+        // One untimed run first: otherwise only systems that follow another user of the same trees would find them in
+        // cache.
         replay((*row.rays)[phase], *row.tracer, row.results[phase], cpu_clock);
         const double seconds = replay((*row.rays)[phase], *row.tracer, row.results[phase], cpu_clock);
         row.seconds[phase].push_back(cpu_clock ? seconds / threads : seconds);
@@ -166,7 +167,7 @@ void print_row(const Json& row) {
              wrong);
 }
 
-/// What any-hit rays meet, named by one system.
+/// Nearest hits of any-hit rays, reported by one system.
 std::vector<RayHit> nearest_hits(const RecordedRays& rays, const RayTracer& tracer) {
   RecordedRays closest = rays;
   closest.any = false;
@@ -175,7 +176,7 @@ std::vector<RayHit> nearest_hits(const RecordedRays& rays, const RayTracer& trac
   return std::move(results.hits);
 }
 
-/// Verdicts on all rows, by phase.
+/// Judges all rows, per phase.
 std::vector<std::vector<HitVerdicts>> judge_phases(const TraceInput& input, const Systems& systems) {
   const System& truth = systems.rows[systems.truth];
   const ExactTriangles triangles(input.file, truth.tracer->space());
@@ -183,7 +184,7 @@ std::vector<std::vector<HitVerdicts>> judge_phases(const TraceInput& input, cons
   for (size_t phase = 0; phase < truth.rays->size(); ++phase) {
     const RecordedRays& rays = (*truth.rays)[phase];
     std::vector<SystemHits> all;
-    std::vector<std::vector<RayHit>> nearest; // only named
+    std::vector<std::vector<RayHit>> nearest; // these hits only add candidates; `all` refers to them
     nearest.reserve(systems.rows.size());
     for (const System& row : systems.rows)
       all.push_back({row.tracer.get(), row.results[phase].hits, row.results[phase].occluded,
@@ -200,7 +201,7 @@ std::vector<std::vector<HitVerdicts>> judge_phases(const TraceInput& input, cons
   return verdicts;
 }
 
-/// Who is right where systems disagree.
+/// Judges with exact hits which systems are right.
 Json compare_with_exact_hits(const TraceInput& input, const Systems& systems) {
   const std::vector<std::vector<HitVerdicts>> verdicts = judge_phases(input, systems);
   fmt::print(
@@ -236,7 +237,7 @@ Json compare_with_exact_hits(const TraceInput& input, const Systems& systems) {
   return json;
 }
 
-/// The renderer's passes with each tracer that it can use.
+/// Times the renderer's passes with each tracer that it can use.
 Json measure_passes(const TraceInput& input, const Systems& systems, const PrimaryCamera& camera, float radius,
                     uint32_t threads, const Options& options) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
@@ -262,7 +263,7 @@ Json measure_passes(const TraceInput& input, const Systems& systems, const Prima
   return passes;
 }
 
-/// Every row has every phase, with a speed.
+/// Whether every row has all phases and speeds.
 bool complete(const Json& rows, size_t expected) {
   return rows.size() == expected && std::all_of(rows.begin(), rows.end(), [](const Json& row) {
            return row["phases"].size() == 3 && row["resident_bytes"].get<uint64_t>() > 0 &&
@@ -320,7 +321,8 @@ Json measure_input(const std::string& name, const Options& options) {
     }
     for (const System& row : systems.rows)
       if (row.name == "packed" && !json.contains("work")) json["work"] = count_work(*row.rays, *row.tracer);
-    if (!json.contains("exact")) json["exact"] = compare_with_exact_hits(*input, systems); // the same for all threads
+    // The same for every number of threads.
+    if (!json.contains("exact")) json["exact"] = compare_with_exact_hits(*input, systems);
     for (Json& pass : measure_passes(*input, systems, camera, radius, threads, options))
       json["passes"].push_back(std::move(pass));
   }

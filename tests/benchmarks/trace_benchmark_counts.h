@@ -9,8 +9,9 @@
 
 namespace packtrace {
 
-/// What a packed tracer does for a ray, by phase: nodes and leaves tested, and so on. Prints it as well. The same for
-/// any load; batches decoded depend on what the thread traced before. Nothing of other tracers.
+/// Counts the work of a packed tracer per ray and phase (nodes and leaves tested, and so on), and prints it. The counts
+/// do not depend on the machine's load, except that decoded batches depend on what the thread traced before. Returns an
+/// empty array for other tracers.
 /// @param rays in the tracer's space
 nlohmann::ordered_json count_work(std::span<const RecordedRays> rays, const RayTracer& tracer);
 

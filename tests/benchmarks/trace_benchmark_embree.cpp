@@ -19,9 +19,9 @@ struct Query {
   }
 };
 
-/// Embree's numbers as they are: looking up what they stand for is not what is measured.
+/// Copies Embree's IDs without looking up the instance, which is not part of the measurement.
 RayHit hit_of(float t, float u, float v, uint32_t instance, uint32_t geometry, uint32_t primitive) {
-  static_assert(RTC_INVALID_GEOMETRY_ID == ~0u); // + 1 is 0, a valid placement
+  static_assert(RTC_INVALID_GEOMETRY_ID == ~0u); // + 1 makes it 0, a valid placement
   return geometry == RTC_INVALID_GEOMETRY_ID ? RayHit{} : RayHit{t, u, v, instance + 1, geometry, primitive};
 }
 bool is_gap(const Ray& ray) { return !(ray.tnear <= ray.tfar); }

@@ -23,7 +23,7 @@ Quad dot(const QuadVector& a, const QuadVector& b) { return a[0] * b[0] + a[1] *
 QuadVector quad(DVec3 v) { return {v.x, v.y, v.z}; }
 double length(const QuadVector& v) { return std::sqrt(static_cast<double>(dot(v, v))); }
 
-/// The nearest t of candidates that are hit in (begin, end); infinity: none.
+/// Smallest t of the candidates that are hit in (begin, end); infinity if there is none.
 double nearest(std::span<const ExactHit> candidates, double begin, double end) {
   double least = std::numeric_limits<double>::infinity();
   for (const ExactHit& candidate : candidates)
@@ -31,7 +31,7 @@ double nearest(std::span<const ExactHit> candidates, double begin, double end) {
   return least;
 }
 
-/// Named by rounding: an ulp of where the ray is then.
+/// Largest distance from a triangle that counts as rounding, in ulp at the ray's position there.
 constexpr double kAsideUlps = 4.0;
 bool nearly_hit(const Ray& ray, const ExactHit& hit) {
   const DVec3 place = glm::abs(DVec3(ray.origin) + DVec3(ray.direction) * hit.t);
@@ -39,17 +39,17 @@ bool nearly_hit(const Ray& ray, const ExactHit& hit) {
   return hit.hit || hit.aside <= kAsideUlps * ulp;
 }
 
-/// The ray's end, moved by as much as t may be off.
+/// The ray's end, moved by the tolerance of t.
 double moved_end(const Ray& ray, double sign) {
   return std::isinf(ray.tfar) ? double{ray.tfar} : ray.tfar + sign * t_tolerance(ray, ray.tfar);
 }
 
-/// The nearest hit that nobody may miss.
+/// Smallest t of hits that every system must find.
 double surely(const Ray& ray, std::span<const ExactHit> candidates) {
   return nearest(candidates, ray.tnear + t_tolerance(ray, ray.tnear), moved_end(ray, -1.0));
 }
 
-/// Whether one may say that there is a hit.
+/// Whether a system may report a hit.
 bool possibly(const Ray& ray, std::span<const ExactHit> candidates) {
   const double begin = ray.tnear - t_tolerance(ray, ray.tnear), end = moved_end(ray, 1.0);
   return std::any_of(candidates.begin(), candidates.end(), [&](const ExactHit& candidate) {
@@ -57,7 +57,7 @@ bool possibly(const Ray& ray, std::span<const ExactHit> candidates) {
   });
 }
 
-/// The distinct triangles that systems name for one ray.
+/// The distinct triangles that systems report for one ray.
 class Candidates {
 public:
   Candidates(const Ray& ray, const ExactTriangles& triangles) : ray_(ray), triangles_(triangles) {}
@@ -90,7 +90,7 @@ ExactHit exact_hit(const Ray& ray, const ExactTriangle& triangle) {
   if (along == 0) return out;
   out.t = static_cast<double>(dot(a, normal) / along);
   out.height = std::abs(static_cast<double>(along)) / length(normal);
-  // How far outside each edge, in the sense in which the ray goes through the plane.
+  // Distances outside each edge, oriented by the side from which the ray passes through the plane.
   const Quad sign = along < 0 ? 1 : -1;
   out.aside = 0.0;
   out.hit = true;
@@ -100,7 +100,7 @@ ExactHit exact_hit(const Ray& ray, const ExactTriangle& triangle) {
     if (!(outside > 0)) continue;
     out.hit = false;
     const double distance = static_cast<double>(outside) / length(cross(d, *corners[i + 1] - *corners[i]));
-    out.aside = std::max(out.aside, distance); // infinite along the edge
+    out.aside = std::max(out.aside, distance); // infinite if the ray is parallel to the edge
   }
   return out;
 }
@@ -173,7 +173,7 @@ std::vector<HitVerdicts> judge(std::span<const Ray> rays, const ExactTriangles& 
   const auto judge_run = [&](const tbb::blocked_range<size_t>& range, Verdicts verdicts) {
     std::vector<std::optional<NamedHit>> answers(systems.size());
     for (size_t i = range.begin(); i < range.end(); ++i) {
-      if (!(rays[i].tnear <= rays[i].tfar)) continue; // a gap
+      if (!(rays[i].tnear <= rays[i].tfar)) continue; // gap
       Candidates candidates(rays[i], triangles);
       for (size_t s = 0; s < systems.size(); ++s) {
         answers[s].reset();

@@ -11,53 +11,56 @@
 
 namespace packtrace {
 
-/// Vertices in unit space.
+/// Triangle corners in unit space.
 using ExactTriangle = std::array<DVec3, 3>;
 
-/// Where a ray meets a triangle, in quadruple precision: for vertices that are floats, signs of edge functions are
+/// Intersection of a ray and a triangle in quadruple precision. If the vertices are floats, signs of edge functions are
 /// exact.
 struct ExactHit {
-  bool hit = false;    ///< within the triangle, edges included, before or behind the origin; not if along its plane
-  double t = 0.0;      ///< of the plane, in lengths of the direction; 0 where the ray runs along it
-  double height = 0.0; ///< what an error of 1 in t is off the plane
-  double aside = 0.0;  ///< how far the ray's line is from that of the edge that it passes farthest outside; 0: hit
+  /// The line hits the triangle or its edges, before or behind the origin; false if parallel to its plane.
+  bool hit = false;
+  double t = 0.0;      ///< at the plane, in lengths of the direction; 0 if the ray is parallel to the plane
+  double height = 0.0; ///< distance from the plane that an error of 1 in t causes
+  double aside = 0.0;  ///< largest distance between the ray's line and an edge that it passes outside; 0 for a hit
 };
 ExactHit exact_hit(const Ray& ray, const ExactTriangle& triangle);
 
-/// 2^-23 of the largest coordinate of a ray's origin, in which distances off it are given.
+/// 2^-23 of the largest |coordinate| of a ray's origin: the unit of distances from the ray.
 double origin_ulp(const Ray& ray);
 
-/// By how much t may be off before it counts: 1e-4 of it and a way of 4 ulp of the ray's origin.
+/// Tolerated error of t: 1e-4 |t| plus a distance of 4 ulp of the ray's origin.
 double t_tolerance(const Ray& ray, double t);
 
-/// What systems said of rays, sorted by what is true of the triangles that any of them names.
+/// Counts of one system's answers, classified with the exact hits of the triangles that any system reports.
 struct HitVerdicts {
-  uint64_t missed = 0;     ///< no hit, though a triangle is hit
-  uint64_t wrong = 0;      ///< a triangle that is not hit, by more than rounding, or any hit where nothing near is hit
-  uint64_t farther = 0;    ///< a triangle beyond the nearest one
-  uint64_t beside = 0;     ///< a triangle that the ray passes outside by rounding: up to 4 ulp
-  uint64_t t_off = 0;      ///< the right triangle, at a t that is off
-  double worst_t = 0.0;    ///< relative error of t where the right triangle is named
-  double worst_ulps = 0.0; ///< there, how far the hit is off the triangle's plane; ulp as in origin_ulp()
+  uint64_t missed = 0; ///< no hit, although a triangle is hit
+  /// A triangle missed by more than rounding, or an any-hit answer although no triangle is nearly hit.
+  uint64_t wrong = 0;
+  uint64_t farther = 0; ///< a triangle behind the nearest one
+  uint64_t beside = 0;  ///< a triangle that the ray misses by rounding only: up to 4 ulp
+  uint64_t t_off = 0;   ///< the right triangle with a wrong t
+  double worst_t = 0.0; ///< largest relative error of t for right triangles
+  /// For right triangles: largest distance of the hit from the triangle's plane, in units of origin_ulp().
+  double worst_ulps = 0.0;
 
   uint64_t all() const { return missed + wrong + farther + beside + t_off; }
   void add(const HitVerdicts& other);
 };
 
-/// An answer to a ray.
+/// A reported hit.
 struct NamedHit {
-  uint32_t candidate = 0; ///< index
+  uint32_t candidate = 0; ///< index of the exact hit in `candidates`
   double t = 0.0;
 };
 
-/// Judges an answer to closest_hits(). Hits within t_tolerance() of the ray's ends may be found or not.
-/// @param candidates exact hits of the triangles that were named
+/// Judges an answer of closest_hits(). Hits within t_tolerance() of the ray's ends are optional.
+/// @param candidates exact hits of all reported triangles
 void judge_closest(const Ray& ray, std::span<const ExactHit> candidates, const std::optional<NamedHit>& answer,
                    HitVerdicts& out);
-/// The same for any_hits().
+/// Judges an answer of any_hits().
 void judge_any(const Ray& ray, std::span<const ExactHit> candidates, bool occluded, HitVerdicts& out);
 
-/// Triangles of a baked file as its bits say, placed in doubles.
+/// Triangles of a baked file, decoded and placed in double precision.
 class ExactTriangles {
 public:
   ExactTriangles(const BakedFile& file, const UnitSpace& space);
@@ -68,15 +71,15 @@ private:
   std::vector<DAffine> unit_from_object_;
 };
 
-/// Hits of some rays by one system.
+/// One system's answers to a set of rays.
 struct SystemHits {
   const RayTracer* tracer;
-  std::span<const RayHit> hits; ///< empty: it was asked for any hit
-  std::span<const uint8_t> any; ///< then: its answers
-  double t_scale = 1.0;         ///< what one of its lengths is in the rays' space
+  std::span<const RayHit> hits; ///< answers of closest_hits(); empty if any_hits() was called
+  std::span<const uint8_t> any; ///< answers of any_hits()
+  double t_scale = 1.0;         ///< factor from the system's lengths to the rays' space
 };
 
-/// Verdicts for each system. Candidates are what those with hits name.
+/// Judges all systems. The candidates are the triangles that systems with hits report.
 /// @param rays in the space of `triangles`
 std::vector<HitVerdicts> judge(std::span<const Ray> rays, const ExactTriangles& triangles,
                                std::span<const SystemHits> systems);

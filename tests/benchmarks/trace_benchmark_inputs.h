@@ -11,12 +11,12 @@
 namespace packtrace {
 
 struct TraceInputOptions {
-  std::filesystem::path scenes; ///< holds house, spaceship, bunny and killeroo
+  std::filesystem::path scenes; ///< folder with house, spaceship, bunny and killeroo
   uint64_t mesh_triangles = 6'000'000;
   uint64_t forest_instances = 50'000;
 };
 
-/// A packed scene that every system traces: float triangles are what is decoded from it.
+/// A packed scene for all systems. Float triangles are decoded from it.
 struct TraceInput {
   TraceInput(std::string input_name, BakedFile baked)
       : name(std::move(input_name)), file(std::move(baked)), source(file) {}
@@ -27,21 +27,21 @@ struct TraceInput {
   BakedFile file;
   PackedSource source;
 
-  /// Each geometry counted once, or with each of its instances.
+  /// Triangles with each geometry counted once, or once per instance.
   uint64_t unique_triangles() const;
   uint64_t placed_triangles() const;
 };
 
-/// A scene to be baked, by name as below; not of a .ptk file. Throws as import_scene(), and Error(kUsage).
+/// Loads a scene to bake, by a name as below, but no .ptk file. Throws like import_scene(), and Error(kUsage).
 Scene load_trace_scene(const std::string& name, const TraceInputOptions& options);
 
-/// Bakes with the defaults. Throws as bake_to_bytes().
+/// Bakes with default options. Throws like bake_to_bytes().
 BakedFile bake_trace_scene(const Scene& scene, const std::string& name);
 
-/// By name: house, spaceship, bunny, killeroo, town (in assets), mesh (generated, of unique triangles), forest
-/// (generated, of instances); anything else is the path of a .ptk or .pbrt file. What is not packed is baked with the
-/// defaults.
-/// Throws as import_scene(), bake_to_bytes() and BakedFile::open().
+/// Loads an input by name: house, spaceship, bunny, killeroo, town (in assets), mesh (generated, with mesh_triangles
+/// unique triangles), forest (generated, with forest_instances instances). Any other name is the path of a .ptk or
+/// .pbrt file. Scenes are baked with default options.
+/// Throws like import_scene(), bake_to_bytes() and BakedFile::open().
 std::unique_ptr<TraceInput> load_trace_input(const std::string& name, const TraceInputOptions& options);
 
 } // namespace packtrace

@@ -11,7 +11,7 @@ class RawEmbree final : public RayTracer {
 public:
   RawEmbree(const SceneSource& source, bool robust) {
     for (const PlacedGeometry& placed : source.instances()) add(source, placed);
-    positions_.resize(positions_.size() + 2, Vec3(0)); // Embree reads 16 bytes at a time
+    positions_.resize(positions_.size() + 2, Vec3(0)); // padding: Embree reads 16 bytes at a time
     scene_.reset(rtcNewScene(device_.get()));
     rtcSetSceneFlags(scene_.get(), robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
     const RtcPtr<RTCGeometryTy> geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
@@ -70,7 +70,7 @@ private:
     for (Triangle& t : triangles) t += Triangle(static_cast<uint32_t>(vertex));
   }
 
-  UnitSpace space_; // the world
+  UnitSpace space_; // identity: world space
   std::vector<Vec3> positions_;
   std::vector<Triangle> triangles_;
   EmbreeDevice device_;

@@ -6,10 +6,9 @@
 
 namespace packtrace {
 
-/// Embree as its manual has it: the source's triangles placed in the world as floats, rays in the world as well, traced
-/// one by one. All surfaces are seen by all rays; hits are not resolved. That is what EmbreeTracer does without its
-/// unit space.
-/// @param source read here only
+/// Embree used as in its manual: the source's triangles as floats in world space, rays in world space, traced one by
+/// one. All rays see all surfaces, and hits are not resolved. This is EmbreeTracer without its unit space.
+/// @param source only read during the call
 std::unique_ptr<RayTracer> raw_embree(const SceneSource& source, bool robust);
 
 } // namespace packtrace

@@ -32,7 +32,7 @@ private:
   Stopwatch wall_;
 };
 
-/// Hands rays on to another tracer and remembers them. For one thread.
+/// Forwards rays to another tracer and records them. Not thread-safe.
 class RecordingTracer final : public RayTracer {
 public:
   RecordingTracer(const RayTracer& tracer, RecordedRays& out) : tracer_(tracer), out_(out) {}
@@ -82,7 +82,8 @@ Camera choose_camera(const SceneSource& source, const std::string& camera, Image
 
 std::vector<RecordedRays> record_phases(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& camera,
                                         float ao_radius) {
-  const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1); // so that tiles are in order
+  // One thread keeps tiles in order.
+  const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
   std::vector<RecordedRays> frame(3);
   frame[0].name = "primary", frame[1].name = "ao any", frame[2].name = "ao closest";
   Progress progress;
@@ -109,7 +110,7 @@ RecordedFrame record_frame(const SceneSource& source, const RayTracer& tracer, c
   RecordedFrame frame{
       PrimaryCamera(choose_camera(source, camera, size), size), default_ao_radius(source.world_bounds()), {}};
   frame.phases = record_phases(source, tracer, frame.camera, frame.ao_radius);
-  if (frame.phases[1].count() == 0 && camera == "0") { // it looks past the scene
+  if (frame.phases[1].count() == 0 && camera == "0") { // the camera looks past the scene
     frame.camera = PrimaryCamera(framing_camera(source.world_bounds(), size), size);
     frame.phases = record_phases(source, tracer, frame.camera, frame.ao_radius);
   }
@@ -125,7 +126,7 @@ std::vector<double> time_passes(const SceneSource& source, const RayTracer& trac
   AoConfig config;
   config.radius = ao_radius;
   AoFrame ao;
-  for (uint32_t repeat = 0; repeat <= repeats; ++repeat) { // the first makes room
+  for (uint32_t repeat = 0; repeat <= repeats; ++repeat) { // the first run allocates memory
     const auto take = [&](size_t phase, const auto& pass) {
       const Clock watch(cpu_clock);
       pass();

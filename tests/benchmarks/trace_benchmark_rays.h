@@ -10,53 +10,53 @@
 
 namespace packtrace {
 
-/// Rays as the renderer hands them to a tracer that wants no more than 1,024 together, span by span.
+/// Rays as the renderer passes them to a tracer that takes at most 1,024 rays per call, span by span.
 struct RecordedRays {
   std::string_view name;
   uint32_t ray_class = 0;
   RayOrder order = RayOrder::kIncoherent;
-  bool any = false; ///< any_hits(), else closest_hits()
+  bool any = false; ///< for any_hits(), otherwise for closest_hits()
   std::vector<Ray> rays;
-  std::vector<size_t> ends; ///< of the spans, ascending; the last is rays.size()
+  std::vector<size_t> ends; ///< ends of the spans, ascending; the last is rays.size()
 
-  /// Those that are no gaps.
+  /// Number of rays, without gaps.
   uint64_t count() const;
 };
 
-/// One frame of a scene.
+/// The rays of one frame of a scene.
 struct RecordedFrame {
   PrimaryCamera camera;
   float ao_radius = 0.0f;
-  std::vector<RecordedRays> phases; ///< "primary"; "ao any", without falloff; "ao closest", with it
+  std::vector<RecordedRays> phases; ///< "primary", "ao any" (without falloff) and "ao closest" (with falloff)
 };
 
 /// Records the rays of one frame.
-/// @param tracer of the source; its space is that of the rays
-/// @param camera number, or "auto"; that instead of camera 0 where it sees nothing
-/// Throws Error(kUsage) for a camera that is not there, Error(kInput) where it sees nothing.
+/// @param tracer for the source; the recorded rays are in its space
+/// @param camera number, or "auto"; if camera 0 sees nothing, "auto" is used instead
+/// Throws Error(kUsage) if the camera does not exist, Error(kInput) if it sees nothing.
 RecordedFrame record_frame(const SceneSource& source, const RayTracer& tracer, const std::string& camera,
                            ImageSize size);
 
-/// Seconds that the renderer's passes over the same frame take, by phase: rays, what makes them and what is made of
-/// their hits. The least of `repeats`.
+/// Times the renderer's passes over the same frame, per phase: generating rays, tracing them and processing the hits.
+/// Returns the minimum over `repeats`, in seconds.
 std::vector<double> time_passes(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& camera,
                                 float ao_radius, uint32_t repeats, bool cpu_clock);
 
-/// The same in another tracer's space. t counts lengths there.
+/// Transforms rays to another tracer's space. t counts lengths of that space.
 std::vector<RecordedRays> moved(std::vector<RecordedRays> recorded, const UnitSpace& from, const UnitSpace& to);
 
-/// What a tracer said of each ray.
+/// A tracer's answers per ray.
 struct RayResults {
   std::vector<uint8_t> occluded; ///< of any_hits()
   std::vector<RayHit> hits;      ///< of closest_hits()
 };
 
-/// Traces all of it on the threads there are, spans side by side.
+/// Traces all rays on all available threads, with spans in parallel.
 /// @return seconds of wall time, or of CPU time of all threads
 double replay(const RecordedRays& recorded, const RayTracer& tracer, RayResults& results, bool cpu_clock);
 
-/// Rays of which two tracers disagree: whether there is a hit, or in t by more than t_tolerance().
-/// @param t_scale what a length of b is in a's space
+/// Counts the rays for which two tracers disagree: in whether there is a hit, or in t by more than t_tolerance().
+/// @param t_scale factor from b's lengths to a's
 uint64_t mismatches(const RecordedRays& recorded, const RayResults& a, const RayResults& b, double t_scale);
 
 } // namespace packtrace

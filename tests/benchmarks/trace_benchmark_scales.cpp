@@ -18,7 +18,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Everything as far apart and as large as `scale` says. @param scale a power of two
+/// Scales all sizes and distances of a scene.
+/// @param scale a power of two
 Scene scaled(Scene scene, double scale) {
   const auto by = static_cast<float>(scale);
   for (Mesh& mesh : scene.meshes)
@@ -46,7 +47,7 @@ std::vector<ScaledSystem> make_systems(const TraceInput& input) {
   return systems;
 }
 
-/// Rays of a space, in that of a system whose scene is `scale` times as large.
+/// Transforms rays from one space to the space of a system whose scene is `scale` times as large.
 RecordedRays moved_to_scale(RecordedRays rays, const UnitSpace& from, const UnitSpace& to, double scale) {
   const double lengths = to.scale() * scale / from.scale();
   for (Ray& ray : rays.rays) {
@@ -57,7 +58,7 @@ RecordedRays moved_to_scale(RecordedRays rays, const UnitSpace& from, const Unit
   return rays;
 }
 
-/// What one system says at one scale, by phase; t in the recorder's space.
+/// Results of one system at one scale, per phase; t in the recorder's space.
 std::vector<RayResults> results_at(const RecordedFrame& frame, const UnitSpace& recorded, const RayTracer& tracer,
                                    double scale) {
   std::vector<RayResults> results(frame.phases.size());
@@ -77,7 +78,7 @@ Json measure_scales(const std::string& name, const TraceInputOptions& options, c
   const TraceInput unscaled(name, bake_trace_scene(scene, name));
   const EmbreeTracer recorder(unscaled.source, {});
   const RecordedFrame frame = record_frame(unscaled.source, recorder, camera, size);
-  std::vector<std::vector<RayResults>> expected; // by system and phase
+  std::vector<std::vector<RayResults>> expected; // per system and phase
   for (const ScaledSystem& system : make_systems(unscaled))
     expected.push_back(results_at(frame, recorder.space(), *system.tracer, 1.0));
 
@@ -108,7 +109,7 @@ Json measure_scales(const std::string& name, const TraceInputOptions& options, c
 
 namespace {
 
-/// One mesh, its rays and what traces them.
+/// A generated mesh, its rays and its tracers.
 struct GrowingMesh {
   GrowingMesh(const TraceInputOptions& options, const std::string& camera, ImageSize size)
       : input("mesh", bake_trace_scene(load_trace_scene("mesh", options), "mesh")),
@@ -164,7 +165,7 @@ Json measure_growth(const TraceInputOptions& options, const std::string& camera,
         const RecordedRays& rays = mesh.systems[s].rays[phase];
         return replay(rays, *mesh.systems[s].tracer, results, cpu_clock) / static_cast<double>(rays.count());
       };
-      for (uint32_t repeat = 0; repeat <= repeats; ++repeat) { // the first warms up
+      for (uint32_t repeat = 0; repeat <= repeats; ++repeat) { // the first run warms up
         const double before = time_of_ray(small), after = time_of_ray(large);
         if (repeat > 0) ratios.push_back(after / before);
       }

@@ -10,15 +10,15 @@
 
 namespace packtrace {
 
-/// Bakes a scene at several scales, sends the rays of one frame through it at each, and prints how many of each
-/// system's hits are not those that it has at scale 1. Scales are rounded to powers of two.
-/// Throws as load_trace_scene(), bake_trace_scene() and record_frame().
+/// Bakes a scene at several scales, traces the rays of one frame at each scale, and prints how many of each system's
+/// hits differ from its hits at scale 1. Scales are rounded to powers of two.
+/// Throws like load_trace_scene(), bake_trace_scene() and record_frame().
 nlohmann::ordered_json measure_scales(const std::string& name, const TraceInputOptions& options,
                                       const std::string& camera, ImageSize size, std::span<const double> scales);
 
-/// How much longer the rays of one frame take in the generated mesh of options.mesh_triangles than in one with a
-/// sixteenth of them, the camera and the shape being the same: prints and returns the ratio of times a ray.
-/// Throws as load_trace_scene(), bake_trace_scene() and record_frame().
+/// Compares the generated mesh of options.mesh_triangles with one of a sixteenth of them, with the same camera and
+/// shape. Prints and returns the ratios of time per ray.
+/// Throws like load_trace_scene(), bake_trace_scene() and record_frame().
 nlohmann::ordered_json measure_growth(const TraceInputOptions& options, const std::string& camera, ImageSize size,
                                       uint32_t repeats, bool cpu_clock);
 

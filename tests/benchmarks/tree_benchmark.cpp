@@ -1,4 +1,4 @@
-// Builds the trees of baked files and says how good, large and fast to build they are.
+// Builds the trees of baked files and reports their quality, size and build time. Usage:
 //
 //   build/release/bin/tree_benchmark house.ptk ...
 
@@ -22,7 +22,7 @@
 namespace packtrace {
 namespace {
 
-/// Half the area of child box `slot`, or of the box of all children.
+/// Half the surface area of the bounds of children [first, last), on the node's grid.
 double half_area(const baked::PackedNode& node, size_t first, size_t last) {
   std::array<double, 3> extent{};
   for (uint32_t axis = 0; axis < 3; ++axis) {
@@ -34,7 +34,8 @@ double half_area(const baked::PackedNode& node, size_t first, size_t last) {
   return extent[0] * extent[1] + extent[1] * extent[2] + extent[2] * extent[0];
 }
 
-/// Sums over trees; expectations are of a random line that meets the root's box, weighted by triangles.
+/// Sums over trees. Visits, batches and tests are expected values for a random line that hits the root's bounds,
+/// weighted by the triangles of each tree.
 struct Figures {
   uint64_t nodes = 0, leaf_nodes = 0, leaves = 0, children = 0, triangles = 0;
   uint32_t depth = 0;

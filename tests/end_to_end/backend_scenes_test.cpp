@@ -1,6 +1,7 @@
-// Every scene by every backend, against Embree on the source's floats: tests/end_to_end/backend_limits.json.
+// Renders every scene with every backend and compares with Embree on the source's floats. Limits:
+// tests/end_to_end/backend_limits.json.
 //
-// Compiled twice: for the scenes below assets/, and (PACKTRACE_SHARED_SCENES) for those below $PACKTRACE_SCENES.
+// Compiled twice: for the scenes in assets/ and, with PACKTRACE_SHARED_SCENES, for those in $PACKTRACE_SCENES.
 
 #include <algorithm>
 #include <cctype>
@@ -48,11 +49,11 @@ bool sees_nothing(const Picture& picture) {
   return std::ranges::all_of(picture.surfaces.instance, [](uint32_t instance) { return instance == kNoInstance; });
 }
 
-/// Fractions of all pixels that differ, and how much the others do.
+/// Differences between two pictures: fractions of all pixels, and the AO difference of matching pixels.
 struct Differences {
-  double hits = 0.0;  ///< pixels that show something in one picture only
-  double depth = 0.0; ///< pixels whose depths are farther apart than depth_tolerance
-  double ao = 0.0;    ///< mean |difference| of the occlusion of pixels that show the same depth
+  double hits = 0.0;  ///< pixels that hit something in only one picture
+  double depth = 0.0; ///< pixels whose depths differ by more than depth_tolerance
+  double ao = 0.0;    ///< mean |AO difference| of pixels with matching depth
 };
 
 Differences compare(const Picture& a, const Picture& b, double depth_tolerance) {
@@ -77,7 +78,7 @@ Differences compare(const Picture& a, const Picture& b, double depth_tolerance) 
 
 class View {
 public:
-  /// @param framed by a camera that sees all of it, not by the scene's own
+  /// @param framed use a camera that frames the whole scene instead of the scene's own
   View(const SceneSource& source, const json& image, bool framed)
       : camera_(camera_of(source, size_of(image), framed), size_of(image)) {
     ao_.radius = default_ao_radius(source.world_bounds());
@@ -120,7 +121,7 @@ protected:
     file_ = std::make_unique<BakedFile>(BakedFile::from_bytes(bake_to_bytes(scene_, {}, diagnostics, progress).bytes));
   }
 
-  /// Of this scene, or of all that have none of their own.
+  /// Limit of this scene, or the common one if this scene has none.
   double limit(const std::string& name) const {
     const json& all = limits_.at("against_floats");
     const json& own = all.at("scenes");

@@ -147,7 +147,7 @@ TEST(CommandLine, DryRunReportsAndWritesNothing) {
   EXPECT_FALSE(fs::exists(bench.baked()));
 }
 
-/// Two balls on a floor 1000 units wide, which the median edge of the floor says nothing about.
+/// Two balls on a floor 1000 units wide: the floor's median edge is unrelated to the visible detail.
 std::string balls_on_a_floor() {
   return "LookAt 6 3 -8  0 0 0  0 1 0\nCamera \"perspective\" \"float fov\" [45]\nWorldBegin\n"
          "Shape \"trianglemesh\" \"integer indices\" [0 1 2 0 2 3]"

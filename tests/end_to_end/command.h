@@ -15,25 +15,25 @@ struct CommandResult {
   std::string err; ///< standard error
 };
 
-/// Runs a program with these arguments, no shell between and nothing on its standard input.
-/// @param program a path, or a name to be found as a shell finds it
-/// @param environment "NAME=value", added to this process's own
-/// @param folder to run in; empty: this process's
-/// @param prepare called in the new process before the program starts, to set limits for example
+/// Runs a program directly, without a shell, and with empty standard input.
+/// @param program a path, or a name to look up in PATH
+/// @param environment "NAME=value" entries, added to this process's environment
+/// @param folder working folder; empty: this process's
+/// @param prepare called in the child process before the program starts, for example to set limits
 CommandResult run_program(const std::string& program, const std::vector<std::string>& arguments,
                           const std::vector<std::string>& environment = {}, const std::filesystem::path& folder = {},
                           const std::function<void()>& prepare = {});
 
-/// run_program() of the packtrace program under test.
+/// Runs the packtrace program under test with run_program().
 CommandResult run_packtrace(const std::vector<std::string>& arguments, const std::vector<std::string>& environment = {},
                             const std::filesystem::path& folder = {});
-/// The same after prepare() in the new process.
+/// Same, with prepare() called in the child process first.
 CommandResult run_packtrace(const std::vector<std::string>& arguments, const std::function<void()>& prepare);
 
 std::string read_text(const std::filesystem::path& file);
 void write_text(const std::filesystem::path& file, const std::string& text);
 
-/// A room of two quads with a camera, about the smallest scene that renders.
+/// Text of a minimal scene: a room of two quads with a camera.
 std::string small_scene_text();
 
 } // namespace packtrace::test

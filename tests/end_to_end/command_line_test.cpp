@@ -1,4 +1,4 @@
-// What holds for all verbs: exit codes, options and promises about files, tried on the program itself.
+// Behaviour common to all verbs: exit codes, options and guarantees about files, tested with the program itself.
 
 #include <algorithm>
 #include <filesystem>

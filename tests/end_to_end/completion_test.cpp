@@ -1,4 +1,4 @@
-// What shells complete and the manual page says, against what --help lists.
+// Compares shell completions and the manual page with the options that --help lists.
 
 #include <cstdlib>
 #include <regex>
@@ -16,7 +16,7 @@ namespace {
 const std::vector<std::string> kVerbs{"bake", "info",    "render",     "compare", "export",
                                       "help", "version", "completion", "man"};
 
-/// Short and long options that a verb's help lists at the start of a line.
+/// Short and long options that a verb's help lists at the start of its lines.
 std::set<std::string> options_of(const std::string& verb) {
   const std::string help = run_packtrace({verb, "--help"}).out;
   std::set<std::string> options;
@@ -34,7 +34,7 @@ bool is_installed(const std::string& program) {
   return run_program("sh", {"-c", "command -v " + program}).exit_code == 0;
 }
 
-/// The part of a text from one marker to another.
+/// Returns the part of a text from one marker to another.
 std::string between(const std::string& text, const std::string& from, const std::string& to) {
   const size_t begin = text.find(from);
   if (begin == std::string::npos) return {};
@@ -79,7 +79,7 @@ TEST(Completion, TheManualPageHasEachOptionOfEachVerb) {
   }
 }
 
-/// Shells, by what reads their scripts.
+/// Shells, named by the program that reads their scripts.
 class CompletionScript : public testing::TestWithParam<const char*> {};
 
 TEST_P(CompletionScript, IsAcceptedByItsShell) {
@@ -99,7 +99,7 @@ TEST(Completion, TheManualPageIsAcceptedByMandoc) {
   const TemporaryFolder folder;
   write_text(folder / "packtrace.1", run_packtrace({"man"}).out);
   const CommandResult checked = run_program("mandoc", {"-T", "lint", "-W", "warning", folder / "packtrace.1"});
-  // A date would be that of the build, and the page not the same for the same program.
+  // The page has no date: a build date would make its text differ between builds of the same program.
   EXPECT_EQ(std::regex_replace(checked.out, std::regex(".*missing date.*\n"), ""), "");
 }
 
@@ -112,7 +112,7 @@ TEST(Completion, TheManualPageIsAcceptedByGroff) {
   EXPECT_EQ(checked.err, "");
 }
 
-/// What bash offers for the last of the words.
+/// Returns bash's completions for the last of the words.
 std::string bash_offers(const std::string& words, const std::filesystem::path& folder) {
   const std::string script = R"(
     source <("$0" completion bash)

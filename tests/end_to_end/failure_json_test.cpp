@@ -9,7 +9,7 @@
 namespace packtrace::test {
 namespace {
 
-/// Runs with --json - and returns what is in "error".
+/// Runs with --json - and returns the "error" object.
 nlohmann::json error_of(std::vector<std::string> words) {
   words.insert(words.end(), {"--json", "-"});
   const CommandResult result = run_packtrace(words);
@@ -77,7 +77,7 @@ TEST(FailureJson, AFileThatIsThereStaysWithoutForce) {
   write_text(bench / "mine.json", "mine");
   EXPECT_EQ(run_packtrace({"info", bench / "none.ptk", "--json", bench / "mine.json"}).exit_code, 6);
   EXPECT_EQ(read_text(bench / "mine.json"), "mine");
-  // Not even --force replaces what is no report: a mistyped name may be that of a mesh.
+  // Even --force replaces only reports: a mistyped name may be that of a mesh.
   EXPECT_EQ(run_packtrace({"info", bench / "none.ptk", "--json", bench / "mine.json", "--force"}).exit_code, 3);
   EXPECT_EQ(read_text(bench / "mine.json"), "mine");
   write_text(bench / "mine.json", "{}");

@@ -1,4 +1,4 @@
-// What people type because other programs take it: each is done, or refused with what to type instead.
+// Options and words that other programs accept: each one works, or is refused with a hint at what to type instead.
 
 #include <filesystem>
 #include <string>
@@ -193,7 +193,7 @@ TEST(Habits, SizesAreTakenInEveryWayPeopleWriteThem) {
   EXPECT_TRUE(contains(wrong.err, "1280x720")) << wrong.err;
 }
 
-TEST(Habits, AnEmptyWordIsNoFile) { // an unset variable in quotes
+TEST(Habits, AnEmptyWordIsNoFile) { // for example an unset variable in quotes
   for (const auto& words : std::vector<std::vector<std::string>>{{""}, {"info", ""}, {"compare", "a.png", ""}}) {
     const CommandResult result = run_packtrace(words);
     EXPECT_EQ(result.exit_code, 2);
@@ -227,7 +227,7 @@ TEST(Habits, InfoTakesSeveralFiles) {
   bench.bake();
   const CommandResult table = run_packtrace({"info", bench.baked(), bench.scene()});
   EXPECT_EQ(table.exit_code, 0) << table.err;
-  EXPECT_EQ(std::ranges::count(table.out, '\n'), 3) << table.out; // a heading and a line a file
+  EXPECT_EQ(std::ranges::count(table.out, '\n'), 3) << table.out; // a heading and one line per file
   const CommandResult data = run_packtrace({"info", bench.baked(), bench.scene(), "--json", "-"});
   const auto documents = nlohmann::json::parse(data.out);
   ASSERT_TRUE(documents.is_array());

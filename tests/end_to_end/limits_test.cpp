@@ -1,4 +1,4 @@
-// What the program does where input, memory or disk space end.
+// Behaviour at the end of input, memory or disk space.
 
 #include <filesystem>
 #include <string>
@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Ends a process that hangs: 128 + SIGALRM.
+/// Ends a hanging process with SIGALRM, which run_program() reports as 128 + SIGALRM.
 void end_soon() { ::alarm(60); }
 
 TEST(Limits, PipesAndDevicesAreRefusedAtOnce) {

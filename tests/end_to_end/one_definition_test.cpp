@@ -1,6 +1,6 @@
-// A type that two source files define differently under one name breaks the one-definition rule, and no compiler or
-// linker says so. Headers are compiled together (packtrace_all_headers in CMakeLists.txt); here types of .cpp files are
-// found as well.
+// Two source files that define different types with the same name break the one-definition rule, and no compiler or
+// linker reports it. packtrace_all_headers (CMakeLists.txt) compiles all headers together; this test also checks types
+// in .cpp files.
 
 #include <cctype>
 #include <filesystem>
@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 bool is_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
 
-/// Where the literal that begins at `at` with a quote ends.
+/// Returns the end of the literal whose opening quote is at `at`.
 size_t end_of_literal(const std::string& text, size_t at) {
   const char quote = text[at];
   if (at > 0 && text[at - 1] == 'R' && quote == '"') {
@@ -30,7 +30,8 @@ size_t end_of_literal(const std::string& text, size_t at) {
   return at + 1;
 }
 
-/// Words and single other characters; "::" is one. Without comments, literals and preprocessor lines.
+/// Splits a text into words and single other characters; "::" is one token. Skips comments, literals and preprocessor
+/// lines.
 std::vector<std::string> tokens_of(const std::string& text) {
   std::vector<std::string> tokens;
   bool line_start = true;
@@ -58,7 +59,7 @@ std::vector<std::string> tokens_of(const std::string& text) {
   return tokens;
 }
 
-/// Finds the types that a file defines at namespace scope, with their namespaces; those of anonymous ones not.
+/// Finds the types that a file defines at namespace scope, with their namespaces; skips anonymous namespaces.
 class TypeFinder {
 public:
   explicit TypeFinder(const std::string& text) : tokens_(tokens_of(text)) {}
@@ -82,8 +83,8 @@ public:
 
 private:
   struct Scope {
-    std::string name; ///< with "::" behind it
-    bool hidden;      ///< no namespace, or an anonymous one
+    std::string name; ///< ends with "::"
+    bool hidden;      ///< an anonymous namespace, or a scope that is no namespace
   };
 
   static bool is_key(const std::string& token) {
@@ -96,7 +97,7 @@ private:
     return true;
   }
 
-  /// Returns the place of its brace, or where an alias or using directive goes on.
+  /// Returns the index of the namespace's opening brace, or where parsing continues after an alias or using directive.
   size_t enter_namespace(size_t i) {
     std::string name;
     for (; i < tokens_.size() && (tokens_[i] == "::" || is_word(tokens_[i][0])); ++i) name += tokens_[i];
@@ -118,7 +119,7 @@ private:
       if (!is_word(token[0])) break;
       if (token != "final") name = token;
     }
-    if (name.empty() || i == tokens_.size() || tokens_[i] == "::" || tokens_[i] == "<") return; // a specialisation
+    if (name.empty() || i == tokens_.size() || tokens_[i] == "::" || tokens_[i] == "<") return; // skips specialisations
     while (i < tokens_.size() && tokens_[i] != "{" && tokens_[i] != ";" && tokens_[i] != "(" && tokens_[i] != "=") ++i;
     if (i == tokens_.size() || tokens_[i] != "{") return;
     std::string scope;

@@ -1,4 +1,4 @@
-// What .png files show beside the layer's own colours: what stands where nothing is hit, and what the colours mean.
+// Preview conventions of .png files: colours of pixels without a hit, and the meaning of the layers' colours.
 
 #include <filesystem>
 #include <string>
@@ -14,7 +14,7 @@
 namespace packtrace::test {
 namespace {
 
-/// A picture of the small scene: walls below, nothing in its upper corners.
+/// Renders the small scene: walls below, no hits in the upper corners.
 Image rendered(const Workbench& bench, const std::vector<std::string>& options) {
   std::vector<std::string> words{"render", bench.scene(), "-o", bench / "x.png", "--frames", "1", "--force", "-q"};
   words.insert(words.end(), options.begin(), options.end());

@@ -1,4 +1,4 @@
-// quickstart.sh with a compiler and a packtrace that only say how they were called.
+// Runs quickstart.sh with stubs of cmake and packtrace that only print how they were called.
 
 #include <filesystem>
 #include <string>
@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A copy of the script in a tree where nothing has to be installed or built.
+/// A copy of the script in a folder tree where nothing has to be installed or built.
 class Quickstart : public testing::Test {
 protected:
   Quickstart() {

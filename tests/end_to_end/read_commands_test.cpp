@@ -13,7 +13,7 @@ TEST(CommandLine, EveryTruncatedPrefixOfABakedFileIsRefused) {
   bench.bake();
   const std::string bytes = read_text(bench.baked());
   ASSERT_GT(bytes.size(), 200u);
-  // The library test tries every length; here a spread of them goes through the program.
+  // The library test tries every length; this one runs the program for some of them.
   for (size_t length = 0; length < bytes.size(); length += std::max<size_t>(1, bytes.size() / 40)) {
     write_text(bench / "cut.ptk", bytes.substr(0, length));
     const CommandResult result = run_packtrace({"info", bench / "cut.ptk"});
@@ -32,7 +32,8 @@ TEST(CommandLine, FlippedBitsInABakedFileAreRefused) {
     damaged[at] = static_cast<char>(damaged[at] ^ (1 << (i % 8)));
     write_text(bench / "bad.ptk", damaged);
     const int code = run_packtrace({"info", bench / "bad.ptk"}).exit_code;
-    EXPECT_TRUE(code == 3 || code == 4) << "byte " << at << " exit " << code; // 4: the version field itself
+    // 4: the changed byte is in the version field
+    EXPECT_TRUE(code == 3 || code == 4) << "byte " << at << " exit " << code;
   }
 }
 

@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Many placements of a ball before a camera, with levels of detail.
+/// Many instances of a ball in front of a camera, with LOD levels.
 class BallsBench : public Workbench {
 public:
   BallsBench() {
@@ -67,7 +67,7 @@ TEST(CommandLine, DetailIsChosenByItsErrorInPixels) {
   }
 }
 
-/// The town's houses stand on its ground, each on a grid of its own.
+/// The town's houses stand on its ground, each on a grid of its own, so seams may open.
 TEST(CommandLine, SeamsOfInstancesAreStatedAndSaidWhereTheyShow) {
   const TemporaryFolder folder;
   const std::string file = folder / "town.ptk", json = folder / "x.json";
@@ -96,7 +96,7 @@ TEST(CommandLine, SeamsOfInstancesAreStatedAndSaidWhereTheyShow) {
   EXPECT_EQ(result.out.find("seams"), std::string::npos) << result.out;
   const auto coarse = render({"--lod-error", "2"});
   EXPECT_GT(coarse.at("of_detail_px"), 0.5);
-  EXPECT_LE(coarse.at("of_detail_px"), 4.0); // both sides
+  EXPECT_LE(coarse.at("of_detail_px"), 4.0); // sum of both sides
   EXPECT_GT(coarse.at("above_half_a_pixel"), 0u);
   EXPECT_NE(result.out.find("seams     may gape by"), std::string::npos) << result.out;
   EXPECT_EQ(render({"--lod-error", "2", "--lod-rays", "occlusion"}), whole);
@@ -145,7 +145,7 @@ TEST(CommandLine, DetailLooksTheSameForAnyNumberOfThreads) {
 
 TEST(CommandLine, DetailThatCannotBeIsAUsageError) {
   const BallsBench bench;
-  bench.bake(); // without levels
+  bench.bake(); // without LOD levels
   const CommandResult none = bench.render({"--lod-error", "1"});
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_NE(none.err.find("no levels of detail; bake it with --lod"), std::string::npos) << none.err;
@@ -255,9 +255,9 @@ TEST(CommandLine, RenderNamesItsBackend) {
     EXPECT_EQ(report.at("resident_bytes").at("tracing"), sum);
   };
   ASSERT_EQ(render({}), 0);
-  check_report("packed"); // what a .ptk file is made for
+  check_report("packed"); // the default backend for .ptk files
   ASSERT_EQ(render({"--bvh", "high"}), 0);
-  check_report("embree"); // whose option that is
+  check_report("embree"); // --bvh belongs to this backend
   ASSERT_EQ(render({"--backend", "embree", "--bvh-quality", "high"}), 0);
   check_report("embree");
   ASSERT_EQ(render({"--backend", "embree-clusters"}), 0);

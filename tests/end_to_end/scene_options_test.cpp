@@ -1,4 +1,4 @@
-// --world and --time on every verb that reads scenes, crop windows, and what info tells of a scene.
+// Tests --world and --time on every verb that reads scenes, crop windows, and what info reports about a scene.
 
 #include <string>
 
@@ -10,7 +10,7 @@
 namespace packtrace::test {
 namespace {
 
-/// A triangle that moves by 8 along x, then a world of two of them that stand still.
+/// A triangle that moves by 8 along x, then a second world with two static triangles.
 constexpr const char* kScene = R"(Camera "perspective"
 Film "image" "integer xresolution" 20 "integer yresolution" 10 "float cropwindow" [.25 .75 .2 .5] "string filename" "a.exr"
 TransformTimes 2 4
@@ -30,7 +30,7 @@ class SceneOptions : public testing::Test {
 protected:
   SceneOptions() { write_text(scene_, kScene); }
 
-  /// The JSON of a verb that must succeed.
+  /// Runs a verb that must succeed and returns its JSON.
   static nlohmann::json json_of(std::vector<std::string> arguments) {
     arguments.insert(arguments.end(), {"--json", "-"});
     const CommandResult result = run_packtrace(arguments);

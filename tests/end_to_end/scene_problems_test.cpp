@@ -1,4 +1,4 @@
-// Scenes with something wrong in them: nothing is lost or overwritten in silence.
+// Scenes with errors: nothing is lost or overwritten without a message.
 
 #include <string>
 #include <vector>
@@ -176,7 +176,7 @@ TEST(NamesOfAScene, DoNotReachTheTerminalAsControlCharacters) {
 
 // Cameras
 
-/// A ball, fine enough for levels of detail, that the camera described by options looks at or not.
+/// A ball fine enough for LOD levels; `options` defines a camera, which may or may not look at it.
 std::string ball_scene(const std::string& options) {
   return options + "\nFilm \"image\" \"integer xresolution\" 32 \"integer yresolution\" 24\n"
                    "WorldBegin\nTranslate 0 0 10 Shape \"sphere\"\nWorldEnd\n";
@@ -230,7 +230,7 @@ TEST(CameraOfAScene, ThatSeesNothingGivesWayToOneThatFramesTheScene) {
     EXPECT_GT(report["hit_pixels"], 100) << result.out;
     EXPECT_EQ(report["width"], 32);
     EXPECT_EQ(report["height"], 24);
-    // The same picture as when it is asked for.
+    // Asking for that camera and size gives the same picture.
     command.insert(command.end(), {"--camera", "auto", "--size", "32x24"});
     const CommandResult framed = run_packtrace(command);
     EXPECT_EQ(framed.err, "");

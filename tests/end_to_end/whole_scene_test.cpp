@@ -1,4 +1,4 @@
-// Whole scenes through the program: counts, sizes and image errors against tests/end_to_end/limits.json.
+// Runs the program on whole scenes and compares counts, sizes and image errors with tests/end_to_end/limits.json.
 
 #include <cstdlib>
 #include <filesystem>
@@ -20,9 +20,9 @@ json read_limits() { return json::parse(read_text(fs::path(PACKTRACE_SOURCE_DIR)
 
 /// One scene of limits.json.
 struct Case {
-  std::string name; ///< path below its root
+  std::string name; ///< path relative to its root folder
   fs::path file;
-  bool external = false; ///< below PACKTRACE_SCENES
+  bool external = false; ///< in the folder PACKTRACE_SCENES
 };
 
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
@@ -80,7 +80,7 @@ protected:
 
 TEST_P(WholeScene, HasTheReferenceCountsAndStaysSmall) {
   if (limits_.contains("triangles")) {
-    uint64_t triangles = 0; // none is lost without being counted
+    uint64_t triangles = 0; // every triangle is either stored or counted as left out
     for (const char* kind : {"triangles", "collapsed_triangles", "coinciding_triangles"})
       triangles += report_.at(kind).get<uint64_t>();
     EXPECT_EQ(triangles, limits_.at("triangles").get<uint64_t>());

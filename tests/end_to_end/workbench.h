@@ -9,13 +9,13 @@
 
 namespace packtrace::test {
 
-/// Files and folders in a directory.
+/// Number of files and folders in a directory.
 inline size_t file_count(const std::filesystem::path& directory) {
   return static_cast<size_t>(
       std::distance(std::filesystem::directory_iterator(directory), std::filesystem::directory_iterator()));
 }
 
-/// A directory with the small scene in it and, on request, its baked file.
+/// A temporary directory with the small scene and, on request, its baked file.
 class Workbench {
 public:
   Workbench() { write_text(scene(), small_scene_text()); }

@@ -1,6 +1,6 @@
-// Baked files, resident and in disk form: decoding of pages, validation, and everything a reader can ask of a file that
-// passed it. Each input is tried as it is, with the sizes and hashes of header, table and pages made right, and with those
-// of what its pages are decoded to made right, too.
+// Fuzzes baked files, resident and paged: decoding of pages, validation, and every query on a file that passed
+// validation. Each input is tried in three forms: unchanged; with correct sizes and hashes of header, table and pages;
+// and with correct sizes and hashes of its decoded pages, too.
 
 #include <algorithm>
 #include <cmath>
@@ -65,10 +65,10 @@ void read_geometry(const BakedFile& file, uint32_t geometry) {
   }
 }
 
-/// Each cluster of level 0 has one chain of groups upwards, along which errors grow and spheres hold those below.
+/// Each cluster of level 0 leads up one chain of groups. Along it, errors grow and each sphere contains those below.
 void read_lod(const BakedFile& file, uint32_t geometry) {
   const LodView lod = file.lod(geometry);
-  std::vector<uint32_t> above(lod.groups.size(), baked::kNoLodGroup); // some group that is made from it
+  std::vector<uint32_t> above(lod.groups.size(), baked::kNoLodGroup); // a group made from this one
   for (size_t level = 0; level < lod.levels.size(); ++level) {
     require(lod.links_of(level).size() == file.clusters(lod.levels[level].geometry).size(), "number of links");
     for (const baked::LodLinkRecord& link : lod.links_of(level)) {
@@ -84,8 +84,8 @@ void read_lod(const BakedFile& file, uint32_t geometry) {
   }
 }
 
-/// Every node but a tree's first is the child of one node, at most as deep as the record says; each triangle that some
-/// ray sees is in one leaf, of the tree of its geometry.
+/// Every node except a tree's root is the child of one node, and no deeper than the record says. Each triangle that any
+/// ray class sees is in one leaf of its geometry's tree.
 void read_trees(const BakedFile& file) {
   const BakedSections& sections = file.sections();
   std::vector<std::vector<uint32_t>> leaves;
@@ -151,7 +151,7 @@ void read_baked(std::span<const std::byte> bytes) {
   });
 }
 
-/// What pages are decoded to after changes no longer has its content hash: validation would look at nothing else.
+/// The content hash of decoded pages is wrong after changes, and validation would stop there. So it is repaired.
 void read_decoded_pages(std::span<const std::byte> bytes) {
   expect_read_or_refused([&] {
     DiskForm form;

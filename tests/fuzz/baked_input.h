@@ -12,7 +12,7 @@
 
 namespace packtrace::fuzz {
 
-/// Most changes to a file would only spoil its sizes and hashes: makes those of a resident file right.
+/// Repairs sizes and hashes of a resident file after changes, so that validation looks further than these.
 inline void repair_resident(std::span<std::byte> bytes) {
   baked::FileHeader header;
   if (bytes.size() < sizeof header) return;
@@ -24,7 +24,7 @@ inline void repair_resident(std::span<std::byte> bytes) {
   test::rehash<baked::FileHeader>(bytes);
 }
 
-/// The same of a file in disk form, whose last page then ends with the file; a resident one where it is none.
+/// Same for a paged file, whose last page is made to end with the file. Other files are treated as resident.
 inline void repair(std::span<std::byte> bytes) {
   baked::PagedHeader header;
   if (!is_paged_file(bytes) || bytes.size() < sizeof header) return repair_resident(bytes);
@@ -48,7 +48,7 @@ inline void repair(std::span<std::byte> bytes) {
   test::rehash_pages(bytes);
 }
 
-/// Calls read, which may refuse the file.
+/// Calls read(), which may reject the file with Error(kInput) or Error(kUnsupported).
 template <class Read>
 void expect_read_or_refused(Read read) {
   try {

@@ -1,5 +1,5 @@
-// The importer's image reader, and for the formats that they read, the readers of runtime/image. The latter check PNG's
-// checksums, which changes to a file would only spoil, so PNG inputs are tried once more with right ones.
+// Fuzzes the importer's image reader and, for the formats that they support, the readers of runtime/image. The latter
+// verify PNG checksums, which changes would invalidate, so PNG inputs are also tried with correct checksums.
 
 #include <algorithm>
 #include <cmath>
@@ -40,7 +40,7 @@ void require_image(const Image& image) {
   require(image.channels > 0 && image.data.size() == image.size.pixels() * image.channels, "number of samples");
 }
 
-/// A PNG file whose chunks, as far as their lengths lead, have the checksums that their content asks for.
+/// Returns a PNG file with correct checksums of all chunks that can be reached by their lengths.
 std::vector<std::byte> with_right_checksums(std::span<const std::byte> bytes) {
   std::vector<std::byte> file(bytes.begin(), bytes.end());
   const auto big_endian = [&](size_t at) {

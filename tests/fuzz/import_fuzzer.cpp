@@ -1,4 +1,4 @@
-// import_scene() on whole scenes of several files (scene_files.h), within small limits so that inputs take
+// Fuzzes import_scene() with whole scenes of several files (scene_files.h). Low limits keep each input within
 // milliseconds.
 
 #include <cstdlib>
@@ -25,11 +25,11 @@ ImportOptions small_limits() {
   options.max_nesting = 32;
   options.tessellation_tolerance = 0.05;
   options.keep_textures = true;
-  options.allow_files_outside_scene_folder = false; // inputs must mean the same on every machine
+  options.allow_files_outside_scene_folder = false; // inputs must behave equally on every machine
   return options;
 }
 
-/// What an import on so many threads gives, as bytes; with the error's text where it fails.
+/// Returns the result of an import with the given number of threads as bytes, or the error's text if it fails.
 std::string outcome(const std::filesystem::path& main_file, const ImportOptions& options, int threads) {
   Diagnostics diagnostics;
   Progress progress;
@@ -60,7 +60,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const std::filesystem::path main_file = folder.write(text);
   auto options = small_limits();
   const std::string alone = outcome(main_file, options, 1);
-  constexpr size_t kSeldom = 16; // these repeat the work
+  constexpr size_t kSeldom = 16; // these options repeat the import, so each is tried for few inputs only
   switch (std::hash<std::string_view>{}(text) % kSeldom) {
   case 0:
     require(outcome(main_file, options, 2) == alone, "the result depends on the number of threads");

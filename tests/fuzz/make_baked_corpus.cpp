@@ -1,5 +1,5 @@
-// Writes the baked forms of scenes of the import corpus, so that the baked corpus always has the current format: each
-// codec, with and without levels of detail, without trees; each encoding of normals and of textures where there are any.
+// Bakes scenes of the import corpus, so that the baked corpus always has the current format: with each codec, with and
+// without LOD levels, without trees, and with each encoding of normals and textures that the scene has.
 
 #include <cstdio>
 #include <exception>
@@ -23,7 +23,7 @@ Scene read_scene(const std::filesystem::path& input) {
   fuzz::SceneFilesFolder files;
   ImportOptions options;
   options.keep_textures = true;
-  options.tessellation_tolerance = 0.1; // small files make small changes matter
+  options.tessellation_tolerance = 0.1; // coarse tessellation: in small files, small changes matter more
   Diagnostics diagnostics;
   Progress progress;
   return import_scene(files.write(text), options, diagnostics, progress).scene;
@@ -33,7 +33,7 @@ Scene read_scene(const std::filesystem::path& input) {
 class CorpusWriter {
 public:
   CorpusWriter(const Scene& scene, std::filesystem::path stem) : scene_(scene), stem_(std::move(stem)) {
-    config_.lod_min_triangles = 48; // of one cluster, too
+    config_.lod_min_triangles = 48; // allows LOD levels of geometries with one cluster
     config_.purpose = baked::kShading;
     config_.textures = true;
   }

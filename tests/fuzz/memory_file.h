@@ -9,7 +9,7 @@
 
 namespace packtrace::fuzz {
 
-/// A regular file without a disk: what takes a path can open path() any number of times.
+/// A regular file in memory. path() can be opened any number of times.
 class MemoryFile {
 public:
   MemoryFile() : descriptor_(::memfd_create("fuzz input", MFD_CLOEXEC)) {
@@ -19,7 +19,7 @@ public:
   MemoryFile(const MemoryFile&) = delete;
   MemoryFile& operator=(const MemoryFile&) = delete;
 
-  /// Replaces the content.
+  /// Replaces the contents.
   void write(std::string_view content) const {
     const auto size = static_cast<ssize_t>(content.size());
     if (::ftruncate(descriptor_, 0) != 0 || ::pwrite(descriptor_, content.data(), content.size(), 0) != size)

@@ -8,7 +8,7 @@
 namespace packtrace::fuzz {
 namespace {
 
-/// The characters between the quotes of a dictionary line.
+/// Returns the characters between the quotes of a dictionary line, unescaped.
 std::string unescaped(std::string_view text, size_t line) {
   std::string word;
   for (size_t i = 0; i < text.size(); ++i) {

@@ -8,18 +8,18 @@
 
 namespace packtrace::fuzz {
 
-/// The words of a dictionary in libFuzzer's notation: lines of `name="text"` with \xNN, \\ and \", and # comments.
-/// Throws std::runtime_error naming the line that is not one.
+/// Returns the words of a dictionary in libFuzzer's notation: lines `name="text"` with \xNN, \\ and \", and # comments.
+/// Throws std::runtime_error, with the line number, for any other line.
 std::vector<std::string> parse_dictionary(std::string_view text);
 
-/// Makes inputs from a corpus. The sequence depends on the arguments alone.
+/// Generates inputs from a corpus. The sequence depends on the arguments only.
 class Mutator {
 public:
   /// @param corpus not empty
   Mutator(std::vector<std::string> corpus, std::vector<std::string> dictionary, uint64_t seed, size_t max_bytes);
 
-  /// One of the corpus with one to eight random changes: bits, bytes, binary and decimal extremes, words of the
-  /// dictionary, parts removed, doubled or taken from another input. At most max_bytes long.
+  /// Returns a corpus input with one to eight random changes: bits, bytes, binary and decimal extremes, dictionary
+  /// words, parts removed, doubled or taken from another input. At most max_bytes long.
   std::string next();
 
 private:

@@ -1,4 +1,4 @@
-// read_ply(): what comes back keeps the contract of Mesh and is bounded by the file's size.
+// Fuzzes read_ply(): its result satisfies the contract of Mesh and is bounded by the file's size.
 
 #include <span>
 
@@ -18,7 +18,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const PlyMesh ply = read_ply(std::as_bytes(std::span(data, size)), count_report);
     fuzz::require_mesh_contract(ply.mesh);
     fuzz::require(ply.dropped_triangles == 0 || reports > 0, "triangles dropped in silence");
-    // A corner takes at least one byte and each beyond a polygon's second makes a triangle.
+    // A corner takes at least one byte, and each corner of a polygon after the second makes a triangle.
     fuzz::require(ply.mesh.triangles.size() + ply.dropped_triangles <= size, "more triangles than bytes");
     fuzz::require(ply.mesh.positions.size() <= size, "more vertices than bytes");
   } catch (const Error& error) {

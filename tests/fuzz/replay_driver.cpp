@@ -1,5 +1,5 @@
-// Runs a fuzz target without libFuzzer: every input of the corpus, then a fixed number of inputs made from them, the
-// same ones in each run. The input under test is kept in a file until it has passed, whichever way the process ends.
+// Runs a fuzz target without libFuzzer: all inputs of the corpus, then a fixed number of inputs made from them, which
+// are the same in every run. The current input stays in a file until it has passed, so it survives a crash.
 
 #include <algorithm>
 #include <charconv>
@@ -29,9 +29,9 @@ constexpr char kUsage[] = "usage: TARGET [-runs=N] [-seed=N] [-timeout=SECONDS] 
                           "  CORPUS: files, and folders of files\n";
 
 struct Options {
-  uint64_t runs = 0; ///< inputs to make
+  uint64_t runs = 0; ///< number of inputs to generate
   uint64_t seed = 1;
-  unsigned timeout = 30; ///< for one input
+  unsigned timeout = 30; ///< seconds per input
   fs::path dictionary;
   std::vector<fs::path> corpus;
 };
@@ -87,7 +87,7 @@ std::vector<fs::path> files_of(const std::vector<fs::path>& corpus) {
   return files;
 }
 
-/// Calls the target, with the input in a file of the working folder meanwhile.
+/// Calls the target while the input is in a file of the working folder.
 class Runner {
 public:
   Runner(const std::string& target, unsigned timeout)
@@ -107,7 +107,8 @@ public:
     const auto size = static_cast<ssize_t>(input.size());
     if (::pwrite(file_, input.data(), input.size(), 0) != size || ::ftruncate(file_, size) != 0)
       throw std::runtime_error("cannot write " + path_.string());
-    const auto exact = std::make_unique<uint8_t[]>(input.size()); // so that reading past the end shows
+    // Exact size, so that sanitizers detect reads past the end.
+    const auto exact = std::make_unique<uint8_t[]>(input.size());
     std::copy(input.begin(), input.end(), exact.get());
     ::alarm(timeout_);
     LLVMFuzzerTestOneInput(exact.get(), input.size());

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Runs one fuzz target for a while, from the kept corpus and from what earlier runs found.
+# Runs one fuzz target for some time, starting from the kept corpus and the inputs that earlier runs found.
 # Usage: tests/fuzz/run.sh TARGET SECONDS [LIBFUZZER OPTION...]      TARGET: tokenizer import ply image baked trace
-# Prints executions, executions per second, coverage (edges and features) and corpus size as libFuzzer counts them.
-# Exit code 1: there is a finding, whose input is in build/fuzz/findings/TARGET. BUILD names another build folder.
+# Prints libFuzzer's counts: executions, executions per second, coverage (edges and features) and corpus size.
+# Exit code 1: there is a finding; its input is in build/fuzz/findings/TARGET. BUILD selects another build folder.
 set -euo pipefail
 [ $# -ge 2 ] || { sed -n '2,5s/^# //p' "$0" >&2; exit 2; }
 target=$1

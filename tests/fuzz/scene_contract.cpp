@@ -16,7 +16,7 @@ bool is_affine_invertible(const DAffine& map) {
   return determinant != 0.0 && std::isfinite(determinant);
 }
 
-/// Checks the numbers that lead from one array of a scene into another, and that all elements are led to.
+/// Checks indices from one array of a scene into another, and that all elements are used.
 class Uses {
 public:
   explicit Uses(size_t count) : used_(count, false) {}
@@ -238,7 +238,7 @@ void require_mesh_contract(const Mesh& mesh) {
   require(mesh.uvs.empty() || mesh.uvs.size() == vertices, "number of texture coordinates");
   for (const Vec3 p : mesh.positions) require(is_finite(p), "position not finite");
   for (const Vec3 n : mesh.normals)
-    require(std::abs(glm::dot(n, n) - 1.0f) < 1e-5f, "normal not of unit length"); // a few roundings
+    require(std::abs(glm::dot(n, n) - 1.0f) < 1e-5f, "normal not of unit length"); // a few rounding errors
   for (const Triangle& t : mesh.triangles) {
     require(std::max({t.x, t.y, t.z}) < vertices, "vertex index out of range");
     require(t.x != t.y && t.y != t.z && t.z != t.x, "triangle repeats an index");

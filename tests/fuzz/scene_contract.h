@@ -8,14 +8,14 @@
 
 namespace packtrace::fuzz {
 
-/// Ends the process where a mesh breaks the contract of scene.h.
+/// Ends the process if a mesh violates the contract of scene.h.
 void require_mesh_contract(const Mesh& mesh);
 
-/// The same for a whole scene, for what import_scene() promises, and for counts that contradict each other or
-/// losses that no diagnostic tells of.
+/// Ends the process if a whole scene violates that contract or the guarantees of import_scene(), if its counts
+/// contradict each other, or if something was lost without a diagnostic.
 void require_import_contract(const ImportResult& result, const Diagnostics& diagnostics);
 
-/// All of an import as bytes: equal exactly where the results, bit for bit, and the texts of the diagnostics are.
+/// Serialises an import: equal bytes exactly if the results are bitwise equal and the diagnostics have equal texts.
 std::string fingerprint(const ImportResult& result, const Diagnostics& diagnostics);
 
 } // namespace packtrace::fuzz

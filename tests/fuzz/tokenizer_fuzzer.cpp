@@ -1,5 +1,5 @@
-// Tokenizer and InputFile: the same tokens for every window size, and the same numbers from runs as from single tokens,
-// each as std::from_chars reads it. Inputs that start with gzip's magic bytes are inflated on the way.
+// Fuzzes Tokenizer and InputFile: every window size gives the same tokens, and runs of numbers equal single tokens
+// parsed with std::from_chars. Inputs that start with gzip's magic bytes are inflated first.
 
 #include <bit>
 #include <charconv>
@@ -31,7 +31,7 @@ Tokenizer open(const MemoryFile& file, size_t window) {
   return Tokenizer(InputFile(file.path(), kMaxContentBytes), window);
 }
 
-/// All tokens up to the end, which is the last one; none where the file cannot be read.
+/// Returns all tokens including the final end token, or nullopt if the file cannot be read.
 std::optional<std::vector<OwnedToken>> tokens_of(const MemoryFile& file, size_t window) {
   std::vector<OwnedToken> tokens;
   try {
@@ -49,7 +49,7 @@ std::optional<std::vector<OwnedToken>> tokens_of(const MemoryFile& file, size_t 
   return tokens;
 }
 
-/// Whether text, as a whole, stands for value.
+/// Whether the whole text parses as `value`.
 template <class T>
 bool stands_for(std::string_view text, T value) {
   T expected{};
@@ -63,7 +63,7 @@ bool stands_for(std::string_view text, T value) {
     return error == std::errc() && expected == value;
 }
 
-/// Reads the file by turns as numbers of type T and as a token.
+/// Reads the file alternately as numbers of type T and as single tokens.
 template <class T>
 void require_same_numbers(const MemoryFile& file, size_t window, const std::vector<OwnedToken>& tokens) {
   Tokenizer tokenizer = open(file, window);
@@ -91,7 +91,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static const MemoryFile file;
   file.write({reinterpret_cast<const char*>(data), size});
   const auto tokens = tokens_of(file, Tokenizer::kDefaultWindow);
-  // The smallest blocks overlap most of all, so they cost most: short inputs are enough for them.
+  // The smallest windows overlap most and therefore cost most, so only short inputs use them.
   const size_t least = size < 256 ? 1 : 64;
   for (const size_t window : {least, size_t{64}, size_t{300}, size_t{1000}})
     require(tokens_of(file, window) == tokens, "tokens depend on the window's size");

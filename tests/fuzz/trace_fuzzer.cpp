@@ -1,5 +1,6 @@
-// Tracing packed files: what validation lets pass can be traced by every kernel this machine has, whatever its trees,
-// boxes and transforms are. Hits name what is there. Kernels need not agree, as boxes need not hold what is below them.
+// Fuzzes tracing of packed files: files that pass validation can be traced by every kernel this machine supports,
+// whatever their trees, bounds and transforms. Hits refer to existing triangles. Kernels need not agree, because node
+// bounds in such files need not contain their contents.
 
 #include <algorithm>
 #include <cmath>
@@ -15,10 +16,10 @@
 namespace packtrace::fuzz {
 namespace {
 
-constexpr uint32_t kRays = 48;      // a group of 16 neighbours, and others that have less in common
-constexpr uint32_t kManyRays = 600; // go through a tree over placements together
+constexpr uint32_t kRays = 48;      // a group of 16 coherent rays, and less coherent ones
+constexpr uint32_t kManyRays = 600; // enough to be traced together through a tree over instances
 
-/// From within and around the scene, the last ones without direction or without an interval.
+/// Rays from within and around the scene. The last two have no direction and an empty interval.
 std::vector<Ray> rays_through(const UnitSpace& space, const Bounds& world, uint32_t count) {
   const DVec3 lo = world.empty() ? DVec3(-1) : space.to_unit(DVec3(world.lo));
   const DVec3 hi = world.empty() ? DVec3(1) : space.to_unit(DVec3(world.hi));
@@ -34,7 +35,7 @@ std::vector<Ray> rays_through(const UnitSpace& space, const Bounds& world, uint3
     const DVec3 from = coherent ? lo - (hi - lo) : at(3 * i);
     const DVec3 to = coherent ? lo + (hi - lo) * DVec3(0.1 + 0.2 * (i & 3), 0.1 + 0.2 * (i >> 2), 0.5) : at(3 * i + 1);
     rays[i].origin = Vec3(from), rays[i].direction = Vec3(to - from);
-    if (i % 5 == 4) rays[i].direction[static_cast<int>(i % 3)] = 0.0f; // along a plane
+    if (i % 5 == 4) rays[i].direction[static_cast<int>(i % 3)] = 0.0f; // parallel to an axis plane
   }
   rays[count - 2].direction = Vec3(0.0f);
   rays[count - 1].tfar = -1.0f;
@@ -75,7 +76,7 @@ void trace(const BakedFile& file, const Source& source) {
     if (isa_supported(isa)) trace(file, source, isa);
 }
 
-/// At details at which some groups pass and others do not.
+/// Traces at levels of detail where some groups pass and others do not.
 void trace_levels(const BakedFile& file, const PackedSource& source) {
   const Bounds world = source.world_bounds();
   const double size = world.empty() ? 0.0 : glm::length(DVec3(world.hi) - DVec3(world.lo));

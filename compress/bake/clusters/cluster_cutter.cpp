@@ -7,13 +7,13 @@
 namespace packtrace {
 namespace {
 
-/// Counts the distinct vertices of a growing cluster.
+/// Counts the distinct vertices of the cluster under construction.
 class VertexCounter {
 public:
   explicit VertexCounter(uint32_t vertex_count) : cluster_of_(vertex_count, 0) {}
 
   void begin_cluster() { ++cluster_, count_ = 0; }
-  /// How many there are with those of a triangle.
+  /// Adds a triangle's vertices and returns the number of distinct vertices.
   uint32_t add(const Triangle& triangle) {
     for (int corner = 0; corner < 3; ++corner)
       if (uint32_t& cluster = cluster_of_[triangle[corner]]; cluster != cluster_) cluster = cluster_, ++count_;
@@ -21,7 +21,7 @@ public:
   }
 
 private:
-  std::vector<uint32_t> cluster_of_; ///< the last one that each vertex was counted for
+  std::vector<uint32_t> cluster_of_; ///< per vertex: the last cluster that counted it
   uint32_t cluster_ = 0, count_ = 0;
 };
 
@@ -43,7 +43,7 @@ Clusters cut_clusters(std::span<const TreeBox> boxes, std::span<const Triangle> 
     if (part_end - begin > kMaxClusterTriangles) close(part_begin);
     for (uint32_t i = part_begin; i < part_end; ++i) {
       if (counter.add(vertices[out.order[i]]) <= kMaxClusterVertices) continue;
-      // Rather a whole part than the head of this one; alone, the part is cut where it must be.
+      // Do not split a part to fill the cluster before it. A part is cut only if it exceeds the limit alone.
       const bool alone = begin >= part_begin;
       if (!alone) i = part_begin;
       close(i);

@@ -13,11 +13,11 @@ namespace {
 constexpr uint32_t kNone = ~0u;
 constexpr uint32_t kWellFilled = kMaxClusterTriangles * 9 / 10;
 
-/// Up to three triangles across each triangle's edges; an edge has at most one partner.
+/// Finds up to three neighbours per triangle, one across each edge. Each edge has at most one partner.
 std::vector<std::array<uint32_t, 3>> find_neighbours(std::span<const Triangle> points, uint32_t point_count) {
   struct Edge {
-    uint32_t high, next; ///< its higher point; the edge before of the same lower point
-    uint32_t open;       ///< the side that waits for a partner
+    uint32_t high, next; ///< the higher point of the edge; the previous edge with the same lower point
+    uint32_t open;       ///< the triangle side without a partner yet
   };
   std::vector<std::array<uint32_t, 3>> neighbours(points.size(), {kNone, kNone, kNone});
   std::vector<Edge> edges;
@@ -43,7 +43,7 @@ std::vector<std::array<uint32_t, 3>> find_neighbours(std::span<const Triangle> p
   return neighbours;
 }
 
-/// Triangles that a cluster may take next, side by side: each step looks at all of them.
+/// The triangles that a cluster may take next, as a structure of arrays because each step scans all of them.
 class Frontier {
 public:
   uint32_t size() const { return count_; }
@@ -51,8 +51,8 @@ public:
   uint32_t added(uint32_t place) const { return added_[place]; }
   void clear() { count_ = 0; }
 
-  /// @param added vertices that the cluster does not have yet
-  /// @param open neighbours that no cluster has yet
+  /// @param added number of vertices that would be new to the cluster
+  /// @param open number of neighbours without a cluster
   void add(uint32_t triangle, const Triangle& vertices, const DVec3& centroid, uint32_t added, uint32_t open) {
     const uint32_t place = count_++;
     triangle_[place] = triangle, added_[place] = added, open_[place] = open;
@@ -61,7 +61,7 @@ public:
     weigh(place);
   }
 
-  /// Those behind it move up: of equal scores the first to come goes first.
+  /// Closes the gap and keeps the order, so that of equal scores the earliest triangle wins.
   void remove(uint32_t place) {
     --count_;
     for (uint32_t i = place; i < count_; ++i) {
@@ -77,7 +77,7 @@ public:
     if (open == 0) weigh(place);
   }
 
-  /// The cluster has the vertex now.
+  /// Called when the cluster gets a vertex.
   void have(uint32_t vertex) {
     for (uint32_t i = 0; i < count_; ++i)
       if (vertices_[0][i] == vertex || vertices_[1][i] == vertex || vertices_[2][i] == vertex) --added_[i], weigh(i);
@@ -88,7 +88,7 @@ public:
     return glm::dot(d, d) * weight_[place];
   }
 
-  /// The place of the least score, the first of several; there is one.
+  /// Returns the place with the lowest score, the first of several. The frontier must not be empty.
   uint32_t best(const DVec3& centre) {
     using Lanes = double __attribute__((vector_size(16)));
     using Places = int64_t __attribute__((vector_size(16)));
@@ -112,7 +112,8 @@ public:
 private:
   static constexpr size_t kMost = 3 * kMaxClusterTriangles + 2; ///< each triangle adds up to three
 
-  /// Left behind, a triangle without open neighbours would become a cluster's lone piece.
+  /// Prefers triangles that add no vertex or have no free neighbour; left behind, the latter would become isolated
+  /// pieces of other clusters.
   void weigh(uint32_t place) {
     weight_[place] = (1.0 + added_[place]) * (added_[place] == 0 || open_[place] == 0 ? 0.125 : 1.0);
   }
@@ -121,7 +122,7 @@ private:
   std::array<uint32_t, kMost> triangle_, added_, open_;
   std::array<std::array<uint32_t, kMost>, 3> vertices_;
   alignas(16) std::array<std::array<double, kMost>, 3> centroid_;
-  alignas(16) std::array<double, kMost> weight_; ///< of squared distances
+  alignas(16) std::array<double, kMost> weight_; ///< factor of the squared distance
 };
 
 class Grower {
@@ -188,7 +189,7 @@ private:
       if (n != kNone && !taken_[n]) see(n);
   }
 
-  /// A neighbour of the triangle just taken.
+  /// Adds or updates a neighbour of the triangle that was just taken.
   void see(uint32_t triangle) {
     uint32_t open = 0;
     for (const uint32_t n : neighbours_[triangle]) open += n != kNone && !taken_[n];
@@ -197,7 +198,7 @@ private:
     frontier_.add(triangle, input_.vertices[triangle], input_.centroids[triangle], new_vertices(triangle), open);
   }
 
-  /// The best triangle of the frontier, or kNone.
+  /// Returns the best triangle of the frontier, or kNone if none fits.
   uint32_t pick() {
     if (frontier_.size() == 0) return kNone;
     const DVec3 centre = sum_ / static_cast<double>(size_);
@@ -215,8 +216,8 @@ private:
   const ClusterizeInput& input_;
   std::vector<std::array<uint32_t, 3>> neighbours_;
   std::vector<uint8_t> taken_;
-  std::vector<uint32_t> place_;     ///< in the frontier, or kNone
-  std::vector<uint32_t> vertex_in_; ///< the last cluster that has it
+  std::vector<uint32_t> place_;     ///< per triangle: place in the frontier, or kNone
+  std::vector<uint32_t> vertex_in_; ///< per vertex: the last cluster that has it
   Frontier frontier_;
   uint32_t cluster_ = 0, cursor_ = 0, size_ = 0, vertices_ = 0;
   DVec3 sum_{0.0};

@@ -8,22 +8,22 @@
 
 namespace packtrace {
 
-/// Finds triangles that quantisation made equal to an earlier one. Equal triangles have the same vertices, kind and
-/// winding, and differ in the source. Duplicates in the source are kept. Triangles of opposite winding are kept, too:
-/// a thin sheet is closed only with both of its sides.
+/// Finds triangles that quantisation made equal to an earlier one: same vertices, kind and winding, but different in
+/// the source. Duplicates in the source are kept. Triangles of opposite winding are kept too, because a thin sheet is
+/// watertight only with both of its sides.
 class CoincidingTriangles {
 public:
-  /// Where a triangle comes from.
+  /// Source of a triangle.
   struct Source {
     uint32_t part = 0;
-    Triangle vertices{}; ///< of the part's mesh, corner by corner
+    Triangle vertices{}; ///< vertex numbers in the part's mesh, by corner
   };
 
-  /// @param capacity triangles at most
+  /// @param capacity maximum number of triangles
   CoincidingTriangles(const SourcePoints& source, size_t capacity) : source_(source), table_(capacity) {}
 
-  /// Whether the triangle is such a repetition. Otherwise later ones are compared with it.
-  /// @param vertices after quantisation
+  /// Returns whether the triangle repeats an earlier one. If its vertices are new, remembers it for later comparisons.
+  /// @param vertices vertex numbers after quantisation
   bool repeats(const Triangle& vertices, uint32_t kind, const Source& from) {
     const int first = vertices.x <= vertices.y && vertices.x <= vertices.z ? 0 : vertices.y <= vertices.z ? 1 : 2;
     const Known known{turned(vertices, first), kind, {from.part, turned(from.vertices, first)}};

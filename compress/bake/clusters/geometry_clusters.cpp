@@ -15,10 +15,10 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kChunkTriangles = 1u << 14; // worked on alone; clusters do not cross chunks
+constexpr uint32_t kChunkTriangles = 1u << 14; // processed independently; clusters do not cross chunks
 
 struct SortKey {
-  uint32_t rank; ///< of the kind
+  uint32_t rank; ///< rank of the kind
   uint32_t triangle;
   uint64_t morton;
   bool operator<(const SortKey& other) const {
@@ -26,12 +26,12 @@ struct SortKey {
   }
 };
 
-/// A run of one kind's triangles.
+/// A run of triangles of one kind.
 struct Chunk {
-  uint32_t begin = 0, end = 0; ///< of the sorted triangles
+  uint32_t begin = 0, end = 0; ///< range of the sorted triangles
 };
 
-/// Clusters of the sorted triangles of a chunk, which their `order` counts.
+/// Splits a chunk of sorted triangles into clusters. Their `order` indexes the chunk.
 Clusters split_chunk(const QuantizedGeometry& geometry, std::span<const SortKey> keys) {
   Renumbering vertex_numbers(keys.size());
   std::vector<Triangle> vertices;
@@ -53,7 +53,7 @@ Clusters split_chunk(const QuantizedGeometry& geometry, std::span<const SortKey>
   return cut_clusters(boxes, vertices, static_cast<uint32_t>(vertex_numbers.values.size()));
 }
 
-/// Rank of each kind: slots, which are ordered by class, so that classes are contiguous.
+/// Ranks the kinds by slot first. Slots are ordered by class, so the triangles of a class are contiguous.
 std::vector<uint32_t> rank_kinds(const std::vector<TriangleKind>& kinds) {
   std::vector<uint32_t> order(kinds.size()), rank(kinds.size());
   for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -70,7 +70,8 @@ std::vector<SortKey> sort_triangles(const QuantizedGeometry& geometry, const std
   int64_t extent = 0;
   for (const LatticePoint& p : geometry.positions)
     for (size_t axis = 0; axis < 3; ++axis) extent = std::max(extent, p[axis] - geometry.origin[axis]);
-  const auto bits = static_cast<uint32_t>(std::bit_width(static_cast<uint64_t>(extent) * 3)); // of a sum of corners
+  // Bits of the sum of three corners.
+  const auto bits = static_cast<uint32_t>(std::bit_width(static_cast<uint64_t>(extent) * 3));
   const uint32_t shift = bits > kMortonBits ? bits - kMortonBits : 0;
 
   std::vector<SortKey> keys(geometry.triangles.size());
@@ -90,7 +91,7 @@ std::vector<SortKey> sort_triangles(const QuantizedGeometry& geometry, const std
   return keys;
 }
 
-/// Chunks of nearly equal size, each of one kind.
+/// Splits the sorted triangles into chunks of one kind and nearly equal size.
 std::vector<Chunk> split_into_chunks(std::span<const SortKey> keys) {
   std::vector<Chunk> chunks;
   for (size_t begin = 0; begin < keys.size();) {

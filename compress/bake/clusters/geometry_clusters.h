@@ -7,20 +7,20 @@
 
 namespace packtrace {
 
-/// Triangles of one kind next to each other.
+/// A run of triangles of one kind.
 struct ClusterRange {
-  uint32_t first_triangle = 0, triangle_count = 0; ///< of GeometryClusters::triangles
-  uint32_t kind = 0;                               ///< of QuantizedGeometry::kinds
+  uint32_t first_triangle = 0, triangle_count = 0; ///< range in GeometryClusters::triangles
+  uint32_t kind = 0;                               ///< index into QuantizedGeometry::kinds
 };
 
 /// The triangles of a geometry, cluster by cluster.
 struct GeometryClusters {
-  std::vector<Triangle> triangles; ///< into QuantizedGeometry::vertices
+  std::vector<Triangle> triangles; ///< indices into QuantizedGeometry::vertices
   std::vector<ClusterRange> clusters;
 };
 
 /// Splits a geometry into clusters of at most 128 triangles and 256 vertices, ordered by material slot, kind and
-/// place. Depends on its input only, not on the thread count.
+/// position. The result depends on the input only, not on the thread count.
 GeometryClusters split_geometry(const QuantizedGeometry& geometry);
 
 } // namespace packtrace

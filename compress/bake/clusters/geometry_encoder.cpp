@@ -14,7 +14,8 @@ namespace packtrace {
 namespace {
 
 struct EncodedChunk {
-  std::vector<baked::ClusterRecord> clusters; ///< payload_offset from the chunk's start, firsts not set
+  /// payload_offset is relative to the chunk; first triangles and vertices are not set
+  std::vector<baked::ClusterRecord> clusters;
   std::vector<uint8_t> payload;
   Vec3 lo{std::numeric_limits<float>::infinity()}, hi{-std::numeric_limits<float>::infinity()};
   ClusterView::StreamBits bits;
@@ -25,7 +26,7 @@ void add(ClusterView::StreamBits& total, const ClusterView::StreamBits& bits) {
       total.uvs += bits.uvs;
 }
 
-/// Numbers a cluster's vertices 0, 1, ... in the order they come.
+/// Numbers a cluster's vertices 0, 1, ... in order of first use.
 class VertexNumbers {
 public:
   uint32_t operator()(uint32_t vertex) {
@@ -42,7 +43,7 @@ private:
   std::vector<uint32_t> values_;
 };
 
-/// Encodes a run of clusters.
+/// Encodes a run of consecutive clusters.
 class ChunkEncoder {
 public:
   ChunkEncoder(const QuantizedGeometry& geometry, const GeometryClusters& clusters)
@@ -71,7 +72,8 @@ private:
     VertexNumbers numbers;
     std::vector<Triangle> local_triangles;
     for (const Triangle& t : std::span(all_.triangles).subspan(cluster.first_triangle, cluster.triangle_count)) {
-      const uint32_t x = numbers(t.x), y = numbers(t.y), z = numbers(t.z); // in this order
+      // Sequenced x, y, z: argument order is unspecified.
+      const uint32_t x = numbers(t.x), y = numbers(t.y), z = numbers(t.z);
       local_triangles.emplace_back(x, y, z);
     }
     const std::span<const uint32_t> used = numbers.values();
@@ -110,7 +112,7 @@ private:
     return !kind.uvs || view.uv_code(local) == std::array<int64_t, 2>{v.uv[0], v.uv[1]};
   }
 
-  /// Decodes a cluster, compares it with what went in, and adds to the totals.
+  /// Decodes a cluster, compares it with its input and adds it to the totals.
   void inspect(const baked::ClusterRecord& record, const TriangleKind& kind) {
     const ClusterView view(frame_, record, out_.payload.data());
     const uint32_t* vertices = expected_vertices_.data() + first_vertex_;
@@ -147,7 +149,7 @@ private:
 } // namespace
 
 EncodedGeometry encode_geometry(const QuantizedGeometry& geometry, const GeometryClusters& clusters) {
-  constexpr size_t kRun = 128; // clusters
+  constexpr size_t kRun = 128; // clusters per task
   const size_t runs = (clusters.clusters.size() + kRun - 1) / kRun;
   std::vector<EncodedChunk> encoded(runs);
   tbb::parallel_for(size_t{0}, runs, [&](size_t i) {

@@ -4,9 +4,9 @@
 
 namespace packtrace {
 
-inline constexpr uint32_t kMortonBits = 21; ///< per axis
+inline constexpr uint32_t kMortonBits = 21; ///< bits per axis
 
-/// The bits of three numbers below 2^kMortonBits in turn, x lowest: the order of a space-filling curve.
+/// Interleaves the bits of three numbers below 2^kMortonBits, x lowest: their position along a Z-order curve.
 constexpr uint64_t morton_code(uint64_t x, uint64_t y, uint64_t z) {
   constexpr auto spread = [](uint64_t v) {
     v = (v | (v << 32)) & 0x001f00000000ffffu;

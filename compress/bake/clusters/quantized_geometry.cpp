@@ -21,9 +21,9 @@
 namespace packtrace {
 namespace {
 
-constexpr size_t kGrain = 4096; // fixed, so that sums are grouped alike for any thread count
+constexpr size_t kGrain = 4096; // fixed, so that sums are grouped equally for any thread count
 
-/// A maximum and a sum over many items.
+/// Maximum and sum over many items.
 struct ErrorStats {
   double max = 0.0, sum = 0.0;
   uint64_t count = 0;
@@ -33,7 +33,7 @@ struct ErrorStats {
   }
 };
 
-/// Sum of per_item(i, stats) over [0, count); bitwise the same for any thread count.
+/// Accumulates per_item(i, stats) over [0, count); bitwise equal for any thread count.
 template <typename PerItem>
 ErrorStats accumulate_errors(size_t count, const PerItem& per_item) {
   return tbb::parallel_deterministic_reduce(
@@ -52,7 +52,7 @@ void for_each(size_t count, const PerItem& per_item) {
   });
 }
 
-/// Zero stays zero.
+/// Returns 0 for a zero vector.
 DVec3 safe_normalize(DVec3 v) {
   const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
   if (!(largest > 0.0)) return DVec3(0.0);
@@ -118,7 +118,7 @@ private:
       vertices += scene_.meshes[part.mesh].positions.size();
       triangles += scene_.meshes[part.mesh].triangles.size();
     }
-    // Vertex numbers of a file count each cluster's vertices: up to three per triangle.
+    // Vertex numbers of a file count the vertices of each cluster separately: up to three per triangle.
     constexpr size_t kMax = std::numeric_limits<uint32_t>::max() / 4;
     if (vertices > kMax || triangles > kMax)
       throw Error(ErrorKind::kLimitExceeded,
@@ -144,15 +144,15 @@ private:
                   plan_.name + ": measured " + what + " " + brief(measured) + " exceeds its bound " + brief(bound));
   }
 
-  /// Everything about a part that is in hand, by source vertex or triangle.
+  /// Working data of one part, per source vertex or triangle.
   struct Work {
     std::vector<LatticePoint> lattice;
-    size_t first_triangle = 0;   ///< in surface_
-    std::vector<DVec3> normals;  ///< unit or empty
-    std::vector<uint8_t> smooth; ///< per normal: some triangle that is not flat has it
+    size_t first_triangle = 0;   ///< index of the part's first triangle in surface_
+    std::vector<DVec3> normals;  ///< unit length; empty if none are stored
+    std::vector<uint8_t> smooth; ///< per normal: used by a triangle that is not flat
     std::vector<uint32_t> codes;
     std::vector<UvLattice> uvs;
-    std::vector<Triangle> triangles; ///< winding as in the file
+    std::vector<Triangle> triangles; ///< with the file's winding
     std::vector<uint8_t> flat;
   };
 
@@ -193,7 +193,7 @@ private:
     out_.stats.max_position_error = std::max(out_.stats.max_position_error, errors.max);
   }
 
-  /// Unit normal of the decoded triangle; zero where it has no area.
+  /// Unit normal of the decoded triangle; zero if it has no area.
   static DVec3 face_normal(const Work& work, const Triangle& t) {
     const LatticePoint &a = work.lattice[t.x], &b = work.lattice[t.y], &c = work.lattice[t.z];
     DVec3 ab, ac;
@@ -233,9 +233,9 @@ private:
           static_cast<uint64_t>(std::count(work.smooth.begin(), work.smooth.end(), uint8_t{0}));
   }
 
-  /// Triangles whose normals are the face's.
+  /// Finds triangles whose normals equal the face normal within the limit.
   void find_flat_triangles(Work& work) {
-    // A little less, so that rounding never lifts a measured angle above it.
+    // Slightly reduced, so that rounding never lifts a measured angle above the limit.
     const double flat_chord = 2.0 * std::sin(limits_.flat_degrees / kDegreesPerRadian * 0.5) * (1.0 - 1e-9);
     const auto near = [&](const Triangle& t, DVec3 n) {
       for (int corner = 0; corner < 3; ++corner) {
@@ -248,7 +248,7 @@ private:
       if (!stays(work, i)) return;
       const Triangle& t = work.triangles[i];
       const DVec3 n = face_normal(work, t);
-      // Tracing turns normals to the side that is seen, so either side of the face will do.
+      // Tracing turns normals towards the viewer, so either side of the face is valid.
       const double sign = near(t, n) ? 1.0 : near(t, -n) ? -1.0 : 0.0;
       work.flat[i] = sign != 0.0;
       for (int corner = 0; corner < 3 && sign != 0.0; ++corner)
@@ -268,7 +268,7 @@ private:
     return angle_degrees(normal, glm::normalize(DVec3(decode_normal(encoding, code))));
   }
 
-  /// Of the fewest bits whose largest error is within the limit; the last where there is none.
+  /// Returns the encoding with the fewest bits whose largest error is within the limit; kAxis32 if there is none.
   NormalEncoding choose_normal_encoding(const std::vector<Work>& parts) const {
     for (const NormalEncoding encoding : {NormalEncoding::kAxis16, NormalEncoding::kOct20, NormalEncoding::kAxis24})
       if (std::all_of(parts.begin(), parts.end(), [&](const Work& part) { return keeps_error(encoding, part); }))
@@ -295,7 +295,7 @@ private:
     }));
   }
 
-  /// Gives vertices without a direction that of a triangle they belong to.
+  /// Replaces each zero normal by the face normal of a triangle that uses it.
   static void repair_normals(Work& work) {
     for (const Triangle& t : work.triangles)
       for (int corner = 0; corner < 3; ++corner)
@@ -305,7 +305,7 @@ private:
   }
 
   void quantize_uvs(const Mesh& mesh, Work& work) {
-    if (mesh.uvs.empty()) return; // (0,0) everywhere
+    if (mesh.uvs.empty()) return; // (0, 0) everywhere
     if (mesh.uvs.size() != mesh.positions.size())
       throw Error(ErrorKind::kInput, mesh.name + ": texture coordinates and positions differ in number");
     work.uvs.resize(mesh.uvs.size());
@@ -339,7 +339,7 @@ private:
     return surface_.merged[corners.x] != 0 || surface_.merged[corners.y] != 0 || surface_.merged[corners.z] != 0;
   }
 
-  /// Triangles that may coincide with another one.
+  /// Counts triangles that may coincide with another one.
   size_t count_merged() const {
     size_t count = 0;
     for (size_t i = 0; i < surface_.corners.size(); ++i)
@@ -356,12 +356,13 @@ private:
     return number;
   }
 
-  /// Of vertices that fell on one point, later ones take the normal of an earlier one where that is within the
-  /// limit: coarse lattices would have many normals at a point that differ by less than its faces tilt.
+  /// Welds a vertex at a position where several source points merged. It reuses a vertex with the same UV whose normal
+  /// is within the error limit: coarse lattices would otherwise store many normals per position that differ by less
+  /// than the faces tilt.
   uint32_t weld_smooth_vertex(QuantizedVertex v, DVec3 normal) {
     constexpr uint32_t kUnset = ~0u;
     if (smooth_at_.empty()) smooth_at_.assign(surface_.positions.size(), kUnset);
-    constexpr uint32_t kMostCompared = 32; // of thousands at one point, too
+    constexpr uint32_t kMostCompared = 32; // bounds the time where thousands of vertices merged
     uint32_t compared = 0;
     for (uint32_t i = smooth_at_[v.position]; i != kUnset && compared < kMostCompared;
          i = smooth_vertices_[i].next, ++compared) {
@@ -384,11 +385,11 @@ private:
     return static_cast<uint32_t>(std::find(out_.kinds.begin(), out_.kinds.end(), kind) - out_.kinds.begin());
   }
 
-  /// Gives the part's triangles vertices, those that stay and coincide with no other.
+  /// Assigns vertices to the part's triangles and appends those that neither collapsed nor coincide with another one.
   void weld(size_t part, const Work& work, CoincidingTriangles& coinciding) {
     constexpr uint32_t kUnset = ~0u;
     const bool uvs = needs_.parts[part].store_uvs();
-    std::array<std::vector<uint32_t>, 2> vertex_of; // smooth, flat
+    std::array<std::vector<uint32_t>, 2> vertex_of; // of smooth and of flat triangles
     for (auto& numbers : vertex_of) numbers.assign(work.lattice.size(), kUnset);
     std::array<uint32_t, 2> kinds{kUnset, kUnset};
     for (size_t i = 0; i < work.triangles.size(); ++i) {
@@ -419,7 +420,7 @@ private:
     }
   }
 
-  /// Renumbers material slots without those that have no triangle left.
+  /// Renumbers the material slots, without those that have no triangles left.
   void close_slots() {
     std::vector<uint32_t> number_of(plan_.slot_class.size());
     for (const TriangleKind& kind : out_.kinds) number_of[kind.slot] = 1;
@@ -444,10 +445,10 @@ private:
   WeldTable vertex_table_;
   WeldedSurface surface_;
   struct SmoothVertex {
-    uint32_t vertex, next; ///< next: another one of the same position, a place in smooth_vertices_
+    uint32_t vertex, next; ///< next: index in smooth_vertices_ of the previous vertex at the same position
   };
   std::vector<SmoothVertex> smooth_vertices_; // at merged positions
-  std::vector<uint32_t> smooth_at_;           // per position: the last of its smooth_vertices_
+  std::vector<uint32_t> smooth_at_;           // per position: index of its last entry in smooth_vertices_
   QuantizedGeometry out_;
 };
 

@@ -8,11 +8,11 @@
 
 namespace packtrace {
 
-/// Numbers values 0, 1, ... in the order in which they first come. Made for corners of neighbouring triangles, where
-/// most values came just before.
+/// Numbers distinct values 0, 1, ... in order of first appearance. Optimised for corners of neighbouring triangles,
+/// where most values repeat recent ones.
 class Renumbering {
 public:
-  /// @param expected distinct values, about
+  /// @param expected approximate number of distinct values
   explicit Renumbering(size_t expected) : slots_(std::bit_ceil(2 * expected + 2), kEmpty) { recent_.fill(kEmpty); }
 
   uint32_t operator()(uint32_t value) {
@@ -21,18 +21,19 @@ public:
     return recent;
   }
 
-  /// Time goes with the number of values, whatever there was room for.
+  /// Takes time proportional to the number of values, whatever the capacity.
   void clear() {
-    for (; !values.empty(); values.pop_back()) slots_[slot_of(values.back())] = kEmpty; // the last of its run
+    // Removal in reverse order of insertion keeps all probe sequences intact.
+    for (; !values.empty(); values.pop_back()) slots_[slot_of(values.back())] = kEmpty;
     recent_.fill(kEmpty);
   }
 
-  std::vector<uint32_t> values; ///< by number
+  std::vector<uint32_t> values; ///< values by number
 
 private:
   static constexpr uint32_t kEmpty = ~0u;
 
-  /// Where it is, or could be.
+  /// Slot of the value, or the empty slot where it would be inserted.
   size_t slot_of(uint32_t value) const {
     const size_t mask = slots_.size() - 1;
     size_t slot = (value * uint64_t{0x9e3779b97f4a7c15u}) >> 32 & mask;
@@ -56,7 +57,7 @@ private:
   }
 
   std::vector<uint32_t> slots_;
-  std::array<uint32_t, 256> recent_; ///< numbers, by their values' low bits
+  std::array<uint32_t, 256> recent_; ///< cache: numbers of recent values, indexed by value modulo its size
 };
 
 } // namespace packtrace

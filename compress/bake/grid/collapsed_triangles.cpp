@@ -14,7 +14,7 @@ namespace {
 
 enum Shape : uint8_t { kArea, kEqualCorners, kSliver };
 
-/// An edge as its lower point and its higher one.
+/// An edge as its lower and its higher point.
 using Edge = std::pair<uint32_t, uint32_t>;
 
 Edge edge_of(const Triangle& t, int side) {
@@ -22,7 +22,7 @@ Edge edge_of(const Triangle& t, int side) {
   return {std::min(a, b), std::max(a, b)};
 }
 
-/// Decides which slivers can go, piece by piece.
+/// Decides per piece which slivers can be removed.
 class SliverPieces {
 public:
   SliverPieces(std::span<const Triangle> triangles, std::span<const uint8_t> shapes, size_t point_count)
@@ -31,12 +31,13 @@ public:
       if (shapes[i] == kSliver) slivers_.push_back(i);
   }
 
-  /// Clears the flags of slivers that must stay.
+  /// Clears the flags of slivers that must be kept.
   void keep_needed(std::vector<uint8_t>& collapsed) {
     if (slivers_.empty()) return;
     gather_edges();
     find_neighbours();
-    std::vector<uint8_t> borders(slivers_.size()); // per piece: edges of its outline at triangles with area, up to two
+    // Per piece: outline edges shared with triangles with area, capped at two.
+    std::vector<uint8_t> borders(slivers_.size());
     for (size_t i = 0; i < edges_.size(); ++i)
       if (odd_[i] != 0 && has_neighbour_[i] != 0) {
         uint8_t& count = borders[piece(sliver_at_[i])];
@@ -47,9 +48,9 @@ public:
   }
 
 private:
-  /// Joins slivers that have an edge together.
+  /// Joins slivers that share an edge.
   void gather_edges() {
-    std::vector<std::pair<Edge, uint32_t>> sides; // and the sliver
+    std::vector<std::pair<Edge, uint32_t>> sides; // edge and sliver
     sides.reserve(3 * slivers_.size());
     for (uint32_t i = 0; i < slivers_.size(); ++i)
       for (int side = 0; side < 3; ++side) {
@@ -75,7 +76,7 @@ private:
     return sliver;
   }
 
-  /// Which edges of slivers belong to triangles with area, too.
+  /// Finds the sliver edges that also belong to triangles with area.
   void find_neighbours() {
     has_neighbour_.resize(edges_.size());
     tbb::parallel_for(size_t{0}, triangles_.size(), [&](size_t i) {
@@ -93,13 +94,13 @@ private:
 
   const std::span<const Triangle> triangles_;
   const std::span<const uint8_t> shapes_;
-  std::vector<uint8_t> at_sliver_;     // per point
-  std::vector<uint32_t> slivers_;      // triangles
-  std::vector<uint32_t> joined_;       // per sliver: another one of its piece, in the end the first
-  std::vector<Edge> edges_;            // of slivers, ascending
-  std::vector<uint32_t> sliver_at_;    // per edge: one that has it
+  std::vector<uint8_t> at_sliver_;     // per point: whether a sliver has it
+  std::vector<uint32_t> slivers_;      // triangle numbers
+  std::vector<uint32_t> joined_;       // per sliver: parent in the union-find forest of pieces
+  std::vector<Edge> edges_;            // edges of slivers, ascending
+  std::vector<uint32_t> sliver_at_;    // per edge: a sliver that has it
   std::vector<uint8_t> odd_;           // per edge: whether an odd number of slivers has it
-  std::vector<uint8_t> has_neighbour_; // per edge
+  std::vector<uint8_t> has_neighbour_; // per edge: whether a triangle with area has it
 };
 
 } // namespace

@@ -9,18 +9,18 @@
 
 namespace packtrace {
 
-/// Whether a triangle has an area: its corners are distinct and not on one line. Exact for |coordinate| <= kMaxLattice.
+/// Whether the corners of a triangle are distinct and not on one line. Exact for |coordinate| <= kMaxLattice.
 bool has_area(const LatticePoint& a, const LatticePoint& b, const LatticePoint& c);
 
-/// Marks the triangles without area that can be left out without opening a crack, one flag per triangle.
+/// Flags the triangles without area that can be removed without opening a crack, one flag per triangle.
 ///
-/// A triangle with two equal corners can always go: its other two edges are one edge, at which its neighbours meet. A
-/// sliver of three points on one line cannot where one neighbour has the long edge and two others the short ones: rays
-/// are tested against rounded vertices, so without the sliver some would pass between them. Slivers that meet at edges
-/// are one piece, and all of it goes where at most one edge of its outline (the edges that an odd number of its
-/// triangles has) belongs to a triangle with area.
-/// @param points distinct, at least those of the triangles
-/// @param triangles into points
+/// A triangle with two equal corners can always be removed: its other two edges coincide, so its neighbours meet there.
+/// A sliver, with three distinct corners on one line, cannot be removed if one neighbour shares its long edge and two
+/// others its short edges: rays are tested against rounded vertices, so some would pass between them. Slivers that
+/// share edges form one piece. A piece is removed if at most one edge of its outline belongs to a triangle with area;
+/// the outline consists of the edges that an odd number of its triangles have.
+/// @param points distinct; includes at least the corners of the triangles
+/// @param triangles indices into points
 std::vector<uint8_t> find_collapsed(std::span<const LatticePoint> points, std::span<const Triangle> triangles);
 
 } // namespace packtrace

@@ -8,31 +8,33 @@
 
 namespace packtrace {
 
-/// Identifies a position by its coordinates as floats: what the source has as one point may differ in the last bits of
-/// doubles.
+/// Key of a position, from its coordinates rounded to floats: one point of the source may differ in the last bits of
+/// its doubles.
 uint64_t position_key(DVec3 p);
 
-/// A position that geometry on a coarser nested grid has too.
+/// A position that also belongs to a geometry on a coarser nested grid.
 struct SharedPosition {
   uint64_t key = 0;   ///< position_key()
-  uint32_t shift = 0; ///< the coarser grid's step is 2^shift times this one's; 1..63
+  uint32_t shift = 0; ///< the coarser grid's step is 2^shift times this grid's; 1..63
   bool operator<(const SharedPosition& other) const { return key < other.key; }
 };
 
-/// The lattice of a geometry, and the positions that are rounded more coarsely on it.
+/// The lattice of a geometry, and the positions that are rounded to a coarser one.
 ///
-/// World-space geometry lies on nested lattices, whose steps are the scene's times 2^-k. A position that several
-/// geometries share is rounded to the coarsest of their lattices in all of them: that is a point of the finer ones as
-/// well, so the geometries decode to the same point there and stay closed.
+/// World-space geometry lies on nested lattices: their steps are the scene's step times 2^-k. A position that several
+/// geometries share is rounded to their coarsest lattice in all of them. That lattice point also lies on the finer
+/// lattices, so all these geometries decode it to the same position and no crack opens.
 struct GeometryGrid {
   PositionGrid grid;
-  std::vector<SharedPosition> shared; ///< sorted
+  std::vector<SharedPosition> shared; ///< sorted by key
 
+  /// Rounds a position to this lattice, or to the coarser lattice of its entry in `shared`.
   LatticePoint round(DVec3 p) const;
-  /// Of the coarsest lattice that some position is rounded to.
+  /// Step of the coarsest lattice that any position is rounded to.
   double coarsest_step() const { return grid.step() * exp2_exact(static_cast<int32_t>(max_shift())); }
+  /// Largest shift in `shared`; 0 if it is empty.
   uint32_t max_shift() const;
-  /// At most the smallest, or at least the largest, lattice coordinate of positions in [lo, hi] along an axis.
+  /// lowest() is at most, and highest() at least, any lattice coordinate along an axis of positions in [lo, hi].
   int64_t lowest(double lo) const;
   int64_t highest(double hi) const;
 };

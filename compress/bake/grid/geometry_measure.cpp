@@ -78,7 +78,7 @@ Bounds measure_geometry(const Scene& scene, const GeometryPlan& plan, LengthHist
       points[i] = transform_point(part.geometry_from_mesh, DVec3(mesh.positions[i]));
       constexpr double kMax = std::numeric_limits<float>::max();
       const DVec3 p = glm::abs(points[i]);
-      if (!(p.x <= kMax && p.y <= kMax && p.z <= kMax)) // also refuses NaN
+      if (!(p.x <= kMax && p.y <= kMax && p.z <= kMax)) // also rejects NaN
         throw Error(ErrorKind::kInput, "vertex " + std::to_string(i) + " of " + mesh.name +
                                            " is not finite, or leaves the float range when transformed");
       bounds.extend(points[i]);

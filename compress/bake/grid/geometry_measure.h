@@ -10,46 +10,50 @@
 
 namespace packtrace {
 
-/// Lengths counted in bins 1.6 % wide, so that medians of many meshes need no memory and do not depend on order.
+/// Histogram of lengths in bins at most 1.6 % wide. Its medians need no list of lengths and do not depend on their
+/// order.
 class LengthHistogram {
 public:
   LengthHistogram() : counts_(kBins) {}
 
   /// Zero lengths are not counted.
   void add_squared(double squared_length);
+  /// Adds the other histogram's lengths.
   void add(const LengthHistogram& other);
-  /// Its lengths times a positive factor, to half a bin.
+  /// Adds the other histogram's lengths times a positive factor, accurate to half a bin.
   void add_scaled(const LengthHistogram& other, double factor);
   void clear();
 
-  /// The lower edge of the median's bin: at most the median and at least .98 of it; 0 if nothing was added.
+  /// Lower edge of the median's bin: at most the median and at least 0.98 of it; 0 if nothing was added.
   double median() const;
 
 private:
   static constexpr uint32_t kMantissaBits = 5; // of the squared length
   static constexpr size_t kBins = size_t{2048} << kMantissaBits;
   std::vector<uint64_t> counts_;
-  size_t first_ = kBins, end_ = 0; // bins in use
+  size_t first_ = kBins, end_ = 0; // range of bins in use
   uint64_t total_ = 0;
 };
 
-/// What choosing a step needs to know of a geometry, or of several together.
+/// Measurements of one geometry, or of several together, for choosing a step.
 struct GeometryMeasure {
   Bounds bounds; ///< geometry space
   double median_edge = 0.0;
 
-  double max_abs() const; ///< largest |coordinate|; 0 where empty
-  /// Half the spacing of floats or more, along the axis where it is least: on a lattice of this step the largest
-  /// coordinates decode to the floats that they were. 0 where empty or all at 0.
+  double max_abs() const; ///< largest |coordinate|; 0 if empty
+  /// At least half the spacing of floats, and less than one spacing, at the largest coordinate along the axis where
+  /// that coordinate is smallest but not 0. On a lattice of this step, the largest float coordinates decode unchanged.
+  /// 0 if empty or if all coordinates are 0.
   double float_step() const;
 };
 
-/// Box of the geometry; its edge lengths are added to `edges`.
-/// Throws Error(kInput) where a position of the geometry is not finite as a float or an index is out of range.
+/// Returns the bounds of the geometry and adds its edge lengths to `edges`.
+/// Throws Error(kInput) if a position of the geometry is not finite as a float or an index is out of range.
 Bounds measure_geometry(const Scene& scene, const GeometryPlan& plan, LengthHistogram& edges);
 
-/// The coarsest grid that keeps config's promise. Where the box is a point and precision relative to it, the step is
-/// about the float's own there.
+/// Returns the coarsest grid that satisfies config's precision. If that would give a step of 0 (for example a relative
+/// precision and bounds that are a point), the step is 2^-24 times the largest |coordinate|, close to the float spacing
+/// there.
 PositionGrid choose_grid(const BakeConfig& config, const GeometryMeasure& measure, double max_stretch);
 
 } // namespace packtrace

@@ -27,7 +27,7 @@ GridCheck check_grid(const GeometryView& view, const GeometryGrid& grid) {
   for (size_t i = 0; i < view.sample.size(); ++i) {
     const SampleTriangle& t = view.sample[i];
     const double weight = seen ? view.sample_pixels[i] : t.weight * area_of(t.corners);
-    DTriangle lattice; // of differences, which are exact
+    DTriangle lattice; // relative to the first corner; differences of lattice coordinates are exact
     const LatticePoint first = grid.round(t.corners[0]);
     for (size_t corner = 0; corner < 3; ++corner) {
       const LatticePoint q = grid.round(t.corners[corner]);

@@ -5,15 +5,15 @@
 
 namespace packtrace {
 
-/// What a lattice does to the sample of a geometry, weighted by the pixels that it covers.
+/// Effect of a lattice on the sample of a geometry, weighted by the pixels that the sample covers.
 struct GridCheck {
-  double collapsed = 0.0;         ///< share of the image that triangles cover which lose their area
-  double mean_tilt_degrees = 0.0; ///< between source and decoded facets that keep an area
-  double tilt_degrees = 0.0;      ///< the same, of the 99 % that tilt least
-  double moved = 0.0;             ///< largest distance along an axis between decoded and source positions, as floats
+  double collapsed = 0.0;         ///< fraction of the image covered by triangles that lose their area
+  double mean_tilt_degrees = 0.0; ///< angle between source and decoded facets that keep an area
+  double tilt_degrees = 0.0;      ///< 99 % quantile of that angle
+  double moved = 0.0; ///< largest distance along an axis between decoded and source positions, both as floats
 };
 
-/// Geometry that no camera sees is weighted by area; nothing of the image then collapses.
+/// Checks a lattice. Geometry that no camera sees is weighted by area, and `collapsed` is 0 for it.
 GridCheck check_grid(const GeometryView& view, const GeometryGrid& grid);
 
 } // namespace packtrace

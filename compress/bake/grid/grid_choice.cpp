@@ -13,13 +13,13 @@ namespace {
 
 constexpr int kMaxRefinements = 3;
 
-// What the check allows.
-constexpr double kMaxCollapsed = 0.001; // share of the image
-constexpr double kMinTilting = 0.01;    // share of the image below which tilts do not count
+// Limits of the check.
+constexpr double kMaxCollapsed = 0.001; // fraction of the image
+constexpr double kMinTilting = 0.01;    // fraction of the image; geometry that covers less may tilt
 constexpr double kMaxMeanTiltDegrees = 1.0;
-constexpr double kMaxTiltDegrees = 5.0;     // at 99 % of the pixels
-constexpr double kMaxPassedPixels = 0.0045; // share of the covered pixels whose centre an outline moves past
-constexpr double kBoundSlack = 2.0;         // factor that bounds on moved positions may be exceeded by
+constexpr double kMaxTiltDegrees = 5.0;     // 99 % quantile over the pixels
+constexpr double kMaxPassedPixels = 0.0045; // fraction of the covered pixels whose centre an outline moves past
+constexpr double kBoundSlack = 2.0;         // factor by which limits on moved positions may be exceeded
 
 class GridChooser {
 public:
@@ -50,13 +50,13 @@ private:
   bool may_refine() const { return config_.precision_kind == PrecisionKind::kPicture; }
   bool is_empty(size_t g) const { return measure_.geometries[g].bounds.empty(); }
 
-  /// The grids that the config asks for, small things included.
+  /// Chooses the grids that config asks for, including finer ones for small things.
   void begin() {
     if (measure_.has_world_space) out_.world = choose_grid(config_, measure_.world, 1.0);
     if (measure_.has_world_space && (may_refine() || config_.precision_kind == PrecisionKind::kEdgeFraction))
       out_.halvings = halvings_of_small_things(plan_, measure_.geometries, config_.precision, out_.world.step());
     for (size_t g = 0; g < out_.grids.size(); ++g) {
-      if (is_empty(g)) continue; // nothing to quantise: the default grid
+      if (is_empty(g)) continue; // nothing to quantise: keep the default grid
       const GeometryPlan& plan = plan_.geometries[g];
       PositionGrid& grid = out_.grids[g].grid;
       grid = plan.world_space ? out_.world : choose_grid(config_, measure_.geometries[g], plan.max_stretch);
@@ -71,7 +71,8 @@ private:
     return steps;
   }
 
-  /// Makes the step about `step` and finer than it was, unless floats are no finer. @return whether it became finer
+  /// Refines the geometry's step to about `step`, but not below the spacing of floats.
+  /// @return whether the step became finer
   bool refine_to(size_t g, double step) {
     PositionGrid& grid = out_.grids[g].grid;
     if (is_empty(g) || !(step < grid.step())) return false;
@@ -96,13 +97,13 @@ private:
     return std::max(measure.float_step(), measure.max_abs() * 0x1p-50);
   }
 
-  /// Positions that geometry on several grids has, and what becomes of the samples.
+  /// Updates the positions that geometries on several grids share, then checks the samples on these grids.
   void share_and_check() {
     std::vector<std::vector<SharedPosition>> shared =
         find_shared_positions(scene_, plan_, measure_.geometries, out_.halvings);
     for (size_t g = 0; g < shared.size(); ++g) out_.grids[g].shared = std::move(shared[g]);
     tbb::parallel_for(size_t{0}, checks_.size(), [&](size_t g) {
-      // What exceeds the lattice is refused when it is packed.
+      // A geometry that exceeds the lattice is rejected when it is packed.
       const bool fits = fits_lattice(measure_.geometries[g].max_abs(), out_.grids[g].grid.step());
       checks_[g] = fits ? check_grid(views_[g], out_.grids[g]) : GridCheck{};
     });
@@ -115,9 +116,9 @@ private:
            (check.mean_tilt_degrees > kMaxMeanTiltDegrees || check.tilt_degrees > kMaxTiltDegrees);
   }
 
-  /// Share of the pixels that a geometry covers whose centre some outline moves past. A strip of height h that is
-  /// displaced by a quarter of the step (the mean over directions) changes step / (2 h) of its area; projection makes
-  /// lengths pi / 4 and areas 1 / 2 on average, so the share is some 3/4 of step / h for strips whose edges are all
+  /// Fraction of a geometry's pixels whose centre an outline moves past. A strip of height h that is displaced by a
+  /// quarter of the step (the mean over all directions) changes step / (2 h) of its area. Projection scales lengths by
+  /// pi / 4 and areas by 1 / 2 on average. So the fraction is about 3/4 step / h for strips whose edges are all
   /// outline.
   double passed_pixels(size_t g) const {
     const GeometryView& view = views_[g];
@@ -126,7 +127,8 @@ private:
     return std::min(0.75 * view.outline_share * step / view.best.height, 1.0);
   }
 
-  /// Marks geometry whose outlines move too far. Marks none while the outlines of the whole scene move little enough.
+  /// Flags geometries whose outlines move too far. Flags none as long as the outlines of the whole scene move little
+  /// enough.
   std::vector<uint8_t> find_moved_outlines() const {
     std::vector<uint8_t> moved(views_.size());
     double covered = 0.0, passed = 0.0;
@@ -139,7 +141,7 @@ private:
     return moved;
   }
 
-  /// Where the check fails, halves the step; also that of coarser geometry which the failing one shares positions with.
+  /// Halves the step of each geometry that fails the check, and of coarser geometries that it shares positions with.
   bool refine_failing() {
     std::vector<uint8_t> failing = find_moved_outlines();
     bool shared = false, refined = false;
@@ -153,7 +155,7 @@ private:
     return refined;
   }
 
-  /// Adds the geometry that failing geometry shares positions with and that is on coarser grids.
+  /// Adds geometries on coarser grids that share positions with a failing geometry.
   void spread_to_sharing(std::vector<uint8_t>& failing) const {
     std::vector<uint64_t> keys;
     for (size_t g = 0; g < failing.size(); ++g)
@@ -172,7 +174,8 @@ private:
     });
   }
 
-  /// Where positions fall on the lattice, or near it, they move less than its step says.
+  /// Positions that lie on or near the lattice move less than half a step; this is twice the distance that they do
+  /// move.
   double effective_step(size_t g) const { return std::min(out_.grids[g].grid.step(), 2.0 * checks_[g].moved); }
 
   void report(std::span<const WantedStep> wanted) {
@@ -205,7 +208,7 @@ private:
   const BakeConfig& config_;
   Progress& progress_;
   std::vector<GeometryView> views_;
-  std::vector<GridCheck> checks_; // by geometry
+  std::vector<GridCheck> checks_; // per geometry
   GridChoice out_;
 };
 

@@ -11,29 +11,31 @@
 
 namespace packtrace {
 
-/// Geometry whose pictures may differ from the source's by more than the default precision promises. Lengths are in
-/// units of the geometry's space.
+/// A geometry whose images may differ from the source's by more than the default precision promises. Lengths are in the
+/// geometry's own units.
 struct Shortfall {
   uint32_t geometry = 0;
-  PictureBound bound = PictureBound::kNone; ///< what is not kept
-  double wanted = 0.0;                      ///< the step that would keep it
-  double step = 0.0;                        ///< that the geometry has
-  bool float_limit = false;                 ///< the step is as fine as floats are where the geometry lies
+  PictureBound bound = PictureBound::kNone; ///< the bound that is exceeded
+  double wanted = 0.0;                      ///< the step that would satisfy the bound
+  double step = 0.0;                        ///< the geometry's step
+  bool float_limit = false; ///< the step is already as fine as float spacing at the geometry's coordinates
 };
 
-/// The lattices of a scene.
+/// Lattices of all geometries of a scene.
 struct GridChoice {
-  PositionGrid world;              ///< the scene's; without meaning where nothing lies in world space
-  std::vector<GeometryGrid> grids; ///< by geometry
-  std::vector<uint32_t> halvings;  ///< of the scene's step, by geometry
-  uint64_t nested_geometries = 0;  ///< on finer grids than the scene's, as they are small (halvings_of_small_things())
-  uint64_t finer_geometries = 0;   ///< on finer grids than the median edge asks for, as pictures need them
+  PositionGrid world;              ///< the scene's grid; unused if no geometry lies in world space
+  std::vector<GeometryGrid> grids; ///< per geometry
+  std::vector<uint32_t> halvings;  ///< per geometry: how often the scene's step is halved
+  /// Small world-space geometries on finer grids than the scene's (halvings_of_small_things()).
+  uint64_t nested_geometries = 0;
+  /// Geometries whose steps are finer than the median edge requires, because images need it.
+  uint64_t finer_geometries = 0;
   std::vector<Shortfall> shortfalls;
 };
 
-/// Chooses a lattice for each geometry. With PrecisionKind::kPicture steps are as fine as pictures need
-/// (bound_steps()), then checked, and halved up to three times where the check fails; other kinds mean what they say
-/// and are checked only.
+/// Chooses a lattice for each geometry. With PrecisionKind::kPicture, the steps satisfy bound_steps(); they are then
+/// checked and halved up to three times where the check fails. With other kinds, the steps follow from config alone and
+/// are only checked.
 GridChoice choose_grids(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure,
                         const BakeConfig& config, Progress& progress);
 

@@ -10,10 +10,10 @@
 namespace packtrace {
 namespace {
 
-constexpr double kRoughFactor = 16.0;  // steps so much above what was asked for show, too
-constexpr double kFloatStep = 0x1p-23; // finer than floats are at the same coordinate: no use
-constexpr double kMaxHalvings = 60.0;  // shifts of lattice coordinates
-constexpr double kMaxSteps = 0x1p50;   // coordinates stay well inside the lattice
+constexpr double kRoughFactor = 16.0;  // a step this many times above the wanted one is visible, too
+constexpr double kFloatStep = 0x1p-23; // finer steps than floats have at the same coordinate are useless
+constexpr double kMaxHalvings = 60.0;  // keeps shifts of lattice coordinates valid
+constexpr double kMaxSteps = 0x1p50;   // keeps coordinates well inside the lattice
 
 template <typename PerPosition>
 void for_each_position(const Scene& scene, const GeometryPlan& plan, const PerPosition& per_position) {
@@ -22,7 +22,7 @@ void for_each_position(const Scene& scene, const GeometryPlan& plan, const PerPo
       per_position(transform_point(part.geometry_from_mesh, DVec3(p)));
 }
 
-/// Positions of world-space geometry on finer grids than the scene's, and the coarsest grid that each is on.
+/// Collects the positions of world-space geometry on finer grids than the scene's, and finds the coarsest grid of each.
 class PositionSharing {
 public:
   PositionSharing(const Scene& scene, const ScenePlan& plan, std::span<const GeometryMeasure> measures,
@@ -75,7 +75,7 @@ private:
     return true;
   }
 
-  /// Marks the first key of each position that geometry on the scene's own grid has too.
+  /// Flags the first key of each position that also belongs to geometry on the scene's own grid.
   void find_coarse_users() {
     tbb::parallel_for(size_t{0}, halvings_.size(), [&](size_t g) {
       if (halvings_[g] > 0 || !plan_.geometries[g].world_space || !may_touch(measures_[g].bounds)) return;
@@ -94,7 +94,7 @@ private:
   const std::span<const GeometryMeasure> measures_;
   const std::span<const uint32_t> halvings_;
   std::vector<Key> keys_;              // of all positions of geometry on finer grids, sorted
-  std::vector<uint8_t> on_scene_grid_; // by key
+  std::vector<uint8_t> on_scene_grid_; // per key
   Bounds bounds_;                      // of geometry on finer grids
 };
 

@@ -14,14 +14,14 @@
 namespace packtrace {
 namespace {
 
-constexpr uint64_t kStars = 1024; // positions whose edges are looked at, about
+constexpr uint64_t kStars = 1024; // approximate number of sampled positions
 
-/// An edge of a triangle, at a chosen position.
+/// A triangle's edge at a sampled position.
 struct StarEdge {
   uint64_t centre, end; ///< position_key()
-  bool outgoing;        ///< the triangle runs through it from the centre
+  bool outgoing;        ///< the triangle's winding runs from the centre to the end
   double length;
-  DVec3 normal; ///< unit
+  DVec3 normal; ///< unit normal of the triangle
 };
 
 class Stars {
@@ -56,7 +56,7 @@ public:
       while (end < edges_.size() && edges_[end].centre == first.centre && edges_[end].end == first.end) ++end;
       double share = 1.0;
       if (end - begin > 1) {
-        const StarEdge& last = edges_[end - 1]; // the other way round where both are wound alike
+        const StarEdge& last = edges_[end - 1]; // in the opposite direction if both triangles have the same winding
         share = angle_degrees(first.normal, first.outgoing != last.outgoing ? last.normal : -last.normal) / 180.0;
       }
       outline += share * first.length;

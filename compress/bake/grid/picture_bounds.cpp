@@ -14,20 +14,20 @@
 namespace packtrace {
 namespace {
 
-constexpr size_t kMaxSample = 8192;                 // triangles of a geometry
-constexpr size_t kMinSample = 64;                   // of a geometry of a scene that has many
-constexpr size_t kMaxSampleLooks = size_t{1} << 20; // samples of all geometries, by cameras
+constexpr size_t kMaxSample = 8192;                 // triangles sampled per geometry
+constexpr size_t kMinSample = 64;                   // lower limit in scenes with many geometries
+constexpr size_t kMaxSampleLooks = size_t{1} << 20; // sample triangles of all geometries, times cameras
 
-constexpr double kLarge = 0.01;         // share of the image from which on facets must not tilt
-constexpr double kLargeTogether = 0.05; // the same of geometries that cover less each
-constexpr double kSeenTogether = 0.005; // as kSeen
-// Limits of the step. Where one is exceeded, the step goes to kMargin of it.
+constexpr double kLarge = 0.01;         // fraction of the image from which a geometry's facets must not tilt
+constexpr double kLargeTogether = 0.05; // the same for all smaller geometries together
+constexpr double kSeenTogether = 0.005; // like kSeen, for all smaller geometries together
+// Limits of the step. If a limit is exceeded, the step becomes kMargin times that limit.
 constexpr double kMargin = 0.4;
-constexpr double kHeightSteps = 24.0;        // steps in the height of a triangle
-constexpr double kLowHeightSteps = 8.0;      // the same of what is hardly seen
-constexpr double kPixelSteps = 8.0;          // steps in a pixel
-constexpr double kContactSteps = 20.0;       // steps in the size of what touches
-constexpr size_t kMaxContactInstances = 256; // of a geometry, that are asked for what touches them
+constexpr double kHeightSteps = 24.0;        // steps per triangle height
+constexpr double kLowHeightSteps = 8.0;      // the same for geometry that covers little of the image
+constexpr double kPixelSteps = 8.0;          // steps per pixel
+constexpr double kContactSteps = 20.0;       // steps per size of a touching object
+constexpr size_t kMaxContactInstances = 256; // instances per geometry whose contacts are searched
 
 Bounds scene_box(const ScenePlan& plan, const SceneMeasure& measure) {
   Bounds box;
@@ -39,13 +39,13 @@ Bounds scene_box(const ScenePlan& plan, const SceneMeasure& measure) {
   return box;
 }
 
-/// Of the size that the promise is about.
+/// Returns all cameras with images of kPromisedSize, including the one that frames the scene.
 std::vector<PrimaryCamera> cameras_of(const Scene& scene, const Bounds& box) {
   std::vector<PrimaryCamera> cameras;
   const auto add = [&](const Camera& camera) {
     try {
       cameras.emplace_back(camera, kPromisedSize);
-    } catch (const Error&) { // a camera without rays
+    } catch (const Error&) { // a camera that cannot make rays
     }
   };
   for (const Camera& camera : scene.cameras) add(camera);
@@ -107,11 +107,11 @@ private:
   Progress& progress_;
   const std::vector<PrimaryCamera> cameras_;
   std::vector<GeometryView> views_;
-  std::vector<std::vector<uint32_t>> instances_; // by geometry: its instances
+  std::vector<std::vector<uint32_t>> instances_; // per geometry: its instances
   size_t max_sample_ = kMaxSample;
 };
 
-/// 2 area / longest edge of all triangles together, in units of the geometry's space.
+/// 2 * area / longest edge, with both summed over all triangles, in the geometry's own units.
 double mean_height(const GeometryView& view) {
   double area = 0.0, edges = 0.0;
   for (const SampleTriangle& t : view.sample)
@@ -139,7 +139,7 @@ public:
   }
 
 private:
-  /// World lengths to lengths of the geometry's space.
+  /// Converts a world-space length to the geometry's own units.
   double to_geometry(size_t g, double world) const { return world / world_scale(plan_.geometries[g]); }
 
   void bound(size_t g, double limit, PictureBound by) {
@@ -149,8 +149,8 @@ private:
     if (by != PictureBound::kHeight && limit < wanted.limit) wanted.limit = limit, wanted.bound = by;
   }
 
-  /// Bounds geometry that covers `alone` of the image, and all that would have a coarser step and covers less, if that
-  /// is `together`.
+  /// Bounds each geometry that covers at least `alone` of the image. Also bounds the smaller ones if those whose steps
+  /// exceed the limit cover at least `together` in total.
   template <typename StepOf>
   void bound_seen(double alone, double together, PictureBound by, const StepOf& step_of) {
     double covered = 0.0;

@@ -12,46 +12,50 @@
 
 namespace packtrace {
 
-/// What limits the step of a geometry, so that pictures of it stay what they are (docs/accuracy.md).
+/// The reason that limits a geometry's step, so that images of it do not change visibly (docs/accuracy.md).
 enum class PictureBound : uint32_t {
   kNone,
-  kHeight,  ///< facets tilt, or lose their area
-  kPixel,   ///< outlines and contacts move on the image
-  kContact, ///< things sink into what they stand on, or hover
-  kOutline, ///< edges of many thin pieces move past pixels
+  kHeight,  ///< facets tilt or lose their area
+  kPixel,   ///< outlines and contacts move in the image
+  kContact, ///< objects sink into their support or hover above it
+  kOutline, ///< outlines of many thin pieces move past pixel centres
 };
+/// Name of a bound for messages and JSON, for example "height".
 std::string_view name_of(PictureBound bound);
 
-/// The largest factor by which an instance turns lengths of the geometry's space into lengths of the world.
+/// Largest factor by which an instance scales lengths from geometry space to world space.
 inline double world_scale(const GeometryPlan& plan) {
   return plan.world_space || !(plan.max_stretch > 0.0) ? 1.0 : plan.max_stretch;
 }
 
-/// A geometry as the cameras of the scene, and the camera that frames all of it, see it.
+/// A geometry as seen by the scene's cameras and by the camera that frames the whole scene.
 struct GeometryView {
   std::vector<SampleTriangle> sample;
-  /// By sample: pixels that the triangles which it stands for cover in `best`.
+  /// Per sample triangle: pixels in `best` covered by the triangles that it represents.
   std::vector<double> sample_pixels;
-  ViewStats best;             ///< of the camera that sees most of it
-  double pixel = 0.0;         ///< least ViewStats::pixel of the cameras that see kSeen of it, else that of `best`
-  double outline_share = 0.0; ///< outline_share() where some camera sees kSeen of it
+  ViewStats best; ///< of the camera in which it covers most pixels
+  /// Smallest ViewStats::pixel of the cameras in which it covers at least kSeen; otherwise that of `best`.
+  double pixel = 0.0;
+  double outline_share = 0.0; ///< outline_share() if it covers at least kSeen in some camera
 };
 
-/// Geometry that covers less of the image counts only together with others.
+/// Geometry that covers a smaller fraction of the image counts only together with others.
 inline constexpr double kSeen = 0.001;
 
-/// By geometry. Cameras that have no rays are left out: nothing can be rendered with them.
+/// Returns the views per geometry. Cameras that cannot make rays are skipped: nothing can be rendered with them.
 std::vector<GeometryView> look_at_scene(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure,
                                         Progress& progress);
 
-/// What a geometry whose step exceeds a bound should have, in units of its space.
+/// The step that a geometry needs if its current step exceeds a bound, in the geometry's own units.
 struct WantedStep {
-  double step = std::numeric_limits<double>::infinity();  ///< below all limits that are exceeded, as a margin
-  double limit = std::numeric_limits<double>::infinity(); ///< the least of those about moved positions
-  PictureBound bound = PictureBound::kNone;               ///< whose that is: kPixel or kContact
+  /// A fixed fraction of the smallest exceeded limit, as a margin; infinity if none is exceeded.
+  double step = std::numeric_limits<double>::infinity();
+  double limit = std::numeric_limits<double>::infinity(); ///< smallest exceeded limit of bounds kPixel and kContact
+  PictureBound bound = PictureBound::kNone;               ///< the bound of `limit`: kPixel or kContact
 };
 
-/// By geometry. @param steps that the geometries have, in units of their spaces
+/// Returns the wanted step per geometry.
+/// @param steps current steps per geometry, in the geometries' own units
 std::vector<WantedStep> bound_steps(const ScenePlan& plan, const SceneMeasure& measure,
                                     std::span<const GeometryView> views, std::span<const double> steps);
 

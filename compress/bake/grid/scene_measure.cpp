@@ -8,13 +8,13 @@
 namespace packtrace {
 namespace {
 
-/// Of the first instances, which are the shapes outside objects.
+/// Whether a shape outside objects is instanced. Such shapes are the first instances of the plan.
 bool is_instanced_shape(const ScenePlan& plan, const baked::InstanceRecord& instance) {
   return instance.geometry != baked::kNone && !plan.geometries[instance.geometry].world_space;
 }
 
-/// For each geometry how much its world shapes, if they are instanced, scale it: the root mean square over the axes.
-/// They count for the scene's step like all other shapes outside objects.
+/// Returns, per geometry, the scales of its instanced world shapes: the root mean square over the axes. These shapes
+/// count towards the scene's step like all other shapes outside objects.
 std::vector<std::vector<double>> instanced_scales(const Scene& scene, const ScenePlan& plan) {
   std::vector<std::vector<double>> scales(plan.geometries.size());
   for (size_t i = 0; i < scene.shapes.size(); ++i) {

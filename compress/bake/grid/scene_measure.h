@@ -8,19 +8,20 @@
 
 namespace packtrace {
 
-/// What choosing grids needs to know of a scene.
+/// Measurements of a scene for choosing grids.
 struct SceneMeasure {
-  std::vector<GeometryMeasure> geometries; ///< as in the plan
-  GeometryMeasure world;                   ///< of all shapes outside objects, also of instanced ones
-  bool has_world_space = false;            ///< some geometry of the world's space has a position
+  std::vector<GeometryMeasure> geometries; ///< in the plan's order
+  GeometryMeasure world;                   ///< of all shapes outside objects, including instanced ones
+  bool has_world_space = false;            ///< some world-space geometry has a position
 };
 
-/// Advances `progress` by one for each geometry. Throws like measure_geometry().
+/// Measures all geometries. Advances `progress` by one per geometry. Throws like measure_geometry().
 SceneMeasure measure_scene(const Scene& scene, const ScenePlan& plan, Progress& progress);
 
+/// Returns world_from_object of an instance.
 DAffine placement_of(const baked::InstanceRecord& instance);
 
-/// Box of an instance, from that of its geometry.
+/// World-space bounds of an instance, from the bounds of its geometry.
 Bounds placed_box(const baked::InstanceRecord& instance, const Bounds& box);
 
 } // namespace packtrace

@@ -9,7 +9,7 @@
 namespace packtrace {
 namespace {
 
-/// How far a decoded point may lie from the source's; the error is that per axis of the object.
+/// Largest world-space distance of a decoded point from its source point, for an error per object axis.
 double displacement(const baked::InstanceRecord& instance, double error) {
   DVec3 world(0.0);
   for (size_t i = 0; i < 9; ++i)

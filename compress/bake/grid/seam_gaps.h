@@ -8,36 +8,37 @@
 
 namespace packtrace {
 
-/// InstanceSeams in a few numbers.
+/// Summary of InstanceSeams.
 struct SeamSummary {
-  uint64_t instances = 0;   ///< on grids of their own
-  uint64_t touching = 0;    ///< of those, in boxes that touch other geometry's
-  double largest_gap = 0.0; ///< of their seams at level 0, at most; world units
+  uint64_t instances = 0;   ///< instances on grids of their own
+  uint64_t touching = 0;    ///< of those, instances whose bounds touch other geometry's
+  double largest_gap = 0.0; ///< upper bound of the seam widths at LOD level 0; world units
 };
 
-/// The instances of a file that lie on grids of their own and touch other geometry, by their boxes. One point of the
-/// source may be decoded to two there: the seam gapes by what both sides lie beside the source. Geometry in world space
-/// shares a grid, and has no such seams with other such geometry.
+/// Finds instances on grids of their own whose bounds touch other geometry. There, one point of the source may decode
+/// to two points, so the seam may open by the position errors of both sides. World-space geometries share nested grids
+/// and have no such seams between them.
 class InstanceSeams {
 public:
-  /// Takes O(n log n) in the number of instances, unless very many boxes overlap.
+  /// Takes O(n log n) time in the number of instances, unless very many bounds overlap.
   explicit InstanceSeams(const BakedFile& file);
 
   size_t instance_count() const { return boxes_.size(); }
-  /// Instances on grids of their own that touch anything, ascending.
+  /// Instances on grids of their own that touch other instances, ascending.
   std::span<const uint32_t> touching() const { return touching_; }
 
-  /// Per entry of touching(): the width of its widest seam at most, world units, at level 0. The position error bound
-  /// of both sides (half a step per axis and the roundings of floats), under their transforms.
+  /// Per entry of touching(): upper bound of the width of its widest seam at LOD level 0, in world units. It is the sum
+  /// of the position error bounds of both sides (half a step per axis plus float rounding) under their transforms.
   const std::vector<double>& gaps() const { return gaps_; }
+  /// Counts, and the largest of gaps().
   SeamSummary summary() const;
 
-  /// Per entry of touching(): the largest value of the other instances that its box touches.
-  /// @param values per instance of the file, not negative
+  /// Returns, per entry of touching(), the largest value of the other instances whose bounds it touches.
+  /// @param values per instance of the file, at least 0
   std::vector<double> largest_beside(std::span<const double> values) const;
 
 private:
-  std::vector<Bounds> boxes_; ///< by instance, world, as far as decoded points may lie from the source's
+  std::vector<Bounds> boxes_; ///< world-space bounds per instance, padded by the position error bound
   std::vector<uint32_t> touching_;
   std::vector<double> gaps_;
   uint64_t own_grid_count_ = 0;

@@ -8,7 +8,7 @@ namespace {
 
 constexpr uint64_t kMaxLookedAt = uint64_t{1} << 20;
 
-/// Every stride-th triangle of the geometry that has area.
+/// Visits every stride-th triangle of the geometry, skipping triangles without area.
 template <typename PerTriangle>
 void for_each_triangle(const Scene& scene, const GeometryPlan& plan, uint64_t stride, const PerTriangle& per_triangle) {
   uint64_t skip = stride / 2;
@@ -51,10 +51,11 @@ std::vector<SampleTriangle> sample_surface(const Scene& scene, const GeometryPla
   const uint64_t stride = (triangles + kMaxLookedAt - 1) / kMaxLookedAt;
   double total_area = 0.0, count = 0.0;
   for_each_triangle(scene, plan, stride, [&](const DTriangle&, double area) { total_area += area, count += 1.0; });
-  // Triangle i has the measure m_i = (area_i / total + 1 / count) / 2, all together 1; the sample lies at equal
-  // distances along the running sum. A triangle that n of the marks fall on counts n / (m_i marks).
+  // Systematic sampling. Triangle i has the measure m_i = (area_i / total area + 1 / count) / 2, which sums to 1, and
+  // marks lie at equal distances along the running sum. A triangle hit by n marks represents n / (m_i * marks)
+  // triangles.
   const auto marks = static_cast<double>(max_count);
-  double end = 0.5 / marks; // measured from the next mark
+  double end = 0.5 / marks; // end of the running sum, relative to the next mark
   for_each_triangle(scene, plan, stride, [&](const DTriangle& t, double area) {
     const double measure = 0.5 * (area / total_area + 1.0 / count);
     end += measure;

@@ -10,20 +10,23 @@ namespace packtrace {
 
 using DTriangle = std::array<DVec3, 3>; ///< corners
 
+/// Area of a triangle.
 double area_of(const DTriangle& t);
+/// Length of a triangle's longest edge.
 double longest_edge_of(const DTriangle& t);
-/// Distance of the longest edge from the opposite corner; 0 where the triangle has no area.
+/// Distance of the longest edge from the opposite corner; 0 if the triangle has no area.
 double height_of(const DTriangle& t);
 
-/// One of the triangles that stand for all of a geometry's.
+/// A triangle of a sample that represents all triangles of a geometry.
 struct SampleTriangle {
   DTriangle corners; ///< geometry space
-  double weight = 1; ///< how many triangles it stands for
+  double weight = 1; ///< number of triangles that it represents
 };
 
-/// All triangles of a geometry that have area, or about max_count of them. Large triangles are taken before small ones,
-/// half by area and half by number, and weighted so that sums over the sample estimate sums over the geometry.
-/// Takes time for at most 2^20 triangles. Depends on its arguments only.
+/// Returns all triangles of a geometry that have area, or a weighted sample of about max_count of them. Half of the
+/// selection goes by area and half by number, so larger triangles are more likely to be chosen. Weights make sums over
+/// the sample estimate sums over the geometry.
+/// Looks at 2^20 triangles at most. Depends on its arguments only.
 std::vector<SampleTriangle> sample_surface(const Scene& scene, const GeometryPlan& plan, size_t max_count);
 
 } // namespace packtrace

@@ -16,8 +16,8 @@ bool overlap(const Bounds& a, const Bounds& b) {
   return true;
 }
 
-/// A binary tree over boxes, halved along the widest axis of their centres. Nodes follow their parent: the left child
-/// of node n is n + 1.
+/// A binary tree over boxes, split at the median along the widest axis of their centres. Nodes are in depth-first
+/// order: the left child of node n is n + 1.
 class BoxTree {
 public:
   BoxTree(std::span<const Bounds> boxes, std::span<const double> sizes) : boxes_(boxes), sizes_(sizes) {
@@ -35,8 +35,8 @@ public:
 private:
   struct Node {
     Bounds bounds;
-    size_t begin = 0, end = 0, right = 0;                      ///< of order_; right == 0: a leaf
-    double smallest = std::numeric_limits<double>::infinity(); ///< size
+    size_t begin = 0, end = 0, right = 0; ///< range in order_, and right child; right == 0 in leaf nodes
+    double smallest = std::numeric_limits<double>::infinity(); ///< smallest size of its boxes
   };
 
   size_t build(size_t begin, size_t end) {

@@ -8,8 +8,11 @@
 
 namespace packtrace {
 
-/// For each of the boxes that are asked about: the least size of any other box that touches or overlaps it, infinity
-/// where there is none. Empty boxes touch nothing. Takes O(n log n) unless many boxes overlap in one axis only.
+/// For each queried box, returns the smallest size of any other box that touches or overlaps it, or infinity if there
+/// is none. Empty boxes touch nothing. Takes O(n log n) time unless many bounds of the search tree overlap.
+/// @param boxes all boxes
+/// @param sizes one value per box
+/// @param asked indices of the queried boxes
 std::vector<double> smallest_touching(std::span<const Bounds> boxes, std::span<const double> sizes,
                                       std::span<const uint32_t> asked);
 

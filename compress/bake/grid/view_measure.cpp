@@ -6,14 +6,14 @@
 namespace packtrace {
 namespace {
 
-constexpr double kPiecePixels = 32.0;     // longest side of a piece, along an axis of the image
-constexpr int kMaxCuts = 48;              // of one triangle, one after another
-constexpr uint32_t kMaxPieces = 1u << 16; // of one geometry, all instances together; beyond, triangles stay whole
-constexpr size_t kMaxInstances = 256;     // looked at
+constexpr double kPiecePixels = 32.0;     // longest side of a piece along an image axis
+constexpr int kMaxCuts = 48;              // successive cuts of one triangle
+constexpr uint32_t kMaxPieces = 1u << 16; // per geometry, over all instances; beyond it, triangles are not cut
+constexpr size_t kMaxInstances = 256;     // instances that are looked at
 constexpr size_t kMaxPlacedTriangles = 8192;
-constexpr double kSmallPixels = 0.02; // share of the covered pixels that may be finer than ViewStats::pixel
+constexpr double kSmallPixels = 0.02; // fraction of the covered pixels whose size may be below ViewStats::pixel
 
-/// Whether all points lie beyond one side of the image; points are homogeneous pixels.
+/// Whether all points are outside the same image edge. Points are in homogeneous pixel coordinates.
 template <size_t kCount>
 bool outside(const std::array<DVec3, kCount>& points, ImageSize size) {
   const auto all = [&](const auto& test) { return std::all_of(points.begin(), points.end(), test); };
@@ -25,14 +25,14 @@ class Look {
 public:
   Look(const PrimaryCamera& camera, ViewSums& sums) : camera_(camera), sums_(sums) {}
 
-  /// @return the pixels that the triangle covers, not yet weighted
+  /// @return the pixels that the triangle covers, without the weight
   double add(const DTriangle& world, double weight) {
     height_ = height_of(world);
     weight_ = weight;
     return cut(world, 0);
   }
 
-  /// An estimate of the pixels that a box covers; 0 only where it is out of sight.
+  /// Estimates the pixels that a box covers. Returns 0 only if the box is out of sight.
   double pixels_of(const Bounds& world) const {
     const double all = static_cast<double>(camera_.size().pixels());
     if (camera_.projection() == Projection::kEnvironment) {
@@ -61,7 +61,7 @@ private:
     return camera_.projection() != Projection::kPerspective || camera_.view_z(world) > 0.0;
   }
 
-  /// World length of a pixel at a place in front of the camera.
+  /// World-space size of a pixel at a point in front of the camera.
   double pixel_at(DVec3 world) const {
     const double spread = camera_.pixel_spread();
     return camera_.projection() == Projection::kOrthographic ? spread : spread * camera_.view_z(world);
@@ -93,7 +93,7 @@ private:
                             static_cast<double>(camera_.size().pixels())));
   }
 
-  /// For cameras that look all around.
+  /// Cuts a triangle for environment cameras, which look in all directions.
   double cut_around(const DTriangle& t, int cuts, bool last) {
     const DVec3 centre = (t[0] + t[1] + t[2]) / 3.0, to_eye = camera_.eye() - centre;
     const double pixel = pixel_at(centre), distance = glm::length(to_eye);
@@ -121,7 +121,7 @@ struct ChosenInstance {
   double weight = 1.0;
 };
 
-/// The instances in view, or some of them that stand for all: large ones before small ones.
+/// Returns the instances in view, or a weighted subset in which larger ones are more likely.
 std::vector<ChosenInstance> choose_instances(const Look& look, const Placements& placements, const Bounds& box) {
   std::vector<double> pixels(placements.size());
   double total = 0.0;
@@ -176,7 +176,7 @@ void look_at_geometry(const PrimaryCamera& camera, std::span<const SampleTriangl
   Look look(camera, sums);
   const std::vector<ChosenInstance> chosen = choose_instances(look, placements, box);
   if (chosen.empty() || sample.empty()) return;
-  // Each instance is seen by every stride-th sample, from another one on.
+  // Each instance gets every stride-th sample triangle, starting at a different one.
   const size_t stride = std::max<size_t>(1, chosen.size() * sample.size() / kMaxPlacedTriangles);
   for (size_t k = 0; k < chosen.size(); ++k) {
     const DAffine placement = placements[chosen[k].instance];

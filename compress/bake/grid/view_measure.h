@@ -11,24 +11,28 @@
 
 namespace packtrace {
 
-/// The image that the default precision is measured by.
+/// Size of the images for which the default precision makes its promise.
 inline constexpr ImageSize kPromisedSize{320, 180};
 
-/// What a camera sees of geometry if nothing hides it.
+/// How a camera sees a geometry if nothing occludes it.
 struct ViewStats {
-  double pixels = 0.0; ///< covered, each as often as surfaces lie over one another
-  double height = 0.0; ///< harmonic mean of triangle heights by pixels, world units; 0 where none is covered
-  double pixel = 0.0;  ///< world length of a pixel there: the 2 % quantile by pixels; 0 where none is covered
+  double pixels = 0.0; ///< covered pixels; each overlapping surface counts
+  double height = 0.0; ///< harmonic mean of triangle heights, weighted by pixels, world units; 0 if no pixel is covered
+  /// World-space size of a pixel at the surface: 2 % quantile over the pixels; 0 if no pixel is covered.
+  double pixel = 0.0;
 
-  /// Share of the image, at most 1.
+  /// Fraction of the image that is covered, at most 1.
   double coverage() const;
 };
 
-/// Sums over the pieces of triangles that a camera sees, for ViewStats.
+/// Accumulates the visible pieces of triangles for ViewStats.
 class ViewSums {
 public:
-  /// @param pixels covered  @param pixel world length of one there  @param height of the triangle, world units
+  /// @param pixels number of covered pixels
+  /// @param pixel world-space size of a pixel at the piece
+  /// @param height height of the triangle, world units
   void add(double pixels, double pixel, double height);
+  /// Returns the statistics of all pieces added so far.
   ViewStats stats() const;
 
 private:
@@ -37,19 +41,19 @@ private:
   double pixels_ = 0.0, pixels_by_height_ = 0.0;
 };
 
-/// world_from_geometry of a geometry's instances.
+/// Transforms (world_from_geometry) of a geometry's instances.
 struct Placements {
-  std::span<const baked::InstanceRecord> instances; ///< of the scene
-  std::span<const uint32_t> chosen;                 ///< the geometry's
+  std::span<const baked::InstanceRecord> instances; ///< all instances of the scene
+  std::span<const uint32_t> chosen;                 ///< indices of the geometry's instances
 
   size_t size() const { return chosen.size(); }
   DAffine operator[](size_t i) const { return placement_of(instances[chosen[i]]); }
 };
 
-/// Adds what the camera sees of a geometry's sample in all of its instances. Where there are many, some stand for
-/// others: about 8192 placed triangles are looked at, large ones in pieces of at most 32 pixels.
-/// @param box of the geometry
-/// @param sample_pixels by sample: the pixels that the triangles which it stands for cover are added
+/// Adds the camera's view of a geometry's sample in all of its instances. If there are many, a weighted subset
+/// represents them: about 8192 placed triangles are visited, large ones split into pieces of at most 32 pixels.
+/// @param box bounds of the geometry
+/// @param sample_pixels per sample triangle: increased by the pixels of the triangles that it represents
 void look_at_geometry(const PrimaryCamera& camera, std::span<const SampleTriangle> sample, const Placements& placements,
                       const Bounds& box, ViewSums& sums, std::span<double> sample_pixels);
 

@@ -13,7 +13,7 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kUnset = ~0u;
-constexpr size_t kGrain = 4096; // fixed, so that sums are grouped alike for any thread count
+constexpr size_t kGrain = 4096; // fixed, so that sums are grouped equally for any thread count
 
 class SurfaceWelder {
 public:
@@ -76,7 +76,7 @@ private:
   }
 
   void add_areas(size_t part, size_t first) {
-    using Areas = std::pair<double, double>; // of all, of those that go
+    using Areas = std::pair<double, double>; // areas of all triangles and of the removed ones
     const std::vector<Triangle>& triangles = parts_[part].triangles;
     const Areas areas = tbb::parallel_deterministic_reduce(
         tbb::blocked_range<size_t>(0, triangles.size(), kGrain), Areas{},
@@ -96,7 +96,7 @@ private:
     out_.source_area += areas.first, out_.collapsed_area += areas.second;
   }
 
-  /// Renumbers positions without those that only triangles had that go.
+  /// Renumbers positions, without those that only removed triangles use.
   void drop_positions() {
     std::vector<uint32_t> number_of(out_.positions.size(), kUnset);
     std::vector<LatticePoint> positions;

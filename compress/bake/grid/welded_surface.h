@@ -9,19 +9,20 @@
 
 namespace packtrace {
 
-/// Positions of a geometry's source, in geometry space.
+/// Source positions of a geometry, in geometry space.
 class SourcePoints {
 public:
   SourcePoints(const Scene& scene, const GeometryPlan& plan) : scene_(scene), plan_(plan) {}
 
-  /// @param part of the plan
-  /// @param vertex of the part's mesh
+  /// @param part number of the plan's part
+  /// @param vertex vertex number in the part's mesh
   DVec3 operator()(size_t part, uint32_t vertex) const {
     const GeometryPart& p = plan_.parts[part];
     return transform_point(p.geometry_from_mesh, DVec3(scene_.meshes[p.mesh].positions[vertex]));
   }
 
-  /// Whether two vertices are one point as floats: what the source has as one may differ in the last bits of doubles.
+  /// Whether two vertices have the same position as floats. One point of the source may differ in the last bits of
+  /// doubles.
   bool same(size_t part_a, uint32_t a, size_t part_b, uint32_t b) const {
     return Vec3((*this)(part_a, a)) == Vec3((*this)(part_b, b));
   }
@@ -33,23 +34,23 @@ private:
 
 /// One part of a geometry on the lattice.
 struct LatticePart {
-  std::vector<LatticePoint> points; ///< by vertex of the mesh
-  std::vector<Triangle> triangles;  ///< into points, winding as in the file
+  std::vector<LatticePoint> points; ///< per vertex of the mesh
+  std::vector<Triangle> triangles;  ///< indices into points, with the file's winding
 };
 
 /// The triangles of a geometry over distinct positions.
 struct WeldedSurface {
-  std::vector<LatticePoint> positions; ///< distinct; those of triangles that stay, in the order in which they come
-  std::vector<uint8_t> merged;         ///< per position: whether points that are apart in the source fell on it
-  std::vector<Triangle> corners;       ///< per triangle of all parts in order, into positions; undefined where it goes
-  std::vector<uint8_t> collapsed;      ///< per triangle: it has no area and goes (find_collapsed())
-  std::vector<uint64_t> left;          ///< per part: triangles that stay
+  std::vector<LatticePoint> positions; ///< distinct positions of the triangles that remain, in order of first use
+  std::vector<uint8_t> merged;         ///< per position: whether distinct source points were rounded to it
+  std::vector<Triangle> corners; ///< per triangle of all parts in order: indices into positions; undefined if collapsed
+  std::vector<uint8_t> collapsed; ///< per triangle: it has no area and is removed (find_collapsed())
+  std::vector<uint64_t> left;     ///< per part: number of triangles that remain
   uint64_t collapsed_count = 0;
   double source_area = 0.0;    ///< geometry space
-  double collapsed_area = 0.0; ///< in the source, of those that go
+  double collapsed_area = 0.0; ///< source area of the removed triangles
 };
 
-/// Welds positions and finds what has no area. Depends on its input only, not on the thread count.
+/// Welds positions and finds triangles without area. Depends on the input only, not on the thread count.
 WeldedSurface weld_surface(const Scene& scene, const GeometryPlan& plan, std::span<const LatticePart> parts);
 
 } // namespace packtrace

@@ -7,8 +7,8 @@
 
 namespace packtrace {
 
-/// For each mesh the first mesh with equal content: the same bytes in the same order, whatever the name. Found by hash
-/// and verified.
+/// Returns, for each mesh, the first mesh with equal content: the same bytes in the same order; names may differ.
+/// Candidates are found by hash and compared byte by byte.
 std::vector<uint32_t> first_equal_meshes(const Scene& scene);
 
 } // namespace packtrace

@@ -20,7 +20,7 @@ namespace {
 
 bool same_transform(const DAffine& a, const DAffine& b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
-/// Largest sum of absolute values in a row of the linear part.
+/// Largest absolute row sum of the linear part: scales an error per object axis to an error per world axis.
 double stretch(const std::array<float, 12>& m) {
   double largest = 0.0;
   for (size_t row = 0; row < 3; ++row)
@@ -37,11 +37,11 @@ baked::InstanceRecord instance_of(uint32_t geometry, const Affine& world_from_ob
   return record;
 }
 
-/// A geometry in the making. Each user, a world shape or an object, brings a material for each part.
+/// A geometry under construction. Each user (a world shape or an object) assigns one material to each part.
 struct Draft {
-  std::vector<uint32_t> part_materials; ///< user by user
+  std::vector<uint32_t> part_materials; ///< materials of all parts, user by user
   uint32_t users = 0;
-  std::vector<uint32_t> first_slot; ///< by user
+  std::vector<uint32_t> first_slot; ///< per user
 };
 
 class Planner {
@@ -96,7 +96,7 @@ private:
     return static_cast<uint32_t>(plan_.geometries.size() - 1);
   }
 
-  /// @return the user's number
+  /// @return the number of the new user
   uint32_t add_user(uint32_t geometry, std::span<const Shape> shapes) {
     Draft& draft = drafts_[geometry];
     for (const Shape& shape : shapes) draft.part_materials.push_back(shape.material);
@@ -109,19 +109,19 @@ private:
                       [&](size_t i) { mesh_boxes_[i] = bounds_of(scene_.meshes[i].positions); });
   }
 
-  /// Box of a shape where it is placed, if that leaves the range of floats.
+  /// Returns a shape's bounds where it is placed if they exceed the float range.
   std::optional<Bounds> beyond_range(const Shape& shape) const {
     const Bounds& mesh_box = mesh_boxes_[shape.mesh];
-    if (mesh_box.empty() || !within_float_range(mesh_box)) return {}; // no mesh of a scene: refused when measured
+    if (mesh_box.empty() || !within_float_range(mesh_box)) return {}; // invalid mesh: measure_geometry() rejects it
     if (within_float_range(transform_bounds(shape.parent_from_mesh, mesh_box))) return {};
-    Bounds box; // the tight one
+    Bounds box; // exact bounds instead of the transformed box
     for (const Vec3 p : scene_.meshes[shape.mesh].positions)
       box.extend(transform_point(shape.parent_from_mesh, DVec3(p)));
     if (within_float_range(box)) return {};
     return box;
   }
 
-  /// Keeps the instance's number in use.
+  /// Adds an instance without geometry, so that later instances keep their numbers.
   void leave_out(std::string what) {
     plan_.left_out.push_back(std::move(what));
     plan_.instances.push_back(instance_of(baked::kNone, Affine(1.0f)));
@@ -139,16 +139,17 @@ private:
     plan.max_stretch = std::max(plan.max_stretch, stretch(plan_.instances.back().world_from_object));
   }
 
-  /// World shapes, and objects of one shape that is not moved, with equal content, material class and orientation.
+  /// World shapes, and objects that consist of one shape at the identity, with equal content, material class and
+  /// orientation.
   struct Group {
     uint32_t shapes = 0, objects = 0;
-    bool one_transform = true; ///< of the shapes
-    bool one_mesh = false;     ///< some of them are one mesh of the scene
-    DAffine transform{1.0};    ///< of the first shape
+    bool one_transform = true; ///< all shapes have the same transform
+    bool one_mesh = false;     ///< several of them use the same mesh index
+    DAffine transform{1.0};    ///< transform of the first shape
     std::optional<uint32_t> geometry;
 
     bool shared() const { return shapes + objects > 1; }
-    /// On a grid of its own.
+    /// Whether its shapes become instances on a grid of their own.
     bool instanced(size_t triangles) const {
       return shared() && !(one_transform && objects == 0) && (one_mesh || triangles >= kMinSharedTriangles);
     }
@@ -219,7 +220,7 @@ private:
     return plan;
   }
 
-  /// Bytes that are equal for objects that can share a geometry.
+  /// Returns bytes that are equal for objects that can share a geometry.
   std::string content_key(std::span<const Shape> shapes) const {
     std::string key;
     const auto append = [&key](const auto& value) { key.append(reinterpret_cast<const char*>(&value), sizeof value); };
@@ -267,15 +268,16 @@ private:
       add_instance(use_of[instance.object].geometry, use_of[instance.object].user, instance.world_from_object);
   }
 
-  /// Parts share a slot where every user has one material for them. Slots are ordered by class, then by materials.
+  /// Merges parts into a slot if every user assigns them the same material. Slots are ordered by class, then by
+  /// materials.
   void assign_slots(uint32_t geometry) {
     Draft& draft = drafts_[geometry];
     GeometryPlan& plan = plan_.geometries[geometry];
     const size_t parts = plan.parts.size();
-    using Column = std::pair<uint32_t, std::vector<uint32_t>>; // class, and a material for each user
+    using Column = std::pair<uint32_t, std::vector<uint32_t>>; // class, and one material per user
     std::map<Column, std::vector<size_t>> parts_of;
     for (size_t p = 0; p < parts; ++p) {
-      if (scene_.meshes[plan.parts[p].mesh].triangles.empty()) continue; // or it would have a slot without clusters
+      if (scene_.meshes[plan.parts[p].mesh].triangles.empty()) continue; // its slot would have no clusters
       Column column;
       for (uint32_t u = 0; u < draft.users; ++u) column.second.push_back(draft.part_materials[u * parts + p]);
       column.first = baked::material_class(scene_.materials[column.second.front()].flags);
@@ -312,11 +314,11 @@ private:
   const Scene& scene_;
   std::vector<uint32_t> equal_mesh_;
   std::vector<Bounds> mesh_boxes_;
-  std::vector<uint8_t> used_;                      // by object
-  std::vector<Draft> drafts_;                      // by geometry
-  std::vector<uint32_t> user_of_;                  // by instance
-  std::map<std::string, uint32_t> geometry_with_;  // by content_key(), of geometries that are not in world space
-  std::map<std::vector<uint32_t>, uint32_t> runs_; // of materials, to their first slot
+  std::vector<uint8_t> used_;                      // per object
+  std::vector<Draft> drafts_;                      // per geometry
+  std::vector<uint32_t> user_of_;                  // per instance
+  std::map<std::string, uint32_t> geometry_with_;  // by content_key(): geometries that are not in world space
+  std::map<std::vector<uint32_t>, uint32_t> runs_; // runs of materials and their first slots
   ScenePlan plan_;
 };
 

@@ -11,8 +11,9 @@ void close_material_slots(ScenePlan& plan, std::span<const std::vector<uint32_t>
   for (size_t i = 0; i < slots_left.size(); ++i) all &= slots_left[i].size() == plan.geometries[i].slot_class.size();
   if (all) return;
   std::vector<uint32_t> materials;
-  std::map<std::vector<uint32_t>, uint32_t> first_of;                  // run, to where it begins
-  std::map<std::pair<uint32_t, uint32_t>, uint32_t> first_of_instance; // geometry and where a run began
+  std::map<std::vector<uint32_t>, uint32_t> first_of; // new run to its first slot
+  // Geometry and old first slot to the new first slot.
+  std::map<std::pair<uint32_t, uint32_t>, uint32_t> first_of_instance;
   for (uint32_t i = 0; i < slots_left.size(); ++i) {
     GeometryPlan& geometry = plan.geometries[i];
     std::vector<uint32_t> runs;
@@ -34,7 +35,7 @@ void close_material_slots(ScenePlan& plan, std::span<const std::vector<uint32_t>
   plan.material_slots = std::move(materials);
   for (baked::InstanceRecord& instance : plan.instances) {
     const auto found = first_of_instance.find({instance.geometry, instance.first_slot});
-    instance.first_slot = found != first_of_instance.end() ? found->second : 0; // none: what is left out has no slots
+    instance.first_slot = found != first_of_instance.end() ? found->second : 0; // left-out instances have no slots
   }
 }
 

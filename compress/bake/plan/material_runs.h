@@ -8,8 +8,9 @@
 
 namespace packtrace {
 
-/// Takes material slots out of a plan: out of its geometries, of the runs of materials, and of its instances.
-/// @param slots_left by geometry: its slots that stay, ascending. Nothing changes where that is all of them everywhere.
+/// Removes material slots from a plan: from its geometries, its runs of materials and its instances.
+/// @param slots_left per geometry: the slots to keep, ascending. If every geometry keeps all of its slots, nothing
+/// changes.
 void close_material_slots(ScenePlan& plan, std::span<const std::vector<uint32_t>> slots_left);
 
 } // namespace packtrace

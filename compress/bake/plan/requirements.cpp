@@ -18,21 +18,21 @@ Vec2 max_abs_uv(const Mesh& mesh) {
   return largest;
 }
 
-/// Something that looks uvs up: texels along the two axes for a step of 1 in u and v.
+/// A mask or texture that is looked up: its texels along u and v, and the scale of its coordinates.
 struct LookUp {
   std::array<uint32_t, 2> size{};
   Vec2 uv_scale{1.0f};
   bool stored = true;
 };
 
-/// Of textures that are not read.
+/// For textures that are not read.
 constexpr LookUp kAssumedLookUp{{kAssumedTexels, kAssumedTexels}, Vec2(1.0f), false};
 
-/// What the materials of one slot ask for together.
+/// Combined needs of the materials of one slot.
 struct SlotNeeds {
   MaterialFlags flags = 0;
-  bool textured = false;   ///< shading looks up a texture of its colour
-  bool stores_uvs = false; ///< some part does
+  bool textured = false;   ///< shading looks up a colour texture
+  bool stores_uvs = false; ///< some part of the slot stores UVs
   std::vector<LookUp> look_ups;
 };
 
@@ -51,7 +51,7 @@ public:
     bool on_request = false;
     for (const GeometryPart& part : plan_.parts) {
       const Mesh& mesh = scene_.meshes[part.mesh];
-      if (mesh.triangles.empty()) { // where all are, there are no slots
+      if (mesh.triangles.empty()) { // if all meshes are empty, there are no slots
         needs.parts.emplace_back();
         continue;
       }
@@ -109,7 +109,7 @@ private:
       needs.normals = config_.keep_normals         ? baked::kOnRequest
                       : camera_visible(slot.flags) ? baked::kForShading
                                                    : baked::kUnused;
-    if (needs_mask(slot.flags)) // also without uvs in the source: (0, 0) is looked up then
+    if (needs_mask(slot.flags)) // even without UVs in the source: then (0, 0) is looked up
       needs.uvs = baked::kForMask;
     else if (!mesh.uvs.empty())
       needs.uvs = config_.keep_uvs                              ? baked::kOnRequest

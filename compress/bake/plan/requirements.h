@@ -9,13 +9,13 @@
 
 namespace packtrace {
 
-/// Why a part of a geometry carries a stream or not; its triangles may differ in normals only (see normals).
+/// Why a part of a geometry stores each stream or not. Triangles of one part may differ in whether they store normals.
 struct PartNeeds {
-  /// kAbsent, kUnused: none. kForShading: but for triangles whose normals are the face's, which are found later.
-  /// kOnRequest: all.
+  /// kAbsent, kUnused: no triangle stores normals. kForShading: all triangles do, except those whose normals equal the
+  /// face normal, which are found later. kOnRequest: all triangles do.
   baked::Reason normals = baked::kAbsent;
   baked::Reason uvs = baked::kAbsent;
-  baked::Reason tangents = baked::kAbsent; ///< the format has no encoding for them yet: a decision without effect
+  baked::Reason tangents = baked::kAbsent; ///< informative only: the format has no encoding for tangents yet
 
   bool store_normals() const { return is_needed(normals); }
   bool store_uvs() const { return is_needed(uvs); }
@@ -24,22 +24,24 @@ private:
   static bool is_needed(baked::Reason reason) { return reason > baked::kInferred; }
 };
 
+/// Which streams a geometry needs, and how precisely.
 struct GeometryNeeds {
-  std::vector<PartNeeds> parts;          ///< as in the plan
-  std::array<int32_t, 2> uv_exponent{};  ///< 0 where no part needs uvs
+  std::vector<PartNeeds> parts;          ///< in the order of the plan's parts
+  std::array<int32_t, 2> uv_exponent{};  ///< 0 if no part needs UVs
   std::array<double, 2> texels_per_uv{}; ///< of the finest mask or texture that is stored
-  bool infer_normals = true;             ///< store none of triangles whose normals are the face's
+  bool infer_normals = true;             ///< leave out normals of triangles whose normals equal the face normal
 };
 
-/// Textures of unknown size are taken to have this many texels along u and v where they ask for texture coordinates.
+/// Assumed size in texels along u and v of textures of unknown size that need texture coordinates.
 inline constexpr uint32_t kAssumedTexels = 4096;
 
-/// Decides which streams a geometry needs, from the flags of all materials that its instances give to its parts:
-/// - normals: where the camera can see the surface;
-/// - uvs: where an alpha mask looks them up; for shading also where a normal map does, or a texture: one that is
-///   stored, or any if none are, as it may come from elsewhere;
-/// - tangents: for shading, where a normal map needs them;
-/// and whatever config.keep asks for. Throws Error(kInput) if a material's mask or stored texture does not exist.
+/// Decides which streams a geometry needs, from the flags of all materials that its instances assign to its parts:
+/// - normals: if the camera can see the surface;
+/// - UVs: if an alpha mask looks them up. For shading also if a normal map does, or a texture: one that is stored, or
+///   any texture if none are stored, as it may be supplied elsewhere;
+/// - tangents: for shading, if a normal map needs them;
+/// and the streams that config.keep_normals and config.keep_uvs request.
+/// Throws Error(kInput) if a material's mask or stored texture does not exist.
 GeometryNeeds analyse_requirements(const Scene& scene, const ScenePlan& scene_plan, const GeometryPlan& plan,
                                    const BakeConfig& config);
 

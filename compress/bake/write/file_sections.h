@@ -15,34 +15,37 @@
 
 namespace packtrace {
 
-/// Gathers the records of a file.
+/// Collects the records of a file.
 class FileSections {
 public:
-  /// Takes materials, masks, textures and cameras. Throws Error(kInput) where they break the rules of scene.h.
-  /// @param textures of the scene in order, or none: then materials refer to none
+  /// Adds materials, masks, textures and cameras. Throws Error(kInput) if they break the rules of scene.h.
+  /// @param textures the scene's textures in order, or empty: then no material refers to a texture
   FileSections(const Scene& scene, const std::vector<EncodedTexture>& textures);
 
-  /// Completes the record with ranges, counts, bounds and name, and appends it with its clusters and payload.
+  /// Sets the record's ranges, counts, bounds and name, and appends it with its clusters and payload.
   void add_geometry(baked::GeometryRecord record, const EncodedGeometry& encoded, std::string_view name);
 
-  /// Appends levels of detail of a geometry, behind all others and in the order of their bases.
+  /// Appends the LOD levels of a geometry. Call after all add_geometry() calls, in the order of the base geometries.
   void add_lod(uint32_t base, const EncodedLod& lod);
 
+  /// Sets all instances. Call before without_trees() and build_trees().
   void set_instances(std::vector<baked::InstanceRecord> instances) { instances_ = std::move(instances); }
 
   void set_material_slots(std::vector<uint32_t> slots) { material_slots_ = std::move(slots); }
   void set_requirements(std::vector<baked::RequirementRecord> rows) { requirements_ = std::move(rows); }
 
+  /// Records of all geometries added so far, including LOD levels.
   const std::vector<baked::GeometryRecord>& geometries() const { return geometries_; }
+  /// Sums of the bits of all added geometries.
   const ClusterView::StreamBits& stream_bits() const { return stream_bits_; }
 
-  /// Geometries, clusters, payload, instances and levels of detail as added so far. Valid until something is added.
+  /// Geometries, clusters, payload, instances and LOD levels added so far. Valid until something is added.
   BakedSections without_trees() const;
 
-  /// Makes the trees of what was added. Throws as build_packed_trees().
+  /// Builds the trees over everything added so far. Throws like build_packed_trees().
   void build_trees();
 
-  /// The file's bytes. Nothing may be added afterwards.
+  /// Returns the file's bytes. Nothing may be added afterwards.
   std::vector<std::byte> assemble(const baked::SummaryRecord& summary);
 
 private:
@@ -55,7 +58,8 @@ private:
 
   std::vector<baked::GeometryRecord> geometries_;
   std::vector<baked::ClusterRecord> clusters_;
-  std::vector<uint8_t> payload_ = std::vector<uint8_t>(kReadSlackBytes); ///< ends with these zero bytes
+  /// Always ends with kReadSlackBytes zero bytes.
+  std::vector<uint8_t> payload_ = std::vector<uint8_t>(kReadSlackBytes);
   std::vector<baked::MaterialRecord> materials_;
   std::vector<baked::InstanceRecord> instances_;
   std::vector<baked::MaskRecord> masks_;

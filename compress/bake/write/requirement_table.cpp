@@ -7,7 +7,7 @@ struct Use {
   uint64_t triangles = 0, source_bytes = 0;
 };
 
-/// Of one geometry, by stream and reason.
+/// Uses in one geometry, by stream and reason.
 using Uses = std::array<std::array<Use, baked::kReasonCount>, baked::kStreamCount>;
 
 Uses uses_of(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs, const QuantizeStats& stats) {

@@ -11,15 +11,15 @@
 
 namespace packtrace {
 
-/// What became of the streams of all geometries, by stream and reason.
+/// Which streams of all geometries were stored or left out, by stream and reason.
 class RequirementTable {
 public:
-  /// Adds a geometry that was packed. Its stored bits count for the last of a stream's reasons.
+  /// Adds a packed geometry. The stored bits of a stream count for the last reason that the geometry has for it.
   /// @return GeometryRecord::requirements
   uint32_t add(const Scene& scene, const GeometryPlan& plan, const GeometryNeeds& needs, const QuantizeStats& stats,
                const ClusterView::StreamBits& bits);
 
-  /// Those that are not empty, ordered by stream and reason.
+  /// The nonempty rows, ordered by stream and reason.
   std::vector<baked::RequirementRecord> rows() const;
 
 private:

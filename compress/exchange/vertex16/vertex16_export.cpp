@@ -12,7 +12,8 @@
 namespace packtrace {
 namespace {
 
-/// Bits that each geometry's lattice loses. World-space geometry loses the same everywhere: what touches stays closed.
+/// Chooses the number of bits that each geometry's lattice loses. All world-space geometry loses the same number, so
+/// that shared vertices stay equal.
 std::vector<uint32_t> choose_shifts(const BakedFile& file) {
   std::vector<uint32_t> shifts(file.base_geometry_count());
   tbb::parallel_for(size_t{0}, shifts.size(),
@@ -70,7 +71,7 @@ public:
     result.bytes =
         vertex16::assemble({vertices_, indices16_, indices32_, geometries_, draws_, instances_, s.material_slots,
                             s.materials, s.masks, s.mask_words, s.textures, s.texture_bytes, s.strings});
-    // Reading back what was written is part of the export.
+    // Reads the result back before it leaves the export.
     vertex16::validate(result.bytes, "export result");
     report_.geometries = geometries_.size(), report_.draws = draws_.size();
     report_.instances = instances_.size(), report_.materials = s.materials.size();

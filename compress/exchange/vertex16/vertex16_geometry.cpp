@@ -17,9 +17,9 @@ namespace packtrace {
 namespace {
 
 constexpr int64_t kPositionCodes = int64_t{1} << 21, kUvCodes = int64_t{1} << 16;
-constexpr uint32_t kMostShort = 65535; // vertices with 16-bit indices: 0xffff stays free for primitive restart
+constexpr uint32_t kMostShort = 65535; // most vertices with 16-bit indices: 0xffff stays free for primitive restart
 
-/// A vertex as the file has it.
+/// A vertex as decoded from the baked file.
 struct SourceVertex {
   LatticePoint position{};
   uint32_t normal = kVertex16FlatNormal;
@@ -34,7 +34,7 @@ struct SourceVertex {
   }
 };
 
-/// Whether moving texture coordinates by a whole number looks up the same texels.
+/// Whether texture coordinates that differ by integers look up the same texels.
 template <class Record>
 bool repeats_every_tile(const Record& mask) {
   const auto whole = [](float f) { return f == std::floor(f); };
@@ -70,10 +70,10 @@ public:
   }
 
 private:
-  /// Of all materials that instances give to a slot.
+  /// Properties of all materials that instances assign to a slot.
   struct Slot {
-    bool normal_map = false; ///< any has one
-    bool repeats = true;     ///< moving texture coordinates by a whole number changes nothing
+    bool normal_map = false; ///< any of them has a normal map
+    bool repeats = true;     ///< integer offsets of texture coordinates change nothing
   };
 
   DVec3 decoded(const LatticePoint& q) const {
@@ -112,7 +112,7 @@ private:
   SourceVertex source_vertex(const ClusterView& view, uint32_t v) {
     SourceVertex vertex;
     vertex.position = view.lattice(v);
-    if (view.has_uvs()) vertex.uv = view.uv(v) + Vec2(0.0f); // -0 becomes 0
+    if (view.has_uvs()) vertex.uv = view.uv(v) + Vec2(0.0f); // turns -0 into 0
     if (!view.has_normals()) return vertex;
     if (view.normal_encoding() == NormalEncoding::kAxis24) {
       vertex.normal = view.normal_code(v);
@@ -161,7 +161,7 @@ private:
     return number;
   }
 
-  /// Subtracts the integer tile that each chart (vertices connected by triangles) begins in.
+  /// Subtracts from each chart (vertices connected by triangles) the integer tile of its smallest coordinates.
   void move_charts_to_the_first_tile() {
     std::vector<uint32_t> parent(vertices_.size());
     std::iota(parent.begin(), parent.end(), 0u);
@@ -208,7 +208,8 @@ private:
     record_.bounds_hi.fill(-std::numeric_limits<float>::infinity());
   }
 
-  /// The exponent of the finest power of two by which lo .. hi takes 2^16 codes, and |lo|, |hi| less than 2^30.
+  /// Returns the exponent of the finest power of two with which lo..hi spans at most 2^16 codes and |lo|, |hi| are less
+  /// than 2^30 steps.
   static int32_t choose_uv_step(double lo, double hi) {
     const double largest = std::max({std::abs(lo), std::abs(hi), std::ldexp(1.0, -90)});
     if (lo == 0.0 && hi == 0.0) return 0;
@@ -245,7 +246,7 @@ private:
   static Vec3 basis_x(DVec3 normal) { return vertex16::vertex16_basis_x(Vec3(normal)); }
   static Vec3 basis_y(DVec3 normal) { return vertex16::vertex16_basis_y(Vec3(normal)); }
 
-  /// Unit length, at right angles to the normal.
+  /// Unit vector orthogonal to the normal.
   DVec3 tangent_of(uint32_t v, DVec3 normal) const {
     normal = glm::normalize(normal);
     const DVec3 sum = tangents_[v] - normal * glm::dot(normal, tangents_[v]);
@@ -280,9 +281,9 @@ private:
   bool tiles_repeat_ = true;
   WeldTable table_;
   std::vector<SourceVertex> vertices_;
-  std::vector<DVec3> tangents_;      // per vertex, sum weighted by area
+  std::vector<DVec3> tangents_;      // per vertex: sum weighted by triangle area
   std::vector<uint8_t> has_tangent_; // per vertex
-  std::vector<Vec2> tile_;           // per vertex, or empty
+  std::vector<Vec2> tile_;           // per vertex; empty if tiles are kept
   Vertex16Geometry out_;
   vertex16::GeometryRecord& record_ = out_.record;
 };

@@ -10,30 +10,30 @@
 
 namespace packtrace {
 
-/// One geometry as vertex16 has it. Draws count indices from the first of this geometry.
+/// One geometry in vertex16 form. Draws count indices from the first index of this geometry.
 struct Vertex16Geometry {
-  vertex16::GeometryRecord record{}; ///< first_vertex and first_draw are left 0
+  vertex16::GeometryRecord record{}; ///< first_vertex and first_draw are 0
   std::vector<glm::uvec4> vertices;
-  std::vector<uint32_t> indices; ///< into vertices
+  std::vector<uint32_t> indices; ///< indices into vertices
   std::vector<vertex16::DrawRecord> draws;
 };
 
-/// Of all vertices of the geometry.
+/// Lattice bounds of all vertices of the geometry.
 LatticeBox lattice_box(const BakedFile& file, uint32_t geometry);
 
-/// The nearest multiple of 2^shift, divided by it; halves go up.
+/// Divides by 2^shift and rounds to the nearest integer, halves upwards.
 constexpr int64_t coarser_lattice(int64_t coordinate, uint32_t shift) {
   return shift == 0 ? coordinate : (coordinate + (int64_t{1} << (shift - 1))) >> shift;
 }
 
-/// The least number of bits that coordinates must lose for the box to fit 21-bit fields over an int32 origin.
+/// Smallest number of low bits to drop so that the box fits 21-bit fields relative to an int32_t origin.
 uint32_t vertex16_shift(const LatticeBox& box);
 
-/// Clusters merged by material slot, vertices welded, everything re-encoded and measured against what the file decodes
-/// to.
+/// Re-encodes a geometry: merges clusters by material slot, welds vertices and measures all errors against the decoded
+/// baked file.
 /// @param runs where the geometry's runs of material slots begin (material_runs())
-/// @param shift at least vertex16_shift() of its box
-/// Throws Error(kLimitExceeded) where the step leaves the range of floats.
+/// @param shift at least vertex16_shift() of the geometry's lattice box
+/// Throws Error(kLimitExceeded) if the step exceeds the float range.
 Vertex16Geometry make_vertex16_geometry(const BakedFile& file, uint32_t geometry, std::span<const uint32_t> runs,
                                         uint32_t shift);
 

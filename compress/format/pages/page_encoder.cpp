@@ -26,7 +26,7 @@ namespace {
 using Bytes = std::vector<uint8_t>;
 using StreamBits = std::array<double, kPageStreams>;
 
-constexpr int kZstdLevel = 19; // slow to write, as quick to read as any
+constexpr int kZstdLevel = 19; // slow to compress, but decompresses as fast as other levels
 
 Bytes zip(ZSTD_CCtx* context, std::span<const uint8_t> bytes) {
   Bytes out(ZSTD_compressBound(bytes.size()));
@@ -55,7 +55,7 @@ Bytes write_small(PageRecorder& recorder, StreamBits& bits) {
   return page;
 }
 
-/// Where a page begins and what it holds.
+/// A page's range of clusters and payload.
 struct PageRange {
   uint64_t first_cluster, payload_offset;
   uint32_t cluster_count, payload_bytes;
@@ -153,7 +153,7 @@ private:
       throw Error(ErrorKind::kLimitExceeded, "a page cannot be stored within the format's limits");
   }
 
-  /// What belongs to no stream, such as sizes and what rounding leaves, counts as records.
+  /// Bytes per stream. The rest, such as sizes and rounding remainders, counts as records.
   static std::array<uint64_t, kPageStreams> whole_bytes(const StreamBits& bits, uint64_t total) {
     std::array<uint64_t, kPageStreams> bytes{};
     uint64_t rest = total;
@@ -172,7 +172,7 @@ private:
   PageDecoder decoder_;
 };
 
-/// Payload bytes of each cluster: up to the next one's.
+/// A cluster's payload ends where the next cluster's begins.
 std::vector<PageRange> split_into_pages(const BakedSections& sections) {
   std::vector<PageRange> pages;
   for (const baked::GeometryRecord& g : sections.geometries)
@@ -190,7 +190,7 @@ std::vector<PageRange> split_into_pages(const BakedSections& sections) {
   return pages;
 }
 
-/// The bytes on disk and their form. Nodes in an order of their own are stored as they are.
+/// Returns the nodes' bytes on disk and their form. Nodes that do not follow from their topology are stored whole.
 std::pair<Bytes, baked::NodeForm> encode_nodes(ZSTD_CCtx* zstd, const BakedSections& sections) {
   if (sections.nodes.empty()) return {{}, baked::kNodesWhole};
   const Bytes topology = pack_tree_topology(sections);

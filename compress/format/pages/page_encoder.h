@@ -8,8 +8,9 @@
 
 namespace packtrace {
 
-/// The disk form of a file, however that was opened. Each page is decoded again and compared; one that would not come
-/// back bit for bit is stored instead. The bytes do not depend on the thread count.
+/// Returns the paged form of a file for disk; the file may have been opened in any form. Each page is decoded again and
+/// compared. A page that would not decode bit for bit is stored as its resident bytes, compressed with zstd. The bytes
+/// do not depend on the thread count.
 /// @param codec kFast or kSmall
 std::vector<std::byte> encode_paged_file(const BakedFile& file, PageCodec codec);
 

@@ -25,13 +25,14 @@ void put_bytes(std::vector<uint8_t>& to, const BitWriter& writer) {
   to.insert(to.end(), writer.bytes().begin(), writer.bytes().end());
 }
 
-/// How many of the residuals have more bits than a byte above low_bits.
+/// Counts the residuals that have more than eight bits above low_bits.
 uint32_t count_escapes(std::span<const uint64_t> residuals, uint32_t low_bits) {
   return static_cast<uint32_t>(
       std::ranges::count_if(residuals, [&](uint64_t r) { return (r >> low_bits) > kByteMask; }));
 }
 
-/// Residuals below 2^low_bits waste bits, those that do not fit take an escape.
+/// Chooses the number of low bits. Residuals below 2^low_bits waste bits; residuals that exceed the byte above them
+/// cost an escape.
 uint32_t choose_low_bits(std::span<const uint64_t> residuals, uint32_t max_escapes) {
   constexpr uint64_t kEscapeCost = 30;
   uint32_t best = 0;
@@ -47,8 +48,8 @@ uint32_t choose_low_bits(std::span<const uint64_t> residuals, uint32_t max_escap
   return best;
 }
 
-/// A zstd frame of almost nothing but Huffman codes, which is the quickest to read; searching for short repetitions
-/// makes pages .3 % smaller. Or the bytes as they are.
+/// Compresses to a zstd frame with hardly anything but Huffman codes, which decodes fastest; shorter matches would make
+/// pages only 0.3 % smaller. Returns the bytes unchanged if that saves less than 5 %.
 std::vector<uint8_t> zip_part(ZSTD_CCtx* zstd, const std::vector<uint8_t>& bytes) {
   if (bytes.empty()) return {};
   std::vector<uint8_t> out(ZSTD_compressBound(bytes.size()));
@@ -62,7 +63,7 @@ std::vector<uint8_t> zip_part(ZSTD_CCtx* zstd, const std::vector<uint8_t>& bytes
   return out.size() * 20 < bytes.size() * 19 ? out : bytes;
 }
 
-/// By the bytes' mean number of bits.
+/// Classifies residuals by the mean number of bits in their bytes.
 uint32_t class_of(std::span<const uint64_t> residuals, uint32_t low_bits) {
   uint64_t bits = 0;
   for (const uint64_t r : residuals)
@@ -92,7 +93,7 @@ void FastPageWriter::add(const baked::GeometryRecord& geometry, const baked::Clu
   add_header(record);
 }
 
-/// The words of each vertex, as they lie in the cluster's streams.
+/// Reads the words of each vertex as they are in the cluster's streams.
 void FastPageWriter::read_vertices(const ClusterView& view) {
   const baked::ClusterRecord& record = view.record();
   layouts_ = {position_layout(record), normal_layout(*geometry_, record), Layout{}};
@@ -120,7 +121,7 @@ void FastPageWriter::read_vertices(const ClusterView& view) {
   }
 }
 
-/// Fresh vertices at the place of an older one, as normals that differ make them.
+/// Finds creases: fresh vertices at the position of an earlier one, typically with another normal.
 void FastPageWriter::find_creases(const ClusterView& view) {
   if (layouts_[kPositions].verbatim()) return;
   std::map<LatticePoint, uint32_t> places;
@@ -134,7 +135,7 @@ void FastPageWriter::find_creases(const ClusterView& view) {
     }
     place->second = v;
   }
-  // Few of them are not worth a bit a vertex.
+  // If there are only a few, one bit per vertex costs more than they save.
   if (count * 16 < vertices_.size()) {
     for (Vertex& vertex : vertices_) vertex.is_crease = false;
     count = 0;
@@ -176,7 +177,7 @@ void FastPageWriter::add_topology(const ClusterView& view) {
   if (header_.creases != 0) put_bytes(parts_[kBits], creases);
 }
 
-/// @param guess p, q, o; p alone where a strip begins
+/// @param guess vertices p, q, o of the prediction p + q - o; p only at the start of a strip
 void FastPageWriter::add_corner(uint32_t vertex, bool fresh, std::array<int32_t, 3> guess) {
   const Vertex& one = vertices_[vertex];
   if (!fresh || one.is_crease) {

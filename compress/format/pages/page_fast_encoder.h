@@ -14,15 +14,17 @@ struct ZSTD_CCtx_s;
 
 namespace packtrace {
 
-/// Writes one page of codec `fast`.
+/// Writes one page with codec `fast`.
 class FastPageWriter {
 public:
-  /// The page's next cluster, which must be valid.
-  /// @param payload of the geometry
+  /// Appends the page's next cluster, which must be valid.
+  /// @param payload payload of the geometry
   void add(const baked::GeometryRecord& geometry, const baked::ClusterRecord& record, const uint8_t* payload);
 
-  /// The page. Nothing may be added afterwards.
-  /// @param bits by PageStream, of all that is written; sizes of parts are left out
+  /// Returns the page. Nothing may be added afterwards.
+  /// @param zstd compression context; its parameters are reset
+  /// @param bits set to the bits per PageStream: bit fields before compression by zstd, other parts after it. Cluster
+  /// headers and the sizes of parts are not included.
   std::vector<uint8_t> finish(ZSTD_CCtx_s* zstd, std::array<double, kPageStreams>& bits);
 
 private:
@@ -30,14 +32,14 @@ private:
   static constexpr uint32_t kCoded = page_fast::kChannels * page_fast::kChannelFields;
   struct Vertex {
     bool is_crease = false;
-    uint32_t original = 0; ///< of a crease: an older vertex at its place
+    uint32_t original = 0; ///< of a crease: number of an earlier vertex at the same position
     std::array<uint64_t, page_fast::kChannels> words{};
   };
-  /// A residual with more than a byte above the low bits.
+  /// A residual whose value above the low bits does not fit one byte.
   struct Escape {
     uint32_t field;
     uint32_t index;
-    uint64_t high; ///< all above the low bits
+    uint64_t high; ///< all bits above the low bits
   };
 
   void read_vertices(const ClusterView& view);
@@ -62,13 +64,13 @@ private:
   const baked::GeometryRecord* geometry_ = nullptr;
   baked::ClusterRecord last_{};
 
-  // Of the cluster.
+  // State of the current cluster.
   page_fast::Header header_{};
   std::array<page_fast::Layout, page_fast::kChannels> layouts_;
   std::array<uint64_t, page_fast::kChannels> prefix_bit_{}, prefix_bits_{};
   std::vector<Vertex> vertices_;
   uint32_t last_old_ = 0;
-  std::array<std::vector<uint64_t>, kCoded> residuals_; ///< zigzag
+  std::array<std::vector<uint64_t>, kCoded> residuals_; ///< zigzag codes
   std::vector<Escape> escapes_;
 };
 

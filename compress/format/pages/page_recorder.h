@@ -12,7 +12,7 @@
 
 namespace packtrace {
 
-/// Coder (page_model.h) that keeps what it is given, for either codec.
+/// Coder for PageModel (page_model.h) that records symbols and bit fields, for codec `small`.
 class PageRecorder {
 public:
   static constexpr bool kDecodes = false;
@@ -39,12 +39,12 @@ public:
   void add_point(const LatticePoint& p, uint32_t point) { points_.emplace(p, point); }
 
   const std::vector<Symbol>& symbols() const { return symbols_; }
-  /// Bit fields, whole bytes. Nothing may be recorded afterwards.
+  /// The recorded bit fields, padded to whole bytes. Nothing may be recorded afterwards.
   const std::vector<uint8_t>& fields() {
     fields_.align(1);
     return fields_.bytes();
   }
-  /// Bits of fields by PageStream.
+  /// Number of bits in fields per PageStream.
   const std::array<uint64_t, kPageStreams>& field_bits() const { return field_bits_; }
 
 private:

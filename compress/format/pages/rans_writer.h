@@ -11,7 +11,7 @@
 
 namespace packtrace {
 
-/// The words that RansReader reads, from all symbols of a page in order.
+/// Encodes all symbols of a page into the words that RansReader reads.
 class RansWriter {
 public:
   explicit RansWriter(size_t symbols) { steps_.reserve(symbols); }
@@ -25,9 +25,9 @@ public:
   }
 
   std::vector<uint8_t> finish() const {
-    // Symbol i went through state i % 2 of the reader; backwards, the states end as the reader's begin.
+    // The reader decodes symbol i with state i % 2. Encoding runs backwards and ends in the reader's initial states.
     std::array<uint32_t, 2> state{RansReader::kLowest, RansReader::kLowest};
-    std::vector<uint16_t> words; // last first
+    std::vector<uint16_t> words; // in reverse order
     for (size_t i = steps_.size(); i-- > 0;) {
       const auto [below, frequency] = steps_[i];
       uint32_t& x = state[i % 2];

@@ -12,7 +12,7 @@ namespace packtrace {
 namespace {
 
 constexpr size_t kTexels = 16;
-constexpr std::array<int32_t, 3> kLargest{31, 63, 31}; // of the channels of an endpoint
+constexpr std::array<int32_t, 3> kLargest{31, 63, 31}; // largest value per channel of an endpoint
 
 using Block = std::array<Rgb8, kTexels>;
 using Colour = std::array<double, 3>;
@@ -27,10 +27,10 @@ Endpoint rounded(const Colour& colour) {
   return e;
 }
 
-/// Endpoints with the nearest of their four colours for each texel.
+/// Two endpoints, and for each texel the nearest of the four colours that they define.
 struct Fit {
   Endpoint a{}, b{};
-  std::array<uint8_t, kTexels> index{}; ///< of BC1: 0 a, 1 b, 2 two thirds of a, 3 one third of a
+  std::array<uint8_t, kTexels> index{}; ///< BC1 index: 0 is a, 1 is b, 2 is 2/3 a + 1/3 b, 3 is 1/3 a + 2/3 b
   uint32_t error = std::numeric_limits<uint32_t>::max();
 };
 
@@ -38,7 +38,7 @@ Fit fit_indices(const Block& block, Endpoint a, Endpoint b) {
   if (packed(a) < packed(b)) std::swap(a, b);
   Fit fit{a, b, {}, 0};
   const std::array<Rgb8, 4> colours = bc1_colours(packed(a), packed(b));
-  const size_t choices = packed(a) == packed(b) ? 1 : 4; // equal endpoints mean another palette
+  const size_t choices = packed(a) == packed(b) ? 1 : 4; // equal endpoints select BC1's other palette
   for (size_t i = 0; i < kTexels; ++i) {
     int32_t least = std::numeric_limits<int32_t>::max();
     for (size_t k = 0; k < choices; ++k) {
@@ -51,7 +51,7 @@ Fit fit_indices(const Block& block, Endpoint a, Endpoint b) {
   return fit;
 }
 
-/// Ends of the block's colours along their principal axis.
+/// Returns the extremes of the block's colours along their principal axis.
 std::pair<Colour, Colour> principal_ends(const Block& block) {
   Colour mean{};
   for (const Rgb8& texel : block)
@@ -60,7 +60,7 @@ std::pair<Colour, Colour> principal_ends(const Block& block) {
   for (const Rgb8& texel : block)
     for (size_t r = 0; r < 3; ++r)
       for (size_t c = 0; c < 3; ++c) covariance[r][c] += (texel[r] - mean[r]) * (texel[c] - mean[c]);
-  // Power iteration from the row of most variance, which is never at right angles to the axis.
+  // Power iteration starts from the row with the largest variance, which is never orthogonal to the axis.
   size_t start = 0;
   for (size_t c = 1; c < 3; ++c)
     if (covariance[c][c] > covariance[start][start]) start = c;
@@ -87,7 +87,8 @@ std::pair<Colour, Colour> principal_ends(const Block& block) {
   return {a, b};
 }
 
-/// The endpoints that, rounding aside, are the best for a fit's indices; the fit's own where all indices are alike.
+/// Returns the endpoints with the least squared error for a fit's indices, before rounding; the fit's own endpoints if
+/// all its indices are equal.
 std::pair<Endpoint, Endpoint> least_squares(const Block& block, const Fit& fit) {
   constexpr std::array<double, 4> kWeightOfA{1.0, 0.0, 2.0 / 3.0, 1.0 / 3.0};
   double aa = 0.0, ab = 0.0, bb = 0.0;
@@ -105,7 +106,7 @@ std::pair<Endpoint, Endpoint> least_squares(const Block& block, const Fit& fit) 
   return {rounded(a), rounded(b)};
 }
 
-/// Moves single channels of the endpoints by one while that lowers the error.
+/// Changes single endpoint channels by one as long as that lowers the error.
 void search_around(const Block& block, Fit& best) {
   for (bool better = true; better && best.error > 0;) {
     better = false;
@@ -129,7 +130,8 @@ Fit fit_block(const Block& block) {
     if (fit.error >= best.error) break;
     best = fit;
   }
-  if (packed(best.a) == packed(best.b) && best.error > 0) { // one colour between those that 5 and 6 bits hold
+  // A single colour that 5 and 6 bits cannot represent: interpolate.
+  if (packed(best.a) == packed(best.b) && best.error > 0) {
     Endpoint a = best.a;
     for (size_t c = 0; c < 3; ++c) a[c] = std::min(a[c] + 1, kLargest[c]);
     const Fit fit = fit_indices(block, a, best.b);
@@ -141,7 +143,7 @@ Fit fit_block(const Block& block) {
 
 Block block_at(const AlbedoTexture& texture, uint32_t x0, uint32_t y0) {
   Block block;
-  for (uint32_t i = 0; i < kTexels; ++i) { // the border goes on behind the border
+  for (uint32_t i = 0; i < kTexels; ++i) { // repeats the texture's border beyond its size
     const uint32_t x = std::min(x0 + i % 4, texture.width - 1), y = std::min(y0 + i / 4, texture.height - 1);
     const uint8_t* const rgb = texture.rgb.data() + (size_t{y} * texture.width + x) * 3;
     block[i] = {rgb[0], rgb[1], rgb[2]};

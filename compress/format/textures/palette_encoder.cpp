@@ -43,8 +43,8 @@ std::vector<Bin> fill_bins(const AlbedoTexture& texture) {
 /// A range of bins that may become one colour.
 struct Box {
   size_t begin = 0, end = 0;
-  size_t axis = 0;    ///< of most variance
-  double error = 0.0; ///< that variance, times the texels
+  size_t axis = 0;    ///< axis of the largest variance
+  double error = 0.0; ///< squared deviations of the texels along that axis, summed
   std::array<double, 3> mean{};
   bool operator<(const Box& other) const {
     return error < other.error || (error == other.error && begin > other.begin);
@@ -70,8 +70,9 @@ Box measure(const std::vector<Bin>& bins, size_t begin, size_t end) {
   return box;
 }
 
-/// Colours by cutting the box of most error along its longest axis at its mean, again and again.
-/// Source: Heckbert, "Color Image Quantization for Frame Buffer Display", 1982, with variance for extent.
+/// Chooses colours by repeatedly splitting the box with the largest error at its mean, along its axis of largest
+/// variance.
+/// Source: Heckbert, "Color Image Quantization for Frame Buffer Display", 1982, with variance instead of extent.
 std::vector<std::array<double, 3>> cut(std::vector<Bin>& bins) {
   std::priority_queue<Box> boxes;
   boxes.push(measure(bins, 0, bins.size()));
@@ -82,7 +83,7 @@ std::vector<std::array<double, 3>> cut(std::vector<Bin>& bins) {
     const auto middle =
         std::stable_partition(from, to, [&](const Bin& bin) { return bin.mean[box.axis] <= box.mean[box.axis]; });
     const auto place = static_cast<size_t>(middle - bins.begin());
-    if (place == box.begin || place == box.end) break; // rounding: the rest differs by nothing
+    if (place == box.begin || place == box.end) break; // rounding: the remaining bins do not differ
     boxes.pop();
     boxes.push(measure(bins, box.begin, place));
     boxes.push(measure(bins, place, box.end));
@@ -102,7 +103,8 @@ size_t nearest(const std::vector<std::array<double, 3>>& colours, const std::arr
   return best;
 }
 
-/// Moves each colour to the mean of what is nearest to it. Source: Lloyd, "Least Squares Quantization in PCM", 1982.
+/// Moves each colour to the mean of the bins nearest to it.
+/// Source: Lloyd, "Least Squares Quantization in PCM", 1982.
 void relax(const std::vector<Bin>& bins, std::vector<std::array<double, 3>>& colours) {
   for (int round = 0; round < kRounds; ++round) {
     std::vector<Bin> sums(colours.size());
@@ -117,7 +119,7 @@ void relax(const std::vector<Bin>& bins, std::vector<std::array<double, 3>>& col
   }
 }
 
-/// All colours of the texture, sorted; nothing where there are more than 256.
+/// Returns all colours of the texture, sorted; empty if there are more than 256.
 std::vector<Rgb8> few_colours(const AlbedoTexture& texture) {
   std::vector<Rgb8> colours;
   for (size_t i = 0; i < texture.rgb.size(); i += 3) {
@@ -165,7 +167,7 @@ std::vector<uint8_t> encode_palette8(const AlbedoTexture& texture) {
   for (const Rgb8& colour : palette) data.insert(data.end(), colour.begin(), colour.end());
   data.resize(kPaletteBytes);
   constexpr uint16_t kUnknown = 0xffff;
-  std::vector<uint16_t> known(size_t{1} << 24, kUnknown); // by colour
+  std::vector<uint16_t> known(size_t{1} << 24, kUnknown); // palette entry per colour
   for (size_t i = 0; i < texture.rgb.size(); i += 3) {
     const uint8_t* const rgb = texture.rgb.data() + i;
     uint16_t& entry = known[(size_t{rgb[0]} << 16) | (size_t{rgb[1]} << 8) | rgb[2]];

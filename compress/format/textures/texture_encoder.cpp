@@ -8,14 +8,14 @@
 namespace packtrace {
 namespace {
 
-/// Two values between which `levels` steps lie evenly, and the nearest level of each value.
+/// Evenly spaced levels 0..levels between two values, and the nearest level of each value.
 struct Ramp {
   uint8_t lo = 0, hi = 0;
   std::array<uint8_t, 256> level{};
 };
 
-/// From the extremes on, least squares for the ends and nearest levels take turns while the error falls.
-/// @param counts of each value of one channel
+/// Starts from the extremes and alternates least squares for the ends with nearest levels while the error falls.
+/// @param counts number of texels per value of one channel
 Ramp fit_ramp(const std::array<uint64_t, 256>& counts, uint32_t levels) {
   size_t first = 0, last = 255;
   while (first < 255 && counts[first] == 0) ++first;
@@ -31,7 +31,8 @@ Ramp fit_ramp(const std::array<uint64_t, 256>& counts, uint32_t levels) {
     for (size_t v = 0; v < 256; ++v) {
       double nearest = std::numeric_limits<double>::infinity();
       for (uint32_t level = 0; level <= levels; ++level) {
-        const uint32_t decoded = (ramp.lo * (levels - level) + ramp.hi * level + levels / 2) / levels; // as the decoder
+        // Rounds like the decoder.
+        const uint32_t decoded = (ramp.lo * (levels - level) + ramp.hi * level + levels / 2) / levels;
         const double d = std::abs(static_cast<double>(v) - decoded);
         if (d < nearest) nearest = d, ramp.level[v] = static_cast<uint8_t>(level);
       }

@@ -12,11 +12,11 @@
 namespace packtrace {
 namespace {
 
-constexpr double kExtraGroup = 0.5;      ///< as TreeCosts::extra_node: strips, too, end where groups do
-constexpr uint32_t kCoordinateBits = 24; ///< whole numbers below 2^24, which floats hold
+constexpr double kExtraGroup = 0.5;      ///< value of TreeCosts::extra_node: strips also end where groups do
+constexpr uint32_t kCoordinateBits = 24; ///< integers below 2^24 are exact in floats
 
-/// The smallest box of whole coordinates below 2^kCoordinateBits that holds each of some points, on a coarser lattice
-/// where they lie farther apart.
+/// Boxes of triangles in integer coordinates below 2^kCoordinateBits. Points that are farther apart are put on a
+/// coarser lattice.
 class PointBoxes {
 public:
   explicit PointBoxes(std::span<const LatticePoint> points) {
@@ -46,14 +46,14 @@ private:
   std::array<FloatBox, kMaxClusterVertices> boxes_;
 };
 
-/// A tree over boxes in any order: each run is split where the surface area heuristic says, of all splits along an
-/// axis by the boxes' centres.
+/// A binary tree over boxes in any order. Each node takes the split with the lowest surface area heuristic cost, of all
+/// splits by the boxes' centres along an axis.
 class SweepTree {
 public:
   /// @param triangles 1..128
   SweepTree(const PointBoxes& points, std::span<const Triangle> triangles) {
     const auto count = static_cast<uint32_t>(triangles.size());
-    std::array<std::array<int32_t, 4>, kMaxClusterTriangles> centres; // doubled
+    std::array<std::array<int32_t, 4>, kMaxClusterTriangles> centres; // twice the centres
     for (uint32_t i = 0; i < count; ++i) {
       boxes_[i] = points.of(triangles[i]);
       const Int4 centre =
@@ -68,11 +68,11 @@ public:
     build(0, count);
   }
   std::span<RunNode> nodes() { return std::span(nodes_).first(size_); }
-  /// The boxes from left to right.
+  /// The box numbers from left to right.
   std::span<const uint8_t> order() const { return std::span(order_[0]).first(nodes_[0].count); }
 
 private:
-  /// The order of places along an axis, by their highest bits; equal ones in their order.
+  /// Sorts places along an axis by their highest bits; stable.
   static void sort(std::span<const uint32_t> places, std::array<uint8_t, kMaxClusterTriangles>& order) {
     constexpr uint32_t kBits = 8;
     uint32_t most = 0;
@@ -93,14 +93,14 @@ private:
     for (uint32_t i = 1; i < count; ++i) box.extend(boxes_[order_[0][first + i]]);
     node.area = first_lane(half_area(box));
     if (count == 1) return;
-    uint32_t left = 1; // of two, which of them is of no account
+    uint32_t left = 1; // a node of two boxes: any split is equal
     if (count > 2) left = split(first, count);
     build(first, left);
     node.right = static_cast<uint8_t>(size_);
     build(first + left, count - left);
   }
 
-  /// Sorts the boxes to the left and right, in each order; how many are on the left.
+  /// Finds the best split and partitions the boxes in all three orders. Returns the number of boxes on the left.
   uint32_t split(uint32_t first, uint32_t count) {
     RunSplit best{std::numeric_limits<float>::infinity(), 1};
     size_t best_axis = 0;
@@ -112,7 +112,7 @@ private:
     return best.left;
   }
 
-  /// Improves `best` by splits of one order; whether it did.
+  /// Lowers `best` by the splits of one order. Returns whether it changed.
   bool sweep(const uint8_t* order, uint32_t count, RunSplit& best) const {
     std::array<Float4, kMaxClusterTriangles> right_area;
     FloatBox box = boxes_[order[count - 1]];
@@ -124,7 +124,7 @@ private:
     box = boxes_[order[0]];
     for (uint32_t i = 1; i < count; ++i) {
       const Float4 left_cost = half_area(box) * static_cast<float>(i);
-      if (first_lane(left_cost) > best.cost) break; // it only grows
+      if (first_lane(left_cost) > best.cost) break; // the cost of the left side only grows
       best.improve(first_lane(left_cost + right_area[i] * static_cast<float>(count - i)), i, count);
       box.extend(boxes_[order[i]]);
     }
@@ -143,8 +143,9 @@ private:
   }
 
   std::array<FloatBox, kMaxClusterTriangles> boxes_;
-  std::array<std::array<uint8_t, kMaxClusterTriangles>, 3> order_; ///< runs of nodes, each by centres along an axis
-  std::array<uint8_t, kMaxClusterTriangles> on_left_;              ///< by box
+  /// Per axis: box numbers; each node's run is sorted by centres along the axis.
+  std::array<std::array<uint8_t, kMaxClusterTriangles>, 3> order_;
+  std::array<uint8_t, kMaxClusterTriangles> on_left_; ///< per box
   std::array<RunNode, 2 * kMaxClusterTriangles> nodes_;
   uint32_t size_ = 0;
 };

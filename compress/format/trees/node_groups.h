@@ -10,16 +10,16 @@
 
 namespace packtrace {
 
-/// Orders a cluster's triangles so that those of a tree's node follow each other: groups are the nodes with leaves that
-/// build_packed_trees() would make of them, had strips no say in their order.
+/// Orders a cluster's triangles so that the triangles of one tree node are consecutive. The groups are the leaf nodes
+/// that build_packed_trees() would choose if strips did not constrain the order of triangles.
 class NodeGroups {
 public:
-  /// @param positions of a cluster's vertices, on the lattice; 1..256
-  /// @param triangles 1..128, into positions
+  /// @param positions lattice positions of the cluster's vertices; 1..256
+  /// @param triangles 1..128 triangles, indices into positions
   void find(std::span<const LatticePoint> positions, std::span<const Triangle> triangles);
 
-  std::span<const Triangle> triangles() const { return triangles_; } ///< group after group
-  std::span<const uint32_t> ends() const { return ends_; }           ///< of groups
+  std::span<const Triangle> triangles() const { return triangles_; } ///< triangles, group by group
+  std::span<const uint32_t> ends() const { return ends_; }           ///< end of each group in triangles()
 
 private:
   std::vector<LeafNode> nodes_;
