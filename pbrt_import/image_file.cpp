@@ -37,7 +37,7 @@ namespace {
 constexpr const char* kDamaged = "damaged image: ";
 constexpr const char* kTruncated = "damaged image: the file is truncated";
 
-// An upper bound for all formats: PNG reaches 8256; DWAB compression of EXR stores chunks in as few as 96 bytes
+// An upper bound for all formats: PNG reaches 8256; DWAB compression of EXR stores chunks in as few as 96 bytes.
 constexpr uint64_t kMostPixelsPerByte = 1u << 16;
 
 constexpr const char *kNotInPalette = "has a colour that the palette lacks; it counts as black",

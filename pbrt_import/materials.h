@@ -64,7 +64,7 @@ public:
 private:
   struct Definition {
     std::string kind;
-    /// shared by the materials that shapes derive from this one; null: none
+    /// Shared by the materials that shapes derive from this one; null: none.
     std::shared_ptr<const ParameterList> parameters;
     MaterialRecipe recipe;
     Place place; ///< of the Material directive, or of the Shape that overrides parameters
@@ -79,7 +79,7 @@ private:
   std::map<TextureGraph::Node, uint32_t> texture_of_node_; ///< kNoTexture: none
   std::unordered_multimap<size_t, uint32_t> textures_by_hash_;
   std::vector<Definition> definitions_;
-  /// number of the use without alpha and light, indexed by recipe; kNone: not used yet
+  /// Number of the use without alpha and light, indexed by recipe; kNone: not used yet.
   std::vector<uint32_t> plain_uses_;
   std::map<MaterialUse, uint32_t> use_numbers_; ///< numbers of all other uses
   std::vector<MaterialUse> uses_;

@@ -30,7 +30,7 @@ bool is_too_large(std::string_view digits) {
     if (error == std::errc::result_out_of_range) return digits[start] != '-';
   }
   const int64_t first_digit = before_point > 0 ? before_point : -leading_zeros;
-  // first_digit + exponent > 0 without overflow, since |first_digit| is at most the text length
+  // first_digit + exponent > 0 without overflow, since |first_digit| is at most the text length.
   return exponent > -first_digit;
 }
 

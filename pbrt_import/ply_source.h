@@ -111,7 +111,7 @@ public:
   explicit AsciiSource(std::span<const std::byte> bytes, size_t body_offset)
       : begin_(reinterpret_cast<const char*>(bytes.data())), next_(begin_ + body_offset), end_(begin_ + bytes.size()) {}
 
-  // + 1, since no blank must follow the last word
+  // One more than the bytes left, since the last word needs no blank after it.
   uint64_t remaining() const { return static_cast<uint64_t>(end_ - next_) + 1; }
   uint64_t min_row_size(const PlyElement& element) const { return 2 * uint64_t{element.properties.size()}; }
   uint64_t min_item_size(PlyType) const { return 2; }

@@ -33,7 +33,7 @@ private:
   std::vector<File> files_; ///< one per opening; there may be many openings of few paths
   std::vector<std::string> paths_;
   std::unordered_map<std::string, uint32_t> path_numbers_;
-  /// cache of files that reports refer to
+  /// Cache of files that reports refer to.
   mutable std::unordered_map<uint32_t, std::shared_ptr<const SourceFile>> located_;
 };
 
