@@ -43,8 +43,8 @@ struct ImportStatistics {
   uint64_t area_lights = 0;               ///< emissive shapes
   uint64_t textures_found = 0;            ///< distinct image files that textures name
   uint64_t textures_missing = 0;
-  uint64_t triangles = 0; ///< unique_triangle_count() of the scene
-  uint64_t worlds = 0;    ///< worlds in the text; all other counts cover only the one that was read
+  uint64_t triangles = 0;                    ///< unique_triangle_count() of the scene
+  uint64_t worlds = 0;                       ///< worlds in the text; all other counts cover only the one that was read
   std::map<std::string, uint64_t> materials; ///< Material and MakeNamedMaterial directives by kind as written
   uint64_t animated_shapes = 0;              ///< shapes in the scene, counted once per object
   uint64_t animated_instances = 0;
@@ -58,7 +58,7 @@ struct ImportResult {
   Scene scene;
   ImportStatistics statistics;
   std::vector<std::filesystem::path> files; ///< all files that the scene names, read or not, in no particular order
-  MemoryReservation memory; ///< reservation for the scene; must live as long as the scene
+  MemoryReservation memory;                 ///< reservation for the scene; must live as long as the scene
 };
 
 /// Reads a pbrt-v3 scene with all files that it includes. Problems are reported to diagnostics with their source

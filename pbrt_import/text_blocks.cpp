@@ -36,7 +36,8 @@ enum class Guess : uint8_t { kUnknown, kInteger, kFloat, kDouble };
 Guess guess_from(std::string_view before) {
   while (!before.empty() && is_space(before.back())) before.remove_suffix(1);
   if (before.empty()) return Guess::kUnknown;
-  if (before.back() != '"') return before.back() == 'm' ? Guess::kDouble : Guess::kFloat; // Transform
+  // Transform and ConcatTransform take doubles.
+  if (before.back() != '"') return before.back() == 'm' ? Guess::kDouble : Guess::kFloat;
   before.remove_suffix(1);
   const size_t quote = before.rfind('"');
   if (quote == std::string_view::npos) return Guess::kUnknown;
