@@ -47,7 +47,7 @@ struct TransformPair {
 /// The state that AttributeBegin saves, apart from names and transforms.
 struct Attributes {
   uint32_t material = kNone;   ///< number in MaterialLibrary; kNone: pbrt's default, grey matte
-  uint32_t area_light = kNone; ///< 1: emits from both sides, 0: from the front
+  uint32_t area_light = kNone; ///< 1: emits from both sides, 0: from the front; kNone: no light
   bool reverse_orientation = false;
 };
 

@@ -44,7 +44,7 @@ struct InputFile::State {
   uint64_t delivered_bytes = 0;
   std::unique_ptr<Inflater> inflater; ///< null if the file is not compressed
   std::vector<unsigned char> compressed;
-  const char* damage = nullptr; ///< found while inflating
+  const char* damage = nullptr; ///< message of damage found while inflating; null: none
   bool member_open = false; ///< inside a gzip member, where an end of file means truncation
 
   /// @param read_some gets a pointer, a size and the number of bytes read so far; returns like POSIX read()

@@ -240,7 +240,8 @@ uint32_t MaterialLibrary::with_shape_parameters(uint32_t base, const ParameterLi
   });
   if (!overrides) return base;
   // A copy, because looking up parameters marks them as used.
-  const std::shared_ptr<const ParameterList> shared = definitions_[base].parameters; // definitions_ grows below
+  // Keeps it alive: definitions_ grows below.
+  const std::shared_ptr<const ParameterList> shared = definitions_[base].parameters;
   const ParameterList base_parameters = shared ? *shared : ParameterList();
   const uint32_t number =
       add(definitions_[base].kind, definitions_[base].recipe.name, TextureParameters(context, shape, &base_parameters));

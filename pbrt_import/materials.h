@@ -27,7 +27,7 @@ struct MaterialUse {
   uint32_t recipe = 0;
   uint32_t alpha = kNone;        ///< texture node; kNone: opaque
   uint32_t shadow_alpha = kNone; ///< texture node
-  uint32_t area_light = kNone;   ///< as Attributes::area_light
+  uint32_t area_light = kNone;   ///< like Attributes::area_light
   auto operator<=>(const MaterialUse&) const = default;
 };
 

@@ -61,7 +61,7 @@ inline DigitRun scan_digits(const char* p) {
   // Sets bit 7 of each byte above 9; carries only corrupt bytes after the first such byte.
   const uint64_t others = ((word + 0x7676767676767676u) | word) & 0x8080808080808080u;
   const auto count = static_cast<uint32_t>(others ? std::countr_zero(others) / 8 : 8);
-  const uint32_t half = 32 - 4 * count; // two shifts: one by 64 would be undefined
+  const uint32_t half = 32 - 4 * count; // two shifts, because a shift by 64 is undefined
   word = word << half << half;          // leading zeros, with the last digit in the highest byte
   word = word * 10 + (word >> 8);       // two-digit values in every second byte
   constexpr uint64_t kPairs = 0x000000FF000000FFu;

@@ -22,7 +22,7 @@ struct Directive {
   std::string_view keyword;
   Place place;
   std::array<double, 16> numbers{};
-  std::array<std::string, 3> names; ///< escapes replaced
+  std::array<std::string, 3> names; ///< quoted names, with escapes replaced
   uint32_t name_count = 0;
   ParameterList parameters;
   MemoryReservation memory; ///< reservation for large parameters
@@ -80,11 +80,11 @@ private:
   SourceStack& source_;
   FileNames& file_names_;
   Reporter& reporter_;
-  std::vector<double> numbers_;        ///< scratch
+  std::vector<double> numbers_;        ///< scratch buffer
   std::string include_name_;           ///< escapes not yet replaced
   std::optional<Declaration> misread_; ///< a declaration that was read as the value of the previous parameter
   MemoryBudget memory_;
-  Directive* directive_ = nullptr; ///< the one being read
+  Directive* directive_ = nullptr; ///< the directive being read
   uint64_t value_bytes_ = 0;       ///< bytes of its parameters
 };
 

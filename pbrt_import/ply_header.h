@@ -39,7 +39,7 @@ struct PlyElement {
 struct PlyHeader {
   PlyFormat format = PlyFormat::kAscii;
   std::vector<PlyElement> elements;
-  size_t body_offset = 0; ///< bytes
+  size_t body_offset = 0; ///< offset of the body in bytes
 
   /// First element of a name; null if there is none.
   const PlyElement* find(std::string_view element_name) const;

@@ -117,7 +117,7 @@ private:
   const CheckCancelledFn check_cancelled_;
   NameTable same_meshes_;                 ///< values of MeshJob::same_as
   std::vector<uint32_t> same_mesh_slots_; ///< index into Scene::meshes, by number in same_meshes_
-  std::string mesh_name_;                 ///< scratch
+  std::string mesh_name_;                 ///< scratch buffer
   MemoryReservation mesh_memory_; ///< for large meshes made from text, reserved one by one
   MemoryReservation kept_memory_; ///< for all other data kept of directives, reserved in steps
   uint64_t kept_bytes_ = 0;

@@ -121,7 +121,7 @@ std::optional<TgaHeader> parse_tga_header(std::span<const std::byte> bytes) {
 TgaPixels decode_tga(std::span<const std::byte> bytes, const TgaHeader& header) {
   constexpr uint64_t kLongestRun = 128;
   const uint64_t pixels_stored = uint64_t{header.width} * header.height / (header.run_lengths ? kLongestRun : 1);
-  if (pixels_stored * bytes_of_bits(header.pixel_bits) > bytes.size()) truncated(); // before allocating
+  if (pixels_stored * bytes_of_bits(header.pixel_bits) > bytes.size()) truncated(); // checked before allocating
   PixelReader reader(bytes, header);
   TgaPixels pixels;
   pixels.rgb.resize(size_t{header.width} * header.height * 3);

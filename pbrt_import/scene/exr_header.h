@@ -19,7 +19,7 @@ struct ExrChannelHeader {
 /// The header data of an EXR file that must be checked before a library opens the file.
 struct ExrHeader {
   int32_t min_x = 0, min_y = 0, max_x = -1, max_y = -1; ///< data window, both ends inclusive; not validated
-  std::vector<ExrChannelHeader> channels;               ///< as stored; may be empty
+  std::vector<ExrChannelHeader> channels;               ///< in the order of the file; may be empty
   uint32_t block_lines = 1;                             ///< scan lines per compressed block; 0 for tiled files
   uint32_t tile_width = 0, tile_height = 0;             ///< pixels; 0 for files without tiles
 

@@ -111,7 +111,7 @@ struct Camera {
   std::string film_name;             ///< pbrt's output file name, for display
   double shutter_open = 0.0;         ///< in the unit of AnimatedTransform::start_time
   double shutter_close = 1.0;        ///< at least shutter_open
-  uint32_t animation = kNotAnimated; ///< into Scene::animations
+  uint32_t animation = kNotAnimated; ///< index into Scene::animations
 };
 
 /// An imported scene in floating point, not yet packed.
