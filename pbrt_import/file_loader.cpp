@@ -101,7 +101,8 @@ void FileLoader::load(std::vector<Mesh>& meshes, std::vector<ImageRequest>& imag
       std::error_code unknown; // a missing file is reported when it is read
       const uint64_t stored_bytes = std::filesystem::file_size(file.path, unknown);
       if (!unknown) heap_pages.local().about_to_allocate(2 * stored_bytes);
-      // A file over the budget ends the import: skipping it would skip different files in each run, as threads race.
+      // A file over the budget ends the import. Skipping it would skip different files in each run, because threads
+      // compete for the budget.
       with_file(file.path, file.uses.front().place, [&] { read_ply_file(file, meshes[file.slot]); });
     }
     progress.advance();

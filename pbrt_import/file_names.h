@@ -19,9 +19,9 @@ public:
   /// @param allow_outside whether names may refer to files outside the folder
   FileNames(std::filesystem::path folder, bool allow_outside);
 
-  /// Path of a file name in the scene. If the file does not exist under the name as written, backslashes of Windows
-  /// exporters are read as slashes, provided that this file exists or that the name has an unknown escape. The file
-  /// need not exist.
+  /// Path of a file name in the scene. Backslashes of Windows exporters are read as slashes, with a warning, if no file
+  /// has the name as written, and either a file has the name with slashes or the name contains an unknown escape. The
+  /// file need not exist.
   /// @param raw string of the scene, escapes not yet replaced
   /// @return an empty path, with an error reported, if the name is empty or refers to a file outside the folder
   ///   although that is not allowed

@@ -125,7 +125,7 @@ struct ClaimedSize {
   }
 };
 
-/// Source: IEC 61966-2-1.
+/// Linear value of an sRGB-encoded value. Source: IEC 61966-2-1.
 float linear_from_srgb(float v) {
   return v <= 0.04045f ? v / 12.92f : static_cast<float>(std::pow((v + 0.055) / 1.055, 2.4));
 }

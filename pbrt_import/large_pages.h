@@ -26,7 +26,7 @@ private:
   void prepare();
 
   uint64_t allocated_ = 0;
-  uint64_t next_ = 2u << 20; ///< not worth the cost for less
+  uint64_t next_ = 2u << 20; ///< smaller amounts are not worth the cost
 };
 
 /// Like reserve(), but calls prefer_large_pages() on the new block before the elements are moved to it.

@@ -239,8 +239,8 @@ uint32_t MaterialLibrary::with_shape_parameters(uint32_t base, const ParameterLi
     return !parameter.used && std::find(names.begin(), names.end(), parameter.name) != names.end();
   });
   if (!overrides) return base;
-  // A copy, because looking up parameters marks them as used.
-  // Keeps it alive: definitions_ grows below.
+  // Copies the list, because looking up parameters marks them as used. `shared` keeps it alive while definitions_
+  // grows.
   const std::shared_ptr<const ParameterList> shared = definitions_[base].parameters;
   const ParameterList base_parameters = shared ? *shared : ParameterList();
   const uint32_t number =

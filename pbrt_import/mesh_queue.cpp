@@ -38,7 +38,7 @@ MeshQueue::~MeshQueue() {
     tasks_.cancel();
     tasks_.wait();
   } catch (...) {
-    // The error that led here is already propagating.
+    // Errors of cancelled tasks are dropped, because another error is already propagating.
   }
 }
 

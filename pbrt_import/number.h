@@ -46,8 +46,8 @@ inline bool is_digit(char c) { return static_cast<unsigned char>(c - '0') < 10; 
 inline constexpr uint64_t kWholePowersOfTen[] = {1,       10,        100,        1'000,      10'000,
                                                  100'000, 1'000'000, 10'000'000, 100'000'000};
 
-/// Reads up to eight digits at p without a branch: the length of a number is unpredictable, so mispredicted branches
-/// would cost more than all the arithmetic.
+/// Result of scan_digits(), which reads up to eight digits without a branch: the length of a number is unpredictable,
+/// so mispredicted branches would cost more than all the arithmetic.
 struct DigitRun {
   uint64_t value;
   uint32_t count;
@@ -58,7 +58,7 @@ inline DigitRun scan_digits(const char* p) {
   uint64_t word;
   std::memcpy(&word, p, sizeof word);
   word ^= 0x3030303030303030u; // digits become 0..9
-  // Sets bit 7 of each byte above 9; carries only corrupt bytes after the first such byte.
+  // Sets bit 7 of each byte above 9. Carries can only corrupt bytes after the first such byte.
   const uint64_t others = ((word + 0x7676767676767676u) | word) & 0x8080808080808080u;
   const auto count = static_cast<uint32_t>(others ? std::countr_zero(others) / 8 : 8);
   const uint32_t half = 32 - 4 * count; // two shifts, because a shift by 64 is undefined

@@ -106,7 +106,7 @@ private:
     const char* const begin = position_;
     NumberRun run;
     if (guess == Guess::kInteger || guess == Guess::kUnknown) {
-      // Minus zero is not converted as an integer, because a float would keep the sign.
+      // Minus zero is not an integer: it would lose the sign that a float keeps.
       const auto scan = [](const char* p, int32_t& value) {
         const char* const end = scan_integer(p, value);
         return end && value == 0 && *p == '-' ? nullptr : end;
