@@ -33,8 +33,8 @@ public:
   /// Size of the file on disk in bytes.
   uint64_t stored_bytes() const;
   bool compressed() const;
-  /// Content length according to the last four bytes of a gzip file, which is correct for files with one member below 4
-  /// GiB. 0 for uncompressed files and for lengths that deflate cannot reach with the stored bytes.
+  /// Content length according to the last four bytes of a gzip file, which is correct for a single member of less than
+  /// 2^32 bytes. 0 for uncompressed files and for lengths that deflate cannot reach with the stored bytes.
   uint64_t claimed_bytes() const;
 
   /// True if both are the same file on disk, regardless of their names.

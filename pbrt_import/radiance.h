@@ -10,8 +10,8 @@
 namespace packtrace {
 
 /// Reads a Radiance picture (.hdr) row by row: shared-exponent colours, uncompressed or in either of the format's two
-/// run-length encodings, rows from the top, columns from the left. The EXPOSURE of the header is not applied. Source:
-/// Greg Ward, Real Pixels, Graphics Gems II, 1991; Radiance's src/common/color.c.
+/// run-length encodings, rows from the top, columns from the left. The EXPOSURE of the header is not applied.
+/// Source: Greg Ward, Real Pixels, Graphics Gems II, 1991; Radiance's src/common/color.c.
 class RadianceReader {
 public:
   /// Parses the header.

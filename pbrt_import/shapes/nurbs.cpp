@@ -47,7 +47,7 @@ struct Axis {
   uint32_t span_of(double t) const {
     const auto first = knots.begin() + order - 1, last = knots.begin() + count;
     auto upper = std::upper_bound(first, last, t);
-    // T is the end of the domain: the last non-empty span.
+    // At the end of the domain, takes the last non-empty span.
     if (upper == last) upper = std::lower_bound(first, last, knots[count]);
     return static_cast<uint32_t>(upper - knots.begin()) - 1;
   }

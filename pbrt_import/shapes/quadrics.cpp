@@ -173,8 +173,8 @@ Mesh sweep_profile(const Sweep& sweep, const std::vector<ProfilePoint>& profile,
 double fraction(uint32_t i, uint32_t n) { return static_cast<double>(i) / n; }
 
 /// Radii from r_begin to r_end for which chords of z = k r^2 between neighbours stay within tolerance. The deviation is
-/// |k| step^2 / 4 along z, times the cosine of the chord's slope, which is at least 2 |k| r. There are at most about 1
-/// / sqrt(2 tolerance / r_end) radii for any k.
+/// |k| step^2 / 4 along z, times the cosine of the chord's slope, which is at least 2 |k| r. For any k there are at
+/// most about sqrt(r_end / (2 tolerance)) radii.
 std::vector<double> parabola_radii(double r_begin, double r_end, double k, double tolerance) {
   std::vector<double> radii{r_begin};
   while (radii.back() < r_end) {

@@ -112,9 +112,9 @@ double limit_weight(uint32_t valence) { return 1.0 / (valence + 3.0 / (8.0 * eve
 constexpr double kEvenBoundaryWeight = 1.0 / 8.0;
 constexpr double kLimitBoundaryWeight = 1.0 / 5.0;
 
-/// Moves every vertex to (1 - n w) p + w (sum of neighbours). Interior vertices use all n neighbours and w =
-/// interior_weight(n); boundary vertices use the two neighbours along the boundary and w = boundary_weight. Streams
-/// over half-edges instead of walking around vertices.
+/// Moves every vertex to (1 - n w) p + w (sum of neighbours). Interior vertices use all n neighbours, with
+/// interior_weight(n) as w; boundary vertices use the two neighbours along the boundary, with boundary_weight as w.
+/// Streams over half-edges instead of walking around vertices.
 template <class Weight>
 std::vector<DVec3> smooth(const Level& level, Weight interior_weight, double boundary_weight) {
   const size_t count = level.points.size();
