@@ -198,7 +198,7 @@ TEST(AnimatedScenes, InstancesKeepTheirKeysWhenOthersAreLeftOut) {
   const Scene& scene = imported.scene;
   ASSERT_EQ(scene.instances.size(), 5u) << imported.text();
   ASSERT_EQ(scene.animated_instances.size(), 3u);
-  ASSERT_EQ(scene.animations.size(), 3u); // without animations of objects that were dropped
+  ASSERT_EQ(scene.animations.size(), 3u); // only those of the remaining instances
   const uint32_t instances[] = {1, 2, 4};
   const float moved[] = {30, 40, 50};
   for (size_t i = 0; i < 3; ++i) {

@@ -38,13 +38,14 @@ Patch bilinear(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
   return patch;
 }
 
-/// A full circle as a rational quadratic with nine control points: (wx, wy, w).
+/// A full circle as a rational quadratic with nine control points: (x, y, w), where x and y are not multiplied by w.
 const auto kHalf = static_cast<float>(std::sqrt(0.5));
 const std::vector<glm::vec3> kCircle{{1, 0, 1},       {1, 1, kHalf}, {0, 1, 1},      {-1, 1, kHalf}, {-1, 0, 1},
                                      {-1, -1, kHalf}, {0, -1, 1},    {1, -1, kHalf}, {1, 0, 1}};
 const std::vector<float> kCircleKnots{0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4};
 
-/// Rotates a rational quadratic profile (wr, wz, w) along v around the z axis; u runs around the axis.
+/// Rotates a rational quadratic profile (r, z, w) along v around the z axis; u runs around the axis. r and z are not
+/// multiplied by w.
 Patch turned(const std::vector<glm::vec3>& profile, const std::vector<float>& knots) {
   Patch patch;
   patch.parameters.nu = 9;

@@ -164,7 +164,7 @@ TEST(Ply, StripsTurnEverySecondTriangleAndStartAnewAtMinusOne) {
 TEST(Ply, StripsMayRepeatAnIndexToGoOnElsewhere) {
   Reports reports;
   const PlyMesh ply = read(strips(Format::kLittle, "int", {{0, 1, 2, 2, 5, 5, 6, 7}}), &reports);
-  // Triangles with the repeated corners 2 and 5 are omitted.
+  // The repeated corners 2 and 5 give no triangles, so vertices 3 and 4 are unused and dropped.
   EXPECT_EQ(ply.mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {4, 3, 5}}));
   EXPECT_EQ(reports.messages, std::vector<std::string>{});
 }
