@@ -28,7 +28,7 @@ void check_options(const ImportOptions& options) {
           "tessellation_tolerance must lie within [1e-6, 0.5]");
 }
 
-/// In strict mode, whatever was reported is a reason to fail.
+/// Strict mode: throws Error(kInput) for the first warning or error.
 void require_clean(const Diagnostics& diagnostics) {
   const uint64_t problems = diagnostics.count(Severity::kError) + diagnostics.count(Severity::kWarning);
   if (problems == 0) return;
@@ -68,7 +68,7 @@ ImportResult import_scene(const std::filesystem::path& main_file, const ImportOp
     progress.advance(bytes - reported_bytes);
     reported_bytes = bytes;
   }
-  reporter.next_directive(); // what is missing at the end comes after everything else
+  reporter.next_directive(); // sorts reports of missing ends after all others
   ImportResult result = builder.finish(source.place(), progress);
   result.files.push_back(main_file);
   result.statistics.files_read += source.files_opened();

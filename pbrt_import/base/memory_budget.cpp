@@ -24,7 +24,7 @@ std::string text_of(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// The number in a file, UINT64_MAX where it says "max" or is not there.
+/// The number in a file; UINT64_MAX if the file holds no number (such as "max") or does not exist.
 uint64_t number_in(const fs::path& file) {
   const std::string text = text_of(file);
   uint64_t value = 0;
@@ -32,7 +32,7 @@ uint64_t number_in(const fs::path& file) {
   return error == std::errc() ? value : UINT64_MAX;
 }
 
-/// The least limit of a group and all around it.
+/// Smallest limit of a control group and its ancestors.
 uint64_t least_limit(const fs::path& root, std::string_view group, const char* file) {
   uint64_t least = number_in(root / file);
   fs::path path = root;

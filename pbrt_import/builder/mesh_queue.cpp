@@ -38,12 +38,12 @@ MeshQueue::~MeshQueue() {
     tasks_.cancel();
     tasks_.wait();
   } catch (...) {
-    // Whoever asked for the end knows already.
+    // Errors of cancelled tasks are dropped, because another error is already propagating.
   }
 }
 
 void MeshQueue::add(Entry entry) {
-  constexpr uint64_t kMaxPendingBytes = 64u << 20; // then this thread works, too
+  constexpr uint64_t kMaxPendingBytes = 64u << 20; // beyond this, the reading thread waits and helps
   entries_.push_back(std::move(entry));
   Entry& queued = entries_.back();
   pending_bytes_ += queued.job.bytes_at_most;

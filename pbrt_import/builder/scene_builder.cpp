@@ -13,7 +13,7 @@ namespace {
 
 using K = DirectiveKind;
 
-/// Where directives may stand, by kind.
+/// The part of the file in which a directive is allowed.
 enum class Section : uint8_t { kAnywhere, kOptions, kWorld };
 
 constexpr auto kSections = [] {
@@ -66,7 +66,7 @@ void SceneBuilder::handle(Directive& directive) {
     carry_out(directive);
 }
 
-/// What follows from a directive that the parser could not make sense of, and has reported.
+/// Effects of a directive whose arguments the parser could not read, which it has reported.
 void SceneBuilder::skip_damaged(Directive& directive) {
   switch (directive.kind) {
   case K::kTranslate:
@@ -79,7 +79,7 @@ void SceneBuilder::skip_damaged(Directive& directive) {
     return state_.lose_transform();
   case K::kCamera:
     return cameras_.leave_out();
-  case K::kObjectBegin: // its shapes do not belong to the world
+  case K::kObjectBegin: // opens the block, since its shapes do not belong to the world
     directive.names[0].clear();
     return begin_object(directive);
   case K::kShape:
@@ -91,14 +91,15 @@ void SceneBuilder::skip_damaged(Directive& directive) {
   }
 }
 
-/// Files that belong to the scene though nothing is made of them.
+/// Records files that belong to the scene although the import does not read them.
 void SceneBuilder::mention_files(const Directive& directive) {
   for (const std::string_view name : {"mapname", "lensfile", "bsdffile", "filename"})
     if (const Parameter* const file = directive.parameters.peek(name, ParameterType::kString))
       for (const std::string& raw : file->strings) file_names_.mention(raw);
 }
 
-/// Accounts for what stays of a directive besides large meshes. About: there are small things in many tables.
+/// Counts an estimate of the memory that is kept of a directive, apart from large meshes; the data is spread over many
+/// tables.
 void SceneBuilder::count_kept(const Directive& directive) {
   uint64_t bytes = 0;
   switch (directive.kind) {
@@ -107,7 +108,7 @@ void SceneBuilder::count_kept(const Directive& directive) {
     bytes = 512;
     break;
   case K::kMaterial:
-  case K::kMakeNamedMaterial: // keep their parameters
+  case K::kMakeNamedMaterial: // materials keep their parameters
     bytes = 512 + directive.memory.bytes();
     for (const Parameter& parameter : directive.parameters.all())
       bytes += sizeof parameter + parameter.floats.size() * sizeof(float);
@@ -199,9 +200,9 @@ void SceneBuilder::carry_out(Directive& directive) {
   case K::kSampler:
     ++statistics_.ignored["render_settings"];
     return;
-  case K::kWorldBegin: // handle() has seen to these
+  case K::kWorldBegin: // dealt with in handle()
   case K::kWorldEnd:
-  case K::kInclude: // never leaves the parser
+  case K::kInclude: // dealt with in the parser
     return;
   }
 }
@@ -307,7 +308,7 @@ void SceneBuilder::handle_medium(const Directive& directive) {
   const bool defines = directive.kind == K::kMakeNamedMedium;
   ++statistics_.ignored[defines ? "media" : "medium_interfaces"];
   for (uint32_t i = 0; i < directive.name_count; ++i)
-    if (!directive.names[i].empty()) // which stands for empty space
+    if (!directive.names[i].empty()) // the empty name is vacuum
       (defines ? media_ : media_uses_).try_emplace(directive.names[i], directive.place);
 }
 
@@ -330,7 +331,7 @@ void SceneBuilder::handle_texture(const Directive& directive) {
 void SceneBuilder::handle_area_light(const Directive& directive) {
   const std::string& kind = directive.names[0];
   constexpr std::string_view kAreaLights[] = {"diffuse", "area"};
-  if (kind != "diffuse" && kind != "area") // "area" is what pbrt-v2 files say
+  if (kind != "diffuse" && kind != "area") // "area" is pbrt-v2's name
     return reporter_.error(directive.place, "unknown area light " + in_quotes(kind) + "; it is ignored" +
                                                 did_you_mean(closest_name(kind, kAreaLights)));
   const TextureContext here = context(directive.place);

@@ -1,4 +1,4 @@
-// The part of SceneBuilder that keeps worlds, blocks, objects and instances.
+// The part of SceneBuilder that deals with worlds, blocks, objects and instances.
 #include <algorithm>
 
 #include "pbrt_import/text/large_pages.h"
@@ -130,7 +130,7 @@ SceneBuilder::Placement SceneBuilder::place(const Directive& directive, std::str
   if (!state_.animated()) return {pair.start, kNotAnimated};
   const std::optional<AnimatedTransform> keys = animate(pair.start, pair.end, transform_times_);
   if (!keys) {
-    if (is_invertible(pair.start)) // else whoever asked reports it
+    if (is_invertible(pair.start)) // otherwise the caller reports it
       reporter_.error(directive.place, "animated " + std::string(thing) +
                                            ": its transform at EndTime has no inverse; it stands as at its start");
     return {pair.start, kNotAnimated};
@@ -142,7 +142,7 @@ SceneBuilder::Placement SceneBuilder::place(const Directive& directive, std::str
   return {interpolate(*keys, scene_.time), static_cast<uint32_t>(all.size() - 1)};
 }
 
-/// Options are complete: says when everything is looked at.
+/// Sets the time at which animations are evaluated, once all options are known.
 void SceneBuilder::settle_time() {
   scene_.time = options_.time.value_or(cameras_.shutter_open());
   cameras_.settle(scene_.time, transform_times_, scene_.animations, reporter_);

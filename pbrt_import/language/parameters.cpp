@@ -35,7 +35,7 @@ const Parameter* single_value(const ParameterList& list, std::string_view name, 
   if (!parameter) return nullptr;
   const size_t count = parameter->floats.size() + parameter->integers.size() + parameter->strings.size();
   if (count == values) return parameter;
-  parameter->used = false; // reported as unused, as pbrt does
+  parameter->used = false; // so that it is reported as unused, as in pbrt
   return nullptr;
 }
 
@@ -72,7 +72,7 @@ const Parameter* ParameterList::keep() {
   if (parameters_.size() <= kLinearSearch + 1) {
     for (Parameter& existing : std::span(parameters_).first(parameters_.size() - 1))
       if (existing.type == last.type && existing.name == last.name) same = &existing;
-  } else { // no scene needs so many, but hostile ones have them
+  } else { // only hostile scenes have so many parameters
     const auto key = [](const Parameter& parameter) { return static_cast<char>(parameter.type) + parameter.name; };
     if (index_.empty())
       for (size_t i = 0; i + 1 < parameters_.size(); ++i) index_.emplace(key(parameters_[i]), i);

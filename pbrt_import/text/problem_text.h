@@ -10,8 +10,8 @@
 
 namespace packtrace {
 
-/// Runs work on one file or shape; what goes wrong with it becomes the text of its problem, empty if nothing does.
-/// Throws Error(kCancelled) on, and MemoryError, which lack of memory becomes.
+/// Runs `work` on one file or shape and returns the message of the error that it throws, or an empty string.
+/// Error(kCancelled) and MemoryError are rethrown; other allocation failures become MemoryError.
 template <class Work>
 std::string problem_of(Work work) {
   try {

@@ -17,7 +17,7 @@ uint32_t SourceFiles::add(const std::string& path, std::optional<Place> included
 std::shared_ptr<const SourceFile> SourceFiles::source_file(uint32_t file) const {
   if (const auto found = located_.find(file); found != located_.end()) return found->second;
   const File& f = files_[file];
-  // As deep as files may include each other.
+  // The recursion is as deep as the Include chain, which is limited.
   auto made = std::make_shared<const SourceFile>(SourceFile{paths_[f.path], locate(f.included_from)});
   located_.emplace(file, made);
   return made;

@@ -10,7 +10,7 @@ namespace {
 
 using namespace std::string_literals;
 
-// Scene text in other files
+// Included files
 
 HostileCase with(HostileCase test_case, const ImportOptions& options) {
   test_case.options = options;
@@ -402,7 +402,7 @@ scene.pbrt:2:17: warning: file names have back-slashes, "models\a.ply"; read as 
 const bool kRegistered = register_cases("HostileIncludes", includes(), __FILE__) &&
                          register_cases("HostileFileNames", file_names(), __FILE__);
 
-// What a table cannot hold: things that are no files.
+// Cases that need more than the table: paths that are not regular files.
 
 std::string listed_folders(int count) {
   std::string path;
@@ -466,7 +466,7 @@ TEST(HostileFiles, LongNamesAreCutInMessages) {
   }
 }
 
-/// The text of the Error that importing main_file throws.
+/// Message of the Error that importing main_file throws.
 std::string refusal_of(const std::filesystem::path& main_file) {
   try {
     (void)import_file(main_file);

@@ -97,7 +97,7 @@ TEST_F(MeshCleanup, NormalsBecomeUnitLength) {
 
 TEST_F(MeshCleanup, BadNormalsAreRecomputedFromTheFacesAround) {
   Mesh mesh = square();
-  mesh.positions[3] = {0, 0, 2}; // the second triangle has twice the first one's area and faces elsewhere
+  mesh.positions[3] = {0, 0, 2}; // the second triangle has twice the area of the first and another orientation
   mesh.normals = {{0, 0, 0}, {kNan, 0, 1}, {0, 1, 0}, {0, kInfinity, 0}};
   clean(mesh);
   const Vec3 first(0, 0, 1), second(2, -2, 0);
@@ -130,7 +130,7 @@ TEST_F(MeshCleanup, UvsThatAreNotFiniteBecomeZero) {
 }
 
 TEST_F(MeshCleanup, LargeMeshesAreCheckedLikeSmallOnes) {
-  constexpr uint32_t kVertices = 100'000, kLost = 50'000; // many pieces' worth
+  constexpr uint32_t kVertices = 100'000, kLost = 50'000; // enough for several parallel pieces
   Mesh mesh;
   for (uint32_t i = 0; i < kVertices; ++i) mesh.positions.emplace_back(i, i % 2, 0);
   for (uint32_t i = 0; i + 2 < kVertices; ++i) mesh.triangles.emplace_back(i, i + 1, i + 2);

@@ -33,7 +33,7 @@ std::string listing(Tokenizer tokenizer) {
   }
 }
 
-/// Appends what read_numbers gives.
+/// Appends the numbers that read_numbers() passes.
 template <class T>
 void read_numbers(Tokenizer& tokenizer, std::vector<T>& values) {
   tokenizer.read_numbers<T>([&](auto numbers) { values.insert(values.end(), numbers.begin(), numbers.end()); });
@@ -178,7 +178,7 @@ TEST(Number, PlainDecimalsAreRoundedLikeFromChars) {
 }
 
 TEST(Number, HalfwayCasesRoundOnce) {
-  // 1 + 2^-24 lies between two floats; a digit far behind decides, which rounding to double first would lose.
+  // 1 + 2^-24 lies between two floats; a late digit decides, which rounding to double first would lose.
   EXPECT_EQ(scanned("1.000000059604644775390625"), 1.0f);
   EXPECT_EQ(scanned("1.0000000596046447754"), std::nextafter(1.0f, 2.0f));
   EXPECT_EQ(scanned("16777217"), 16777216.0f);
