@@ -6,7 +6,7 @@
 namespace packtrace {
 namespace {
 
-// relative to the root's area; keeps the number of nodes low for boxes without area
+// Relative to the root's area. It keeps the number of nodes low for boxes without area.
 constexpr float kNodeCost = 0x1p-20f;
 
 /// Best use of i child slots of the parent by a subtree, i = 1 .. 8 at index i - 1.

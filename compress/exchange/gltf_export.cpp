@@ -241,7 +241,7 @@ private:
     tinygltf::Camera out;
     out.name = to_utf8(camera.film_name);
     const double aspect = double(camera.width_px) / double(camera.height_px);
-    // half size of the screen; an off-centre window becomes centred
+    // Half size of the screen. An off-centre window becomes centred.
     glm::dvec2 half(std::max(aspect, 1.0), std::max(1.0 / aspect, 1.0));
     if (camera.screen_window)
       half = glm::abs(glm::dvec2(camera.screen_window->y - camera.screen_window->x,

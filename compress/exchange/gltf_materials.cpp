@@ -19,7 +19,7 @@
 namespace packtrace {
 namespace {
 
-// leaves room for the JSON part
+// Leaves room for the JSON part.
 constexpr uint64_t kMostBytes = std::numeric_limits<uint32_t>::max() - (uint64_t{64} << 20);
 constexpr int kChannels = 4;
 

@@ -350,7 +350,7 @@ private:
   BakedSections sections_;
   std::vector<uint32_t> class_ends_; // by material slot
   uint64_t text_bytes_ = 0;
-  // by geometry: first_slot of its first instance; other instances have equal classes
+  // By geometry: first_slot of its first instance. The other instances have equal classes.
   std::vector<uint32_t> first_slots_;
 };
 

@@ -123,7 +123,7 @@ void box_leaves(const Box* boxes, const uint8_t* vertices, const LeafCorners* le
     const LeafCorners& leaf = leaves[i];
     Int8 box = lanes(boxes[vertices[leaf.kept[0]]]);
     extend(box, lanes(boxes[vertices[leaf.kept[1]]]));
-    // eight corners per step; the first corner replaces missing ones
+    // Eight corners per step. The first corner replaces missing ones.
     for (uint32_t c = leaf.begin; c < leaf.end; c += 8) {
       uint64_t eight = load(vertices + c);
       if (const uint32_t left = leaf.end - c; left < 8) {

@@ -153,7 +153,7 @@ NormalFields fold_normal(NormalEncoding encoding, NormalFields fields) {
   const NormalFormat& format = format_of(encoding);
   const uint32_t chart = std::min(fields.chart, format.charts - 1);
   const int32_t last = last_x(format);
-  // distance past the border; above 0 outside the face
+  // Distance past the border, above 0 outside the face.
   const auto beyond = [&](int32_t c) { return std::max(c - last, -c); };
   const int32_t x = std::clamp(fields.x, 0, last), y = std::clamp(fields.y, 0, last_y(format));
   if (format.family != NormalFamily::kAxis || std::max(beyond(fields.x), beyond(fields.y)) <= 0) return {chart, x, y};

@@ -117,7 +117,7 @@ void ClusterPacker::find_palette(const ClusterValues& values) {
   std::array<uint16_t, kSlots> slots;
   slots.fill(kFree);
   std::array<uint8_t, kMaxClusterVertices> use; // by vertex: number of its code in order of first use
-  // code in the upper bits, its number in order of first use in the low 8 bits
+  // Code in the upper bits, its number in order of first use in the low 8 bits.
   std::array<uint64_t, kMaxClusterVertices> order;
   for (uint32_t v = 0; v < values.vertex_count; ++v) {
     const uint32_t code = join_normal_code(encoding_, values.normals[v]);

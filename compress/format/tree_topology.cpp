@@ -65,7 +65,7 @@ public:
       : s_(sections), topology_(topology), nodes_(nodes), boxes_(nodes.size()) {}
 
   bool run() {
-    // find_tree_record_fault() checks their number
+    // find_tree_record_fault() checks their number.
     s_.nodes = nodes_;
     if (nodes_.size() > std::numeric_limits<uint32_t>::max()) return false; // files store such trees whole
     if (!clusters_ok() || find_tree_record_fault(s_, members_)) return false;

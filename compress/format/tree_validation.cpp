@@ -10,7 +10,7 @@ namespace {
 
 constexpr uint8_t kSeen = baked::kCameraBelow | baked::kOcclusionBelow;
 constexpr int64_t kMaxOrigin = int64_t{1} << 60;
-// for bytes of eight slots: ones, and the highest bits
+// For the bytes of eight slots: ones, and the highest bits.
 constexpr uint64_t kEach = 0x0101010101010101, kTops = 0x80 * kEach;
 
 /// Set of triangles of one cluster.
@@ -192,7 +192,7 @@ private:
     if (node.first_child != 0) return "child numbers";
     if (node.cluster >= s_.clusters.size() || members_.tree_of[node.cluster] != tree) return "cluster";
     if (node.ray_classes != members_.ray_classes[node.cluster] || (node.ray_classes & kSeen) == 0) return "ray classes";
-    // in the next line, bytes above kMaxLeafTriangles set their highest bit
+    // Bytes above kMaxLeafTriangles set their highest bit in the sum below.
     const uint64_t sizes = bytes_of(node.children);
     if (((sizes | (sizes + (127 - baked::kMaxLeafTriangles) * kEach)) & kTops) != 0) return "leaves";
     if (used < baked::kNodeWidth && sizes >> (8 * used) != 0) return "leaves";
