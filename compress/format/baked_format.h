@@ -160,7 +160,7 @@ struct TextureRecord {
   uint32_t codec; ///< texture_codec.h
   std::array<float, 2> uv_scale;
   std::array<float, 2> uv_offset;
-  float psnr_db; ///< measured; infinite where nothing was lost
+  float psnr_db; ///< measured; infinite if lossless
   uint32_t reserved;
   StringRef name;
 };

@@ -78,7 +78,6 @@ NormalFields fold_normal(NormalEncoding encoding, NormalFields fields);
 
 /// Decodes a normal. Its length is 1 within 3e-7. The bits are the same on every machine: only +, -, x, / and square
 /// root of floats are used.
-/// @param fields canonical
 /// zsign: x = 2 X / 32766 - 1, y = 2 Y / 65534 - 1, |z| = sqrt(1 - x^2 - y^2); outside the unit disc z = 0 and (x, y)
 /// is scaled to length 1.
 /// axis: for axis a of x, y, z and C codes, with t = (2 X - (C - 1)) / (C - 1) and s likewise from Y, component a + 1
@@ -87,6 +86,7 @@ NormalFields fold_normal(NormalEncoding encoding, NormalFields fields);
 /// like sin(t pi / 4).
 /// oct: x = (X - K) / K, y = (Y - K) / K, K = codes / 2 - 1, z = 1 - |x| - |y|, folded where z < 0, then normalised.
 /// Source: Meyer, Suessmuth, Sussner, Stamminger, Greiner, "On Floating-Point Normal Vectors", 2010.
+/// @param fields canonical
 Vec3 decode_normal(NormalEncoding encoding, NormalFields fields);
 
 /// Decodes any code. Codes that encode_normal() never writes decode to some unit vector.

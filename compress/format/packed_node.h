@@ -27,8 +27,9 @@ inline constexpr uint8_t kInnerChild = 0xff; ///< values 1..kMaxLeafTriangles: a
 /// grid:
 ///   lo = origin + (lo[axis][child] << exponent(axis)),  hi = origin + (hi[axis][child] << exponent(axis))
 /// They are rounded outwards, so they contain the child's triangles exactly; |coordinate| < 2^31. Either all children
-/// are nodes, or all are leaves. Slots in use come first. Child nodes are consecutive from first_child on, in slot
-/// order. Leaves are consecutive runs of triangles of one cluster, from first_triangle on, in slot order.
+/// are nodes, or all are leaves; a node whose children are leaves is called a leaf node. Slots in use come first. Child
+/// nodes are consecutive from first_child on, in slot order. Leaves are consecutive runs of triangles of one cluster,
+/// from first_triangle on, in slot order.
 /// Source of the child boxes relative to their parent: Ylitie, Karras, Laine, "Efficient incoherent ray traversal on
 /// GPUs through compressed wide BVHs" (2017).
 struct PackedNode {

@@ -14,7 +14,6 @@ namespace packtrace {
 /// lowest bytes of all nodes first.
 /// Leaf nodes are listed in depth-first order. In the same order children are numbered: a node's children begin at the
 /// first number that is still free.
-/// said in turn.
 std::vector<uint8_t> pack_tree_topology(const BakedSections& sections);
 
 /// Inverse of pack_tree_topology(): fills in the nodes, with boxes computed from the triangles. Returns false if that
