@@ -13,7 +13,7 @@ namespace packtrace {
 /// Index from clusters to the leaf nodes in a file's trees. Empty if the file has no trees, or 2^32 nodes or more.
 class StoredLeafNodes {
 public:
-  /// @param sections of a valid file; its nodes must outlive this index
+  /// @param sections of a valid file; not kept
   explicit StoredLeafNodes(const BakedSections& sections);
 
   bool empty() const { return nodes_.empty(); }

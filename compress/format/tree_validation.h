@@ -32,9 +32,9 @@ std::vector<uint32_t> sole_identity_instances(const BakedSections& sections);
 /// Relies only on valid geometry and cluster records.
 std::optional<TreeFault> find_tree_record_fault(const BakedSections& sections, TreeMembers& members);
 
-/// Checks tree records and nodes. Each node but a tree's first is the child of exactly one earlier node, no tree is
-/// deeper than its record says, leaves are runs of a cluster's triangles, and each triangle of each cluster that some
-/// ray sees is in exactly one leaf. Takes linear time. Does not check that boxes contain their triangles.
+/// Checks tree records and nodes. Each node but a tree's first is the child of exactly one earlier node, the depth of
+/// each tree equals that in its record, leaves are runs of a cluster's triangles, and each triangle of each cluster
+/// that some ray sees is in exactly one leaf. Takes linear time. Does not check that boxes contain their triangles.
 std::optional<TreeFault> find_tree_fault(const BakedSections& sections);
 
 } // namespace packtrace
