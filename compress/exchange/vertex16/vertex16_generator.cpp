@@ -11,7 +11,7 @@
 namespace packtrace {
 namespace {
 
-/// The shortest text that reads back as the same float, as both languages write it.
+/// Shortest literal that reads back as the same float in both languages.
 std::string literal(float value) {
   std::array<char, 32> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
@@ -68,8 +68,7 @@ std::string packer(const std::string& prefix) {
   return text + ");\n}\n";
 }
 
-/// What the fields mean, in the language that GLSL and C++ with GLM have in common. $ stands for the prefix of
-/// functions.
+/// Decoders of the fields, in the common subset of GLSL and C++ with GLM. $ stands for the prefix of functions.
 constexpr std::string_view kDecoders = R"(
 // Object space. Exact where |origin + field| <= 2^24; the same lattice point is the same float in every geometry.
 $vec3 vertex16_position(uvec4 v, Vertex16Frame frame) {

@@ -9,7 +9,7 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kUvAnchorBits = 32, kUvWidthBits = 5; // baked_format.md, texture coordinates
+constexpr uint32_t kUvAnchorBits = 32, kUvWidthBits = 5; // docs/baked_format.md, texture coordinates
 
 void unpack_strips(const ClusterView& view, ClusterValues& values) {
   const IndexLayout& layout = view.layout();
@@ -112,12 +112,13 @@ bool ClusterPacker::plan_normals(const baked::GeometryRecord& geometry, const Cl
 }
 
 void ClusterPacker::find_palette(const ClusterValues& values) {
-  // Distinct codes in order of first use, found by a hash table; then sorted.
+  // A hash table finds the distinct codes in order of first use; then they are sorted.
   constexpr uint32_t kSlots = 1024, kFree = 0xffff;
   std::array<uint16_t, kSlots> slots;
   slots.fill(kFree);
-  std::array<uint8_t, kMaxClusterVertices> use;    // vertex -> distinct code in order of first use
-  std::array<uint64_t, kMaxClusterVertices> order; // code above, use below
+  std::array<uint8_t, kMaxClusterVertices> use; // by vertex: number of its code in order of first use
+  // Code in the upper bits, its number in order of first use in the low 8 bits.
+  std::array<uint64_t, kMaxClusterVertices> order;
   for (uint32_t v = 0; v < values.vertex_count; ++v) {
     const uint32_t code = join_normal_code(encoding_, values.normals[v]);
     uint32_t slot = (code * 0x9e3779b1u) >> 22;

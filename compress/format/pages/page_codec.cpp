@@ -27,7 +27,7 @@ constexpr uint64_t align_up(uint64_t bytes) {
   return (bytes + baked::kSectionAlignment - 1) / baked::kSectionAlignment * baked::kSectionAlignment;
 }
 
-/// Expands one file. Every failure names the file and the part.
+/// Expands one file. Each error names the file and the damaged part.
 class Expander {
 public:
   Expander(std::span<const std::byte> bytes, const std::string& name) : bytes_(bytes), name_(name) {}
@@ -81,7 +81,7 @@ private:
     if (header_.reserved != 0 || header_.padding != decltype(header_.padding){}) fail("reserved header fields");
   }
 
-  /// Page records, head and tail, and where the pages lie.
+  /// Reads the page records, and finds head, tail, nodes and pages.
   void read_table() {
     uint64_t left = bytes_.size() - sizeof header_;
     for (const uint64_t part :
@@ -110,7 +110,7 @@ private:
     if (offset != bytes_.size()) fail("pages that do not fill the file");
   }
 
-  /// The places of the resident file's parts, all of which the page records and the header imply.
+  /// Computes the layout of the resident file, which follows from the page records and the header.
   void lay_out() {
     const auto ratio_ok = [](uint64_t bytes, uint64_t disk_bytes) {
       return bytes / baked::kMaxDiskRatio <= disk_bytes;
@@ -135,7 +135,7 @@ private:
     if (ZSTD_isError(size) != 0 || size != bytes) fail(what);
   }
 
-  /// What decoding a page relies on; validation looks at everything else.
+  /// Checks what decoding pages relies on; validation checks everything else.
   void check_head() {
     baked::FileHeader header;
     std::memcpy(&header, resident_.data(), sizeof header);
@@ -192,7 +192,7 @@ private:
 
   uint64_t node_bytes() const { return header_.node_count * sizeof(baked::PackedNode); }
 
-  /// Of the tail: nothing of it changes while nodes are made.
+  /// Section in the head or tail. Restoring nodes does not change it.
   template <typename T>
   std::span<const T> section(const baked::FileHeader& header, baked::Section number) const {
     const baked::SectionRecord& record = header.sections[number];
@@ -209,7 +209,7 @@ private:
       unzip(nodes_, nodes_begin_, node_bytes(), "nodes");
       return;
     }
-    constexpr uint64_t kMostBytes = 14; // of a node's topology: its kind, eight sizes, a triangle and a cluster
+    constexpr uint64_t kMostBytes = 14; // per node: its kind, eight sizes, first triangle and cluster
     const uint64_t size = ZSTD_getFrameContentSize(nodes_.data(), nodes_.size());
     if (size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR || size > kMostBytes * header_.node_count ||
         size / baked::kMaxDiskRatio > nodes_.size())
@@ -228,7 +228,7 @@ private:
     const std::span<baked::PackedNode> nodes{reinterpret_cast<baked::PackedNode*>(resident_.data() + nodes_begin_),
                                              static_cast<size_t>(header_.node_count)};
     if (ZSTD_isError(got) != 0 || got != size || !restore_nodes(sections, topology, nodes)) fail("nodes");
-    // Those sections are where the pages were decoded to, unless the file lies.
+    // The header's section table is not validated yet, so check that its sections are those that were decoded above.
     const auto lies_at = [&](baked::Section number, uint64_t offset, uint64_t bytes) {
       return header.sections[number].offset == offset && header.sections[number].bytes == bytes;
     };

@@ -13,16 +13,17 @@ namespace packtrace {
 
 using namespace page_fast;
 
-/// What is known of the cluster that is being decoded.
+/// Data of the cluster that is being decoded.
 struct FastPageReader::Work {
   std::array<Layout, kChannels> layouts;
-  std::array<uint64_t, kChannels> prefix_bit{}; ///< of what is copied: palettes, anchors of texture coordinates
+  /// Place of the bits that are copied: palettes; anchors and widths of texture coordinates.
+  std::array<uint64_t, kChannels> prefix_bit{};
   std::array<uint32_t, kChannels> prefix_bits{};
-  std::array<uint64_t, kChannels> verbatim_bit{}; ///< of the words that are copied
-  const uint8_t* turns = nullptr;                 ///< bits
+  std::array<uint64_t, kChannels> verbatim_bit{}; ///< place of words without prediction
+  const uint8_t* turns = nullptr;                 ///< bit array
   const uint8_t* fresh = nullptr;
-  std::array<uint64_t, 3> restarts{}; ///< bits; the last word is only read
-  WalkMemory::Words residuals{};      ///< of one channel, without gaps
+  std::array<uint64_t, 3> restarts{}; ///< bit array; the last word is read, but never set
+  WalkMemory::Words residuals{};      ///< residuals of positions, without gaps for creases
   WalkInput input;
   WalkMemory memory;
 };
@@ -189,7 +190,7 @@ bool FastPageReader::read_channel(uint32_t channel, const Header& header, uint32
   return true;
 }
 
-/// A residual that has more bits.
+/// Adds a residual whose high part is wider than a byte.
 bool FastPageReader::read_escape(const ChannelCode& code, uint32_t count, uint64_t* residuals) {
   const uint8_t* bits = parts_[kFields].at;
   uint64_t at = 0;

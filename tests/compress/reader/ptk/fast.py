@@ -8,9 +8,9 @@ from ptk.records import HAS_NORMALS, HAS_UVS, BadFile, Bits, Cursor, Record, ind
 from ptk.zstd import decompress
 
 PART_COUNT = 9
-FIELDS, HEADERS, BITS, RUNS, OLDS, RESIDUALS = range(6)  # the residuals' classes follow each other
+FIELDS, HEADERS, BITS, RUNS, OLDS, RESIDUALS = range(6)  # followed by the other classes of residuals
 WORD = (1 << 64) - 1
-WIDE = 57  # words of more bits are copied
+WIDE = 57  # wider words are copied
 
 HEADER = Record(
     ("anchor", "3I"), ("material_slot", "I"), ("normal_anchor", "2H"), ("normal_palette", "H"),

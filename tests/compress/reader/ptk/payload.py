@@ -30,9 +30,9 @@ class PageCluster:
     starts: list = field(default_factory=list)  # per triangle: whether it begins a strip
     lefts: list = field(default_factory=list)  # per triangle
     fresh: list = field(default_factory=list)  # per corner
-    olds: list = field(default_factory=list)  # vertices of the corners that are not fresh
+    olds: list = field(default_factory=list)  # vertices of corners that are not fresh
     positions: list = field(default_factory=list)  # words: the fields of a vertex, first field lowest
-    normals: list = field(default_factory=list)  # words, or numbers in the palette
+    normals: list = field(default_factory=list)  # words, or palette indices
     palette: list = field(default_factory=list)  # words
     uvs: list = field(default_factory=list)  # words
     uv_anchors: tuple = (0, 0)  # as unsigned numbers

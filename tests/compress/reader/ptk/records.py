@@ -108,7 +108,7 @@ NODE = Record(
     ("cluster", "I"), ("children", "8B"), ("lo", "24B"), ("hi", "24B"))
 INNER_CHILD = 255
 
-# In the order of the section table; None: bytes.
+# In the order of the section table; None: plain bytes.
 SECTIONS = (
     ("geometries", GEOMETRY), ("clusters", CLUSTER), ("payload", None), ("materials", MATERIAL),
     ("instances", INSTANCE), ("masks", MASK), ("mask_words", Record(("word", "I"))), ("textures", TEXTURE),

@@ -15,9 +15,9 @@ class Mesh:
     lattice: list
     positions: list
     normals: list  # (0, 0, 0) in flat clusters
-    uvs: list  # (0, 0) in clusters without
+    uvs: list  # (0, 0) in clusters without texture coordinates
     triangles: list
-    slots: list  # per triangle, of materials
+    slots: list  # material slot per triangle
 
 
 def read_triangles(bits, cluster):
