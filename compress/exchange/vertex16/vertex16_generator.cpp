@@ -151,7 +151,7 @@ std::string decoders(const std::string& prefix) {
   return replaced(std::move(text), "@LAST", std::to_string(last));
 }
 
-constexpr std::string_view kNotice = "// Made by vertex16_generator from compress/exchange/vertex16/vertex16_fields.h; "
+constexpr std::string_view kNotice = "// Made by vertex16_generator from vertex16_fields.h; "
                                      "docs/vertex16.md says where the bytes lie.\n";
 constexpr std::string_view kFrame = R"(
 // What a geometry's vertices share: 32 bytes, as std430 and C++ lay them out.
