@@ -72,7 +72,7 @@ public:
       : source_(source), tracer_(tracer), gbuffer_(gbuffer), config_(config), coefficient_(config),
         sampler_(config.sampler, config.seed), first_sample_(static_cast<uint64_t>(frame_index) * config.spp),
         unit_radius_(config.radius * tracer.space().scale()),
-        unit_reach_(static_cast<float>(unit_radius_ * coefficient_.end())), out_(out) {}
+        ray_length_(static_cast<float>(unit_radius_ * coefficient_.end())), out_(out) {}
 
   /// Needs RayHit for distances, a byte otherwise.
   template <typename Result>
@@ -135,7 +135,7 @@ private:
       make_basis(point.normal, point.tangent, point.bitangent);
       const DVec3 origin = DVec3(gbuffer_.position[pixel]) + DVec3(point.geometric) * double(gbuffer_.offset[pixel]);
       rays[count].origin = Vec3(tracer_.space().to_unit(origin));
-      rays[count++].tfar = unit_reach_;
+      rays[count++].tfar = ray_length_;
     }
     return count;
   }
@@ -186,7 +186,7 @@ private:
   const PixelSampler sampler_;
   const uint64_t first_sample_;
   const double unit_radius_;
-  const float unit_reach_;
+  const float ray_length_;
   AoFrame& out_;
 };
 

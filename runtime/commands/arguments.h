@@ -21,7 +21,7 @@ namespace packtrace {
 /// Words behind "--" stay as they are.
 /// @param words without the program's name
 /// Throws Error(kUsage).
-std::vector<std::string> plain_arguments(CLI::App& app, std::span<const char* const> words);
+std::vector<std::string> normalised_arguments(CLI::App& app, std::span<const char* const> words);
 
 /// The value of an option in words that could not be parsed: of the last "--name VALUE" or "--name=VALUE" before "--";
 /// empty where there is none.

@@ -34,7 +34,7 @@ constexpr std::array<const char*, baked::kPurposeCount> kPurposes{"ao", "shading
 constexpr const char* kKeepNormals = "normals";
 constexpr const char* kKeepUvs = "uv";
 constexpr std::array<const char*, 3> kLodUses{"off", "instanced", "all"}; // by LodUse
-constexpr const char* kLodAlone = kLodUses[2];                            // for --lod without a value
+constexpr const char* kLodDefaultValue = kLodUses[2];                            // for --lod without a value
 
 struct BakeOptions {
   std::string input, output;
@@ -103,7 +103,7 @@ nlohmann::json promise_json(const BakeReport& baked) {
 }
 
 /// What is lost, and which option keeps it; empty where pictures are as promised.
-std::string promise_text(const BakeReport& baked, bool chosen) {
+std::string precision_warning(const BakeReport& baked, bool chosen) {
   constexpr size_t kMaxShown = 3;
   if (baked.promise.empty()) return {};
   std::vector<BrokenPromise> worst = baked.promise;
@@ -213,7 +213,7 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   report_diagnostics(diagnostics, globals);
 
   if (json.wanted()) json.write(report(options, baked, imported.statistics, import_s, bake_s, globals.verbosity > 0));
-  const std::string promise = promise_text(baked, config.precision_kind != PrecisionKind::kPicture);
+  const std::string promise = precision_warning(baked, config.precision_kind != PrecisionKind::kPicture);
   if (json.to_stdout() || globals.quiet) {
     print_printable(promise, stderr);
     return 0;
@@ -332,7 +332,7 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
           "off)")
       ->check(one_of(std::vector<std::string>(kLodUses.begin(), kLodUses.end())))
       ->expected(0, 1)
-      ->default_str(kLodAlone)
+      ->default_str(kLodDefaultValue)
       ->group("Levels of detail");
   verb.add_option("--lod-min-triangles", options->lod_min_triangles,
                   "Geometries of fewer triangles get no levels (default 128)")

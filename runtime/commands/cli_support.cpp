@@ -93,7 +93,7 @@ int run_words(CLI::App& app, GlobalOptions& globals, std::span<const char* const
 
 /// Whether an error may be written there: where there is nothing yet, or results. What is no JSON may be a file of the
 /// scene that could not be read.
-bool may_take_error(const std::string& destination) {
+bool can_hold_error_json(const std::string& destination) {
   std::error_code unknown;
   if (destination == "-" || !std::filesystem::is_regular_file(destination, unknown)) return true;
   std::ifstream file(destination);
@@ -107,7 +107,7 @@ void write_failure(CLI::App& app, const GlobalOptions& globals, std::span<const 
   // Where the words could not be parsed, no option has its value.
   const std::string destination = globals.json.empty() ? value_in_words(words, "--json") : globals.json;
   if (destination.empty() || find_verb(app, destination)) return; // "--json info": the name was forgotten
-  if (!may_take_error(destination)) {
+  if (!can_hold_error_json(destination)) {
     print_failure(destination + ": holds something else than JSON, so the error is not written there", 0);
     return;
   }

@@ -9,7 +9,7 @@ class App;
 
 namespace packtrace {
 
-/// Parses the words behind the program's name into the app's options, after plain_arguments(). What is wrong is said in
+/// Parses the words behind the program's name into the app's options, after normalised_arguments(). What is wrong is said in
 /// this program's words, with the nearest name there is.
 /// @return false where the words asked for help or the version, which has been printed
 /// Throws Error(kUsage).

@@ -30,7 +30,7 @@ struct ExportOptions {
   std::string layout; ///< empty: by the output's extension
   std::string codec = kDraco;
   GltfConfig gltf;
-  bool for_gltf = false; ///< an option was given that only glTF has
+  bool has_gltf_option = false; ///< an option was given that only glTF has
 };
 
 /// Bytes to be written and what is said about them.
@@ -155,7 +155,7 @@ Exported export_file(const ExportOptions& options, const std::string& layout, co
 int run(const ExportOptions& options, const GlobalOptions& globals) {
   if (options.output.empty()) fail_without_output("export", options.input, ".glb");
   const std::string layout = layout_of(options);
-  if (layout == kVertex16 && options.for_gltf)
+  if (layout == kVertex16 && options.has_gltf_option)
     throw Error(ErrorKind::kUsage, "--codec, --level, --normal-bits and --uv-bits are for --layout gltf");
   JsonOutput json(globals.json, globals.force);
   BinaryOutput output(options.output, globals.force, json);
@@ -177,7 +177,7 @@ void add_export_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<ExportOptions>();
   CLI::App& verb = add_verb(app, globals, "export", "Write a .ptk file in a form that other programs read",
                             [options, &globals] { return run(*options, globals); });
-  const auto of_gltf = [options](const std::string&) { options->for_gltf = true; };
+  const auto of_gltf = [options](const std::string&) { options->has_gltf_option = true; };
   verb.add_option("FILE", options->input, "A .ptk file")->required();
   add_output_option(verb, options->output, "The file to write, or - for standard output with --layout (required)");
   verb.add_option("--layout", options->layout,

@@ -34,7 +34,7 @@ public:
   void write(const RenderedImage& image, const ExrAttributes& attributes);
 
   /// Whether a layer is about levels of detail.
-  bool show_detail() const;
+  bool has_lod_layers() const;
 
   /// Standard output carries a picture: text for people does not belong there.
   bool to_stdout() const { return to_stdout_; }

@@ -29,7 +29,7 @@ public:
   };
   static constexpr double kTerminalInterval = 0.1; ///< seconds
   static constexpr double kPlainInterval = 10.0;   ///< seconds
-  static constexpr double kWorthALine = 0.5;       ///< seconds; shorter phases are not mentioned in plain lines
+  static constexpr double kMinPlainPhase = 0.5;       ///< seconds; shorter phases are not mentioned in plain lines
 
   explicit ProgressDisplay(const GlobalOptions& globals);
   explicit ProgressDisplay(Config config);

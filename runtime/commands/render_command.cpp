@@ -95,7 +95,7 @@ ChosenCamera choose_camera(const SceneSource& source, const RenderOptions& optio
 }
 
 /// What is shown instead of a camera that sees nothing of the scene.
-ChosenCamera frame_instead(const ChosenCamera& blind, const SceneSource& source, ImageSize size,
+ChosenCamera frame_whole_scene(const ChosenCamera& blind, const SceneSource& source, ImageSize size,
                            const RenderOptions& options, const GlobalOptions& globals) {
   ChosenCamera framing{framing_camera(source.world_bounds(), size), std::nullopt,
                        fmt::format("camera {} sees nothing", blind.index.value())};
@@ -163,11 +163,11 @@ MemoryReservation reserve_picture(const RenderOptions& options, const RenderConf
 
 /// @param baked whether the input is a .ptk file
 Backend choose_backend(const RenderOptions& options, bool baked) {
-  const bool about_embree = options.bvh || options.fast_edges;
-  if (!options.backend) return baked && !about_embree ? Backend::kPacked : Backend::kEmbree;
+  const bool needs_embree = options.bvh || options.fast_edges;
+  if (!options.backend) return baked && !needs_embree ? Backend::kPacked : Backend::kEmbree;
   const std::string& name = *options.backend; // one of those that the option's check knows
   if (name == "embree") return Backend::kEmbree;
-  if (about_embree)
+  if (needs_embree)
     throw Error(ErrorKind::kUsage, "--bvh and --fast-edges are about Embree's own triangles, for backend embree");
   if (name == "packed") return Backend::kPacked;
   if (options.lod.error_px)
@@ -296,7 +296,7 @@ struct Traced {
 };
 
 Traced trace(const RenderOptions& options, const GlobalOptions& globals, const LoadedScene& loaded, RenderConfig config,
-             ChosenCamera chosen, const TracerConfig& backend, bool show_detail, Progress& progress) {
+             ChosenCamera chosen, const TracerConfig& backend, bool has_lod_layers, Progress& progress) {
   Traced traced;
   traced.camera = std::move(chosen);
   double build_s = 0.0;
@@ -319,24 +319,24 @@ Traced trace(const RenderOptions& options, const GlobalOptions& globals, const L
       choose(&seen);
       return Occluders{traced.detail->source.get(), traced.tracers[1].get(), *options.lod.error_px};
     };
-  const bool sees_levels = options.lod.error_px && !options.lod.only_occlusion();
-  if (sees_levels && show_detail) config.lod_error_px = *options.lod.error_px;
+  const bool camera_uses_lod = options.lod.error_px && !options.lod.only_occlusion();
+  if (camera_uses_lod && has_lod_layers) config.lod_error_px = *options.lod.error_px;
   const auto render = [&] {
     progress.begin("bvh", 0);
-    if (sees_levels) { // those that this camera needs
+    if (camera_uses_lod) { // those that this camera needs
       traced.tracers.clear();
       choose(nullptr);
     } else if (traced.tracers.empty()) {
       build([&] { return make_tracer(*loaded.source, loaded.baked ? &*loaded.baked : nullptr, backend); });
     }
-    const SceneSource& source = sees_levels ? *traced.detail->source : *loaded.source;
+    const SceneSource& source = camera_uses_lod ? *traced.detail->source : *loaded.source;
     traced.image = render_view(source, *traced.tracers[0], traced.camera.camera, config, progress, occluders);
   };
-  config.only_if_seen = !options.camera && traced.camera.index;
+  config.stop_if_nothing_visible = !options.camera && traced.camera.index;
   render();
-  if (!traced.image.seen && config.only_if_seen) {
-    traced.camera = frame_instead(traced.camera, *loaded.source, config.size, options, globals);
-    config.only_if_seen = false;
+  if (!traced.image.seen && config.stop_if_nothing_visible) {
+    traced.camera = frame_whole_scene(traced.camera, *loaded.source, config.size, options, globals);
+    config.stop_if_nothing_visible = false;
     render();
   }
   traced.image.timings.build_s = build_s;
@@ -351,7 +351,7 @@ PreviewStyle preview_style(const RenderOptions& options) {
 }
 
 /// @param count of instances that are not traced
-void warn_of_lines(const std::string& input, size_t count) {
+void warn_of_flat_instances(const std::string& input, size_t count) {
   if (count == 0) return;
   print_printable(fmt::format("{}: warning: {} instance{} not traced: pressed onto a line or a point\n", input, count,
                               count == 1 ? " is" : "s are"),
@@ -364,14 +364,14 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   if (!options.size.empty()) parse_size(options.size);
   validate(options.lod);
   JsonOutput json(globals.json, globals.force);
-  const bool sees_levels = options.lod.error_px && !options.lod.only_occlusion();
-  ImageOutputs outputs(options.outputs, options.aovs, sees_levels, globals.force,
+  const bool camera_uses_lod = options.lod.error_px && !options.lod.only_occlusion();
+  ImageOutputs outputs(options.outputs, options.aovs, camera_uses_lod, globals.force,
                        preview_style(options)); // before the work, like the above
   if (outputs.to_stdout() && json.to_stdout())
     throw Error(ErrorKind::kUsage, "-o - and --json - would both go to standard output; give one of them a file");
-  if (outputs.show_detail() && !options.lod.error_px)
+  if (outputs.has_lod_layers() && !options.lod.error_px)
     throw Error(ErrorKind::kUsage, "layers about levels of detail need --lod-error");
-  if (outputs.show_detail() && !sees_levels)
+  if (outputs.has_lod_layers() && !camera_uses_lod)
     throw Error(ErrorKind::kUsage, "with --lod-rays occlusion all that is seen is level 0: no layers about detail");
   ProgressDisplay display(globals);
   Progress progress(display.observer());
@@ -385,7 +385,7 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   const MemoryReservation pixels = reserve_picture(options, config, globals.memory);
   const TracerConfig backend = tracer_config(options, globals, loaded.baked.has_value());
   const Traced traced =
-      trace(options, globals, loaded, config, std::move(camera), backend, outputs.show_detail(), progress);
+      trace(options, globals, loaded, config, std::move(camera), backend, outputs.has_lod_layers(), progress);
   display.finish();
   const RenderedImage& image = traced.image;
 
@@ -406,11 +406,11 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
     const PrimaryCamera traced_pixels(
         traced.camera.camera, {config.size.width * config.supersample, config.size.height * config.supersample});
     result["seams"] =
-        visible_seams_json(InstanceSeams(*loaded.baked), image, traced_pixels, sees_levels ? &*traced.detail : nullptr);
+        visible_seams_json(InstanceSeams(*loaded.baked), image, traced_pixels, camera_uses_lod ? &*traced.detail : nullptr);
   }
   if (!image.seen && !globals.quiet)
     print_printable(options.input + ": warning: this camera sees nothing of the scene; try --camera auto\n", stderr);
-  if (!globals.quiet) warn_of_lines(options.input, tracers[0]->flat_instances().size());
+  if (!globals.quiet) warn_of_flat_instances(options.input, tracers[0]->flat_instances().size());
   if (json.wanted()) json.write(result);
   if (json.to_stdout() || globals.quiet) return 0;
   std::FILE* const text = outputs.to_stdout() ? stderr : stdout;

@@ -159,7 +159,7 @@ BlurRow make_row(const NoisyImage& image, int step, const Plane<float>& samples,
 
 void edge_blur(const EdgeWeights& edges, const Plane<float>& samples, Fade fade, float limit, ImageSize size,
                NoisyImage& image, BlurScratch& scratch) {
-  if (std::none_of(image.youngest.begin(), image.youngest.end(), [&](float tspp) { return tspp < fade.end; })) return;
+  if (std::none_of(image.min_tspp.begin(), image.min_tspp.end(), [&](float tspp) { return tspp < fade.end; })) return;
   const int width = static_cast<int>(size.width);
   for_row_blocks(size.height, [&](int first, int last) {
     for (size_t direction = 0; direction < EdgeWeights::kDirections.size(); ++direction)
@@ -167,7 +167,7 @@ void edge_blur(const EdgeWeights& edges, const Plane<float>& samples, Fade fade,
   });
   for_row_blocks(size.height, [&](int first, int last) {
     for (int y = first; y < last; ++y) {
-      if (image.youngest[static_cast<size_t>(y)] < fade.end) {
+      if (image.min_tspp[static_cast<size_t>(y)] < fade.end) {
         blur_row(width, edges.step(), make_row(image, edges.step(), samples, y, scratch), fade);
       } else {
         std::copy_n(image.value.row(y), width, scratch.image.value.row(y));

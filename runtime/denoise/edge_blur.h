@@ -9,11 +9,11 @@ namespace packtrace {
 struct NoisyImage {
   Plane<float> value;
   Plane<float> inverse_variance; ///< 1 / variance of the noise left in `value`
-  std::vector<float> youngest;   ///< per row: least tspp of its pixels; misses do not count
+  std::vector<float> min_tspp;   ///< per row: least tspp of its pixels; misses do not count
 
   void resize(ImageSize size) {
     value.resize(size), inverse_variance.resize(size);
-    youngest.assign(size.height, 0.0f);
+    min_tspp.assign(size.height, 0.0f);
   }
 };
 

@@ -13,7 +13,7 @@ namespace {
 constexpr float kMinWeight = 1e-3f;
 
 /// Footprints with less weight cross an edge that sharpening would overshoot at.
-constexpr float kSharpenWeight = 0.9f;
+constexpr float kMinSharpenWeight = 0.9f;
 
 struct Tests {
   float depth, slope;
@@ -128,7 +128,7 @@ public:
     corner(at + 1, fx * (1.0f - fy));
     corner(at + previous_.stride, (1.0f - fx) * fy);
     corner(at + previous_.stride + 1, fx * fy);
-    if (sum.weight > kSharpenWeight && (fx > 0.0f || fy > 0.0f))
+    if (sum.weight > kMinSharpenWeight && (fx > 0.0f || fy > 0.0f))
       sum.sharpening = sharpen(previous_, at, fx, fy, surface);
     return sum;
   }

@@ -61,7 +61,7 @@ struct CorrectScales {
 PACKTRACE_AVX2_CLONES
 float correct_row(int width, const CorrectRow& rows, CorrectScales s) {
   const CorrectRow r = rows;
-  int32_t youngest = std::numeric_limits<int32_t>::max(); // bits of floats >= 0 are ordered like integers
+  int32_t min_tspp = std::numeric_limits<int32_t>::max(); // bits of floats >= 0 are ordered like integers
 #pragma GCC ivdep
   for (int x = 0; x < width; ++x) {
     const float noise = r.local_variance[x] * s.fast_share;
@@ -82,7 +82,7 @@ float correct_row(int width, const CorrectRow& rows, CorrectScales s) {
     const float distrust = s.trust_frames / larger(n, 1.0f);
     const float hit_samples = r.disparity[x] > 0.0f ? n : std::numeric_limits<float>::max();
     const int32_t bits = std::bit_cast<int32_t>(hit_samples);
-    youngest = bits < youngest ? bits : youngest;
+    min_tspp = bits < min_tspp ? bits : min_tspp;
     r.mean[x] = new_mean;
     r.square[x] = moment + new_mean * new_mean;
     r.samples[x] = n;
@@ -90,7 +90,7 @@ float correct_row(int width, const CorrectRow& rows, CorrectScales s) {
     r.value[x] = new_mean;
     r.inverse_variance[x] = 1.0f / (variance * (1.0f + distrust * distrust) + kMinVariance);
   }
-  return std::bit_cast<float>(youngest);
+  return std::bit_cast<float>(min_tspp);
 }
 
 } // namespace
@@ -135,7 +135,7 @@ void correct_history(const FrameSamples& samples, const Guides& guides, const De
                            history.mean.row(y),        history.square.row(y),
                            history.samples.row(y),     &value_variance[static_cast<size_t>(y) * guides.size.width],
                            image.value.row(y),         image.inverse_variance.row(y)};
-      image.youngest[static_cast<size_t>(y)] = correct_row(static_cast<int>(guides.size.width), row, scales);
+      image.min_tspp[static_cast<size_t>(y)] = correct_row(static_cast<int>(guides.size.width), row, scales);
     }
   });
 }

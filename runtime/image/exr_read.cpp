@@ -28,7 +28,7 @@ constexpr uint32_t kMaxTileSide = 8192, kMinTileSide = 8;
 /// More than any of the format's lossless codecs can shrink; a file may claim that many times its own length, so that
 /// a few hundred bytes cannot demand gigabytes. Small images are allowed in any case.
 constexpr uint64_t kMaxRatio = 2048;
-constexpr uint64_t kFreeBytes = uint64_t{64} << 20;
+constexpr uint64_t kAlwaysAcceptedBytes = uint64_t{64} << 20;
 
 [[noreturn]] void fail(std::string_view name, const std::string& what, ErrorKind kind = ErrorKind::kInput) {
   throw FileError(kind, std::string(name), what);
@@ -65,7 +65,7 @@ ImageSize checked_size(const ExrHeader& header, uint64_t file_bytes, std::string
       fail(name, "EXR tile size is not supported", ErrorKind::kUnsupported);
   }
   if (width > kMaxImageSide || height > kMaxImageSide ||
-      std::max(width * height * pixel_bytes, header.block_bytes()) > std::max(kFreeBytes, kMaxRatio * file_bytes))
+      std::max(width * height * pixel_bytes, header.block_bytes()) > std::max(kAlwaysAcceptedBytes, kMaxRatio * file_bytes))
     fail(name, "image of " + std::to_string(width) + " x " + std::to_string(height) + " pixels and " +
                    std::to_string(header.channels.size()) + " channels is too large for a file of " +
                    std::to_string(file_bytes) + " bytes");

@@ -21,7 +21,7 @@ struct RenderConfig {
   uint32_t supersample = 1;  ///< [1, 8]: traced and denoised at this multiple per axis, box-filtered at the end
   uint32_t frames = 32;      ///< [1, 65536]: each traces AoConfig::spp samples a pixel
   bool denoise = true;       ///< false: frames are averaged, nothing else
-  bool only_if_seen = false; ///< stop behind the camera rays where none of them hits
+  bool stop_if_nothing_visible = false; ///< stop behind the camera rays where none of them hits
   /// Above 0: fill the layers of RenderedImage about levels of detail. The error that was allowed, in traced pixels.
   double lod_error_px = 0.0;
   AoConfig ao;
@@ -44,7 +44,7 @@ struct RenderTimings {
 /// that of the first of them.
 struct RenderedImage {
   ImageSize size;
-  bool seen = true;            ///< false: no camera ray hits; with RenderConfig::only_if_seen all layers are empty then
+  bool seen = true;            ///< false: no camera ray hits; with RenderConfig::stop_if_nothing_visible all layers are empty then
   std::vector<float> ao;       ///< denoised, or the mean over all frames
   std::vector<float> ao_raw;   ///< of the last frame alone
   std::vector<float> depth;    ///< camera-space z, world units
