@@ -33,8 +33,8 @@ constexpr const char *kAuto = "auto", *kNoTextures = "none";
 constexpr std::array<const char*, baked::kPurposeCount> kPurposes{"ao", "shading"};
 constexpr const char* kKeepNormals = "normals";
 constexpr const char* kKeepUvs = "uv";
-constexpr std::array<const char*, 3> kLodUses{"off", "instanced", "all"}; // by LodUse
-constexpr const char* kLodAlone = kLodUses[2];                            // for --lod without a value
+constexpr std::array<const char*, 3> kLodUses{"off", "instanced", "all"}; // indexed by LodUse
+constexpr const char* kLodAlone = kLodUses[2];                            // meaning of --lod without a value
 
 struct BakeOptions {
   std::string input, output;
@@ -45,7 +45,7 @@ struct BakeOptions {
   std::string purpose = kPurposes[baked::kAo];
   std::vector<std::string> keep;
   std::string uvs = kAuto;
-  std::optional<std::string> textures; ///< without one, what the purpose needs
+  std::optional<std::string> textures; ///< if not set, the purpose decides
   std::optional<double> texture_psnr;
   std::string trees = "on";
   std::string lod = kLodUses[0];
@@ -90,7 +90,7 @@ BakeConfig make_config(const BakeOptions& options) {
   config.lod_levels = options.lod_levels.value_or(config.lod_levels);
   config.resume = options.resume;
   config.trees = options.trees == "on";
-  config.codec = find_page_codec(options.codec).value(); // the option's check knows the names
+  config.codec = find_page_codec(options.codec).value(); // the option's check accepts only these names
   config.validate();
   return config;
 }
@@ -102,7 +102,9 @@ nlohmann::json promise_json(const BakeReport& baked) {
   return {{"kept", baked.promise.empty()}, {"geometries", geometries}};
 }
 
-/// What is lost, and which option keeps it; empty where pictures are as promised.
+/// Warning about geometries whose grid step is coarser than required, with the option that avoids it; empty if there
+/// are none.
+/// @param chosen whether the user gave a precision option
 std::string promise_text(const BakeReport& baked, bool chosen) {
   constexpr size_t kMaxShown = 3;
   if (baked.promise.empty()) return {};
@@ -112,7 +114,7 @@ std::string promise_text(const BakeReport& baked, bool chosen) {
   });
   std::string text = fmt::format("warning: ambient occlusion may differ more than promised: {} of {} geometries\n",
                                  worst.size(), baked.file.geometries);
-  double step = 0.0; // of the world
+  double step = 0.0; // finest step that is required, world units
   for (size_t i = 0; i < worst.size(); ++i) {
     const BrokenPromise& g = worst[i];
     if (!g.float_limit && (step == 0.0 || g.wanted * g.scale < step)) step = g.wanted * g.scale;
@@ -161,7 +163,7 @@ nlohmann::json report(const BakeOptions& options, const BakeReport& baked, const
   return json;
 }
 
-/// How to come by the kind of file that the output's ending names.
+/// Advice on how to produce a file of the type that the output's extension names.
 std::string advice_for(const BakeOptions& options) {
   const std::filesystem::path output(options.output);
   const std::string baked = std::filesystem::path(output).replace_extension(".ptk").string(),

@@ -27,7 +27,7 @@ std::string nearest_of(std::string_view name, const std::vector<std::string>& na
 
 constexpr const char* kProgram = "packtrace";
 
-/// "packtrace bake", or "packtrace" alone.
+/// Returns "packtrace bake" for a verb, "packtrace" for the program.
 std::string command_of(const CLI::App& app) { return app.get_parent() ? kProgram + (" " + app.get_name()) : kProgram; }
 
 std::string no_such_option(CLI::App& app, const std::string& word) {
@@ -54,13 +54,13 @@ std::string no_such_option(CLI::App& app, const std::string& word) {
               fmt::format("unknown verb '{}'{}; there are {}", word, nearest_of(word, names), verb_names(app)));
 }
 
-/// Whether the words ask for what needs no verb.
+/// Whether a word requests help or the version, which need no verb.
 bool asks_for_help(const CLI::App& app, const std::string& word) {
   const auto is = [&](const CLI::Option* option) { return option && option->check_name(word); };
   return is(app.get_help_ptr()) || is(app.get_version_ptr());
 }
 
-/// CLI11 says "a subcommand is required" for no verb, and for one that it does not know; this names it.
+/// Throws Error(kUsage) if the verb is missing or unknown. CLI11 would report "a subcommand is required" for both.
 void require_verb(CLI::App& app, const std::vector<std::string>& words) {
   for (size_t i = 0; i < words.size(); ++i) {
     const std::string& word = words[i];
@@ -78,12 +78,12 @@ void require_verb(CLI::App& app, const std::vector<std::string>& words) {
   throw Error(ErrorKind::kUsage, "a verb is needed: " + verb_names(app) + " (packtrace --help explains)");
 }
 
-/// What is wrong with the command line of a verb.
+/// Error message for the command line of a verb.
 std::string message_of(const CLI::ParseError& error, CLI::App& verb) {
   const std::string text = error.what();
   if (dynamic_cast<const CLI::ExtrasError*>(&error)) {
     std::vector<std::string> left = verb.remaining();
-    const auto mark = std::ranges::find(left, "--"); // what follows it is no option, whatever it looks like
+    const auto mark = std::ranges::find(left, "--"); // words after "--" are never options
     const auto given = std::find_if(left.begin(), mark, [](const std::string& word) { return word.starts_with("-"); });
     if (given != mark) return no_such_option(verb, *given);
     std::erase(left, "--");
@@ -107,7 +107,7 @@ bool parse_command_line(CLI::App& app, std::span<const char* const> words) {
   require_verb(app, plain);
   app.require_subcommand(1);
   try {
-    std::ranges::reverse(plain); // as App::parse() wants them
+    std::ranges::reverse(plain); // App::parse() expects the words in reverse order
     app.parse(std::move(plain));
     return true;
   } catch (const CLI::Success& success) {

@@ -32,8 +32,8 @@ namespace {
 struct CompareOptions {
   std::string test, reference, layer;
   std::vector<std::string> metrics{"all"};
-  std::array<std::optional<double>, 5> limits; ///< by MetricKind::kAll order
-  std::optional<double> max_mismatch;          ///< fraction of pixels
+  std::array<std::optional<double>, 5> limits; ///< indexed like kMetrics
+  std::optional<double> max_mismatch;          ///< fraction of pixels, [0, 1]
   double pixels_per_degree = kFlipPixelsPerDegree;
   std::string diff, diff_metric = "mae";
   float diff_white = 0.25f;
@@ -43,8 +43,8 @@ struct MetricKind {
   const char* name;
   const char* json_name;
   bool higher_is_better;
-  uint32_t smallest_side; ///< of images it can be computed for
-  bool colors_only;       ///< needs 1 or 3 channels
+  uint32_t smallest_side; ///< minimum image width and height, pixels
+  bool colors_only;       ///< requires 1 or 3 channels
 };
 constexpr std::array<MetricKind, 5> kMetrics{{{"rmse", "rmse", false, 1, false},
                                               {"mae", "mae", false, 1, false},
@@ -58,13 +58,13 @@ size_t metric_index(std::string_view name) {
   return static_cast<size_t>(found - kMetrics.begin());
 }
 
-/// Two images made alike, and which of their pixels have values.
+/// Two images with the same channels, and the pixels that have a value in both.
 struct ImagePair {
   Image test, reference;
   std::string layer;
-  std::vector<uint8_t> valid; ///< empty: all
-  uint64_t compared = 0;      ///< pixels with a value in both
-  uint64_t mismatched = 0;    ///< pixels with a value in only one
+  std::vector<uint8_t> valid; ///< one entry per pixel, nonzero if compared; empty: all pixels
+  uint64_t compared = 0;      ///< pixels with a value in both images
+  uint64_t mismatched = 0;    ///< pixels with a value in only one image
   bool alpha_ignored = false;
 };
 
@@ -73,7 +73,8 @@ void drop_alpha(LoadedImage& loaded) {
   loaded.alpha = false;
 }
 
-/// Pixels of an ambient occlusion layer that have a value. PNG files and other layers have one everywhere.
+/// Mask of the pixels of an ambient occlusion layer that have a value. Empty for PNG files and other layers, where all
+/// pixels have one.
 std::vector<uint8_t> valid_pixels(const LoadedImage& loaded) {
   std::vector<uint8_t> valid;
   if (!loaded.layer.starts_with("ao") || loaded.image.channels != 1) return valid;
@@ -97,7 +98,7 @@ ImagePair load_pair(const CompareOptions& options) {
   const std::vector<uint8_t> a = valid_pixels(test), b = valid_pixels(reference);
   pair.compared = test.image.size.pixels();
   if (!a.empty() || !b.empty()) {
-    // A picture that cannot say "no value" takes the other's word for it.
+    // If only one image can mark pixels without a value, its mask applies to both.
     pair.valid = a.empty() ? b : a;
     for (size_t i = 0; i < pair.valid.size() && !a.empty() && !b.empty(); ++i) {
       pair.mismatched += a[i] != b[i];
@@ -132,7 +133,7 @@ Metric compute(size_t metric, const ImagePair& pair, const CompareOptions& optio
   }
 }
 
-/// Metrics asked for by name, by "all" where they can be computed, or by a limit or the difference picture.
+/// Selects the metrics that are requested by name, by "all" (if applicable), by a limit, or for the difference picture.
 std::array<bool, 5> wanted_metrics(const CompareOptions& options, const Image& image) {
   std::array<bool, 5> wanted{};
   for (const std::string& name : options.metrics)
@@ -144,7 +145,7 @@ std::array<bool, 5> wanted_metrics(const CompareOptions& options, const Image& i
   return wanted;
 }
 
-/// One limit that was given, and how the images did.
+/// A limit from the command line and the measured value.
 struct Check {
   std::string name;
   double limit = 0.0, value = 0.0;
@@ -171,7 +172,7 @@ nlohmann::json to_json(const CompareOptions& options, const ImagePair& pair,
                        const std::array<std::optional<double>, 5>& values, const std::vector<Check>& checks) {
   nlohmann::json metrics = nlohmann::json::object(), limits = nlohmann::json::array();
   for (size_t i = 0; i < kMetrics.size(); ++i)
-    if (values[i]) metrics[kMetrics[i].json_name] = *values[i]; // the PSNR of equal images, infinity, becomes null
+    if (values[i]) metrics[kMetrics[i].json_name] = *values[i]; // infinity (the PSNR of equal images) becomes null
   for (const Check& check : checks)
     limits.push_back({{"name", check.name}, {"limit", check.limit}, {"value", check.value}, {"passed", check.passed}});
   return {{"verb", "compare"},
@@ -244,7 +245,7 @@ int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
   }
   const Error error(ErrorKind::kLimitExceeded, fmt::format("{} is {:.6g}, beyond its limit {:.6g}", exceeded->name,
                                                            exceeded->value, exceeded->limit));
-  document["error"] = error_json(error); // beside what was measured
+  document["error"] = error_json(error); // in addition to the measured values
   json.write(document);
   return report_error(error);
 }

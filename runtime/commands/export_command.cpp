@@ -27,13 +27,13 @@ constexpr const char *kVertex16 = "vertex16", *kGltf = "gltf", *kDraco = "draco"
 
 struct ExportOptions {
   std::string input, output;
-  std::string layout; ///< empty: by the output's extension
+  std::string layout; ///< empty: chosen by the output's extension
   std::string codec = kDraco;
   GltfConfig gltf;
-  bool for_gltf = false; ///< an option was given that only glTF has
+  bool for_gltf = false; ///< whether an option was given that applies to glTF only
 };
 
-/// Bytes to be written and what is said about them.
+/// The exported file and its reports.
 struct Exported {
   std::vector<std::byte> bytes;
   nlohmann::json json;
@@ -117,7 +117,8 @@ std::string to_text(const ExportOptions& options, const GltfReport& r) {
   return text;
 }
 
-/// The layout asked for, or that of the output's extension.
+/// Returns the layout from --layout, or else the one that the output's extension implies. Throws Error(kUsage) if they
+/// contradict each other or neither is known.
 std::string layout_of(const ExportOptions& options) {
   const std::string ending = ending_of(options.output);
   if (ending == ".gltf") throw FileError(ErrorKind::kUsage, options.output, "glTF is written as one binary file, .glb");

@@ -16,7 +16,7 @@
 namespace packtrace {
 namespace {
 
-/// A verb without the options that only make sense for work on files.
+/// Adds a verb without the common options, which only apply to verbs that work on files.
 CLI::App& add_plain_verb(CLI::App& app, GlobalOptions& globals, const char* name, const char* description,
                          std::function<void()> print) {
   CLI::App& verb = *app.add_subcommand(name, description)->group("About packtrace")->footer("");
@@ -34,7 +34,7 @@ CLI::App& add_plain_verb(CLI::App& app, GlobalOptions& globals, const char* name
 void add_help_commands(CLI::App& app, GlobalOptions& globals, const std::string& version) {
   const auto topic = std::make_shared<std::string>(), shell = std::make_shared<std::string>();
   CLI::App& help = add_plain_verb(app, globals, "help", "Explain packtrace, or one of its verbs", [&app, topic] {
-    // App::help() is about the verb that was parsed, which is this one.
+    // App::help() would describe the parsed verb, which is `help` itself.
     const CLI::App& explained = topic->empty() ? app : *find_verb(app, *topic);
     const std::string name = topic->empty() ? app.get_name() : app.get_name() + " " + *topic;
     fmt::print("{}", app.get_formatter()->make_help(&explained, name, CLI::AppFormatMode::Normal));

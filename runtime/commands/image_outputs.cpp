@@ -14,7 +14,7 @@ namespace packtrace {
 namespace {
 
 constexpr std::array kAlways{"ao", "ao_raw", "depth", "normal", "instance", "albedo", "shaded"};
-/// Only with levels of detail.
+/// Layers that need LOD levels.
 constexpr std::array kOfDetail{"lod", "lod-error"};
 
 std::vector<std::string> chosen(const std::vector<std::string>& aovs, const std::string& otherwise, bool detail) {
@@ -53,7 +53,8 @@ Layer exr_layer(const RenderedImage& image, const std::string& aov) {
   return {aov, rgb, floats_of(image.shaded), true};
 }
 
-/// Names of files, of which several may stand in one word: "x.png,x.exr". A comma inside of a name stays one.
+/// Splits words such as "x.png,x.exr" at commas. A word is split only if every part ends in .png or .exr, so that file
+/// names may contain commas.
 std::vector<std::string> separate_files(const std::vector<std::string>& words) {
   std::vector<std::string> files;
   for (const std::string& word : words) {

@@ -93,7 +93,7 @@ nlohmann::json to_json(const ImportResult& imported, uint32_t world) {
       {"bounds", {{"lo", {bounds.lo.x, bounds.lo.y, bounds.lo.z}}, {"hi", {bounds.hi.x, bounds.hi.y, bounds.hi.z}}}}};
 }
 
-/// "title   a 1   b 2", without its end of line.
+/// Formats counts as "title   a 1   b 2", without a newline.
 std::string row_of(std::string_view title, const std::map<std::string, uint64_t>& counts) {
   std::string row(title);
   for (const auto& [name, count] : counts) row += fmt::format(grouped(), "   {} {:L}", name, count);
@@ -131,11 +131,11 @@ std::string to_text(const ImportResult& imported, uint32_t world) {
   return text;
 }
 
-/// What is said of one file.
+/// The reports about one file.
 struct FileInfo {
   nlohmann::json json;
   std::string text;
-  std::string row; ///< of the table for several files
+  std::string row; ///< row of the table that is printed for several files
 };
 
 std::string table_row(const std::string& file, uint64_t triangles, uint64_t placed, uint64_t bytes,
@@ -187,8 +187,8 @@ int run_one(const InfoOptions& options, const GlobalOptions& globals) {
   return 0;
 }
 
-/// A line of a table for each file, or with -v all of each. A file that cannot be read is reported and left out; the
-/// first such decides the exit code.
+/// Prints a table with a row per file, or with -v the full report of each file. Files that cannot be read are reported
+/// and skipped; the first failure determines the exit code.
 int run_several(const InfoOptions& options, const GlobalOptions& globals) {
   JsonOutput json(globals.json, globals.force);
   nlohmann::json documents = nlohmann::json::array();
@@ -205,7 +205,7 @@ int run_several(const InfoOptions& options, const GlobalOptions& globals) {
     } catch (const Error& error) {
       if (error.kind() == ErrorKind::kCancelled || error.kind() == ErrorKind::kUsage) throw;
       display.finish();
-      std::fflush(stdout); // so that the two streams are in order
+      std::fflush(stdout); // keeps the output of the two streams in order
       report_error(error);
       if (code == 0) code = error.exit_code();
       documents.push_back({{"verb", "info"}, {"input", input}, {"error", error_json(error)}});

@@ -66,14 +66,14 @@ void require_no_scene_choice(const std::filesystem::path& file, const SceneOptio
 
 namespace {
 
-/// Refuses what is plainly another kind of file, whose bytes would be reported one by one.
+/// Throws Error(kInput) for files that are obviously not pbrt scenes. The parser would report them byte by byte.
 void require_scene_text(const std::filesystem::path& file) {
   std::array<char, 512> start{};
   size_t size = 0;
   try {
-    size = InputFile(file, start.size()).read(start); // inflated where it is compressed
+    size = InputFile(file, start.size()).read(start); // decompresses .gz files
   } catch (const Error&) {
-    return; // the import says why
+    return; // the import reports the error
   }
   const std::string_view text(start.data(), size);
   if (is_baked_file(file))
@@ -114,7 +114,7 @@ ImportResult import_for_command(const std::filesystem::path& file, const SceneOp
   ImportResult result;
   try {
     result = import_scene(file, options, diagnostics, progress);
-  } catch (const Error&) { // what was found until then may explain it
+  } catch (const Error&) { // earlier diagnostics may explain the error
     display.finish();
     report_diagnostics(diagnostics, globals);
     throw;
@@ -123,14 +123,14 @@ ImportResult import_for_command(const std::filesystem::path& file, const SceneOp
   refuse_to_replace(result.files);
   const bool empty = placed_triangle_count(result.scene) == 0;
   GlobalOptions shown = globals;
-  if (empty) shown.verbosity = std::max(shown.verbosity, 1); // notes may say why
+  if (empty) shown.verbosity = std::max(shown.verbosity, 1); // notes may explain why
   report_diagnostics(diagnostics, shown);
   if (empty) throw FileError(ErrorKind::kInput, file, "the scene has no triangles to work with");
   return result;
 }
 
 void LoadedScene::copy_file(const std::filesystem::path& file, const MemoryBudget& budget) {
-  std::error_code unknown; // what is wrong with the file is said when it is read
+  std::error_code unknown; // reading the file reports the error
   const uint64_t bytes = std::filesystem::file_size(file, unknown);
   try {
     memory.merge(MemoryReservation(budget, unknown ? 0 : bytes, "a private copy"));
@@ -142,8 +142,7 @@ void LoadedScene::copy_file(const std::filesystem::path& file, const MemoryBudge
 }
 
 LoadedScene load_scene(const std::filesystem::path& file, const SceneOptions& scene_options,
-                       const GlobalOptions& globals, Progress& progress, ProgressDisplay& display,
-                       bool private_copy) {
+                       const GlobalOptions& globals, Progress& progress, ProgressDisplay& display, bool private_copy) {
   LoadedScene loaded;
   if (is_baked_file(file)) {
     require_no_scene_choice(file, scene_options);

@@ -25,7 +25,7 @@ constexpr std::array<std::pair<const char*, SharingScheme>, 5> kSchemes{{{"steps
                                                                          {"per-instance", SharingScheme::kPerInstance},
                                                                          {"off", SharingScheme::kOff}}};
 
-/// @param name of kSchemes: the option's check knows them
+/// @param name a name in kSchemes, which the option's check guarantees
 SharingScheme scheme_of(const std::string& name) {
   return std::ranges::find(kSchemes, name, &std::pair<const char*, SharingScheme>::first)->second;
 }
@@ -45,10 +45,11 @@ SharingConfig sharing_config(const LodOptions& options) {
   return config;
 }
 
-/// Takes built trees through BlasCompactor: what a device would hold that must allocate before it builds.
+/// Simulates BLAS compaction (BlasCompactor) for the built trees. The result is the memory that a GPU would hold, which
+/// must allocate the worst case before each build.
 class TreeMemory final : public BlasMemoryBackend {
 public:
-  /// @param base_of a geometry of the trees: the file's
+  /// @param base_of maps TreeBytes::geometry to the file's geometry
   template <typename BaseOf>
   TreeMemory(const std::vector<TreeBytes>& trees, const BaseOf& base_of) : trees_(trees) {
     CompactionConfig config;
@@ -60,11 +61,11 @@ public:
       compactor.add(i, base_of(trees[i].geometry));
       moving.push_back(i);
     }
-    while (!moving.empty()) { // each frame settles some, or measures
+    while (!moving.empty()) { // every frame advances the state of some trees
       compactor.begin_frame();
       std::erase_if(moving, [&](uint32_t i) { return compactor.state_of(i) == BlasMemoryState::kSettled; });
     }
-    for (uint32_t frame = 0; frame < config.frames_in_flight; ++frame) compactor.begin_frame(); // releases
+    for (uint32_t frame = 0; frame < config.frames_in_flight; ++frame) compactor.begin_frame(); // releases old buffers
     resident = compactor.resident_bytes();
     peak = compactor.peak_bytes();
     by_geometry = compactor.geometry_bytes();
@@ -78,14 +79,14 @@ public:
   void record_copy(uint32_t, BlasBuffer, BlasBuffer) override {}
 
   uint64_t worst_case = 0, resident = 0, peak = 0;
-  std::map<uint32_t, GeometryBytes> by_geometry; ///< kNoGeometry: the world
+  std::map<uint32_t, GeometryBytes> by_geometry; ///< keyed by the file's geometry; kNoGeometry: the TLAS
 
 private:
   const std::vector<TreeBytes>& trees_;
   BlasBuffer next_ = 0;
 };
 
-/// A row for each geometry that has levels.
+/// A row per geometry that has LOD levels and instances.
 nlohmann::json geometries_json(const ChosenDetail& detail) {
   nlohmann::json rows = nlohmann::json::array();
   std::vector<uint64_t> instances(detail.geometries->size(), 0), builds = instances, triangles = instances;

@@ -15,7 +15,7 @@
 
 namespace {
 
-/// A verb that is documented to come, so that asking for it gives a better answer than "unknown".
+/// Adds a hidden verb that is planned. It reports so, instead of being unknown.
 void add_planned_verb(CLI::App& app, packtrace::GlobalOptions& globals, const std::string& name) {
   packtrace::add_verb(app, globals, name, "Planned",
                       [name]() -> int {

@@ -9,7 +9,7 @@
 namespace packtrace {
 namespace {
 
-/// Text that roff shows as it is: no line may begin with a control character.
+/// Escapes text for roff, including control characters at the start of a line.
 std::string roff(const std::string& text) {
   std::string escaped;
   for (const char c : text) {
@@ -25,14 +25,14 @@ std::string roff(const std::string& text) {
   return escaped;
 }
 
-/// A paragraph: line ends of the help's layout are spaces here.
+/// Escapes a paragraph, with line ends replaced by spaces.
 std::string flowing(const std::string& text) {
   std::string joined = text;
   std::ranges::replace(joined, '\n', ' ');
   return roff(joined);
 }
 
-/// "-o, --output FILE" with the names in bold and the value in italics.
+/// Formats "-o, --output FILE" with the names in bold and the value in italics.
 std::string heading_of(const OptionEntry& option) {
   std::string heading;
   for (const auto& names : {option.short_names, option.long_names})
@@ -51,7 +51,7 @@ std::string options_of(const std::vector<OptionEntry>& options, const std::strin
   return text;
 }
 
-/// A group of options that every verb has is told once.
+/// Formats the option groups of a verb, except those in `told`, which are listed once for all verbs.
 std::string groups_of(const VerbEntry& verb, const std::set<std::string>& told) {
   std::vector<std::string> groups;
   for (const OptionEntry& option : verb.options)
@@ -65,7 +65,7 @@ std::string groups_of(const VerbEntry& verb, const std::set<std::string>& told) 
   return text;
 }
 
-/// The end of a verb's help: sentences flow, indented lines are examples.
+/// Formats the end of a help text. Indented lines are examples and keep their line ends; other lines are filled.
 std::string footer_of(const std::string& footer) {
   std::string text;
   bool example = false;

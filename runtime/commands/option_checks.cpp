@@ -11,7 +11,7 @@
 namespace packtrace {
 namespace {
 
-/// Endings that promise a format. Text and data of no format in particular (.txt, .bin) are not among them.
+/// Extensions that stand for a format. Generic ones (.txt, .bin) are not included.
 constexpr std::array<std::string_view, 41> kFormatEndings{
     ".ptk",  ".pbrt", ".json", ".v16", ".glb",   ".gltf", ".ply", ".obj", ".fbx",  ".stl", ".usd",
     ".usda", ".usdc", ".usdz", ".abc", ".blend", ".png",  ".exr", ".jpg", ".jpeg", ".tga", ".hdr",
@@ -45,7 +45,7 @@ CLI::Validator number_in(double lo, double hi) {
 }
 
 std::vector<std::string> choices_of(const CLI::Option& option) {
-  const std::string type = option.get_type_name(); // "TEXT:{a,b}": what its checks say of themselves comes last
+  const std::string type = option.get_type_name(); // "TEXT:{a,b}": the descriptions of the checks come last
   const size_t begin = type.find(':' + std::string(kChoices));
   if (begin == std::string::npos || !type.ends_with("}")) return {};
   const size_t first = begin + 1 + kChoices.size();

@@ -29,7 +29,7 @@ std::string camera_text(const Camera& camera) {
   return {};
 }
 
-/// Where positions lie: on the grids of a baked file, or on none.
+/// Describes the grids of the positions of a baked file.
 std::string grid_text(const LoadedScene& loaded) {
   if (!loaded.baked) return "positions are the scene's floats: no grid";
   const FileSummary file = summarize(*loaded.baked);

@@ -39,9 +39,9 @@ constexpr uint32_t kGroundTruthSpp = 1024;
 struct RenderOptions {
   std::string input;
   std::vector<std::string> outputs, aovs;
-  std::optional<std::string> camera; ///< number, or "auto"; without one camera 0, if it sees anything
+  std::optional<std::string> camera; ///< number or "auto"; if not set, camera 0, or "auto" if that sees nothing
   std::string size;
-  std::optional<std::string> background; ///< of .png files; without one, what suits the layer
+  std::optional<std::string> background; ///< background of .png files; if not set, it depends on the layer
   bool no_legend = false;
   bool private_copy = false;
   uint32_t supersample = 1;
@@ -52,7 +52,7 @@ struct RenderOptions {
   bool ao_falloff_off = false;
   float ao_interreflection = 0.0f;
   uint64_t seed = 0;
-  std::optional<std::string> backend; ///< without one, what suits the input
+  std::optional<std::string> backend; ///< if not set, the input decides
   std::optional<std::string> bvh;
   LodOptions lod;
 };
@@ -71,11 +71,11 @@ ImageSize parse_size(const std::string& text) {
   return size;
 }
 
-/// Which camera a render is of, and why.
+/// The camera of a render.
 struct ChosenCamera {
   Camera camera;
-  std::optional<uint32_t> index; ///< among the scene's; none: it frames all of the scene
-  std::string reason;            ///< of framing the scene without being asked to
+  std::optional<uint32_t> index; ///< index in the scene's cameras; not set if the camera frames the whole scene
+  std::string reason;            ///< why the scene is framed although --camera auto was not given; else empty
 };
 
 ChosenCamera choose_camera(const SceneSource& source, const RenderOptions& options, const GlobalOptions& globals) {
@@ -94,7 +94,7 @@ ChosenCamera choose_camera(const SceneSource& source, const RenderOptions& optio
   return {framing_camera(source.world_bounds(), size), std::nullopt, "the scene has no camera"};
 }
 
-/// What is shown instead of a camera that sees nothing of the scene.
+/// Returns a camera that frames the whole scene, to replace a camera that sees nothing of it. Prints a warning.
 ChosenCamera frame_instead(const ChosenCamera& blind, const SceneSource& source, ImageSize size,
                            const RenderOptions& options, const GlobalOptions& globals) {
   ChosenCamera framing{framing_camera(source.world_bounds(), size), std::nullopt,
@@ -106,7 +106,7 @@ ChosenCamera frame_instead(const ChosenCamera& blind, const SceneSource& source,
   return framing;
 }
 
-/// Why a render is as it is, for -v. The camera and the rest have been chosen by the functions beside this one.
+/// Collects the reasons for the settings of a render, for -v.
 RenderChoices reasons(const SceneSource& source, const ChosenCamera& camera, const RenderOptions& options, bool baked,
                       const GlobalOptions& globals) {
   const size_t cameras = source.cameras().size();
@@ -147,7 +147,8 @@ RenderConfig make_config(const SceneSource& source, const Camera& camera, const 
   return config;
 }
 
-/// For the layers of a view, the G-buffer's and the denoiser's, about. Sizes may come from the scene's film.
+/// Reserves the approximate memory of the G-buffer, the denoiser and the layers of a view. The image size may come from
+/// the scene file, so it is not trusted.
 MemoryReservation reserve_picture(const RenderOptions& options, const RenderConfig& config,
                                   const MemoryBudget& budget) {
   constexpr double kPixelBytes = 320.0, kMost = 0x1p62;
@@ -165,7 +166,7 @@ MemoryReservation reserve_picture(const RenderOptions& options, const RenderConf
 Backend choose_backend(const RenderOptions& options, bool baked) {
   const bool about_embree = options.bvh || options.fast_edges;
   if (!options.backend) return baked && !about_embree ? Backend::kPacked : Backend::kEmbree;
-  const std::string& name = *options.backend; // one of those that the option's check knows
+  const std::string& name = *options.backend; // the option's check accepts only known names
   if (name == "embree") return Backend::kEmbree;
   if (about_embree)
     throw Error(ErrorKind::kUsage, "--bvh and --fast-edges are about Embree's own triangles, for backend embree");
@@ -193,7 +194,7 @@ double mean_of_valid(const std::vector<float>& ao) {
 
 double rate_m(uint64_t rays, double seconds) { return seconds > 0 ? static_cast<double>(rays) / seconds * 1e-6 : 0; }
 
-/// Bytes by name. The file and the threads' caches are those of all tracers.
+/// Resident bytes by name, summed over tracers. Shared parts (the file, the threads' caches) count once.
 nlohmann::json resident_parts(std::span<const RayTracer* const> tracers) {
   nlohmann::json parts = nlohmann::json::object();
   for (const RayTracer* tracer : tracers)
@@ -286,11 +287,11 @@ void print(std::FILE* stream, const nlohmann::json& r) {
   for (const auto& file : r.at("files")) print_printable("wrote " + file.get<std::string>() + "\n", stream);
 }
 
-/// A picture and what it was traced with.
+/// A rendered view and the objects it was traced with.
 struct Traced {
   ChosenCamera camera;
   std::optional<ChosenDetail> detail;
-  std::vector<std::unique_ptr<RayTracer>> tracers; ///< what the camera sees, then what only occlusion rays meet
+  std::vector<std::unique_ptr<RayTracer>> tracers; ///< the camera's; with --lod-rays occlusion also the occlusion rays'
   RenderedImage image;
 };
 
@@ -318,7 +319,7 @@ Traced trace(const RenderOptions& options, const GlobalOptions& globals, const L
   if (sees_levels && show_detail) config.lod_error_px = *options.lod.error_px;
   const auto render = [&] {
     progress.begin("bvh", 0);
-    if (sees_levels) { // those that this camera needs
+    if (sees_levels) { // the cut depends on the camera
       traced.tracers.clear();
       choose(nullptr);
     } else if (traced.tracers.empty()) {
@@ -345,7 +346,8 @@ PreviewStyle preview_style(const RenderOptions& options) {
   return style;
 }
 
-/// @param count of instances that are not traced
+/// Warns about instances that are not traced because their transform is degenerate.
+/// @param count number of these instances
 void warn_of_lines(const std::string& input, size_t count) {
   if (count == 0) return;
   print_printable(fmt::format("{}: warning: {} instance{} not traced: pressed onto a line or a point\n", input, count,
@@ -355,13 +357,13 @@ void warn_of_lines(const std::string& input, size_t count) {
 
 int run(const RenderOptions& options, const GlobalOptions& globals) {
   if (options.outputs.empty()) fail_without_output("render", options.input, ".png");
-  tracer_config(options, false); // complains before the work
+  tracer_config(options, false); // reports wrong options before any work
   if (!options.size.empty()) parse_size(options.size);
   validate(options.lod);
   JsonOutput json(globals.json, globals.force);
   const bool sees_levels = options.lod.error_px && !options.lod.only_occlusion();
   ImageOutputs outputs(options.outputs, options.aovs, sees_levels, globals.force,
-                       preview_style(options)); // before the work, like the above
+                       preview_style(options)); // reports unwritable files before any work
   if (outputs.to_stdout() && json.to_stdout())
     throw Error(ErrorKind::kUsage, "-o - and --json - would both go to standard output; give one of them a file");
   if (outputs.show_detail() && !options.lod.error_px)

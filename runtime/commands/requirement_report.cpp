@@ -25,14 +25,14 @@ bool kept_on_request(const FileSummary& s, uint32_t stream) {
   return (s.bake.purpose >> baked::kKeepShift >> stream & 1u) != 0;
 }
 
-/// Bits that decide which rays see a surface; shading looks at all of them.
+/// Material flags that a purpose reads: AO only those that affect visibility, shading all.
 MaterialFlags flags_read(uint32_t purpose) {
   constexpr MaterialFlags kVisibility =
       kAlphaMask | kShadowAlphaMask | kTransmissive | kInvisible | kAbsent | kNoShadow;
   return purpose == baked::kAo ? kVisibility : kAllMaterialFlags;
 }
 
-/// The decision and why, as the begin of a sentence.
+/// The decision about a stream and its reason, as the first part of a report line.
 std::string decision(uint32_t stream, uint32_t reason, uint32_t purpose) {
   const std::string name(kStreamNames[stream]);
   switch (reason) {
@@ -98,7 +98,7 @@ std::string sentence(const GeometryUse& use, uint32_t purpose) {
     bool stored = false;
     for (uint32_t reason = 0; reason < baked::kReasonCount; ++reason) {
       if ((use.requirements & baked::requirement_bit(stream, reason)) == 0) continue;
-      if (stream == baked::kTangents && reason == baked::kAbsent) continue; // nearly everywhere
+      if (stream == baked::kTangents && reason == baked::kAbsent) continue; // holds for nearly all geometries
       text += "; " + decision(stream, reason, purpose);
       stored |= reason > baked::kInferred;
     }

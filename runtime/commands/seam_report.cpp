@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kVisiblePx = 0.5;
 
-/// By instance: how near pixels show it, camera-space depth; infinite where none does.
+/// Smallest camera-space depth per instance over all pixels, world units; infinite for instances that no pixel shows.
 std::vector<double> nearest_depths(const RenderedImage& image, size_t instances) {
   std::vector<double> nearest(instances, std::numeric_limits<double>::infinity());
   for (size_t i = 0; i < image.instance.size(); ++i)
@@ -23,7 +23,7 @@ std::vector<double> nearest_depths(const RenderedImage& image, size_t instances)
   return nearest;
 }
 
-/// By instance: how far what is traced of it lies from level 0, world units.
+/// Error bound per instance: distance of the traced LOD cut from level 0, world units.
 std::vector<double> stated_errors(const ChosenDetail& detail) {
   const LodSource& source = *detail.source;
   std::vector<double> of_blas(source.geometry_count());
@@ -36,7 +36,7 @@ std::vector<double> stated_errors(const ChosenDetail& detail) {
   return errors;
 }
 
-/// What the choice of detail promises, in pixels; infinite where it promises nothing.
+/// Screen-space error bound of the LOD cuts in pixels; infinite if the options give no bound.
 double promised_px(const ChosenDetail& detail) {
   const SharingConfig& config = detail.sharing->config();
   if (config.tolerant_levels > 0) return std::numeric_limits<double>::infinity();
