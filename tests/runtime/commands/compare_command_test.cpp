@@ -84,8 +84,8 @@ TEST(CompareCommand, EachLimitCanFail) {
 TEST(CompareCommand, MissesAreLeftOutAndMismatchesReported) {
   const TemporaryFolder folder;
   std::vector<float> a(kSize.pixels(), 0.5f), b = a;
-  a[0] = b[0] = kInvalidAo; // misses in both
-  b[1] = kInvalidAo;        // in one
+  a[0] = b[0] = kInvalidAo; // no value in either image
+  b[1] = kInvalidAo;        // no value in one image
   const std::string file_a = write_ao(folder / "a.exr", a), file_b = write_ao(folder / "b.exr", b);
   const Outcome result = compare({file_a, file_b, "--json", "-"});
   EXPECT_EQ(result.code, 0);
@@ -97,7 +97,7 @@ TEST(CompareCommand, MissesAreLeftOutAndMismatchesReported) {
   EXPECT_NE(result.err.find("1 pixels have a value in only one"), std::string::npos) << result.err;
   EXPECT_EQ(compare({file_a, file_b, "--max-mismatch", "0.001"}).code, 5);
   EXPECT_EQ(compare({file_a, file_b, "--max-mismatch", "0.01"}).code, 0);
-  // Other layers have no such value: there -1 is a number.
+  // In other layers -1 is an ordinary value.
   EXPECT_EQ(compare({file_a, file_b, "--layer", "depth", "--metric", "mae", "--json", "-"}).json()["metrics"]["mae"],
             1.5 / static_cast<double>(kSize.pixels()));
 }
