@@ -61,7 +61,7 @@ private:
   bool has_next() const { return next_ < words_.size(); }
 
   void add_other(const std::string& word) {
-    if (word.empty()) throw Error(ErrorKind::kUsage, "an argument is empty, where a verb or a file is expected");
+    if (word.empty()) throw Error(ErrorKind::kUsage, "an argument is empty; expected a verb or a file");
     if (app_->get_parent() == nullptr)
       if (CLI::App* verb = find_verb(*app_, word)) app_ = verb;
     plain_.push_back(word);
@@ -88,8 +88,8 @@ private:
     std::string value = take();
     const bool is_verb = app_->get_parent() == nullptr && find_verb(*app_, value) != nullptr;
     if (value == "--" || is_verb || option_of(*app_, value) != nullptr)
-      throw Error(ErrorKind::kUsage, name + " needs a value, but " + value + " follows; " + name +
-                                         (name.starts_with("--") ? "=" : " ./") + value + " if that is its value");
+      throw Error(ErrorKind::kUsage, name + " needs a value, but " + value + " follows; write " + name +
+                                         (name.starts_with("--") ? "=" : " ./") + value + " if this is the value");
     if (value_name(option) == kSize && is_number(value) && has_next() && is_number(words_[next_]))
       value += "x" + take();
     plain_.push_back(value);

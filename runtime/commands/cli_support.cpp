@@ -108,7 +108,7 @@ void write_failure(CLI::App& app, const GlobalOptions& globals, std::span<const 
   const std::string destination = globals.json.empty() ? value_in_words(words, "--json") : globals.json;
   if (destination.empty() || find_verb(app, destination)) return; // "--json info": the file name is missing
   if (!may_take_error(destination)) {
-    print_failure(destination + ": holds something else than JSON, so the error is not written there", 0);
+    print_failure(destination + ": not a JSON file, so the error is not written to it", 0);
     return;
   }
   const bool force =
@@ -123,20 +123,23 @@ void write_failure(CLI::App& app, const GlobalOptions& globals, std::span<const 
 }
 
 void add_options_of_every_verb(CLI::App& app, GlobalOptions& globals) {
-  constexpr const char* kGroup = "Options of every verb";
+  constexpr const char* kGroup = "Common options";
   app.add_flag("-q,--quiet", globals.quiet, "Print errors only")->group(kGroup);
   app.add_flag_function(
          "-v,--verbose", [&globals](int64_t count) { globals.verbosity += static_cast<int>(count); },
-         "Print more; may be repeated")
+         "Also print notes, the chosen settings with their reasons, and details per geometry")
       ->group(kGroup);
-  app.add_option("--json", globals.json, "Write results, or the error, as JSON to FILE, or to standard output for -")
+  app.add_option("--json", globals.json,
+                 "Write the results, or the error, as JSON to FILE, or to standard output if FILE is -. "
+                 "docs/json_output.md lists the keys")
       ->type_name("FILE")
       ->take_last()
       ->group(kGroup);
-  app.add_flag("--force", globals.force, "Replace existing files")->group(kGroup);
-  app.add_option("--threads", globals.threads,
-                 fmt::format("Use N threads, 1..{} (default: the environment variable {}, else all)", kMaxThreads,
-                             kThreadsVariable))
+  app.add_flag("--force", globals.force, "Replace existing output files")->group(kGroup);
+  app.add_option(
+         "--threads", globals.threads,
+         fmt::format("Number of threads, 1..{} (default: the environment variable {}, else all hardware threads)",
+                     kMaxThreads, kThreadsVariable))
       ->check(CLI::Range(1u, kMaxThreads))
       ->type_name("N")
       ->take_last()
@@ -150,8 +153,8 @@ void add_options_of_every_verb(CLI::App& app, GlobalOptions& globals) {
              throw CLI::ValidationError("--max-memory", error.what());
            }
          },
-         "Memory that the input may take: bytes, 512M, 8G, or 50% of the machine's (the default). Input that needs "
-         "more ends with exit code 3")
+         "Memory limit for data whose size the input determines, in bytes or as 512M, 8G or 50% of the machine's "
+         "memory (default 50%). Input that needs more fails with exit code 3")
       ->type_name("SIZE")
       ->take_last()
       ->group(kGroup);
@@ -208,7 +211,7 @@ uint32_t thread_limit(const GlobalOptions& globals) {
   uint32_t threads = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), threads);
   if (error != std::errc() || end != text.data() + text.size() || threads < 1 || threads > kMaxThreads)
-    throw Error(ErrorKind::kUsage, fmt::format("{} is '{}'; give a number of threads from 1 to {}, or unset it",
+    throw Error(ErrorKind::kUsage, fmt::format("{} is '{}'; set it to a number of threads from 1 to {}, or unset it",
                                                kThreadsVariable, text, kMaxThreads));
   return threads;
 }

@@ -27,7 +27,7 @@ std::vector<std::string> chosen(const std::vector<std::string>& aovs, const std:
     if (std::find(aov_names().begin(), aov_names().end(), name) != aov_names().end()) continue;
     std::string known = "all";
     for (const std::string& aov : aov_names()) known += ", " + aov;
-    throw Error(ErrorKind::kUsage, "--aov " + name + ": no such layer; there are " + known);
+    throw Error(ErrorKind::kUsage, "--aov " + name + ": no such layer; layers are " + known);
   }
   std::vector<std::string> unique;
   for (const std::string& name : names)
@@ -106,7 +106,7 @@ ImageOutputs::ImageOutputs(const std::vector<std::string>& files, const std::vec
         add(target, force, false, {aov});
       }
     } else {
-      throw Error(ErrorKind::kUsage, name + ": images end in .exr or .png");
+      throw Error(ErrorKind::kUsage, name + ": image file names must end in .png or .exr");
     }
   }
 }
@@ -114,7 +114,7 @@ ImageOutputs::ImageOutputs(const std::vector<std::string>& files, const std::vec
 void ImageOutputs::add_standard_output(std::vector<std::string> aovs) {
   if (std::exchange(to_stdout_, true)) throw Error(ErrorKind::kUsage, "-o - was given twice");
   if (aovs.size() > 1)
-    throw Error(ErrorKind::kUsage, "-o - writes one PNG to standard output, so --aov can name one layer only");
+    throw Error(ErrorKind::kUsage, "-o - writes a single PNG to standard output, so --aov can select only one layer");
   refuse_terminal("a PNG");
   add("-", false, false, std::move(aovs));
 }

@@ -125,7 +125,7 @@ std::string to_text(const ImportResult& imported, uint32_t world) {
   text += left_out_cameras_text(imported);
   if (s.worlds > 1) text += fmt::format("world {} of {}\n", world, s.worlds);
   if (s.animated_shapes + s.animated_instances + s.animated_cameras > 0)
-    text += fmt::format(grouped(), "animated   shapes {:L}   instances {:L}   cameras {:L}   (shown as at time {})\n",
+    text += fmt::format(grouped(), "animated   shapes {:L}   instances {:L}   cameras {:L}   (evaluated at time {})\n",
                         s.animated_shapes, s.animated_instances, s.animated_cameras, scene.time);
   if (!s.ignored.empty()) text += row_of("ignored", s.ignored) + "\n";
   return text;
@@ -146,7 +146,7 @@ std::string table_row(const std::string& file, uint64_t triangles, uint64_t plac
 }
 
 std::string table_heading() {
-  return fmt::format("{:>14}{:>14}{:>15}{:>10}{:>12}  {}\n", "triangles", "placed", "bytes", "a tri.", "pos. error",
+  return fmt::format("{:>14}{:>14}{:>15}{:>10}{:>12}  {}\n", "triangles", "placed", "bytes", "per tri.", "pos. error",
                      "file");
 }
 
@@ -219,15 +219,21 @@ int run_several(const InfoOptions& options, const GlobalOptions& globals) {
 
 void add_info_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<InfoOptions>();
-  CLI::App& verb = add_verb(app, globals, "info", "Say what .ptk files and .pbrt scenes hold", [options, &globals] {
-    return options->inputs.size() == 1 ? run_one(*options, globals) : run_several(*options, globals);
-  });
+  CLI::App& verb = add_verb(
+      app, globals, "info", "Show contents, sizes and errors of .ptk files and .pbrt scenes", [options, &globals] {
+        return options->inputs.size() == 1 ? run_one(*options, globals) : run_several(*options, globals);
+      });
   verb.add_option("FILE", options->inputs,
-                  "A .ptk file or a .pbrt scene; of several a table is printed, or with -v all")
+                  "One or more .ptk files or .pbrt scenes. For several files a table with one row per file is printed; "
+                  "-v prints each in full")
       ->required();
   add_scene_options(verb, options->scene);
-  verb.footer("Examples:\n"
+  verb.footer("For a .ptk file: counts, grid steps, errors measured against the source, bytes\n"
+              "per stream, LOD levels, and why each stream is stored or dropped. For a scene:\n"
+              "shapes, materials, cameras and everything that was ignored.\n"
+              "Examples:\n"
               "  packtrace info house.ptk\n"
+              "  packtrace info house.ptk -v\n"
               "  packtrace info *.ptk\n"
               "  packtrace info house.ptk --json - | jq .bytes_per_triangle");
 }

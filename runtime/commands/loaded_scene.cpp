@@ -36,7 +36,7 @@ MemoryReservation reserve_decoded(const std::filesystem::path& file, const Memor
   if (start.size() < sizeof header || !is_paged_file(std::as_bytes(std::span(start)))) return memory;
   std::memcpy(&header, start.data(), sizeof header);
   try {
-    memory.resize(header.resident_bytes, "what the file is decoded to");
+    memory.resize(header.resident_bytes, "decoding the file");
   } catch (const MemoryError& error) {
     throw MemoryError(file, error.what());
   }
@@ -44,14 +44,18 @@ MemoryReservation reserve_decoded(const std::filesystem::path& file, const Memor
 }
 
 void add_scene_options(CLI::App& verb, SceneOptions& options) {
-  constexpr const char* kGroup = "Reading of .pbrt scenes";
-  verb.add_flag("--strict", options.strict, "Fail if the scene has any problem")->group(kGroup);
-  verb.add_option("--world", options.world, "Which of the file's worlds, from 1 (the default)")
+  constexpr const char* kGroup = "Options for .pbrt scenes";
+  verb.add_flag("--strict", options.strict,
+                "Fail if reading the scene reports any warning or error, instead of continuing with the rest")
+      ->group(kGroup);
+  verb.add_option("--world", options.world,
+                  "Number of the world to read from a file with several WorldBegin blocks, from 1 (default 1)")
       ->check(CLI::Range(1u, UINT32_MAX))
       ->type_name("N")
       ->group(kGroup);
   verb.add_option("--time", options.time,
-                  "When to look at what moves, in the unit of TransformTimes (default: as the camera's shutter opens)")
+                  "Time at which to evaluate animated transforms, in the unit of TransformTimes (default: the time at "
+                  "which the camera's shutter opens)")
       ->type_name("T")
       ->group(kGroup);
 }
@@ -61,7 +65,7 @@ void require_no_scene_choice(const std::filesystem::path& file, const SceneOptio
   if (option)
     throw FileError(ErrorKind::kUsage, file,
                     std::string(option) +
-                        " is for .pbrt scenes; a .ptk file holds one world at one time, chosen by bake");
+                        " only applies to .pbrt scenes; the world and the time of a .ptk file were chosen by bake");
 }
 
 namespace {
@@ -77,11 +81,12 @@ void require_scene_text(const std::filesystem::path& file) {
   }
   const std::string_view text(start.data(), size);
   if (is_baked_file(file))
-    throw FileError(ErrorKind::kInput, file, "a baked file already; give the .pbrt scene that it was made of");
+    throw FileError(ErrorKind::kInput, file, "already a baked file; use the .pbrt scene it was made from");
   if (text.starts_with("ply\n") || text.starts_with("ply\r"))
-    throw FileError(ErrorKind::kInput, file, "a PLY mesh, not a scene; name it in a .pbrt file with Shape \"plymesh\"");
+    throw FileError(ErrorKind::kInput, file,
+                    "a PLY mesh, not a scene; refer to it from a .pbrt file with Shape \"plymesh\"");
   if (text.find('\0') != std::string::npos)
-    throw FileError(ErrorKind::kInput, file, "not a text file, so no pbrt-v3 scene");
+    throw FileError(ErrorKind::kInput, file, "not a text file, so not a pbrt-v3 scene");
 }
 
 } // namespace
@@ -89,9 +94,10 @@ void require_scene_text(const std::filesystem::path& file) {
 std::string left_out_cameras_text(const ImportResult& imported) {
   const uint64_t left_out = imported.statistics.cameras_left_out;
   if (left_out == 0) return {};
-  return fmt::format("{} camera{} left out, as the errors above say; {}\n", left_out, left_out == 1 ? " is" : "s are",
-                     imported.scene.cameras.empty() ? "without one, render frames the whole scene"
-                                                    : "camera 0 is the last of the others");
+  return fmt::format("{} camera{} skipped because of the errors above; {}\n", left_out,
+                     left_out == 1 ? " was" : "s were",
+                     imported.scene.cameras.empty() ? "render will show the whole scene"
+                                                    : "camera 0 is the last of the remaining ones");
 }
 
 nlohmann::json problems_json(const ImportStatistics& statistics) {

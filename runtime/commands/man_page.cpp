@@ -98,8 +98,8 @@ std::string man_page(const ProgramEntry& program, const std::string& version) {
     page += (&verb == &program.verbs.front() ? "" : ".br\n") + usage_of(verb) + "\n";
   page += ".SH DESCRIPTION\n" + footer_of(program.program.footer);
   page +=
-      ".SH OPTIONS\nThese may stand before the verb or behind it. Of an option that is given twice the last counts, "
-      "unless it may be repeated.\n";
+      ".SH OPTIONS\nThese options may precede or follow the verb. If an option is given twice, the last one counts, "
+      "unless it accepts several values.\n";
   std::set<std::string> told;
   for (const OptionEntry& option : program.program.options)
     if (told.insert(option.group).second) page += options_of(program.program.options, option.group);
@@ -112,11 +112,12 @@ std::string man_page(const ProgramEntry& program, const std::string& version) {
     page += groups_of(verb, told);
     if (!verb.footer.empty()) page += ".PP\n" + footer_of(verb.footer);
   }
-  return page + ".SH ENVIRONMENT\n"
-                ".TP\n\\fBPACKTRACE_THREADS\\fR\nNumber of threads where \\fB\\-\\-threads\\fR is not given.\n"
-                ".TP\n\\fBPACKTRACE_ISA\\fR\nInstruction set of the kernels: scalar, avx2 or avx512; the best that the "
-                "machine has where it is not set.\n"
-                ".TP\n\\fBNO_COLOR\\fR\nNo colours on a terminal, if set to anything.\n";
+  return page +
+         ".SH ENVIRONMENT\n"
+         ".TP\n\\fBPACKTRACE_THREADS\\fR\nNumber of threads if \\fB\\-\\-threads\\fR is not given.\n"
+         ".TP\n\\fBPACKTRACE_ISA\\fR\nInstruction set of the packed tracer: scalar, avx2 or avx512 (default: the "
+         "best that the machine supports).\n"
+         ".TP\n\\fBNO_COLOR\\fR\nIf set and not empty, output to a terminal has no colours.\n";
 }
 
 } // namespace packtrace

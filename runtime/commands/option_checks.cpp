@@ -28,7 +28,7 @@ CLI::Validator one_of(std::vector<std::string> names) {
       [names = std::move(names)](std::string& text) -> std::string {
         if (std::ranges::find(names, text) != names.end()) return {};
         const std::vector<std::string_view> known(names.begin(), names.end());
-        return fmt::format("'{}' is none of {}{}", text, fmt::join(names, ", "),
+        return fmt::format("'{}' is not one of {}{}", text, fmt::join(names, ", "),
                            did_you_mean_text(closest_name(text, known)));
       },
       listed);
@@ -78,7 +78,7 @@ CLI::Option* add_output_option(CLI::App& verb, std::string& output, const std::s
           "-o,--output",
           [&output](const std::vector<std::string>& names) {
             if (names.size() > 1)
-              throw CLI::ValidationError("-o", fmt::format("was given {} times, but one file is written: {}",
+              throw CLI::ValidationError("-o", fmt::format("was given {} times, but only one file can be written: {}",
                                                            names.size(), fmt::join(names, ", ")));
             output = names.front();
           },

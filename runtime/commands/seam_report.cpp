@@ -52,8 +52,8 @@ nlohmann::json seams_json(const SeamSummary& seams) {
 std::string seams_text(const SeamSummary& seams) {
   if (seams.touching == 0) return {};
   return fmt::format(grouped(),
-                     "{:L} of {:L} instances on grids of their own touch other geometry: seams gape by {:.3g} world "
-                     "units at most, half a step of both grids, and by the errors of coarser levels\n",
+                     "{:L} of {:L} instances with their own grid touch other geometry: seams may open by up to {:.3g} "
+                     "world units (half a step of each of the two grids), and by the errors of coarser LOD levels\n",
                      seams.touching, seams.instances, seams.largest_gap);
 }
 
@@ -87,8 +87,8 @@ std::string visible_seams_text(const nlohmann::json& seams) {
   if (seams.at("above_half_a_pixel") == 0) return {};
   return fmt::format(
       grouped(),
-      "  seams     may gape by {:.2g} px where instances touch other geometry (grids {:.2g}, detail {:.2g}); "
-      "by more than half a pixel at {:L} of {:L} instances\n",
+      "  seams     may open by up to {:.2g} px where instances touch other geometry (grids {:.2g}, LOD {:.2g}); "
+      "more than half a pixel at {:L} of {:L} visible instances\n",
       seams.at("largest_px").get<double>(), seams.at("of_grids_px").get<double>(),
       seams.at("of_detail_px").get<double>(), seams.at("above_half_a_pixel").get<uint64_t>(),
       seams.at("visible").get<uint64_t>());

@@ -80,7 +80,7 @@ Background parse_background(std::string_view text) {
   if (const auto rgb = hexadecimal(lower)) return {Background::Kind::kColor, color_of(*rgb)};
   const std::vector<std::string_view> known(background_names().begin(), background_names().end());
   throw Error(ErrorKind::kUsage, "--background " + std::string(text) +
-                                     ": give rrggbb in hexadecimal digits, transparent, sky, or a colour's name" +
+                                     ": must be a colour name, rrggbb in hexadecimal digits, transparent or sky" +
                                      did_you_mean_text(closest_name(lower, known)));
 }
 

@@ -77,7 +77,7 @@ TEST(CompareCommand, EachLimitCanFail) {
     const Outcome failed = compare({a, b, option, fail, "--json", "-"});
     EXPECT_EQ(failed.code, 5) << option;
     EXPECT_EQ(failed.json()["passed"], false);
-    EXPECT_NE(failed.err.find("beyond its limit"), std::string::npos) << failed.err;
+    EXPECT_NE(failed.err.find("beyond the limit"), std::string::npos) << failed.err;
   }
 }
 
