@@ -136,10 +136,10 @@ TEST(CompareCommand, WritesADifferencePictureOnce) {
   b[5] = 1.0f;
   const std::string file_b = write_ao(folder / "b.exr", b), diff = folder / "diff.png";
   EXPECT_EQ(compare({file_a, file_b, "--diff", diff, "--max-mae", "0"}).code, 5)
-      << "the picture is what a failure needs";
+      << "the difference picture is written although the limit is exceeded";
   const Image picture = read_png(diff, PngTransfer::kRaw);
   EXPECT_EQ(picture.size, kSize);
-  EXPECT_EQ(picture.pixel(5, 0)[2], 1.0f) << "beyond 0.25: white";
+  EXPECT_EQ(picture.pixel(5, 0)[2], 1.0f) << "errors above 0.25 are white";
   EXPECT_EQ(picture.pixel(6, 0)[0], 0.0f);
   EXPECT_EQ(compare({file_a, file_b, "--diff", diff}).code, 6) << "it exists already";
   for (const char* metric : {"rmse", "psnr", "ssim", "flip"})

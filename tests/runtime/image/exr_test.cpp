@@ -167,7 +167,7 @@ TEST(Exr, LengthsInsideTheHeaderCannotExceedTheFile) {
                    reinterpret_cast<const std::byte*>(list.data()) + 27);
   try {
     exr_info(with_list, "list");
-    FAIL() << "the string's length was believed";
+    FAIL() << "the wrong string length was accepted";
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("string is larger"), std::string::npos) << error.what();
   }

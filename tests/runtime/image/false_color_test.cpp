@@ -72,7 +72,7 @@ TEST(FalseColor, NeighbouringIdsAreTellableApart) {
   for (uint32_t id = 0; id < 64; ++id) {
     const Vec3 c = id_color(id) * 255.0f;
     codes.insert({static_cast<int>(c.x), static_cast<int>(c.y), static_cast<int>(c.z)});
-    EXPECT_GT(lightness(id_color(id)), 0.1) << "pleasant: never near black, which stands for missing";
+    EXPECT_GT(lightness(id_color(id)), 0.1) << "ids must not be near black, which means missing";
   }
   EXPECT_EQ(codes.size(), 64u);
   const Image picture = id_preview({2, 1}, std::vector<uint32_t>{7, kNoInstance}, kMissing);
