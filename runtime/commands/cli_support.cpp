@@ -129,9 +129,10 @@ void add_options_of_every_verb(CLI::App& app, GlobalOptions& globals) {
          "-v,--verbose", [&globals](int64_t count) { globals.verbosity += static_cast<int>(count); },
          "Also print notes, the chosen settings with their reasons, and details per geometry")
       ->group(kGroup);
-  app.add_option("--json", globals.json,
-                 "Write the results, or the error, as JSON to FILE, or to standard output if FILE is -. "
-                 "docs/json_output.md lists the keys")
+  app.add_option(
+         "--json", globals.json,
+         "Write the results, or the error, as JSON to FILE (- for standard output). See docs/json_output.md for "
+         "the keys")
       ->type_name("FILE")
       ->take_last()
       ->group(kGroup);

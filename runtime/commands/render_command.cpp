@@ -444,10 +444,10 @@ void add_render_command(CLI::App& app, GlobalOptions& globals) {
           "(default: all in .exr, ao in .png). Several layers in .png become NAME.LAYER.png")
       ->delimiter(',')
       ->type_name("LAYERS");
-  verb.add_option(
-          "--camera", options->camera,
-          "Number of the scene's camera, from 0, or auto for a view of the whole scene (default 0, or auto if there is "
-          "no camera or camera 0 sees nothing)")
+  verb.add_option("--camera", options->camera,
+                  "Camera number in the scene, from 0, or auto for a view of the whole scene (default 0, or auto if "
+                  "there is no "
+                  "camera or camera 0 sees nothing)")
       ->type_name("I|auto");
   verb.add_option("--size", options->size,
                   "Image size in pixels, for example 640x360 (default: the size of the scene's film, or 1280x720 with "
