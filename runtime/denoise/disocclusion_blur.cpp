@@ -40,7 +40,7 @@ void fill_unsampled(const Guides& guides, const Plane<float>& samples, std::span
       if (image.youngest[static_cast<size_t>(y)] > 0.0f) continue;
       for (int x = 0; x < static_cast<int>(guides.size.width); ++x) {
         if (!(guides.disparity.row(y)[x] > 0.0f) || samples.row(y)[x] > 0.0f) continue;
-        WeightedMean mean; // of sampled pixels only: none of them is written here
+        WeightedMean mean; // only of sampled pixels, which this loop never writes
         for (size_t i = 0; i < edges.size() && mean.weight == 0.0f; ++i)
           mean = mean_of_surface(edges[i], samples, image.value, x, y);
         if (mean.weight == 0.0f) mean = mean_of_window(samples, image.value, x, y);
