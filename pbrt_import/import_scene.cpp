@@ -3,12 +3,12 @@
 #include <cmath>
 #include <string>
 
+#include "pbrt_import/base/file_error.h"
+#include "pbrt_import/builder/scene_builder.h"
 #include "pbrt_import/language/file_names.h"
 #include "pbrt_import/language/parser.h"
 #include "pbrt_import/text/problem_text.h"
 #include "pbrt_import/text/reporter.h"
-#include "pbrt_import/base/file_error.h"
-#include "pbrt_import/builder/scene_builder.h"
 #include "pbrt_import/text/source_stack.h"
 
 namespace packtrace {

@@ -44,7 +44,7 @@ uint64_t least_limit(const fs::path& root, std::string_view group, const char* f
 }
 
 uint64_t resource_limit(__rlimit_resource resource) {
-  struct rlimit limit {};
+  struct rlimit limit{};
   return ::getrlimit(resource, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY ? limit.rlim_cur : UINT64_MAX;
 }
 
@@ -150,8 +150,8 @@ uint64_t parse_memory_size(std::string_view text, uint64_t all) {
     if (!rest.empty()) return fail();
   }
   if (!(value >= 1.0)) return fail();
-  constexpr double kMost = 0x1p63; // more than any machine has
-  return static_cast<uint64_t>(std::min(value, kMost));
+  constexpr double kMax = 0x1p63; // more than any machine has
+  return static_cast<uint64_t>(std::min(value, kMax));
 }
 
 std::string memory_text(uint64_t bytes) {

@@ -84,9 +84,7 @@ fs::path claim_of(const fs::path& target) {
 /// Path under /proc by which an open file can be opened again and linked.
 std::string name_of(const Descriptor& file) { return "/proc/self/fd/" + std::to_string(file.get()); }
 
-[[noreturn]] void fail(const fs::path& path, const std::string& what) {
-  throw FileError(ErrorKind::kIo, path, what);
-}
+[[noreturn]] void fail(const fs::path& path, const std::string& what) { throw FileError(ErrorKind::kIo, path, what); }
 
 void check_target(const fs::path& target, bool force) {
   std::error_code error;
@@ -128,7 +126,7 @@ std::optional<pid_t> owner_of(std::string_view name) {
   return owner;
 }
 
-constexpr int kMostAttempts = 1000;
+constexpr int kMaxNameAttempts = 1000;
 
 /// Creates a file without a name. Returns an invalid descriptor if the file system does not support it, or if /proc,
 /// which is needed to name the file later, is not available.
@@ -140,7 +138,7 @@ Descriptor create_nameless(const fs::path& folder) {
 
 /// Creates an empty file with a unique name, locked so that remove_stale_output() knows that it is in use.
 Descriptor create_named(const fs::path& folder, const fs::path& target, fs::path& name) {
-  for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
+  for (int attempt = 0; attempt < kMaxNameAttempts; ++attempt) {
     name = temporary_name(folder);
     Descriptor file(open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
     if (!file.valid()) {
@@ -148,7 +146,7 @@ Descriptor create_named(const fs::path& folder, const fs::path& target, fs::path
       continue;
     }
     flock(file.get(), LOCK_EX); // without file locks, the process id in the name protects it
-    struct stat info {};
+    struct stat info{};
     if (fstat(file.get(), &info) == 0 && info.st_nlink > 0) return file; // otherwise it was removed as a stale file
   }
   fail(target, "cannot find a free temporary name");
@@ -213,7 +211,7 @@ void OutputFile::write(std::span<const std::byte> bytes) {
 /// Gives a nameless file a temporary name, from which it can be renamed over an existing file.
 void OutputFile::give_name() {
   const fs::path folder = folder_of(target_);
-  for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
+  for (int attempt = 0; attempt < kMaxNameAttempts; ++attempt) {
     temporary_ = temporary_name(folder);
     remember(temporary_.c_str());
     flock(descriptor_.get(), LOCK_EX);

@@ -20,7 +20,7 @@ constexpr uint64_t kDeflateRatio = 1032;
 /// file must not demand gigabytes.
 constexpr uint64_t kSurplusBytes = uint64_t{64} << 20;
 /// Larger than any image that is read; counting the decompressed bytes takes seconds at most below this limit.
-constexpr uint64_t kMostBytes = uint64_t{8} << 30;
+constexpr uint64_t kMaxBytes = uint64_t{8} << 30;
 
 uint32_t read_be32(std::span<const std::byte> bytes, size_t at) {
   uint32_t value = 0;
@@ -32,8 +32,8 @@ uint32_t read_be32(std::span<const std::byte> bytes, size_t at) {
 uint64_t row_bytes(const PngHeader& header, uint64_t width, uint64_t height) {
   const uint64_t bits_per_pixel = uint64_t{header.bits_per_sample} * header.channels;
   const uint64_t row = width == 0 ? 0 : 1 + (width * bits_per_pixel + 7) / 8;
-  constexpr uint64_t kMost = uint64_t{1} << 60;
-  return row > 0 && height > kMost / row ? kMost : height * row;
+  constexpr uint64_t kMax = uint64_t{1} << 60;
+  return row > 0 && height > kMax / row ? kMax : height * row;
 }
 
 /// Expected size of the decompressed image data in bytes.
@@ -122,7 +122,7 @@ private:
   void check_amount(uint64_t wanted) const {
     if (data_.empty()) damaged("it has no image data");
     if (wanted / kDeflateRatio > packed_bytes_) damaged("too little data for its size");
-    if (wanted > kMostBytes) damaged("it has more pixels than are read");
+    if (wanted > kMaxBytes) damaged("it has more pixels than are read");
     const uint64_t most = wanted + kSurplusBytes;
     if (packed_bytes_ > most / kDeflateRatio && unpacks_beyond(most)) damaged("too much data for its size");
   }

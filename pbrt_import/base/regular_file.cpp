@@ -38,7 +38,7 @@ Descriptor& Descriptor::operator=(Descriptor&& other) noexcept {
 int Descriptor::release() { return std::exchange(value_, -1); }
 
 RegularFile open_regular_file(const std::filesystem::path& path) {
-  struct stat info {};
+  struct stat info{};
   // Checks the type before opening, because opening a device can have side effects.
   if (::stat(path.c_str(), &info) == 0) require_regular(info.st_mode);
   // Non-blocking, because the path may have become a pipe without a writer since the check.

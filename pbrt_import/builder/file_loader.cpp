@@ -8,11 +8,11 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/files/ply.h"
 #include "pbrt_import/text/input_file.h"
 #include "pbrt_import/text/large_pages.h"
-#include "pbrt_import/files/ply.h"
 #include "pbrt_import/text/problem_text.h"
-#include "pbrt_import/base/error.h"
 #include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
@@ -63,8 +63,7 @@ FileLoader::Outcome FileLoader::read_image_file(ImageRequest& image) const {
     outcome.memory = MemoryReservation(options_.memory);
     const std::vector<std::byte> bytes = read_whole_file(image.path, kNoLimit, &content);
     outcome.bytes = bytes.size();
-    image.summary =
-        read_image(bytes, image.decode_srgb, {image.want_mask, image.want_colours}, outcome.memory);
+    image.summary = read_image(bytes, image.decode_srgb, {image.want_mask, image.want_colours}, outcome.memory);
   });
   outcome.memory.resize(bytes_of(image.summary), "its pixels");
   image.missing = !outcome.error.empty();

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "pbrt_import/import_scene.h"
-#include "pbrt_import/text/reporter.h"
-#include "pbrt_import/scene/scene.h"
 #include "pbrt_import/language/texture_graph.h"
+#include "pbrt_import/scene/scene.h"
+#include "pbrt_import/text/reporter.h"
 
 namespace packtrace {
 

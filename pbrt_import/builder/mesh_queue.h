@@ -10,14 +10,14 @@
 
 #include <tbb/task_group.h>
 
-#include "pbrt_import/language/parameters.h"
 #include "pbrt_import/base/diagnostics.h"
 #include "pbrt_import/builder/shape_builder.h"
+#include "pbrt_import/language/parameters.h"
 
 namespace packtrace {
 
 /// Result of a MeshJob.
-struct MadeMesh {
+struct MeshResult {
   Mesh mesh;
   std::string problem; ///< empty if the mesh has triangles
   std::vector<std::pair<Severity, std::string>> reports;
@@ -25,11 +25,12 @@ struct MadeMesh {
   std::string memory_problem; ///< not empty if the mesh exceeds the memory budget
 };
 
-/// Makes the mesh of a job. Memory errors are returned in MadeMesh::memory_problem. Throws what check_cancelled throws.
+/// Makes the mesh of a job. Memory errors are returned in MeshResult::memory_problem. Throws what check_cancelled
+/// throws.
 /// @param job its given mesh is moved out
 /// @param memory resized to the bytes of the mesh; null: not counted
-MadeMesh run_job(MeshJob& job, double tessellation_tolerance, const CheckCancelledFn& check_cancelled,
-                 MemoryReservation* memory = nullptr);
+MeshResult run_job(MeshJob& job, double tessellation_tolerance, const CheckCancelledFn& check_cancelled,
+                   MemoryReservation* memory = nullptr);
 
 /// Makes meshes on all threads while the scene text is still being read.
 class MeshQueue {
@@ -39,10 +40,10 @@ public:
     MeshJob job;
     std::string_view kind; ///< ShapeKind::name, for messages
     Place place;
-    uint64_t sequence = 0; ///< Reporter::sequence() of its directive
-    uint32_t slot = 0;     ///< index in Scene::meshes
+    uint64_t sequence = 0;    ///< Reporter::sequence() of its directive
+    uint32_t slot = 0;        ///< index in Scene::meshes
     MemoryReservation memory; ///< for the mesh
-    MadeMesh made;
+    MeshResult made;
   };
 
   MeshQueue(double tessellation_tolerance, const CheckCancelledFn& check_cancelled)

@@ -7,18 +7,18 @@
 #include <string_view>
 #include <vector>
 
-#include "pbrt_import/language/cameras.h"
 #include "pbrt_import/builder/file_loader.h"
+#include "pbrt_import/builder/mesh_queue.h"
+#include "pbrt_import/import_scene.h"
+#include "pbrt_import/language/cameras.h"
 #include "pbrt_import/language/file_names.h"
 #include "pbrt_import/language/graphics_state.h"
-#include "pbrt_import/import_scene.h"
-#include "pbrt_import/text/large_pages.h"
 #include "pbrt_import/language/materials.h"
-#include "pbrt_import/builder/mesh_queue.h"
 #include "pbrt_import/language/parser.h"
-#include "pbrt_import/text/reporter.h"
 #include "pbrt_import/language/texture_graph.h"
 #include "pbrt_import/language/transforms.h"
+#include "pbrt_import/text/large_pages.h"
+#include "pbrt_import/text/reporter.h"
 
 namespace packtrace {
 
@@ -47,9 +47,9 @@ private:
   bool reading() const { return world_ == wanted_world(); }
 
   bool allowed_here(const Directive& directive);
-  void carry_out(Directive& directive);
+  void execute_directive(Directive& directive);
   void skip_damaged(Directive& directive);
-  void mention_files(const Directive& directive);
+  void record_unread_files(const Directive& directive);
   void handle_transform(const Directive& directive);
   void handle_active_transform(const Directive& directive);
   void handle_coordinate_system(const Directive& directive);
@@ -68,7 +68,7 @@ private:
   void add_instance(const Directive& directive);
   Placement place(const Directive& directive, std::string_view thing);
 
-  void settle_time();
+  void set_scene_time();
   void check_worlds(const Place& end);
   void report_media();
   void count_features();
@@ -94,7 +94,7 @@ private:
   Reporter& reporter_;
   Phase phase_ = Phase::kOptions;
   uint32_t world_ = 1; ///< number of the current world, which spans its options up to its WorldEnd
-  std::optional<Place> options_behind_world_;
+  std::optional<Place> options_after_world_;
   TransformTimes transform_times_;
   GraphicsState state_;
   NameTable coordinate_system_names_;
@@ -115,11 +115,11 @@ private:
   uint64_t ignored_blocks_ = 0;  ///< open blocks beyond the nesting limit
   uint32_t open_blocks_[3] = {}; ///< by BlockKind
   const CheckCancelledFn check_cancelled_;
-  NameTable same_meshes_;                 ///< values of MeshJob::same_as
-  std::vector<uint32_t> same_mesh_slots_; ///< index into Scene::meshes, by number in same_meshes_
-  std::string mesh_name_;                 ///< scratch buffer
-  MemoryReservation mesh_memory_; ///< for large meshes made from text, reserved one by one
-  MemoryReservation kept_memory_; ///< for all other data kept of directives, reserved in steps
+  NameTable mesh_keys_;                     ///< values of MeshJob::same_as
+  std::vector<uint32_t> mesh_slots_by_key_; ///< index into Scene::meshes, by number in mesh_keys_
+  std::string mesh_name_;                   ///< scratch buffer
+  MemoryReservation mesh_memory_;           ///< for large meshes made from text, reserved one by one
+  MemoryReservation kept_memory_;           ///< for all other data kept of directives, reserved in steps
   uint64_t kept_bytes_ = 0;
   LargeHeapPages heap_pages_;
   MeshQueue mesh_queue_; ///< last member, so that its tasks end before other members are destroyed

@@ -3,12 +3,12 @@
 
 #include <algorithm>
 
-#include "pbrt_import/text/large_pages.h"
-#include "pbrt_import/text/problem_text.h"
 #include "pbrt_import/builder/scene_pruning.h"
 #include "pbrt_import/builder/shape_builder.h"
-#include "pbrt_import/text/tokenizer.h"
 #include "pbrt_import/language/transforms.h"
+#include "pbrt_import/text/large_pages.h"
+#include "pbrt_import/text/problem_text.h"
+#include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
 
@@ -113,15 +113,15 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
       return skip_shape(name, directive.place, "its size leaves the range of numbers");
   }
   const std::string same_as = std::move(entry.job.same_as);
-  if (const std::optional<uint32_t> known = same_as.empty() ? std::nullopt : same_meshes_.find(same_as)) {
-    shape.mesh = same_mesh_slots_[*known];
+  if (const std::optional<uint32_t> known = same_as.empty() ? std::nullopt : mesh_keys_.find(same_as)) {
+    shape.mesh = mesh_slots_by_key_[*known];
     return true;
   }
   if (!make_or_queue(std::move(entry))) return false;
   shape.mesh = static_cast<uint32_t>(scene_.meshes.size() - 1);
   if (!same_as.empty()) {
-    same_meshes_.intern(same_as);
-    same_mesh_slots_.push_back(shape.mesh);
+    mesh_keys_.intern(same_as);
+    mesh_slots_by_key_.push_back(shape.mesh);
   }
   return true;
 }
@@ -129,15 +129,15 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
 /// Adds a mesh to the scene. Large meshes are queued and stay empty until take_queued_meshes().
 /// @return false if the mesh could not be made
 bool SceneBuilder::make_or_queue(MeshQueue::Entry&& entry) {
-  constexpr uint64_t kWorthATask = 32 * 1024;
-  constexpr uint64_t kLeast = 128; // for its name and the rounding of heap blocks
-  heap_pages_.about_to_allocate(entry.job.bytes_at_most + kLeast);
-  const bool small = entry.job.bytes_at_most > 0 && entry.job.bytes_at_most < kWorthATask;
+  constexpr uint64_t kMinTaskBytes = 32 * 1024;
+  constexpr uint64_t kMin = 128; // for its name and the rounding of heap blocks
+  heap_pages_.about_to_allocate(entry.job.bytes_at_most + kMin);
+  const bool small = entry.job.bytes_at_most > 0 && entry.job.bytes_at_most < kMinTaskBytes;
   if (!small) {
     entry.memory = MemoryReservation(options_.memory);
     entry.memory.resize(std::max(entry.job.bytes_at_most, entry.job.bytes_at_least), "the shape");
   }
-  if (entry.job.bytes_at_most >= kWorthATask) {
+  if (entry.job.bytes_at_most >= kMinTaskBytes) {
     reserve_one_more(scene_.meshes);
     scene_.meshes.emplace_back();
     mesh_queue_.add(std::move(entry));
@@ -172,8 +172,7 @@ bool SceneBuilder::report_mesh(MeshQueue::Entry& entry) {
 /// Waits for the queued meshes and stores them. A mesh that could not be made stays empty.
 void SceneBuilder::take_queued_meshes() {
   mesh_queue_.finish([&](MeshQueue::Entry& entry) {
-    if (!entry.made.memory_problem.empty())
-      throw MemoryError(reporter_.locate(entry.place), entry.made.memory_problem);
+    if (!entry.made.memory_problem.empty()) throw MemoryError(reporter_.locate(entry.place), entry.made.memory_problem);
     mesh_memory_.merge(std::move(entry.memory));
     reporter_.set_sequence(entry.sequence);
     if (report_mesh(entry))
@@ -244,8 +243,8 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
   for (const ImageRequest& image : graph_.images())
     ++(image.missing ? statistics_.textures_missing : statistics_.textures_found);
   MemoryReservation texture_memory(options_.memory);
-  const std::vector<uint32_t> material_numbers = with_place(
-      reporter_, [&] { return end; }, [&] { return materials_.resolve(scene_, texture_memory, reporter_); });
+  const std::vector<uint32_t> material_numbers =
+      with_place(reporter_, [&] { return end; }, [&] { return materials_.resolve(scene_, texture_memory, reporter_); });
   drop_unusable_shapes(material_numbers, scene_.shapes);
   for (Object& object : scene_.objects) drop_unusable_shapes(material_numbers, object.shapes);
   if (const uint64_t absent = statistics_.shapes_absent; absent > 0)

@@ -92,7 +92,8 @@ MeshJob read_triangle_mesh(ParameterList& parameters, const ReportFn& report) {
 
 /// Creates the job of a quadric. The key for equal meshes consists of the quadric's kind and parameters.
 template <class Quadric>
-MeshJob quadric_job(std::string_view kind, const Quadric& quadric, Mesh (*tessellate)(const Quadric&, double, MemoryReservation*)) {
+MeshJob quadric_job(std::string_view kind, const Quadric& quadric,
+                    Mesh (*tessellate)(const Quadric&, double, MemoryReservation*)) {
   static_assert(std::is_trivially_copyable_v<Quadric> && sizeof(Quadric) % sizeof(float) == 0);
   MeshJob job;
   job.make = [=](ShapeContext& context) { return tessellate(quadric, context.tessellation_tolerance, context.memory); };
@@ -108,8 +109,8 @@ MeshJob read_sphere(ParameterList& parameters, const ReportFn&) {
   sphere.z_max = parameters.get_float("zmax", sphere.radius);
   sphere.phi_max = parameters.get_float("phimax", 360.0f);
   // Whole spheres only differ in scale, so that scenes with many spheres share one mesh.
-  const bool whole = std::min(sphere.z_min, sphere.z_max) <= -sphere.radius &&
-                     std::max(sphere.z_min, sphere.z_max) >= sphere.radius;
+  const bool whole =
+      std::min(sphere.z_min, sphere.z_max) <= -sphere.radius && std::max(sphere.z_min, sphere.z_max) >= sphere.radius;
   const double scale = whole && sphere.radius > 0.0f && std::isfinite(sphere.radius) ? sphere.radius : 1.0;
   if (scale != 1.0) sphere = {1.0f, -1.0f, 1.0f, sphere.phi_max};
   MeshJob job = quadric_job("sphere", sphere, tessellate_sphere);
@@ -169,7 +170,7 @@ MeshJob read_loop_subdivision(ParameterList& parameters, const ReportFn& report)
   std::vector<Vec3> points = take_points(parameters);
   MeshJob job;
   // Each level splits a triangle into four and adds at most one vertex per new triangle.
-  if (constexpr uint32_t kFewLevels = 12; levels <= kFewLevels) { // more levels exceed the triangle limit
+  if (constexpr uint32_t kMaxSizedLevels = 12; levels <= kMaxSizedLevels) { // more levels exceed the triangle limit
     const uint64_t made = static_cast<uint64_t>(triangles.size()) << (2 * levels);
     job.bytes_at_least = made * sizeof(Triangle);
     job.bytes_at_most = job.bytes_at_least + (points.size() + made) * 2 * sizeof(Vec3);
@@ -250,7 +251,7 @@ MeshJob read_height_field(ParameterList& parameters, const ReportFn&) {
   job.bytes_at_most = heights.size() * (sizeof(Vec3) + sizeof(Vec2) + 2 * sizeof(Triangle));
   job.make = [nu, nv, heights = std::move(heights)](ShapeContext& context) {
     Mesh mesh = make_heightfield(nu, nv, heights);
-    context.dropped_triangles += drop_bad_triangles(mesh, context.report);
+    context.dropped_triangles += clean_up_mesh(mesh, context.report);
     return mesh;
   };
   return job;

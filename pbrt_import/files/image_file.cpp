@@ -21,13 +21,13 @@
 #define STBI_ONLY_PNG
 #include <stb/stb_image.h>
 
-#include "pbrt_import/text/number.h"
-#include "pbrt_import/files/radiance.h"
-#include "pbrt_import/scene/albedo_texture.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/exr_header.h"
 #include "pbrt_import/base/png_chunks.h"
+#include "pbrt_import/files/radiance.h"
 #include "pbrt_import/files/tga.h"
+#include "pbrt_import/scene/albedo_texture.h"
+#include "pbrt_import/text/number.h"
 
 namespace packtrace {
 namespace {
@@ -38,7 +38,7 @@ constexpr const char* kDamaged = "damaged image: ";
 constexpr const char* kTruncated = "damaged image: the file is truncated";
 
 // An upper bound for all formats: PNG reaches 8256; DWAB compression of EXR stores chunks in as few as 96 bytes.
-constexpr uint64_t kMostPixelsPerByte = 1u << 16;
+constexpr uint64_t kMaxPixelsPerByte = 1u << 16;
 
 constexpr const char *kNotInPalette = "has a colour that the palette lacks; it counts as black",
                      *kNotInPaletteMany = "have colours that the palette lacks; they count as black";
@@ -57,7 +57,7 @@ public:
       : width_(width), want_mask_(wants.mask), want_colours_(wants.colours) {
     summary_.width = width;
     summary_.height = height;
-    want_colours_ = want_colours_ && uint64_t{width} * height <= kMostTextureTexels;
+    want_colours_ = want_colours_ && uint64_t{width} * height <= kMaxTextureTexels;
     if (want_colours_) summary_.rgb.assign(static_cast<size_t>(width) * height * 3, 0);
     if (want_mask_) summary_.nonzero.assign(static_cast<size_t>(AlphaMask::row_words(width)) * height, 0);
   }
@@ -106,7 +106,7 @@ private:
 /// Image size as claimed by a file header, checked before memory is allocated.
 struct ClaimedSize {
   uint64_t width = 0, height = 0;
-  uint64_t pixels_per_byte = kMostPixelsPerByte; ///< upper bound of the format's compression
+  uint64_t pixels_per_byte = kMaxPixelsPerByte; ///< upper bound of the format's compression
 
   std::string text() const { return std::to_string(width) + " x " + std::to_string(height); }
 
@@ -119,7 +119,7 @@ struct ClaimedSize {
     if (pixels / pixels_per_byte > stored_bytes)
       fail("damaged image: its " + std::to_string(stored_bytes) + " bytes cannot hold the " + text() +
            " pixels it claims");
-    const uint64_t kept = (wants.colours && pixels <= kMostTextureTexels ? 3 * pixels : 0) +
+    const uint64_t kept = (wants.colours && pixels <= kMaxTextureTexels ? 3 * pixels : 0) +
                           (wants.mask ? AlphaMask::row_words(static_cast<uint32_t>(width)) * height * 4 : 0);
     memory.cover(working_bytes + kept, "decoding its " + text() + " pixels");
   }
@@ -277,9 +277,9 @@ void check_exr(std::span<const std::byte> bytes, ImageWants wants, MemoryReserva
   if (const std::string_view why = unsupported_exr_kind(bytes); !why.empty()) fail(std::string(why));
   const ExrHeader header = scan_exr_header(bytes, kDamaged);
   // OpenEXR keeps a few blocks, compressed and decompressed.
-  constexpr uint64_t kBlockCopies = 4, kFreeBytes = 64u << 20, kRows = 64;
+  constexpr uint64_t kBlockCopies = 4, kAlwaysAcceptedBytes = 64u << 20, kRows = 64;
   const uint64_t block = header.block_bytes();
-  if (block > kFreeBytes && block / kMostPixelsPerByte > bytes.size())
+  if (block > kAlwaysAcceptedBytes && block / kMaxPixelsPerByte > bytes.size())
     fail("damaged image: its " + std::to_string(bytes.size()) + " bytes cannot hold the blocks it claims");
   const uint64_t blocks = block > UINT64_MAX / (2 * kBlockCopies) ? UINT64_MAX / 2 : block * kBlockCopies;
   const ClaimedSize size{header.width(), header.height()};

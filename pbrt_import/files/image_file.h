@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "pbrt_import/scene/math.h"
 #include "pbrt_import/base/memory_budget.h"
+#include "pbrt_import/scene/math.h"
 
 namespace packtrace {
 
@@ -29,7 +29,7 @@ struct ImageWants {
 };
 
 /// Only the average is kept of images with more texels.
-inline constexpr uint64_t kMostTextureTexels = uint64_t{1} << 26;
+inline constexpr uint64_t kMaxTextureTexels = uint64_t{1} << 26;
 
 /// Reads the formats of pbrt, which are PNG, TGA, OpenEXR and PFM, and also HDR. Alpha channels are ignored, as in
 /// pbrt. Other formats, which pbrt does not read either, are rejected with their name.

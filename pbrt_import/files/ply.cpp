@@ -5,9 +5,9 @@
 #include <cstring>
 #include <limits>
 
+#include "pbrt_import/base/error.h"
 #include "pbrt_import/files/ply_header.h"
 #include "pbrt_import/files/ply_source.h"
-#include "pbrt_import/base/error.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
 #include "pbrt_import/text/tokenizer.h"
 
@@ -114,7 +114,7 @@ std::vector<Attribute> allocate_attributes(const PlyElement& element, Mesh& mesh
   Attribute attribute;
   if (!find_attribute(element, Names3{"x", "y", "z"}, attribute))
     throw Error(ErrorKind::kInput, "the vertices have no x, y and z");
-  memory.add(element.count * (sizeof(Vec3) + 1)); // one more byte for drop_bad_triangles()
+  memory.add(element.count * (sizeof(Vec3) + 1)); // one more byte for clean_up_mesh()
   mesh.positions.resize(count);
   attribute.destination = &mesh.positions[0].x;
   attributes.push_back(attribute);
@@ -139,7 +139,7 @@ static_assert(sizeof(Vec3) == 3 * sizeof(float) && sizeof(Vec2) == 2 * sizeof(fl
 
 /// Reads vertex rows of any layout, value by value.
 template <class Source>
-void read_vertices_slowly(Source& source, const PlyElement& element, const std::vector<Attribute>& attributes) {
+void read_vertices_by_value(Source& source, const PlyElement& element, const std::vector<Attribute>& attributes) {
   struct Slot {
     float* destination = nullptr;
     size_t stride = 0;
@@ -206,7 +206,7 @@ void read_vertices(Source& source, const PlyElement& element, Mesh& mesh, MeshMe
   if constexpr (Source::kBinary) {
     if (!element.has_lists()) return read_vertex_table(source, element, attributes);
   }
-  read_vertices_slowly(source, element, attributes);
+  read_vertices_by_value(source, element, attributes);
 }
 
 uint32_t to_index(double value) {
@@ -239,8 +239,8 @@ bool read_polygon(Source& source, const PlyProperty& property, std::vector<Trian
 template <bool kSwap>
 uint64_t read_triangle_run(BinarySource<kSwap>& source, uint64_t max_count, std::vector<Triangle>& triangles,
                            MeshMemory& memory) {
-  constexpr uint64_t kRowBytes = 13, kMostAtOnce = 1u << 16;
-  const uint64_t limit = std::min({max_count, source.remaining() / kRowBytes, kMostAtOnce});
+  constexpr uint64_t kRowBytes = 13, kMaxTrianglesAtOnce = 1u << 16;
+  const uint64_t limit = std::min({max_count, source.remaining() / kRowBytes, kMaxTrianglesAtOnce});
   memory.reserve(triangles, limit);
   const std::byte* const table = source.take(0);
   uint64_t count = 0;
@@ -350,7 +350,7 @@ PlyMesh read_body(Source source, const PlyHeader& header, const ReportFn& report
     else
       read_strips(source, element, result.mesh, report, memory);
   }
-  result.dropped_triangles = drop_bad_triangles(result.mesh, report);
+  result.dropped_triangles = clean_up_mesh(result.mesh, report);
   return result;
 }
 

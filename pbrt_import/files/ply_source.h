@@ -10,9 +10,9 @@
 #include <string>
 #include <string_view>
 
-#include "pbrt_import/text/number.h"
-#include "pbrt_import/files/ply_header.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/files/ply_header.h"
+#include "pbrt_import/text/number.h"
 #include "pbrt_import/text/tokenizer.h"
 
 /// Readers for the values of a PLY body. BinarySource and AsciiSource have the same members, so that element readers

@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
-#include "pbrt_import/text/number.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/text/number.h"
 
 namespace packtrace {
 namespace {

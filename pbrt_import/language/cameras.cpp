@@ -148,12 +148,12 @@ void CameraCollector::add_film(const Directive& directive, Reporter& reporter) {
   film.place = directive.place;
   film.name = list.get_string("filename", film.name);
   const auto read_side = [&](std::string_view name, uint32_t& side) {
-    constexpr int32_t kMostPixels = 1 << 16;
+    constexpr int32_t kMaxPixels = 1 << 16;
     const int32_t pixels = list.get_integer(name, static_cast<int32_t>(side));
-    if (pixels >= 1 && pixels <= kMostPixels)
+    if (pixels >= 1 && pixels <= kMaxPixels)
       side = static_cast<uint32_t>(pixels);
     else
-      reporter.error(directive.place, std::string(name) + " must lie between 1 and " + std::to_string(kMostPixels) +
+      reporter.error(directive.place, std::string(name) + " must lie between 1 and " + std::to_string(kMaxPixels) +
                                           "; " + std::to_string(side) + " is used");
   };
   read_side("xresolution", film.width_px);

@@ -8,9 +8,9 @@
 
 #include "pbrt_import/language/graphics_state.h"
 #include "pbrt_import/language/parser.h"
-#include "pbrt_import/text/reporter.h"
-#include "pbrt_import/scene/scene.h"
 #include "pbrt_import/language/transforms.h"
+#include "pbrt_import/scene/scene.h"
+#include "pbrt_import/text/reporter.h"
 
 namespace packtrace {
 

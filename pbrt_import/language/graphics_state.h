@@ -84,7 +84,7 @@ public:
   void set_transform(const TransformPair& pair);
   void reset_transform();
   /// Marks the transform as unknown, because a directive that changes it had to be ignored.
-  void lose_transform() { transform_.known = false; }
+  void mark_transform_unknown() { transform_.known = false; }
   /// Selects the transforms that later directives change: bit 0 is the start, bit 1 the end.
   void set_active(uint8_t bits) { active_ = bits, animated_ = true; }
 

@@ -10,8 +10,8 @@
 
 #include "pbrt_import/language/graphics_state.h"
 #include "pbrt_import/language/parser.h"
-#include "pbrt_import/scene/scene.h"
 #include "pbrt_import/language/texture_parameters.h"
+#include "pbrt_import/scene/scene.h"
 
 namespace packtrace {
 

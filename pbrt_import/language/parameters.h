@@ -8,9 +8,9 @@
 #include <unordered_map>
 #include <vector>
 
-#include "pbrt_import/text/number_array.h"
 #include "pbrt_import/base/closest_name.h"
 #include "pbrt_import/scene/math.h"
+#include "pbrt_import/text/number_array.h"
 
 namespace packtrace {
 
@@ -71,7 +71,7 @@ public:
   const Parameter* keep();
   void drop() { parameters_.pop_back(); }
   void clear() {
-    parameters_.clear(), asked_.clear(), types_ = 0;
+    parameters_.clear(), looked_up_.clear(), types_ = 0;
     if (!index_.empty()) index_ = {}; // also frees its buckets
   }
   bool empty() const { return parameters_.empty(); }
@@ -108,16 +108,16 @@ public:
 
   /// Of the names looked up so far, the one that `name` is most likely a misspelling of; empty if none is close.
   std::string_view suggestion(std::string_view name) const;
-  bool was_asked(std::string_view name) const;
+  bool was_looked_up(std::string_view name) const;
 
 private:
   static constexpr uint32_t bit_of(ParameterType type) { return 1u << static_cast<uint32_t>(type); }
   const Parameter* find_type_in(uint32_t type_bits, std::string_view name) const;
 
   std::vector<Parameter> parameters_;
-  std::unordered_map<std::string, size_t> index_; ///< index into parameters_ by type and name; empty for short lists
-  uint32_t types_ = 0;                            ///< bit_of() of all parameters' types
-  mutable std::vector<std::string_view> asked_;   ///< names looked up, string literals, possibly with repeats
+  std::unordered_map<std::string, size_t> index_;   ///< index into parameters_ by type and name; empty for short lists
+  uint32_t types_ = 0;                              ///< bit_of() of all parameters' types
+  mutable std::vector<std::string_view> looked_up_; ///< names looked up, string literals, possibly with repeats
 };
 
 /// Returns `; did you mean "x"?`, or an empty string without a suggestion.

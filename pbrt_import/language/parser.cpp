@@ -299,11 +299,11 @@ void Parser::reserve_values() {
 void Parser::read_parameters(ParameterList& list) {
   constexpr uint64_t kParameterBytes = 2 * sizeof(Parameter); // the list doubles its capacity as it grows
   while (true) {
-    if (misread_) {
-      count_value(kParameterBytes + misread_->text.size());
+    if (misread_declaration_) {
+      count_value(kParameterBytes + misread_declaration_->text.size());
       Parameter& parameter = list.append();
-      parameter.place = misread_->place;
-      const bool declared = read_declaration(std::exchange(misread_, std::nullopt)->text, parameter);
+      parameter.place = misread_declaration_->place;
+      const bool declared = read_declaration(std::exchange(misread_declaration_, std::nullopt)->text, parameter);
       read_value_of_last(list, declared);
       continue;
     }
@@ -433,9 +433,9 @@ bool Parser::read_single(Parameter& parameter) {
   const bool has_value =
       next.kind == TokenKind::kOpen || is_number(next) || (next.kind == TokenKind::kString && !declares(next.text));
   if (!has_value) return true;
-  misread_ = Declaration{std::move(parameter.strings[0]), place};
+  misread_declaration_ = Declaration{std::move(parameter.strings[0]), place};
   reporter_.error(place, "expected a value for parameter " + in_quotes(parameter.name) + ", found the parameter " +
-                             in_quotes(misread_->text) + "; the parameter is ignored");
+                             in_quotes(misread_declaration_->text) + "; the parameter is ignored");
   return false;
 }
 
@@ -463,8 +463,8 @@ bool Parser::read_array(Parameter& parameter) {
     if (!text && token.kind == TokenKind::kString && declares(token.text)) return runs_into(describe(token));
     if (text && !parameter.strings.empty() && (token.kind == TokenKind::kOpen || is_number(token)) &&
         declares(parameter.strings.back())) { // the last string is a declaration, because a value follows it
-      misread_ = Declaration{std::move(parameter.strings.back()), last};
-      return runs_into("the parameter " + in_quotes(misread_->text));
+      misread_declaration_ = Declaration{std::move(parameter.strings.back()), last};
+      return runs_into("the parameter " + in_quotes(misread_declaration_->text));
     }
     last = source_.place();
     if (parameter.type == ParameterType::kBool ? take_bool(parameter) : take_string(parameter)) continue;

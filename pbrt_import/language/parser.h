@@ -7,10 +7,10 @@
 #include <string_view>
 #include <vector>
 
+#include "pbrt_import/base/memory_budget.h"
 #include "pbrt_import/language/directive_info.h"
 #include "pbrt_import/language/file_names.h"
 #include "pbrt_import/language/parameters.h"
-#include "pbrt_import/base/memory_budget.h"
 #include "pbrt_import/text/source_stack.h"
 
 namespace packtrace {
@@ -26,7 +26,7 @@ struct Directive {
   uint32_t name_count = 0;
   ParameterList parameters;
   MemoryReservation memory; ///< reservation for large parameters
-  bool damaged = false; ///< its numbers or names are malformed, which was reported; only kind is valid
+  bool damaged = false;     ///< its numbers or names are malformed, which was reported; only kind is valid
 };
 
 /// Reads directives one by one and follows Include. Malformed input is reported and costs as little as possible: one
@@ -80,9 +80,10 @@ private:
   SourceStack& source_;
   FileNames& file_names_;
   Reporter& reporter_;
-  std::vector<double> numbers_;        ///< scratch buffer
-  std::string include_name_;           ///< escapes not yet replaced
-  std::optional<Declaration> misread_; ///< a declaration that was read as the value of the previous parameter
+  std::vector<double> numbers_; ///< scratch buffer
+  std::string include_name_;    ///< escapes not yet replaced
+  std::optional<Declaration>
+      misread_declaration_; ///< a declaration that was read as the value of the previous parameter
   MemoryBudget memory_;
   Directive* directive_ = nullptr; ///< the directive being read
   uint64_t value_bytes_ = 0;       ///< bytes of its parameters

@@ -222,9 +222,9 @@ TextureGraph::MaskResult TextureGraph::alpha_mask(Node node) const {
   } else if (board) { // a checkerboard repeats every two cells
     mask.uv_scale = 0.5f * board->mapping.scale, mask.uv_offset = 0.5f * board->mapping.offset;
   }
-  constexpr size_t kMostNodes = 64;                        // per texel
-  constexpr uint64_t kMostEvaluations = uint64_t{1} << 31; // a few seconds; unbounded, it could be hours
-  if (order.size() > kMostNodes || uint64_t{mask.width} * mask.height > kMostEvaluations / order.size()) {
+  constexpr size_t kMaxEvaluatedNodes = 64;               // per texel
+  constexpr uint64_t kMaxEvaluations = uint64_t{1} << 31; // a few seconds; unbounded, it could be hours
+  if (order.size() > kMaxEvaluatedNodes || uint64_t{mask.width} * mask.height > kMaxEvaluations / order.size()) {
     result.exact = false;
     mask = {};
     return result;
@@ -335,9 +335,9 @@ std::optional<AlbedoTexture> TextureGraph::albedo_texture(Node node, MemoryReser
     texture.uv_scale = 0.5f * board->mapping.scale, texture.uv_offset = 0.5f * board->mapping.offset;
   }
   const uint64_t texels = uint64_t{texture.width} * texture.height;
-  constexpr size_t kMostNodes = 64;                        // per texel
-  constexpr uint64_t kMostEvaluations = uint64_t{1} << 28; // a few seconds; unbounded, it could be minutes
-  if (order.size() > kMostNodes || texels > kMostTextureTexels || texels > kMostEvaluations / order.size())
+  constexpr size_t kMaxEvaluatedNodes = 64;               // per texel
+  constexpr uint64_t kMaxEvaluations = uint64_t{1} << 28; // a few seconds; unbounded, it could be minutes
+  if (order.size() > kMaxEvaluatedNodes || texels > kMaxTextureTexels || texels > kMaxEvaluations / order.size())
     return std::nullopt;
   if (texels * order.size() > evaluations_left_) return texture;
   memory.resize(memory.bytes() + 3 * texels, "the textures of materials");

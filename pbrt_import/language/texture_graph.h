@@ -33,8 +33,8 @@ struct ImageRequest {
   bool needed = false;   ///< a used material depends on it
   bool want_mask = false;
   bool want_colours = false;
-  bool missing = false; ///< missing or unreadable: counts as 1 everywhere, as in pbrt
-  ImageSummary summary; ///< filled in by FileLoader
+  bool missing = false;     ///< missing or unreadable: counts as 1 everywhere, as in pbrt
+  ImageSummary summary;     ///< filled in by FileLoader
   MemoryReservation memory; ///< for the summary
 };
 
@@ -85,7 +85,7 @@ public:
 
   /// The colours over uv, sampled at the texels of the widest image. Textures without a uv mapping contribute their
   /// average. Returns nullopt if the colours do not depend on uv, if an image's colours were not kept, if there are
-  /// more than kMostTextureTexels texels, or if the expression is too large to evaluate. Returns a texture without
+  /// more than kMaxTextureTexels texels, or if the expression is too large to evaluate. Returns a texture without
   /// texels once the scene's budget of evaluations is used up.
   /// @param memory grows by the texels
   /// Throws MemoryError.

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pbrt_import/text/input_file.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/language/spectrum.h"
+#include "pbrt_import/text/input_file.h"
 #include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {

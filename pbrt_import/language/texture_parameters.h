@@ -7,8 +7,8 @@
 #include "pbrt_import/language/file_names.h"
 #include "pbrt_import/language/graphics_state.h"
 #include "pbrt_import/language/parameters.h"
-#include "pbrt_import/text/reporter.h"
 #include "pbrt_import/language/texture_graph.h"
+#include "pbrt_import/text/reporter.h"
 
 namespace packtrace {
 

@@ -76,11 +76,11 @@ std::optional<TransformKey> decompose(const DAffine& map) {
   };
   // Newton's iteration for the nearest orthogonal matrix. The factor speeds up the first steps for badly scaled maps;
   // it tends to 1 near the solution, where convergence is quadratic.
-  constexpr int kMostSteps = 64;
+  constexpr int kMaxSteps = 64;
   constexpr double kConverged = 1e-14;
   glm::dmat3 rotation = linear;
   double change = 1.0;
-  for (int step = 0; step < kMostSteps && change > kConverged; ++step) {
+  for (int step = 0; step < kMaxSteps && change > kConverged; ++step) {
     const glm::dmat3 inverted = glm::transpose(glm::inverse(rotation));
     const double factor = std::sqrt(norm(inverted) / norm(rotation));
     const glm::dmat3 next = (rotation * factor + inverted / factor) * 0.5;

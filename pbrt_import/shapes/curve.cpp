@@ -265,7 +265,7 @@ Mesh tessellate_curve(const CurveParameters& curve, MemoryReservation* memory) {
   Mesh mesh = ribbon ? make_ribbon(stations) : make_tube(std::move(stations));
   for (const Vec3& p : mesh.positions)
     if (!is_finite(p)) fail("the curve leaves the range of single precision");
-  drop_bad_triangles(mesh, {}); // removes vertices of omitted triangles
+  clean_up_mesh(mesh, {}); // removes vertices of omitted triangles
   if (mesh.triangles.empty()) fail("nothing of the curve can be drawn");
   return mesh;
 }

@@ -44,9 +44,8 @@ auto add_up(size_t count, CountUp count_up) {
   constexpr size_t kPiece = 1u << 15;
   if (count <= kPiece) return count_up(size_t{0}, count);
   std::vector<decltype(count_up(size_t{0}, count))> sums((count + kPiece - 1) / kPiece);
-  tbb::parallel_for(size_t{0}, sums.size(), [&](size_t i) {
-    sums[i] = count_up(i * kPiece, std::min(count, (i + 1) * kPiece));
-  });
+  tbb::parallel_for(size_t{0}, sums.size(),
+                    [&](size_t i) { sums[i] = count_up(i * kPiece, std::min(count, (i + 1) * kPiece)); });
   for (size_t i = 1; i < sums.size(); ++i) sums[0] += sums[i];
   return sums[0];
 }
@@ -204,7 +203,7 @@ void check_count(std::vector<T>& attribute, size_t vertex_count, std::string_vie
 
 } // namespace
 
-uint64_t drop_bad_triangles(Mesh& mesh, const ReportFn& report) {
+uint64_t clean_up_mesh(Mesh& mesh, const ReportFn& report) {
   check_count(mesh.normals, mesh.positions.size(), "normals", report);
   check_count(mesh.uvs, mesh.positions.size(), "uvs", report);
   std::vector<uint8_t> used(mesh.positions.size());

@@ -14,6 +14,6 @@ namespace packtrace {
 /// pbrt-v3, and noted.
 /// @param report receives one diagnostic per kind of problem, with its count and the first triangle or vertex number
 /// @return the number of triangles dropped
-uint64_t drop_bad_triangles(Mesh& mesh, const ReportFn& report);
+uint64_t clean_up_mesh(Mesh& mesh, const ReportFn& report);
 
 } // namespace packtrace

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
 
 namespace packtrace {
@@ -140,7 +140,7 @@ public:
     }
 
   private:
-    Jet curve(double u, DVec4 Jet::*which) const {
+    Jet curve(double u, DVec4 Jet::* which) const {
       const Axis& axis = surface_.u_;
       const uint32_t span = axis.span_of(u), first = span + 1 - axis.order;
       DVec4 points[kMaxOrder];
@@ -289,7 +289,7 @@ Mesh mesh_of(const Grid& grid, const Surface& surface, const CheckCancelledFn& c
       add(a, c, d);
     }
   }
-  drop_bad_triangles(mesh, {}); // recomputes normals at poles from the faces around them
+  clean_up_mesh(mesh, {}); // recomputes normals at poles from the faces around them
   return mesh;
 }
 

@@ -123,7 +123,7 @@ public:
   }
 
   Mesh take() {
-    if (collapsed_) drop_bad_triangles(mesh_, {}); // removes their vertices
+    if (collapsed_) clean_up_mesh(mesh_, {}); // removes their vertices
     require(!mesh_.triangles.empty(), "the quadric is too thin for single precision");
     return std::move(mesh_);
   }
@@ -234,8 +234,8 @@ Mesh tessellate_disk(const DiskParameters& disk, double relative_tolerance, Memo
           "the disk's inner radius is not within [0, radius)");
   const Sweep sweep = make_sweep(disk.phi_max, relative_tolerance);
   const double height = disk.height;
-  return sweep_profile(sweep,
-                       {{{disk.radius, 0, height}, {0, 0, 1}, 0.0}, {{disk.inner_radius, 0, height}, {0, 0, 1}, 1.0}}, memory);
+  return sweep_profile(
+      sweep, {{{disk.radius, 0, height}, {0, 0, 1}, 0.0}, {{disk.inner_radius, 0, height}, {0, 0, 1}, 1.0}}, memory);
 }
 
 Mesh tessellate_cone(const ConeParameters& cone, double relative_tolerance, MemoryReservation* memory) {
@@ -249,7 +249,8 @@ Mesh tessellate_cone(const ConeParameters& cone, double relative_tolerance, Memo
   return sweep_profile(sweep, {{{radius, 0, 0}, normal, 0.0}, {{0, 0, height}, normal, 1.0}}, memory);
 }
 
-Mesh tessellate_paraboloid(const ParaboloidParameters& paraboloid, double relative_tolerance, MemoryReservation* memory) {
+Mesh tessellate_paraboloid(const ParaboloidParameters& paraboloid, double relative_tolerance,
+                           MemoryReservation* memory) {
   require_tolerance(relative_tolerance);
   require_finite({paraboloid.radius, paraboloid.z_min, paraboloid.z_max});
   require(paraboloid.radius > 0.0f, "the paraboloid's radius is not positive");
@@ -273,7 +274,8 @@ Mesh tessellate_paraboloid(const ParaboloidParameters& paraboloid, double relati
   return sweep_profile(sweep, profile, memory);
 }
 
-Mesh tessellate_hyperboloid(const HyperboloidParameters& hyperboloid, double relative_tolerance, MemoryReservation* memory) {
+Mesh tessellate_hyperboloid(const HyperboloidParameters& hyperboloid, double relative_tolerance,
+                            MemoryReservation* memory) {
   require_tolerance(relative_tolerance);
   DVec3 p1(hyperboloid.p1), p2(hyperboloid.p2);
   require(is_finite(p1) && is_finite(p2), "a parameter is not finite");

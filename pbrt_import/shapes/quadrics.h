@@ -55,10 +55,13 @@ struct HyperboloidParameters { ///< the segment p1 p2 swept around the z axis
 /// precision); MemoryError.
 /// Source: Matt Pharr, Wenzel Jakob and Greg Humphreys, Physically Based Rendering, 3rd edition, 2016, chapter 3.
 Mesh tessellate_sphere(const SphereParameters& sphere, double relative_tolerance, MemoryReservation* memory = nullptr);
-Mesh tessellate_cylinder(const CylinderParameters& cylinder, double relative_tolerance, MemoryReservation* memory = nullptr);
+Mesh tessellate_cylinder(const CylinderParameters& cylinder, double relative_tolerance,
+                         MemoryReservation* memory = nullptr);
 Mesh tessellate_disk(const DiskParameters& disk, double relative_tolerance, MemoryReservation* memory = nullptr);
 Mesh tessellate_cone(const ConeParameters& cone, double relative_tolerance, MemoryReservation* memory = nullptr);
-Mesh tessellate_paraboloid(const ParaboloidParameters& paraboloid, double relative_tolerance, MemoryReservation* memory = nullptr);
-Mesh tessellate_hyperboloid(const HyperboloidParameters& hyperboloid, double relative_tolerance, MemoryReservation* memory = nullptr);
+Mesh tessellate_paraboloid(const ParaboloidParameters& paraboloid, double relative_tolerance,
+                           MemoryReservation* memory = nullptr);
+Mesh tessellate_hyperboloid(const HyperboloidParameters& hyperboloid, double relative_tolerance,
+                            MemoryReservation* memory = nullptr);
 
 } // namespace packtrace

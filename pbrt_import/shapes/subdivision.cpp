@@ -278,7 +278,7 @@ Level control_level(std::span<const Vec3> points, std::span<const Triangle> tria
   Mesh mesh;
   mesh.positions.assign(points.begin(), points.end());
   mesh.triangles.assign(triangles.begin(), triangles.end());
-  const uint64_t dropped = drop_bad_triangles(mesh, report);
+  const uint64_t dropped = clean_up_mesh(mesh, report);
   if (dropped_triangles) *dropped_triangles += dropped;
   Level level;
   level.points.assign(mesh.positions.begin(), mesh.positions.end());
@@ -341,7 +341,7 @@ Mesh subdivide_loop(std::span<const Vec3> points, std::span<const Triangle> tria
   for (size_t h = 0; h < level.start.size(); h += 3)
     mesh.triangles.emplace_back(level.start[h], level.start[h + 1], level.start[h + 2]);
   const bool flat_spots = std::find(mesh.normals.begin(), mesh.normals.end(), Vec3(0.0f)) != mesh.normals.end();
-  if (flat_spots) drop_bad_triangles(mesh, report); // recomputes zero normals
+  if (flat_spots) clean_up_mesh(mesh, report); // recomputes zero normals
   return mesh;
 }
 

@@ -45,7 +45,7 @@ struct InputFile::State {
   std::unique_ptr<Inflater> inflater; ///< null if the file is not compressed
   std::vector<unsigned char> compressed;
   const char* damage = nullptr; ///< message of damage found while inflating; null: none
-  bool member_open = false; ///< inside a gzip member, where an end of file means truncation
+  bool member_open = false;     ///< inside a gzip member, where an end of file means truncation
 
   /// @param read_some gets a pointer, a size and the number of bytes read so far; returns like POSIX read()
   template <class ReadSome>
@@ -147,14 +147,14 @@ bool InputFile::same_file(const InputFile& other) const {
 }
 
 uint64_t InputFile::claimed_bytes() const {
-  constexpr uint64_t kMostPerByte = 1032; // maximum expansion by deflate
+  constexpr uint64_t kMaxInflationRatio = 1032; // maximum expansion by deflate
   std::array<unsigned char, 4> last{};
   const uint64_t stored = stored_bytes();
   if (!compressed() || stored < last.size() ||
       ::pread(state_->file.descriptor.get(), last.data(), last.size(), static_cast<off_t>(stored - last.size())) != 4)
     return 0;
   const uint64_t claimed = last[0] | (last[1] << 8) | (last[2] << 16) | (uint64_t{last[3]} << 24);
-  return claimed / kMostPerByte <= stored ? claimed : 0;
+  return claimed / kMaxInflationRatio <= stored ? claimed : 0;
 }
 
 std::vector<std::byte> read_whole_file(const std::filesystem::path& path, uint64_t max_bytes,

@@ -8,8 +8,8 @@ namespace packtrace {
 
 void prefer_large_pages(void* memory, size_t bytes) {
   constexpr uintptr_t kLargePage = 2u << 20;
-  constexpr size_t kWorthIt = 4 * kLargePage;
-  if (!memory || bytes < kWorthIt) return;
+  constexpr size_t kMinLargePageBytes = 4 * kLargePage;
+  if (!memory || bytes < kMinLargePageBytes) return;
   const uintptr_t begin = (reinterpret_cast<uintptr_t>(memory) + kLargePage - 1) & ~(kLargePage - 1);
   const uintptr_t end = (reinterpret_cast<uintptr_t>(memory) + bytes) & ~(kLargePage - 1);
   // Kernels without large pages return an error, which is harmless.

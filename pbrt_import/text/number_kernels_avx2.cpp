@@ -14,9 +14,9 @@ constexpr double kPowersOfTen[16] = {1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7
 constexpr double kInversePowersOfTen[16] = {1e0,  1e-1, 1e-2,  1e-3,  1e-4,  1e-5,  1e-6,  1e-7,
                                             1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14, 1e-15};
 
-alignas(64) constexpr uint8_t kTailMasks[32] = {
-    0,    0,    0,    0,    0,    0,    0,    0,    0,    0,    0,    0,    0,    0,    0,    0,
-    0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff};
+alignas(64) constexpr uint8_t kTailMasks[32] = {0,    0,    0,    0,    0,    0,    0,    0,    0,    0,    0,
+                                                0,    0,    0,    0,    0,    0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
+                                                0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff};
 
 __m128i load16(const void* p) { return _mm_loadu_si128(static_cast<const __m128i*>(p)); }
 
@@ -104,8 +104,8 @@ struct ReadDouble {
     if (length - 1 > 15) return false;
     const Decimal decimal = read_decimal(end, length);
     // Both operands of the division are exact, so the result is rounded once.
-    value = with_sign(static_cast<double>(static_cast<int64_t>(decimal.mantissa)) / kPowersOfTen[decimal.fraction_digits],
-                      negative);
+    value = with_sign(
+        static_cast<double>(static_cast<int64_t>(decimal.mantissa)) / kPowersOfTen[decimal.fraction_digits], negative);
     return decimal.valid && decimal.mantissa <= 1ull << 53;
   }
 };

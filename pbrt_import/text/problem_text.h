@@ -4,9 +4,9 @@
 #include <stdexcept>
 #include <string>
 
-#include "pbrt_import/text/reporter.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/memory_budget.h"
+#include "pbrt_import/text/reporter.h"
 
 namespace packtrace {
 

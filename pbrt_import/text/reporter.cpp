@@ -60,7 +60,7 @@ void report_unused(const ParameterList& parameters, Reporter& reporter) {
   for (const Parameter& parameter : parameters.all()) {
     if (parameter.used) continue;
     std::string message = "parameter " + describe(parameter) + " is ";
-    if (parameters.was_asked(parameter.name))
+    if (parameters.was_looked_up(parameter.name))
       message += "ignored: it has the wrong type or number of values here";
     else
       message += "not used" + did_you_mean(parameters.suggestion(parameter.name));

@@ -8,8 +8,8 @@
 #include <unordered_set>
 #include <vector>
 
-#include "pbrt_import/language/parameters.h"
 #include "pbrt_import/base/diagnostics.h"
+#include "pbrt_import/language/parameters.h"
 
 namespace packtrace {
 
@@ -30,7 +30,7 @@ private:
   std::shared_ptr<const SourceFile> source_file(uint32_t file) const;
 
   static constexpr uint32_t kMainFile = ~0u; ///< File::included_from.file of the main file
-  std::vector<File> files_; ///< one per opening; there may be many openings of few paths
+  std::vector<File> files_;                  ///< one per opening; there may be many openings of few paths
   std::vector<std::string> paths_;
   std::unordered_map<std::string, uint32_t> path_numbers_;
   /// Cache of files that reports refer to.

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "pbrt_import/text/reporter.h"
 #include "pbrt_import/base/memory_budget.h"
+#include "pbrt_import/text/reporter.h"
 #include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {

@@ -22,7 +22,7 @@ constexpr size_t kOverlap = 256;
 // Smaller files are read faster than a task starts.
 constexpr uint64_t kSmallFile = 512 * 1024;
 constexpr size_t kBlocksAheadPerThread = 2;
-constexpr size_t kMostThreads = 8; // the parsing thread cannot keep up with more
+constexpr size_t kMaxBlockThreads = 8; // the parsing thread cannot keep up with more
 
 /// Offset of the first white-space character, npos if there is none.
 size_t first_space(std::string_view text) {
@@ -90,8 +90,7 @@ private:
       read_run(guess);
       if (position_ >= end_ || *position_ == ']' || *position_ == '[' || *position_ == '"') return;
       // Skips a comment, or a word that is not a plain number and is left to the parser. The array continues after it.
-      if (*position_ == '#')
-        position_ = std::find_if(position_, end_, [](char c) { return c == '\n' || c == '\r'; });
+      if (*position_ == '#') position_ = std::find_if(position_, end_, [](char c) { return c == '\n' || c == '\r'; });
       const char* const word = std::find_if_not(position_, end_, is_space);
       if (word != end_ && *word == '#') {
         position_ = word;
@@ -178,7 +177,7 @@ private:
 
   TextBlock& block_;
   const char* text_;
-  const char* end_;      ///< end of the text that this block converts
+  const char* end_; ///< end of the text that this block converts
   const char* position_ = nullptr;
   const NumberKernels kernels_ = number_kernels() ? *number_kernels() : NumberKernels{};
 };
@@ -198,7 +197,7 @@ TextBlocks::TextBlocks(InputFile file, size_t block_bytes) : file_(std::move(fil
       std::min<size_t>(static_cast<size_t>(tbb::this_task_arena::max_concurrency()),
                        tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   if (threads > 1 && file_.stored_bytes() >= kSmallFile) helpers_ = std::make_unique<tbb::task_group>();
-  slots_.resize(helpers_ ? 1 + kBlocksAheadPerThread * std::min(threads, kMostThreads) : 1);
+  slots_.resize(helpers_ ? 1 + kBlocksAheadPerThread * std::min(threads, kMaxBlockThreads) : 1);
   for (std::unique_ptr<Slot>& slot : slots_) slot = std::make_unique<Slot>();
 }
 

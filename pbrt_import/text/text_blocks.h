@@ -30,8 +30,8 @@ struct NumberRun {
 struct TextBlock {
   uint64_t offset = 0;
   size_t size = 0;
-  bool last = false;      ///< the content ends with this block
-  std::vector<char> text; ///< at least size + kScannerReach
+  bool last = false;           ///< the content ends with this block
+  std::vector<char> text;      ///< at least size + kScannerReach
   std::vector<NumberRun> runs; ///< sorted by begin
   std::vector<int32_t> integers;
   std::vector<float> floats;
@@ -82,7 +82,7 @@ private:
   uint64_t next_ = 0;                        ///< blocks with smaller numbers have been returned or skipped
   bool inflated_all_ = false;
   std::exception_ptr damage_;                ///< error of a compressed file, located after the queued blocks
-  std::vector<char> carry_;                 ///< compressed files: content read beyond the last queued block's stride
+  std::vector<char> carry_;                  ///< compressed files: content read beyond the last queued block's stride
   std::unique_ptr<tbb::task_group> helpers_; ///< null: only the calling thread works
 };
 

@@ -5,9 +5,9 @@
 #include <bit>
 #include <cstring>
 
-#include "pbrt_import/text/number.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/printable.h"
+#include "pbrt_import/text/number.h"
 
 namespace packtrace {
 namespace {
@@ -189,9 +189,9 @@ Token Tokenizer::next() {
 }
 
 Token Tokenizer::read_string() {
-  constexpr uint32_t kMostBadBytes = 16; // strings with more are treated as binary data
-  size_t length = 1;                     // relative to position_, which refill() changes
-  size_t bad_at = 0;                     // of the first bad byte, relative to position_
+  constexpr uint32_t kMaxStringBadBytes = 16; // strings with more are treated as binary data
+  size_t length = 1;                          // relative to position_, which refill() changes
+  size_t bad_at = 0;                          // of the first bad byte, relative to position_
   uint32_t bad_bytes = 0;
   bool too_long = false;
   const auto end = [&](TokenKind kind, size_t text_end, size_t next) {
@@ -211,7 +211,7 @@ Token Tokenizer::read_string() {
     if (position_ + length >= size_) continue;
     const char c = window_[position_ + length];
     if (c == '"') return end(TokenKind::kString, position_ + length, position_ + length + 1);
-    if (c == '\n' || c == '\r' || bad_bytes == kMostBadBytes) break;
+    if (c == '\n' || c == '\r' || bad_bytes == kMaxStringBadBytes) break;
     if (is_bad_byte(c) && bad_bytes++ == 0) bad_at = length;
     if (c == '\\') {
       if (position_ + length + 1 >= size_) refill();

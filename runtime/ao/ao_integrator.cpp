@@ -11,7 +11,7 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kTilePixels = kTileSize * kTileSize;
-constexpr uint32_t kMostTogether = 4; ///< maximum samples per pixel that one tracer call gets for a tile
+constexpr uint32_t kMaxSamplesPerCall = 4; ///< maximum samples per pixel that one tracer call gets for a tile
 
 /// Visibility of a sample as a function of its hit distance; see AoConfig.
 class Coefficient {
@@ -73,17 +73,17 @@ public:
       : source_(source), tracer_(tracer), gbuffer_(gbuffer), config_(config), coefficient_(config),
         sampler_(config.sampler, config.seed), first_sample_(static_cast<uint64_t>(frame_index) * config.spp),
         unit_radius_(config.radius * tracer.space().scale()),
-        unit_reach_(static_cast<float>(unit_radius_ * coefficient_.end())), out_(out) {}
+        ray_length_(static_cast<float>(unit_radius_ * coefficient_.end())), out_(out) {}
 
   /// @tparam Result RayHit for nearest-hit queries, which return distances; uint8_t for any-hit queries
   template <typename Result>
   void trace_tile(const Tile& tile, const Progress& progress) const {
     const uint32_t together =
-        std::clamp(tracer_.rays_together() / kTilePixels, 1u, std::min(config_.spp, kMostTogether));
+        std::clamp(tracer_.preferred_rays_per_call() / kTilePixels, 1u, std::min(config_.spp, kMaxSamplesPerCall));
     if (together == 1)
       trace_samples<Result, 1>(tile, together, progress);
     else
-      trace_samples<Result, kMostTogether>(tile, together, progress);
+      trace_samples<Result, kMaxSamplesPerCall>(tile, together, progress);
   }
 
 private:
@@ -136,7 +136,7 @@ private:
       make_basis(point.normal, point.tangent, point.bitangent);
       const DVec3 origin = DVec3(gbuffer_.position[pixel]) + DVec3(point.geometric) * double(gbuffer_.offset[pixel]);
       rays[count].origin = Vec3(tracer_.space().to_unit(origin));
-      rays[count++].tfar = unit_reach_;
+      rays[count++].tfar = ray_length_;
     }
     return count;
   }
@@ -187,7 +187,7 @@ private:
   const PixelSampler sampler_;
   const uint64_t first_sample_;
   const double unit_radius_;
-  const float unit_reach_;
+  const float ray_length_;
   AoFrame& out_;
 };
 

@@ -102,7 +102,7 @@ private:
 
 } // namespace
 
-std::vector<std::string> plain_arguments(CLI::App& app, std::span<const char* const> words) {
+std::vector<std::string> normalised_arguments(CLI::App& app, std::span<const char* const> words) {
   return Words(app, words).plain();
 }
 

@@ -20,7 +20,7 @@ namespace packtrace {
 /// Words after "--" are not changed.
 /// @param words the command line without the program's name
 /// Throws Error(kUsage).
-std::vector<std::string> plain_arguments(CLI::App& app, std::span<const char* const> words);
+std::vector<std::string> normalised_arguments(CLI::App& app, std::span<const char* const> words);
 
 /// Finds an option's value in a command line that could not be parsed: that of the last "--name VALUE" or
 /// "--name=VALUE" before "--". Returns an empty string if there is none.

@@ -34,7 +34,7 @@ constexpr std::array<const char*, baked::kPurposeCount> kPurposes{"ao", "shading
 constexpr const char* kKeepNormals = "normals";
 constexpr const char* kKeepUvs = "uv";
 constexpr std::array<const char*, 3> kLodUses{"off", "instanced", "all"}; // indexed by LodUse
-constexpr const char* kLodAlone = kLodUses[2];                            // meaning of --lod without a value
+constexpr const char* kLodDefaultValue = kLodUses[2];                     // meaning of --lod without a value
 
 struct BakeOptions {
   std::string input, output;
@@ -105,7 +105,7 @@ nlohmann::json promise_json(const BakeReport& baked) {
 /// Warning about geometries whose grid step is coarser than required, with the option that avoids it; empty if there
 /// are none.
 /// @param chosen whether the user gave a precision option
-std::string promise_text(const BakeReport& baked, bool chosen) {
+std::string precision_warning(const BakeReport& baked, bool chosen) {
   constexpr size_t kMaxShown = 3;
   if (baked.promise.empty()) return {};
   std::vector<BrokenPromise> worst = baked.promise;
@@ -216,7 +216,7 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   report_diagnostics(diagnostics, globals);
 
   if (json.wanted()) json.write(report(options, baked, imported.statistics, import_s, bake_s, globals.verbosity > 0));
-  const std::string promise = promise_text(baked, config.precision_kind != PrecisionKind::kPicture);
+  const std::string promise = precision_warning(baked, config.precision_kind != PrecisionKind::kPicture);
   if (json.to_stdout() || globals.quiet) {
     print_printable(promise, stderr);
     return 0;
@@ -350,7 +350,7 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
           "half the triangles of the next finer one")
       ->check(one_of(std::vector<std::string>(kLodUses.begin(), kLodUses.end())))
       ->expected(0, 1)
-      ->default_str(kLodAlone)
+      ->default_str(kLodDefaultValue)
       ->group("Levels of detail");
   verb.add_option("--lod-min-triangles", options->lod_min_triangles,
                   "Minimum number of triangles for a geometry to get LOD levels (default 128)")

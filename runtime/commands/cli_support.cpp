@@ -93,7 +93,7 @@ int run_words(CLI::App& app, GlobalOptions& globals, std::span<const char* const
 
 /// Whether error JSON may be written to the destination: it does not exist yet, is empty, or looks like JSON. Any other
 /// file could be an input file that could not be read.
-bool may_take_error(const std::string& destination) {
+bool can_hold_error_json(const std::string& destination) {
   std::error_code unknown;
   if (destination == "-" || !std::filesystem::is_regular_file(destination, unknown)) return true;
   std::ifstream file(destination);
@@ -107,7 +107,7 @@ void write_failure(CLI::App& app, const GlobalOptions& globals, std::span<const 
   // If parsing failed, globals.json is not set, so the value is searched for in the words.
   const std::string destination = globals.json.empty() ? value_in_words(words, "--json") : globals.json;
   if (destination.empty() || find_verb(app, destination)) return; // "--json info": the file name is missing
-  if (!may_take_error(destination)) {
+  if (!can_hold_error_json(destination)) {
     print_failure(destination + ": not a JSON file, so the error is not written to it", 0);
     return;
   }
@@ -218,7 +218,7 @@ uint32_t thread_limit(const GlobalOptions& globals) {
 }
 
 void install_interrupt_handlers() {
-  struct sigaction action {};
+  struct sigaction action{};
   action.sa_handler = on_interrupt;
   sigemptyset(&action.sa_mask);
   action.sa_flags = SA_RESTART;

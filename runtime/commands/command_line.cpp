@@ -103,7 +103,7 @@ std::string message_of(const CLI::ParseError& error, CLI::App& verb) {
 } // namespace
 
 bool parse_command_line(CLI::App& app, std::span<const char* const> words) {
-  std::vector<std::string> plain = plain_arguments(app, words);
+  std::vector<std::string> plain = normalised_arguments(app, words);
   require_verb(app, plain);
   app.require_subcommand(1);
   try {

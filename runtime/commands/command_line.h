@@ -9,7 +9,7 @@ class App;
 
 namespace packtrace {
 
-/// Applies plain_arguments() to the command line and parses it into the app's options. Error messages suggest the
+/// Applies normalised_arguments() to the command line and parses it into the app's options. Error messages suggest the
 /// closest known name instead of using CLI11's texts.
 /// @param words the command line without the program's name
 /// @return false if help or the version was requested, which has then been printed

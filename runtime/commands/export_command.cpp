@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "compress/exchange/vertex16/vertex16_export.h"
 #include "compress/exchange/gltf/gltf_export.h"
+#include "compress/exchange/vertex16/vertex16_export.h"
 #include "pbrt_import/base/file_error.h"
 #include "runtime/commands/binary_output.h"
 #include "runtime/commands/cli_support.h"
@@ -30,7 +30,7 @@ struct ExportOptions {
   std::string layout; ///< empty: chosen by the output's extension
   std::string codec = kDraco;
   GltfConfig gltf;
-  bool for_gltf = false; ///< whether an option was given that applies to glTF only
+  bool has_gltf_option = false; ///< whether an option was given that applies to glTF only
 };
 
 /// The exported file and its reports.
@@ -160,7 +160,7 @@ Exported export_file(const ExportOptions& options, const std::string& layout, co
 int run(const ExportOptions& options, const GlobalOptions& globals) {
   if (options.output.empty()) fail_without_output("export", options.input, ".glb");
   const std::string layout = layout_of(options);
-  if (layout == kVertex16 && options.for_gltf)
+  if (layout == kVertex16 && options.has_gltf_option)
     throw Error(ErrorKind::kUsage, "--codec, --level, --normal-bits and --uv-bits only apply to --layout gltf");
   JsonOutput json(globals.json, globals.force);
   BinaryOutput output(options.output, globals.force, json);
@@ -182,7 +182,7 @@ void add_export_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<ExportOptions>();
   CLI::App& verb = add_verb(app, globals, "export", "Convert a .ptk file to glTF or to a GPU vertex layout",
                             [options, &globals] { return run(*options, globals); });
-  const auto of_gltf = [options](const std::string&) { options->for_gltf = true; };
+  const auto of_gltf = [options](const std::string&) { options->has_gltf_option = true; };
   verb.add_option("FILE", options->input, ".ptk file to convert")->required();
   add_output_option(verb, options->output,
                     "Output file (required), .glb or .v16, or - for standard output together with --layout");

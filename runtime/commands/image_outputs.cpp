@@ -13,15 +13,15 @@
 namespace packtrace {
 namespace {
 
-constexpr std::array kAlways{"ao", "ao_raw", "depth", "normal", "instance", "albedo", "shaded"};
+constexpr std::array kBaseLayers{"ao", "ao_raw", "depth", "normal", "instance", "albedo", "shaded"};
 /// Layers that need LOD levels.
-constexpr std::array kOfDetail{"lod", "lod-error"};
+constexpr std::array kLodLayers{"lod", "lod-error"};
 
 std::vector<std::string> chosen(const std::vector<std::string>& aovs, const std::string& otherwise, bool detail) {
   std::vector<std::string> names = aovs.empty() ? std::vector{otherwise} : aovs;
   if (std::find(names.begin(), names.end(), "all") != names.end()) {
     if (detail) return aov_names();
-    return {kAlways.begin(), kAlways.end()};
+    return {kBaseLayers.begin(), kBaseLayers.end()};
   }
   for (const std::string& name : names) {
     if (std::find(aov_names().begin(), aov_names().end(), name) != aov_names().end()) continue;
@@ -78,8 +78,8 @@ std::vector<std::string> separate_files(const std::vector<std::string>& words) {
 
 const std::vector<std::string>& aov_names() {
   static const std::vector<std::string> kNames = [] {
-    std::vector<std::string> names(kAlways.begin(), kAlways.end());
-    names.insert(names.end(), kOfDetail.begin(), kOfDetail.end());
+    std::vector<std::string> names(kBaseLayers.begin(), kBaseLayers.end());
+    names.insert(names.end(), kLodLayers.begin(), kLodLayers.end());
     return names;
   }();
   return kNames;
@@ -138,10 +138,10 @@ void ImageOutputs::write(const RenderedImage& image, const ExrAttributes& attrib
     if (entry.file) entry.file->commit();
 }
 
-bool ImageOutputs::show_detail() const {
+bool ImageOutputs::has_lod_layers() const {
   return std::ranges::any_of(entries_, [](const Entry& entry) {
     return std::ranges::any_of(entry.aovs, [](const std::string& aov) {
-      return std::find(kOfDetail.begin(), kOfDetail.end(), aov) != kOfDetail.end();
+      return std::find(kLodLayers.begin(), kLodLayers.end(), aov) != kLodLayers.end();
     });
   });
 }

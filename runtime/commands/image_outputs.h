@@ -34,7 +34,7 @@ public:
   void write(const RenderedImage& image, const ExrAttributes& attributes);
 
   /// Whether a LOD layer was requested.
-  bool show_detail() const;
+  bool has_lod_layers() const;
 
   /// Whether an image goes to standard output, so that human-readable text must go elsewhere.
   bool to_stdout() const { return to_stdout_; }

@@ -11,11 +11,11 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "pbrt_import/text/input_file.h"
 #include "pbrt_import/base/file_bytes.h"
 #include "pbrt_import/base/file_error.h"
 #include "pbrt_import/base/output_file.h"
 #include "pbrt_import/base/regular_file.h"
+#include "pbrt_import/text/input_file.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/trace/source/float_source.h"
 #include "runtime/trace/source/packed_source.h"

@@ -82,7 +82,7 @@ void ProgressDisplay::end_phase(bool done) {
   if (phase_.empty()) return;
   const double elapsed = config_.seconds() - phase_start_;
   const bool whole = done || total_ == 0 || done_ >= total_;
-  if (config_.terminal || !whole || elapsed >= kWorthALine)
+  if (config_.terminal || !whole || elapsed >= kMinPlainPhase)
     print(fmt::format("{}: {}{}", phase_, whole ? "" : "stopped after ", duration_text(elapsed)), true);
   phase_.clear();
 }

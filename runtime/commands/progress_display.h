@@ -19,7 +19,7 @@ struct GlobalOptions;
 std::string progress_text(std::string_view phase, uint64_t done, uint64_t total, double elapsed_s);
 
 /// Displays a Progress on standard error. On a terminal there is one line per phase that updates in place. Otherwise a
-/// plain line is printed every kPlainInterval, and at the end of phases of at least kWorthALine.
+/// plain line is printed every kPlainInterval, and at the end of phases of at least kMinPlainPhase.
 /// The object must outlive the Progress that it observes.
 class ProgressDisplay {
 public:
@@ -31,7 +31,7 @@ public:
   };
   static constexpr double kTerminalInterval = 0.1; ///< seconds
   static constexpr double kPlainInterval = 10.0;   ///< seconds
-  static constexpr double kWorthALine = 0.5;       ///< seconds; shorter phases get no plain line
+  static constexpr double kMinPlainPhase = 0.5;    ///< seconds; shorter phases get no plain line
 
   explicit ProgressDisplay(const GlobalOptions& globals);
   explicit ProgressDisplay(Config config);

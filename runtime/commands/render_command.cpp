@@ -13,8 +13,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "pbrt_import/scene/camera_rays.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/scene/camera_rays.h"
 #include "runtime/commands/binary_output.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/image_outputs.h"
@@ -96,8 +96,8 @@ ChosenCamera choose_camera(const SceneSource& source, const RenderOptions& optio
 }
 
 /// Returns a camera that frames the whole scene, to replace a camera that sees nothing of it. Prints a warning.
-ChosenCamera frame_instead(const ChosenCamera& blind, const SceneSource& source, ImageSize size,
-                           const RenderOptions& options, const GlobalOptions& globals) {
+ChosenCamera frame_whole_scene(const ChosenCamera& blind, const SceneSource& source, ImageSize size,
+                               const RenderOptions& options, const GlobalOptions& globals) {
   ChosenCamera framing{framing_camera(source.world_bounds(), size), std::nullopt,
                        fmt::format("camera {} sees nothing", blind.index.value())};
   if (!globals.quiet)
@@ -154,11 +154,11 @@ RenderConfig make_config(const SceneSource& source, const Camera& camera, const 
 /// the scene file, so it is not trusted.
 MemoryReservation reserve_picture(const RenderOptions& options, const RenderConfig& config,
                                   const MemoryBudget& budget) {
-  constexpr double kPixelBytes = 320.0, kMost = 0x1p62;
+  constexpr double kPixelBytes = 320.0, kMax = 0x1p62;
   const double side = config.supersample;
   const double bytes = kPixelBytes * side * side * static_cast<double>(config.size.width) * config.size.height;
   try {
-    return MemoryReservation(budget, static_cast<uint64_t>(std::min(kMost, bytes)),
+    return MemoryReservation(budget, static_cast<uint64_t>(std::min(kMax, bytes)),
                              fmt::format("a picture of {} x {} pixels", config.size.width, config.size.height));
   } catch (const MemoryError& error) {
     throw MemoryError(options.input, error.what());
@@ -167,11 +167,11 @@ MemoryReservation reserve_picture(const RenderOptions& options, const RenderConf
 
 /// @param baked whether the input is a .ptk file
 Backend choose_backend(const RenderOptions& options, bool baked) {
-  const bool about_embree = options.bvh || options.fast_edges;
-  if (!options.backend) return baked && !about_embree ? Backend::kPacked : Backend::kEmbree;
+  const bool needs_embree = options.bvh || options.fast_edges;
+  if (!options.backend) return baked && !needs_embree ? Backend::kPacked : Backend::kEmbree;
   const std::string& name = *options.backend; // the option's check accepts only known names
   if (name == "embree") return Backend::kEmbree;
-  if (about_embree) throw Error(ErrorKind::kUsage, "--bvh and --fast-edges require --backend embree");
+  if (needs_embree) throw Error(ErrorKind::kUsage, "--bvh and --fast-edges require --backend embree");
   if (name == "packed") return Backend::kPacked;
   if (options.lod.error_px)
     throw Error(ErrorKind::kUsage, "--lod-error does not work with --backend embree-clusters; use packed or embree");
@@ -182,7 +182,8 @@ TracerConfig tracer_config(const RenderOptions& options, const GlobalOptions& gl
   TracerConfig config;
   config.backend = choose_backend(options, baked);
   const std::string quality = options.bvh.value_or("medium");
-  config.embree = {quality == "high" ? BvhQuality::kHigh : BvhQuality::kMedium, !options.fast_edges, false, globals.memory};
+  config.embree = {quality == "high" ? BvhQuality::kHigh : BvhQuality::kMedium, !options.fast_edges, false,
+                   globals.memory};
   return config;
 }
 
@@ -298,7 +299,7 @@ struct Traced {
 };
 
 Traced trace(const RenderOptions& options, const GlobalOptions& globals, const LoadedScene& loaded, RenderConfig config,
-             ChosenCamera chosen, const TracerConfig& backend, bool show_detail, Progress& progress) {
+             ChosenCamera chosen, const TracerConfig& backend, bool has_lod_layers, Progress& progress) {
   Traced traced;
   traced.camera = std::move(chosen);
   double build_s = 0.0;
@@ -321,24 +322,24 @@ Traced trace(const RenderOptions& options, const GlobalOptions& globals, const L
       choose(&seen);
       return Occluders{traced.detail->source.get(), traced.tracers[1].get(), *options.lod.error_px};
     };
-  const bool sees_levels = options.lod.error_px && !options.lod.only_occlusion();
-  if (sees_levels && show_detail) config.lod_error_px = *options.lod.error_px;
+  const bool camera_uses_lod = options.lod.error_px && !options.lod.only_occlusion();
+  if (camera_uses_lod && has_lod_layers) config.lod_error_px = *options.lod.error_px;
   const auto render = [&] {
     progress.begin("bvh", 0);
-    if (sees_levels) { // the cut depends on the camera
+    if (camera_uses_lod) { // the cut depends on the camera
       traced.tracers.clear();
       choose(nullptr);
     } else if (traced.tracers.empty()) {
       build([&] { return make_tracer(*loaded.source, loaded.baked ? &*loaded.baked : nullptr, backend); });
     }
-    const SceneSource& source = sees_levels ? *traced.detail->source : *loaded.source;
+    const SceneSource& source = camera_uses_lod ? *traced.detail->source : *loaded.source;
     traced.image = render_view(source, *traced.tracers[0], traced.camera.camera, config, progress, occluders);
   };
-  config.only_if_seen = !options.camera && traced.camera.index;
+  config.stop_if_nothing_visible = !options.camera && traced.camera.index;
   render();
-  if (!traced.image.seen && config.only_if_seen) {
-    traced.camera = frame_instead(traced.camera, *loaded.source, config.size, options, globals);
-    config.only_if_seen = false;
+  if (!traced.image.seen && config.stop_if_nothing_visible) {
+    traced.camera = frame_whole_scene(traced.camera, *loaded.source, config.size, options, globals);
+    config.stop_if_nothing_visible = false;
     render();
   }
   traced.image.timings.build_s = build_s;
@@ -354,7 +355,7 @@ PreviewStyle preview_style(const RenderOptions& options) {
 
 /// Warns about instances that are not traced because their transform is degenerate.
 /// @param count number of these instances
-void warn_of_lines(const std::string& input, size_t count) {
+void warn_of_flat_instances(const std::string& input, size_t count) {
   if (count == 0) return;
   print_printable(
       fmt::format("{}: warning: {} instance{} not traced: flattened to a line or a point by the transform\n", input,
@@ -368,14 +369,14 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   if (!options.size.empty()) parse_size(options.size);
   validate(options.lod);
   JsonOutput json(globals.json, globals.force);
-  const bool sees_levels = options.lod.error_px && !options.lod.only_occlusion();
-  ImageOutputs outputs(options.outputs, options.aovs, sees_levels, globals.force,
+  const bool camera_uses_lod = options.lod.error_px && !options.lod.only_occlusion();
+  ImageOutputs outputs(options.outputs, options.aovs, camera_uses_lod, globals.force,
                        preview_style(options)); // reports unwritable files before any work
   if (outputs.to_stdout() && json.to_stdout())
     throw Error(ErrorKind::kUsage, "-o - and --json - would both write to standard output; use a file for one of them");
-  if (outputs.show_detail() && !options.lod.error_px)
+  if (outputs.has_lod_layers() && !options.lod.error_px)
     throw Error(ErrorKind::kUsage, "the layers lod and lod-error require --lod-error");
-  if (outputs.show_detail() && !sees_levels)
+  if (outputs.has_lod_layers() && !camera_uses_lod)
     throw Error(ErrorKind::kUsage,
                 "the layers lod and lod-error do not work with --lod-rays occlusion, where the camera sees "
                 "level 0");
@@ -391,7 +392,7 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   const MemoryReservation pixels = reserve_picture(options, config, globals.memory);
   const TracerConfig backend = tracer_config(options, globals, loaded.baked.has_value());
   const Traced traced =
-      trace(options, globals, loaded, config, std::move(camera), backend, outputs.show_detail(), progress);
+      trace(options, globals, loaded, config, std::move(camera), backend, outputs.has_lod_layers(), progress);
   display.finish();
   const RenderedImage& image = traced.image;
 
@@ -411,12 +412,12 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   if (loaded.baked) {
     const PrimaryCamera traced_pixels(
         traced.camera.camera, {config.size.width * config.supersample, config.size.height * config.supersample});
-    result["seams"] =
-        visible_seams_json(InstanceSeams(*loaded.baked), image, traced_pixels, sees_levels ? &*traced.detail : nullptr);
+    result["seams"] = visible_seams_json(InstanceSeams(*loaded.baked), image, traced_pixels,
+                                         camera_uses_lod ? &*traced.detail : nullptr);
   }
   if (!image.seen && !globals.quiet)
     print_printable(options.input + ": warning: this camera sees nothing of the scene; try --camera auto\n", stderr);
-  if (!globals.quiet) warn_of_lines(options.input, tracers[0]->flat_instances().size());
+  if (!globals.quiet) warn_of_flat_instances(options.input, tracers[0]->flat_instances().size());
   if (json.wanted()) json.write(result);
   if (json.to_stdout() || globals.quiet) return 0;
   std::FILE* const text = outputs.to_stdout() ? stderr : stdout;

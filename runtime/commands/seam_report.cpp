@@ -24,7 +24,7 @@ std::vector<double> nearest_depths(const RenderedImage& image, size_t instances)
 }
 
 /// Error bound per instance: distance of the traced LOD cut from level 0, world units.
-std::vector<double> stated_errors(const ChosenDetail& detail) {
+std::vector<double> instance_errors(const ChosenDetail& detail) {
   const LodSource& source = *detail.source;
   std::vector<double> of_blas(source.geometry_count());
   for (uint32_t blas = 0; blas < of_blas.size(); ++blas)
@@ -37,7 +37,7 @@ std::vector<double> stated_errors(const ChosenDetail& detail) {
 }
 
 /// Screen-space error bound of the LOD cuts in pixels; infinite if the options give no bound.
-double promised_px(const ChosenDetail& detail) {
+double lod_error_bound_px(const ChosenDetail& detail) {
   const SharingConfig& config = detail.sharing->config();
   if (config.tolerant_levels > 0) return std::numeric_limits<double>::infinity();
   return detail.error_px * std::max(1.0, config.culled_error_scale);
@@ -63,7 +63,8 @@ nlohmann::json visible_seams_json(const InstanceSeams& seams, const RenderedImag
   const bool orthographic = camera.projection() == Projection::kOrthographic;
   std::vector<double> errors(nearest.size()), beside(seams.touching().size());
   double promised = 0.0;
-  if (detail) errors = stated_errors(*detail), beside = seams.largest_beside(errors), promised = promised_px(*detail);
+  if (detail)
+    errors = instance_errors(*detail), beside = seams.largest_touching(errors), promised = lod_error_bound_px(*detail);
   uint64_t visible = 0, wide = 0;
   double grids_px = 0.0, detail_px = 0.0, largest_px = 0.0;
   for (size_t i = 0; i < seams.touching().size(); ++i) {

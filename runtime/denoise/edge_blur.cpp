@@ -21,11 +21,11 @@ constexpr float kNoise = 1.2f;
 /// lie on the same surface. The difference is 0 where they do not.
 PACKTRACE_AVX2_CLONES
 void compare_row(int begin, int end, const float* __restrict value, const float* __restrict other,
-                 const float* __restrict precision, const float* __restrict other_precision,
+                 const float* __restrict inverse_variance, const float* __restrict other_inverse_variance,
                  const uint8_t* __restrict edge, float* __restrict distance, uint8_t* __restrict same) {
   for (int x = begin; x < end; ++x) {
     const float difference = other[x] - value[x];
-    const float noise_units = difference * difference * smaller(precision[x], other_precision[x]);
+    const float noise_units = difference * difference * smaller(inverse_variance[x], other_inverse_variance[x]);
     distance[x] = edge[x] != 0 ? noise_units : 0.0f;
   }
   for (int x = begin; x < end; ++x) same[x] = edge[x] != 0 ? 1 : 0;
@@ -85,8 +85,8 @@ void weigh_values(const NoisyImage& image, const EdgeWeights& edges, size_t dire
   const Plane<uint8_t>& edge = edges.direction(direction);
   PatchRows rows(width);
   const auto compare = [&](int y) {
-    compare_row(-1, width + 1, image.value.row(y), image.value.row(y + dy) + dx, image.precision.row(y),
-                image.precision.row(y + dy) + dx, edge.row(y), rows.distance(y), rows.same(y));
+    compare_row(-1, width + 1, image.value.row(y), image.value.row(y + dy) + dx, image.inverse_variance.row(y),
+                image.inverse_variance.row(y + dy) + dx, edge.row(y), rows.distance(y), rows.same(y));
   };
   compare(first - 1), compare(first);
   for (int y = first; y < last; ++y) {
@@ -98,10 +98,10 @@ void weigh_values(const NoisyImage& image, const EdgeWeights& edges, size_t dire
 /// Inputs and outputs of blur_row(): values of the row and of the rows one step above and below, and weights of the
 /// directions that start in the row or in the row one step above.
 struct BlurRow {
-  const float *value, *value_above, *value_below, *precision, *samples;
+  const float *value, *value_above, *value_below, *inverse_variance, *samples;
   const uint8_t *right, *down, *down_right, *down_left;
   const uint8_t *above_down, *above_down_right, *above_down_left;
-  float *out_value, *out_precision;
+  float *out_value, *out_inverse_variance;
 };
 
 struct Sums {
@@ -136,7 +136,7 @@ void blur_row(int width, ptrdiff_t step, const BlurRow& rows, Fade fade) {
     r.out_value[x] = v + strength * sums.flux;
     // The square root halves the predicted gain as an exponent: large noise differences get smaller weights, so less
     // noise is removed than the weights suggest.
-    r.out_precision[x] = r.precision[x] / std::sqrt(kept * kept + strength * strength * sums.squares);
+    r.out_inverse_variance[x] = r.inverse_variance[x] / std::sqrt(kept * kept + strength * strength * sums.squares);
   }
 }
 
@@ -145,7 +145,7 @@ BlurRow make_row(const NoisyImage& image, int step, const Plane<float>& samples,
   return {image.value.row(y),
           image.value.row(y - step),
           image.value.row(y + step),
-          image.precision.row(y),
+          image.inverse_variance.row(y),
           samples.row(y),
           weights[0].row(y),
           weights[1].row(y),
@@ -155,14 +155,14 @@ BlurRow make_row(const NoisyImage& image, int step, const Plane<float>& samples,
           weights[2].row(y - step),
           weights[3].row(y - step),
           scratch.image.value.row(y),
-          scratch.image.precision.row(y)};
+          scratch.image.inverse_variance.row(y)};
 }
 
 } // namespace
 
 void edge_blur(const EdgeWeights& edges, const Plane<float>& samples, Fade fade, float limit, ImageSize size,
                NoisyImage& image, BlurScratch& scratch) {
-  if (std::none_of(image.youngest.begin(), image.youngest.end(), [&](float tspp) { return tspp < fade.end; })) return;
+  if (std::none_of(image.min_tspp.begin(), image.min_tspp.end(), [&](float tspp) { return tspp < fade.end; })) return;
   const int width = static_cast<int>(size.width);
   for_row_blocks(size.height, [&](int first, int last) {
     for (size_t direction = 0; direction < EdgeWeights::kDirections.size(); ++direction)
@@ -170,16 +170,16 @@ void edge_blur(const EdgeWeights& edges, const Plane<float>& samples, Fade fade,
   });
   for_row_blocks(size.height, [&](int first, int last) {
     for (int y = first; y < last; ++y) {
-      if (image.youngest[static_cast<size_t>(y)] < fade.end) {
+      if (image.min_tspp[static_cast<size_t>(y)] < fade.end) {
         blur_row(width, edges.step(), make_row(image, edges.step(), samples, y, scratch), fade);
       } else {
         std::copy_n(image.value.row(y), width, scratch.image.value.row(y));
-        std::copy_n(image.precision.row(y), width, scratch.image.precision.row(y));
+        std::copy_n(image.inverse_variance.row(y), width, scratch.image.inverse_variance.row(y));
       }
     }
   });
   std::swap(image.value, scratch.image.value);
-  std::swap(image.precision, scratch.image.precision);
+  std::swap(image.inverse_variance, scratch.image.inverse_variance);
 }
 
 } // namespace packtrace

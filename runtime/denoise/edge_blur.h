@@ -8,12 +8,12 @@ namespace packtrace {
 /// AO between blur passes, with an estimate of its noise.
 struct NoisyImage {
   Plane<float> value;
-  Plane<float> precision;      ///< 1 / variance of the noise left in `value`
-  std::vector<float> youngest; ///< per row: smallest tspp of its hit pixels
+  Plane<float> inverse_variance; ///< 1 / variance of the noise left in `value`
+  std::vector<float> min_tspp;   ///< per row: smallest tspp of its hit pixels
 
   void resize(ImageSize size) {
-    value.resize(size), precision.resize(size);
-    youngest.assign(size.height, 0.0f);
+    value.resize(size), inverse_variance.resize(size);
+    min_tspp.assign(size.height, 0.0f);
   }
 };
 

@@ -10,10 +10,10 @@ namespace packtrace {
 namespace {
 
 /// History with a smaller total weight is rejected: the tests' soft weights let hardly any of the surface through.
-constexpr float kLeastWeight = 1e-3f;
+constexpr float kMinHistoryWeight = 1e-3f;
 
 /// Footprints with a smaller total weight cross an edge, where sharpening would overshoot.
-constexpr float kSharpenWeight = 0.9f;
+constexpr float kMinSharpenWeight = 0.9f;
 
 struct Tests {
   float depth, slope;
@@ -106,10 +106,9 @@ class Reprojection {
 public:
   Reprojection(const FrameHistory& previous, const Guides& guides, const DepthDerivatives& derivatives,
                const DenoiserConfig& config)
-      : previous_(previous), guides_(guides),
-        derivatives_(derivatives), tests_{config.reprojection_depth, config.reprojection_slope,
-                                          std::countr_zero(config.reprojection_normal_power),
-                                          config.reprojection_instance_test},
+      : previous_(previous), guides_(guides), derivatives_(derivatives),
+        tests_{config.reprojection_depth, config.reprojection_slope, std::countr_zero(config.reprojection_normal_power),
+               config.reprojection_instance_test},
         width_(static_cast<float>(guides.size.width)), height_(static_cast<float>(guides.size.height)) {}
 
   Gathered gather(int x, int y, Vec2 motion) const {
@@ -130,7 +129,7 @@ public:
     corner(at + 1, fx * (1.0f - fy));
     corner(at + previous_.stride, (1.0f - fx) * fy);
     corner(at + previous_.stride + 1, fx * fy);
-    if (sum.weight > kSharpenWeight && (fx > 0.0f || fy > 0.0f))
+    if (sum.weight > kMinSharpenWeight && (fx > 0.0f || fy > 0.0f))
       sum.sharpening = sharpen(previous_, at, fx, fy, surface);
     return sum;
   }
@@ -152,7 +151,7 @@ private:
 };
 
 void store(const Gathered& sum, float longest, History& history, int x, int y) {
-  const bool found = sum.weight > kLeastWeight;
+  const bool found = sum.weight > kMinHistoryWeight;
   const float scale = found ? 1.0f / sum.weight : 0.0f;
   const float linear = sum.mean * scale;
   const float sharp = found ? smaller(larger(linear + sum.sharpening, 0.0f), 1.0f) : 0.0f;

@@ -15,7 +15,7 @@ namespace {
 constexpr float kVariancePrior = 4.0f;
 
 /// Added to the variance so that the precision stays finite. Far below the square of an 8-bit quantisation step.
-constexpr float kLeastVariance = 1e-8f;
+constexpr float kVarianceFloor = 1e-8f;
 
 struct AccumulateRow {
   const float *ao, *disparity;
@@ -49,7 +49,7 @@ inline float excess(float change, float limit) { return std::copysign(larger(std
 
 struct CorrectRow {
   const float *count, *local_variance, *change, *narrow_count, *narrow_change, *disparity;
-  float *mean, *square, *samples, *variance, *value, *precision;
+  float *mean, *square, *samples, *variance, *value, *inverse_variance;
 };
 
 struct CorrectScales {
@@ -61,7 +61,7 @@ struct CorrectScales {
 PACKTRACE_AVX2_CLONES
 float correct_row(int width, const CorrectRow& rows, CorrectScales s) {
   const CorrectRow r = rows;
-  int32_t youngest = std::numeric_limits<int32_t>::max(); // non-negative floats sort like their bits as integers
+  int32_t min_tspp = std::numeric_limits<int32_t>::max(); // non-negative floats sort like their bits as integers
 #pragma GCC ivdep
   for (int x = 0; x < width; ++x) {
     const float noise = r.local_variance[x] * s.fast_share;
@@ -82,15 +82,15 @@ float correct_row(int width, const CorrectRow& rows, CorrectScales s) {
     const float distrust = s.trust_frames / larger(n, 1.0f);
     const float hit_samples = r.disparity[x] > 0.0f ? n : std::numeric_limits<float>::max();
     const int32_t bits = std::bit_cast<int32_t>(hit_samples);
-    youngest = bits < youngest ? bits : youngest;
+    min_tspp = bits < min_tspp ? bits : min_tspp;
     r.mean[x] = new_mean;
     r.square[x] = moment + new_mean * new_mean;
     r.samples[x] = n;
     r.variance[x] = variance;
     r.value[x] = new_mean;
-    r.precision[x] = 1.0f / (variance * (1.0f + distrust * distrust) + kLeastVariance);
+    r.inverse_variance[x] = 1.0f / (variance * (1.0f + distrust * distrust) + kVarianceFloor);
   }
-  return std::bit_cast<float>(youngest);
+  return std::bit_cast<float>(min_tspp);
 }
 
 } // namespace
@@ -134,8 +134,8 @@ void correct_history(const FrameSamples& samples, const Guides& guides, const De
                            local.narrow_change.data(), guides.disparity.row(y),
                            history.mean.row(y),        history.square.row(y),
                            history.samples.row(y),     &value_variance[static_cast<size_t>(y) * guides.size.width],
-                           image.value.row(y),         image.precision.row(y)};
-      image.youngest[static_cast<size_t>(y)] = correct_row(static_cast<int>(guides.size.width), row, scales);
+                           image.value.row(y),         image.inverse_variance.row(y)};
+      image.min_tspp[static_cast<size_t>(y)] = correct_row(static_cast<int>(guides.size.width), row, scales);
     }
   });
 }

@@ -26,9 +26,10 @@ namespace {
 constexpr size_t kMaxChannels = 1024;
 constexpr uint32_t kMaxTileSide = 8192, kMinTileSide = 8;
 /// Maximum accepted ratio of decoded size to file size, above the compression ratio of EXR's lossless codecs. It keeps
-/// a file of a few hundred bytes from requesting gigabytes of memory. Images of at most kFreeBytes are always accepted.
+/// a file of a few hundred bytes from requesting gigabytes of memory. Images of at most kAlwaysAcceptedBytes are always
+/// accepted.
 constexpr uint64_t kMaxRatio = 2048;
-constexpr uint64_t kFreeBytes = uint64_t{64} << 20;
+constexpr uint64_t kAlwaysAcceptedBytes = uint64_t{64} << 20;
 
 [[noreturn]] void fail(std::string_view name, const std::string& what, ErrorKind kind = ErrorKind::kInput) {
   throw FileError(kind, std::string(name), what);
@@ -65,7 +66,8 @@ ImageSize checked_size(const ExrHeader& header, uint64_t file_bytes, std::string
       fail(name, "EXR tile size is not supported", ErrorKind::kUnsupported);
   }
   if (width > kMaxImageSide || height > kMaxImageSide ||
-      std::max(width * height * pixel_bytes, header.block_bytes()) > std::max(kFreeBytes, kMaxRatio * file_bytes))
+      std::max(width * height * pixel_bytes, header.block_bytes()) >
+          std::max(kAlwaysAcceptedBytes, kMaxRatio * file_bytes))
     fail(name, "image of " + std::to_string(width) + " x " + std::to_string(height) + " pixels and " +
                    std::to_string(header.channels.size()) + " channels is too large for a file of " +
                    std::to_string(file_bytes) + " bytes");

@@ -27,7 +27,7 @@ struct FreeMemory {
 template <class T>
 using Malloced = std::unique_ptr<T, FreeMemory>;
 
-std::string complaint_about(std::string_view name) { return std::string(name) + ": damaged PNG file: "; }
+std::string damaged_png_prefix(std::string_view name) { return std::string(name) + ": damaged PNG file: "; }
 
 template <class Sample>
 Image to_floats(const Sample* samples, ImageSize size, uint32_t channels, PngTransfer transfer) {
@@ -86,19 +86,19 @@ void write_png(const std::filesystem::path& path, const Image& image, PngTransfe
 
 /// Throws Error(kInput) if a pixel's index exceeds the palette. stb_image would read uninitialised memory there.
 void check_palette(std::span<const std::byte> bytes, std::string_view name) {
-  const PngPalette palette = png_palette(bytes, complaint_about(name));
+  const PngPalette palette = png_palette(bytes, damaged_png_prefix(name));
   int width = 0, height = 0, channels = 0;
   const Malloced<stbi_uc> grey(stbi_load_from_memory(reinterpret_cast<const stbi_uc*>(palette.indices_as_grey.data()),
                                                      static_cast<int>(bytes.size()), &width, &height, &channels, 1));
   if (!grey) return; // decoding the file itself will fail as well
   const std::span<const stbi_uc> indices(grey.get(), static_cast<size_t>(width) * static_cast<size_t>(height));
   if (std::ranges::any_of(indices, [&](stbi_uc v) { return v / palette.grey_step >= palette.colours.size(); }))
-    throw Error(ErrorKind::kInput, complaint_about(name) + "pixels have colours that the palette lacks");
+    throw Error(ErrorKind::kInput, damaged_png_prefix(name) + "pixels have colours that the palette lacks");
 }
 
 Image decode_png(std::span<const std::byte> bytes, std::string_view name, PngTransfer transfer) {
   if (bytes.size() > kMaxImageSamples) throw FileError(ErrorKind::kInput, std::string(name), "file is too large");
-  const PngHeader header = check_png_chunks(bytes, PngChecksums::kVerify, complaint_about(name));
+  const PngHeader header = check_png_chunks(bytes, PngChecksums::kVerify, damaged_png_prefix(name));
   const ImageSize size{header.width, header.height};
   if (size.width > kMaxImageSide || size.height > kMaxImageSide || size.pixels() > kMaxImageSamples / 4)
     throw FileError(ErrorKind::kInput, std::string(name),
@@ -112,7 +112,7 @@ Image decode_png(std::span<const std::byte> bytes, std::string_view name, PngTra
   const auto load = [&](auto* samples) {
     using Sample = std::remove_pointer_t<decltype(samples)>;
     const Malloced<Sample> owner(samples);
-    if (!samples) throw Error(ErrorKind::kInput, complaint_about(name) + "its pixels cannot be decoded");
+    if (!samples) throw Error(ErrorKind::kInput, damaged_png_prefix(name) + "its pixels cannot be decoded");
     image = to_floats(samples, size, static_cast<uint32_t>(channels), transfer);
   };
   if (header.bits_per_sample == 16)

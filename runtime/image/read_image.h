@@ -12,8 +12,8 @@ namespace packtrace {
 /// An image and what was read from the file.
 struct LoadedImage {
   Image image;
-  std::string layer;  ///< name of the EXR layer that was read; empty for PNG files and for plain EXR channels
-  bool alpha = false; ///< whether the last channel is alpha
+  std::string layer;        ///< name of the EXR layer that was read; empty for PNG files and for plain EXR channels
+  bool alpha = false;       ///< whether the last channel is alpha
   MemoryReservation memory; ///< for the image and for decoding it
 };
 

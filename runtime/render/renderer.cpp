@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <string>
 
-#include "pbrt_import/scene/camera_rays.h"
 #include "pbrt_import/base/error.h"
-#include "runtime/stopwatch.h"
+#include "pbrt_import/scene/camera_rays.h"
 #include "runtime/camera/lod_view.h"
 #include "runtime/camera/origin_lift.h"
 #include "runtime/camera/primary_visibility.h"
+#include "runtime/stopwatch.h"
 
 namespace packtrace {
 namespace {
@@ -130,7 +130,7 @@ RenderedImage render_view(const SceneSource& source, const RayTracer& tracer, co
   const auto hit_pixels = static_cast<uint64_t>(
       std::count_if(g.instance.begin(), g.instance.end(), [](uint32_t id) { return id != kNoInstance; }));
   image.seen = hit_pixels > 0;
-  if (!image.seen && config.only_if_seen) return image;
+  if (!image.seen && config.stop_if_nothing_visible) return image;
   image.ao_rays = hit_pixels * config.ao.spp * config.frames;
 
   Occluders occluders{&source, &tracer, 0.0};

@@ -5,11 +5,11 @@
 #include <optional>
 #include <vector>
 
-#include "pbrt_import/scene/camera_rays.h"
 #include "pbrt_import/base/progress.h"
+#include "pbrt_import/scene/camera_rays.h"
 #include "runtime/ao/ao_integrator.h"
-#include "runtime/denoise/denoiser.h"
 #include "runtime/camera/gbuffer.h"
+#include "runtime/denoise/denoiser.h"
 #include "runtime/trace/ray_tracer.h"
 #include "runtime/trace/source/scene_source.h"
 
@@ -17,11 +17,11 @@ namespace packtrace {
 
 /// Settings for rendering one still view.
 struct RenderConfig {
-  ImageSize size;            ///< size of the result in pixels
-  uint32_t supersample = 1;  ///< [1, 8]: factor per axis at which the view is traced and denoised, then box-filtered
-  uint32_t frames = 32;      ///< [1, 65536]: each frame traces AoConfig::spp samples per pixel
-  bool denoise = true;       ///< false: raw frames are averaged
-  bool only_if_seen = false; ///< return after the camera rays if all of them miss
+  ImageSize size;           ///< size of the result in pixels
+  uint32_t supersample = 1; ///< [1, 8]: factor per axis at which the view is traced and denoised, then box-filtered
+  uint32_t frames = 32;     ///< [1, 65536]: each frame traces AoConfig::spp samples per pixel
+  bool denoise = true;      ///< false: raw frames are averaged
+  bool stop_if_nothing_visible = false; ///< return after the camera rays if all of them miss
   /// Screen-space error of the LOD cut in traced pixels, for the report. If above 0, the LOD layers of RenderedImage
   /// are filled.
   double lod_error_px = 0.0;
@@ -45,10 +45,11 @@ struct RenderTimings {
 /// the sub-pixels that hit unless stated otherwise; instance is that of the first sub-pixel that hits.
 struct RenderedImage {
   ImageSize size;
-  bool seen = true;          ///< false: all camera rays miss; with RenderConfig::only_if_seen all layers are then empty
-  std::vector<float> ao;     ///< denoised; without the denoiser the mean over all frames
-  std::vector<float> ao_raw; ///< AO of the last frame alone, not denoised
-  std::vector<float> depth;  ///< camera-space z, world units
+  bool seen =
+      true; ///< false: all camera rays miss; with RenderConfig::stop_if_nothing_visible all layers are then empty
+  std::vector<float> ao;       ///< denoised; without the denoiser the mean over all frames
+  std::vector<float> ao_raw;   ///< AO of the last frame alone, not denoised
+  std::vector<float> depth;    ///< camera-space z, world units
   std::vector<float> coverage; ///< fraction of sub-pixels whose camera ray hits, [0, 1]
   std::vector<Vec3> normal;    ///< world space
   std::vector<Vec3> albedo;    ///< linear sRGB

@@ -30,7 +30,7 @@ private:
 
 /// Whether geometry `g` holds exactly the mesh's triangles, with each corner at the nearest lattice point.
 inline bool holds(const BakedFile& file, uint32_t g, const Mesh& mesh, const DAffine& transform = DAffine(1.0),
-           bool flip = false) {
+                  bool flip = false) {
   const baked::GeometryRecord& record = file.geometries()[g];
   const double step = PositionGrid{record.step_mantissa, record.step_exponent}.step();
   TriangleCensus census;

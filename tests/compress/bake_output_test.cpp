@@ -42,7 +42,7 @@ protected:
 
 TEST_F(BakeOutput, AWriteThatFailsHalfWayLeavesTheOldFileAlone) {
   write_file_bytes(folder_ / "a.ptk", bytes("old"));
-  struct rlimit limit {};
+  struct rlimit limit{};
   ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &limit), 0);
   struct rlimit small = limit;
   small.rlim_cur = 1000; // maximum file size in bytes; every baked file is larger

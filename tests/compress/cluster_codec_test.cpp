@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "compress/format/layout/bit_stream.h"
 #include "compress/format/cluster/normal_codec.h"
+#include "compress/format/layout/bit_stream.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {
@@ -202,8 +202,8 @@ TEST(ClusterCodec, FaultsOfARecordAreFound) {
   EXPECT_TRUE(fault([](auto& r) { r.vertex_count = 0; }));
   EXPECT_TRUE(fault([](auto& r) { r.vertex_count = 257; }));
   EXPECT_TRUE(fault([](auto& r) { --r.vertex_count; }));
-  EXPECT_TRUE(fault([](auto& r) { r.restart_count = 0; }));
-  EXPECT_TRUE(fault([](auto& r) { r.restart_count = 200; }));
+  EXPECT_TRUE(fault([](auto& r) { r.strip_count = 0; }));
+  EXPECT_TRUE(fault([](auto& r) { r.strip_count = 200; }));
   EXPECT_TRUE(fault([](auto& r) { r.position_bits[1] = 58; }));
   EXPECT_TRUE(fault([](auto& r) { r.position_bits[1] = 57; })); // exceeds the payload
   EXPECT_TRUE(fault([](auto& r) { r.normal_bits[0] = 1; }));
@@ -338,7 +338,7 @@ TEST_P(ClusterNormals, AllAtOnceAreThoseOneByOne) {
     geometry.normal_encoding = static_cast<uint32_t>(GetParam());
     const uint32_t width = round % 3 == 0 ? 17 : 1 + random.bits() % 12;
     baked::ClusterRecord record{};
-    record.triangle_count = record.restart_count = 128;
+    record.triangle_count = record.strip_count = 128;
     record.vertex_count = static_cast<uint16_t>(vertex_count);
     record.normal_bits = {static_cast<uint8_t>(width), static_cast<uint8_t>(random.bits() % (width + 1))};
     for (int16_t& anchor : record.normal_anchor)

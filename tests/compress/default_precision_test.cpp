@@ -263,7 +263,7 @@ ViewStats look(const Scene& scene, const Camera& camera) {
   const std::vector<uint32_t> instances{0};
   const Bounds box = bounds_of(scene.meshes[0].positions);
   ViewSums sums;
-  look_at_geometry(PrimaryCamera(camera, kPromisedSize), sample, {plan.instances, instances}, box, sums, pixels);
+  add_geometry_view(PrimaryCamera(camera, kPromisedSize), sample, {plan.instances, instances}, box, sums, pixels);
   return sums.stats();
 }
 

@@ -8,9 +8,9 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "compress/format/pages/page_encoder.h"
 #include "compress/format/file/file_summary.h"
 #include "compress/format/pages/page_decoder.h"
+#include "compress/format/pages/page_encoder.h"
 #include "pbrt_import/base/error.h"
 #include "tests/compress/file_hashes.h"
 #include "tests/compress/test_scenes.h"

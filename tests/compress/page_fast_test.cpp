@@ -7,10 +7,10 @@
 #include <gtest/gtest.h>
 #include <zstd.h>
 
-#include "compress/format/pages/page_encoder.h"
 #include "compress/format/file/baked_file.h"
 #include "compress/format/pages/page_codec.h"
 #include "compress/format/pages/page_decoder.h"
+#include "compress/format/pages/page_encoder.h"
 #include "compress/format/pages/page_fast_kernels.h"
 #include "tests/compress/test_scenes.h"
 
@@ -76,7 +76,7 @@ TEST(FastPage, APageWrittenByHandIsDecoded) {
   EXPECT_EQ(record.material_slot, 3u);
   EXPECT_EQ(record.triangle_count, 2);
   EXPECT_EQ(record.vertex_count, 4);
-  EXPECT_EQ(record.restart_count, 1);
+  EXPECT_EQ(record.strip_count, 1);
   BitWriter expected;
   expected.put(0b01, 2), expected.put(0, 2), expected.put(0b1111, 4);
   for (const auto& [x, y] : {std::pair{0, 0}, {10, 0}, {0, 6}, {9, 5}}) // the last one: 10 + 0 - 0 - 1, 0 + 6 - 0 - 1

@@ -59,7 +59,7 @@ TEST(SeamGaps, HoldForWhatTouches) {
       if (world_from_object != flattened) { // edges are 0.1 long, diagonals 0.14
         EXPECT_LT(seams.gaps()[0], 0.5 * precision);
       }
-      EXPECT_EQ(seams.largest_beside(std::vector<double>{7, 1, 9}), std::vector<double>{7});
+      EXPECT_EQ(seams.largest_touching(std::vector<double>{7, 1, 9}), std::vector<double>{7});
     }
 }
 

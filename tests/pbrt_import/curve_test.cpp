@@ -10,8 +10,8 @@
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/scene/bounds.h"
 
 namespace packtrace {
 namespace {

@@ -108,9 +108,10 @@ TEST(HostileMemory, StringsLongerThanAnyNameAreLeftOut) {
   EXPECT_EQ(refusal(folder, world("Material \"" + text + "\"")), "accepted");
   EXPECT_EQ(refusal(folder, world(text)), "accepted");
   const Imported imported = import_text(folder, world("Material \"" + text + "\""));
-  EXPECT_EQ(without_folder(imported.text(), folder),
-            "scene.pbrt:2:10: error: expected a quoted name after Material, found a word or string of more than 2.0 MiB; "
-            "Material is ignored\n");
+  EXPECT_EQ(
+      without_folder(imported.text(), folder),
+      "scene.pbrt:2:10: error: expected a quoted name after Material, found a word or string of more than 2.0 MiB; "
+      "Material is ignored\n");
   EXPECT_EQ(kept_of(imported), (Kept{1, 1, 0, 0}));
 }
 

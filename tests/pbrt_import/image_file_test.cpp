@@ -475,7 +475,8 @@ TEST(ExrImage, ClaimsAreCheckedBeforeAnythingIsAllocated) {
   };
   EXPECT_EQ(corner(3, 3), "");
   EXPECT_EQ(corner(3, 1'000'000), "damaged image: the file is truncated"); // too short for the offset table
-  const std::string blocks = "damaged image: its " + std::to_string(file.size()) + " bytes cannot hold the blocks it claims";
+  const std::string blocks =
+      "damaged image: its " + std::to_string(file.size()) + " bytes cannot hold the blocks it claims";
   EXPECT_EQ(corner(16'000'000, 3), blocks);
   EXPECT_EQ(corner(2'000'000, 3), blocks);
   EXPECT_EQ(corner(500'000, 3), "decoding its 500001 x 4 pixels needs 427 MiB of memory, of 64.0 MiB left; "

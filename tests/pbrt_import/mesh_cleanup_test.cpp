@@ -20,7 +20,7 @@ class MeshCleanup : public testing::Test {
 protected:
   uint64_t clean(Mesh& mesh) {
     reports_.clear();
-    return drop_bad_triangles(mesh, [this](Severity severity, uint32_t line, std::string message) {
+    return clean_up_mesh(mesh, [this](Severity severity, uint32_t line, std::string message) {
       EXPECT_EQ(line, 0u);
       reports_.push_back({severity, std::move(message)});
     });
@@ -171,7 +171,7 @@ TEST_F(MeshCleanup, NothingLeftIsAnEmptyMesh) {
   EXPECT_EQ(clean(mesh), 2u);
   EXPECT_TRUE(mesh.positions.empty() && mesh.triangles.empty());
   Mesh empty;
-  EXPECT_EQ(drop_bad_triangles(empty, {}), 0u);
+  EXPECT_EQ(clean_up_mesh(empty, {}), 0u);
 }
 
 } // namespace

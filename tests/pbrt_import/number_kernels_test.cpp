@@ -38,9 +38,9 @@ private:
     for (size_t i = 0; i < count; ++i) text_ += static_cast<char>('0' + below(10));
   }
   void add_word() {
-    constexpr const char* kOthers[] = {"-",   ".",    "-.",  "+1",  "1e5", "nan",  "1.2.3", "--1",
-                                       "1-2", "12a4", "]",   "1]",  "#x",  "\"a\"", "1,",    "-0",
-                                       "0",   "-.5",  "5.",  "00",  "1:2", "1/2",  "\x7f",  "16777217"};
+    constexpr const char* kOthers[] = {"-",   ".",    "-.", "+1", "1e5", "nan",   "1.2.3", "--1",
+                                       "1-2", "12a4", "]",  "1]", "#x",  "\"a\"", "1,",    "-0",
+                                       "0",   "-.5",  "5.", "00", "1:2", "1/2",   "\x7f",  "16777217"};
     if (below(30) == 0) {
       text_ += kOthers[below(std::size(kOthers))];
       return;
@@ -144,8 +144,8 @@ TEST(NumberKernels, FloatsNearTheMiddleRoundOnce) {
     const float low = std::bit_cast<float>(0x3c000000u + static_cast<uint32_t>(random() % 0x09000000u));
     const double middle = (static_cast<double>(low) + std::nextafter(low, 1e9f)) / 2;
     char word[64];
-    const auto end = std::to_chars(word, word + sizeof word, middle, std::chars_format::fixed,
-                                   static_cast<int>(4 + random() % 11));
+    const auto end =
+        std::to_chars(word, word + sizeof word, middle, std::chars_format::fixed, static_cast<int>(4 + random() % 11));
     std::string text(kKernelLead, ' ');
     text.append(word, end.ptr).append(" ").append(kKernelReach, '\0');
     float value = 0, expected = 0;

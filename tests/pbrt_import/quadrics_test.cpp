@@ -14,8 +14,8 @@
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/scene/bounds.h"
 
 namespace packtrace {
 namespace {
@@ -388,10 +388,10 @@ TEST(Quadrics, SteepParaboloidsTakeFewRows) {
 }
 
 TEST(Quadrics, VerticesStayFewAtTheFinestTolerance) {
-  constexpr size_t kMost = size_t{1} << 23;
-  EXPECT_LT(tessellate_sphere({}, 1e-6).positions.size(), kMost);
-  EXPECT_LT(tessellate_paraboloid({1e-3f, 0, 1e30f, 360}, 1e-6).positions.size(), kMost);
-  EXPECT_LT(tessellate_hyperboloid({{1, -1e-3f, -1}, {-1, 1e-3f, 1}, 360}, 1e-6).positions.size(), kMost);
+  constexpr size_t kMax = size_t{1} << 23;
+  EXPECT_LT(tessellate_sphere({}, 1e-6).positions.size(), kMax);
+  EXPECT_LT(tessellate_paraboloid({1e-3f, 0, 1e30f, 360}, 1e-6).positions.size(), kMax);
+  EXPECT_LT(tessellate_hyperboloid({{1, -1e-3f, -1}, {-1, 1e-3f, 1}, 360}, 1e-6).positions.size(), kMax);
 }
 
 using Place = std::array<float, 3>;
@@ -455,30 +455,19 @@ TEST(Quadrics, VolumesConvergeToTheAnalyticOnesFromInside) {
     double volume;
   };
   const Solid solids[] = {
-      {"sphere",
-       [](double t) {
-         return six_volumes(tessellate_sphere({1.5f, -1.5f, 1.5f, 360}, t));
-       },
+      {"sphere", [](double t) { return six_volumes(tessellate_sphere({1.5f, -1.5f, 1.5f, 360}, t)); },
        4.0 / 3.0 * kPi * r * r * r},
       {"half sphere with its disk at 0",
-       [](double t) {
-         return six_volumes(tessellate_sphere({1.5f, 0, 1.5f, 360}, t));
-       },
-       2.0 / 3.0 * kPi * r * r * r},
+       [](double t) { return six_volumes(tessellate_sphere({1.5f, 0, 1.5f, 360}, t)); }, 2.0 / 3.0 * kPi * r * r * r},
       {"cylinder with two disks",
        [&](double t) {
          return six_volumes(tessellate_cylinder({1.5f, 2.25f, -1, 360}, t)) + disk_volume(t, h) - disk_volume(t, -1);
        },
        kPi * r * r * (h + 1)},
-      {"cone with its disk at 0",
-       [](double t) {
-         return six_volumes(tessellate_cone({1.5f, 2.25f, 360}, t));
-       },
+      {"cone with its disk at 0", [](double t) { return six_volumes(tessellate_cone({1.5f, 2.25f, 360}, t)); },
        kPi * r * r * h / 3},
       {"paraboloid with its disk",
-       [&](double t) {
-         return six_volumes(tessellate_paraboloid({1.5f, 0, 2.25f, 360}, t)) + disk_volume(t, h);
-       },
+       [&](double t) { return six_volumes(tessellate_paraboloid({1.5f, 0, 2.25f, 360}, t)) + disk_volume(t, h); },
        kPi * r * r * h / 2},
   };
   for (const Solid& solid : solids) {

@@ -18,8 +18,8 @@
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <OpenMesh/Tools/Subdivider/Uniform/LoopT.hh>
 
-#include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/scene/bounds.h"
 
 namespace packtrace {
 namespace {
@@ -95,9 +95,8 @@ size_t boundary_edge_count(const Mesh& mesh) {
   std::set<std::pair<uint32_t, uint32_t>> edges;
   for (const Triangle& t : mesh.triangles)
     for (int k = 0; k < 3; ++k) EXPECT_TRUE(edges.insert({t[k], t[(k + 1) % 3]}).second);
-  return static_cast<size_t>(std::count_if(edges.begin(), edges.end(), [&](auto e) {
-    return !edges.count({e.second, e.first});
-  }));
+  return static_cast<size_t>(
+      std::count_if(edges.begin(), edges.end(), [&](auto e) { return !edges.count({e.second, e.first}); }));
 }
 
 void expect_sound(const Mesh& mesh) {

@@ -84,16 +84,12 @@ std::vector<std::function<Mesh()>> one_of_each() {
       [] { return tessellate_disk({}, 1e-3); },
       [] { return tessellate_cone({}, 1e-3); },
       [] { return tessellate_paraboloid({}, 1e-3); },
-      [] {
-        return tessellate_hyperboloid({{1, 0, -1}, {0, 1, 1}, 360}, 1e-3);
-      },
+      [] { return tessellate_hyperboloid({{1, 0, -1}, {0, 1, 1}, 360}, 1e-3); },
       [=] { return make_curve(CurveType::kFlat); },
       [=] { return make_curve(CurveType::kCylinder); },
       [=] { return make_curve(CurveType::kRibbon); },
       [] { return subdivide_loop(points, triangles, 4, {}); },
-      [] {
-        return tessellate_nurbs({2, 2, 2, 2, knots, knots, {}, {}, {}, {}, control}, 1e-3);
-      },
+      [] { return tessellate_nurbs({2, 2, 2, 2, knots, knots, {}, {}, {}, {}, control}, 1e-3); },
       [] { return make_heightfield(3, 2, heights); },
   };
 }
@@ -160,24 +156,12 @@ private:
 
 TEST(Tessellation, AnyNumbersGiveAnErrorOrASoundMesh) {
   const std::function<Mesh(Numbers&)> kinds[] = {
-      [](Numbers& x) {
-        return tessellate_sphere({x(), x(), x(), x() * 300}, 0.05);
-      },
-      [](Numbers& x) {
-        return tessellate_cylinder({x(), x(), x(), x() * 300}, 0.05);
-      },
-      [](Numbers& x) {
-        return tessellate_disk({x(), x(), x(), x() * 300}, 0.05);
-      },
-      [](Numbers& x) {
-        return tessellate_cone({x(), x(), x() * 300}, 0.05);
-      },
-      [](Numbers& x) {
-        return tessellate_paraboloid({x(), x(), x(), x() * 300}, 0.05);
-      },
-      [](Numbers& x) {
-        return tessellate_hyperboloid({x.vector(), x.vector(), x() * 300}, 0.05);
-      },
+      [](Numbers& x) { return tessellate_sphere({x(), x(), x(), x() * 300}, 0.05); },
+      [](Numbers& x) { return tessellate_cylinder({x(), x(), x(), x() * 300}, 0.05); },
+      [](Numbers& x) { return tessellate_disk({x(), x(), x(), x() * 300}, 0.05); },
+      [](Numbers& x) { return tessellate_cone({x(), x(), x() * 300}, 0.05); },
+      [](Numbers& x) { return tessellate_paraboloid({x(), x(), x(), x() * 300}, 0.05); },
+      [](Numbers& x) { return tessellate_hyperboloid({x.vector(), x.vector(), x() * 300}, 0.05); },
       [](Numbers& x) {
         std::vector<Vec3> points(3 + x.below(6)), normals(2 + x.below(3));
         for (Vec3& p : points) p = x.vector();

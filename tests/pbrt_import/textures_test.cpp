@@ -2,8 +2,8 @@
 
 #include <tbb/global_control.h>
 
-#include "pbrt_import/files/image_file.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/files/image_file.h"
 #include "pbrt_import/language/spectrum.h"
 #include "pbrt_import/language/texture_graph.h"
 #include "tests/pbrt_import/scene_folder.h"

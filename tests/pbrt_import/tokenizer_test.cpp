@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/text/number.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/text/number.h"
 #include "tests/pbrt_import/damaged_files.h"
 #include "tests/pbrt_import/scene_folder.h"
 
@@ -245,8 +245,7 @@ TEST(Escapes, KnownOnesAreReplacedOthersKept) {
 
 TEST(InputFile, GzipMembersAreInflated) {
   const SceneFolder folder;
-  EXPECT_EQ(listing(open(folder, gzip("Scale 1 ") + gzip("2 3"))),
-            "w:Scale@1:1 w:1@1:7 w:2@1:9 w:3@1:11 end@1:12 ");
+  EXPECT_EQ(listing(open(folder, gzip("Scale 1 ") + gzip("2 3"))), "w:Scale@1:1 w:1@1:7 w:2@1:9 w:3@1:11 end@1:12 ");
 }
 
 TEST(InputFile, EveryTruncatedGzipIsAnError) {
@@ -272,8 +271,9 @@ TEST(InputFile, GzipBombsStopAtTheLimit) {
 TEST(Tokenizer, TokensLongerThanAnyNameHaveNoText) {
   const SceneFolder folder;
   const std::string longest(kMaxTokenBytes - 2, 'a'), too_long(5 * kMaxTokenBytes, 'a');
-  EXPECT_EQ(listing(open(folder, "\"" + longest + "\" b")), "s:" + longest + "@1:1 w:b@1:" + std::to_string(longest.size() + 4) +
-                                                                 " end@1:" + std::to_string(longest.size() + 5) + " ");
+  EXPECT_EQ(listing(open(folder, "\"" + longest + "\" b")), "s:" + longest +
+                                                                "@1:1 w:b@1:" + std::to_string(longest.size() + 4) +
+                                                                " end@1:" + std::to_string(longest.size() + 5) + " ");
   for (const size_t window : {size_t{64}, Tokenizer::kDefaultWindow}) {
     EXPECT_EQ(listing(open(folder, "\"" + too_long + "\"\nb", window)), "l@1:1 w:b@2:1 end@2:2 ");
     EXPECT_EQ(listing(open(folder, too_long + "\nb", window)), "l@1:1 w:b@2:1 end@2:2 ");

@@ -13,14 +13,14 @@
 #pragma GCC diagnostic pop
 
 #include "pbrt_import/base/error.h"
-#include "pbrt_import/scene/material_flags.h"
 #include "pbrt_import/base/printable.h"
+#include "pbrt_import/scene/material_flags.h"
 
 namespace packtrace {
 namespace {
 
 // Leaves room for the JSON part.
-constexpr uint64_t kMostBytes = std::numeric_limits<uint32_t>::max() - (uint64_t{64} << 20);
+constexpr uint64_t kMaxBytes = std::numeric_limits<uint32_t>::max() - (uint64_t{64} << 20);
 constexpr int kChannels = 4;
 
 int wrap_of(WrapMode wrap) {
@@ -42,7 +42,7 @@ bool same_layout(const A& a, const B& b) {
 int append_buffer_view(tinygltf::Model& model, const void* bytes, size_t size) {
   std::vector<unsigned char>& data = model.buffers.front().data;
   data.resize((data.size() + 3) / 4 * 4);
-  if (size > kMostBytes - std::min<uint64_t>(kMostBytes, data.size()))
+  if (size > kMaxBytes - std::min<uint64_t>(kMaxBytes, data.size()))
     throw Error(ErrorKind::kLimitExceeded, "more than the 4 GiB that a .glb file holds");
   tinygltf::BufferView view;
   view.buffer = 0;

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "compress/format/file/baked_file.h"
 #include "compress/format/cluster/position_grid.h"
+#include "compress/format/file/baked_file.h"
 
 namespace packtrace {
 

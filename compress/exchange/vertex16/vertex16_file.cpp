@@ -8,8 +8,8 @@
 
 #include "compress/format/layout/section_file.h"
 #include "compress/format/textures/texture_codec.h"
-#include "pbrt_import/scene/alpha_mask.h"
 #include "pbrt_import/base/file_error.h"
+#include "pbrt_import/scene/alpha_mask.h"
 
 namespace packtrace::vertex16 {
 namespace {

@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "compress/format/layout/baked_format.h"
 #include "compress/exchange/vertex16/vertex16_decode.h"
+#include "compress/format/layout/baked_format.h"
 
 /// Records of the files that `export --layout vertex16` writes, version 1; docs/vertex16.md describes them. All values
 /// are little-endian. Every section starts at a multiple of 64 bytes. Bytes that belong to no field and no section are

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <string_view>
 
-#include "compress/format/cluster/normal_codec.h"
 #include "compress/exchange/vertex16/vertex16_fields.h"
+#include "compress/format/cluster/normal_codec.h"
 
 namespace packtrace {
 namespace {

@@ -4,8 +4,8 @@
 #include <cassert>
 #include <numeric>
 
-#include "compress/format/layout/bit_stream.h"
 #include "compress/format/cluster/normal_kernels.h"
+#include "compress/format/layout/bit_stream.h"
 
 namespace packtrace {
 namespace {
@@ -62,9 +62,8 @@ std::optional<std::string_view> find_normal_fault(const baked::GeometryRecord& g
 
 ClusterView::ClusterView(const baked::GeometryRecord& geometry, const baked::ClusterRecord& cluster,
                          const uint8_t* payload)
-    : record_(&cluster),
-      bits_(payload + uint64_t{4} * cluster.payload_offset), layout_{cluster.triangle_count, cluster.vertex_count,
-                                                                     cluster.restart_count},
+    : record_(&cluster), bits_(payload + uint64_t{4} * cluster.payload_offset),
+      layout_{cluster.triangle_count, cluster.vertex_count, cluster.strip_count},
       step_(PositionGrid{geometry.step_mantissa, geometry.step_exponent}.step()),
       u_decoder_(static_cast<UvEncoding>(geometry.uv_encoding), geometry.uv_exponent[0]),
       v_decoder_(static_cast<UvEncoding>(geometry.uv_encoding), geometry.uv_exponent[1]),
@@ -228,10 +227,10 @@ void decode_uvs(const ClusterView& cluster, std::span<Vec2> out) {
 std::optional<std::string_view> find_cluster_fault(const baked::GeometryRecord& geometry,
                                                    const baked::ClusterRecord& cluster, const uint8_t* payload,
                                                    uint64_t payload_bytes) {
-  const IndexLayout layout{cluster.triangle_count, cluster.vertex_count, cluster.restart_count};
+  const IndexLayout layout{cluster.triangle_count, cluster.vertex_count, cluster.strip_count};
   if (layout.triangle_count < 1 || layout.triangle_count > kMaxClusterTriangles) return "triangle count";
   if (layout.vertex_count < 1 || layout.vertex_count > kMaxClusterVertices) return "vertex count";
-  if (layout.restart_count < 1 || layout.restart_count > layout.triangle_count) return "strip count";
+  if (layout.strip_count < 1 || layout.strip_count > layout.triangle_count) return "strip count";
   if (layout.vertex_count > layout.corner_count()) return "more vertices than corners";
   for (size_t axis = 0; axis < 3; ++axis) {
     if (cluster.position_bits[axis] > kMaxFieldBits) return "position bits";

@@ -6,11 +6,11 @@
 #include <string_view>
 #include <vector>
 
-#include "compress/format/layout/baked_format.h"
 #include "compress/format/cluster/index_codec.h"
 #include "compress/format/cluster/normal_codec.h"
 #include "compress/format/cluster/position_grid.h"
 #include "compress/format/cluster/uv_codec.h"
+#include "compress/format/layout/baked_format.h"
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {

@@ -132,7 +132,7 @@ Triangle decode_triangle(const uint8_t* bits, const IndexLayout& layout, uint32_
 bool strips_are_valid(const uint8_t* bits, const IndexLayout& layout) {
   const uint32_t n = layout.triangle_count;
   const Mask128 restart(bits, 0, n), left(bits, n, n);
-  if (!restart.test(0) || restart.count() != layout.restart_count) return false;
+  if (!restart.test(0) || restart.count() != layout.strip_count) return false;
   if ((restart.word[0] & left.word[0]) != 0 || (restart.word[1] & left.word[1]) != 0) return false;
   const uint32_t width = layout.index_bits();
   if (fresh_before(bits, layout.fresh_bit(), layout.corner_count()) != layout.vertex_count) return false;

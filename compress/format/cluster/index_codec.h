@@ -27,9 +27,9 @@ inline constexpr uint32_t kMaxClusterCorners = 3 * kMaxClusterTriangles;
 struct IndexLayout {
   uint32_t triangle_count = 0; ///< T, 1..128
   uint32_t vertex_count = 0;   ///< V, 1..256
-  uint32_t restart_count = 0;  ///< R, 1..T
+  uint32_t strip_count = 0;    ///< R, 1..T
 
-  uint32_t corner_count() const { return triangle_count + 2 * restart_count; }
+  uint32_t corner_count() const { return triangle_count + 2 * strip_count; }
   uint32_t fresh_bit() const { return 2 * triangle_count; }
   uint32_t explicit_bit() const { return fresh_bit() + corner_count(); }
   uint32_t index_bits() const; ///< width of one explicit index

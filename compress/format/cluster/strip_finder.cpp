@@ -60,7 +60,7 @@ public:
     for (uint32_t group = 0, t = 0; group < group_ends.size(); ++group)
       for (; t < group_ends[group]; ++t) group_of_[t] = static_cast<uint8_t>(group), ++left_in_group_[group];
     for (uint32_t t = 0; t < triangles.size(); ++t)
-      for (uint32_t e = 0; e < 3; ++e) exits_[t] += is_exit(t, partners_[3 * t + e]);
+      for (uint32_t e = 0; e < 3; ++e) unvisited_neighbours_[t] += is_in_same_group(t, partners_[3 * t + e]);
   }
 
   Strips run() {
@@ -72,28 +72,32 @@ public:
 
 private:
   /// Whether an unvisited triangle is allowed next: the current group is finished, or contains it.
-  bool may_come(uint32_t triangle) const { return left_in_group_[group_] == 0 || group_of_[triangle] == group_; }
+  bool is_allowed_next(uint32_t triangle) const { return left_in_group_[group_] == 0 || group_of_[triangle] == group_; }
 
   uint32_t pick_start() const {
     uint32_t best = ~0u;
     for (uint32_t t = 0; t < triangles_.size(); ++t)
-      if (!visited_[t] && may_come(t) && (best == ~0u || exits_[t] < exits_[best])) best = t;
+      if (!visited_[t] && is_allowed_next(t) && (best == ~0u || unvisited_neighbours_[t] < unvisited_neighbours_[best]))
+        best = t;
     return best;
   }
 
   /// Whether the triangle of `edge` belongs to the same group as `from`.
-  bool is_exit(uint32_t from, uint16_t edge) const { return edge != kNone && group_of_[edge / 3u] == group_of_[from]; }
+  bool is_in_same_group(uint32_t from, uint16_t edge) const {
+    return edge != kNone && group_of_[edge / 3u] == group_of_[from];
+  }
 
   /// Returns the partner of an edge if its triangle is unvisited and allowed next, else kNone.
   uint16_t across(uint32_t edge) const {
     const uint16_t partner = partners_[edge];
-    return partner != kNone && !visited_[partner / 3u] && may_come(partner / 3u) ? partner : kNone;
+    return partner != kNone && !visited_[partner / 3u] && is_allowed_next(partner / 3u) ? partner : kNone;
   }
 
   void visit(uint32_t triangle, bool restart, bool left) {
     visited_[triangle] = true;
     for (uint32_t e = 0; e < 3; ++e)
-      if (const uint16_t partner = partners_[3 * triangle + e]; is_exit(triangle, partner)) --exits_[partner / 3u];
+      if (const uint16_t partner = partners_[3 * triangle + e]; is_in_same_group(triangle, partner))
+        --unvisited_neighbours_[partner / 3u];
     strips_.triangle_order.push_back(triangle);
     group_ = group_of_[triangle];
     --left_in_group_[group_];
@@ -133,13 +137,14 @@ private:
 
   bool better(uint16_t a, uint16_t b) const {
     if (a == kNone || b == kNone) return b == kNone && a != kNone;
-    return exits_[a / 3u] < exits_[b / 3u];
+    return unvisited_neighbours_[a / 3u] < unvisited_neighbours_[b / 3u];
   }
 
   std::span<const Triangle> triangles_;
   EdgePartners partners_;
-  std::vector<uint32_t> number_;                      // old vertex -> new vertex, ~0 if not used yet
-  std::array<uint8_t, kMaxClusterTriangles> exits_{}; // by triangle: number of unvisited neighbours in its group
+  std::vector<uint32_t> number_; // old vertex -> new vertex, ~0 if not used yet
+  std::array<uint8_t, kMaxClusterTriangles>
+      unvisited_neighbours_{}; // by triangle: number of unvisited neighbours in its group
   std::array<bool, kMaxClusterTriangles> visited_{};
   std::array<uint8_t, kMaxClusterTriangles> group_of_{};
   std::array<uint8_t, kMaxClusterTriangles> left_in_group_{}; // by group: number of unvisited triangles

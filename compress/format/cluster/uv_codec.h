@@ -51,8 +51,8 @@ public:
   /// float that is a multiple of the step is restored exactly. unorm16: the float nearest to code / 65535.
   float operator()(int64_t code) const {
     if (encoding_ == UvEncoding::kFp16) return from_fp16(code);
-    constexpr double kMost = std::numeric_limits<float>::max();
-    return static_cast<float>(std::clamp(static_cast<double>(code) * step_ / divisor_, -kMost, kMost));
+    constexpr double kMax = std::numeric_limits<float>::max();
+    return static_cast<float>(std::clamp(static_cast<double>(code) * step_ / divisor_, -kMax, kMax));
   }
 
 private:

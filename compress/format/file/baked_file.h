@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "compress/format/layout/baked_format.h"
 #include "compress/format/cluster/cluster_codec.h"
+#include "compress/format/layout/baked_format.h"
 #include "compress/format/pages/page_codec.h"
 #include "compress/format/textures/texture_codec.h"
 #include "pbrt_import/scene/alpha_mask.h"

@@ -6,10 +6,10 @@
 
 #include <xxhash.h>
 
-#include "compress/format/file/baked_file.h"
-#include "compress/format/layout/bit_stream.h"
 #include "compress/format/cluster/cluster_validation.h"
+#include "compress/format/file/baked_file.h"
 #include "compress/format/file/lod_validation.h"
+#include "compress/format/layout/bit_stream.h"
 #include "compress/format/trees/tree_validation.h"
 #include "pbrt_import/base/file_error.h"
 

@@ -30,7 +30,8 @@ StreamBytes stream_bytes(const BakedFile& file) {
   bytes.total = file.file_bytes();
   bytes.header_and_alignment = bytes.total - s.payload.size() - bytes.cluster_records - bytes.geometry_records -
                                bytes.instance_records - bytes.material_records - bytes.masks - bytes.textures -
-                               bytes.cameras - bytes.strings - bytes.requirement_records - bytes.lod_records - bytes.trees;
+                               bytes.cameras - bytes.strings - bytes.requirement_records - bytes.lod_records -
+                               bytes.trees;
   return bytes;
 }
 

@@ -49,9 +49,9 @@ struct GeometryUse {
 /// An encoding of texture coordinates and its use.
 struct UvUse {
   UvEncoding encoding;
-  uint32_t geometries = 0;     ///< geometries that store texture coordinates
-  uint64_t vertices = 0;       ///< vertices with texture coordinates, summed over clusters
-  float max_error = 0;         ///< measured, larger axis
+  uint32_t geometries = 0; ///< geometries that store texture coordinates
+  uint64_t vertices = 0;   ///< vertices with texture coordinates, summed over clusters
+  float max_error = 0;     ///< measured, larger axis
   /// Upper bound: largest product of a geometry's error and the size of its finest texture.
   double max_error_texels = 0;
 };
@@ -79,8 +79,8 @@ struct FileSummary {
   std::vector<TextureUse> textures;
   std::vector<UvUse> uvs; ///< ordered by encoding
   LodSummary lod;
-  uint64_t trees = 0, nodes = 0; ///< of all levels
-  uint32_t tree_depth = 0;       ///< levels of nodes in the deepest tree
+  uint64_t trees = 0, nodes = 0;   ///< of all levels
+  uint32_t tree_depth = 0;         ///< levels of nodes in the deepest tree
   double max_position_error = 0.0; ///< measured, largest axis, object units, maximum over all geometries
   double max_position_error_bound = 0.0;
   float max_normal_error_degrees = 0.0f;

@@ -26,7 +26,7 @@ public:
     uint64_t count = 0;
     for (const baked::LodLevelRecord& level : levels) count += level.group_count;
     groups_ = s_.lod_groups.subspan(static_cast<size_t>(levels.front().first_group), static_cast<size_t>(count));
-    has_members_.assign(groups_.size(), 0), made_something_.assign(groups_.size(), 0);
+    has_members_.assign(groups_.size(), 0), has_coarser_clusters_.assign(groups_.size(), 0);
   }
 
   std::optional<LodFault> run() {
@@ -38,7 +38,7 @@ public:
     }
     for (size_t i = 0; i < groups_.size(); ++i) {
       if (has_members_[i] == 0) return of_group(i, "no clusters");
-      if (std::isfinite(groups_[i].error) != (made_something_[i] != 0)) return of_group(i, "coarser clusters");
+      if (std::isfinite(groups_[i].error) != (has_coarser_clusters_[i] != 0)) return of_group(i, "coarser clusters");
     }
     return std::nullopt;
   }
@@ -78,7 +78,7 @@ private:
         if (!std::isfinite(generating.error)) return fault("generating group is terminal");
         if (group.error < generating.error) return fault("error below that of the generating group");
         if (!baked::holds_sphere(group, generating)) return fault("sphere does not hold that of the generating group");
-        made_something_[link.generating_group] = 1;
+        has_coarser_clusters_[link.generating_group] = 1;
       }
       const uint32_t triangles = s_.clusters[static_cast<size_t>(g.first_cluster + c)].triangle_count;
       own += triangles;
@@ -98,7 +98,7 @@ private:
   const BakedSections& s_;
   std::span<const baked::LodLevelRecord> levels_;
   std::span<const baked::LodGroupRecord> groups_;
-  std::vector<uint8_t> has_members_, made_something_; // by group
+  std::vector<uint8_t> has_members_, has_coarser_clusters_; // by group
   uint64_t terminal_below_ = 0;
   float largest_error_ = 0.0f; // largest finite group error of the levels below
 };

@@ -121,7 +121,7 @@ struct ClusterRecord {
   uint16_t vertex_count;                ///< 1..256
   uint16_t normal_palette;              ///< number of palette entries; 0: no palette, one normal per vertex in order
   uint8_t triangle_count;               ///< 1..128
-  uint8_t restart_count;                ///< number of strips, 1..triangle_count
+  uint8_t strip_count;                  ///< number of strips, 1..triangle_count
   std::array<uint8_t, 3> position_bits; ///< 0..57 per axis
   std::array<uint8_t, 2> normal_bits;   ///< widths of x and y relative to the normal anchor, 0..17
   uint8_t flags;
@@ -237,7 +237,7 @@ struct SummaryRecord {
 };
 
 template <typename T>
-inline constexpr bool kIsPod = std::is_trivially_copyable_v<T>&& std::is_standard_layout_v<T>;
+inline constexpr bool kIsPod = std::is_trivially_copyable_v<T> && std::is_standard_layout_v<T>;
 
 static_assert(kIsPod<FileHeader> && sizeof(SectionRecord) == 24 && sizeof(FileHeader) == 512);
 static_assert(offsetof(FileHeader, content_hash) == 24 && offsetof(FileHeader, sections) == 48 &&

@@ -15,9 +15,9 @@ inline constexpr uint32_t kMaxLeafTriangles = 16;
 inline constexpr uint32_t kMaxTreeDepth = 48;
 
 // PackedNode::ray_classes
-inline constexpr uint8_t kCameraBelow = 1u << 0;    ///< a cluster below is visible to camera rays
-inline constexpr uint8_t kOcclusionBelow = 1u << 1; ///< a cluster below occludes
-inline constexpr uint8_t kMaskedLeaves = 1u << 2;   ///< hits in this node's leaves require a mask lookup
+inline constexpr uint8_t kVisibleToCamera = 1u << 0;    ///< a cluster below is visible to camera rays
+inline constexpr uint8_t kVisibleToOcclusion = 1u << 1; ///< a cluster below occludes
+inline constexpr uint8_t kMaskedLeaves = 1u << 2;       ///< hits in this node's leaves require a mask lookup
 
 // PackedNode::children
 inline constexpr uint8_t kNoChild = 0;

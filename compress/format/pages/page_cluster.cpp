@@ -61,7 +61,7 @@ void unpack_uvs(const ClusterView& view, ClusterValues& values) {
 void unpack_cluster(const ClusterView& view, ClusterValues& values) {
   values.triangle_count = view.triangle_count();
   values.vertex_count = view.vertex_count();
-  values.restart_count = view.layout().restart_count;
+  values.strip_count = view.layout().strip_count;
   values.material = view.material_slot();
   values.has_normals = view.has_normals();
   values.has_uvs = view.has_uvs();
@@ -232,11 +232,11 @@ void ClusterPacker::put_uvs(const ClusterValues& values) {
 bool ClusterPacker::append(const baked::GeometryRecord& geometry, const ClusterValues& values,
                            baked::ClusterRecord& record) {
   record = {};
-  const IndexLayout layout{values.triangle_count, values.vertex_count, values.restart_count};
+  const IndexLayout layout{values.triangle_count, values.vertex_count, values.strip_count};
   record.material_slot = values.material;
   record.triangle_count = static_cast<uint8_t>(layout.triangle_count);
   record.vertex_count = static_cast<uint16_t>(layout.vertex_count);
-  record.restart_count = static_cast<uint8_t>(layout.restart_count);
+  record.strip_count = static_cast<uint8_t>(layout.strip_count);
   if (!plan_positions(geometry, values, record) || !plan_normals(geometry, values, record) || !plan_uvs(values, record))
     return false;
   const uint64_t count = values.vertex_count;

@@ -14,7 +14,7 @@ enum class Turn : uint8_t { kRight = 0, kLeft = 1, kRestart = 2 };
 
 /// Decoded values of one cluster, independent of their encoding in its record and bit streams.
 struct ClusterValues {
-  uint32_t triangle_count = 0, vertex_count = 0, restart_count = 0;
+  uint32_t triangle_count = 0, vertex_count = 0, strip_count = 0;
   uint32_t material = 0; ///< material slot
   bool has_normals = false, has_uvs = false;
   std::array<Turn, kMaxClusterTriangles> turns;

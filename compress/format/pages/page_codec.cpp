@@ -9,13 +9,13 @@
 #include <xxhash.h>
 #include <zstd.h>
 
+#include "compress/format/cluster/normal_codec.h"
+#include "compress/format/cluster/position_grid.h"
+#include "compress/format/cluster/uv_codec.h"
 #include "compress/format/file/baked_file.h"
 #include "compress/format/layout/bit_stream.h"
-#include "compress/format/cluster/normal_codec.h"
 #include "compress/format/pages/page_decoder.h"
-#include "compress/format/cluster/position_grid.h"
 #include "compress/format/trees/tree_topology.h"
-#include "compress/format/cluster/uv_codec.h"
 #include "pbrt_import/base/error.h"
 
 namespace packtrace {
@@ -35,13 +35,13 @@ public:
   std::vector<std::byte> run(DiskForm& form) {
     check_header();
     read_table();
-    lay_out();
+    compute_layout();
     resident_.resize(static_cast<size_t>(header_.resident_bytes));
     unzip(head_, 0, header_.head_bytes, "head");
     unzip(tail_, tail_begin_, header_.tail_bytes, "tail");
     check_head();
     decode_pages();
-    add_up_clusters();
+    set_first_triangles_and_vertices();
     decode_nodes();
     form = {static_cast<PageCodec>(header_.codec),
             bytes_.size(),
@@ -111,7 +111,7 @@ private:
   }
 
   /// Computes the layout of the resident file, which follows from the page records and the header.
-  void lay_out() {
+  void compute_layout() {
     const auto ratio_ok = [](uint64_t bytes, uint64_t disk_bytes) {
       return bytes / baked::kMaxDiskRatio <= disk_bytes;
     };
@@ -209,9 +209,9 @@ private:
       unzip(nodes_, nodes_begin_, node_bytes(), "nodes");
       return;
     }
-    constexpr uint64_t kMostBytes = 14; // per node: its kind, eight sizes, first triangle and cluster
+    constexpr uint64_t kMaxBytes = 14; // per node: its kind, eight sizes, first triangle and cluster
     const uint64_t size = ZSTD_getFrameContentSize(nodes_.data(), nodes_.size());
-    if (size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR || size > kMostBytes * header_.node_count ||
+    if (size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR || size > kMaxBytes * header_.node_count ||
         size / baked::kMaxDiskRatio > nodes_.size())
       fail("nodes");
     std::vector<uint8_t> topology(static_cast<size_t>(size));
@@ -237,7 +237,7 @@ private:
                         lies_at(baked::kNodes, nodes_begin_, node_bytes());
   }
 
-  void add_up_clusters() {
+  void set_first_triangles_and_vertices() {
     for (const baked::GeometryRecord& g : geometries_) {
       uint32_t triangles = 0, vertices = 0;
       for (baked::ClusterRecord& c : clusters().subspan(static_cast<size_t>(g.first_cluster), g.cluster_count)) {

@@ -19,8 +19,8 @@ inline constexpr uint32_t kStripNaming = kTurn + 72; // 4 pairs of new corners x
 // 3 corners of a strip's first triangle x 12 states of the guesses
 inline constexpr uint32_t kNaming = kStripNaming + 96;
 inline constexpr uint32_t kVersion = kNaming + 36;
-inline constexpr uint32_t kVersionBack = kVersion + 1;
-inline constexpr uint32_t kBack = kVersionBack + 1; // 4 kinds of corners
+inline constexpr uint32_t kVertexAtPointBack = kVersion + 1;
+inline constexpr uint32_t kBack = kVertexAtPointBack + 1; // 4 kinds of corners
 inline constexpr uint32_t kPageBack = kBack + 4;
 inline constexpr uint32_t kPosition = kPageBack + 1; // 20 extents x 3 levels of surprise
 // 3 kinds of the last vertex x 3 counts of known x 3 of other candidates

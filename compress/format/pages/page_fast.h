@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <type_traits>
 
-#include "compress/format/layout/baked_format.h"
-#include "compress/format/layout/bit_stream.h"
 #include "compress/format/cluster/index_codec.h"
 #include "compress/format/cluster/normal_codec.h"
+#include "compress/format/layout/baked_format.h"
+#include "compress/format/layout/bit_stream.h"
 
 /// Disk form of pages with codec `fast`; docs/baked_format.md describes it. This header has what encoder and decoder
 /// share.
@@ -21,12 +21,12 @@ namespace packtrace::page_fast {
 
 /// The parts of a page, in order.
 enum Part : uint32_t {
-  kFields,    ///< bit fields
-  kHeaders,   ///< headers of all clusters, transposed: byte 0 of all headers first
-  kBits,      ///< per cluster, each starting at a whole byte: turns, fresh corners, creases
-  kRuns,      ///< triangle count of each strip
-  kOlds,      ///< vertices of corners that are not fresh, and the originals of creases
-  kResiduals, ///< the byte above the low bits of each residual, in kClasses parts
+  kFields,         ///< bit fields
+  kHeaders,        ///< headers of all clusters, transposed: byte 0 of all headers first
+  kBits,           ///< per cluster, each starting at a whole byte: turns, fresh corners, creases
+  kRuns,           ///< triangle count of each strip
+  kReusedVertices, ///< vertices of corners that are not fresh, and the originals of creases
+  kResiduals,      ///< the byte above the low bits of each residual, in kClasses parts
   kParts = kResiduals + 4
 };
 inline constexpr uint32_t kClasses = kParts - kResiduals;

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/pages/page_fast_kernels.h"
 #include "compress/format/layout/payload_writer.h"
+#include "compress/format/pages/page_fast_kernels.h"
 
 struct ZSTD_DCtx_s;
 

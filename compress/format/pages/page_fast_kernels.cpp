@@ -83,7 +83,8 @@ public:
         corner(guess);
       }
     }
-    if constexpr (!kCreases) std::memcpy(memory_.explicits.data(), memory_.olds.data(), memory_.explicits.size());
+    if constexpr (!kCreases)
+      std::memcpy(memory_.explicits.data(), memory_.reused_vertices.data(), memory_.explicits.size());
   }
 
 private:
@@ -99,9 +100,9 @@ private:
   }
 
   void corner(const std::array<Lane, kCount>& guess) {
-    const uint32_t fresh = memory_.fresh[corner_++], named = memory_.olds[old_];
+    const uint32_t fresh = memory_.fresh[corner_++], named = memory_.reused_vertices[reused_];
     const uint32_t placed = kCreases ? fresh & (memory_.crease[vertex_] ^ 1u) : fresh; // fresh and no crease
-    old_ += placed ^ 1u;
+    reused_ += placed ^ 1u;
     if constexpr (kCreases) {
       memory_.explicits[explicit_] = static_cast<uint8_t>(named);
       explicit_ += fresh ^ 1u;
@@ -120,7 +121,7 @@ private:
   const WalkInput& input_;
   WalkMemory& memory_;
   std::array<Channels<Lane>, kCount> t_;
-  uint32_t corner_ = 0, vertex_ = 0, old_ = 0, explicit_ = 0;
+  uint32_t corner_ = 0, vertex_ = 0, reused_ = 0, explicit_ = 0;
 };
 
 template <class Lane, uint32_t kCount>
@@ -166,7 +167,7 @@ uint32_t expand_bits(const uint8_t* bits, uint32_t count, uint8_t* out) {
   return ones;
 }
 
-void add_up_olds(const uint8_t* differences, uint32_t count, uint8_t* out) {
+void sum_reused_vertices(const uint8_t* differences, uint32_t count, uint8_t* out) {
   uint32_t last = 0;
   for (uint32_t i = 0; i < count; ++i) {
     last += static_cast<uint32_t>(unzigzag(differences[i]));
@@ -191,7 +192,7 @@ uint64_t pack_four(const uint8_t* bytes, uint32_t width) {
   return (two & 0xffffu) | (uint64_t{two >> 16} << (2 * width));
 }
 
-void spread_residuals(const uint64_t* residuals, const uint8_t* flags, uint32_t count, uint64_t* out) {
+void expand_residuals(const uint64_t* residuals, const uint8_t* flags, uint32_t count, uint64_t* out) {
   for (uint32_t i = 0, k = 0; i < count; ++i) {
     out[i] = residuals[k];
     k += flags[i] ^ 1u;

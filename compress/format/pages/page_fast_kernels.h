@@ -20,7 +20,7 @@ struct WalkMemory {
   std::array<uint8_t, kMaxClusterTriangles + kSpareWords> left{};
   std::array<uint8_t, kMaxClusterCorners + kSpareWords> fresh{};
   std::array<uint8_t, kMaxClusterVertices + kSpareWords> crease{}; ///< by vertex
-  std::array<uint8_t, kMaxClusterCorners + kMaxClusterVertices + kSpareWords> olds{};
+  std::array<uint8_t, kMaxClusterCorners + kMaxClusterVertices + kSpareWords> reused_vertices{};
   std::array<uint8_t, kMaxClusterCorners + kSpareWords> explicits{}; ///< vertices of the corners that are not fresh
   std::array<Words, kChannels> residuals{};                          ///< by vertex: difference to its prediction
   std::array<Words, kChannels> words{};
@@ -30,14 +30,14 @@ struct WalkInput {
   const uint8_t* runs = nullptr; ///< triangle count of each strip; the sum is at most 128
   uint32_t run_count = 0;
   std::array<bool, kChannels> has{}; ///< channels of the cluster; positions are always present
-  bool creases = false;              ///< `crease` is valid, and olds[] also holds the originals of creases
+  bool creases = false;              ///< `crease` is valid, and reused_vertices[] also holds the originals of creases
 };
 
 /// Writes bit i as byte i (0 or 1) for i < count, and zeroes up to 7 bytes behind. Returns the number of ones.
 uint32_t expand_bits(const uint8_t* bits, uint32_t count, uint8_t* out);
 
 /// Prefix sums, modulo 256, of zigzag differences.
-void add_up_olds(const uint8_t* differences, uint32_t count, uint8_t* out);
+void sum_reused_vertices(const uint8_t* differences, uint32_t count, uint8_t* out);
 
 /// Place of the residuals of one field.
 struct FieldCode {
@@ -66,7 +66,7 @@ inline uint64_t residual_word(const FieldCode& field, uint64_t high, uint64_t lo
 
 /// Leaves gaps at the vertices with flags[i] != 0: out[i] = residuals[k] for the k-th of the other vertices. The values
 /// in the gaps are unspecified.
-void spread_residuals(const uint64_t* residuals, const uint8_t* flags, uint32_t count, uint64_t* out);
+void expand_residuals(const uint64_t* residuals, const uint8_t* flags, uint32_t count, uint64_t* out);
 
 /// Computes the words and explicit vertices of a cluster. Stays within its memory for any input, provided that as many
 /// corners are fresh as there are vertices.

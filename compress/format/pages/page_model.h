@@ -62,7 +62,7 @@ private:
   static constexpr uint32_t kNone = ~0u;
   static constexpr uint16_t kNoVertex = 0xffff;
   static constexpr uint32_t kMaxExtent = 19;
-  static constexpr uint32_t kWide = 15; ///< magnitudes of this many bits and more store their width explicitly
+  static constexpr uint32_t kExplicitWidth = 15; ///< magnitudes of this many bits and more store their width explicitly
 
   /// Border edges at a point, newest first. Two surfaces that touch in a point have one each; kNone marks unused
   /// entries.
@@ -101,15 +101,15 @@ private:
   /// the leading one.
   uint64_t magnitude(uint32_t context, uint64_t value) {
     const auto bits = static_cast<uint32_t>(std::bit_width(value));
-    const uint32_t width = coder_.symbol(context, std::min(bits, kWide));
-    if (width == kWide) return wide_magnitude(context, value, bits);
+    const uint32_t width = coder_.symbol(context, std::min(bits, kExplicitWidth));
+    if (width == kExplicitWidth) return wide_magnitude(context, value, bits);
     // Without a branch on the width, which is unpredictable.
     const uint64_t first = (uint64_t{1} << width) >> 1;
     return first | coder_.raw(context, value - (kDecodes ? 0 : first), width - (width != 0 ? 1 : 0));
   }
 
   uint64_t wide_magnitude(uint32_t context, uint64_t value, uint32_t bits) {
-    const auto width = kWide + static_cast<uint32_t>(coder_.raw(context, bits - kWide, 6));
+    const auto width = kExplicitWidth + static_cast<uint32_t>(coder_.raw(context, bits - kExplicitWidth, 6));
     if (width > 64) {
       fault_ = true;
       return 0;
@@ -179,7 +179,7 @@ private:
     }
     c.vertex_count = vertex_count_;
     c.corner_count = corner_count_;
-    c.restart_count = restarts;
+    c.strip_count = restarts;
   }
 
   static uint64_t wrap(int64_t value) { return static_cast<uint64_t>(value); }
@@ -267,7 +267,7 @@ private:
     const uint32_t state = guess_state(guess_[0]) * 4 + (same ? 3 : guess_state(guess_[1]));
     naming = coder_.symbol(names + state, naming);
     history_ = (2 * history_ + (naming == kNewPoint ? 1 : 0)) & 3u;
-    if (corner_count_ >= kMaxClusterCorners) naming = kNoNaming;
+    if (corner_count_ >= kMaxClusterCorners) naming = kInvalidNaming;
     switch (naming) {
     case kNewPoint:
       point = add_point();
@@ -277,7 +277,7 @@ private:
       point = guess_[naming - kGuess0];
       if (point == kNone) return fail();
       if (points_[point].cluster == cluster_)
-        fresh = code_version(fresh, point, vertex);
+        fresh = code_vertex_at_point(fresh, point, vertex);
       else
         fresh = true;
       break;
@@ -314,7 +314,7 @@ private:
     return {point, vertex};
   }
 
-  static constexpr uint32_t kNoNaming = 15;
+  static constexpr uint32_t kInvalidNaming = 15;
 
   Corner fail() {
     fault_ = true;
@@ -323,11 +323,11 @@ private:
   }
 
   /// Codes which of the cluster's vertices at a point is meant: the newest, an older one, or a fresh one.
-  bool code_version(bool fresh, uint32_t point, uint16_t& vertex) {
+  bool code_vertex_at_point(bool fresh, uint32_t point, uint16_t& vertex) {
     const uint32_t version = coder_.symbol(context::kVersion, fresh ? 2u : vertex == points_[point].vertex ? 0u : 1u);
     if (version == 0) vertex = points_[point].vertex;
     if (version == 1) {
-      const uint64_t back = magnitude(context::kVersionBack, wrap(vertex_count_ - 1 - vertex));
+      const uint64_t back = magnitude(context::kVertexAtPointBack, wrap(vertex_count_ - 1 - vertex));
       if (back >= vertex_count_)
         fail();
       else

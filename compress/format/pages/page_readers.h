@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
+#include "compress/format/cluster/position_grid.h"
 #include "compress/format/layout/bit_stream.h"
 #include "compress/format/pages/page_contexts.h"
-#include "compress/format/cluster/position_grid.h"
 #include "compress/format/pages/rans.h"
 
 namespace packtrace {

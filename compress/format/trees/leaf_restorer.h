@@ -5,9 +5,9 @@
 #include <span>
 
 #include "compress/format/cluster/cluster_codec.h"
+#include "compress/format/layout/packed_node.h"
 #include "compress/format/trees/leaf_nodes.h"
 #include "compress/format/trees/node_kernels.h"
-#include "compress/format/layout/packed_node.h"
 #include "compress/format/trees/tree_grid.h"
 
 namespace packtrace {

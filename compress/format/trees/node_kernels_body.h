@@ -99,7 +99,7 @@ void number_corners(const CornerBits& corners, uint8_t* vertices) {
   const uint8_t* const bits = corners.bits; // local copies: byte stores might alias the struct
   const uint32_t corner_count = corners.corner_count, fresh_bit = corners.fresh_bit;
   spread_fields(bits, corners.explicit_bit, corners.index_bits, corner_count - corners.vertex_count, named);
-  constexpr uint64_t kIota = 0x0706050403020100, kEach = 0x0101010101010101;
+  constexpr uint64_t kIota = 0x0706050403020100, kByteOnes = 0x0101010101010101;
   uint32_t used = 0;
   for (uint32_t c = 0; c < corner_count; c += 8) {
     const uint32_t bit = fresh_bit + c, left = corner_count - c;
@@ -111,7 +111,7 @@ void number_corners(const CornerBits& corners, uint8_t* vertices) {
     const Bytes16 picked = pick_bytes(from, reinterpret_cast<Bytes16>(Long2{kIota - below, 0}));
     uint64_t taken;
     __builtin_memcpy(&taken, &picked, sizeof taken); // not a subscript, which GCC 12 miscompiles under sanitizers
-    const uint64_t set = kBytes.set[byte], fresh = (below + (used & 127u) * kEach) ^ ((used & 128u) * kEach);
+    const uint64_t set = kBytes.set[byte], fresh = (below + (used & 127u) * kByteOnes) ^ ((used & 128u) * kByteOnes);
     const uint64_t eight = (fresh & set) | (taken & ~set);
     __builtin_memcpy(vertices + c, &eight, sizeof eight);
     used += kBytes.count[byte];

@@ -9,11 +9,11 @@
 
 #include <tbb/parallel_for.h>
 
-#include "compress/format/trees/wide_tree.h"
 #include "compress/format/trees/node_writer.h"
 #include "compress/format/trees/stored_nodes.h"
 #include "compress/format/trees/tree_grid.h"
 #include "compress/format/trees/tree_validation.h"
+#include "compress/format/trees/wide_tree.h"
 #include "pbrt_import/base/error.h"
 
 namespace packtrace {
@@ -36,7 +36,7 @@ struct LeafNodes {
 
 /// Trees over chosen clusters live only as long as one view, so reinsertion is limited: moving all subtrees would take
 /// ten times as long as the rest of building their nodes.
-constexpr ReinsertionConfig kMovesOfPlans{.passes = 1, .subtrees = 1 << 10, .search = 64};
+constexpr ReinsertionConfig kChosenTreeReinsertion{.passes = 1, .subtrees = 1 << 10, .search = 64};
 
 /// Makes the leaf nodes of one cluster after another.
 class LeafNodeBuilder {
@@ -50,7 +50,7 @@ public:
     const size_t before = out.nodes.size();
     const std::span<const uint32_t> numbers = stored.of_cluster(cluster.number);
     if (numbers.empty()) return add(cluster, out);
-    const NodeMove move(sections_.trees[stored.tree_of_cluster(cluster.number)], tree_);
+    const NodeGridTransfer move(sections_.trees[stored.tree_of_cluster(cluster.number)], tree_);
     for (const uint32_t number : numbers) {
       out.nodes.push_back({});
       if (const std::optional<TreeGridBox> box = move.move(sections_.nodes[number], out.nodes.back())) {
@@ -159,7 +159,7 @@ public:
       for (uint32_t c = 0; c < geometry.class_clusters.size(); ++c) {
         const uint8_t classes = ray_classes_of(c);
         const uint32_t end = next + geometry.class_clusters[c];
-        if ((classes & (baked::kCameraBelow | baked::kOcclusionBelow)) != 0)
+        if ((classes & (baked::kVisibleToCamera | baked::kVisibleToOcclusion)) != 0)
           for (uint32_t i = next; i < end; ++i) clusters.push_back({i, g, classes});
         next = end;
       }
@@ -170,7 +170,7 @@ public:
   /// Returns the 90th percentile of the typical leaf node area over all clusters. One value serves the whole tree, so
   /// that nodes are spent where they save most: the few clusters with large triangles are cut most finely.
   double find_typical_area(std::span<const TreeCluster> clusters, const baked::TreeRecord& tree) const {
-    constexpr double kOfRecord = 0.5; // boxes from records have about twice the area of exact boxes
+    constexpr double kRecordBoxAreaFactor = 0.5; // boxes from records have about twice the area of exact boxes
     std::vector<double> areas;
     areas.reserve(clusters.size());
     for (const TreeCluster& of : clusters) {
@@ -182,7 +182,7 @@ public:
         size[axis] =
             std::ldexp(static_cast<double>(box.hi[axis] - box.lo[axis]), geometry.step_exponent - tree.step_exponent);
       const double half_area = size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
-      areas.push_back(typical_node_area(kOfRecord * half_area, cluster.triangle_count));
+      areas.push_back(typical_node_area(kRecordBoxAreaFactor * half_area, cluster.triangle_count));
     }
     if (areas.empty()) return 0.0;
     const auto at = areas.begin() + static_cast<ptrdiff_t>((areas.size() - 1) * 9 / 10);
@@ -289,7 +289,7 @@ struct ChosenTreeBuilder::Tables {
     out.record = grids[grid_of[tree]].record;
     out.record.node_count = from.node_count, out.record.depth = from.depth;
     out.nodes.resize(from.node_count);
-    const NodeMove move(from, out.record);
+    const NodeGridTransfer move(from, out.record);
     if (!move.exact()) return std::nullopt;
     for (uint32_t i = 0; i < from.node_count; ++i)
       if (!move.move(sections.nodes[static_cast<size_t>(from.first_node) + i], out.nodes[i])) return std::nullopt;
@@ -309,7 +309,7 @@ struct ChosenTreeBuilder::Tables {
       }
     TreeBuilder::Tree out;
     out.record = grid.record;
-    TreeBuilder::build_nodes(leaves, kMovesOfPlans, out);
+    TreeBuilder::build_nodes(leaves, kChosenTreeReinsertion, out);
     return out;
   }
 };

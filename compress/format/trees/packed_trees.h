@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "compress/format/file/baked_file.h"
-#include "compress/format/trees/leaf_nodes.h"
 #include "compress/format/layout/packed_node.h"
+#include "compress/format/trees/leaf_nodes.h"
 
 namespace packtrace {
 

@@ -8,13 +8,13 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kNone = ~0u;
-constexpr float kLeastGain = 0x1p-24f; // relative to the root's area, which has about this rounding error
+constexpr float kMinGain = 0x1p-24f; // relative to the root's area, which has about this rounding error
 
 /// A tree with parent links and free node order, so that subtrees can be moved. Nodes keep their numbers from the
 /// BoxTree.
-class LooseTree {
+class LinkedTree {
 public:
-  explicit LooseTree(const BoxTree& tree) : nodes_(tree.nodes.size()) {
+  explicit LinkedTree(const BoxTree& tree) : nodes_(tree.nodes.size()) {
     const double whole = tree.nodes[0].box.half_area();
     scale_ = whole > 0.0 ? 1.0 / whole : 0.0;
     for (uint32_t i = 0; i < nodes_.size(); ++i) {
@@ -110,7 +110,7 @@ private:
     const TreeBox& box = nodes_[node].box;
     const float own_area = nodes_[node].area;
     uint32_t best = kNone;
-    float best_gain = kLeastGain;
+    float best_gain = kMinGain;
     const auto take = [&](uint32_t place, float gain) {
       if (gain > best_gain) best = place, best_gain = gain;
     };
@@ -185,7 +185,7 @@ private:
 
 void reinsert_subtrees(BoxTree& tree, const ReinsertionConfig& config) {
   if (tree.nodes.empty()) return;
-  LooseTree loose(tree);
+  LinkedTree loose(tree);
   bool changed = false;
   for (uint32_t pass = 0; pass < config.passes && loose.reinsert(config); ++pass) changed = true;
   if (changed) tree = loose.ordered(tree);

@@ -56,17 +56,17 @@ std::span<const uint32_t> StoredLeafNodes::of_cluster(uint32_t cluster) const {
   return std::span(nodes_).subspan(first_[cluster], first_[cluster + 1] - first_[cluster]);
 }
 
-NodeMove::NodeMove(const baked::TreeRecord& from, const baked::TreeRecord& to)
+NodeGridTransfer::NodeGridTransfer(const baked::TreeRecord& from, const baked::TreeRecord& to)
     : possible_(from.step_mantissa == to.step_mantissa &&
                 std::abs(from.step_exponent - to.step_exponent) <= kMaxTreeStepDoublings),
       shift_(from.step_exponent - to.step_exponent), from_(from), to_(to) {}
 
-std::optional<TreeGridBox> NodeMove::move(const baked::PackedNode& node, baked::PackedNode& out) const {
+std::optional<TreeGridBox> NodeGridTransfer::move(const baked::PackedNode& node, baked::PackedNode& out) const {
   if (!possible_) return std::nullopt;
   return shift_ == 0 ? translate(node, out) : rescale(node, out);
 }
 
-std::optional<TreeGridBox> NodeMove::translate(const baked::PackedNode& node, baked::PackedNode& out) const {
+std::optional<TreeGridBox> NodeGridTransfer::translate(const baked::PackedNode& node, baked::PackedNode& out) const {
   WideBox whole;
   std::array<int64_t, 3> origin;
   for (uint32_t axis = 0; axis < 3; ++axis) {
@@ -84,7 +84,7 @@ std::optional<TreeGridBox> NodeMove::translate(const baked::PackedNode& node, ba
   return box;
 }
 
-std::optional<TreeGridBox> NodeMove::rescale(const baked::PackedNode& node, baked::PackedNode& out) const {
+std::optional<TreeGridBox> NodeGridTransfer::rescale(const baked::PackedNode& node, baked::PackedNode& out) const {
   const TreeGridMap map(to_, from_.step_exponent);
   std::array<TreeGridBox, baked::kNodeWidth> children;
   const auto count = static_cast<size_t>(std::ranges::find(node.children, baked::kNoChild) - node.children.begin());

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "compress/format/file/baked_file.h"
-#include "compress/format/trees/leaf_nodes.h"
 #include "compress/format/layout/packed_node.h"
+#include "compress/format/trees/leaf_nodes.h"
 
 namespace packtrace {
 
@@ -34,11 +34,11 @@ private:
 };
 
 /// Moves nodes from the grid of one tree to the grid of another.
-class NodeMove {
+class NodeGridTransfer {
 public:
   /// @param from of a valid file
   /// @param to its origin must lie within +-2^60
-  NodeMove(const baked::TreeRecord& from, const baked::TreeRecord& to);
+  NodeGridTransfer(const baked::TreeRecord& from, const baked::TreeRecord& to);
 
   /// Whether boxes keep their exact size and place.
   bool exact() const { return possible_ && shift_ == 0; }

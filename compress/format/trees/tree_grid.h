@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <span>
 
-#include "compress/format/layout/baked_format.h"
 #include "compress/format/cluster/lattice_box.h"
-#include "compress/format/layout/packed_node.h"
 #include "compress/format/cluster/position_grid.h"
+#include "compress/format/layout/baked_format.h"
+#include "compress/format/layout/packed_node.h"
 
 namespace packtrace {
 

@@ -165,7 +165,7 @@ PackedNode random_node(test::Random& random, int32_t about) {
   return node;
 }
 
-TEST(NodeMove, HoldsWhatWasThereAndLittleMore) {
+TEST(NodeGridTransfer, HoldsWhatWasThereAndLittleMore) {
   test::Random random(9);
   for (const int32_t doublings : {-7, -1, 0, 1, 6})
     for (int round = 0; round < 200; ++round) {
@@ -175,7 +175,7 @@ TEST(NodeMove, HoldsWhatWasThereAndLittleMore) {
       from.origin = {1 << 20, -77, 0}, to.origin = {(1 << 22) + 3, 0, round - 100};
       const PackedNode node = random_node(random, round);
       PackedNode out;
-      const NodeMove move(from, to);
+      const NodeGridTransfer move(from, to);
       ASSERT_EQ(move.exact(), doublings == 0);
       const std::optional<TreeGridBox> whole = move.move(node, out);
       ASSERT_TRUE(whole);
@@ -202,24 +202,24 @@ TEST(NodeMove, HoldsWhatWasThereAndLittleMore) {
     }
 }
 
-TEST(NodeMove, RefusesWhatCannotBe) {
+TEST(NodeGridTransfer, RefusesWhatCannotBe) {
   test::Random random(3);
   TreeRecord from{}, to{};
   from.step_mantissa = to.step_mantissa = kMinStepMantissa;
   const PackedNode node = random_node(random, 0);
   PackedNode out;
-  EXPECT_TRUE(NodeMove(from, to).move(node, out));
+  EXPECT_TRUE(NodeGridTransfer(from, to).move(node, out));
   to.origin[1] = int64_t{1} << 60; // beyond the tree coordinates at any scale
   from.origin[1] = -to.origin[1];
-  EXPECT_FALSE(NodeMove(from, to).move(node, out));
+  EXPECT_FALSE(NodeGridTransfer(from, to).move(node, out));
   to.step_exponent = -60;
-  EXPECT_FALSE(NodeMove(from, to).move(node, out));
+  EXPECT_FALSE(NodeGridTransfer(from, to).move(node, out));
   from.origin = to.origin = {};
-  EXPECT_FALSE(NodeMove(from, to).move(node, out));
+  EXPECT_FALSE(NodeGridTransfer(from, to).move(node, out));
   to.step_exponent = 61;
-  EXPECT_FALSE(NodeMove(from, to).move(node, out));
+  EXPECT_FALSE(NodeGridTransfer(from, to).move(node, out));
   to.step_exponent = 0, to.step_mantissa = kMinStepMantissa + 1;
-  EXPECT_FALSE(NodeMove(from, to).move(node, out));
+  EXPECT_FALSE(NodeGridTransfer(from, to).move(node, out));
 }
 
 } // namespace

@@ -9,9 +9,9 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
-#include "compress/format/pages/page_encoder.h"
 #include "compress/format/file/baked_file.h"
 #include "compress/format/pages/page_codec.h"
+#include "compress/format/pages/page_encoder.h"
 #include "pbrt_import/base/file_bytes.h"
 #include "tests/compress/file_hashes.h"
 #include "tests/compress/test_scenes.h"

@@ -7,9 +7,9 @@
 
 #include <gtest/gtest.h>
 
-#include "compress/format/cluster/normal_codec.h"
 #include "compress/exchange/vertex16/vertex16_fields.h"
 #include "compress/exchange/vertex16/vertex16_generator.h"
+#include "compress/format/cluster/normal_codec.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {
@@ -25,8 +25,10 @@ std::string read_text(const std::string& file) {
 uvec4 with_normal(uint32_t code) { return vertex16_pack(0, 0, 0, 0, code, 0, 0, 0); }
 
 TEST(Vertex16Generator, WhatItWroteIsCurrent) {
-  EXPECT_EQ(read_text("compress/exchange/vertex16/vertex16.glsl"), vertex16_glsl()) << "run vertex16_generator compress/exchange/vertex16";
-  EXPECT_EQ(read_text("compress/exchange/vertex16/vertex16_decode.h"), vertex16_cpp()) << "run vertex16_generator compress/exchange/vertex16";
+  EXPECT_EQ(read_text("compress/exchange/vertex16/vertex16.glsl"), vertex16_glsl())
+      << "run vertex16_generator compress/exchange/vertex16";
+  EXPECT_EQ(read_text("compress/exchange/vertex16/vertex16_decode.h"), vertex16_cpp())
+      << "run vertex16_generator compress/exchange/vertex16";
 }
 
 TEST(Vertex16Generator, TheManualHasTheSameFields) {

@@ -9,9 +9,9 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "compress/exchange/vertex16/vertex16_geometry.h"
 #include "compress/exchange/vertex16/vertex16_fields.h"
 #include "compress/exchange/vertex16/vertex16_file.h"
+#include "compress/exchange/vertex16/vertex16_geometry.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {
