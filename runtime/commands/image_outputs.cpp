@@ -14,7 +14,7 @@ namespace packtrace {
 namespace {
 
 constexpr std::array kBaseLayers{"ao", "ao_raw", "depth", "normal", "instance", "albedo", "shaded"};
-/// Only with levels of detail.
+/// Layers that need LOD levels.
 constexpr std::array kLodLayers{"lod", "lod-error"};
 
 std::vector<std::string> chosen(const std::vector<std::string>& aovs, const std::string& otherwise, bool detail) {
@@ -27,7 +27,7 @@ std::vector<std::string> chosen(const std::vector<std::string>& aovs, const std:
     if (std::find(aov_names().begin(), aov_names().end(), name) != aov_names().end()) continue;
     std::string known = "all";
     for (const std::string& aov : aov_names()) known += ", " + aov;
-    throw Error(ErrorKind::kUsage, "--aov " + name + ": no such layer; there are " + known);
+    throw Error(ErrorKind::kUsage, "--aov " + name + ": no such layer; layers are " + known);
   }
   std::vector<std::string> unique;
   for (const std::string& name : names)
@@ -53,7 +53,8 @@ Layer exr_layer(const RenderedImage& image, const std::string& aov) {
   return {aov, rgb, floats_of(image.shaded), true};
 }
 
-/// Names of files, of which several may stand in one word: "x.png,x.exr". A comma inside of a name stays one.
+/// Splits words such as "x.png,x.exr" at commas. A word is split only if every part ends in .png or .exr, so that file
+/// names may contain commas.
 std::vector<std::string> separate_files(const std::vector<std::string>& words) {
   std::vector<std::string> files;
   for (const std::string& word : words) {
@@ -105,7 +106,7 @@ ImageOutputs::ImageOutputs(const std::vector<std::string>& files, const std::vec
         add(target, force, false, {aov});
       }
     } else {
-      throw Error(ErrorKind::kUsage, name + ": images end in .exr or .png");
+      throw Error(ErrorKind::kUsage, name + ": image file names must end in .png or .exr");
     }
   }
 }
@@ -113,7 +114,7 @@ ImageOutputs::ImageOutputs(const std::vector<std::string>& files, const std::vec
 void ImageOutputs::add_standard_output(std::vector<std::string> aovs) {
   if (std::exchange(to_stdout_, true)) throw Error(ErrorKind::kUsage, "-o - was given twice");
   if (aovs.size() > 1)
-    throw Error(ErrorKind::kUsage, "-o - writes one PNG to standard output, so --aov can name one layer only");
+    throw Error(ErrorKind::kUsage, "-o - writes a single PNG to standard output, so --aov can select only one layer");
   refuse_terminal("a PNG");
   add("-", false, false, std::move(aovs));
 }

@@ -10,8 +10,8 @@ struct WeightedMean {
   void add(float w, float value) { weight += w, sum += w * value; }
 };
 
-WeightedMean weighted_neighbour_mean(const EdgeWeights& edges, const Plane<float>& samples, const Plane<float>& value, int x,
-                             int y) {
+WeightedMean weighted_neighbour_mean(const EdgeWeights& edges, const Plane<float>& samples, const Plane<float>& value,
+                                     int x, int y) {
   WeightedMean mean;
   for (size_t d = 0; d < EdgeWeights::kDirections.size(); ++d) {
     const int dx = edges.step() * EdgeWeights::kDirections[d][0], dy = edges.step() * EdgeWeights::kDirections[d][1];
@@ -40,7 +40,7 @@ void fill_unsampled(const Guides& guides, const Plane<float>& samples, std::span
       if (image.min_tspp[static_cast<size_t>(y)] > 0.0f) continue;
       for (int x = 0; x < static_cast<int>(guides.size.width); ++x) {
         if (!(guides.disparity.row(y)[x] > 0.0f) || samples.row(y)[x] > 0.0f) continue;
-        WeightedMean mean; // of sampled pixels only: none of them is written here
+        WeightedMean mean; // only of sampled pixels, which this loop never writes
         for (size_t i = 0; i < edges.size() && mean.weight == 0.0f; ++i)
           mean = weighted_neighbour_mean(edges[i], samples, image.value, x, y);
         if (mean.weight == 0.0f) mean = mean_of_window(samples, image.value, x, y);

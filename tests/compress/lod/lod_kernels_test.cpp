@@ -215,7 +215,7 @@ TEST(Overlay, HolesAndSecondLayersAreNoCover) {
   EXPECT_FALSE(overlay.overlay(p, DVec3(0, 0, 1), twice, pieces));
   EXPECT_FALSE(overlay.overlay(p, DVec3(0, 0, -1), s.all(), pieces)); // seen from behind
   EXPECT_FALSE(overlay.overlay(p, DVec3(1, 0, 0), s.all(), pieces));  // edge-on
-  EXPECT_EQ(pieces.size(), whole.size());                         // nothing was appended
+  EXPECT_EQ(pieces.size(), whole.size());                             // nothing was appended
 }
 
 TEST(Overlay, HalfCoveredTwiceIsNotCovered) {

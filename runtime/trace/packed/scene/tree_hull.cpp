@@ -7,7 +7,6 @@
 namespace packtrace {
 namespace {
 
-
 struct Child {
   DVec3 lo, hi;
   uint32_t node; ///< number of the node; 0 for a leaf
