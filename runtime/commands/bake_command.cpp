@@ -227,7 +227,7 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
                               static_cast<double>(peak_rss_bytes()) / (1 << 20)),
                   text);
   fmt::print(text, "{}", size_text(baked.file));
-  fmt::print(text, "maximum position error {:.3g}, {}\n", baked.max_position_error,
+  fmt::print(text, "maximum position error {:.3g} (object units), {}\n", baked.max_position_error,
              baked.file.normals.empty()
                  ? std::string("no normals stored")
                  : fmt::format("maximum normal error {:.4f} degrees", baked.max_normal_error_degrees));
