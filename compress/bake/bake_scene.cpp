@@ -155,6 +155,21 @@ private:
     if (far > 0)
       warn(std::to_string(far) + " of " + std::to_string(grids_.size()) +
            " geometries lie so far from the origin that float positions are coarser than the step of their grid");
+    warn_of_far_world();
+  }
+
+  /// Positions that are hit are floats in world space, for every backend and without packing too.
+  void warn_of_far_world() {
+    constexpr double kMaxSpacing = 1.0 / 512.0; // of the scene's diagonal; pictures are right to 0.002 AO at half of it
+    const Bounds world = world_bounds(scene_);
+    if (world.empty()) return;
+    const DVec3 largest = glm::max(glm::abs(world.lo), glm::abs(world.hi));
+    const auto furthest = static_cast<float>(std::max({largest.x, largest.y, largest.z}));
+    const double spacing = static_cast<double>(std::nextafter(furthest, HUGE_VALF) - furthest);
+    const double diagonal = world.diagonal();
+    if (diagonal > 0.0 && spacing > kMaxSpacing * diagonal)
+      warn("the scene lies so far from the origin that floats are " + brief(spacing) + " apart there, " +
+           brief(100.0 * spacing / diagonal) + " % of its diagonal; move it closer, or pictures will be wrong");
   }
 
   /// Leaves out instances that exceed the float range.

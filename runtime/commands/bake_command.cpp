@@ -126,7 +126,7 @@ std::string precision_warning(const BakeReport& baked, bool chosen) {
   if (worst.size() > kMaxShown) text += fmt::format("  and {} more; --json lists them\n", worst.size() - kMaxShown);
   if (step > 0.0)
     text += chosen ? std::string("  without a precision option, bake chooses steps that are fine enough\n")
-                   : fmt::format("  --precision-abs {:.2g} is fine enough, but makes the file larger\n", step);
+                   : fmt::format("  --grid-step-abs {:.2g} is fine enough, but makes the file larger\n", step);
   return text;
 }
 
@@ -292,12 +292,12 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   };
   const std::array<CLI::Option*, 4> precisions{
       add_precision(
-          "--precision-edge", options->precision_edge, "F",
+          "--grid-step-edge,--precision-edge", options->precision_edge, "F",
           "Grid step as a fraction of the median edge length, 1e-9..1 (default 1/128, and finer where thin triangles, "
           "contacts or close views need it). Smaller steps give larger files"),
-      add_precision("--precision", options->precision, "REL",
+      add_precision("--grid-step,--precision", options->precision, "REL",
                     "Grid step as a fraction of the bounding box diagonal, 1e-12..0.1"),
-      add_precision("--precision-abs", options->precision_abs, "UNITS",
+      add_precision("--grid-step-abs,--precision-abs", options->precision_abs, "UNITS",
                     "Grid step in world units; positions move by at most half of it per axis"),
       add_precision("--position-bits", options->position_bits, "N",
                     "Bits per coordinate along the longest side of the bounding box, 1..40")};
@@ -398,7 +398,7 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
               "  packtrace bake house.pbrt -o house.ptk\n"
               "  packtrace bake forest.pbrt -o forest.ptk --lod --codec small\n"
               "  packtrace bake house.pbrt -o - | ssh host 'cat > house.ptk'\n"
-              "  packtrace bake house.pbrt -o small.ptk --precision 1e-4 --json report.json");
+              "  packtrace bake house.pbrt -o small.ptk --grid-step 1e-4 --json report.json");
 }
 
 } // namespace packtrace

@@ -119,7 +119,7 @@ RenderChoices reasons(const SceneSource& source, const ChosenCamera& camera, con
                               ? camera.reason + ", so the whole scene is shown"
                               : fmt::format("number {} of {}, counted from 0{}", camera.index.value_or(0), cameras,
                                             camera.index == 0u && cameras > 1 ? "; --camera selects another" : "");
-  choices.size_reason = options.size.empty() ? (cameras > 0 ? "the camera's film" : "the default") : "--size";
+  choices.size_reason = options.size.empty() ? (camera.index ? "the camera's film" : "the default") : "--size";
   choices.radius_reason = options.ao_radius ? "--ao-radius"
                                             : fmt::format("10 % of the scene's diagonal, {:.5g}",
                                                           glm::length(source.world_bounds().extent()));

@@ -33,6 +33,19 @@ TEST(BakeScene, EmptyScenesAndMeshesAreFine) {
   EXPECT_TRUE(BakedFile::from_bytes(bake({}).bytes).world_bounds().empty());
 }
 
+TEST(BakeScene, ScenesFarFromTheOriginAreWarnedAbout) {
+  const auto warns = [](double distance) {
+    Mesh mesh = test::grid_mesh(2);
+    for (Vec3& p : mesh.positions) p = Vec3(50.0f * p.x + static_cast<float>(distance), 50.0f * p.y, 50.0f * p.z);
+    const std::vector<std::string> warnings = bake(scene_of(std::move(mesh))).report.warnings;
+    return std::any_of(warnings.begin(), warnings.end(), [](const std::string& text) {
+      return text.find("the scene lies so far from the origin that floats are ") == 0;
+    });
+  };
+  for (const double distance : {0.0, 1e4, 1e5}) EXPECT_FALSE(warns(distance)) << distance;
+  for (const double distance : {1e7, -1e8}) EXPECT_TRUE(warns(distance)) << distance;
+}
+
 TEST(BakeScene, ScenesThatBreakTheRulesAreRefused) {
   const auto broken = [](auto&& change) {
     Scene scene = masked_scene();
