@@ -1,4 +1,4 @@
-#include "runtime/commands/help_commands.h"
+#include "runtime/commands/commands.h"
 
 #include <functional>
 #include <memory>
