@@ -1,4 +1,4 @@
-#include "runtime/commands/bake_command.h"
+#include "runtime/commands/commands.h"
 
 #include <algorithm>
 #include <array>

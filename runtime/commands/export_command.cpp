@@ -1,4 +1,4 @@
-#include "runtime/commands/export_command.h"
+#include "runtime/commands/commands.h"
 
 #include <filesystem>
 #include <memory>

@@ -1,4 +1,4 @@
-#include "runtime/commands/info_command.h"
+#include "runtime/commands/commands.h"
 
 #include <algorithm>
 #include <map>

@@ -4,14 +4,9 @@
 #include <CLI/CLI.hpp>
 
 #include "pbrt_import/base/error.h"
-#include "runtime/commands/bake_command.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/commands.h"
-#include "runtime/commands/compare_command.h"
-#include "runtime/commands/export_command.h"
 #include "runtime/commands/help_formatter.h"
-#include "runtime/commands/info_command.h"
-#include "runtime/commands/render_command.h"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "runtime/commands/render_command.h"
+#include "runtime/commands/commands.h"
 
 #include <charconv>
 #include <cmath>
