@@ -6,6 +6,7 @@
 
 #include "compress/format/cluster/normal_kernels.h"
 #include "compress/format/layout/bit_stream.h"
+#include "pbrt_import/base/cpu.h"
 
 namespace packtrace {
 namespace {
@@ -213,8 +214,7 @@ void ClusterView::decode_normal_entries(uint32_t count, std::span<Vec3> out) con
 
 AxisNormalKernel axis_normal_kernel() {
 #if defined(__x86_64__)
-  static const bool has_avx2 = __builtin_cpu_supports("avx2");
-  if (has_avx2) return avx2::decode_axis_normals;
+  if (cpu_has_avx2()) return avx2::decode_axis_normals;
 #endif
   return nullptr;
 }

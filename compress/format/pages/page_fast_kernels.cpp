@@ -1,4 +1,5 @@
 #include "compress/format/pages/page_fast_kernels.h"
+#include "pbrt_import/base/cpu.h"
 
 #include <algorithm>
 #include <bit>
@@ -212,8 +213,7 @@ void walk_strips(const WalkInput& input, WalkMemory& memory) {
 
 ResidualKernel residual_kernel() {
 #if defined(__x86_64__)
-  static const bool has_avx2 = __builtin_cpu_supports("avx2");
-  if (has_avx2) return avx2::read_residuals;
+  if (cpu_has_avx2()) return avx2::read_residuals;
 #endif
   return read_residuals;
 }

@@ -1,4 +1,5 @@
 #include "compress/format/trees/node_kernels_body.h"
+#include "pbrt_import/base/cpu.h"
 
 namespace packtrace::node_kernels {
 
@@ -6,8 +7,7 @@ const Kernels kPortable{place_vertices, number_corners, box_leaves, pack_childre
 
 const Kernels& kernels() {
 #if defined(__x86_64__)
-  static const bool has_avx2 = __builtin_cpu_supports("avx2");
-  if (has_avx2) return kAvx2;
+  if (cpu_has_avx2()) return kAvx2;
 #endif
   return kPortable;
 }

@@ -9,6 +9,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "pbrt_import/base/cpu.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/progress.h"
 #include "runtime/trace/embree/embree_device.h"
@@ -330,7 +331,7 @@ RTCSceneTy* EmbreeTracer::handle() const { return device_->top.get(); }
 std::string_view EmbreeTracer::isa() const {
   const auto wide = [&](RTCDeviceProperty property) { return rtcGetDeviceProperty(device_->embree.get(), property); };
   if (wide(RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)) return "avx512";
-  if (wide(RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED)) return __builtin_cpu_supports("avx2") ? "avx2" : "avx";
+  if (wide(RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED)) return cpu_has_avx2() ? "avx2" : "avx";
   return "sse";
 }
 

@@ -6,6 +6,7 @@
 
 #include "compress/format/trees/leaf_restorer.h"
 #include "compress/format/trees/node_writer.h"
+#include "pbrt_import/base/cpu.h"
 #include "tests/compress/file_damage.h"
 #include "tests/compress/test_scenes.h"
 
@@ -17,7 +18,7 @@ using baked::PackedNode;
 std::vector<const node_kernels::Kernels*> all_kernels() {
   std::vector<const node_kernels::Kernels*> all{&node_kernels::kPortable};
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2")) all.push_back(&node_kernels::kAvx2);
+  if (cpu_has_avx2()) all.push_back(&node_kernels::kAvx2);
 #endif
   return all;
 }

@@ -15,6 +15,7 @@
 #include "compress/bake/lod/bound/triangle_set.h"
 #include "compress/bake/lod/simplify/edge_heap.h"
 #include "compress/bake/lod/simplify/edge_placement.h"
+#include "pbrt_import/base/cpu.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace::test {
@@ -336,7 +337,7 @@ TEST(EdgePlacement, IsNoWorseThanTheEnds) {
 #if defined(__x86_64__)
 
 TEST(LodKernels, GiveTheSameBitsOnEveryProcessor) {
-  if (!__builtin_cpu_supports("avx2")) GTEST_SKIP() << "no AVX2";
+  if (!cpu_has_avx2()) GTEST_SKIP() << "no AVX2";
   Random random(10);
   const Surface s = random_triangles(64, 11);
   std::vector<TriangleBlock> blocks(5);

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "compress/bake/lod/bound/triangle_distance.h"
+#include "pbrt_import/base/cpu.h"
 
 namespace packtrace {
 namespace {
@@ -16,7 +17,7 @@ static_assert(sizeof(DVec3) == 3 * sizeof(double));
 
 OverlayKernel pick_kernel() {
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2")) return avx2::overlay_kernel;
+  if (cpu_has_avx2()) return avx2::overlay_kernel;
 #endif
   return overlay_kernel;
 }

@@ -1,4 +1,5 @@
 #include "compress/bake/lod/bound/triangle_set.h"
+#include "pbrt_import/base/cpu.h"
 
 namespace packtrace {
 namespace {
@@ -7,14 +8,14 @@ constexpr double kFar = 1e150; // coordinate of padding; its square is finite
 
 DistanceKernel pick_distance_kernel() {
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2")) return avx2::triangle_distances;
+  if (cpu_has_avx2()) return avx2::triangle_distances;
 #endif
   return triangle_distances;
 }
 
 NearestKernel pick_nearest_kernel() {
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2")) return avx2::nearest_triangle;
+  if (cpu_has_avx2()) return avx2::nearest_triangle;
 #endif
   return nearest_triangle;
 }

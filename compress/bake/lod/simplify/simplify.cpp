@@ -9,6 +9,7 @@
 #include "compress/bake/lod/simplify/corner_lists.h"
 #include "compress/bake/lod/simplify/edge_heap.h"
 #include "compress/bake/lod/simplify/surface_edges.h"
+#include "pbrt_import/base/cpu.h"
 
 namespace packtrace {
 namespace {
@@ -19,7 +20,7 @@ constexpr double kRetryShare = 0.75; // share of the triangles left at which rej
 
 PlacementKernel pick_placement_kernel() {
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2")) return avx2::place_edges;
+  if (cpu_has_avx2()) return avx2::place_edges;
 #endif
   return place_edges;
 }

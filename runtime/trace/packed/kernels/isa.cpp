@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "pbrt_import/base/cpu.h"
 #include "pbrt_import/base/error.h"
 
 namespace packtrace {
@@ -11,11 +12,8 @@ namespace packtrace {
 bool isa_supported(PackedIsa isa) {
   if (isa == PackedIsa::kScalar) return true;
 #if defined(__x86_64__)
-  const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
-                    __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("lzcnt") &&
-                    __builtin_cpu_supports("popcnt");
-  if (isa == PackedIsa::kAvx2) return avx2;
-  return avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+  if (isa == PackedIsa::kAvx2) return cpu_has_avx2();
+  return cpu_has_avx2() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
          __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
          __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512vbmi") &&
          __builtin_cpu_supports("avx512vbmi2") && __builtin_cpu_supports("avx512vpopcntdq");
