@@ -3,12 +3,12 @@
 #include <cmath>
 #include <string>
 
+#include "pbrt_import/base/file_error.h"
+#include "pbrt_import/builder/scene_builder.h"
 #include "pbrt_import/language/file_names.h"
 #include "pbrt_import/language/parser.h"
 #include "pbrt_import/text/problem_text.h"
 #include "pbrt_import/text/reporter.h"
-#include "pbrt_import/base/file_error.h"
-#include "pbrt_import/builder/scene_builder.h"
 #include "pbrt_import/text/source_stack.h"
 
 namespace packtrace {
@@ -28,7 +28,7 @@ void check_options(const ImportOptions& options) {
           "tessellation_tolerance must lie within [1e-6, 0.5]");
 }
 
-/// In strict mode, whatever was reported is a reason to fail.
+/// Strict mode: throws Error(kInput) for the first warning or error.
 void require_clean(const Diagnostics& diagnostics) {
   const uint64_t problems = diagnostics.count(Severity::kError) + diagnostics.count(Severity::kWarning);
   if (problems == 0) return;
@@ -68,7 +68,7 @@ ImportResult import_scene(const std::filesystem::path& main_file, const ImportOp
     progress.advance(bytes - reported_bytes);
     reported_bytes = bytes;
   }
-  reporter.next_directive(); // what is missing at the end comes after everything else
+  reporter.next_directive(); // sorts reports of missing ends after all others
   ImportResult result = builder.finish(source.place(), progress);
   result.files.push_back(main_file);
   result.statistics.files_read += source.files_opened();

@@ -46,7 +46,7 @@ Model make_asteroid(uint64_t seed, uint64_t number) {
 }
 
 /// Random rotation from three angles; not exactly uniform, but sufficient for rocks.
-DAffine tumbled(Random& random) {
+DAffine random_rock_rotation(Random& random) {
   const double x = random.uniform(0.0, 2.0 * kPi), y = random.uniform(0.0, 2.0 * kPi),
                z = random.uniform(0.0, 2.0 * kPi);
   return compose(rotation_x(x), compose(rotation_y(y), rotation_z(z)));
@@ -78,7 +78,7 @@ SceneTotals generate_asteroids(const AsteroidsConfig& config, const OutputConfig
     do {
       for (int axis = 0; axis < 3; ++axis) place[axis] = random.uniform(-half, half);
     } while (glm::dot(place, place) < kClearAround * kClearAround);
-    const DAffine turned = compose(tumbled(random), scaling(DVec3(random.uniform(0.4, 1.3))));
+    const DAffine turned = compose(random_rock_rotation(random), scaling(DVec3(random.uniform(0.4, 1.3))));
     writer.instance(name, compose(translation(place), turned));
   }
   return writer.finish();

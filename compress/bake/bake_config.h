@@ -4,11 +4,11 @@
 #include <filesystem>
 #include <optional>
 
-#include "compress/format/layout/baked_format.h"
 #include "compress/format/cluster/normal_codec.h"
+#include "compress/format/cluster/uv_codec.h"
+#include "compress/format/layout/baked_format.h"
 #include "compress/format/pages/page_codec.h"
 #include "compress/format/textures/texture_codec.h"
-#include "compress/format/cluster/uv_codec.h"
 #include "pbrt_import/base/memory_budget.h"
 
 namespace packtrace {

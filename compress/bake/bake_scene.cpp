@@ -11,21 +11,21 @@
 #include <tbb/task_arena.h>
 #include <tbb/task_group.h>
 
-#include "pbrt_import/base/brief.h"
-#include "compress/bake/write/file_sections.h"
 #include "compress/bake/clusters/geometry_encoder.h"
 #include "compress/bake/grid/geometry_measure.h"
-#include "compress/bake/plan/geometry_plan.h"
 #include "compress/bake/grid/grid_choice.h"
-#include "compress/bake/lod/lod_encoder.h"
-#include "compress/bake/write/lod_store.h"
-#include "compress/bake/lod/shared_borders.h"
-#include "compress/bake/plan/material_runs.h"
-#include "compress/format/pages/page_encoder.h"
-#include "compress/bake/write/requirement_table.h"
 #include "compress/bake/grid/scene_measure.h"
+#include "compress/bake/lod/lod_encoder.h"
+#include "compress/bake/lod/shared_borders.h"
+#include "compress/bake/plan/geometry_plan.h"
+#include "compress/bake/plan/material_runs.h"
+#include "compress/bake/write/file_sections.h"
+#include "compress/bake/write/lod_store.h"
+#include "compress/bake/write/requirement_table.h"
 #include "compress/format/file/baked_image.h"
 #include "compress/format/layout/bit_stream.h"
+#include "compress/format/pages/page_encoder.h"
+#include "pbrt_import/base/brief.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/output_file.h"
 
@@ -90,7 +90,7 @@ private:
 
   std::vector<std::byte> assemble() {
     progress_.begin("assembling the file", 0);
-    close_slots();
+    remove_empty_slots();
     FileSections sections(scene_, textures_);
     RequirementTable requirements;
     for (size_t i = 0; i < packed_.size(); ++i) {
@@ -116,10 +116,10 @@ private:
   }
 
   /// Removes slots without triangles from the plan; the packed geometries do not have them.
-  void close_slots() {
+  void remove_empty_slots() {
     std::vector<std::vector<uint32_t>> left;
     for (Packed& packed : packed_) left.push_back(std::move(packed.slots));
-    close_material_slots(plan_, left);
+    remove_material_slots(plan_, left);
   }
 
   void measure() {

@@ -8,7 +8,7 @@ namespace {
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; }
 
-/// Twice the edit distance, letters that differ in case only counting 1; stops caring above the names' own lengths.
+/// Twice the edit distance, where letters that differ only in case count 1.
 size_t doubled_distance(std::string_view a, std::string_view b) {
   std::vector<size_t> row(b.size() + 1);
   for (size_t j = 0; j <= b.size(); ++j) row[j] = 2 * j;
@@ -31,7 +31,8 @@ std::string_view closest_name(std::string_view name, std::span<const std::string
   constexpr size_t kLongestName = 64;
   if (name.empty() || name.size() > kLongestName) return {};
   std::string_view best;
-  // Two edits, but no more than a third of the name: "Ks" is no misspelling of "Kd". A difference in case always is.
+  // Two edits, but at most a third of the name: "Ks" is not a misspelling of "Kd". One difference in case is always
+  // allowed.
   size_t best_distance = 2 * std::min<size_t>(2, name.size() / 3) + 2;
   for (const std::string_view candidate : candidates) {
     if (candidate == name || candidate.size() > name.size() + 2 || name.size() > candidate.size() + 2) continue;

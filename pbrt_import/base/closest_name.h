@@ -6,10 +6,12 @@
 
 namespace packtrace {
 
-/// The candidate within two edits of name that needs fewest; empty if none. Case differences count half an edit.
+/// The candidate with the smallest edit distance to the name; empty if all need more than two edits, or more than a
+/// third of the name's length. A difference in case counts half an edit and is allowed on top. Names of more than 64
+/// characters have no candidate.
 std::string_view closest_name(std::string_view name, std::span<const std::string_view> candidates);
 
-/// The end of a message about an unknown name: "; did you mean SHOWN?", empty where shown is.
+/// Suffix of a message about an unknown name: "; did you mean SHOWN?", or empty if `shown` is empty.
 std::string did_you_mean_text(std::string_view shown);
 
 } // namespace packtrace

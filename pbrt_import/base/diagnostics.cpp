@@ -20,7 +20,7 @@ std::string_view to_string(Severity severity) {
 std::string to_string(const SourceLocation& location) {
   if (!location.file) return {};
   std::string text = location.file->path;
-  // append() rather than ":" + ..., about which GCC 12 warns in error (-Wrestrict).
+  // append() instead of ":" + ..., because GCC 12 issues a false -Wrestrict warning for the latter.
   if (location.line > 0) text.append(":").append(std::to_string(location.line));
   if (location.line > 0 && location.column > 0) text.append(":").append(std::to_string(location.column));
   return text;
@@ -31,7 +31,7 @@ std::string to_string(const Diagnostic& diagnostic) {
   if (!text.empty()) text += ": ";
   text += std::string(to_string(diagnostic.severity)) + ": " + diagnostic.message;
   if (diagnostic.count > 1) text += " (" + std::to_string(diagnostic.count) + " times, first here)";
-  // Of a long chain the ends say most: what included the file, and where it began.
+  // The ends of a long chain are the most useful: the files around the problem and the main file.
   constexpr size_t kShownAtEachEnd = 4;
   std::vector<const SourceLocation*> chain;
   for (const SourceFile* file = diagnostic.location.file.get(); file && file->included_from.file;

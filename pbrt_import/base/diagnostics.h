@@ -17,45 +17,47 @@ std::string_view to_string(Severity severity);
 
 struct SourceFile;
 
-/// A place in a source file. Lines and columns count from 1; 0 means "the file as a whole".
+/// A position in a source file. Lines and columns count from 1; 0 means "the file as a whole".
 struct SourceLocation {
-  std::shared_ptr<const SourceFile> file; ///< null: no file is to blame
+  std::shared_ptr<const SourceFile> file; ///< null: no file
   uint32_t line = 0;
   uint32_t column = 0;
 };
 
-/// One opened source file and, where it was included, the place of the Include directive.
+/// An opened source file and, if it was included, the position of the Include directive.
 struct SourceFile {
   std::string path;
   SourceLocation included_from;
 };
 
-/// "file:line:column", shortened by the parts that are 0; empty where there is no file.
+/// The location as "file:line:column", without the parts that are 0; empty without a file.
 std::string to_string(const SourceLocation& location);
 
-/// One problem found in the input.
+/// A problem found in the input.
 struct Diagnostic {
   Severity severity = Severity::kNote;
   SourceLocation location; ///< of the first occurrence
   std::string message;
-  uint64_t count = 1; ///< how many times this message was reported for this file
+  uint64_t count = 1; ///< number of reports of this message for this file
 };
 
-/// "file:line:column: error: message (N times)" followed by one "  included from ..." line per include.
+/// The diagnostic as "file:line:column: error: message (N times, first here)", followed by one "  included from ..."
+/// line per Include; the middle of a long chain is left out.
 std::string to_string(const Diagnostic& diagnostic);
 
-/// Collects problems that do not stop the work. Reports from several threads are allowed; entries() is ordered
-/// by a sequence number the caller gives (the order of the source text), so it is the same for any thread count.
+/// Collects problems that do not stop the work. Thread-safe; entries() is ordered by a sequence number of the caller
+/// (the order of the source text), so that it does not depend on the number of threads.
 class Diagnostics {
 public:
-  /// Adds a problem, or counts it where the same message was reported for the same file before.
-  /// @param sequence orders entries; entries with equal numbers keep (file, line, column, message) order
+  /// Adds a problem, or counts it if the same message was reported for the same file before.
+  /// @param sequence orders the entries; entries with equal numbers are ordered by line and column, then by severity,
+  ///   file and message
   void report(Severity severity, SourceLocation location, std::string message, uint64_t sequence = 0);
 
-  /// All problems, first occurrences in order of sequence. Not to be called while others report.
+  /// All problems in order of their sequence numbers, each with the location of its first occurrence.
   std::vector<Diagnostic> entries() const;
 
-  /// Occurrences (not distinct messages) at this severity.
+  /// Number of occurrences (not distinct messages) at this severity.
   uint64_t count(Severity severity) const;
 
 private:
@@ -64,7 +66,7 @@ private:
     uint64_t sequence = 0;
   };
   mutable std::mutex mutex_;
-  std::map<std::tuple<Severity, std::string, std::string>, Entry> entries_; // (severity, file path, message)
+  std::map<std::tuple<Severity, std::string, std::string>, Entry> entries_; // by (severity, file path, message)
 };
 
 } // namespace packtrace

@@ -18,7 +18,7 @@ constexpr uint32_t kVersion = 2, kTiledFlag = 0x200, kLongNamesFlag = 0x400, kDe
 constexpr size_t kMaxNameBytes = 255;
 constexpr const char* kTruncated = "the file is truncated";
 
-/// Types whose values have one size. OpenEXR reads as much as the type needs, whatever the file says.
+/// Attribute types of fixed size. OpenEXR reads as many bytes as the type implies, regardless of the size in the file.
 constexpr std::pair<std::string_view, uint32_t> kFixedSizes[] = {{"box2f", 16},
                                                                  {"box2i", 16},
                                                                  {"chromaticities", 32},
@@ -44,10 +44,10 @@ constexpr std::pair<std::string_view, uint32_t> kFixedSizes[] = {{"box2f", 16},
                                                                  {"v3f", 12},
                                                                  {"v3i", 12}};
 
-/// Lines in a block, by compression: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB.
+/// Lines per block, by compression: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB.
 constexpr std::array<uint32_t, 10> kBlockLines{1, 1, 1, 16, 32, 16, 32, 32, 32, 256};
 
-/// Reads bytes one after the other.
+/// Sequential reader of bytes, with bounds checks.
 class Cursor {
 public:
   Cursor(std::span<const std::byte> bytes, const std::string& complaint) : bytes_(bytes), complaint_(complaint) {}
@@ -97,7 +97,7 @@ std::vector<ExrChannelHeader> read_channels(Cursor value) {
   return channels;
 }
 
-/// Values whose size depends on their content.
+/// Checks attributes whose size depends on their content.
 void check_variable_size(std::string_view type, Cursor value) {
   if (type == "stringvector") {
     while (value.left() > 0) {
@@ -123,7 +123,7 @@ void check_size(std::string_view type, const Cursor& value) {
   check_variable_size(type, value);
 }
 
-/// Reads the attributes that matter.
+/// Reads all attributes and extracts the relevant ones.
 class Attributes {
 public:
   ExrHeader read(Cursor& file, bool tiled) {
@@ -187,7 +187,7 @@ uint64_t ExrHeader::pixel_bytes() const {
 uint64_t ExrHeader::block_bytes() const {
   const uint64_t columns = tile_width > 0 ? blocks(width(), tile_width) * tile_width : width();
   const uint64_t lines = tile_width > 0 ? tile_height : block_lines;
-  const uint64_t pixels = columns * lines; // 33 and 31 bits
+  const uint64_t pixels = columns * lines; // no overflow: 33 and 31 bits
   const uint64_t each = std::max<uint64_t>(pixel_bytes(), 1);
   return pixels > std::numeric_limits<uint64_t>::max() / each ? std::numeric_limits<uint64_t>::max() : pixels * each;
 }
@@ -210,7 +210,7 @@ ExrHeader scan_exr_header(std::span<const std::byte> bytes, const std::string& c
   if (file.u32() != kMagic) file.damaged("its first bytes are not those of an EXR file");
   const uint32_t version = file.u32();
   ExrHeader header = Attributes().read(file, (version & kTiledFlag) != 0);
-  // One offset for each block follows, even in files whose other blocks were never written.
+  // The offset table follows, with one entry per block, even in files with missing blocks.
   const bool tiled = header.tile_width > 0;
   const uint64_t columns = tiled ? blocks(header.width(), header.tile_width) : 1;
   const uint64_t rows = blocks(header.height(), tiled ? header.tile_height : header.block_lines);

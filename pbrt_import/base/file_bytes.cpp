@@ -52,7 +52,7 @@ void write_file_bytes(const std::filesystem::path& path, std::span<const std::by
   if (!file) throw Error(ErrorKind::kIo, reason(path, "cannot open for writing", errno));
   const bool written = bytes.empty() || std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size();
   const int write_error = errno;
-  // Buffered bytes meet a full disk only here.
+  // A full disk may show only when buffered bytes are flushed on closing.
   const bool closed = std::fclose(file.release()) == 0;
   if (!written || !closed) throw Error(ErrorKind::kIo, reason(path, "cannot write", written ? errno : write_error));
 }

@@ -8,11 +8,11 @@
 
 namespace packtrace {
 
-/// All bytes of a regular file. Throws Error(kInput) where it is missing, larger than max_bytes or of another kind, or
-/// cannot be read.
+/// Reads all bytes of a regular file. Throws Error(kInput) if it is missing, larger than max_bytes, not a regular file
+/// or unreadable.
 std::vector<std::byte> read_file_bytes(const std::filesystem::path& path, uint64_t max_bytes = uint64_t{1} << 32);
 
-/// Replaces the file's content. Throws Error(kIo) where that fails, a full disk included.
+/// Replaces the content of a file. Throws Error(kIo) on failure, including a full disk.
 void write_file_bytes(const std::filesystem::path& path, std::span<const std::byte> bytes);
 
 } // namespace packtrace

@@ -9,20 +9,20 @@
 
 namespace packtrace {
 
-/// An Error that a file is to blame for, with the place as it is shown in what(): "file:line:column: problem".
+/// An Error that concerns a file; what() is "file:line:column: problem".
 class FileError : public Error {
 public:
   FileError(ErrorKind kind, const std::filesystem::path& file, const std::string& problem)
       : Error(kind, file.string() + ": " + problem), file_(file.string()) {}
 
-  /// @param location what() is the problem alone where it names no file
+  /// @param location position in the file; without a file, what() is the problem alone
   FileError(ErrorKind kind, const SourceLocation& location, const std::string& problem)
       : Error(kind, location.file ? to_string(location) + ": " + problem : problem),
         file_(location.file ? location.file->path : std::string()), line_(location.line), column_(location.column) {}
 
-  const std::string& file() const { return file_; } ///< empty: none
+  const std::string& file() const { return file_; } ///< empty: no file
   uint32_t line() const { return line_; }           ///< from 1; 0: the file as a whole
-  uint32_t column() const { return column_; }       ///< from 1, of bytes; 0: the line as a whole
+  uint32_t column() const { return column_; }       ///< in bytes, from 1; 0: the line as a whole
 
 private:
   std::string file_;

@@ -24,7 +24,7 @@ std::string text_of(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// The number in a file, UINT64_MAX where it says "max" or is not there.
+/// The number in a file; UINT64_MAX if the file holds no number (such as "max") or does not exist.
 uint64_t number_in(const fs::path& file) {
   const std::string text = text_of(file);
   uint64_t value = 0;
@@ -32,7 +32,7 @@ uint64_t number_in(const fs::path& file) {
   return error == std::errc() ? value : UINT64_MAX;
 }
 
-/// The least limit of a group and all around it.
+/// Smallest limit of a control group and its ancestors.
 uint64_t least_limit(const fs::path& root, std::string_view group, const char* file) {
   uint64_t least = number_in(root / file);
   fs::path path = root;
@@ -44,7 +44,7 @@ uint64_t least_limit(const fs::path& root, std::string_view group, const char* f
 }
 
 uint64_t resource_limit(__rlimit_resource resource) {
-  struct rlimit limit {};
+  struct rlimit limit{};
   return ::getrlimit(resource, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY ? limit.rlim_cur : UINT64_MAX;
 }
 
@@ -150,8 +150,8 @@ uint64_t parse_memory_size(std::string_view text, uint64_t all) {
     if (!rest.empty()) return fail();
   }
   if (!(value >= 1.0)) return fail();
-  constexpr double kMost = 0x1p63; // more than any machine has
-  return static_cast<uint64_t>(std::min(value, kMost));
+  constexpr double kMax = 0x1p63; // more than any machine has
+  return static_cast<uint64_t>(std::min(value, kMax));
 }
 
 std::string memory_text(uint64_t bytes) {

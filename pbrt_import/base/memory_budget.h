@@ -12,8 +12,8 @@
 
 namespace packtrace {
 
-/// Input needs more memory than it may take. Readers that skip what is bad pass this one on: a picture without what did
-/// not fit would be a wrong one.
+/// The input needs more memory than its budget has. Readers that skip bad input pass this error on, because a picture
+/// without the parts that did not fit would be wrong.
 class MemoryError : public FileError {
 public:
   explicit MemoryError(const std::string& problem) : FileError(ErrorKind::kInput, SourceLocation{}, problem) {}
@@ -23,16 +23,16 @@ public:
       : FileError(ErrorKind::kInput, file, problem) {}
 };
 
-/// The problem where an allocation itself fails.
+/// Message for allocations that fail themselves.
 inline constexpr const char* kNoMemory = "not enough memory: the system has no more";
 
-/// How much memory a command may take for its input. Whatever the input decides the size of is reserved here before it
-/// is allocated. Copies of a budget are the same budget; any thread may use them.
+/// Limit of the memory that a command may use for its input. Every allocation whose size depends on the input is
+/// reserved here first. Copies share one budget; thread-safe.
 class MemoryBudget {
 public:
   explicit MemoryBudget(uint64_t bytes = default_bytes());
 
-  /// Half of machine_memory().
+  /// Half of machine_memory(), computed once.
   static uint64_t default_bytes();
 
   uint64_t limit() const { return state_->limit; }
@@ -50,12 +50,12 @@ private:
   std::shared_ptr<State> state_;
 };
 
-/// A part of a budget, given back by the destructor.
+/// A reserved part of a budget, which the destructor returns.
 class MemoryReservation {
 public:
-  /// Of no budget: no limit, and nothing is counted.
+  /// Without a budget: unlimited and not counted.
   MemoryReservation() = default;
-  /// Of nothing yet.
+  /// An empty reservation of a budget.
   explicit MemoryReservation(const MemoryBudget& budget) : budget_(budget) {}
   MemoryReservation(const MemoryBudget& budget, uint64_t bytes, std::string_view what) : MemoryReservation(budget) {
     resize(bytes, what);
@@ -66,14 +66,14 @@ public:
 
   uint64_t bytes() const { return bytes_; }
 
-  /// Throws MemoryError, "WHAT needs N GiB of memory, of M GiB left; ...", and changes nothing, where the budget has
-  /// not that much left.
+  /// Sets the size of the reservation. If the budget has too little left, throws MemoryError, "WHAT needs N GiB of
+  /// memory, of M GiB left; ...", and changes nothing.
   void resize(uint64_t bytes, std::string_view what);
-  /// Grows to bytes where it is smaller. Throws like resize().
+  /// Grows the reservation to at least `bytes`. Throws like resize().
   void cover(uint64_t bytes, std::string_view what) {
     if (bytes > bytes_) resize(bytes, what);
   }
-  /// Takes what the other one holds, of the same budget.
+  /// Takes over the bytes of another reservation of the same budget.
   void merge(MemoryReservation&& other) noexcept;
   void release() noexcept;
 
@@ -82,20 +82,20 @@ private:
   uint64_t bytes_ = 0;
 };
 
-/// Bytes that this process may use: of the machine, or less where a control group (version 1 or 2) around the process
-/// or a limit of its address space (ulimit -v) says so.
+/// Bytes that this process may use: the machine's memory, or less if a control group (version 1 or 2) of the process or
+/// a limit of its address space or data segment (ulimit -v, -d) says so.
 uint64_t machine_memory();
 
-/// The least limit that control groups set, UINT64_MAX where none does.
+/// Smallest limit of the control groups of a process; UINT64_MAX if there is none.
 /// @param membership content of /proc/self/cgroup
-/// @param root where control groups are mounted, /sys/fs/cgroup
+/// @param root mount point of control groups, /sys/fs/cgroup
 uint64_t control_group_memory(std::string_view membership, const std::filesystem::path& root);
 
-/// The number of bytes that text stands for: "1000000", "512K", "1.5G" (of 1024), or "50%" of all.
-/// Throws Error(kUsage) where it stands for none, or for less than 1 byte.
+/// Parses a number of bytes: "1000000", "512K" or "1.5G" (units of 1024), or "50%" of `all`. Throws Error(kUsage) if
+/// the text is malformed or means less than 1 byte.
 uint64_t parse_memory_size(std::string_view text, uint64_t all);
 
-/// "3.7 GiB".
+/// A number of bytes as text, such as "3.7 GiB".
 std::string memory_text(uint64_t bytes);
 
 } // namespace packtrace

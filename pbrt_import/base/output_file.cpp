@@ -26,8 +26,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Names for a signal handler, which can neither lock nor allocate. More files than slots are possible; those beyond
-/// are only removed by their destructors.
+/// Paths of temporary files for a signal handler, which must neither lock nor allocate. If the slots run out, further
+/// files are only removed by their destructors.
 std::array<std::atomic<const char*>, 32> unfinished_paths{};
 static_assert(std::atomic<const char*>::is_always_lock_free);
 
@@ -45,10 +45,10 @@ void forget(const char* path) {
   }
 }
 
-/// Targets of files that are neither committed nor gone, so that no two of them are the same.
+/// Targets of all uncommitted OutputFiles, used to reject duplicates.
 class Claims {
 public:
-  /// @return false where another file has claimed it
+  /// @return false if another file has claimed the target
   bool add(const fs::path& target) {
     const std::scoped_lock lock(mutex_);
     return targets_.insert(target).second;
@@ -74,19 +74,17 @@ private:
 };
 Claims claims;
 
-/// One name for all ways to write it.
+/// Canonical path of a target.
 fs::path claim_of(const fs::path& target) {
   std::error_code error;
   const fs::path canonical = fs::weakly_canonical(fs::absolute(target, error), error);
   return error ? target : canonical;
 }
 
-/// The name by which an open file can be opened again, and linked.
+/// Path under /proc by which an open file can be opened again and linked.
 std::string name_of(const Descriptor& file) { return "/proc/self/fd/" + std::to_string(file.get()); }
 
-[[noreturn]] void fail(const fs::path& path, const std::string& what) {
-  throw FileError(ErrorKind::kIo, path, what);
-}
+[[noreturn]] void fail(const fs::path& path, const std::string& what) { throw FileError(ErrorKind::kIo, path, what); }
 
 void check_target(const fs::path& target, bool force) {
   std::error_code error;
@@ -97,7 +95,7 @@ void check_target(const fs::path& target, bool force) {
   if (!force) fail(target, "exists already; --force replaces it");
 }
 
-/// Follows links, so that the rename replaces what a link leads to and not the link.
+/// Follows symbolic links, so that renaming replaces the linked file and not the link.
 fs::path resolve(const fs::path& target) {
   std::error_code error;
   if (!fs::is_symlink(fs::symlink_status(target, error))) return target;
@@ -110,7 +108,7 @@ constexpr std::string_view kPrefix = ".packtrace-", kSuffix = ".tmp";
 
 fs::path folder_of(const fs::path& target) { return target.has_parent_path() ? target.parent_path() : fs::path("."); }
 
-/// A name for a temporary file, another one with each call.
+/// A new name for a temporary file, different in each call.
 fs::path temporary_name(const fs::path& folder) {
   static std::atomic<uint64_t> number{0};
   std::string name(kPrefix);
@@ -118,7 +116,7 @@ fs::path temporary_name(const fs::path& folder) {
   return folder / name;
 }
 
-/// The process whose temporary file this is; nothing where it is not the name of one.
+/// Process id of the owner of a temporary file; nullopt if the name is not that of a temporary file.
 std::optional<pid_t> owner_of(std::string_view name) {
   if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix)) return std::nullopt;
   name.remove_prefix(kPrefix.size());
@@ -128,38 +126,40 @@ std::optional<pid_t> owner_of(std::string_view name) {
   return owner;
 }
 
-constexpr int kMostAttempts = 1000;
+constexpr int kMaxNameAttempts = 1000;
 
-/// A file without a name; nothing where the file system has none, or /proc, through which it gets one, is not there.
+/// Creates a file without a name. Returns an invalid descriptor if the file system does not support it, or if /proc,
+/// which is needed to name the file later, is not available.
 Descriptor create_nameless(const fs::path& folder) {
   Descriptor file(open(folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, 0666));
   if (file.valid() && access(name_of(file).c_str(), W_OK) != 0) return Descriptor();
   return file;
 }
 
-/// A new empty file with a name that nobody else has, locked so that remove_stale_output() knows that it is in use.
+/// Creates an empty file with a unique name, locked so that remove_stale_output() knows that it is in use.
 Descriptor create_named(const fs::path& folder, const fs::path& target, fs::path& name) {
-  for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
+  for (int attempt = 0; attempt < kMaxNameAttempts; ++attempt) {
     name = temporary_name(folder);
     Descriptor file(open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
     if (!file.valid()) {
       if (errno != EEXIST) fail(target, std::string("cannot write there: ") + std::strerror(errno));
       continue;
     }
-    flock(file.get(), LOCK_EX); // file systems without locks keep the process number in the name
-    struct stat info {};
-    if (fstat(file.get(), &info) == 0 && info.st_nlink > 0) return file; // else it was taken for a stale one
+    flock(file.get(), LOCK_EX); // without file locks, the process id in the name protects it
+    struct stat info{};
+    if (fstat(file.get(), &info) == 0 && info.st_nlink > 0) return file; // otherwise it was removed as a stale file
   }
   fail(target, "cannot find a free temporary name");
 }
 
-/// On disk before it gets its name: after a crash the name stands for the old file or for all of the new one.
+/// Flushes the file before it gets its name, so that after a crash the name refers to either the old file or the
+/// complete new one.
 void flush_to_disk(const Descriptor& file, const fs::path& target) {
-  if (fsync(file.get()) == 0 || errno == EINVAL) return; // EINVAL: not for this file system
+  if (fsync(file.get()) == 0 || errno == EINVAL) return; // EINVAL: not supported by this file system
   fail(target, std::string("cannot be written to disk: ") + std::strerror(errno));
 }
 
-/// Renames without replacing, where the file system can do that in one step.
+/// Renames without replacing an existing file, atomically if the file system supports it. Returns 0 or errno.
 int rename_if_free(const fs::path& from, const fs::path& to) {
   if (renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
   if (errno != EINVAL && errno != ENOSYS) return errno;
@@ -208,10 +208,10 @@ void OutputFile::write(std::span<const std::byte> bytes) {
   if (error != 0) fail(target_, std::string("cannot write: ") + std::strerror(error));
 }
 
-/// Gives a nameless file a temporary name, under which it can replace another one.
+/// Gives a nameless file a temporary name, from which it can be renamed over an existing file.
 void OutputFile::give_name() {
   const fs::path folder = folder_of(target_);
-  for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
+  for (int attempt = 0; attempt < kMaxNameAttempts; ++attempt) {
     temporary_ = temporary_name(folder);
     remember(temporary_.c_str());
     flock(descriptor_.get(), LOCK_EX);
@@ -224,7 +224,7 @@ void OutputFile::give_name() {
   fail(target_, "cannot find a free temporary name");
 }
 
-/// For file systems that make nameless files and then do not link them.
+/// Copies the content to a named file, for file systems that create nameless files but cannot link them.
 void OutputFile::copy_to_named() {
   fs::path name;
   Descriptor copy = create_named(folder_of(target_), target_, name);
@@ -239,7 +239,8 @@ void OutputFile::copy_to_named() {
   flush_to_disk(descriptor_, target_);
 }
 
-/// @return 0 or what errno was
+/// Links or renames the file to the target.
+/// @return 0 or the value of errno
 int OutputFile::put_in_place() {
   if (temporary_.empty() && !force_) {
     if (linkat(AT_FDCWD, path_.c_str(), AT_FDCWD, target_.c_str(), AT_SYMLINK_FOLLOW) == 0) return 0;
@@ -258,7 +259,7 @@ void OutputFile::commit() {
   if (!temporary_.empty()) forget(temporary_.c_str());
   claims.remove(claim_of(target_));
   committed_ = true;
-  descriptor_ = Descriptor(); // and with it the lock
+  descriptor_ = Descriptor(); // also releases the lock
 }
 
 void refuse_to_replace(const std::vector<fs::path>& inputs, const fs::path& target) {
@@ -284,12 +285,12 @@ void remove_stale_output(const fs::path& folder) noexcept {
     for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
       const std::optional<pid_t> owner = owner_of(entry->path().filename().native());
       if (!owner || kill(*owner, 0) == 0 || errno != ESRCH) continue;
-      // Whoever runs elsewhere, on another machine or in a container with process numbers of its own, holds the lock.
+      // A process on another machine or in another process namespace still holds the lock of its file.
       const Descriptor file(open(entry->path().c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
       if (file.valid() && flock(file.get(), LOCK_EX | LOCK_NB) == 0) unlink(entry->path().c_str());
     }
   } catch (const std::exception&) {
-    // They stay, and harm nobody.
+    // Stale files that remain are harmless.
   }
 }
 

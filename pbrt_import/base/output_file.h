@@ -9,32 +9,32 @@
 
 namespace packtrace {
 
-/// A file that appears whole or not at all: the caller writes to path(), or calls write(), and commit() puts the file
-/// in the place of the target. Until then the target is untouched.
+/// An output file that is created atomically: the caller writes to path(), or calls write(), and commit() moves the
+/// complete file to the target. Until then the target is untouched.
 ///
-/// Where the file system can, the file has no name before commit(), so nothing is left of it however the process ends.
-/// Elsewhere it is a temporary file in the target's folder, which the destructor removes; what a killed process left
-/// there is removed by the next OutputFile in that folder.
+/// If the file system supports it, the file has no name before commit(), so that nothing remains of it however the
+/// process ends. Otherwise it is a temporary file in the target's folder, which the destructor removes; files left by
+/// killed processes are removed by the next OutputFile in that folder.
 class OutputFile {
 public:
-  /// A target that is a symbolic link stands for the file it leads to.
-  /// @param force an existing target may be replaced
-  /// Throws Error(kIo) where the target exists and force is not set, is not a regular file, or its folder is missing
-  /// or cannot be written to; Error(kUsage) for an empty name, and for the target of another OutputFile that is not
-  /// committed yet.
+  /// If the target is a symbolic link, the file that it points to is replaced.
+  /// @param force whether an existing target may be replaced
+  /// Throws Error(kIo) if the target exists and force is not set, if the target is not a regular file, or if its folder
+  /// is missing or not writable; Error(kUsage) for an empty name, or if another uncommitted OutputFile has the same
+  /// target.
   OutputFile(std::filesystem::path target, bool force);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// Where to write. It has a name of its own, so writers must not judge the format by it.
+  /// Path to write to. Its name is temporary, so writers must not derive the format from it.
   const std::filesystem::path& path() const { return path_; }
   const std::filesystem::path& target() const { return target_; }
 
-  /// Replaces the content. Throws Error(kIo), which names the target, where that fails.
+  /// Replaces the content of the uncommitted file. Throws Error(kIo), which names the target, on failure.
   void write(std::span<const std::byte> bytes);
 
-  /// Puts the file in its place. Throws Error(kIo) where that fails, or where a target appeared meanwhile and force was
+  /// Moves the file to the target. Throws Error(kIo) on failure, or if the target was created meanwhile and force is
   /// not set.
   void commit();
 
@@ -46,20 +46,20 @@ private:
   std::filesystem::path target_;
   Descriptor descriptor_;
   std::filesystem::path path_;
-  std::filesystem::path temporary_; ///< its name in the target's folder; empty while it has none
+  std::filesystem::path temporary_; ///< its name in the target's folder; empty while it has no name
   bool force_ = false;
   bool committed_ = false;
 };
 
-/// Throws Error(kUsage) if target is one of the files that a command reads, under whatever name. Without a target: any
-/// of the OutputFiles of the process that are not committed.
+/// Throws Error(kUsage) if the target is one of the input files of a command, under any name. Without a target, checks
+/// all uncommitted OutputFiles of the process.
 void refuse_to_replace(const std::vector<std::filesystem::path>& inputs, const std::filesystem::path& target);
 void refuse_to_replace(const std::vector<std::filesystem::path>& inputs);
 
-/// Removes the temporary files of all OutputFiles of the process that are not committed. Async-signal-safe.
+/// Removes the temporary files of all uncommitted OutputFiles of the process. Async-signal-safe.
 void remove_unfinished_output() noexcept;
 
-/// Removes temporary files that processes which have ended left in a folder. Does nothing where it cannot.
+/// Removes temporary files of ended processes from a folder. Errors are ignored.
 void remove_stale_output(const std::filesystem::path& folder) noexcept;
 
 } // namespace packtrace

@@ -16,11 +16,11 @@ constexpr std::string_view kSignature = "\x89PNG\r\n\x1a\n";
 constexpr size_t kChunkBytes = 12; // length, type, checksum
 constexpr uint32_t kPaletteColours = 3, kGreyColours = 0;
 constexpr uint64_t kDeflateRatio = 1032;
-/// What data may unpack to beyond what the header asks for: other readers ignore surplus too, but a few bytes must not
-/// demand gigabytes.
+/// Accepted excess of the decompressed data over the header's size: other readers ignore excess data too, but a small
+/// file must not demand gigabytes.
 constexpr uint64_t kSurplusBytes = uint64_t{64} << 20;
-/// Beyond all that readers take; below it, looking for surplus takes seconds.
-constexpr uint64_t kMostBytes = uint64_t{8} << 30;
+/// Larger than any image that is read; counting the decompressed bytes takes seconds at most below this limit.
+constexpr uint64_t kMaxBytes = uint64_t{8} << 30;
 
 uint32_t read_be32(std::span<const std::byte> bytes, size_t at) {
   uint32_t value = 0;
@@ -28,15 +28,15 @@ uint32_t read_be32(std::span<const std::byte> bytes, size_t at) {
   return value;
 }
 
-/// Bytes of the filtered rows of an image of that size; at most 2^60, so that seven passes can be added.
+/// Bytes of the filtered rows of an image of this size; at most 2^60, so that seven passes can be summed.
 uint64_t row_bytes(const PngHeader& header, uint64_t width, uint64_t height) {
   const uint64_t bits_per_pixel = uint64_t{header.bits_per_sample} * header.channels;
   const uint64_t row = width == 0 ? 0 : 1 + (width * bits_per_pixel + 7) / 8;
-  constexpr uint64_t kMost = uint64_t{1} << 60;
-  return row > 0 && height > kMost / row ? kMost : height * row;
+  constexpr uint64_t kMax = uint64_t{1} << 60;
+  return row > 0 && height > kMax / row ? kMax : height * row;
 }
 
-/// What the image data unpack to.
+/// Expected size of the decompressed image data in bytes.
 uint64_t unpacked_bytes(const PngHeader& header) {
   if (!header.interlaced) return row_bytes(header, header.width, header.height);
   struct Pass {
@@ -99,7 +99,8 @@ private:
     const auto color_type = std::to_integer<uint32_t>(data[9]), interlace = std::to_integer<uint32_t>(data[12]);
     if (header.width == 0 || header.height == 0) damaged("it has no pixels");
     if (header.width > INT32_MAX || header.height > INT32_MAX) damaged("impossible size");
-    constexpr uint32_t kChannels[7] = {1, 0, 3, 1, 2, 0, 4}; // grey, RGB, palette, grey with alpha, RGBA
+    // By colour type: grey, -, RGB, palette, grey with alpha, -, RGBA.
+    constexpr uint32_t kChannels[7] = {1, 0, 3, 1, 2, 0, 4};
     header.channels = color_type < 7 ? kChannels[color_type] : 0;
     header.palette = color_type == kPaletteColours;
     if (header.channels == 0) damaged("unknown kind of colours");
@@ -112,7 +113,7 @@ private:
   }
 
   void add(std::span<const std::byte> data) {
-    // Legal in front of other data, but nobody writes it, and decoders copy from null pointers.
+    // Legal before other data, but never written in practice, and decoders copy from a null pointer for it.
     if (data.empty() && data_.empty()) damaged("an image data chunk is empty");
     if (!data.empty()) data_.push_back(data);
     packed_bytes_ += data.size();
@@ -121,12 +122,12 @@ private:
   void check_amount(uint64_t wanted) const {
     if (data_.empty()) damaged("it has no image data");
     if (wanted / kDeflateRatio > packed_bytes_) damaged("too little data for its size");
-    if (wanted > kMostBytes) damaged("it has more pixels than are read");
+    if (wanted > kMaxBytes) damaged("it has more pixels than are read");
     const uint64_t most = wanted + kSurplusBytes;
     if (packed_bytes_ > most / kDeflateRatio && unpacks_beyond(most)) damaged("too much data for its size");
   }
 
-  /// Whether the data unpack to more than that many bytes; if they are damaged, up to where they are.
+  /// Whether the data decompress to more than `most` bytes, counted up to the first damage.
   bool unpacks_beyond(uint64_t most) const {
     z_stream stream{};
     if (inflateInit(&stream) != Z_OK) throw std::bad_alloc();
@@ -142,7 +143,7 @@ private:
         status = inflate(&stream, Z_NO_FLUSH);
         total += scratch.size() - stream.avail_out;
       } while (status == Z_OK && total <= most && (stream.avail_in > 0 || stream.avail_out == 0));
-      if (status == Z_BUF_ERROR) status = Z_OK; // this chunk is used up exactly
+      if (status == Z_BUF_ERROR) status = Z_OK; // the chunk's input is used up
     }
     inflateEnd(&stream);
     return total > most;
@@ -173,7 +174,7 @@ PngPalette png_palette(std::span<const std::byte> bytes, const std::string& comp
       if (length % 3 != 0 || length == 0 || length > 256 * 3)
         throw Error(ErrorKind::kInput, complaint + "wrong palette size");
       std::memcpy(result.colours.data(), bytes.data() + data, length);
-    } else if (type == "tRNS") { // of another size for grey images; decoders skip what they do not know
+    } else if (type == "tRNS") { // hidden as an unknown chunk: it has another size in grey images
       std::memcpy(result.indices_as_grey.data() + at + 4, "tRNs", 4);
     } else if (type == "IDAT" && result.colours.empty()) {
       throw Error(ErrorKind::kInput, complaint + "no palette before the image data");

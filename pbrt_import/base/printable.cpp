@@ -9,7 +9,7 @@ namespace {
 
 uint32_t byte_at(std::string_view text, size_t i) { return static_cast<unsigned char>(text[i]); }
 
-/// Of a character of utf8_length() bytes.
+/// Code point of the character of `length` bytes at the start of text, where length is its utf8_length().
 uint32_t code_point(std::string_view text, size_t length) {
   constexpr uint32_t kLeadBits[] = {0, 0x7f, 0x1f, 0x0f, 0x07};
   uint32_t code = byte_at(text, 0) & kLeadBits[length];
@@ -20,7 +20,8 @@ uint32_t code_point(std::string_view text, size_t length) {
 struct Range {
   uint32_t first, last;
 };
-/// Unicode's categories Cc, Cf, Zl and Zp and what is invisible besides, as far as text can be misread by it.
+/// Code points of Unicode's categories Cc, Cf, Zl and Zp, and other invisible ones that could make text misleading.
+/// Sorted.
 constexpr Range kHidden[] = {
     {0x0000, 0x001f},   {0x007f, 0x009f},   {0x00ad, 0x00ad},   {0x034f, 0x034f},   {0x0600, 0x0605},
     {0x061c, 0x061c},   {0x06dd, 0x06dd},   {0x070f, 0x070f},   {0x0890, 0x0891},   {0x08e2, 0x08e2},

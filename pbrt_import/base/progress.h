@@ -7,17 +7,17 @@
 
 namespace packtrace {
 
-/// Carries progress out of long operations and cancellation into them. One object serves one command.
-/// Long loops call advance() from any thread; the observer is called from whichever thread crossed a step.
+/// Reports the progress of long operations and cancels them. Each command has one object. Long loops call advance()
+/// from any thread; the observer is called in the same thread.
 class Progress {
 public:
-  /// done and total count the phase's own units (bytes, meshes, samples); total 0: unknown.
+  /// done and total are in units of the phase (bytes, meshes, samples); total 0 means unknown.
   using Observer = std::function<void(std::string_view phase, uint64_t done, uint64_t total)>;
 
   Progress() = default;
   explicit Progress(Observer observer) : observer_(std::move(observer)) {}
 
-  /// Starts a phase. phase must outlive it (a literal). Throws Error(kCancelled) if cancelled.
+  /// Starts a phase. `phase` is not copied and must stay valid (a literal). Throws Error(kCancelled) if cancelled.
   void begin(std::string_view phase, uint64_t total);
 
   /// Adds finished units. Throws Error(kCancelled) if cancelled.

@@ -38,10 +38,10 @@ Descriptor& Descriptor::operator=(Descriptor&& other) noexcept {
 int Descriptor::release() { return std::exchange(value_, -1); }
 
 RegularFile open_regular_file(const std::filesystem::path& path) {
-  struct stat info {};
-  // Before it is opened: opening a device may do something.
+  struct stat info{};
+  // Checks the type before opening, because opening a device can have side effects.
   if (::stat(path.c_str(), &info) == 0) require_regular(info.st_mode);
-  // Non-blocking: it may have become a pipe without a writer since then.
+  // Non-blocking, because the path may have become a pipe without a writer since the check.
   RegularFile file{Descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK))};
   if (!file.descriptor.valid())
     fail(errno == ENOENT ? "no such file" : std::string("cannot open: ") + std::strerror(errno));

@@ -9,7 +9,7 @@
 
 namespace packtrace {
 
-/// Owns a file descriptor; -1 owns none.
+/// Owner of a file descriptor; -1 means none.
 class Descriptor {
 public:
   explicit Descriptor(int value = -1) : value_(value) {}
@@ -19,14 +19,14 @@ public:
 
   int get() const { return value_; }
   bool valid() const { return value_ >= 0; }
-  /// Gives the descriptor away.
+  /// Releases ownership and returns the descriptor.
   int release();
 
 private:
   int value_;
 };
 
-/// An open regular file, and what was known of it when it was opened.
+/// An open regular file with its properties at the time of opening.
 struct RegularFile {
   Descriptor descriptor;
   uint64_t bytes = 0;
@@ -34,12 +34,12 @@ struct RegularFile {
   ino_t inode = 0;
 };
 
-/// Opens a file for reading. Never waits: pipes, sockets and devices, whose reading may block for ever or never end,
-/// are refused at once. Throws Error(kInput), message without the path, if the file is missing, cannot be opened or is
-/// not a regular file.
+/// Opens a regular file for reading. Never blocks: pipes, sockets and devices, which may block forever or never end,
+/// are rejected at once. Throws Error(kInput), with a message without the path, if the file is missing, cannot be
+/// opened or is not a regular file.
 RegularFile open_regular_file(const std::filesystem::path& path);
 
-/// The first bytes of a regular file, fewer where it is shorter; empty where it cannot be read.
+/// The first bytes of a regular file, fewer if it is shorter; empty if it cannot be read.
 std::string read_file_start(const std::filesystem::path& path, size_t max_bytes);
 
 } // namespace packtrace

@@ -8,17 +8,17 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
+#include "pbrt_import/base/error.h"
+#include "pbrt_import/files/ply.h"
 #include "pbrt_import/text/input_file.h"
 #include "pbrt_import/text/large_pages.h"
-#include "pbrt_import/files/ply.h"
 #include "pbrt_import/text/problem_text.h"
-#include "pbrt_import/base/error.h"
 #include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
 namespace {
 
-constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max() / 2; // but the memory budget
+constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max() / 2; // only the memory budget limits file sizes
 
 } // namespace
 
@@ -63,8 +63,7 @@ FileLoader::Outcome FileLoader::read_image_file(ImageRequest& image) const {
     outcome.memory = MemoryReservation(options_.memory);
     const std::vector<std::byte> bytes = read_whole_file(image.path, kNoLimit, &content);
     outcome.bytes = bytes.size();
-    image.summary =
-        read_image(bytes, image.decode_srgb, {image.want_mask, image.want_colours}, outcome.memory);
+    image.summary = read_image(bytes, image.decode_srgb, {image.want_mask, image.want_colours}, outcome.memory);
   });
   outcome.memory.resize(bytes_of(image.summary), "its pixels");
   image.missing = !outcome.error.empty();
@@ -88,20 +87,21 @@ void FileLoader::load(std::vector<Mesh>& meshes, std::vector<ImageRequest>& imag
     try {
       work();
     } catch (const MemoryError& error) {
-      const std::scoped_lock lock(problem_mutex); // locate() may remember something
+      const std::scoped_lock lock(problem_mutex); // locate() caches its results
       throw MemoryError(reporter_.locate(place), in_quotes(path.string(), kMaxShownPath) + ": " + error.what());
     }
   };
   tbb::parallel_for(size_t{0}, count, [&](size_t i) {
-    if (i < wanted_images.size()) { // images first: one may take longer than many meshes
+    if (i < wanted_images.size()) { // images first: one image may take longer than many meshes
       ImageRequest& image = *wanted_images[i];
       with_file(image.path, image.place, [&] { image_outcomes[i] = read_image_file(image); });
     } else {
       PlyFile& file = *wanted_plys[i - wanted_images.size()];
-      std::error_code unknown; // found out when it is read
+      std::error_code unknown; // a missing file is reported when it is read
       const uint64_t stored_bytes = std::filesystem::file_size(file.path, unknown);
       if (!unknown) heap_pages.local().about_to_allocate(2 * stored_bytes);
-      // Leaving out those beyond the budget would leave out others in each run.
+      // A file over the budget ends the import. Skipping it would skip different files in each run, because threads
+      // compete for the budget.
       with_file(file.path, file.uses.front().place, [&] { read_ply_file(file, meshes[file.slot]); });
     }
     progress.advance();
@@ -119,7 +119,7 @@ void FileLoader::load(std::vector<Mesh>& meshes, std::vector<ImageRequest>& imag
     dropped_triangles += file->outcome.dropped_triangles;
   }
   for (PlyFile* const file : wanted_plys) memory_.merge(std::move(file->outcome.memory));
-  // Of images most is done with once textures are made of them.
+  // The image reservations move to their requests, since most are released once the textures are made.
   for (size_t i = 0; i < wanted_images.size(); ++i) wanted_images[i]->memory = std::move(image_outcomes[i].memory);
 }
 

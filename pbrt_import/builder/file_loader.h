@@ -8,31 +8,32 @@
 #include <vector>
 
 #include "pbrt_import/import_scene.h"
-#include "pbrt_import/text/reporter.h"
-#include "pbrt_import/scene/scene.h"
 #include "pbrt_import/language/texture_graph.h"
+#include "pbrt_import/scene/scene.h"
+#include "pbrt_import/text/reporter.h"
 
 namespace packtrace {
 
-/// The PLY files that shapes ask for, each read once, all in parallel with the images once the text has been read.
+/// Loads the PLY files that shapes request, each once. All PLY files and images are read in parallel after the scene
+/// text.
 class FileLoader {
 public:
   FileLoader(const ImportOptions& options, Reporter& reporter) : options_(options), reporter_(reporter) {}
 
-  /// Asks for a PLY file on behalf of a shape.
-  /// @param slot index in Scene::meshes that a first request gets
-  /// @return the slot that holds, or will hold, the mesh
+  /// Requests a PLY file for a shape.
+  /// @param slot index in Scene::meshes that the mesh gets if this is the first request for the file
+  /// @return index in Scene::meshes of the file's mesh, which load() fills
   uint32_t request_ply(const std::filesystem::path& path, const Place& place, uint32_t slot);
 
-  /// Marks what slot's mesh came from as needed; no effect on other meshes.
+  /// Marks the PLY file of the mesh in this slot as needed; no effect on meshes from other sources.
   void require(uint32_t slot);
 
-  /// Reads all files that are needed into meshes and images. A mesh that cannot be read stays empty and is reported
-  /// for each shape that asked for it. Throws Error(kCancelled), and MemoryError where there is not enough for all.
+  /// Reads all needed files into meshes and images. A mesh that cannot be read stays empty, with one error per shape
+  /// that requested it. Throws Error(kCancelled), or MemoryError if the files together exceed the memory budget.
   void load(std::vector<Mesh>& meshes, std::vector<ImageRequest>& images, Progress& progress,
             ImportStatistics& statistics, uint64_t& dropped_triangles);
 
-  /// What the meshes take that load() read.
+  /// Hands over the reservation for the memory of the meshes that load() read.
   MemoryReservation take_memory() { return std::move(memory_); }
 
 private:
@@ -43,10 +44,10 @@ private:
   };
   struct Outcome {
     std::vector<Report> reports;
-    std::string error; ///< empty: all is well
+    std::string error; ///< empty on success
     uint64_t bytes = 0;
     uint64_t dropped_triangles = 0;
-    MemoryReservation memory; ///< for what was made of the file
+    MemoryReservation memory; ///< for the data made from the file
   };
   struct PlyUse {
     Place place;
@@ -70,7 +71,7 @@ private:
   std::vector<PlyFile> plys_;
   std::unordered_map<std::string, uint32_t> ply_by_path_;
   std::unordered_map<uint32_t, uint32_t> ply_by_slot_;
-  MemoryReservation memory_; ///< of meshes
+  MemoryReservation memory_; ///< for the meshes read
 };
 
 } // namespace packtrace

@@ -2,15 +2,15 @@
 
 #include <tbb/task_arena.h>
 
-#include "pbrt_import/text/problem_text.h"
 #include "pbrt_import/base/memory_budget.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
+#include "pbrt_import/text/problem_text.h"
 
 namespace packtrace {
 
-MadeMesh run_job(MeshJob& job, double tessellation_tolerance, const CheckCancelledFn& check_cancelled,
-                 MemoryReservation* memory) try {
-  MadeMesh made;
+MeshResult run_job(MeshJob& job, double tessellation_tolerance, const CheckCancelledFn& check_cancelled,
+                   MemoryReservation* memory) try {
+  MeshResult made;
   const ReportFn report = [&](Severity severity, uint32_t, std::string message) {
     made.reports.emplace_back(severity, std::move(message));
   };
@@ -20,7 +20,7 @@ MadeMesh run_job(MeshJob& job, double tessellation_tolerance, const CheckCancell
       made.mesh = job.make(context);
     } else {
       made.mesh = std::move(job.given);
-      context.dropped_triangles = drop_bad_triangles(made.mesh, report);
+      context.dropped_triangles = clean_up_mesh(made.mesh, report);
     }
     made.dropped_triangles = context.dropped_triangles;
     if (made.mesh.triangles.empty()) throw Error(ErrorKind::kInput, "no triangle is left");
@@ -28,7 +28,7 @@ MadeMesh run_job(MeshJob& job, double tessellation_tolerance, const CheckCancell
   if (memory) memory->resize(bytes_of(made.mesh), "the shape");
   return made;
 } catch (const MemoryError& error) {
-  MadeMesh made;
+  MeshResult made;
   made.memory_problem = error.what();
   return made;
 }
@@ -38,12 +38,12 @@ MeshQueue::~MeshQueue() {
     tasks_.cancel();
     tasks_.wait();
   } catch (...) {
-    // Whoever asked for the end knows already.
+    // Errors of cancelled tasks are dropped, because another error is already propagating.
   }
 }
 
 void MeshQueue::add(Entry entry) {
-  constexpr uint64_t kMaxPendingBytes = 64u << 20; // then this thread works, too
+  constexpr uint64_t kMaxPendingBytes = 64u << 20; // beyond this, the reading thread waits and helps
   entries_.push_back(std::move(entry));
   Entry& queued = entries_.back();
   pending_bytes_ += queued.job.bytes_at_most;

@@ -13,7 +13,7 @@ namespace {
 
 using K = DirectiveKind;
 
-/// Where directives may stand, by kind.
+/// The part of the file in which a directive is allowed.
 enum class Section : uint8_t { kAnywhere, kOptions, kWorld };
 
 constexpr auto kSections = [] {
@@ -33,9 +33,8 @@ constexpr auto kSections = [] {
 
 SceneBuilder::SceneBuilder(const ImportOptions& options, FileNames& file_names, Reporter& reporter, Progress& progress)
     : options_(options), file_names_(file_names), reporter_(reporter), loader_(options, reporter),
-      check_cancelled_([&progress] { progress.check_cancelled(); }),
-      mesh_memory_(options.memory), kept_memory_(options.memory),
-      mesh_queue_(options.tessellation_tolerance, check_cancelled_) {}
+      check_cancelled_([&progress] { progress.check_cancelled(); }), mesh_memory_(options.memory),
+      kept_memory_(options.memory), mesh_queue_(options.tessellation_tolerance, check_cancelled_) {}
 
 bool SceneBuilder::allowed_here(const Directive& directive) {
   const Section section = kSections[static_cast<size_t>(directive.kind)];
@@ -56,17 +55,17 @@ void SceneBuilder::handle(Directive& directive) {
   if (!allowed_here(directive)) return;
   if (directive.kind == K::kWorldBegin) return begin_world(directive);
   if (directive.kind == K::kWorldEnd) return end_world(directive.place);
-  if (phase_ == Phase::kOptions && statistics_.worlds > 0 && !options_behind_world_)
-    options_behind_world_ = directive.place;
+  if (phase_ == Phase::kOptions && statistics_.worlds > 0 && !options_after_world_)
+    options_after_world_ = directive.place;
   if (!reading()) return;
   count_kept(directive);
   if (directive.damaged)
     skip_damaged(directive);
   else
-    carry_out(directive);
+    execute_directive(directive);
 }
 
-/// What follows from a directive that the parser could not make sense of, and has reported.
+/// Effects of a directive whose arguments the parser could not read, which it has reported.
 void SceneBuilder::skip_damaged(Directive& directive) {
   switch (directive.kind) {
   case K::kTranslate:
@@ -76,10 +75,10 @@ void SceneBuilder::skip_damaged(Directive& directive) {
   case K::kTransform:
   case K::kConcatTransform:
   case K::kCoordSysTransform:
-    return state_.lose_transform();
+    return state_.mark_transform_unknown();
   case K::kCamera:
     return cameras_.leave_out();
-  case K::kObjectBegin: // its shapes do not belong to the world
+  case K::kObjectBegin: // opens the block, since its shapes do not belong to the world
     directive.names[0].clear();
     return begin_object(directive);
   case K::kShape:
@@ -91,14 +90,15 @@ void SceneBuilder::skip_damaged(Directive& directive) {
   }
 }
 
-/// Files that belong to the scene though nothing is made of them.
-void SceneBuilder::mention_files(const Directive& directive) {
+/// Records files that belong to the scene although the import does not read them.
+void SceneBuilder::record_unread_files(const Directive& directive) {
   for (const std::string_view name : {"mapname", "lensfile", "bsdffile", "filename"})
     if (const Parameter* const file = directive.parameters.peek(name, ParameterType::kString))
       for (const std::string& raw : file->strings) file_names_.mention(raw);
 }
 
-/// Accounts for what stays of a directive besides large meshes. About: there are small things in many tables.
+/// Counts an estimate of the memory that is kept of a directive, apart from large meshes; the data is spread over many
+/// tables.
 void SceneBuilder::count_kept(const Directive& directive) {
   uint64_t bytes = 0;
   switch (directive.kind) {
@@ -107,7 +107,7 @@ void SceneBuilder::count_kept(const Directive& directive) {
     bytes = 512;
     break;
   case K::kMaterial:
-  case K::kMakeNamedMaterial: // keep their parameters
+  case K::kMakeNamedMaterial: // materials keep their parameters
     bytes = 512 + directive.memory.bytes();
     for (const Parameter& parameter : directive.parameters.all())
       bytes += sizeof parameter + parameter.floats.size() * sizeof(float);
@@ -131,7 +131,7 @@ void SceneBuilder::count_kept(const Directive& directive) {
   if (kept_bytes_ > kept_memory_.bytes() + kStep) kept_memory_.resize(kept_bytes_, "what the scene's text describes");
 }
 
-void SceneBuilder::carry_out(Directive& directive) {
+void SceneBuilder::execute_directive(Directive& directive) {
   switch (directive.kind) {
   case K::kAttributeBegin:
     return open(BlockKind::kAttribute, directive);
@@ -161,25 +161,25 @@ void SceneBuilder::carry_out(Directive& directive) {
   case K::kCoordSysTransform:
     return handle_coordinate_system(directive);
   case K::kCamera:
-    mention_files(directive);
+    record_unread_files(directive);
     define_coordinate_system(
         "camera", {inverse(state_.transform().start), inverse(state_.transform().end), state_.transform().known});
     return cameras_.add_camera(directive, state_.transform(), reporter_);
   case K::kFilm:
     return cameras_.add_film(directive, reporter_);
   case K::kTexture:
-    mention_files(directive);
+    record_unread_files(directive);
     return handle_texture(directive);
   case K::kMaterial:
   case K::kMakeNamedMaterial:
-    mention_files(directive);
+    record_unread_files(directive);
     return handle_material(directive);
   case K::kNamedMaterial:
     return handle_named_material(directive);
   case K::kAreaLightSource:
     return handle_area_light(directive);
   case K::kLightSource:
-    mention_files(directive);
+    record_unread_files(directive);
     ++statistics_.light_sources;
     ++statistics_.ignored["light_sources"];
     return;
@@ -199,9 +199,9 @@ void SceneBuilder::carry_out(Directive& directive) {
   case K::kSampler:
     ++statistics_.ignored["render_settings"];
     return;
-  case K::kWorldBegin: // handle() has seen to these
+  case K::kWorldBegin: // dealt with in handle()
   case K::kWorldEnd:
-  case K::kInclude: // never leaves the parser
+  case K::kInclude: // dealt with in the parser
     return;
   }
 }
@@ -243,7 +243,7 @@ void SceneBuilder::handle_transform(const Directive& directive) {
   if (!numbers_finite(count)) problem = "a number is not finite", map.reset();
   if (map && !is_finite(*map)) problem = "its numbers are out of range", map.reset();
   if (!map) {
-    state_.lose_transform();
+    state_.mark_transform_unknown();
     return reporter_.error(directive.place, std::string(directive.keyword) + " is ignored: " + problem);
   }
   if (directive.kind == K::kIdentity || directive.kind == K::kTransform)
@@ -267,7 +267,7 @@ void SceneBuilder::handle_coordinate_system(const Directive& directive) {
   if (directive.kind == K::kCoordinateSystem) return define_coordinate_system(name, state_.transform());
   const std::optional<uint32_t> found = coordinate_system_names_.find(name);
   if (!found) {
-    state_.lose_transform();
+    state_.mark_transform_unknown();
     return reporter_.error(directive.place,
                            "no coordinate system " + in_quotes(name) + "; the transform stays" +
                                did_you_mean(coordinate_system_names_.closest(name, [](uint32_t) { return true; })));
@@ -307,7 +307,7 @@ void SceneBuilder::handle_medium(const Directive& directive) {
   const bool defines = directive.kind == K::kMakeNamedMedium;
   ++statistics_.ignored[defines ? "media" : "medium_interfaces"];
   for (uint32_t i = 0; i < directive.name_count; ++i)
-    if (!directive.names[i].empty()) // which stands for empty space
+    if (!directive.names[i].empty()) // the empty name is vacuum
       (defines ? media_ : media_uses_).try_emplace(directive.names[i], directive.place);
 }
 
@@ -330,7 +330,7 @@ void SceneBuilder::handle_texture(const Directive& directive) {
 void SceneBuilder::handle_area_light(const Directive& directive) {
   const std::string& kind = directive.names[0];
   constexpr std::string_view kAreaLights[] = {"diffuse", "area"};
-  if (kind != "diffuse" && kind != "area") // "area" is what pbrt-v2 files say
+  if (kind != "diffuse" && kind != "area") // "area" is pbrt-v2's name
     return reporter_.error(directive.place, "unknown area light " + in_quotes(kind) + "; it is ignored" +
                                                 did_you_mean(closest_name(kind, kAreaLights)));
   const TextureContext here = context(directive.place);

@@ -7,32 +7,32 @@
 #include <string_view>
 #include <vector>
 
-#include "pbrt_import/language/cameras.h"
 #include "pbrt_import/builder/file_loader.h"
+#include "pbrt_import/builder/mesh_queue.h"
+#include "pbrt_import/import_scene.h"
+#include "pbrt_import/language/cameras.h"
 #include "pbrt_import/language/file_names.h"
 #include "pbrt_import/language/graphics_state.h"
-#include "pbrt_import/import_scene.h"
-#include "pbrt_import/text/large_pages.h"
 #include "pbrt_import/language/materials.h"
-#include "pbrt_import/builder/mesh_queue.h"
 #include "pbrt_import/language/parser.h"
-#include "pbrt_import/text/reporter.h"
 #include "pbrt_import/language/texture_graph.h"
 #include "pbrt_import/language/transforms.h"
+#include "pbrt_import/text/large_pages.h"
+#include "pbrt_import/text/reporter.h"
 
 namespace packtrace {
 
-/// Carries out directives: keeps the graphics state and collects shapes, objects, instances and cameras.
+/// Executes directives: maintains the graphics state and collects shapes, objects, instances and cameras.
 class SceneBuilder {
 public:
   SceneBuilder(const ImportOptions& options, FileNames& file_names, Reporter& reporter, Progress& progress);
 
-  /// May take large arrays out of the directive's parameters.
+  /// Executes a directive. May move large arrays out of its parameters.
   void handle(Directive& directive);
 
-  /// Reads the files that the scene needs and returns it. Call once, after the last directive.
-  /// @param end where the text ended
-  /// Throws Error(kInput) if the text has no world of the number asked for.
+  /// Reads the files that the scene needs and returns the scene. Call once, after the last directive.
+  /// @param end position of the end of the text
+  /// Throws Error(kInput) if the text does not have the requested world; MemoryError; Error(kCancelled).
   ImportResult finish(const Place& end, Progress& progress);
 
 private:
@@ -41,15 +41,15 @@ private:
   /// The current transform at the scene's time.
   struct Placement {
     DAffine map{1.0};
-    uint32_t animation = kNotAnimated; ///< into Scene::animations
+    uint32_t animation = kNotAnimated; ///< index into Scene::animations
   };
   uint32_t wanted_world() const { return options_.world.value_or(1); }
   bool reading() const { return world_ == wanted_world(); }
 
   bool allowed_here(const Directive& directive);
-  void carry_out(Directive& directive);
+  void execute_directive(Directive& directive);
   void skip_damaged(Directive& directive);
-  void mention_files(const Directive& directive);
+  void record_unread_files(const Directive& directive);
   void handle_transform(const Directive& directive);
   void handle_active_transform(const Directive& directive);
   void handle_coordinate_system(const Directive& directive);
@@ -68,7 +68,7 @@ private:
   void add_instance(const Directive& directive);
   Placement place(const Directive& directive, std::string_view thing);
 
-  void settle_time();
+  void set_scene_time();
   void check_worlds(const Place& end);
   void report_media();
   void count_features();
@@ -93,36 +93,36 @@ private:
   FileNames& file_names_;
   Reporter& reporter_;
   Phase phase_ = Phase::kOptions;
-  uint32_t world_ = 1; ///< number of the world that directives belong to, from its options to its WorldEnd
-  std::optional<Place> options_behind_world_;
+  uint32_t world_ = 1; ///< number of the current world, which spans its options up to its WorldEnd
+  std::optional<Place> options_after_world_;
   TransformTimes transform_times_;
   GraphicsState state_;
   NameTable coordinate_system_names_;
-  std::vector<TransformPair> coordinate_systems_; ///< by number in coordinate_system_names_
+  std::vector<TransformPair> coordinate_systems_; ///< indexed by number in coordinate_system_names_
   TextureGraph graph_;
   MaterialLibrary materials_{graph_};
   FileLoader loader_;
-  Scene scene_; ///< shapes hold MaterialLibrary uses instead of materials until finish()
+  Scene scene_; ///< until finish(), Shape::material is the number of a MaterialLibrary use
   ImportStatistics statistics_;
   CameraCollector cameras_{statistics_.ignored};
-  std::map<std::string, Place> media_;      ///< where MakeNamedMedium defines them
-  std::map<std::string, Place> media_uses_; ///< where MediumInterface names them first
+  std::map<std::string, Place> media_;      ///< position of the MakeNamedMedium by name
+  std::map<std::string, Place> media_uses_; ///< position of the first MediumInterface by name
   NameTable object_names_;
-  std::vector<uint32_t> objects_by_name_; ///< into Scene::objects, by number in object_names_
+  std::vector<uint32_t> objects_by_name_; ///< index into Scene::objects, by number in object_names_
   std::vector<Place> object_places_;
   uint32_t current_object_ = kNone;
-  uint32_t nested_objects_ = 0;  ///< ObjectBegins that were refused but will have their ObjectEnd
-  uint64_t ignored_blocks_ = 0;  ///< open ones beyond the nesting limit
-  uint32_t open_blocks_[3] = {}; ///< by kind
+  uint32_t nested_objects_ = 0;  ///< rejected nested ObjectBegins whose ObjectEnd is still to come
+  uint64_t ignored_blocks_ = 0;  ///< open blocks beyond the nesting limit
+  uint32_t open_blocks_[3] = {}; ///< by BlockKind
   const CheckCancelledFn check_cancelled_;
-  NameTable same_meshes_;                 ///< MeshJob::same_as
-  std::vector<uint32_t> same_mesh_slots_; ///< in Scene::meshes, by number in same_meshes_
-  std::string mesh_name_;                 ///< scratch
-  MemoryReservation mesh_memory_; ///< of meshes made from text and worth asking for one by one
-  MemoryReservation kept_memory_; ///< of all else that stays of directives, much of little things
+  NameTable mesh_keys_;                     ///< values of MeshJob::same_as
+  std::vector<uint32_t> mesh_slots_by_key_; ///< index into Scene::meshes, by number in mesh_keys_
+  std::string mesh_name_;                   ///< scratch buffer
+  MemoryReservation mesh_memory_;           ///< for large meshes made from text, reserved one by one
+  MemoryReservation kept_memory_;           ///< for all other data kept of directives, reserved in steps
   uint64_t kept_bytes_ = 0;
   LargeHeapPages heap_pages_;
-  MeshQueue mesh_queue_; ///< last: its tasks end before anything else does
+  MeshQueue mesh_queue_; ///< last member, so that its tasks end before other members are destroyed
 };
 
 } // namespace packtrace

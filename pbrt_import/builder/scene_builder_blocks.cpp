@@ -1,9 +1,9 @@
-// The part of SceneBuilder that keeps worlds, blocks, objects and instances.
+// The part of SceneBuilder that deals with worlds, blocks, objects and instances.
 #include <algorithm>
 
-#include "pbrt_import/text/large_pages.h"
 #include "pbrt_import/base/file_error.h"
 #include "pbrt_import/builder/scene_builder.h"
+#include "pbrt_import/text/large_pages.h"
 #include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
@@ -13,9 +13,9 @@ void SceneBuilder::begin_world(const Directive& directive) {
     return reporter_.error(directive.place, "WorldBegin inside the world block; it is ignored");
   phase_ = Phase::kWorld;
   ++statistics_.worlds;
-  options_behind_world_.reset();
+  options_after_world_.reset();
   if (!reading()) return;
-  settle_time();
+  set_scene_time();
   state_.reset_transform();
   define_coordinate_system("world", state_.transform());
 }
@@ -130,7 +130,7 @@ SceneBuilder::Placement SceneBuilder::place(const Directive& directive, std::str
   if (!state_.animated()) return {pair.start, kNotAnimated};
   const std::optional<AnimatedTransform> keys = animate(pair.start, pair.end, transform_times_);
   if (!keys) {
-    if (is_invertible(pair.start)) // else whoever asked reports it
+    if (is_invertible(pair.start)) // otherwise the caller reports it
       reporter_.error(directive.place, "animated " + std::string(thing) +
                                            ": its transform at EndTime has no inverse; it stands as at its start");
     return {pair.start, kNotAnimated};
@@ -142,8 +142,8 @@ SceneBuilder::Placement SceneBuilder::place(const Directive& directive, std::str
   return {interpolate(*keys, scene_.time), static_cast<uint32_t>(all.size() - 1)};
 }
 
-/// Options are complete: says when everything is looked at.
-void SceneBuilder::settle_time() {
+/// Sets the time at which animations are evaluated, once all options are known.
+void SceneBuilder::set_scene_time() {
   scene_.time = options_.time.value_or(cameras_.shutter_open());
   cameras_.settle(scene_.time, transform_times_, scene_.animations, reporter_);
 }
@@ -153,15 +153,15 @@ void SceneBuilder::check_worlds(const Place& end) {
   if (wanted_world() > std::max<uint64_t>(worlds, 1))
     throw FileError(ErrorKind::kInput, reporter_.locate({end.file, 0, 0}),
                     "there is no world " + std::to_string(wanted_world()) + ": the file has " + std::to_string(worlds));
-  if (worlds == 0) return settle_time();
+  if (worlds == 0) return set_scene_time();
   if (worlds > 1)
     reporter_.report(options_.world ? Severity::kNote : Severity::kWarning, end,
                      "the file has " + std::to_string(worlds) + " worlds; only world " +
                          std::to_string(wanted_world()) + " is read");
   if (phase_ != Phase::kOptions) return;
   phase_ = Phase::kDone;
-  if (options_behind_world_)
-    reporter_.warning(*options_behind_world_,
+  if (options_after_world_)
+    reporter_.warning(*options_after_world_,
                       "what follows the last WorldEnd has no effect: options belong before their WorldBegin");
 }
 

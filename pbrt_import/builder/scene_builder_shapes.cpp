@@ -1,14 +1,14 @@
-// The part of SceneBuilder that turns Shape directives into shapes and, at the end, all of it into a Scene.
+// The part of SceneBuilder that converts Shape directives to shapes and, at the end, assembles the Scene.
 #include "pbrt_import/builder/scene_builder.h"
 
 #include <algorithm>
 
-#include "pbrt_import/text/large_pages.h"
-#include "pbrt_import/text/problem_text.h"
 #include "pbrt_import/builder/scene_pruning.h"
 #include "pbrt_import/builder/shape_builder.h"
-#include "pbrt_import/text/tokenizer.h"
 #include "pbrt_import/language/transforms.h"
+#include "pbrt_import/text/large_pages.h"
+#include "pbrt_import/text/problem_text.h"
+#include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
 
@@ -53,7 +53,8 @@ void SceneBuilder::add_shape(Directive& directive) {
   (current_object_ == kNone ? scene_.shapes : scene_.objects[current_object_].shapes).push_back(shape);
 }
 
-/// @return false if the shape is absent for all rays
+/// Reads the alpha textures of a triangle mesh.
+/// @return false if its alpha is constant 0, so that no ray can hit the shape
 bool SceneBuilder::read_alpha(const Directive& directive, const TextureContext& context, MaterialUse& use) {
   if (directive.names[0] != "trianglemesh" && directive.names[0] != "plymesh") return true;
   const TextureParameters parameters(context, directive.parameters);
@@ -94,7 +95,7 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
   const std::string& name = directive.names[0];
   const ShapeKind* const kind = find_shape_kind(name);
   if (!kind) return skip_shape(name, directive.place, "unknown shape" + did_you_mean(closest_shape_kind(name)));
-  // Captures no more than fits in a std::function.
+  // Two captured pointers fit in a std::function without an allocation.
   const ReportFn report = [this, &directive](Severity severity, uint32_t, std::string message) {
     reporter_.report(severity, directive.place, directive.names[0] + ": " + message);
   };
@@ -104,7 +105,7 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
   entry.sequence = reporter_.sequence();
   entry.slot = static_cast<uint32_t>(scene_.meshes.size());
   const std::string problem = problem_of([&] { entry.job = kind->read(directive.parameters, report); });
-  directive.memory.release(); // what was large moved into the job
+  directive.memory.release(); // large arrays have moved into the job
   if (!problem.empty()) return skip_shape(name, directive.place, problem);
   if (entry.job.scale != 1.0) {
     shape.parent_from_mesh = compose(shape.parent_from_mesh, scaling(DVec3(entry.job.scale)));
@@ -112,31 +113,31 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
       return skip_shape(name, directive.place, "its size leaves the range of numbers");
   }
   const std::string same_as = std::move(entry.job.same_as);
-  if (const std::optional<uint32_t> known = same_as.empty() ? std::nullopt : same_meshes_.find(same_as)) {
-    shape.mesh = same_mesh_slots_[*known];
+  if (const std::optional<uint32_t> known = same_as.empty() ? std::nullopt : mesh_keys_.find(same_as)) {
+    shape.mesh = mesh_slots_by_key_[*known];
     return true;
   }
   if (!make_or_queue(std::move(entry))) return false;
   shape.mesh = static_cast<uint32_t>(scene_.meshes.size() - 1);
   if (!same_as.empty()) {
-    same_meshes_.intern(same_as);
-    same_mesh_slots_.push_back(shape.mesh);
+    mesh_keys_.intern(same_as);
+    mesh_slots_by_key_.push_back(shape.mesh);
   }
   return true;
 }
 
-/// Adds a mesh to the scene, empty until take_queued_meshes() if making it is worth a task.
+/// Adds a mesh to the scene. Large meshes are queued and stay empty until take_queued_meshes().
 /// @return false if the mesh could not be made
 bool SceneBuilder::make_or_queue(MeshQueue::Entry&& entry) {
-  constexpr uint64_t kWorthATask = 32 * 1024;
-  constexpr uint64_t kLeast = 128; // its name, and what blocks are rounded up to
-  heap_pages_.about_to_allocate(entry.job.bytes_at_most + kLeast);
-  const bool small = entry.job.bytes_at_most > 0 && entry.job.bytes_at_most < kWorthATask;
+  constexpr uint64_t kMinTaskBytes = 32 * 1024;
+  constexpr uint64_t kMin = 128; // for its name and the rounding of heap blocks
+  heap_pages_.about_to_allocate(entry.job.bytes_at_most + kMin);
+  const bool small = entry.job.bytes_at_most > 0 && entry.job.bytes_at_most < kMinTaskBytes;
   if (!small) {
     entry.memory = MemoryReservation(options_.memory);
     entry.memory.resize(std::max(entry.job.bytes_at_most, entry.job.bytes_at_least), "the shape");
   }
-  if (entry.job.bytes_at_most >= kWorthATask) {
+  if (entry.job.bytes_at_most >= kMinTaskBytes) {
     reserve_one_more(scene_.meshes);
     scene_.meshes.emplace_back();
     mesh_queue_.add(std::move(entry));
@@ -157,21 +158,21 @@ bool SceneBuilder::skip_shape(std::string_view kind, const Place& place, const s
   return false;
 }
 
+/// Reports the problems of a mesh and names it.
 /// @return false if the mesh could not be made
 bool SceneBuilder::report_mesh(MeshQueue::Entry& entry) {
   for (auto& [severity, message] : entry.made.reports)
     reporter_.report(severity, entry.place, std::string(entry.kind) + ": " + message);
   scene_.dropped_triangles += entry.made.dropped_triangles;
   mesh_name_.assign(entry.kind).append(":").append(std::to_string(entry.place.line));
-  entry.made.mesh.name = std::string(mesh_name_); // without room to grow: there may be many
+  entry.made.mesh.name = std::string(mesh_name_); // without spare capacity, as there may be many meshes
   return entry.made.problem.empty() || skip_shape(entry.kind, entry.place, entry.made.problem);
 }
 
-/// Waits for the meshes that were made meanwhile. One that could not be made stays empty.
+/// Waits for the queued meshes and stores them. A mesh that could not be made stays empty.
 void SceneBuilder::take_queued_meshes() {
   mesh_queue_.finish([&](MeshQueue::Entry& entry) {
-    if (!entry.made.memory_problem.empty())
-      throw MemoryError(reporter_.locate(entry.place), entry.made.memory_problem);
+    if (!entry.made.memory_problem.empty()) throw MemoryError(reporter_.locate(entry.place), entry.made.memory_problem);
     mesh_memory_.merge(std::move(entry.memory));
     reporter_.set_sequence(entry.sequence);
     if (report_mesh(entry))
@@ -185,13 +186,13 @@ void SceneBuilder::drop_unusable_shapes(const std::vector<uint32_t>& material_nu
   std::erase_if(shapes, [&](Shape& shape) {
     shape.material = material_numbers[shape.material];
     const bool absent = scene_.materials[shape.material].flags & kAbsent;
-    const bool empty = scene_.meshes[shape.mesh].triangles.empty(); // its file could not be read
+    const bool empty = scene_.meshes[shape.mesh].triangles.empty(); // its file or its parameters were unusable
     statistics_.shapes_absent += absent && !empty;
     return absent || empty;
   });
 }
 
-/// Counts what the finished scene has and its text could not tell.
+/// Fills in statistics that are only known once the scene is complete.
 void SceneBuilder::count_features() {
   const auto count = [](const auto& things) {
     return static_cast<uint64_t>(
@@ -209,7 +210,7 @@ void SceneBuilder::count_features() {
 void SceneBuilder::report_and_drop_unused_objects() {
   uint64_t count = 0;
   uint32_t first = 0;
-  std::string name; // before objects are renumbered
+  std::string name; // copied before the objects are renumbered
   drop_unused_objects(scene_, [&](uint32_t object) {
     if (count++ > 0) return;
     first = object;
@@ -233,7 +234,7 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
   const uint64_t last_sequence = reporter_.sequence();
   take_queued_meshes();
   reporter_.set_sequence(last_sequence);
-  // What nothing shows is not worth reading its files.
+  // Drops unused objects first, so that files that only they need are not read.
   report_and_drop_unused_objects();
   for_each_shape(scene_, [&](const Shape& shape) { loader_.require(shape.mesh); });
   materials_.require_images(options_.keep_textures);
@@ -242,8 +243,8 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
   for (const ImageRequest& image : graph_.images())
     ++(image.missing ? statistics_.textures_missing : statistics_.textures_found);
   MemoryReservation texture_memory(options_.memory);
-  const std::vector<uint32_t> material_numbers = with_place(
-      reporter_, [&] { return end; }, [&] { return materials_.resolve(scene_, texture_memory, reporter_); });
+  const std::vector<uint32_t> material_numbers =
+      with_place(reporter_, [&] { return end; }, [&] { return materials_.resolve(scene_, texture_memory, reporter_); });
   drop_unusable_shapes(material_numbers, scene_.shapes);
   for (Object& object : scene_.objects) drop_unusable_shapes(material_numbers, object.shapes);
   if (const uint64_t absent = statistics_.shapes_absent; absent > 0)

@@ -7,7 +7,7 @@
 namespace packtrace {
 namespace {
 
-/// Renumbers the elements that something uses, in order, and drops the others.
+/// Keeps the used elements in order, drops the others and returns the new index of each element.
 template <class Element>
 std::vector<uint32_t> keep_used(std::vector<Element>& elements, const std::vector<uint8_t>& used) {
   std::vector<uint32_t> numbers(elements.size(), 0);

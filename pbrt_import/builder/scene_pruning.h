@@ -14,13 +14,12 @@ void for_each_shape(Scene& scene, Function function) {
     for (Shape& shape : object.shapes) function(shape);
 }
 
-/// Leaves out objects that nothing shows and objects without shapes, with the instances of the latter; what is left
-/// keeps its order.
-/// @param unused called with the number of each object that has shapes but no instance
+/// Drops objects without instances, and objects without shapes together with their instances. The rest keeps its order.
+/// @param unused called with the index of each object that has shapes but no instance
 void drop_unused_objects(Scene& scene, const std::function<void(uint32_t object)>& unused);
 
-/// Leaves out meshes and materials that no shape uses, then masks that no material uses, then animations that nothing
-/// has.
+/// Drops meshes and materials that no shape uses, then masks and textures that no material uses, then unused
+/// animations.
 void drop_unused_parts(Scene& scene);
 
 } // namespace packtrace

@@ -20,7 +20,7 @@
 namespace packtrace {
 namespace {
 
-/// Groups components into vectors, leaving out an incomplete last one.
+/// Groups components into vectors; an incomplete last group is ignored.
 template <class Vector>
 std::vector<Vector> grouped(std::span<const float> components) {
   static_assert(sizeof(Vector) % sizeof(float) == 0);
@@ -33,7 +33,7 @@ std::vector<Vector> grouped(std::span<const float> components) {
   return vectors;
 }
 
-/// Like grouped, of a parameter whose type does not say how its values are grouped.
+/// Like grouped(), for a parameter whose type does not imply the group size. Reports an incomplete last group.
 template <class Vector>
 std::vector<Vector> read_groups(const ParameterList& parameters, std::string_view name, ParameterType type,
                                 const ReportFn& report) {
@@ -53,7 +53,7 @@ std::vector<Vec2> read_uvs(const ParameterList& parameters, const ReportFn& repo
   return {};
 }
 
-/// Negative indices become huge ones, which are out of range like all others that are.
+/// Takes the index triples. Negative indices become large unsigned ones, which are out of range for every mesh.
 std::vector<Triangle> take_triangles(ParameterList& parameters, const ReportFn& report) {
   const size_t count = parameters.integers("indices").size();
   if (count == 0) throw Error(ErrorKind::kInput, "no \"integer indices\"");
@@ -90,9 +90,10 @@ MeshJob read_triangle_mesh(ParameterList& parameters, const ReportFn& report) {
   return job;
 }
 
-/// A job for a quadric, which is small enough a description to find equal ones by.
+/// Creates the job of a quadric. The key for equal meshes consists of the quadric's kind and parameters.
 template <class Quadric>
-MeshJob quadric_job(std::string_view kind, const Quadric& quadric, Mesh (*tessellate)(const Quadric&, double, MemoryReservation*)) {
+MeshJob quadric_job(std::string_view kind, const Quadric& quadric,
+                    Mesh (*tessellate)(const Quadric&, double, MemoryReservation*)) {
   static_assert(std::is_trivially_copyable_v<Quadric> && sizeof(Quadric) % sizeof(float) == 0);
   MeshJob job;
   job.make = [=](ShapeContext& context) { return tessellate(quadric, context.tessellation_tolerance, context.memory); };
@@ -107,9 +108,9 @@ MeshJob read_sphere(ParameterList& parameters, const ReportFn&) {
   sphere.z_min = parameters.get_float("zmin", -sphere.radius);
   sphere.z_max = parameters.get_float("zmax", sphere.radius);
   sphere.phi_max = parameters.get_float("phimax", 360.0f);
-  // Whole spheres are all the same but for their size: scenes of many particles need only one.
-  const bool whole = std::min(sphere.z_min, sphere.z_max) <= -sphere.radius &&
-                     std::max(sphere.z_min, sphere.z_max) >= sphere.radius;
+  // Whole spheres only differ in scale, so that scenes with many spheres share one mesh.
+  const bool whole =
+      std::min(sphere.z_min, sphere.z_max) <= -sphere.radius && std::max(sphere.z_min, sphere.z_max) >= sphere.radius;
   const double scale = whole && sphere.radius > 0.0f && std::isfinite(sphere.radius) ? sphere.radius : 1.0;
   if (scale != 1.0) sphere = {1.0f, -1.0f, 1.0f, sphere.phi_max};
   MeshJob job = quadric_job("sphere", sphere, tessellate_sphere);
@@ -168,8 +169,8 @@ MeshJob read_loop_subdivision(ParameterList& parameters, const ReportFn& report)
   std::vector<Triangle> triangles = take_triangles(parameters, report);
   std::vector<Vec3> points = take_points(parameters);
   MeshJob job;
-  // Each level makes four triangles of one and at most a vertex for each of them.
-  if (constexpr uint32_t kFewLevels = 12; levels <= kFewLevels) { // more: refused for the number of triangles
+  // Each level splits a triangle into four and adds at most one vertex per new triangle.
+  if (constexpr uint32_t kMaxSizedLevels = 12; levels <= kMaxSizedLevels) { // more levels exceed the triangle limit
     const uint64_t made = static_cast<uint64_t>(triangles.size()) << (2 * levels);
     job.bytes_at_least = made * sizeof(Triangle);
     job.bytes_at_most = job.bytes_at_least + (points.size() + made) * 2 * sizeof(Vec3);
@@ -246,10 +247,11 @@ MeshJob read_height_field(ParameterList& parameters, const ReportFn&) {
   const uint32_t nu = count_of(parameters, "nu", 0), nv = count_of(parameters, "nv", 0);
   std::vector<float> heights = grouped<float>(parameters.floats("Pz", ParameterType::kFloat));
   MeshJob job;
-  job.bytes_at_most = heights.size() * (sizeof(Vec3) + sizeof(Vec2) + 2 * sizeof(Triangle)); // two triangles a sample
+  // At most two triangles per sample.
+  job.bytes_at_most = heights.size() * (sizeof(Vec3) + sizeof(Vec2) + 2 * sizeof(Triangle));
   job.make = [nu, nv, heights = std::move(heights)](ShapeContext& context) {
     Mesh mesh = make_heightfield(nu, nv, heights);
-    context.dropped_triangles += drop_bad_triangles(mesh, context.report);
+    context.dropped_triangles += clean_up_mesh(mesh, context.report);
     return mesh;
   };
   return job;

@@ -13,21 +13,21 @@
 #include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfRgbaFile.h>
 
-#define STB_IMAGE_STATIC // other libraries of a program may bring their own copy
+#define STB_IMAGE_STATIC // other libraries may bring their own copy of stb_image
 #define STB_IMAGE_IMPLEMENTATION
 #define STBI_NO_STDIO
 #define STBI_NO_LINEAR
-// What it decodes beyond that, JPEG above all, reads and writes outside of its buffers where files are damaged.
+// stb_image's other decoders, JPEG above all, access memory outside their buffers when files are damaged.
 #define STBI_ONLY_PNG
 #include <stb/stb_image.h>
 
-#include "pbrt_import/text/number.h"
-#include "pbrt_import/files/radiance.h"
-#include "pbrt_import/scene/albedo_texture.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/exr_header.h"
 #include "pbrt_import/base/png_chunks.h"
+#include "pbrt_import/files/radiance.h"
 #include "pbrt_import/files/tga.h"
+#include "pbrt_import/scene/albedo_texture.h"
+#include "pbrt_import/text/number.h"
 
 namespace packtrace {
 namespace {
@@ -37,26 +37,27 @@ namespace {
 constexpr const char* kDamaged = "damaged image: ";
 constexpr const char* kTruncated = "damaged image: the file is truncated";
 
-constexpr uint64_t kMostPixelsPerByte = 1u << 16; // PNG reaches 8256; EXR's DWAB compression has chunks of 96 bytes
+// An upper bound for all formats: PNG reaches 8256; DWAB compression of EXR stores chunks in as few as 96 bytes.
+constexpr uint64_t kMaxPixelsPerByte = 1u << 16;
 
 constexpr const char *kNotInPalette = "has a colour that the palette lacks; it counts as black",
                      *kNotInPaletteMany = "have colours that the palette lacks; they count as black";
 
-/// Adds a problem that so many pixels have, if any.
+/// Adds a problem that affects `pixels` pixels; none if the count is 0.
 void add_problem(ImageSummary& summary, uint64_t pixels, std::string_view of_one, std::string_view of_more) {
   if (pixels == 0) return;
   const std::string subject = pixels == 1 ? "1 pixel " : std::to_string(pixels) + " pixels ";
   summary.problems.push_back(subject + std::string(pixels == 1 ? of_one : of_more));
 }
 
-/// Takes pixels one after the other, rows from the top.
+/// Accumulates an ImageSummary from pixels that are added in row order, from the top.
 class Summarizer {
 public:
   Summarizer(uint32_t width, uint32_t height, ImageWants wants)
       : width_(width), want_mask_(wants.mask), want_colours_(wants.colours) {
     summary_.width = width;
     summary_.height = height;
-    want_colours_ = want_colours_ && uint64_t{width} * height <= kMostTextureTexels;
+    want_colours_ = want_colours_ && uint64_t{width} * height <= kMaxTextureTexels;
     if (want_colours_) summary_.rgb.assign(static_cast<size_t>(width) * height * 3, 0);
     if (want_mask_) summary_.nonzero.assign(static_cast<size_t>(AlphaMask::row_words(width)) * height, 0);
   }
@@ -79,7 +80,7 @@ public:
       summary_.nonzero[static_cast<size_t>(y) * AlphaMask::row_words(width_) + x / 32] |= 1u << (x % 32);
   }
 
-  /// Sums by rows keep long sums exact enough.
+  /// Summing per row keeps the rounding error of the total small.
   void end_row() {
     total_ += row_;
     row_ = DVec3(0.0);
@@ -102,14 +103,14 @@ private:
   DVec3 row_{0.0}, total_{0.0};
 };
 
-/// The size that a header claims, checked before anything is allocated.
+/// Image size as claimed by a file header, checked before memory is allocated.
 struct ClaimedSize {
   uint64_t width = 0, height = 0;
-  uint64_t pixels_per_byte = kMostPixelsPerByte; ///< that the format can store at most
+  uint64_t pixels_per_byte = kMaxPixelsPerByte; ///< upper bound of the format's compression
 
   std::string text() const { return std::to_string(width) + " x " + std::to_string(height); }
 
-  /// @param working_bytes that decoding takes besides what is kept of the image
+  /// @param working_bytes memory that decoding takes in addition to the kept data
   void check(uint64_t stored_bytes, uint64_t working_bytes, ImageWants wants, MemoryReservation& memory) const {
     if (width == 0 || height == 0) fail("the image has no pixels");
     constexpr uint64_t kMaxSide = 1u << 24;
@@ -118,13 +119,13 @@ struct ClaimedSize {
     if (pixels / pixels_per_byte > stored_bytes)
       fail("damaged image: its " + std::to_string(stored_bytes) + " bytes cannot hold the " + text() +
            " pixels it claims");
-    const uint64_t kept = (wants.colours && pixels <= kMostTextureTexels ? 3 * pixels : 0) +
+    const uint64_t kept = (wants.colours && pixels <= kMaxTextureTexels ? 3 * pixels : 0) +
                           (wants.mask ? AlphaMask::row_words(static_cast<uint32_t>(width)) * height * 4 : 0);
     memory.cover(working_bytes + kept, "decoding its " + text() + " pixels");
   }
 };
 
-/// Source: IEC 61966-2-1.
+/// Linear value of an sRGB-encoded value. Source: IEC 61966-2-1.
 float linear_from_srgb(float v) {
   return v <= 0.04045f ? v / 12.92f : static_cast<float>(std::pow((v + 0.055) / 1.055, 2.4));
 }
@@ -145,7 +146,7 @@ ImageSummary summarize(const T* pixels, int width, int height, ImageWants wants,
   return summarizer.finish();
 }
 
-/// What 8-bit values stand for, in linear RGB.
+/// Linear value of each 8-bit sample value.
 std::array<float, 256> linear_of_bytes(bool decode_srgb) {
   std::array<float, 256> linear{};
   for (size_t i = 0; i < linear.size(); ++i) {
@@ -155,7 +156,7 @@ std::array<float, 256> linear_of_bytes(bool decode_srgb) {
   return linear;
 }
 
-/// stb_image's pixels of a PNG file whose chunks have been checked.
+/// Decodes a PNG file with stb_image. The chunks must have been checked.
 template <class Sample>
 std::unique_ptr<Sample, StbFree> decode_png(std::span<const std::byte> bytes, int channels,
                                             Sample* (*load)(const stbi_uc*, int, int*, int*, int*, int)) {
@@ -193,7 +194,7 @@ ImageSummary read_palette_png(std::span<const std::byte> bytes, const PngHeader&
 ImageSummary read_png(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants, MemoryReservation& memory) {
   if (bytes.size() > static_cast<size_t>(INT32_MAX)) fail("the image file exceeds 2 GiB");
   const PngHeader header = check_png_chunks(bytes, PngChecksums::kCount, kDamaged);
-  // stb_image holds up to two copies, of four channels at most.
+  // stb_image holds at most two copies of at most four channels.
   const ClaimedSize size{header.width, header.height};
   size.check(bytes.size(), size.width * size.height * (header.bits_per_sample > 8 ? 16 : 8), wants, memory);
   const int width = static_cast<int>(header.width), height = static_cast<int>(header.height);
@@ -218,11 +219,11 @@ ImageSummary read_png(std::span<const std::byte> bytes, bool decode_srgb, ImageW
   return summary;
 }
 
-/// A format without a mark of its own: what nothing else claims.
+/// TGA has no magic number, so it is tried for files that match no other format.
 ImageSummary read_tga(std::span<const std::byte> bytes, bool decode_srgb, ImageWants wants, MemoryReservation& memory) {
   const std::optional<TgaHeader> header = parse_tga_header(bytes);
   if (!header) fail("not an image in a known format (PNG, TGA, EXR, PFM, HDR)");
-  constexpr uint64_t kPixelsPerByte = 64; // a run of 128 takes two bytes at least
+  constexpr uint64_t kPixelsPerByte = 64; // a run of up to 128 pixels takes at least two bytes
   const ClaimedSize size{header->width, header->height, kPixelsPerByte};
   size.check(bytes.size(), size.width * size.height * 3, wants, memory);
   const TgaPixels pixels = decode_tga(bytes, *header);
@@ -238,7 +239,7 @@ ImageSummary read_tga(std::span<const std::byte> bytes, bool decode_srgb, ImageW
 ImageSummary read_hdr(std::span<const std::byte> bytes, ImageWants wants, MemoryReservation& memory) {
   RadianceReader reader(bytes);
   const ClaimedSize size{reader.width(), reader.height()};
-  size.check(bytes.size(), size.width * 2 * sizeof(Vec3), wants, memory); // a row
+  size.check(bytes.size(), size.width * 2 * sizeof(Vec3), wants, memory); // working memory: one row
   Summarizer summarizer(reader.width(), reader.height(), wants);
   for (uint32_t y = 0; y < reader.height(); ++y) {
     const std::span<const Vec3> row = reader.read_row();
@@ -248,7 +249,7 @@ ImageSummary read_hdr(std::span<const std::byte> bytes, ImageWants wants, Memory
   return summarizer.finish();
 }
 
-/// OpenEXR's view of bytes in memory.
+/// Input stream of OpenEXR over bytes in memory.
 class MemoryStream : public Imf::IStream {
 public:
   explicit MemoryStream(std::span<const std::byte> bytes) : Imf::IStream("image"), bytes_(bytes) {}
@@ -271,14 +272,14 @@ private:
   size_t position_ = 0;
 };
 
-/// Before OpenEXR, which allocates first, gets to see the file.
+/// Checks the header before OpenEXR reads the file, because OpenEXR allocates before it checks.
 void check_exr(std::span<const std::byte> bytes, ImageWants wants, MemoryReservation& memory) {
   if (const std::string_view why = unsupported_exr_kind(bytes); !why.empty()) fail(std::string(why));
   const ExrHeader header = scan_exr_header(bytes, kDamaged);
-  // OpenEXR keeps a few blocks, packed and unpacked.
+  // OpenEXR keeps a few blocks, compressed and decompressed.
   constexpr uint64_t kBlockCopies = 4, kFreeBytes = 64u << 20, kRows = 64;
   const uint64_t block = header.block_bytes();
-  if (block > kFreeBytes && block / kMostPixelsPerByte > bytes.size())
+  if (block > kFreeBytes && block / kMaxPixelsPerByte > bytes.size())
     fail("damaged image: its " + std::to_string(bytes.size()) + " bytes cannot hold the blocks it claims");
   const uint64_t blocks = block > UINT64_MAX / (2 * kBlockCopies) ? UINT64_MAX / 2 : block * kBlockCopies;
   const ClaimedSize size{header.width(), header.height()};
@@ -296,12 +297,13 @@ ImageSummary read_exr(std::span<const std::byte> bytes, ImageWants wants, Memory
       fail("the EXR image has none of the channels R, G, B and Y");
     const auto w = static_cast<uint32_t>(width);
     Summarizer summarizer(w, static_cast<uint32_t>(height), wants);
-    constexpr int64_t kBlock = 64; // whole blocks of every compression but the rarest
+    constexpr int64_t kBlock = 64; // a multiple of the block height of every compression except DWAB (256 rows)
     const auto block = static_cast<int>(std::min(height, kBlock));
     std::vector<Imf::Rgba> rows(static_cast<size_t>(w) * static_cast<size_t>(block));
     for (int first = box.min.y; first <= box.max.y; first += block) {
       const int last = std::min(first + block - 1, box.max.y);
-      // The library addresses pixel (x, y) as base + x + y * stride. Windows may lie anywhere, so this is no pointer.
+      // OpenEXR addresses pixel (x, y) as base + x + y * stride. The data window may have any origin, so base can lie
+      // outside the array and is computed as an integer.
       const auto before = static_cast<uint64_t>(box.min.x + int64_t{first} * width) * sizeof(Imf::Rgba);
       const uint64_t base = reinterpret_cast<uintptr_t>(rows.data()) - before;
       file.setFrameBuffer(reinterpret_cast<Imf::Rgba*>(base), 1, w);
@@ -321,7 +323,8 @@ ImageSummary read_exr(std::span<const std::byte> bytes, ImageWants wants, Memory
   }
 }
 
-/// Portable float map: "PF" or "Pf", width, height, scale (negative: little-endian), then rows from the bottom.
+/// Reads a portable float map: "PF" (RGB) or "Pf" (grey), width, height, scale (negative: little-endian), then rows
+/// from the bottom.
 ImageSummary read_pfm(std::span<const std::byte> bytes, ImageWants wants, MemoryReservation& memory) {
   std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   const size_t channels = text[1] == 'F' ? 3 : 1;
@@ -361,7 +364,8 @@ ImageSummary read_pfm(std::span<const std::byte> bytes, ImageWants wants, Memory
   return summarizer.finish();
 }
 
-/// Names by their first bytes, none of which start a TGA file, formats that people do put into scenes.
+/// Name of an unsupported format that is common in scenes, detected by its first bytes; empty if none matches. No TGA
+/// file starts with any of these bytes.
 std::string_view other_format(std::string_view file) {
   using namespace std::string_view_literals;
   for (const auto& [magic, name] : {std::pair{"\xff\xd8\xff"sv, "JPEG"sv},

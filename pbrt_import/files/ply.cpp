@@ -5,9 +5,9 @@
 #include <cstring>
 #include <limits>
 
+#include "pbrt_import/base/error.h"
 #include "pbrt_import/files/ply_header.h"
 #include "pbrt_import/files/ply_source.h"
-#include "pbrt_import/base/error.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
 #include "pbrt_import/text/tokenizer.h"
 
@@ -21,10 +21,10 @@ bool is_read(const PlyElement& element) {
   return element.count > 0 && (element.name == kVertices || element.name == kFaces || element.name == kStrips);
 }
 
-constexpr uint32_t kBadIndex = ~0u;                  // out of range for every mesh: dropped and counted with the others
-constexpr uint64_t kMaxVertices = uint64_t{1} << 31; // so that negative indices are out of range once unsigned
+constexpr uint32_t kBadIndex = ~0u;                  // out of range for every mesh, so dropped as a bad index
+constexpr uint64_t kMaxVertices = uint64_t{1} << 31; // makes negative indices out of range as unsigned
 
-/// Accounts for what the mesh takes, ahead of taking it.
+/// Counts the memory of the mesh before it is allocated.
 class MeshMemory {
 public:
   explicit MeshMemory(MemoryReservation* memory) : memory_(memory) {}
@@ -33,12 +33,12 @@ public:
     bytes_ += bytes;
     if (memory_) memory_->cover(bytes_, "its mesh");
   }
-  /// Makes room for more triangles.
+  /// Reserves room for more triangles, growing by at least half.
   void reserve(std::vector<Triangle>& triangles, uint64_t more) {
     const uint64_t old = triangles.capacity(), needed = triangles.size() + more;
     if (needed <= old) return;
     const uint64_t larger = std::max(needed, old + old / 2);
-    add(larger * sizeof(Triangle)); // beside the old ones, while they move
+    add(larger * sizeof(Triangle)); // both arrays exist during the copy
     triangles.reserve(static_cast<size_t>(larger));
     bytes_ -= old * sizeof(Triangle);
   }
@@ -48,7 +48,7 @@ private:
   uint64_t bytes_ = 0;
 };
 
-/// Throws if the file is too short for the rows an element claims, so that allocating them is safe.
+/// Throws Error(kInput) if the file is too short for the rows that an element claims, so that allocating them is safe.
 template <class Source>
 void check_row_count(Source& source, const PlyElement& element) {
   source.at = {&element, 0};
@@ -86,14 +86,14 @@ void skip_element(Source& source, const PlyElement& element) {
     for (const PlyProperty& property : element.properties) skip_property(source, property);
 }
 
-/// One attribute of the vertices: which properties it comes from and where it goes.
+/// A vertex attribute: its source properties and its destination.
 struct Attribute {
   std::array<size_t, 3> properties{};
-  size_t size = 0;              ///< 2 or 3 of them
-  float* destination = nullptr; ///< size floats per vertex
+  size_t size = 0;              ///< number of components, 2 or 3
+  float* destination = nullptr; ///< `size` floats per vertex
 };
 
-/// Sets attribute if all names are scalar properties of the element.
+/// Sets the properties of `attribute` and returns true if the element has scalar properties of all these names.
 template <size_t kSize>
 bool find_attribute(const PlyElement& element, const std::array<std::string_view, kSize>& names, Attribute& attribute) {
   for (size_t i = 0; i < kSize; ++i) {
@@ -105,7 +105,7 @@ bool find_attribute(const PlyElement& element, const std::array<std::string_view
   return true;
 }
 
-/// Allocates the attributes that the file has; the caller has checked the count.
+/// Allocates the attributes that the file has. Precondition: the row count has been checked.
 std::vector<Attribute> allocate_attributes(const PlyElement& element, Mesh& mesh, MeshMemory& memory) {
   using Names3 = std::array<std::string_view, 3>;
   using Names2 = std::array<std::string_view, 2>;
@@ -114,7 +114,7 @@ std::vector<Attribute> allocate_attributes(const PlyElement& element, Mesh& mesh
   Attribute attribute;
   if (!find_attribute(element, Names3{"x", "y", "z"}, attribute))
     throw Error(ErrorKind::kInput, "the vertices have no x, y and z");
-  memory.add(element.count * (sizeof(Vec3) + 1)); // 1: drop_bad_triangles()
+  memory.add(element.count * (sizeof(Vec3) + 1)); // one more byte for clean_up_mesh()
   mesh.positions.resize(count);
   attribute.destination = &mesh.positions[0].x;
   attributes.push_back(attribute);
@@ -137,9 +137,9 @@ std::vector<Attribute> allocate_attributes(const PlyElement& element, Mesh& mesh
 
 static_assert(sizeof(Vec3) == 3 * sizeof(float) && sizeof(Vec2) == 2 * sizeof(float));
 
-/// Vertex rows of any kind, value by value.
+/// Reads vertex rows of any layout, value by value.
 template <class Source>
-void read_vertices_slowly(Source& source, const PlyElement& element, const std::vector<Attribute>& attributes) {
+void read_vertices_by_value(Source& source, const PlyElement& element, const std::vector<Attribute>& attributes) {
   struct Slot {
     float* destination = nullptr;
     size_t stride = 0;
@@ -170,7 +170,7 @@ void convert_column(PlyType type, const std::byte* from, size_t row_bytes, size_
   });
 }
 
-/// Binary rows of one size: attribute by attribute, in blocks of rows that stay in the first-level cache.
+/// Reads binary rows of fixed size, attribute by attribute, in blocks of rows that fit the L1 cache.
 template <bool kSwap>
 void read_vertex_table(BinarySource<kSwap>& source, const PlyElement& element,
                        const std::vector<Attribute>& attributes) {
@@ -206,7 +206,7 @@ void read_vertices(Source& source, const PlyElement& element, Mesh& mesh, MeshMe
   if constexpr (Source::kBinary) {
     if (!element.has_lists()) return read_vertex_table(source, element, attributes);
   }
-  read_vertices_slowly(source, element, attributes);
+  read_vertices_by_value(source, element, attributes);
 }
 
 uint32_t to_index(double value) {
@@ -215,7 +215,7 @@ uint32_t to_index(double value) {
              : kBadIndex;
 }
 
-/// Reads one face's list of indices and appends its fan. Returns false if it has fewer than three corners.
+/// Reads the index list of a face and appends its triangle fan. Returns false if it has fewer than three corners.
 template <class Source>
 bool read_polygon(Source& source, const PlyProperty& property, std::vector<Triangle>& triangles, MeshMemory& memory) {
   const uint64_t length = read_list_length(source, property);
@@ -234,13 +234,13 @@ bool read_polygon(Source& source, const PlyProperty& property, std::vector<Trian
   return true;
 }
 
-/// The common layout: faces that are nothing but a list with a one-byte length and four-byte indices. Reads triangles
-/// up to the first other polygon and returns how many.
+/// Fast path for faces that only have a list with a one-byte length and four-byte indices. Reads triangles up to the
+/// first other polygon and returns their number.
 template <bool kSwap>
 uint64_t read_triangle_run(BinarySource<kSwap>& source, uint64_t max_count, std::vector<Triangle>& triangles,
                            MeshMemory& memory) {
-  constexpr uint64_t kRowBytes = 13, kMostAtOnce = 1u << 16;
-  const uint64_t limit = std::min({max_count, source.remaining() / kRowBytes, kMostAtOnce});
+  constexpr uint64_t kRowBytes = 13, kMaxTrianglesAtOnce = 1u << 16;
+  const uint64_t limit = std::min({max_count, source.remaining() / kRowBytes, kMaxTrianglesAtOnce});
   memory.reserve(triangles, limit);
   const std::byte* const table = source.take(0);
   uint64_t count = 0;
@@ -251,7 +251,7 @@ uint64_t read_triangle_run(BinarySource<kSwap>& source, uint64_t max_count, std:
   return count;
 }
 
-/// Which property of faces or strips lists their vertices.
+/// Index of the property of faces or strips that lists their vertices. Throws Error(kInput) if there is none.
 size_t index_list_of(const PlyElement& element) {
   auto found = element.find("vertex_indices", true);
   if (!found) found = element.find("vertex_index", true);
@@ -261,16 +261,16 @@ size_t index_list_of(const PlyElement& element) {
   return *found;
 }
 
-/// Reads one list of strips, each of which ends with -1 or the list, and appends their triangles, every second one
-/// turned round. A repeated index only leads on to another place. Returns how many strips have fewer than three
-/// corners.
+/// Reads one list of triangle strips, each terminated by -1 or the end of the list, and appends their triangles; every
+/// second one is flipped. Triangles with a repeated index only connect parts of a strip and are omitted. Returns the
+/// number of strips with fewer than three corners.
 template <class Source>
 uint64_t read_strip_list(Source& source, const PlyProperty& property, std::vector<Triangle>& triangles,
                          MeshMemory& memory) {
   const double restart = property.type == PlyType::kUint32 ? 4294967295.0 : -1.0;
   const uint64_t length = read_list_length(source, property);
   memory.reserve(triangles, length);
-  uint64_t too_short = 0, corners = 0; // of the current strip
+  uint64_t too_short = 0, corners = 0; // corners of the current strip
   uint32_t a = 0, b = 0;
   const auto end_strip = [&] { too_short += corners > 0 && corners < 3, corners = 0; };
   for (uint64_t i = 0; i < length; ++i) {
@@ -309,7 +309,7 @@ void read_faces(Source& source, const PlyElement& element, Mesh& mesh, const Rep
   const size_t index_list = index_list_of(element);
   const PlyProperty& indices = element.properties[index_list];
   const uint64_t triangle_size =
-      source.min_row_size(element) + 3 * source.min_item_size(indices.type); // the estimate must not trust the count
+      source.min_row_size(element) + 3 * source.min_item_size(indices.type); // the reservation must not trust the count
   memory.reserve(mesh.triangles, std::min(element.count, source.remaining() / triangle_size));
   const bool is_simple = element.properties.size() == 1 && byte_size(*indices.length_type) == 1 &&
                          (indices.type == PlyType::kInt32 || indices.type == PlyType::kUint32);
@@ -350,11 +350,12 @@ PlyMesh read_body(Source source, const PlyHeader& header, const ReportFn& report
     else
       read_strips(source, element, result.mesh, report, memory);
   }
-  result.dropped_triangles = drop_bad_triangles(result.mesh, report);
+  result.dropped_triangles = clean_up_mesh(result.mesh, report);
   return result;
 }
 
-/// One element of vertices and one of faces or of strips, or one of each, and rows of both kinds.
+/// Checks that there is at most one element each of vertices, faces and strips, that there are vertices, and that there
+/// are faces or strips. Throws Error(kInput).
 void check_elements(const PlyHeader& header) {
   const auto rows = [&](std::string_view name) {
     const auto is_named = [&](const PlyElement& e) { return e.name == name; };
@@ -364,7 +365,7 @@ void check_elements(const PlyHeader& header) {
     return element ? element->count : 0;
   };
   if (rows(kVertices) == 0) throw Error(ErrorKind::kInput, "no vertices");
-  const uint64_t face_rows = rows(kFaces), strip_rows = rows(kStrips); // both are to be looked at
+  const uint64_t face_rows = rows(kFaces), strip_rows = rows(kStrips); // both calls are needed for their checks
   if (face_rows == 0 && strip_rows == 0) throw Error(ErrorKind::kInput, "no faces");
   if (header.find(kVertices)->count >= kMaxVertices)
     throw Error(ErrorKind::kInput, "more than " + std::to_string(kMaxVertices - 1) +

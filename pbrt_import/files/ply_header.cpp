@@ -51,7 +51,7 @@ public:
     const bool cr = text_[offset_++] == '\r';
     const bool lf_follows = offset_ < text_.size() && text_[offset_] == '\n';
     if (line_ == 1) bare_cr_ = cr && !lf_follows;
-    // Where lines end in a bare CR, an LF after end_header's is the first byte of the data.
+    // If lines end in a bare CR, an LF after the one of end_header is the first byte of the data.
     if (cr && lf_follows && !bare_cr_) ++offset_;
   }
 

@@ -10,13 +10,13 @@
 #include <string>
 #include <string_view>
 
-#include "pbrt_import/text/number.h"
-#include "pbrt_import/files/ply_header.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/files/ply_header.h"
+#include "pbrt_import/text/number.h"
 #include "pbrt_import/text/tokenizer.h"
 
-/// Where the values of a PLY file's body come from. BinarySource and AsciiSource have the same members, so that readers
-/// are templates over them.
+/// Readers for the values of a PLY body. BinarySource and AsciiSource have the same members, so that element readers
+/// can be templates over them.
 namespace packtrace::ply {
 
 static_assert(std::endian::native == std::endian::little);
@@ -59,7 +59,7 @@ auto visit_type(PlyType type, Visitor&& visitor) {
   return visitor.template operator()<double>();
 }
 
-/// Where the body is being read, and for messages, what.
+/// Current read position in the body, for messages.
 struct Position {
   const PlyElement* element = nullptr;
   uint64_t row = 0;
@@ -70,7 +70,7 @@ struct Position {
                                      std::to_string(at.row) + " of " + std::to_string(at.element->count) + ")");
 }
 
-/// The values of a binary body, one by one.
+/// Reads the values of a binary body one by one.
 template <bool kSwap>
 class BinarySource {
 public:
@@ -87,9 +87,9 @@ public:
     return visit_type(type, [&]<class T>() { return static_cast<double>(load<T, kSwap>(from)); });
   }
   float real(PlyType type) { return static_cast<float>(number(type)); }
-  void skip(PlyType type, uint64_t count) { take(byte_size(type) * count); } // count <= remaining(): no overflow
+  void skip(PlyType type, uint64_t count) { take(byte_size(type) * count); } // no overflow, since count <= remaining()
 
-  /// The next size bytes, which are then behind.
+  /// Consumes and returns the next `size` bytes. Throws Error(kInput) if the body is shorter.
   const std::byte* take(uint64_t size) {
     if (size > remaining()) fail_at(at, "the file is truncated");
     const std::byte* const from = next_;
@@ -104,14 +104,15 @@ private:
   const std::byte* end_;
 };
 
-/// The words of an ASCII body. Line ends mean nothing more than blanks, as in the usual readers.
+/// Reads the words of an ASCII body. Line ends count as blanks, as in common PLY readers.
 class AsciiSource {
 public:
   static constexpr bool kBinary = false;
   explicit AsciiSource(std::span<const std::byte> bytes, size_t body_offset)
       : begin_(reinterpret_cast<const char*>(bytes.data())), next_(begin_ + body_offset), end_(begin_ + bytes.size()) {}
 
-  uint64_t remaining() const { return static_cast<uint64_t>(end_ - next_) + 1; } // the last word needs no blank
+  // One more than the bytes left, since the last word needs no blank after it.
+  uint64_t remaining() const { return static_cast<uint64_t>(end_ - next_) + 1; }
   uint64_t min_row_size(const PlyElement& element) const { return 2 * uint64_t{element.properties.size()}; }
   uint64_t min_item_size(PlyType) const { return 2; }
 

@@ -6,15 +6,15 @@
 #include <string>
 #include <string_view>
 
-#include "pbrt_import/text/number.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/text/number.h"
 
 namespace packtrace {
 namespace {
 
 [[noreturn]] void damaged(const std::string& what) { throw Error(ErrorKind::kInput, "damaged image: " + what); }
 
-/// Rows of other widths are never run-length encoded by component.
+/// Only rows with widths in this range can be run-length encoded per component.
 constexpr uint32_t kMinPlaneWidth = 8, kMaxPlaneWidth = 0x7fff;
 
 std::string_view take_line(std::string_view& text) {
@@ -71,7 +71,7 @@ std::span<const std::byte> RadianceReader::take(size_t count) {
   return taken;
 }
 
-/// Red, green, blue, exponent of the whole row after each other, each in runs.
+/// Decodes the newer encoding: red, green, blue and exponent of the whole row one after the other, each in runs.
 void RadianceReader::read_planes() {
   for (size_t plane = 0; plane < 4; ++plane)
     for (uint32_t x = 0; x < width_;) {
@@ -85,8 +85,8 @@ void RadianceReader::read_planes() {
     }
 }
 
-/// Whole pixels; 1, 1, 1, n repeats the last one n times, and each such code right behind another counts 256 times
-/// more.
+/// Decodes the older encoding: whole pixels, where (1, 1, 1, n) repeats the last pixel n times. Each such code directly
+/// after another counts 256 times more.
 void RadianceReader::read_pixels() {
   uint32_t shift = 0;
   for (uint32_t x = 0; x < width_;) {

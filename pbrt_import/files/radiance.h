@@ -9,21 +9,22 @@
 
 namespace packtrace {
 
-/// Reads a Radiance picture (.hdr) row by row: shared-exponent colours, stored as they are or run-length encoded in
-/// either of the format's ways, rows from the top, columns from the left. Factors in the header (EXPOSURE) are not
-/// applied. Source: Greg Ward, Real Pixels, Graphics Gems II, 1991; Radiance's src/common/color.c.
+/// Reads a Radiance picture (.hdr) row by row: shared-exponent colours, uncompressed or in either of the format's two
+/// run-length encodings, rows from the top, columns from the left. The EXPOSURE of the header is not applied.
+/// Source: Greg Ward, Real Pixels, Graphics Gems II, 1991; Radiance's src/common/color.c.
 class RadianceReader {
 public:
-  /// Reads the header.
+  /// Parses the header.
   /// @param bytes the whole file, which must outlive the reader
-  /// Throws Error(kInput), message without a file name, if it is damaged, or has another orientation or colour space.
+  /// Throws Error(kInput), with a message without file name, if it is damaged or has another orientation or colour
+  /// space.
   explicit RadianceReader(std::span<const std::byte> bytes);
 
   uint32_t width() const { return width_; }   ///< pixels, 1 to 2^24
   uint32_t height() const { return height_; } ///< pixels, 1 to 2^24
 
-  /// The next row, width() linear RGB values; to be called height() times at most. Valid until the next call.
-  /// Throws Error(kInput) if the file ends or a run leaves the row.
+  /// Decodes the next row and returns its width() linear RGB values, valid until the next call. Call at most height()
+  /// times. Throws Error(kInput) if the file ends early or a run exceeds the row.
   std::span<const Vec3> read_row();
 
 private:
@@ -33,7 +34,7 @@ private:
 
   std::span<const std::byte> left_;
   uint32_t width_ = 0, height_ = 0;
-  std::vector<uint8_t> rgbe_; ///< of one row, four bytes a pixel
+  std::vector<uint8_t> rgbe_; ///< one row, four bytes per pixel
   std::vector<Vec3> row_;
 };
 

@@ -14,7 +14,7 @@ using Rgb = std::array<uint8_t, 3>;
 
 [[noreturn]] void truncated() { throw Error(ErrorKind::kInput, "damaged image: the file is truncated"); }
 
-/// Little-endian, of up to four bytes.
+/// Little-endian integer of up to four bytes.
 uint32_t load(std::span<const std::byte> bytes) {
   uint32_t value = 0;
   for (size_t i = bytes.size(); i-- > 0;) value = value << 8 | std::to_integer<uint32_t>(bytes[i]);
@@ -24,7 +24,8 @@ uint32_t load(std::span<const std::byte> bytes) {
 bool is_colour_size(uint32_t bits) { return bits == 8 || bits == 15 || bits == 16 || bits == 24 || bits == 32; }
 size_t bytes_of_bits(uint32_t bits) { return (bits + 7) / 8; }
 
-/// 8 bits are grey, 16 are five bits a channel, or grey and alpha; alpha is left out.
+/// Converts a stored colour: 8 bits are grey; 15 and 16 bits are five bits per channel, or grey and alpha; alpha is
+/// ignored.
 Rgb colour_of(uint32_t word, uint32_t bits, bool grey) {
   const auto byte = [&](uint32_t shift) { return static_cast<uint8_t>(word >> shift); };
   if (bits == 8 || grey) return {byte(0), byte(0), byte(0)};
@@ -33,7 +34,7 @@ Rgb colour_of(uint32_t word, uint32_t bits, bool grey) {
   return {byte(16), byte(8), byte(0)};
 }
 
-/// Pixels in the order of the file.
+/// Reads pixels in file order.
 class PixelReader {
 public:
   PixelReader(std::span<const std::byte> bytes, const TgaHeader& header) : header_(header) {
@@ -86,7 +87,7 @@ private:
   const TgaHeader& header_;
   std::span<const std::byte> left_;
   std::vector<Rgb> palette_;
-  uint32_t packet_left_ = 0; ///< pixels
+  uint32_t packet_left_ = 0; ///< pixels left in the current run
   bool repeats_ = false;
   Rgb run_{};
   uint64_t out_of_range_ = 0;
@@ -120,7 +121,7 @@ std::optional<TgaHeader> parse_tga_header(std::span<const std::byte> bytes) {
 TgaPixels decode_tga(std::span<const std::byte> bytes, const TgaHeader& header) {
   constexpr uint64_t kLongestRun = 128;
   const uint64_t pixels_stored = uint64_t{header.width} * header.height / (header.run_lengths ? kLongestRun : 1);
-  if (pixels_stored * bytes_of_bits(header.pixel_bits) > bytes.size()) truncated(); // before allocating
+  if (pixels_stored * bytes_of_bits(header.pixel_bits) > bytes.size()) truncated(); // checked before allocating
   PixelReader reader(bytes, header);
   TgaPixels pixels;
   pixels.rgb.resize(size_t{header.width} * header.height * 3);

@@ -31,7 +31,7 @@ std::optional<glm::dvec4> read_screen_window(const Directive& directive, Reporte
   return std::nullopt;
 }
 
-/// What pbrt shows of the screen plane for an aspect of the film: [-1, 1] along its shorter axis.
+/// pbrt's default screen window for a film aspect ratio (width / height): [-1, 1] along the shorter axis.
 glm::dvec4 window_of_aspect(double a) {
   return a >= 1.0 ? glm::dvec4(-a, a, -1.0, 1.0) : glm::dvec4(-1.0, 1.0, -1.0 / a, 1.0 / a);
 }
@@ -94,7 +94,7 @@ void CameraCollector::add_camera(const Directive& directive, const TransformPair
       reporter.error(directive.place, "frameaspectratio must be one positive number; the film's is used");
   }
   report_unused(list, reporter);
-  // The inverse of what is only invertible by the rounding of a flattening map may not be invertible itself.
+  // A map that flattens space can count as invertible through rounding alone; its inverse may then not be invertible.
   if (!is_invertible(camera_from_world.start) || !is_invertible(inverse(camera_from_world.start))) {
     reporter.error(directive.place, "the camera's transform has no inverse; the camera is left out");
     return leave_out();
@@ -120,7 +120,7 @@ void CameraCollector::read_crop_window(const Directive& directive, Film& film, R
                                         "; it is ignored");
     return;
   }
-  // pbrt rounds in float, and upwards at both ends.
+  // pbrt rounds in float, and rounds both ends up.
   const auto pixels = [](uint32_t side, float a, float b) {
     const auto edge = [&](float share) {
       return static_cast<uint32_t>(std::ceil(static_cast<float>(side) * std::clamp(share, 0.0f, 1.0f)));
@@ -148,12 +148,12 @@ void CameraCollector::add_film(const Directive& directive, Reporter& reporter) {
   film.place = directive.place;
   film.name = list.get_string("filename", film.name);
   const auto read_side = [&](std::string_view name, uint32_t& side) {
-    constexpr int32_t kMostPixels = 1 << 16;
+    constexpr int32_t kMaxPixels = 1 << 16;
     const int32_t pixels = list.get_integer(name, static_cast<int32_t>(side));
-    if (pixels >= 1 && pixels <= kMostPixels)
+    if (pixels >= 1 && pixels <= kMaxPixels)
       side = static_cast<uint32_t>(pixels);
     else
-      reporter.error(directive.place, std::string(name) + " must lie between 1 and " + std::to_string(kMostPixels) +
+      reporter.error(directive.place, std::string(name) + " must lie between 1 and " + std::to_string(kMaxPixels) +
                                           "; " + std::to_string(side) + " is used");
   };
   read_side("xresolution", film.width_px);
@@ -187,7 +187,7 @@ void CameraCollector::fit_to_film(Entry& entry, const Film& film, Reporter& repo
   camera.width_px = film.width_px;
   camera.height_px = film.height_px;
   camera.film_name = film.name;
-  if (camera.projection == Projection::kEnvironment) { // which sees all directions whatever windows say
+  if (camera.projection == Projection::kEnvironment) { // covers all directions regardless of windows
     camera.screen_window.reset();
     if (!film.cropped()) return;
     ++ignored_["environment_crops"];
@@ -195,7 +195,7 @@ void CameraCollector::fit_to_film(Entry& entry, const Film& film, Reporter& repo
   }
   if (entry.frame_aspect && !camera.screen_window) camera.screen_window = window_of_aspect(*entry.frame_aspect);
   if (!film.cropped()) return;
-  // The crop is a smaller film with a smaller window: its pixels have the rays they have in the whole picture.
+  // A crop is a smaller film with a smaller window, so its pixels have the same rays as in the full image.
   const double film_width = film.width_px, film_height = film.height_px;
   const glm::dvec4 whole = camera.screen_window.value_or(window_of_aspect(film_width / film_height));
   const auto x = [&](uint32_t column) { return whole.x + (whole.y - whole.x) * column / film_width; };
@@ -209,7 +209,7 @@ void CameraCollector::settle(double time, TransformTimes times, std::vector<Anim
                              Reporter& reporter) {
   const Film* before = nullptr;
   for (Entry& entry : entries_) {
-    // Without any film after the first camera, last_film_ is the one before it, or the default.
+    // If no film follows the first camera, last_film_ is the film before it or the default.
     const Film& film = entry.film ? *entry.film : before ? *before : last_film_;
     before = &film;
     fit_to_film(entry, film, reporter);

@@ -8,36 +8,37 @@
 
 #include "pbrt_import/language/graphics_state.h"
 #include "pbrt_import/language/parser.h"
-#include "pbrt_import/text/reporter.h"
-#include "pbrt_import/scene/scene.h"
 #include "pbrt_import/language/transforms.h"
+#include "pbrt_import/scene/scene.h"
+#include "pbrt_import/text/reporter.h"
 
 namespace packtrace {
 
 /// Collects the Camera and Film directives of a scene's options.
 class CameraCollector {
 public:
-  /// @param ignored counts what the camera has and renders do without, as ImportStatistics::ignored
+  /// @param ignored receives counts of camera features that renders do not support, as in ImportStatistics::ignored
   explicit CameraCollector(std::map<std::string, uint64_t>& ignored) : ignored_(ignored) {}
 
-  /// @param camera_from_world the current transforms. Reports problems; a camera is left out if they have no inverse or
-  ///   are not known: it would show something else than what was asked for.
+  /// Reads a Camera directive and reports its problems. The camera is left out if the current transform is not
+  /// invertible or not known, because it would show a different view.
+  /// @param camera_from_world current transforms at both ends of the shutter interval
   void add_camera(const Directive& directive, const TransformPair& camera_from_world, Reporter& reporter);
   void add_film(const Directive& directive, Reporter& reporter);
 
-  /// Counts a camera that cannot be used; add_camera() does so by itself.
+  /// Counts a camera that is left out. add_camera() counts those that it leaves out itself.
   void leave_out() { ++left_out_; }
   uint64_t left_out() const { return left_out_; }
 
-  /// When the shutter of the camera that pbrt renders with opens; 0 without cameras.
+  /// Shutter opening time of the last camera, which pbrt renders with; 0 without cameras.
   double shutter_open() const { return entries_.empty() ? 0.0 : entries_.back().camera.shutter_open; }
 
-  /// Gives each camera its film and its place at a time; the keys of those that move are added to animations. Call
-  /// once, after the last option. A camera has the film that comes next after it, before another camera; if none does,
-  /// the one before it.
+  /// Assigns a film to each camera and evaluates its transform at `time`; the keys of animated cameras are appended to
+  /// `animations`. A camera uses the first film that follows it before the next camera, or else the film of the camera
+  /// before it. Call once, after the last option directive.
   void settle(double time, TransformTimes times, std::vector<AnimatedTransform>& animations, Reporter& reporter);
 
-  /// The file's last camera, which pbrt renders with, then the others in file order.
+  /// Cameras with the last one of the file first, since pbrt renders with it; the others follow in file order.
   std::vector<Camera> finish() const;
 
 private:
@@ -48,8 +49,8 @@ private:
   struct Film {
     uint32_t width_px = 1280;
     uint32_t height_px = 720;
-    PixelRange columns{0, 1280}; ///< inside the crop window
-    PixelRange rows{0, 720};     ///< from the top
+    PixelRange columns{0, 1280}; ///< half-open range inside the crop window
+    PixelRange rows{0, 720};     ///< half-open range inside the crop window, counted from the top
     std::string name = "pbrt.exr";
     Place place;
 
@@ -66,7 +67,7 @@ private:
   static void read_crop_window(const Directive& directive, Film& film, Reporter& reporter);
   void fit_to_film(Entry& entry, const Film& film, Reporter& reporter);
 
-  /// Moves an animated camera to where it is at a time.
+  /// Sets the camera's transform to its animation evaluated at `time`.
   static void animate_camera(Entry& entry, double time, TransformTimes times,
                              std::vector<AnimatedTransform>& animations, Reporter& reporter);
 

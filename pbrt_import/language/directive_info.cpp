@@ -54,13 +54,14 @@ static_assert(std::size(kInfos) == 37);
 
 constexpr size_t kSlots = 128;
 
-/// Few collisions among the keywords, and independent of a word's length.
+/// Hash of a word in constant time: it reads three characters and the length, and has few collisions among the
+/// keywords.
 constexpr size_t slot_of(std::string_view word) {
   const auto letter = [&](size_t i) { return static_cast<size_t>(static_cast<unsigned char>(word[i])); };
   return (letter(0) * 5 + letter(word.size() / 2) * 11 + letter(word.size() - 1) * 3 + word.size() * 17) % kSlots;
 }
 
-/// Open addressing: index into kInfos plus one, 0 where free.
+/// Open-addressing table: index into kInfos plus one, 0 for a free slot.
 constexpr std::array<uint8_t, kSlots> make_slots() {
   std::array<uint8_t, kSlots> slots{};
   for (size_t i = 0; i < std::size(kInfos); ++i) {

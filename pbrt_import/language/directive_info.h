@@ -17,7 +17,7 @@ enum class DirectiveKind : uint8_t {
   kCoordinateSystem,
   kFilm,
   kIdentity,
-  kInclude, ///< never leaves the parser
+  kInclude, ///< handled by the parser, never passed on
   kIntegrator,
   kLightSource,
   kLookAt,
@@ -45,18 +45,18 @@ enum class DirectiveKind : uint8_t {
   kWorldEnd,
 };
 
-/// What a keyword takes.
+/// Arguments that a directive keyword takes.
 struct DirectiveInfo {
   std::string_view keyword;
   DirectiveKind kind;
   uint8_t numbers = 0;
-  uint8_t names = 0; ///< in quotes
+  uint8_t names = 0; ///< quoted strings
   bool parameters = false;
 };
 
-/// Null for words that are no directive.
+/// Looks up a directive by keyword; null if the word is not a directive.
 const DirectiveInfo* find_directive(std::string_view keyword);
-/// The keyword that word is most likely a misspelling of; empty: none.
+/// Directive keyword that `word` is most likely a misspelling of; empty if none is close.
 std::string_view closest_directive(std::string_view word);
 
 } // namespace packtrace

@@ -40,7 +40,7 @@ std::filesystem::path FileNames::resolve(std::string_view raw, const Place& plac
   }
   std::filesystem::path path = (folder_ / name).lexically_normal();
   if (raw.find('\\') != std::string_view::npos && !file_exists(path)) {
-    // Back-slashes were meant as they stand: "textures\brick.png" has no backspace in it.
+    // The backslashes are literal separators: "textures\brick.png" does not contain a backspace.
     std::string slashes;
     for (const char c : raw)
       if (c != '\\')

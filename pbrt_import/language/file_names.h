@@ -12,21 +12,26 @@ namespace packtrace {
 
 class Reporter;
 
-/// Turns file names of scene files into paths, all relative to the main file's folder.
+/// Resolves file names of a scene to paths, relative to the main file's folder. It also keeps track of all files that
+/// the scene names.
 class FileNames {
 public:
-  /// @param allow_outside whether names may lead out of folder
+  /// @param allow_outside whether names may refer to files outside the folder
   FileNames(std::filesystem::path folder, bool allow_outside);
 
-  /// The path that raw, a string of the scene with its escapes in place, names. Back-slashes of Windows exporters are
-  /// read as slashes if only that finds a file (reported once). The file need not exist.
-  /// @return empty, and an error is reported, if the name is empty or leads out of the folder against the rules
+  /// Path of a file name in the scene. Backslashes of Windows exporters are read as slashes, with a warning, if no file
+  /// has the name as written, and either a file has the name with slashes or the name contains an unknown escape. The
+  /// file need not exist.
+  /// @param raw string of the scene, escapes not yet replaced
+  /// @return an empty path, with an error reported, if the name is empty or refers to a file outside the folder
+  ///   although that is not allowed
   std::filesystem::path resolve(std::string_view raw, const Place& place, Reporter& reporter);
 
-  /// Takes note of a name that is of no use to the import, but is a file of the scene all the same.
+  /// Records a file that the scene names but the import does not read.
   void mention(std::string_view raw);
 
-  /// What the names given to both stand for, each path once, in no order. Call once.
+  /// Takes the paths of all names passed to resolve() and mention(), without duplicates, in no particular order. Call
+  /// once.
   std::vector<std::filesystem::path> take_named();
 
 private:

@@ -14,14 +14,14 @@ namespace packtrace {
 
 inline constexpr uint32_t kNone = ~0u;
 
-/// Names that stand for numbers, where blocks give back what was visible before them. Opening a block costs nothing
-/// however many names there are; closing one costs the definitions made inside it.
+/// Maps names to numbers with block scope: closing a block restores the definitions that were visible before it.
+/// Opening a block costs O(1); closing one costs O(definitions made inside it).
 class ScopedNames {
 public:
   /// @param value not kNone
   void define(std::string_view name, uint32_t value);
   std::optional<uint32_t> find(std::string_view name) const;
-  /// The visible name that name is most likely a misspelling of; empty: none.
+  /// Visible name that `name` is most likely a misspelling of; empty if none is close.
   std::string_view closest(std::string_view name) const;
 
   size_t mark() const { return undo_.size(); }
@@ -33,21 +33,21 @@ private:
     uint32_t previous;
   };
   NameTable names_;
-  std::vector<uint32_t> values_; ///< by name; kNone: not visible
+  std::vector<uint32_t> values_; ///< indexed by the name's number; kNone: not visible
   std::vector<Undo> undo_;
 };
 
-/// The transform at the start and at the end of the shutter.
+/// The current transform at the start and at the end of the shutter interval.
 struct TransformPair {
   DAffine start{1.0};
   DAffine end{1.0};
-  bool known = true; ///< false: a directive that should have changed it was ignored
+  bool known = true; ///< false: a directive that changes the transform had to be ignored
 };
 
-/// What AttributeBegin saves, names apart.
+/// The state that AttributeBegin saves, apart from names and transforms.
 struct Attributes {
-  uint32_t material = kNone;   ///< MaterialLibrary's number; kNone: pbrt's default, grey matte
-  uint32_t area_light = kNone; ///< 1: emits from both sides, 0: from the front
+  uint32_t material = kNone;   ///< number in MaterialLibrary; kNone: pbrt's default, grey matte
+  uint32_t area_light = kNone; ///< 1: emits from both sides, 0: from the front; kNone: no light
   bool reverse_orientation = false;
 };
 
@@ -55,7 +55,7 @@ enum class BlockKind : uint8_t { kAttribute, kTransform, kObject };
 std::string_view begin_keyword(BlockKind kind);
 std::string_view end_keyword(BlockKind kind);
 
-/// One open Begin.
+/// An open block, with the state to restore when it closes.
 struct Block {
   BlockKind kind = BlockKind::kAttribute;
   uint8_t active = 3;
@@ -67,36 +67,36 @@ struct Block {
   size_t spectrum_textures = 0;
 };
 
-/// pbrt-v3's graphics state with its stack of blocks, which lives on the heap.
+/// pbrt-v3's graphics state and its stack of open blocks, which is on the heap so that deep nesting is safe.
 class GraphicsState {
 public:
   Attributes attributes;
-  ScopedNames named_materials;   ///< to MaterialLibrary numbers
-  ScopedNames float_textures;    ///< to TextureGraph numbers
-  ScopedNames spectrum_textures; ///< to TextureGraph numbers
+  ScopedNames named_materials;   ///< MaterialLibrary numbers
+  ScopedNames float_textures;    ///< TextureGraph numbers
+  ScopedNames spectrum_textures; ///< TextureGraph numbers
 
   const TransformPair& transform() const { return transform_; }
   bool animated() const { return animated_ && transform_.start != transform_.end; }
 
-  /// Applies a map, before all earlier ones in the order points see it, to the active transforms.
+  /// Multiplies the active transforms by `map` from the right: points are mapped by `map` first.
   void concatenate(const DAffine& map);
   void set_transform(const DAffine& map);
   void set_transform(const TransformPair& pair);
   void reset_transform();
-  /// A directive that should have changed the transform is ignored.
-  void lose_transform() { transform_.known = false; }
-  /// Bit 0: start, bit 1: end.
+  /// Marks the transform as unknown, because a directive that changes it had to be ignored.
+  void mark_transform_unknown() { transform_.known = false; }
+  /// Selects the transforms that later directives change: bit 0 is the start, bit 1 the end.
   void set_active(uint8_t bits) { active_ = bits, animated_ = true; }
 
   void open_block(BlockKind kind, const Place& place);
-  /// Closes the innermost block. There must be one.
+  /// Closes the innermost block and restores its state. Precondition: a block is open.
   void close_block();
   const std::vector<Block>& blocks() const { return blocks_; }
 
 private:
   TransformPair transform_;
   uint8_t active_ = 3;
-  bool animated_ = false; ///< ActiveTransform was ever used
+  bool animated_ = false; ///< whether ActiveTransform was ever used
   std::vector<Block> blocks_;
 };
 

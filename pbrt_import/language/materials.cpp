@@ -14,7 +14,7 @@ namespace {
 
 using Node = TextureGraph::Node;
 
-/// Every name pbrt-v3's materials look up, by kind.
+/// All parameter names that pbrt-v3 looks up for a kind of material.
 std::span<const std::string_view> parameter_names(std::string_view kind) {
   static constexpr std::string_view kMatte[] = {"Kd", "sigma", "bumpmap"};
   static constexpr std::string_view kPlastic[] = {"Kd", "Ks", "roughness", "remaproughness", "bumpmap"};
@@ -70,7 +70,7 @@ std::span<const std::string_view> parameter_names(std::string_view kind) {
   return {};
 }
 
-/// The type that pbrt-v3's materials want a parameter to have.
+/// The type that pbrt-v3 expects of a material parameter.
 TextureParameters::Kind parameter_kind(std::string_view material, std::string_view name) {
   using Kind = TextureParameters::Kind;
   constexpr std::string_view kSpectra[] = {
@@ -116,7 +116,7 @@ Node metal_albedo(const TextureParameters& parameters) {
   return parameters.context().graph.constant(albedo);
 }
 
-/// Diffuse colour, or what stands for it, and flags of a material that is not a mix.
+/// Sets the albedo and the flags of a material that is not a mix. The albedo is the diffuse colour or an approximation.
 void fill_recipe(MaterialRecipe& recipe, std::string_view kind, const TextureParameters& parameters) {
   TextureGraph& graph = parameters.context().graph;
   const auto spectrum = [&](std::string_view name, float fallback) {
@@ -136,7 +136,7 @@ void fill_recipe(MaterialRecipe& recipe, std::string_view kind, const TexturePar
     recipe.albedo = spectrum("Kt", 1.0f);
     const Vec3* const transmitted = graph.constant_value(recipe.albedo);
     if (transmitted && *transmitted == Vec3(0.0f))
-      recipe.albedo = spectrum("Kr", 1.0f); // nothing passes
+      recipe.albedo = spectrum("Kr", 1.0f); // the glass is opaque
     else
       recipe.flags |= kTransmissive;
   } else if (kind == "metal") {
@@ -149,7 +149,7 @@ void fill_recipe(MaterialRecipe& recipe, std::string_view kind, const TexturePar
   } else if (kind == "hair") {
     recipe.albedo = spectrum("color", 0.2f); // pbrt's default is brown hair: eumelanin 1.3
   } else if (kind == "subsurface") {
-    recipe.albedo = graph.constant(Vec3(0.8f)); // most of its measured media scatter far more than they absorb
+    recipe.albedo = graph.constant(Vec3(0.8f)); // most of pbrt's measured media scatter far more than they absorb
   } else if (kind == "none" || kind.empty()) {
     recipe.albedo = graph.constant(Vec3(0.0f));
     recipe.flags |= kInvisible;
@@ -239,8 +239,9 @@ uint32_t MaterialLibrary::with_shape_parameters(uint32_t base, const ParameterLi
     return !parameter.used && std::find(names.begin(), names.end(), parameter.name) != names.end();
   });
   if (!overrides) return base;
-  // A copy: looking parameters up leaves its marks on the list.
-  const std::shared_ptr<const ParameterList> shared = definitions_[base].parameters; // definitions_ grows below
+  // Copies the list, because looking up parameters marks them as used. `shared` keeps it alive while definitions_
+  // grows.
+  const std::shared_ptr<const ParameterList> shared = definitions_[base].parameters;
   const ParameterList base_parameters = shared ? *shared : ParameterList();
   const uint32_t number =
       add(definitions_[base].kind, definitions_[base].recipe.name, TextureParameters(context, shape, &base_parameters));
@@ -250,7 +251,7 @@ uint32_t MaterialLibrary::with_shape_parameters(uint32_t base, const ParameterLi
 
 uint32_t MaterialLibrary::use(const MaterialUse& use) {
   const bool plain = use.alpha == kNone && use.shadow_alpha == kNone && use.area_light == kNone;
-  if (plain) { // most are
+  if (plain) { // most uses are plain
     plain_uses_.resize(definitions_.size(), kNone);
     uint32_t& number = plain_uses_[use.recipe];
     if (number != kNone) return number;
@@ -299,7 +300,7 @@ uint32_t MaterialLibrary::texture_of(const Definition& definition, Scene& scene,
   }
   const size_t count = scene.textures.size();
   it->second = add_texture(scene.textures, std::move(*texture));
-  if (scene.textures.size() == count) memory.resize(before, ""); // there was an equal one
+  if (scene.textures.size() == count) memory.resize(before, ""); // an equal texture exists
   return it->second;
 }
 

@@ -10,62 +10,64 @@
 
 #include "pbrt_import/language/graphics_state.h"
 #include "pbrt_import/language/parser.h"
-#include "pbrt_import/scene/scene.h"
 #include "pbrt_import/language/texture_parameters.h"
+#include "pbrt_import/scene/scene.h"
 
 namespace packtrace {
 
-/// A pbrt material reduced to what the Material of a scene says, textures still as nodes.
+/// A pbrt material reduced to the properties of a scene's Material, with textures still as graph nodes.
 struct MaterialRecipe {
   std::string name; ///< the MakeNamedMaterial name, or the material's kind
   MaterialFlags flags = 0;
   TextureGraph::Node albedo = 0;
 };
 
-/// A recipe as one shape uses it.
+/// A recipe together with a shape's alpha textures and area light.
 struct MaterialUse {
   uint32_t recipe = 0;
   uint32_t alpha = kNone;        ///< texture node; kNone: opaque
   uint32_t shadow_alpha = kNone; ///< texture node
-  uint32_t area_light = kNone;   ///< as Attributes::area_light
+  uint32_t area_light = kNone;   ///< like Attributes::area_light
   auto operator<=>(const MaterialUse&) const = default;
 };
 
-/// All materials of a scene by number.
+/// All materials of a scene, addressed by number.
 class MaterialLibrary {
 public:
   explicit MaterialLibrary(TextureGraph& graph);
 
-  /// pbrt's material for shapes before any Material directive.
+  /// Number of pbrt's default material, for shapes before any Material directive.
   static constexpr uint32_t kDefault = 0;
 
-  /// Reads a Material or MakeNamedMaterial directive, as far as its name is known. Reports problems.
+  /// Defines a material from a Material or MakeNamedMaterial directive and returns its number. Reports problems;
+  /// unknown kinds become matte.
   uint32_t define(const Directive& directive, const TextureContext& context);
 
-  /// The material that a shape with those parameters has: base, or a new one where the shape sets some of base's
-  /// parameters. Marks the parameters it takes as used.
+  /// Number of the material of a shape: `base`, or a new material if the shape's parameters override some of base's.
+  /// Marks the parameters that it uses as used.
   uint32_t with_shape_parameters(uint32_t base, const ParameterList& shape, const TextureContext& context);
 
-  /// Number for a shape to hold until resolve().
+  /// Registers a use and returns its number, which the shape holds until resolve(). Equal uses get the same number.
   uint32_t use(const MaterialUse& use);
 
-  /// Marks the images that used materials depend on as needed.
+  /// Marks the images that the used materials depend on as needed.
   /// @param colours whether resolve() is to make textures
   void require_images(bool colours);
 
-  /// Makes a scene material of each use(), equal ones once, with the masks they need, and the textures if their images
-  /// were required with colours. Call once images are read.
-  /// @param memory grows by the textures
+  /// Makes the scene's materials from all uses, merging equal ones, with their alpha masks, and their textures if
+  /// require_images() was called with colours. Call once, after the images are read.
+  /// @param memory grows by the size of the textures
+  /// @return for each use, its index in scene.materials
   /// Throws MemoryError.
-  /// @return for each use its index in scene.materials
   std::vector<uint32_t> resolve(Scene& scene, MemoryReservation& memory, Reporter& reporter);
 
 private:
   struct Definition {
     std::string kind;
-    std::shared_ptr<const ParameterList> parameters; ///< also of those that shapes make of it; null: none
+    /// Shared by the materials that shapes derive from this one; null: none.
+    std::shared_ptr<const ParameterList> parameters;
     MaterialRecipe recipe;
-    Place place; ///< of the directive that made it: a material's, or a shape's that overrides parameters
+    Place place; ///< of the Material directive, or of the Shape that overrides parameters
   };
   uint32_t add(std::string kind, std::string name, const TextureParameters& parameters);
   Vec3 albedo_of(const Definition& definition, Reporter& reporter);
@@ -77,8 +79,9 @@ private:
   std::map<TextureGraph::Node, uint32_t> texture_of_node_; ///< kNoTexture: none
   std::unordered_multimap<size_t, uint32_t> textures_by_hash_;
   std::vector<Definition> definitions_;
-  std::vector<uint32_t> plain_uses_;            ///< by recipe, without alpha and light; kNone: not used yet
-  std::map<MaterialUse, uint32_t> use_numbers_; ///< of the others
+  /// Number of the use without alpha and light, indexed by recipe; kNone: not used yet.
+  std::vector<uint32_t> plain_uses_;
+  std::map<MaterialUse, uint32_t> use_numbers_; ///< numbers of all other uses
   std::vector<MaterialUse> uses_;
 };
 

@@ -17,8 +17,7 @@ uint32_t hash_of(std::string_view name) {
 
 size_t NameTable::find_slot(std::string_view name, uint32_t hash) const {
   size_t i = hash & (slots_.size() - 1);
-  while (slots_[i].number_plus_one != 0 &&
-         (slots_[i].hash != hash || names_[slots_[i].number_plus_one - 1] != name))
+  while (slots_[i].number_plus_one != 0 && (slots_[i].hash != hash || names_[slots_[i].number_plus_one - 1] != name))
     i = (i + 1) & (slots_.size() - 1);
   return i;
 }
@@ -41,9 +40,9 @@ uint32_t NameTable::intern(std::string_view name) {
 }
 
 std::string_view NameTable::closest(std::string_view name, const std::function<bool(uint32_t)>& visible) const {
-  constexpr uint64_t kMostCompared = 1'000'000;
+  constexpr uint64_t kMaxCompared = 1'000'000;
   compared_ += names_.size();
-  if (compared_ > kMostCompared) return {};
+  if (compared_ > kMaxCompared) return {};
   std::vector<std::string_view> candidates;
   for (uint32_t number = 0; number < names_.size(); ++number)
     if (visible(number)) candidates.push_back(names_[number]);

@@ -9,38 +9,40 @@
 
 namespace packtrace {
 
-/// Numbers for names, in order of first use. Names are never forgotten.
+/// Assigns numbers to names, in order of first use. Names are never removed.
 class NameTable {
 public:
-  /// The name's number, a new one if it is new.
+  /// Number of a name, which is added if it is new.
   uint32_t intern(std::string_view name);
   std::optional<uint32_t> find(std::string_view name) const;
 
-  /// The name that name is most likely a misspelling of, the first in the alphabet of several; empty: none. A broken
-  /// file must not become a slow one: after a million comparisons in all there are no more hints.
-  /// @param visible tells by number which names may be given
+  /// Name that `name` is most likely a misspelling of; the alphabetically first if several are equally close; empty if
+  /// none is. After a million comparisons in total it always returns empty, so that scenes with many mistakes are not
+  /// slow.
+  /// @param visible tells by number which names may be suggested
   std::string_view closest(std::string_view name, const std::function<bool(uint32_t)>& visible) const;
 
-  /// @param number below size(); the view lives as long as the table
+  /// @param number below size()
+  /// @return view that lives as long as the table
   std::string_view name(uint32_t number) const { return names_[number]; }
   uint32_t size() const { return static_cast<uint32_t>(names_.size()); }
 
 private:
   struct Slot {
     uint32_t hash = 0;
-    uint32_t number_plus_one = 0; ///< 0: free
+    uint32_t number_plus_one = 0; ///< 0: free slot
   };
-  /// The slot that holds name, or the free one where it belongs. There must be a free one.
+  /// Index of the slot that holds the name, or of the free slot where it belongs. Precondition: a slot is free.
   size_t find_slot(std::string_view name, uint32_t hash) const;
   void grow();
   std::string_view keep(std::string_view name);
 
-  std::vector<Slot> slots_; ///< open addressing, size a power of two
+  std::vector<Slot> slots_; ///< open addressing; the size is a power of two
   std::vector<std::string_view> names_;
-  std::vector<std::unique_ptr<char[]>> text_; ///< what names_ look at
-  char* room_ = nullptr;                      ///< in the last of text_
+  std::vector<std::unique_ptr<char[]>> text_; ///< storage of names_
+  char* room_ = nullptr;                      ///< free space in the last block of text_
   size_t room_bytes_ = 0;
-  mutable uint64_t compared_ = 0; ///< names, to find hints
+  mutable uint64_t compared_ = 0; ///< names compared by closest() so far
 };
 
 } // namespace packtrace

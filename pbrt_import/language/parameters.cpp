@@ -35,7 +35,7 @@ const Parameter* single_value(const ParameterList& list, std::string_view name, 
   if (!parameter) return nullptr;
   const size_t count = parameter->floats.size() + parameter->integers.size() + parameter->strings.size();
   if (count == values) return parameter;
-  parameter->used = false; // reported as unused, as pbrt does
+  parameter->used = false; // so that it is reported as unused, as in pbrt
   return nullptr;
 }
 
@@ -72,7 +72,7 @@ const Parameter* ParameterList::keep() {
   if (parameters_.size() <= kLinearSearch + 1) {
     for (Parameter& existing : std::span(parameters_).first(parameters_.size() - 1))
       if (existing.type == last.type && existing.name == last.name) same = &existing;
-  } else { // no scene needs so many, but hostile ones have them
+  } else { // only hostile scenes have so many parameters
     const auto key = [](const Parameter& parameter) { return static_cast<char>(parameter.type) + parameter.name; };
     if (index_.empty())
       for (size_t i = 0; i + 1 < parameters_.size(); ++i) index_.emplace(key(parameters_[i]), i);
@@ -86,7 +86,7 @@ const Parameter* ParameterList::keep() {
 }
 
 const Parameter* ParameterList::find_type_in(uint32_t type_bits, std::string_view name) const {
-  asked_.push_back(name);
+  looked_up_.push_back(name);
   if ((types_ & type_bits) == 0) return nullptr;
   for (auto it = parameters_.rbegin(); it != parameters_.rend(); ++it)
     if ((type_bits & bit_of(it->type)) != 0 && it->name == name) {
@@ -157,16 +157,16 @@ std::vector<Triangle> ParameterList::take_triangles(std::string_view name) {
 }
 
 void ParameterList::mark_used(std::span<const std::string_view> names) const {
-  asked_.insert(asked_.end(), names.begin(), names.end());
+  looked_up_.insert(looked_up_.end(), names.begin(), names.end());
   for (const Parameter& parameter : parameters_)
     if (std::find(names.begin(), names.end(), parameter.name) != names.end()) parameter.used = true;
 }
 
-bool ParameterList::was_asked(std::string_view name) const {
-  return std::find(asked_.begin(), asked_.end(), name) != asked_.end();
+bool ParameterList::was_looked_up(std::string_view name) const {
+  return std::find(looked_up_.begin(), looked_up_.end(), name) != looked_up_.end();
 }
 
-std::string_view ParameterList::suggestion(std::string_view name) const { return closest_name(name, asked_); }
+std::string_view ParameterList::suggestion(std::string_view name) const { return closest_name(name, looked_up_); }
 
 std::string did_you_mean(std::string_view suggestion) {
   return did_you_mean_text(suggestion.empty() ? std::string() : in_quotes(suggestion));

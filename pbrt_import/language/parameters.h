@@ -8,13 +8,13 @@
 #include <unordered_map>
 #include <vector>
 
-#include "pbrt_import/text/number_array.h"
 #include "pbrt_import/base/closest_name.h"
 #include "pbrt_import/scene/math.h"
+#include "pbrt_import/text/number_array.h"
 
 namespace packtrace {
 
-/// A place in one of the files of an import; SourceFiles turns it into a SourceLocation.
+/// Position in a file of an import; SourceFiles converts it to a SourceLocation.
 struct Place {
   uint32_t file = 0;
   uint32_t line = 0;
@@ -22,7 +22,7 @@ struct Place {
   bool operator==(const Place&) const = default;
 };
 
-/// pbrt-v3's parameter types with synonyms folded: point is point3, vector is vector3, color is rgb.
+/// pbrt-v3's parameter types. Synonyms are merged: point is point3, vector is vector3, color is rgb.
 enum class ParameterType : uint8_t {
   kInteger,
   kFloat,
@@ -42,52 +42,52 @@ enum class ParameterType : uint8_t {
 
 std::optional<ParameterType> parameter_type(std::string_view name);
 std::string_view to_string(ParameterType type);
-/// The type's name that name is most likely a misspelling of; empty: none.
+/// Type name that `name` is most likely a misspelling of; empty if none is close.
 std::string_view closest_parameter_type(std::string_view name);
 
-/// One `"type name" [ values ]`. Values are in the one vector that fits the type.
+/// One parameter, `"type name" [ values ]`. Its values are in the array that fits the type.
 struct Parameter {
   ParameterType type = ParameterType::kFloat;
   std::string name;
   Place place;
-  FloatArray floats;                ///< all kinds of points, vectors, spectra: components one after the other
-  IntegerArray integers;            ///< integer, and bool as 0 or 1
-  std::vector<std::string> strings; ///< string, texture, spectrum files: escapes not replaced yet
-  mutable bool used = false;        ///< somebody asked for it with its type
+  FloatArray floats;                ///< components of points, vectors and spectra one after the other
+  IntegerArray integers;            ///< values of integer; of bool as 0 or 1
+  std::vector<std::string> strings; ///< string, texture and spectrum file names, escapes not yet replaced
+  mutable bool used = false;        ///< whether it was looked up with its type
 };
 
-/// `"type name"` for messages.
+/// The parameter as `"type name"` for messages.
 std::string describe(const Parameter& parameter);
 
-/// The parameters of one directive. Where a name and type occur twice the last one wins. Looking a parameter up marks
-/// it as used; what stays unused is a mistake in the scene worth reporting.
+/// The parameters of one directive. If a name and type occur twice, the last one wins. Looking up a parameter marks it
+/// as used; unused parameters are reported as mistakes of the scene.
 class ParameterList {
 public:
-  /// A new parameter to be filled in as last(); then keep() or drop() it.
+  /// Appends a parameter, which is filled in through last(). Then call keep() or drop().
   Parameter& append() { return parameters_.emplace_back(); }
   Parameter& last() { return parameters_.back(); }
-  /// It replaces one of the same name and type, if there is one.
-  /// @return null, or where it is now instead of the one before it
+  /// Keeps the last parameter. It replaces an earlier one of the same name and type.
+  /// @return null if it replaces none; otherwise its new location
   const Parameter* keep();
   void drop() { parameters_.pop_back(); }
   void clear() {
-    parameters_.clear(), asked_.clear(), types_ = 0;
-    if (!index_.empty()) index_ = {}; // with its buckets
+    parameters_.clear(), looked_up_.clear(), types_ = 0;
+    if (!index_.empty()) index_ = {}; // also frees its buckets
   }
   bool empty() const { return parameters_.empty(); }
   std::span<const Parameter> all() const { return parameters_; }
 
-  /// The parameter of that name with one of those types; null if there is none.
+  /// Finds a parameter by name with one of the types and marks it as used; null if there is none.
   const Parameter* find(std::string_view name, std::initializer_list<ParameterType> types) const {
     uint32_t bits = 0;
     for (const ParameterType type : types) bits |= bit_of(type);
     return find_type_in(bits, name);
   }
 
-  /// The same, but for one type and without marking it as used.
+  /// Finds a parameter by name and type without marking it as used; null if there is none.
   const Parameter* peek(std::string_view name, ParameterType type) const;
 
-  /// First value of a parameter with exactly one value, else the fallback.
+  /// Value of a parameter that holds exactly one value; otherwise the fallback.
   float get_float(std::string_view name, float fallback) const;
   int32_t get_integer(std::string_view name, int32_t fallback) const;
   bool get_bool(std::string_view name, bool fallback) const;
@@ -95,32 +95,32 @@ public:
   Vec3 get_point(std::string_view name, Vec3 fallback) const;
   Vec3 get_vector(std::string_view name, Vec3 fallback) const;
 
-  /// All values; empty if there are none.
+  /// All values of a parameter; empty if there is no such parameter.
   std::span<const float> floats(std::string_view name, ParameterType type) const;
   std::span<const int32_t> integers(std::string_view name) const;
 
-  /// Moves all values out in groups of three; empty if there are none.
+  /// Moves out all values of a parameter in groups of three; empty if there is no such parameter.
   std::vector<Vec3> take_vectors(std::string_view name, ParameterType type);
   std::vector<Triangle> take_triangles(std::string_view name);
 
-  /// Declares names as known without needing their values.
+  /// Marks the parameters with these names as used, whatever their types.
   void mark_used(std::span<const std::string_view> names) const;
 
-  /// Among the names looked up so far, the one that name is most likely a misspelling of; empty: none is close.
+  /// Of the names looked up so far, the one that `name` is most likely a misspelling of; empty if none is close.
   std::string_view suggestion(std::string_view name) const;
-  bool was_asked(std::string_view name) const;
+  bool was_looked_up(std::string_view name) const;
 
 private:
   static constexpr uint32_t bit_of(ParameterType type) { return 1u << static_cast<uint32_t>(type); }
   const Parameter* find_type_in(uint32_t type_bits, std::string_view name) const;
 
   std::vector<Parameter> parameters_;
-  std::unordered_map<std::string, size_t> index_; ///< into parameters_ by type and name, where there are many
-  uint32_t types_ = 0;                            ///< bit_of() all of them
-  mutable std::vector<std::string_view> asked_;   ///< literals, some of them often
+  std::unordered_map<std::string, size_t> index_;   ///< index into parameters_ by type and name; empty for short lists
+  uint32_t types_ = 0;                              ///< bit_of() of all parameters' types
+  mutable std::vector<std::string_view> looked_up_; ///< names looked up, string literals, possibly with repeats
 };
 
-/// `; did you mean "x"?` or nothing.
+/// Returns `; did you mean "x"?`, or an empty string without a suggestion.
 std::string did_you_mean(std::string_view suggestion);
 
 } // namespace packtrace

@@ -45,7 +45,8 @@ bool is_directive(const Token& token) {
 
 bool is_letter(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'); }
 
-/// A number, maybe with other characters behind it; a word like "Info" is none, though it begins like one.
+/// Whether a token is a number, possibly followed by other characters. A word such as "Info" is not a number, although
+/// it starts like one.
 bool is_number(const Token& token) {
   if (token.kind != TokenKind::kWord) return false;
   const size_t used = parse_number<double>(token.text).used;
@@ -60,7 +61,7 @@ bool is_numeric(ParameterType type) {
   return type != ParameterType::kString && type != ParameterType::kTexture && type != ParameterType::kBool;
 }
 
-/// Appends, converting if need be.
+/// Appends numbers, converted to the type of `values`.
 template <class Number>
 void append(std::vector<double>& values, std::span<const Number> more) {
   values.insert(values.end(), more.begin(), more.end());
@@ -70,7 +71,7 @@ void append(NumberArray<Number, Triplet>& values, std::span<const Other> more) {
   values.append(more);
 }
 
-/// parse_number of a word in the tokenizer's window, which scanners may read beyond.
+/// Like parse_number(), for a word in the tokenizer's window, behind which scanners may read.
 template <class T>
 NumberText<T> parse_word(std::string_view word) {
   NumberText<T> number;
@@ -84,7 +85,7 @@ NumberText<T> parse_word(std::string_view word) {
   return number;
 }
 
-/// What a parameter's declaration holds; empty where it has fewer words.
+/// The words of a parameter declaration; missing words are empty.
 struct DeclaredWords {
   std::string_view type, name, more;
 };
@@ -105,13 +106,13 @@ DeclaredWords split_declaration(std::string_view text) {
   return words;
 }
 
-/// Whether a string is a parameter's declaration rather than a value.
+/// Whether a string is a parameter declaration rather than a value.
 bool declares(std::string_view text) {
   const DeclaredWords words = split_declaration(text);
   return parameter_type(words.type) && !words.name.empty() && words.more.empty();
 }
 
-/// Components per value: values come in multiples of it.
+/// Number of components per value; the count of numbers must be a multiple of it.
 size_t components(ParameterType type) {
   switch (type) {
   case ParameterType::kPoint2:
@@ -217,7 +218,7 @@ bool Parser::read_directive_names(const DirectiveInfo& info, Directive& directiv
       if (info.kind == K::kMediumInterface && directive.name_count == 1) return true;
       const std::string keyword(info.keyword);
       report_unexpected("a quoted name after " + keyword, "; " + keyword + " is ignored");
-      if (token.kind == TokenKind::kWord && !is_directive(token)) source_.consume(); // reported
+      if (token.kind == TokenKind::kWord && !is_directive(token)) source_.consume(); // already reported
       return false;
     }
     if (info.kind == K::kInclude) include_name_ = token.text;
@@ -231,8 +232,8 @@ bool Parser::read_directive_names(const DirectiveInfo& info, Directive& directiv
   return true;
 }
 
-/// What is there instead of what was expected.
-/// @param consequence ends the message, such as "; it is ignored"
+/// Reports the current token as unexpected.
+/// @param consequence end of the message, such as "; it is ignored"
 void Parser::report_unexpected(const std::string& expected, const std::string& consequence) {
   const Token& token = source_.peek();
   const bool unterminated = token.kind == TokenKind::kUnterminatedString;
@@ -241,7 +242,7 @@ void Parser::report_unexpected(const std::string& expected, const std::string& c
                                        consequence);
 }
 
-/// To what is a directive, or stands where one would and may be meant to be one: a word in front of a line behind line.
+/// Skips to the next directive, or to a word that may be meant as one: the first word of a line after `line`.
 void Parser::skip_to_directive(uint32_t line) {
   while (source_.peek().kind != TokenKind::kEnd && !is_directive(source_.peek())) {
     const Token& token = source_.peek();
@@ -268,7 +269,7 @@ bool Parser::take_number(Values& values) {
       reporter_.warning(source_.place(), "integer " + describe(token) + " does not fit in 32 bits");
     else if (number.value != std::trunc(number.value))
       reporter_.warning(source_.place(), "integer expected, found " + describe(token) + "; the fraction is cut off");
-    // Not a number becomes the least integer, which no index or count can be.
+    // NaN becomes the smallest integer, which is not a valid index or count.
     values.push_back(number.value > std::numeric_limits<int32_t>::max()   ? std::numeric_limits<int32_t>::max()
                      : number.value > std::numeric_limits<int32_t>::min() ? static_cast<int32_t>(number.value)
                                                                           : std::numeric_limits<int32_t>::min());
@@ -290,19 +291,19 @@ void Parser::read_number_run(Values& values) {
 }
 
 void Parser::reserve_values() {
-  constexpr uint64_t kStep = 1u << 20; // asking for each number would take longer than reading it
+  constexpr uint64_t kStep = 1u << 20; // a call for every number would take longer than parsing it
   directive_->memory.cover(value_bytes_ + kStep, "what the directive's parameters hold");
 }
 
-/// Everything up to the next directive. What is malformed costs the parameter that it belongs to, and no other.
+/// Reads all parameters up to the next directive. Malformed input costs the parameter that it belongs to and no other.
 void Parser::read_parameters(ParameterList& list) {
-  constexpr uint64_t kParameterBytes = 2 * sizeof(Parameter); // lists double as they grow
+  constexpr uint64_t kParameterBytes = 2 * sizeof(Parameter); // the list doubles its capacity as it grows
   while (true) {
-    if (misread_) {
-      count_value(kParameterBytes + misread_->text.size());
+    if (misread_declaration_) {
+      count_value(kParameterBytes + misread_declaration_->text.size());
       Parameter& parameter = list.append();
-      parameter.place = misread_->place;
-      const bool declared = read_declaration(std::exchange(misread_, std::nullopt)->text, parameter);
+      parameter.place = misread_declaration_->place;
+      const bool declared = read_declaration(std::exchange(misread_declaration_, std::nullopt)->text, parameter);
       read_value_of_last(list, declared);
       continue;
     }
@@ -323,7 +324,7 @@ void Parser::read_parameters(ParameterList& list) {
   }
 }
 
-/// The value of the parameter that was appended last; without a value that can be used the parameter goes.
+/// Reads the value of the parameter that was appended last, and drops the parameter if it has no usable value.
 /// @param declared whether its type and name are known
 void Parser::read_value_of_last(ParameterList& list, bool declared) {
   if (!declared) skip_value();
@@ -333,9 +334,9 @@ void Parser::read_value_of_last(ParameterList& list, bool declared) {
     reporter_.warning(again->place, "parameter " + describe(*again) + " is given again; the last one counts");
 }
 
-/// A word among parameters: a stray one if they go on behind it, else a misspelled directive, which takes its arguments
-/// with it.
-/// @return whether parameters go on behind it
+/// Handles an unexpected word among parameters. If a parameter declaration follows, only the word is skipped; otherwise
+/// it is treated as a misspelled directive and skipped with its arguments.
+/// @return whether more parameters follow
 bool Parser::skip_stray_word() {
   const Place place = source_.place();
   const std::string stray = "expected a parameter or a directive, found " + describe(source_.peek());
@@ -348,7 +349,7 @@ bool Parser::skip_stray_word() {
   return goes_on;
 }
 
-/// What no parameter begins with: a value, a bracket, half a string.
+/// Skips a token that cannot start a parameter: a value, a bracket or an unterminated string.
 void Parser::skip_stray_value(const ParameterList& list) {
   const std::string after = list.empty() ? "" : " after " + describe(list.all().back());
   const Token& token = source_.peek();
@@ -385,7 +386,7 @@ bool Parser::read_declaration(std::string_view text, Parameter& parameter) {
   return false;
 }
 
-/// Skips what could be the value of a parameter that was not understood.
+/// Skips the presumed value of a parameter whose declaration is malformed.
 void Parser::skip_value() {
   const TokenKind kind = source_.peek().kind;
   if (kind == TokenKind::kOpen) {
@@ -397,7 +398,7 @@ void Parser::skip_value() {
   }
 }
 
-/// Skips to behind the array's "]", or to what shows that there is none: a directive, or the next parameter.
+/// Skips past the array's "]", or up to a token that shows that it is missing: a directive or the next parameter.
 void Parser::skip_array_rest() {
   while (true) {
     const Token& token = source_.peek();
@@ -427,14 +428,14 @@ bool Parser::read_single(Parameter& parameter) {
     return false;
   }
   if (parameter.strings.empty() || !declares(parameter.strings[0])) return true;
-  // The value is missing where what was taken for it has a value of its own.
+  // If the string read as the value is a declaration followed by a value, then the value of this parameter is missing.
   const Token& next = source_.peek();
   const bool has_value =
       next.kind == TokenKind::kOpen || is_number(next) || (next.kind == TokenKind::kString && !declares(next.text));
   if (!has_value) return true;
-  misread_ = Declaration{std::move(parameter.strings[0]), place};
+  misread_declaration_ = Declaration{std::move(parameter.strings[0]), place};
   reporter_.error(place, "expected a value for parameter " + in_quotes(parameter.name) + ", found the parameter " +
-                             in_quotes(misread_->text) + "; the parameter is ignored");
+                             in_quotes(misread_declaration_->text) + "; the parameter is ignored");
   return false;
 }
 
@@ -461,9 +462,9 @@ bool Parser::read_array(Parameter& parameter) {
     const bool text = parameter.type == ParameterType::kString || parameter.type == ParameterType::kTexture;
     if (!text && token.kind == TokenKind::kString && declares(token.text)) return runs_into(describe(token));
     if (text && !parameter.strings.empty() && (token.kind == TokenKind::kOpen || is_number(token)) &&
-        declares(parameter.strings.back())) { // what has values of its own was no string of the array
-      misread_ = Declaration{std::move(parameter.strings.back()), last};
-      return runs_into("the parameter " + in_quotes(misread_->text));
+        declares(parameter.strings.back())) { // the last string is a declaration, because a value follows it
+      misread_declaration_ = Declaration{std::move(parameter.strings.back()), last};
+      return runs_into("the parameter " + in_quotes(misread_declaration_->text));
     }
     last = source_.place();
     if (parameter.type == ParameterType::kBool ? take_bool(parameter) : take_string(parameter)) continue;

@@ -7,37 +7,38 @@
 #include <string_view>
 #include <vector>
 
+#include "pbrt_import/base/memory_budget.h"
 #include "pbrt_import/language/directive_info.h"
 #include "pbrt_import/language/file_names.h"
 #include "pbrt_import/language/parameters.h"
-#include "pbrt_import/base/memory_budget.h"
 #include "pbrt_import/text/source_stack.h"
 
 namespace packtrace {
 
-/// One directive with all that belongs to it. Numbers and names are as many as the kind takes (MediumInterface: one or
-/// two names; ActiveTransform: its word is names[0]).
+/// One directive with its arguments. It has as many numbers and names as its kind requires; MediumInterface has one or
+/// two names, and names[0] of ActiveTransform is its word.
 struct Directive {
   DirectiveKind kind = DirectiveKind::kIdentity;
   std::string_view keyword;
   Place place;
   std::array<double, 16> numbers{};
-  std::array<std::string, 3> names; ///< escapes replaced
+  std::array<std::string, 3> names; ///< quoted names, with escapes replaced
   uint32_t name_count = 0;
   ParameterList parameters;
-  MemoryReservation memory; ///< of the parameters, where they are many
-  bool damaged = false; ///< its numbers or names could not be read, which was reported: nothing but its kind counts
+  MemoryReservation memory; ///< reservation for large parameters
+  bool damaged = false;     ///< its numbers or names are malformed, which was reported; only kind is valid
 };
 
-/// Reads directives one after the other and follows Include. What is malformed is reported and costs as little as
-/// possible: a parameter, or a directive that cannot do without its names or numbers.
+/// Reads directives one by one and follows Include. Malformed input is reported and costs as little as possible: one
+/// parameter, or one directive if its names or numbers are malformed.
 class Parser {
 public:
-  /// @param memory for the parameters of directives
+  /// @param memory budget for the parameters of directives
   Parser(SourceStack& source, FileNames& file_names, Reporter& reporter, const MemoryBudget& memory = MemoryBudget())
       : source_(source), file_names_(file_names), reporter_(reporter), memory_(memory) {}
 
-  /// False at the end of the main file. directive is reused: spans into its parameters end here. Throws MemoryError.
+  /// Reads the next directive; returns false at the end of the main file. `directive` is reused, which invalidates
+  /// spans into its parameters. Throws MemoryError.
   bool next(Directive& directive);
 
 private:
@@ -68,9 +69,9 @@ private:
   void skip_array_rest();
   void skip_to_directive(uint32_t line);
   void report_unexpected(const std::string& expected, const std::string& consequence);
-  /// Call before a value of the directive is kept.
+  /// Counts the memory of a value against the budget. Call before the value is stored.
   void count_value(uint64_t bytes) {
-    constexpr uint64_t kFree = 1u << 20; // most directives need no more
+    constexpr uint64_t kFree = 1u << 20; // enough for most directives
     value_bytes_ += bytes;
     if (value_bytes_ > kFree && value_bytes_ > directive_->memory.bytes()) reserve_values();
   }
@@ -79,12 +80,13 @@ private:
   SourceStack& source_;
   FileNames& file_names_;
   Reporter& reporter_;
-  std::vector<double> numbers_;        ///< scratch
-  std::string include_name_;           ///< escapes untouched
-  std::optional<Declaration> misread_; ///< taken for the value of the parameter before it
+  std::vector<double> numbers_; ///< scratch buffer
+  std::string include_name_;    ///< escapes not yet replaced
+  std::optional<Declaration>
+      misread_declaration_; ///< a declaration that was read as the value of the previous parameter
   MemoryBudget memory_;
-  Directive* directive_ = nullptr; ///< the one being read
-  uint64_t value_bytes_ = 0;       ///< of its parameters
+  Directive* directive_ = nullptr; ///< the directive being read
+  uint64_t value_bytes_ = 0;       ///< bytes of its parameters
 };
 
 } // namespace packtrace

@@ -24,7 +24,7 @@ DVec3 matching_functions(double nm) {
           1.217 * lobe(nm, 437.0, 0.0845, 0.0278) + 0.681 * lobe(nm, 459.0, 0.0385, 0.0725)};
 }
 
-/// XYZ of a spectrum, divided by the Y of a flat one.
+/// Linear sRGB of a spectrum, normalised so that a flat spectrum of 1 has Y = 1.
 template <class Spectrum>
 Vec3 rgb_from_spectrum(Spectrum spectrum) {
   DVec3 xyz(0.0);
@@ -98,7 +98,7 @@ float conductor_albedo(float eta, float k) {
   const double eta2 = static_cast<double>(eta) * eta, k2 = static_cast<double>(k) * k;
   double sum = 0.0;
   for (int i = 0; i < kSteps; ++i) {
-    // Midpoints in cos^2, whose density 2 cos d(cos) is the cosine weight.
+    // Samples cos^2 at midpoints: d(cos^2) = 2 cos d(cos) is the cosine weight.
     const double cos2 = (i + 0.5) / kSteps, sin2 = 1.0 - cos2, cosine = std::sqrt(cos2);
     const double t0 = eta2 - k2 - sin2;
     const double a2b2 = std::sqrt(t0 * t0 + 4.0 * eta2 * k2);

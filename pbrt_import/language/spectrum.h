@@ -14,17 +14,17 @@ namespace packtrace {
 /// Linear sRGB from CIE XYZ, D65 white.
 Vec3 rgb_from_xyz(Vec3 xyz);
 
-/// Linear sRGB of a spectrum given as wavelength (nm), value pairs in any order, linear in between and constant
+/// Linear sRGB of a spectrum given as (wavelength in nm, value) pairs in any order, linear between samples and constant
 /// outside. A flat spectrum of 1 has Y = 1. Components may be negative for saturated colours.
 /// Source: Chris Wyman, Peter-Pike Sloan, Peter Shirley, Simple Analytic Approximations to the CIE XYZ Color Matching
 /// Functions, JCGT 2013, multi-lobe fit.
 Vec3 rgb_from_samples(std::span<const float> pairs);
 
-/// Linear sRGB of a black body, brightest wavelength normalised to 1 (pbrt-v3's convention), times scale.
+/// Linear sRGB of a black body spectrum, normalised to 1 at its peak wavelength (pbrt-v3's convention), times scale.
 Vec3 rgb_from_blackbody(double kelvin, double scale);
 
-/// The wavelength, value pairs of an .spd file: numbers, `#` comments to the end of the line.
-/// @return none if there is something else in it, or an odd or no number of values
+/// Parses the (wavelength, value) pairs of an .spd file: numbers, with `#` comments to the end of the line.
+/// @return nullopt if there is anything else, or an odd number of values or none
 std::optional<std::vector<float>> parse_spd(std::string_view text);
 
 /// Directional-hemispherical reflectance of a smooth conductor in air, averaged over cosine-weighted directions.
@@ -37,8 +37,9 @@ struct MetalIndices {
   Vec3 k{0.0f};
 };
 
-/// By chemical symbol, as it begins file names such as "metals/Cu.eta.spd". Copper is pbrt-v3's default metal.
-/// @return none if not in the table
+/// Indices of refraction by chemical symbol, which starts file names such as "metals/Cu.eta.spd". Copper is pbrt-v3's
+/// default metal.
+/// @return nullopt if the metal is not in the table
 std::optional<MetalIndices> metal_by_name(std::string_view name);
 
 } // namespace packtrace

@@ -21,8 +21,8 @@ glm::dvec2 mapped(glm::dvec2 uv, const TextureMapping& mapping) {
   return uv * glm::dvec2(mapping.scale) + glm::dvec2(mapping.offset);
 }
 
-/// Where a texel lies in its image, or nothing where a black-wrapped image ends.
-/// @param x,y texel, whole numbers, possibly outside the image
+/// Applies the wrap mode to texel coordinates; nullopt outside an image with black wrap.
+/// @param x,y integer texel coordinates, possibly outside the image
 std::optional<std::pair<uint32_t, uint32_t>> wrapped_texel(const ImageSummary& image, WrapMode wrap, double x,
                                                            double y) {
   const double w = image.width, h = image.height;
@@ -40,7 +40,7 @@ bool texel_nonzero(const ImageSummary& image, WrapMode wrap, double x, double y)
          1u;
 }
 
-/// The side of textures that have no image to give them one: checkerboards.
+/// Resolution of textures that contain checkerboards but no image.
 constexpr uint32_t kSampledMaskSize = 1024, kSampledTextureSize = 256;
 
 } // namespace
@@ -176,16 +176,16 @@ bool TextureGraph::nonzero(const NodeData& data, glm::dvec2 uv, std::span<const 
     const ImageRequest& image = images_[data.a];
     if (is_zero(data.value)) return false;
     if (image.missing || !is_usable(data.mapping)) return true;
-    // The texel itself, not pbrt's bilinear neighbourhood: AlphaMaskView looks at that.
+    // Looks up a single texel, because AlphaMaskView applies pbrt's bilinear footprint later.
     const glm::dvec2 st = mapped(uv, data.mapping);
-    if (!std::isfinite(st.x) || !std::isfinite(st.y)) return true; // as AlphaMaskView does
+    if (!std::isfinite(st.x) || !std::isfinite(st.y)) return true; // opaque, as in AlphaMaskView
     return texel_nonzero(image.summary, data.wrap, std::floor(st.x * image.summary.width),
                          std::floor((1.0 - st.y) * image.summary.height));
   }
   case Kind::kProduct:
     return operands[0] && operands[1];
   case Kind::kMix:
-    return operands[0] || (operands[1] && operands[2]); // an amount of exactly 1 is not told apart
+    return operands[0] || (operands[1] && operands[2]); // an amount of exactly 1 is not handled specially
   case Kind::kCheckerboard: {
     if (!is_usable(data.mapping)) return operands[0] || operands[1];
     const glm::dvec2 st = mapped(uv, data.mapping);
@@ -199,8 +199,8 @@ bool TextureGraph::nonzero(const NodeData& data, glm::dvec2 uv, std::span<const 
 TextureGraph::MaskResult TextureGraph::alpha_mask(Node node) const {
   MaskResult result;
   const std::vector<Node> order = reachable(node);
-  const NodeData* layout = nullptr; // the image that sets the resolution
-  const NodeData* board = nullptr;  // the checkerboard that sets the period where there is no image
+  const NodeData* layout = nullptr; // the widest image, which sets the resolution
+  const NodeData* board = nullptr;  // the checkerboard that sets the period if there is no image
   bool only_image_varies = true, sampled = false;
   for (const Node n : order) {
     const NodeData& data = nodes_[n];
@@ -219,12 +219,12 @@ TextureGraph::MaskResult TextureGraph::alpha_mask(Node node) const {
   mask.height = layout ? images_[layout->a].summary.height : sampled ? kSampledMaskSize : 1;
   if (layout) {
     mask.wrap = layout->wrap, mask.uv_scale = layout->mapping.scale, mask.uv_offset = layout->mapping.offset;
-  } else if (board) { // a checkerboard repeats after two cells
+  } else if (board) { // a checkerboard repeats every two cells
     mask.uv_scale = 0.5f * board->mapping.scale, mask.uv_offset = 0.5f * board->mapping.offset;
   }
-  constexpr size_t kMostNodes = 64;                        // per texel
-  constexpr uint64_t kMostEvaluations = uint64_t{1} << 31; // seconds, where nodes and texels multiply to hours
-  if (order.size() > kMostNodes || uint64_t{mask.width} * mask.height > kMostEvaluations / order.size()) {
+  constexpr size_t kMaxEvaluatedNodes = 64;               // per texel
+  constexpr uint64_t kMaxEvaluations = uint64_t{1} << 31; // a few seconds; unbounded, it could be hours
+  if (order.size() > kMaxEvaluatedNodes || uint64_t{mask.width} * mask.height > kMaxEvaluations / order.size()) {
     result.exact = false;
     mask = {};
     return result;
@@ -242,14 +242,14 @@ TextureGraph::MaskResult TextureGraph::alpha_mask(Node node) const {
   size_t set = 0;
   for (const uint32_t word : mask.words) set += static_cast<size_t>(std::popcount(word));
   const size_t all = static_cast<size_t>(mask.width) * mask.height;
-  // Outside a black-wrapped image everything is 0, however opaque the image.
+  // Everything outside an image with black wrap is 0, so an opaque image has holes as well.
   const bool all_set = set == all && !(layout && mask.wrap == WrapMode::kBlack);
   result.kind = set == 0 ? MaskKind::kAllHoles : all_set ? MaskKind::kNoHoles : MaskKind::kSomeHoles;
   if (result.kind != MaskKind::kSomeHoles) mask = {};
   return result;
 }
 
-/// Evaluates the nodes, operands first, at each texel's centre; the last one's result is put at the texel.
+/// Evaluates the nodes at each texel's centre, operands first, and passes the last node's result to `put`.
 template <class Value, class Texture, class Evaluate, class Put>
 void TextureGraph::rasterize(std::span<const Node> order, const Texture& texture, const Evaluate& evaluate,
                              const Put& put) const {
@@ -313,7 +313,7 @@ Vec3 TextureGraph::colour(Node node, glm::dvec2 uv, std::span<const Vec3> operan
 }
 
 std::optional<AlbedoTexture> TextureGraph::albedo_texture(Node node, MemoryReservation& memory) {
-  average(node); // those of all nodes up to it
+  average(node); // computes the averages of all nodes up to this one
   const std::vector<Node> order = reachable(node);
   const NodeData *layout = nullptr, *board = nullptr; // as in alpha_mask()
   for (const Node n : order) {
@@ -335,9 +335,9 @@ std::optional<AlbedoTexture> TextureGraph::albedo_texture(Node node, MemoryReser
     texture.uv_scale = 0.5f * board->mapping.scale, texture.uv_offset = 0.5f * board->mapping.offset;
   }
   const uint64_t texels = uint64_t{texture.width} * texture.height;
-  constexpr size_t kMostNodes = 64;                        // per texel
-  constexpr uint64_t kMostEvaluations = uint64_t{1} << 28; // seconds, where nodes and texels multiply to minutes
-  if (order.size() > kMostNodes || texels > kMostTextureTexels || texels > kMostEvaluations / order.size())
+  constexpr size_t kMaxEvaluatedNodes = 64;               // per texel
+  constexpr uint64_t kMaxEvaluations = uint64_t{1} << 28; // a few seconds; unbounded, it could be minutes
+  if (order.size() > kMaxEvaluatedNodes || texels > kMaxTextureTexels || texels > kMaxEvaluations / order.size())
     return std::nullopt;
   if (texels * order.size() > evaluations_left_) return texture;
   memory.resize(memory.bytes() + 3 * texels, "the textures of materials");

@@ -16,81 +16,84 @@
 
 namespace packtrace {
 
-/// st = uv * scale + offset, or something else (spherical, planar ...) of which only averages can be told.
+/// Texture mapping: st = uv * scale + offset, or another mapping (spherical, planar, ...), for which only the texture's
+/// average is known.
 struct TextureMapping {
   Vec2 scale{1.0f};
   Vec2 offset{0.0f};
   bool is_uv = true;
 };
 
-/// An image file that textures name. One per file and colour encoding.
+/// An image file that textures use. There is one request per file and colour encoding.
 struct ImageRequest {
   std::filesystem::path path;
   bool decode_srgb = false;
-  Place place;           ///< of the first texture that names it
-  uint64_t sequence = 0; ///< of that texture's directive
-  bool needed = false;   ///< something visible depends on it
+  Place place;           ///< position of the first texture that uses it
+  uint64_t sequence = 0; ///< Reporter::sequence() of that texture's directive
+  bool needed = false;   ///< a used material depends on it
   bool want_mask = false;
   bool want_colours = false;
-  bool missing = false; ///< no such file, or unreadable: counts as 1 everywhere, as in pbrt
-  ImageSummary summary; ///< filled in by whoever reads the files
-  MemoryReservation memory; ///< of the summary
+  bool missing = false;     ///< missing or unreadable: counts as 1 everywhere, as in pbrt
+  ImageSummary summary;     ///< filled in by FileLoader
+  MemoryReservation memory; ///< for the summary
 };
 
-/// All textures of a scene as expressions over constants and images. A node only refers to nodes made before it. Values
-/// are known once the images that require() asks for have been read.
+/// All textures of a scene as expressions over constants and images. The operands of a node have smaller numbers.
+/// Values are known once the images that require() marks have been read.
 class TextureGraph {
 public:
   using Node = uint32_t;
 
   Node constant(Vec3 value);
-  Node procedural(Vec3 mean); ///< varies in a way that only its mean is known of; not 0 anywhere
+  Node procedural(Vec3 mean); ///< varies in an unmodelled way, with this mean; never exactly 0
   Node image(uint32_t image, Vec3 scale, WrapMode wrap, const TextureMapping& mapping);
   Node product(Node a, Node b);
   Node mix(Node a, Node b, Node amount); ///< (1 - amount) a + amount b
   Node checkerboard(Node a, Node b, const TextureMapping& mapping);
 
-  /// Number for image(): the request with this path and encoding, made if there is none.
+  /// Returns the index of the request with this path and encoding, which image() takes; adds it if there is none.
   uint32_t request_image(const std::filesystem::path& path, bool decode_srgb, const Place& place, uint64_t sequence);
   std::vector<ImageRequest>& images() { return images_; }
 
-  /// A Texture directive that stands for a node.
+  /// The Texture directive that defined a node.
   struct Origin {
     std::string name;
     Place place;
   };
-  /// The first origin of a node stays.
+  /// Sets the origin of a node; the first call per node wins.
   void set_origin(Node node, const std::string& name, const Place& place) { origins_.try_emplace(node, name, place); }
-  /// Nameless for nodes that no directive stands for.
+  /// Origin of a node; without a name if no directive defined it.
   Origin origin(Node node) const;
 
-  /// The value, where it is the same everywhere and no image has to be read for it.
+  /// The value of a constant node; null for all other nodes.
   const Vec3* constant_value(Node node) const;
 
-  /// Marks the images behind node as needed, and what is wanted of them.
+  /// Marks the images that a node depends on as needed, and adds to what is wanted of them.
   void require(Node node, ImageWants wants);
 
-  /// Mean over the texture's domain; of a product the product of means.
+  /// Mean over the texture's domain; the mean of a product is approximated by the product of the means.
   Vec3 average(Node node);
 
-  /// Where the texture is exactly 0, as pbrt's alpha test asks.
+  /// Classifies where a texture is exactly 0, which is pbrt's alpha test.
   enum class MaskKind { kNoHoles, kAllHoles, kSomeHoles };
   struct MaskResult {
     MaskKind kind = MaskKind::kNoHoles;
-    AlphaMask mask;    ///< for kSomeHoles
-    bool exact = true; ///< false: sampled, or holes ignored because they cannot be told from uv
+    AlphaMask mask;    ///< only set for kSomeHoles
+    bool exact = true; ///< false: sampled, or with holes ignored that do not depend on uv alone
   };
   MaskResult alpha_mask(Node node) const;
 
-  /// The colours over uv, sampled at the texels of the widest image; nothing where uv does not change them, where an
-  /// image's colours were not kept, or there are more than kMostTextureTexels. What has no uv counts with its average.
-  /// Without texels where all textures so far took too many evaluations.
+  /// The colours over uv, sampled at the texels of the widest image. Textures without a uv mapping contribute their
+  /// average. Returns nullopt if the colours do not depend on uv, if an image's colours were not kept, if there are
+  /// more than kMaxTextureTexels texels, or if the expression is too large to evaluate. Returns a texture without
+  /// texels once the scene's budget of evaluations is used up.
   /// @param memory grows by the texels
   /// Throws MemoryError.
   std::optional<AlbedoTexture> albedo_texture(Node node, MemoryReservation& memory);
 
 private:
-  uint64_t evaluations_left_ = uint64_t{1} << 32; ///< of nodes at texels, for the textures of a scene
+  /// Remaining node evaluations at texels, for all textures of the scene.
+  uint64_t evaluations_left_ = uint64_t{1} << 32;
   enum class Kind : uint8_t { kConstant, kProcedural, kImage, kProduct, kMix, kCheckerboard };
   struct NodeData {
     Kind kind = Kind::kConstant;
@@ -108,7 +111,7 @@ private:
   Vec3 image_colour(Node node, glm::dvec2 uv) const;
 
   std::vector<NodeData> nodes_;
-  std::vector<Vec3> averages_; ///< of the first nodes; grows on demand
+  std::vector<Vec3> averages_; ///< averages of the first nodes, extended on demand
   std::unordered_map<Node, Origin> origins_;
   std::vector<ImageRequest> images_;
   std::map<std::pair<std::filesystem::path, bool>, uint32_t> image_numbers_;

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pbrt_import/text/input_file.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/language/spectrum.h"
+#include "pbrt_import/text/input_file.h"
 #include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
@@ -131,7 +131,7 @@ std::optional<Vec3> TextureParameters::rgb_from_file(const Parameter& parameter)
   } catch (const Error& error) {
     std::error_code ignored;
     if (metal_by_name(parameter.strings[0]) && !std::filesystem::exists(path, ignored))
-      return std::nullopt; // the caller knows that metal without the file
+      return std::nullopt; // the caller knows this metal without the file
     context_.reporter.error(parameter.place, "cannot read spectrum file " + in_quotes(path.string(), kMaxShownPath) +
                                                  ": " + error.what());
     return std::nullopt;
@@ -157,7 +157,7 @@ std::string TextureParameters::get_string(std::string_view name, std::string_vie
 }
 
 void TextureParameters::check(std::string_view name, Kind kind) const {
-  find(name, {}); // the name is known, whatever its type
+  find(name, {}); // registers the name as known, whatever its type
   const auto unread = [&](const Parameter& parameter) { return parameter.name == name && !parameter.used; };
   if (std::none_of(first_.all().begin(), first_.all().end(), unread)) return;
   switch (kind) {

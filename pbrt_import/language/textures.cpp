@@ -12,7 +12,7 @@ namespace {
 
 using Node = TextureGraph::Node;
 
-/// One Texture directive being read.
+/// A Texture directive being read.
 struct TextureMaker {
   const Directive& directive;
   const TextureContext& context;
@@ -80,7 +80,7 @@ std::optional<Node> make_imagemap(const TextureMaker& maker) {
   }
   const std::filesystem::path path = context.file_names.resolve(file->strings[0], file->place, context.reporter);
   if (path.empty()) return maker.constant(Vec3(scale));
-  // pbrt's rule: formats that usually are sRGB-encoded are taken to be.
+  // pbrt's rule: PNG and TGA images are sRGB-encoded by default.
   std::string extension = path.extension().string();
   for (char& c : extension)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c + 32);
@@ -158,8 +158,8 @@ std::optional<Node> make_by_class(const TextureMaker& maker, const std::string& 
     read_mapping(maker);
     return maker.constant(Vec3(0.5f, 0.5f, 0.0f));
   }
-  // About the means of pbrt-v3's procedural textures at their default parameters, negative values being black; an
-  // average colour asks for no more.
+  // Approximate means of pbrt-v3's procedural textures at their default parameters, with negative values clamped to 0;
+  // an average colour does not need more precision.
   if (kind == "fbm") return make_mean(maker, Vec3(maker.is_float ? 0.0f : 0.12f));
   if (kind == "wrinkled") return make_mean(maker, Vec3(0.4f));
   if (kind == "windy") return make_mean(maker, Vec3(0.03f));

@@ -7,9 +7,9 @@
 
 namespace packtrace {
 
-/// The node that a Texture directive stands for: an expression over constants and images, or the mean of a procedural
-/// texture. Float textures have three equal components. Reports problems, among them missing image files.
-/// @return none if the directive is unusable; the name stays undefined
+/// Creates the graph node of a Texture directive: an expression over constants and images, or the mean of a procedural
+/// texture. Float textures have three equal components. Reports problems, including missing image files.
+/// @return nullopt if the directive is unusable; its name then stays undefined
 std::optional<TextureGraph::Node> make_texture(const Directive& directive, const TextureContext& context);
 
 } // namespace packtrace

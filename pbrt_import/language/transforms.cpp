@@ -24,7 +24,7 @@ std::optional<DAffine> rotation(double degrees, DVec3 axis) {
   if (!(length > 0.0)) return std::nullopt;
   const DVec3 a = axis / length;
   const double angle = degrees * std::numbers::pi / 180.0;
-  // Quarter turns are exact: exporters use them to swap axes, and dust in the matrix would tilt every plane.
+  // Quarter turns are exact: exporters use them to swap axes, and rounding errors in the matrix would tilt every plane.
   const double quarters = degrees / 90.0;
   const bool exact = quarters == std::floor(quarters) && std::abs(quarters) < 1e9;
   const auto quarter = exact ? static_cast<int64_t>(quarters) & 3 : 0;
@@ -57,7 +57,7 @@ bool is_finite(const DAffine& map) {
 bool is_invertible(const DAffine& map) {
   if (!is_finite(map)) return false;
   const double determinant = glm::determinant(glm::dmat3(map));
-  // Far from overflow: nine products of two entries, and the offset, divided by the determinant.
+  // Far from overflow: the inverse divides products of two entries, and the offset, by the determinant.
   constexpr double kModerate = 1e90;
   const auto moderate = [](DVec3 v) {
     return std::abs(v.x) < kModerate && std::abs(v.y) < kModerate && std::abs(v.z) < kModerate;
@@ -74,20 +74,20 @@ std::optional<TransformKey> decompose(const DAffine& map) {
   const auto norm = [](const glm::dmat3& m) {
     return std::sqrt(glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
   };
-  // Newton's iteration for the nearest orthogonal matrix. The factor makes its first steps count for any scale; near
-  // the end it is 1 and convergence quadratic.
-  constexpr int kMostSteps = 64;
+  // Newton's iteration for the nearest orthogonal matrix. The factor speeds up the first steps for badly scaled maps;
+  // it tends to 1 near the solution, where convergence is quadratic.
+  constexpr int kMaxSteps = 64;
   constexpr double kConverged = 1e-14;
   glm::dmat3 rotation = linear;
   double change = 1.0;
-  for (int step = 0; step < kMostSteps && change > kConverged; ++step) {
+  for (int step = 0; step < kMaxSteps && change > kConverged; ++step) {
     const glm::dmat3 inverted = glm::transpose(glm::inverse(rotation));
     const double factor = std::sqrt(norm(inverted) / norm(rotation));
     const glm::dmat3 next = (rotation * factor + inverted / factor) * 0.5;
     change = norm(next - rotation) / norm(next);
     rotation = next;
   }
-  if (!(change <= std::sqrt(kConverged))) return std::nullopt; // singular as far as doubles can tell
+  if (!(change <= std::sqrt(kConverged))) return std::nullopt; // numerically singular
   if (glm::determinant(rotation) < 0.0) rotation = -rotation;
   return TransformKey{map, glm::normalize(glm::quat_cast(rotation)), glm::transpose(rotation) * linear};
 }

@@ -32,7 +32,7 @@ bool AlphaMaskView::opaque(Vec2 uv) const {
   const double t = static_cast<double>(uv.y) * uv_scale.y + uv_offset.y;
   // Texel centres are at (i + 1/2) / size; t runs up while rows run down.
   const double x = s * width - 0.5, y = (1.0 - t) * height - 0.5;
-  constexpr double kLimit = 9.0e15; // beyond it neighbouring texels are not distinguishable in double
+  constexpr double kLimit = 9.0e15; // beyond this, doubles cannot distinguish neighbouring texels
   if (!(std::abs(x) < kLimit && std::abs(y) < kLimit)) return true;
   const auto x0 = static_cast<int64_t>(std::floor(x)), y0 = static_cast<int64_t>(std::floor(y));
   // A texel with zero bilinear weight does not contribute.

@@ -10,20 +10,20 @@ namespace packtrace {
 
 enum class WrapMode : uint32_t { kRepeat = 0, kBlack = 1, kClamp = 2 };
 
-/// Where an alpha texture is exactly zero: 1 bit per texel, set = opaque. Row 0 is the image's top row, which pbrt's
-/// (u,v) = (0,1) corner maps to; rows start at word boundaries.
+/// Mask of the texels where an alpha texture is not exactly 0: one bit per texel, set = opaque. Row 0 is the top row of
+/// the image, to which pbrt's corner (u, v) = (0, 1) maps; rows start at word boundaries.
 struct AlphaMask {
   uint32_t width = 0;  ///< texels
   uint32_t height = 0; ///< texels
   WrapMode wrap = WrapMode::kRepeat;
   Vec2 uv_scale{1.0f}; ///< st = uv * uv_scale + uv_offset
   Vec2 uv_offset{0.0f};
-  std::vector<uint32_t> words; ///< height x row_words(width), bit x%32 of word x/32 is texel x
+  std::vector<uint32_t> words; ///< height x row_words(width) words; bit x % 32 of word x / 32 of a row is texel x
 
   static constexpr uint32_t row_words(uint32_t width_texels) { return width_texels / 32 + (width_texels % 32 != 0); }
 };
 
-/// A mask that does not own its bits; what both AlphaMask and the baked file can be looked at through.
+/// View of a mask whose bits belong to an AlphaMask or to a baked file.
 struct AlphaMaskView {
   uint32_t width = 0;
   uint32_t height = 0;
@@ -32,8 +32,8 @@ struct AlphaMaskView {
   Vec2 uv_offset{0.0f};
   std::span<const uint32_t> words;
 
-  /// False where pbrt's bilinear lookup at uv would return exactly 0: all four texels of the footprint are 0.
-  /// Non-finite uv count as opaque.
+  /// False if pbrt's bilinear lookup at uv returns exactly 0, that is, if all texels of the footprint with nonzero
+  /// weight are 0. Non-finite uv count as opaque.
   bool opaque(Vec2 uv) const;
 };
 

@@ -20,10 +20,10 @@ struct Bounds {
   double diagonal() const { return glm::length(extent()); }
 };
 
-/// Box of the eight transformed corners; empty stays empty.
+/// Bounds of the eight transformed corners; empty bounds stay empty.
 Bounds transform_bounds(const DAffine& to_from, const Bounds& bounds);
 
-/// Box of all points.
+/// Bounds of all points.
 Bounds bounds_of(std::span<const Vec3> points);
 
 } // namespace packtrace

@@ -27,7 +27,7 @@ glm::dvec4 default_window(ImageSize size) {
   return aspect >= 1.0 ? glm::dvec4(-aspect, aspect, -1.0, 1.0) : glm::dvec4(-1.0, 1.0, -1.0 / aspect, 1.0 / aspect);
 }
 
-/// The film's window, refitted where the image has another size than the film.
+/// The screen window of the film, adapted if the image size differs from the film's.
 glm::dvec4 window_for(const Camera& camera, ImageSize size) {
   if (!camera.screen_window) return default_window(size);
   const glm::dvec4 window = *camera.screen_window;

@@ -15,14 +15,14 @@
 
 namespace packtrace {
 
-/// Triangles in the space of the shape that made them. Every index is in range, every position finite, no triangle
-/// repeats an index; normals and uvs are empty or one per vertex.
-/// The geometric normal is cross(p1 - p0, p2 - p0) in this space; it travels to other spaces with normal_matrix(), so
-/// mirroring transforms do not turn it over (pbrt-v3, Triangle::Intersect).
+/// A triangle mesh in the space of the shape that defines it. All indices are in range, all positions are finite, and
+/// no triangle repeats an index; normals and uvs are empty or have one element per vertex.
+/// The geometric normal is cross(p1 - p0, p2 - p0) in this space. normal_matrix() transforms it to other spaces, so
+/// mirroring transforms do not flip it (pbrt-v3, Triangle::Intersect).
 struct Mesh {
-  std::string name; ///< for people: file name or shape kind with its line
+  std::string name; ///< file name, or kind of shape with its line; for display
   std::vector<Vec3> positions;
-  std::vector<Vec3> normals; ///< unit length, or empty: flat
+  std::vector<Vec3> normals; ///< of unit length; empty: flat shading
   std::vector<Vec2> uvs;
   std::vector<Triangle> triangles;
 };
@@ -30,67 +30,69 @@ struct Mesh {
 inline constexpr uint32_t kNoMask = ~0u;
 inline constexpr uint32_t kNoTexture = ~0u;
 
-/// What ambient occlusion and simple shading need of a pbrt material together with its shape's alpha and light.
+/// A pbrt material, together with its shape's alpha and area light, reduced to what ambient occlusion and simple
+/// shading need.
 struct Material {
   std::string name;
   MaterialFlags flags = 0;
   Vec3 albedo{0.5f};                    ///< linear sRGB, [0,1]
-  uint32_t alpha_mask = kNoMask;        ///< into Scene::masks, for all rays
-  uint32_t shadow_alpha_mask = kNoMask; ///< into Scene::masks, for occlusion rays only
-  uint32_t albedo_texture = kNoTexture; ///< into Scene::textures; albedo is its average
+  uint32_t alpha_mask = kNoMask;        ///< index into Scene::masks, for all rays
+  uint32_t shadow_alpha_mask = kNoMask; ///< index into Scene::masks, for occlusion rays only
+  uint32_t albedo_texture = kNoTexture; ///< index into Scene::textures; albedo is the texture's average
 };
 
-/// An invertible map and its parts: map = translation (its last column) * rotation * scale.
+/// An invertible map and its decomposition: map = translation (its last column) * rotation * scale.
 struct TransformKey {
   DAffine map{1.0};
   glm::dquat rotation{1.0, 0.0, 0.0, 0.0}; ///< unit length
-  glm::dmat3 scale{1.0};                   ///< symmetric; positive definite, negative definite where the map mirrors
+  glm::dmat3 scale{1.0};                   ///< symmetric; positive definite, or negative definite if the map mirrors
 };
 
-/// A transform that moves from one key to another.
+/// A transform that moves between two keys.
 struct AnimatedTransform {
-  double start_time = 0.0; ///< pbrt's TransformTimes, in the unit of the shutter's times
+  double start_time = 0.0; ///< from pbrt's TransformTimes, in the unit of shutter times
   double end_time = 1.0;
   TransformKey start;
-  TransformKey end; ///< its rotation lies in start's hemisphere: the way between them is the shorter one
+  TransformKey end; ///< its rotation is in start's hemisphere, so that slerp takes the shorter way
 };
 
-/// The map at a time: translation and scale are blended linearly, rotation spherically. Exactly the start's map up to
-/// start_time, exactly the end's from end_time on. Between keys of which one mirrors the map may be singular.
+/// Evaluates the map at a time: translation and scale are interpolated linearly, rotation spherically. Exactly the
+/// start's map up to start_time, exactly the end's from end_time on. If only one key mirrors, the map may be singular
+/// in between.
 /// Source: Pharr, Jakob, Humphreys, Physically Based Rendering, 3rd ed. (2016), section 2.9.3.
 DAffine interpolate(const AnimatedTransform& keys, double time);
 
 inline constexpr uint32_t kNotAnimated = ~0u;
 
-/// One pbrt Shape: a mesh placed in its parent's space (the world, or the object it belongs to).
+/// A pbrt Shape: a mesh placed in its parent's space (the world, or the object that contains it).
 struct Shape {
   Shape() = default;
   Shape(uint32_t mesh_number, uint32_t material_number, bool reversed, const DAffine& placement)
       : mesh(mesh_number), material(material_number), reverse_orientation(reversed), parent_from_mesh(placement) {}
 
-  uint32_t mesh = 0;                 ///< into Scene::meshes; several shapes may share one
-  uint32_t material = 0;             ///< into Scene::materials
-  bool reverse_orientation = false;  ///< the geometric normal is the negated one
-  uint32_t animation = kNotAnimated; ///< into Scene::animations; fills what would be padding
-  DAffine parent_from_mesh{1.0};     ///< at Scene::time; may mirror; never singular
+  uint32_t mesh = 0;                 ///< index into Scene::meshes; shapes may share a mesh
+  uint32_t material = 0;             ///< index into Scene::materials
+  bool reverse_orientation = false;  ///< whether the geometric normal is negated
+  uint32_t animation = kNotAnimated; ///< index into Scene::animations; occupies padding
+  DAffine parent_from_mesh{1.0};     ///< at Scene::time; may mirror, never singular
 };
 
-/// ObjectBegin ... ObjectEnd.
+/// The shapes between ObjectBegin and ObjectEnd.
 struct Object {
   std::string name;
   std::vector<Shape> shapes;
 };
 
-/// ObjectInstance.
+/// An ObjectInstance directive.
 struct Instance {
-  uint32_t object = 0;            ///< into Scene::objects
+  uint32_t object = 0;            ///< index into Scene::objects
   Affine world_from_object{1.0f}; ///< at Scene::time
 };
 
-/// That an instance moves: apart from Instance, of which there are many and which rarely do.
+/// Animation of an instance. Stored separately, because there are many instances and few of them move.
 struct AnimatedInstance {
-  uint32_t instance = 0;  ///< into Scene::instances
-  uint32_t animation = 0; ///< into Scene::animations
+  uint32_t instance = 0;  ///< index into Scene::instances
+  uint32_t animation = 0; ///< index into Scene::animations
 };
 
 enum class Projection : uint32_t { kPerspective = 0, kOrthographic = 1, kEnvironment = 2 };
@@ -98,45 +100,45 @@ enum class Projection : uint32_t { kPerspective = 0, kOrthographic = 1, kEnviron
 /// A pbrt camera with its film. Camera space: +x right, +y up, +z forward (left-handed).
 struct Camera {
   Projection projection = Projection::kPerspective;
-  DAffine world_from_camera{1.0}; ///< at Scene::time; may scale or mirror: pbrt scenes do
+  DAffine world_from_camera{1.0}; ///< at Scene::time; may scale or mirror, as in some pbrt scenes
   double fov_degrees = 90.0;      ///< perspective: full angle across the shorter image axis
   /// Film rectangle on the plane z = 1 in units of tan(fov/2) (perspective) or camera units (orthographic):
   /// x0, x1, y0, y1; x1 is the right edge, y1 the top edge.
-  std::optional<glm::dvec4> screen_window; ///< none: [-a,a] x [-1,1] for aspect a >= 1, [-1,1] x [-1/a,1/a] below
-  /// Pixels of the film. Of a film with a crop window: those inside, with the screen window around them.
+  std::optional<glm::dvec4> screen_window; ///< unset: [-a,a] x [-1,1] for aspect a >= 1, [-1,1] x [-1/a,1/a] below
+  /// Size of the film in pixels. With a crop window, only its pixels count and screen_window is reduced to it.
   uint32_t width_px = 1280;
   uint32_t height_px = 720;
-  std::string film_name;             ///< pbrt's output file name, for people
-  double shutter_open = 0.0;         ///< in the unit of AnimatedTransform's times
-  double shutter_close = 1.0;        ///< not before shutter_open
-  uint32_t animation = kNotAnimated; ///< into Scene::animations
+  std::string film_name;             ///< pbrt's output file name, for display
+  double shutter_open = 0.0;         ///< in the unit of AnimatedTransform::start_time
+  double shutter_close = 1.0;        ///< at least shutter_open
+  uint32_t animation = kNotAnimated; ///< index into Scene::animations
 };
 
-/// An imported scene: floats, no packing.
+/// An imported scene in floating point, not yet packed.
 struct Scene {
   std::vector<Mesh> meshes;
   std::vector<Material> materials;
   std::vector<AlphaMask> masks;
-  std::vector<AlbedoTexture> textures; ///< empty unless the import kept them
-  std::vector<Shape> shapes;           ///< those outside objects, parent = world
+  std::vector<AlbedoTexture> textures; ///< empty unless ImportOptions::keep_textures
+  std::vector<Shape> shapes;           ///< shapes outside objects; their parent is the world
   std::vector<Object> objects;
   std::vector<Instance> instances;
-  std::vector<Camera> cameras; ///< empty where the file has none
+  std::vector<Camera> cameras; ///< empty if the file has none
 
-  double time = 0.0;                                ///< when all transforms hold
-  std::vector<AnimatedTransform> animations;        ///< empty where nothing moves
-  std::vector<AnimatedInstance> animated_instances; ///< by ascending instance
+  double time = 0.0;                                ///< time at which all transforms are evaluated
+  std::vector<AnimatedTransform> animations;        ///< empty if nothing moves
+  std::vector<AnimatedInstance> animated_instances; ///< sorted by instance
 
-  uint64_t dropped_triangles = 0; ///< degenerate, out-of-range or not finite; each is in the diagnostics
+  uint64_t dropped_triangles = 0; ///< repeated or out-of-range index, or non-finite vertex; see the diagnostics
 };
 
-/// Memory that a mesh's vertices and triangles take.
+/// Bytes of a mesh's vertices and triangles.
 uint64_t bytes_of(const Mesh& mesh);
-/// Triangles stored once: each shape's mesh, objects counted once however often instanced.
+/// Number of stored triangles: the meshes of all shapes, with objects counted once regardless of their instances.
 uint64_t unique_triangle_count(const Scene& scene);
-/// Triangles as placed: every instance counted.
+/// Number of triangles with all instances counted.
 uint64_t placed_triangle_count(const Scene& scene);
-/// World box of everything placed, from instance boxes (so not always tight for rotated instances).
+/// World-space bounds of all shapes and instances, computed from transformed boxes; not always tight for rotated ones.
 Bounds world_bounds(const Scene& scene);
 
 } // namespace packtrace

@@ -15,16 +15,16 @@ namespace packtrace {
 namespace {
 
 using Bezier = std::array<DVec3, 4>;
-constexpr uint32_t kSides = 8; // a side's sagitta is 1 - cos(pi / 8) = 7.6% of the radius, within width / 20
+constexpr uint32_t kSides = 8; // sagitta of a side: 1 - cos(pi / 8) = 7.6% of the radius, within width / 20
 constexpr size_t kMaxStations = (size_t{1} << 24) / (kSides + 1);
-// Of the mesh: a row of vertices and two triangles for each of them.
+// Memory of the mesh per station: a row of vertices and two triangles per vertex.
 constexpr uint64_t kBytesPerStation = (kSides + 1) * (2 * sizeof(Vec3) + sizeof(Vec2) + 2 * sizeof(Triangle));
 
 [[noreturn]] void fail(const std::string& problem) { throw Error(ErrorKind::kInput, problem); }
 
 Bezier elevated(DVec3 a, DVec3 b, DVec3 c) { return {a, glm::mix(a, b, 2.0 / 3.0), glm::mix(b, c, 1.0 / 3.0), c}; }
 
-/// Every segment as a cubic Bezier curve.
+/// Converts all segments to cubic Bezier curves.
 std::vector<Bezier> segments_of(const CurveParameters& curve) {
   if (curve.degree != 2 && curve.degree != 3) fail("the curve's degree is neither 2 nor 3");
   const size_t degree = curve.degree, count = curve.points.size();
@@ -53,8 +53,8 @@ std::vector<Bezier> segments_of(const CurveParameters& curve) {
 /// A cross-section of the curve.
 struct Station {
   DVec3 centre{0.0};
-  DVec3 tangent{0.0}; ///< unit
-  DVec3 normal{0.0};  ///< unit, across the tangent
+  DVec3 tangent{0.0}; ///< unit length
+  DVec3 normal{0.0};  ///< unit length; perpendicular to the tangent in tubes
   double width = 0.0;
   double u = 0.0;
 };
@@ -62,7 +62,7 @@ struct Station {
 DVec3 tangent_at(const Bezier& b, double t) {
   const double s = 1.0 - t;
   const DVec3 d = s * s * (b[1] - b[0]) + 2.0 * s * t * (b[2] - b[1]) + t * t * (b[3] - b[2]);
-  return glm::dot(d, d) > 0.0 ? d : b[3] - b[0]; // where control points coincide, as pbrt does
+  return glm::dot(d, d) > 0.0 ? d : b[3] - b[0]; // if control points coincide, as in pbrt
 }
 
 DVec3 point_at(const Bezier& b, double t) {
@@ -70,15 +70,15 @@ DVec3 point_at(const Bezier& b, double t) {
   return s * s * s * b[0] + 3.0 * s * s * t * b[1] + 3.0 * s * t * t * b[2] + t * t * t * b[3];
 }
 
-/// Pieces of equal parameter so that chords stay within tolerance: the second derivative is at most 6 times the
-/// largest second difference of the control points.
+/// Number of pieces of equal parameter range for which chords stay within tolerance. The second derivative is at most 6
+/// times the largest second difference of the control points.
 uint32_t piece_count(const Bezier& b, double tolerance) {
   const double bend = std::max(glm::length(b[0] - 2.0 * b[1] + b[2]), glm::length(b[1] - 2.0 * b[2] + b[3]));
   return static_cast<uint32_t>(std::max(1.0, std::ceil(std::sqrt(6.0 * bend / (8.0 * tolerance)))));
 }
 
-/// How far a chord may be from its curve: width / 20, as in pbrt, but not finer than floats are at the points, where no
-/// segment needs more than 7000 pieces.
+/// Tolerance of chords: width / 20, as in pbrt, but not finer than the float precision at the control points. With that
+/// bound no segment needs more than 7000 pieces.
 double centre_tolerance(const CurveParameters& curve) {
   float largest = 0.0f;
   for (const Vec3& p : curve.points) largest = std::max({largest, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
@@ -86,7 +86,7 @@ double centre_tolerance(const CurveParameters& curve) {
   return std::max(double{std::max(curve.width0, curve.width1)} / 20.0, kRounding * largest);
 }
 
-/// pbrt's interpolation of a ribbon's normals on the sphere.
+/// Spherical interpolation of a ribbon's normals, as in pbrt.
 DVec3 slerp(DVec3 a, DVec3 b, double t) {
   const double angle = std::acos(std::clamp(glm::dot(a, b), 0.0, 1.0)), sine = std::sin(angle);
   if (sine < 1e-6) return glm::mix(a, b, t);
@@ -103,7 +103,7 @@ DVec3 unit(Vec3 v) {
   throw Error(ErrorKind::kLimitExceeded, "the curve's width asks for more than 2^24 vertices");
 }
 
-/// Walks along the segments and puts a station wherever a cross-section is needed.
+/// Places stations along the segments wherever a cross-section is needed.
 class StationMaker {
 public:
   StationMaker(const CurveParameters& curve, std::span<const Bezier> segments, MemoryReservation* memory)
@@ -122,14 +122,15 @@ public:
   }
 
 private:
-  static constexpr double kSmooth = 0.999;    // cosine: 2.6 degrees
-  static constexpr double kLargestTurn = 0.8; // cosine: 37 degrees, where the outside of a bend loses 5% of the radius
+  static constexpr double kSmooth = 0.999; // cosine of 2.6 degrees
+  // Cosine of 37 degrees, where the outside of a bend loses 5% of the radius.
+  static constexpr double kLargestTurn = 0.8;
 
   void add_segment(const Bezier& b, size_t index) {
-    if (glm::dot(tangent_at(b, 0.0), tangent_at(b, 0.0)) == 0.0) return; // pbrt never hits a segment without length
+    if (glm::dot(tangent_at(b, 0.0), tangent_at(b, 0.0)) == 0.0) return; // pbrt never hits a segment of zero length
     const uint32_t pieces = piece_count(b, tolerance_);
     Station from = station_at(b, index, 0.0);
-    // At a corner the segment before ends and this one starts with a cross-section of its own.
+    // At a corner, this segment starts with its own cross-section after the last one of the previous segment.
     if (stations_.empty() || glm::dot(stations_.back().tangent, from.tangent) < kSmooth) push(from);
     for (uint32_t i = 1; i <= pieces; ++i) {
       const Station to = station_at(b, index, static_cast<double>(i) / pieces);
@@ -138,9 +139,9 @@ private:
     }
   }
 
-  /// Splits a piece that turns far, down to what may as well be a cusp.
+  /// Splits a piece recursively while it turns too far, down to a size at which it may be a cusp.
   void add_piece(const Bezier& b, size_t index, const Station& from, double t_from, const Station& to, double t_to) {
-    constexpr double kShortest = 1e-6; // of the segment's parameter
+    constexpr double kShortest = 1e-6; // in units of the segment's parameter
     if (glm::dot(from.tangent, to.tangent) < kLargestTurn && t_to - t_from > kShortest) {
       const double middle = (t_from + t_to) / 2;
       const Station between = station_at(b, index, middle);
@@ -161,7 +162,7 @@ private:
     Station station{point_at(b, t), DVec3(0.0), DVec3(0.0), glm::mix(double{curve_.width0}, double{curve_.width1}, u),
                     u};
     const DVec3 tangent = tangent_at(b, t);
-    // Both may vanish inside a loop that comes back to its start; there any direction is as good.
+    // The derivative and the chord may both be zero in a closed loop; any direction is then acceptable.
     if (glm::dot(tangent, tangent) > 0.0)
       station.tangent = glm::normalize(tangent);
     else
@@ -177,7 +178,7 @@ private:
   std::vector<Station> stations_;
 };
 
-/// Normals that turn about the tangent as little as possible: each is the one before, reflected twice.
+/// Computes rotation-minimising frames: each normal is the previous one, reflected twice.
 void add_rotation_minimizing_frames(std::vector<Station>& stations) {
   const DVec3 t = stations[0].tangent;
   const DVec3 axis = std::abs(t.x) < 0.6 ? DVec3(1, 0, 0) : DVec3(0, 1, 0);
@@ -191,12 +192,12 @@ void add_rotation_minimizing_frames(std::vector<Station>& stations) {
     const DVec3 step = stations[i].centre - before.centre;
     const DVec3 normal = reflected(before.normal, step), tangent = reflected(before.tangent, step);
     DVec3 turned = reflected(normal, stations[i].tangent - tangent);
-    turned -= glm::dot(turned, stations[i].tangent) * stations[i].tangent; // rounding must not accumulate
+    turned -= glm::dot(turned, stations[i].tangent) * stations[i].tangent; // prevents rounding errors from accumulating
     stations[i].normal = glm::normalize(turned);
   }
 }
 
-/// Joins rows of row_size vertices, leaving out triangles that a width of zero has collapsed.
+/// Joins consecutive rows of row_size vertices by triangles, omitting those that collapsed because the width is zero.
 void join_rows(Mesh& mesh, uint32_t row_size) {
   const auto add = [&](uint32_t a, uint32_t b, uint32_t c) {
     const Vec3 p = mesh.positions[a], q = mesh.positions[b], r = mesh.positions[c];
@@ -215,9 +216,9 @@ Mesh make_tube(std::vector<Station> stations) {
   add_rotation_minimizing_frames(stations);
   Mesh mesh;
   for (const Station& s : stations) {
-    const DVec3 other = glm::cross(s.normal, s.tangent); // so that along x around points outwards
+    const DVec3 other = glm::cross(s.normal, s.tangent); // such that the surface normal points outwards
     for (uint32_t i = 0; i <= kSides; ++i) {
-      const double angle = 2.0 * std::numbers::pi * (i % kSides) / kSides; // the seam's columns coincide
+      const double angle = 2.0 * std::numbers::pi * (i % kSides) / kSides; // the columns of the seam coincide
       const DVec3 out = std::cos(angle) * s.normal + std::sin(angle) * other;
       mesh.positions.emplace_back(s.centre + out * (s.width / 2));
       mesh.normals.emplace_back(out);
@@ -233,7 +234,7 @@ Mesh make_ribbon(const std::vector<Station>& stations) {
   for (const Station& s : stations) {
     const DVec3 across = glm::cross(s.normal, s.tangent);
     const double length = glm::length(across);
-    if (!(length > 1e-12)) continue; // the normal is along the curve: no ribbon here
+    if (!(length > 1e-12)) continue; // the normal is parallel to the curve: no ribbon here
     const DVec3 half = across * (s.width / (2.0 * length));
     for (const double v : {0.0, 1.0}) {
       mesh.positions.emplace_back(s.centre + half * (2.0 * v - 1.0));
@@ -259,11 +260,12 @@ Mesh tessellate_curve(const CurveParameters& curve, MemoryReservation* memory) {
     fail("a ribbon of " + std::to_string(segments.size()) + " segments needs one normal more than segments, not " +
          std::to_string(curve.normals.size()));
   std::vector<Station> stations = StationMaker(curve, segments, memory).take();
-  reserve_for_shape(memory, stations.size() * (sizeof(Station) + 2 * kBytesPerStation)); // vectors double as they grow
+  // Vectors double their capacity as they grow.
+  reserve_for_shape(memory, stations.size() * (sizeof(Station) + 2 * kBytesPerStation));
   Mesh mesh = ribbon ? make_ribbon(stations) : make_tube(std::move(stations));
   for (const Vec3& p : mesh.positions)
     if (!is_finite(p)) fail("the curve leaves the range of single precision");
-  drop_bad_triangles(mesh, {}); // vertices of triangles that were left out
+  clean_up_mesh(mesh, {}); // removes vertices of omitted triangles
   if (mesh.triangles.empty()) fail("nothing of the curve can be drawn");
   return mesh;
 }

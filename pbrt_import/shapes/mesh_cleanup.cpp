@@ -10,7 +10,7 @@
 namespace packtrace {
 namespace {
 
-/// How often something happened, and where first.
+/// Number of occurrences of a problem, and the first one.
 struct Tally {
   uint64_t count = 0;
   uint64_t first = 0;
@@ -18,12 +18,12 @@ struct Tally {
   void add(uint64_t where) {
     if (count++ == 0) first = where;
   }
-  /// What came after this.
+  /// Adds a tally of later elements.
   void operator+=(const Tally& more) {
     if (count == 0) first = more.first;
     count += more.count;
   }
-  /// "3 triangles (the first is number 17) dropped: ..."
+  /// Reports the tally as "3 triangles (the first is number 17) dropped: ...".
   void report_to(const ReportFn& report, Severity severity, std::string_view noun, std::string_view text) const {
     if (count > 0 && report) describe_to(report, severity, noun, text);
   }
@@ -37,21 +37,20 @@ private:
   }
 };
 
-/// The sum, in order, of what count_up(begin, end) returns for the pieces of [0, count). Pieces of large meshes are
-/// shared among all threads.
+/// Sums up, in order, the results of count_up(begin, end) for pieces of [0, count). Large meshes are processed in
+/// parallel.
 template <class CountUp>
 auto add_up(size_t count, CountUp count_up) {
   constexpr size_t kPiece = 1u << 15;
   if (count <= kPiece) return count_up(size_t{0}, count);
   std::vector<decltype(count_up(size_t{0}, count))> sums((count + kPiece - 1) / kPiece);
-  tbb::parallel_for(size_t{0}, sums.size(), [&](size_t i) {
-    sums[i] = count_up(i * kPiece, std::min(count, (i + 1) * kPiece));
-  });
+  tbb::parallel_for(size_t{0}, sums.size(),
+                    [&](size_t i) { sums[i] = count_up(i * kPiece, std::min(count, (i + 1) * kPiece)); });
   for (size_t i = 1; i < sums.size(); ++i) sums[0] += sums[i];
   return sums[0];
 }
 
-/// Integer arithmetic, so that the compiler vectorises the loop.
+/// Uses integer arithmetic, so that the compiler vectorises the loop.
 bool all_finite(const std::vector<Vec3>& points) {
   constexpr uint32_t kExponent = 0x7f800000u;
   const auto count_bad = [&](size_t begin, size_t end) {
@@ -77,13 +76,13 @@ struct TriangleTallies {
   }
 };
 
-/// What is wrong with triangles, one by one.
+/// Checks single triangles.
 class TriangleCheck {
 public:
   explicit TriangleCheck(const std::vector<Vec3>& positions)
       : positions_(positions), all_finite_(all_finite(positions)) {}
 
-  /// @return false: the triangle is to be dropped
+  /// @return false if the triangle must be dropped
   bool operator()(const Triangle& t, size_t number, TriangleTallies& tallies) const {
     const std::vector<Vec3>& p = positions_;
     if (t.x >= p.size() || t.y >= p.size() || t.z >= p.size())
@@ -112,7 +111,7 @@ uint64_t drop_triangles(Mesh& mesh, std::vector<uint8_t>& used, const ReportFn& 
     for (size_t i = begin; i < end; ++i) {
       const Triangle t = mesh.triangles[i];
       if (!check(t, i, tallies)) continue;
-      for (const uint32_t vertex : {t.x, t.y, t.z}) // of other threads' triangles, too
+      for (const uint32_t vertex : {t.x, t.y, t.z}) // other threads may mark the same vertex
         std::atomic_ref(used[vertex]).store(1, std::memory_order_relaxed);
     }
     return tallies;
@@ -151,7 +150,7 @@ void drop_unused_vertices(Mesh& mesh, const std::vector<uint8_t>& used) {
   keep_used(mesh.uvs, used);
 }
 
-/// Sets the marked normals to the area-weighted mean of the faces around them; +z where those cancel or have no area.
+/// Sets the marked normals to the area-weighted mean of the adjacent face normals, or to +z if that is zero.
 void normals_from_faces(Mesh& mesh, const std::vector<uint8_t>& marked) {
   std::vector<DVec3> sums(marked.size(), DVec3(0.0));
   for (const Triangle& t : mesh.triangles) {
@@ -167,9 +166,9 @@ void normals_from_faces(Mesh& mesh, const std::vector<uint8_t>& marked) {
   }
 }
 
-/// The normal with length 1, as it is where it has no direction.
+/// Normalises a normal; returns false and leaves it unchanged if it has no direction.
 bool make_unit(Vec3& n) {
-  constexpr float kUnitTolerance = 4e-7f; // on the squared length; a few roundings of a float unit vector
+  constexpr float kUnitTolerance = 4e-7f; // for the squared length: a few roundings of a float unit vector
   if (std::abs(glm::dot(n, n) - 1.0f) <= kUnitTolerance) return true;
   const DVec3 wide(n);
   const double length = glm::length(wide); // cannot overflow: the components are floats
@@ -204,7 +203,7 @@ void check_count(std::vector<T>& attribute, size_t vertex_count, std::string_vie
 
 } // namespace
 
-uint64_t drop_bad_triangles(Mesh& mesh, const ReportFn& report) {
+uint64_t clean_up_mesh(Mesh& mesh, const ReportFn& report) {
   check_count(mesh.normals, mesh.positions.size(), "normals", report);
   check_count(mesh.uvs, mesh.positions.size(), "uvs", report);
   std::vector<uint8_t> used(mesh.positions.size());

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/shapes/mesh_cleanup.h"
 
 namespace packtrace {
@@ -35,7 +35,7 @@ std::string two_digits(double value) {
   return stream.str();
 }
 
-/// The knots of one direction and the part of its domain that is drawn.
+/// The knots of one parameter direction, and the part of its domain that is drawn.
 struct Axis {
   std::vector<double> knots;
   uint32_t order = 0;
@@ -47,7 +47,8 @@ struct Axis {
   uint32_t span_of(double t) const {
     const auto first = knots.begin() + order - 1, last = knots.begin() + count;
     auto upper = std::upper_bound(first, last, t);
-    if (upper == last) upper = std::lower_bound(first, last, knots[count]); // t at the end: the span below it
+    // At the end of the domain, takes the last non-empty span.
+    if (upper == last) upper = std::lower_bound(first, last, knots[count]);
     return static_cast<uint32_t>(upper - knots.begin()) - 1;
   }
 };
@@ -71,13 +72,13 @@ Axis make_axis(const char* name, uint32_t count, uint32_t order, std::span<const
   return result;
 }
 
-/// A point and its derivative, homogeneous.
+/// A point and its derivative in homogeneous coordinates.
 struct Jet {
   DVec4 value{0.0};
   DVec4 derivative{0.0};
 };
 
-/// de Boor's algorithm in place on the order control points of a span.
+/// de Boor's algorithm, in place on the `order` control points of a span.
 Jet de_boor(const Axis& axis, uint32_t span, double t, DVec4* points) {
   const uint32_t degree = axis.order - 1;
   Jet jet;
@@ -86,7 +87,7 @@ Jet de_boor(const Axis& axis, uint32_t span, double t, DVec4* points) {
       jet.derivative = (points[degree] - points[degree - 1]) * (degree / (axis.knots[span + 1] - axis.knots[span]));
     for (uint32_t i = degree; i >= level; --i) {
       const double low = axis.knots[span - degree + i], high = axis.knots[span + 1 + i - level];
-      const double alpha = (t - low) / (high - low); // high > low: the span between them is not empty
+      const double alpha = (t - low) / (high - low); // high > low, since the span is not empty
       points[i] = (1.0 - alpha) * points[i - 1] + alpha * points[i];
     }
   }
@@ -105,7 +106,7 @@ public:
     weight_is_positive_ = row(v.begin).weight(u.begin) > 0.0;
   }
 
-  /// The surface along u at one v: a curve whose control points are worked out once.
+  /// The curve of the surface along u at a fixed v, whose control points are computed once.
   class Row {
   public:
     Row(const Surface& surface, double v) : surface_(surface), jets_(surface.u_.count) {
@@ -139,7 +140,7 @@ public:
     }
 
   private:
-    Jet curve(double u, DVec4 Jet::*which) const {
+    Jet curve(double u, DVec4 Jet::* which) const {
       const Axis& axis = surface_.u_;
       const uint32_t span = axis.span_of(u), first = span + 1 - axis.order;
       DVec4 points[kMaxOrder];
@@ -148,7 +149,7 @@ public:
     }
 
     const Surface& surface_;
-    std::vector<Jet> jets_; ///< the curve's control points and their derivatives along v
+    std::vector<Jet> jets_; ///< control points of the curve, and their derivatives along v
   };
 
   Row row(double v) const { return Row(*this, v); }
@@ -157,10 +158,10 @@ private:
   const Axis& u_;
   const Axis& v_;
   std::span<const glm::vec4> points_;
-  bool weight_is_positive_ = true; ///< everywhere, or everywhere negative
+  bool weight_is_positive_ = true; ///< sign of the weight on the whole surface
 };
 
-/// Knots within the drawn range and its ends, with each span cut into equal segments.
+/// The knots within the drawn range and the ends of the range, with each span divided into equal segments.
 std::vector<double> grid_lines(const Axis& axis, uint32_t segments) {
   std::vector<double> stops{axis.begin};
   for (const double knot : axis.knots)
@@ -175,7 +176,8 @@ std::vector<double> grid_lines(const Axis& axis, uint32_t segments) {
   return lines;
 }
 
-/// @param doubled whether segments are cut in two
+/// Number of grid lines.
+/// @param doubled whether each segment is halved
 uint64_t line_count(const std::vector<double>& lines, bool doubled) {
   return doubled ? 2 * uint64_t{lines.size()} - 1 : lines.size();
 }
@@ -186,21 +188,21 @@ struct Grid {
   uint64_t vertex_count() const { return uint64_t{u.size()} * v.size(); }
 };
 
-/// Lines with the middles between them: 2 n - 1 of them.
+/// The n lines and the midpoints between them, 2 n - 1 in total.
 std::vector<double> with_middles(const std::vector<double>& lines) {
   std::vector<double> result{lines[0]};
   for (size_t i = 1; i < lines.size(); ++i) result.insert(result.end(), {(lines[i - 1] + lines[i]) / 2, lines[i]});
   return result;
 }
 
-/// How far the surface is from the triangles of a grid, at most, where that is looked at.
+/// Largest measured distances between the surface and the triangles of a grid.
 struct Deviation {
-  double along_u = 0.0; ///< of the middles of edges
+  double along_u = 0.0; ///< at the midpoints of edges along u
   double along_v = 0.0;
-  double centre = 0.0; ///< of the middles of cells from the diagonals that cut them
-  double size = 0.0;   ///< half the diagonal of the surface's box
+  double centre = 0.0; ///< at the midpoints of cells, from the diagonal that splits the cell
+  double size = 0.0;   ///< half the diagonal of the surface's bounds
 
-  /// The relative tolerance that the grid keeps.
+  /// The relative tolerance that the grid meets.
   double tolerance() const { return size > 0.0 ? std::max({2 * along_u, 2 * along_v, centre}) / size : 0.0; }
 };
 
@@ -230,7 +232,7 @@ Deviation measure(const Grid& grid, const Surface& surface, const CheckCancelled
 
 Grid refine(const Axis& u, const Axis& v, const Surface& surface, double relative_tolerance, const ReportFn& report,
             const CheckCancelledFn& check_cancelled) {
-  // Four segments to begin with, so that an inflection in the middle of a span does not look straight.
+  // Starts with four segments, so that an inflection in the middle of a span does not look straight.
   uint32_t u_segments = u.order > 2 ? 4 : 1, v_segments = v.order > 2 ? 4 : 1;
   Grid grid{grid_lines(u, u_segments), grid_lines(v, v_segments)};
   if (grid.vertex_count() > kMaxVertices) fail_too_many();
@@ -239,7 +241,7 @@ Grid refine(const Axis& u, const Axis& v, const Surface& surface, double relativ
     if (deviation.tolerance() <= relative_tolerance) return grid;
     const double most = relative_tolerance * deviation.size / 2;
     bool refine_u = deviation.along_u > most, refine_v = deviation.along_v > most;
-    if (!refine_u && !refine_v) refine_u = refine_v = true; // cells may be twisted while their edges are straight
+    if (!refine_u && !refine_v) refine_u = refine_v = true; // cells can be twisted although their edges are straight
     refine_u = refine_u && u_segments < kMaxSegmentsPerSpan;
     refine_v = refine_v && v_segments < kMaxSegmentsPerSpan;
     u_segments *= refine_u ? 2 : 1;
@@ -287,7 +289,7 @@ Mesh mesh_of(const Grid& grid, const Surface& surface, const CheckCancelledFn& c
       add(a, c, d);
     }
   }
-  drop_bad_triangles(mesh, {}); // normals at poles come from the faces around
+  clean_up_mesh(mesh, {}); // recomputes normals at poles from the faces around them
   return mesh;
 }
 
@@ -306,7 +308,7 @@ Mesh tessellate_nurbs(const NurbsParameters& nurbs, double relative_tolerance, c
     if (!is_finite(Vec3(p)) || !std::isfinite(p.w)) fail("a control point is not finite");
   const Surface surface(u, v, nurbs.control_points);
   const Grid grid = refine(u, v, surface, relative_tolerance, report, check_cancelled);
-  const uint64_t triangle_bytes = 2 * 2 * sizeof(Triangle); // the vector of triangles doubles as it grows
+  const uint64_t triangle_bytes = 2 * 2 * sizeof(Triangle); // the vector of triangles doubles its capacity as it grows
   reserve_for_shape(memory, grid.vertex_count() * (2 * sizeof(Vec3) + sizeof(Vec2) + triangle_bytes));
   return mesh_of(grid, surface, check_cancelled);
 }

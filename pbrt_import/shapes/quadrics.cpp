@@ -36,7 +36,7 @@ void require_tolerance(double tolerance) {
   require(tolerance >= 1e-6 && tolerance <= 0.5, "the tessellation tolerance is not within [1e-6, 0.5]");
 }
 
-/// Segments of an arc so that chords stay within tolerance x radius of it: 1 - cos(step / 2) <= tolerance.
+/// Number of segments for which the chords of an arc stay within tolerance x radius: 1 - cos(step / 2) <= tolerance.
 uint32_t arc_segments(double angle, double tolerance) {
   const double step = 2.0 * std::acos(1.0 - tolerance);
   return static_cast<uint32_t>(std::max(1.0, std::ceil(angle / step - 1e-9)));
@@ -58,17 +58,17 @@ glm::dvec2 direction_at(double degrees) {
   }
 }
 
-/// The directions of the columns of a sweep.
+/// Directions of the columns of a sweep.
 struct Sweep {
-  std::vector<glm::dvec2> directions; ///< (cos phi, sin phi), segments + 1 of them
-  double step = 0.0;                  ///< radians between two of them
+  std::vector<glm::dvec2> directions; ///< (cos phi, sin phi), segments + 1 elements
+  double step = 0.0;                  ///< radians between consecutive columns
 
   uint32_t segments() const { return static_cast<uint32_t>(directions.size() - 1); }
 };
 
-/// The same columns for all quadrics of the same phi_max, so that their rims meet. They may use half of the tolerance:
-/// where rows have chords too, both sagittas add up in the middle of a cell. Full sweeps get a multiple of four
-/// segments, so that they reach their bounding box.
+/// All quadrics with the same phi_max get the same columns, so that their rims meet. The sweep may use half of the
+/// tolerance, because the sagittas of rows and columns add up in the middle of a cell. Full sweeps get a multiple of
+/// four segments, so that they reach their bounding box.
 Sweep make_sweep(float phi_max_degrees, double relative_tolerance) {
   require(std::isfinite(phi_max_degrees), "phimax is not finite");
   require(phi_max_degrees > 0.0f, "phimax leaves nothing to draw");
@@ -80,10 +80,10 @@ Sweep make_sweep(float phi_max_degrees, double relative_tolerance) {
   return sweep;
 }
 
-/// A place on the profile that is swept: where it is at phi = 0, and which way the surface faces there.
+/// A point of the swept profile: its position at phi = 0 and the surface normal there.
 struct ProfilePoint {
   DVec3 position{0.0};
-  DVec3 normal{0.0}; ///< along cross(dp/du, dp/dv), not zero, any length
+  DVec3 normal{0.0}; ///< along cross(dp/du, dp/dv), nonzero, any length
   double v = 0.0;
 
   bool is_pole() const { return position.x == 0.0 && position.y == 0.0; }
@@ -103,17 +103,17 @@ public:
     mesh_.triangles.reserve(2 * columns * row_count);
   }
 
-  /// Adds a row of vertices and joins it to the one before. A pole has one vertex per segment, in the middle of its u:
-  /// all at the same place, but each with the normal and u of the triangle that ends there.
+  /// Adds a row of vertices and joins it to the previous row. A pole has one vertex per segment, all at the same
+  /// position, each with the normal and u of the middle of its triangle.
   void add_row(const ProfilePoint& point) {
     const bool pole = point.is_pole();
     const auto first = static_cast<uint32_t>(mesh_.positions.size());
     const uint32_t segments = sweep_.segments();
     for (uint32_t i = 0; i < segments + (pole ? 0u : 1u); ++i) {
-      // The bisector of two neighbouring columns; never zero, as a sweep step is less than half a turn.
+      // The bisector of two adjacent columns is never zero, because a step is less than half a turn.
       const glm::dvec2 direction =
           pole ? glm::normalize(sweep_.directions[i] + sweep_.directions[i + 1]) : sweep_.directions[i];
-      mesh_.positions.emplace_back(rotated(point.position, direction) + 0.0); // no negative zeros
+      mesh_.positions.emplace_back(rotated(point.position, direction) + 0.0); // turns -0 into 0
       mesh_.normals.emplace_back(glm::normalize(rotated(point.normal, direction)));
       mesh_.uvs.emplace_back(static_cast<float>((i + (pole ? 0.5 : 0.0)) / segments), static_cast<float>(point.v));
     }
@@ -123,7 +123,7 @@ public:
   }
 
   Mesh take() {
-    if (collapsed_) drop_bad_triangles(mesh_, {}); // their vertices
+    if (collapsed_) clean_up_mesh(mesh_, {}); // removes their vertices
     require(!mesh_.triangles.empty(), "the quadric is too thin for single precision");
     return std::move(mesh_);
   }
@@ -145,7 +145,7 @@ private:
     }
   }
 
-  /// Leaves out triangles whose corners rounding to float has put in one place.
+  /// Adds a triangle, unless rounding to float made two of its corners coincide.
   void add(uint32_t a, uint32_t b, uint32_t c) {
     const Vec3 p = mesh_.positions[a], q = mesh_.positions[b], r = mesh_.positions[c];
     if (p == q || q == r || r == p)
@@ -169,18 +169,18 @@ Mesh sweep_profile(const Sweep& sweep, const std::vector<ProfilePoint>& profile,
   return swept.take();
 }
 
-/// t = i / n, exact at both ends.
+/// i / n, exact at both ends.
 double fraction(uint32_t i, uint32_t n) { return static_cast<double>(i) / n; }
 
-/// Radii from r_begin up to r_end so that chords of z = k r^2 between neighbours stay within tolerance of it: |k|
-/// step^2 / 4 along z, times the cosine of the chord's slope, which is at least 2 |k| r. About 1 / sqrt(2 tolerance /
-/// r_end) of them at most, however steep it is.
+/// Radii from r_begin to r_end for which chords of z = k r^2 between neighbours stay within tolerance. The deviation is
+/// |k| step^2 / 4 along z, times the cosine of the chord's slope, which is at least 2 |k| r. For any k there are at
+/// most about sqrt(r_end / (2 tolerance)) radii.
 std::vector<double> parabola_radii(double r_begin, double r_end, double k, double tolerance) {
   std::vector<double> radii{r_begin};
   while (radii.back() < r_end) {
     const double r = radii.back(), slope = 2.0 * k * r, left = r_end - r;
     const double step = 2.0 * std::sqrt(tolerance / std::abs(k)) * std::pow(1.0 + slope * slope, 0.25);
-    radii.push_back(left <= step ? r_end : r + std::min(step, left / 2)); // no sliver at the end
+    radii.push_back(left <= step ? r_end : r + std::min(step, left / 2)); // avoids a sliver at the end
   }
   return radii;
 }
@@ -195,16 +195,16 @@ Mesh tessellate_sphere(const SphereParameters& sphere, double relative_tolerance
   const auto [first, second] = std::minmax({double{sphere.z_min}, double{sphere.z_max}});
   const double low = std::clamp(first, -radius, radius), high = std::clamp(second, -radius, radius);
   require(low < high, "zmin and zmax leave nothing of the sphere");
-  const double theta_min = std::acos(low / radius), theta_max = std::acos(high / radius); // pbrt's names
+  const double theta_min = std::acos(low / radius), theta_max = std::acos(high / radius); // names as in pbrt
   const Sweep sweep = make_sweep(sphere.phi_max, relative_tolerance);
   uint32_t rows = arc_segments(theta_min - theta_max, relative_tolerance / 2);
   const bool whole = low == -radius && high == radius;
-  if (whole) rows += rows % 2; // a row at the equator, so that the sphere reaches its bounding box
+  if (whole) rows += rows % 2; // puts a row at the equator, so that the sphere reaches its bounding box
   std::vector<ProfilePoint> profile(rows + 1);
   for (uint32_t i = 0; i <= rows; ++i) {
     const double v = fraction(i, rows), theta = theta_min + v * (theta_max - theta_min);
     DVec3 position(radius * std::sin(theta), 0.0, radius * std::cos(theta));
-    if (i == 0 || i == rows) { // where other shapes may meet it
+    if (i == 0 || i == rows) { // exact at the ends, where other shapes may meet the sphere
       const double z = i == 0 ? low : high;
       position = {std::sqrt((radius - z) * (radius + z)), 0.0, z};
     } else if (whole && 2 * i == rows) {
@@ -234,8 +234,8 @@ Mesh tessellate_disk(const DiskParameters& disk, double relative_tolerance, Memo
           "the disk's inner radius is not within [0, radius)");
   const Sweep sweep = make_sweep(disk.phi_max, relative_tolerance);
   const double height = disk.height;
-  return sweep_profile(sweep,
-                       {{{disk.radius, 0, height}, {0, 0, 1}, 0.0}, {{disk.inner_radius, 0, height}, {0, 0, 1}, 1.0}}, memory);
+  return sweep_profile(
+      sweep, {{{disk.radius, 0, height}, {0, 0, 1}, 0.0}, {{disk.inner_radius, 0, height}, {0, 0, 1}, 1.0}}, memory);
 }
 
 Mesh tessellate_cone(const ConeParameters& cone, double relative_tolerance, MemoryReservation* memory) {
@@ -249,14 +249,15 @@ Mesh tessellate_cone(const ConeParameters& cone, double relative_tolerance, Memo
   return sweep_profile(sweep, {{{radius, 0, 0}, normal, 0.0}, {{0, 0, height}, normal, 1.0}}, memory);
 }
 
-Mesh tessellate_paraboloid(const ParaboloidParameters& paraboloid, double relative_tolerance, MemoryReservation* memory) {
+Mesh tessellate_paraboloid(const ParaboloidParameters& paraboloid, double relative_tolerance,
+                           MemoryReservation* memory) {
   require_tolerance(relative_tolerance);
   require_finite({paraboloid.radius, paraboloid.z_min, paraboloid.z_max});
   require(paraboloid.radius > 0.0f, "the paraboloid's radius is not positive");
   const auto [z_min, z_max] = std::minmax({double{paraboloid.z_min}, double{paraboloid.z_max}});
   require(z_max != 0.0, "the paraboloid's larger z is 0: it is a plane without an end");
   const double radius = paraboloid.radius, k = z_max / (radius * radius); // z = k r^2
-  const double low = z_max > 0.0 ? std::max(z_min, 0.0) : z_min;          // v still counts from z_min
+  const double low = z_max > 0.0 ? std::max(z_min, 0.0) : z_min;          // v still starts at z_min
   require(low < z_max, "zmin and zmax leave nothing of the paraboloid");
   const double r_low = std::sqrt(low / k), largest = std::max(r_low, radius);
   require_float_range(largest);
@@ -273,11 +274,12 @@ Mesh tessellate_paraboloid(const ParaboloidParameters& paraboloid, double relati
   return sweep_profile(sweep, profile, memory);
 }
 
-Mesh tessellate_hyperboloid(const HyperboloidParameters& hyperboloid, double relative_tolerance, MemoryReservation* memory) {
+Mesh tessellate_hyperboloid(const HyperboloidParameters& hyperboloid, double relative_tolerance,
+                            MemoryReservation* memory) {
   require_tolerance(relative_tolerance);
   DVec3 p1(hyperboloid.p1), p2(hyperboloid.p2);
   require(is_finite(p1) && is_finite(p2), "a parameter is not finite");
-  if (p2.z == 0.0) std::swap(p1, p2); // pbrt's convention; it turns v and the normal over
+  if (p2.z == 0.0) std::swap(p1, p2); // pbrt's convention, which flips v and the normal
   const glm::dvec2 q1(p1), q2(p2);
   const double radius = std::max(glm::length(q1), glm::length(q2));
   require(p1.z != p2.z, "the hyperboloid's p1 and p2 are at the same height");
@@ -285,11 +287,11 @@ Mesh tessellate_hyperboloid(const HyperboloidParameters& hyperboloid, double rel
   require_float_range(radius);
   const Sweep sweep = make_sweep(hyperboloid.phi_max, relative_tolerance);
   const DVec3 along = p2 - p1;
-  const auto facing = [&](glm::dvec2 q) { // cross(dp/du, dp/dv) where the segment is at q
+  const auto facing = [&](glm::dvec2 q) { // cross(dp/du, dp/dv) at the point q of the segment
     return DVec3(q.x * along.z, q.y * along.z, -(q.x * along.x + q.y * along.y));
   };
   if (q1.x * q2.y == q1.y * q2.x && glm::dot(q1, q2) <= 0.0) {
-    // The segment meets the axis: one cone or two, each with its own normals at the apex.
+    // The segment meets the axis: one or two cones, each with its own normals at the apex.
     const double v = glm::length(q1) / (glm::length(q1) + glm::length(q2));
     const DVec3 apex(0.0, 0.0, p1.z + v * along.z);
     std::vector<ProfilePoint> profile;
@@ -297,7 +299,8 @@ Mesh tessellate_hyperboloid(const HyperboloidParameters& hyperboloid, double rel
     if (v < 1.0) profile.insert(profile.end(), {{apex, facing(q2), v}, {p2, facing(q2), 1.0}});
     return sweep_profile(sweep, profile, memory);
   }
-  // Cells between two rulings are saddles: a diagonal leaves them by at most a quarter of their ends' relative turn.
+  // Cells between two rulings are saddles, whose diagonals deviate by at most a quarter of the relative turn of their
+  // ends.
   const auto rows = static_cast<uint32_t>(
       std::max(1.0, std::ceil(sweep.step * glm::length(q2 - q1) / (4.0 * (relative_tolerance / 2) * radius))));
   std::vector<ProfilePoint> profile(rows + 1);

@@ -14,19 +14,19 @@ namespace {
 
 constexpr uint32_t kNone = ~0u;
 
-/// A half-edge is 3 * triangle + corner and runs from that corner to the next one.
+/// Half-edge 3 * triangle + corner runs from that corner to the next one.
 constexpr uint32_t next(uint32_t half_edge) { return half_edge % 3 == 2 ? half_edge - 2 : half_edge + 1; }
 constexpr uint32_t previous(uint32_t half_edge) { return half_edge % 3 == 0 ? half_edge + 2 : half_edge - 1; }
 
-/// One level of subdivision: consistently oriented triangles in which every vertex has one fan, open or closed.
+/// A level of subdivision: consistently oriented triangles in which every vertex has a single fan, open or closed.
 struct Level {
   std::vector<DVec3> points;
-  std::vector<uint32_t> start;    ///< per half-edge: the vertex it leaves
-  std::vector<uint32_t> opposite; ///< per half-edge: the one that runs the other way, or kNone at the boundary
+  std::vector<uint32_t> start;    ///< per half-edge: its start vertex
+  std::vector<uint32_t> opposite; ///< per half-edge: the opposite half-edge, or kNone at the boundary
 
   uint32_t half_edge_count() const { return static_cast<uint32_t>(start.size()); }
   uint32_t end(uint32_t half_edge) const { return start[next(half_edge)]; }
-  /// The next half-edge that leaves the same vertex, around it; kNone past the boundary.
+  /// The next half-edge around the start vertex; kNone past the boundary.
   uint32_t counter_clockwise(uint32_t half_edge) const { return opposite[previous(half_edge)]; }
   uint32_t clockwise(uint32_t half_edge) const {
     const uint32_t across = opposite[half_edge];
@@ -34,13 +34,13 @@ struct Level {
   }
 };
 
-/// Half-edges ordered by their two vertices, whichever way they run: a bucket for each lower vertex, sorted within.
+/// Half-edges grouped by their lower vertex, and sorted by their higher vertex within each group.
 struct SortedHalfEdges {
   struct Entry {
     uint32_t high;
     uint32_t half_edge;
   };
-  std::vector<uint32_t> first; ///< per vertex, plus one
+  std::vector<uint32_t> first; ///< start of each vertex's entries, with one more element at the end
   std::vector<Entry> entries;
 };
 
@@ -61,8 +61,8 @@ SortedHalfEdges sort_half_edges(const Level& level) {
   return sorted;
 }
 
-/// Fills level.opposite. Two half-edges are joined where they alone share an edge and run in opposite directions.
-/// Returns the number of edges that several triangles share and that stay apart all the same.
+/// Fills level.opposite. Two half-edges are joined if they are the only ones on an edge and run in opposite directions.
+/// Returns the number of edges that several triangles share but that stay unjoined.
 uint64_t join_half_edges(Level& level) {
   const SortedHalfEdges sorted = sort_half_edges(level);
   uint64_t apart = 0;
@@ -84,8 +84,8 @@ uint64_t join_half_edges(Level& level) {
   return apart;
 }
 
-/// Gives each fan of triangles a vertex of its own: a point's first fan keeps its number, others follow at the end.
-/// Returns the number of vertices added.
+/// Gives each fan of triangles its own vertex: the first fan of a point keeps the point's number, others get new
+/// vertices at the end. Returns the number of vertices added.
 uint64_t split_fans(Level& level) {
   const size_t point_count = level.points.size();
   std::vector<uint32_t> vertex(level.half_edge_count(), kNone);
@@ -106,15 +106,15 @@ uint64_t split_fans(Level& level) {
   return level.points.size() - point_count;
 }
 
-// Weights of each neighbour; what is left to 1 is the vertex's own.
+// Weights of each neighbour; the vertex itself has the rest of 1.
 double even_weight(uint32_t valence) { return valence == 3 ? 3.0 / 16.0 : 3.0 / (8.0 * valence); }
 double limit_weight(uint32_t valence) { return 1.0 / (valence + 3.0 / (8.0 * even_weight(valence))); }
 constexpr double kEvenBoundaryWeight = 1.0 / 8.0;
 constexpr double kLimitBoundaryWeight = 1.0 / 5.0;
 
-/// Every vertex moved to (1 - n w) p + w (sum of neighbours): with w = interior_weight(valence) and all n neighbours,
-/// or at the boundary w = boundary_weight and the two neighbours along it. Streams over half-edges instead of walking
-/// around vertices.
+/// Moves every vertex to (1 - n w) p + w (sum of neighbours). Interior vertices use all n neighbours, with
+/// interior_weight(n) as w; boundary vertices use the two neighbours along the boundary, with boundary_weight as w.
+/// Streams over half-edges instead of walking around vertices.
 template <class Weight>
 std::vector<DVec3> smooth(const Level& level, Weight interior_weight, double boundary_weight) {
   const size_t count = level.points.size();
@@ -142,12 +142,13 @@ std::vector<DVec3> smooth(const Level& level, Weight interior_weight, double bou
   return sums;
 }
 
-/// One new vertex per edge, numbered after the old ones in the order of their first half-edge.
+/// Adds one vertex per edge, numbered after the old ones in the order of the edges' first half-edges. Returns the edge
+/// vertex of each half-edge.
 std::vector<uint32_t> add_edge_points(const Level& level, std::vector<DVec3>& points) {
   std::vector<uint32_t> edge_vertex(level.half_edge_count());
   for (uint32_t h = 0; h < level.half_edge_count(); ++h) {
     const uint32_t across = level.opposite[h];
-    if (across < h) { // kNone is never less
+    if (across < h) { // never true for kNone
       edge_vertex[h] = edge_vertex[across];
       continue;
     }
@@ -160,8 +161,9 @@ std::vector<uint32_t> add_edge_points(const Level& level, std::vector<DVec3>& po
   return edge_vertex;
 }
 
-/// Triangle t becomes 4t + k at its corner k and 4t + 3 in the middle. Corners keep their place in the triangle, so an
-/// edge's halves are edge k of child k and edge k of child k + 1, and neighbours follow without a search.
+/// Splits triangle t into triangles 4t + k at its corners k, and 4t + 3 in the middle. Corners keep their position in
+/// the triangle, so the halves of edge k are edge k of child k and edge k of child k + 1, and opposite half-edges
+/// follow without a search.
 Level subdivide(const Level& level) {
   Level fine;
   const uint32_t half_edge_count = level.half_edge_count();
@@ -192,7 +194,7 @@ Level subdivide(const Level& level) {
   return fine;
 }
 
-/// cos and sin of 2 pi j / n, for the valences that most vertices have.
+/// Cosine and sine of 2 pi j / n, tabulated for common valences.
 class RingTable {
 public:
   RingTable() {
@@ -223,7 +225,7 @@ DVec3 interior_normal(std::span<const DVec3> ring, const RingTable& table) {
   return glm::cross(s, t);
 }
 
-/// s runs along the boundary, t into the surface.
+/// Normal at a boundary vertex: s is the tangent along the boundary, t the one into the surface.
 DVec3 boundary_normal(std::span<const DVec3> ring) {
   const size_t n = ring.size();
   const DVec3 s = ring[0] - ring[n - 1];
@@ -244,7 +246,7 @@ DVec3 boundary_normal(std::span<const DVec3> ring) {
 
 /// Unit normals of the limit surface; zero where its tangents vanish.
 std::vector<Vec3> limit_normals(const Level& level) {
-  // Where each vertex's fan starts: at its boundary, or anywhere.
+  // Start of each vertex's fan: at the boundary, or anywhere for interior vertices.
   std::vector<uint32_t> first(level.points.size(), kNone);
   for (uint32_t h = 0; h < level.half_edge_count(); ++h) {
     uint32_t& f = first[level.start[h]];
@@ -252,7 +254,7 @@ std::vector<Vec3> limit_normals(const Level& level) {
   }
   const RingTable table;
   std::vector<Vec3> normals(level.points.size(), Vec3(0.0f));
-  std::vector<DVec3> ring; // relative to the vertex: the masks' weights add up to zero
+  std::vector<DVec3> ring; // relative to the vertex, which is valid as the mask weights sum to zero
   for (size_t v = 0; v < normals.size(); ++v) {
     ring.clear();
     uint32_t h = first[v], last = h;
@@ -270,13 +272,13 @@ std::vector<Vec3> limit_normals(const Level& level) {
   return normals;
 }
 
-/// The control mesh as a Level, with what cannot be drawn removed.
+/// Converts the control mesh to a Level, without triangles that cannot be drawn.
 Level control_level(std::span<const Vec3> points, std::span<const Triangle> triangles, const ReportFn& report,
                     uint64_t* dropped_triangles) {
   Mesh mesh;
   mesh.positions.assign(points.begin(), points.end());
   mesh.triangles.assign(triangles.begin(), triangles.end());
-  const uint64_t dropped = drop_bad_triangles(mesh, report);
+  const uint64_t dropped = clean_up_mesh(mesh, report);
   if (dropped_triangles) *dropped_triangles += dropped;
   Level level;
   level.points.assign(mesh.positions.begin(), mesh.positions.end());
@@ -293,11 +295,12 @@ Level control_level(std::span<const Vec3> points, std::span<const Triangle> tria
   return level;
 }
 
-/// What a level takes, and what is made of it: another one, or the mesh. Closed surfaces have half as many points as
-/// triangles, a triangle alone three.
+/// Bytes of a level together with the next level or the mesh made from it. Closed surfaces have half as many points as
+/// triangles, a single triangle has three.
 uint64_t bytes_while_working(uint64_t triangles, uint64_t points) {
   constexpr uint64_t kHalfEdge = 2 * sizeof(uint32_t);
-  constexpr uint64_t kPoint = 2 * sizeof(DVec3) + 2 * sizeof(Vec3) + sizeof(uint32_t) + 1; // smooth() and limit_normals()
+  // Includes the arrays of smooth() and limit_normals().
+  constexpr uint64_t kPoint = 2 * sizeof(DVec3) + 2 * sizeof(Vec3) + sizeof(uint32_t) + 1;
   return triangles * (3 * kHalfEdge + sizeof(Triangle)) + points * kPoint;
 }
 
@@ -318,7 +321,8 @@ Mesh subdivide_loop(std::span<const Vec3> points, std::span<const Triangle> tria
                     const ReportFn& report, uint64_t* dropped_triangles, const CheckCancelledFn& check_cancelled,
                     MemoryReservation* memory) {
   check_budget(triangles.size(), levels);
-  // Each level has four triangles for one, and a point more for each edge: three for two triangles at least.
+  // Each level has four triangles per triangle and one new point per edge; there are at least three edges per two
+  // triangles.
   const uint64_t finest = triangles.empty() ? 0 : static_cast<uint64_t>(triangles.size()) << (2 * levels);
   reserve_for_shape(memory, bytes_while_working(finest, finest / 2 + points.size()));
   Level level = control_level(points, triangles, report, dropped_triangles);
@@ -337,7 +341,7 @@ Mesh subdivide_loop(std::span<const Vec3> points, std::span<const Triangle> tria
   for (size_t h = 0; h < level.start.size(); h += 3)
     mesh.triangles.emplace_back(level.start[h], level.start[h + 1], level.start[h + 2]);
   const bool flat_spots = std::find(mesh.normals.begin(), mesh.normals.end(), Vec3(0.0f)) != mesh.normals.end();
-  if (flat_spots) drop_bad_triangles(mesh, report); // mends the normals
+  if (flat_spots) clean_up_mesh(mesh, report); // recomputes zero normals
   return mesh;
 }
 

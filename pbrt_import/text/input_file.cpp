@@ -22,7 +22,7 @@ namespace {
 class Inflater {
 public:
   Inflater() {
-    constexpr int kGzipWindow = 15 + 16; // largest window, gzip wrapper only
+    constexpr int kGzipWindow = 15 + 16; // largest window; accept the gzip format only
     if (inflateInit2(&stream_, kGzipWindow) != Z_OK) fail("cannot start inflating");
   }
   ~Inflater() { inflateEnd(&stream_); }
@@ -42,12 +42,12 @@ struct InputFile::State {
   RegularFile file;
   uint64_t max_bytes = 0;
   uint64_t delivered_bytes = 0;
-  std::unique_ptr<Inflater> inflater; ///< null: plain file
+  std::unique_ptr<Inflater> inflater; ///< null if the file is not compressed
   std::vector<unsigned char> compressed;
-  const char* damage = nullptr; ///< found while inflating
-  bool member_open = false; ///< inside a gzip member: the end of the file here means truncation
+  const char* damage = nullptr; ///< message of damage found while inflating; null: none
+  bool member_open = false;     ///< inside a gzip member, where an end of file means truncation
 
-  /// @param read_some gets a pointer, a size and how much came before; returns like POSIX read
+  /// @param read_some gets a pointer, a size and the number of bytes read so far; returns like POSIX read()
   template <class ReadSome>
   static size_t read_fully(char* to, size_t size, ReadSome read_some) {
     size_t got = 0;
@@ -65,7 +65,7 @@ struct InputFile::State {
     return read_fully(to, size, [&](char* p, size_t n, size_t) { return ::read(file.descriptor.get(), p, n); });
   }
 
-  /// True if there is compressed input to work on.
+  /// Refills the input buffer if it is empty; returns false at the end of the file.
   bool refill() {
     z_stream& z = inflater->stream();
     if (z.avail_in > 0) return true;
@@ -81,13 +81,13 @@ struct InputFile::State {
                   "content exceeds the limit of " + std::to_string(max_bytes) + " bytes for this file");
   }
 
-  /// What could be inflated before damage comes first, then the damage is reported.
+  /// Returns the bytes that precede damage first and reports the damage in the next call.
   size_t read_inflated(char* to, size_t size) {
     if (damage) fail(damage);
     z_stream& z = inflater->stream();
     size_t got = 0;
     while (got < size && refill()) {
-      if (!member_open) { // gzip files may be several members in a row
+      if (!member_open) { // a gzip file may consist of several members
         if (inflateReset(&z) != Z_OK) fail("cannot start inflating");
         member_open = true;
       }
@@ -147,14 +147,14 @@ bool InputFile::same_file(const InputFile& other) const {
 }
 
 uint64_t InputFile::claimed_bytes() const {
-  constexpr uint64_t kMostPerByte = 1032; // what deflate makes of nothing but repetition
+  constexpr uint64_t kMaxInflationRatio = 1032; // maximum expansion by deflate
   std::array<unsigned char, 4> last{};
   const uint64_t stored = stored_bytes();
   if (!compressed() || stored < last.size() ||
       ::pread(state_->file.descriptor.get(), last.data(), last.size(), static_cast<off_t>(stored - last.size())) != 4)
     return 0;
   const uint64_t claimed = last[0] | (last[1] << 8) | (last[2] << 16) | (uint64_t{last[3]} << 24);
-  return claimed / kMostPerByte <= stored ? claimed : 0;
+  return claimed / kMaxInflationRatio <= stored ? claimed : 0;
 }
 
 std::vector<std::byte> read_whole_file(const std::filesystem::path& path, uint64_t max_bytes,
@@ -167,19 +167,19 @@ std::vector<std::byte> read_whole_file(const std::filesystem::path& path, uint64
     if (memory) memory->cover(bytes, "its content");
   };
   std::vector<std::byte> content;
-  // One byte more than expected, so that the end of an unchanged file shows in a single read.
+  // One more byte than expected, so that a single read detects the end of an unchanged file.
   size_t room = static_cast<size_t>(std::min(std::max(file.stored_bytes(), file.claimed_bytes()), max_bytes)) + 1;
   size_t size = 0;
   while (true) {
-    reserve(size == 0 ? room : 2 * size + room); // while it moves, there are two of it
+    reserve(size == 0 ? room : 2 * size + room); // two copies exist while the vector grows
     content.resize(size + room);
     const size_t got = file.read({reinterpret_cast<char*>(content.data()) + size, room});
     size += got;
     if (got < room) {
-      if (char none; file.compressed()) file.read({&none, 1}); // throws if more was to come
+      if (char none; file.compressed()) file.read({&none, 1}); // throws if the gzip data is damaged or truncated
       break;
     }
-    // One byte more than allowed is enough to find out.
+    // Reading one byte more than allowed is enough to detect an oversized file.
     room = static_cast<size_t>(std::min<uint64_t>(std::max<size_t>(size / 2, kCompressedChunk), max_bytes - size + 1));
   }
   content.resize(size);

@@ -11,32 +11,33 @@
 
 namespace packtrace {
 
-/// Sequential reader of one regular file; files that start with gzip's magic bytes are inflated on the way.
+/// Sequential reader of one regular file. Files that start with gzip's magic bytes are inflated.
 class InputFile {
 public:
-  /// Opens path. Throws Error(kInput), message without the path, if it is missing, unreadable or not a regular file.
-  /// @param max_bytes of content, after inflating
+  /// Opens a file. Throws Error(kInput), with a message without the path, if it is missing, unreadable or not a regular
+  /// file.
+  /// @param max_bytes limit of the content's size, after inflating
   InputFile(const std::filesystem::path& path, uint64_t max_bytes);
   ~InputFile();
   InputFile(InputFile&&) noexcept;
   InputFile& operator=(InputFile&&) noexcept;
 
-  /// Fills buffer from the start; fewer bytes than asked for only at the end of the file, or before damaged gzip data,
-  /// which the next call throws Error(kInput) for. Throws Error(kInput) if reading fails, Error(kLimitExceeded) past
-  /// max_bytes.
+  /// Reads the next bytes of the content and returns their number. It is less than the size of the buffer only at the
+  /// end of the file or before damaged gzip data; the next call then throws Error(kInput) for the damage. Throws
+  /// Error(kInput) if reading fails, Error(kLimitExceeded) if the content exceeds max_bytes.
   size_t read(std::span<char> buffer);
 
-  /// Like read, from an offset in the content of a file that is not compressed. Any thread may call it.
+  /// Like read(), but at an offset in the content. Only for uncompressed files; thread-safe.
   size_t read_at(uint64_t offset, std::span<char> buffer) const;
 
-  /// Bytes on disk.
+  /// Size of the file on disk in bytes.
   uint64_t stored_bytes() const;
   bool compressed() const;
-  /// What gzip says of the length of the content, in its last four bytes: right for files of one member below 4 GiB,
-  /// else, or where it cannot be, 0.
+  /// Content length according to the last four bytes of a gzip file, which is correct for a single member of less than
+  /// 2^32 bytes. 0 for uncompressed files and for lengths that deflate cannot reach with the stored bytes.
   uint64_t claimed_bytes() const;
 
-  /// True where both are the same file on disk, whatever their names.
+  /// True if both are the same file on disk, regardless of their names.
   bool same_file(const InputFile& other) const;
 
 private:
@@ -44,8 +45,8 @@ private:
   std::unique_ptr<State> state_;
 };
 
-/// The whole content, inflated if need be.
-/// @param memory grows by what this takes, before it is taken; null: nobody counts
+/// Reads the whole content of a file, inflated if it is compressed.
+/// @param memory grows by the memory that reading needs, before it is allocated; null: not counted
 /// Throws like InputFile, and MemoryError.
 std::vector<std::byte> read_whole_file(const std::filesystem::path& path, uint64_t max_bytes,
                                        MemoryReservation* memory = nullptr);

@@ -8,21 +8,22 @@ namespace packtrace {
 
 void prefer_large_pages(void* memory, size_t bytes) {
   constexpr uintptr_t kLargePage = 2u << 20;
-  constexpr size_t kWorthIt = 4 * kLargePage;
-  if (!memory || bytes < kWorthIt) return;
+  constexpr size_t kMinLargePageBytes = 4 * kLargePage;
+  if (!memory || bytes < kMinLargePageBytes) return;
   const uintptr_t begin = (reinterpret_cast<uintptr_t>(memory) + kLargePage - 1) & ~(kLargePage - 1);
   const uintptr_t end = (reinterpret_cast<uintptr_t>(memory) + bytes) & ~(kLargePage - 1);
-  // A kernel without large pages refuses, and nothing is lost.
+  // Kernels without large pages return an error, which is harmless.
   (void)::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
 }
 
-/// Takes a large block and gives it back untouched: malloc keeps it and cuts small ones out of it. glibc maps a large
-/// block apart at first, but having seen one freed takes those up to 32 MiB from its heap. Other kinds of malloc may
-/// return both blocks to the system: then nothing is lost, either.
+/// Allocates a large block and frees it untouched: malloc keeps the block and serves small allocations from it. glibc
+/// first maps a large block separately, but after such a block is freed it serves sizes up to 32 MiB from its heap;
+/// hence two rounds. Other malloc implementations may return both blocks to the system, which is harmless.
 /// Source: the GNU C library's manual, mallopt(3), M_MMAP_THRESHOLD.
 void LargeHeapPages::prepare() {
   constexpr size_t kBlock = 24u << 20;
-  // Others' blocks come out of it, too. Not in small steps: malloc's notes behind each block spoil a large page.
+  // Less than kBlock, because other allocations use the block as well. Small steps would not work: malloc's bookkeeping
+  // behind each block touches a large page.
   constexpr uint64_t kStep = 16u << 20;
   for (int time = 0; time < 2; ++time) {
     void* const block = std::malloc(kBlock);

@@ -8,14 +8,15 @@
 
 namespace packtrace {
 
-/// Asks for memory that is about to be written for the first time to come in large pages, if it is large.
+/// Asks the kernel to back a block of memory with large pages (2 MiB) when it is first written. No effect on blocks
+/// below 8 MiB.
 void prefer_large_pages(void* memory, size_t bytes);
 
-/// The same for what malloc hands out to one thread in small blocks. The kernel takes longer to give a page of 4 KiB
-/// than most readers to fill it.
+/// Asks for large pages for the small blocks that malloc returns to one thread. Page faults for 4 KiB pages take the
+/// kernel longer than most readers take to fill the pages.
 class LargeHeapPages {
 public:
-  /// Call ahead of allocations of that many bytes in all.
+  /// Call before allocating this number of bytes in total.
   void about_to_allocate(uint64_t bytes) {
     allocated_ += bytes;
     if (allocated_ >= next_) prepare();
@@ -25,10 +26,10 @@ private:
   void prepare();
 
   uint64_t allocated_ = 0;
-  uint64_t next_ = 2u << 20; ///< less is not worth it
+  uint64_t next_ = 2u << 20; ///< smaller amounts are not worth the cost
 };
 
-/// Makes room for capacity elements like reserve(), the old ones moved only after prefer_large_pages().
+/// Like reserve(), but calls prefer_large_pages() on the new block before the elements are moved to it.
 template <class T>
 void reserve_large(std::vector<T>& elements, size_t capacity) {
   std::vector<T> larger;
@@ -38,8 +39,8 @@ void reserve_large(std::vector<T>& elements, size_t capacity) {
   elements = std::move(larger);
 }
 
-/// Room for one more of what there may be many of. Room that is never used costs address space only, where copies
-/// would cost time, and memory while they are made.
+/// Reserves room for at least one more element of an array that may grow large, by a factor of 16 or 4. Unused capacity
+/// costs address space only, whereas frequent growth costs time for copies and memory for the second array.
 template <class T>
 void reserve_one_more(std::vector<T>& elements) {
   constexpr size_t kFirst = 1024, kFew = 1u << 16;

@@ -7,8 +7,8 @@
 namespace packtrace {
 namespace {
 
-/// Whether a decimal number that from_chars found out of range is too large (else too small), from its decimal
-/// exponent: the place of the first non-zero digit plus the written exponent.
+/// Whether a decimal number that from_chars reports as out of range is too large rather than too small. The test uses
+/// its decimal exponent: the position of the first nonzero digit plus the written exponent.
 bool is_too_large(std::string_view digits) {
   int64_t before_point = 0, leading_zeros = 0;
   bool seen_point = false, seen_nonzero = false;
@@ -30,7 +30,8 @@ bool is_too_large(std::string_view digits) {
     if (error == std::errc::result_out_of_range) return digits[start] != '-';
   }
   const int64_t first_digit = before_point > 0 ? before_point : -leading_zeros;
-  return exponent > -first_digit; // first_digit + exponent > 0 without overflow: |first_digit| is a text length
+  // first_digit + exponent > 0 without overflow, since |first_digit| is at most the text length.
+  return exponent > -first_digit;
 }
 
 template <class T>
@@ -52,7 +53,7 @@ NumberText<T> parse_number(std::string_view word) {
   if (word.empty()) return number;
   const bool has_sign = word[0] == '-' || word[0] == '+';
   const std::string_view magnitude = word.substr(has_sign ? 1 : 0);
-  if (magnitude.empty() || magnitude[0] == '-') return number; // from_chars would take a second minus
+  if (magnitude.empty() || magnitude[0] == '-') return number; // from_chars would accept a second minus
   const size_t used = parse(magnitude, word[0] == '-', number.value);
   if (used > 0) number.used = used + (has_sign ? 1 : 0);
   return number;

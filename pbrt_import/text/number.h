@@ -10,19 +10,20 @@
 
 namespace packtrace {
 
-/// A number at the start of a word. used is how many characters belong to it; 0: the word does not start with one.
+/// A number at the start of a word. `used` is the number of characters that belong to it, 0 if the word does not start
+/// with a number.
 template <class T>
 struct NumberText {
   T value{};
   size_t used = 0;
 };
 
-/// Reads the longest number at the start of word: digits with an optional sign, point and exponent, or nan and inf.
-/// Correctly rounded to T, float or double; too large becomes infinity, too small zero. Does not depend on the locale.
+/// Parses the longest number at the start of a word: digits with an optional sign, point and exponent, or nan and inf.
+/// Correctly rounded to T, which is float or double; overflow gives infinity, underflow 0. Independent of the locale.
 template <class T>
 NumberText<T> parse_number(std::string_view word);
 
-/// Characters that end a word in pbrt's language. NUL is not one of them, but every buffer ends with one.
+/// Characters that end a word in pbrt's language, plus NUL, with which every buffer ends.
 constexpr bool is_space(char c) { return c == ' ' || c == '\n' || c == '\t' || c == '\r'; }
 constexpr bool ends_word(char c) { return is_space(c) || c == '"' || c == '[' || c == ']' || c == '\0'; }
 
@@ -32,7 +33,7 @@ constexpr bool may_start_number(char c) {
          (c | 0x20) == 'i';
 }
 
-/// How far the scanners below read ahead: the text they work on is followed by that many zeros, or goes on.
+/// Number of readable bytes that the scanners below need behind the start of a number: more text or zeros.
 inline constexpr size_t kScannerReach = 72;
 
 namespace detail {
@@ -45,8 +46,8 @@ inline bool is_digit(char c) { return static_cast<unsigned char>(c - '0') < 10; 
 inline constexpr uint64_t kWholePowersOfTen[] = {1,       10,        100,        1'000,      10'000,
                                                  100'000, 1'000'000, 10'000'000, 100'000'000};
 
-/// The digits at p, up to eight, without a loop: how long a number is cannot be predicted, and branches on it would
-/// cost more than all the arithmetic.
+/// Result of scan_digits(), which reads up to eight digits without a branch: the length of a number is unpredictable,
+/// so mispredicted branches would cost more than all the arithmetic.
 struct DigitRun {
   uint64_t value;
   uint32_t count;
@@ -57,19 +58,20 @@ inline DigitRun scan_digits(const char* p) {
   uint64_t word;
   std::memcpy(&word, p, sizeof word);
   word ^= 0x3030303030303030u; // digits become 0..9
-  // Bit 7 of each byte above 9; carries only spoil bytes after the first such one.
+  // Sets bit 7 of each byte above 9. Carries can only corrupt bytes after the first such byte.
   const uint64_t others = ((word + 0x7676767676767676u) | word) & 0x8080808080808080u;
   const auto count = static_cast<uint32_t>(others ? std::countr_zero(others) / 8 : 8);
-  const uint32_t half = 32 - 4 * count; // two shifts: one by 64 would be undefined
-  word = word << half << half;          // zeros in front, the last digit in the highest byte
-  word = word * 10 + (word >> 8);       // pairs in every second byte
+  const uint32_t half = 32 - 4 * count; // two shifts, because a shift by 64 is undefined
+  word = word << half << half;          // leading zeros, with the last digit in the highest byte
+  word = word * 10 + (word >> 8);       // two-digit values in every second byte
   constexpr uint64_t kPairs = 0x000000FF000000FFu;
   const uint64_t value =
       ((word & kPairs) * (1'000'000ull << 32 | 100) + ((word >> 16) & kPairs) * (10'000ull << 32 | 1)) >> 32;
   return {value, count};
 }
 
-/// The digits behind the first eight. Stops where there are more than a mantissa holds, so that nothing reads far ahead.
+/// Reads the digits after the first eight. Stops after 12, which is more than the mantissa can hold, to bound the
+/// read-ahead.
 inline const char* scan_more_digits(const char* p, uint64_t& mantissa) {
   for (int more = 0; more < 12 && is_digit(*p); ++more) mantissa = mantissa * 10 + static_cast<uint64_t>(*p++ - '0');
   return p;
@@ -77,9 +79,10 @@ inline const char* scan_more_digits(const char* p, uint64_t& mantissa) {
 
 } // namespace detail
 
-/// The common form of a number, read fast: at most 19 digits, small exponent, ended by a delimiter.
-/// @param p start of the number in a buffer that ends with kScannerReach zeros
-/// @return one past the number, with value set to what std::from_chars would give; null: let parse_number decide
+/// Fast parser for the common form of a number: at most 19 digits and a small exponent, followed by a delimiter.
+/// @param p start of the number, with kScannerReach readable bytes
+/// @param value set to the result of std::from_chars
+/// @return one past the number; null if parse_number() has to be used instead
 inline const char* scan_double(const char* p, double& value) {
   using namespace detail;
   const bool negative = *p == '-';
@@ -99,7 +102,7 @@ inline const char* scan_double(const char* p, double& value) {
     exponent = fraction - p;
     digits += p - fraction;
   }
-  if (digits == 0 || digits > 19) return nullptr; // 19 digits fit in 64 bits; with more, mantissa is worthless
+  if (digits == 0 || digits > 19) return nullptr; // 19 digits fit in 64 bits; the mantissa overflows with more
   if ((*p | 0x20) == 'e') {
     ++p;
     const bool negative_exponent = *p == '-';
@@ -110,7 +113,7 @@ inline const char* scan_double(const char* p, double& value) {
     exponent += negative_exponent ? -static_cast<std::ptrdiff_t>(run.value) : static_cast<std::ptrdiff_t>(run.value);
   }
   if (!ends_word(*p)) return nullptr;
-  // Both operands are exact, so there is one rounding.
+  // Both operands are exact, so the result is rounded once.
   // Source: William Clinger, How to Read Floating Point Numbers Accurately, 1990, section 4.
   if (mantissa > 1ull << 53 || exponent < -22 || exponent > 22) return nullptr;
   const double power = kPowersOfTen[exponent < 0 ? -exponent : exponent];
@@ -119,20 +122,20 @@ inline const char* scan_double(const char* p, double& value) {
   return p;
 }
 
-/// Like scan_double, rounded as if once: equal to std::from_chars to a float.
+/// Like scan_double(), for float: the result equals that of std::from_chars for a float, without double rounding.
 inline const char* scan_float(const char* p, float& value) {
   double wide;
   p = scan_double(p, wide);
   if (!p) return nullptr;
-  // The second rounding is harmless unless the double lies exactly between two floats, or below the normal ones where
-  // floats lie closer together than their bits tell.
+  // Rounding twice is only wrong if the double lies exactly in the middle between two floats, or in the range of
+  // subnormal floats, whose spacing this bit test does not cover.
   if ((std::bit_cast<uint64_t>(wide) & 0x1FFFFFFFu) == 0x10000000u) return nullptr;
   if (wide != 0.0 && !(std::abs(wide) >= FLT_MIN && std::abs(wide) <= FLT_MAX)) return nullptr;
   value = static_cast<float>(wide);
   return p;
 }
 
-/// Like scan_double for whole numbers that fit in 32 bits.
+/// Like scan_double(), for integers that fit in 32 bits.
 inline const char* scan_integer(const char* p, int32_t& value) {
   using namespace detail;
   const bool negative = *p == '-';

@@ -7,12 +7,12 @@
 #include <span>
 #include <vector>
 
-#include "pbrt_import/text/large_pages.h"
 #include "pbrt_import/scene/math.h"
+#include "pbrt_import/text/large_pages.h"
 
 namespace packtrace {
 
-/// A growing row of numbers, stored in groups of three: what the large ones become, points or triangles, is taken out
+/// A growing array of numbers, stored in groups of three, so that large arrays can be taken out as points or triangles
 /// without a copy.
 template <class Number, class Triplet>
 class NumberArray {
@@ -31,7 +31,7 @@ public:
 
   void push_back(Number value) { append(std::span<const Number>(&value, 1)); }
 
-  /// Values of another type are converted.
+  /// Appends values, converted to Number.
   template <class Other>
   void append(std::span<const Other> values) {
     grow(values.size());
@@ -39,13 +39,13 @@ public:
     size_ += values.size();
   }
 
-  /// @param size at most the present one
+  /// @param size at most size()
   void truncate(size_t size) {
     size_ = size;
     triplets_.resize((size + 2) / 3);
   }
 
-  /// All of it, but for an incomplete last group. Leaves nothing.
+  /// Moves out all complete groups of three and leaves the array empty.
   std::vector<Triplet> take_triplets() {
     triplets_.resize(size_ / 3);
     size_ = 0;
@@ -55,8 +55,8 @@ public:
 private:
   const Number* data() const { return reinterpret_cast<const Number*>(triplets_.data()); }
 
-  /// The first append allocates just what it needs, since most arrays come in one piece; room that is never used costs
-  /// address space, not memory, where an array is large.
+  /// Resizes the storage for `more` numbers. The first append allocates exactly, since most arrays arrive in one piece.
+  /// Later ones grow large arrays by a factor of 4: unused capacity of large arrays costs address space, not memory.
   void grow(size_t more) {
     constexpr size_t kLarge = 1u << 18;
     const size_t needed = (size_ + more + 2) / 3;

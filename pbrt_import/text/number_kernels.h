@@ -5,24 +5,24 @@
 
 namespace packtrace {
 
-/// How far number kernels read beyond the text they are given, and how far before it.
+/// Readable bytes that a kernel needs behind the limit of its text, and before the text.
 inline constexpr size_t kKernelReach = 72;
 inline constexpr size_t kKernelLead = 17;
 
-/// What a kernel did.
+/// Result of a kernel.
 struct NumberBatch {
-  const char* end = nullptr; ///< one past the last number converted; where the text started if there is none
+  const char* end = nullptr; ///< one past the last number converted; the start of the text if there is none
   size_t count = 0;
-  uint32_t line_ends = 0;              ///< from the start of the text to end
-  const char* last_line_end = nullptr; ///< its last character; null: none
+  uint32_t line_ends = 0;              ///< line ends between the start of the text and `end`
+  const char* last_line_end = nullptr; ///< last character of the last of these line ends; null: none
 };
 
-/// Convert numbers in plain notation, at most 16 digits with or without a point, that are set apart by space, up to a
-/// `]` or the first word that is anything else. Values are rounded correctly; minus zero is no integer. A number that
-/// takes more care than that is left alone.
-/// @param text kKernelLead bytes before it and kKernelReach bytes behind limit must be readable
-/// @param limit numbers that start at or behind it are left alone
-/// @param values room for capacity numbers
+/// Converts numbers in plain notation, with at most 16 digits and an optional point, separated by white space. Stops at
+/// a `]` or at the first word that is not such a number. Values are correctly rounded; minus zero is not an integer.
+/// Numbers whose rounding the fast path cannot decide also stop the kernel.
+/// @param text needs kKernelLead readable bytes before it, and kKernelReach behind limit
+/// @param limit numbers that start at or behind it are not converted
+/// @param values has room for `capacity` numbers
 using IntegerKernel = NumberBatch (*)(const char* text, const char* limit, int32_t* values, size_t capacity);
 using FloatKernel = NumberBatch (*)(const char* text, const char* limit, float* values, size_t capacity);
 using DoubleKernel = NumberBatch (*)(const char* text, const char* limit, double* values, size_t capacity);
@@ -33,7 +33,7 @@ struct NumberKernels {
   DoubleKernel doubles = nullptr;
 };
 
-/// Those for this processor; null where there are none, and the portable scanners do it all.
+/// The kernels for this processor; null if there are none, and the portable scanners must be used.
 const NumberKernels* number_kernels();
 
 namespace avx2 {

@@ -1,4 +1,5 @@
-// Compiled for AVX2: nothing here may be inline in a header, or other translation units could end up calling it.
+// Compiled for AVX2. Inline functions of headers must not be used here, because the linker could pick the AVX2 version
+// for other translation units.
 #include "pbrt_import/text/number_kernels.h"
 
 #if defined(__x86_64__)
@@ -13,19 +14,19 @@ constexpr double kPowersOfTen[16] = {1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7
 constexpr double kInversePowersOfTen[16] = {1e0,  1e-1, 1e-2,  1e-3,  1e-4,  1e-5,  1e-6,  1e-7,
                                             1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14, 1e-15};
 
-alignas(64) constexpr uint8_t kTailMasks[32] = {
-    0,    0,    0,    0,    0,    0,    0,    0,    0,    0,    0,    0,    0,    0,    0,    0,
-    0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff};
+alignas(64) constexpr uint8_t kTailMasks[32] = {0,    0,    0,    0,    0,    0,    0,    0,    0,    0,    0,
+                                                0,    0,    0,    0,    0,    0xff, 0xff, 0xff, 0xff, 0xff, 0xff,
+                                                0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff};
 
 __m128i load16(const void* p) { return _mm_loadu_si128(static_cast<const __m128i*>(p)); }
 
-/// The last n bytes are 0xFF, the others 0; n within [0, 16].
+/// Mask whose last n bytes are 0xFF and whose other bytes are 0; n within [0, 16].
 __m128i last_bytes(size_t n) { return load16(kTailMasks + n); }
 
-/// What is where among 64 bytes: bit i is set where byte i is such a character.
+/// Character classes of 64 bytes: bit i is set if byte i is in the class.
 struct Layout {
   uint64_t spaces;
-  uint64_t line_ends; ///< LF, and CR where no LF follows
+  uint64_t line_ends; ///< LF, and CR if no LF follows
   uint64_t closes;    ///< ]
 };
 
@@ -37,8 +38,8 @@ uint64_t mask_of(__m256i low, __m256i high) {
 [[gnu::always_inline]] inline Layout layout_of(const char* p) {
   const auto load32 = [](const char* at) { return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(at)); };
   const __m256i low = load32(p), high = load32(p + 32);
-  // A byte is a space if it equals the one space with its lower four bits. Source: Geoff Langdale and Daniel Lemire,
-  // Parsing Gigabytes of JSON per Second, 2019, section 3.1.2, in a simpler case.
+  // A byte is white space if it equals the only white-space character with the same lower four bits. Source: Geoff
+  // Langdale and Daniel Lemire, Parsing Gigabytes of JSON per Second, 2019, section 3.1.2, in a simpler case.
   const __m256i space_by_low_bits =
       _mm256_setr_epi8(' ', -1, -1, -1, -1, -1, -1, -1, -1, '\t', '\n', -1, -1, '\r', -1, -1, //
                        ' ', -1, -1, -1, -1, -1, -1, -1, -1, '\t', '\n', -1, -1, '\r', -1, -1);
@@ -53,21 +54,23 @@ uint64_t mask_of(__m256i low, __m256i high) {
   return layout;
 }
 
-/// Digits with at most one point, without a sign.
+/// An unsigned number with at most one point.
 struct Decimal {
   uint64_t mantissa;
   size_t fraction_digits;
   bool valid;
 };
 
-/// All digits at once: those before the point move over it, then sums of pairs, fours and eights.
-/// @param end one past the last character, length within [1, 16]
+/// Converts all digits at once: shifts the digits before the point by one byte to close the gap, then sums pairs, fours
+/// and eights.
+/// @param end one past the last character
+/// @param length number of characters, within [1, 16]
 [[gnu::always_inline]] inline Decimal read_decimal(const char* end, size_t length) {
   const __m128i text = load16(end - 16), shifted = load16(end - 17);
   const auto points = static_cast<uint32_t>(_mm_movemask_epi8(_mm_cmpeq_epi8(text, _mm_set1_epi8('.')))) &
                       (0xFFFFu << (16 - length) & 0xFFFFu);
   const size_t has_point = points != 0;
-  const size_t behind = 15 - _tzcnt_u32(points | 0x8000u); // digits behind the first point
+  const size_t behind = 15 - _tzcnt_u32(points | 0x8000u); // digits after the first point
   const size_t unmoved = has_point ? behind : 16;
   const size_t digits = length - has_point;
   const __m128i joined = _mm_blendv_epi8(shifted, text, last_bytes(unmoved));
@@ -86,7 +89,7 @@ uint64_t bits_of(double value) {
   return bits;
 }
 
-/// Without a branch: signs cannot be predicted.
+/// Branch-free, because signs are unpredictable.
 double with_sign(double magnitude, bool negative) {
   const uint64_t bits = bits_of(magnitude) | static_cast<uint64_t>(negative) << 63;
   double value;
@@ -100,9 +103,9 @@ struct ReadDouble {
     const size_t length = static_cast<size_t>(end - begin) - negative;
     if (length - 1 > 15) return false;
     const Decimal decimal = read_decimal(end, length);
-    // Both operands of the division are exact, so there is one rounding.
-    value = with_sign(static_cast<double>(static_cast<int64_t>(decimal.mantissa)) / kPowersOfTen[decimal.fraction_digits],
-                      negative);
+    // Both operands of the division are exact, so the result is rounded once.
+    value = with_sign(
+        static_cast<double>(static_cast<int64_t>(decimal.mantissa)) / kPowersOfTen[decimal.fraction_digits], negative);
     return decimal.valid && decimal.mantissa <= 1ull << 53;
   }
 };
@@ -113,8 +116,8 @@ struct ReadFloat {
     const size_t length = static_cast<size_t>(end - begin) - negative;
     if (length - 1 > 15) return false;
     const Decimal decimal = read_decimal(end, length);
-    // Three roundings, so wrong by less than two units in the last place of a double: enough to round to a float, but
-    // near the middle between two floats. Sixteen digits cannot leave the range of a float.
+    // Three roundings give an error below two units in the last place of a double. Rounding to float is then correct,
+    // except near the middle between two floats. Sixteen digits cannot leave the range of a float.
     const double wide =
         static_cast<double>(static_cast<int64_t>(decimal.mantissa)) * kInversePowersOfTen[decimal.fraction_digits];
     constexpr uint64_t kMiddle = 0x10000000u, kMargin = 4;
@@ -128,7 +131,7 @@ struct ReadInteger {
   bool operator()(const char* begin, const char* end, int32_t& value) const {
     const bool negative = *begin == '-';
     const size_t length = static_cast<size_t>(end - begin) - negative;
-    if (length - 1 > 7) return false; // longer ones may be too large
+    if (length - 1 > 7) return false; // longer integers may not fit
     uint64_t word;
     __builtin_memcpy(&word, end - 8, sizeof word);
     word = (word ^ 0x3030303030303030u) & ~uint64_t{0} << (64 - 8 * length);
@@ -143,11 +146,11 @@ struct ReadInteger {
   }
 };
 
-/// Where words start and end is found for 64 bytes at once, so that the numbers in them do not wait for each other.
+/// Finds the starts and ends of words for 64 bytes at once, so that their numbers can be converted independently.
 template <class T, class Read>
 NumberBatch convert(const char* text, const char* limit, T* values, size_t capacity, Read read) {
   NumberBatch batch;
-  const char* p = text; // not within a word
+  const char* p = text; // never inside a word
   T* value = values;
   T* const room_end = values + capacity;
   bool stopped = false;
@@ -161,7 +164,7 @@ NumberBatch convert(const char* text, const char* limit, T* values, size_t capac
       starts &= _blsmsk_u64(layout.closes);
       stopped = true;
     }
-    size_t done = 0; // bytes of these 64
+    size_t done = 0; // bytes of this block that are converted
     while (ends && starts) {
       const size_t begin = _tzcnt_u64(starts), end = _tzcnt_u64(ends);
       if (value == room_end || !read(p + begin, p + end, *value)) {

@@ -4,14 +4,14 @@
 #include <stdexcept>
 #include <string>
 
-#include "pbrt_import/text/reporter.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/memory_budget.h"
+#include "pbrt_import/text/reporter.h"
 
 namespace packtrace {
 
-/// Runs work on one file or shape; what goes wrong with it becomes the text of its problem, empty if nothing does.
-/// Throws Error(kCancelled) on, and MemoryError, which lack of memory becomes.
+/// Runs `work` on one file or shape and returns the message of the error that it throws, or an empty string.
+/// Error(kCancelled) and MemoryError are rethrown; other allocation failures become MemoryError.
 template <class Work>
 std::string problem_of(Work work) {
   try {

@@ -17,7 +17,7 @@ uint32_t SourceFiles::add(const std::string& path, std::optional<Place> included
 std::shared_ptr<const SourceFile> SourceFiles::source_file(uint32_t file) const {
   if (const auto found = located_.find(file); found != located_.end()) return found->second;
   const File& f = files_[file];
-  // As deep as files may include each other.
+  // The recursion is as deep as the Include chain, which is limited.
   auto made = std::make_shared<const SourceFile>(SourceFile{paths_[f.path], locate(f.included_from)});
   located_.emplace(file, made);
   return made;
@@ -60,7 +60,7 @@ void report_unused(const ParameterList& parameters, Reporter& reporter) {
   for (const Parameter& parameter : parameters.all()) {
     if (parameter.used) continue;
     std::string message = "parameter " + describe(parameter) + " is ";
-    if (parameters.was_asked(parameter.name))
+    if (parameters.was_looked_up(parameter.name))
       message += "ignored: it has the wrong type or number of values here";
     else
       message += "not used" + did_you_mean(parameters.suggestion(parameter.name));

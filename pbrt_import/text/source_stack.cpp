@@ -7,7 +7,7 @@
 namespace packtrace {
 namespace {
 
-// A file with more of them than this is not text.
+// A file with more bad bytes is not text.
 constexpr uint32_t kMaxBadBytes = 1000;
 
 std::string byte_name(char c) {

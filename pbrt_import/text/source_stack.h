@@ -6,51 +6,52 @@
 #include <string>
 #include <vector>
 
-#include "pbrt_import/text/reporter.h"
 #include "pbrt_import/base/memory_budget.h"
+#include "pbrt_import/text/reporter.h"
 #include "pbrt_import/text/tokenizer.h"
 
 namespace packtrace {
 
-/// Bounds on what a scene's text may make the reader do.
+/// Limits for reading the text of a scene.
 struct SourceLimits {
-  uint32_t max_depth = 64;               ///< files open at once, the main one included
-  uint64_t max_files = 1'000'000;        ///< opened in all: includes that double at every level would never end
-  uint64_t max_file_bytes = 16ull << 30; ///< content of one file, after inflating
+  uint32_t max_depth = 64;               ///< files open at once, including the main file
+  uint64_t max_files = 1'000'000;        ///< files opened in total; bounds Includes that double at every level
+  uint64_t max_file_bytes = 16ull << 30; ///< content of one file in bytes, after inflating
 };
 
-/// The tokens of the main file and all it includes, as one stream: whatever began in an included file may go on in
-/// the file that included it. Bytes that no text has are reported here.
+/// The tokens of the main file and all included files as one stream, so that a construct may start in an included file
+/// and continue in the including one. Reports bytes that are not valid in text.
 class SourceStack {
 public:
   /// Throws Error(kInput), "path: message", if the main file cannot be read.
   SourceStack(const std::filesystem::path& main_file, const SourceLimits& limits, SourceFiles& files,
               Reporter& reporter);
 
-  /// The token that comes next; the same until consume().
+  /// The next token; stays the same until consume().
   const Token& peek();
   void consume() { peeked_ = false; }
-  /// Of the token that peek() gives.
+  /// Position of the token that peek() returned.
   Place place() const { return {files_open_.back().number, token_.line, token_.column}; }
 
-  /// Tokenizer::read_numbers of the current file. Only right after consume().
+  /// Calls Tokenizer::read_numbers() of the current file. Only valid directly after consume().
   template <class T, class Take>
   void read_numbers(Take take) {
     guarded([&](Tokenizer& tokenizer) { tokenizer.read_numbers<T>(take); });
   }
 
-  /// Goes on with the start of another file. Reports and stays where it is if that is not possible.
-  /// @param place of the Include directive
+  /// Continues with the start of another file. If the file cannot be included, this is reported and reading continues
+  /// after the Include.
+  /// @param place position of the Include directive
   void include(const std::filesystem::path& path, const Place& place);
 
   uint64_t files_opened() const { return opened_; }
-  /// Content bytes consumed so far, all files together.
+  /// Content bytes consumed so far in all files.
   uint64_t bytes_read() const;
 
 private:
   struct OpenFile {
     Tokenizer tokenizer;
-    uint32_t number = 0; ///< in SourceFiles
+    uint32_t number = 0; ///< number in SourceFiles
     uint32_t bad_bytes = 0;
   };
 
@@ -67,7 +68,7 @@ private:
   uint64_t closed_bytes_ = 0;
   Token token_;
   bool peeked_ = false;
-  bool gave_up_ = false; ///< on the innermost file: the rest of it is not read
+  bool gave_up_ = false; ///< the rest of the innermost file is skipped
 };
 
 template <class Work>

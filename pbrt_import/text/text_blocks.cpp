@@ -17,26 +17,27 @@ using Kind = NumberRun::Kind;
 
 static_assert(kScannerReach >= kKernelReach);
 
-// How far blocks reach into the next one: enough for any word but the longest to be whole.
+// Overlap of a block with the next one: all tokens but the longest are complete in a block.
 constexpr size_t kOverlap = 256;
-// Below this a file is read faster than a task is started.
+// Smaller files are read faster than a task starts.
 constexpr uint64_t kSmallFile = 512 * 1024;
 constexpr size_t kBlocksAheadPerThread = 2;
-constexpr size_t kMostThreads = 8; // one thread cannot take what more of them give
+constexpr size_t kMaxBlockThreads = 8; // the parsing thread cannot keep up with more
 
-/// Offset in text of the first space in it, npos if there is none.
+/// Offset of the first white-space character, npos if there is none.
 size_t first_space(std::string_view text) {
   const auto* const found = std::find_if(text.begin(), text.end(), is_space);
   return found == text.end() ? std::string_view::npos : static_cast<size_t>(found - text.begin());
 }
 
-/// What the text before a `[` says about the numbers after it.
+/// Type of the numbers after a `[`, guessed from the text before it.
 enum class Guess : uint8_t { kUnknown, kInteger, kFloat, kDouble };
 
 Guess guess_from(std::string_view before) {
   while (!before.empty() && is_space(before.back())) before.remove_suffix(1);
   if (before.empty()) return Guess::kUnknown;
-  if (before.back() != '"') return before.back() == 'm' ? Guess::kDouble : Guess::kFloat; // Transform
+  // Transform and ConcatTransform take doubles.
+  if (before.back() != '"') return before.back() == 'm' ? Guess::kDouble : Guess::kFloat;
   before.remove_suffix(1);
   const size_t quote = before.rfind('"');
   if (quote == std::string_view::npos) return Guess::kUnknown;
@@ -49,7 +50,7 @@ public:
   RunFinder(TextBlock& block, uint64_t stride) : block_(block), text_(block.text.data()) {
     const size_t own = static_cast<size_t>(std::min<uint64_t>(stride, block.size));
     const size_t rest = block.last ? std::string_view::npos : first_space({text_ + own, block.size - own});
-    // Without a space to end at, the numbers just end where one could be cut.
+    // Without a white-space character to end at, stop before a number that the block's end could cut.
     end_ = text_ + (block.last ? block.size
                     : rest != std::string_view::npos && own + rest + kScannerReach <= block.size
                         ? own + rest
@@ -68,7 +69,7 @@ public:
   }
 
 private:
-  /// Where the block before this one stopped, or a `[` before that.
+  /// The position at which the previous block stopped, or just after a `[` before it.
   const char* start() const {
     if (block_.offset == 0) return text_ + (std::string_view(text_, block_.size).starts_with("\xef\xbb\xbf") ? 3 : 0);
     const size_t space = std::min(first_space({text_, std::min(block_.size, kOverlap)}), block_.size);
@@ -82,15 +83,14 @@ private:
     return guess_from({bracket - length, static_cast<size_t>(length)});
   }
 
-  /// Numbers up to the array's end, or to something that no array of numbers holds.
+  /// Converts numbers up to the end of the array, or to a token that no number array contains.
   void read_array(const char* p, Guess guess) {
     position_ = p;
     while (true) {
       read_run(guess);
       if (position_ >= end_ || *position_ == ']' || *position_ == '[' || *position_ == '"') return;
-      // A comment, or a word that is no plain number: somebody else's work, and the row goes on behind it.
-      if (*position_ == '#')
-        position_ = std::find_if(position_, end_, [](char c) { return c == '\n' || c == '\r'; });
+      // Skips a comment, or a word that is not a plain number and is left to the parser. The array continues after it.
+      if (*position_ == '#') position_ = std::find_if(position_, end_, [](char c) { return c == '\n' || c == '\r'; });
       const char* const word = std::find_if_not(position_, end_, is_space);
       if (word != end_ && *word == '#') {
         position_ = word;
@@ -105,14 +105,14 @@ private:
     const char* const begin = position_;
     NumberRun run;
     if (guess == Guess::kInteger || guess == Guess::kUnknown) {
-      // Minus zero is no integer: a float keeps the sign.
+      // Minus zero is not an integer: it would lose the sign that a float keeps.
       const auto scan = [](const char* p, int32_t& value) {
         const char* const end = scan_integer(p, value);
         return end && value == 0 && *p == '-' ? nullptr : end;
       };
       run = convert(block_.integers, scan, kernels_.integers, Kind::kInteger);
       const bool number_follows = position_ < end_ && *position_ != '#' && !ends_word(*position_);
-      if (guess == Guess::kUnknown && number_follows) { // one that is no integer
+      if (guess == Guess::kUnknown && number_follows) { // a number that is not an integer
         block_.integers.resize(run.first);
         position_ = begin;
         guess = Guess::kFloat;
@@ -141,7 +141,7 @@ private:
     const auto scan_one = [&] {
       for (; p < end_ && is_space(*p); ++p)
         if (*p == '\n' || (*p == '\r' && p[1] != '\n')) add_line_ends(1, p);
-      if (p < end_ && detail::is_digit(*p) && ends_word(p[1])) { // most numbers of short arrays
+      if (p < end_ && detail::is_digit(*p) && ends_word(p[1])) { // the common case in short arrays
         chunk[count++] = static_cast<T>(*p++ - '0');
         return true;
       }
@@ -151,7 +151,7 @@ private:
       ++count;
       return true;
     };
-    // A kernel takes its time to start.
+    // Starting a kernel does not pay off for short arrays.
     constexpr size_t kShortArray = 48;
     if (std::memchr(p, ']', kShortArray)) kernel = nullptr;
     do {
@@ -177,7 +177,7 @@ private:
 
   TextBlock& block_;
   const char* text_;
-  const char* end_;      ///< of what is this block's to convert
+  const char* end_; ///< end of the text that this block converts
   const char* position_ = nullptr;
   const NumberKernels kernels_ = number_kernels() ? *number_kernels() : NumberKernels{};
 };
@@ -197,7 +197,7 @@ TextBlocks::TextBlocks(InputFile file, size_t block_bytes) : file_(std::move(fil
       std::min<size_t>(static_cast<size_t>(tbb::this_task_arena::max_concurrency()),
                        tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   if (threads > 1 && file_.stored_bytes() >= kSmallFile) helpers_ = std::make_unique<tbb::task_group>();
-  slots_.resize(helpers_ ? 1 + kBlocksAheadPerThread * std::min(threads, kMostThreads) : 1);
+  slots_.resize(helpers_ ? 1 + kBlocksAheadPerThread * std::min(threads, kMaxBlockThreads) : 1);
   for (std::unique_ptr<Slot>& slot : slots_) slot = std::make_unique<Slot>();
 }
 
@@ -227,7 +227,7 @@ void TextBlocks::queue(uint64_t number) {
   if (helpers_) helpers_->run([this, &slot] { try_work(slot); });
 }
 
-/// Only in order, so only by the thread that asks for blocks.
+/// Blocks must be inflated in order, so only the thread that calls at() does it.
 void TextBlocks::inflate(TextBlock& block) {
   block.text.resize(stride_ + kOverlap + kScannerReach);
   std::copy(carry_.begin(), carry_.end(), block.text.begin());
@@ -238,7 +238,7 @@ void TextBlocks::inflate(TextBlock& block) {
     try {
       char none;
       (void)file_.read({&none, 1});
-    } catch (...) { // damage comes after what could be inflated
+    } catch (...) { // report the damage after the content before it
       block.last = false;
       damage_ = std::current_exception();
     }
@@ -255,7 +255,7 @@ bool TextBlocks::try_work(Slot& slot) {
     TextBlock& block = slot.block;
     if (!file_.compressed()) {
       const uint64_t left = file_.stored_bytes() - std::min(file_.stored_bytes(), block.offset);
-      // One byte more than there should be, so that the end shows.
+      // Reads one byte more than expected, which detects the end of the file.
       const size_t wanted = static_cast<size_t>(std::min<uint64_t>(stride_ + kOverlap, left + 1));
       block.text.resize(std::max(block.text.size(), wanted + kScannerReach));
       block.size = file_.read_at(block.offset, {block.text.data(), wanted});
@@ -276,7 +276,7 @@ bool TextBlocks::try_work(Slot& slot) {
 void TextBlocks::work_until_done(Slot& slot) {
   if (try_work(slot)) return;
   while (slot.state.load(std::memory_order_acquire) != State::kDone) {
-    // Somebody works on it; meanwhile there may be others.
+    // Another thread works on this block; work on other queued blocks meanwhile.
     const bool worked =
         std::any_of(slots_.begin(), slots_.end(), [&](const std::unique_ptr<Slot>& other) { return try_work(*other); });
     if (!worked) slot.state.wait(State::kRunning, std::memory_order_acquire);

@@ -5,9 +5,9 @@
 #include <bit>
 #include <cstring>
 
-#include "pbrt_import/text/number.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/printable.h"
+#include "pbrt_import/text/number.h"
 
 namespace packtrace {
 namespace {
@@ -17,7 +17,7 @@ constexpr bool is_bad_byte(char c) {
   return (byte < 0x20 && !is_space(c) && c != '\v' && c != '\f') || byte == 0x7f || byte == 0xff;
 }
 
-/// Which bytes a predicate holds for.
+/// Table of a predicate over all byte values.
 template <class Predicate>
 constexpr std::array<bool, 256> table_of(Predicate predicate) {
   std::array<bool, 256> table{};
@@ -25,22 +25,22 @@ constexpr std::array<bool, 256> table_of(Predicate predicate) {
   return table;
 }
 
-/// What a word goes on with, and a string as long as there is nothing to decide. Neither holds the zeros that follow a
-/// window.
+/// Bytes that continue a word, and bytes of a string that need no special treatment. Neither table contains the zero
+/// bytes that follow a window.
 constexpr std::array<bool, 256> kWordBytes = table_of([](char c) { return !ends_word(c) && !is_bad_byte(c); });
 constexpr std::array<bool, 256> kPlainStringBytes =
     table_of([](char c) { return c != '"' && c != '\\' && c != '\n' && c != '\r' && !is_bad_byte(c); });
 
 constexpr uint64_t kOnes = 0x0101010101010101u, kHighBits = 0x80 * kOnes;
 
-// Eight bytes at once: bit 7 of those below a bound, or equal to a character. Bytes after the first such one may seem
-// to be so, too, and those from 0x80 on may seem to be anything.
+// SWAR tests of eight bytes: bit 7 is set for bytes below a bound, or equal to a character. The result is exact up to
+// the first such byte; later bytes, and bytes from 0x80 on, may be set wrongly.
 constexpr uint64_t bytes_below(uint64_t word, uint64_t bound) { return word - bound * kOnes; }
 constexpr uint64_t bytes_equal(uint64_t word, char c) { return (word ^ static_cast<unsigned char>(c) * kOnes) - kOnes; }
 constexpr uint64_t bytes_from_0x7f(uint64_t word) { return word | (word + kOnes); }
 
-/// How many bytes in a row the table holds for.
-/// @param special_bytes of eight bytes: bit 7 of the first for which the table may not hold
+/// Number of leading bytes for which the table is true.
+/// @param special_bytes takes eight bytes; sets bit 7 of the first byte for which the table may be false
 template <class SpecialBytes>
 size_t count_while(const char* text, const std::array<bool, 256>& bytes, SpecialBytes special_bytes) {
   static_assert(kScannerReach >= sizeof(uint64_t) && std::endian::native == std::endian::little);
@@ -108,13 +108,13 @@ bool Tokenizer::refill() {
     show(blocks_->at(wanted));
     return true;
   }
-  // What begins here is longer than the blocks overlap.
+  // The token that starts here is longer than the overlap of blocks.
   const size_t kept = size_ - position_;
   if (window_ == joined_.data())
     joined_.erase(joined_.begin(), joined_.begin() + static_cast<std::ptrdiff_t>(position_));
   else
     joined_.assign(window_ + position_, window_ + size_);
-  joined_.resize(kept); // without the zeros
+  joined_.resize(kept); // removes the zeros
   block_ = &blocks_->at(last + 1);
   run_ = 0;
   const size_t known = std::min(static_cast<size_t>(offset + kept - block_->offset), block_->size);
@@ -158,7 +158,7 @@ bool Tokenizer::skip_space_and_comments() {
     if (c == '\n') {
       count_line_end(position_);
     } else if (c == '\r') {
-      if (position_ + 1 == size_) refill(); // is the second half of CR LF still to come?
+      if (position_ + 1 == size_) refill(); // LF of a CR LF may follow
       if (window_[position_ + 1] != '\n') count_line_end(position_);
     } else if (c == '#') {
       skip_comment();
@@ -189,9 +189,9 @@ Token Tokenizer::next() {
 }
 
 Token Tokenizer::read_string() {
-  constexpr uint32_t kMostBadBytes = 16; // more: no string, but something that is no text
-  size_t length = 1;                     // from position_, which refill() moves
-  size_t bad_at = 0;                     // the first bad byte, from there
+  constexpr uint32_t kMaxStringBadBytes = 16; // strings with more are treated as binary data
+  size_t length = 1;                          // relative to position_, which refill() changes
+  size_t bad_at = 0;                          // of the first bad byte, relative to position_
   uint32_t bad_bytes = 0;
   bool too_long = false;
   const auto end = [&](TokenKind kind, size_t text_end, size_t next) {
@@ -211,7 +211,7 @@ Token Tokenizer::read_string() {
     if (position_ + length >= size_) continue;
     const char c = window_[position_ + length];
     if (c == '"') return end(TokenKind::kString, position_ + length, position_ + length + 1);
-    if (c == '\n' || c == '\r' || bad_bytes == kMostBadBytes) break;
+    if (c == '\n' || c == '\r' || bad_bytes == kMaxStringBadBytes) break;
     if (is_bad_byte(c) && bad_bytes++ == 0) bad_at = length;
     if (c == '\\') {
       if (position_ + length + 1 >= size_) refill();

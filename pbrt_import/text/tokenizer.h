@@ -14,27 +14,27 @@ namespace packtrace {
 
 enum class TokenKind : uint8_t {
   kWord,               ///< a directive or a number
-  kString,             ///< text: the characters between the quotes, escapes untouched
+  kString,             ///< text: the characters between the quotes, escapes not replaced
   kOpen,               ///< [
   kClose,              ///< ]
-  kUnterminatedString, ///< text: what there was up to the end of the line
-  kBadByte,            ///< text: a byte that no pbrt file has, the first one of the string that it is in
-  kTooLong,            ///< a word or string of more than kMaxTokenBytes; no text
-  kEnd,                ///< end of the file, again and again
+  kUnterminatedString, ///< text: the rest of the line
+  kBadByte,            ///< text: a byte that is invalid in pbrt files; in a string, the first such byte
+  kTooLong,            ///< a word or string longer than kMaxTokenBytes; no text
+  kEnd,                ///< end of the file, returned again by every further call
 };
 
-/// No name, number or path has as many bytes.
+/// Longer than any name, number or path.
 inline constexpr size_t kMaxTokenBytes = size_t{2} << 20;
 
 struct Token {
   TokenKind kind = TokenKind::kEnd;
-  std::string_view text; ///< valid until the tokenizer is asked for anything else
+  std::string_view text; ///< valid until the next call of the tokenizer
   uint32_t line = 0;     ///< of the first character, from 1
   uint32_t column = 0;   ///< in bytes, from 1
 };
 
-/// Splits one pbrt-v3 file into tokens in a single pass over a window of it: a block, or a copy of several where a
-/// token lies across them. Lines end with LF, CR LF or CR; a UTF-8 byte order mark is skipped.
+/// Splits a pbrt-v3 file into tokens in one pass over a window of its text, which is a block, or a copy of several
+/// blocks if a token spans them. Lines end with LF, CR LF or CR; a UTF-8 byte order mark is skipped.
 class Tokenizer {
 public:
   static constexpr size_t kDefaultWindow = 128 * 1024;
@@ -42,24 +42,24 @@ public:
   /// Throws Error like InputFile::read, and Error(kInput) for UTF-16.
   explicit Tokenizer(InputFile file, size_t window_bytes = kDefaultWindow);
 
-  /// The next token. Throws Error like InputFile::read.
+  /// Returns the next token. Throws Error like InputFile::read.
   Token next();
 
-  /// Calls take(std::span<const T>) with the numbers that come next in the file, as many as were converted ahead:
-  /// maybe none, and never more than up to the end of their array. T is float, double or int32_t; take may get a span
-  /// of int32_t whatever T is. Throws Error like InputFile::read.
+  /// Calls take(std::span<const T>) with the numbers that follow in the file and were converted ahead; there may be
+  /// none, and they never extend beyond the end of their array. T is float, double or int32_t; for any T, take may also
+  /// get a span of int32_t. Throws Error like InputFile::read.
   template <class T, class Take>
   void read_numbers(Take take);
 
-  /// Content bytes consumed.
+  /// Content bytes consumed so far.
   uint64_t consumed_bytes() const { return window_offset_ + position_; }
   const InputFile& file() const { return blocks_->file(); }
 
 private:
-  /// Reads on, so that the window goes on where it ends now. False at the end of the file.
+  /// Extends the window beyond its current end; false at the end of the file.
   bool refill();
   void show(const TextBlock& block);
-  /// The run that starts at the current position and can be read as T; null if there is none.
+  /// The run of numbers that starts at the current position and is convertible to T; null if there is none.
   template <class T>
   const NumberRun* find_run();
   void skip(const NumberRun& run);
@@ -68,31 +68,31 @@ private:
   void count_line_end(size_t at);
   Token read_string();
   Token read_word();
-  /// Moves over the first length bytes of a token that is longer than tokens may be.
+  /// Skips the first `length` bytes of a token that exceeds kMaxTokenBytes, and sets length to 0.
   void cut(size_t& length);
   Token make(TokenKind kind, size_t start, size_t end) const;
   void check_encoding();
 
   std::unique_ptr<TextBlocks> blocks_;
-  const TextBlock* block_ = nullptr; ///< the one read last
-  size_t run_ = 0;                   ///< runs of block_ before it lie behind the current position
-  std::vector<char> joined_;         ///< the window where that is not block_'s text
-  const char* window_ = nullptr;     ///< size_ bytes, then kScannerReach zeros
+  const TextBlock* block_ = nullptr; ///< the block read last
+  size_t run_ = 0;                   ///< index into block_->runs; earlier runs start before the current position
+  std::vector<char> joined_;         ///< copy of several blocks, if the window is not block_'s text
+  const char* window_ = nullptr;     ///< size_ bytes followed by kScannerReach zeros
   size_t size_ = 0;
   size_t position_ = 0;
-  uint64_t window_offset_ = 0; ///< of window_[0] in the content
-  bool at_end_ = false;        ///< the file has nothing after the window
+  uint64_t window_offset_ = 0; ///< offset of window_[0] in the content
+  bool at_end_ = false;        ///< the file ends with the window
   uint32_t line_ = 1;
   uint64_t line_start_ = 0; ///< offset of the line's first byte in the content
   uint32_t token_line_ = 1;
   uint32_t token_column_ = 1;
 };
 
-/// The text a string token stands for: \b \f \n \r \t \\ \' \" replaced, other back-slashes kept.
-/// @param unknown_escape set to true where a back-slash was kept
+/// Value of a string token: \b \f \n \r \t \\ \' \" are replaced, other backslashes are kept.
+/// @param unknown_escape set to true if a backslash was kept
 std::string unescape(std::string_view raw, bool& unknown_escape);
 
-/// Text for messages, in double quotes: bytes that are not printable() as \xNN, cut after max_length bytes.
+/// Text in double quotes for messages: bytes that are not printable() are shown as \xNN; cut after max_length bytes.
 inline constexpr size_t kMaxShownPath = 4096;
 std::string in_quotes(std::string_view text, size_t max_length = 60);
 

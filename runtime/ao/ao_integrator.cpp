@@ -11,7 +11,7 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kTilePixels = kTileSize * kTileSize;
-constexpr uint32_t kMostTogether = 4; ///< samples of a tile that are handed on in one call, at most
+constexpr uint32_t kMaxTogether = 4; ///< samples of a tile that are handed on in one call, at most
 
 /// What hits at each distance do to a sample; see AoConfig.
 class Coefficient {
@@ -78,11 +78,11 @@ public:
   template <typename Result>
   void trace_tile(const Tile& tile, const Progress& progress) const {
     const uint32_t together =
-        std::clamp(tracer_.rays_together() / kTilePixels, 1u, std::min(config_.spp, kMostTogether));
+        std::clamp(tracer_.preferred_rays_per_call() / kTilePixels, 1u, std::min(config_.spp, kMaxTogether));
     if (together == 1)
       trace_samples<Result, 1>(tile, together, progress);
     else
-      trace_samples<Result, kMostTogether>(tile, together, progress);
+      trace_samples<Result, kMaxTogether>(tile, together, progress);
   }
 
 private:

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <limits>
 
-#include "runtime/trace/source/albedo_lookup.h"
-#include "runtime/trace/ray_offset.h"
 #include "runtime/camera/tiles.h"
+#include "runtime/trace/ray_offset.h"
+#include "runtime/trace/source/albedo_lookup.h"
 
 namespace packtrace {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "pbrt_import/scene/camera_rays.h"
 #include "pbrt_import/base/progress.h"
+#include "pbrt_import/scene/camera_rays.h"
 #include "runtime/camera/gbuffer.h"
 #include "runtime/trace/ray_tracer.h"
 

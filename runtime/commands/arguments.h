@@ -15,7 +15,8 @@ namespace packtrace {
 ///  - an option whose value may be left out takes the next word only where that can be one of its values, so that
 ///    `bake --lod scene.pbrt` keeps its scene;
 ///  - `--size 640 360` is `--size 640x360`;
-///  - an option, or a verb, in the place of an option's value is an error: `--json --force` would write a file called "--force".
+///  - an option, or a verb, in the place of an option's value is an error: `--json --force` would write a file called
+///  "--force".
 ///    `--json=--force` means just that.
 /// Words behind "--" stay as they are.
 /// @param words without the program's name

@@ -214,7 +214,7 @@ uint32_t thread_limit(const GlobalOptions& globals) {
 }
 
 void install_interrupt_handlers() {
-  struct sigaction action {};
+  struct sigaction action{};
   action.sa_handler = on_interrupt;
   sigemptyset(&action.sa_mask);
   action.sa_flags = SA_RESTART;

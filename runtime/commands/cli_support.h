@@ -18,13 +18,13 @@ namespace packtrace {
 
 /// What every verb understands, and the verb that was given.
 struct GlobalOptions {
-  bool quiet = false;          ///< errors only
-  int verbosity = 0;           ///< how often -v was given; 1 shows notes
-  std::string json;            ///< where results go as JSON: a file, "-" for standard output, empty for nowhere
-  bool force = false;          ///< existing files may be replaced
-  uint32_t threads = 0;        ///< 0: PACKTRACE_THREADS, or as many as the machine has
+  bool quiet = false;   ///< errors only
+  int verbosity = 0;    ///< how often -v was given; 1 shows notes
+  std::string json;     ///< where results go as JSON: a file, "-" for standard output, empty for nowhere
+  bool force = false;   ///< existing files may be replaced
+  uint32_t threads = 0; ///< 0: PACKTRACE_THREADS, or as many as the machine has
   MemoryBudget memory = MemoryBudget(); ///< for all that the input decides the size of
-  std::function<int()> action; ///< of the verb on the command line; returns the exit code
+  std::function<int()> action;          ///< of the verb on the command line; returns the exit code
 };
 
 /// Adds the options of every verb to the program itself, so that they may stand before the verb too.

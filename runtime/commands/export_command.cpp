@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "compress/exchange/vertex16/vertex16_export.h"
 #include "compress/exchange/gltf/gltf_export.h"
+#include "compress/exchange/vertex16/vertex16_export.h"
 #include "pbrt_import/base/file_error.h"
 #include "runtime/commands/binary_output.h"
 #include "runtime/commands/cli_support.h"
@@ -202,7 +202,8 @@ void add_export_command(CLI::App& app, GlobalOptions& globals) {
       ->capture_default_str();
   verb.footer(
       "vertex16 packs position 3x21, normal 24, tangent 1+8 and uv 2x16 bits. docs/vertex16.md lays out the file,\n"
-      "compress/exchange/vertex16/vertex16.glsl and vertex16_decode.h decode it. glTF positions stay on the file's lattice.\n"
+      "compress/exchange/vertex16/vertex16.glsl and vertex16_decode.h decode it. glTF positions stay on the file's "
+      "lattice.\n"
       "Examples:\n"
       "  packtrace export house.ptk -o house.v16\n"
       "  packtrace export house.ptk -o house.glb --level 10\n"

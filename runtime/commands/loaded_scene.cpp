@@ -11,11 +11,11 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "pbrt_import/text/input_file.h"
 #include "pbrt_import/base/file_bytes.h"
 #include "pbrt_import/base/file_error.h"
 #include "pbrt_import/base/output_file.h"
 #include "pbrt_import/base/regular_file.h"
+#include "pbrt_import/text/input_file.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/trace/source/float_source.h"
 #include "runtime/trace/source/packed_source.h"
@@ -142,8 +142,7 @@ void LoadedScene::copy_file(const std::filesystem::path& file, const MemoryBudge
 }
 
 LoadedScene load_scene(const std::filesystem::path& file, const SceneOptions& scene_options,
-                       const GlobalOptions& globals, Progress& progress, ProgressDisplay& display,
-                       bool private_copy) {
+                       const GlobalOptions& globals, Progress& progress, ProgressDisplay& display, bool private_copy) {
   LoadedScene loaded;
   if (is_baked_file(file)) {
     require_no_scene_choice(file, scene_options);

@@ -8,8 +8,8 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "compress/format/file/baked_file.h"
-#include "pbrt_import/import_scene.h"
 #include "pbrt_import/base/progress.h"
+#include "pbrt_import/import_scene.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/progress_display.h"
 #include "runtime/trace/source/scene_source.h"

@@ -9,11 +9,11 @@
 #include <nlohmann/json.hpp>
 
 #include "pbrt_import/base/error.h"
+#include "runtime/camera/lod_view.h"
 #include "runtime/commands/file_report.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/lod/compaction.h"
 #include "runtime/stopwatch.h"
-#include "runtime/camera/lod_view.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
 
 namespace packtrace {
@@ -91,7 +91,7 @@ nlohmann::json geometries_json(const ChosenDetail& detail) {
   std::vector<uint64_t> instances(detail.geometries->size(), 0), builds = instances, triangles = instances;
   for (const LodInstance& instance : detail.instances) ++instances[instance.geometry];
   for (const PlannedBlas& blas : detail.plan.blas) {
-    if (blas.kind == BlasKind::kLowest) continue;
+    if (blas.kind == BlasKind::kCoarsest) continue;
     ++builds[blas.geometry];
     triangles[blas.geometry] += blas.triangles;
   }

@@ -13,8 +13,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "pbrt_import/scene/camera_rays.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/scene/camera_rays.h"
 #include "runtime/commands/binary_output.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/image_outputs.h"
@@ -150,11 +150,11 @@ RenderConfig make_config(const SceneSource& source, const Camera& camera, const 
 /// For the layers of a view, the G-buffer's and the denoiser's, about. Sizes may come from the scene's film.
 MemoryReservation reserve_picture(const RenderOptions& options, const RenderConfig& config,
                                   const MemoryBudget& budget) {
-  constexpr double kPixelBytes = 320.0, kMost = 0x1p62;
+  constexpr double kPixelBytes = 320.0, kMax = 0x1p62;
   const double side = config.supersample;
   const double bytes = kPixelBytes * side * side * static_cast<double>(config.size.width) * config.size.height;
   try {
-    return MemoryReservation(budget, static_cast<uint64_t>(std::min(kMost, bytes)),
+    return MemoryReservation(budget, static_cast<uint64_t>(std::min(kMax, bytes)),
                              fmt::format("a picture of {} x {} pixels", config.size.width, config.size.height));
   } catch (const MemoryError& error) {
     throw MemoryError(options.input, error.what());
@@ -179,7 +179,8 @@ TracerConfig tracer_config(const RenderOptions& options, const GlobalOptions& gl
   TracerConfig config;
   config.backend = choose_backend(options, baked);
   const std::string quality = options.bvh.value_or("medium");
-  config.embree = {quality == "high" ? BvhQuality::kHigh : BvhQuality::kMedium, !options.fast_edges, false, globals.memory};
+  config.embree = {quality == "high" ? BvhQuality::kHigh : BvhQuality::kMedium, !options.fast_edges, false,
+                   globals.memory};
   return config;
 }
 

@@ -63,7 +63,7 @@ nlohmann::json visible_seams_json(const InstanceSeams& seams, const RenderedImag
   const bool orthographic = camera.projection() == Projection::kOrthographic;
   std::vector<double> errors(nearest.size()), beside(seams.touching().size());
   double promised = 0.0;
-  if (detail) errors = stated_errors(*detail), beside = seams.largest_beside(errors), promised = promised_px(*detail);
+  if (detail) errors = stated_errors(*detail), beside = seams.largest_touching(errors), promised = promised_px(*detail);
   uint64_t visible = 0, wide = 0;
   double grids_px = 0.0, detail_px = 0.0, largest_px = 0.0;
   for (size_t i = 0; i < seams.touching().size(); ++i) {

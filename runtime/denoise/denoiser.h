@@ -3,8 +3,8 @@
 #include <memory>
 #include <vector>
 
-#include "runtime/denoise/denoiser_config.h"
 #include "runtime/camera/gbuffer.h"
+#include "runtime/denoise/denoiser_config.h"
 
 namespace packtrace {
 

@@ -3,7 +3,7 @@
 namespace packtrace {
 namespace {
 
-constexpr float kUnknownPrecision = 4.0f;
+constexpr float kUnknownInverseVariance = 4.0f;
 
 struct WeightedMean {
   float weight = 0, sum = 0;
@@ -45,7 +45,7 @@ void fill_unsampled(const Guides& guides, const Plane<float>& samples, std::span
           mean = mean_of_surface(edges[i], samples, image.value, x, y);
         if (mean.weight == 0.0f) mean = mean_of_window(samples, image.value, x, y);
         image.value.row(y)[x] = mean.weight > 0.0f ? mean.sum / mean.weight : 1.0f;
-        image.precision.row(y)[x] = kUnknownPrecision;
+        image.inverse_variance.row(y)[x] = kUnknownInverseVariance;
       }
     }
   });

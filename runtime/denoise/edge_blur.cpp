@@ -20,11 +20,11 @@ constexpr float kNoise = 1.2f;
 /// Squared differences in units of the noise between two rows of pixels, and where both lie on one surface.
 PACKTRACE_AVX2_CLONES
 void compare_row(int begin, int end, const float* __restrict value, const float* __restrict other,
-                 const float* __restrict precision, const float* __restrict other_precision,
+                 const float* __restrict inverse_variance, const float* __restrict other_inverse_variance,
                  const uint8_t* __restrict edge, float* __restrict distance, uint8_t* __restrict same) {
   for (int x = begin; x < end; ++x) {
     const float difference = other[x] - value[x];
-    const float noise_units = difference * difference * smaller(precision[x], other_precision[x]);
+    const float noise_units = difference * difference * smaller(inverse_variance[x], other_inverse_variance[x]);
     distance[x] = edge[x] != 0 ? noise_units : 0.0f;
   }
   for (int x = begin; x < end; ++x) same[x] = edge[x] != 0 ? 1 : 0;
@@ -83,8 +83,8 @@ void weigh_values(const NoisyImage& image, const EdgeWeights& edges, size_t dire
   const Plane<uint8_t>& edge = edges.direction(direction);
   PatchRows rows(width);
   const auto compare = [&](int y) {
-    compare_row(-1, width + 1, image.value.row(y), image.value.row(y + dy) + dx, image.precision.row(y),
-                image.precision.row(y + dy) + dx, edge.row(y), rows.distance(y), rows.same(y));
+    compare_row(-1, width + 1, image.value.row(y), image.value.row(y + dy) + dx, image.inverse_variance.row(y),
+                image.inverse_variance.row(y + dy) + dx, edge.row(y), rows.distance(y), rows.same(y));
   };
   compare(first - 1), compare(first);
   for (int y = first; y < last; ++y) {
@@ -96,10 +96,10 @@ void weigh_values(const NoisyImage& image, const EdgeWeights& edges, size_t dire
 /// What a row reads: values of it and the rows one step above and below, and the weights that leave it and the row
 /// above.
 struct BlurRow {
-  const float *value, *value_above, *value_below, *precision, *samples;
+  const float *value, *value_above, *value_below, *inverse_variance, *samples;
   const uint8_t *right, *down, *down_right, *down_left;
   const uint8_t *above_down, *above_down_right, *above_down_left;
-  float *out_value, *out_precision;
+  float *out_value, *out_inverse_variance;
 };
 
 struct Sums {
@@ -133,7 +133,7 @@ void blur_row(int width, ptrdiff_t step, const BlurRow& rows, Fade fade) {
     const float kept = 1.0f - strength * sums.taken;
     r.out_value[x] = v + strength * sums.flux;
     // Differences that noise made large were mixed less, so less noise is gone than the weights say.
-    r.out_precision[x] = r.precision[x] / std::sqrt(kept * kept + strength * strength * sums.squares);
+    r.out_inverse_variance[x] = r.inverse_variance[x] / std::sqrt(kept * kept + strength * strength * sums.squares);
   }
 }
 
@@ -142,7 +142,7 @@ BlurRow make_row(const NoisyImage& image, int step, const Plane<float>& samples,
   return {image.value.row(y),
           image.value.row(y - step),
           image.value.row(y + step),
-          image.precision.row(y),
+          image.inverse_variance.row(y),
           samples.row(y),
           weights[0].row(y),
           weights[1].row(y),
@@ -152,7 +152,7 @@ BlurRow make_row(const NoisyImage& image, int step, const Plane<float>& samples,
           weights[2].row(y - step),
           weights[3].row(y - step),
           scratch.image.value.row(y),
-          scratch.image.precision.row(y)};
+          scratch.image.inverse_variance.row(y)};
 }
 
 } // namespace
@@ -171,12 +171,12 @@ void edge_blur(const EdgeWeights& edges, const Plane<float>& samples, Fade fade,
         blur_row(width, edges.step(), make_row(image, edges.step(), samples, y, scratch), fade);
       } else {
         std::copy_n(image.value.row(y), width, scratch.image.value.row(y));
-        std::copy_n(image.precision.row(y), width, scratch.image.precision.row(y));
+        std::copy_n(image.inverse_variance.row(y), width, scratch.image.inverse_variance.row(y));
       }
     }
   });
   std::swap(image.value, scratch.image.value);
-  std::swap(image.precision, scratch.image.precision);
+  std::swap(image.inverse_variance, scratch.image.inverse_variance);
 }
 
 } // namespace packtrace

@@ -8,11 +8,11 @@ namespace packtrace {
 /// An image on its way through the blurs.
 struct NoisyImage {
   Plane<float> value;
-  Plane<float> precision;      ///< 1 / variance of the noise left in `value`
-  std::vector<float> youngest; ///< per row: least tspp of its pixels; misses do not count
+  Plane<float> inverse_variance; ///< 1 / variance of the noise left in `value`
+  std::vector<float> youngest;   ///< per row: least tspp of its pixels; misses do not count
 
   void resize(ImageSize size) {
-    value.resize(size), precision.resize(size);
+    value.resize(size), inverse_variance.resize(size);
     youngest.assign(size.height, 0.0f);
   }
 };

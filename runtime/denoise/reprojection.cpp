@@ -10,7 +10,7 @@ namespace packtrace {
 namespace {
 
 /// History with less weight than this is noise of the tests, not a surface.
-constexpr float kLeastWeight = 1e-3f;
+constexpr float kMinWeight = 1e-3f;
 
 /// Footprints with less weight cross an edge that sharpening would overshoot at.
 constexpr float kSharpenWeight = 0.9f;
@@ -105,10 +105,9 @@ class Reprojection {
 public:
   Reprojection(const FrameHistory& previous, const Guides& guides, const DepthDerivatives& derivatives,
                const DenoiserConfig& config)
-      : previous_(previous), guides_(guides),
-        derivatives_(derivatives), tests_{config.reprojection_depth, config.reprojection_slope,
-                                          std::countr_zero(config.reprojection_normal_power),
-                                          config.reprojection_instance_test},
+      : previous_(previous), guides_(guides), derivatives_(derivatives),
+        tests_{config.reprojection_depth, config.reprojection_slope, std::countr_zero(config.reprojection_normal_power),
+               config.reprojection_instance_test},
         width_(static_cast<float>(guides.size.width)), height_(static_cast<float>(guides.size.height)) {}
 
   Gathered gather(int x, int y, Vec2 motion) const {
@@ -151,7 +150,7 @@ private:
 };
 
 void store(const Gathered& sum, float longest, History& history, int x, int y) {
-  const bool found = sum.weight > kLeastWeight;
+  const bool found = sum.weight > kMinWeight;
   const float scale = found ? 1.0f / sum.weight : 0.0f;
   const float linear = sum.mean * scale;
   const float sharp = found ? smaller(larger(linear + sum.sharpening, 0.0f), 1.0f) : 0.0f;

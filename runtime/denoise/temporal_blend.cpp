@@ -15,7 +15,7 @@ namespace {
 constexpr float kVariancePrior = 4.0f;
 
 /// Variance below which values count as free of noise: far below the square of one step of 8 bits.
-constexpr float kLeastVariance = 1e-8f;
+constexpr float kMinVariance = 1e-8f;
 
 struct AccumulateRow {
   const float *ao, *disparity;
@@ -49,7 +49,7 @@ inline float excess(float change, float limit) { return std::copysign(larger(std
 
 struct CorrectRow {
   const float *count, *local_variance, *change, *narrow_count, *narrow_change, *disparity;
-  float *mean, *square, *samples, *variance, *value, *precision;
+  float *mean, *square, *samples, *variance, *value, *inverse_variance;
 };
 
 struct CorrectScales {
@@ -88,7 +88,7 @@ float correct_row(int width, const CorrectRow& rows, CorrectScales s) {
     r.samples[x] = n;
     r.variance[x] = variance;
     r.value[x] = new_mean;
-    r.precision[x] = 1.0f / (variance * (1.0f + distrust * distrust) + kLeastVariance);
+    r.inverse_variance[x] = 1.0f / (variance * (1.0f + distrust * distrust) + kMinVariance);
   }
   return std::bit_cast<float>(youngest);
 }
@@ -134,7 +134,7 @@ void correct_history(const FrameSamples& samples, const Guides& guides, const De
                            local.narrow_change.data(), guides.disparity.row(y),
                            history.mean.row(y),        history.square.row(y),
                            history.samples.row(y),     &value_variance[static_cast<size_t>(y) * guides.size.width],
-                           image.value.row(y),         image.precision.row(y)};
+                           image.value.row(y),         image.inverse_variance.row(y)};
       image.youngest[static_cast<size_t>(y)] = correct_row(static_cast<int>(guides.size.width), row, scales);
     }
   });

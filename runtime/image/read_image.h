@@ -12,8 +12,8 @@ namespace packtrace {
 /// An image together with where it came from.
 struct LoadedImage {
   Image image;
-  std::string layer;  ///< the EXR layer taken; empty for PNG and for plain EXR channels
-  bool alpha = false; ///< the last channel is opacity, not colour
+  std::string layer;        ///< the EXR layer taken; empty for PNG and for plain EXR channels
+  bool alpha = false;       ///< the last channel is opacity, not colour
   MemoryReservation memory; ///< of the image and of what decoding it took
 };
 

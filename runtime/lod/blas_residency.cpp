@@ -28,7 +28,7 @@ BlasResidency::BlasResidency(const LodSharing& sharing, const ResidencyConfig& c
     step_handles_.back() = g;
     const auto last = static_cast<uint32_t>(steps.size()) - 1;
     residents_.push_back(
-        {g, BlasKind::kLowest, last, steps[last].clusters, steps[last].triangles, steps[last].error, {}, 0, true});
+        {g, BlasKind::kCoarsest, last, steps[last].clusters, steps[last].triangles, steps[last].error, {}, 0, true});
     live_triangles_ += steps[last].triangles;
     ++live_;
   }
@@ -173,7 +173,7 @@ void BlasResidency::refer(const LodPlan& plan) {
 void BlasResidency::drop_unused() {
   for (BlasHandle handle = 0; handle < residents_.size(); ++handle) {
     const ResidentBlas& resident = residents_[handle];
-    if (!resident.live || resident.kind == BlasKind::kLowest) continue;
+    if (!resident.live || resident.kind == BlasKind::kCoarsest) continue;
     const uint32_t keep = resident.kind == BlasKind::kOwn ? config_.keep_own_frames : config_.keep_step_frames;
     if (number_ - resident.last_used > keep) drop(handle);
   }

@@ -32,7 +32,7 @@ inline constexpr BlasHandle kNoBlas = ~0u;
 /// A BLAS that exists.
 struct ResidentBlas {
   uint32_t geometry = 0;
-  BlasKind kind = BlasKind::kLowest;
+  BlasKind kind = BlasKind::kCoarsest;
   uint32_t step = 0; ///< unused for kOwn
   uint32_t clusters = 0;
   uint64_t triangles = 0;

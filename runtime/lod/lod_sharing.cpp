@@ -245,7 +245,7 @@ void LodSharing::add_steps(uint32_t geometry) {
   const std::span<const LodStep> steps = steps_[geometry];
   for (uint32_t step = 0; step < steps.size(); ++step) {
     if (part.users[step] == 0) continue;
-    const BlasKind kind = step + 1 == steps.size() ? BlasKind::kLowest : BlasKind::kStep;
+    const BlasKind kind = step + 1 == steps.size() ? BlasKind::kCoarsest : BlasKind::kStep;
     part.blas.push_back({geometry, kind, step, steps[step].clusters, steps[step].triangles, 0, part.users[step]});
     part.users[step] = static_cast<uint32_t>(part.blas.size()) - 1; // from here on: index in part.blas
   }
@@ -255,7 +255,7 @@ void LodSharing::add_steps(uint32_t geometry) {
     if (choice.category == InstanceCategory::kOwn) continue;
     const uint32_t number = part.users[choice.step];
     blas_of_slot_[slot] = number;
-    if (part.blas[number].kind == BlasKind::kLowest) continue;
+    if (part.blas[number].kind == BlasKind::kCoarsest) continue;
     choice.category = provided[number] ? InstanceCategory::kShares : InstanceCategory::kProvider;
     provided[number] = true;
   }
@@ -332,7 +332,7 @@ void LodSharing::collect(LodPlan& plan) {
     first_blas[g] = static_cast<uint32_t>(plan.blas.size());
     for (PlannedBlas blas : parts_[g].blas) {
       if (blas.kind == BlasKind::kOwn) blas.first_word += plan.passed.size();
-      if (blas.kind != BlasKind::kLowest) {
+      if (blas.kind != BlasKind::kCoarsest) {
         ++plan.builds;
         plan.built_triangles += blas.triangles;
         plan.built_clusters += blas.clusters;

@@ -20,15 +20,15 @@ struct LodInstance {
 inline constexpr uint32_t kMaxLodInstances = 1u << 27;
 
 enum class BlasKind : uint8_t {
-  kLowest, ///< the coarsest cut; every geometry has it from the start
-  kStep,   ///< a view-independent step of the geometry
-  kOwn,    ///< a cut for this view
+  kCoarsest, ///< the coarsest cut; every geometry has it from the start
+  kStep,     ///< a view-independent step of the geometry
+  kOwn,      ///< a cut for this view
 };
 
 /// A BLAS that a plan requires.
 struct PlannedBlas {
   uint32_t geometry = 0;
-  BlasKind kind = BlasKind::kLowest;
+  BlasKind kind = BlasKind::kCoarsest;
   uint32_t index = 0; ///< index in LodSharing::steps(); for kOwn, the first instance that uses it
   uint32_t clusters = 0;
   uint64_t triangles = 0;
@@ -38,7 +38,7 @@ struct PlannedBlas {
 
 /// How an instance got its BLAS.
 enum class InstanceCategory : uint8_t {
-  kLowest,   ///< the coarsest cut is fine enough
+  kCoarsest, ///< the coarsest cut is fine enough
   kProvider, ///< first to use a BLAS that others may share
   kShares,   ///< uses another instance's BLAS
   kOwn,      ///< has its own cut
@@ -64,7 +64,7 @@ struct LodPlan {
   std::vector<uint32_t> step_of_instance;        ///< the coarsest step that is fine enough, used or not
   std::vector<LevelHistogram> histograms;        ///< per geometry; only with kOneProvider or SharingConfig::measure
   std::array<uint64_t, 4> category_counts{};     ///< per InstanceCategory
-  uint64_t builds = 0;                           ///< number of BLASes other than kLowest
+  uint64_t builds = 0;                           ///< number of BLASes other than kCoarsest
   uint64_t built_triangles = 0, built_clusters = 0;
   uint64_t traced_triangles = 0; ///< sum over instances, of the BLAS each uses
   uint64_t own_triangles = 0;    ///< sum over instances, of each one's own cut; only with SharingConfig::measure
@@ -120,7 +120,7 @@ private:
     uint64_t own_triangles = 0; ///< of its own cut, or a sufficient lower bound
     uint32_t step = 0;
     uint8_t min_level = 0, max_level = 0;
-    InstanceCategory category = InstanceCategory::kLowest;
+    InstanceCategory category = InstanceCategory::kCoarsest;
   };
   struct Block {
     uint32_t geometry, first, last; ///< range of slots

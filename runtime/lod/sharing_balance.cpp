@@ -61,7 +61,7 @@ private:
 };
 
 /// Chooses the steps to build and moves the users of all others to them.
-void leave_out_steps(std::span<const LodStep> steps, double limit, SharingBalance& balance) {
+void choose_built_steps(std::span<const LodStep> steps, double limit, SharingBalance& balance) {
   balance.instead.resize(steps.size());
   std::iota(balance.instead.begin(), balance.instead.end(), 0u);
   uint64_t spent = 0, room = 0;
@@ -92,7 +92,7 @@ SharingBalance balance_builds(std::span<const LodStep> steps, std::span<const ui
     if (static_cast<double>(now.traced) <= limit || own == savings.size()) {
       if (!any) end = std::min(end, own + kTries);
       SharingBalance tried = now;
-      leave_out_steps(steps, limit, tried);
+      choose_built_steps(steps, limit, tried);
       if (!any || own + tried.builds < best.own_cuts + best.builds) best = std::move(tried);
       any = true;
     }

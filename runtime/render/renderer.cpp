@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <string>
 
-#include "pbrt_import/scene/camera_rays.h"
 #include "pbrt_import/base/error.h"
-#include "runtime/stopwatch.h"
+#include "pbrt_import/scene/camera_rays.h"
 #include "runtime/camera/lod_view.h"
 #include "runtime/camera/origin_lift.h"
 #include "runtime/camera/primary_visibility.h"
+#include "runtime/stopwatch.h"
 
 namespace packtrace {
 namespace {

@@ -5,11 +5,11 @@
 #include <optional>
 #include <vector>
 
-#include "pbrt_import/scene/camera_rays.h"
 #include "pbrt_import/base/progress.h"
+#include "pbrt_import/scene/camera_rays.h"
 #include "runtime/ao/ao_integrator.h"
-#include "runtime/denoise/denoiser.h"
 #include "runtime/camera/gbuffer.h"
+#include "runtime/denoise/denoiser.h"
 #include "runtime/trace/ray_tracer.h"
 #include "runtime/trace/source/scene_source.h"
 

@@ -92,7 +92,7 @@ public:
 
   /// Preferred number of incoherent rays per call, if the caller has as many. Fewer rays stay in nearer caches; more
   /// rays form larger groups.
-  virtual uint32_t rays_together() const { return 1024; }
+  virtual uint32_t preferred_rays_per_call() const { return 1024; }
 
   /// Finds the nearest hit of each ray in (tnear, tfar). hits.size() == rays.size().
   /// @param ray_class one bit: selects the surfaces and the alpha mask that count

@@ -9,9 +9,9 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "compress/format/textures/texture_encoder.h"
 #include "compress/format/cluster/tangent_codec.h"
 #include "compress/format/cluster/uv_codec.h"
+#include "compress/format/textures/texture_encoder.h"
 #include "pbrt_import/import_scene.h"
 
 /// Prints the tables of docs/accuracy.md: errors of texture coordinates, tangents and textures. Fails if a documented
@@ -49,13 +49,13 @@ double worst_uv(UvEncoding encoding, float most, size_t count) {
 }
 
 void print_uvs(size_t count) {
-  constexpr std::array<float, 7> kMost{0.25f, 1.0f, 8.0f, 32.0f, 1000.0f, 1e4f, 7e4f};
+  constexpr std::array<float, 7> kMax{0.25f, 1.0f, 8.0f, 32.0f, 1000.0f, 1e4f, 7e4f};
   fmt::print("\nTexels of 4096, largest error for |u| up to\n| encoding |");
-  for (const float most : kMost) fmt::print(" {:g} |", most);
+  for (const float most : kMax) fmt::print(" {:g} |", most);
   fmt::print("\n|---|---|---|---|---|---|---|---|\n");
   for (const UvEncoding encoding : {UvEncoding::kLattice, UvEncoding::kUnorm16, UvEncoding::kFp16}) {
     fmt::print("| {} |", kUvEncodingNames[static_cast<size_t>(encoding)]);
-    for (const float most : kMost) {
+    for (const float most : kMax) {
       const double worst = worst_uv(encoding, most, count);
       fmt::print(" {:.3g} |", worst);
       if (encoding == UvEncoding::kLattice && most <= 16384.0f) expect(worst <= 1.0 / 32.0, "1/32 texel");

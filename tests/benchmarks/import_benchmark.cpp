@@ -64,7 +64,7 @@ Spread spread(std::vector<double> values) {
 Json to_json(const Spread& s) { return {{"min", s.min}, {"median", s.median}, {"max", s.max}}; }
 
 template <class T>
-Spread spread(const std::vector<T>& measurements, double T::*member) {
+Spread spread(const std::vector<T>& measurements, double T::* member) {
   std::vector<double> values;
   for (const T& measurement : measurements) values.push_back(measurement.*member);
   return spread(std::move(values));

@@ -18,9 +18,9 @@
 #include <tbb/global_control.h>
 #include <unistd.h>
 
-#include "pbrt_import/import_scene.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/file_bytes.h"
+#include "pbrt_import/import_scene.h"
 
 namespace packtrace {
 namespace {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "compress/bake/bake_scene.h"
-#include "compress/format/file/baked_file.h"
 #include "compress/format/cluster/position_grid.h"
+#include "compress/format/file/baked_file.h"
 
 namespace packtrace {
 namespace {

@@ -58,7 +58,7 @@ void closest_packets(const Query& q, std::span<RayHit> hits) {
   for (size_t first = 0; first < q.rays.size(); first += RayPacket16::kRays) {
     const size_t count = std::min(RayPacket16::kRays, q.rays.size() - first);
     packet.load(q.rays.subspan(first, count), lanes.ray);
-    forget_hits(lanes.hit);
+    clear_hits(lanes.hit);
     rtcIntersect16(packet.valid, q.scene, &context, &lanes);
     for (size_t i = 0; i < count; ++i)
       hits[first + i] = hit_of(lanes.ray.tfar[i], lanes.hit.u[i], lanes.hit.v[i], lanes.hit.instID[0][i],

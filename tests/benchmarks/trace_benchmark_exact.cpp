@@ -45,7 +45,7 @@ double moved_end(const Ray& ray, double sign) {
 }
 
 /// Smallest t of hits that every system must find.
-double surely(const Ray& ray, std::span<const ExactHit> candidates) {
+double nearest_required_hit(const Ray& ray, std::span<const ExactHit> candidates) {
   return nearest(candidates, ray.tnear + t_tolerance(ray, ray.tnear), moved_end(ray, -1.0));
 }
 
@@ -121,7 +121,7 @@ void HitVerdicts::add(const HitVerdicts& other) {
 
 void judge_closest(const Ray& ray, std::span<const ExactHit> candidates, const std::optional<NamedHit>& answer,
                    HitVerdicts& out) {
-  const double sure = surely(ray, candidates);
+  const double sure = nearest_required_hit(ray, candidates);
   if (!answer) {
     out.missed += std::isfinite(sure);
     return;
@@ -147,7 +147,7 @@ void judge_closest(const Ray& ray, std::span<const ExactHit> candidates, const s
 
 void judge_any(const Ray& ray, std::span<const ExactHit> candidates, bool occluded, HitVerdicts& out) {
   if (!occluded)
-    out.missed += std::isfinite(surely(ray, candidates));
+    out.missed += std::isfinite(nearest_required_hit(ray, candidates));
   else
     out.wrong += !possibly(ray, candidates);
 }

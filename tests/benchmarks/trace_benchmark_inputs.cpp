@@ -3,8 +3,8 @@
 #include "assets/generator/displaced_mesh.h"
 #include "assets/generator/forest.h"
 #include "compress/bake/bake_scene.h"
-#include "pbrt_import/import_scene.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/import_scene.h"
 #include "tests/temporary_folder.h"
 
 namespace packtrace {

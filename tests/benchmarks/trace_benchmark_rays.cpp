@@ -10,8 +10,8 @@
 #include <tbb/parallel_for.h>
 
 #include "pbrt_import/base/error.h"
-#include "runtime/stopwatch.h"
 #include "runtime/camera/primary_visibility.h"
+#include "runtime/stopwatch.h"
 #include "tests/benchmarks/trace_benchmark_exact.h"
 
 namespace packtrace {

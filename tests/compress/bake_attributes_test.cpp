@@ -29,10 +29,11 @@ TEST(BakeScene, NormalsComeBackWithinTheErrorOfEachEncoding) {
     EXPECT_EQ(file.geometries()[0].normal_encoding, i);
     const double limit = kNormalFormats[i].max_error_degrees;
     const Decoded all = decode(file, 0);
-    for (size_t v = 0; v < all.positions.size(); ++v) // on a unit sphere positions are normals, to .2 degrees here
+    // On a unit sphere normals equal positions, here within 0.2 degrees.
+    for (size_t v = 0; v < all.positions.size(); ++v)
       EXPECT_GT(glm::dot(all.normals[v], glm::normalize(all.positions[v])), std::cos((limit + 0.2) / 57.29));
     EXPECT_LE(baked.report.max_normal_error_degrees, limit) << kNormalFormats[i].name;
-    if (encoding != NormalEncoding::kZsign32) { // whose worst normals are few
+    if (encoding != NormalEncoding::kZsign32) { // its largest errors are rare
       EXPECT_GT(baked.report.max_normal_error_degrees, 0.3 * limit);
     }
     EXPECT_GT(baked.report.mean_normal_error_degrees, 0.0);
@@ -57,7 +58,7 @@ TEST(BakeScene, AutoTakesTheFewestBitsThatKeepTheError) {
   EXPECT_EQ(chosen(sphere, 0.04), NormalEncoding::kAxis24);
   EXPECT_EQ(chosen(sphere, 0.01), NormalEncoding::kAxis32);
   EXPECT_EQ(chosen(sphere, 0.0025), NormalEncoding::kAxis32);
-  Mesh bent = test::grid_mesh(4); // every normal along an axis: any number of bits is enough
+  Mesh bent = test::grid_mesh(4); // all normals along an axis: every encoding is exact
   for (size_t i = 0; i < bent.positions.size(); ++i)
     bent.normals.push_back(i % 2 == 0 ? Vec3(1, 0, 0) : Vec3(0, -1, 0));
   EXPECT_EQ(chosen(bent, 0.0025), NormalEncoding::kAxis16);
@@ -74,7 +75,7 @@ TEST(BakeScene, CoarseGridsTakeCoarseNormals) {
   EXPECT_EQ(chosen(kDefaultEdgeFraction, std::nullopt), NormalEncoding::kAxis24);
   EXPECT_EQ(chosen(1.0 / 20.0, std::nullopt), NormalEncoding::kOct20);
   EXPECT_EQ(chosen(1.0 / 4.0, std::nullopt), NormalEncoding::kAxis16);
-  EXPECT_EQ(chosen(1.0 / 4.0, 0.04), NormalEncoding::kAxis24); // as was asked for
+  EXPECT_EQ(chosen(1.0 / 4.0, 0.04), NormalEncoding::kAxis24); // the requested error
 }
 
 TEST(BakeScene, VerticesThatFallTogetherShareANormalWithinTheLimit) {
@@ -104,7 +105,7 @@ TEST(BakeScene, EveryPartOfAGeometryHasItsEncoding) {
   const BakedFile file = BakedFile::from_bytes(bake(scene).bytes);
   EXPECT_EQ(file.geometries()[0].normal_encoding, static_cast<uint32_t>(NormalEncoding::kAxis24));
   const Decoded all = decode(file, 0);
-  EXPECT_GE(std::count(all.normals.begin(), all.normals.end(), Vec3(1, 0, 0)), 25); // perhaps some of the sphere's too
+  EXPECT_GE(std::count(all.normals.begin(), all.normals.end(), Vec3(1, 0, 0)), 25); // the sphere may have some as well
 }
 
 TEST(BakeScene, FlatNormalsAreDroppedAndSaidToBe) {
@@ -124,7 +125,7 @@ TEST(BakeScene, FlatNormalsAreDroppedAndSaidToBe) {
 
 TEST(BakeScene, SplitVerticesMerge) {
   Mesh mesh = test::grid_mesh(20, 0.1f, true);
-  Mesh split; // every triangle with vertices of its own
+  Mesh split; // every triangle has its own vertices
   split.name = "split";
   for (const Triangle& t : mesh.triangles) {
     const auto base = static_cast<uint32_t>(split.positions.size());
@@ -150,7 +151,7 @@ TEST(BakeScene, TextureCoordinatesAreKeptWhereAMaskNeedsThem) {
   EXPECT_FALSE(file.cluster(0, 0).has_uvs());
   EXPECT_TRUE(file.cluster(1, 0).has_uvs());
   const Decoded all = decode(file, 1);
-  for (size_t i = 0; i < all.positions.size(); ++i) { // the grid's uvs are its x and y
+  for (size_t i = 0; i < all.positions.size(); ++i) { // the grid's uvs equal its x and y
     EXPECT_NEAR(all.uvs[i].x, all.positions[i].x, 1.0 / (2 * 16 * 64) + 0.001);
     EXPECT_NEAR(all.uvs[i].y, all.positions[i].y, 1.0 / (2 * 16 * 32) + 0.001);
   }
@@ -190,7 +191,7 @@ TEST(BakeScene, HalfFloatCoordinatesAreRefusedOrWarnedOfWhereTheyBreak) {
   scene.shapes[0].material = 1;
   BakeConfig config;
   config.uvs = UvEncoding::kFp16;
-  EXPECT_TRUE(bake(scene, config).report.warnings.empty()); // a mask of 64 texels
+  EXPECT_TRUE(bake(scene, config).report.warnings.empty()); // the mask has only 64 texels
   for (Vec2& uv : scene.meshes[0].uvs) uv *= 40.0f;
   const BakedScene rough = bake(scene, config);
   ASSERT_EQ(rough.report.warnings.size(), 1u);

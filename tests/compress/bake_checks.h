@@ -10,12 +10,13 @@ namespace packtrace::test {
 
 using LatticeTriangle = std::array<LatticePoint, 3>;
 
-/// Counts triangles by their lattice corners, starting at the smallest: equal maps mean equal triangles and winding.
+/// Counts triangles by their lattice corners, rotated to start at the smallest. Equal counts mean equal triangles with
+/// equal winding.
 class TriangleCensus {
 public:
   void add(LatticeTriangle t, int by) {
     std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
-    // Two equal smallest corners leave two rotations; take the smaller one.
+    // If two corners are equally small, two rotations qualify; take the smaller one.
     const LatticeTriangle second = {t[1], t[2], t[0]}, third = {t[2], t[0], t[1]};
     counts_[std::min({t, second, third})] += by;
   }
@@ -27,9 +28,9 @@ private:
   std::map<LatticeTriangle, int> counts_;
 };
 
-/// Whether geometry `g` holds exactly the mesh's triangles, each corner on the nearest lattice point.
+/// Whether geometry `g` holds exactly the mesh's triangles, with each corner at the nearest lattice point.
 inline bool holds(const BakedFile& file, uint32_t g, const Mesh& mesh, const DAffine& transform = DAffine(1.0),
-           bool flip = false) {
+                  bool flip = false) {
   const baked::GeometryRecord& record = file.geometries()[g];
   const double step = PositionGrid{record.step_mantissa, record.step_exponent}.step();
   TriangleCensus census;
@@ -59,7 +60,7 @@ inline BakeConfig precision(PrecisionKind kind, double value) {
   return config;
 }
 
-/// A shape, and materials with a mask and of glass.
+/// A grid shape; the materials include one with a mask and one of glass.
 inline Scene masked_scene() {
   Scene scene = scene_of(grid_mesh(12));
   scene.masks.push_back(striped_mask());
@@ -68,7 +69,7 @@ inline Scene masked_scene() {
   return scene;
 }
 
-/// Smallest cosine between winding normal and direction from the origin.
+/// Smallest cosine between a triangle's winding normal and its direction from the origin.
 inline double winding_agreement(const Decoded& all) {
   double worst = 1.0;
   for (const Triangle& t : all.triangles) {

@@ -54,7 +54,7 @@ TEST(BakeConfig, NormalErrorsOutOfRangeAreRefusedNotClamped) {
     config.normal_error_degrees = good;
     EXPECT_NO_THROW(config.validate()) << good;
   }
-  // The promise can be kept for all normals at the lowest and at the default error.
+  // The format can guarantee the lowest and the default error for all normals.
   EXPECT_LE(format_of(NormalEncoding::kAxis32).max_error_degrees, 0.0025);
   EXPECT_LE(format_of(NormalEncoding::kAxis24).max_error_degrees, kDefaultNormalError);
 }
@@ -74,7 +74,7 @@ TEST(BakeConfig, AStatedEncodingOrErrorIsPromisedAtEveryStep) {
 
 TEST(BakeConfig, NormalsMayLoseMoreWhereStepsTiltFacesMore) {
   const BakeConfig config;
-  for (const double fine : {0.0, 1.0 / 1024.0, kDefaultEdgeFraction}) { // the default and finer ones
+  for (const double fine : {0.0, 1.0 / 1024.0, kDefaultEdgeFraction}) { // the default precision and finer ones
     EXPECT_EQ(config.normal_limits(fine).error_degrees, kDefaultNormalError);
     EXPECT_EQ(config.normal_limits(fine).flat_degrees, kDefaultNormalError);
   }

@@ -78,7 +78,7 @@ bool reported(const BakedWithProblems& result, const std::string& message) {
   });
 }
 
-/// The message of the bake's error; empty where there is none.
+/// The error message of a strict bake; empty if it succeeds.
 std::string strict_message(const Scene& scene) {
   BakeConfig config;
   config.strict = true;
@@ -101,7 +101,7 @@ TEST(BakeScene, InstancesThatLeaveTheFloatRangeAreLeftOutByName) {
   scene.instances.push_back({0, Affine(test::scaling(DVec3(1e6)))});
   const BakedWithProblems result = bake_reported(scene);
   const BakedFile file = BakedFile::from_bytes(result.baked.bytes);
-  ASSERT_EQ(file.instances().size(), 3u); // numbers stay
+  ASSERT_EQ(file.instances().size(), 3u); // instance numbers do not change
   EXPECT_EQ(file.instances()[0].geometry, file.instances()[2].geometry);
   EXPECT_EQ(file.geometries()[file.instances()[1].geometry].triangle_count, 0u);
   EXPECT_EQ(result.baked.report.left_out, 1u);
@@ -109,7 +109,7 @@ TEST(BakeScene, InstancesThatLeaveTheFloatRangeAreLeftOutByName) {
   const std::string what = "an instance of galaxy leaves the float range: its coordinates reach 1e+50";
   EXPECT_TRUE(reported(result, what));
   EXPECT_EQ(strict_message(scene), what);
-  scene.instances = {scene.instances[1]}; // nothing is left of the geometry
+  scene.instances = {scene.instances[1]}; // no instance of the geometry is left
   EXPECT_EQ(bake(scene).report.file.triangles, 0u);
 }
 
@@ -126,7 +126,8 @@ TEST(BakeScene, ShapesThatLeaveTheFloatRangeAreLeftOutByName) {
   beyond[3].x = HUGE_VALF;
   scene.instances.push_back({0, beyond});
   scene.shapes[2].parent_from_mesh = test::translation({4, 0, 0});
-  EXPECT_EQ(bake_kind(scene), ErrorKind::kInput); // an instance that is not finite is no scene's
+  // An instance that is not finite is invalid input, not left out.
+  EXPECT_EQ(bake_kind(scene), ErrorKind::kInput);
   scene.instances.pop_back();
   const BakedWithProblems result = bake_reported(scene);
   const BakedFile file = BakedFile::from_bytes(result.baked.bytes);
@@ -152,7 +153,8 @@ TEST(BakeScene, TransformsOfSharedShapesThatNoFloatHoldsAreLeftOut) {
 TEST(BakeScene, WhatIsLeftAloneStaysOnTheWorldsGrid) {
   Scene scene = scene_of(test::sphere_mesh(12));
   scene.shapes.push_back(scene.shapes[0]);
-  scene.shapes[1].parent_from_mesh = test::scaling(DVec3(1e50)); // left out: the other one shares with nobody
+  // This shape is left out, so the other one has nothing to share with.
+  scene.shapes[1].parent_from_mesh = test::scaling(DVec3(1e50));
   const BakedScene baked = bake(scene);
   EXPECT_EQ(baked.report.left_out, 1u);
   EXPECT_EQ(baked.report.instanced_shapes, 0u);
@@ -173,7 +175,7 @@ TEST(BakeScene, LatticesBeyondTheLimitAreAnErrorThatNamesIt) {
 }
 
 TEST(BakeScene, CancellingStopsTheBake) {
-  struct Guard { // cancellation is process-wide and has no way back: this test runs in a process of its own
+  struct Guard { // cancellation is process-wide and irreversible, so this test runs in a child process
     static void run() {
       Progress::cancel();
       Diagnostics diagnostics;

@@ -42,10 +42,10 @@ protected:
 
 TEST_F(BakeOutput, AWriteThatFailsHalfWayLeavesTheOldFileAlone) {
   write_file_bytes(folder_ / "a.ptk", bytes("old"));
-  struct rlimit limit {};
+  struct rlimit limit{};
   ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &limit), 0);
   struct rlimit small = limit;
-  small.rlim_cur = 1000; // bytes a file may have, less than any baked file
+  small.rlim_cur = 1000; // maximum file size in bytes; every baked file is larger
   const auto previous = std::signal(SIGXFSZ, SIG_IGN);
   ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
   const Scene scene = test::scene_of(test::grid_mesh(8));
@@ -60,7 +60,7 @@ TEST_F(BakeOutput, AWriteThatFailsHalfWayLeavesTheOldFileAlone) {
 
 TEST_F(BakeOutput, TheOutputIsCheckedBeforeTheSceneIsBaked) {
   Scene bad = test::scene_of(test::grid_mesh(2));
-  bad.shapes[0].mesh = 99; // would be Error(kInput) as soon as work starts
+  bad.shapes[0].mesh = 99; // would throw Error(kInput) once work starts
   write_file_bytes(folder_ / "a.ptk", bytes("old"));
   Diagnostics diagnostics;
   Progress progress;

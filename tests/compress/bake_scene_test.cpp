@@ -89,17 +89,18 @@ TEST(BakeScene, ExtremeScalesAndPlacesKeepTheBound) {
 }
 
 TEST(BakeScene, SharedVerticesDoNotCrack) {
-  // Four patches with a bumpy common border, baked as four shapes whose transforms differ.
+  // Four patches with a bumpy common border, baked as four shapes with different transforms.
   Scene scene;
   scene.materials.push_back({});
   const Mesh whole = test::grid_mesh(64, 0.2f);
   for (uint32_t part = 0; part < 4; ++part) {
     Mesh mesh;
-    const DVec3 offset(part * 0.125, -0.25 * part, 0.5); // exact in float: the placed vertices agree exactly
+    const DVec3 offset(part * 0.125, -0.25 * part, 0.5); // exact in float, so the placed vertices agree exactly
     for (const Vec3 p : whole.positions) mesh.positions.push_back(p - Vec3(offset));
     for (size_t i = 0; i < whole.triangles.size(); ++i)
       if (i * 4 / whole.triangles.size() == part) mesh.triangles.push_back(whole.triangles[i]);
-    // Rounding in the subtraction moves vertices by what the placed ones disagree; snap to what all parts can hold.
+    // The subtraction rounds, so the placed vertices of neighbouring parts may differ; snap to values that all parts
+    // hold exactly.
     for (Vec3& p : mesh.positions) p = glm::round(p * 4096.0f) / 4096.0f;
     test::add_shape(scene, std::move(mesh), test::translation(offset));
   }
@@ -116,7 +117,7 @@ TEST(BakeScene, SharedVerticesDoNotCrack) {
       }
   }
   const auto open = std::count_if(edges.begin(), edges.end(), [](const auto& e) { return e.second == 1; });
-  EXPECT_EQ(open, 4 * 64); // the outer border of the whole and nothing else
+  EXPECT_EQ(open, 4 * 64); // only the outer border
 }
 
 TEST(BakeScene, WindingCarriesTheNormalThroughMirrors) {
@@ -127,7 +128,7 @@ TEST(BakeScene, WindingCarriesTheNormalThroughMirrors) {
     scene.shapes[0].reverse_orientation = true;
     const Decoded reversed = decode(BakedFile::from_bytes(bake(scene).bytes), 0);
     EXPECT_LT(winding_agreement(reversed), -0.5);
-    for (size_t i = 0; i < reversed.positions.size(); ++i) // shading normals stay as given
+    for (size_t i = 0; i < reversed.positions.size(); ++i) // shading normals are unchanged
       EXPECT_GT(glm::dot(reversed.normals[i], reversed.positions[i]), 0.0f);
   }
 }
@@ -137,12 +138,12 @@ TEST(BakeScene, WindingCarriesTheNormalThroughMirrorsInsideObjects) {
   scene.materials.push_back({});
   scene.meshes.push_back(test::sphere_mesh(16));
   scene.objects.push_back({"pair", {Shape{0, 0, false, test::scaling({1, 1, -1})}, Shape{0, 0, false, DAffine(1.0)}}});
-  scene.instances.push_back({0, Affine(test::scaling({-1, 1, 1}))}); // an instance's mirror is the tracer's business
+  scene.instances.push_back({0, Affine(test::scaling({-1, 1, 1}))}); // the mirror of an instance is left to the tracer
   EXPECT_GT(winding_agreement(decode(BakedFile::from_bytes(bake(scene).bytes), 0)), 0.5);
 }
 
 TEST(BakeScene, BytesDoNotDependOnThreads) {
-  Scene scene = scene_of(test::grid_mesh(150, 0.3f, true)); // several chunks
+  Scene scene = scene_of(test::grid_mesh(150, 0.3f, true)); // large enough for several parallel chunks
   for (uint32_t i = 0; i < 20; ++i)
     test::add_shape(scene, test::sphere_mesh(4 + i), test::translation({static_cast<double>(i), 0, 0}));
   test::add_shape(scene, test::soup_mesh(3000, 5));
@@ -171,8 +172,8 @@ TEST(BakeScene, ClustersOfAMaterialClassAreContiguous) {
                 c);
   EXPECT_EQ(cluster, g.cluster_count);
   EXPECT_GT(g.class_clusters[0], 0u);
-  EXPECT_GT(g.class_clusters[2], 0u); // does not occlude
-  EXPECT_GT(g.class_clusters[4], 0u); // masked
+  EXPECT_GT(g.class_clusters[2], 0u); // clusters that do not occlude
+  EXPECT_GT(g.class_clusters[4], 0u); // masked clusters
 }
 
 } // namespace

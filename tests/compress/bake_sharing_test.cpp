@@ -19,7 +19,7 @@ TEST(BakeScene, EqualMeshesAreStoredOnceAndInstanced) {
   for (const double x : {1.0, 2.0, 3.0}) test::add_shape(scene, test::sphere_mesh(16), test::translation({x, 0, 0}));
   scene.shapes[2].parent_from_mesh = test::scaling({-1, 1, 1});
   scene.materials[1].flags = kTransmissive;
-  test::add_shape(scene, test::sphere_mesh(16), test::translation({4, 0, 0}), 1); // another class
+  test::add_shape(scene, test::sphere_mesh(16), test::translation({4, 0, 0}), 1); // another material class
   const BakedScene baked = bake(scene);
   const BakedFile file = BakedFile::from_bytes(baked.bytes);
   ASSERT_EQ(file.geometries().size(), 3u);
@@ -43,7 +43,7 @@ std::vector<uint32_t> materials_of(const BakedFile& file, uint32_t instance) {
 TEST(BakeScene, ShapesThatDifferInMaterialShareAGeometry) {
   Scene scene;
   scene.materials.resize(4);
-  scene.materials[1].flags = kMirror; // of the same class as none
+  scene.materials[1].flags = kMirror; // the same class as without flags
   scene.materials[2].flags = kInvisible;
   scene.materials[3].albedo = Vec3(1);
   for (const uint32_t material : {0u, 1u, 2u, 3u, 1u})
@@ -56,7 +56,7 @@ TEST(BakeScene, ShapesThatDifferInMaterialShareAGeometry) {
     EXPECT_EQ(file.instances()[i].geometry, geometries[i]);
     EXPECT_EQ(materials_of(file, i), std::vector{materials[i]});
   }
-  EXPECT_EQ(file.sections().material_slots.size(), 4u); // equal choices are stored once
+  EXPECT_EQ(file.sections().material_slots.size(), 4u); // equal runs are stored once
   EXPECT_EQ(baked.report.shared_shapes, 3u);
   EXPECT_EQ(baked.report.instanced_shapes, 4u);
 }
@@ -91,7 +91,8 @@ TEST(BakeScene, ShapesOfOneMeshShareItHoweverSmall) {
 }
 
 TEST(BakeScene, InstancedShapesCountForTheScenesStep) {
-  // A floor of two large triangles below many small spheres, which would lose its place if the floor alone counted.
+  // A floor of two large triangles below many small spheres. With a step from the floor alone, spheres and floor would
+  // lose their relative position.
   Scene scene = scene_of(test::grid_mesh(1), compose(test::translation({-50, -50, -1}), test::scaling(DVec3(100))));
   scene.meshes.push_back(test::sphere_mesh(8));
   for (uint32_t i = 0; i < 20; ++i)
@@ -102,7 +103,7 @@ TEST(BakeScene, InstancedShapesCountForTheScenesStep) {
   Scene wide = scene;
   wide.shapes[20].parent_from_mesh = test::translation({1000, 0, 0});
   EXPECT_GT(bake(wide, precision(PrecisionKind::kPositionBits, 14.0)).report.world_step, 1000.0 / (1 << 14) * 0.88);
-  for (uint32_t i = 1; i < 21; ++i) { // the same as meshes that nothing shares
+  for (uint32_t i = 1; i < 21; ++i) { // now with different meshes, so that nothing is shared
     Mesh own = scene.meshes[1];
     own.positions[0].z *= 1.0f + 1e-3f * static_cast<float>(i);
     scene.shapes[i].mesh = static_cast<uint32_t>(scene.meshes.size());
@@ -129,7 +130,8 @@ TEST(BakeScene, InstancesOnGridsOfTheirOwnThatTouchAreCounted) {
 }
 
 TEST(BakeScene, ObjectsThatDifferInMaterialShareAGeometry) {
-  // Walls, roof and door: one house has a material for all, the others differ in which parts have the same.
+  // Walls, roof and door: the first house uses one material for everything; the others differ in which parts share a
+  // material.
   Scene scene;
   scene.materials.resize(5);
   scene.materials[4].flags = kTransmissive;
@@ -145,11 +147,11 @@ TEST(BakeScene, ObjectsThatDifferInMaterialShareAGeometry) {
   const BakedFile file = BakedFile::from_bytes(baked.bytes);
   ASSERT_EQ(file.geometries().size(), 2u);
   EXPECT_EQ(baked.report.shared_objects, 2u);
-  // Wall and door share a slot: no object tells them apart.
+  // Wall and door share a slot, because they have the same material in every object.
   EXPECT_EQ(materials_of(file, 0), (std::vector{1u, 2u}));
   EXPECT_EQ(materials_of(file, 1), (std::vector{0u, 0u}));
   EXPECT_EQ(materials_of(file, 3), (std::vector{3u, 0u}));
-  EXPECT_EQ(materials_of(file, 2), (std::vector{0u, 4u})); // by class: what occludes comes first
+  EXPECT_EQ(materials_of(file, 2), (std::vector{0u, 4u})); // ordered by class: occluding materials first
   const Decoded all = decode(file, file.instances()[0].geometry);
   EXPECT_EQ(std::count(all.slots.begin(), all.slots.end(), 0u), 18 + 32);
   EXPECT_EQ(std::count(all.slots.begin(), all.slots.end(), 1u), std::ssize(scene.meshes[1].triangles));
@@ -160,7 +162,7 @@ TEST(BakeScene, SmallEqualMeshesStayInWorldSpaceSoThatTheyTouch) {
   scene.materials.push_back({});
   for (const double x : {0.0, 1.0}) test::add_shape(scene, test::grid_mesh(4), test::translation({x, 0, 0}));
   EXPECT_EQ(BakedFile::from_bytes(bake(scene).bytes).geometries().size(), 2u);
-  scene.shapes[1].parent_from_mesh = scene.shapes[0].parent_from_mesh; // the same place: nothing to lose
+  scene.shapes[1].parent_from_mesh = scene.shapes[0].parent_from_mesh; // the same place, so sharing loses nothing
   EXPECT_EQ(BakedFile::from_bytes(bake(scene).bytes).geometries().size(), 1u);
 }
 

@@ -15,7 +15,7 @@ namespace {
 
 using test::message_after, test::open_kind, test::rehash;
 
-/// A small file with something in every section.
+/// A small scene whose file has data in every section.
 Scene full_scene() {
   Scene scene = test::scene_of(test::grid_mesh(3, 0.1f, true));
   AlphaMask mask;
@@ -50,7 +50,7 @@ BakedScene full_bake() {
   return test::bake(full_scene(), config);
 }
 
-/// Reads everything a reader can ask for.
+/// Reads everything that the interface of BakedFile gives access to.
 void read_all(const BakedFile& file) {
   for (uint32_t g = 0; g < file.geometries().size(); ++g) {
     const test::Decoded all = test::decode(file, g);
@@ -161,7 +161,7 @@ TEST(BakedFile, DamageWithRightHashesIsRefusedOrHarmless) {
     }
     if (testing::Test::HasFatalFailure()) return;
   }
-  EXPECT_GT(refused, 1000u); // both ways are taken, or this test tests nothing
+  EXPECT_GT(refused, 1000u); // both outcomes must occur often enough
   EXPECT_GT(accepted, 100u);
 }
 
@@ -202,12 +202,14 @@ TEST(BakedFile, MaterialSlotsAreChecked) {
   const std::string damaged = "memory: damaged baked file: ";
   EXPECT_EQ(message(baked::kMaterialSlots, 4, 2), damaged + "material slot 1: material");
   EXPECT_EQ(message(baked::kGeometries, slots_of(0), 0), damaged + "geometry 0: material slots");
-  EXPECT_EQ(message(baked::kGeometries, slots_of(2), 2), damaged + "geometry 2: material slots"); // of one cluster
+  EXPECT_EQ(message(baked::kGeometries, slots_of(2), 2), damaged + "geometry 2: material slots"); // it has one cluster
   EXPECT_EQ(message(baked::kGeometries, slots_of(2), ~0u), damaged + "instance 2: material slots");
   EXPECT_EQ(message(baked::kInstances, first_slot_of(4), 3), damaged + "instance 4: material slots");
   EXPECT_EQ(message(baked::kInstances, first_slot_of(0), ~0u), damaged + "instance 0: material slots");
-  EXPECT_EQ(message(baked::kInstances, first_slot_of(3), 1), damaged + "instance 3: material classes"); // not 2's
-  EXPECT_EQ(message(baked::kInstances, first_slot_of(4), 1), damaged + "instance 4: material classes"); // descending
+  // Instance 2 has other classes.
+  EXPECT_EQ(message(baked::kInstances, first_slot_of(3), 1), damaged + "instance 3: material classes");
+  // The classes descend.
+  EXPECT_EQ(message(baked::kInstances, first_slot_of(4), 1), damaged + "instance 4: material classes");
   EXPECT_EQ(message(baked::kInstances, first_slot_of(0), 1), damaged + "cluster 0: material class order");
   EXPECT_EQ(
       message(baked::kInstances, 4 * sizeof(baked::InstanceRecord) + offsetof(baked::InstanceRecord, geometry), 0),
@@ -225,7 +227,7 @@ TEST(BakedFile, RequirementsAreChecked) {
   EXPECT_EQ(message(0, baked::kStreamCount), damaged + "requirement 0: stream or reason");
   EXPECT_EQ(message(4, baked::kReasonCount), damaged + "requirement 0: stream or reason");
   EXPECT_EQ(message(kRow + 8, 0), damaged + "requirement 1: geometries");
-  EXPECT_EQ(message(kRow + 8, 4), damaged + "requirement 1: geometries"); // of three
+  EXPECT_EQ(message(kRow + 8, 4), damaged + "requirement 1: geometries"); // of three geometries
   EXPECT_EQ(message(kRow + 12, 1), damaged + "requirement 1: stream or reason");
   EXPECT_EQ(message(0, baked::kTangents), damaged + "requirement 1: order");
   EXPECT_EQ(message_after(bytes, baked::kSummary, offsetof(baked::SummaryRecord, purpose), 2), damaged + "purpose");
@@ -262,7 +264,7 @@ TEST(FileSummary, StreamsAddUpToTheFile) {
   EXPECT_EQ(s.shared_geometries, 1u);
   EXPECT_EQ(s.placed_triangles, 18u + 8u + 2u * 48u);
   EXPECT_EQ(s.triangles, 18u + 8u + 48u);
-  ASSERT_EQ(s.grids.size(), 3u); // two nested ones of world space, one of the object
+  ASSERT_EQ(s.grids.size(), 3u); // two nested grids in world space, one of the object
   for (size_t i = 0; i < 3; ++i) {
     EXPECT_EQ(s.grids[i].world_space, i < 2);
     EXPECT_EQ(s.grids[i].geometries, 1u);

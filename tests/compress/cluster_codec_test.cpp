@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "compress/format/layout/bit_stream.h"
 #include "compress/format/cluster/normal_codec.h"
+#include "compress/format/layout/bit_stream.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {
@@ -25,7 +25,7 @@ struct Case {
   NormalEncoding encoding() const { return static_cast<NormalEncoding>(geometry.normal_encoding); }
 };
 
-/// One cluster with the bytes it lies in, kReadSlackBytes included.
+/// One encoded cluster: record and payload, followed by kReadSlackBytes.
 struct Encoded {
   baked::ClusterRecord record;
   std::vector<uint8_t> bytes;
@@ -48,7 +48,7 @@ Encoded encode(const Case& c, const Strips& strips) {
   return encoded;
 }
 
-/// Encodes, checks that the fault finder agrees, and compares every way of reading with what went in.
+/// Encodes a cluster, checks that find_cluster_fault() accepts it, and compares all ways of decoding it with the input.
 std::vector<uint8_t> expect_round_trip(const Case& c) {
   const Strips strips = find_strips(c.triangles, static_cast<uint32_t>(c.positions.size()));
   const Encoded encoded = encode(c, strips);
@@ -120,11 +120,11 @@ TEST(ClusterCodec, FewDistinctNormalsBecomeAPalette) {
   const size_t five = expect_round_trip(c).size();
   for (uint32_t& code : c.codes) code = random.bits();
   const size_t many = expect_round_trip(c).size();
-  EXPECT_LT(five + 200 * 2, many); // 3 bits instead of 32 for those in use
+  EXPECT_LT(five + 200 * 2, many); // 3 bits instead of 32 per used vertex
   std::fill(c.codes.begin(), c.codes.end(), 0xdeadbeefu);
   const size_t one = expect_round_trip(c).size();
   c.codes.clear();
-  EXPECT_EQ(one, expect_round_trip(c).size()); // no bits at all
+  EXPECT_EQ(one, expect_round_trip(c).size()); // one distinct normal takes no bits
 }
 
 TEST(ClusterCodec, FlatAxesCostNothing) {
@@ -171,12 +171,13 @@ TEST(ClusterCodec, GoldenBytesOfNormalsAcrossAnEdgeOfTheCube) {
   c.geometry.normal_encoding = static_cast<uint32_t>(kEncoding);
   c.triangles = {{0, 1, 2}, {2, 1, 3}};
   c.positions = {{100, 7, -3}, {101, 7, -3}, {100, 7, 0}, {103, 7, -1}};
-  // On the faces +z and +x, at most three codes from their edge. Around +x, y is 1670 + 1 where the edge is crossed.
+  // On the faces +z and +x, at most three codes from their common edge. Unfolded around +x, y is
+  // above 1670 beyond that edge.
   for (const NormalFields fields :
        {NormalFields{4, 1670, 835}, NormalFields{0, 835, 1670}, NormalFields{4, 1668, 836}, NormalFields{0, 836, 1669}})
     c.codes.push_back(join_normal_code(kEncoding, fields));
   const auto [record, bytes] = encode(c, find_strips(c.triangles, 4));
-  EXPECT_EQ(record.flags, baked::kClusterHasNormals); // around chart 0
+  EXPECT_EQ(record.flags, baked::kClusterHasNormals); // unfolded around chart 0
   EXPECT_EQ(record.normal_anchor, (std::array<int16_t, 2>{417, 834}));
   EXPECT_EQ(record.normal_bits, (std::array<uint8_t, 2>{2, 3}));
   const std::vector<uint8_t> expected = {0xf1, 0x10, 0xbc,        // as above
@@ -201,24 +202,24 @@ TEST(ClusterCodec, FaultsOfARecordAreFound) {
   EXPECT_TRUE(fault([](auto& r) { r.vertex_count = 0; }));
   EXPECT_TRUE(fault([](auto& r) { r.vertex_count = 257; }));
   EXPECT_TRUE(fault([](auto& r) { --r.vertex_count; }));
-  EXPECT_TRUE(fault([](auto& r) { r.restart_count = 0; }));
-  EXPECT_TRUE(fault([](auto& r) { r.restart_count = 200; }));
+  EXPECT_TRUE(fault([](auto& r) { r.strip_count = 0; }));
+  EXPECT_TRUE(fault([](auto& r) { r.strip_count = 200; }));
   EXPECT_TRUE(fault([](auto& r) { r.position_bits[1] = 58; }));
-  EXPECT_TRUE(fault([](auto& r) { r.position_bits[1] = 57; })); // beyond the payload
+  EXPECT_TRUE(fault([](auto& r) { r.position_bits[1] = 57; })); // exceeds the payload
   EXPECT_TRUE(fault([](auto& r) { r.normal_bits[0] = 1; }));
   EXPECT_TRUE(fault([](auto& r) { r.normal_anchor[1] = -1; }));
   EXPECT_TRUE(fault([](auto& r) { r.flags = baked::kClusterMixedCharts; }));
   EXPECT_TRUE(fault([](auto& r) { r.flags = 1u << baked::kClusterChartShift; }));
   EXPECT_TRUE(fault([](auto& r) { r.flags = 0x80; }));
   EXPECT_TRUE(fault([](auto& r) { r.flags |= baked::kClusterHasNormals, r.normal_bits[1] = 18; }));
-  EXPECT_FALSE(fault([](auto& r) { r.flags |= baked::kClusterHasNormals; })); // one normal for all, in no bits
+  EXPECT_FALSE(fault([](auto& r) { r.flags |= baked::kClusterHasNormals; })); // all normals are equal and take no bits
   EXPECT_TRUE(fault([](auto& r) { r.flags |= baked::kClusterHasNormals | (2u << baked::kClusterChartShift); }));
   EXPECT_TRUE(fault([](auto& r) { r.flags |= baked::kClusterHasNormals, r.normal_palette = 300; }));
   EXPECT_TRUE(fault([](auto& r) { r.flags |= baked::kClusterHasUvs; }));
   EXPECT_TRUE(fault([](auto& r) { r.payload_offset = 0x7fffffff; }));
 }
 
-/// Clusters with normals of one encoding, by how they are packed.
+/// Clusters with normals of one encoding, in all packings.
 class ClusterNormals : public testing::TestWithParam<NormalEncoding> {
 protected:
   uint32_t code(DVec3 n) const { return encode_normal(GetParam(), n); }
@@ -230,7 +231,8 @@ protected:
   static DVec3 any_direction(test::Random& random) {
     return {random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)};
   }
-  /// Everywhere, and around every `stride`-th of the cube's faces, edges and corners: 60 normals, seven, or one.
+  /// Random normals everywhere, and around every `stride`-th of the cube's faces, edges and corners; with 60, 7 or 1
+  /// distinct normals.
   std::vector<Case> cases(test::Random& random, int stride) const {
     std::vector<DVec3> middles{DVec3(0.0)};
     for (int i = 0; i < 27; i += stride) middles.emplace_back(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
@@ -261,16 +263,16 @@ TEST_P(ClusterNormals, NormalsAroundOneDirectionTakeFewBits) {
   };
   const size_t all = size(DVec3(0.0));
   for (const DVec3 middle : {DVec3(0, 0.2, 1), DVec3(0.6, 0.1, 0.4), DVec3(0.3, 0.7, 0.3)})
-    EXPECT_LT(size(middle) + 60 * 4 / 8, all); // a tenth of the sphere's width: four bits of each component's at most
+    EXPECT_LT(size(middle) + 60 * 4 / 8, all); // a tenth of the sphere's width saves at least four bits per vertex
   if (format_of(GetParam()).family != NormalFamily::kAxis) return;
-  for (int i = 0; i < 8; ++i) { // also across the edges and corners of the cube
+  for (int i = 0; i < 8; ++i) { // also across edges and corners of the cube
     const DVec3 corner(i % 2 * 2 - 1, i / 2 % 2 * 2 - 1, i / 4 * 2 - 1);
     EXPECT_LT(size(corner) + 60 * 4 / 8, all) << i;
     EXPECT_LT(size(corner * DVec3(1, 1, 0)) + 60 * 4 / 8, all) << i;
   }
 }
 
-/// Reads all normals; they are unit vectors whatever the bits say.
+/// Decodes all normals; they are unit vectors for any bits.
 void expect_unit_normals(const Case& c, const baked::ClusterRecord& record, const uint8_t* payload) {
   const ClusterView view(c.geometry, record, payload);
   if (!view.has_normals()) return;
@@ -289,7 +291,7 @@ TEST_P(ClusterNormals, TruncatedPrefixesAreFaults) {
       const std::vector<uint8_t> prefix(good.bytes.begin(),
                                         good.bytes.begin() + static_cast<std::ptrdiff_t>(size + kReadSlackBytes));
       const bool fault = find_cluster_fault(c.geometry, good.record, prefix.data(), size).has_value();
-      ASSERT_EQ(fault, size < used) << size; // all but the padding is needed
+      ASSERT_EQ(fault, size < used) << size; // everything but the padding is needed
     }
   }
 }
@@ -321,11 +323,11 @@ TEST_P(ClusterNormals, FlippedBitsAreFaultsOrHarmless) {
       read(damaged);
     }
   }
-  EXPECT_GT(harmless, 1000u); // both ways are taken, or this test tests nothing
+  EXPECT_GT(harmless, 1000u); // both outcomes must occur often enough
   EXPECT_GT(faults, 1000u);
 }
 
-/// Whatever the bits are: charts that do not exist, codes far beyond the cross of unfolded faces.
+/// Random bits, including charts that do not exist and codes far outside the cross of unfolded faces.
 TEST_P(ClusterNormals, AllAtOnceAreThoseOneByOne) {
   test::Random random(17);
   uint32_t charts = 0;
@@ -336,7 +338,7 @@ TEST_P(ClusterNormals, AllAtOnceAreThoseOneByOne) {
     geometry.normal_encoding = static_cast<uint32_t>(GetParam());
     const uint32_t width = round % 3 == 0 ? 17 : 1 + random.bits() % 12;
     baked::ClusterRecord record{};
-    record.triangle_count = record.restart_count = 128;
+    record.triangle_count = record.strip_count = 128;
     record.vertex_count = static_cast<uint16_t>(vertex_count);
     record.normal_bits = {static_cast<uint8_t>(width), static_cast<uint8_t>(random.bits() % (width + 1))};
     for (int16_t& anchor : record.normal_anchor)
@@ -349,13 +351,13 @@ TEST_P(ClusterNormals, AllAtOnceAreThoseOneByOne) {
     std::vector<uint8_t> bytes(layout.total_bits() / 8 + vertex_count * 6 + kReadSlackBytes);
     for (uint8_t& byte : bytes) byte = static_cast<uint8_t>(random.bits());
     const uint32_t stride = record.normal_bits[0] + record.normal_bits[1] + (mixed ? bits_for_count(chart_count) : 0u);
-    if (random.bits() % 4 == 0) { // an index below 2^7 each
+    if (random.bits() % 4 == 0) { // palette indices of 7 bits are below 128
       record.normal_palette = 128;
       record.vertex_count = 200;
       bytes.resize(layout.total_bits() / 8 + 128 * 6 + 200 + 2 * kReadSlackBytes);
     } else {
       const uint64_t bits = layout.total_bits() + uint64_t{vertex_count} * stride;
-      bytes.resize(static_cast<size_t>((bits + 7) / 8) + kReadSlackBytes); // not a byte more than is promised
+      bytes.resize(static_cast<size_t>((bits + 7) / 8) + kReadSlackBytes); // only the promised slack
     }
     const ClusterView view(geometry, record, bytes.data());
     std::vector<Vec3> normals(view.vertex_count());

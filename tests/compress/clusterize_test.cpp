@@ -35,7 +35,7 @@ Clusters cut(const Mesh& mesh) {
   return cut_clusters(boxes, mesh.triangles, static_cast<uint32_t>(mesh.positions.size()));
 }
 
-/// Of the clusters' boxes, in x and y.
+/// Sum of the areas of the clusters' boxes in x and y.
 double covered_area(const Mesh& mesh, const Clusters& clusters) {
   double area = 0.0;
   uint32_t begin = 0;
@@ -81,7 +81,7 @@ TEST(Clusterize, ClustersAreNinetyPercentFull) {
 
 TEST(Clusterize, ClustersAreCompact) {
   const Mesh mesh = test::grid_mesh(100);
-  EXPECT_LT(covered_area(mesh, run(mesh)), 2.5); // boxes of perfect squares would cover the unit square exactly once
+  EXPECT_LT(covered_area(mesh, run(mesh)), 2.5); // perfectly square boxes would cover the unit square exactly once
 }
 
 TEST(Clusterize, EdgesOfManyTrianglesAreNoTrouble) {
@@ -101,7 +101,7 @@ TEST(CutClusters, EveryTriangleIsInOneClusterWithinTheLimits) {
   expect_valid({}, cut({}));
 }
 
-/// Three vertices a triangle: 85 fill a cluster, so parts must be cut, and neighbours not joined.
+/// Three vertices per triangle: a cluster holds 85 triangles, so parts must be cut, and neighbours cannot be joined.
 TEST(CutClusters, KeepsTheLimitOfVertices) {
   Mesh loose;
   for (uint32_t i = 0; i < 1000; ++i) {
@@ -113,7 +113,7 @@ TEST(CutClusters, KeepsTheLimitOfVertices) {
   const Clusters clusters = cut(loose);
   expect_valid(loose, clusters);
   EXPECT_LT(clusters.ends.size(), 1000u / 85 * 3);
-  Mesh same = loose; // nothing for a heuristic to go by
+  Mesh same = loose; // equal boxes, so the heuristic has no preference
   for (size_t i = 0; i < same.positions.size(); ++i) same.positions[i] = same.positions[i % 3];
   expect_valid(same, cut(same));
 }

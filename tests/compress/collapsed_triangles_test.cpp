@@ -19,7 +19,7 @@ TEST(CollapsedTriangles, AreaIsExactOverTheWholeLattice) {
   const LatticePoint far{kMax, kMax, kMax}, near{-kMax, -kMax, -kMax};
   EXPECT_FALSE(has_area(near, {0, 0, 0}, far));
   EXPECT_FALSE(has_area(near, far, {kMax - 1, kMax - 1, kMax - 1}));
-  for (size_t axis = 0; axis < 3; ++axis) { // one step beside a line of 2^56 steps: doubles do not see it
+  for (size_t axis = 0; axis < 3; ++axis) { // one step beside a line of 2^56 steps, which double cannot resolve
     LatticePoint beside{1, 1, 1};
     beside[axis] += 1;
     EXPECT_TRUE(has_area(near, beside, far));
@@ -35,7 +35,7 @@ TEST(CollapsedTriangles, EqualCornersAlwaysGo) {
   EXPECT_EQ(find_collapsed(points, triangles), (Flags{0, 1, 1, 1}));
 }
 
-/// Points 0, 1, 2 lie on a line in this order, 3 beside it and 4 beside it on the other side.
+/// Points 0, 1, 2 lie on a line in this order; 3 and 4 lie on opposite sides of it.
 const std::vector<LatticePoint> kLine{{0, 0, 0}, {3, 0, 0}, {7, 0, 0}, {3, 5, 0}, {4, -5, 0}};
 
 TEST(CollapsedTriangles, SliverBetweenALongEdgeAndTwoShortOnesStays) {
@@ -49,12 +49,12 @@ TEST(CollapsedTriangles, SliverThatNothingLongAndShortMeetsAtGoes) {
 }
 
 TEST(CollapsedTriangles, SliversThatCloseAmongThemselvesGoTogether) {
-  // A tube of two slivers, its sides on each other, with triangles at both of its short edges and at its long one.
+  // A tube of two slivers with coinciding sides, with triangles at both of its short edges and at its long edge.
   const std::vector<Triangle> triangles{{0, 2, 1}, {0, 1, 2}, {0, 1, 3}, {1, 2, 3}, {2, 0, 4}};
   EXPECT_EQ(find_collapsed(kLine, triangles), (Flags{1, 1, 0, 0, 0}));
 }
 
-/// A closed tube along a diagonal, of rings far thinner than they are apart.
+/// A closed tube along a diagonal; its rings are much narrower than their distance.
 Mesh thin_tube(double radius) {
   constexpr uint32_t kRings = 20, kSides = 6;
   Mesh mesh;
@@ -83,13 +83,13 @@ TEST(CollapsedTriangles, AreLeftOutWithTheirPointsAndClustersAndCounted) {
   EXPECT_EQ(baked.report.collapsed_triangles, 19u * 12u);
   EXPECT_EQ(baked.report.coinciding_triangles, 0u);
   EXPECT_EQ(baked.report.vanished_geometries, 1u);
-  const double tube = 6 * 1e-4 * 19.0 * std::sqrt(2.49); // of six sides: about 2 pi r in all
+  const double tube = 6 * 1e-4 * 19.0 * std::sqrt(2.49); // of six sides: about 2 pi r in total
   EXPECT_NEAR(baked.report.collapsed_area, tube, 0.2 * tube);
   EXPECT_NEAR(baked.report.source_area, 1.0 + baked.report.collapsed_area, 1e-6);
   EXPECT_EQ(file.summary().collapsed_triangles, baked.report.collapsed_triangles);
   EXPECT_EQ(file.summary().collapsed_area, baked.report.collapsed_area);
   EXPECT_EQ(file.summary().source_area, baked.report.source_area);
-  ASSERT_EQ(baked.report.warnings.size(), 3u); // a rough surface, its area, and the tube
+  ASSERT_EQ(baked.report.warnings.size(), 3u); // rough surface, collapsed area, vanished tube
   EXPECT_NE(baked.report.warnings[1].find("228 triangles with "), std::string::npos) << baked.report.warnings[1];
   EXPECT_NE(baked.report.warnings[2].find("nothing is left of 1 geometries"), std::string::npos);
 }
@@ -103,11 +103,12 @@ TEST(CollapsedTriangles, AreaOfInstancesCountsAsTheyArePlaced) {
   const double once = bake(scene, config).report.collapsed_area;
   scene.instances.push_back({0, Affine(test::scaling(DVec3(3.0)))});
   const BakeReport both = bake(scene, config).report;
-  EXPECT_EQ(both.collapsed_triangles, 19u * 12u); // stored once
+  EXPECT_EQ(both.collapsed_triangles, 19u * 12u); // stored once for all instances
   EXPECT_NEAR(both.collapsed_area, 10.0 * once, 1e-5 * once);
 }
 
-/// Two plates of the same winding, a thousandth apart, and one of the opposite winding as far below.
+/// Two plates with the same winding at a distance of 0.001, and one with the opposite winding at the same distance
+/// below.
 Mesh plates() {
   Mesh mesh;
   const Mesh grid = test::grid_mesh(8);
@@ -134,7 +135,8 @@ TEST(CoincidingTriangles, AreLeftOutButForTheOppositeSide) {
 TEST(CoincidingTriangles, WhatTheSourceHasTwiceIsNotTouched) {
   Mesh twice = test::grid_mesh(8, 0.1f);
   const auto count = static_cast<uint32_t>(twice.positions.size());
-  for (uint32_t i = 0; i < count; ++i) twice.positions.push_back(Vec3(twice.positions[i])); // split and repeated
+  // An identical copy of every vertex.
+  for (uint32_t i = 0; i < count; ++i) twice.positions.push_back(Vec3(twice.positions[i]));
   for (size_t i = 0; i < 128; ++i) {
     const Triangle t = twice.triangles[i] + Triangle(count);
     twice.triangles.emplace_back(t.y, t.z, t.x);
@@ -151,7 +153,7 @@ TEST(CollapsedTriangles, SlotsWithoutTrianglesAreClosed) {
   Scene scene;
   for (const char* name : {"glass", "tube", "plate"})
     scene.materials.push_back({name, 0, Vec3(0.5f), kNoMask, kNoMask});
-  scene.materials[0].flags = kTransmissive; // of a class of its own
+  scene.materials[0].flags = kTransmissive; // a material class of its own
   scene.meshes = {thin_tube(1e-4), test::grid_mesh(10), test::sphere_mesh(8)};
   scene.objects.push_back({"all",
                            {Shape{0, 1, false, DAffine(1.0)}, Shape{1, 2, false, DAffine(1.0)},
@@ -166,7 +168,7 @@ TEST(CollapsedTriangles, SlotsWithoutTrianglesAreClosed) {
     const std::span<const uint32_t> materials = file.instance_materials(instance);
     ASSERT_EQ(materials.size(), 2u);
     const test::Decoded all = decode(file, g);
-    for (size_t i = 0; i < all.triangles.size(); ++i) // the sphere lies at x > 1
+    for (size_t i = 0; i < all.triangles.size(); ++i) // only the sphere lies at x > 1.5
       EXPECT_EQ(file.materials()[materials[all.slots[i]]].name,
                 all.positions[all.triangles[i].x].x > 1.5f ? "glass" : "plate");
   }
@@ -181,11 +183,12 @@ TEST(CollapsedTriangles, LevelsAreBuiltOfWhatIsLeft) {
   const BakedFile file = BakedFile::from_bytes(baked.bytes);
   EXPECT_GE(file.lod(0).levels.size(), 3u);
   EXPECT_EQ(file.lod(0).levels[0].triangles, file.geometries()[0].triangle_count);
-  config.precision = 1; // eight points: too few triangles for levels
+  config.precision = 1; // a lattice of eight points leaves too few triangles for levels
   EXPECT_EQ(bake(scene_of(test::sphere_mesh(60)), config).report.lod_geometries, 0u);
 }
 
-/// The mesh with its vertices off by up to a fraction of its first edge: no lattice fits it better than others.
+/// Displaces the vertices randomly by up to a fraction of the first edge, so that no lattice fits the mesh particularly
+/// well.
 Mesh shaken(Mesh mesh, float fraction) {
   test::Random random(7);
   const float by = fraction * glm::length(mesh.positions[mesh.triangles[0].y] - mesh.positions[mesh.triangles[0].x]);

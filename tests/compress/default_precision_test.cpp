@@ -1,4 +1,4 @@
-// The default precision: what pictures of a scene need, whatever its scales.
+// The default precision suffices for rendering a scene whatever its range of scales.
 
 #include <array>
 #include <cmath>
@@ -19,7 +19,7 @@ using test::bake;
 using test::Decoded;
 using test::Random;
 
-/// Two triangles over [-half, half]^2 at a height y.
+/// Two triangles over [-half, half]^2 at height y.
 Mesh floor_mesh(float half, float y) {
   Mesh mesh;
   mesh.name = "floor";
@@ -46,7 +46,7 @@ void add_tube(Mesh& mesh, DVec3 a, DVec3 b, double radius) {
   }
 }
 
-/// Tubes of radius .01 and length 20.
+/// Tubes of radius 0.01 and length 20.
 Mesh tubes_mesh(uint32_t count) {
   Mesh mesh;
   mesh.name = "tubes";
@@ -77,7 +77,7 @@ void add_instance(Scene& scene, uint32_t object, const DAffine& world_from_objec
   scene.instances.push_back({object, Affine(world_from_object)});
 }
 
-/// Two unit spheres, instances of one, on a floor 1000 units wide.
+/// Two instances of a unit sphere on a floor 1000 units wide.
 Scene spheres_on_a_floor(DVec3 place = DVec3(0.0)) {
   Scene scene = test::scene_of(floor_mesh(500.0f, -1.0f), test::translation(place));
   add_object(scene, "sphere", test::sphere_mesh(24));
@@ -96,7 +96,7 @@ Scene tubes_scene() {
 
 double step_of(const baked::GeometryRecord& g) { return PositionGrid{g.step_mantissa, g.step_exponent}.step(); }
 
-/// Largest angle between facets of the source and of the file, of geometry 0, whose triangles must all be there.
+/// Largest angle between corresponding facets of the source and of geometry 0, which must contain all triangles.
 double largest_tilt_degrees(const BakedFile& file, const Mesh& mesh) {
   const double step = step_of(file.geometries()[0]);
   double worst = 0.0;
@@ -240,7 +240,7 @@ TEST(SurfaceSample, EstimatesSumsOverAllTriangles) {
   Mesh mesh = test::grid_mesh(150, 0.3f);
   const auto first = static_cast<uint32_t>(mesh.positions.size());
   for (const Vec3 p : {Vec3(0, 0, 5), Vec3(100, 0, 5), Vec3(0, 100, 5)}) mesh.positions.push_back(p);
-  mesh.triangles.emplace_back(first, first + 1, first + 2); // most of the area
+  mesh.triangles.emplace_back(first, first + 1, first + 2); // it has most of the area
   const Scene scene = test::scene_of(mesh);
   const std::vector<SampleTriangle> all = sample_of(scene, 1 << 20), some = sample_of(scene, 2000);
   ASSERT_EQ(all.size(), mesh.triangles.size());
@@ -263,7 +263,7 @@ ViewStats look(const Scene& scene, const Camera& camera) {
   const std::vector<uint32_t> instances{0};
   const Bounds box = bounds_of(scene.meshes[0].positions);
   ViewSums sums;
-  look_at_geometry(PrimaryCamera(camera, kPromisedSize), sample, {plan.instances, instances}, box, sums, pixels);
+  add_geometry_view(PrimaryCamera(camera, kPromisedSize), sample, {plan.instances, instances}, box, sums, pixels);
   return sums.stats();
 }
 
@@ -302,8 +302,8 @@ double outline_of(const Mesh& mesh) {
 TEST(OutlineShare, TellsLooseTrianglesFromSurfaces) {
   EXPECT_EQ(outline_of(test::soup_mesh(500, 3)), 1.0);
   EXPECT_LT(outline_of(test::sphere_mesh(40)), 0.04);
-  EXPECT_NEAR(outline_of(floor_mesh(1.0f, 0.0f)), 8.0 / (8.0 + std::sqrt(8.0)), 1e-6); // all but the diagonal
-  Mesh apart; // a sphere whose triangles have vertices of their own
+  EXPECT_NEAR(outline_of(floor_mesh(1.0f, 0.0f)), 8.0 / (8.0 + std::sqrt(8.0)), 1e-6); // all edges but the diagonal
+  Mesh apart; // a sphere whose triangles share no vertices
   const Mesh sphere = test::sphere_mesh(40);
   for (const Triangle& t : sphere.triangles) {
     const auto first = static_cast<uint32_t>(apart.positions.size());

@@ -28,7 +28,7 @@ using test::bake;
 using test::Decoded;
 using test::scene_of;
 
-/// A geometry's source: positions in the space it is stored in, double, and triangles of any winding.
+/// Source of a geometry: positions in double, in the space that the file stores, and triangles of any winding.
 struct Source {
   std::vector<DVec3> positions;
   std::vector<Triangle> triangles;
@@ -46,7 +46,7 @@ Source source_of(const Mesh& mesh, const DAffine& transform = DAffine(1.0)) {
   return source;
 }
 
-/// Triangles as sorted corner numbers, in order: equal lists are equal sets of triangles.
+/// Triangles as sorted triples of vertex numbers, in sorted order: equal lists mean equal sets of triangles.
 std::vector<std::array<uint32_t, 3>> corner_sets(const std::vector<Triangle>& triangles) {
   std::vector<std::array<uint32_t, 3>> sets;
   for (const Triangle& t : triangles) {
@@ -57,14 +57,14 @@ std::vector<std::array<uint32_t, 3>> corner_sets(const std::vector<Triangle>& tr
   return sets;
 }
 
-/// Of the triangle over its longest edge; 0 where it has no area.
+/// Height of the triangle over its longest edge; 0 if that edge has no length.
 double height(const Source& source, const std::array<uint32_t, 3>& triangle) {
   const DVec3 a = source.positions[triangle[0]], b = source.positions[triangle[1]], c = source.positions[triangle[2]];
   const double longest = std::max({glm::length(b - a), glm::length(c - b), glm::length(a - c)});
   return longest > 0.0 ? glm::length(glm::cross((b - a) / longest, c - a)) : 0.0;
 }
 
-/// Finds source vertices by place.
+/// Finds source vertices by position.
 class SourceIndex {
 public:
   explicit SourceIndex(const Source& source) : source_(source), by_x_(source.positions.size()) {
@@ -72,7 +72,7 @@ public:
     std::sort(by_x_.begin(), by_x_.end(), [&](uint32_t a, uint32_t b) { return at(a).x < at(b).x; });
   }
 
-  /// Numbers of the vertices within `bound` of p along every axis; at most two.
+  /// Returns the vertices within `bound` of p along every axis; at most two.
   std::vector<uint32_t> near(DVec3 p, double bound) const {
     std::vector<uint32_t> found;
     auto i = std::lower_bound(by_x_.begin(), by_x_.end(), p.x - bound,
@@ -91,9 +91,9 @@ private:
   std::vector<uint32_t> by_x_;
 };
 
-/// Checks a geometry against its source: the bound it states is half a step and what floats add, every decoded vertex
-/// lies within the bound of a source vertex, and triangles connect the same vertices, as far as places tell them apart.
-/// Triangles may be missing that are so thin that they have no area on the lattice.
+/// Checks a geometry against its source: the stated error bound is half a step plus float rounding, every decoded
+/// vertex lies within the bound of a source vertex, and triangles connect the same vertices, as far as positions
+/// distinguish them. Triangles may be missing if they are so thin that they have no area on the lattice.
 void expect_holds(const BakedFile& file, uint32_t g, const Source& source, double flushed = 0.0) {
   const baked::GeometryRecord& record = file.geometries()[g];
   const double step = PositionGrid{record.step_mantissa, record.step_exponent}.step();
@@ -143,11 +143,11 @@ void expect_survives(const Mesh& mesh, const DAffine& transform = DAffine(1.0), 
   expect_holds(BakedFile::from_bytes(baked.bytes), 0, source_of(mesh, transform));
 }
 
-/// Subnormal floats are read and written as 0 while it lives, on this thread.
+/// While it exists, this thread reads and writes subnormal floats as 0.
 class FlushToZero {
 public:
 #if defined(__SSE2__)
-  FlushToZero() : before_(_mm_getcsr()) { _mm_setcsr(before_ | 0x8040u); } // flush to zero, denormals are zero
+  FlushToZero() : before_(_mm_getcsr()) { _mm_setcsr(before_ | 0x8040u); } // FTZ and DAZ
   ~FlushToZero() { _mm_setcsr(before_); }
   static constexpr bool kAvailable = true;
 
@@ -183,7 +183,7 @@ TEST(Extremes, TheLargestFloats) {
     SCOPED_TRACE(radius);
     expect_survives(test::sphere_mesh(9, radius));
   }
-  // Steps of 2^126: the nearest lattice point is 2^128, which is no float.
+  // With steps of 2^126 the nearest lattice point is 2^128, which exceeds the float range.
   expect_refused(scene_of(test::sphere_mesh(9, FLT_MAX)), precision(PrecisionKind::kPositionBits, 3.0),
                  "sphere: coordinates up to 3.4e+38 round to more than the largest float at a step of 9.57e+37");
 }
@@ -217,7 +217,7 @@ TEST(Extremes, SubnormalPositions) {
   for (const double scale : {1e-38, 1e-40, 1e-42, 1e-44, 1e-45, 1e-50}) {
     SCOPED_TRACE(scale);
     expect_survives(test::sphere_mesh(9), test::scaling(DVec3(scale)));
-    Mesh mesh = test::sphere_mesh(9); // in the source's own floats
+    Mesh mesh = test::sphere_mesh(9); // scaled in the source's floats
     for (Vec3& p : mesh.positions) p = Vec3(DVec3(p) * scale);
     expect_survives(mesh);
   }
@@ -257,14 +257,14 @@ TEST(Extremes, SubnormalPositionsMoveByNoMoreThanTheirSizeWhenFlushed) {
 TEST(Extremes, OneVertexAndOneTriangle) {
   Mesh point;
   point.positions = {Vec3(3.0f, -4.0f, 5.0f)};
-  expect_survives(point); // no triangle, so nothing to store
+  expect_survives(point); // no triangle, so nothing is stored
   for (const Vec3 second : {Vec3(1, 0, 0), Vec3(1e-30f, 0, 0), Vec3(1e30f, 0, 0)}) {
     Mesh triangle;
     triangle.positions = {Vec3(0.0f), second, Vec3(0, second.x, 0)};
     triangle.triangles = {{0, 1, 2}};
     expect_survives(triangle);
   }
-  Mesh collapsed; // three vertices in one place
+  Mesh collapsed; // three vertices at the same position
   collapsed.positions.assign(3, Vec3(1e6f, 2.0f, -3.0f));
   collapsed.triangles = {{0, 1, 2}};
   const BakedScene baked = bake(scene_of(collapsed));
@@ -296,7 +296,7 @@ WorldEnd
   EXPECT_EQ(file.geometries()[0].triangle_count, 3u);
 }
 
-/// Every geometry of a file against the shapes it was made from.
+/// Checks every geometry of a file against the shapes that it was made from.
 void expect_scene_holds(const Scene& scene, const BakeConfig& config) {
   const BakedScene baked = bake(scene, config);
   const BakedFile file = BakedFile::from_bytes(baked.bytes);
@@ -334,7 +334,7 @@ TEST(Extremes, ScalesSideBySideInOneScene) {
 TEST(Extremes, WorldShapesOfEveryScaleShareOneLattice) {
   Scene scene;
   scene.materials.push_back({});
-  uint32_t rings = 8; // no two shapes are alike, or they would share a geometry of its own grid
+  uint32_t rings = 8; // different meshes, because equal ones would share a geometry with its own grid
   for (const double scale : {1e-6, 1e-3, 1.0, 1e3, 1e6})
     test::add_shape(scene, test::sphere_mesh(rings++),
                     compose(test::translation({2.5 * scale, 0, 0}), test::scaling(DVec3(scale))));
@@ -342,7 +342,7 @@ TEST(Extremes, WorldShapesOfEveryScaleShareOneLattice) {
   const BakedFile file = BakedFile::from_bytes(baked.bytes);
   for (const baked::GeometryRecord& geometry : file.geometries()) {
     EXPECT_NE(geometry.flags & baked::kWorldSpace, 0u);
-    EXPECT_EQ(geometry.step_mantissa, file.summary().world_step_mantissa); // finer by powers of two
+    EXPECT_EQ(geometry.step_mantissa, file.summary().world_step_mantissa); // steps differ by powers of two
     EXPECT_LE(geometry.step_exponent, file.summary().world_step_exponent);
   }
   expect_scene_holds(scene, {});
@@ -351,14 +351,14 @@ TEST(Extremes, WorldShapesOfEveryScaleShareOneLattice) {
 
 double step_of(const baked::GeometryRecord& g) { return PositionGrid{g.step_mantissa, g.step_exponent}.step(); }
 
-/// A mountain of 20,000 triangles over 1e6 units.
+/// A mountain of 20,000 triangles, 1e6 units wide.
 Scene mountain_scene() { return scene_of(test::grid_mesh(100, 0.3f), test::scaling(DVec3(1e6))); }
 
 TEST(Extremes, CrumbsBeforeAMountainKeepTheirShape) {
   Scene scene = mountain_scene();
   const DAffine small = compose(test::translation({-1e-5, 0, 0}), test::scaling(DVec3(1e-6)));
   test::add_shape(scene, test::sphere_mesh(9), small);
-  test::add_shape(scene, test::grid_mesh(5, 0.1f), // as fine as floats are there
+  test::add_shape(scene, test::grid_mesh(5, 0.1f), // as fine as floats are at this place
                   compose(test::translation({2e6, 0, 0}), test::scaling(DVec3(100))));
   const BakedScene baked = bake(scene);
   const BakedFile file = BakedFile::from_bytes(baked.bytes);
@@ -376,14 +376,14 @@ TEST(Extremes, CrumbsBeforeAMountainKeepTheirShape) {
   EXPECT_GE(step_of(file.geometries()[2]), 2e6 * 0x1p-23);
   EXPECT_LE(step_of(file.geometries()[2]), 2e6 * 0x1p-22);
   expect_scene_holds(scene, {});
-  // Who asks for an absolute error, or one relative to the scene, gets just that.
+  // An absolute or scene-relative error is used as requested, without nested grids.
   for (const BakeConfig& config :
        {precision(PrecisionKind::kAbsolute, 10.0), precision(PrecisionKind::kPositionBits, 14.0),
         precision(PrecisionKind::kDiagonalFraction, 1e-5)})
     EXPECT_EQ(bake(scene, config).report.nested_geometries, 0u);
 }
 
-/// Distinct decoded positions of a geometry.
+/// Sorted distinct decoded positions of a geometry.
 std::vector<std::array<float, 3>> positions_of(const BakedFile& file, uint32_t g) {
   std::vector<std::array<float, 3>> all;
   for (const Vec3 p : test::decode(file, g).positions) all.push_back({p.x, p.y, p.z});
@@ -400,7 +400,7 @@ size_t common_positions(const BakedFile& file, uint32_t a, uint32_t b) {
 }
 
 TEST(Extremes, SmallThingsThatTouchStayClosed) {
-  // Two small patches with a border in common, of different fineness, and one that hangs on a vertex of the mountain.
+  // Two small patches of different fineness with a common border, and one attached to a vertex of the mountain.
   Scene scene = mountain_scene();
   const DVec3 place(-1e3, 0, 0);
   Mesh left = test::grid_mesh(8, 0.1f), right = test::grid_mesh(16, 0.1f);
@@ -413,11 +413,11 @@ TEST(Extremes, SmallThingsThatTouchStayClosed) {
   const BakedScene baked = bake(scene);
   const BakedFile file = BakedFile::from_bytes(baked.bytes);
   EXPECT_EQ(baked.report.nested_geometries, 3u);
-  EXPECT_GT(step_of(file.geometries()[1]), step_of(file.geometries()[2])); // each its own
+  EXPECT_GT(step_of(file.geometries()[1]), step_of(file.geometries()[2])); // each has its own step
   EXPECT_LT(step_of(file.geometries()[1]), 1.0 / 8 / 128);
-  const baked::GeometryRecord& hanging = file.geometries()[3]; // as fine as floats are there
+  const baked::GeometryRecord& hanging = file.geometries()[3]; // as fine as floats are at this place
   EXPECT_LT(step_of(hanging), std::max({std::abs(peak.x), std::abs(peak.y), std::abs(peak.z)}) * 0x1p-22);
-  EXPECT_EQ(common_positions(file, 1, 2), 9u); // the border, every vertex of the coarser patch
+  EXPECT_EQ(common_positions(file, 1, 2), 9u); // the border: every vertex of the coarser patch
   EXPECT_GE(common_positions(file, 0, 3), 1u); // the peak, on the mountain's lattice
   EXPECT_GE(hanging.position_error_bound, baked.report.world_step / 2);
 }
@@ -448,7 +448,7 @@ TEST(Extremes, TwentyMillionVerticesInBoundedMemory) {
   ASSERT_EQ(record.triangle_count, triangles);
   EXPECT_LE(record.max_position_error, record.position_error_bound);
   std::vector<Vec3> positions;
-  for (uint32_t c = 0; c < record.cluster_count; ++c) { // the source is a grid: each vertex tells where it belongs
+  for (uint32_t c = 0; c < record.cluster_count; ++c) { // the source is a grid, so a position determines its vertex
     const ClusterView cluster = file.cluster(0, c);
     positions.resize(cluster.vertex_count());
     decode_positions(cluster, positions);

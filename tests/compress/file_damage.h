@@ -13,7 +13,7 @@
 
 namespace packtrace::test {
 
-/// The kind of error that opening a file ends with, which must be one.
+/// Opens a file, which must fail, and returns the kind of error.
 inline ErrorKind open_kind(std::span<const std::byte> bytes, std::string* message = nullptr) {
   try {
     (void)BakedFile::from_bytes(bytes);
@@ -25,7 +25,7 @@ inline ErrorKind open_kind(std::span<const std::byte> bytes, std::string* messag
   return ErrorKind::kCancelled;
 }
 
-/// Changes one u32 of a file and returns what opening it says.
+/// Changes one u32 of a file and returns the error message of opening it.
 inline std::string message_after(std::vector<std::byte> bytes, baked::Section section, size_t at, uint32_t value) {
   baked::FileHeader header;
   std::memcpy(&header, bytes.data(), sizeof header);

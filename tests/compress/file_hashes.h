@@ -11,8 +11,8 @@
 
 namespace packtrace::test {
 
-/// Makes the hashes right again, so that damage reaches the checks behind them: of content and header.
-/// @param Header what the file begins with: baked::FileHeader or vertex16::Header
+/// Recomputes the hashes of content and header, so that damage reaches the checks behind them.
+/// @param Header header type of the file: baked::FileHeader or vertex16::Header
 template <class Header>
 void rehash(std::span<std::byte> bytes) {
   if (bytes.size() < sizeof(Header)) return;
@@ -24,13 +24,14 @@ void rehash(std::span<std::byte> bytes) {
   std::memcpy(bytes.data(), &header, sizeof header);
 }
 
-/// The same of the disk form: of pages and table where the sizes allow that, and of the header.
+/// Like rehash() for the disk form: recomputes the hashes of the header and, if the sizes are plausible, of pages and
+/// table.
 inline void rehash_pages(std::span<std::byte> bytes) {
   baked::PagedHeader header;
   if (bytes.size() < sizeof header) return;
   std::memcpy(&header, bytes.data(), sizeof header);
   const uint64_t limit = bytes.size(), table_bytes = uint64_t{header.page_count} * sizeof(baked::PageRecord);
-  uint64_t data = sizeof header + table_bytes; // where the pages begin
+  uint64_t data = sizeof header + table_bytes; // start of the pages
   for (const uint64_t part : {header.head_disk_bytes, header.tail_disk_bytes, header.node_disk_bytes})
     data += std::min(part, limit + 1);
   if (data <= limit) {

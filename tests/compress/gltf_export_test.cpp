@@ -37,7 +37,8 @@ uint32_t word_at(const std::vector<std::byte>& bytes, size_t place) {
   return word;
 }
 
-/// tinygltf without Draco refuses accessors without bytes of their own, as Draco's are: they get the first buffer view.
+/// tinygltf without Draco rejects accessors without a buffer view, as Draco primitives have them, so they get the first
+/// one.
 std::vector<std::byte> readable_without_draco(const std::vector<std::byte>& glb) {
   constexpr size_t kHeader = 12, kChunkHeader = 8;
   const size_t json_bytes = word_at(glb, kHeader);
@@ -100,7 +101,7 @@ std::vector<Value> draco_values(const draco::Mesh& mesh, const tinygltf::Value& 
   return values;
 }
 
-/// One primitive, decoded as any reader would, after comparing it with what the accessors promise.
+/// Decodes one primitive as any reader would, and checks it against its accessors.
 Part part_of(const tinygltf::Model& model, const tinygltf::Primitive& primitive) {
   Part part;
   const auto count = [&](int accessor) { return model.accessors[static_cast<size_t>(accessor)].count; };
@@ -154,7 +155,7 @@ std::multiset<Face> faces_of(const BakedFile& file, uint32_t geometry) {
   return faces;
 }
 
-/// Faces of a mesh on the lattice of a step, and that its positions lie on it.
+/// Faces of a mesh in lattice coordinates for the given step. Checks that its positions lie on the lattice.
 std::multiset<Face> faces_of(const tinygltf::Model& model, const tinygltf::Mesh& mesh, double step) {
   std::multiset<Face> faces;
   for (const tinygltf::Primitive& primitive : mesh.primitives) {
@@ -206,7 +207,7 @@ TEST(GltfExport, NormalsAndTextureCoordinatesAreWithinTheirBits) {
   for (size_t m = 0; m < exact.meshes.size(); ++m)
     for (size_t p = 0; p < exact.meshes[m].primitives.size(); ++p) {
       const Part a = part_of(exact, exact.meshes[m].primitives[p]), b = part_of(coded, coded.meshes[m].primitives[p]);
-      // Every coded vertex has an exact one at its place that it stands for.
+      // Every Draco vertex must match an exact vertex at its position.
       std::multimap<std::array<float, 3>, size_t> places;
       const auto key = [](Vec3 v) {
         return std::array<float, 3>{std::round(v.x * 1e4f), std::round(v.y * 1e4f), std::round(v.z * 1e4f)};
@@ -214,7 +215,7 @@ TEST(GltfExport, NormalsAndTextureCoordinatesAreWithinTheirBits) {
       for (size_t i = 0; i < a.positions.size(); ++i) places.emplace(key(a.positions[i]), i);
       for (size_t i = 0; i < b.positions.size(); ++i) {
         const auto [first, last] = places.equal_range(key(b.positions[i]));
-        if (first == last) continue; // on the edge of a rounding cell
+        if (first == last) continue; // rounded to another cell
         float normal_cosine = -1.0f, uv_distance = 1e9f;
         for (auto at = first; at != last; ++at) {
           if (!b.normals.empty())
@@ -224,7 +225,7 @@ TEST(GltfExport, NormalsAndTextureCoordinatesAreWithinTheirBits) {
         normals += !b.normals.empty(), uvs += !b.uvs.empty();
         if (!b.normals.empty()) {
           EXPECT_GT(normal_cosine, 0.999995f);
-        } // .04 degrees at 12 bits, and rounding
+        } // 0.04 degrees at 12 bits, plus rounding
         if (!b.uvs.empty()) {
           EXPECT_LT(uv_distance, 4.0f / 16384.0f);
         }
@@ -235,7 +236,7 @@ TEST(GltfExport, NormalsAndTextureCoordinatesAreWithinTheirBits) {
 }
 
 TEST(GltfExport, WorldSpaceNeighboursDecodeToTheSameBits) {
-  // Two grids side by side share the points x = 1.
+  // Two adjacent grids share the points at x = 1.
   Scene scene = test::scene_of(test::grid_mesh(16, 0.2f));
   test::add_shape(scene, test::grid_mesh(16, 0.2f), test::translation({1, 0, 0}));
   scene.materials.push_back({"other", 0, Vec3(0.1f), kNoMask, kNoMask});
@@ -286,7 +287,7 @@ TEST(GltfExport, CamerasSeeTheSame) {
   const tinygltf::Model model = parse(export_of(BakedFile::from_bytes(baked.bytes)));
   ASSERT_EQ(model.cameras.size(), 1u);
   const tinygltf::PerspectiveCamera& lens = model.cameras[0].perspective;
-  EXPECT_NEAR(lens.yfov, 50.0 * std::numbers::pi / 180.0, 1e-12); // the shorter axis
+  EXPECT_NEAR(lens.yfov, 50.0 * std::numbers::pi / 180.0, 1e-12); // along the shorter axis
   EXPECT_NEAR(lens.aspectRatio, 640.0 / 360.0, 1e-12);
   glm::dmat4 node(1.0), mirror(1.0);
   for (int i = 0; i < 16; ++i) node[i / 4][i % 4] = model.nodes.back().matrix[static_cast<size_t>(i)];

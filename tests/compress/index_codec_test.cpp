@@ -12,7 +12,7 @@ namespace {
 
 struct Encoded {
   Strips strips;
-  std::vector<uint8_t> bytes; // with slack
+  std::vector<uint8_t> bytes; // followed by kReadSlackBytes
 };
 
 Encoded encode(std::span<const Triangle> triangles, uint32_t vertex_count) {
@@ -26,12 +26,12 @@ Encoded encode(std::span<const Triangle> triangles, uint32_t vertex_count) {
   return result;
 }
 
-/// The smallest of the three ways to write a triangle.
+/// The smallest rotation of a triangle.
 std::array<uint32_t, 3> rotated_to_smallest(Triangle t) {
   return std::min({std::array{t.x, t.y, t.z}, std::array{t.y, t.z, t.x}, std::array{t.z, t.x, t.y}});
 }
 
-/// Decodes both ways and compares with the source, up to the corner a triangle starts at.
+/// Decodes in both ways and compares with the source, up to rotation of each triangle.
 void expect_round_trip(std::span<const Triangle> triangles, uint32_t vertex_count) {
   const Encoded e = encode(triangles, vertex_count);
   ASSERT_TRUE(strips_are_valid(e.bytes.data(), e.strips.layout));
@@ -53,7 +53,7 @@ TEST(IndexCodec, GridsRoundTripAndCostLittle) {
   const Mesh grid = test::grid_mesh(8);
   expect_round_trip(grid.triangles, 81);
   const Encoded e = encode(grid.triangles, 81);
-  EXPECT_LT(e.strips.layout.total_bits(), 128 * 8u); // one byte a triangle; u8 x 3 takes three
+  EXPECT_LT(e.strips.layout.total_bits(), 128 * 8u); // one byte per triangle; three u8 indices take three
 }
 
 TEST(IndexCodec, GroupsStayTogether) {
@@ -70,7 +70,7 @@ TEST(IndexCodec, GroupsStayTogether) {
   std::vector<uint32_t> order = strips.triangle_order;
   std::sort(order.begin(), order.end());
   for (uint32_t i = 0; i < 128; ++i) ASSERT_EQ(order[i], i);
-  EXPECT_LE(strips.layout.restart_count, find_strips(grid.triangles, 81).layout.restart_count + 8u);
+  EXPECT_LE(strips.layout.strip_count, find_strips(grid.triangles, 81).layout.strip_count + 8u);
 }
 
 TEST(IndexCodec, DegenerateAndRepeatedTrianglesRoundTrip) {
@@ -97,7 +97,7 @@ TEST(IndexCodec, AFullClusterOfSeparateVerticesRoundTrips) {
 }
 
 TEST(IndexCodec, GoldenBytes) {
-  // A strip of a right and a left turn, then a strip of its own: see the layout in the header.
+  // A strip with a right and a left turn, then a strip of one triangle; see the layout in the header.
   Strips strips;
   strips.layout = {4, 6, 2};
   strips.restart = {1, 0, 0, 1};
@@ -113,8 +113,8 @@ TEST(IndexCodec, GoldenBytes) {
   std::array<Triangle, 4> triangles;
   decode_triangles(bytes.data(), strips.layout, 10, triangles);
   EXPECT_EQ(triangles[0], Triangle(10, 11, 12));
-  EXPECT_EQ(triangles[1], Triangle(12, 11, 13)); // right: across 1-2
-  EXPECT_EQ(triangles[2], Triangle(12, 13, 14)); // left: keeps 2
+  EXPECT_EQ(triangles[1], Triangle(12, 11, 13)); // right turn: across edge 1-2
+  EXPECT_EQ(triangles[2], Triangle(12, 13, 14)); // left turn: keeps 2
   EXPECT_EQ(triangles[3], Triangle(14, 10, 15));
 }
 

@@ -55,7 +55,7 @@ TEST_P(NormalCodec, CodesSplitAndJoin) {
   }
 }
 
-TEST_P(NormalCodec, EveryNumberDecodesToUnitLength) { // also those that are no codes
+TEST_P(NormalCodec, EveryNumberDecodesToUnitLength) { // also numbers that are no codes
   test::Random random(2);
   for (int i = 0; i < 200000; ++i) {
     const uint32_t code = i % 2 == 0 ? random.bits() : random_code(random);
@@ -71,12 +71,12 @@ TEST_P(NormalCodec, TheErrorStaysBelowItsBoundAndComesNearIt) {
   double worst = 0.0;
   for (int i = 0; i < 60000; ++i) {
     DVec3 n = random_direction(random);
-    if (i % 3 == 1) n.z *= 0.01;                                // the equator, where zsign is weak
-    if (i % 3 == 2) n.y = std::copysign(n.x, n.y) * (1 + 1e-5); // borders of charts
+    if (i % 3 == 1) n.z *= 0.01;                                // near the equator, where zsign is least accurate
+    if (i % 3 == 2) n.y = std::copysign(n.x, n.y) * (1 + 1e-5); // at borders of charts
     worst = std::max(worst, error(n));
   }
   EXPECT_LE(worst, format().max_error_degrees);
-  EXPECT_GT(worst, 0.85 * format().max_error_degrees); // or the bound says too little
+  EXPECT_GT(worst, 0.85 * format().max_error_degrees); // the bound must be tight
 }
 
 TEST_P(NormalCodec, AxesAndDiagonalsStayBelowTheBound) {
@@ -109,7 +109,7 @@ TEST_P(NormalCodec, UnfoldingComesBackAndChangesNothing) {
   uint32_t unfolded = 0;
   for (int i = 0; i < 20000; ++i) {
     NormalFields fields = split_normal_code(encoding(), random_code(random));
-    if (i % 4 == 0) fields.x = i % 8 == 0 ? 0 : static_cast<int32_t>(format().x_codes) - 1; // borders
+    if (i % 4 == 0) fields.x = i % 8 == 0 ? 0 : static_cast<int32_t>(format().x_codes) - 1; // borders of charts
     if (i % 5 == 0) fields.y = i % 10 == 0 ? 0 : static_cast<int32_t>(format().y_codes) - 1;
     for (uint32_t chart = 0; chart < format().charts; ++chart) {
       const auto placed = unfold_normal(encoding(), fields, chart);
@@ -153,7 +153,7 @@ TEST(Zsign32, LayoutIsSignThenXThenY) {
   EXPECT_EQ(encode_normal(kEncoding, {1, 0, 0}) & 0x7fffffffu, (32766u << 16) | 32767u);
   EXPECT_EQ(encode_normal(kEncoding, {0, -1, 0}) & 0x7fffffffu, 16383u << 16);
   EXPECT_EQ(decode_normal(kEncoding, (16383u << 16) | 32767u), Vec3(0, 0, 1));
-  EXPECT_EQ(encode_normal(kEncoding, {1.0000001, 0, 1e-9}) >> 31, 0u); // does not overflow into the sign
+  EXPECT_EQ(encode_normal(kEncoding, {1.0000001, 0, 1e-9}) >> 31, 0u); // must not overflow into the sign
 }
 
 TEST(Zsign32, ErrsAtTheEquatorWhereTheAxisEncodingsDoNot) {
@@ -166,16 +166,16 @@ TEST(Zsign32, ErrsAtTheEquatorWhereTheAxisEncodingsDoNot) {
     zsign = std::max(zsign, error(NormalEncoding::kZsign32));
     axis = std::max(axis, error(NormalEncoding::kAxis32));
   }
-  EXPECT_GT(zsign, 0.1); // the format's known weak place: if it is gone, this is another format
+  EXPECT_GT(zsign, 0.1); // known weakness of the published format, which must not change
   EXPECT_LT(axis, 0.0025);
 }
 
 TEST(AxisNormals, LayoutIsChartThenXThenY) {
-  constexpr auto kEncoding = NormalEncoding::kAxis16; // 103 codes each, 51 is 0
+  constexpr auto kEncoding = NormalEncoding::kAxis16; // 103 codes each, 51 stands for 0
   EXPECT_EQ(encode_normal(kEncoding, {1, 0, 0}), (0u * 103 + 51) * 103 + 51);
   EXPECT_EQ(encode_normal(kEncoding, {-1, 0, 0}), (1u * 103 + 51) * 103 + 51);
   EXPECT_EQ(encode_normal(kEncoding, {0, 0, -1}), (5u * 103 + 51) * 103 + 51);
-  // Component a + 1 is x: of axis y that is z; the border is where both are equally large.
+  // Component a + 1 holds x: for axis y it is z. The border is where both are equally large.
   EXPECT_EQ(encode_normal(kEncoding, {0, 1, 0.999999}), (2u * 103 + 102) * 103 + 51);
   EXPECT_EQ(encode_normal(kEncoding, {-0.999999, 1, 0}), (2u * 103 + 51) * 103 + 0);
 }
@@ -183,9 +183,9 @@ TEST(AxisNormals, LayoutIsChartThenXThenY) {
 TEST(AxisNormals, NeighboursOnTheCrossAreNeighboursOnTheSphere) {
   constexpr auto kEncoding = NormalEncoding::kAxis24;
   constexpr int32_t kLast = 1670;
-  const double step = 0.1; // degrees; two codes lie .054 apart at most
+  const double step = 0.1; // degrees; adjacent codes are at most 0.054 apart
   for (uint32_t chart = 0; chart < 6; ++chart)
-    for (int32_t x = -kLast - 1; x < 2 * kLast + 1; ++x) { // along the middle, over both borders
+    for (int32_t x = -kLast - 1; x < 2 * kLast + 1; ++x) { // along the middle, across both borders
       const auto at = [&](int32_t u) {
         return DVec3(decode_normal(kEncoding, fold_normal(kEncoding, {chart, u, 835})));
       };
@@ -194,7 +194,7 @@ TEST(AxisNormals, NeighboursOnTheCrossAreNeighboursOnTheSphere) {
 }
 
 TEST(OctNormals, LayoutIsXThenY) {
-  constexpr auto kEncoding = NormalEncoding::kOct16; // 0 .. 254, 127 is 0
+  constexpr auto kEncoding = NormalEncoding::kOct16; // 0 .. 254, 127 stands for 0
   EXPECT_EQ(encode_normal(kEncoding, {0, 0, 1}), (127u << 8) | 127u);
   EXPECT_EQ(encode_normal(kEncoding, {1, 0, 0}), (254u << 8) | 127u);
   EXPECT_EQ(encode_normal(kEncoding, {0, -1, 0}), (127u << 8) | 0u);

@@ -8,9 +8,9 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "compress/format/pages/page_encoder.h"
 #include "compress/format/file/file_summary.h"
 #include "compress/format/pages/page_decoder.h"
+#include "compress/format/pages/page_encoder.h"
 #include "pbrt_import/base/error.h"
 #include "tests/compress/file_hashes.h"
 #include "tests/compress/test_scenes.h"
@@ -27,7 +27,7 @@ BakeConfig config_of(PageCodec codec, std::optional<NormalEncoding> normals = {}
   return config;
 }
 
-/// Bumps and normals, a mask with texture coordinates, creases, soup, and an instanced sphere.
+/// Bumps with normals, a mask with texture coordinates, creases, triangle soup, and an instanced sphere.
 Scene mixed_scene(uint32_t n) {
   Scene scene = test::scene_of(test::grid_mesh(n, 0.1f, true));
   AlphaMask mask;
@@ -116,7 +116,7 @@ TEST_P(PageCodecs, FilesOfManyPagesAreSmallAndTheSameForAnyThreadCount) {
 
 TEST_P(PageCodecs, WhatEncodersDoNotWriteIsStored) {
   Bytes plain = test::bake(test::scene_of(test::soup_mesh(300, 5))).bytes;
-  { // Sets the last bit of the padding behind the first cluster's streams, which nobody reads.
+  { // set the last padding bit behind the first cluster's streams, which is never read
     const BakedFile file = BakedFile::from_bytes(plain);
     const ClusterView view = file.cluster(0, 0);
     const uint64_t bits = view.stream_bits().total();
@@ -169,7 +169,8 @@ TEST_P(PageCodecs, DamageWithRightHashesIsRefusedOrHarmless) {
     }
     test::rehash_pages(bytes);
     try {
-      // What decoding lets pass, the resident file's own content hash catches; without damage to the data it is equal.
+      // Damage that decoding does not detect fails the content hash of the resident file. Otherwise the data must be
+      // equal.
       const BakedFile file = BakedFile::from_bytes(bytes);
       ASSERT_EQ(file.file_bytes(), plain.size());
     } catch (const Error& error) {
@@ -177,7 +178,7 @@ TEST_P(PageCodecs, DamageWithRightHashesIsRefusedOrHarmless) {
       ++refused;
     }
   }
-  EXPECT_GT(refused, 15000u); // what is left hits the stream sizes, which are figures for people, or changes nothing
+  EXPECT_GT(refused, 15000u); // the rest changes nothing, or only the stream sizes, which are not used
 }
 
 TEST_P(PageCodecs, HugeClaimsAreRefusedBeforeMemoryIsTaken) {

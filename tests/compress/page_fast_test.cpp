@@ -7,10 +7,10 @@
 #include <gtest/gtest.h>
 #include <zstd.h>
 
-#include "compress/format/pages/page_encoder.h"
 #include "compress/format/file/baked_file.h"
 #include "compress/format/pages/page_codec.h"
 #include "compress/format/pages/page_decoder.h"
+#include "compress/format/pages/page_encoder.h"
 #include "compress/format/pages/page_fast_kernels.h"
 #include "tests/compress/test_scenes.h"
 
@@ -25,7 +25,7 @@ void append_number(Bytes& to, size_t value) {
   to.insert(to.end(), reinterpret_cast<const uint8_t*>(&number), reinterpret_cast<const uint8_t*>(&number + 1));
 }
 
-/// A page whose parts lie there as they are.
+/// A page whose parts are not compressed.
 Bytes page_of(const std::array<Bytes, kParts>& parts) {
   Bytes page;
   for (const Bytes& part : parts)
@@ -34,7 +34,7 @@ Bytes page_of(const std::array<Bytes, kParts>& parts) {
   return page;
 }
 
-/// A square of two triangles, put together by hand.
+/// A square of two triangles, encoded by hand.
 struct Square {
   baked::GeometryRecord geometry{};
   std::array<Bytes, kParts> parts;
@@ -48,7 +48,7 @@ struct Square {
     header.position_bits = {4, 3, 0};
     header.coding[1] = 1 | 1 << kClassShift;
     header.coding[2] = 2 << kClassShift;
-    parts[kFields] = {0x00, 0x02}; // the first vertex: 0 in 7 bits; low bits of y: 0, 0, 1
+    parts[kFields] = {0x00, 0x02}; // first vertex: 0 in 7 bits; low bits of y: 0, 0, 1
     parts[kBits] = {0x00, 0x0f};   // a right turn; all corners are fresh
     parts[kRuns] = {2};
     parts[kResiduals + 0] = {20, 19, 1}; // x: +10, -10, -1
@@ -76,10 +76,10 @@ TEST(FastPage, APageWrittenByHandIsDecoded) {
   EXPECT_EQ(record.material_slot, 3u);
   EXPECT_EQ(record.triangle_count, 2);
   EXPECT_EQ(record.vertex_count, 4);
-  EXPECT_EQ(record.restart_count, 1);
+  EXPECT_EQ(record.strip_count, 1);
   BitWriter expected;
   expected.put(0b01, 2), expected.put(0, 2), expected.put(0b1111, 4);
-  for (const auto& [x, y] : {std::pair{0, 0}, {10, 0}, {0, 6}, {9, 5}}) // the last: 10 + 0 - 0 - 1, 0 + 6 - 0 - 1
+  for (const auto& [x, y] : {std::pair{0, 0}, {10, 0}, {0, 6}, {9, 5}}) // the last one: 10 + 0 - 0 - 1, 0 + 6 - 0 - 1
     expected.put(static_cast<uint32_t>(x), 4), expected.put(static_cast<uint32_t>(y), 3);
   expected.align(4);
   payload.resize(expected.bytes().size());
@@ -127,7 +127,7 @@ TEST(FastPage, HeadersOutOfRangeAreRefused) {
   EXPECT_FALSE(decodes([](Header& h) { h.flags = baked::kClusterHasUvs; }));
 }
 
-/// The headers of all pages of a scene, which comes back bit for bit in pages of this form.
+/// Headers of all pages of a scene, in codec fast. Checks that the file is restored bit for bit.
 std::vector<Header> headers_of(const Scene& scene, BakeConfig config = {}) {
   const std::vector<std::byte> plain = test::bake(scene, config).bytes;
   const std::vector<std::byte> disk = encode_paged_file(BakedFile::from_bytes(plain), PageCodec::kFast);
@@ -171,7 +171,7 @@ uint32_t total(const std::vector<Header>& headers, const Of& of) {
 
 TEST(FastPage, CreasesShareThePlaceOfAnOlderVertex) {
   Mesh mesh = test::grid_mesh(20, 0.1f, true);
-  Mesh split; // a vertex of its own for each corner, with one of two normals
+  Mesh split; // each corner has its own vertex, with one of two normals
   for (const Triangle& t : mesh.triangles)
     for (int k = 0; k < 3; ++k) {
       split.positions.push_back(mesh.positions[t[k]]);

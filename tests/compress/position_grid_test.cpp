@@ -46,7 +46,7 @@ TEST(PositionGrid, DecodeIsMonotone) {
 TEST(PositionGrid, ErrorStaysWithinItsBoundAtEveryScale) {
   test::Random random(1);
   for (const double scale : {1e-44, 1e-38, 1e-30, 1e-6, 1.0, 1e6, 1e30}) {
-    for (const double step_over_scale : {1e-3, 1e-7, 3e-9}) { // from far above the float's ulp to far below
+    for (const double step_over_scale : {1e-3, 1e-7, 3e-9}) { // from far above the float's ulp to far below it
       const double step = choose_position_grid(scale * step_over_scale).step();
       for (int i = 0; i < 2000; ++i) {
         const double p = static_cast<double>(random.uniform(-1, 1)) * scale;

@@ -15,7 +15,7 @@ std::vector<uint8_t> write(const std::vector<uint32_t>& symbols) {
   return writer.finish();
 }
 
-/// Skewed as real symbols are: mostly small, with runs of one symbol.
+/// Skewed like real symbols: mostly small, with runs of equal symbols.
 std::vector<uint32_t> skewed_symbols(size_t count) {
   test::Random random(4);
   std::vector<uint32_t> symbols;
@@ -75,15 +75,15 @@ TEST(NibbleModel, CostsComeCloseToTheEntropy) {
   RansWriter writer(100000);
   test::Random random(3);
   double bits = 0.0;
-  for (int i = 0; i < 100000; ++i) bits += writer.put(model, random.bits() % 4); // entropy 2
+  for (int i = 0; i < 100000; ++i) bits += writer.put(model, random.bits() % 4); // entropy of 2 bits
   EXPECT_LT(bits / 100000, 2.03);
   const double written = static_cast<double>(writer.finish().size()) * 8.0;
   EXPECT_GT(written, bits);
-  EXPECT_LT(written, bits * 1.001 + 64.0); // two final states
+  EXPECT_LT(written, bits * 1.001 + 64.0); // the two final states take 64 bits
 }
 
 TEST(Rans, BytesStayTheSame) {
-  // A change of the models or of the coder is a change of the format.
+  // A change of the models or of the coder changes the format.
   std::vector<uint32_t> symbols;
   for (uint32_t i = 0; i < 40; ++i) symbols.push_back(i * i % 16);
   const std::vector<uint8_t> bytes = write(symbols);

@@ -12,7 +12,7 @@ using test::bake;
 
 constexpr uint32_t kPlain = 0, kLeaf = 1, kPainted = 2, kBumpy = 3, kHidden = 4;
 
-/// A material of each kind, and a bumpy mesh with normals and texture coordinates.
+/// One material of each kind, and a bumpy mesh with normals and texture coordinates.
 Scene materials_scene() {
   Scene scene;
   scene.materials.resize(5);
@@ -70,7 +70,7 @@ TEST(Requirements, TextureCoordinatesStayForWhatLooksThemUp) {
 TEST(Requirements, WithTexturesStoredOnlyThoseLookTextureCoordinatesUp) {
   BakeConfig with_textures = config(baked::kShading);
   with_textures.textures = true;
-  Scene scene = scene_with(kPainted); // its texture is none that could be stored
+  Scene scene = scene_with(kPainted); // its texture cannot be stored
   EXPECT_EQ(needs(scene, with_textures).uvs, baked::kUnused);
   scene.textures.push_back({"t", 64, 256, WrapMode::kRepeat, Vec2(2, 1), Vec2(0), std::vector<uint8_t>(3 * 64 * 256)});
   scene.materials[kPainted].albedo_texture = 0;
@@ -79,7 +79,7 @@ TEST(Requirements, WithTexturesStoredOnlyThoseLookTextureCoordinatesUp) {
   const GeometryNeeds stored = analyse_requirements(scene, plan, plan.geometries.front(), with_textures);
   EXPECT_EQ(stored.texels_per_uv, (std::array<double, 2>{128.0, 256.0}));
   const GeometryNeeds elsewhere = analyse_requirements(scene, plan, plan.geometries.front(), config(baked::kShading));
-  EXPECT_EQ(elsewhere.texels_per_uv[0], 0.0); // of no stored texture
+  EXPECT_EQ(elsewhere.texels_per_uv[0], 0.0); // no stored texture uses them
   EXPECT_EQ(elsewhere.uv_exponent[0], stored.uv_exponent[0] - 5);
   EXPECT_EQ(elsewhere.uv_exponent[1], stored.uv_exponent[1] - 4);
   scene.materials[kPainted].albedo_texture = 1;
@@ -127,7 +127,7 @@ TEST(Requirements, TheFinestOfSeveralMasksChoosesTheStep) {
 
 TEST(Requirements, DecisionsAreInTheFileWithCountsAndBytes) {
   Scene scene = scene_with(kPainted);
-  test::add_shape(scene, test::grid_mesh(12, 0.0f, true), DAffine(1.0), kLeaf); // flat
+  test::add_shape(scene, test::grid_mesh(12, 0.0f, true), DAffine(1.0), kLeaf); // flat normals
   const BakedFile file = BakedFile::from_bytes(bake(scene, config(baked::kAo, false, false)).bytes);
   struct Row {
     uint32_t stream, reason, geometries;
@@ -162,7 +162,7 @@ TEST(Requirements, DecisionsAreInTheFileWithCountsAndBytes) {
   EXPECT_EQ(summary.by_geometry[1].uv_triangles, kTriangles);
 }
 
-/// The mesh with the face's normal at the corners of every n-th triangle, which its neighbours share.
+/// Replaces the normals at the corners of every n-th triangle by its face normal; neighbours share these vertices.
 Mesh with_flat_triangles(Mesh mesh, uint32_t n) {
   for (uint32_t i = 0; i < mesh.triangles.size(); i += n) {
     const Triangle& t = mesh.triangles[i];
@@ -173,7 +173,7 @@ Mesh with_flat_triangles(Mesh mesh, uint32_t n) {
 }
 
 TEST(Requirements, NormalsAreInferredWhereThatMakesTheFileSmaller) {
-  // Steps so fine that the decoded faces have their normals within what is promised.
+  // The step is so fine that the normals of decoded faces stay within the allowed error.
   const auto inferred = [](const Mesh& mesh) {
     BakeConfig by_need = config(baked::kAo), all = config(baked::kAo, true);
     by_need.precision = all.precision = 1e-5;
@@ -190,12 +190,12 @@ TEST(Requirements, NormalsAreInferredWhereThatMakesTheFileSmaller) {
   half_flat.normals.insert(half_flat.normals.end(), floor.normals.begin(), floor.normals.end());
   for (const Triangle& t : floor.triangles) half_flat.triangles.push_back(t + first);
   EXPECT_EQ(inferred(half_flat), floor.triangles.size());
-  EXPECT_EQ(inferred(with_flat_triangles(sphere, 60)), 0u); // strewn about: clusters of their own take more
+  EXPECT_EQ(inferred(with_flat_triangles(sphere, 60)), 0u); // scattered: separate clusters would take more bytes
 }
 
 TEST(Requirements, WhatIsKeptOnRequestIsStoredEverywhere) {
   Scene scene = scene_with(kHidden);
-  test::add_shape(scene, test::grid_mesh(12, 0.0f, true), DAffine(1.0), kPlain); // flat
+  test::add_shape(scene, test::grid_mesh(12, 0.0f, true), DAffine(1.0), kPlain); // flat normals
   const BakedScene kept = bake(scene, config(baked::kShading, true, true));
   for (const GeometryUse& use : kept.report.file.by_geometry) {
     EXPECT_EQ(use.normal_triangles, kTriangles);

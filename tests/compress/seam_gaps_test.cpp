@@ -10,7 +10,7 @@
 namespace packtrace::test {
 namespace {
 
-/// A sheet in world space, and an object of many small triangles whose first instance continues it.
+/// A sheet in world space, and an object of many small triangles whose first instance continues the sheet.
 Scene sheet_and_instances(const DAffine& world_from_object) {
   Scene scene = scene_of(grid_mesh(10));
   Mesh beside = grid_mesh(10);
@@ -48,7 +48,7 @@ TEST(SeamGaps, HoldForWhatTouches) {
       double widest = 0.0;
       const std::vector<DVec3> sheet = placed_positions(file, 0);
       for (const DVec3 p : placed_positions(file, 1)) {
-        if (p.x > 1.05) continue; // not on the seam
+        if (p.x > 1.05) continue; // not at the seam
         double nearest = std::numeric_limits<double>::infinity();
         for (const DVec3 q : sheet) nearest = std::min(nearest, glm::length(p - q));
         widest = std::max(widest, nearest);
@@ -56,10 +56,10 @@ TEST(SeamGaps, HoldForWhatTouches) {
       constexpr double kInstanceRounding = 1e-6; // of the transform's floats
       EXPECT_LE(widest, seams.gaps()[0] + kInstanceRounding) << precision;
       EXPECT_EQ(seams.summary().largest_gap, seams.gaps()[0]);
-      if (world_from_object != flattened) { // edges are .1 long, with diagonals .14
+      if (world_from_object != flattened) { // edges are 0.1 long, diagonals 0.14
         EXPECT_LT(seams.gaps()[0], 0.5 * precision);
       }
-      EXPECT_EQ(seams.largest_beside(std::vector<double>{7, 1, 9}), std::vector<double>{7});
+      EXPECT_EQ(seams.largest_touching(std::vector<double>{7, 1, 9}), std::vector<double>{7});
     }
 }
 

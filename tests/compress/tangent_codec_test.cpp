@@ -20,7 +20,7 @@ DVec3 direction(test::Random& random) {
 }
 
 TEST(UvTangent, IsTheDirectionInWhichUGrows) {
-  // u = x / 2 + 3, v = 5 y on a plane that is turned: P = x a + y b.
+  // u = x / 2 + 3, v = 5 y on a rotated plane: P = x a + y b.
   const DVec3 a = glm::normalize(DVec3(1, 2, 3)), b = glm::normalize(glm::cross(a, DVec3(0, 1, 0)));
   const std::array<glm::dvec2, 3> places{{{0, 0}, {2, 1}, {-1, 3}}};
   std::array<DVec3, 3> positions;
@@ -48,7 +48,7 @@ TEST(Diamond, CodesComeBackAndErrorsStayBelowTheBound) {
     for (int i = 0; i < 20000; ++i) {
       const double phi = static_cast<double>(random.uniform(-4, 4));
       const glm::dvec2 d(std::cos(phi), std::sin(phi)), back = decode_diamond(encode_diamond(d * 7.0, bits), bits);
-      // A side of length sqrt 2 has 2^bits / 4 codes and is sqrt 1/2 away at its middle.
+      // A side of length sqrt(2) has 2^bits / 4 codes; its middle is sqrt(1/2) from the origin.
       ASSERT_LE(std::acos(std::min(glm::dot(d, back), 1.0)), std::ldexp(4.0, -static_cast<int>(bits)) + 1e-7);
     }
   }
@@ -56,7 +56,7 @@ TEST(Diamond, CodesComeBackAndErrorsStayBelowTheBound) {
   EXPECT_EQ(encode_diamond({0, 1}, 8), 64u);
   EXPECT_EQ(encode_diamond({-1, 0}, 8), 128u);
   EXPECT_EQ(encode_diamond({0, -1}, 8), 192u);
-  EXPECT_EQ(encode_diamond({1, -1e-9}, 8), 0u); // wraps
+  EXPECT_EQ(encode_diamond({1, -1e-9}, 8), 0u); // wraps around
 }
 
 TEST(QTangent, FramesComeBackWithTheirSign) {
@@ -68,13 +68,14 @@ TEST(QTangent, FramesComeBackWithTheirSign) {
       frame.normal = direction(random);
       frame.tangent = glm::normalize(glm::cross(frame.normal, direction(random)));
       frame.mirrored = random.bits() % 2 != 0;
-      if (i % 4 == 0) frame.normal = {0, 0, -1}, frame.tangent = {std::cos(i), std::sin(i), 0}; // w is 0 there
+      // w is 0 for these frames.
+      if (i % 4 == 0) frame.normal = {0, 0, -1}, frame.tangent = {std::cos(i), std::sin(i), 0};
       const TangentFrame back = decode_q_tangent(encode_q_tangent(frame, bits), bits);
       ASSERT_EQ(back.mirrored, frame.mirrored);
       worst = std::max({worst, angle(back.normal, frame.normal), angle(back.tangent, frame.tangent)});
       ASSERT_NEAR(glm::dot(back.normal, back.tangent), 0.0, 1e-12);
     }
-    EXPECT_LE(worst, std::ldexp(4.0, 1 - static_cast<int>(bits))); // a quaternion's error counts twice
+    EXPECT_LE(worst, std::ldexp(4.0, 1 - static_cast<int>(bits))); // errors of a quaternion count twice in the rotation
     EXPECT_GE(worst, std::ldexp(0.5, 1 - static_cast<int>(bits)));
   }
   const TangentFrame none = decode_q_tangent({0, 0, 0, 0}, 8);

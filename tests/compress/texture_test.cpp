@@ -31,7 +31,7 @@ AlbedoTexture noise(uint32_t width, uint32_t height, uint32_t seed) {
   });
 }
 
-/// What photographs are like: colours that change slowly, in one direction within a block.
+/// Resembles a photograph: colours change slowly, and within a block along one direction.
 AlbedoTexture smooth(uint32_t size) {
   return texture_of(size, size, [&](uint32_t x, uint32_t y) {
     const double u = 6.0 * x / size, v = 6.0 * y / size, light = 0.5 + 0.4 * std::sin(u + std::cos(v));
@@ -56,14 +56,14 @@ double psnr(const AlbedoTexture& texture, TextureCodec codec) {
 
 TEST(TextureCodec, SrgbBytesRoundTripAndRoundToTheNearest) {
   for (size_t i = 0; i < 256; ++i) EXPECT_EQ(srgb8_of_linear(linear_of_srgb8()[i]), i);
-  EXPECT_EQ(srgb8_of_linear(0.21404114f), 128); // 127.5 and a little
+  EXPECT_EQ(srgb8_of_linear(0.21404114f), 128); // slightly above 127.5
   EXPECT_EQ(srgb8_of_linear(-1.0f), 0);
   EXPECT_EQ(srgb8_of_linear(7.0f), 255);
   EXPECT_EQ(srgb8_of_linear(std::nanf("")), 0);
 }
 
 TEST(TextureCodec, Bc1BlocksAreThoseOfGraphicsCards) {
-  // Endpoints pure red and pure blue, indices 0 1 2 3 in the first row, 3 2 1 0 in the second, then all 1.
+  // Endpoints pure red and pure blue; indices 0 1 2 3 in the first row, 3 2 1 0 in the second, 1 in the other rows.
   const std::vector<uint8_t> block{0x00, 0xf8, 0x1f, 0x00, 0b11100100, 0b00011011, 0b01010101, 0b01010101};
   TextureView texture{4, 4, WrapMode::kRepeat, Vec2(1.0f), Vec2(0.0f), TextureCodec::kBc1, block};
   const std::array<Rgb8, 4> colours{Rgb8{255, 0, 0}, {0, 0, 255}, {170, 0, 85}, {85, 0, 170}};
@@ -72,7 +72,7 @@ TEST(TextureCodec, Bc1BlocksAreThoseOfGraphicsCards) {
     EXPECT_EQ(texture.texel(x, 1), colours[3 - x]);
     EXPECT_EQ(texture.texel(x, 3), colours[1]);
   }
-  // The smaller number first: three colours and black.
+  // With the smaller number first: three colours and black.
   const std::vector<uint8_t> dark{0x1f, 0x00, 0x00, 0xf8, 0b11100100, 0, 0, 0};
   texture.data = dark;
   EXPECT_EQ(texture.texel(0, 0), (Rgb8{0, 0, 255}));
@@ -99,13 +99,13 @@ TEST(TextureCodec, Bc1KeepsSmoothColoursAndOddSizes) {
     return Rgb8{static_cast<uint8_t>(40 * x), static_cast<uint8_t>(40 * x), static_cast<uint8_t>(30 * y / 3)};
   });
   EXPECT_GT(psnr(odd, TextureCodec::kBc1), 28.0);
-  EXPECT_GT(psnr(noise(64, 64, 1), TextureCodec::kBc1), 12.5); // nothing fits; that is what its kind reaches
+  EXPECT_GT(psnr(noise(64, 64, 1), TextureCodec::kBc1), 12.5); // noise fits no block; this is the expected quality
 }
 
 TEST(TextureCodec, PalettesOfFewColoursAreExact) {
   const AlbedoTexture few = texture_of(16, 16, [](uint32_t x, uint32_t y) {
     return Rgb8{static_cast<uint8_t>(x * 17), static_cast<uint8_t>(y * 17), static_cast<uint8_t>(x ^ y)};
-  }); // 256 of them
+  }); // 256 colours
   EXPECT_EQ(psnr(few, TextureCodec::kPalette8), std::numeric_limits<double>::infinity());
   EXPECT_GT(psnr(smooth(128), TextureCodec::kPalette8), 38.0);
   EXPECT_GT(psnr(noise(64, 64, 2), TextureCodec::kPalette8), 22.0);
@@ -133,7 +133,7 @@ TEST(TextureCodec, AutoTakesTheSmallestThatIsGoodEnough) {
   ASSERT_LT(keys, palette);
   EXPECT_EQ(encode_texture(rough, {}, (keys + palette) / 2).codec, TextureCodec::kPalette8);
   EXPECT_EQ(encode_texture(rough, {}, keys - 0.1).codec, TextureCodec::kR2G4B2);
-  // 13 x 13 texels: the palette is larger than the texture.
+  // For 13 x 13 texels the palette is larger than the texture.
   EXPECT_EQ(encode_texture(noise(13, 13, 5), {}, 34.0).codec, TextureCodec::kRgb8);
 }
 
@@ -142,9 +142,9 @@ TEST(TextureCodec, SamplesAreBilinearInLinearLight) {
     return Rgb8{static_cast<uint8_t>(x == 0 ? 0 : 255), static_cast<uint8_t>(y == 0 ? 0 : 255), 0};
   });
   TextureView t = view(texture);
-  EXPECT_EQ(t.sample({0.25f, 0.75f}), Vec3(0, 0, 0)); // the middle of texel (0, 0): the top row is v = 1
+  EXPECT_EQ(t.sample({0.25f, 0.75f}), Vec3(0, 0, 0)); // centre of texel (0, 0): the top row is at v = 1
   EXPECT_EQ(t.sample({0.75f, 0.25f}), Vec3(1, 1, 0));
-  EXPECT_EQ(t.sample({0.5f, 0.5f}), Vec3(0.5f, 0.5f, 0)); // not the 0.21 of a mean of encoded values
+  EXPECT_EQ(t.sample({0.5f, 0.5f}), Vec3(0.5f, 0.5f, 0)); // 0.21 would be the mean of encoded values
   EXPECT_EQ(t.sample({0.0f, 0.75f}), Vec3(0.5f, 0, 0));   // repeats
   EXPECT_EQ(t.sample({-7.0f, 0.75f}), Vec3(0.5f, 0, 0));
   t.wrap = WrapMode::kClamp;
@@ -212,7 +212,7 @@ TEST(BakeTextures, DifferByInstanceOfOneGeometry) {
   Scene scene = textured_scene();
   scene.textures.push_back(smooth(16));
   scene.materials.push_back({"coarse", kAlbedoTexture, Vec3(0.5f), kNoMask, kNoMask, 1});
-  scene.shapes.emplace_back(1, 3, false, test::translation({0, 5, 0})); // the mesh of "photo"
+  scene.shapes.emplace_back(1, 3, false, test::translation({0, 5, 0})); // uses the mesh of "photo"
   BakeConfig config;
   config.purpose = baked::kShading;
   config.textures = true;
@@ -223,7 +223,7 @@ TEST(BakeTextures, DifferByInstanceOfOneGeometry) {
   EXPECT_EQ(file.materials()[file.instance_materials(3)[0]].albedo_texture, 1u);
   EXPECT_LE(baked.report.max_uv_error_texels, 1.0 / 32.0);
   ASSERT_EQ(baked.report.file.uvs.size(), 1u);
-  // In texels of the finer texture, whichever instance comes first.
+  // Errors are in texels of the finer texture, for any order of the instances.
   double bumpy_and_photo = 0.0;
   for (const uint32_t g : {file.instances()[1].geometry, file.instances()[2].geometry})
     bumpy_and_photo = std::max(bumpy_and_photo, file.geometries()[g].max_uv_error * (g == 1 ? 64.0 : 0.0));

@@ -38,7 +38,7 @@ TEST(UvCodec, OneFarCoordinateDoesNotCoarsenTheOthers) {
     const float uv = i % 2 == 0 ? random.uniform(-1, 1) : random.uniform(-kFar, kFar);
     const double error = std::abs(static_cast<double>(round_trip(UvEncoding::kLattice, uv, exponent)) - uv) * 4096;
     EXPECT_LE(error, 1.0 / 32.0) << uv;
-    if (std::abs(uv) > 256.0f) { // floats there are coarser than the step
+    if (std::abs(uv) > 256.0f) { // floats are coarser than the step here
       EXPECT_EQ(error, 0.0) << uv;
     }
   }

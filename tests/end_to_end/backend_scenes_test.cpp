@@ -22,12 +22,12 @@
 #include "pbrt_import/import_scene.h"
 #include "pbrt_import/scene/camera_rays.h"
 #include "runtime/ao/ao_integrator.h"
+#include "runtime/camera/primary_visibility.h"
 #include "runtime/trace/embree/embree_cluster_tracer.h"
 #include "runtime/trace/embree/embree_tracer.h"
-#include "runtime/trace/source/float_source.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
+#include "runtime/trace/source/float_source.h"
 #include "runtime/trace/source/packed_source.h"
-#include "runtime/camera/primary_visibility.h"
 
 namespace packtrace {
 namespace {
@@ -187,8 +187,7 @@ std::vector<std::string> scenes() {
 
 std::string test_name(const testing::TestParamInfo<std::string>& info) {
   std::string name = info.param.substr(0, info.param.rfind('.'));
-  std::ranges::replace_if(
-      name, [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
+  std::ranges::replace_if(name, [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
   return name;
 }
 

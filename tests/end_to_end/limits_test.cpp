@@ -46,7 +46,7 @@ TEST(Limits, FilesLargerThanTheLimitOfTheProcessAreAnIoErrorAndLeaveNothing) {
   write_text(bench / "ball.pbrt", "WorldBegin\nShape \"sphere\"\nWorldEnd\n");
   const std::string out = bench / "out.ptk";
   const auto small_files = [] {
-    const struct rlimit limit { 4096, 4096 };
+    const struct rlimit limit{4096, 4096};
     ::setrlimit(RLIMIT_FSIZE, &limit);
   };
   const CommandResult result = run_packtrace({"bake", bench / "ball.pbrt", "-o", out}, small_files);

@@ -9,9 +9,9 @@
 
 #include <zlib.h>
 
+#include "pbrt_import/base/error.h"
 #include "pbrt_import/files/image_file.h"
 #include "pbrt_import/scene/alpha_mask.h"
-#include "pbrt_import/base/error.h"
 #include "runtime/image/exr.h"
 #include "runtime/image/png.h"
 #include "tests/fuzz/fuzz_target.h"

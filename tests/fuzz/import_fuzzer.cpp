@@ -8,8 +8,8 @@
 
 #include <tbb/task_arena.h>
 
-#include "pbrt_import/import_scene.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/import_scene.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/scene_contract.h"
 #include "tests/fuzz/scene_files.h"
@@ -60,8 +60,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const std::filesystem::path main_file = folder.write(text);
   auto options = small_limits();
   const std::string alone = outcome(main_file, options, 1);
-  constexpr size_t kSeldom = 16; // these options repeat the import, so each is tried for few inputs only
-  switch (std::hash<std::string_view>{}(text) % kSeldom) {
+  constexpr size_t kRepeatInterval = 16; // these options repeat the import, so each is tried for few inputs only
+  switch (std::hash<std::string_view>{}(text) % kRepeatInterval) {
   case 0:
     require(outcome(main_file, options, 2) == alone, "the result depends on the number of threads");
     break;

@@ -9,8 +9,8 @@
 #include <string>
 
 #include "compress/bake/bake_scene.h"
-#include "pbrt_import/import_scene.h"
 #include "pbrt_import/base/file_bytes.h"
+#include "pbrt_import/import_scene.h"
 #include "tests/fuzz/scene_files.h"
 
 namespace {

@@ -2,8 +2,8 @@
 
 #include <span>
 
-#include "pbrt_import/files/ply.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/files/ply.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/scene_contract.h"
 

@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "pbrt_import/import_scene.h"
 #include "pbrt_import/base/diagnostics.h"
+#include "pbrt_import/import_scene.h"
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace::fuzz {

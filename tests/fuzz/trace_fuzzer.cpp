@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "compress/format/file/baked_file.h"
-#include "runtime/trace/source/lod_source.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
+#include "runtime/trace/source/lod_source.h"
 #include "runtime/trace/source/packed_source.h"
 #include "tests/fuzz/baked_input.h"
 

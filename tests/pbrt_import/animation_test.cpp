@@ -22,7 +22,7 @@ DAffine middle(const DAffine& start, const DAffine& end) {
   return keys ? interpolate(*keys, 0.5) : DAffine(0.0);
 }
 
-// Parts of a map
+// Decomposition of maps
 
 TEST(Decomposition, PartsMakeTheMapAgain) {
   const DAffine sheared(DVec3(1, 0.2, 0), DVec3(-0.7, 3, 0.5), DVec3(0, 0.1, 0.4), DVec3(9, 8, 7));
@@ -54,7 +54,7 @@ TEST(Decomposition, FlatMapsHaveNone) {
   EXPECT_FALSE(decompose(DAffine(DVec3(1, 1, 0), DVec3(1, 1, 0), DVec3(0, 0, 1), DVec3(0))));
 }
 
-// Between two keys
+// Interpolation between keys
 
 TEST(Interpolation, EndPointsAreTheGivenMapsAndTimesOutsideAreClamped) {
   const DAffine start = compose(translation({1, 2, 3}), compose(turned(20), scaling({1, 0.3, 7})));
@@ -81,7 +81,7 @@ TEST(Interpolation, RotationAtTheMiddleIsTheHalfAngle) {
 }
 
 TEST(Interpolation, RotationTakesTheShorterWay) {
-  // Turning by 350 degrees is turning back by 10: quaternions of opposite signs are the same rotation.
+  // A rotation by 350 degrees equals one by -10: quaternions of opposite signs are the same rotation.
   expect_near(middle(DAffine(1.0), turned(350)), turned(-5), 1e-12);
   expect_near(middle(turned(100), turned(-100)), turned(180), 1e-12);
   const AnimatedTransform keys = *animate(turned(170), turned(190), {});
@@ -157,7 +157,7 @@ TEST(AnimatedScenes, KeysAreKeptWithTheirTimes) {
   const Imported imported =
       import_text(folder, "TransformTimes 10 14 WorldBegin" + moving_shape() + std::string(kTriangle) + "Identity" +
                               std::string(kTriangle) + "WorldEnd");
-  ASSERT_EQ(imported.scene.animations.size(), 1u); // two shapes move alike
+  ASSERT_EQ(imported.scene.animations.size(), 1u); // both shapes share one animation
   EXPECT_EQ(imported.scene.shapes[0].animation, 0u);
   EXPECT_EQ(imported.scene.shapes[1].animation, 0u);
   EXPECT_EQ(imported.scene.shapes[2].animation, kNotAnimated);
@@ -198,7 +198,7 @@ TEST(AnimatedScenes, InstancesKeepTheirKeysWhenOthersAreLeftOut) {
   const Scene& scene = imported.scene;
   ASSERT_EQ(scene.instances.size(), 5u) << imported.text();
   ASSERT_EQ(scene.animated_instances.size(), 3u);
-  ASSERT_EQ(scene.animations.size(), 3u); // none of what is not there
+  ASSERT_EQ(scene.animations.size(), 3u); // only those of the remaining instances
   const uint32_t instances[] = {1, 2, 4};
   const float moved[] = {30, 40, 50};
   for (size_t i = 0; i < 3; ++i) {
@@ -213,7 +213,7 @@ TEST(AnimatedScenes, InstancesKeepTheirKeysWhenOthersAreLeftOut) {
 
 TEST(AnimatedScenes, CamerasMove) {
   const SceneFolder folder;
-  // The current transform is camera_from_world, the inverse of what moves.
+  // The current transform is camera_from_world, whereas world_from_camera is animated.
   const std::string text = "Translate 0 0 -3" + std::string(kMoveBy8) +
                            "Camera \"perspective\" Identity Camera \"orthographic\" WorldBegin WorldEnd";
   const Imported imported = import_text(folder, text, at_time(0.25));
@@ -278,7 +278,7 @@ TEST(AnimatedScenes, WhatStandsStillCostsNothing) {
   static_assert(sizeof(Instance) == sizeof(uint32_t) + sizeof(Affine));
   static_assert(sizeof(Shape) == 4 * sizeof(uint32_t) + sizeof(DAffine));
   const SceneFolder folder;
-  // Both transforms change alike: nothing moves.
+  // Both transforms change equally, so nothing is animated.
   const Imported imported = import_world(
       folder, "ActiveTransform StartTime Translate 1 0 0 ActiveTransform EndTime Translate 1 0 0 ActiveTransform All" +
                   std::string(kTriangle) + "ObjectBegin \"o\"" + std::string(kTriangle) +

@@ -78,7 +78,7 @@ TEST(Cameras, ThoseBehindAnIgnoredTransformAreLeftOut) {
     EXPECT_TRUE(imported.scene.cameras.empty()) << ignored;
     EXPECT_EQ(imported.statistics.cameras_left_out, 1u) << ignored;
     EXPECT_TRUE(imported.reported("2:1: error: a transform before the camera is ignored")) << imported.text();
-    EXPECT_EQ(imported.scene.shapes.size(), 1u); // WorldBegin starts anew
+    EXPECT_EQ(imported.scene.shapes.size(), 1u); // WorldBegin resets the transform
     EXPECT_FALSE(imported.reported("may stand in a wrong place")) << imported.text();
   }
 }
@@ -92,7 +92,7 @@ TEST(Cameras, TransformsThatStartAnewAreKnownAgain) {
     EXPECT_EQ(imported.scene.cameras.size(), 1u) << known;
     EXPECT_EQ(imported.statistics.cameras_left_out, 0u) << known;
   }
-  // A name keeps what was lost.
+  // A coordinate system remembers that its transform is unknown.
   const Imported imported = import_text(folder, "Rotate 90 0 0 0 CoordinateSystem \"lost\" Identity CoordSysTransform "
                                                 "\"lost\" Camera \"perspective\" WorldBegin WorldEnd");
   EXPECT_TRUE(imported.scene.cameras.empty());
@@ -124,7 +124,7 @@ TEST(Cameras, ScreenWindowBeatsTheAspectRatio) {
       import_text(folder, "Camera \"perspective\" \"float frameaspectratio\" 3 \"float screenwindow\" [-1 2 -3 4] "
                           "\"float fov\" 10 \"float halffov\" 30 WorldBegin WorldEnd");
   EXPECT_EQ(imported.scene.cameras[0].screen_window, glm::dvec4(-1, 2, -3, 4));
-  EXPECT_EQ(imported.scene.cameras[0].fov_degrees, 60.0); // halffov beats fov
+  EXPECT_EQ(imported.scene.cameras[0].fov_degrees, 60.0); // halffov takes precedence over fov
   EXPECT_EQ(imported.text(), "");
 }
 
@@ -179,7 +179,7 @@ Imported cropped(const SceneFolder& folder, const std::string& camera, const std
                                  " WorldBegin WorldEnd");
 }
 
-/// The centre of a pixel on the plane z = 1, in the unit of the window.
+/// Centre of a pixel on the plane z = 1, in units of the screen window.
 glm::dvec2 film_point(const Camera& camera, glm::dvec4 window, double column, double row) {
   return {window.x + (column + 0.5) / camera.width_px * (window.y - window.x),
           window.w + (row + 0.5) / camera.height_px * (window.z - window.w)};
@@ -191,7 +191,7 @@ TEST(CropWindow, PixelsAreThoseOfTheWholePicture) {
   for (const std::string window : {"", "\"float screenwindow\" [-3 1 -1 4]", "\"float frameaspectratio\" .5"}) {
     const Camera whole = cropped(folder, window, "").scene.cameras[0];
     const Camera part = cropped(folder, window, crop).scene.cameras[0];
-    // Edges round upwards: columns [ceil 2.5, ceil 8), rows [ceil 2.1, 7) from the top.
+    // Edges are rounded up: columns [ceil 2.5, ceil 8), rows [ceil 2.1, 7) from the top.
     ASSERT_EQ(part.width_px, 5u);
     ASSERT_EQ(part.height_px, 4u);
     ASSERT_TRUE(part.screen_window);

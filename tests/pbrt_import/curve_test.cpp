@@ -10,8 +10,8 @@
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/scene/bounds.h"
 
 namespace packtrace {
 namespace {
@@ -38,7 +38,7 @@ void expect_sound(const Mesh& mesh) {
   }
 }
 
-/// From p to the cubic Bezier curve, by sampling.
+/// Distance from p to the cubic Bezier curve, by sampling.
 float distance_to(const std::vector<Vec3>& b, Vec3 p) {
   float nearest = std::numeric_limits<float>::infinity();
   for (int i = 0; i <= 10000; ++i) {
@@ -131,7 +131,7 @@ TEST(Curve, RibbonTurnsWithItsNormals) {
   EXPECT_GT(glm::dot(mesh.normals.back(), Vec3(1, 0, 0)), 0.999f);
 }
 
-/// Edges by position that belong to one triangle only.
+/// Number of edges, identified by positions, that belong to one triangle only.
 size_t boundary_edge_count(const Mesh& mesh) {
   using Place = std::array<float, 3>;
   std::map<std::pair<Place, Place>, int> edges;
@@ -163,7 +163,7 @@ TEST(Curve, TubesHaveNoCapsAndNoOtherHoles) {
           for (const Vec3& n : mesh.normals) ASSERT_NEAR(glm::length(n), 1.0f, 1e-5f);
           EXPECT_EQ(mesh.uvs.front().x, 0.0f);
           EXPECT_EQ(mesh.uvs.back().x, 1.0f);
-          // Widths are linear in u.
+          // Widths are interpolated linearly in u.
           const size_t row = type == CurveType::kRibbon ? 2 : 9;
           for (size_t i = 0; i < mesh.positions.size(); i += row) {
             const Vec3 opposite = mesh.positions[i + row / 2];
@@ -181,7 +181,7 @@ TEST(Curve, SplinesGoThroughTheirKnotPoints) {
     const size_t segments = p.size() - degree;
     const Mesh mesh = tessellate_curve(curve);
     for (size_t s = 0; s <= segments; ++s) {
-      // The uniform basis functions at a knot: 1/2 1/2, or 1/6 2/3 1/6.
+      // The uniform basis functions at a knot are 1/2, 1/2 or 1/6, 2/3, 1/6.
       const Vec3 knot = degree == 2 ? (p[s] + p[s + 1]) / 2.0f : (p[s] + 4.0f * p[s + 1] + p[s + 2]) / 6.0f;
       const float u = static_cast<float>(s) / static_cast<float>(segments);
       size_t found = 0;

@@ -9,7 +9,7 @@
 
 namespace packtrace {
 
-/// zlib's output for its window_bits: 15 zlib, 31 gzip.
+/// Compresses text with zlib; window_bits selects the format: 15 zlib, 31 gzip.
 inline std::string deflated(std::string_view text, int window_bits) {
   z_stream z{};
   EXPECT_EQ(deflateInit2(&z, 9, Z_DEFLATED, window_bits, 8, Z_DEFAULT_STRATEGY), Z_OK);
@@ -48,7 +48,7 @@ inline std::string png_chunk(const std::string& type_and_data) {
 
 inline constexpr char kGrey = 0, kRgb = 2;
 
-/// A PNG that claims a size and has rows of pixels, whether or not they fit it.
+/// A PNG file that claims a size and contains the given rows, which need not match it.
 inline std::string png(uint32_t width, uint32_t height, int bits, const std::string& rows, char colour = kRgb) {
   const std::string format{static_cast<char>(bits), colour, 0, 0, 0};
   return "\x89PNG\r\n\x1a\n" + png_chunk("IHDR" + big_endian(width) + big_endian(height) + format) +

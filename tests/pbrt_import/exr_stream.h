@@ -9,7 +9,7 @@
 
 namespace packtrace {
 
-/// What OpenEXR writes, as a string.
+/// Output stream of OpenEXR into a string.
 class StringStream : public Imf::OStream {
 public:
   StringStream() : Imf::OStream("image") {}

@@ -34,11 +34,11 @@ TEST(Transforms, LookAtPutsTheTargetOnTheZAxis) {
   EXPECT_NEAR(target.x, 0.0, 1e-9);
   EXPECT_NEAR(target.y, 0.0, 1e-9);
   EXPECT_GT(target.z, 0.0);
-  EXPECT_GT(transform_vector(camera_from_world, DVec3(0, 0, 1)).y, 0.0); // up stays up
+  EXPECT_GT(transform_vector(camera_from_world, DVec3(0, 0, 1)).y, 0.0); // the up direction is kept
 }
 
 TEST(Transforms, LookAtIsLeftHanded) {
-  // Looking along +z with +y up, pbrt's +x points right.
+  // If +z is forward and +y is up, +x points right in pbrt.
   expect_near(transform_vector(*look_at({0, 0, 0}, {0, 0, 5}, {0, 1, 0}), DVec3(1, 0, 0)), {1, 0, 0});
 }
 
@@ -107,7 +107,7 @@ TEST(GraphicsState, TransformBlocksGiveBackTransformsOnly) {
   EXPECT_EQ(state.attributes.material, 5u);
   EXPECT_EQ(state.named_materials.find("a"), 2u);
   EXPECT_EQ(state.transform().start[3], DVec3(0.0));
-  state.concatenate(translation({1, 2, 3})); // both are active again
+  state.concatenate(translation({1, 2, 3})); // both transforms are active again
   EXPECT_EQ(state.transform().end[3], DVec3(1, 2, 3));
 }
 

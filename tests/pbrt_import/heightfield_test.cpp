@@ -24,7 +24,7 @@ TEST(Heightfield, SamplesSpanTheUnitSquareRowByRow) {
 TEST(Heightfield, SamplesThatAreNotFiniteCostOnlyTheirTriangles) {
   const std::array<float, 4> heights{0, 0, 0, std::numeric_limits<float>::infinity()};
   Mesh mesh = make_heightfield(2, 2, heights);
-  EXPECT_EQ(drop_bad_triangles(mesh, {}), 2u);
+  EXPECT_EQ(clean_up_mesh(mesh, {}), 2u);
 }
 
 TEST(Heightfield, CountsThatDoNotFitAreErrors) {

@@ -15,10 +15,10 @@
 
 namespace packtrace {
 
-/// What an import leaves of a scene.
+/// Counts of what an import keeps of a scene.
 struct Kept {
-  uint64_t shapes = 0;            ///< placed, instances counted
-  uint64_t triangles = 0;         ///< placed
+  uint64_t shapes = 0;            ///< shapes with all instances counted
+  uint64_t triangles = 0;         ///< triangles with all instances counted
   uint64_t skipped_shapes = 0;    ///< ImportStatistics::shapes_skipped
   uint64_t dropped_triangles = 0; ///< Scene::dropped_triangles
   bool operator==(const Kept&) const = default;
@@ -29,18 +29,19 @@ inline std::ostream& operator<<(std::ostream& out, const Kept& kept) {
              << kept.dropped_triangles << " dropped";
 }
 
-/// An awkward scene, everything that importing it says, and what is left of it.
+/// A hostile scene with the expected diagnostics and the expected result of its import.
 struct HostileCase {
   std::string name;
   std::string scene;       ///< text of scene.pbrt
-  std::string diagnostics; ///< all of them in order as a user reads them, without the folder's path
+  std::string diagnostics; ///< all diagnostics in order as a user sees them, without the folder's path
   Kept kept;
-  std::vector<std::pair<std::string, std::string>> files = {}; ///< name and content, beside scene.pbrt
+  std::vector<std::pair<std::string, std::string>> files = {}; ///< names and contents of files next to scene.pbrt
   ImportOptions options = {};
-  std::optional<ErrorKind> refused = {}; ///< the import throws this, with diagnostics as its text
+  /// Kind of the error that the import throws with `diagnostics` as its text; unset: none.
+  std::optional<ErrorKind> refused = {};
 };
 
-/// A world with body from line 2 on and a good triangle behind it, which must survive whatever body does.
+/// A world whose body starts in line 2, followed by a valid triangle that must survive whatever the body contains.
 inline std::string world(const std::string& body) {
   return "WorldBegin\n" + body + "\n" + std::string(kTriangle) + "\nWorldEnd\n";
 }
@@ -58,7 +59,7 @@ inline Kept kept_of(const Imported& imported) {
   return {shapes, placed_triangle_count(scene), imported.statistics.shapes_skipped, scene.dropped_triangles};
 }
 
-/// Whatever the input was: all references in range, all numbers finite.
+/// Checks that all indices are in range and all numbers are finite.
 inline void expect_sound(const Scene& scene) {
   const auto check = [&](const Shape& shape) {
     ASSERT_LT(shape.mesh, scene.meshes.size());
@@ -83,7 +84,8 @@ inline void expect_sound(const Scene& scene) {
   }
 }
 
-/// Imports once more with ImportOptions::strict, which must refuse exactly what was warned about, with the first text.
+/// Imports again with ImportOptions::strict. The import must fail if and only if there was a warning or an error, with
+/// the first of them as its message.
 inline void expect_strict_agrees(const HostileCase& test_case, const std::filesystem::path& scene,
                                  const Imported& lenient) {
   ImportOptions options = test_case.options;
@@ -100,7 +102,7 @@ inline void expect_strict_agrees(const HostileCase& test_case, const std::filesy
   }
 }
 
-/// Imports the case's scene and compares everything with what the case says.
+/// Imports the scene of a case and compares all results with the expected ones.
 inline void run(const HostileCase& test_case) {
   const SceneFolder folder;
   for (const auto& [name, content] : test_case.files) folder.write(name, content);
@@ -119,7 +121,7 @@ inline void run(const HostileCase& test_case) {
   }
 }
 
-/// One case as a test.
+/// A test that runs one case.
 class HostileTest : public testing::Test {
 public:
   explicit HostileTest(const HostileCase& test_case) : case_(test_case) {}
@@ -129,7 +131,8 @@ private:
   const HostileCase& case_; ///< outlives the test
 };
 
-/// Makes "suite.name" tests of all cases. @return true, to initialise a constant with
+/// Registers a test "suite.name" for each case.
+/// @return true, so that it can initialise a constant
 inline bool register_cases(const char* suite, const std::vector<HostileCase>& cases, const char* file) {
   for (const HostileCase& test_case : cases)
     testing::RegisterTest(suite, test_case.name.c_str(), nullptr, nullptr, file, 0,

@@ -10,7 +10,7 @@ namespace {
 
 using namespace std::string_literals;
 
-// Scene text in other files
+// Included files
 
 HostileCase with(HostileCase test_case, const ImportOptions& options) {
   test_case.options = options;
@@ -402,7 +402,7 @@ scene.pbrt:2:17: warning: file names have back-slashes, "models\a.ply"; read as 
 const bool kRegistered = register_cases("HostileIncludes", includes(), __FILE__) &&
                          register_cases("HostileFileNames", file_names(), __FILE__);
 
-// What a table cannot hold: things that are no files.
+// Cases that need more than the table: paths that are not regular files.
 
 std::string listed_folders(int count) {
   std::string path;
@@ -421,13 +421,14 @@ TEST(HostileFiles, FifosAreNotWaitedFor) {
       import_text(folder, world("Include \"fifo\"\n" + ply_shape("fifo") +
                                 "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"fifo\"\n"
                                 "Material \"matte\" \"spectrum Kd\" \"fifo\""));
-  EXPECT_EQ(without_folder(imported.text(), folder),
-            "scene.pbrt:2:1: error: cannot include \"fifo\": is a pipe, not a file; save what it delivers in a file first\n"
-            "scene.pbrt:3:1: error: plymesh \"fifo\": is a pipe, not a file; save what it delivers in a file first; the "
-            "shape is skipped\n"
-            "scene.pbrt:4:32: error: texture file \"fifo\" is not a regular file; it counts as white\n"
-            "scene.pbrt:5:18: error: cannot read spectrum file \"fifo\": is a pipe, not a file; save what it delivers in "
-            "a file first\n");
+  EXPECT_EQ(
+      without_folder(imported.text(), folder),
+      "scene.pbrt:2:1: error: cannot include \"fifo\": is a pipe, not a file; save what it delivers in a file first\n"
+      "scene.pbrt:3:1: error: plymesh \"fifo\": is a pipe, not a file; save what it delivers in a file first; the "
+      "shape is skipped\n"
+      "scene.pbrt:4:32: error: texture file \"fifo\" is not a regular file; it counts as white\n"
+      "scene.pbrt:5:18: error: cannot read spectrum file \"fifo\": is a pipe, not a file; save what it delivers in "
+      "a file first\n");
   EXPECT_EQ(imported.scene.shapes.size(), 1u);
 }
 
@@ -466,7 +467,7 @@ TEST(HostileFiles, LongNamesAreCutInMessages) {
   }
 }
 
-/// The text of the Error that importing main_file throws.
+/// Message of the Error that importing main_file throws.
 std::string refusal_of(const std::filesystem::path& main_file) {
   try {
     (void)import_file(main_file);
@@ -480,7 +481,8 @@ std::string refusal_of(const std::filesystem::path& main_file) {
 TEST(HostileFiles, MainFileMustBeAFile) {
   const SceneFolder folder;
   make_fifo(folder, "fifo");
-  EXPECT_EQ(without_folder(refusal_of(folder.path() / "fifo"), folder), "fifo: is a pipe, not a file; save what it delivers in a file first");
+  EXPECT_EQ(without_folder(refusal_of(folder.path() / "fifo"), folder),
+            "fifo: is a pipe, not a file; save what it delivers in a file first");
   EXPECT_EQ(without_folder(refusal_of(folder.path() / ""), folder), ": is a directory, not a file");
   EXPECT_EQ(refusal_of("/dev/zero"), "/dev/zero: is a device, not a file");
   EXPECT_EQ(refusal_of(""), ": no such file");

@@ -52,7 +52,7 @@ std::string exr() {
   return stream.text();
 }
 
-/// Depth, but no colour.
+/// An EXR file with a depth channel but no colour channels.
 std::string depth_exr() {
   StringStream stream;
   {
@@ -69,7 +69,7 @@ std::string depth_exr() {
   return stream.text();
 }
 
-/// exr() with a data window that claims other pixels.
+/// exr() with a different maximum corner of its data window.
 std::string exr_with_corner(int32_t x, int32_t y) {
   std::string file = exr();
   const size_t at = file.find("dataWindow\0box2i\0"s) + 17 + 4 + 8;
@@ -78,7 +78,7 @@ std::string exr_with_corner(int32_t x, int32_t y) {
   return file;
 }
 
-/// A disk with an image for its colour.
+/// A disk whose colour is an image texture.
 HostileCase image_case(const std::string& name, const std::string& file, const std::string& content,
                        const std::string& diagnostics) {
   return {name,
@@ -312,7 +312,7 @@ TEST(HostileFiles, LargeAlphaImagesWithManyNodesAreApproximated) {
   const SceneFolder folder;
   constexpr uint32_t kSide = 8192;
   std::string rows(size_t{kSide} * (1 + kSide / 8), '\xaa');
-  for (size_t row = 0; row < kSide; ++row) rows[row * (1 + kSide / 8)] = 0; // each begins with its filter
+  for (size_t row = 0; row < kSide; ++row) rows[row * (1 + kSide / 8)] = 0; // each row starts with its filter byte
   folder.write("a.png", png(kSide, kSide, 1, rows, kGrey));
   std::string text = "Texture \"t0\" \"float\" \"imagemap\" \"string filename\" \"a.png\"\n";
   for (int i = 1; i < 60; ++i)

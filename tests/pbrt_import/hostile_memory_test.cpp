@@ -1,4 +1,4 @@
-// Small inputs that ask for much memory.
+// Small inputs that require much memory.
 
 #include <string>
 
@@ -13,7 +13,7 @@ namespace {
 
 constexpr uint64_t kBudget = 8u << 20;
 
-/// What importing text is refused with for want of memory; "accepted" if it is not.
+/// Message of the MemoryError that importing text throws, or "accepted".
 std::string refusal(const SceneFolder& folder, const std::string& text) {
   ImportOptions options;
   options.memory = MemoryBudget(kBudget);
@@ -108,9 +108,10 @@ TEST(HostileMemory, StringsLongerThanAnyNameAreLeftOut) {
   EXPECT_EQ(refusal(folder, world("Material \"" + text + "\"")), "accepted");
   EXPECT_EQ(refusal(folder, world(text)), "accepted");
   const Imported imported = import_text(folder, world("Material \"" + text + "\""));
-  EXPECT_EQ(without_folder(imported.text(), folder),
-            "scene.pbrt:2:10: error: expected a quoted name after Material, found a word or string of more than 2.0 MiB; "
-            "Material is ignored\n");
+  EXPECT_EQ(
+      without_folder(imported.text(), folder),
+      "scene.pbrt:2:10: error: expected a quoted name after Material, found a word or string of more than 2.0 MiB; "
+      "Material is ignored\n");
   EXPECT_EQ(kept_of(imported), (Kept{1, 1, 0, 0}));
 }
 
@@ -134,7 +135,8 @@ TEST(HostileMemory, PolygonsAskForTheirTriangles) {
 
 TEST(HostileMemory, ImagesAskForTheirPixels) {
   const SceneFolder folder;
-  std::string tga{0, 0, 10, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 16, 0, 16, 24, 0}; // runs; 4096 x 4096 pixels of 3 bytes
+  // Run-length encoded; 4096 x 4096 pixels of 3 bytes.
+  std::string tga{0, 0, 10, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 16, 0, 16, 24, 0};
   for (int i = 0; i < 4096 * 4096 / 128; ++i) tga += std::string("\xff\1\2\3", 4);
   folder.write("a.tga", tga);
   const std::string text = world("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.tga\"\n"

@@ -25,7 +25,7 @@ std::string replaced(std::string text, const std::string& from, const std::strin
 std::string ascii(const std::string& vertices, const std::string& faces, const std::string& body) {
   return kAscii + vertices + faces + kEnd + body;
 }
-/// The square with one thing replaced.
+/// The square with one replacement in its text.
 std::string square(const std::string& from = "", const std::string& to = "") {
   const std::string text = ascii(kVertices, kFaces, kPoints + kIndices);
   return from.empty() ? text : replaced(text, from, to);
@@ -37,7 +37,7 @@ std::string floats(std::initializer_list<float> values) {
   return bytes;
 }
 
-/// The square in binary form, with one thing of its header replaced.
+/// The square in binary form with one replacement in its header.
 std::string binary(const std::string& from = "", const std::string& to = "") {
   std::string text = kLittle + kVertices + kFaces + kEnd;
   if (!from.empty()) text = replaced(text, from, to);
@@ -51,7 +51,7 @@ HostileCase ply_case(const std::string& name, const std::string& content, const 
 
 const Kept kLost{1, 1, 1, 0};
 
-/// The header cut behind each of its lines.
+/// One case per header line, truncated after that line.
 std::vector<HostileCase> truncated_headers() {
   const std::string whole = square();
   std::vector<HostileCase> cases;

@@ -561,7 +561,7 @@ scene.pbrt:2:99: warning: parameter "point N" is ignored: it has the wrong type 
   };
 }
 
-/// One bad parameter costs itself: the shape and its other parameters stay. Radius 1 is the default.
+/// A bad parameter is lost alone: the shape and its other parameters stay. The default radius is 1.
 std::vector<HostileCase> lost_parameters() {
   return {
       {"TypeUnknownOfOneAmongMany",
@@ -954,9 +954,9 @@ scene.pbrt:3:2: warning: this shape may stand in a wrong place: a transform befo
   };
 }
 
-// What only size makes awkward
+// Large inputs
 
-/// CPU time that importing a text takes, and what it says.
+/// CPU time of an import, and its result.
 struct Timed {
   double seconds = 0.0;
   Imported imported;
@@ -968,13 +968,13 @@ Timed timed_import(const SceneFolder& folder, const std::string& text) {
   return {static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, std::move(imported)};
 }
 
-/// Four times as much must not take sixteen times as long; what is too quick to measure passes.
+/// Four times the input must take less than ten times as long; inputs that are too fast to measure pass.
 void expect_linear(const Timed& small, const Timed& four_times) {
   constexpr double kMeasurableSeconds = 0.05;
   EXPECT_LT(four_times.seconds, 10.0 * std::max(small.seconds, kMeasurableSeconds));
 }
 
-/// item(0) ... item(count - 1).
+/// Concatenates item(0) to item(count - 1).
 template <class Item>
 std::string listed(int count, Item item) {
   std::string all;
@@ -1067,7 +1067,7 @@ TEST(HostileSizes, ThousandsOfUnknownNamedMaterialsAmongThousands) {
   EXPECT_EQ(without_folder(to_string(large.imported.diagnostics.front()), folder),
             "scene.pbrt:9002:1: error: no named material \"metl0\"; the material before it stays; did you mean "
             "\"metal0\"?");
-  EXPECT_EQ(without_folder(to_string(large.imported.diagnostics.back()), folder), // so many get no hints
+  EXPECT_EQ(without_folder(to_string(large.imported.diagnostics.back()), folder), // no hints after too many comparisons
             "scene.pbrt:13001:1: error: no named material \"metl3999\"; the material before it stays");
   EXPECT_EQ(kept_of(large.imported), (Kept{1, 1, 0, 0}));
 }
@@ -1084,7 +1084,7 @@ TEST(HostileSizes, FileNameOfAHundredThousandFolders) {
   EXPECT_EQ(kept_of(large.imported), (Kept{1, 1, 0, 0}));
 }
 
-// Languages
+// Locales
 
 class DecimalComma : public std::numpunct<char> {
   char do_decimal_point() const override { return ','; }
@@ -1092,7 +1092,7 @@ class DecimalComma : public std::numpunct<char> {
   std::string do_grouping() const override { return "\3"; }
 };
 
-/// C++'s global locale with decimal commas, and C's where one is installed, as long as it lives.
+/// Sets C++'s global locale to decimal commas, and C's if such a locale is installed, during its lifetime.
 class CommaLocale {
 public:
   CommaLocale()

@@ -3,7 +3,7 @@
 namespace packtrace {
 namespace {
 
-/// A trianglemesh of the unit square's two triangles with other parameters behind.
+/// A trianglemesh of the unit square, followed by other parameters.
 std::string square(const std::string& more) {
   return "Shape \"trianglemesh\" \"integer indices\" [0 1 2 0 2 3] \"point P\" [0 0 0 1 0 0 1 1 0 0 1 0] " + more;
 }
@@ -821,7 +821,7 @@ scene.pbrt:4:1: error: unknown area light "spot"; it is ignored
   };
 }
 
-// What materials come to that ask for the odd
+// Colours of unusual materials
 
 struct ColourCase {
   const char* text;

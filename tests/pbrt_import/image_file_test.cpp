@@ -38,7 +38,7 @@ ImageSummary read(const std::string& file, bool want_mask = false) {
   return read_image(std::as_bytes(std::span(file)), false, want_mask, kBudget);
 }
 
-/// What reading a file complains about; "" if it does not.
+/// Message of the Error that reading a file throws; "" if there is none.
 std::string complaint(const std::string& file) {
   try {
     (void)read(file, true);
@@ -54,7 +54,7 @@ void expect_average(const std::string& file, Vec3 average, float tolerance = 1e-
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(image.average[c], average[c], tolerance) << c;
 }
 
-/// Every proper prefix must be refused, every flipped byte read or refused.
+/// Every proper prefix must be rejected; files with a flipped byte must be read or rejected.
 void expect_robust(const std::string& file) {
   for (size_t size = 0; size < file.size(); ++size) EXPECT_NE(complaint(file.substr(0, size)), "") << size;
   for (const int flip : {0x01, 0x80, 0xff})
@@ -96,7 +96,7 @@ std::string png_header(uint32_t width, uint32_t height, uint32_t bits, PngColour
                                                  number(colour, 1) + "\0\0"s + number(interlaced, 1));
 }
 
-/// @param rows filter byte and samples for each
+/// @param rows filter byte and samples of each row
 std::string png(uint32_t width, uint32_t height, uint32_t bits, PngColour colour, const std::string& rows,
                 uint32_t interlaced = 0) {
   std::string file = png_header(width, height, bits, colour, interlaced);
@@ -160,11 +160,11 @@ TEST(PngImage, ChunksThatLieAreRefused) {
 
 TEST(PngImage, DataThatUnpackWithoutEndAreRefused) {
   EXPECT_EQ(complaint(png(4, 4, 8, kGrey, std::string(80 << 20, '\0'))), "damaged image: too much data for its size");
-  // Some surplus does no harm.
+  // Some excess data is accepted.
   EXPECT_EQ(complaint(png(4, 4, 8, kGrey, std::string(1 << 20, '\0'))), "");
 }
 
-/// What is wrong with a file that can be read.
+/// Problems of a file that is read in spite of damage.
 std::vector<std::string> problems(const std::string& file) { return read(file, true).problems; }
 using Problems = std::vector<std::string>;
 
@@ -174,14 +174,15 @@ TEST(PngImage, WrongChecksumsAreReported) {
   file[file.size() - 1] ^= 1;
   EXPECT_EQ(problems(file), Problems{"a chunk has a wrong checksum; the image may be damaged"});
   expect_average(file, Vec3(0x60 / 255.0f));
-  file[8 + 8 + 13] ^= 1; // of the header
+  file[8 + 8 + 13] ^= 1; // in the checksum of the header
   EXPECT_EQ(problems(file), Problems{"2 chunks have wrong checksums; the image may be damaged"});
 }
 
 TEST(PngImage, ColoursBeyondThePaletteAreBlackAndReported) {
   const Vec3 half_orange(0.5f, 0x40 / 255.0f, 0.0f);
   for (const int bits : {2, 4, 8}) {
-    const std::string pixels = bits == 2 ? "\0\x70"s : bits == 4 ? "\0\x13"s : "\0\1\3"s; // colours 1 and 3 of two
+    // Colours 1 and 3 of a palette of two.
+    const std::string pixels = bits == 2 ? "\0\x70"s : bits == 4 ? "\0\x13"s : "\0\1\3"s;
     EXPECT_EQ(problems(png(2, 1, bits, kPalette, pixels)),
               Problems{"1 pixel has a colour that the palette lacks; it counts as black"});
     expect_average(png(2, 1, bits, kPalette, pixels), half_orange);
@@ -191,7 +192,7 @@ TEST(PngImage, ColoursBeyondThePaletteAreBlackAndReported) {
 }
 
 TEST(PngImage, PalettesOfEveryDepthAreRead) {
-  for (const int bits : {1, 2, 4, 8}) // two pixels of colours 0 and 1
+  for (const int bits : {1, 2, 4, 8}) // two pixels with colours 0 and 1
     expect_average(png(2, 1, bits, kPalette,
                        '\0' + (bits == 8 ? "\0\1"s : std::string(1, static_cast<char>(1 << (8 - 2 * bits))))),
                    {0.5f, 0x40 / 255.0f, 0.0f});
@@ -232,7 +233,7 @@ TEST(TgaImage, PixelsComeInEveryOrderAndDepth) {
     MemoryReservation memory{MemoryBudget(kBudget)};
     return read_image(std::as_bytes(std::span(file)), true, ImageWants{false, true}, memory).rgb;
   };
-  std::string file = tga(2, 2, 2, 24, "\0\0\x01\0\0\x02\0\0\x03\0\0\x04"s); // red 1 to 4
+  std::string file = tga(2, 2, 2, 24, "\0\0\x01\0\0\x02\0\0\x03\0\0\x04"s); // red values 1 to 4
   const auto reds = [&] {
     const std::vector<uint8_t> rgb = first_red(file);
     return std::vector<int>{rgb[0], rgb[3], rgb[6], rgb[9]};
@@ -277,7 +278,7 @@ TEST(HdrImage, SharedExponentsScale) {
   expect_average(hdr("-Y 1 +X 1", "\x80\x40\x20\x84"), {8.0f, 4.0f, 2.0f});
   expect_average(hdr("-Y 1 +X 1", "\x80\x40\x20\0"s), Vec3(0.0f));
   expect_average("#?RGBE\r\nFORMAT=32-bit_rle_rgbe\r\n\r\n-Y 1 +X 1\r\n\x80\x40\x20\x81", {1.0f, 0.5f, 0.25f});
-  // Factors that were applied already.
+  // EXPOSURE is ignored, since it has been applied to the pixels.
   expect_average(hdr("-Y 1 +X 1", "\x80\x40\x20\x81", "# comment\nEXPOSURE=2\n"), {1.0f, 0.5f, 0.25f});
 }
 
@@ -290,7 +291,7 @@ TEST(HdrImage, RowsComeFromTheTop) {
 }
 
 TEST(HdrImage, RunsOfComponentsAreRead) {
-  // Red: eight equal; green: two runs; blue: as they are; exponent: a run and the rest.
+  // Red: one run of eight; green: two runs; blue: literal; exponent: a run and two literal values.
   const std::string row =
       "\2\2\0\x08"s + "\x88\x80" + "\x84\x80\x84\0"s + "\x08\x80\0\x80\0\x80\0\x80\0"s + "\x86\x81" + "\x02\x81\x81";
   expect_average(hdr("-Y 2 +X 8", row + row), {1.0f, 0.5f, 0.5f});
@@ -298,7 +299,7 @@ TEST(HdrImage, RunsOfComponentsAreRead) {
 
 TEST(HdrImage, RunsOfPixelsAreRead) {
   expect_average(hdr("-Y 1 +X 4", "\x80\x40\x20\x81\1\1\1\3"), {1.0f, 0.5f, 0.25f});
-  // 2 + 1 * 256 times the first pixel.
+  // Repeats the first pixel 2 + 1 * 256 times.
   expect_average(hdr("-Y 1 +X 259", "\x80\x40\x20\x81\1\1\1\2\1\1\1\1"), {1.0f, 0.5f, 0.25f});
 }
 
@@ -306,12 +307,12 @@ TEST(HdrImage, EveryByteOfARowIsLookedAt) {
   const std::string truncated = "damaged image: the file is truncated",
                     wrong = "damaged image: a run does not fit its row";
   const std::string start = "\2\2\0\x08"s;
-  EXPECT_EQ(complaint(hdr("-Y 1 +X 8", start + '\0')), wrong); // a run of nothing
+  EXPECT_EQ(complaint(hdr("-Y 1 +X 8", start + '\0')), wrong); // an empty run
   EXPECT_EQ(complaint(hdr("-Y 1 +X 8", start + "\x80" + std::string(128, '\1'))), wrong);
   EXPECT_EQ(complaint(hdr("-Y 1 +X 8", start + "\x89\1")), wrong);
   EXPECT_EQ(complaint(hdr("-Y 1 +X 8", start)), truncated);
   EXPECT_EQ(complaint(hdr("-Y 1 +X 8", "\2\2\0\x09"s)), "damaged image: a row has a different width");
-  EXPECT_EQ(complaint(hdr("-Y 1 +X 2", "\1\1\1\1")), wrong); // repeats what is not there
+  EXPECT_EQ(complaint(hdr("-Y 1 +X 2", "\1\1\1\1")), wrong); // repeats a pixel that does not exist
   EXPECT_EQ(complaint(hdr("-Y 1 +X 4", "\x80\x40\x20\x81\1\1\1\4")), wrong);
   EXPECT_EQ(complaint(hdr("-Y 1 +X 4", "\x80\x40\x20\x81\1\1\1\0\1\1\1\0\1\1\1\0\1\1\1\0"s)), wrong);
 }
@@ -367,7 +368,8 @@ std::string exr(Imf::Header header, Imf::RgbaChannels channels = Imf::WRITE_RGB)
     const std::vector<Imf::Rgba> pixels(static_cast<size_t>(width) * static_cast<size_t>(height), kPixel);
     Imf::RgbaOutputFile file(stream, header, channels);
     const auto before = static_cast<uint64_t>(box.min.x + int64_t{box.min.y} * width) * sizeof(Imf::Rgba);
-    const uint64_t base = reinterpret_cast<uintptr_t>(pixels.data()) - before; // far outside, so no pointer
+    // An integer, since it lies outside the array.
+    const uint64_t base = reinterpret_cast<uintptr_t>(pixels.data()) - before;
     file.setFrameBuffer(reinterpret_cast<const Imf::Rgba*>(base), 1, static_cast<size_t>(width));
     file.writePixels(height);
   }
@@ -385,14 +387,14 @@ std::string tiled_exr(int width, int height) {
   return stream.text();
 }
 
-/// An attribute in front of all others of a file that is one block.
+/// Inserts an attribute in front of all others of a file with a single block.
 std::string with_attribute(std::string file, const std::string& name, const std::string& type, uint32_t bytes,
                            const std::string& value) {
   const std::string attribute = name + '\0' + type + '\0' + number(bytes, 4) + value;
   for (size_t at = 0; at + 8 <= file.size(); ++at) {
     uint64_t offset;
     std::memcpy(&offset, file.data() + at, 8);
-    if (offset != at + 8) continue; // not the block's
+    if (offset != at + 8) continue; // not the offset of the block
     offset += attribute.size();
     std::memcpy(file.data() + at, &offset, 8);
   }
@@ -472,8 +474,9 @@ TEST(ExrImage, ClaimsAreCheckedBeforeAnythingIsAllocated) {
     return complaint(replaced(file, window, 4 + 8, number(x, 4) + number(y, 4)));
   };
   EXPECT_EQ(corner(3, 3), "");
-  EXPECT_EQ(corner(3, 1'000'000), "damaged image: the file is truncated"); // no room for the offsets of its rows
-  const std::string blocks = "damaged image: its " + std::to_string(file.size()) + " bytes cannot hold the blocks it claims";
+  EXPECT_EQ(corner(3, 1'000'000), "damaged image: the file is truncated"); // too short for the offset table
+  const std::string blocks =
+      "damaged image: its " + std::to_string(file.size()) + " bytes cannot hold the blocks it claims";
   EXPECT_EQ(corner(16'000'000, 3), blocks);
   EXPECT_EQ(corner(2'000'000, 3), blocks);
   EXPECT_EQ(corner(500'000, 3), "decoding its 500001 x 4 pixels needs 427 MiB of memory, of 64.0 MiB left; "
@@ -506,7 +509,7 @@ TEST(ExrImage, DamageIsSurvived) {
   expect_robust(tiled_exr(20, 10));
 }
 
-// Others
+// Other formats
 
 TEST(ImageFormats, ThoseThatAreNotReadAreNamed) {
   for (const auto& [magic, name] : {std::pair{"\xff\xd8\xff\xe0"s, "JPEG"},

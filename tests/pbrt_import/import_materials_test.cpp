@@ -47,7 +47,7 @@ TEST(Materials, MetalsReflectTheirColour) {
   EXPECT_GT(gold.albedo.x, 2.0f * gold.albedo.z);
   const Material glassy = only_material(
       import_world(folder, "Material \"metal\" \"rgb eta\" [1.5 1.5 1.5] \"rgb k\" [0 0 0]" + std::string(kTriangle)));
-  EXPECT_NEAR(glassy.albedo.x, 0.092f, 0.002f); // diffuse reflectance of glass from outside, index 1.5
+  EXPECT_NEAR(glassy.albedo.x, 0.092f, 0.002f); // diffuse reflectance of glass with index 1.5 from outside
 }
 
 TEST(Materials, MixesBlendColoursAndShareFlags) {

@@ -88,7 +88,7 @@ TEST(Objects, InstancesComposeWithTheObjectsOwnTransform) {
   ASSERT_EQ(imported.scene.objects.size(), 1u);
   ASSERT_EQ(imported.scene.instances.size(), 2u);
   EXPECT_TRUE(imported.scene.shapes.empty());
-  // The transform at ObjectBegin is part of both: pbrt multiplies instance and shape transforms.
+  // The transform at ObjectBegin applies twice: pbrt multiplies instance and shape transforms.
   EXPECT_EQ(placed(imported.scene.objects[0].shapes[0], imported.scene, 0), DVec3(1, 1, 0));
   EXPECT_EQ(imported.scene.instances[1].world_from_object[3], Vec3(1, 0, 1));
   EXPECT_EQ(placed_triangle_count(imported.scene), 2u);

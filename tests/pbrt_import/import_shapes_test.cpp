@@ -36,7 +36,7 @@ TEST(Shapes, EqualQuadricsShareAMesh) {
                            "Shape \"disk\" \"float height\" 1");
   ASSERT_EQ(imported.scene.shapes.size(), 6u) << imported.text();
   const auto mesh = [&](size_t shape) { return imported.scene.shapes[shape].mesh; };
-  EXPECT_EQ(mesh(0), mesh(1)); // whole spheres differ in scale only
+  EXPECT_EQ(mesh(0), mesh(1)); // whole spheres only differ in scale
   EXPECT_NE(mesh(0), mesh(2));
   EXPECT_EQ(mesh(3), mesh(4));
   EXPECT_NE(mesh(4), mesh(5));
@@ -46,7 +46,7 @@ TEST(Shapes, EqualQuadricsShareAMesh) {
 TEST(Shapes, MeshesMadeByOtherThreadsKeepTheirOrderAndTheirReports) {
   const SceneFolder folder;
   std::string text;
-  for (int i = 0; i < 40; ++i) { // large enough for tasks of their own, and every third one with a bad triangle
+  for (int i = 0; i < 40; ++i) { // large enough for separate tasks; every third one has a bad triangle
     std::string indices, points;
     for (int k = 0; k < 2000; ++k) {
       indices += "0 1 2 ";
@@ -172,7 +172,7 @@ TEST(Shapes, AbsurdCountsAreRefused) {
       "Shape \"nurbs\" \"integer nu\" 2000000000 \"integer nv\" 2000000000 \"integer uorder\" 2 \"integer vorder\" 2 "
       "\"point P\" [0 0 0]\nShape \"curve\" \"string type\" \"round\" \"point P\" [0 0 0 1 0 0 2 1 0 3 1 0]\n" +
           std::string(kTriangle));
-  EXPECT_EQ(imported.scene.shapes.size(), 2u); // pbrt draws the curve, too
+  EXPECT_EQ(imported.scene.shapes.size(), 2u); // pbrt also draws the curve
   EXPECT_EQ(imported.count(Severity::kError), 4u) << imported.text();
   EXPECT_TRUE(imported.reported("is skipped: negative \"nu\""));
 }
@@ -280,7 +280,7 @@ TEST(PlyShapes, TruncatedFilesAreDropped) {
 TEST(PlyShapes, WindowsPathsAreFound) {
   const SceneFolder folder;
   folder.write("models/new.ply", kPly);
-  const Imported imported = import_world(folder, ply_shape("models\\new.ply")); // \n is not a line end here
+  const Imported imported = import_world(folder, ply_shape("models\\new.ply")); // \n is not a line feed here
   EXPECT_EQ(imported.scene.shapes.size(), 1u) << imported.text();
 }
 

@@ -24,7 +24,7 @@ TEST(LargePages, ElementsStayWhileRoomGrows) {
 
 TEST(LargePages, LargeRoomIsMovedInto) {
   std::vector<uint32_t> numbers{1, 2, 3};
-  reserve_large(numbers, size_t{1} << 22); // 16 MiB: worth large pages
+  reserve_large(numbers, size_t{1} << 22); // 16 MiB: uses large pages
   EXPECT_EQ(numbers, (std::vector<uint32_t>{1, 2, 3}));
   EXPECT_GE(numbers.capacity(), size_t{1} << 22);
   numbers.resize(size_t{1} << 22, 7u);
@@ -34,7 +34,7 @@ TEST(LargePages, LargeRoomIsMovedInto) {
 TEST(LargePages, BlocksKeepWhatIsWrittenToThem) {
   LargeHeapPages heap_pages;
   std::vector<std::vector<uint32_t>> blocks;
-  for (uint32_t i = 0; i < 3000; ++i) { // 48 MB in all: the heap is prepared several times in between
+  for (uint32_t i = 0; i < 3000; ++i) { // 48 MB in total: the heap is prepared several times
     constexpr size_t kNumbers = 4000;
     heap_pages.about_to_allocate(kNumbers * sizeof(uint32_t));
     blocks.emplace_back(kNumbers, i);

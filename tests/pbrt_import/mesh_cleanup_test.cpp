@@ -20,7 +20,7 @@ class MeshCleanup : public testing::Test {
 protected:
   uint64_t clean(Mesh& mesh) {
     reports_.clear();
-    return drop_bad_triangles(mesh, [this](Severity severity, uint32_t line, std::string message) {
+    return clean_up_mesh(mesh, [this](Severity severity, uint32_t line, std::string message) {
       EXPECT_EQ(line, 0u);
       reports_.push_back({severity, std::move(message)});
     });
@@ -97,7 +97,7 @@ TEST_F(MeshCleanup, NormalsBecomeUnitLength) {
 
 TEST_F(MeshCleanup, BadNormalsAreRecomputedFromTheFacesAround) {
   Mesh mesh = square();
-  mesh.positions[3] = {0, 0, 2}; // the second triangle has twice the first one's area and faces elsewhere
+  mesh.positions[3] = {0, 0, 2}; // the second triangle has twice the area of the first and another orientation
   mesh.normals = {{0, 0, 0}, {kNan, 0, 1}, {0, 1, 0}, {0, kInfinity, 0}};
   clean(mesh);
   const Vec3 first(0, 0, 1), second(2, -2, 0);
@@ -130,7 +130,7 @@ TEST_F(MeshCleanup, UvsThatAreNotFiniteBecomeZero) {
 }
 
 TEST_F(MeshCleanup, LargeMeshesAreCheckedLikeSmallOnes) {
-  constexpr uint32_t kVertices = 100'000, kLost = 50'000; // many pieces' worth
+  constexpr uint32_t kVertices = 100'000, kLost = 50'000; // enough for several parallel pieces
   Mesh mesh;
   for (uint32_t i = 0; i < kVertices; ++i) mesh.positions.emplace_back(i, i % 2, 0);
   for (uint32_t i = 0; i + 2 < kVertices; ++i) mesh.triangles.emplace_back(i, i + 1, i + 2);
@@ -171,7 +171,7 @@ TEST_F(MeshCleanup, NothingLeftIsAnEmptyMesh) {
   EXPECT_EQ(clean(mesh), 2u);
   EXPECT_TRUE(mesh.positions.empty() && mesh.triangles.empty());
   Mesh empty;
-  EXPECT_EQ(drop_bad_triangles(empty, {}), 0u);
+  EXPECT_EQ(clean_up_mesh(empty, {}), 0u);
 }
 
 } // namespace

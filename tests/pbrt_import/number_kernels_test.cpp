@@ -16,7 +16,7 @@
 namespace packtrace {
 namespace {
 
-/// Words set apart by one or more spaces or line ends, some of them no plain numbers.
+/// Random words separated by one or more spaces or line ends; some are not plain numbers.
 class RandomText {
 public:
   explicit RandomText(uint64_t seed) : random_(seed) {
@@ -38,9 +38,9 @@ private:
     for (size_t i = 0; i < count; ++i) text_ += static_cast<char>('0' + below(10));
   }
   void add_word() {
-    constexpr const char* kOthers[] = {"-",   ".",    "-.",  "+1",  "1e5", "nan",  "1.2.3", "--1",
-                                       "1-2", "12a4", "]",   "1]",  "#x",  "\"a\"", "1,",    "-0",
-                                       "0",   "-.5",  "5.",  "00",  "1:2", "1/2",  "\x7f",  "16777217"};
+    constexpr const char* kOthers[] = {"-",   ".",    "-.", "+1", "1e5", "nan",   "1.2.3", "--1",
+                                       "1-2", "12a4", "]",  "1]", "#x",  "\"a\"", "1,",    "-0",
+                                       "0",   "-.5",  "5.", "00", "1:2", "1/2",   "\x7f",  "16777217"};
     if (below(30) == 0) {
       text_ += kOthers[below(std::size(kOthers))];
       return;
@@ -56,7 +56,7 @@ private:
   size_t size_ = 0;
 };
 
-/// Whatever numbers a kernel converts, they are those that stand there.
+/// Checks that all numbers that a kernel converts equal those in the text.
 template <class T>
 void expect_right_numbers(const RandomText& text, NumberBatch (*kernel)(const char*, const char*, T*, size_t)) {
   const char* p = text.begin();
@@ -83,7 +83,7 @@ void expect_right_numbers(const RandomText& text, NumberBatch (*kernel)(const ch
       ASSERT_EQ(batch.line_ends, line_ends);
       ASSERT_EQ(batch.last_line_end, last_line_end);
     }
-    // One word as the caller does it.
+    // Skips one word, as the caller would.
     skip_space();
     while (p < text.end() && !is_space(*p)) ++p;
   }
@@ -112,7 +112,7 @@ TEST(NumberKernels, ConvertPlainNumbersWithoutHelp) {
   const NumberBatch batch =
       kernels->floats(text.data() + kKernelLead, text.data() + size, values.data(), values.size());
   EXPECT_EQ(batch.count, 1000u);
-  EXPECT_EQ(batch.line_ends, 333u); // the last one comes after the last number
+  EXPECT_EQ(batch.line_ends, 333u); // the last line end comes after the last number
 }
 
 TEST(NumberKernels, TakeTheNumberBeforeTheBracketAndStopThere) {
@@ -140,17 +140,17 @@ TEST(NumberKernels, FloatsNearTheMiddleRoundOnce) {
   std::mt19937_64 random(5);
   uint64_t converted = 0;
   for (int i = 0; i < 300'000; ++i) {
-    // Sixteen digits around the middle between two neighbouring floats.
+    // Sixteen digits near the middle between two neighbouring floats.
     const float low = std::bit_cast<float>(0x3c000000u + static_cast<uint32_t>(random() % 0x09000000u));
     const double middle = (static_cast<double>(low) + std::nextafter(low, 1e9f)) / 2;
     char word[64];
-    const auto end = std::to_chars(word, word + sizeof word, middle, std::chars_format::fixed,
-                                   static_cast<int>(4 + random() % 11));
+    const auto end =
+        std::to_chars(word, word + sizeof word, middle, std::chars_format::fixed, static_cast<int>(4 + random() % 11));
     std::string text(kKernelLead, ' ');
     text.append(word, end.ptr).append(" ").append(kKernelReach, '\0');
     float value = 0, expected = 0;
     const char* const begin = text.data() + kKernelLead;
-    if (kernels->floats(begin, begin + 1, &value, 1).count == 0) continue; // left to the scanner
+    if (kernels->floats(begin, begin + 1, &value, 1).count == 0) continue; // left to the portable scanner
     ++converted;
     std::from_chars(word, end.ptr, expected);
     ASSERT_EQ(value, expected) << std::string(word, end.ptr);

@@ -17,12 +17,12 @@ namespace packtrace {
 namespace {
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr uint64_t kShare = 50; // sanitizers make each value tens of times slower
+constexpr uint64_t kShare = 50; // sanitizers slow each value down by more than ten times
 #else
 constexpr uint64_t kShare = 1;
 #endif
 
-/// Values of all tests together, without sanitizers.
+/// Numbers of values in all tests together, without sanitizers.
 constexpr uint64_t kRandomBits = 4'000'000, kDecimals = 4'000'000, kHalfway = 1'200'000, kEdges = 500'000,
                    kLong = 100'000, kIntegers = 1'000'000;
 static_assert(kRandomBits + kDecimals + kHalfway + kEdges + kLong + kIntegers >= 10'000'000);
@@ -31,7 +31,7 @@ using Random = std::mt19937_64;
 
 uint64_t below(Random& random, uint64_t bound) { return random() % bound; }
 
-/// A text, a delimiter, and the zeros that the scanners count on.
+/// A text, a delimiter, and the zeros that the scanners require.
 class NumberBuffer {
 public:
   void clear() { size_ = 0; }
@@ -76,8 +76,8 @@ bool same_bits(T a, T b) {
   return std::bit_cast<Bits>(a) == std::bit_cast<Bits>(b);
 }
 
-/// Correctly rounded by the standard library. Where std::from_chars only says that the value leaves the range, strtod
-/// (or strtof) tells on which side.
+/// Reference value, correctly rounded by the standard library. If std::from_chars reports a value out of range, strtod
+/// (or strtof) tells whether it overflows or underflows.
 template <class T>
 T reference(std::string_view text) {
   T value{};
@@ -91,7 +91,7 @@ T reference(std::string_view text) {
     return std::strtod(copy.c_str(), nullptr);
 }
 
-/// How many numbers took the fast way, so that a test that never does shows.
+/// Counts how many numbers took the fast path, so that a test that never takes it fails.
 struct Tally {
   uint64_t all = 0;
   uint64_t scanned = 0;
@@ -121,7 +121,7 @@ bool check_type(const NumberBuffer& buffer, Tally& tally) {
   return true;
 }
 
-/// Both types, the scanner and the parser.
+/// Checks the scanner and the parser for both types.
 bool check(NumberBuffer& buffer, Tally& tally, char delimiter = ' ') {
   buffer.end(delimiter);
   return check_type<float>(buffer, tally) && check_type<double>(buffer, tally);
@@ -181,7 +181,7 @@ TEST(NumberParsing, HalfwayBetweenFloats) {
   NumberBuffer buffer;
   Tally tally;
   for (uint64_t i = 0; i < kHalfway / kShare / 3; ++i) {
-    // Near 1, so that the exact decimals are few: 2^-40 to 2^40.
+    // Between 2^-40 and 2^40, so that the exact decimal expansions are short.
     const auto bits = static_cast<uint32_t>((87 + below(random, 80)) << 23 | (random() & 0x7fffff));
     const double low = std::bit_cast<float>(bits), high = std::bit_cast<float>(bits + 1);
     const double middle = 0.5 * (low + high); // exact
@@ -202,7 +202,8 @@ TEST(NumberParsing, HalfwayBetweenDoubles) {
   NumberBuffer buffer;
   Tally tally;
   for (uint64_t i = 0; i < kLong / kShare / 2; ++i) {
-    // (2 m + 1) 2^-k with 54 bits before the power: between two doubles; its decimals are those of an integer / 10^k.
+    // (2 m + 1) 2^-k, where m has 54 bits: a quarter of the doubles' spacing away from a double. Its decimals are those
+    // of an integer divided by 10^k.
     const auto value = static_cast<long double>((uint64_t{1} << 53 | (random() >> 11)) << 1 | 1);
     const long double middle = std::ldexp(value, -static_cast<int>(below(random, 60)));
     for (const char* const behind : {"", "0", "00000000000000000000000000000001", "1"}) {
@@ -227,7 +228,7 @@ TEST(NumberParsing, EdgesOfTheRange) {
     buffer.add('.');
     buffer.digits(random, below(random, 20));
     buffer.add('e');
-    // Around where floats and doubles end at either side, and where powers of ten stop being exact.
+    // Around the ends of the ranges of float and double, and around the largest exact power of ten.
     constexpr int kExponents[] = {-324, -308, -46, -45, -38, -22, 22, 38, 39, 308, 309};
     buffer.add_number(kExponents[below(random, std::size(kExponents))] + static_cast<int>(below(random, 5)) - 2);
     if (!check(buffer, tally)) return;
@@ -317,7 +318,7 @@ TEST(NumberParsing, IntegersOfAnyLength) {
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), expected);
     const char* const after = scan_integer(buffer.data(), found);
     if (!after) {
-      // Eleven digits and more may be left to the slow way, a fitting number of ten may not.
+      // Numbers of more than ten digits may be left to the slow path, shorter ones that fit may not.
       const size_t digits = text.size() - (text[0] == '-');
       ASSERT_TRUE(error == std::errc::result_out_of_range || digits > 10) << text;
       ++refused;
@@ -351,7 +352,7 @@ TEST(NumberParsing, WhatIsNoNumberIsLeftAlone) {
 TEST(NumberParsing, ScannersLeaveOddEndsToTheParser) {
   struct Case {
     const char* text;
-    size_t used; ///< what parse_number takes
+    size_t used; ///< characters that parse_number() uses
   };
   for (const Case& c : {Case{"1,5", 1},
                         {"1.2.3", 3},

@@ -16,7 +16,7 @@
 namespace packtrace {
 namespace {
 
-/// Keeps what NurbsParameters only looks at.
+/// NurbsParameters with the arrays that they refer to.
 struct Patch {
   NurbsParameters parameters;
   std::vector<float> u_knots, v_knots;
@@ -38,13 +38,14 @@ Patch bilinear(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
   return patch;
 }
 
-/// A full circle as nine points of a rational quadratic: x, y, w.
+/// A full circle as a rational quadratic with nine control points: (x, y, w), where x and y are not multiplied by w.
 const auto kHalf = static_cast<float>(std::sqrt(0.5));
 const std::vector<glm::vec3> kCircle{{1, 0, 1},       {1, 1, kHalf}, {0, 1, 1},      {-1, 1, kHalf}, {-1, 0, 1},
                                      {-1, -1, kHalf}, {0, -1, 1},    {1, -1, kHalf}, {1, 0, 1}};
 const std::vector<float> kCircleKnots{0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4};
 
-/// A profile (r, z, w), rational quadratic along v, turned around the z axis along u.
+/// Rotates a rational quadratic profile (r, z, w) along v around the z axis; u runs around the axis. r and z are not
+/// multiplied by w.
 Patch turned(const std::vector<glm::vec3>& profile, const std::vector<float>& knots) {
   Patch patch;
   patch.parameters.nu = 9;
@@ -60,19 +61,19 @@ Patch turned(const std::vector<glm::vec3>& profile, const std::vector<float>& kn
   return patch;
 }
 
-/// The unit sphere: a half circle from the south pole.
+/// The unit sphere, whose profile is a half circle from the south pole.
 Patch sphere() {
   return turned({{0, -1, 1}, {1, -1, kHalf}, {1, 0, 1}, {1, 1, kHalf}, {0, 1, 1}}, {0, 0, 0, 1, 1, 2, 2, 2});
 }
 
-/// Radii 2 and 0.5.
+/// A torus with major radius 2 and minor radius 0.5.
 Patch torus() {
   std::vector<glm::vec3> profile;
   for (const glm::vec3& c : kCircle) profile.emplace_back(2 + 0.5f * c.x, 0.5f * c.y, c.z);
   return turned(profile, kCircleKnots);
 }
 
-/// One rational arc of degree 2 in the xy plane, (wx, wy, w), raised from z = 0 to 1.
+/// A rational arc of degree 2 in the xy plane, (wx, wy, w), extruded from z = 0 to 1.
 Patch wall(const std::vector<glm::vec3>& arc) {
   Patch patch;
   patch.parameters.nu = patch.parameters.u_order = 3;
@@ -120,11 +121,12 @@ TEST(Nurbs, RationalSphereIsRoundWithinTheTolerance) {
       volume += glm::dot(a, glm::cross(b, c)) / 6.0;
       EXPECT_TRUE(a != b && b != c && c != a);
     }
-    EXPECT_LE(worst, tolerance * std::sqrt(3.0)); // half the diagonal of the control points' box
+    EXPECT_LE(worst, tolerance * std::sqrt(3.0)); // half the diagonal of the control points' bounds
     EXPECT_NEAR(volume, 4.0 / 3.0 * std::numbers::pi, 20 * tolerance);
     for (size_t i = 0; i < mesh.positions.size(); ++i) {
       EXPECT_NEAR(glm::length(mesh.positions[i]), 1.0f, 1e-6f);
-      const float worst_dot = std::abs(mesh.positions[i].z) < 0.99f ? 0.99999f : 0.95f; // poles: from the faces around
+      // Pole normals come from adjacent faces.
+      const float worst_dot = std::abs(mesh.positions[i].z) < 0.99f ? 0.99999f : 0.95f;
       EXPECT_GT(glm::dot(mesh.positions[i], mesh.normals[i]), worst_dot);
     }
   }
@@ -148,8 +150,7 @@ TEST(Nurbs, RationalTorusHasItsAreaAndVolumeAndCloses) {
     for (const auto& [edge, count] : edges)
       EXPECT_EQ(edges.count({edge.second, edge.first}), 1u) << "the seams' positions are the same floats";
     constexpr double kPi = std::numbers::pi;
-    // Half the diagonal of its box, 5 x 5 x 1, over the smaller radius: relative to that one, errors are so much
-    // larger.
+    // The tolerance is relative to half the diagonal of the 5 x 5 x 1 bounds, errors to the minor radius 0.5.
     const double worst = 2 * tolerance * std::sqrt(51.0) / 2 / 0.5;
     EXPECT_NEAR(area_of(mesh) / (4 * kPi * kPi * 2 * 0.5), 1.0, worst);
     EXPECT_NEAR(volume / (2 * kPi * kPi * 2 * 0.25), 1.0, worst);
@@ -164,7 +165,7 @@ TEST(Nurbs, RationalTorusHasItsAreaAndVolumeAndCloses) {
 TEST(Nurbs, WeightsMayBeZeroOrNegative) {
   const struct {
     std::vector<glm::vec3> arc;
-    double angle; ///< of the unit circle
+    double angle; ///< angle of the circular arc in degrees
   } cases[] = {{{{1, 0, 1}, {kHalf, kHalf, kHalf}, {0, 1, 1}}, 90},
                {{{1, 0, 1}, {0, 1, 0}, {-1, 0, 1}}, 180},
                {{{1, 0, 1}, {-kHalf, -kHalf, -kHalf}, {0, 1, 1}}, 270},
@@ -194,7 +195,7 @@ void keep_report(Severity severity, uint32_t, std::string message) {
 }
 
 TEST(Nurbs, ToleranceThatIsNotReachedIsReported) {
-  Patch torn; // a knot as often as the order: two sheets that are joined by a step
+  Patch torn; // a knot as often as the order: two sheets joined by a step
   torn.parameters.nu = 4;
   torn.parameters.nv = torn.parameters.u_order = torn.parameters.v_order = 2;
   torn.u_knots = {0, 0, 1, 1, 2, 2};
@@ -206,7 +207,8 @@ TEST(Nurbs, ToleranceThatIsNotReachedIsReported) {
   EXPECT_EQ(mesh.triangles.size(), 2u * 2u * 128u);
   EXPECT_NEAR(area_of(mesh), 6.0, 1e-4);
   ASSERT_EQ(g_reports.size(), 1u);
-  // The middle of the step's cell is 2 away from the chord; twice that over half of the box's diagonal.
+  // The midpoint of the step's cell is 2 away from the chord; the reached tolerance is twice that over half the
+  // diagonal of the bounds.
   EXPECT_EQ(g_reports[0], "the surface is followed to within 1.3 of its size only, not the tolerance of 0.001");
   g_reports.clear();
   (void)tessellate_nurbs(sphere().view(), 1e-3, keep_report);

@@ -55,7 +55,7 @@ TEST(Parameters, WrongTypeGivesTheDefaultAndStaysUnused) {
   add(list, number("levels", {2}));
   EXPECT_EQ(list.get_integer("levels", 3), 3);
   EXPECT_FALSE(list.all()[0].used);
-  EXPECT_TRUE(list.was_asked("levels"));
+  EXPECT_TRUE(list.was_looked_up("levels"));
 }
 
 TEST(Parameters, TakingMovesTheValuesOut) {

@@ -8,7 +8,7 @@
 namespace packtrace {
 namespace {
 
-/// Parses text as scene.pbrt of a folder of its own.
+/// Parses text as scene.pbrt in a temporary folder.
 class ParserTest : public testing::Test {
 protected:
   struct Copy {
@@ -75,7 +75,7 @@ TEST_F(ParserTest, AllDirectivesAreKnown) {
       "Shape \"sphere\" Texture \"t\" \"float\" \"constant\" Transform [1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1] "
       "TransformBegin "
       "TransformEnd TransformTimes 0 1 Translate 0 0 0 WorldBegin WorldEnd");
-  EXPECT_EQ(all.size(), 36u); // all 37 but Include
+  EXPECT_EQ(all.size(), 36u); // all 37 except Include
   EXPECT_EQ(messages_, "");
 }
 

@@ -32,7 +32,7 @@ PlyMesh read(const std::string& text, Reports* reports = nullptr) {
   return read_ply(std::as_bytes(std::span(text)), reports ? reports->fn() : ReportFn());
 }
 
-/// The message of the Error that reading throws; "" if it does not.
+/// Message of the Error that reading throws; "" if there is none.
 std::string error_of(const std::string& text) {
   try {
     read(text);
@@ -46,7 +46,7 @@ std::string error_of(const std::string& text) {
 enum class Format { kAscii, kLittle, kBig };
 constexpr Format kFormats[] = {Format::kAscii, Format::kLittle, Format::kBig};
 
-/// Writes PLY files value by value, in the types the header names.
+/// Writes PLY files value by value, in the types of the header.
 class Writer {
 public:
   explicit Writer(Format format) : format_(format) {
@@ -136,7 +136,7 @@ TEST(Ply, EveryFormatAndTypeGivesTheSameMesh) {
   }
 }
 
-/// Eight corners, the number of which is in x, and lists of strips.
+/// Eight vertices with their numbers in x, and lists of strips.
 std::string strips(Format format, const std::string& index,
                    std::initializer_list<std::initializer_list<double>> lists) {
   Writer writer(format);
@@ -164,7 +164,8 @@ TEST(Ply, StripsTurnEverySecondTriangleAndStartAnewAtMinusOne) {
 TEST(Ply, StripsMayRepeatAnIndexToGoOnElsewhere) {
   Reports reports;
   const PlyMesh ply = read(strips(Format::kLittle, "int", {{0, 1, 2, 2, 5, 5, 6, 7}}), &reports);
-  EXPECT_EQ(ply.mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {4, 3, 5}})); // without corners 3 and 4
+  // The repeated corners 2 and 5 give no triangles, so vertices 3 and 4 are unused and dropped.
+  EXPECT_EQ(ply.mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {4, 3, 5}}));
   EXPECT_EQ(reports.messages, std::vector<std::string>{});
 }
 
@@ -249,7 +250,7 @@ TEST(Ply, SkipsWhatItDoesNotKnow) {
       writer.put("float", i).put("uchar", 9).put("double", 10 + i).put("float", 20 + i * i).put("float", 0.5);
     }
     writer.list("uchar", "uint", {77, 78}).put("short", -3).list("uchar", "int", {2, 1, 0});
-    writer.list("uchar", "float", {0, 0, 1, 0, 1, 1}); // the edges are missing: nothing needs them
+    writer.list("uchar", "float", {0, 0, 1, 0, 1, 1}); // the body has no edge elements, which are not needed
     const Mesh mesh = read(writer.text()).mesh;
     EXPECT_EQ(mesh.positions, (std::vector<Vec3>{{20, 10, 0}, {21, 11, 1}, {24, 12, 2}}));
     EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{2, 1, 0}}));
@@ -297,7 +298,7 @@ TEST(Ply, HeaderLinesMayEndInLfCrLfOrCr) {
       expect_square(read(other + text.substr(body)));
     }
   }
-  // Where lines end in CR alone, a line feed after the header is data.
+  // If lines end in CR alone, a line feed after the header belongs to the data.
   Writer writer(Format::kLittle);
   writer.line("element vertex 3").line("property uchar x").line("property uchar y").line("property uchar z");
   writer.line("element face 1").line("property list uchar uchar vertex_indices").line("end_header");
@@ -408,7 +409,7 @@ TEST(Ply, MalformedHeadersAreErrorsWithTheirLine) {
   EXPECT_EQ(with("element face 2", "element polygon 2"), "no faces");
 }
 
-/// Whatever the bytes, the result is an Error or a mesh that keeps its contract.
+/// Checks that any bytes give an Error or a mesh that fulfils its contract.
 void expect_error_or_sound_mesh(const std::string& text) {
   try {
     const Mesh mesh = read(text).mesh;
@@ -442,7 +443,7 @@ std::string slurp(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// Triangles of the PLY files that a scene file's plymesh lines name, as far as they exist.
+/// Number of triangles in the existing PLY files that the plymesh lines of a scene file name.
 uint64_t count_scene_triangles(const std::filesystem::path& folder) {
   std::ifstream scene(folder / "scene.pbrt");
   uint64_t count = 0;

@@ -14,8 +14,8 @@
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/scene/bounds.h"
 
 namespace packtrace {
 namespace {
@@ -24,7 +24,7 @@ constexpr double kPi = std::numbers::pi;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-/// A quadric, and what is known of it without the tessellation.
+/// A quadric with properties that are known without the tessellation.
 struct Case {
   std::string name;
   std::function<Mesh(double tolerance)> tessellate;
@@ -94,7 +94,7 @@ Case cone(const std::string& name, ConeParameters c, uint32_t loops) {
           loops};
 }
 
-/// From (r, z) to z = k r^2. The nearest point lies between those straight above and straight across.
+/// Distance from (r, z) to z = k r^2. The nearest point lies between the vertical and the horizontal projection.
 double distance_to_parabola(double k, double r, double z) {
   double a = r, b = std::sqrt(std::max(0.0, z / k));
   const auto at = [&](double x) { return std::hypot(x - r, k * x * x - z); };
@@ -198,7 +198,7 @@ TEST(Quadrics, NoTriangleLeavesTheSurfaceByMoreThanTheTolerance) {
 }
 
 TEST(Quadrics, TheToleranceIsNotWasted) {
-  // Half of it for the sweep takes 2 pi / (2 acos(1 - tolerance / 2)) = 99.3 columns: 100 of them.
+  // With half the tolerance, the sweep needs 2 pi / (2 acos(1 - tolerance / 2)) = 99.3 columns, rounded up to 100.
   EXPECT_EQ(tessellate_cylinder({}, 1e-3).triangles.size(), 2u * 100u);
   EXPECT_EQ(tessellate_cone({}, 1e-3).triangles.size(), 100u);
   EXPECT_LE(tessellate_sphere({}, 1e-3).triangles.size(), 2u * 100u * 50u);
@@ -224,7 +224,7 @@ TEST(Quadrics, NormalsAndWindingFollowTheParameterDirections) {
     std::vector<uint8_t> at_apex(mesh.positions.size(), 0);
     for (size_t i = 0; i < mesh.positions.size(); ++i) {
       EXPECT_NEAR(glm::length(mesh.normals[i]), 1.0f, 1e-6f);
-      // Central differences, kept inside the surface.
+      // Central differences inside the parameter range.
       const double h = 1e-5, u = std::clamp<double>(mesh.uvs[i].x, h, 1 - h),
                    v = std::clamp<double>(mesh.uvs[i].y, h, 1 - h);
       const DVec3 du = c.point(u + h, v) - c.point(u - h, v), dv = c.point(u, v + h) - c.point(u, v - h);
@@ -238,12 +238,12 @@ TEST(Quadrics, NormalsAndWindingFollowTheParameterDirections) {
   }
 }
 
-/// Edges by position that have no partner running the other way; none may occur twice.
+/// Edges, identified by positions, without an opposite edge; no edge may occur twice in one direction.
 std::vector<std::pair<uint32_t, uint32_t>> boundary_edges(const Mesh& mesh, const std::string& name) {
   std::map<std::array<float, 3>, uint32_t> place;
   std::map<std::pair<uint32_t, uint32_t>, int> edges;
   const auto id = [&](uint32_t v) {
-    const Vec3 p = mesh.positions[v] + Vec3(0.0f); // -0 and 0 are one place
+    const Vec3 p = mesh.positions[v] + Vec3(0.0f); // -0 and 0 are equal
     return place.try_emplace({p.x, p.y, p.z}, static_cast<uint32_t>(place.size())).first->second;
   };
   for (const Triangle& t : mesh.triangles)
@@ -259,7 +259,7 @@ std::vector<std::pair<uint32_t, uint32_t>> boundary_edges(const Mesh& mesh, cons
 
 TEST(Quadrics, SeamsAndPolesAreWatertightByPosition) {
   for (const Case& c : all_cases()) {
-    if (c.name == "double cone") continue; // both of its cones meet in one point: checked below
+    if (c.name == "double cone") continue; // its two cones meet in a point; checked below
     const auto open = boundary_edges(c.tessellate(0.01), c.name);
     std::map<uint32_t, uint32_t> next(open.begin(), open.end());
     EXPECT_EQ(next.size(), open.size()) << c.name;
@@ -288,7 +288,7 @@ TEST(Quadrics, NoTriangleIsDegenerate) {
 
 TEST(Quadrics, AreasConvergeToTheAnalyticOnes) {
   for (const Case& c : all_cases()) {
-    if (c.area < 0.0) continue; // no closed form at hand
+    if (c.area < 0.0) continue; // no closed form
     const Mesh mesh = c.tessellate(1e-4);
     double area = 0.0;
     for (const Triangle& t : mesh.triangles) area += glm::length(area_vector(mesh, t));
@@ -375,24 +375,23 @@ TEST(Quadrics, ParametersThatLeaveNothingToDrawAreErrors) {
 }
 
 TEST(Quadrics, SteepParaboloidsTakeFewRows) {
-  // Equal steps of r would take 10^4 rows for the first and 10^18 for the last.
+  // Equal steps in r would need 10^4 rows for the first height and 10^18 for the last.
   for (const float height : {1e3f, 1e9f, 1e30f}) {
     const Case c = paraboloid("steep", {1e-3f, 0, height, 360}, 1e-3, 1);
     const Mesh mesh = c.tessellate(1e-3);
     EXPECT_LE(mesh.positions.size(), 101u * 50u) << height;
     double area = 0.0;
     for (const Triangle& t : mesh.triangles) area += glm::length(area_vector(mesh, t));
-    // Almost a cone's surface between the circles that it is made of, so 4/3 pi r h; the polygons lose 1 -
-    // sinc(pi/100).
+    // The surface is almost that of cones between the circles, 4/3 pi r h in total; the polygons lose 1 - sinc(pi/100).
     EXPECT_NEAR(area / (4.0 / 3.0 * kPi * 1e-3 * height), 1.0, 3e-3) << height;
   }
 }
 
 TEST(Quadrics, VerticesStayFewAtTheFinestTolerance) {
-  constexpr size_t kMost = size_t{1} << 23;
-  EXPECT_LT(tessellate_sphere({}, 1e-6).positions.size(), kMost);
-  EXPECT_LT(tessellate_paraboloid({1e-3f, 0, 1e30f, 360}, 1e-6).positions.size(), kMost);
-  EXPECT_LT(tessellate_hyperboloid({{1, -1e-3f, -1}, {-1, 1e-3f, 1}, 360}, 1e-6).positions.size(), kMost);
+  constexpr size_t kMax = size_t{1} << 23;
+  EXPECT_LT(tessellate_sphere({}, 1e-6).positions.size(), kMax);
+  EXPECT_LT(tessellate_paraboloid({1e-3f, 0, 1e30f, 360}, 1e-6).positions.size(), kMax);
+  EXPECT_LT(tessellate_hyperboloid({{1, -1e-3f, -1}, {-1, 1e-3f, 1}, 360}, 1e-6).positions.size(), kMax);
 }
 
 using Place = std::array<float, 3>;
@@ -400,7 +399,7 @@ Place place_of(Vec3 p) { return {p.x, p.y, p.z}; }
 
 using Edge = std::pair<Place, Place>;
 
-/// The boundary edges along the circle of that radius and height.
+/// The boundary edges along the circle of a given radius and height.
 std::set<Edge> rim_of(const Mesh& mesh, float radius, float z) {
   std::map<Edge, int> edges;
   for (const Triangle& t : mesh.triangles)
@@ -429,7 +428,7 @@ TEST(Quadrics, ShapesThatMeetInACircleHaveTheSameRim) {
       EXPECT_EQ(rim_of(tessellate_cone({r, h, phi}, tolerance), r, 0), base);
       EXPECT_EQ(rim_of(tessellate_sphere({r, 0, r, phi}, tolerance), r, 0), base);
       EXPECT_EQ(rim_of(tessellate_sphere({r, -r, 0, phi}, tolerance), r, 0), base);
-      const float z = 0.42f, at_z = 0.56f; // a triangle of sides 3, 4 and 5
+      const float z = 0.42f, at_z = 0.56f; // a right triangle with sides 3, 4 and 5
       const std::set<Edge> cut = rim_of(tessellate_sphere({r, -r, z, phi}, tolerance), at_z, z);
       EXPECT_EQ(cut.size(), rim.size());
       EXPECT_EQ(rim_of(tessellate_sphere({r, z, r, phi}, tolerance), at_z, z), cut);
@@ -447,7 +446,7 @@ double six_volumes(const Mesh& mesh) {
 
 TEST(Quadrics, VolumesConvergeToTheAnalyticOnesFromInside) {
   const double r = 1.5, h = 2.25;
-  const auto disk_volume = [&](double tolerance, double height) { // facing up
+  const auto disk_volume = [&](double tolerance, double height) { // of a disk that faces up
     return six_volumes(tessellate_disk({static_cast<float>(height), 1.5f, 0, 360}, tolerance));
   };
   struct Solid {
@@ -456,37 +455,26 @@ TEST(Quadrics, VolumesConvergeToTheAnalyticOnesFromInside) {
     double volume;
   };
   const Solid solids[] = {
-      {"sphere",
-       [](double t) {
-         return six_volumes(tessellate_sphere({1.5f, -1.5f, 1.5f, 360}, t));
-       },
+      {"sphere", [](double t) { return six_volumes(tessellate_sphere({1.5f, -1.5f, 1.5f, 360}, t)); },
        4.0 / 3.0 * kPi * r * r * r},
       {"half sphere with its disk at 0",
-       [](double t) {
-         return six_volumes(tessellate_sphere({1.5f, 0, 1.5f, 360}, t));
-       },
-       2.0 / 3.0 * kPi * r * r * r},
+       [](double t) { return six_volumes(tessellate_sphere({1.5f, 0, 1.5f, 360}, t)); }, 2.0 / 3.0 * kPi * r * r * r},
       {"cylinder with two disks",
        [&](double t) {
          return six_volumes(tessellate_cylinder({1.5f, 2.25f, -1, 360}, t)) + disk_volume(t, h) - disk_volume(t, -1);
        },
        kPi * r * r * (h + 1)},
-      {"cone with its disk at 0",
-       [](double t) {
-         return six_volumes(tessellate_cone({1.5f, 2.25f, 360}, t));
-       },
+      {"cone with its disk at 0", [](double t) { return six_volumes(tessellate_cone({1.5f, 2.25f, 360}, t)); },
        kPi * r * r * h / 3},
       {"paraboloid with its disk",
-       [&](double t) {
-         return six_volumes(tessellate_paraboloid({1.5f, 0, 2.25f, 360}, t)) + disk_volume(t, h);
-       },
+       [&](double t) { return six_volumes(tessellate_paraboloid({1.5f, 0, 2.25f, 360}, t)) + disk_volume(t, h); },
        kPi * r * r * h / 2},
   };
   for (const Solid& solid : solids) {
     for (const double tolerance : {0.05, 1e-3, 1e-5}) {
       const double error = 1.0 - solid.six_volumes_at(tolerance) / 6.0 / solid.volume;
       EXPECT_GE(error, -1e-6) << solid.name << " " << tolerance << ": inscribed";
-      EXPECT_LE(error, 4.0 * tolerance) << solid.name << " " << tolerance; // area / volume x radius, at most
+      EXPECT_LE(error, 4.0 * tolerance) << solid.name << " " << tolerance; // at most area / volume x radius
     }
   }
 }
@@ -509,7 +497,7 @@ TEST(Quadrics, LimitsMayComeInEitherOrder) {
 }
 
 TEST(Quadrics, WhatFloatsCannotTellApartIsLeftOut) {
-  // Neighbouring floats: some points of the two circles round to the same places, others do not.
+  // For neighbouring floats, some points of the two circles round to the same position and others do not.
   const float radius = std::nextafter(2.0f, 0.0f), inner = std::nextafter(radius, 0.0f);
   const Mesh ring = tessellate_disk({0, radius, inner, 360}, 1e-3);
   EXPECT_FALSE(ring.triangles.empty());

@@ -14,7 +14,7 @@
 
 namespace packtrace {
 
-/// A folder of its own for one test, removed with it.
+/// A temporary folder for one test, which the destructor removes.
 class SceneFolder : public TemporaryFolder {
 public:
   std::filesystem::path write(const std::string& name, std::string_view content) const {
@@ -25,10 +25,10 @@ public:
   }
 };
 
-/// "name7" of "name" and 7.
+/// Appends a number to a name: "name", 7 -> "name7".
 inline std::string numbered(std::string name, int number) { return name += std::to_string(number); }
 
-/// What an import gave, with its diagnostics as text.
+/// Result of an import with its diagnostics.
 struct Imported {
   Scene scene;
   ImportStatistics statistics;
@@ -60,7 +60,7 @@ inline Imported import_text(const SceneFolder& folder, std::string_view text, co
   return import_file(folder.write("scene.pbrt", text), options);
 }
 
-/// Imports what stands between WorldBegin and WorldEnd; its first line is line 1.
+/// Imports the content of a world; its first line is line 1 of the file.
 inline Imported import_world(const SceneFolder& folder, std::string_view world, const ImportOptions& options = {}) {
   return import_text(folder, "WorldBegin " + std::string(world) + "\nWorldEnd\n", options);
 }
@@ -68,7 +68,7 @@ inline Imported import_world(const SceneFolder& folder, std::string_view world, 
 inline constexpr std::string_view kTriangle =
     " Shape \"trianglemesh\" \"integer indices\" [0 1 2] \"point P\" [0 0 0  1 0 0  0 1 0] ";
 
-/// A file with that triangle, and the shape that names it.
+/// A PLY file with this triangle, and the shape that refers to it.
 inline constexpr std::string_view kPly =
     "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
     "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
@@ -77,12 +77,12 @@ inline std::string ply_shape(const std::string& file) {
   return "Shape \"plymesh\" \"string filename\" \"" + file + "\"\n";
 }
 
-/// A shape's vertex in its parent's space.
+/// Position of a shape's vertex in its parent's space.
 inline DVec3 placed(const Shape& shape, const Scene& scene, size_t vertex) {
   return transform_point(shape.parent_from_mesh, DVec3(scene.meshes[shape.mesh].positions[vertex]));
 }
 
-/// The one material there should be.
+/// The only material of a scene; fails if there is any other number of them.
 inline Material only_material(const Imported& imported) {
   EXPECT_EQ(imported.scene.materials.size(), 1u) << imported.text();
   return imported.scene.materials.empty() ? Material{} : imported.scene.materials[0];

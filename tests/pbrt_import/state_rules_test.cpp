@@ -1,4 +1,4 @@
-// What pbrt-v3's graphics state keeps apart, what it shares, and what it gives back.
+// Scoping rules of pbrt-v3's graphics state: what blocks save and restore, and what is global.
 #include "pbrt_import/language/transforms.h"
 #include "tests/pbrt_import/scene_folder.h"
 
@@ -11,7 +11,7 @@ const Material& material_of(const Imported& imported, size_t shape) {
   return imported.scene.materials[imported.scene.shapes[shape].material];
 }
 
-/// Where the n-th shape's first vertex ends up.
+/// Position of a shape's first vertex in its parent's space.
 DVec3 corner(const Imported& imported, size_t shape) { return placed(imported.scene.shapes[shape], imported.scene, 0); }
 
 TEST(StateRules, AttributeBlocksScopeMaterialLightAndOrientation) {
@@ -61,7 +61,7 @@ TEST(StateRules, FloatAndSpectrumTexturesHaveNamesOfTheirOwn) {
       folder, "Texture \"t\" \"float\" \"constant\" \"float value\" 0 Texture \"t\" \"spectrum\" \"constant\" \"rgb "
               "value\" [.25 .25 .25] Material \"matte\" \"texture Kd\" \"t\"" +
                   kShape + kShape + "\"texture alpha\" \"t\"");
-  ASSERT_EQ(imported.scene.shapes.size(), 1u) << imported.text(); // the other one's alpha is 0
+  ASSERT_EQ(imported.scene.shapes.size(), 1u) << imported.text(); // the other shape's alpha is 0
   EXPECT_NEAR(material_of(imported, 0).albedo.x, 0.25f, 1e-6f);
 }
 
@@ -153,7 +153,7 @@ TEST(StateRules, ObjectsScopeLikeAttributeBlocks) {
   const Shape& inside = imported.scene.objects[0].shapes[0];
   EXPECT_TRUE(inside.reverse_orientation);
   EXPECT_EQ(imported.scene.materials[inside.material].flags, kMirror);
-  EXPECT_EQ(placed(inside, imported.scene, 0), DVec3(6, 5, 5)); // not from the origin anew
+  EXPECT_EQ(placed(inside, imported.scene, 0), DVec3(6, 5, 5)); // the transform is not reset
 }
 
 TEST(StateRules, ReverseOrientationTwiceIsNone) {
@@ -185,7 +185,7 @@ TEST(StateRules, NormalsFollowOrientationAndHandedness) {
 
 TEST(StateRules, InstanceTransformsDoNotTurnNormalsOver) {
   const SceneFolder folder;
-  // pbrt takes an instance's normals along with the inverse transpose: mirroring does not reverse an orientation.
+  // pbrt transforms an instance's normals by the inverse transpose, so mirroring does not flip the orientation.
   const Imported imported = import_world(folder, "ObjectBegin \"o\" ReverseOrientation" + kShape +
                                                      "ObjectEnd Scale 1 -1 1 ObjectInstance \"o\"");
   const Shape& shape = imported.scene.objects[0].shapes[0];

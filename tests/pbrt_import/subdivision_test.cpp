@@ -18,8 +18,8 @@
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <OpenMesh/Tools/Subdivider/Uniform/LoopT.hh>
 
-#include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/scene/bounds.h"
 
 namespace packtrace {
 namespace {
@@ -38,7 +38,8 @@ Control octahedron() {
           {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}, {1, 0, 5}, {2, 1, 5}, {3, 2, 5}, {0, 3, 5}}};
 }
 
-/// n x n squares in the xy plane, each cut the same way: inner vertices have valence 6. height disturbs z.
+/// n x n squares in the xy plane, all split along the same diagonal, so that inner vertices have valence 6. `height`
+/// scales a random displacement in z.
 Control grid(uint32_t n, float height = 0.0f) {
   Control control;
   std::mt19937 random(3);
@@ -55,7 +56,7 @@ Control grid(uint32_t n, float height = 0.0f) {
   return control;
 }
 
-/// A closed double pyramid over an n-gon: apexes of valence n, others of valence 4.
+/// A closed double pyramid over an n-gon: the apexes have valence n, the other vertices valence 4.
 Control double_pyramid(uint32_t n) {
   Control control{{{0.1f, 0, 1}, {0, 0.1f, -2}}, {}};
   for (uint32_t i = 0; i < n; ++i) {
@@ -70,7 +71,7 @@ Control double_pyramid(uint32_t n) {
   return control;
 }
 
-/// An open fan of n triangles around point 0, which is on the boundary.
+/// An open fan of n triangles around point 0, which is at the boundary.
 Control open_fan(uint32_t n) {
   Control control{{{0, 0, 0.2f}}, {}};
   for (uint32_t i = 0; i <= n; ++i) {
@@ -89,14 +90,13 @@ Mesh subdivide(const Control& control, uint32_t levels) {
   return subdivide_loop(control.points, control.triangles, levels, keep_message);
 }
 
-/// Edges by index without a partner; fails where an edge runs the same way twice.
+/// Number of edges without an opposite edge; fails if an edge occurs twice in one direction.
 size_t boundary_edge_count(const Mesh& mesh) {
   std::set<std::pair<uint32_t, uint32_t>> edges;
   for (const Triangle& t : mesh.triangles)
     for (int k = 0; k < 3; ++k) EXPECT_TRUE(edges.insert({t[k], t[(k + 1) % 3]}).second);
-  return static_cast<size_t>(std::count_if(edges.begin(), edges.end(), [&](auto e) {
-    return !edges.count({e.second, e.first});
-  }));
+  return static_cast<size_t>(
+      std::count_if(edges.begin(), edges.end(), [&](auto e) { return !edges.count({e.second, e.first}); }));
 }
 
 void expect_sound(const Mesh& mesh) {
@@ -184,7 +184,7 @@ TEST(Subdivision, BoundaryVerticesFollowPbrtsRules) {
     const Vec3 expected = (half_first + 3.0f * even(first, p, last) + half_last) / 5.0f;
     EXPECT_LT(glm::distance(subdivide(fan, 1).positions[0], expected), 1e-6f);
   }
-  // Normals of flat fans, and the tangents of a bent one: the boundary's chord and the middle rib.
+  // Normals of flat fans, and tangents of a bent fan: the chord of the boundary and the middle edge.
   for (const uint32_t n : {1u, 2u, 3u, 4u, 9u}) {
     Control flat = open_fan(n);
     for (Vec3& p : flat.points) p.z = 0.0f;
@@ -233,7 +233,7 @@ TEST(Subdivision, BoundaryCurveDependsOnTheBoundaryAlone) {
   EXPECT_EQ(flat_edge, bumped_edge);
 }
 
-/// OpenMesh weighs vertices of valence 3 and 6, and boundaries while it refines, as pbrt does.
+/// Compares with OpenMesh, which uses pbrt's weights at vertices of valence 3 and 6, and at boundaries while refining.
 void expect_agreement_with_openmesh(const Control& control) {
   using Oracle = OpenMesh::TriMesh_ArrayKernelT<>;
   Oracle oracle;
@@ -244,11 +244,11 @@ void expect_agreement_with_openmesh(const Control& control) {
   loop.attach(oracle);
   loop(2);
   const size_t coarse_count = oracle.n_vertices();
-  loop(5); // the vertices of two levels keep their handles and approach the limit
+  loop(5); // the vertices of two levels keep their handles and converge to the limit
   loop.detach();
   const Mesh mesh = subdivide(control, 2);
   ASSERT_EQ(mesh.positions.size(), coarse_count);
-  const std::vector<uint8_t> boundary = on_boundary(mesh); // pbrt has its own idea of a boundary's limit
+  const std::vector<uint8_t> boundary = on_boundary(mesh); // pbrt uses a different limit at the boundary
   std::vector<uint8_t> matched(coarse_count, 0);
   for (size_t v = 0; v < coarse_count; ++v) {
     if (boundary[v]) continue;
@@ -281,7 +281,7 @@ TEST(Subdivision, ThreeTrianglesAtAnEdgeAreKeptAndReported) {
 }
 
 TEST(Subdivision, SurfacesCutAlongACurveStayTogetherThere) {
-  // Three strips that share a polyline: their boundaries along it are the same curve.
+  // Three strips that share a polyline; their boundaries along it are the same curve.
   Control strips;
   for (int i = 0; i < 6; ++i) strips.points.emplace_back(0.1 * (i % 2), 0, i);
   for (uint32_t s = 0; s < 3; ++s) {
@@ -298,7 +298,8 @@ TEST(Subdivision, SurfacesCutAlongACurveStayTogetherThere) {
   EXPECT_EQ(mesh.triangles.size(), 30u * 16u);
   std::map<std::array<float, 3>, int> places;
   for (const Vec3& p : mesh.positions) ++places[{p.x, p.y, p.z}];
-  // Inner points of the curve, 17 of 21: its ends are corners of each strip and so have other neighbours.
+  // Points of the curve away from its ends, 17 of 21, are shared by all strips; the ends are corners of each strip and
+  // have other neighbours.
   EXPECT_GE(std::count_if(places.begin(), places.end(), [](const auto& place) { return place.second == 3; }), 13);
 }
 
@@ -339,12 +340,12 @@ TEST(Subdivision, HostileTopologyLosesNoTriangle) {
 }
 
 TEST(Subdivision, LimitsAreTheMasksOfTheirValence) {
-  // A pyramid's apex over a ring at 0 ends up at 1 - n gamma of its height, gamma = 1 / (n + 3 / (8 beta)).
+  // The apex of a pyramid over a ring at height 0 moves to 1 - n gamma of its height, gamma = 1 / (n + 3 / (8 beta)).
   for (const uint32_t n : {3u, 4u, 5u, 6u, 7u, 20u, 64u, 1000u}) {
     Control control = double_pyramid(n);
     control.points[0] = {0, 0, 1};
     for (size_t i = 2; i < control.points.size(); ++i) control.points[i].z = 0.0f;
-    const float expected = n == 3 ? 0.4f : 0.5f; // beta is 3 / 16 for 3, else 3 / (8 n)
+    const float expected = n == 3 ? 0.4f : 0.5f; // beta is 3 / 16 for n = 3, else 3 / (8 n)
     for (uint32_t levels = 0; levels <= 3; ++levels) {
       const Mesh mesh = subdivide(control, levels);
       EXPECT_NEAR(mesh.positions[0].z, expected, 1e-6f) << n;

@@ -1,4 +1,4 @@
-// What all shapes have in common: which side they face, and that they depend on nothing but their parameters.
+// Common properties of all shapes: their orientation, and that they depend on their parameters only.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -22,7 +22,7 @@
 namespace packtrace {
 namespace {
 
-/// The geometric normal of a triangle in its parent's space, not unit, by the rule that scene.h gives.
+/// Geometric normal of a triangle in its parent's space, not normalised, as defined in scene.h.
 DVec3 geometric_normal(const Scene& scene, const Shape& shape, const Triangle& t) {
   const DVec3 a = placed(shape, scene, t.x), b = placed(shape, scene, t.y), c = placed(shape, scene, t.z);
   const bool negated = shape.reverse_orientation != swaps_handedness(shape.parent_from_mesh);
@@ -32,7 +32,7 @@ DVec3 geometric_normal(const Scene& scene, const Shape& shape, const Triangle& t
 TEST(Tessellation, QuadricsFaceWherePbrtSays) {
   const struct {
     const char* shape;
-    std::function<DVec3(DVec3)> facing; ///< at a point of the shape: cross(dp/du, dp/dv)
+    std::function<DVec3(DVec3)> facing; ///< cross(dp/du, dp/dv) at a point of the shape
   } cases[] = {
       {R"("sphere")", [](DVec3 p) { return p; }},
       {R"("sphere" "float zmin" -0.5 "float zmax" 0.25 "float phimax" 200)", [](DVec3 p) { return p; }},
@@ -57,7 +57,8 @@ TEST(Tessellation, QuadricsFaceWherePbrtSays) {
         for (const Triangle& t : mesh.triangles) {
           const DVec3 middle =
               (DVec3(mesh.positions[t.x]) + DVec3(mesh.positions[t.y]) + DVec3(mesh.positions[t.z])) / 3.0;
-          // pbrt mirrors neither n nor the rule: its normals are transformed as such, then negated if reversed.
+          // In pbrt mirroring does not flip normals: they are transformed as normals, then negated if the shape is
+          // reversed.
           const DVec3 expected = normal_from_mesh * c.facing(middle) * (reversed ? -1.0 : 1.0);
           ASSERT_GT(glm::dot(geometric_normal(imported.scene, shape, t), expected), 0.0) << text;
           for (int k = 0; k < 3; ++k) ASSERT_GT(glm::dot(DVec3(mesh.normals[t[k]]), c.facing(middle)), 0.0) << text;
@@ -83,16 +84,12 @@ std::vector<std::function<Mesh()>> one_of_each() {
       [] { return tessellate_disk({}, 1e-3); },
       [] { return tessellate_cone({}, 1e-3); },
       [] { return tessellate_paraboloid({}, 1e-3); },
-      [] {
-        return tessellate_hyperboloid({{1, 0, -1}, {0, 1, 1}, 360}, 1e-3);
-      },
+      [] { return tessellate_hyperboloid({{1, 0, -1}, {0, 1, 1}, 360}, 1e-3); },
       [=] { return make_curve(CurveType::kFlat); },
       [=] { return make_curve(CurveType::kCylinder); },
       [=] { return make_curve(CurveType::kRibbon); },
       [] { return subdivide_loop(points, triangles, 4, {}); },
-      [] {
-        return tessellate_nurbs({2, 2, 2, 2, knots, knots, {}, {}, {}, {}, control}, 1e-3);
-      },
+      [] { return tessellate_nurbs({2, 2, 2, 2, knots, knots, {}, {}, {}, {}, control}, 1e-3); },
       [] { return make_heightfield(3, 2, heights); },
   };
 }
@@ -135,7 +132,7 @@ TEST(Tessellation, KeepsTheContractOfMeshes) {
   for (const auto& make : one_of_each()) expect_contract(make(), "one of each");
 }
 
-/// Numbers that make trouble, and some that do not.
+/// Random numbers, problematic and ordinary ones.
 class Numbers {
 public:
   explicit Numbers(uint32_t seed) : random_(seed) {}
@@ -159,24 +156,12 @@ private:
 
 TEST(Tessellation, AnyNumbersGiveAnErrorOrASoundMesh) {
   const std::function<Mesh(Numbers&)> kinds[] = {
-      [](Numbers& x) {
-        return tessellate_sphere({x(), x(), x(), x() * 300}, 0.05);
-      },
-      [](Numbers& x) {
-        return tessellate_cylinder({x(), x(), x(), x() * 300}, 0.05);
-      },
-      [](Numbers& x) {
-        return tessellate_disk({x(), x(), x(), x() * 300}, 0.05);
-      },
-      [](Numbers& x) {
-        return tessellate_cone({x(), x(), x() * 300}, 0.05);
-      },
-      [](Numbers& x) {
-        return tessellate_paraboloid({x(), x(), x(), x() * 300}, 0.05);
-      },
-      [](Numbers& x) {
-        return tessellate_hyperboloid({x.vector(), x.vector(), x() * 300}, 0.05);
-      },
+      [](Numbers& x) { return tessellate_sphere({x(), x(), x(), x() * 300}, 0.05); },
+      [](Numbers& x) { return tessellate_cylinder({x(), x(), x(), x() * 300}, 0.05); },
+      [](Numbers& x) { return tessellate_disk({x(), x(), x(), x() * 300}, 0.05); },
+      [](Numbers& x) { return tessellate_cone({x(), x(), x() * 300}, 0.05); },
+      [](Numbers& x) { return tessellate_paraboloid({x(), x(), x(), x() * 300}, 0.05); },
+      [](Numbers& x) { return tessellate_hyperboloid({x.vector(), x.vector(), x() * 300}, 0.05); },
       [](Numbers& x) {
         std::vector<Vec3> points(3 + x.below(6)), normals(2 + x.below(3));
         for (Vec3& p : points) p = x.vector();

@@ -21,7 +21,7 @@ TextBlock block_of(std::string_view text) {
   return block;
 }
 
-/// Runs as "kind begin-end xCOUNT".
+/// Number runs as "kind begin-end xCOUNT".
 std::string runs_of(std::string_view text) {
   std::string all;
   for (const NumberRun& run : block_of(text).runs) {
@@ -39,7 +39,7 @@ TEST(NumberRuns, DeclarationsSayWhatTheNumbersAre) {
 TEST(NumberRuns, WithoutADeclarationWholeNumbersAreIntegers) {
   EXPECT_EQ(runs_of("1 2 3]"), "i0-5 x3; ");
   EXPECT_EQ(runs_of("1 2 3.5]"), "f0-7 x3; ");
-  EXPECT_EQ(runs_of("-0 1]"), "f0-4 x2; "); // the sign would be lost
+  EXPECT_EQ(runs_of("-0 1]"), "f0-4 x2; "); // as an integer it would lose its sign
 }
 
 TEST(NumberRuns, GoOnBehindWhatIsNoPlainNumber) {
@@ -48,7 +48,7 @@ TEST(NumberRuns, GoOnBehindWhatIsNoPlainNumber) {
 
 TEST(NumberRuns, EndWithTheirArray) { EXPECT_EQ(runs_of("\"float f\" [1] 2 3 \"float g\" [\"a\" 4]"), "f11-12 x1; "); }
 
-/// All tokens and numbers of a file, the numbers taken from runs where there are some.
+/// All tokens and numbers of a file; numbers come from runs if possible.
 std::string reading_of(const std::filesystem::path& path, size_t window, uint64_t& numbers_in_runs) {
   Tokenizer tokenizer(InputFile(path, 1u << 30), window);
   std::string all;
@@ -97,7 +97,7 @@ TEST(TextBlocks, EveryBlockSizeReadsTheSame) {
 
 TEST(TextBlocks, EveryThreadCountReadsTheSame) {
   const SceneFolder folder;
-  const std::filesystem::path file = folder.write("text", large_scene(300)); // large enough for help
+  const std::filesystem::path file = folder.write("text", large_scene(300)); // large enough for helper threads
   std::vector<std::string> readings;
   for (const size_t threads : {size_t{1}, size_t{2}, size_t{4}}) {
     const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism, threads);

@@ -2,8 +2,8 @@
 
 #include <tbb/global_control.h>
 
-#include "pbrt_import/files/image_file.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/files/image_file.h"
 #include "pbrt_import/language/spectrum.h"
 #include "pbrt_import/language/texture_graph.h"
 #include "tests/pbrt_import/scene_folder.h"
@@ -11,7 +11,7 @@
 namespace packtrace {
 namespace {
 
-/// An uncompressed 24-bit TGA from top to bottom; grey values of one byte each.
+/// An uncompressed 24-bit TGA with rows from the top, from grey values of one byte.
 std::string grey_tga(uint32_t width, uint32_t height, const std::vector<uint8_t>& grey) {
   std::string file(18, '\0');
   file[2] = 2;
@@ -84,7 +84,7 @@ TEST(Spectrum, FlatSpectrumHasUnitLuminance) {
   const float flat[] = {400, 1, 700, 1};
   const Vec3 rgb = rgb_from_samples(flat);
   EXPECT_NEAR(0.212671f * rgb.x + 0.715160f * rgb.y + 0.072169f * rgb.z, 1.0f, 1e-3f);
-  EXPECT_NEAR(rgb.y, 0.95f, 0.05f); // equal energy is a little pink in sRGB
+  EXPECT_NEAR(rgb.y, 0.95f, 0.05f); // equal energy is slightly pink in sRGB
 }
 
 TEST(Spectrum, LongWavesAreRed) {
@@ -99,7 +99,7 @@ TEST(Spectrum, XyzOfD65IsWhite) {
 }
 
 TEST(Spectrum, ConductorsReflect) {
-  EXPECT_NEAR(conductor_albedo(1.0f, 0.0f), 0.0f, 1e-6f); // no boundary at all
+  EXPECT_NEAR(conductor_albedo(1.0f, 0.0f), 0.0f, 1e-6f); // no interface
   const MetalIndices copper = *metal_by_name("metals/Cu.eta.spd");
   const Vec3 albedo(conductor_albedo(copper.eta.x, copper.k.x), conductor_albedo(copper.eta.y, copper.k.y),
                     conductor_albedo(copper.eta.z, copper.k.z));
@@ -330,7 +330,7 @@ TEST(AlphaTextures, DeepTextureGraphsEnd) {
   EXPECT_FALSE(shallow.reported("approximated"));
 }
 
-/// The world with textures kept.
+/// Imports a world with ImportOptions::keep_textures.
 ImportResult with_textures(const SceneFolder& folder, const std::string& world) {
   folder.write("kept.pbrt", "WorldBegin\n" + world + "\nWorldEnd\n");
   ImportOptions options;
@@ -416,13 +416,13 @@ TEST(AlbedoTextures, EqualOnesAreStoredOnceAndUnusedOnesNot) {
 TEST(AlbedoTextures, TogetherStayWithinTheBudget) {
   const SceneFolder folder;
   std::string world;
-  for (const std::string name : {"a", "b", "c"}) { // 3000 bytes of colours each
+  for (const std::string name : {"a", "b", "c"}) { // each has 3000 bytes of colours
     folder.write(name + ".tga", grey_tga(100, 10, std::vector<uint8_t>(1000, static_cast<uint8_t>(name[0]))));
     world += "Texture \"" + name + "\" \"spectrum\" \"imagemap\" \"string filename\" \"" + name + ".tga\"\n" +
              "Material \"matte\" \"texture Kd\" \"" + name + "\"\n" + std::string(kTriangle) + "\n";
   }
   folder.write("three.pbrt", "WorldBegin\n" + world + "\nWorldEnd\n");
-  const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1); // one image after the other
+  const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1); // one image at a time
   const auto textures = [&](uint64_t budget, bool keep) {
     ImportOptions options;
     options.keep_textures = keep;
@@ -431,7 +431,8 @@ TEST(AlbedoTextures, TogetherStayWithinTheBudget) {
     Progress progress;
     return import_scene(folder.path() / "three.pbrt", options, diagnostics, progress).scene.textures.size();
   };
-  // Content and decoding take 10,000 bytes at a time, colours of the images 9000 and the textures 9000.
+  // Reading and decoding need 10,000 bytes at a time; the images' colours and the textures need 9000 bytes each in
+  // total.
   EXPECT_EQ(textures(20'000, true), 3u);
   EXPECT_EQ(textures(15'000, false), 0u);
   EXPECT_THROW(textures(15'000, true), MemoryError);

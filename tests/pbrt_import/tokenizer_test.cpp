@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "pbrt_import/text/number.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/text/number.h"
 #include "tests/pbrt_import/damaged_files.h"
 #include "tests/pbrt_import/scene_folder.h"
 
@@ -33,7 +33,7 @@ std::string listing(Tokenizer tokenizer) {
   }
 }
 
-/// Appends what read_numbers gives.
+/// Appends the numbers that read_numbers() passes.
 template <class T>
 void read_numbers(Tokenizer& tokenizer, std::vector<T>& values) {
   tokenizer.read_numbers<T>([&](auto numbers) { values.insert(values.end(), numbers.begin(), numbers.end()); });
@@ -178,7 +178,7 @@ TEST(Number, PlainDecimalsAreRoundedLikeFromChars) {
 }
 
 TEST(Number, HalfwayCasesRoundOnce) {
-  // 1 + 2^-24 lies between two floats; a digit far behind decides, which rounding to double first would lose.
+  // 1 + 2^-24 lies between two floats; a late digit decides, which rounding to double first would lose.
   EXPECT_EQ(scanned("1.000000059604644775390625"), 1.0f);
   EXPECT_EQ(scanned("1.0000000596046447754"), std::nextafter(1.0f, 2.0f));
   EXPECT_EQ(scanned("16777217"), 16777216.0f);
@@ -245,8 +245,7 @@ TEST(Escapes, KnownOnesAreReplacedOthersKept) {
 
 TEST(InputFile, GzipMembersAreInflated) {
   const SceneFolder folder;
-  EXPECT_EQ(listing(open(folder, gzip("Scale 1 ") + gzip("2 3"))),
-            "w:Scale@1:1 w:1@1:7 w:2@1:9 w:3@1:11 end@1:12 ");
+  EXPECT_EQ(listing(open(folder, gzip("Scale 1 ") + gzip("2 3"))), "w:Scale@1:1 w:1@1:7 w:2@1:9 w:3@1:11 end@1:12 ");
 }
 
 TEST(InputFile, EveryTruncatedGzipIsAnError) {
@@ -272,8 +271,9 @@ TEST(InputFile, GzipBombsStopAtTheLimit) {
 TEST(Tokenizer, TokensLongerThanAnyNameHaveNoText) {
   const SceneFolder folder;
   const std::string longest(kMaxTokenBytes - 2, 'a'), too_long(5 * kMaxTokenBytes, 'a');
-  EXPECT_EQ(listing(open(folder, "\"" + longest + "\" b")), "s:" + longest + "@1:1 w:b@1:" + std::to_string(longest.size() + 4) +
-                                                                 " end@1:" + std::to_string(longest.size() + 5) + " ");
+  EXPECT_EQ(listing(open(folder, "\"" + longest + "\" b")), "s:" + longest +
+                                                                "@1:1 w:b@1:" + std::to_string(longest.size() + 4) +
+                                                                " end@1:" + std::to_string(longest.size() + 5) + " ");
   for (const size_t window : {size_t{64}, Tokenizer::kDefaultWindow}) {
     EXPECT_EQ(listing(open(folder, "\"" + too_long + "\"\nb", window)), "l@1:1 w:b@2:1 end@2:2 ");
     EXPECT_EQ(listing(open(folder, too_long + "\nb", window)), "l@1:1 w:b@2:1 end@2:2 ");

@@ -1,4 +1,4 @@
-// Files with several worlds, of which one is read.
+// Files with several worlds, of which only one is read.
 #include "pbrt_import/base/error.h"
 #include "tests/pbrt_import/scene_folder.h"
 
@@ -11,7 +11,7 @@ ImportOptions world(uint32_t number) {
   return options;
 }
 
-/// Two worlds that differ in everything a world has.
+/// Two worlds that differ in all their content.
 std::string two_worlds() {
   return "Translate 0 0 1 CoordinateSystem \"mine\" Camera \"perspective\" \"float fov\" 30\n"
          "Film \"image\" \"integer xresolution\" 11\n"
@@ -96,7 +96,7 @@ TEST(Worlds, FilesOfUnreadOnesAreNotOpenedButTheirTextIsChecked) {
       import_text(folder, "WorldBegin" + std::string(kTriangle) + "WorldEnd\nWorldBegin " + ply_shape("gone.ply") +
                               "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"gone.png\"\n"
                               "Trianslate 1 2 3\nTranslate 1 2\nWorldEnd");
-  EXPECT_EQ(imported.statistics.shapes.size(), 1u); // and not counted
+  EXPECT_EQ(imported.statistics.shapes.size(), 1u); // shapes of other worlds are not counted
   EXPECT_EQ(imported.statistics.textures_missing, 0u);
   EXPECT_EQ(imported.count(Severity::kError), 2u) << imported.text();
   EXPECT_TRUE(imported.reported("4:1: error: unknown directive \"Trianslate\""));

@@ -110,7 +110,7 @@ public:
   }
 
 private:
-  static constexpr size_t kMost = 3 * kMaxClusterTriangles + 2; ///< each triangle adds up to three
+  static constexpr size_t kMax = 3 * kMaxClusterTriangles + 2; ///< each triangle adds up to three
 
   /// Prefers triangles that add no vertex or have no free neighbour; left behind, the latter would become isolated
   /// pieces of other clusters.
@@ -119,10 +119,10 @@ private:
   }
 
   uint32_t count_ = 0;
-  std::array<uint32_t, kMost> triangle_, added_, open_;
-  std::array<std::array<uint32_t, kMost>, 3> vertices_;
-  alignas(16) std::array<std::array<double, kMost>, 3> centroid_;
-  alignas(16) std::array<double, kMost> weight_; ///< factor of the squared distance
+  std::array<uint32_t, kMax> triangle_, added_, open_;
+  std::array<std::array<uint32_t, kMax>, 3> vertices_;
+  alignas(16) std::array<std::array<double, kMax>, 3> centroid_;
+  alignas(16) std::array<double, kMax> weight_; ///< factor of the squared distance
 };
 
 class Grower {

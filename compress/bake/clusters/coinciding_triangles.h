@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "pbrt_import/base/weld_table.h"
 #include "compress/bake/grid/welded_surface.h"
+#include "pbrt_import/base/weld_table.h"
 
 namespace packtrace {
 

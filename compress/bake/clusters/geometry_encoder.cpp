@@ -5,10 +5,10 @@
 
 #include <tbb/parallel_for.h>
 
-#include "compress/format/trees/node_groups.h"
-#include "pbrt_import/base/weld_table.h"
 #include "compress/format/layout/bit_stream.h"
+#include "compress/format/trees/node_groups.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/base/weld_table.h"
 
 namespace packtrace {
 namespace {

@@ -5,8 +5,8 @@
 
 #include "compress/bake/clusters/geometry_clusters.h"
 #include "compress/bake/clusters/quantized_geometry.h"
-#include "compress/format/layout/baked_format.h"
 #include "compress/format/cluster/cluster_codec.h"
+#include "compress/format/layout/baked_format.h"
 
 namespace packtrace {
 

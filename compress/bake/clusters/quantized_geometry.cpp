@@ -10,13 +10,13 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
-#include "pbrt_import/scene/angle.h"
-#include "pbrt_import/base/brief.h"
 #include "compress/bake/clusters/coinciding_triangles.h"
-#include "pbrt_import/base/weld_table.h"
 #include "compress/bake/grid/welded_surface.h"
 #include "compress/format/cluster/normal_codec.h"
+#include "pbrt_import/base/brief.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/base/weld_table.h"
+#include "pbrt_import/scene/angle.h"
 
 namespace packtrace {
 namespace {
@@ -99,7 +99,7 @@ public:
       parts[i] = {};
     }
     out_.positions = std::move(surface_.positions);
-    close_slots();
+    remove_empty_slots();
     out_.stats.collapsed_triangles = surface_.collapsed_count;
     out_.stats.source_area = surface_.source_area;
     out_.stats.collapsed_area = surface_.collapsed_area;
@@ -362,9 +362,9 @@ private:
   uint32_t weld_smooth_vertex(QuantizedVertex v, DVec3 normal) {
     constexpr uint32_t kUnset = ~0u;
     if (smooth_at_.empty()) smooth_at_.assign(surface_.positions.size(), kUnset);
-    constexpr uint32_t kMostCompared = 32; // bounds the time where thousands of vertices merged
+    constexpr uint32_t kMaxCompared = 32; // bounds the time where thousands of vertices merged
     uint32_t compared = 0;
-    for (uint32_t i = smooth_at_[v.position]; i != kUnset && compared < kMostCompared;
+    for (uint32_t i = smooth_at_[v.position]; i != kUnset && compared < kMaxCompared;
          i = smooth_vertices_[i].next, ++compared) {
       const QuantizedVertex& other = out_.vertices[smooth_vertices_[i].vertex];
       const double error = encoding_error(out_.normal_encoding, normal, other.normal_code);
@@ -421,7 +421,7 @@ private:
   }
 
   /// Renumbers the material slots, without those that have no triangles left.
-  void close_slots() {
+  void remove_empty_slots() {
     std::vector<uint32_t> number_of(plan_.slot_class.size());
     for (const TriangleKind& kind : out_.kinds) number_of[kind.slot] = 1;
     for (uint32_t slot = 0; slot < number_of.size(); ++slot) {

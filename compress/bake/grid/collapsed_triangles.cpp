@@ -32,7 +32,7 @@ public:
   }
 
   /// Clears the flags of slivers that must be kept.
-  void keep_needed(std::vector<uint8_t>& collapsed) {
+  void unflag_needed_slivers(std::vector<uint8_t>& collapsed) {
     if (slivers_.empty()) return;
     gather_edges();
     find_neighbours();
@@ -122,7 +122,7 @@ std::vector<uint8_t> find_collapsed(std::span<const LatticePoint> points, std::s
       shapes[i] = has_area(points[t.x], points[t.y], points[t.z]) ? kArea : kSliver;
     collapsed[i] = shapes[i] != kArea;
   });
-  SliverPieces(triangles, shapes, points.size()).keep_needed(collapsed);
+  SliverPieces(triangles, shapes, points.size()).unflag_needed_slivers(collapsed);
   return collapsed;
 }
 

@@ -34,7 +34,7 @@ public:
   GridChoice run() {
     begin();
     progress_.begin("choosing grids", out_.grids.size());
-    views_ = look_at_scene(scene_, plan_, measure_, progress_);
+    views_ = measure_views(scene_, plan_, measure_, progress_);
     const std::vector<WantedStep> wanted = bound_steps(plan_, measure_, views_, steps());
     const std::vector<double> first = steps();
     if (may_refine())
@@ -54,7 +54,7 @@ private:
   void begin() {
     if (measure_.has_world_space) out_.world = choose_grid(config_, measure_.world, 1.0);
     if (measure_.has_world_space && (may_refine() || config_.precision_kind == PrecisionKind::kEdgeFraction))
-      out_.halvings = halvings_of_small_things(plan_, measure_.geometries, config_.precision, out_.world.step());
+      out_.halvings = halvings_of_small_geometries(plan_, measure_.geometries, config_.precision, out_.world.step());
     for (size_t g = 0; g < out_.grids.size(); ++g) {
       if (is_empty(g)) continue; // nothing to quantise: keep the default grid
       const GeometryPlan& plan = plan_.geometries[g];
@@ -120,7 +120,7 @@ private:
   /// quarter of the step (the mean over all directions) changes step / (2 h) of its area. Projection scales lengths by
   /// pi / 4 and areas by 1 / 2 on average. So the fraction is about 3/4 step / h for strips whose edges are all
   /// outline.
-  double passed_pixels(size_t g) const {
+  double passed_pixel_fraction(size_t g) const {
     const GeometryView& view = views_[g];
     if (!(view.best.height > 0.0)) return 0.0;
     const double step = effective_step(g) * world_scale(plan_.geometries[g]);
@@ -134,10 +134,10 @@ private:
     double covered = 0.0, passed = 0.0;
     for (size_t g = 0; g < views_.size(); ++g) {
       covered += views_[g].best.pixels;
-      passed += views_[g].best.pixels * passed_pixels(g);
+      passed += views_[g].best.pixels * passed_pixel_fraction(g);
     }
     for (size_t g = 0; g < views_.size() && passed > kMaxPassedPixels * covered; ++g)
-      moved[g] = passed_pixels(g) > kMaxPassedPixels;
+      moved[g] = passed_pixel_fraction(g) > kMaxPassedPixels;
     return moved;
   }
 
@@ -190,7 +190,7 @@ private:
         shortfall.wanted = std::min(wanted[g].step, shortfall.step / std::max(2.0, tilt));
       } else if (outlines[g] != 0) {
         shortfall.bound = PictureBound::kOutline;
-        shortfall.wanted = std::min(wanted[g].step, shortfall.step * kMaxPassedPixels / passed_pixels(g));
+        shortfall.wanted = std::min(wanted[g].step, shortfall.step * kMaxPassedPixels / passed_pixel_fraction(g));
       } else if (views_[g].best.coverage() >= kSeen && step > kBoundSlack * wanted[g].limit) {
         shortfall.bound = wanted[g].bound;
         shortfall.wanted = wanted[g].step;

@@ -26,7 +26,7 @@ struct GridChoice {
   PositionGrid world;              ///< the scene's grid; unused if no geometry lies in world space
   std::vector<GeometryGrid> grids; ///< per geometry
   std::vector<uint32_t> halvings;  ///< per geometry: how often the scene's step is halved
-  /// Small world-space geometries on finer grids than the scene's (halvings_of_small_things()).
+  /// Small world-space geometries on finer grids than the scene's (halvings_of_small_geometries()).
   uint64_t nested_geometries = 0;
   /// Geometries whose steps are finer than the median edge requires, because images need it.
   uint64_t finer_geometries = 0;

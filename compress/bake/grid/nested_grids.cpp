@@ -10,7 +10,7 @@
 namespace packtrace {
 namespace {
 
-constexpr double kRoughFactor = 16.0;  // a step this many times above the wanted one is visible, too
+constexpr double kMaxStepRatio = 16.0; // a step this many times above the wanted one is visible, too
 constexpr double kFloatStep = 0x1p-23; // finer steps than floats have at the same coordinate are useless
 constexpr double kMaxHalvings = 60.0;  // keeps shifts of lattice coordinates valid
 constexpr double kMaxSteps = 0x1p50;   // keeps coordinates well inside the lattice
@@ -33,7 +33,7 @@ public:
     std::vector<std::vector<SharedPosition>> shared(halvings_.size());
     gather_positions();
     if (keys_.empty()) return shared;
-    find_coarse_users();
+    flag_scene_grid_positions();
     for (size_t begin = 0, end = 0; begin < keys_.size(); begin = end) {
       uint32_t least = halvings_[keys_[begin].geometry];
       for (end = begin; end < keys_.size() && keys_[end].position == keys_[begin].position; ++end) {
@@ -76,7 +76,7 @@ private:
   }
 
   /// Flags the first key of each position that also belongs to geometry on the scene's own grid.
-  void find_coarse_users() {
+  void flag_scene_grid_positions() {
     tbb::parallel_for(size_t{0}, halvings_.size(), [&](size_t g) {
       if (halvings_[g] > 0 || !plan_.geometries[g].world_space || !may_touch(measures_[g].bounds)) return;
       for_each_position(scene_, plan_.geometries[g], [&](DVec3 p) {
@@ -110,13 +110,13 @@ uint32_t max_halvings(const GeometryMeasure& measure, double world_step, double 
       std::clamp(std::floor(std::min({by_floats, by_lattice, by_exponent})), 0.0, kMaxHalvings));
 }
 
-std::vector<uint32_t> halvings_of_small_things(const ScenePlan& plan, std::span<const GeometryMeasure> measures,
-                                               double precision, double world_step) {
+std::vector<uint32_t> halvings_of_small_geometries(const ScenePlan& plan, std::span<const GeometryMeasure> measures,
+                                                   double precision, double world_step) {
   std::vector<uint32_t> halvings(plan.geometries.size());
   for (size_t g = 0; g < halvings.size(); ++g) {
     const GeometryMeasure& measure = measures[g];
     if (!plan.geometries[g].world_space || measure.bounds.empty() || !(measure.median_edge > 0.0)) continue;
-    if (world_step <= std::max(kRoughFactor * precision, kRoughEdge) * measure.median_edge) continue;
+    if (world_step <= std::max(kMaxStepRatio * precision, kRoughEdge) * measure.median_edge) continue;
     const double wanted = std::ceil(std::log2(world_step / (precision * measure.median_edge)));
     halvings[g] = static_cast<uint32_t>(
         std::min(wanted, static_cast<double>(max_halvings(measure, world_step, measure.max_abs() * kFloatStep))));

@@ -17,8 +17,8 @@ namespace packtrace {
 /// the coarsest step, of the scene's step times 2^-k, that is at most precision times its own median edge, but no step
 /// below 2^-23 of its largest coordinate.
 /// @param world_step step of the scene's grid
-std::vector<uint32_t> halvings_of_small_things(const ScenePlan& plan, std::span<const GeometryMeasure> measures,
-                                               double precision, double world_step);
+std::vector<uint32_t> halvings_of_small_geometries(const ScenePlan& plan, std::span<const GeometryMeasure> measures,
+                                                   double precision, double world_step);
 
 /// How often the scene's step may be halved for a world-space geometry so that it stays at least `finest` and within
 /// the limits of lattices.

@@ -7,9 +7,9 @@
 #include <tuple>
 #include <vector>
 
-#include "pbrt_import/scene/angle.h"
 #include "compress/bake/grid/geometry_grid.h"
 #include "compress/bake/grid/surface_sample.h"
+#include "pbrt_import/scene/angle.h"
 
 namespace packtrace {
 namespace {

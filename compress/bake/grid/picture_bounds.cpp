@@ -18,9 +18,9 @@ constexpr size_t kMaxSample = 8192;                 // triangles sampled per geo
 constexpr size_t kMinSample = 64;                   // lower limit in scenes with many geometries
 constexpr size_t kMaxSampleLooks = size_t{1} << 20; // sample triangles of all geometries, times cameras
 
-constexpr double kLarge = 0.01;         // fraction of the image from which a geometry's facets must not tilt
-constexpr double kLargeTogether = 0.05; // the same for all smaller geometries together
-constexpr double kSeenTogether = 0.005; // like kSeen, for all smaller geometries together
+constexpr double kLarge = 0.01;                // fraction of the image from which a geometry's facets must not tilt
+constexpr double kMinTotalTiltCoverage = 0.05; // the same for all smaller geometries together
+constexpr double kMinTotalCoverage = 0.005;    // like kSeen, for all smaller geometries together
 // Limits of the step. If a limit is exceeded, the step becomes kMargin times that limit.
 constexpr double kMargin = 0.4;
 constexpr double kHeightSteps = 24.0;        // steps per triangle height
@@ -53,9 +53,9 @@ std::vector<PrimaryCamera> cameras_of(const Scene& scene, const Bounds& box) {
   return cameras;
 }
 
-class SceneLook {
+class ViewMeasurer {
 public:
-  SceneLook(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure, Progress& progress)
+  ViewMeasurer(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure, Progress& progress)
       : scene_(scene), plan_(plan), measure_(measure), progress_(progress),
         cameras_(cameras_of(scene, scene_box(plan, measure))), views_(plan.geometries.size()),
         instances_(plan.geometries.size()) {
@@ -90,8 +90,8 @@ private:
     for (const PrimaryCamera& camera : cameras_) {
       std::vector<double> pixels(view.sample.size());
       ViewSums sums;
-      look_at_geometry(camera, view.sample, {plan_.instances, instances_[g]}, measure_.geometries[g].bounds, sums,
-                       pixels);
+      add_geometry_view(camera, view.sample, {plan_.instances, instances_[g]}, measure_.geometries[g].bounds, sums,
+                        pixels);
       const ViewStats stats = sums.stats();
       if (stats.coverage() >= kSeen) pixel = std::min(pixel.value_or(stats.pixel), stats.pixel);
       if (stats.pixels > view.best.pixels) view.best = stats, view.sample_pixels = std::move(pixels);
@@ -125,10 +125,10 @@ double middle_extent(const Bounds& box) {
   return sides[1];
 }
 
-class Bounding {
+class StepBounder {
 public:
-  Bounding(const ScenePlan& plan, const SceneMeasure& measure, std::span<const GeometryView> views,
-           std::span<const double> steps)
+  StepBounder(const ScenePlan& plan, const SceneMeasure& measure, std::span<const GeometryView> views,
+              std::span<const double> steps)
       : plan_(plan), measure_(measure), views_(views), steps_(steps), wanted_(views.size()) {}
 
   std::vector<WantedStep> run() {
@@ -167,12 +167,13 @@ private:
     const auto height = [&](size_t g) {
       return views_[g].best.coverage() >= kSeen ? to_geometry(g, views_[g].best.height) : mean_height(views_[g]);
     };
-    bound_seen(kLarge, kLargeTogether, PictureBound::kHeight, [&](size_t g) { return height(g) / kHeightSteps; });
+    bound_seen(kLarge, kMinTotalTiltCoverage, PictureBound::kHeight,
+               [&](size_t g) { return height(g) / kHeightSteps; });
     for (size_t g = 0; g < views_.size(); ++g) bound(g, height(g) / kLowHeightSteps, PictureBound::kHeight);
   }
 
   void bound_pixels() {
-    bound_seen(kSeen, kSeenTogether, PictureBound::kPixel,
+    bound_seen(kSeen, kMinTotalCoverage, PictureBound::kPixel,
                [&](size_t g) { return to_geometry(g, views_[g].pixel) / kPixelSteps; });
   }
 
@@ -215,14 +216,14 @@ std::string_view name_of(PictureBound bound) {
   return kNames[static_cast<size_t>(bound)];
 }
 
-std::vector<GeometryView> look_at_scene(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure,
+std::vector<GeometryView> measure_views(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure,
                                         Progress& progress) {
-  return SceneLook(scene, plan, measure, progress).run();
+  return ViewMeasurer(scene, plan, measure, progress).run();
 }
 
 std::vector<WantedStep> bound_steps(const ScenePlan& plan, const SceneMeasure& measure,
                                     std::span<const GeometryView> views, std::span<const double> steps) {
-  return Bounding(plan, measure, views, steps).run();
+  return StepBounder(plan, measure, views, steps).run();
 }
 
 } // namespace packtrace

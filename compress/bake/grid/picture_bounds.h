@@ -43,7 +43,7 @@ struct GeometryView {
 inline constexpr double kSeen = 0.001;
 
 /// Returns the views per geometry. Cameras that cannot make rays are skipped: nothing can be rendered with them.
-std::vector<GeometryView> look_at_scene(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure,
+std::vector<GeometryView> measure_views(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure,
                                         Progress& progress);
 
 /// The step that a geometry needs if its current step exceeds a bound, in the geometry's own units.

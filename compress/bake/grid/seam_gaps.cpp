@@ -32,9 +32,9 @@ InstanceSeams::InstanceSeams(const BakedFile& file) : boxes_(file.instances().si
     own[i] = displacement(instance, geometry.position_error_bound);
     if ((geometry.flags & baked::kWorldSpace) == 0) asked.push_back(i);
   }
-  own_grid_count_ = asked.size();
+  own_grid_instance_count_ = asked.size();
   touching_ = std::move(asked);
-  const std::vector<double> beside = largest_beside(own);
+  const std::vector<double> beside = largest_touching(own);
   size_t kept = 0;
   for (size_t i = 0; i < beside.size(); ++i) {
     if (std::isinf(beside[i])) continue; // touches nothing
@@ -45,10 +45,10 @@ InstanceSeams::InstanceSeams(const BakedFile& file) : boxes_(file.instances().si
 }
 
 SeamSummary InstanceSeams::summary() const {
-  return {own_grid_count_, touching_.size(), gaps_.empty() ? 0.0 : *std::ranges::max_element(gaps_)};
+  return {own_grid_instance_count_, touching_.size(), gaps_.empty() ? 0.0 : *std::ranges::max_element(gaps_)};
 }
 
-std::vector<double> InstanceSeams::largest_beside(std::span<const double> values) const {
+std::vector<double> InstanceSeams::largest_touching(std::span<const double> values) const {
   std::vector<double> sizes(values.size());
   std::ranges::transform(values, sizes.begin(), [](double value) { return -value; });
   std::vector<double> result = smallest_touching(boxes_, sizes, touching_);

@@ -35,13 +35,13 @@ public:
 
   /// Returns, per entry of touching(), the largest value of the other instances whose bounds it touches.
   /// @param values per instance of the file, at least 0
-  std::vector<double> largest_beside(std::span<const double> values) const;
+  std::vector<double> largest_touching(std::span<const double> values) const;
 
 private:
   std::vector<Bounds> boxes_; ///< world-space bounds per instance, padded by the position error bound
   std::vector<uint32_t> touching_;
   std::vector<double> gaps_;
-  uint64_t own_grid_count_ = 0;
+  uint64_t own_grid_instance_count_ = 0;
 };
 
 } // namespace packtrace

@@ -21,9 +21,9 @@ bool outside(const std::array<DVec3, kCount>& points, ImageSize size) {
          all([&](DVec3 p) { return p.x > size.width * p.z; }) || all([&](DVec3 p) { return p.y > size.height * p.z; });
 }
 
-class Look {
+class TriangleProjector {
 public:
-  Look(const PrimaryCamera& camera, ViewSums& sums) : camera_(camera), sums_(sums) {}
+  TriangleProjector(const PrimaryCamera& camera, ViewSums& sums) : camera_(camera), sums_(sums) {}
 
   /// @return the pixels that the triangle covers, without the weight
   double add(const DTriangle& world, double weight) {
@@ -122,7 +122,8 @@ struct ChosenInstance {
 };
 
 /// Returns the instances in view, or a weighted subset in which larger ones are more likely.
-std::vector<ChosenInstance> choose_instances(const Look& look, const Placements& placements, const Bounds& box) {
+std::vector<ChosenInstance> choose_instances(const TriangleProjector& look, const Placements& placements,
+                                             const Bounds& box) {
   std::vector<double> pixels(placements.size());
   double total = 0.0;
   size_t seen = 0;
@@ -171,9 +172,10 @@ ViewStats ViewSums::stats() const {
           std::exp2(static_cast<double>(bin) / kBinsPerOctave + kFirstOctave)};
 }
 
-void look_at_geometry(const PrimaryCamera& camera, std::span<const SampleTriangle> sample, const Placements& placements,
-                      const Bounds& box, ViewSums& sums, std::span<double> sample_pixels) {
-  Look look(camera, sums);
+void add_geometry_view(const PrimaryCamera& camera, std::span<const SampleTriangle> sample,
+                       const Placements& placements, const Bounds& box, ViewSums& sums,
+                       std::span<double> sample_pixels) {
+  TriangleProjector look(camera, sums);
   const std::vector<ChosenInstance> chosen = choose_instances(look, placements, box);
   if (chosen.empty() || sample.empty()) return;
   // Each instance gets every stride-th sample triangle, starting at a different one.

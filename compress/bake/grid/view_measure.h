@@ -54,7 +54,8 @@ struct Placements {
 /// represents them: about 8192 placed triangles are visited, large ones split into pieces of at most 32 pixels.
 /// @param box bounds of the geometry
 /// @param sample_pixels per sample triangle: increased by the pixels of the triangles that it represents
-void look_at_geometry(const PrimaryCamera& camera, std::span<const SampleTriangle> sample, const Placements& placements,
-                      const Bounds& box, ViewSums& sums, std::span<double> sample_pixels);
+void add_geometry_view(const PrimaryCamera& camera, std::span<const SampleTriangle> sample,
+                       const Placements& placements, const Bounds& box, ViewSums& sums,
+                       std::span<double> sample_pixels);
 
 } // namespace packtrace

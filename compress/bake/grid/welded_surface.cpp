@@ -90,9 +90,7 @@ private:
           }
           return sum;
         },
-        [](const Areas& a, const Areas& b) {
-          return Areas{a.first + b.first, a.second + b.second};
-        });
+        [](const Areas& a, const Areas& b) { return Areas{a.first + b.first, a.second + b.second}; });
     out_.source_area += areas.first, out_.collapsed_area += areas.second;
   }
 

@@ -97,12 +97,12 @@ struct Adjacency {
 };
 
 Adjacency find_adjacency(const ClusterRuns& clusters) {
-  constexpr size_t kMostSharers = 8; // of edges with more clusters, only the first ones are linked
+  constexpr size_t kMaxClustersPerEdge = 8; // of edges with more clusters, only the first ones are linked
   const std::vector<BorderEdge> edges = border_edges(clusters);
   std::vector<std::pair<uint32_t, uint32_t>> pairs;
   for (size_t i = 0, next; i < edges.size(); i = next) {
     for (next = i + 1; next < edges.size() && edges[next].a == edges[i].a && edges[next].b == edges[i].b;) ++next;
-    const size_t end = std::min(next, i + kMostSharers);
+    const size_t end = std::min(next, i + kMaxClustersPerEdge);
     for (size_t k = i; k < end; ++k)
       for (size_t l = i; l < end; ++l)
         if (l != k) pairs.emplace_back(edges[k].cluster, edges[l].cluster);

@@ -20,7 +20,7 @@ constexpr double kKept = 0.47; // share of the triangles that a level keeps
 // The last few hundred triangles are reduced faster: each level adds records that would take more space than its
 // clusters.
 constexpr uint64_t kFewTriangles = 512;
-constexpr double kKeptOfFew = 0.25;
+constexpr double kKeptWhenFew = 0.25;
 constexpr uint64_t kCoarsest = 16;        // levels with at most this many triangles are the last
 constexpr double kInflation = 1.0 + 1e-6; // of bounding spheres, to cover rounding errors
 
@@ -114,7 +114,7 @@ private:
         progress_.check_cancelled();
         uint64_t triangles = 0;
         for (const uint32_t member : members[i]) triangles += lod_.clusters[member].range.triangle_count;
-        results[i] = simplify_group(members[i], all > kFewTriangles ? kKept : kKeptOfFew);
+        results[i] = simplify_group(members[i], all > kFewTriangles ? kKept : kKeptWhenFew);
         progress_.advance(triangles);
       });
     }

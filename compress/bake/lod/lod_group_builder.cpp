@@ -7,14 +7,14 @@
 #include <utility>
 
 #include "compress/bake/clusters/clusterize.h"
-#include "compress/bake/lod/bound/direct_bound.h"
-#include "compress/bake/lod/loose_pieces.h"
-#include "compress/bake/lod/simplify/simplify.h"
-#include "compress/bake/lod/bound/surface_bound.h"
 #include "compress/bake/clusters/morton.h"
 #include "compress/bake/clusters/renumbering.h"
-#include "pbrt_import/base/weld_table.h"
+#include "compress/bake/lod/bound/direct_bound.h"
+#include "compress/bake/lod/bound/surface_bound.h"
+#include "compress/bake/lod/loose_pieces.h"
+#include "compress/bake/lod/simplify/simplify.h"
 #include "compress/format/cluster/normal_codec.h"
+#include "pbrt_import/base/weld_table.h"
 
 namespace packtrace {
 namespace {
@@ -50,9 +50,9 @@ private:
   void drop_pieces(uint32_t target) {
     std::vector<double> errors;
     for (const LodTriangle& t : mesh_.triangles) errors.push_back(t.error);
-    const std::vector<TriangleStand> stands = drop_loose_pieces(mesh_, {target, share_of_triangles(kWorthwhile)});
+    const std::vector<TriangleSubstitute> stands = drop_loose_pieces(mesh_, {target, share_of_triangles(kWorthwhile)});
     for (SurfaceLink& link : links_.links) {
-      const TriangleStand& stand = stands[link.after];
+      const TriangleSubstitute& stand = stands[link.after];
       link.after = stand.triangle;
       double& bound = links_.bounds[link.before];
       dropped_ |= stand.dropped;

@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "compress/bake/lod/cluster_lod.h"
 #include "compress/bake/lod/bound/line_cover.h"
 #include "compress/bake/lod/bound/triangle_history.h"
+#include "compress/bake/lod/cluster_lod.h"
 
 namespace packtrace {
 

@@ -13,7 +13,7 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kNone = ~0u;
-constexpr double kFewTimes = 3.0; // maximum cost of a piece, relative to the largest error of the input
+constexpr double kMaxPieceCost = 3.0; // maximum cost of a piece, relative to the largest error of the input
 
 struct Piece {
   std::vector<uint32_t> triangles;
@@ -23,7 +23,7 @@ struct Piece {
 };
 
 /// The triangle nearest to a piece, which stands for it once the piece is dropped.
-struct Stand {
+struct PieceSubstitute {
   double distance = std::numeric_limits<double>::infinity();
   uint32_t piece = kNone, triangle = kNone;
 };
@@ -32,7 +32,7 @@ class Dropper {
 public:
   explicit Dropper(SimplifyMesh& mesh) : m_(mesh) {}
 
-  std::vector<TriangleStand> run(const DropTargets& targets) {
+  std::vector<TriangleSubstitute> run(const DropTargets& targets) {
     find_pieces();
     stand_of_.assign(pieces_.size(), kNone);
     if (pieces_.size() > 1) drop_some(targets);
@@ -43,12 +43,12 @@ private:
   void drop_some(const DropTargets& targets) {
     size_t live = m_.triangles.size();
     double dear = 0.0;
-    for (const Piece& piece : pieces_) dear = std::max(dear, kFewTimes * piece.error);
-    std::vector<Stand> stands(pieces_.size());
+    for (const Piece& piece : pieces_) dear = std::max(dear, kMaxPieceCost * piece.error);
+    std::vector<PieceSubstitute> stands(pieces_.size());
     std::vector<uint32_t> order;
     for (uint32_t i = 0; i < pieces_.size(); ++i)
       if (!pieces_[i].locked && pieces_[i].triangles.size() <= live - targets.triangles)
-        stands[i] = find_stand(i), order.push_back(i);
+        stands[i] = find_substitute(i), order.push_back(i);
     std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
       return stands[a].distance != stands[b].distance ? stands[a].distance < stands[b].distance : a < b;
     });
@@ -57,8 +57,8 @@ private:
       for (const uint32_t i : order) {
         if (live <= target) break;
         if (pieces_[i].dropped) continue;
-        if (stands[i].piece == kNone || pieces_[stands[i].piece].dropped) stands[i] = find_stand(i);
-        const Stand& stand = stands[i];
+        if (stands[i].piece == kNone || pieces_[stands[i].piece].dropped) stands[i] = find_substitute(i);
+        const PieceSubstitute& stand = stands[i];
         if (stand.piece == kNone) break; // the last piece
         if (!any_cost && pieces_[i].error + stand.distance > dear) continue;
         drop(i, stand);
@@ -67,7 +67,7 @@ private:
     }
   }
 
-  void drop(uint32_t piece, const Stand& stand) {
+  void drop(uint32_t piece, const PieceSubstitute& stand) {
     LodTriangle& t = m_.triangles[stand.triangle];
     t.error = std::max(t.error, pieces_[piece].error + stand.distance);
     pieces_[stand.piece].error = std::max(pieces_[stand.piece].error, t.error);
@@ -118,7 +118,7 @@ private:
   }
 
   /// Finds the nearest triangle of the pieces with the nearest centres.
-  Stand find_stand(uint32_t number) const {
+  PieceSubstitute find_substitute(uint32_t number) const {
     constexpr size_t kTried = 3; // number of pieces tried, those with the nearest centres
     std::array<std::pair<double, uint32_t>, kTried> nearest;
     nearest.fill({std::numeric_limits<double>::infinity(), kNone});
@@ -130,7 +130,7 @@ private:
       for (auto& entry : nearest)
         if (candidate < entry) std::swap(candidate, entry);
     }
-    Stand best;
+    PieceSubstitute best;
     for (const auto& [unused, other] : nearest) {
       if (other == kNone) continue;
       for (const uint32_t triangle : pieces_[other].triangles) {
@@ -141,11 +141,11 @@ private:
     return best;
   }
 
-  std::vector<TriangleStand> remove_dropped() {
+  std::vector<TriangleSubstitute> remove_dropped() {
     std::vector<uint32_t> piece_of(m_.triangles.size());
     for (uint32_t i = 0; i < pieces_.size(); ++i)
       for (const uint32_t triangle : pieces_[i].triangles) piece_of[triangle] = i;
-    std::vector<TriangleStand> stands(m_.triangles.size());
+    std::vector<TriangleSubstitute> stands(m_.triangles.size());
     uint32_t kept = 0;
     for (size_t i = 0; i < stands.size(); ++i) {
       stands[i].dropped = pieces_[piece_of[i]].dropped;
@@ -168,7 +168,7 @@ private:
 
 } // namespace
 
-std::vector<TriangleStand> drop_loose_pieces(SimplifyMesh& mesh, const DropTargets& targets) {
+std::vector<TriangleSubstitute> drop_loose_pieces(SimplifyMesh& mesh, const DropTargets& targets) {
   return Dropper(mesh).run(targets);
 }
 

@@ -11,8 +11,8 @@
 
 #include <tbb/parallel_for.h>
 
-#include "pbrt_import/base/brief.h"
 #include "compress/bake/plan/equal_meshes.h"
+#include "pbrt_import/base/brief.h"
 #include "pbrt_import/base/error.h"
 
 namespace packtrace {

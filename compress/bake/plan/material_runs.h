@@ -9,8 +9,8 @@
 namespace packtrace {
 
 /// Removes material slots from a plan: from its geometries, its runs of materials and its instances.
-/// @param slots_left per geometry: the slots to keep, ascending. If every geometry keeps all of its slots, nothing
+/// @param kept_slots per geometry: the slots to keep, ascending. If every geometry keeps all of its slots, nothing
 /// changes.
-void close_material_slots(ScenePlan& plan, std::span<const std::vector<uint32_t>> slots_left);
+void remove_material_slots(ScenePlan& plan, std::span<const std::vector<uint32_t>> kept_slots);
 
 } // namespace packtrace

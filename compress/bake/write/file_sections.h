@@ -7,9 +7,9 @@
 
 #include "compress/bake/clusters/geometry_encoder.h"
 #include "compress/bake/lod/lod_encoder.h"
-#include "compress/format/textures/texture_encoder.h"
 #include "compress/format/layout/baked_format.h"
 #include "compress/format/layout/bit_stream.h"
+#include "compress/format/textures/texture_encoder.h"
 #include "compress/format/trees/packed_trees.h"
 #include "pbrt_import/scene/scene.h"
 

@@ -48,7 +48,7 @@ std::optional<DracoPrimitive> encode_draco(const PlainPrimitive& primitive, cons
   encoder.SetTrackEncodedProperties(true);
   Vec3 origin;
   for (int axis = 0; axis < 3; ++axis) origin[axis] = from_lattice(grid.origin[static_cast<size_t>(axis)], grid.step);
-  const auto range = static_cast<float>(grid.step * (std::exp2(grid.bits) - 1.0)); // codes are steps
+  const auto range = static_cast<float>(grid.step * (std::exp2(grid.bits) - 1.0)); // so one code is one step
   encoder.SetAttributeExplicitQuantization(position, grid.bits, 3, &origin.x, range);
   if (normal >= 0) encoder.SetAttributeQuantization(normal, config.normal_bits);
   if (uv >= 0) encoder.SetAttributeQuantization(uv, config.uv_bits);

@@ -21,7 +21,7 @@ namespace packtrace {
 namespace {
 
 constexpr int kMaxDracoBits = 30;
-constexpr double kNear = 1e-4, kFar = 10.0; // of the scene's diagonal: pbrt's cameras see any distance
+constexpr double kNear = 1e-4, kFar = 10.0; // near and far planes relative to the scene's diagonal; pbrt has none
 constexpr const char* kDracoExtension = "KHR_draco_mesh_compression";
 
 struct LatticeBox {
@@ -34,7 +34,7 @@ struct LatticeBox {
     }
     empty = false;
   }
-  /// Of codes from lo on, at least 1.
+  /// Bits per axis for codes that count from lo, at least 1.
   int bits() const {
     uint64_t extent = 1;
     for (size_t axis = 0; axis < 3; ++axis) extent = std::max(extent, static_cast<uint64_t>(hi[axis] - lo[axis]));
@@ -42,7 +42,7 @@ struct LatticeBox {
   }
 };
 
-/// A primitive made ready, not in the model yet.
+/// A primitive, encoded but not yet added to the model.
 struct EncodedPrimitive {
   PlainPrimitive plain;
   std::optional<DracoPrimitive> draco;
@@ -52,8 +52,8 @@ double step_of(const baked::GeometryRecord& geometry) {
   return PositionGrid{geometry.step_mantissa, geometry.step_exponent}.step();
 }
 
-/// Lattices of world-space geometry with one step are one lattice: they share a grid, so that what touches decodes
-/// alike.
+/// Draco grids of all geometries. World-space geometries with equal steps lie on one lattice and share a grid, so that
+/// touching surfaces decode to equal positions.
 class Grids {
 public:
   void add(const baked::GeometryRecord& geometry, uint32_t number, const LatticeBox& box) {
@@ -190,7 +190,7 @@ private:
     return add_accessor(std::move(accessor), triangles, 3 * count, draco, TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER);
   }
 
-  /// Draco's accessors have no bytes of their own.
+  /// Adds an accessor. With Draco it has no buffer view.
   template <typename Value>
   int add_accessor(tinygltf::Accessor accessor, const std::vector<Value>& values, size_t count, bool draco,
                    int target) {
@@ -212,7 +212,7 @@ private:
     accessor.maxValues = {hi.x, hi.y, hi.z};
   }
 
-  /// One mesh for each geometry and list of materials; the meshes of a geometry share its buffers.
+  /// Returns the mesh for the instance's geometry and material list; meshes of one geometry share its buffers.
   int mesh_of(const baked::InstanceRecord& instance) {
     const auto [place, added] =
         meshes_.try_emplace({instance.geometry, instance.first_slot}, static_cast<int>(model_.meshes.size()));
@@ -241,7 +241,8 @@ private:
     tinygltf::Camera out;
     out.name = to_utf8(camera.film_name);
     const double aspect = double(camera.width_px) / double(camera.height_px);
-    glm::dvec2 half(std::max(aspect, 1.0), std::max(1.0 / aspect, 1.0)); // of the screen; a shifted one is centred
+    // Half size of the screen. An off-centre window becomes centred.
+    glm::dvec2 half(std::max(aspect, 1.0), std::max(1.0 / aspect, 1.0));
     if (camera.screen_window)
       half = glm::abs(glm::dvec2(camera.screen_window->y - camera.screen_window->x,
                                  camera.screen_window->w - camera.screen_window->z)) *
@@ -267,7 +268,7 @@ private:
     add_node(std::move(node));
   }
 
-  /// World units, above 0.
+  /// Diagonal of the scene in world units, or 1 if it is 0.
   double scene_size() const {
     const double diagonal = file_.world_bounds().diagonal();
     return diagonal > 0.0 ? diagonal : 1.0;
@@ -295,7 +296,7 @@ void validate(const GltfConfig& config) {
 
 GltfExport export_gltf(const BakedFile& file, const GltfConfig& config, Progress& progress) {
   validate(config);
-  const auto geometries = file.base_geometry_count(); // levels of detail stay behind
+  const auto geometries = file.base_geometry_count(); // LOD levels are not exported
   std::vector<std::vector<EncodedPrimitive>> encoded(geometries);
   std::vector<LatticeBox> boxes(geometries);
   progress.begin("decoding", geometries);

@@ -13,13 +13,14 @@
 #pragma GCC diagnostic pop
 
 #include "pbrt_import/base/error.h"
-#include "pbrt_import/scene/material_flags.h"
 #include "pbrt_import/base/printable.h"
+#include "pbrt_import/scene/material_flags.h"
 
 namespace packtrace {
 namespace {
 
-constexpr uint64_t kMostBytes = std::numeric_limits<uint32_t>::max() - (uint64_t{64} << 20); // room for the JSON part
+// Leaves room for the JSON part.
+constexpr uint64_t kMaxBytes = std::numeric_limits<uint32_t>::max() - (uint64_t{64} << 20);
 constexpr int kChannels = 4;
 
 int wrap_of(WrapMode wrap) {
@@ -30,7 +31,7 @@ tinygltf::Value numbers(double x, double y) {
   return tinygltf::Value(tinygltf::Value::Array{tinygltf::Value(x), tinygltf::Value(y)});
 }
 
-/// Whether a mask and a texture lie on the surface alike.
+/// Whether a mask and a texture have the same texture transform and wrap mode.
 template <typename A, typename B>
 bool same_layout(const A& a, const B& b) {
   return a.wrap == b.wrap && a.uv_scale == b.uv_scale && a.uv_offset == b.uv_offset;
@@ -41,7 +42,7 @@ bool same_layout(const A& a, const B& b) {
 int append_buffer_view(tinygltf::Model& model, const void* bytes, size_t size) {
   std::vector<unsigned char>& data = model.buffers.front().data;
   data.resize((data.size() + 3) / 4 * 4);
-  if (size > kMostBytes - std::min<uint64_t>(kMostBytes, data.size()))
+  if (size > kMaxBytes - std::min<uint64_t>(kMaxBytes, data.size()))
     throw Error(ErrorKind::kLimitExceeded, "more than the 4 GiB that a .glb file holds");
   tinygltf::BufferView view;
   view.buffer = 0;
@@ -60,7 +61,7 @@ void GltfMaterials::add_all() {
 void GltfMaterials::add(const baked::MaterialRecord& record) {
   tinygltf::Material material;
   material.name = to_utf8(file_.text(record.name));
-  material.doubleSided = true; // as pbrt's surfaces are
+  material.doubleSided = true; // as all surfaces in pbrt
   tinygltf::PbrMetallicRoughness& surface = material.pbrMetallicRoughness;
   surface.baseColorFactor = {record.albedo[0], record.albedo[1], record.albedo[2], 1.0};
   surface.metallicFactor = (record.flags & (kMetal | kMirror)) != 0 ? 1.0 : 0.0;
@@ -69,7 +70,7 @@ void GltfMaterials::add(const baked::MaterialRecord& record) {
   if (record.flags & kTransmissive)
     material.extensions["KHR_materials_transmission"] =
         tinygltf::Value(tinygltf::Value::Object{{"transmissionFactor", tinygltf::Value(1.0)}});
-  // glTF has one mask: that of camera rays.
+  // glTF has one mask per material; it gets the one for camera rays.
   const uint32_t mask = (record.flags & kAlphaMask) != 0 ? record.alpha_mask : baked::kNone;
   if (mask != baked::kNone || record.albedo_texture != baked::kNone) add_image(record, mask, material);
   material.extras =
@@ -88,7 +89,7 @@ void GltfMaterials::add_image(const baked::MaterialRecord& record, uint32_t mask
   if (albedo != baked::kNone) surface.baseColorFactor = {1.0, 1.0, 1.0, 1.0};
   const Vec2 scale = mask != baked::kNone ? file_.mask(mask).uv_scale : file_.texture(albedo).uv_scale;
   const Vec2 offset = mask != baked::kNone ? file_.mask(mask).uv_offset : file_.texture(albedo).uv_offset;
-  // Rows count from the top: t = 1 - (v scale + offset).
+  // glTF rows count from the top: t = 1 - (v scale + offset).
   surface.baseColorTexture.extensions["KHR_texture_transform"] =
       tinygltf::Value(tinygltf::Value::Object{{"offset", numbers(double{offset.x}, 1.0 - double{offset.y})},
                                               {"scale", numbers(double{scale.x}, -double{scale.y})}});
@@ -97,7 +98,7 @@ void GltfMaterials::add_image(const baked::MaterialRecord& record, uint32_t mask
   material.alphaCutoff = 0.5;
 }
 
-/// An image of a mask, an albedo texture or both; the finer of the two sets its size.
+/// Returns the glTF texture for a mask, an albedo texture or both. Its size per axis is that of the larger one.
 int GltfMaterials::texture_of(uint32_t mask, uint32_t albedo_texture) {
   const auto [place, added] = textures_.try_emplace({mask, albedo_texture}, static_cast<int>(model_.textures.size()));
   if (!added) return place->second;

@@ -13,21 +13,21 @@
 
 namespace packtrace {
 
-/// Appends bytes to a model's one buffer, at multiples of 4, and returns the new buffer view.
-/// Throws Error(kLimitExceeded) beyond what a .glb can hold.
+/// Appends bytes to the model's only buffer, aligned to 4 bytes, and returns the number of the new buffer view.
+/// Throws Error(kLimitExceeded) beyond the size limit of a .glb.
 int append_buffer_view(tinygltf::Model& model, const void* bytes, size_t size);
 
-/// Turns the materials of a baked file into those of a glTF model, and masks and textures into its images. Extras hold
-/// the flags.
+/// Converts the materials of a baked file to glTF materials, and their masks and textures to images. The extras of a
+/// material hold its flags.
 class GltfMaterials {
 public:
   GltfMaterials(const BakedFile& file, tinygltf::Model& model) : file_(file), model_(model) {}
 
-  /// All materials, in the file's order.
+  /// Adds all materials, in the file's order.
   void add_all();
 
   uint64_t image_bytes() const { return image_bytes_; }
-  /// Whose mask and texture lie differently on the surface: the texture's average is used.
+  /// Number of materials whose mask and texture have different transforms; they use the texture's average colour.
   uint64_t simplified() const { return simplified_; }
 
 private:

@@ -7,7 +7,7 @@
 namespace packtrace {
 namespace {
 
-/// Everything a vertex of one primitive is, as the file has it.
+/// All stored values of a vertex; equal keys are merged.
 struct VertexKey {
   LatticePoint position{};
   uint32_t normal = 0;

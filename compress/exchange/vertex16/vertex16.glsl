@@ -1,4 +1,4 @@
-// Made by vertex16_generator from compress/exchange/vertex16/vertex16_fields.h; docs/vertex16.md says where the bytes lie.
+// Made by vertex16_generator from vertex16_fields.h; docs/vertex16.md says where the bytes lie.
 // GLSL 3.30 and later.
 
 // What a geometry's vertices share: 32 bytes, as std430 and C++ lay them out.

@@ -1,6 +1,6 @@
 #pragma once
 
-// Made by vertex16_generator from compress/exchange/vertex16/vertex16_fields.h; docs/vertex16.md says where the bytes lie.
+// Made by vertex16_generator from vertex16_fields.h; docs/vertex16.md says where the bytes lie.
 // clang-format off
 
 #include <glm/glm.hpp>

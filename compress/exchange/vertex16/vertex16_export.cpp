@@ -5,8 +5,8 @@
 
 #include <tbb/parallel_for.h>
 
-#include "compress/exchange/vertex16/vertex16_geometry.h"
 #include "compress/exchange/vertex16/vertex16_file.h"
+#include "compress/exchange/vertex16/vertex16_geometry.h"
 #include "pbrt_import/base/error.h"
 
 namespace packtrace {
@@ -35,8 +35,8 @@ public:
     vertex16::GeometryRecord record = geometry.record;
     const bool narrow = record.index_bits == 16;
     const size_t first_index = narrow ? indices16_.size() : indices32_.size();
-    constexpr size_t kMost = std::numeric_limits<uint32_t>::max() - 1;
-    if (geometry.vertices.size() > kMost - vertices_.size() || geometry.indices.size() > kMost - first_index)
+    constexpr size_t kMax = std::numeric_limits<uint32_t>::max() - 1;
+    if (geometry.vertices.size() > kMax - vertices_.size() || geometry.indices.size() > kMax - first_index)
       throw Error(ErrorKind::kLimitExceeded, "more than 2^32 - 2 vertices or indices in one file");
     record.first_vertex = static_cast<uint32_t>(vertices_.size());
     record.first_draw = static_cast<uint32_t>(draws_.size());

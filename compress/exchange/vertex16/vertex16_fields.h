@@ -6,15 +6,15 @@
 
 namespace packtrace {
 
-/// A bit field of the 16-byte vertex. Fields follow each other from bit 0 of the first of four 32-bit words.
+/// A bit field of the 16-byte vertex. The fields are consecutive, from bit 0 of the first of four 32-bit words.
 struct Vertex16Field {
   std::string_view name;
   uint32_t bits;
   std::string_view meaning;
 };
 
-/// The one description of the 16-byte vertex: vertex16_generator writes the C++ and GLSL access to it, and
-/// docs/vertex16.md repeats it (tests compare all three).
+/// The only definition of the 16-byte vertex. vertex16_generator writes the C++ and GLSL accessors from it, and
+/// docs/vertex16.md repeats it; tests compare all three.
 inline constexpr std::array<Vertex16Field, 8> kVertex16Fields{{
     {"position_x", 21, "lattice coordinate, less the geometry's origin"},
     {"position_y", 21, "the same along y"},

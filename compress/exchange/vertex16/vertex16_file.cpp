@@ -8,8 +8,8 @@
 
 #include "compress/format/layout/section_file.h"
 #include "compress/format/textures/texture_codec.h"
-#include "pbrt_import/scene/alpha_mask.h"
 #include "pbrt_import/base/file_error.h"
+#include "pbrt_import/scene/alpha_mask.h"
 
 namespace packtrace::vertex16 {
 namespace {
@@ -95,7 +95,7 @@ private:
                   g.draw_count <= s_.draws.size() - draws,
               "ranges of geometry", i);
       require(g.index_bits == 16 || g.index_bits == 32, "index bits of geometry", i);
-      // Sums of an origin and a field stay within int32_t.
+      // With this limit the sum of an origin and a field stays within int32_t.
       constexpr int64_t kLargest = (int64_t{1} << 31) - (int64_t{1} << 21);
       bool frame = std::isfinite(g.frame.step) && g.frame.step > 0.0f;
       for (int axis = 0; axis < 3; ++axis) frame = frame && std::abs(int64_t{g.frame.origin[axis]}) <= kLargest;

@@ -10,7 +10,7 @@
 
 namespace packtrace::vertex16 {
 
-/// Typed spans over the sections of a file.
+/// Typed spans over the sections of a vertex16 file. They do not own memory.
 struct Sections {
   std::span<const glm::uvec4> vertices;
   std::span<const uint16_t> indices16;
@@ -26,21 +26,21 @@ struct Sections {
   std::span<const uint8_t> texture_bytes;
   std::span<const char> strings;
 
-  /// Corner of a draw's triangles, 0 .. index_count - 1, as a place in vertices.
+  /// Index into `vertices` of a corner of the draw's triangles, 0 .. index_count - 1.
   uint32_t vertex(const DrawRecord& draw, uint32_t corner) const {
     const uint32_t at = draw.first_index + corner;
     return draw.vertex_offset + (geometries[draw.geometry].index_bits == 16 ? indices16[at] : indices32[at]);
   }
 };
 
-/// Lays sections out as a file: header, hashes, alignment.
+/// Assembles a file image from its sections: header, hashes, alignment.
 std::vector<std::byte> assemble(const Sections& sections);
 
-/// Checks hashes, sizes, and every range and index, so that whatever a record names is there. What materials, masks and
-/// strings hold is checked as far as they refer to each other.
+/// Checks hashes, sizes, and every range and index, so that all references of records are valid. Of materials, masks
+/// and strings only the references are checked.
 /// @param bytes 8-byte aligned
-/// @param name stands for the file in errors
-/// Throws Error(kInput) saying what is wrong; Error(kUnsupported) for other versions.
+/// @param name stands for the file in error messages
+/// Throws Error(kInput) with the fault, Error(kUnsupported) for other versions.
 Sections validate(std::span<const std::byte> bytes, const std::string& name);
 
 } // namespace packtrace::vertex16

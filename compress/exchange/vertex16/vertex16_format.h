@@ -4,25 +4,26 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "compress/format/layout/baked_format.h"
 #include "compress/exchange/vertex16/vertex16_decode.h"
+#include "compress/format/layout/baked_format.h"
 
-/// What lies in a file of `export --layout vertex16`, version 1; docs/vertex16.md says it in words. Little-endian;
-/// every section starts at a multiple of 64 bytes; bytes that no field or section owns are zero.
+/// Records of the files that `export --layout vertex16` writes, version 1; docs/vertex16.md describes them. All values
+/// are little-endian. Every section starts at a multiple of 64 bytes. Bytes that belong to no field and no section are
+/// zero.
 namespace packtrace::vertex16 {
 
 inline constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'V', '1', '6', '\r', '\n', 0x1a};
 inline constexpr uint32_t kVersion = 1;
 
-/// Section numbers are places in Header::sections.
+/// Section numbers are indices into Header::sections.
 enum Section : uint32_t {
-  kVertices,  ///< glm::uvec4 each
-  kIndices16, ///< uint16_t, of draws with index_bits 16
-  kIndices32, ///< uint32_t
+  kVertices,  ///< one glm::uvec4 per vertex
+  kIndices16, ///< uint16_t: indices of draws with index_bits 16
+  kIndices32, ///< uint32_t: indices of draws with index_bits 32
   kGeometries,
   kDraws,
   kInstances,
-  kMaterialSlots, ///< this and the rest as in the .ptk file
+  kMaterialSlots, ///< this and all following sections are as in the .ptk file
   kMaterials,
   kMasks,
   kMaskWords,
@@ -45,44 +46,44 @@ struct Header {
   uint64_t header_hash; ///< XXH3-64 of the header before this field
 };
 
-/// Errors are those of the export, against what the .ptk file decodes to.
+/// Errors are those of the export, measured against the decoded .ptk file.
 struct GeometryRecord {
   Vertex16Frame frame;
   uint32_t first_vertex;
   uint32_t vertex_count;
   uint32_t first_draw;
   uint32_t draw_count;
-  std::array<float, 3> bounds_lo; ///< of the decoded vertices; lo > hi where there are none
-  float max_position_error;       ///< larger axis, object units
+  std::array<float, 3> bounds_lo; ///< of the decoded vertices; lo > hi if there are none
+  float max_position_error;       ///< largest axis, object units
   std::array<float, 3> bounds_hi;
   float max_uv_error; ///< larger axis
   float max_normal_error_degrees;
-  float max_tangent_error_degrees; ///< against the mean of dP/du of the triangles around a vertex
-  uint32_t index_bits;             ///< 16 or 32, of all its draws
-  uint32_t slot_count;             ///< of material slots
+  float max_tangent_error_degrees; ///< against the mean of dP/du over the triangles around a vertex
+  uint32_t index_bits;             ///< 16 or 32, for all its draws
+  uint32_t slot_count;             ///< number of material slots
 };
 
 // DrawRecord::flags
-inline constexpr uint32_t kDrawFlat = 1u << 0;     ///< all vertices have the flat normal; otherwise none has
-inline constexpr uint32_t kDrawUvs = 1u << 1;      ///< else they mean nothing
-inline constexpr uint32_t kDrawTangents = 1u << 2; ///< else they mean nothing
+inline constexpr uint32_t kDrawFlat = 1u << 0;     ///< all vertices have the flat normal; if not set, none has it
+inline constexpr uint32_t kDrawUvs = 1u << 1;      ///< if not set, texture coordinates are meaningless
+inline constexpr uint32_t kDrawTangents = 1u << 2; ///< if not set, tangents are meaningless
 inline constexpr uint32_t kDrawFlags = kDrawFlat | kDrawUvs | kDrawTangents;
 
 /// Triangles of one geometry with one material slot: DrawIndexed(index_count, 1, first_index, vertex_offset, 0).
 struct DrawRecord {
-  uint32_t first_index;   ///< into the section of its geometry's index_bits
+  uint32_t first_index;   ///< into the index section that the geometry's index_bits select
   uint32_t index_count;   ///< multiple of 3
   uint32_t vertex_offset; ///< the geometry's first_vertex
   uint32_t geometry;
-  uint32_t material_slot; ///< its material in an instance: that at the instance's first_slot + this
+  uint32_t material_slot; ///< an instance's material is material_slots[first_slot + material_slot]
   uint32_t flags;
   std::array<uint32_t, 2> reserved;
 };
 
 struct InstanceRecord {
-  std::array<float, 12> world_from_object; ///< three rows of four, as VkTransformMatrixKHR
+  std::array<float, 12> world_from_object; ///< three rows of four, like VkTransformMatrixKHR
   uint32_t geometry;
-  uint32_t first_slot; ///< into the material slots, of the geometry's slot_count
+  uint32_t first_slot; ///< into the material slots; the run has the geometry's slot_count entries
   std::array<uint32_t, 2> reserved;
 };
 
@@ -95,7 +96,7 @@ static_assert(baked::kIsPod<DrawRecord> && sizeof(DrawRecord) == 32 && offsetof(
 static_assert(baked::kIsPod<InstanceRecord> && sizeof(InstanceRecord) == 64);
 static_assert(sizeof(glm::uvec4) == 16);
 
-/// sizeof the records of each section.
+/// Record size of each section in bytes.
 inline constexpr std::array<uint32_t, kSectionCount> kRecordBytes = {sizeof(glm::uvec4),
                                                                      sizeof(uint16_t),
                                                                      sizeof(uint32_t),

@@ -5,13 +5,13 @@
 #include <cstdint>
 #include <string_view>
 
-#include "compress/format/cluster/normal_codec.h"
 #include "compress/exchange/vertex16/vertex16_fields.h"
+#include "compress/format/cluster/normal_codec.h"
 
 namespace packtrace {
 namespace {
 
-/// The shortest text that reads back as the same float, as both languages write it.
+/// Shortest literal that reads back as the same float in both languages.
 std::string literal(float value) {
   std::array<char, 32> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
@@ -68,8 +68,7 @@ std::string packer(const std::string& prefix) {
   return text + ");\n}\n";
 }
 
-/// What the fields mean, in the language that GLSL and C++ with GLM have in common. $ stands for the prefix of
-/// functions.
+/// Decoders of the fields, in the common subset of GLSL and C++ with GLM. $ stands for the prefix of functions.
 constexpr std::string_view kDecoders = R"(
 // Object space. Exact where |origin + field| <= 2^24; the same lattice point is the same float in every geometry.
 $vec3 vertex16_position(uvec4 v, Vertex16Frame frame) {
@@ -152,7 +151,7 @@ std::string decoders(const std::string& prefix) {
   return replaced(std::move(text), "@LAST", std::to_string(last));
 }
 
-constexpr std::string_view kNotice = "// Made by vertex16_generator from compress/exchange/vertex16/vertex16_fields.h; "
+constexpr std::string_view kNotice = "// Made by vertex16_generator from vertex16_fields.h; "
                                      "docs/vertex16.md says where the bytes lie.\n";
 constexpr std::string_view kFrame = R"(
 // What a geometry's vertices share: 32 bytes, as std430 and C++ lay them out.

@@ -7,17 +7,18 @@
 #include <numeric>
 #include <string>
 
-#include "pbrt_import/scene/angle.h"
-#include "pbrt_import/base/weld_table.h"
-#include "compress/format/cluster/tangent_codec.h"
 #include "compress/exchange/vertex16/vertex16_fields.h"
+#include "compress/format/cluster/tangent_codec.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/base/weld_table.h"
+#include "pbrt_import/scene/angle.h"
 
 namespace packtrace {
 namespace {
 
 constexpr int64_t kPositionCodes = int64_t{1} << 21, kUvCodes = int64_t{1} << 16;
-constexpr uint32_t kMostShort = 65535; // most vertices with 16-bit indices: 0xffff stays free for primitive restart
+constexpr uint32_t kMaxVertices16BitIndices =
+    65535; // most vertices with 16-bit indices: 0xffff stays free for primitive restart
 
 /// A vertex as decoded from the baked file.
 struct SourceVertex {
@@ -61,7 +62,7 @@ public:
     record_.vertex_count = static_cast<uint32_t>(vertices_.size());
     record_.draw_count = static_cast<uint32_t>(out_.draws.size());
     record_.slot_count = source_.slot_count;
-    record_.index_bits = record_.vertex_count <= kMostShort ? 16 : 32;
+    record_.index_bits = record_.vertex_count <= kMaxVertices16BitIndices ? 16 : 32;
     if (tiles_repeat_) move_charts_to_the_first_tile();
     choose_frame();
     out_.vertices.reserve(vertices_.size());

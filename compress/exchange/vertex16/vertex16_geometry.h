@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/file/baked_file.h"
-#include "compress/format/cluster/lattice_box.h"
 #include "compress/exchange/vertex16/vertex16_format.h"
+#include "compress/format/cluster/lattice_box.h"
+#include "compress/format/file/baked_file.h"
 
 namespace packtrace {
 

@@ -4,16 +4,16 @@
 #include <cassert>
 #include <numeric>
 
-#include "compress/format/layout/bit_stream.h"
 #include "compress/format/cluster/normal_kernels.h"
+#include "compress/format/layout/bit_stream.h"
 
 namespace packtrace {
 namespace {
 
 constexpr uint32_t kUvAnchorBits = 32, kUvWidthBits = 5;
 constexpr uint32_t kUvHeaderBits = 2 * (kUvAnchorBits + kUvWidthBits);
-constexpr uint32_t kMaxUvBits = 31;     // -kMaxUvLattice .. kMaxUvLattice
-constexpr uint32_t kMaxNormalBits = 17; // three times the codes of axis32
+constexpr uint32_t kMaxUvBits = 31;     // for differences of codes in -kMaxUvLattice .. kMaxUvLattice
+constexpr uint32_t kMaxNormalBits = 17; // covers three times the codes of axis32 (unfolded charts)
 
 uint32_t uv_width(const uint8_t* bits, uint32_t uv_bit, uint32_t axis) {
   return static_cast<uint32_t>(read_bits(bits, uv_bit + 2 * kUvAnchorBits + axis * kUvWidthBits, kUvWidthBits));
@@ -62,9 +62,8 @@ std::optional<std::string_view> find_normal_fault(const baked::GeometryRecord& g
 
 ClusterView::ClusterView(const baked::GeometryRecord& geometry, const baked::ClusterRecord& cluster,
                          const uint8_t* payload)
-    : record_(&cluster),
-      bits_(payload + uint64_t{4} * cluster.payload_offset), layout_{cluster.triangle_count, cluster.vertex_count,
-                                                                     cluster.restart_count},
+    : record_(&cluster), bits_(payload + uint64_t{4} * cluster.payload_offset),
+      layout_{cluster.triangle_count, cluster.vertex_count, cluster.strip_count},
       step_(PositionGrid{geometry.step_mantissa, geometry.step_exponent}.step()),
       u_decoder_(static_cast<UvEncoding>(geometry.uv_encoding), geometry.uv_exponent[0]),
       v_decoder_(static_cast<UvEncoding>(geometry.uv_encoding), geometry.uv_exponent[1]),
@@ -110,7 +109,7 @@ NormalFields ClusterView::normal_entry(uint32_t entry) const {
   const auto y = static_cast<int32_t>(field & ((1u << y_bits) - 1));
   const auto x = static_cast<int32_t>((field >> y_bits) & ((1u << x_bits) - 1));
   return fold_normal(normal_encoding_,
-                     {chart_of(*record_) + static_cast<uint32_t>(field >> (x_bits + y_bits)), // one of the two is 0
+                     {chart_of(*record_) + static_cast<uint32_t>(field >> (x_bits + y_bits)), // one of them is 0
                       2 * record_->normal_anchor[0] + x, 2 * record_->normal_anchor[1] + y});
 }
 
@@ -155,7 +154,7 @@ void decode_positions(const ClusterView& cluster, std::span<Vec3> out) {
   const LatticePoint base = cluster.base_;
   const double step = cluster.step_;
   uint64_t bit = cluster.position_bit_;
-  if (stride <= kMaxFieldBits) { // the usual case: a vertex in one load
+  if (stride <= kMaxFieldBits) { // usual case: one load per vertex
     const uint64_t x_mask = (uint64_t{1} << x_bits) - 1, y_mask = (uint64_t{1} << y_bits) - 1;
     for (uint32_t v = 0; v < count; ++v, bit += stride) {
       const uint64_t field = read_bits(cluster.bits_, bit, stride);
@@ -228,16 +227,16 @@ void decode_uvs(const ClusterView& cluster, std::span<Vec2> out) {
 std::optional<std::string_view> find_cluster_fault(const baked::GeometryRecord& geometry,
                                                    const baked::ClusterRecord& cluster, const uint8_t* payload,
                                                    uint64_t payload_bytes) {
-  const IndexLayout layout{cluster.triangle_count, cluster.vertex_count, cluster.restart_count};
+  const IndexLayout layout{cluster.triangle_count, cluster.vertex_count, cluster.strip_count};
   if (layout.triangle_count < 1 || layout.triangle_count > kMaxClusterTriangles) return "triangle count";
   if (layout.vertex_count < 1 || layout.vertex_count > kMaxClusterVertices) return "vertex count";
-  if (layout.restart_count < 1 || layout.restart_count > layout.triangle_count) return "strip count";
+  if (layout.strip_count < 1 || layout.strip_count > layout.triangle_count) return "strip count";
   if (layout.vertex_count > layout.corner_count()) return "more vertices than corners";
   for (size_t axis = 0; axis < 3; ++axis) {
     if (cluster.position_bits[axis] > kMaxFieldBits) return "position bits";
     const int64_t low = geometry.origin[axis] + int64_t{cluster.anchor[axis]} * (int64_t{1} << geometry.anchor_shift);
     const int64_t high = low + ((int64_t{1} << cluster.position_bits[axis]) - 1);
-    // A field's top value may lie past the last vertex, so the limit is loose; it keeps all sums inside int64.
+    // The top value of a field may lie past the last vertex, so the limit is loose; it keeps all sums within int64.
     if (low < -2 * kMaxLattice || high > 8 * kMaxLattice) return "position anchor";
   }
   if ((cluster.flags & ~baked::kClusterFlags) != 0) return "flags";
@@ -265,7 +264,7 @@ std::optional<std::string_view> find_cluster_fault(const baked::GeometryRecord& 
   if (!fits(view.stream_bits().total())) return "payload extent";
   Vec3 lo, hi;
   view.bounds(lo, hi);
-  // The box may reach past the largest float where the vertices do not.
+  // The box may exceed the float range although all vertices are finite.
   for (uint32_t v = 0; !(is_finite(lo) && is_finite(hi)) && v < layout.vertex_count; ++v)
     if (!is_finite(view.position(v))) return "position beyond the float range";
   return std::nullopt;

@@ -3,9 +3,9 @@
 #include <cassert>
 #include <limits>
 
-#include "compress/format/layout/bit_stream.h"
 #include "compress/format/cluster/cluster_codec.h"
 #include "compress/format/cluster/normal_packing.h"
+#include "compress/format/layout/bit_stream.h"
 
 namespace packtrace {
 namespace {
@@ -82,7 +82,7 @@ baked::ClusterRecord encode_cluster(const ClusterInput& input, BitWriter& writer
   record.material_slot = input.material_slot;
   record.triangle_count = static_cast<uint8_t>(layout.triangle_count);
   record.vertex_count = static_cast<uint16_t>(layout.vertex_count);
-  record.restart_count = static_cast<uint8_t>(layout.restart_count);
+  record.strip_count = static_cast<uint8_t>(layout.strip_count);
   write_strips(*input.strips, writer);
   write_positions(input, record, writer);
   write_normals(input, record, writer);

@@ -10,18 +10,18 @@
 
 namespace packtrace {
 
-/// What is wrong with the clusters of a geometry.
+/// Fault in the clusters of a geometry.
 struct ClusterListFault {
-  std::optional<uint32_t> cluster; ///< of the geometry; none: the geometry as a whole
+  std::optional<uint32_t> cluster; ///< number within the geometry; empty if the fault concerns the whole geometry
   std::string_view what;
 };
 
-/// Checks the clusters of one geometry: each of them (find_cluster_fault()), their slots and the order of their
-/// classes, the numbers of their first triangles and vertices, and the totals and bounds that the geometry states.
-/// @param geometry whose lattice, encodings and range of the payload are checked
-/// @param payload of the geometry; the 8 bytes behind it are readable
-/// @param class_of_slot material_class() of slots below geometry.slot_count
-/// @param each_checked find_cluster_fault() has found nothing in any of them before
+/// Checks the clusters of one geometry: each cluster (find_cluster_fault()), the slots and the order of their classes,
+/// the numbers of first triangles and vertices, and the totals and bounds in the geometry record.
+/// @param geometry its lattice, encodings and payload range must have been checked
+/// @param payload of the geometry, followed by 8 readable bytes
+/// @param class_of_slot returns the material_class() of a slot below geometry.slot_count
+/// @param each_checked find_cluster_fault() has already accepted every cluster
 std::optional<ClusterListFault> find_cluster_list_fault(const baked::GeometryRecord& geometry,
                                                         std::span<const baked::ClusterRecord> clusters,
                                                         const uint8_t* payload,

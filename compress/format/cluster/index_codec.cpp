@@ -9,7 +9,7 @@
 namespace packtrace {
 namespace {
 
-/// The 128 bits from `first`, least significant first; bits at and beyond `count` are zero.
+/// Up to 128 bits starting at bit `first`, least significant first. Bits at and beyond `count` are zero.
 struct Mask128 {
   std::array<uint64_t, 2> word{};
 
@@ -20,7 +20,7 @@ struct Mask128 {
   bool test(uint32_t bit) const { return (word[bit >> 6] >> (bit & 63u)) & 1u; }
   uint32_t count() const { return static_cast<uint32_t>(std::popcount(word[0]) + std::popcount(word[1])); }
 
-  /// Bits 0..bit of this.
+  /// Copy with only bits 0..bit.
   Mask128 up_to(uint32_t bit) const {
     Mask128 result = *this;
     const uint64_t last = ~uint64_t{0} >> (63u - (bit & 63u));
@@ -30,14 +30,14 @@ struct Mask128 {
       result.word[1] &= last;
     return result;
   }
-  /// Number of the highest set bit, or -1.
+  /// Number of the highest set bit, or -1 if none is set.
   int32_t highest() const {
     if (word[1] != 0) return 127 - std::countl_zero(word[1]);
     return 63 - std::countl_zero(word[0]);
   }
 };
 
-/// Fresh corners before corner `end`.
+/// Number of fresh corners before corner `end`.
 uint32_t fresh_before(const uint8_t* bits, uint32_t fresh_bit, uint32_t end) {
   uint32_t count = 0, at = 0;
   for (; at + 57 <= end; at += 57) count += static_cast<uint32_t>(std::popcount(read_bits(bits, fresh_bit + at, 57)));
@@ -79,7 +79,7 @@ void decode_triangles(const uint8_t* bits, const IndexLayout& layout, uint32_t b
   const Mask128 restart(bits, 0, layout.triangle_count), left(bits, layout.triangle_count, layout.triangle_count);
   const uint32_t width = layout.index_bits();
   uint64_t fresh_at = layout.fresh_bit(), explicit_at = layout.explicit_bit();
-  uint64_t fresh = 0; // bits from fresh_at on
+  uint64_t fresh = 0; // unread fresh bits; the lowest is next
   uint32_t fresh_left = 0, used = base;
   const auto next_corner = [&] {
     if (fresh_left == 0) {
@@ -110,18 +110,19 @@ void decode_triangles(const uint8_t* bits, const IndexLayout& layout, uint32_t b
 
 Triangle decode_triangle(const uint8_t* bits, const IndexLayout& layout, uint32_t index) {
   const Mask128 restarts = Mask128(bits, 0, layout.triangle_count).up_to(index);
-  const uint32_t corner = index + 2 * restarts.count(); // of the triangle's newest vertex
+  const uint32_t corner = index + 2 * restarts.count(); // of the corner that this triangle adds
   const auto first = static_cast<uint32_t>(restarts.highest());
   const auto vertex = [&](uint32_t at) { return corner_vertex(bits, layout, at); };
   if (first == index) return {vertex(corner - 2), vertex(corner - 1), vertex(corner)};
 
-  // One of a, b is the corner before. The other was last replaced by the last turn the other way in this strip, by the
-  // corner before that turn's; without such a turn it is still the strip's own.
+  // One of a, b is the corner added before this one. The other was last replaced at the last turn in the other
+  // direction in this strip, by the corner added before that turn. Without such a turn it is still a corner of the
+  // strip's first triangle.
   Mask128 other(bits, layout.triangle_count, layout.triangle_count);
   const bool is_left = other.test(index);
   if (is_left) other.word = {~other.word[0], ~other.word[1]};
   const int32_t turn = other.up_to(index).highest();
-  const uint32_t first_corner = corner - (index - first); // of the strip's first triangle's newest vertex
+  const uint32_t first_corner = corner - (index - first); // of the last corner of the strip's first triangle
   const uint32_t kept = turn > static_cast<int32_t>(first) ? vertex(corner - (index - static_cast<uint32_t>(turn)) - 1)
                                                            : vertex(is_left ? first_corner - 2 : first_corner - 1);
   const uint32_t previous = vertex(corner - 1), newest = vertex(corner);
@@ -131,11 +132,11 @@ Triangle decode_triangle(const uint8_t* bits, const IndexLayout& layout, uint32_
 bool strips_are_valid(const uint8_t* bits, const IndexLayout& layout) {
   const uint32_t n = layout.triangle_count;
   const Mask128 restart(bits, 0, n), left(bits, n, n);
-  if (!restart.test(0) || restart.count() != layout.restart_count) return false;
+  if (!restart.test(0) || restart.count() != layout.strip_count) return false;
   if ((restart.word[0] & left.word[0]) != 0 || (restart.word[1] & left.word[1]) != 0) return false;
   const uint32_t width = layout.index_bits();
   if (fresh_before(bits, layout.fresh_bit(), layout.corner_count()) != layout.vertex_count) return false;
-  // Of the corners that are not fresh, the k-th has corner - k fresh ones before it.
+  // The k-th corner that is not fresh has (corner - k) fresh corners before it.
   uint64_t explicit_at = layout.explicit_bit();
   bool valid = true;
   for (uint32_t first = 0, k = 0; first < layout.corner_count(); first += 32) {

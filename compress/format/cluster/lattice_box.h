@@ -4,7 +4,7 @@
 
 namespace packtrace {
 
-/// Smallest and largest lattice coordinates of something; both ends are inside.
+/// Box of lattice coordinates; both ends are inside.
 struct LatticeBox {
   LatticePoint lo{}, hi{};
 };

@@ -7,7 +7,7 @@
 namespace packtrace {
 namespace {
 
-constexpr int32_t kZsignXLast = 32766, kZsignYLast = 65534; // the codes of +1; larger ones are never written
+constexpr int32_t kZsignXLast = 32766, kZsignYLast = 65534; // codes of +1; larger codes are never written
 
 int32_t last_x(const NormalFormat& format) { return static_cast<int32_t>(format.x_codes) - 1; }
 int32_t last_y(const NormalFormat& format) { return static_cast<int32_t>(format.y_codes) - 1; }
@@ -24,12 +24,12 @@ Vec3 decode_zsign(NormalFields fields) {
   return {x, y, fields.chart != 0 ? -z : z};
 }
 
-/// @param t twice the distance from the middle code, over the number of steps: -1 .. 1
+/// @param t twice the code's distance from the middle code, divided by the number of steps: -1 .. 1
 float warp(float t) { return t * (static_cast<float>(kAxisSlope) + static_cast<float>(kAxisCubic) * (t * t)); }
 
 double inverse_warp(double x) {
   double t = x * 1.4142135623730951;
-  for (int i = 0; i < 3; ++i) // Newton; the first guess is within .04, each step about squares that
+  for (int i = 0; i < 3; ++i) // Newton's method: the first guess is within 0.04, and each step about squares the error
     t -= (t * (kAxisSlope + kAxisCubic * t * t) - x) / (kAxisSlope + 3.0 * kAxisCubic * t * t);
   return t;
 }
@@ -39,7 +39,7 @@ Vec3 decode_axis(const NormalFormat& format, NormalFields fields) {
   const float scale = 1.0f / static_cast<float>(last);
   const float u = warp(static_cast<float>(2 * fields.x - last) * scale);
   const float v = warp(static_cast<float>(2 * fields.y - last) * scale);
-  // The sum first: it is the same when the two change places, as they do between charts.
+  // u^2 + v^2 is summed first, so that w keeps its bits if u and v swap places, as they do between charts.
   const float w = std::sqrt(std::max(1.0f - (u * u + v * v), 0.0f));
   const float signed_w = (fields.chart & 1u) != 0 ? -w : w;
   const uint32_t axis = fields.chart / 2;
@@ -59,7 +59,7 @@ Vec3 decode_oct(const NormalFormat& format, NormalFields fields) {
   return {x / length, y / length, z / length};
 }
 
-/// The candidate nearest to n: all of x0 .. x1 by y0 .. y1 in one chart.
+/// Finds the code nearest to n among candidates x0 .. x1 by y0 .. y1 of one chart.
 class Nearest {
 public:
   Nearest(NormalEncoding encoding, DVec3 n) : encoding_(encoding), n_(n) {}
@@ -67,7 +67,7 @@ public:
   void search(uint32_t chart, int32_t x0, int32_t x1, int32_t y0, int32_t y1) {
     for (int32_t x = x0; x <= x1; ++x)
       for (int32_t y = y0; y <= y1; ++y) {
-        // The chord, not the dot product: cosines this close to 1 all look alike.
+        // Compares chords, not dot products: cosines this close to 1 are not distinguishable.
         const DVec3 d = DVec3(decode_normal(encoding_, NormalFields{chart, x, y})) - n_;
         const double distance = glm::dot(d, d);
         if (distance < distance_) distance_ = distance, best_ = {chart, x, y};
@@ -91,7 +91,7 @@ void search_zsign(Nearest& nearest, DVec3 n) {
                  std::min(y + 1, kZsignYLast));
 }
 
-/// The lower of the two of last + 1 codes of -1 .. 1 around t.
+/// Returns the lower of the two codes around t, where last + 1 codes span -1 .. 1.
 int32_t code_below(double t, int32_t last) {
   return std::clamp(static_cast<int32_t>((t + 1.0) * 0.5 * last), 0, last - 1);
 }
@@ -133,8 +133,9 @@ uint32_t join_normal_code(NormalEncoding encoding, NormalFields fields) {
          static_cast<uint32_t>(fields.y);
 }
 
-// On the cross around face a with sign s, x runs along axis a + 1 and y along a + 2. Beyond the face's border x goes on
-// along the neighbour, one code later: from there on it counts how far the neighbour's coordinate along a has sunk.
+// Layout of the cross around face a with sign s: x runs along axis a + 1 and y along axis a + 2. Beyond the border of
+// the face the coordinate continues on the neighbour, one code later. There it counts the decrease of the neighbour's
+// coordinate along a.
 
 std::optional<NormalFields> unfold_normal(NormalEncoding encoding, NormalFields fields, uint32_t chart) {
   if (fields.chart == chart) return fields;
@@ -142,7 +143,7 @@ std::optional<NormalFields> unfold_normal(NormalEncoding encoding, NormalFields 
   if (format.family != NormalFamily::kAxis || fields.chart / 2 == chart / 2) return std::nullopt;
   const int32_t last = last_x(format);
   const bool along_x = fields.chart / 2 == (chart / 2 + 1) % 3;
-  const int32_t height = along_x ? fields.y : fields.x; // along the chart's axis
+  const int32_t height = along_x ? fields.y : fields.x; // coordinate along the chart's axis
   const int32_t sunk = (chart & 1u) != 0 ? height : last - height;
   const int32_t beyond = (fields.chart & 1u) != 0 ? -1 - sunk : last + 1 + sunk;
   return along_x ? NormalFields{chart, beyond, fields.x} : NormalFields{chart, fields.y, beyond};
@@ -152,7 +153,8 @@ NormalFields fold_normal(NormalEncoding encoding, NormalFields fields) {
   const NormalFormat& format = format_of(encoding);
   const uint32_t chart = std::min(fields.chart, format.charts - 1);
   const int32_t last = last_x(format);
-  const auto beyond = [&](int32_t c) { return std::max(c - last, -c); }; // of the border; above 0 outside
+  // Distance past the border, above 0 outside the face.
+  const auto beyond = [&](int32_t c) { return std::max(c - last, -c); };
   const int32_t x = std::clamp(fields.x, 0, last), y = std::clamp(fields.y, 0, last_y(format));
   if (format.family != NormalFamily::kAxis || std::max(beyond(fields.x), beyond(fields.y)) <= 0) return {chart, x, y};
   const bool along_x = beyond(fields.x) > 0;
@@ -182,7 +184,7 @@ Vec3 decode_normal(NormalEncoding encoding, uint32_t code) {
 }
 
 uint32_t encode_normal(NormalEncoding encoding, DVec3 n) {
-  // Scaling by the largest component first keeps the squares away from overflow and from zero.
+  // Scaling by the largest component first keeps the squares from overflow and underflow.
   n /= std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)});
   n /= glm::length(n);
   const NormalFormat& format = format_of(encoding);
@@ -195,7 +197,7 @@ uint32_t encode_normal(NormalEncoding encoding, DVec3 n) {
     search_axis(nearest, last_x(format), n);
     break;
   case NormalFamily::kOct:
-    search_oct(nearest, last_x(format) - 1, n); // one code of the power of two is left
+    search_oct(nearest, last_x(format) - 1, n); // an even number of codes leaves one code unused
     break;
   }
   return nearest.code();

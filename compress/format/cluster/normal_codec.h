@@ -10,27 +10,27 @@
 
 namespace packtrace {
 
-/// How a geometry's normals are stored. The numbers are on disk.
+/// Encoding of a geometry's normals. Files store these numbers.
 enum class NormalEncoding : uint32_t { kZsign32, kAxis32, kAxis24, kAxis16, kOct32, kOct24, kOct20, kOct16 };
 
 enum class NormalFamily : uint32_t {
   kZsign, ///< the sign of z and two components
-  kAxis,  ///< the dominant axis, its sign, and the two other components
-  kOct    ///< octahedron, unfolded
+  kAxis,  ///< the dominant axis, its sign, and the other two components
+  kOct    ///< unfolded octahedron
 };
 
-/// One encoding. A code is (chart * x_codes + x) * y_codes + y, below 2^bits.
+/// Parameters of one encoding. A code is (chart * x_codes + x) * y_codes + y, below 2^bits.
 struct NormalFormat {
   std::string_view name;
   NormalFamily family;
   uint32_t bits;
   uint32_t charts; ///< zsign: sign of z; axis: 2 axis + sign; oct: 1
   uint32_t x_codes, y_codes;
-  double max_error_degrees; ///< no unit vector is farther from its decoded code
+  double max_error_degrees; ///< upper bound of the angle between a unit vector and its decoded code
 };
 
-/// By NormalEncoding. The axis formats have the largest odd number of codes that leaves room for six charts, so that 0
-/// is a code.
+/// Indexed by NormalEncoding. The axis formats have the largest odd number of codes per axis that leaves room for six
+/// charts. An odd number makes 0 a code.
 inline constexpr std::array<NormalFormat, 8> kNormalFormats{{
     {"zsign32", NormalFamily::kZsign, 32, 2, 1u << 15, 1u << 16, 0.33},
     {"axis32", NormalFamily::kAxis, 32, 6, 26753, 26753, 0.0024},
@@ -46,14 +46,15 @@ constexpr const NormalFormat& format_of(NormalEncoding encoding) {
   return kNormalFormats[static_cast<size_t>(encoding)];
 }
 
-/// Of the cubic of the axis encodings, t (slope + cubic t^2): the slope at 0, a multiple of 2^-10 near the best for the
-/// largest error, and what leads to sqrt(1/2) at t = 1.
+/// Coefficients of the axis encodings' cubic t (slope + cubic t^2). The slope at 0 is a multiple of 2^-10 close to the
+/// one with the least maximum error. The cubic coefficient makes the value sqrt(1/2) at t = 1.
 inline constexpr double kAxisSlope = 803.0 / 1024.0;
 inline constexpr double kAxisCubic = 0.70710678118654752440 - kAxisSlope;
 
 std::optional<NormalEncoding> find_normal_encoding(std::string_view name);
 
-/// The parts of a code. Those of split_normal_code() are canonical: chart < charts, 0 <= x < x_codes, 0 <= y < y_codes.
+/// Components of a code. Canonical fields, as split_normal_code() returns them, have chart < charts, 0 <= x < x_codes
+/// and 0 <= y < y_codes.
 struct NormalFields {
   uint32_t chart = 0;
   int32_t x = 0, y = 0;
@@ -64,32 +65,35 @@ NormalFields split_normal_code(NormalEncoding encoding, uint32_t code);
 /// @param fields canonical
 uint32_t join_normal_code(NormalEncoding encoding, NormalFields fields);
 
-/// The axis encodings' charts are the faces of a cube. Unfolding lays a face and its four neighbours into the plane of
-/// the face `chart` as a cross, in which they join without a gap: x and y are then -codes .. 2 codes - 1. The
-/// face itself keeps its x and y. Nothing for the opposite face; in the other families nothing for any other chart.
+/// Unfolds a normal of an axis encoding into the plane of the face `chart`. The charts are the faces of a cube; a face
+/// and its four neighbours form a gapless cross in that plane, in which x and y are -codes .. 2 codes - 1. Normals on
+/// the face itself keep their x and y. Returns nothing for the opposite face; in the other families, nothing for any
+/// chart but the normal's own.
 /// @param fields canonical
 std::optional<NormalFields> unfold_normal(NormalEncoding encoding, NormalFields fields, uint32_t chart);
 
-/// The canonical fields of unfolded ones; inverse of unfold_normal(). Total: for all other fields (|x|, |y| < 2^29),
-/// the canonical fields of a nearby place.
+/// Returns the canonical fields of unfolded ones; inverse of unfold_normal(). Accepts any fields with |x|, |y| < 2^29:
+/// if they do not lie on the cross, the result is a nearby code.
 NormalFields fold_normal(NormalEncoding encoding, NormalFields fields);
 
-/// Unit length within 3e-7, the same bits on every machine: +, -, x, / and square root of floats.
-/// @param fields canonical
+/// Decodes a normal. Its length is 1 within 3e-7. The bits are the same on every machine: only +, -, x, / and square
+/// root of floats are used.
 /// zsign: x = 2 X / 32766 - 1, y = 2 Y / 65534 - 1, |z| = sqrt(1 - x^2 - y^2); outside the unit disc z = 0 and (x, y)
-/// is scaled to length 1. axis: for axis a of x, y, z and C codes, with t = (2 X - (C - 1)) / (C - 1) and s likewise of
-/// Y, component a + 1 is t (A + B t^2), component a + 2 (cyclic) is s (A + B s^2), and component a the rest of the unit
-/// length with the chart's sign. A + B = sqrt(1/2), where two components are equally large; the cubic spreads the codes
-/// evenly, as sin(t pi / 4) does. oct: x = (X - K) / K, y = (Y - K) / K, K = codes / 2 - 1, z = 1 - |x| - |y|, folded
-/// where z < 0, normalised. Source: Meyer, Suessmuth, Sussner, Stamminger, Greiner, "On Floating-Point Normal Vectors",
-/// 2010.
+/// is scaled to length 1.
+/// axis: for axis a of x, y, z and C codes, with t = (2 X - (C - 1)) / (C - 1) and s likewise from Y, component a + 1
+/// is t (A + B t^2), component a + 2 (cyclic) is s (A + B s^2), and component a completes the unit length, with the
+/// chart's sign. A + B = sqrt(1/2), where two components are equally large. The cubic spaces the codes almost evenly,
+/// like sin(t pi / 4).
+/// oct: x = (X - K) / K, y = (Y - K) / K, K = codes / 2 - 1, z = 1 - |x| - |y|, folded where z < 0, then normalised.
+/// Source: Meyer, Suessmuth, Sussner, Stamminger, Greiner, "On Floating-Point Normal Vectors", 2010.
+/// @param fields canonical
 Vec3 decode_normal(NormalEncoding encoding, NormalFields fields);
 
-/// For every code; those that encode_normal() never writes decode to some unit vector.
+/// Decodes any code. Codes that encode_normal() never writes decode to some unit vector.
 Vec3 decode_normal(NormalEncoding encoding, uint32_t code);
 
-/// The code nearest to n among the four around it; for zsign32 among the nine around the rounded one, as published.
-/// Inputs of any non-zero length are normalised first. n must be finite and not zero.
+/// Returns the code nearest to n among the four codes around it; for zsign32 among the nine codes around the rounded
+/// one, as published. n must be finite and not zero; it is normalised first.
 /// Source for oct: Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors", 2014.
 uint32_t encode_normal(NormalEncoding encoding, DVec3 n);
 

@@ -4,9 +4,9 @@
 
 namespace packtrace {
 
-/// Normals of an axis encoding as they lie in a cluster: docs/baked_format.md, "Normals".
+/// Normals of an axis encoding in a cluster's payload; see docs/baked_format.md, "Normals".
 struct AxisNormalStream {
-  const uint8_t* bits = nullptr; ///< 8 bytes behind the last normal's are readable
+  const uint8_t* bits = nullptr; ///< 8 bytes are readable behind the last normal
   uint32_t first_bit = 0, stride = 0, count = 0;
   uint32_t x_bits = 0, y_bits = 0;
   int32_t x_anchor = 0, y_anchor = 0;
@@ -15,10 +15,11 @@ struct AxisNormalStream {
   float scale = 0.0f, slope = 0.0f, cubic = 0.0f;
 };
 
-/// All of them as x, y, z.
+/// Decodes all normals to x, y, z triples.
 using AxisNormalKernel = void (*)(const AxisNormalStream& stream, float* out);
 
-/// That of this processor, with the same bits as decode_normal(fold_normal()); null where there is none.
+/// Returns the kernel for this processor, which gives the same bits as decode_normal(fold_normal()); null if there is
+/// none.
 AxisNormalKernel axis_normal_kernel();
 
 namespace avx2 {

@@ -1,4 +1,5 @@
-// Compiled for AVX2: nothing here may be inline in a header, or other translation units could end up calling it.
+// Compiled for AVX2. Code here must not be inline in a header: the linker might keep the AVX2 version for other
+// translation units.
 #include "compress/format/cluster/normal_kernels.h"
 
 #if defined(__x86_64__)
@@ -14,13 +15,13 @@ struct Lanes {
   __m256i chart, x, y;
 };
 
-/// The low halves of eight 64-bit numbers.
+/// Packs the low halves of eight 64-bit numbers.
 [[gnu::always_inline]] inline __m256i low_halves(__m256i first, __m256i second) {
   const __m256i even = _mm256_setr_epi32(0, 2, 4, 6, 0, 2, 4, 6);
   return _mm256_blend_epi32(_mm256_permutevar8x32_epi32(first, even), _mm256_permutevar8x32_epi32(second, even), 0xf0);
 }
 
-/// The fields of the normals from `first` on, of the last one for those behind it.
+/// Reads the fields of eight normals from `first` on. Lanes beyond the last normal repeat it.
 [[gnu::always_inline]] inline Lanes read_fields(const AxisNormalStream& s, uint32_t first) {
   const __m256i lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
   const __m256i index = _mm256_min_epi32(_mm256_add_epi32(_mm256_set1_epi32(static_cast<int>(first)), lanes),
@@ -53,7 +54,7 @@ struct Lanes {
   return _mm256_blendv_epi8(b, a, mask);
 }
 
-/// fold_normal() of an axis encoding.
+/// fold_normal() for an axis encoding.
 [[gnu::always_inline]] inline Lanes fold(const AxisNormalStream& s, const Lanes& in) {
   const __m256i zero = _mm256_setzero_si256(), last = _mm256_set1_epi32(s.last), one = _mm256_set1_epi32(1);
   const auto clamp = [&](__m256i c) { return _mm256_min_epi32(_mm256_max_epi32(c, zero), last); };
@@ -65,7 +66,7 @@ struct Lanes {
   const __m256i odd = _mm256_and_si256(in.chart, one), is_odd = _mm256_cmpgt_epi32(odd, zero);
   const __m256i height = select(is_odd, sunk, _mm256_sub_epi32(last, sunk));
   const __m256i below = _mm256_srli_epi32(select(along_x, in.x, in.y), 31);
-  // The next axis, or the one behind that.
+  // Advances to the next axis (along x) or the one after it (along y).
   const __m256i steps = _mm256_sub_epi32(_mm256_sub_epi32(zero, along_x), _mm256_add_epi32(along_y, along_y));
   const __m256i sum = _mm256_add_epi32(_mm256_srli_epi32(in.chart, 1), steps), three = _mm256_set1_epi32(3);
   const __m256i axis = _mm256_sub_epi32(sum, _mm256_and_si256(_mm256_cmpgt_epi32(sum, _mm256_set1_epi32(2)), three));

@@ -10,7 +10,7 @@
 namespace packtrace {
 namespace {
 
-/// Of one component.
+/// Range of one component, x or y.
 struct Range {
   int32_t lo = std::numeric_limits<int32_t>::max(), hi = std::numeric_limits<int32_t>::min();
   void add(int32_t value) { lo = std::min(lo, value), hi = std::max(hi, value); }

@@ -19,7 +19,7 @@ PositionGrid choose_position_grid(double max_step) {
 
 double position_error_bound(double step, double max_abs) {
   constexpr double kHalfFloatUlp = 0x1p-24, kSmallestFloatHalf = 0x1p-150, kDoubleRoundings = 0x1p-51;
-  const double largest = max_abs + step; // quantising may move the largest coordinate outwards
+  const double largest = max_abs + step; // quantisation may move the largest coordinate outwards
   return 0.5 * step + largest * (kHalfFloatUlp + kDoubleRoundings) + kSmallestFloatHalf;
 }
 

@@ -7,10 +7,10 @@ namespace packtrace {
 namespace {
 
 constexpr uint16_t kNone = 0xffff;
-constexpr uint32_t kTableSize = 1024; // power of two, above twice the directed edges of a full cluster
+constexpr uint32_t kTableSize = 1024; // power of two, above twice the number of directed edges of a full cluster
 
-/// Which triangle lies across each edge. Edge e of a triangle runs from its corner e to corner e + 1; its number is
-/// 3 triangle + e. An edge has at most one partner, the first unpaired one that runs the other way.
+/// Finds the triangle across each edge. Edge e of a triangle runs from its corner e to corner e + 1; its number is 3
+/// triangle + e. An edge has at most one partner: the first unpaired edge in the opposite direction.
 class EdgePartners {
 public:
   explicit EdgePartners(std::span<const Triangle> triangles) {
@@ -51,8 +51,8 @@ private:
   std::array<uint16_t, kTableSize> table_;
 };
 
-/// Walks strips greedily, always towards the triangle with the fewest ways out, so that few are left stranded. It
-/// leaves a group only once all of it is visited.
+/// Builds strips greedily. It always moves to the triangle with the fewest unvisited neighbours, so that few triangles
+/// are left isolated. It leaves a group only when all of the group's triangles are visited.
 class StripWalk {
 public:
   StripWalk(std::span<const Triangle> triangles, uint32_t vertex_count, std::span<const uint32_t> group_ends)
@@ -60,7 +60,7 @@ public:
     for (uint32_t group = 0, t = 0; group < group_ends.size(); ++group)
       for (; t < group_ends[group]; ++t) group_of_[t] = static_cast<uint8_t>(group), ++left_in_group_[group];
     for (uint32_t t = 0; t < triangles.size(); ++t)
-      for (uint32_t e = 0; e < 3; ++e) exits_[t] += is_exit(t, partners_[3 * t + e]);
+      for (uint32_t e = 0; e < 3; ++e) unvisited_neighbours_[t] += is_in_same_group(t, partners_[3 * t + e]);
   }
 
   Strips run() {
@@ -71,29 +71,33 @@ public:
   }
 
 private:
-  /// Whether a triangle that is not visited may come next.
-  bool may_come(uint32_t triangle) const { return left_in_group_[group_] == 0 || group_of_[triangle] == group_; }
+  /// Whether an unvisited triangle is allowed next: the current group is finished, or contains it.
+  bool is_allowed_next(uint32_t triangle) const { return left_in_group_[group_] == 0 || group_of_[triangle] == group_; }
 
   uint32_t pick_start() const {
     uint32_t best = ~0u;
     for (uint32_t t = 0; t < triangles_.size(); ++t)
-      if (!visited_[t] && may_come(t) && (best == ~0u || exits_[t] < exits_[best])) best = t;
+      if (!visited_[t] && is_allowed_next(t) && (best == ~0u || unvisited_neighbours_[t] < unvisited_neighbours_[best]))
+        best = t;
     return best;
   }
 
-  /// Whether the triangle behind an edge is of the same group as `from`.
-  bool is_exit(uint32_t from, uint16_t edge) const { return edge != kNone && group_of_[edge / 3u] == group_of_[from]; }
+  /// Whether the triangle of `edge` belongs to the same group as `from`.
+  bool is_in_same_group(uint32_t from, uint16_t edge) const {
+    return edge != kNone && group_of_[edge / 3u] == group_of_[from];
+  }
 
-  /// The unvisited triangle that may come next across an edge, as its edge number, or kNone.
+  /// Returns the partner of an edge if its triangle is unvisited and allowed next, else kNone.
   uint16_t across(uint32_t edge) const {
     const uint16_t partner = partners_[edge];
-    return partner != kNone && !visited_[partner / 3u] && may_come(partner / 3u) ? partner : kNone;
+    return partner != kNone && !visited_[partner / 3u] && is_allowed_next(partner / 3u) ? partner : kNone;
   }
 
   void visit(uint32_t triangle, bool restart, bool left) {
     visited_[triangle] = true;
     for (uint32_t e = 0; e < 3; ++e)
-      if (const uint16_t partner = partners_[3 * triangle + e]; is_exit(triangle, partner)) --exits_[partner / 3u];
+      if (const uint16_t partner = partners_[3 * triangle + e]; is_in_same_group(triangle, partner))
+        --unvisited_neighbours_[partner / 3u];
     strips_.triangle_order.push_back(triangle);
     group_ = group_of_[triangle];
     --left_in_group_[group_];
@@ -113,7 +117,7 @@ private:
 
   void walk_from(uint32_t triangle) {
     visit(triangle, true, false);
-    // Start so that the best way out is a right turn: across the edge into the newest corner.
+    // Choose the first corner such that the best exit is a right turn: across the edge that ends in the newest corner.
     uint32_t exit = 0;
     for (uint32_t e = 1; e < 3; ++e)
       if (better(across(3 * triangle + e), across(3 * triangle + exit))) exit = e;
@@ -133,17 +137,18 @@ private:
 
   bool better(uint16_t a, uint16_t b) const {
     if (a == kNone || b == kNone) return b == kNone && a != kNone;
-    return exits_[a / 3u] < exits_[b / 3u];
+    return unvisited_neighbours_[a / 3u] < unvisited_neighbours_[b / 3u];
   }
 
   std::span<const Triangle> triangles_;
   EdgePartners partners_;
-  std::vector<uint32_t> number_;                      // old vertex -> new, ~0 while unused
-  std::array<uint8_t, kMaxClusterTriangles> exits_{}; // unvisited neighbours
+  std::vector<uint32_t> number_; // old vertex -> new vertex, ~0 if not used yet
+  std::array<uint8_t, kMaxClusterTriangles>
+      unvisited_neighbours_{}; // by triangle: number of unvisited neighbours in its group
   std::array<bool, kMaxClusterTriangles> visited_{};
   std::array<uint8_t, kMaxClusterTriangles> group_of_{};
-  std::array<uint8_t, kMaxClusterTriangles> left_in_group_{}; // triangles that are not visited
-  uint32_t group_ = 0;                                        // of the last triangle; at first the first one
+  std::array<uint8_t, kMaxClusterTriangles> left_in_group_{}; // by group: number of unvisited triangles
+  uint32_t group_ = 0;                                        // group of the last triangle; initially the first group
   uint32_t restart_count_ = 0;
   Strips strips_;
 };

@@ -36,7 +36,7 @@ QTangent encode_q_tangent(const TangentFrame& frame, uint32_t bits) {
   glm::dquat q = glm::normalize(glm::quat_cast(axes));
   if (q.w < 0.0) q = -q;
   const double most = std::ldexp(1.0, static_cast<int>(bits) - 1) - 1.0;
-  const double least = 1.0 / most; // w's sign must not vanish
+  const double least = 1.0 / most; // |w| is at least one code, so that its sign is kept
   if (q.w < least) {
     const double scale = std::sqrt(1.0 - least * least) / std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z);
     q = glm::dquat(least, q.x * scale, q.y * scale, q.z * scale);

@@ -20,11 +20,12 @@ std::optional<UvEncoding> find_uv_encoding(std::string_view name) {
 }
 
 int32_t choose_uv_exponent(uint32_t texels, float scale, float max_abs) {
-  // A scale of 0 looks up one texel whatever the coordinate: any step does.
+  // With a scale of 0 every coordinate looks up the same texel, so any step suffices.
   const double per_uv = kUvCodesPerTexel * texels * std::abs(static_cast<double>(scale));
   const int32_t wanted =
       per_uv > 0.0 && std::isfinite(per_uv) ? -static_cast<int32_t>(std::ceil(std::log2(per_uv))) : 0;
-  // |uv| < 2^(ilogb + 1), so this exponent puts it below 2^30 steps; a float of 24 bits is not rounded there.
+  // |uv| < 2^(ilogb + 1), so this exponent keeps it below 2^30 steps. The 24 bits of max_abs are not rounded at this
+  // step.
   const int32_t finest = max_abs > 0.0f ? std::ilogb(max_abs) - 29 : kMinUvExponent;
   return std::clamp(std::max(wanted, finest), kMinUvExponent, kMaxUvExponent);
 }
@@ -37,7 +38,7 @@ std::optional<int32_t> encode_uv(UvEncoding encoding, float uv, int32_t exponent
   if (encoding == UvEncoding::kLattice) return whole(std::ldexp(static_cast<double>(uv), -exponent));
   if (encoding == UvEncoding::kUnorm16) return whole(static_cast<double>(uv) * kUnorm16);
   if (uv == 0.0f) return 0;
-  // Below the smallest normal number the step stays; a fraction that rounds up carries into the exponent.
+  // Subnormal numbers keep the step of the smallest normal ones. A fraction that rounds up carries into the exponent.
   const int32_t binade = std::max(std::ilogb(uv), kFp16MinExponent);
   if (binade > 15) return std::nullopt;
   const auto fraction =

@@ -85,7 +85,7 @@ LodView BakedFile::lod(uint32_t geometry) const {
       std::partition_point(all.begin(), all.end(), [&](const baked::LodLevelRecord& l) { return l.base < geometry; });
   auto end = first;
   uint64_t groups = 0, links = 0;
-  for (; end != all.end() && end->base == geometry; ++end) // kMaxLodLevels at most
+  for (; end != all.end() && end->base == geometry; ++end) // at most kMaxLodLevels steps
     groups += end->group_count, links += sections_.geometries[end->geometry].cluster_count;
   if (first == end) return {};
   return {{first, end},

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "compress/format/layout/baked_format.h"
 #include "compress/format/cluster/cluster_codec.h"
+#include "compress/format/layout/baked_format.h"
 #include "compress/format/pages/page_codec.h"
 #include "compress/format/textures/texture_codec.h"
 #include "pbrt_import/scene/alpha_mask.h"
@@ -18,7 +18,7 @@ namespace packtrace {
 
 class MappedFile;
 
-/// Typed spans over the sections of a baked file.
+/// Typed spans over the sections of a baked file. They do not own memory.
 struct BakedSections {
   std::span<const baked::GeometryRecord> geometries;
   std::span<const baked::ClusterRecord> clusters;
@@ -31,31 +31,32 @@ struct BakedSections {
   std::span<const uint8_t> texture_bytes;
   std::span<const baked::CameraRecord> cameras;
   std::span<const char> strings;
-  std::span<const baked::SummaryRecord> summary; ///< exactly one
+  std::span<const baked::SummaryRecord> summary; ///< exactly one record
   std::span<const uint32_t> material_slots;
   std::span<const baked::RequirementRecord> requirements;
   std::span<const baked::LodLevelRecord> lod_levels;
   std::span<const baked::LodGroupRecord> lod_groups;
   std::span<const baked::LodLinkRecord> lod_links;
-  std::span<const baked::TreeRecord> trees; ///< none: build_packed_trees() makes them
+  std::span<const baked::TreeRecord> trees; ///< empty if the file stores no trees; build_packed_trees() makes them
   std::span<const baked::PackedNode> nodes;
 
   std::string_view text(baked::StringRef ref) const { return {strings.data() + ref.offset, ref.bytes}; }
 };
 
-/// A baked file that was validated as a whole when opened: nothing read through it can leave its bytes. Spans and views
-/// live as long as the BakedFile (moving it keeps them). All functions are const and may run on several threads.
+/// A baked file that was validated as a whole when it was opened. No access through it can leave the file's bytes.
+/// Spans and views live as long as the BakedFile; moving it does not invalidate them. All functions are const and may
+/// run on several threads.
 class BakedFile {
 public:
-  /// Maps the file and validates it. Files of codec fast and small are decoded into memory first.
-  /// Throws Error(kInput) saying what is wrong and where; Error(kUnsupported) for other format versions; Error(kIo).
+  /// Maps the file and validates it. Files with codec fast or small are decoded into memory first.
+  /// Throws Error(kInput) with the fault and its place, Error(kUnsupported) for other format versions, and Error(kIo).
   static BakedFile open(const std::filesystem::path& path);
 
-  /// The same for bytes in memory, which are copied.
-  /// @param name stands for the path in errors
+  /// Like open(), for bytes in memory. Resident bytes are copied.
+  /// @param name stands for the path in error messages
   static BakedFile from_bytes(std::span<const std::byte> bytes, const std::string& name = "memory");
 
-  /// The same for bytes that the caller keeps alive and unchanged; 8-byte aligned.
+  /// Like from_bytes() without the copy: the caller keeps the bytes alive and unchanged. They must be 8-byte aligned.
   static BakedFile borrow_bytes(std::span<const std::byte> bytes, const std::string& name = "memory");
 
   BakedFile(BakedFile&&) noexcept;
@@ -66,25 +67,25 @@ public:
   std::span<const baked::InstanceRecord> instances() const { return sections_.instances; }
   const baked::SummaryRecord& summary() const { return sections_.summary.front(); }
   const BakedSections& sections() const { return sections_; }
-  /// The file with codec none, which is what is held in memory.
+  /// The resident file (codec none), as it is held in memory.
   std::span<const std::byte> bytes() const { return bytes_; }
   uint64_t file_bytes() const { return bytes_.size(); }
-  /// As it was opened.
+  /// Codec and sizes of the file that was opened, before decoding.
   const DiskForm& disk() const { return disk_; }
   std::string_view text(baked::StringRef ref) const { return sections_.text(ref); }
 
   std::span<const baked::ClusterRecord> clusters(uint32_t geometry) const;
   ClusterView cluster(uint32_t geometry, uint32_t cluster) const;
-  /// Of the geometry's cluster that holds a triangle; triangle < triangle_count. Takes O(log clusters).
+  /// Index of the geometry's cluster that holds `triangle`; triangle < triangle_count. Takes O(log clusters).
   uint32_t cluster_of_triangle(uint32_t geometry, uint32_t triangle) const;
 
-  /// Geometries that instances can be of come first; those from here on are levels of detail of them.
+  /// Number of geometries that instances may reference. They come first; all geometries behind them are LOD levels.
   uint32_t base_geometry_count() const;
-  /// Levels of detail of a geometry below base_geometry_count(); empty where it has none. Takes O(log levels).
+  /// LOD levels of a geometry below base_geometry_count(); empty if it has none. Takes O(log levels).
   LodView lod(uint32_t geometry) const;
 
   Affine world_from_object(uint32_t instance) const;
-  /// Materials of the instance's geometry, by slot.
+  /// Material numbers of the instance's geometry, by material slot.
   std::span<const uint32_t> instance_materials(uint32_t instance) const;
   AlphaMaskView mask(uint32_t index) const;
   TextureView texture(uint32_t index) const;
@@ -97,22 +98,22 @@ private:
             const DiskForm& disk, const std::string& name);
   static BakedFile expand(std::span<const std::byte> bytes, const std::string& name);
 
-  std::unique_ptr<MappedFile> map_; // owner of bytes_, or
-  std::vector<std::byte> owned_;    // owner of bytes_, or neither: borrowed
+  std::unique_ptr<MappedFile> map_; // owns bytes_ if not null
+  std::vector<std::byte> owned_;    // else owns bytes_ if not empty; else bytes_ is borrowed
   std::span<const std::byte> bytes_;
   DiskForm disk_;
   BakedSections sections_;
 };
 
-/// Of the decoded vertices; object space. Empty where there are no clusters.
+/// Bounds of the decoded vertices in object space. Empty if the geometry has no clusters.
 Bounds object_bounds(const baked::GeometryRecord& geometry);
 
-/// By geometry: where the runs of material slots of its instances begin, ascending, each once.
+/// By geometry: the distinct values of first_slot of its instances, ascending.
 std::vector<std::vector<uint32_t>> material_runs(const BakedSections& sections);
 
-/// Validates a whole file image and returns its sections; what BakedFile does when it opens.
+/// Validates a whole file image and returns its sections. BakedFile calls it when it opens a file.
 /// @param bytes 8-byte aligned
-/// @param clusters_checked find_cluster_fault() has found none in any of them, see DiskForm
+/// @param clusters_checked find_cluster_fault() has already accepted every cluster, see DiskForm
 BakedSections validate_baked_file(std::span<const std::byte> bytes, const std::string& name,
                                   bool clusters_checked = false);
 

@@ -6,10 +6,10 @@
 
 #include <xxhash.h>
 
-#include "compress/format/file/baked_file.h"
-#include "compress/format/layout/bit_stream.h"
 #include "compress/format/cluster/cluster_validation.h"
+#include "compress/format/file/baked_file.h"
 #include "compress/format/file/lod_validation.h"
+#include "compress/format/layout/bit_stream.h"
 #include "compress/format/trees/tree_validation.h"
 #include "pbrt_import/base/file_error.h"
 
@@ -18,7 +18,7 @@ namespace {
 
 static_assert(baked::kNone == kNoMask && baked::kNone == kNoTexture);
 
-/// Checks one file image. Every failure names the file, the section and the record.
+/// Checks one file image. Each error names the file, the section and the record.
 class Validator {
 public:
   Validator(std::span<const std::byte> bytes, const std::string& name, bool clusters_checked)
@@ -132,7 +132,7 @@ private:
     return zero(end, bytes_.size());
   }
 
-  /// Texts do not share bytes, so that all names together are no larger than the section.
+  /// Strings do not share bytes, so the total length of all names is at most the size of the section.
   bool text_ok(baked::StringRef ref) {
     text_bytes_ += ref.bytes;
     return text_bytes_ <= sections_.strings.size() && ref.offset <= sections_.strings.size() &&
@@ -219,7 +219,8 @@ private:
     return baked::material_class(sections_.materials[sections_.material_slots[slot]].flags);
   }
 
-  /// Where each run of slots of one class ends, so that runs of thousands of slots compare in a few steps.
+  /// Finds the end of each run of slots with equal class, so that same_classes() compares thousands of slots in a few
+  /// steps.
   void find_class_ends() {
     class_ends_.resize(sections_.material_slots.size());
     for (auto i = static_cast<uint32_t>(class_ends_.size()); i-- > 0;)
@@ -227,7 +228,7 @@ private:
           i + 1 < class_ends_.size() && class_of_slot(i) == class_of_slot(i + 1) ? class_ends_[i + 1] : i + 1;
   }
 
-  /// Whether two runs of slots have the same classes, in ascending order.
+  /// Whether both runs of slots have the same classes, in ascending order.
   bool same_classes(uint32_t first, uint32_t other, uint32_t count) const {
     for (uint32_t i = 0; i < count;) {
       const uint32_t end = std::min(class_ends_[first + i] - first, count);
@@ -240,7 +241,7 @@ private:
   }
 
   void check_slots(size_t geometry, const baked::GeometryRecord& g) const {
-    if ((g.flags & baked::kLodLevel) != 0) return; // they are the base's
+    if ((g.flags & baked::kLodLevel) != 0) return; // it uses the base's slots
     if (g.cluster_count == 0 ? g.slot_count != 0 : g.slot_count == 0 || g.slot_count > g.cluster_count)
       fail("geometry", geometry, "material slots");
     if (g.cluster_count > 0 && first_slots_[geometry] == baked::kNone)
@@ -279,15 +280,15 @@ private:
     check_runs();
   }
 
-  /// Levels of detail have their base's material slots.
+  /// LOD levels use the material slots of their base.
   void check_lod_levels() {
     if (const auto fault = find_lod_level_fault(sections_)) fail(fault->section, fault->record, fault->what);
     for (const baked::LodLevelRecord& level : sections_.lod_levels)
       first_slots_[level.geometry] = first_slots_[level.base];
   }
 
-  /// The runs of slots of one geometry are equal or apart, so that going through all of them takes no longer than the
-  /// file.
+  /// The runs of slots of one geometry must be equal or disjoint, so that visiting all distinct runs takes time linear
+  /// in the file size.
   void check_runs() const {
     std::vector<std::pair<uint32_t, uint32_t>> runs; // geometry, first slot
     for (const baked::InstanceRecord& instance : sections_.instances)
@@ -349,7 +350,8 @@ private:
   BakedSections sections_;
   std::vector<uint32_t> class_ends_; // by material slot
   uint64_t text_bytes_ = 0;
-  std::vector<uint32_t> first_slots_; // by geometry: of its first instance; the others have the same classes
+  // By geometry: first_slot of its first instance. The other instances have equal classes.
+  std::vector<uint32_t> first_slots_;
 };
 
 } // namespace

@@ -30,7 +30,8 @@ StreamBytes stream_bytes(const BakedFile& file) {
   bytes.total = file.file_bytes();
   bytes.header_and_alignment = bytes.total - s.payload.size() - bytes.cluster_records - bytes.geometry_records -
                                bytes.instance_records - bytes.material_records - bytes.masks - bytes.textures -
-                               bytes.cameras - bytes.strings - bytes.requirement_records - bytes.lod_records - bytes.trees;
+                               bytes.cameras - bytes.strings - bytes.requirement_records - bytes.lod_records -
+                               bytes.trees;
   return bytes;
 }
 
@@ -60,7 +61,7 @@ void add_normals(std::vector<NormalUse>& uses, const baked::GeometryRecord& g,
   use->max_error_degrees = std::max(use->max_error_degrees, g.max_normal_error_degrees);
 }
 
-/// Texels per unit of texture coordinate, along the axis of more, of the finest texture that a material looks up.
+/// Texels per unit of texture coordinate, larger axis, of the finest texture or mask of a material.
 double texels_per_uv(const BakedSections& s, const baked::MaterialRecord& material) {
   double most = 0.0;
   if (material.albedo_texture != baked::kNone) {
@@ -77,7 +78,8 @@ double texels_per_uv(const BakedSections& s, const baked::MaterialRecord& materi
   return most;
 }
 
-/// Largest of the texels of runs of slots, whose beginnings ascend. Looks at each slot once, however much they overlap.
+/// Maximum of texels_of_slot over runs of `slots` slots whose starts ascend. Visits each slot once even if runs
+/// overlap.
 double finest_texture(const std::vector<double>& texels_of_slot, const std::vector<uint32_t>& runs, uint32_t slots) {
   double most = 0.0;
   uint64_t end = 0;
@@ -89,7 +91,7 @@ double finest_texture(const std::vector<double>& texels_of_slot, const std::vect
   return most;
 }
 
-/// @param texels per unit of texture coordinate, of the finest texture that any instance's materials look up
+/// @param texels per unit of texture coordinate, of the finest texture that the materials of any instance use
 void add_uvs(std::vector<UvUse>& uses, const baked::GeometryRecord& g, std::span<const baked::ClusterRecord> clusters,
              double texels) {
   uint64_t vertices = 0;
@@ -123,7 +125,7 @@ GeometryUse use_of(const BakedFile& file, uint32_t geometry, uint32_t instances)
 }
 
 void add_materials(FileSummary& summary, const BakedSections& s) {
-  std::vector<int64_t> change(s.material_slots.size() + 1); // of the number of instances that have the slot
+  std::vector<int64_t> change(s.material_slots.size() + 1); // of the number of instances, from slot to slot
   for (const baked::InstanceRecord& instance : s.instances) {
     ++change[instance.first_slot];
     --change[instance.first_slot + s.geometries[instance.geometry].slot_count];

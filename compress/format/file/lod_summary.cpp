@@ -39,9 +39,9 @@ LodLevelUse use_of(const BakedFile& file, const LodView& lod, size_t number) {
   return use;
 }
 
-/// Adds a geometry's levels to those of all.
+/// Adds the levels of one geometry to the totals.
 void add(LodTable& all, const LodTable& one) {
-  LodLevelUse above; // where those before have ended
+  LodLevelUse above; // initial values of a new level: the sum over the last levels of the geometries before
   if (!all.levels.empty()) {
     const LodLevelUse& last = all.levels.back();
     above.triangles = last.triangles;

@@ -9,7 +9,7 @@ namespace {
 
 bool is_level(const baked::GeometryRecord& g) { return (g.flags & baked::kLodLevel) != 0; }
 
-/// Whether a level's clusters decode on its base's lattice and with its slots.
+/// Whether a level's clusters share the base's lattice, encodings and slots.
 bool alike(const baked::GeometryRecord& level, const baked::GeometryRecord& base) {
   return level.flags == (base.flags | baked::kLodLevel) && level.origin == base.origin &&
          level.step_mantissa == base.step_mantissa && level.step_exponent == base.step_exponent &&
@@ -18,7 +18,7 @@ bool alike(const baked::GeometryRecord& level, const baked::GeometryRecord& base
          level.slot_count == base.slot_count && level.position_error_bound == base.position_error_bound;
 }
 
-/// Groups and links of one geometry.
+/// Checks the groups and links of one geometry.
 class GroupChecker {
 public:
   GroupChecker(const BakedSections& sections, std::span<const baked::LodLevelRecord> levels)
@@ -26,11 +26,11 @@ public:
     uint64_t count = 0;
     for (const baked::LodLevelRecord& level : levels) count += level.group_count;
     groups_ = s_.lod_groups.subspan(static_cast<size_t>(levels.front().first_group), static_cast<size_t>(count));
-    has_members_.assign(groups_.size(), 0), made_something_.assign(groups_.size(), 0);
+    has_members_.assign(groups_.size(), 0), has_coarser_clusters_.assign(groups_.size(), 0);
   }
 
   std::optional<LodFault> run() {
-    uint64_t first = 0, below = 0; // groups of this level and of the one below
+    uint64_t first = 0, below = 0; // first group of this level and of the level below
     for (const baked::LodLevelRecord& level : levels_) {
       if (auto fault = check_groups(level, first)) return fault;
       if (auto fault = check_links(level, first, below)) return fault;
@@ -38,7 +38,7 @@ public:
     }
     for (size_t i = 0; i < groups_.size(); ++i) {
       if (has_members_[i] == 0) return of_group(i, "no clusters");
-      if (std::isfinite(groups_[i].error) != (made_something_[i] != 0)) return of_group(i, "coarser clusters");
+      if (std::isfinite(groups_[i].error) != (has_coarser_clusters_[i] != 0)) return of_group(i, "coarser clusters");
     }
     return std::nullopt;
   }
@@ -58,7 +58,7 @@ private:
     return std::nullopt;
   }
 
-  /// Also what the level record says of its triangles and its error.
+  /// Also checks the triangle count and the error in the level record.
   std::optional<LodFault> check_links(const baked::LodLevelRecord& level, uint64_t first, uint64_t below) {
     const baked::GeometryRecord& g = s_.geometries[level.geometry];
     uint64_t own = 0, terminal = 0;
@@ -78,7 +78,7 @@ private:
         if (!std::isfinite(generating.error)) return fault("generating group is terminal");
         if (group.error < generating.error) return fault("error below that of the generating group");
         if (!baked::holds_sphere(group, generating)) return fault("sphere does not hold that of the generating group");
-        made_something_[link.generating_group] = 1;
+        has_coarser_clusters_[link.generating_group] = 1;
       }
       const uint32_t triangles = s_.clusters[static_cast<size_t>(g.first_cluster + c)].triangle_count;
       own += triangles;
@@ -98,9 +98,9 @@ private:
   const BakedSections& s_;
   std::span<const baked::LodLevelRecord> levels_;
   std::span<const baked::LodGroupRecord> groups_;
-  std::vector<uint8_t> has_members_, made_something_; // by group
+  std::vector<uint8_t> has_members_, has_coarser_clusters_; // by group
   uint64_t terminal_below_ = 0;
-  float largest_error_ = 0.0f; // of finite groups below
+  float largest_error_ = 0.0f; // largest finite group error of the levels below
 };
 
 } // namespace

@@ -21,8 +21,7 @@ MappedFile::MappedFile(const std::filesystem::path& path) {
   const auto size = static_cast<size_t>(file.bytes);
   if (size == 0) return; // mmap refuses it; the reader reports it as truncated
   void* address = ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file.descriptor.get(), 0);
-  if (address == MAP_FAILED)
-    throw FileError(ErrorKind::kIo, path, std::generic_category().message(errno));
+  if (address == MAP_FAILED) throw FileError(ErrorKind::kIo, path, std::generic_category().message(errno));
   bytes_ = {static_cast<const std::byte*>(address), size};
 }
 

@@ -9,8 +9,8 @@
 #include "compress/format/layout/packed_node.h"
 #include "pbrt_import/scene/material_flags.h"
 
-/// What lies in a .ptk file, version 5; docs/baked_format.md says it in words. Little-endian; every section starts at a
-/// multiple of 64 bytes; bytes that no field or section owns are zero.
+/// Records of a .ptk file, version 5; docs/baked_format.md describes them. All values are little-endian. Every section
+/// starts at a multiple of 64 bytes. Bytes that belong to no field and no section are zero.
 namespace packtrace::baked {
 
 inline constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'K', 0x89, '\r', '\n', 0x1a, 0};
@@ -18,27 +18,27 @@ inline constexpr uint32_t kVersion = 5;
 inline constexpr size_t kSectionAlignment = 64;
 inline constexpr uint32_t kNone = ~0u;
 
-/// Section numbers are places in FileHeader::sections.
+/// Section numbers are indices into FileHeader::sections.
 enum Section : uint32_t {
   kGeometries,
   kClusters,
-  kPayload, ///< bytes: bit streams, then 8 zero bytes
+  kPayload, ///< bytes: bit streams of all clusters, then 8 zero bytes
   kMaterials,
   kInstances,
   kMasks,
-  kMaskWords, ///< uint32_t, rows of all masks
+  kMaskWords, ///< uint32_t: texel rows of all masks
   kTextures,
-  kTextureBytes, ///< of all textures
+  kTextureBytes, ///< texels of all textures
   kCameras,
   kStrings,       ///< UTF-8 bytes, not terminated
   kSummary,       ///< one record
-  kMaterialSlots, ///< uint32_t: materials, in runs that instances begin at
+  kMaterialSlots, ///< uint32_t: material numbers; each instance uses a run of them
   kRequirements,
   kLodLevels, ///< LodLevelRecord, lod_format.h
   kLodGroups, ///< LodGroupRecord
   kLodLinks,  ///< LodLinkRecord
   kTrees,     ///< TreeRecord, packed_node.h
-  kNodes,     ///< PackedNode, of all trees in order; the last section, as files of other codecs make it anew
+  kNodes,     ///< PackedNode of all trees; the last section, because the disk forms store it apart from the others
   kSectionCount
 };
 
@@ -67,8 +67,9 @@ struct StringRef {
 };
 
 // GeometryRecord::flags
-inline constexpr uint32_t kWorldSpace = 1u << 0; ///< on the scene's grid; its instances' transforms are the identity
-inline constexpr uint32_t kLodLevel = 1u << 1; ///< a coarser level of another geometry; no instances; behind all others
+inline constexpr uint32_t kWorldSpace = 1u << 0; ///< lies on the scene's grid; instance transforms are the identity
+/// LOD level above 0 of another geometry; no instance references it; behind all others.
+inline constexpr uint32_t kLodLevel = 1u << 1;
 inline constexpr uint32_t kGeometryFlags = kWorldSpace | kLodLevel;
 
 /// Clusters of one geometry, ordered by material_class().
@@ -76,53 +77,53 @@ struct GeometryRecord {
   uint64_t first_cluster;
   uint64_t payload_offset;       ///< bytes into the payload section, multiple of 4
   uint64_t payload_bytes;        ///< multiple of 4
-  std::array<int64_t, 3> origin; ///< lattice
+  std::array<int64_t, 3> origin; ///< of the grid, in lattice steps
   double max_position_error;     ///< measured, largest axis, object units
-  double position_error_bound;   ///< what the step and the float result allow, >= max_position_error
+  double position_error_bound;   ///< upper bound from the step and the rounding to float, >= max_position_error
   uint32_t cluster_count;
   uint32_t triangle_count;
   uint32_t vertex_count; ///< sum over clusters
   uint32_t step_mantissa;
   int32_t step_exponent;
-  uint32_t anchor_shift;              ///< cluster anchors count 2^anchor_shift steps
-  std::array<int32_t, 2> uv_exponent; ///< 0 unless the encoding is the lattice
-  std::array<float, 3> bounds_lo;     ///< of the decoded vertices; lo > hi where there are none
+  uint32_t anchor_shift;              ///< cluster anchors are in units of 2^anchor_shift steps
+  std::array<int32_t, 2> uv_exponent; ///< u, v; 0 unless the encoding is the lattice
+  std::array<float, 3> bounds_lo;     ///< of the decoded vertices; lo > hi if there are none
   std::array<float, 3> bounds_hi;
   float max_normal_error_degrees;  ///< measured against the source
-  float mean_normal_error_degrees; ///< of all its normals
+  float mean_normal_error_degrees; ///< mean over all its normals
   float max_uv_error;
   uint32_t flags;
   std::array<uint32_t, 8> class_clusters; ///< clusters of each material class; sums to cluster_count
   StringRef name;
-  uint32_t normal_encoding; ///< normal_codec.h, of all its clusters
-  uint32_t uv_encoding;     ///< uv_codec.h, of all its clusters
-  uint32_t slot_count;      ///< of material slots, ordered by material_class(); 0 without clusters
-  uint32_t requirements;    ///< requirement_bit()s: reasons that hold for some of its triangles
+  uint32_t normal_encoding; ///< normal_codec.h; the same for all its clusters
+  uint32_t uv_encoding;     ///< uv_codec.h; the same for all its clusters
+  uint32_t slot_count;      ///< number of material slots, which are ordered by material_class(); 0 without clusters
+  uint32_t requirements;    ///< requirement_bit()s of the reasons that hold for some of its triangles
 };
 
 // ClusterRecord::flags
 inline constexpr uint8_t kClusterHasNormals = 1u << 0;
 inline constexpr uint8_t kClusterHasUvs = 1u << 1;
-inline constexpr uint8_t kClusterMixedCharts = 1u << 2; ///< each normal carries its chart
-inline constexpr uint32_t kClusterChartShift = 3;       ///< else all are unfolded around this one:
+inline constexpr uint8_t kClusterMixedCharts = 1u << 2; ///< every normal stores its chart
+inline constexpr uint32_t kClusterChartShift = 3;       ///< otherwise kClusterChart is the common chart:
 inline constexpr uint8_t kClusterChart = 7u << kClusterChartShift;
 inline constexpr uint8_t kClusterFlags = kClusterHasNormals | kClusterHasUvs | kClusterMixedCharts | kClusterChart;
 
-/// Up to 128 triangles of one material slot. Payload, bit by bit without gaps: strips (index_codec.h); per vertex the
-/// lattice coordinates x, y, z less the anchor; normals; texture coordinates.
+/// Up to 128 triangles of one material slot. The payload holds, bit by bit without gaps: strips (index_codec.h); per
+/// vertex the lattice coordinates x, y, z relative to the anchor; normals; texture coordinates.
 struct ClusterRecord {
-  uint32_t payload_offset;              ///< in 4-byte words from the geometry's payload
+  uint32_t payload_offset;              ///< in 4-byte words from the start of the geometry's payload
   uint32_t first_triangle;              ///< within the geometry
   uint32_t first_vertex;                ///< within the geometry
-  uint32_t material_slot;               ///< each instance has a material for it: that at its first_slot + this
-  std::array<int32_t, 3> anchor;        ///< lattice, less the geometry's origin, in 2^anchor_shift steps
+  uint32_t material_slot;               ///< an instance's material is material_slots[first_slot + material_slot]
+  std::array<int32_t, 3> anchor;        ///< lattice, relative to the geometry's origin, in 2^anchor_shift steps
   std::array<int16_t, 2> normal_anchor; ///< of x and y, in units of two codes
   uint16_t vertex_count;                ///< 1..256
-  uint16_t normal_palette;              ///< distinct normals, or 0: one per vertex in order
+  uint16_t normal_palette;              ///< number of palette entries; 0: no palette, one normal per vertex in order
   uint8_t triangle_count;               ///< 1..128
-  uint8_t restart_count;                ///< strips, 1..triangle_count
+  uint8_t strip_count;                  ///< number of strips, 1..triangle_count
   std::array<uint8_t, 3> position_bits; ///< 0..57 per axis
-  std::array<uint8_t, 2> normal_bits;   ///< above the anchor: x and y, 0..17
+  std::array<uint8_t, 2> normal_bits;   ///< widths of x and y relative to the normal anchor, 0..17
   uint8_t flags;
 };
 
@@ -138,7 +139,7 @@ struct MaterialRecord {
 struct InstanceRecord {
   std::array<float, 12> world_from_object; ///< four columns of three
   uint32_t geometry;
-  uint32_t first_slot; ///< into the material slots, of the geometry's slot_count
+  uint32_t first_slot; ///< into the material slots; the run has the geometry's slot_count entries
 };
 
 struct MaskRecord {
@@ -159,7 +160,7 @@ struct TextureRecord {
   uint32_t codec; ///< texture_codec.h
   std::array<float, 2> uv_scale;
   std::array<float, 2> uv_offset;
-  float psnr_db; ///< measured; infinite where nothing was lost
+  float psnr_db; ///< measured; infinite if lossless
   uint32_t reserved;
   StringRef name;
 };
@@ -175,66 +176,68 @@ struct CameraRecord {
   StringRef film_name;
 };
 
-/// What the file is to be good for.
+/// Purpose that the file is baked for.
 enum Purpose : uint32_t { kAo, kShading, kPurposeCount };
 
-/// Streams that geometry has only where something needs them.
+/// Vertex streams that a geometry stores only if something needs them.
 enum Stream : uint32_t { kNormals, kUvs, kTangents, kStreamCount };
 
-/// Why a stream is in the file, or not: up to kInferred it is not stored, from kForMask on it is, except tangents.
+/// Why a stream is stored or not: not stored for kAbsent to kInferred, stored from kForMask on. Tangents are never
+/// stored.
 enum Reason : uint32_t {
-  kAbsent,       ///< the source has none, or nothing that would need it
-  kUnused,       ///< nothing looks at it for this purpose
-  kInferred,     ///< normals: the face's
-  kForMask,      ///< an alpha mask looks it up
-  kForTexture,   ///< a texture looks it up
+  kAbsent,       ///< the source has none; for tangents also: it has no normal map
+  kUnused,       ///< nothing reads it for this purpose
+  kInferred,     ///< normals: equal to the face normals
+  kForMask,      ///< an alpha mask is looked up with it
+  kForTexture,   ///< a texture is looked up with it
   kForNormalMap, ///< a normal or bump map needs it
-  kForShading,   ///< normals: not the face's, or among such, where separating them takes more
+  kForShading,   ///< normals: differ from the face normals, or separating the equal ones would take more bytes
   kOnRequest,    ///< the user asked for it
   kReasonCount
 };
 
-/// Of GeometryRecord::requirements.
+/// Bit of GeometryRecord::requirements.
 constexpr uint32_t requirement_bit(uint32_t stream, uint32_t reason) { return 1u << (kReasonCount * stream + reason); }
 inline constexpr uint32_t kAllRequirements = (1u << (uint32_t{kReasonCount} * kStreamCount)) - 1;
 
-inline constexpr uint32_t kKeepShift = 8; ///< of SummaryRecord::purpose
+inline constexpr uint32_t kKeepShift = 8; ///< first keep bit of SummaryRecord::purpose
 
-/// What was decided about some triangles, of all geometries together. Ordered by stream, then reason.
+/// Totals over the triangles of all geometries for which one reason holds for one stream. Ordered by stream, then
+/// reason.
 struct RequirementRecord {
   uint32_t stream;
   uint32_t reason;
-  uint32_t geometries; ///< with such triangles
+  uint32_t geometries; ///< number of geometries with such triangles
   uint32_t reserved;
   uint64_t triangles;
-  uint64_t source_bytes; ///< that the stream takes in the source
-  uint64_t stored_bits;  ///< of the payload; a geometry's count for the last of the stream's reasons
+  uint64_t source_bytes; ///< size of the stream in the source
+  uint64_t stored_bits;  ///< payload bits; a geometry's bits count for the last of the stream's reasons in it
 };
 
-/// What the bake did: figures for people, nothing that decoding needs.
+/// Figures of the bake for reports. Decoding needs none of them.
 struct SummaryRecord {
-  uint64_t source_triangles;  ///< of all shapes and objects of the scene
-  uint64_t dropped_triangles; ///< by the importer
-  uint64_t unused_triangles;  ///< of objects that are never instanced; not stored
+  uint64_t source_triangles;  ///< of all shapes and objects in the scene
+  uint64_t dropped_triangles; ///< dropped by the importer
+  uint64_t unused_triangles;  ///< triangles of objects without instances; not stored
   uint64_t source_vertices;
   uint64_t merged_vertices;
-  uint64_t collapsed_triangles;    ///< have no area on the lattice; not stored
-  std::array<double, 3> bounds_lo; ///< world, of the decoded instances
+  uint64_t collapsed_triangles;    ///< no area on the lattice; not stored
+  std::array<double, 3> bounds_lo; ///< world space, of the decoded instances
   std::array<double, 3> bounds_hi;
   double precision_value;
   uint32_t precision_kind;      ///< 0 edge fraction, 1 diagonal fraction, 2 absolute, 3 bits
   uint32_t world_step_mantissa; ///< 0: no world-space geometry
   int32_t world_step_exponent;
-  uint32_t purpose;                    ///< Purpose; bits kKeepShift + Stream: all of it was to be kept
+  uint32_t purpose;                    ///< Purpose; bit kKeepShift + Stream: the bake had to keep all of it
   std::array<uint64_t, 4> stream_bits; ///< payload: indices, positions, normals, uvs
-  uint64_t left_out;                   ///< shapes and instances that leave the float range; not stored
-  uint64_t coinciding_triangles;       ///< became equal to another one by quantisation; not stored
+  uint64_t left_out;                   ///< shapes and instances outside the float range; not stored
+  uint64_t coinciding_triangles;       ///< equal to another triangle after quantisation; not stored
   double source_area;                  ///< of all placed triangles before quantisation, world units squared, about
-  double collapsed_area;               ///< of collapsed_triangles, likewise
+  double collapsed_area;               ///< of collapsed_triangles, in the same units
 };
 
 template <typename T>
-inline constexpr bool kIsPod = std::is_trivially_copyable_v<T>&& std::is_standard_layout_v<T>;
+inline constexpr bool kIsPod = std::is_trivially_copyable_v<T> && std::is_standard_layout_v<T>;
 
 static_assert(kIsPod<FileHeader> && sizeof(SectionRecord) == 24 && sizeof(FileHeader) == 512);
 static_assert(offsetof(FileHeader, content_hash) == 24 && offsetof(FileHeader, sections) == 48 &&
@@ -260,7 +263,7 @@ static_assert(kAllRequirements == 0xffffff);
 static_assert(kIsPod<SummaryRecord> && sizeof(SummaryRecord) == 184 && offsetof(SummaryRecord, stream_bits) == 120 &&
               offsetof(SummaryRecord, coinciding_triangles) == 160);
 
-/// sizeof the records of each section.
+/// Record size of each section in bytes.
 inline constexpr std::array<uint32_t, kSectionCount> kRecordBytes = {sizeof(GeometryRecord),
                                                                      sizeof(ClusterRecord),
                                                                      1,
@@ -281,9 +284,9 @@ inline constexpr std::array<uint32_t, kSectionCount> kRecordBytes = {sizeof(Geom
                                                                      sizeof(TreeRecord),
                                                                      sizeof(PackedNode)};
 
-inline constexpr uint32_t kMaskedClass = 4; ///< bit of a material class: a mask must be looked up
+inline constexpr uint32_t kMaskedClass = 4; ///< bit of a material class: rays must look up a mask
 
-/// Order of clusters within a geometry, 0..7: solid and seen by everything first, masked ones last.
+/// Class that orders clusters within a geometry, 0..7: solid clusters that all rays see come first, masked ones last.
 constexpr uint32_t material_class(MaterialFlags flags) {
   return (camera_visible(flags) ? 0u : 1u) | (occludes(flags) ? 0u : 2u) | (needs_mask(flags) ? kMaskedClass : 0u);
 }

@@ -8,18 +8,18 @@
 
 namespace packtrace {
 
-/// Writes the bit streams of clusters, one after the other, into a buffer of fixed size. Unlike a BitWriter it is told
-/// beforehand how long each cluster is, and then checks nothing.
+/// Writes the bit streams of clusters one after another into a buffer of fixed size. Unlike BitWriter it gets the
+/// length of each cluster in advance and then checks nothing.
 class PayloadWriter {
 public:
-  /// Starts over with a buffer for `bytes` bytes.
+  /// Starts a new buffer of `bytes` bytes.
   void begin(size_t bytes) {
     limit_ = bytes;
     bytes_.assign(bytes + 2 * kReadSlackBytes, 0);
     word_ = 0;
   }
 
-  /// Begins the next cluster, at a multiple of 4 bytes. False where the buffer has no room for `bits` bits.
+  /// Begins the next cluster at a multiple of 4 bytes. Returns false if the buffer has no room for `bits` bits.
   bool begin_cluster(uint64_t bits) {
     const uint64_t words = (bits + 31) / 32;
     if (words > limit_ / 4 - word_) return false;
@@ -34,10 +34,10 @@ public:
     put_each(1, bits, [&](uint32_t) { return value; });
   }
 
-  /// value_of(0) to value_of(count - 1), `bits` bits each.
+  /// Writes value_of(0) to value_of(count - 1) with `bits` bits each.
   template <class ValueOf>
   void put_each(uint32_t count, uint32_t bits, const ValueOf& value_of) {
-    // In registers: what is stored could be these members, for all the compiler knows.
+    // Local copies stay in registers; the compiler must assume that byte stores modify the members.
     uint8_t* at = at_;
     uint64_t pending = pending_;
     uint32_t pending_bits = pending_bits_;
@@ -58,8 +58,8 @@ public:
 
 private:
   std::vector<uint8_t> bytes_;
-  uint64_t word_ = 0;  // where the next cluster begins, in 4 bytes
-  uint64_t limit_ = 0; // bytes
+  uint64_t word_ = 0;  // start of the next cluster, in units of 4 bytes
+  uint64_t limit_ = 0; // in bytes
   uint8_t* at_ = nullptr;
   uint64_t pending_ = 0; // at most 7 bits between calls
   uint32_t pending_bits_ = 0;

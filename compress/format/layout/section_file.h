@@ -13,14 +13,15 @@
 
 namespace packtrace {
 
-/// Where the next section starts.
+/// Offset of the next section: `bytes` rounded up to the alignment.
 constexpr uint64_t align_section(uint64_t bytes) {
   return (bytes + baked::kSectionAlignment - 1) / baked::kSectionAlignment * baked::kSectionAlignment;
 }
 
-/// A file of a header and its sections in order, each at a multiple of kSectionAlignment, gaps zero, with both hashes.
-/// @param header magic and version are set
-/// @param record_bytes of each section's records
+/// Assembles a file from a header and sections in order. Each section starts at a multiple of kSectionAlignment, gaps
+/// are zero, and both hashes are set.
+/// @param header with magic and version set
+/// @param record_bytes record size of each section
 template <class Header, size_t kCount>
 std::vector<std::byte> assemble_section_file(Header header, const std::array<std::span<const std::byte>, kCount>& parts,
                                              const std::array<uint32_t, kCount>& record_bytes) {

@@ -9,7 +9,7 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kUvAnchorBits = 32, kUvWidthBits = 5; // baked_format.md, texture coordinates
+constexpr uint32_t kUvAnchorBits = 32, kUvWidthBits = 5; // docs/baked_format.md, texture coordinates
 
 void unpack_strips(const ClusterView& view, ClusterValues& values) {
   const IndexLayout& layout = view.layout();
@@ -61,7 +61,7 @@ void unpack_uvs(const ClusterView& view, ClusterValues& values) {
 void unpack_cluster(const ClusterView& view, ClusterValues& values) {
   values.triangle_count = view.triangle_count();
   values.vertex_count = view.vertex_count();
-  values.restart_count = view.layout().restart_count;
+  values.strip_count = view.layout().strip_count;
   values.material = view.material_slot();
   values.has_normals = view.has_normals();
   values.has_uvs = view.has_uvs();
@@ -112,12 +112,13 @@ bool ClusterPacker::plan_normals(const baked::GeometryRecord& geometry, const Cl
 }
 
 void ClusterPacker::find_palette(const ClusterValues& values) {
-  // Distinct codes in order of first use, found by a hash table; then sorted.
+  // A hash table finds the distinct codes in order of first use; then they are sorted.
   constexpr uint32_t kSlots = 1024, kFree = 0xffff;
   std::array<uint16_t, kSlots> slots;
   slots.fill(kFree);
-  std::array<uint8_t, kMaxClusterVertices> use;    // vertex -> distinct code in order of first use
-  std::array<uint64_t, kMaxClusterVertices> order; // code above, use below
+  std::array<uint8_t, kMaxClusterVertices> use; // by vertex: number of its code in order of first use
+  // Code in the upper bits, its number in order of first use in the low 8 bits.
+  std::array<uint64_t, kMaxClusterVertices> order;
   for (uint32_t v = 0; v < values.vertex_count; ++v) {
     const uint32_t code = join_normal_code(encoding_, values.normals[v]);
     uint32_t slot = (code * 0x9e3779b1u) >> 22;
@@ -231,11 +232,11 @@ void ClusterPacker::put_uvs(const ClusterValues& values) {
 bool ClusterPacker::append(const baked::GeometryRecord& geometry, const ClusterValues& values,
                            baked::ClusterRecord& record) {
   record = {};
-  const IndexLayout layout{values.triangle_count, values.vertex_count, values.restart_count};
+  const IndexLayout layout{values.triangle_count, values.vertex_count, values.strip_count};
   record.material_slot = values.material;
   record.triangle_count = static_cast<uint8_t>(layout.triangle_count);
   record.vertex_count = static_cast<uint16_t>(layout.vertex_count);
-  record.restart_count = static_cast<uint8_t>(layout.restart_count);
+  record.strip_count = static_cast<uint8_t>(layout.strip_count);
   if (!plan_positions(geometry, values, record) || !plan_normals(geometry, values, record) || !plan_uvs(values, record))
     return false;
   const uint64_t count = values.vertex_count;

@@ -9,35 +9,36 @@
 
 namespace packtrace {
 
-/// How a triangle is reached; the values are part of the disk form.
+/// Direction in which a strip reaches a triangle. The values are part of the disk form.
 enum class Turn : uint8_t { kRight = 0, kLeft = 1, kRestart = 2 };
 
-/// What one cluster holds, as values: all that its record and bit streams say, and nothing of how they say it.
+/// Decoded values of one cluster, independent of their encoding in its record and bit streams.
 struct ClusterValues {
-  uint32_t triangle_count = 0, vertex_count = 0, restart_count = 0;
-  uint32_t material = 0; ///< slot
+  uint32_t triangle_count = 0, vertex_count = 0, strip_count = 0;
+  uint32_t material = 0; ///< material slot
   bool has_normals = false, has_uvs = false;
   std::array<Turn, kMaxClusterTriangles> turns;
   uint32_t corner_count = 0;
   std::array<uint16_t, kMaxClusterCorners> corners; ///< the corner list (index_codec.h)
   std::array<LatticePoint, kMaxClusterVertices> positions;
-  uint32_t normal_chart = 0;   ///< that pack_normals() takes
-  bool normal_palette = false; ///< distinct normals are stored once
+  uint32_t normal_chart = 0;   ///< the `chart` argument of pack_normals()
+  bool normal_palette = false; ///< the cluster uses a palette of distinct normals
   std::array<NormalFields, kMaxClusterVertices> normals;
   std::array<UvLattice, kMaxClusterVertices> uvs;
 };
 
-/// The values of a valid cluster. Clusters that encode_cluster() wrote come back from them, bit for bit.
+/// Reads the values of a valid cluster. For clusters that encode_cluster() wrote, ClusterPacker restores the same bits
+/// from them.
 void unpack_cluster(const ClusterView& view, ClusterValues& values);
 
-/// Appends the resident form of clusters to a buffer of fixed size, byte for byte as encode_cluster() does.
+/// Appends clusters in resident form to a buffer of fixed size, with the same bytes as encode_cluster().
 class ClusterPacker {
 public:
-  /// Starts over with a buffer for `bytes` bytes.
+  /// Starts a new buffer of `bytes` bytes.
   void begin(size_t bytes) { payload_.begin(bytes); }
 
-  /// The record without payload_offset, first_triangle and first_vertex. Returns false, having written nothing, where
-  /// the values cannot be those of a valid cluster of this geometry, or do not fit the buffer.
+  /// Appends a cluster and fills in its record, except payload_offset, first_triangle and first_vertex. Returns false
+  /// and writes nothing if the values cannot be those of a valid cluster of this geometry or do not fit the buffer.
   bool append(const baked::GeometryRecord& geometry, const ClusterValues& values, baked::ClusterRecord& record);
 
   size_t size() const { return payload_.size(); }
@@ -57,9 +58,9 @@ private:
   LatticePoint base_{};
   NormalEncoding encoding_{};
   NormalPacking normals_;
-  uint32_t palette_count_ = 0;                             // 0: none
-  std::array<NormalFields, kMaxClusterVertices> palette_;  // distinct, by code
-  std::array<uint8_t, kMaxClusterVertices> palette_entry_; // per vertex
+  uint32_t palette_count_ = 0;                             // 0: no palette
+  std::array<NormalFields, kMaxClusterVertices> palette_;  // distinct normals, ordered by code
+  std::array<uint8_t, kMaxClusterVertices> palette_entry_; // palette index per vertex
   UvLattice uv_lo_{};
   std::array<uint32_t, 2> uv_bits_{};
 };

@@ -9,13 +9,13 @@
 #include <xxhash.h>
 #include <zstd.h>
 
+#include "compress/format/cluster/normal_codec.h"
+#include "compress/format/cluster/position_grid.h"
+#include "compress/format/cluster/uv_codec.h"
 #include "compress/format/file/baked_file.h"
 #include "compress/format/layout/bit_stream.h"
-#include "compress/format/cluster/normal_codec.h"
 #include "compress/format/pages/page_decoder.h"
-#include "compress/format/cluster/position_grid.h"
 #include "compress/format/trees/tree_topology.h"
-#include "compress/format/cluster/uv_codec.h"
 #include "pbrt_import/base/error.h"
 
 namespace packtrace {
@@ -27,7 +27,7 @@ constexpr uint64_t align_up(uint64_t bytes) {
   return (bytes + baked::kSectionAlignment - 1) / baked::kSectionAlignment * baked::kSectionAlignment;
 }
 
-/// Expands one file. Every failure names the file and the part.
+/// Expands one file. Each error names the file and the damaged part.
 class Expander {
 public:
   Expander(std::span<const std::byte> bytes, const std::string& name) : bytes_(bytes), name_(name) {}
@@ -35,13 +35,13 @@ public:
   std::vector<std::byte> run(DiskForm& form) {
     check_header();
     read_table();
-    lay_out();
+    compute_layout();
     resident_.resize(static_cast<size_t>(header_.resident_bytes));
     unzip(head_, 0, header_.head_bytes, "head");
     unzip(tail_, tail_begin_, header_.tail_bytes, "tail");
     check_head();
     decode_pages();
-    add_up_clusters();
+    set_first_triangles_and_vertices();
     decode_nodes();
     form = {static_cast<PageCodec>(header_.codec),
             bytes_.size(),
@@ -81,7 +81,7 @@ private:
     if (header_.reserved != 0 || header_.padding != decltype(header_.padding){}) fail("reserved header fields");
   }
 
-  /// Page records, head and tail, and where the pages lie.
+  /// Reads the page records, and finds head, tail, nodes and pages.
   void read_table() {
     uint64_t left = bytes_.size() - sizeof header_;
     for (const uint64_t part :
@@ -110,8 +110,8 @@ private:
     if (offset != bytes_.size()) fail("pages that do not fill the file");
   }
 
-  /// The places of the resident file's parts, all of which the page records and the header imply.
-  void lay_out() {
+  /// Computes the layout of the resident file, which follows from the page records and the header.
+  void compute_layout() {
     const auto ratio_ok = [](uint64_t bytes, uint64_t disk_bytes) {
       return bytes / baked::kMaxDiskRatio <= disk_bytes;
     };
@@ -135,7 +135,7 @@ private:
     if (ZSTD_isError(size) != 0 || size != bytes) fail(what);
   }
 
-  /// What decoding a page relies on; validation looks at everything else.
+  /// Checks what decoding pages relies on; validation checks everything else.
   void check_head() {
     baked::FileHeader header;
     std::memcpy(&header, resident_.data(), sizeof header);
@@ -192,7 +192,7 @@ private:
 
   uint64_t node_bytes() const { return header_.node_count * sizeof(baked::PackedNode); }
 
-  /// Of the tail: nothing of it changes while nodes are made.
+  /// Section in the head or tail. Restoring nodes does not change it.
   template <typename T>
   std::span<const T> section(const baked::FileHeader& header, baked::Section number) const {
     const baked::SectionRecord& record = header.sections[number];
@@ -209,9 +209,9 @@ private:
       unzip(nodes_, nodes_begin_, node_bytes(), "nodes");
       return;
     }
-    constexpr uint64_t kMostBytes = 14; // of a node's topology: its kind, eight sizes, a triangle and a cluster
+    constexpr uint64_t kMaxBytes = 14; // per node: its kind, eight sizes, first triangle and cluster
     const uint64_t size = ZSTD_getFrameContentSize(nodes_.data(), nodes_.size());
-    if (size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR || size > kMostBytes * header_.node_count ||
+    if (size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR || size > kMaxBytes * header_.node_count ||
         size / baked::kMaxDiskRatio > nodes_.size())
       fail("nodes");
     std::vector<uint8_t> topology(static_cast<size_t>(size));
@@ -228,7 +228,7 @@ private:
     const std::span<baked::PackedNode> nodes{reinterpret_cast<baked::PackedNode*>(resident_.data() + nodes_begin_),
                                              static_cast<size_t>(header_.node_count)};
     if (ZSTD_isError(got) != 0 || got != size || !restore_nodes(sections, topology, nodes)) fail("nodes");
-    // Those sections are where the pages were decoded to, unless the file lies.
+    // The header's section table is not validated yet, so check that its sections are those that were decoded above.
     const auto lies_at = [&](baked::Section number, uint64_t offset, uint64_t bytes) {
       return header.sections[number].offset == offset && header.sections[number].bytes == bytes;
     };
@@ -237,7 +237,7 @@ private:
                         lies_at(baked::kNodes, nodes_begin_, node_bytes());
   }
 
-  void add_up_clusters() {
+  void set_first_triangles_and_vertices() {
     for (const baked::GeometryRecord& g : geometries_) {
       uint32_t triangles = 0, vertices = 0;
       for (baked::ClusterRecord& c : clusters().subspan(static_cast<size_t>(g.first_cluster), g.cluster_count)) {

@@ -6,36 +6,39 @@
 
 namespace packtrace {
 
-/// Streams of a page: what `info` tells apart.
+/// Streams of a page that `info` reports separately.
 enum class PageStream : uint32_t { kTopology, kPositions, kNormals, kUvs, kRecords, kCount };
 inline constexpr uint32_t kPageStreams = static_cast<uint32_t>(PageStream::kCount);
 
-/// Numbers of the adaptive models that symbols are coded with. PageModel says what selects one within a range.
+/// Numbers of the adaptive models that code symbols. PageModel documents the selection of a model within a range.
 namespace context {
 inline constexpr uint32_t kStripCorner = 0, kFirstCorner = 1, kSecondCorner = 2, kThirdCorner = 3; // kinds of corners
-inline constexpr uint32_t kTurn = 0;                   // 9 pairs of turns x 4 open edges, without and with normals
-inline constexpr uint32_t kStripNaming = kTurn + 72;   // 4 pairs of corners x same turn x 12 states of the guesses
-inline constexpr uint32_t kNaming = kStripNaming + 96; // 3 corners of a strip's first triangle x 12
+// 9 pairs of turns x 4 states of open edges, without and with normals
+inline constexpr uint32_t kTurn = 0;
+inline constexpr uint32_t kStripNaming = kTurn + 72; // 4 pairs of new corners x same turn x 12 states of the guesses
+// 3 corners of a strip's first triangle x 12 states of the guesses
+inline constexpr uint32_t kNaming = kStripNaming + 96;
 inline constexpr uint32_t kVersion = kNaming + 36;
-inline constexpr uint32_t kVersionBack = kVersion + 1;
-inline constexpr uint32_t kBack = kVersionBack + 1; // 4 kinds
+inline constexpr uint32_t kVertexAtPointBack = kVersion + 1;
+inline constexpr uint32_t kBack = kVertexAtPointBack + 1; // 4 kinds of corners
 inline constexpr uint32_t kPageBack = kBack + 4;
-inline constexpr uint32_t kPosition = kPageBack + 1;      // 20 extents x 3 surprises
-inline constexpr uint32_t kNormalChoice = kPosition + 60; // 3 last x 3 known x 3
+inline constexpr uint32_t kPosition = kPageBack + 1; // 20 extents x 3 levels of surprise
+// 3 kinds of the last vertex x 3 counts of known x 3 of other candidates
+inline constexpr uint32_t kNormalChoice = kPosition + 60;
 inline constexpr uint32_t kNormalSeam = kNormalChoice + 27;
 inline constexpr uint32_t kNormalX = kNormalSeam + 1;
-inline constexpr uint32_t kNormalY = kNormalX + 1; // 16 widths of x
+inline constexpr uint32_t kNormalY = kNormalX + 1; // 16 widths of the difference in x
 inline constexpr uint32_t kUv = kNormalY + 16;     // 2 axes
 inline constexpr uint32_t kSameMaterial = kUv + 2;
-inline constexpr uint32_t kHasNormals = kSameMaterial + 1; // 2 of the last
-inline constexpr uint32_t kHasUvs = kHasNormals + 2;       // 2 of the last
+inline constexpr uint32_t kHasNormals = kSameMaterial + 1; // by the value for the last cluster
+inline constexpr uint32_t kHasUvs = kHasNormals + 2;       // by the value for the last cluster
 inline constexpr uint32_t kFull = kHasUvs + 2;
 inline constexpr uint32_t kNormalChart = kFull + 1;
 inline constexpr uint32_t kNormalPalette = kNormalChart + 1;
 inline constexpr uint32_t kCount = kNormalPalette + 1;
 } // namespace context
 
-/// What a model, or the bit fields that follow its symbols, count as.
+/// Returns the stream that a model's symbols and the bit fields behind them are counted in.
 constexpr PageStream page_stream_of(uint32_t number) {
   if (number < context::kPosition) return PageStream::kTopology;
   if (number < context::kNormalChoice) return PageStream::kPositions;

@@ -17,7 +17,7 @@
 namespace packtrace {
 namespace {
 
-/// The parts of a page that lie behind a table of their sizes.
+/// Splits a page into consecutive parts.
 class Parts {
 public:
   explicit Parts(std::span<const uint8_t> bytes) : rest_(bytes) {}
@@ -56,7 +56,7 @@ struct PageDecoder::Scratch {
   std::vector<uint8_t> bytes;
   ZstdDecoder zstd = make_zstd_decoder();
 
-  /// Codec small: the size of the bit fields, these, and the words of the symbols.
+  /// Codec small: size of the bit fields (u32), the bit fields, then the words of the symbols.
   bool begin_small(std::span<const uint8_t> page) {
     Parts parts(page);
     const auto field_bytes = parts.number();
@@ -76,7 +76,9 @@ struct PageDecoder::Scratch {
     return true;
   }
 
-  /// @param append writes the next cluster behind those in `packed`, whose record it returns; false where it cannot
+  /// Decodes all clusters of a page.
+  /// @param append writes the next cluster behind the earlier ones in `packed` and fills in its record; false if that
+  /// fails
   template <class Packed, class Append>
   static bool decode_clusters(const Packed& packed, const Append& append, const PagePlace& place,
                               std::span<baked::ClusterRecord> clusters, std::span<uint8_t> payload) {

@@ -9,24 +9,26 @@
 
 namespace packtrace {
 
-/// What a page needs to know of its file.
+/// The parts of a file that decoding a page needs.
 struct PagePlace {
-  std::span<const baked::GeometryRecord> geometries; ///< ranges without gaps, encodings and steps checked
-  uint64_t first_cluster = 0;                        ///< of the page, in the cluster section
-  uint64_t payload_offset = 0;                       ///< of the page, in the payload section
+  /// Cluster and payload ranges without gaps; encodings and steps checked.
+  std::span<const baked::GeometryRecord> geometries;
+  uint64_t first_cluster = 0;  ///< first cluster of the page, in the cluster section
+  uint64_t payload_offset = 0; ///< start of the page's payload, in the payload section
 };
 
-/// Decodes pages, one after the other; keeps its memory. One a thread.
+/// Decodes pages one after another and keeps its scratch memory. Use one decoder per thread.
 class PageDecoder {
 public:
   PageDecoder();
   ~PageDecoder();
 
-  /// @param page record.disk_bytes bytes; their hash is not looked at
-  /// @param clusters record.cluster_count records; first_triangle and first_vertex are left 0 unless record.form is
-  ///        kNone, since they depend on the pages before
+  /// Decodes one page.
+  /// @param page record.disk_bytes bytes; their hash is not checked
+  /// @param clusters record.cluster_count records. first_triangle and first_vertex depend on the pages before, so they
+  /// are left 0 unless record.form is kNone.
   /// @param payload record.payload_bytes bytes
-  /// @return false where the bytes are not what an encoder writes; then the outputs hold anything
+  /// @return false if no encoder writes such bytes; the outputs are then unspecified
   bool decode(const baked::PageRecord& record, std::span<const uint8_t> page, const PagePlace& place,
               std::span<baked::ClusterRecord> clusters, std::span<uint8_t> payload);
 
@@ -35,7 +37,7 @@ private:
   std::unique_ptr<Scratch> scratch_;
 };
 
-/// Whether a page's record is within its limits.
+/// Whether the values of a page's record are within their limits.
 bool page_record_ok(const baked::PageRecord& record, PageCodec file_codec);
 
 } // namespace packtrace

@@ -10,14 +10,14 @@
 #include <xxhash.h>
 #include <zstd.h>
 
-#include "compress/format/pages/page_fast_encoder.h"
-#include "compress/format/pages/page_recorder.h"
-#include "compress/format/pages/rans_writer.h"
 #include "compress/format/pages/page_cluster.h"
 #include "compress/format/pages/page_decoder.h"
+#include "compress/format/pages/page_fast_encoder.h"
 #include "compress/format/pages/page_model.h"
-#include "compress/format/trees/tree_topology.h"
+#include "compress/format/pages/page_recorder.h"
+#include "compress/format/pages/rans_writer.h"
 #include "compress/format/pages/zstd_context.h"
+#include "compress/format/trees/tree_topology.h"
 #include "pbrt_import/base/error.h"
 
 namespace packtrace {
@@ -79,7 +79,7 @@ public:
     page.record.form = static_cast<uint32_t>(codec_);
     page.bytes = encode(range, bits);
     page.record.disk_bytes = static_cast<uint32_t>(page.bytes.size());
-    if (!comes_back(page, range)) store(page, range, bits);
+    if (!decodes_identically(page, range)) store(page, range, bits);
     page.record.hash = XXH3_64bits(page.bytes.data(), page.bytes.size());
     page.stream_bytes = whole_bytes(bits, page.bytes.size());
     return page;
@@ -126,7 +126,7 @@ private:
     return writer.finish(zstd_.get(), bits);
   }
 
-  bool comes_back(const EncodedPage& page, const PageRange& range) {
+  bool decodes_identically(const EncodedPage& page, const PageRange& range) {
     if (!page_record_ok(page.record, codec_)) return false;
     std::vector<baked::ClusterRecord> records(range.cluster_count);
     Bytes bytes(range.payload_bytes);

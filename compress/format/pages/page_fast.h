@@ -5,49 +5,53 @@
 #include <cstdint>
 #include <type_traits>
 
-#include "compress/format/layout/baked_format.h"
-#include "compress/format/layout/bit_stream.h"
 #include "compress/format/cluster/index_codec.h"
 #include "compress/format/cluster/normal_codec.h"
+#include "compress/format/layout/baked_format.h"
+#include "compress/format/layout/bit_stream.h"
 
-/// The disk form of pages of codec `fast`; docs/baked_format.md says it in words. What both directions share.
+/// Disk form of pages with codec `fast`; docs/baked_format.md describes it. This header has what encoder and decoder
+/// share.
 ///
-/// All fields of a vertex lie in one 64-bit word as they lie in the cluster's bit stream. Sums and differences of such
-/// words, as integers modulo 2^64, are those of the fields wherever the result's fields are in range: so a vertex is
-/// predicted by one addition and one subtraction for all of its axes, and what is decoded is what the stream holds.
+/// All fields of a vertex in one channel form a 64-bit word, with the same layout as in the cluster's bit stream.
+/// Adding or subtracting two words as integers modulo 2^64 adds or subtracts all fields, provided that the fields of
+/// the result are in range. So one addition and one subtraction predict all axes of a vertex, and decoding yields the
+/// words of the stream.
 namespace packtrace::page_fast {
 
 /// The parts of a page, in order.
 enum Part : uint32_t {
-  kFields,    ///< bit fields
-  kHeaders,   ///< the bytes of all clusters' headers, byte 0 of all first
-  kBits,      ///< per cluster, each from a whole byte on: turns, fresh corners, creases
-  kRuns,      ///< triangles of each strip
-  kOlds,      ///< vertices that corners name
-  kResiduals, ///< low bytes of residuals, in kClasses parts
+  kFields,         ///< bit fields
+  kHeaders,        ///< headers of all clusters, transposed: byte 0 of all headers first
+  kBits,           ///< per cluster, each starting at a whole byte: turns, fresh corners, creases
+  kRuns,           ///< triangle count of each strip
+  kReusedVertices, ///< vertices of corners that are not fresh, and the originals of creases
+  kResiduals,      ///< the byte above the low bits of each residual, in kClasses parts
   kParts = kResiduals + 4
 };
 inline constexpr uint32_t kClasses = kParts - kResiduals;
 
-/// Fields of a vertex, in channels: positions x, y, z; normals y, x, chart, or the palette entry; texture coordinates.
+/// Channels of a vertex word, and their fields: positions x, y, z; normals y, x, chart, or the palette index; texture
+/// coordinates u, v.
 enum Channel : uint32_t { kPositions, kNormals, kUvs, kChannels };
-inline constexpr uint32_t kChannelFields = 3; ///< at most
+inline constexpr uint32_t kChannelFields = 3; ///< maximum number of fields per channel
 
-/// What is said of a cluster; differences are to the cluster before, as zigzag numbers.
+/// Header of a cluster. Differences are zigzag numbers relative to the cluster before.
 struct Header {
-  std::array<uint32_t, 3> anchor;         ///< difference
-  uint32_t material_slot;                 ///< exclusive or with the last
-  std::array<uint16_t, 2> normal_anchor;  ///< difference
-  uint16_t palette;                       ///< as in the record
-  uint8_t triangles;                      ///< less one
-  uint8_t vertices;                       ///< less one
-  uint8_t strips;                         ///< less one
-  uint8_t flags;                          ///< as in the record
-  uint8_t creases;                        ///< fresh vertices at the place of an older one of the cluster
-  std::array<uint8_t, kChannels> escapes; ///< residuals with more than a byte above their low bits
+  std::array<uint32_t, 3> anchor;        ///< zigzag difference
+  uint32_t material_slot;                ///< exclusive or with that of the cluster before
+  std::array<uint16_t, 2> normal_anchor; ///< zigzag difference
+  uint16_t palette;                      ///< as in the record
+  uint8_t triangles;                     ///< minus one
+  uint8_t vertices;                      ///< minus one
+  uint8_t strips;                        ///< minus one
+  uint8_t flags;                         ///< as in the record
+  /// Number of fresh vertices at the position of an older vertex of the cluster.
+  uint8_t creases;
+  std::array<uint8_t, kChannels> escapes; ///< number of residuals whose value does not fit the low bits and one byte
   std::array<uint8_t, 3> position_bits;
   std::array<uint8_t, 2> normal_bits;
-  std::array<uint8_t, kChannels * kChannelFields> coding; ///< of a field: low bits, and 64 times the class
+  std::array<uint8_t, kChannels * kChannelFields> coding; ///< per field: number of low bits, plus 64 times the class
 };
 inline constexpr size_t kHeaderBytes = 44;
 static_assert(sizeof(Header) == kHeaderBytes && std::is_trivially_copyable_v<Header>);
@@ -57,13 +61,13 @@ inline constexpr uint32_t kEscapeFieldBits = 2, kEscapeIndexBits = 8, kEscapeWid
 inline constexpr uint32_t kUvAnchorBits = 32, kUvWidthBits = 5;
 inline constexpr uint32_t kByteBits = 8;
 
-/// One channel of one cluster.
+/// Field widths of one channel of one cluster.
 struct Layout {
   uint32_t field_count = 0;
   std::array<uint32_t, kChannelFields> width{};
 
   uint32_t stride() const { return width[0] + width[1] + width[2]; }
-  /// Wider words than a stream field can be are stored as they are.
+  /// Words wider than kMaxFieldBits are stored without prediction.
   bool verbatim() const { return stride() > kMaxFieldBits; }
 };
 
@@ -71,7 +75,7 @@ inline Layout position_layout(const baked::ClusterRecord& record) {
   return {3, {record.position_bits[0], record.position_bits[1], record.position_bits[2]}};
 }
 
-/// Bits of a normal, or of a palette entry.
+/// Width of the chart in a normal or a palette entry.
 inline uint32_t normal_chart_bits(const baked::GeometryRecord& geometry, const baked::ClusterRecord& record) {
   const auto encoding = static_cast<NormalEncoding>(geometry.normal_encoding);
   return (record.flags & baked::kClusterMixedCharts) != 0 ? bits_for_count(format_of(encoding).charts) : 0;

@@ -13,16 +13,17 @@ namespace packtrace {
 
 using namespace page_fast;
 
-/// What is known of the cluster that is being decoded.
+/// Data of the cluster that is being decoded.
 struct FastPageReader::Work {
   std::array<Layout, kChannels> layouts;
-  std::array<uint64_t, kChannels> prefix_bit{}; ///< of what is copied: palettes, anchors of texture coordinates
+  /// Place of the bits that are copied: palettes; anchors and widths of texture coordinates.
+  std::array<uint64_t, kChannels> prefix_bit{};
   std::array<uint32_t, kChannels> prefix_bits{};
-  std::array<uint64_t, kChannels> verbatim_bit{}; ///< of the words that are copied
-  const uint8_t* turns = nullptr;                 ///< bits
+  std::array<uint64_t, kChannels> verbatim_bit{}; ///< place of words without prediction
+  const uint8_t* turns = nullptr;                 ///< bit array
   const uint8_t* fresh = nullptr;
-  std::array<uint64_t, 3> restarts{}; ///< bits; the last word is only read
-  WalkMemory::Words residuals{};      ///< of one channel, without gaps
+  std::array<uint64_t, 3> restarts{}; ///< bit array; the last word is read, but never set
+  WalkMemory::Words residuals{};      ///< residuals of positions, without gaps for creases
   WalkInput input;
   WalkMemory memory;
 };
@@ -94,7 +95,7 @@ bool FastPageReader::read_record(const Header& header, baked::ClusterRecord& rec
   record.vertex_count = static_cast<uint16_t>(header.vertices + 1);
   record.normal_palette = header.palette;
   record.triangle_count = static_cast<uint8_t>(header.triangles + 1);
-  record.restart_count = static_cast<uint8_t>(header.strips + 1);
+  record.strip_count = static_cast<uint8_t>(header.strips + 1);
   record.position_bits = header.position_bits;
   record.normal_bits = header.normal_bits;
   record.flags = header.flags;
@@ -105,7 +106,7 @@ bool FastPageReader::read_record(const Header& header, baked::ClusterRecord& rec
   for (const uint8_t bits : record.normal_bits)
     if (bits > 24) return false;
   return record.normal_palette <= record.vertex_count &&
-         record.vertex_count <= record.triangle_count + 2u * record.restart_count;
+         record.vertex_count <= record.triangle_count + 2u * record.strip_count;
 }
 
 bool FastPageReader::read_topology(const Header& header, const IndexLayout& layout) {
@@ -115,12 +116,12 @@ bool FastPageReader::read_topology(const Header& header, const IndexLayout& layo
   w.turns = parts_[kBits].take(bytes_of(triangles));
   w.fresh = parts_[kBits].take(bytes_of(corners));
   const uint8_t* creases = parts_[kBits].take(header.creases != 0 ? bytes_of(vertices) : 0);
-  const uint8_t* runs = parts_[kRuns].take(layout.restart_count);
+  const uint8_t* runs = parts_[kRuns].take(layout.strip_count);
   if (w.turns == nullptr || w.fresh == nullptr || creases == nullptr || runs == nullptr) return false;
 
   w.restarts = {};
   uint32_t first = 0;
-  for (uint32_t i = 0; i < layout.restart_count; ++i) {
+  for (uint32_t i = 0; i < layout.strip_count; ++i) {
     if (runs[i] == 0 || first >= triangles) return false;
     w.restarts[first >> 6] |= uint64_t{1} << (first & 63u);
     first += runs[i];
@@ -132,11 +133,11 @@ bool FastPageReader::read_topology(const Header& header, const IndexLayout& layo
   if (expand_bits(w.fresh, corners, m.fresh.data()) != vertices) return false;
   if (header.creases != 0 && expand_bits(creases, vertices, m.crease.data()) != header.creases) return false;
   const uint32_t old_count = corners - vertices + header.creases;
-  const uint8_t* olds = parts_[kOlds].take(old_count);
-  if (olds == nullptr) return false;
-  add_up_olds(olds, old_count, m.olds.data());
+  const uint8_t* reused_vertices = parts_[kReusedVertices].take(old_count);
+  if (reused_vertices == nullptr) return false;
+  sum_reused_vertices(reused_vertices, old_count, m.reused_vertices.data());
   w.input = {runs,
-             layout.restart_count,
+             layout.strip_count,
              {true, w.layouts[kNormals].field_count != 0, w.layouts[kUvs].field_count != 0},
              header.creases != 0};
   return true;
@@ -185,11 +186,11 @@ bool FastPageReader::read_channel(uint32_t channel, const Header& header, uint32
   for (uint32_t i = 0; i < header.escapes[channel]; ++i)
     if (!read_escape(code, count, residuals + 1)) return false;
   if (creases != 0)
-    spread_residuals(residuals, w.memory.crease.data(), vertex_count, w.memory.residuals[channel].data());
+    expand_residuals(residuals, w.memory.crease.data(), vertex_count, w.memory.residuals[channel].data());
   return true;
 }
 
-/// A residual that has more bits.
+/// Adds a residual whose high part is wider than a byte.
 bool FastPageReader::read_escape(const ChannelCode& code, uint32_t count, uint64_t* residuals) {
   const uint8_t* bits = parts_[kFields].at;
   uint64_t at = 0;
@@ -250,7 +251,7 @@ bool FastPageReader::append(const baked::GeometryRecord& geometry, baked::Cluste
   Work& w = *work_;
   const Header header = next_header();
   if (!read_record(header, record)) return false;
-  const IndexLayout layout{record.triangle_count, record.vertex_count, record.restart_count};
+  const IndexLayout layout{record.triangle_count, record.vertex_count, record.strip_count};
   w.layouts[kPositions] = position_layout(record);
   w.layouts[kNormals] = normal_layout(geometry, record);
   if (record.normal_palette != 0 && w.layouts[kNormals].field_count == 0) return false;

@@ -6,26 +6,28 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/pages/page_fast_kernels.h"
 #include "compress/format/layout/payload_writer.h"
+#include "compress/format/pages/page_fast_kernels.h"
 
 struct ZSTD_DCtx_s;
 
 namespace packtrace {
 
-/// Decodes the clusters of one page of codec `fast` after the other. Keeps its memory.
+/// Decodes the clusters of a page with codec `fast` in order. Keeps its scratch memory for the next page.
 class FastPageReader {
 public:
   FastPageReader();
   ~FastPageReader();
 
+  /// Begins a page and unpacks its parts.
   /// @param cluster_count 1 .. baked::kMaxPageClusters
-  /// @param payload_bytes of all of them, resident
-  /// @return false where the page's parts are not there
+  /// @param payload_bytes resident size of all clusters
+  /// @return false if the parts do not match the page
   bool begin(ZSTD_DCtx_s* zstd, std::span<const uint8_t> page, uint32_t cluster_count, uint32_t payload_bytes);
 
-  /// The next cluster: its streams behind those before, and its record without payload_offset, first_triangle and
-  /// first_vertex. Returns false where that cannot be. What is decoded of nonsense is nonsense, within its memory.
+  /// Decodes the next cluster: appends its streams to the payload and fills in its record, except payload_offset,
+  /// first_triangle and first_vertex. Returns false if no encoder writes such data. For invalid data the result is
+  /// unspecified, but all accesses stay within the decoder's memory.
   bool append(const baked::GeometryRecord& geometry, baked::ClusterRecord& record);
 
   /// Whether every byte of the page was used.
@@ -39,7 +41,7 @@ private:
     const uint8_t* at = nullptr;
     const uint8_t* end = nullptr;
 
-    /// Null where so many bytes are not left.
+    /// Returns the next `count` bytes, or null if fewer are left.
     const uint8_t* take(size_t count) {
       if (count > static_cast<size_t>(end - at)) return nullptr;
       at += count;
@@ -58,9 +60,9 @@ private:
   void put_bits(const uint8_t* bytes, uint64_t first, uint64_t count);
   void put_cluster(const baked::ClusterRecord& record, const IndexLayout& layout);
 
-  std::vector<uint8_t> bytes_; ///< all parts, unzipped
+  std::vector<uint8_t> bytes_; ///< all parts, decompressed
   std::array<Cursor, page_fast::kParts> parts_;
-  uint64_t field_bit_ = 0, field_end_ = 0; ///< in part kFields
+  uint64_t field_bit_ = 0, field_end_ = 0; ///< bit positions in part kFields
   uint32_t cluster_ = 0, cluster_count_ = 0;
   baked::ClusterRecord last_{};
   PayloadWriter payload_;

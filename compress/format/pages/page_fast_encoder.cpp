@@ -85,7 +85,7 @@ void FastPageWriter::add(const baked::GeometryRecord& geometry, const baked::Clu
   geometry_ = &geometry;
   header_ = {};
   for (std::vector<uint64_t>& residuals : residuals_) residuals.clear();
-  last_old_ = 0;
+  last_reused_ = 0;
   read_vertices(view);
   find_creases(view);
   add_topology(view);
@@ -182,9 +182,9 @@ void FastPageWriter::add_corner(uint32_t vertex, bool fresh, std::array<int32_t,
   const Vertex& one = vertices_[vertex];
   if (!fresh || one.is_crease) {
     const uint32_t named = fresh ? one.original : vertex;
-    const auto difference = static_cast<int8_t>(static_cast<uint8_t>(named - last_old_));
-    parts_[kOlds].push_back(static_cast<uint8_t>(zigzag(difference)));
-    last_old_ = named;
+    const auto difference = static_cast<int8_t>(static_cast<uint8_t>(named - last_reused_));
+    parts_[kReusedVertices].push_back(static_cast<uint8_t>(zigzag(difference)));
+    last_reused_ = named;
   }
   if (fresh && vertex > 0) add_residuals(vertex, guess);
 }
@@ -274,7 +274,7 @@ void FastPageWriter::add_header(const baked::ClusterRecord& record) {
   header_.palette = record.normal_palette;
   header_.triangles = static_cast<uint8_t>(record.triangle_count - 1);
   header_.vertices = static_cast<uint8_t>(record.vertex_count - 1);
-  header_.strips = static_cast<uint8_t>(record.restart_count - 1);
+  header_.strips = static_cast<uint8_t>(record.strip_count - 1);
   header_.flags = record.flags;
   header_.position_bits = record.position_bits;
   header_.normal_bits = record.normal_bits;
@@ -304,7 +304,8 @@ std::vector<uint8_t> FastPageWriter::finish(ZSTD_CCtx_s* zstd, std::array<double
 }
 
 void FastPageWriter::count_part(uint32_t part, double part_bits, std::array<double, kPageStreams>& bits) const {
-  if (part == kBits || part == kRuns || part == kOlds) bits[static_cast<size_t>(PageStream::kTopology)] += part_bits;
+  if (part == kBits || part == kRuns || part == kReusedVertices)
+    bits[static_cast<size_t>(PageStream::kTopology)] += part_bits;
   if (part < kResiduals || parts_[part].empty()) return;
   for (uint32_t channel = 0; channel < kChannels; ++channel)
     bits[static_cast<size_t>(kStreamOf[channel])] += part_bits *

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/layout/bit_stream.h"
 #include "compress/format/cluster/cluster_codec.h"
+#include "compress/format/layout/bit_stream.h"
 #include "compress/format/pages/page_contexts.h"
 #include "compress/format/pages/page_fast.h"
 
@@ -69,7 +69,7 @@ private:
   std::array<page_fast::Layout, page_fast::kChannels> layouts_;
   std::array<uint64_t, page_fast::kChannels> prefix_bit_{}, prefix_bits_{};
   std::vector<Vertex> vertices_;
-  uint32_t last_old_ = 0;
+  uint32_t last_reused_ = 0;
   std::array<std::vector<uint64_t>, kCoded> residuals_; ///< zigzag codes
   std::vector<Escape> escapes_;
 };

@@ -7,17 +7,17 @@
 namespace packtrace::page_fast {
 namespace {
 
-/// Two channels in one register.
+/// Words of two channels in one register.
 using Pair [[gnu::vector_size(16)]] = uint64_t;
 
-/// All of `a` where mask is ~0, of `b` where it is 0.
+/// Returns `a` in lanes where mask is ~0, and `b` where it is 0.
 template <class Lane>
 Lane select(Lane mask, Lane a, Lane b) {
   return b ^ ((a ^ b) & mask);
 }
 uint64_t mask_of(uint64_t bit) { return 0 - bit; }
 
-/// One or two channels.
+/// State of one or two channels that share a register.
 template <class Lane>
 struct Channels {
   static constexpr size_t kCount = sizeof(Lane) / sizeof(uint64_t);
@@ -45,14 +45,15 @@ struct Channels {
       return Lane{first, second};
   }
 
-  Lane a{}, b{}, c{}; ///< words of the last triangle's corners
+  Lane a{}, b{}, c{}; ///< words of the corners of the last triangle
 };
 
-/// Positions, and attributes, which creases have of their own, behind them.
+/// Reconstructs the vertex words of a cluster along its strips. The first channel holds positions; a crease copies its
+/// position from an older vertex, but has its own values in the other channels.
 template <class Lane, uint32_t kCount, bool kCreases>
 class Walk {
 public:
-  /// @param channels positions first; one may be there twice
+  /// @param channels positions first; a channel may occur twice
   Walk(const WalkInput& input, WalkMemory& memory,
        const std::array<uint32_t, kCount * Channels<Lane>::kCount>& channels)
       : input_(input), memory_(memory) {
@@ -82,7 +83,8 @@ public:
         corner(guess);
       }
     }
-    if constexpr (!kCreases) std::memcpy(memory_.explicits.data(), memory_.olds.data(), memory_.explicits.size());
+    if constexpr (!kCreases)
+      std::memcpy(memory_.explicits.data(), memory_.reused_vertices.data(), memory_.explicits.size());
   }
 
 private:
@@ -98,20 +100,20 @@ private:
   }
 
   void corner(const std::array<Lane, kCount>& guess) {
-    const uint32_t fresh = memory_.fresh[corner_++], named = memory_.olds[old_];
-    const uint32_t placed = kCreases ? fresh & (memory_.crease[vertex_] ^ 1u) : fresh; // not at a named vertex
-    old_ += placed ^ 1u;
+    const uint32_t fresh = memory_.fresh[corner_++], named = memory_.reused_vertices[reused_];
+    const uint32_t placed = kCreases ? fresh & (memory_.crease[vertex_] ^ 1u) : fresh; // fresh and no crease
+    reused_ += placed ^ 1u;
     if constexpr (kCreases) {
       memory_.explicits[explicit_] = static_cast<uint8_t>(named);
       explicit_ += fresh ^ 1u;
     }
     for (uint32_t k = 0; k < kCount; ++k) {
-      // All but the last two operations can be done before the guess is known.
+      // All but the last two operations are independent of the guess.
       Channels<Lane>& t = t_[k];
       const Lane is_new = Channels<Lane>::both(mask_of(k == 0 ? placed : fresh), mask_of(fresh));
       const Lane rest = select(is_new, t.load(t.residuals, vertex_), t.load(t.words, named));
       t.c = (guess[k] & is_new) + rest;
-      t.store(vertex_, t.c); // overwritten unless it is a new vertex
+      t.store(vertex_, t.c); // harmless for an old vertex: a later one overwrites it
     }
     vertex_ += fresh;
   }
@@ -119,7 +121,7 @@ private:
   const WalkInput& input_;
   WalkMemory& memory_;
   std::array<Channels<Lane>, kCount> t_;
-  uint32_t corner_ = 0, vertex_ = 0, old_ = 0, explicit_ = 0;
+  uint32_t corner_ = 0, vertex_ = 0, reused_ = 0, explicit_ = 0;
 };
 
 template <class Lane, uint32_t kCount>
@@ -156,7 +158,7 @@ uint32_t expand_bits(const uint8_t* bits, uint32_t count, uint8_t* out) {
   for (uint32_t i = 0; i < count; i += 8) {
     uint64_t byte = bits[i / 8];
     if (count - i < 8) byte &= (1u << (count - i)) - 1;
-    // Byte k keeps bit k of eight copies, and then says whether there is anything.
+    // Byte k keeps bit k of eight copies of the byte; then nonzero bytes become 1.
     const uint64_t spread = (byte * 0x0101010101010101u) & 0x8040201008040201u;
     const uint64_t bytes = ((spread + 0x7f7f7f7f7f7f7f7fu) >> 7) & 0x0101010101010101u;
     ones += static_cast<uint32_t>((bytes * 0x0101010101010101u) >> 56);
@@ -165,7 +167,7 @@ uint32_t expand_bits(const uint8_t* bits, uint32_t count, uint8_t* out) {
   return ones;
 }
 
-void add_up_olds(const uint8_t* differences, uint32_t count, uint8_t* out) {
+void sum_reused_vertices(const uint8_t* differences, uint32_t count, uint8_t* out) {
   uint32_t last = 0;
   for (uint32_t i = 0; i < count; ++i) {
     last += static_cast<uint32_t>(unzigzag(differences[i]));
@@ -190,7 +192,7 @@ uint64_t pack_four(const uint8_t* bytes, uint32_t width) {
   return (two & 0xffffu) | (uint64_t{two >> 16} << (2 * width));
 }
 
-void spread_residuals(const uint64_t* residuals, const uint8_t* flags, uint32_t count, uint64_t* out) {
+void expand_residuals(const uint64_t* residuals, const uint8_t* flags, uint32_t count, uint64_t* out) {
   for (uint32_t i = 0, k = 0; i < count; ++i) {
     out[i] = residuals[k];
     k += flags[i] ^ 1u;

@@ -1,4 +1,5 @@
-// Compiled for AVX2: nothing here may be inline in a header, or other translation units could end up calling it.
+// Compiled for AVX2. Code here must not be inline in a header: the linker might keep the AVX2 version for other
+// translation units.
 #include "compress/format/pages/page_fast_kernels.h"
 
 #if defined(__x86_64__)
@@ -19,7 +20,7 @@ struct Field {
   __m256i low_mask;
 };
 
-/// Four vertices at a time, and as many more behind the last as that takes.
+/// Processes four vertices per step, so up to three words behind the last one are written.
 template <uint32_t kCount>
 [[gnu::always_inline]] inline void sum_fields(const ChannelCode& code, uint32_t count, uint64_t* out) {
   Field fields[kCount];

@@ -13,26 +13,26 @@
 
 namespace packtrace {
 
-/// The order in which the values of a page's clusters are coded, and what each is predicted from. One code for both
-/// directions: a coder's functions take the value and return it; those of a decoder ignore what they are given.
+/// Codes the values of a page's clusters: their order, and the prediction of each value. The same code encodes and
+/// decodes. A coder's functions take the value and return it; decoders ignore the argument.
 ///
 /// A Coder has:
 ///   static constexpr bool kDecodes;
 ///   uint32_t symbol(uint32_t context, uint32_t value);              values 0..15
-///   uint64_t raw(uint32_t context, uint64_t value, uint32_t bits);  0..32 bits; the context only says what they are
+///   uint64_t raw(uint32_t context, uint64_t value, uint32_t bits);  0..32 bits; the context only assigns a stream
 ///   uint32_t find_point(const LatticePoint&);                       encoders: the page's point there, or kNoPoint
 ///   void add_point(const LatticePoint&, uint32_t point);            encoders
-/// Decoded values stay within the arrays they index whatever the bytes are; fault() says that they were nonsense.
+/// Decoded values stay within the arrays that they index, for any bytes; fault() reports invalid data.
 ///
-/// Points are the places of a page's vertices, in order of first use. The border of the triangles coded so far is kept
-/// as at most one edge out of each point: a triangle that continues the surface closes an edge of it, so that the
-/// edge's other end is the guess for its third corner, across clusters as within them.
+/// Points are the distinct vertex positions of a page, in order of first use. The border of the triangles coded so far
+/// is stored as up to two outgoing and two incoming edges per point. A triangle that continues the surface closes a
+/// border edge, so the end point of that edge predicts its third corner, both within and across clusters.
 template <class Coder>
 class PageModel {
 public:
   explicit PageModel(Coder& coder) : coder_(coder) {}
 
-  /// Before the first cluster of each page.
+  /// Call before the first cluster of each page.
   void begin() {
     points_.clear();
     cluster_ = 0;
@@ -40,7 +40,8 @@ public:
     fault_ = false;
   }
 
-  /// @param values given by encoders, filled in by decoders
+  /// Codes one cluster.
+  /// @param values input of encoders, output of decoders
   void code_cluster(const baked::GeometryRecord& geometry, ClusterValues& values) {
     ++cluster_;
     values_ = &values;
@@ -61,28 +62,29 @@ private:
   static constexpr uint32_t kNone = ~0u;
   static constexpr uint16_t kNoVertex = 0xffff;
   static constexpr uint32_t kMaxExtent = 19;
-  static constexpr uint32_t kWide = 15; ///< bits of magnitudes that say their width themselves
+  static constexpr uint32_t kExplicitWidth = 15; ///< magnitudes of this many bits and more store their width explicitly
 
-  /// Surfaces that touch in a point have borders of their own there; kNone where there are fewer.
+  /// Border edges at a point, newest first. Two surfaces that touch in a point have one each; kNone marks unused
+  /// entries.
   using Ends = std::array<uint32_t, 2>;
   static constexpr Ends kNoEnds = {kNone, kNone};
 
   struct Point {
     LatticePoint position;
-    Ends next = kNoEnds;                 ///< ends of the border edges that begin here, newest first
-    Ends previous = kNoEnds;             ///< begins of those that end here, newest first
+    Ends next = kNoEnds;                 ///< end points of border edges that begin here, newest first
+    Ends previous = kNoEnds;             ///< start points of border edges that end here, newest first
     Ends apex = kNoEnds;                 ///< third corners of the triangles at the edges to `next`
-    uint32_t cluster = 0;                ///< the last one with a vertex here
-    uint16_t vertex = 0;                 ///< the newest of that cluster's here
+    uint32_t cluster = 0;                ///< last cluster with a vertex here
+    uint16_t vertex = 0;                 ///< newest vertex of that cluster here
     uint16_t normal_count = 0;           ///< 0..2
-    std::array<NormalFields, 2> normals; ///< the last two different ones, newest first
+    std::array<NormalFields, 2> normals; ///< the last two different normals, newest first
   };
   /// A vertex of the current cluster.
   struct Vertex {
     uint32_t point;
-    std::array<uint16_t, 2> neighbours; ///< earlier corners of the triangle that brought it, or kNoVertex
+    std::array<uint16_t, 2> neighbours; ///< earlier corners of the triangle that first uses it, or kNoVertex
   };
-  /// The corner of a triangle: a point, and the cluster's vertex there.
+  /// A triangle corner: a point, and the cluster's vertex at that point.
   struct Corner {
     uint32_t point = 0;
     uint16_t vertex = 0;
@@ -95,18 +97,19 @@ private:
 
   uint32_t flag(uint32_t context, bool value) { return coder_.symbol(context, value ? 1 : 0) & 1u; }
 
-  /// Any 64-bit value, cheap where it is small: the number of its bits as a symbol, then all below the first.
+  /// Codes any 64-bit value; small values take few bits. A symbol holds the bit width, raw bits hold everything below
+  /// the leading one.
   uint64_t magnitude(uint32_t context, uint64_t value) {
     const auto bits = static_cast<uint32_t>(std::bit_width(value));
-    const uint32_t width = coder_.symbol(context, std::min(bits, kWide));
-    if (width == kWide) return wide_magnitude(context, value, bits);
-    // No branch on the width, which nothing predicts.
+    const uint32_t width = coder_.symbol(context, std::min(bits, kExplicitWidth));
+    if (width == kExplicitWidth) return wide_magnitude(context, value, bits);
+    // Without a branch on the width, which is unpredictable.
     const uint64_t first = (uint64_t{1} << width) >> 1;
     return first | coder_.raw(context, value - (kDecodes ? 0 : first), width - (width != 0 ? 1 : 0));
   }
 
   uint64_t wide_magnitude(uint32_t context, uint64_t value, uint32_t bits) {
-    const auto width = kWide + static_cast<uint32_t>(coder_.raw(context, bits - kWide, 6));
+    const auto width = kExplicitWidth + static_cast<uint32_t>(coder_.raw(context, bits - kExplicitWidth, 6));
     if (width > 64) {
       fault_ = true;
       return 0;
@@ -146,7 +149,7 @@ private:
     vertex_count_ = 0, corner_count_ = 0;
     uint32_t restarts = 0;
     std::array<Corner, 3> t{};
-    uint32_t turns = 8; // the last two
+    uint32_t turns = 8; // the last two turns as base-3 digits; 2 is a restart
     for (uint32_t i = 0; i < triangle_count && !fault_; ++i) {
       Turn turn = Turn::kRestart;
       if (i > 0) {
@@ -163,7 +166,7 @@ private:
         ++restarts;
         code_restart(t);
       } else {
-        const size_t left = turn == Turn::kLeft ? 1 : 0; // an index, since no branch predicts it
+        const size_t left = turn == Turn::kLeft ? 1 : 0; // an index, because a branch would be unpredictable
         const Corner opposite = t[left];
         t = {t[2 - 2 * left], t[1 + left], {}};
         guess_third(t, opposite.point);
@@ -176,22 +179,22 @@ private:
     }
     c.vertex_count = vertex_count_;
     c.corner_count = corner_count_;
-    c.restart_count = restarts;
+    c.strip_count = restarts;
   }
 
   static uint64_t wrap(int64_t value) { return static_cast<uint64_t>(value); }
 
-  /// Bits of the span of three coordinates.
+  /// Bit width of the span of three coordinates.
   static uint32_t extent(int64_t a, int64_t b, int64_t c) {
     const int64_t lo = std::min({a, b, c}), hi = std::max({a, b, c});
     return static_cast<uint32_t>(std::bit_width(wrap(hi) - wrap(lo)));
   }
 
   static bool has(const Ends& ends, uint32_t point) { return (ends[0] == point) | (ends[1] == point); }
-  /// Forgets the older one.
+  /// Adds an edge and drops the older of two.
   static void push(Ends& ends, uint32_t point) { ends = {point, ends[0]}; }
   static void erase(Ends& ends, size_t at) { ends = {at == 0 ? ends[1] : ends[0], kNone}; }
-  /// The newest that is another.
+  /// Newest entry that differs from `other_than`.
   static uint32_t pick(const Ends& ends, uint32_t other_than) { return ends[0] != other_than ? ends[0] : ends[1]; }
 
   void guess_third(const std::array<Corner, 3>& t, uint32_t opposite) {
@@ -215,19 +218,20 @@ private:
     basis_ = {t[0].point, kNone, kNone};
     t[1] = code_corner(context::kNaming + 12, context::kSecondCorner, {t[0].vertex, kNoVertex});
     const Point& b = points_[t[1].point];
-    // The triangle across the first two corners, if there is one.
+    // Third corner of the triangle on the other side of the first two corners, if there is one.
     const uint32_t apex = has(b.next, t[0].point) ? b.apex[b.next[0] == t[0].point ? 0 : 1] : kNone;
     guess_third(t, apex);
     basis_ = {t[0].point, t[1].point, apex != kNone ? apex : t[0].point};
     t[2] = code_corner(context::kNaming + 24, context::kThirdCorner, {t[0].vertex, t[1].vertex});
   }
 
-  /// Where a new point is expected: at p + q - o of the basis, or at p, or nowhere; and the span to measure errors by.
+  /// Predicts a new point: at p + q - o of the basis, or at p, or at 0. Also sets extent_, the spans that select the
+  /// contexts of the errors.
   std::array<uint64_t, 3> predict() {
     std::array<uint64_t, 3> prediction{};
     if (basis_[0] == kNone) return prediction;
     const LatticePoint& p = points_[basis_[0]].position;
-    if (basis_[1] == kNone) return {wrap(p[0]), wrap(p[1]), wrap(p[2])}; // the last span
+    if (basis_[1] == kNone) return {wrap(p[0]), wrap(p[1]), wrap(p[2])}; // extent_ keeps the last span
     const LatticePoint &q = points_[basis_[1]].position, &o = points_[basis_[2]].position;
     for (size_t axis = 0; axis < 3; ++axis) {
       prediction[axis] = wrap(p[axis]) + wrap(q[axis]) - wrap(o[axis]);
@@ -236,7 +240,7 @@ private:
     return prediction;
   }
 
-  /// Names of corners; symbols.
+  /// Symbols that name a corner.
   enum Naming : uint32_t { kNewPoint, kGuess0, kGuess1, kOfCluster, kOfPage, kCreaseOfCluster };
 
   uint32_t guess_state(uint32_t guess) const {
@@ -263,7 +267,7 @@ private:
     const uint32_t state = guess_state(guess_[0]) * 4 + (same ? 3 : guess_state(guess_[1]));
     naming = coder_.symbol(names + state, naming);
     history_ = (2 * history_ + (naming == kNewPoint ? 1 : 0)) & 3u;
-    if (corner_count_ >= kMaxClusterCorners) naming = kNoNaming;
+    if (corner_count_ >= kMaxClusterCorners) naming = kInvalidNaming;
     switch (naming) {
     case kNewPoint:
       point = add_point();
@@ -273,7 +277,7 @@ private:
       point = guess_[naming - kGuess0];
       if (point == kNone) return fail();
       if (points_[point].cluster == cluster_)
-        fresh = code_version(fresh, point, vertex);
+        fresh = code_vertex_at_point(fresh, point, vertex);
       else
         fresh = true;
       break;
@@ -310,20 +314,20 @@ private:
     return {point, vertex};
   }
 
-  static constexpr uint32_t kNoNaming = 15;
+  static constexpr uint32_t kInvalidNaming = 15;
 
   Corner fail() {
     fault_ = true;
-    if (points_.empty()) points_.emplace_back(); // that the corner may name
+    if (points_.empty()) points_.emplace_back(); // the returned corner refers to point 0
     return {};
   }
 
-  /// Which of the cluster's vertices at a point: the newest, an older one, or a fresh one.
-  bool code_version(bool fresh, uint32_t point, uint16_t& vertex) {
+  /// Codes which of the cluster's vertices at a point is meant: the newest, an older one, or a fresh one.
+  bool code_vertex_at_point(bool fresh, uint32_t point, uint16_t& vertex) {
     const uint32_t version = coder_.symbol(context::kVersion, fresh ? 2u : vertex == points_[point].vertex ? 0u : 1u);
     if (version == 0) vertex = points_[point].vertex;
     if (version == 1) {
-      const uint64_t back = magnitude(context::kVersionBack, wrap(vertex_count_ - 1 - vertex));
+      const uint64_t back = magnitude(context::kVertexAtPointBack, wrap(vertex_count_ - 1 - vertex));
       if (back >= vertex_count_)
         fail();
       else
@@ -337,7 +341,7 @@ private:
     LatticePoint position{};
     if constexpr (!kDecodes) position = values_->positions[vertex_count_];
     const std::array<uint64_t, 3> prediction = predict();
-    uint32_t surprise = 0; // how far the axes before were off, against the span
+    uint32_t surprise = 0; // error of the axis before relative to its span; 0 for x
     for (size_t axis = 0; axis < 3; ++axis) {
       const uint32_t e = extent_[axis];
       const auto delta = static_cast<int64_t>(wrap(position[axis]) - prediction[axis]);
@@ -422,7 +426,7 @@ private:
     return fold_normal(encoding_, {chart, limit(predicted.x + limit(dx)), limit(predicted.y + limit(dy))});
   }
 
-  /// Per vertex, the sum of its triangles' normals in the cluster.
+  /// Sums, per vertex, the normals of its triangles in the cluster.
   void sum_face_normals() {
     std::fill_n(face_normals_.begin(), vertex_count_, DVec3(0.0));
     const auto& positions = values_->positions;
@@ -470,9 +474,9 @@ private:
   std::array<std::array<uint16_t, 3>, kMaxClusterTriangles> corners_of_;
   std::array<DVec3, kMaxClusterVertices> face_normals_;
   std::array<uint32_t, 2> guess_{};
-  uint32_t history_ = 0;             // which of the last two corners were new points
-  std::array<uint32_t, 3> basis_{};  // points that the next new one is predicted from
-  std::array<uint32_t, 3> extent_{}; // bits per axis of the span of the last three such points
+  uint32_t history_ = 0;             // bits: whether the last two corners were new points
+  std::array<uint32_t, 3> basis_{};  // points that the next new point is predicted from
+  std::array<uint32_t, 3> extent_{}; // per axis: bit width of the span of the last three basis points
 };
 
 } // namespace packtrace

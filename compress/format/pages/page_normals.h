@@ -7,13 +7,14 @@
 
 namespace packtrace {
 
-/// Canonical fields near those of a direction: a guess, not an encoding. The same on every machine: +, -, x, / and
-/// square root of doubles. Vectors of length zero get some fields.
-/// @param n any length below 1e150
+/// Predicts the canonical fields of a direction's normal; they are near its code, not necessarily equal. The same on
+/// every machine: only +, -, x, / and square root of doubles are used. For vectors of length zero the result is
+/// unspecified but valid.
+/// @param n length below 1e150
 inline NormalFields predict_normal_fields(NormalEncoding encoding, DVec3 n) {
   const NormalFormat& format = format_of(encoding);
   const auto x_last = static_cast<int32_t>(format.x_codes) - 1, y_last = static_cast<int32_t>(format.y_codes) - 1;
-  /// Of -1 .. 1.
+  /// Code of a coordinate in -1 .. 1.
   const auto code = [](double t, int32_t last) {
     return std::clamp(static_cast<int32_t>((t + 1.0) * 0.5 * last + 0.5), 0, last);
   };
@@ -29,7 +30,7 @@ inline NormalFields predict_normal_fields(NormalEncoding encoding, DVec3 n) {
   int axis = 0;
   for (int other = 1; other < 3; ++other)
     if (std::abs(n[other]) > std::abs(n[axis])) axis = other;
-  // decode_normal()'s cubic inverted by a series that is right to a few thousandths, and one step of Newton.
+  // Inverts the cubic of decode_normal(): a series with errors of a few thousandths, then one Newton step.
   const auto unwarp = [](double x) {
     const double square = x * x, t = x * (1.2752 + square * (0.16 + square * 0.23));
     return t - (t * (kAxisSlope + kAxisCubic * t * t) - x) / (kAxisSlope + 3.0 * kAxisCubic * t * t);

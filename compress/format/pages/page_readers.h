@@ -5,18 +5,18 @@
 #include <span>
 #include <vector>
 
+#include "compress/format/cluster/position_grid.h"
 #include "compress/format/layout/bit_stream.h"
 #include "compress/format/pages/page_contexts.h"
-#include "compress/format/cluster/position_grid.h"
 #include "compress/format/pages/rans.h"
 
 namespace packtrace {
 
-/// Bit fields in order, never read outside their bytes: fields that are missing are zero, and whole() says so.
+/// Reads bit fields in order and never outside their bytes. Missing fields read as zero; whole() reports them.
 class FieldReader {
 public:
   FieldReader() = default;
-  /// @param bytes 8 readable bytes follow them
+  /// @param bytes followed by 8 readable bytes
   explicit FieldReader(std::span<const uint8_t> bytes) : bytes_(bytes.data()), end_(8 * uint64_t{bytes.size()}) {}
 
   uint64_t take(uint32_t bits) {
@@ -27,7 +27,7 @@ public:
     at_ += bits;
     return read_bits(bytes_, at_ - bits, bits);
   }
-  /// Whether nothing was missing and less than a byte is left.
+  /// Whether no field was missing and less than a byte is left.
   bool whole() const { return !missing_ && end_ - at_ < 8; }
 
 private:
@@ -36,13 +36,13 @@ private:
   bool missing_ = false;
 };
 
-/// Coder (page_model.h) of pages of codec `small`.
+/// The Coder (page_model.h) that decodes pages with codec `small`.
 class SmallPageReader {
 public:
   static constexpr bool kDecodes = true;
 
-  /// @param fields bit fields; 8 readable bytes follow them
-  /// @param words of a RansWriter
+  /// @param fields bit fields, followed by 8 readable bytes
+  /// @param words output of a RansWriter
   void begin(std::span<const uint8_t> fields, std::span<const uint8_t> words) {
     models_.fill(NibbleModel());
     fields_ = FieldReader(fields);

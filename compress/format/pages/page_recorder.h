@@ -6,9 +6,9 @@
 #include <unordered_map>
 #include <vector>
 
+#include "compress/format/cluster/position_grid.h"
 #include "compress/format/layout/bit_stream.h"
 #include "compress/format/pages/page_contexts.h"
-#include "compress/format/cluster/position_grid.h"
 
 namespace packtrace {
 

@@ -15,12 +15,12 @@
 
 namespace packtrace {
 
-/// Frequencies of all 16 symbols add up to 2^kProbabilityBits.
+/// The frequencies of the 16 symbols add up to 2^kProbabilityBits.
 inline constexpr uint32_t kProbabilityBits = 15;
 inline constexpr uint32_t kNibbleSymbols = 16;
 
-/// An adaptive distribution over 16 symbols: cumulative frequencies that move towards each coded symbol, quickly at
-/// first. No frequency ever falls to zero. Encoder and decoder keep equal copies.
+/// An adaptive distribution over 16 symbols. The cumulative frequencies move towards each coded symbol, at a rate that
+/// decreases with the number of symbols. No frequency ever reaches zero. Encoder and decoder keep equal copies.
 /// Source: Giesen, "Mixing discrete probability distributions", fgiesen.wordpress.com (2015).
 class NibbleModel {
 public:
@@ -31,7 +31,7 @@ public:
   uint32_t below(uint32_t symbol) const { return below_[symbol]; }
   uint32_t frequency(uint32_t symbol) const { return uint32_t{below_[symbol + 1]} - below_[symbol]; }
 
-  /// The symbol with below(symbol) <= slot < below(symbol + 1).
+  /// Returns the symbol with below(symbol) <= slot < below(symbol + 1).
   /// @param slot < 2^kProbabilityBits
   uint32_t find(uint32_t slot) const {
 #if defined(__SSE2__)
@@ -69,8 +69,8 @@ private:
 #endif
 
   using Targets = std::array<std::array<int16_t, kNibbleSymbols>, kNibbleSymbols>;
-  /// Cumulative frequencies where one symbol takes all but 1 of each other: consecutive ones differ by 1 at least, so
-  /// that moving a fraction of the way keeps every frequency positive.
+  /// Target cumulative frequencies per symbol: every other symbol has frequency 1. Consecutive values differ by at
+  /// least 1, so that moving a fraction of the way keeps every frequency positive.
   static constexpr Targets kTargets = [] {
     Targets targets{};
     for (uint32_t symbol = 0; symbol < kNibbleSymbols; ++symbol)
@@ -78,7 +78,7 @@ private:
         targets[symbol][i] = static_cast<int16_t>(i <= symbol ? i : (1u << kProbabilityBits) - kNibbleSymbols + i);
     return targets;
   }();
-  /// Shift of the step after that many symbols.
+  /// Right shift that scales the step, by number of symbols coded before.
   static constexpr std::array<uint8_t, 96> kRates = [] {
     std::array<uint8_t, 96> rates{};
     for (size_t i = 0; i < rates.size(); ++i)
@@ -91,8 +91,9 @@ private:
   uint16_t count_ = 0;
 };
 
-/// Reads what RansWriter wrote: symbols by two interleaved range-variant asymmetric numeral system states, renormalised
-/// in 16-bit words. Never reads outside its bytes: words that are missing are zero, and whole() says so.
+/// Reads the output of RansWriter: symbols coded by two interleaved states of a range-variant asymmetric numeral
+/// system, renormalised in 16-bit words. Never reads outside its bytes: missing words read as zero, and whole() reports
+/// them.
 /// Source: Duda, "Asymmetric numeral systems" (2013); Giesen, "Interleaved entropy coders" (2014).
 class RansReader {
 public:
@@ -114,7 +115,7 @@ public:
     return symbol;
   }
 
-  /// Whether everything was read, nothing was missing, and the states are where the writer began.
+  /// Whether all bytes were read, none were missing, and the states are the writer's initial ones.
   bool whole() const { return at_ == end_ && !missing_ && state_[0] == kLowest && state_[1] == kLowest; }
 
   static constexpr uint32_t kLowest = 1u << 16; ///< states are in [kLowest, 2^32)

@@ -14,7 +14,7 @@ struct FreeZstd {
 using ZstdEncoder = std::unique_ptr<ZSTD_CCtx, FreeZstd>;
 using ZstdDecoder = std::unique_ptr<ZSTD_DCtx, FreeZstd>;
 
-/// Never null. Throws std::bad_alloc where zstd cannot allocate it.
+/// Returns a context, never null. Throws std::bad_alloc if zstd cannot allocate it.
 inline ZstdEncoder make_zstd_encoder() {
   ZstdEncoder context(ZSTD_createCCtx());
   if (!context) throw std::bad_alloc();

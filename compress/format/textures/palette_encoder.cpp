@@ -120,7 +120,7 @@ void relax(const std::vector<Bin>& bins, std::vector<std::array<double, 3>>& col
 }
 
 /// Returns all colours of the texture, sorted; empty if there are more than 256.
-std::vector<Rgb8> few_colours(const AlbedoTexture& texture) {
+std::vector<Rgb8> all_colours_if_few(const AlbedoTexture& texture) {
   std::vector<Rgb8> colours;
   for (size_t i = 0; i < texture.rgb.size(); i += 3) {
     const Rgb8 colour{texture.rgb[i], texture.rgb[i + 1], texture.rgb[i + 2]};
@@ -133,7 +133,7 @@ std::vector<Rgb8> few_colours(const AlbedoTexture& texture) {
 }
 
 std::vector<Rgb8> choose_palette(const AlbedoTexture& texture) {
-  std::vector<Rgb8> palette = few_colours(texture);
+  std::vector<Rgb8> palette = all_colours_if_few(texture);
   if (!palette.empty()) return palette;
   std::vector<Bin> bins = fill_bins(texture);
   std::vector<std::array<double, 3>> colours = cut(bins);

@@ -7,7 +7,7 @@
 namespace packtrace {
 namespace {
 
-/// Channels of 5, 6 and 5 bits, red highest; their bits repeated to fill 8.
+/// Expands channels of 5, 6 and 5 bits, red highest, to 8 bits by repeating their bits.
 Rgb8 from_565(uint16_t c) {
   const uint32_t r = c >> 11, g = (c >> 5) & 63u, b = c & 31u;
   return {static_cast<uint8_t>((r << 3) | (r >> 2)), static_cast<uint8_t>((g << 2) | (g >> 4)),
@@ -30,7 +30,7 @@ Rgb8 decode_bc1(std::span<const uint8_t> block, uint32_t x, uint32_t y) {
   return bc1_colours(endpoint(0), endpoint(2))[index];
 }
 
-/// Wraps a texel's coordinate, or nothing where the image ends.
+/// Wraps a texel coordinate; nothing if it lies outside a black-wrapped texture.
 std::optional<uint32_t> wrapped(int64_t i, uint32_t size, WrapMode wrap) {
   const int64_t n = size;
   switch (wrap) {
@@ -111,9 +111,9 @@ Rgb8 TextureView::texel(uint32_t x, uint32_t y) const {
 Vec3 TextureView::sample(Vec2 uv) const {
   const double s = static_cast<double>(uv.x) * uv_scale.x + uv_offset.x;
   const double t = static_cast<double>(uv.y) * uv_scale.y + uv_offset.y;
-  // Texel centres are at (i + 1/2) / size; t runs up while rows run down.
+  // Texel centres are at (i + 1/2) / size. t points up, rows run down.
   double x = s * width - 0.5, y = (1.0 - t) * height - 0.5;
-  constexpr double kLimit = 9.0e15; // beyond it neighbouring texels are not distinguishable in double
+  constexpr double kLimit = 9.0e15; // neighbouring texels beyond this are equal in double
   if (!(std::abs(x) < kLimit && std::abs(y) < kLimit)) x = y = 0.0;
   const auto x0 = static_cast<int64_t>(std::floor(x)), y0 = static_cast<int64_t>(std::floor(y));
   const auto right = static_cast<float>(x - static_cast<double>(x0)),

@@ -12,25 +12,25 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kMaxBins = 64;
-constexpr uint32_t kParallelCount = 2048; // smaller subtrees are built by one thread
+constexpr uint32_t kParallelCount = 2048; // smaller subtrees are built serially
 
 TreeBox empty_box() {
   constexpr float kInf = std::numeric_limits<float>::infinity();
   return {{kInf, kInf, kInf}, {-kInf, -kInf, -kInf}};
 }
 
-/// Twice the centre along an axis.
+/// Twice the centre of a box along an axis.
 double centre(const TreeBox& box, size_t axis) { return double{box.lo[axis]} + box.hi[axis]; }
 
 struct Split {
   double cost = std::numeric_limits<double>::infinity();
   size_t axis = 0;
-  uint32_t bin = 0; ///< the first one on the right
+  uint32_t bin = 0; ///< the first bin on the right
 };
 
-/// Which bin a centre lies in.
+/// Maps centres along one axis to bins.
 struct BinAxis {
-  double low = 0.0, scale = 0.0; ///< scale is 0 where all centres are equal
+  double low = 0.0, scale = 0.0; ///< scale is 0 if all centres are equal
   uint32_t bins = 0;
 
   uint32_t operator()(double place) const {
@@ -39,13 +39,13 @@ struct BinAxis {
   }
 };
 
-/// Splits runs of boxes.
+/// Splits runs of boxes in two.
 class Splitter {
 public:
-  /// @param unit boxes that cost as much as one, once there is one: a leaf
+  /// @param unit number of boxes per leaf: any count up to it costs as much as one leaf
   explicit Splitter(std::span<const TreeBox> boxes, uint32_t unit = 1) : boxes_(boxes), unit_(unit) {}
 
-  /// The boxes' centres' box, and what holds them all.
+  /// Returns the bounds of the boxes' centres. `whole` receives the bounds of the boxes.
   TreeBox measure(std::span<const uint32_t> order, TreeBox& whole) const {
     whole = empty_box();
     TreeBox centres = empty_box();
@@ -60,11 +60,11 @@ public:
     return centres;
   }
 
-  /// Sorts the boxes to the left and right; how many are on the left, 1 .. count - 1.
+  /// Partitions the boxes into left and right; returns the number on the left, 1 .. count - 1.
   uint32_t split(std::span<uint32_t> order, const TreeBox& centres, uint32_t levels) const {
     const auto count = static_cast<uint32_t>(order.size());
-    // A subtree of k levels holds up to 2^(k - 1) boxes. Unless all but one of them fit on one side, only halving ends
-    // in time.
+    // A subtree of k levels holds up to 2^(k - 1) boxes. If a child with levels - 1 levels might not hold all boxes but
+    // one, only halving is sure to keep the depth limit.
     const bool must_halve = static_cast<uint32_t>(std::bit_width(count - 1)) + 1 >= levels;
     if (!must_halve) {
       std::array<BinAxis, 3> axes;
@@ -103,7 +103,7 @@ private:
       boxes[b].extend(boxes_[i]);
       ++counts[b];
     }
-    std::array<double, kMaxBins> right_cost; // of bins b and above, b > 0
+    std::array<double, kMaxBins> right_cost; // of bins b and above, for b > 0
     TreeBox box = empty_box();
     for (uint32_t b = bins.bins, n = 0; b-- > 1;) {
       if (counts[b] > 0) box.extend(boxes[b]), n += counts[b];
@@ -118,7 +118,7 @@ private:
     }
   }
 
-  /// Sorts the half with the lower centres along the longest axis to the left.
+  /// Moves the half with the lower centres along the longest axis to the left.
   void halve(std::span<uint32_t> order, const TreeBox& centres) const {
     size_t axis = 0;
     for (size_t a = 1; a < 3; ++a)
@@ -138,7 +138,7 @@ class Builder {
 public:
   Builder(std::span<const TreeBox> boxes, BoxTree& tree) : splitter_(boxes), tree_(tree) {}
 
-  /// Builds the subtree at `node` over order[first .. first + count), of at most `levels` levels.
+  /// Builds the subtree at `node` over order[first .. first + count), with at most `levels` levels.
   void build(uint32_t node, uint32_t first, uint32_t count, uint32_t levels) {
     BoxTreeNode& out = tree_.nodes[node];
     out.first = first, out.count = count, out.right = 0;

@@ -28,7 +28,7 @@ public:
   }
 
 private:
-  /// The children of `node` have been chosen.
+  /// The children of `node` must have been processed.
   void choose(RunNode& node) const {
     const bool may_be_leaf = node.count <= costs_.max_leaf_triangles;
     const auto batches = static_cast<float>((node.count + kWidth - 1) / kWidth);
@@ -44,9 +44,9 @@ private:
     node.node_cost = node.is_node ? as_node : as_nodes;
   }
 
-  /// The best i leaves of both sides together, for all i side by side: k on the left, i - k on the right.
+  /// Computes leaf_cost for all i at once: the least cost over k leaves on the left and i - k on the right.
   static void join(const RunNode& left, const RunNode& right, RunNode& out) {
-    alignas(16) float of_right[2 * kWidth]; // [kWidth + i - 1]: as i leaves
+    alignas(16) float of_right[2 * kWidth]; // [kWidth + i - 1]: cost of the right side as at most i leaves
     std::fill_n(of_right, kWidth, kInfinity);
     std::copy_n(right.leaf_cost, kWidth, of_right + kWidth);
     Float4 low = load(out.leaf_cost), high = load(out.leaf_cost + 4);
@@ -67,7 +67,8 @@ private:
   }
   static Float4 min_of(Float4 a, Float4 b) { return a < b ? a : b; }
 
-  /// Leaves of the left child in the best `slots` of both; 0: one leaf is as good.
+  /// Number of leaves on the left in the cheapest division of both sides into `slots` leaves; 0 if one leaf costs the
+  /// same.
   uint32_t leaves_on_left(const RunNode& node, uint32_t slots) const {
     if (node.count == 1 || node.leaf_cost[slots - 1] == node.leaf_cost[0]) return 0;
     const RunNode &left = (&node)[1], &right = nodes_[node.right];
@@ -88,7 +89,7 @@ private:
 
   std::span<RunNode> nodes_;
   const TreeCosts& costs_;
-  const float extra_; ///< of one more node
+  const float extra_; ///< cost of one more node
   const float node_ = static_cast<float>(costs_.node), leaf_ = static_cast<float>(costs_.leaf),
               batch_ = static_cast<float>(costs_.batch);
 };

@@ -14,7 +14,7 @@ using Int4 = int32_t __attribute__((vector_size(16)));
 
 inline Float4 max_of(Float4 a, Float4 b) { return a > b ? a : b; }
 
-/// A box of four lanes, so that one instruction extends a side: low ends negated, so that all of it are maxima.
+/// A box in SIMD lanes. The low end is negated, so that one maximum per vector extends the box.
 struct FloatBox {
   Float4 minus_lo, hi; ///< the fourth lanes are 0
 
@@ -32,21 +32,22 @@ struct FloatBox {
   }
 };
 
-/// Half the surface of a box, in the first lane.
+/// Half the surface area of a box, in the first lane.
 inline Float4 half_area(const FloatBox& box) {
   const Float4 size = box.hi + box.minus_lo;
   const Float4 faces = size * __builtin_shufflevector(size, size, 1, 2, 0, 3);
   return faces + __builtin_shufflevector(faces, faces, 1, 0, 3, 2) + __builtin_shufflevector(faces, faces, 2, 3, 0, 1);
 }
 
-/// The first lane. Through memory, as GCC 12 reads lanes of vectors wrongly under sanitizers.
+/// Returns the first lane. Goes through memory because GCC 12 reads vector lanes wrongly under sanitizers.
 inline float first_lane(const Float4& lanes) {
   float first;
   std::memcpy(&first, &lanes, sizeof first);
   return first;
 }
 
-/// Where a run of `count` triangles is best split: the least cost, of those the nearest to the middle.
+/// Best split of a run of `count` triangles: the split with the least cost; of equal costs the one nearest to the
+/// middle.
 struct RunSplit {
   float cost;
   uint32_t left;
@@ -59,19 +60,20 @@ struct RunSplit {
   }
 };
 
-/// A node of a binary tree over runs of a cluster's triangles, in preorder: the left child is the next node.
+/// A node of a binary tree over runs of a cluster's triangles, stored in preorder: the left child is the next node.
 struct RunNode {
-  float area;                                     ///< half the surface of its box
-  uint8_t first, count, right;                    ///< triangles; the right child's number
-  bool is_node;                                   ///< rather than nodes on both sides
-  float node_cost;                                ///< as one node or several
-  alignas(16) float leaf_cost[baked::kNodeWidth]; ///< as i leaves at most, in [i - 1]
+  float area;                                     ///< half the surface area of its box
+  uint8_t first, count, right;                    ///< run of triangles; number of the right child
+  bool is_node;                                   ///< cheaper as one PackedNode than split into nodes of both children
+  float node_cost;                                ///< least cost of the run as one or several nodes
+  alignas(16) float leaf_cost[baked::kNodeWidth]; ///< [i - 1]: least cost of the run as at most i leaves
 };
 
-/// Cuts the triangles below nodes[0] into leaves, and those into nodes, at the least cost that cuts of this tree allow.
-/// @param nodes with area, first, count and right; the rest is set
+/// Cuts the triangles below nodes[0] into leaves, and groups the leaves into nodes, at the least cost among the cuts of
+/// this tree.
+/// @param nodes input: area, first, count and right; the function sets the other members
 /// @param typical_area see find_leaf_nodes()
-/// @param out appended to
+/// @param out the nodes are appended to it
 void choose_leaf_nodes(std::span<RunNode> nodes, const TreeCosts& costs, double typical_area,
                        std::vector<LeafNode>& out);
 

@@ -9,7 +9,7 @@
 namespace packtrace {
 namespace {
 
-/// The tree over triangles in their order.
+/// Binary tree over runs of triangles in stream order, split by the surface area heuristic.
 class RunTree {
 public:
   explicit RunTree(std::span<const TreeGridBox> boxes) {

@@ -23,7 +23,8 @@ void LeafRestorer::place_vertices(const baked::GeometryRecord& geometry, const b
   const auto [x, y, z] = cluster.record().position_bits;
   if (const int32_t doublings = geometry.step_exponent - tree.step_exponent;
       doublings >= 0 && uint32_t{x} + y + z <= kMaxFieldBits) {
-    // The whole box lies within the coordinates, so that fields have less than 31 bits, or none and any shift will do.
+    // The whole box lies within the tree's coordinates, so a field has less than 31 bits after the shift. For fields of
+    // zero bits any shift works.
     const LatticePoint lo = box_of_record(geometry, cluster.record()).lo;
     const auto base = [&](size_t axis) { return static_cast<int32_t>(map.floor(lo[axis], axis)); };
     kernels_.place_vertices({cluster.bits(),
@@ -66,15 +67,16 @@ node_kernels::LeafCorners LeafRestorer::corners_of(uint32_t begin, uint32_t end)
   const uint32_t word = begin >> 6, bit = begin & 63u;
   if (((restart_[word] >> bit) & 1u) != 0) return {first, last, {first, first}};
 
-  // One kept corner is the one before. The other was last replaced by the last turn the other way in this strip, by
-  // the corner before that turn's; without such a turn it is still the strip's own.
+  // One kept corner is the corner added before. The other was last replaced at the last turn in the other direction in
+  // this strip, by the corner added before that turn. Without such a turn it is still a corner of the strip's first
+  // triangle.
   const bool is_left = ((left_[word] >> bit) & 1u) != 0;
   const uint64_t flip = is_left ? ~uint64_t{0} : 0, up_to = ~uint64_t{0} >> (63 - bit);
   const uint64_t here = (left_[word] ^ flip) & up_to, below = word != 0 ? left_[0] ^ flip : 0;
   const int32_t turn =
       here != 0 ? static_cast<int32_t>(64 * word + 63) - std::countl_zero(here) : 63 - std::countl_zero(below);
   const uint32_t strip_begin = strip_begins_[strips - 1];
-  const uint32_t newest = strip_begin + 2 * strips; // of the strip's first triangle
+  const uint32_t newest = strip_begin + 2 * strips; // last corner of the strip's first triangle
   const uint32_t kept = turn > static_cast<int32_t>(strip_begin)
                             ? newest + (static_cast<uint32_t>(turn) - strip_begin) - 1
                             : newest - (is_left ? 2 : 1);

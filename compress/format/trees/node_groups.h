@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "compress/format/trees/leaf_nodes.h"
 #include "compress/format/cluster/position_grid.h"
+#include "compress/format/trees/leaf_nodes.h"
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {

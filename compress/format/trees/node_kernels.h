@@ -2,27 +2,28 @@
 
 #include <cstdint>
 
-/// What making the nodes of a file over takes most time for, by the instructions of this processor. The results are the
-/// same bits for all of them. Arrays of plain types only: nothing of another header may be compiled for AVX2.
+/// SIMD kernels for the most expensive parts of restoring a file's nodes, one set per instruction set. All sets return
+/// the same bits. The interface uses arrays of plain types only, because no inline function of another header may be
+/// compiled for AVX2.
 namespace packtrace::node_kernels {
 
-/// A box of tree coordinates: both halves become smaller where the box grows.
+/// A box of tree coordinates. Growing the box makes all lanes smaller, so extending it is a minimum.
 struct alignas(32) Box {
   int32_t lo[4];       ///< x, y, z, 0
   int32_t minus_hi[4]; ///< x, y, z, 0
 };
 
-/// A cluster's positions on the way into a tree's grid: coordinate = base + field * 2^shift.
+/// Position fields of a cluster, and their map to a tree's grid: coordinate = base + field * 2^shift.
 struct VertexFields {
   const uint8_t* bits; ///< 8 bytes behind the last field are readable
   uint64_t first_bit;
-  uint32_t count;     ///< vertices
-  uint32_t widths[3]; ///< at most 57 in all
+  uint32_t count;     ///< number of vertices
+  uint32_t widths[3]; ///< sum at most 57
   int32_t base[3];    ///< modulo 2^32
   uint32_t shift;     ///< 0..31; field * 2^shift < 2^31
 };
 
-/// The corner list of a cluster (IndexLayout) as it lies in its payload.
+/// The corner list of a cluster (IndexLayout) in its payload.
 struct CornerBits {
   const uint8_t* bits; ///< 8 bytes behind the last field are readable
   uint32_t fresh_bit, explicit_bit;
@@ -31,31 +32,34 @@ struct CornerBits {
   uint32_t index_bits; ///< 0..8
 };
 
-/// Corners that a leaf's triangles bring, [begin, end), and two more: those that its first triangle keeps, or any of
-/// its own.
+/// Corners of a leaf: the corners [begin, end) that its triangles add, and the two corners that its first triangle
+/// keeps. If the first triangle begins a strip, `kept` repeats one of its own corners.
 struct LeafCorners {
   uint16_t begin, end;
   uint16_t kept[2];
 };
 
-/// Of a node, as PackedNode has them; a byte per child, the first one's lowest.
+/// Boxes of a PackedNode; one byte per child, the first child in the lowest byte.
 struct NodeBoxes {
   int32_t origin[3];
   uint32_t exponents;
   uint64_t lo[3], hi[3];
 };
 
-inline constexpr uint32_t kSpareIds = 32; ///< so many bytes behind the corners may be overwritten
+inline constexpr uint32_t kSpareIds = 32; ///< number of bytes behind the corners that kernels may overwrite
 
-/// A box for each vertex, without extent.
+/// Writes the box of each vertex. The vertices are grid points, so the boxes have no extent.
 using PlaceVertices = void (*)(const VertexFields& fields, Box* boxes);
-/// The vertex of each corner. Stays within its memory whatever the bits are, if vertex_count of them are fresh.
+/// Writes the vertex of each corner. Stays within its memory for any bits, provided that exactly vertex_count are
+/// fresh.
 using NumberCorners = void (*)(const CornerBits& corners, uint8_t* vertices);
-/// @param vertices by corner; kSpareIds more bytes are readable @param boxes by vertex
+/// Writes the box of each leaf.
+/// @param vertices by corner; kSpareIds more bytes are readable
+/// @param boxes by vertex
 using BoxLeaves = void (*)(const Box* boxes, const uint8_t* vertices, const LeafCorners* leaves, uint32_t count,
                            Box* out);
-/// A node's boxes from those of 1..8 children: the smallest exponents, each box rounded outwards.
-/// @param whole the box of all
+/// Packs a node's boxes from the boxes of 1..8 children: the smallest exponents that fit, each box rounded outwards.
+/// @param whole receives the box of all children
 using PackChildren = void (*)(const Box* children, uint32_t count, NodeBoxes& node, Box& whole);
 
 struct Kernels {
@@ -68,7 +72,7 @@ struct Kernels {
 extern const Kernels kPortable;
 extern const Kernels kAvx2;
 
-/// Those of this processor.
+/// Returns the fastest set that this processor supports.
 const Kernels& kernels();
 
 } // namespace packtrace::node_kernels

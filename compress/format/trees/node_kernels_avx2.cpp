@@ -1,4 +1,5 @@
-// Compiled for AVX2: nothing here may be inline in a header that others use, or they could end up calling it.
+// Compiled for AVX2. Code here must not use inline functions of shared headers: the linker might keep the AVX2 version
+// for callers on processors without AVX2.
 #if defined(__x86_64__)
 
 #include "compress/format/trees/node_kernels_body.h"

@@ -1,4 +1,5 @@
-// The kernels of node_kernels.h, for each instruction set. No other header's functions may be compiled for AVX2.
+// Kernels of node_kernels.h, compiled once per instruction set. Code here must not use inline functions of other
+// headers, because they would be compiled for AVX2.
 
 #include "compress/format/trees/node_kernels.h"
 
@@ -22,9 +23,9 @@ using Long2 = uint64_t __attribute__((vector_size(16)));
   return word;
 }
 
-/// The byte of `from` that each byte of `which` names, modulo 16.
+/// Returns, for each byte of `which`, the byte of `from` at that index modulo 16.
 [[gnu::always_inline]] inline Bytes16 pick_bytes(const Bytes16& from, const Bytes16& which) {
-#ifdef __clang__ // shuffles by constants only
+#ifdef __clang__ // clang shuffles by constants only
   uint8_t source[16], picked[16];
   __builtin_memcpy(source, &from, sizeof source);
   __builtin_memcpy(picked, &which, sizeof picked);
@@ -44,7 +45,7 @@ void place_vertices(const VertexFields& fields, Box* boxes) {
   const Uint8 flip = {0, 0, 0, 0, ~0u, ~0u, ~0u, 0}; // -v = ~v + 1
   const auto base = [&](int axis) { return static_cast<uint32_t>(b[axis]); };
   const Uint8 add = {base(0), base(1), base(2), 0, 1 - base(0), 1 - base(1), 1 - base(2), 0};
-  Long4 shifts[8]; // by the field's bit in its byte; below 64 even for fields of no bits
+  Long4 shifts[8]; // by the field's bit offset in its byte; below 64 even for fields of zero width
   for (uint64_t i = 0; i < 8; ++i) shifts[i] = Long4{i, y == 0 ? 0 : i + x, z == 0 ? 0 : i + x + y, 0};
   const uint8_t* const bits = fields.bits;
   const uint64_t stride = x + y + z;
@@ -59,7 +60,8 @@ void place_vertices(const VertexFields& fields, Box* boxes) {
   }
 }
 
-/// By a byte of bits: how many bits below each are set, and whether it is; in all.
+/// By byte value: for each bit the number of set bits below it, for each bit 255 if it is set, and the number of set
+/// bits.
 struct ByteTable {
   uint64_t below[256], set[256];
   uint8_t count[256];
@@ -78,7 +80,7 @@ struct ByteTable {
 };
 constexpr ByteTable kBytes;
 
-/// Fields of 0..8 bits as a byte each, four at a time.
+/// Expands fields of 0..8 bits to one byte each, four per step.
 [[gnu::always_inline]] inline void spread_fields(const uint8_t* bits, uint64_t at, uint32_t width, uint32_t count,
                                                  uint8_t* out) {
   const uint64_t all = (uint64_t{1} << (4 * width)) - 1, pair = (uint64_t{1} << (2 * width)) - 1;
@@ -93,11 +95,11 @@ constexpr ByteTable kBytes;
 }
 
 void number_corners(const CornerBits& corners, uint8_t* vertices) {
-  uint8_t named[384 + kSpareIds];           // 16 readable behind any
-  const uint8_t* const bits = corners.bits; // bytes that are written may lie anywhere, as far as the compiler knows
+  uint8_t named[384 + kSpareIds];           // 16 bytes are readable behind any entry
+  const uint8_t* const bits = corners.bits; // local copies: byte stores might alias the struct
   const uint32_t corner_count = corners.corner_count, fresh_bit = corners.fresh_bit;
   spread_fields(bits, corners.explicit_bit, corners.index_bits, corner_count - corners.vertex_count, named);
-  constexpr uint64_t kIota = 0x0706050403020100, kEach = 0x0101010101010101;
+  constexpr uint64_t kIota = 0x0706050403020100, kByteOnes = 0x0101010101010101;
   uint32_t used = 0;
   for (uint32_t c = 0; c < corner_count; c += 8) {
     const uint32_t bit = fresh_bit + c, left = corner_count - c;
@@ -108,8 +110,8 @@ void number_corners(const CornerBits& corners, uint8_t* vertices) {
     __builtin_memcpy(&from, named + (c - used), sizeof from);
     const Bytes16 picked = pick_bytes(from, reinterpret_cast<Bytes16>(Long2{kIota - below, 0}));
     uint64_t taken;
-    __builtin_memcpy(&taken, &picked, sizeof taken); // no subscript, which GCC 12 gets wrong under its sanitizers
-    const uint64_t set = kBytes.set[byte], fresh = (below + (used & 127u) * kEach) ^ ((used & 128u) * kEach);
+    __builtin_memcpy(&taken, &picked, sizeof taken); // not a subscript, which GCC 12 miscompiles under sanitizers
+    const uint64_t set = kBytes.set[byte], fresh = (below + (used & 127u) * kByteOnes) ^ ((used & 128u) * kByteOnes);
     const uint64_t eight = (fresh & set) | (taken & ~set);
     __builtin_memcpy(vertices + c, &eight, sizeof eight);
     used += kBytes.count[byte];
@@ -121,13 +123,14 @@ void box_leaves(const Box* boxes, const uint8_t* vertices, const LeafCorners* le
     const LeafCorners& leaf = leaves[i];
     Int8 box = lanes(boxes[vertices[leaf.kept[0]]]);
     extend(box, lanes(boxes[vertices[leaf.kept[1]]]));
-    for (uint32_t c = leaf.begin; c < leaf.end; c += 8) { // eight, the first in the place of those that are not there
+    // Eight corners per step. The first corner replaces missing ones.
+    for (uint32_t c = leaf.begin; c < leaf.end; c += 8) {
       uint64_t eight = load(vertices + c);
       if (const uint32_t left = leaf.end - c; left < 8) {
         const uint64_t beyond = ~uint64_t{0} << (8 * left);
         eight = (eight & ~beyond) | (uint64_t{vertices[c]} * 0x0101010101010101 & beyond);
       }
-      Int8 other = lanes(boxes[eight & 255u]); // two minima side by side
+      Int8 other = lanes(boxes[eight & 255u]); // two independent minimum chains
       extend(box, lanes(boxes[(eight >> 8) & 255u]));
       extend(other, lanes(boxes[(eight >> 16) & 255u]));
       extend(box, lanes(boxes[(eight >> 24) & 255u]));
@@ -151,9 +154,9 @@ void pack_children(const Box* children, uint32_t count, NodeBoxes& node, Box& wh
     node.origin[axis] = whole.lo[axis];
     const auto extent = static_cast<uint32_t>(-int64_t{whole.minus_hi[axis]} - whole.lo[axis]); // < 2^31
     uint32_t exponent = extent < 256 ? 0 : 24 - static_cast<uint32_t>(__builtin_clz(extent));
-    exponent += extent > 255u << exponent ? 1 : 0; // at most 23
+    exponent += extent > 255u << exponent ? 1 : 0; // exponent is at most 23
     exponents[axis] = exponent;
-    ups[axis] = (1u << exponent) - static_cast<uint32_t>(whole.lo[axis]); // and ~minus_hi is hi - 1
+    ups[axis] = (1u << exponent) - static_cast<uint32_t>(whole.lo[axis]); // rounds up, as ~minus_hi is hi - 1
     node.exponents |= exponent << (5 * axis);
   }
   const auto down = [&](uint32_t axis) { return 0 - static_cast<uint32_t>(whole.lo[axis]); };

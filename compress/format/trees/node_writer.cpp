@@ -53,7 +53,7 @@ void set_children(uint32_t first_child, std::span<const baked::PackedNode> child
     node.children[child] = baked::kInnerChild;
     classes |= children[child].ray_classes;
   }
-  node.ray_classes = static_cast<uint8_t>(classes & (baked::kCameraBelow | baked::kOcclusionBelow));
+  node.ray_classes = static_cast<uint8_t>(classes & (baked::kVisibleToCamera | baked::kVisibleToOcclusion));
   node.first_triangle = 0;
   node.first_child = first_child;
   node.cluster = 0;

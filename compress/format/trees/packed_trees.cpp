@@ -9,47 +9,48 @@
 
 #include <tbb/parallel_for.h>
 
-#include "compress/format/trees/wide_tree.h"
 #include "compress/format/trees/node_writer.h"
 #include "compress/format/trees/stored_nodes.h"
 #include "compress/format/trees/tree_grid.h"
 #include "compress/format/trees/tree_validation.h"
+#include "compress/format/trees/wide_tree.h"
 #include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {
 
-constexpr size_t kChunkClusters = 64; // worked on by one thread
+constexpr size_t kChunkClusters = 64; // clusters per parallel task
 
-/// A cluster of a tree.
+/// A cluster to be put into a tree.
 struct TreeCluster {
   uint32_t number = 0; ///< in the cluster section
   uint32_t geometry = 0;
   uint8_t ray_classes = 0;
 };
 
-/// Nodes with leaves, and the boxes of all below.
+/// Leaf nodes and, for each, the box of all its leaves.
 struct LeafNodes {
   std::vector<baked::PackedNode> nodes;
   std::vector<TreeGridBox> boxes;
 };
 
-/// Trees of a plan last as long as a view: all moves would take ten times as long as what else their nodes take.
-constexpr ReinsertionConfig kMovesOfPlans{.passes = 1, .subtrees = 1 << 10, .search = 64};
+/// Trees over chosen clusters live only as long as one view, so reinsertion is limited: moving all subtrees would take
+/// ten times as long as the rest of building their nodes.
+constexpr ReinsertionConfig kChosenTreeReinsertion{.passes = 1, .subtrees = 1 << 10, .search = 64};
 
-/// Builds the leaf nodes of one cluster after the other.
+/// Makes the leaf nodes of one cluster after another.
 class LeafNodeBuilder {
 public:
   LeafNodeBuilder(const BakedSections& sections, const TreeCosts& costs, const baked::TreeRecord& tree,
                   double typical_area)
       : sections_(sections), costs_(costs), tree_(tree), typical_area_(typical_area) {}
 
-  /// Those that the file has, if it has any that will do.
+  /// Reuses the file's leaf nodes if they fit this tree's grid; otherwise makes new ones.
   void find(const TreeCluster& cluster, const StoredLeafNodes& stored, LeafNodes& out) {
     const size_t before = out.nodes.size();
     const std::span<const uint32_t> numbers = stored.of_cluster(cluster.number);
     if (numbers.empty()) return add(cluster, out);
-    const NodeMove move(sections_.trees[stored.tree_of_cluster(cluster.number)], tree_);
+    const NodeGridTransfer move(sections_.trees[stored.tree_of_cluster(cluster.number)], tree_);
     for (const uint32_t number : numbers) {
       out.nodes.push_back({});
       if (const std::optional<TreeGridBox> box = move.move(sections_.nodes[number], out.nodes.back())) {
@@ -120,7 +121,7 @@ public:
     return (sections_.geometries[geometry].flags & baked::kWorldSpace) != 0 && placed_[geometry] != baked::kNone;
   }
 
-  /// Sorts the geometries with clusters into those of the world's tree and those with trees of their own.
+  /// Divides the geometries with clusters into those of the world's tree and those with trees of their own.
   void find_world(std::vector<uint32_t>& world, std::vector<uint32_t>& others) const {
     const auto& geometries = sections_.geometries;
     uint32_t mantissa = 0;
@@ -149,7 +150,7 @@ public:
     return tree;
   }
 
-  /// Those that some ray can hit.
+  /// Returns the clusters that some ray can hit.
   std::vector<TreeCluster> find_clusters(std::span<const uint32_t> geometries) const {
     std::vector<TreeCluster> clusters;
     for (const uint32_t g : geometries) {
@@ -158,7 +159,7 @@ public:
       for (uint32_t c = 0; c < geometry.class_clusters.size(); ++c) {
         const uint8_t classes = ray_classes_of(c);
         const uint32_t end = next + geometry.class_clusters[c];
-        if ((classes & (baked::kCameraBelow | baked::kOcclusionBelow)) != 0)
+        if ((classes & (baked::kVisibleToCamera | baked::kVisibleToOcclusion)) != 0)
           for (uint32_t i = next; i < end; ++i) clusters.push_back({i, g, classes});
         next = end;
       }
@@ -166,10 +167,10 @@ public:
     return clusters;
   }
 
-  /// Of the nodes with leaves of a tree: what those of nine in ten clusters stay below. One for all, so that nodes are
-  /// spent where they save most; the few clusters of large triangles are cut the finest.
+  /// Returns the 90th percentile of the typical leaf node area over all clusters. One value serves the whole tree, so
+  /// that nodes are spent where they save most: the few clusters with large triangles are cut most finely.
   double find_typical_area(std::span<const TreeCluster> clusters, const baked::TreeRecord& tree) const {
-    constexpr double kOfRecord = 0.5; // boxes of records have about twice the area
+    constexpr double kRecordBoxAreaFactor = 0.5; // boxes from records have about twice the area of exact boxes
     std::vector<double> areas;
     areas.reserve(clusters.size());
     for (const TreeCluster& of : clusters) {
@@ -181,7 +182,7 @@ public:
         size[axis] =
             std::ldexp(static_cast<double>(box.hi[axis] - box.lo[axis]), geometry.step_exponent - tree.step_exponent);
       const double half_area = size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
-      areas.push_back(typical_node_area(kOfRecord * half_area, cluster.triangle_count));
+      areas.push_back(typical_node_area(kRecordBoxAreaFactor * half_area, cluster.triangle_count));
     }
     if (areas.empty()) return 0.0;
     const auto at = areas.begin() + static_cast<ptrdiff_t>((areas.size() - 1) * 9 / 10);
@@ -189,7 +190,7 @@ public:
     return *at;
   }
 
-  /// @param stored takes what it has from there
+  /// @param stored leaf nodes to reuse where possible; null: make all
   LeafNodes build_leaf_nodes(std::span<const TreeCluster> clusters, const baked::TreeRecord& tree, double typical_area,
                              const StoredLeafNodes* stored = nullptr) const {
     const size_t chunks = (clusters.size() + kChunkClusters - 1) / kChunkClusters;
@@ -238,7 +239,7 @@ public:
 private:
   const BakedSections& sections_;
   const TreeCosts& costs_;
-  std::vector<uint32_t> placed_; // by geometry: sole_identity_instances()
+  std::vector<uint32_t> placed_; // by geometry: its sole_identity_instances()
 };
 
 } // namespace
@@ -248,14 +249,14 @@ PackedTrees build_packed_trees(const BakedSections& sections, const TreeCosts& c
 }
 
 struct ChosenTreeBuilder::Tables {
-  /// The nodes with leaves of one grid's clusters: of the world, or of one geometry and its levels.
+  /// Leaf nodes of all clusters in one grid: the world's, or that of one geometry and its LOD levels.
   struct Grid {
     baked::TreeRecord record{};
-    std::vector<TreeCluster> clusters; ///< those of any choice
+    std::vector<TreeCluster> clusters; ///< clusters that some choice contains
     LeafNodes leaves;
   };
   struct Run {
-    uint32_t first = 0, count = 0; ///< of its grid's leaves
+    uint32_t first = 0, count = 0; ///< range in the leaves of its grid
   };
 
   const BakedSections& sections;
@@ -271,7 +272,7 @@ struct ChosenTreeBuilder::Tables {
     return count;
   }
 
-  /// The tree of the file that holds these clusters and no others, in another place; none if there is no such tree.
+  /// Returns the stored tree that holds exactly these clusters, translated to their grid; nothing if there is none.
   std::optional<TreeBuilder::Tree> stored_tree(size_t tree) const {
     uint32_t number = baked::kNone;
     uint64_t count = 0;
@@ -288,7 +289,7 @@ struct ChosenTreeBuilder::Tables {
     out.record = grids[grid_of[tree]].record;
     out.record.node_count = from.node_count, out.record.depth = from.depth;
     out.nodes.resize(from.node_count);
-    const NodeMove move(from, out.record);
+    const NodeGridTransfer move(from, out.record);
     if (!move.exact()) return std::nullopt;
     for (uint32_t i = 0; i < from.node_count; ++i)
       if (!move.move(sections.nodes[static_cast<size_t>(from.first_node) + i], out.nodes[i])) return std::nullopt;
@@ -308,7 +309,7 @@ struct ChosenTreeBuilder::Tables {
       }
     TreeBuilder::Tree out;
     out.record = grid.record;
-    TreeBuilder::build_nodes(leaves, kMovesOfPlans, out);
+    TreeBuilder::build_nodes(leaves, kChosenTreeReinsertion, out);
     return out;
   }
 };
@@ -319,7 +320,7 @@ ChosenTreeBuilder::ChosenTreeBuilder(const BakedSections& sections, std::span<co
   const TreeCosts costs;
   const TreeBuilder builder(sections, costs);
   std::vector<uint8_t> wanted(sections.clusters.size(), 0);
-  std::vector<std::vector<uint32_t>> with_levels(sections.geometries.size()); // by geometry
+  std::vector<std::vector<uint32_t>> with_levels(sections.geometries.size()); // by geometry: itself and its LOD levels
   for (uint32_t g = 0; g < with_levels.size(); ++g)
     if ((sections.geometries[g].flags & baked::kLodLevel) == 0) with_levels[g].push_back(g);
   for (const baked::LodLevelRecord& level : sections.lod_levels)
@@ -353,7 +354,8 @@ ChosenTreeBuilder::ChosenTreeBuilder(const BakedSections& sections, std::span<co
     if (records.empty()) return;
     choose_tree_grid(records, sections.clusters, grid.record);
     grid.clusters = builder.find_clusters(geometries[i]);
-    // Of all clusters, so that nodes do not depend on the choice. Of stored nodes only those that do not fit are made.
+    // Computed from all clusters of the grid, so that leaf nodes do not depend on the choice. If the file stores leaf
+    // nodes, only those that do not fit the grid are made, and the value 0 is used for them.
     const double typical_area = t.stored.empty() ? builder.find_typical_area(grid.clusters, grid.record) : 0.0;
     std::erase_if(grid.clusters, [&](const TreeCluster& cluster) { return wanted[cluster.number] == 0; });
     grid.leaves = builder.build_leaf_nodes(grid.clusters, grid.record, typical_area, &t.stored);

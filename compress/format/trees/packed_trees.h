@@ -5,53 +5,54 @@
 #include <vector>
 
 #include "compress/format/file/baked_file.h"
-#include "compress/format/trees/leaf_nodes.h"
 #include "compress/format/layout/packed_node.h"
+#include "compress/format/trees/leaf_nodes.h"
 
 namespace packtrace {
 
-/// What lies in the sections of trees and nodes.
+/// Contents of the tree and node sections.
 struct PackedTrees {
-  std::vector<baked::TreeRecord> trees; ///< the world's first if there is one, then by geometry
+  std::vector<baked::TreeRecord> trees; ///< the world's tree first if there is one, then by geometry
   std::vector<baked::PackedNode> nodes; ///< of all trees in order
 };
 
-/// Builds the trees of a file: one over the clusters of all world-space geometries, one for each other geometry with
-/// clusters. World-space geometry that the world's tree cannot hold has one of its own: if it has several instances, or
-/// one that is not placed by the identity, or a step that is not 2^-k times the coarsest one with k in 0..30. Clusters
-/// that neither camera nor occlusion rays see are left out; a tree may be empty. On all threads; the result depends on
-/// the sections only.
-/// @param sections of a valid file; reads geometries, clusters, payload and instances only
-/// Throws Error(kLimitExceeded) where a tree would have more than 2^30 nodes with leaves.
+/// Builds the trees of a file: one over the clusters of all world-space geometries, and one for each other geometry
+/// with clusters. A world-space geometry gets a tree of its own if the world's tree cannot hold it: it has several
+/// instances, its instance is not placed by the identity, or its step is not 2^-k times the coarsest one with k in
+/// 0..30. Clusters that neither camera nor occlusion rays see are left out; a tree may be empty. Runs on all threads;
+/// the result depends only on the arguments.
+/// @param sections of a valid file; only geometries, clusters, payload and instances are read
+/// Throws Error(kLimitExceeded) if a tree would have more than 2^30 leaf nodes.
 PackedTrees build_packed_trees(const BakedSections& sections, const TreeCosts& costs = {});
 
-/// What one tree is wanted over: clusters of a geometry and its levels of detail, or of all world-space geometry.
+/// Clusters that one tree is built over: of a geometry and its LOD levels, or of all world-space geometry.
 struct ChosenClusters {
-  uint32_t geometry = 0;          ///< as in TreeRecord; no level of another one
+  uint32_t geometry = 0;          ///< as in TreeRecord; not an LOD level of another geometry
   std::vector<uint32_t> clusters; ///< numbers in the cluster section, ascending
 };
 
-/// Trees over choices of clusters, several of one geometry if need be. All trees of a geometry have one grid, which
-/// holds all its levels of detail. Nodes with leaves are those of the file's trees, taken into that grid, or are made
-/// once for each cluster where it has none; what is built for a tree is the nodes above them. A choice of all that a
-/// tree of the file holds is that tree, if its grid has the same step.
+/// Builds trees over chosen clusters, possibly several trees per geometry. All trees of a geometry share one grid,
+/// which holds all its LOD levels. Leaf nodes are taken from the file's trees and moved into that grid; clusters
+/// without stored leaf nodes get new ones, once per cluster. For each tree only the nodes above the leaf nodes are
+/// built. If a choice contains exactly the clusters of a stored tree whose grid has the same step, that tree is reused.
 class ChosenTreeBuilder {
 public:
-  /// Finds or makes the nodes with leaves. @param sections of a valid file; must outlive it
-  /// @param chosen must outlive it; geometry kWorldTree at most once, and only with geometries of joins_world()
+  /// Finds or makes the leaf nodes.
+  /// @param sections of a valid file; must outlive the builder
+  /// @param chosen must outlive the builder; kWorldTree occurs at most once, and only with geometries of joins_world()
   ChosenTreeBuilder(const BakedSections& sections, std::span<const ChosenClusters> chosen);
   ~ChosenTreeBuilder();
   ChosenTreeBuilder(const ChosenTreeBuilder&) = delete;
   ChosenTreeBuilder& operator=(const ChosenTreeBuilder&) = delete;
 
-  /// By geometry, levels not counted: whether it is one of those of the world's tree.
+  /// By geometry: whether it belongs to the world's tree. LOD levels do not count: their entries are 0.
   static std::vector<uint8_t> joins_world(const BakedSections& sections);
 
-  /// One tree for each choice, in order. On all threads; the result depends on sections and choices only.
-  /// Throws as build_packed_trees().
+  /// Builds one tree per choice, in order. Runs on all threads; the result depends only on sections and choices.
+  /// Throws as build_packed_trees() does.
   PackedTrees build() const;
 
-  /// Nodes with leaves below a tree; it has fewer nodes above them.
+  /// Number of leaf nodes of a tree. It has fewer nodes above them.
   uint64_t leaf_nodes(size_t tree) const;
 
 private:

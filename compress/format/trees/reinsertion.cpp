@@ -8,12 +8,13 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kNone = ~0u;
-constexpr float kLeastGain = 0x1p-24f; // of the root's area, which is known no better
+constexpr float kMinGain = 0x1p-24f; // relative to the root's area, which has about this rounding error
 
-/// A tree whose nodes have no order, so that subtrees can be moved. Nodes keep their numbers of the tree it was.
-class LooseTree {
+/// A tree with parent links and free node order, so that subtrees can be moved. Nodes keep their numbers from the
+/// BoxTree.
+class LinkedTree {
 public:
-  explicit LooseTree(const BoxTree& tree) : nodes_(tree.nodes.size()) {
+  explicit LinkedTree(const BoxTree& tree) : nodes_(tree.nodes.size()) {
     const double whole = tree.nodes[0].box.half_area();
     scale_ = whole > 0.0 ? 1.0 / whole : 0.0;
     for (uint32_t i = 0; i < nodes_.size(); ++i) {
@@ -26,7 +27,7 @@ public:
     }
   }
 
-  /// One pass. Returns whether anything was moved.
+  /// Runs one pass. Returns whether a subtree was moved.
   bool reinsert(const ReinsertionConfig& config) {
     std::vector<uint32_t> largest;
     for (uint32_t i = 1; i < nodes_.size(); ++i) largest.push_back(i);
@@ -42,13 +43,14 @@ public:
     bool moved = false;
     for (const uint32_t node : largest) {
       const uint32_t parent = nodes_[node].parent;
-      if (parent == kNone || nodes_[parent].parent == kNone) continue; // taken out, it would leave no root
+      if (parent == kNone || nodes_[parent].parent == kNone) continue; // the root and its children cannot be removed
       if (const uint32_t place = find_place(node, config.search); place != kNone) move(node, place), moved = true;
     }
     return moved;
   }
 
-  /// Puts the nodes into an order again. @param from what it was made of
+  /// Returns the nodes in preorder.
+  /// @param from the tree that this one was made from
   BoxTree ordered(const BoxTree& from) const {
     struct Waiting {
       uint32_t node, right_of;
@@ -79,7 +81,7 @@ public:
 private:
   struct Node {
     TreeBox box{};
-    float area = 0.0f; ///< of the root's
+    float area = 0.0f; ///< relative to the root's area
     uint32_t parent = kNone;
     std::array<uint32_t, 2> children{kNone, kNone};
   };
@@ -96,24 +98,25 @@ private:
     return left == node ? right : left;
   }
 
-  /// The node beside which a subtree is best put, or kNone if it stays. Looks below each sibling on the way up; what a
-  /// place gains is what the nodes that the subtree leaves lose of their areas, less what those that it comes to grow.
+  /// Returns the node beside which a subtree is best inserted, or kNone if it stays. Searches below each sibling on the
+  /// way to the root. The gain of a place is the area that the left ancestors lose, minus the area that the new
+  /// ancestors grow by.
   uint32_t find_place(uint32_t node, uint32_t budget) const {
     struct Waiting {
-      float gain; ///< of a place just above
+      float gain; ///< gain of a place directly above `node`, before the new parent's area
       uint32_t node;
     };
-    std::array<Waiting, 128> waiting; // a place that would be one too many is left out
+    std::array<Waiting, 128> waiting; // further entries are skipped
     const TreeBox& box = nodes_[node].box;
     const float own_area = nodes_[node].area;
     uint32_t best = kNone;
-    float best_gain = kLeastGain;
+    float best_gain = kMinGain;
     const auto take = [&](uint32_t place, float gain) {
       if (gain > best_gain) best = place, best_gain = gain;
     };
     uint32_t from = node, above = nodes_[node].parent;
-    float gain = nodes_[above].area;          // it goes, as its other child takes its place
-    TreeBox rest = nodes_[sibling(node)].box; // of what stays below `above`
+    float gain = nodes_[above].area;          // the parent is removed; its other child replaces it
+    TreeBox rest = nodes_[sibling(node)].box; // bounds of everything below `above` without the subtree
     while (true) {
       size_t size = 0;
       waiting[size++] = {gain, sibling(from)};
@@ -132,7 +135,7 @@ private:
       from = above, above = nodes_[above].parent;
       if (above == kNone || budget == 0) return best;
       if (from != nodes_[node].parent) {
-        // Beside all else that lies below `from`: a node of the box it has now.
+        // Candidate: beside everything else below `from`. The new parent has the current box of `from`.
         const float without = area(rest);
         take(from, gain - without);
         gain += nodes_[from].area - without;
@@ -141,7 +144,7 @@ private:
     }
   }
 
-  /// Puts a subtree beside a node that is not below it; its parent goes along.
+  /// Inserts a subtree beside a node that is not below it. The subtree's parent moves with it.
   void move(uint32_t node, uint32_t place) {
     const uint32_t parent = nodes_[node].parent, other = sibling(node), left = nodes_[parent].parent;
     replace(parent, other);
@@ -153,7 +156,7 @@ private:
     refit(nodes_[parent].parent);
   }
 
-  /// Puts `node` in the place of `old`.
+  /// Replaces `old` by `node` among the children of old's parent.
   void replace(uint32_t old, uint32_t node) {
     const uint32_t parent = nodes_[old].parent;
     auto& children = nodes_[parent].children;
@@ -161,12 +164,12 @@ private:
     nodes_[node].parent = parent;
   }
 
-  /// Those above a node whose box changed, until one stays.
+  /// Refits nodes from `node` upwards until a box does not change.
   void refit(uint32_t node) {
     while (node != kNone && fit(node)) node = nodes_[node].parent;
   }
 
-  /// Returns whether the node's box changed.
+  /// Recomputes the node's box. Returns whether it changed.
   bool fit(uint32_t node) {
     const auto [left, right] = nodes_[node].children;
     const TreeBox before = std::exchange(nodes_[node].box, joined(nodes_[left].box, nodes_[right].box));
@@ -182,7 +185,7 @@ private:
 
 void reinsert_subtrees(BoxTree& tree, const ReinsertionConfig& config) {
   if (tree.nodes.empty()) return;
-  LooseTree loose(tree);
+  LinkedTree loose(tree);
   bool changed = false;
   for (uint32_t pass = 0; pass < config.passes && loose.reinsert(config); ++pass) changed = true;
   if (changed) tree = loose.ordered(tree);

@@ -6,19 +6,19 @@
 
 namespace packtrace {
 
-/// Work that reinsert_subtrees() does at most.
+/// Limits of the work of reinsert_subtrees().
 struct ReinsertionConfig {
-  uint32_t passes = 4;         ///< over the largest subtrees; fewer where one changes nothing
-  uint32_t subtrees = 1 << 14; ///< of a pass: those with the largest boxes
-  uint32_t search = 256;       ///< places that are looked at for one of them
+  uint32_t passes = 4;         ///< stops earlier if a pass moves nothing
+  uint32_t subtrees = 1 << 14; ///< per pass: the subtrees with the largest boxes
+  uint32_t search = 256;       ///< maximum number of nodes visited to find a place for one subtree
 };
 
-/// Takes subtrees out and puts each in where the sum of the inner nodes' areas becomes the least, the largest first, so
-/// that boxes of very different size come to lie at levels of their own, which no split of all boxes does: boxes that
-/// lie one in the other become a chain, as deep as there are boxes. On the calling thread; time O(n), and for each
-/// place that a subtree is moved to, the levels above it whose boxes change. Source: Bittner, Hapala, Havran, "Fast
-/// insertion-based optimization of bounding volume hierarchies" (2013); the search is that of Meister, Bittner,
-/// "Parallel reinsertion for bounding volume hierarchy optimization" (2018).
+/// Optimises a tree by reinsertion: removes subtrees, largest first, and inserts each where the sum of the areas of
+/// inner nodes becomes least. Boxes of very different size thereby move to levels of their own, which top-down splits
+/// do not achieve. Nested boxes become a chain as deep as the number of boxes. Runs on the calling thread. Takes O(n)
+/// time, plus for each move the levels above whose boxes change.
+/// Source: Bittner, Hapala, Havran, "Fast insertion-based optimization of bounding volume hierarchies" (2013); the
+/// search is from Meister, Bittner, "Parallel reinsertion for bounding volume hierarchy optimization" (2018).
 void reinsert_subtrees(BoxTree& tree, const ReinsertionConfig& config = {});
 
 } // namespace packtrace

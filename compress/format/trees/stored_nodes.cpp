@@ -10,13 +10,13 @@
 namespace packtrace {
 namespace {
 
-/// Coordinates before they are known to fit.
+/// A box in 64-bit coordinates, before the range check.
 struct WideBox {
   std::array<int64_t, 3> lo, hi;
 };
 
-/// In the grid, or none where it cannot be that of vertices. Nothing lies beyond the largest coordinate, but boxes are
-/// rounded up a little past it.
+/// Converts to tree coordinates; nothing if the box cannot be one of vertices. Vertices lie within
+/// +-kMaxTreeCoordinate, but outward rounding may move the high end slightly beyond, so it is clamped.
 std::optional<TreeGridBox> in_coordinates(const WideBox& box) {
   TreeGridBox out;
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -56,24 +56,24 @@ std::span<const uint32_t> StoredLeafNodes::of_cluster(uint32_t cluster) const {
   return std::span(nodes_).subspan(first_[cluster], first_[cluster + 1] - first_[cluster]);
 }
 
-NodeMove::NodeMove(const baked::TreeRecord& from, const baked::TreeRecord& to)
+NodeGridTransfer::NodeGridTransfer(const baked::TreeRecord& from, const baked::TreeRecord& to)
     : possible_(from.step_mantissa == to.step_mantissa &&
                 std::abs(from.step_exponent - to.step_exponent) <= kMaxTreeStepDoublings),
       shift_(from.step_exponent - to.step_exponent), from_(from), to_(to) {}
 
-std::optional<TreeGridBox> NodeMove::move(const baked::PackedNode& node, baked::PackedNode& out) const {
+std::optional<TreeGridBox> NodeGridTransfer::move(const baked::PackedNode& node, baked::PackedNode& out) const {
   if (!possible_) return std::nullopt;
   return shift_ == 0 ? translate(node, out) : rescale(node, out);
 }
 
-std::optional<TreeGridBox> NodeMove::translate(const baked::PackedNode& node, baked::PackedNode& out) const {
+std::optional<TreeGridBox> NodeGridTransfer::translate(const baked::PackedNode& node, baked::PackedNode& out) const {
   WideBox whole;
   std::array<int64_t, 3> origin;
   for (uint32_t axis = 0; axis < 3; ++axis) {
     const uint32_t exponent = node.exponent(axis);
     origin[axis] = node.origin[axis] + (from_.origin[axis] - to_.origin[axis]);
-    if (origin[axis] < -baked::kMaxTreeCoordinate) return std::nullopt; // may lie below all boxes
-    // Slots that are not in use hold the largest and the smallest.
+    if (origin[axis] < -baked::kMaxTreeCoordinate) return std::nullopt; // the origin may lie below all boxes
+    // Unused slots have lo 255 and hi 0, so they do not change minimum and maximum.
     whole.lo[axis] = origin[axis] + (int64_t{*std::ranges::min_element(node.lo[axis])} << exponent);
     whole.hi[axis] = origin[axis] + (int64_t{*std::ranges::max_element(node.hi[axis])} << exponent);
   }
@@ -84,7 +84,7 @@ std::optional<TreeGridBox> NodeMove::translate(const baked::PackedNode& node, ba
   return box;
 }
 
-std::optional<TreeGridBox> NodeMove::rescale(const baked::PackedNode& node, baked::PackedNode& out) const {
+std::optional<TreeGridBox> NodeGridTransfer::rescale(const baked::PackedNode& node, baked::PackedNode& out) const {
   const TreeGridMap map(to_, from_.step_exponent);
   std::array<TreeGridBox, baked::kNodeWidth> children;
   const auto count = static_cast<size_t>(std::ranges::find(node.children, baked::kNoChild) - node.children.begin());

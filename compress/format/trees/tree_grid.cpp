@@ -7,14 +7,14 @@
 namespace packtrace {
 namespace {
 
-/// Of lattice coordinates in coarsest steps.
+/// Range of lattice coordinates along one axis, in units of the coarsest step.
 struct Range {
   double lo = std::numeric_limits<double>::infinity(), hi = -std::numeric_limits<double>::infinity();
 
   bool movable() const { return (lo > 0.0 && hi <= 2.0 * lo) || (hi < 0.0 && lo >= 2.0 * hi); }
   double largest() const { return std::max(std::abs(lo), std::abs(hi)); }
   double centre() const { return lo + 0.5 * (hi - lo); }
-  /// Of coordinates, once moved.
+  /// Largest |coordinate| once the origin is subtracted.
   double reach() const { return movable() ? 0.5 * (hi - lo) : largest(); }
 };
 
@@ -43,7 +43,7 @@ void choose_tree_grid(std::span<const baked::GeometryRecord* const> geometries,
     extend(box, *g, clusters.subspan(static_cast<size_t>(g->first_cluster), g->cluster_count),
            exp2_exact(g->step_exponent - coarsest));
 
-  // Doubles hold 53 bits of the 60 that a coordinate may have, hence the margins.
+  // Doubles hold 53 of up to 60 bits of a coordinate, hence the margins.
   constexpr double kReach = baked::kMaxTreeCoordinate - 1024.0, kLargest = 0x1p60;
   const auto fits = [&](double scale) {
     return std::all_of(box.begin(), box.end(), [&](const Range& range) {

@@ -4,17 +4,17 @@
 #include <cstdint>
 #include <span>
 
-#include "compress/format/layout/baked_format.h"
 #include "compress/format/cluster/lattice_box.h"
-#include "compress/format/layout/packed_node.h"
 #include "compress/format/cluster/position_grid.h"
+#include "compress/format/layout/baked_format.h"
+#include "compress/format/layout/packed_node.h"
 
 namespace packtrace {
 
-/// Steps of a tree and of its geometries differ by 2^this at most, either way.
+/// Maximum |difference| of the step exponents of a tree and its geometries.
 inline constexpr int32_t kMaxTreeStepDoublings = 60;
 
-/// A box that holds a cluster's vertices, from its record alone: at most a power of two larger per axis.
+/// Box that contains a cluster's vertices, from its record alone. It is up to about twice as large per axis.
 inline LatticeBox box_of_record(const baked::GeometryRecord& geometry, const baked::ClusterRecord& cluster) {
   LatticeBox box;
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -24,18 +24,19 @@ inline LatticeBox box_of_record(const baked::GeometryRecord& geometry, const bak
   return box;
 }
 
-/// From a geometry's lattice to a tree's grid. Results beyond +-2^61 are that, before the origin is subtracted.
+/// Maps a geometry's lattice to a tree's grid. Scaled coordinates are clamped to +-2^61 before the origin is
+/// subtracted.
 class TreeGridMap {
 public:
-  /// The steps' exponents differ by kMaxTreeStepDoublings at most; |lattice coordinate| <= 2^59, |origin| <= 2^60.
+  /// The step exponents differ by at most kMaxTreeStepDoublings; |lattice coordinate| <= 2^59, |origin| <= 2^60.
   TreeGridMap(const baked::TreeRecord& tree, const baked::GeometryRecord& geometry)
       : TreeGridMap(tree, geometry.step_exponent) {}
-  /// From any lattice of the tree's mantissa.
+  /// For any lattice with the tree's step mantissa.
   TreeGridMap(const baked::TreeRecord& tree, int32_t step_exponent)
       : origin_(tree.origin), shift_(step_exponent - tree.step_exponent),
         limit_((int64_t{1} << 61) >> (shift_ > 0 ? shift_ : 0)) {}
 
-  /// The tree coordinate of a lattice coordinate, rounded down and up.
+  /// Tree coordinate of a lattice coordinate, rounded down or up.
   int64_t floor(int64_t q, size_t axis) const { return scaled(q) - origin_[axis]; }
   int64_t ceil(int64_t q, size_t axis) const { return -scaled(-q) - origin_[axis]; }
 
@@ -49,8 +50,8 @@ private:
   int64_t limit_;
 };
 
-/// The finest grid of a tree over some geometries that have one step_mantissa and steps that differ by 2^60 at most:
-/// fills in step and origin (TreeRecord says how it is chosen).
+/// Chooses the finest possible grid for a tree over geometries with equal step_mantissa and step exponents that differ
+/// by at most 60. Sets step and origin as TreeRecord specifies.
 /// @param clusters the cluster section
 void choose_tree_grid(std::span<const baked::GeometryRecord* const> geometries,
                       std::span<const baked::ClusterRecord> clusters, baked::TreeRecord& tree);

@@ -24,7 +24,7 @@ uint32_t used_slots(const baked::PackedNode& node) {
   return used;
 }
 
-/// The parts of a topology, whose sizes follow from the first one.
+/// Reads the parts of a topology. Their sizes follow from the first part.
 class TopologyReader {
 public:
   TopologyReader(std::span<const uint8_t> bytes, size_t node_count) : bytes_(bytes) {
@@ -40,7 +40,7 @@ public:
   bool valid() const { return valid_; }
   uint8_t kind(size_t node) const { return bytes_[node]; }
 
-  /// The next node with leaves, of `count` of them.
+  /// Reads the next leaf node, which has `count` leaves.
   LeafNode next_leaves(uint32_t count, uint32_t& cluster) {
     LeafNode leaves{bytes_[first_at_ + read_], count, {}};
     for (uint32_t i = 0; i < count; ++i) leaves.triangles[i] = bytes_[size_at_++];
@@ -65,8 +65,9 @@ public:
       : s_(sections), topology_(topology), nodes_(nodes), boxes_(nodes.size()) {}
 
   bool run() {
-    s_.nodes = nodes_;                                                      // their number is checked with the records
-    if (nodes_.size() > std::numeric_limits<uint32_t>::max()) return false; // such trees are stored whole
+    // find_tree_record_fault() checks their number.
+    s_.nodes = nodes_;
+    if (nodes_.size() > std::numeric_limits<uint32_t>::max()) return false; // files store such trees whole
     if (!clusters_ok() || find_tree_record_fault(s_, members_)) return false;
     TopologyReader reader(topology_, nodes_.size());
     if (!reader.valid()) return false;
@@ -78,7 +79,7 @@ public:
   }
 
 private:
-  /// A node with leaves that is to be made.
+  /// A leaf node to restore.
   struct Pending {
     uint32_t cluster;
     size_t node;
@@ -133,9 +134,9 @@ private:
     return end <= s_.clusters[pending.cluster].triangle_count;
   }
 
-  /// By cluster, as each is decoded once.
+  /// Restores leaf nodes cluster by cluster, so that each cluster is decoded once.
   void make_leaf_nodes() {
-    std::vector<uint32_t> ends(s_.clusters.size() + 1, 0); // of a cluster's nodes, after sorting
+    std::vector<uint32_t> ends(s_.clusters.size() + 1, 0); // by cluster: end of its nodes in `order`
     for (const Pending& one : pending_) ++ends[one.cluster + 1];
     for (size_t c = 1; c < ends.size(); ++c) ends[c] += ends[c - 1];
     std::vector<uint32_t> order(pending_.size());
@@ -161,7 +162,7 @@ private:
     }
   }
 
-  /// From the last one up, as children lie behind their parents.
+  /// From the last node to the first, because children lie behind their parents.
   void make_inner_nodes() {
     const node_kernels::Kernels& kernels = node_kernels::kernels();
     for (const baked::TreeRecord& tree : s_.trees) {
@@ -181,7 +182,7 @@ private:
   BakedSections s_;
   std::span<const uint8_t> topology_;
   std::span<baked::PackedNode> nodes_;
-  std::vector<node_kernels::Box> boxes_; // of what lies below each node
+  std::vector<node_kernels::Box> boxes_; // by node: box of its subtree
   TreeMembers members_;
   std::vector<Pending> pending_;
 };
@@ -197,7 +198,7 @@ std::vector<uint8_t> pack_tree_topology(const BakedSections& sections) {
     for (const baked::PackedNode& node : nodes)
       kinds.push_back(static_cast<uint8_t>(used_slots(node) + (node.has_leaves() ? 0 : kInner)));
     std::vector<uint32_t> waiting(nodes.empty() ? 0 : 1, 0);
-    while (!waiting.empty()) { // in the order in which they will be restored
+    while (!waiting.empty()) { // in the order in which restore_nodes() visits nodes
       const baked::PackedNode& node = nodes[waiting.back()];
       waiting.pop_back();
       const uint32_t used = used_slots(node);

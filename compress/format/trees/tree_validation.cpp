@@ -8,15 +8,16 @@
 namespace packtrace {
 namespace {
 
-constexpr uint8_t kSeen = baked::kCameraBelow | baked::kOcclusionBelow;
+constexpr uint8_t kSeen = baked::kVisibleToCamera | baked::kVisibleToOcclusion;
 constexpr int64_t kMaxOrigin = int64_t{1} << 60;
-constexpr uint64_t kEach = 0x0101010101010101, kTops = 0x80 * kEach; // of a node's eight slots
+// For the bytes of eight slots: ones, and the highest bits.
+constexpr uint64_t kByteOnes = 0x0101010101010101, kByteHighBits = 0x80 * kByteOnes;
 
-/// A cluster's triangles.
+/// Set of triangles of one cluster.
 struct TriangleSet {
   std::array<uint64_t, 2> words{};
 
-  /// Adds a run, 1..128 triangles long; false where it holds one already.
+  /// Adds a run of 1..128 triangles; false if one of them is already in the set.
   bool add(uint32_t first, uint32_t count) {
     bool fresh = true;
     for (uint32_t w = 0; w < 2; ++w) {
@@ -105,7 +106,7 @@ private:
   TreeMembers& members_;
 };
 
-/// Checks the nodes of trees whose records are right.
+/// Checks the nodes of trees with valid records.
 class NodeChecker {
 public:
   NodeChecker(const BakedSections& sections, const TreeMembers& members)
@@ -140,7 +141,8 @@ private:
   const char* check_node(uint32_t number, uint32_t tree) {
     const baked::PackedNode& node = nodes_[number];
     const uint64_t children = bytes_of(node.children);
-    const uint64_t empty = (children - kEach) & ~children & kTops; // the lowest one is that of the first empty slot
+    const uint64_t empty =
+        (children - kByteOnes) & ~children & kByteHighBits; // its lowest bit belongs to the first empty slot
     const uint32_t used = empty == 0 ? baked::kNodeWidth : static_cast<uint32_t>(std::countr_zero(empty)) / 8;
     if (used == 0) return "no children";
     if (const char* what = check_boxes(node, used)) return what;
@@ -160,10 +162,12 @@ private:
       if (node.origin[axis] < -baked::kMaxTreeCoordinate || node.origin[axis] > baked::kMaxTreeCoordinate)
         return "origin";
       const uint64_t lo = bytes_of(node.lo[axis]), hi = bytes_of(node.hi[axis]);
-      const uint64_t low_bits_fit = (hi | kTops) - (lo & ~kTops); // in each byte's highest bit
+      const uint64_t low_bits_fit =
+          (hi | kByteHighBits) - (lo & ~kByteHighBits); // result in the highest bit of each byte
       const uint64_t fits = (hi & ~lo) | (~(hi ^ lo) & low_bits_fit);
-      if (((fits | unused) & kTops) != kTops || (lo & unused) != unused || (hi & unused) != 0) return "boxes";
-      // Rounding up reaches up to one unit past the vertices.
+      if (((fits | unused) & kByteHighBits) != kByteHighBits || (lo & unused) != unused || (hi & unused) != 0)
+        return "boxes";
+      // Outward rounding extends less than one unit past the vertices.
       const int64_t end = baked::kMaxTreeCoordinate + (int64_t{1} << exponent);
       if (node.origin[axis] + (int64_t{255} << exponent) >= end &&
           node.origin[axis] + (int64_t{*std::ranges::max_element(node.hi[axis])} << exponent) >= end)
@@ -191,26 +195,27 @@ private:
     if (node.first_child != 0) return "child numbers";
     if (node.cluster >= s_.clusters.size() || members_.tree_of[node.cluster] != tree) return "cluster";
     if (node.ray_classes != members_.ray_classes[node.cluster] || (node.ray_classes & kSeen) == 0) return "ray classes";
-    const uint64_t sizes = bytes_of(node.children); // bytes from 17 on reach the highest bit
-    if (((sizes | (sizes + (127 - baked::kMaxLeafTriangles) * kEach)) & kTops) != 0) return "leaves";
+    // Bytes above kMaxLeafTriangles set their highest bit in the sum below.
+    const uint64_t sizes = bytes_of(node.children);
+    if (((sizes | (sizes + (127 - baked::kMaxLeafTriangles) * kByteOnes)) & kByteHighBits) != 0) return "leaves";
     if (used < baked::kNodeWidth && sizes >> (8 * used) != 0) return "leaves";
-    const auto triangles = static_cast<uint32_t>(sizes * kEach >> 56); // at most 128
+    const auto triangles = static_cast<uint32_t>(sizes * kByteOnes >> 56); // at most 128
     if (node.first_triangle + triangles > s_.clusters[node.cluster].triangle_count) return "leaves";
     return covered_[node.cluster].add(node.first_triangle, triangles) ? nullptr : "triangles of two leaves";
   }
 
   const BakedSections& s_;
   const TreeMembers& members_;
-  std::span<const baked::PackedNode> nodes_; // of one tree
-  std::vector<uint8_t> levels_;              // of its nodes; 0 until a parent was found
+  std::span<const baked::PackedNode> nodes_; // of the current tree
+  std::vector<uint8_t> levels_;              // by node of the current tree; 0 until its parent is found
   std::vector<TriangleSet> covered_;         // by cluster
 };
 
 } // namespace
 
 uint8_t ray_classes_of(uint32_t material_class) {
-  return static_cast<uint8_t>(((material_class & 1u) == 0 ? baked::kCameraBelow : 0) |
-                              ((material_class & 2u) == 0 ? baked::kOcclusionBelow : 0) |
+  return static_cast<uint8_t>(((material_class & 1u) == 0 ? baked::kVisibleToCamera : 0) |
+                              ((material_class & 2u) == 0 ? baked::kVisibleToOcclusion : 0) |
                               ((material_class & baked::kMaskedClass) != 0 ? baked::kMaskedLeaves : 0));
 }
 

@@ -8,33 +8,33 @@
 
 namespace packtrace {
 
-/// What is wrong with trees, and where.
+/// Fault in trees, and its place.
 struct TreeFault {
   const char* section;
   uint64_t record;
   const char* what;
 };
 
-/// Which tree each cluster belongs to, and which rays see it.
+/// Tree of each cluster, and the rays that see it.
 struct TreeMembers {
-  std::vector<uint32_t> tree_of;    ///< by cluster of the file; kNone without trees
-  std::vector<uint8_t> ray_classes; ///< by cluster: PackedNode::ray_classes of its leaves
+  std::vector<uint32_t> tree_of;    ///< by cluster of the file; kNone if there are no trees
+  std::vector<uint8_t> ray_classes; ///< by cluster: PackedNode::ray_classes of its leaf nodes
 };
 
-/// PackedNode::ray_classes of the leaves of a material class.
+/// PackedNode::ray_classes of leaf nodes whose clusters have this material class.
 uint8_t ray_classes_of(uint32_t material_class);
 
-/// The first instance of a geometry, if that is its only one and placed by the identity: then world-space geometry may
-/// be in the world's tree. By geometry; else kNone.
+/// By geometry: its instance if it has exactly one and that is placed by the identity, else kNone. World-space geometry
+/// may belong to the world's tree only if it has such an instance.
 std::vector<uint32_t> sole_identity_instances(const BakedSections& sections);
 
-/// Checks tree records: that each geometry with clusters is in one tree, and its vertices within the tree's
-/// coordinates. Relies on valid geometry and cluster records, and on nothing else.
+/// Checks tree records: each geometry with clusters belongs to one tree, whose coordinates hold all its vertices.
+/// Relies only on valid geometry and cluster records.
 std::optional<TreeFault> find_tree_record_fault(const BakedSections& sections, TreeMembers& members);
 
-/// That, and checks nodes: each is the child of one node before it, none lies deeper than its record says, leaves are
-/// runs of a cluster's triangles, and each triangle of each cluster that some ray sees is in one leaf. In linear time.
-/// Not checked: that boxes hold what lies below.
+/// Checks tree records and nodes. Each node but a tree's first is the child of exactly one earlier node, the depth of
+/// each tree equals that in its record, leaves are runs of a cluster's triangles, and each triangle of each cluster
+/// that some ray sees is in exactly one leaf. Takes linear time. Does not check that boxes contain their triangles.
 std::optional<TreeFault> find_tree_fault(const BakedSections& sections);
 
 } // namespace packtrace

@@ -6,12 +6,13 @@
 namespace packtrace {
 namespace {
 
-constexpr float kNodeCost = 0x1p-20f; // of the root's area, so that boxes without area get few nodes as well
+// Relative to the root's area. It keeps the number of nodes low for boxes without area.
+constexpr float kNodeCost = 0x1p-20f;
 
-/// Of a subtree that takes i of its parent's children at most, i = 1 .. 8 in [i - 1].
+/// Best use of i child slots of the parent by a subtree, i = 1 .. 8 at index i - 1.
 struct Choice {
-  std::array<float, kWideTreeWidth> cost{};      ///< sum of the areas of inner nodes
-  std::array<uint8_t, kWideTreeWidth> on_left{}; ///< children that the left subtree takes; 0: the subtree is one child
+  std::array<float, kWideTreeWidth> cost{};      ///< least sum of the areas of inner nodes
+  std::array<uint8_t, kWideTreeWidth> on_left{}; ///< slots for the left child's subtree; 0: the subtree takes one slot
 };
 
 class Collapser {
@@ -62,7 +63,7 @@ private:
       if (out.cost[0] < out.cost[i - 1]) out.cost[i - 1] = out.cost[0], out.on_left[i - 1] = 0;
   }
 
-  /// The children that a subtree is when it may be up to `slots` of them.
+  /// Appends the nodes that represent a subtree in up to `slots` child slots.
   void gather(uint32_t node, uint32_t slots, std::vector<uint32_t>& children) const {
     const uint32_t on_left = slots == 1 ? 0 : choices_[node].on_left[slots - 1];
     if (on_left == 0) {

@@ -10,29 +10,29 @@ namespace packtrace {
 
 inline constexpr uint32_t kWideTreeWidth = 8;
 
-/// A node of a wide tree. Children follow each other.
+/// A node of a wide tree. Its children are consecutive.
 struct WideNode {
-  uint32_t source = 0;      ///< the node of the binary tree that it stands for, whose box is its own
-  uint32_t first_child = 0; ///< above the node's own number
-  uint32_t child_count = 0; ///< 2..8, or 0 for one of the boxes: source's only one
+  uint32_t source = 0;      ///< node of the binary tree with the same box and the same leaves below
+  uint32_t first_child = 0; ///< larger than the node's own number
+  uint32_t child_count = 0; ///< 2..8, or 0 for a leaf, which holds the one box of `source`
 };
 
-/// Collapses a binary tree so that the sum of the inner nodes' areas is the least that any choice among its nodes
-/// gives. Node 0 is the root; a subtree's nodes lie together but for its root, which lies beside its siblings. Source:
-/// Ylitie, Karras, Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs" (2017),
+/// Collapses a binary tree with the least possible sum of the areas of inner nodes. Node 0 is the root. The nodes of a
+/// subtree are contiguous, except its root, which is stored with its siblings.
+/// Source: Ylitie, Karras, Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs" (2017),
 /// section 3.1, with leaves of one box.
 std::vector<WideNode> collapse_box_tree(const BoxTree& tree);
 
 /// A wide tree over boxes.
 struct WideTree {
-  BoxTree binary;              ///< what it was collapsed from
-  std::vector<WideNode> nodes; ///< none for no boxes
+  BoxTree binary;              ///< the tree that was collapsed
+  std::vector<WideNode> nodes; ///< empty without boxes
   uint32_t depth = 0;          ///< levels of nodes
 };
 
-/// Splits boxes (build_box_tree()), moves subtrees (reinsert_subtrees()), and collapses what comes of it. Where moved
-/// subtrees would make the tree deeper than max_depth, they stay.
-/// @param max_depth levels of nodes, 33 or more
+/// Builds a binary tree (build_box_tree()), optimises it (reinsert_subtrees()) and collapses it. If reinsertion makes
+/// the tree deeper than max_depth, the tree is rebuilt without it.
+/// @param max_depth levels of nodes, at least 33
 WideTree build_wide_tree(std::span<const TreeBox> boxes, uint32_t max_depth, const ReinsertionConfig& config = {});
 
 } // namespace packtrace

@@ -168,8 +168,7 @@ struct EmbreeClusterTracer::Trees {
     rtcSetGeometryMask(geometry.get(), kAllRays);
     rtcCommitGeometry(geometry.get());
     rtcAttachGeometry(scene.get(), geometry.get());
-    rtcSetSceneProgressMonitorFunction(
-        scene.get(), [](void*, double) { return !Progress::cancelled(); }, nullptr);
+    rtcSetSceneProgressMonitorFunction(scene.get(), [](void*, double) { return !Progress::cancelled(); }, nullptr);
     rtcCommitScene(scene.get());
     device.check();
     return scene;
@@ -188,7 +187,7 @@ EmbreeClusterTracer::EmbreeClusterTracer(const BakedFile& file, const SceneSourc
     Progress().check_cancelled();
     trees_->scenes.push_back(nodes.primitive_count() > 0 ? trees_->build(nodes) : nullptr);
   }
-  packed_.search_trees(
+  packed_.set_tree_search(
       [](const void* searcher, const packed::TreeSearch& search) {
         const RTCScene scene = static_cast<const Trees*>(searcher)->scenes[search.tree].get();
         search.any != 0 ? find_any(scene, search) : find_closest(scene, search);

@@ -44,7 +44,7 @@ public:
                 std::span<uint8_t> occluded) const override {
     packed_.any_hits(rays, ray_class, order, occluded);
   }
-  uint32_t rays_together() const override { return packed_.rays_together(); }
+  uint32_t preferred_rays_per_call() const override { return packed_.preferred_rays_per_call(); }
   HitSurface resolve(const RayHit& hit) const override { return packed_.resolve(hit); }
 
   /// The parts of PackedTracer, "bvh" (Embree's trees) and "cluster nodes" (the leaf nodes of each primitive).

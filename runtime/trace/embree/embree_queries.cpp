@@ -48,7 +48,7 @@ void EmbreeTracer::closest_packets(std::span<const Ray> rays, uint32_t ray_class
   for (size_t first = 0; first < rays.size(); first += kPacket) {
     const size_t count = std::min(kPacket, rays.size() - first);
     packet.load(rays.subspan(first, count), lanes.ray);
-    forget_hits(lanes.hit);
+    clear_hits(lanes.hit);
     rtcIntersect16(packet.valid, handle(), &context, &lanes);
     for (size_t i = 0; i < count; ++i)
       hits[first + i] = hit_of(lanes.ray.tfar[i], lanes.hit.u[i], lanes.hit.v[i], lanes.hit.instID[0][i],

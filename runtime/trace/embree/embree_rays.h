@@ -72,7 +72,7 @@ inline void set_constants(uint32_t ray_class, RTCRay16& ray) {
   std::fill_n(ray.flags, RayPacket16::kRays, 0u);
 }
 
-inline void forget_hits(RTCHit16& hit) {
+inline void clear_hits(RTCHit16& hit) {
   std::fill_n(hit.geomID, RayPacket16::kRays, RTC_INVALID_GEOMETRY_ID);
   std::fill_n(hit.instID[0], RayPacket16::kRays, RTC_INVALID_GEOMETRY_ID);
 }

@@ -11,9 +11,9 @@
 
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/progress.h"
-#include "runtime/trace/source/alpha_filter.h"
 #include "runtime/trace/embree/embree_device.h"
 #include "runtime/trace/placement.h"
+#include "runtime/trace/source/alpha_filter.h"
 
 namespace packtrace {
 namespace {
@@ -81,8 +81,7 @@ struct EmbreeTracer::Device {
     const int flags =
         (config.robust ? RTC_SCENE_FLAG_ROBUST : 0) | (config.compact ? RTC_SCENE_FLAG_COMPACT : RTC_SCENE_FLAG_NONE);
     rtcSetSceneFlags(scene.get(), static_cast<RTCSceneFlags>(flags));
-    rtcSetSceneProgressMonitorFunction(
-        scene.get(), [](void*, double) { return !Progress::cancelled(); }, nullptr);
+    rtcSetSceneProgressMonitorFunction(scene.get(), [](void*, double) { return !Progress::cancelled(); }, nullptr);
     return scene;
   }
 

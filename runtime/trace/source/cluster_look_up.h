@@ -3,8 +3,8 @@
 #include <optional>
 #include <span>
 
-#include "compress/format/file/baked_file.h"
 #include "compress/format/cluster/cluster_codec.h"
+#include "compress/format/file/baked_file.h"
 #include "runtime/trace/source/packed_source.h"
 
 namespace packtrace {

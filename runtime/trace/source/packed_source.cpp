@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "compress/format/file/baked_file.h"
 #include "compress/format/cluster/cluster_codec.h"
+#include "compress/format/file/baked_file.h"
 #include "runtime/trace/source/cluster_look_up.h"
 
 namespace packtrace {

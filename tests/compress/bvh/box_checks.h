@@ -28,7 +28,7 @@ inline std::vector<TreeBox> random_boxes(uint32_t count, float size, uint32_t se
   return boxes;
 }
 
-/// Levels of the subtree, having checked that it is one over exactly order[first .. first + count).
+/// Checks that a subtree covers exactly order[first .. first + count). Returns its number of levels.
 inline uint32_t check_subtree(const BoxTree& tree, std::span<const TreeBox> boxes, uint32_t number) {
   const BoxTreeNode& node = tree.nodes[number];
   for (uint32_t i = 0; i < node.count; ++i)

@@ -25,7 +25,7 @@ TEST(BoxTree, HoldsEveryBoxOnce) {
 }
 
 TEST(BoxTree, SeparatesWhatIsApart) {
-  // Two heaps far apart: the first split is between them.
+  // Two groups far apart: the first split separates them.
   std::vector<TreeBox> boxes = random_boxes(200, 0.1f, 1);
   for (size_t i = 0; i < boxes.size(); i += 2) boxes[i].lo[1] += 10.0f, boxes[i].hi[1] += 10.0f;
   const BoxTree tree = build_box_tree(boxes);
@@ -36,10 +36,10 @@ TEST(BoxTree, SeparatesWhatIsApart) {
 
 TEST(BoxTree, EndsOnEqualAndExtremeBoxes) {
   constexpr float kMax = std::numeric_limits<float>::max(), kDenormal = std::numeric_limits<float>::denorm_min();
-  std::deque<std::vector<TreeBox>> cases;                  // keeps them in place
+  std::deque<std::vector<TreeBox>> cases;                  // deque: elements stay in place
   cases.emplace_back(5000, TreeBox{{1, 2, 3}, {1, 2, 3}}); // equal points
   cases.emplace_back(5000, TreeBox{{-kMax, -kMax, -kMax}, {kMax, kMax, kMax}});
-  std::vector<TreeBox>& growing = cases.emplace_back(); // each split takes one off
+  std::vector<TreeBox>& growing = cases.emplace_back(); // each split separates one box
   for (int i = 0; i < 250; ++i) {
     const float x = std::ldexp(1.0f, i - 125);
     growing.push_back({{x, 0, 0}, {x, 0, 0}});
@@ -64,7 +64,7 @@ TEST(BoxTree, IsTheSameForAnyThreadCount) {
   EXPECT_TRUE(test::same(build_box_tree(boxes), tree));
 }
 
-/// Levels below and with a node, having counted the boxes.
+/// Checks the wide subtree at a node, counts its boxes in `seen`, and returns its number of levels.
 uint32_t check_wide(const BoxTree& binary, std::span<const WideNode> wide, uint32_t number,
                     std::vector<uint32_t>& seen) {
   const WideNode& node = wide[number];
@@ -94,7 +94,7 @@ TEST(WideTree, HoldsEveryBoxOnceInFewNodes) {
     std::vector<uint32_t> seen(count);
     check_wide(binary, wide, 0, seen);
     EXPECT_EQ(seen, std::vector<uint32_t>(count, 1));
-    EXPECT_LE(wide.size() - count, 1 + count * 2 / 5); // one for each 3.5 of 8 children
+    EXPECT_LE(wide.size() - count, 1 + count * 2 / 5); // at least 3.5 children per inner node on average
     if (count <= 8 && count > 1) {
       EXPECT_EQ(wide.size(), count + 1);
     }

@@ -20,7 +20,7 @@ namespace {
 using baked::PackedNode;
 using baked::TreeRecord;
 
-/// Two geometries of the world on different lattices, far from the origin, and one that is instanced; all with levels.
+/// Two world-space geometries on different lattices, far from the origin, and an instanced one; all with LOD levels.
 Scene scene_of_levels() {
   Scene scene = test::scene_of(test::sphere_mesh(60, 40.0f), test::translation({1000, 1, 1}));
   test::add_shape(scene, test::sphere_mesh(50, 0.01f), test::translation({1040, 1, 1}));
@@ -36,7 +36,8 @@ BakedFile bake_levels(const Scene& scene) {
   return BakedFile::from_bytes(test::bake(scene, config).bytes);
 }
 
-/// One choice for the world and one for each other geometry, of clusters of all levels of which `take` is true.
+/// One choice for the world and one for each other geometry. Each contains the clusters of all levels for which `take`
+/// returns true.
 template <typename Take>
 std::vector<ChosenClusters> choose(const BakedFile& file, Take take) {
   const BakedSections& sections = file.sections();
@@ -78,7 +79,7 @@ TEST(ChosenTrees, OfAllClustersAreThoseOfTheWholeFile) {
   EXPECT_TRUE(same(ChosenTreeBuilder(file.sections(), chosen).build(), expected));
 }
 
-/// The bytes of all nodes with leaves.
+/// Bytes of all leaf nodes.
 std::multiset<std::string> leaf_nodes_of(const PackedTrees& trees) {
   std::multiset<std::string> nodes;
   for (const baked::PackedNode& node : trees.nodes)
@@ -126,7 +127,7 @@ TEST(ChosenTrees, HoldEachTriangleOnceWhereverTheirNodesComeFrom) {
 
 TEST(ChosenTrees, TakeNodesFromTheFile) {
   const BakedFile file = bake_levels(scene_of_levels());
-  // Trees with one triangle a leaf, which nobody would build: they are seen again if they are taken.
+  // Trees with one triangle per leaf, which no builder would make, so that reused nodes are recognisable.
   TreeCosts costs;
   costs.max_leaf_triangles = 1;
   const PackedTrees odd = build_packed_trees(file.sections(), costs);
@@ -150,7 +151,7 @@ TEST(ChosenTrees, TakeNodesFromTheFile) {
   EXPECT_GT(moved + rescaled, 0u);
 }
 
-/// A node of random boxes about a point.
+/// A node of random boxes around a point.
 PackedNode random_node(test::Random& random, int32_t about) {
   std::vector<TreeGridBox> boxes(1 + static_cast<size_t>(random.uniform(0.0f, 7.9f)));
   for (TreeGridBox& box : boxes)
@@ -164,7 +165,7 @@ PackedNode random_node(test::Random& random, int32_t about) {
   return node;
 }
 
-TEST(NodeMove, HoldsWhatWasThereAndLittleMore) {
+TEST(NodeGridTransfer, HoldsWhatWasThereAndLittleMore) {
   test::Random random(9);
   for (const int32_t doublings : {-7, -1, 0, 1, 6})
     for (int round = 0; round < 200; ++round) {
@@ -174,7 +175,7 @@ TEST(NodeMove, HoldsWhatWasThereAndLittleMore) {
       from.origin = {1 << 20, -77, 0}, to.origin = {(1 << 22) + 3, 0, round - 100};
       const PackedNode node = random_node(random, round);
       PackedNode out;
-      const NodeMove move(from, to);
+      const NodeGridTransfer move(from, to);
       ASSERT_EQ(move.exact(), doublings == 0);
       const std::optional<TreeGridBox> whole = move.move(node, out);
       ASSERT_TRUE(whole);
@@ -201,24 +202,24 @@ TEST(NodeMove, HoldsWhatWasThereAndLittleMore) {
     }
 }
 
-TEST(NodeMove, RefusesWhatCannotBe) {
+TEST(NodeGridTransfer, RefusesWhatCannotBe) {
   test::Random random(3);
   TreeRecord from{}, to{};
   from.step_mantissa = to.step_mantissa = kMinStepMantissa;
   const PackedNode node = random_node(random, 0);
   PackedNode out;
-  EXPECT_TRUE(NodeMove(from, to).move(node, out));
-  to.origin[1] = int64_t{1} << 60; // beyond the coordinates, at any scale
+  EXPECT_TRUE(NodeGridTransfer(from, to).move(node, out));
+  to.origin[1] = int64_t{1} << 60; // beyond the tree coordinates at any scale
   from.origin[1] = -to.origin[1];
-  EXPECT_FALSE(NodeMove(from, to).move(node, out));
+  EXPECT_FALSE(NodeGridTransfer(from, to).move(node, out));
   to.step_exponent = -60;
-  EXPECT_FALSE(NodeMove(from, to).move(node, out));
+  EXPECT_FALSE(NodeGridTransfer(from, to).move(node, out));
   from.origin = to.origin = {};
-  EXPECT_FALSE(NodeMove(from, to).move(node, out));
+  EXPECT_FALSE(NodeGridTransfer(from, to).move(node, out));
   to.step_exponent = 61;
-  EXPECT_FALSE(NodeMove(from, to).move(node, out));
+  EXPECT_FALSE(NodeGridTransfer(from, to).move(node, out));
   to.step_exponent = 0, to.step_mantissa = kMinStepMantissa + 1;
-  EXPECT_FALSE(NodeMove(from, to).move(node, out));
+  EXPECT_FALSE(NodeGridTransfer(from, to).move(node, out));
 }
 
 } // namespace

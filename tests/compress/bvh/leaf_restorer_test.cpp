@@ -34,8 +34,8 @@ LeafNode random_leaves(uint32_t triangle_count, test::Random& random) {
   return leaves;
 }
 
-/// Compares with what is made from boxes of triangles, in trees whose steps are 2^-2 to 2^2 of the geometry's. Returns
-/// the widest vertex seen, in bits.
+/// Compares restored leaf nodes with those made from triangle boxes, in trees with steps of 2^-2 to 2^2 times the
+/// geometry's. Returns the largest number of position bits per vertex.
 uint32_t compare(const BakedFile& file, const node_kernels::Kernels& kernels) {
   test::Random random(3);
   uint32_t widest = 0, node_count = 0;

@@ -18,7 +18,8 @@ namespace {
 using baked::PackedNode;
 using baked::TreeRecord;
 
-/// Every triangle of clusters that some ray sees is in one leaf of all trees, the others in none.
+/// Builds the trees of a file and checks them: every triangle of a cluster that some ray sees is in exactly one leaf of
+/// all trees, all other triangles in none.
 PackedTrees check(const BakedFile& file) {
   PackedTrees built = build_packed_trees(file.sections());
   std::vector<std::vector<uint32_t>> seen;
@@ -61,7 +62,7 @@ TEST(PackedTrees, WorldSpaceGeometryHasOneTree) {
   EXPECT_EQ(built.trees[0].geometry, baked::kWorldTree);
   uint64_t triangles = 0;
   for (const baked::ClusterRecord& cluster : file.sections().clusters) triangles += cluster.triangle_count;
-  EXPECT_LE(built.nodes.size(), triangles / 20); // 4 bytes a triangle
+  EXPECT_LE(built.nodes.size(), triangles / 20); // 4 bytes per triangle
 }
 
 TEST(PackedTrees, LargeTrianglesAmongSmallOnesGetNodesOfFew) {
@@ -109,7 +110,7 @@ TEST(PackedTrees, KeepsWhatEachKindOfRaySees) {
 
 TEST(PackedTrees, FineGeometryOfTheWorldKeepsItsDetail) {
   Scene scene = test::scene_of(test::sphere_mesh(40, 1000.0f));
-  test::add_shape(scene, test::sphere_mesh(20, 0.001f)); // on a finer lattice in the large one's
+  test::add_shape(scene, test::sphere_mesh(20, 0.001f)); // its finer lattice contains the lattice of the large sphere
   const BakedFile file = bake_file(scene);
   ASSERT_NE(file.geometries()[0].step_exponent, file.geometries()[1].step_exponent);
   const PackedTrees built = check(file);
@@ -193,7 +194,7 @@ TEST(LeafNodes, EveryTriangleIsInOneLeafInOrder) {
       EXPECT_EQ(next, count);
       if (flat) {
         EXPECT_LE(nodes.size(), (count + 63) / 64);
-      } // of leaves that are half full at least
+      } // the leaves are at least half full
     }
 }
 

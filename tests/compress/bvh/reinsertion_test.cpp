@@ -20,7 +20,8 @@ double inner_area(const BoxTree& tree) {
   return sum;
 }
 
-/// Small boxes, and a few as large as all of them together: splits by centres leave the large ones among the small.
+/// Small boxes, and a few as large as all small ones together. Splits by centres leave the large boxes among the small
+/// ones.
 std::vector<TreeBox> boxes_of_many_sizes() {
   std::vector<TreeBox> boxes = random_boxes(2000, 0.01f, 1);
   for (const TreeBox& box : random_boxes(200, 2.0f, 2)) boxes.push_back(box);
@@ -37,8 +38,8 @@ TEST(Reinsertion, MakesInnerNodesSmaller) {
 }
 
 TEST(Reinsertion, FindsTheMovesThatATreeNeeds) {
-  // Two pairs, and a tree that has one of each pair on either side: moving one subtree mends one side, moving another
-  // the other.
+  // Two pairs, and a tree with one box of each pair on either side. Moving one subtree repairs one side, moving another
+  // one repairs the other.
   const std::vector<TreeBox> boxes{
       {{0, 0, 0}, {1, 1, 1}}, {{9, 0, 0}, {10, 1, 1}}, {{0, 0, 1}, {1, 1, 2}}, {{9, 0, 1}, {10, 1, 2}}};
   BoxTree tree;
@@ -54,7 +55,7 @@ TEST(Reinsertion, FindsTheMovesThatATreeNeeds) {
   ASSERT_EQ(check_tree(tree, boxes), 3u);
   reinsert_subtrees(tree);
   EXPECT_EQ(check_tree(tree, boxes), 3u);
-  EXPECT_EQ(inner_area(tree), 32.0 + 5.0 + 5.0); // of the root, and of both pairs
+  EXPECT_EQ(inner_area(tree), 32.0 + 5.0 + 5.0); // the root and both pairs
 }
 
 TEST(Reinsertion, LooksNoFartherThanItMay) {
@@ -76,7 +77,7 @@ TEST(Reinsertion, LooksNoFartherThanItMay) {
   }
 }
 
-/// One in the other, each larger by a factor: the best tree is a chain.
+/// Nested boxes, each larger by a factor than the one before: the best tree is a chain.
 std::vector<TreeBox> nested_boxes(int count, double factor) {
   std::vector<TreeBox> boxes;
   for (int i = 0; i < count; ++i) {
@@ -103,7 +104,7 @@ TEST(Reinsertion, WideTreesThatWouldBeTooDeepStayAsTheSplitsMadeThem) {
   };
   const std::vector<TreeBox> many = nested_boxes(3000, 1.01);
   EXPECT_TRUE(test::same(nodes_after(many, 4), nodes_after(many, 0)));
-  // Fewer fit, though the binary tree has more levels than that.
+  // 150 boxes stay within the limit, although the binary tree has more than 40 levels.
   const std::vector<TreeBox> few = nested_boxes(150, 1.2);
   const BoxTree moved = nodes_after(few, 4);
   EXPECT_GT(check_tree(moved, few), 40u);

@@ -17,7 +17,7 @@ using baked::PackedNode;
 using baked::TreeRecord;
 using test::message_after;
 
-/// World-space geometry of two materials, and an instanced sphere.
+/// World-space geometry with two materials, and an instanced sphere.
 Scene scene_with_trees() {
   Scene scene = test::scene_of(test::sphere_mesh(30));
   scene.materials.push_back({"glass", kTransmissive, Vec3(0.5f), kNoMask, kNoMask});
@@ -79,7 +79,7 @@ TEST(TreeFile, DamagedTopologyIsRefusedOrMakesNodesThatFit) {
   EXPECT_GT(accepted, 10u);
 }
 
-/// A file, and the message that it is refused with after a change.
+/// A file, and the error messages that it is refused with after changes.
 class TreeDamage : public testing::Test {
 protected:
   TreeDamage() : bytes_(test::bake(scene_with_trees()).bytes), file_(BakedFile::from_bytes(bytes_)) {
@@ -93,7 +93,7 @@ protected:
     return message(baked::kNodes, number * sizeof(PackedNode) + field, value);
   }
   const PackedNode& node(size_t number) const { return file_.sections().nodes[number]; }
-  size_t leaf() const { return leaf_; } ///< the first node with leaves
+  size_t leaf() const { return leaf_; } ///< the first leaf node
   const BakedFile& file() const { return file_; }
 
 private:
@@ -118,7 +118,8 @@ TEST_F(TreeDamage, RecordsAreChecked) {
   EXPECT_EQ(tree(0, offsetof(TreeRecord, reserved), 1), "tree 0: depth or reserved field");
   EXPECT_EQ(tree(0, offsetof(TreeRecord, geometry), 77), "tree 0: geometry");
   EXPECT_EQ(tree(1, offsetof(TreeRecord, geometry), baked::kWorldTree), "tree 1: geometry");
-  EXPECT_EQ(tree(1, offsetof(TreeRecord, geometry), 0), "geometry 0: lattice beyond that of its tree"); // not the ball's
+  // The ball's lattice does not fit.
+  EXPECT_EQ(tree(1, offsetof(TreeRecord, geometry), 0), "geometry 0: lattice beyond that of its tree");
   EXPECT_EQ(tree(0, offsetof(TreeRecord, step_mantissa), 7), "tree 0: step");
   EXPECT_EQ(tree(0, offsetof(TreeRecord, step_exponent), 5000), "tree 0: step");
   EXPECT_EQ(tree(0, offsetof(TreeRecord, origin) + 4, 1u << 30), "tree 0: origin");
@@ -149,7 +150,7 @@ TEST_F(TreeDamage, LeavesAreChecked) {
   uint32_t children;
   std::memcpy(&children, node(leaf()).children.data(), sizeof children);
   EXPECT_EQ(node(leaf(), offsetof(PackedNode, children), (children & ~0xffu) | 17u), at + "leaves");
-  uint32_t shift = 0; // to a leaf that may lose a triangle
+  uint32_t shift = 0; // of a leaf that may lose a triangle
   while (shift < 24 && ((children >> shift) & 0xffu) <= 1) shift += 8;
   ASSERT_GT((children >> shift) & 0xffu, 1u);
   const uint32_t fewer = children - (1u << shift);

@@ -23,10 +23,10 @@ struct ExactBox {
   }
 };
 
-/// Walks a tree, checks what packed_node.h says of it, and counts the leaves that hold each triangle.
+/// Walks a tree, checks the guarantees of packed_node.h, and counts the leaves that hold each triangle.
 class TreeWalk {
 public:
-  /// @param looseness in steps of a node's boxes, that rounding may make them larger than what they hold
+  /// @param looseness maximum excess of a node's boxes over their contents, in steps of the node's boxes
   TreeWalk(const BakedFile& file, const baked::TreeRecord& tree, std::span<const baked::PackedNode> all,
            double looseness = 1.0)
       : file_(file), tree_(tree), looseness_(looseness),
@@ -39,7 +39,7 @@ public:
     EXPECT_EQ(visited_, tree.node_count);
     EXPECT_EQ(deepest_, tree.depth);
   }
-  /// By cluster of the file and triangle: leaves that hold it.
+  /// By cluster of the file, then by triangle: number of leaves that hold it.
   const std::vector<std::vector<uint32_t>>& seen() const { return seen_; }
 
 private:

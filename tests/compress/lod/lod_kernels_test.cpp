@@ -9,12 +9,12 @@
 
 #include <gtest/gtest.h>
 
-#include "compress/bake/lod/simplify/edge_heap.h"
-#include "compress/bake/lod/simplify/edge_placement.h"
 #include "compress/bake/lod/bound/triangle_distance.h"
 #include "compress/bake/lod/bound/triangle_overlay.h"
 #include "compress/bake/lod/bound/triangle_refiner.h"
 #include "compress/bake/lod/bound/triangle_set.h"
+#include "compress/bake/lod/simplify/edge_heap.h"
+#include "compress/bake/lod/simplify/edge_placement.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace::test {
@@ -262,7 +262,7 @@ TEST(EdgeHeap, OrdersEdgesWhoseCostsChange) {
     cost[heap.near(place)] = place % 2 == 0 ? 20.5f + static_cast<float>(place) : 0.25f;
     heap.change_near(place, cost[heap.near(place)]);
   }
-  heap.near_changed();
+  heap.restore_order();
   for (float last = 0.0f; !heap.empty(); heap.pop()) {
     EXPECT_GE(cost[heap.top()], last);
     last = cost[heap.top()];

@@ -111,7 +111,7 @@ TEST(LodStore, LevelsThatNoFileMayHoldAreMadeAgain) {
   EXPECT_TRUE(kept.refuses(kClusters, field(offsetof(baked::ClusterRecord, vertex_count)), uint16_t{0}));
   EXPECT_TRUE(kept.refuses(kClusters, field(offsetof(baked::ClusterRecord, triangle_count)), uint8_t{0}));
   EXPECT_TRUE(kept.refuses(kClusters, field(offsetof(baked::ClusterRecord, triangle_count)), uint8_t{255}));
-  EXPECT_TRUE(kept.refuses(kClusters, field(offsetof(baked::ClusterRecord, restart_count)), uint8_t{0}));
+  EXPECT_TRUE(kept.refuses(kClusters, field(offsetof(baked::ClusterRecord, strip_count)), uint8_t{0}));
   EXPECT_TRUE(kept.refuses(kClusters, field(offsetof(baked::ClusterRecord, position_bits)), uint8_t{255}));
   EXPECT_TRUE(kept.refuses(kClusters, field(offsetof(baked::ClusterRecord, flags)), uint8_t{255}));
   const float nan = std::numeric_limits<float>::quiet_NaN(), infinite = std::numeric_limits<float>::infinity();

@@ -8,10 +8,10 @@
 
 #include <gtest/gtest.h>
 
-#include "compress/bake/lod/loose_pieces.h"
-#include "compress/bake/lod/simplify/quadric.h"
 #include "compress/bake/lod/bound/surface_bound.h"
 #include "compress/bake/lod/bound/triangle_distance.h"
+#include "compress/bake/lod/loose_pieces.h"
+#include "compress/bake/lod/simplify/quadric.h"
 #include "tests/compress/lod/lod_meshes.h"
 #include "tests/compress/test_scenes.h"
 

@@ -16,7 +16,7 @@ import struct
 import sys
 import zlib
 
-sys.dont_write_bytecode = True  # nothing but the sources in their folder
+sys.dont_write_bytecode = True  # keep the source folder clean
 
 from ptk.checks import TreeCheck, check_levels
 from ptk.disk import expand, is_disk_form
@@ -25,7 +25,7 @@ from ptk.records import SECTIONS, BadFile
 from ptk.resident import BakedFile
 
 
-# Damage also shows as numbers that lead nowhere.
+# Damage may also appear as out-of-range numbers.
 NOT_A_FILE = (BadFile, OSError, ArithmeticError, LookupError, StopIteration, TypeError, ValueError, struct.error)
 
 

@@ -9,9 +9,9 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
-#include "compress/format/pages/page_encoder.h"
 #include "compress/format/file/baked_file.h"
 #include "compress/format/pages/page_codec.h"
+#include "compress/format/pages/page_encoder.h"
 #include "pbrt_import/base/file_bytes.h"
 #include "tests/compress/file_hashes.h"
 #include "tests/compress/test_scenes.h"
@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Arrays as ptk_reader.py's compare() wants them.
+/// Arrays in the format that ptk_reader.py's compare() expects.
 class Dump {
 public:
   template <typename Value>
@@ -41,7 +41,7 @@ private:
   std::vector<std::byte> bytes_;
 };
 
-/// A cut in the middle of a geometry's levels.
+/// Writes a cut at a threshold between the errors of a geometry's levels.
 void put_cut(Dump& out, const BakedFile& file, uint32_t geometry) {
   const LodView lod = file.lod(geometry);
   out.put_number(static_cast<uint32_t>(lod.levels.size()));
@@ -92,7 +92,7 @@ std::vector<std::byte> dump(const BakedFile& file) {
   return out.bytes();
 }
 
-/// Files of a baked scene, and the reader that is written from the format's description.
+/// Files of a baked scene, and an independent reader written from the description of the format.
 class IndependentReader : public testing::Test {
 protected:
   void SetUp() override {
@@ -108,12 +108,12 @@ protected:
     baked_ = test::bake(scene, config).bytes;
     dump_ = dump(BakedFile::from_bytes(baked_));
   }
-  /// Of codec none.
+  /// Bytes of the file with codec none.
   std::vector<std::byte>& baked() { return baked_; }
   std::vector<std::byte>& dumped() { return dump_; }
   std::vector<std::byte>& disk(PageCodec codec) { return disk_[codec]; }
 
-  /// The reader's exit code for the file of codec none: 0 where it decodes the same.
+  /// Exit code of the reader for the file with codec none: 0 if it decodes the same data.
   int read() const { return read(baked_); }
   int read(const std::vector<std::byte>& bytes) const {
     store("scene.ptk", bytes);
@@ -125,10 +125,10 @@ protected:
     const int status = std::system(command.c_str());
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
-  /// What it took the last file's resident form to be.
+  /// The resident form of the last file, as the reader restored it.
   std::vector<std::byte> resident() const { return read_file_bytes(folder_.path() / "scene.resident"); }
 
-  /// The same from files of all codecs, to the byte.
+  /// Expects the same data from the files of all codecs, and the resident form byte for byte.
   void expect_reads_every_codec() const {
     EXPECT_EQ(read(), 0);
     for (const auto& [codec, bytes] : disk_) {
@@ -165,7 +165,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, IndependentReaderOfAssets,
                            return name.substr(name.find('/') + 1, name.rfind('.') - name.find('/') - 1);
                          });
 
-/// Normals of every direction, few different normals, texture coordinates, single triangles, instances.
+/// Normals in every direction, a palette of normals, texture coordinates, single triangles, instances.
 Scene scene_of_every_stream() {
   Scene scene = test::scene_of(test::sphere_mesh(30));
   scene.masks.push_back(test::striped_mask());
@@ -232,7 +232,7 @@ TEST_F(IndependentReader, DecodesEveryCodecOfTextures) {
     config.texture_codec = static_cast<TextureCodec>(codec);
     write(scene, config);
     EXPECT_EQ(read(), 0) << kTextureCodecNames[codec];
-    dumped()[dumped().size() - 1 - sizeof(uint32_t)] ^= std::byte{1}; // before the number of levels
+    dumped()[dumped().size() - 1 - sizeof(uint32_t)] ^= std::byte{1}; // the byte before the number of levels
     EXPECT_EQ(read(), 1) << "a texel that differs";
   }
 }
@@ -265,9 +265,9 @@ TEST_F(IndependentReader, DecodesLevelsOfDetailAndCutsThem) {
   ASSERT_GT(file.lod(1).levels.size(), 3u);
   ASSERT_GT(file.lod(file.base_geometry_count() - 1).levels.size(), 1u);
   expect_reads_every_codec();
-  dumped().back() ^= std::byte{1}; // of the last cut's last cluster
+  dumped().back() ^= std::byte{1}; // the last cluster of the last cut
   EXPECT_EQ(read(), 1);
-  // A level that says it holds fewer triangles than a cut of its error needs.
+  // A level that states fewer triangles than a cut at its error has.
   baked::FileHeader header;
   std::memcpy(&header, baked().data(), sizeof header);
   const size_t at = header.sections[baked::kLodLevels].offset + sizeof(baked::LodLevelRecord);
@@ -299,10 +299,12 @@ TEST_F(IndependentReader, ReadsPagesAndNodesThatAreStoredWhole) {
   const ClusterView view = file.cluster(0, 0);
   ASSERT_NE(view.stream_bits().total() % 32, 0u) << "no padding";
   const auto begin = static_cast<size_t>(view.bits() - reinterpret_cast<const uint8_t*>(file.bytes().data()));
-  odd[begin + static_cast<size_t>(view.stream_bits().total() / 32 * 4 + 3)] |= std::byte{0x80}; // nobody reads it
+  // A padding bit, which is never read.
+  odd[begin + static_cast<size_t>(view.stream_bits().total() / 32 * 4 + 3)] |= std::byte{0x80};
   baked::FileHeader header;
   std::memcpy(&header, odd.data(), sizeof header);
-  odd[header.sections[baked::kNodes].offset + offsetof(baked::PackedNode, hi)] ^= std::byte{1}; // not the nearest
+  // No longer the nearest bound.
+  odd[header.sections[baked::kNodes].offset + offsetof(baked::PackedNode, hi)] ^= std::byte{1};
   test::rehash<baked::FileHeader>(odd);
   for (const PageCodec codec : {PageCodec::kFast, PageCodec::kSmall}) {
     const std::vector<std::byte> stored = encode_paged_file(BakedFile::from_bytes(odd), codec);
@@ -332,7 +334,7 @@ TEST_F(IndependentReader, TellsWhatDiffersFromWhatIsNoFile) {
   write(test::scene_of(test::sphere_mesh(8)));
   ASSERT_EQ(read(), 0);
   const std::vector<std::byte> good = dumped();
-  dumped()[16] ^= std::byte{1}; // of the first lattice coordinate
+  dumped()[16] ^= std::byte{1}; // in the first lattice coordinate
   EXPECT_EQ(read(), 1);
   dumped() = good;
   dumped().pop_back();

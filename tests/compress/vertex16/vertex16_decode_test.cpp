@@ -7,9 +7,9 @@
 
 #include <gtest/gtest.h>
 
-#include "compress/format/cluster/normal_codec.h"
 #include "compress/exchange/vertex16/vertex16_fields.h"
 #include "compress/exchange/vertex16/vertex16_generator.h"
+#include "compress/format/cluster/normal_codec.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {
@@ -25,8 +25,10 @@ std::string read_text(const std::string& file) {
 uvec4 with_normal(uint32_t code) { return vertex16_pack(0, 0, 0, 0, code, 0, 0, 0); }
 
 TEST(Vertex16Generator, WhatItWroteIsCurrent) {
-  EXPECT_EQ(read_text("compress/exchange/vertex16/vertex16.glsl"), vertex16_glsl()) << "run vertex16_generator compress/exchange/vertex16";
-  EXPECT_EQ(read_text("compress/exchange/vertex16/vertex16_decode.h"), vertex16_cpp()) << "run vertex16_generator compress/exchange/vertex16";
+  EXPECT_EQ(read_text("compress/exchange/vertex16/vertex16.glsl"), vertex16_glsl())
+      << "run vertex16_generator compress/exchange/vertex16";
+  EXPECT_EQ(read_text("compress/exchange/vertex16/vertex16_decode.h"), vertex16_cpp())
+      << "run vertex16_generator compress/exchange/vertex16";
 }
 
 TEST(Vertex16Generator, TheManualHasTheSameFields) {
@@ -61,7 +63,7 @@ TEST(Vertex16, BytesLieWhereTheManualSays) {
   const uvec4 v = vertex16_pack(0x12345, 0x1abcde, 0x0f0f0f, 1, 0xabcdef, 0x42, 0x1234, 0x5678);
   EXPECT_EQ(v, uvec4(0x12345u | (0x1abcdeu << 21), (0x1abcdeu >> 11) | (0x0f0f0fu << 10) | 0x80000000u, 0x42abcdefu,
                      0x56781234u));
-  // Read as one number of 128 bits, low bits first: the table's offsets.
+  // Read the vertex as one 128-bit number, lowest bits first, with the offsets of the table.
   const auto bits = [&](uint32_t at, uint32_t count) {
     uint64_t value = 0;
     for (uint32_t i = 0; i < count; ++i) value |= uint64_t{(v[(at + i) / 32] >> ((at + i) % 32)) & 1u} << i;
@@ -99,7 +101,7 @@ TEST(Vertex16, TangentsAreUnitVectorsAtRightAnglesAndEvenlySpread) {
       ASSERT_NEAR(glm::dot(Vec3(t), n), 0.0f, 2e-6f);
       ASSERT_EQ(t.w, (angle & 1u) != 0 ? -1.0f : 1.0f);
       const vec4 next = vertex16_tangent(vertex16_pack(0, 0, 0, 0, 0, (angle + 1) & 255u, 0, 0), n);
-      // A step of 1/64 of a side turns by 1/64 to 1/32.
+      // 1/64 of a side turns the direction by 1/64 to 1/32 radians.
       const float turn = std::acos(std::min(glm::dot(Vec3(t), Vec3(next)), 1.0f));
       ASSERT_GT(turn, 0.0150f);
       ASSERT_LT(turn, 0.0316f);

@@ -9,9 +9,9 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "compress/exchange/vertex16/vertex16_geometry.h"
 #include "compress/exchange/vertex16/vertex16_fields.h"
 #include "compress/exchange/vertex16/vertex16_file.h"
+#include "compress/exchange/vertex16/vertex16_geometry.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {
@@ -28,7 +28,7 @@ Vertex16Export export_of(const BakedFile& file) {
 using Corner = std::tuple<float, float, float, float, float, float, float, float>;
 using Face = std::array<Corner, 3>;
 
-/// All triangles of a geometry by material slot, as the baked file decodes them.
+/// All triangles of a geometry with their material slots, decoded from the baked file.
 std::multiset<std::pair<uint32_t, Face>> faces_of(const BakedFile& file, uint32_t geometry) {
   std::multiset<std::pair<uint32_t, Face>> faces;
   for (uint32_t c = 0; c < file.clusters(geometry).size(); ++c) {
@@ -81,7 +81,7 @@ TEST(Vertex16Export, HoldsTheSameTrianglesBitForBit) {
   EXPECT_EQ(exported.report.max_position_error, 0.0);
   EXPECT_EQ(exported.report.max_normal_error_degrees, 0.0);
   EXPECT_EQ(exported.report.max_uv_error, 0.0);
-  EXPECT_EQ(exported.report.triangles, exported.report.index_bytes / 6); // all of 16 bits
+  EXPECT_EQ(exported.report.triangles, exported.report.index_bytes / 6); // all indices have 16 bits
   EXPECT_EQ(exported.report.vertex_bytes, 16 * exported.report.vertices);
   ASSERT_EQ(s.instances.size(), file.instances().size());
   for (uint32_t i = 0; i < s.instances.size(); ++i)
@@ -134,7 +134,8 @@ TEST(Vertex16Export, OtherNormalsAreReencodedWithinTheCodesError) {
 }
 
 TEST(Vertex16Export, WideWorldsLoseTheSameBitsEverywhereAndStayClosed) {
-  // Two meshes that share an edge, of which only one needs a coarser lattice.
+  // Two meshes that share an edge. Only a third, large mesh exceeds the range of a field, but all meshes must use the
+  // same coarser lattice.
   Scene scene = test::scene_of(test::grid_mesh(4));
   test::add_shape(scene, test::grid_mesh(4), test::translation({1, 0, 0}));
   Mesh far = test::soup_mesh(3, 1);
@@ -167,7 +168,7 @@ TEST(Vertex16Export, ShiftIsTheLeastThatFits) {
   constexpr int64_t kCodes = int64_t{1} << 21;
   EXPECT_EQ(vertex16_shift({{0, 0, 0}, {kCodes - 1, 5, 5}}), 0u);
   EXPECT_EQ(vertex16_shift({{0, 0, 0}, {kCodes, 5, 5}}), 1u);
-  EXPECT_EQ(vertex16_shift({{0, -kCodes, 0}, {0, kCodes - 1, 5}}), 2u); // one more than half of it rounds up
+  EXPECT_EQ(vertex16_shift({{0, -kCodes, 0}, {0, kCodes - 1, 5}}), 2u); // one more than half the range rounds up
   EXPECT_EQ(vertex16_shift({{int64_t{1} << 31, 0, 0}, {int64_t{1} << 31, 0, 0}}), 1u);
   EXPECT_EQ(coarser_lattice(-3, 1), -1);
   EXPECT_EQ(coarser_lattice(3, 1), 2);
@@ -193,18 +194,18 @@ TEST(Vertex16Export, ChartsAreMovedToTheFirstTileWhereTexturesRepeat) {
   scene.masks[0].wrap = WrapMode::kClamp;
   EXPECT_GE(uv_of_first().x, 500.0f);
   scene.masks[0].wrap = WrapMode::kRepeat;
-  scene.masks[0].uv_scale = {1.5f, 1.0f}; // a tile further is half a texture further
+  scene.masks[0].uv_scale = {1.5f, 1.0f}; // one tile of uv is one and a half textures
   EXPECT_GE(uv_of_first().x, 500.0f);
 }
 
 TEST(Vertex16Export, TangentsPointAlongUWhereANormalMapNeedsThem) {
   Scene scene = test::scene_of(test::grid_mesh(20, 0.2f, true));
-  Mesh mirrored = test::grid_mesh(20, 0.2f, true); // v as it was, u backwards
+  Mesh mirrored = test::grid_mesh(20, 0.2f, true); // u is reversed, v unchanged
   for (Vec2& uv : mirrored.uvs) uv.x = 1.0f - uv.x;
   test::add_shape(scene, mirrored, test::translation({2, 0, 0}));
   scene.materials[0].flags |= kNormalMap;
   BakeConfig config;
-  config.purpose = baked::kShading; // keeps the texture coordinates
+  config.purpose = baked::kShading; // keeps texture coordinates
   const BakedFile file = BakedFile::from_bytes(test::bake(scene, config).bytes);
   const Vertex16Export exported = export_of(file);
   EXPECT_GT(exported.report.max_tangent_error_degrees, 0.3);
@@ -217,7 +218,7 @@ TEST(Vertex16Export, TangentsPointAlongUWhereANormalMapNeedsThem) {
         for (uint32_t i = 0; i < draw.index_count; ++i, ++vertices) {
           const glm::uvec4 v = s.vertices[s.vertex(draw, i)];
           const glm::vec4 t = vertex16::vertex16_tangent(v, vertex16::vertex16_decode_normal(v));
-          EXPECT_GT(g == 0 ? t.x : -t.x, 0.4f); // steep in places, but never across
+          EXPECT_GT(g == 0 ? t.x : -t.x, 0.4f); // steep in places, but never perpendicular
           EXPECT_LT(std::abs(t.y), 0.6f);
           EXPECT_EQ(t.w, g == 0 ? 1.0f : -1.0f);
         }
@@ -226,7 +227,7 @@ TEST(Vertex16Export, TangentsPointAlongUWhereANormalMapNeedsThem) {
   EXPECT_EQ(export_of(BakedFile::from_bytes(test::bake(scene).bytes)).report.max_tangent_error_degrees, 0.0);
 }
 
-/// Two instances of one geometry, of which only the second has a normal map and a texture that ends.
+/// Two instances of one geometry; only the second has a normal map and a clamped texture.
 TEST(Vertex16Export, SlotsTakeTheMaterialsOfAllInstances) {
   Scene scene = test::scene_of(test::grid_mesh(20, 0.2f, true));
   for (Vec2& uv : scene.meshes[0].uvs) uv += Vec2(40.0f, 0.0f);

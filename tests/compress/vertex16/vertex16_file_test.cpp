@@ -61,7 +61,7 @@ TEST(Vertex16File, EverySingleBitFlipIsRefused) {
   }
 }
 
-/// Reads every vertex, index and mask word that a record names.
+/// Reads every vertex, index and mask word that a record references.
 void read_all(const vertex16::Sections& s) {
   float sum = 0.0f;
   for (const vertex16::DrawRecord& draw : s.draws)
@@ -103,7 +103,7 @@ TEST(Vertex16File, DamageWithRightHashesIsRefusedOrHarmless) {
       ++refused;
     }
   }
-  EXPECT_GT(refused, 1000u); // both ways are taken, or this test tests nothing
+  EXPECT_GT(refused, 1000u); // both outcomes must occur often enough
   EXPECT_GT(accepted, 100u);
 }
 

@@ -15,7 +15,7 @@ using namespace vertex16;
 
 constexpr uint32_t kBatch = 1u << 18, kBatches = 16; // 4 M vertices
 
-/// Any bits at all; normals of all codes, the flat one and those that nobody writes among them.
+/// Random bits; the normals include all codes, the flat one, and numbers that are no codes.
 std::vector<glm::uvec4> random_vertices(test::Random& random) {
   std::vector<glm::uvec4> vertices(kBatch);
   for (glm::uvec4& v : vertices) v = {random.bits(), random.bits(), random.bits(), random.bits()};
@@ -52,7 +52,7 @@ TEST(Vertex16Vulkan, TheShaderDecodesWhatTheHeaderDoes) {
       std::memcpy(got.data(), bytes.data() + i * sizeof got, sizeof got);
       const vec3 position = vertex16_position(vertices[i], frame), normal = vertex16_decode_normal(vertices[i]);
       const vec2 uv = vertex16_uv(vertices[i], frame);
-      // Exact by construction: no rounding before the one product.
+      // Exact by construction: one product, and no rounding before it.
       ASSERT_EQ(vec3(got[0], got[1], got[2]), position) << i;
       ASSERT_EQ(vec2(got[6], got[7]), uv) << i;
       const vec4 tangent = vertex16_tangent(vertices[i], normal);
@@ -63,7 +63,7 @@ TEST(Vertex16Vulkan, TheShaderDecodesWhatTheHeaderDoes) {
       ASSERT_EQ(got[11], tangent.w) << i;
     }
   }
-  EXPECT_LE(largest, 4e-6f); // .0003 degrees: square roots, divisions and fused operations differ between devices
+  EXPECT_LE(largest, 4e-6f); // 0.0003 degrees: devices differ in square roots, divisions and fused operations
   std::printf("%s: normals and tangents of %u vertices within %g\n", gpu->device().c_str(), kBatch * kBatches,
               static_cast<double>(largest));
 }

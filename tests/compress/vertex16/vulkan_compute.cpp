@@ -48,7 +48,7 @@ struct VulkanCompute::State {
     if (instance != VK_NULL_HANDLE) vkDestroyInstance(instance, nullptr);
   }
 
-  /// False where there is no device.
+  /// Returns false if there is no device.
   bool find_device(std::string& name) {
     VkApplicationInfo application{
         VK_STRUCTURE_TYPE_APPLICATION_INFO, nullptr, "test", 0, nullptr, 0, VK_API_VERSION_1_0};

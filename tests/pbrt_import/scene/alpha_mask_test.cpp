@@ -7,7 +7,7 @@
 namespace packtrace {
 namespace {
 
-/// Width x height texels, opaque where `opaque(x, y)`; row 0 is the top.
+/// A mask of width x height texels that is opaque where `opaque(x, y)` is true; row 0 is the top.
 template <typename Opaque>
 AlphaMask make_mask(uint32_t width, uint32_t height, WrapMode wrap, Opaque opaque) {
   AlphaMask mask{width, height, wrap, Vec2(1), Vec2(0), {}};
@@ -18,7 +18,7 @@ AlphaMask make_mask(uint32_t width, uint32_t height, WrapMode wrap, Opaque opaqu
   return mask;
 }
 
-/// uv of a texel's centre.
+/// uv of the centre of a texel.
 Vec2 centre(const AlphaMask& mask, uint32_t x, uint32_t y) {
   return {(static_cast<float>(x) + 0.5f) / static_cast<float>(mask.width),
           1.0f - (static_cast<float>(y) + 0.5f) / static_cast<float>(mask.height)};
@@ -52,7 +52,7 @@ TEST(AlphaMask, IsTransparentOnlyWhereTheWholeBilinearFootprintIsZero) {
 
 TEST(AlphaMask, WrapModesDifferOutsideTheUnitSquare) {
   const auto left_column = [](uint32_t x, uint32_t) { return x == 0; };
-  // Texel centres one image to the right and one to the left of the square.
+  // Texel centres one image to the right and one to the left of the unit square.
   const auto at = [&](WrapMode wrap, float u) { return view(make_mask(4, 4, wrap, left_column)).opaque({u, 0.5f}); };
   EXPECT_TRUE(at(WrapMode::kRepeat, 1.125f));
   EXPECT_FALSE(at(WrapMode::kClamp, 1.125f));
@@ -66,7 +66,7 @@ TEST(AlphaMask, ScaleAndOffsetMapUvToTheImage) {
   AlphaMask mask = make_mask(4, 1, WrapMode::kRepeat, [](uint32_t x, uint32_t) { return x == 2; });
   mask.uv_scale = Vec2(0.5f, 1.0f);
   mask.uv_offset = Vec2(0.25f, 0.0f);
-  EXPECT_TRUE(view(mask).opaque({0.75f, 0.5f})); // s = .625, the centre of texel 2
+  EXPECT_TRUE(view(mask).opaque({0.75f, 0.5f})); // s = 0.625, the centre of texel 2
   EXPECT_FALSE(view(mask).opaque({0.0f, 0.5f}));
 }
 

@@ -22,7 +22,7 @@ TEST(Diagnostics, TextHasPlaceSeverityAndIncludeChain) {
   EXPECT_EQ(to_string(diagnostics.entries()[0]), "geometry.pbrt:3:9: error: bad radius\n  included from main.pbrt:7:1");
 }
 
-/// How an error looks in the last of so many files, each included by the one before it.
+/// Text of an error in the last of `files` files, each included by the previous one.
 std::string text_of_chain(int files) {
   SourceLocation place;
   for (int i = 0; i < files; ++i)

@@ -19,7 +19,8 @@ std::string text_of(const std::string& file) {
   return text.str();
 }
 
-/// Names by bit number, of every match of a pattern whose groups are given.
+/// Maps bit numbers to names for all matches of a pattern.
+/// @param bit,name groups of the pattern
 std::map<int, std::string> bits_in(const std::string& text, const std::regex& pattern, size_t bit, size_t name) {
   std::map<int, std::string> bits;
   for (std::sregex_iterator match(text.begin(), text.end(), pattern), end; match != end; ++match)

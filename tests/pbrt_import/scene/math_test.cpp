@@ -60,7 +60,7 @@ TEST(LookAt, PutsTheTargetAheadAndUpAbove) {
   EXPECT_GT(glm::determinant(glm::dmat3(camera)), 0.0);
 }
 
-TEST(LookAt, LeftHanded) { // looking along +z with +y up, +x is to the right
+TEST(LookAt, LeftHanded) { // if +z is forward and +y is up, +x is right
   const DAffine camera = *look_at(DVec3(0), DVec3(0, 0, 1), DVec3(0, 1, 0));
   expect_near(camera[0], DVec3(1, 0, 0), 0);
 }

@@ -5,7 +5,7 @@
 namespace packtrace {
 namespace {
 
-/// One mesh of two triangles in the world, and an object of the same mesh twice with three instances.
+/// A mesh of two triangles in the world, and an object that contains the mesh twice and has three instances.
 Scene make_scene() {
   Scene scene;
   Mesh mesh;

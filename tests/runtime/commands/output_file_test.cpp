@@ -186,7 +186,7 @@ TEST(OutputFile, PermissionsAreThoseOfNewFiles) {
   for (const bool force : {false, true}) {
     OutputFile file(folder / "a", force);
     file.commit();
-    struct stat info {};
+    struct stat info{};
     ASSERT_EQ(stat((folder / "a").c_str(), &info), 0);
     EXPECT_EQ(info.st_mode & 0777u, 0640u) << force;
   }
@@ -199,7 +199,7 @@ TEST(OutputFile, FullDisksAreReportedByTheNameOfTheTarget) {
   const pid_t child = fork();
   if (child == 0) {
     std::signal(SIGXFSZ, SIG_IGN);
-    const struct rlimit limit { 10, 10 };
+    const struct rlimit limit{10, 10};
     setrlimit(RLIMIT_FSIZE, &limit);
     try {
       OutputFile file(folder / "a", false);

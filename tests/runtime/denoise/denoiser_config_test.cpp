@@ -20,7 +20,7 @@ void expect_rejected(const DenoiserConfig& config) {
 }
 
 template <typename T>
-void expect_range(T DenoiserConfig::*field, T low, T high, T below, T above) {
+void expect_range(T DenoiserConfig::* field, T low, T high, T below, T above) {
   for (T good : {low, high}) {
     DenoiserConfig config;
     config.*field = good;
@@ -34,7 +34,7 @@ void expect_range(T DenoiserConfig::*field, T low, T high, T below, T above) {
   }
 }
 
-void expect_float_range(float DenoiserConfig::*field, float low, float high) {
+void expect_float_range(float DenoiserConfig::* field, float low, float high) {
   const float infinity = std::numeric_limits<float>::infinity();
   expect_range(field, low, high, std::nextafter(low, -infinity), std::nextafter(high, infinity));
   DenoiserConfig config;

@@ -210,7 +210,9 @@ TEST(Exr, KindsThatCannotBeReadAreUnsupported) {
     headers[i].setType(Imf::SCANLINEIMAGE);
     headers[i].channels().insert("Y", Imf::Channel(Imf::HALF));
   }
-  { const Imf::MultiPartOutputFile file((folder / "multi.exr").c_str(), headers.data(), 2); }
+  {
+    const Imf::MultiPartOutputFile file((folder / "multi.exr").c_str(), headers.data(), 2);
+  }
   EXPECT_EQ(error_kind_of([&] { read_exr(folder / "multi.exr"); }), ErrorKind::kUnsupported);
 
   Imf::Header header(4, 4);

@@ -109,7 +109,7 @@ TEST_P(Flight, EndsInThePlanFromScratch) {
                 content(fresh, expected, expected.blas[expected.blas_of_instance[i]]));
     std::set<Content> needed; // only the coarsest cuts and what is used are kept
     for (uint32_t g = 0; g < geometries.size(); ++g)
-      needed.insert({g, BlasKind::kLowest, static_cast<uint32_t>(fresh.steps(g).size()) - 1, {}});
+      needed.insert({g, BlasKind::kCoarsest, static_cast<uint32_t>(fresh.steps(g).size()) - 1, {}});
     for (const PlannedBlas& blas : expected.blas) needed.insert(content(fresh, expected, blas));
     EXPECT_EQ(residency.live_count(), needed.size());
   }
@@ -186,7 +186,7 @@ TEST(BlasResidency, KeepsUnusedStepsAsLongAsItSays) {
   const LodPlan near = sharing.plan(make_detail_view(DVec3(0, 0, 3), 0.01, 1.0, 1080.0, 1.0));
   const LodPlan far = sharing.plan(make_detail_view(DVec3(0, 0, 1e6), 0.01, 1.0, 1080.0, 1.0));
   ASSERT_EQ(near.blas[0].kind, BlasKind::kStep);
-  ASSERT_EQ(far.blas[0].kind, BlasKind::kLowest);
+  ASSERT_EQ(far.blas[0].kind, BlasKind::kCoarsest);
   ASSERT_EQ(residency.update(near).built.size(), 1u);
   for (int frame = 1; frame <= 5; ++frame) ASSERT_TRUE(residency.update(far).dropped.empty());
   EXPECT_EQ(residency.update(near).built.size(), 0u); // was still resident

@@ -105,7 +105,7 @@ TEST(LodSharing, StrictSchemesNeverGiveLessDetailThanTheOwnCut) {
             for (size_t t = 0; t < own_levels.size(); ++t) ASSERT_LE(used_levels[t], own_levels[t]);
           }
           const PlannedBlas& blas = plan.blas[plan.blas_of_instance[i]];
-          shared += blas.users > 1 && blas.kind != BlasKind::kLowest;
+          shared += blas.users > 1 && blas.kind != BlasKind::kCoarsest;
           own += blas.kind == BlasKind::kOwn;
           finer += used != needed;
         }
@@ -167,7 +167,7 @@ TEST(LodSharing, PlansAddUp) {
       EXPECT_EQ(blas.triangles, size.triangles);
       EXPECT_EQ(blas.clusters, size.clusters);
       traced += blas.triangles * blas.users;
-      if (blas.kind == BlasKind::kLowest) continue;
+      if (blas.kind == BlasKind::kCoarsest) continue;
       ++builds, built += blas.triangles, clusters += blas.clusters;
     }
     EXPECT_EQ(plan.builds, builds);

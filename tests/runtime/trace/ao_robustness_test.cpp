@@ -173,13 +173,13 @@ TEST(AoFrames, FramesOfOneSampleAreOneFrameOfMany) {
   for (size_t i = 0; i < sum.size(); ++i) EXPECT_FLOAT_EQ(whole.ao[i], static_cast<float>(sum[i] / 32));
 }
 
-/// Forwards to a tracer with a given rays_together(), and records the largest number of rays per call.
-class CrowdTracer final : public RayTracer {
+/// Forwards to a tracer with a given preferred_rays_per_call(), and records the largest number of rays per call.
+class CallSizeRecorder final : public RayTracer {
 public:
-  CrowdTracer(const RayTracer& tracer, uint32_t rays) : tracer_(tracer), rays_(rays) {}
+  CallSizeRecorder(const RayTracer& tracer, uint32_t rays) : tracer_(tracer), rays_(rays) {}
   std::string_view name() const override { return tracer_.name(); }
   const UnitSpace& space() const override { return tracer_.space(); }
-  uint32_t rays_together() const override { return rays_; }
+  uint32_t preferred_rays_per_call() const override { return rays_; }
   HitSurface resolve(const RayHit& hit) const override { return tracer_.resolve(hit); }
   std::vector<ResidentPart> resident() const override { return tracer_.resident(); }
   void closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
@@ -211,7 +211,7 @@ TEST(AoFrames, SamplesThatAreTracedTogetherGiveTheSameBytes) {
     AoConfig config = visibility(1.5f, 7); // 7 = 4 + 3
     config.falloff = falloff;
     AoFrame apart, together;
-    const CrowdTracer few(embree, 1), many(embree, 1u << 20);
+    const CallSizeRecorder few(embree, 1), many(embree, 1u << 20);
     trace_ao(source, few, gbuffer, config, 2, apart, progress);
     trace_ao(source, many, gbuffer, config, 2, together, progress);
     EXPECT_EQ(few.most(), gbuffer.size.pixels());
@@ -227,7 +227,7 @@ TEST(AoFrames, SamplesThatThePackedTracerTakesTogetherGiveTheSameBytes) {
   const Scene scene = test::thicket_scene();
   const test::BakedScene baked(scene);
   const PackedTracer packed(baked.file, baked.source);
-  const CrowdTracer one(packed, 1), all(packed, packed.rays_together());
+  const CallSizeRecorder one(packed, 1), all(packed, packed.preferred_rays_per_call());
   AoConfig config = visibility(1.5f, 5); // 5 = 4 + 1
   const GBuffer gbuffer = render(scene, camera_at({0, 6, -9}, {0, 1, 0}), {40, 40}, config).gbuffer;
   Progress progress;

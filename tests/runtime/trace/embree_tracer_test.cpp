@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "pbrt_import/base/error.h"
-#include "runtime/trace/source/float_source.h"
 #include "runtime/trace/make_tracer.h"
+#include "runtime/trace/source/float_source.h"
 #include "tests/runtime/trace/test_scenes.h"
 
 namespace packtrace {

@@ -43,7 +43,7 @@ std::vector<Ray> rays_within(const Region& region, size_t count, const UnitSpace
 /// must have the same hit; the others must hit nothing or the extreme object. Up to 1 in 200 rays may differ, as rays
 /// that pass an outline do.
 /// @param usual scene without the extreme object; its instances come first in `scene`
-void expect_what_is_usual(const Scene& usual, const Scene& scene, const Region& region, size_t least_hits) {
+void expect_usual_hits(const Scene& usual, const Scene& scene, const Region& region, size_t least_hits) {
   const FloatSource floats(usual);
   const EmbreeTracer embree(floats, {});
   const std::vector<RayHit> expected = test::closest(embree, rays_within(region, kRays, embree.space()));
@@ -105,14 +105,14 @@ TEST(ExtremeScenes, AFloorOfAnySizeLiesBelowWhatStandsOnIt) {
     return scene;
   };
   for (const float size : {1e2f, 1e6f, 1e9f, 1e12f})
-    expect_what_is_usual(standing_on(10.0f), standing_on(size), about(6e-3), kRays / 2);
+    expect_usual_hits(standing_on(10.0f), standing_on(size), about(6e-3), kRays / 2);
 }
 
 TEST(ExtremeScenes, AnInstanceFarAwayLeavesTheOthersWhereTheyAre) {
   for (const float distance : {1e6f, 1e15f, 1e30f}) {
     Scene scene = spheres();
     scene.instances.push_back({0, Affine(placed(DVec3(distance, -distance, 0.5 * distance)))});
-    expect_what_is_usual(spheres(), scene, about(6.0), kRays / 4);
+    expect_usual_hits(spheres(), scene, about(6.0), kRays / 4);
   }
 }
 
@@ -120,7 +120,7 @@ TEST(ExtremeScenes, TinyAndEnormousInstancesLieBesideOthers) {
   for (const double scale : {1e-20, 1e-12, 1e12, 1e20}) {
     Scene scene = spheres();
     scene.instances.push_back({0, Affine(placed({1, 1, 1}, DVec3(scale), 50))});
-    expect_what_is_usual(spheres(), scene, about(6.0), kRays / 4);
+    expect_usual_hits(spheres(), scene, about(6.0), kRays / 4);
   }
 }
 
@@ -130,8 +130,8 @@ TEST(ExtremeScenes, AGeometryOfAnySizeLiesBesideOthers) {
     scene.instances.push_back({add_object(scene, floor_of(size)), Affine(placed({0, -0.5, 0}))});
     return scene;
   };
-  expect_what_is_usual(spheres(), above(1e-30f), about(6.0), kRays / 4);
-  for (const float size : {1e15f, 1e30f}) expect_what_is_usual(above(1e4f), above(size), about(6.0), kRays / 2);
+  expect_usual_hits(spheres(), above(1e-30f), about(6.0), kRays / 4);
+  for (const float size : {1e15f, 1e30f}) expect_usual_hits(above(1e4f), above(size), about(6.0), kRays / 2);
 }
 
 TEST(ExtremeScenes, ThingsWithoutAnExtentLieBesideOthers) {
@@ -141,7 +141,7 @@ TEST(ExtremeScenes, ThingsWithoutAnExtentLieBesideOthers) {
   for (const uint32_t object : {line, point}) scene.instances.push_back({object, Affine(placed({3, 0, 0}))});
   for (const DVec3 scale : {DVec3(1, 0, 1), DVec3(0, 0, 1), DVec3(0)})
     scene.instances.push_back({0, Affine(placed({0, -50, 0}, scale))});
-  expect_what_is_usual(spheres(), scene, about(6.0), kRays / 4);
+  expect_usual_hits(spheres(), scene, about(6.0), kRays / 4);
 }
 
 /// Mean number of placements that a ray enters.

@@ -5,9 +5,9 @@
 
 #include <gtest/gtest.h>
 
-#include "runtime/trace/source/float_source.h"
 #include "runtime/camera/lod_view.h"
 #include "runtime/camera/primary_visibility.h"
+#include "runtime/trace/source/float_source.h"
 #include "tests/runtime/trace/test_scenes.h"
 
 namespace packtrace {

@@ -21,7 +21,7 @@ size_t wrong_batches(const BakedFile& file, const packed::Kernels& kernels, size
     for (uint32_t c = 0; c < geometry.cluster_count; ++c) {
       const ClusterView view = file.cluster(g, c);
       const packed::TraceCluster cluster = trace_cluster(tree, geometry, view, packed::kSeenByCamera);
-      if ((cluster.flags & packed::kWide) != 0) continue;
+      if ((cluster.flags & packed::kNeedsWideDecode) != 0) continue;
       for (uint32_t first = 0; first < view.triangle_count(); ++first)
         for (uint32_t count = 1; count <= std::min(view.triangle_count() - first, 16u); ++count) {
           packed::DecodedBatch decoded{}, expected{};
@@ -95,7 +95,7 @@ TEST(TraceCluster, LeavesWhatDoesNotFitToTheExactDecoder) {
   const PackedTrees trees = build_packed_trees(baked.file.sections());
   const packed::TraceCluster cluster =
       trace_cluster(trees.trees[0], baked.file.geometries()[0], baked.file.cluster(0, 0), packed::kSeenByCamera);
-  EXPECT_TRUE((cluster.flags & packed::kWide) != 0);
+  EXPECT_TRUE((cluster.flags & packed::kNeedsWideDecode) != 0);
   for (const PackedIsa isa : test::isas()) {
     const PackedTracer tracer(baked.file, baked.source, isa);
     Ray ray; // from the centre outwards

@@ -6,8 +6,8 @@
 
 #include "compress/bake/bake_scene.h"
 #include "compress/format/file/baked_file.h"
-#include "runtime/trace/source/float_source.h"
 #include "runtime/camera/primary_visibility.h"
+#include "runtime/trace/source/float_source.h"
 #include "tests/runtime/trace/test_scenes.h"
 
 namespace packtrace {

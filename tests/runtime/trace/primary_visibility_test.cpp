@@ -7,8 +7,8 @@
 #include <tbb/global_control.h>
 
 #include "pbrt_import/base/error.h"
-#include "runtime/trace/source/float_source.h"
 #include "runtime/trace/make_tracer.h"
+#include "runtime/trace/source/float_source.h"
 #include "tests/runtime/trace/test_scenes.h"
 
 namespace packtrace {

@@ -6,8 +6,8 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "pbrt_import/scene/camera_rays.h"
-#include "runtime/trace/source/float_source.h"
 #include "runtime/camera/primary_visibility.h"
+#include "runtime/trace/source/float_source.h"
 
 namespace packtrace::test {
 

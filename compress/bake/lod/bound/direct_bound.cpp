@@ -6,11 +6,11 @@
 #include <utility>
 #include <vector>
 
+#include "compress/bake/clusters/renumbering.h"
 #include "compress/bake/lod/bound/stated_error.h"
 #include "compress/bake/lod/bound/surface_side.h"
 #include "compress/bake/lod/bound/triangle_refiner.h"
 #include "compress/bake/lod/bound/triangle_set.h"
-#include "compress/bake/clusters/renumbering.h"
 
 namespace packtrace {
 namespace {
@@ -19,8 +19,9 @@ using Corners = std::array<DVec3, 3>;
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kRounding = 1e-3; // steps; tolerance when triangles are clipped
 constexpr double kSlack = 1.25;    // stops once the largest error left is within this factor of largest_
-// At most max(kFew, 1 / kFewOf of all triangles) are measured: if more have large errors, tightening them gains little.
-constexpr size_t kFew = 512, kFewOf = 8;
+// At most max(kFew, 1 / kMeasuredFraction of all triangles) are measured: if more have large errors, tightening them
+// gains little.
+constexpr size_t kFew = 512, kMeasuredFraction = 8;
 constexpr size_t kWork = 400; // maximum work per triangle of the group: distances and triangles looked at
 
 /// A convex planar polygon.
@@ -78,13 +79,13 @@ private:
 class Tightener {
 public:
   Tightener(const DirectBoundInput& input, SimplifyMesh& mesh, SurfaceLinks& links)
-      : in_(input), m_(mesh), links_(links), after_({mesh.points, mesh.triangles}), largest_(input.floor) {
-    after_.link();
+      : in_(input), m_(mesh), links_(links), simplified_({mesh.points, mesh.triangles}), largest_(input.floor) {
+    simplified_.link();
   }
 
   void run() {
     fill_heap();
-    size_t left = std::max(kFew, (in_.triangles.size() + m_.triangles.size()) / kFewOf);
+    size_t left = std::max(kFew, (in_.triangles.size() + m_.triangles.size()) / kMeasuredFraction);
     while (!heap_.empty() && heap_.front().first > kSlack * largest_ && left-- > 0 && !spent()) {
       std::pop_heap(heap_.begin(), heap_.end());
       const auto [stated, number] = heap_.back();
@@ -153,12 +154,12 @@ private:
   double measure_before(uint32_t t, double stated) {
     const Corners corners = corners_before(t);
     const Neighbourhood near(corners);
-    const double had = in_.triangles[t].error;
-    const DVec3 lo = glm::min(glm::min(corners[0], corners[1]), corners[2]) - had;
-    const DVec3 hi = glm::max(glm::max(corners[0], corners[1]), corners[2]) + had;
+    const double inherited = in_.triangles[t].error;
+    const DVec3 lo = glm::min(glm::min(corners[0], corners[1]), corners[2]) - inherited;
+    const DVec3 hi = glm::max(glm::max(corners[0], corners[1]), corners[2]) + inherited;
     gather_after(t);
     set_.clear(), vertices_.clear(), distances_.clear();
-    for (const uint32_t s : after_.candidates()) set_.add(after_.surface(), s);
+    for (const uint32_t s : simplified_.candidates()) set_.add(simplified_.surface(), s);
     double largest = 0.0, worst = 0.0; // of parts near enough, and of the others
     pieces_.clear(), worst_pieces_.clear();
     numbers_.assign(1, in_.numbers[t]);
@@ -167,13 +168,13 @@ private:
       size_t kept = 0;
       for (const uint32_t below : numbers_) {
         if (spent()) return stated;
-        const size_t before = worst_pieces_.size();
+        const size_t source = worst_pieces_.size();
         const double bound = measure_below(t, near, below, depth, stated);
         if (bound <= largest_) {
           largest = std::max(largest, bound);
-          pieces_.insert(pieces_.end(), worst_pieces_.begin() + static_cast<std::ptrdiff_t>(before),
+          pieces_.insert(pieces_.end(), worst_pieces_.begin() + static_cast<std::ptrdiff_t>(source),
                          worst_pieces_.end());
-          worst_pieces_.resize(before);
+          worst_pieces_.resize(source);
         } else {
           worst = std::max(worst, bound);
           numbers_[kept++] = below;
@@ -204,7 +205,7 @@ private:
       const Corners corners_part{part.corners[0], part.corners[i - 1], part.corners[i]};
       double distance = measure_part(corners_part, enough, kInfinite);
       if (distance > enough && last) {
-        after_.gather_within(corners_part, std::min(distance, (stated - error) / kErrorInflation));
+        simplified_.gather_within(corners_part, std::min(distance, (stated - error) / kErrorInflation));
         work_ += m_.triangles.size();
         distance = measure_part(corners_part, enough, distance);
         gather_after(t);
@@ -217,7 +218,7 @@ private:
   /// Makes the simplified triangles around the points that t's corners became the candidates.
   void gather_after(uint32_t t) {
     const Triangle& p = in_.triangles[t].points;
-    after_.gather({m_.stands_for[p.x], m_.stands_for[p.y], m_.stands_for[p.z]});
+    simplified_.gather({m_.stands_for[p.x], m_.stands_for[p.y], m_.stands_for[p.z]});
   }
 
   /// The triangle of set_ whose largest distance from a lower-level triangle is smallest, and that distance.
@@ -248,22 +249,22 @@ private:
   double measure_part(const Corners& part, double enough, double known) {
     best_.clear();
     double best = known;
-    lay(part, enough, best);
+    overlay(part, enough, best);
     if (best > enough) refine(part, enough, best);
     for (const auto& [s, d] : best_) worst_pieces_.push_back(s);
     return best;
   }
 
   /// Bounds by an overlay; replaces best_ and `best` if that bound is smaller.
-  void lay(const Corners& triangle, double enough, double& best) {
+  void overlay(const Corners& triangle, double enough, double& best) {
     overlay_.clear();
-    work_ += after_.candidates().size();
+    work_ += simplified_.candidates().size();
     const DVec3 normal = glm::cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
-    if (!after_.lay(triangle, normal, overlay_)) return;
+    if (!simplified_.overlay(triangle, normal, overlay_)) return;
     double largest = 0.0;
     tried_.clear();
     for (OverlayPiece& piece : overlay_) {
-      if (piece.distance > enough) piece.distance = after_.overlay().nearest_distance(piece);
+      if (piece.distance > enough) piece.distance = simplified_.overlay().nearest_distance(piece);
       largest = std::max(largest, piece.distance);
       tried_.emplace_back(piece.triangle, piece.distance);
     }
@@ -273,7 +274,7 @@ private:
   /// Bounds by subdivision; replaces best_ and `best` if that bound is smaller.
   void refine(const Corners& triangle, double enough, double& best) {
     tried_.clear();
-    refiner_.begin(after_);
+    refiner_.begin(simplified_);
     refiner_.measure_corners(triangle);
     const double d = refiner_.run([&](double distance, uint32_t) { return distance <= enough; },
                                   [&](uint32_t s, double distance) { tried_.emplace_back(s, distance); });
@@ -285,20 +286,20 @@ private:
   /// Bounds the error of a simplified triangle. Goes back level by level while the bound exceeds largest_.
   double measure_after(uint32_t s, double stated) {
     if (linked_.ends.empty()) linked_ = links_.by_after(m_.triangles.size());
-    const Corners corners = after_.corners(s);
+    const Corners corners = simplified_.corners(s);
     const DVec3 lo = glm::min(glm::min(corners[0], corners[1]), corners[2]) - stated;
     const DVec3 hi = glm::max(glm::max(corners[0], corners[1]), corners[2]) + stated;
     numbers_.clear();
-    for (uint32_t i = linked_.ends[s]; i < linked_.ends[s + 1]; ++i) numbers_.push_back(in_.numbers[linked_.before[i]]);
+    for (uint32_t i = linked_.ends[s]; i < linked_.ends[s + 1]; ++i) numbers_.push_back(in_.numbers[linked_.source[i]]);
     double bound = stated;
     for (uint32_t depth = 0; depth < TriangleHistory::kDepth && bound > largest_ && !spent() && go_back(lo, hi);
          ++depth)
-      bound = std::min(bound, measure_over_below(corners));
+      bound = std::min(bound, measure_against_lower(corners));
     return bound;
   }
 
   /// Bounds a simplified triangle by subdivision against the triangles in numbers_.
-  double measure_over_below(const Corners& corners) {
+  double measure_against_lower(const Corners& corners) {
     TriangleSet& below = refiner_.begin();
     for (const uint32_t number : numbers_) below.add(corners_of(number), number);
     const auto stated = [&](double distance, uint32_t number) {
@@ -314,7 +315,7 @@ private:
   const DirectBoundInput& in_;
   SimplifyMesh& m_;
   SurfaceLinks& links_;
-  SurfaceSide after_;
+  SurfaceSide simplified_;
   double largest_;                                ///< lower bound of the group's error
   std::vector<std::pair<double, uint32_t>> heap_; ///< error bounds; source triangles first, then simplified ones
   LinkLists linked_;                              ///< set up on first use
@@ -337,7 +338,7 @@ void bound_directly(const DirectBoundInput& input, SimplifyMesh& mesh, SurfaceLi
   if (input.dropped || std::any_of(input.numbers.begin(), input.numbers.end(), below))
     Tightener(input, mesh, links).run();
   for (const SurfaceLink& link : links.links)
-    mesh.triangles[link.after].error = std::max(mesh.triangles[link.after].error, links.bounds[link.before]);
+    mesh.triangles[link.simplified].error = std::max(mesh.triangles[link.simplified].error, links.bounds[link.source]);
 }
 
 } // namespace packtrace

@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <span>
 
-#include "compress/bake/lod/simplify/simplify.h"
 #include "compress/bake/lod/bound/surface_bound.h"
 #include "compress/bake/lod/bound/triangle_history.h"
+#include "compress/bake/lod/simplify/simplify.h"
 
 namespace packtrace {
 
@@ -29,8 +29,8 @@ struct DirectBoundInput {
 /// on the simplified surface. Simplified triangles are measured against all lower-level triangles that their linked
 /// source triangles go back to.
 /// @param mesh the simplified mesh; its triangle errors are updated
-/// @param links from bound_errors(), with `after` numbering the triangles left in the mesh and bounds that include the
-/// errors of dropped pieces; more links are appended
+/// @param links from bound_errors(), with `simplified` numbering the triangles left in the mesh and bounds that include
+/// the errors of dropped pieces; more links are appended
 void bound_directly(const DirectBoundInput& input, SimplifyMesh& mesh, SurfaceLinks& links);
 
 } // namespace packtrace

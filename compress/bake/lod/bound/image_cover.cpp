@@ -29,21 +29,21 @@ void ImageCover::add(uint32_t triangle, const TriangleImages::Image& image) {
 
 /// Marks the triangles that borders of the mapped images cross, and the sides that they run along.
 void ImageCover::mark_borders(std::span<const uint8_t> mapped) {
-  using Way = SurfaceWalk::Way;
-  const std::span<const Way> ways = walk_.ways();
+  using EdgePath = SurfaceWalk::EdgePath;
+  const std::span<const EdgePath> ways = walk_.ways();
   std::vector<int32_t> balance(ways.size());
   for (uint32_t t = 0; 3 * size_t{t} < mesh_.side_edges.size(); ++t) {
     if (mapped[t] == 0) continue;
-    const Triangle& p = walk_.before().triangles[t].points;
+    const Triangle& p = walk_.source().triangles[t].points;
     const uint32_t* edge = &mesh_.side_edges[3 * size_t{t}];
     balance[edge[0]] += p.x < p.y ? 1 : -1;
     balance[edge[1]] += p.y < p.z ? 1 : -1;
     balance[edge[2]] += p.z < p.x ? 1 : -1;
   }
   for (uint32_t e = 0; e < ways.size(); ++e) {
-    const Way& w = ways[e];
+    const EdgePath& w = ways[e];
     if (balance[e] == 0) continue;
-    if (w.state == Way::State::kAcross) {
+    if (w.state == EdgePath::State::kAcross) {
       borders_[w.start] |= kCrossed;
       for (uint32_t k = w.first; k < w.first + w.count; ++k) borders_[walk_.into(k)] |= kCrossed;
     } else if (const uint32_t side = walk_.side_along(e); side != kNone) {

@@ -26,9 +26,11 @@ public:
   /// Adds the image of a mapped source triangle.
   void add(uint32_t triangle, const TriangleImages::Image& image);
   /// Adds a simplified triangle that is also a source triangle.
-  void add_unchanged(uint32_t after) { shares_[after] += 1.0; }
+  void add_unchanged(uint32_t simplified) { shares_[simplified] += 1.0; }
   /// Whether images cover the whole simplified triangle. Valid once all images are added.
-  bool whole(uint32_t after) const { return part_[after] != kNone && std::abs(shares_[seeds_[part_[after]]]) > 0.5; }
+  bool whole(uint32_t simplified) const {
+    return part_[simplified] != kNone && std::abs(shares_[seeds_[part_[simplified]]]) > 0.5;
+  }
 
 private:
   static constexpr uint32_t kNone = SurfaceWalk::kNone;

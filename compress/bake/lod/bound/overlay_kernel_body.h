@@ -112,7 +112,7 @@ struct Sides4 {
 }
 
 [[gnu::always_inline]] inline void load(const OverlayPoint* const* from, Corner4& out) {
-  const auto at = [&](int i) __attribute__((always_inline))->const LanesIn& {
+  const auto at = [&](int i) __attribute__((always_inline)) -> const LanesIn& {
     return *reinterpret_cast<const LanesIn*>(from[i]);
   };
   const Lanes v0 = at(0), v1 = at(1), v2 = at(2), v3 = at(3);

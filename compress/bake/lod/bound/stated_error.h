@@ -7,7 +7,7 @@ namespace packtrace {
 inline constexpr double kErrorInflation = 1.001; ///< factor on measured distances that covers all rounding errors
 
 /// Error bound from a measured distance and the inherited error of the triangle that it was measured to or from.
-inline double stated_error(double distance, double had) { return distance * kErrorInflation + had; }
+inline double stated_error(double distance, double inherited) { return distance * kErrorInflation + inherited; }
 
 /// Error bounds of a group while its triangles are measured. The group's error is that of its worst part, so parts
 /// below limit() need no closer look.
@@ -19,7 +19,9 @@ struct GroupError {
   double proven = 0.0;  ///< lower bound of the group's error, as far as the candidates tell
 
   double limit() const { return std::max(largest, kSlack * proven); }
-  bool enough(double distance, double had) const { return distance <= kFine || stated_error(distance, had) <= limit(); }
+  bool enough(double distance, double inherited) const {
+    return distance <= kFine || stated_error(distance, inherited) <= limit();
+  }
 };
 
 } // namespace packtrace

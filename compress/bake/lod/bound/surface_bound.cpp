@@ -20,7 +20,7 @@ namespace {
 using Corners = std::array<DVec3, 3>;
 
 /// A source triangle with a known image, or with an overlay: pieces_[first .. first + count).
-struct Laid {
+struct MappedTriangle {
   uint32_t triangle;
   bool settled = false; ///< a tighter measurement replaces this one
   TriangleImages::Image image;
@@ -37,24 +37,24 @@ struct Claim {
 class Measurer {
 public:
   Measurer(std::span<const DVec3> points, std::span<const LodTriangle> triangles, SimplifyMesh& mesh)
-      : m_(mesh), before_({points, triangles}, mesh.stands_for), after_({mesh.points, mesh.triangles}),
-        walk_(before_.surface(), after_, mesh), images_(walk_, mesh), cover_(walk_, images_, mesh),
+      : m_(mesh), source_({points, triangles}, mesh.stands_for), simplified_({mesh.points, mesh.triangles}),
+        walk_(source_.surface(), simplified_, mesh), images_(walk_, mesh), cover_(walk_, images_, mesh),
         errors_(mesh.triangles.size()), bounds_(triangles.size()), mapped_(triangles.size()),
         unchanged_(triangles.size()) {}
 
   SurfaceLinks run() {
-    after_.link();
+    simplified_.link();
     find_unchanged();
     links_.reserve(4 * unchanged_.size());
-    laid_.reserve(unchanged_.size());
+    mapped_triangles_.reserve(unchanged_.size());
     claims_.reserve(unchanged_.size());
     for (uint32_t t = 0; t < unchanged_.size(); ++t)
-      if (unchanged_[t] == 0) lay_over_after(t);
+      if (unchanged_[t] == 0) map_or_overlay(t);
     settle();
-    for (const uint32_t t : not_covered_) {
+    for (const uint32_t t : without_overlay_) {
       best_.clear();
-      after_.gather(before_.corner_points(t));
-      measure_harder(t, std::numeric_limits<double>::infinity());
+      simplified_.gather(source_.corner_points(t));
+      measure_by_subdivision(t, std::numeric_limits<double>::infinity());
     }
     measure_uncovered();
     for (size_t s = 0; s < errors_.size(); ++s) m_.triangles[s].error = errors_[s];
@@ -62,23 +62,23 @@ public:
   }
 
 private:
-  double had(uint32_t before) const { return before_.surface().triangles[before].error; }
+  double inherited_error(uint32_t source) const { return source_.surface().triangles[source].error; }
 
   /// Part of the simplified triangle lies within the distance of the source triangle.
-  void note_after(uint32_t after, uint32_t before, double distance) {
-    errors_[after] = std::max(errors_[after], stated_error(distance, had(before)));
-    error_.largest = std::max(error_.largest, errors_[after]);
-    link(before, after);
+  void note_after(uint32_t simplified, uint32_t source, double distance) {
+    errors_[simplified] = std::max(errors_[simplified], stated_error(distance, inherited_error(source)));
+    error_.largest = std::max(error_.largest, errors_[simplified]);
+    link(source, simplified);
   }
 
-  void link(uint32_t before, uint32_t after) {
-    if (links_.empty() || links_.back() != SurfaceLink{before, after}) links_.push_back({before, after});
+  void link(uint32_t source, uint32_t simplified) {
+    if (links_.empty() || links_.back() != SurfaceLink{source, simplified}) links_.push_back({source, simplified});
   }
 
   /// Parts of both triangles lie within the distance of each other.
-  void note(uint32_t after, uint32_t before, double distance) {
-    note_after(after, before, distance);
-    bounds_[before] = std::max(bounds_[before], stated_error(distance, had(before)));
+  void note(uint32_t simplified, uint32_t source, double distance) {
+    note_after(simplified, source, distance);
+    bounds_[source] = std::max(bounds_[source], stated_error(distance, inherited_error(source)));
   }
 
   /// Maps triangles that simplify() left unchanged to themselves.
@@ -86,7 +86,7 @@ private:
     for (uint32_t s = 0; s < errors_.size(); ++s) {
       const Triangle& now = m_.triangles[s].points;
       const uint32_t t = m_.source[s];
-      if (now != before_.surface().triangles[t].points || m_.moved[now.x] + m_.moved[now.y] + m_.moved[now.z] != 0)
+      if (now != source_.surface().triangles[t].points || m_.moved[now.x] + m_.moved[now.y] + m_.moved[now.z] != 0)
         continue;
       unchanged_[t] = mapped_[t] = 1;
       note(s, t, 0.0);
@@ -94,31 +94,32 @@ private:
   }
 
   /// Finds the image of a source triangle or, without one, overlays it on the simplified surface.
-  void lay_over_after(uint32_t t) {
-    Laid laid{t, false, {}};
-    mapped_[t] = images_.find(t, laid.image);
+  void map_or_overlay(uint32_t t) {
+    MappedTriangle entry{t, false, {}};
+    mapped_[t] = images_.find(t, entry.image);
     if (mapped_[t] == 0) {
-      after_.gather(before_.corner_points(t));
-      laid.image.first = static_cast<uint32_t>(pieces_.size());
-      if (!after_.lay(before_.corners(t), before_.surface().area_normal(t), pieces_)) {
-        not_covered_.push_back(t);
+      simplified_.gather(source_.corner_points(t));
+      entry.image.first = static_cast<uint32_t>(pieces_.size());
+      if (!simplified_.overlay(source_.corners(t), source_.surface().area_normal(t), pieces_)) {
+        without_overlay_.push_back(t);
         return;
       }
-      laid.image.count = static_cast<uint32_t>(pieces_.size()) - laid.image.first;
-      laid.image.distance = largest_of(laid);
+      entry.image.count = static_cast<uint32_t>(pieces_.size()) - entry.image.first;
+      entry.image.distance = largest_of(entry);
     }
-    if (laid.image.distance > GroupError::kFine)
-      claims_.push_back({stated_error(laid.image.distance, had(t)), static_cast<uint32_t>(laid_.size())});
-    laid_.push_back(laid);
+    if (entry.image.distance > GroupError::kFine)
+      claims_.push_back(
+          {stated_error(entry.image.distance, inherited_error(t)), static_cast<uint32_t>(mapped_triangles_.size())});
+    mapped_triangles_.push_back(entry);
   }
 
-  std::span<const OverlayPiece> pieces_of(const Laid& laid) const {
-    return std::span(pieces_).subspan(laid.image.first, laid.image.count);
+  std::span<const OverlayPiece> pieces_of(const MappedTriangle& entry) const {
+    return std::span(pieces_).subspan(entry.image.first, entry.image.count);
   }
 
-  double largest_of(const Laid& laid) const {
+  double largest_of(const MappedTriangle& entry) const {
     double largest = 0.0;
-    for (const OverlayPiece& piece : pieces_of(laid)) largest = std::max(largest, piece.distance);
+    for (const OverlayPiece& piece : pieces_of(entry)) largest = std::max(largest, piece.distance);
     return largest;
   }
 
@@ -127,87 +128,87 @@ private:
     std::make_heap(claims_.begin(), claims_.end());
     while (!claims_.empty() && claims_.front().stated > error_.limit()) {
       std::pop_heap(claims_.begin(), claims_.end());
-      Laid& laid = laid_[claims_.back().index];
+      MappedTriangle& entry = mapped_triangles_[claims_.back().index];
       claims_.pop_back();
-      laid.settled = true;
-      const uint32_t t = laid.triangle;
-      if (look_closer_at_image(laid)) continue;
+      entry.settled = true;
+      const uint32_t t = entry.triangle;
+      if (look_closer_at_image(entry)) continue;
       mapped_[t] = 0;
-      after_.gather(before_.corner_points(t));
+      simplified_.gather(source_.corner_points(t));
       best_.clear();
       // Even with an image, the triangle may not be covered by the candidates.
-      const bool once = after_.lay(before_.corners(t), before_.surface().area_normal(t), best_);
+      const bool once = simplified_.overlay(source_.corners(t), source_.surface().area_normal(t), best_);
       const double distance = once ? look_closer(t) : std::numeric_limits<double>::infinity();
-      if (error_.enough(distance, had(t)))
+      if (error_.enough(distance, inherited_error(t)))
         accept(t);
       else
-        measure_harder(t, distance);
+        measure_by_subdivision(t, distance);
     }
-    edge_had_.assign(walk_.ways().size(), -1.0);
-    point_had_.assign(before_.surface().points.size(), -1.0);
-    for (const Laid& laid : laid_) {
-      if (laid.settled) continue;
-      if (mapped_[laid.triangle] != 0)
-        see_image(laid);
+    edge_inherited_error_.assign(walk_.ways().size(), -1.0);
+    point_inherited_error_.assign(source_.surface().points.size(), -1.0);
+    for (const MappedTriangle& entry : mapped_triangles_) {
+      if (entry.settled) continue;
+      if (mapped_[entry.triangle] != 0)
+        accept_image(entry);
       else
-        accept(pieces_of(laid), laid.triangle);
+        accept(pieces_of(entry), entry.triangle);
     }
-    accept_ways();
+    accept_paths();
     for (const double error : errors_) error_.largest = std::max(error_.largest, error);
   }
 
-  /// Uses an image without further measurements. Records the distance inside it; accept_ways() handles sides and
+  /// Uses an image without further measurements. Records the distance inside it; accept_paths() handles sides and
   /// corners, which neighbours share.
-  void see_image(const Laid& laid) {
-    const uint32_t t = laid.triangle;
-    const Triangle& p = before_.surface().triangles[t].points;
-    const double had = this->had(t), inside = stated_error(laid.image.inside, had);
-    for (const uint32_t s : images_.met(laid.image)) {
+  void accept_image(const MappedTriangle& entry) {
+    const uint32_t t = entry.triangle;
+    const Triangle& p = source_.surface().triangles[t].points;
+    const double inherited_error = this->inherited_error(t), inside = stated_error(entry.image.inside, inherited_error);
+    for (const uint32_t s : images_.met(entry.image)) {
       errors_[s] = std::max(errors_[s], inside);
       link(t, s);
     }
-    bounds_[t] = std::max(bounds_[t], stated_error(laid.image.distance, had));
+    bounds_[t] = std::max(bounds_[t], stated_error(entry.image.distance, inherited_error));
     for (int i = 0; i < 3; ++i) {
-      double& of_edge = edge_had_[m_.side_edges[3 * size_t{t} + static_cast<size_t>(i)]];
-      of_edge = std::max(of_edge, had);
-      point_had_[p[i]] = std::max(point_had_[p[i]], had);
+      double& of_edge = edge_inherited_error_[m_.side_edges[3 * size_t{t} + static_cast<size_t>(i)]];
+      of_edge = std::max(of_edge, inherited_error);
+      point_inherited_error_[p[i]] = std::max(point_inherited_error_[p[i]], inherited_error);
     }
   }
 
   /// Records the distances at path crossings and corner images, for the simplified triangles on both sides.
-  void accept_ways() {
-    for (uint32_t e = 0; e < edge_had_.size(); ++e) {
-      const SurfaceWalk::Way& way = walk_.ways()[e];
-      if (edge_had_[e] < 0.0 || way.state != SurfaceWalk::Way::State::kAcross) continue;
+  void accept_paths() {
+    for (uint32_t e = 0; e < edge_inherited_error_.size(); ++e) {
+      const SurfaceWalk::EdgePath& way = walk_.ways()[e];
+      if (edge_inherited_error_[e] < 0.0 || way.state != SurfaceWalk::EdgePath::State::kAcross) continue;
       uint32_t from = way.start;
       for (uint32_t k = way.first; k < way.first + way.count; ++k) {
-        const double error = stated_error(std::sqrt(walk_.crossing(k).distance2), edge_had_[e]);
+        const double error = stated_error(std::sqrt(walk_.crossing(k).distance2), edge_inherited_error_[e]);
         const uint32_t into = walk_.into(k);
         errors_[from] = std::max(errors_[from], error);
         errors_[into] = std::max(errors_[into], error);
         from = into;
       }
     }
-    for (uint32_t p = 0; p < point_had_.size(); ++p) {
-      if (point_had_[p] < 0.0) continue;
+    for (uint32_t p = 0; p < point_inherited_error_.size(); ++p) {
+      if (point_inherited_error_[p] < 0.0) continue;
       const SurfaceWalk::Place& place = walk_.place(p);
-      const double error = stated_error(std::sqrt(place.distance2), point_had_[p]);
+      const double error = stated_error(std::sqrt(place.distance2), point_inherited_error_[p]);
       if (place.state == SurfaceWalk::Place::State::kTriangle)
         errors_[place.number] = std::max(errors_[place.number], error);
       else if (place.distance2 > 0.0)
-        for (const uint32_t s : after_.around(place.number)) errors_[s] = std::max(errors_[s], error);
+        for (const uint32_t s : simplified_.around(place.number)) errors_[s] = std::max(errors_[s], error);
     }
   }
 
   /// On steep parts an image may lie far from its preimage. Measures to the nearest points instead.
-  bool look_closer_at_image(const Laid& laid) {
-    const uint32_t t = laid.triangle;
+  bool look_closer_at_image(const MappedTriangle& entry) {
+    const uint32_t t = entry.triangle;
     if (mapped_[t] == 0) return false;
     best_.clear();
-    images_.look_closer(t, laid.image, best_);
+    images_.look_closer(t, entry.image, best_);
     double largest = 0.0;
     for (const OverlayPiece& piece : best_) largest = std::max(largest, piece.distance);
-    if (!error_.enough(largest, had(t))) return false;
+    if (!error_.enough(largest, inherited_error(t))) return false;
     accept(t);
     return true;
   }
@@ -217,7 +218,8 @@ private:
   double look_closer(uint32_t t) {
     double largest = 0.0;
     for (OverlayPiece& piece : best_) {
-      if (!error_.enough(piece.distance, had(t))) piece.distance = after_.overlay().nearest_distance(piece);
+      if (!error_.enough(piece.distance, inherited_error(t)))
+        piece.distance = simplified_.overlay().nearest_distance(piece);
       largest = std::max(largest, piece.distance);
     }
     return largest;
@@ -231,12 +233,13 @@ private:
 
   /// Subdivides a triangle that overlays do not bound well.
   /// @param bound largest distance in best_
-  void measure_harder(uint32_t t, double bound) {
-    const Corners p = before_.corners(t);
-    if (after_.candidates().empty()) after_.gather_near(p[0]); // a degenerate triangle without connected neighbours
+  void measure_by_subdivision(uint32_t t, double bound) {
+    const Corners p = source_.corners(t);
+    if (simplified_.candidates().empty())
+      simplified_.gather_near(p[0]); // a degenerate triangle without connected neighbours
     refine_over_after(t, bound, false);
-    if (!error_.enough(bound, had(t))) {
-      after_.gather_within(p, bound);
+    if (!error_.enough(bound, inherited_error(t))) {
+      simplified_.gather_within(p, bound);
       refine_over_after(t, bound, true);
     }
     accept(t);
@@ -245,27 +248,27 @@ private:
   /// @param all whether the candidates include every triangle that may be near enough; only then the corner distances
   /// are a valid lower bound
   void refine_over_after(uint32_t t, double& bound, bool all) {
-    refiner_.begin(after_);
+    refiner_.begin(simplified_);
     // Lower bound of the error against the current candidates.
-    const double before = error_.proven, least = stated_error(refiner_.measure_corners(before_.corners(t)), had(t));
+    const double source = error_.proven,
+                 least = stated_error(refiner_.measure_corners(source_.corners(t)), inherited_error(t));
     error_.proven = std::max(error_.proven, least);
-    if (!error_.enough(bound, had(t))) {
+    if (!error_.enough(bound, inherited_error(t))) {
       refined_.clear();
-      const double refined = refiner_.run([&](double distance, uint32_t) { return error_.enough(distance, had(t)); },
-                                          [&](uint32_t s, double distance) {
-                                            refined_.push_back({s, 0, distance});
-                                          });
+      const double refined =
+          refiner_.run([&](double distance, uint32_t) { return error_.enough(distance, inherited_error(t)); },
+                       [&](uint32_t s, double distance) { refined_.push_back({s, 0, distance}); });
       if (refined < bound) std::swap(best_, refined_), bound = refined;
     }
-    error_.proven = all ? std::max(before, std::min(least, stated_error(bound, had(t)))) : before;
+    error_.proven = all ? std::max(source, std::min(least, stated_error(bound, inherited_error(t)))) : source;
   }
 
   // ---- simplified triangles that images do not cover
 
   void find_covered() {
     cover_.begin(mapped_);
-    for (const Laid& laid : laid_)
-      if (mapped_[laid.triangle] != 0) cover_.add(laid.triangle, laid.image);
+    for (const MappedTriangle& entry : mapped_triangles_)
+      if (mapped_[entry.triangle] != 0) cover_.add(entry.triangle, entry.image);
     for (uint32_t s = 0; s < errors_.size(); ++s)
       if (unchanged_[m_.source[s]] != 0) cover_.add_unchanged(s);
   }
@@ -275,23 +278,23 @@ private:
     find_covered();
     std::vector<SurfaceLink> found;
     for (const SurfaceLink& link : links_)
-      if (!cover_.whole(link.after)) found.push_back(link);
+      if (!cover_.whole(link.simplified)) found.push_back(link);
     std::stable_sort(found.begin(), found.end(),
-                     [](const SurfaceLink& a, const SurfaceLink& b) { return a.after < b.after; });
-    UncoveredBound uncovered(before_, after_, error_, refiner_);
+                     [](const SurfaceLink& a, const SurfaceLink& b) { return a.simplified < b.simplified; });
+    UncoveredBound uncovered(source_, simplified_, error_, refiner_);
     std::vector<uint32_t> befores;
     size_t i = 0;
     for (uint32_t s = 0; s < errors_.size(); ++s) {
       if (cover_.whole(s)) continue;
-      before_.link();
-      for (befores.clear(); i < found.size() && found[i].after == s; ++i) befores.push_back(found[i].before);
+      source_.link();
+      for (befores.clear(); i < found.size() && found[i].simplified == s; ++i) befores.push_back(found[i].source);
       uncovered.measure(s, befores);
     }
-    for (const PartDistance& part : uncovered.finish()) note_after(part.after, part.before, part.distance);
+    for (const PartDistance& part : uncovered.finish()) note_after(part.simplified, part.source, part.distance);
   }
 
   SimplifyMesh& m_;
-  SurfaceSide before_, after_;
+  SurfaceSide source_, simplified_;
   SurfaceWalk walk_;
   TriangleImages images_;
   ImageCover cover_;
@@ -301,11 +304,11 @@ private:
   std::vector<uint8_t> mapped_; ///< per source triangle: unchanged, or its image is used
   std::vector<uint8_t> unchanged_;
   std::vector<OverlayPiece> pieces_;
-  std::vector<Laid> laid_;
+  std::vector<MappedTriangle> mapped_triangles_;
   std::vector<Claim> claims_; ///< a heap
   /// largest inherited error of the accepted images at each edge and point; negative if none
-  std::vector<double> edge_had_, point_had_;
-  std::vector<uint32_t> not_covered_;
+  std::vector<double> edge_inherited_error_, point_inherited_error_;
+  std::vector<uint32_t> without_overlay_;
   std::vector<OverlayPiece> best_, refined_; ///< of the current triangle
   TriangleRefiner refiner_;
   GroupError error_;
@@ -315,10 +318,10 @@ private:
 
 LinkLists SurfaceLinks::by_after(size_t count) const {
   LinkLists lists{std::vector<uint32_t>(count + 1), std::vector<uint32_t>(links.size())};
-  for (const SurfaceLink& link : links) ++lists.ends[link.after + 1];
+  for (const SurfaceLink& link : links) ++lists.ends[link.simplified + 1];
   std::partial_sum(lists.ends.begin(), lists.ends.end(), lists.ends.begin());
   std::vector<uint32_t> next(lists.ends.begin(), lists.ends.end() - 1);
-  for (const SurfaceLink& link : links) lists.before[next[link.after]++] = link.before;
+  for (const SurfaceLink& link : links) lists.source[next[link.simplified]++] = link.source;
   return lists;
 }
 

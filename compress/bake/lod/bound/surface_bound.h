@@ -9,13 +9,13 @@ namespace packtrace {
 
 /// A source triangle, part of which maps to a simplified triangle.
 struct SurfaceLink {
-  uint32_t before, after;
+  uint32_t source, simplified;
   bool operator==(const SurfaceLink&) const = default;
 };
 
 /// Source triangles linked to each simplified triangle s: before[ends[s] .. ends[s + 1]), possibly with duplicates.
 struct LinkLists {
-  std::vector<uint32_t> ends, before;
+  std::vector<uint32_t> ends, source;
 };
 
 /// Where each source triangle lies on the simplified surface.

@@ -43,8 +43,8 @@ public:
   void gather_near(DVec3 point); ///< adds a few triangles near a point
   /// Makes every triangle that may be within `distance` of `triangle` a candidate; conservative.
   void gather_within(const std::array<DVec3, 3>& triangle, double distance);
-  bool lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::vector<OverlayPiece>& pieces) {
-    return overlay_.lay(triangle, direction, candidates_, pieces);
+  bool overlay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::vector<OverlayPiece>& pieces) {
+    return overlay_.overlay(triangle, direction, candidates_, pieces);
   }
 
 private:

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <utility>
 
-#include "compress/bake/lod/simplify/corner_lists.h"
 #include "compress/bake/lod/bound/triangle_distance.h"
+#include "compress/bake/lod/simplify/corner_lists.h"
 
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kMostSteps = 32; // maximum number of triangles on a path
+constexpr uint32_t kMaxSteps = 32; // maximum number of triangles on a path
 // minimum sine (edge to normal) of a slice; minimum cosine (normals) of an image's triangle
 constexpr double kSteep = 0.05;
 
@@ -18,10 +18,11 @@ uint32_t last_corner(uint32_t corner) { return CornerLists::last_corner(corner);
 
 } // namespace
 
-SurfaceWalk::SurfaceWalk(const OverlaySurface& before, const SurfaceSide& after, const SimplifyMesh& mesh)
-    : before_(before), after_(after), mesh_(mesh), places_(before.points.size()), ways_(mesh.edge_became.size()),
-      side_of_edge_(mesh.edge_became.size(), kNone), corner_points_(4 * mesh.triangles.size()),
-      opposite_(corner_points_.size(), kNone), normals_(mesh.triangles.size()), facing_(mesh.points.size()) {
+SurfaceWalk::SurfaceWalk(const OverlaySurface& source, const SurfaceSide& simplified, const SimplifyMesh& mesh)
+    : source_(source), simplified_(simplified), mesh_(mesh), places_(source.points.size()),
+      ways_(mesh.edge_became.size()), side_of_edge_(mesh.edge_became.size(), kNone),
+      corner_points_(4 * mesh.triangles.size()), opposite_(corner_points_.size(), kNone),
+      normals_(mesh.triangles.size()), facing_(mesh.points.size()) {
   for (size_t t = 0; t < normals_.size(); ++t) {
     const Triangle& p = mesh.triangles[t].points;
     const DVec3 a = point(p.x);
@@ -71,7 +72,7 @@ inline bool SurfaceWalk::make_slice(const DVec3& from, const DVec3& to, const DV
 }
 
 inline bool SurfaceWalk::leave_point(const Slice& slice, uint32_t from, Exit& out) const {
-  for (const uint32_t t : after_.around(from)) {
+  for (const uint32_t t : simplified_.around(from)) {
     const uint32_t* p = &corner_points_[4 * size_t{t}];
     const uint32_t corner = p[0] == from ? 1u : p[1] == from ? 2u : 0u;
     out.right = &point(p[corner]);
@@ -109,10 +110,10 @@ inline void SurfaceWalk::enter(const Slice& slice, uint32_t corner, Exit& exit) 
     exit.corner = next_corner(corner), exit.left = &next, exit.side_left = side;
 }
 
-/// Walks from the simplified point that `before` became to where `before` projects onto the surface along the normal.
-void SurfaceWalk::find_place(uint32_t before, Place& out) const {
-  const uint32_t became = mesh_.stands_for[before];
-  const DVec3 &from = point(became), &to = before_.points[before];
+/// Walks from the simplified point that `source` became to where `source` projects onto the surface along the normal.
+void SurfaceWalk::find_place(uint32_t source, Place& out) const {
+  const uint32_t became = mesh_.stands_for[source];
+  const DVec3 &from = point(became), &to = source_.points[source];
   out.state = Place::State::kPoint, out.number = became, out.at = from;
   if (from == to) return;
   out.state = Place::State::kNowhere;
@@ -128,7 +129,7 @@ void SurfaceWalk::find_place(uint32_t before, Place& out) const {
       out.state = Place::State::kPoint;
     return;
   }
-  for (uint32_t step = 0; step < kMostSteps; ++step) {
+  for (uint32_t step = 0; step < kMaxSteps; ++step) {
     const double t = exit.side_right / (exit.side_right - exit.side_left);
     const DVec3 crossing = *exit.right + t * (*exit.left - *exit.right);
     if (glm::dot(crossing - slice.from, slice.along) >= 1.0) {
@@ -147,8 +148,8 @@ void SurfaceWalk::find_place(uint32_t before, Place& out) const {
   }
 }
 
-void SurfaceWalk::find_way(uint32_t edge, uint32_t a, uint32_t b, Way& out) {
-  out.state = Way::State::kNowhere;
+void SurfaceWalk::find_path(uint32_t edge, uint32_t a, uint32_t b, EdgePath& out) {
+  out.state = EdgePath::State::kNowhere;
   out.first = static_cast<uint32_t>(crossing_count_);
   const Place &from = place(a), &goal = place(b);
   if (from.state == Place::State::kNowhere || goal.state == Place::State::kNowhere) return;
@@ -157,28 +158,28 @@ void SurfaceWalk::find_way(uint32_t edge, uint32_t a, uint32_t b, Way& out) {
   } else {
     out.start = from.state == Place::State::kTriangle ? from.number : goal.number;
     if (from.state == Place::State::kTriangle ? at(from.number, goal) : has(goal.number, from.number)) {
-      out.state = Way::State::kAcross;
+      out.state = EdgePath::State::kAcross;
       return;
     }
   }
   Slice slice;
   const DVec3 up = facing_[mesh_.stands_for[a]] + facing_[mesh_.stands_for[b]];
-  if (!make_slice(before_.points[a], before_.points[b], up, slice)) return;
+  if (!make_slice(source_.points[a], source_.points[b], up, slice)) return;
   Exit exit;
   if (!(from.state == Place::State::kPoint ? leave_point(slice, from.number, exit)
                                            : leave_triangle(slice, from.number, exit)))
     return;
   out.start = exit.corner / 4;
   make_room();
-  if (cross(slice, exit, goal)) out.state = Way::State::kAcross;
+  if (cross(slice, exit, goal)) out.state = EdgePath::State::kAcross;
   out.count = static_cast<uint32_t>(crossing_count_) - out.first;
   for (uint32_t i = 0; i < out.count; ++i) out.distance2 = std::max(out.distance2, crossings_[out.first + i].distance2);
 }
 
 /// Reserves space for the crossings of one more path.
 inline void SurfaceWalk::make_room() {
-  if (crossing_count_ + kMostSteps <= crossing_room_) return;
-  crossing_room_ = std::max(2 * crossing_room_, 2 * ways_.size() + kMostSteps);
+  if (crossing_count_ + kMaxSteps <= crossing_room_) return;
+  crossing_room_ = std::max(2 * crossing_room_, 2 * ways_.size() + kMaxSteps);
   auto larger = std::make_unique_for_overwrite<Crossing[]>(crossing_room_);
   std::copy_n(crossings_.get(), crossing_count_, larger.get());
   crossings_ = std::move(larger);
@@ -188,7 +189,7 @@ inline void SurfaceWalk::make_room() {
 inline bool SurfaceWalk::cross(const Slice& slice, Exit& exit, const Place& goal) {
   const bool to_point = goal.state == Place::State::kPoint;
   double last = 0.0;
-  for (uint32_t step = 0; step < kMostSteps; ++step) {
+  for (uint32_t step = 0; step < kMaxSteps; ++step) {
     const double t = exit.side_right / (exit.side_right - exit.side_left);
     const DVec3 crossing = *exit.right + t * (*exit.left - *exit.right);
     const double on = glm::dot(crossing - slice.from, slice.along);
@@ -205,7 +206,7 @@ inline bool SurfaceWalk::cross(const Slice& slice, Exit& exit, const Place& goal
 }
 
 /// If the source edge is still an edge of the simplified surface, the path follows it.
-bool SurfaceWalk::find_along(uint32_t edge, uint32_t from, uint32_t to, Way& out) const {
+bool SurfaceWalk::find_along(uint32_t edge, uint32_t from, uint32_t to, EdgePath& out) const {
   const uint32_t side = side_along(edge);
   if (side == kNone) return false;
   const uint32_t begin = point_at(side), end = point_at(next_corner(side));
@@ -213,7 +214,7 @@ bool SurfaceWalk::find_along(uint32_t edge, uint32_t from, uint32_t to, Way& out
   if (!forward && !(begin == to && end == from)) return false;
   (forward ? out.start : out.right) = side / 4;
   (forward ? out.right : out.start) = across(side / 4, begin);
-  out.state = Way::State::kAlong;
+  out.state = EdgePath::State::kAlong;
   return true;
 }
 

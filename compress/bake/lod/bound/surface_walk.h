@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "compress/bake/lod/simplify/simplify.h"
 #include "compress/bake/lod/bound/surface_side.h"
+#include "compress/bake/lod/simplify/simplify.h"
 
 namespace packtrace {
 
@@ -38,7 +38,7 @@ public:
   /// The path of a source edge, from its lower-numbered point to the higher one. kAcross: begins in triangle `start`
   /// and enters further triangles at crossings first .. first + count. kAlong: follows a simplified edge with triangle
   /// `start` on its left and `right` on its right.
-  struct Way {
+  struct EdgePath {
     enum class State : uint8_t { kUnknown, kNowhere, kAlong, kAcross };
     double distance2 = 0.0; ///< largest of its crossings
     uint32_t start = kNone, right = kNone, first = 0, count = 0;
@@ -46,26 +46,26 @@ public:
   };
 
   /// All arguments must outlive this object. mesh.side_edges says which edges the source triangles share.
-  SurfaceWalk(const OverlaySurface& before, const SurfaceSide& after, const SimplifyMesh& mesh);
+  SurfaceWalk(const OverlaySurface& source, const SurfaceSide& simplified, const SimplifyMesh& mesh);
 
-  const Place& place(uint32_t before) {
-    Place& p = places_[before];
-    if (p.state == Place::State::kUnknown) find_place(before, p);
+  const Place& place(uint32_t source) {
+    Place& p = places_[source];
+    if (p.state == Place::State::kUnknown) find_place(source, p);
     return p;
   }
   /// @param edge between points a and b, in either direction
-  const Way& way(uint32_t edge, uint32_t a, uint32_t b) {
-    Way& w = ways_[edge];
-    if (w.state == Way::State::kUnknown) find_way(edge, a < b ? a : b, a < b ? b : a, w);
+  const EdgePath& way(uint32_t edge, uint32_t a, uint32_t b) {
+    EdgePath& w = ways_[edge];
+    if (w.state == EdgePath::State::kUnknown) find_path(edge, a < b ? a : b, a < b ? b : a, w);
     return w;
   }
   /// Per edge; the state is kUnknown for edges that way() was not called for.
-  std::span<const Way> ways() const { return ways_; }
+  std::span<const EdgePath> ways() const { return ways_; }
   const Crossing& crossing(uint32_t i) const { return crossings_[i]; }
   uint32_t into(uint32_t i) const { return crossings_[i].into; }
 
-  const DVec3& area_normal(uint32_t after) const { return normals_[after]; }
-  const DVec3& point(uint32_t after) const { return mesh_.points[after]; }
+  const DVec3& area_normal(uint32_t simplified) const { return normals_[simplified]; }
+  const DVec3& point(uint32_t simplified) const { return mesh_.points[simplified]; }
   /// The point of a corner; corners are numbered 4 * triangle + 0, 1, 2.
   uint32_t point_at(uint32_t corner) const { return corner_points_[corner]; }
   bool has(uint32_t triangle, uint32_t point) const {
@@ -83,7 +83,7 @@ public:
   }
   /// A corner where the simplified edge that the source edge became begins, or kNone.
   uint32_t side_along(uint32_t edge) const { return side_of_edge_[mesh_.edge_became[edge]]; }
-  const OverlaySurface& before() const { return before_; }
+  const OverlaySurface& source() const { return source_; }
 
 private:
   /// The plane through a source edge and the local surface normal; a path lies in it.
@@ -105,10 +105,10 @@ private:
   bool leave_point(const Slice& slice, uint32_t point, Exit& out) const;
   bool leave_triangle(const Slice& slice, uint32_t triangle, Exit& out) const;
   void enter(const Slice& slice, uint32_t corner, Exit& exit) const;
-  void find_place(uint32_t before, Place& out) const;
-  void find_way(uint32_t edge, uint32_t a, uint32_t b, Way& out);
+  void find_place(uint32_t source, Place& out) const;
+  void find_path(uint32_t edge, uint32_t a, uint32_t b, EdgePath& out);
   bool cross(const Slice& slice, Exit& exit, const Place& goal);
-  bool find_along(uint32_t edge, uint32_t from, uint32_t to, Way& out) const;
+  bool find_along(uint32_t edge, uint32_t from, uint32_t to, EdgePath& out) const;
   bool step_aside(uint32_t triangle, const Place& goal, const DVec3& end);
   void add(uint32_t into, const DVec3& at, double on, double distance2) {
     crossings_[crossing_count_++] = {{at.x, at.y, at.z}, on, distance2, into};
@@ -117,11 +117,11 @@ private:
     return goal.state == Place::State::kPoint ? has(triangle, goal.number) : triangle == goal.number;
   }
 
-  OverlaySurface before_;
-  const SurfaceSide& after_;
+  OverlaySurface source_;
+  const SurfaceSide& simplified_;
   const SimplifyMesh& mesh_;
   std::vector<Place> places_;
-  std::vector<Way> ways_;
+  std::vector<EdgePath> ways_;
   std::unique_ptr<Crossing[]> crossings_;
   size_t crossing_count_ = 0, crossing_room_ = 0;
   std::vector<uint32_t> side_of_edge_;             ///< per simplified edge: a corner where it begins, or kNone

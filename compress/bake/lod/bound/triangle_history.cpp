@@ -9,8 +9,8 @@ void TriangleHistory::begin_level() {
 
 void TriangleHistory::append(std::span<const uint32_t> ends, std::span<const uint32_t> below) {
   Level& level = levels_.back();
-  const auto before = static_cast<uint32_t>(level.below.size());
-  for (const uint32_t end : ends) level.ends.push_back(before + end);
+  const auto source = static_cast<uint32_t>(level.below.size());
+  for (const uint32_t end : ends) level.ends.push_back(source + end);
   level.below.insert(level.below.end(), below.begin(), below.end());
   next_triangle_ += static_cast<uint32_t>(ends.size());
 }

@@ -9,7 +9,7 @@ namespace packtrace {
 namespace {
 
 using Place = SurfaceWalk::Place;
-using Way = SurfaceWalk::Way;
+using EdgePath = SurfaceWalk::EdgePath;
 
 } // namespace
 
@@ -21,17 +21,17 @@ template <typename Visitor>
 bool TriangleImages::follow(uint32_t triangle, Visitor& visitor) {
   const Triangle& p = points(triangle);
   const uint32_t* edge = edges(triangle);
-  const Way* ways[3];
+  const EdgePath* ways[3];
   uint32_t starts[3];
   for (int i = 0; i < 3; ++i) {
     const uint32_t a = p[i], b = p[i == 2 ? 0 : i + 1];
-    const Way& w = walk_.way(edge[i], a, b);
-    if (w.state == Way::State::kNowhere) return false;
+    const EdgePath& w = walk_.way(edge[i], a, b);
+    if (w.state == EdgePath::State::kNowhere) return false;
     ways[i] = &w;
-    if (a < b || (w.state == Way::State::kAcross && w.count == 0))
+    if (a < b || (w.state == EdgePath::State::kAcross && w.count == 0))
       starts[i] = w.start;
     else
-      starts[i] = w.state == Way::State::kAlong ? w.right : walk_.into(w.first + w.count - 1);
+      starts[i] = w.state == EdgePath::State::kAlong ? w.right : walk_.into(w.first + w.count - 1);
     if (starts[i] == kNone) return false;
   }
   uint32_t steps = 1, last = starts[0];
@@ -39,8 +39,8 @@ bool TriangleImages::follow(uint32_t triangle, Visitor& visitor) {
   visitor.corner(0);
   for (int side = 0; side < 3; ++side) {
     const int next = side == 2 ? 0 : side + 1;
-    const Way& w = *ways[side];
-    if (steps + w.count + 1 > kMost) return false;
+    const EdgePath& w = *ways[side];
+    if (steps + w.count + 1 > kMax) return false;
     steps += w.count;
     if (p[side] < p[next])
       for (uint32_t k = 0; k < w.count; ++k) visitor.cross(w.first + k, last = walk_.into(w.first + k));
@@ -54,7 +54,7 @@ bool TriangleImages::follow(uint32_t triangle, Visitor& visitor) {
     // next side.
     while (last != starts[next]) {
       last = walk_.across(last, end.number);
-      if (last == kNone || ++steps == kMost) return false;
+      if (last == kNone || ++steps == kMax) return false;
       visitor.turn(last, next);
     }
   }
@@ -66,7 +66,7 @@ bool TriangleImages::follow(uint32_t triangle, Visitor& visitor) {
 /// fan.
 /// @param inside set to the interior point, or kNone
 bool TriangleImages::contract(std::span<const uint32_t> outline, uint32_t& inside) const {
-  std::array<uint32_t, kMost> word;
+  std::array<uint32_t, kMax> word;
   size_t begin = 0, end = 0;
   for (const uint32_t t : outline) {
     if (end >= 1 && word[end - 1] == t) continue;
@@ -100,15 +100,15 @@ bool TriangleImages::contract(std::span<const uint32_t> outline, uint32_t& insid
 }
 
 double TriangleImages::distance2_from(uint32_t triangle, const DVec3& point) const {
-  const OverlaySurface& before = walk_.before();
+  const OverlaySurface& source = walk_.source();
   const DVec3 d =
-      point - nearest_point(point, before.corner(triangle, 0), before.corner(triangle, 1), before.corner(triangle, 2));
+      point - nearest_point(point, source.corner(triangle, 0), source.corner(triangle, 1), source.corner(triangle, 2));
   return glm::dot(d, d);
 }
 
 bool TriangleImages::find(uint32_t triangle, Image& out) {
   if (3 * size_t{triangle} >= mesh_.side_edges.size()) return false;
-  if (met_count_ + kMost > met_.size()) met_.resize(2 * met_.size());
+  if (met_count_ + kMax > met_.size()) met_.resize(2 * met_.size());
   struct Collector {
     uint32_t* triangles;
     uint32_t count = 0;
@@ -140,15 +140,15 @@ bool TriangleImages::find(uint32_t triangle, Image& out) {
 void TriangleImages::look_closer(uint32_t triangle, const Image& image, std::vector<OverlayPiece>& pieces) {
   struct Measurer {
     TriangleImages& images;
-    uint32_t before;
+    uint32_t source;
     Word word;
-    std::array<double, kMost> distances2;
+    std::array<double, kMax> distances2;
     DVec3 point; ///< last position on the source outline; `image` is its image
     DVec3 image;
     double of_both;
 
-    void begin(uint32_t after) {
-      word.triangles[word.count] = after;
+    void begin(uint32_t simplified) {
+      word.triangles[word.count] = simplified;
       distances2[word.count++] = 0.0;
     }
     /// Accounts for the last position in the current simplified triangle.
@@ -156,33 +156,33 @@ void TriangleImages::look_closer(uint32_t triangle, const Image& image, std::vec
       const Triangle& t = images.mesh_.triangles[word.triangles[word.count - 1]].points;
       const SurfaceWalk& walk = images.walk_;
       const DVec3 there = point - nearest_point(point, walk.point(t.x), walk.point(t.y), walk.point(t.z));
-      const double larger2 = std::max(glm::dot(there, there), images.distance2_from(before, image));
+      const double larger2 = std::max(glm::dot(there, there), images.distance2_from(source, image));
       distances2[word.count - 1] = std::max(distances2[word.count - 1], std::min(of_both, larger2));
     }
     void take_place(int i) {
-      const uint32_t number = images.points(before)[i];
+      const uint32_t number = images.points(source)[i];
       const Place& place = images.walk_.place(number);
-      point = images.walk_.before().points[number], image = place.at, of_both = place.distance2;
+      point = images.walk_.source().points[number], image = place.at, of_both = place.distance2;
     }
     void corner(int i) {
       take_place(i);
       measure();
     }
-    void turn(uint32_t after, int i) {
+    void turn(uint32_t simplified, int i) {
       take_place(i);
-      begin(after);
+      begin(simplified);
       measure();
     }
     void cross(uint32_t crossing, uint32_t into) {
       const SurfaceWalk::Crossing& c = images.walk_.crossing(crossing);
-      const Triangle& p = images.points(before);
-      const uint32_t* edge = images.edges(before);
+      const Triangle& p = images.points(source);
+      const uint32_t* edge = images.edges(source);
       int side = 0; // the side whose path has the crossing
       for (; side < 2; ++side)
-        if (const Way& w = images.walk_.ways()[edge[side]]; crossing - w.first < w.count) break;
+        if (const EdgePath& w = images.walk_.ways()[edge[side]]; crossing - w.first < w.count) break;
       const uint32_t a = p[side], b = p[side == 2 ? 0 : side + 1];
-      const DVec3 &low = images.walk_.before().points[std::min(a, b)],
-                  &high = images.walk_.before().points[std::max(a, b)];
+      const DVec3 &low = images.walk_.source().points[std::min(a, b)],
+                  &high = images.walk_.source().points[std::max(a, b)];
       point = low + c.on * (high - low), image = c.point(), of_both = c.distance2;
       measure();
       begin(into);
@@ -217,14 +217,14 @@ void TriangleImages::add_shares(uint32_t triangle, const Image& image, std::span
                                 std::span<double> shares) {
   struct Collector {
     TriangleImages& images;
-    uint32_t before;
-    void begin(uint32_t after) {
-      images.outline_.intervals.push_back({after, static_cast<uint32_t>(images.outline_.points.size())});
+    uint32_t source;
+    void begin(uint32_t simplified) {
+      images.outline_.intervals.push_back({simplified, static_cast<uint32_t>(images.outline_.points.size())});
     }
     void add(const DVec3& point) { images.outline_.points.push_back(point); }
-    void corner(int i) { add(images.walk_.place(images.points(before)[i]).at); }
-    void turn(uint32_t after, int i) {
-      begin(after);
+    void corner(int i) { add(images.walk_.place(images.points(source)[i]).at); }
+    void turn(uint32_t simplified, int i) {
+      begin(simplified);
       corner(i);
     }
     void cross(uint32_t crossing, uint32_t into) {

@@ -25,7 +25,7 @@ public:
 
   /// Both arguments must outlive this object.
   TriangleImages(SurfaceWalk& walk, const SimplifyMesh& mesh)
-      : walk_(walk), mesh_(mesh), met_(4 * walk.before().triangles.size() + kMost) {}
+      : walk_(walk), mesh_(mesh), met_(4 * walk.source().triangles.size() + kMax) {}
 
   /// Returns false, and changes nothing, if a corner or side has no image or the outline encloses more than one point.
   bool find(uint32_t triangle, Image& out);
@@ -43,12 +43,12 @@ public:
 
 private:
   /// maximum number of simplified triangles on an outline; longer ones have no image
-  static constexpr uint32_t kMost = 64;
+  static constexpr uint32_t kMax = 64;
 
   /// A sequence of adjacent simplified triangles.
   struct Word {
     uint32_t count = 0;
-    std::array<uint32_t, kMost> triangles;
+    std::array<uint32_t, kMax> triangles;
   };
 
   /// The part of an outline in one simplified triangle: points from first_point up to that of the next interval.
@@ -65,8 +65,8 @@ private:
   bool follow(uint32_t triangle, Visitor& visitor);
   bool contract(std::span<const uint32_t> outline, uint32_t& inside) const;
   double distance2_from(uint32_t triangle, const DVec3& point) const;
-  const Triangle& points(uint32_t before) const { return walk_.before().triangles[before].points; }
-  const uint32_t* edges(uint32_t before) const { return &mesh_.side_edges[3 * size_t{before}]; }
+  const Triangle& points(uint32_t source) const { return walk_.source().triangles[source].points; }
+  const uint32_t* edges(uint32_t source) const { return &mesh_.side_edges[3 * size_t{source}]; }
 
   SurfaceWalk& walk_;
   const SimplifyMesh& mesh_;

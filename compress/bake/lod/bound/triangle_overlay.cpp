@@ -9,9 +9,9 @@
 namespace packtrace {
 namespace {
 
-constexpr double kSteep = 0.05;       // cosine; steeper triangles count as edge-on
-constexpr double kRounding = 1e-6;    // tolerance of the coverage, which is an integer
-constexpr double kOnce = 1.0 - 1e-12; // coverage at which the search stops: usually all of it is covered
+constexpr double kSteep = 0.05;               // cosine; steeper triangles count as edge-on
+constexpr double kRounding = 1e-6;            // tolerance of the coverage, which is an integer
+constexpr double kFullCoverage = 1.0 - 1e-12; // coverage at which the search stops: usually all of it is covered
 static_assert(sizeof(DVec3) == 3 * sizeof(double));
 
 OverlayKernel pick_kernel() {
@@ -75,8 +75,8 @@ void Overlay::prepare() {
   task_.stamps = stamps_.data();
 }
 
-bool Overlay::lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::span<const uint32_t> candidates,
-                  std::vector<OverlayPiece>& pieces) {
+bool Overlay::overlay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::span<const uint32_t> candidates,
+                      std::vector<OverlayPiece>& pieces) {
   static const OverlayKernel kernel = pick_kernel();
   const double length = glm::length(direction);
   if (!(length > 0.0) || candidates.empty()) return false;
@@ -99,18 +99,18 @@ bool Overlay::lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::sp
   ++task_.stamp;
 
   if (found_.size() < candidates.size()) found_.resize(candidates.size());
-  task_.enough = kOnce;
+  task_.enough = kFullCoverage;
   double covered = 0.0;
   const auto find = [&] {
     return kernel(task_, candidates.data(), static_cast<uint32_t>(candidates.size()), found_.data(), &covered);
   };
   uint32_t count = find();
   if (covered < 1.0 - kRounding) return false;
-  bool together = hang_together(std::span(found_).first(count));
-  if (!together && covered >= kOnce && has_layers()) {
+  bool together = has_no_open_sides(std::span(found_).first(count));
+  if (!together && covered >= kFullCoverage && has_layers()) {
     task_.enough = std::numeric_limits<double>::infinity();
     count = find();
-    together = hang_together(std::span(found_).first(count));
+    together = has_no_open_sides(std::span(found_).first(count));
   }
   if (!together || std::abs(covered - std::round(covered)) > kRounding) return false;
   pieces.insert(pieces.end(), found_.begin(), found_.begin() + count);
@@ -118,7 +118,7 @@ bool Overlay::lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::sp
 }
 
 /// Whether no candidate side through the interior is a border of the pieces.
-bool Overlay::hang_together(std::span<const OverlayPiece> pieces) {
+bool Overlay::has_no_open_sides(std::span<const OverlayPiece> pieces) {
   open_sides_.clear();
   for (const OverlayPiece& piece : pieces)
     for (uint32_t i = 0; i < 3; ++i) {

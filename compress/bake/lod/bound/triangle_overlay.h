@@ -32,15 +32,15 @@ public:
   /// side through its interior is shared by two candidates, so they cover all of it equally often, and their areas say
   /// how often. Otherwise returns false and leaves `pieces` unchanged. Back-facing candidates are ignored.
   /// @param direction any nonzero length; returns false if the triangle is nearly edge-on
-  bool lay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::span<const uint32_t> candidates,
-           std::vector<OverlayPiece>& pieces);
+  bool overlay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::span<const uint32_t> candidates,
+               std::vector<OverlayPiece>& pieces);
 
   /// The maximum distance of a piece of the last lay() to nearest points; at most the distance along the direction.
   double nearest_distance(const OverlayPiece& piece) const;
 
 private:
   void prepare(); ///< on first use, as most overlays are never needed
-  bool hang_together(std::span<const OverlayPiece> pieces);
+  bool has_no_open_sides(std::span<const OverlayPiece> pieces);
   bool has_layers();
 
   OverlaySurface surface_;

@@ -7,7 +7,7 @@ namespace packtrace {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-constexpr uint32_t kMostCuts = 3; // subdivision levels here; the refiner adds its own
+constexpr uint32_t kMaxSubdivisions = 3; // subdivision levels here; the refiner adds its own
 // Maximum number of distances per triangle (source and simplified). Limits the time in soups, where every triangle is
 // near all others and more work gains little.
 constexpr size_t kWork = 100;
@@ -15,15 +15,15 @@ constexpr size_t kWork = 100;
 } // namespace
 
 bool UncoveredBound::spent() const {
-  return refiner_.work() > kWork * (before_.surface().triangles.size() + after_.surface().triangles.size());
+  return refiner_.work() > kWork * (source_.surface().triangles.size() + simplified_.surface().triangles.size());
 }
 
 void UncoveredBound::measure(uint32_t triangle, std::span<const uint32_t> found) {
-  before_.gather(after_.corner_points(triangle));
-  for (const uint32_t t : found) before_.add(t);
+  source_.gather(simplified_.corner_points(triangle));
+  for (const uint32_t t : found) source_.add(t);
   const size_t first = parts_.size();
   double least = 0.0;
-  const double stated = measure_part(triangle, after_.corners(triangle), least);
+  const double stated = measure_part(triangle, simplified_.corners(triangle), least);
   claims_.push_back({stated, triangle, first, parts_.size() - first});
 }
 
@@ -34,8 +34,8 @@ std::vector<PartDistance> UncoveredBound::finish() {
     size_t first = claim.first, count = claim.count;
     double stated = claim.stated;
     if (stated > error_.limit()) {
-      const Corners corners = after_.corners(claim.triangle);
-      before_.gather_within(corners, stated);
+      const Corners corners = simplified_.corners(claim.triangle);
+      source_.gather_within(corners, stated);
       const size_t begin = parts_.size();
       const double closer = look_closer(claim.triangle, corners, stated, 0);
       if (closer < stated) stated = closer, first = begin, count = parts_.size() - begin;
@@ -57,7 +57,8 @@ double UncoveredBound::look_closer(uint32_t triangle, const Corners& part, doubl
   error_.proven = std::max(error_.proven, least);
   double largest = 0.0; // largest distance in parts_
   for (size_t i = begin; i < parts_.size(); ++i) largest = std::max(largest, parts_[i].distance);
-  if (depth == kMostCuts || stated <= error_.limit() || largest <= GroupError::kSlack * least || spent()) return stated;
+  if (depth == kMaxSubdivisions || stated <= error_.limit() || largest <= GroupError::kSlack * least || spent())
+    return stated;
   const size_t end = parts_.size();
   const Corners middles{0.5 * (part[0] + part[1]), 0.5 * (part[1] + part[2]), 0.5 * (part[2] + part[0])};
   double closer = 0.0;
@@ -78,29 +79,29 @@ double UncoveredBound::look_closer(uint32_t triangle, const Corners& part, doubl
 /// @param least set to a lower bound of the part's largest distance from the candidates; unchanged if the overlay is
 /// enough
 double UncoveredBound::measure_part(uint32_t triangle, const Corners& part, double& least) {
-  double by_laying = kInfinite;
-  if (lay(part, by_laying) && by_laying <= error_.limit()) {
-    for (const OverlayPiece& piece : laid_) parts_.push_back({triangle, piece.triangle, piece.distance});
-    return by_laying;
+  double by_overlay = kInfinite;
+  if (overlay(part, by_overlay) && by_overlay <= error_.limit()) {
+    for (const OverlayPiece& piece : mapped_triangles_) parts_.push_back({triangle, piece.triangle, piece.distance});
+    return by_overlay;
   }
-  refiner_.begin(before_);
+  refiner_.begin(source_);
   least = refiner_.measure_corners(part);
   const double by_cutting = refine();
-  for (const OverlayPiece& piece : by_laying < by_cutting ? laid_ : refined_)
+  for (const OverlayPiece& piece : by_overlay < by_cutting ? mapped_triangles_ : refined_)
     parts_.push_back({triangle, piece.triangle, piece.distance});
-  return std::min(by_laying, by_cutting);
+  return std::min(by_overlay, by_cutting);
 }
 
 /// Bounds the part by an overlay in laid_. Returns false if the candidates do not cover it.
-bool UncoveredBound::lay(const Corners& part, double& stated) {
-  laid_.clear();
+bool UncoveredBound::overlay(const Corners& part, double& stated) {
+  mapped_triangles_.clear();
   const DVec3 normal = glm::cross(part[1] - part[0], part[2] - part[0]);
-  if (!before_.lay(part, normal, laid_)) return false;
+  if (!source_.overlay(part, normal, mapped_triangles_)) return false;
   stated = 0.0;
-  for (OverlayPiece& piece : laid_) {
-    const double had = this->had(piece.triangle);
-    if (!error_.enough(piece.distance, had)) piece.distance = before_.overlay().nearest_distance(piece);
-    stated = std::max(stated, stated_error(piece.distance, had));
+  for (OverlayPiece& piece : mapped_triangles_) {
+    const double inherited = this->inherited(piece.triangle);
+    if (!error_.enough(piece.distance, inherited)) piece.distance = source_.overlay().nearest_distance(piece);
+    stated = std::max(stated, stated_error(piece.distance, inherited));
   }
   return true;
 }
@@ -108,11 +109,11 @@ bool UncoveredBound::lay(const Corners& part, double& stated) {
 /// Bounds the part that measure_corners() was called for by subdivision.
 double UncoveredBound::refine() {
   refined_.clear();
-  double stated = before_.candidates().empty() ? kInfinite : 0.0;
-  refiner_.run([&](double distance, uint32_t t) { return error_.enough(distance, had(t)); },
+  double stated = source_.candidates().empty() ? kInfinite : 0.0;
+  refiner_.run([&](double distance, uint32_t t) { return error_.enough(distance, inherited(t)); },
                [&](uint32_t t, double distance) {
                  refined_.push_back({t, 0, distance});
-                 stated = std::max(stated, stated_error(distance, had(t)));
+                 stated = std::max(stated, stated_error(distance, inherited(t)));
                });
   return stated;
 }

@@ -13,7 +13,7 @@ namespace packtrace {
 
 /// A part of a simplified triangle lies within `distance` of a source triangle.
 struct PartDistance {
-  uint32_t after, before;
+  uint32_t simplified, source;
   double distance;
 };
 
@@ -23,9 +23,9 @@ struct PartDistance {
 /// source triangle that may be near enough.
 class UncoveredBound {
 public:
-  /// @param before, after, error, refiner must outlive this object; `before` must be linked
-  UncoveredBound(SurfaceSide& before, const SurfaceSide& after, GroupError& error, TriangleRefiner& refiner)
-      : before_(before), after_(after), error_(error), refiner_(refiner) {}
+  /// @param before, after, error, refiner must outlive this object; `source` must be linked
+  UncoveredBound(SurfaceSide& source, const SurfaceSide& simplified, GroupError& error, TriangleRefiner& refiner)
+      : source_(source), simplified_(simplified), error_(error), refiner_(refiner) {}
 
   /// Bounds the distance of a whole simplified triangle.
   /// @param found source triangles, parts of which may map to it; may contain duplicates
@@ -44,20 +44,20 @@ private:
     bool operator<(const Claim& o) const { return stated != o.stated ? stated < o.stated : triangle > o.triangle; }
   };
 
-  double had(uint32_t before) const { return before_.surface().triangles[before].error; }
-  bool lay(const Corners& part, double& stated);
+  double inherited(uint32_t source) const { return source_.surface().triangles[source].error; }
+  bool overlay(const Corners& part, double& stated);
   double refine();
   double measure_part(uint32_t triangle, const Corners& part, double& least);
   double look_closer(uint32_t triangle, const Corners& part, double known, uint32_t depth);
   bool spent() const;
 
-  SurfaceSide& before_;
-  const SurfaceSide& after_;
+  SurfaceSide& source_;
+  const SurfaceSide& simplified_;
   GroupError& error_;
   TriangleRefiner& refiner_;
   std::vector<PartDistance> parts_;
   std::vector<Claim> claims_;
-  std::vector<OverlayPiece> laid_, refined_; ///< bounds of the current part
+  std::vector<OverlayPiece> mapped_triangles_, refined_; ///< bounds of the current part
 };
 
 } // namespace packtrace

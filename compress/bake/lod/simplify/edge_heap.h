@@ -32,9 +32,9 @@ public:
   static constexpr size_t kNear = 7;
   size_t near_count() const { return std::min(kNear, keys_.size()); }
   uint32_t near(size_t place) const { return static_cast<uint32_t>(keys_[place]); }
-  /// Changes the cost of one of them without restoring the heap order; call near_changed() afterwards.
+  /// Changes the cost of one of them without restoring the heap order; call restore_order() afterwards.
   void change_near(size_t place, double cost) { keys_[place] = key(cost, near(place)); }
-  void near_changed() {
+  void restore_order() {
     for (size_t i = near_count(); i-- > 0;) sink(i, keys_[i]);
   }
 

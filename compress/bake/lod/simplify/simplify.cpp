@@ -140,7 +140,7 @@ private:
       edge_stamp_[edge] = stamp_[ends[i].a] + stamp_[ends[i].b];
       heap_.change_near(places[i], placed[i].cost);
     }
-    heap_.near_changed();
+    heap_.restore_order();
   }
 
   void retry_rejected() {
@@ -167,7 +167,7 @@ private:
     const EdgeEnds e = surface_.ends[edge];
     const EdgePlacement& p = placements_[edge];
     const DVec3 point(p.at[0], p.at[1], p.at[2]);
-    if (!gather_star(e.a, e.b) || (!may_tear_ && tears(e.a, e.b)) || turns_over(point))
+    if (!gather_star(e.a, e.b) || (!may_tear_ && disconnects(e.a, e.b)) || folds_over(point))
       rejected_.push_back(edge);
     else
       collapse(e.a, e.b, point, p.along);
@@ -195,7 +195,7 @@ private:
 
   /// Whether the collapse would remove the only triangle that connects its third point to the edge. The quadrics do not
   /// measure what the surface loses there, so this is allowed only when no other edge can collapse.
-  bool tears(uint32_t a, uint32_t b) {
+  bool disconnects(uint32_t a, uint32_t b) {
     for (const uint32_t triangle : removed_)
       for (uint32_t corner = 4 * triangle; corner < 4 * triangle + 3; ++corner) {
         const uint32_t point = corners_.point(corner);
@@ -212,7 +212,7 @@ private:
   }
 
   /// Whether moving both ends to `point` would fold over a triangle.
-  bool turns_over(const DVec3& point) {
+  bool folds_over(const DVec3& point) {
     for (StarTriangle& t : star_) {
       const DVec3& before = surface_.area_normals[t.triangle];
       t.area_normal = glm::cross(m_.points[t.next] - point, m_.points[t.last] - point);

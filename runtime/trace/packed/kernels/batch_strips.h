@@ -4,8 +4,8 @@
 
 #include "runtime/trace/packed/kernels/kernel_types.h"
 
-/// Finds the corners of a batch's triangles from the bits of the cluster's strips (compress/format/cluster/index_codec.h),
-/// without walking from triangle to triangle.
+/// Finds the corners of a batch's triangles from the bits of the cluster's strips
+/// (compress/format/cluster/index_codec.h), without walking from triangle to triangle.
 namespace packtrace::packed {
 namespace {
 
@@ -65,7 +65,7 @@ inline uint32_t corner_vertex(const TraceCluster& cluster, uint32_t corner) {
   const uint32_t fresh_bit = 2u * cluster.triangle_count;
   const uint32_t rank = count_ones(cluster.bits, fresh_bit, corner);
   if (field(cluster.bits, fresh_bit + corner, 1) != 0) return rank;
-  const uint32_t explicit_bit = fresh_bit + cluster.triangle_count + 2u * cluster.restart_count;
+  const uint32_t explicit_bit = fresh_bit + cluster.triangle_count + 2u * cluster.strip_count;
   return static_cast<uint32_t>(
       field(cluster.bits, explicit_bit + (corner - rank) * index_bits(cluster), index_bits(cluster)));
 }
@@ -111,7 +111,7 @@ inline void read_strips(const TraceCluster& cluster, uint32_t first, uint32_t co
   batch.first_fresh = rank;
   batch.fresh = static_cast<uint32_t>(field(bits, fresh_bit + corner, batch.corner_count - batch.lead_count))
                 << batch.lead_count;
-  batch.explicit_bit = fresh_bit + triangle_count + 2u * cluster.restart_count + (corner - rank) * index_bits(cluster);
+  batch.explicit_bit = fresh_bit + triangle_count + 2u * cluster.strip_count + (corner - rank) * index_bits(cluster);
 }
 
 /// A triangle's corners as entries of the batch's corner list.

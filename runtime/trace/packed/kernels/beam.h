@@ -32,12 +32,12 @@ struct alignas(64) Beam {
   }
 };
 
-constexpr uint32_t kLeastBeam = 16; ///< minimum number of rays for which a beam is worth its setup
+constexpr uint32_t kMinBeamRays = 16; ///< minimum number of rays for which a beam is worth its setup
 
 /// Makes a beam of all rays of a group. Returns false if they have no common origin or octant, or are too few.
 /// @param group its lanes that are not in `rays` get values of one of `rays`, and an empty range of t
 inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam& beam) {
-  if (static_cast<uint32_t>(__builtin_popcountll(rays)) < kLeastBeam) return false;
+  if (static_cast<uint32_t>(__builtin_popcountll(rays)) < kMinBeamRays) return false;
   const auto first = static_cast<uint32_t>(__builtin_ctzll(rays));
   for (uint32_t at = 0; at < kGroup; at += kBlock) {
     Ints same = Ints{} - 1;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "runtime/trace/packed/kernels/reach.h"
+#include "runtime/trace/packed/kernels/group_bounds.h"
 
 /// Transforms rays from unit space into the grid of a placed tree.
 namespace packtrace::packed {
@@ -90,9 +90,9 @@ template <bool kAligned>
     keep_magnitude(largest, out.direction[axis]);
     keep_magnitude(away, out.origin[axis]);
   }
-  constexpr int64_t kExponent = int64_t{2047} << 52, kLeast = int64_t{523} << 52, kMost = int64_t{1523} << 52;
-  const Doubles least = Doubles{} + __builtin_bit_cast(double, kLeast),
-                most = Doubles{} + __builtin_bit_cast(double, kMost);
+  constexpr int64_t kExponent = int64_t{2047} << 52, kMin = int64_t{523} << 52, kMax = int64_t{1523} << 52;
+  const Doubles least = Doubles{} + __builtin_bit_cast(double, kMin),
+                most = Doubles{} + __builtin_bit_cast(double, kMax);
   // Rounded down to a power of two; the limits 2^-500 and 2^500 keep its inverse one, too.
   Doubles power = reinterpret_cast<Doubles>(reinterpret_cast<Longs>(largest) & kExponent);
   power = power < least ? least : power;
@@ -212,9 +212,10 @@ template <bool kNearest, typename Group>
 inline uint64_t enter(const TracePlacement& placement, float max_coordinate, float pad_coordinate, const UnitRays& from,
                       uint64_t rays, Group& group) {
   uint64_t entered = 0;
-  const bool find_reach = Group::kSideBySide && static_cast<uint32_t>(__builtin_popcountll(rays)) >= kLeastSideBySide &&
+  const bool find_reach = Group::kSideBySide &&
+                          static_cast<uint32_t>(__builtin_popcountll(rays)) >= kMinSideBySideRays &&
                           !(kNearest && from.one_origin);
-  ReachFinder reach(max_coordinate);
+  GroupBoundsFinder reach(max_coordinate);
   for (uint64_t& backward : group.backward) backward = 0;
   if constexpr (Group::kTriangles)
     for (uint64_t& major : group.major) major = 0;
@@ -237,7 +238,7 @@ inline uint64_t enter(const TracePlacement& placement, float max_coordinate, flo
     if (find_reach)
       reach.read(Group::kTriangles ? 0.0f : kUnitFlat * max_coordinate, group.reach);
     else
-      group.reach = kEverywhere;
+      group.reach = kUnboundedGroup;
   }
   return entered;
 }

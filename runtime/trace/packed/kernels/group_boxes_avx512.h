@@ -3,7 +3,7 @@
 #include <immintrin.h>
 
 #include "runtime/trace/packed/kernels/beam.h"
-#include "runtime/trace/packed/kernels/reach.h"
+#include "runtime/trace/packed/kernels/group_bounds.h"
 
 /// The tests of group_boxes.h with all planes of an axis in one register: per child the near plane and the negated far
 /// plane, so that a maximum narrows both ends of an interval.
@@ -61,14 +61,14 @@ inline __m256 firsts(__m512 pairs) {
 }
 
 /// See the overload for GroupBoxes.
-inline uint32_t pass_reach(const Avx512GroupBoxes& boxes, const Reach& reach) {
+inline uint32_t pass_group_bounds(const Avx512GroupBoxes& boxes, const GroupBounds& reach) {
   const __m512 most_pad = both(reach.pad);
   const auto beyond = [&](uint32_t axis) {
     const __m512 plane = boxes.plane[axis], sign = _mm512_set1_ps(reach.sign[axis]);
     const __m512 less = _mm512_mul_ps(_mm512_add_ps(plane, _mm512_permute_ps(plane, 0xb1)), sign); // -extent
     const __m512 extent = _mm512_sub_ps(_mm512_set1_ps(-reach.flat), less);
-    const __m512 pad =
-        _mm512_min_ps(_mm512_max_ps(_mm512_mul_ps(extent, _mm512_set1_ps(kAnyExtent)), _mm512_setzero_ps()), most_pad);
+    const __m512 pad = _mm512_min_ps(
+        _mm512_max_ps(_mm512_mul_ps(extent, _mm512_set1_ps(kExtentScale)), _mm512_setzero_ps()), most_pad);
     return _mm512_fmadd_ps(plane, sign, _mm512_sub_ps(both(reach.shift[axis]), pad));
   };
   const __m512 most = _mm512_max_ps(_mm512_max_ps(beyond(0), beyond(1)), beyond(2));

@@ -15,11 +15,11 @@ inline constexpr uint32_t kBatch = 8;
 inline constexpr uint32_t kBatchCorners = 16;
 
 // TraceCluster::flags
-inline constexpr uint8_t kSeenByCamera = baked::kCameraBelow;
-inline constexpr uint8_t kOccludes = baked::kOcclusionBelow;
+inline constexpr uint8_t kSeenByCamera = baked::kVisibleToCamera;
+inline constexpr uint8_t kOccludes = baked::kVisibleToOcclusion;
 inline constexpr uint8_t kMasked = baked::kMaskedLeaves;
-inline constexpr uint8_t kWide = 1u << 3;       ///< its vertices can be read by KernelScene::decode_wide only
-inline constexpr uint32_t kIndexBitsShift = 4u; ///< from this bit on: bits per explicit vertex number, 0..8
+inline constexpr uint8_t kNeedsWideDecode = 1u << 3; ///< its vertices can be read by KernelScene::decode_wide only
+inline constexpr uint32_t kIndexBitsShift = 4u;      ///< from this bit on: bits per explicit vertex number, 0..8
 
 /// A cluster as the kernels read it; computed once from its record and its geometry's.
 struct TraceCluster {
@@ -29,7 +29,7 @@ struct TraceCluster {
   uint8_t position_bits[3]; ///< field widths along x, y, z; their sum is at most 57
   uint8_t up, down;         ///< tree coordinate = (base + field 2^up) / 2^down; one of the two is 0
   uint8_t triangle_count;
-  uint8_t restart_count;
+  uint8_t strip_count;
   uint8_t flags;
   uint8_t reserved[2];
 };
@@ -52,7 +52,7 @@ struct BatchCache {
 
 // Sizes for rays that traverse the tree over placements together (placement_stream.h).
 inline constexpr uint32_t kStreamRays = 4096; ///< maximum number of rays per portion
-inline constexpr uint32_t kLeastStream = 512;
+inline constexpr uint32_t kMinStreamRays = 512;
 inline constexpr uint32_t kStreamGroups = kStreamRays / 64 + 7; ///< groups of up to 64 rays of one octant
 inline constexpr size_t kStreamGroupBytes = 4224, kStreamPartBytes = 16, kStreamAlignment = 64;
 
@@ -128,8 +128,8 @@ struct TreeSearch {
 };
 
 /// top_pad_coordinate of the tree over many placements, in units of the largest coordinate M. kBoxPad times it exceeds
-/// 6 M kSmallestDirection, by which clamping a direction component may move a ray.
-inline constexpr float kLeastTopPad = 0x1p-57f;
+/// 6 M kMinDirectionComponent, by which clamping a direction component may move a ray.
+inline constexpr float kMinTopPad = 0x1p-57f;
 
 struct KernelScene {
   const TraceCluster* clusters; ///< by number in the file's cluster section
@@ -140,7 +140,7 @@ struct KernelScene {
   TracePlacement top; ///< the tree of top_nodes, whose grid is unit space
   /// Largest absolute coordinate, in unit space, of the boxes in top_nodes and of the grids of aligned placements.
   float top_max_coordinate;
-  /// M of kBoxPad for the tree over placements. With more than eight placements it is kLeastTopPad times the largest
+  /// M of kBoxPad for the tree over placements. With more than eight placements it is kMinTopPad times the largest
   /// coordinate, and the boxes themselves are enlarged by 2^-20 of their planes' coordinates, which covers the planes'
   /// share of the roundings. Otherwise a single placement far away would make every ray near the origin enter all other
   /// placements.

@@ -5,7 +5,7 @@
 
 /// Tests the triangles of a batch against the rays that reach its leaf, in one of three arrangements:
 ///  - test_triangles(): one ray against eight triangles, one triangle per SIMD lane.
-///  - test_few(): several rays in one register, each against four or eight triangles.
+///  - test_several_rays(): several rays in one register, each against four or eight triangles.
 ///  - test_rays(): one triangle against one ray per lane.
 /// All three perform the same arithmetic, so they return the same bits.
 namespace packtrace::packed {
@@ -14,7 +14,7 @@ namespace {
 inline uint32_t first_bit(uint64_t word) { return static_cast<uint32_t>(__builtin_ctzll(word)); }
 
 /// Returns the triangles of a batch that one ray hits, as a bit mask.
-template <typename Lanes, bool kRest>
+template <typename Lanes, bool kUseResidual>
 inline uint32_t test_triangles(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group,
                                uint32_t ray, LaneHits<Lanes>& hits, uint64_t& exact_count) {
   const uint32_t axis[3] = {group.axis[0][ray], group.axis[1][ray], group.axis[2][ray]};
@@ -27,51 +27,53 @@ inline uint32_t test_triangles(const DecodedBatch& batch, const BatchNormals& no
       {Lanes::set(group.shear[0][ray]), Lanes::set(group.shear[1][ray]), Lanes::set(group.shear[2][ray])},
       Lanes::set(group.begin[ray]),
       Lanes::set(group.end[ray])};
-  return test_lanes<Lanes, true, kRest>(relative, normal, rest, lanes, (1u << batch.count) - 1, hits, exact_count);
+  return test_lanes<Lanes, true, kUseResidual>(relative, normal, rest, lanes, (1u << batch.count) - 1, hits,
+                                               exact_count);
 }
 
 /// The first kTriangles triangles of a batch, repeated until they fill a register. Coordinates are permuted to Woop's
 /// axes for rays whose kx is k0.
-template <typename Wide, uint32_t kTriangles, bool kRest>
+template <typename WideLanes, uint32_t kTriangles, bool kUseResidual>
 struct BatchLanes {
-  static constexpr uint32_t kRays = Wide::kLanes / kTriangles;
-  typename Wide::F vertex[3][3], normal[3];
+  static constexpr uint32_t kRays = WideLanes::kLanes / kTriangles;
+  typename WideLanes::F vertex[3][3], normal[3];
 
   BatchLanes(const DecodedBatch& batch, const BatchNormals& normals, uint32_t k0) {
     const uint32_t k[3] = {k0, k0 == 2 ? 0 : k0 + 1, k0 == 0 ? 2 : k0 - 1};
     for (uint32_t i = 0; i < 3; ++i) {
-      normal[i] = Wide::template repeat<kTriangles>(normals.normal[k[i]]);
+      normal[i] = WideLanes::template repeat<kTriangles>(normals.normal[k[i]]);
       for (uint32_t corner = 0; corner < 3; ++corner)
-        vertex[i][corner] = Wide::template repeat<kTriangles>(batch.vertex[k[i]][corner]);
+        vertex[i][corner] = WideLanes::template repeat<kTriangles>(batch.vertex[k[i]][corner]);
     }
   }
 
   /// Tests kRays rays against the triangles and returns the lanes with a hit, as a bit mask. Ray i has the lanes from
   /// kTriangles i on.
   /// @param wanted bit mask of the lanes that hold a triangle
-  uint32_t test(const TestRay* const (&rays)[kRays], const TestRest* const (&rests)[kRays], uint32_t wanted,
+  uint32_t test(const TestRay* const (&rays)[kRays], const TestResidual* const (&rests)[kRays], uint32_t wanted,
                 uint64_t& exact_count) const {
-    typename Wide::F origin[4], shear[4], rest[4]; // The fourth elements hold the rays' begin, their end and no value.
-    if constexpr (kRest) Wide::template spread<kTriangles, 0>(rests, rest);
-    Wide::template spread<kTriangles, 0>(rays, origin);
-    Wide::template spread<kTriangles, 4>(rays, shear);
-    const RayLanes<Wide> lanes{{shear[0], shear[1], shear[2]}, origin[3], shear[3]};
-    LaneHits<Wide> hits;
-    return test_lanes<Wide, false, kRest>(
-        [&](uint32_t i, uint32_t corner) { return Wide::sub(vertex[i][corner], origin[i]); },
+    typename WideLanes::F origin[4], shear[4],
+        rest[4]; // The fourth elements hold the rays' begin, their end and no value.
+    if constexpr (kUseResidual) WideLanes::template spread<kTriangles, 0>(rests, rest);
+    WideLanes::template spread<kTriangles, 0>(rays, origin);
+    WideLanes::template spread<kTriangles, 4>(rays, shear);
+    const RayLanes<WideLanes> lanes{{shear[0], shear[1], shear[2]}, origin[3], shear[3]};
+    LaneHits<WideLanes> hits;
+    return test_lanes<WideLanes, false, kUseResidual>(
+        [&](uint32_t i, uint32_t corner) { return WideLanes::sub(vertex[i][corner], origin[i]); },
         [&](uint32_t i) { return normal[i]; }, [&](uint32_t i) { return rest[i]; }, lanes, wanted, hits, exact_count);
   }
 };
 
 /// Returns the rays of the bit mask `rays` that hit a triangle of a batch of at most kTriangles triangles. If the last
 /// register is not full, its last ray is repeated.
-template <typename Wide, uint32_t kTriangles, bool kRest>
-inline uint64_t test_few(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group, uint64_t rays,
-                         uint64_t& exact) {
-  using Triangles = BatchLanes<Wide, kTriangles, kRest>;
+template <typename WideLanes, uint32_t kTriangles, bool kUseResidual>
+inline uint64_t test_several_rays(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group,
+                                  uint64_t rays, uint64_t& exact) {
+  using Triangles = BatchLanes<WideLanes, kTriangles, kUseResidual>;
   constexpr uint32_t kRays = Triangles::kRays;
-  constexpr uint32_t kFirsts = (kTriangles == 8 ? 0x0101u : 0x1111u) & ((1u << Wide::kLanes) - 1);
-  const uint32_t wanted = ((1u << batch.count) - 1) * kFirsts;
+  constexpr uint32_t kFirstLanes = (kTriangles == 8 ? 0x0101u : 0x1111u) & ((1u << WideLanes::kLanes) - 1);
+  const uint32_t wanted = ((1u << batch.count) - 1) * kFirstLanes;
   uint64_t hit = 0;
   for (uint32_t k = 0; k < 3; ++k) {
     uint64_t m = rays & group.major[k];
@@ -80,7 +82,7 @@ inline uint64_t test_few(const DecodedBatch& batch, const BatchNormals& normals,
     do {
       uint32_t number[kRays];
       const TestRay* few[kRays];
-      const TestRest* rests[kRays];
+      const TestResidual* rests[kRays];
       for (uint64_t i = 0, last = 0; i < kRays; ++i, m &= m - 1) {
         last = m | (last & (0 - uint64_t{m == 0})); // Branch-free, because a branch would often be mispredicted.
         number[i] = first_bit(last);
@@ -97,43 +99,44 @@ inline uint64_t test_few(const DecodedBatch& batch, const BatchNormals& normals,
 /// Tests the rays at `at`, `at` + 1, ... of a group, one per lane, against one triangle of a batch. Returns the lanes
 /// with a hit, as a bit mask.
 /// @param axis Woop's (kx, ky, kz), which all wanted rays share
-template <typename Wide, bool kRest>
+template <typename WideLanes, bool kUseResidual>
 inline uint32_t test_rays(const DecodedBatch& batch, const BatchNormals& normals, uint32_t triangle,
                           const RayGroup& group, const uint32_t (&axis)[3], uint32_t at, uint32_t wanted,
-                          LaneHits<Wide>& hits, uint64_t& exact_count) {
+                          LaneHits<WideLanes>& hits, uint64_t& exact_count) {
   const auto relative = [&](uint32_t k, uint32_t corner) {
-    return Wide::sub(Wide::set(batch.vertex[axis[k]][corner][triangle]), Wide::load(&group.origin[axis[k]][at]));
+    return WideLanes::sub(WideLanes::set(batch.vertex[axis[k]][corner][triangle]),
+                          WideLanes::load(&group.origin[axis[k]][at]));
   };
-  const auto normal = [&](uint32_t k) { return Wide::set(normals.normal[axis[k]][triangle]); };
-  const auto rest = [&](uint32_t k) { return Wide::load(&group.rest[axis[k]][at]); };
-  const RayLanes<Wide> lanes{
-      {Wide::load(&group.shear[0][at]), Wide::load(&group.shear[1][at]), Wide::load(&group.shear[2][at])},
-      Wide::load(&group.begin[at]),
-      Wide::load(&group.end[at])};
-  return test_lanes<Wide, true, kRest>(relative, normal, rest, lanes, wanted, hits, exact_count);
+  const auto normal = [&](uint32_t k) { return WideLanes::set(normals.normal[axis[k]][triangle]); };
+  const auto rest = [&](uint32_t k) { return WideLanes::load(&group.rest[axis[k]][at]); };
+  const RayLanes<WideLanes> lanes{{WideLanes::load(&group.shear[0][at]), WideLanes::load(&group.shear[1][at]),
+                                   WideLanes::load(&group.shear[2][at])},
+                                  WideLanes::load(&group.begin[at]),
+                                  WideLanes::load(&group.end[at])};
+  return test_lanes<WideLanes, true, kUseResidual>(relative, normal, rest, lanes, wanted, hits, exact_count);
 }
 
 /// Minimum number of rays for which a leaf test that needs t, u and v first finds the rays that hit (rays_that_hit())
 /// and then computes the hits of those rays alone.
-constexpr uint32_t kLeastTestedTwice = 4;
+constexpr uint32_t kMinPrefilteredRays = 4;
 
 /// Reads Woop's (kx, ky, kz) of the wanted rays. Returns false if they differ between rays.
-template <typename Wide>
+template <typename WideLanes>
 inline bool same_axes(const RayGroup& group, uint32_t at, uint32_t wanted, uint32_t (&axis)[3]) {
   const uint32_t first = at + static_cast<uint32_t>(__builtin_ctz(wanted));
   for (uint32_t k = 0; k < 3; ++k) axis[k] = group.axis[k][first];
-  return (Wide::equal(&group.axis[2][at], axis[2]) & wanted) == wanted;
+  return (WideLanes::equal(&group.axis[2][at], axis[2]) & wanted) == wanted;
 }
 
 /// Returns the rays of the bit mask `rays` that hit a triangle of a batch. The test of one ray does not depend on the
 /// result of another.
 /// @param exact incremented by the number of lanes that were evaluated in doubles
-template <typename Lanes, bool kRest>
+template <typename Lanes, bool kUseResidual>
 inline uint64_t rays_that_hit(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group,
                               uint64_t rays, uint64_t& exact) {
-  using Wide = typename Lanes::Wide;
-  return batch.count <= 4 ? test_few<Wide, 4, kRest>(batch, normals, group, rays, exact)
-                          : test_few<Wide, 8, kRest>(batch, normals, group, rays, exact);
+  using WideLanes = typename Lanes::WideLanes;
+  return batch.count <= 4 ? test_several_rays<WideLanes, 4, kUseResidual>(batch, normals, group, rays, exact)
+                          : test_several_rays<WideLanes, 8, kUseResidual>(batch, normals, group, rays, exact);
 }
 
 } // namespace

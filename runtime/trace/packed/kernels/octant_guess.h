@@ -7,9 +7,9 @@ namespace {
 
 /// Computes the octant of a ray's direction in a placement's grid in floats. The result may differ from that of the
 /// exact transform where a component is almost 0.
-class OctantGuess {
+class ApproximateOctant {
 public:
-  explicit OctantGuess(const TracePlacement& placement) {
+  explicit ApproximateOctant(const TracePlacement& placement) {
     for (uint32_t i = 0; i < 3; ++i)
       for (uint32_t axis = 0; axis < 3; ++axis)
         column_[i][axis] = static_cast<float>(placement.grid_from_unit[3 * i + axis]);

@@ -13,7 +13,7 @@ namespace {
 /// Maximum number of rays in a group: the bits of a 64-bit mask.
 constexpr uint32_t kGroup = 64;
 /// Minimum number of rays at a node for tests on the group as a whole (reach) and for testing rays side by side.
-constexpr uint32_t kLeastSideBySide = 12;
+constexpr uint32_t kMinSideBySideRays = 12;
 
 /// Box planes are moved outwards by this times M, the largest coordinate of the ray's origin and the tree. It covers
 /// all roundings, here in units of u = 2^-24 for a direction whose largest component is in [1, 2):
@@ -28,7 +28,7 @@ constexpr uint32_t kLeastSideBySide = 12;
 /// The sum is at most 20 u M, and 24 u M are taken. For the tree over many placements M is smaller: see
 /// KernelScene::top_pad_coordinate.
 constexpr float kBoxPad = 24.0f * 0x1p-24f;
-constexpr float kSmallestDirection = 0x1p-80f;
+constexpr float kMinDirectionComponent = 0x1p-80f;
 
 /// Relative error bound of t: rounding to float in unit space (2^-24) and once more in a tree's grid (2^-24).
 constexpr double kUnitRounding = 0x1p-23;
@@ -42,8 +42,9 @@ struct alignas(64) UnitRays {
 
 struct Beam;
 
-/// Bounding box of all points at which a group's rays may hit something, to compare a node's boxes with: see reach.h.
-struct Reach {
+/// Bounding box of all points at which a group's rays may hit something, to compare a node's boxes with: see
+/// group_bounds.h.
+struct GroupBounds {
   float lo[3], hi[3];
   float flat;   ///< boxes whose extent along an axis is at most this are flat
   float pad[2]; ///< 0, and the pad at the side where rays start, for boxes with an extent
@@ -66,16 +67,16 @@ struct alignas(32) TestRay {
   float origin[3], begin, shear[3], end;
 };
 /// One ray's origin rounding error (exact minus rounded) along Woop's axes.
-struct alignas(16) TestRest {
+struct alignas(16) TestResidual {
   float along[3], unused;
 };
 
-constexpr Reach kEverywhere{{-__builtin_inff(), -__builtin_inff(), -__builtin_inff()},
-                            {__builtin_inff(), __builtin_inff(), __builtin_inff()},
-                            0.0f,
-                            {},
-                            {},
-                            {}};
+constexpr GroupBounds kUnboundedGroup{{-__builtin_inff(), -__builtin_inff(), -__builtin_inff()},
+                                      {__builtin_inff(), __builtin_inff(), __builtin_inff()},
+                                      0.0f,
+                                      {},
+                                      {},
+                                      {}};
 
 /// Ray data for box tests, one array per value. Elements of unused rays are not initialised.
 struct alignas(64) BoxRays {
@@ -104,7 +105,7 @@ struct alignas(64) SideBySideRays : BoxRays {
   static constexpr bool kSideBySide = true;
   float near_bias[3][kGroup], far_bias[3][kGroup]; ///< bias[0] and -bias[1]
   float begin[kGroup], end[kGroup];                ///< limits[0] and -limits[1]
-  Reach reach;
+  GroupBounds reach;
 
   void set_tmax(uint32_t i, float t) {
     BoxRays::set_tmax(i, t);
@@ -124,7 +125,7 @@ struct alignas(64) RayGroup : SideBySideRays {
   Beam* beam = nullptr;  ///< of all rays of the group, or null; see beam.h
   // For leaf tests:
   TestRay tests[kGroup];
-  TestRest rests[kGroup]; ///< for nearest hits only
+  TestResidual rests[kGroup]; ///< for nearest hits only
 
   void set_tmax(uint32_t i, float t) {
     SideBySideRays::set_tmax(i, t);
@@ -183,7 +184,7 @@ template <typename Group>
   }
   for (uint32_t axis = 0; axis < 3; ++axis) {
     const Floats d = block.direction[axis], size = magnitude(d);
-    const Floats over = 1.0f / (size > kSmallestDirection ? size : Floats{} + kSmallestDirection);
+    const Floats over = 1.0f / (size > kMinDirectionComponent ? size : Floats{} + kMinDirectionComponent);
     const Ints sign = reinterpret_cast<Ints>(d) & static_cast<int32_t>(0x80000000u);
     const Floats inverse = reinterpret_cast<Floats>(reinterpret_cast<Ints>(over) | sign);
     const Floats back = block.origin[axis] * inverse, away = kBoxPad * reach * over;

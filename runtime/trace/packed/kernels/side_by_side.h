@@ -8,17 +8,17 @@ namespace packtrace::packed {
 namespace {
 
 /// Returns the bits of `rays` from bit `first` on that correspond to one register, as a lane mask.
-template <typename Wide>
+template <typename WideLanes>
 inline uint32_t lanes_at(uint64_t rays, uint32_t first) {
-  return static_cast<uint32_t>(rays >> first) & ((1u << Wide::kLanes) - 1);
+  return static_cast<uint32_t>(rays >> first) & ((1u << WideLanes::kLanes) - 1);
 }
 
 /// Whether testing rays in SIMD lanes beats testing boxes in lanes: registers of rays times boxes must be below two
 /// thirds of the number of rays.
-template <typename Wide>
-inline bool pays_side_by_side(uint64_t rays, uint32_t slots) {
+template <typename WideLanes>
+inline bool prefers_side_by_side(uint64_t rays, uint32_t slots) {
   uint32_t registers = 0;
-  for (uint32_t at = 0; at < kGroup; at += Wide::kLanes) registers += lanes_at<Wide>(rays, at) != 0 ? 1 : 0;
+  for (uint32_t at = 0; at < kGroup; at += WideLanes::kLanes) registers += lanes_at<WideLanes>(rays, at) != 0 ? 1 : 0;
   return 3 * registers * static_cast<uint32_t>(__builtin_popcount(slots)) <
          2 * static_cast<uint32_t>(__builtin_popcountll(rays));
 }
@@ -38,28 +38,31 @@ inline void read_planes(const GroupBoxes<Lanes>& boxes, BoxPlanes& planes) {
 
 /// Tests the children of the bit mask `slots`. Returns the children that any ray passes, as a bit mask.
 /// @param out by child: the rays of the bit mask `rays` that pass its box; 0 for children not in `slots`
-template <typename Wide>
-[[gnu::always_inline]] inline uint32_t pass_each(const BoxPlanes& planes, const SideBySideRays& group, uint64_t rays,
-                                                 uint32_t slots, uint64_t (&out)[baked::kNodeWidth]) {
-  using F = typename Wide::F;
+template <typename WideLanes>
+[[gnu::always_inline]] inline uint32_t test_boxes_side_by_side(const BoxPlanes& planes, const SideBySideRays& group,
+                                                               uint64_t rays, uint32_t slots,
+                                                               uint64_t (&out)[baked::kNodeWidth]) {
+  using F = typename WideLanes::F;
   for (uint64_t& word : out) word = 0;
-  for (uint32_t at = 0; at < kGroup; at += Wide::kLanes) {
-    if (lanes_at<Wide>(rays, at) == 0) continue;
-    const F ray_begin = Wide::load(&group.begin[at]), ray_end = Wide::load(&group.end[at]);
+  for (uint32_t at = 0; at < kGroup; at += WideLanes::kLanes) {
+    if (lanes_at<WideLanes>(rays, at) == 0) continue;
+    const F ray_begin = WideLanes::load(&group.begin[at]), ray_end = WideLanes::load(&group.end[at]);
     F inverse[3], near_bias[3], far_bias[3];
     for (uint32_t axis = 0; axis < 3; ++axis) {
-      inverse[axis] = Wide::load(&group.inverse[axis][at]);
-      near_bias[axis] = Wide::load(&group.near_bias[axis][at]);
-      far_bias[axis] = Wide::load(&group.far_bias[axis][at]);
+      inverse[axis] = WideLanes::load(&group.inverse[axis][at]);
+      near_bias[axis] = WideLanes::load(&group.near_bias[axis][at]);
+      far_bias[axis] = WideLanes::load(&group.far_bias[axis][at]);
     }
     for (uint32_t m = slots; m != 0; m &= m - 1) {
       const auto slot = static_cast<uint32_t>(__builtin_ctz(m));
       F begin = ray_begin, end = ray_end;
       for (uint32_t axis = 0; axis < 3; ++axis) {
-        begin = Wide::max(begin, Wide::fma(Wide::set(planes.near[axis][slot]), inverse[axis], near_bias[axis]));
-        end = Wide::min(end, Wide::fma(Wide::set(planes.far[axis][slot]), inverse[axis], far_bias[axis]));
+        begin = WideLanes::max(begin,
+                               WideLanes::fma(WideLanes::set(planes.near[axis][slot]), inverse[axis], near_bias[axis]));
+        end =
+            WideLanes::min(end, WideLanes::fma(WideLanes::set(planes.far[axis][slot]), inverse[axis], far_bias[axis]));
       }
-      out[slot] |= uint64_t{Wide::less_equal(begin, end)} << at;
+      out[slot] |= uint64_t{WideLanes::less_equal(begin, end)} << at;
     }
   }
   uint32_t used = 0;

@@ -130,13 +130,13 @@ inline BatchNormals batch_normals(const DecodedBatch& batch) {
 
 /// Returns the lanes in which a ray hits a triangle, as a bit mask. Avoids unpredictable branches until a lane hits.
 /// @tparam kWeights whether hits are filled in; otherwise only the lanes are computed
-/// @tparam kRest whether t counts from the origin before it was rounded to floats
+/// @tparam kUseResidual whether t counts from the origin before it was rounded to floats
 /// @param relative (k, corner): the corner's coordinate along Woop's axis k minus the origin's
 /// @param normal (k): the plane normal along Woop's axis k
 /// @param rest (k): the origin's rounding error (exact minus rounded) along Woop's axis k
 /// @param wanted bit mask of the lanes to test
 /// @param exact_count incremented by the number of lanes that were evaluated in doubles
-template <typename Lanes, bool kWeights, bool kRest, typename Relative, typename Normal, typename Rest>
+template <typename Lanes, bool kWeights, bool kUseResidual, typename Relative, typename Normal, typename Rest>
 inline uint32_t test_lanes(Relative relative, Normal normal, Rest rest, const RayLanes<Lanes>& rays, uint32_t wanted,
                            LaneHits<Lanes>& hits, uint64_t& exact_count) {
   using F = typename Lanes::F;
@@ -164,7 +164,7 @@ inline uint32_t test_lanes(Relative relative, Normal normal, Rest rest, const Ra
   uint32_t unsure = (Lanes::less_equal(below, least) | Lanes::less_equal(most, error)) & wanted & ~inside;
   if constexpr (kWeights)
     if ((inside | unsure) == 0) return 0;
-  if constexpr (kRest)
+  if constexpr (kUseResidual)
     depth = Lanes::sub(depth,
                        Lanes::fma(rest(0), normal(0), Lanes::fma(rest(1), normal(1), Lanes::mul(rest(2), normal(2)))));
   const F along = Lanes::fma(sx, normal(0), Lanes::fma(sy, normal(1), normal(2))), zero = Lanes::set(0.0f);

@@ -4,15 +4,15 @@
 #include <cassert>
 #include <cmath>
 
-#include "compress/format/trees/box_tree.h"
 #include "compress/format/cluster/position_grid.h"
-#include "pbrt_import/scene/bounds.h"
+#include "compress/format/trees/box_tree.h"
 #include "pbrt_import/base/error.h"
-#include "runtime/trace/source/alpha_filter.h"
+#include "pbrt_import/scene/bounds.h"
 #include "runtime/trace/packed/scene/thread_memory.h"
 #include "runtime/trace/packed/scene/top_tree.h"
 #include "runtime/trace/packed/scene/trace_cluster.h"
 #include "runtime/trace/placement.h"
+#include "runtime/trace/source/alpha_filter.h"
 
 namespace packtrace {
 namespace {
@@ -21,14 +21,13 @@ static_assert(sizeof(Ray) == sizeof(packed::KernelRay) && offsetof(Ray, tfar) ==
               offsetof(Ray, origin) == offsetof(packed::KernelRay, origin) &&
               offsetof(Ray, tnear) == offsetof(packed::KernelRay, tnear) &&
               offsetof(Ray, direction) == offsetof(packed::KernelRay, direction));
-static_assert(sizeof(RayHit) == sizeof(packed::KernelHit) &&
-              offsetof(RayHit, t) == offsetof(packed::KernelHit, t) &&
+static_assert(sizeof(RayHit) == sizeof(packed::KernelHit) && offsetof(RayHit, t) == offsetof(packed::KernelHit, t) &&
               offsetof(RayHit, u) == offsetof(packed::KernelHit, u) &&
               offsetof(RayHit, v) == offsetof(packed::KernelHit, v) &&
               offsetof(RayHit, placement) == offsetof(packed::KernelHit, placement) &&
               offsetof(RayHit, part) == offsetof(packed::KernelHit, cluster) &&
               offsetof(RayHit, triangle) == offsetof(packed::KernelHit, triangle));
-static_assert(baked::kCameraBelow == kCameraRays && baked::kOcclusionBelow == kOcclusionRays);
+static_assert(baked::kVisibleToCamera == kCameraRays && baked::kVisibleToOcclusion == kOcclusionRays);
 
 const packed::KernelRay* kernel_rays(std::span<const Ray> rays) {
   return reinterpret_cast<const packed::KernelRay*>(rays.data());
@@ -48,7 +47,7 @@ bool is_aligned(const DAffine& m) {
 }
 
 /// Maximum number of placements for which rays are tested against the boxes of parts (KernelScene::parts).
-constexpr size_t kMostWithParts = baked::kNodeWidth;
+constexpr size_t kMaxPlacementsWithParts = baked::kNodeWidth;
 
 /// Enlarges a box of the tree over many placements by the rounding errors of its planes: see
 /// packed::KernelScene::top_pad_coordinate.
@@ -68,14 +67,14 @@ void place_top(std::span<const TreeBox> boxes, float max_coordinate, packed::Ker
   for (const TreeBox& box : boxes) all.extend(box);
   scene.top = {};
   scene.top.aligned = 1;
-  const bool parts = boxes.size() <= kMostWithParts; // boxes are not enlarged then
+  const bool parts = boxes.size() <= kMaxPlacementsWithParts; // boxes are not enlarged then
   scene.top_max_coordinate = max_coordinate;
   for (size_t axis = 0; axis < 3; ++axis) {
     scene.top.grid_from_unit[3 * axis + axis] = 1.0;
     scene.top.box_lo[axis] = all.lo[axis], scene.top.box_hi[axis] = all.hi[axis];
     scene.top_max_coordinate = std::max({scene.top_max_coordinate, std::abs(all.lo[axis]), std::abs(all.hi[axis])});
   }
-  scene.top_pad_coordinate = (parts ? 1.0f : packed::kLeastTopPad) * scene.top_max_coordinate;
+  scene.top_pad_coordinate = (parts ? 1.0f : packed::kMinTopPad) * scene.top_max_coordinate;
 }
 
 } // namespace
@@ -87,7 +86,7 @@ struct PackedTracer::Tables : TracedTrees {
   std::vector<uint32_t> first_instance; ///< by the file's geometry; a LOD level has that of its base geometry
   std::vector<Placement> surfaces;      ///< by instance
   std::vector<packed::TopNode> top;
-  std::vector<packed::TopNode> parts; ///< by placement; used if there are at most kMostWithParts
+  std::vector<packed::TopNode> parts; ///< by placement; used if there are at most kMaxPlacementsWithParts
   packed::KernelScene scene{};
   /// Largest coordinate, in unit space, of the grids of aligned placements.
   float aligned_max_coordinate = 0.0f;
@@ -115,11 +114,11 @@ PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, con
   t.scene.placements = t.placements.data();
   t.scene.placement_count = static_cast<uint32_t>(t.placements.size());
   if (t.placements.size() > 1) {
-    if (t.placements.size() > kMostWithParts) std::ranges::transform(t.boxes, t.boxes.begin(), grown);
+    if (t.placements.size() > kMaxPlacementsWithParts) std::ranges::transform(t.boxes, t.boxes.begin(), grown);
     t.top = build_top_tree(t.boxes);
     t.scene.top_nodes = t.top.data();
     if (t.top.size() > 1) t.stream_depth = top_tree_depth(t.top);
-    if (t.placements.size() <= kMostWithParts) t.scene.parts = t.parts.data();
+    if (t.placements.size() <= kMaxPlacementsWithParts) t.scene.parts = t.parts.data();
     place_top(t.boxes, t.aligned_max_coordinate, t.scene);
   }
   t.scene.owner = this;
@@ -220,7 +219,7 @@ void PackedTracer::add_placement(uint32_t tree, uint32_t instance, const DAffine
                    static_cast<float>(t.trees[tree].max_coordinate * std::abs(unit_from_grid[axis][axis])));
   placement.ray_classes = t.trees[tree].nodes[0].ray_classes;
   t.boxes.push_back(hull.placed(unit_from_grid));
-  if (t.parts.size() < kMostWithParts)
+  if (t.parts.size() < kMaxPlacementsWithParts)
     t.parts.push_back(top_node(hull.placed_parts(unit_from_grid, placement.aligned != 0)));
   t.placements.push_back(placement);
   t.instance_of.push_back(instance);
@@ -233,8 +232,8 @@ uint32_t PackedTracer::geometry_of_cluster(uint32_t cluster) const {
   return static_cast<uint32_t>(next - geometries.begin() - 1);
 }
 
-uint32_t PackedTracer::rays_together() const {
-  return tables_->stream_depth > 0 ? packed::kStreamRays : RayTracer::rays_together();
+uint32_t PackedTracer::preferred_rays_per_call() const {
+  return tables_->stream_depth > 0 ? packed::kStreamRays : RayTracer::preferred_rays_per_call();
 }
 
 void PackedTracer::closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder, std::span<RayHit> hits) const {
@@ -250,7 +249,7 @@ void PackedTracer::any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOr
                nullptr);
 }
 
-void PackedTracer::search_trees(void (*search)(const void*, const packed::TreeSearch&), const void* searcher) {
+void PackedTracer::set_tree_search(void (*search)(const void*, const packed::TreeSearch&), const void* searcher) {
   tables_->scene.search_tree = search;
   tables_->scene.searcher = searcher;
 }
@@ -278,7 +277,7 @@ HitSurface PackedTracer::resolve(const RayHit& hit) const {
   surface.placement = &t.surfaces[instance];
   surface.geometry = source_.instances()[instance].geometry;
   surface.triangle = triangle_of(hit.part, instance, hit.triangle);
-  if (const packed::TraceCluster& cluster = t.clusters[hit.part]; (cluster.flags & packed::kWide) == 0) {
+  if (const packed::TraceCluster& cluster = t.clusters[hit.part]; (cluster.flags & packed::kNeedsWideDecode) == 0) {
     decode_vertices(cluster, hit.triangle, surface.vertices);
     return surface;
   }

@@ -28,7 +28,7 @@ public:
   std::string_view name() const override { return "packed"; }
   std::string_view isa() const override { return kernels_.isa; }
   const UnitSpace& space() const override { return space_; }
-  uint32_t rays_together() const override;
+  uint32_t preferred_rays_per_call() const override;
 
   void closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
                     std::span<RayHit> hits) const override;
@@ -44,7 +44,7 @@ public:
   const LodTrees& lod_trees() const { return lod_trees_; }
 
   /// From now on `search` finds the leaf nodes, and the trees' inner nodes are not read. See packed::TreeSearch.
-  void search_trees(void (*search)(const void* searcher, const packed::TreeSearch&), const void* searcher);
+  void set_tree_search(void (*search)(const void* searcher, const packed::TreeSearch&), const void* searcher);
   /// The trees, the file's or built here, by number.
   std::span<const baked::TreeRecord> tree_records() const;
   std::span<const packed::TraceTree> trees() const;

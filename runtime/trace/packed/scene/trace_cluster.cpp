@@ -62,12 +62,12 @@ packed::TraceCluster trace_cluster(const baked::TreeRecord& tree, const baked::G
   packed::TraceCluster out{};
   out.bits = cluster.bits();
   out.triangle_count = static_cast<uint8_t>(cluster.triangle_count());
-  out.restart_count = static_cast<uint8_t>(cluster.layout().restart_count);
+  out.strip_count = static_cast<uint8_t>(cluster.layout().strip_count);
   out.position_bit = static_cast<uint16_t>(cluster.layout().total_bits());
   const uint32_t flags = ray_classes | (cluster.layout().index_bits() << packed::kIndexBitsShift);
   out.flags = static_cast<uint8_t>(flags);
   if (!is_plain(tree, geometry, cluster, by, out.base)) {
-    out.flags = static_cast<uint8_t>(flags | packed::kWide);
+    out.flags = static_cast<uint8_t>(flags | packed::kNeedsWideDecode);
     return out;
   }
   std::copy(cluster.record().position_bits.begin(), cluster.record().position_bits.end(), out.position_bits);

@@ -9,7 +9,8 @@
 namespace packtrace {
 
 /// Returns a cluster as kernels read it.
-/// @param ray_classes ray classes of the cluster's material slot: baked::kCameraBelow, kOcclusionBelow, kMaskedLeaves
+/// @param ray_classes ray classes of the cluster's material slot: baked::kVisibleToCamera, kVisibleToOcclusion,
+/// kMaskedLeaves
 packed::TraceCluster trace_cluster(const baked::TreeRecord& tree, const baked::GeometryRecord& geometry,
                                    const ClusterView& cluster, uint8_t ray_classes);
 

@@ -9,8 +9,8 @@ namespace packtrace {
 namespace {
 
 uint8_t ray_classes(uint32_t material_class) {
-  return static_cast<uint8_t>(((material_class & 1u) == 0 ? baked::kCameraBelow : 0) |
-                              ((material_class & 2u) == 0 ? baked::kOcclusionBelow : 0) |
+  return static_cast<uint8_t>(((material_class & 1u) == 0 ? baked::kVisibleToCamera : 0) |
+                              ((material_class & 2u) == 0 ? baked::kVisibleToOcclusion : 0) |
                               ((material_class & baked::kMaskedClass) != 0 ? baked::kMaskedLeaves : 0));
 }
 

@@ -6,10 +6,10 @@
 
 #include "compress/format/file/baked_file.h"
 #include "compress/format/trees/packed_trees.h"
-#include "runtime/trace/source/lod_source.h"
 #include "runtime/trace/packed/kernels/kernel_types.h"
 #include "runtime/trace/packed/scene/tree_hull.h"
 #include "runtime/trace/ray_tracer.h"
+#include "runtime/trace/source/lod_source.h"
 
 namespace packtrace {
 

@@ -8,7 +8,7 @@ namespace packtrace {
 namespace {
 
 /// Maximum number of boxes: children or grandchildren of the root.
-constexpr size_t kMostBoxes = size_t{baked::kNodeWidth} * baked::kNodeWidth;
+constexpr size_t kMaxBoxes = size_t{baked::kNodeWidth} * baked::kNodeWidth;
 
 struct Child {
   DVec3 lo, hi;

@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "compress/format/trees/box_tree.h"
 #include "compress/format/layout/packed_node.h"
+#include "compress/format/trees/box_tree.h"
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {

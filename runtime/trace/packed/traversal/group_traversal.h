@@ -3,10 +3,10 @@
 #include "runtime/trace/packed/kernels/batch_decode.h"
 #include "runtime/trace/packed/kernels/beam.h"
 #include "runtime/trace/packed/kernels/enter.h"
+#include "runtime/trace/packed/kernels/group_bounds.h"
 #include "runtime/trace/packed/kernels/leaf_tests.h"
 #include "runtime/trace/packed/kernels/node_children.h"
 #include "runtime/trace/packed/traversal/outside_search.h"
-#include "runtime/trace/packed/kernels/reach.h"
 
 /// Traces groups of rays through the tree over placements and through placed trees. A group visits a node together, as
 /// a 64-bit mask of rays, and the node test yields a mask per child of the rays that pass its box. A node is read and
@@ -52,7 +52,7 @@ public:
   }
 
   /// Does the same, and keeps the hits found so far: each ray ends at its nearest hit.
-  void take_again(const uint32_t* numbers, uint32_t count) {
+  void take_with_hits(const uint32_t* numbers, uint32_t count) {
     take(numbers, count);
     if constexpr (!kAny)
       for (uint32_t i = 0; i < count; ++i)
@@ -80,7 +80,7 @@ public:
   uint64_t nearer() const { return nearer_; }
 
 private:
-  friend struct OutsideSearch<GroupTraversal>;
+  friend struct ExternalTreeSearch<GroupTraversal>;
 
   struct Place {
     uint32_t placement, cluster, triangle;
@@ -161,7 +161,7 @@ private:
     by_octant(group, rays, [&](uint64_t together, uint32_t octant) {
       group.reach.set_octant(octant);
       if (scene_.search_tree != nullptr)
-        OutsideSearch<GroupTraversal>::run(*this, placement, tree.nodes, group, together, octant);
+        ExternalTreeSearch<GroupTraversal>::run(*this, placement, tree.nodes, group, together, octant);
       else
         trace_tree(placement, tree.nodes, group, together, octant);
     });
@@ -175,7 +175,7 @@ private:
     while (size > 0) {
       const Pending next = stack[--size];
       const uint64_t active = next.rays & alive_;
-      if (active == 0 || passed_by(group, next)) continue;
+      if (active == 0 || is_beyond_beam_hits(group, next)) continue;
       const baked::PackedNode& node = nodes[next.node];
       count_node(active);
       if ((node.ray_classes & ray_class_) == 0) continue;
@@ -202,7 +202,7 @@ private:
   }
 
   /// Whether a beam has no ray left that reaches this entry: all its nearest hits are in front of it.
-  static bool passed_by(const RayGroup& group, const Pending& pending) {
+  static bool is_beyond_beam_hits(const RayGroup& group, const Pending& pending) {
     if constexpr (kAny) return false;
     return group.beam != nullptr && pending.t > -group.beam->limits[1];
   }
@@ -217,10 +217,11 @@ private:
       if (group.beam != nullptr) {
         slots &= pass_beam(boxes, *group.beam, t);
         if (slots == 0) return 0;
-        if (count_ones(rays) < kLeastSideBySide) return slots & Lanes::Children::pass(boxes, group, rays, by_child);
+        if (count_ones(rays) < kMinSideBySideRays) return slots & Lanes::Children::pass(boxes, group, rays, by_child);
         return pass_side_by_side(boxes, group, rays, slots, by_child);
       }
-    if (kAny && count_ones(rays) < kLeastSideBySide) return slots & Lanes::Children::pass(boxes, group, rays, by_child);
+    if (kAny && count_ones(rays) < kMinSideBySideRays)
+      return slots & Lanes::Children::pass(boxes, group, rays, by_child);
     return pass_apart(boxes, group, rays, slots, by_child, t);
   }
 
@@ -230,13 +231,13 @@ private:
   [[gnu::noinline]] static uint32_t pass_apart(const typename Lanes::Boxes& boxes, const Group& group, uint64_t rays,
                                                uint32_t slots, uint64_t (&by_child)[baked::kNodeWidth],
                                                float (&t)[baked::kNodeWidth]) {
-    const bool many = count_ones(rays) >= kLeastSideBySide;
+    const bool many = count_ones(rays) >= kMinSideBySideRays;
     if (many) {
-      slots &= pass_reach(boxes, group.reach);
+      slots &= pass_group_bounds(boxes, group.reach);
       if (slots == 0) return 0;
     }
     if constexpr (!kAny) Lanes::Children::enter(boxes, group, first_bit(rays), t);
-    if (many && pays_side_by_side<typename Lanes::Wide>(rays, slots))
+    if (many && prefers_side_by_side<typename Lanes::WideLanes>(rays, slots))
       return pass_side_by_side(boxes, group, rays, slots, by_child);
     return slots & Lanes::Children::pass(boxes, group, rays, by_child);
   }
@@ -247,7 +248,7 @@ private:
                                                            uint64_t (&by_child)[baked::kNodeWidth]) {
     BoxPlanes planes;
     read_planes(boxes, planes);
-    return pass_each<typename Lanes::Wide>(planes, group, rays, slots, by_child);
+    return test_boxes_side_by_side<typename Lanes::WideLanes>(planes, group, rays, slots, by_child);
   }
 
   /// Pushes the children of a node that rays pass. For nearest hits the child that the first ray enters first ends on
@@ -312,7 +313,7 @@ private:
         alive_ &= ~rays_that_hit<Lanes, !kAny>(batch, normals, group, rays, exact);
       } else {
         const uint64_t others = test_side_by_side(batch, normals, place, group, rays);
-        const bool many = Lanes::Wide::kLanes > kBatch && count_ones(others) >= kLeastTestedTwice;
+        const bool many = Lanes::WideLanes::kLanes > kBatch && count_ones(others) >= kMinPrefilteredRays;
         test_each(batch, normals, place, group,
                   many ? rays_that_hit<Lanes, !kAny>(batch, normals, group, others, exact) : others);
       }
@@ -340,17 +341,17 @@ private:
   /// the batch has triangles. Returns the remaining rays, as a bit mask.
   uint64_t test_side_by_side(const DecodedBatch& batch, const BatchNormals& normals, Place place, RayGroup& group,
                              uint64_t rays) {
-    using Wide = typename Lanes::Wide;
+    using WideLanes = typename Lanes::WideLanes;
     const uint32_t begin = place.triangle;
-    for (uint32_t at = 0; at < kGroup; at += Wide::kLanes) {
-      const uint32_t wanted = lanes_at<Wide>(rays, at);
+    for (uint32_t at = 0; at < kGroup; at += WideLanes::kLanes) {
+      const uint32_t wanted = lanes_at<WideLanes>(rays, at);
       uint32_t axis[3];
-      if (count_ones(wanted) < batch.count || !same_axes<Wide>(group, at, wanted, axis)) continue;
+      if (count_ones(wanted) < batch.count || !same_axes<WideLanes>(group, at, wanted, axis)) continue;
       rays &= ~(uint64_t{wanted} << at);
       for (uint32_t triangle = 0; triangle < batch.count; ++triangle) {
-        LaneHits<Wide> hits;
+        LaneHits<WideLanes> hits;
         uint64_t exact = 0;
-        uint32_t lanes = test_rays<Wide, !kAny>(batch, normals, triangle, group, axis, at, wanted, hits, exact);
+        uint32_t lanes = test_rays<WideLanes, !kAny>(batch, normals, triangle, group, axis, at, wanted, hits, exact);
         if constexpr (kCount) counters_->exact_triangles += exact;
         place.triangle = begin + triangle;
         for (; lanes != 0; lanes &= lanes - 1) {
@@ -370,8 +371,9 @@ private:
       if constexpr (kCount) ++counters_->batches_decoded;
       const TraceCluster& packed = scene_.clusters[cluster];
       batch.tag = tag;
-      batch.count = (packed.flags & kWide) == 0 ? Lanes::decode(packed, first, count, batch)
-                                                : scene_.decode_wide(scene_.owner, cluster, first, count, batch);
+      batch.count = (packed.flags & kNeedsWideDecode) == 0
+                        ? Lanes::decode(packed, first, count, batch)
+                        : scene_.decode_wide(scene_.owner, cluster, first, count, batch);
     }
     return batch;
   }

@@ -5,7 +5,7 @@ namespace packtrace::packed {
 namespace {
 
 struct Avx2Kernel : Avx2Lanes {
-  using Wide = Avx2Lanes; ///< for tests with one ray per lane
+  using WideLanes = Avx2Lanes; ///< for tests with one ray per lane
   using Boxes = GroupBoxes<Avx2Lanes>;
   using Children = ChildRays<Avx2Lanes>;
 

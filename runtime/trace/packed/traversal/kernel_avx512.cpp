@@ -8,7 +8,7 @@ namespace packtrace::packed {
 namespace {
 
 struct Avx512Kernel : Avx2Lanes {
-  using Wide = Avx512Lanes;
+  using WideLanes = Avx512Lanes;
   using Boxes = Avx512GroupBoxes;
   using Children = Avx512ChildRays;
 

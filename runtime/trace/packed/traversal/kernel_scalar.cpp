@@ -5,7 +5,7 @@ namespace packtrace::packed {
 namespace {
 
 struct ScalarKernel : ScalarLanes {
-  using Wide = ScalarLanes;
+  using WideLanes = ScalarLanes;
   using Boxes = GroupBoxes<ScalarLanes>;
   using Children = ChildRays<ScalarLanes>;
 

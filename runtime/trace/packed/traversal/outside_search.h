@@ -9,14 +9,14 @@ namespace {
 
 /// @tparam Traversal the GroupTraversal that tests the leaves
 template <typename Traversal>
-struct OutsideSearch {
+struct ExternalTreeSearch {
   using Lanes = typename Traversal::Kernel;
 
   /// See GroupTraversal::trace_tree().
   static void run(Traversal& self, uint32_t placement, const baked::PackedNode* nodes, RayGroup& group, uint64_t rays,
                   uint32_t octant) {
     const KernelScene& scene = self.scene_;
-    OutsideSearch state{&self, nodes, &group, placement, octant};
+    ExternalTreeSearch state{&self, nodes, &group, placement, octant};
     TreeSearch search;
     search.tree = scene.placements[placement].tree;
     search.any = Traversal::kAnyHit ? 1 : 0;
@@ -47,13 +47,13 @@ private:
   /// Embree treats direction components below 1e-18 as 0. Components are therefore at least 2^-40 here, which moves a
   /// ray by at most 6 M 2^-40; the pad of Embree's boxes covers that.
   static float within_limit(float inverse) {
-    constexpr float kMost = 0x1p40f;
-    return inverse > kMost ? kMost : inverse < -kMost ? -kMost : inverse;
+    constexpr float kMax = 0x1p40f;
+    return inverse > kMax ? kMax : inverse < -kMax ? -kMax : inverse;
   }
 
   static uint64_t visit_leaf_nodes(const TreeSearch& search, const uint32_t* nodes, uint32_t node_count,
                                    uint64_t rays) {
-    const OutsideSearch& at = *static_cast<const OutsideSearch*>(search.traversal);
+    const ExternalTreeSearch& at = *static_cast<const ExternalTreeSearch*>(search.traversal);
     Traversal& self = *at.self;
     for (uint32_t i = 0; i < node_count && (rays &= self.alive_) != 0; ++i) {
       const baked::PackedNode& node = at.nodes[nodes[i]];

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "runtime/trace/packed/traversal/group_traversal.h"
 #include "runtime/trace/packed/kernels/octant_guess.h"
+#include "runtime/trace/packed/traversal/group_traversal.h"
 
 /// Traces many groups of rays through the tree over placements together. It is for scenes in which few rays of a group
 /// enter the same placement: the rays that all groups send to a placement are regrouped there.
@@ -136,7 +136,7 @@ private:
     const uint32_t number = at.node & ~kTopLeaf;
     const TracePlacement& placement = scene_.placements[number];
     if ((placement.ray_classes & ray_class_) == 0) return;
-    const OctantGuess octant_of(placement);
+    const ApproximateOctant octant_of(placement);
     Gathered gathered[8];
     for (uint32_t i = 0; i < at.part_count; ++i) {
       const StreamGroup& group = groups_[at.parts[i].group];
@@ -155,7 +155,7 @@ private:
     uint32_t numbers[kGroup] = {};
     for (uint32_t i = 0; i < gathered.count; ++i)
       numbers[i] = groups_[gathered.rays[i] / kGroup].numbers[gathered.rays[i] % kGroup];
-    traversal_.take_again(numbers, gathered.count);
+    traversal_.take_with_hits(numbers, gathered.count);
     const uint64_t before = traversal_.alive();
     traversal_.trace(placement);
     for (uint64_t m = kAny ? before & ~traversal_.alive() : traversal_.nearer(); m != 0; m &= m - 1) {

@@ -22,7 +22,7 @@ public:
         stream_(scene, groups_, memory.stream, rays, ray_class, occluded) {}
 
   void run(size_t count) {
-    streams_ = streams_ && count >= kLeastStream;
+    streams_ = streams_ && count >= kMinStreamRays;
     for (size_t first = 0; first < count; first += kStreamRays) {
       sort(first, first + kStreamRays < count ? first + kStreamRays : count);
       if (streams_) stream_.trace();

@@ -30,12 +30,12 @@ def pack(values, geometry):
     position_bits = widths_above(base, values.places)
     cluster = PageCluster({
         "material_slot": values.slot, "anchor": anchor, "normal_anchor": (0, 0), "vertex_count": len(values.places),
-        "normal_palette": 0, "triangle_count": values.triangle_count, "restart_count": values.turns.count(RESTART),
+        "normal_palette": 0, "triangle_count": values.triangle_count, "strip_count": values.turns.count(RESTART),
         "position_bits": position_bits, "normal_bits": (0, 0), "flags": HAS_UVS if values.has_uvs else 0})
     cluster.starts = [int(turn == RESTART) for turn in values.turns]
     cluster.lefts = [int(turn == LEFT) for turn in values.turns]
     cluster.fresh = [int(fresh) for _, fresh in values.corners]
-    cluster.olds = [vertex for vertex, fresh in values.corners if not fresh]
+    cluster.reused_vertices = [vertex for vertex, fresh in values.corners if not fresh]
     cluster.positions = [word_of([p - b for p, b in zip(place, base)], position_bits) for place in values.places]
     if values.has_normals:
         pack_normals(cluster, values, encoding)

@@ -18,7 +18,7 @@ def check_levels(baked, meshes):
         for level in levels:
             chosen = baked.cut(base, level["error"])
             triangles = sum(baked.clusters(geometries[g])[c]["triangle_count"] for g, c in chosen)
-            if triangles > level["triangles"]: # a cut may be coarser: groups have smaller errors than the level
+            if triangles > level["triangles"]: # a cut may have fewer: group errors may be smaller than the level's
                 raise BadFile("a cut has more triangles than the level of its error")
             if was_closed and not is_closed(baked, chosen, meshes):
                 raise BadFile("a cut through levels of a closed surface is open")
@@ -46,7 +46,7 @@ class TreeBoxes:
         for number, geometry in enumerate(baked.sections["geometries"]):
             self.geometry_of += [number] * geometry["cluster_count"]
             for material_class, count in enumerate(geometry["class_clusters"]):
-                # bits: seen by the camera, occludes, a mask must be looked up
+                # bits: visible to the camera, occludes, needs a mask lookup
                 self.classes_of += [(~material_class & 3) | (material_class & 4)] * count
 
     def leaf_box(self, tree, cluster, first, count):

@@ -8,9 +8,9 @@ from ptk.records import HAS_NORMALS, HAS_UVS, BadFile, Bits, Cursor, Record, ind
 from ptk.zstd import decompress
 
 PART_COUNT = 9
-FIELDS, HEADERS, BITS, RUNS, OLDS, RESIDUALS = range(6)  # the residuals' classes follow each other
+FIELDS, HEADERS, BITS, RUNS, REUSED_VERTICES, RESIDUALS = range(6)  # followed by the other classes of residuals
 WORD = (1 << 64) - 1
-WIDE = 57  # words of more bits are copied
+WIDE = 57  # wider words are copied
 
 HEADER = Record(
     ("anchor", "3I"), ("material_slot", "I"), ("normal_anchor", "2H"), ("normal_palette", "H"),
@@ -64,7 +64,7 @@ def record_of(header):
     record = {name: header[name] for name in
               ("material_slot", "anchor", "normal_anchor", "normal_palette", "position_bits", "normal_bits", "flags")}
     return record | {"vertex_count": header["vertices"] + 1, "triangle_count": header["triangles"] + 1,
-                     "restart_count": header["strips"] + 1}
+                     "strip_count": header["strips"] + 1}
 
 
 class FastCluster:
@@ -77,7 +77,7 @@ class FastCluster:
     def read_strips(self):
         """Also which vertex each fresh one is guessed from: guesses[v] is (p, q, o), vertices or None."""
         cluster, parts = self.cluster, self.parts
-        triangles, strips = cluster.record["triangle_count"], cluster.record["restart_count"]
+        triangles, strips = cluster.record["triangle_count"], cluster.record["strip_count"]
         cluster.lefts = parts[BITS].take_bits(triangles)
         cluster.fresh = parts[BITS].take_bits(triangles + 2 * strips)
         creases = parts[BITS].take_bits(self.count) if self.header["creases"] else [0] * self.count
@@ -109,11 +109,11 @@ class FastCluster:
             if self.creases[vertex]:
                 self.originals[vertex] = self.old()
             return vertex
-        self.cluster.olds.append(self.old())
-        return self.cluster.olds[-1]
+        self.cluster.reused_vertices.append(self.old())
+        return self.cluster.reused_vertices[-1]
 
     def old(self):
-        self.last_old = self.last_old + unzigzag(self.parts[OLDS].take(1)[0]) & 255
+        self.last_old = self.last_old + unzigzag(self.parts[REUSED_VERTICES].take(1)[0]) & 255
         return self.last_old
 
     def read_fields(self, bits):

@@ -38,5 +38,5 @@ def guess_normal(encoding, n):
         return 0, code_of(n[0] + math.copysign(fold, n[0]), x_last - 1), code_of(n[1] + math.copysign(fold, n[1]), y_last - 1)
     if encoding.family == "zsign":
         return int(n[2] < 0.0), code_of(n[0], x_last - 1), code_of(n[1], y_last - 1)
-    axis = max(range(3), key=lambda i: abs(n[i]))  # the first of equal ones
+    axis = max(range(3), key=lambda i: abs(n[i]))  # the first of equal components
     return 2 * axis + (n[axis] < 0.0), code_of(unwarp(n[(axis + 1) % 3]), x_last), code_of(unwarp(n[(axis + 2) % 3]), y_last)

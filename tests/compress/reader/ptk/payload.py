@@ -30,9 +30,9 @@ class PageCluster:
     starts: list = field(default_factory=list)  # per triangle: whether it begins a strip
     lefts: list = field(default_factory=list)  # per triangle
     fresh: list = field(default_factory=list)  # per corner
-    olds: list = field(default_factory=list)  # vertices of the corners that are not fresh
+    reused_vertices: list = field(default_factory=list)  # vertices of corners that are not fresh
     positions: list = field(default_factory=list)  # words: the fields of a vertex, first field lowest
-    normals: list = field(default_factory=list)  # words, or numbers in the palette
+    normals: list = field(default_factory=list)  # words, or palette indices
     palette: list = field(default_factory=list)  # words
     uvs: list = field(default_factory=list)  # words
     uv_anchors: tuple = (0, 0)  # as unsigned numbers
@@ -49,7 +49,7 @@ class PageCluster:
         for bits in (self.starts, self.lefts, self.fresh):
             for bit in bits:
                 out.put(bit, 1)
-        for vertex in self.olds:
+        for vertex in self.reused_vertices:
             out.put(vertex, index_bits(self.record["vertex_count"]))
         for word in self.positions:
             out.put(word, sum(self.record["position_bits"]))

@@ -7,7 +7,7 @@ from ptk.records import BadFile, Bits, unzigzag
 SYMBOLS = 16
 PROBABILITY_BITS = 15
 LOWEST = 1 << 16
-WIDE = 15  # bits of a number from which on it says its width itself
+WIDE = 15  # numbers of this many bits and more store their width explicitly
 
 
 class Model:

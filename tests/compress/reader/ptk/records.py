@@ -69,7 +69,7 @@ GEOMETRY = Record(
 CLUSTER = Record(
     ("payload_offset", "I"), ("first_triangle", "I"), ("first_vertex", "I"), ("material_slot", "I"),
     ("anchor", "3i"), ("normal_anchor", "2h"), ("vertex_count", "H"), ("normal_palette", "H"),
-    ("triangle_count", "B"), ("restart_count", "B"), ("position_bits", "3B"), ("normal_bits", "2B"), ("flags", "B"))
+    ("triangle_count", "B"), ("strip_count", "B"), ("position_bits", "3B"), ("normal_bits", "2B"), ("flags", "B"))
 MATERIAL = Record(
     ("flags", "I"), ("albedo", "3f"), ("alpha_mask", "I"), ("shadow_alpha_mask", "I"),
     ("albedo_texture", "I"), ("name", "2I"))
@@ -108,7 +108,7 @@ NODE = Record(
     ("cluster", "I"), ("children", "8B"), ("lo", "24B"), ("hi", "24B"))
 INNER_CHILD = 255
 
-# In the order of the section table; None: bytes.
+# In the order of the section table; None: plain bytes.
 SECTIONS = (
     ("geometries", GEOMETRY), ("clusters", CLUSTER), ("payload", None), ("materials", MATERIAL),
     ("instances", INSTANCE), ("masks", MASK), ("mask_words", Record(("word", "I"))), ("textures", TEXTURE),

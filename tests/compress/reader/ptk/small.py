@@ -22,9 +22,9 @@ class Point:
     place: tuple
     outward: list = field(default_factory=list)
     inward: list = field(default_factory=list)
-    cluster: int = -1  # the last one with a vertex here
-    vertex: int = 0  # the newest of that cluster's
-    normals: list = field(default_factory=list)  # the last two different ones, newest first
+    cluster: int = -1  # last cluster with a vertex here
+    vertex: int = 0  # newest vertex of that cluster here
+    normals: list = field(default_factory=list)  # the last two different normals, newest first
 
     def ends(self):
         return [end for end, _ in self.outward]
@@ -33,7 +33,7 @@ class Point:
 @dataclass
 class Vertex:
     point: int
-    before: tuple  # earlier corners, as vertices, of the triangle that brought it
+    before: tuple  # earlier corners, as vertices, of the triangle that first uses it
 
 
 @dataclass
@@ -44,7 +44,7 @@ class SmallCluster:
     has_normals: int = 0
     has_uvs: int = 0
     triangle_count: int = FULL
-    chart: int = 0  # that normals are unfolded around; the number of charts: each has one
+    chart: int = 0  # chart that normals are unfolded around; the number of charts: one per normal
     has_palette: int = 0
     turns: list = field(default_factory=list)
     corners: list = field(default_factory=list)  # one or three per triangle: (vertex, whether it is fresh)
@@ -66,7 +66,7 @@ class PageDecoder:
         self.points = []
         self.number = 0
         self.last = SmallCluster()
-        self.recent_new = (0, 0)  # whether the corner before the last, and the last, were new points
+        self.recent_new = (0, 0)  # whether the last but one corner, and the last one, were new points
         self.spans = [MAX_SPAN] * 3
 
     def cluster(self, encoding):
@@ -97,7 +97,7 @@ class PageDecoder:
 
     def triangles(self):
         c = self.c
-        t, before = (), 0  # corners as vertices; the point of the corner before
+        t, before = (), 0  # corners as vertices; the point of the last corner
         recent = RESTART, RESTART
         for i in range(c.triangle_count):
             turn = RESTART

@@ -15,9 +15,9 @@ class Mesh:
     lattice: list
     positions: list
     normals: list  # (0, 0, 0) in flat clusters
-    uvs: list  # (0, 0) in clusters without
+    uvs: list  # (0, 0) in clusters without texture coordinates
     triangles: list
-    slots: list  # per triangle, of materials
+    slots: list  # material slot per triangle
 
 
 def read_triangles(bits, cluster):
@@ -25,7 +25,7 @@ def read_triangles(bits, cluster):
     count, vertex_count = cluster["triangle_count"], cluster["vertex_count"]
     restart = [bits.take(1) for _ in range(count)]
     left = [bits.take(1) for _ in range(count)]
-    if restart[0] != 1 or sum(restart) != cluster["restart_count"]:
+    if restart[0] != 1 or sum(restart) != cluster["strip_count"]:
         raise BadFile("restart bits do not fit the number of strips")
     corner_count = count + 2 * sum(restart)
     fresh = [bits.take(1) for _ in range(corner_count)]

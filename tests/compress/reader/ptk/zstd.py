@@ -6,7 +6,7 @@ import functools
 
 from ptk.records import BadFile
 
-GROWTH = 1 << 15  # no size may exceed this many times the bytes it comes from
+GROWTH = 1 << 15  # maximum ratio of a decoded size to its size on disk
 
 
 @functools.cache
