@@ -277,9 +277,9 @@ void check_exr(std::span<const std::byte> bytes, ImageWants wants, MemoryReserva
   if (const std::string_view why = unsupported_exr_kind(bytes); !why.empty()) fail(std::string(why));
   const ExrHeader header = scan_exr_header(bytes, kDamaged);
   // OpenEXR keeps a few blocks, compressed and decompressed.
-  constexpr uint64_t kBlockCopies = 4, kFreeBytes = 64u << 20, kRows = 64;
+  constexpr uint64_t kBlockCopies = 4, kAlwaysAcceptedBytes = 64u << 20, kRows = 64;
   const uint64_t block = header.block_bytes();
-  if (block > kFreeBytes && block / kMaxPixelsPerByte > bytes.size())
+  if (block > kAlwaysAcceptedBytes && block / kMaxPixelsPerByte > bytes.size())
     fail("damaged image: its " + std::to_string(bytes.size()) + " bytes cannot hold the blocks it claims");
   const uint64_t blocks = block > UINT64_MAX / (2 * kBlockCopies) ? UINT64_MAX / 2 : block * kBlockCopies;
   const ClaimedSize size{header.width(), header.height()};

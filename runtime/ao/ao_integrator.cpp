@@ -11,9 +11,9 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kTilePixels = kTileSize * kTileSize;
-constexpr uint32_t kMaxTogether = 4; ///< samples of a tile that are handed on in one call, at most
+constexpr uint32_t kMaxSamplesPerCall = 4; ///< maximum samples per pixel that one tracer call gets for a tile
 
-/// What hits at each distance do to a sample; see AoConfig.
+/// Visibility of a sample as a function of its hit distance; see AoConfig.
 class Coefficient {
 public:
   explicit Coefficient(const AoConfig& config)
@@ -26,11 +26,11 @@ public:
     linear_ = config.continuous && 1.0 - floor_ < 1e-6; // the limit for lambda -> 0
   }
 
-  /// Distance that rays need to see, in radii.
+  /// Length of the rays (x_end), in radii.
   double end() const { return end_; }
 
-  /// @param x distance in radii, [0, end]
-  /// @param luminance of the surface that was hit; only matters for rho > 0
+  /// @param x hit distance in radii, [0, end]
+  /// @param luminance luminance of the hit surface's albedo; used only if rho > 0
   double visibility(double x, double luminance) const {
     x = std::min(x, end_);
     const double occlusion = linear_         ? 1.0 - (x / end_) * (x / end_)
@@ -47,17 +47,18 @@ private:
   bool linear_ = false;
 };
 
-/// An orthonormal pair for a unit vector. Source: Duff et al., "Building an orthonormal basis, revisited" (2017), who
-/// switch at z = 0. Walls have z of +0, -0 or a rounding error there, which must not choose their samples.
+/// Completes the unit vector n to an orthonormal basis. Source: Duff et al., "Building an orthonormal basis, revisited"
+/// (2017). The paper switches formulas at z = 0; this version switches at z = -0.4. Vertical walls have z = +0, -0 or a
+/// rounding error, so a switch at 0 would rotate their sample pattern from pixel to pixel.
 void make_basis(Vec3 n, Vec3& tangent, Vec3& bitangent) {
-  constexpr float kSwitch = -0.4f; // sign + z is 0.6 at least
+  constexpr float kSwitch = -0.4f; // keeps |sign + z| >= 0.6
   const float sign = n.z < kSwitch ? -1.0f : 1.0f;
   const float a = -1.0f / (sign + n.z), b = n.x * n.y * a;
   tangent = {1.0f + sign * n.x * n.x * a, sign * b, -sign * n.x};
   bitangent = {b, sign + n.y * n.y * a, -n.y};
 }
 
-/// A pixel that casts rays.
+/// A pixel whose camera ray hit a surface, prepared for casting occlusion rays.
 struct ShadingPoint {
   size_t pixel;
   PixelSampler::Pixel sampler;
@@ -72,21 +73,21 @@ public:
       : source_(source), tracer_(tracer), gbuffer_(gbuffer), config_(config), coefficient_(config),
         sampler_(config.sampler, config.seed), first_sample_(static_cast<uint64_t>(frame_index) * config.spp),
         unit_radius_(config.radius * tracer.space().scale()),
-        unit_reach_(static_cast<float>(unit_radius_ * coefficient_.end())), out_(out) {}
+        ray_length_(static_cast<float>(unit_radius_ * coefficient_.end())), out_(out) {}
 
-  /// Needs RayHit for distances, a byte otherwise.
+  /// @tparam Result RayHit for nearest-hit queries, which return distances; uint8_t for any-hit queries
   template <typename Result>
   void trace_tile(const Tile& tile, const Progress& progress) const {
     const uint32_t together =
-        std::clamp(tracer_.preferred_rays_per_call() / kTilePixels, 1u, std::min(config_.spp, kMaxTogether));
+        std::clamp(tracer_.preferred_rays_per_call() / kTilePixels, 1u, std::min(config_.spp, kMaxSamplesPerCall));
     if (together == 1)
       trace_samples<Result, 1>(tile, together, progress);
     else
-      trace_samples<Result, kMaxTogether>(tile, together, progress);
+      trace_samples<Result, kMaxSamplesPerCall>(tile, together, progress);
   }
 
 private:
-  /// @param together samples in one call, kRoom at most
+  /// @param together samples per pixel in one tracer call, at most kRoom
   template <typename Result, uint32_t kRoom>
   void trace_samples(const Tile& tile, uint32_t together, const Progress& progress) const {
     ShadingPoint points[kTilePixels];
@@ -114,8 +115,8 @@ private:
     }
   }
 
-  /// Collects a tile's hits, 4 x 4 pixels at a time so that neighbouring rays share cache lines of the tree, and
-  /// marks its misses.
+  /// Collects the tile's hit pixels in Morton order, so that consecutive rays share cache lines of the BVH, and writes
+  /// kInvalidAo to the others. Returns the number of hit pixels.
   uint32_t gather(const Tile& tile, ShadingPoint* points, Ray* rays) const {
     uint32_t count = 0;
     for (uint32_t code = 0; code < kTilePixels; ++code) {
@@ -135,7 +136,7 @@ private:
       make_basis(point.normal, point.tangent, point.bitangent);
       const DVec3 origin = DVec3(gbuffer_.position[pixel]) + DVec3(point.geometric) * double(gbuffer_.offset[pixel]);
       rays[count].origin = Vec3(tracer_.space().to_unit(origin));
-      rays[count++].tfar = unit_reach_;
+      rays[count++].tfar = ray_length_;
     }
     return count;
   }
@@ -170,7 +171,7 @@ private:
     distance += std::min(x, 1.0);
   }
 
-  /// Of the hit surface's albedo, Rec. 709 weights.
+  /// Luminance of the hit surface's albedo, with Rec. 709 weights.
   double luminance(const RayHit& hit) const {
     const HitSurface surface = tracer_.resolve(hit);
     const uint32_t material = source_.material_of(surface.placement->instance, surface.triangle);
@@ -186,7 +187,7 @@ private:
   const PixelSampler sampler_;
   const uint64_t first_sample_;
   const double unit_radius_;
-  const float unit_reach_;
+  const float ray_length_;
   AoFrame& out_;
 };
 

@@ -9,42 +9,46 @@
 
 namespace packtrace {
 
-/// Parameters of ambient occlusion. A hit at distance t darkens its direction by
-///   occlusion = exp(-lambda x^2), x = t / radius, seen up to the distance x_end where it falls to `cutoff` (at most
-///   1),
-/// made continuous there as (exp(-lambda x^2) - exp(-lambda x_end^2)) / (1 - exp(-lambda x_end^2)): 1 at the surface,
-/// 0 at the end. The sample is then 1 - (1 - min_visibility) occlusion, and a miss is 1.
-/// With interreflection rho the sample k of a hit becomes k / (1 - rho L (1 - k)), L the hit surface's luminance.
+/// Parameters of ambient occlusion. A hit at distance t, with x = t / radius, has
+///   occlusion(x) = exp(-lambda x^2)  for x <= x_end, 0 beyond,
+/// where x_end = min(1, the x at which occlusion falls to `cutoff`). With `continuous` the curve is rescaled so that
+/// it reaches 0 at x_end:
+///   (exp(-lambda x^2) - exp(-lambda x_end^2)) / (1 - exp(-lambda x_end^2)).
+/// The visibility of a hit is k = 1 - (1 - min_visibility) occlusion; the visibility of a miss is 1.
+/// Interreflection rho brightens a hit to k / (1 - rho L (1 - k)), where L is the luminance of the hit's albedo.
 struct AoConfig {
   float radius = 1.0f;          ///< world units, > 0; see default_ao_radius()
   uint32_t spp = 1;             ///< samples per pixel and frame, 1..65536
   bool falloff = true;          ///< false: every hit within radius occludes fully
   float lambda = 2.0f;          ///< 0..20
-  float cutoff = 0.4f;          ///< 0..below 1
-  bool continuous = true;       ///< false: occlusion steps down at x_end instead of fading to zero
-  float min_visibility = 0.0f;  ///< 0..1: what full occlusion leaves
+  float cutoff = 0.4f;          ///< [0, 1)
+  bool continuous = true;       ///< false: occlusion drops from `cutoff` to 0 at x_end instead of fading out
+  float min_visibility = 0.0f;  ///< 0..1: visibility of a fully occluded sample
   float interreflection = 0.0f; ///< rho, 0..1; 0: off
   uint64_t seed = 0;
   SamplerKind sampler = SamplerKind::kSpaceTimeNet;
 };
 
-/// A radius for scenes whose units are not known: 10 % of the diagonal; 1 for boxes without extent.
+/// Returns a radius for scenes with unknown units: 10 % of the bounds' diagonal, or 1 if the diagonal is zero or not
+/// finite.
 float default_ao_radius(const Bounds& bounds);
 
 /// Throws Error(kUsage) naming the first parameter out of range.
 void validate(const AoConfig& config);
 
-/// Ambient occlusion for every hit of a G-buffer.
+/// Traces ambient occlusion for every hit pixel of a G-buffer.
 ///
-/// Directions are cosine-weighted about the shading normal; those below the geometric surface are mirrored up at it, so
-/// that an open surface has AO 1 whatever its vertex normals. Rays start `offset` above the surface, with tnear 0.
-/// Without falloff and interreflection any hit ends a ray; distances are then unknown, and an occluded sample counts
-/// as half the radius in hit_distance.
-/// Sample frame_index * spp + i of a pixel's sequence is sample i of this frame. AO is in [min_visibility, 1], or
-/// kInvalidAo (distance 0) where the camera ray missed. The result is the same for any number of threads.
-/// @param gbuffer of this source and tracer; ao is resized to it
-/// @param progress advances by the image's pixels, a tile at a time; its phase is begun by the caller, for one frame or
-///        for many
+/// Directions are cosine-weighted about the shading normal. Directions below the geometric surface are mirrored to its
+/// upper side, so an unoccluded surface has AO 1 for any shading normal. Rays start at GBuffer::offset above the
+/// surface, with tnear 0.
+/// If falloff and interreflection are both off, any-hit queries suffice. Hit distances are then unknown, and an
+/// occluded sample adds half the radius to hit_distance.
+/// Sample i of this frame is sample frame_index * spp + i of the pixel's sequence. AO lies in [min_visibility, 1];
+/// pixels whose camera ray missed get kInvalidAo and distance 0. The result does not depend on the number of threads.
+/// @param gbuffer traced with the same source and tracer, or with a finer version of the same instances
+/// @param ao resized to the G-buffer
+/// @param progress advances by the number of pixels, tile by tile. The caller begins the phase, which may span several
+///        frames.
 /// Throws Error(kUsage) as validate() does, Error(kCancelled).
 void trace_ao(const SceneSource& source, const RayTracer& tracer, const GBuffer& gbuffer, const AoConfig& config,
               uint32_t frame_index, AoFrame& ao, Progress& progress);

@@ -8,16 +8,17 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kNumberBits = 16; // sample numbers per sequence: beyond, another scramble
+constexpr uint32_t kNumberBits = 16; // log2 of the sequence length; later samples repeat it with another scramble
 constexpr uint32_t kBlockLog2 = 3;   // 8 x 8 pixels share a net
 constexpr uint32_t kBlockBits = 2 * kBlockLog2;
 
-/// One column of both generator matrices: bit r is digit r after the point.
+/// One column of the generator matrices of x and y. Bit r is digit r after the point.
 struct Column {
   uint32_t x, y;
 };
 
-/// Sobol's first two dimensions: identity and Pascal's triangle modulo 2, whose entry (r, i) is 1 where r & ~i is 0.
+/// The first two Sobol dimensions: the identity, and Pascal's triangle modulo 2, whose entry (r, i) is 1 if
+/// r & ~i is 0.
 constexpr std::array<Column, kNumberBits> number_columns() {
   std::array<Column, kNumberBits> columns{};
   for (uint32_t i = 0; i < kNumberBits; ++i) {
@@ -28,9 +29,9 @@ constexpr std::array<Column, kNumberBits> number_columns() {
 }
 constexpr std::array<Column, kNumberBits> kNumberColumns = number_columns();
 
-/// For the Morton code of a pixel in its block. Together with the columns above they were searched for so that these
-/// sets of points are (0, m, 2)-nets: aligned 2^a pixels of one sample number, a <= 6; 2 x 2 pixels of 4 aligned sample
-/// numbers, 4 x 4 of 16, 8 x 8 of 64. A test checks all of them.
+/// Generator columns for the Morton code of a pixel within its block. They were found by a search such that, together
+/// with kNumberColumns, these point sets are (0, m, 2)-nets: 2^a pixels aligned in Morton order at one sample number,
+/// a <= 6; and 2 x 2 pixels over 4 aligned sample numbers, 4 x 4 over 16, 8 x 8 over 64. A test checks all of them.
 constexpr std::array<Column, kBlockBits> kPixelColumns = {
     {{0xb7ff, 0x854f}, {0x7e66, 0xef59}, {0x9c2d, 0x9ef5}, {0xad83, 0xf7c1}, {0xe44f, 0xbc30}, {0xc8fd, 0x1e43}}};
 
@@ -45,9 +46,9 @@ constexpr uint32_t hash32(uint32_t x) {
 
 constexpr uint32_t combine(uint32_t seed, uint32_t value) { return hash32(seed + 0x9e3779b9u + hash32(value)); }
 
-/// Owen's nested uniform scrambling by hashing: bit i changes depending on the bits below it only (the digits before
-/// it). Source: Laine, Karras, "Stratified sampling for stochastic transparency" (2011); constants by Vegdahl,
-/// "Building a better LK hash" (2021).
+/// Owen's nested uniform scrambling by hashing: whether bit i flips depends only on the lower bits, which are the
+/// preceding digits. Source: Laine, Karras, "Stratified sampling for stochastic transparency" (2011); constants by
+/// Vegdahl, "Building a better LK hash" (2021).
 inline uint32_t scramble(uint32_t digits, uint32_t seed) {
   digits ^= digits * 0x3d20adeau;
   digits += seed;
@@ -113,7 +114,7 @@ Vec3 cosine_direction(Vec2 point) {
   const bool wide = std::abs(a) > std::abs(b);
   const float radius = wide ? a : b;
   const float angle = radius != 0.0f ? kQuarterPi * (wide ? b : a) / radius : 0.0f; // in [-pi/4, pi/4]
-  // Taylor polynomials, error below 4e-7 on that range; the same bits with every C library.
+  // Taylor polynomials: the error is below 4e-7 on this range, and the bits do not depend on the C library.
   const float s = angle * angle;
   const float sine = angle * (1.0f + s * (-1.0f / 6 + s * (1.0f / 120 + s * (-1.0f / 5040))));
   const float cosine = 1.0f + s * (-0.5f + s * (1.0f / 24 + s * (-1.0f / 720 + s * (1.0f / 40320))));

@@ -11,11 +11,12 @@ namespace packtrace {
 
 inline constexpr uint32_t kNoInstance = ~0u;
 
-/// The one representation of "no ambient occlusion here" (camera ray missed, or not traced this frame). Never NaN.
+/// Marks pixels without ambient occlusion: the camera ray missed, or the pixel was not traced this frame. NaN is never
+/// used for this.
 inline constexpr float kInvalidAo = -1.0f;
 
-/// Primary visibility of one frame, rows top to bottom, one entry per pixel in every array.
-/// At pixels that miss: view_z 0, instance kNoInstance, everything else 0.
+/// Primary visibility of one frame. Every array has one entry per pixel, rows top to bottom.
+/// Pixels whose camera ray misses hold instance kNoInstance and 0 in all other arrays.
 struct GBuffer {
   ImageSize size;
   std::vector<float> view_z;          ///< camera-space z in world units (distance for environment cameras); 0 = miss
@@ -24,12 +25,12 @@ struct GBuffer {
   std::vector<Vec3> normal;           ///< shading normal: world space, unit, in the geometric normal's hemisphere
   std::vector<Vec3> albedo;           ///< linear sRGB
   std::vector<uint32_t> instance;     ///< SceneSource::instances() index
-  std::vector<uint32_t> triangle;     ///< of the instance's geometry
+  std::vector<uint32_t> triangle;     ///< index in the instance's geometry
   std::vector<uint32_t> material;     ///< SceneSource::materials() index
-  std::vector<uint8_t> back_face;     ///< 1 where the traced triangle's own normal points away from the camera
+  std::vector<uint8_t> back_face;     ///< 1 where the camera sees the triangle's back (its winding normal points away)
   std::vector<float> offset;          ///< ray-origin offset along the geometric normal, world units (docs/accuracy.md)
-  /// Pixels to subtract from this pixel's centre to find the same surface point in the previous frame (x right, y
-  /// down).
+  /// Screen-space motion since the previous frame in pixels (x right, y down): this pixel's centre minus the motion is
+  /// where the previous frame saw the same surface point.
   std::vector<Vec2> motion_px;
 
   void resize(ImageSize new_size) {
@@ -45,9 +46,8 @@ struct GBuffer {
 /// Ambient occlusion of one frame before denoising.
 struct AoFrame {
   ImageSize size;
-  std::vector<float> ao; ///< 1 = open, 0 = fully occluded, kInvalidAo = none
-  std::vector<float>
-      hit_distance; ///< mean distance of the samples' hits, misses counting as the AO radius; world units
+  std::vector<float> ao;           ///< 1 = open, 0 = fully occluded, kInvalidAo = no value
+  std::vector<float> hit_distance; ///< mean hit distance of the samples, world units; a miss counts as the AO radius
 
   void resize(ImageSize new_size) {
     size = new_size;

@@ -19,15 +19,15 @@ bool is_number(std::string_view word) {
   return !word.empty() && word.find_first_not_of("0123456789") == std::string_view::npos;
 }
 
-/// The option that a word like "--output", "--output=x", "-o" or "-o=x" names; null where it names none.
+/// Returns the option named by a word such as "--output", "--output=x", "-o" or "-o=x"; null for other words.
 CLI::Option* option_of(CLI::App& app, const std::string& word) {
   if (word.size() < 2 || word[0] != '-') return nullptr;
   const std::string name = word.substr(0, word.find('='));
   return app.get_option_no_throw(name);
 }
 
-/// Whether a word is meant as the value of an option whose value may be left out. Everything but what looks like a file
-/// is: the option's check says what is wrong with it.
+/// Whether a word is meant as the value of an option with an optional value. True for all words that do not look like a
+/// file or an option, including misspelt values, which the option's check then reports.
 bool is_meant_as_value(CLI::Option& option, const std::string& word) {
   const std::vector<std::string> choices = choices_of(option);
   if (std::ranges::find(choices, word) != choices.end()) return true;
@@ -61,7 +61,7 @@ private:
   bool has_next() const { return next_ < words_.size(); }
 
   void add_other(const std::string& word) {
-    if (word.empty()) throw Error(ErrorKind::kUsage, "an argument is empty, where a verb or a file is expected");
+    if (word.empty()) throw Error(ErrorKind::kUsage, "an argument is empty; expected a verb or a file");
     if (app_->get_parent() == nullptr)
       if (CLI::App* verb = find_verb(*app_, word)) app_ = verb;
     plain_.push_back(word);
@@ -88,21 +88,21 @@ private:
     std::string value = take();
     const bool is_verb = app_->get_parent() == nullptr && find_verb(*app_, value) != nullptr;
     if (value == "--" || is_verb || option_of(*app_, value) != nullptr)
-      throw Error(ErrorKind::kUsage, name + " needs a value, but " + value + " follows; " + name +
-                                         (name.starts_with("--") ? "=" : " ./") + value + " if that is its value");
+      throw Error(ErrorKind::kUsage, name + " needs a value, but " + value + " follows; write " + name +
+                                         (name.starts_with("--") ? "=" : " ./") + value + " if this is the value");
     if (value_name(option) == kSize && is_number(value) && has_next() && is_number(words_[next_]))
       value += "x" + take();
     plain_.push_back(value);
   }
 
-  CLI::App* app_; ///< of the verb, once there is one
+  CLI::App* app_; ///< the program, or the verb once its name was read
   std::vector<std::string> words_, plain_;
   size_t next_ = 0;
 };
 
 } // namespace
 
-std::vector<std::string> plain_arguments(CLI::App& app, std::span<const char* const> words) {
+std::vector<std::string> normalised_arguments(CLI::App& app, std::span<const char* const> words) {
   return Words(app, words).plain();
 }
 

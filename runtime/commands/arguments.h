@@ -10,21 +10,20 @@ class App;
 
 namespace packtrace {
 
-/// The words of a command line as CLI11 takes them. What is changed is what people write and CLI11 reads otherwise:
-///  - a value may follow a short option after "=": -o=x.png;
-///  - an option whose value may be left out takes the next word only where that can be one of its values, so that
-///    `bake --lod scene.pbrt` keeps its scene;
-///  - `--size 640 360` is `--size 640x360`;
-///  - an option, or a verb, in the place of an option's value is an error: `--json --force` would write a file called
-///  "--force".
-///    `--json=--force` means just that.
-/// Words behind "--" stay as they are.
-/// @param words without the program's name
+/// Rewrites command-line words that CLI11 would misread:
+///  - A short option accepts its value after "=": -o=x.png.
+///  - An option with an optional value takes the next word only if it can be such a value, so `bake --lod scene.pbrt`
+///    still has its scene.
+///  - `--size 640 360` becomes `--size 640x360`.
+///  - An option name or a verb in place of an option's value is an error. Otherwise `--json --force` would write a file
+///    called "--force". `--json=--force` asks for exactly that.
+/// Words after "--" are not changed.
+/// @param words the command line without the program's name
 /// Throws Error(kUsage).
-std::vector<std::string> plain_arguments(CLI::App& app, std::span<const char* const> words);
+std::vector<std::string> normalised_arguments(CLI::App& app, std::span<const char* const> words);
 
-/// The value of an option in words that could not be parsed: of the last "--name VALUE" or "--name=VALUE" before "--";
-/// empty where there is none.
+/// Finds an option's value in a command line that could not be parsed: that of the last "--name VALUE" or
+/// "--name=VALUE" before "--". Returns an empty string if there is none.
 std::string value_in_words(std::span<const char* const> words, const std::string& name);
 
 } // namespace packtrace

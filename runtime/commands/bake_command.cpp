@@ -33,8 +33,8 @@ constexpr const char *kAuto = "auto", *kNoTextures = "none";
 constexpr std::array<const char*, baked::kPurposeCount> kPurposes{"ao", "shading"};
 constexpr const char* kKeepNormals = "normals";
 constexpr const char* kKeepUvs = "uv";
-constexpr std::array<const char*, 3> kLodUses{"off", "instanced", "all"}; // by LodUse
-constexpr const char* kLodAlone = kLodUses[2];                            // for --lod without a value
+constexpr std::array<const char*, 3> kLodUses{"off", "instanced", "all"}; // indexed by LodUse
+constexpr const char* kLodDefaultValue = kLodUses[2];                     // meaning of --lod without a value
 
 struct BakeOptions {
   std::string input, output;
@@ -45,7 +45,7 @@ struct BakeOptions {
   std::string purpose = kPurposes[baked::kAo];
   std::vector<std::string> keep;
   std::string uvs = kAuto;
-  std::optional<std::string> textures; ///< without one, what the purpose needs
+  std::optional<std::string> textures; ///< if not set, the purpose decides
   std::optional<double> texture_psnr;
   std::string trees = "on";
   std::string lod = kLodUses[0];
@@ -69,7 +69,7 @@ BakeConfig make_config(const BakeOptions& options) {
   config.normals = find_normal_encoding(options.normals);
   if (config.normals && options.normal_error)
     throw Error(ErrorKind::kUsage,
-                "--normal-error chooses an encoding; it is of no use with --normals " + options.normals);
+                "--normal-error only applies to --normals auto, not to --normals " + options.normals);
   config.normal_error_degrees = options.normal_error;
   config.purpose = options.purpose == kPurposes[baked::kShading] ? baked::kShading : baked::kAo;
   for (const std::string& stream : options.keep) (stream == kKeepUvs ? config.keep_uvs : config.keep_normals) = true;
@@ -79,18 +79,18 @@ BakeConfig make_config(const BakeOptions& options) {
   config.textures = textures != kNoTextures;
   config.texture_codec = find_texture_codec(textures);
   if (config.textures && config.purpose != baked::kShading)
-    throw Error(ErrorKind::kUsage, "--textures " + textures + " is for shading; add --for shading");
+    throw Error(ErrorKind::kUsage, "--textures " + textures + " requires --for shading");
   if (options.texture_psnr && textures != kAuto)
-    throw Error(ErrorKind::kUsage, "--texture-psnr chooses codecs; it is of no use without --textures auto");
+    throw Error(ErrorKind::kUsage, "--texture-psnr only applies to --textures auto");
   if (options.texture_psnr) config.min_texture_psnr_db = *options.texture_psnr;
   config.lod = static_cast<LodUse>(std::find(kLodUses.begin(), kLodUses.end(), options.lod) - kLodUses.begin());
   if (config.lod == LodUse::kOff && (options.lod_min_triangles || options.lod_levels || !options.resume.empty()))
-    throw Error(ErrorKind::kUsage, "--lod-min-triangles, --lod-levels and --resume are of no use without --lod");
+    throw Error(ErrorKind::kUsage, "--lod-min-triangles, --lod-levels and --resume require --lod");
   config.lod_min_triangles = options.lod_min_triangles.value_or(config.lod_min_triangles);
   config.lod_levels = options.lod_levels.value_or(config.lod_levels);
   config.resume = options.resume;
   config.trees = options.trees == "on";
-  config.codec = find_page_codec(options.codec).value(); // the option's check knows the names
+  config.codec = find_page_codec(options.codec).value(); // the option's check accepts only these names
   config.validate();
   return config;
 }
@@ -102,28 +102,31 @@ nlohmann::json promise_json(const BakeReport& baked) {
   return {{"kept", baked.promise.empty()}, {"geometries", geometries}};
 }
 
-/// What is lost, and which option keeps it; empty where pictures are as promised.
-std::string promise_text(const BakeReport& baked, bool chosen) {
+/// Warning about geometries whose grid step is coarser than required, with the option that avoids it; empty if there
+/// are none.
+/// @param chosen whether the user gave a precision option
+std::string precision_warning(const BakeReport& baked, bool chosen) {
   constexpr size_t kMaxShown = 3;
   if (baked.promise.empty()) return {};
   std::vector<BrokenPromise> worst = baked.promise;
   std::stable_sort(worst.begin(), worst.end(), [](const BrokenPromise& a, const BrokenPromise& b) {
     return a.step / a.wanted > b.step / b.wanted;
   });
-  std::string text = fmt::format("warning: ambient occlusion may differ more than promised: {} of {} geometries\n",
-                                 worst.size(), baked.file.geometries);
-  double step = 0.0; // of the world
+  std::string text =
+      fmt::format("warning: the grid is too coarse for accurate ambient occlusion: {} of {} geometries\n", worst.size(),
+                  baked.file.geometries);
+  double step = 0.0; // finest step that is required, world units
   for (size_t i = 0; i < worst.size(); ++i) {
     const BrokenPromise& g = worst[i];
     if (!g.float_limit && (step == 0.0 || g.wanted * g.scale < step)) step = g.wanted * g.scale;
     if (i < kMaxShown)
-      text += fmt::format("  {}: step {:.3g}{}; wanted {:.2g} ({})\n", g.name, g.step,
-                          g.float_limit ? ", as floats are no finer there" : "", g.wanted, g.bound);
+      text += fmt::format("  {}: grid step {:.3g}{}; required {:.2g} ({})\n", g.name, g.step,
+                          g.float_limit ? " (limit of float precision)" : "", g.wanted, g.bound);
   }
-  if (worst.size() > kMaxShown) text += fmt::format("  and {} more; --json names them\n", worst.size() - kMaxShown);
+  if (worst.size() > kMaxShown) text += fmt::format("  and {} more; --json lists them\n", worst.size() - kMaxShown);
   if (step > 0.0)
-    text += chosen ? std::string("  without a precision option the bake chooses steps that keep it\n")
-                   : fmt::format("  --precision-abs {:.2g} keeps it, for more bytes\n", step);
+    text += chosen ? std::string("  without a precision option, bake chooses steps that are fine enough\n")
+                   : fmt::format("  --precision-abs {:.2g} is fine enough, but makes the file larger\n", step);
   return text;
 }
 
@@ -161,7 +164,7 @@ nlohmann::json report(const BakeOptions& options, const BakeReport& baked, const
   return json;
 }
 
-/// How to come by the kind of file that the output's ending names.
+/// Advice on how to produce a file of the type that the output's extension names.
 std::string advice_for(const BakeOptions& options) {
   const std::filesystem::path output(options.output);
   const std::string baked = std::filesystem::path(output).replace_extension(".ptk").string(),
@@ -169,7 +172,7 @@ std::string advice_for(const BakeOptions& options) {
   const char* verb = nullptr;
   if (ending == ".glb" || ending == ".gltf" || ending == ".v16") verb = "export";
   if (ending == ".png" || ending == ".exr") verb = "render";
-  if (!verb) return "give it the ending .ptk: -o " + shell_word(baked);
+  if (!verb) return "use the extension .ptk: -o " + shell_word(baked);
   const std::string wanted =
       ending == ".gltf" ? std::filesystem::path(output).replace_extension(".glb").string() : options.output;
   return fmt::format("bake to {}, then packtrace {} {} -o {}", shell_word(baked), verb, shell_word(baked),
@@ -213,7 +216,7 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   report_diagnostics(diagnostics, globals);
 
   if (json.wanted()) json.write(report(options, baked, imported.statistics, import_s, bake_s, globals.verbosity > 0));
-  const std::string promise = promise_text(baked, config.precision_kind != PrecisionKind::kPicture);
+  const std::string promise = precision_warning(baked, config.precision_kind != PrecisionKind::kPicture);
   if (json.to_stdout() || globals.quiet) {
     print_printable(promise, stderr);
     return 0;
@@ -224,33 +227,41 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
                               static_cast<double>(peak_rss_bytes()) / (1 << 20)),
                   text);
   fmt::print(text, "{}", size_text(baked.file));
-  fmt::print(text, "position error {:.3g}, {}\n", baked.max_position_error,
-             baked.file.normals.empty() ? std::string("no normals stored")
-                                        : fmt::format("normal error {:.4f} degrees", baked.max_normal_error_degrees));
+  fmt::print(text, "maximum position error {:.3g}, {}\n", baked.max_position_error,
+             baked.file.normals.empty()
+                 ? std::string("no normals stored")
+                 : fmt::format("maximum normal error {:.4f} degrees", baked.max_normal_error_degrees));
   fmt::print(text, "{}", collapsed_text(baked.file));
   if (const LodTable& lod = baked.file.lod.all; !lod.levels.empty())
-    fmt::print(text, "{}",
-               fmt::format(
-                   grouped(), "{} levels of detail of {:L} geometries: {:.3f} bytes for each of their {:L} triangles\n",
-                   lod.levels.size() - 1, baked.lod_geometries, lod.bytes_per_triangle(), lod.base_triangles()));
+    fmt::print(
+        text, "{}",
+        fmt::format(grouped(),
+                    "{} coarser LOD levels for {:L} geometries: all levels take {:.3f} bytes per triangle of level 0 "
+                    "({:L} triangles)\n",
+                    lod.levels.size() - 1, baked.lod_geometries, lod.bytes_per_triangle(), lod.base_triangles()));
   if (baked.resumed_geometries > 0)
     fmt::print(text, "{}",
-               fmt::format(grouped(), "levels of {:L} geometries were there from before\n", baked.resumed_geometries));
+               fmt::format(grouped(), "resumed: the LOD levels of {:L} geometries were already finished\n",
+                           baked.resumed_geometries));
   if (baked.instanced_shapes > 0)
     fmt::print(text, "{}",
-               fmt::format(grouped(), "{:L} shapes outside objects share geometry, on grids of its own\n",
+               fmt::format(grouped(), "{:L} shapes outside objects share geometry, which has its own grid\n",
                            baked.instanced_shapes));
   if (baked.nested_geometries > 0)
     fmt::print(text, "{}",
-               fmt::format(grouped(), "{:L} geometries have finer steps, as they are small beside the scene's\n",
+               fmt::format(grouped(),
+                           "{:L} geometries have a finer grid, because they are small compared with the scene\n",
                            baked.nested_geometries));
   if (baked.finer_geometries > 0)
     fmt::print(text, "{}",
                fmt::format(grouped(),
-                           "{:L} geometries have finer steps, as their triangles are thin or seen from near\n",
+                           "{:L} geometries have a finer grid, because their triangles are thin or close to a camera\n",
                            baked.finer_geometries));
   if (baked.left_out > 0)
-    fmt::print(text, "{}", fmt::format(grouped(), "{:L} shapes and instances are left out\n", baked.left_out));
+    fmt::print(text, "{}",
+               fmt::format(grouped(),
+                           "{:L} shapes and instances are dropped, because they exceed the range of floats\n",
+                           baked.left_out));
   fmt::print(text, "{}", dropped_streams_text(baked.file));
   fmt::print(text, "{}", left_out_cameras_text(imported));
   if (globals.verbosity > 0) print_printable("\n" + to_text(baked.file, true), text);
@@ -263,53 +274,59 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
 
 void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<BakeOptions>();
-  CLI::App& verb = add_verb(app, globals, "bake", "Import a pbrt-v3 scene and pack it into a .ptk file",
+  CLI::App& verb = add_verb(app, globals, "bake", "Convert a pbrt-v3 scene into a compact .ptk file",
                             [options, &globals] { return run(*options, globals); });
-  verb.add_option("SCENE", options->input, "A pbrt-v3 scene")->required();
+  verb.add_option("SCENE", options->input, "pbrt-v3 scene file")->required();
   add_output_option(verb, options->output,
-                    "The .ptk file to write, or - for standard output; required but for --dry-run");
+                    "Output file (.ptk), or - for standard output. Required unless --dry-run is given");
   const auto add_precision = [&](const char* name, auto& value, const char* type, const char* description) {
-    return verb.add_option(name, value, description)->type_name(type)->group("Precision of positions, at most one of");
+    return verb.add_option(name, value, description)
+        ->type_name(type)
+        ->group("Precision of positions (at most one of these)");
   };
   const std::array<CLI::Option*, 4> precisions{
       add_precision(
           "--precision-edge", options->precision_edge, "F",
-          "Grid step as a fraction of the median edge length. Without one of these options it is 1/128 of it, and "
-          "finer where thin triangles, contacts or near views need it"),
-      add_precision("--precision", options->precision, "REL", "Grid step as a fraction of the diagonal"),
-      add_precision("--precision-abs", options->precision_abs, "UNITS", "Grid step in world units"),
-      add_precision("--position-bits", options->position_bits, "N", "Bits over the longest side, 1..40")};
+          "Grid step as a fraction of the median edge length, 1e-9..1 (default 1/128, and finer where thin triangles, "
+          "contacts or close views need it). Smaller steps give larger files"),
+      add_precision("--precision", options->precision, "REL",
+                    "Grid step as a fraction of the bounding box diagonal, 1e-12..0.1"),
+      add_precision("--precision-abs", options->precision_abs, "UNITS",
+                    "Grid step in world units; positions move by at most half of it per axis"),
+      add_precision("--position-bits", options->position_bits, "N",
+                    "Bits per coordinate along the longest side of the bounding box, 1..40")};
   for (CLI::Option* option : precisions)
     for (CLI::Option* other : precisions)
       if (option != other) option->excludes(other);
   std::vector<std::string> encodings{kAuto};
   for (const NormalFormat& format : kNormalFormats) encodings.emplace_back(format.name);
   verb.add_option("--normals", options->normals,
-                  "Encoding of normals; auto: for each geometry axis16, oct20, axis24 or axis32, by --normal-error")
+                  "Normal encoding. auto picks for each geometry the smallest of axis16, oct20, axis24 and axis32 that "
+                  "meets --normal-error (default auto)")
       ->check(one_of(encodings))
       ->default_str(kAuto)
       ->group("Normals");
   verb.add_option("--normal-error", options->normal_error,
-                  "Largest angle that auto allows between a normal and the decoded one, 0.0025..10 degrees (default "
-                  "0.04; where the "
-                  "grid is coarser than the default, more in proportion to the angle that a step makes over an edge)")
+                  "Maximum angle between source and decoded normals with --normals auto, 0.0025..10 degrees (default "
+                  "0.04, and more in geometries whose grid is coarser than the default grid)")
       ->type_name("DEGREES")
       ->group("Normals");
   verb.add_option("--for", options->purpose,
-                  "What the file is to be good for; what that does not need is left out. shading also keeps textures "
-                  "of materials, and the texture coordinates that they and normal maps need")
+                  "Purpose of the file; data it does not need is dropped. ao suffices for ambient occlusion; shading "
+                  "also keeps material textures, and the texture coordinates used by textures and normal maps (default "
+                  "ao)")
       ->check(one_of(std::vector<std::string>(kPurposes.begin(), kPurposes.end())))
       ->default_str(options->purpose)
       ->group("What is kept");
-  verb.add_option("--keep", options->keep, "Streams to keep everywhere, needed or not: uv, normals")
+  verb.add_option("--keep", options->keep, "Streams to store even where --for does not need them, separated by commas")
       ->delimiter(',')
       ->check(one_of({kKeepUvs, kKeepNormals}))
       ->type_name("STREAMS")
       ->group("What is kept");
   verb.add_option(
           "--uvs", options->uvs,
-          "Texture coordinates: auto keeps 1/32 texel wherever they lie; unorm16 (steps of 1/65535) and fp16 are "
-          "for compatibility")
+          "Encoding of texture coordinates. auto is accurate to 1/32 texel; unorm16 (steps of 1/65535) and fp16 exist "
+          "for compatibility (default auto)")
       ->check(one_of(std::vector<std::string>{kAuto,
                                               std::string(kUvEncodingNames[static_cast<size_t>(UvEncoding::kUnorm16)]),
                                               std::string(kUvEncodingNames[static_cast<size_t>(UvEncoding::kFp16)])}))
@@ -318,60 +335,64 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
   std::vector<std::string> texture_codecs{kNoTextures, kAuto};
   texture_codecs.insert(texture_codecs.end(), kTextureCodecNames.begin(), kTextureCodecNames.end());
   verb.add_option("--textures", options->textures,
-                  "Textures of materials: none leaves their average; auto takes for each the smallest codec that "
-                  "--texture-psnr allows (default auto with --for shading, else none)")
+                  "Encoding of material textures. none stores their average colour only; auto picks for each the "
+                  "smallest encoding that meets --texture-psnr (default: auto with --for shading, else none)")
       ->check(one_of(texture_codecs))
       ->group("Textures");
-  verb.add_option("--texture-psnr", options->texture_psnr, "What auto keeps, 10..100 dB of sRGB values (default 34)")
+  verb.add_option("--texture-psnr", options->texture_psnr,
+                  "Minimum PSNR with --textures auto, 10..100 dB of sRGB values (default 34)")
       ->type_name("DB")
       ->group("Textures");
   verb.add_option(
           "--lod", options->lod,
-          "Levels of detail, each of less than half the triangles of the one below: all geometries get them, or "
-          "instanced ones only, that is those with more than one instance; --lod alone is --lod all (default "
-          "off)")
+          "Store LOD levels, which render --lod-error needs. all adds them to every geometry; instanced only to "
+          "geometries with several instances; --lod without a value means all (default off). Each level has less than "
+          "half the triangles of the next finer one")
       ->check(one_of(std::vector<std::string>(kLodUses.begin(), kLodUses.end())))
       ->expected(0, 1)
-      ->default_str(kLodAlone)
+      ->default_str(kLodDefaultValue)
       ->group("Levels of detail");
   verb.add_option("--lod-min-triangles", options->lod_min_triangles,
-                  "Geometries of fewer triangles get no levels (default 128)")
+                  "Minimum number of triangles for a geometry to get LOD levels (default 128)")
       ->type_name("N")
       ->group("Levels of detail");
-  verb.add_option("--lod-levels", options->lod_levels, "Coarser levels at most, 1..31 (default 31)")
+  verb.add_option("--lod-levels", options->lod_levels,
+                  "Maximum number of levels coarser than level 0, 1..31 (default 31)")
       ->type_name("N")
       ->group("Levels of detail");
   verb.add_option(
           "--resume", options->resume,
-          "A folder for levels that are done: an interrupted bake, started again, takes them from there; removed "
-          "when the file is written")
+          "Folder that collects finished LOD levels. If bake is interrupted, run it again with the same folder to "
+          "continue; its contents are removed after the file was written")
       ->type_name("DIR")
       ->group("Levels of detail");
   verb.add_option("--trees", options->trees,
-                  "Whether the file holds trees over its clusters for the packed tracer, 1 to 2.5 bytes a triangle")
+                  "Store BVH trees for the packed tracer, 1 to 2.5 bytes per triangle (default on). Without them files "
+                  "are smaller, but every render builds the trees first")
       ->check(one_of({"on", "off"}))
       ->default_str(options->trees);
   verb.add_option(
           "--codec", options->codec,
-          "Form on disk: none is mapped and traced as it is; fast and small are smaller, and decoded when opened, fast "
-          "four to five times as quickly")
+          "Compression on disk. none is memory-mapped and traced as it is; fast and small are decoded into memory when "
+          "the file is opened. small gives the smallest file; fast opens four to five times as fast as small (default "
+          "none)")
       ->check(one_of({std::string(name_of(PageCodec::kNone)), std::string(name_of(PageCodec::kFast)),
                       std::string(name_of(PageCodec::kSmall))}))
       ->default_str(std::string(name_of(PageCodec::kNone)));
-  verb.add_flag("--dry-run", options->dry_run, "Do everything but write the file");
+  verb.add_flag("--dry-run", options->dry_run, "Import and bake without writing a file, to see sizes and errors");
   add_scene_options(verb, options->scene);
-  verb.footer(
-      "Shapes outside objects lie on one grid, so meshes that touch stay closed; shapes that share a mesh are stored "
-      "once,\n"
-      "on a grid of its own. The error that was measured against the source is printed, stored in the file, and never\n"
-      "above half a step per axis and the rounding to floats. What was left out, and why, is printed; -v says it of "
-      "each geometry. Without a precision option steps are as fine as pictures from the scene's cameras need; what is\n"
-      "lost beyond that is said in the last lines.\n"
-      "Examples:\n"
-      "  packtrace bake house.pbrt -o house.ptk\n"
-      "  packtrace bake forest.pbrt -o forest.ptk --lod --codec small\n"
-      "  packtrace bake house.pbrt -o - | ssh host 'cat > house.ptk'\n"
-      "  packtrace bake house.pbrt -o small.ptk --precision 1e-4 --json report.json");
+  verb.footer("Positions are rounded to an integer grid. Shapes outside objects share one grid, so\n"
+              "meshes that touch stay closed; a mesh used by several shapes is stored once, on its\n"
+              "own grid. The position error measured against the source is printed and stored in\n"
+              "the file; per axis it is at most half a grid step plus the rounding to floats.\n"
+              "Without a precision option the grid is fine enough for pictures from the scene's\n"
+              "cameras; a warning at the end says where it is not. Dropped data is listed with the\n"
+              "reason; -v lists it per geometry.\n"
+              "Examples:\n"
+              "  packtrace bake house.pbrt -o house.ptk\n"
+              "  packtrace bake forest.pbrt -o forest.ptk --lod --codec small\n"
+              "  packtrace bake house.pbrt -o - | ssh host 'cat > house.ptk'\n"
+              "  packtrace bake house.pbrt -o small.ptk --precision 1e-4 --json report.json");
 }
 
 } // namespace packtrace

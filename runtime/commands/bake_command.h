@@ -8,7 +8,7 @@ namespace packtrace {
 
 struct GlobalOptions;
 
-/// `packtrace bake SCENE -o OUT.ptk`: imports a pbrt scene and packs it.
+/// Adds `packtrace bake SCENE -o OUT.ptk`, which imports a pbrt scene and compresses it into a .ptk file.
 void add_bake_command(CLI::App& app, GlobalOptions& globals);
 
 } // namespace packtrace

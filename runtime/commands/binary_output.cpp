@@ -16,7 +16,7 @@ BinaryOutput::BinaryOutput(const std::string& target, bool force, const JsonOutp
     return;
   }
   if (json.to_stdout())
-    throw Error(ErrorKind::kUsage, "-o - and --json - would both go to standard output; give one of them a file");
+    throw Error(ErrorKind::kUsage, "-o - and --json - would both write to standard output; use a file for one of them");
   refuse_terminal("a binary file");
 }
 
@@ -37,7 +37,7 @@ void write_standard_output(std::span<const std::byte> bytes) {
 void refuse_terminal(const std::string& what) {
   if (isatty(STDOUT_FILENO) != 0)
     throw Error(ErrorKind::kUsage,
-                "-o - would write " + what + " to the terminal; redirect standard output, or give a file");
+                "-o - would write " + what + " to the terminal; redirect standard output, or use a file");
 }
 
 void fail_without_output(const std::string& verb, const std::string& input, const std::string& ending) {

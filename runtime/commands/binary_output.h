@@ -10,33 +10,34 @@
 
 namespace packtrace {
 
-/// Where a verb's one file goes: a file, or standard output for "-". Made before the work starts, so that a target that
-/// cannot be written is known at once.
+/// The single output of a verb: a file, or standard output for "-". Construct it before the work starts, so that an
+/// unwritable target is reported at once.
 class BinaryOutput {
 public:
-  /// Throws like OutputFile, and Error(kUsage) for "-" where standard output is a terminal or carries the JSON.
+  /// Throws like OutputFile, and Error(kUsage) for "-" if standard output is a terminal or already used by --json.
   BinaryOutput(const std::string& target, bool force, const JsonOutput& json);
 
-  /// Writes all of it, once. Throws Error(kIo) where that fails.
+  /// Writes the whole output; call it once. Throws Error(kIo) if writing fails.
   void write(std::span<const std::byte> bytes);
 
-  /// Where text for people goes: standard error where standard output has the bytes.
+  /// Stream for human-readable text: standard output, or standard error if the bytes go to standard output.
   std::FILE* text_stream() const { return file_ ? stdout : stderr; }
-  /// For messages.
+  /// Name of the output for messages.
   std::string name() const { return file_ ? file_->target().string() : "standard output"; }
 
 private:
   std::optional<OutputFile> file_;
 };
 
-/// Writes to standard output, all of it. Throws Error(kIo) where that fails.
+/// Writes all bytes to standard output. Throws Error(kIo) if that fails.
 void write_standard_output(std::span<const std::byte> bytes);
 
-/// Throws Error(kUsage) where standard output is a terminal, which binary data would upset. @param what "a PNG"
+/// Throws Error(kUsage) if standard output is a terminal.
+/// @param what the kind of data for the message, such as "a PNG"
 void refuse_terminal(const std::string& what);
 
-/// Throws Error(kUsage) for a verb without -o, with a command line to copy.
-/// @param ending of the file to suggest: ".ptk"
+/// Throws Error(kUsage) for a missing -o, with an example command line.
+/// @param ending extension of the file in the example, such as ".ptk"
 [[noreturn]] void fail_without_output(const std::string& verb, const std::string& input, const std::string& ending);
 
 } // namespace packtrace

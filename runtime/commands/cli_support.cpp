@@ -34,7 +34,7 @@ constexpr int kInternalError = 1;
 constexpr uint32_t kMaxThreads = 1024;
 constexpr const char* kThreadsVariable = "PACKTRACE_THREADS";
 
-/// ANSI colour per severity.
+/// ANSI escape sequence for the colour of a severity.
 const char* color_of(Severity severity) {
   switch (severity) {
   case Severity::kNote:
@@ -52,10 +52,10 @@ bool is_shown(Severity severity, const GlobalOptions& globals) {
   return !globals.quiet && (severity == Severity::kWarning || globals.verbosity > 0);
 }
 
-/// The message with its "error:" in colour.
+/// The message with its severity ("error:") in colour.
 std::string painted(const Diagnostic& diagnostic) {
   std::string text = printable(to_string(diagnostic));
-  // The place may contain anything, so skip it before looking for the word.
+  // The location may contain the word as well, so the search starts after it.
   const std::string word = std::string(to_string(diagnostic.severity)) + ":";
   if (const size_t at = text.find(word, printable(to_string(diagnostic.location)).size()); at != std::string::npos) {
     text.insert(at + word.size(), "\x1b[0m");
@@ -72,13 +72,13 @@ int print_failure(const std::string& message, int exit_code) {
   return exit_code;
 }
 
-/// What is still buffered would otherwise be lost without a word, for example on a full disk.
+/// Flushes standard output, so that a failure, for example on a full disk, is reported.
 void flush_output() {
   if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
     throw Error(ErrorKind::kIo, "cannot write to standard output");
 }
 
-/// Parses the words and runs their verb. Returns its exit code.
+/// Parses the command line, runs its verb and returns the exit code.
 int run_words(CLI::App& app, GlobalOptions& globals, std::span<const char* const> words) {
   int code = 0;
   if (parse_command_line(app, words)) {
@@ -91,9 +91,9 @@ int run_words(CLI::App& app, GlobalOptions& globals, std::span<const char* const
   return code;
 }
 
-/// Whether an error may be written there: where there is nothing yet, or results. What is no JSON may be a file of the
-/// scene that could not be read.
-bool may_take_error(const std::string& destination) {
+/// Whether error JSON may be written to the destination: it does not exist yet, is empty, or looks like JSON. Any other
+/// file could be an input file that could not be read.
+bool can_hold_error_json(const std::string& destination) {
   std::error_code unknown;
   if (destination == "-" || !std::filesystem::is_regular_file(destination, unknown)) return true;
   std::ifstream file(destination);
@@ -101,14 +101,14 @@ bool may_take_error(const std::string& destination) {
   return !(file >> first) || first == '{' || first == '[';
 }
 
-/// Writes a failure to where --json goes. A file that is there stays unless --force was given, like any other output.
+/// Writes a failure to the destination of --json. Like other outputs, an existing file is replaced only with --force.
 void write_failure(CLI::App& app, const GlobalOptions& globals, std::span<const char* const> words,
                    nlohmann::json error) {
-  // Where the words could not be parsed, no option has its value.
+  // If parsing failed, globals.json is not set, so the value is searched for in the words.
   const std::string destination = globals.json.empty() ? value_in_words(words, "--json") : globals.json;
-  if (destination.empty() || find_verb(app, destination)) return; // "--json info": the name was forgotten
-  if (!may_take_error(destination)) {
-    print_failure(destination + ": holds something else than JSON, so the error is not written there", 0);
+  if (destination.empty() || find_verb(app, destination)) return; // "--json info": the file name is missing
+  if (!can_hold_error_json(destination)) {
+    print_failure(destination + ": not a JSON file, so the error is not written to it", 0);
     return;
   }
   const bool force =
@@ -123,20 +123,24 @@ void write_failure(CLI::App& app, const GlobalOptions& globals, std::span<const 
 }
 
 void add_options_of_every_verb(CLI::App& app, GlobalOptions& globals) {
-  constexpr const char* kGroup = "Options of every verb";
+  constexpr const char* kGroup = "Common options";
   app.add_flag("-q,--quiet", globals.quiet, "Print errors only")->group(kGroup);
   app.add_flag_function(
          "-v,--verbose", [&globals](int64_t count) { globals.verbosity += static_cast<int>(count); },
-         "Print more; may be repeated")
+         "Also print notes, the chosen settings with their reasons, and details per geometry")
       ->group(kGroup);
-  app.add_option("--json", globals.json, "Write results, or the error, as JSON to FILE, or to standard output for -")
+  app.add_option(
+         "--json", globals.json,
+         "Write the results, or the error, as JSON to FILE (- for standard output). See docs/json_output.md for "
+         "the keys")
       ->type_name("FILE")
       ->take_last()
       ->group(kGroup);
-  app.add_flag("--force", globals.force, "Replace existing files")->group(kGroup);
-  app.add_option("--threads", globals.threads,
-                 fmt::format("Use N threads, 1..{} (default: the environment variable {}, else all)", kMaxThreads,
-                             kThreadsVariable))
+  app.add_flag("--force", globals.force, "Replace existing output files")->group(kGroup);
+  app.add_option(
+         "--threads", globals.threads,
+         fmt::format("Number of threads, 1..{} (default: the environment variable {}, else all hardware threads)",
+                     kMaxThreads, kThreadsVariable))
       ->check(CLI::Range(1u, kMaxThreads))
       ->type_name("N")
       ->take_last()
@@ -150,8 +154,8 @@ void add_options_of_every_verb(CLI::App& app, GlobalOptions& globals) {
              throw CLI::ValidationError("--max-memory", error.what());
            }
          },
-         "Memory that the input may take: bytes, 512M, 8G, or 50% of the machine's (the default). Input that needs "
-         "more ends with exit code 3")
+         "Memory limit for data whose size the input determines, in bytes or as 512M, 8G or 50% of the machine's "
+         "memory (default 50%). Input that needs more fails with exit code 3")
       ->type_name("SIZE")
       ->take_last()
       ->group(kGroup);
@@ -172,7 +176,7 @@ CLI::App& add_verb(CLI::App& app, GlobalOptions& globals, const std::string& nam
                    std::function<int()> action) {
   CLI::App& verb = *app.add_subcommand(name, description)->group("Verbs");
   verb.callback([&globals, action = std::move(action)] { globals.action = action; });
-  verb.option_defaults()->take_last(); // as scripts and aliases expect that append to a command
+  verb.option_defaults()->take_last(); // lets scripts and aliases override options by appending them
   add_options_of_every_verb(verb, globals);
   return verb;
 }
@@ -191,7 +195,7 @@ int run_verbs(CLI::App& app, GlobalOptions& globals, int argc, const char* const
     return fail(error_json(error));
   } catch (const std::bad_alloc&) {
     return fail(error_json(MemoryError(kNoMemory)));
-  } catch (const std::system_error& error) { // of std::filesystem, or fmt::print on a full disk
+  } catch (const std::system_error& error) { // from std::filesystem, or from fmt::print on a full disk
     return fail(error_json("io", static_cast<int>(ErrorKind::kIo), error.what()));
   } catch (const std::exception& error) {
     return fail(error_json("internal", kInternalError, std::string("internal: ") + error.what()));
@@ -208,7 +212,7 @@ uint32_t thread_limit(const GlobalOptions& globals) {
   uint32_t threads = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), threads);
   if (error != std::errc() || end != text.data() + text.size() || threads < 1 || threads > kMaxThreads)
-    throw Error(ErrorKind::kUsage, fmt::format("{} is '{}'; give a number of threads from 1 to {}, or unset it",
+    throw Error(ErrorKind::kUsage, fmt::format("{} is '{}'; set it to a number of threads from 1 to {}, or unset it",
                                                kThreadsVariable, text, kMaxThreads));
   return threads;
 }
@@ -220,7 +224,7 @@ void install_interrupt_handlers() {
   action.sa_flags = SA_RESTART;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
-  // Writing beyond a limit of file sizes fails with EFBIG instead, which is reported like a full disk.
+  // Writing beyond the file size limit then fails with EFBIG, which is reported like a full disk.
   std::signal(SIGXFSZ, SIG_IGN);
 }
 

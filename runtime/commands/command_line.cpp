@@ -27,7 +27,7 @@ std::string nearest_of(std::string_view name, const std::vector<std::string>& na
 
 constexpr const char* kProgram = "packtrace";
 
-/// "packtrace bake", or "packtrace" alone.
+/// Returns "packtrace bake" for a verb, "packtrace" for the program.
 std::string command_of(const CLI::App& app) { return app.get_parent() ? kProgram + (" " + app.get_name()) : kProgram; }
 
 std::string no_such_option(CLI::App& app, const std::string& word) {
@@ -45,22 +45,22 @@ std::string no_such_option(CLI::App& app, const std::string& word) {
     const std::string stem = std::filesystem::path(word).stem().string();
     const std::string example = ending_of(word) == ".ptk" ? "render " + file + " -o " + shell_word(stem + ".png")
                                                           : "bake " + file + " -o " + shell_word(stem + ".ptk");
-    throw Error(ErrorKind::kUsage, fmt::format("{}: say first what to do with it, for example {} {}, or {} info {}",
-                                               word, kProgram, example, kProgram, file));
+    throw Error(ErrorKind::kUsage, fmt::format("{}: no verb given, for example {} {}, or {} info {}", word, kProgram,
+                                               example, kProgram, file));
   }
   std::vector<std::string> names;
   for (const CLI::App* verb : shown_verbs(app)) names.push_back(verb->get_name());
   throw Error(ErrorKind::kUsage,
-              fmt::format("unknown verb '{}'{}; there are {}", word, nearest_of(word, names), verb_names(app)));
+              fmt::format("unknown verb '{}'{}; verbs are {}", word, nearest_of(word, names), verb_names(app)));
 }
 
-/// Whether the words ask for what needs no verb.
+/// Whether a word requests help or the version, which need no verb.
 bool asks_for_help(const CLI::App& app, const std::string& word) {
   const auto is = [&](const CLI::Option* option) { return option && option->check_name(word); };
   return is(app.get_help_ptr()) || is(app.get_version_ptr());
 }
 
-/// CLI11 says "a subcommand is required" for no verb, and for one that it does not know; this names it.
+/// Throws Error(kUsage) if the verb is missing or unknown. CLI11 would report "a subcommand is required" for both.
 void require_verb(CLI::App& app, const std::vector<std::string>& words) {
   for (size_t i = 0; i < words.size(); ++i) {
     const std::string& word = words[i];
@@ -72,29 +72,29 @@ void require_verb(CLI::App& app, const std::vector<std::string>& words) {
     if (asks_for_help(app, word)) return;
     const CLI::Option* option = app.get_option_no_throw(word.substr(0, word.find('=')));
     if (!option && !word.starts_with("--") && word.size() > 2) option = app.get_option_no_throw(word.substr(0, 2));
-    if (!option) throw Error(ErrorKind::kUsage, no_such_option(app, word) + " (packtrace --help explains)");
+    if (!option) throw Error(ErrorKind::kUsage, no_such_option(app, word) + " (see packtrace --help)");
     if (option->get_items_expected_max() > 0 && app.get_option_no_throw(word)) ++i;
   }
-  throw Error(ErrorKind::kUsage, "a verb is needed: " + verb_names(app) + " (packtrace --help explains)");
+  throw Error(ErrorKind::kUsage, "no verb given; verbs are " + verb_names(app) + " (see packtrace --help)");
 }
 
-/// What is wrong with the command line of a verb.
+/// Error message for the command line of a verb.
 std::string message_of(const CLI::ParseError& error, CLI::App& verb) {
   const std::string text = error.what();
   if (dynamic_cast<const CLI::ExtrasError*>(&error)) {
     std::vector<std::string> left = verb.remaining();
-    const auto mark = std::ranges::find(left, "--"); // what follows it is no option, whatever it looks like
+    const auto mark = std::ranges::find(left, "--"); // words after "--" are never options
     const auto given = std::find_if(left.begin(), mark, [](const std::string& word) { return word.starts_with("-"); });
     if (given != mark) return no_such_option(verb, *given);
     std::erase(left, "--");
-    if (!left.empty()) return left.front() + ": one argument too many";
+    if (!left.empty()) return left.front() + ": unexpected argument";
   }
   if (dynamic_cast<const CLI::ConversionError*>(&error)) {
     constexpr std::string_view kBefore = "Could not convert: ", kBetween = " = ";
     const size_t between = text.find(kBetween);
     if (text.starts_with(kBefore) && between != std::string::npos)
-      return fmt::format("{}: '{}' is not a number that it can take",
-                         text.substr(kBefore.size(), between - kBefore.size()), text.substr(between + kBetween.size()));
+      return fmt::format("{}: '{}' is not a valid number", text.substr(kBefore.size(), between - kBefore.size()),
+                         text.substr(between + kBetween.size()));
   }
   if (dynamic_cast<const CLI::ArgumentMismatch*>(&error)) return text.substr(0, text.find(':')) + " needs a value";
   return text;
@@ -103,11 +103,11 @@ std::string message_of(const CLI::ParseError& error, CLI::App& verb) {
 } // namespace
 
 bool parse_command_line(CLI::App& app, std::span<const char* const> words) {
-  std::vector<std::string> plain = plain_arguments(app, words);
+  std::vector<std::string> plain = normalised_arguments(app, words);
   require_verb(app, plain);
   app.require_subcommand(1);
   try {
-    std::ranges::reverse(plain); // as App::parse() wants them
+    std::ranges::reverse(plain); // App::parse() expects the words in reverse order
     app.parse(std::move(plain));
     return true;
   } catch (const CLI::Success& success) {
@@ -116,7 +116,7 @@ bool parse_command_line(CLI::App& app, std::span<const char* const> words) {
   } catch (const CLI::ParseError& error) {
     const auto verbs = app.get_subcommands();
     CLI::App& verb = verbs.empty() ? app : *verbs.front();
-    throw Error(ErrorKind::kUsage, message_of(error, verb) + " (" + command_of(verb) + " --help explains)");
+    throw Error(ErrorKind::kUsage, message_of(error, verb) + " (see " + command_of(verb) + " --help)");
   }
 }
 

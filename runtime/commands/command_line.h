@@ -9,16 +9,17 @@ class App;
 
 namespace packtrace {
 
-/// Parses the words behind the program's name into the app's options, after plain_arguments(). What is wrong is said in
-/// this program's words, with the nearest name there is.
-/// @return false where the words asked for help or the version, which has been printed
+/// Applies normalised_arguments() to the command line and parses it into the app's options. Error messages suggest the
+/// closest known name instead of using CLI11's texts.
+/// @param words the command line without the program's name
+/// @return false if help or the version was requested, which has then been printed
 /// Throws Error(kUsage).
 bool parse_command_line(CLI::App& app, std::span<const char* const> words);
 
-/// The verb among the words; empty where there is none.
+/// Returns the name of the first verb among the words, or an empty string.
 std::string verb_in_words(CLI::App& app, std::span<const char* const> words);
 
-/// Of verbs that are shown, in the order of --help.
+/// Returns the names of all visible verbs in the order of --help, separated by ", ".
 std::string verb_names(CLI::App& app);
 
 } // namespace packtrace

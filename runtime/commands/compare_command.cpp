@@ -32,8 +32,8 @@ namespace {
 struct CompareOptions {
   std::string test, reference, layer;
   std::vector<std::string> metrics{"all"};
-  std::array<std::optional<double>, 5> limits; ///< by MetricKind::kAll order
-  std::optional<double> max_mismatch;          ///< fraction of pixels
+  std::array<std::optional<double>, 5> limits; ///< indexed like kMetrics
+  std::optional<double> max_mismatch;          ///< fraction of pixels, [0, 1]
   double pixels_per_degree = kFlipPixelsPerDegree;
   std::string diff, diff_metric = "mae";
   float diff_white = 0.25f;
@@ -43,8 +43,8 @@ struct MetricKind {
   const char* name;
   const char* json_name;
   bool higher_is_better;
-  uint32_t smallest_side; ///< of images it can be computed for
-  bool colors_only;       ///< needs 1 or 3 channels
+  uint32_t smallest_side; ///< minimum image width and height, pixels
+  bool colors_only;       ///< requires 1 or 3 channels
 };
 constexpr std::array<MetricKind, 5> kMetrics{{{"rmse", "rmse", false, 1, false},
                                               {"mae", "mae", false, 1, false},
@@ -58,13 +58,13 @@ size_t metric_index(std::string_view name) {
   return static_cast<size_t>(found - kMetrics.begin());
 }
 
-/// Two images made alike, and which of their pixels have values.
+/// Two images with the same channels, and the pixels that have a value in both.
 struct ImagePair {
   Image test, reference;
   std::string layer;
-  std::vector<uint8_t> valid; ///< empty: all
-  uint64_t compared = 0;      ///< pixels with a value in both
-  uint64_t mismatched = 0;    ///< pixels with a value in only one
+  std::vector<uint8_t> valid; ///< one entry per pixel, nonzero if compared; empty: all pixels
+  uint64_t compared = 0;      ///< pixels with a value in both images
+  uint64_t mismatched = 0;    ///< pixels with a value in only one image
   bool alpha_ignored = false;
   MemoryReservation memory; ///< of both images and of what metrics derive from them
 };
@@ -74,7 +74,8 @@ void drop_alpha(LoadedImage& loaded) {
   loaded.alpha = false;
 }
 
-/// Pixels of an ambient occlusion layer that have a value. PNG files and other layers have one everywhere.
+/// Mask of the pixels of an ambient occlusion layer that have a value. Empty for PNG files and other layers, where all
+/// pixels have one.
 std::vector<uint8_t> valid_pixels(const LoadedImage& loaded) {
   std::vector<uint8_t> valid;
   if (!loaded.layer.starts_with("ao") || loaded.image.channels != 1) return valid;
@@ -103,7 +104,7 @@ ImagePair load_pair(const CompareOptions& options, const MemoryBudget& budget) {
   const std::vector<uint8_t> a = valid_pixels(test), b = valid_pixels(reference);
   pair.compared = test.image.size.pixels();
   if (!a.empty() || !b.empty()) {
-    // A picture that cannot say "no value" takes the other's word for it.
+    // If only one image can mark pixels without a value, its mask applies to both.
     pair.valid = a.empty() ? b : a;
     for (size_t i = 0; i < pair.valid.size() && !a.empty() && !b.empty(); ++i) {
       pair.mismatched += a[i] != b[i];
@@ -138,7 +139,7 @@ Metric compute(size_t metric, const ImagePair& pair, const CompareOptions& optio
   }
 }
 
-/// Metrics asked for by name, by "all" where they can be computed, or by a limit or the difference picture.
+/// Selects the metrics that are requested by name, by "all" (if applicable), by a limit, or for the difference picture.
 std::array<bool, 5> wanted_metrics(const CompareOptions& options, const Image& image) {
   std::array<bool, 5> wanted{};
   for (const std::string& name : options.metrics)
@@ -150,7 +151,7 @@ std::array<bool, 5> wanted_metrics(const CompareOptions& options, const Image& i
   return wanted;
 }
 
-/// One limit that was given, and how the images did.
+/// A limit from the command line and the measured value.
 struct Check {
   std::string name;
   double limit = 0.0, value = 0.0;
@@ -177,7 +178,7 @@ nlohmann::json to_json(const CompareOptions& options, const ImagePair& pair,
                        const std::array<std::optional<double>, 5>& values, const std::vector<Check>& checks) {
   nlohmann::json metrics = nlohmann::json::object(), limits = nlohmann::json::array();
   for (size_t i = 0; i < kMetrics.size(); ++i)
-    if (values[i]) metrics[kMetrics[i].json_name] = *values[i]; // the PSNR of equal images, infinity, becomes null
+    if (values[i]) metrics[kMetrics[i].json_name] = *values[i]; // infinity (the PSNR of equal images) becomes null
   for (const Check& check : checks)
     limits.push_back({{"name", check.name}, {"limit", check.limit}, {"value", check.value}, {"passed", check.passed}});
   return {{"verb", "compare"},
@@ -200,7 +201,7 @@ void print_results(const ImagePair& pair, const std::array<std::optional<double>
   std::string text;
   for (size_t i = 0; i < kMetrics.size(); ++i)
     if (values[i]) text += fmt::format("{:<5} {:.6g}{}\n", kMetrics[i].name, *values[i], i == 2 ? " dB" : "");
-  text += fmt::format("over {} of {} pixels\n", pair.compared, pair.test.size.pixels());
+  text += fmt::format("{} of {} pixels compared\n", pair.compared, pair.test.size.pixels());
   for (const Check& check : checks)
     text += fmt::format("limit {} {:.6g}: {}\n", check.name, check.limit, check.passed ? "ok" : "EXCEEDED");
   std::fwrite(text.data(), 1, text.size(), stdout);
@@ -210,14 +211,14 @@ void print_notes(const ImagePair& pair, const GlobalOptions& globals) {
   Diagnostics notes;
   if (pair.mismatched > 0)
     notes.report(Severity::kWarning, {},
-                 fmt::format("{} pixels have a value in only one image; metrics leave them out", pair.mismatched));
+                 fmt::format("{} pixels have a value in only one image; metrics ignore them", pair.mismatched));
   if (pair.alpha_ignored) notes.report(Severity::kNote, {}, "alpha channels are not compared");
   report_diagnostics(notes, globals);
 }
 
 int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
   if (!options.diff.empty() && ending_of(options.diff) != ".png")
-    throw Error(ErrorKind::kUsage, "--diff " + options.diff + ": the picture is a .png");
+    throw Error(ErrorKind::kUsage, "--diff " + options.diff + ": the file name must end in .png");
   JsonOutput json(globals.json, globals.force);
   std::optional<OutputFile> diff;
   if (!options.diff.empty()) diff.emplace(options.diff, globals.force);
@@ -248,9 +249,9 @@ int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
     json.write(document);
     return 0;
   }
-  const Error error(ErrorKind::kLimitExceeded, fmt::format("{} is {:.6g}, beyond its limit {:.6g}", exceeded->name,
+  const Error error(ErrorKind::kLimitExceeded, fmt::format("{} is {:.6g}, beyond the limit {:.6g}", exceeded->name,
                                                            exceeded->value, exceeded->limit));
-  document["error"] = error_json(error); // beside what was measured
+  document["error"] = error_json(error); // in addition to the measured values
   json.write(document);
   return report_error(error);
 }
@@ -259,46 +260,62 @@ int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
 
 void add_compare_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<CompareOptions>();
-  CLI::App& verb = add_verb(app, globals, "compare", "Measure how different two images are",
+  CLI::App& verb = add_verb(app, globals, "compare", "Compute image metrics between two images and check limits",
                             [options, &globals] { return run_compare(*options, globals); });
-  verb.add_option("TEST", options->test, "PNG (read as sRGB) or EXR")->required();
-  verb.add_option("REFERENCE", options->reference, "The image to compare with")->required();
-  verb.add_option("--layer", options->layer, "EXR layer (default: ao, else colours, else the only one)");
-  verb.add_option("--metric", options->metrics, "Metrics to compute: all, rmse, mae, psnr, ssim, flip")
+  verb.add_option("TEST", options->test, "Image to check, .png (decoded from sRGB to linear) or .exr")->required();
+  verb.add_option("REFERENCE", options->reference, "Reference image of the same size")->required();
+  verb.add_option("--layer", options->layer,
+                  "EXR layer to compare (default: ao, else the colour channels, else the only layer)");
+  verb.add_option("--metric", options->metrics,
+                  "Metrics to compute, separated by commas. all computes every metric that applies to the images; ssim "
+                  "needs 11 x 11 pixels, flip 1 or 3 channels (default all)")
       ->delimiter(',')
       ->check(one_of({"all", "rmse", "mae", "psnr", "ssim", "flip"}))
       ->default_str("all");
-  verb.add_option("--ppd", options->pixels_per_degree, "FLIP: pixels per degree of visual angle")
+  verb.add_option(
+          "--ppd", options->pixels_per_degree,
+          "Pixels per degree of visual angle for flip, 0.001..1000 (default 67.0206, for a 0.7 m wide 4K screen "
+          "seen from 0.7 m). Smaller values mean a closer observer, who sees more differences")
       ->check(number_in(1e-3, 1000.0))
       ->capture_default_str();
 
-  const std::string group = "Limits: exit code 5 beyond them";
+  const std::string group = "Limits (exit code 5 if one is exceeded)";
   constexpr double kHuge = 1e30;
-  verb.add_option("--max-rmse", options->limits[0], "Root of the mean squared error")
+  verb.add_option("--max-rmse", options->limits[0], "Maximum root mean squared error; 0 means equal images")
       ->check(number_in(0.0, kHuge))
       ->group(group);
-  verb.add_option("--max-mae", options->limits[1], "Mean absolute error")->check(number_in(0.0, kHuge))->group(group);
-  verb.add_option("--min-psnr", options->limits[2], "Peak signal to noise, dB")
+  verb.add_option("--max-mae", options->limits[1], "Maximum mean absolute error; 0 means equal images")
+      ->check(number_in(0.0, kHuge))
+      ->group(group);
+  verb.add_option("--min-psnr", options->limits[2],
+                  "Minimum peak signal-to-noise ratio in dB, for the peak value 1; larger is better")
       ->check(number_in(-kHuge, kHuge))
       ->group(group);
-  verb.add_option("--min-ssim", options->limits[3], "Structural similarity, 1 for the same")
+  verb.add_option("--min-ssim", options->limits[3], "Minimum structural similarity, -1..1; 1 means equal images")
       ->check(number_in(-1.0, 1.0))
       ->group(group);
-  verb.add_option("--max-flip", options->limits[4], "FLIP, 0 for the same")->check(number_in(0.0, 1.0))->group(group);
-  verb.add_option("--max-mismatch", options->max_mismatch, "Fraction of pixels with a value in only one image")
+  verb.add_option("--max-flip", options->limits[4], "Maximum mean FLIP difference, 0..1; 0 means equal images")
+      ->check(number_in(0.0, 1.0))
+      ->group(group);
+  verb.add_option("--max-mismatch", options->max_mismatch,
+                  "Maximum fraction of pixels that have a value in only one image, 0..1")
       ->check(number_in(0.0, 1.0))
       ->group(group);
 
-  verb.add_option("--diff", options->diff, "Write a .png of the errors: black, red, yellow, white")->type_name("FILE");
-  verb.add_option("--diff-metric", options->diff_metric, "Whose error per pixel to show")
+  verb.add_option("--diff", options->diff,
+                  "Write a .png with the error per pixel, from black (0) over red and yellow to white (--diff-white)")
+      ->type_name("FILE");
+  verb.add_option("--diff-metric", options->diff_metric, "Metric that --diff shows (default mae)")
       ->check(one_of({"rmse", "mae", "psnr", "ssim", "flip"}))
       ->capture_default_str();
-  verb.add_option("--diff-white", options->diff_white, "Error shown as white")
+  verb.add_option("--diff-white", options->diff_white,
+                  "Error that --diff shows as white, 1e-6..1e6 (default 0.25). Lower it to see small errors")
       ->check(number_in(1e-6, 1e6))
       ->capture_default_str();
-  verb.footer("Examples:\n"
+  verb.footer("Pixels without a value (ambient occlusion where no surface is hit) are ignored.\n"
+              "Examples:\n"
               "  packtrace compare test.exr truth.exr --layer ao --min-psnr 34\n"
-              "  packtrace compare test.png truth.png --diff errors.png");
+              "  packtrace compare test.png truth.png --diff errors.png --diff-white 0.05");
 }
 
 } // namespace packtrace

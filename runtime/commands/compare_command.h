@@ -8,7 +8,7 @@ namespace packtrace {
 
 struct GlobalOptions;
 
-/// `packtrace compare A B`: how different two images are; exit code 5 where a limit is exceeded.
+/// Adds `packtrace compare TEST REFERENCE`, which computes image metrics. Exit code 5 if a limit is exceeded.
 void add_compare_command(CLI::App& app, GlobalOptions& globals);
 
 } // namespace packtrace

@@ -11,7 +11,7 @@
 namespace packtrace {
 namespace {
 
-/// One line, up to the first end of a sentence or a clause: lists of completions are narrow.
+/// Shortens a description to its first clause, since completion lists are narrow.
 std::string brief(const std::string& description) {
   std::string text = description;
   std::ranges::replace(text, '\n', ' ');
@@ -19,10 +19,10 @@ std::string brief(const std::string& description) {
   return text;
 }
 
-/// In single quotes, as bash and zsh read them.
+/// Quotes text with single quotes for bash and zsh.
 std::string quoted(const std::string& text) { return "'" + CLI::detail::find_and_replace(text, "'", R"('\'')") + "'"; }
 
-/// In single quotes, as fish reads them.
+/// Quotes text with single quotes for fish.
 std::string fish_quoted(const std::string& text) {
   const std::string slashes = CLI::detail::find_and_replace(text, "\\", "\\\\");
   return "'" + CLI::detail::find_and_replace(slashes, "'", "\\'") + "'";
@@ -42,8 +42,8 @@ std::string verb_list(const ProgramEntry& program) {
 
 // --- bash
 
-/// Fills bash's list of completions, one a line: names may have spaces in them.
-/// @param what options of compgen
+/// Bash command that fills the list of completions. It reads one completion per line, because names may contain spaces.
+/// @param what arguments of compgen
 std::string bash_offer(const std::string& what) {
   return "mapfile -t COMPREPLY < <(compgen " + what + " -- \"$current\")";
 }
@@ -52,10 +52,10 @@ std::string bash_words(const std::vector<std::string>& words) {
   return fmt::format("-W \"{}\"", fmt::join(words, " "));
 }
 
-/// What completes the value of an option; empty for any text.
+/// Bash command that completes the value of an option; empty if the value is free text.
 std::string bash_value(const OptionEntry& option) {
   switch (option.value) {
-  case ValueKind::kChoice: // where the value may be left out, what follows may be a file
+  case ValueKind::kChoice: // an optional value may be omitted, so the next word may also be a file
     return bash_offer(bash_words(option.choices) + (option.value_optional ? " -f" : ""));
   case ValueKind::kFile:
     return bash_offer("-f");
@@ -85,7 +85,7 @@ std::string bash_verb(const VerbEntry& verb) {
 }
 
 std::string bash_script(const ProgramEntry& program) {
-  VerbEntry before = program.program; // what stands before the verb; the verbs are its positional
+  VerbEntry before = program.program; // the part before the verb; its positional is the verb
   before.name.clear();
   OptionEntry verbs;
   for (const VerbEntry& verb : program.verbs) verbs.choices.push_back(verb.name);
@@ -107,7 +107,7 @@ std::string bash_script(const ProgramEntry& program) {
 
 // --- zsh
 
-/// With what _arguments reads as its own escaped.
+/// Escapes the special characters of zsh's _arguments.
 std::string zsh_text(const std::string& text) {
   std::string escaped;
   for (const char c : brief(text)) {
@@ -136,9 +136,9 @@ std::string zsh_arguments(const VerbEntry& verb) {
   std::string lines;
   for (const OptionEntry& option : verb.options)
     for (const std::string& name : names_of(option)) {
-      // "=": the value may follow after an equals sign, or as a word of its own; the same for "+" and short names.
+      // "=" allows the value after an equals sign or as the next word; "+" does the same for short names.
       const char* joint = option.value == ValueKind::kNoValue ? "" : name.starts_with("--") ? "=" : "+";
-      if (option.value_optional) joint = "=-"; // only after "=": the next word may be the scene
+      if (option.value_optional) joint = "=-"; // only after "=", because the next word may be the scene
       lines += " \\\n        " + quoted(fmt::format("{}{}{}[{}]{}", option.repeatable ? "*" : "", name, joint,
                                                     zsh_text(option.description), zsh_value(option)));
     }

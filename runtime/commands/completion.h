@@ -8,10 +8,10 @@
 
 namespace packtrace {
 
-/// The shells that completion_script() knows.
+/// Names of the shells that completion_script() supports.
 const std::vector<std::string>& completion_shells();
 
-/// A script for bash, zsh or fish that completes verbs, options, their values and files.
+/// Returns a script for bash, zsh or fish that completes verbs, options, option values and files.
 /// Throws Error(kUsage) for other shells.
 std::string completion_script(const ProgramEntry& program, std::string_view shell);
 

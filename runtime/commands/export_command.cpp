@@ -27,13 +27,13 @@ constexpr const char *kVertex16 = "vertex16", *kGltf = "gltf", *kDraco = "draco"
 
 struct ExportOptions {
   std::string input, output;
-  std::string layout; ///< empty: by the output's extension
+  std::string layout; ///< empty: chosen by the output's extension
   std::string codec = kDraco;
   GltfConfig gltf;
-  bool for_gltf = false; ///< an option was given that only glTF has
+  bool has_gltf_option = false; ///< whether an option was given that applies to glTF only
 };
 
-/// Bytes to be written and what is said about them.
+/// The exported file and its reports.
 struct Exported {
   std::vector<std::byte> bytes;
   nlohmann::json json;
@@ -64,16 +64,18 @@ std::string to_text(const ExportOptions& options, const Vertex16Report& r) {
   const double per = r.triangles > 0 ? 1.0 / static_cast<double>(r.triangles) : 0.0;
   std::string text = fmt::format(
       grouped(),
-      "{}: {:L} vertices, {:L} triangles in {:L} draws of {:L} geometries; {:L} bytes, {:.2f} a triangle "
+      "{}: {:L} vertices, {:L} triangles in {:L} draws of {:L} geometries; {:L} bytes, {:.2f} per triangle "
       "({:.2f} vertices, {:.2f} indices)\n"
-      "error against the .ptk file: position {:.3g}   normal {:.4f} degrees   uv {:.3g}   tangent {:.3f} degrees\n",
+      "maximum error against the .ptk file: position {:.3g}   normal {:.4f} degrees   uv {:.3g}   tangent {:.3f} "
+      "degrees\n",
       options.output, r.vertices, r.triangles, r.draws, r.geometries, r.file_bytes,
       static_cast<double>(r.file_bytes) * per, static_cast<double>(r.vertex_bytes) * per,
       static_cast<double>(r.index_bytes) * per, r.max_position_error, r.max_normal_error_degrees, r.max_uv_error,
       r.max_tangent_error_degrees);
   if (r.coarser_geometries > 0)
-    text += fmt::format(grouped(), "{:L} geometries span more than 2^21 steps of their grid and got a coarser one\n",
-                        r.coarser_geometries);
+    text +=
+        fmt::format(grouped(), "{:L} geometries span more than 2^21 grid steps and were rounded to a coarser grid\n",
+                    r.coarser_geometries);
   return text;
 }
 
@@ -104,34 +106,37 @@ std::string to_text(const ExportOptions& options, const GltfReport& r) {
   std::string text = fmt::format(
       grouped(),
       "{}: {:L} vertices, {:L} triangles in {:L} primitives; {:L} meshes, {:L} nodes, {:L} materials, {:L} images, "
-      "{:L} cameras\n{:L} bytes: geometry {:L} ({:.2f} a triangle), images {:L}\n",
+      "{:L} cameras\n{:L} bytes: geometry {:L} ({:.2f} per triangle), images {:L}\n",
       options.output, r.vertices, r.triangles, r.primitives, r.meshes, r.nodes, r.materials, r.images, r.cameras,
       r.file_bytes, r.geometry_bytes, static_cast<double>(r.geometry_bytes) * per, r.image_bytes);
   const auto note = [&](uint64_t count, const char* what) {
     if (count > 0) text += fmt::format(grouped(), "{:L} {}\n", count, what);
   };
-  note(r.collapsed_triangles, "triangles without area, two corners in one place, were left out by Draco");
-  note(r.plain_primitives, "primitives need more than Draco's 30 bits, or it refused them: stored as floats");
-  note(r.simplified_materials, "materials have a mask and a texture that lie differently: the texture was left out");
-  note(r.skipped_cameras, "cameras have a projection that glTF does not know");
+  note(r.collapsed_triangles, "degenerate triangles (with two equal corners) were dropped by Draco");
+  note(r.plain_primitives, "primitives are stored as floats: they need more than 30 bits, or Draco cannot encode them");
+  note(r.simplified_materials, "materials lost their texture, because it is mapped differently from their alpha mask");
+  note(r.skipped_cameras, "cameras were skipped, because glTF has no environment cameras");
   return text;
 }
 
-/// The layout asked for, or that of the output's extension.
+/// Returns the layout from --layout, or else the one that the output's extension implies. Throws Error(kUsage) if they
+/// contradict each other or neither is known.
 std::string layout_of(const ExportOptions& options) {
   const std::string ending = ending_of(options.output);
-  if (ending == ".gltf") throw FileError(ErrorKind::kUsage, options.output, "glTF is written as one binary file, .glb");
+  if (ending == ".gltf")
+    throw FileError(ErrorKind::kUsage, options.output,
+                    "glTF is written as a single binary file; use the extension .glb");
   const std::string layout = !options.layout.empty() ? options.layout
                              : ending == ".glb"      ? kGltf
                              : ending == ".v16"      ? kVertex16
                                                      : "";
   refuse_foreign_ending(options.output, {".glb", ".v16"}, "export", {});
   if (layout.empty() && options.output == "-")
-    throw Error(ErrorKind::kUsage, "-o - has no ending to tell the layout; say --layout gltf or --layout vertex16");
+    throw Error(ErrorKind::kUsage, "-o - has no extension to choose a layout by; add --layout gltf or vertex16");
   if (layout.empty())
-    throw FileError(ErrorKind::kUsage, options.output, "give it the ending .glb or .v16, or say --layout");
+    throw FileError(ErrorKind::kUsage, options.output, "use the extension .glb or .v16, or add --layout");
   if ((ending == ".glb" && layout != kGltf) || (ending == ".v16" && layout != kVertex16))
-    throw FileError(ErrorKind::kUsage, options.output, "the ending is not that of --layout " + layout);
+    throw FileError(ErrorKind::kUsage, options.output, "the extension does not match --layout " + layout);
   return layout;
 }
 
@@ -139,7 +144,7 @@ Exported export_file(const ExportOptions& options, const std::string& layout, co
                      Progress& progress) {
   if (!is_baked_file(options.input))
     throw FileError(ErrorKind::kInput, options.input,
-                    "not a packtrace baked file; make one with packtrace bake SCENE.pbrt -o FILE.ptk");
+                    "not a packtrace baked file; create one with packtrace bake SCENE.pbrt -o FILE.ptk");
   const MemoryReservation memory = reserve_decoded(options.input, budget);
   const BakedFile file = BakedFile::open(options.input);
   if (layout == kGltf) {
@@ -155,8 +160,8 @@ Exported export_file(const ExportOptions& options, const std::string& layout, co
 int run(const ExportOptions& options, const GlobalOptions& globals) {
   if (options.output.empty()) fail_without_output("export", options.input, ".glb");
   const std::string layout = layout_of(options);
-  if (layout == kVertex16 && options.for_gltf)
-    throw Error(ErrorKind::kUsage, "--codec, --level, --normal-bits and --uv-bits are for --layout gltf");
+  if (layout == kVertex16 && options.has_gltf_option)
+    throw Error(ErrorKind::kUsage, "--codec, --level, --normal-bits and --uv-bits only apply to --layout gltf");
   JsonOutput json(globals.json, globals.force);
   BinaryOutput output(options.output, globals.force, json);
   refuse_to_replace({options.input});
@@ -175,39 +180,48 @@ int run(const ExportOptions& options, const GlobalOptions& globals) {
 
 void add_export_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<ExportOptions>();
-  CLI::App& verb = add_verb(app, globals, "export", "Write a .ptk file in a form that other programs read",
+  CLI::App& verb = add_verb(app, globals, "export", "Convert a .ptk file to glTF or to a GPU vertex layout",
                             [options, &globals] { return run(*options, globals); });
-  const auto of_gltf = [options](const std::string&) { options->for_gltf = true; };
-  verb.add_option("FILE", options->input, "A .ptk file")->required();
-  add_output_option(verb, options->output, "The file to write, or - for standard output with --layout (required)");
+  const auto of_gltf = [options](const std::string&) { options->has_gltf_option = true; };
+  verb.add_option("FILE", options->input, ".ptk file to convert")->required();
+  add_output_option(verb, options->output,
+                    "Output file (required), .glb or .v16, or - for standard output together with --layout");
   verb.add_option("--layout", options->layout,
-                  "vertex16: 16 bytes a vertex, 16- or 32-bit indices; gltf: one binary glTF 2.0 file with materials,\n"
-                  "instances, textures and cameras. Default: gltf for .glb, vertex16 for .v16")
+                  "Output format. gltf is a binary glTF 2.0 file with materials, instances, textures and cameras; "
+                  "vertex16 has 16 bytes per vertex and 16- or 32-bit indices, for direct upload to a GPU (default: "
+                  "gltf for .glb, vertex16 for .v16)")
       ->check(one_of({kVertex16, kGltf}));
-  verb.add_option("--codec", options->codec, "gltf: draco compresses (KHR_draco_mesh_compression), none stores floats")
+  verb.add_option(
+          "--codec", options->codec,
+          "Geometry compression for gltf. draco uses KHR_draco_mesh_compression; none stores floats, which every "
+          "glTF viewer can read (default draco)")
       ->check(one_of({kDraco, kNone}))
       ->each(of_gltf)
       ->capture_default_str();
-  verb.add_option("--level", options->gltf.codec.level, "draco: 0 fastest to 10 smallest")
+  verb.add_option("--level", options->gltf.codec.level,
+                  "Draco compression level, 0 (fastest) to 10 (smallest file) (default 7)")
       ->check(CLI::Range(0, 10))
       ->each(of_gltf)
       ->capture_default_str();
-  verb.add_option("--normal-bits", options->gltf.codec.normal_bits, "draco: bits of normals, 2 to 30")
+  verb.add_option("--normal-bits", options->gltf.codec.normal_bits,
+                  "Draco quantisation bits of octahedral normals, 2..30 (default 12)")
       ->check(CLI::Range(2, 30))
       ->each(of_gltf)
       ->capture_default_str();
-  verb.add_option("--uv-bits", options->gltf.codec.uv_bits, "draco: bits of texture coordinates, 1 to 30")
+  verb.add_option("--uv-bits", options->gltf.codec.uv_bits,
+                  "Draco quantisation bits of texture coordinates over their range, 1..30 (default 14). Raise it if "
+                  "textures shift")
       ->check(CLI::Range(1, 30))
       ->each(of_gltf)
       ->capture_default_str();
-  verb.footer(
-      "vertex16 packs position 3x21, normal 24, tangent 1+8 and uv 2x16 bits. docs/vertex16.md lays out the file,\n"
-      "compress/exchange/vertex16/vertex16.glsl and vertex16_decode.h decode it. glTF positions stay on the file's "
-      "lattice.\n"
-      "Examples:\n"
-      "  packtrace export house.ptk -o house.v16\n"
-      "  packtrace export house.ptk -o house.glb --level 10\n"
-      "  packtrace export house.ptk -o - --layout gltf | gltf_viewer /dev/stdin");
+  verb.footer("vertex16 packs position (3 x 21 bits), normal (24), tangent (1 + 8) and uv\n"
+              "(2 x 16) of a vertex. docs/vertex16.md describes the file;\n"
+              "compress/exchange/vertex16/vertex16.glsl and vertex16_decode.h decode it. Positions in glTF\n"
+              "files lie on the grid of the .ptk file.\n"
+              "Examples:\n"
+              "  packtrace export house.ptk -o house.v16\n"
+              "  packtrace export house.ptk -o house.glb --level 10\n"
+              "  packtrace export house.ptk -o - --layout gltf | gltf_viewer /dev/stdin");
 }
 
 } // namespace packtrace

@@ -8,7 +8,8 @@ namespace packtrace {
 
 struct GlobalOptions;
 
-/// `packtrace export FILE.ptk -o OUT --layout vertex16`: a baked file in a layout that engines upload as it is.
+/// Adds `packtrace export FILE.ptk -o OUT`, which converts a baked file to binary glTF 2.0, or to the vertex16 layout
+/// that engines can upload without conversion.
 void add_export_command(CLI::App& app, GlobalOptions& globals);
 
 } // namespace packtrace

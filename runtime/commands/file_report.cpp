@@ -144,26 +144,27 @@ std::string size_text(const FileSummary& s) {
   };
   const uint64_t on_disk = s.disk.file_bytes, resident = s.bytes.total;
   if (s.disk.codec == PageCodec::kNone)
-    return fmt::format(grouped(), "{:L} triangles; {:L} bytes, {:.3f} a triangle, in the file and resident\n",
+    return fmt::format(grouped(), "{:L} triangles; {:L} bytes on disk and in memory, {:.3f} per triangle\n",
                        s.triangles, resident, bytes_each(resident));
   return fmt::format(grouped(),
-                     "{:L} triangles; file: {:L} bytes, {:.3f} a triangle, codec {}; resident: {:L} bytes, {:.3f} a "
-                     "triangle\n",
+                     "{:L} triangles; {:L} bytes on disk, {:.3f} per triangle (codec {}); {:L} bytes in memory, {:.3f} "
+                     "per triangle\n",
                      s.triangles, on_disk, bytes_each(on_disk), name_of(s.disk.codec), resident, bytes_each(resident));
 }
 
 std::string collapsed_text(const FileSummary& s) {
   if (s.bake.collapsed_triangles + s.bake.coinciding_triangles == 0) return {};
   const double share = s.bake.source_area > 0.0 ? s.bake.collapsed_area / s.bake.source_area : 0.0;
-  return fmt::format(grouped(),
-                     "left out, as the grid is too coarse for them: {:L} triangles without area on it ({:.3g} % of the "
-                     "source's area), {:L} equal to others\n",
-                     s.bake.collapsed_triangles, 100.0 * share, s.bake.coinciding_triangles);
+  return fmt::format(
+      grouped(),
+      "dropped because the grid is too coarse for them: {:L} degenerate triangles ({:.3g} % of the source "
+      "area), {:L} duplicates\n",
+      s.bake.collapsed_triangles, 100.0 * share, s.bake.coinciding_triangles);
 }
 
 std::string disk_text(const FileSummary& s) {
   if (s.disk.codec == PageCodec::kNone) return {};
-  return fmt::format(grouped(), "on disk, codec {}: {:L} bytes, {:.3f} a triangle, in {:L} pages\n",
+  return fmt::format(grouped(), "on disk with codec {}: {:L} bytes, {:.3f} per triangle, in {:L} pages\n",
                      name_of(s.disk.codec), s.disk.file_bytes,
                      s.triangles > 0 ? static_cast<double>(s.disk.file_bytes) / static_cast<double>(s.triangles) : 0.0,
                      s.disk.page_count);
@@ -190,7 +191,7 @@ std::string to_text(const FileSummary& s, bool by_geometry) {
     text += fmt::format(grouped(), "normals {}: {:L} geometries, {:L} vertices, error {:.4f} degrees\n",
                         format_of(use.encoding).name, use.geometries, use.vertices, use.max_error_degrees);
   for (const UvUse& use : s.uvs)
-    text += fmt::format(grouped(), "uvs {}: {:L} geometries, {:L} vertices, error {:.3g}, {:.3g} texels at most\n",
+    text += fmt::format(grouped(), "uvs {}: {:L} geometries, {:L} vertices, error {:.3g} (at most {:.3g} texels)\n",
                         kUvEncodingNames[static_cast<size_t>(use.encoding)], use.geometries, use.vertices,
                         use.max_error, use.max_error_texels);
   if (!s.normals.empty() || !s.uvs.empty()) text += "\n";
@@ -204,9 +205,10 @@ std::string to_text(const FileSummary& s, bool by_geometry) {
       text += fmt::format(grouped(), "{:<22}{:>14L}{:>16.3f}\n", name, bytes,
                           triangles > 0 ? static_cast<double>(bytes) / triangles : 0.0);
   if (s.trees > 0)
-    text += fmt::format(grouped(), "{:L} trees of {:L} nodes, up to {} deep\n", s.trees, s.nodes, s.tree_depth);
+    text +=
+        fmt::format(grouped(), "{:L} BVH trees with {:L} nodes, maximum depth {}\n", s.trees, s.nodes, s.tree_depth);
   else
-    text += "no trees: tracing builds them\n";
+    text += "no BVH trees: render builds them\n";
   if (s.disk.codec != PageCodec::kNone) {
     text += "\n" + disk_text(s);
     for (const auto& [name, bytes] : disk_rows(s.disk))
@@ -215,8 +217,8 @@ std::string to_text(const FileSummary& s, bool by_geometry) {
                             triangles > 0 ? static_cast<double>(bytes) / triangles : 0.0);
   }
   if (s.placed_triangles != s.triangles)
-    text += fmt::format(grouped(), "{:<22}{:>14L}{:>16.3f}\n", "total, as placed", s.bytes.total,
-                        s.bytes_per_placed_triangle);
+    text +=
+        fmt::format(grouped(), "{:<22}{:>14L}{:>16.3f}\n", "total, placed", s.bytes.total, s.bytes_per_placed_triangle);
   return text + "\n" + lod_text(s, by_geometry) + requirements_text(s, by_geometry);
 }
 

@@ -9,23 +9,23 @@
 
 namespace packtrace {
 
-/// What a baked file holds, as `info --json` and `bake --json` write it (docs/json_output.md).
-/// @param by_geometry also what each geometry requires
+/// Contents of a baked file as JSON for `info --json` and `bake --json` (docs/json_output.md).
+/// @param by_geometry also list the streams required by each geometry
 nlohmann::json to_json(const FileSummary& summary, bool by_geometry);
 
-/// For fmt's {:L}: 1234567 as 1,234,567, whatever the user's locale.
+/// Locale for fmt's {:L} that prints 1234567 as 1,234,567, independent of the user's locale.
 const std::locale& grouped();
 
-/// One line: triangles, the file's bytes and those that are resident when it is traced, each also a triangle.
+/// One line with the number of triangles, the file size and the memory resident for tracing, in total and per triangle.
 std::string size_text(const FileSummary& summary);
 
-/// One line on the bytes on disk; empty for files with codec none.
+/// One line about the compressed size on disk; empty for files with codec none.
 std::string disk_text(const FileSummary& summary);
 
-/// One line on the triangles that bake left out as their grid is too coarse for them; empty where there are none.
+/// One line about the triangles that bake dropped because the grid is too coarse for them; empty if there are none.
 std::string collapsed_text(const FileSummary& summary);
 
-/// The same as to_json() for people: counts, errors, and a table of bytes by stream.
+/// Human-readable form of to_json(): counts, errors, and a table of bytes per stream.
 std::string to_text(const FileSummary& summary, bool by_geometry);
 
 } // namespace packtrace

@@ -16,7 +16,7 @@
 namespace packtrace {
 namespace {
 
-/// A verb without the options that only make sense for work on files.
+/// Adds a verb without the common options, which only apply to verbs that work on files.
 CLI::App& add_plain_verb(CLI::App& app, GlobalOptions& globals, const char* name, const char* description,
                          std::function<void()> print) {
   CLI::App& verb = *app.add_subcommand(name, description)->group("About packtrace")->footer("");
@@ -33,22 +33,25 @@ CLI::App& add_plain_verb(CLI::App& app, GlobalOptions& globals, const char* name
 
 void add_help_commands(CLI::App& app, GlobalOptions& globals, const std::string& version) {
   const auto topic = std::make_shared<std::string>(), shell = std::make_shared<std::string>();
-  CLI::App& help = add_plain_verb(app, globals, "help", "Explain packtrace, or one of its verbs", [&app, topic] {
-    // App::help() is about the verb that was parsed, which is this one.
+  CLI::App& help = add_plain_verb(app, globals, "help", "Show help for packtrace or one of its verbs", [&app, topic] {
+    // App::help() would describe the parsed verb, which is `help` itself.
     const CLI::App& explained = topic->empty() ? app : *find_verb(app, *topic);
     const std::string name = topic->empty() ? app.get_name() : app.get_name() + " " + *topic;
     fmt::print("{}", app.get_formatter()->make_help(&explained, name, CLI::AppFormatMode::Normal));
   });
   add_plain_verb(app, globals, "version", "Print the version", [version] { fmt::print("{}\n", version); });
   CLI::App& completion =
-      add_plain_verb(app, globals, "completion", "Print a script that completes packtrace's options in a shell",
+      add_plain_verb(app, globals, "completion", "Print a completion script for bash, zsh or fish",
                      [&app, shell] { fmt::print("{}", completion_script(list_options(app), *shell)); });
-  completion.add_option("SHELL", *shell, "The shell")->required()->check(one_of(completion_shells()));
-  completion.footer("Examples:\n"
+  completion.add_option("SHELL", *shell, "Shell to print the script for")
+      ->required()
+      ->check(one_of(completion_shells()));
+  completion.footer("The script completes verbs, options, their values and file names. Install it with\n"
+                    "one of these commands:\n"
                     "  packtrace completion bash > ~/.local/share/bash-completion/completions/packtrace\n"
                     "  packtrace completion zsh > \"${fpath[1]}/_packtrace\"\n"
                     "  packtrace completion fish > ~/.config/fish/completions/packtrace.fish\n"
-                    "or for this shell alone:\n"
+                    "or use it in the current bash only:\n"
                     "  source <(packtrace completion bash)");
   add_plain_verb(app, globals, "man", "Print the manual page",
                  [&app, version] { fmt::print("{}", man_page(list_options(app), version)); })
@@ -58,7 +61,7 @@ void add_help_commands(CLI::App& app, GlobalOptions& globals, const std::string&
   std::vector<std::string> verbs;
   for (const CLI::App* verb : app.get_subcommands([](CLI::App* known) { return !known->get_group().empty(); }))
     verbs.push_back(verb->get_name());
-  help.add_option("VERB", *topic, "The verb to explain")->check(one_of(verbs));
+  help.add_option("VERB", *topic, "Verb to describe")->check(one_of(verbs));
 }
 
 } // namespace packtrace

@@ -11,7 +11,7 @@ namespace {
 
 constexpr size_t kNames = 28, kDescription = 84; // columns
 
-/// With line ends between words, so that no line is longer than kDescription unless a word is.
+/// Wraps text between words to lines of at most kDescription columns. Longer words get a line of their own.
 std::string wrapped(const std::string& text) {
   std::string result;
   size_t column = 0;
@@ -36,7 +36,7 @@ std::string HelpFormatter::make_option_opts(const CLI::Option* option) const {
   if (option->get_items_expected_max() == 0) return {};
   const std::vector<std::string> choices = choices_of(*option);
   std::string text = choices.empty() ? value_name(*option) : fmt::format("{{{}}}", fmt::join(choices, ","));
-  if (option->get_positional() && choices.empty()) text.clear(); // its name says it
+  if (option->get_positional() && choices.empty()) text.clear(); // a positional's name already describes its value
   if (has_optional_value(*option)) text = "[" + text + "]";
   if (option->get_required()) text += " (required)";
   return text.empty() ? text : " " + text;

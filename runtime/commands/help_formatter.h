@@ -4,7 +4,7 @@
 
 namespace packtrace {
 
-/// CLI11's help with lines that fit a terminal, and with values as they are typed: "{none,fast,small}", "FILE".
+/// Formats help with wrapped lines, and with option values as the user types them: "{none,fast,small}", "FILE".
 class HelpFormatter final : public CLI::Formatter {
 public:
   HelpFormatter();

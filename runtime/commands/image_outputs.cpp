@@ -13,21 +13,21 @@
 namespace packtrace {
 namespace {
 
-constexpr std::array kAlways{"ao", "ao_raw", "depth", "normal", "instance", "albedo", "shaded"};
-/// Only with levels of detail.
-constexpr std::array kOfDetail{"lod", "lod-error"};
+constexpr std::array kBaseLayers{"ao", "ao_raw", "depth", "normal", "instance", "albedo", "shaded"};
+/// Layers that need LOD levels.
+constexpr std::array kLodLayers{"lod", "lod-error"};
 
 std::vector<std::string> chosen(const std::vector<std::string>& aovs, const std::string& otherwise, bool detail) {
   std::vector<std::string> names = aovs.empty() ? std::vector{otherwise} : aovs;
   if (std::find(names.begin(), names.end(), "all") != names.end()) {
     if (detail) return aov_names();
-    return {kAlways.begin(), kAlways.end()};
+    return {kBaseLayers.begin(), kBaseLayers.end()};
   }
   for (const std::string& name : names) {
     if (std::find(aov_names().begin(), aov_names().end(), name) != aov_names().end()) continue;
     std::string known = "all";
     for (const std::string& aov : aov_names()) known += ", " + aov;
-    throw Error(ErrorKind::kUsage, "--aov " + name + ": no such layer; there are " + known);
+    throw Error(ErrorKind::kUsage, "--aov " + name + ": no such layer; layers are " + known);
   }
   std::vector<std::string> unique;
   for (const std::string& name : names)
@@ -53,7 +53,8 @@ Layer exr_layer(const RenderedImage& image, const std::string& aov) {
   return {aov, rgb, floats_of(image.shaded), true};
 }
 
-/// Names of files, of which several may stand in one word: "x.png,x.exr". A comma inside of a name stays one.
+/// Splits words such as "x.png,x.exr" at commas. A word is split only if every part ends in .png or .exr, so that file
+/// names may contain commas.
 std::vector<std::string> separate_files(const std::vector<std::string>& words) {
   std::vector<std::string> files;
   for (const std::string& word : words) {
@@ -77,8 +78,8 @@ std::vector<std::string> separate_files(const std::vector<std::string>& words) {
 
 const std::vector<std::string>& aov_names() {
   static const std::vector<std::string> kNames = [] {
-    std::vector<std::string> names(kAlways.begin(), kAlways.end());
-    names.insert(names.end(), kOfDetail.begin(), kOfDetail.end());
+    std::vector<std::string> names(kBaseLayers.begin(), kBaseLayers.end());
+    names.insert(names.end(), kLodLayers.begin(), kLodLayers.end());
     return names;
   }();
   return kNames;
@@ -105,7 +106,7 @@ ImageOutputs::ImageOutputs(const std::vector<std::string>& files, const std::vec
         add(target, force, false, {aov});
       }
     } else {
-      throw Error(ErrorKind::kUsage, name + ": images end in .exr or .png");
+      throw Error(ErrorKind::kUsage, name + ": image file names must end in .png or .exr");
     }
   }
 }
@@ -113,7 +114,7 @@ ImageOutputs::ImageOutputs(const std::vector<std::string>& files, const std::vec
 void ImageOutputs::add_standard_output(std::vector<std::string> aovs) {
   if (std::exchange(to_stdout_, true)) throw Error(ErrorKind::kUsage, "-o - was given twice");
   if (aovs.size() > 1)
-    throw Error(ErrorKind::kUsage, "-o - writes one PNG to standard output, so --aov can name one layer only");
+    throw Error(ErrorKind::kUsage, "-o - writes a single PNG to standard output, so --aov can select only one layer");
   refuse_terminal("a PNG");
   add("-", false, false, std::move(aovs));
 }
@@ -137,10 +138,10 @@ void ImageOutputs::write(const RenderedImage& image, const ExrAttributes& attrib
     if (entry.file) entry.file->commit();
 }
 
-bool ImageOutputs::show_detail() const {
+bool ImageOutputs::has_lod_layers() const {
   return std::ranges::any_of(entries_, [](const Entry& entry) {
     return std::ranges::any_of(entry.aovs, [](const std::string& aov) {
-      return std::find(kOfDetail.begin(), kOfDetail.end(), aov) != kOfDetail.end();
+      return std::find(kLodLayers.begin(), kLodLayers.end(), aov) != kLodLayers.end();
     });
   });
 }

@@ -13,33 +13,33 @@
 
 namespace packtrace {
 
-/// The layers a render can write, in the order `--help` lists them.
+/// Names of the layers that a render can write.
 const std::vector<std::string>& aov_names();
 
-/// The image files of one render. Made before the work starts, so that a target that cannot be written is known at
-/// once; nothing appears under its name before write() has written all of them.
+/// The image files of one render. Construct it before the work starts, so that unwritable targets are reported at once.
+/// No file appears under its final name before write() has written all of them.
 class ImageOutputs {
 public:
-  /// @param files ending in .exr (one file of all chosen layers) or .png (one file a layer: NAME.png for a single
-  ///   layer, NAME.LAYER.png for several), in any case; several may stand in one string, separated by commas. "-" is a
-  ///   PNG of a single layer on standard output, which must not be a terminal
+  /// @param files names ending in .exr (one file with all chosen layers) or .png (one file per layer: NAME.png for a
+  ///   single layer, NAME.LAYER.png for several); case is ignored. A string may hold several names separated by commas.
+  ///   "-" writes a PNG with a single layer to standard output, which must not be a terminal.
   /// @param aovs layers from aov_names(), or "all"; empty: all for .exr and "ao" for .png
-  /// @param detail whether levels of detail are seen: "all" holds the layers about them
-  /// Throws Error(kUsage) for other endings and layer names, and for two outputs to one file; otherwise like
-  /// OutputFile.
+  /// @param detail whether camera rays use LOD levels; if so, "all" includes the LOD layers
+  /// Throws Error(kUsage) for other extensions, for unknown layers, and if two outputs have the same name; otherwise
+  /// throws like OutputFile.
   ImageOutputs(const std::vector<std::string>& files, const std::vector<std::string>& aovs, bool detail, bool force,
                const PreviewStyle& style);
 
-  /// Throws Error(kIo).
+  /// Writes all files. Throws Error(kIo).
   void write(const RenderedImage& image, const ExrAttributes& attributes);
 
-  /// Whether a layer is about levels of detail.
-  bool show_detail() const;
+  /// Whether a LOD layer was requested.
+  bool has_lod_layers() const;
 
-  /// Standard output carries a picture: text for people does not belong there.
+  /// Whether an image goes to standard output, so that human-readable text must go elsewhere.
   bool to_stdout() const { return to_stdout_; }
 
-  /// The files, in the order of writing; "-" for standard output.
+  /// File names in the order of writing; "-" for standard output.
   std::vector<std::string> targets() const;
 
 private:

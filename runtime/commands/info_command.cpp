@@ -93,7 +93,7 @@ nlohmann::json to_json(const ImportResult& imported, uint32_t world) {
       {"bounds", {{"lo", {bounds.lo.x, bounds.lo.y, bounds.lo.z}}, {"hi", {bounds.hi.x, bounds.hi.y, bounds.hi.z}}}}};
 }
 
-/// "title   a 1   b 2", without its end of line.
+/// Formats counts as "title   a 1   b 2", without a newline.
 std::string row_of(std::string_view title, const std::map<std::string, uint64_t>& counts) {
   std::string row(title);
   for (const auto& [name, count] : counts) row += fmt::format(grouped(), "   {} {:L}", name, count);
@@ -125,17 +125,17 @@ std::string to_text(const ImportResult& imported, uint32_t world) {
   text += left_out_cameras_text(imported);
   if (s.worlds > 1) text += fmt::format("world {} of {}\n", world, s.worlds);
   if (s.animated_shapes + s.animated_instances + s.animated_cameras > 0)
-    text += fmt::format(grouped(), "animated   shapes {:L}   instances {:L}   cameras {:L}   (shown as at time {})\n",
+    text += fmt::format(grouped(), "animated   shapes {:L}   instances {:L}   cameras {:L}   (evaluated at time {})\n",
                         s.animated_shapes, s.animated_instances, s.animated_cameras, scene.time);
   if (!s.ignored.empty()) text += row_of("ignored", s.ignored) + "\n";
   return text;
 }
 
-/// What is said of one file.
+/// The reports about one file.
 struct FileInfo {
   nlohmann::json json;
   std::string text;
-  std::string row; ///< of the table for several files
+  std::string row; ///< row of the table that is printed for several files
 };
 
 std::string table_row(const std::string& file, uint64_t triangles, uint64_t placed, uint64_t bytes,
@@ -146,7 +146,7 @@ std::string table_row(const std::string& file, uint64_t triangles, uint64_t plac
 }
 
 std::string table_heading() {
-  return fmt::format("{:>14}{:>14}{:>15}{:>10}{:>12}  {}\n", "triangles", "placed", "bytes", "a tri.", "pos. error",
+  return fmt::format("{:>14}{:>14}{:>15}{:>10}{:>12}  {}\n", "triangles", "placed", "bytes", "per tri.", "pos. error",
                      "file");
 }
 
@@ -187,8 +187,8 @@ int run_one(const InfoOptions& options, const GlobalOptions& globals) {
   return 0;
 }
 
-/// A line of a table for each file, or with -v all of each. A file that cannot be read is reported and left out; the
-/// first such decides the exit code.
+/// Prints a table with a row per file, or with -v the full report of each file. Files that cannot be read are reported
+/// and skipped; the first failure determines the exit code.
 int run_several(const InfoOptions& options, const GlobalOptions& globals) {
   JsonOutput json(globals.json, globals.force);
   nlohmann::json documents = nlohmann::json::array();
@@ -205,7 +205,7 @@ int run_several(const InfoOptions& options, const GlobalOptions& globals) {
     } catch (const Error& error) {
       if (error.kind() == ErrorKind::kCancelled || error.kind() == ErrorKind::kUsage) throw;
       display.finish();
-      std::fflush(stdout); // so that the two streams are in order
+      std::fflush(stdout); // keeps the output of the two streams in order
       report_error(error);
       if (code == 0) code = error.exit_code();
       documents.push_back({{"verb", "info"}, {"input", input}, {"error", error_json(error)}});
@@ -219,15 +219,21 @@ int run_several(const InfoOptions& options, const GlobalOptions& globals) {
 
 void add_info_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<InfoOptions>();
-  CLI::App& verb = add_verb(app, globals, "info", "Say what .ptk files and .pbrt scenes hold", [options, &globals] {
-    return options->inputs.size() == 1 ? run_one(*options, globals) : run_several(*options, globals);
-  });
+  CLI::App& verb = add_verb(
+      app, globals, "info", "Show contents, sizes and errors of .ptk files and .pbrt scenes", [options, &globals] {
+        return options->inputs.size() == 1 ? run_one(*options, globals) : run_several(*options, globals);
+      });
   verb.add_option("FILE", options->inputs,
-                  "A .ptk file or a .pbrt scene; of several a table is printed, or with -v all")
+                  "One or more .ptk files or .pbrt scenes. For several files a table with one row per file is printed; "
+                  "-v prints each in full")
       ->required();
   add_scene_options(verb, options->scene);
-  verb.footer("Examples:\n"
+  verb.footer("For a .ptk file: counts, grid steps, errors measured against the source, bytes\n"
+              "per stream, LOD levels, and why each stream is stored or dropped. For a scene:\n"
+              "shapes, materials, cameras and everything that was ignored.\n"
+              "Examples:\n"
               "  packtrace info house.ptk\n"
+              "  packtrace info house.ptk -v\n"
               "  packtrace info *.ptk\n"
               "  packtrace info house.ptk --json - | jq .bytes_per_triangle");
 }

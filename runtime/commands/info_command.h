@@ -8,7 +8,7 @@ namespace packtrace {
 
 struct GlobalOptions;
 
-/// `packtrace info FILE`: what a baked file or a pbrt scene holds, and what each byte is for.
+/// Adds `packtrace info FILE...`, which prints the contents and memory use of baked files and pbrt scenes.
 void add_info_command(CLI::App& app, GlobalOptions& globals);
 
 } // namespace packtrace

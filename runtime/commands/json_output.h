@@ -10,20 +10,20 @@
 
 namespace packtrace {
 
-/// Where --json goes. Made before the work starts, so that a target that cannot be written is known at once.
+/// The destination of --json. Construct it before the work starts, so that an unwritable target is reported at once.
 class JsonOutput {
 public:
-  /// @param destination a file, "-" for standard output, empty for nowhere
-  /// Throws like OutputFile, and Error(kUsage) for endings of other formats: `--json room.ptk`.
+  /// @param destination a file, "-" for standard output, empty for none
+  /// Throws like OutputFile, and Error(kUsage) for extensions of other formats, such as `--json room.ptk`.
   JsonOutput(const std::string& destination, bool force);
 
-  /// Something is to be written.
+  /// Whether JSON output was requested.
   bool wanted() const { return file_ || to_stdout_; }
-  /// Standard output is taken: text for people does not belong there.
+  /// Whether JSON goes to standard output, so that human-readable text must go elsewhere.
   bool to_stdout() const { return to_stdout_; }
 
-  /// Writes the document, indented by 2, with a final newline. NaN and infinities become null, bytes that are not
-  /// UTF-8 become U+FFFD. Throws Error(kIo) where writing fails.
+  /// Writes the document, indented by 2, with a final newline. Does nothing unless wanted(). NaN and infinities become
+  /// null, bytes that are not UTF-8 become U+FFFD. Throws Error(kIo) if writing fails.
   void write(const nlohmann::json& document);
 
 private:
@@ -31,10 +31,10 @@ private:
   bool to_stdout_ = false;
 };
 
-/// What the "error" key holds (docs/json_output.md).
+/// Value of the "error" key (docs/json_output.md).
 nlohmann::json error_json(const Error& error);
 
-/// The same of a failure that has no Error: "internal", or lack of memory.
+/// The same for failures that are not an Error, such as internal errors.
 nlohmann::json error_json(const std::string& kind, int exit_code, const std::string& message);
 
 } // namespace packtrace

@@ -12,7 +12,7 @@
 namespace packtrace {
 namespace {
 
-/// Linear colours with the sRGB transfer.
+/// Applies the sRGB transfer to linear colours.
 Image display_picture(ImageSize size, const std::vector<Vec3>& linear) {
   Image picture(size, 3);
   for (size_t i = 0; i < linear.size(); ++i)
@@ -21,7 +21,7 @@ Image display_picture(ImageSize size, const std::vector<Vec3>& linear) {
   return picture;
 }
 
-/// A layer without what stands behind it.
+/// Returns the picture of a layer without background.
 Image plain_preview(const RenderedImage& image, const std::string& aov) {
   if (aov == "ao") return ao_preview(image.size, image.ao);
   if (aov == "ao_raw") return ao_preview(image.size, image.ao_raw);
@@ -46,7 +46,7 @@ Legend level_legend(const RenderedImage& image) {
   uint32_t coarsest = 0;
   for (size_t i = 0; i < image.lod.size(); ++i)
     if (image.coverage[i] > 0.0f) coarsest = std::max(coarsest, image.lod[i]);
-  constexpr uint32_t kLastColor = 8; // of level_color()
+  constexpr uint32_t kLastColor = 8; // last level with its own level_color()
   std::vector<std::pair<Vec3, std::string>> bands;
   for (uint32_t level = 0; level <= std::min(coarsest, kLastColor); ++level)
     bands.emplace_back(level_color(level), level < kLastColor ? std::to_string(level) : "8+");

@@ -9,13 +9,13 @@
 
 namespace packtrace {
 
-/// How layers are shown in .png files.
+/// How layers are displayed in .png files.
 struct PreviewStyle {
-  std::optional<Background> background; ///< none: a sky behind albedo and shaded, kDefaultBackground behind the rest
-  bool legend = true;                   ///< a strip below the layers whose colours stand for numbers
+  std::optional<Background> background; ///< if not set: sky for albedo and shaded, kDefaultBackground for other layers
+  bool legend = true;                   ///< add a colour scale below depth, lod and lod-error
 };
 
-/// A layer as a picture of display values, three channels, or four in front of a transparent background.
+/// Returns a picture of a layer in display values: three channels, or four with a transparent background.
 /// @param aov one of aov_names()
 Image layer_preview(const RenderedImage& image, const std::string& aov, const PreviewStyle& style);
 

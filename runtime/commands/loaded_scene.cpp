@@ -36,7 +36,7 @@ MemoryReservation reserve_decoded(const std::filesystem::path& file, const Memor
   if (start.size() < sizeof header || !is_paged_file(std::as_bytes(std::span(start)))) return memory;
   std::memcpy(&header, start.data(), sizeof header);
   try {
-    memory.resize(header.resident_bytes, "what the file is decoded to");
+    memory.resize(header.resident_bytes, "decoding the file");
   } catch (const MemoryError& error) {
     throw MemoryError(file, error.what());
   }
@@ -44,14 +44,18 @@ MemoryReservation reserve_decoded(const std::filesystem::path& file, const Memor
 }
 
 void add_scene_options(CLI::App& verb, SceneOptions& options) {
-  constexpr const char* kGroup = "Reading of .pbrt scenes";
-  verb.add_flag("--strict", options.strict, "Fail if the scene has any problem")->group(kGroup);
-  verb.add_option("--world", options.world, "Which of the file's worlds, from 1 (the default)")
+  constexpr const char* kGroup = "Options for .pbrt scenes";
+  verb.add_flag("--strict", options.strict,
+                "Fail if reading the scene reports any warning or error, instead of continuing with the rest")
+      ->group(kGroup);
+  verb.add_option("--world", options.world,
+                  "Number of the world to read from a file with several WorldBegin blocks, from 1 (default 1)")
       ->check(CLI::Range(1u, UINT32_MAX))
       ->type_name("N")
       ->group(kGroup);
   verb.add_option("--time", options.time,
-                  "When to look at what moves, in the unit of TransformTimes (default: as the camera's shutter opens)")
+                  "Time at which to evaluate animated transforms, in the unit of TransformTimes (default: the time at "
+                  "which the camera's shutter opens)")
       ->type_name("T")
       ->group(kGroup);
 }
@@ -61,27 +65,28 @@ void require_no_scene_choice(const std::filesystem::path& file, const SceneOptio
   if (option)
     throw FileError(ErrorKind::kUsage, file,
                     std::string(option) +
-                        " is for .pbrt scenes; a .ptk file holds one world at one time, chosen by bake");
+                        " only applies to .pbrt scenes; the world and the time of a .ptk file were chosen by bake");
 }
 
 namespace {
 
-/// Refuses what is plainly another kind of file, whose bytes would be reported one by one.
+/// Throws Error(kInput) for files that are obviously not pbrt scenes. The parser would report them byte by byte.
 void require_scene_text(const std::filesystem::path& file) {
   std::array<char, 512> start{};
   size_t size = 0;
   try {
-    size = InputFile(file, start.size()).read(start); // inflated where it is compressed
+    size = InputFile(file, start.size()).read(start); // decompresses .gz files
   } catch (const Error&) {
-    return; // the import says why
+    return; // the import reports the error
   }
   const std::string_view text(start.data(), size);
   if (is_baked_file(file))
-    throw FileError(ErrorKind::kInput, file, "a baked file already; give the .pbrt scene that it was made of");
+    throw FileError(ErrorKind::kInput, file, "already a baked file; use the .pbrt scene it was made from");
   if (text.starts_with("ply\n") || text.starts_with("ply\r"))
-    throw FileError(ErrorKind::kInput, file, "a PLY mesh, not a scene; name it in a .pbrt file with Shape \"plymesh\"");
+    throw FileError(ErrorKind::kInput, file,
+                    "a PLY mesh, not a scene; refer to it from a .pbrt file with Shape \"plymesh\"");
   if (text.find('\0') != std::string::npos)
-    throw FileError(ErrorKind::kInput, file, "not a text file, so no pbrt-v3 scene");
+    throw FileError(ErrorKind::kInput, file, "not a text file, so not a pbrt-v3 scene");
 }
 
 } // namespace
@@ -89,9 +94,10 @@ void require_scene_text(const std::filesystem::path& file) {
 std::string left_out_cameras_text(const ImportResult& imported) {
   const uint64_t left_out = imported.statistics.cameras_left_out;
   if (left_out == 0) return {};
-  return fmt::format("{} camera{} left out, as the errors above say; {}\n", left_out, left_out == 1 ? " is" : "s are",
-                     imported.scene.cameras.empty() ? "without one, render frames the whole scene"
-                                                    : "camera 0 is the last of the others");
+  return fmt::format("{} camera{} skipped because of the errors above; {}\n", left_out,
+                     left_out == 1 ? " was" : "s were",
+                     imported.scene.cameras.empty() ? "render will show the whole scene"
+                                                    : "camera 0 is the last of the remaining ones");
 }
 
 nlohmann::json problems_json(const ImportStatistics& statistics) {
@@ -114,7 +120,7 @@ ImportResult import_for_command(const std::filesystem::path& file, const SceneOp
   ImportResult result;
   try {
     result = import_scene(file, options, diagnostics, progress);
-  } catch (const Error&) { // what was found until then may explain it
+  } catch (const Error&) { // earlier diagnostics may explain the error
     display.finish();
     report_diagnostics(diagnostics, globals);
     throw;
@@ -123,14 +129,14 @@ ImportResult import_for_command(const std::filesystem::path& file, const SceneOp
   refuse_to_replace(result.files);
   const bool empty = placed_triangle_count(result.scene) == 0;
   GlobalOptions shown = globals;
-  if (empty) shown.verbosity = std::max(shown.verbosity, 1); // notes may say why
+  if (empty) shown.verbosity = std::max(shown.verbosity, 1); // notes may explain why
   report_diagnostics(diagnostics, shown);
   if (empty) throw FileError(ErrorKind::kInput, file, "the scene has no triangles to work with");
   return result;
 }
 
 void LoadedScene::copy_file(const std::filesystem::path& file, const MemoryBudget& budget) {
-  std::error_code unknown; // what is wrong with the file is said when it is read
+  std::error_code unknown; // reading the file reports the error
   const uint64_t bytes = std::filesystem::file_size(file, unknown);
   try {
     memory.merge(MemoryReservation(budget, unknown ? 0 : bytes, "a private copy"));

@@ -16,53 +16,55 @@
 
 namespace packtrace {
 
-/// True for .ptk files: by the name, or by the first bytes where the name says something else.
+/// Whether the file is a baked file: its name ends in .ptk, or it starts with the magic bytes of the format.
 bool is_baked_file(const std::filesystem::path& file);
 
-/// Memory for what a .ptk of codec fast or small is decoded to, as far as its header can be read. Throws MemoryError.
+/// Reserves memory for decoding a .ptk file with codec fast or small. Reserves nothing for codec none, or if the header
+/// cannot be read. Throws MemoryError.
 MemoryReservation reserve_decoded(const std::filesystem::path& file, const MemoryBudget& budget);
 
-/// How verbs read a pbrt scene; as in ImportOptions.
+/// Options for importing a pbrt scene; see ImportOptions.
 struct SceneOptions {
   bool strict = false;
   std::optional<uint32_t> world;
   std::optional<double> time;
 };
 
-/// Adds --strict, --world and --time to a verb; options must outlive it.
+/// Adds --strict, --world and --time to a verb. `options` must outlive the verb.
 void add_scene_options(CLI::App& verb, SceneOptions& options);
 
-/// Throws Error(kUsage) where options ask for what only a .pbrt scene has: a baked file holds one world at one time.
+/// Throws Error(kUsage) if --world or --time is given for a baked file, which holds one world at one time.
 void require_no_scene_choice(const std::filesystem::path& file, const SceneOptions& options);
 
-/// Imports a pbrt file, prints its diagnostics, and refuses scenes without triangles, and outputs in the place of files
-/// that the scene is made of.
+/// Imports a pbrt file and prints its diagnostics.
 /// @param keep_textures as in ImportOptions
-/// Throws Error(kInput) where the file cannot be read, lacks the world asked for, nothing is left of it, or strict is
-/// set and there was a problem; Error(kUsage) like refuse_to_replace().
+/// Throws Error(kInput) if the file cannot be read, does not have the requested world, or has no triangles, or if
+/// strict is set and there was a problem. Throws Error(kUsage) if an output would replace one of the scene's files.
 ImportResult import_for_command(const std::filesystem::path& file, const SceneOptions& scene_options,
                                 const GlobalOptions& globals, Progress& progress, ProgressDisplay& display,
                                 bool keep_textures = false);
 
-/// A line on cameras that the scene has and the import could not use; empty if there are none.
+/// One line about the scene's cameras that could not be imported; empty if there are none.
 std::string left_out_cameras_text(const ImportResult& imported);
 
-/// How many problems an import reported: {notes, warnings, errors}.
+/// Numbers of problems that an import reported: {"notes", "warnings", "errors"}.
 nlohmann::json problems_json(const ImportStatistics& statistics);
 
-/// A scene on disk, packed or not, ready to be traced.
+/// A loaded .ptk or .pbrt file, ready for tracing.
 struct LoadedScene {
-  std::vector<std::byte> copy;         ///< of the file, where baked is to be over that
-  std::optional<BakedFile> baked;      ///< of a .ptk
-  std::unique_ptr<Scene> imported;     ///< of a .pbrt
-  std::unique_ptr<SceneSource> source; ///< over one of the two
-  MemoryReservation memory;            ///< of what is held in memory
+  std::vector<std::byte> copy;         ///< the file's bytes, if `baked` refers to a private copy
+  std::optional<BakedFile> baked;      ///< set for .ptk files
+  std::unique_ptr<Scene> imported;     ///< set for .pbrt files
+  std::unique_ptr<SceneSource> source; ///< view of `baked` or `imported`
+  MemoryReservation memory;            ///< reservation for the loaded data
 
-  /// Reads a .ptk into copy and puts baked over that.
+  /// Reads a .ptk file into `copy` and lets `baked` refer to it. Throws MemoryError, and like
+  /// BakedFile::borrow_bytes().
   void copy_file(const std::filesystem::path& file, const MemoryBudget& budget);
 };
 
-/// @param private_copy read a .ptk into memory instead of mapping it
+/// Loads a .ptk file, or imports a .pbrt scene.
+/// @param private_copy read a .ptk file into memory instead of mapping it
 /// Throws like BakedFile::open(), reserve_decoded(), require_no_scene_choice() and import_for_command().
 LoadedScene load_scene(const std::filesystem::path& file, const SceneOptions& scene_options,
                        const GlobalOptions& globals, Progress& progress, ProgressDisplay& display,

@@ -25,7 +25,7 @@ constexpr std::array<std::pair<const char*, SharingScheme>, 5> kSchemes{{{"steps
                                                                          {"per-instance", SharingScheme::kPerInstance},
                                                                          {"off", SharingScheme::kOff}}};
 
-/// @param name of kSchemes: the option's check knows them
+/// @param name a name in kSchemes, which the option's check guarantees
 SharingScheme scheme_of(const std::string& name) {
   return std::ranges::find(kSchemes, name, &std::pair<const char*, SharingScheme>::first)->second;
 }
@@ -45,10 +45,11 @@ SharingConfig sharing_config(const LodOptions& options) {
   return config;
 }
 
-/// Takes built trees through BlasCompactor: what a device would hold that must allocate before it builds.
+/// Simulates BLAS compaction (BlasCompactor) for the built trees. The result is the memory that a GPU would hold, which
+/// must allocate the worst case before each build.
 class TreeMemory final : public BlasMemoryBackend {
 public:
-  /// @param base_of a geometry of the trees: the file's
+  /// @param base_of maps TreeBytes::geometry to the file's geometry
   template <typename BaseOf>
   TreeMemory(const std::vector<TreeBytes>& trees, const BaseOf& base_of) : trees_(trees) {
     CompactionConfig config;
@@ -60,11 +61,11 @@ public:
       compactor.add(i, base_of(trees[i].geometry));
       moving.push_back(i);
     }
-    while (!moving.empty()) { // each frame settles some, or measures
+    while (!moving.empty()) { // every frame advances the state of some trees
       compactor.begin_frame();
       std::erase_if(moving, [&](uint32_t i) { return compactor.state_of(i) == BlasMemoryState::kSettled; });
     }
-    for (uint32_t frame = 0; frame < config.frames_in_flight; ++frame) compactor.begin_frame(); // releases
+    for (uint32_t frame = 0; frame < config.frames_in_flight; ++frame) compactor.begin_frame(); // releases old buffers
     resident = compactor.resident_bytes();
     peak = compactor.peak_bytes();
     by_geometry = compactor.geometry_bytes();
@@ -78,14 +79,14 @@ public:
   void record_copy(uint32_t, BlasBuffer, BlasBuffer) override {}
 
   uint64_t worst_case = 0, resident = 0, peak = 0;
-  std::map<uint32_t, GeometryBytes> by_geometry; ///< kNoGeometry: the world
+  std::map<uint32_t, GeometryBytes> by_geometry; ///< keyed by the file's geometry; kNoGeometry: the TLAS
 
 private:
   const std::vector<TreeBytes>& trees_;
   BlasBuffer next_ = 0;
 };
 
-/// A row for each geometry that has levels.
+/// A row per geometry that has LOD levels and instances.
 nlohmann::json geometries_json(const ChosenDetail& detail) {
   nlohmann::json rows = nlohmann::json::array();
   std::vector<uint64_t> instances(detail.geometries->size(), 0), builds = instances, triangles = instances;
@@ -136,39 +137,42 @@ double ratio(double a, double b) { return b > 0.0 ? a / b : 0.0; }
 void add_lod_options(CLI::App& verb, LodOptions& options) {
   std::vector<std::string> schemes;
   for (const auto& [name, scheme] : kSchemes) schemes.emplace_back(name);
-  constexpr const char* kGroup = "Levels of detail (of files baked with --lod)";
+  constexpr const char* kGroup = "Levels of detail (for files baked with --lod)";
   verb.add_option("--lod-error", options.error_px,
-                  "Choose coarser levels that lie at most so many pixels beside the finest, to either side; "
-                  "--supersample counts: pixels as traced")
+                  "Maximum screen-space error in pixels; coarser LOD levels are used where their error is smaller "
+                  "(default: level 0 everywhere). Pixels are those traced, so --supersample 2 halves the error. Start "
+                  "with 1; 0.2 also keeps seams between instances below half a pixel")
       ->type_name("PX")
       ->group(kGroup);
   verb.add_option("--lod-scheme", options.scheme,
-                  "Who gets which acceleration structure: steps (the default) and per-level share ones that do not "
-                  "depend on the view, one-provider lends one instance's, per-instance shares only the coarsest; off: "
-                  "level 0 for all")
+                  "How instances share acceleration structures (BLASes). steps and per-level share BLASes that do not "
+                  "depend on the view; with one-provider, one instance of each geometry shares its own cut; "
+                  "per-instance shares only the coarsest cut; off uses level 0 for all (default steps)")
       ->check(one_of(schemes))
       ->group(kGroup);
-  verb.add_option("--lod-traced-ratio", options.traced_ratio,
-                  "steps, per-level: build as few as possible while at most so many times the triangles of the "
-                  "instances' own cuts are traced (default 1.25; 0: each instance decides alone)")
+  verb.add_option(
+          "--lod-traced-ratio", options.traced_ratio,
+          "Maximum number of traced triangles for steps and per-level, relative to a separate cut per instance, "
+          "1 or more (default 1.25). Larger values build fewer BLASes; 0 decides for each instance separately")
       ->type_name("R")
       ->group(kGroup);
   verb.add_option("--lod-tolerance", options.tolerance,
-                  "Let shared structures be up to N levels (or steps) too coarse (default 0)")
+                  "Number of levels (or steps) by which a shared BLAS may be too coarse, 0..32 (default 0). Above 0, "
+                  "fewer BLASes are built, but the error may exceed --lod-error")
       ->type_name("N")
       ->group(kGroup);
   verb.add_option("--lod-culled-scale", options.culled_scale,
-                  "How many times the error is allowed for instances that --lod-cull names (default 1)")
+                  "Factor on --lod-error for instances that --lod-cull selects, 1..1e6 (default 1)")
       ->type_name("S")
       ->group(kGroup);
   verb.add_option("--lod-cull", options.cull,
-                  "Which instances --lod-culled-scale is about: frustum, outside of what the camera looks at (the "
-                  "default); visible, those that no pixel shows, with --lod-rays occlusion")
+                  "Instances to which --lod-culled-scale applies. frustum selects those outside the camera's view; "
+                  "visible selects those that no pixel shows, and needs --lod-rays occlusion (default frustum)")
       ->check(one_of({"frustum", "visible"}))
       ->group(kGroup);
   verb.add_option("--lod-rays", options.rays,
-                  "Which rays meet coarser levels: all (the default), or occlusion: the camera sees level 0, so that "
-                  "what thin and touching parts show stays")
+                  "Rays that use coarser levels. all means camera and occlusion rays; with occlusion, camera rays use "
+                  "level 0, so that thin and touching parts look as without LOD (default all)")
       ->check(one_of({"all", "occlusion"}))
       ->group(kGroup);
 }
@@ -176,17 +180,19 @@ void add_lod_options(CLI::App& verb, LodOptions& options) {
 void validate(const LodOptions& options) {
   if (!options.error_px && (options.scheme || options.traced_ratio || options.culled_scale || options.tolerance ||
                             options.rays || options.cull))
-    throw Error(ErrorKind::kUsage, "--lod-scheme and the options about it count with --lod-error only");
+    throw Error(ErrorKind::kUsage, "the other --lod options require --lod-error");
   if (options.error_px && !(*options.error_px > 0.0 && *options.error_px <= 1e9))
-    throw Error(ErrorKind::kUsage, fmt::format("--lod-error {}: give pixels above 0", *options.error_px));
+    throw Error(ErrorKind::kUsage,
+                fmt::format("--lod-error {}: must be a number of pixels above 0", *options.error_px));
   if (options.cull == "visible" && !options.only_occlusion())
-    throw Error(ErrorKind::kUsage, "--lod-cull visible needs --lod-rays occlusion: what is visible is known only "
-                                   "where camera rays come first");
+    throw Error(ErrorKind::kUsage, "--lod-cull visible requires --lod-rays occlusion, where camera rays are "
+                                   "traced before the levels are chosen");
   sharing_config(options);
 }
 
 void require_levels(const std::string& input, const LoadedScene& loaded) {
-  if (!loaded.baked) throw Error(ErrorKind::kUsage, input + ": --lod-error is for .ptk files; bake it with --lod");
+  if (!loaded.baked)
+    throw Error(ErrorKind::kUsage, input + ": --lod-error requires a .ptk file; bake the scene with --lod");
   if (loaded.baked->sections().lod_levels.empty())
     throw Error(ErrorKind::kUsage, input + ": --lod-error: the file has no levels of detail; bake it with --lod");
 }
@@ -259,21 +265,23 @@ std::string detail_text(const nlohmann::json& r) {
   const auto& own = r.at("own_cuts");
   const auto& categories = r.at("categories");
   const uint64_t builds = count(r.at("builds")), alone = count(own.at("builds"));
-  std::string text =
-      fmt::format(grouped(), "  detail    {} px, {}: {:L} built for {:L} instances ({:+.1f} % against {:L} alone)\n",
-                  r.at("error_px").get<double>(), r.at("scheme").get<std::string>(), builds, count(r.at("instances")),
-                  alone > 0 ? 100.0 * (static_cast<double>(builds) / static_cast<double>(alone) - 1.0) : 0.0, alone);
+  std::string text = fmt::format(
+      grouped(), "  lod       {} px, {}: {:L} BLASes for {:L} instances ({:+.1f} % vs. {:L} without sharing)\n",
+      r.at("error_px").get<double>(), r.at("scheme").get<std::string>(), builds, count(r.at("instances")),
+      alone > 0 ? 100.0 * (static_cast<double>(builds) / static_cast<double>(alone) - 1.0) : 0.0, alone);
   text +=
-      fmt::format(grouped(), "            {:L} triangles built, {:L} traced: {:.3f} times the instances' own cuts\n",
+      fmt::format(grouped(), "            {:L} triangles built, {:L} traced ({:.3f} times those of separate cuts)\n",
                   count(r.at("built_triangles")), count(r.at("traced_triangles")), r.at("traced_ratio").get<double>());
-  text += fmt::format(grouped(),
-                      "            instances: {:L} coarsest, {:L} lend, {:L} share, {:L} have their own; {:L} culled\n",
-                      count(categories.at("lowest")), count(categories.at("provider")), count(categories.at("shares")),
-                      count(categories.at("own")), count(r.at("instances_culled")));
-  text += fmt::format("            plan {:.1f} ms, lists of clusters {:.1f} ms", ms("plan"), ms("clusters"));
-  if (r.at("seconds").contains("trees")) text += fmt::format(", nodes above clusters {:.1f} ms", ms("trees"));
+  text +=
+      fmt::format(grouped(),
+                  "            instances: {:L} use the coarsest cut, {:L} the first of a shared BLAS, {:L} more share "
+                  "it, {:L} have their own; {:L} culled\n",
+                  count(categories.at("lowest")), count(categories.at("provider")), count(categories.at("shares")),
+                  count(categories.at("own")), count(r.at("instances_culled")));
+  text += fmt::format("            planning {:.1f} ms, cluster lists {:.1f} ms", ms("plan"), ms("clusters"));
+  if (r.at("seconds").contains("trees")) text += fmt::format(", upper BVH nodes {:.1f} ms", ms("trees"));
   const auto& trees = r.at("trees");
-  return text + fmt::format(grouped(), "; {:L} trees, {:L} bytes of at most {:L}\n", count(trees.at("count")),
+  return text + fmt::format(grouped(), "; {:L} trees, {:L} bytes (worst case {:L})\n", count(trees.at("count")),
                             count(trees.at("resident_bytes")), count(trees.at("worst_case_bytes")));
 }
 

@@ -45,7 +45,7 @@ std::string table_text(const LodTable& table) {
                         use.max_error, 100.0 * use.max_error_diagonals, whole_bytes(use.stream_bits.indices),
                         whole_bytes(use.stream_bits.positions), whole_bytes(use.stream_bits.normals), use.bytes);
   }
-  return text + fmt::format(grouped(), "all levels: {:L} bytes, {:.3f} for each of the {:L} triangles of level 0\n",
+  return text + fmt::format(grouped(), "all levels: {:L} bytes, {:.3f} per triangle of level 0 ({:L} triangles)\n",
                             table.bytes(), table.bytes_per_triangle(), table.base_triangles());
 }
 
@@ -69,7 +69,7 @@ nlohmann::json lod_json(const FileSummary& summary, bool by_geometry) {
 std::string lod_text(const FileSummary& summary, bool by_geometry) {
   const LodSummary& lod = summary.lod;
   if (lod.by_geometry.empty()) return {};
-  std::string text = fmt::format(grouped(), "levels of detail of {:L} geometries\n", lod.by_geometry.size());
+  std::string text = fmt::format(grouped(), "LOD levels of {:L} geometries\n", lod.by_geometry.size());
   text += table_text(lod.all) + "\n";
   if (!by_geometry || lod.by_geometry.size() == 1) return text;
   for (const LodSummary::OfGeometry& one : lod.by_geometry)

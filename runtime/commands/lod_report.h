@@ -8,11 +8,11 @@
 
 namespace packtrace {
 
-/// Levels of detail, as `info --json` and `bake --json` write them (docs/json_output.md); null where there are none.
-/// @param by_geometry also those of each geometry
+/// LOD levels as JSON for `info --json` and `bake --json` (docs/json_output.md); null if the file has none.
+/// @param by_geometry also list the levels of each geometry
 nlohmann::json lod_json(const FileSummary& summary, bool by_geometry);
 
-/// The same for people: a table of levels; empty where there are none.
+/// Human-readable form of lod_json(): a table of levels; empty if the file has none.
 std::string lod_text(const FileSummary& summary, bool by_geometry);
 
 } // namespace packtrace

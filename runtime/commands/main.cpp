@@ -15,12 +15,12 @@
 
 namespace {
 
-/// A verb that is documented to come, so that asking for it gives a better answer than "unknown".
+/// Adds a hidden verb that is planned. It reports so, instead of being unknown.
 void add_planned_verb(CLI::App& app, packtrace::GlobalOptions& globals, const std::string& name) {
   packtrace::add_verb(app, globals, name, "Planned",
                       [name]() -> int {
                         throw packtrace::Error(packtrace::ErrorKind::kUnsupported,
-                                               "'" + name + "' is planned but not there yet");
+                                               "'" + name + "' is planned but not implemented yet");
                       })
       .allow_extras()
       ->group("");
@@ -30,16 +30,18 @@ void add_planned_verb(CLI::App& app, packtrace::GlobalOptions& globals, const st
 
 int main(int argc, char** argv) {
   packtrace::install_interrupt_handlers();
-  CLI::App app("packtrace: compact, ray-traceable assets from pbrt-v3 scenes, and ambient occlusion traced over them",
+  CLI::App app("packtrace: bake pbrt-v3 scenes into compact, ray-traceable files and render their ambient occlusion",
                "packtrace");
   const std::string version = "packtrace " PACKTRACE_VERSION;
   app.set_version_flag("-V,--version", version, "Print the version and exit");
   app.formatter(std::make_shared<packtrace::HelpFormatter>());
-  app.footer("packtrace help VERB explains a verb. For any scene:\n"
+  app.footer("'packtrace help VERB' shows the options of a verb, with examples. Typical use:\n"
              "  packtrace bake scene.pbrt -o scene.ptk\n"
+             "  packtrace info scene.ptk\n"
              "  packtrace render scene.ptk -o scene.png\n"
-             "Exit codes: 0 ok, 1 internal error, 2 usage, 3 input, 4 unsupported, 5 accuracy or limit exceeded, 6 "
-             "I/O, 7 cancelled.");
+             "Exit codes: 0 success, 1 internal error, 2 wrong command line, 3 unusable input\n"
+             "or too little memory, 4 unsupported feature, 5 limit exceeded (compare),\n"
+             "6 I/O error, 7 cancelled.");
   packtrace::GlobalOptions globals;
   packtrace::add_global_options(app, globals);
   packtrace::add_bake_command(app, globals);

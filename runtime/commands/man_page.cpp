@@ -9,7 +9,7 @@
 namespace packtrace {
 namespace {
 
-/// Text that roff shows as it is: no line may begin with a control character.
+/// Escapes text for roff, including control characters at the start of a line.
 std::string roff(const std::string& text) {
   std::string escaped;
   for (const char c : text) {
@@ -25,14 +25,14 @@ std::string roff(const std::string& text) {
   return escaped;
 }
 
-/// A paragraph: line ends of the help's layout are spaces here.
+/// Escapes a paragraph, with line ends replaced by spaces.
 std::string flowing(const std::string& text) {
   std::string joined = text;
   std::ranges::replace(joined, '\n', ' ');
   return roff(joined);
 }
 
-/// "-o, --output FILE" with the names in bold and the value in italics.
+/// Formats "-o, --output FILE" with the names in bold and the value in italics.
 std::string heading_of(const OptionEntry& option) {
   std::string heading;
   for (const auto& names : {option.short_names, option.long_names})
@@ -51,7 +51,7 @@ std::string options_of(const std::vector<OptionEntry>& options, const std::strin
   return text;
 }
 
-/// A group of options that every verb has is told once.
+/// Formats the option groups of a verb, except those in `told`, which are listed once for all verbs.
 std::string groups_of(const VerbEntry& verb, const std::set<std::string>& told) {
   std::vector<std::string> groups;
   for (const OptionEntry& option : verb.options)
@@ -65,7 +65,7 @@ std::string groups_of(const VerbEntry& verb, const std::set<std::string>& told) 
   return text;
 }
 
-/// The end of a verb's help: sentences flow, indented lines are examples.
+/// Formats the end of a help text. Indented lines are examples and keep their line ends; other lines are filled.
 std::string footer_of(const std::string& footer) {
   std::string text;
   bool example = false;
@@ -98,8 +98,8 @@ std::string man_page(const ProgramEntry& program, const std::string& version) {
     page += (&verb == &program.verbs.front() ? "" : ".br\n") + usage_of(verb) + "\n";
   page += ".SH DESCRIPTION\n" + footer_of(program.program.footer);
   page +=
-      ".SH OPTIONS\nThese may stand before the verb or behind it. Of an option that is given twice the last counts, "
-      "unless it may be repeated.\n";
+      ".SH OPTIONS\nThese options may precede or follow the verb. If an option is given twice, the last one counts, "
+      "unless it accepts several values.\n";
   std::set<std::string> told;
   for (const OptionEntry& option : program.program.options)
     if (told.insert(option.group).second) page += options_of(program.program.options, option.group);
@@ -112,11 +112,12 @@ std::string man_page(const ProgramEntry& program, const std::string& version) {
     page += groups_of(verb, told);
     if (!verb.footer.empty()) page += ".PP\n" + footer_of(verb.footer);
   }
-  return page + ".SH ENVIRONMENT\n"
-                ".TP\n\\fBPACKTRACE_THREADS\\fR\nNumber of threads where \\fB\\-\\-threads\\fR is not given.\n"
-                ".TP\n\\fBPACKTRACE_ISA\\fR\nInstruction set of the kernels: scalar, avx2 or avx512; the best that the "
-                "machine has where it is not set.\n"
-                ".TP\n\\fBNO_COLOR\\fR\nNo colours on a terminal, if set to anything.\n";
+  return page +
+         ".SH ENVIRONMENT\n"
+         ".TP\n\\fBPACKTRACE_THREADS\\fR\nNumber of threads if \\fB\\-\\-threads\\fR is not given.\n"
+         ".TP\n\\fBPACKTRACE_ISA\\fR\nInstruction set of the packed tracer: scalar, avx2 or avx512 (default: the "
+         "best that the machine supports).\n"
+         ".TP\n\\fBNO_COLOR\\fR\nIf set and not empty, output to a terminal has no colours.\n";
 }
 
 } // namespace packtrace

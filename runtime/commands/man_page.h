@@ -6,7 +6,7 @@
 
 namespace packtrace {
 
-/// The program's page of section 1, in the man macros of roff.
+/// Returns the program's manual page (section 1) as roff with man macros.
 std::string man_page(const ProgramEntry& program, const std::string& version);
 
 } // namespace packtrace

@@ -11,7 +11,7 @@
 namespace packtrace {
 namespace {
 
-/// Endings that promise a format. Text and data of no format in particular (.txt, .bin) are not among them.
+/// Extensions that stand for a format. Generic ones (.txt, .bin) are not included.
 constexpr std::array<std::string_view, 41> kFormatEndings{
     ".ptk",  ".pbrt", ".json", ".v16", ".glb",   ".gltf", ".ply", ".obj", ".fbx",  ".stl", ".usd",
     ".usda", ".usdc", ".usdz", ".abc", ".blend", ".png",  ".exr", ".jpg", ".jpeg", ".tga", ".hdr",
@@ -28,7 +28,7 @@ CLI::Validator one_of(std::vector<std::string> names) {
       [names = std::move(names)](std::string& text) -> std::string {
         if (std::ranges::find(names, text) != names.end()) return {};
         const std::vector<std::string_view> known(names.begin(), names.end());
-        return fmt::format("'{}' is none of {}{}", text, fmt::join(names, ", "),
+        return fmt::format("'{}' is not one of {}{}", text, fmt::join(names, ", "),
                            did_you_mean_text(closest_name(text, known)));
       },
       listed);
@@ -45,7 +45,7 @@ CLI::Validator number_in(double lo, double hi) {
 }
 
 std::vector<std::string> choices_of(const CLI::Option& option) {
-  const std::string type = option.get_type_name(); // "TEXT:{a,b}": what its checks say of themselves comes last
+  const std::string type = option.get_type_name(); // "TEXT:{a,b}": the descriptions of the checks come last
   const size_t begin = type.find(':' + std::string(kChoices));
   if (begin == std::string::npos || !type.ends_with("}")) return {};
   const size_t first = begin + 1 + kChoices.size();
@@ -78,7 +78,7 @@ CLI::Option* add_output_option(CLI::App& verb, std::string& output, const std::s
           "-o,--output",
           [&output](const std::vector<std::string>& names) {
             if (names.size() > 1)
-              throw CLI::ValidationError("-o", fmt::format("was given {} times, but one file is written: {}",
+              throw CLI::ValidationError("-o", fmt::format("was given {} times, but only one file can be written: {}",
                                                            names.size(), fmt::join(names, ", ")));
             output = names.front();
           },

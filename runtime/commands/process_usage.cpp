@@ -7,7 +7,7 @@ namespace packtrace {
 uint64_t peak_rss_bytes() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
-  return static_cast<uint64_t>(usage.ru_maxrss) * 1024; // Linux counts KiB
+  return static_cast<uint64_t>(usage.ru_maxrss) * 1024; // Linux reports KiB
 }
 
 } // namespace packtrace

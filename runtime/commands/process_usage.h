@@ -4,7 +4,7 @@
 
 namespace packtrace {
 
-/// Most memory this process ever had resident, bytes, mapped file pages included.
+/// Peak resident memory of this process in bytes, including mapped file pages.
 uint64_t peak_rss_bytes();
 
 } // namespace packtrace

@@ -28,7 +28,7 @@ std::string duration_text(double seconds) {
 std::string progress_text(std::string_view phase, uint64_t done, uint64_t total, double elapsed_s) {
   std::string text = fmt::format("{}:", phase);
   const double fraction = total > 0 ? std::min(1.0, static_cast<double>(done) / static_cast<double>(total)) : 0.0;
-  // Rounded down: 100% means finished.
+  // Rounded down, so that 100% means finished.
   if (total > 0) text += fmt::format(" {}% after", static_cast<int>(fraction * 100.0));
   text.append(" ").append(duration_text(elapsed_s));
   if (fraction > 0.0 && fraction < 1.0)
@@ -52,18 +52,19 @@ void ProgressDisplay::observe(std::string_view phase, uint64_t done, uint64_t to
   const double now = config_.seconds();
   const bool begins = done == 0;
   if (!begins && now < next_print_.load(std::memory_order_relaxed)) {
-    // Cheap for the many calls in between; what they report is seen by later ones, the end of a phase excepted.
+    // Frequent calls return here without taking the lock. A later call reports the progress anyway; only the end of a
+    // phase has no later call.
     if (total == 0 || done < total) return;
   }
   const std::lock_guard lock(mutex_);
   if (begins || phase != phase_) {
-    end_phase(true); // the work went on, so it was done, whatever it had counted
+    end_phase(true); // a new phase has begun, so the previous one is finished whatever its count
     phase_ = phase;
     phase_start_ = now;
     done_ = 0;
     next_print_.store(now + (config_.terminal ? kTerminalInterval : kPlainInterval), std::memory_order_relaxed);
   }
-  done_ = std::max(done_, done); // reports of several threads overtake each other
+  done_ = std::max(done_, done); // reports from several threads may arrive out of order
   total_ = total;
   if (now < next_print_.load(std::memory_order_relaxed)) return;
   next_print_.store(now + (config_.terminal ? kTerminalInterval : kPlainInterval), std::memory_order_relaxed);
@@ -71,7 +72,7 @@ void ProgressDisplay::observe(std::string_view phase, uint64_t done, uint64_t to
 }
 
 void ProgressDisplay::print(const std::string& text, bool last_of_phase) {
-  // One write per line: other output does not get in between.
+  // A single write per line keeps other output from getting in between.
   const std::string line = config_.terminal ? "\r\x1b[K" + text + (last_of_phase ? "\n" : "") : text + "\n";
   std::fwrite(line.data(), 1, line.size(), config_.stream);
   std::fflush(config_.stream);
@@ -81,7 +82,7 @@ void ProgressDisplay::end_phase(bool done) {
   if (phase_.empty()) return;
   const double elapsed = config_.seconds() - phase_start_;
   const bool whole = done || total_ == 0 || done_ >= total_;
-  if (config_.terminal || !whole || elapsed >= kWorthALine)
+  if (config_.terminal || !whole || elapsed >= kMinPlainPhase)
     print(fmt::format("{}: {}{}", phase_, whole ? "" : "stopped after ", duration_text(elapsed)), true);
   phase_.clear();
 }

@@ -14,22 +14,24 @@ namespace packtrace {
 
 struct GlobalOptions;
 
-/// "phase: 42% after 1.3 s, 1.8 s left"; without the parts that are not known.
+/// Formats "phase: 42% after 1.3 s, 1.8 s left". Unknown parts are omitted.
+/// @param total 0: unknown
 std::string progress_text(std::string_view phase, uint64_t done, uint64_t total, double elapsed_s);
 
-/// Shows a Progress on standard error: one line per phase that updates itself on a terminal, otherwise a plain line
-/// when a phase of some length ends and every kPlainInterval in between. It must outlive the Progress that it observes.
+/// Displays a Progress on standard error. On a terminal there is one line per phase that updates in place. Otherwise a
+/// plain line is printed every kPlainInterval, and at the end of phases of at least kMinPlainPhase.
+/// The object must outlive the Progress that it observes.
 class ProgressDisplay {
 public:
   struct Config {
     std::FILE* stream = stderr;
     bool terminal = false;
     bool quiet = false;
-    std::function<double()> seconds; ///< clock, any origin; empty: the steady clock
+    std::function<double()> seconds; ///< clock with any origin, seconds; empty: the steady clock
   };
   static constexpr double kTerminalInterval = 0.1; ///< seconds
   static constexpr double kPlainInterval = 10.0;   ///< seconds
-  static constexpr double kWorthALine = 0.5;       ///< seconds; shorter phases are not mentioned in plain lines
+  static constexpr double kMinPlainPhase = 0.5;    ///< seconds; shorter phases get no plain line
 
   explicit ProgressDisplay(const GlobalOptions& globals);
   explicit ProgressDisplay(Config config);
@@ -37,10 +39,10 @@ public:
   ProgressDisplay(const ProgressDisplay&) = delete;
   ProgressDisplay& operator=(const ProgressDisplay&) = delete;
 
-  /// For Progress's constructor. May be called from any thread.
+  /// Returns the observer for Progress's constructor; it may be called from any thread. Empty if quiet.
   Progress::Observer observer();
 
-  /// Ends the current line, so that other text can follow.
+  /// Ends the current line, so that other output can follow.
   void finish();
 
 private:
@@ -50,8 +52,8 @@ private:
 
   Config config_;
   std::mutex mutex_;
-  std::atomic<double> next_print_{0.0}; ///< nothing to do before, save for new phases
-  std::string phase_;                   ///< empty: none is running
+  std::atomic<double> next_print_{0.0}; ///< earliest time of the next print within a phase
+  std::string phase_;                   ///< current phase; empty: none
   double phase_start_ = 0.0;
   uint64_t done_ = 0, total_ = 0;
 };

@@ -29,9 +29,9 @@ std::string camera_text(const Camera& camera) {
   return {};
 }
 
-/// Where positions lie: on the grids of a baked file, or on none.
+/// Describes the grids of the positions of a baked file.
 std::string grid_text(const LoadedScene& loaded) {
-  if (!loaded.baked) return "positions are the scene's floats: no grid";
+  if (!loaded.baked) return "no grid: positions are the scene's floats";
   const FileSummary file = summarize(*loaded.baked);
   if (file.grids.empty()) return "no grid: no geometry";
   const auto& finest = *std::ranges::min_element(file.grids, {}, [](const GridUse& use) { return use.grid.step(); });

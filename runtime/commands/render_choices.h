@@ -9,18 +9,18 @@
 
 namespace packtrace {
 
-/// What a render chose, each with the reason in words: "the first of the file's 2".
+/// The settings that a render chose, each with the reason as text, such as "--size" or "the camera's film".
 struct RenderChoices {
   Camera camera;
   std::string camera_reason, size_reason, radius_reason, backend_reason, threads_reason;
 };
 
-/// Seconds that RenderTimings does not have.
+/// Wall times in seconds that RenderTimings does not include.
 struct FileTimings {
   double load_s = 0.0, write_s = 0.0;
 };
 
-/// What `render -v` adds, a line for each choice and for the time and memory outside of tracing.
+/// The additional output of `render -v`: a line per choice, and lines for load time, write time and memory.
 std::string choices_text(const RenderChoices& choices, const RenderConfig& config, const LoadedScene& loaded,
                          const RayTracer& tracer, const FileTimings& timings);
 

@@ -39,9 +39,9 @@ constexpr uint32_t kGroundTruthSpp = 1024;
 struct RenderOptions {
   std::string input;
   std::vector<std::string> outputs, aovs;
-  std::optional<std::string> camera; ///< number, or "auto"; without one camera 0, if it sees anything
+  std::optional<std::string> camera; ///< number or "auto"; if not set, camera 0, or "auto" if that sees nothing
   std::string size;
-  std::optional<std::string> background; ///< of .png files; without one, what suits the layer
+  std::optional<std::string> background; ///< background of .png files; if not set, it depends on the layer
   bool no_legend = false;
   bool private_copy = false;
   uint32_t supersample = 1;
@@ -52,7 +52,7 @@ struct RenderOptions {
   bool ao_falloff_off = false;
   float ao_interreflection = 0.0f;
   uint64_t seed = 0;
-  std::optional<std::string> backend; ///< without one, what suits the input
+  std::optional<std::string> backend; ///< if not set, the input decides
   std::optional<std::string> bvh;
   LodOptions lod;
 };
@@ -71,11 +71,11 @@ ImageSize parse_size(const std::string& text) {
   return size;
 }
 
-/// Which camera a render is of, and why.
+/// The camera of a render.
 struct ChosenCamera {
   Camera camera;
-  std::optional<uint32_t> index; ///< among the scene's; none: it frames all of the scene
-  std::string reason;            ///< of framing the scene without being asked to
+  std::optional<uint32_t> index; ///< index in the scene's cameras; not set if the camera frames the whole scene
+  std::string reason;            ///< why the scene is framed although --camera auto was not given; else empty
 };
 
 ChosenCamera choose_camera(const SceneSource& source, const RenderOptions& options, const GlobalOptions& globals) {
@@ -85,49 +85,52 @@ ChosenCamera choose_camera(const SceneSource& source, const RenderOptions& optio
   if (name == "auto") return {framing_camera(source.world_bounds(), size), std::nullopt, {}};
   uint32_t index = 0;
   if (!parse_number(name, index))
-    throw Error(ErrorKind::kUsage, "--camera " + name + ": give a number from 0, or auto");
+    throw Error(ErrorKind::kUsage, "--camera " + name + ": must be a camera number, from 0, or auto");
   if (index < cameras.size()) return {cameras[index], index, {}};
   if (index > 0)
     throw Error(ErrorKind::kUsage, fmt::format("--camera {}: the scene has {} camera{}", index, cameras.size(),
                                                cameras.size() == 1 ? "" : "s"));
-  if (!globals.quiet) print_printable(options.input + ": warning: no camera; framing the scene's bounds\n", stderr);
+  if (!globals.quiet)
+    print_printable(options.input + ": warning: the scene has no camera; showing the whole scene\n", stderr);
   return {framing_camera(source.world_bounds(), size), std::nullopt, "the scene has no camera"};
 }
 
-/// What is shown instead of a camera that sees nothing of the scene.
-ChosenCamera frame_instead(const ChosenCamera& blind, const SceneSource& source, ImageSize size,
-                           const RenderOptions& options, const GlobalOptions& globals) {
+/// Returns a camera that frames the whole scene, to replace a camera that sees nothing of it. Prints a warning.
+ChosenCamera frame_whole_scene(const ChosenCamera& blind, const SceneSource& source, ImageSize size,
+                               const RenderOptions& options, const GlobalOptions& globals) {
   ChosenCamera framing{framing_camera(source.world_bounds(), size), std::nullopt,
                        fmt::format("camera {} sees nothing", blind.index.value())};
   if (!globals.quiet)
-    print_printable(fmt::format("{}: warning: {} of the scene; framing its bounds (--camera {} keeps the camera)\n",
-                                options.input, framing.reason, *blind.index),
-                    stderr);
+    print_printable(
+        fmt::format("{}: warning: {} of the scene; showing the whole scene (--camera {} keeps the camera)\n",
+                    options.input, framing.reason, *blind.index),
+        stderr);
   return framing;
 }
 
-/// Why a render is as it is, for -v. The camera and the rest have been chosen by the functions beside this one.
+/// Collects the reasons for the settings of a render, for -v.
 RenderChoices reasons(const SceneSource& source, const ChosenCamera& camera, const RenderOptions& options, bool baked,
                       const GlobalOptions& globals) {
   const size_t cameras = source.cameras().size();
   RenderChoices choices;
   choices.camera = camera.camera;
-  choices.camera_reason = options.camera == "auto" ? "--camera auto, which frames all of the scene"
+  choices.camera_reason = options.camera == "auto" ? "--camera auto, which shows the whole scene"
                           : !camera.reason.empty()
-                              ? camera.reason + ", so all of it is framed"
-                              : fmt::format("number {} of the scene's {}, from 0{}", camera.index.value_or(0), cameras,
-                                            camera.index == 0u && cameras > 1 ? "; --camera takes another" : "");
+                              ? camera.reason + ", so the whole scene is shown"
+                              : fmt::format("number {} of {}, counted from 0{}", camera.index.value_or(0), cameras,
+                                            camera.index == 0u && cameras > 1 ? "; --camera selects another" : "");
   choices.size_reason = options.size.empty() ? (cameras > 0 ? "the camera's film" : "the default") : "--size";
   choices.radius_reason = options.ao_radius ? "--ao-radius"
                                             : fmt::format("10 % of the scene's diagonal, {:.5g}",
                                                           glm::length(source.world_bounds().extent()));
-  choices.backend_reason = options.backend                     ? "--backend"
-                           : !baked                            ? "floats of a .pbrt scene"
-                           : options.bvh || options.fast_edges ? "--bvh and --fast-edges are Embree's"
-                                                               : "a .ptk file's clusters are traced as they are";
+  choices.backend_reason = options.backend ? "--backend"
+                           : !baked        ? "default for .pbrt scenes, which are traced as floats"
+                           : options.bvh || options.fast_edges
+                               ? "--bvh and --fast-edges select Embree"
+                               : "default for .ptk files, which are traced as packed clusters";
   choices.threads_reason = globals.threads > 0         ? "--threads"
                            : thread_limit(globals) > 0 ? "PACKTRACE_THREADS"
-                                                       : "all that the machine has";
+                                                       : "all hardware threads";
   return choices;
 }
 
@@ -147,7 +150,8 @@ RenderConfig make_config(const SceneSource& source, const Camera& camera, const 
   return config;
 }
 
-/// For the layers of a view, the G-buffer's and the denoiser's, about. Sizes may come from the scene's film.
+/// Reserves the approximate memory of the G-buffer, the denoiser and the layers of a view. The image size may come from
+/// the scene file, so it is not trusted.
 MemoryReservation reserve_picture(const RenderOptions& options, const RenderConfig& config,
                                   const MemoryBudget& budget) {
   constexpr double kPixelBytes = 320.0, kMax = 0x1p62;
@@ -163,15 +167,14 @@ MemoryReservation reserve_picture(const RenderOptions& options, const RenderConf
 
 /// @param baked whether the input is a .ptk file
 Backend choose_backend(const RenderOptions& options, bool baked) {
-  const bool about_embree = options.bvh || options.fast_edges;
-  if (!options.backend) return baked && !about_embree ? Backend::kPacked : Backend::kEmbree;
-  const std::string& name = *options.backend; // one of those that the option's check knows
+  const bool needs_embree = options.bvh || options.fast_edges;
+  if (!options.backend) return baked && !needs_embree ? Backend::kPacked : Backend::kEmbree;
+  const std::string& name = *options.backend; // the option's check accepts only known names
   if (name == "embree") return Backend::kEmbree;
-  if (about_embree)
-    throw Error(ErrorKind::kUsage, "--bvh and --fast-edges are about Embree's own triangles, for backend embree");
+  if (needs_embree) throw Error(ErrorKind::kUsage, "--bvh and --fast-edges require --backend embree");
   if (name == "packed") return Backend::kPacked;
   if (options.lod.error_px)
-    throw Error(ErrorKind::kUsage, "--lod-error is for the backends packed and embree, not for embree-clusters");
+    throw Error(ErrorKind::kUsage, "--lod-error does not work with --backend embree-clusters; use packed or embree");
   return Backend::kEmbreeClusters;
 }
 
@@ -194,7 +197,7 @@ double mean_of_valid(const std::vector<float>& ao) {
 
 double rate_m(uint64_t rays, double seconds) { return seconds > 0 ? static_cast<double>(rays) / seconds * 1e-6 : 0; }
 
-/// Bytes by name. The file and the threads' caches are those of all tracers.
+/// Resident bytes by name, summed over tracers. Shared parts (the file, the threads' caches) count once.
 nlohmann::json resident_parts(std::span<const RayTracer* const> tracers) {
   nlohmann::json parts = nlohmann::json::object();
   for (const RayTracer* tracer : tracers)
@@ -278,25 +281,25 @@ void print(std::FILE* stream, const nlohmann::json& r) {
   fmt::print(stream, "  ao        {:8.3f} s   {:.1f} Mrays/s\n", seconds.at("ao").get<double>(),
              r.at("mrays_per_s").at("ao").get<double>());
   if (r.at("denoise").get<bool>())
-    fmt::print(stream, "  denoise   {:8.3f} s   {:.1f} ms a frame\n", seconds.at("denoise").get<double>(),
+    fmt::print(stream, "  denoise   {:8.3f} s   {:.1f} ms per frame\n", seconds.at("denoise").get<double>(),
                seconds.at("denoise").get<double>() * 1e3 / frames);
   if (r.contains("lod")) fmt::print(stream, "{}", detail_text(r.at("lod")));
   if (r.contains("seams")) fmt::print(stream, "{}", visible_seams_text(r.at("seams")));
   if (const auto& reason = r.at("camera").at("reason"); !reason.is_null())
-    fmt::print(stream, "{}: the picture frames the whole scene\n", reason.get<std::string>());
+    fmt::print(stream, "{}: the image shows the whole scene\n", reason.get<std::string>());
   for (const auto& file : r.at("files")) print_printable("wrote " + file.get<std::string>() + "\n", stream);
 }
 
-/// A picture and what it was traced with.
+/// A rendered view and the objects it was traced with.
 struct Traced {
   ChosenCamera camera;
   std::optional<ChosenDetail> detail;
-  std::vector<std::unique_ptr<RayTracer>> tracers; ///< what the camera sees, then what only occlusion rays meet
+  std::vector<std::unique_ptr<RayTracer>> tracers; ///< the camera's; with --lod-rays occlusion also the occlusion rays'
   RenderedImage image;
 };
 
 Traced trace(const RenderOptions& options, const GlobalOptions& globals, const LoadedScene& loaded, RenderConfig config,
-             ChosenCamera chosen, const TracerConfig& backend, bool show_detail, Progress& progress) {
+             ChosenCamera chosen, const TracerConfig& backend, bool has_lod_layers, Progress& progress) {
   Traced traced;
   traced.camera = std::move(chosen);
   double build_s = 0.0;
@@ -319,24 +322,24 @@ Traced trace(const RenderOptions& options, const GlobalOptions& globals, const L
       choose(&seen);
       return Occluders{traced.detail->source.get(), traced.tracers[1].get(), *options.lod.error_px};
     };
-  const bool sees_levels = options.lod.error_px && !options.lod.only_occlusion();
-  if (sees_levels && show_detail) config.lod_error_px = *options.lod.error_px;
+  const bool camera_uses_lod = options.lod.error_px && !options.lod.only_occlusion();
+  if (camera_uses_lod && has_lod_layers) config.lod_error_px = *options.lod.error_px;
   const auto render = [&] {
     progress.begin("bvh", 0);
-    if (sees_levels) { // those that this camera needs
+    if (camera_uses_lod) { // the cut depends on the camera
       traced.tracers.clear();
       choose(nullptr);
     } else if (traced.tracers.empty()) {
       build([&] { return make_tracer(*loaded.source, loaded.baked ? &*loaded.baked : nullptr, backend); });
     }
-    const SceneSource& source = sees_levels ? *traced.detail->source : *loaded.source;
+    const SceneSource& source = camera_uses_lod ? *traced.detail->source : *loaded.source;
     traced.image = render_view(source, *traced.tracers[0], traced.camera.camera, config, progress, occluders);
   };
-  config.only_if_seen = !options.camera && traced.camera.index;
+  config.stop_if_nothing_visible = !options.camera && traced.camera.index;
   render();
-  if (!traced.image.seen && config.only_if_seen) {
-    traced.camera = frame_instead(traced.camera, *loaded.source, config.size, options, globals);
-    config.only_if_seen = false;
+  if (!traced.image.seen && config.stop_if_nothing_visible) {
+    traced.camera = frame_whole_scene(traced.camera, *loaded.source, config.size, options, globals);
+    config.stop_if_nothing_visible = false;
     render();
   }
   traced.image.timings.build_s = build_s;
@@ -350,29 +353,33 @@ PreviewStyle preview_style(const RenderOptions& options) {
   return style;
 }
 
-/// @param count of instances that are not traced
-void warn_of_lines(const std::string& input, size_t count) {
+/// Warns about instances that are not traced because their transform is degenerate.
+/// @param count number of these instances
+void warn_of_flat_instances(const std::string& input, size_t count) {
   if (count == 0) return;
-  print_printable(fmt::format("{}: warning: {} instance{} not traced: pressed onto a line or a point\n", input, count,
-                              count == 1 ? " is" : "s are"),
-                  stderr);
+  print_printable(
+      fmt::format("{}: warning: {} instance{} not traced: flattened to a line or a point by the transform\n", input,
+                  count, count == 1 ? " is" : "s are"),
+      stderr);
 }
 
 int run(const RenderOptions& options, const GlobalOptions& globals) {
   if (options.outputs.empty()) fail_without_output("render", options.input, ".png");
-  tracer_config(options, globals, false); // complains before the work
+  tracer_config(options, globals, false); // reports wrong options before any work
   if (!options.size.empty()) parse_size(options.size);
   validate(options.lod);
   JsonOutput json(globals.json, globals.force);
-  const bool sees_levels = options.lod.error_px && !options.lod.only_occlusion();
-  ImageOutputs outputs(options.outputs, options.aovs, sees_levels, globals.force,
-                       preview_style(options)); // before the work, like the above
+  const bool camera_uses_lod = options.lod.error_px && !options.lod.only_occlusion();
+  ImageOutputs outputs(options.outputs, options.aovs, camera_uses_lod, globals.force,
+                       preview_style(options)); // reports unwritable files before any work
   if (outputs.to_stdout() && json.to_stdout())
-    throw Error(ErrorKind::kUsage, "-o - and --json - would both go to standard output; give one of them a file");
-  if (outputs.show_detail() && !options.lod.error_px)
-    throw Error(ErrorKind::kUsage, "layers about levels of detail need --lod-error");
-  if (outputs.show_detail() && !sees_levels)
-    throw Error(ErrorKind::kUsage, "with --lod-rays occlusion all that is seen is level 0: no layers about detail");
+    throw Error(ErrorKind::kUsage, "-o - and --json - would both write to standard output; use a file for one of them");
+  if (outputs.has_lod_layers() && !options.lod.error_px)
+    throw Error(ErrorKind::kUsage, "the layers lod and lod-error require --lod-error");
+  if (outputs.has_lod_layers() && !camera_uses_lod)
+    throw Error(ErrorKind::kUsage,
+                "the layers lod and lod-error do not work with --lod-rays occlusion, where the camera sees "
+                "level 0");
   ProgressDisplay display(globals);
   Progress progress(display.observer());
   FileTimings timings;
@@ -385,7 +392,7 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   const MemoryReservation pixels = reserve_picture(options, config, globals.memory);
   const TracerConfig backend = tracer_config(options, globals, loaded.baked.has_value());
   const Traced traced =
-      trace(options, globals, loaded, config, std::move(camera), backend, outputs.show_detail(), progress);
+      trace(options, globals, loaded, config, std::move(camera), backend, outputs.has_lod_layers(), progress);
   display.finish();
   const RenderedImage& image = traced.image;
 
@@ -405,12 +412,12 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   if (loaded.baked) {
     const PrimaryCamera traced_pixels(
         traced.camera.camera, {config.size.width * config.supersample, config.size.height * config.supersample});
-    result["seams"] =
-        visible_seams_json(InstanceSeams(*loaded.baked), image, traced_pixels, sees_levels ? &*traced.detail : nullptr);
+    result["seams"] = visible_seams_json(InstanceSeams(*loaded.baked), image, traced_pixels,
+                                         camera_uses_lod ? &*traced.detail : nullptr);
   }
   if (!image.seen && !globals.quiet)
     print_printable(options.input + ": warning: this camera sees nothing of the scene; try --camera auto\n", stderr);
-  if (!globals.quiet) warn_of_lines(options.input, tracers[0]->flat_instances().size());
+  if (!globals.quiet) warn_of_flat_instances(options.input, tracers[0]->flat_instances().size());
   if (json.wanted()) json.write(result);
   if (json.to_stdout() || globals.quiet) return 0;
   std::FILE* const text = outputs.to_stdout() ? stderr : stdout;
@@ -426,70 +433,86 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
 
 void add_render_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<RenderOptions>();
-  CLI::App& verb = add_verb(app, globals, "render", "Trace and denoise ambient occlusion",
+  CLI::App& verb = add_verb(app, globals, "render", "Render denoised ambient occlusion of a .ptk file or a .pbrt scene",
                             [options, &globals] { return run(*options, globals); });
-  verb.add_option("FILE", options->input, "A .ptk file, or a .pbrt scene to be traced in floats without packing")
+  verb.add_option("FILE", options->input, ".ptk file, or .pbrt scene, which is traced as floats without compression")
       ->required();
   verb.add_option("-o,--output", options->outputs,
-                  "Image to write, .exr or .png (required); may be repeated, or a list separated by commas; - is a PNG "
-                  "on standard output")
+                  "Output image, .png or .exr (required). Repeat the option or separate names by commas to write "
+                  "several; - writes a PNG to standard output")
       ->type_name("FILE")
       ->allow_extra_args(false);
   verb.add_option(
           "--aov", options->aovs,
-          "Layers, separated by commas: ao (denoised), ao_raw (the last frame as traced), depth, normal, instance, "
-          "albedo, shaded (albedo times ao), with --lod-error also lod and lod-error, or all (default: all "
-          "in .exr, ao in .png). Several layers become NAME.LAYER.png")
+          "Layers to write, separated by commas. ao is denoised, ao_raw is the last frame before denoising, shaded is "
+          "albedo times ao; others are depth, normal, instance, albedo, with --lod-error lod and lod-error, and all "
+          "(default: all in .exr, ao in .png). Several layers in .png become NAME.LAYER.png")
       ->delimiter(',')
       ->type_name("LAYERS");
-  verb.add_option(
-          "--camera", options->camera,
-          "Which of the scene's cameras, from 0; auto frames all of the scene (default: 0, or auto where there is "
-          "none or it sees nothing)")
+  verb.add_option("--camera", options->camera,
+                  "Camera number in the scene, from 0, or auto for a view of the whole scene (default 0, or auto if "
+                  "there is no "
+                  "camera or camera 0 sees nothing)")
       ->type_name("I|auto");
-  verb.add_option("--size", options->size, "Image size, for example 1280x720 (default: the scene's film)")
+  verb.add_option("--size", options->size,
+                  "Image size in pixels, for example 640x360 (default: the size of the scene's film, or 1280x720 with "
+                  "--camera auto)")
       ->type_name("WxH");
   verb.add_option("--background", options->background,
-                  "What .png files show where nothing is hit: a colour as rrggbb in hexadecimal digits or by its name, "
-                  "transparent, or sky (default: light grey, which no surface has; sky behind albedo and shaded). .exr "
-                  "files keep their values")
+                  "Background of .png files, where no surface is hit. A colour name, rrggbb in hexadecimal digits, "
+                  "transparent or sky (default: light grey; sky for albedo and shaded). It does not affect .exr files")
       ->type_name("COLOR");
   verb.add_flag("--no-legend", options->no_legend,
-                "Leave out the strip of numbers below the .png files of depth, lod and lod-error");
+                "Do not add the colour scale below .png files of depth, lod and lod-error");
   verb.add_option("--supersample", options->supersample,
-                  "Trace at N times the size per axis and filter down (default 1)")
+                  "Trace at N times the width and height and filter down, for smooth edges, 1..8 (default 1). Time and "
+                  "memory grow with N squared")
       ->type_name("N");
-  verb.add_option("--frames", options->frames, "Frames to accumulate and denoise (default 32)")->type_name("N");
-  verb.add_option("--spp", options->spp, "Ambient occlusion rays per pixel and frame (default 1)")->type_name("N");
-  verb.add_flag("--ground-truth", options->ground_truth, "No denoiser, one frame of 1024 spp unless said otherwise");
-  verb.add_flag("--no-denoise", options->no_denoise, "Average the frames and do nothing else");
-  verb.add_option("--ao-radius", options->ao_radius,
-                  "Longest occlusion distance in world units (default: 10 % of the scene's diagonal)")
+  verb.add_option("--frames", options->frames,
+                  "Number of frames to accumulate and denoise, 1..65536 (default 32). More frames give "
+                  "less noise and take longer")
+      ->type_name("N");
+  verb.add_option("--spp", options->spp, "Ambient occlusion rays per pixel and frame, 1..65536 (default 1)")
+      ->type_name("N");
+  verb.add_flag("--ground-truth", options->ground_truth,
+                "Render a reference image without denoiser, in 1 frame of 1024 spp unless --frames or --spp are given. "
+                "Takes minutes");
+  verb.add_flag("--no-denoise", options->no_denoise, "Average the frames without denoising");
+  verb.add_option(
+          "--ao-radius", options->ao_radius,
+          "Distance up to which surfaces occlude, in world units (default: 10 % of the scene's diagonal). Small "
+          "radii darken creases only, large ones whole rooms")
       ->type_name("R");
   verb.add_flag("--ao-no-falloff", options->ao_falloff_off,
-                "Every hit within the radius occludes fully, however far: plain visibility");
+                "Let every hit within the radius occlude fully, instead of fading with its distance");
   verb.add_option("--ao-interreflection", options->ao_interreflection,
-                  "Share of light bounced back by what a ray hits, 0..1 (default 0: off)")
+                  "Fraction of light that occluding surfaces reflect, 0..1 (default 0, off). Brightens creases between "
+                  "light surfaces")
       ->type_name("RHO");
   verb.add_flag("--private-copy", options->private_copy,
-                "Read a .ptk into memory instead of mapping it: it may then change, or go, while it is rendered");
-  verb.add_option("--seed", options->seed, "Seed of the sample pattern (default 0)")->type_name("N");
+                "Read a .ptk file into memory instead of mapping it, so that it may be changed or deleted meanwhile");
+  verb.add_option("--seed", options->seed, "Seed of the sample pattern (default 0). Another seed gives other noise")
+      ->type_name("N");
   verb.add_option(
           "--backend", options->backend,
-          "What traces the rays: packed (the clusters' own bytes; the default for .ptk files), embree (floats; the\n"
-          "default for .pbrt files) or embree-clusters (Embree's tree over packed clusters)")
+          "Ray tracer to use. packed traces the compressed clusters (default for .ptk files); embree traces floats "
+          "(default for .pbrt scenes, and with --bvh or --fast-edges); embree-clusters uses Embree's BVH over packed "
+          "clusters")
       ->check(one_of({"packed", "embree", "embree-clusters"}));
   verb.add_option(
           "--bvh,--bvh-quality", options->bvh,
-          "Embree's tree, and --backend embree: medium (the default), or high (slower to build, faster to trace)")
+          "Quality of Embree's BVH; selects --backend embree (default medium). high takes longer to build; it traces "
+          "faster together with --fast-edges")
       ->check(one_of({"medium", "high"}));
   verb.add_flag(
       "--fast-edges", options->fast_edges,
-      "--backend embree up to a fifth faster, but a few rays slip between triangles that touch; --bvh high needs it "
-      "to pay off");
+      "Use Embree's faster, non-watertight intersection tests; selects --backend embree. Tracing is up to 20 % faster, "
+      "but a few rays slip through between adjacent triangles");
   add_lod_options(verb, options->lod);
   add_scene_options(verb, options->scene);
-  verb.footer("Examples:\n"
+  verb.footer("The image is the mean of --frames frames of --spp rays per pixel, denoised over time\n"
+              "and space. -v prints the chosen camera, radius, backend and grid with the reasons.\n"
+              "Examples:\n"
               "  packtrace render house.ptk -o house.png\n"
               "  packtrace render house.ptk -o house.png,house.exr --aov all --supersample 2\n"
               "  packtrace render house.ptk -o - --background transparent | display\n"

@@ -8,7 +8,8 @@ namespace packtrace {
 
 struct GlobalOptions;
 
-/// `packtrace render FILE -o OUT`: denoised ambient occlusion of a baked file, or of a pbrt scene kept in floats.
+/// Adds `packtrace render FILE -o OUT`, which renders denoised ambient occlusion of a baked file, or of a pbrt scene
+/// with uncompressed float positions.
 void add_render_command(CLI::App& app, GlobalOptions& globals);
 
 } // namespace packtrace

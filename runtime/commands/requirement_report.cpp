@@ -25,36 +25,36 @@ bool kept_on_request(const FileSummary& s, uint32_t stream) {
   return (s.bake.purpose >> baked::kKeepShift >> stream & 1u) != 0;
 }
 
-/// Bits that decide which rays see a surface; shading looks at all of them.
+/// Material flags that a purpose reads: AO only those that affect visibility, shading all.
 MaterialFlags flags_read(uint32_t purpose) {
   constexpr MaterialFlags kVisibility =
       kAlphaMask | kShadowAlphaMask | kTransmissive | kInvisible | kAbsent | kNoShadow;
   return purpose == baked::kAo ? kVisibility : kAllMaterialFlags;
 }
 
-/// The decision and why, as the begin of a sentence.
+/// The decision about a stream and its reason, as the first part of a report line.
 std::string decision(uint32_t stream, uint32_t reason, uint32_t purpose) {
   const std::string name(kStreamNames[stream]);
   switch (reason) {
   case baked::kAbsent:
     return stream == baked::kTangents ? "tangents not needed: no normal map" : name + ": the source has none";
   case baked::kUnused:
-    if (stream == baked::kNormals) return "normals dropped: the camera does not see the surface";
-    if (stream == baked::kTangents) return "tangents not needed: ao does not look at normal maps";
+    if (stream == baked::kNormals) return "normals dropped: the surface is invisible to camera rays";
+    if (stream == baked::kTangents) return "tangents not needed: ao does not use normal maps";
     return purpose == baked::kAo ? "uv dropped: no masked material" : "uv dropped: no textured or masked material";
   case baked::kInferred:
-    return name + " dropped: they equal the face's";
+    return name + " dropped: equal to the face normals";
   case baked::kForMask:
-    return name + " kept: alpha masks look them up";
+    return name + " kept: used by alpha masks";
   case baked::kForTexture:
-    return name + " kept: textures look them up";
+    return name + " kept: used by textures";
   case baked::kForNormalMap:
-    return stream == baked::kTangents ? "tangents needed by normal maps, but the format has none: follow them from uv"
-                                      : name + " kept: normal maps look them up";
+    return stream == baked::kTangents ? "tangents needed by normal maps, but not stored: derive them from uv"
+                                      : name + " kept: used by normal maps";
   case baked::kForShading:
-    return name + " kept: they differ from the face's";
+    return name + " kept: different from the face normals";
   case baked::kOnRequest:
-    return name + " kept: asked for";
+    return name + " kept: requested by --keep";
   default:
     return name;
   }
@@ -68,8 +68,8 @@ std::string sentence(const baked::RequirementRecord& r, uint32_t purpose) {
   std::string text = decision(r.stream, r.reason, purpose) +
                      fmt::format(grouped(), ", {:L} triangles of {:L} geometries", r.triangles, r.geometries);
   if (r.source_bytes == 0) return text;
-  if (dropped(r)) return text + fmt::format(grouped(), ", {:L} bytes of source saved", r.source_bytes);
-  return text + fmt::format(grouped(), ", {:L} bytes of source as {:L}", r.source_bytes, (r.stored_bits + 7) / 8);
+  if (dropped(r)) return text + fmt::format(grouped(), ", {:L} source bytes saved", r.source_bytes);
+  return text + fmt::format(grouped(), ", {:L} source bytes stored as {:L}", r.source_bytes, (r.stored_bits + 7) / 8);
 }
 
 std::string flag_list(MaterialFlags flags) {
@@ -83,12 +83,12 @@ int bits_for(uint32_t count) { return count > 0 ? std::bit_width(count - 1) : 0;
 
 std::string materials_sentence(const FileSummary& s) {
   const MaterialFlags read = s.material_flags & flags_read(purpose_of(s));
-  return fmt::format(
-      grouped(),
-      "materials: {:L} of {:L} in use, at most {:L} in one geometry ({} bits); flags in use: {} ({} of {} "
-      "bits), {} looks at: {}",
-      s.materials_in_use, s.materials, s.max_slots, bits_for(s.max_slots), flag_list(s.material_flags),
-      std::popcount(s.material_flags), kFlagNames.size(), kPurposeNames[purpose_of(s)], flag_list(read));
+  return fmt::format(grouped(),
+                     "materials: {:L} of {:L} in use, at most {:L} per geometry ({} bits); flags in use: {} ({} of {} "
+                     "bits); flags that "
+                     "{} uses: {}",
+                     s.materials_in_use, s.materials, s.max_slots, bits_for(s.max_slots), flag_list(s.material_flags),
+                     std::popcount(s.material_flags), kFlagNames.size(), kPurposeNames[purpose_of(s)], flag_list(read));
 }
 
 std::string sentence(const GeometryUse& use, uint32_t purpose) {
@@ -98,7 +98,7 @@ std::string sentence(const GeometryUse& use, uint32_t purpose) {
     bool stored = false;
     for (uint32_t reason = 0; reason < baked::kReasonCount; ++reason) {
       if ((use.requirements & baked::requirement_bit(stream, reason)) == 0) continue;
-      if (stream == baked::kTangents && reason == baked::kAbsent) continue; // nearly everywhere
+      if (stream == baked::kTangents && reason == baked::kAbsent) continue; // holds for nearly all geometries
       text += "; " + decision(stream, reason, purpose);
       stored |= reason > baked::kInferred;
     }

@@ -8,14 +8,16 @@
 
 namespace packtrace {
 
-/// What the analysis of requirements decided, in sentences with counts and bytes: a line for each decision about a
-/// stream, one on materials; then, if wanted, a line for each geometry.
+/// Human-readable result of the requirement analysis, which decides what streams (normals, uv, tangents) are stored: a
+/// line per decision with counts and bytes, and a line about materials.
+/// @param by_geometry also add a line per geometry
 std::string requirements_text(const FileSummary& summary, bool by_geometry);
 
-/// The lines of requirements_text() on streams that were left out, which is what `bake` says unasked.
+/// The lines of requirements_text() about dropped streams, which `bake` always prints.
 std::string dropped_streams_text(const FileSummary& summary);
 
-/// The same for machines (docs/json_output.md): {"for", "keep", "streams", "materials"} and "geometries" if wanted.
+/// JSON form of requirements_text() (docs/json_output.md): {"for", "keep", "streams", "materials"}, with by_geometry
+/// also "geometries".
 nlohmann::json requirements_json(const FileSummary& summary, bool by_geometry);
 
 /// The array "dropped_streams" of `bake --json`.

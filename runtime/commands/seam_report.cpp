@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kVisiblePx = 0.5;
 
-/// By instance: how near pixels show it, camera-space depth; infinite where none does.
+/// Smallest camera-space depth per instance over all pixels, world units; infinite for instances that no pixel shows.
 std::vector<double> nearest_depths(const RenderedImage& image, size_t instances) {
   std::vector<double> nearest(instances, std::numeric_limits<double>::infinity());
   for (size_t i = 0; i < image.instance.size(); ++i)
@@ -23,8 +23,8 @@ std::vector<double> nearest_depths(const RenderedImage& image, size_t instances)
   return nearest;
 }
 
-/// By instance: how far what is traced of it lies from level 0, world units.
-std::vector<double> stated_errors(const ChosenDetail& detail) {
+/// Error bound per instance: distance of the traced LOD cut from level 0, world units.
+std::vector<double> instance_errors(const ChosenDetail& detail) {
   const LodSource& source = *detail.source;
   std::vector<double> of_blas(source.geometry_count());
   for (uint32_t blas = 0; blas < of_blas.size(); ++blas)
@@ -36,8 +36,8 @@ std::vector<double> stated_errors(const ChosenDetail& detail) {
   return errors;
 }
 
-/// What the choice of detail promises, in pixels; infinite where it promises nothing.
-double promised_px(const ChosenDetail& detail) {
+/// Screen-space error bound of the LOD cuts in pixels; infinite if the options give no bound.
+double lod_error_bound_px(const ChosenDetail& detail) {
   const SharingConfig& config = detail.sharing->config();
   if (config.tolerant_levels > 0) return std::numeric_limits<double>::infinity();
   return detail.error_px * std::max(1.0, config.culled_error_scale);
@@ -52,8 +52,8 @@ nlohmann::json seams_json(const SeamSummary& seams) {
 std::string seams_text(const SeamSummary& seams) {
   if (seams.touching == 0) return {};
   return fmt::format(grouped(),
-                     "{:L} of {:L} instances on grids of their own touch other geometry: seams gape by {:.3g} world "
-                     "units at most, half a step of both grids, and by the errors of coarser levels\n",
+                     "{:L} of {:L} instances with their own grid touch other geometry: seams may open by up to {:.3g} "
+                     "world units (half a step of each of the two grids), and by the errors of coarser LOD levels\n",
                      seams.touching, seams.instances, seams.largest_gap);
 }
 
@@ -63,7 +63,8 @@ nlohmann::json visible_seams_json(const InstanceSeams& seams, const RenderedImag
   const bool orthographic = camera.projection() == Projection::kOrthographic;
   std::vector<double> errors(nearest.size()), beside(seams.touching().size());
   double promised = 0.0;
-  if (detail) errors = stated_errors(*detail), beside = seams.largest_touching(errors), promised = promised_px(*detail);
+  if (detail)
+    errors = instance_errors(*detail), beside = seams.largest_touching(errors), promised = lod_error_bound_px(*detail);
   uint64_t visible = 0, wide = 0;
   double grids_px = 0.0, detail_px = 0.0, largest_px = 0.0;
   for (size_t i = 0; i < seams.touching().size(); ++i) {
@@ -87,8 +88,8 @@ std::string visible_seams_text(const nlohmann::json& seams) {
   if (seams.at("above_half_a_pixel") == 0) return {};
   return fmt::format(
       grouped(),
-      "  seams     may gape by {:.2g} px where instances touch other geometry (grids {:.2g}, detail {:.2g}); "
-      "by more than half a pixel at {:L} of {:L} instances\n",
+      "  seams     may open by up to {:.2g} px where instances touch other geometry (grids {:.2g}, LOD {:.2g}); "
+      "more than half a pixel at {:L} of {:L} visible instances\n",
       seams.at("largest_px").get<double>(), seams.at("of_grids_px").get<double>(),
       seams.at("of_detail_px").get<double>(), seams.at("above_half_a_pixel").get<uint64_t>(),
       seams.at("visible").get<uint64_t>());

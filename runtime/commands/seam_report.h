@@ -11,21 +11,21 @@
 
 namespace packtrace {
 
-/// Seams between instances on grids of their own and what they touch, as `bake --json` and `info --json` write them
-/// (docs/json_output.md).
+/// Seams between instances with grids of their own and the geometry they touch, as JSON for `bake --json` and
+/// `info --json` (docs/json_output.md).
 nlohmann::json seams_json(const SeamSummary& seams);
 
-/// The same for people; empty where there are none.
+/// Human-readable form of seams_json(); empty if there are no seams.
 std::string seams_text(const SeamSummary& seams);
 
-/// How wide such seams may be in a picture, as `render --json` writes it: of the instances that pixels show, each where
-/// it is nearest.
-/// @param camera of the pixels traced
-/// @param detail what was traced by camera rays; null: level 0
+/// Bounds of the width of such seams in an image, as JSON for `render --json`. Each visible instance is evaluated at
+/// its nearest visible point.
+/// @param camera camera with the traced image size, including supersampling
+/// @param detail LOD cuts that camera rays used; null: level 0
 nlohmann::json visible_seams_json(const InstanceSeams& seams, const RenderedImage& image, const PrimaryCamera& camera,
                                   const ChosenDetail* detail);
 
-/// The same for people; empty where no seam is wider than half a pixel.
+/// Human-readable form of visible_seams_json(); empty if no seam can be wider than half a pixel.
 std::string visible_seams_text(const nlohmann::json& seams);
 
 } // namespace packtrace

@@ -17,7 +17,8 @@
 namespace packtrace {
 namespace {
 
-/// The blurs of 3 x 3 taps 1 and 2 apart are for all surfaces, those further apart for new ones.
+/// Number of blur passes applied to all surfaces (tap distances 1 and 2). The remaining passes are for disoccluded
+/// surfaces.
 constexpr size_t kBlurPasses = 2;
 
 PACKTRACE_AVX2_CLONES
@@ -52,7 +53,7 @@ struct AoDenoiser::State {
 
   DenoiserConfig config;
   bool has_frame = false;
-  FrameHistory now, before; // `before` is scratch between frames
+  FrameHistory now, before; // `before` is only used while a frame is denoised
   DepthDerivatives derivatives;
   std::vector<EdgeWeights> edges = {EdgeWeights(1), EdgeWeights(2), EdgeWeights(4)};
   FrameSamples samples;
@@ -73,7 +74,7 @@ void AoDenoiser::State::resize(ImageSize size) {
   has_frame = false;
 }
 
-/// Brings guides and history to this frame's view. Where nothing moves, all of it stays in place.
+/// Loads this frame's guides and reprojects the history. Does nothing if no pixel moves and no guide changes.
 void AoDenoiser::State::update_history(const GBuffer& gbuffer) {
   if (has_frame && now.guides.still_matches(gbuffer)) return;
   std::swap(now, before);

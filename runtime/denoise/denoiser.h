@@ -11,16 +11,16 @@ namespace packtrace {
 /// Result of one frame, rows top to bottom, one entry per pixel in every array.
 struct DenoisedAo {
   ImageSize size;
-  std::vector<float> ao;       ///< [0,1]; kInvalidAo exactly where the G-buffer missed
-  std::vector<float> variance; ///< of the pixel's temporal mean, before any blur, AO squared; 0 where nothing is known
-  std::vector<float> tspp;     ///< frames of history that stand behind the pixel; 0: none
+  std::vector<float> ao;       ///< [0,1], or kInvalidAo at pixels whose camera ray missed
+  std::vector<float> variance; ///< variance of the pixel's temporal mean before any blur, AO squared; 0 without history
+  std::vector<float> tspp;     ///< temporal samples per pixel: frames of accumulated history; 0 without history
 };
 
-/// Spatio-temporal denoiser of ambient occlusion: accumulates samples along the motion of surfaces and blurs what noise
-/// is left, within surfaces (docs/denoiser.md). The accumulated history itself is never blurred, so a still image
+/// Spatio-temporal denoiser for ambient occlusion (docs/denoiser.md). It accumulates samples along surface motion and
+/// removes the remaining noise with edge-aware blurs. The accumulated history itself is never blurred, so a still image
 /// converges to the mean of its samples.
 ///
-/// Results are the same bits for any number of threads. One object serves one view and one thread at a time.
+/// Results are bit-identical for any number of threads. Use one object per view, from one thread at a time.
 class AoDenoiser {
 public:
   /// Throws Error (kUsage) if the configuration is out of range.
@@ -29,14 +29,14 @@ public:
   AoDenoiser(AoDenoiser&&) noexcept;
   AoDenoiser& operator=(AoDenoiser&&) noexcept;
 
-  /// Denoises the next frame. A frame of another size starts anew, as after reset(). Pixels of `ao` that are negative
-  /// or not finite have no sample in this frame. Damaged guides (not finite) cost their pixel its history or count as
-  /// a miss; they spoil nothing else.
-  /// Throws Error (kUsage) if an array that is read does not have size.pixels() entries, or the sizes differ.
-  /// @return valid until the next call
+  /// Denoises the next frame. A change of the image size discards the history, as reset() does. Negative and non-finite
+  /// values of `ao` mean that the pixel has no sample in this frame. A pixel with a non-finite depth counts as a miss;
+  /// a pixel with a non-finite normal gets no history and no blur. Other pixels are not affected. Throws Error (kUsage)
+  /// if the two sizes differ or an array does not have one entry per pixel.
+  /// @return the result, valid until the next call
   const DenoisedAo& next_frame(const GBuffer& gbuffer, const AoFrame& ao);
 
-  /// Forgets all history: for camera cuts.
+  /// Discards all history. Call it at camera cuts.
   void reset();
 
 private:

@@ -7,7 +7,7 @@
 namespace packtrace {
 namespace {
 
-/// Derivative at a pixel from three disparities in a row; misses are 0.
+/// Derivative at `centre` from three consecutive disparities, where 0 means a miss.
 inline float smaller_difference(float before, float centre, float after) {
   const float backward = centre - before, forward = after - centre;
   const bool use_backward = before > 0.0f && !(after > 0.0f && std::abs(forward) < std::abs(backward));

@@ -4,8 +4,9 @@
 
 namespace packtrace {
 
-/// Change of disparity per pixel along x and y: the smaller of the backward and the forward difference by magnitude,
-/// so that the plane of a surface is not bent at its silhouette. 0 where the pixel or both neighbours missed.
+/// Change of disparity per pixel along x and y. Of the backward and the forward difference the one of smaller magnitude
+/// is used, so that a step at a silhouette does not tilt the surface's tangent plane. Neighbours that missed are
+/// ignored; the derivative is 0 where the pixel or both neighbours missed.
 struct DepthDerivatives {
   Plane<float> x, y;
 

@@ -10,8 +10,8 @@ struct WeightedMean {
   void add(float w, float value) { weight += w, sum += w * value; }
 };
 
-WeightedMean mean_of_surface(const EdgeWeights& edges, const Plane<float>& samples, const Plane<float>& value, int x,
-                             int y) {
+WeightedMean weighted_neighbour_mean(const EdgeWeights& edges, const Plane<float>& samples, const Plane<float>& value,
+                                     int x, int y) {
   WeightedMean mean;
   for (size_t d = 0; d < EdgeWeights::kDirections.size(); ++d) {
     const int dx = edges.step() * EdgeWeights::kDirections[d][0], dy = edges.step() * EdgeWeights::kDirections[d][1];
@@ -37,12 +37,12 @@ void fill_unsampled(const Guides& guides, const Plane<float>& samples, std::span
                     NoisyImage& image) {
   for_row_blocks(guides.size.height, [&](int first, int last) {
     for (int y = first; y < last; ++y) {
-      if (image.youngest[static_cast<size_t>(y)] > 0.0f) continue;
+      if (image.min_tspp[static_cast<size_t>(y)] > 0.0f) continue;
       for (int x = 0; x < static_cast<int>(guides.size.width); ++x) {
         if (!(guides.disparity.row(y)[x] > 0.0f) || samples.row(y)[x] > 0.0f) continue;
-        WeightedMean mean; // of sampled pixels only: none of them is written here
+        WeightedMean mean; // only of sampled pixels, which this loop never writes
         for (size_t i = 0; i < edges.size() && mean.weight == 0.0f; ++i)
-          mean = mean_of_surface(edges[i], samples, image.value, x, y);
+          mean = weighted_neighbour_mean(edges[i], samples, image.value, x, y);
         if (mean.weight == 0.0f) mean = mean_of_window(samples, image.value, x, y);
         image.value.row(y)[x] = mean.weight > 0.0f ? mean.sum / mean.weight : 1.0f;
         image.inverse_variance.row(y)[x] = kUnknownInverseVariance;

@@ -7,15 +7,19 @@
 
 namespace packtrace {
 
-/// Gives pixels of `guides` that have neither history nor a sample the mean of the sampled neighbours on the same
-/// surface (by the edge weights, nearest first), else that of whatever lies within kPlaneBorder pixels, else 1 (open).
-/// Only the image is filled: in the history these pixels stay unsampled. Their variance becomes 1/4, the largest that
-/// values in [0,1] can have.
+/// Fills hit pixels that have neither history nor a sample. The value is, in this order of preference:
+///  - the mean of the sampled neighbours on the same surface, weighted by edge weights, for the smallest tap distance
+///    that finds any;
+///  - the mean of all sampled pixels within kPlaneBorder pixels;
+///  - 1 (unoccluded).
+/// The variance is set to 1/4, the maximum for values in [0,1]. Only `image` is filled; the history of these pixels
+/// stays empty.
+/// @param samples tspp per pixel
 void fill_unsampled(const Guides& guides, const Plane<float>& samples, std::span<const EdgeWeights> edges,
                     NoisyImage& image);
 
-/// The passes for surfaces that came into view a few frames ago: one edge_blur for each entry of `edges`, of a strength
-/// that falls from 1 to 0 at `frames` frames of history.
+/// Blurs surfaces that came into view a few frames ago: one edge_blur pass per entry of `edges`. The strength falls
+/// linearly from 1 without history to 0 at `frames` frames of history.
 void disocclusion_blur(const Plane<float>& samples, std::span<const EdgeWeights> edges, float frames, float limit,
                        ImageSize size, NoisyImage& image, BlurScratch& scratch);
 

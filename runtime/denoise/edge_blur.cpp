@@ -10,14 +10,15 @@ namespace packtrace {
 namespace {
 
 constexpr float kAside = 0.27901f, kCentre = 0.44198f;
-constexpr float kStraight = kAside * kCentre / 255.0f; // Gaussian and the scale of weights
+constexpr float kStraight = kAside * kCentre / 255.0f; // Gaussian weight divided by the largest edge weight
 constexpr float kDiagonal = kAside * kAside / 255.0f;
 
-/// Mean squared difference of patches, in units of the noise, up to which they are taken for equal: a little above the
-/// 1 that is expected, for it varies.
+/// Patches count as equal up to this mean squared difference in units of the noise variance. It is slightly above the
+/// expected value 1 to allow for scatter.
 constexpr float kNoise = 1.2f;
 
-/// Squared differences in units of the noise between two rows of pixels, and where both lie on one surface.
+/// For two rows of pixels: squared differences in units of the noise variance, and a flag (0 or 1) whether both pixels
+/// lie on the same surface. The difference is 0 where they do not.
 PACKTRACE_AVX2_CLONES
 void compare_row(int begin, int end, const float* __restrict value, const float* __restrict other,
                  const float* __restrict inverse_variance, const float* __restrict other_inverse_variance,
@@ -30,13 +31,14 @@ void compare_row(int begin, int end, const float* __restrict value, const float*
   for (int x = begin; x < end; ++x) same[x] = edge[x] != 0 ? 1 : 0;
 }
 
-/// What compare_row() found in three rows, one above the other.
+/// Results of compare_row() for three consecutive rows.
 struct Patch {
   const float* distance[3];
   const uint8_t* same[3];
 };
 
-/// Edge weights times value weights of a row. Columns -1 to width of everything in `patch` and `column` exist.
+/// Writes edge weight times value weight for a row. Columns [-1, width] of `patch` and of the two column buffers must
+/// be valid.
 PACKTRACE_AVX2_CLONES
 void weigh_row(int width, const Patch& patch, float limit, const uint8_t* __restrict edge, float* __restrict column,
                uint8_t* __restrict same_column, uint8_t* __restrict weights) {
@@ -58,7 +60,7 @@ void weigh_row(int width, const Patch& patch, float limit, const uint8_t* __rest
   }
 }
 
-/// The rows of one direction that weigh_row() works on, kept while the patches slide down.
+/// Ring buffer of the three rows that weigh_row() needs for one direction, plus its column sums.
 class PatchRows {
 public:
   explicit PatchRows(int width) : stride_(static_cast<size_t>(width) + 2), distance_(4 * stride_), same_(4 * stride_) {}
@@ -93,8 +95,8 @@ void weigh_values(const NoisyImage& image, const EdgeWeights& edges, size_t dire
   }
 }
 
-/// What a row reads: values of it and the rows one step above and below, and the weights that leave it and the row
-/// above.
+/// Inputs and outputs of blur_row(): values of the row and of the rows one step above and below, and weights of the
+/// directions that start in the row or in the row one step above.
 struct BlurRow {
   const float *value, *value_above, *value_below, *inverse_variance, *samples;
   const uint8_t *right, *down, *down_right, *down_left;
@@ -132,7 +134,8 @@ void blur_row(int width, ptrdiff_t step, const BlurRow& rows, Fade fade) {
     const float strength = smaller(larger((fade.end - r.samples[x]) * fade_scale, 0.0f), 1.0f);
     const float kept = 1.0f - strength * sums.taken;
     r.out_value[x] = v + strength * sums.flux;
-    // Differences that noise made large were mixed less, so less noise is gone than the weights say.
+    // The square root halves the predicted gain as an exponent: large noise differences get smaller weights, so less
+    // noise is removed than the weights suggest.
     r.out_inverse_variance[x] = r.inverse_variance[x] / std::sqrt(kept * kept + strength * strength * sums.squares);
   }
 }
@@ -159,7 +162,7 @@ BlurRow make_row(const NoisyImage& image, int step, const Plane<float>& samples,
 
 void edge_blur(const EdgeWeights& edges, const Plane<float>& samples, Fade fade, float limit, ImageSize size,
                NoisyImage& image, BlurScratch& scratch) {
-  if (std::none_of(image.youngest.begin(), image.youngest.end(), [&](float tspp) { return tspp < fade.end; })) return;
+  if (std::none_of(image.min_tspp.begin(), image.min_tspp.end(), [&](float tspp) { return tspp < fade.end; })) return;
   const int width = static_cast<int>(size.width);
   for_row_blocks(size.height, [&](int first, int last) {
     for (size_t direction = 0; direction < EdgeWeights::kDirections.size(); ++direction)
@@ -167,7 +170,7 @@ void edge_blur(const EdgeWeights& edges, const Plane<float>& samples, Fade fade,
   });
   for_row_blocks(size.height, [&](int first, int last) {
     for (int y = first; y < last; ++y) {
-      if (image.youngest[static_cast<size_t>(y)] < fade.end) {
+      if (image.min_tspp[static_cast<size_t>(y)] < fade.end) {
         blur_row(width, edges.step(), make_row(image, edges.step(), samples, y, scratch), fade);
       } else {
         std::copy_n(image.value.row(y), width, scratch.image.value.row(y));

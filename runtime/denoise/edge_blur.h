@@ -5,26 +5,26 @@
 
 namespace packtrace {
 
-/// An image on its way through the blurs.
+/// AO between blur passes, with an estimate of its noise.
 struct NoisyImage {
   Plane<float> value;
   Plane<float> inverse_variance; ///< 1 / variance of the noise left in `value`
-  std::vector<float> youngest;   ///< per row: least tspp of its pixels; misses do not count
+  std::vector<float> min_tspp;   ///< per row: smallest tspp of its hit pixels
 
   void resize(ImageSize size) {
     value.resize(size), inverse_variance.resize(size);
-    youngest.assign(size.height, 0.0f);
+    min_tspp.assign(size.height, 0.0f);
   }
 };
 
-/// Strength of a blur by the frames of history: 1 up to `begin`, falling linearly to 0 at `end`.
+/// Blur strength as a function of history length in frames: 1 up to `begin`, then linear to 0 at `end`.
 struct Fade {
   float begin = 0, end = 1;
 };
 
-/// Memory of edge_blur between its steps; one object serves any number of calls for images of one size.
+/// Scratch memory for edge_blur(), reusable for all images of one size.
 struct BlurScratch {
-  std::array<Plane<uint8_t>, 4> weights; ///< as EdgeWeights, times the value weights
+  std::array<Plane<uint8_t>, 4> weights; ///< edge weight times value weight per direction, laid out as in EdgeWeights
   NoisyImage image;
 
   void resize(ImageSize size) {
@@ -33,20 +33,24 @@ struct BlurScratch {
   }
 };
 
-/// One 3 x 3 pass with taps step pixels apart, in flux form:
+/// One 3 x 3 blur pass whose taps are edges.step() pixels apart, in flux form:
 ///   out_p = v_p + s_p sum_q g_pq e_pq k_pq (v_q - v_p)
-/// with g a normalised Gaussian (.27901 .44198 .27901 per axis), e the edge weights and k what the values say:
+/// g is a normalised Gaussian (0.27901 0.44198 0.27901 per axis), e the edge weights, s the strength from `fade`, and k
+/// the value weights:
 ///   k_pq = saturate((limit - D) / (limit - 1.2))^2,  D = mean_o (v_(q+o) - v_(p+o))^2 min(precision) / 2
-/// over the 3 x 3 patch of offsets o, as far as p + o and q + o lie on one surface. D is 1 in expectation if noise is
-/// the only difference, and as a mean it stays near 1: comparing patches tells an edge from noise where single pixels
-/// cannot. Source: A. Buades, B. Coll, J.-M. Morel, "A non-local algorithm for image denoising", 2005.
-/// g e k is the same from both ends: what one pixel gains the other loses, so the mean of a surface stays what it was
-/// whatever the values do to the weights. Weights that are divided by their sum pull skewed noise towards its majority
-/// instead. Constants pass exactly, and results never leave the range of their inputs.
-/// The precision of the result takes the neighbours' noise for independent and as large as the pixel's own; half the
-/// gain that this predicts, as an exponent, is booked.
+/// D is averaged over those offsets o of a 3 x 3 patch where p + o and q + o lie on the same surface. If noise is the
+/// only difference between two patches, D is 1 in expectation and, being a mean, close to 1. Comparing patches
+/// therefore separates edges from noise where single pixels cannot.
+/// Source: A. Buades, B. Coll, J.-M. Morel, "A non-local algorithm for image denoising", 2005.
+///
+/// The weights g e k are symmetric in p and q. Where s is 1, one pixel gains what the other loses, so the mean of a
+/// surface is preserved for any dependence of the weights on the values. (Weights normalised by their sum would instead
+/// pull skewed noise towards its most frequent values.) Constant images pass unchanged, and results stay within the
+/// range of their inputs.
+/// The new precision assumes that the neighbours' noise is independent of the pixel's and equally large. Only the
+/// square root of the gain predicted by this assumption is applied.
+/// @param samples tspp per pixel, which determines s; the image stays as it is if s is 0 in all rows
 /// @param limit above 1.2
-/// @param samples tspp of the pixels, which sets s; nothing happens if s is 0 everywhere
 void edge_blur(const EdgeWeights& edges, const Plane<float>& samples, Fade fade, float limit, ImageSize size,
                NoisyImage& image, BlurScratch& scratch);
 

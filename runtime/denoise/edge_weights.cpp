@@ -8,7 +8,7 @@
 namespace packtrace {
 namespace {
 
-/// One row of everything the weights read, at either end of the offset.
+/// One row of the guides, at one end of the tap offset.
 struct GuideRow {
   const float *disparity, *dx, *dy, *nx, *ny, *nz;
 };
@@ -33,7 +33,7 @@ void weigh_row(int width, const GuideRow& p, const GuideRow& q, float offset_x, 
     const float rise_a = a.dx[x] * offset_x + a.dy[x] * offset_y;
     const float rise_b = b.dx[x] * offset_x + b.dy[x] * offset_y;
     const float distance = larger(std::abs(difference - rise_a), std::abs(difference - rise_b));
-    // The flatter of the two slopes: at a silhouette one of them may be steep by accident.
+    // Uses the flatter of the two slopes, since one of them may be meaninglessly steep at a silhouette.
     const float allowed = t.depth * smaller(a.disparity[x], b.disparity[x]) +
                           t.slope * smaller(std::abs(rise_a), std::abs(rise_b)) + 1e-37f;
     const float depth_weight = larger(0.0f, 1.0f - distance / allowed);

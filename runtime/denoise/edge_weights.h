@@ -9,19 +9,20 @@
 
 namespace packtrace {
 
-/// How much the surface of a pixel and that of the pixel `step` further along have in common, for the eight neighbours
-/// of a 3 x 3 filter with taps `step` apart: 0 (an edge between them, or outside the image) to 255 (one plane).
-/// The weight is the same from both ends, so four directions are stored; it depends on guides only, so it lasts as long
-/// as the image stands still.
+/// Edge-stopping weights for a 3 x 3 filter whose taps are `step` pixels apart: 0 (edge between the two pixels, or
+/// outside the image) to 255 (both pixels on one plane). The weight is the product of
 ///   normals: max(0, n_p . n_q) ^ blur_normal_power
-///   depth:   max(0, 1 - r / t)^2, r the larger distance of one point from the other's tangent plane in disparity,
-///            t = blur_depth |disparity| + blur_slope |derivative . offset|
+///   depth:   max(0, 1 - r / t)^2, where r is the larger of the two distances of one point from the other's tangent
+///            plane, in disparity, and t = blur_depth * disparity + blur_slope * |derivative . offset|, each term the
+///            smaller of its values at the two pixels.
+/// Weights are symmetric, so four of the eight directions are stored. They depend on guides only and stay valid while
+/// the image stands still.
 class EdgeWeights {
 public:
-  /// Offsets of the stored directions, times step.
+  /// Stored directions (x, y); the tap offset is step times the direction.
   static constexpr std::array<std::array<int, 2>, 4> kDirections = {{{1, 0}, {0, 1}, {1, 1}, {-1, 1}}};
 
-  /// @param step distance of taps in pixels, at most kPlaneBorder
+  /// @param step tap distance in pixels, at most kPlaneBorder
   explicit EdgeWeights(int step) : step_(step) {}
 
   void resize(ImageSize size);
@@ -29,7 +30,8 @@ public:
 
   int step() const { return step_; }
 
-  /// Weight between (x, y) and (x, y) + step * kDirections[direction], also for pixels of the border (0).
+  /// Plane whose entry (x, y) is the weight between (x, y) and (x, y) + step * kDirections[index]. Entries of the
+  /// border are 0.
   const Plane<uint8_t>& direction(size_t index) const { return weights_[index]; }
 
 private:

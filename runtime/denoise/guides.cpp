@@ -11,10 +11,10 @@ namespace {
 
 constexpr float kLargest = std::numeric_limits<float>::max();
 
-/// 1 / z, or 0 where z is no distance or its inverse is no number.
+/// Returns 1 / z, or 0 if z is not a positive normal finite number.
 inline float disparity_of(float z) { return z >= std::numeric_limits<float>::min() && z <= kLargest ? 1.0f / z : 0.0f; }
 
-/// A component of a unit vector, with some room for rounding; false for NaN.
+/// Whether c can be a component of a unit vector, with some room for rounding. False for NaN.
 inline bool is_component(float c) { return c >= -2.0f && c <= 2.0f; }
 
 PACKTRACE_AVX2_CLONES
@@ -30,7 +30,7 @@ void load_row(int width, const float* __restrict z, const float* __restrict norm
   }
 }
 
-/// Counts pixels whose guides differ or that move.
+/// Counts the pixels whose guides differ plus the motion components above kStillMotion; 0 means that the row is still.
 PACKTRACE_AVX2_CLONES
 int count_changes(int width, const float* __restrict z, const float* __restrict normal,
                   const uint32_t* __restrict instance, const float* __restrict motion,

@@ -4,24 +4,27 @@
 
 namespace packtrace {
 
-/// Motion below this many pixels counts as none: it moves the longest default history by a quarter of a pixel.
+/// Motion up to this many pixels per frame is ignored. Over the longest default history (256 frames) it adds up to a
+/// quarter of a pixel.
 inline constexpr float kStillMotion = 1e-3f;
 
-/// What the filters need of a G-buffer, as planes. Damaged pixels (depth or normal not finite, depth not positive) are
-/// made harmless: no depth means a miss, a zero normal means no neighbour and no history.
+/// The G-buffer channels that the filters use, as planes. A depth that is not positive and finite is stored as
+/// disparity 0, which means a miss. A normal that is not finite is stored as a zero vector, which gets weight 0 in
+/// blurs and in reprojection.
 struct Guides {
   ImageSize size;
-  /// 1 / view_z, 0 where the camera ray missed. Linear over the image on every plane seen in perspective.
+  /// 1 / view_z, or 0 where the camera ray missed. In a perspective view it is a linear function of pixel coordinates
+  /// on every planar surface.
   Plane<float> disparity;
   Plane<float> normal_x, normal_y, normal_z;
   Plane<uint32_t> instance;
 
   void resize(ImageSize new_size);
 
-  /// Overwrites all pixels.
+  /// Copies the guides of a G-buffer of the same size.
   void load(const GBuffer& gbuffer);
 
-  /// True if load() would change nothing and nothing moves.
+  /// Returns true if load() would change nothing and no pixel moves by more than kStillMotion.
   bool still_matches(const GBuffer& gbuffer) const;
 };
 

@@ -4,12 +4,12 @@
 
 namespace packtrace {
 
-/// What is remembered of every pixel. All 0 where there is no history.
+/// Accumulated history per pixel. All values are 0 where there is none.
 struct History {
   Plane<float> mean;    ///< mean AO of the slow history
-  Plane<float> square;  ///< mean of squared AO over the same frames
-  Plane<float> fast;    ///< mean AO of the last few frames
-  Plane<float> samples; ///< frames that `mean` stands for (tspp); not whole after a correction or resampling
+  Plane<float> square;  ///< mean squared AO of the slow history
+  Plane<float> fast;    ///< fast history: mean AO of the last few frames
+  Plane<float> samples; ///< length of the slow history in frames (tspp); fractional after a correction or resampling
 
   void resize(ImageSize size) { mean.resize(size), square.resize(size), fast.resize(size), samples.resize(size); }
 };

@@ -12,7 +12,7 @@ PACKTRACE_AVX2_CLONES
 void sum_row(int width, int radius, const float* __restrict in, float* __restrict out) {
   for (int x = 0; x < width; ++x) out[x] = in[x - 1] + in[x] + in[x + 1];
   int r = 2;
-  for (; r + 1 <= radius; r += 2) // two rings at a time: fewer trips through memory
+  for (; r + 1 <= radius; r += 2) // two distances per pass over `out` save memory traffic
     for (int x = 0; x < width; ++x) out[x] += (in[x - r] + in[x + r]) + (in[x - r - 1] + in[x + r + 1]);
   if (r <= radius)
     for (int x = 0; x < width; ++x) out[x] += in[x - r] + in[x + r];
@@ -34,7 +34,7 @@ void add_two_rows(int width, const float* __restrict a, const float* __restrict 
   for (int x = 0; x < width; ++x) out[x] += a[x] + b[x];
 }
 
-/// Sums become mean and Bessel-corrected variance.
+/// Turns window sums into means and the Bessel-corrected variance, in place.
 PACKTRACE_AVX2_CLONES
 void finish_row(int width, const float* __restrict count, float* __restrict mean, float* __restrict variance,
                 float* __restrict change, const float* __restrict narrow_count, float* __restrict narrow_change) {

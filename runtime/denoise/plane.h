@@ -12,25 +12,26 @@
 
 namespace packtrace {
 
-/// Zeroed pixels around every plane, so that filters read past the image without asking.
+/// Width of the zero border around every plane, in pixels. It lets filters read past the image without bounds checks.
 inline constexpr int kPlaneBorder = 8;
 
-/// One channel of an image, row by row, inside a border of kPlaneBorder pixels that stay zero.
+/// One image channel in row-major order, surrounded by kPlaneBorder pixels that stay zero.
 template <typename T>
 class Plane {
 public:
-  /// Zeroes everything.
+  /// Sets all pixels to zero.
   void resize(ImageSize size) {
     stride_ = static_cast<size_t>(size.width) + 2 * kPlaneBorder;
     data_.assign(stride_ * (static_cast<size_t>(size.height) + 2 * kPlaneBorder), T{});
   }
   void clear() { std::fill(data_.begin(), data_.end(), T{}); }
 
-  /// Pixel (0, y), y in [-kPlaneBorder, height + kPlaneBorder). Columns -kPlaneBorder to width + kPlaneBorder exist.
+  /// Pointer to pixel (0, y), for y in [-kPlaneBorder, height + kPlaneBorder). Columns [-kPlaneBorder, width +
+  /// kPlaneBorder) are valid.
   T* row(int y) { return data_.data() + offset(y); }
   const T* row(int y) const { return data_.data() + offset(y); }
 
-  /// Pixels from one row to the next; the same for all planes of one size.
+  /// Distance between rows in pixels; the same for all planes of one size.
   ptrdiff_t stride() const { return static_cast<ptrdiff_t>(stride_); }
 
 private:
@@ -39,10 +40,10 @@ private:
   std::vector<T> data_;
 };
 
-/// Rows that one task works on. Fixed, so that nothing depends on the number of threads.
+/// Number of rows per task. It is fixed so that results do not depend on the number of threads.
 inline constexpr int kRowsPerTask = 32;
 
-/// Calls body(first_row, last_row) for half-open blocks that cover [0, height), in parallel.
+/// Calls body(first_row, end_row) in parallel for half-open blocks of rows that cover [0, height).
 template <typename Body>
 void for_row_blocks(uint32_t height, const Body& body) {
   const int rows = static_cast<int>(height);

@@ -9,11 +9,11 @@
 namespace packtrace {
 namespace {
 
-/// History with less weight than this is noise of the tests, not a surface.
-constexpr float kMinWeight = 1e-3f;
+/// History with a smaller total weight is rejected: the tests' soft weights let hardly any of the surface through.
+constexpr float kMinHistoryWeight = 1e-3f;
 
-/// Footprints with less weight cross an edge that sharpening would overshoot at.
-constexpr float kSharpenWeight = 0.9f;
+/// Footprints with a smaller total weight cross an edge, where sharpening would overshoot.
+constexpr float kMinSharpenWeight = 0.9f;
 
 struct Tests {
   float depth, slope;
@@ -21,14 +21,14 @@ struct Tests {
   bool instance;
 };
 
-/// What the history of one pixel must agree with.
+/// The surface at the current pixel, which history must match.
 struct Surface {
   float disparity, tolerance;
   Vec3 normal;
   uint32_t instance;
 };
 
-/// The previous frame by offsets from pixel (0, 0), which are the same in all planes: y * stride + x.
+/// Pointers to pixel (0, 0) of the previous frame's planes. The offset y * stride + x is valid for all of them.
 struct Previous {
   explicit Previous(const FrameHistory& frame)
       : disparity(frame.guides.disparity.row(0)), normal_x(frame.guides.normal_x.row(0)),
@@ -42,7 +42,7 @@ struct Previous {
   ptrdiff_t stride;
 };
 
-/// 0 if the previous pixel shows another surface, up to 1 if it agrees.
+/// Similarity of a previous pixel to the current surface: 0 for another surface, up to 1 for a perfect match.
 inline float agreement(const Previous& previous, ptrdiff_t at, const Surface& surface, const Tests& tests) {
   const float disparity = previous.disparity[at];
   if (!(disparity > 0.0f) || (tests.instance && previous.instance[at] != surface.instance)) return 0.0f;
@@ -56,21 +56,22 @@ inline float agreement(const Previous& previous, ptrdiff_t at, const Surface& su
   return depth_weight * cosine;
 }
 
-/// Whether a pixel may take part in sharpening: the tests without weights, and without the normals.
+/// Whether a previous pixel may be used for sharpening: a hard test of instance and disparity, without normals.
 inline bool same_surface(const Previous& previous, ptrdiff_t at, const Surface& surface) {
   return previous.instance[at] == surface.instance && previous.samples[at] > 0.0f &&
          std::abs(previous.disparity[at] - surface.disparity) <= surface.tolerance;
 }
 
-/// What Catmull-Rom interpolation along x or y adds to linear interpolation between a and b, with their neighbours
-/// before and after: -t (1 - t) / 2 times the second differences at a and b, interpolated.
+/// The difference between Catmull-Rom and linear interpolation between a and b, where before and after are the outer
+/// neighbours: -t (1 - t) / 2 times the linearly interpolated second differences at a and b.
 /// Source: R. Keys, "Cubic convolution interpolation for digital image processing", 1981, a = -1/2.
 inline float sharpening(float before, float a, float b, float after, float t) {
   return -0.5f * t * (1.0f - t) * ((1.0f - t) * (before - 2.0f * a + b) + t * (a - 2.0f * b + after));
 }
 
-/// Linear interpolation of every frame's history is a blur that adds up. This undoes it to second order along both axes
-/// where the 2 x 2 footprint from `at` and the eight pixels around it without the corners show one surface; else 0.
+/// Correction for the blur of bilinear interpolation, which would accumulate over frames. It is exact to second order
+/// along both axes. Returns 0 unless the 2 x 2 footprint starting at `at` and its eight edge-adjacent neighbours all
+/// lie on the same surface.
 float sharpen(const Previous& previous, ptrdiff_t at, float tx, float ty, const Surface& surface) {
   const ptrdiff_t down = previous.stride;
   const ptrdiff_t taps[12] = {0, 1, down, down + 1, -1, down - 1, 2, down + 2, -down, 1 - down, 2 * down, 2 * down + 1};
@@ -87,11 +88,11 @@ float sharpen(const Previous& previous, ptrdiff_t at, float tx, float ty, const 
 /// Weighted sum of history over a 2 x 2 footprint.
 struct Gathered {
   float weight = 0, mean = 0, square = 0, fast = 0, samples = 0;
-  float sharpening = 0; // to be added to the mean
+  float sharpening = 0; // added to the mean after normalisation
 
   void add(const Previous& previous, ptrdiff_t at, float w) {
     const float count = previous.samples[at];
-    if (!(count > 0.0f)) return; // seen before, but never sampled
+    if (!(count > 0.0f)) return; // the pixel was visible but never got a sample
     weight += w;
     mean += w * previous.mean[at];
     square += w * previous.square[at];
@@ -113,13 +114,13 @@ public:
   Gathered gather(int x, int y, Vec2 motion) const {
     Gathered sum;
     const float from_x = static_cast<float>(x) - motion.x, from_y = static_cast<float>(y) - motion.y;
-    // Also false for NaN, and what passes fits an int.
+    // Rejects NaN, too, and ensures that the conversion to int below cannot overflow.
     if (!(from_x > -1.0f && from_x < width_ && from_y > -1.0f && from_y < height_)) return sum;
     const Surface surface = surface_at(x, y);
     const float floor_x = std::floor(from_x), floor_y = std::floor(from_y);
     const float fx = from_x - floor_x, fy = from_y - floor_y;
     const ptrdiff_t at = static_cast<int>(floor_y) * previous_.stride + static_cast<int>(floor_x);
-    const auto corner = [&](ptrdiff_t tap, float bilinear) { // the border counts as missed
+    const auto corner = [&](ptrdiff_t tap, float bilinear) { // border pixels have disparity 0, so they are rejected
       if (!(bilinear > 0.0f)) return;
       const float w = bilinear * agreement(previous_, tap, surface, tests_);
       if (w > 0.0f) sum.add(previous_, tap, w);
@@ -128,7 +129,7 @@ public:
     corner(at + 1, fx * (1.0f - fy));
     corner(at + previous_.stride, (1.0f - fx) * fy);
     corner(at + previous_.stride + 1, fx * fy);
-    if (sum.weight > kSharpenWeight && (fx > 0.0f || fy > 0.0f))
+    if (sum.weight > kMinSharpenWeight && (fx > 0.0f || fy > 0.0f))
       sum.sharpening = sharpen(previous_, at, fx, fy, surface);
     return sum;
   }
@@ -150,12 +151,12 @@ private:
 };
 
 void store(const Gathered& sum, float longest, History& history, int x, int y) {
-  const bool found = sum.weight > kMinWeight;
+  const bool found = sum.weight > kMinHistoryWeight;
   const float scale = found ? 1.0f / sum.weight : 0.0f;
   const float linear = sum.mean * scale;
   const float sharp = found ? smaller(larger(linear + sum.sharpening, 0.0f), 1.0f) : 0.0f;
   history.mean.row(y)[x] = sharp;
-  history.square.row(y)[x] = sum.square * scale + (sharp - linear) * (sharp + linear); // the variance stays
+  history.square.row(y)[x] = sum.square * scale + (sharp - linear) * (sharp + linear); // keeps the variance
   history.fast.row(y)[x] = sum.fast * scale;
   history.samples.row(y)[x] = found ? smaller(sum.samples, longest) : 0.0f;
 }

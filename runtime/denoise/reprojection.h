@@ -9,17 +9,20 @@
 
 namespace packtrace {
 
-/// One frame's surfaces and the history that belongs to them.
+/// The guides of a frame and the history of its pixels.
 struct FrameHistory {
   Guides guides;
   History history;
 };
 
-/// Fetches for every pixel of `guides` the history of the surface point it shows: the mean of the 2 x 2 previous pixels
-/// around it, each weighted bilinearly, by how well depth and normal agree, and by whether the instance is the same.
-/// The mean is interpolated by cubics where the surface goes on all around, so that pans do not blur it.
-/// Pixels whose history is rejected are written too, with zeros. The count of samples shrinks with the weight found.
-/// @param motion_px GBuffer::motion_px; not finite means no history
+/// Resamples the previous frame's history at the surface points of the current frame. The history of a pixel is the
+/// weighted mean of the 2 x 2 previous pixels around its previous position. Weights are bilinear, times the agreement
+/// of depth and normal; previous pixels of another instance have weight 0.
+/// Where the neighbourhood lies on one surface, the AO mean is interpolated with bicubic precision along each axis, so
+/// that camera pans do not blur it.
+/// All pixels of `reprojected` are written: 0 where history is rejected. The sample count is scaled by the sum of the
+/// weights, so partial agreement shortens the history.
+/// @param motion_px GBuffer::motion_px; pixels with non-finite motion get no history
 void reproject(const FrameHistory& previous, const Guides& guides, const DepthDerivatives& derivatives,
                std::span<const Vec2> motion_px, const DenoiserConfig& config, History& reprojected);
 

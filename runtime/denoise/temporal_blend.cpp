@@ -11,11 +11,11 @@
 namespace packtrace {
 namespace {
 
-/// Frames that the window's variance counts for beside the history's own.
+/// Weight of the window's variance relative to the history's own, in frames.
 constexpr float kVariancePrior = 4.0f;
 
-/// Variance below which values count as free of noise: far below the square of one step of 8 bits.
-constexpr float kMinVariance = 1e-8f;
+/// Added to the variance so that the precision stays finite. Far below the square of an 8-bit quantisation step.
+constexpr float kVarianceFloor = 1e-8f;
 
 struct AccumulateRow {
   const float *ao, *disparity;
@@ -44,7 +44,7 @@ void accumulate_row(int width, const AccumulateRow& rows, float longest, float f
   }
 }
 
-/// `change` less `limit`, towards 0.
+/// Reduces the magnitude of `change` by `limit`, at most to 0 (soft threshold).
 inline float excess(float change, float limit) { return std::copysign(larger(std::abs(change) - limit, 0.0f), change); }
 
 struct CorrectRow {
@@ -53,15 +53,15 @@ struct CorrectRow {
 };
 
 struct CorrectScales {
-  float fast_share; ///< variance of the fast history per variance of a sample
+  float fast_share; ///< variance of the fast history divided by the variance of a sample
   float gamma, tolerance, response, fast_frames, trust_frames;
 };
 
-/// Returns the least count of samples of a pixel that the camera ray hit.
+/// Returns the smallest sample count of the row's hit pixels.
 PACKTRACE_AVX2_CLONES
 float correct_row(int width, const CorrectRow& rows, CorrectScales s) {
   const CorrectRow r = rows;
-  int32_t youngest = std::numeric_limits<int32_t>::max(); // bits of floats >= 0 are ordered like integers
+  int32_t min_tspp = std::numeric_limits<int32_t>::max(); // non-negative floats sort like their bits as integers
 #pragma GCC ivdep
   for (int x = 0; x < width; ++x) {
     const float noise = r.local_variance[x] * s.fast_share;
@@ -75,22 +75,22 @@ float correct_row(int width, const CorrectRow& rows, CorrectScales s) {
     const float shift = new_mean - old_mean;
     const float kept = 1.0f - smaller(s.response * std::abs(shift), 1.0f);
     const float n = smaller(r.samples[x], larger(r.samples[x] * kept, s.fast_frames));
-    const float moment = larger(r.square[x] - old_mean * old_mean, 0.0f); // a shift leaves the variance alone
+    const float moment = larger(r.square[x] - old_mean * old_mean, 0.0f); // a shift keeps the variance
     const float sample_variance =
         (kVariancePrior * r.local_variance[x] + n * moment) / (kVariancePrior + larger(n, 1.0f) - 1.0f);
     const float variance = seen ? sample_variance / larger(n, 1.0f) : 0.0f;
     const float distrust = s.trust_frames / larger(n, 1.0f);
     const float hit_samples = r.disparity[x] > 0.0f ? n : std::numeric_limits<float>::max();
     const int32_t bits = std::bit_cast<int32_t>(hit_samples);
-    youngest = bits < youngest ? bits : youngest;
+    min_tspp = bits < min_tspp ? bits : min_tspp;
     r.mean[x] = new_mean;
     r.square[x] = moment + new_mean * new_mean;
     r.samples[x] = n;
     r.variance[x] = variance;
     r.value[x] = new_mean;
-    r.inverse_variance[x] = 1.0f / (variance * (1.0f + distrust * distrust) + kMinVariance);
+    r.inverse_variance[x] = 1.0f / (variance * (1.0f + distrust * distrust) + kVarianceFloor);
   }
-  return std::bit_cast<float>(youngest);
+  return std::bit_cast<float>(min_tspp);
 }
 
 } // namespace
@@ -135,7 +135,7 @@ void correct_history(const FrameSamples& samples, const Guides& guides, const De
                            history.mean.row(y),        history.square.row(y),
                            history.samples.row(y),     &value_variance[static_cast<size_t>(y) * guides.size.width],
                            image.value.row(y),         image.inverse_variance.row(y)};
-      image.youngest[static_cast<size_t>(y)] = correct_row(static_cast<int>(guides.size.width), row, scales);
+      image.min_tspp[static_cast<size_t>(y)] = correct_row(static_cast<int>(guides.size.width), row, scales);
     }
   });
 }

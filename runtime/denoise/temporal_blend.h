@@ -10,26 +10,29 @@
 
 namespace packtrace {
 
-/// Adds a frame's samples to the slow and the fast history in place: x += (sample - x) / min(n + 1, longest).
-/// Samples that are negative or not finite count as absent, samples above 1 as 1; without one a pixel keeps its
-/// history. Also lists what local statistics need.
-/// @param ao one value per pixel of the guides' size
+/// Adds a frame's samples to the slow and the fast history in place: x += (sample - x) / min(n + 1, longest), where n
+/// is the history length and longest is max_tspp for the slow and fast_frames for the fast history. Negative and
+/// non-finite samples are ignored, and the pixel keeps its history. Samples above 1 are clamped to 1.
+/// @param ao one value per pixel, rows top to bottom
+/// @param samples out: the input of the local statistics
 void accumulate(std::span<const float> ao, const Guides& guides, const DenoiserConfig& config, History& history,
                 FrameSamples& samples);
 
-/// Corrects the slow history where the fast one says that the scene has changed, and estimates the noise.
+/// Corrects the slow history where the fast history shows that the scene has changed, and estimates the noise.
 ///
-/// The change of a pixel is the mean over its window of fast minus slow history. Both see the same edges in the same
-/// window, so unlike the distance of a pixel from its neighbours' mean this is 0 in expectation while nothing
-/// changes, however much AO varies in space. Where it exceeds change_gamma standard errors + change_tolerance the
-/// excess is added to the mean and the count of samples shrinks, so that detail follows within a few frames. The 3 x 3
-/// window does the same for changes too small for the wide window.
+/// The change at a pixel is the mean over its window of the fast minus the slow history. Both histories contain the
+/// same spatial edges, so the expected change is 0 while the scene stands still, however much AO varies in space.
+/// (Comparing a pixel with its neighbours' mean does not have this property.) Where the change exceeds change_gamma
+/// standard errors + change_tolerance, the excess is added to the mean and the sample count is reduced, so that detail
+/// recovers within a few frames. A 3 x 3 window is tested in the same way to find changes in areas too small for the
+/// wide window; the larger of the two corrections is applied.
 ///
-/// @param value_variance out, one entry per pixel: variance of history.mean, AO squared; the variance of samples is
-///        that of the history, held up by the window's while the history is short; 0 without history
-/// @param image out: history.mean and the precision for the blurs to reckon with. A few samples are skewed and say
-///        little about their variance, so differences between young pixels are no evidence of an edge: their variance
-///        is taken (1 + (blur_trust_frames / tspp)^2) times as large.
+/// @param value_variance out, one entry per pixel: variance of history.mean, AO squared; 0 without history. It is the
+///        sample variance divided by tspp. The sample variance blends the history's own variance with the window's
+///        variance, which dominates while the history is short.
+/// @param image out: history.mean and the precision for the blurs. A short history has a skewed distribution and a
+///        poor variance estimate, so differences between young pixels are weak evidence of an edge. The variance used
+///        for the precision is therefore multiplied by 1 + (blur_trust_frames / tspp)^2.
 void correct_history(const FrameSamples& samples, const Guides& guides, const DenoiserConfig& config, History& history,
                      std::span<float> value_variance, NoisyImage& image);
 

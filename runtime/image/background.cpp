@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::string_view kSky = "sky", kTransparent = "transparent";
 
-/// Those of CSS, where CSS has them.
+/// CSS colours, except darkgrey, which is darker here.
 constexpr std::array<std::pair<std::string_view, uint32_t>, 16> kColors{{{"white", 0xffffff},
                                                                          {"black", 0x000000},
                                                                          {"grey", 0x808080},
@@ -47,10 +47,10 @@ std::optional<uint32_t> hexadecimal(std::string_view digits) {
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value, 16);
   if (error != std::errc() || end != digits.data() + digits.size()) return std::nullopt;
   if (digits.size() == 6) return value;
-  return ((value & 0xf00) << 8 | (value & 0x0f0) << 4 | (value & 0x00f)) * 0x11; // "rgb" is "rrggbb"
+  return ((value & 0xf00) << 8 | (value & 0x0f0) << 4 | (value & 0x00f)) * 0x11; // expands "rgb" to "rrggbb"
 }
 
-/// Linear colour of a soft sky, lighter towards the bottom of the picture.
+/// Linear colour of a sky gradient that gets lighter towards the bottom of the picture.
 Vec3 sky(uint32_t y, uint32_t height) {
   const float t = (static_cast<float>(y) + 0.5f) / static_cast<float>(height);
   return glm::mix(Vec3(0.30f, 0.50f, 0.78f), Vec3(0.86f, 0.90f, 0.93f), std::pow(t, 0.8f));
@@ -80,7 +80,7 @@ Background parse_background(std::string_view text) {
   if (const auto rgb = hexadecimal(lower)) return {Background::Kind::kColor, color_of(*rgb)};
   const std::vector<std::string_view> known(background_names().begin(), background_names().end());
   throw Error(ErrorKind::kUsage, "--background " + std::string(text) +
-                                     ": give rrggbb in hexadecimal digits, transparent, sky, or a colour's name" +
+                                     ": must be a colour name, rrggbb in hexadecimal digits, transparent or sky" +
                                      did_you_mean_text(closest_name(lower, known)));
 }
 

@@ -10,28 +10,29 @@
 
 namespace packtrace {
 
-/// What stands in a preview where nothing was hit.
+/// Background of a preview, shown where no camera ray hits.
 struct Background {
   enum class Kind { kColor, kSky, kTransparent };
   Kind kind = Kind::kColor;
-  Vec3 color{0}; ///< of kColor: display values in [0,1], with the sRGB transfer
+  Vec3 color{0}; ///< for kColor: sRGB-encoded display values in [0,1]
 };
 
-/// A light grey with a trace of blue: told apart from unoccluded surfaces, which are white, and from all occluded ones,
-/// which are neutral.
+/// Light grey with a trace of blue. It differs from unoccluded surfaces, which are white, and from occluded surfaces,
+/// which are neutral grey.
 inline constexpr Vec3 kDefaultBackground{0.79f, 0.82f, 0.86f};
 
-/// The names that parse_background() knows, "sky" and "transparent" among them.
+/// Names that parse_background() accepts, including "sky" and "transparent".
 const std::vector<std::string>& background_names();
 
-/// A name of background_names(), or rrggbb or rgb in hexadecimal digits, with "#" or without, as a shell takes an
-/// unquoted "#" for a comment. Case does not matter. Throws Error(kUsage) for others.
+/// Parses a name from background_names(), or rrggbb or rgb in hexadecimal digits. The "#" is optional, because shells
+/// start a comment at an unquoted "#". Case is ignored. Throws Error(kUsage) for any other text.
 Background parse_background(std::string_view text);
 
-/// A preview in front of a background. Partial coverage mixes linear light.
+/// Composites a preview over a background. Colours are mixed in linear light.
 /// @param preview three channels of display values
-/// @param coverage of each pixel, in [0,1]
-/// @return display values of three channels; of four for kTransparent, the last being the coverage
+/// @param coverage one value per pixel, in [0,1]
+/// @return display values with three channels; for kTransparent four channels, where alpha is the coverage and colours
+///         are not premultiplied
 Image over_background(const Image& preview, std::span<const float> coverage, const Background& background);
 
 } // namespace packtrace

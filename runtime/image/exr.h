@@ -17,66 +17,69 @@ namespace packtrace {
 /// How one channel is stored in an EXR file.
 enum class ExrType : uint8_t { kHalf, kFloat, kUint };
 
-/// One group of channels to write, looking at the caller's samples. A layer "normal" with channels X, Y, Z becomes
-/// normal.X, normal.Y, normal.Z; with the one channel "" it becomes just "normal"; a layer "" with channels R, G, B
-/// becomes plain R, G, B.
+/// A group of channels to write. It refers to the caller's samples. The layer "normal" with channels X, Y, Z is stored
+/// as normal.X, normal.Y, normal.Z; with a single channel "" it is stored as "normal"; the layer "" with channels
+/// R, G, B is stored as R, G, B.
 struct Layer {
   std::string name;
   std::vector<std::string> channels;
-  /// size.pixels() * channels.size() samples, interleaved; integers are stored as such whatever `half` says.
+  /// size.pixels() * channels.size() samples, interleaved. Integers are stored as 32-bit integers, ignoring `half`.
   std::variant<std::span<const float>, std::span<const uint32_t>> data;
-  bool half = false; ///< store as 16-bit floats: 11 significant bits, magnitudes above 65504 become infinite
+  bool half = false; ///< store floats with 16 bits: 11 significant bits, magnitudes above 65504 become infinite
 };
 
 using ExrAttribute = std::variant<int, double, std::string>;
 using ExrAttributes = std::map<std::string, ExrAttribute>;
 
-/// One single-part scan-line EXR file with lossless ZIP compression. The bytes depend on nothing but the arguments.
-/// Throws Error(kUsage) where the image is empty or too large, layers name a channel twice or have the wrong sample
-/// count, or an attribute has the name of one of the format's own.
+/// Encodes a single-part scan-line EXR file with lossless ZIP compression. The bytes depend on the arguments only.
+/// Throws Error(kUsage) if the image is empty or too large, a channel name is empty, too long or used twice, a layer
+/// has the wrong sample count, or an attribute has the name of a standard attribute. Throws Error(kIo) if OpenEXR
+/// fails.
 std::vector<std::byte> encode_exr(ImageSize size, std::span<const Layer> layers, const ExrAttributes& attributes = {});
 
-/// encode_exr() to a file. Throws Error(kIo) where writing fails.
+/// Writes encode_exr() to a file. Throws like encode_exr(), and Error(kIo) if writing fails.
 void write_exr(const std::filesystem::path& path, ImageSize size, std::span<const Layer> layers,
                const ExrAttributes& attributes = {});
 
-/// One channel as the file has it.
+/// A channel of a file.
 struct ExrChannel {
-  std::string name; ///< full: "normal.X"
+  std::string name; ///< full name, such as "normal.X"
   ExrType type = ExrType::kHalf;
 };
 
-/// One group of channels of a file.
+/// A group of channels of a file.
 struct ExrLayer {
-  std::string name;                 ///< "" for plain channels that have no group of their own (R, G, B, A, Y)
-  std::vector<ExrChannel> channels; ///< in reading order: R, G, B, A first, the others by name
+  std::string name;                 ///< channel name up to its last dot; "" for the plain channels R, G, B, A, Y
+  std::vector<ExrChannel> channels; ///< decoding order: R, G, B, A first, then the others by name
 };
 
-/// What an EXR file holds, from its header alone.
+/// Contents of an EXR file's header.
 struct ExrInfo {
-  ImageSize size; ///< of the data window
+  ImageSize size; ///< size of the data window
   std::vector<ExrLayer> layers;
-  ExrAttributes attributes; ///< those of type int, float, double and string
+  ExrAttributes attributes; ///< attributes of type int, float, double and string
 };
 
-/// Throws like decode_exr().
+/// Reads the header of a file in memory. Throws like decode_exr().
 ExrInfo exr_info(std::span<const std::byte> bytes, std::string_view name);
 
-/// The layer of that name; where it is empty "ao", else the plain colours, else the only layer.
-/// Throws Error(kInput), listing the layers, where there is no such layer or the choice is not clear.
+/// Returns the layer with this name. If the name is empty, returns the layer "ao", else the plain colour channels, else
+/// the only layer. Throws Error(kInput) listing the layers if there is no such layer or the choice is ambiguous.
+/// @param name file name for messages
 const ExrLayer& choose_layer(const ExrInfo& info, std::string_view layer, std::string_view name);
 
-/// Decodes one layer of a file in memory, channels in the order of ExrLayer, integers as the nearest float.
-/// @param name for messages, usually the path
-/// @param layer which one; empty: see choose_layer()
-/// Throws Error(kInput) for damaged or truncated files, for claims about sizes that the file's length cannot back,
-/// and for missing layers; Error(kUnsupported) for multi-part, deep and subsampled images.
+/// Decodes one layer of a file in memory. Channels are in the order of ExrLayer; integers become the nearest float.
+/// @param name file name for messages, usually the path
+/// @param layer layer name; if empty, choose_layer() decides
+/// Throws Error(kInput) for damaged or truncated files, image sizes that are implausible for the file's length, and
+/// missing layers; Error(kUnsupported) for multi-part, deep and subsampled images.
 Image decode_exr(std::span<const std::byte> bytes, std::string_view name, std::string_view layer = {});
 
-/// Decodes a layer of one integer channel without rounding, such as instance ids. Throws like decode_exr().
+/// Decodes a layer with a single integer channel without rounding, such as instance ids. Throws like decode_exr(), and
+/// Error(kInput) for layers of another kind.
 std::vector<uint32_t> decode_exr_uint(std::span<const std::byte> bytes, std::string_view name, std::string_view layer);
 
-/// decode_exr() of a file. Throws Error(kInput) also where it cannot be read.
+/// Reads and decodes a file. Throws like decode_exr(), and Error(kInput) if the file cannot be read.
 Image read_exr(const std::filesystem::path& path, std::string_view layer = {});
 
 } // namespace packtrace

@@ -25,10 +25,11 @@ namespace {
 
 constexpr size_t kMaxChannels = 1024;
 constexpr uint32_t kMaxTileSide = 8192, kMinTileSide = 8;
-/// More than any of the format's lossless codecs can shrink; a file may claim that many times its own length, so that
-/// a few hundred bytes cannot demand gigabytes. Small images are allowed in any case.
+/// Maximum accepted ratio of decoded size to file size, above the compression ratio of EXR's lossless codecs. It keeps
+/// a file of a few hundred bytes from requesting gigabytes of memory. Images of at most kAlwaysAcceptedBytes are always
+/// accepted.
 constexpr uint64_t kMaxRatio = 2048;
-constexpr uint64_t kFreeBytes = uint64_t{64} << 20;
+constexpr uint64_t kAlwaysAcceptedBytes = uint64_t{64} << 20;
 
 [[noreturn]] void fail(std::string_view name, const std::string& what, ErrorKind kind = ErrorKind::kInput) {
   throw FileError(kind, std::string(name), what);
@@ -53,7 +54,7 @@ private:
   uint64_t position_ = 0;
 };
 
-/// The data window's size, once the file is known to be long enough to fill it.
+/// Returns the data window's size. Throws unless the size is plausible for the file's length.
 ImageSize checked_size(const ExrHeader& header, uint64_t file_bytes, std::string_view name) {
   const uint64_t width = header.width(), height = header.height(), pixel_bytes = header.pixel_bytes();
   if (width < 1 || height < 1) fail(name, "damaged EXR file: it has no pixels");
@@ -65,14 +66,15 @@ ImageSize checked_size(const ExrHeader& header, uint64_t file_bytes, std::string
       fail(name, "EXR tile size is not supported", ErrorKind::kUnsupported);
   }
   if (width > kMaxImageSide || height > kMaxImageSide ||
-      std::max(width * height * pixel_bytes, header.block_bytes()) > std::max(kFreeBytes, kMaxRatio * file_bytes))
+      std::max(width * height * pixel_bytes, header.block_bytes()) >
+          std::max(kAlwaysAcceptedBytes, kMaxRatio * file_bytes))
     fail(name, "image of " + std::to_string(width) + " x " + std::to_string(height) + " pixels and " +
                    std::to_string(header.channels.size()) + " channels is too large for a file of " +
                    std::to_string(file_bytes) + " bytes");
   return {static_cast<uint32_t>(width), static_cast<uint32_t>(height)};
 }
 
-/// A header that OpenEXR may be trusted with, and the size of its data window.
+/// A header that was checked before OpenEXR parsed it, and the size of its data window.
 struct CheckedHeader {
   Imf::Header header;
   ImageSize size;
@@ -92,7 +94,7 @@ CheckedHeader read_header(std::span<const std::byte> bytes, std::string_view nam
   return checked;
 }
 
-/// Runs OpenEXR's code; whatever it throws becomes an Error about this file.
+/// Runs a function that calls OpenEXR, and turns OpenEXR's exceptions into an Error about this file.
 template <class Function>
 auto guarded(std::string_view name, Function function) -> decltype(function()) {
   try {
@@ -106,7 +108,7 @@ auto guarded(std::string_view name, Function function) -> decltype(function()) {
   }
 }
 
-/// R, G, B, A first; X, Y, Z and everything else by name.
+/// Sort key of channels: R, G, B, A first, all others by name.
 std::pair<size_t, std::string> reading_order(const std::string& full_name) {
   const std::string last = full_name.substr(full_name.rfind('.') + 1);
   const size_t colour = std::string_view("RGBA").find(last);
@@ -145,7 +147,8 @@ ExrInfo info_of(const Imf::Header& header, ImageSize size) {
   return info;
 }
 
-/// Reads the channels of one layer, interleaved, as Sample (float, or uint32_t for integer channels).
+/// Reads the channels of a layer, interleaved.
+/// @tparam Sample float, or uint32_t for integer channels
 template <class Sample>
 std::vector<Sample> read_pixels(std::span<const std::byte> bytes, std::string_view name, const Imf::Header& header,
                                 ImageSize size, const ExrLayer& layer) {

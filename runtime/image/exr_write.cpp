@@ -22,7 +22,7 @@ namespace packtrace {
 
 namespace {
 
-/// Collects a file in memory, so that a full disk is noticed when the bytes are written in one go.
+/// Collects the file in memory. Writing it in one call afterwards reports a full disk reliably.
 class MemoryWriter : public Imf::OStream {
 public:
   MemoryWriter() : OStream("memory") {}
@@ -67,7 +67,7 @@ void check_layers(ImageSize size, std::span<const Layer> layers) {
 
 void add_attributes(Imf::Header& header, const ExrAttributes& attributes) {
   for (const auto& [name, value] : attributes) {
-    // Present already: one that the format itself defines.
+    // Attributes that the header already has are standard attributes of the format.
     if (name.empty() || name.size() > 255 || header.find(name) != header.end() || name == "tiles" ||
         name == "chunkCount")
       throw Error(ErrorKind::kUsage, "EXR attribute name \"" + name + "\" cannot be used");
@@ -77,7 +77,7 @@ void add_attributes(Imf::Header& header, const ExrAttributes& attributes) {
   }
 }
 
-/// 16-bit copies of a layer's samples: OpenEXR converts types only when reading.
+/// Converts a layer's samples to 16 bits, because OpenEXR converts types only when reading.
 std::vector<half> to_half(std::span<const float> samples) {
   std::vector<half> result(samples.size());
   std::transform(samples.begin(), samples.end(), result.begin(), [](float value) { return half(value); });
@@ -89,7 +89,7 @@ void add_slices(Imf::FrameBuffer& frame, Imf::PixelType type, const Layer& layer
                 const Sample* samples) {
   const size_t stride = sizeof(Sample) * layer.channels.size();
   for (size_t c = 0; c < layer.channels.size(); ++c) {
-    // OpenEXR's slices are for reading too, hence the cast; writing does not change them.
+    // OpenEXR uses the same non-const slices for reading and writing. Writing does not modify the samples.
     char* base = reinterpret_cast<char*>(const_cast<Sample*>(samples + c));
     frame.insert(full_name(layer.name, layer.channels[c]), Imf::Slice(type, base, stride, stride * size.width));
   }
@@ -104,7 +104,7 @@ std::vector<std::byte> encode_exr(ImageSize size, std::span<const Layer> layers,
   add_attributes(header, attributes);
 
   Imf::FrameBuffer frame;
-  std::vector<std::vector<half>> halves; // alive until the pixels are written
+  std::vector<std::vector<half>> halves; // must live until the pixels are written
   for (const Layer& layer : layers) {
     Imf::PixelType type = Imf::UINT;
     if (const auto* integers = std::get_if<std::span<const uint32_t>>(&layer.data)) {

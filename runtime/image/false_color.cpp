@@ -23,7 +23,7 @@ Image paint(ImageSize size, size_t values, Function color) {
 
 bool has_depth(float depth) { return depth > 0.0f && std::isfinite(depth); }
 
-/// Linear sRGB of an OKLab colour given by lightness, chroma and hue (radians). Source: B. Ottosson, "A perceptual
+/// Linear sRGB of an OKLab colour given by lightness, chroma and hue in radians. Source: B. Ottosson, "A perceptual
 /// color space for image processing", 2020.
 Vec3 linear_rgb_from_oklch(float lightness, float chroma, float hue_rad) {
   const float a = chroma * std::cos(hue_rad), b = chroma * std::sin(hue_rad);
@@ -38,8 +38,8 @@ Vec3 linear_rgb_from_oklch(float lightness, float chroma, float hue_rad) {
 } // namespace
 
 Vec3 depth_color(float t) {
-  // A helix around the grey axis keeps the lightness monotone, so the picture also reads in grey. Source: D. Green, "A
-  // colour scheme for the display of astronomical intensity images", 2011, equation 2; start 0.5, -1.5 rotations,
+  // A helix around the grey axis with monotone lightness, so the picture stays readable in greyscale. Source: D. Green,
+  // "A colour scheme for the display of astronomical intensity images", 2011, equation 2; start 0.5, -1.5 rotations,
   // hue 1, gamma 1.
   t = std::clamp(t, 0.0f, 1.0f);
   const float angle = 2.0f * std::numbers::pi_v<float> * (0.5f / 3.0f + 1.0f - 1.5f * t);
@@ -50,7 +50,7 @@ Vec3 depth_color(float t) {
 }
 
 Vec3 heat_color(float t) {
-  const float level = t > 0.0f ? std::min(t, 1.0f) * 3.0f : 0.0f; // NaN is 0
+  const float level = t > 0.0f ? std::min(t, 1.0f) * 3.0f : 0.0f; // NaN maps to 0
   return glm::clamp(Vec3(level, level - 1.0f, level - 2.0f), 0.0f, 1.0f);
 }
 
@@ -62,9 +62,9 @@ Vec3 level_color(uint32_t level) {
 }
 
 Vec3 id_color(uint32_t id) {
-  // Steps of the golden ratio keep neighbouring ids apart in hue for any number of ids.
+  // Golden-ratio steps keep the hues of consecutive ids apart for any number of ids.
   const auto fraction = static_cast<float>(id * 0x9e3779b9u) * 0x1p-32f;
-  // Bits mixed well enough that lightness does not follow hue. Source: A. Appleby, MurmurHash3 finalizer, 2011.
+  // The hash decorrelates lightness from hue. Source: A. Appleby, MurmurHash3 finalizer, 2011.
   uint32_t mixed = id;
   mixed = (mixed ^ (mixed >> 16)) * 0x85ebca6bu;
   mixed = (mixed ^ (mixed >> 13)) * 0xc2b2ae35u;
@@ -94,7 +94,9 @@ DepthRange depth_preview_range(std::span<const float> depth) {
   return {nearest, percentile(99)};
 }
 
-Vec3 depth_preview_color(float t) { return depth_color(0.95f - 0.85f * t); } // not down to black, which may be missing
+Vec3 depth_preview_color(float t) {
+  return depth_color(0.95f - 0.85f * t);
+} // stays above black, which may mean missing
 
 Image depth_preview(ImageSize size, std::span<const float> depth, Vec3 missing) {
   const DepthRange range = depth_preview_range(depth);

@@ -8,49 +8,52 @@
 
 namespace packtrace {
 
-// Pictures of data for people. All return three channels of display values in [0,1], with the sRGB transfer already
-// applied where there is any: write them with PngTransfer::kRaw. Spans have size.pixels() entries, else the behaviour
-// is undefined. `missing` is the display colour of pixels without a value.
+// False-colour pictures of data. All functions return three channels of display values in [0,1]. The sRGB transfer is
+// already applied where needed, so write them with PngTransfer::kRaw. Spans must have size.pixels() entries. `missing`
+// is the display colour of pixels without a value.
 
-/// Ambient occlusion as grey light, so that decoding the picture as sRGB gives the values back. Negative values
+/// Ambient occlusion as grey, sRGB-encoded, so that decoding the picture as sRGB returns the AO values. Negative values
 /// (kInvalidAo) are missing.
 Image ao_preview(ImageSize size, std::span<const float> ao, Vec3 missing = Vec3(0));
 
-/// Depth, near bright and far dark: logarithmic between the 1st and the 99th percentile of the positive finite depths,
-/// so that a single far pixel does not darken the rest. Other depths (0) are missing.
+/// Depth with near pixels bright and far pixels dark. The scale is logarithmic between the 1st and the 99th percentile
+/// of the positive finite depths, so that a few distant pixels do not compress the range. All other values (0) are
+/// missing.
 Image depth_preview(ImageSize size, std::span<const float> depth, Vec3 missing = Vec3(0));
 
-/// The depths between which depth_preview() tells colours apart: its percentiles. Both are 0 where there is no depth.
+/// The depth range that depth_preview() maps to colours: its two percentiles. Both are 0 without any valid depth.
 struct DepthRange {
   float nearest = 0.0f, farthest = 0.0f;
 };
 DepthRange depth_preview_range(std::span<const float> depth);
 
-/// The colour of depth_preview() at t of the way between the logarithms of the nearest and the farthest depth.
+/// Colour of depth_preview() at t in [0,1], interpolating the logarithm of depth from nearest (0) to farthest (1).
 Vec3 depth_preview_color(float t);
 
-/// Directions as 0.5 + 0.5 n; zero vectors are missing.
+/// Unit normals as 0.5 + 0.5 n; zero vectors are missing.
 Image normal_preview(ImageSize size, std::span<const Vec3> normals, Vec3 missing = Vec3(0));
 
-/// One colour per id, the same in every picture; kNoInstance is missing.
+/// A colour per id (id_color()), the same in every picture; kNoInstance is missing.
 Image id_preview(ImageSize size, std::span<const uint32_t> ids, Vec3 missing = Vec3(0));
 
-/// One hue per level of detail (level_color()), darker where `shade` is low, and a little for every other cluster.
-/// Pixels with a negative shade are missing.
+/// A hue per LOD level (level_color()), darkened where `shade` is low, with a slightly different brightness per
+/// cluster. Pixels with a negative shade are missing.
+/// @param shade usually AO, linear [0,1]
 Image level_preview(ImageSize size, std::span<const uint32_t> levels, std::span<const uint32_t> clusters,
                     std::span<const float> shade, Vec3 missing = Vec3(0));
 
-/// Errors from black (0) over red and yellow to white (`white` and more). Negative and NaN count as 0.
-/// @param white in (0, infinity)
+/// Error magnitudes from black (0) over red and yellow to white (at or above `white`). Negative values and NaN count
+/// as 0.
+/// @param white error shown as white, in (0, infinity)
 Image heat_map(ImageSize size, std::span<const float> errors, float white = 1.0f);
 
-/// Display colours of the maps above for one value in [0,1].
+/// Display colour of a value in [0,1] for depth pictures and heat maps.
 Vec3 depth_color(float t);
 Vec3 heat_color(float t);
-/// Display colour of a level of detail: grey for 0, then red, orange, yellow, green, teal, blue, violet, and pink for
-/// all from 8 on.
+/// Display colour of a LOD level: 0 grey, then red, orange, yellow, green, teal, blue, violet, and pink for levels from
+/// 8 on.
 Vec3 level_color(uint32_t level);
-/// Display colour of an id: hues far apart for neighbouring ids, lightness in three steps.
+/// Display colour of an id: consecutive ids get distant hues; lightness has three steps.
 Vec3 id_color(uint32_t id);
 
 } // namespace packtrace

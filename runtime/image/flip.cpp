@@ -12,14 +12,14 @@ namespace packtrace {
 
 namespace {
 
-/// What an observer sees of one image.
+/// An image as the observer perceives it.
 struct Seen {
-  std::array<ImagePlane, 3> color; ///< L, a, b with the Hunt adjustment, of the filtered image
-  ImagePlane edges;                ///< strength of edges and points in the unfiltered one
+  std::array<ImagePlane, 3> color; ///< Hunt-adjusted L, a, b of the filtered image
+  ImagePlane edges;                ///< edge and point strength in the unfiltered luminance
   ImagePlane points;
 };
 
-/// Y, Cx, Cz of the image clamped to [0,1].
+/// Planes Y, Cx, Cz of the image clamped to [0,1]. Pixels that do not count are black.
 std::array<ImagePlane, 3> opponent_planes(const Image& image, std::span<const uint8_t> valid) {
   std::array<ImagePlane, 3> planes;
   for (ImagePlane& plane : planes) plane.resize(image.size.pixels());
@@ -45,7 +45,7 @@ ImagePlane filter_contrast(const ImagePlane& plane, ImageSize size, const std::v
   return sum;
 }
 
-/// Length per pixel of the vector of a detector along x and along y.
+/// Feature strength per pixel: the length of the vector of the detector's responses along x and along y.
 ImagePlane detect(const ImagePlane& smooth_rows, const ImagePlane& smooth_columns, ImageSize size,
                   const std::vector<double>& detector) {
   ImagePlane strength = filter_rows(smooth_columns, size, detector);

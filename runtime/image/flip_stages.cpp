@@ -8,8 +8,8 @@ namespace packtrace {
 
 namespace {
 
-/// Columns are the XYZ of linear sRGB's red, green and blue. Source: IEC 61966-2-1:1999 primaries and white (x 0.3127,
-/// y 0.3290), as the exact fractions that follow from them.
+/// Matrix whose columns are the XYZ values of linear sRGB red, green and blue. Source: exact fractions derived from the
+/// primaries and the white point (x 0.3127, y 0.3290) of IEC 61966-2-1:1999.
 const glm::dmat3& xyz_from_rgb() {
   static const glm::dmat3 matrix(10135552.0 / 24577794.0, 2613072.0 / 12288897.0, 1425312.0 / 73733382.0,
                                  8788810.0 / 24577794.0, 8788810.0 / 12288897.0, 8788810.0 / 73733382.0,
@@ -22,13 +22,14 @@ const DVec3& white_xyz() {
   return white;
 }
 
-/// CIELAB's compressed cube root.
+/// The function f of CIELAB: a cube root with a linear segment near 0.
 double lab_f(double t) {
   constexpr double kDelta = 6.0 / 29.0;
   return t > kDelta * kDelta * kDelta ? std::cbrt(t) : t / (3.0 * kDelta * kDelta) + 4.0 / 29.0;
 }
 
-/// A Gaussian of the contrast sensitivity's Fourier transform: a sqrt(pi / b) exp(-pi^2 x^2 / b), x in degrees.
+/// A Gaussian of the contrast sensitivity function's Fourier transform: a sqrt(pi / b) exp(-pi^2 x^2 / b), with x in
+/// degrees.
 struct CsfGaussian {
   double a = 0.0, b = 1.0;
 };
@@ -45,9 +46,9 @@ std::vector<CsfGaussian> csf_gaussians(OpponentChannel channel) {
   return {};
 }
 
-constexpr double kWidestCsf = 0.04; // b of the widest Gaussian: all channels are cut off at three of its sigmas
+constexpr double kWidestCsf = 0.04; // b of the widest Gaussian; all kernels are cut off at three times its sigma
 
-/// Scales positive weights to sum 1 and negative ones to sum -1.
+/// Scales the positive weights to sum 1 and the negative weights to sum -1.
 void normalize_signs(std::vector<double>& kernel) {
   double positive = 0.0, negative = 0.0;
   for (const double weight : kernel) (weight > 0.0 ? positive : negative) += std::abs(weight);
@@ -89,7 +90,7 @@ double flip_color_error(double hyab) {
   const double most = flip_max_color_distance(), knee = 0.4 * most;
   const double distance = std::pow(hyab, 0.7);
   const double error = distance < knee ? 0.95 / knee * distance : 0.95 + 0.05 * (distance - knee) / (most - knee);
-  return std::min(error, 1.0); // rounding only
+  return std::min(error, 1.0); // only rounding can exceed 1
 }
 
 std::vector<CsfTerm> csf_terms(OpponentChannel channel, double pixels_per_degree) {
@@ -114,7 +115,7 @@ std::vector<CsfTerm> csf_terms(OpponentChannel channel, double pixels_per_degree
 }
 
 FeatureKernels feature_kernels(double pixels_per_degree) {
-  constexpr double kFeatureWidth = 0.082; // degrees, peak to trough of the human edge detector
+  constexpr double kFeatureWidth = 0.082; // peak-to-trough width of the human edge detector, degrees
   const double sigma = 0.5 * kFeatureWidth * pixels_per_degree;
   const int radius = static_cast<int>(std::ceil(3.0 * sigma));
   FeatureKernels kernels;

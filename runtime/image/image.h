@@ -8,20 +8,20 @@
 
 namespace packtrace {
 
-/// Largest width and height of an image this program reads or writes, pixels.
+/// Maximum width and height of images to read or write, in pixels.
 inline constexpr uint32_t kMaxImageSide = 65536;
-/// Most samples (pixels times channels) of an image this program reads: 4 GiB of floats.
+/// Maximum number of samples (pixels times channels) of images to read: 4 GiB of floats.
 inline constexpr uint64_t kMaxImageSamples = uint64_t{1} << 30;
 
-/// Float samples, rows top to bottom, channels interleaved: data[(y * width + x) * channels + c]. Colours are linear
-/// sRGB (Rec. 709 primaries) unless a function says otherwise.
+/// An image of float samples, rows top to bottom, channels interleaved: data[(y * width + x) * channels + c]. Colours
+/// are linear sRGB (Rec. 709 primaries) unless stated otherwise.
 struct Image {
   ImageSize size;
   uint32_t channels = 0;
   std::vector<float> data; ///< size.pixels() * channels
 
   Image() = default;
-  /// All samples set to fill.
+  /// Creates an image with all samples set to `fill`.
   Image(ImageSize image_size, uint32_t channel_count, float fill = 0.0f)
       : size(image_size), channels(channel_count), data(image_size.pixels() * channel_count, fill) {}
 
@@ -38,10 +38,10 @@ float srgb_from_linear(float linear);
 /// Inverse of srgb_from_linear().
 float linear_from_srgb(float encoded);
 
-/// The first `channels` channels of each pixel, 1 <= channels <= image.channels. Drops alpha, for example.
+/// Copies the first `channels` channels, 1 <= channels <= image.channels; for example to drop alpha.
 Image keep_channels(const Image& image, uint32_t channels);
 
-/// The three-channel image whose channels all equal a one-channel image.
+/// Expands a one-channel image to three equal channels.
 Image grey_to_rgb(const Image& image);
 
 } // namespace packtrace

@@ -9,7 +9,7 @@
 namespace packtrace {
 namespace {
 
-// Pixels at scale 1. A row of text is 7 pixels of capitals and 2 below the line.
+// Sizes in pixels at scale 1. A line of text has 7 pixels for capitals and 2 for descenders.
 constexpr uint32_t kMargin = 4, kText = 9, kBar = 8, kGap = 3;
 constexpr uint32_t kHeight = kMargin + kText + kGap + kBar + kGap + kText + kMargin;
 constexpr uint32_t kWidthPerScale = 640;
@@ -17,7 +17,7 @@ constexpr Vec3 kPaper(0.96f), kInk(0.12f);
 
 uint32_t scale_of(uint32_t width) { return std::max(1u, width / kWidthPerScale); }
 
-/// What stb_easy_font_print() writes: a corner of an axis-parallel rectangle in pixels at scale 1.
+/// The vertex layout of stb_easy_font_print(): a corner of an axis-aligned rectangle, in pixels at scale 1.
 struct Vertex {
   float x, y, z;
   std::array<unsigned char, 4> color;
@@ -32,12 +32,12 @@ public:
 
   uint32_t scale() const { return scale_; }
 
-  /// Width of a line of text, pixels.
+  /// Width of a line of text in pixels.
   uint32_t text_width(std::string text) const {
     return static_cast<uint32_t>(stb_easy_font_width(text.data())) * scale_;
   }
 
-  /// @param x, y of the text's upper left corner below the strip's, pixels
+  /// @param x, y upper left corner of the text relative to that of the strip, pixels
   void draw_text(uint32_t x, uint32_t y, std::string text) {
     constexpr size_t kMaxQuads = 4096;
     std::vector<Vertex> corners(kMaxQuads * 4);
@@ -50,7 +50,7 @@ public:
     }
   }
 
-  /// A rectangle in one colour; what lies outside the image is left out.
+  /// Fills a rectangle, clipped to the image.
   void fill(uint32_t x, uint32_t y, uint32_t width, uint32_t height, Vec3 color) {
     const uint32_t right = std::min(x + width, image_.size.width);
     const uint32_t bottom = std::min(top_ + y + height, image_.size.height);
@@ -72,11 +72,11 @@ void draw(Strip& strip, uint32_t width, const Legend& legend) {
   const uint32_t bar_top = (kMargin + kText + kGap) * s, text_top = bar_top + (kBar + kGap) * s;
   if (strip.text_width(legend.title) <= bar_width) strip.draw_text(margin, kMargin * s, legend.title);
   strip.fill(margin > s ? margin - s : 0, bar_top - s, bar_width + 2 * s, (kBar + 2) * s,
-             kInk); // pale colours end somewhere
+             kInk); // a dark frame, so that pale colours at the bar's ends remain visible
   for (uint32_t x = 0; x < bar_width; ++x)
     strip.fill(margin + x, bar_top, 1, kBar * s,
                legend.color((static_cast<float>(x) + 0.5f) / static_cast<float>(bar_width)));
-  uint32_t free_from = 0; // labels that would touch the last one are left out, the bar's end coming first
+  uint32_t free_from = 0; // labels that would touch the previous label or the bar's last label are left out
   const auto place = [&](const std::pair<float, std::string>& tick) {
     const uint32_t text = strip.text_width(tick.second), most = width > text ? width - text : 0;
     const auto middle = margin + static_cast<uint32_t>(tick.first * static_cast<float>(bar_width));

@@ -10,26 +10,27 @@
 
 namespace packtrace {
 
-/// What the colours of a picture mean.
+/// A colour scale for a false-colour picture.
 struct Legend {
-  std::string title;                                ///< "depth", with the unit
+  std::string title;                                ///< quantity and unit, such as "depth, world units"
   std::function<Vec3(float)> color;                 ///< display colour along the bar, t in [0,1]
-  std::vector<std::pair<float, std::string>> ticks; ///< where a label belongs on the bar, and the label; ordered
+  std::vector<std::pair<float, std::string>> ticks; ///< position on the bar in [0,1], ascending, and its label
 };
 
-/// The picture with a strip below it: a bar of colours, its labels and the title, as far as they fit. The pixels of the
-/// picture stay as they are. Letters are as tall as the picture's width allows.
+/// Appends a strip below the picture with the title, a colour bar and its labels. A title or label that does not fit is
+/// left out. The picture's own pixels do not change. Text grows with the picture's width.
 /// @param picture three or four channels of display values
 Image with_legend(const Image& picture, const Legend& legend);
 
-/// Height of the strip that with_legend() adds to a picture of this width, pixels.
+/// Height in pixels of the strip that with_legend() adds to a picture of this width.
 uint32_t legend_height(uint32_t width);
 
-/// A colour scale of discrete steps: bands of equal width, each labelled in its middle.
+/// A colour scale of discrete steps: bands of equal width, labelled in their middle.
+/// @param bands colour and label, at least one
 Legend banded_legend(std::string title, const std::vector<std::pair<Vec3, std::string>>& bands);
 
-/// Up to five labels at equal distances, of values between those of the bar's ends.
-/// @param value_at of t in [0,1]
+/// Five equidistant labels from t = 0 to t = 1, with three significant digits.
+/// @param value_at value at position t in [0,1]
 std::vector<std::pair<float, std::string>> even_ticks(const std::function<double(float)>& value_at);
 
 } // namespace packtrace

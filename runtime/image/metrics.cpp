@@ -9,7 +9,7 @@ namespace packtrace {
 
 namespace {
 
-/// Mean over a pixel's channels of f(difference).
+/// Returns a function of the pixel index: the mean of f(difference) over the pixel's channels.
 template <class Function>
 auto per_pixel(const Image& test, const Image& reference, Function f) {
   return [&test, &reference, f](size_t pixel) {

@@ -27,7 +27,7 @@ struct FreeMemory {
 template <class T>
 using Malloced = std::unique_ptr<T, FreeMemory>;
 
-std::string complaint_about(std::string_view name) { return std::string(name) + ": damaged PNG file: "; }
+std::string damaged_png_prefix(std::string_view name) { return std::string(name) + ": damaged PNG file: "; }
 
 template <class Sample>
 Image to_floats(const Sample* samples, ImageSize size, uint32_t channels, PngTransfer transfer) {
@@ -46,7 +46,7 @@ Image to_floats(const Sample* samples, ImageSize size, uint32_t channels, PngTra
 }
 
 uint8_t to_byte(float value) {
-  if (!(value > 0.0f)) return 0; // NaN too
+  if (!(value > 0.0f)) return 0; // also for NaN
   return static_cast<uint8_t>(std::min(value, 1.0f) * 255.0f + 0.5f);
 }
 
@@ -63,7 +63,7 @@ std::vector<std::byte> encode_png(const Image& image, PngTransfer transfer) {
   std::vector<uint8_t> samples(bytes);
   for (size_t i = 0; i < samples.size(); ++i) {
     const bool coded = transfer == PngTransfer::kSrgb && i % image.channels < colours;
-    // Clamp first: the transfer's power law is for [0,1].
+    // Clamp first, because the sRGB transfer is defined on [0,1].
     const float value = std::clamp(image.data[i], 0.0f, 1.0f);
     samples[i] = to_byte(coded ? srgb_from_linear(value) : value);
   }
@@ -76,7 +76,7 @@ std::vector<std::byte> encode_png(const Image& image, PngTransfer transfer) {
   const int stride = static_cast<int>(image.size.width * image.channels);
   if (stbi_write_png_to_func(append, &file, static_cast<int>(image.size.width), static_cast<int>(image.size.height),
                              static_cast<int>(image.channels), samples.data(), stride) == 0)
-    throw std::bad_alloc(); // the one way in which it fails
+    throw std::bad_alloc(); // stb_image_write fails for lack of memory only
   return file;
 }
 
@@ -84,21 +84,21 @@ void write_png(const std::filesystem::path& path, const Image& image, PngTransfe
   write_file_bytes(path, encode_png(image, transfer));
 }
 
-/// stb_image takes whatever memory holds for colours that a palette lacks.
+/// Throws Error(kInput) if a pixel's index exceeds the palette. stb_image would read uninitialised memory there.
 void check_palette(std::span<const std::byte> bytes, std::string_view name) {
-  const PngPalette palette = png_palette(bytes, complaint_about(name));
+  const PngPalette palette = png_palette(bytes, damaged_png_prefix(name));
   int width = 0, height = 0, channels = 0;
   const Malloced<stbi_uc> grey(stbi_load_from_memory(reinterpret_cast<const stbi_uc*>(palette.indices_as_grey.data()),
                                                      static_cast<int>(bytes.size()), &width, &height, &channels, 1));
-  if (!grey) return; // the decoder finds the same
+  if (!grey) return; // decoding the file itself will fail as well
   const std::span<const stbi_uc> indices(grey.get(), static_cast<size_t>(width) * static_cast<size_t>(height));
   if (std::ranges::any_of(indices, [&](stbi_uc v) { return v / palette.grey_step >= palette.colours.size(); }))
-    throw Error(ErrorKind::kInput, complaint_about(name) + "pixels have colours that the palette lacks");
+    throw Error(ErrorKind::kInput, damaged_png_prefix(name) + "pixels have colours that the palette lacks");
 }
 
 Image decode_png(std::span<const std::byte> bytes, std::string_view name, PngTransfer transfer) {
   if (bytes.size() > kMaxImageSamples) throw FileError(ErrorKind::kInput, std::string(name), "file is too large");
-  const PngHeader header = check_png_chunks(bytes, PngChecksums::kVerify, complaint_about(name));
+  const PngHeader header = check_png_chunks(bytes, PngChecksums::kVerify, damaged_png_prefix(name));
   const ImageSize size{header.width, header.height};
   if (size.width > kMaxImageSide || size.height > kMaxImageSide || size.pixels() > kMaxImageSamples / 4)
     throw FileError(ErrorKind::kInput, std::string(name),
@@ -112,7 +112,7 @@ Image decode_png(std::span<const std::byte> bytes, std::string_view name, PngTra
   const auto load = [&](auto* samples) {
     using Sample = std::remove_pointer_t<decltype(samples)>;
     const Malloced<Sample> owner(samples);
-    if (!samples) throw Error(ErrorKind::kInput, complaint_about(name) + "its pixels cannot be decoded");
+    if (!samples) throw Error(ErrorKind::kInput, damaged_png_prefix(name) + "its pixels cannot be decoded");
     image = to_floats(samples, size, static_cast<uint32_t>(channels), transfer);
   };
   if (header.bits_per_sample == 16)

@@ -23,7 +23,8 @@ std::array<double, kSsimWindow> window() {
   return weights;
 }
 
-/// Weighted means over the window of each pixel of value(pixel index); pixels that do not count have weight 0.
+/// Gaussian-weighted mean of value(pixel index) over the window around each pixel. Pixels that do not count have
+/// weight 0.
 class WindowMean {
 public:
   WindowMean(ImageSize size, std::span<const uint8_t> valid) : size_(size), valid_(valid), window_(window()) {

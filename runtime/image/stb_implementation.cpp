@@ -1,5 +1,5 @@
-// The one place where stb's code is compiled, PNG only and from memory only; its warnings are silenced in
-// CMakeLists.txt.
+// The only translation unit that compiles the code of stb: PNG from memory, nothing else. CMakeLists.txt silences its
+// warnings.
 #define STB_IMAGE_IMPLEMENTATION
 #define STBI_ONLY_PNG
 #define STBI_NO_STDIO

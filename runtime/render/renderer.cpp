@@ -26,7 +26,7 @@ ImageSize traced_size(const RenderConfig& config) {
   return {config.size.width * config.supersample, config.size.height * config.supersample};
 }
 
-/// Mean over frames of the raw AO, for renders without the denoiser.
+/// Accumulates the mean of raw AO over frames, for renders without the denoiser.
 class FrameMean {
 public:
   void add(const AoFrame& frame) {
@@ -38,7 +38,7 @@ public:
     std::vector<float> mean(sum_.size());
     std::transform(sum_.begin(), sum_.end(), mean.begin(),
                    [&](double sum) { return static_cast<float>(sum / static_cast<double>(frames_)); });
-    return mean; // kInvalidAo stays itself: the view does not move, so a pixel misses in every frame or in none
+    return mean; // kInvalidAo survives averaging: the view is fixed, so a pixel misses in all frames or in none
   }
 
 private:
@@ -50,7 +50,7 @@ Vec3 shade(const Material& material, Vec3 albedo, float ao) {
   return (material.flags & kEmissive) != 0 ? Vec3(1.0f) : albedo * ao;
 }
 
-/// Averages the sub-pixels that hit and fills every layer of the result.
+/// Box-filters the sub-pixels whose camera rays hit, and fills every layer except the LOD layers.
 void resolve(const SceneSource& source, const GBuffer& g, const std::vector<float>& ao, const std::vector<float>& raw,
              uint32_t factor, RenderedImage& image) {
   const std::span<const Material> materials = source.materials();
@@ -85,7 +85,7 @@ void resolve(const SceneSource& source, const GBuffer& g, const std::vector<floa
   }
 }
 
-/// Which detail each pixel shows.
+/// Fills the LOD layers: level, cluster and screen-space error per pixel.
 void resolve_detail(const SceneSource& source, const PrimaryCamera& view, const GBuffer& g, uint32_t factor,
                     RenderedImage& image) {
   const size_t n = image.size.pixels();
@@ -130,7 +130,7 @@ RenderedImage render_view(const SceneSource& source, const RayTracer& tracer, co
   const auto hit_pixels = static_cast<uint64_t>(
       std::count_if(g.instance.begin(), g.instance.end(), [](uint32_t id) { return id != kNoInstance; }));
   image.seen = hit_pixels > 0;
-  if (!image.seen && config.only_if_seen) return image;
+  if (!image.seen && config.stop_if_nothing_visible) return image;
   image.ao_rays = hit_pixels * config.ao.spp * config.frames;
 
   Occluders occluders{&source, &tracer, 0.0};

@@ -15,14 +15,15 @@
 
 namespace packtrace {
 
-/// One still view: how it is sampled over frames and how it is resolved.
+/// Settings for rendering one still view.
 struct RenderConfig {
-  ImageSize size;            ///< of the result
-  uint32_t supersample = 1;  ///< [1, 8]: traced and denoised at this multiple per axis, box-filtered at the end
-  uint32_t frames = 32;      ///< [1, 65536]: each traces AoConfig::spp samples a pixel
-  bool denoise = true;       ///< false: frames are averaged, nothing else
-  bool only_if_seen = false; ///< stop behind the camera rays where none of them hits
-  /// Above 0: fill the layers of RenderedImage about levels of detail. The error that was allowed, in traced pixels.
+  ImageSize size;           ///< size of the result in pixels
+  uint32_t supersample = 1; ///< [1, 8]: factor per axis at which the view is traced and denoised, then box-filtered
+  uint32_t frames = 32;     ///< [1, 65536]: each frame traces AoConfig::spp samples per pixel
+  bool denoise = true;      ///< false: raw frames are averaged
+  bool stop_if_nothing_visible = false; ///< return after the camera rays if all of them miss
+  /// Screen-space error of the LOD cut in traced pixels, for the report. If above 0, the LOD layers of RenderedImage
+  /// are filled.
   double lod_error_px = 0.0;
   AoConfig ao;
   DenoiserConfig denoiser;
@@ -31,51 +32,54 @@ struct RenderConfig {
 /// Throws Error(kUsage) naming the option that is out of range.
 void validate(const RenderConfig& config);
 
-/// Seconds of wall time, summed over frames.
+/// Wall time in seconds, summed over frames.
 struct RenderTimings {
-  double build_s = 0;   ///< decode and BVH
-  double primary_s = 0; ///< one frame: the view does not change
+  double build_s = 0;   ///< decoding and BVH construction
+  double primary_s = 0; ///< camera rays; traced once, since the view does not change
   double ao_s = 0;
   double denoise_s = 0;
 };
 
-/// What a view looks like, rows top to bottom. Pixels whose camera rays all miss: depth 0, instance kNoInstance, ao and
-/// ao_raw kInvalidAo, rest 0. With supersampling every layer is the mean over the sub-pixels that hit, and instance
-/// that of the first of them.
+/// Layers of a rendered view, rows top to bottom, one entry per pixel. Where all camera rays of a pixel miss, ao and
+/// ao_raw are kInvalidAo, instance is kNoInstance and all other layers are 0. With supersampling, layers are means over
+/// the sub-pixels that hit unless stated otherwise; instance is that of the first sub-pixel that hits.
 struct RenderedImage {
   ImageSize size;
-  bool seen = true;            ///< false: no camera ray hits; with RenderConfig::only_if_seen all layers are empty then
-  std::vector<float> ao;       ///< denoised, or the mean over all frames
-  std::vector<float> ao_raw;   ///< of the last frame alone
+  bool seen =
+      true; ///< false: all camera rays miss; with RenderConfig::stop_if_nothing_visible all layers are then empty
+  std::vector<float> ao;       ///< denoised; without the denoiser the mean over all frames
+  std::vector<float> ao_raw;   ///< AO of the last frame alone, not denoised
   std::vector<float> depth;    ///< camera-space z, world units
-  std::vector<float> coverage; ///< share of sub-pixels that hit something
+  std::vector<float> coverage; ///< fraction of sub-pixels whose camera ray hits, [0, 1]
   std::vector<Vec3> normal;    ///< world space
   std::vector<Vec3> albedo;    ///< linear sRGB
-  std::vector<Vec3> shaded;    ///< albedo x ao, emitters as they are: the scene under an even sky, linear sRGB
+  std::vector<Vec3> shaded;    ///< albedo times ao, as under a uniform white sky; emitters are white; linear sRGB
   std::vector<uint32_t> instance;
-  std::vector<uint32_t> lod;     ///< level of detail, of the last sub-pixel that hits; with RenderConfig::lod_error_px
-  std::vector<uint32_t> cluster; ///< a number of the cluster there; the same
-  std::vector<float> lod_error;  ///< largest bound of the distance from level 0, in traced pixels; the same
-  double lod_error_px = 0.0;     ///< that was allowed
+  // The LOD layers are empty unless RenderConfig::lod_error_px > 0.
+  std::vector<uint32_t> lod;     ///< LOD level at the last sub-pixel that hits
+  std::vector<uint32_t> cluster; ///< cluster number at the last sub-pixel that hits
+  std::vector<float> lod_error;  ///< largest error bound (distance from level 0) of the sub-pixels, in traced pixels
+  double lod_error_px = 0.0;     ///< copy of RenderConfig::lod_error_px
   RenderTimings timings;
   uint64_t ao_rays = 0;
   uint64_t primary_rays = 0;
 };
 
-/// What occlusion rays meet where that is coarser than what the camera sees; of the same instances.
+/// The geometry that occlusion rays are traced against: a coarser version of the instances that the camera sees.
 struct Occluders {
   const SceneSource* source = nullptr;
   const RayTracer* tracer = nullptr; ///< built from source
-  double error_px = 0.0;             ///< that surfaces may lie beside those that the camera sees; traced pixels
+  double error_px = 0.0;             ///< bound of the distance from the surfaces that the camera sees, in traced pixels
 };
 
-/// Called once, with what the camera sees. What it returns must live until render_view() is done.
+/// Called once, after the camera rays. `seen` is their G-buffer. The source and the tracer it returns must outlive
+/// render_view().
 using ChooseOccluders = std::function<Occluders(const GBuffer& seen, const PrimaryCamera& view)>;
 
-/// Renders one camera. tracer must have been built from source.
-/// The image depends on its arguments alone, not on the number of threads.
-/// @param choose_occluders none: occlusion rays meet what camera rays do
-/// Throws Error(kUsage) for a config out of range, Error(kCancelled), and what choose_occluders throws.
+/// Renders one camera. The image does not depend on the number of threads.
+/// @param tracer built from source
+/// @param choose_occluders optional; without it occlusion rays use source and tracer
+/// Throws Error(kUsage) for settings out of range, Error(kCancelled), and whatever choose_occluders throws.
 RenderedImage render_view(const SceneSource& source, const RayTracer& tracer, const Camera& camera,
                           const RenderConfig& config, Progress& progress, const ChooseOccluders& choose_occluders = {});
 

@@ -204,7 +204,7 @@ TEST(Habits, AnEmptyWordIsNoFile) { // for example an unset variable in quotes
 TEST(Habits, NumbersThatAreNoneAreNamed) {
   const CommandResult result = run_packtrace({"render", "x.ptk", "-o", "x.png", "--frames", "many"});
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_TRUE(contains(result.err, "--frames: 'many' is not a number")) << result.err;
+  EXPECT_TRUE(contains(result.err, "--frames: 'many' is not a valid number")) << result.err;
 }
 
 TEST(Habits, ThreadsMayBeSetForAllCommands) {

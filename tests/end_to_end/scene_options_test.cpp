@@ -67,7 +67,7 @@ TEST_F(SceneOptions, InfoSaysTheSameInText) {
   for (const char* part :
        {"shapes   trianglemesh 1   (0 skipped, 0 absent)", "materials by kind   glass 1\n",
         "camera   perspective 10x3 \"a.exr\"\n", "world 1 of 2\n",
-        "animated   shapes 1   instances 0   cameras 0   (shown as at time 3)\n", "ignored   light sources 1\n"})
+        "animated   shapes 1   instances 0   cameras 0   (evaluated at time 3)\n", "ignored   light sources 1\n"})
     EXPECT_NE(result.out.find(part), std::string::npos) << part << "\nis not in\n" << result.out;
 }
 

@@ -85,8 +85,7 @@ TEST_F(FilesOfAScene, NoErrorReplacesThem) {
       "bake", scene_, "-o", bench_ / "x.ptk", "--strict", "--json", bench_ / "part.json", "--force"};
   const CommandResult result = run_packtrace(command);
   EXPECT_EQ(result.exit_code, 3);
-  EXPECT_TRUE(contains(result.err, "part.json: holds something else than JSON, so the error is not written there"))
-      << result.err;
+  EXPECT_TRUE(contains(result.err, "part.json: not a JSON file, so the error is not written to it")) << result.err;
   EXPECT_EQ(read_text(bench_ / "part.json"), "Nonsense\n" + kTriangles);
 }
 
@@ -119,7 +118,7 @@ TEST(CompressedScene, WhatIsNoSceneIsRefusedAsIfItWereNotCompressed) {
   write_text(bench / "zeros.gz", gzip(std::string(1 << 20, '\0')));
   const CommandResult zeros = run_packtrace({"bake", bench / "zeros.gz", "-o", bench / "x.ptk"});
   EXPECT_EQ(zeros.exit_code, 3);
-  EXPECT_TRUE(contains(zeros.err, "not a text file, so no pbrt-v3 scene")) << zeros.err;
+  EXPECT_TRUE(contains(zeros.err, "not a text file, so not a pbrt-v3 scene")) << zeros.err;
   write_text(bench / "mesh.gz", gzip(kPlyText));
   EXPECT_TRUE(contains(run_packtrace({"info", bench / "mesh.gz"}).err, "a PLY mesh, not a scene"));
   write_text(bench / "cut.gz", without_end(gzip("WorldBegin\n" + kTriangles + "WorldEnd\n"), 9));
@@ -187,8 +186,7 @@ TEST(CameraOfAScene, IsLeftOutBehindAnIgnoredTransformAndTheEndSaysSo) {
   const Workbench bench;
   const std::string scene = bench / "scene.pbrt", baked = bench / "scene.ptk";
   write_text(scene, ball_scene("Transform [1 0 0 0  0 1 0 0  0 0 1 .5  0 0 4 1] Camera \"perspective\""));
-  const std::string line =
-      "1 camera is left out, as the errors above say; without one, render frames the whole scene\n";
+  const std::string line = "1 camera was skipped because of the errors above; render will show the whole scene\n";
   for (const std::vector<std::string>& command :
        std::vector<std::vector<std::string>>{{"info", scene}, {"bake", scene, "-o", baked}}) {
     const CommandResult result = run_packtrace(command);
@@ -201,7 +199,7 @@ TEST(CameraOfAScene, IsLeftOutBehindAnIgnoredTransformAndTheEndSaysSo) {
   for (const std::string& input : {scene, baked}) {
     const CommandResult result =
         run_packtrace({"render", input, "-o", bench / "x.png", "--force", "--frames", "1", "--json", "-"});
-    EXPECT_TRUE(contains(result.err, "no camera; framing the scene's bounds")) << result.err;
+    EXPECT_TRUE(contains(result.err, "no camera; showing the whole scene")) << result.err;
     const nlohmann::json report = nlohmann::json::parse(result.out, nullptr, false);
     EXPECT_EQ(report["camera"],
               (nlohmann::json{{"index", nullptr}, {"frames_scene", true}, {"reason", "the scene has no camera"}}));
@@ -221,8 +219,9 @@ TEST(CameraOfAScene, ThatSeesNothingGivesWayToOneThatFramesTheScene) {
     command.insert(command.end(), input.begin(), input.end());
     const CommandResult result = run_packtrace(command);
     EXPECT_EQ(result.exit_code, 0) << result.err;
-    EXPECT_TRUE(contains(
-        result.err, "warning: camera 0 sees nothing of the scene; framing its bounds (--camera 0 keeps the camera)"))
+    EXPECT_TRUE(
+        contains(result.err,
+                 "warning: camera 0 sees nothing of the scene; showing the whole scene (--camera 0 keeps the camera)"))
         << result.err;
     const nlohmann::json report = nlohmann::json::parse(result.out, nullptr, false);
     EXPECT_EQ(report["camera"],

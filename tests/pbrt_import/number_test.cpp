@@ -202,9 +202,9 @@ TEST(NumberParsing, HalfwayBetweenDoubles) {
   NumberBuffer buffer;
   Tally tally;
   for (uint64_t i = 0; i < kLong / kShare / 2; ++i) {
-    // (2 m + 1) 2^-k, where m has 54 bits: a quarter of the doubles' spacing away from a double. Its decimals are those
-    // of an integer divided by 10^k.
-    const auto value = static_cast<long double>((uint64_t{1} << 53 | (random() >> 11)) << 1 | 1);
+    // (2 m + 1) 2^-k, where m has 53 bits: halfway between two doubles. Its decimals are those of an integer divided by
+    // 10^k.
+    const auto value = static_cast<long double>((uint64_t{1} << 52 | (random() >> 12)) << 1 | 1);
     const long double middle = std::ldexp(value, -static_cast<int>(below(random, 60)));
     for (const char* const behind : {"", "0", "00000000000000000000000000000001", "1"}) {
       buffer.clear();

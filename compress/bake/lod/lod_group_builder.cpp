@@ -52,9 +52,9 @@ private:
     for (const LodTriangle& t : mesh_.triangles) errors.push_back(t.error);
     const std::vector<TriangleSubstitute> stands = drop_loose_pieces(mesh_, {target, share_of_triangles(kWorthwhile)});
     for (SurfaceLink& link : links_.links) {
-      const TriangleSubstitute& stand = stands[link.after];
-      link.after = stand.triangle;
-      double& bound = links_.bounds[link.before];
+      const TriangleSubstitute& stand = stands[link.simplified];
+      link.simplified = stand.triangle;
+      double& bound = links_.bounds[link.source];
       dropped_ |= stand.dropped;
       if (stand.dropped) bound = std::max(bound, mesh_.triangles[stand.triangle].error);
     }

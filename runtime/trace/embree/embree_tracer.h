@@ -25,7 +25,7 @@ struct EmbreeConfig {
   bool robust = true;
   bool compact = false; ///< smaller and slower trees
   /// Pays for vertices, indices and trees; no limit without one.
-  std::optional<MemoryBudget> memory;
+  std::optional<MemoryBudget> memory = std::nullopt;
 };
 
 /// Traces a SceneSource with Embree 3: triangles are decoded to floats once, and Embree builds its trees over them.

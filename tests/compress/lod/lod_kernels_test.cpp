@@ -164,7 +164,7 @@ TEST(Overlay, PiecesBoundTheDistanceOfTheTriangle) {
   for (size_t t = 0; t < fine.triangles.size(); ++t) {
     const std::array<DVec3, 3> p = fine.corners(t);
     std::vector<OverlayPiece> pieces;
-    ASSERT_TRUE(overlay.lay(p, DVec3(0, 0, 1), all, pieces)) << t;
+    ASSERT_TRUE(overlay.overlay(p, DVec3(0, 0, 1), all, pieces)) << t;
     double bound = 0.0, nearest_bound = 0.0;
     for (const OverlayPiece& piece : pieces) {
       bound = std::max(bound, piece.distance);
@@ -189,7 +189,7 @@ TEST(Overlay, ACoincidingTriangleIsOnePiece) {
   Overlay overlay(s.view());
   for (const uint32_t t : all) {
     std::vector<OverlayPiece> pieces;
-    ASSERT_TRUE(overlay.lay(s.corners(t), s.view().area_normal(t), all, pieces));
+    ASSERT_TRUE(overlay.overlay(s.corners(t), s.view().area_normal(t), all, pieces));
     ASSERT_EQ(pieces.size(), 1u);
     EXPECT_EQ(pieces[0].triangle, t);
     EXPECT_EQ(pieces[0].inner_sides, 0u);
@@ -202,20 +202,20 @@ TEST(Overlay, HolesAndSecondLayersAreNoCover) {
   Overlay overlay(s.view());
   const std::array<DVec3, 3> p = other.corners(8);
   std::vector<OverlayPiece> pieces;
-  ASSERT_TRUE(overlay.lay(p, DVec3(0, 0, 1), s.all(), pieces));
+  ASSERT_TRUE(overlay.overlay(p, DVec3(0, 0, 1), s.all(), pieces));
   const std::vector<OverlayPiece> whole = pieces;
   ASSERT_GE(whole.size(), 2u);
   for (const OverlayPiece& left_out : whole) {
     std::vector<uint32_t> with_hole = s.all();
     std::erase(with_hole, left_out.triangle);
-    EXPECT_FALSE(overlay.lay(p, DVec3(0, 0, 1), with_hole, pieces));
+    EXPECT_FALSE(overlay.overlay(p, DVec3(0, 0, 1), with_hole, pieces));
   }
   std::vector<uint32_t> twice = {whole[0].triangle, whole[0].triangle};
   for (const OverlayPiece& piece : whole) twice.push_back(piece.triangle);
-  EXPECT_FALSE(overlay.lay(p, DVec3(0, 0, 1), twice, pieces));
-  EXPECT_FALSE(overlay.lay(p, DVec3(0, 0, -1), s.all(), pieces)); // seen from behind
-  EXPECT_FALSE(overlay.lay(p, DVec3(1, 0, 0), s.all(), pieces));  // edge-on
-  EXPECT_EQ(pieces.size(), whole.size());                         // nothing was appended
+  EXPECT_FALSE(overlay.overlay(p, DVec3(0, 0, 1), twice, pieces));
+  EXPECT_FALSE(overlay.overlay(p, DVec3(0, 0, -1), s.all(), pieces)); // seen from behind
+  EXPECT_FALSE(overlay.overlay(p, DVec3(1, 0, 0), s.all(), pieces));  // edge-on
+  EXPECT_EQ(pieces.size(), whole.size());                             // nothing was appended
 }
 
 TEST(Overlay, HalfCoveredTwiceIsNotCovered) {
@@ -228,8 +228,8 @@ TEST(Overlay, HalfCoveredTwiceIsNotCovered) {
   const std::array<DVec3, 3> p{DVec3(0, 0, 0), DVec3(2, 0, 0), DVec3(0, 2, 0)};
   std::vector<OverlayPiece> pieces;
   // although the areas add up to the triangle's
-  EXPECT_FALSE(Overlay(layers.view()).lay(p, DVec3(0, 0, 1), layers.all(), pieces));
-  EXPECT_TRUE(Overlay(whole.view()).lay(p, DVec3(0, 0, 1), whole.all(), pieces));
+  EXPECT_FALSE(Overlay(layers.view()).overlay(p, DVec3(0, 0, 1), layers.all(), pieces));
+  EXPECT_TRUE(Overlay(whole.view()).overlay(p, DVec3(0, 0, 1), whole.all(), pieces));
 }
 
 TEST(EdgeHeap, GivesEdgesByCostThenNumber) {

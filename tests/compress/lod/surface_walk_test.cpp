@@ -144,7 +144,7 @@ protected:
 
 TEST_P(SurfaceBoundOf, EveryTriangleBeforeIsWithinItsBoundOfThoseLinkedToIt) {
   std::vector<std::vector<uint32_t>> linked(s_.triangles.size());
-  for (const SurfaceLink& link : links_.links) linked[link.before].push_back(link.after);
+  for (const SurfaceLink& link : links_.links) linked[link.source].push_back(link.simplified);
   for (uint32_t t = 0; t < linked.size(); ++t) {
     EXPECT_FALSE(linked[t].empty()) << "triangle " << t;
     for (const DVec3& at : points_in(before_.corner(t, 0), before_.corner(t, 1), before_.corner(t, 2), 8)) {
@@ -161,7 +161,7 @@ TEST_P(SurfaceBoundOf, EveryTriangleAfterIsWithinItsErrorOfThoseLinkedToIt) {
     for (const DVec3& at : points_in(after_.corner(s, 0), after_.corner(s, 1), after_.corner(s, 2), 24)) {
       double least = 1e300;
       for (uint32_t i = linked.ends[s]; i < linked.ends[s + 1]; ++i)
-        least = std::min(least, before_.distance(at, linked.before[i]));
+        least = std::min(least, before_.distance(at, linked.source[i]));
       ASSERT_LE(least, s_.mesh.triangles[s].error + kRounding) << "triangle " << s;
     }
 }

@@ -25,7 +25,7 @@ struct Outcome {
   std::string out, err;
 };
 
-/// Runs a program whose only verb, "go", does `action`.
+/// Runs a program with a single verb, "go", which performs `action`.
 Outcome run(std::vector<const char*> arguments, std::function<int(const GlobalOptions&)> action) {
   CLI::App app("test");
   GlobalOptions globals;
@@ -96,7 +96,7 @@ TEST(CliSupport, ErrorsBecomeExitCodesAndOneLine) {
 }
 
 TEST(CliSupport, LostOutputIsAnIoError) {
-  struct Guard { // the lost stream is the process's own
+  struct Guard { // runs in a child process, because it redirects the stdout of its process
     static void run() {
       CLI::App app("test");
       GlobalOptions globals;

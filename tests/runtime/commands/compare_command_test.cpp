@@ -77,15 +77,15 @@ TEST(CompareCommand, EachLimitCanFail) {
     const Outcome failed = compare({a, b, option, fail, "--json", "-"});
     EXPECT_EQ(failed.code, 5) << option;
     EXPECT_EQ(failed.json()["passed"], false);
-    EXPECT_NE(failed.err.find("beyond its limit"), std::string::npos) << failed.err;
+    EXPECT_NE(failed.err.find("beyond the limit"), std::string::npos) << failed.err;
   }
 }
 
 TEST(CompareCommand, MissesAreLeftOutAndMismatchesReported) {
   const TemporaryFolder folder;
   std::vector<float> a(kSize.pixels(), 0.5f), b = a;
-  a[0] = b[0] = kInvalidAo; // misses in both
-  b[1] = kInvalidAo;        // in one
+  a[0] = b[0] = kInvalidAo; // no value in either image
+  b[1] = kInvalidAo;        // no value in one image
   const std::string file_a = write_ao(folder / "a.exr", a), file_b = write_ao(folder / "b.exr", b);
   const Outcome result = compare({file_a, file_b, "--json", "-"});
   EXPECT_EQ(result.code, 0);
@@ -97,7 +97,7 @@ TEST(CompareCommand, MissesAreLeftOutAndMismatchesReported) {
   EXPECT_NE(result.err.find("1 pixels have a value in only one"), std::string::npos) << result.err;
   EXPECT_EQ(compare({file_a, file_b, "--max-mismatch", "0.001"}).code, 5);
   EXPECT_EQ(compare({file_a, file_b, "--max-mismatch", "0.01"}).code, 0);
-  // Other layers have no such value: there -1 is a number.
+  // In other layers -1 is an ordinary value.
   EXPECT_EQ(compare({file_a, file_b, "--layer", "depth", "--metric", "mae", "--json", "-"}).json()["metrics"]["mae"],
             1.5 / static_cast<double>(kSize.pixels()));
 }
@@ -136,10 +136,10 @@ TEST(CompareCommand, WritesADifferencePictureOnce) {
   b[5] = 1.0f;
   const std::string file_b = write_ao(folder / "b.exr", b), diff = folder / "diff.png";
   EXPECT_EQ(compare({file_a, file_b, "--diff", diff, "--max-mae", "0"}).code, 5)
-      << "the picture is what a failure needs";
+      << "the difference picture is written although the limit is exceeded";
   const Image picture = read_png(diff, PngTransfer::kRaw);
   EXPECT_EQ(picture.size, kSize);
-  EXPECT_EQ(picture.pixel(5, 0)[2], 1.0f) << "beyond 0.25: white";
+  EXPECT_EQ(picture.pixel(5, 0)[2], 1.0f) << "errors above 0.25 are white";
   EXPECT_EQ(picture.pixel(6, 0)[0], 0.0f);
   EXPECT_EQ(compare({file_a, file_b, "--diff", diff}).code, 6) << "it exists already";
   for (const char* metric : {"rmse", "psnr", "ssim", "flip"})

@@ -154,7 +154,7 @@ TEST(OutputFile, KilledProcessesLeaveNothing) {
     int status = 0;
     ASSERT_EQ(waitpid(child, &status, 0), child);
     EXPECT_TRUE(WIFSIGNALED(status));
-    // At once, or else as soon as somebody writes there again.
+    // The file vanishes with the process, or else when the next output is written to the folder.
     remove_stale_output(folder.path());
     EXPECT_EQ(folder.files(), 0u);
   }
@@ -164,7 +164,7 @@ TEST(OutputFile, OnlyFilesOfDeadProcessesAreStale) {
   const TemporaryFolder folder;
   const pid_t child = fork();
   if (child == 0) std::_Exit(0);
-  ASSERT_EQ(waitpid(child, nullptr, 0), child); // and so its number is free
+  ASSERT_EQ(waitpid(child, nullptr, 0), child); // the child's process id is free now
   const auto name = [&](pid_t owner, int number) {
     return folder / (".packtrace-" + std::to_string(owner) + "-" + std::to_string(number) + ".tmp");
   };

@@ -12,7 +12,7 @@
 namespace packtrace {
 namespace {
 
-/// A display that writes to a file, with a clock that the test turns.
+/// A display that writes to a file and uses a clock set by the test.
 class Screen {
 public:
   explicit Screen(bool terminal, bool quiet = false)
@@ -62,7 +62,7 @@ TEST(ProgressDisplay, PlainOutputIsSparse) {
 TEST(ProgressDisplay, PlainOutputLeavesOutMomentsAndTrustsThatWorkWentOn) {
   Screen screen(false);
   Progress progress(screen.display().observer());
-  progress.begin("reading", 100); // never counted, yet the next phase began
+  progress.begin("reading", 100); // counts nothing, but is finished because the next phase begins
   screen.wait(2.0);
   progress.begin("measuring", 10);
   screen.wait(0.1);

@@ -14,8 +14,8 @@ using namespace synthetic;
 constexpr ImageSize kSize{64, 512};
 constexpr uint32_t kEdge = 32; ///< first column of the right side
 
-/// Denoises noise on the left of kEdge beside unoccluded pixels on the right; returns what of it reaches the right.
-/// Noise, so that values do not give the edge away: only guides can.
+/// Denoises an image with noise left of kEdge and AO 1 to its right. Returns the largest error on the right side. The
+/// left side is noisy so that the edge can be found from the guides only, not from the values.
 float worst_leak(const GBuffer& g, uint32_t frames) {
   AoDenoiser denoiser;
   float worst = 0;
@@ -37,7 +37,7 @@ GBuffer walls(const std::function<void(GBuffer&, size_t i, uint32_t x)>& change)
   return g;
 }
 
-TEST(DenoiserEdges, WithoutAnEdgeInTheGuidesNoiseDoesSpread) { // or the tests below could not fail
+TEST(DenoiserEdges, WithoutAnEdgeInTheGuidesNoiseDoesSpread) { // shows that the tests below can fail
   EXPECT_GT(worst_leak(wall(kSize), 1), 0.05f);
 }
 
@@ -52,7 +52,7 @@ TEST(DenoiserEdges, DepthStepOfATenthDoesNotLeak) {
 }
 
 TEST(DenoiserEdges, DepthStepBehindASteepSurfaceDoesNotLeak) {
-  EXPECT_LE(worst_leak(walls([&](GBuffer& g, size_t i, uint32_t x) { // disparity is linear on a plane
+  EXPECT_LE(worst_leak(walls([&](GBuffer& g, size_t i, uint32_t x) { // a slanted plane: disparity is linear in x
                          const float slope = 1.0f / (0.1f + 0.002f * static_cast<float>(x));
                          g.view_z[i] = x < kEdge ? slope : 2.0f * slope;
                          g.normal[i] = glm::normalize(Vec3(0.7f, 0, -0.7f));
@@ -88,7 +88,7 @@ TEST(DenoiserEdges, TiltedPlanesBlurLikeFlatOnes) {
                    [](uint32_t, uint32_t) { return expected(0.5f); });
   };
   const double tilted = rmse(walls([](GBuffer& g, size_t i, uint32_t x) {
-    g.view_z[i] = 1.0f / (0.05f + 0.004f * static_cast<float>(x)); // five times nearer on the right
+    g.view_z[i] = 1.0f / (0.05f + 0.004f * static_cast<float>(x)); // the right end is five times nearer
     g.normal[i] = glm::normalize(Vec3(1, 0, -0.2f));
   }));
   EXPECT_LE(tilted, 1.1 * rmse(wall(kSize)));

@@ -33,7 +33,7 @@ TEST(Reprojection, IntegerPansFetchTheSameBits) {
   for (Vec2& motion : g.motion_px) motion = Vec2(3, -2);
   History out;
   out.resize(size);
-  for (int y = 0; y < 21; ++y) std::fill_n(out.mean.row(y), 33, 0.5f); // what a rejection must overwrite
+  for (int y = 0; y < 21; ++y) std::fill_n(out.mean.row(y), 33, 0.5f); // a rejection must overwrite these values
   reproject(previous, previous.guides, derivatives, g.motion_px, DenoiserConfig{}, out);
   for (int y = 0; y < 21; ++y)
     for (int x = 0; x < 33; ++x) {
@@ -45,7 +45,7 @@ TEST(Reprojection, IntegerPansFetchTheSameBits) {
     }
 }
 
-/// Denoises a second frame whose guides changed; true if its pixels kept the history of the first.
+/// Denoises two frames with a change of the guides in between. Returns whether the pixels keep their history.
 bool keeps_history(const std::function<void(GBuffer&, size_t)>& change) {
   AoDenoiser denoiser;
   GBuffer g = wall(kSize);
@@ -56,17 +56,17 @@ bool keeps_history(const std::function<void(GBuffer&, size_t)>& change) {
 
 TEST(Reprojection, AnotherDepthNormalOrInstanceIsAnotherSurface) {
   EXPECT_TRUE(keeps_history([](GBuffer&, size_t) {}));
-  EXPECT_TRUE(keeps_history([](GBuffer& g, size_t i) { g.view_z[i] *= 1.01f; })); // the camera backs off a little
+  EXPECT_TRUE(keeps_history([](GBuffer& g, size_t i) { g.view_z[i] *= 1.01f; })); // the camera moves away slightly
   EXPECT_FALSE(keeps_history([](GBuffer& g, size_t i) { g.view_z[i] *= 1.1f; }));
   EXPECT_FALSE(keeps_history([](GBuffer& g, size_t i) { g.normal[i] = Vec3(0.8f, 0, -0.6f); }));
   EXPECT_FALSE(keeps_history([](GBuffer& g, size_t i) { g.instance[i] = 1; }));
   EXPECT_FALSE(keeps_history([](GBuffer& g, size_t i) { g.motion_px[i] = Vec2(1e30f, 0); }));
 }
 
-/// PSNR after 64 frames of a wall with soft occlusion that moves `pan` pixels a frame.
+/// PSNR after 64 frames of a wall with smooth occlusion that moves by `pan` pixels per frame.
 double psnr_of_pan(Vec2 pan) {
   DenoiserConfig config;
-  config.max_tspp = config.max_tspp_moving; // the same history for both
+  config.max_tspp = config.max_tspp_moving; // equal history lengths for still and moving images
   AoDenoiser denoiser(config);
   const auto p_at = [](float x, float y) { return 0.5f + 0.3f * std::sin(x * 0.15f) * std::cos(y * 0.2f); };
   double rmse = 0;
@@ -93,7 +93,7 @@ TEST(Reprojection, SubPixelPansLoseLittle) {
 
 TEST(AoDenoiser, DisoccludedSurfacesCatchUpInTwelveFrames) {
   const float p = 0.5f;
-  const auto covered = [](uint32_t f, uint32_t x, uint32_t y) { // a card that moves 16 pixels right at frame 40
+  const auto covered = [](uint32_t f, uint32_t x, uint32_t y) { // a card that moves right by 16 pixels in frame 40
     const uint32_t left = f < 40 ? 40 : 56;
     return x >= left && x < left + 40 && y >= 20 && y < 76;
   };
@@ -107,8 +107,9 @@ TEST(AoDenoiser, DisoccludedSurfacesCatchUpInTwelveFrames) {
     }
     const DenoisedAo& result = denoiser.next_frame(g, noise(kSize, p, f));
     if (f == 40) {
-      EXPECT_EQ(result.tspp[48 * kSize.width + 48], 1.0f);  // uncovered
-      EXPECT_EQ(result.tspp[48 * kSize.width + 75], 34.0f); // the card took its history along, as long as may be
+      EXPECT_EQ(result.tspp[48 * kSize.width + 48], 1.0f); // disoccluded
+      EXPECT_EQ(result.tspp[48 * kSize.width + 75],
+                34.0f); // on the card: max_tspp_moving frames of history, plus this frame
     }
     for (float ao : result.ao) ASSERT_TRUE(ao >= 0.0f && ao <= 1.0f);
     if (f != 51) continue;
@@ -118,7 +119,7 @@ TEST(AoDenoiser, DisoccludedSurfacesCatchUpInTwelveFrames) {
   }
 }
 
-/// Shares of a change of occlusion that are left 4, 8, 16 and 32 frames after it.
+/// Remaining fraction of an occlusion change 4, 8, 16 and 32 frames after the change.
 std::array<double, 4> ghost(float before, float after, Rect changed, const DenoiserConfig& config = {}) {
   AoDenoiser denoiser(config);
   std::array<double, 4> left{};
@@ -146,10 +147,10 @@ void expect_ghost_gone(const std::array<double, 4>& left) {
 
 TEST(AoDenoiser, GhostOfARemovedOccluderFades) {
   expect_ghost_gone(ghost(0.9f, 0.1f, {40, 20, 110, 76}));
-  expect_ghost_gone(ghost(0.1f, 0.9f, {40, 20, 110, 76})); // and of one that appears
+  expect_ghost_gone(ghost(0.1f, 0.9f, {40, 20, 110, 76})); // an occluder that appears
 }
 
-TEST(AoDenoiser, GhostOfAChangeWithinTheNoiseFadesToo) { // 0.15 in a noise of 0.375
+TEST(AoDenoiser, GhostOfAChangeWithinTheNoiseFadesToo) { // AO changes by 0.15, noise has a deviation of 0.375
   const std::array<double, 4> left = ghost(0.6f, 0.4f, {40, 20, 110, 76});
   EXPECT_LE(left[2], 0.22);
   EXPECT_LE(left[3], 0.12);
@@ -161,7 +162,7 @@ TEST(AoDenoiser, GhostOfAThinOccluderFades) {
   EXPECT_LE(left[3], 0.1);
 }
 
-TEST(AoDenoiser, WithoutCorrectionGhostsStay) { // or the tests above could not fail
+TEST(AoDenoiser, WithoutCorrectionGhostsStay) { // shows that the tests above can fail
   DenoiserConfig config;
   config.change_tolerance = 1.0f;
   EXPECT_GT(ghost(0.9f, 0.1f, {40, 20, 110, 76}, config)[3], 0.5);

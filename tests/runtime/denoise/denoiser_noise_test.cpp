@@ -20,7 +20,7 @@ TEST(AoDenoiser, ConstantAoStaysConstantUnderAnyGuides) {
   const AoFrame frame = samples(size, [](uint32_t, uint32_t) { return 0.37f; });
   for (uint32_t f = 0; f < 256; ++f) {
     GBuffer g = wall(size);
-    const uint32_t guides = f < 128 ? f : 128; // every frame other guides and motion, then still
+    const uint32_t guides = f < 128 ? f : 128; // new guides and motion in each of 128 frames, then still
     for (uint32_t i = 0; i < size.pixels(); ++i) {
       g.view_z[i] = uniform(i, 1, guides) < 0.1f ? 0.0f : 1.0f + 9.0f * uniform(i, 2, guides);
       if (uniform(i, 3, guides) < 0.5f)
@@ -94,7 +94,7 @@ TEST(AoDenoiser, TsppCountsValidFramesUpToTheCap) {
   const ImageSize size{40, 24};
   DenoiserConfig config;
   config.max_tspp = 10;
-  config.change_gamma = 10.0f; // no correction interferes
+  config.change_gamma = 10.0f; // disables the history correction in practice
   AoDenoiser denoiser(config);
   for (uint32_t f = 1; f <= 14; ++f) {
     const AoFrame frame = samples(size, [&](uint32_t x, uint32_t y) {

@@ -123,7 +123,7 @@ TEST(AoDenoiser, CheckerboardsAreFilledAtOnceAndStayClose) {
                                                  return (x + y + f) % 2 == 0 ? noisy(0.5f, x, y, f) : kInvalidAo;
                                                }));
     for (float ao : result.ao) ASSERT_TRUE(ao >= 0.0f && ao <= 1.0f);
-    // Half the samples are sqrt(2) more noise; while some pixels have one and others two it is 1.5.
+    // Half as many samples give sqrt(2) times the noise, or 1.5 times while some pixels have one sample and others two.
     const double most = f < 3 ? 1.6 : 1.5;
     EXPECT_LE(rmse_of(result.ao, size, all(size), truth), most * rmse_of(all_pixels.ao, size, all(size), truth)) << f;
   }

@@ -9,7 +9,7 @@ namespace {
 
 using synthetic::uniform;
 
-/// Straight sums over the window, as the definition says.
+/// Reference implementation: plain sums over the window.
 struct Reference {
   double count = 0, sum = 0, squares = 0, change = 0;
 
@@ -29,7 +29,7 @@ TEST(LocalStatistics, AreThoseOfTheSamplesInTheWindow) {
   samples.resize(size);
   for (uint32_t y = 0; y < size.height; ++y)
     for (uint32_t x = 0; x < size.width; ++x) {
-      if (uniform(x, y, 0) < 0.5f || y > 30) continue; // windows without any sample too
+      if (uniform(x, y, 0) < 0.5f || y > 30) continue; // some windows get no samples at all
       samples.ao.row(static_cast<int>(y))[x] = uniform(x, y, 1);
       samples.valid.row(static_cast<int>(y))[x] = 1.0f;
       samples.change.row(static_cast<int>(y))[x] = uniform(x, y, 2) - 0.5f;

@@ -9,7 +9,7 @@
 
 namespace packtrace::synthetic {
 
-/// Uniform in [0,1), independent for every pixel and frame.
+/// Uniform random number in [0,1), independent per pixel and frame.
 inline float uniform(uint32_t x, uint32_t y, uint32_t frame) {
   uint64_t h = (static_cast<uint64_t>(frame) << 42) ^ (static_cast<uint64_t>(y) << 21) ^ x;
   h = (h ^ (h >> 31)) * 0x9e3779b97f4a7c15ull;
@@ -18,14 +18,15 @@ inline float uniform(uint32_t x, uint32_t y, uint32_t frame) {
   return static_cast<float>(static_cast<uint32_t>((h ^ (h >> 31)) >> 40)) * 0x1p-24f;
 }
 
-inline constexpr float kOccluded = 0.25f; ///< AO of a sample that hits; 1 if it misses: raw RMSE 0.375 at p = 1/2
+inline constexpr float kOccluded =
+    0.25f; ///< AO of an occluded sample; others have 1, so the raw RMSE at p = 1/2 is 0.375
 
 inline float noisy(float p, uint32_t x, uint32_t y, uint32_t frame) {
   return uniform(x, y, frame) < p ? kOccluded : 1.0f;
 }
 inline float expected(float p) { return 1.0f - (1.0f - kOccluded) * p; }
 
-/// A wall that faces the camera.
+/// G-buffer of a wall that faces the camera.
 inline GBuffer wall(ImageSize size, float z = 10.0f) {
   GBuffer g;
   g.resize(size);
@@ -33,7 +34,7 @@ inline GBuffer wall(ImageSize size, float z = 10.0f) {
   return g;
 }
 
-/// AO given per pixel.
+/// AO frame with values from a function of the pixel.
 inline AoFrame samples(ImageSize size, const std::function<float(uint32_t x, uint32_t y)>& ao) {
   AoFrame frame;
   frame.resize(size);

@@ -25,7 +25,7 @@ namespace {
 using Bytes = std::vector<std::byte>;
 constexpr ImageSize kSize{7, 5};
 
-/// A frame with everything that a renderer writes.
+/// A frame with all kinds of layers that the renderer writes.
 struct Frame {
   Image ao = noise_image(kSize, 1, 1), normal = noise_image(kSize, 3, 2), color = noise_image(kSize, 3, 3);
   std::vector<uint32_t> instance = std::vector<uint32_t>(kSize.pixels(), 0xfffffff1u);
@@ -45,7 +45,7 @@ size_t find(const Bytes& bytes, std::string_view text) {
   return std::string_view(begin, bytes.size()).find(text);
 }
 
-/// Decodes whatever can be decoded. Only Errors may come out.
+/// Decodes all layers of a possibly damaged file. Only exceptions of type Error are accepted.
 void decode_all(std::span<const std::byte> bytes) {
   try {
     for (const ExrLayer& layer : exr_info(bytes, "memory").layers) decode_exr(bytes, "memory", layer.name);
@@ -159,7 +159,7 @@ TEST(Exr, LengthsInsideTheHeaderCannotExceedTheFile) {
     std::memcpy(file.data() + length, &value, 4);
     EXPECT_EQ(error_kind_of([&] { exr_info(file, "long"); }), ErrorKind::kInput);
   }
-  // The same for a list of strings, whose elements have lengths of their own.
+  // The same for an attribute with a list of strings, where each element has its own length.
   const std::array<unsigned char, 29> list{'l', 0, 's', 't', 'r',  'i',  'n',  'g',  'v', 'e', 'c', 't', 'o', 'r', 0,
                                            8,   0, 0,   0,   0xf0, 0xff, 0xff, 0x7f, 'a', 'b', 'c', 'd', 0,   0};
   Bytes with_list = Frame().encode();
@@ -167,7 +167,7 @@ TEST(Exr, LengthsInsideTheHeaderCannotExceedTheFile) {
                    reinterpret_cast<const std::byte*>(list.data()) + 27);
   try {
     exr_info(with_list, "list");
-    FAIL() << "the string's length was believed";
+    FAIL() << "the wrong string length was accepted";
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("string is larger"), std::string::npos) << error.what();
   }
@@ -177,7 +177,7 @@ TEST(Exr, FilesOfOtherProgramsAreRead) {
   const TemporaryFolder folder;
   const Image image = noise_image({40, 30}, 1, 5);
   Imf::Header header(40, 30);
-  // A crop: the data window starts somewhere else.
+  // A cropped image, whose data window does not start at the origin.
   header.dataWindow() = Imath::Box2i({-10, 100}, {29, 129});
   header.channels().insert("Y", Imf::Channel(Imf::FLOAT));
   header.compression() = Imf::PIZ_COMPRESSION;

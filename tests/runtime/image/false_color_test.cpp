@@ -72,7 +72,7 @@ TEST(FalseColor, NeighbouringIdsAreTellableApart) {
   for (uint32_t id = 0; id < 64; ++id) {
     const Vec3 c = id_color(id) * 255.0f;
     codes.insert({static_cast<int>(c.x), static_cast<int>(c.y), static_cast<int>(c.z)});
-    EXPECT_GT(lightness(id_color(id)), 0.1) << "pleasant: never near black, which stands for missing";
+    EXPECT_GT(lightness(id_color(id)), 0.1) << "ids must not be near black, which means missing";
   }
   EXPECT_EQ(codes.size(), 64u);
   const Image picture = id_preview({2, 1}, std::vector<uint32_t>{7, kNoInstance}, kMissing);
@@ -102,8 +102,8 @@ TEST(LevelPreview, ShowsLevelsByHueAndClustersByLightness) {
   const auto color = [&](size_t i) { return Vec3(image.data[3 * i], image.data[3 * i + 1], image.data[3 * i + 2]); };
   EXPECT_EQ(color(1), Vec3(0.25f, 0.5f, 0.75f));
   EXPECT_NE(color(0), color(2));
-  EXPECT_NEAR(color(0).x / color(0).y, color(2).x / color(2).y, 1e-4f); // one hue
-  EXPECT_LT(color(3).x, color(0).x);                                    // in the shade
+  EXPECT_NEAR(color(0).x / color(0).y, color(2).x / color(2).y, 1e-4f); // clusters of a level share its hue
+  EXPECT_LT(color(3).x, color(0).x);                                    // occluded pixels are darker
 }
 
 } // namespace

@@ -14,8 +14,8 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// FLIP of one pixel straight from the paper's formulas: full two-dimensional filters, no shared code but the colour
-/// space conversions, which have tests of their own.
+/// FLIP of one pixel computed directly from the paper's formulas with two-dimensional filters. It shares only the
+/// colour space conversions with the code under test; those are tested separately.
 double flip_by_definition(const Image& test, const Image& reference, int px, int py, double ppd) {
   const auto opponent = [](const Image& image, int x, int y) {
     x = std::clamp(x, 0, static_cast<int>(image.size.width) - 1);
@@ -126,7 +126,7 @@ TEST(FlipStages, FiltersAreNormalised) {
       EXPECT_NEAR(sum(*kernel, false), -1.0, 1e-12);
     }
   }
-  // Radii at the default distance: 3 sigma of the widest filter.
+  // Kernel radius at the default distance: 3 sigma of the widest filter.
   EXPECT_EQ(csf_terms(OpponentChannel::kAchromatic, kFlipPixelsPerDegree)[0].kernel.size(), 2u * 10 + 1);
   EXPECT_EQ(feature_kernels(kFlipPixelsPerDegree).edge.size(), 2u * 9 + 1);
 }
@@ -142,7 +142,7 @@ TEST(Flip, MatchesTheDefinitionPixelByPixel) {
 }
 
 TEST(Flip, BlackAgainstWhiteIsTheirColourDistance) {
-  // No features and nothing to blur: HyAB is 100, which the redistribution takes to 0.96738.
+  // Constant images have no features and are not changed by filters. HyAB is 100, which maps to an error of 0.96738.
   const Image black({16, 16}, 3, 0.0f), white({16, 16}, 3, 1.0f);
   EXPECT_NEAR(flip(black, white).value, 0.9673797614921327, 1e-6);
   EXPECT_NEAR(flip(Image({16, 16}, 1, 0.5f), Image({16, 16}, 1, 0.6f)).value, 0.19621471154646333, 1e-6);

@@ -10,7 +10,7 @@
 
 namespace packtrace {
 
-/// Uniform numbers in [0,1) that are the same on every machine.
+/// Uniform random numbers in [0,1), identical on all machines.
 class Noise {
 public:
   explicit Noise(uint64_t seed) : state_(seed) {}
@@ -30,7 +30,7 @@ inline Image noise_image(ImageSize size, uint32_t channels, uint64_t seed) {
   return image;
 }
 
-/// The kind of the Error that `function` throws; fails the test where it throws none or something else.
+/// Returns the kind of the Error that `function` throws. Fails the test if it throws nothing or another exception.
 inline ErrorKind error_kind_of(const std::function<void()>& function) {
   try {
     function();

@@ -104,7 +104,7 @@ TEST(Metrics, ImagesThatCannotBeComparedAreInputErrors) {
 }
 
 TEST(Ssim, OneWindowMatchesTheDefinition) {
-  // An image of 11 x 11 pixels has one window, so its SSIM is equation 13 with the weights written out.
+  // An image of 11 x 11 pixels has a single window, so its SSIM is equation 13 with explicit weights.
   const Image x = noise_image({11, 11}, 1, 1), y = noise_image({11, 11}, 1, 2);
   double weights = 0, mx = 0, my = 0, xx = 0, yy = 0, xy = 0;
   for (uint32_t j = 0; j < 11; ++j)

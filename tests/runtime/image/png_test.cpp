@@ -19,7 +19,7 @@ void append_be32(Bytes& bytes, uint32_t value) {
   for (int shift = 24; shift >= 0; shift -= 8) bytes.push_back(static_cast<std::byte>(value >> shift));
 }
 
-/// Bit by bit from the definition, so that it shares nothing with the code under test.
+/// CRC-32 computed bit by bit from its definition, so that it shares no code with the code under test.
 uint32_t crc(const Bytes& bytes, size_t begin) {
   uint32_t remainder = ~0u;
   for (size_t i = begin; i < bytes.size(); ++i)
@@ -93,7 +93,7 @@ TEST(Png, LinearColoursSurviveTheTransferWithinHalfAStep) {
 
 TEST(Png, StoresKnownSrgbCodes) {
   Image image({3, 1}, 1);
-  image.data = {0.0f, 0.2140411f, 1.0f}; // the middle one is sRGB 127.5 / 255
+  image.data = {0.0f, 0.2140411f, 1.0f}; // the middle value encodes to 127.5 / 255 in sRGB
   const Image read = decode_png(encode_png(image, PngTransfer::kSrgb), "memory", PngTransfer::kRaw);
   EXPECT_EQ(read.data[0], 0.0f);
   EXPECT_NEAR(read.data[1], 127.5f / 255.0f, 0.51f / 255.0f);

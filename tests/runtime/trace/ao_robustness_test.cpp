@@ -331,7 +331,7 @@ TEST(AoFrames, AllBvhVariantsAgree) {
   for (int i = 0; i < 9; ++i) add_shape(scene, test::sphere({float(i % 3), 0.5f, float(i / 3)}, 0.49f, 24));
   const Camera camera = camera_at({2, 3, -5}, {1, 0, 1});
   const Rendered reference = render(scene, camera, {96, 64}, visibility(2));
-  for (const EmbreeConfig config : {EmbreeConfig{BvhQuality::kHigh, false}, EmbreeConfig{BvhQuality::kMedium, true}}) {
+  for (const EmbreeConfig& config : {EmbreeConfig{BvhQuality::kHigh, false}, EmbreeConfig{BvhQuality::kMedium, true}}) {
     const Rendered other = render(scene, camera, {96, 64}, visibility(2), config);
     uint32_t different = 0;
     for (size_t i = 0; i < other.ao.ao.size(); ++i) different += reference.ao.ao[i] != other.ao.ao[i];

@@ -7,9 +7,6 @@
 namespace packtrace {
 namespace {
 
-/// Maximum number of boxes: children or grandchildren of the root.
-constexpr size_t kMaxBoxes = size_t{baked::kNodeWidth} * baked::kNodeWidth;
-
 struct Child {
   DVec3 lo, hi;
   uint32_t node; ///< number of the node; 0 for a leaf
