@@ -90,9 +90,9 @@ py::dict render(const std::shared_ptr<BakedFile>& file, std::optional<std::pair<
 } // namespace
 
 void bind_rendering(py::module_& module) {
-  module.def("render", &render, py::arg("file"), py::kw_only(), py::arg("size") = py::none(), py::arg("camera") = 0,
-             py::arg("frames") = 32, py::arg("spp") = 1, py::arg("denoise") = true, py::arg("ao_radius") = py::none(),
-             py::arg("backend") = "packed", py::arg("seed") = 0);
+  module.def("render", &render, py::arg("file").none(false), py::kw_only(), py::arg("size") = py::none(),
+             py::arg("camera") = 0, py::arg("frames") = 32, py::arg("spp") = 1, py::arg("denoise") = true,
+             py::arg("ao_radius") = py::none(), py::arg("backend") = "packed", py::arg("seed") = 0);
 }
 
 } // namespace packtrace
