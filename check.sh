@@ -13,11 +13,14 @@ if [ -z "${PACKTRACE_SCENES:-}" ] && [ -d ../shared/scenes ]; then
 fi
 echo "== Debian packages"
 # Some tests need these: clang compiles the fuzz preset's kernels, and shells and man tools check the generated files.
-bash .ci/install_packages.sh clang-19 zsh fish mandoc groff-base
+bash .ci/install_packages.sh tests benchmarks python clang-19 zsh fish mandoc groff-base
 export CTEST_PARALLEL_LEVEL=${CTEST_PARALLEL_LEVEL:-$(nproc)}
 for preset in "${presets[@]}"; do
   echo "== Build ($preset)"
-  cmake --preset "$preset" -DPACKTRACE_WERROR=ON >/dev/null
+  options=(-DPACKTRACE_WERROR=ON)
+  # The Python module is tested with Debian's interpreter, whichever comes first in the PATH.
+  [ "$preset" != release ] || options+=(-DPACKTRACE_BUILD_PYTHON=ON -DPython_EXECUTABLE=/usr/bin/python3)
+  cmake --preset "$preset" "${options[@]}" >/dev/null
   cmake --build --preset "$preset"
   echo "== Test ($preset)"
   exclude=()

@@ -15,20 +15,24 @@ cd -- "$root"
 started=$SECONDS
 out=build/quickstart
 packtrace=build/release/bin/packtrace
+run() {
+  echo "+ $*" >&2
+  "$@"
+}
 
 echo "== 1/4 Debian packages"
-bash .ci/install_packages.sh
+run bash .ci/install_packages.sh
 echo "== 2/4 Build"
-cmake --preset release >/dev/null
-cmake --build --preset release --target packtrace
+run cmake --preset tools >/dev/null # without tests, benchmarks and Python, which need more packages
+run cmake --build --preset tools --target packtrace
 mkdir -p "$out"
 echo "== 3/4 Bake $scene"
-"$packtrace" bake "$scene" -o "$out/scene.ptk" --force --json "$out/bake.json"
+run "$packtrace" bake "$scene" -o "$out/scene.ptk" --force --json "$out/bake.json"
 echo "== 4/4 Trace and denoise"
-"$packtrace" render "$out/scene.ptk" -o "$out/picture.png" -o "$out/layers.exr" --aov all --supersample 2 --frames 32 \
+run "$packtrace" render "$out/scene.ptk" -o "$out/picture.png" -o "$out/layers.exr" --aov all --supersample 2 --frames 32 \
   --force --json "$out/render.json"
 echo
-"$packtrace" info "$out/scene.ptk"
+run "$packtrace" info "$out/scene.ptk"
 echo
 echo "Done in $((SECONDS - started)) s; in $root:"
 echo "  $out/picture.shaded.png   denoised ambient occlusion times albedo"

@@ -1,19 +1,28 @@
 #!/usr/bin/env bash
-# Installs the Debian 12 packages for building and testing, and those named as arguments. Does nothing if all are
-# installed.
-# Usage: .ci/install_packages.sh [PACKAGE ...]
+# Installs Debian 12 packages: those that packtrace itself needs, those of the groups named, and further ones by name.
+# Does nothing if all are installed.
+# Usage: .ci/install_packages.sh [tests | benchmarks | python | PACKAGE ...]
 set -euo pipefail
 
 packages=(
-  g++ cmake ninja-build ccache pkg-config
-  libtbb-dev libglm-dev libembree-dev libopenexr-dev libopenmesh-dev libxxhash-dev libzstd-dev libstb-dev zlib1g-dev
+  g++ cmake ninja-build pkg-config
+  libtbb-dev libglm-dev libembree-dev libopenexr-dev libxxhash-dev libzstd-dev libstb-dev zlib1g-dev
   libcli11-dev libfmt-dev nlohmann-json3-dev
-  libgtest-dev libbenchmark-dev python3
-  glslang-tools spirv-tools libvulkan-dev mesa-vulkan-drivers # compile the GLSL of vertex16 and run it on the CPU
   libdraco-dev libtinygltf-dev # glTF export
-  libmeshoptimizer-dev # compared with in the packing benchmark
-  "$@"
 )
+for argument in "$@"; do
+  case $argument in
+    tests)
+      packages+=(
+        ccache libgtest-dev libopenmesh-dev python3
+        glslang-tools spirv-tools libvulkan-dev mesa-vulkan-drivers # compile the GLSL of vertex16 and run it on the CPU
+        dpkg-dev file # Debian packages of packtrace itself
+      ) ;;
+    benchmarks) packages+=(libbenchmark-dev libopenmesh-dev libmeshoptimizer-dev) ;; # what packtrace is compared with
+    python) packages+=(python3-dev python3-numpy pybind11-dev) ;;
+    *) packages+=("$argument") ;;
+  esac
+done
 
 missing=()
 for package in "${packages[@]}"; do
@@ -21,11 +30,12 @@ for package in "${packages[@]}"; do
 done
 [ ${#missing[@]} -eq 0 ] && exit 0
 
-echo "Installing: ${missing[*]}"
+echo "Installing ${#missing[@]} packages and what they depend on: ${missing[*]}"
 as_root=()
 if [ "$(id -u)" -ne 0 ]; then
   command -v sudo >/dev/null || { echo "Run as root, or install sudo, to add the packages above." >&2; exit 1; }
   as_root=(sudo)
 fi
 "${as_root[@]}" apt-get update -qq
-"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}" |
+  grep -E '^(Need to get|After this operation)' || [ "${PIPESTATUS[0]}" -eq 0 ]

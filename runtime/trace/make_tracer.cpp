@@ -1,6 +1,7 @@
 #include "runtime/trace/make_tracer.h"
 
 #include "pbrt_import/base/error.h"
+#include "runtime/trace/embree/embree_cluster_tracer.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
 
 namespace packtrace {

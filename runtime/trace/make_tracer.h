@@ -1,14 +1,15 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 
-#include "runtime/trace/embree/embree_cluster_tracer.h"
 #include "runtime/trace/embree/embree_tracer.h"
 
 namespace packtrace {
 
 class BakedFile;
 class LodSource;
+enum class ClusterPrimitives : uint8_t; // embree_cluster_tracer.h
 
 enum class Backend : uint8_t {
   kEmbree,         ///< Embree over triangles decoded to floats
@@ -19,7 +20,7 @@ enum class Backend : uint8_t {
 struct TracerConfig {
   Backend backend = Backend::kEmbree;
   EmbreeConfig embree;
-  ClusterPrimitives cluster_primitives = ClusterPrimitives::kClusters; ///< for kEmbreeClusters
+  ClusterPrimitives cluster_primitives{}; ///< for kEmbreeClusters; kClusters
 };
 
 /// Creates a tracer; the only function that knows all backends. Keeps references: source and file must outlive the

@@ -13,6 +13,7 @@
 
 #include "pbrt_import/base/error.h"
 #include "runtime/stopwatch.h"
+#include "runtime/trace/embree/embree_cluster_tracer.h"
 #include "runtime/trace/make_tracer.h"
 #include "tests/benchmarks/benchmark_main.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"

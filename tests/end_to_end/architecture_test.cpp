@@ -99,6 +99,9 @@ const std::vector<Room> kRooms = {
       "compress/bake/grid", "compress/bake", "compress/exchange/gltf", "compress/exchange/vertex16", "runtime/lod",
       "runtime/trace/source", "runtime/trace/packed/scene", "runtime/trace", "runtime/camera", "runtime/render",
       "runtime/image", "runtime"}},
+    {"runtime/python",
+     {"pbrt_import/base", "pbrt_import", "compress/format/file", "compress/bake", "runtime/trace/source",
+      "runtime/trace", "runtime/render", "runtime/commands"}},
 };
 
 const Room* room_of(const std::string& path) {

@@ -10,6 +10,7 @@
 #include "runtime/camera/lod_view.h"
 #include "runtime/camera/primary_visibility.h"
 #include "runtime/trace/make_tracer.h"
+#include "runtime/trace/packed/scene/packed_tracer.h"
 #include "tests/runtime/trace/packed_scenes.h"
 #include "tests/runtime/trace/test_scenes.h"
 
