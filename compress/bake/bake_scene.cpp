@@ -100,6 +100,7 @@ private:
       packed_[i].encoded = {};
     }
     for (size_t i = 0; i < packed_.size(); ++i) {
+      report_.lod_candidates += lod_wanted_[i] != 0;
       report_.lod_geometries += !packed_[i].lod.levels.empty();
       sections.add_lod(static_cast<uint32_t>(i), packed_[i].lod);
       packed_[i].lod = {};

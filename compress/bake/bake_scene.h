@@ -55,6 +55,7 @@ struct BakeReport {
   double max_normal_error_degrees = 0.0, mean_normal_error_degrees = 0.0;
   double max_uv_error = 0.0;
   double max_uv_error_texels = 0.0;  ///< relative to the finest texture that the same geometry looks up
+  uint64_t lod_candidates = 0;       ///< geometries for which BakeConfig asks for LOD levels
   uint64_t lod_geometries = 0;       ///< geometries with LOD levels
   uint64_t resumed_geometries = 0;   ///< geometries whose LOD levels came from an interrupted bake
   std::vector<std::string> warnings; ///< also reported in the diagnostics

@@ -57,7 +57,7 @@ void SceneBuilder::handle(Directive& directive) {
   if (directive.kind == K::kWorldEnd) return end_world(directive.place);
   if (phase_ == Phase::kOptions && statistics_.worlds > 0 && !options_after_world_)
     options_after_world_ = directive.place;
-  if (!reading()) return;
+  if (!reading()) return record_unread_files(directive); // no output may replace the files of another world either
   count_kept(directive);
   if (directive.damaged)
     skip_damaged(directive);

@@ -17,6 +17,10 @@ constexpr bool is_bad_byte(char c) {
   return (byte < 0x20 && !is_space(c) && c != '\v' && c != '\f') || byte == 0x7f || byte == 0xff;
 }
 
+/// Bytes that do not belong in strings. Names are bytes in any encoding that contains ASCII, and 0xFF is a letter in
+/// many.
+constexpr bool is_bad_string_byte(char c) { return is_bad_byte(c) && static_cast<unsigned char>(c) != 0xff; }
+
 /// Table of a predicate over all byte values.
 template <class Predicate>
 constexpr std::array<bool, 256> table_of(Predicate predicate) {
@@ -29,7 +33,7 @@ constexpr std::array<bool, 256> table_of(Predicate predicate) {
 /// bytes that follow a window.
 constexpr std::array<bool, 256> kWordBytes = table_of([](char c) { return !ends_word(c) && !is_bad_byte(c); });
 constexpr std::array<bool, 256> kPlainStringBytes =
-    table_of([](char c) { return c != '"' && c != '\\' && c != '\n' && c != '\r' && !is_bad_byte(c); });
+    table_of([](char c) { return c != '"' && c != '\\' && c != '\n' && c != '\r' && !is_bad_string_byte(c); });
 
 constexpr uint64_t kOnes = 0x0101010101010101u, kHighBits = 0x80 * kOnes;
 
@@ -212,7 +216,7 @@ Token Tokenizer::read_string() {
     const char c = window_[position_ + length];
     if (c == '"') return end(TokenKind::kString, position_ + length, position_ + length + 1);
     if (c == '\n' || c == '\r' || bad_bytes == kMaxStringBadBytes) break;
-    if (is_bad_byte(c) && bad_bytes++ == 0) bad_at = length;
+    if (is_bad_string_byte(c) && bad_bytes++ == 0) bad_at = length;
     if (c == '\\') {
       if (position_ + length + 1 >= size_) refill();
       const char escaped = window_[position_ + length + 1];

@@ -227,7 +227,7 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
                               static_cast<double>(peak_rss_bytes()) / (1 << 20)),
                   text);
   fmt::print(text, "{}", size_text(baked.file));
-  fmt::print(text, "maximum position error {:.3g}, {}\n", baked.max_position_error,
+  fmt::print(text, "maximum position error {:.3g} (object units), {}\n", baked.max_position_error,
              baked.file.normals.empty()
                  ? std::string("no normals stored")
                  : fmt::format("maximum normal error {:.4f} degrees", baked.max_normal_error_degrees));
@@ -239,6 +239,12 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
                     "{} coarser LOD levels for {:L} geometries: all levels take {:.3f} bytes per triangle of level 0 "
                     "({:L} triangles)\n",
                     lod.levels.size() - 1, baked.lod_geometries, lod.bytes_per_triangle(), lod.base_triangles()));
+  else if (baked.lod_candidates > 0)
+    fmt::print(
+        text,
+        "no coarser LOD levels: none of the {} geometries can be simplified, because their vertices lie on borders "
+        "that other geometries share or their triangles are too few\n",
+        baked.lod_candidates);
   if (baked.resumed_geometries > 0)
     fmt::print(text, "{}",
                fmt::format(grouped(), "resumed: the LOD levels of {:L} geometries were already finished\n",

@@ -195,7 +195,8 @@ int run_verbs(CLI::App& app, GlobalOptions& globals, int argc, const char* const
     return fail(error_json(error));
   } catch (const std::bad_alloc&) {
     return fail(error_json(MemoryError(kNoMemory)));
-  } catch (const std::system_error& error) { // from std::filesystem, or from fmt::print on a full disk
+  } catch (const std::system_error& error) { // from std::filesystem, std::thread, or from fmt::print on a full disk
+    if (error.code() == std::errc::resource_unavailable_try_again) return fail(error_json(MemoryError(kNoMemory)));
     return fail(error_json("io", static_cast<int>(ErrorKind::kIo), error.what()));
   } catch (const std::exception& error) {
     return fail(error_json("internal", kInternalError, std::string("internal: ") + error.what()));
@@ -217,7 +218,28 @@ uint32_t thread_limit(const GlobalOptions& globals) {
   return threads;
 }
 
+namespace {
+
+/// Libraries start threads where no handler of this program sees the error.
+[[noreturn]] void on_terminate() {
+  try {
+    if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
+  } catch (const std::exception& error) {
+    const std::string_view problem = error.what();
+    const bool no_thread = problem.find("pthread_create") != problem.npos;
+    if (no_thread || dynamic_cast<const std::bad_alloc*>(&error) != nullptr) {
+      std::fprintf(stderr, "packtrace: error: %s (%s)\n", kNoMemory, error.what());
+      std::_Exit(static_cast<int>(ErrorKind::kInput));
+    }
+    std::fprintf(stderr, "packtrace: internal: %s\n", error.what());
+  }
+  std::abort();
+}
+
+} // namespace
+
 void install_interrupt_handlers() {
+  std::set_terminate(on_terminate);
   struct sigaction action{};
   action.sa_handler = on_interrupt;
   sigemptyset(&action.sa_mask);

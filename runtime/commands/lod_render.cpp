@@ -194,7 +194,9 @@ void require_levels(const std::string& input, const LoadedScene& loaded) {
   if (!loaded.baked)
     throw Error(ErrorKind::kUsage, input + ": --lod-error requires a .ptk file; bake the scene with --lod");
   if (loaded.baked->sections().lod_levels.empty())
-    throw Error(ErrorKind::kUsage, input + ": --lod-error: the file has no levels of detail; bake it with --lod");
+    throw Error(
+        ErrorKind::kUsage,
+        input + ": --lod-error: the file has no levels of detail; bake it with --lod, which says if none can be made");
 }
 
 ChosenDetail choose_detail(const LoadedScene& loaded, const Camera& camera, const RenderConfig& config,

@@ -182,7 +182,7 @@ TracerConfig tracer_config(const RenderOptions& options, const GlobalOptions& gl
   TracerConfig config;
   config.backend = choose_backend(options, baked);
   const std::string quality = options.bvh.value_or("medium");
-  config.embree = {quality == "high" ? BvhQuality::kHigh : BvhQuality::kMedium, !options.fast_edges, false,
+  config.embree = {quality == "high" ? BvhQuality::kHigh : BvhQuality::kMedium, !options.fast_edges, false, true,
                    globals.memory};
   return config;
 }

@@ -87,10 +87,10 @@ Systems make_systems(const TraceInput& input) {
     EmbreeCall call;
   };
   Systems out;
-  for (const Variant& variant : {Variant{"Embree default", {BvhQuality::kMedium, false, false}},
-                                 Variant{"Embree robust", {BvhQuality::kMedium, true, false}},
-                                 Variant{"Embree high", {BvhQuality::kHigh, false, false}},
-                                 Variant{"Embree compact", {BvhQuality::kMedium, false, true}}}) {
+  for (const Variant& variant : {Variant{"Embree default", {BvhQuality::kMedium, false, false, false}},
+                                 Variant{"Embree robust", {BvhQuality::kMedium, true, false, false}},
+                                 Variant{"Embree high", {BvhQuality::kHigh, false, false, false}},
+                                 Variant{"Embree compact", {BvhQuality::kMedium, false, true, false}}}) {
     const Stopwatch watch;
     out.trees.push_back(std::make_unique<EmbreeTracer>(input.source, variant.config));
     const double build_ms = 1e3 * watch.seconds();

@@ -136,6 +136,11 @@ scene.pbrt:2:11: error: expected a quoted name after Material, found a stray byt
              "NamedMaterial \"\xf8\xf9\xfa\xfb\xfd\xfe\""),
        "",
        {1, 1, 0, 0}},
+      {"LettersOfTheLastByteAreText", // y with diaeresis in Latin-1, ya in Windows-1251
+       world("MakeNamedMaterial \"\xff\" \"string type\" \"mirror\"\nNamedMaterial \"\xff\"\nNamedMaterial \"\xfe\""),
+       R"(scene.pbrt:4:1: error: no named material "\xfe"; the material before it stays; did you mean "\xff"?
+)",
+       {1, 1, 0, 0}},
       {"Latin1IsShownInHexadecimal",
        world("MakeNamedMaterial \"gr\xfcn\" \"string type\" \"mirror\"\nNamedMaterial \"Gr\xfcn\"\n"
              "NamedMaterial \"\xc4rger\"\n\xfc"

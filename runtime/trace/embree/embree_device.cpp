@@ -7,6 +7,7 @@ namespace packtrace {
 
 EmbreeDevice::EmbreeDevice(const std::optional<MemoryBudget>& budget)
     : budget_(budget), device_(rtcNewDevice(nullptr)) {
+  if (!device_ && rtcGetDeviceError(nullptr) == RTC_ERROR_OUT_OF_MEMORY) throw MemoryError(kNoMemory);
   if (!device_) throw Error(ErrorKind::kUnsupported, "Embree cannot create a device on this machine");
   if (budget_) reserved_ = MemoryReservation(*budget_);
   reserve();

@@ -20,14 +20,26 @@ namespace {
 
 constexpr size_t kPaddingVertices = 2;
 
-// A class is a combination of camera_visible, occludes and needs_mask; the first two bits are also the Embree geometry
-// mask.
+// A class is a combination of camera_visible, occludes, needs_mask and is_sliver(); the first two bits are also the
+// Embree geometry mask.
 constexpr uint32_t kMaskedClass = 1u << 2;
-constexpr uint32_t kClassCount = 8;
+constexpr uint32_t kSliverClass = 1u << 3;
+constexpr uint32_t kClassCount = 16;
 
 uint32_t material_class(MaterialFlags flags) {
   return (camera_visible(flags) ? kCameraRays : 0u) | (occludes(flags) ? kOcclusionRays : 0u) |
          (needs_mask(flags) ? kMaskedClass : 0u);
+}
+
+/// Whether Embree's float normal may tilt a triangle so far that a ray that starts above it hits it. Edges of length L
+/// have rounding errors of eps L, which tilt the normal by about eps L / h, h being the height over the longest edge,
+/// and move the plane by eps L^2 / h at its far end. Ray offsets cover a few eps of the largest coordinate.
+bool is_sliver(const DVec3& a, const DVec3& b, const DVec3& c) {
+  constexpr double kCovered = 8.0;
+  const double longest2 = std::max({glm::dot(b - a, b - a), glm::dot(c - b, c - b), glm::dot(a - c, a - c)});
+  const DVec3 largest = glm::max(glm::max(glm::abs(a), glm::abs(b)), glm::abs(c));
+  const double twice_area = glm::length(glm::cross(b - a, c - a));
+  return longest2 * std::sqrt(longest2) > kCovered * std::max({largest.x, largest.y, largest.z}) * twice_area;
 }
 
 bool is_identity(const Affine& m) { return m == Affine(1.0f); }
@@ -49,11 +61,28 @@ struct EmbreeTracer::Part {
 
   uint32_t source_triangle(uint32_t i) const { return source_triangles.empty() ? i : source_triangles[i]; }
 
-  /// Embree filter function: rejects hits where an alpha mask removes the surface.
+  /// Whether a ray hits the plane of a triangle in double precision where its interval begins or later.
+  bool is_hit_ahead(const RTCFilterFunctionNArguments* args, uint32_t i) const {
+    const std::vector<Vec3>& positions = tracer->surfaces_[surface].positions;
+    const Triangle& t = triangles[RTCHitN_primID(args->hit, args->N, i)];
+    const DVec3 a(positions[t.x]), b(positions[t.y]), c(positions[t.z]);
+    const DVec3 origin(RTCRayN_org_x(args->ray, args->N, i), RTCRayN_org_y(args->ray, args->N, i),
+                       RTCRayN_org_z(args->ray, args->N, i));
+    const DVec3 direction(RTCRayN_dir_x(args->ray, args->N, i), RTCRayN_dir_y(args->ray, args->N, i),
+                          RTCRayN_dir_z(args->ray, args->N, i));
+    const DVec3 normal = glm::cross(b - a, c - a);
+    return glm::dot(normal, a - origin) / glm::dot(normal, direction) >=
+           static_cast<double>(RTCRayN_tnear(args->ray, args->N, i)); // false where the ray lies in the plane
+  }
+
+  /// Embree filter function: rejects hits where an alpha mask removes the surface, and hits of slivers that lie behind
+  /// the ray.
   static void filter(const RTCFilterFunctionNArguments* args) {
     const auto& part = *static_cast<const Part*>(args->geometryUserPtr);
     for (uint32_t i = 0; i < args->N; ++i) {
       if (args->valid[i] != -1) continue;
+      if ((part.material_class & kSliverClass) != 0 && !part.is_hit_ahead(args, i)) args->valid[i] = 0;
+      if ((part.material_class & kMaskedClass) == 0 || args->valid[i] != -1) continue;
       const uint32_t triangle = part.source_triangle(RTCHitN_primID(args->hit, args->N, i));
       const Vec2 barycentrics(RTCHitN_u(args->hit, args->N, i), RTCHitN_v(args->hit, args->N, i));
       const bool occlusion = (RTCRayN_mask(args->ray, args->N, i) & kOcclusionRays) != 0;
@@ -101,7 +130,7 @@ struct EmbreeTracer::Device {
                                sizeof(Triangle), part.triangles.size());
     rtcSetGeometryMask(geometry.get(), part.material_class & (kCameraRays | kOcclusionRays));
     rtcSetGeometryUserData(geometry.get(), &part);
-    if (part.material_class & kMaskedClass) {
+    if ((part.material_class & (kMaskedClass | kSliverClass)) != 0) {
       rtcSetGeometryIntersectFilterFunction(geometry.get(), Part::filter);
       rtcSetGeometryOccludedFilterFunction(geometry.get(), Part::filter);
     }
@@ -227,7 +256,10 @@ void EmbreeTracer::split_parts(uint32_t surface, const std::vector<Triangle>& tr
     const uint32_t material = source_.material_of(instance, t);
     if (material >= materials.size())
       throw Error(ErrorKind::kInput, geometry_label(out.geometry) + " has a triangle without a material");
-    Part& part = by_class[material_class(materials[material].flags)];
+    const auto corner = [&](uint32_t vertex) { return DVec3(out.positions[vertex]); };
+    const Triangle& corners = triangles[t];
+    const bool sliver = config_.check_slivers && is_sliver(corner(corners.x), corner(corners.y), corner(corners.z));
+    Part& part = by_class[material_class(materials[material].flags) | (sliver ? kSliverClass : 0u)];
     part.triangles.push_back(triangles[t]);
     part.source_triangles.push_back(t);
   }

@@ -24,6 +24,8 @@ struct EmbreeConfig {
   /// spatial splits.
   bool robust = true;
   bool compact = false; ///< smaller and slower trees
+  /// Tests hits of thin triangles again in double precision. Embree alone lets rays hit the sliver that they start on.
+  bool check_slivers = true;
   /// Pays for vertices, indices and trees; no limit without one.
   std::optional<MemoryBudget> memory = std::nullopt;
 };

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <random>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -36,6 +37,45 @@ Scene roofed(MaterialFlags roof_flags) {
   add_shape(scene, quad({-1000, 0, -1000}, {0, 0, 2000}, {2000, 0, 0}));
   add_shape(scene, quad({-1000, 1, -1000}, {2000, 0, 0}, {0, 0, 2000}), roof_flags);
   return scene;
+}
+
+/// Single triangles of length 30 in all directions, each alone within the radius of the rays.
+Scene loose_slivers(float width) {
+  Scene scene;
+  std::mt19937 random(11);
+  const auto number = [&](float lo, float hi) {
+    return lo + (hi - lo) * static_cast<float>(random()) / static_cast<float>(random.max());
+  };
+  Mesh mesh;
+  for (uint32_t i = 0; i < 400; ++i) {
+    const Vec3 along = glm::normalize(Vec3(number(-1, 1), number(-1, 1), number(-1, 1)));
+    const Vec3 across = glm::normalize(glm::cross(along, Vec3(number(-1, 1), number(-1, 1), number(-1, 1))));
+    const Vec3 middle(number(-20, 20), number(-20, 20), number(-20, 20));
+    mesh.positions.insert(mesh.positions.end(),
+                          {middle - 15.0f * along, middle + 15.0f * along, middle + width * across});
+    mesh.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+  }
+  add_shape(scene, std::move(mesh));
+  return scene;
+}
+
+TEST(AoVisibility, NothingOccludesLooseSlivers) {
+  const auto occluded = [](float width, const EmbreeConfig& config) {
+    const Rendered image =
+        render(loose_slivers(width), camera_at({0, 0, -60}, {0, 0, 0}), {320, 180}, visibility(1e-3f), config);
+    uint64_t hits = 0, occluded_pixels = 0;
+    for (const float ao : image.ao.ao) hits += ao >= 0.0f, occluded_pixels += ao >= 0.0f && ao < 1.0f;
+    EXPECT_GT(hits, 20u) << width;
+    return occluded_pixels;
+  };
+  EmbreeConfig unchecked;
+  unchecked.check_slivers = false;
+  uint64_t without_check = 0;
+  for (const float width : {0.3f, 0.03f, 0.003f}) {
+    EXPECT_EQ(occluded(width, {}), 0u) << width;
+    without_check += occluded(width, unchecked);
+  }
+  EXPECT_GT(without_check, 0u) << "the scene does not show what Embree alone does";
 }
 
 TEST(AoVisibility, OnlyOccludingMaterialsOcclude) {

@@ -39,7 +39,7 @@ PackedIsa chosen_isa() {
     if (isa == "scalar") return PackedIsa::kScalar;
     if (isa == "avx2") return PackedIsa::kAvx2;
     if (isa == "avx512") return PackedIsa::kAvx512;
-    throw Error(ErrorKind::kInput, "PACKTRACE_ISA is \"" + std::string(isa) + "\", not scalar, avx2 or avx512");
+    throw Error(ErrorKind::kUsage, "PACKTRACE_ISA is \"" + std::string(isa) + "\", not scalar, avx2 or avx512");
   }
   for (const PackedIsa isa : {PackedIsa::kAvx512, PackedIsa::kAvx2})
     if (isa_supported(isa)) return isa;
