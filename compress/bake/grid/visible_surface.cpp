@@ -39,6 +39,7 @@ struct PlacedPart {
   DAffine world_from_geometry;
   uint32_t first_triangle;
   bool moved;           ///< geometry_from_mesh is not the identity
+  bool placed;          ///< world_from_geometry is not the identity
   double most_movement; ///< upper bound of the distance between source and rounded positions, world units
 };
 
@@ -72,7 +73,9 @@ public:
   VisiblePointFinder(const PrimaryCamera& camera, const Scene& scene, const ScenePlan& plan,
                      std::span<const uint32_t> instances, std::span<const GeometryGrid> grids)
       : camera_(camera), scene_(scene), grids_(grids), width_(camera.size().width), height_(camera.size().height),
-        source_(camera.size().pixels()), rounded_(camera.size().pixels()) {
+        spread_(camera.pixel_spread()), source_(camera.size().pixels()), rounded_(camera.size().pixels()) {
+    const CameraRay ray = camera.ray(0, 0);
+    depth_scale_ = camera.view_z(ray.origin + ray.direction) / camera.homogeneous_pixel(ray.origin + ray.direction).z;
     for (const uint32_t i : instances) add_instance(plan, plan.instances[i]);
   }
 
@@ -92,13 +95,16 @@ private:
       if ((geometry.slot_class[part.slot] & 1u) != 0 || count == 0) continue; // bit 0: invisible to cameras
       const double movement = std::sqrt(0.75) * grids_[instance.geometry].coarsest_step() * world_scale(geometry);
       parts_.push_back({instance.geometry, &part, placement_of(instance), triangles_,
-                        part.geometry_from_mesh != DAffine(1.0), movement});
+                        part.geometry_from_mesh != DAffine(1.0), placement_of(instance) != DAffine(1.0), movement});
       triangles_ += count;
     }
   }
 
   const Mesh& mesh_of(const PlacedPart& placed) const { return scene_.meshes[placed.part->mesh]; }
 
+  static DVec3 to_world(const PlacedPart& placed, Vec3 p) {
+    return placed.placed ? transform_point(placed.world_from_geometry, DVec3(p)) : DVec3(p);
+  }
   /// Position of a vertex in geometry space.
   DVec3 geometry_position(const PlacedPart& placed, uint32_t vertex) const {
     const DVec3 p(mesh_of(placed).positions[vertex]);
@@ -106,21 +112,21 @@ private:
   }
   /// World position of a vertex, rounded to a float in geometry space.
   DVec3 source_position(const PlacedPart& placed, uint32_t vertex) const {
-    return transform_point(placed.world_from_geometry, DVec3(Vec3(geometry_position(placed, vertex))));
+    return to_world(placed, Vec3(geometry_position(placed, vertex)));
   }
   /// World position of a vertex on the lattice, as the file's readers decode it.
   DVec3 rounded_position(const PlacedPart& placed, uint32_t vertex) const {
     const GeometryGrid& grid = grids_[placed.geometry];
     const double step = grid.grid.step();
     const LatticePoint q = grid.round(geometry_position(placed, vertex));
-    return transform_point(placed.world_from_geometry,
-                           {from_lattice(q[0], step), from_lattice(q[1], step), from_lattice(q[2], step)});
+    return to_world(placed, {from_lattice(q[0], step), from_lattice(q[1], step), from_lattice(q[2], step)});
   }
 
   ImagePoint project(DVec3 world) const {
     const DVec3 h = camera_.homogeneous_pixel(world);
-    const double depth = camera_.view_z(world), scale = h.z > 0.0 ? 1.0 / h.z : 1.0;
-    return {h.x * scale, h.y * scale, h.z, depth};
+    if (camera_.projection() == Projection::kOrthographic) return {h.x, h.y, h.z, camera_.view_z(world)};
+    const double scale = h.z > 0.0 ? 1.0 / h.z : 1.0;
+    return {h.x * scale, h.y * scale, h.z, h.z * depth_scale_};
   }
 
   void draw(const PlacedPart& placed) {
@@ -152,7 +158,7 @@ private:
     const bool perspective = camera_.projection() == Projection::kPerspective;
     if (perspective && !(depth > 2.0 * movement)) return std::max({t[0].depth, t[1].depth, t[2].depth}) > -movement;
     // Beside the centre of the image, movement along the view direction adds to movement across it.
-    const double margin = 4.0 * movement / (camera_.pixel_spread() * (perspective ? depth : 1.0));
+    const double margin = 4.0 * movement / (spread_ * (perspective ? depth : 1.0));
     const auto [left, right] = std::minmax({t[0].x, t[1].x, t[2].x});
     const auto [top, bottom] = std::minmax({t[0].y, t[1].y, t[2].y});
     return std::ceil(std::max(left - margin, 0.0) - 0.5) <= std::floor(std::min(right + margin, width_) - 0.5) &&
@@ -183,11 +189,10 @@ private:
       std::array<double, 3> constants;
       for (size_t i = 0; i < 3; ++i) {
         constants[i] = edges[i].x * 0.5 + edges[i].y * (row + 0.5) + edges[i].z;
-        const double zero = -constants[i] / edges[i].x;
         if (edges[i].x > 0.0)
-          first = std::max(first, std::ceil(zero));
+          first = std::max(first, std::ceil(-constants[i] / edges[i].x));
         else if (edges[i].x < 0.0)
-          last = std::min(last, std::floor(zero));
+          last = std::min(last, std::floor(-constants[i] / edges[i].x));
         else if (constants[i] < 0.0)
           last = -1.0;
       }
@@ -236,6 +241,8 @@ private:
   const Scene& scene_;
   const std::span<const GeometryGrid> grids_;
   const double width_, height_;
+  const double spread_;           // PrimaryCamera::pixel_spread()
+  double depth_scale_ = 1.0;      // depth / w, perspective cameras
   std::vector<PlacedPart> parts_; // by first_triangle
   uint32_t triangles_ = 0;
   DepthBuffer source_, rounded_;
