@@ -261,7 +261,7 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   if (baked.finer_geometries > 0)
     fmt::print(text, "{}",
                fmt::format(grouped(),
-                           "{:L} geometries have a finer grid, because their triangles are thin or close to a camera\n",
+                           "{:L} geometries have a finer grid, because their triangles or gaps are thin or close to a camera\n",
                            baked.finer_geometries));
   if (baked.left_out > 0)
     fmt::print(text, "{}",

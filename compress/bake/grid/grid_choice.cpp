@@ -6,12 +6,16 @@
 #include <tbb/parallel_for.h>
 
 #include "compress/bake/grid/grid_check.h"
+#include "compress/bake/grid/moved_edges.h"
 #include "compress/bake/grid/nested_grids.h"
 
 namespace packtrace {
 namespace {
 
 constexpr int kMaxRefinements = 3;
+constexpr int kMaxEdgeRefinements = 5;
+constexpr double kEdgeMargin = 0.6;       // of the allowed number of changed pixels, to aim at
+constexpr double kMaxPixelSteps = 1024.0; // no step becomes finer than this fraction of a pixel for its edges
 
 // Limits of the check.
 constexpr double kMaxCollapsed = 0.001; // fraction of the image
@@ -34,13 +38,20 @@ public:
   GridChoice run() {
     begin();
     progress_.begin("choosing grids", out_.grids.size());
-    views_ = measure_views(scene_, plan_, measure_, progress_);
+    const std::vector<PrimaryCamera> cameras = promised_cameras(scene_, plan_, measure_);
+    views_ = measure_views(scene_, plan_, measure_, cameras, progress_);
     const std::vector<WantedStep> wanted = bound_steps(plan_, measure_, views_, steps());
     const std::vector<double> first = steps();
     if (may_refine())
       for (size_t g = 0; g < wanted.size(); ++g) refine_to(g, wanted[g].step);
     share_and_check();
     for (int i = 0; may_refine() && i < kMaxRefinements && refine_failing(); ++i) share_and_check();
+    const MovedEdges edges(scene_, plan_, measure_, cameras, progress_);
+    changes_ = compare(edges);
+    for (int i = 0; may_refine() && i < kMaxEdgeRefinements && refine_moved(); ++i) {
+      share_and_check();
+      changes_ = compare(edges);
+    }
     for (size_t g = 0; g < first.size(); ++g) out_.finer_geometries += out_.grids[g].grid.step() < first[g];
     report(wanted);
     return std::move(out_);
@@ -155,6 +166,35 @@ private:
     return refined;
   }
 
+  std::vector<MovedEdges::Change> compare(const MovedEdges& edges) const {
+    for (size_t g = 0; g < out_.grids.size(); ++g) // as in share_and_check()
+      if (!fits_lattice(measure_.geometries[g].max_abs(), out_.grids[g].grid.step()))
+        return std::vector<MovedEdges::Change>(out_.grids.size());
+    return edges.compare(out_.grids);
+  }
+
+  /// Refines the steps of geometries whose edges move too far, and of coarser geometries that share positions with
+  /// them.
+  bool refine_moved() {
+    std::vector<uint8_t> failing(changes_.size());
+    bool shared = false, refined = false;
+    for (size_t g = 0; g < failing.size(); ++g) {
+      failing[g] = changes_[g].excess > 1.0;
+      shared |= failing[g] != 0 && !out_.grids[g].shared.empty();
+    }
+    if (shared) spread_to_sharing(failing);
+    for (size_t g = 0; g < failing.size(); ++g) {
+      if (failing[g] == 0) continue;
+      const double step = out_.grids[g].grid.step(), wanted = changes_[g].excess > 1.0 ? edge_step(g) : step / 2.0;
+      const double finest = views_[g].pixel / world_scale(plan_.geometries[g]) / kMaxPixelSteps;
+      if (step > finest) refined |= refine_to(g, std::max(wanted, finest));
+    }
+    return refined;
+  }
+
+  /// The step at which the edges of a geometry that fails move little enough.
+  double edge_step(size_t g) const { return out_.grids[g].grid.step() * kEdgeMargin / changes_[g].excess; }
+
   /// Adds geometries on coarser grids that share positions with a failing geometry.
   void spread_to_sharing(std::vector<uint8_t>& failing) const {
     std::vector<uint64_t> keys;
@@ -191,6 +231,9 @@ private:
       } else if (outlines[g] != 0) {
         shortfall.bound = PictureBound::kOutline;
         shortfall.wanted = std::min(wanted[g].step, shortfall.step * kMaxPassedPixels / passed_pixel_fraction(g));
+      } else if (changes_[g].excess > 1.0) {
+        shortfall.bound = PictureBound::kOutline;
+        shortfall.wanted = std::min(wanted[g].step, edge_step(g));
       } else if (views_[g].best.coverage() >= kSeen && step > kBoundSlack * wanted[g].limit) {
         shortfall.bound = wanted[g].bound;
         shortfall.wanted = wanted[g].step;
@@ -208,7 +251,8 @@ private:
   const BakeConfig& config_;
   Progress& progress_;
   std::vector<GeometryView> views_;
-  std::vector<GridCheck> checks_; // per geometry
+  std::vector<GridCheck> checks_;           // per geometry
+  std::vector<MovedEdges::Change> changes_; // per geometry
   GridChoice out_;
 };
 

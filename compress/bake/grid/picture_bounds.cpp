@@ -39,26 +39,12 @@ Bounds scene_box(const ScenePlan& plan, const SceneMeasure& measure) {
   return box;
 }
 
-/// Returns all cameras with images of kPromisedSize, including the one that frames the scene.
-std::vector<PrimaryCamera> cameras_of(const Scene& scene, const Bounds& box) {
-  std::vector<PrimaryCamera> cameras;
-  const auto add = [&](const Camera& camera) {
-    try {
-      cameras.emplace_back(camera, kPromisedSize);
-    } catch (const Error&) { // a camera that cannot make rays
-    }
-  };
-  for (const Camera& camera : scene.cameras) add(camera);
-  if (!box.empty()) add(framing_camera(box, kPromisedSize));
-  return cameras;
-}
-
 class ViewMeasurer {
 public:
-  ViewMeasurer(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure, Progress& progress)
-      : scene_(scene), plan_(plan), measure_(measure), progress_(progress),
-        cameras_(cameras_of(scene, scene_box(plan, measure))), views_(plan.geometries.size()),
-        instances_(plan.geometries.size()) {
+  ViewMeasurer(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure,
+               std::span<const PrimaryCamera> cameras, Progress& progress)
+      : scene_(scene), plan_(plan), measure_(measure), progress_(progress), cameras_(cameras),
+        views_(plan.geometries.size()), instances_(plan.geometries.size()) {
     for (uint32_t i = 0; i < plan.instances.size(); ++i)
       if (const baked::InstanceRecord& instance = plan.instances[i];
           instance.geometry != baked::kNone && is_in_range(instance))
@@ -105,7 +91,7 @@ private:
   const ScenePlan& plan_;
   const SceneMeasure& measure_;
   Progress& progress_;
-  const std::vector<PrimaryCamera> cameras_;
+  const std::span<const PrimaryCamera> cameras_;
   std::vector<GeometryView> views_;
   std::vector<std::vector<uint32_t>> instances_; // per geometry: its instances
   size_t max_sample_ = kMaxSample;
@@ -216,9 +202,22 @@ std::string_view name_of(PictureBound bound) {
   return kNames[static_cast<size_t>(bound)];
 }
 
+std::vector<PrimaryCamera> promised_cameras(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure) {
+  std::vector<PrimaryCamera> cameras;
+  const auto add = [&](const Camera& camera) {
+    try {
+      cameras.emplace_back(camera, kPromisedSize);
+    } catch (const Error&) { // a camera that cannot make rays
+    }
+  };
+  for (const Camera& camera : scene.cameras) add(camera);
+  if (const Bounds box = scene_box(plan, measure); !box.empty()) add(framing_camera(box, kPromisedSize));
+  return cameras;
+}
+
 std::vector<GeometryView> measure_views(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure,
-                                        Progress& progress) {
-  return ViewMeasurer(scene, plan, measure, progress).run();
+                                        std::span<const PrimaryCamera> cameras, Progress& progress) {
+  return ViewMeasurer(scene, plan, measure, cameras, progress).run();
 }
 
 std::vector<WantedStep> bound_steps(const ScenePlan& plan, const SceneMeasure& measure,

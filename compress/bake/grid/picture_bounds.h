@@ -42,9 +42,13 @@ struct GeometryView {
 /// Geometry that covers a smaller fraction of the image counts only together with others.
 inline constexpr double kSeen = 0.001;
 
-/// Returns the views per geometry. Cameras that cannot make rays are skipped: nothing can be rendered with them.
+/// Returns the scene's cameras and the camera that frames the whole scene, for images of kPromisedSize. Cameras that
+/// cannot make rays are skipped: nothing can be rendered with them.
+std::vector<PrimaryCamera> promised_cameras(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure);
+
+/// Returns the views per geometry.
 std::vector<GeometryView> measure_views(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure,
-                                        Progress& progress);
+                                        std::span<const PrimaryCamera> cameras, Progress& progress);
 
 /// The step that a geometry needs if its current step exceeds a bound, in the geometry's own units.
 struct WantedStep {

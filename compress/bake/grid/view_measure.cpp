@@ -21,6 +21,10 @@ bool outside(const std::array<DVec3, kCount>& points, ImageSize size) {
          all([&](DVec3 p) { return p.x > size.width * p.z; }) || all([&](DVec3 p) { return p.y > size.height * p.z; });
 }
 
+bool is_in_front(const PrimaryCamera& camera, DVec3 world) {
+  return camera.projection() != Projection::kPerspective || camera.view_z(world) > 0.0;
+}
+
 class TriangleProjector {
 public:
   TriangleProjector(const PrimaryCamera& camera, ViewSums& sums) : camera_(camera), sums_(sums) {}
@@ -32,34 +36,8 @@ public:
     return cut(world, 0);
   }
 
-  /// Estimates the pixels that a box covers. Returns 0 only if the box is out of sight.
-  double pixels_of(const Bounds& world) const {
-    const double all = static_cast<double>(camera_.size().pixels());
-    if (camera_.projection() == Projection::kEnvironment) {
-      const double distance = glm::distance(world.centre(), camera_.eye()), radius = 0.5 * world.diagonal();
-      const double pixel = std::max(distance - radius, 0.0) * camera_.pixel_spread();
-      return pixel > 0.0 ? std::clamp(4.0 * radius * radius / (pixel * pixel), 0x1p-60, all) : all;
-    }
-    std::array<DVec3, 8> corners;
-    bool in_front = true;
-    for (int i = 0; i < 8; ++i) {
-      const DVec3 corner(i & 1 ? world.hi.x : world.lo.x, i & 2 ? world.hi.y : world.lo.y,
-                         i & 4 ? world.hi.z : world.lo.z);
-      corners[static_cast<size_t>(i)] = camera_.homogeneous_pixel(corner);
-      in_front &= in_view_depth(corner);
-    }
-    if (outside(corners, camera_.size())) return 0.0;
-    if (!in_front) return all;
-    glm::dvec2 lo(std::numeric_limits<double>::infinity()), hi(-lo);
-    for (const DVec3 c : corners) lo = glm::min(lo, glm::dvec2(c) / c.z), hi = glm::max(hi, glm::dvec2(c) / c.z);
-    const glm::dvec2 sides = hi - lo;
-    return std::clamp(sides.x * sides.y, 0x1p-60, all);
-  }
-
 private:
-  bool in_view_depth(DVec3 world) const {
-    return camera_.projection() != Projection::kPerspective || camera_.view_z(world) > 0.0;
-  }
+  bool in_view_depth(DVec3 world) const { return is_in_front(camera_, world); }
 
   /// World-space size of a pixel at a point in front of the camera.
   double pixel_at(DVec3 world) const {
@@ -122,13 +100,13 @@ struct ChosenInstance {
 };
 
 /// Returns the instances in view, or a weighted subset in which larger ones are more likely.
-std::vector<ChosenInstance> choose_instances(const TriangleProjector& look, const Placements& placements,
+std::vector<ChosenInstance> choose_instances(const PrimaryCamera& camera, const Placements& placements,
                                              const Bounds& box) {
   std::vector<double> pixels(placements.size());
   double total = 0.0;
   size_t seen = 0;
   for (size_t i = 0; i < pixels.size(); ++i) {
-    pixels[i] = look.pixels_of(transform_bounds(placements[i], box));
+    pixels[i] = box_pixels(camera, transform_bounds(placements[i], box));
     total += pixels[i];
     seen += pixels[i] > 0.0;
   }
@@ -153,6 +131,29 @@ std::vector<ChosenInstance> choose_instances(const TriangleProjector& look, cons
 
 } // namespace
 
+double box_pixels(const PrimaryCamera& camera, const Bounds& world) {
+  const double all = static_cast<double>(camera.size().pixels());
+  if (camera.projection() == Projection::kEnvironment) {
+    const double distance = glm::distance(world.centre(), camera.eye()), radius = 0.5 * world.diagonal();
+    const double pixel = std::max(distance - radius, 0.0) * camera.pixel_spread();
+    return pixel > 0.0 ? std::clamp(4.0 * radius * radius / (pixel * pixel), 0x1p-60, all) : all;
+  }
+  std::array<DVec3, 8> corners;
+  bool in_front = true;
+  for (int i = 0; i < 8; ++i) {
+    const DVec3 corner(i & 1 ? world.hi.x : world.lo.x, i & 2 ? world.hi.y : world.lo.y,
+                       i & 4 ? world.hi.z : world.lo.z);
+    corners[static_cast<size_t>(i)] = camera.homogeneous_pixel(corner);
+    in_front &= is_in_front(camera, corner);
+  }
+  if (outside(corners, camera.size())) return 0.0;
+  if (!in_front) return all;
+  glm::dvec2 lo(std::numeric_limits<double>::infinity()), hi(-lo);
+  for (const DVec3 c : corners) lo = glm::min(lo, glm::dvec2(c) / c.z), hi = glm::max(hi, glm::dvec2(c) / c.z);
+  const glm::dvec2 sides = hi - lo;
+  return std::clamp(sides.x * sides.y, 0x1p-60, all);
+}
+
 double ViewStats::coverage() const { return std::min(pixels / static_cast<double>(kPromisedSize.pixels()), 1.0); }
 
 void ViewSums::add(double pixels, double pixel, double height) {
@@ -176,7 +177,7 @@ void add_geometry_view(const PrimaryCamera& camera, std::span<const SampleTriang
                        const Placements& placements, const Bounds& box, ViewSums& sums,
                        std::span<double> sample_pixels) {
   TriangleProjector look(camera, sums);
-  const std::vector<ChosenInstance> chosen = choose_instances(look, placements, box);
+  const std::vector<ChosenInstance> chosen = choose_instances(camera, placements, box);
   if (chosen.empty() || sample.empty()) return;
   // Each instance gets every stride-th sample triangle, starting at a different one.
   const size_t stride = std::max<size_t>(1, chosen.size() * sample.size() / kMaxPlacedTriangles);

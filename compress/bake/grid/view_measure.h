@@ -50,6 +50,9 @@ struct Placements {
   DAffine operator[](size_t i) const { return placement_of(instances[chosen[i]]); }
 };
 
+/// Estimates the pixels that a world-space box covers. Returns 0 only if the box is out of sight.
+double box_pixels(const PrimaryCamera& camera, const Bounds& world);
+
 /// Adds the camera's view of a geometry's sample in all of its instances. If there are many, a weighted subset
 /// represents them: about 8192 placed triangles are visited, large ones split into pieces of at most 32 pixels.
 /// @param box bounds of the geometry

@@ -1,0 +1,122 @@
+#include "compress/bake/grid/moved_edges.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "compress/bake/grid/picture_bounds.h"
+#include "compress/bake/grid/view_measure.h"
+#include "pbrt_import/scene/angle.h"
+
+namespace packtrace {
+namespace {
+
+constexpr uint64_t kMinDrawnTriangles = uint64_t{1} << 22;
+constexpr uint64_t kMaxDrawsPerTriangle = 4;
+constexpr uint64_t kMaxDrawnTriangles = uint64_t{1} << 31;
+constexpr double kMaxMoved = 0.0055;    // fraction of pixels that may show another surface, weighted by contrast
+constexpr double kMaxMissed = 0.001;    // fraction of the image in which hit and miss may differ
+constexpr double kMinMissedShare = 0.1; // of all such pixels; geometries with fewer are not to blame
+constexpr double kMinPixels = 576.0;    // 1 % of the image; with fewer pixels, one counts too much
+
+/// Returns the instances that a camera sees, the largest of them if they have more than max_triangles triangles.
+std::vector<uint32_t> choose_drawn(const PrimaryCamera& camera, const Scene& scene, const ScenePlan& plan,
+                                   const SceneMeasure& measure, uint64_t max_triangles, uint64_t& drawn) {
+  struct Seen {
+    double pixels;
+    uint32_t instance;
+    uint64_t triangles;
+  };
+  std::vector<uint64_t> triangles(plan.geometries.size());
+  for (size_t g = 0; g < triangles.size(); ++g)
+    for (const GeometryPart& part : plan.geometries[g].parts) triangles[g] += scene.meshes[part.mesh].triangles.size();
+  std::vector<Seen> seen;
+  for (uint32_t i = 0; i < plan.instances.size(); ++i) {
+    const uint32_t g = plan.instances[i].geometry;
+    if (g == baked::kNone) continue;
+    const Bounds box = placed_box(plan.instances[i], measure.geometries[g].bounds);
+    if (box.empty() || !within_float_range(box)) continue;
+    if (const double pixels = box_pixels(camera, box); pixels > 0.0) seen.push_back({pixels, i, triangles[g]});
+  }
+  std::stable_sort(seen.begin(), seen.end(), [](const Seen& a, const Seen& b) { return a.pixels > b.pixels; });
+  std::vector<uint32_t> instances;
+  uint64_t sum = 0;
+  for (const Seen& one : seen) {
+    if (sum + one.triangles > (sum > 0 ? max_triangles : kMaxDrawnTriangles)) break;
+    sum += one.triangles;
+    instances.push_back(one.instance);
+  }
+  std::sort(instances.begin(), instances.end());
+  drawn += sum;
+  return instances;
+}
+
+/// Expected contrast of ambient occlusion between two surfaces that are seen through one pixel centre, 0..1: 1 if one
+/// lies behind the other, otherwise by the angle between them.
+/// @param step the most that one surface moves away from its plane, world units
+double contrast(const VisiblePoint& a, const VisiblePoint& b, double step) {
+  if (a.triangle == b.triangle) return 0.0;
+  const DVec3 between = b.position - a.position;
+  const double gap = std::max(std::abs(glm::dot(between, a.normal)), std::abs(glm::dot(between, b.normal)));
+  if (!(gap <= step)) return 1.0;
+  const double degrees = angle_degrees(a.normal, b.normal);
+  return std::min(degrees, 180.0 - degrees) / 180.0;
+}
+
+/// Moved pixels over the limit. The standard deviation of their number is added, because few pixels may be lucky ones.
+double moved_excess(double moved, double seen) {
+  return (moved + std::sqrt(moved)) / (kMaxMoved * std::max(seen, kMinPixels));
+}
+
+} // namespace
+
+MovedEdges::MovedEdges(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure,
+                       std::span<const PrimaryCamera> cameras, Progress& progress)
+    : scene_(scene), plan_(plan), progress_(progress) {
+  uint64_t stored = 0, drawn = 0;
+  for (const GeometryPlan& geometry : plan.geometries)
+    for (const GeometryPart& part : geometry.parts) stored += scene.meshes[part.mesh].triangles.size();
+  const uint64_t most = std::clamp(kMaxDrawsPerTriangle * stored, kMinDrawnTriangles, kMaxDrawnTriangles);
+  for (const PrimaryCamera& camera : cameras) {
+    if (camera.projection() == Projection::kEnvironment || drawn >= most) continue;
+    progress_.check_cancelled();
+    View view{&camera, choose_drawn(camera, scene, plan, measure, most - drawn, drawn)};
+    views_.push_back(std::move(view));
+  }
+}
+
+std::vector<MovedEdges::Change> MovedEdges::compare(std::span<const GeometryGrid> grids) const {
+  std::vector<Change> changes(grids.size());
+  for (const View& view : views_) {
+    progress_.check_cancelled();
+    add_changes(find_visible_points(*view.camera, scene_, plan_, view.instances, grids), grids, changes);
+  }
+  return changes;
+}
+
+void MovedEdges::add_changes(const VisiblePoints& points, std::span<const GeometryGrid> grids,
+                             std::span<Change> changes) const {
+  struct Sums {
+    double seen = 0.0, moved = 0.0, missed = 0.0;
+  };
+  std::vector<Sums> sums(grids.size());
+  Sums all;
+  for (size_t i = 0; i < points.source.size(); ++i) {
+    const VisiblePoint &a = points.source[i], &b = points.rounded[i];
+    if (a.geometry == baked::kNone && b.geometry == baked::kNone) continue;
+    // The nearer surface is the one whose edge moved.
+    const bool of_source = b.geometry == baked::kNone || (a.geometry != baked::kNone && a.depth <= b.depth);
+    const uint32_t g = of_source ? a.geometry : b.geometry;
+    const bool missed = a.geometry == baked::kNone || b.geometry == baked::kNone;
+    const double moved = missed ? 0.0 : contrast(a, b, grids[g].grid.step() * world_scale(plan_.geometries[g]));
+    for (Sums* sum : {&sums[g], &all}) sum->seen += 1.0, sum->moved += moved, sum->missed += missed ? 1.0 : 0.0;
+  }
+  const double all_moved = moved_excess(all.moved, all.seen);
+  const double all_missed = all.missed / (kMaxMissed * static_cast<double>(kPromisedSize.pixels()));
+  for (size_t g = 0; g < sums.size(); ++g) {
+    const double moved = all_moved > 1.0 ? moved_excess(sums[g].moved, sums[g].seen) : 0.0;
+    const double missed = all_missed > 1.0 && sums[g].missed >= kMinMissedShare * all.missed ? all_missed : 0.0;
+    changes[g].excess = std::max({changes[g].excess, moved, missed});
+  }
+}
+
+} // namespace packtrace

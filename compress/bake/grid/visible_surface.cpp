@@ -1,0 +1,258 @@
+#include "compress/bake/grid/visible_surface.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <memory>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include "compress/bake/grid/picture_bounds.h"
+#include "compress/bake/grid/scene_measure.h"
+
+namespace packtrace {
+namespace {
+
+constexpr uint64_t kNothing = ~uint64_t{0};
+constexpr size_t kBlockTriangles = 4096;
+constexpr double kMaxTests = 0x1p28;      // pixels tested per image, shared out by number of triangles
+constexpr double kMinBlockTests = 0x1p20; // least share of a block
+
+/// A projected vertex.
+struct ImagePoint {
+  double x, y;  ///< pixel coordinates; homogeneous ones (x w, y w) if w <= 0
+  double w;     ///< homogeneous coordinate, as in PrimaryCamera::homogeneous_pixel()
+  double depth; ///< PrimaryCamera::view_z()
+
+  DVec3 homogeneous() const { return w > 0.0 ? DVec3(x * w, y * w, w) : DVec3(x, y, w); }
+};
+
+using ImageTriangle = std::array<ImagePoint, 3>;
+
+/// One mesh of one instance.
+struct PlacedPart {
+  uint32_t geometry;
+  const GeometryPart* part;
+  DAffine world_from_geometry;
+  uint32_t first_triangle;
+  bool moved;           ///< geometry_from_mesh is not the identity
+  bool placed;          ///< world_from_geometry is not the identity
+  double most_movement; ///< upper bound of the distance between source and rounded positions, world units
+};
+
+/// The nearest triangle per pixel.
+class DepthBuffer {
+public:
+  explicit DepthBuffer(size_t pixels) : nearest_(pixels, kNothing) {}
+
+  /// Keeps the nearest triangle, the first of equally near ones. Bits of positive floats are ordered like the floats.
+  void put(size_t pixel, float depth, uint32_t triangle) {
+    const uint64_t key = uint64_t{std::bit_cast<uint32_t>(depth)} << 32 | triangle;
+    const std::atomic_ref<uint64_t> nearest(nearest_[pixel]);
+    uint64_t before = nearest.load(std::memory_order_relaxed);
+    while (key < before && !nearest.compare_exchange_weak(before, key, std::memory_order_relaxed)) {
+    }
+  }
+
+  size_t size() const { return nearest_.size(); }
+  bool empty(size_t pixel) const { return nearest_[pixel] == kNothing; }
+  uint32_t triangle(size_t pixel) const { return static_cast<uint32_t>(nearest_[pixel]); }
+  double depth(size_t pixel) const {
+    return double{std::bit_cast<float>(static_cast<uint32_t>(nearest_[pixel] >> 32))};
+  }
+
+private:
+  std::vector<uint64_t> nearest_; // bits of the depth, then the triangle's number
+};
+
+class VisiblePointFinder {
+public:
+  VisiblePointFinder(const PrimaryCamera& camera, const Scene& scene, const ScenePlan& plan,
+                     std::span<const uint32_t> instances, std::span<const GeometryGrid> grids)
+      : camera_(camera), scene_(scene), grids_(grids), width_(camera.size().width), height_(camera.size().height),
+        spread_(camera.pixel_spread()), source_(camera.size().pixels()), rounded_(camera.size().pixels()) {
+    const CameraRay ray = camera.ray(0, 0);
+    depth_scale_ = camera.view_z(ray.origin + ray.direction) / camera.homogeneous_pixel(ray.origin + ray.direction).z;
+    for (const uint32_t i : instances) add_instance(plan, plan.instances[i]);
+  }
+
+  VisiblePoints run() {
+    tbb::parallel_for(size_t{0}, parts_.size(), [&](size_t i) { draw(parts_[i]); });
+    return {points(source_, &VisiblePointFinder::source_position),
+            points(rounded_, &VisiblePointFinder::rounded_position)};
+  }
+
+private:
+  using Position = DVec3 (VisiblePointFinder::*)(const PlacedPart&, uint32_t vertex) const;
+
+  void add_instance(const ScenePlan& plan, const baked::InstanceRecord& instance) {
+    const GeometryPlan& geometry = plan.geometries[instance.geometry];
+    for (const GeometryPart& part : geometry.parts) {
+      const auto count = static_cast<uint32_t>(scene_.meshes[part.mesh].triangles.size());
+      if ((geometry.slot_class[part.slot] & 1u) != 0 || count == 0) continue; // bit 0: invisible to cameras
+      const double movement = std::sqrt(0.75) * grids_[instance.geometry].coarsest_step() * world_scale(geometry);
+      parts_.push_back({instance.geometry, &part, placement_of(instance), triangles_,
+                        part.geometry_from_mesh != DAffine(1.0), placement_of(instance) != DAffine(1.0), movement});
+      triangles_ += count;
+    }
+  }
+
+  const Mesh& mesh_of(const PlacedPart& placed) const { return scene_.meshes[placed.part->mesh]; }
+
+  static DVec3 to_world(const PlacedPart& placed, Vec3 p) {
+    return placed.placed ? transform_point(placed.world_from_geometry, DVec3(p)) : DVec3(p);
+  }
+  /// Position of a vertex in geometry space.
+  DVec3 geometry_position(const PlacedPart& placed, uint32_t vertex) const {
+    const DVec3 p(mesh_of(placed).positions[vertex]);
+    return placed.moved ? transform_point(placed.part->geometry_from_mesh, p) : p;
+  }
+  /// World position of a vertex, rounded to a float in geometry space.
+  DVec3 source_position(const PlacedPart& placed, uint32_t vertex) const {
+    return to_world(placed, Vec3(geometry_position(placed, vertex)));
+  }
+  /// World position of a vertex on the lattice, as the file's readers decode it.
+  DVec3 rounded_position(const PlacedPart& placed, uint32_t vertex) const {
+    const GeometryGrid& grid = grids_[placed.geometry];
+    const double step = grid.grid.step();
+    const LatticePoint q = grid.round(geometry_position(placed, vertex));
+    return to_world(placed, {from_lattice(q[0], step), from_lattice(q[1], step), from_lattice(q[2], step)});
+  }
+
+  ImagePoint project(DVec3 world) const {
+    const DVec3 h = camera_.homogeneous_pixel(world);
+    if (camera_.projection() == Projection::kOrthographic) return {h.x, h.y, h.z, camera_.view_z(world)};
+    const double scale = h.z > 0.0 ? 1.0 / h.z : 1.0;
+    return {h.x * scale, h.y * scale, h.z, h.z * depth_scale_};
+  }
+
+  void draw(const PlacedPart& placed) {
+    const Mesh& mesh = mesh_of(placed);
+    const auto points = std::make_unique_for_overwrite<ImagePoint[]>(mesh.positions.size());
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, mesh.positions.size(), kBlockTriangles), [&](const auto& range) {
+      for (size_t v = range.begin(); v < range.end(); ++v)
+        points[v] = project(source_position(placed, static_cast<uint32_t>(v)));
+    });
+    const size_t count = mesh.triangles.size();
+    tbb::parallel_for(size_t{0}, (count + kBlockTriangles - 1) / kBlockTriangles, [&](size_t block) {
+      const size_t begin = block * kBlockTriangles, end = std::min(begin + kBlockTriangles, count);
+      double tests = std::max(kMinBlockTests, kMaxTests * static_cast<double>(end - begin) / triangles_);
+      for (size_t i = begin; i < end && tests > 0.0; ++i) {
+        const Triangle& t = mesh.triangles[i];
+        const ImageTriangle source{points[t.x], points[t.y], points[t.z]};
+        if (!may_cover_centre(source, placed.most_movement)) continue;
+        const auto rounded = [&](uint32_t vertex) { return project(rounded_position(placed, vertex)); };
+        const uint32_t number = placed.first_triangle + static_cast<uint32_t>(i);
+        tests -= draw(source, number, source_) + draw({rounded(t.x), rounded(t.y), rounded(t.z)}, number, rounded_);
+      }
+    });
+  }
+
+  /// Whether the triangle covers a pixel's centre, or may do so when its vertices move.
+  /// @param movement world units
+  bool may_cover_centre(const ImageTriangle& t, double movement) const {
+    const double depth = std::min({t[0].depth, t[1].depth, t[2].depth});
+    const bool perspective = camera_.projection() == Projection::kPerspective;
+    if (perspective && !(depth > 2.0 * movement)) return std::max({t[0].depth, t[1].depth, t[2].depth}) > -movement;
+    // Beside the centre of the image, movement along the view direction adds to movement across it.
+    const double margin = 4.0 * movement / (spread_ * (perspective ? depth : 1.0));
+    const auto [left, right] = std::minmax({t[0].x, t[1].x, t[2].x});
+    const auto [top, bottom] = std::minmax({t[0].y, t[1].y, t[2].y});
+    return std::ceil(std::max(left - margin, 0.0) - 0.5) <= std::floor(std::min(right + margin, width_) - 0.5) &&
+           std::ceil(std::max(top - margin, 0.0) - 0.5) <= std::floor(std::min(bottom + margin, height_) - 0.5);
+  }
+
+  /// @return the number of tested pixels
+  double draw(const ImageTriangle& t, uint32_t number, DepthBuffer& buffer) const {
+    double x0 = 0.0, x1 = width_ - 1.0, y0 = 0.0, y1 = height_ - 1.0; // numbers of pixels
+    const auto [least_depth, most_depth] = std::minmax({t[0].depth, t[1].depth, t[2].depth});
+    if (!(most_depth > 0.0)) return 0.0;
+    if (std::min({t[0].w, t[1].w, t[2].w}) > 0.0) {
+      const auto [left, right] = std::minmax({t[0].x, t[1].x, t[2].x});
+      const auto [top, bottom] = std::minmax({t[0].y, t[1].y, t[2].y});
+      x0 = std::max(x0, std::ceil(left - 0.5)), x1 = std::min(x1, std::floor(right - 0.5));
+      y0 = std::max(y0, std::ceil(top - 0.5)), y1 = std::min(y1, std::floor(bottom - 0.5));
+    }
+    if (!(x0 <= x1 && y0 <= y1)) return 0.0;
+    const DVec3 a = t[0].homogeneous(), b = t[1].homogeneous(), c = t[2].homogeneous();
+    std::array<DVec3, 3> edges{glm::cross(b, c), glm::cross(c, a), glm::cross(a, b)};
+    const double volume = glm::dot(a, edges[0]);
+    if (!(std::abs(volume) > 0.0)) return 0.0;
+    for (DVec3& edge : edges) edge /= volume;
+    double tests = 0.0;
+    for (double row = y0; row <= y1; ++row) {
+      // Edge functions are linear along the row: edge.x * x + constant >= 0 inside.
+      double first = x0, last = x1;
+      std::array<double, 3> constants;
+      for (size_t i = 0; i < 3; ++i) {
+        constants[i] = edges[i].x * 0.5 + edges[i].y * (row + 0.5) + edges[i].z;
+        if (edges[i].x > 0.0)
+          first = std::max(first, std::ceil(-constants[i] / edges[i].x));
+        else if (edges[i].x < 0.0)
+          last = std::min(last, std::floor(-constants[i] / edges[i].x));
+        else if (constants[i] < 0.0)
+          last = -1.0;
+      }
+      if (!(first <= last)) continue;
+      tests += last - first + 1.0;
+      const size_t line = static_cast<size_t>(row) * camera_.size().width;
+      for (double x = first; x <= last; ++x) {
+        double sum = 0.0, depth = 0.0;
+        for (size_t i = 0; i < 3; ++i) {
+          const double share = edges[i].x * x + constants[i];
+          sum += share, depth += share * t[i].depth;
+        }
+        if (!(sum > 0.0)) continue;
+        depth = std::clamp(depth / sum, least_depth, most_depth);
+        if (depth > 0.0) buffer.put(line + static_cast<size_t>(x), static_cast<float>(depth), number);
+      }
+    }
+    return tests + y1 - y0;
+  }
+
+  std::vector<VisiblePoint> points(const DepthBuffer& buffer, Position position) const {
+    std::vector<VisiblePoint> points(buffer.size());
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, points.size(), kBlockTriangles), [&](const auto& range) {
+      for (size_t pixel = range.begin(); pixel < range.end(); ++pixel)
+        if (!buffer.empty(pixel)) points[pixel] = point_at(pixel, buffer, position);
+    });
+    return points;
+  }
+
+  VisiblePoint point_at(size_t pixel, const DepthBuffer& buffer, Position position) const {
+    const uint32_t number = buffer.triangle(pixel);
+    const auto after = std::upper_bound(parts_.begin(), parts_.end(), number,
+                                        [](uint32_t n, const PlacedPart& part) { return n < part.first_triangle; });
+    const PlacedPart& placed = *std::prev(after);
+    const Triangle& t = mesh_of(placed).triangles[number - placed.first_triangle];
+    const DVec3 a = (this->*position)(placed, t.x), b = (this->*position)(placed, t.y),
+                c = (this->*position)(placed, t.z);
+    const DVec3 normal = glm::normalize(glm::cross(b - a, c - a));
+    const CameraRay ray = camera_.ray(static_cast<uint32_t>(pixel % camera_.size().width),
+                                      static_cast<uint32_t>(pixel / camera_.size().width));
+    const double distance = glm::dot(a - ray.origin, normal) / glm::dot(ray.direction, normal);
+    return {placed.geometry, number, buffer.depth(pixel), ray.origin + distance * ray.direction, normal};
+  }
+
+  const PrimaryCamera& camera_;
+  const Scene& scene_;
+  const std::span<const GeometryGrid> grids_;
+  const double width_, height_;
+  const double spread_;           // PrimaryCamera::pixel_spread()
+  double depth_scale_ = 1.0;      // depth / w, perspective cameras
+  std::vector<PlacedPart> parts_; // by first_triangle
+  uint32_t triangles_ = 0;
+  DepthBuffer source_, rounded_;
+};
+
+} // namespace
+
+VisiblePoints find_visible_points(const PrimaryCamera& camera, const Scene& scene, const ScenePlan& plan,
+                                  std::span<const uint32_t> instances, std::span<const GeometryGrid> grids) {
+  return VisiblePointFinder(camera, scene, plan, instances, grids).run();
+}
+
+} // namespace packtrace
