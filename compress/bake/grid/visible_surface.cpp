@@ -92,7 +92,7 @@ private:
     const GeometryPlan& geometry = plan.geometries[instance.geometry];
     for (const GeometryPart& part : geometry.parts) {
       const auto count = static_cast<uint32_t>(scene_.meshes[part.mesh].triangles.size());
-      if ((geometry.slot_class[part.slot] & 1u) != 0 || count == 0) continue; // bit 0: invisible to cameras
+      if (count == 0 || (geometry.slot_class[part.slot] & 1u) != 0) continue; // bit 0: invisible to cameras
       const double movement = std::sqrt(0.75) * grids_[instance.geometry].coarsest_step() * world_scale(geometry);
       parts_.push_back({instance.geometry, &part, placement_of(instance), triangles_,
                         part.geometry_from_mesh != DAffine(1.0), placement_of(instance) != DAffine(1.0), movement});
