@@ -260,9 +260,10 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
                            baked.nested_geometries));
   if (baked.finer_geometries > 0)
     fmt::print(text, "{}",
-               fmt::format(grouped(),
-                           "{:L} geometries have a finer grid, because their triangles or gaps are thin or close to a camera\n",
-                           baked.finer_geometries));
+               fmt::format(
+                   grouped(),
+                   "{:L} geometries have a finer grid, because their triangles or gaps are thin or close to a camera\n",
+                   baked.finer_geometries));
   if (baked.left_out > 0)
     fmt::print(text, "{}",
                fmt::format(grouped(),
