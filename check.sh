@@ -13,8 +13,11 @@ if [ -z "${PACKTRACE_SCENES:-}" ] && [ -d ../shared/scenes ]; then
 fi
 echo "== Debian packages"
 # Some tests need these: clang compiles the fuzz preset's kernels, and shells and man tools check the generated files.
-bash .ci/install_packages.sh tests benchmarks python clang-19 zsh fish mandoc groff-base
+bash .ci/install_packages.sh tests benchmarks python clang-19 clang-format-19 zsh fish mandoc groff-base
 export CTEST_PARALLEL_LEVEL=${CTEST_PARALLEL_LEVEL:-$(nproc)}
+echo "== Format"
+find pbrt_import compress runtime tests assets docs \( -name '*.h' -o -name '*.cpp' \) -print0 |
+  xargs -0 clang-format-19 --dry-run -Werror
 for preset in "${presets[@]}"; do
   echo "== Build ($preset)"
   options=(-DPACKTRACE_WERROR=ON)
