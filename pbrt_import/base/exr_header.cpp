@@ -111,6 +111,8 @@ void check_variable_size(std::string_view type, Cursor value) {
     const uint64_t width = value.u32(), height = value.u32();
     if (width > INT32_MAX || height > INT32_MAX || width * height != value.left() / 4 || value.left() % 4 != 0)
       value.damaged("its preview image has a wrong size");
+  } else if (type == "chlist") { // OpenEXR reads channels of any attribute up to an empty name, not up to the size
+    read_channels(value);
   } else if (type == "idmanifest") {
     value.u32();
   }

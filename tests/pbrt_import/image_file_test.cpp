@@ -461,6 +461,12 @@ TEST(ExrImage, SizesOfAttributesMustFitTheirTypes) {
               "damaged image: an attribute of type " + std::string(type) + " has " + std::to_string(bytes) + " bytes");
   EXPECT_EQ(complaint(with_attribute(file, "note", "stringvector", 6, "\xff\xff\xff\x7f__")),
             "damaged image: a string is larger than its attribute");
+  // OpenEXR reads channels up to an empty name, here beyond the attribute.
+  EXPECT_EQ(complaint(with_attribute(file, "note", "chlist", 18, "R\0\1\0\0\0\0\0\0\0\1\0\0\0\1\0\0\0"s)),
+            "damaged image: the file is truncated");
+  EXPECT_EQ(complaint(with_attribute(file, "note", "chlist", 3, "\0ab"s)),
+            "damaged image: its list of channels ends early");
+  EXPECT_EQ(complaint(with_attribute(file, "note", "chlist", 1, "\0"s)), "");
   EXPECT_EQ(complaint(with_attribute(file, "note", "preview", 8, "\0\1\0\0\0\1\0\0"s)),
             "damaged image: its preview image has a wrong size");
   EXPECT_EQ(complaint(with_attribute(file, "dataWindow", "box2i", 16, std::string(16, '\0'))),
