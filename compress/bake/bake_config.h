@@ -46,7 +46,9 @@ inline constexpr double kDefaultNormalError = 0.04;
 
 /// Largest normal errors allowed in one geometry.
 struct NormalLimits {
-  double error_degrees = kDefaultNormalError; ///< largest angle between a source normal and its decoded normal
+  /// Largest angle between a source normal and its decoded normal. Where source points merge on the lattice, a vertex
+  /// may take the normal of another one, which adds at most the encoding's own error if the user states no limit.
+  double error_degrees = kDefaultNormalError;
   /// A triangle stores no normals if all three are within this angle of its decoded face normal or of the opposite.
   double flat_degrees = kDefaultNormalError;
 };
@@ -56,8 +58,8 @@ struct BakeConfig {
   PrecisionKind precision_kind = PrecisionKind::kPicture;
   double precision = kDefaultEdgeFraction;
 
-  /// Normal encoding of every geometry. If unset, each geometry gets the one with the fewest bits, of axis16, oct20,
-  /// axis24 and axis32, whose largest error, measured over its own normals, is within normal_limits().
+  /// Normal encoding of every geometry. If unset, each geometry gets the one with the fewest bits, of axis12, axis16,
+  /// oct20, axis24 and axis32, whose largest error, measured over its own normals, is within normal_limits().
   std::optional<NormalEncoding> normals;
   /// Largest allowed angle for the automatic choice of an encoding, 0.0025..10 degrees. If unset, normal_limits()
   /// derives it from the step. Ignored if `normals` is set.

@@ -307,9 +307,10 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
       if (option != other) option->excludes(other);
   std::vector<std::string> encodings{kAuto};
   for (const NormalFormat& format : kNormalFormats) encodings.emplace_back(format.name);
-  verb.add_option("--normals", options->normals,
-                  "Normal encoding. auto picks for each geometry the smallest of axis16, oct20, axis24 and axis32 that "
-                  "meets --normal-error (default auto)")
+  verb.add_option(
+          "--normals", options->normals,
+          "Normal encoding. auto picks for each geometry the smallest of axis12, axis16, oct20, axis24 and axis32 that "
+          "meets --normal-error (default auto)")
       ->check(one_of(encodings))
       ->default_str(kAuto)
       ->group("Normals");

@@ -52,6 +52,7 @@ TEST(BakeScene, AutoTakesTheFewestBitsThatKeepTheError) {
     return uses.front().encoding;
   };
   const Mesh sphere = test::sphere_mesh(30);
+  EXPECT_EQ(chosen(sphere, 3.0), NormalEncoding::kAxis12);
   EXPECT_EQ(chosen(sphere, 1.0), NormalEncoding::kAxis16);
   EXPECT_EQ(chosen(sphere, 0.5), NormalEncoding::kOct20);
   EXPECT_EQ(chosen(sphere, 0.1), NormalEncoding::kAxis24);
@@ -61,7 +62,7 @@ TEST(BakeScene, AutoTakesTheFewestBitsThatKeepTheError) {
   Mesh bent = test::grid_mesh(4); // all normals along an axis: every encoding is exact
   for (size_t i = 0; i < bent.positions.size(); ++i)
     bent.normals.push_back(i % 2 == 0 ? Vec3(1, 0, 0) : Vec3(0, -1, 0));
-  EXPECT_EQ(chosen(bent, 0.0025), NormalEncoding::kAxis16);
+  EXPECT_EQ(chosen(bent, 0.0025), NormalEncoding::kAxis12);
 }
 
 TEST(BakeScene, CoarseGridsTakeCoarseNormals) {
@@ -69,12 +70,15 @@ TEST(BakeScene, CoarseGridsTakeCoarseNormals) {
     BakeConfig config = test::precision(PrecisionKind::kEdgeFraction, edge_fraction);
     config.normal_error_degrees = error_degrees;
     const BakeReport report = bake(scene_of(test::sphere_mesh(30)), config).report;
-    EXPECT_LE(report.max_normal_error_degrees, config.normal_limits(edge_fraction).error_degrees);
-    return report.file.normals.at(0).encoding;
+    const NormalEncoding encoding = report.file.normals.at(0).encoding;
+    const double merged = error_degrees ? 0.0 : format_of(encoding).max_error_degrees;
+    EXPECT_LE(report.max_normal_error_degrees, config.normal_limits(edge_fraction).error_degrees + merged);
+    return encoding;
   };
   EXPECT_EQ(chosen(kDefaultEdgeFraction, std::nullopt), NormalEncoding::kAxis24);
   EXPECT_EQ(chosen(1.0 / 20.0, std::nullopt), NormalEncoding::kOct20);
   EXPECT_EQ(chosen(1.0 / 4.0, std::nullopt), NormalEncoding::kAxis16);
+  EXPECT_EQ(chosen(1.0, std::nullopt), NormalEncoding::kAxis12);
   EXPECT_EQ(chosen(1.0 / 4.0, 0.04), NormalEncoding::kAxis24); // the requested error
 }
 

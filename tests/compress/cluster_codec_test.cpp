@@ -374,7 +374,7 @@ TEST_P(ClusterNormals, AllAtOnceAreThoseOneByOne) {
 INSTANTIATE_TEST_SUITE_P(Encodings, ClusterNormals,
                          testing::Values(NormalEncoding::kZsign32, NormalEncoding::kAxis32, NormalEncoding::kAxis24,
                                          NormalEncoding::kAxis16, NormalEncoding::kOct32, NormalEncoding::kOct24,
-                                         NormalEncoding::kOct20, NormalEncoding::kOct16),
+                                         NormalEncoding::kOct20, NormalEncoding::kOct16, NormalEncoding::kAxis12),
                          [](const auto& test) { return std::string(format_of(test.param).name); });
 
 } // namespace

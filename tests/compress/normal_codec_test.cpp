@@ -143,7 +143,7 @@ TEST_P(NormalCodec, IsFoundByItsName) { EXPECT_EQ(find_normal_encoding(format().
 INSTANTIATE_TEST_SUITE_P(Encodings, NormalCodec,
                          testing::Values(NormalEncoding::kZsign32, NormalEncoding::kAxis32, NormalEncoding::kAxis24,
                                          NormalEncoding::kAxis16, NormalEncoding::kOct32, NormalEncoding::kOct24,
-                                         NormalEncoding::kOct20, NormalEncoding::kOct16),
+                                         NormalEncoding::kOct20, NormalEncoding::kOct16, NormalEncoding::kAxis12),
                          [](const auto& test) { return std::string(format_of(test.param).name); });
 
 TEST(Zsign32, LayoutIsSignThenXThenY) {
@@ -209,7 +209,7 @@ TEST(NormalFormats, CodesAndDecodedBitsStayAsTheyAre) {
     std::array<uint32_t, 3> bits; ///< of the decoded floats
   };
   const DVec3 a(0.3, -0.9, 0.2), b(-0.5, 0.6, -0.7);
-  const std::array<Golden, 16> golden{{
+  const std::array<Golden, 18> golden{{
       {NormalEncoding::kZsign32, a, 0x53cc092e, {0x3e9e6a78, 0xbf6da3db, 0x3e534167}},
       {NormalEncoding::kZsign32, b, 0xa17dc938, {0xbef413d0, 0x3f127324, 0xbf2add92}},
       {NormalEncoding::kAxis32, a, 0x9af621cd, {0x3e9e6f4e, 0xbf6da36a, 0x3e533ad7}},
@@ -226,6 +226,8 @@ TEST(NormalFormats, CodesAndDecodedBitsStayAsTheyAre) {
       {NormalEncoding::kOct20, b, 0x0002ab70, {0xbef42a12, 0x3f12279a, 0xbf2b1644}},
       {NormalEncoding::kOct16, a, 0x00009a2d, {0x3e9cc1dc, 0xbf6e09ef, 0x3e51027a}},
       {NormalEncoding::kOct16, b, 0x00002adb, {0xbef1e00d, 0x3f112009, 0xbf2cc49c}},
+      {NormalEncoding::kAxis12, a, 0x000008db, {0x3ea46fe7, 0xbf6d4054, 0x3e47844f}},
+      {NormalEncoding::kAxis12, b, 0x00000cae, {0xbefff974, 0x3f0e3d17, 0xbf2a11a6}},
   }};
   for (const Golden& g : golden) {
     EXPECT_EQ(encode_normal(g.encoding, g.normal), g.code) << format_of(g.encoding).name;

@@ -106,7 +106,7 @@ public:
     out_.stats.left = std::move(surface_.left);
     require_bound("position error", out_.stats.max_position_error,
                   position_error_bound(grid_.coarsest_step(), max_abs));
-    require_bound("normal error in degrees", out_.stats.max_normal_error_degrees, limits_.error_degrees);
+    require_bound("normal error in degrees", out_.stats.max_normal_error_degrees, weld_limit());
     out_.stats.distinct_vertices = out_.vertices.size();
     return std::move(out_);
   }
@@ -270,7 +270,8 @@ private:
 
   /// Returns the encoding with the fewest bits whose largest error is within the limit; kAxis32 if there is none.
   NormalEncoding choose_normal_encoding(const std::vector<Work>& parts) const {
-    for (const NormalEncoding encoding : {NormalEncoding::kAxis16, NormalEncoding::kOct20, NormalEncoding::kAxis24})
+    for (const NormalEncoding encoding :
+         {NormalEncoding::kAxis12, NormalEncoding::kAxis16, NormalEncoding::kOct20, NormalEncoding::kAxis24})
       if (std::all_of(parts.begin(), parts.end(), [&](const Work& part) { return keeps_error(encoding, part); }))
         return encoding;
     return NormalEncoding::kAxis32;
@@ -347,6 +348,13 @@ private:
     return count;
   }
 
+  /// Largest angle between a source normal and the decoded normal of another vertex that replaces it. A limit of the
+  /// user holds; otherwise the encoding's own error must not use up the angle that lets vertices share a normal.
+  double weld_limit() const {
+    if (config_.normals || config_.normal_error_degrees) return limits_.error_degrees;
+    return limits_.error_degrees + format_of(out_.normal_encoding).max_error_degrees;
+  }
+
   uint32_t weld_vertex(const QuantizedVertex& v) {
     const uint64_t uv = static_cast<uint32_t>(v.uv[0]) | (uint64_t{static_cast<uint32_t>(v.uv[1])} << 32);
     const auto next = static_cast<uint32_t>(out_.vertices.size());
@@ -357,7 +365,7 @@ private:
   }
 
   /// Welds a vertex at a position where several source points merged. It reuses a vertex with the same UV whose normal
-  /// is within the error limit: coarse lattices would otherwise store many normals per position that differ by less
+  /// is within weld_limit(): coarse lattices would otherwise store many normals per position that differ by less
   /// than the faces tilt.
   uint32_t weld_smooth_vertex(QuantizedVertex v, DVec3 normal) {
     constexpr uint32_t kUnset = ~0u;
@@ -368,7 +376,7 @@ private:
          i = smooth_vertices_[i].next, ++compared) {
       const QuantizedVertex& other = out_.vertices[smooth_vertices_[i].vertex];
       const double error = encoding_error(out_.normal_encoding, normal, other.normal_code);
-      if (other.uv != v.uv || error > limits_.error_degrees) continue;
+      if (other.uv != v.uv || error > weld_limit()) continue;
       out_.stats.normal_error_sum += error - encoding_error(out_.normal_encoding, normal, v.normal_code);
       out_.stats.max_normal_error_degrees = std::max(out_.stats.max_normal_error_degrees, error);
       return smooth_vertices_[i].vertex;

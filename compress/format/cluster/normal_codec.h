@@ -11,7 +11,7 @@
 namespace packtrace {
 
 /// Encoding of a geometry's normals. Files store these numbers.
-enum class NormalEncoding : uint32_t { kZsign32, kAxis32, kAxis24, kAxis16, kOct32, kOct24, kOct20, kOct16 };
+enum class NormalEncoding : uint32_t { kZsign32, kAxis32, kAxis24, kAxis16, kOct32, kOct24, kOct20, kOct16, kAxis12 };
 
 enum class NormalFamily : uint32_t {
   kZsign, ///< the sign of z and two components
@@ -31,7 +31,7 @@ struct NormalFormat {
 
 /// Indexed by NormalEncoding. The axis formats have the largest odd number of codes per axis that leaves room for six
 /// charts. An odd number makes 0 a code.
-inline constexpr std::array<NormalFormat, 8> kNormalFormats{{
+inline constexpr std::array<NormalFormat, 9> kNormalFormats{{
     {"zsign32", NormalFamily::kZsign, 32, 2, 1u << 15, 1u << 16, 0.33},
     {"axis32", NormalFamily::kAxis, 32, 6, 26753, 26753, 0.0024},
     {"axis24", NormalFamily::kAxis, 24, 6, 1671, 1671, 0.0385},
@@ -40,6 +40,7 @@ inline constexpr std::array<NormalFormat, 8> kNormalFormats{{
     {"oct24", NormalFamily::kOct, 24, 1, 1u << 12, 1u << 12, 0.0405},
     {"oct20", NormalFamily::kOct, 20, 1, 1u << 10, 1u << 10, 0.162},
     {"oct16", NormalFamily::kOct, 16, 1, 1u << 8, 1u << 8, 0.65},
+    {"axis12", NormalFamily::kAxis, 12, 6, 25, 25, 2.68},
 }};
 
 constexpr const NormalFormat& format_of(NormalEncoding encoding) {

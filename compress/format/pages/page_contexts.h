@@ -26,8 +26,8 @@ inline constexpr uint32_t kPosition = kPageBack + 1; // 20 extents x 3 levels of
 // 3 kinds of the last vertex x 3 counts of known x 3 of other candidates
 inline constexpr uint32_t kNormalChoice = kPosition + 60;
 inline constexpr uint32_t kNormalSeam = kNormalChoice + 27;
-inline constexpr uint32_t kNormalX = kNormalSeam + 1;
-inline constexpr uint32_t kNormalY = kNormalX + 1; // 16 widths of the difference in x
+inline constexpr uint32_t kNormalX = kNormalSeam + 1; // 16 sizes of the expected error
+inline constexpr uint32_t kNormalY = kNormalX + 16; // 16 widths of the difference in x
 inline constexpr uint32_t kUv = kNormalY + 16;     // 2 axes
 inline constexpr uint32_t kSameMaterial = kUv + 2;
 inline constexpr uint32_t kHasNormals = kSameMaterial + 1; // by the value for the last cluster

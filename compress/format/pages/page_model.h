@@ -7,9 +7,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "compress/format/pages/normal_predictor.h"
 #include "compress/format/pages/page_cluster.h"
 #include "compress/format/pages/page_contexts.h"
-#include "compress/format/pages/page_normals.h"
 
 namespace packtrace {
 
@@ -37,6 +37,7 @@ public:
     points_.clear();
     cluster_ = 0;
     last_ = {};
+    normals_.begin();
     fault_ = false;
   }
 
@@ -78,11 +79,16 @@ private:
     uint16_t vertex = 0;                 ///< newest vertex of that cluster here
     uint16_t normal_count = 0;           ///< 0..2
     std::array<NormalFields, 2> normals; ///< the last two different normals, newest first
+    Vec3 unit_normal{0.0f};              ///< the newest, decoded
   };
   /// A vertex of the current cluster.
   struct Vertex {
     uint32_t point;
     std::array<uint16_t, 2> neighbours; ///< earlier corners of the triangle that first uses it, or kNoVertex
+    uint32_t opposite;                  ///< point across their edge, or kNone
+    uint32_t triangle_count;            ///< triangles of the cluster that use it
+    DVec3 face_sum;                     ///< sum of their cross products, in lattice steps
+    Vec3 unit_normal;                   ///< decoded
   };
   /// A triangle corner: a point, and the cluster's vertex at that point.
   struct Corner {
@@ -305,7 +311,7 @@ private:
     if (fresh) {
       if (vertex_count_ >= kMaxClusterVertices) return fail();
       vertex = static_cast<uint16_t>(vertex_count_++);
-      vertices_[vertex] = {point, neighbours};
+      vertices_[vertex] = {point, neighbours, basis_[2] != basis_[0] ? basis_[2] : kNone, 0, DVec3(0.0), Vec3(0.0f)};
       c.positions[vertex] = points_[point].position;
       points_[point].cluster = cluster_;
       points_[point].vertex = vertex;
@@ -397,11 +403,14 @@ private:
         fault_ = true;
         return;
       }
-      c.normals[v] = choice > 0 ? *candidates[choice - 1]
-                                : code_normal(fields, predict_normal_fields(encoding_, face_normals_[v]));
+      c.normals[v] =
+          choice > 0 ? *candidates[choice - 1] : code_normal(fields, normals_.predict(encoding_, surroundings(v)));
+      vertices_[v].unit_normal = decode_normal(encoding_, c.normals[v]);
+      if (choice == 0) normals_.learn(DVec3(vertices_[v].unit_normal));
       if (choice == 0 || choice > known || choice == 2) {
         point.normals[1] = point.normals[0];
         point.normals[0] = c.normals[v];
+        point.unit_normal = vertices_[v].unit_normal;
         point.normal_count = static_cast<uint16_t>(std::min(point.normal_count + 1, 2));
       }
     }
@@ -417,7 +426,7 @@ private:
     }
     if (format.charts > 1 && flag(context::kNormalSeam, flat.chart != chart) != 0)
       chart = std::min(static_cast<uint32_t>(coder_.raw(context::kNormalSeam, flat.chart, 3)), format.charts - 1);
-    const int64_t dx = difference(context::kNormalX, flat.x - predicted.x);
+    const int64_t dx = difference(context::kNormalX + normals_.expected_error(), flat.x - predicted.x);
     const auto width = static_cast<uint32_t>(std::bit_width(wrap(dx < 0 ? ~dx : dx)));
     const int64_t dy = difference(context::kNormalY + std::min(width, 15u), flat.y - predicted.y);
     const auto limit = [](int64_t value) {
@@ -426,21 +435,40 @@ private:
     return fold_normal(encoding_, {chart, limit(predicted.x + limit(dx)), limit(predicted.y + limit(dy))});
   }
 
-  /// Sums, per vertex, the normals of its triangles in the cluster.
+  /// Vector between two points; a difference of more than 63 bits wraps.
+  static DVec3 steps_between(const LatticePoint& from, const LatticePoint& to) {
+    DVec3 steps;
+    for (size_t axis = 0; axis < 3; ++axis)
+      steps[static_cast<int>(axis)] = static_cast<double>(static_cast<int64_t>(wrap(to[axis]) - wrap(from[axis])));
+    return steps;
+  }
+
+  NormalSurroundings surroundings(uint32_t v) const {
+    const Vertex& vertex = vertices_[v];
+    NormalSurroundings s{.face_sum = vertex.face_sum, .triangle_count = vertex.triangle_count};
+    for (const uint16_t n : vertex.neighbours) {
+      if (n == kNoVertex) break;
+      s.neighbours[s.neighbour_count] = DVec3(vertices_[n].unit_normal);
+      s.edges[s.neighbour_count++] = steps_between(values_->positions[n], values_->positions[v]);
+    }
+    if (s.neighbour_count == 2 && vertex.opposite != kNone && points_[vertex.opposite].normal_count > 0) {
+      s.has_opposite = true;
+      s.opposite = DVec3(points_[vertex.opposite].unit_normal);
+    }
+    return s;
+  }
+
+  /// Sums the cross products of the cluster's triangles at their vertices.
   void sum_face_normals() {
-    std::fill_n(face_normals_.begin(), vertex_count_, DVec3(0.0));
     const auto& positions = values_->positions;
     for (uint32_t i = 0; i < values_->triangle_count; ++i) {
       const auto& [a, b, c] = corners_of_[i];
-      DVec3 ab, ac;
-      for (size_t axis = 0; axis < 3; ++axis) {
-        ab[static_cast<int>(axis)] =
-            static_cast<double>(static_cast<int64_t>(wrap(positions[b][axis]) - wrap(positions[a][axis])));
-        ac[static_cast<int>(axis)] =
-            static_cast<double>(static_cast<int64_t>(wrap(positions[c][axis]) - wrap(positions[a][axis])));
+      const DVec3 normal =
+          glm::cross(steps_between(positions[a], positions[b]), steps_between(positions[a], positions[c]));
+      for (const uint16_t corner : corners_of_[i]) {
+        vertices_[corner].face_sum += normal;
+        ++vertices_[corner].triangle_count;
       }
-      const DVec3 normal = glm::cross(ab, ac);
-      face_normals_[a] += normal, face_normals_[b] += normal, face_normals_[c] += normal;
     }
   }
 
@@ -472,7 +500,7 @@ private:
   uint32_t vertex_count_ = 0, corner_count_ = 0;
   std::array<Vertex, kMaxClusterVertices> vertices_;
   std::array<std::array<uint16_t, 3>, kMaxClusterTriangles> corners_of_;
-  std::array<DVec3, kMaxClusterVertices> face_normals_;
+  NormalPredictor normals_;
   std::array<uint32_t, 2> guess_{};
   uint32_t history_ = 0;             // bits: whether the last two corners were new points
   std::array<uint32_t, 3> basis_{};  // points that the next new point is predicted from

@@ -7,10 +7,8 @@
 
 namespace packtrace {
 
-/// Predicts the canonical fields of a direction's normal; they are near its code, not necessarily equal. The same on
-/// every machine: only +, -, x, / and square root of doubles are used. For vectors of length zero the result is
-/// unspecified but valid.
-/// @param n length below 1e150
+/// Returns canonical fields near the code of a unit vector, not necessarily equal. The same on every machine: only +,
+/// -, x, / of doubles are used. For zero vectors the result is unspecified but valid.
 inline NormalFields predict_normal_fields(NormalEncoding encoding, DVec3 n) {
   const NormalFormat& format = format_of(encoding);
   const auto x_last = static_cast<int32_t>(format.x_codes) - 1, y_last = static_cast<int32_t>(format.y_codes) - 1;
@@ -24,8 +22,6 @@ inline NormalFields predict_normal_fields(NormalEncoding encoding, DVec3 n) {
     const double fold = std::max(-n.z, 0.0);
     return {0, code(n.x + std::copysign(fold, n.x), x_last - 1), code(n.y + std::copysign(fold, n.y), y_last - 1)};
   }
-  const double length = std::sqrt(glm::dot(n, n));
-  if (length > 0.0) n *= 1.0 / length;
   if (format.family == NormalFamily::kZsign) return {n.z < 0.0 ? 1u : 0u, code(n.x, x_last - 1), code(n.y, y_last - 1)};
   int axis = 0;
   for (int other = 1; other < 3; ++other)

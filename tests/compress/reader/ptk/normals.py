@@ -97,4 +97,4 @@ NORMAL_ENCODINGS = (
     NormalEncoding("zsign", 2, 32768, 65536),
     NormalEncoding("axis", 6, 26753, 26753), NormalEncoding("axis", 6, 1671, 1671), NormalEncoding("axis", 6, 103, 103),
     NormalEncoding("oct", 1, 65536, 65536), NormalEncoding("oct", 1, 4096, 4096), NormalEncoding("oct", 1, 1024, 1024),
-    NormalEncoding("oct", 1, 256, 256))
+    NormalEncoding("oct", 1, 256, 256), NormalEncoding("axis", 6, 25, 25))

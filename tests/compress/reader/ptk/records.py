@@ -2,7 +2,7 @@
 
 import struct
 
-VERSION = 5
+VERSION = 6
 MAGIC = b"PTK\x89\r\n\x1a\0"
 HEADER_BYTES = 512
 NONE = 0xFFFFFFFF

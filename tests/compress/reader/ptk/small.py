@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from ptk.canonical import pack
-from ptk.normal_guess import guess_normal, sum_of_face_normals
+from ptk.normal_guess import NormalPredictor, sum_of_face_normals
 from ptk.normals import NORMAL_ENCODINGS
 from ptk.rans import Values
 from ptk.records import BadFile
@@ -25,6 +25,7 @@ class Point:
     cluster: int = -1  # last cluster with a vertex here
     vertex: int = 0  # newest vertex of that cluster here
     normals: list = field(default_factory=list)  # the last two different normals, newest first
+    direction: tuple = None  # the newest, decoded
 
     def ends(self):
         return [end for end, _ in self.outward]
@@ -34,6 +35,8 @@ class Point:
 class Vertex:
     point: int
     before: tuple  # earlier corners, as vertices, of the triangle that first uses it
+    opposite: int  # point across their edge, or None
+    direction: tuple = None  # its normal, decoded
 
 
 @dataclass
@@ -68,6 +71,7 @@ class PageDecoder:
         self.last = SmallCluster()
         self.recent_new = (0, 0)  # whether the last but one corner, and the last one, were new points
         self.spans = [MAX_SPAN] * 3
+        self.predictor = NormalPredictor()
 
     def cluster(self, encoding):
         self.encoding = encoding
@@ -166,7 +170,8 @@ class PageDecoder:
             raise BadFile("a corner without a name")
         if fresh:
             vertex = len(self.vertices)
-            self.vertices.append(Vertex(point, before))
+            opposite = basis[2] if len(basis) == 3 and basis[2] != basis[0] else None
+            self.vertices.append(Vertex(point, before, opposite))
             self.points[point].cluster, self.points[point].vertex = self.number, vertex
         self.c.corners.append((vertex, fresh))
         return vertex
@@ -213,17 +218,31 @@ class PageDecoder:
             offered = list(dict.fromkeys(point.normals + [c.normals[v] for v in vertex.before]))
             choice = self.values.symbol("normal", last, known, len(offered) - known)
             last = 2 if choice > known else min(choice, 2)
-            normal = offered[choice - 1] if choice else self.coded_normal(guess_normal(self.encoding, sums[number]))
+            count = sum(triangle.count(number) for triangle in c.triangles)
+            normal = offered[choice - 1] if choice else self.coded_normal(self.predicted(number, sums[number], count))
+            vertex.direction = self.encoding.decode(*normal)
+            if choice == 0:
+                self.predictor.learn(vertex.direction)
             c.normals.append(normal)
             if choice == 0 or choice > known or choice == 2:
                 point.normals = [normal] + point.normals[:1]
+                point.direction = vertex.direction
+
+    def predicted(self, number, face_sum, triangles):
+        vertex, places = self.vertices[number], self.c.places
+        neighbours = [self.vertices[v].direction for v in vertex.before]
+        edges = [tuple(float(q - p) for p, q in zip(places[v], places[number])) for v in vertex.before]
+        opposite = None
+        if len(vertex.before) == 2 and vertex.opposite is not None:
+            opposite = self.points[vertex.opposite].direction
+        return self.predictor.predict(self.encoding, face_sum, triangles, neighbours, edges, opposite)
 
     def coded_normal(self, guess):
         chart, x, y = guess
         values = self.values
         if self.encoding.charts > 1 and values.flag("seam"):
             chart = values.field(3)
-        dx = values.difference("normal x")
+        dx = values.difference("normal x", self.predictor.expected_error())
         dy = values.difference("normal y", min((~dx if dx < 0 else dx).bit_length(), 15))
         return self.encoding.canonical(chart, x + dx, y + dy)
 
