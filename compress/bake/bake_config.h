@@ -46,8 +46,8 @@ inline constexpr double kDefaultNormalError = 0.04;
 
 /// Largest normal errors allowed in one geometry.
 struct NormalLimits {
-  /// Largest angle between a source normal and its decoded normal. Where source points merge on the lattice, a vertex
-  /// may take the normal of another one, which adds at most the encoding's own error if the user states no limit.
+  /// Largest angle between a source normal and its decoded normal. On grids coarser than the default, a vertex may take
+  /// the normal of another one that rounds to the same point, which adds at most the encoding's own error.
   double error_degrees = kDefaultNormalError;
   /// A triangle stores no normals if all three are within this angle of its decoded face normal or of the opposite.
   double flat_degrees = kDefaultNormalError;

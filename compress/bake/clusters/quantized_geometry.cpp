@@ -348,10 +348,12 @@ private:
     return count;
   }
 
-  /// Largest angle between a source normal and the decoded normal of another vertex that replaces it. A limit of the
-  /// user holds; otherwise the encoding's own error must not use up the angle that lets vertices share a normal.
+  /// Largest angle between a source normal and the decoded normal of another vertex that replaces it. Grids coarser
+  /// than the default have a larger limit of their own choice; there the encoding's error must not use up the angle
+  /// that lets vertices share a normal.
   double weld_limit() const {
-    if (config_.normals || config_.normal_error_degrees) return limits_.error_degrees;
+    const bool chosen = !config_.normals && !config_.normal_error_degrees;
+    if (!chosen || limits_.error_degrees <= kDefaultNormalError) return limits_.error_degrees;
     return limits_.error_degrees + format_of(out_.normal_encoding).max_error_degrees;
   }
 
