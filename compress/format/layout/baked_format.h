@@ -9,7 +9,7 @@
 #include "compress/format/layout/packed_node.h"
 #include "pbrt_import/scene/material_flags.h"
 
-/// Records of a .ptk file, version 5; docs/baked_format.md describes them. All values are little-endian. Every section
+/// Records of a .ptk file, version 6; docs/baked_format.md describes them. All values are little-endian. Every section
 /// starts at a multiple of 64 bytes. Bytes that belong to no field and no section are zero.
 namespace packtrace::baked {
 
