@@ -10,7 +10,6 @@
 
 #include "pbrt_import/base/closest_name.h"
 #include "pbrt_import/base/error.h"
-#include "runtime/commands/arguments.h"
 #include "runtime/commands/option_checks.h"
 
 namespace packtrace {
