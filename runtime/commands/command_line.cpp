@@ -79,7 +79,7 @@ void require_verb(CLI::App& app, const std::vector<std::string>& words) {
 
 /// Error message for the command line of a verb.
 std::string message_of(const CLI::ParseError& error, CLI::App& verb) {
-  const std::string text = error.what();
+  std::string text = error.what();
   if (dynamic_cast<const CLI::ExtrasError*>(&error)) {
     std::vector<std::string> left = verb.remaining();
     const auto mark = std::ranges::find(left, "--"); // words after "--" are never options
