@@ -1,10 +1,10 @@
-"""The guess that codec small's normals are differences to."""
+"""Predicts normals from faces; codec small stores differences from the prediction."""
 
 import math
 
 
 def sum_of_face_normals(places, triangles):
-    """Per vertex, in doubles; triangles in order."""
+    """Returns per vertex the sum of its faces' area-weighted normals, added in the order of the triangles."""
     sums = [(0.0, 0.0, 0.0)] * len(places)
     for triangle in triangles:
         a, b, c = (places[corner] for corner in triangle)
@@ -20,7 +20,7 @@ def code_of(t, last):
 
 
 def unwarp(w):
-    """The inverse of w(t) = t (803/1024 + c t^2), nearly."""
+    """Approximates the inverse of w(t) = t (803/1024 + c t^2), c = sqrt(1/2) - 803/1024."""
     slope, cubic = 803 / 1024, 0.70710678118654752440 - 803 / 1024
     square = w * w
     t = w * (1.2752 + square * (0.16 + square * 0.23))
@@ -28,7 +28,7 @@ def unwarp(w):
 
 
 def guess_normal(encoding, n):
-    """Chart, x and y near a direction of any length."""
+    """Returns the (chart, x, y) predicted for a direction, which need not be of unit length."""
     x_last, y_last = encoding.x_codes - 1, encoding.y_codes - 1
     length = abs(n[0]) + abs(n[1]) + abs(n[2]) if encoding.family == "oct" else math.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
     if length > 0.0:
