@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs dependencies, builds, and runs all tests with their regression limits.
 # Usage: ./check.sh [PRESET ...] (default: release, then asan without the tests on whole scenes)
+#        ./check.sh tidy (clang-tidy on all sources; otherwise it checks those that changed since main)
 set -euo pipefail
 cd "$(dirname "$0")"
 started=$SECONDS
@@ -13,17 +14,23 @@ if [ -z "${PACKTRACE_SCENES:-}" ] && [ -d ../shared/scenes ]; then
 fi
 echo "== Debian packages"
 # Some tests need these: clang compiles the fuzz preset's kernels, and shells and man tools check the generated files.
-bash .ci/install_packages.sh tests benchmarks python clang-19 clang-format-19 zsh fish mandoc groff-base
+bash .ci/install_packages.sh tests benchmarks python clang-19 clang-format-19 clang-tidy-19 zsh fish mandoc groff-base
 export CTEST_PARALLEL_LEVEL=${CTEST_PARALLEL_LEVEL:-$(nproc)}
 echo "== Format"
 find pbrt_import compress runtime tests assets docs \( -name '*.h' -o -name '*.cpp' \) -print0 |
   xargs -0 clang-format-19 --dry-run -Werror
+if [ "${presets[*]}" = tidy ]; then
+  echo "== clang-tidy (all sources)"
+  cmake --preset release >/dev/null
+  exec .ci/clang_tidy.sh all
+fi
 for preset in "${presets[@]}"; do
   echo "== Build ($preset)"
   options=(-DPACKTRACE_WERROR=ON)
   # The Python module is tested with Debian's interpreter, whichever comes first in the PATH.
   [ "$preset" != release ] || options+=(-DPACKTRACE_BUILD_PYTHON=ON -DPython_EXECUTABLE=/usr/bin/python3)
   cmake --preset "$preset" "${options[@]}" >/dev/null
+  [ "$preset" != release ] || { echo "== clang-tidy" && .ci/clang_tidy.sh; }
   cmake --build --preset "$preset"
   echo "== Test ($preset)"
   exclude=()

@@ -131,6 +131,7 @@ void SceneBuilder::count_kept(const Directive& directive) {
   if (kept_bytes_ > kept_memory_.bytes() + kStep) kept_memory_.resize(kept_bytes_, "what the scene's text describes");
 }
 
+/// Longer than other functions: a table of all directives in one switch.
 void SceneBuilder::execute_directive(Directive& directive) {
   switch (directive.kind) {
   case K::kAttributeBegin:

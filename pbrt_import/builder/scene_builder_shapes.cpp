@@ -96,7 +96,7 @@ bool SceneBuilder::make_inline_mesh(Directive& directive, Shape& shape) {
   const ShapeKind* const kind = find_shape_kind(name);
   if (!kind) return skip_shape(name, directive.place, "unknown shape" + did_you_mean(closest_shape_kind(name)));
   // Two captured pointers fit in a std::function without an allocation.
-  const ReportFn report = [this, &directive](Severity severity, uint32_t, std::string message) {
+  const ReportFn report = [this, &directive](Severity severity, uint32_t, const std::string& message) {
     reporter_.report(severity, directive.place, directive.names[0] + ": " + message);
   };
   MeshQueue::Entry entry;

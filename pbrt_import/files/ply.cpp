@@ -62,7 +62,8 @@ template <class Source>
 uint64_t read_list_length(Source& source, const PlyProperty& property) {
   const double length = source.number(*property.length_type);
   if (!(length >= 0.0) || length != std::floor(length)) fail_at(source.at, "a list has a length that is not a count");
-  if (length > static_cast<double>(source.remaining() / source.min_item_size(property.type)))
+  const uint64_t most = source.remaining() / source.min_item_size(property.type);
+  if (length > static_cast<double>(most))
     fail_at(source.at, "the file is truncated: a list is longer than the rest of it");
   return static_cast<uint64_t>(length);
 }

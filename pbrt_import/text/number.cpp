@@ -4,6 +4,9 @@
 #include <limits>
 #include <system_error>
 
+#include "pbrt_import/base/cpu.h"
+#include "pbrt_import/text/number_kernels.h"
+
 namespace packtrace {
 namespace {
 
@@ -61,5 +64,13 @@ NumberText<T> parse_number(std::string_view word) {
 
 template NumberText<float> parse_number(std::string_view word);
 template NumberText<double> parse_number(std::string_view word);
+
+const NumberKernels* number_kernels() {
+#if defined(__x86_64__)
+  static constexpr NumberKernels kAvx2{avx2::convert_integers, avx2::convert_floats, avx2::convert_doubles};
+  if (cpu_has_avx2()) return &kAvx2;
+#endif
+  return nullptr;
+}
 
 } // namespace packtrace

@@ -1,4 +1,6 @@
-#include "runtime/commands/arguments.h"
+// normalised_arguments(): the words of a command line before CLI11 reads them.
+
+#include "runtime/commands/command_line.h"
 
 #include <algorithm>
 #include <filesystem>

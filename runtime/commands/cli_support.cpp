@@ -15,13 +15,13 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+#include <sys/resource.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
 
 #include "pbrt_import/base/output_file.h"
 #include "pbrt_import/base/printable.h"
 #include "pbrt_import/base/progress.h"
-#include "runtime/commands/arguments.h"
 #include "runtime/commands/command_line.h"
 #include "runtime/commands/json_output.h"
 #include "runtime/commands/option_checks.h"
@@ -284,6 +284,12 @@ std::string format_diagnostics(const Diagnostics& diagnostics, const GlobalOptio
 void report_diagnostics(const Diagnostics& diagnostics, const GlobalOptions& globals) {
   const std::string text = format_diagnostics(diagnostics, globals, wants_color(stderr));
   std::fwrite(text.data(), 1, text.size(), stderr);
+}
+
+uint64_t peak_rss_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<uint64_t>(usage.ru_maxrss) * 1024; // Linux reports KiB
 }
 
 } // namespace packtrace

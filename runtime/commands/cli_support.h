@@ -71,4 +71,7 @@ inline constexpr size_t kMaxShownProblems = 20;
 /// Prints format_diagnostics() to standard error.
 void report_diagnostics(const Diagnostics& diagnostics, const GlobalOptions& globals);
 
+/// Peak resident memory of this process in bytes, including mapped file pages.
+uint64_t peak_rss_bytes();
+
 } // namespace packtrace

@@ -10,7 +10,6 @@
 
 #include "pbrt_import/base/closest_name.h"
 #include "pbrt_import/base/error.h"
-#include "runtime/commands/arguments.h"
 #include "runtime/commands/option_checks.h"
 
 namespace packtrace {
@@ -80,7 +79,7 @@ void require_verb(CLI::App& app, const std::vector<std::string>& words) {
 
 /// Error message for the command line of a verb.
 std::string message_of(const CLI::ParseError& error, CLI::App& verb) {
-  const std::string text = error.what();
+  std::string text = error.what();
   if (dynamic_cast<const CLI::ExtrasError*>(&error)) {
     std::vector<std::string> left = verb.remaining();
     const auto mark = std::ranges::find(left, "--"); // words after "--" are never options

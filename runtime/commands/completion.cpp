@@ -119,7 +119,7 @@ std::string zsh_text(const std::string& text) {
 
 std::string zsh_value(const OptionEntry& option) {
   if (option.value == ValueKind::kNoValue) return {};
-  const std::string start = (option.value_optional ? "::" : ":") + option.value_name + ":";
+  std::string start = (option.value_optional ? "::" : ":") + option.value_name + ":";
   switch (option.value) {
   case ValueKind::kChoice:
     return start + fmt::format("({})", fmt::join(option.choices, " "));

@@ -17,7 +17,6 @@
 #include "runtime/commands/json_output.h"
 #include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/option_checks.h"
-#include "runtime/commands/process_usage.h"
 #include "runtime/commands/progress_display.h"
 
 namespace packtrace {

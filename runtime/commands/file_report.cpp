@@ -60,6 +60,46 @@ const char* precision_name(uint32_t kind) {
   return kind < kNames.size() ? kNames[kind] : "unknown";
 }
 
+nlohmann::json grids_json(const FileSummary& s) {
+  nlohmann::json grids = nlohmann::json::array();
+  for (const GridUse& use : s.grids)
+    grids.push_back({{"step", use.grid.step()}, {"world_space", use.world_space}, {"geometries", use.geometries}});
+  return grids;
+}
+
+nlohmann::json normals_json(const FileSummary& s) {
+  nlohmann::json normals = nlohmann::json::array();
+  for (const NormalUse& use : s.normals)
+    normals.push_back({{"encoding", format_of(use.encoding).name},
+                       {"geometries", use.geometries},
+                       {"vertices", use.vertices},
+                       {"max_error_degrees", use.max_error_degrees}});
+  return normals;
+}
+
+nlohmann::json uvs_json(const FileSummary& s) {
+  nlohmann::json uvs = nlohmann::json::array();
+  for (const UvUse& use : s.uvs)
+    uvs.push_back({{"encoding", kUvEncodingNames[static_cast<size_t>(use.encoding)]},
+                   {"geometries", use.geometries},
+                   {"vertices", use.vertices},
+                   {"max_error", use.max_error},
+                   {"max_error_texels", use.max_error_texels}});
+  return uvs;
+}
+
+nlohmann::json textures_json(const FileSummary& s) {
+  nlohmann::json textures = nlohmann::json::array();
+  for (const TextureUse& use : s.textures)
+    textures.push_back({{"name", use.name},
+                        {"width", use.width},
+                        {"height", use.height},
+                        {"codec", kTextureCodecNames[static_cast<size_t>(use.codec)]},
+                        {"bytes", use.bytes},
+                        {"psnr_db", use.psnr_db}});
+  return textures;
+}
+
 std::array<double, 3> array_of(DVec3 v) { return {v.x, v.y, v.z}; }
 
 } // namespace
@@ -74,30 +114,8 @@ const std::locale& grouped() {
 }
 
 nlohmann::json to_json(const FileSummary& s, bool by_geometry) {
-  nlohmann::json bytes, grids = nlohmann::json::array(), normals = nlohmann::json::array(),
-                        uvs = nlohmann::json::array();
+  nlohmann::json bytes;
   for (const auto& [name, count] : stream_rows(s.bytes)) bytes[name] = count;
-  for (const GridUse& use : s.grids)
-    grids.push_back({{"step", use.grid.step()}, {"world_space", use.world_space}, {"geometries", use.geometries}});
-  for (const NormalUse& use : s.normals)
-    normals.push_back({{"encoding", format_of(use.encoding).name},
-                       {"geometries", use.geometries},
-                       {"vertices", use.vertices},
-                       {"max_error_degrees", use.max_error_degrees}});
-  for (const UvUse& use : s.uvs)
-    uvs.push_back({{"encoding", kUvEncodingNames[static_cast<size_t>(use.encoding)]},
-                   {"geometries", use.geometries},
-                   {"vertices", use.vertices},
-                   {"max_error", use.max_error},
-                   {"max_error_texels", use.max_error_texels}});
-  nlohmann::json textures = nlohmann::json::array();
-  for (const TextureUse& use : s.textures)
-    textures.push_back({{"name", use.name},
-                        {"width", use.width},
-                        {"height", use.height},
-                        {"codec", kTextureCodecNames[static_cast<size_t>(use.codec)]},
-                        {"bytes", use.bytes},
-                        {"psnr_db", use.psnr_db}});
   return {
       {"triangles", s.triangles},
       {"placed_triangles", s.placed_triangles},
@@ -114,10 +132,10 @@ nlohmann::json to_json(const FileSummary& s, bool by_geometry) {
       {"bytes_per_triangle", s.bytes_per_triangle},
       {"bytes_per_placed_triangle", s.bytes_per_placed_triangle},
       {"disk", disk_json(s.disk)},
-      {"grids", grids},
-      {"normals", normals},
-      {"uvs", uvs},
-      {"textures", textures},
+      {"grids", grids_json(s)},
+      {"normals", normals_json(s)},
+      {"uvs", uvs_json(s)},
+      {"textures", textures_json(s)},
       {"max_position_error", s.max_position_error},
       {"max_position_error_bound", s.max_position_error_bound},
       {"max_normal_error_degrees", s.max_normal_error_degrees},

@@ -38,8 +38,8 @@ std::string heading_of(const OptionEntry& option) {
   for (const auto& names : {option.short_names, option.long_names})
     for (const std::string& name : names) heading += (heading.empty() ? "" : ", ") + ("\\fB" + roff(name) + "\\fR");
   if (option.value_name.empty()) return heading;
-  const std::string value = option.choices.empty() ? "\\fI" + roff(option.value_name) + "\\fR"
-                                                   : roff(fmt::format("{}", fmt::join(option.choices, "|")));
+  std::string value = option.choices.empty() ? "\\fI" + roff(option.value_name) + "\\fR"
+                                             : roff(fmt::format("{}", fmt::join(option.choices, "|")));
   if (heading.empty()) return value;
   return heading + (option.value_optional ? " [" + value + "]" : " " + value);
 }

@@ -158,8 +158,7 @@ RenderedImage render_view(const SceneSource& source, const RayTracer& tracer, co
   }
   if (!config.denoise) ao = mean.result();
   resolve(source, g, ao, raw.ao, config.supersample, image);
-  image.lod_error_px = config.lod_error_px;
-  if (config.lod_error_px > 0.0) resolve_detail(source, view, g, config.supersample, image);
+  if (config.lod_layers) resolve_detail(source, view, g, config.supersample, image);
   return image;
 }
 

@@ -22,9 +22,7 @@ struct RenderConfig {
   uint32_t frames = 32;     ///< [1, 65536]: each frame traces AoConfig::spp samples per pixel
   bool denoise = true;      ///< false: raw frames are averaged
   bool stop_if_nothing_visible = false; ///< return after the camera rays if all of them miss
-  /// Screen-space error of the LOD cut in traced pixels, for the report. If above 0, the LOD layers of RenderedImage
-  /// are filled.
-  double lod_error_px = 0.0;
+  bool lod_layers = false;              ///< fill the LOD layers of RenderedImage
   AoConfig ao;
   DenoiserConfig denoiser;
 };
@@ -55,11 +53,10 @@ struct RenderedImage {
   std::vector<Vec3> albedo;    ///< linear sRGB
   std::vector<Vec3> shaded;    ///< albedo times ao, as under a uniform white sky; emitters are white; linear sRGB
   std::vector<uint32_t> instance;
-  // The LOD layers are empty unless RenderConfig::lod_error_px > 0.
+  // The LOD layers are empty unless RenderConfig::lod_layers is set.
   std::vector<uint32_t> lod;     ///< LOD level at the last sub-pixel that hits
   std::vector<uint32_t> cluster; ///< cluster number at the last sub-pixel that hits
   std::vector<float> lod_error;  ///< largest error bound (distance from level 0) of the sub-pixels, in traced pixels
-  double lod_error_px = 0.0;     ///< copy of RenderConfig::lod_error_px
   RenderTimings timings;
   uint64_t ao_rays = 0;
   uint64_t primary_rays = 0;

@@ -6,7 +6,7 @@
 
 #include "pbrt_import/base/memory_budget.h"
 #include "tests/pbrt_import/damaged_files.h"
-#include "tests/pbrt_import/hostile_case.h"
+#include "tests/pbrt_import/hostile_scene.h"
 
 namespace packtrace {
 namespace {

@@ -18,6 +18,7 @@
 namespace packtrace {
 namespace {
 
+// NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): equal bits are meant
 bool same_transform(const DAffine& a, const DAffine& b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
 /// Largest absolute row sum of the linear part: scales an error per object axis to an error per world axis.

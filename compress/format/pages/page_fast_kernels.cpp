@@ -21,6 +21,7 @@ uint64_t mask_of(uint64_t bit) { return 0 - bit; }
 /// State of one or two channels that share a register.
 template <class Lane>
 struct Channels {
+  // NOLINTNEXTLINE(bugprone-sizeof-expression): Lane is a vector or a single word
   static constexpr size_t kCount = sizeof(Lane) / sizeof(uint64_t);
 
   std::array<uint64_t*, kCount> words;

@@ -31,7 +31,8 @@ private:
   /// The children of `node` must have been processed.
   void choose(RunNode& node) const {
     const bool may_be_leaf = node.count <= costs_.max_leaf_triangles;
-    const auto batches = static_cast<float>((node.count + kWidth - 1) / kWidth);
+    const uint32_t whole_batches = (node.count + kWidth - 1) / kWidth;
+    const auto batches = static_cast<float>(whole_batches);
     std::fill_n(node.leaf_cost, kWidth, may_be_leaf ? node.area * (leaf_ + batch_ * batches) : kInfinity);
     float as_nodes = kInfinity;
     if (node.count > 1) {

@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
-"""Reads baked files (.ptk) of any codec, written from docs/baked_format.md alone: Python's standard library, and libzstd
-for files in disk form.
+"""Reads baked files (.ptk) of any codec.
 
     ptk_reader.py FILE.ptk                  prints counts, boxes and a checksum of each geometry
-    ptk_reader.py FILE.ptk --expect DUMP    also compares everything decoded with a dump (ptk/dump.py)
+    ptk_reader.py FILE.ptk --expect DUMP    also compares all decoded values with a dump (ptk/dump.py)
     ptk_reader.py FILE.ptk --resident OUT   also writes the resident form
 
-Exit codes: 0 fine, 1 the dump differs, 3 not a file this reader understands. Hashes are not checked: the standard library
-has no XXH3.
+The code follows docs/baked_format.md alone. It needs Python's standard library, and libzstd for files in disk form.
+Hashes are not checked, because the standard library has no XXH3.
+
+Exit codes: 0 success, 1 the dump differs, 3 invalid file.
 """
 
 import argparse
@@ -25,7 +26,7 @@ from ptk.records import SECTIONS, BadFile
 from ptk.resident import BakedFile
 
 
-# Damage may also appear as out-of-range numbers.
+# A damaged file may also cause out-of-range numbers.
 NOT_A_FILE = (BadFile, OSError, ArithmeticError, LookupError, StopIteration, TypeError, ValueError, struct.error)
 
 

@@ -82,7 +82,7 @@ struct Sides4 {
 [[gnu::always_inline]] inline void meet(const Corner4& a, const Corner4& b, const Corner4& c, Lanes& area,
                                         Lanes& height, Lanes& facing, Mask& inner) {
   const Lanes zero = {}, one = zero + 1.0;
-  const Mask all = zero == zero;
+  const Mask all = zero == zero; // NOLINT(misc-redundant-expression): sets all lanes
   facing = (b.l1 - a.l1) * (c.l2 - a.l2) - (b.l2 - a.l2) * (c.l1 - a.l1);
   area = height = zero;
   Mask inner_ab, inner_bc, inner_ca;

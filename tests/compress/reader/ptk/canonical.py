@@ -1,4 +1,4 @@
-"""Record and streams of a cluster from its values: the narrowest widths, anchors rounded down."""
+"""Packs the decoded values of a cluster into its record and streams, with the smallest bit widths that fit."""
 
 from ptk.normals import NORMAL_ENCODINGS
 from ptk.payload import PageCluster
@@ -8,7 +8,7 @@ LEFT, RESTART = 1, 2
 
 
 def word_of(fields, widths):
-    """The first field lowest."""
+    """Returns the bit fields as one integer; the first field has the lowest bits."""
     word, at = 0, 0
     for value, width in zip(fields, widths):
         word |= value << at
@@ -17,12 +17,12 @@ def word_of(fields, widths):
 
 
 def widths_above(bases, tuples):
-    """Bits that the largest value less the base takes, by component."""
+    """Returns per component the number of bits of its largest difference from the base."""
     return tuple((max(column) - base).bit_length() for base, column in zip(bases, zip(*tuples)))
 
 
 def pack(values, geometry):
-    """@param values a SmallCluster"""
+    """Returns the PageCluster of a SmallCluster. Anchors are rounded down."""
     encoding = NORMAL_ENCODINGS[geometry["normal_encoding"]]
     shift = geometry["anchor_shift"]
     anchor = tuple(min(column) - o >> shift for column, o in zip(zip(*values.places), geometry["origin"]))

@@ -1,11 +1,11 @@
-"""What levels of detail and trees promise."""
+"""Checks the invariants of LOD levels and BVH trees."""
 
 from ptk.records import INNER_CHILD, LOD_LEVEL, NONE, BadFile
 
 
 def check_levels(baked, meshes):
-    """That levels hold the triangles that they say, and that where level 0 is closed, so is the cut at each level's
-    error."""
+    """Checks that the cut at each level's error has at most the triangle count in the level's record, and that it is
+    closed if level 0 is closed. Raises BadFile."""
     geometries = baked.sections["geometries"]
     for base, geometry in enumerate(geometries):
         levels = baked.levels(base)
@@ -18,7 +18,7 @@ def check_levels(baked, meshes):
         for level in levels:
             chosen = baked.cut(base, level["error"])
             triangles = sum(baked.clusters(geometries[g])[c]["triangle_count"] for g, c in chosen)
-            if triangles > level["triangles"]: # a cut may have fewer: group errors may be smaller than the level's
+            if triangles > level["triangles"]: # fewer if group errors are below the level's
                 raise BadFile("a cut has more triangles than the level of its error")
             if was_closed and not is_closed(baked, chosen, meshes):
                 raise BadFile("a cut through levels of a closed surface is open")
@@ -38,7 +38,7 @@ def is_closed(baked, chosen, meshes):
 
 
 class TreeBoxes:
-    """What trees know of clusters: the rays that see them, and boxes of their triangles in a tree's coordinates."""
+    """What trees derive from clusters: their ray classes, and bounding boxes of their triangles on a tree's grid."""
 
     def __init__(self, baked, meshes):
         self.baked, self.meshes = baked, meshes
@@ -50,7 +50,7 @@ class TreeBoxes:
                 self.classes_of += [(~material_class & 3) | (material_class & 4)] * count
 
     def leaf_box(self, tree, cluster, first, count):
-        """Low and high corner of a leaf, rounded down and up where the tree's grid is the coarser one."""
+        """Returns the corners of a leaf's box on the tree's grid, rounded outwards if that grid is coarser."""
         number = self.geometry_of[cluster]
         geometry, mesh = self.baked.sections["geometries"][number], self.meshes[number]
         start = self.baked.sections["clusters"][cluster]["first_triangle"] + first
@@ -62,8 +62,8 @@ class TreeBoxes:
 
 
 class TreeCheck:
-    """Walks the trees of a file: leaves hold each triangle that some ray sees once, boxes hold what lies below, and are
-    no larger than rounding makes them."""
+    """Walks the trees of a file and checks that each triangle visible to some ray lies in exactly one leaf, and that
+    each box encloses its subtree and is no larger than rounding requires. Raises BadFile."""
 
     def __init__(self, baked, meshes):
         self.baked, self.meshes = baked, meshes
@@ -87,7 +87,7 @@ class TreeCheck:
                 raise BadFile(f"triangles of cluster {cluster} are not in one leaf each")
 
     def walk(self, number):
-        """The exact box below a node, and the levels of nodes from it down."""
+        """Returns the exact bounding box of a node's subtree and its depth in nodes."""
         node = self.nodes[number]
         below, depth, classes = [], 0, 0
         triangle = node["first_triangle"]

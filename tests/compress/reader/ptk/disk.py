@@ -1,4 +1,4 @@
-"""The disk form: makes the bytes of the resident file of it."""
+"""Expands files in disk form to resident form."""
 
 import struct
 
@@ -18,13 +18,14 @@ SECTION_NAMES = [name for name, _ in SECTIONS]
 
 
 def section_place(resident, name):
-    """Offset and bytes, by the table in the resident file's header."""
+    """Returns a section's offset and size in bytes, from the table in the header of the resident form."""
     return struct.unpack_from("<QQ", resident, 48 + 24 * SECTION_NAMES.index(name))
 
 
 def clusters_of_page(data, page, geometries, codec, payload_begin):
-    """Records and streams of a page's clusters. @param geometries of each cluster
-    @param payload_begin where the page's payload lies in the section"""
+    """Returns the records of a page's clusters and the bytes of their streams.
+    @param geometries the geometry of each cluster
+    @param payload_begin offset of the page's payload in the payload section"""
     if page["form"] == 0:
         plain = decompress(data, page["clusters"] * CLUSTER.layout.size + page["payload_bytes"])
         records = CLUSTER.read_all(plain[: page["clusters"] * CLUSTER.layout.size])
@@ -40,7 +41,7 @@ def clusters_of_page(data, page, geometries, codec, payload_begin):
 
 
 def number_clusters(records, geometry_of):
-    """Fills in the numbers of the first triangle and vertex within the geometry."""
+    """Sets first_triangle and first_vertex of each record; both count within the geometry."""
     last = None
     for record, geometry in zip(records, geometry_of):
         if geometry is not last:
@@ -55,7 +56,7 @@ def is_disk_form(data):
 
 
 def expand(data):
-    """@return the resident file's bytes"""
+    """Returns the bytes of the resident form. Raises BadFile."""
     if len(data) < HEADER.layout.size:
         raise BadFile("the file is too short")
     (header,) = HEADER.read_all(data[: HEADER.layout.size])

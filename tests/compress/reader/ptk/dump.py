@@ -1,4 +1,4 @@
-"""Compares what was decoded with a dump."""
+"""Compares decoded geometry with a dump that the C++ library wrote."""
 
 import array
 import sys
@@ -8,11 +8,11 @@ from ptk.textures import read_texels
 
 
 class Differs(Exception):
-    """What was decoded is not what the dump holds."""
+    """A decoded value differs from the dump."""
 
 
 class Dump:
-    """Takes arrays off a dump, little-endian and without gaps."""
+    """Reads the arrays of a dump in order; they are little-endian and packed."""
 
     def __init__(self, data):
         self.data, self.at = data, 0
@@ -42,11 +42,15 @@ def require_equal(what, ours, theirs):
 
 
 def compare(baked, meshes, dump):
-    """A dump: geometries (u32); for each vertices, triangles (u32), then lattice (3 i64 a vertex), positions, normals
-    (3 floats a vertex), uvs (2 floats), triangles (3 u32 each), material slots (u32 a triangle); instances (u32); for each
-    12 floats, a geometry (u32) and its materials by slot (u32 each); of all textures the texels (3 u8 each); for each
-    geometry that is no level itself the number of its levels (u32) and, where there are any, a threshold (float) and the cut for it: clusters
-    (u32), for each a geometry and a cluster of it (u32). All must be equal."""
+    """Compares all decoded values with a dump, which holds:
+    - the number of geometries (u32); per geometry the vertex and triangle counts (u32), per vertex its grid position
+      (3 i64), then all positions (3 floats each), normals (3 floats) and uvs (2 floats), per triangle three vertices
+      (u32), then all material slots (u32)
+    - the number of instances (u32); per instance a matrix (12 floats), a geometry (u32) and a material per slot (u32)
+    - the texels of all textures (3 u8 each)
+    - per geometry that is not a LOD level, the number of its levels (u32); if there are any, an error threshold (float)
+      and the cut for it: the number of clusters (u32), and per cluster its geometry and its index there (u32)
+    Raises Differs."""
     require_equal("geometries", [len(meshes)], dump.take("I", 1))
     for number, mesh in enumerate(meshes):
         vertices, triangles = len(mesh.lattice), len(mesh.triangles)

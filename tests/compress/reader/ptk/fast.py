@@ -1,4 +1,4 @@
-"""Pages of codec fast."""
+"""Decodes pages of codec fast."""
 
 import struct
 
@@ -8,9 +8,9 @@ from ptk.records import HAS_NORMALS, HAS_UVS, BadFile, Bits, Cursor, Record, ind
 from ptk.zstd import decompress
 
 PART_COUNT = 9
-FIELDS, HEADERS, BITS, RUNS, REUSED_VERTICES, RESIDUALS = range(6)  # followed by the other classes of residuals
+FIELDS, HEADERS, BITS, RUNS, REUSED_VERTICES, RESIDUALS = range(6)  # the first residual class; the others follow
 WORD = (1 << 64) - 1
-WIDE = 57  # wider words are copied
+WIDE = 57  # maximum width of predicted words; wider ones are stored as they are
 
 HEADER = Record(
     ("anchor", "3I"), ("material_slot", "I"), ("normal_anchor", "2H"), ("normal_palette", "H"),
@@ -24,10 +24,10 @@ def signed(number, bits):
 
 
 class PartCursor(Cursor):
-    """A part of a page, read from its begin to its end."""
+    """A part of a page, read sequentially."""
 
     def take_bits(self, count):
-        """From a whole byte on."""
+        """Reads bits that start at a byte boundary and are padded to one."""
         number = int.from_bytes(self.take((count + 7) // 8), "little")
         return [number >> i & 1 for i in range(count)]
 
@@ -46,7 +46,7 @@ def read_parts(page):
 
 
 def read_headers(part, count):
-    """Records of clusters, their differences added up."""
+    """Returns the headers of a page's clusters, with the differences between consecutive ones resolved."""
     columns = part.take(count * HEADER.layout.size)
     headers = HEADER.read_all(b"".join(columns[i::count] for i in range(count)))
     anchor, slot, normal_anchor = [0, 0, 0], 0, [0, 0]
@@ -75,7 +75,8 @@ class FastCluster:
         self.count = self.cluster.record["vertex_count"]
 
     def read_strips(self):
-        """Also which vertex each fresh one is guessed from: guesses[v] is (p, q, o), vertices or None."""
+        """Reads the triangle strips. Sets guesses[v] = (p, q, o), the vertices (or None) that predict new vertex v as
+        p + q - o."""
         cluster, parts = self.cluster, self.parts
         triangles, strips = cluster.record["triangle_count"], cluster.record["strip_count"]
         cluster.lefts = parts[BITS].take_bits(triangles)
@@ -132,7 +133,7 @@ class FastCluster:
             cluster.uvs = self.channel(bits, 2, cluster.uv_bits, {})
 
     def channel(self, bits, number, widths, copies):
-        """Words of all vertices. @param copies vertices that have the word of another one"""
+        """Returns the words of all vertices. @param copies maps a vertex to the one whose word it repeats"""
         total = sum(widths)
         coded = [v for v in range(1, self.count) if v not in copies]
         if total > WIDE:
@@ -158,7 +159,7 @@ class FastCluster:
 
 
 def decode_page(page, geometries):
-    """@param geometries of each cluster"""
+    """Returns the PageClusters of a page. @param geometries the geometry of each cluster"""
     parts = read_parts(page)
     clusters = [FastCluster(header, parts, NORMAL_ENCODINGS[geometry["normal_encoding"]].charts)
                 for header, geometry in zip(read_headers(parts[HEADERS], len(geometries)), geometries)]

@@ -1,4 +1,4 @@
-"""Nodes of trees from their topology: boxes and ray classes follow from the clusters."""
+"""Restores BVH nodes from their topology; boxes and ray classes follow from the clusters."""
 
 from ptk.checks import TreeBoxes
 from ptk.records import INNER_CHILD, NODE, BadFile, unzigzag
@@ -6,7 +6,7 @@ from ptk.resident import BakedFile
 
 
 def read_topology(data, trees):
-    """Nodes without boxes, by tree, of the bytes of form 1."""
+    """Returns the nodes of each tree, without boxes, from the bytes of node form 1."""
     counts, at = data[: sum(tree["node_count"] for tree in trees)], 0
     of_trees, with_leaves = [], []
     for tree in trees:
@@ -45,7 +45,7 @@ def new_node():
 
 
 def fit_boxes(node, boxes):
-    """The node's origin, exponents and its children's boxes."""
+    """Sets the node's origin and exponents, and the quantised boxes of its children."""
     origin, exponents = [], 0
     for axis in range(3):
         lo, hi = min(box[0][axis] for box in boxes), max(box[1][axis] for box in boxes)
@@ -61,7 +61,7 @@ def fit_boxes(node, boxes):
 
 
 def restore_nodes(resident, topology):
-    """The bytes of the node section. @param resident all other bytes"""
+    """Returns the bytes of the node section. @param resident the resident form with that section empty"""
     baked = BakedFile(resident, with_nodes=False)
     meshes = [baked.decode(geometry) for geometry in baked.sections["geometries"]]
     boxes = TreeBoxes(baked, meshes)

@@ -1,11 +1,11 @@
-"""The prediction that normals of codec small are differences to."""
+"""Predicts normals from faces and neighbours; codec small stores differences from the prediction."""
 
 import math
 import struct
 
 
 def sum_of_face_normals(places, triangles):
-    """Per vertex, in doubles; triangles in order."""
+    """Returns per vertex the sum of its faces' area-weighted normals, added in the order of the triangles."""
     sums = [(0.0, 0.0, 0.0)] * len(places)
     for triangle in triangles:
         a, b, c = (places[corner] for corner in triangle)
@@ -21,7 +21,7 @@ def code_of(t, last):
 
 
 def unwarp(w):
-    """The inverse of w(t) = t (803/1024 + c t^2), nearly."""
+    """Approximates the inverse of w(t) = t (803/1024 + c t^2), c = sqrt(1/2) - 803/1024."""
     slope, cubic = 803 / 1024, 0.70710678118654752440 - 803 / 1024
     square = w * w
     t = w * (1.2752 + square * (0.16 + square * 0.23))
@@ -29,7 +29,7 @@ def unwarp(w):
 
 
 def guess_normal(encoding, n):
-    """Chart, x and y near a unit vector."""
+    """Returns the (chart, x, y) predicted for a unit vector."""
     x_last, y_last = encoding.x_codes - 1, encoding.y_codes - 1
     if encoding.family == "oct":
         length = abs(n[0]) + abs(n[1]) + abs(n[2])

@@ -1,4 +1,4 @@
-"""Encodings of normals."""
+"""Normal encodings."""
 
 import math
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from ptk.records import to_float32
 
 @dataclass(frozen=True)
 class NormalEncoding:
-    """Decodes normals; arithmetic is that of 32-bit floats, each operation rounded."""
+    """A normal encoding. Decoding rounds every operation to a 32-bit float."""
 
     family: str
     charts: int
@@ -19,7 +19,7 @@ class NormalEncoding:
         return getattr(self, "decode_" + self.family)(*self.canonical(chart, x, y))
 
     def canonical(self, chart, x, y):
-        """The chart that holds the normal, and codes in their range."""
+        """Returns the chart that contains the normal, and x and y clamped to their range."""
         if self.family == "axis":
             chart, x, y = self.fold(chart, x, y)
         chart = min(chart, self.charts - 1)
@@ -29,7 +29,8 @@ class NormalEncoding:
         return (chart * self.x_codes + x) * self.y_codes + y
 
     def unfold(self, normal, chart):
-        """The inverse of fold(): the same around the face `chart`, or None where it is no neighbour."""
+        """Inverse of fold(): returns the normal in the plane of cube face `chart`, or None if that is not adjacent to
+        the normal's face."""
         face, x, y = normal
         if face == chart:
             return normal
@@ -42,7 +43,7 @@ class NormalEncoding:
         return (chart, beyond, x) if along_x else (chart, y, beyond)
 
     def fold(self, chart, x, y):
-        """From the cross of a face and its neighbours to the face that holds the normal."""
+        """Maps codes that extend beyond cube face `chart` onto the adjacent face that contains the normal."""
         codes, axis, sign = self.x_codes, chart >> 1, chart & 1
         for number, (own, other) in enumerate(((x, y), (y, x))):
             if 0 <= own < codes:

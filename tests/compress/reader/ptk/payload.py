@@ -1,4 +1,4 @@
-"""Writes the streams of clusters, as the resident form has them: what decoding a page ends with."""
+"""Writes the streams of clusters in resident form, the last step of decoding a page."""
 
 from dataclasses import dataclass, field
 
@@ -6,7 +6,7 @@ from ptk.records import HAS_NORMALS, HAS_UVS, MIXED_CHARTS, index_bits
 
 
 class FieldWriter:
-    """The inverse of Bits."""
+    """Writes bit fields that Bits reads."""
 
     def __init__(self):
         self.value = 0
@@ -24,7 +24,7 @@ class FieldWriter:
 
 @dataclass
 class PageCluster:
-    """A cluster of a page: its record, but for what follows from those before it, and the content of its streams."""
+    """A cluster of a page: its record, without the fields that depend on preceding clusters, and its streams."""
 
     record: dict
     starts: list = field(default_factory=list)  # per triangle: whether it begins a strip
@@ -39,12 +39,12 @@ class PageCluster:
     uv_bits: tuple = (0, 0)
 
     def normal_bits(self, charts):
-        """Of a normal, or of a palette's entry."""
+        """Returns the number of bits of a normal or a palette entry."""
         mixed = self.record["flags"] & MIXED_CHARTS
         return sum(self.record["normal_bits"]) + (index_bits(charts) if mixed else 0)
 
     def streams(self, charts):
-        """@param charts of the geometry's encoding of normals"""
+        """Returns the bytes of the streams. @param charts number of charts of the geometry's normal encoding"""
         out = FieldWriter()
         for bits in (self.starts, self.lefts, self.fresh):
             for bit in bits:

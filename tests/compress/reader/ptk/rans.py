@@ -1,4 +1,4 @@
-"""What codec small reads its values from: adaptive symbols and bit fields."""
+"""Entropy decoder of codec small: adaptive rANS symbols and plain bit fields."""
 
 import struct
 
@@ -11,7 +11,7 @@ WIDE = 15  # numbers of this many bits and more store their width explicitly
 
 
 class Model:
-    """Cumulative frequencies of the symbols, which move towards what is coded."""
+    """Cumulative symbol frequencies, which adapt to the symbols decoded."""
 
     def __init__(self):
         self.below = [i << PROBABILITY_BITS - 4 for i in range(SYMBOLS + 1)]
@@ -35,7 +35,7 @@ class Model:
 
 
 class Values:
-    """A page's symbols and bit fields. Models are called by any name: each has its own state."""
+    """The symbols and bit fields of a page. A model is created when its name is first used."""
 
     def __init__(self, page):
         (size,) = struct.unpack_from("<I", page)

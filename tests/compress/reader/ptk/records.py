@@ -1,4 +1,4 @@
-"""Records of the format and fields of bits, as docs/baked_format.md has them."""
+"""The on-disk records and bit fields of docs/baked_format.md."""
 
 import struct
 
@@ -12,11 +12,11 @@ HAS_NORMALS, HAS_UVS, MIXED_CHARTS, CHART_SHIFT = 1, 2, 4, 3  # cluster flags
 
 
 class BadFile(Exception):
-    """The file is not what the format's description says."""
+    """The file violates the format's description."""
 
 
 class Cursor:
-    """Takes bytes one after the other."""
+    """Reads bytes sequentially."""
 
     def __init__(self, data, at=0):
         self.data, self.at = data, at
@@ -29,7 +29,7 @@ class Cursor:
 
 
 class Record:
-    """A record of fixed size; fields are (name, struct letters), several letters give a tuple."""
+    """A record of fixed size. Fields are (name, struct format); a format of several values gives a tuple."""
 
     def __init__(self, *fields):
         self.fields = fields
@@ -108,7 +108,7 @@ NODE = Record(
     ("cluster", "I"), ("children", "8B"), ("lo", "24B"), ("hi", "24B"))
 INNER_CHILD = 255
 
-# In the order of the section table; None: plain bytes.
+# In the order of the section table; None means plain bytes.
 SECTIONS = (
     ("geometries", GEOMETRY), ("clusters", CLUSTER), ("payload", None), ("materials", MATERIAL),
     ("instances", INSTANCE), ("masks", MASK), ("mask_words", Record(("word", "I"))), ("textures", TEXTURE),
@@ -118,12 +118,12 @@ SECTIONS = (
 
 
 def index_bits(count):
-    """Bits that number `count` things: ceil(log2 count)."""
+    """Returns the number of bits of an index below `count`: ceil(log2 count)."""
     return (count - 1).bit_length()
 
 
 def unzigzag(number):
-    """The inverse of d -> 2 d, or -2 d - 1 below zero."""
+    """Inverse of zigzag coding, which maps d >= 0 to 2 d and d < 0 to -2 d - 1."""
     return -(number + 1 >> 1) if number & 1 else number >> 1
 
 
@@ -132,7 +132,7 @@ def to_float32(value):
 
 
 class Bits:
-    """Fields packed least significant bit first."""
+    """Reads bit fields that are packed from the least significant bit."""
 
     def __init__(self, data):
         self.value = int.from_bytes(data, "little")

@@ -1,4 +1,4 @@
-"""The resident form: records by section, geometries decoded on demand."""
+"""Reads the resident form."""
 
 import math
 import struct
@@ -8,7 +8,7 @@ from ptk.streams import Mesh, read_lattice, read_normals, read_triangles, read_u
 
 
 class BakedFile:
-    """A file's records, and its geometries decoded on demand."""
+    """The records of a file by section. decode() decodes its geometries."""
 
     def __init__(self, data, with_nodes=True):
         if len(data) < 16 or data[:8] != MAGIC:
@@ -54,7 +54,7 @@ class BakedFile:
         return [level for level in self.sections["lod_levels"] if level["base"] == base]
 
     def cut(self, base, threshold):
-        """Clusters, as (geometry, cluster of it), that stand for a geometry where errors up to `threshold` are allowed."""
+        """Returns the LOD cut of a geometry for errors up to `threshold`: pairs of a geometry and a cluster index there."""
         levels = self.levels(base)
         groups = self.sections["lod_groups"][levels[0]["first_group"]:]
         chosen = []

@@ -1,4 +1,4 @@
-"""Pages of codec small."""
+"""Decodes pages of codec small."""
 
 from dataclasses import dataclass, field
 
@@ -16,8 +16,8 @@ MAX_SPAN = 19
 
 @dataclass
 class Point:
-    """A place of the page. Border edges, newest first: those that begin here as (end, third corner), and the begins of
-    those that end here."""
+    """A vertex position of the page with its border edges, newest first: outgoing ones as (end point, third corner of the
+    triangle), incoming ones as start points."""
 
     place: tuple
     outward: list = field(default_factory=list)
@@ -34,20 +34,20 @@ class Point:
 @dataclass
 class Vertex:
     point: int
-    before: tuple  # earlier corners, as vertices, of the triangle that first uses it
+    before: tuple  # vertices of the preceding corners of the triangle that first uses it
     opposite: int  # point across their edge, or None
     direction: tuple = None  # its normal, decoded
 
 
 @dataclass
 class SmallCluster:
-    """What a cluster's values say; canonical.pack() makes record and streams of it."""
+    """The decoded values of a cluster; canonical.pack() converts them into its record and streams."""
 
     slot: int = 0
     has_normals: int = 0
     has_uvs: int = 0
     triangle_count: int = FULL
-    chart: int = 0  # chart that normals are unfolded around; the number of charts: one per normal
+    chart: int = 0  # common chart of all normals; the number of charts if each normal has its own
     has_palette: int = 0
     turns: list = field(default_factory=list)
     corners: list = field(default_factory=list)  # one or three per triangle: (vertex, whether it is fresh)
@@ -58,7 +58,7 @@ class SmallCluster:
 
 
 def first_but(ends, other):
-    """The newest, or the one before it where that is `other`; None where there is none."""
+    """Returns the newest end, or the second newest if the newest is `other`; None if there is none."""
     newest, before = (ends + [None, None])[:2]
     return newest if newest != other else before
 
@@ -69,7 +69,7 @@ class PageDecoder:
         self.points = []
         self.number = 0
         self.last = SmallCluster()
-        self.recent_new = (0, 0)  # whether the last but one corner, and the last one, were new points
+        self.recent_new = (0, 0)  # whether the last two corners were new points
         self.spans = [MAX_SPAN] * 3
         self.predictor = NormalPredictor()
 
@@ -133,7 +133,7 @@ class PageDecoder:
         return a, b, self.third(a, b, apex, p if apex is None else apex, ("first", 2), kind=3)
 
     def ends_at(self, point):
-        """Begin of the newest border edge into a point, end of the newest one out of it."""
+        """Returns the start of the newest border edge into the point and the end of the newest one out of it."""
         return first_but(self.points[point].inward, None), first_but(self.points[point].ends(), None)
 
     def third(self, a, b, opposite, origin, model, kind=0):
@@ -142,7 +142,7 @@ class PageDecoder:
         return self.corner(guesses, (p, q, origin), (a, b), model, kind)
 
     def corner(self, guesses, basis, before, model, kind):
-        """@return its vertex"""
+        """Decodes a corner and returns its vertex."""
         values = self.values
         state = tuple(self.state_of(guess) for guess in guesses)
         if guesses[0] == guesses[1]:
@@ -255,7 +255,7 @@ class PageDecoder:
 
 
 def decode_page(page, geometries):
-    """@param geometries of each cluster"""
+    """Returns the PageClusters of a page. @param geometries the geometry of each cluster"""
     decoder = PageDecoder(page)
     clusters = [pack(decoder.cluster(NORMAL_ENCODINGS[geometry["normal_encoding"]]), geometry) for geometry in geometries]
     if not decoder.values.whole():

@@ -1,4 +1,4 @@
-"""The streams of a cluster, in the resident form."""
+"""Decodes the streams of clusters in resident form."""
 
 import math
 import struct
@@ -10,7 +10,7 @@ from ptk.records import CHART_SHIFT, MIXED_CHARTS, BadFile, index_bits, to_float
 
 @dataclass
 class Mesh:
-    """One decoded geometry: its clusters one after another, vertex numbers counting through them."""
+    """A decoded geometry: its clusters are concatenated, and vertex indices are relative to the geometry."""
 
     lattice: list
     positions: list
@@ -21,7 +21,7 @@ class Mesh:
 
 
 def read_triangles(bits, cluster):
-    """The cluster's triangles as local vertex numbers."""
+    """Returns the triangles of a cluster as vertex indices relative to the cluster."""
     count, vertex_count = cluster["triangle_count"], cluster["vertex_count"]
     restart = [bits.take(1) for _ in range(count)]
     left = [bits.take(1) for _ in range(count)]

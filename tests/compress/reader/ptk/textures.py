@@ -1,4 +1,4 @@
-"""Texels."""
+"""Decodes textures."""
 
 import struct
 
@@ -16,7 +16,7 @@ def bc1_colours(first, second):
 
 
 def read_texels(texture, data):
-    """All texels from the top, three values each."""
+    """Returns the texels row by row from the top, three values each."""
     width, height, codec = texture["width"], texture["height"], texture["codec"]
     if codec == 0:
         return list(data[: 3 * width * height])

@@ -1,4 +1,4 @@
-"""zstd frames, through the C library: the one thing of the disk form that the standard library lacks."""
+"""Decompresses zstd frames with the C library, since Python's standard library cannot."""
 
 import ctypes
 import ctypes.util
@@ -20,7 +20,7 @@ def library():
 
 
 def decompress(frame, size=None):
-    """The bytes of a frame: `size`, or where that is None as many as the frame says."""
+    """Returns the content of a frame. @param size its expected size; None: the size that the frame states"""
     stated = library().ZSTD_getFrameContentSize(frame, len(frame))
     if size is None:
         size = stated

@@ -1,0 +1,160 @@
+#include "runtime/commands/render_options.h"
+
+#include "pbrt_import/base/error.h"
+#include "runtime/commands/option_checks.h"
+#include "runtime/commands/render_camera.h"
+
+namespace packtrace {
+namespace {
+
+constexpr uint32_t kGroundTruthSpp = 1024;
+
+/// Options for the pictures to write.
+void add_picture_options(CLI::App& verb, RenderOptions& options) {
+  verb.add_option("-o,--output", options.outputs,
+                  "Output image, .png or .exr (required). Repeat the option or separate names by commas to write "
+                  "several; - writes a PNG to standard output")
+      ->type_name("FILE")
+      ->allow_extra_args(false);
+  verb.add_option(
+          "--aov", options.aovs,
+          "Layers to write, separated by commas. ao is denoised, ao_raw is the last frame before denoising, shaded is "
+          "albedo times ao; others are depth, normal, instance, albedo, with --lod-error lod and lod-error, and all "
+          "(default: all in .exr, ao in .png). Several layers in .png become NAME.LAYER.png")
+      ->delimiter(',')
+      ->type_name("LAYERS");
+  verb.add_option("--camera", options.camera,
+                  "Camera number in the scene, from 0, or auto for a view of the whole scene (default 0, or auto if "
+                  "there is no "
+                  "camera or camera 0 sees nothing)")
+      ->type_name("I|auto");
+  verb.add_option("--size", options.size,
+                  "Image size in pixels, for example 640x360 (default: the size of the scene's film, or 1280x720 with "
+                  "--camera auto)")
+      ->type_name("WxH");
+  verb.add_option("--background", options.background,
+                  "Background of .png files, where no surface is hit. A colour name, rrggbb in hexadecimal digits, "
+                  "transparent or sky (default: light grey; sky for albedo and shaded). It does not affect .exr files")
+      ->type_name("COLOR");
+  verb.add_flag("--no-legend", options.no_legend,
+                "Do not add the colour scale below .png files of depth, lod and lod-error");
+  verb.add_option("--supersample", options.supersample,
+                  "Trace at N times the width and height and filter down, for smooth edges, 1..8 (default 1). Time and "
+                  "memory grow with N squared")
+      ->type_name("N");
+}
+
+/// Options for rays, samples and the denoiser.
+void add_sampling_options(CLI::App& verb, RenderOptions& options) {
+  verb.add_option("--frames", options.frames,
+                  "Number of frames to accumulate and denoise, 1..65536 (default 32). More frames give "
+                  "less noise and take longer")
+      ->type_name("N");
+  verb.add_option("--spp", options.spp, "Ambient occlusion rays per pixel and frame, 1..65536 (default 1)")
+      ->type_name("N");
+  verb.add_flag("--ground-truth", options.ground_truth,
+                "Render a reference image without denoiser, in 1 frame of 1024 spp unless --frames or --spp are given. "
+                "Takes minutes");
+  verb.add_flag("--no-denoise", options.no_denoise, "Average the frames without denoising");
+  verb.add_option(
+          "--ao-radius", options.ao_radius,
+          "Distance up to which surfaces occlude, in world units (default: 10 % of the scene's diagonal). Small "
+          "radii darken creases only, large ones whole rooms")
+      ->type_name("R");
+  verb.add_flag("--ao-no-falloff", options.ao_falloff_off,
+                "Let every hit within the radius occlude fully, instead of fading with its distance");
+  verb.add_option("--ao-interreflection", options.ao_interreflection,
+                  "Fraction of light that occluding surfaces reflect, 0..1 (default 0, off). Brightens creases between "
+                  "light surfaces")
+      ->type_name("RHO");
+  verb.add_flag("--private-copy", options.private_copy,
+                "Read a .ptk file into memory instead of mapping it, so that it may be changed or deleted meanwhile");
+  verb.add_option("--seed", options.seed, "Seed of the sample pattern (default 0). Another seed gives other noise")
+      ->type_name("N");
+}
+
+void add_tracer_options(CLI::App& verb, RenderOptions& options) {
+  verb.add_option(
+          "--backend", options.backend,
+          "Ray tracer to use. packed traces the compressed clusters (default for .ptk files); embree traces floats "
+          "(default for .pbrt scenes, and with --bvh or --fast-edges); embree-clusters uses Embree's BVH over packed "
+          "clusters")
+      ->check(one_of({"packed", "embree", "embree-clusters"}));
+  verb.add_option(
+          "--bvh,--bvh-quality", options.bvh,
+          "Quality of Embree's BVH; selects --backend embree (default medium). high takes longer to build; it traces "
+          "faster together with --fast-edges")
+      ->check(one_of({"medium", "high"}));
+  verb.add_flag(
+      "--fast-edges", options.fast_edges,
+      "Use Embree's faster, non-watertight intersection tests; selects --backend embree. Tracing is up to 20 % faster, "
+      "but a few rays slip through between adjacent triangles");
+}
+
+/// @param baked whether the input is a .ptk file
+Backend choose_backend(const RenderOptions& options, bool baked) {
+  const bool needs_embree = options.bvh || options.fast_edges;
+  if (!options.backend) return baked && !needs_embree ? Backend::kPacked : Backend::kEmbree;
+  const std::string& name = *options.backend; // the option's check accepts only known names
+  if (name == "embree") return Backend::kEmbree;
+  if (needs_embree) throw Error(ErrorKind::kUsage, "--bvh and --fast-edges require --backend embree");
+  if (name == "packed") return Backend::kPacked;
+  if (options.lod.error_px)
+    throw Error(ErrorKind::kUsage, "--lod-error does not work with --backend embree-clusters; use packed or embree");
+  return Backend::kEmbreeClusters;
+}
+
+} // namespace
+
+void add_render_options(CLI::App& verb, RenderOptions& options) {
+  verb.add_option("FILE", options.input, ".ptk file, or .pbrt scene, which is traced as floats without compression")
+      ->required();
+  add_picture_options(verb, options);
+  add_sampling_options(verb, options);
+  add_tracer_options(verb, options);
+  add_lod_options(verb, options.lod);
+  add_scene_options(verb, options.scene);
+  verb.footer("The image is the mean of --frames frames of --spp rays per pixel, denoised over time\n"
+              "and space. -v prints the chosen camera, radius, backend and grid with the reasons.\n"
+              "Examples:\n"
+              "  packtrace render house.ptk -o house.png\n"
+              "  packtrace render house.ptk -o house.png,house.exr --aov all --supersample 2\n"
+              "  packtrace render house.ptk -o - --background transparent | display\n"
+              "  packtrace render forest.ptk -o forest.png --lod-error 1 --aov ao,lod\n"
+              "  packtrace render scene.pbrt -o truth.exr --ground-truth --spp 1024");
+}
+
+RenderConfig make_config(const SceneSource& source, const Camera& camera, const RenderOptions& options) {
+  RenderConfig config;
+  config.size = options.size.empty() ? ImageSize{camera.width_px, camera.height_px} : parse_size(options.size);
+  config.supersample = options.supersample;
+  config.denoise = !options.no_denoise && !options.ground_truth;
+  config.frames = options.frames.value_or(options.ground_truth ? 1 : 32);
+  config.ao.spp = options.spp.value_or(options.ground_truth ? kGroundTruthSpp : 1);
+  config.ao.radius = options.ao_radius.value_or(default_ao_radius(source.world_bounds()));
+  config.ao.falloff = !options.ao_falloff_off;
+  config.ao.interreflection = options.ao_interreflection;
+  config.ao.seed = options.seed;
+  validate(config);
+  validate(config.ao);
+  return config;
+}
+
+TracerConfig tracer_config(const RenderOptions& options, const GlobalOptions& globals, bool baked) {
+  TracerConfig config;
+  config.backend = choose_backend(options, baked);
+  const std::string quality = options.bvh.value_or("medium");
+  config.embree = {quality == "high" ? BvhQuality::kHigh : BvhQuality::kMedium, !options.fast_edges, false, true,
+                   globals.memory};
+  return config;
+}
+
+PreviewStyle preview_style(const RenderOptions& options) {
+  PreviewStyle style;
+  if (options.background) style.background = parse_background(*options.background);
+  style.legend = !options.no_legend;
+  style.max_lod_error_px = options.lod.error_px.value_or(0.0);
+  return style;
+}
+
+} // namespace packtrace

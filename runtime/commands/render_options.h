@@ -1,0 +1,52 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "runtime/commands/cli_support.h"
+#include "runtime/commands/layer_previews.h"
+#include "runtime/commands/loaded_scene.h"
+#include "runtime/commands/lod_render.h"
+#include "runtime/render/renderer.h"
+#include "runtime/trace/make_tracer.h"
+
+namespace packtrace {
+
+/// The options of `render`.
+struct RenderOptions {
+  std::string input;
+  std::vector<std::string> outputs, aovs;
+  std::optional<std::string> camera; ///< number or "auto"; if not set, camera 0, or "auto" if that sees nothing
+  std::string size;
+  std::optional<std::string> background; ///< background of .png files; if not set, it depends on the layer
+  bool no_legend = false;
+  bool private_copy = false;
+  uint32_t supersample = 1;
+  std::optional<uint32_t> spp, frames;
+  bool ground_truth = false, no_denoise = false, fast_edges = false;
+  SceneOptions scene;
+  std::optional<float> ao_radius;
+  bool ao_falloff_off = false;
+  float ao_interreflection = 0.0f;
+  uint64_t seed = 0;
+  std::optional<std::string> backend; ///< if not set, the input decides
+  std::optional<std::string> bvh;
+  LodOptions lod;
+};
+
+/// Adds all options of `render` to the verb. `options` must outlive it.
+void add_render_options(CLI::App& verb, RenderOptions& options);
+
+/// What to render with the camera. Throws Error(kUsage) for values out of range.
+RenderConfig make_config(const SceneSource& source, const Camera& camera, const RenderOptions& options);
+
+/// @param baked whether the input is a .ptk file
+/// Throws Error(kUsage) for contradictory options.
+TracerConfig tracer_config(const RenderOptions& options, const GlobalOptions& globals, bool baked);
+
+PreviewStyle preview_style(const RenderOptions& options);
+
+} // namespace packtrace
