@@ -52,9 +52,10 @@ void add_precision_options(CLI::App& verb, BakeConfig& config) {
 void add_stream_options(CLI::App& verb, BakeOptions& options) {
   std::vector<std::string> encodings{kAuto};
   for (const NormalFormat& format : kNormalFormats) encodings.emplace_back(format.name);
-  verb.add_option("--normals", options.normals,
-                  "Normal encoding. auto picks for each geometry the smallest of axis12, axis16, oct20, axis24 and axis32 that "
-                  "meets --normal-error (default auto)")
+  verb.add_option(
+          "--normals", options.normals,
+          "Normal encoding. auto picks for each geometry the smallest of axis12, axis16, oct20, axis24 and axis32 that "
+          "meets --normal-error (default auto)")
       ->check(one_of(encodings))
       ->default_str(kAuto)
       ->group("Normals");
