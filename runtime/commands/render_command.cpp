@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/base/with_file.h"
 #include "pbrt_import/scene/camera_rays.h"
 #include "runtime/commands/binary_output.h"
 #include "runtime/commands/cli_support.h"
@@ -157,12 +158,10 @@ MemoryReservation reserve_picture(const RenderOptions& options, const RenderConf
   constexpr double kPixelBytes = 320.0, kMax = 0x1p62;
   const double side = config.supersample;
   const double bytes = kPixelBytes * side * side * static_cast<double>(config.size.width) * config.size.height;
-  try {
+  return with_file(options.input, [&] {
     return MemoryReservation(budget, static_cast<uint64_t>(std::min(kMax, bytes)),
                              fmt::format("a picture of {} x {} pixels", config.size.width, config.size.height));
-  } catch (const MemoryError& error) {
-    throw MemoryError(options.input, error.what());
-  }
+  });
 }
 
 /// @param baked whether the input is a .ptk file
@@ -302,11 +301,7 @@ Traced trace(const RenderOptions& options, const GlobalOptions& globals, const L
   double build_s = 0.0;
   const auto build = [&](const auto& make) {
     const Stopwatch building;
-    try {
-      traced.tracers.push_back(make());
-    } catch (const MemoryError& error) {
-      throw MemoryError(options.input, error.what());
-    }
+    with_file(options.input, [&] { traced.tracers.push_back(make()); });
     build_s += building.seconds();
   };
   const auto choose = [&](const GBuffer* seen) {
