@@ -11,6 +11,7 @@
 
 #include "compress/bake/bake_scene.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/base/with_file.h"
 #include "runtime/commands/bake_options.h"
 #include "runtime/commands/bake_report.h"
 #include "runtime/commands/binary_output.h"
@@ -60,13 +61,8 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
 
   Diagnostics diagnostics;
   const Stopwatch baking;
-  BakedScene scene = [&] {
-    try {
-      return bake_to_bytes(imported.scene, config, diagnostics, progress);
-    } catch (const MemoryError& error) {
-      throw MemoryError(options.input, error.what());
-    }
-  }();
+  BakedScene scene =
+      with_file(options.input, [&] { return bake_to_bytes(imported.scene, config, diagnostics, progress); });
   if (output) {
     progress.begin("writing the file", 0);
     output->write(scene.bytes);

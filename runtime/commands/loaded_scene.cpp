@@ -15,6 +15,7 @@
 #include "pbrt_import/base/file_error.h"
 #include "pbrt_import/base/output_file.h"
 #include "pbrt_import/base/regular_file.h"
+#include "pbrt_import/base/with_file.h"
 #include "pbrt_import/text/input_file.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/trace/source/float_source.h"
@@ -35,11 +36,7 @@ MemoryReservation reserve_decoded(const std::filesystem::path& file, const Memor
   MemoryReservation memory(budget);
   if (start.size() < sizeof header || !is_paged_file(std::as_bytes(std::span(start)))) return memory;
   std::memcpy(&header, start.data(), sizeof header);
-  try {
-    memory.resize(header.resident_bytes, "decoding the file");
-  } catch (const MemoryError& error) {
-    throw MemoryError(file, error.what());
-  }
+  with_file(file, [&] { memory.resize(header.resident_bytes, "decoding the file"); });
   return memory;
 }
 
@@ -138,11 +135,7 @@ ImportResult import_for_command(const std::filesystem::path& file, const SceneOp
 void LoadedScene::copy_file(const std::filesystem::path& file, const MemoryBudget& budget) {
   std::error_code unknown; // reading the file reports the error
   const uint64_t bytes = std::filesystem::file_size(file, unknown);
-  try {
-    memory.merge(MemoryReservation(budget, unknown ? 0 : bytes, "a private copy"));
-  } catch (const MemoryError& error) {
-    throw MemoryError(file, error.what());
-  }
+  with_file(file, [&] { memory.merge(MemoryReservation(budget, unknown ? 0 : bytes, "a private copy")); });
   copy = read_file_bytes(file, unknown ? 0 : bytes);
   baked.emplace(BakedFile::borrow_bytes(copy, file.string()));
 }

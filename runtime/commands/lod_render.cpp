@@ -19,11 +19,8 @@
 namespace packtrace {
 namespace {
 
-constexpr std::array<std::pair<const char*, SharingScheme>, 5> kSchemes{{{"steps", SharingScheme::kSteps},
-                                                                         {"per-level", SharingScheme::kLevels},
-                                                                         {"one-provider", SharingScheme::kOneProvider},
-                                                                         {"per-instance", SharingScheme::kPerInstance},
-                                                                         {"off", SharingScheme::kOff}}};
+constexpr std::array<std::pair<const char*, SharingScheme>, 3> kSchemes{
+    {{"steps", SharingScheme::kSteps}, {"one-provider", SharingScheme::kOneProvider}, {"off", SharingScheme::kOff}}};
 
 /// @param name a name in kSchemes, which the option's check guarantees
 SharingScheme scheme_of(const std::string& name) {
@@ -145,15 +142,14 @@ void add_lod_options(CLI::App& verb, LodOptions& options) {
       ->type_name("PX")
       ->group(kGroup);
   verb.add_option("--lod-scheme", options.scheme,
-                  "How instances share acceleration structures (BLASes). steps and per-level share BLASes that do not "
-                  "depend on the view; with one-provider, one instance of each geometry shares its own cut; "
-                  "per-instance shares only the coarsest cut; off uses level 0 for all (default steps)")
+                  "How instances share acceleration structures (BLASes). steps shares BLASes that do not depend on "
+                  "the view; with one-provider, one instance of each geometry shares its own cut; off uses level 0 "
+                  "for all (default steps)")
       ->check(one_of(schemes))
       ->group(kGroup);
-  verb.add_option(
-          "--lod-traced-ratio", options.traced_ratio,
-          "Maximum number of traced triangles for steps and per-level, relative to a separate cut per instance, "
-          "1 or more (default 1.25). Larger values build fewer BLASes; 0 decides for each instance separately")
+  verb.add_option("--lod-traced-ratio", options.traced_ratio,
+                  "Maximum number of traced triangles for steps, relative to a separate cut per instance, "
+                  "1 or more (default 1.25). Larger values build fewer BLASes; 0 decides for each instance separately")
       ->type_name("R")
       ->group(kGroup);
   verb.add_option("--lod-tolerance", options.tolerance,
@@ -223,16 +219,11 @@ ChosenDetail choose_detail(const LoadedScene& loaded, const Camera& camera, cons
   const Stopwatch listing;
   detail.source = std::make_unique<LodSource>(file, source, *detail.sharing, detail.plan);
   detail.source_s = listing.seconds();
-
-  SharingConfig alone = detail.sharing->config();
-  alone.scheme = SharingScheme::kPerInstance;
-  LodSharing(*detail.geometries, detail.instances, alone).plan(from, culled, detail.alone);
-  detail.alone.passed = {};
   return detail;
 }
 
 nlohmann::json detail_json(const ChosenDetail& detail, const RayTracer& tracer) {
-  const LodPlan &plan = detail.plan, &alone = detail.alone;
+  const LodPlan& plan = detail.plan;
   const auto& counts = plan.category_counts;
   nlohmann::json result = {
       {"scheme", name_of(detail.sharing->config().scheme)},
@@ -240,15 +231,16 @@ nlohmann::json detail_json(const ChosenDetail& detail, const RayTracer& tracer) 
       {"instances", detail.instances.size()},
       {"instances_culled", detail.culled},
       {"builds", plan.builds},
-      {"references_saved", static_cast<int64_t>(alone.builds) - static_cast<int64_t>(plan.builds)},
+      {"references_saved", static_cast<int64_t>(plan.own.builds) - static_cast<int64_t>(plan.builds)},
       {"built_triangles", plan.built_triangles},
       {"built_clusters", plan.built_clusters},
       {"traced_triangles", plan.traced_triangles},
       {"own_cuts",
-       {{"builds", alone.builds},
-        {"built_triangles", alone.built_triangles},
-        {"traced_triangles", plan.own_triangles}}},
-      {"traced_ratio", ratio(static_cast<double>(plan.traced_triangles), static_cast<double>(plan.own_triangles))},
+       {{"builds", plan.own.builds},
+        {"built_triangles", plan.own.built_triangles},
+        {"traced_triangles", plan.own.traced_triangles}}},
+      {"traced_ratio",
+       ratio(static_cast<double>(plan.traced_triangles), static_cast<double>(plan.own.traced_triangles))},
       {"categories", {{"lowest", counts[0]}, {"provider", counts[1]}, {"shares", counts[2]}, {"own", counts[3]}}},
       {"seconds", {{"load", detail.load_s}, {"plan", detail.plan_s}, {"clusters", detail.source_s}}},
       {"geometries", geometries_json(detail)},

@@ -37,7 +37,7 @@ struct ChosenDetail {
   std::unique_ptr<const std::vector<LodGeometry>> geometries; ///< on the heap, because `sharing` refers to it
   std::vector<LodInstance> instances;
   std::unique_ptr<LodSharing> sharing;
-  LodPlan plan, alone; ///< alone: baseline with a separate cut per instance, for the report
+  LodPlan plan;
   std::unique_ptr<LodSource> source;
   double error_px = 0.0;
   size_t culled = 0; ///< number of instances that --lod-cull classifies as culled

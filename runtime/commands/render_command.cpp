@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/base/with_file.h"
 #include "runtime/commands/binary_output.h"
 #include "runtime/commands/image_outputs.h"
 #include "runtime/commands/json_output.h"
@@ -30,12 +31,10 @@ MemoryReservation reserve_picture(const RenderOptions& options, const RenderConf
   constexpr double kPixelBytes = 320.0, kMax = 0x1p62;
   const double side = config.supersample;
   const double bytes = kPixelBytes * side * side * static_cast<double>(config.size.width) * config.size.height;
-  try {
+  return with_file(options.input, [&] {
     return MemoryReservation(budget, static_cast<uint64_t>(std::min(kMax, bytes)),
                              fmt::format("a picture of {} x {} pixels", config.size.width, config.size.height));
-  } catch (const MemoryError& error) {
-    throw MemoryError(options.input, error.what());
-  }
+  });
 }
 
 /// A rendered view and the objects it was traced with.
@@ -53,11 +52,7 @@ Traced trace(const RenderOptions& options, const GlobalOptions& globals, const L
   double build_s = 0.0;
   const auto build = [&](const auto& make) {
     const Stopwatch building;
-    try {
-      traced.tracers.push_back(make());
-    } catch (const MemoryError& error) {
-      throw MemoryError(options.input, error.what());
-    }
+    with_file(options.input, [&] { traced.tracers.push_back(make()); });
     build_s += building.seconds();
   };
   const auto choose = [&](const GBuffer* seen) {

@@ -77,9 +77,8 @@ void add_tracer_options(CLI::App& verb, RenderOptions& options) {
   verb.add_option(
           "--backend", options.backend,
           "Ray tracer to use. packed traces the compressed clusters (default for .ptk files); embree traces floats "
-          "(default for .pbrt scenes, and with --bvh or --fast-edges); embree-clusters uses Embree's BVH over packed "
-          "clusters")
-      ->check(one_of({"packed", "embree", "embree-clusters"}));
+          "(default for .pbrt scenes, and with --bvh or --fast-edges)")
+      ->check(one_of({"packed", "embree"}));
   verb.add_option(
           "--bvh,--bvh-quality", options.bvh,
           "Quality of Embree's BVH; selects --backend embree (default medium). high takes longer to build; it traces "
@@ -98,10 +97,7 @@ Backend choose_backend(const RenderOptions& options, bool baked) {
   const std::string& name = *options.backend; // the option's check accepts only known names
   if (name == "embree") return Backend::kEmbree;
   if (needs_embree) throw Error(ErrorKind::kUsage, "--bvh and --fast-edges require --backend embree");
-  if (name == "packed") return Backend::kPacked;
-  if (options.lod.error_px)
-    throw Error(ErrorKind::kUsage, "--lod-error does not work with --backend embree-clusters; use packed or embree");
-  return Backend::kEmbreeClusters;
+  return Backend::kPacked;
 }
 
 } // namespace

@@ -8,6 +8,7 @@
 
 #include "pbrt_import/base/file_bytes.h"
 #include "pbrt_import/base/file_error.h"
+#include "pbrt_import/base/with_file.h"
 #include "runtime/image/exr.h"
 #include "runtime/image/png.h"
 
@@ -17,11 +18,7 @@ namespace {
 
 /// Grows memory by what an image of a file takes, and names the file where that is too much.
 void reserve_more(MemoryReservation& memory, uint64_t bytes, const std::filesystem::path& path, std::string_view what) {
-  try {
-    memory.resize(memory.bytes() + bytes, what);
-  } catch (const MemoryError& error) {
-    throw MemoryError(path, error.what());
-  }
+  with_file(path, [&] { memory.resize(memory.bytes() + bytes, what); });
 }
 
 /// What the header of a PNG file says. Nothing where decode_png() refuses the file for its size.

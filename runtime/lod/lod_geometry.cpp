@@ -176,15 +176,6 @@ LodStep step_of_prefix(const LodGeometry& geometry, uint32_t passed) {
 
 } // namespace
 
-std::vector<LodStep> level_steps(const LodGeometry& geometry) {
-  std::vector<LodStep> steps;
-  for (const LodLevel& level : geometry.levels()) {
-    const uint32_t passed = geometry.ranks_up_to(level.error);
-    if (steps.empty() || passed > steps.back().passed) steps.push_back(step_of_prefix(geometry, passed));
-  }
-  return steps;
-}
-
 std::vector<LodStep> ratio_steps(const LodGeometry& geometry, double ratio) {
   const uint32_t count = geometry.rank_count();
   std::vector<LodStep> steps{step_of_prefix(geometry, geometry.ranks_up_to(0.0))};

@@ -101,12 +101,8 @@ struct LodStep {
   uint32_t clusters = 0;
 };
 
-/// Returns one step per level, without duplicates. Its error is at most the discrete level's, and it has at most as
-/// many triangles. Sorted from fine to coarse; the first step has error 0, the last is the coarsest cut.
-std::vector<LodStep> level_steps(const LodGeometry& geometry);
-
 /// Returns steps such that for any allowed error, the coarsest step within it has less than `ratio` times the triangles
-/// of the coarsest cut within it. Sorted as above, with the same first and last step.
+/// of the coarsest cut within it. Sorted from fine to coarse; the first step has error 0, the last is the coarsest cut.
 /// @param ratio above 1
 std::vector<LodStep> ratio_steps(const LodGeometry& geometry, double ratio);
 

@@ -53,10 +53,8 @@ LodSharing::LodSharing(std::span<const LodGeometry> geometries, std::span<const 
     for (uint32_t first = first_slot_[g]; first < first_slot_[g + 1]; first += kSlotsPerBlock)
       blocks_.push_back({g, first, std::min(first + kSlotsPerBlock, first_slot_[g + 1])});
   steps_.resize(geometries.size());
-  tbb::parallel_for(size_t{0}, geometries.size(), [&](size_t g) {
-    steps_[g] = config_.scheme == SharingScheme::kSteps ? ratio_steps(geometries_[g], config_.step_ratio)
-                                                        : level_steps(geometries_[g]);
-  });
+  tbb::parallel_for(size_t{0}, geometries.size(),
+                    [&](size_t g) { steps_[g] = ratio_steps(geometries_[g], config_.step_ratio); });
   choices_.resize(instances.size());
   blas_of_slot_.resize(instances.size());
   parts_.resize(geometries.size());
@@ -103,7 +101,7 @@ InstanceMetric LodSharing::metric(const Frame& frame, const LodGeometry& geometr
   return {view, transforms_[slot], slots_[slot].ball.stretch, geometry.reach()};
 }
 
-/// Chooses between a shared step and an own cut, for schemes whose shared BLASes are steps.
+/// Chooses between a shared step and an own cut, with kSteps.
 /// @param fine_step coarsest step that passes for sure; set to the coarsest step that is fine enough
 void LodSharing::choose_step(const Frame& frame, uint32_t number, size_t slot, const Need& need, Choice& choice,
                              uint32_t& fine_step) const {
@@ -145,7 +143,7 @@ void LodSharing::choose_slots(const Frame& frame, const Block& block, LodPlan& p
     } else if (wanted.range.min == geometry.last_level()) {
       choice.step = last_step;
       choice.own_triangles = steps_[block.geometry][last_step].triangles;
-    } else if (config_.scheme == SharingScheme::kLevels || config_.scheme == SharingScheme::kSteps) {
+    } else if (config_.scheme == SharingScheme::kSteps) {
       choose_step(frame, block.geometry, slot, wanted, choice, fine_step);
     } else {
       choice.category = InstanceCategory::kOwn;
@@ -187,8 +185,7 @@ void LodSharing::plan_geometry(const Frame& frame, uint32_t geometry, LodPlan& p
     else
       ++part.users[choices_[slot].step];
   }
-  const bool by_steps = config_.scheme == SharingScheme::kLevels || config_.scheme == SharingScheme::kSteps;
-  if (by_steps && config_.traced_ratio > 0.0) balance(geometry);
+  if (config_.scheme == SharingScheme::kSteps && config_.traced_ratio > 0.0) balance(geometry);
   add_steps(geometry);
   uint32_t provider = kNone;
   if (config_.scheme == SharingScheme::kOneProvider) provider = choose_provider(geometry, plan.histograms[geometry]);
@@ -298,7 +295,7 @@ void LodSharing::add_own_cuts(const Frame& frame, uint32_t number) {
     for (size_t i = 1; i < own.size(); ++i)
       for (size_t word = 0; word < words; ++word) cut(0)[word] &= cut(i)[word];
     same_as.assign(own.size(), 0);
-  } else if (config_.share_equal_cuts && config_.scheme != SharingScheme::kPerInstance) {
+  } else if (config_.share_equal_cuts) {
     std::vector<uint32_t> order = same_as;
     std::stable_sort(order.begin(), order.end(),
                      [&](uint32_t a, uint32_t b) { return std::ranges::lexicographical_compare(cut(a), cut(b)); });
@@ -326,7 +323,7 @@ void LodSharing::add_own_cuts(const Frame& frame, uint32_t number) {
 void LodSharing::collect(LodPlan& plan) {
   plan.blas.clear();
   plan.passed.clear();
-  plan.builds = plan.built_triangles = plan.built_clusters = plan.traced_triangles = plan.own_triangles = 0;
+  plan.builds = plan.built_triangles = plan.built_clusters = plan.traced_triangles = 0;
   std::vector<uint32_t> first_blas(parts_.size());
   for (size_t g = 0; g < parts_.size(); ++g) {
     first_blas[g] = static_cast<uint32_t>(plan.blas.size());
@@ -342,21 +339,33 @@ void LodSharing::collect(LodPlan& plan) {
     }
     plan.passed.insert(plan.passed.end(), parts_[g].passed.begin(), parts_[g].passed.end());
   }
-  std::vector<std::array<uint64_t, 5>> counts(blocks_.size()); // per category, then own triangles
+  struct BlockCounts {
+    std::array<uint64_t, 4> categories{};
+    OwnCuts own;
+  };
+  std::vector<BlockCounts> counts(blocks_.size());
   tbb::parallel_for(size_t{0}, blocks_.size(), [&](size_t b) {
-    counts[b] = {};
+    const uint32_t last_level = geometries_[blocks_[b].geometry].last_level();
     for (uint32_t slot = blocks_[b].first; slot < blocks_[b].last; ++slot) {
       const uint32_t instance = slots_[slot].instance;
       plan.blas_of_instance[instance] = first_blas[blocks_[b].geometry] + blas_of_slot_[slot];
       plan.category_of_instance[instance] = choices_[slot].category;
-      ++counts[b][static_cast<size_t>(choices_[slot].category)];
-      counts[b][4] += config_.measure ? choices_[slot].own_triangles : 0;
+      ++counts[b].categories[static_cast<size_t>(choices_[slot].category)];
+      if (!config_.measure) continue;
+      OwnCuts& own = counts[b].own;
+      own.traced_triangles += choices_[slot].own_triangles;
+      if (choices_[slot].min_level == last_level) continue;
+      ++own.builds;
+      own.built_triangles += choices_[slot].own_triangles;
     }
   });
   plan.category_counts = {};
-  for (const std::array<uint64_t, 5>& of_block : counts) {
-    for (size_t i = 0; i < 4; ++i) plan.category_counts[i] += of_block[i];
-    plan.own_triangles += of_block[4];
+  plan.own = {};
+  for (const BlockCounts& of_block : counts) {
+    for (size_t i = 0; i < 4; ++i) plan.category_counts[i] += of_block.categories[i];
+    plan.own.builds += of_block.own.builds;
+    plan.own.built_triangles += of_block.own.built_triangles;
+    plan.own.traced_triangles += of_block.own.traced_triangles;
   }
 }
 

@@ -53,6 +53,13 @@ struct LevelHistogram {
   std::array<uint32_t, baked::kMaxLodLevels> provider{};
 };
 
+/// What a view would need if every instance had its own cut and only the coarsest cuts were shared.
+struct OwnCuts {
+  uint64_t builds = 0; ///< number of instances for which the coarsest cut is not fine enough
+  uint64_t built_triangles = 0;
+  uint64_t traced_triangles = 0; ///< sum over all instances
+};
+
 /// The BLASes needed for a view, and the BLAS of each instance.
 struct LodPlan {
   /// sorted by geometry; within one, steps from fine to coarse, then own cuts by instance
@@ -67,7 +74,7 @@ struct LodPlan {
   uint64_t builds = 0;                           ///< number of BLASes other than kCoarsest
   uint64_t built_triangles = 0, built_clusters = 0;
   uint64_t traced_triangles = 0; ///< sum over instances, of the BLAS each uses
-  uint64_t own_triangles = 0;    ///< sum over instances, of each one's own cut; only with SharingConfig::measure
+  OwnCuts own;                   ///< only with SharingConfig::measure
 };
 
 /// The groups that pass in a planned BLAS, as cut_words() words.
@@ -88,7 +95,7 @@ public:
   const SharingConfig& config() const { return config_; }
   std::span<const LodGeometry> geometries() const { return geometries_; }
   uint32_t geometry_of_instance(uint32_t instance) const { return geometry_of_instance_[instance]; }
-  /// The shared steps of a geometry, fine to coarse: ratio_steps() with kSteps, level_steps() otherwise.
+  /// The ratio_steps() of a geometry. Schemes other than kSteps use only the first and the last.
   std::span<const LodStep> steps(uint32_t geometry) const { return steps_[geometry]; }
 
   /// Throws as the constructor does. The instance number must be in range.

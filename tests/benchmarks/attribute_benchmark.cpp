@@ -13,6 +13,7 @@
 #include "compress/format/cluster/uv_codec.h"
 #include "compress/format/textures/texture_encoder.h"
 #include "pbrt_import/import_scene.h"
+#include "tests/compress/q_tangent.h"
 
 /// Prints the tables of docs/accuracy.md: errors of texture coordinates, tangents and textures. Fails if a documented
 /// bound does not hold.
@@ -98,11 +99,11 @@ void print_tangents(size_t count) {
     Generator g(3);
     Errors tangents, normals;
     for (size_t i = 0; i < count; ++i) {
-      TangentFrame frame;
+      test::TangentFrame frame;
       frame.normal = direction(g);
       frame.tangent = glm::normalize(glm::cross(frame.normal, direction(g)));
       frame.mirrored = i % 2 != 0;
-      const TangentFrame back = decode_q_tangent(encode_q_tangent(frame, bits), bits);
+      const test::TangentFrame back = test::decode_q_tangent(test::encode_q_tangent(frame, bits), bits);
       tangents.add(angle(back.tangent, frame.tangent)), normals.add(angle(back.normal, frame.normal));
     }
     fmt::print("| q-tangent, normal and all | 4 x {} | {:.3g}° | {:.3g}° | {:.3g}° |\n", bits, tangents.sum / n,

@@ -107,7 +107,7 @@ def culling(bench):
 def schemes(bench):
     """Builds, memory and times of each way to share structures, both tracers."""
     file = bench.baked("asteroids")
-    names = ["none", "off", "per-instance", "one-provider", "per-level", "steps"]
+    names = ["none", "off", "one-provider", "steps"]
     options = {name: [] if name == "none" else ["--lod-error", "1", "--lod-scheme", name] for name in names}
     runs = {(backend, name): [] for backend in ["packed", "embree"] for name in names}
     for _ in range(3):

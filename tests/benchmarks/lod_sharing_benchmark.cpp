@@ -42,15 +42,16 @@ struct Scheme {
 };
 
 std::vector<Scheme> schemes() {
-  SharingConfig per_instance, one_provider, levels_alone, levels, steps, merged;
-  per_instance.scheme = SharingScheme::kPerInstance;
+  SharingConfig one_provider, steps_alone, steps, merged;
   one_provider.scheme = SharingScheme::kOneProvider;
-  levels_alone.scheme = levels.scheme = SharingScheme::kLevels;
-  levels_alone.traced_ratio = 0.0;
-  levels_alone.own_cut_ratio = 1.25;
+  steps_alone.traced_ratio = 0.0;
+  steps_alone.own_cut_ratio = 1.25;
   merged.merge_own_cuts = true;
-  return {{"per instance", per_instance}, {"one provider", one_provider}, {"levels, each alone", levels_alone},
-          {"levels, balanced", levels},   {"steps, balanced", steps},     {"steps, own cuts merged", merged}};
+  return {{"per instance", test::own_cuts()},
+          {"one provider", one_provider},
+          {"steps, each alone", steps_alone},
+          {"steps, balanced", steps},
+          {"steps, own cuts merged", merged}};
 }
 
 struct SceneCase {
@@ -180,7 +181,7 @@ Json run_scene(const SceneCase& scene, std::span<const LodGeometry> geometries, 
     const Flown flown = fly(geometries, instances, scheme.config, options.frames);
     const double against =
         static_cast<double>(plan.builds) / static_cast<double>(std::max<uint64_t>(reference, 1)) - 1.0;
-    const double traced = static_cast<double>(plan.traced_triangles) / static_cast<double>(plan.own_triangles);
+    const double traced = static_cast<double>(plan.traced_triangles) / static_cast<double>(plan.own.traced_triangles);
     const double mib = static_cast<double>(plan.built_triangles) * options.triangle_bytes / (1 << 20);
     const double frames = std::max(1.0, static_cast<double>(options.frames) - 1.0);
     fmt::print("| {} | {} | {:.1f} % | {:.2f} | {:.3f} | {} | {:.3f} / {:.3f} | {:.3f} | {:.2f} | {:.1f} | {} |\n",

@@ -13,7 +13,6 @@
 
 #include "pbrt_import/base/error.h"
 #include "runtime/stopwatch.h"
-#include "runtime/trace/embree/embree_cluster_tracer.h"
 #include "runtime/trace/make_tracer.h"
 #include "tests/benchmarks/benchmark_main.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"
@@ -23,6 +22,7 @@
 #include "tests/benchmarks/trace_benchmark_inputs.h"
 #include "tests/benchmarks/trace_benchmark_rays.h"
 #include "tests/benchmarks/trace_benchmark_scales.h"
+#include "tests/runtime/trace/embree_cluster_tracer.h"
 
 namespace packtrace {
 namespace {
@@ -66,11 +66,12 @@ struct Systems {
   size_t truth_trees = 0;
 };
 
-void add_tracer(const TraceInput& input, const char* name, const TracerConfig& config, Systems& out) {
+template <typename Make>
+void add_tracer(const char* name, const Make& make, Systems& out) {
   try {
     const Stopwatch watch;
-    std::unique_ptr<RayTracer> tracer = make_tracer(input.source, &input.file, config);
-    out.rows.push_back({name, kRayTracer, std::move(tracer), 1e3 * watch.seconds(), config.embree.robust});
+    std::unique_ptr<RayTracer> tracer = make();
+    out.rows.push_back({name, kRayTracer, std::move(tracer), 1e3 * watch.seconds(), true});
   } catch (const Error& error) {
     if (error.kind() != ErrorKind::kUnsupported) throw;
     fmt::print(stderr, "{}: {}\n", name, error.what());
@@ -100,10 +101,15 @@ Systems make_systems(const TraceInput& input) {
           {variant.name, call.name, direct_embree(*out.trees.back(), call.call), build_ms, variant.config.robust});
   }
   out.single = 0, out.packets = 1, out.truth = 3, out.truth_trees = 1;
-  add_tracer(input, "embree", {}, out);
-  add_tracer(input, "packed", {Backend::kPacked, {}, {}}, out);
-  add_tracer(input, "embree-clusters", {Backend::kEmbreeClusters, {}, {}}, out);
-  add_tracer(input, "embree-clusters, nodes", {Backend::kEmbreeClusters, {}, ClusterPrimitives::kLeafNodes}, out);
+  add_tracer("embree", [&] { return make_tracer(input.source, &input.file, {}); }, out);
+  add_tracer("packed", [&] { return make_tracer(input.source, &input.file, {Backend::kPacked, {}}); }, out);
+  for (const ClusterPrimitives primitives : {ClusterPrimitives::kClusters, ClusterPrimitives::kLeafNodes}) {
+    const bool clusters = primitives == ClusterPrimitives::kClusters;
+    const auto make = [&] {
+      return std::make_unique<EmbreeClusterTracer>(input.file, input.source, chosen_isa(), primitives);
+    };
+    add_tracer(clusters ? "embree-clusters" : "embree-clusters, nodes", make, out);
+  }
   return out;
 }
 

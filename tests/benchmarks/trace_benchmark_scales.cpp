@@ -43,7 +43,7 @@ std::vector<ScaledSystem> make_systems(const TraceInput& input) {
   systems.push_back({"Embree, rays and triangles in the world", raw_embree(input.source, false)});
   systems.push_back({"Embree robust, likewise", raw_embree(input.source, true)});
   systems.push_back({"embree", make_tracer(input.source, &input.file, {})});
-  systems.push_back({"packed", make_tracer(input.source, &input.file, {Backend::kPacked, {}, {}})});
+  systems.push_back({"packed", make_tracer(input.source, &input.file, {Backend::kPacked, {}})});
   return systems;
 }
 
@@ -119,7 +119,7 @@ struct GrowingMesh {
     add("Embree default, 1", direct_embree(trees, EmbreeCall::kSingle), recorder);
     add("Embree default, 16", direct_embree(trees, EmbreeCall::kPacket16), recorder);
     add("Embree default, 1M", direct_embree(trees, EmbreeCall::kStream), recorder);
-    add("packed", make_tracer(input.source, &input.file, {Backend::kPacked, {}, {}}), recorder);
+    add("packed", make_tracer(input.source, &input.file, {Backend::kPacked, {}}), recorder);
   }
 
   struct System {

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/compress/q_tangent.h"
 #include "tests/compress/test_scenes.h"
 
 namespace packtrace {
@@ -64,13 +65,13 @@ TEST(QTangent, FramesComeBackWithTheirSign) {
   for (const uint32_t bits : {8u, 10u, 16u, 24u}) {
     double worst = 0.0;
     for (int i = 0; i < 20000; ++i) {
-      TangentFrame frame;
+      test::TangentFrame frame;
       frame.normal = direction(random);
       frame.tangent = glm::normalize(glm::cross(frame.normal, direction(random)));
       frame.mirrored = random.bits() % 2 != 0;
       // w is 0 for these frames.
       if (i % 4 == 0) frame.normal = {0, 0, -1}, frame.tangent = {std::cos(i), std::sin(i), 0};
-      const TangentFrame back = decode_q_tangent(encode_q_tangent(frame, bits), bits);
+      const test::TangentFrame back = test::decode_q_tangent(test::encode_q_tangent(frame, bits), bits);
       ASSERT_EQ(back.mirrored, frame.mirrored);
       worst = std::max({worst, angle(back.normal, frame.normal), angle(back.tangent, frame.tangent)});
       ASSERT_NEAR(glm::dot(back.normal, back.tangent), 0.0, 1e-12);
@@ -78,7 +79,7 @@ TEST(QTangent, FramesComeBackWithTheirSign) {
     EXPECT_LE(worst, std::ldexp(4.0, 1 - static_cast<int>(bits))); // errors of a quaternion count twice in the rotation
     EXPECT_GE(worst, std::ldexp(0.5, 1 - static_cast<int>(bits)));
   }
-  const TangentFrame none = decode_q_tangent({0, 0, 0, 0}, 8);
+  const test::TangentFrame none = test::decode_q_tangent({0, 0, 0, 0}, 8);
   EXPECT_EQ(none.normal, DVec3(0, 0, 1));
 }
 

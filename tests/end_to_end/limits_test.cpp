@@ -106,14 +106,11 @@ TEST(Limits, EmbreeAsksForMemoryToo) {
   EXPECT_EQ(decoding.exit_code, 3);
   EXPECT_NE(decoding.err.find(bench.baked() + ": decoding the scene for Embree needs "), std::string::npos)
       << decoding.err;
-  for (const auto& [backend, memory] : {std::pair("embree", "4M"), {"embree-clusters", "100K"}}) {
-    const CommandResult building = render(backend, memory);
-    EXPECT_EQ(building.exit_code, 3);
-    EXPECT_NE(building.err.find(bench.baked() + ": Embree's trees need more than the "), std::string::npos)
-        << building.err;
-  }
-  for (const char* backend : {"embree", "embree-clusters", "packed"})
-    EXPECT_EQ(render(backend, "64M").exit_code, 0) << backend;
+  const CommandResult building = render("embree", "4M");
+  EXPECT_EQ(building.exit_code, 3);
+  EXPECT_NE(building.err.find(bench.baked() + ": Embree's trees need more than the "), std::string::npos)
+      << building.err;
+  for (const char* backend : {"embree", "packed"}) EXPECT_EQ(render(backend, "64M").exit_code, 0) << backend;
 }
 
 TEST(Limits, ComparedImagesAskForMemoryToo) {

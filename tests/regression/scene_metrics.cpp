@@ -12,11 +12,11 @@
 #include "pbrt_import/scene/camera_rays.h"
 #include "runtime/ao/ao_integrator.h"
 #include "runtime/camera/primary_visibility.h"
-#include "runtime/trace/embree/embree_cluster_tracer.h"
 #include "runtime/trace/embree/embree_tracer.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
 #include "runtime/trace/source/float_source.h"
 #include "runtime/trace/source/packed_source.h"
+#include "tests/runtime/trace/embree_cluster_tracer.h"
 
 namespace packtrace::test {
 namespace {

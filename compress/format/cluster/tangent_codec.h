@@ -3,8 +3,6 @@
 #include <array>
 #include <cstdint>
 
-#include <glm/gtc/quaternion.hpp>
-
 #include "pbrt_import/scene/math.h"
 
 namespace packtrace {
@@ -28,18 +26,5 @@ UvTangent uv_tangent(const std::array<DVec3, 3>& positions, const std::array<glm
 /// @param direction any nonzero length
 uint32_t encode_diamond(glm::dvec2 direction, uint32_t bits);
 glm::dvec2 decode_diamond(uint32_t code, uint32_t bits); ///< unit length
-
-/// Normal, tangent and the sign of the bitangent as one unit quaternion. It rotates x to the tangent and z to the
-/// normal; w is negative if the bitangent's sign is. Each component is a signed number of `bits` bits. Source: Frey,
-/// Herzeg, "Spherical Skinning with Dual Quaternions and QTangents", 2011.
-struct TangentFrame {
-  DVec3 normal{0.0, 0.0, 1.0};  ///< unit length
-  DVec3 tangent{1.0, 0.0, 0.0}; ///< unit length, orthogonal to the normal
-  bool mirrored = false;
-};
-using QTangent = std::array<int32_t, 4>; ///< x, y, z, w
-/// @param bits 4..24 per component
-QTangent encode_q_tangent(const TangentFrame& frame, uint32_t bits);
-TangentFrame decode_q_tangent(const QTangent& code, uint32_t bits);
 
 } // namespace packtrace

@@ -15,12 +15,11 @@ namespace packtrace {
 namespace {
 
 /// A few geometries in all directions, and a camera that flies through them.
-class Flight : public testing::TestWithParam<SharingScheme> {
+class Flight : public testing::TestWithParam<SharingConfig> {
 protected:
   Flight() {
     for (uint32_t i = 0; i < 4; ++i) geometries.push_back(test::random_records(10 + 10 * i, i + 1).geometry());
     instances = test::random_instances(300, 4, 60.0, 4.0, 1);
-    config.scheme = GetParam();
   }
 
   static DetailView view_at(double t) {
@@ -30,8 +29,14 @@ protected:
 
   std::vector<LodGeometry> geometries;
   std::vector<LodInstance> instances;
-  SharingConfig config;
+  const SharingConfig config = GetParam();
 };
+
+SharingConfig scheme(SharingScheme which) {
+  SharingConfig config;
+  config.scheme = which;
+  return config;
+}
 
 /// Identifies what an instance uses, independent of its handle.
 using Content = std::tuple<uint32_t, BlasKind, uint32_t, std::vector<uint64_t>>;
@@ -171,8 +176,8 @@ TEST_P(Flight, SaysHonestlyWhereDetailIsMissing) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Schemes, Flight,
-                         testing::Values(SharingScheme::kOff, SharingScheme::kPerInstance, SharingScheme::kOneProvider,
-                                         SharingScheme::kLevels, SharingScheme::kSteps));
+                         testing::Values(scheme(SharingScheme::kOff), test::own_cuts(),
+                                         scheme(SharingScheme::kOneProvider), scheme(SharingScheme::kSteps)));
 
 TEST(BlasResidency, KeepsUnusedStepsAsLongAsItSays) {
   const std::vector<LodGeometry> geometries{test::random_records(30, 1).geometry()};

@@ -91,20 +91,6 @@ TEST(LodGeometry, PrefixesHoldWhatTheirClustersHold) {
   }
 }
 
-TEST(LodGeometry, LevelStepsHoldNoMoreThanTheDiscreteLevelOfTheirError) {
-  for (uint32_t seed = 1; seed <= 20; ++seed) {
-    const LodGeometry geometry = test::random_records(40, seed).geometry();
-    const std::vector<LodStep> steps = level_steps(geometry);
-    EXPECT_EQ(steps.front().error, 0.0);
-    EXPECT_EQ(steps.back().passed, geometry.rank_count());
-    for (const LodLevel& level : geometry.levels()) {
-      const LodStep& step = steps[coarsest_step(steps, level.error)];
-      EXPECT_LE(step.error, level.error);
-      EXPECT_LE(step.triangles, level.triangles);
-    }
-  }
-}
-
 TEST(LodGeometry, RatioStepsHoldLessThanTheRatioTimesTheCoarsestCut) {
   for (uint32_t seed = 1; seed <= 20; ++seed) {
     const LodGeometry geometry = test::random_records(60, seed).geometry();
@@ -132,10 +118,9 @@ TEST(LodGeometry, GeometryOfOneLevelHasOneStep) {
   const LodGeometry geometry({&group, 1}, {&link, 1}, {&triangles, 1});
   EXPECT_EQ(geometry.last_level(), 0u);
   EXPECT_EQ(geometry.rank_count(), 0u);
-  for (const std::vector<LodStep>& steps : {level_steps(geometry), ratio_steps(geometry, 2.0)}) {
-    ASSERT_EQ(steps.size(), 1u);
-    EXPECT_EQ(steps[0].triangles, 12u);
-  }
+  const std::vector<LodStep> steps = ratio_steps(geometry, 2.0);
+  ASSERT_EQ(steps.size(), 1u);
+  EXPECT_EQ(steps[0].triangles, 12u);
 }
 
 struct Damage {

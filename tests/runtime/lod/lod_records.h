@@ -7,6 +7,7 @@
 #include "runtime/lod/lod_sharing.h"
 #include "tests/compress/lod/lod_meshes.h"
 #include "tests/compress/test_scenes.h"
+#include "tests/runtime/lod/own_cuts.h"
 
 namespace packtrace::test {
 

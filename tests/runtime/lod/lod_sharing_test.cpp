@@ -14,8 +14,7 @@
 namespace packtrace {
 namespace {
 
-constexpr SharingScheme kSchemes[] = {SharingScheme::kOff, SharingScheme::kPerInstance, SharingScheme::kOneProvider,
-                                      SharingScheme::kLevels, SharingScheme::kSteps};
+constexpr SharingScheme kSchemes[] = {SharingScheme::kOff, SharingScheme::kOneProvider, SharingScheme::kSteps};
 
 std::vector<LodGeometry> some_geometries(uint32_t count) {
   std::vector<LodGeometry> geometries;
@@ -110,21 +109,18 @@ TEST(LodSharing, StrictSchemesNeverGiveLessDetailThanTheOwnCut) {
           finer += used != needed;
         }
       }
-      if (scheme != SharingScheme::kPerInstance) {
-        EXPECT_GT(shared, 100u);
-        EXPECT_GT(finer, 50u);
-      }
-      if (scheme == SharingScheme::kPerInstance || scheme == SharingScheme::kOneProvider) {
+      EXPECT_GT(shared, 100u);
+      EXPECT_GT(finer, 50u);
+      if (scheme == SharingScheme::kOneProvider) {
         EXPECT_GT(own, 5u);
       }
     }
 }
 
-TEST(LodSharing, PerInstanceGivesEachItsOwnCut) {
+TEST(LodSharing, WithoutSharedLevelsEachHasItsOwnCut) {
   const std::vector<LodGeometry> geometries = some_geometries(4);
   const std::vector<LodInstance> instances = wild_instances(300, 4, 2);
-  SharingConfig config;
-  config.scheme = SharingScheme::kPerInstance;
+  SharingConfig config = test::own_cuts();
   config.measure = true;
   LodSharing sharing(geometries, instances, config);
   const DetailView view = view_from(DVec3(0.0));
@@ -136,8 +132,31 @@ TEST(LodSharing, PerInstanceGivesEachItsOwnCut) {
     triangles += size_of_cut(geometries[instances[i].geometry], own).triangles;
   }
   EXPECT_EQ(plan.traced_triangles, triangles);
-  EXPECT_EQ(plan.own_triangles, triangles);
+  EXPECT_EQ(plan.own.traced_triangles, triangles);
   EXPECT_EQ(plan.builds + plan.category_counts[0], instances.size());
+  EXPECT_EQ(plan.own.builds, plan.builds);
+  EXPECT_EQ(plan.own.built_triangles, plan.built_triangles);
+}
+
+/// What own cuts would cost does not depend on how BLASes are shared.
+TEST(LodSharing, AllSchemesStateTheSameOwnCuts) {
+  const std::vector<LodGeometry> geometries = some_geometries(4);
+  const std::vector<LodInstance> instances = wild_instances(300, 4, 2);
+  const DetailView view = view_from(DVec3(0.0));
+  SharingConfig config = test::own_cuts();
+  config.measure = true;
+  const OwnCuts expected = LodSharing(geometries, instances, config).plan(view).own;
+  EXPECT_GT(expected.builds, 20u);
+  EXPECT_LT(expected.built_triangles, expected.traced_triangles);
+  for (const SharingScheme scheme : kSchemes) {
+    SharingConfig shared;
+    shared.scheme = scheme;
+    shared.measure = true;
+    const OwnCuts own = LodSharing(geometries, instances, shared).plan(view).own;
+    EXPECT_EQ(own.builds, expected.builds);
+    EXPECT_EQ(own.built_triangles, expected.built_triangles);
+    EXPECT_EQ(own.traced_triangles, expected.traced_triangles);
+  }
 }
 
 /// The totals of a plan match its contents, and each BLAS has the stated size.
@@ -181,14 +200,14 @@ TEST(LodSharing, PlansAddUp) {
 TEST(LodSharing, TracedTrianglesStayWithinTheRatio) {
   const std::vector<LodGeometry> geometries = some_geometries(5);
   for (const double ratio : {1.0, 1.1, 1.25, 2.0})
-    for (const SharingScheme scheme : {SharingScheme::kLevels, SharingScheme::kSteps}) {
+    for (const double step_ratio : {1.15, 4.0}) {
       SharingConfig config;
-      config.scheme = scheme;
+      config.step_ratio = step_ratio;
       config.traced_ratio = ratio;
       config.measure = true;
       LodSharing sharing(geometries, wild_instances(800, 5, 4), config);
       const LodPlan plan = sharing.plan(view_from(DVec3(0.0)));
-      EXPECT_LE(static_cast<double>(plan.traced_triangles), ratio * static_cast<double>(plan.own_triangles));
+      EXPECT_LE(static_cast<double>(plan.traced_triangles), ratio * static_cast<double>(plan.own.traced_triangles));
       EXPECT_GT(plan.builds, 0u);
     }
 }
@@ -199,7 +218,7 @@ TEST(LodSharing, OwnCutsGoToThoseThatSaveMost) {
   const std::vector<LodInstance> instances = wild_instances(400, 4, 11);
   const DetailView view = view_from(DVec3(0.0));
   SharingConfig config;
-  config.scheme = SharingScheme::kLevels;
+  config.step_ratio = 4.0; // far apart, so that the limit requires own cuts
   config.own_cut_ratio = 1e9;
   config.traced_ratio = 1.05;
   config.share_equal_cuts = false;
@@ -273,7 +292,7 @@ TEST(LodSharing, IsTheSameForAnyNumberOfThreads) {
       EXPECT_EQ(plans[p].step_of_instance, plans[0].step_of_instance);
       EXPECT_EQ(plans[p].passed, plans[0].passed);
       EXPECT_EQ(plans[p].traced_triangles, plans[0].traced_triangles);
-      EXPECT_EQ(plans[p].own_triangles, plans[0].own_triangles);
+      EXPECT_EQ(plans[p].own.traced_triangles, plans[0].own.traced_triangles);
       ASSERT_EQ(plans[p].blas.size(), plans[0].blas.size());
       for (size_t g = 0; g < 7; ++g) EXPECT_EQ(plans[p].histograms[g].provider, plans[0].histograms[g].provider);
     }
@@ -301,7 +320,6 @@ TEST(LodSharing, ToleranceIsKeptToItsLevels) {
   const std::vector<LodInstance> instances = wild_instances(600, 4, 6);
   const DetailView view = view_from(DVec3(0.0));
   SharingConfig config;
-  config.scheme = SharingScheme::kLevels;
   config.tolerant_levels = 2;
   config.traced_ratio = 1.0;
   LodSharing sharing(geometries, instances, config);
@@ -322,7 +340,7 @@ TEST(LodSharing, OnlyEnabledLevelsAreShared) {
   const std::vector<LodGeometry> geometries = some_geometries(4);
   const std::vector<LodInstance> instances = wild_instances(600, 4, 7);
   const DetailView view = view_from(DVec3(0.0));
-  for (const SharingScheme scheme : {SharingScheme::kOneProvider, SharingScheme::kLevels, SharingScheme::kSteps}) {
+  for (const SharingScheme scheme : {SharingScheme::kOneProvider, SharingScheme::kSteps}) {
     SharingConfig config;
     config.scheme = scheme;
     config.share_equal_cuts = false;
@@ -344,8 +362,7 @@ TEST(LodSharing, CulledInstancesAreCoarserAndOthersAsTheyWere) {
   const DetailView view = view_from(DVec3(0.0));
   std::vector<uint8_t> culled(instances.size());
   for (size_t i = 0; i < culled.size(); i += 2) culled[i] = 1;
-  SharingConfig config;
-  config.scheme = SharingScheme::kPerInstance;
+  SharingConfig config = test::own_cuts();
   const LodPlan before = LodSharing(geometries, instances, config).plan(view, culled);
   for (const bool by_level : {false, true}) {
     config.culled_coarser_levels = by_level ? 1 : 0;
@@ -374,8 +391,7 @@ TEST(LodSharing, CulledInstancesAreCoarserAndOthersAsTheyWere) {
 TEST(LodSharing, MergedCutsAreOneAGeometry) {
   const std::vector<LodGeometry> geometries = some_geometries(4);
   const std::vector<LodInstance> instances = wild_instances(600, 4, 9);
-  SharingConfig config;
-  config.scheme = SharingScheme::kPerInstance;
+  SharingConfig config = test::own_cuts();
   config.merge_own_cuts = true;
   const LodPlan plan = LodSharing(geometries, instances, config).plan(view_from(DVec3(0.0)));
   EXPECT_EQ(plan.builds, 4u);
@@ -431,7 +447,7 @@ TEST(LodSharing, BadInputIsRejected) {
   reject([](SharingConfig& c) { c.tolerant_levels = 33; });
   reject([](SharingConfig& c) { c.culled_coarser_levels = 33; });
   reject([](SharingConfig& c) { c.culled_error_scale = 0.5; });
-  reject([](SharingConfig& c) { c.scheme = static_cast<SharingScheme>(5); });
+  reject([](SharingConfig& c) { c.scheme = static_cast<SharingScheme>(3); });
 }
 
 } // namespace

@@ -1,4 +1,4 @@
-#include "runtime/trace/embree/embree_cluster_tracer.h"
+#include "tests/runtime/trace/embree_cluster_tracer.h"
 
 #include <algorithm>
 #include <cmath>

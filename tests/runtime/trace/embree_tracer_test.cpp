@@ -154,17 +154,15 @@ TEST(MakeTracer, KnowsEmbree) {
   EXPECT_EQ(resident_bytes(*tracer), sum);
 }
 
-TEST(MakeTracer, PackedBackendsNeedAPackedFile) {
+TEST(MakeTracer, BackendPackedNeedsAPackedFile) {
   Scene scene;
   add_shape(scene, test::sphere({0, 0, 0}, 1, 8));
   const FloatSource source(scene);
-  for (const Backend backend : {Backend::kPacked, Backend::kEmbreeClusters}) {
-    try {
-      make_tracer(source, nullptr, {backend, {}, {}});
-      FAIL();
-    } catch (const Error& error) {
-      EXPECT_EQ(error.kind(), ErrorKind::kUnsupported);
-    }
+  try {
+    make_tracer(source, nullptr, {Backend::kPacked, {}});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::kUnsupported);
   }
 }
 

@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "runtime/trace/embree/embree_cluster_tracer.h"
 #include "runtime/trace/source/float_source.h"
+#include "tests/runtime/trace/embree_cluster_tracer.h"
 #include "tests/runtime/trace/packed_scenes.h"
 
 namespace packtrace {

@@ -11,6 +11,7 @@
 #include "runtime/camera/primary_visibility.h"
 #include "runtime/trace/make_tracer.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
+#include "tests/runtime/lod/own_cuts.h"
 #include "tests/runtime/trace/packed_scenes.h"
 #include "tests/runtime/trace/test_scenes.h"
 
@@ -100,7 +101,7 @@ TEST_F(LodSourceTest, OfLevel0IsTheSceneItself) {
 }
 
 TEST_F(LodSourceTest, NumbersTrianglesAsItDecodesThem) {
-  const Detailed detailed(baked_, camera_, 0.1, scheme(SharingScheme::kPerInstance));
+  const Detailed detailed(baked_, camera_, 0.1, test::own_cuts());
   ASSERT_GT(detailed.source.geometry_count(), detailed.geometries.size());
   uint32_t coarse = 0;
   for (uint32_t b = 0; b < detailed.source.geometry_count(); ++b) {
@@ -154,9 +155,8 @@ TEST_F(LodSourceTest, LooksUpManyPlacesAsItDoesOne) {
 }
 
 TEST_F(LodSourceTest, IsTheSameForAllTracersAndAnyNumberOfThreads) {
-  for (const SharingScheme which :
-       {SharingScheme::kPerInstance, SharingScheme::kOneProvider, SharingScheme::kLevels, SharingScheme::kSteps}) {
-    const Detailed detailed(baked_, camera_, 0.1, scheme(which));
+  for (const SharingConfig& config : {test::own_cuts(), scheme(SharingScheme::kOneProvider), SharingConfig{}}) {
+    const Detailed detailed(baked_, camera_, 0.1, config);
     ASSERT_GE(detailed.plan.builds, 2u);
     const PackedTracer packed(baked_.file, detailed.source);
     const GBuffer expected = primary(detailed.source, packed, camera_);
@@ -170,7 +170,7 @@ TEST_F(LodSourceTest, IsTheSameForAllTracersAndAnyNumberOfThreads) {
     EXPECT_GT(hits, 2000u);
     EXPECT_LE(different, 3u); // at silhouettes
     const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-    const Detailed again(baked_, camera_, 0.1, scheme(which));
+    const Detailed again(baked_, camera_, 0.1, config);
     const PackedTracer alone(baked_.file, again.source);
     expect_same_image(primary(again.source, alone, camera_), expected);
     ASSERT_EQ(alone.lod_trees().trees.size(), packed.lod_trees().trees.size());
@@ -196,8 +196,6 @@ TEST_F(LodSourceTest, TracersTellWhatTheirTreesTake) {
       EXPECT_GE(tree.worst_case, tree.built);
     }
   }
-  config.backend = Backend::kEmbreeClusters;
-  EXPECT_THROW(make_tracer(detailed.source, baked_.file, config), Error);
 }
 
 double distance_to_triangle(DVec3 p, DVec3 a, DVec3 b, DVec3 c) {
@@ -252,8 +250,8 @@ TEST_F(LodSourceTest, SurfacesStayWithinTheErrorInPixels) {
   constexpr double kRounding = 1e-3; // in pixels: positions are floats
   const GBuffer whole = primary(baked_.source, PackedTracer(baked_.file, baked_.source), camera_);
   for (const double error_px : {0.05, 0.2, 2.0})
-    for (const SharingScheme which : {SharingScheme::kPerInstance, SharingScheme::kSteps}) {
-      const Detailed detailed(baked_, camera_, error_px, scheme(which));
+    for (const SharingConfig& config : {test::own_cuts(), SharingConfig{}}) {
+      const Detailed detailed(baked_, camera_, error_px, config);
       const GBuffer seen = primary(detailed.source, PackedTracer(baked_.file, detailed.source), camera_);
       const double there = largest_distance_px(seen, baked_.source, camera_);
       EXPECT_LE(there, error_px + kRounding);

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "runtime/trace/embree/embree_cluster_tracer.h"
+#include "tests/runtime/trace/embree_cluster_tracer.h"
 #include "tests/runtime/trace/packed_scenes.h"
 #include "tests/runtime/trace/test_scenes.h"
 

@@ -10,8 +10,8 @@
 
 #include <gtest/gtest.h>
 
-#include "runtime/trace/embree/embree_cluster_tracer.h"
 #include "runtime/trace/ray_offset.h"
+#include "tests/runtime/trace/embree_cluster_tracer.h"
 #include "tests/runtime/trace/packed_scenes.h"
 
 namespace packtrace {

@@ -1,4 +1,4 @@
-#include "runtime/trace/embree/embree_cluster_tracer.h"
+#include "tests/runtime/trace/embree_cluster_tracer.h"
 
 #include <algorithm>
 #include <array>
@@ -150,8 +150,6 @@ void find_any(RTCScene scene, const packed::TreeSearch& search) {
 } // namespace
 
 struct EmbreeClusterTracer::Trees {
-  explicit Trees(const std::optional<MemoryBudget>& memory) : device(memory) {}
-
   std::vector<ClusterNodes> nodes; ///< by tree
   EmbreeDevice device;
   std::vector<RtcPtr<RTCSceneTy>> scenes; ///< by tree; null for trees without clusters
@@ -176,8 +174,8 @@ struct EmbreeClusterTracer::Trees {
 };
 
 EmbreeClusterTracer::EmbreeClusterTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa,
-                                         ClusterPrimitives primitives, const std::optional<MemoryBudget>& memory)
-    : packed_(file, source, isa), trees_(std::make_unique<Trees>(memory)) {
+                                         ClusterPrimitives primitives)
+    : packed_(file, source, isa), trees_(std::make_unique<Trees>()) {
   if (rtcGetDeviceProperty(trees_->device.get(), RTC_DEVICE_PROPERTY_USER_GEOMETRY_SUPPORTED) == 0)
     throw Error(ErrorKind::kUnsupported, "this Embree was built without user geometry");
   const std::span<const packed::TraceTree> trees = packed_.trees();

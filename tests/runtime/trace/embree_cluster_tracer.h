@@ -1,9 +1,7 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 
-#include "pbrt_import/base/memory_budget.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
 
 namespace packtrace {
@@ -17,16 +15,14 @@ enum class ClusterPrimitives : uint8_t {
 /// Traces a baked file's clusters with the same bits as PackedTracer, but finds them with Embree: each tree of the file
 /// becomes an Embree scene of user primitives, one per cluster or leaf node. Embree's callbacks hand their rays to the
 /// packed kernels. Rays are transformed into the tree's grid before Embree sees them, so no Embree instances are
-/// needed.
+/// needed. Checks the packed traversal against independent trees and box tests.
 class EmbreeClusterTracer final : public RayTracer {
 public:
   /// Keeps references: both must outlive the tracer.
   /// Throws as PackedTracer, Error(kUnsupported) for an Embree built without the needed features,
-  /// MemoryError where the budget does not suffice for Embree's trees, Error(kLimitExceeded) where the system runs out
-  /// of memory, Error(kCancelled) after Progress::cancel().
+  /// Error(kLimitExceeded) where the system runs out of memory, Error(kCancelled) after Progress::cancel().
   EmbreeClusterTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa = chosen_isa(),
-                      ClusterPrimitives primitives = ClusterPrimitives::kClusters,
-                      const std::optional<MemoryBudget>& memory = std::nullopt);
+                      ClusterPrimitives primitives = ClusterPrimitives::kClusters);
   ~EmbreeClusterTracer() override;
   EmbreeClusterTracer(const EmbreeClusterTracer&) = delete;
   EmbreeClusterTracer& operator=(const EmbreeClusterTracer&) = delete;
