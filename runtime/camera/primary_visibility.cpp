@@ -129,7 +129,10 @@ private:
     out_.triangle[pixel] = hit.triangle;
     out_.material[pixel] = attributes.material;
     out_.back_face[pixel] = glm::dot(own_normal, facing) < 0.0;
-    out_.offset[pixel] = static_cast<float>(ray_offset(hit, space_, unit_position, facing) * space_.inverse_scale());
+    // Positions are rounded to multiples of the least denormal float, and so are sums of position and offset.
+    constexpr double kLeastOffset = 4.0 * double{std::numeric_limits<float>::denorm_min()};
+    out_.offset[pixel] = static_cast<float>(
+        std::max(ray_offset(hit, space_, unit_position, facing) * space_.inverse_scale(), kLeastOffset));
     out_.motion_px[pixel] = motion(position, glm::dvec2(batch.x[i], batch.y[i]) + 0.5);
   }
 
