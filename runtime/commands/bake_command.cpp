@@ -138,6 +138,7 @@ nlohmann::json report(const BakeOptions& options, const BakeReport& baked, const
   json["output"] = options.dry_run ? nlohmann::json() : nlohmann::json(options.output);
   json["seconds"] = {{"import", import_s}, {"bake", bake_s}};
   json["peak_rss_bytes"] = peak_rss_bytes();
+  json["rms_position_error"] = baked.rms_position_error;
   json["mean_normal_error_degrees"] = baked.mean_normal_error_degrees;
   json["shared_shapes"] = baked.shared_shapes;
   json["instanced_shapes"] = baked.instanced_shapes;

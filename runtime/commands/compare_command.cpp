@@ -32,7 +32,7 @@ namespace {
 struct CompareOptions {
   std::string test, reference, layer;
   std::vector<std::string> metrics{"all"};
-  std::array<std::optional<double>, 5> limits; ///< indexed like kMetrics
+  std::array<std::optional<double>, 6> limits; ///< indexed like kMetrics
   std::optional<double> max_mismatch;          ///< fraction of pixels, [0, 1]
   double pixels_per_degree = kFlipPixelsPerDegree;
   std::string diff, diff_metric = "mae";
@@ -46,11 +46,12 @@ struct MetricKind {
   uint32_t smallest_side; ///< minimum image width and height, pixels
   bool colors_only;       ///< requires 1 or 3 channels
 };
-constexpr std::array<MetricKind, 5> kMetrics{{{"rmse", "rmse", false, 1, false},
+constexpr std::array<MetricKind, 6> kMetrics{{{"rmse", "rmse", false, 1, false},
                                               {"mae", "mae", false, 1, false},
                                               {"psnr", "psnr_db", true, 1, false},
                                               {"ssim", "ssim", true, kSsimWindow, false},
-                                              {"flip", "flip", false, 1, true}}};
+                                              {"flip", "flip", false, 1, true},
+                                              {"p99", "p99", false, 1, false}}};
 
 size_t metric_index(std::string_view name) {
   const auto found =
@@ -134,14 +135,16 @@ Metric compute(size_t metric, const ImagePair& pair, const CompareOptions& optio
     return psnr(pair.test, pair.reference, how);
   case 3:
     return ssim(pair.test, pair.reference, how);
+  case 5:
+    return p99(pair.test, pair.reference, how);
   default:
     return flip(pair.test, pair.reference, how, options.pixels_per_degree);
   }
 }
 
 /// Selects the metrics that are requested by name, by "all" (if applicable), by a limit, or for the difference picture.
-std::array<bool, 5> wanted_metrics(const CompareOptions& options, const Image& image) {
-  std::array<bool, 5> wanted{};
+std::array<bool, 6> wanted_metrics(const CompareOptions& options, const Image& image) {
+  std::array<bool, 6> wanted{};
   for (const std::string& name : options.metrics)
     for (size_t i = 0; i < kMetrics.size(); ++i)
       if (name == kMetrics[i].name || (name == "all" && applicable(kMetrics[i], image))) wanted[i] = true;
@@ -159,7 +162,7 @@ struct Check {
 };
 
 std::vector<Check> check_limits(const CompareOptions& options, const ImagePair& pair,
-                                const std::array<std::optional<double>, 5>& values) {
+                                const std::array<std::optional<double>, 6>& values) {
   std::vector<Check> checks;
   for (size_t i = 0; i < kMetrics.size(); ++i)
     if (options.limits[i]) {
@@ -175,7 +178,7 @@ std::vector<Check> check_limits(const CompareOptions& options, const ImagePair& 
 }
 
 nlohmann::json to_json(const CompareOptions& options, const ImagePair& pair,
-                       const std::array<std::optional<double>, 5>& values, const std::vector<Check>& checks) {
+                       const std::array<std::optional<double>, 6>& values, const std::vector<Check>& checks) {
   nlohmann::json metrics = nlohmann::json::object(), limits = nlohmann::json::array();
   for (size_t i = 0; i < kMetrics.size(); ++i)
     if (values[i]) metrics[kMetrics[i].json_name] = *values[i]; // infinity (the PSNR of equal images) becomes null
@@ -196,7 +199,7 @@ nlohmann::json to_json(const CompareOptions& options, const ImagePair& pair,
           {"passed", std::all_of(checks.begin(), checks.end(), [](const Check& c) { return c.passed; })}};
 }
 
-void print_results(const ImagePair& pair, const std::array<std::optional<double>, 5>& values,
+void print_results(const ImagePair& pair, const std::array<std::optional<double>, 6>& values,
                    const std::vector<Check>& checks) {
   std::string text;
   for (size_t i = 0; i < kMetrics.size(); ++i)
@@ -226,8 +229,8 @@ int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
   refuse_to_replace({options.test, options.reference});
   const ImagePair pair = load_pair(options, globals.memory);
   print_notes(pair, globals);
-  const std::array<bool, 5> wanted = wanted_metrics(options, pair.test);
-  std::array<std::optional<double>, 5> values;
+  const std::array<bool, 6> wanted = wanted_metrics(options, pair.test);
+  std::array<std::optional<double>, 6> values;
   for (size_t i = 0; i < kMetrics.size(); ++i) {
     if (!wanted[i]) continue;
     const bool shown = diff && i == metric_index(options.diff_metric);
@@ -270,7 +273,7 @@ void add_compare_command(CLI::App& app, GlobalOptions& globals) {
                   "Metrics to compute, separated by commas. all computes every metric that applies to the images; ssim "
                   "needs 11 x 11 pixels, flip 1 or 3 channels (default all)")
       ->delimiter(',')
-      ->check(one_of({"all", "rmse", "mae", "psnr", "ssim", "flip"}))
+      ->check(one_of({"all", "rmse", "mae", "psnr", "ssim", "flip", "p99"}))
       ->default_str("all");
   verb.add_option(
           "--ppd", options->pixels_per_degree,
@@ -297,6 +300,10 @@ void add_compare_command(CLI::App& app, GlobalOptions& globals) {
   verb.add_option("--max-flip", options->limits[4], "Maximum mean FLIP difference, 0..1; 0 means equal images")
       ->check(number_in(0.0, 1.0))
       ->group(group);
+  verb.add_option("--max-p99", options->limits[5],
+                  "Maximum absolute error of 99 % of the pixels; 0 means that they are equal")
+      ->check(number_in(0.0, kHuge))
+      ->group(group);
   verb.add_option("--max-mismatch", options->max_mismatch,
                   "Maximum fraction of pixels that have a value in only one image, 0..1")
       ->check(number_in(0.0, 1.0))
@@ -306,7 +313,7 @@ void add_compare_command(CLI::App& app, GlobalOptions& globals) {
                   "Write a .png with the error per pixel, from black (0) over red and yellow to white (--diff-white)")
       ->type_name("FILE");
   verb.add_option("--diff-metric", options->diff_metric, "Metric that --diff shows (default mae)")
-      ->check(one_of({"rmse", "mae", "psnr", "ssim", "flip"}))
+      ->check(one_of({"rmse", "mae", "psnr", "ssim", "flip", "p99"}))
       ->capture_default_str();
   verb.add_option("--diff-white", options->diff_white,
                   "Error that --diff shows as white, 1e-6..1e6 (default 0.25). Lower it to see small errors")
