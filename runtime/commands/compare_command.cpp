@@ -18,6 +18,7 @@
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/output_file.h"
 #include "runtime/commands/cli_support.h"
+#include "runtime/commands/geometry_compare.h"
 #include "runtime/commands/json_output.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/image/false_color.h"
@@ -35,6 +36,7 @@ struct CompareOptions {
   std::array<std::optional<double>, 6> limits; ///< indexed like kMetrics
   std::optional<double> max_mismatch;          ///< fraction of pixels, [0, 1]
   double pixels_per_degree = kFlipPixelsPerDegree;
+  uint64_t samples = kDefaultDistanceSamples; ///< points on each surface, for baked files
   std::string diff, diff_metric = "mae";
   float diff_white = 0.25f;
 };
@@ -220,6 +222,9 @@ void print_notes(const ImagePair& pair, const GlobalOptions& globals) {
 }
 
 int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
+  const std::string ending = ending_of(options.test), other = ending_of(options.reference);
+  if (ending == ".ptk" || ending == ".pbrt" || other == ".ptk" || other == ".pbrt")
+    return compare_geometry(options.test, options.reference, options.samples, globals);
   if (!options.diff.empty() && ending_of(options.diff) != ".png")
     throw Error(ErrorKind::kUsage, "--diff " + options.diff + ": the file name must end in .png");
   JsonOutput json(globals.json, globals.force);
@@ -263,10 +268,14 @@ int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
 
 void add_compare_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<CompareOptions>();
-  CLI::App& verb = add_verb(app, globals, "compare", "Compute image metrics between two images and check limits",
+  CLI::App& verb = add_verb(app, globals, "compare",
+                            "Compute image metrics between two images, or distances between a baked file and its scene",
                             [options, &globals] { return run_compare(*options, globals); });
-  verb.add_option("TEST", options->test, "Image to check, .png (decoded from sRGB to linear) or .exr")->required();
-  verb.add_option("REFERENCE", options->reference, "Reference image of the same size")->required();
+  verb.add_option("TEST", options->test, "Image to check, .png (decoded from sRGB to linear) or .exr; or a .ptk file")
+      ->required();
+  verb.add_option("REFERENCE", options->reference,
+                  "Reference image of the same size; or the .pbrt scene of the .ptk file")
+      ->required();
   verb.add_option("--layer", options->layer,
                   "EXR layer to compare (default: ao, else the colour channels, else the only layer)");
   verb.add_option("--metric", options->metrics,
@@ -281,6 +290,11 @@ void add_compare_command(CLI::App& app, GlobalOptions& globals) {
           "seen from 0.7 m). Smaller values mean a closer observer, who sees more differences")
       ->check(number_in(1e-3, 1000.0))
       ->capture_default_str();
+
+  verb.add_option("--samples", options->samples,
+                  "Points to sample on each surface of a .ptk file and its scene, 1..1e9 (default 200000)")
+      ->check(number_in(1.0, 1e9))
+      ->type_name("N");
 
   const std::string group = "Limits (exit code 5 if one is exceeded)";
   constexpr double kHuge = 1e30;
@@ -322,7 +336,8 @@ void add_compare_command(CLI::App& app, GlobalOptions& globals) {
   verb.footer("Pixels without a value (ambient occlusion where no surface is hit) are ignored.\n"
               "Examples:\n"
               "  packtrace compare test.exr truth.exr --layer ao --min-psnr 34\n"
-              "  packtrace compare test.png truth.png --diff errors.png --diff-white 0.05");
+              "  packtrace compare test.png truth.png --diff errors.png --diff-white 0.05\n"
+              "  packtrace compare house.ptk house.pbrt");
 }
 
 } // namespace packtrace

@@ -62,7 +62,9 @@ void follow(pid_t child, int errors, std::string& text) {
   }
 }
 
-double seconds_of(const timeval& time) { return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec); }
+double seconds_of(const timeval& time) {
+  return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+}
 
 std::string ascii(std::string text) {
   if (text.size() > kKeptError) text.erase(0, text.size() - kKeptError);

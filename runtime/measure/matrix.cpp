@@ -123,13 +123,14 @@ void add_rendering(Matrix& matrix, MatrixMode mode) {
 
 void add_product(Matrix& matrix, MatrixMode mode) {
   const bool full = mode == MatrixMode::kFull, quick = mode == MatrixMode::kQuick;
-  const std::vector<uint32_t> bits = quick ? std::vector<uint32_t>{14}
+  const std::vector<uint32_t> bits = quick  ? std::vector<uint32_t>{14}
                                      : full ? std::vector<uint32_t>{10, 12, 14, 16, 18, 20}
                                             : std::vector<uint32_t>{12, 14, 16, 18};
   const std::vector<std::string> normals = full    ? std::vector<std::string>{"auto", "axis16", "oct20"}
                                            : quick ? std::vector<std::string>{"auto"}
                                                    : std::vector<std::string>{"auto", "axis16"};
-  const std::vector<std::string> codecs = full ? std::vector<std::string>{"none", "fast", "small"} : std::vector<std::string>{"small"};
+  const std::vector<std::string> codecs =
+      full ? std::vector<std::string>{"none", "fast", "small"} : std::vector<std::string>{"small"};
   for (const uint32_t b : bits)
     for (const std::string& n : normals)
       for (const std::string& codec : codecs)
