@@ -14,6 +14,8 @@
 
 #include "compress/bake/bake_scene.h"
 #include "pbrt_import/base/error.h"
+#include "runtime/commands/bake_options.h"
+#include "runtime/commands/bake_target.h"
 #include "runtime/commands/binary_output.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/file_report.h"
@@ -28,72 +30,6 @@
 
 namespace packtrace {
 namespace {
-
-constexpr const char *kAuto = "auto", *kNoTextures = "none";
-constexpr std::array<const char*, baked::kPurposeCount> kPurposes{"ao", "shading"};
-constexpr const char* kKeepNormals = "normals";
-constexpr const char* kKeepUvs = "uv";
-constexpr std::array<const char*, 3> kLodUses{"off", "instanced", "all"}; // indexed by LodUse
-constexpr const char* kLodDefaultValue = kLodUses[2];                     // meaning of --lod without a value
-
-struct BakeOptions {
-  std::string input, output;
-  std::optional<double> precision, precision_abs, precision_edge;
-  std::optional<uint32_t> position_bits;
-  std::string normals = kAuto;
-  std::optional<double> normal_error;
-  std::string purpose = kPurposes[baked::kAo];
-  std::vector<std::string> keep;
-  std::string uvs = kAuto;
-  std::optional<std::string> textures; ///< if not set, the purpose decides
-  std::optional<double> texture_psnr;
-  std::string trees = "on";
-  std::string lod = kLodUses[0];
-  std::optional<uint32_t> lod_min_triangles, lod_levels;
-  std::string resume;
-  std::string codec{name_of(PageCodec::kNone)};
-  SceneOptions scene;
-  bool dry_run = false;
-};
-
-BakeConfig make_config(const BakeOptions& options) {
-  BakeConfig config;
-  const auto set_precision = [&](PrecisionKind kind, double value) {
-    config.precision_kind = kind;
-    config.precision = value;
-  };
-  if (options.precision) set_precision(PrecisionKind::kDiagonalFraction, *options.precision);
-  if (options.precision_abs) set_precision(PrecisionKind::kAbsolute, *options.precision_abs);
-  if (options.precision_edge) set_precision(PrecisionKind::kEdgeFraction, *options.precision_edge);
-  if (options.position_bits) set_precision(PrecisionKind::kPositionBits, static_cast<double>(*options.position_bits));
-  config.normals = find_normal_encoding(options.normals);
-  if (config.normals && options.normal_error)
-    throw Error(ErrorKind::kUsage,
-                "--normal-error only applies to --normals auto, not to --normals " + options.normals);
-  config.normal_error_degrees = options.normal_error;
-  config.purpose = options.purpose == kPurposes[baked::kShading] ? baked::kShading : baked::kAo;
-  for (const std::string& stream : options.keep) (stream == kKeepUvs ? config.keep_uvs : config.keep_normals) = true;
-  config.strict = options.scene.strict;
-  config.uvs = find_uv_encoding(options.uvs);
-  const std::string textures = options.textures.value_or(config.purpose == baked::kShading ? kAuto : kNoTextures);
-  config.textures = textures != kNoTextures;
-  config.texture_codec = find_texture_codec(textures);
-  if (config.textures && config.purpose != baked::kShading)
-    throw Error(ErrorKind::kUsage, "--textures " + textures + " requires --for shading");
-  if (options.texture_psnr && textures != kAuto)
-    throw Error(ErrorKind::kUsage, "--texture-psnr only applies to --textures auto");
-  if (options.texture_psnr) config.min_texture_psnr_db = *options.texture_psnr;
-  config.lod = static_cast<LodUse>(std::find(kLodUses.begin(), kLodUses.end(), options.lod) - kLodUses.begin());
-  if (config.lod == LodUse::kOff && (options.lod_min_triangles || options.lod_levels || !options.resume.empty()))
-    throw Error(ErrorKind::kUsage, "--lod-min-triangles, --lod-levels and --resume require --lod");
-  config.lod_min_triangles = options.lod_min_triangles.value_or(config.lod_min_triangles);
-  config.lod_levels = options.lod_levels.value_or(config.lod_levels);
-  config.resume = options.resume;
-  config.trees = options.trees == "on";
-  config.codec = find_page_codec(options.codec).value(); // the option's check accepts only these names
-  config.validate();
-  return config;
-}
 
 nlohmann::json promise_json(const BakeReport& baked) {
   nlohmann::json geometries = nlohmann::json::array();
@@ -180,14 +116,21 @@ std::string advice_for(const BakeOptions& options) {
                      shell_word(wanted));
 }
 
-int run(const BakeOptions& options, const GlobalOptions& globals) {
+int run(const BakeOptions& given, const GlobalOptions& globals) {
+  BakeOptions options = given;
+  apply_preset(options);
   BakeConfig config = make_config(options);
-  config.memory = globals.memory;
   if (options.output.empty() && !options.dry_run) fail_without_output("bake", options.input, ".ptk");
   refuse_foreign_ending(options.output, {".ptk"}, "bake", advice_for(options));
   JsonOutput json(globals.json, globals.force);
   std::optional<BinaryOutput> output;
   if (!options.dry_run) output.emplace(options.output, globals.force, json);
+  nlohmann::json target;
+  if (!options.targets.empty()) {
+    target = find_target(options, globals);
+    config = make_config(options);
+  }
+  config.memory = globals.memory;
   ProgressDisplay display(globals);
   Progress progress(display.observer());
 
@@ -216,7 +159,11 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   display.finish();
   report_diagnostics(diagnostics, globals);
 
-  if (json.wanted()) json.write(report(options, baked, imported.statistics, import_s, bake_s, globals.verbosity > 0));
+  if (json.wanted()) {
+    nlohmann::json document = report(options, baked, imported.statistics, import_s, bake_s, globals.verbosity > 0);
+    if (!target.is_null()) document["target"] = target;
+    json.write(document);
+  }
   const std::string promise = precision_warning(baked, config.precision_kind != PrecisionKind::kPicture);
   if (json.to_stdout() || globals.quiet) {
     print_printable(promise, stderr);
@@ -378,7 +325,7 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
                   "Store BVH trees for the packed tracer, 1 to 2.5 bytes per triangle (default on). Without them files "
                   "are smaller, but every render builds the trees first")
       ->check(one_of({"on", "off"}))
-      ->default_str(options->trees);
+      ->default_str("on");
   verb.add_option(
           "--codec", options->codec,
           "Compression on disk. none is memory-mapped and traced as it is; fast and small are decoded into memory when "
@@ -387,6 +334,19 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
       ->check(one_of({std::string(name_of(PageCodec::kNone)), std::string(name_of(PageCodec::kFast)),
                       std::string(name_of(PageCodec::kSmall))}))
       ->default_str(std::string(name_of(PageCodec::kNone)));
+  verb.add_option("--preset", options->preset,
+                  "Options to start from; others override them. smallest: 16 bits, coarse normals, codec small, no "
+                  "trees. balanced: default precision, codec fast. exact: 24 bits, the finest normals")
+      ->check(one_of(std::vector<std::string>(kPresets.begin(), kPresets.end())))
+      ->group("Choosing by result");
+  verb.add_option("--target", options->targets,
+                  "Search for the smallest file that keeps a measured limit: ao-error=X (mean absolute error), "
+                  "position-error=UNITS, normal-error=DEGREES or size=3MB. Repeat it for several limits. Options that "
+                  "are given are not changed; exit code 5 if no file keeps the limits")
+      ->type_name("NAME=VALUE")
+      ->allow_extra_args(false)
+      ->take_all()
+      ->group("Choosing by result");
   verb.add_flag("--dry-run", options->dry_run, "Import and bake without writing a file, to see sizes and errors");
   add_scene_options(verb, options->scene);
   verb.footer("Positions are rounded to an integer grid. Shapes outside objects share one grid, so\n"
@@ -400,7 +360,8 @@ void add_bake_command(CLI::App& app, GlobalOptions& globals) {
               "  packtrace bake house.pbrt -o house.ptk\n"
               "  packtrace bake forest.pbrt -o forest.ptk --lod --codec small\n"
               "  packtrace bake house.pbrt -o - | ssh host 'cat > house.ptk'\n"
-              "  packtrace bake house.pbrt -o small.ptk --grid-step 1e-4 --json report.json");
+              "  packtrace bake house.pbrt -o small.ptk --grid-step 1e-4 --json report.json\n"
+              "  packtrace bake house.pbrt -o small.ptk --target ao-error=0.002");
 }
 
 } // namespace packtrace

@@ -157,7 +157,6 @@ MeasureConfig config_of(const MeasureOptions& options, const GlobalOptions& glob
       imported.scene.cameras.empty() && !options.camera ? std::optional<std::string>("auto") : options.camera;
   runner.spp = options.spp.value_or(std::array{64u, 64u, 256u}[mode]);
   runner.distance_samples = std::array<uint64_t, 3>{50'000, kDefaultDistanceSamples, 1'000'000}[mode];
-  runner.embree_beside_each_point = options.mode() != MatrixMode::kQuick;
   runner.diagonal = config.matrix_scene.diagonal;
   return config;
 }

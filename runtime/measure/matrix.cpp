@@ -154,7 +154,7 @@ std::vector<MeasurePoint> make_matrix(MatrixMode mode, const MatrixScene& scene,
   add_rendering(matrix, mode);
   add_positions(matrix, mode, scene);
   add_streams(matrix, mode, scene);
-  if (mode != MatrixMode::kQuick) add_levels(matrix, mode);
+  add_levels(matrix, mode);
   add_product(matrix, mode);
   return matrix.take();
 }
@@ -166,7 +166,7 @@ std::vector<uint32_t> convergence_frames(MatrixMode mode) {
 }
 
 std::vector<double> lod_errors(MatrixMode mode) {
-  if (mode == MatrixMode::kQuick) return {};
+  if (mode == MatrixMode::kQuick) return {0, 1};
   if (mode == MatrixMode::kDefault) return {0, 0.5, 1, 2, 4};
   return {0, 0.25, 0.5, 1, 2, 4, 8};
 }

@@ -95,7 +95,7 @@ std::string PointRunner::key(const MeasurePoint& point) const {
 nlohmann::json PointRunner::commands(const MeasurePoint& point) const {
   const std::string stem = fs::path(config_.scene).stem().string(), file = stem + ".ptk";
   return {{"bake", shell_command(Words{"packtrace", "bake", config_.scene, "-o", file} + words_of(point.bake) +
-                                 config_.scene_options)},
+                                 config_.bake_options + config_.scene_options)},
           {"render",
            shell_command(Words{"packtrace", "render", file, "-o", stem + ".exr", "--size",
                                fmt::format("{}x{}", config_.size.width, config_.size.height)} +
@@ -179,7 +179,8 @@ void PointRunner::bake(const BakeKnobs& knobs) {
   baked_.reset();
   const std::string file = folder_ / "work/point.ptk";
   fs::create_directories(folder_ / "work");
-  bake_report_ = run("bake", Words{"bake", config_.scene, "-o", file} + words_of(knobs) + config_.scene_options);
+  bake_report_ = run("bake", Words{"bake", config_.scene, "-o", file} + words_of(knobs) + config_.bake_options +
+                                 config_.scene_options);
   comparison_ = run("compare", {"compare", file, config_.scene, "--samples", std::to_string(config_.distance_samples)});
   baked_ = knobs;
 }

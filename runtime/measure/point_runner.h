@@ -19,6 +19,7 @@ struct RunnerConfig {
   std::string identity; ///< text of the program's version and the state of the scene's files
   Words common;         ///< options of every command: --threads, --max-memory
   Words scene_options;  ///< --world and --time
+  Words bake_options;   ///< further options of every bake
   ImageSize size;
   std::optional<std::string> camera;
   uint32_t spp = 64;
