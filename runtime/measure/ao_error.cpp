@@ -71,11 +71,11 @@ nlohmann::json ao_error(const AoImage& test, const AoImage& reference) {
   return json;
 }
 
-std::vector<Tile> worst_tiles(const std::vector<float>& errors, ImageSize size, uint32_t side, size_t count) {
-  std::vector<Tile> tiles;
+std::vector<ErrorTile> worst_tiles(const std::vector<float>& errors, ImageSize size, uint32_t side, size_t count) {
+  std::vector<ErrorTile> tiles;
   for (uint32_t y = 0; y < size.height; y += side)
     for (uint32_t x = 0; x < size.width; x += side) {
-      Tile tile{x, y, std::min(side, size.width - x), std::min(side, size.height - y), 0.0, 0.0, x, y};
+      ErrorTile tile{x, y, std::min(side, size.width - x), std::min(side, size.height - y), 0.0, 0.0, x, y};
       double sum = 0.0;
       for (uint32_t j = y; j < y + tile.height; ++j)
         for (uint32_t i = x; i < x + tile.width; ++i) {
@@ -86,7 +86,7 @@ std::vector<Tile> worst_tiles(const std::vector<float>& errors, ImageSize size, 
       tile.mae = sum / (static_cast<double>(tile.width) * tile.height);
       if (tile.mae > 0.0) tiles.push_back(tile);
     }
-  std::ranges::stable_sort(tiles, [](const Tile& a, const Tile& b) { return a.mae > b.mae; });
+  std::ranges::stable_sort(tiles, [](const ErrorTile& a, const ErrorTile& b) { return a.mae > b.mae; });
   if (tiles.size() > count) tiles.resize(count);
   return tiles;
 }

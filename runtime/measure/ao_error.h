@@ -27,13 +27,13 @@ std::vector<float> error_map(const AoImage& test, const AoImage& reference);
 nlohmann::json ao_error(const AoImage& test, const AoImage& reference);
 
 /// A square of pixels, cut off at the picture's right and bottom.
-struct Tile {
+struct ErrorTile {
   uint32_t x = 0, y = 0, width = 0, height = 0;
   double mae = 0.0, max = 0.0; ///< of the error map
   uint32_t worst_x = 0, worst_y = 0;
 };
 
 /// The tiles with the largest mean error, worst first; at most `count`, and none without an error.
-std::vector<Tile> worst_tiles(const std::vector<float>& errors, ImageSize size, uint32_t side, size_t count);
+std::vector<ErrorTile> worst_tiles(const std::vector<float>& errors, ImageSize size, uint32_t side, size_t count);
 
 } // namespace packtrace

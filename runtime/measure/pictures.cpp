@@ -27,7 +27,7 @@ Image display(const AoImage& ao) {
   return picture;
 }
 
-Image crop(const Image& picture, const Tile& tile) {
+Image crop(const Image& picture, const ErrorTile& tile) {
   Image enlarged({tile.width * kEnlarged, tile.height * kEnlarged}, picture.channels);
   for (uint32_t y = 0; y < enlarged.size.height; ++y)
     for (uint32_t x = 0; x < enlarged.size.width; ++x)
@@ -79,7 +79,7 @@ nlohmann::json write_pictures(const std::vector<PicturedPoint>& points, const Ao
                         {"difference", write(folder, point.id + "_difference", heat)},
                         {"difference_white", static_cast<double>(white)}});
     size_t number = 0;
-    for (const Tile& tile : worst_tiles(errors, size, tile_px, kTilesPerPoint)) {
+    for (const ErrorTile& tile : worst_tiles(errors, size, tile_px, kTilesPerPoint)) {
       const std::string name = fmt::format("{}_tile{}", point.id, number++);
       const uint32_t instance = instances[size_t{tile.worst_y} * size.width + tile.worst_x];
       tiles.push_back({{"point_id", point.id},

@@ -122,7 +122,7 @@ TEST(AoError, PixelsWithoutAValueAreCountedAndLeftOut) {
 TEST(AoError, TheWorstTilesComeFirst) {
   std::vector<float> errors(6 * 3, 0.0f);
   errors[2 * 6 + 5] = 1.0f, errors[0] = 0.5f; // the corner tile has 1 x 1 pixels of 2 x 2
-  const std::vector<Tile> tiles = worst_tiles(errors, {6, 3}, 2, 10);
+  const std::vector<ErrorTile> tiles = worst_tiles(errors, {6, 3}, 2, 10);
   ASSERT_EQ(tiles.size(), 2u) << "tiles without an error are left out";
   EXPECT_EQ(tiles[0].x, 4u);
   EXPECT_EQ(tiles[0].height, 1u);
