@@ -419,6 +419,8 @@ private:
       report_.max_position_error = std::max(report_.max_position_error, s.max_position_error);
       report_.max_normal_error_degrees = std::max(report_.max_normal_error_degrees, s.max_normal_error_degrees);
       report_.max_uv_error = std::max(report_.max_uv_error, s.max_uv_error);
+      all.position_error_squares += s.position_error_squares;
+      all.position_error_count += s.position_error_count;
       all.normal_error_sum += s.normal_error_sum;
       all.normal_count += s.normal_count;
       all.repaired_normals += s.repaired_normals;
@@ -426,6 +428,9 @@ private:
       coarse_uvs += s.max_uv_error_texels > 0.5;
       report_.max_uv_error_texels = std::max(report_.max_uv_error_texels, s.max_uv_error_texels);
     }
+    if (all.position_error_count > 0)
+      report_.rms_position_error =
+          std::sqrt(all.position_error_squares / static_cast<double>(all.position_error_count));
     report_.mean_normal_error_degrees = mean_normal_error(all);
     report_.source_triangles = unique_triangle_count(scene_);
     report_.resumed_geometries = resumed_;

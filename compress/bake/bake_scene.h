@@ -52,6 +52,7 @@ struct BakeReport {
   uint64_t finer_geometries = 0;
   std::vector<BrokenPromise> promise; ///< geometries that may break the default precision's promise; empty if none does
   double max_position_error = 0.0;    ///< measured against the source, largest over the axes, object units
+  double rms_position_error = 0.0;    ///< root mean square over all source vertices and axes, object units
   double max_normal_error_degrees = 0.0, mean_normal_error_degrees = 0.0;
   double max_uv_error = 0.0;
   double max_uv_error_texels = 0.0;  ///< relative to the finest texture that the same geometry looks up

@@ -14,6 +14,7 @@
 #include "pbrt_import/base/with_file.h"
 #include "runtime/commands/bake_options.h"
 #include "runtime/commands/bake_report.h"
+#include "runtime/commands/bake_target.h"
 #include "runtime/commands/binary_output.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/file_report.h"
@@ -41,14 +42,21 @@ std::string advice_for(const BakeOptions& options) {
                      shell_word(wanted));
 }
 
-int run(const BakeOptions& options, const GlobalOptions& globals) {
+int run(const BakeOptions& given, const GlobalOptions& globals) {
+  BakeOptions options = given;
+  apply_preset(options);
   BakeConfig config = make_config(options);
-  config.memory = globals.memory;
   if (options.output.empty() && !options.dry_run) fail_without_output("bake", options.input, ".ptk");
   refuse_foreign_ending(options.output, {".ptk"}, "bake", advice_for(options));
   JsonOutput json(globals.json, globals.force);
   std::optional<BinaryOutput> output;
   if (!options.dry_run) output.emplace(options.output, globals.force, json);
+  nlohmann::json target;
+  if (!options.targets.empty()) {
+    target = find_target(options, globals);
+    config = make_config(options);
+  }
+  config.memory = globals.memory;
   ProgressDisplay display(globals);
   Progress progress(display.observer());
 
@@ -73,7 +81,11 @@ int run(const BakeOptions& options, const GlobalOptions& globals) {
   display.finish();
   report_diagnostics(diagnostics, globals);
 
-  if (json.wanted()) json.write(bake_json(options, baked, imported.statistics, timings, globals.verbosity > 0));
+  if (json.wanted()) {
+    nlohmann::json document = bake_json(options, baked, imported.statistics, timings, globals.verbosity > 0);
+    if (!target.is_null()) document["target"] = target;
+    json.write(document);
+  }
   const std::string promise = precision_warning(baked, config.precision_kind != PrecisionKind::kPicture);
   if (json.to_stdout() || globals.quiet) {
     print_printable(promise, stderr);

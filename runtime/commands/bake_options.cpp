@@ -127,6 +127,22 @@ void add_level_options(CLI::App& verb, BakeOptions& options) {
       ->group("Levels of detail");
 }
 
+void add_choice_options(CLI::App& verb, BakeOptions& options) {
+  verb.add_option("--preset", options.preset,
+                  "Options to start from; others override them. smallest: 16 bits, coarse normals, codec small, no "
+                  "trees. balanced: default precision, codec fast. exact: 24 bits, the finest normals")
+      ->check(one_of(std::vector<std::string>(kPresets.begin(), kPresets.end())))
+      ->group("Choosing by result");
+  verb.add_option("--target", options.targets,
+                  "Search for the smallest file that keeps a measured limit: ao-error=X (mean absolute error), "
+                  "position-error=UNITS, normal-error=DEGREES or size=3MB. Repeat it for several limits. Options that "
+                  "are given are not changed; exit code 5 if no file keeps the limits")
+      ->type_name("NAME=VALUE")
+      ->allow_extra_args(false)
+      ->take_all()
+      ->group("Choosing by result");
+}
+
 } // namespace
 
 void add_bake_options(CLI::App& verb, BakeOptions& options) {
@@ -141,7 +157,7 @@ void add_bake_options(CLI::App& verb, BakeOptions& options) {
                   "Store BVH trees for the packed tracer, 1 to 2.5 bytes per triangle (default on). Without them files "
                   "are smaller, but every render builds the trees first")
       ->check(one_of({"on", "off"}))
-      ->default_str(options.trees);
+      ->default_str("on");
   verb.add_option(
           "--codec", options.codec,
           "Compression on disk. none is memory-mapped and traced as it is; fast and small are decoded into memory when "
@@ -150,6 +166,7 @@ void add_bake_options(CLI::App& verb, BakeOptions& options) {
       ->check(one_of({std::string(name_of(PageCodec::kNone)), std::string(name_of(PageCodec::kFast)),
                       std::string(name_of(PageCodec::kSmall))}))
       ->default_str(std::string(name_of(PageCodec::kNone)));
+  add_choice_options(verb, options);
   verb.add_flag("--dry-run", options.dry_run, "Import and bake without writing a file, to see sizes and errors");
   add_scene_options(verb, options.scene);
   verb.footer("Positions are rounded to an integer grid. Shapes outside objects share one grid, so\n"
@@ -163,15 +180,31 @@ void add_bake_options(CLI::App& verb, BakeOptions& options) {
               "  packtrace bake house.pbrt -o house.ptk\n"
               "  packtrace bake forest.pbrt -o forest.ptk --lod --codec small\n"
               "  packtrace bake house.pbrt -o - | ssh host 'cat > house.ptk'\n"
-              "  packtrace bake house.pbrt -o small.ptk --grid-step 1e-4 --json report.json");
+              "  packtrace bake house.pbrt -o small.ptk --grid-step 1e-4 --json report.json\n"
+              "  packtrace bake house.pbrt -o small.ptk --target ao-error=0.002");
+}
+
+bool chooses_grid(const BakeOptions& options) { return options.config.precision_kind != PrecisionKind::kPicture; }
+
+void apply_preset(BakeOptions& options) {
+  if (options.preset.empty()) return;
+  const bool smallest = options.preset == kPresets[0], balanced = options.preset == kPresets[1];
+  if (!chooses_grid(options) && !balanced) {
+    options.config.precision_kind = PrecisionKind::kPositionBits;
+    options.config.precision = smallest ? 16 : 24; // floats have 24 bits
+  }
+  if (!options.normals && !options.normal_error && !balanced) options.normals = smallest ? "axis16" : "axis32";
+  if (!options.codec)
+    options.codec = std::string(name_of(smallest ? PageCodec::kSmall : balanced ? PageCodec::kFast : PageCodec::kNone));
+  if (!options.trees && smallest) options.trees = "off";
 }
 
 BakeConfig make_config(const BakeOptions& options) {
   BakeConfig config = options.config;
-  config.normals = find_normal_encoding(options.normals);
+  config.normals = find_normal_encoding(options.normals.value_or(kAuto));
   if (config.normals && options.normal_error)
     throw Error(ErrorKind::kUsage,
-                "--normal-error only applies to --normals auto, not to --normals " + options.normals);
+                "--normal-error only applies to --normals auto, not to --normals " + *options.normals);
   config.normal_error_degrees = options.normal_error;
   config.purpose = options.purpose == kPurposes[baked::kShading] ? baked::kShading : baked::kAo;
   for (const std::string& stream : options.keep) (stream == kKeepUvs ? config.keep_uvs : config.keep_normals) = true;
@@ -191,8 +224,9 @@ BakeConfig make_config(const BakeOptions& options) {
   config.lod_min_triangles = options.lod_min_triangles.value_or(config.lod_min_triangles);
   config.lod_levels = options.lod_levels.value_or(config.lod_levels);
   config.resume = options.resume;
-  config.trees = options.trees == "on";
-  config.codec = find_page_codec(options.codec).value(); // the option's check accepts only these names
+  config.trees = options.trees.value_or("on") == "on";
+  config.codec = find_page_codec(options.codec.value_or(std::string(name_of(PageCodec::kNone))))
+                     .value(); // the option's check accepts only these names
   config.validate();
   return config;
 }

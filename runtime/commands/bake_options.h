@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,28 +12,38 @@
 
 namespace packtrace {
 
+inline constexpr std::array<const char*, 3> kPresets{"smallest", "balanced", "exact"};
+
 /// The options of `bake`.
 struct BakeOptions {
   std::string input, output;
-  BakeConfig config; ///< its precision; make_config() adds the rest
-  std::string normals = "auto";
+  BakeConfig config;                  ///< its precision; make_config() adds the rest
+  std::optional<std::string> normals; ///< auto unless set
   std::optional<double> normal_error;
   std::string purpose = "ao";
   std::vector<std::string> keep;
   std::string uvs = "auto";
   std::optional<std::string> textures; ///< if not set, the purpose decides
   std::optional<double> texture_psnr;
-  std::string trees = "on";
+  std::optional<std::string> trees; ///< on unless set
   std::string lod = "off";
   std::optional<uint32_t> lod_min_triangles, lod_levels;
   std::string resume;
-  std::string codec{name_of(PageCodec::kNone)};
+  std::optional<std::string> codec; ///< none unless set
   SceneOptions scene;
   bool dry_run = false;
+  std::string preset;               ///< empty, or one of kPresets
+  std::vector<std::string> targets; ///< limits that a search must keep, see parse_target()
 };
 
 /// Adds all options of `bake` to the verb. `options` must outlive it.
 void add_bake_options(CLI::App& verb, BakeOptions& options);
+
+/// Whether an option chooses the position grid.
+bool chooses_grid(const BakeOptions& options);
+
+/// Sets what the preset says and the user did not.
+void apply_preset(BakeOptions& options);
 
 /// Throws Error(kUsage) for values out of range and contradictory options.
 BakeConfig make_config(const BakeOptions& options);

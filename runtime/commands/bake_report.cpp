@@ -66,6 +66,7 @@ nlohmann::json bake_json(const BakeOptions& options, const BakeReport& baked, co
   json["output"] = options.dry_run ? nlohmann::json() : nlohmann::json(options.output);
   json["seconds"] = {{"import", timings.import_s}, {"bake", timings.bake_s}};
   json["peak_rss_bytes"] = peak_rss_bytes();
+  json["rms_position_error"] = baked.rms_position_error;
   json["mean_normal_error_degrees"] = baked.mean_normal_error_degrees;
   json["shared_shapes"] = baked.shared_shapes;
   json["instanced_shapes"] = baked.instanced_shapes;

@@ -27,6 +27,10 @@ void add_compare_command(CLI::App& app, GlobalOptions& globals);
 /// that engines can upload without conversion.
 void add_export_command(CLI::App& app, GlobalOptions& globals);
 
+/// Adds `packtrace measure SCENE -o DIR`, which measures size, accuracy and speed over many options of bake.
+/// @param version the program's, for the report
+void add_measure_command(CLI::App& app, GlobalOptions& globals, const std::string& version);
+
 /// Adds the verbs help, version, completion and man. They describe all verbs that `app` has when they are run.
 void add_help_commands(CLI::App& app, GlobalOptions& globals, const std::string& version);
 

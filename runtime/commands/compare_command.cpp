@@ -18,6 +18,7 @@
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/output_file.h"
 #include "runtime/commands/cli_support.h"
+#include "runtime/commands/geometry_compare.h"
 #include "runtime/commands/json_output.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/image/false_color.h"
@@ -32,9 +33,10 @@ namespace {
 struct CompareOptions {
   std::string test, reference, layer;
   std::vector<std::string> metrics{"all"};
-  std::array<std::optional<double>, 5> limits; ///< indexed like kMetrics
+  std::array<std::optional<double>, 6> limits; ///< indexed like kMetrics
   std::optional<double> max_mismatch;          ///< fraction of pixels, [0, 1]
   double pixels_per_degree = kFlipPixelsPerDegree;
+  uint64_t samples = kDefaultDistanceSamples; ///< points on each surface, for baked files
   std::string diff, diff_metric = "mae";
   float diff_white = 0.25f;
 };
@@ -46,11 +48,12 @@ struct MetricKind {
   uint32_t smallest_side; ///< minimum image width and height, pixels
   bool colors_only;       ///< requires 1 or 3 channels
 };
-constexpr std::array<MetricKind, 5> kMetrics{{{"rmse", "rmse", false, 1, false},
+constexpr std::array<MetricKind, 6> kMetrics{{{"rmse", "rmse", false, 1, false},
                                               {"mae", "mae", false, 1, false},
                                               {"psnr", "psnr_db", true, 1, false},
                                               {"ssim", "ssim", true, kSsimWindow, false},
-                                              {"flip", "flip", false, 1, true}}};
+                                              {"flip", "flip", false, 1, true},
+                                              {"p99", "p99", false, 1, false}}};
 
 size_t metric_index(std::string_view name) {
   const auto found =
@@ -134,14 +137,16 @@ Metric compute(size_t metric, const ImagePair& pair, const CompareOptions& optio
     return psnr(pair.test, pair.reference, how);
   case 3:
     return ssim(pair.test, pair.reference, how);
+  case 5:
+    return p99(pair.test, pair.reference, how);
   default:
     return flip(pair.test, pair.reference, how, options.pixels_per_degree);
   }
 }
 
 /// Selects the metrics that are requested by name, by "all" (if applicable), by a limit, or for the difference picture.
-std::array<bool, 5> wanted_metrics(const CompareOptions& options, const Image& image) {
-  std::array<bool, 5> wanted{};
+std::array<bool, 6> wanted_metrics(const CompareOptions& options, const Image& image) {
+  std::array<bool, 6> wanted{};
   for (const std::string& name : options.metrics)
     for (size_t i = 0; i < kMetrics.size(); ++i)
       if (name == kMetrics[i].name || (name == "all" && applicable(kMetrics[i], image))) wanted[i] = true;
@@ -159,7 +164,7 @@ struct Check {
 };
 
 std::vector<Check> check_limits(const CompareOptions& options, const ImagePair& pair,
-                                const std::array<std::optional<double>, 5>& values) {
+                                const std::array<std::optional<double>, 6>& values) {
   std::vector<Check> checks;
   for (size_t i = 0; i < kMetrics.size(); ++i)
     if (options.limits[i]) {
@@ -175,7 +180,7 @@ std::vector<Check> check_limits(const CompareOptions& options, const ImagePair& 
 }
 
 nlohmann::json to_json(const CompareOptions& options, const ImagePair& pair,
-                       const std::array<std::optional<double>, 5>& values, const std::vector<Check>& checks) {
+                       const std::array<std::optional<double>, 6>& values, const std::vector<Check>& checks) {
   nlohmann::json metrics = nlohmann::json::object(), limits = nlohmann::json::array();
   for (size_t i = 0; i < kMetrics.size(); ++i)
     if (values[i]) metrics[kMetrics[i].json_name] = *values[i]; // infinity (the PSNR of equal images) becomes null
@@ -196,7 +201,7 @@ nlohmann::json to_json(const CompareOptions& options, const ImagePair& pair,
           {"passed", std::all_of(checks.begin(), checks.end(), [](const Check& c) { return c.passed; })}};
 }
 
-void print_results(const ImagePair& pair, const std::array<std::optional<double>, 5>& values,
+void print_results(const ImagePair& pair, const std::array<std::optional<double>, 6>& values,
                    const std::vector<Check>& checks) {
   std::string text;
   for (size_t i = 0; i < kMetrics.size(); ++i)
@@ -217,6 +222,9 @@ void print_notes(const ImagePair& pair, const GlobalOptions& globals) {
 }
 
 int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
+  const std::string ending = ending_of(options.test), other = ending_of(options.reference);
+  if (ending == ".ptk" || ending == ".pbrt" || other == ".ptk" || other == ".pbrt")
+    return compare_geometry(options.test, options.reference, options.samples, globals);
   if (!options.diff.empty() && ending_of(options.diff) != ".png")
     throw Error(ErrorKind::kUsage, "--diff " + options.diff + ": the file name must end in .png");
   JsonOutput json(globals.json, globals.force);
@@ -226,8 +234,8 @@ int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
   refuse_to_replace({options.test, options.reference});
   const ImagePair pair = load_pair(options, globals.memory);
   print_notes(pair, globals);
-  const std::array<bool, 5> wanted = wanted_metrics(options, pair.test);
-  std::array<std::optional<double>, 5> values;
+  const std::array<bool, 6> wanted = wanted_metrics(options, pair.test);
+  std::array<std::optional<double>, 6> values;
   for (size_t i = 0; i < kMetrics.size(); ++i) {
     if (!wanted[i]) continue;
     const bool shown = diff && i == metric_index(options.diff_metric);
@@ -260,17 +268,21 @@ int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
 
 void add_compare_command(CLI::App& app, GlobalOptions& globals) {
   const auto options = std::make_shared<CompareOptions>();
-  CLI::App& verb = add_verb(app, globals, "compare", "Compute image metrics between two images and check limits",
+  CLI::App& verb = add_verb(app, globals, "compare",
+                            "Compute image metrics between two images, or distances between a baked file and its scene",
                             [options, &globals] { return run_compare(*options, globals); });
-  verb.add_option("TEST", options->test, "Image to check, .png (decoded from sRGB to linear) or .exr")->required();
-  verb.add_option("REFERENCE", options->reference, "Reference image of the same size")->required();
+  verb.add_option("TEST", options->test, "Image to check, .png (decoded from sRGB to linear) or .exr; or a .ptk file")
+      ->required();
+  verb.add_option("REFERENCE", options->reference,
+                  "Reference image of the same size; or the .pbrt scene of the .ptk file")
+      ->required();
   verb.add_option("--layer", options->layer,
                   "EXR layer to compare (default: ao, else the colour channels, else the only layer)");
   verb.add_option("--metric", options->metrics,
                   "Metrics to compute, separated by commas. all computes every metric that applies to the images; ssim "
                   "needs 11 x 11 pixels, flip 1 or 3 channels (default all)")
       ->delimiter(',')
-      ->check(one_of({"all", "rmse", "mae", "psnr", "ssim", "flip"}))
+      ->check(one_of({"all", "rmse", "mae", "psnr", "ssim", "flip", "p99"}))
       ->default_str("all");
   verb.add_option(
           "--ppd", options->pixels_per_degree,
@@ -278,6 +290,11 @@ void add_compare_command(CLI::App& app, GlobalOptions& globals) {
           "seen from 0.7 m). Smaller values mean a closer observer, who sees more differences")
       ->check(number_in(1e-3, 1000.0))
       ->capture_default_str();
+
+  verb.add_option("--samples", options->samples,
+                  "Points to sample on each surface of a .ptk file and its scene, 1..1e9 (default 200000)")
+      ->check(number_in(1.0, 1e9))
+      ->type_name("N");
 
   const std::string group = "Limits (exit code 5 if one is exceeded)";
   constexpr double kHuge = 1e30;
@@ -297,6 +314,10 @@ void add_compare_command(CLI::App& app, GlobalOptions& globals) {
   verb.add_option("--max-flip", options->limits[4], "Maximum mean FLIP difference, 0..1; 0 means equal images")
       ->check(number_in(0.0, 1.0))
       ->group(group);
+  verb.add_option("--max-p99", options->limits[5],
+                  "Maximum absolute error of 99 % of the pixels; 0 means that they are equal")
+      ->check(number_in(0.0, kHuge))
+      ->group(group);
   verb.add_option("--max-mismatch", options->max_mismatch,
                   "Maximum fraction of pixels that have a value in only one image, 0..1")
       ->check(number_in(0.0, 1.0))
@@ -306,7 +327,7 @@ void add_compare_command(CLI::App& app, GlobalOptions& globals) {
                   "Write a .png with the error per pixel, from black (0) over red and yellow to white (--diff-white)")
       ->type_name("FILE");
   verb.add_option("--diff-metric", options->diff_metric, "Metric that --diff shows (default mae)")
-      ->check(one_of({"rmse", "mae", "psnr", "ssim", "flip"}))
+      ->check(one_of({"rmse", "mae", "psnr", "ssim", "flip", "p99"}))
       ->capture_default_str();
   verb.add_option("--diff-white", options->diff_white,
                   "Error that --diff shows as white, 1e-6..1e6 (default 0.25). Lower it to see small errors")
@@ -315,7 +336,8 @@ void add_compare_command(CLI::App& app, GlobalOptions& globals) {
   verb.footer("Pixels without a value (ambient occlusion where no surface is hit) are ignored.\n"
               "Examples:\n"
               "  packtrace compare test.exr truth.exr --layer ao --min-psnr 34\n"
-              "  packtrace compare test.png truth.png --diff errors.png --diff-white 0.05");
+              "  packtrace compare test.png truth.png --diff errors.png --diff-white 0.05\n"
+              "  packtrace compare house.ptk house.pbrt");
 }
 
 } // namespace packtrace

@@ -44,7 +44,8 @@ int main(int argc, char** argv) {
   packtrace::add_render_command(app, globals);
   packtrace::add_compare_command(app, globals);
   packtrace::add_export_command(app, globals);
-  for (const char* verb : {"measure", "view"}) add_planned_verb(app, globals, verb);
+  packtrace::add_measure_command(app, globals, PACKTRACE_VERSION);
+  add_planned_verb(app, globals, "view");
   packtrace::add_help_commands(app, globals, version);
   return packtrace::run_verbs(app, globals, argc, argv);
 }

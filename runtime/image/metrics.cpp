@@ -1,7 +1,9 @@
 #include "runtime/image/metrics.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "runtime/image/metric_support.h"
 
@@ -37,6 +39,20 @@ Metric mae(const Image& test, const Image& reference, const MetricOptions& optio
   const auto absolute = per_pixel(test, reference, [](double d) { return std::abs(d); });
   Metric metric;
   metric.value = mean_over(test.size, options.valid, absolute);
+  if (options.error_map) metric.error_map = map_over(test.size, options.valid, absolute);
+  return metric;
+}
+
+Metric p99(const Image& test, const Image& reference, const MetricOptions& options) {
+  check_comparable(test, reference, options.valid);
+  const auto absolute = per_pixel(test, reference, [](double d) { return std::abs(d); });
+  std::vector<double> errors;
+  for (size_t i = 0; i < test.size.pixels(); ++i)
+    if (counts(options.valid, i)) errors.push_back(absolute(i));
+  const auto rank = errors.begin() + static_cast<std::ptrdiff_t>((errors.size() * 99 + 99) / 100 - 1);
+  std::nth_element(errors.begin(), rank, errors.end());
+  Metric metric;
+  metric.value = *rank;
   if (options.error_map) metric.error_map = map_over(test.size, options.valid, absolute);
   return metric;
 }

@@ -30,6 +30,10 @@ Metric rmse(const Image& test, const Image& reference, const MetricOptions& opti
 /// Mean absolute difference over counted pixels and channels. Map: the same per pixel.
 Metric mae(const Image& test, const Image& reference, const MetricOptions& options = {});
 
+/// 99th percentile of the absolute difference per pixel, the mean over its channels: the smallest difference that at
+/// least 99 % of the counted pixels do not exceed. Map: as mae().
+Metric p99(const Image& test, const Image& reference, const MetricOptions& options = {});
+
 /// Peak signal-to-noise ratio in dB for the peak value 1: -20 log10(rmse); +infinity for equal images. Map: as rmse().
 Metric psnr(const Image& test, const Image& reference, const MetricOptions& options = {});
 

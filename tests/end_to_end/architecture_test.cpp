@@ -101,7 +101,7 @@ const std::vector<Room> kRooms = {
      {"pbrt_import/base", "pbrt_import/scene", "pbrt_import/text", "pbrt_import", "compress/format/file",
       "compress/bake/grid", "compress/bake", "compress/exchange/gltf", "compress/exchange/vertex16", "runtime/lod",
       "runtime/trace/source", "runtime/trace/packed/scene", "runtime/trace", "runtime/camera", "runtime/render",
-      "runtime/image", "runtime"}},
+      "runtime/image", "runtime/measure", "runtime"}},
     {"runtime/python",
      {"pbrt_import/base", "pbrt_import", "compress/format/file", "compress/bake", "runtime/trace/source",
       "runtime/trace", "runtime/render", "runtime/commands"}},

@@ -25,11 +25,11 @@ constexpr size_t kGrain = 4096; // fixed, so that sums are grouped equally for a
 
 /// Maximum and sum over many items.
 struct ErrorStats {
-  double max = 0.0, sum = 0.0;
+  double max = 0.0, sum = 0.0, squares = 0.0;
   uint64_t count = 0;
-  void add(double error) { max = std::max(max, error), sum += error, ++count; }
+  void add(double error) { max = std::max(max, error), sum += error, squares += error * error, ++count; }
   static ErrorStats join(ErrorStats a, const ErrorStats& b) {
-    return {std::max(a.max, b.max), a.sum + b.sum, a.count + b.count};
+    return {std::max(a.max, b.max), a.sum + b.sum, a.squares + b.squares, a.count + b.count};
   }
 };
 
@@ -191,6 +191,8 @@ private:
         stats.add(std::abs(static_cast<double>(from_lattice(lattice[i][static_cast<size_t>(axis)], step_)) - p[axis]));
     });
     out_.stats.max_position_error = std::max(out_.stats.max_position_error, errors.max);
+    out_.stats.position_error_squares += errors.squares;
+    out_.stats.position_error_count += errors.count;
   }
 
   /// Unit normal of the decoded triangle; zero if it has no area.

@@ -41,10 +41,12 @@ struct QuantizeStats {
   std::vector<uint64_t> left;  ///< triangles per part, without those left out
   /// Triangles whose source normals equal the face normal within the limit, so that they are not stored.
   uint64_t flat_triangles = 0;
-  uint64_t inferred_normals = 0;   ///< source normals that no triangle needs except flat ones
-  uint64_t repaired_normals = 0;   ///< were zero, or became zero under a flattening transform
-  uint64_t replaced_uvs = 0;       ///< were not finite
-  double max_position_error = 0.0; ///< largest over the axes
+  uint64_t inferred_normals = 0;       ///< source normals that no triangle needs except flat ones
+  uint64_t repaired_normals = 0;       ///< were zero, or became zero under a flattening transform
+  uint64_t replaced_uvs = 0;           ///< were not finite
+  double max_position_error = 0.0;     ///< largest over the axes
+  double position_error_squares = 0.0; ///< sum of the squared errors of every vertex and axis
+  uint64_t position_error_count = 0;   ///< number of errors in position_error_squares
   double max_normal_error_degrees = 0.0;
   double normal_error_sum = 0.0;    ///< degrees
   uint64_t normal_count = 0;        ///< number of normals in normal_error_sum

@@ -15,7 +15,7 @@ namespace {
 
 using MetricFunction = Metric (*)(const Image&, const Image&, const MetricOptions&);
 Metric default_flip(const Image& a, const Image& b, const MetricOptions& o) { return flip(a, b, o); }
-constexpr MetricFunction kAll[] = {rmse, mae, psnr, ssim, default_flip};
+constexpr MetricFunction kAll[] = {rmse, mae, psnr, p99, ssim, default_flip};
 
 TEST(Metrics, EqualImagesHaveNoError) {
   const Image image = noise_image({32, 24}, 3, 1);
@@ -44,6 +44,18 @@ TEST(Metrics, OneDifferentSampleWeighsAsItShould) {
   const Metric with_map = rmse(test, reference, {{}, true});
   EXPECT_NEAR(with_map.error_map.pixel(3, 4)[0], 0.4 / std::sqrt(2.0), 1e-6);
   EXPECT_EQ(std::count(with_map.error_map.data.begin(), with_map.error_map.data.end(), 0.0f), 99);
+}
+
+TEST(Metrics, TheNinetyNinthPercentileLeavesOnePixelInAHundredOut) {
+  Image test({20, 10}, 1, 0.5f);
+  const Image reference = test;
+  test.pixel(0, 0)[0] = 1.0f, test.pixel(1, 0)[0] = 0.75f;
+  EXPECT_EQ(p99(test, reference).value, 0.0) << "two of 200 pixels differ";
+  test.pixel(2, 0)[0] = 0.625f;
+  EXPECT_EQ(p99(test, reference).value, 0.125) << "the third largest of 200";
+  std::vector<uint8_t> valid(200, 1);
+  valid[1] = 0;
+  EXPECT_EQ(p99(test, reference, {valid}).value, 0.125) << "the second largest of 199";
 }
 
 TEST(Metrics, AllAreSymmetric) {

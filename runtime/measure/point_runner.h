@@ -1,0 +1,88 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "runtime/measure/ao_error.h"
+#include "runtime/measure/child_process.h"
+#include "runtime/measure/matrix.h"
+#include "runtime/measure/measure_folder.h"
+
+namespace packtrace {
+
+/// What all points of a measurement have in common.
+struct RunnerConfig {
+  std::string scene;
+  std::string identity; ///< text of the program's version and the state of the scene's files
+  Words common;         ///< options of every command: --threads, --max-memory
+  Words scene_options;  ///< --world and --time
+  Words bake_options;   ///< further options of every bake
+  ImageSize size;
+  std::optional<std::string> camera;
+  uint32_t spp = 64;
+  uint64_t seed = 0, noise_seed = 1;
+  uint64_t distance_samples = 200'000;
+  bool embree_beside_each_point = true;
+  double diagonal = 0.0; ///< of the scene, world units
+};
+
+/// A stage of a point that did not succeed.
+struct StageFailure {
+  std::string stage;
+  ChildResult child;
+};
+
+/// Value of "error" in a report.
+nlohmann::json to_json(const StageFailure& failure);
+/// "failed", "killed" or "out-of-memory".
+std::string status_of(const StageFailure& failure);
+
+/// Measures points, each in processes of their own, and keeps the results in the folder. The file of the last bake is
+/// kept for points that trace the same file.
+class PointRunner {
+public:
+  /// Keeps a reference to the folder.
+  PointRunner(RunnerConfig config, const MeasureFolder& folder);
+  ~PointRunner();
+  PointRunner(const PointRunner&) = delete;
+  PointRunner& operator=(const PointRunner&) = delete;
+
+  /// Renders the float images, or takes them from the folder. Must succeed before measure().
+  /// @return "reference" of the report. Throws Error with the exit code's kind if a render fails.
+  nlohmann::json make_reference();
+
+  /// A point of the report, without flags. Failures of its processes are part of it.
+  nlohmann::json measure(const MeasurePoint& point);
+
+  /// "convergence" of the report for the given file options; an empty array if a process fails.
+  nlohmann::json convergence(const BakeKnobs& bake, const std::vector<uint32_t>& frames);
+
+  /// Commands that a user types for a point, by name: bake and render.
+  nlohmann::json commands(const MeasurePoint& point) const;
+  /// Name of the point's files in the folder.
+  std::string key(const MeasurePoint& point) const;
+
+  const AoImage& reference() const { return *reference_; }
+  std::filesystem::path reference_file() const { return folder_ / "reference/float.exr"; }
+
+private:
+  nlohmann::json run(const std::string& stage, Words words);
+  nlohmann::json render(const std::string& stage, const std::string& input, const std::filesystem::path& output,
+                        uint64_t seed, const Words& options);
+  void bake(const BakeKnobs& knobs);
+  void add_file_values(nlohmann::json& point) const;
+  void add_render_values(nlohmann::json& point, const MeasurePoint& what);
+  void add_noise_ratio(nlohmann::json& ao) const;
+
+  RunnerConfig config_;
+  const MeasureFolder& folder_;
+  std::optional<AoImage> reference_;
+  double noise_mae_ = 0.0;
+  std::optional<BakeKnobs> baked_;          ///< options of the file in the folder
+  nlohmann::json bake_report_, comparison_; ///< JSON of bake and compare for that file
+};
+
+} // namespace packtrace

@@ -1,0 +1,134 @@
+// Measuring a scene, and baking by a measured target.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/end_to_end/workbench.h"
+
+namespace packtrace::test {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+CommandResult measure(const Workbench& bench, std::vector<std::string> more = {}) {
+  std::vector<std::string> words{"measure", bench.scene(), "-o", bench / "report", "--quick", "--width",
+                                 "32",      "--spp",       "4"};
+  words.insert(words.end(), more.begin(), more.end());
+  return run_packtrace(words);
+}
+
+TEST(Measure, WritesAReportThatFollowsItsSchema) {
+  const Workbench bench;
+  const CommandResult result = measure(bench);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Json::parse(read_text(bench / "report/report.json"));
+  EXPECT_EQ(report["schema"], "packtrace-measure");
+  EXPECT_EQ(report["schema_version"], 1);
+  for (const char* key :
+       {"program", "command", "started", "seconds", "machine", "scene", "settings", "reference", "points", "default_id",
+        "fronts", "convergence", "lod", "tiles", "pictures", "answers", "counts"})
+    EXPECT_TRUE(report.contains(key)) << key;
+  EXPECT_EQ(report["answers"].size(), 5u);
+  EXPECT_FALSE(report["convergence"].empty());
+  for (const Json& point : report["points"]) {
+    for (const char* key :
+         {"id",          "label",     "group",       "status",         "error",       "reused",
+          "commands",    "knobs",     "bytes",       "resident_bytes", "position",    "distance",
+          "normal",      "triangles", "ao",          "seconds",        "cpu_seconds", "peak_bytes",
+          "mrays_per_s", "embree",    "speed_ratio", "ms_per_frame",   "histograms",  "worst_geometries",
+          "flags"})
+      EXPECT_TRUE(point.contains(key)) << point["id"] << key;
+    if (point["status"] != "ok") continue;
+    uint64_t sum = 0;
+    for (const Json& stream : point["bytes"]["streams"]) sum += stream["bytes"].get<uint64_t>();
+    EXPECT_EQ(sum, point["bytes"]["file"].get<uint64_t>()) << point["id"] << ": streams add up to the file";
+    EXPECT_GT(point["peak_bytes"]["render"].get<uint64_t>(), 0u);
+  }
+  for (const Json& picture : report["pictures"])
+    for (const char* key : {"float", "packed", "difference"})
+      EXPECT_TRUE(fs::exists(bench / ("report/" + picture[key].get<std::string>())));
+  for (const char* name : {"report.html", "report.csv"})
+    EXPECT_TRUE(fs::exists(bench / (std::string("report/") + name)));
+  EXPECT_FALSE(fs::exists(bench / "report/work")) << "baked files are removed";
+}
+
+TEST(Measure, ContinuesAndRefusesTheFolderOfAChangedScene) {
+  const Workbench bench;
+  ASSERT_EQ(measure(bench).exit_code, 0);
+  const CommandResult again = measure(bench, {"--json", "-"});
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  const Json counts = Json::parse(again.out)["counts"];
+  EXPECT_EQ(counts["reused"], counts["ok"]);
+  write_text(bench.scene(), small_scene_text() + "# changed\n");
+  const CommandResult changed = measure(bench);
+  EXPECT_EQ(changed.exit_code, 6) << changed.err;
+  EXPECT_NE(changed.err.find("--force"), std::string::npos) << changed.err;
+  EXPECT_EQ(measure(bench, {"--force"}).exit_code, 0);
+}
+
+TEST(Measure, ListsItsPointsWithoutRunningThem) {
+  const Workbench bench;
+  const CommandResult result = run_packtrace({"measure", bench.scene(), "--matrix"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find("bits-12"), std::string::npos);
+  EXPECT_EQ(run_packtrace({"measure", bench.scene()}).exit_code, 2) << "no folder";
+  EXPECT_EQ(run_packtrace({"measure", bench.scene(), "-o", bench.scene()}).exit_code, 6) << "a file";
+}
+
+TEST(Target, WritesTheSmallestFileThatKeepsTheLimitOrNone) {
+  const Workbench bench;
+  const std::string out = bench / "a.ptk";
+  const CommandResult found =
+      run_packtrace({"bake", bench.scene(), "-o", out, "--target", "ao-error=0.01", "--json", "-"});
+  ASSERT_EQ(found.exit_code, 0) << found.err;
+  const Json target = Json::parse(found.out)["target"];
+  const Json& chosen = target["tried"][target["chosen"].get<size_t>()];
+  EXPECT_LE(chosen["ao"]["mae"].get<double>(), 0.01);
+  EXPECT_EQ(chosen["bytes"]["file"].get<uint64_t>(), fs::file_size(out)) << "the measured file is the written one";
+  for (const Json& tried : target["tried"])
+    if (tried["ao"]["mae"].get<double>() <= 0.01) {
+      EXPECT_GE(tried["bytes"]["file"], chosen["bytes"]["file"]);
+    }
+  const CommandResult none = run_packtrace({"bake", bench.scene(), "-o", bench / "b.ptk", "--target", "size=10"});
+  EXPECT_EQ(none.exit_code, 5) << none.err;
+  EXPECT_FALSE(fs::exists(bench / "b.ptk"));
+  EXPECT_EQ(run_packtrace({"bake", bench.scene(), "-o", bench / "b.ptk", "--target", "speed=1"}).exit_code, 2);
+}
+
+TEST(Preset, OptionsOverrideIt) {
+  const Workbench bench;
+  const auto bake = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"bake", bench.scene(), "--dry-run", "--json", "-"});
+    return Json::parse(run_packtrace(more).out);
+  };
+  EXPECT_EQ(bake({"--preset", "smallest"})["disk"]["codec"], "small");
+  EXPECT_EQ(bake({"--preset", "smallest"})["trees"]["trees"], 0);
+  EXPECT_EQ(bake({"--preset", "smallest", "--codec", "none"})["disk"]["codec"], "none");
+  EXPECT_EQ(bake({"--preset", "exact"})["precision"]["value"], 24.0);
+  EXPECT_EQ(bake({"--preset", "exact", "--position-bits", "9"})["precision"]["value"], 9.0);
+  EXPECT_EQ(bake({"--preset", "balanced"})["disk"]["codec"], "fast");
+}
+
+TEST(Compare, MeasuresABakedFileAgainstItsScene) {
+  const Workbench bench;
+  bench.bake();
+  const CommandResult result =
+      run_packtrace({"compare", bench.baked(), bench.scene(), "--samples", "1000", "--json", "-"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json json = Json::parse(result.out);
+  const CommandResult info = run_packtrace({"info", bench.baked(), "--json", "-"});
+  const double bound = std::sqrt(3.0) * Json::parse(info.out)["max_position_error_bound"].get<double>() + 1e-12;
+  EXPECT_LE(json["distance"]["to_packed"]["max"].get<double>(), bound);
+  EXPECT_LE(json["distance"]["to_source"]["max"].get<double>(), bound);
+  EXPECT_GE(json["distance"]["samples"].get<uint64_t>(), 1000u - 64u);
+  EXPECT_EQ(json["missing_geometries"], 0);
+  EXPECT_EQ(run_packtrace({"compare", bench.scene(), bench.baked()}).exit_code, 2) << "the wrong way round";
+}
+
+} // namespace
+} // namespace packtrace::test
