@@ -13,8 +13,9 @@ if [ -z "${PACKTRACE_SCENES:-}" ] && [ -d ../shared/scenes ]; then
   export PACKTRACE_SCENES
 fi
 echo "== Debian packages"
-# Some tests need these: clang compiles the fuzz preset's kernels, and shells and man tools check the generated files.
-bash .ci/install_packages.sh tests benchmarks python clang-19 clang-format-19 clang-tidy-19 zsh fish mandoc groff-base
+# Some tests need these: clang compiles the fuzz preset's kernels, shells and man tools check the generated files, and
+# Chromium opens the HTML report.
+bash .ci/install_packages.sh tests benchmarks python clang-19 clang-format-19 clang-tidy-19 zsh fish mandoc groff-base chromium
 export CTEST_PARALLEL_LEVEL=${CTEST_PARALLEL_LEVEL:-$(nproc)}
 echo "== Format"
 find pbrt_import compress runtime tests assets docs \( -name '*.h' -o -name '*.cpp' \) -print0 |

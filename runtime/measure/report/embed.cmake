@@ -1,0 +1,37 @@
+# cmake -D OUTPUT=report_page.cpp -D "SCRIPTS=a.js b.js" -P embed.cmake: writes the page's files as C++ strings, with the
+# hashes for its Content-Security-Policy.
+cmake_minimum_required(VERSION 3.25)
+set(folder ${CMAKE_CURRENT_LIST_DIR})
+
+# Text that would end the string literal or the element early must not occur.
+function(check name content)
+  foreach(forbidden ")page\"" "\r" ${ARGN})
+    string(FIND "${content}" "${forbidden}" found)
+    if(NOT found EQUAL -1)
+      message(FATAL_ERROR "${name} contains ${forbidden}")
+    endif()
+  endforeach()
+endfunction()
+
+file(READ ${folder}/report.html kTemplate)
+file(READ ${folder}/report.css kStyle)
+set(kScript "")
+separate_arguments(SCRIPTS)
+foreach(script ${SCRIPTS})
+  file(READ ${folder}/${script} content)
+  string(APPEND kScript "${content}")
+endforeach()
+
+set(code "#include \"runtime/measure/report_page.h\"\n\nnamespace packtrace::report_page {\n\n")
+check(report.html "${kTemplate}")
+check(report.css "${kStyle}" "</style" "<!--")
+check("a script" "${kScript}" "</script" "<script" "<!--")
+foreach(name kTemplate kStyle kScript)
+  string(APPEND code "const std::string_view ${name} = R\"page(${${name}})page\";\n")
+endforeach()
+foreach(name kStyle kScript)
+  string(SHA256 hash "${${name}}")
+  string(APPEND code "const std::string_view ${name}Sha256 = \"${hash}\";\n")
+endforeach()
+string(APPEND code "\n} // namespace packtrace::report_page\n")
+file(WRITE ${OUTPUT} "${code}")

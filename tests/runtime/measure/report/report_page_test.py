@@ -1,0 +1,386 @@
+"""Checks report.html in a headless Chromium.
+
+Usage: report_page_test.py WRITE_SAMPLE_REPORT AXE_JS [FOLDER_FOR_SCREENSHOTS]
+Exit code 77 without Chromium.
+"""
+
+import json
+import os
+import re
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+import zlib
+
+from browser import Browser, find_chromium
+
+HOSTILE = "</script><script>window.pwned = 1</script><img src=x onerror=\"window.pwned=2\"> '\"&amp; \u202egnp"
+NOISE = 0.0118
+WRITER, AXE, SCREENSHOTS = "", "", None
+
+
+def png(width, height, pixel):
+    """Returns a PNG file; pixel(x, y) gives (red, green, blue)."""
+    rows = b"".join(b"\0" + b"".join(bytes(pixel(x, y)) for x in range(width)) for y in range(height))
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0))
+            + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+
+
+def ao(mae):
+    """An `ao` object of docs/measure.md."""
+    return {"mae": mae, "rmse": 6 * mae, "p99": 12 * mae, "psnr_db": 50.0, "ssim": 0.99, "flip": 7 * mae,
+            "mismatched_pixels": 4, "compared_pixels": 57000, "noise_ratio": mae / NOISE}
+
+
+def point(identifier, label, group, size, mae, rate, resident, bits=None, codec="none"):
+    """A measured point."""
+    geometries = [{"name": f"{HOSTILE} {i}", "geometry": i, "triangles": 1000 * (i + 1), "bytes": 9000 * (i + 1),
+                   "max_distance": 1e-5 * (10 - i), "max_normal_degrees": 0.04} for i in range(10)]
+    histogram = {"unit": "units", "edges": [0] + [1e-6 * 2 ** i for i in range(12)], "counts": list(range(12))}
+    return {
+        "id": identifier, "label": label, "group": group, "status": "ok", "error": None, "reused": False,
+        "commands": {"bake": f"packtrace bake '{HOSTILE}.pbrt' -o x.ptk # {identifier}", "render": "packtrace render x.ptk"},
+        "knobs": {"positions": {"kind": "bits" if bits else "default", "value": bits}, "normals": "auto", "uvs": "auto",
+                  "textures": "none", "codec": codec, "trees": "on", "lod": "off", "purpose": "ao", "spp": 64,
+                  "frames": 1, "denoise": False, "lod_error_px": None, "backend": "packed"},
+        "bytes": {"file": size, "memory": size, "per_triangle": size / 1.5e6,
+                  "streams": [{"name": name, "bytes": size // 2 >> i} for i, name in enumerate(
+                      ["positions", "trees", "normals", "indices", "cluster_records", "strings", "padding", "header"])]},
+        "resident_bytes": resident, "position": {"max": mae / 10, "rms": mae / 20, "max_of_diagonal": 1e-7, "grid_step": 2e-5},
+        "distance": {side: {"max": mae / 10, "mean": mae / 90, "rms": mae / 50} for side in ("to_packed", "to_source")},
+        "normal": {"max_degrees": 0.04, "mean_degrees": 0.02, "sampled_max_degrees": 0.9, "sampled_mean_degrees": 0.02},
+        "triangles": {"stored": 1500000, "collapsed": 284, "coinciding": 264}, "ao": ao(mae),
+        "seconds": {"import": 0.2, "bake": 1.75, "open": 0.008, "bvh": 0.001, "first_ray": 0.009, "render": 0.4},
+        "cpu_seconds": {"bake": 2.7, "render": 0.8}, "peak_bytes": {"bake": 129499136, "render": 33764147},
+        "mrays_per_s": {"camera": 2.7, "ao": rate}, "embree": {"camera": 5.1, "ao": 7.7},
+        "speed_ratio": {"camera": 0.5, "ao": rate / 7.7}, "ms_per_frame": {"camera": 23.0, "ao": 351.0, "denoise": 0},
+        "histograms": {"position": histogram, "normal": histogram, "ao": histogram},
+        "worst_geometries": {"by_error": geometries, "by_bytes": geometries[::-1]},
+        "flags": {"default": identifier == "default", "dominated": False, "knee": identifier == "bits-14",
+                  "fronts": ["bytes-error"]}}
+
+
+def sample():
+    """A report with every part."""
+    points = [point("default", "default", "default", 11_800_000, 0.000146, 10.5, 12_400_000)]
+    for bits in range(8, 23, 2):
+        points.append(point(f"bits-{bits}", f"{bits} bits per coordinate", "positions", 5_300_000 + bits * 213_000,
+                            0.0001 + 0.0167 * 2 ** -((bits - 8) / 1.4), 11.5 - bits / 20, 8_000_000 + bits * 200_000, bits))
+    points.append(point("small", "codec small", "codec", 8_230_000, 0.000146, 10.5, 15_300_000, codec="small"))
+    points.append(point("trees-off", HOSTILE, "trees", 8_810_000, 0.000146, 10.4, 18_400_000))
+    points.append(point("levels", "levels for all geometries", "lod", 21_000_000, 0.000146, 10.2, 21_600_000))
+    failed = {key: None for key in points[0]} | {
+        "id": "bits-40", "label": "40 bits per coordinate", "group": "positions", "status": "failed", "reused": False,
+        "error": {"stage": "bake", "exit_code": 3, "signal": None, "message": HOSTILE},
+        "commands": points[0]["commands"], "knobs": points[0]["knobs"],
+        "flags": {"default": False, "dominated": None, "knee": False, "fronts": []}}
+    fronts = [{"name": name, "x": x, "y": y, "x_label": x, "y_label": y, "knee_id": "bits-14",
+               "ids": [p["id"] for p in points if p["group"] == "positions"]}
+              for name, x, y in (("bytes-error", "bytes.file", "ao.mae"), ("bytes-distance", "bytes.file", "distance.to_source.rms"),
+                                 ("speed-error", "mrays_per_s.ao", "ao.mae"), ("memory-error", "resident_bytes", "ao.mae"))]
+    pictures = [{"id": i, "title": HOSTILE if i == "default" else i, "width": 32, "height": 18, "float": "pictures/float.png",
+                 "packed": f"pictures/{i}.png", "difference": "pictures/difference.png", "difference_white": 0.05}
+                for i in ("default", "bits-10")]
+    tiles = [{"point_id": "bits-10", "x": 32 * i, "y": 0, "width": 32, "height": 32, "mae": 0.09, "max": 0.8, "geometry": HOSTILE,
+              "float": "pictures/float.png", "packed": "pictures/bits-10.png", "difference": "pictures/difference.png"} for i in range(4)]
+    return {
+        "schema": "packtrace-measure", "schema_version": 1, "program": {"name": "packtrace", "version": "0.1.0"},
+        "command": f"packtrace measure '{HOSTILE}'", "started": "2026-01-31T12:00:00Z", "seconds": 181.2,
+        "machine": {"cpu": HOSTILE, "hardware_threads": 2, "threads": 2, "memory_bytes": 17179869184, "system": "Linux", "isa": "avx2"},
+        "scene": {"path": HOSTILE, "name": HOSTILE, "triangles": 1570630, "placed_triangles": 1570630, "geometries": 270,
+                  "instances": 270, "materials": 30, "cameras": 1, "files": 272, "file_bytes": 49040959, "float_bytes": 38000000,
+                  "diagonal": 52.9, "bounds": {"lo": [0, 0, 0], "hi": [1, 1, 1]}, "median_edge": 0.003},
+        "settings": {"mode": "default", "width": 320, "height": 180, "camera": 0, "ao_radius": 5.29, "spp": 64, "seed": 0,
+                     "noise_seed": 1, "distance_samples": 200000, "tile_px": 32, "embree_beside_each_point": True},
+        "reference": {"commands": [], "noise_floor": ao(NOISE), "mean_ao": 0.7}, "points": points + [failed],
+        "default_id": "default", "fronts": fronts,
+        "convergence": [{"frames": 2 ** i, "spp": 1, "noisy": ao(0.16 / 2 ** (i / 2)), "denoised": ao(0.03 / 2 ** (i / 4)),
+                         "ms_per_frame": {"ao": 5.6, "denoise": 4.2}} for i in range(7)],
+        "lod": [{"error_px": e, "triangles": int(1.5e6 / (1 + 2 * e)), "traced_ratio": 1.0, "ao": ao(0.00015 + 0.002 * e),
+                 "mrays_per_s": {"camera": 2.5, "ao": 10.5 + e}, "ms_per_frame": {"camera": 23, "ao": 350}} for e in (0, 0.5, 1, 2, 4)],
+        "tiles": tiles, "pictures": pictures,
+        "answers": [{"question": f"Question {i}?", "text": f"Answer {i} {HOSTILE}", "command": "packtrace", "figures": []} for i in range(5)],
+        "counts": {"points": len(points) + 1, "ok": len(points), "failed": 1, "reused": 0}}
+
+
+def smallest(report, limit):
+    """The smallest file within an AO error: what the page must answer."""
+    fit = [p for p in report["points"] if p["status"] == "ok" and p["ao"]["mae"] <= limit]
+    return min(fit, key=lambda p: p["bytes"]["file"]) if fit else None
+
+
+class ReportPage(unittest.TestCase):
+    """Each test loads the page anew."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory(prefix="report-page-")
+        cls.report = sample()
+        pictures = os.path.join(cls.folder.name, "pictures")
+        os.mkdir(pictures)
+        for name, tint in (("float", 0), ("default", 1), ("bits-10", 40), ("difference", 90)):
+            with open(os.path.join(pictures, f"{name}.png"), "wb") as file:
+                file.write(png(32, 18, lambda x, y, t=tint: ((8 * x + t) % 256, 8 * x, 12 * y)))
+        cls.page = cls.write(cls.report, "report")
+        cls.browser = Browser(find_chromium())
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.browser.close()
+        cls.folder.cleanup()
+
+    @classmethod
+    def write(cls, report, name):
+        """Writes NAME.html as `packtrace measure` does."""
+        source, page = (os.path.join(cls.folder.name, f"{name}.{ending}") for ending in ("json", "html"))
+        with open(source, "w", encoding="utf-8") as file:
+            json.dump(report, file)
+        subprocess.run([WRITER, source, page], check=True)
+        return page
+
+    def open(self, width=1280, height=900, dark=False, page=None):
+        """Opens the page."""
+        self.browser.open(page or self.page, width, height, dark)
+
+    def js(self, expression):
+        """Value of an expression in the page."""
+        return self.browser.evaluate(expression)
+
+    def frame(self):
+        """Waits until the page was drawn again."""
+        self.js("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+    def check_silence(self):
+        """Neither messages nor requests other than the page and its data: pictures."""
+        self.assertEqual(self.browser.console, [])
+        other = [url for url in self.browser.requests if not url.startswith("data:image/png;base64,")]
+        self.assertEqual([url.split("/")[-1] for url in other if url.startswith("file:")], [other[0].split("/")[-1]])
+        self.assertEqual(len(other), 1, other)
+
+    def test_opens_without_messages_and_requests(self):
+        self.open()
+        self.check_silence()
+        self.assertLess(os.path.getsize(self.page), 2_000_000)
+
+    def test_a_forbidden_script_and_request_would_be_noticed(self):
+        self.open()
+        self.js("""(() => { const s = document.createElement('script'); s.textContent = 'window.pwned = 3';
+                   document.body.append(s); return fetch('https://example.org/').catch(() => 0); })()""")
+        self.assertIsNone(self.js("window.pwned ?? null"), "the policy stops scripts that are not the page's own")
+        self.assertIn("Content Security Policy", " ".join(self.browser.console))
+        self.assertEqual([url for url in self.browser.requests if url.startswith("http")], [])
+
+    def test_names_of_the_scene_stay_text(self):
+        self.open()
+        self.assertIsNone(self.js("window.pwned ?? null"))
+        self.assertEqual(self.js("document.querySelectorAll('script').length"), 2)
+        self.assertEqual(self.js("document.querySelectorAll('img[src=x]').length"), 0)
+        self.assertEqual(self.js("document.querySelector('h1 .name').textContent"), HOSTILE)
+        self.assertEqual(self.js("document.title"), f"{HOSTILE} – packtrace measure")
+        for part in ("#point", "#pictures", "#all", "#how"):
+            self.assertIn(HOSTILE, self.js(f"document.querySelector('{part}').textContent"), part)
+
+    def test_every_plot_is_drawn(self):
+        self.open()
+        plots = json.loads(self.js("""JSON.stringify([...document.querySelectorAll('main svg')].map(svg => {
+            const box = svg.getBoundingClientRect(), marks = [...svg.querySelectorAll('.mark, .bar')];
+            return {name: svg.getAttribute('aria-label'), width: box.width, height: box.height, marks: marks.length,
+                    bad: svg.outerHTML.includes('NaN') || svg.outerHTML.includes('Infinity'),
+                    outside: marks.filter(m => { const b = m.getBoundingClientRect();
+                      return b.left < box.left - 1 || b.right > box.right + 1 || b.top < box.top - 1 || b.bottom > box.bottom + 1; }).length};
+            }))"""))
+        # The noise scale, four fronts, streams, levels, the denoiser and three histograms.
+        self.assertEqual(len(plots), 11, [p["name"] for p in plots])
+        for shown in plots:
+            with self.subTest(shown["name"]):
+                self.assertGreater(shown["width"], 150)
+                self.assertGreater(shown["height"], 70)
+                self.assertGreaterEqual(shown["marks"], 2)
+                self.assertEqual(shown["outside"], 0)
+                self.assertFalse(shown["bad"])
+        measured = sum(p["status"] == "ok" for p in self.report["points"])
+        self.assertEqual([p["marks"] for p in plots if "front" in p["name"]], [measured] * 4)
+
+    def test_every_plot_has_a_table(self):
+        self.open()
+        self.assertEqual(self.js("document.querySelectorAll('main figure svg').length"),
+                         self.js("document.querySelectorAll('main figure .alternative tbody tr:first-child').length"))
+
+    def test_the_slider_moves_the_answer(self):
+        self.open()
+        seen = set()
+        self.js("document.getElementById('limit-slider').focus()")
+        for key in ["PageUp"] * 4 + ["ArrowRight"] * 4:
+            self.browser.key(key)
+            limit = float(self.js("document.getElementById('limit').value"))
+            best = smallest(self.report, limit)
+            command = self.js("document.querySelector('#goals .goal:first-child code')?.textContent ?? null")
+            self.assertEqual(command, best and best["commands"]["bake"], limit)
+            seen.add(command)
+        self.assertGreater(len(seen), 2)
+        self.check_silence()
+
+    def test_the_field_moves_the_answer_and_refuses_nonsense(self):
+        self.open()
+
+        def type_limit(text):
+            self.js(f"""(() => {{ const f = document.getElementById('limit'); f.value = {json.dumps(text)};
+                        f.dispatchEvent(new Event('input', {{bubbles: true}})); }})()""")
+
+        for limit in (0.02, 0.003, 0.0005, 0.00015):
+            type_limit(str(limit))
+            best = smallest(self.report, limit)
+            self.assertEqual(self.js("document.querySelector('#goals code').textContent"), best["commands"]["bake"])
+            self.assertIn(best["label"], self.js("document.getElementById('answer-1').textContent"))
+        before = self.js("document.getElementById('answer-1').textContent")
+        for text in ("", "-1", "abc", "Infinity"):
+            type_limit(text)
+            self.assertEqual(self.js("document.getElementById('limit').getAttribute('aria-invalid')"), "true", text)
+            self.assertEqual(self.js("document.getElementById('answer-1').textContent"), before)
+        type_limit("1e-9")
+        self.assertIn("No measured point", self.js("document.getElementById('answer-1').textContent"))
+
+    def test_the_first_screen_answers_five_questions(self):
+        self.open(1280, 900)
+        for i in range(1, 6):
+            with self.subTest(question=i):
+                box = json.loads(self.js(f"JSON.stringify(document.getElementById('answer-{i}').getBoundingClientRect())"))
+                self.assertGreater(box["height"], 10)
+                self.assertLessEqual(box["bottom"], 900)
+        self.assertGreaterEqual(self.js("[...document.querySelectorAll('#answers .copy')].filter(b => b.getBoundingClientRect().bottom < 900).length"), 3)
+
+    def test_bits_change_what_is_lost(self):
+        self.open()
+        before = self.js("document.getElementById('answer-2').textContent")
+        self.js("document.getElementById('bits').focus()")
+        self.browser.key("ArrowRight")
+        self.assertNotEqual(self.js("document.getElementById('answer-2').textContent"), before)
+        self.assertEqual(self.js("document.querySelectorAll('.crops img').length"), 9)
+
+    def test_keys_move_between_points_and_select(self):
+        self.open()
+        self.js("document.querySelector('#trade .mark[tabindex=\"0\"]').focus()")
+        first = self.js("document.activeElement.getAttribute('aria-label')")
+        self.browser.key("ArrowRight")
+        second = self.js("document.activeElement.getAttribute('aria-label')")
+        self.assertNotEqual(first, second)
+        self.browser.key("Enter", "\r")
+        label = second.split(":")[0]
+        self.assertIn(label, self.js("document.getElementById('chosen').textContent"))
+        self.assertEqual(self.js("document.getElementById('point-choice').selectedOptions[0].textContent"), label)
+        self.frame()
+        self.assertEqual(self.js("document.querySelectorAll('#trade .halo').length"), 4)
+        self.assertIn(label, self.js("document.activeElement.getAttribute('aria-label') || ''"), "the focus stays on the point")
+
+    def test_hovering_shows_figures_and_command(self):
+        self.open()
+        self.js("document.documentElement.style.scrollBehavior = 'auto'; document.getElementById('trade').scrollIntoView()")
+        box = json.loads(self.js("JSON.stringify(document.querySelector('#trade path.mark').getBoundingClientRect())"))
+        self.browser.move_mouse(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        self.browser.wait_for("!document.getElementById('tip').hidden")
+        text = self.js("document.getElementById('tip').textContent")
+        for part in ("14 bits per coordinate", "# bits-14", "AO error", "M/s", "MB"):
+            self.assertIn(part, text)
+
+    def test_the_comparator_moves(self):
+        self.open()
+        clip = "getComputedStyle(document.querySelector('.stage .over')).clipPath"
+        before = self.js(clip)
+        self.js("document.getElementById('wipe').focus()")
+        self.browser.key("ArrowLeft")
+        self.assertNotEqual(self.js(clip), before)
+        self.assertTrue(self.js("[...document.images].every(i => i.complete && i.naturalWidth > 0)"))
+        self.assertEqual(self.js("document.querySelectorAll('.tiles img').length"), 12)
+
+    def test_tables_sort(self):
+        self.open()
+        read = "JSON.stringify([...document.querySelectorAll('#all tbody')[0].rows].map(r => r.cells[2].textContent))"
+        click = "[...document.querySelectorAll('#all .sort')].find(b => b.textContent === 'File').click()"
+        self.js(click)
+        sizes = sorted((p["bytes"]["file"] for p in self.report["points"] if p["status"] == "ok"), reverse=True)
+        shown = json.loads(self.js(read))
+        self.assertEqual([round(float(text.split("\u00a0")[0]), 3) for text in shown], [float(f"{s / 1e6:.3g}") for s in sizes])
+        self.assertEqual(self.js("document.querySelector('#all [aria-sort]').getAttribute('aria-sort')"), "descending")
+        self.js(click)
+        self.assertEqual(json.loads(self.js(read)), shown[::-1])
+
+    def test_the_theme_follows_the_system_and_the_button(self):
+        background = "getComputedStyle(document.body).backgroundColor"
+        self.open()
+        light = self.js(background)
+        self.js("document.getElementById('theme').click()")
+        dark = self.js(background)
+        self.assertNotEqual(light, dark)
+        self.js("localStorage.clear()")
+        self.open(dark=True)
+        self.assertEqual(self.js(background), dark)
+
+    def test_a_phone_needs_no_sideways_scrolling(self):
+        self.open(390, 844)
+        self.assertLessEqual(self.js("document.documentElement.scrollWidth"), 390)
+        self.assertGreaterEqual(float(self.js("parseFloat(getComputedStyle(document.querySelector('.answer')).fontSize)")), 14)
+
+    def test_it_prints(self):
+        self.open()
+        pdf = self.browser.call("Page.printToPDF", printBackground=True)["data"]
+        self.assertTrue(pdf.startswith("JVBERi0"), "the signature of PDF files in base64")
+        self.check_silence()
+
+    def test_axe_finds_no_barrier(self):
+        with open(AXE, encoding="utf-8") as file:
+            axe = file.read()
+        for width, height, dark in ((1280, 900, False), (1280, 900, True), (390, 844, False)):
+            with self.subTest(width=width, dark=dark):
+                self.open(width, height, dark)
+                self.js("for (const d of document.querySelectorAll('details')) d.open = true")
+                self.js(axe + "; 0")
+                found = json.loads(self.js("axe.run().then(r => JSON.stringify({passes: r.passes.length, violations: "
+                                           "r.violations.map(v => [v.id, v.nodes[0].html, v.nodes[0].failureSummary])}))"))
+                self.assertEqual(found["violations"], [])
+                self.assertGreater(found["passes"], 20)
+
+    def test_reports_that_lack_parts_open_too(self):
+        for name, report in (("empty", {}), ("failed", {"points": [self.report["points"][-1]], "scene": {"name": "x"}}),
+                             ("single", {"points": self.report["points"][:1], "default_id": "default"}),
+                             ("no-fronts", self.report | {"fronts": [], "lod": [], "convergence": [], "pictures": [], "tiles": [], "reference": None})):
+            with self.subTest(name):
+                self.open(page=self.write(report, name))
+                self.check_silence()
+                self.assertGreater(len(re.sub(r"\s", "", self.js("document.getElementById('main').textContent"))), 100)
+
+    def test_zero_errors_are_drawn(self):
+        report = sample()
+        for p in report["points"][:3]:
+            p["ao"] = ao(0.0)
+        self.open(page=self.write(report, "zeros"))
+        self.check_silence()
+        self.assertFalse(self.js("[...document.querySelectorAll('main svg')].some(s => s.outerHTML.includes('NaN'))"))
+
+    def test_missing_pictures_are_said(self):
+        report = sample()
+        report["pictures"][0]["packed"] = "pictures/none.png"
+        self.open(page=self.write(report, "missing"))
+        self.assertIn("1 picture", self.js("document.getElementById('left-out').textContent"))
+        self.check_silence()
+
+    def test_screenshots(self):
+        if not SCREENSHOTS:
+            self.skipTest("no folder for screenshots")
+        for name, width, height, dark in (("light", 1280, 900, False), ("dark", 1280, 900, True), ("phone", 390, 844, False)):
+            self.open(width, height, dark)
+            self.browser.screenshot(os.path.join(SCREENSHOTS, f"{name}.png"))
+
+
+if __name__ == "__main__":
+    if not find_chromium():
+        print("Skipped: no Chromium (Debian package chromium)")
+        sys.exit(77)
+    WRITER, AXE = sys.argv[1:3]
+    SCREENSHOTS = sys.argv[3] if len(sys.argv) > 3 else None
+    unittest.main(argv=sys.argv[:1])
