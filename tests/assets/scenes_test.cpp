@@ -92,6 +92,7 @@ TEST(Generators, TreesStandOnTheGround) {
   generate_forest({5, 1'000'000, 0}, {folder / "forest", false});
   const Scene scene = import_quietly(folder / "forest/forest.pbrt").scene;
   const Mesh& ground = scene.meshes[scene.shapes.at(0).mesh];
+  ASSERT_GT(scene.instances.size(), 100u);
   for (const Instance& instance : scene.instances) {
     const Vec3 foot = instance.world_from_object[3];
     double nearest = 1e30, height = 0.0; // of the ground point next to it in plan

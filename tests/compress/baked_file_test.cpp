@@ -218,6 +218,20 @@ TEST(BakedFile, MaterialSlotsAreChecked) {
             damaged + "cluster 0: material slot");
 }
 
+TEST(BakedFile, MaskedClustersNeedTextureCoordinates) {
+  const std::vector<std::byte> bytes = test::bake(full_scene()).bytes;
+  const BakedFile file = BakedFile::from_bytes(bytes);
+  ASSERT_EQ(file.clusters(1).size(), 1u); // masked
+  const baked::ClusterRecord record = file.clusters(1)[0];
+  ASSERT_NE(record.flags & baked::kClusterHasUvs, 0);
+  constexpr size_t kWord = offsetof(baked::ClusterRecord, flags) - 3; // the u32 with the flags in its highest byte
+  uint32_t word = 0;
+  std::memcpy(&word, reinterpret_cast<const std::byte*>(&record) + kWord, sizeof word);
+  const size_t at = static_cast<size_t>(file.geometries()[1].first_cluster) * sizeof record + kWord;
+  EXPECT_EQ(message_after(bytes, baked::kClusters, at, word & ~(uint32_t{baked::kClusterHasUvs} << 24)),
+            "memory: damaged baked file: cluster 1: masked material without texture coordinates");
+}
+
 TEST(BakedFile, RequirementsAreChecked) {
   const std::vector<std::byte> bytes = test::bake(full_scene()).bytes;
   ASSERT_GE(BakedFile::from_bytes(bytes).sections().requirements.size(), 3u);

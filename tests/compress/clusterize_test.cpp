@@ -128,5 +128,20 @@ TEST(CutClusters, ClustersAreCompact) {
   EXPECT_LT(covered_area(mesh, cut(mesh)), 1.5);
 }
 
+TEST(CutClusters, PartsAreNotSplitToFillTheClusterBefore) {
+  // Two heaps of loose triangles, 120 and 60: a cluster holds the vertices of 85.
+  test::Random random(6);
+  Mesh mesh;
+  for (uint32_t i = 0; i < 180; ++i) {
+    const Vec3 at(i < 120 ? 0.0f : 1000.0f, 0.0f, 0.0f);
+    for (int corner = 0; corner < 3; ++corner)
+      mesh.positions.push_back(at + Vec3(random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)));
+    mesh.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+  }
+  const Clusters clusters = cut(mesh);
+  expect_valid(mesh, clusters);
+  EXPECT_EQ(clusters.ends, (std::vector<uint32_t>{85, 120, 180}));
+}
+
 } // namespace
 } // namespace packtrace

@@ -81,7 +81,9 @@ TEST_P(PageCodecs, EveryFileComesBackBitForBit) {
     DiskForm form;
     EXPECT_TRUE(expand_paged_file(disk, "memory", form) == plain);
     EXPECT_EQ(form.file_bytes, disk.size());
-    for (const baked::PageRecord& page : pages_of(disk))
+    const auto pages = pages_of(disk);
+    EXPECT_EQ(pages.empty(), scene.shapes.empty() && scene.instances.empty());
+    for (const baked::PageRecord& page : pages)
       EXPECT_EQ(page.form, static_cast<uint32_t>(GetParam())) << "a page was stored, not coded";
   }
 }
@@ -138,6 +140,11 @@ TEST_P(PageCodecs, EveryTruncatedPrefixIsRefused) {
     ASSERT_EQ(open_kind(std::span(bytes).first(size)), ErrorKind::kInput) << size;
   Bytes longer = bytes;
   longer.resize(bytes.size() + 1);
+  EXPECT_EQ(open_kind(longer), ErrorKind::kInput);
+  baked::PagedHeader header = header_of(longer); // counts the surplus byte, which is in no page
+  header.file_bytes = longer.size();
+  std::memcpy(longer.data(), &header, sizeof header);
+  test::rehash_pages(longer);
   EXPECT_EQ(open_kind(longer), ErrorKind::kInput);
 }
 

@@ -1,5 +1,7 @@
 // Preview conventions of .png files: colours of pixels without a hit, and the meaning of the layers' colours.
 
+#include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -54,6 +56,10 @@ TEST(Preview, TheBackgroundCanBeChosen) {
   ASSERT_EQ(clear.channels, 4u);
   EXPECT_EQ(clear.pixel(0, 0)[3], 0.0f);
   EXPECT_EQ(clear.pixel(32, 40)[3], 1.0f);
+  uint32_t quarters = 0; // pixels of which one or three samples hit
+  for (size_t i = 3; i < clear.data.size(); i += 4)
+    quarters += std::abs(clear.data[i] - 0.25f) < 0.01f || std::abs(clear.data[i] - 0.75f) < 0.01f;
+  EXPECT_GT(quarters, 0u);
   for (const char* wrong : {"#ff80", "reddish", "", "#gggggg"})
     EXPECT_EQ(run_packtrace({"render", bench.scene(), "-o", bench / "y.png", "--background", wrong}).exit_code, 2)
         << wrong;

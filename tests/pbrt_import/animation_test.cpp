@@ -87,6 +87,10 @@ TEST(Interpolation, RotationTakesTheShorterWay) {
   const AnimatedTransform keys = *animate(turned(170), turned(190), {});
   EXPECT_GE(glm::dot(keys.start.rotation, keys.end.rotation), 0.0);
   expect_near(interpolate(keys, 0.5), turned(180), 1e-12);
+  // Of these two the quaternions with the largest component positive are in opposite hemispheres.
+  const AnimatedTransform apart = *animate(turned(10), turned(220), {});
+  EXPECT_GE(glm::dot(apart.start.rotation, apart.end.rotation), 0.0);
+  expect_near(interpolate(apart, 0.5), turned(-65), 1e-12);
 }
 
 TEST(Interpolation, TranslationAndScaleAreBlendedLinearly) {

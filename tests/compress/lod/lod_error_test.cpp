@@ -98,6 +98,7 @@ TEST_P(LodErrorOf, IsNotBelowTheDistanceOfCuts) {
 TEST(LodError, OfCoarseLevelsIsNotFarAboveTheDistance) {
   const LodSurfaces surfaces(build_lod(torus_mesh(200, 120)));
   const ClusterLod& lod = surfaces.lod();
+  ASSERT_GE(lod.level_count, 4u);
   const std::vector<Triangle> base = surfaces.triangles_of(cut_clusters(lod, 0.0));
   for (uint32_t level = 0; level + 1 < lod.level_count; ++level) {
     double threshold = 0.0;
@@ -123,6 +124,7 @@ TEST(LodError, OfTheLastTrianglesIsNotBelowTheDistance) {
     }
     const LodSurfaces surfaces(build_lod(mesh));
     const ClusterLod& lod = surfaces.lod();
+    ASSERT_GE(lod.level_count, 2u);
     const std::vector<Triangle> base = surfaces.triangles_of(cut_clusters(lod, 0.0));
     for (const LodGroup& group : lod.groups) {
       if (group.terminal) continue;

@@ -126,6 +126,8 @@ TEST(SharedBorders, AClosedSurfaceOfSeveralGeometriesIsClosedAtEveryPairOfLevels
 
 TEST(SharedBorders, CutsOfAnyViewsAreClosedAcrossGeometries) {
   const std::vector<ClusterLod> parts = bake_levels(scene_of_parts(torus_parts()));
+  ASSERT_GE(parts.size(), 2u);
+  for (const ClusterLod& part : parts) ASSERT_GE(part.level_count, 2u);
   Random random(3);
   for (int repeat = 0; repeat < 200; ++repeat) {
     Chain chain;

@@ -107,6 +107,8 @@ TEST(Vertex16Export, VerticesAreDistinctAndDrawsMerged) {
   const BakedFile file = BakedFile::from_bytes(test::bake(test::mixed_scene()).bytes);
   const Vertex16Export exported = export_of(file);
   const Sections s = vertex16::validate(exported.bytes, "test");
+  ASSERT_EQ(s.geometries.size(), file.base_geometry_count());
+  ASSERT_FALSE(s.draws.empty());
   for (const vertex16::GeometryRecord& g : s.geometries) {
     std::set<std::array<uint32_t, 4>> distinct;
     for (uint32_t v = 0; v < g.vertex_count; ++v) {

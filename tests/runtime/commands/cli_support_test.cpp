@@ -15,6 +15,7 @@
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/output_file.h"
 #include "pbrt_import/base/progress.h"
+#include "runtime/commands/option_checks.h"
 #include "tests/temporary_folder.h"
 
 namespace packtrace {
@@ -181,6 +182,13 @@ TEST(CliSupport, FilesAreNoTerminals) {
   EXPECT_FALSE(is_terminal(file));
   EXPECT_FALSE(wants_color(file));
   std::fclose(file);
+}
+
+TEST(NumberIn, IncludesBothEnds) {
+  const CLI::Validator check = number_in(0.5, 8.0);
+  for (const char* const text : {"0.5", "3", "8"}) EXPECT_EQ(check(std::string(text)), "") << text;
+  for (const char* const text : {"0.499", "8.001", "-1", "nan", "wide"})
+    EXPECT_NE(check(std::string(text)), "") << text;
 }
 
 } // namespace

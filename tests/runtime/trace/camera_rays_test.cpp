@@ -136,6 +136,13 @@ TEST(PrimaryCamera, EnvironmentCoversTheSphereLikePbrt) {
   EXPECT_NEAR(primary.project({0, -3, 0})->view_z, 3.0, 1e-12);
 }
 
+TEST(PrimaryCamera, PixelsOfAnEnvironmentSpreadByTheirShorterSide) {
+  Camera camera;
+  camera.projection = Projection::kEnvironment;
+  EXPECT_NEAR(PrimaryCamera(camera, {8, 8}).pixel_spread(), kPi / 8, 1e-12);
+  EXPECT_NEAR(PrimaryCamera(camera, {32, 8}).pixel_spread(), 2 * kPi / 32, 1e-12);
+}
+
 TEST(PrimaryCamera, ProjectionInvertsRays) {
   Camera camera = perspective(35);
   camera.world_from_camera = *look_at(DVec3(3, 4, -9), DVec3(1, 0, 2), DVec3(0.1, 1, 0));

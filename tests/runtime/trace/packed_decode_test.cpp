@@ -106,5 +106,21 @@ TEST(TraceCluster, LeavesWhatDoesNotFitToTheExactDecoder) {
   }
 }
 
+TEST(TraceCluster, LeavesCoordinatesBeyond32BitsToTheExactDecoder) {
+  Scene scene;
+  test::add_shape(scene, test::sphere({0, 0, 0}, 1, 16));
+  const test::BakedScene sphere(scene);
+  baked::TreeRecord tree = build_packed_trees(sphere.file.sections()).trees[0];
+  const auto cluster = [&] {
+    return trace_cluster(tree, sphere.file.geometries()[0], sphere.file.cluster(0, 0), packed::kSeenByCamera);
+  };
+  const packed::TraceCluster near = cluster();
+  ASSERT_EQ(near.flags & packed::kNeedsWideDecode, 0);
+  ASSERT_GT(near.position_bits[0], near.down + 1);
+  // Moves the lowest x to the largest 32-bit integer, or to less than a step of the tree's grid below it.
+  tree.origin[0] -= (int64_t{std::numeric_limits<int32_t>::max()} - near.base[0]) >> near.down;
+  EXPECT_NE(cluster().flags & packed::kNeedsWideDecode, 0);
+}
+
 } // namespace
 } // namespace packtrace

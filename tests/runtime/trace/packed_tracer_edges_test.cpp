@@ -175,6 +175,17 @@ TEST(TreeHull, IsCloserThanTheTurnedRootsBoxAndHoldsAllThatIsHit) {
     }
   }
   EXPECT_GT(vertices, 3000u);
+  // Rays in the grid have errors of up to 2^-22 of its largest coordinate, so boxes of unaligned trees are padded.
+  const DVec3 far = glm::max(glm::abs(hull.lo()), glm::abs(hull.hi()));
+  const double error = 0x1p-22 * std::max({far.x, far.y, far.z});
+  const TreeBox padded = hull.placed(DAffine(1.0));
+  const std::vector<TreeBox> parts = hull.placed_parts(DAffine(1.0), true); // without padding
+  ASSERT_FALSE(parts.empty());
+  for (const TreeBox& part : parts)
+    for (size_t axis = 0; axis < 3; ++axis) {
+      EXPECT_LE(double{padded.lo[axis]}, double{part.lo[axis]} - 2 * error);
+      EXPECT_GE(double{padded.hi[axis]}, double{part.hi[axis]} + 2 * error);
+    }
 }
 
 TEST(PackedTracer, TracesManyInstances) {

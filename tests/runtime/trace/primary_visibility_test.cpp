@@ -99,6 +99,7 @@ TEST(PrimaryVisibility, EmptyScenesMissEverywhere) {
 TEST(PrimaryVisibility, CamerasFarAwaySeeWhatTheyPointAt) {
   Camera camera = camera_at({0, 0, -3e19}, {0, 0, 0}, 90);
   const GBuffer wide = trace(wall_scene(), camera, {8, 8});
+  ASSERT_EQ(wide.instance.size(), 64u);
   for (const uint32_t instance : wide.instance)
     EXPECT_EQ(instance, kNoInstance) << "the wall is far smaller than a pixel";
   camera.projection = Projection::kOrthographic;
@@ -209,6 +210,7 @@ TEST(PrimaryVisibility, MotionLeadsToThePreviousPlace) {
   const GBuffer g = trace(scene, now, previous);
   // The image shows 10 units of the wall in 20 pixels; the point at the centre of a pixel was one pixel farther right
   // in the previous image.
+  ASSERT_EQ(g.motion_px.size(), size.pixels());
   for (const Vec2 motion : g.motion_px) {
     EXPECT_NEAR(motion.x, -1.0f, 1e-4f);
     EXPECT_NEAR(motion.y, 0.0f, 1e-4f);
@@ -218,7 +220,9 @@ TEST(PrimaryVisibility, MotionLeadsToThePreviousPlace) {
 TEST(PrimaryVisibility, MotionOfPointsBehindThePreviousCameraLeavesTheImage) {
   const ImageSize size{8, 8};
   const PrimaryCamera previous(camera_at({0, 0, 9}, {0, 0, 10}), size), now(camera_at({0, 0, 0}, {0, 0, 1}), size);
-  for (const Vec2 motion : trace(wall_scene(), now, previous).motion_px) EXPECT_EQ(motion, Vec2(kNoMotionPx));
+  const GBuffer g = trace(wall_scene(), now, previous);
+  ASSERT_EQ(g.motion_px.size(), size.pixels());
+  for (const Vec2 motion : g.motion_px) EXPECT_EQ(motion, Vec2(kNoMotionPx));
 }
 
 TEST(PrimaryVisibility, SubPixelOffsetMovesTheSamples) {
