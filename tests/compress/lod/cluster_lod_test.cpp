@@ -33,7 +33,7 @@ std::vector<std::vector<uint32_t>> clusters_in(const ClusterLod& lod) {
 
 class ClusterLodOf : public testing::TestWithParam<NamedMesh> {
 protected:
-  const BuiltLod built_ = build_lod(GetParam().make());
+  const BuiltLod& built_ = built_lod(GetParam());
   const ClusterLod& lod_ = built_.lod;
 };
 

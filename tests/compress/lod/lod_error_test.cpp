@@ -54,7 +54,7 @@ protected:
 
 class LodErrorOf : public LodSurfaces, public testing::TestWithParam<NamedMesh> {
 protected:
-  LodErrorOf() : LodSurfaces(build_lod(GetParam().make())) {}
+  LodErrorOf() : LodSurfaces(built_lod(GetParam())) {}
 };
 
 /// Tested in this direction only: the clusters of level 0 that a group was made from extend beyond the group.

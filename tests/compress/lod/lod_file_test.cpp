@@ -79,9 +79,17 @@ void expect_honest_levels(const BakedFile& file, uint32_t geometry, double slack
 
 double step_of(const baked::GeometryRecord& g) { return PositionGrid{g.step_mantissa, g.step_exponent}.step(); }
 
+/// The bytes of a stress mesh with LOD levels, baked once per program.
+std::vector<std::byte> baked_bytes(const NamedMesh& mesh) {
+  static std::map<std::string, std::vector<std::byte>> baked; // by name
+  const auto [at, is_new] = baked.try_emplace(mesh.name);
+  if (is_new) at->second = bake(scene_of(mesh.make()), lod_config()).bytes;
+  return at->second;
+}
+
 class LodFileOf : public testing::TestWithParam<NamedMesh> {
 protected:
-  const BakedFile file_ = BakedFile::from_bytes(bake(scene_of(GetParam().make()), lod_config()).bytes);
+  const BakedFile file_ = BakedFile::from_bytes(baked_bytes(GetParam()));
   const LodView view_ = file_.lod(0);
 };
 

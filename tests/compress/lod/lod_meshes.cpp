@@ -237,6 +237,12 @@ BuiltLod build_lod(const Mesh& mesh) {
   return result;
 }
 
+const BuiltLod& built_lod(const NamedMesh& mesh) {
+  static std::map<std::string, BuiltLod> built; // by name
+  const auto at = built.find(mesh.name);
+  return at != built.end() ? at->second : built.emplace(mesh.name, build_lod(mesh.make())).first->second;
+}
+
 ClusterLod read_lod(const BakedFile& file, uint32_t geometry) {
   const LodView view = file.lod(geometry);
   ClusterLod lod;

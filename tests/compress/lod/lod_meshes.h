@@ -46,6 +46,8 @@ struct BuiltLod {
   ClusterLod lod;
 };
 BuiltLod build_lod(const Mesh& mesh);
+/// The same of a stress mesh, built once per program.
+const BuiltLod& built_lod(const NamedMesh& mesh);
 
 /// Reads levels from a file in the builder's form: decoded lattice points; errors and spheres as stored, in object
 /// units.
