@@ -14,6 +14,7 @@
 #include "runtime/measure/html_report.h"
 #include "runtime/measure/pictures.h"
 #include "runtime/measure/report.h"
+#include "runtime/measure/stability.h"
 #include "runtime/stopwatch.h"
 
 namespace packtrace {
@@ -75,6 +76,25 @@ std::vector<PicturedPoint> pictured_points(const std::vector<MeasurePoint>& matr
   return pictured;
 }
 
+/// How the program does at extremes of size, place and shape; does not depend on the scene.
+Json stability_table() {
+  Json table = Json::array();
+  for (const StabilityCase& stability_case : stability_cases()) {
+    const StabilityResult r = measure_stability(stability_case);
+    table.push_back({{"name", r.name},
+                     {"triangles", r.triangles},
+                     {"pixels", r.pixels},
+                     {"hits", r.hits},
+                     {"wrong_pixels", r.wrong_pixels},
+                     {"wrong_depths", r.wrong_depths},
+                     {"ao_mae", r.ao_mae},
+                     {"self_intersections", r.self_intersections},
+                     {"leaks", r.leaks},
+                     {"warned", r.warned}});
+  }
+  return table;
+}
+
 void write_report(const MeasureFolder& folder, const Json& report) {
   write_json(folder / "report.json", report);
   write_text_file(folder / "report.csv", csv_of(report.at("points")));
@@ -117,6 +137,7 @@ nlohmann::json run_measure(const MeasureConfig& config, Progress& progress) {
   report["fronts"] = add_fronts(points, config.runner.spp);
   report["lod"] = lod_curve(points);
   report["counts"] = counts_of(points);
+  report["stability"] = config.mode == MatrixMode::kQuick ? Json::array() : stability_table();
   if (points[0].contains("isa")) report["machine"]["isa"] = points[0].at("isa");
   const std::string reference = file_bytes(runner.reference_file());
   const Json shown = write_pictures(pictured_points(matrix, points, runner, folder), runner.reference(),

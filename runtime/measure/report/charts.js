@@ -179,6 +179,18 @@ function convergencePlots() {
     rules: noise > 0 ? [{y: noise, text: `noise of ${get(report, "settings.spp")} samples`, className: "noise"}] : []}), table(columns, steps, {caption: "Convergence of the denoiser", sort: 0}))];
 }
 
+function stabilitySection() {
+  const cases = list(report.stability);
+  if (cases.length === 0) return null;
+  const columns = [{name: "Scene", value: c => c.name, numeric: false}, {name: "Triangles", value: c => c.triangles, text: c => count(c.triangles)},
+    {name: "Wrong hit or miss, pixels", value: c => c.wrong_pixels, text: c => count(c.wrong_pixels)}, {name: "Wrong depth, pixels", value: c => c.wrong_depths, text: c => count(c.wrong_depths)},
+    {name: "AO error", value: c => c.ao_mae, text: c => figure(c.ao_mae)}, {name: "Self-intersections", value: c => c.self_intersections, text: c => count(c.self_intersections)},
+    {name: "Leaks", value: c => c.leaks, text: c => count(c.leaks)}, {name: "Bake", value: c => (c.warned ? "warns" : ""), numeric: false}];
+  return el("section", {id: "extremes", "aria-labelledby": "extremes-title"}, el("h2", {id: "extremes-title"}, "At the extremes"),
+    el("p", {class: "muted"}, `Scenes of the program's own at extremes of size, place and shape, with default options. Each of ${count(cases[0].pixels)} pixels is compared with the source floats in extended precision; depths are wrong if they differ by more than 0.1 %. Occlusion rays of convex shapes must hit nothing, those within closed shapes must hit something.`),
+    table(columns, cases, {caption: "Numerical stability"}));
+}
+
 function levelSection() {
   const plots = [...levelPlots(), ...convergencePlots()];
   return plots.length === 0 ? null : el("section", {id: "levels", "aria-labelledby": "levels-title"}, el("h2", {id: "levels-title"}, "Levels of detail and denoiser"), el("div", {class: "grid two"}, plots));
