@@ -174,6 +174,14 @@ Json above_noise(const Points& points, const Json& report) {
   return answer("Is the error above sampling noise?", text, nullptr, figures);
 }
 
+/// Rate of occlusion rays over the default's. Embree's rates beside both points, if measured, cancel what else the
+/// machine did.
+double relative_speed(const Json& point, const Json& standard) {
+  const std::optional<double> ratio = number_at(point, "speed_ratio.ao"), base = number_at(standard, "speed_ratio.ao");
+  if (ratio && base && *base > 0.0) return *ratio / *base;
+  return at(point, "mrays_per_s.ao") / at(standard, "mrays_per_s.ao");
+}
+
 Json costs(const Points& points) {
   const Json& standard = *points.standard;
   std::string text;
@@ -183,7 +191,7 @@ Json costs(const Points& points) {
     if (!point) continue;
     const double bytes = 100.0 * (at(*point, "bytes.file") / at(standard, "bytes.file") - 1.0);
     const double first = at(*point, "seconds.first_ray") - at(standard, "seconds.first_ray");
-    const double speed = 100.0 * (at(*point, "mrays_per_s.ao") / at(standard, "mrays_per_s.ao") - 1.0);
+    const double speed = 100.0 * (relative_speed(*point, standard) - 1.0);
     const std::string label = text_at(*point, "label");
     text += fmt::format("{}{}: {:+.0f} % bytes, {:+.0f} ms until the first ray, {:+.0f} % AO rays per second",
                         text.empty() ? "Against the default, " : "; ", label, bytes, first * 1e3, speed);

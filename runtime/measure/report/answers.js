@@ -230,7 +230,7 @@ function questionFour() {
     let width = 0;
     new ResizeObserver(() => { if (holder.clientWidth !== width) { width = holder.clientWidth; draw(); } }).observe(holder);
     const above = comparable.filter(p => get(p, "ao.mae") > noise).length;
-    card.append(el("p", {class: "muted"}, `${above === 0 ? "No" : above} of ${comparable.length} points ${above === 1 ? "is" : "are"} above the noise. Both images share their samples, so the error is that of packing alone.`));
+    card.append(el("p", {class: "muted"}, `${above === 0 ? "None" : above} of ${comparable.length} points ${above < 2 ? "is" : "are"} above the noise. Both images share their samples, so the error is that of packing alone.`));
   }
   return card;
 }
@@ -239,7 +239,7 @@ function questionFive() {
   const rows = working.filter(p => ["codec", "trees", "lod"].includes(p.group)).map(p => [pointLink(p),
     change(get(p, "bytes.file"), ofBase("bytes.file")),
     isNumber(get(p, "seconds.first_ray")) && isNumber(ofBase("seconds.first_ray")) ? signed(p.seconds.first_ray - ofBase("seconds.first_ray"), v => (Math.abs(v) < 5e-4 ? "0 s" : v < 0 ? `−${seconds(-v)}` : seconds(v))).replace("+0 s", "0 s") : none,
-    change(get(p, "mrays_per_s.ao"), ofBase("mrays_per_s.ao"))]);
+    isNumber(get(p, "speed_ratio.ao")) && isNumber(ofBase("speed_ratio.ao")) ? change(get(p, "speed_ratio.ao"), ofBase("speed_ratio.ao")) : change(get(p, "mrays_per_s.ao"), ofBase("mrays_per_s.ao"))]);
   return el("section", {class: "card", "aria-labelledby": "q5"}, el("h2", {id: "q5"}, "What do codec, trees and levels cost?"),
     el("p", {class: "answer", id: "answer-5"}, unbroken(get(report, "answers.4.text") || "Against the default:")),
     rows.length ? miniTable(["change", "bytes", "first ray", "rays/s"], rows, "Bytes, time to the first ray and AO rays a second against the default") : null,
