@@ -15,7 +15,7 @@
 #include "pbrt_import/import_scene.h"
 #include "tests/compress/q_tangent.h"
 
-/// Prints the tables of docs/accuracy.md: errors of texture coordinates, tangents and textures. Fails if a documented
+/// Prints figures of docs/accuracy.md: errors of texture coordinates, tangents and textures. Fails if a documented
 /// bound does not hold.
 namespace packtrace {
 namespace {

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What levels of detail do to pictures, work and memory: the tables of docs/lod_runtime.md, as Markdown.
+"""What levels of detail do to pictures, work and memory: the figures of docs/lod_runtime.md, as tables in Markdown.
 
 Usage: lod_pictures.py BIN_DIRECTORY FOLDER [TABLE ...]
   BIN_DIRECTORY  that has packtrace and packtrace_scenegen, for example build/release/bin

@@ -1,5 +1,5 @@
-// Scenes at extremes of size, place and shape against the limits in tests/regression/limits.json; docs/accuracy.md has
-// the table.
+// Scenes at extremes of size, place and shape against the limits in tests/regression/limits.json; docs/accuracy.md
+// sums up the results.
 
 #include <algorithm>
 #include <array>
