@@ -10,24 +10,20 @@
 
 #include "compress/bake/grid/outline_share.h"
 #include "compress/bake/grid/view_measure.h"
-#include "compress/bake/grid/visible_surface.h"
 #include "tests/compress/bake_checks.h"
+#include "tests/compress/precision_scenes.h"
 
 namespace packtrace {
 namespace {
 
+using test::add_instance;
+using test::add_object;
 using test::bake;
+using test::camera_at;
 using test::Decoded;
+using test::floor_mesh;
 using test::Random;
-
-/// Two triangles over [-half, half]^2 at height y.
-Mesh floor_mesh(float half, float y) {
-  Mesh mesh;
-  mesh.name = "floor";
-  mesh.positions = {{-half, y, -half}, {half, y, -half}, {half, y, half}, {-half, y, half}};
-  mesh.triangles = {{0, 2, 1}, {0, 3, 2}};
-  return mesh;
-}
+using test::step_of;
 
 /// An open tube of 2 x 12 triangles from a to b.
 void add_tube(Mesh& mesh, DVec3 a, DVec3 b, double radius) {
@@ -59,25 +55,6 @@ Mesh tubes_mesh(uint32_t count) {
   return mesh;
 }
 
-Camera camera_at(DVec3 eye, DVec3 target) {
-  Camera camera;
-  camera.fov_degrees = 45.0;
-  camera.world_from_camera = look_at(eye, target, DVec3(0, 1, 0)).value();
-  return camera;
-}
-
-void add_object(Scene& scene, const std::string& name, Mesh mesh) {
-  Object object;
-  object.name = name;
-  object.shapes.emplace_back(static_cast<uint32_t>(scene.meshes.size()), 0u, false, DAffine(1.0));
-  scene.meshes.push_back(std::move(mesh));
-  scene.objects.push_back(std::move(object));
-}
-
-void add_instance(Scene& scene, uint32_t object, const DAffine& world_from_object) {
-  scene.instances.push_back({object, Affine(world_from_object)});
-}
-
 /// Two instances of a unit sphere on a floor 1000 units wide.
 Scene spheres_on_a_floor(DVec3 place = DVec3(0.0)) {
   Scene scene = test::scene_of(floor_mesh(500.0f, -1.0f), test::translation(place));
@@ -94,8 +71,6 @@ Scene tubes_scene() {
   scene.cameras.push_back(camera_at({12, 8, -18}, {0, 1, 0}));
   return scene;
 }
-
-double step_of(const baked::GeometryRecord& g) { return PositionGrid{g.step_mantissa, g.step_exponent}.step(); }
 
 /// Largest angle between corresponding facets of the source and of geometry 0, which must contain all triangles.
 double largest_tilt_degrees(const BakedFile& file, const Mesh& mesh) {
@@ -177,134 +152,6 @@ TEST(DefaultPrecision, WhoAsksForAPrecisionGetsJustThatAndHearsWhatItLoses) {
     EXPECT_LT(baked.report.promise[0].wanted, 0.001);
   }
   EXPECT_TRUE(bake(scene, test::precision(PrecisionKind::kAbsolute, 1e-5)).report.promise.empty());
-}
-
-/// Boxes in one mesh, all turned about two axes.
-class BoxMesh {
-public:
-  explicit BoxMesh(std::string name) { mesh_.name = std::move(name); }
-
-  void add(DVec3 lo, DVec3 hi) {
-    constexpr std::array<std::array<uint32_t, 4>, 6> kSides{
-        {{0, 1, 3, 2}, {4, 6, 7, 5}, {0, 4, 5, 1}, {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 5, 7, 3}}};
-    const auto first = static_cast<uint32_t>(mesh_.positions.size());
-    for (uint32_t i = 0; i < 8; ++i) {
-      const DVec3 p(i & 1 ? hi.x : lo.x, i & 2 ? hi.y : lo.y, i & 4 ? hi.z : lo.z);
-      const double c = std::cos(0.3), s = std::sin(0.3), d = std::cos(0.2), t = std::sin(0.2);
-      const DVec3 q(c * p.x - s * p.y, s * p.x + c * p.y, p.z);
-      mesh_.positions.emplace_back(q.x, d * q.y - t * q.z, t * q.y + d * q.z);
-    }
-    for (const std::array<uint32_t, 4>& side : kSides) {
-      mesh_.triangles.emplace_back(first + side[0], first + side[1], first + side[2]);
-      mesh_.triangles.emplace_back(first + side[0], first + side[2], first + side[3]);
-    }
-  }
-  Mesh take() { return std::move(mesh_); }
-
-private:
-  Mesh mesh_;
-};
-
-/// Horizontal plates of 100 x 100 units that are then tilted, in one mesh.
-Mesh plates_mesh(double thickness, double gap, int count = 200) {
-  BoxMesh boxes("plates");
-  for (int i = 0; i < count; ++i) {
-    const double y = (i - count / 2) * (thickness + gap);
-    boxes.add({-50, y, -50}, {50, y + thickness, 50});
-  }
-  return boxes.take();
-}
-
-/// Slanted blades in a frame.
-Mesh louvre_mesh() {
-  BoxMesh boxes("louvre");
-  for (int i = 0; i < 100; ++i) {
-    const double y = 0.4 * i - 20.0;
-    boxes.add({-40, y, -1}, {40, y + 0.05, 1});
-  }
-  boxes.add({-42, -22, -2}, {-40, 22, 2});
-  boxes.add({40, -22, -2}, {42, 22, 2});
-  return boxes.take();
-}
-
-/// Crossing bars before a wall.
-Mesh grille_mesh() {
-  BoxMesh boxes("grille");
-  for (int i = -60; i < 60; ++i) {
-    boxes.add({0.5 * i, -30, 0}, {0.5 * i + 0.2, 30, 0.2});
-    boxes.add({-30, 0.5 * i, 0.2}, {30, 0.5 * i + 0.2, 0.4});
-  }
-  boxes.add({-30, -30, 3}, {30, 30, 4});
-  return boxes.take();
-}
-
-Scene box_scene(Mesh mesh) {
-  Scene scene = test::scene_of(std::move(mesh));
-  scene.cameras.push_back(camera_at({0, 8, -130}, {0, 0, 0}));
-  return scene;
-}
-
-/// Fraction of covered pixels in which the first camera sees another plate, or another of its sides, on the geometry's
-/// lattice than in the source.
-double changed_pixels(const Scene& scene, const BakedScene& baked) {
-  const ScenePlan plan = plan_scene(scene);
-  const BakedFile file = BakedFile::from_bytes(baked.bytes);
-  std::vector<GeometryGrid> grids(plan.geometries.size());
-  for (uint32_t g = 0; g < grids.size(); ++g)
-    grids[g].grid = {file.geometries()[g].step_mantissa, file.geometries()[g].step_exponent};
-  const std::vector<uint32_t> instances{0};
-  const VisiblePoints points =
-      find_visible_points(PrimaryCamera(scene.cameras[0], kPromisedSize), scene, plan, instances, grids);
-  double seen = 0.0, changed = 0.0;
-  for (size_t i = 0; i < points.source.size(); ++i) {
-    if (points.source[i].geometry == baked::kNone && points.rounded[i].geometry == baked::kNone) continue;
-    seen += 1.0;
-    changed += points.source[i].triangle / 2 != points.rounded[i].triangle / 2; // two triangles per side of a box
-  }
-  EXPECT_GT(seen, 5000.0);
-  return changed / seen;
-}
-
-TEST(DefaultPrecision, GapsAndPlatesWithinOneMeshCount) {
-  const std::array<Mesh, 8> meshes{
-      plates_mesh(0.02, 0.08),     plates_mesh(0.1, 0.2),      plates_mesh(0.09, 0.01), plates_mesh(0.05, 0.05, 400),
-      plates_mesh(0.02, 0.48, 60), plates_mesh(0.3, 0.02, 90), louvre_mesh(),           grille_mesh()};
-  for (const Mesh& mesh : meshes) {
-    const Scene scene = box_scene(mesh);
-    const BakedScene baked = bake(scene);
-    SCOPED_TRACE(mesh.name);
-    EXPECT_LT(changed_pixels(scene, baked), 0.012);
-    EXPECT_TRUE(baked.report.promise.empty());
-  }
-}
-
-TEST(DefaultPrecision, PlatesFarBelowAPixelBreakThePromiseAloud) {
-  const Scene scene = box_scene(plates_mesh(0.001, 0.002, 3000));
-  const BakedScene baked = bake(scene);
-  ASSERT_FALSE(baked.report.promise.empty());
-  EXPECT_EQ(baked.report.promise[0].bound, "outline");
-  EXPECT_LT(baked.report.promise[0].wanted, baked.report.promise[0].step);
-}
-
-TEST(DefaultPrecision, StatedStepsThatMoveEdgesAreReported) {
-  const BakedScene baked = bake(box_scene(plates_mesh(0.02, 0.08)), test::precision(PrecisionKind::kAbsolute, 0.02));
-  ASSERT_FALSE(baked.report.promise.empty());
-  EXPECT_EQ(baked.report.promise[0].bound, "outline");
-  EXPECT_GT(baked.report.promise[0].wanted, 0.0001);
-}
-
-TEST(DefaultPrecision, HiddenPlatesNeedNoFinerGrid) {
-  const Scene shown = box_scene(plates_mesh(0.02, 0.08));
-  Scene hidden = shown;
-  BoxMesh cover("cover");
-  for (const double side : {-1.0, 1.0}) {
-    cover.add({52 * side - 1, -30, -53}, {52 * side + 1, 30, 53});
-    cover.add({-53, -30, 52 * side - 1}, {53, 30, 52 * side + 1});
-    cover.add({-53, 14 * side - 1, -53}, {53, 14 * side + 1, 53});
-  }
-  test::add_shape(hidden, cover.take());
-  const double fine = step_of(BakedFile::from_bytes(bake(shown).bytes).geometries()[0]);
-  EXPECT_GT(step_of(BakedFile::from_bytes(bake(hidden).bytes).geometries()[0]), 4.0 * fine);
 }
 
 TEST(DefaultPrecision, GeometriesOnTwoGridsAgreeWhereTheyTouch) {
@@ -421,43 +268,6 @@ TEST(ViewMeasure, WhatIsBehindOrBesideTheCameraCoversNothing) {
 TEST(ViewMeasure, AFloorThroughTheEyeTakesBoundedTime) {
   const ViewStats stats = look(test::scene_of(floor_mesh(1e6f, 0.0f)), camera_at({0, 0, 0}, {0, -0.2, 1}));
   EXPECT_TRUE(std::isfinite(stats.pixels));
-}
-
-TEST(VisibleSurface, ShowsTheNearestSurfaceOfEachPixelsRay) {
-  Mesh mesh = floor_mesh(1e4f, -1.0f); // passes under the camera and behind it
-  const Mesh sphere = test::sphere_mesh(24);
-  const auto first = static_cast<uint32_t>(mesh.positions.size());
-  mesh.positions.insert(mesh.positions.end(), sphere.positions.begin(), sphere.positions.end());
-  for (const Triangle& t : sphere.triangles) mesh.triangles.emplace_back(t.x + first, t.y + first, t.z + first);
-  Scene scene = test::scene_of(mesh);
-  const ScenePlan plan = plan_scene(scene);
-  const std::vector<GeometryGrid> grids{{choose_position_grid(1e-7), {}}};
-  for (const Projection projection : {Projection::kPerspective, Projection::kOrthographic}) {
-    Camera view = camera_at({0, 1, -5}, {0, 0, 0});
-    view.projection = projection;
-    const PrimaryCamera camera(view, {40, 30});
-    const VisiblePoints points = find_visible_points(camera, scene, plan, std::vector<uint32_t>{0}, grids);
-    ASSERT_EQ(points.source.size(), 1200u);
-    size_t of_sphere = 0;
-    for (uint32_t i = 0; i < 1200; ++i) {
-      const CameraRay ray = camera.ray(i % 40, i / 40);
-      const VisiblePoint& point = points.source[i];
-      const double b = glm::dot(ray.origin, ray.direction), c = glm::dot(ray.origin, ray.origin) - 1.0;
-      const bool hits_sphere = b * b - c > 0.01, misses_sphere = b * b - c < -0.1;
-      if (hits_sphere) {
-        EXPECT_GE(point.triangle, 2u);
-        EXPECT_NEAR(glm::length(point.position), 1.0, 0.02);
-        ++of_sphere;
-      } else if (misses_sphere && ray.direction.y < -0.001) {
-        EXPECT_LT(point.triangle, 2u);
-        EXPECT_NEAR(point.position.y, -1.0, 1e-6 * glm::length(point.position));
-      } else if (misses_sphere && ray.direction.y > 0.0) {
-        EXPECT_EQ(point.geometry, baked::kNone);
-      }
-      EXPECT_EQ(points.rounded[i].geometry, point.geometry);
-    }
-    EXPECT_GT(of_sphere, 20u);
-  }
 }
 
 double outline_of(const Mesh& mesh) {

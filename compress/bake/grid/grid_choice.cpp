@@ -6,8 +6,8 @@
 #include <tbb/parallel_for.h>
 
 #include "compress/bake/grid/grid_check.h"
-#include "compress/bake/grid/moved_edges.h"
 #include "compress/bake/grid/nested_grids.h"
+#include "compress/bake/grid/visible_changes.h"
 
 namespace packtrace {
 namespace {
@@ -46,7 +46,7 @@ public:
       for (size_t g = 0; g < wanted.size(); ++g) refine_to(g, wanted[g].step);
     share_and_check();
     for (int i = 0; may_refine() && i < kMaxRefinements && refine_failing(); ++i) share_and_check();
-    const MovedEdges edges(scene_, plan_, measure_, cameras, progress_);
+    const VisibleChanges edges(scene_, plan_, measure_, cameras, progress_);
     changes_ = compare(edges);
     for (int i = 0; may_refine() && i < kMaxEdgeRefinements && refine_moved(); ++i) {
       share_and_check();
@@ -166,10 +166,10 @@ private:
     return refined;
   }
 
-  std::vector<MovedEdges::Change> compare(const MovedEdges& edges) const {
+  std::vector<VisibleChanges::Change> compare(const VisibleChanges& edges) const {
     for (size_t g = 0; g < out_.grids.size(); ++g) // as in share_and_check()
       if (!fits_lattice(measure_.geometries[g].max_abs(), out_.grids[g].grid.step()))
-        return std::vector<MovedEdges::Change>(out_.grids.size());
+        return std::vector<VisibleChanges::Change>(out_.grids.size());
     return edges.compare(out_.grids);
   }
 
@@ -179,13 +179,13 @@ private:
     std::vector<uint8_t> failing(changes_.size());
     bool shared = false, refined = false;
     for (size_t g = 0; g < failing.size(); ++g) {
-      failing[g] = changes_[g].excess > 1.0;
+      failing[g] = changes_[g].excess() > 1.0;
       shared |= failing[g] != 0 && !out_.grids[g].shared.empty();
     }
     if (shared) spread_to_sharing(failing);
     for (size_t g = 0; g < failing.size(); ++g) {
       if (failing[g] == 0) continue;
-      const double step = out_.grids[g].grid.step(), wanted = changes_[g].excess > 1.0 ? edge_step(g) : step / 2.0;
+      const double step = out_.grids[g].grid.step(), wanted = changes_[g].excess() > 1.0 ? edge_step(g) : step / 2.0;
       const double finest = views_[g].pixel / world_scale(plan_.geometries[g]) / kMaxPixelSteps;
       if (step > finest) refined |= refine_to(g, std::max(wanted, finest));
     }
@@ -193,7 +193,7 @@ private:
   }
 
   /// The step at which the edges of a geometry that fails move little enough.
-  double edge_step(size_t g) const { return out_.grids[g].grid.step() * kEdgeMargin / changes_[g].excess; }
+  double edge_step(size_t g) const { return out_.grids[g].grid.step() * kEdgeMargin / changes_[g].excess(); }
 
   /// Adds geometries on coarser grids that share positions with a failing geometry.
   void spread_to_sharing(std::vector<uint8_t>& failing) const {
@@ -231,8 +231,8 @@ private:
       } else if (outlines[g] != 0) {
         shortfall.bound = PictureBound::kOutline;
         shortfall.wanted = std::min(wanted[g].step, shortfall.step * kMaxPassedPixels / passed_pixel_fraction(g));
-      } else if (changes_[g].excess > 1.0) {
-        shortfall.bound = PictureBound::kOutline;
+      } else if (changes_[g].excess() > 1.0) {
+        shortfall.bound = changes_[g].edges > 1.0 ? PictureBound::kOutline : PictureBound::kGap;
         shortfall.wanted = std::min(wanted[g].step, edge_step(g));
       } else if (views_[g].best.coverage() >= kSeen && step > kBoundSlack * wanted[g].limit) {
         shortfall.bound = wanted[g].bound;
@@ -251,8 +251,8 @@ private:
   const BakeConfig& config_;
   Progress& progress_;
   std::vector<GeometryView> views_;
-  std::vector<GridCheck> checks_;           // per geometry
-  std::vector<MovedEdges::Change> changes_; // per geometry
+  std::vector<GridCheck> checks_;               // per geometry
+  std::vector<VisibleChanges::Change> changes_; // per geometry
   GridChoice out_;
 };
 

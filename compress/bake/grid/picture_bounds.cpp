@@ -198,7 +198,7 @@ private:
 } // namespace
 
 std::string_view name_of(PictureBound bound) {
-  constexpr std::array<std::string_view, 5> kNames{"none", "height", "pixel", "contact", "outline"};
+  constexpr std::array<std::string_view, 6> kNames{"none", "height", "pixel", "contact", "outline", "gap"};
   return kNames[static_cast<size_t>(bound)];
 }
 

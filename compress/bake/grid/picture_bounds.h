@@ -19,6 +19,7 @@ enum class PictureBound : uint32_t {
   kPixel,   ///< outlines and contacts move in the image
   kContact, ///< objects sink into their support or hover above it
   kOutline, ///< outlines of many thin pieces move past pixel centres
+  kGap,     ///< narrow gaps change their width
 };
 /// Name of a bound for messages and JSON, for example "height".
 std::string_view name_of(PictureBound bound);

@@ -2,21 +2,17 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
-#include <bit>
 #include <cmath>
 #include <memory>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include "compress/bake/grid/picture_bounds.h"
-#include "compress/bake/grid/scene_measure.h"
+#include "compress/bake/grid/nearest_triangles.h"
 
 namespace packtrace {
 namespace {
 
-constexpr uint64_t kNothing = ~uint64_t{0};
 constexpr size_t kBlockTriangles = 4096;
 constexpr double kMaxTests = 0x1p28;      // pixels tested per image, shared out by number of triangles
 constexpr double kMinBlockTests = 0x1p20; // least share of a block
@@ -32,96 +28,21 @@ struct ImagePoint {
 
 using ImageTriangle = std::array<ImagePoint, 3>;
 
-/// One mesh of one instance.
-struct PlacedPart {
-  uint32_t geometry;
-  const GeometryPart* part;
-  DAffine world_from_geometry;
-  uint32_t first_triangle;
-  bool moved;           ///< geometry_from_mesh is not the identity
-  bool placed;          ///< world_from_geometry is not the identity
-  double most_movement; ///< upper bound of the distance between source and rounded positions, world units
-};
-
-/// The nearest triangle per pixel.
-class DepthBuffer {
-public:
-  explicit DepthBuffer(size_t pixels) : nearest_(pixels, kNothing) {}
-
-  /// Keeps the nearest triangle, the first of equally near ones. Bits of positive floats are ordered like the floats.
-  void put(size_t pixel, float depth, uint32_t triangle) {
-    const uint64_t key = uint64_t{std::bit_cast<uint32_t>(depth)} << 32 | triangle;
-    const std::atomic_ref<uint64_t> nearest(nearest_[pixel]);
-    uint64_t before = nearest.load(std::memory_order_relaxed);
-    while (key < before && !nearest.compare_exchange_weak(before, key, std::memory_order_relaxed)) {
-    }
-  }
-
-  size_t size() const { return nearest_.size(); }
-  bool empty(size_t pixel) const { return nearest_[pixel] == kNothing; }
-  uint32_t triangle(size_t pixel) const { return static_cast<uint32_t>(nearest_[pixel]); }
-  double depth(size_t pixel) const {
-    return double{std::bit_cast<float>(static_cast<uint32_t>(nearest_[pixel] >> 32))};
-  }
-
-private:
-  std::vector<uint64_t> nearest_; // bits of the depth, then the triangle's number
-};
-
 class VisiblePointFinder {
 public:
-  VisiblePointFinder(const PrimaryCamera& camera, const Scene& scene, const ScenePlan& plan,
-                     std::span<const uint32_t> instances, std::span<const GeometryGrid> grids)
-      : camera_(camera), scene_(scene), grids_(grids), width_(camera.size().width), height_(camera.size().height),
+  VisiblePointFinder(const PrimaryCamera& camera, const PlacedParts& parts)
+      : camera_(camera), parts_(parts), width_(camera.size().width), height_(camera.size().height),
         spread_(camera.pixel_spread()), source_(camera.size().pixels()), rounded_(camera.size().pixels()) {
     const CameraRay ray = camera.ray(0, 0);
     depth_scale_ = camera.view_z(ray.origin + ray.direction) / camera.homogeneous_pixel(ray.origin + ray.direction).z;
-    for (const uint32_t i : instances) add_instance(plan, plan.instances[i]);
   }
 
   VisiblePoints run() {
-    tbb::parallel_for(size_t{0}, parts_.size(), [&](size_t i) { draw(parts_[i]); });
-    return {points(source_, &VisiblePointFinder::source_position),
-            points(rounded_, &VisiblePointFinder::rounded_position)};
+    tbb::parallel_for(size_t{0}, parts_.parts().size(), [&](size_t i) { draw(parts_.parts()[i]); });
+    return {points(source_, &PlacedParts::source_position), points(rounded_, &PlacedParts::rounded_position)};
   }
 
 private:
-  using Position = DVec3 (VisiblePointFinder::*)(const PlacedPart&, uint32_t vertex) const;
-
-  void add_instance(const ScenePlan& plan, const baked::InstanceRecord& instance) {
-    const GeometryPlan& geometry = plan.geometries[instance.geometry];
-    for (const GeometryPart& part : geometry.parts) {
-      const auto count = static_cast<uint32_t>(scene_.meshes[part.mesh].triangles.size());
-      if (count == 0 || (geometry.slot_class[part.slot] & 1u) != 0) continue; // bit 0: invisible to cameras
-      const double movement = std::sqrt(0.75) * grids_[instance.geometry].coarsest_step() * world_scale(geometry);
-      parts_.push_back({instance.geometry, &part, placement_of(instance), triangles_,
-                        part.geometry_from_mesh != DAffine(1.0), placement_of(instance) != DAffine(1.0), movement});
-      triangles_ += count;
-    }
-  }
-
-  const Mesh& mesh_of(const PlacedPart& placed) const { return scene_.meshes[placed.part->mesh]; }
-
-  static DVec3 to_world(const PlacedPart& placed, Vec3 p) {
-    return placed.placed ? transform_point(placed.world_from_geometry, DVec3(p)) : DVec3(p);
-  }
-  /// Position of a vertex in geometry space.
-  DVec3 geometry_position(const PlacedPart& placed, uint32_t vertex) const {
-    const DVec3 p(mesh_of(placed).positions[vertex]);
-    return placed.moved ? transform_point(placed.part->geometry_from_mesh, p) : p;
-  }
-  /// World position of a vertex, rounded to a float in geometry space.
-  DVec3 source_position(const PlacedPart& placed, uint32_t vertex) const {
-    return to_world(placed, Vec3(geometry_position(placed, vertex)));
-  }
-  /// World position of a vertex on the lattice, as the file's readers decode it.
-  DVec3 rounded_position(const PlacedPart& placed, uint32_t vertex) const {
-    const GeometryGrid& grid = grids_[placed.geometry];
-    const double step = grid.grid.step();
-    const LatticePoint q = grid.round(geometry_position(placed, vertex));
-    return to_world(placed, {from_lattice(q[0], step), from_lattice(q[1], step), from_lattice(q[2], step)});
-  }
-
   ImagePoint project(DVec3 world) const {
     const DVec3 h = camera_.homogeneous_pixel(world);
     if (camera_.projection() == Projection::kOrthographic) return {h.x, h.y, h.z, camera_.view_z(world)};
@@ -130,21 +51,23 @@ private:
   }
 
   void draw(const PlacedPart& placed) {
-    const Mesh& mesh = mesh_of(placed);
+    const Mesh& mesh = parts_.mesh_of(placed);
     const auto points = std::make_unique_for_overwrite<ImagePoint[]>(mesh.positions.size());
     tbb::parallel_for(tbb::blocked_range<size_t>(0, mesh.positions.size(), kBlockTriangles), [&](const auto& range) {
       for (size_t v = range.begin(); v < range.end(); ++v)
-        points[v] = project(source_position(placed, static_cast<uint32_t>(v)));
+        points[v] = project(parts_.source_position(placed, static_cast<uint32_t>(v)));
     });
     const size_t count = mesh.triangles.size();
     tbb::parallel_for(size_t{0}, (count + kBlockTriangles - 1) / kBlockTriangles, [&](size_t block) {
       const size_t begin = block * kBlockTriangles, end = std::min(begin + kBlockTriangles, count);
-      double tests = std::max(kMinBlockTests, kMaxTests * static_cast<double>(end - begin) / triangles_);
+      // Upper bound of the distance between source and rounded positions.
+      const double movement = std::sqrt(0.75) * placed.step;
+      double tests = std::max(kMinBlockTests, kMaxTests * static_cast<double>(end - begin) / parts_.triangle_count());
       for (size_t i = begin; i < end && tests > 0.0; ++i) {
         const Triangle& t = mesh.triangles[i];
         const ImageTriangle source{points[t.x], points[t.y], points[t.z]};
-        if (!may_cover_centre(source, placed.most_movement)) continue;
-        const auto rounded = [&](uint32_t vertex) { return project(rounded_position(placed, vertex)); };
+        if (!may_cover_centre(source, movement)) continue;
+        const auto rounded = [&](uint32_t vertex) { return project(parts_.rounded_position(placed, vertex)); };
         const uint32_t number = placed.first_triangle + static_cast<uint32_t>(i);
         tests -= draw(source, number, source_) + draw({rounded(t.x), rounded(t.y), rounded(t.z)}, number, rounded_);
       }
@@ -166,7 +89,7 @@ private:
   }
 
   /// @return the number of tested pixels
-  double draw(const ImageTriangle& t, uint32_t number, DepthBuffer& buffer) const {
+  double draw(const ImageTriangle& t, uint32_t number, NearestTriangles& buffer) const {
     double x0 = 0.0, x1 = width_ - 1.0, y0 = 0.0, y1 = height_ - 1.0; // numbers of pixels
     const auto [least_depth, most_depth] = std::minmax({t[0].depth, t[1].depth, t[2].depth});
     if (!(most_depth > 0.0)) return 0.0;
@@ -213,7 +136,7 @@ private:
     return tests + y1 - y0;
   }
 
-  std::vector<VisiblePoint> points(const DepthBuffer& buffer, Position position) const {
+  std::vector<VisiblePoint> points(const NearestTriangles& buffer, PlacedParts::Position position) const {
     std::vector<VisiblePoint> points(buffer.size());
     tbb::parallel_for(tbb::blocked_range<size_t>(0, points.size(), kBlockTriangles), [&](const auto& range) {
       for (size_t pixel = range.begin(); pixel < range.end(); ++pixel)
@@ -222,37 +145,30 @@ private:
     return points;
   }
 
-  VisiblePoint point_at(size_t pixel, const DepthBuffer& buffer, Position position) const {
+  VisiblePoint point_at(size_t pixel, const NearestTriangles& buffer, PlacedParts::Position position) const {
     const uint32_t number = buffer.triangle(pixel);
-    const auto after = std::upper_bound(parts_.begin(), parts_.end(), number,
-                                        [](uint32_t n, const PlacedPart& part) { return n < part.first_triangle; });
-    const PlacedPart& placed = *std::prev(after);
-    const Triangle& t = mesh_of(placed).triangles[number - placed.first_triangle];
-    const DVec3 a = (this->*position)(placed, t.x), b = (this->*position)(placed, t.y),
-                c = (this->*position)(placed, t.z);
-    const DVec3 normal = glm::normalize(glm::cross(b - a, c - a));
+    const auto [a, b, c] = parts_.corners(number, position);
     const CameraRay ray = camera_.ray(static_cast<uint32_t>(pixel % camera_.size().width),
                                       static_cast<uint32_t>(pixel / camera_.size().width));
+    DVec3 normal = glm::normalize(glm::cross(b - a, c - a));
+    if (glm::dot(normal, ray.direction) > 0.0) normal = -normal;
     const double distance = glm::dot(a - ray.origin, normal) / glm::dot(ray.direction, normal);
-    return {placed.geometry, number, buffer.depth(pixel), ray.origin + distance * ray.direction, normal};
+    return {parts_.part_of(number).geometry, number, buffer.distance(pixel), ray.origin + distance * ray.direction,
+            normal};
   }
 
   const PrimaryCamera& camera_;
-  const Scene& scene_;
-  const std::span<const GeometryGrid> grids_;
+  const PlacedParts& parts_;
   const double width_, height_;
-  const double spread_;           // PrimaryCamera::pixel_spread()
-  double depth_scale_ = 1.0;      // depth / w, perspective cameras
-  std::vector<PlacedPart> parts_; // by first_triangle
-  uint32_t triangles_ = 0;
-  DepthBuffer source_, rounded_;
+  const double spread_;      // PrimaryCamera::pixel_spread()
+  double depth_scale_ = 1.0; // depth / w, perspective cameras
+  NearestTriangles source_, rounded_;
 };
 
 } // namespace
 
-VisiblePoints find_visible_points(const PrimaryCamera& camera, const Scene& scene, const ScenePlan& plan,
-                                  std::span<const uint32_t> instances, std::span<const GeometryGrid> grids) {
-  return VisiblePointFinder(camera, scene, plan, instances, grids).run();
+VisiblePoints find_visible_points(const PrimaryCamera& camera, const PlacedParts& parts) {
+  return VisiblePointFinder(camera, parts).run();
 }
 
 } // namespace packtrace

@@ -1,11 +1,9 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <vector>
 
-#include "compress/bake/grid/geometry_grid.h"
-#include "compress/bake/plan/geometry_plan.h"
+#include "compress/bake/grid/placed_parts.h"
 #include "pbrt_import/scene/camera_rays.h"
 
 namespace packtrace {
@@ -16,7 +14,7 @@ struct VisiblePoint {
   uint32_t triangle = 0;            ///< number among the placed triangles
   double depth = 0.0;               ///< PrimaryCamera::view_z()
   DVec3 position{0.0};              ///< world space
-  DVec3 normal{0.0};                ///< geometric unit normal, world space, either side
+  DVec3 normal{0.0};                ///< geometric unit normal towards the camera, world space
 };
 
 /// What a camera sees per pixel, in rows from the top.
@@ -30,9 +28,6 @@ struct VisiblePoints {
 /// tested at most, which drops triangles only where thousands of large ones overlap. Depends on its arguments only, not
 /// on the thread count. Source: Olano, Greer, "Triangle scan conversion using 2D homogeneous coordinates" (1997).
 /// @param camera perspective or orthographic
-/// @param instances indices of the instances to draw
-/// @param grids per geometry: the lattice to which positions are rounded
-VisiblePoints find_visible_points(const PrimaryCamera& camera, const Scene& scene, const ScenePlan& plan,
-                                  std::span<const uint32_t> instances, std::span<const GeometryGrid> grids);
+VisiblePoints find_visible_points(const PrimaryCamera& camera, const PlacedParts& parts);
 
 } // namespace packtrace

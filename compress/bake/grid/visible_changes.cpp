@@ -1,8 +1,9 @@
-#include "compress/bake/grid/moved_edges.h"
+#include "compress/bake/grid/visible_changes.h"
 
 #include <algorithm>
 #include <cmath>
 
+#include "compress/bake/grid/narrow_gaps.h"
 #include "compress/bake/grid/picture_bounds.h"
 #include "compress/bake/grid/view_measure.h"
 #include "pbrt_import/scene/angle.h"
@@ -15,6 +16,7 @@ constexpr uint64_t kMaxDrawsPerTriangle = 4;
 constexpr uint64_t kMaxDrawnTriangles = uint64_t{1} << 31;
 constexpr double kMaxMoved = 0.0055;    // fraction of pixels that may show another surface, weighted by contrast
 constexpr double kMaxMissed = 0.001;    // fraction of the image in which hit and miss may differ
+constexpr double kMaxGapChange = 0.012; // mean of measure_gap_changes() over all covered pixels
 constexpr double kMinMissedShare = 0.1; // of all such pixels; geometries with fewer are not to blame
 constexpr double kMinPixels = 576.0;    // 1 % of the image; with fewer pixels, one counts too much
 
@@ -67,39 +69,66 @@ double moved_excess(double moved, double seen) {
   return (moved + std::sqrt(moved)) / (kMaxMoved * std::max(seen, kMinPixels));
 }
 
+/// Changes of gaps over the limit.
+double gap_excess(double changes, double probed) { return changes / (kMaxGapChange * std::max(probed, kMinPixels)); }
+
+/// Perspective images that show what a camera sees: the camera itself, or the faces of a cube around an environment
+/// camera with as many pixels in total.
+std::vector<PrimaryCamera> images_of(const PrimaryCamera& camera) {
+  if (camera.projection() != Projection::kEnvironment) return {camera};
+  std::vector<PrimaryCamera> faces;
+  const auto side = static_cast<uint32_t>(std::sqrt(static_cast<double>(camera.size().pixels()) / 6.0));
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double sign : {-1.0, 1.0}) {
+      Camera face; // field of view: 90 degrees
+      face.world_from_camera = DAffine(0.0);
+      for (int i = 0; i < 3; ++i) face.world_from_camera[i][(axis + 1 + i) % 3] = i == 2 ? sign : 1.0;
+      face.world_from_camera[3] = camera.eye();
+      faces.emplace_back(face, ImageSize{side, side});
+    }
+  return faces;
+}
+
 } // namespace
 
-MovedEdges::MovedEdges(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure,
-                       std::span<const PrimaryCamera> cameras, Progress& progress)
+VisibleChanges::VisibleChanges(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure,
+                               std::span<const PrimaryCamera> cameras, Progress& progress)
     : scene_(scene), plan_(plan), progress_(progress) {
   uint64_t stored = 0, drawn = 0;
   for (const GeometryPlan& geometry : plan.geometries)
     for (const GeometryPart& part : geometry.parts) stored += scene.meshes[part.mesh].triangles.size();
   const uint64_t most = std::clamp(kMaxDrawsPerTriangle * stored, kMinDrawnTriangles, kMaxDrawnTriangles);
   for (const PrimaryCamera& camera : cameras) {
-    if (camera.projection() == Projection::kEnvironment || drawn >= most) continue;
+    if (drawn >= most) continue;
     progress_.check_cancelled();
-    View view{&camera, choose_drawn(camera, scene, plan, measure, most - drawn, drawn)};
-    views_.push_back(std::move(view));
+    views_.push_back({images_of(camera), choose_drawn(camera, scene, plan, measure, most - drawn, drawn)});
   }
 }
 
-std::vector<MovedEdges::Change> MovedEdges::compare(std::span<const GeometryGrid> grids) const {
+/// What an image shows of a geometry, in pixels.
+struct VisibleChanges::Sums {
+  double seen = 0.0, moved = 0.0, missed = 0.0;
+  double probed = 0.0, gaps = 0.0; // points whose gap is known, and the sum of its relative changes
+};
+
+std::vector<VisibleChanges::Change> VisibleChanges::compare(std::span<const GeometryGrid> grids) const {
   std::vector<Change> changes(grids.size());
   for (const View& view : views_) {
-    progress_.check_cancelled();
-    add_changes(find_visible_points(*view.camera, scene_, plan_, view.instances, grids), grids, changes);
+    const PlacedParts parts(scene_, plan_, view.instances, grids);
+    std::vector<Sums> sums(grids.size());
+    for (const PrimaryCamera& image : view.images) {
+      progress_.check_cancelled();
+      const VisiblePoints points = find_visible_points(image, parts);
+      add_edges(points, grids, sums);
+      add_gaps(points.source, measure_gap_changes(parts, points), sums);
+    }
+    add_changes(sums, changes);
   }
   return changes;
 }
 
-void MovedEdges::add_changes(const VisiblePoints& points, std::span<const GeometryGrid> grids,
-                             std::span<Change> changes) const {
-  struct Sums {
-    double seen = 0.0, moved = 0.0, missed = 0.0;
-  };
-  std::vector<Sums> sums(grids.size());
-  Sums all;
+void VisibleChanges::add_edges(const VisiblePoints& points, std::span<const GeometryGrid> grids,
+                               std::vector<Sums>& sums) const {
   for (size_t i = 0; i < points.source.size(); ++i) {
     const VisiblePoint &a = points.source[i], &b = points.rounded[i];
     if (a.geometry == baked::kNone && b.geometry == baked::kNone) continue;
@@ -108,14 +137,30 @@ void MovedEdges::add_changes(const VisiblePoints& points, std::span<const Geomet
     const uint32_t g = of_source ? a.geometry : b.geometry;
     const bool missed = a.geometry == baked::kNone || b.geometry == baked::kNone;
     const double moved = missed ? 0.0 : contrast(a, b, grids[g].grid.step() * world_scale(plan_.geometries[g]));
-    for (Sums* sum : {&sums[g], &all}) sum->seen += 1.0, sum->moved += moved, sum->missed += missed ? 1.0 : 0.0;
+    sums[g].seen += 1.0, sums[g].moved += moved, sums[g].missed += missed ? 1.0 : 0.0;
   }
-  const double all_moved = moved_excess(all.moved, all.seen);
+}
+
+void VisibleChanges::add_gaps(std::span<const VisiblePoint> points, std::span<const float> changes,
+                              std::vector<Sums>& sums) {
+  for (size_t i = 0; i < points.size(); ++i)
+    if (points[i].geometry != baked::kNone && !std::isnan(changes[i]))
+      sums[points[i].geometry].probed += 1.0, sums[points[i].geometry].gaps += double{changes[i]};
+}
+
+void VisibleChanges::add_changes(std::span<const Sums> sums, std::span<Change> changes) {
+  Sums all;
+  for (const Sums& one : sums)
+    all.seen += one.seen, all.moved += one.moved, all.missed += one.missed, all.probed += one.probed,
+        all.gaps += one.gaps;
+  const double all_moved = moved_excess(all.moved, all.seen), all_gaps = gap_excess(all.gaps, all.probed);
   const double all_missed = all.missed / (kMaxMissed * static_cast<double>(kPromisedSize.pixels()));
   for (size_t g = 0; g < sums.size(); ++g) {
     const double moved = all_moved > 1.0 ? moved_excess(sums[g].moved, sums[g].seen) : 0.0;
     const double missed = all_missed > 1.0 && sums[g].missed >= kMinMissedShare * all.missed ? all_missed : 0.0;
-    changes[g].excess = std::max({changes[g].excess, moved, missed});
+    const double gaps = all_gaps > 1.0 ? gap_excess(sums[g].gaps, sums[g].probed) : 0.0;
+    changes[g].edges = std::max({changes[g].edges, moved, missed});
+    changes[g].gaps = std::max(changes[g].gaps, gaps);
   }
 }
 
