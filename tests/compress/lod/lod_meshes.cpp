@@ -283,6 +283,13 @@ std::vector<double> thresholds(const ClusterLod& lod) {
   return {values.begin(), values.end()};
 }
 
+uint64_t level_triangles(const ClusterLod& lod, uint32_t level) {
+  uint64_t count = 0;
+  for (const LodCluster& c : lod.clusters)
+    if (c.level == level || (c.level < level && lod.groups[c.group].terminal)) count += c.range.triangle_count;
+  return count;
+}
+
 std::vector<uint32_t> cut_clusters(const ClusterLod& lod, double threshold) {
   std::vector<uint32_t> cut;
   for (uint32_t i = 0; i < lod.clusters.size(); ++i) {

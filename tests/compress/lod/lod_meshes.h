@@ -56,6 +56,9 @@ ClusterLod read_lod(const BakedFile& file, uint32_t geometry);
 /// 0, every error of a group, and the adjacent values on both sides of it. Ascending.
 std::vector<double> thresholds(const ClusterLod& lod);
 
+/// Number of triangles of a discrete level: its clusters and those of terminal groups below it.
+uint64_t level_triangles(const ClusterLod& lod, uint32_t level);
+
 /// The clusters of the cut that allows errors up to `threshold`.
 std::vector<uint32_t> cut_clusters(const ClusterLod& lod, double threshold);
 
