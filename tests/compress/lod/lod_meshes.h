@@ -39,6 +39,12 @@ std::vector<NamedMesh> closed_stress_meshes();
 /// Converts a mesh name to a test name.
 std::string identifier(std::string name);
 
+/// Gives LOD levels to all geometries of at least `min_triangles` triangles that `use` selects.
+BakeConfig config_with_levels(LodUse use = LodUse::kAll, uint32_t min_triangles = 1);
+
+/// Two materials of different classes, one with texture coordinates, and normals; each mesh is placed twice.
+Scene mixed_lod_scene();
+
 /// A quantised mesh with its clusters and LOD levels.
 struct BuiltLod {
   QuantizedGeometry geometry;
