@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -232,11 +233,7 @@ int run(int argc, char** argv) {
   Options options;
   CLI::App app{"Traces the same recorded rays with every tracer and in all ways of Embree; see docs/tracing.md."};
   add_options(app, options);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorKind::kUsage);
-  }
+  if (const std::optional<int> code = parse_arguments(app, argc, argv)) return *code;
   if (options.names.empty()) {
     options.names = {"town"};
     if (!options.inputs.scenes.empty())
