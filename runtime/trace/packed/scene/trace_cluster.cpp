@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "compress/format/layout/bit_stream.h"
+#include "compress/format/layout/bit_fields.h"
 #include "runtime/trace/packed/kernels/batch_decode.h"
 
 namespace packtrace {
