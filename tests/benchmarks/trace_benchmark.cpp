@@ -13,6 +13,7 @@
 #include <tbb/global_control.h>
 
 #include "pbrt_import/base/error.h"
+#include "runtime/trace/make_tracer.h"
 #include "tests/benchmarks/benchmark_main.h"
 #include "tests/benchmarks/packing_benchmark_machine.h"
 #include "tests/benchmarks/trace_benchmark_counts.h"
