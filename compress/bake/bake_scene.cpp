@@ -1,7 +1,6 @@
 #include "compress/bake/bake_scene.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <functional>
 #include <numeric>
@@ -9,13 +8,12 @@
 
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
-#include <tbb/task_group.h>
 
-#include "compress/bake/clusters/geometry_encoder.h"
+#include "compress/bake/bake_totals.h"
+#include "compress/bake/geometry_packer.h"
 #include "compress/bake/grid/geometry_measure.h"
 #include "compress/bake/grid/grid_choice.h"
 #include "compress/bake/grid/scene_measure.h"
-#include "compress/bake/lod/lod_encoder.h"
 #include "compress/bake/lod/shared_borders.h"
 #include "compress/bake/plan/geometry_plan.h"
 #include "compress/bake/plan/material_runs.h"
@@ -23,7 +21,6 @@
 #include "compress/bake/write/lod_store.h"
 #include "compress/bake/write/requirement_table.h"
 #include "compress/format/file/baked_image.h"
-#include "compress/format/layout/bit_stream.h"
 #include "compress/format/pages/page_encoder.h"
 #include "pbrt_import/base/brief.h"
 #include "pbrt_import/base/error.h"
@@ -31,24 +28,6 @@
 
 namespace packtrace {
 namespace {
-
-/// Triangles processed to build a geometry's LOD levels, relative to its own number of triangles: each level has half
-/// as many as the one below.
-constexpr uint64_t kLodWork = 2;
-
-/// A bake warns if collapsed triangles exceed this fraction of the source area.
-constexpr double kVisibleAreaShare = 1e-3;
-
-double mean_normal_error(const QuantizeStats& stats) {
-  return stats.normal_count > 0 ? stats.normal_error_sum / static_cast<double>(stats.normal_count) : 0.0;
-}
-
-/// Factor by which an instance scales areas, |det|^(2/3). Exact for uniform scale, otherwise an estimate.
-double area_scale(const baked::InstanceRecord& instance) {
-  const auto& m = instance.world_from_object;
-  const DVec3 x(m[0], m[1], m[2]), y(m[3], m[4], m[5]), z(m[6], m[7], m[8]);
-  return std::pow(std::abs(glm::dot(glm::cross(x, y), z)), 2.0 / 3.0);
-}
 
 class Baker {
 public:
@@ -77,17 +56,6 @@ public:
   }
 
 private:
-  struct Packed {
-    baked::GeometryRecord record{};
-    EncodedGeometry encoded;
-    QuantizeStats stats;
-    std::vector<uint32_t> slots; ///< slots of the plan that still have triangles
-    GeometryNeeds needs;
-    EncodedLod lod;
-
-    size_t bytes() const { return encoded.payload.size() + encoded.clusters.size() * sizeof(baked::ClusterRecord); }
-  };
-
   std::vector<std::byte> assemble() {
     progress_.begin("assembling the file", 0);
     remove_empty_slots();
@@ -112,14 +80,15 @@ private:
       progress_.begin("building trees", 0);
       sections.build_trees();
     }
-    add_up();
+    report_.resumed_geometries = packer_->resumed();
+    add_up(scene_, plan_, packed_, report_, diagnostics_);
     return sections.assemble(summary(sections));
   }
 
   /// Removes slots without triangles from the plan; the packed geometries do not have them.
   void remove_empty_slots() {
     std::vector<std::vector<uint32_t>> left;
-    for (Packed& packed : packed_) left.push_back(std::move(packed.slots));
+    for (PackedGeometry& packed : packed_) left.push_back(std::move(packed.slots));
     remove_material_slots(plan_, left);
   }
 
@@ -236,14 +205,14 @@ private:
   void pack() {
     lod_wanted_ = choose_lod();
     reserve_memory();
+    packer_.emplace(scene_, plan_, measure_, grids_, config_, progress_);
     find_shared_borders();
-    if (!config_.resume.empty()) store_.emplace(config_.resume);
     uint64_t triangles = 0;
     for (size_t i = 0; i < packed_.size(); ++i) triangles += (lod_wanted_[i] != 0 ? 1 + kLodWork : 1) * triangles_of(i);
     progress_.begin(config_.lod == LodUse::kOff ? "packing geometry" : "packing geometry and its levels", triangles);
     tbb::parallel_for(size_t{0}, packed_.size(), [&](size_t i) {
       progress_.check_cancelled();
-      packed_[i] = pack_one(i);
+      packed_[i] = packer_->pack(i, lod_wanted_[i] != 0 ? &shared_borders_ : nullptr);
       progress_.advance(triangles_of(i));
     });
   }
@@ -261,7 +230,7 @@ private:
     tbb::parallel_for(size_t{0}, world.size(), [&](size_t i) {
       progress_.check_cancelled();
       const GeometryPlan& plan = plan_.geometries[world[i]];
-      finder.add(i, quantize(world[i], {std::vector<PartNeeds>(plan.parts.size()), {}, {}, true}));
+      finder.add(i, packer_->quantize(world[i], {std::vector<PartNeeds>(plan.parts.size()), {}, {}, true}));
       progress_.advance();
     });
     shared_borders_ = finder.finish();
@@ -303,93 +272,6 @@ private:
     return wanted;
   }
 
-  /// A geometry as quantised, as clusters and as packed.
-  struct Draft {
-    QuantizedGeometry quantized;
-    GeometryClusters clusters;
-    Packed packed;
-  };
-
-  Packed pack_one(size_t index) {
-    GeometryNeeds needs = analyse_requirements(scene_, plan_, plan_.geometries[index], config_);
-    Draft draft = pack_with(index, needs);
-    // Flat triangles need clusters of their own. If only some triangles are flat, those clusters may cost more than the
-    // normals they save, so try both.
-    const bool mixed = draft.packed.stats.flat_triangles > 0 && draft.packed.encoded.stream_bits.normals > 0;
-    needs.infer_normals = false;
-    if (mixed)
-      if (Draft other = pack_with(index, needs); other.packed.bytes() < draft.packed.bytes()) draft = std::move(other);
-    if (lod_wanted_[index] != 0 && draft.quantized.triangles.size() >= config_.lod_min_triangles) {
-      LodLimits limits{config_.lod_levels + 1, {}};
-      if (plan_.geometries[index].world_space) limits.locked = shared_borders_.locks(draft.quantized);
-      draft.packed.lod = find_or_build_lod(draft, limits);
-    }
-    return std::move(draft.packed);
-  }
-
-  /// @param draft its quantised geometry is consumed
-  EncodedLod find_or_build_lod(Draft& draft, const LodLimits& limits) {
-    QuantizedGeometry& geometry = draft.quantized;
-    const GeometryClusters& clusters = draft.clusters;
-    const LodKey key = store_ ? lod_key(geometry, clusters, limits) : LodKey{};
-    if (store_)
-      if (std::optional<EncodedLod> found =
-              store_->find(key, {draft.packed.record, draft.packed.encoded, geometry.slot_class, limits.max_levels})) {
-        ++resumed_;
-        progress_.advance(kLodWork * clusters.triangles.size());
-        return std::move(*found);
-      }
-    ClusterLod lod = build_cluster_lod(geometry, clusters, progress_, limits);
-    EncodedLod encoded = encode_lod(geometry, lod);
-    // If another geometry failed or the bake was cancelled, inner loops return early with incomplete levels.
-    if (store_ && !tbb::is_current_task_group_canceling()) store_->keep(key, encoded);
-    return encoded;
-  }
-
-  QuantizedGeometry quantize(size_t index, const GeometryNeeds& needs) const {
-    GeometryMeasure measure = measure_.geometries[index];
-    // The scene's step follows the scene's median edge. Small meshes use that edge if it is longer than their own;
-    // otherwise their short edges would loosen the limit on their normals.
-    if (plan_.geometries[index].world_space)
-      measure.median_edge = std::max(measure.median_edge, measure_.world.median_edge);
-    return quantize_geometry(scene_, plan_.geometries[index], needs, config_, grids_[index], measure);
-  }
-
-  Draft pack_with(size_t index, const GeometryNeeds& needs) const {
-    const GeometryPlan& plan = plan_.geometries[index];
-    const GeometryMeasure& measure = measure_.geometries[index];
-    Draft draft;
-    draft.quantized = quantize(index, needs);
-    const QuantizedGeometry& q = draft.quantized;
-    draft.clusters = split_geometry(q);
-    draft.packed = {record_of(plan, q, position_error_bound(grids_[index].coarsest_step(), measure.max_abs())),
-                    encode_geometry(q, draft.clusters),
-                    q.stats,
-                    q.slots,
-                    needs,
-                    {}};
-    return draft;
-  }
-
-  static baked::GeometryRecord record_of(const GeometryPlan& plan, const QuantizedGeometry& q, double error_bound) {
-    baked::GeometryRecord record{};
-    record.origin = q.origin;
-    record.max_position_error = q.stats.max_position_error;
-    record.position_error_bound = error_bound;
-    record.step_mantissa = q.grid.mantissa;
-    record.step_exponent = q.grid.exponent;
-    record.anchor_shift = q.anchor_shift;
-    record.uv_exponent = q.uv_exponent;
-    record.uv_encoding = static_cast<uint32_t>(q.uv_encoding);
-    record.normal_encoding = static_cast<uint32_t>(q.normal_encoding);
-    record.max_normal_error_degrees = static_cast<float>(q.stats.max_normal_error_degrees);
-    record.mean_normal_error_degrees = static_cast<float>(mean_normal_error(q.stats));
-    record.max_uv_error = static_cast<float>(q.stats.max_uv_error);
-    record.flags = plan.world_space ? baked::kWorldSpace : 0;
-    record.slot_count = static_cast<uint32_t>(q.slot_class.size());
-    return record;
-  }
-
   /// World-space bounds of all instances, from the bounds of their geometries.
   Bounds placed_bounds(const FileSections& sections) const {
     Bounds bounds;
@@ -402,70 +284,6 @@ private:
       bounds.extend(placed_box(instance, box));
     }
     return bounds;
-  }
-
-  /// Fills in the report's totals over the scene.
-  void add_up() {
-    QuantizeStats all;
-    uint64_t coarse_uvs = 0;
-    for (const Packed& p : packed_) {
-      const QuantizeStats& s = p.stats;
-      report_.source_vertices += s.source_vertices;
-      report_.merged_vertices += s.source_vertices - std::min(s.distinct_vertices, s.source_vertices);
-      report_.collapsed_triangles += s.collapsed_triangles;
-      report_.coinciding_triangles += s.coinciding_triangles;
-      report_.vanished_geometries += s.collapsed_triangles > 0 &&
-                                     std::all_of(s.left.begin(), s.left.end(), [](uint64_t left) { return left == 0; });
-      report_.max_position_error = std::max(report_.max_position_error, s.max_position_error);
-      report_.max_normal_error_degrees = std::max(report_.max_normal_error_degrees, s.max_normal_error_degrees);
-      report_.max_uv_error = std::max(report_.max_uv_error, s.max_uv_error);
-      all.position_error_squares += s.position_error_squares;
-      all.position_error_count += s.position_error_count;
-      all.normal_error_sum += s.normal_error_sum;
-      all.normal_count += s.normal_count;
-      all.repaired_normals += s.repaired_normals;
-      all.replaced_uvs += s.replaced_uvs;
-      coarse_uvs += s.max_uv_error_texels > 0.5;
-      report_.max_uv_error_texels = std::max(report_.max_uv_error_texels, s.max_uv_error_texels);
-    }
-    if (all.position_error_count > 0)
-      report_.rms_position_error =
-          std::sqrt(all.position_error_squares / static_cast<double>(all.position_error_count));
-    report_.mean_normal_error_degrees = mean_normal_error(all);
-    report_.source_triangles = unique_triangle_count(scene_);
-    report_.resumed_geometries = resumed_;
-    report_.shared_shapes = plan_.shared_shapes;
-    report_.instanced_shapes = plan_.instanced_shapes;
-    report_.shared_objects = plan_.shared_objects;
-    report_.unused_objects = plan_.unused_objects;
-    report_.unused_triangles = plan_.unused_triangles;
-    if (all.repaired_normals > 0)
-      warn(std::to_string(all.repaired_normals) + " normals have no direction; face normals took their place");
-    if (all.replaced_uvs > 0)
-      warn(std::to_string(all.replaced_uvs) + " texture coordinates are not finite; (0, 0) took their place");
-    if (coarse_uvs > 0)
-      warn("texture coordinates of " + std::to_string(coarse_uvs) + " geometries are up to " +
-           brief(report_.max_uv_error_texels) + " texels off; without an encoding of your own they stay within 1/32");
-    add_up_areas();
-    if (plan_.unused_objects > 0)
-      warn(std::to_string(plan_.unused_objects) + " objects with " + std::to_string(plan_.unused_triangles) +
-           " triangles are never instanced and not stored");
-  }
-
-  void add_up_areas() {
-    for (const baked::InstanceRecord& instance : plan_.instances) {
-      const QuantizeStats& stats = packed_[instance.geometry].stats;
-      const double scale = area_scale(instance);
-      report_.source_area += scale * stats.source_area;
-      report_.collapsed_area += scale * stats.collapsed_area;
-    }
-    if (report_.collapsed_area > kVisibleAreaShare * report_.source_area)
-      warn(std::to_string(report_.collapsed_triangles) + " triangles with " +
-           brief(100.0 * report_.collapsed_area / report_.source_area) +
-           " % of the area are too small or thin for the grid's step and are left out; a finer precision keeps them");
-    if (report_.vanished_geometries > 0)
-      warn("nothing is left of " + std::to_string(report_.vanished_geometries) +
-           " geometries, as all of their triangles are too small or thin for the grid's step");
   }
 
   baked::SummaryRecord summary(const FileSections& sections) const {
@@ -495,10 +313,7 @@ private:
     return s;
   }
 
-  void warn(std::string message) {
-    diagnostics_.report(Severity::kWarning, {}, message);
-    report_.warnings.push_back(std::move(message));
-  }
+  void warn(std::string message) { packtrace::warn(std::move(message), report_, diagnostics_); }
 
   const Scene& scene_;
   const BakeConfig& config_;
@@ -508,12 +323,11 @@ private:
   SceneMeasure measure_;
   PositionGrid world_grid_;
   std::vector<GeometryGrid> grids_;
-  std::vector<Packed> packed_;
+  std::vector<PackedGeometry> packed_;
   std::vector<uint8_t> lod_wanted_; // per geometry
   SharedBorders shared_borders_;
   MemoryReservation memory_{config_.memory};
-  std::optional<LodStore> store_;
-  std::atomic<uint64_t> resumed_{0};
+  std::optional<GeometryPacker> packer_;
   std::vector<EncodedTexture> textures_; // in the scene's order; empty if textures are not stored
   BakeReport report_;
 };
@@ -542,8 +356,7 @@ void forget_resumed_levels(const BakeConfig& config, BakeReport& report, Diagnos
   try {
     LodStore(config.resume).clear();
   } catch (const Error& error) {
-    report.warnings.push_back(std::string("levels of an interrupted bake stay: ") + error.what());
-    diagnostics.report(Severity::kWarning, {}, report.warnings.back());
+    warn(std::string("levels of an interrupted bake stay: ") + error.what(), report, diagnostics);
   }
 }
 

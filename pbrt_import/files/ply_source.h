@@ -75,7 +75,6 @@ template <bool kSwap>
 class BinarySource {
 public:
   static constexpr bool kBinary = true;
-  static constexpr bool kSwapped = kSwap;
   explicit BinarySource(std::span<const std::byte> body) : next_(body.data()), end_(body.data() + body.size()) {}
 
   uint64_t remaining() const { return static_cast<uint64_t>(end_ - next_); }

@@ -129,11 +129,6 @@ Vec3 ParameterList::get_point(std::string_view name, Vec3 fallback) const {
   return found ? Vec3(found->floats[0], found->floats[1], found->floats[2]) : fallback;
 }
 
-Vec3 ParameterList::get_vector(std::string_view name, Vec3 fallback) const {
-  const Parameter* const found = single_value(*this, name, ParameterType::kVector3, 3);
-  return found ? Vec3(found->floats[0], found->floats[1], found->floats[2]) : fallback;
-}
-
 std::span<const float> ParameterList::floats(std::string_view name, ParameterType type) const {
   const Parameter* const found = find(name, {type});
   return found ? std::span<const float>(found->floats) : std::span<const float>();

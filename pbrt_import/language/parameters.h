@@ -93,7 +93,6 @@ public:
   bool get_bool(std::string_view name, bool fallback) const;
   std::string get_string(std::string_view name, std::string_view fallback) const;
   Vec3 get_point(std::string_view name, Vec3 fallback) const;
-  Vec3 get_vector(std::string_view name, Vec3 fallback) const;
 
   /// All values of a parameter; empty if there is no such parameter.
   std::span<const float> floats(std::string_view name, ParameterType type) const;

@@ -42,6 +42,20 @@ std::string advice_for(const BakeOptions& options) {
                      shell_word(wanted));
 }
 
+/// @param output null for a dry run
+void print_results(BinaryOutput* output, const BakeReport& baked, const ImportResult& imported,
+                   const BakeTimings& timings, const GlobalOptions& globals) {
+  std::FILE* const text = output != nullptr ? output->text_stream() : stdout;
+  print_printable(fmt::format("{}: import {:.3f} s, bake {:.3f} s, peak memory {:.0f} MiB\n",
+                              output != nullptr ? output->name() : "dry run", timings.import_s, timings.bake_s,
+                              static_cast<double>(peak_rss_bytes()) / (1 << 20)),
+                  text);
+  fmt::print(text, "{}", bake_text(baked));
+  fmt::print(text, "{}", left_out_cameras_text(imported));
+  if (globals.verbosity > 0) print_printable("\n" + to_text(baked.file, true), text);
+  std::fflush(text);
+}
+
 int run(const BakeOptions& given, const GlobalOptions& globals) {
   BakeOptions options = given;
   apply_preset(options);
@@ -91,15 +105,7 @@ int run(const BakeOptions& given, const GlobalOptions& globals) {
     print_printable(promise, stderr);
     return 0;
   }
-  std::FILE* const text = output ? output->text_stream() : stdout;
-  print_printable(fmt::format("{}: import {:.3f} s, bake {:.3f} s, peak memory {:.0f} MiB\n",
-                              output ? output->name() : "dry run", timings.import_s, timings.bake_s,
-                              static_cast<double>(peak_rss_bytes()) / (1 << 20)),
-                  text);
-  fmt::print(text, "{}", bake_text(baked));
-  fmt::print(text, "{}", left_out_cameras_text(imported));
-  if (globals.verbosity > 0) print_printable("\n" + to_text(baked.file, true), text);
-  std::fflush(text);
+  print_results(output ? &*output : nullptr, baked, imported, timings, globals);
   print_printable(promise, stderr);
   return 0;
 }

@@ -264,6 +264,35 @@ int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
   return report_error(error);
 }
 
+void add_limits(CLI::App& verb, CompareOptions& options) {
+  const std::string group = "Limits (exit code 5 if one is exceeded)";
+  constexpr double kHuge = 1e30;
+  verb.add_option("--max-rmse", options.limits[0], "Maximum root mean squared error; 0 means equal images")
+      ->check(number_in(0.0, kHuge))
+      ->group(group);
+  verb.add_option("--max-mae", options.limits[1], "Maximum mean absolute error; 0 means equal images")
+      ->check(number_in(0.0, kHuge))
+      ->group(group);
+  verb.add_option("--min-psnr", options.limits[2],
+                  "Minimum peak signal-to-noise ratio in dB, for the peak value 1; larger is better")
+      ->check(number_in(-kHuge, kHuge))
+      ->group(group);
+  verb.add_option("--min-ssim", options.limits[3], "Minimum structural similarity, -1..1; 1 means equal images")
+      ->check(number_in(-1.0, 1.0))
+      ->group(group);
+  verb.add_option("--max-flip", options.limits[4], "Maximum mean FLIP difference, 0..1; 0 means equal images")
+      ->check(number_in(0.0, 1.0))
+      ->group(group);
+  verb.add_option("--max-p99", options.limits[5],
+                  "Maximum absolute error of 99 % of the pixels; 0 means that they are equal")
+      ->check(number_in(0.0, kHuge))
+      ->group(group);
+  verb.add_option("--max-mismatch", options.max_mismatch,
+                  "Maximum fraction of pixels that have a value in only one image, 0..1")
+      ->check(number_in(0.0, 1.0))
+      ->group(group);
+}
+
 } // namespace
 
 void add_compare_command(CLI::App& app, GlobalOptions& globals) {
@@ -296,33 +325,7 @@ void add_compare_command(CLI::App& app, GlobalOptions& globals) {
       ->check(number_in(1.0, 1e9))
       ->type_name("N");
 
-  const std::string group = "Limits (exit code 5 if one is exceeded)";
-  constexpr double kHuge = 1e30;
-  verb.add_option("--max-rmse", options->limits[0], "Maximum root mean squared error; 0 means equal images")
-      ->check(number_in(0.0, kHuge))
-      ->group(group);
-  verb.add_option("--max-mae", options->limits[1], "Maximum mean absolute error; 0 means equal images")
-      ->check(number_in(0.0, kHuge))
-      ->group(group);
-  verb.add_option("--min-psnr", options->limits[2],
-                  "Minimum peak signal-to-noise ratio in dB, for the peak value 1; larger is better")
-      ->check(number_in(-kHuge, kHuge))
-      ->group(group);
-  verb.add_option("--min-ssim", options->limits[3], "Minimum structural similarity, -1..1; 1 means equal images")
-      ->check(number_in(-1.0, 1.0))
-      ->group(group);
-  verb.add_option("--max-flip", options->limits[4], "Maximum mean FLIP difference, 0..1; 0 means equal images")
-      ->check(number_in(0.0, 1.0))
-      ->group(group);
-  verb.add_option("--max-p99", options->limits[5],
-                  "Maximum absolute error of 99 % of the pixels; 0 means that they are equal")
-      ->check(number_in(0.0, kHuge))
-      ->group(group);
-  verb.add_option("--max-mismatch", options->max_mismatch,
-                  "Maximum fraction of pixels that have a value in only one image, 0..1")
-      ->check(number_in(0.0, 1.0))
-      ->group(group);
-
+  add_limits(verb, *options);
   verb.add_option("--diff", options->diff,
                   "Write a .png with the error per pixel, from black (0) over red and yellow to white (--diff-white)")
       ->type_name("FILE");

@@ -37,10 +37,6 @@ using ExrAttributes = std::map<std::string, ExrAttribute>;
 /// fails.
 std::vector<std::byte> encode_exr(ImageSize size, std::span<const Layer> layers, const ExrAttributes& attributes = {});
 
-/// Writes encode_exr() to a file. Throws like encode_exr(), and Error(kIo) if writing fails.
-void write_exr(const std::filesystem::path& path, ImageSize size, std::span<const Layer> layers,
-               const ExrAttributes& attributes = {});
-
 /// A channel of a file.
 struct ExrChannel {
   std::string name; ///< full name, such as "normal.X"

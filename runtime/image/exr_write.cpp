@@ -15,7 +15,6 @@
 #include <OpenEXR/ImfStringAttribute.h>
 
 #include "pbrt_import/base/error.h"
-#include "pbrt_import/base/file_bytes.h"
 #include "runtime/image/exr.h"
 
 namespace packtrace {
@@ -131,11 +130,6 @@ std::vector<std::byte> encode_exr(ImageSize size, std::span<const Layer> layers,
     throw Error(ErrorKind::kIo, std::string("cannot encode EXR: ") + error.what());
   }
   return writer.take();
-}
-
-void write_exr(const std::filesystem::path& path, ImageSize size, std::span<const Layer> layers,
-               const ExrAttributes& attributes) {
-  write_file_bytes(path, encode_exr(size, layers, attributes));
 }
 
 } // namespace packtrace

@@ -94,7 +94,6 @@ public:
   size_t instance_count() const { return slots_.size(); }
   const SharingConfig& config() const { return config_; }
   std::span<const LodGeometry> geometries() const { return geometries_; }
-  uint32_t geometry_of_instance(uint32_t instance) const { return geometry_of_instance_[instance]; }
   /// The ratio_steps() of a geometry. Schemes other than kSteps use only the first and the last.
   std::span<const LodStep> steps(uint32_t geometry) const { return steps_[geometry]; }
 

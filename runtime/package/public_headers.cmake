@@ -26,6 +26,7 @@ set(packtrace_public_headers
   compress/format/file/file_summary.h
   compress/format/file/lod_summary.h
   compress/format/layout/baked_format.h
+  compress/format/layout/bit_fields.h
   compress/format/layout/bit_stream.h
   compress/format/layout/lod_format.h
   compress/format/layout/packed_node.h

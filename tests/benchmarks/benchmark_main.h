@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "pbrt_import/base/error.h"
@@ -33,6 +34,16 @@ public:
 private:
   std::optional<OutputFile> file_;
 };
+
+/// Parses the command line. Returns the exit code if the program ends here: it only prints help, or an option is wrong.
+inline std::optional<int> parse_arguments(CLI::App& app, int argc, const char* const* argv) {
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorKind::kUsage);
+  }
+  return std::nullopt;
+}
 
 /// Implements main() of a benchmark: calls run(argc, argv) and prints its errors to stderr after the name.
 /// @return the exit code

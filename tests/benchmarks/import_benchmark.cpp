@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <optional>
 #include <thread>
 
 #include <CLI/CLI.hpp>
@@ -291,11 +292,7 @@ int run(int argc, char** argv) {
   app.add_flag("--growth", options.growth, "also measures 1/4, 1/2 and all of the size");
   app.add_option("INPUT", options.inputs, "which; all if none is named")
       ->check(CLI::IsMember(std::vector<std::string>(input_names().begin(), input_names().end())));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorKind::kUsage);
-  }
+  if (const std::optional<int> code = parse_arguments(app, argc, argv)) return *code;
   if (options.inputs.empty()) options.inputs.assign(input_names().begin(), input_names().end());
   std::optional<TemporaryFolder> temporary;
   if (options.folder.empty()) options.folder = temporary.emplace().path();

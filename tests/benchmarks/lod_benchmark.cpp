@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -326,11 +327,7 @@ int run(int argc, char** argv) {
   app.add_flag("!--levels-only", options.simplifiers, "leaves the other programs' simplifiers out");
   app.add_flag("!--times-only", options.levels, "only builds, and measures no distance");
   app.add_option("--json", options.json_file, "writes all figures here");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorKind::kUsage);
-  }
+  if (const std::optional<int> code = parse_arguments(app, argc, argv)) return *code;
   options.inputs.choose();
   FiguresFile figures(options.json_file);
   Json json = describe_machine();

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -227,7 +228,7 @@ Json run_growth(std::span<const LodGeometry> geometries, const Options& options)
   return rows;
 }
 
-void parse(int argc, char** argv, CLI::App& app, Options& options) {
+void add_options(CLI::App& app, Options& options) {
   app.add_option("--scenes", options.scenes, "holds the bunny")->envname("PACKTRACE_SCENES");
   app.add_option("--triangles", options.triangles, "of the generated meshes")->capture_default_str();
   app.add_option("--repeats", options.repeats, "plans that are timed; the fastest counts")->capture_default_str();
@@ -238,7 +239,6 @@ void parse(int argc, char** argv, CLI::App& app, Options& options) {
       ->check(CLI::Range(0.001, 1.0))
       ->capture_default_str();
   app.add_option("--json", options.json_file, "writes all figures here");
-  app.parse(argc, argv);
 }
 
 /// Meshes whose LOD levels are built: the bunny if available, the generated mesh, and a torus with seams.
@@ -259,11 +259,8 @@ int run(int argc, char** argv) {
   CLI::App app{
       "Shares BLASes of levels of detail between instances by several schemes, and says what is built, what is "
       "traced and how long the choice takes; see docs/lod_runtime.md."};
-  try {
-    parse(argc, argv, app, options);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorKind::kUsage);
-  }
+  add_options(app, options);
+  if (const std::optional<int> code = parse_arguments(app, argc, argv)) return *code;
   FiguresFile figures(options.json_file);
   Json json = describe_machine();
   const auto meshes = build_meshes(options);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -193,11 +194,7 @@ int run(int argc, char** argv) {
   CLI::App app{"Measures the error and the speed of each encoding of normals; see docs/accuracy.md."};
   app.add_option("--directions", count, "of each set")->check(CLI::PositiveNumber)->capture_default_str();
   app.add_option("--json", json_file, "writes all figures here");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorKind::kUsage);
-  }
+  if (const std::optional<int> code = parse_arguments(app, argc, argv)) return *code;
   FiguresFile figures(json_file);
   Json json = describe_machine();
   json["directions"] = count;

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -179,11 +180,7 @@ int run(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--codec", options.codec, "only codecs with this in their names");
   app.add_option("--json", options.json_file, "writes all figures here");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorKind::kUsage);
-  }
+  if (const std::optional<int> code = parse_arguments(app, argc, argv)) return *code;
   options.inputs.choose();
   FiguresFile figures(options.json_file);
 

@@ -18,97 +18,11 @@
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <OpenMesh/Tools/Subdivider/Uniform/LoopT.hh>
 
-#include "pbrt_import/base/error.h"
 #include "pbrt_import/scene/bounds.h"
+#include "tests/pbrt_import/subdivision_controls.h"
 
-namespace packtrace {
+namespace packtrace::subdivision_test {
 namespace {
-
-struct Control {
-  std::vector<Vec3> points;
-  std::vector<Triangle> triangles;
-};
-
-Control tetrahedron() {
-  return {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}}};
-}
-
-Control octahedron() {
-  return {{{1, 0, 0}, {0, 1, 0}, {-1, 0, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}},
-          {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}, {1, 0, 5}, {2, 1, 5}, {3, 2, 5}, {0, 3, 5}}};
-}
-
-/// n x n squares in the xy plane, all split along the same diagonal, so that inner vertices have valence 6. `height`
-/// scales a random displacement in z.
-Control grid(uint32_t n, float height = 0.0f) {
-  Control control;
-  std::mt19937 random(3);
-  for (uint32_t y = 0; y <= n; ++y)
-    for (uint32_t x = 0; x <= n; ++x)
-      control.points.emplace_back(x, y, height * static_cast<float>(random() % 1000) / 1000.0f);
-  for (uint32_t y = 0; y < n; ++y) {
-    for (uint32_t x = 0; x < n; ++x) {
-      const uint32_t a = y * (n + 1) + x, b = a + 1, c = a + n + 2, d = a + n + 1;
-      control.triangles.emplace_back(a, b, c);
-      control.triangles.emplace_back(a, c, d);
-    }
-  }
-  return control;
-}
-
-/// A closed double pyramid over an n-gon: the apexes have valence n, the other vertices valence 4.
-Control double_pyramid(uint32_t n) {
-  Control control{{{0.1f, 0, 1}, {0, 0.1f, -2}}, {}};
-  for (uint32_t i = 0; i < n; ++i) {
-    const double angle = 2 * std::numbers::pi * i / n;
-    control.points.emplace_back(std::cos(angle), 1.5 * std::sin(angle), 0.1 * (i % 3));
-  }
-  for (uint32_t i = 0; i < n; ++i) {
-    const uint32_t a = 2 + i, b = 2 + (i + 1) % n;
-    control.triangles.emplace_back(0, a, b);
-    control.triangles.emplace_back(1, b, a);
-  }
-  return control;
-}
-
-/// An open fan of n triangles around point 0, which is at the boundary.
-Control open_fan(uint32_t n) {
-  Control control{{{0, 0, 0.2f}}, {}};
-  for (uint32_t i = 0; i <= n; ++i) {
-    const double angle = std::numbers::pi * i / n;
-    control.points.emplace_back(std::cos(angle), std::sin(angle), 0.1 * (i % 2));
-  }
-  for (uint32_t i = 0; i < n; ++i) control.triangles.emplace_back(0, 1 + i, 2 + i);
-  return control;
-}
-
-std::vector<std::string> g_messages;
-void keep_message(Severity, uint32_t, std::string message) { g_messages.push_back(std::move(message)); }
-
-Mesh subdivide(const Control& control, uint32_t levels) {
-  g_messages.clear();
-  return subdivide_loop(control.points, control.triangles, levels, keep_message);
-}
-
-/// Number of edges without an opposite edge; fails if an edge occurs twice in one direction.
-size_t boundary_edge_count(const Mesh& mesh) {
-  std::set<std::pair<uint32_t, uint32_t>> edges;
-  for (const Triangle& t : mesh.triangles)
-    for (int k = 0; k < 3; ++k) EXPECT_TRUE(edges.insert({t[k], t[(k + 1) % 3]}).second);
-  return static_cast<size_t>(
-      std::count_if(edges.begin(), edges.end(), [&](auto e) { return !edges.count({e.second, e.first}); }));
-}
-
-void expect_sound(const Mesh& mesh) {
-  ASSERT_EQ(mesh.normals.size(), mesh.positions.size());
-  EXPECT_TRUE(mesh.uvs.empty());
-  for (const Vec3& p : mesh.positions) ASSERT_TRUE(is_finite(p));
-  for (const Vec3& n : mesh.normals) ASSERT_NEAR(glm::length(n), 1.0f, 1e-5f);
-  for (const Triangle& t : mesh.triangles) {
-    ASSERT_TRUE(t.x < mesh.positions.size() && t.y < mesh.positions.size() && t.z < mesh.positions.size());
-    ASSERT_TRUE(t.x != t.y && t.y != t.z && t.z != t.x);
-  }
-}
 
 TEST(Subdivision, EachLevelHasFourTimesTheTriangles) {
   for (const Control& control : {tetrahedron(), octahedron(), double_pyramid(7), grid(3, 1.0f), open_fan(5)}) {
@@ -270,75 +184,6 @@ TEST(Subdivision, AgreesWithOpenMesh) {
   expect_agreement_with_openmesh(grid(3, 1.0f));
 }
 
-TEST(Subdivision, ThreeTrianglesAtAnEdgeAreKeptAndReported) {
-  const Control book{{{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {-1, 1, 0}, {-1, -1, 0}}, {{0, 1, 2}, {0, 1, 3}, {1, 0, 4}}};
-  const Mesh mesh = subdivide(book, 3);
-  expect_sound(mesh);
-  EXPECT_EQ(mesh.triangles.size(), 3u * 64u);
-  EXPECT_EQ(boundary_edge_count(mesh), 3u * 3u * 8u) << "three separate sheets";
-  ASSERT_EQ(g_messages.size(), 1u);
-  EXPECT_NE(g_messages[0].find("1 edges"), std::string::npos);
-}
-
-TEST(Subdivision, SurfacesCutAlongACurveStayTogetherThere) {
-  // Three strips that share a polyline; their boundaries along it are the same curve.
-  Control strips;
-  for (int i = 0; i < 6; ++i) strips.points.emplace_back(0.1 * (i % 2), 0, i);
-  for (uint32_t s = 0; s < 3; ++s) {
-    const double angle = 2.0 * std::numbers::pi * s / 3;
-    const auto first = static_cast<uint32_t>(strips.points.size());
-    for (int i = 0; i < 6; ++i) strips.points.emplace_back(std::cos(angle), std::sin(angle), i);
-    for (uint32_t i = 0; i < 5; ++i) {
-      strips.triangles.emplace_back(i, i + 1, first + i);
-      strips.triangles.emplace_back(i + 1, first + i + 1, first + i);
-    }
-  }
-  const Mesh mesh = subdivide(strips, 2);
-  expect_sound(mesh);
-  EXPECT_EQ(mesh.triangles.size(), 30u * 16u);
-  std::map<std::array<float, 3>, int> places;
-  for (const Vec3& p : mesh.positions) ++places[{p.x, p.y, p.z}];
-  // Points of the curve away from its ends, 17 of 21, are shared by all strips; the ends are corners of each strip and
-  // have other neighbours.
-  EXPECT_GE(std::count_if(places.begin(), places.end(), [](const auto& place) { return place.second == 3; }), 13);
-}
-
-TEST(Subdivision, FansThatShareOnlyAPointAreSplit) {
-  const Control bow_tie{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {-1, 0, 0}, {-1, -1, 0}}, {{0, 1, 2}, {0, 3, 4}}};
-  const Mesh mesh = subdivide(bow_tie, 2);
-  expect_sound(mesh);
-  EXPECT_EQ(mesh.triangles.size(), 32u);
-  ASSERT_EQ(g_messages.size(), 1u);
-  EXPECT_NE(g_messages[0].find("1 points"), std::string::npos);
-}
-
-TEST(Subdivision, HostileTopologyLosesNoTriangle) {
-  const Control moebius{{{0, 0, 0}, {1, 0, 0}, {2, 1, 0}, {1, 2, 1}, {0, 2, 0}},
-                        {{0, 1, 2}, {1, 3, 2}, {2, 3, 4}, {3, 0, 4}, {4, 0, 1}}};
-  const Control disagreeing{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}}, {{0, 1, 2}, {1, 2, 3}}};
-  const Control twice{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 1, 2}, {1, 2, 0}}};
-  const Control pillow{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 1}}};
-  const Control flat{std::vector<Vec3>(3, Vec3(2.0f)), {{0, 1, 2}}};
-  for (const Control& control : {moebius, disagreeing, twice, pillow, flat, double_pyramid(3000)}) {
-    const Mesh mesh = subdivide(control, 2);
-    expect_sound(mesh);
-    EXPECT_EQ(mesh.triangles.size(), control.triangles.size() * 16);
-  }
-  std::mt19937 random(11);
-  for (int round = 0; round < 200; ++round) {
-    Control soup;
-    for (int i = 0; i < 8; ++i) soup.points.emplace_back(random() % 10, random() % 10, random() % 10);
-    for (int i = 0; i < 12; ++i) {
-      const uint32_t a = random() % 8, b = (a + 1 + random() % 3) % 8, c = (a + 4 + random() % 4) % 8;
-      soup.triangles.emplace_back(a, b, c);
-    }
-    const Mesh mesh = subdivide(soup, 2);
-    expect_sound(mesh);
-    EXPECT_EQ(mesh.triangles.size(), 12u * 16u);
-    boundary_edge_count(mesh);
-  }
-}
-
 TEST(Subdivision, LimitsAreTheMasksOfTheirValence) {
   // The apex of a pyramid over a ring at height 0 moves to 1 - n gamma of its height, gamma = 1 / (n + 3 / (8 beta)).
   for (const uint32_t n : {3u, 4u, 5u, 6u, 7u, 20u, 64u, 1000u}) {
@@ -352,45 +197,6 @@ TEST(Subdivision, LimitsAreTheMasksOfTheirValence) {
       EXPECT_GT(mesh.normals[0].z, 0.99f) << n;
     }
   }
-}
-
-TEST(Subdivision, WorkCanBeCancelledBetweenLevels) {
-  uint32_t calls = 0;
-  const CheckCancelledFn check = [&] {
-    if (++calls == 3) throw Error(ErrorKind::kCancelled, "stop");
-  };
-  const Control control = octahedron();
-  EXPECT_THROW(subdivide_loop(control.points, control.triangles, 5, {}, nullptr, check), Error);
-  EXPECT_EQ(calls, 3u);
-}
-
-TEST(Subdivision, BadTrianglesAreDroppedAndReported) {
-  Control control = octahedron();
-  control.points.push_back({std::numeric_limits<float>::quiet_NaN(), 0, 0});
-  control.triangles.insert(control.triangles.end(), {{0, 1, 99}, {0, 0, 1}, {0, 1, 6}});
-  g_messages.clear();
-  uint64_t dropped = 10;
-  const Mesh mesh = subdivide_loop(control.points, control.triangles, 1, keep_message, &dropped);
-  EXPECT_EQ(dropped, 13u);
-  EXPECT_EQ(mesh.triangles.size(), 32u);
-  EXPECT_EQ(boundary_edge_count(mesh), 0u);
-  EXPECT_EQ(g_messages.size(), 3u);
-}
-
-TEST(Subdivision, ResultsBeyondTheBudgetAreRejectedBeforeAllocating) {
-  for (const uint32_t levels : {13u, 30u, 4294967295u}) {
-    try {
-      subdivide(octahedron(), levels);
-      FAIL() << levels;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.kind(), ErrorKind::kLimitExceeded);
-    }
-  }
-}
-
-TEST(Subdivision, NothingGivesNothing) {
-  EXPECT_TRUE(subdivide({}, 4294967295u).triangles.empty());
-  EXPECT_TRUE(subdivide({{{0, 0, 0}}, {{0, 1, 2}}}, 3).triangles.empty());
 }
 
 std::vector<float> numbers_after(const std::string& text, const std::string& name) {
@@ -424,4 +230,4 @@ TEST(Subdivision, KillerooHasItsReferenceTriangleCount) {
 }
 
 } // namespace
-} // namespace packtrace
+} // namespace packtrace::subdivision_test

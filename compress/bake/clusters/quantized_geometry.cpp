@@ -1,64 +1,21 @@
 #include "compress/bake/clusters/quantized_geometry.h"
 
 #include <algorithm>
-#include <atomic>
 #include <bit>
 #include <cmath>
 #include <limits>
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
-
 #include "compress/bake/clusters/coinciding_triangles.h"
+#include "compress/bake/clusters/error_stats.h"
+#include "compress/bake/clusters/normal_quantizer.h"
 #include "compress/bake/grid/welded_surface.h"
 #include "compress/format/cluster/normal_codec.h"
 #include "pbrt_import/base/brief.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/weld_table.h"
-#include "pbrt_import/scene/angle.h"
 
 namespace packtrace {
 namespace {
-
-constexpr size_t kGrain = 4096; // fixed, so that sums are grouped equally for any thread count
-
-/// Maximum and sum over many items.
-struct ErrorStats {
-  double max = 0.0, sum = 0.0, squares = 0.0;
-  uint64_t count = 0;
-  void add(double error) { max = std::max(max, error), sum += error, squares += error * error, ++count; }
-  static ErrorStats join(ErrorStats a, const ErrorStats& b) {
-    return {std::max(a.max, b.max), a.sum + b.sum, a.squares + b.squares, a.count + b.count};
-  }
-};
-
-/// Accumulates per_item(i, stats) over [0, count); bitwise equal for any thread count.
-template <typename PerItem>
-ErrorStats accumulate_errors(size_t count, const PerItem& per_item) {
-  return tbb::parallel_deterministic_reduce(
-      tbb::blocked_range<size_t>(0, count, kGrain), ErrorStats{},
-      [&](const tbb::blocked_range<size_t>& range, ErrorStats stats) {
-        for (size_t i = range.begin(); i < range.end(); ++i) per_item(i, stats);
-        return stats;
-      },
-      ErrorStats::join);
-}
-
-template <typename PerItem>
-void for_each(size_t count, const PerItem& per_item) {
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, count, kGrain), [&](const tbb::blocked_range<size_t>& range) {
-    for (size_t i = range.begin(); i < range.end(); ++i) per_item(i);
-  });
-}
-
-/// Returns 0 for a zero vector.
-DVec3 safe_normalize(DVec3 v) {
-  const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
-  if (!(largest > 0.0)) return DVec3(0.0);
-  v /= largest;
-  return v / glm::length(v);
-}
 
 class Quantizer {
 public:
@@ -85,16 +42,16 @@ public:
     std::vector<LatticePart> lattice;
     for (const GeometryPart& part : plan_.parts) lattice.push_back(place_on_lattice(part));
     surface_ = weld_surface(scene_, plan_, lattice);
-    std::vector<Work> parts(plan_.parts.size());
+    std::vector<QuantizedPart> parts(plan_.parts.size());
     size_t first_triangle = 0;
     for (size_t i = 0; i < parts.size(); ++i) {
       parts[i] = quantize_part(i, std::move(lattice[i]), first_triangle);
       first_triangle += parts[i].triangles.size();
     }
-    out_.normal_encoding = config_.normals ? *config_.normals : choose_normal_encoding(parts);
+    out_.normal_encoding = config_.normals ? *config_.normals : choose_normal_encoding(parts, limits_.error_degrees);
     CoincidingTriangles coinciding(source_, count_merged());
     for (size_t i = 0; i < parts.size(); ++i) {
-      encode_normals(parts[i]);
+      encode_normals(out_.normal_encoding, parts[i], out_.stats);
       weld(i, parts[i], coinciding);
       parts[i] = {};
     }
@@ -144,18 +101,6 @@ private:
                   plan_.name + ": measured " + what + " " + brief(measured) + " exceeds its bound " + brief(bound));
   }
 
-  /// Working data of one part, per source vertex or triangle.
-  struct Work {
-    std::vector<LatticePoint> lattice;
-    size_t first_triangle = 0;   ///< index of the part's first triangle in surface_
-    std::vector<DVec3> normals;  ///< unit length; empty if none are stored
-    std::vector<uint8_t> smooth; ///< per normal: used by a triangle that is not flat
-    std::vector<uint32_t> codes;
-    std::vector<UvLattice> uvs;
-    std::vector<Triangle> triangles; ///< with the file's winding
-    std::vector<uint8_t> flat;
-  };
-
   LatticePart place_on_lattice(const GeometryPart& part) {
     const Mesh& mesh = scene_.meshes[part.mesh];
     LatticePart result;
@@ -167,17 +112,19 @@ private:
     return result;
   }
 
-  Work quantize_part(size_t number, LatticePart&& lattice, size_t first_triangle) {
+  QuantizedPart quantize_part(size_t number, LatticePart&& lattice, size_t first_triangle) {
     const GeometryPart& part = plan_.parts[number];
     const PartNeeds& needs = needs_.parts[number];
     const Mesh& mesh = scene_.meshes[part.mesh];
-    Work work;
+    QuantizedPart work;
     work.lattice = std::move(lattice.points);
     work.triangles = std::move(lattice.triangles);
-    work.first_triangle = first_triangle;
+    work.collapsed = std::span(surface_.collapsed).subspan(first_triangle, work.triangles.size());
+    work.corners = std::span(surface_.corners).subspan(first_triangle, work.triangles.size());
     work.flat.assign(work.triangles.size(), 1);
     if (needs.store_normals())
-      quantize_normals(part, mesh, work, needs.normals != baked::kOnRequest && needs_.infer_normals);
+      quantize_normals(part, mesh, needs.normals != baked::kOnRequest && needs_.infer_normals, limits_.flat_degrees,
+                       work, out_.stats);
     if (needs.store_uvs()) quantize_uvs(mesh, work);
     return work;
   }
@@ -195,119 +142,7 @@ private:
     out_.stats.position_error_count += errors.count;
   }
 
-  /// Unit normal of the decoded triangle; zero if it has no area.
-  static DVec3 face_normal(const Work& work, const Triangle& t) {
-    const LatticePoint &a = work.lattice[t.x], &b = work.lattice[t.y], &c = work.lattice[t.z];
-    DVec3 ab, ac;
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto i = static_cast<size_t>(axis);
-      ab[axis] = static_cast<double>(b[i] - a[i]);
-      ac[axis] = static_cast<double>(c[i] - a[i]);
-    }
-    return safe_normalize(glm::cross(ab, ac));
-  }
-
-  void quantize_normals(const GeometryPart& part, const Mesh& mesh, Work& work, bool infer) {
-    if (mesh.normals.size() != mesh.positions.size())
-      throw Error(ErrorKind::kInput, mesh.name + ": normals and positions differ in number");
-    const glm::dmat3 matrix = normal_matrix(part.geometry_from_mesh);
-    work.normals.resize(mesh.normals.size());
-    std::atomic<uint64_t> zeros{0};
-    std::atomic<bool> finite{true};
-    for_each(mesh.normals.size(), [&](size_t i) {
-      if (!is_finite(mesh.normals[i])) finite.store(false, std::memory_order_relaxed);
-      work.normals[i] = safe_normalize(matrix * DVec3(mesh.normals[i]));
-      if (work.normals[i] == DVec3(0.0)) zeros.fetch_add(1, std::memory_order_relaxed);
-    });
-    if (!finite) throw Error(ErrorKind::kInput, mesh.name + ": a normal is not finite");
-    if (zeros > 0) repair_normals(work);
-    out_.stats.repaired_normals += zeros;
-    if (infer)
-      find_flat_triangles(work);
-    else
-      work.flat.assign(work.triangles.size(), 0);
-    work.smooth.assign(work.normals.size(), 0);
-    for (size_t i = 0; i < work.triangles.size(); ++i)
-      for (int corner = 0; corner < 3 && work.flat[i] == 0 && stays(work, i); ++corner)
-        work.smooth[work.triangles[i][corner]] = 1;
-    if (infer)
-      out_.stats.inferred_normals +=
-          static_cast<uint64_t>(std::count(work.smooth.begin(), work.smooth.end(), uint8_t{0}));
-  }
-
-  /// Finds triangles whose normals equal the face normal within the limit.
-  void find_flat_triangles(Work& work) {
-    // Slightly reduced, so that rounding never lifts a measured angle above the limit.
-    const double flat_chord = 2.0 * std::sin(limits_.flat_degrees / kDegreesPerRadian * 0.5) * (1.0 - 1e-9);
-    const auto near = [&](const Triangle& t, DVec3 n) {
-      for (int corner = 0; corner < 3; ++corner) {
-        const DVec3 d = work.normals[t[corner]] - n;
-        if (!(glm::dot(d, d) <= flat_chord * flat_chord)) return false;
-      }
-      return true;
-    };
-    const ErrorStats flat_errors = accumulate_errors(work.triangles.size(), [&](size_t i, ErrorStats& stats) {
-      if (!stays(work, i)) return;
-      const Triangle& t = work.triangles[i];
-      const DVec3 n = face_normal(work, t);
-      // Tracing turns normals towards the viewer, so either side of the face is valid.
-      const double sign = near(t, n) ? 1.0 : near(t, -n) ? -1.0 : 0.0;
-      work.flat[i] = sign != 0.0;
-      for (int corner = 0; corner < 3 && sign != 0.0; ++corner)
-        stats.add(angle_degrees(work.normals[t[corner]], sign * n));
-    });
-    out_.stats.flat_triangles += flat_errors.count / 3;
-    add_normal_errors(flat_errors);
-  }
-
-  void add_normal_errors(const ErrorStats& errors) {
-    out_.stats.max_normal_error_degrees = std::max(out_.stats.max_normal_error_degrees, errors.max);
-    out_.stats.normal_error_sum += errors.sum;
-    out_.stats.normal_count += errors.count;
-  }
-
-  static double encoding_error(NormalEncoding encoding, DVec3 normal, uint32_t code) {
-    return angle_degrees(normal, glm::normalize(DVec3(decode_normal(encoding, code))));
-  }
-
-  /// Returns the encoding with the fewest bits whose largest error is within the limit; kAxis32 if there is none.
-  NormalEncoding choose_normal_encoding(const std::vector<Work>& parts) const {
-    for (const NormalEncoding encoding :
-         {NormalEncoding::kAxis12, NormalEncoding::kAxis16, NormalEncoding::kOct20, NormalEncoding::kAxis24})
-      if (std::all_of(parts.begin(), parts.end(), [&](const Work& part) { return keeps_error(encoding, part); }))
-        return encoding;
-    return NormalEncoding::kAxis32;
-  }
-
-  bool keeps_error(NormalEncoding encoding, const Work& work) const {
-    std::atomic<bool> kept{true};
-    for_each(work.normals.size(), [&](size_t i) {
-      if (work.smooth[i] == 0 || !kept.load(std::memory_order_relaxed)) return;
-      if (encoding_error(encoding, work.normals[i], encode_normal(encoding, work.normals[i])) > limits_.error_degrees)
-        kept.store(false, std::memory_order_relaxed);
-    });
-    return kept;
-  }
-
-  void encode_normals(Work& work) {
-    work.codes.assign(work.normals.size(), 0);
-    add_normal_errors(accumulate_errors(work.normals.size(), [&](size_t i, ErrorStats& stats) {
-      if (work.smooth[i] == 0) return;
-      work.codes[i] = encode_normal(out_.normal_encoding, work.normals[i]);
-      stats.add(encoding_error(out_.normal_encoding, work.normals[i], work.codes[i]));
-    }));
-  }
-
-  /// Replaces each zero normal by the face normal of a triangle that uses it.
-  static void repair_normals(Work& work) {
-    for (const Triangle& t : work.triangles)
-      for (int corner = 0; corner < 3; ++corner)
-        if (DVec3& n = work.normals[t[corner]]; n == DVec3(0.0)) n = face_normal(work, t);
-    for (DVec3& n : work.normals)
-      if (n == DVec3(0.0)) n = DVec3(0.0, 0.0, 1.0);
-  }
-
-  void quantize_uvs(const Mesh& mesh, Work& work) {
+  void quantize_uvs(const Mesh& mesh, QuantizedPart& work) {
     if (mesh.uvs.empty()) return; // (0, 0) everywhere
     if (mesh.uvs.size() != mesh.positions.size())
       throw Error(ErrorKind::kInput, mesh.name + ": texture coordinates and positions differ in number");
@@ -331,11 +166,6 @@ private:
     out_.stats.max_uv_error = std::max(out_.stats.max_uv_error, error);
     out_.stats.max_uv_error_texels = std::max(out_.stats.max_uv_error_texels, error * needs_.texels_per_uv[axis]);
     return *code;
-  }
-
-  /// Whether a triangle of the part has not collapsed.
-  bool stays(const Work& work, size_t triangle) const {
-    return surface_.collapsed[work.first_triangle + triangle] == 0;
   }
 
   bool at_merged(const Triangle& corners) const {
@@ -379,9 +209,9 @@ private:
     for (uint32_t i = smooth_at_[v.position]; i != kUnset && compared < kMaxCompared;
          i = smooth_vertices_[i].next, ++compared) {
       const QuantizedVertex& other = out_.vertices[smooth_vertices_[i].vertex];
-      const double error = encoding_error(out_.normal_encoding, normal, other.normal_code);
+      const double error = normal_encoding_error(out_.normal_encoding, normal, other.normal_code);
       if (other.uv != v.uv || error > weld_limit()) continue;
-      out_.stats.normal_error_sum += error - encoding_error(out_.normal_encoding, normal, v.normal_code);
+      out_.stats.normal_error_sum += error - normal_encoding_error(out_.normal_encoding, normal, v.normal_code);
       out_.stats.max_normal_error_degrees = std::max(out_.stats.max_normal_error_degrees, error);
       return smooth_vertices_[i].vertex;
     }
@@ -398,17 +228,17 @@ private:
   }
 
   /// Assigns vertices to the part's triangles and appends those that neither collapsed nor coincide with another one.
-  void weld(size_t part, const Work& work, CoincidingTriangles& coinciding) {
+  void weld(size_t part, const QuantizedPart& work, CoincidingTriangles& coinciding) {
     constexpr uint32_t kUnset = ~0u;
     const bool uvs = needs_.parts[part].store_uvs();
     std::array<std::vector<uint32_t>, 2> vertex_of; // of smooth and of flat triangles
     for (auto& numbers : vertex_of) numbers.assign(work.lattice.size(), kUnset);
     std::array<uint32_t, 2> kinds{kUnset, kUnset};
     for (size_t i = 0; i < work.triangles.size(); ++i) {
-      if (!stays(work, i)) continue;
+      if (!work.stays(i)) continue;
       const uint8_t flat = work.flat[i];
       if (kinds[flat] == kUnset) kinds[flat] = kind_number({plan_.parts[part].slot, flat != 0, uvs});
-      const Triangle& corners = surface_.corners[work.first_triangle + i];
+      const Triangle& corners = work.corners[i];
       Triangle t{};
       for (int corner = 0; corner < 3; ++corner) {
         const uint32_t source = work.triangles[i][corner];

@@ -268,11 +268,4 @@ ClusterLod build_cluster_lod(const QuantizedGeometry& geometry, const GeometryCl
   return LodBuilder(geometry, progress, limits).run(base);
 }
 
-uint64_t level_triangles(const ClusterLod& lod, uint32_t level) {
-  uint64_t count = 0;
-  for (const LodCluster& c : lod.clusters)
-    if (c.level == level || (c.level < level && lod.groups[c.group].terminal)) count += c.range.triangle_count;
-  return count;
-}
-
 } // namespace packtrace

@@ -63,7 +63,4 @@ struct LodLimits {
 ClusterLod build_cluster_lod(const QuantizedGeometry& geometry, const GeometryClusters& base, Progress& progress,
                              const LodLimits& limits = {});
 
-/// Number of triangles of a discrete level: its clusters and those of terminal groups below it.
-uint64_t level_triangles(const ClusterLod& lod, uint32_t level);
-
 } // namespace packtrace

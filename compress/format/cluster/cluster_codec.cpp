@@ -11,8 +11,6 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kUvAnchorBits = 32, kUvWidthBits = 5;
-constexpr uint32_t kUvHeaderBits = 2 * (kUvAnchorBits + kUvWidthBits);
 constexpr uint32_t kMaxUvBits = 31;     // for differences of codes in -kMaxUvLattice .. kMaxUvLattice
 constexpr uint32_t kMaxNormalBits = 17; // covers three times the codes of axis32 (unfolded charts)
 
@@ -79,12 +77,16 @@ ClusterView::ClusterView(const baked::GeometryRecord& geometry, const baked::Clu
 
 LatticePoint ClusterView::lattice(uint32_t vertex) const {
   uint64_t bit = position_bit_ + uint64_t{vertex} * position_stride_;
-  LatticePoint point = base_;
-  for (size_t axis = 0; axis < 3; ++axis) {
-    point[axis] += static_cast<int64_t>(read_bits(bits_, bit, record_->position_bits[axis]));
-    bit += record_->position_bits[axis];
+  const auto [x_bits, y_bits, z_bits] = record_->position_bits;
+  if (position_stride_ > kMaxFieldBits) { // more than one load holds
+    LatticePoint point = base_;
+    for (size_t axis = 0; axis < 3; bit += record_->position_bits[axis++])
+      point[axis] += static_cast<int64_t>(read_bits(bits_, bit, record_->position_bits[axis]));
+    return point;
   }
-  return point;
+  const PositionFields fields = read_position(bits_, bit, x_bits, y_bits, z_bits);
+  return {base_[0] + static_cast<int64_t>(fields.axis[0]), base_[1] + static_cast<int64_t>(fields.axis[1]),
+          base_[2] + static_cast<int64_t>(fields.axis[2])};
 }
 
 Vec3 ClusterView::position(uint32_t vertex) const {
@@ -148,24 +150,9 @@ ClusterView::StreamBits ClusterView::stream_bits() const {
 }
 
 void decode_positions(const ClusterView& cluster, std::span<Vec3> out) {
-  const uint32_t count = cluster.vertex_count();
-  assert(out.size() >= count);
-  const auto [x_bits, y_bits, z_bits] = cluster.record_->position_bits;
-  const uint32_t stride = cluster.position_stride_;
-  const LatticePoint base = cluster.base_;
-  const double step = cluster.step_;
-  uint64_t bit = cluster.position_bit_;
-  if (stride <= kMaxFieldBits) { // usual case: one load per vertex
-    const uint64_t x_mask = (uint64_t{1} << x_bits) - 1, y_mask = (uint64_t{1} << y_bits) - 1;
-    for (uint32_t v = 0; v < count; ++v, bit += stride) {
-      const uint64_t field = read_bits(cluster.bits_, bit, stride);
-      out[v] = {from_lattice(base[0] + static_cast<int64_t>(field & x_mask), step),
-                from_lattice(base[1] + static_cast<int64_t>((field >> x_bits) & y_mask), step),
-                from_lattice(base[2] + static_cast<int64_t>(field >> (x_bits + y_bits)), step)};
-    }
-    return;
-  }
-  for (uint32_t v = 0; v < count; ++v) out[v] = cluster.position(v);
+  assert(out.size() >= cluster.vertex_count());
+  const ClusterView view = cluster; // a local copy, because writes to `out` might change the original
+  for (uint32_t v = 0; v < view.vertex_count(); ++v) out[v] = view.position(v);
 }
 
 void decode_indices(const ClusterView& cluster, uint32_t base, std::span<Triangle> out) {

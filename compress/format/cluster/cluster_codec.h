@@ -62,9 +62,7 @@ public:
   const IndexLayout& layout() const { return layout_; }
 
 private:
-  friend void decode_positions(const ClusterView&, std::span<Vec3>);
   friend void decode_normals(const ClusterView&, std::span<Vec3>);
-  friend void decode_uvs(const ClusterView&, std::span<Vec2>);
 
   /// @param entry a vertex, or with a palette one of its entries
   NormalFields normal_entry(uint32_t entry) const;

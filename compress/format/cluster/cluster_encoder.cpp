@@ -64,9 +64,9 @@ void write_uvs(std::span<const UvLattice> uvs, baked::ClusterRecord& record, Bit
   std::array<uint32_t, 2> width{};
   for (size_t axis = 0; axis < 2; ++axis) {
     width[axis] = static_cast<uint32_t>(std::bit_width(static_cast<uint32_t>(hi[axis] - lo[axis])));
-    writer.put(static_cast<uint32_t>(lo[axis]), 32);
+    writer.put(static_cast<uint32_t>(lo[axis]), kUvAnchorBits);
   }
-  for (const uint32_t bits : width) writer.put(bits, 5);
+  for (const uint32_t bits : width) writer.put(bits, kUvWidthBits);
   for (const UvLattice& uv : uvs)
     for (size_t axis = 0; axis < 2; ++axis) writer.put(static_cast<uint32_t>(uv[axis] - lo[axis]), width[axis]);
 }

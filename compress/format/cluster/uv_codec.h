@@ -25,6 +25,10 @@ inline constexpr int32_t kMinUvExponent = -148;
 inline constexpr int32_t kMaxUvExponent = 98; // the largest float has 30 bits in steps of this size
 inline constexpr int32_t kMaxFp16Code = 0x7bff;
 
+/// A cluster's texture coordinates begin with the smallest code of each axis, then the field width of each axis.
+inline constexpr uint32_t kUvAnchorBits = 32, kUvWidthBits = 5;
+inline constexpr uint32_t kUvHeaderBits = 2 * (kUvAnchorBits + kUvWidthBits);
+
 /// Codes per texel of the finest texture that a geometry uses.
 inline constexpr double kUvCodesPerTexel = 16.0;
 

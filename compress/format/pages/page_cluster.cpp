@@ -9,8 +9,6 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kUvAnchorBits = 32, kUvWidthBits = 5; // docs/baked_format.md, texture coordinates
-
 void unpack_strips(const ClusterView& view, ClusterValues& values) {
   const IndexLayout& layout = view.layout();
   const uint8_t* bits = view.bits();
@@ -245,7 +243,7 @@ bool ClusterPacker::append(const baked::GeometryRecord& geometry, const ClusterV
   if (values.has_normals)
     bits += palette_count_ == 0 ? count * normals_.stride()
                                 : palette_count_ * normals_.stride() + count * bits_for_count(palette_count_);
-  if (values.has_uvs) bits += 2 * (kUvAnchorBits + kUvWidthBits) + count * (uv_bits_[0] + uv_bits_[1]);
+  if (values.has_uvs) bits += kUvHeaderBits + count * (uv_bits_[0] + uv_bits_[1]);
   if (!payload_.begin_cluster(bits)) return false;
   put_strips(values, layout);
   put_positions(values, record);

@@ -7,6 +7,7 @@
 
 #include "compress/format/cluster/index_codec.h"
 #include "compress/format/cluster/normal_codec.h"
+#include "compress/format/cluster/uv_codec.h"
 #include "compress/format/layout/baked_format.h"
 #include "compress/format/layout/bit_stream.h"
 
@@ -58,7 +59,6 @@ static_assert(sizeof(Header) == kHeaderBytes && std::is_trivially_copyable_v<Hea
 
 inline constexpr uint32_t kLowBitsMask = 63, kClassShift = 6;
 inline constexpr uint32_t kEscapeFieldBits = 2, kEscapeIndexBits = 8, kEscapeWidthBits = 6;
-inline constexpr uint32_t kUvAnchorBits = 32, kUvWidthBits = 5;
 inline constexpr uint32_t kByteBits = 8;
 
 /// Field widths of one channel of one cluster.

@@ -148,7 +148,7 @@ bool FastPageReader::read_uv_layout(const baked::ClusterRecord& record) {
   w.layouts[kUvs] = {};
   w.prefix_bits[kUvs] = 0;
   if ((record.flags & baked::kClusterHasUvs) == 0) return true;
-  w.prefix_bits[kUvs] = 2 * (kUvAnchorBits + kUvWidthBits);
+  w.prefix_bits[kUvs] = kUvHeaderBits;
   if (!take_bits(w.prefix_bits[kUvs], w.prefix_bit[kUvs])) return false;
   const uint8_t* bits = parts_[kFields].at;
   uint64_t at = w.prefix_bit[kUvs] + 2 * kUvAnchorBits;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstring>
 
 #include "compress/format/layout/bit_stream.h"
 #include "compress/format/trees/node_writer.h"

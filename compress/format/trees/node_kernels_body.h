@@ -1,6 +1,7 @@
 // Kernels of node_kernels.h, compiled once per instruction set. Code here must not use inline functions of other
-// headers, because they would be compiled for AVX2.
+// headers, because they would be compiled for AVX2; those of bit_fields.h are always inlined.
 
+#include "compress/format/layout/bit_fields.h"
 #include "compress/format/trees/node_kernels.h"
 
 namespace packtrace::node_kernels {
@@ -16,12 +17,6 @@ using Long2 = uint64_t __attribute__((vector_size(16)));
 [[gnu::always_inline]] inline Int8& lanes(Box& box) { return reinterpret_cast<Int8&>(box); }
 
 [[gnu::always_inline]] inline void extend(Int8& box, const Int8& other) { box = other < box ? other : box; }
-
-[[gnu::always_inline]] inline uint64_t load(const uint8_t* from) {
-  uint64_t word;
-  __builtin_memcpy(&word, from, sizeof word);
-  return word;
-}
 
 /// Returns, for each byte of `which`, the byte of `from` at that index modulo 16.
 [[gnu::always_inline]] inline Bytes16 pick_bytes(const Bytes16& from, const Bytes16& which) {
@@ -52,7 +47,7 @@ void place_vertices(const VertexFields& fields, Box* boxes) {
   const uint32_t count = fields.count, shift = fields.shift;
   uint64_t bit = fields.first_bit;
   for (uint32_t v = 0; v < count; ++v, bit += stride) {
-    const uint64_t word = load(bits + (bit >> 3));
+    const uint64_t word = load64(bits + (bit >> 3));
     const Long4 field = (Long4{word, word, word, word} >> shifts[bit & 7u]) & masks;
     const auto halves = reinterpret_cast<Uint8>(field),
                both = __builtin_shufflevector(halves, halves, 0, 2, 4, 6, 0, 2, 4, 6);
@@ -83,10 +78,10 @@ constexpr ByteTable kBytes;
 /// Expands fields of 0..8 bits to one byte each, four per step.
 [[gnu::always_inline]] inline void spread_fields(const uint8_t* bits, uint64_t at, uint32_t width, uint32_t count,
                                                  uint8_t* out) {
-  const uint64_t all = (uint64_t{1} << (4 * width)) - 1, pair = (uint64_t{1} << (2 * width)) - 1;
+  const uint64_t pair = (uint64_t{1} << (2 * width)) - 1;
   const uint32_t single = (1u << width) - 1;
   for (uint32_t i = 0; i < count; i += 4, at += uint64_t{4} * width) {
-    const uint64_t word = (load(bits + (at >> 3)) >> (at & 7u)) & all;
+    const uint64_t word = read_bits(bits, at, 4 * width);
     const uint64_t pairs = (word & pair) | (word >> (2 * width) << 16);
     const uint64_t low = pairs & (single * 0x10001u), high = (pairs >> width) & (single * 0x10001u);
     const auto four = static_cast<uint32_t>(low | high << 8);
@@ -103,8 +98,7 @@ void number_corners(const CornerBits& corners, uint8_t* vertices) {
   uint32_t used = 0;
   for (uint32_t c = 0; c < corner_count; c += 8) {
     const uint32_t bit = fresh_bit + c, left = corner_count - c;
-    const auto byte =
-        static_cast<uint8_t>((load(bits + (bit >> 3)) >> (bit & 7u)) & (left < 8 ? (1u << left) - 1 : 255u));
+    const auto byte = static_cast<uint8_t>(read_bits(bits, bit, left < 8 ? left : 8));
     const uint64_t below = kBytes.below[byte];
     Bytes16 from;
     __builtin_memcpy(&from, named + (c - used), sizeof from);
@@ -125,7 +119,7 @@ void box_leaves(const Box* boxes, const uint8_t* vertices, const LeafCorners* le
     extend(box, lanes(boxes[vertices[leaf.kept[1]]]));
     // Eight corners per step. The first corner replaces missing ones.
     for (uint32_t c = leaf.begin; c < leaf.end; c += 8) {
-      uint64_t eight = load(vertices + c);
+      uint64_t eight = load64(vertices + c);
       if (const uint32_t left = leaf.end - c; left < 8) {
         const uint64_t beyond = ~uint64_t{0} << (8 * left);
         eight = (eight & ~beyond) | (uint64_t{vertices[c]} * 0x0101010101010101 & beyond);

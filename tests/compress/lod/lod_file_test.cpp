@@ -10,7 +10,6 @@
 #include <tbb/global_control.h>
 
 #include "compress/bake/lod/lod_encoder.h"
-#include "compress/bake/write/lod_store.h"
 #include "compress/format/file/baked_file.h"
 #include "compress/format/file/file_summary.h"
 #include "pbrt_import/base/error.h"
@@ -18,17 +17,9 @@
 #include "tests/compress/lod/lod_meshes.h"
 #include "tests/compress/lod/surface_distance.h"
 #include "tests/compress/test_scenes.h"
-#include "tests/pbrt_import/scene_folder.h"
 
 namespace packtrace::test {
 namespace {
-
-BakeConfig lod_config(LodUse use = LodUse::kAll, uint32_t min_triangles = 1) {
-  BakeConfig config;
-  config.lod = use;
-  config.lod_min_triangles = min_triangles;
-  return config;
-}
 
 /// Object-space positions of ClusterLod::positions, as decoded.
 std::vector<DVec3> decoded_positions(const BakedFile& file, uint32_t geometry, const ClusterLod& lod) {
@@ -83,7 +74,7 @@ double step_of(const baked::GeometryRecord& g) { return PositionGrid{g.step_mant
 std::vector<std::byte> baked_bytes(const NamedMesh& mesh) {
   static std::map<std::string, std::vector<std::byte>> baked; // by name
   const auto [at, is_new] = baked.try_emplace(mesh.name);
-  if (is_new) at->second = bake(scene_of(mesh.make()), lod_config()).bytes;
+  if (is_new) at->second = bake(scene_of(mesh.make()), config_with_levels()).bytes;
   return at->second;
 }
 
@@ -167,7 +158,7 @@ TEST(LodFile, MeshesThatCannotBeSimplifiedHaveNoLevels) {
   uint32_t count = 0;
   for (const NamedMesh& mesh : stress_meshes()) {
     if (mesh.name != "one triangle" && mesh.name != "triangles without area") continue;
-    const BakedFile file = BakedFile::from_bytes(bake(scene_of(mesh.make()), lod_config()).bytes);
+    const BakedFile file = BakedFile::from_bytes(bake(scene_of(mesh.make()), config_with_levels()).bytes);
     EXPECT_TRUE(file.lod(0).levels.empty()) << mesh.name;
     EXPECT_EQ(file.base_geometry_count(), file.geometries().size()) << mesh.name;
     ++count;
@@ -178,7 +169,7 @@ TEST(LodFile, MeshesThatCannotBeSimplifiedHaveNoLevels) {
 /// Rotated and far from the origin, decoded points leave the plane; errors must include this.
 TEST(LodFile, ErrorsCountWhatFloatsLoseFarFromTheOrigin) {
   const DAffine turned(DVec3(0.36, 0.48, -0.8), DVec3(-0.8, 0.6, 0.0), DVec3(0.48, 0.64, 0.6), DVec3(3e4, -2e4, 1e4));
-  const BakedFile file = BakedFile::from_bytes(bake(scene_of(grid_mesh(60), turned), lod_config()).bytes);
+  const BakedFile file = BakedFile::from_bytes(bake(scene_of(grid_mesh(60), turned), config_with_levels()).bytes);
   ASSERT_GE(file.lod(0).levels.size(), 3u);
   EXPECT_GT(file.lod(0).levels[1].error, 3e4f * 0x1p-24f);
   expect_honest_levels(file, 0, 1e-9);
@@ -207,20 +198,8 @@ TEST(LodFile, StoredErrorsAndSpheresAreNotSmallerThanTheBuilders) {
   }
 }
 
-/// Two materials of different classes, one with texture coordinates, and normals; each mesh is placed twice.
-Scene mixed_scene() {
-  Scene scene = scene_of(torus_mesh(24, 16));
-  scene.masks.push_back(striped_mask());
-  scene.materials.push_back({"leaf", kAlphaMask, Vec3(0.5f), 0, kNoMask});
-  scene.meshes.push_back(grid_mesh(40, 0.3f, true));
-  scene.meshes.push_back(half_faceted(torus_mesh(40, 30)));
-  scene.objects.push_back({"both", {Shape{1, 1, false, DAffine(1.0)}, Shape{2, 0, false, DAffine(1.0)}}});
-  for (const double x : {5.0, -5.0}) scene.instances.push_back({0, Affine(translation({x, 0, 0}))});
-  return scene;
-}
-
 TEST(LodFile, LevelsKeepSlotsClassesAndStreams) {
-  const BakedFile file = BakedFile::from_bytes(bake(mixed_scene(), lod_config()).bytes);
+  const BakedFile file = BakedFile::from_bytes(bake(mixed_lod_scene(), config_with_levels()).bytes);
   const uint32_t geometry = file.instances()[1].geometry;
   const LodView lod = file.lod(geometry);
   ASSERT_GE(lod.levels.size(), 4u);
@@ -248,7 +227,7 @@ TEST(LodFile, LevelsKeepSlotsClassesAndStreams) {
 
 TEST(LodFile, SaysWhichGeometriesGetLevels) {
   const auto with = [](LodUse use, uint32_t min_triangles) {
-    const BakedFile file = BakedFile::from_bytes(bake(mixed_scene(), lod_config(use, min_triangles)).bytes);
+    const BakedFile file = BakedFile::from_bytes(bake(mixed_lod_scene(), config_with_levels(use, min_triangles)).bytes);
     // torus with 768 triangles, both meshes with 5600
     return std::pair(!file.lod(0).levels.empty(), !file.lod(1).levels.empty());
   };
@@ -261,22 +240,22 @@ TEST(LodFile, SaysWhichGeometriesGetLevels) {
 
 TEST(LodFile, LimitsTheNumberOfLevels) {
   for (const uint32_t levels : {1u, 3u}) {
-    BakeConfig config = lod_config();
+    BakeConfig config = config_with_levels();
     config.lod_levels = levels;
     const BakedFile file = BakedFile::from_bytes(bake(scene_of(torus_mesh(96, 64)), config).bytes);
     ASSERT_EQ(file.lod(0).levels.size(), levels + 1);
     for (const baked::LodGroupRecord& group : file.lod(0).groups_of(levels)) EXPECT_TRUE(std::isinf(group.error));
   }
   for (const uint32_t levels : {0u, 32u}) {
-    BakeConfig config = lod_config();
+    BakeConfig config = config_with_levels();
     config.lod_levels = levels;
     EXPECT_THROW(config.validate(), Error) << levels;
   }
 }
 
 TEST(LodFile, LevelZeroIsTheSameWithAndWithoutLevels) {
-  const BakedFile without = BakedFile::from_bytes(bake(mixed_scene()).bytes);
-  const BakedFile with = BakedFile::from_bytes(bake(mixed_scene(), lod_config()).bytes);
+  const BakedFile without = BakedFile::from_bytes(bake(mixed_lod_scene()).bytes);
+  const BakedFile with = BakedFile::from_bytes(bake(mixed_lod_scene(), config_with_levels()).bytes);
   ASSERT_EQ(with.base_geometry_count(), without.geometries().size());
   for (uint32_t g = 0; g < with.base_geometry_count(); ++g) {
     const Decoded a = decode(without, g), b = decode(with, g);
@@ -295,9 +274,9 @@ TEST(LodFile, LevelZeroIsTheSameWithAndWithoutLevels) {
 TEST(LodFile, SameBytesForAnyThreadCountAndCodec) {
   const auto bytes = [](size_t threads, PageCodec codec) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    BakeConfig config = lod_config();
+    BakeConfig config = config_with_levels();
     config.codec = codec;
-    return bake(mixed_scene(), config).bytes;
+    return bake(mixed_lod_scene(), config).bytes;
   };
   const std::vector<std::byte> one = bytes(1, PageCodec::kNone);
   EXPECT_EQ(one, bytes(4, PageCodec::kNone));
@@ -308,57 +287,8 @@ TEST(LodFile, SameBytesForAnyThreadCountAndCodec) {
   }
 }
 
-TEST(LodFile, AnInterruptedBakeGoesOnWithWhatItHas) {
-  const SceneFolder folder;
-  BakeConfig config = lod_config();
-  const std::vector<std::byte> whole = bake(mixed_scene(), config).bytes;
-  config.resume = folder.path() / "levels";
-  const BakedScene first = bake(mixed_scene(), config);
-  EXPECT_EQ(first.bytes, whole);
-  EXPECT_EQ(first.report.resumed_geometries, 0u);
-  std::vector<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(config.resume)) files.push_back(entry.path());
-  ASSERT_EQ(files.size(), 2u);
-  std::filesystem::remove(files[0]);
-  const BakedScene second = bake(mixed_scene(), config);
-  EXPECT_EQ(second.bytes, whole);
-  EXPECT_EQ(second.report.resumed_geometries, 1u);
-  const BakedScene third = bake(mixed_scene(), config);
-  EXPECT_EQ(third.bytes, whole);
-  EXPECT_EQ(third.report.resumed_geometries, 2u);
-  config.lod_levels = 2;
-  EXPECT_EQ(bake(mixed_scene(), config).report.resumed_geometries, 0u);
-  Diagnostics diagnostics;
-  Progress progress;
-  bake_scene(mixed_scene(), config, folder.path() / "out.ptk", false, diagnostics, progress);
-  EXPECT_FALSE(std::filesystem::exists(config.resume));
-}
-
-/// At any point of interruption, the files left behind are complete.
-TEST(LodFile, AnInterruptedBakeLeavesNoHalfMadeLevels) {
-  const SceneFolder folder;
-  Scene scene = mixed_scene();
-  for (uint32_t i = 0; i < 6; ++i) add_shape(scene, torus_mesh(60 + 10 * i, 40), translation({4.0 * i, 9, 0}));
-  BakeConfig config = lod_config();
-  const std::vector<std::byte> whole = bake(scene, config).bytes;
-  config.resume = folder.path() / "levels";
-  uint64_t resumed = 0;
-  for (const uint64_t stop : {1u, 20u, 40u, 60u, 80u}) {
-    Diagnostics diagnostics;
-    Progress progress([&](std::string_view phase, uint64_t done, uint64_t total) {
-      if (phase.ends_with("levels") && 100 * done >= stop * total) throw Error(ErrorKind::kCancelled, "stopped");
-    });
-    EXPECT_THROW((void)bake_to_bytes(scene, config, diagnostics, progress), Error) << stop;
-    const BakedScene after = bake(scene, config);
-    EXPECT_TRUE(after.bytes == whole) << stop;
-    resumed += after.report.resumed_geometries;
-    LodStore(config.resume).clear();
-  }
-  EXPECT_GT(resumed, 0u);
-}
-
 TEST(LodFile, SummaryCountsLevelsAndTheirBytes) {
-  const BakedFile file = BakedFile::from_bytes(bake(mixed_scene(), lod_config()).bytes);
+  const BakedFile file = BakedFile::from_bytes(bake(mixed_lod_scene(), config_with_levels()).bytes);
   const FileSummary s = summarize(file);
   ASSERT_EQ(s.lod.by_geometry.size(), 2u);
   const LodTable &small = s.lod.by_geometry[0].table, &large = s.lod.by_geometry[1].table;
@@ -388,7 +318,7 @@ TEST(LodFile, ThousandsOfTinyGeometriesGetNone) {
   Scene scene = scene_of(soup_mesh(1, 1));
   for (uint32_t i = 0; i < 2000; ++i) add_shape(scene, soup_mesh(1 + i % 7, i), translation({double(i), 0, 0}));
   add_shape(scene, torus_mesh(24, 16), translation({0, 9, 0}));
-  const BakedFile file = BakedFile::from_bytes(bake(scene, lod_config(LodUse::kAll, 512)).bytes);
+  const BakedFile file = BakedFile::from_bytes(bake(scene, config_with_levels(LodUse::kAll, 512)).bytes);
   EXPECT_EQ(file.base_geometry_count(), 2002u);
   EXPECT_GT(file.lod(2001).levels.size(), 1u);
   EXPECT_EQ(file.sections().lod_levels.front().base, 2001u);
@@ -398,7 +328,7 @@ TEST(LodFile, ThousandsOfTinyGeometriesGetNone) {
 TEST(LodFile, GeometryAtTheEndOfTheFloatRange) {
   for (const double size : {2e38, 1e-40}) {
     const BakedFile file =
-        BakedFile::from_bytes(bake(scene_of(torus_mesh(24, 16), scaling(DVec3(size))), lod_config()).bytes);
+        BakedFile::from_bytes(bake(scene_of(torus_mesh(24, 16), scaling(DVec3(size))), config_with_levels()).bytes);
     EXPECT_EQ(file.geometries()[0].triangle_count, 768u);
     for (const baked::LodGroupRecord& group : file.lod(0).groups) EXPECT_TRUE(std::isfinite(group.radius));
   }

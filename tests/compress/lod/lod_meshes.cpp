@@ -219,6 +219,24 @@ std::string identifier(std::string name) {
   return name;
 }
 
+BakeConfig config_with_levels(LodUse use, uint32_t min_triangles) {
+  BakeConfig config;
+  config.lod = use;
+  config.lod_min_triangles = min_triangles;
+  return config;
+}
+
+Scene mixed_lod_scene() {
+  Scene scene = scene_of(torus_mesh(24, 16));
+  scene.masks.push_back(striped_mask());
+  scene.materials.push_back({"leaf", kAlphaMask, Vec3(0.5f), 0, kNoMask});
+  scene.meshes.push_back(grid_mesh(40, 0.3f, true));
+  scene.meshes.push_back(half_faceted(torus_mesh(40, 30)));
+  scene.objects.push_back({"both", {Shape{1, 1, false, DAffine(1.0)}, Shape{2, 0, false, DAffine(1.0)}}});
+  for (const double x : {5.0, -5.0}) scene.instances.push_back({0, Affine(translation({x, 0, 0}))});
+  return scene;
+}
+
 BuiltLod build_lod(const Mesh& mesh) {
   const Scene scene = scene_of(mesh);
   const ScenePlan plan = plan_scene(scene);
@@ -281,6 +299,13 @@ std::vector<double> thresholds(const ClusterLod& lod) {
       for (const double t : {std::nextafter(group.error, 0.0), group.error, std::nextafter(group.error, 1e300)})
         values.insert(t);
   return {values.begin(), values.end()};
+}
+
+uint64_t level_triangles(const ClusterLod& lod, uint32_t level) {
+  uint64_t count = 0;
+  for (const LodCluster& c : lod.clusters)
+    if (c.level == level || (c.level < level && lod.groups[c.group].terminal)) count += c.range.triangle_count;
+  return count;
 }
 
 std::vector<uint32_t> cut_clusters(const ClusterLod& lod, double threshold) {

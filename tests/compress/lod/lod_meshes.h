@@ -39,6 +39,12 @@ std::vector<NamedMesh> closed_stress_meshes();
 /// Converts a mesh name to a test name.
 std::string identifier(std::string name);
 
+/// Gives LOD levels to all geometries of at least `min_triangles` triangles that `use` selects.
+BakeConfig config_with_levels(LodUse use = LodUse::kAll, uint32_t min_triangles = 1);
+
+/// Two materials of different classes, one with texture coordinates, and normals; each mesh is placed twice.
+Scene mixed_lod_scene();
+
 /// A quantised mesh with its clusters and LOD levels.
 struct BuiltLod {
   QuantizedGeometry geometry;
@@ -55,6 +61,9 @@ ClusterLod read_lod(const BakedFile& file, uint32_t geometry);
 
 /// 0, every error of a group, and the adjacent values on both sides of it. Ascending.
 std::vector<double> thresholds(const ClusterLod& lod);
+
+/// Number of triangles of a discrete level: its clusters and those of terminal groups below it.
+uint64_t level_triangles(const ClusterLod& lod, uint32_t level);
 
 /// The clusters of the cut that allows errors up to `threshold`.
 std::vector<uint32_t> cut_clusters(const ClusterLod& lod, double threshold);

@@ -175,6 +175,55 @@ TEST(LodStore, ClearNamesWhatItCannotRemove) {
   EXPECT_EQ(left, 2u); // the others were removed
 }
 
+TEST(LodStore, AnInterruptedBakeGoesOnWithWhatItHas) {
+  const SceneFolder folder;
+  BakeConfig config = config_with_levels();
+  const std::vector<std::byte> whole = bake(mixed_lod_scene(), config).bytes;
+  config.resume = folder.path() / "levels";
+  const BakedScene first = bake(mixed_lod_scene(), config);
+  EXPECT_EQ(first.bytes, whole);
+  EXPECT_EQ(first.report.resumed_geometries, 0u);
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(config.resume)) files.push_back(entry.path());
+  ASSERT_EQ(files.size(), 2u);
+  std::filesystem::remove(files[0]);
+  const BakedScene second = bake(mixed_lod_scene(), config);
+  EXPECT_EQ(second.bytes, whole);
+  EXPECT_EQ(second.report.resumed_geometries, 1u);
+  const BakedScene third = bake(mixed_lod_scene(), config);
+  EXPECT_EQ(third.bytes, whole);
+  EXPECT_EQ(third.report.resumed_geometries, 2u);
+  config.lod_levels = 2;
+  EXPECT_EQ(bake(mixed_lod_scene(), config).report.resumed_geometries, 0u);
+  Diagnostics diagnostics;
+  Progress progress;
+  bake_scene(mixed_lod_scene(), config, folder.path() / "out.ptk", false, diagnostics, progress);
+  EXPECT_FALSE(std::filesystem::exists(config.resume));
+}
+
+/// At any point of interruption, the files left behind are complete.
+TEST(LodStore, AnInterruptedBakeLeavesNoHalfMadeLevels) {
+  const SceneFolder folder;
+  Scene scene = mixed_lod_scene();
+  for (uint32_t i = 0; i < 6; ++i) add_shape(scene, torus_mesh(60 + 10 * i, 40), translation({4.0 * i, 9, 0}));
+  BakeConfig config = config_with_levels();
+  const std::vector<std::byte> whole = bake(scene, config).bytes;
+  config.resume = folder.path() / "levels";
+  uint64_t resumed = 0;
+  for (const uint64_t stop : {1u, 20u, 40u, 60u, 80u}) {
+    Diagnostics diagnostics;
+    Progress progress([&](std::string_view phase, uint64_t done, uint64_t total) {
+      if (phase.ends_with("levels") && 100 * done >= stop * total) throw Error(ErrorKind::kCancelled, "stopped");
+    });
+    EXPECT_THROW((void)bake_to_bytes(scene, config, diagnostics, progress), Error) << stop;
+    const BakedScene after = bake(scene, config);
+    EXPECT_TRUE(after.bytes == whole) << stop;
+    resumed += after.report.resumed_geometries;
+    LodStore(config.resume).clear();
+  }
+  EXPECT_GT(resumed, 0u);
+}
+
 TEST(LodStore, LevelsThatStayDoNotSpoilTheFile) {
   const SceneFolder folder;
   BakeConfig config;

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "pbrt_import/base/file_bytes.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/image/exr.h"
 #include "runtime/image/png.h"
@@ -44,7 +45,7 @@ Outcome compare(std::vector<std::string> arguments) {
 std::string write_ao(const std::filesystem::path& path, const std::vector<float>& ao) {
   const std::array layers{Layer{"ao", {""}, std::span<const float>(ao)},
                           Layer{"depth", {""}, std::span<const float>(ao)}};
-  write_exr(path, kSize, layers);
+  write_file_bytes(path, encode_exr(kSize, layers));
   return path.string();
 }
 

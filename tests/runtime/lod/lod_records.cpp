@@ -23,6 +23,15 @@ glm::dmat3 random_rotation(Random& random) {
 
 DAffine affine(const glm::dmat3& linear, DVec3 translation) { return {linear[0], linear[1], linear[2], translation}; }
 
+baked::LodGroupRecord random_group(Random& random, uint32_t level) {
+  baked::LodGroupRecord g{};
+  g.level = level;
+  for (float& c : g.center) c = random.uniform(-1, 1);
+  g.radius = random.uniform(0.01f, 0.2f);
+  g.error = random.uniform(0.0005f, 0.002f);
+  return g;
+}
+
 DVec3 random_point(Random& random, double half_size) {
   const auto h = static_cast<float>(half_size);
   return {random.uniform(-h, h), random.uniform(-h, h), random.uniform(-h, h)};
@@ -50,14 +59,7 @@ LodRecords random_records(uint32_t finest, uint32_t seed) {
   for (uint32_t level = 0, count = finest; level < 31; ++level, count = std::max(1u, count / 2)) {
     const auto first = static_cast<uint32_t>(out.groups.size());
     std::vector<Made> made;
-    for (uint32_t i = 0; i < count; ++i) {
-      baked::LodGroupRecord g{};
-      g.level = level;
-      for (float& c : g.center) c = random.uniform(-1, 1);
-      g.radius = random.uniform(0.01f, 0.2f);
-      g.error = random.uniform(0.0005f, 0.002f);
-      out.groups.push_back(g);
-    }
+    for (uint32_t i = 0; i < count; ++i) out.groups.push_back(random_group(random, level));
     const auto add_cluster = [&](uint32_t group, uint32_t generating, uint32_t triangles) {
       out.links.push_back({group, generating});
       out.cluster_triangles.push_back(triangles);

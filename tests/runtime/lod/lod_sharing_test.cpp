@@ -9,47 +9,12 @@
 #include <tbb/global_control.h>
 
 #include "pbrt_import/base/error.h"
-#include "tests/runtime/lod/lod_records.h"
+#include "tests/runtime/lod/sharing_cases.h"
 
-namespace packtrace {
+namespace packtrace::sharing_test {
 namespace {
 
 constexpr SharingScheme kSchemes[] = {SharingScheme::kOff, SharingScheme::kOneProvider, SharingScheme::kSteps};
-
-std::vector<LodGeometry> some_geometries(uint32_t count) {
-  std::vector<LodGeometry> geometries;
-  for (uint32_t i = 0; i < count; ++i) geometries.push_back(test::random_records(8 + 9 * i, i + 1).geometry());
-  return geometries;
-}
-
-/// Instances with sheared, mirrored and flattened transforms, from within a few diagonals to far away.
-std::vector<LodInstance> wild_instances(uint32_t count, uint32_t geometries, uint32_t seed) {
-  test::Random random(seed);
-  std::vector<LodInstance> instances;
-  for (uint32_t i = 0; i < count; ++i)
-    instances.push_back({random.bits() % geometries, test::random_affine(random, std::exp2(random.uniform(2, 13)))});
-  return instances;
-}
-
-DetailView view_from(DVec3 eye, double error_px = 1.0) { return make_detail_view(eye, 0.01, 1.0, 1080.0, error_px); }
-
-InstanceMetric metric_of(const LodGeometry& geometry, const LodInstance& instance, const DetailView& view) {
-  return {view, instance.world_from_object, largest_stretch(instance.world_from_object), geometry.reach()};
-}
-
-/// The instance's own cut, by definition.
-std::vector<uint64_t> own_cut(const LodGeometry& geometry, const LodInstance& instance, const DetailView& view) {
-  std::vector<uint64_t> passed(cut_words(geometry));
-  const InstanceMetric metric = metric_of(geometry, instance, view);
-  for (uint32_t rank = 0; rank < geometry.rank_count(); ++rank)
-    passed[rank / 64] |= uint64_t{metric.passes(geometry.ranks(), rank)} << (rank % 64);
-  return passed;
-}
-
-std::vector<uint64_t> used_cut(const LodSharing& sharing, const LodPlan& plan, uint32_t instance) {
-  const PlannedBlas& blas = plan.blas[plan.blas_of_instance[instance]];
-  return passed_of_blas(sharing.geometries()[blas.geometry], sharing.steps(blas.geometry), plan, blas);
-}
 
 uint32_t level_of_group(const LodGeometry& geometry, uint32_t group) {
   uint32_t level = 0;
@@ -197,63 +162,6 @@ TEST(LodSharing, PlansAddUp) {
   }
 }
 
-TEST(LodSharing, TracedTrianglesStayWithinTheRatio) {
-  const std::vector<LodGeometry> geometries = some_geometries(5);
-  for (const double ratio : {1.0, 1.1, 1.25, 2.0})
-    for (const double step_ratio : {1.15, 4.0}) {
-      SharingConfig config;
-      config.step_ratio = step_ratio;
-      config.traced_ratio = ratio;
-      config.measure = true;
-      LodSharing sharing(geometries, wild_instances(800, 5, 4), config);
-      const LodPlan plan = sharing.plan(view_from(DVec3(0.0)));
-      EXPECT_LE(static_cast<double>(plan.traced_triangles), ratio * static_cast<double>(plan.own.traced_triangles));
-      EXPECT_GT(plan.builds, 0u);
-    }
-}
-
-/// If the limit requires own cuts, they go to the instances with the largest savings.
-TEST(LodSharing, OwnCutsGoToThoseThatSaveMost) {
-  const std::vector<LodGeometry> geometries = some_geometries(4);
-  const std::vector<LodInstance> instances = wild_instances(400, 4, 11);
-  const DetailView view = view_from(DVec3(0.0));
-  SharingConfig config;
-  config.step_ratio = 4.0; // far apart, so that the limit requires own cuts
-  config.own_cut_ratio = 1e9;
-  config.traced_ratio = 1.05;
-  config.share_equal_cuts = false;
-  LodSharing sharing(geometries, instances, config);
-  const LodPlan plan = sharing.plan(view);
-  std::vector<uint64_t> least_of_own(4, ~uint64_t{0}), most_of_others(4);
-  for (uint32_t i = 0; i < instances.size(); ++i) {
-    const uint32_t g = instances[i].geometry;
-    const std::span<const LodStep> steps = sharing.steps(g);
-    const uint64_t shared = steps[plan.step_of_instance[i]].triangles;
-    const uint64_t saved = shared - size_of_cut(geometries[g], own_cut(geometries[g], instances[i], view)).triangles;
-    if (plan.category_of_instance[i] == InstanceCategory::kOwn)
-      least_of_own[g] = std::min(least_of_own[g], saved);
-    else
-      most_of_others[g] = std::max(most_of_others[g], saved);
-  }
-  EXPECT_GT(plan.category_counts[static_cast<size_t>(InstanceCategory::kOwn)], 5u);
-  for (size_t g = 0; g < 4; ++g) EXPECT_GE(least_of_own[g], most_of_others[g]);
-}
-
-TEST(LodSharing, SharesMoreTheMoreMayBeTraced) {
-  const std::vector<LodGeometry> geometries = some_geometries(5);
-  const std::vector<LodInstance> instances = test::random_instances(3000, 5, 100.0, 2.0, 1);
-  uint64_t before = ~uint64_t{0};
-  for (const double ratio : {1.0, 1.25, 2.0, 1e9}) {
-    SharingConfig config;
-    config.traced_ratio = ratio;
-    config.own_cut_ratio = 1e9;
-    const uint64_t builds = LodSharing(geometries, instances, config).plan(view_from(DVec3(0.0))).builds;
-    EXPECT_LT(builds, before);
-    before = builds;
-  }
-  EXPECT_LE(before, geometries.size()); // no limit: one build per geometry
-}
-
 /// Histograms match the ranges, and the plan does not depend on the number of threads.
 TEST(LodSharing, IsTheSameForAnyNumberOfThreads) {
   const std::vector<LodGeometry> geometries = some_geometries(7);
@@ -313,47 +221,6 @@ TEST(LodSharing, TheProviderIsStable) {
   ASSERT_EQ(plan.category_counts[static_cast<size_t>(InstanceCategory::kShares)], 49u);
   EXPECT_EQ(plan.category_of_instance[49], InstanceCategory::kProvider);
   EXPECT_EQ(plan.builds, 1u);
-}
-
-TEST(LodSharing, ToleranceIsKeptToItsLevels) {
-  const std::vector<LodGeometry> geometries = some_geometries(4);
-  const std::vector<LodInstance> instances = wild_instances(600, 4, 6);
-  const DetailView view = view_from(DVec3(0.0));
-  SharingConfig config;
-  config.tolerant_levels = 2;
-  config.traced_ratio = 1.0;
-  LodSharing sharing(geometries, instances, config);
-  const LodPlan plan = sharing.plan(view);
-  size_t coarser = 0;
-  for (uint32_t i = 0; i < instances.size(); ++i) {
-    const PlannedBlas& blas = plan.blas[plan.blas_of_instance[i]];
-    if (blas.kind == BlasKind::kOwn) continue;
-    const std::span<const LodStep> steps = sharing.steps(instances[i].geometry);
-    const uint32_t needed = plan.step_of_instance[i];
-    EXPECT_LE(blas.index, needed + 2);
-    coarser += blas.index > needed;
-  }
-  EXPECT_GT(coarser, 50u);
-}
-
-TEST(LodSharing, OnlyEnabledLevelsAreShared) {
-  const std::vector<LodGeometry> geometries = some_geometries(4);
-  const std::vector<LodInstance> instances = wild_instances(600, 4, 7);
-  const DetailView view = view_from(DVec3(0.0));
-  for (const SharingScheme scheme : {SharingScheme::kOneProvider, SharingScheme::kSteps}) {
-    SharingConfig config;
-    config.scheme = scheme;
-    config.share_equal_cuts = false;
-    config.shared_levels = 0;
-    const LodPlan none = LodSharing(geometries, instances, config).plan(view);
-    EXPECT_EQ(none.category_counts[static_cast<size_t>(InstanceCategory::kShares)], 0u);
-    EXPECT_EQ(none.builds + none.category_counts[0], instances.size());
-    config.shared_levels = 3;
-    const LodPlan some = LodSharing(geometries, instances, config).plan(view);
-    EXPECT_LT(some.builds, none.builds);
-    config.shared_levels = 32;
-    EXPECT_LT(LodSharing(geometries, instances, config).plan(view).builds, some.builds);
-  }
 }
 
 TEST(LodSharing, CulledInstancesAreCoarserAndOthersAsTheyWere) {
@@ -451,4 +318,4 @@ TEST(LodSharing, BadInputIsRejected) {
 }
 
 } // namespace
-} // namespace packtrace
+} // namespace packtrace::sharing_test

@@ -20,7 +20,7 @@ size_t wrong_batches(const BakedFile& file, const packed::Kernels& kernels, size
     const baked::GeometryRecord& geometry = file.geometries()[g];
     for (uint32_t c = 0; c < geometry.cluster_count; ++c) {
       const ClusterView view = file.cluster(g, c);
-      const packed::TraceCluster cluster = trace_cluster(tree, geometry, view, packed::kSeenByCamera);
+      const packed::TraceCluster cluster = trace_cluster(tree, geometry, view, baked::kVisibleToCamera);
       if ((cluster.flags & packed::kNeedsWideDecode) != 0) continue;
       for (uint32_t first = 0; first < view.triangle_count(); ++first)
         for (uint32_t count = 1; count <= std::min(view.triangle_count() - first, 16u); ++count) {
@@ -94,7 +94,7 @@ TEST(TraceCluster, LeavesWhatDoesNotFitToTheExactDecoder) {
   const test::BakedScene baked(scene, config);
   const PackedTrees trees = build_packed_trees(baked.file.sections());
   const packed::TraceCluster cluster =
-      trace_cluster(trees.trees[0], baked.file.geometries()[0], baked.file.cluster(0, 0), packed::kSeenByCamera);
+      trace_cluster(trees.trees[0], baked.file.geometries()[0], baked.file.cluster(0, 0), baked::kVisibleToCamera);
   EXPECT_TRUE((cluster.flags & packed::kNeedsWideDecode) != 0);
   for (const PackedIsa isa : test::isas()) {
     const PackedTracer tracer(baked.file, baked.source, isa);
@@ -112,7 +112,7 @@ TEST(TraceCluster, LeavesCoordinatesBeyond32BitsToTheExactDecoder) {
   const test::BakedScene sphere(scene);
   baked::TreeRecord tree = build_packed_trees(sphere.file.sections()).trees[0];
   const auto cluster = [&] {
-    return trace_cluster(tree, sphere.file.geometries()[0], sphere.file.cluster(0, 0), packed::kSeenByCamera);
+    return trace_cluster(tree, sphere.file.geometries()[0], sphere.file.cluster(0, 0), baked::kVisibleToCamera);
   };
   const packed::TraceCluster near = cluster();
   ASSERT_EQ(near.flags & packed::kNeedsWideDecode, 0);

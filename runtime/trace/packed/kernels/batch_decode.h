@@ -12,6 +12,30 @@ inline float power_of_two(uint32_t negated_exponent) { // 2^-n
   return result;
 }
 
+/// Reads a cluster's vertices one by one, in the tree's grid.
+class VertexReader {
+public:
+  explicit VertexReader(const TraceCluster& cluster)
+      : cluster_(cluster), x_bits_(cluster.position_bits[0]), y_bits_(cluster.position_bits[1]),
+        z_bits_(cluster.position_bits[2]), scale_(power_of_two(cluster.down)) {}
+
+  void operator()(uint32_t vertex, float (&point)[3]) const {
+    const uint32_t stride = x_bits_ + y_bits_ + z_bits_;
+    const PositionFields fields =
+        read_position(cluster_.bits, cluster_.position_bit + vertex * stride, x_bits_, y_bits_, z_bits_);
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+      const uint32_t offset = static_cast<uint32_t>(fields.axis[axis]) << cluster_.up;
+      point[axis] =
+          static_cast<float>(static_cast<int32_t>(static_cast<uint32_t>(cluster_.base[axis]) + offset)) * scale_;
+    }
+  }
+
+private:
+  const TraceCluster& cluster_;
+  uint32_t x_bits_, y_bits_, z_bits_;
+  float scale_;
+};
+
 /// Decodes triangles from `first` on, as many of `count` as fit into a batch; returns their number. Portable code.
 inline uint32_t decode_batch_scalar(const TraceCluster& cluster, uint32_t first, uint32_t count, DecodedBatch& out) {
   BatchStrips batch;
@@ -19,19 +43,12 @@ inline uint32_t decode_batch_scalar(const TraceCluster& cluster, uint32_t first,
   uint32_t vertex[kBatchCorners];
   batch_vertices(cluster, batch, vertex);
 
-  const uint32_t widths[3] = {cluster.position_bits[0], cluster.position_bits[1], cluster.position_bits[2]};
-  const uint32_t stride = widths[0] + widths[1] + widths[2];
-  const float scale = power_of_two(cluster.down);
+  const VertexReader read_vertex(cluster);
   float position[3][kBatchCorners];
   for (uint32_t i = 0; i < kBatchCorners; ++i) {
-    uint64_t fields = field(cluster.bits, cluster.position_bit + vertex[i] * stride, stride);
-    for (uint32_t axis = 0; axis < 3; ++axis) {
-      const auto value = static_cast<uint32_t>(fields & ((uint64_t{1} << widths[axis]) - 1));
-      fields >>= widths[axis];
-      position[axis][i] =
-          static_cast<float>(static_cast<int32_t>(static_cast<uint32_t>(cluster.base[axis]) + (value << cluster.up))) *
-          scale;
-    }
+    float point[3];
+    read_vertex(vertex[i], point);
+    for (uint32_t axis = 0; axis < 3; ++axis) position[axis][i] = point[axis];
   }
   for (uint32_t i = 0; i < kBatch; ++i) {
     const BatchTriangle triangle = batch_triangle(batch, i < batch.count ? i : 0);

@@ -2,23 +2,13 @@
 
 #include <cstdint>
 
+#include "compress/format/layout/bit_fields.h"
 #include "runtime/trace/packed/kernels/kernel_types.h"
 
 /// Finds the corners of a batch's triangles from the bits of the cluster's strips
 /// (compress/format/cluster/index_codec.h), without walking from triangle to triangle.
 namespace packtrace::packed {
 namespace {
-
-inline uint64_t load64(const uint8_t* p) {
-  uint64_t word;
-  __builtin_memcpy(&word, p, sizeof word);
-  return word;
-}
-
-/// Reads `count` <= 57 bits from bit `bit` on.
-inline uint64_t field(const uint8_t* bits, uint32_t bit, uint32_t count) {
-  return (load64(bits + (bit >> 3)) >> (bit & 7u)) & ((uint64_t{1} << count) - 1);
-}
 
 inline uint32_t count_ones(uint64_t word) { return static_cast<uint32_t>(__builtin_popcountll(word)); }
 
@@ -37,7 +27,7 @@ inline int32_t last_one(const uint8_t* bits, uint32_t bit, uint32_t count, uint6
   while (count > 0) {
     const uint32_t step = count < 57 ? count : 57;
     count -= step;
-    const uint64_t word = (field(bits, bit + count, step) ^ zeros) & ((uint64_t{1} << step) - 1);
+    const uint64_t word = (read_bits(bits, bit + count, step) ^ zeros) & ((uint64_t{1} << step) - 1);
     if (word != 0) return static_cast<int32_t>(count) + 63 - __builtin_clzll(word);
   }
   return -1;
@@ -64,10 +54,10 @@ inline uint32_t index_bits(const TraceCluster& cluster) { return uint32_t{cluste
 inline uint32_t corner_vertex(const TraceCluster& cluster, uint32_t corner) {
   const uint32_t fresh_bit = 2u * cluster.triangle_count;
   const uint32_t rank = count_ones(cluster.bits, fresh_bit, corner);
-  if (field(cluster.bits, fresh_bit + corner, 1) != 0) return rank;
+  if (read_bits(cluster.bits, fresh_bit + corner, 1) != 0) return rank;
   const uint32_t explicit_bit = fresh_bit + cluster.triangle_count + 2u * cluster.strip_count;
   return static_cast<uint32_t>(
-      field(cluster.bits, explicit_bit + (corner - rank) * index_bits(cluster), index_bits(cluster)));
+      read_bits(cluster.bits, explicit_bit + (corner - rank) * index_bits(cluster), index_bits(cluster)));
 }
 
 /// Returns the vertex numbers of the first two corners of a triangle that does not begin a strip.
@@ -76,7 +66,7 @@ inline void lead_corners(const TraceCluster& cluster, uint32_t triangle, uint32_
   const uint8_t* bits = cluster.bits;
   const uint32_t left_bit = cluster.triangle_count;
   const auto first = static_cast<uint32_t>(last_one(bits, 0, triangle + 1, 0)); // first triangle of the strip
-  const bool left = field(bits, left_bit + triangle, 1) != 0;
+  const bool left = read_bits(bits, left_bit + triangle, 1) != 0;
   // One of the two corners is the previous entry. The other one was last replaced at the strip's last turn to the other
   // side, by the entry before that turn's. Without such a turn it is one of the strip's first two corners.
   const int32_t turn = last_one(bits, left_bit + first + 1, triangle - first, left ? ~uint64_t{0} : 0);
@@ -92,14 +82,14 @@ inline void read_strips(const TraceCluster& cluster, uint32_t first, uint32_t co
   const uint8_t* bits = cluster.bits;
   const uint32_t triangle_count = cluster.triangle_count;
   count = count < kBatch ? count : kBatch;
-  uint32_t restarts = static_cast<uint32_t>(field(bits, first, count));
+  uint32_t restarts = static_cast<uint32_t>(read_bits(bits, first, count));
   const bool begins = (restarts & 1u) != 0;
   restarts |= 1u;
   while (count + 2 * count_ones(restarts & ((1u << count) - 1)) > kBatchCorners) --count;
   restarts &= (1u << count) - 1;
   batch.count = count;
   batch.restarts = restarts;
-  batch.lefts = static_cast<uint32_t>(field(bits, triangle_count + first, count)) & ~1u;
+  batch.lefts = static_cast<uint32_t>(read_bits(bits, triangle_count + first, count)) & ~1u;
   batch.corner_count = count + 2 * count_ones(restarts);
   batch.lead_count = begins ? 0 : 2;
 
@@ -109,7 +99,7 @@ inline void read_strips(const TraceCluster& cluster, uint32_t first, uint32_t co
   const uint32_t fresh_bit = 2 * triangle_count;
   const uint32_t rank = count_ones(bits, fresh_bit, corner);
   batch.first_fresh = rank;
-  batch.fresh = static_cast<uint32_t>(field(bits, fresh_bit + corner, batch.corner_count - batch.lead_count))
+  batch.fresh = static_cast<uint32_t>(read_bits(bits, fresh_bit + corner, batch.corner_count - batch.lead_count))
                 << batch.lead_count;
   batch.explicit_bit = fresh_bit + triangle_count + 2u * cluster.strip_count + (corner - rank) * index_bits(cluster);
 }
@@ -142,7 +132,7 @@ inline void batch_vertices(const TraceCluster& cluster, const BatchStrips& batch
     } else if (((batch.fresh >> i) & 1u) != 0) {
       vertex[i] = fresh++;
     } else {
-      vertex[i] = static_cast<uint32_t>(field(cluster.bits, explicit_bit, width));
+      vertex[i] = static_cast<uint32_t>(read_bits(cluster.bits, explicit_bit, width));
       explicit_bit += width;
     }
   }

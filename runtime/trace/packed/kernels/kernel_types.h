@@ -15,8 +15,6 @@ inline constexpr uint32_t kBatch = 8;
 inline constexpr uint32_t kBatchCorners = 16;
 
 // TraceCluster::flags
-inline constexpr uint8_t kSeenByCamera = baked::kVisibleToCamera;
-inline constexpr uint8_t kOccludes = baked::kVisibleToOcclusion;
 inline constexpr uint8_t kMasked = baked::kMaskedLeaves;
 inline constexpr uint8_t kNeedsWideDecode = 1u << 3; ///< its vertices can be read by KernelScene::decode_wide only
 inline constexpr uint32_t kIndexBitsShift = 4u;      ///< from this bit on: bits per explicit vertex number, 0..8

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "compress/format/layout/bit_stream.h"
+#include "compress/format/layout/bit_fields.h"
 #include "runtime/trace/packed/kernels/batch_decode.h"
 
 namespace packtrace {
@@ -98,9 +98,7 @@ void decode_vertices(const packed::TraceCluster& cluster, uint32_t triangle, Vec
   packed::read_strips(cluster, triangle, 1, batch);
   uint32_t fresh = batch.first_fresh, explicit_bit = batch.explicit_bit;
   const uint32_t width = packed::index_bits(cluster);
-  const auto& widths = cluster.position_bits;
-  const uint32_t stride = uint32_t{widths[0]} + widths[1] + widths[2];
-  const float scale = packed::power_of_two(cluster.down);
+  const packed::VertexReader read_vertex(cluster);
   for (uint32_t corner = 0; corner < 3; ++corner) { // the batch's corner list is the triangle's corners
     uint32_t vertex = 0;
     if (corner < batch.lead_count)
@@ -108,15 +106,10 @@ void decode_vertices(const packed::TraceCluster& cluster, uint32_t triangle, Vec
     else if (((batch.fresh >> corner) & 1u) != 0)
       vertex = fresh++;
     else
-      vertex = static_cast<uint32_t>(packed::field(cluster.bits, explicit_bit, width)), explicit_bit += width;
-    uint64_t fields = packed::field(cluster.bits, cluster.position_bit + vertex * stride, stride);
-    for (int axis = 0; axis < 3; ++axis) {
-      const uint32_t bits = widths[axis];
-      const auto value = static_cast<uint32_t>(fields & ((uint64_t{1} << bits) - 1)) << cluster.up;
-      fields >>= bits;
-      vertices[corner][axis] =
-          static_cast<float>(static_cast<int32_t>(static_cast<uint32_t>(cluster.base[axis]) + value)) * scale;
-    }
+      vertex = static_cast<uint32_t>(read_bits(cluster.bits, explicit_bit, width)), explicit_bit += width;
+    float point[3];
+    read_vertex(vertex, point);
+    vertices[corner] = {point[0], point[1], point[2]};
   }
 }
 

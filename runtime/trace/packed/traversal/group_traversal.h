@@ -6,6 +6,7 @@
 #include "runtime/trace/packed/kernels/group_bounds.h"
 #include "runtime/trace/packed/kernels/leaf_tests.h"
 #include "runtime/trace/packed/kernels/node_children.h"
+#include "runtime/trace/packed/traversal/child_tests.h"
 #include "runtime/trace/packed/traversal/outside_search.h"
 
 /// Traces groups of rays through the tree over placements and through placed trees. A group visits a node together, as
@@ -18,13 +19,6 @@ namespace {
 /// Number of cache lines of a cluster's bits to prefetch. They hold most of the 400 to 500 bytes of a cluster without
 /// normals.
 constexpr uint32_t kPrefetchedLines = 7;
-
-/// A stack entry: a node or placement, and the rays that are to visit it.
-struct Pending {
-  uint64_t rays; ///< bit mask
-  uint32_t node;
-  float t; ///< t at which the first of the rays, or the beam, enters the box; 0 for any hits
-};
 
 /// Finds any hits (kAny) or nearest hits of one ray class in one scene, on one thread, group by group.
 template <typename Lanes, bool kAny, bool kCount>
@@ -81,6 +75,7 @@ public:
 
 private:
   friend struct ExternalTreeSearch<GroupTraversal>;
+  using Tests = ChildTests<Lanes, kAny>;
 
   struct Place {
     uint32_t placement, cluster, triangle;
@@ -131,8 +126,8 @@ private:
         continue;
       }
       const TopNode& node = scene_.top_nodes[next.node];
-      push_children(typename Lanes::Boxes(node, octant), group, active, node.slots, stack, size,
-                    [&](uint32_t slot) { return node.child[slot]; });
+      Tests::push_children(typename Lanes::Boxes(node, octant), group, active, node.slots, stack, size,
+                           [&](uint32_t slot) { return node.child[slot]; });
     }
   }
 
@@ -142,7 +137,7 @@ private:
     const TopNode& parts = scene_.parts[placement];
     uint64_t by_part[baked::kNodeWidth], reaching = 0;
     float t[baked::kNodeWidth];
-    uint32_t slots = pass(typename Lanes::Boxes(parts, octant), group, rays, parts.slots, by_part, t);
+    uint32_t slots = Tests::pass(typename Lanes::Boxes(parts, octant), group, rays, parts.slots, by_part, t);
     for (; slots != 0; slots &= slots - 1) reaching |= by_part[__builtin_ctz(slots)];
     return reaching;
   }
@@ -185,8 +180,8 @@ private:
       if (children.leaves())
         trace_leaves(placement, node, children, boxes, group, active);
       else
-        push_children(boxes, group, active, children.slots(), stack, size,
-                      [&](uint32_t slot) { return node.first_child + slot; });
+        Tests::push_children(boxes, group, active, children.slots(), stack, size,
+                             [&](uint32_t slot) { return node.first_child + slot; });
     }
   }
 
@@ -207,75 +202,6 @@ private:
     return group.beam != nullptr && pending.t > -group.beam->limits[1];
   }
 
-  /// Tests rays against the children in the bit mask `slots`. Returns the children that any ray passes, as a bit mask.
-  /// @param by_child by child: the rays that pass its box
-  /// @param t for nearest hits: where the first ray enters each child; for a beam, a lower bound over its rays
-  template <typename Group>
-  static uint32_t pass(const typename Lanes::Boxes& boxes, const Group& group, uint64_t rays, uint32_t slots,
-                       uint64_t (&by_child)[baked::kNodeWidth], float (&t)[baked::kNodeWidth]) {
-    if constexpr (!kAny && Group::kTriangles)
-      if (group.beam != nullptr) {
-        slots &= pass_beam(boxes, *group.beam, t);
-        if (slots == 0) return 0;
-        if (count_ones(rays) < kMinSideBySideRays) return slots & Lanes::Children::pass(boxes, group, rays, by_child);
-        return pass_side_by_side(boxes, group, rays, slots, by_child);
-      }
-    if (kAny && count_ones(rays) < kMinSideBySideRays)
-      return slots & Lanes::Children::pass(boxes, group, rays, by_child);
-    return pass_apart(boxes, group, rays, slots, by_child, t);
-  }
-
-  /// Does the same for rays that form no beam. It is a function of its own because the compiler generates slower code
-  /// for beams if both are one function.
-  template <typename Group>
-  [[gnu::noinline]] static uint32_t pass_apart(const typename Lanes::Boxes& boxes, const Group& group, uint64_t rays,
-                                               uint32_t slots, uint64_t (&by_child)[baked::kNodeWidth],
-                                               float (&t)[baked::kNodeWidth]) {
-    const bool many = count_ones(rays) >= kMinSideBySideRays;
-    if (many) {
-      slots &= pass_group_bounds(boxes, group.reach);
-      if (slots == 0) return 0;
-    }
-    if constexpr (!kAny) Lanes::Children::enter(boxes, group, first_bit(rays), t);
-    if (many && prefers_side_by_side<typename Lanes::WideLanes>(rays, slots))
-      return pass_side_by_side(boxes, group, rays, slots, by_child);
-    return slots & Lanes::Children::pass(boxes, group, rays, by_child);
-  }
-
-  template <typename Group>
-  [[gnu::always_inline]] static uint32_t pass_side_by_side(const typename Lanes::Boxes& boxes, const Group& group,
-                                                           uint64_t rays, uint32_t slots,
-                                                           uint64_t (&by_child)[baked::kNodeWidth]) {
-    BoxPlanes planes;
-    read_planes(boxes, planes);
-    return test_boxes_side_by_side<typename Lanes::WideLanes>(planes, group, rays, slots, by_child);
-  }
-
-  /// Pushes the children of a node that rays pass. For nearest hits the child that the first ray enters first ends on
-  /// top of the stack; for any hits, the first child in the tree's order.
-  template <typename Group, typename Number>
-  static void push_children(const typename Lanes::Boxes& boxes, const Group& group, uint64_t rays, uint32_t slots,
-                            Pending* stack, uint32_t& size, Number number) {
-    uint64_t by_child[baked::kNodeWidth];
-    float t[baked::kNodeWidth] = {};
-    slots = pass(boxes, group, rays, slots, by_child, t);
-    if constexpr (kAny) {
-      while (slots != 0) {
-        const uint32_t slot = 31u - static_cast<uint32_t>(__builtin_clz(slots));
-        slots &= ~(1u << slot);
-        stack[size++] = {by_child[slot], number(slot), 0.0f};
-      }
-      return;
-    }
-    const uint32_t begin = size;
-    for (; slots != 0; slots &= slots - 1) {
-      const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
-      uint32_t at = size++;
-      for (; at > begin && stack[at - 1].t < t[slot]; --at) stack[at] = stack[at - 1];
-      stack[at] = {by_child[slot], number(slot), t[slot]};
-    }
-  }
-
   void trace_leaves(uint32_t placement, const baked::PackedNode& node, NodeChildren children,
                     const typename Lanes::Boxes& boxes, RayGroup& group, uint64_t rays) {
     // Without the prefetch, decoding waits longer for them than it takes.
@@ -284,7 +210,7 @@ private:
     if ((scene_.clusters[node.cluster].flags & ray_class_) == 0) return;
     uint64_t by_child[baked::kNodeWidth];
     float t[baked::kNodeWidth];
-    uint32_t slots = pass(boxes, group, rays, children.slots(), by_child, t);
+    uint32_t slots = Tests::pass(boxes, group, rays, children.slots(), by_child, t);
     const uint64_t begins = children.leaf_begins();
     for (; slots != 0; slots &= slots - 1) {
       const auto slot = static_cast<uint32_t>(__builtin_ctz(slots));
