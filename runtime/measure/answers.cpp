@@ -157,13 +157,23 @@ Json above_noise(const Points& points, const Json& report) {
   const Json& standard = *points.standard;
   const double error = at(standard, "ao.mae"), ratio = at(standard, "ao.noise_ratio");
   const double noise = at(report.at("reference").at("noise_floor"), "mae");
-  std::string text = fmt::format("{}: the default's mean AO error of {:.2g} is {:.2g} times the difference of two "
-                                 "float images with {} samples per "
-                                 "pixel and different seeds ({:.2g}).",
-                                 ratio > 1.0 ? "Yes" : "No", error, ratio, at(report.at("settings"), "spp"), noise);
-  Json figures{figure("error", error, "MAE"), figure("noise", noise, "MAE"), figure("ratio", ratio, "")};
+  const double spp = at(report.at("settings"), "spp");
+  std::string text =
+      noise > 0.0 ? fmt::format("{}: the default's mean AO error of {:.2g} is {:.2g} times the difference of two float "
+                                "images with {} samples per pixel and different seeds ({:.2g}).",
+                                ratio > 1.0 ? "Yes" : "No", error, ratio, spp, noise)
+      : error > 0.0
+          ? fmt::format("Yes: the default's mean AO error is {:.2g}, and there is no noise: two float images with {} "
+                        "samples per pixel and different seeds are equal.",
+                        error, spp)
+          : fmt::format(
+                "No: the default has no AO error. There is no noise either: two float images with {} samples per "
+                "pixel and different seeds are equal.",
+                spp);
+  Json figures{figure("error", error, "MAE"), figure("noise", noise, "MAE")};
+  if (noise > 0.0) figures.push_back(figure("ratio", ratio, ""));
   size_t above = 0;
-  for (const Json* point : points.all) above += at(*point, "ao.noise_ratio") > 1.0;
+  for (const Json* point : points.all) above += at(*point, "ao.mae") > noise;
   text += fmt::format(" {} of {} points are above it.", above, points.all.size());
   if (const Json& curve = report.at("convergence"); !curve.empty()) {
     const Json& last = curve.back();

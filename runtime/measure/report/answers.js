@@ -33,6 +33,9 @@ function best(path, larger) {
   return fit.reduce((a, p) => (a === null || keys(p).reduce((d, k, i) => d || k - keys(a)[i], 0) < 0 ? p : a), null);
 }
 
+/// The geometry that a tile shows; none where the float picture shows no surface at all.
+const placeName = tile => (tile.geometry === null ? el("span", {}, "background") : named(tile.geometry));
+
 const overNoise = mae => (isNumber(mae) && isNumber(noise) && noise > 0 ? `${figure(mae / noise, 2)}\u00a0×\u00a0noise` : null);
 const joined = (...parts) => parts.filter(p => p && p !== none).join(" · ");
 
@@ -140,7 +143,7 @@ const bitPoints = working.filter(p => p.group === "positions" && get(p, "knobs.p
 function cropRow(tiles) {
   return tiles.map(tile => el("li", {}, ["float", "packed", "difference"].map(kind =>
     pictureOf(tile[kind], `${kind} crop at ${tile.x}, ${tile.y}`) || el("span", {class: "hole"})),
-    el("span", {class: "where"}, named(tile.geometry), el("span", {class: "muted"}, ` error ${figure(tile.mae, 2)}, at most ${figure(tile.max, 2)}`))));
+    el("span", {class: "where"}, placeName(tile), el("span", {class: "muted"}, ` error ${figure(tile.mae, 2)}, at most ${figure(tile.max, 2)}`))));
 }
 
 function questionTwo() {
