@@ -117,13 +117,14 @@ function limitControl() {
 }
 
 function questionOne() {
+  const blind = isNumber(noise) && noise === 0 ? el("p", {class: "warning"}, "The pictures show no occlusion, so its error says nothing about this scene. Measure with another ", el("code", {}, "--camera"), ", or choose the largest vertex error below.") : null;
   const results = el("div", {class: "goals", id: "goals"}), sentence = el("p", {class: "answer", id: "answer-1", "aria-live": "polite"});
   const card = el("section", {class: "card wide", "aria-labelledby": "q1"}, el("h2", {id: "q1"}, "What is the smallest, fastest or leanest file within my error, and which command makes it?"));
   if (!state.metric) {
     card.append(el("p", {}, unbroken(get(report, "answers.0.text") || "No point was measured completely.")), command(get(report, "answers.0.command")) || "");
     return card;
   }
-  card.append(limitControl(), sentence, results);
+  card.append(...[blind, limitControl(), sentence, results].filter(Boolean));
   onChange(() => {
     const [small, fast, lean] = goals.map(g => best(g.path, g.larger));
     const says = (point, path, text) => [text(get(point, path)), " (", named(point.label), ")"];

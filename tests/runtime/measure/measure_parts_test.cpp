@@ -233,6 +233,11 @@ TEST(Answers, NoiseIsComparedOnlyIfThereIsSome) {
   EXPECT_TRUE(fourth(0.04, 0.02).starts_with("Yes: the default's mean AO error of 0.04 is 2 times"));
   EXPECT_TRUE(fourth(0.01, 0.0).starts_with("Yes: the default's mean AO error is 0.01, and there is no noise"))
       << fourth(0.01, 0.0);
+  const auto first = [](double noise) {
+    return answer_questions(report_json(0.0, noise), 0.005)[0]["text"].get<std::string>();
+  };
+  EXPECT_NE(first(0.0).find("show no occlusion"), std::string::npos) << first(0.0);
+  EXPECT_EQ(first(0.02).find("show no occlusion"), std::string::npos);
   EXPECT_TRUE(fourth(0.0, 0.0).starts_with("No: the default has no AO error. There is no noise")) << fourth(0.0, 0.0);
 }
 

@@ -222,6 +222,14 @@ class ReportPage(unittest.TestCase):
             for label in labels:
                 self.assertTrue(label["below"] or label["whole"], (width, label))
 
+    def test_pictures_without_occlusion_are_said(self):
+        report = sample()
+        self.assertEqual(self.js("document.querySelectorAll('#answers .warning').length"), 0)
+        report["reference"]["noise_floor"] = ao(0)
+        self.open(page=self.write(report, "open"))
+        self.assertIn("no occlusion", self.js("document.querySelector('#answers .warning').textContent"))
+        self.check_silence()
+
     def test_a_tile_without_a_surface_is_background(self):
         report = sample()
         report["tiles"][0]["geometry"] = None
