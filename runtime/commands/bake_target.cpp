@@ -1,5 +1,6 @@
 #include "runtime/commands/bake_target.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <filesystem>
@@ -11,6 +12,7 @@
 #include "pbrt_import/base/error.h"
 #include "runtime/commands/progress_display.h"
 #include "runtime/measure/point_runner.h"
+#include "runtime/measure/report.h"
 #include "runtime/measure/target.h"
 
 namespace packtrace {
@@ -143,6 +145,12 @@ nlohmann::json find_target(BakeOptions& options, const GlobalOptions& globals) {
   Progress progress(display.observer());
   progress.begin("searching", 0);
   const nlohmann::json reference = runner.make_reference();
+  const bool limits_ao =
+      std::ranges::any_of(search.targets, [](const Target& t) { return t.kind == TargetKind::kAoError; });
+  if (const auto noise = number_at(reference, "noise_floor.mae"); limits_ao && !(noise.value_or(0.0) > 0.0))
+    throw Error(ErrorKind::kUsage,
+                "--target ao-error: the pictures show no occlusion, so any file would keep it; choose "
+                "another --camera, or limit position-error");
   size_t number = 0;
   const TargetResult result = search_target(search, [&](const BakeKnobs& knobs) {
     progress.advance();

@@ -102,7 +102,8 @@ nlohmann::json run_measure(const MeasureConfig& config, Progress& progress) {
   const std::vector<MeasurePoint> matrix = make_matrix(config.mode, config.matrix_scene, config.runner.spp);
   const std::vector<uint32_t> frames = convergence_frames(config.mode);
   PointRunner runner(config.runner, folder);
-  progress.begin("measuring", matrix.size() + 3);
+  const auto unmeasured = std::ranges::count_if(matrix, [&](const MeasurePoint& p) { return !runner.is_measured(p); });
+  progress.begin("measuring", static_cast<uint64_t>(unmeasured) + 3); // so that the time left is right in later runs
   Json report{{"schema", "packtrace-measure"},
               {"schema_version", 1},
               {"program", {{"name", "packtrace"}, {"version", config.version}}},
@@ -118,13 +119,13 @@ nlohmann::json run_measure(const MeasureConfig& config, Progress& progress) {
   Json points = Json::array();
   for (const MeasurePoint& point : matrix) {
     points.push_back(runner.measure(point));
+    if (!points.back().at("reused")) progress.advance();
     if (point.group == "default") {
       report["convergence"] = runner.convergence(point.bake, frames);
       progress.advance();
       report["resolution"] = runner.resolution(point.bake, resolution_samples(config.mode));
       progress.advance();
     }
-    progress.advance();
   }
   report["fronts"] = add_fronts(points, config.runner.spp);
   report["lod"] = lod_curve(points);

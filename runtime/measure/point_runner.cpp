@@ -275,9 +275,15 @@ void PointRunner::add_render_values(nlohmann::json& point, const MeasurePoint& w
   point["histograms"]["ao"] = to_json(make_histogram(errors, "occlusion"));
 }
 
+bool PointRunner::is_measured(const MeasurePoint& point) const {
+  const std::string name = key(point);
+  return folder_.load(name) && fs::exists(folder_.image(name));
+}
+
 nlohmann::json PointRunner::measure(const MeasurePoint& what) {
   const std::string name = key(what);
-  if (std::optional<Json> known = folder_.load(name); known && fs::exists(folder_.image(name))) {
+  if (is_measured(what)) {
+    std::optional<Json> known = folder_.load(name);
     (*known)["reused"] = true;
     for (const auto& [field, value] : {std::pair{"id", what.id}, {"label", what.label}, {"group", what.group}})
       (*known)[field] = value;
@@ -302,6 +308,9 @@ nlohmann::json PointRunner::measure(const MeasurePoint& what) {
     add_render_values(point, what);
     folder_.save(name, point);
   } catch (const StageFailure& failure) {
+    if (failure.child.exit_code == static_cast<int>(ErrorKind::kIo))
+      throw Error(ErrorKind::kIo, fmt::format("{} of point {} failed: {}; the same command continues", failure.stage,
+                                              what.id, failure.child.error));
     point["status"] = status_of(failure);
     point["error"] = to_json(failure);
   }

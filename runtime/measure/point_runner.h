@@ -56,7 +56,11 @@ public:
   /// @return "reference" of the report. Throws Error with the exit code's kind if a render fails.
   nlohmann::json make_reference();
 
-  /// A point of the report, without flags. Failures of its processes are part of it.
+  /// Whether an earlier run measured the point.
+  bool is_measured(const MeasurePoint& point) const;
+
+  /// A point of the report, without flags. Failures of its processes are part of it, except those to write: throws
+  /// Error(kIo), since all other points would fail too.
   nlohmann::json measure(const MeasurePoint& point);
 
   /// "convergence" of the report for the given file options; an empty array if a process fails.

@@ -9,6 +9,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <sys/resource.h>
+
 #include "tests/end_to_end/workbench.h"
 
 namespace packtrace::test {
@@ -60,6 +62,21 @@ TEST(Measure, ContinuesAndRefusesTheFolderOfAChangedScene) {
   EXPECT_EQ(changed.exit_code, 6) << changed.err;
   EXPECT_NE(changed.err.find("--force"), std::string::npos) << changed.err;
   EXPECT_EQ(measure(bench, {"--force"}).exit_code, 0);
+}
+
+TEST(Measure, StopsAtAFullDiskAndContinues) {
+  const Workbench bench;
+  const std::vector<std::string> words{"measure", bench.scene(), "-o", bench / "report", "--quick", "--width",
+                                       "8",       "--spp",       "1"};
+  const CommandResult full = run_packtrace(words, [] { // room for the float pictures, not for a baked file
+    const rlimit limit{2000, 2000};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  });
+  EXPECT_EQ(full.exit_code, 6) << full.err;
+  EXPECT_NE(full.err.find("bake of point default failed"), std::string::npos) << full.err;
+  EXPECT_NE(full.err.find("the same command continues"), std::string::npos) << full.err;
+  EXPECT_FALSE(fs::exists(bench / "report/work"));
+  EXPECT_EQ(run_packtrace(words).exit_code, 0);
 }
 
 TEST(Measure, ListsItsPointsWithoutRunningThem) {
@@ -138,6 +155,17 @@ TEST(Target, WritesTheSmallestFileThatKeepsTheLimitOrNone) {
   EXPECT_EQ(none.exit_code, 5) << none.err;
   EXPECT_FALSE(fs::exists(bench / "b.ptk"));
   EXPECT_EQ(run_packtrace({"bake", bench.scene(), "-o", bench / "b.ptk", "--target", "speed=1"}).exit_code, 2);
+}
+
+TEST(Target, RefusesToLimitOcclusionThatThePicturesDoNotShow) {
+  const Workbench bench;
+  std::string text = small_scene_text();
+  write_text(bench.scene(), text.erase(text.rfind("Shape"), text.rfind("WorldEnd") - text.rfind("Shape"))); // a floor
+  const CommandResult result =
+      run_packtrace({"bake", bench.scene(), "-o", bench / "a.ptk", "--target", "ao-error=0.01"});
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_NE(result.err.find("show no occlusion"), std::string::npos) << result.err;
+  EXPECT_FALSE(fs::exists(bench / "a.ptk"));
 }
 
 TEST(Target, ComparesPicturesOfTheChosenCamera) {
