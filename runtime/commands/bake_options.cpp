@@ -141,6 +141,11 @@ void add_choice_options(CLI::App& verb, BakeOptions& options) {
       ->allow_extra_args(false)
       ->take_all()
       ->group("Choosing by result");
+  verb.add_option("--camera", options.camera,
+                  "Camera of the pictures that --target compares: a number in the scene, from 0, or auto for a view of "
+                  "the whole scene (default 0, or auto if there is no camera or camera 0 sees nothing)")
+      ->type_name("I|auto")
+      ->group("Choosing by result");
 }
 
 } // namespace
@@ -223,6 +228,8 @@ BakeConfig make_config(const BakeOptions& options) {
     throw Error(ErrorKind::kUsage, "--lod-min-triangles, --lod-levels and --resume require --lod");
   config.lod_min_triangles = options.lod_min_triangles.value_or(config.lod_min_triangles);
   config.lod_levels = options.lod_levels.value_or(config.lod_levels);
+  if (options.camera && options.targets.empty())
+    throw Error(ErrorKind::kUsage, "--camera only applies to --target; a file is for all cameras");
   config.resume = options.resume;
   config.trees = options.trees.value_or("on") == "on";
   config.codec = find_page_codec(options.codec.value_or(std::string(name_of(PageCodec::kNone))))

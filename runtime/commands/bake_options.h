@@ -32,8 +32,9 @@ struct BakeOptions {
   std::optional<std::string> codec; ///< none unless set
   SceneOptions scene;
   bool dry_run = false;
-  std::string preset;               ///< empty, or one of kPresets
-  std::vector<std::string> targets; ///< limits that a search must keep, see parse_target()
+  std::string preset;                ///< empty, or one of kPresets
+  std::vector<std::string> targets;  ///< limits that a search must keep, see parse_target()
+  std::optional<std::string> camera; ///< of the pictures that a search compares; as of render
 };
 
 /// Adds all options of `bake` to the verb. `options` must outlive it.

@@ -1,5 +1,6 @@
 #include "runtime/commands/bake_target.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <filesystem>
@@ -11,6 +12,7 @@
 #include "pbrt_import/base/error.h"
 #include "runtime/commands/progress_display.h"
 #include "runtime/measure/point_runner.h"
+#include "runtime/measure/report.h"
 #include "runtime/measure/target.h"
 
 namespace packtrace {
@@ -91,6 +93,7 @@ RunnerConfig runner_config(const BakeOptions& options, const GlobalOptions& glob
     config.scene_options.insert(config.scene_options.end(), {"--time", number_text(*options.scene.time)});
   config.bake_options = further_options(options);
   config.size = {320, 180};
+  config.camera = options.camera;
   config.embree_beside_each_point = false;
   return config;
 }
@@ -105,7 +108,15 @@ void take(BakeOptions& options, const BakeKnobs& knobs) {
   options.codec = knobs.codec, options.trees = knobs.trees;
 }
 
-nlohmann::json summary_of(const TargetResult& result, const TargetSearch& search) {
+/// A line about the camera of the compared pictures. @param camera as in the JSON of render
+std::string camera_text(const nlohmann::json& camera) {
+  if (camera.at("index").is_number())
+    return fmt::format("compared with camera {} of the scene\n", camera.at("index").get<uint32_t>());
+  const nlohmann::json& reason = camera.at("reason");
+  return "compared in a view of the whole scene" + (reason.is_null() ? "" : ": " + reason.get<std::string>()) + "\n";
+}
+
+nlohmann::json summary_of(const TargetResult& result, const TargetSearch& search, const nlohmann::json& camera) {
   nlohmann::json limits = nlohmann::json::object(), tried = nlohmann::json::array();
   for (const Target& target : search.targets) limits[name_of(target.kind)] = target.limit;
   for (const nlohmann::json& point : result.tried)
@@ -117,7 +128,10 @@ nlohmann::json summary_of(const TargetResult& result, const TargetSearch& search
                      {"ao", point.at("ao")},
                      {"normal", point.at("normal")},
                      {"position", point.at("position")}});
-  return {{"limits", limits}, {"tried", tried}, {"chosen", result.best ? nlohmann::json(*result.best) : nullptr}};
+  return {{"limits", limits},
+          {"camera", camera},
+          {"tried", tried},
+          {"chosen", result.best ? nlohmann::json(*result.best) : nullptr}};
 }
 
 } // namespace
@@ -130,7 +144,13 @@ nlohmann::json find_target(BakeOptions& options, const GlobalOptions& globals) {
   ProgressDisplay display(globals);
   Progress progress(display.observer());
   progress.begin("searching", 0);
-  runner.make_reference();
+  const nlohmann::json reference = runner.make_reference();
+  const bool limits_ao =
+      std::ranges::any_of(search.targets, [](const Target& t) { return t.kind == TargetKind::kAoError; });
+  if (const auto noise = number_at(reference, "noise_floor.mae"); limits_ao && !(noise.value_or(0.0) > 0.0))
+    throw Error(ErrorKind::kUsage,
+                "--target ao-error: the pictures show no occlusion, so any file would keep it; choose "
+                "another --camera, or limit position-error");
   size_t number = 0;
   const TargetResult result = search_target(search, [&](const BakeKnobs& knobs) {
     progress.advance();
@@ -139,13 +159,14 @@ nlohmann::json find_target(BakeOptions& options, const GlobalOptions& globals) {
     return runner.measure(point);
   });
   display.finish();
-  if (!globals.quiet || !result.best) print_printable(to_text(result, search.targets), stderr);
+  if (!globals.quiet || !result.best)
+    print_printable(camera_text(reference.at("camera")) + to_text(result, search.targets), stderr);
   if (!result.best)
     throw Error(ErrorKind::kLimitExceeded, "no options keep the target" +
                                                std::string(search.targets.size() > 1 ? "s" : "") +
                                                "; the table above has what was tried");
   take(options, result.knobs[*result.best]);
-  return summary_of(result, search);
+  return summary_of(result, search, reference.at("camera"));
 }
 
 } // namespace packtrace

@@ -20,6 +20,7 @@
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/geometry_compare.h"
 #include "runtime/commands/json_output.h"
+#include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/image/false_color.h"
 #include "runtime/image/metrics.h"
@@ -39,6 +40,7 @@ struct CompareOptions {
   uint64_t samples = kDefaultDistanceSamples; ///< points on each surface, for baked files
   std::string diff, diff_metric = "mae";
   float diff_white = 0.25f;
+  SceneOptions scene;
 };
 
 struct MetricKind {
@@ -224,7 +226,9 @@ void print_notes(const ImagePair& pair, const GlobalOptions& globals) {
 int run_compare(const CompareOptions& options, const GlobalOptions& globals) {
   const std::string ending = ending_of(options.test), other = ending_of(options.reference);
   if (ending == ".ptk" || ending == ".pbrt" || other == ".ptk" || other == ".pbrt")
-    return compare_geometry(options.test, options.reference, options.samples, globals);
+    return compare_geometry(options.test, options.reference, options.samples, options.scene, globals);
+  if (options.scene.strict || options.scene.world || options.scene.time)
+    throw Error(ErrorKind::kUsage, "--strict, --world and --time only apply to a .pbrt scene");
   if (!options.diff.empty() && ending_of(options.diff) != ".png")
     throw Error(ErrorKind::kUsage, "--diff " + options.diff + ": the file name must end in .png");
   JsonOutput json(globals.json, globals.force);
@@ -336,6 +340,7 @@ void add_compare_command(CLI::App& app, GlobalOptions& globals) {
                   "Error that --diff shows as white, 1e-6..1e6 (default 0.25). Lower it to see small errors")
       ->check(number_in(1e-6, 1e6))
       ->capture_default_str();
+  add_scene_options(verb, options->scene);
   verb.footer("Pixels without a value (ambient occlusion where no surface is hit) are ignored.\n"
               "Examples:\n"
               "  packtrace compare test.exr truth.exr --layer ao --min-psnr 34\n"

@@ -10,7 +10,7 @@
 
 namespace packtrace {
 
-int compare_geometry(const std::string& test, const std::string& reference, uint64_t samples,
+int compare_geometry(const std::string& test, const std::string& reference, uint64_t samples, const SceneOptions& scene,
                      const GlobalOptions& globals) {
   if (!is_baked_file(test) || is_baked_file(reference))
     throw Error(ErrorKind::kUsage, "compare two images, or a .ptk file with the .pbrt scene that it was baked from");
@@ -18,7 +18,7 @@ int compare_geometry(const std::string& test, const std::string& reference, uint
   ProgressDisplay display(globals);
   Progress progress(display.observer());
   const LoadedScene packed = load_scene(test, {}, globals, progress, display);
-  const LoadedScene source = load_scene(reference, {}, globals, progress, display);
+  const LoadedScene source = load_scene(reference, scene, globals, progress, display);
   const SurfaceError error =
       surface_error(*source.source, *packed.source, *packed.baked, samples, globals.memory, progress);
   display.finish();

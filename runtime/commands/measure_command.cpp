@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <memory>
@@ -14,6 +15,7 @@
 
 #include <sys/utsname.h>
 
+#include "compress/bake/grid/scene_measure.h"
 #include "pbrt_import/base/error.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/commands.h"
@@ -39,10 +41,14 @@ struct MeasureOptions {
   MatrixMode mode() const { return quick ? MatrixMode::kQuick : full ? MatrixMode::kFull : MatrixMode::kDefault; }
 };
 
-/// Size of the pictures: the camera's shape, with a longer side of the given length.
-ImageSize picture_size(const Scene& scene, uint32_t longer) {
-  const double w = scene.cameras.empty() ? 16.0 : scene.cameras[0].width_px;
-  const double h = scene.cameras.empty() ? 9.0 : scene.cameras[0].height_px;
+/// Size of the pictures: the camera's shape, or 16:9 if the whole scene is framed, with a longer side of the given
+/// length.
+ImageSize picture_size(const Scene& scene, const std::optional<std::string>& camera, uint32_t longer) {
+  uint32_t index = 0;
+  const std::string name = camera.value_or("0");
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), index);
+  const bool known = error == std::errc() && end == name.data() + name.size() && index < scene.cameras.size();
+  const double w = known ? scene.cameras[index].width_px : 16.0, h = known ? scene.cameras[index].height_px : 9.0;
   const auto side = [&](double length) {
     return std::max(1u, static_cast<uint32_t>(std::lround(longer * length / std::max(w, h))));
   };
@@ -83,6 +89,8 @@ nlohmann::json scene_json(const MeasureOptions& options, const ImportResult& imp
     const uint64_t size = std::filesystem::file_size(file, missing);
     if (!missing) bytes += size;
   }
+  Progress unseen;
+  const double median_edge = measure_scene(scene, plan_scene(scene), unseen).world.median_edge;
   const auto array = [](DVec3 v) { return std::array{v.x, v.y, v.z}; };
   return {{"path", options.input},
           {"name", std::filesystem::absolute(options.input).parent_path().filename().string() + "/" +
@@ -97,7 +105,8 @@ nlohmann::json scene_json(const MeasureOptions& options, const ImportResult& imp
           {"file_bytes", bytes},
           {"float_bytes", float_bytes(scene)},
           {"diagonal", bounds.diagonal()},
-          {"bounds", {{"lo", array(bounds.lo)}, {"hi", array(bounds.hi)}}}};
+          {"bounds", {{"lo", array(bounds.lo)}, {"hi", array(bounds.hi)}}},
+          {"median_edge", median_edge > 0.0 ? nlohmann::json(median_edge) : nullptr}};
 }
 
 /// Name of the geometry of each instance, numbered like SceneSource::instances().
@@ -152,7 +161,8 @@ MeasureConfig config_of(const MeasureOptions& options, const GlobalOptions& glob
   const std::vector<std::filesystem::path> sorted(files.begin(), files.end());
   runner.identity = version + "\n" + state_of(sorted) + shell_command(scene_words(options.scene));
   runner.common = common_words(globals), runner.scene_options = scene_words(options.scene);
-  runner.size = picture_size(imported.scene, options.width.value_or(std::array{320u, 480u, 640u}[mode]));
+  runner.size =
+      picture_size(imported.scene, options.camera, options.width.value_or(std::array{320u, 480u, 640u}[mode]));
   runner.camera =
       imported.scene.cameras.empty() && !options.camera ? std::optional<std::string>("auto") : options.camera;
   runner.spp = options.spp.value_or(std::array{64u, 64u, 256u}[mode]);

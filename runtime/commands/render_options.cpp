@@ -56,6 +56,12 @@ void add_sampling_options(CLI::App& verb, RenderOptions& options) {
                 "Render a reference image without denoiser, in 1 frame of 1024 spp unless --frames or --spp are given. "
                 "Takes minutes");
   verb.add_flag("--no-denoise", options.no_denoise, "Average the frames without denoising");
+  verb.add_option("--ao-resolution", options.ao_resolution,
+                  "Pixels for which ambient occlusion is traced. quarter traces one of 2 x 2 pixels, a quarter of the "
+                  "rays, and interpolates the others along surfaces; about four times as fast, with softer contact "
+                  "shadows (default full)")
+      ->check(one_of({"full", "quarter"}))
+      ->default_str(options.ao_resolution);
   verb.add_option(
           "--ao-radius", options.ao_radius,
           "Distance up to which surfaces occlude, in world units (default: 10 % of the scene's diagonal). Small "
@@ -125,6 +131,9 @@ RenderConfig make_config(const SceneSource& source, const Camera& camera, const 
   config.size = options.size.empty() ? ImageSize{camera.width_px, camera.height_px} : parse_size(options.size);
   config.supersample = options.supersample;
   config.denoise = !options.no_denoise && !options.ground_truth;
+  if (options.ao_resolution == "quarter") config.ao_resolution = AoResolution::kQuarter;
+  if (options.ground_truth && config.ao_resolution != AoResolution::kFull)
+    throw Error(ErrorKind::kUsage, "--ground-truth needs all pixels; it does not go with --ao-resolution quarter");
   config.frames = options.frames.value_or(options.ground_truth ? 1 : 32);
   config.ao.spp = options.spp.value_or(options.ground_truth ? kGroundTruthSpp : 1);
   config.ao.radius = options.ao_radius.value_or(default_ao_radius(source.world_bounds()));

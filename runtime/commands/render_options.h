@@ -27,6 +27,7 @@ struct RenderOptions {
   uint32_t supersample = 1;
   std::optional<uint32_t> spp, frames;
   bool ground_truth = false, no_denoise = false, fast_edges = false;
+  std::string ao_resolution = "full";
   SceneOptions scene;
   std::optional<float> ao_radius;
   bool ao_falloff_off = false;

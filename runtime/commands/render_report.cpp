@@ -136,6 +136,7 @@ nlohmann::json render_json(const RenderOptions& options, const RenderConfig& con
       {"supersample", config.supersample},
       {"frames", config.frames},
       {"spp", config.ao.spp},
+      {"ao_resolution", options.ao_resolution},
       {"denoise", config.denoise},
       {"ao_radius", config.ao.radius},
       {"ao_falloff", config.ao.falloff},
@@ -144,7 +145,12 @@ nlohmann::json render_json(const RenderOptions& options, const RenderConfig& con
       {"mean_ao", mean_of_valid(image.ao)},
       {"rays", {{"primary", image.primary_rays}, {"ao", image.ao_rays}}},
       {"mrays_per_s", {{"primary", rate_m(image.primary_rays, t.primary_s)}, {"ao", rate_m(image.ao_rays, t.ao_s)}}},
-      {"seconds", {{"bvh", t.build_s}, {"primary", t.primary_s}, {"ao", t.ao_s}, {"denoise", t.denoise_s}}},
+      {"seconds",
+       {{"bvh", t.build_s},
+        {"primary", t.primary_s},
+        {"ao", t.ao_s},
+        {"denoise", t.denoise_s},
+        {"upsample", t.upsample_s}}},
       {"resident_bytes",
        {{"source", source.resident_bytes()},
         {"tracing", sum_of(parts)},
@@ -173,6 +179,9 @@ void print_render(std::FILE* stream, const nlohmann::json& r) {
   if (r.at("denoise").get<bool>())
     fmt::print(stream, "  denoise   {:8.3f} s   {:.1f} ms per frame\n", seconds.at("denoise").get<double>(),
                seconds.at("denoise").get<double>() * 1e3 / frames);
+  if (r.at("ao_resolution") == "quarter")
+    fmt::print(stream, "  upsample  {:8.3f} s   occlusion of one of 2 x 2 pixels\n",
+               seconds.at("upsample").get<double>());
   if (r.contains("lod")) fmt::print(stream, "{}", detail_text(r.at("lod")));
   if (r.contains("seams")) fmt::print(stream, "{}", visible_seams_text(r.at("seams")));
   if (const auto& reason = r.at("camera").at("reason"); !reason.is_null())

@@ -65,7 +65,13 @@ struct Points {
   }
 };
 
-Json smallest(const Points& points, double max_error) {
+/// What to say before the answers if the pictures cannot show errors of occlusion.
+std::string caution(const Json& report) {
+  if (at(report.at("reference").at("noise_floor"), "mae") > 0.0) return {};
+  return "The pictures show no occlusion, so its error says nothing; choose another --camera. ";
+}
+
+Json smallest(const Points& points, double max_error, const std::string& caution) {
   constexpr const char* kQuestion = "What is the smallest file, the fastest or the least memory within my error?";
   const Json* small = points.best(max_error, "bytes.file", false);
   if (!small)
@@ -75,13 +81,14 @@ Json smallest(const Points& points, double max_error) {
   const Json& lean = *points.best(max_error, "resident_bytes", false);
   return answer(
       kQuestion,
-      fmt::format(
-          "Within a mean AO error of {:.3g}, the smallest file has {} ({:.2f} bytes per triangle, error {:.2g}): "
-          "{}. The fastest traces {:.1f} million AO rays per second: {}. The least memory while tracing is {}: "
-          "{}.",
-          max_error, bytes_text(at(*small, "bytes.file")), at(*small, "bytes.per_triangle"), at(*small, "ao.mae"),
-          text_at(*small, "label"), at(fast, "mrays_per_s.ao"), text_at(fast, "label"),
-          bytes_text(at(lean, "resident_bytes")), text_at(lean, "label")),
+      caution +
+          fmt::format(
+              "Within a mean AO error of {:.3g}, the smallest file has {} ({:.2f} bytes per triangle, error {:.2g}): "
+              "{}. The fastest traces {:.1f} million AO rays per second: {}. The least memory while tracing is {}: "
+              "{}.",
+              max_error, bytes_text(at(*small, "bytes.file")), at(*small, "bytes.per_triangle"), at(*small, "ao.mae"),
+              text_at(*small, "label"), at(fast, "mrays_per_s.ao"), text_at(fast, "label"),
+              bytes_text(at(lean, "resident_bytes")), text_at(lean, "label")),
       small->at("commands").at("bake"),
       {figure("smallest file", at(*small, "bytes.file"), "bytes"), figure("its AO error", at(*small, "ao.mae"), "MAE"),
        figure("fastest", at(fast, "mrays_per_s.ao"), "Mrays/s"),
@@ -157,13 +164,23 @@ Json above_noise(const Points& points, const Json& report) {
   const Json& standard = *points.standard;
   const double error = at(standard, "ao.mae"), ratio = at(standard, "ao.noise_ratio");
   const double noise = at(report.at("reference").at("noise_floor"), "mae");
-  std::string text = fmt::format("{}: the default's mean AO error of {:.2g} is {:.2g} times the difference of two "
-                                 "float images with {} samples per "
-                                 "pixel and different seeds ({:.2g}).",
-                                 ratio > 1.0 ? "Yes" : "No", error, ratio, at(report.at("settings"), "spp"), noise);
-  Json figures{figure("error", error, "MAE"), figure("noise", noise, "MAE"), figure("ratio", ratio, "")};
+  const double spp = at(report.at("settings"), "spp");
+  std::string text =
+      noise > 0.0 ? fmt::format("{}: the default's mean AO error of {:.2g} is {:.2g} times the difference of two float "
+                                "images with {} samples per pixel and different seeds ({:.2g}).",
+                                ratio > 1.0 ? "Yes" : "No", error, ratio, spp, noise)
+      : error > 0.0
+          ? fmt::format("Yes: the default's mean AO error is {:.2g}, and there is no noise: two float images with {} "
+                        "samples per pixel and different seeds are equal.",
+                        error, spp)
+          : fmt::format(
+                "No: the default has no AO error. There is no noise either: two float images with {} samples per "
+                "pixel and different seeds are equal.",
+                spp);
+  Json figures{figure("error", error, "MAE"), figure("noise", noise, "MAE")};
+  if (noise > 0.0) figures.push_back(figure("ratio", ratio, ""));
   size_t above = 0;
-  for (const Json* point : points.all) above += at(*point, "ao.noise_ratio") > 1.0;
+  for (const Json* point : points.all) above += at(*point, "ao.mae") > noise;
   text += fmt::format(" {} of {} points are above it.", above, points.all.size());
   if (const Json& curve = report.at("convergence"); !curve.empty()) {
     const Json& last = curve.back();
@@ -208,7 +225,7 @@ Json costs(const Points& points) {
 nlohmann::json answer_questions(const nlohmann::json& report, double max_error) {
   const Points points(report);
   if (!points.standard) return Json::array();
-  return {smallest(points, max_error), loss_by_bits(points, report), next_stream(points, max_error),
+  return {smallest(points, max_error, caution(report)), loss_by_bits(points, report), next_stream(points, max_error),
           above_noise(points, report), costs(points)};
 }
 

@@ -75,13 +75,13 @@ std::vector<ErrorTile> worst_tiles(const std::vector<float>& errors, ImageSize s
   std::vector<ErrorTile> tiles;
   for (uint32_t y = 0; y < size.height; y += side)
     for (uint32_t x = 0; x < size.width; x += side) {
-      ErrorTile tile{x, y, std::min(side, size.width - x), std::min(side, size.height - y), 0.0, 0.0, x, y};
+      ErrorTile tile{x, y, std::min(side, size.width - x), std::min(side, size.height - y)};
       double sum = 0.0;
       for (uint32_t j = y; j < y + tile.height; ++j)
         for (uint32_t i = x; i < x + tile.width; ++i) {
           const double error = errors[size_t{j} * size.width + i];
           sum += error;
-          if (error > tile.max) tile.max = error, tile.worst_x = i, tile.worst_y = j;
+          tile.max = std::max(tile.max, error);
         }
       tile.mae = sum / (static_cast<double>(tile.width) * tile.height);
       if (tile.mae > 0.0) tiles.push_back(tile);

@@ -30,7 +30,6 @@ nlohmann::json ao_error(const AoImage& test, const AoImage& reference);
 struct ErrorTile {
   uint32_t x = 0, y = 0, width = 0, height = 0;
   double mae = 0.0, max = 0.0; ///< of the error map
-  uint32_t worst_x = 0, worst_y = 0;
 };
 
 /// The tiles with the largest mean error, worst first; at most `count`, and none without an error.

@@ -49,6 +49,7 @@ Words words_of(const RenderKnobs& knobs) {
   if (!knobs.denoise) words.emplace_back("--no-denoise");
   if (knobs.lod_error_px) words.insert(words.end(), {"--lod-error", number_text(*knobs.lod_error_px)});
   add(words, "--backend", knobs.backend, "packed");
+  add(words, "--ao-resolution", knobs.ao_resolution, "full");
   return words;
 }
 
@@ -69,7 +70,8 @@ nlohmann::json to_json(const BakeKnobs& bake, const RenderKnobs& render) {
           {"frames", render.frames},
           {"denoise", render.denoise},
           {"lod_error_px", render.lod_error_px ? Json(*render.lod_error_px) : Json()},
-          {"backend", render.backend}};
+          {"backend", render.backend},
+          {"ao_resolution", render.ao_resolution}};
 }
 
 std::string shell_command(const Words& words) {

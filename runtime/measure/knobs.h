@@ -35,6 +35,7 @@ struct RenderKnobs {
   bool denoise = false;
   std::optional<double> lod_error_px;
   std::string backend = "packed";
+  std::string ao_resolution = "full";
   bool operator==(const RenderKnobs&) const = default;
 };
 

@@ -115,10 +115,14 @@ void add_rendering(Matrix& matrix, MatrixMode mode) {
                [&](MeasurePoint& p) { p.render.spp = spp; });
   for (const uint32_t frames : {8u, 32u})
     matrix.add("denoise", fmt::format("frames-{}_denoised", frames), fmt::format("{} frames, denoised", frames),
-               [&](MeasurePoint& p) { p.render = {1, frames, true, std::nullopt, "packed"}; });
-  for (const char* backend : {"embree", "embree-clusters"})
-    matrix.add("backend", backend, fmt::format("backend {}", backend),
-               [&](MeasurePoint& p) { p.render.backend = backend; });
+               [&](MeasurePoint& p) { p.render.spp = 1, p.render.frames = frames, p.render.denoise = true; });
+  matrix.add("resolution", "quarter", "occlusion at quarter resolution",
+             [](MeasurePoint& p) { p.render.ao_resolution = "quarter"; });
+  matrix.add("resolution", "frames-32_denoised_quarter", "32 frames, denoised, quarter resolution",
+             [](MeasurePoint& p) {
+               p.render.spp = 1, p.render.frames = 32, p.render.denoise = true, p.render.ao_resolution = "quarter";
+             });
+  matrix.add("backend", "embree", "backend embree", [](MeasurePoint& p) { p.render.backend = "embree"; });
 }
 
 void add_product(Matrix& matrix, MatrixMode mode) {
@@ -163,6 +167,12 @@ std::vector<uint32_t> convergence_frames(MatrixMode mode) {
   if (mode == MatrixMode::kQuick) return {1, 4, 16};
   if (mode == MatrixMode::kDefault) return {1, 2, 4, 8, 16, 32};
   return {1, 2, 4, 8, 16, 32, 64, 128};
+}
+
+std::vector<uint32_t> resolution_samples(MatrixMode mode) {
+  if (mode == MatrixMode::kQuick) return {4};
+  if (mode == MatrixMode::kDefault) return {1, 4, 16};
+  return {1, 4, 16, 64};
 }
 
 std::vector<double> lod_errors(MatrixMode mode) {

@@ -34,6 +34,10 @@ std::vector<MeasurePoint> make_matrix(MatrixMode mode, const MatrixScene& scene,
 /// Frame counts at which the denoiser's convergence is measured.
 std::vector<uint32_t> convergence_frames(MatrixMode mode);
 
+/// Samples per pixel at which full and quarter resolution are compared; quarter resolution also gets four times as
+/// many, which are as many rays.
+std::vector<uint32_t> resolution_samples(MatrixMode mode);
+
 /// Screen-space errors at which levels of detail are measured, traced pixels; 0 first.
 std::vector<double> lod_errors(MatrixMode mode);
 

@@ -79,19 +79,8 @@ std::vector<PicturedPoint> pictured_points(const std::vector<MeasurePoint>& matr
 /// How the program does at extremes of size, place and shape; does not depend on the scene.
 Json stability_table() {
   Json table = Json::array();
-  for (const StabilityCase& stability_case : stability_cases()) {
-    const StabilityResult r = measure_stability(stability_case);
-    table.push_back({{"name", r.name},
-                     {"triangles", r.triangles},
-                     {"pixels", r.pixels},
-                     {"hits", r.hits},
-                     {"wrong_pixels", r.wrong_pixels},
-                     {"wrong_depths", r.wrong_depths},
-                     {"ao_mae", r.ao_mae},
-                     {"self_intersections", r.self_intersections},
-                     {"leaks", r.leaks},
-                     {"warned", r.warned}});
-  }
+  for (const StabilityCase& stability_case : stability_cases())
+    table.push_back(to_json(measure_stability(stability_case)));
   return table;
 }
 
@@ -113,7 +102,8 @@ nlohmann::json run_measure(const MeasureConfig& config, Progress& progress) {
   const std::vector<MeasurePoint> matrix = make_matrix(config.mode, config.matrix_scene, config.runner.spp);
   const std::vector<uint32_t> frames = convergence_frames(config.mode);
   PointRunner runner(config.runner, folder);
-  progress.begin("measuring", matrix.size() + 2);
+  const auto unmeasured = std::ranges::count_if(matrix, [&](const MeasurePoint& p) { return !runner.is_measured(p); });
+  progress.begin("measuring", static_cast<uint64_t>(unmeasured) + 3); // so that the time left is right in later runs
   Json report{{"schema", "packtrace-measure"},
               {"schema_version", 1},
               {"program", {{"name", "packtrace"}, {"version", config.version}}},
@@ -124,15 +114,18 @@ nlohmann::json run_measure(const MeasureConfig& config, Progress& progress) {
               {"default_id", matrix.front().id}};
   report["reference"] = runner.make_reference();
   report["settings"] = settings_of(config, report["reference"]);
+  for (const char* setting : {"camera", "ao_radius"}) report["reference"].erase(setting);
   progress.advance();
   Json points = Json::array();
   for (const MeasurePoint& point : matrix) {
     points.push_back(runner.measure(point));
+    if (!points.back().at("reused")) progress.advance();
     if (point.group == "default") {
       report["convergence"] = runner.convergence(point.bake, frames);
       progress.advance();
+      report["resolution"] = runner.resolution(point.bake, resolution_samples(config.mode));
+      progress.advance();
     }
-    progress.advance();
   }
   report["fronts"] = add_fronts(points, config.runner.spp);
   report["lod"] = lod_curve(points);

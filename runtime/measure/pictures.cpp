@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pbrt_import/base/output_file.h"
+#include "runtime/camera/gbuffer.h"
 #include "runtime/image/false_color.h"
 #include "runtime/image/png.h"
 
@@ -42,6 +43,20 @@ std::string write(const MeasureFolder& folder, const std::string& name, const Im
   output.write(encode_png(picture, PngTransfer::kRaw));
   output.commit();
   return path;
+}
+
+/// The instance that the float picture shows at the pixel of a tile with the largest error, of those that show one;
+/// kNoInstance if none does.
+uint32_t worst_instance(const ErrorTile& tile, const std::vector<float>& errors, const std::vector<uint32_t>& instances,
+                        uint32_t width) {
+  uint32_t worst = kNoInstance;
+  float largest = -1.0f;
+  for (uint32_t y = tile.y; y < tile.y + tile.height; ++y)
+    for (uint32_t x = tile.x; x < tile.x + tile.width; ++x) {
+      const size_t pixel = size_t{y} * width + x;
+      if (instances[pixel] != kNoInstance && errors[pixel] > largest) largest = errors[pixel], worst = instances[pixel];
+    }
+  return worst;
 }
 
 /// A round number above which at most one pixel in a hundred of those with an error lies.
@@ -81,7 +96,7 @@ nlohmann::json write_pictures(const std::vector<PicturedPoint>& points, const Ao
     size_t number = 0;
     for (const ErrorTile& tile : worst_tiles(errors, size, tile_px, kTilesPerPoint)) {
       const std::string name = fmt::format("{}_tile{}", point.id, number++);
-      const uint32_t instance = instances[size_t{tile.worst_y} * size.width + tile.worst_x];
+      const uint32_t instance = worst_instance(tile, errors, instances, size.width);
       tiles.push_back({{"point_id", point.id},
                        {"x", tile.x},
                        {"y", tile.y},

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -54,11 +55,17 @@ double finest_step(const Json& bake) {
   return step;
 }
 
+RenderKnobs reference_knobs(uint32_t spp) {
+  RenderKnobs knobs;
+  knobs.spp = spp, knobs.backend = "embree";
+  return knobs;
+}
+
 /// All values of a point that a failed one lacks.
 void add_nulls(Json& point) {
   for (const char* name : {"bytes", "resident_bytes", "position", "distance", "normal", "triangles", "ao", "seconds",
                            "cpu_seconds", "peak_bytes", "mrays_per_s", "embree", "speed_ratio", "ms_per_frame",
-                           "histograms", "worst_geometries", "traced_triangles"})
+                           "histograms", "worst_geometries", "traced_triangles", "isa"})
     point[name] = nullptr;
 }
 
@@ -125,7 +132,7 @@ nlohmann::json PointRunner::render(const std::string& stage, const std::string& 
 }
 
 nlohmann::json PointRunner::make_reference() {
-  const Words options = words_of(RenderKnobs{config_.spp, 1, false, std::nullopt, "embree"}) + config_.scene_options;
+  const Words options = words_of(reference_knobs(config_.spp)) + config_.scene_options;
   const auto command = [&](uint64_t seed) {
     return shell_command(Words{"packtrace", "render", config_.scene, "-o", "float.exr", "--size",
                                fmt::format("{}x{}", config_.size.width, config_.size.height), "--seed",
@@ -181,7 +188,19 @@ void PointRunner::bake(const BakeKnobs& knobs) {
   fs::create_directories(folder_ / "work");
   bake_report_ = run("bake", Words{"bake", config_.scene, "-o", file} + words_of(knobs) + config_.bake_options +
                                  config_.scene_options);
-  comparison_ = run("compare", {"compare", file, config_.scene, "--samples", std::to_string(config_.distance_samples)});
+  baked_ = knobs;
+  BakeKnobs surfaces = knobs; // codecs, trees and levels leave level 0 as it is
+  surfaces.codec = BakeKnobs{}.codec, surfaces.trees = BakeKnobs{}.trees, surfaces.lod = BakeKnobs{}.lod;
+  const auto known = std::ranges::find(comparisons_, surfaces, &std::pair<BakeKnobs, Json>::first);
+  if (known != comparisons_.end()) {
+    comparison_ = known->second;
+    return;
+  }
+  baked_.reset(); // until it is compared
+  comparison_ =
+      run("compare", Words{"compare", file, config_.scene, "--samples", std::to_string(config_.distance_samples)} +
+                         config_.scene_options);
+  comparisons_.emplace_back(surfaces, comparison_);
   baked_ = knobs;
 }
 
@@ -230,7 +249,8 @@ void PointRunner::add_render_values(nlohmann::json& point, const MeasurePoint& w
   point["mrays_per_s"] = {{"camera", at("/mrays_per_s/primary")}, {"ao", at("/mrays_per_s/ao")}};
   point["ms_per_frame"] = {{"camera", at("/seconds/primary") * 1e3},
                            {"ao", at("/seconds/ao") * 1e3 / frames},
-                           {"denoise", what.render.denoise ? at("/seconds/denoise") * 1e3 / frames : 0.0}};
+                           {"denoise", what.render.denoise ? at("/seconds/denoise") * 1e3 / frames : 0.0},
+                           {"upsample", at("/seconds/upsample") * 1e3}};
   point["isa"] = r.at("isa");
   point["embree"] = point["speed_ratio"] = nullptr;
   if (config_.embree_beside_each_point && what.render.backend == "packed" && !what.render.lod_error_px) {
@@ -255,9 +275,15 @@ void PointRunner::add_render_values(nlohmann::json& point, const MeasurePoint& w
   point["histograms"]["ao"] = to_json(make_histogram(errors, "occlusion"));
 }
 
+bool PointRunner::is_measured(const MeasurePoint& point) const {
+  const std::string name = key(point);
+  return folder_.load(name) && fs::exists(folder_.image(name));
+}
+
 nlohmann::json PointRunner::measure(const MeasurePoint& what) {
   const std::string name = key(what);
-  if (std::optional<Json> known = folder_.load(name); known && fs::exists(folder_.image(name))) {
+  if (is_measured(what)) {
+    std::optional<Json> known = folder_.load(name);
     (*known)["reused"] = true;
     for (const auto& [field, value] : {std::pair{"id", what.id}, {"label", what.label}, {"group", what.group}})
       (*known)[field] = value;
@@ -282,6 +308,9 @@ nlohmann::json PointRunner::measure(const MeasurePoint& what) {
     add_render_values(point, what);
     folder_.save(name, point);
   } catch (const StageFailure& failure) {
+    if (failure.child.exit_code == static_cast<int>(ErrorKind::kIo))
+      throw Error(ErrorKind::kIo, fmt::format("{} of point {} failed: {}; the same command continues", failure.stage,
+                                              what.id, failure.child.error));
     point["status"] = status_of(failure);
     point["error"] = to_json(failure);
   }
@@ -299,7 +328,8 @@ nlohmann::json PointRunner::convergence(const BakeKnobs& bake_knobs, const std::
     for (const uint32_t count : frames) {
       Json entry{{"frames", count}, {"spp", 1}};
       for (const bool denoise : {false, true}) {
-        const RenderKnobs knobs{1, count, denoise, std::nullopt, "packed"};
+        RenderKnobs knobs;
+        knobs.frames = count, knobs.denoise = denoise;
         const Json r = render("render", folder_ / "work/point.ptk", image, config_.noise_seed,
                               words_of(knobs) + Words{"--aov", "ao"});
         Json& ao = entry[denoise ? "denoised" : "noisy"];
@@ -316,6 +346,42 @@ nlohmann::json PointRunner::convergence(const BakeKnobs& bake_knobs, const std::
   }
   folder_.save(name, curve);
   return curve;
+}
+
+nlohmann::json PointRunner::resolution(const BakeKnobs& bake_knobs, const std::vector<uint32_t>& samples) {
+  Json table = Json::array();
+  const std::string name =
+      "resolution-" + key({"", "", "", bake_knobs, {}}) + fmt::format("-{}-{}", config_.spp, samples.size());
+  if (std::optional<Json> known = folder_.load(name)) return *known;
+  const fs::path image = folder_ / "work/resolution.exr";
+  std::set<std::pair<std::string, uint32_t>> what;
+  for (const uint32_t spp : samples) {
+    what.emplace("full", spp);
+    what.emplace("quarter", spp);
+    what.emplace("quarter", 4 * spp);
+  }
+  try {
+    bake(bake_knobs);
+    for (const auto& [resolution, spp] : what) {
+      RenderKnobs knobs;
+      knobs.spp = spp, knobs.ao_resolution = resolution;
+      const Json r = render("render", folder_ / "work/point.ptk", image, config_.noise_seed,
+                            words_of(knobs) + Words{"--aov", "ao"});
+      Json ao = ao_error(read_ao(image), *reference_);
+      add_noise_ratio(ao);
+      table.push_back({{"ao_resolution", resolution},
+                       {"spp", spp},
+                       {"rays", r.at("/rays/ao"_json_pointer)},
+                       {"ao", ao},
+                       {"ms",
+                        {{"ao", r.at("/seconds/ao"_json_pointer).get<double>() * 1e3},
+                         {"upsample", r.at("/seconds/upsample"_json_pointer).get<double>() * 1e3}}}});
+    }
+  } catch (const StageFailure&) {
+    return Json::array();
+  }
+  folder_.save(name, table);
+  return table;
 }
 
 } // namespace packtrace

@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -54,11 +56,19 @@ public:
   /// @return "reference" of the report. Throws Error with the exit code's kind if a render fails.
   nlohmann::json make_reference();
 
-  /// A point of the report, without flags. Failures of its processes are part of it.
+  /// Whether an earlier run measured the point.
+  bool is_measured(const MeasurePoint& point) const;
+
+  /// A point of the report, without flags. Failures of its processes are part of it, except those to write: throws
+  /// Error(kIo), since all other points would fail too.
   nlohmann::json measure(const MeasurePoint& point);
 
   /// "convergence" of the report for the given file options; an empty array if a process fails.
   nlohmann::json convergence(const BakeKnobs& bake, const std::vector<uint32_t>& frames);
+
+  /// "resolution" of the report: occlusion at full and quarter resolution, for equal samples per pixel and for equal
+  /// rays; an empty array if a process fails.
+  nlohmann::json resolution(const BakeKnobs& bake, const std::vector<uint32_t>& samples);
 
   /// Commands that a user types for a point, by name: bake and render.
   nlohmann::json commands(const MeasurePoint& point) const;
@@ -81,8 +91,9 @@ private:
   const MeasureFolder& folder_;
   std::optional<AoImage> reference_;
   double noise_mae_ = 0.0;
-  std::optional<BakeKnobs> baked_;          ///< options of the file in the folder
-  nlohmann::json bake_report_, comparison_; ///< JSON of bake and compare for that file
+  std::optional<BakeKnobs> baked_;                                ///< options of the file in the folder
+  nlohmann::json bake_report_, comparison_;                       ///< JSON of bake and compare for that file
+  std::vector<std::pair<BakeKnobs, nlohmann::json>> comparisons_; ///< by the options that decide the surfaces
 };
 
 } // namespace packtrace

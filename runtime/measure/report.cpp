@@ -55,7 +55,7 @@ std::string csv_field(const Json& value) {
   return quoted + "\"";
 }
 
-constexpr std::array<std::pair<const char*, const char*>, 42> kColumns{{
+constexpr std::array<std::pair<const char*, const char*>, 43> kColumns{{
     {"id", "id"},
     {"group", "group"},
     {"status", "status"},
@@ -67,6 +67,7 @@ constexpr std::array<std::pair<const char*, const char*>, 42> kColumns{{
     {"spp", "knobs.spp"},
     {"frames", "knobs.frames"},
     {"denoise", "knobs.denoise"},
+    {"ao_resolution", "knobs.ao_resolution"},
     {"file_bytes", "bytes.file"},
     {"memory_bytes", "bytes.memory"},
     {"bytes_per_triangle", "bytes.per_triangle"},
@@ -116,7 +117,8 @@ std::optional<double> number_at(const nlohmann::json& object, const std::string&
 bool on_equal_terms(const nlohmann::json& point, uint32_t spp) {
   const Json& knobs = point.at("knobs");
   return point.at("status") == "ok" && knobs.at("spp") == spp && knobs.at("frames") == 1 &&
-         knobs.at("denoise") == false && knobs.at("lod_error_px").is_null() && knobs.at("backend") == "packed";
+         knobs.at("denoise") == false && knobs.at("lod_error_px").is_null() && knobs.at("backend") == "packed" &&
+         knobs.at("ao_resolution") == "full";
 }
 
 nlohmann::json add_fronts(nlohmann::json& points, uint32_t spp) {

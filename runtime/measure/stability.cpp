@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include <nlohmann/json.hpp>
+
 #include "compress/bake/bake_scene.h"
 #include "compress/format/file/baked_file.h"
 #include "runtime/ao/ao_integrator.h"
@@ -121,6 +123,19 @@ double exact_distance(const CameraRay& ray, std::span<const WorldTriangle> trian
     if (t > 0) nearest = std::min(nearest, t);
   }
   return static_cast<double>(nearest);
+}
+
+nlohmann::json to_json(const StabilityResult& r) {
+  return {{"name", r.name},
+          {"triangles", r.triangles},
+          {"pixels", r.pixels},
+          {"hits", r.hits},
+          {"wrong_pixels", r.wrong_pixels},
+          {"wrong_depths", r.wrong_depths},
+          {"ao_mae", r.ao_mae},
+          {"self_intersections", r.self_intersections},
+          {"leaks", r.leaks},
+          {"warned", r.warned}};
 }
 
 StabilityResult measure_stability(const StabilityCase& stability_case) {

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "pbrt_import/scene/camera_rays.h"
 #include "pbrt_import/scene/scene.h"
 #include "runtime/measure/stability_cases.h"
@@ -35,6 +37,9 @@ struct StabilityResult {
   uint32_t leaks = 0;              ///< occlusion rays that leave a closed shape
   bool warned = false;             ///< the bake warned that its default precision may not suffice
 };
+
+/// An element of "stability" in a report (docs/measure.md).
+nlohmann::json to_json(const StabilityResult& result);
 
 /// Bakes a case with default options and renders it with the packed tracer. Deterministic.
 StabilityResult measure_stability(const StabilityCase& stability_case);

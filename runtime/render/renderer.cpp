@@ -5,6 +5,7 @@
 
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/scene/camera_rays.h"
+#include "runtime/ao/half_resolution.h"
 #include "runtime/camera/lod_view.h"
 #include "runtime/camera/origin_lift.h"
 #include "runtime/camera/primary_visibility.h"
@@ -45,6 +46,11 @@ private:
   std::vector<double> sum_;
   uint32_t frames_ = 0;
 };
+
+uint64_t hit_pixels(const GBuffer& g) {
+  return static_cast<uint64_t>(
+      std::count_if(g.instance.begin(), g.instance.end(), [](uint32_t id) { return id != kNoInstance; }));
+}
 
 Vec3 shade(const Material& material, Vec3 albedo, float ao) {
   return (material.flags & kEmissive) != 0 ? Vec3(1.0f) : albedo * ao;
@@ -127,11 +133,8 @@ RenderedImage render_view(const SceneSource& source, const RayTracer& tracer, co
   image.timings.primary_s = primary.seconds();
   image.primary_rays = g.size.pixels();
 
-  const auto hit_pixels = static_cast<uint64_t>(
-      std::count_if(g.instance.begin(), g.instance.end(), [](uint32_t id) { return id != kNoInstance; }));
-  image.seen = hit_pixels > 0;
+  image.seen = hit_pixels(g) > 0;
   if (!image.seen && config.stop_if_nothing_visible) return image;
-  image.ao_rays = hit_pixels * config.ao.spp * config.frames;
 
   Occluders occluders{&source, &tracer, 0.0};
   if (choose_occluders) {
@@ -140,23 +143,36 @@ RenderedImage render_view(const SceneSource& source, const RayTracer& tracer, co
     lift_origins(*occluders.tracer, view, occluders.error_px, g, progress);
     image.timings.ao_s += lifting.seconds();
   }
+  const bool quarter = config.ao_resolution == AoResolution::kQuarter;
+  const Stopwatch halving;
+  const HalfGBuffer half = quarter ? halve(g) : HalfGBuffer{};
+  image.timings.upsample_s = quarter ? halving.seconds() : 0.0;
+  const GBuffer& shaded = quarter ? half.gbuffer : g;
+  image.ao_rays = hit_pixels(shaded) * config.ao.spp * config.frames;
   AoFrame raw;
   AoDenoiser denoiser(config.denoiser);
   FrameMean mean;
   std::vector<float> ao;
-  progress.begin("ambient occlusion", config.frames * static_cast<uint64_t>(g.size.pixels()));
+  progress.begin("ambient occlusion", config.frames * static_cast<uint64_t>(shaded.size.pixels()));
   for (uint32_t frame = 0; frame < config.frames; ++frame) {
     const Stopwatch tracing;
-    trace_ao(*occluders.source, *occluders.tracer, g, config.ao, frame, raw, progress);
+    trace_ao(*occluders.source, *occluders.tracer, shaded, config.ao, frame, raw, progress);
     image.timings.ao_s += tracing.seconds();
     const Stopwatch denoising;
     if (!config.denoise)
       mean.add(raw);
-    else if (const DenoisedAo& denoised = denoiser.next_frame(g, raw); frame + 1 == config.frames)
+    else if (const DenoisedAo& denoised = denoiser.next_frame(shaded, raw); frame + 1 == config.frames)
       ao = denoised.ao;
     image.timings.denoise_s += denoising.seconds();
   }
   if (!config.denoise) ao = mean.result();
+  if (quarter) {
+    const Stopwatch upsampling;
+    const bool same = !config.denoise && config.frames == 1;
+    ao = upsample_ao(g, half, ao);
+    raw.ao = same ? ao : upsample_ao(g, half, raw.ao);
+    image.timings.upsample_s += upsampling.seconds();
+  }
   resolve(source, g, ao, raw.ao, config.supersample, image);
   if (config.lod_layers) resolve_detail(source, view, g, config.supersample, image);
   return image;

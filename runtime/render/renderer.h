@@ -15,12 +15,19 @@
 
 namespace packtrace {
 
+/// Pixels for which occlusion rays are traced.
+enum class AoResolution : uint8_t {
+  kFull,
+  kQuarter, ///< one of 2 x 2 pixels; the denoised result is upsampled (runtime/ao/half_resolution.h)
+};
+
 /// Settings for rendering one still view.
 struct RenderConfig {
   ImageSize size;           ///< size of the result in pixels
   uint32_t supersample = 1; ///< [1, 8]: factor per axis at which the view is traced and denoised, then box-filtered
   uint32_t frames = 32;     ///< [1, 65536]: each frame traces AoConfig::spp samples per pixel
   bool denoise = true;      ///< false: raw frames are averaged
+  AoResolution ao_resolution = AoResolution::kFull;
   bool stop_if_nothing_visible = false; ///< return after the camera rays if all of them miss
   bool lod_layers = false;              ///< fill the LOD layers of RenderedImage
   AoConfig ao;
@@ -36,6 +43,7 @@ struct RenderTimings {
   double primary_s = 0; ///< camera rays; traced once, since the view does not change
   double ao_s = 0;
   double denoise_s = 0;
+  double upsample_s = 0; ///< of AO traced at a lower resolution, and selecting its pixels; once per view
 };
 
 /// Layers of a rendered view, rows top to bottom, one entry per pixel. Where all camera rays of a pixel miss, ao and

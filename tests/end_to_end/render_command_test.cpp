@@ -299,5 +299,29 @@ TEST(CommandLine, TexturesOfTheFileLookLikeThoseOfTheScene) {
   EXPECT_EQ(run_packtrace({"bake", scene, "-o", baked, "--force", "-q", "--textures", "none"}).exit_code, 0);
 }
 
+TEST(RenderCommand, QuarterResolutionTracesAQuarterOfTheRays) {
+  const Workbench bench;
+  bench.bake();
+  const auto render = [&](const std::string& resolution, std::vector<std::string> more = {}) {
+    more.insert(more.begin(), {"render", bench.baked(), "-o", bench / (resolution + ".exr"), "--force", "--size",
+                               "63x41", "--spp", "64", "--frames", "2", "--ao-resolution", resolution, "--json", "-"});
+    return run_packtrace(more);
+  };
+  for (const std::vector<std::string>& denoise : {std::vector<std::string>{}, {"--no-denoise"}}) {
+    const nlohmann::json full = nlohmann::json::parse(render("full", denoise).out),
+                         quarter = nlohmann::json::parse(render("quarter", denoise).out);
+    EXPECT_EQ(full["rays"]["ao"], full["hit_pixels"].get<uint64_t>() * 128);
+    EXPECT_NEAR(quarter["rays"]["ao"].get<double>(), full["rays"]["ao"].get<double>() / 4,
+                0.02 * full["rays"]["ao"].get<double>());
+    EXPECT_EQ(quarter["hit_pixels"], full["hit_pixels"]);
+    EXPECT_NEAR(quarter["mean_ao"].get<double>(), full["mean_ao"].get<double>(), 0.003);
+    const CommandResult same = run_packtrace(
+        {"compare", bench / "quarter.exr", bench / "full.exr", "--max-mismatch", "0", "--max-rmse", "0.03"});
+    EXPECT_EQ(same.exit_code, 0) << same.out << same.err;
+  }
+  EXPECT_EQ(render("half").exit_code, 2);
+  EXPECT_EQ(render("quarter", {"--ground-truth"}).exit_code, 2);
+}
+
 } // namespace
 } // namespace packtrace::test

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "compress/bake/bake_scene.h"
@@ -11,6 +12,7 @@
 #include "pbrt_import/import_scene.h"
 #include "pbrt_import/scene/camera_rays.h"
 #include "runtime/ao/ao_integrator.h"
+#include "runtime/ao/half_resolution.h"
 #include "runtime/camera/primary_visibility.h"
 #include "runtime/trace/embree/embree_tracer.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
@@ -66,6 +68,34 @@ void raise(Metrics& metrics, const std::string& name, double value) {
   worst = std::max(worst, value);
 }
 
+/// Adds mean, root mean square and 99th percentile of AO differences.
+void add_ao_differences(Metrics& metrics, const std::string& prefix, std::vector<double> ao) {
+  double sum = 0.0, squares = 0.0, p99 = 0.0;
+  for (const double error : ao) sum += error, squares += error * error;
+  const double count = std::max<double>(static_cast<double>(ao.size()), 1.0);
+  if (!ao.empty()) {
+    const auto nth = ao.begin() + static_cast<std::ptrdiff_t>((ao.size() - 1) * 99 / 100);
+    std::nth_element(ao.begin(), nth, ao.end());
+    p99 = *nth;
+  }
+  raise(metrics, prefix + "ao_mae", sum / count);
+  raise(metrics, prefix + "ao_rmse", std::sqrt(squares / count));
+  raise(metrics, prefix + "ao_p99", p99);
+}
+
+/// Adds the error of upsampling the AO of one of 2 x 2 pixels, against that of all pixels.
+void add_quarter_resolution(Metrics& metrics, const Picture& picture) {
+  const HalfGBuffer half = halve(picture.surfaces);
+  std::vector<float> quarter;
+  for (const uint32_t pixel : half.pixel) quarter.push_back(picture.ao.ao[pixel]);
+  const std::vector<float> upsampled = upsample_ao(picture.surfaces, half, quarter);
+  std::vector<double> errors;
+  for (size_t i = 0; i < upsampled.size(); ++i)
+    if (picture.surfaces.instance[i] != kNoInstance)
+      errors.push_back(std::abs(double{upsampled[i]} - double{picture.ao.ao[i]}));
+  add_ao_differences(metrics, "quarter_", std::move(errors));
+}
+
 /// Adds the differences between two pictures: shares of all pixels that hit something in one picture only (hits) or
 /// whose depths differ (depth), and mean, root mean square and 99th percentile of |AO difference| over the others.
 void add_differences(Metrics& metrics, const std::string& prefix, const Picture& a, const Picture& b,
@@ -83,20 +113,9 @@ void add_differences(Metrics& metrics, const std::string& prefix, const Picture&
     else
       ++depth;
   }
-  double sum = 0.0, squares = 0.0;
-  for (const double error : ao) sum += error, squares += error * error;
-  const double count = std::max<double>(static_cast<double>(ao.size()), 1.0);
   raise(metrics, prefix + "hits", static_cast<double>(hits) / static_cast<double>(pixels));
   raise(metrics, prefix + "depth", static_cast<double>(depth) / static_cast<double>(pixels));
-  raise(metrics, prefix + "ao_mae", sum / count);
-  raise(metrics, prefix + "ao_rmse", std::sqrt(squares / count));
-  double p99 = 0.0;
-  if (!ao.empty()) {
-    const auto nth = ao.begin() + static_cast<std::ptrdiff_t>((ao.size() - 1) * 99 / 100);
-    std::nth_element(ao.begin(), nth, ao.end());
-    p99 = *nth;
-  }
-  raise(metrics, prefix + "ao_p99", p99);
+  add_ao_differences(metrics, prefix, std::move(ao));
 }
 
 void add_pictures(Metrics& metrics, const Scene& scene, const BakedFile& file, const PictureSettings& settings) {
@@ -108,6 +127,7 @@ void add_pictures(Metrics& metrics, const Scene& scene, const BakedFile& file, c
     view = View(float_source, settings, true);
     floats = view.of(float_source, float_tracer);
   }
+  add_quarter_resolution(metrics, floats);
   const PackedSource source(file);
   const Picture embree = view.of(source, EmbreeTracer(source, {}));
   const auto add = [&](const Picture& picture) {

@@ -33,6 +33,9 @@ function best(path, larger) {
   return fit.reduce((a, p) => (a === null || keys(p).reduce((d, k, i) => d || k - keys(a)[i], 0) < 0 ? p : a), null);
 }
 
+/// The geometry that a tile shows; none where the float picture shows no surface at all.
+const placeName = tile => (tile.geometry === null ? el("span", {}, "background") : named(tile.geometry));
+
 const overNoise = mae => (isNumber(mae) && isNumber(noise) && noise > 0 ? `${figure(mae / noise, 2)}\u00a0×\u00a0noise` : null);
 const joined = (...parts) => parts.filter(p => p && p !== none).join(" · ");
 
@@ -114,13 +117,14 @@ function limitControl() {
 }
 
 function questionOne() {
+  const blind = isNumber(noise) && noise === 0 ? el("p", {class: "warning"}, "The pictures show no occlusion, so its error says nothing about this scene. Measure with another ", el("code", {}, "--camera"), ", or choose the largest vertex error below.") : null;
   const results = el("div", {class: "goals", id: "goals"}), sentence = el("p", {class: "answer", id: "answer-1", "aria-live": "polite"});
   const card = el("section", {class: "card wide", "aria-labelledby": "q1"}, el("h2", {id: "q1"}, "What is the smallest, fastest or leanest file within my error, and which command makes it?"));
   if (!state.metric) {
     card.append(el("p", {}, unbroken(get(report, "answers.0.text") || "No point was measured completely.")), command(get(report, "answers.0.command")) || "");
     return card;
   }
-  card.append(limitControl(), sentence, results);
+  card.append(...[blind, limitControl(), sentence, results].filter(Boolean));
   onChange(() => {
     const [small, fast, lean] = goals.map(g => best(g.path, g.larger));
     const says = (point, path, text) => [text(get(point, path)), " (", named(point.label), ")"];
@@ -140,7 +144,7 @@ const bitPoints = working.filter(p => p.group === "positions" && get(p, "knobs.p
 function cropRow(tiles) {
   return tiles.map(tile => el("li", {}, ["float", "packed", "difference"].map(kind =>
     pictureOf(tile[kind], `${kind} crop at ${tile.x}, ${tile.y}`) || el("span", {class: "hole"})),
-    el("span", {class: "where"}, named(tile.geometry), el("span", {class: "muted"}, ` error ${figure(tile.mae, 2)}, at most ${figure(tile.max, 2)}`))));
+    el("span", {class: "where"}, placeName(tile), el("span", {class: "muted"}, ` error ${figure(tile.mae, 2)}, at most ${figure(tile.max, 2)}`))));
 }
 
 function questionTwo() {

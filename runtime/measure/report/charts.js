@@ -106,7 +106,7 @@ const streamLegend = () => el("p", {class: "legend"}, [...shownStreams, "other"]
 function streamStrip(point) {
   const total = get(point, "bytes.file") || 1, parts = streamsOf(point).filter(s => s.bytes > 0);
   return el("div", {class: "stream-strip", role: "img", "aria-label": parts.map(s => `${streamName(s.name)} ${figure(100 * s.bytes / total, 2)} %`).join(", ")},
-    parts.map(s => el("span", {class: s.className, style: {width: `${100 * s.bytes / total}%`}}, s.bytes / total > 0.13 ? `${s.name} ${Math.round(100 * s.bytes / total)} %` : "")));
+    parts.map(s => el("span", {class: s.className, style: {width: `${100 * s.bytes / total}%`}}, el("i"), el("b", {}, streamName(s.name)), el("b", {}, `${Math.round(100 * s.bytes / total)}\u00a0%`))));
 }
 
 function streamPlot(width, rows) {
@@ -135,7 +135,7 @@ function streamSection() {
   const sized = working.filter(p => isNumber(get(p, "bytes.file")));
   const front = new Set(list((list(report.fronts).find(f => f.name === "bytes-error") || {}).ids));
   const choices = [["Default and the front", p => p === base || front.has(p.id)],
-    ...[...new Set(sized.map(p => p.group))].filter(g => !["default", "spp", "denoise", "lod-error", "backend"].includes(g)).map(g => [`Default and ${g}`, p => p === base || p.group === g]),
+    ...[...new Set(sized.map(p => p.group))].filter(g => !["default", "spp", "denoise", "resolution", "lod-error", "backend"].includes(g)).map(g => [`Default and ${g}`, p => p === base || p.group === g]),
     ["All points", () => true]];
   const chooser = el("select", {id: "stream-rows"}, choices.map(([name]) => el("option", {}, name)));
   const rows = () => sized.filter(choices[chooser.selectedIndex][1]).sort((a, b) => b.bytes.file - a.bytes.file);
@@ -179,6 +179,19 @@ function convergencePlots() {
     rules: noise > 0 ? [{y: noise, text: `noise of ${get(report, "settings.spp")} samples`, className: "noise"}] : []}), table(columns, steps, {caption: "Convergence of the denoiser", sort: 0}))];
 }
 
+/// Error of full and quarter resolution against the rays that they need.
+function resolutionPlots() {
+  const rows = list(report.resolution).filter(r => isNumber(get(r, "ao.mae")) && r.rays > 0);
+  if (rows.length === 0) return [];
+  const describe = r => tipRows(`${r.ao_resolution} resolution, ${count(r.spp)} spp`, [["AO rays", shortCount(r.rays)], ["AO error", joined(figure(r.ao.mae), overNoise(r.ao.mae))], ["SSIM", figure(get(r, "ao.ssim"))], ["tracing", `${figure(get(r, "ms.ao"))} ms`], ["upsampling", r.ao_resolution === "quarter" ? `${figure(get(r, "ms.upsample"))} ms` : none]]);
+  const curve = (kind, className) => ({name: kind, className, points: rows.filter(r => r.ao_resolution === kind).sort((a, b) => a.rays - b.rays).map(r => ({x: r.rays, y: r.ao.mae, label: `${kind}, ${r.spp} spp`, data: r}))});
+  const columns = [{name: "Resolution", value: r => r.ao_resolution, numeric: false}, {name: "Samples", value: r => r.spp, text: r => count(r.spp)}, {name: "AO rays", value: r => r.rays, text: r => count(r.rays)},
+    {name: "AO error", value: r => r.ao.mae, text: r => figure(r.ao.mae)}, {name: "RMS", value: r => get(r, "ao.rmse"), text: r => figure(get(r, "ao.rmse"))}, {name: "Tracing, ms", value: r => get(r, "ms.ao"), text: r => figure(get(r, "ms.ao"))}, {name: "Upsampling, ms", value: r => get(r, "ms.upsample"), text: r => figure(get(r, "ms.upsample"))}];
+  return [plot("Occlusion at quarter resolution", "One frame without denoiser, against the float reference. Quarter resolution traces one of 2 × 2 pixels.", width => linePlot(width, {
+    series: [curve("full", "dominated"), curve("quarter", "front")], xLog: true, yLog: true, xText: v => shortCount(v), yText: v => plain(v, 1), xTitle: "AO rays, log", yTitle: "AO error (MAE), log", describe,
+    label: "AO error of full and quarter resolution against rays", rules: noise > 0 ? [{y: noise, text: `noise of ${get(report, "settings.spp")} samples`, className: "noise"}] : []}), table(columns, rows, {caption: "Occlusion at full and quarter resolution", sort: 2}))];
+}
+
 function stabilitySection() {
   const cases = list(report.stability);
   if (cases.length === 0) return null;
@@ -192,6 +205,6 @@ function stabilitySection() {
 }
 
 function levelSection() {
-  const plots = [...levelPlots(), ...convergencePlots()];
-  return plots.length === 0 ? null : el("section", {id: "levels", "aria-labelledby": "levels-title"}, el("h2", {id: "levels-title"}, "Levels of detail and denoiser"), el("div", {class: "grid two"}, plots));
+  const plots = [...levelPlots(), ...convergencePlots(), ...resolutionPlots()];
+  return plots.length === 0 ? null : el("section", {id: "levels", "aria-labelledby": "levels-title"}, el("h2", {id: "levels-title"}, "Levels of detail, denoiser and resolution"), el("div", {class: "grid two"}, plots));
 }

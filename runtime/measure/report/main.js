@@ -25,7 +25,7 @@ function themeButton() {
 
 function heading() {
   const scene = report.scene || {}, counts = report.counts || {};
-  const links = [["answers", "Answers"], ["trade", "Trade-offs"], ["streams", "Bytes"], ["pictures", "Pictures"], ["levels", "Levels and denoiser"], ["extremes", "At the extremes"], ["point", "One point"], ["all", "All points"], ["how", "How it was measured"]].filter(([id]) => document.getElementById(id));
+  const links = [["answers", "Answers"], ["trade", "Trade-offs"], ["streams", "Bytes"], ["pictures", "Pictures"], ["levels", "Levels, denoiser, resolution"], ["extremes", "At the extremes"], ["point", "One point"], ["all", "All points"], ["how", "How it was measured"]].filter(([id]) => document.getElementById(id));
   document.getElementById("top").replaceChildren(
     el("div", {class: "title"}, el("h1", {}, named(scene.name || "scene"), el("span", {class: "muted"}, " packtrace measure")), themeButton()),
     el("p", {class: "muted"}, joined(`${count(scene.triangles)} triangles`, isNumber(scene.geometries) ? `${count(scene.geometries)} ${scene.geometries === 1 ? "geometry" : "geometries"}` : null, isNumber(counts.ok) ? `${count(counts.ok)} of ${count(counts.points)} points measured` : null, get(report, "settings.mode") ? `${report.settings.mode} mode` : null, isNumber(report.seconds) ? `in ${seconds(report.seconds)}` : null,

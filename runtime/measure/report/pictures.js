@@ -40,7 +40,7 @@ function wipe(picture) {
 
 function tileList(tiles) {
   return el("ul", {class: "tiles"}, tiles.map(tile => el("li", {}, el("div", {class: "triple"}, ["float", "packed", "difference"].map(kind => el("figure", {}, pictureOf(tile[kind], `${kind}, pixels ${tile.x}, ${tile.y}`) || el("span", {class: "hole"}), el("figcaption", {}, kind)))),
-    el("p", {}, named(tile.geometry), el("br"), el("span", {class: "muted"}, `error ${figure(tile.mae, 2)}, at most ${figure(tile.max, 2)}; ${tile.width} × ${tile.height} pixels at ${tile.x}, ${tile.y}`)))));
+    el("p", {}, placeName(tile), el("br"), el("span", {class: "muted"}, `error ${figure(tile.mae, 2)}, at most ${figure(tile.max, 2)}; ${tile.width} × ${tile.height} pixels at ${tile.x}, ${tile.y}`)))));
 }
 
 function pictureSection() {

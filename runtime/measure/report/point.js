@@ -1,6 +1,6 @@
 // One point in detail, and the table of all points.
 
-const knobNames = {normals: "Normals", uvs: "Texture coordinates", textures: "Textures", codec: "Codec", trees: "Stored trees", lod: "Levels", purpose: "Purpose", spp: "Samples per pixel", frames: "Frames", denoise: "Denoiser", lod_error_px: "LOD error, px", backend: "Tracer"};
+const knobNames = {normals: "Normals", uvs: "Texture coordinates", textures: "Textures", codec: "Codec", trees: "Stored trees", lod: "Levels", purpose: "Purpose", spp: "Samples per pixel", frames: "Frames", denoise: "Denoiser", lod_error_px: "LOD error, px", backend: "Tracer", ao_resolution: "AO resolution"};
 
 function positionKnob(knob) {
   if (!knob || knob.kind === "default" || knob.value === null) return "chosen by bake";

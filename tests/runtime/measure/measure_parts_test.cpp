@@ -7,12 +7,14 @@
 #include <nlohmann/json.hpp>
 
 #include "pbrt_import/base/error.h"
+#include "runtime/measure/answers.h"
 #include "runtime/measure/ao_error.h"
 #include "runtime/measure/child_process.h"
 #include "runtime/measure/histogram.h"
 #include "runtime/measure/matrix.h"
 #include "runtime/measure/measure_folder.h"
 #include "runtime/measure/pareto.h"
+#include "runtime/measure/pictures.h"
 #include "runtime/measure/report.h"
 #include "tests/temporary_folder.h"
 
@@ -126,7 +128,7 @@ TEST(AoError, TheWorstTilesComeFirst) {
   ASSERT_EQ(tiles.size(), 2u) << "tiles without an error are left out";
   EXPECT_EQ(tiles[0].x, 4u);
   EXPECT_EQ(tiles[0].height, 1u);
-  EXPECT_EQ(tiles[0].worst_x, 5u);
+  EXPECT_DOUBLE_EQ(tiles[0].max, 1.0);
   EXPECT_DOUBLE_EQ(tiles[0].mae, 0.5);
   EXPECT_EQ(worst_tiles(errors, {6, 3}, 2, 1).size(), 1u);
 }
@@ -190,7 +192,8 @@ Json point_json(const char* id, const char* status, double bytes, double mae) {
             {"denoise", false},
             {"lod", "off"},
             {"lod_error_px", nullptr},
-            {"backend", "packed"}}},
+            {"backend", "packed"},
+            {"ao_resolution", "full"}}},
           {"bytes", {{"file", bytes}}},
           {"ao", {{"mae", mae}}},
           {"label", "a \"b\", c"},
@@ -209,6 +212,48 @@ TEST(Report, FlagsDominatedPointsAndCountsFailures) {
   const std::string csv = csv_of(points);
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 4);
   EXPECT_NE(csv.find("\"x, y\",z\n"), std::string::npos) << csv;
+}
+
+/// A report with what the answers need; both float pictures are equal if `noise` is 0.
+Json report_json(double error, double noise) {
+  Json point = point_json("default", "ok", 100, error);
+  point["ao"]["noise_ratio"] = noise > 0.0 ? Json(error / noise) : Json();
+  point["bytes"]["streams"] = Json::array({Json{{"name", "positions"}, {"bytes", 100}}});
+  return {{"settings", {{"spp", 64}}},    {"points", Json::array({point})},
+          {"default_id", "default"},      {"tiles", Json::array()},
+          {"convergence", Json::array()}, {"reference", {{"noise_floor", {{"mae", noise}}}}}};
+}
+
+TEST(Answers, NoiseIsComparedOnlyIfThereIsSome) {
+  const auto fourth = [](double error, double noise) {
+    return answer_questions(report_json(error, noise), 0.005)[3]["text"].get<std::string>();
+  };
+  EXPECT_TRUE(fourth(0.01, 0.02).starts_with("No: the default's mean AO error of 0.01 is 0.5 times"))
+      << fourth(0.01, 0.02);
+  EXPECT_TRUE(fourth(0.04, 0.02).starts_with("Yes: the default's mean AO error of 0.04 is 2 times"));
+  EXPECT_TRUE(fourth(0.01, 0.0).starts_with("Yes: the default's mean AO error is 0.01, and there is no noise"))
+      << fourth(0.01, 0.0);
+  const auto first = [](double noise) {
+    return answer_questions(report_json(0.0, noise), 0.005)[0]["text"].get<std::string>();
+  };
+  EXPECT_NE(first(0.0).find("show no occlusion"), std::string::npos) << first(0.0);
+  EXPECT_EQ(first(0.02).find("show no occlusion"), std::string::npos);
+  EXPECT_TRUE(fourth(0.0, 0.0).starts_with("No: the default has no AO error. There is no noise")) << fourth(0.0, 0.0);
+}
+
+TEST(Pictures, TilesNameTheGeometryAtTheirWorstPixelThatShowsOne) {
+  const TemporaryFolder temporary;
+  const MeasureFolder folder(temporary / "report", {{"scene", "a"}}, false);
+  const ImageSize size{4, 2}; // tiles of 2 x 2 pixels
+  const AoImage floats = ao_image({-1.0f, 0.5f, -1.0f, -1.0f, 0.5f, 0.5f, -1.0f, -1.0f}, size);
+  const AoImage packed =
+      ao_image({0.5f, 0.75f, 0.5f, -1.0f, 0.5f, 0.5f, -1.0f, -1.0f}, size); // hits in two more pixels
+  const std::vector<uint32_t> instances{~0u, 1, ~0u, ~0u, 0, 0, ~0u, ~0u};
+  const Json tiles =
+      write_pictures({{"default", "default", packed}}, floats, instances, {"floor", "wall"}, 2, folder)["tiles"];
+  ASSERT_EQ(tiles.size(), 2u);
+  EXPECT_EQ(tiles[0]["geometry"], "wall");
+  EXPECT_TRUE(tiles[1]["geometry"].is_null()) << "the float picture shows nothing there";
 }
 
 } // namespace

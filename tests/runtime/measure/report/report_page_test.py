@@ -104,6 +104,9 @@ def sample():
                          "ms_per_frame": {"ao": 5.6, "denoise": 4.2}} for i in range(7)],
         "lod": [{"error_px": e, "triangles": int(1.5e6 / (1 + 2 * e)), "traced_ratio": 1.0, "ao": ao(0.00015 + 0.002 * e),
                  "mrays_per_s": {"camera": 2.5, "ao": 10.5 + e}, "ms_per_frame": {"camera": 23, "ao": 350}} for e in (0, 0.5, 1, 2, 4)],
+        "resolution": [{"ao_resolution": r, "spp": s, "rays": 50000 * s // (4 if r == "quarter" else 1), "ao": ao(0.1 / s ** 0.5),
+                        "ms": {"ao": 5.0 * s, "upsample": 3.0 if r == "quarter" else 0}} for r, s in
+                       (("full", 1), ("full", 4), ("quarter", 1), ("quarter", 4), ("quarter", 16))],
         "tiles": tiles, "pictures": pictures,
         "answers": [{"question": f"Question {i}?", "text": f"Answer {i} {HOSTILE}", "command": "packtrace", "figures": []} for i in range(5)],
         "counts": {"points": len(points) + 1, "ok": len(points), "failed": 1, "reused": 0}}
@@ -195,8 +198,8 @@ class ReportPage(unittest.TestCase):
                     outside: marks.filter(m => { const b = m.getBoundingClientRect();
                       return b.left < box.left - 1 || b.right > box.right + 1 || b.top < box.top - 1 || b.bottom > box.bottom + 1; }).length};
             }))"""))
-        # The noise scale, four fronts, streams, levels, the denoiser and three histograms.
-        self.assertEqual(len(plots), 11, [p["name"] for p in plots])
+        # The noise scale, four fronts, streams, levels, the denoiser, the resolution and three histograms.
+        self.assertEqual(len(plots), 12, [p["name"] for p in plots])
         for shown in plots:
             with self.subTest(shown["name"]):
                 self.assertGreater(shown["width"], 150)
@@ -206,6 +209,33 @@ class ReportPage(unittest.TestCase):
                 self.assertFalse(shown["bad"])
         measured = sum(p["status"] == "ok" for p in self.report["points"])
         self.assertEqual([p["marks"] for p in plots if "front" in p["name"]], [measured] * 4)
+
+    def test_stream_labels_are_whole_or_hidden(self):
+        for width in (360, 800, 1280):
+            self.open(width, 900)
+            labels = json.loads(self.js("""JSON.stringify([...document.querySelectorAll('.stream-strip b')].map(label => {
+                const box = label.getBoundingClientRect(), part = label.parentElement.getBoundingClientRect();
+                return {text: label.textContent, below: box.top >= part.bottom - 1, whole: box.left >= part.left - 1 && box.right <= part.right + 1};
+                }))"""))
+            self.assertGreater(len(labels), 3)
+            self.assertTrue(any(not label["below"] for label in labels), width)
+            for label in labels:
+                self.assertTrue(label["below"] or label["whole"], (width, label))
+
+    def test_pictures_without_occlusion_are_said(self):
+        report = sample()
+        self.assertEqual(self.js("document.querySelectorAll('#answers .warning').length"), 0)
+        report["reference"]["noise_floor"] = ao(0)
+        self.open(page=self.write(report, "open"))
+        self.assertIn("no occlusion", self.js("document.querySelector('#answers .warning').textContent"))
+        self.check_silence()
+
+    def test_a_tile_without_a_surface_is_background(self):
+        report = sample()
+        report["tiles"][0]["geometry"] = None
+        self.open(page=self.write(report, "background"))
+        self.assertIn("background", self.js("document.querySelector('#pictures').textContent"))
+        self.assertNotIn("(no name)", self.js("document.querySelector('main').textContent"))
 
     def test_every_plot_has_a_table(self):
         self.open()

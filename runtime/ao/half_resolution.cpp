@@ -1,0 +1,212 @@
+#include "runtime/ao/half_resolution.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+namespace packtrace {
+namespace {
+
+constexpr double kMaxSlope = 0.3;    ///< sine of the angle between line and surface from which the weight is 0
+constexpr float kNormalSlack = 1.1f; ///< normals up to acos(1 / 1.1) = 25 degrees apart count as equal
+constexpr int kNormalSquarings = 6;  ///< cosine to the power of 64
+constexpr float kEnough = 0.1f;      ///< weight from which a mean stands for the pixel
+constexpr float kEnoughFar = 0.01f;  ///< the same for the wider neighbourhood
+constexpr float kWell = 0.99f;       ///< likeness that is not improved on
+constexpr float kMuchWorse = 0.25f;  ///< difference of likeness that moves a block's sample
+
+/// How two surface points relate.
+struct Relation {
+  float cosine; ///< between the shading normals
+  float slope2; ///< squared sine of the angle between their line and the surfaces, the larger one
+};
+
+Relation relate(const GBuffer& g, size_t a, size_t b) {
+  const DVec3 line = DVec3(g.position[b]) - DVec3(g.position[a]);
+  const double length2 = glm::dot(line, line);
+  const double height = std::max(std::abs(glm::dot(DVec3(g.geometric_normal[a]), line)),
+                                 std::abs(glm::dot(DVec3(g.geometric_normal[b]), line)));
+  const double slope2 = length2 > 0.0 ? height * height / length2 : 0.0;
+  return {glm::dot(g.normal[a], g.normal[b]), static_cast<float>(slope2)};
+}
+
+/// 1 for points of one plane, 0 for points of different surfaces.
+float likeness(Relation r) {
+  float aligned = std::min(1.0f, kNormalSlack * r.cosine);
+  const float flat = 1.0f - r.slope2 / static_cast<float>(kMaxSlope * kMaxSlope);
+  if (!(aligned > 0.0f) || !(flat > 0.0f)) return 0.0f; // also for NaN
+  for (int i = 0; i < kNormalSquarings; ++i) aligned *= aligned;
+  return aligned * flat * flat;
+}
+
+float likeness(const GBuffer& g, size_t a, size_t b) {
+  if (!(glm::dot(g.normal[a], g.normal[b]) > 0.0f)) return 0.0f; // spares reading positions
+  return likeness(relate(g, a, b));
+}
+
+bool is_hit(const GBuffer& g, size_t pixel) { return g.instance[pixel] != kNoInstance; }
+
+constexpr std::array<std::array<uint32_t, 2>, 4> kOffsets{{{0, 0}, {1, 1}, {1, 0}, {0, 1}}}; ///< diagonal first
+
+/// Full pixels of a block; those beyond the right and bottom edge are left out.
+struct Block {
+  std::array<uint32_t, 4> pixels;
+  uint32_t count = 0;
+
+  Block(ImageSize full, uint32_t bx, uint32_t by) {
+    for (const auto& [x, y] : kOffsets)
+      if (2 * bx + x < full.width && 2 * by + y < full.height) pixels[count++] = (2 * by + y) * full.width + 2 * bx + x;
+  }
+};
+
+template <class Body>
+void for_each_row(uint32_t rows, const Body& body) {
+  tbb::parallel_for(tbb::blocked_range<uint32_t>(0, rows, 8), [&](const tbb::blocked_range<uint32_t>& range) {
+    for (uint32_t y = range.begin(); y != range.end(); ++y) body(y);
+  });
+}
+
+/// Calls body(index) for the blocks within `reach` of a block, itself included.
+template <class Body>
+void for_neighbours(ImageSize half, uint32_t bx, uint32_t by, uint32_t reach, const Body& body) {
+  const uint32_t x0 = bx > reach ? bx - reach : 0, y0 = by > reach ? by - reach : 0;
+  const uint32_t x1 = std::min(half.width - 1, bx + reach), y1 = std::min(half.height - 1, by + reach);
+  for (uint32_t y = y0; y <= y1; ++y)
+    for (uint32_t x = x0; x <= x1; ++x) body(size_t{y} * half.width + x);
+}
+
+/// The first pixel of each block that hits.
+std::vector<uint32_t> first_hits(const GBuffer& full, ImageSize half) {
+  std::vector<uint32_t> pixel(half.pixels());
+  for_each_row(half.height, [&](uint32_t by) {
+    for (uint32_t bx = 0; bx < half.width; ++bx) {
+      const Block block(full.size, bx, by);
+      const auto end = block.pixels.begin() + block.count;
+      const auto found = std::find_if(block.pixels.begin(), end, [&](uint32_t p) { return is_hit(full, p); });
+      pixel[size_t{by} * half.width + bx] = found == end ? block.pixels[0] : *found;
+    }
+  });
+  return pixel;
+}
+
+/// The pixel of a block that the neighbouring blocks describe worst.
+uint32_t least_described(const GBuffer& full, ImageSize half, const std::vector<uint32_t>& first, uint32_t bx,
+                         uint32_t by) {
+  const size_t own = size_t{by} * half.width + bx;
+  const auto described = [&](uint32_t p) {
+    float best = 0.0f;
+    for_neighbours(half, bx, by, 1, [&](size_t other) {
+      if (other != own && best < kWell && is_hit(full, first[other]))
+        best = std::max(best, likeness(full, p, first[other]));
+    });
+    return best;
+  };
+  uint32_t chosen = first[own];
+  if (!is_hit(full, chosen)) return chosen;
+  float least = described(chosen) - kMuchWorse;
+  const Block block(full.size, bx, by);
+  for (uint32_t i = 0; i < block.count && least > 0.0f; ++i) {
+    const uint32_t p = block.pixels[i];
+    if (p == first[own] || !is_hit(full, p)) continue;
+    if (const float value = described(p); value < least) least = value, chosen = p;
+  }
+  return chosen;
+}
+
+GBuffer pixels_of(const GBuffer& full, ImageSize half, const std::vector<uint32_t>& pixel) {
+  GBuffer g;
+  g.resize(half);
+  for_each_row(half.height, [&](uint32_t by) {
+    for (size_t i = size_t{by} * half.width; i < size_t{by + 1} * half.width; ++i) {
+      const uint32_t p = pixel[i];
+      g.view_z[i] = full.view_z[p], g.position[i] = full.position[p], g.normal[i] = full.normal[p];
+      g.geometric_normal[i] = full.geometric_normal[p], g.albedo[i] = full.albedo[p];
+      g.instance[i] = full.instance[p], g.triangle[i] = full.triangle[p], g.material[i] = full.material[p];
+      g.back_face[i] = full.back_face[p], g.offset[i] = full.offset[p], g.motion_px[i] = full.motion_px[p] * 0.5f;
+    }
+  });
+  return g;
+}
+
+class Upsampler {
+public:
+  Upsampler(const GBuffer& full, const HalfGBuffer& half, std::span<const float> ao)
+      : full_(full), half_(half), ao_(ao) {}
+
+  float value(uint32_t x, uint32_t y) const {
+    const size_t pixel = size_t{y} * full_.size.width + x;
+    if (!is_hit(full_, pixel)) return kInvalidAo;
+    const ImageSize size = half_.gbuffer.size;
+    const uint32_t bx = x / 2, by = y / 2;
+    if (const size_t own = size_t{by} * size.width + bx; half_.pixel[own] == pixel) return ao_[own];
+    Mean near, far, unlike;
+    for_neighbours(size, bx, by, 1, [&](size_t i) {
+      if (!usable(i)) return;
+      const auto [dx, dy] = offset(x, y, i);
+      if (dx < 2 && dy < 2) near.add((2 - dx) * (2 - dy) * 0.25f * likeness(full_, pixel, half_.pixel[i]), ao_[i]);
+    });
+    if (near.weight >= kEnough) return near.value();
+    for_neighbours(size, bx, by, 2, [&](size_t i) {
+      if (!usable(i)) return;
+      const auto [dx, dy] = offset(x, y, i);
+      const float closeness = 1.0f / (1.0f + dx * dx + dy * dy);
+      const Relation r = relate(full_, pixel, half_.pixel[i]);
+      far.add(closeness * likeness(r), ao_[i]);
+      const float alike = (1.0f + r.cosine) * (1.0f - r.slope2);
+      unlike.add(alike > 0.0f ? closeness * (alike * alike + 1e-6f) : closeness * 1e-6f, ao_[i]);
+    });
+    return (far.weight >= kEnoughFar ? far : unlike).value(); // the own block has a sample
+  }
+
+private:
+  struct Mean {
+    float weight = 0.0f, sum = 0.0f, lo = INFINITY, hi = -INFINITY;
+    void add(float w, float v) {
+      if (!(w > 0.0f)) return;
+      weight += w, sum += w * v, lo = std::min(lo, v), hi = std::max(hi, v);
+    }
+    float value() const { return std::clamp(sum / weight, lo, hi); } // rounding leaves the range otherwise
+  };
+
+  bool usable(size_t i) const { return is_hit(half_.gbuffer, i) && ao_[i] >= 0.0f; }
+
+  /// Distances along both axes, in full pixels.
+  std::array<float, 2> offset(uint32_t x, uint32_t y, size_t i) const {
+    const uint32_t p = half_.pixel[i], width = full_.size.width;
+    return {std::abs(static_cast<float>(p % width) - static_cast<float>(x)),
+            std::abs(static_cast<float>(p / width) - static_cast<float>(y))};
+  }
+
+  const GBuffer& full_;
+  const HalfGBuffer& half_;
+  const std::span<const float> ao_;
+};
+
+} // namespace
+
+HalfGBuffer halve(const GBuffer& full) {
+  const ImageSize size{(full.size.width + 1) / 2, (full.size.height + 1) / 2};
+  const std::vector<uint32_t> first = first_hits(full, size);
+  HalfGBuffer half;
+  half.pixel.resize(size.pixels());
+  for_each_row(size.height, [&](uint32_t by) {
+    for (uint32_t bx = 0; bx < size.width; ++bx)
+      half.pixel[size_t{by} * size.width + bx] = least_described(full, size, first, bx, by);
+  });
+  half.gbuffer = pixels_of(full, size, half.pixel);
+  return half;
+}
+
+std::vector<float> upsample_ao(const GBuffer& full, const HalfGBuffer& half, std::span<const float> ao) {
+  const Upsampler upsampler(full, half, ao);
+  std::vector<float> result(full.size.pixels());
+  for_each_row(full.size.height, [&](uint32_t y) {
+    for (uint32_t x = 0; x < full.size.width; ++x) result[size_t{y} * full.size.width + x] = upsampler.value(x, y);
+  });
+  return result;
+}
+
+} // namespace packtrace

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/camera/gbuffer.h"
+
+namespace packtrace {
+
+/// A G-buffer of half the width and height, rounded up. Each of its pixels is one pixel of a block of 2 x 2 full
+/// pixels: the top left one, unless the neighbouring blocks' pixels describe another one much worse. So a surface one
+/// pixel wide gets samples of its own, and the surface behind it has those of the neighbouring blocks.
+struct HalfGBuffer {
+  GBuffer gbuffer;
+  std::vector<uint32_t> pixel; ///< full pixel of each half pixel
+};
+
+/// Selects the pixels. A block has no surface only if all its pixels miss.
+HalfGBuffer halve(const GBuffer& full);
+
+/// Joint bilateral upsampling: each pixel is the weighted mean of the nearest half pixels. The weight falls with the
+/// distance in the picture (a tent two pixels wide), with the angle between the shading normals, and with the angle
+/// between the line that connects the two points and their surfaces, which is 0 within a plane whatever the slope, and
+/// near 90 degrees across a step in depth. Both angles do not depend on the camera or the scene's scale. Pixels that no
+/// half pixel of the 5 x 5 nearest blocks describes get the mean of those that are least unlike them.
+/// Source: Kopf, Cohen, Lischinski, Uyttendaele, "Joint bilateral upsampling" (2007).
+/// @param full the G-buffer that `half` was made from
+/// @param ao one value per half pixel; valid where a surface is
+/// @return one value per full pixel, within the range of the values; kInvalidAo where no surface is
+std::vector<float> upsample_ao(const GBuffer& full, const HalfGBuffer& half, std::span<const float> ao);
+
+} // namespace packtrace
