@@ -22,14 +22,14 @@ find pbrt_import compress runtime tests assets docs \( -name '*.h' -o -name '*.c
   xargs -0 clang-format-19 --dry-run -Werror
 if [ "${presets[*]}" = tidy ]; then
   echo "== clang-tidy (all sources)"
-  cmake --preset release >/dev/null
   exec .ci/clang_tidy.sh all
 fi
 for preset in "${presets[@]}"; do
   echo "== Build ($preset)"
   options=(-DPACKTRACE_WERROR=ON)
   # The Python module is tested with Debian's interpreter, whichever comes first in the PATH.
-  [ "$preset" != release ] || options+=(-DPACKTRACE_BUILD_PYTHON=ON -DPython_EXECUTABLE=/usr/bin/python3)
+  [ "$preset" != release ] ||
+    options+=(-DPACKTRACE_BUILD_PYTHON=ON -DPython_EXECUTABLE=/usr/bin/python3 -DPACKTRACE_UNITY=tools)
   cmake --preset "$preset" "${options[@]}" >/dev/null
   [ "$preset" != release ] || { echo "== clang-tidy" && .ci/clang_tidy.sh; }
   cmake --build --preset "$preset"
