@@ -23,7 +23,7 @@ BakedFile bake(const Scene& scene, BakeConfig config = {}) {
 }
 
 /// A floor, a masked screen, a glass sphere and three instances of a smooth sphere, one of them mirrored.
-Scene varied_scene() {
+Scene cubes_scene() {
   Scene scene;
   add_shape(scene, test::quad({-8, 0, -8}, {0, 0, 16}, {16, 0, 0}));
   add_shape(scene, test::quad({-4, 0, 4}, {8, 0, 0}, {0, 5, 0}), kAlphaMask);
@@ -56,7 +56,7 @@ Image render(const SceneSource& source) {
 }
 
 TEST(PackedSource, LooksUpManyPlacesAsItDoesOne) {
-  const Scene scene = varied_scene();
+  const Scene scene = cubes_scene();
   const BakedFile file = bake(scene);
   const PackedSource packed(file);
   const FloatSource floats(scene);
@@ -88,7 +88,7 @@ TEST(PackedSource, LooksUpManyPlacesAsItDoesOne) {
 }
 
 TEST(PackedSource, RendersTheImageOfTheFloats) {
-  const Scene scene = varied_scene();
+  const Scene scene = cubes_scene();
   const BakedFile file = bake(scene);
   const PackedSource packed(file);
   const FloatSource floats(scene);
@@ -148,14 +148,14 @@ TEST(PackedSource, InstancesOfOneGeometryHaveMaterialsAndMasksOfTheirOwn) {
 TEST(PackedSource, LevelsOfDetailAreNotTraced) {
   BakeConfig config;
   config.lod = LodUse::kAll;
-  const BakedFile without = bake(varied_scene()), with = bake(varied_scene(), config);
+  const BakedFile without = bake(cubes_scene()), with = bake(cubes_scene(), config);
   ASSERT_GT(with.geometries().size(), without.geometries().size());
   EXPECT_EQ(PackedSource(with).geometry_count(), PackedSource(without).geometry_count());
   EXPECT_EQ(render(PackedSource(with)).ao.ao, render(PackedSource(without)).ao.ao);
 }
 
 TEST(PackedSource, DecodedTrianglesMatchRandomAccess) {
-  const BakedFile file = bake(varied_scene());
+  const BakedFile file = bake(cubes_scene());
   const PackedSource source(file);
   for (uint32_t i = 0; i < source.instances().size(); ++i) {
     const uint32_t g = source.instances()[i].geometry;
