@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "compress/format/file/baked_file.h"
-#include "pbrt_import/scene/mesh.h"
+#include "pbrt_import/scene/scene.h"
 
 namespace packtrace::test {
 

@@ -25,6 +25,7 @@ namespace packtrace {
 namespace {
 
 using test::bake;
+using test::Decoded;
 using test::expect_holds;
 using test::scene_of;
 using test::Source;

@@ -22,6 +22,11 @@ int32_t uv_anchor(const uint8_t* bits, uint32_t uv_bit, uint32_t axis) {
   return static_cast<int32_t>(static_cast<uint32_t>(read_bits(bits, uv_bit + axis * kUvAnchorBits, kUvAnchorBits)));
 }
 
+LatticePoint offset(const LatticePoint& base, const PositionFields& fields) {
+  return {base[0] + static_cast<int64_t>(fields.axis[0]), base[1] + static_cast<int64_t>(fields.axis[1]),
+          base[2] + static_cast<int64_t>(fields.axis[2])};
+}
+
 uint32_t position_stride(const baked::ClusterRecord& record) {
   return std::accumulate(record.position_bits.begin(), record.position_bits.end(), 0u);
 }
@@ -84,9 +89,7 @@ LatticePoint ClusterView::lattice(uint32_t vertex) const {
       point[axis] += static_cast<int64_t>(read_bits(bits_, bit, record_->position_bits[axis]));
     return point;
   }
-  const PositionFields fields = read_position(bits_, bit, x_bits, y_bits, z_bits);
-  return {base_[0] + static_cast<int64_t>(fields.axis[0]), base_[1] + static_cast<int64_t>(fields.axis[1]),
-          base_[2] + static_cast<int64_t>(fields.axis[2])};
+  return offset(base_, read_position(bits_, bit, x_bits, y_bits, z_bits));
 }
 
 Vec3 ClusterView::position(uint32_t vertex) const {
@@ -150,9 +153,22 @@ ClusterView::StreamBits ClusterView::stream_bits() const {
 }
 
 void decode_positions(const ClusterView& cluster, std::span<Vec3> out) {
-  assert(out.size() >= cluster.vertex_count());
-  const ClusterView view = cluster; // a local copy, because writes to `out` might change the original
-  for (uint32_t v = 0; v < view.vertex_count(); ++v) out[v] = view.position(v);
+  const uint32_t count = cluster.vertex_count(), stride = cluster.position_stride_;
+  assert(out.size() >= count);
+  if (stride > kMaxFieldBits) {
+    for (uint32_t v = 0; v < count; ++v) out[v] = cluster.position(v);
+    return;
+  }
+  // Local copies, because writes to `out` might change the originals: a seventh faster.
+  const auto [x_bits, y_bits, z_bits] = cluster.record_->position_bits;
+  const uint8_t* const bits = cluster.bits_;
+  const LatticePoint base = cluster.base_;
+  const double step = cluster.step_;
+  uint64_t bit = cluster.position_bit_;
+  for (uint32_t v = 0; v < count; ++v, bit += stride) {
+    const LatticePoint q = offset(base, read_position(bits, bit, x_bits, y_bits, z_bits));
+    out[v] = {from_lattice(q[0], step), from_lattice(q[1], step), from_lattice(q[2], step)};
+  }
 }
 
 void decode_indices(const ClusterView& cluster, uint32_t base, std::span<Triangle> out) {

@@ -62,6 +62,7 @@ public:
   const IndexLayout& layout() const { return layout_; }
 
 private:
+  friend void decode_positions(const ClusterView&, std::span<Vec3>);
   friend void decode_normals(const ClusterView&, std::span<Vec3>);
 
   /// @param entry a vertex, or with a palette one of its entries
