@@ -61,7 +61,10 @@ void add_positions(Matrix& matrix, MatrixMode mode, const MatrixScene& scene) {
                [&](MeasurePoint& p) { set_grid(p, kind, value); });
   };
   for (const double value : {1e-6, 1e-5, 1e-4}) grid(GridKind::kRelative, "relative", value, "of the diagonal");
-  for (const double value : {1.0 / 512, 1.0 / 32, 1.0 / 8}) grid(GridKind::kEdge, "edge", value, "of the median edge");
+  for (const double parts : {512.0, 32.0, 8.0})
+    matrix.add("grid-step", fmt::format("edge-{}", 1.0 / parts),
+               fmt::format("grid step 1/{} of the median edge", parts),
+               [&](MeasurePoint& p) { set_grid(p, GridKind::kEdge, 1.0 / parts); });
   if (mode == MatrixMode::kDefault) return;
   for (const double share : {1e-5, 1e-4}) { // rounded to two digits, so that the command is readable
     const double value = std::stod(fmt::format("{:.1e}", share * scene.diagonal));
