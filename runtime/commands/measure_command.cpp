@@ -241,7 +241,8 @@ void add_measure_command(CLI::App& app, GlobalOptions& globals, const std::strin
   verb.add_option("-o,--output", options->output, "Folder of the report; an interrupted measurement in it is continued")
       ->type_name("DIR");
   CLI::Option* quick = verb.add_flag("--quick", options->quick, "Measure few points, in about a minute");
-  verb.add_flag("--full", options->full, "Measure every point, in large pictures")->excludes(quick);
+  verb.add_flag("--full", options->full, "Measure every point, in large pictures; takes an hour or more")
+      ->excludes(quick);
   verb.add_flag("--matrix", options->matrix, "List the points without measuring them");
   verb.add_option("--spp", options->spp,
                   "Samples per pixel of the compared pictures, 1..65536 (default 64; 256 with --full)")

@@ -1,6 +1,7 @@
 #include "runtime/measure/answers.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <string>
 #include <utility>
@@ -203,6 +204,7 @@ Json costs(const Points& points) {
   const Json& standard = *points.standard;
   std::string text;
   Json figures = Json::array();
+  double noise = 0.0; // codecs are decoded to the same bytes
   for (const char* id : {"fast", "small", "trees-off", "lod-all"}) {
     const Json* point = points.find(id);
     if (!point) continue;
@@ -215,6 +217,12 @@ Json costs(const Points& points) {
     figures.push_back(figure(label + ", bytes", bytes, "%"));
     figures.push_back(figure(label + ", first ray", first, "s"));
     figures.push_back(figure(label + ", AO rays", speed, "%"));
+    if (point->at("group") == "codec") noise = std::max(noise, std::abs(speed));
+  }
+  if (noise > 0.0) {
+    text +=
+        fmt::format(". All codecs are traced as the same bytes, so rates are uncertain by at least {:.0f} %", noise);
+    figures.push_back(figure("uncertainty of rates", noise, "%"));
   }
   return answer("What do codec, trees and levels cost in bytes, loading and rays a second?",
                 text.empty() ? "Not measured." : text + ".", nullptr, figures);

@@ -61,7 +61,10 @@ void add_positions(Matrix& matrix, MatrixMode mode, const MatrixScene& scene) {
                [&](MeasurePoint& p) { set_grid(p, kind, value); });
   };
   for (const double value : {1e-6, 1e-5, 1e-4}) grid(GridKind::kRelative, "relative", value, "of the diagonal");
-  for (const double value : {1.0 / 512, 1.0 / 32, 1.0 / 8}) grid(GridKind::kEdge, "edge", value, "of the median edge");
+  for (const double parts : {512.0, 32.0, 8.0})
+    matrix.add("grid-step", fmt::format("edge-{}", 1.0 / parts),
+               fmt::format("grid step 1/{} of the median edge", parts),
+               [&](MeasurePoint& p) { set_grid(p, GridKind::kEdge, 1.0 / parts); });
   if (mode == MatrixMode::kDefault) return;
   for (const double share : {1e-5, 1e-4}) { // rounded to two digits, so that the command is readable
     const double value = std::stod(fmt::format("{:.1e}", share * scene.diagonal));
@@ -101,8 +104,8 @@ void add_levels(Matrix& matrix, MatrixMode mode) {
   matrix.add("lod", "lod-all", "levels for all geometries", [](MeasurePoint& p) { p.bake.lod = "all"; });
   for (const double error_px : lod_errors(mode))
     if (error_px > 0.0)
-      matrix.add("lod-error", fmt::format("lod-error-{}", error_px), fmt::format("levels, {} pixels", error_px),
-                 [&](MeasurePoint& p) {
+      matrix.add("lod-error", fmt::format("lod-error-{}", error_px),
+                 fmt::format("levels, {} pixel{}", error_px, error_px == 1.0 ? "" : "s"), [&](MeasurePoint& p) {
                    p.bake.lod = "all";
                    p.render.lod_error_px = error_px;
                  });
@@ -111,7 +114,7 @@ void add_levels(Matrix& matrix, MatrixMode mode) {
 void add_rendering(Matrix& matrix, MatrixMode mode) {
   if (mode == MatrixMode::kQuick) return;
   for (const uint32_t spp : {1u, 4u, 16u})
-    matrix.add("spp", fmt::format("spp-{}", spp), fmt::format("{} samples per pixel", spp),
+    matrix.add("spp", fmt::format("spp-{}", spp), fmt::format("{} sample{} per pixel", spp, spp == 1 ? "" : "s"),
                [&](MeasurePoint& p) { p.render.spp = spp; });
   for (const uint32_t frames : {8u, 32u})
     matrix.add("denoise", fmt::format("frames-{}_denoised", frames), fmt::format("{} frames, denoised", frames),
@@ -127,6 +130,9 @@ void add_rendering(Matrix& matrix, MatrixMode mode) {
 
 void add_product(Matrix& matrix, MatrixMode mode) {
   const bool full = mode == MatrixMode::kFull, quick = mode == MatrixMode::kQuick;
+  if (!quick)
+    matrix.add("product", "small_trees-off", "codec small, no trees",
+               [](MeasurePoint& p) { p.bake.codec = "small", p.bake.trees = "off"; });
   const std::vector<uint32_t> bits = quick  ? std::vector<uint32_t>{14}
                                      : full ? std::vector<uint32_t>{10, 12, 14, 16, 18, 20}
                                             : std::vector<uint32_t>{12, 14, 16, 18};

@@ -67,7 +67,7 @@ TEST(Measure, ContinuesAndRefusesTheFolderOfAChangedScene) {
 TEST(Measure, StopsAtAFullDiskAndContinues) {
   const Workbench bench;
   const std::vector<std::string> words{"measure", bench.scene(), "-o", bench / "report", "--quick", "--width",
-                                       "8",       "--spp",       "1"};
+                                       "16",      "--spp",       "1"};
   const CommandResult full = run_packtrace(words, [] { // room for the float pictures, not for a baked file
     const rlimit limit{2000, 2000};
     setrlimit(RLIMIT_FSIZE, &limit);

@@ -102,7 +102,8 @@ function limitControl() {
       ...(state.metric.ao && noise > 0 ? [["a tenth of the noise", noise / 10], ["the noise", noise]] : [["median of the points", sorted[sorted.length >> 1]]]),
     ].filter(([, v]) => isNumber(v)).map(([text, v]) => [text, roundedUp(v)]);
     chips.replaceChildren(...choices.map(([text, v]) => el("button", {type: "button", click: () => set(v, null)}, text)));
-    set((choices[1] || choices[0] || [0, sorted[0] || 0])[1], null);
+    const asked = state.metric.path === "ao.mae" ? get(report, "settings.max_error") : null;
+    set(isNumber(asked) ? asked : (choices[1] || choices[0] || [0, sorted[0] || 0])[1], null);
   }
   slider.addEventListener("input", () => set(Number((range[0] * (range[1] / range[0]) ** (slider.value / 1000)).toPrecision(2)), slider));
   field.addEventListener("input", () => set(field.value.trim() === "" ? NaN : Number(field.value.trim().replace(",", ".")), field));

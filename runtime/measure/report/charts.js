@@ -21,7 +21,7 @@ function frontPlot(front, width) {
   const xLog = Math.min(...xs) > 0 && Math.max(...xs) / Math.min(...xs) > 2.5;
   const text = v => (front.x.startsWith("mrays") ? plain(v) : bytes(v, plain));
   const x = (xLog ? logScale : linearScale)(...padded(xs, xLog), left, width - right, text, width < 420 ? 4 : 6);
-  const y = logScale(...padded([...ys, ...(ao && noise > 0 ? [noise] : [])], true), height - bottom, top, v => plain(v, 1));
+  const y = logScale(...padded([...ys, ...(ao && noise > 0 ? [noise] : [])], true), height - bottom, top, v => plain(v, 2));
   // A front is a staircase: between two of its points, the worse one still holds.
   const place = p => ({x: x.at(get(p, front.x)), y: y.at(get(p, front.y))});
   const ids = new Set(list(front.ids)), on = shown.filter(p => ids.has(p.id)).sort((a, b) => get(a, front.x) - get(b, front.x) || get(b, front.y) - get(a, front.y)).map(place);
@@ -110,13 +110,13 @@ function streamStrip(point) {
 }
 
 function streamPlot(width, rows) {
-  const narrow = width < 560, rowHeight = narrow ? 40 : 26, left = narrow ? 4 : 250, right = 70, height = rows.length * rowHeight + 8;
+  const narrow = width < 560, rowHeight = narrow ? 40 : 26, left = narrow ? 4 : Math.min(330, 7.2 * Math.max(12, ...rows.map(p => p.label.length)) + 14), longest = narrow ? Math.floor(width / 7) : 44, right = 70, height = rows.length * rowHeight + 8;
   const most = Math.max(...rows.map(p => get(p, "bytes.file") || 0), 1), scale = (width - left - right) / most;
   const svg = el("svg", {width, height, viewBox: `0 0 ${width} ${height}`, role: "group", "aria-label": `Bytes by stream of ${rows.length} points; the table below has the figures`});
   rows.forEach((point, i) => {
     const y = i * rowHeight + (narrow ? 18 : 4), h = 18;
     let at = left;
-    const label = point.label.length > 34 ? `${point.label.slice(0, 33)}…` : point.label;
+    const label = point.label.length > longest ? `${point.label.slice(0, longest - 1)}…` : point.label;
     svg.append(el("text", {class: `row-label${point === base ? " default" : ""}`, x: narrow ? left : left - 10, y: narrow ? y - 5 : y + 13, "text-anchor": narrow ? "start" : "end"}, label));
     for (const s of streamsOf(point)) {
       if (s.bytes <= 0) continue;
@@ -160,7 +160,7 @@ function levelPlots() {
     {name: "AO rays", value: l => get(l, "mrays_per_s.ao"), text: l => rate(get(l, "mrays_per_s.ao"))}];
   return [plot("Levels of detail: error against triangles", "The default file with levels, traced at each --lod-error (labels, pixels).", width => linePlot(width, {
     series: [{name: "levels", className: "front", points: levels.map(l => ({x: l.triangles, y: l.ao.mae, label: `${plain(l.error_px)} px`, data: l}))}],
-    xLog: true, yLog: true, xText: v => shortCount(v), yText: v => plain(v, 1), xTitle: "triangles in use, log", yTitle: "AO error (MAE), log", describe,
+    xLog: true, yLog: true, xText: v => shortCount(v), yText: v => plain(v, 2), xTitle: "triangles in use, log", yTitle: "AO error (MAE), log", describe,
     label: "AO error against triangles for each LOD error", rules: noise > 0 ? [{y: noise, text: "noise floor", className: "noise"}] : []}), table(columns, levels, {caption: "Levels of detail", sort: 0}))];
 }
 
@@ -174,7 +174,7 @@ function convergencePlots() {
   const columns = [{name: "Frames", value: s => s.frames, text: s => count(s.frames)}, {name: "Noisy, MAE", value: s => s.noisy.mae, text: s => figure(s.noisy.mae)}, {name: "Denoised, MAE", value: s => s.denoised.mae, text: s => figure(s.denoised.mae)},
     {name: "Denoised, SSIM", value: s => get(s, "denoised.ssim"), text: s => figure(get(s, "denoised.ssim"))}, {name: "Denoiser, ms", value: s => get(s, "ms_per_frame.denoise"), text: s => figure(get(s, "ms_per_frame.denoise"))}];
   return [plot("Denoiser: error against frames", `${get(steps[0], "spp") ?? 1} sample per pixel and frame, against the float reference.`, width => linePlot(width, {
-    series: [curve("noisy", "dominated"), curve("denoised", "front")], xLog: true, yLog: true, xTicks: steps.map(s => s.frames), xText: count, yText: v => plain(v, 1),
+    series: [curve("noisy", "dominated"), curve("denoised", "front")], xLog: true, yLog: true, xTicks: steps.map(s => s.frames), xText: count, yText: v => plain(v, 2),
     xTitle: "frames, log", yTitle: "AO error (MAE), log", describe, label: "AO error of noisy and denoised images against frames",
     rules: noise > 0 ? [{y: noise, text: `noise of ${get(report, "settings.spp")} samples`, className: "noise"}] : []}), table(columns, steps, {caption: "Convergence of the denoiser", sort: 0}))];
 }
@@ -184,11 +184,11 @@ function resolutionPlots() {
   const rows = list(report.resolution).filter(r => isNumber(get(r, "ao.mae")) && r.rays > 0);
   if (rows.length === 0) return [];
   const describe = r => tipRows(`${r.ao_resolution} resolution, ${count(r.spp)} spp`, [["AO rays", shortCount(r.rays)], ["AO error", joined(figure(r.ao.mae), overNoise(r.ao.mae))], ["SSIM", figure(get(r, "ao.ssim"))], ["tracing", `${figure(get(r, "ms.ao"))} ms`], ["upsampling", r.ao_resolution === "quarter" ? `${figure(get(r, "ms.upsample"))} ms` : none]]);
-  const curve = (kind, className) => ({name: kind, className, points: rows.filter(r => r.ao_resolution === kind).sort((a, b) => a.rays - b.rays).map(r => ({x: r.rays, y: r.ao.mae, label: `${kind}, ${r.spp} spp`, data: r}))});
+  const curve = (kind, className) => ({name: kind, className, points: rows.filter(r => r.ao_resolution === kind).sort((a, b) => a.rays - b.rays).map((r, i, all) => ({x: r.rays, y: r.ao.mae, label: `${i + 1 < all.length ? "" : `${kind}, `}${r.spp} spp`, data: r}))});
   const columns = [{name: "Resolution", value: r => r.ao_resolution, numeric: false}, {name: "Samples", value: r => r.spp, text: r => count(r.spp)}, {name: "AO rays", value: r => r.rays, text: r => count(r.rays)},
     {name: "AO error", value: r => r.ao.mae, text: r => figure(r.ao.mae)}, {name: "RMS", value: r => get(r, "ao.rmse"), text: r => figure(get(r, "ao.rmse"))}, {name: "Tracing, ms", value: r => get(r, "ms.ao"), text: r => figure(get(r, "ms.ao"))}, {name: "Upsampling, ms", value: r => get(r, "ms.upsample"), text: r => figure(get(r, "ms.upsample"))}];
   return [plot("Occlusion at quarter resolution", "One frame without denoiser, against the float reference. Quarter resolution traces one of 2 × 2 pixels.", width => linePlot(width, {
-    series: [curve("full", "dominated"), curve("quarter", "front")], xLog: true, yLog: true, xText: v => shortCount(v), yText: v => plain(v, 1), xTitle: "AO rays, log", yTitle: "AO error (MAE), log", describe,
+    series: [curve("full", "dominated"), curve("quarter", "front")], xLog: true, yLog: true, xText: v => shortCount(v), yText: v => plain(v, 2), xTitle: "AO rays, log", yTitle: "AO error (MAE), log", describe,
     label: "AO error of full and quarter resolution against rays", rules: noise > 0 ? [{y: noise, text: `noise of ${get(report, "settings.spp")} samples`, className: "noise"}] : []}), table(columns, rows, {caption: "Occlusion at full and quarter resolution", sort: 2}))];
 }
 

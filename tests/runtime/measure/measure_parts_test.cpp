@@ -66,6 +66,13 @@ TEST(Matrix, SinglePointsDifferFromTheDefaultInOneFactor) {
   EXPECT_GE(std::ranges::count(points, "positions", &MeasurePoint::group), 15) << "8..22 bits";
 }
 
+TEST(Matrix, HasWhatASearchForTheSmallestFileStartsFrom) {
+  for (const MatrixMode mode : {MatrixMode::kDefault, MatrixMode::kFull})
+    EXPECT_TRUE(std::ranges::any_of(make_matrix(mode, {10.0, true}, 64), [](const MeasurePoint& p) {
+      return p.bake.grid == GridKind::kDefault && p.bake.codec == "small" && p.bake.trees == "off";
+    }));
+}
+
 TEST(ShellCommand, QuotesWhatAShellWouldSplit) {
   EXPECT_EQ(shell_command({"packtrace", "bake", "my room.pbrt", "it's", ""}),
             "packtrace bake 'my room.pbrt' 'it'\\''s' ''");

@@ -256,6 +256,13 @@ class ReportPage(unittest.TestCase):
         self.assertGreater(len(seen), 2)
         self.check_silence()
 
+    def test_the_limit_starts_where_the_user_set_it(self):
+        report = sample()
+        report["settings"]["max_error"] = 0.0123
+        self.open(page=self.write(report, "limit"))
+        self.assertEqual(self.js("document.getElementById('limit').value"), "0.0123")
+        self.assertEqual(self.js("document.querySelector('#goals code').textContent"), smallest(report, 0.0123)["commands"]["bake"])
+
     def test_the_field_moves_the_answer_and_refuses_nonsense(self):
         self.open()
 
