@@ -7,7 +7,6 @@
 
 #include "compress/format/cluster/normal_codec.h"
 #include "compress/format/cluster/position_grid.h"
-#include "pbrt_import/scene/math.h"
 
 namespace packtrace {
 
