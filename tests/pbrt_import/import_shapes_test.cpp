@@ -97,8 +97,10 @@ TEST(Shapes, AbsurdSubdivisionIsRefused) {
 
 TEST(Shapes, AllSpellingsOfTextureCoordinatesAreRead) {
   const SceneFolder folder;
-  for (const char* const uv : {"point2 uv", "float uv", "point2 st", "float st"}) {
-    const Imported imported = import_world(folder, std::string(kTriangle) + "\"" + uv + "\" [0 0 0.5 0 0 0.25]");
+  for (const std::string uv : {"point2 uv", "float uv", "point2 st", "float st"}) {
+    std::string world = kTriangle;
+    world.append("\"").append(uv).append("\" [0 0 0.5 0 0 0.25]");
+    const Imported imported = import_world(folder, world);
     ASSERT_EQ(imported.scene.meshes.size(), 1u);
     ASSERT_EQ(imported.scene.meshes[0].uvs.size(), 3u) << uv;
     EXPECT_EQ(imported.scene.meshes[0].uvs[2], Vec2(0, 0.25f));
