@@ -98,7 +98,7 @@ TEST(Shapes, AbsurdSubdivisionIsRefused) {
 TEST(Shapes, AllSpellingsOfTextureCoordinatesAreRead) {
   const SceneFolder folder;
   for (const std::string uv : {"point2 uv", "float uv", "point2 st", "float st"}) {
-    std::string world = kTriangle;
+    std::string world(kTriangle);
     world.append("\"").append(uv).append("\" [0 0 0.5 0 0 0.25]");
     const Imported imported = import_world(folder, world);
     ASSERT_EQ(imported.scene.meshes.size(), 1u);
