@@ -153,11 +153,15 @@ private:
     if constexpr (kCount) counters_->placements += count_ones(rays);
     const TraceTree& tree = scene_.trees[place.tree];
     exact_differences_ = tree.max_coordinate <= kExactDifferences;
+    fine_grid_ = tree.max_coordinate > kFineGrid;
     RayGroup group;
-    rays = enter<!kAny>(place, tree.max_coordinate, tree.max_coordinate, unit_, rays, group);
+    graded_ = tree.graded != 0;
+    const float pad_coordinate = (graded_ ? kMinTopPad : 1.0f) * tree.max_coordinate;
+    rays = enter<!kAny>(place, tree.max_coordinate, pad_coordinate, unit_, rays, group);
+    if (graded_) group.reach = kUnboundedGroup;
     Beam beam;
     if constexpr (!kAny)
-      if (unit_.one_origin && make_beam(group, tree.max_coordinate, rays, beam)) group.beam = &beam;
+      if (unit_.one_origin && make_beam(group, pad_coordinate, rays, beam)) group.beam = &beam;
     by_octant(group, rays, [&](uint64_t together, uint32_t octant) {
       group.reach.set_octant(octant);
       if (scene_.search_tree != nullptr)
@@ -181,7 +185,8 @@ private:
       if ((node.ray_classes & ray_class_) == 0) continue;
       const NodeChildren children(node);
       if (!children.leaves()) prefetch_siblings(nodes + node.first_child);
-      const typename Lanes::Boxes boxes(node, octant);
+      typename Lanes::Boxes boxes(node, octant);
+      if (graded_) enlarge_boxes(node, octant, boxes);
       if (children.leaves())
         trace_leaves(placement, node, children, boxes, group, active);
       else
@@ -310,12 +315,12 @@ private:
         batch_normals_of_large(batch, normals);
       uint64_t exact = 0;
       if (kAny && (scene_.clusters[cluster].flags & kMasked) == 0) {
-        alive_ &= ~rays_that_hit<Lanes, !kAny>(batch, normals, group, rays, exact);
+        alive_ &= ~rays_that_hit<Lanes, !kAny>(batch, normals, group, rays, fine_grid_, exact);
       } else {
         const uint64_t others = test_side_by_side(batch, normals, place, group, rays);
         const bool many = Lanes::WideLanes::kLanes > kBatch && count_ones(others) >= kMinPrefilteredRays;
         test_each(batch, normals, place, group,
-                  many ? rays_that_hit<Lanes, !kAny>(batch, normals, group, others, exact) : others);
+                  many ? rays_that_hit<Lanes, !kAny>(batch, normals, group, others, fine_grid_, exact) : others);
       }
       if constexpr (kCount) counters_->exact_triangles += exact;
       rays &= alive_;
@@ -331,7 +336,7 @@ private:
       const uint32_t i = first_bit(m);
       LaneHits<Lanes> hits;
       uint64_t exact = 0;
-      const uint32_t lanes = test_triangles<Lanes, !kAny>(batch, normals, group, i, hits, exact);
+      const uint32_t lanes = test_triangles<Lanes, !kAny>(batch, normals, group, i, fine_grid_, hits, exact);
       if constexpr (kCount) counters_->exact_triangles += exact;
       if (lanes != 0) take_hits(place, i, hits, lanes, group);
     }
@@ -351,7 +356,8 @@ private:
       for (uint32_t triangle = 0; triangle < batch.count; ++triangle) {
         LaneHits<WideLanes> hits;
         uint64_t exact = 0;
-        uint32_t lanes = test_rays<WideLanes, !kAny>(batch, normals, triangle, group, axis, at, wanted, hits, exact);
+        uint32_t lanes =
+            test_rays<WideLanes, !kAny>(batch, normals, triangle, group, axis, at, fine_grid_, wanted, hits, exact);
         if constexpr (kCount) counters_->exact_triangles += exact;
         place.triangle = begin + triangle;
         for (; lanes != 0; lanes &= lanes - 1) {
@@ -429,7 +435,9 @@ private:
   const uint32_t* numbers_ = nullptr; ///< indices of its rays
   uint64_t alive_ = 0;                ///< rays that still look for a hit
   uint64_t nearer_ = 0;               ///< rays whose nearest hit lies in the placement traced last
+  bool graded_ = false;               ///< TraceTree::graded of the current tree
   bool exact_differences_ = false;    ///< whether vertex differences are exact in floats in the current tree
+  bool fine_grid_ = false;            ///< whether coordinates of the current tree exceed kFineGrid
   UnitRays unit_;
 };
 
