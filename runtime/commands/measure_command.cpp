@@ -97,7 +97,7 @@ nlohmann::json scene_json(const MeasureOptions& options, const ImportResult& imp
           {"file_bytes", bytes},
           {"float_bytes", float_bytes(scene)},
           {"diagonal", bounds.diagonal()},
-          {"bounds", {{"lo", array(bounds.lo)}, {"hi", array(bounds.hi)}}}};
+          {"bounds", {{"lo", array(bounds.lo + source.origin())}, {"hi", array(bounds.hi + source.origin())}}}};
 }
 
 /// Name of the geometry of each instance, numbered like SceneSource::instances().

@@ -6,6 +6,7 @@
 
 #include "compress/bake/bake_scene.h"
 #include "compress/format/file/baked_file.h"
+#include "pbrt_import/scene/far_world.h"
 #include "runtime/ao/ao_integrator.h"
 #include "runtime/camera/primary_visibility.h"
 #include "runtime/trace/embree/embree_tracer.h"
@@ -124,7 +125,8 @@ double exact_distance(const CameraRay& ray, std::span<const WorldTriangle> trian
 }
 
 StabilityResult measure_stability(const StabilityCase& stability_case) {
-  const Scene& scene = stability_case.scene;
+  Scene scene = stability_case.scene;
+  move_far_world(scene); // as the importer does
   Diagnostics diagnostics;
   Progress progress;
   const BakedScene baked = bake_to_bytes(scene, {}, diagnostics, progress);
