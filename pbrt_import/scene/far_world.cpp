@@ -10,9 +10,9 @@
 namespace packtrace {
 namespace {
 
-/// Distance from zero, in diagonals of the box, beyond which a box is moved. Half a float ulp is up to 2^-12 diagonals
-/// there.
-constexpr double kFar = 4096.0;
+/// Distances from zero, in diagonals of the box, beyond which the world and objects are moved. Half a float ulp is up
+/// to 2^-16 diagonals of the world there, and 2^-12 of an object, which is small in the picture.
+constexpr double kFarWorld = 256.0, kFarObject = 4096.0;
 
 Bounds bounds_of_shapes(const std::vector<Shape>& shapes, const std::vector<Bounds>& meshes) {
   Bounds result;
@@ -20,12 +20,13 @@ Bounds bounds_of_shapes(const std::vector<Shape>& shapes, const std::vector<Boun
   return result;
 }
 
-/// Returns by how much to move a box towards zero: the point near its centre that becomes zero. 0 if it is not far.
-DVec3 new_zero(const Bounds& box) {
+/// Returns by how much to move a box towards zero: the point near its centre that becomes zero. 0 if it is not farther
+/// than `limit` diagonals.
+DVec3 new_zero(const Bounds& box, double limit) {
   if (box.empty()) return DVec3(0.0);
   const DVec3 far = glm::max(glm::abs(box.lo), glm::abs(box.hi));
   const double distance = std::max({far.x, far.y, far.z}), diagonal = box.diagonal();
-  if (!std::isfinite(distance) || !(distance > kFar * diagonal)) return DVec3(0.0);
+  if (!std::isfinite(distance) || !(distance > limit * diagonal)) return DVec3(0.0);
   // Multiples of a power of two have few bits, so that subtracting one is exact. A box without extent gets its centre.
   const double unit = diagonal > 0.0 ? std::ldexp(1.0, std::ilogb(diagonal)) : 0.0;
   if (!(unit > distance * 0x1p-50)) return box.centre();
@@ -54,7 +55,7 @@ public:
     Bounds world = bounds_of_shapes(scene_.shapes, meshes_);
     for (size_t i = 0; i < maps_.size(); ++i)
       world.extend(transform_bounds(maps_[i], object_boxes_[scene_.instances[i].object]));
-    const DVec3 origin = new_zero(world);
+    const DVec3 origin = new_zero(world, kFarWorld);
     if (origin != DVec3(0.0)) move_world(origin);
     if (!objects_moved && origin == DVec3(0.0)) return; // every bit stays as it was
     for (size_t i = 0; i < maps_.size(); ++i) scene_.instances[i].world_from_object = Affine(maps_[i]);
@@ -65,7 +66,7 @@ private:
     std::vector<DVec3> zeros(scene_.objects.size(), DVec3(0.0));
     for (size_t i = 0; i < zeros.size(); ++i) {
       object_boxes_.push_back(bounds_of_shapes(scene_.objects[i].shapes, meshes_));
-      zeros[i] = new_zero(object_boxes_[i]);
+      zeros[i] = new_zero(object_boxes_[i], kFarObject);
     }
     for (const AnimatedInstance& animated : scene_.animated_instances)
       zeros[scene_.instances[animated.instance].object] = DVec3(0.0);

@@ -137,13 +137,13 @@ StabilityResult measure_stability(const StabilityCase& stability_case) {
   const AoConfig ao = ao_of(stability_case);
   const Traced packed = trace(packed_source, PackedTracer(file, packed_source), camera, ao);
   const Traced floats = trace(float_source, EmbreeTracer(float_source, {}), camera, ao);
-  const std::vector<WorldTriangle> triangles = world_triangles(scene);
+  const std::vector<WorldTriangle> triangles = world_triangles(stability_case.scene);
   StabilityResult result;
   result.name = stability_case.name;
   result.triangles = static_cast<uint32_t>(triangles.size());
   result.pixels = static_cast<uint32_t>(kSize.pixels());
   result.warned = !baked.report.warnings.empty() || diagnostics.count(Severity::kWarning) > 0;
-  count_pixels(camera, triangles, packed.surfaces, result);
+  count_pixels(PrimaryCamera(stability_case.scene.cameras.at(0), kSize), triangles, packed.surfaces, result);
   count_occlusion(stability_case.shape, packed, floats, result);
   return result;
 }
