@@ -14,9 +14,9 @@ namespace {
 inline uint32_t first_bit(uint64_t word) { return static_cast<uint32_t>(__builtin_ctzll(word)); }
 
 /// Returns the triangles of a batch that one ray hits, as a bit mask.
-template <typename Lanes, bool kUseResidual>
+template <typename Lanes, bool kUseResidual, typename Fine>
 inline uint32_t test_triangles(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group,
-                               uint32_t ray, bool fine, LaneHits<Lanes>& hits, uint64_t& exact_count) {
+                               uint32_t ray, Fine fine, LaneHits<Lanes>& hits, uint64_t& exact_count) {
   const uint32_t axis[3] = {group.axis[0][ray], group.axis[1][ray], group.axis[2][ray]};
   const auto vertex = [&](uint32_t k, uint32_t corner) { return Lanes::load(batch.vertex[axis[k]][corner]); };
   const auto origin = [&](uint32_t k) { return Lanes::set(group.origin[axis[k]][ray]); };
@@ -49,7 +49,8 @@ struct BatchLanes {
   /// Tests kRays rays against the triangles and returns the lanes with a hit, as a bit mask. Ray i has the lanes from
   /// kTriangles i on.
   /// @param wanted bit mask of the lanes that hold a triangle
-  uint32_t test(const TestRay* const (&rays)[kRays], const TestResidual* const (&rests)[kRays], bool fine,
+  template <typename Fine>
+  uint32_t test(const TestRay* const (&rays)[kRays], const TestResidual* const (&rests)[kRays], Fine fine,
                 uint32_t wanted, uint64_t& exact_count) const {
     typename WideLanes::F origin[4], shear[4],
         rest[4]; // The fourth elements hold the rays' begin, their end and no value.
@@ -67,9 +68,9 @@ struct BatchLanes {
 
 /// Returns the rays of the bit mask `rays` that hit a triangle of a batch of at most kTriangles triangles. If the last
 /// register is not full, its last ray is repeated.
-template <typename WideLanes, uint32_t kTriangles, bool kUseResidual>
+template <typename WideLanes, uint32_t kTriangles, bool kUseResidual, typename Fine>
 inline uint64_t test_several_rays(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group,
-                                  uint64_t rays, bool fine, uint64_t& exact) {
+                                  uint64_t rays, Fine fine, uint64_t& exact) {
   using Triangles = BatchLanes<WideLanes, kTriangles, kUseResidual>;
   constexpr uint32_t kRays = Triangles::kRays;
   constexpr uint32_t kFirstLanes = (kTriangles == 8 ? 0x0101u : 0x1111u) & ((1u << WideLanes::kLanes) - 1);
@@ -99,9 +100,9 @@ inline uint64_t test_several_rays(const DecodedBatch& batch, const BatchNormals&
 /// Tests the rays at `at`, `at` + 1, ... of a group, one per lane, against one triangle of a batch. Returns the lanes
 /// with a hit, as a bit mask.
 /// @param axis Woop's (kx, ky, kz), which all wanted rays share
-template <typename WideLanes, bool kUseResidual>
+template <typename WideLanes, bool kUseResidual, typename Fine>
 inline uint32_t test_rays(const DecodedBatch& batch, const BatchNormals& normals, uint32_t triangle,
-                          const RayGroup& group, const uint32_t (&axis)[3], uint32_t at, bool fine, uint32_t wanted,
+                          const RayGroup& group, const uint32_t (&axis)[3], uint32_t at, Fine fine, uint32_t wanted,
                           LaneHits<WideLanes>& hits, uint64_t& exact_count) {
   const auto vertex = [&](uint32_t k, uint32_t corner) {
     return WideLanes::set(batch.vertex[axis[k]][corner][triangle]);
@@ -133,9 +134,9 @@ inline bool same_axes(const RayGroup& group, uint32_t at, uint32_t wanted, uint3
 /// result of another.
 /// @param fine as in test_lanes()
 /// @param exact incremented by the number of lanes that were evaluated in doubles
-template <typename Lanes, bool kUseResidual>
+template <typename Lanes, bool kUseResidual, typename Fine>
 inline uint64_t rays_that_hit(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group,
-                              uint64_t rays, bool fine, uint64_t& exact) {
+                              uint64_t rays, Fine fine, uint64_t& exact) {
   using WideLanes = typename Lanes::WideLanes;
   return batch.count <= 4 ? test_several_rays<WideLanes, 4, kUseResidual>(batch, normals, group, rays, fine, exact)
                           : test_several_rays<WideLanes, 8, kUseResidual>(batch, normals, group, rays, fine, exact);

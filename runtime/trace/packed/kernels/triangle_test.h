@@ -107,6 +107,12 @@ constexpr float kExactDifferences = 0x1p23f;
 /// From this coordinate on, rounding moves sheared corners by half a grid step and more.
 constexpr float kFineGrid = 0x1p21f;
 
+/// Whether coordinates of a tree exceed kFineGrid. A type, so that tests in usual trees are compiled without doubles.
+template <bool kFine>
+struct FineGrid {
+  static constexpr bool value = kFine;
+};
+
 /// Returns plane normals of triangles whose vertex differences are exact in floats (kExactDifferences). The relative
 /// error per component is at most 2^-23. A plain float cross product would tilt a thin triangle's plane by up to 2^-24
 /// of its length over its height, and rays that start just above it would hit it far from their origins.
@@ -221,13 +227,14 @@ inline uint32_t starts_near_plane(Relative relative, Normal normal, typename Lan
 /// @param origin (k): the origin's coordinate along Woop's axis k
 /// @param normal (k): the plane normal along Woop's axis k
 /// @param rest (k): the origin's rounding error (exact minus rounded) along Woop's axis k
-/// @param fine whether the tree's grid is so fine that sheared corners need doubles near edges
+/// @tparam Fine FineGrid<true> if the tree's grid is so fine that sheared corners need doubles near edges, else
+/// FineGrid<false>
 /// @param wanted bit mask of the lanes to test
 /// @param exact_count incremented by the number of lanes that were evaluated in doubles
 template <typename Lanes, bool kWeights, bool kUseResidual, typename Vertex, typename Origin, typename Normal,
-          typename Rest>
-inline uint32_t test_lanes(Vertex vertex, Origin origin, Normal normal, Rest rest, const RayLanes<Lanes>& rays,
-                           bool fine, uint32_t wanted, LaneHits<Lanes>& hits, uint64_t& exact_count) {
+          typename Rest, typename Fine>
+inline uint32_t test_lanes(Vertex vertex, Origin origin, Normal normal, Rest rest, const RayLanes<Lanes>& rays, Fine,
+                           uint32_t wanted, LaneHits<Lanes>& hits, uint64_t& exact_count) {
   using F = typename Lanes::F;
   const F sx = rays.shear[0], sy = rays.shear[1];
   const auto relative = [&](uint32_t k, uint32_t corner) { return Lanes::sub(vertex(k, corner), origin(k)); };
@@ -248,8 +255,7 @@ inline uint32_t test_lanes(Vertex vertex, Origin origin, Normal normal, Rest res
   // p q' - q p' has an error of at most 2^-24 (|q p'| + |result|), so its sign is right where its magnitude is above
   // that error.
   F error = Lanes::fma(Lanes::largest(Lanes::largest(u2, v2), w2), Lanes::set(kEdgeError), Lanes::set(kSmallestEdge));
-  if (fine) [[unlikely]]
-    error = Lanes::add(error, shear_error<Lanes>(relative, x, y));
+  if constexpr (Fine::value) error = Lanes::add(error, shear_error<Lanes>(relative, x, y));
   const F below = Lanes::negate(error);
   const uint32_t inside = (Lanes::less(error, least) | Lanes::less(most, below)) & wanted;
   uint32_t unsure = (Lanes::less_equal(below, least) | Lanes::less_equal(most, error)) & wanted & ~inside;
@@ -262,8 +268,7 @@ inline uint32_t test_lanes(Vertex vertex, Origin origin, Normal normal, Rest res
   // Rounding the sheared corners may give area to a sliver that has no plane or whose plane contains the ray's
   // direction.
   unsure |= inside & Lanes::less_equal(along, zero) & Lanes::less_equal(zero, along);
-  if (fine) [[unlikely]]
-    unsure |= inside & starts_near_plane<Lanes>(relative, normal, depth);
+  if constexpr (Fine::value) unsure |= inside & starts_near_plane<Lanes>(relative, normal, depth);
   F t = Lanes::mul(Lanes::div(depth, along), rays.shear[2]);
   uint32_t hit = inside & ~unsure & Lanes::less(rays.begin, t) & Lanes::less_equal(t, rays.end);
   if constexpr (kWeights) {
@@ -276,7 +281,7 @@ inline uint32_t test_lanes(Vertex vertex, Origin origin, Normal normal, Rest res
   if (unsure != 0) {
     exact_count += static_cast<uint64_t>(__builtin_popcount(unsure));
     uint32_t found;
-    if (fine) {
+    if constexpr (Fine::value) {
       float stored[20][Lanes::kLanes];
       const auto corners = shear_exactly<Lanes, kUseResidual>(vertex, origin, normal, rest, rays, stored);
       found = test_exactly<Lanes>(unsure, corners, rays.shear[2], along, hits);
