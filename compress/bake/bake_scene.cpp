@@ -29,6 +29,35 @@
 namespace packtrace {
 namespace {
 
+/// Distance of neighbouring floats at a box's largest coordinate.
+double float_spacing(const Bounds& box) {
+  if (box.empty()) return 0.0;
+  const DVec3 largest = glm::max(glm::abs(box.lo), glm::abs(box.hi));
+  const auto furthest = static_cast<float>(std::max({largest.x, largest.y, largest.z}));
+  return static_cast<double>(std::nextafter(furthest, HUGE_VALF) - furthest);
+}
+
+double stretch_of(const DAffine& map) {
+  return std::sqrt(std::max({glm::dot(map[0], map[0]), glm::dot(map[1], map[1]), glm::dot(map[2], map[2])}));
+}
+
+/// Largest float_spacing() of a mesh, in world units where it is stretched most.
+double largest_mesh_spacing(const Scene& scene) {
+  std::vector<double> stretch(scene.meshes.size(), 0.0), of_object(scene.objects.size(), 0.0);
+  const auto add = [&](const std::vector<Shape>& shapes, double factor) {
+    for (const Shape& shape : shapes)
+      stretch[shape.mesh] = std::max(stretch[shape.mesh], factor * stretch_of(shape.parent_from_mesh));
+  };
+  for (const Instance& instance : scene.instances)
+    of_object[instance.object] = std::max(of_object[instance.object], stretch_of(DAffine(instance.world_from_object)));
+  add(scene.shapes, 1.0);
+  for (size_t i = 0; i < of_object.size(); ++i) add(scene.objects[i].shapes, of_object[i]);
+  double largest = 0.0;
+  for (size_t i = 0; i < stretch.size(); ++i)
+    if (stretch[i] > 0.0) largest = std::max(largest, stretch[i] * float_spacing(bounds_of(scene.meshes[i].positions)));
+  return largest;
+}
+
 class Baker {
 public:
   Baker(const Scene& scene, const BakeConfig& config, Diagnostics& diagnostics, Progress& progress)
@@ -124,18 +153,16 @@ private:
     if (far > 0)
       warn(std::to_string(far) + " of " + std::to_string(grids_.size()) +
            " geometries lie so far from the origin that float positions are coarser than the step of their grid");
-    warn_of_far_world();
+    warn_of_coarse_floats();
   }
 
-  /// Positions that are hit are floats in world space, for every backend and without packing too.
-  void warn_of_far_world() {
+  /// Positions that are hit are floats in world space, for every backend, and so are those of meshes in their own
+  /// space.
+  void warn_of_coarse_floats() {
     constexpr double kMaxSpacing = 1.0 / 512.0; // of the scene's diagonal; pictures are right to 0.002 AO at half of it
     const Bounds world = world_bounds(scene_);
     if (world.empty()) return;
-    const DVec3 largest = glm::max(glm::abs(world.lo), glm::abs(world.hi));
-    const auto furthest = static_cast<float>(std::max({largest.x, largest.y, largest.z}));
-    const double spacing = static_cast<double>(std::nextafter(furthest, HUGE_VALF) - furthest);
-    const double diagonal = world.diagonal();
+    const double spacing = std::max(float_spacing(world), largest_mesh_spacing(scene_)), diagonal = world.diagonal();
     if (diagonal > 0.0 && spacing > kMaxSpacing * diagonal)
       warn("the scene lies so far from the origin that floats are " + brief(spacing) + " apart there, " +
            brief(100.0 * spacing / diagonal) + " % of its diagonal; move it closer, or pictures will be wrong");
@@ -295,6 +322,7 @@ private:
     s.merged_vertices = report_.merged_vertices;
     s.collapsed_triangles = report_.collapsed_triangles;
     const Bounds bounds = placed_bounds(sections);
+    s.origin = {scene_.origin.x, scene_.origin.y, scene_.origin.z};
     s.bounds_lo = {bounds.lo.x, bounds.lo.y, bounds.lo.z};
     s.bounds_hi = {bounds.hi.x, bounds.hi.y, bounds.hi.z};
     const PrecisionKind kind = config_.precision_kind;

@@ -80,6 +80,26 @@ public:
       summary_.nonzero[static_cast<size_t>(y) * AlphaMask::row_words(width_) + x / 32] |= 1u << (x % 32);
   }
 
+  /// Adds a whole row of 8-bit pixels, as add() and end_row() would.
+  /// @tparam kChannels 3, or 1 for grey pixels
+  /// @param linear linear value of each sample value, not negative
+  template <uint32_t kChannels>
+  void add_row(uint32_t y, const uint8_t* pixels, const std::array<float, 256>& linear) {
+    double sums[kChannels] = {};
+    const uint8_t* sample = pixels;
+    for (uint32_t x = 0; x < width_; ++x)
+      for (double& sum : sums) sum += double{linear[*sample++]};
+    row_ += DVec3(sums[0], sums[kChannels / 2], sums[kChannels - 1]);
+    if (want_mask_) set_mask_row<kChannels>(y, pixels, linear);
+    if (want_colours_) {
+      uint8_t* to = summary_.rgb.data() + static_cast<size_t>(y) * width_ * 3;
+      for (uint32_t x = 0; x < width_; ++x)
+        for (uint32_t c = 0; c < 3; ++c)
+          *to++ = srgb8_of_linear(linear[pixels[x * kChannels + (kChannels == 1 ? 0 : c)]]);
+    }
+    end_row();
+  }
+
   /// Summing per row keeps the rounding error of the total small.
   void end_row() {
     total_ += row_;
@@ -96,6 +116,22 @@ public:
   }
 
 private:
+  template <uint32_t kChannels>
+  void set_mask_row(uint32_t y, const uint8_t* pixels, const std::array<float, 256>& linear) {
+    const uint32_t words = AlphaMask::row_words(width_);
+    uint32_t* const row = summary_.nonzero.data() + static_cast<size_t>(y) * words;
+    for (uint32_t w = 0; w < words; ++w) {
+      const uint32_t count = std::min(32u, width_ - 32 * w);
+      uint32_t bits = 0;
+      for (uint32_t i = 0; i < count; ++i) {
+        bool nonzero = false;
+        for (uint32_t c = 0; c < kChannels; ++c) nonzero |= linear[*pixels++] != 0.0f;
+        bits |= (nonzero ? 1u : 0u) << i;
+      }
+      row[w] = bits;
+    }
+  }
+
   ImageSummary summary_;
   uint64_t not_finite_pixels_ = 0, negative_pixels_ = 0;
   uint32_t width_;
@@ -134,6 +170,16 @@ struct StbFree {
   void operator()(void* p) const { stbi_image_free(p); }
 };
 
+/// Summarizes rows of 8-bit pixels.
+template <uint32_t kChannels>
+ImageSummary summarize_bytes(const uint8_t* pixels, uint32_t width, uint32_t height, ImageWants wants,
+                             const std::array<float, 256>& linear) {
+  Summarizer summarizer(width, height, wants);
+  for (uint32_t y = 0; y < height; ++y)
+    summarizer.add_row<kChannels>(y, pixels + static_cast<size_t>(y) * width * kChannels, linear);
+  return summarizer.finish();
+}
+
 template <class T, class ToLinear>
 ImageSummary summarize(const T* pixels, int width, int height, ImageWants wants, ToLinear to_linear) {
   const auto w = static_cast<uint32_t>(width), h = static_cast<uint32_t>(height);
@@ -151,6 +197,16 @@ std::array<float, 256> linear_of_bytes(bool decode_srgb) {
   std::array<float, 256> linear{};
   for (size_t i = 0; i < linear.size(); ++i) {
     const float v = static_cast<float>(i) / 255.0f;
+    linear[i] = decode_srgb ? linear_from_srgb(v) : v;
+  }
+  return linear;
+}
+
+/// Linear value of each 16-bit sample value.
+std::vector<float> linear_of_words(bool decode_srgb) {
+  std::vector<float> linear(size_t{1} << 16);
+  for (size_t i = 0; i < linear.size(); ++i) {
+    const float v = static_cast<float>(i) / 65535.0f;
     linear[i] = decode_srgb ? linear_from_srgb(v) : v;
   }
   return linear;
@@ -176,15 +232,16 @@ ImageSummary read_palette_png(std::span<const std::byte> bytes, const PngHeader&
   Summarizer summarizer(header.width, header.height, wants);
   uint64_t out_of_range = 0;
   const stbi_uc* pixel = grey.get();
+  std::vector<uint8_t> row(size_t{header.width} * 3);
   for (uint32_t y = 0; y < header.height; ++y) {
     for (uint32_t x = 0; x < header.width; ++x) {
       const size_t index = *pixel++ / palette.grey_step;
       out_of_range += index >= palette.colours.size();
       const std::array<uint8_t, 3> colour =
           index < palette.colours.size() ? palette.colours[index] : std::array<uint8_t, 3>{};
-      summarizer.add(x, y, {linear[colour[0]], linear[colour[1]], linear[colour[2]]});
+      std::ranges::copy(colour, row.begin() + ptrdiff_t{3} * x);
     }
-    summarizer.end_row();
+    summarizer.add_row<3>(y, row.data(), linear);
   }
   ImageSummary summary = summarizer.finish();
   add_problem(summary, out_of_range, kNotInPalette, kNotInPaletteMany);
@@ -197,19 +254,20 @@ ImageSummary read_png(std::span<const std::byte> bytes, bool decode_srgb, ImageW
   // stb_image holds at most two copies of at most four channels.
   const ClaimedSize size{header.width, header.height};
   size.check(bytes.size(), size.width * size.height * (header.bits_per_sample > 8 ? 16 : 8), wants, memory);
-  const int width = static_cast<int>(header.width), height = static_cast<int>(header.height);
   ImageSummary summary;
   if (header.palette) {
     summary = read_palette_png(bytes, header, decode_srgb, wants);
   } else if (header.bits_per_sample > 8) {
     const auto pixels = decode_png(bytes, 3, stbi_load_16_from_memory);
-    summary = summarize(pixels.get(), width, height, wants, [&](stbi_us v) {
-      return decode_srgb ? linear_from_srgb(static_cast<float>(v) / 65535.0f) : static_cast<float>(v) / 65535.0f;
-    });
+    const std::vector<float> linear = linear_of_words(decode_srgb);
+    summary = summarize(pixels.get(), static_cast<int>(header.width), static_cast<int>(header.height), wants,
+                        [&](stbi_us v) { return linear[v]; });
   } else {
-    const auto pixels = decode_png(bytes, 3, stbi_load_from_memory);
     const std::array<float, 256> linear = linear_of_bytes(decode_srgb);
-    summary = summarize(pixels.get(), width, height, wants, [&](stbi_uc v) { return linear[v]; });
+    const bool grey = header.channels <= 2;
+    const auto pixels = decode_png(bytes, grey ? 1 : 3, stbi_load_from_memory);
+    summary = grey ? summarize_bytes<1>(pixels.get(), header.width, header.height, wants, linear)
+                   : summarize_bytes<3>(pixels.get(), header.width, header.height, wants, linear);
   }
   if (header.wrong_checksums > 0)
     summary.problems.push_back(header.wrong_checksums == 1
@@ -227,9 +285,8 @@ ImageSummary read_tga(std::span<const std::byte> bytes, bool decode_srgb, ImageW
   const ClaimedSize size{header->width, header->height, kPixelsPerByte};
   size.check(bytes.size(), size.width * size.height * 3, wants, memory);
   const TgaPixels pixels = decode_tga(bytes, *header);
-  const std::array<float, 256> linear = linear_of_bytes(decode_srgb);
-  ImageSummary summary = summarize(pixels.rgb.data(), static_cast<int>(header->width), static_cast<int>(header->height),
-                                   wants, [&](uint8_t v) { return linear[v]; });
+  ImageSummary summary =
+      summarize_bytes<3>(pixels.rgb.data(), header->width, header->height, wants, linear_of_bytes(decode_srgb));
   add_problem(summary, pixels.pixels_out_of_range, kNotInPalette, kNotInPaletteMany);
   add_problem(summary, pixels.surplus_pixels, "of the last run lies beyond the image's end; it is ignored",
               "of the last run lie beyond the image's end; they are ignored");

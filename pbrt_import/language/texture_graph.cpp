@@ -229,16 +229,20 @@ TextureGraph::MaskResult TextureGraph::alpha_mask(Node node) const {
     mask = {};
     return result;
   }
-  mask.words.assign(static_cast<size_t>(AlphaMask::row_words(mask.width)) * mask.height, 0);
-  rasterize<uint8_t>(
-      order, mask,
-      [&](Node n, glm::dvec2 uv, std::span<const uint8_t> operands) -> uint8_t {
-        return nonzero(nodes_[n], uv, operands);
-      },
-      [&](uint32_t x, uint32_t y, uint8_t opaque) {
-        if (opaque != 0)
-          mask.words[static_cast<size_t>(y) * AlphaMask::row_words(mask.width) + x / 32] |= 1u << (x % 32);
-      });
+  if (order.size() == 1 && layout) { // the image's own texels
+    mask.words = images_[layout->a].summary.nonzero;
+  } else {
+    mask.words.assign(static_cast<size_t>(AlphaMask::row_words(mask.width)) * mask.height, 0);
+    rasterize<uint8_t>(
+        order, mask,
+        [&](Node n, glm::dvec2 uv, std::span<const uint8_t> operands) -> uint8_t {
+          return nonzero(nodes_[n], uv, operands);
+        },
+        [&](uint32_t x, uint32_t y, uint8_t opaque) {
+          if (opaque != 0)
+            mask.words[static_cast<size_t>(y) * AlphaMask::row_words(mask.width) + x / 32] |= 1u << (x % 32);
+        });
+  }
   size_t set = 0;
   for (const uint32_t word : mask.words) set += static_cast<size_t>(std::popcount(word));
   const size_t all = static_cast<size_t>(mask.width) * mask.height;

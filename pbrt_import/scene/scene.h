@@ -125,6 +125,9 @@ struct Scene {
   std::vector<Instance> instances;
   std::vector<Camera> cameras; ///< empty if the file has none
 
+  /// World coordinates of this scene's zero, not 0 if the world was moved (move_far_world()): transforms and cameras
+  /// map to world coordinates minus the origin.
+  DVec3 origin{0.0};
   double time = 0.0;                                ///< time at which all transforms are evaluated
   std::vector<AnimatedTransform> animations;        ///< empty if nothing moves
   std::vector<AnimatedInstance> animated_instances; ///< sorted by instance

@@ -55,7 +55,8 @@ nlohmann::json to_json(const Camera& camera) {
 nlohmann::json to_json(const ImportResult& imported, uint32_t world) {
   const Scene& scene = imported.scene;
   const ImportStatistics& statistics = imported.statistics;
-  const Bounds bounds = world_bounds(scene);
+  Bounds bounds = world_bounds(scene);
+  bounds.lo += scene.origin, bounds.hi += scene.origin;
   nlohmann::json cameras = nlohmann::json::array();
   for (const Camera& camera : scene.cameras) cameras.push_back(to_json(camera));
   return {

@@ -105,7 +105,7 @@ nlohmann::json scene_json(const MeasureOptions& options, const ImportResult& imp
           {"file_bytes", bytes},
           {"float_bytes", float_bytes(scene)},
           {"diagonal", bounds.diagonal()},
-          {"bounds", {{"lo", array(bounds.lo)}, {"hi", array(bounds.hi)}}},
+          {"bounds", {{"lo", array(bounds.lo + source.origin())}, {"hi", array(bounds.hi + source.origin())}}},
           {"median_edge", median_edge > 0.0 ? nlohmann::json(median_edge) : nullptr}};
 }
 

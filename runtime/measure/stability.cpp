@@ -8,6 +8,7 @@
 
 #include "compress/bake/bake_scene.h"
 #include "compress/format/file/baked_file.h"
+#include "pbrt_import/scene/far_world.h"
 #include "runtime/ao/ao_integrator.h"
 #include "runtime/camera/primary_visibility.h"
 #include "runtime/trace/embree/embree_tracer.h"
@@ -139,7 +140,8 @@ nlohmann::json to_json(const StabilityResult& r) {
 }
 
 StabilityResult measure_stability(const StabilityCase& stability_case) {
-  const Scene& scene = stability_case.scene;
+  Scene scene = stability_case.scene;
+  move_far_world(scene); // as the importer does
   Diagnostics diagnostics;
   Progress progress;
   const BakedScene baked = bake_to_bytes(scene, {}, diagnostics, progress);
@@ -150,13 +152,13 @@ StabilityResult measure_stability(const StabilityCase& stability_case) {
   const AoConfig ao = ao_of(stability_case);
   const Traced packed = trace(packed_source, PackedTracer(file, packed_source), camera, ao);
   const Traced floats = trace(float_source, EmbreeTracer(float_source, {}), camera, ao);
-  const std::vector<WorldTriangle> triangles = world_triangles(scene);
+  const std::vector<WorldTriangle> triangles = world_triangles(stability_case.scene);
   StabilityResult result;
   result.name = stability_case.name;
   result.triangles = static_cast<uint32_t>(triangles.size());
   result.pixels = static_cast<uint32_t>(kSize.pixels());
   result.warned = !baked.report.warnings.empty() || diagnostics.count(Severity::kWarning) > 0;
-  count_pixels(camera, triangles, packed.surfaces, result);
+  count_pixels(PrimaryCamera(stability_case.scene.cameras.at(0), kSize), triangles, packed.surfaces, result);
   count_occlusion(stability_case.shape, packed, floats, result);
   return result;
 }

@@ -96,12 +96,24 @@ StabilityCase still_life(std::string name, double scale, DVec3 extents) {
   return result;
 }
 
+/// The same in a world far away: meshes lie near their zero, and transforms have all digits.
+StabilityCase placed_still_life(std::string name, double extents) {
+  StabilityCase result = still_life(std::move(name), 1.0, DVec3(0.0));
+  const DVec3 origin = DVec3(1.0, 0.25, -0.5) * extents * 4.0 + DVec3(0.3, 0.7, 0.1);
+  for (Shape& shape : result.scene.shapes) shape.parent_from_mesh[3] += origin;
+  for (Camera& c : result.scene.cameras) c.world_from_camera[3] += origin;
+  return result;
+}
+
 void add_scales(std::vector<StabilityCase>& cases) {
   for (const int exponent : {-40, -12, -6, 0, 6, 12})
     cases.push_back(still_life("scale 1e" + std::to_string(exponent), std::pow(10.0, exponent), DVec3(0.0)));
   for (const int exponent : {3, 5, 7})
     cases.push_back(still_life("moved by 1e" + std::to_string(exponent) + " extents", 1.0,
                                DVec3(1.0, 0.25, -0.5) * std::pow(10.0, exponent)));
+  for (const int exponent : {3, 5, 7})
+    cases.push_back(
+        placed_still_life("placed 1e" + std::to_string(exponent) + " extents away", std::pow(10.0, exponent)));
 }
 
 void add_shapes(std::vector<StabilityCase>& cases) {

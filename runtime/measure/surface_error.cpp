@@ -62,6 +62,7 @@ struct Surface {
       : scene(&from), geometry(from.instances()[instance].geometry),
         world_from_object(from.instances()[instance].world_from_object),
         world_normal(normal_matrix(world_from_object)) {
+    world_from_object[3] += from.origin();
     const GeometryCounts counts = from.counts(geometry);
     std::vector<Vec3> decoded(counts.vertices);
     triangles.resize(counts.triangles);

@@ -43,9 +43,9 @@ void register_records() {
                        width_px, height_px, film_name);
   PYBIND11_NUMPY_DTYPE(RequirementRecord, stream, reason, geometries, reserved, triangles, source_bytes, stored_bits);
   PYBIND11_NUMPY_DTYPE(SummaryRecord, source_triangles, dropped_triangles, unused_triangles, source_vertices,
-                       merged_vertices, collapsed_triangles, bounds_lo, bounds_hi, precision_value, precision_kind,
-                       world_step_mantissa, world_step_exponent, purpose, stream_bits, left_out, coinciding_triangles,
-                       source_area, collapsed_area);
+                       merged_vertices, collapsed_triangles, bounds_lo, bounds_hi, origin, precision_value,
+                       precision_kind, world_step_mantissa, world_step_exponent, purpose, stream_bits, left_out,
+                       coinciding_triangles, source_area, collapsed_area);
   PYBIND11_NUMPY_DTYPE(LodLevelRecord, first_group, first_link, triangles, base, level, geometry, group_count, error,
                        reserved);
   PYBIND11_NUMPY_DTYPE(LodGroupRecord, center, radius, error, level);

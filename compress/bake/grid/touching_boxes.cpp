@@ -21,9 +21,13 @@ bool overlap(const Bounds& a, const Bounds& b) {
 class BoxTree {
 public:
   BoxTree(std::span<const Bounds> boxes, std::span<const double> sizes) : boxes_(boxes), sizes_(sizes) {
+    std::vector<Item> items;
     for (uint32_t i = 0; i < boxes.size(); ++i)
-      if (!boxes[i].empty()) order_.push_back(i);
-    if (!order_.empty()) build(0, order_.size());
+      if (!boxes[i].empty()) items.push_back({boxes[i].lo + boxes[i].hi, i});
+    if (items.empty()) return;
+    order_.resize(items.size());
+    nodes_.reserve(items.size());
+    build(items, 0);
   }
 
   double smallest_touching(uint32_t box) const {
@@ -39,24 +43,38 @@ private:
     double smallest = std::numeric_limits<double>::infinity(); ///< smallest size of its boxes
   };
 
-  size_t build(size_t begin, size_t end) {
+  /// A box while the tree is built. Copies of centres are faster to partition than numbers of boxes.
+  struct Item {
+    DVec3 twice_centre;
+    uint32_t box;
+  };
+
+  /// @param begin number of the first item in order_
+  size_t build(std::span<Item> items, size_t begin) {
     const size_t number = nodes_.size();
-    nodes_.push_back({{}, begin, end});
-    Bounds bounds, centres;
-    for (size_t i = begin; i < end; ++i) bounds.extend(boxes_[order_[i]]), centres.extend(boxes_[order_[i]].centre());
-    nodes_[number].bounds = bounds;
-    for (size_t i = begin; i < end; ++i) nodes_[number].smallest = std::min(nodes_[number].smallest, sizes_[order_[i]]);
-    if (end - begin <= kLeafBoxes) return number;
+    nodes_.push_back({{}, begin, begin + items.size()});
+    if (items.size() <= kLeafBoxes) {
+      for (size_t i = 0; i < items.size(); ++i) {
+        const uint32_t box = order_[begin + i] = items[i].box;
+        nodes_[number].bounds.extend(boxes_[box]);
+        nodes_[number].smallest = std::min(nodes_[number].smallest, sizes_[box]);
+      }
+      return number;
+    }
+    Bounds centres;
+    for (const Item& item : items) centres.extend(item.twice_centre);
     const DVec3 extent = centres.extent();
     const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
-    const size_t middle = begin + (end - begin) / 2;
-    const auto at = [&](size_t i) { return order_.begin() + static_cast<std::ptrdiff_t>(i); };
-    std::nth_element(at(begin), at(middle), at(end), [&](uint32_t a, uint32_t b) {
-      return boxes_[a].lo[axis] + boxes_[a].hi[axis] < boxes_[b].lo[axis] + boxes_[b].hi[axis];
-    });
-    build(begin, middle);
-    const size_t right = build(middle, end);
-    nodes_[number].right = right;
+    const size_t middle = items.size() / 2;
+    std::nth_element(items.begin(), items.begin() + static_cast<std::ptrdiff_t>(middle), items.end(),
+                     [axis](const Item& a, const Item& b) { return a.twice_centre[axis] < b.twice_centre[axis]; });
+    const size_t left = build(items.first(middle), begin), right = build(items.subspan(middle), begin + middle);
+    Node& node = nodes_[number];
+    node.right = right;
+    for (const size_t child : {left, right}) {
+      node.bounds.extend(nodes_[child].bounds);
+      node.smallest = std::min(node.smallest, nodes_[child].smallest);
+    }
     return number;
   }
 

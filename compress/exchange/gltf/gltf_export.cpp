@@ -86,6 +86,7 @@ public:
     tinygltf::Node root;
     root.name = "world";
     root.scale = {-1.0, 1.0, 1.0};
+    if (const DVec3 origin = file.origin(); origin != DVec3(0.0)) root.translation = {-origin.x, origin.y, origin.z};
     model_.nodes.push_back(std::move(root));
     model_.scenes.front().nodes = {0};
     materials_.add_all();

@@ -176,6 +176,11 @@ Bounds object_bounds(const baked::GeometryRecord& geometry) {
   return bounds;
 }
 
+DVec3 BakedFile::origin() const {
+  const std::array<double, 3>& origin = summary().origin;
+  return DVec3(origin[0], origin[1], origin[2]);
+}
+
 Bounds BakedFile::world_bounds() const {
   const baked::SummaryRecord& s = summary();
   Bounds bounds;

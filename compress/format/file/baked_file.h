@@ -92,6 +92,9 @@ public:
   std::vector<Material> materials() const;
   std::vector<Camera> cameras() const;
   Bounds world_bounds() const;
+  /// World coordinates of the point that all positions, instances and cameras of the file are relative to. It is 0
+  /// unless the world lies far from its zero.
+  DVec3 origin() const;
 
 private:
   BakedFile(std::unique_ptr<MappedFile> map, std::vector<std::byte> owned, std::span<const std::byte> bytes,

@@ -338,7 +338,8 @@ private:
         s.world_step_exponent > kMaxStepExponent)
       fail("summary");
     for (size_t axis = 0; axis < 3; ++axis)
-      if (std::isnan(s.bounds_lo[axis]) || std::isnan(s.bounds_hi[axis])) fail("summary bounds");
+      if (std::isnan(s.bounds_lo[axis]) || std::isnan(s.bounds_hi[axis]) || !std::isfinite(s.origin[axis]))
+        fail("summary bounds");
     for (const double area : {s.source_area, s.collapsed_area})
       if (!(area >= 0.0 && std::isfinite(area))) fail("summary areas");
   }

@@ -196,6 +196,7 @@ FileSummary summarize(const BakedFile& file) {
   if (summary.clusters > 0)
     summary.triangles_per_cluster = static_cast<double>(summary.triangles) / static_cast<double>(summary.clusters);
   summary.bounds = file.world_bounds();
+  summary.bounds.lo += file.origin(), summary.bounds.hi += file.origin();
   summary.bake = s.summary.front();
   return summary;
 }

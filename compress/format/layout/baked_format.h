@@ -9,12 +9,12 @@
 #include "compress/format/layout/packed_node.h"
 #include "pbrt_import/scene/material_flags.h"
 
-/// Records of a .ptk file, version 6; docs/baked_format.md describes them. All values are little-endian. Every section
+/// Records of a .ptk file, version 7; docs/baked_format.md describes them. All values are little-endian. Every section
 /// starts at a multiple of 64 bytes. Bytes that belong to no field and no section are zero.
 namespace packtrace::baked {
 
 inline constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'K', 0x89, '\r', '\n', 0x1a, 0};
-inline constexpr uint32_t kVersion = 6;
+inline constexpr uint32_t kVersion = 7;
 inline constexpr size_t kSectionAlignment = 64;
 inline constexpr uint32_t kNone = ~0u;
 
@@ -222,8 +222,9 @@ struct SummaryRecord {
   uint64_t source_vertices;
   uint64_t merged_vertices;
   uint64_t collapsed_triangles;    ///< no area on the lattice; not stored
-  std::array<double, 3> bounds_lo; ///< world space, of the decoded instances
+  std::array<double, 3> bounds_lo; ///< of the decoded instances, in the file's coordinates
   std::array<double, 3> bounds_hi;
+  std::array<double, 3> origin; ///< world coordinates of the file's zero; instances and cameras are relative to it
   double precision_value;
   uint32_t precision_kind;      ///< 0 edge fraction, 1 diagonal fraction, 2 absolute, 3 bits
   uint32_t world_step_mantissa; ///< 0: no world-space geometry
@@ -260,8 +261,8 @@ static_assert(kIsPod<TextureRecord> && sizeof(TextureRecord) == 56 && offsetof(T
 static_assert(kIsPod<CameraRecord> && sizeof(CameraRecord) == 160 && offsetof(CameraRecord, projection) == 136);
 static_assert(kIsPod<RequirementRecord> && sizeof(RequirementRecord) == 40);
 static_assert(kAllRequirements == 0xffffff);
-static_assert(kIsPod<SummaryRecord> && sizeof(SummaryRecord) == 184 && offsetof(SummaryRecord, stream_bits) == 120 &&
-              offsetof(SummaryRecord, coinciding_triangles) == 160);
+static_assert(kIsPod<SummaryRecord> && sizeof(SummaryRecord) == 208 && offsetof(SummaryRecord, stream_bits) == 144 &&
+              offsetof(SummaryRecord, coinciding_triangles) == 184);
 
 /// Record size of each section in bytes.
 inline constexpr std::array<uint32_t, kSectionCount> kRecordBytes = {sizeof(GeometryRecord),

@@ -62,7 +62,8 @@ struct EmbreeTracer::Part {
 
   uint32_t source_triangle(uint32_t i) const { return source_triangles.empty() ? i : source_triangles[i]; }
 
-  /// Whether a ray hits the plane of a triangle in double precision where its interval begins or later.
+  /// Whether a ray hits a triangle in double precision where its interval begins or later. Triangles that share an edge
+  /// agree on its side.
   bool is_hit_ahead(const RTCFilterFunctionNArguments* args, uint32_t i) const {
     const std::vector<Vec3>& positions = tracer->surfaces_[surface].positions;
     const Triangle& t = triangles[RTCHitN_primID(args->hit, args->N, i)];
@@ -71,13 +72,17 @@ struct EmbreeTracer::Part {
                        RTCRayN_org_z(args->ray, args->N, i));
     const DVec3 direction(RTCRayN_dir_x(args->ray, args->N, i), RTCRayN_dir_y(args->ray, args->N, i),
                           RTCRayN_dir_z(args->ray, args->N, i));
+    const DVec3 to_a = a - origin, to_b = b - origin, to_c = c - origin;
+    const double u = glm::dot(direction, glm::cross(to_b, to_c)), v = glm::dot(direction, glm::cross(to_c, to_a)),
+                 w = glm::dot(direction, glm::cross(to_a, to_b));
+    if ((u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0)) return false;
     const DVec3 normal = glm::cross(b - a, c - a);
-    return glm::dot(normal, a - origin) / glm::dot(normal, direction) >=
+    return glm::dot(normal, to_a) / glm::dot(normal, direction) >=
            static_cast<double>(RTCRayN_tnear(args->ray, args->N, i)); // false where the ray lies in the plane
   }
 
   /// Embree filter function: rejects hits where an alpha mask removes the surface, and hits of slivers that lie behind
-  /// the ray.
+  /// or beside the ray.
   static void filter(const RTCFilterFunctionNArguments* args) {
     const auto& part = *static_cast<const Part*>(args->geometryUserPtr);
     for (uint32_t i = 0; i < args->N; ++i) {

@@ -30,6 +30,7 @@ public:
   TextureView texture(uint32_t index) const override { return view(scene_.textures[index]); }
   std::span<const Camera> cameras() const override { return scene_.cameras; }
   Bounds world_bounds() const override { return world_bounds_; }
+  DVec3 origin() const override { return scene_.origin; }
   uint64_t resident_bytes() const override;
 
 private:

@@ -57,6 +57,7 @@ public:
   std::span<const Camera> cameras() const override { return source_.cameras(); }
   /// Bounds of LOD level 0.
   Bounds world_bounds() const override { return source_.world_bounds(); }
+  DVec3 origin() const override { return source_.origin(); }
   /// Bytes of the file and of the tables.
   uint64_t resident_bytes() const override;
 

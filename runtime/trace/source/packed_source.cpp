@@ -34,6 +34,8 @@ PackedSource::PackedSource(const BakedFile& file)
     instances_.push_back({file.instances()[i].geometry, file.world_from_object(i)});
 }
 
+DVec3 PackedSource::origin() const { return file_.origin(); }
+
 uint32_t PackedSource::geometry_count() const { return file_.base_geometry_count(); }
 
 GeometryCounts PackedSource::counts(uint32_t geometry) const {

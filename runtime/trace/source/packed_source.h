@@ -38,6 +38,7 @@ public:
   TextureView texture(uint32_t index) const override;
   std::span<const Camera> cameras() const override { return cameras_; }
   Bounds world_bounds() const override { return world_bounds_; }
+  DVec3 origin() const override;
 
   /// Bytes of the whole mapped file and of the tables.
   uint64_t resident_bytes() const override;

@@ -87,6 +87,8 @@ public:
   virtual TextureView texture(uint32_t) const { return {}; }
   virtual std::span<const Camera> cameras() const = 0;
   virtual Bounds world_bounds() const = 0;
+  /// World coordinates of the zero that instances, cameras and bounds are relative to; see Scene::origin.
+  virtual DVec3 origin() const = 0;
 
   /// Bytes of geometry that stay resident, without those that the tracing backend builds.
   virtual uint64_t resident_bytes() const = 0;

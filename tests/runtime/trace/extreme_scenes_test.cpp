@@ -144,8 +144,12 @@ TEST(ExtremeScenes, ThingsWithoutAnExtentLieBesideOthers) {
   expect_usual_hits(spheres(), scene, about(6.0), kRays / 4);
 }
 
-/// Mean number of placements that a ray enters.
-double placements_entered(const Scene& scene, double size) {
+/// What rays in the box about(size) do on average.
+struct Work {
+  double placements = 0.0, triangles = 0.0;
+};
+
+Work work_per_ray(const Scene& scene, double size) {
   const test::BakedScene baked(scene);
   const PackedTracer tracer(baked.file, baked.source);
   const std::vector<Ray> rays = rays_within(about(size), 5000, tracer.space());
@@ -154,16 +158,59 @@ double placements_entered(const Scene& scene, double size) {
   packed::KernelCounters counters;
   tracer.count_closest(rays, kCameraRays, hits, counters);
   tracer.count_any(rays, kOcclusionRays, occluded, counters);
-  return static_cast<double>(counters.placements) / static_cast<double>(counters.rays);
+  const auto count = static_cast<double>(counters.rays);
+  return {static_cast<double>(counters.placements) / count, static_cast<double>(counters.triangles) / count};
 }
 
 TEST(ExtremeScenes, AnInstanceFarAwayDoesNotMakeRaysEnterAllOthers) {
   Scene scene = test::thicket_scene();
-  const double before = placements_entered(scene, 6.0);
+  const double before = work_per_ray(scene, 6.0).placements;
   for (const double distance : {1e6, 1e9, 1e15}) {
     Scene far = scene;
     far.instances.push_back({0, Affine(placed({distance, 0, -distance}))});
-    EXPECT_LT(placements_entered(far, 6.0), 1.1 * before) << distance;
+    EXPECT_LT(work_per_ray(far, 6.0).placements, 1.1 * before) << distance;
+  }
+}
+
+/// 2,000 small triangles in the box about(6).
+Mesh splinters() {
+  std::mt19937 generator(5);
+  std::uniform_real_distribution<float> within(-6.0f, 6.0f), small(-0.05f, 0.05f);
+  Mesh mesh;
+  for (uint32_t i = 0; i < 2000; ++i) {
+    const float x = within(generator), y = within(generator), z = within(generator);
+    for (int corner = 0; corner < 3; ++corner) {
+      const float dx = small(generator), dy = small(generator), dz = small(generator);
+      mesh.positions.emplace_back(x + dx, y + dy, z + dz);
+    }
+    mesh.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+  }
+  return mesh;
+}
+
+/// Adds a floor of two triangles, which most rays within about(6) miss, to a mesh.
+void add_floor(Mesh& mesh, float size) {
+  const auto first = static_cast<uint32_t>(mesh.positions.size());
+  for (const Vec3 corner : {Vec3(-1, 0, -1), Vec3(1, 0, -1), Vec3(1, 0, 1), Vec3(-1, 0, 1)})
+    mesh.positions.push_back(corner * size + Vec3(0, -7, 0));
+  mesh.triangles.emplace_back(first, first + 2, first + 1);
+  mesh.triangles.emplace_back(first, first + 3, first + 2);
+}
+
+TEST(ExtremeScenes, HugeTrianglesDoNotMakeRaysTestAllSmallOnes) {
+  const auto scene_with = [](float size, bool apart) {
+    Scene scene;
+    Mesh mesh = splinters(), floor;
+    add_floor(apart ? floor : mesh, size);
+    add_shape(scene, mesh);
+    if (apart) add_shape(scene, floor);
+    return scene;
+  };
+  for (const bool apart : {true, false}) {
+    const double before = work_per_ray(scene_with(10.0f, apart), 6.0).triangles;
+    for (const float size : {1e4f, 1e6f})
+      EXPECT_LT(work_per_ray(scene_with(size, apart), 6.0).triangles, 1.5 * before) << size;
+    expect_usual_hits(scene_with(1e4f, apart), scene_with(1e6f, apart), about(5.0), kRays / 4);
   }
 }
 

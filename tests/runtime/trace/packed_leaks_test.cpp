@@ -198,6 +198,17 @@ TEST(PackedLeaks, NoneFarFromTheOrigin) {
   for (const PackedIsa isa : test::isas()) EXPECT_EQ(leaks(scene, {1000.1, 2000.2, -500}, 100000, isa), 0u);
 }
 
+TEST(PackedLeaks, NoneBesideAHugeTriangle) {
+  Scene scene; // The triangle is so large that pads of rays would be larger than leaf nodes.
+  test::add_shape(scene, test::sphere({0.3, -0.2, 0.1}, 1, 50));
+  Mesh huge;
+  huge.positions = {{1e6f, 10, 10}, {1e6f, 2e4f, 10}, {-1e6f, 1e6f, 2e4f}};
+  huge.triangles = {{0, 1, 2}};
+  test::add_shape(scene, huge);
+  for (const PackedIsa isa : test::isas())
+    EXPECT_EQ(leaks(scene, {0.4, 0, 0.05}, isa == PackedIsa::kScalar ? kManyRays / 5 : kManyRays, isa), 0u);
+}
+
 TEST(PackedLeaks, NoneThroughInstances) {
   for (const DVec3 scale : {DVec3(1, 1, 1), DVec3(-3, 0.02, 1), DVec3(1e-6, 1e-6, 2e-6)}) {
     Scene scene;
@@ -286,7 +297,7 @@ TEST(PackedLeaks, NoneBesideSliversThatJoinALongEdgeToShortOnes) {
 TEST(PackedLeaks, NoneAtAnyNumberOfPositionBits) {
   Scene scene;
   test::add_shape(scene, test::sphere({0, 0, 0}, 1, 50));
-  for (const int bits : {3, 5, 6, 8, 10, 12}) {
+  for (const int bits : {3, 5, 6, 8, 10, 12, 22, 25, 28}) {
     BakeConfig config;
     config.precision_kind = PrecisionKind::kPositionBits;
     config.precision = bits;

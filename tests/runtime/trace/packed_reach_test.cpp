@@ -91,7 +91,8 @@ TEST(GroupBounds, HoldsWhatTheTriangleTestAcceptsBesideIt) {
       LaneHits<ScalarLanes> hits;
       uint64_t exact = 0;
       const uint32_t hit =
-          test_triangles<ScalarLanes, false>(batch, normals, group, first_bit(rays), hits, exact) & 15u;
+          test_triangles<ScalarLanes, false>(batch, normals, group, first_bit(rays), FineGrid<false>(), hits, exact) &
+          15u;
       only_left += hit != 0 && (hit & ~kLeft) == 0;
       ASSERT_TRUE((hit & kLeft) == 0 || (slots & 1u) != 0);
       ASSERT_TRUE((hit & ~kLeft) == 0 || (slots & 2u) != 0);

@@ -10,39 +10,13 @@
 
 #include <gtest/gtest.h>
 
-#include "runtime/trace/ray_offset.h"
 #include "tests/runtime/trace/embree_cluster_tracer.h"
-#include "tests/runtime/trace/packed_scenes.h"
+#include "tests/runtime/trace/surface_rays.h"
 
-namespace packtrace {
+namespace packtrace::test {
 namespace {
 
-using Random = std::mt19937;
-
 constexpr double kSpacing = 1.5; ///< distance between the centres of needles of length 1
-
-double uniform(Random& random, double lo, double hi) { return std::uniform_real_distribution(lo, hi)(random); }
-
-DVec3 random_direction(Random& random) {
-  for (;;) {
-    const double x = uniform(random, -1, 1), y = uniform(random, -1, 1), z = uniform(random, -1, 1);
-    const DVec3 v(x, y, z);
-    if (const double squared = glm::dot(v, v); squared > 1e-4 && squared <= 1.0) return v / std::sqrt(squared);
-  }
-}
-
-/// Adds a tetrahedron, two opposite edges of which are `length` apart. It is convex however its corners are rounded.
-void add_needle(Mesh& mesh, DVec3 centre, DVec3 direction, double length, double thickness, Random& random) {
-  const DVec3 side = glm::normalize(glm::cross(direction, random_direction(random)));
-  const DVec3 other = glm::cross(direction, side);
-  const auto first = static_cast<uint32_t>(mesh.positions.size());
-  for (const DVec3 corner :
-       {direction * (-0.5 * length) + side * thickness, direction * (-0.5 * length) - side * thickness,
-        direction * (0.5 * length) + other * thickness, direction * (0.5 * length) - other * thickness})
-    mesh.positions.emplace_back(centre + corner);
-  for (const Triangle t : {Triangle{0, 1, 2}, Triangle{0, 3, 1}, Triangle{0, 2, 3}, Triangle{1, 3, 2}})
-    mesh.triangles.push_back(t + Triangle(first));
-}
 
 /// Needles of length 1 in various directions, too far apart to intersect.
 Mesh needles(double aspect, Random& random) {
@@ -67,49 +41,13 @@ struct Places {
 Scene scene_of(const Places& places, Random& random) {
   Scene scene;
   if (!places.instanced) {
-    test::add_shape(scene, needles(places.aspect, random));
+    add_shape(scene, needles(places.aspect, random));
     return scene;
   }
-  test::add_object(scene, needles(places.aspect, random));
-  scene.instances.push_back({0, Affine(test::placed({1, 2, 3}, {1, 1.3, -0.8}, 33, {1, 2, 3}))});
-  scene.instances.push_back({0, Affine(test::placed({40, -7, 11}, DVec3(1), 80, {3, 1, 2}))});
+  add_object(scene, needles(places.aspect, random));
+  scene.instances.push_back({0, Affine(placed({1, 2, 3}, {1, 1.3, -0.8}, 33, {1, 2, 3}))});
+  scene.instances.push_back({0, Affine(placed({40, -7, 11}, DVec3(1), 80, {3, 1, 2}))});
   return scene;
-}
-
-/// A point on a surface, as the renderer computes it.
-struct Place {
-  DVec3 position, normal; ///< world space
-  double offset;
-};
-
-std::optional<Place> place_on(const RayTracer& tracer, DVec3 target, DVec3 from) {
-  const UnitSpace& space = tracer.space();
-  Ray ray;
-  ray.origin = Vec3(space.to_unit(from));
-  ray.direction = Vec3(space.to_unit(target) - DVec3(ray.origin));
-  const std::vector<RayHit> hits = test::closest(tracer, {&ray, 1});
-  if (!hits[0].valid()) return std::nullopt;
-  const HitSurface hit = tracer.resolve(hits[0]);
-  const DVec3 v0(hit.vertices[0]), e = DVec3(hit.vertices[1]) - v0, f = DVec3(hit.vertices[2]) - v0;
-  const DVec3 inside = v0 + e * double{hits[0].u} + f * double{hits[0].v};
-  const Placement& placement = *hit.placement;
-  const DVec3 cross = glm::cross(e, f);
-  const DVec3 unit = placement.instanced ? transform_point(placement.unit_from_surface, inside) : inside;
-  DVec3 normal = glm::normalize(placement.instanced ? placement.surface_normal * cross : cross);
-  if (glm::dot(normal, DVec3(ray.direction)) > 0.0) normal = -normal;
-  return Place{space.from_unit(unit), DVec3(Vec3(normal)),
-               ray_offset(hit, space, unit, normal) * space.inverse_scale()};
-}
-
-/// Returns a ray that starts as ambient occlusion rays do.
-/// @param direction unit length
-Ray start_at(const Place& place, DVec3 direction, double length, const UnitSpace& space) {
-  Ray ray;
-  ray.origin =
-      Vec3(space.to_unit(DVec3(Vec3(place.position)) + place.normal * double{static_cast<float>(place.offset)}));
-  ray.direction = Vec3(direction);
-  ray.tfar = static_cast<float>(length * space.scale());
-  return ray;
 }
 
 struct Counts {
@@ -162,7 +100,8 @@ Counts trace_rays(const RayTracer& tracer, const SceneSource& source, double thi
         const double a = uniform(random, 0, 1), b = uniform(random, 0, 1 - a);
         const DVec3 target = p[0] + (p[1] - p[0]) * a + (p[2] - p[0]) * b;
         const std::optional<Place> place = place_on(tracer, target, target + normal * (4.0 * thickness));
-        if (!place || glm::dot(place->normal, normal) < 0.99) continue;
+        // Rays that pass an edge within rounding may see the inside of the triangle behind it.
+        if (!place || place->triangle != t) continue;
         ++counts.places;
         for (int k = 0; k < 8; ++k) {
           DVec3 direction = random_direction(random);
@@ -176,7 +115,7 @@ Counts trace_rays(const RayTracer& tracer, const SceneSource& source, double thi
     }
   }
   const auto occluded = [&](std::span<const Ray> rays) {
-    return static_cast<size_t>(std::ranges::count(test::any(tracer, rays), 1));
+    return static_cast<size_t>(std::ranges::count(any(tracer, rays), 1));
   };
   counts.up = up.size(), counts.up_occluded = occluded(up);
   counts.down = down.size(), counts.down_missed = down.size() - occluded(down);
@@ -193,20 +132,20 @@ TEST_P(SliverRays, LeaveTheSurfaceThatTheyStartOn) {
   BakeConfig config;
   config.precision_kind = PrecisionKind::kAbsolute;
   config.precision = places.step * thickness;
-  const test::BakedScene baked(scene, config);
+  const BakedScene baked(scene, config);
   std::vector<std::unique_ptr<RayTracer>> tracers;
   tracers.push_back(std::make_unique<EmbreeTracer>(baked.source, EmbreeConfig{}));
-  for (const PackedIsa isa : test::isas())
-    tracers.push_back(std::make_unique<PackedTracer>(baked.file, baked.source, isa));
+  for (const PackedIsa isa : isas()) tracers.push_back(std::make_unique<PackedTracer>(baked.file, baked.source, isa));
   tracers.push_back(std::make_unique<EmbreeClusterTracer>(baked.file, baked.source));
   for (const auto& tracer : tracers) {
     Random rays(5);
     const Counts counts = trace_rays(*tracer, baked.source, thickness, rays);
     const std::string name = std::string(tracer->name()) + " " + std::string(tracer->isa());
     EXPECT_GT(counts.places, 500u) << name;
-    // Embree's arithmetic occludes a few rays near edges; so do bodies thinner than a float's ulp at their position.
-    const double share = tracer->name() == "embree" ? 1e-3 : places.aspect > 1e5 ? 1e-4 : 0.0;
-    EXPECT_LE(static_cast<double>(counts.up_occluded), share * static_cast<double>(counts.up)) << name;
+    // Bodies may be thinner than a float's ulp at their position.
+    const double share = places.aspect > 1e5 ? 1e-4 : 0.0;
+    EXPECT_LE(static_cast<double>(counts.up_occluded), share * static_cast<double>(counts.up))
+        << name << ", " << counts.up_occluded;
     EXPECT_LE(counts.down_missed, 2 + counts.down / 1000) << name << ", of " << counts.down;
   }
 }
@@ -228,4 +167,4 @@ std::string test_name(const testing::TestParamInfo<Places>& info) {
 INSTANTIATE_TEST_SUITE_P(Needles, SliverRays, testing::ValuesIn(all_places()), test_name);
 
 } // namespace
-} // namespace packtrace
+} // namespace packtrace::test

@@ -13,6 +13,21 @@ namespace {
 /// and 10 u M of the triangle test.
 constexpr float kBeamPad = 28.0f * 0x1p-24f;
 
+/// Enlarges a node's boxes by what kBoxPad and kBeamPad cover, for M the largest coordinate of the node; the pads of
+/// rays then cover their own origins only. Everything below a node lies within its coordinates, so pads shrink towards
+/// the leaves: in a tree of small triangles around the grid's zero with a few huge ones, a pad that the huge ones
+/// determine would make rays pass many boxes that they miss by far.
+template <typename Boxes>
+inline void enlarge_boxes(const baked::PackedNode& node, uint32_t octant, Boxes& boxes) {
+  float most = 0.0f;
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    const NodeAxis at(node, axis, false);
+    most = __builtin_fmaxf(most,
+                           __builtin_fmaxf(__builtin_fabsf(at.origin), __builtin_fabsf(at.origin + 255.0f * at.unit)));
+  }
+  boxes.enlarge(kBeamPad * most, octant);
+}
+
 struct alignas(64) Beam {
   /// Bounds over all rays. origin: subtracted from near planes (first), added to far planes (second), pad included.
   /// inverse: least and greatest reciprocal of the direction. limits: as RayGroup::limits.
@@ -35,8 +50,9 @@ struct alignas(64) Beam {
 constexpr uint32_t kMinBeamRays = 16; ///< minimum number of rays for which a beam is worth its setup
 
 /// Makes a beam of all rays of a group. Returns false if they have no common origin or octant, or are too few.
+/// @param pad_coordinate as in enter()
 /// @param group its lanes that are not in `rays` get values of one of `rays`, and an empty range of t
-inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam& beam) {
+inline bool make_beam(RayGroup& group, float pad_coordinate, uint64_t rays, Beam& beam) {
   if (static_cast<uint32_t>(__builtin_popcountll(rays)) < kMinBeamRays) return false;
   const auto first = static_cast<uint32_t>(__builtin_ctzll(rays));
   for (uint32_t at = 0; at < kGroup; at += kBlock) {
@@ -59,7 +75,7 @@ inline bool make_beam(RayGroup& group, float max_coordinate, uint64_t rays, Beam
     group.begin[i] = __builtin_inff();
     group.end[i] = -__builtin_inff();
   }
-  float reach = max_coordinate;
+  float reach = pad_coordinate;
   for (uint32_t axis = 0; axis < 3; ++axis) reach = __builtin_fmaxf(reach, __builtin_fabsf(group.origin[axis][first]));
   for (uint32_t axis = 0; axis < 3; ++axis) {
     Floats least = Floats{} + group.inverse[axis][first], most = least;

@@ -47,6 +47,15 @@ struct GroupBoxes {
     }
   }
 
+  /// Moves all planes outwards.
+  void enlarge(float pad, uint32_t octant) {
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+      const auto by = Lanes::set(((octant >> axis) & 1u) != 0 ? -pad : pad);
+      near[axis] = Lanes::sub(near[axis], by);
+      far[axis] = Lanes::add(far[axis], by);
+    }
+  }
+
   GroupBoxes(const TopNode& node, uint32_t octant) {
     for (uint32_t axis = 0; axis < 3; ++axis) {
       const bool backward = ((octant >> axis) & 1u) != 0;

@@ -23,6 +23,12 @@ struct Avx512GroupBoxes {
     }
   }
 
+  /// See GroupBoxes::enlarge().
+  void enlarge(float pad, uint32_t octant) {
+    for (uint32_t axis = 0; axis < 3; ++axis)
+      plane[axis] = _mm512_sub_ps(plane[axis], _mm512_set1_ps(((octant >> axis) & 1u) != 0 ? -pad : pad));
+  }
+
   [[gnu::always_inline]] Avx512GroupBoxes(const TopNode& node, uint32_t octant) {
     const __m512i pairs = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
     for (uint32_t axis = 0; axis < 3; ++axis) {

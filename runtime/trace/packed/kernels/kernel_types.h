@@ -66,6 +66,9 @@ struct TraceTree {
   const baked::PackedNode* nodes; ///< root first
   /// Largest absolute coordinate of the root's box, and so of the vertices in it; at least 1.
   float max_coordinate;
+  /// 1: a node's boxes are enlarged by rounding errors at the node's own coordinates (enlarge_boxes()); 0: the pads of
+  /// rays cover those at max_coordinate.
+  uint32_t graded;
 };
 
 /// A placed tree.

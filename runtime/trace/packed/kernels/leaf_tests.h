@@ -14,20 +14,19 @@ namespace {
 inline uint32_t first_bit(uint64_t word) { return static_cast<uint32_t>(__builtin_ctzll(word)); }
 
 /// Returns the triangles of a batch that one ray hits, as a bit mask.
-template <typename Lanes, bool kUseResidual>
+template <typename Lanes, bool kUseResidual, typename Fine>
 inline uint32_t test_triangles(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group,
-                               uint32_t ray, LaneHits<Lanes>& hits, uint64_t& exact_count) {
+                               uint32_t ray, Fine fine, LaneHits<Lanes>& hits, uint64_t& exact_count) {
   const uint32_t axis[3] = {group.axis[0][ray], group.axis[1][ray], group.axis[2][ray]};
-  const auto relative = [&](uint32_t k, uint32_t corner) {
-    return Lanes::sub(Lanes::load(batch.vertex[axis[k]][corner]), Lanes::set(group.origin[axis[k]][ray]));
-  };
+  const auto vertex = [&](uint32_t k, uint32_t corner) { return Lanes::load(batch.vertex[axis[k]][corner]); };
+  const auto origin = [&](uint32_t k) { return Lanes::set(group.origin[axis[k]][ray]); };
   const auto normal = [&](uint32_t k) { return Lanes::load(normals.normal[axis[k]]); };
   const auto rest = [&](uint32_t k) { return Lanes::set(group.rest[axis[k]][ray]); };
   const RayLanes<Lanes> lanes{
       {Lanes::set(group.shear[0][ray]), Lanes::set(group.shear[1][ray]), Lanes::set(group.shear[2][ray])},
       Lanes::set(group.begin[ray]),
       Lanes::set(group.end[ray])};
-  return test_lanes<Lanes, true, kUseResidual>(relative, normal, rest, lanes, (1u << batch.count) - 1, hits,
+  return test_lanes<Lanes, true, kUseResidual>(vertex, origin, normal, rest, lanes, fine, (1u << batch.count) - 1, hits,
                                                exact_count);
 }
 
@@ -50,8 +49,9 @@ struct BatchLanes {
   /// Tests kRays rays against the triangles and returns the lanes with a hit, as a bit mask. Ray i has the lanes from
   /// kTriangles i on.
   /// @param wanted bit mask of the lanes that hold a triangle
-  uint32_t test(const TestRay* const (&rays)[kRays], const TestResidual* const (&rests)[kRays], uint32_t wanted,
-                uint64_t& exact_count) const {
+  template <typename Fine>
+  uint32_t test(const TestRay* const (&rays)[kRays], const TestResidual* const (&rests)[kRays], Fine fine,
+                uint32_t wanted, uint64_t& exact_count) const {
     typename WideLanes::F origin[4], shear[4],
         rest[4]; // The fourth elements hold the rays' begin, their end and no value.
     if constexpr (kUseResidual) WideLanes::template spread<kTriangles, 0>(rests, rest);
@@ -60,16 +60,17 @@ struct BatchLanes {
     const RayLanes<WideLanes> lanes{{shear[0], shear[1], shear[2]}, origin[3], shear[3]};
     LaneHits<WideLanes> hits;
     return test_lanes<WideLanes, false, kUseResidual>(
-        [&](uint32_t i, uint32_t corner) { return WideLanes::sub(vertex[i][corner], origin[i]); },
-        [&](uint32_t i) { return normal[i]; }, [&](uint32_t i) { return rest[i]; }, lanes, wanted, hits, exact_count);
+        [&](uint32_t i, uint32_t corner) { return vertex[i][corner]; }, [&](uint32_t i) { return origin[i]; },
+        [&](uint32_t i) { return normal[i]; }, [&](uint32_t i) { return rest[i]; }, lanes, fine, wanted, hits,
+        exact_count);
   }
 };
 
 /// Returns the rays of the bit mask `rays` that hit a triangle of a batch of at most kTriangles triangles. If the last
 /// register is not full, its last ray is repeated.
-template <typename WideLanes, uint32_t kTriangles, bool kUseResidual>
+template <typename WideLanes, uint32_t kTriangles, bool kUseResidual, typename Fine>
 inline uint64_t test_several_rays(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group,
-                                  uint64_t rays, uint64_t& exact) {
+                                  uint64_t rays, Fine fine, uint64_t& exact) {
   using Triangles = BatchLanes<WideLanes, kTriangles, kUseResidual>;
   constexpr uint32_t kRays = Triangles::kRays;
   constexpr uint32_t kFirstLanes = (kTriangles == 8 ? 0x0101u : 0x1111u) & ((1u << WideLanes::kLanes) - 1);
@@ -88,7 +89,7 @@ inline uint64_t test_several_rays(const DecodedBatch& batch, const BatchNormals&
         number[i] = first_bit(last);
         few[i] = &group.tests[number[i]], rests[i] = &group.rests[number[i]];
       }
-      const uint32_t lanes = triangles.test(few, rests, wanted, exact);
+      const uint32_t lanes = triangles.test(few, rests, fine, wanted, exact);
       for (uint32_t i = 0; i < kRays; ++i)
         hit |= uint64_t{((lanes >> (kTriangles * i)) & ((1u << kTriangles) - 1)) != 0} << number[i];
     } while (m != 0);
@@ -99,21 +100,22 @@ inline uint64_t test_several_rays(const DecodedBatch& batch, const BatchNormals&
 /// Tests the rays at `at`, `at` + 1, ... of a group, one per lane, against one triangle of a batch. Returns the lanes
 /// with a hit, as a bit mask.
 /// @param axis Woop's (kx, ky, kz), which all wanted rays share
-template <typename WideLanes, bool kUseResidual>
+template <typename WideLanes, bool kUseResidual, typename Fine>
 inline uint32_t test_rays(const DecodedBatch& batch, const BatchNormals& normals, uint32_t triangle,
-                          const RayGroup& group, const uint32_t (&axis)[3], uint32_t at, uint32_t wanted,
+                          const RayGroup& group, const uint32_t (&axis)[3], uint32_t at, Fine fine, uint32_t wanted,
                           LaneHits<WideLanes>& hits, uint64_t& exact_count) {
-  const auto relative = [&](uint32_t k, uint32_t corner) {
-    return WideLanes::sub(WideLanes::set(batch.vertex[axis[k]][corner][triangle]),
-                          WideLanes::load(&group.origin[axis[k]][at]));
+  const auto vertex = [&](uint32_t k, uint32_t corner) {
+    return WideLanes::set(batch.vertex[axis[k]][corner][triangle]);
   };
+  const auto origin = [&](uint32_t k) { return WideLanes::load(&group.origin[axis[k]][at]); };
   const auto normal = [&](uint32_t k) { return WideLanes::set(normals.normal[axis[k]][triangle]); };
   const auto rest = [&](uint32_t k) { return WideLanes::load(&group.rest[axis[k]][at]); };
   const RayLanes<WideLanes> lanes{{WideLanes::load(&group.shear[0][at]), WideLanes::load(&group.shear[1][at]),
                                    WideLanes::load(&group.shear[2][at])},
                                   WideLanes::load(&group.begin[at]),
                                   WideLanes::load(&group.end[at])};
-  return test_lanes<WideLanes, true, kUseResidual>(relative, normal, rest, lanes, wanted, hits, exact_count);
+  return test_lanes<WideLanes, true, kUseResidual>(vertex, origin, normal, rest, lanes, fine, wanted, hits,
+                                                   exact_count);
 }
 
 /// Minimum number of rays for which a leaf test that needs t, u and v first finds the rays that hit (rays_that_hit())
@@ -130,13 +132,14 @@ inline bool same_axes(const RayGroup& group, uint32_t at, uint32_t wanted, uint3
 
 /// Returns the rays of the bit mask `rays` that hit a triangle of a batch. The test of one ray does not depend on the
 /// result of another.
+/// @param fine as in test_lanes()
 /// @param exact incremented by the number of lanes that were evaluated in doubles
-template <typename Lanes, bool kUseResidual>
+template <typename Lanes, bool kUseResidual, typename Fine>
 inline uint64_t rays_that_hit(const DecodedBatch& batch, const BatchNormals& normals, const RayGroup& group,
-                              uint64_t rays, uint64_t& exact) {
+                              uint64_t rays, Fine fine, uint64_t& exact) {
   using WideLanes = typename Lanes::WideLanes;
-  return batch.count <= 4 ? test_several_rays<WideLanes, 4, kUseResidual>(batch, normals, group, rays, exact)
-                          : test_several_rays<WideLanes, 8, kUseResidual>(batch, normals, group, rays, exact);
+  return batch.count <= 4 ? test_several_rays<WideLanes, 4, kUseResidual>(batch, normals, group, rays, fine, exact)
+                          : test_several_rays<WideLanes, 8, kUseResidual>(batch, normals, group, rays, fine, exact);
 }
 
 } // namespace

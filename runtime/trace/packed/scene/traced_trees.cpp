@@ -1,6 +1,7 @@
 #include "runtime/trace/packed/scene/traced_trees.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "runtime/stopwatch.h"
 #include "runtime/trace/packed/scene/trace_cluster.h"
@@ -14,14 +15,37 @@ uint8_t ray_classes(uint32_t material_class) {
                               ((material_class & baked::kMaskedClass) != 0 ? baked::kMaskedLeaves : 0));
 }
 
+/// Whether the pads of rays would be so large, compared with the boxes of leaf nodes, that rays would pass boxes which
+/// they miss: decided by the median of a sample of leaf nodes.
+bool needs_graded_pads(std::span<const baked::PackedNode> nodes, float max_coordinate) {
+  constexpr size_t kSample = 256;
+  constexpr float kVisiblePad = 0x1p-24f * 24.0f * 32.0f; // 32 times kBoxPad
+  std::vector<float> sizes;
+  for (size_t i = 0; i < kSample; ++i) {
+    const baked::PackedNode& node = nodes[i * nodes.size() / kSample];
+    if (!node.has_leaves()) continue;
+    float size = 0.0f;
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+      const int extent = *std::ranges::max_element(node.hi[axis]) - *std::ranges::min_element(node.lo[axis]);
+      size = std::max(size, std::ldexp(static_cast<float>(extent), static_cast<int>(node.exponent(axis))));
+    }
+    sizes.push_back(size);
+  }
+  if (sizes.empty()) return false;
+  const auto middle = sizes.begin() + static_cast<ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return kVisiblePad * max_coordinate > *middle;
+}
+
 void add_tree(TracedTrees& t, uint32_t number) {
   const baked::TreeRecord& record = t.records[number];
-  packed::TraceTree tree{t.nodes.data() + record.first_node, 1.0f};
+  packed::TraceTree tree{t.nodes.data() + record.first_node, 1.0f, 0};
   if (record.node_count > 0) {
     t.hulls[number].emplace(tree.nodes);
     const DVec3 far = glm::max(glm::abs(t.hulls[number]->lo()), glm::abs(t.hulls[number]->hi()));
     tree.max_coordinate =
         std::max({1.0f, static_cast<float>(far.x), static_cast<float>(far.y), static_cast<float>(far.z)});
+    tree.graded = needs_graded_pads({tree.nodes, record.node_count}, tree.max_coordinate) ? 1 : 0;
   }
   t.trees.push_back(tree);
 }

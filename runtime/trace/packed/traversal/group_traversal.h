@@ -148,21 +148,29 @@ private:
     if constexpr (kCount) counters_->placements += count_ones(rays);
     const TraceTree& tree = scene_.trees[place.tree];
     exact_differences_ = tree.max_coordinate <= kExactDifferences;
+    fine_grid_ = tree.max_coordinate > kFineGrid;
     RayGroup group;
-    rays = enter<!kAny>(place, tree.max_coordinate, tree.max_coordinate, unit_, rays, group);
+    graded_ = tree.graded != 0;
+    const float pad_coordinate = (graded_ ? kMinTopPad : 1.0f) * tree.max_coordinate;
+    rays = enter<!kAny>(place, tree.max_coordinate, pad_coordinate, unit_, rays, group);
+    if (graded_) group.reach = kUnboundedGroup;
     Beam beam;
     if constexpr (!kAny)
-      if (unit_.one_origin && make_beam(group, tree.max_coordinate, rays, beam)) group.beam = &beam;
+      if (unit_.one_origin && make_beam(group, pad_coordinate, rays, beam)) group.beam = &beam;
     by_octant(group, rays, [&](uint64_t together, uint32_t octant) {
       group.reach.set_octant(octant);
       if (scene_.search_tree != nullptr)
         ExternalTreeSearch<GroupTraversal>::run(*this, placement, tree.nodes, group, together, octant);
+      else if (graded_)
+        trace_tree<true>(placement, tree.nodes, group, together, octant);
       else
-        trace_tree(placement, tree.nodes, group, together, octant);
+        trace_tree<false>(placement, tree.nodes, group, together, octant);
     });
   }
 
   /// Traces rays of one octant through a placed tree.
+  /// @tparam kGraded TraceTree::graded
+  template <bool kGraded>
   void trace_tree(uint32_t placement, const baked::PackedNode* nodes, RayGroup& group, uint64_t rays, uint32_t octant) {
     Pending stack[baked::kMaxTreeDepth * (baked::kNodeWidth - 1) + 1];
     uint32_t size = 0;
@@ -176,7 +184,8 @@ private:
       if ((node.ray_classes & ray_class_) == 0) continue;
       const NodeChildren children(node);
       if (!children.leaves()) prefetch_siblings(nodes + node.first_child);
-      const typename Lanes::Boxes boxes(node, octant);
+      typename Lanes::Boxes boxes(node, octant);
+      if constexpr (kGraded) enlarge_boxes(node, octant, boxes);
       if (children.leaves())
         trace_leaves(placement, node, children, boxes, group, active);
       else
@@ -224,6 +233,20 @@ private:
 
   void trace_leaf(uint32_t placement, uint32_t cluster, uint32_t first, uint32_t count, RayGroup& group,
                   uint64_t rays) {
+    if (fine_grid_) [[unlikely]]
+      trace_fine_leaf(placement, cluster, first, count, group, rays);
+    else
+      trace_leaf(placement, cluster, first, count, group, rays, FineGrid<false>());
+  }
+
+  [[gnu::noinline]] void trace_fine_leaf(uint32_t placement, uint32_t cluster, uint32_t first, uint32_t count,
+                                         RayGroup& group, uint64_t rays) {
+    trace_leaf(placement, cluster, first, count, group, rays, FineGrid<true>());
+  }
+
+  template <typename Fine>
+  void trace_leaf(uint32_t placement, uint32_t cluster, uint32_t first, uint32_t count, RayGroup& group, uint64_t rays,
+                  Fine fine) {
     if constexpr (kCount) ++counters_->leaves, counters_->leaf_rays += count_ones(rays);
     while (count > 0) {
       const DecodedBatch& batch = decoded(cluster, first, count);
@@ -236,12 +259,12 @@ private:
         batch_normals_of_large(batch, normals);
       uint64_t exact = 0;
       if (kAny && (scene_.clusters[cluster].flags & kMasked) == 0) {
-        alive_ &= ~rays_that_hit<Lanes, !kAny>(batch, normals, group, rays, exact);
+        alive_ &= ~rays_that_hit<Lanes, !kAny>(batch, normals, group, rays, fine, exact);
       } else {
-        const uint64_t others = test_side_by_side(batch, normals, place, group, rays);
+        const uint64_t others = test_side_by_side(batch, normals, place, group, rays, fine);
         const bool many = Lanes::WideLanes::kLanes > kBatch && count_ones(others) >= kMinPrefilteredRays;
         test_each(batch, normals, place, group,
-                  many ? rays_that_hit<Lanes, !kAny>(batch, normals, group, others, exact) : others);
+                  many ? rays_that_hit<Lanes, !kAny>(batch, normals, group, others, fine, exact) : others, fine);
       }
       if constexpr (kCount) counters_->exact_triangles += exact;
       rays &= alive_;
@@ -251,13 +274,14 @@ private:
   }
 
   /// Tests one ray after the other, each against all triangles of the batch.
+  template <typename Fine>
   void test_each(const DecodedBatch& batch, const BatchNormals& normals, const Place& place, RayGroup& group,
-                 uint64_t rays) {
+                 uint64_t rays, Fine fine) {
     for (uint64_t m = rays; m != 0; m &= m - 1) {
       const uint32_t i = first_bit(m);
       LaneHits<Lanes> hits;
       uint64_t exact = 0;
-      const uint32_t lanes = test_triangles<Lanes, !kAny>(batch, normals, group, i, hits, exact);
+      const uint32_t lanes = test_triangles<Lanes, !kAny>(batch, normals, group, i, fine, hits, exact);
       if constexpr (kCount) counters_->exact_triangles += exact;
       if (lanes != 0) take_hits(place, i, hits, lanes, group);
     }
@@ -265,8 +289,9 @@ private:
 
   /// Tests one triangle after the other against registers of rays, where a register has at least as many active rays as
   /// the batch has triangles. Returns the remaining rays, as a bit mask.
+  template <typename Fine>
   uint64_t test_side_by_side(const DecodedBatch& batch, const BatchNormals& normals, Place place, RayGroup& group,
-                             uint64_t rays) {
+                             uint64_t rays, Fine fine) {
     using WideLanes = typename Lanes::WideLanes;
     const uint32_t begin = place.triangle;
     for (uint32_t at = 0; at < kGroup; at += WideLanes::kLanes) {
@@ -277,7 +302,8 @@ private:
       for (uint32_t triangle = 0; triangle < batch.count; ++triangle) {
         LaneHits<WideLanes> hits;
         uint64_t exact = 0;
-        uint32_t lanes = test_rays<WideLanes, !kAny>(batch, normals, triangle, group, axis, at, wanted, hits, exact);
+        uint32_t lanes =
+            test_rays<WideLanes, !kAny>(batch, normals, triangle, group, axis, at, fine, wanted, hits, exact);
         if constexpr (kCount) counters_->exact_triangles += exact;
         place.triangle = begin + triangle;
         for (; lanes != 0; lanes &= lanes - 1) {
@@ -355,7 +381,9 @@ private:
   const uint32_t* numbers_ = nullptr; ///< indices of its rays
   uint64_t alive_ = 0;                ///< rays that still look for a hit
   uint64_t nearer_ = 0;               ///< rays whose nearest hit lies in the placement traced last
+  bool graded_ = false;               ///< TraceTree::graded of the current tree
   bool exact_differences_ = false;    ///< whether vertex differences are exact in floats in the current tree
+  bool fine_grid_ = false;            ///< whether coordinates of the current tree exceed kFineGrid
   UnitRays unit_;
 };
 

@@ -58,8 +58,9 @@ private:
     for (uint32_t i = 0; i < node_count && (rays &= self.alive_) != 0; ++i) {
       const baked::PackedNode& node = at.nodes[nodes[i]];
       self.count_node(rays);
-      self.trace_leaves(at.placement, node, NodeChildren(node), typename Lanes::Boxes(node, at.octant), *at.group,
-                        rays);
+      typename Lanes::Boxes boxes(node, at.octant);
+      if (self.graded_) enlarge_boxes(node, at.octant, boxes);
+      self.trace_leaves(at.placement, node, NodeChildren(node), boxes, *at.group, rays);
     }
     return rays & self.alive_;
   }

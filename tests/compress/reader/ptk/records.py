@@ -2,7 +2,7 @@
 
 import struct
 
-VERSION = 6
+VERSION = 7
 MAGIC = b"PTK\x89\r\n\x1a\0"
 HEADER_BYTES = 512
 NONE = 0xFFFFFFFF
@@ -86,7 +86,7 @@ CAMERA = Record(
 SUMMARY = Record(
     ("source_triangles", "Q"), ("dropped_triangles", "Q"), ("unused_triangles", "Q"), ("source_vertices", "Q"),
     ("merged_vertices", "Q"), ("collapsed_triangles", "Q"), ("bounds_lo", "3d"), ("bounds_hi", "3d"),
-    ("precision_value", "d"), ("precision_kind", "I"), ("world_step_mantissa", "I"), ("world_step_exponent", "i"),
+    ("origin", "3d"), ("precision_value", "d"), ("precision_kind", "I"), ("world_step_mantissa", "I"), ("world_step_exponent", "i"),
     ("purpose", "I"), ("stream_bits", "4Q"), ("left_out", "Q"), ("coinciding_triangles", "Q"), ("source_area", "d"),
     ("collapsed_area", "d"))
 

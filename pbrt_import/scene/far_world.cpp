@@ -1,0 +1,128 @@
+#include "pbrt_import/scene/far_world.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <utility>
+#include <vector>
+
+namespace packtrace {
+namespace {
+
+/// Distances from zero, in diagonals of the box, beyond which the world and objects are moved. Half a float ulp is up
+/// to 2^-16 diagonals of the world there, and 2^-12 of an object, which is small in the picture.
+constexpr double kFarWorld = 256.0, kFarObject = 4096.0;
+
+Bounds bounds_of_shapes(const std::vector<Shape>& shapes, const std::vector<Bounds>& meshes) {
+  Bounds result;
+  for (const Shape& shape : shapes) result.extend(transform_bounds(shape.parent_from_mesh, meshes[shape.mesh]));
+  return result;
+}
+
+/// Returns by how much to move a box towards zero: the point near its centre that becomes zero. 0 if it is not farther
+/// than `limit` diagonals.
+DVec3 new_zero(const Bounds& box, double limit) {
+  if (box.empty()) return DVec3(0.0);
+  const DVec3 far = glm::max(glm::abs(box.lo), glm::abs(box.hi));
+  const double distance = std::max({far.x, far.y, far.z}), diagonal = box.diagonal();
+  if (!std::isfinite(distance) || !(distance > limit * diagonal)) return DVec3(0.0);
+  // Multiples of a power of two have few bits, so that subtracting one is exact. A box without extent gets its centre.
+  const double unit = diagonal > 0.0 ? std::ldexp(1.0, std::ilogb(diagonal)) : 0.0;
+  if (!(unit > distance * 0x1p-50)) return box.centre();
+  return glm::round(box.centre() / unit) * unit;
+}
+
+DAffine moved(DAffine map, DVec3 by) {
+  map[3] += by;
+  return map;
+}
+
+class Mover {
+public:
+  Mover(Scene& scene, std::span<const Affine> rests) : scene_(scene) {
+    for (const Mesh& mesh : scene.meshes) meshes_.push_back(bounds_of(mesh.positions));
+    maps_.reserve(scene.instances.size());
+    for (size_t i = 0; i < scene.instances.size(); ++i) {
+      DAffine map(scene.instances[i].world_from_object);
+      if (!rests.empty()) map += DAffine(rests[i]);
+      maps_.push_back(map);
+    }
+  }
+
+  void run() {
+    const bool objects_moved = move_objects();
+    Bounds world = bounds_of_shapes(scene_.shapes, meshes_);
+    for (size_t i = 0; i < maps_.size(); ++i)
+      world.extend(transform_bounds(maps_[i], object_boxes_[scene_.instances[i].object]));
+    const DVec3 origin = new_zero(world, kFarWorld);
+    if (origin != DVec3(0.0)) move_world(origin);
+    if (!objects_moved && origin == DVec3(0.0)) return; // every bit stays as it was
+    for (size_t i = 0; i < maps_.size(); ++i) scene_.instances[i].world_from_object = Affine(maps_[i]);
+  }
+
+private:
+  bool move_objects() {
+    std::vector<DVec3> zeros(scene_.objects.size(), DVec3(0.0));
+    for (size_t i = 0; i < zeros.size(); ++i) {
+      object_boxes_.push_back(bounds_of_shapes(scene_.objects[i].shapes, meshes_));
+      zeros[i] = new_zero(object_boxes_[i], kFarObject);
+    }
+    for (const AnimatedInstance& animated : scene_.animated_instances)
+      zeros[scene_.instances[animated.instance].object] = DVec3(0.0);
+    bool any = false;
+    for (size_t i = 0; i < zeros.size(); ++i) {
+      if (zeros[i] == DVec3(0.0)) continue;
+      any = true;
+      move_shapes(scene_.objects[i].shapes, zeros[i]);
+      object_boxes_[i].lo -= zeros[i], object_boxes_[i].hi -= zeros[i];
+    }
+    if (any)
+      for (size_t i = 0; i < maps_.size(); ++i)
+        maps_[i][3] = transform_point(maps_[i], zeros[scene_.instances[i].object]);
+    return any;
+  }
+
+  void move_world(DVec3 origin) {
+    scene_.origin = origin;
+    move_shapes(scene_.shapes, origin);
+    for (DAffine& map : maps_) map[3] -= origin;
+    for (AnimatedInstance& animated : scene_.animated_instances) move_animation(animated.animation, origin);
+    for (Camera& camera : scene_.cameras) {
+      camera.world_from_camera = moved(camera.world_from_camera, -origin);
+      move_animation(camera.animation, origin);
+    }
+  }
+
+  void move_shapes(std::vector<Shape>& shapes, DVec3 zero) {
+    for (Shape& shape : shapes) {
+      shape.parent_from_mesh = moved(shape.parent_from_mesh, -zero);
+      move_animation(shape.animation, zero);
+    }
+  }
+
+  /// Replaces an animation by one that is moved: others may use it as it is.
+  void move_animation(uint32_t& animation, DVec3 zero) {
+    if (animation == kNotAnimated) return;
+    const auto key = std::pair(animation, std::array{zero.x, zero.y, zero.z});
+    const auto [found, inserted] = animations_.try_emplace(key, static_cast<uint32_t>(scene_.animations.size()));
+    if (inserted) {
+      AnimatedTransform copy = scene_.animations[animation];
+      copy.start.map = moved(copy.start.map, -zero);
+      copy.end.map = moved(copy.end.map, -zero);
+      scene_.animations.push_back(copy);
+    }
+    animation = found->second;
+  }
+
+  Scene& scene_;
+  std::vector<Bounds> meshes_, object_boxes_;
+  std::vector<DAffine> maps_; ///< by instance: world_from_object in doubles
+  std::map<std::pair<uint32_t, std::array<double, 3>>, uint32_t> animations_;
+};
+
+} // namespace
+
+void move_far_world(Scene& scene, std::span<const Affine> rests) { Mover(scene, rests).run(); }
+
+} // namespace packtrace
