@@ -88,7 +88,8 @@ TEST(HostileQuadrics, WholeSpheresAreScaledToTheirSize) {
     const Mesh& mesh = imported.scene.meshes[0];
     for (size_t i = 0; i < mesh.positions.size(); ++i) {
       EXPECT_NEAR(glm::length(DVec3(mesh.positions[i])), 1.0, 1e-6);
-      const DVec3 centred = placed(imported.scene.shapes[0], imported.scene, i) - DVec3(1, 0, 0);
+      const DVec3 centred =
+          imported.scene.origin + placed(imported.scene.shapes[0], imported.scene, i) - DVec3(1, 0, 0);
       ASSERT_NEAR(glm::length(centred), radius, 1e-6 * std::max(radius, 1.0)) << text;
     }
   }

@@ -62,9 +62,9 @@ struct EmbreeTracer::Part {
 
   uint32_t source_triangle(uint32_t i) const { return source_triangles.empty() ? i : source_triangles[i]; }
 
-  /// Whether a ray hits the plane of a triangle in double precision where its interval begins or later, and the
-  /// triangle itself if that is within 1/64 of its length: rounding must not let a ray hit the face beyond the edge
-  /// that it starts beside. Farther away Embree decides, so that no ray slips between a sliver and its neighbours.
+  /// Whether a ray hits the plane of a triangle in double precision where its interval begins or later. Occlusion rays
+  /// must hit the triangle itself, too: rounding must not let a ray hit the face beyond the edge that it starts beside.
+  /// For camera rays Embree decides, so that none slips between a sliver and its neighbours.
   bool is_hit_ahead(const RTCFilterFunctionNArguments* args, uint32_t i) const {
     const std::vector<Vec3>& positions = tracer->surfaces_[surface].positions;
     const Triangle& t = triangles[RTCHitN_primID(args->hit, args->N, i)];
@@ -75,17 +75,16 @@ struct EmbreeTracer::Part {
                           RTCRayN_dir_z(args->ray, args->N, i));
     const DVec3 to_a = a - origin, to_b = b - origin, to_c = c - origin;
     const DVec3 normal = glm::cross(b - a, c - a);
-    const double distance = glm::dot(normal, to_a) / glm::dot(normal, direction);
-    if (!(distance >= static_cast<double>(RTCRayN_tnear(args->ray, args->N, i)))) return false; // NaN: in the plane
-    const double length = std::max(glm::distance(a, b), glm::distance(a, c));
-    if (distance * glm::length(direction) > length / 64.0) return true;
+    const double distance = glm::dot(normal, to_a) / glm::dot(normal, direction); // NaN for a ray in the plane
+    if (!(distance >= static_cast<double>(RTCRayN_tnear(args->ray, args->N, i)))) return false;
+    if ((RTCRayN_mask(args->ray, args->N, i) & kOcclusionRays) == 0) return true;
     const double u = glm::dot(direction, glm::cross(to_b, to_c)), v = glm::dot(direction, glm::cross(to_c, to_a)),
                  w = glm::dot(direction, glm::cross(to_a, to_b));
     return (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
   }
 
-  /// Embree filter function: rejects hits where an alpha mask removes the surface, and hits of slivers that lie behind
-  /// or beside the ray.
+  /// Embree filter function: rejects hits where an alpha mask removes the surface, and hits of slivers that
+  /// is_hit_ahead() rejects.
   static void filter(const RTCFilterFunctionNArguments* args) {
     const auto& part = *static_cast<const Part*>(args->geometryUserPtr);
     for (uint32_t i = 0; i < args->N; ++i) {
