@@ -8,8 +8,8 @@
 
 #include "pbrt_import/base/output_file.h"
 #include "runtime/commands/layer_previews.h"
+#include "runtime/frame/rendered_image.h"
 #include "runtime/image/exr.h"
-#include "runtime/render/renderer.h"
 
 namespace packtrace {
 

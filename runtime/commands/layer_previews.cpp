@@ -22,14 +22,14 @@ Image display_picture(ImageSize size, const std::vector<Vec3>& linear) {
 }
 
 /// Returns the picture of a layer without background.
-Image plain_preview(const RenderedImage& image, const std::string& aov, double max_lod_error_px) {
+Image plain_preview(const RenderedImage& image, const std::string& aov) {
   if (aov == "ao") return ao_preview(image.size, image.ao);
   if (aov == "ao_raw") return ao_preview(image.size, image.ao_raw);
   if (aov == "depth") return depth_preview(image.size, image.depth);
   if (aov == "normal") return normal_preview(image.size, image.normal);
   if (aov == "instance") return id_preview(image.size, image.instance);
   if (aov == "lod") return level_preview(image.size, image.lod, image.cluster, image.ao);
-  if (aov == "lod-error") return heat_map(image.size, image.lod_error, static_cast<float>(max_lod_error_px));
+  if (aov == "lod-error") return heat_map(image.size, image.lod_error, static_cast<float>(image.max_lod_error_px));
   return display_picture(image.size, aov == "albedo" ? image.albedo : image.shaded);
 }
 
@@ -64,12 +64,12 @@ Image layer_preview(const RenderedImage& image, const std::string& aov, const Pr
   const bool picture = aov == "albedo" || aov == "shaded";
   const Background usual =
       picture ? Background{Background::Kind::kSky, Vec3(0)} : Background{Background::Kind::kColor, kDefaultBackground};
-  Image preview = over_background(plain_preview(image, aov, style.max_lod_error_px), image.coverage,
+  Image preview = over_background(plain_preview(image, aov), image.coverage,
                                   style.background.value_or(usual));
   if (!style.legend) return preview;
   if (aov == "depth") return with_legend(preview, depth_legend(image));
   if (aov == "lod") return with_legend(preview, level_legend(image));
-  if (aov == "lod-error") return with_legend(preview, error_legend(style.max_lod_error_px));
+  if (aov == "lod-error") return with_legend(preview, error_legend(image.max_lod_error_px));
   return preview;
 }
 

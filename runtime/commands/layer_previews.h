@@ -3,9 +3,9 @@
 #include <optional>
 #include <string>
 
+#include "runtime/frame/rendered_image.h"
 #include "runtime/image/background.h"
 #include "runtime/image/image.h"
-#include "runtime/render/renderer.h"
 
 namespace packtrace {
 
@@ -13,7 +13,6 @@ namespace packtrace {
 struct PreviewStyle {
   std::optional<Background> background; ///< if not set: sky for albedo and shaded, kDefaultBackground for other layers
   bool legend = true;                   ///< add a colour scale below depth, lod and lod-error
-  double max_lod_error_px = 0.0;        ///< end of the colour scale of lod-error
 };
 
 /// Returns a picture of a layer in display values: three channels, or four with a transparent background.

@@ -9,11 +9,9 @@
 #include <nlohmann/json.hpp>
 
 #include "pbrt_import/base/error.h"
-#include "runtime/camera/lod_view.h"
 #include "runtime/commands/file_report.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/lod/compaction.h"
-#include "runtime/stopwatch.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
 
 namespace packtrace {
@@ -29,17 +27,6 @@ SharingScheme scheme_of(const std::string& name) {
 
 const char* name_of(SharingScheme scheme) {
   return std::ranges::find(kSchemes, scheme, &std::pair<const char*, SharingScheme>::second)->first;
-}
-
-SharingConfig sharing_config(const LodOptions& options) {
-  SharingConfig config;
-  if (options.scheme) config.scheme = scheme_of(*options.scheme);
-  if (options.traced_ratio) config.traced_ratio = *options.traced_ratio;
-  if (options.culled_scale) config.culled_error_scale = *options.culled_scale;
-  if (options.tolerance) config.tolerant_levels = *options.tolerance;
-  config.measure = true;
-  config.validate();
-  return config;
 }
 
 /// Simulates BLAS compaction (BlasCompactor) for the built trees. The result is the memory that a GPU would hold, which
@@ -84,37 +71,40 @@ private:
 };
 
 /// A row per geometry that has LOD levels and instances.
-nlohmann::json geometries_json(const ChosenDetail& detail) {
+nlohmann::json geometries_json(const DetailPlanner& detail) {
   nlohmann::json rows = nlohmann::json::array();
-  std::vector<uint64_t> instances(detail.geometries->size(), 0), builds = instances, triangles = instances;
-  for (const LodInstance& instance : detail.instances) ++instances[instance.geometry];
-  for (const PlannedBlas& blas : detail.plan.blas) {
+  std::vector<uint64_t> instances(detail.geometries().size(), 0), builds = instances, triangles = instances;
+  for (const LodInstance& instance : detail.instances()) ++instances[instance.geometry];
+  for (const PlannedBlas& blas : detail.current().blas) {
     if (blas.kind == BlasKind::kCoarsest) continue;
     ++builds[blas.geometry];
     triangles[blas.geometry] += blas.triangles;
   }
-  for (size_t g = 0; g < detail.geometries->size(); ++g) {
-    const size_t levels = (*detail.geometries)[g].levels().size();
+  for (size_t g = 0; g < detail.geometries().size(); ++g) {
+    const size_t levels = detail.geometries()[g].levels().size();
     if (levels < 2 || instances[g] == 0) continue;
-    const LevelHistogram& histogram = detail.plan.histograms[g];
-    const auto counts = [&](const auto& by_level) {
-      return std::vector<uint32_t>(by_level.begin(), by_level.begin() + static_cast<std::ptrdiff_t>(levels));
-    };
-    rows.push_back({{"geometry", g},
-                    {"levels", levels},
-                    {"instances", instances[g]},
-                    {"builds", builds[g]},
-                    {"built_triangles", triangles[g]},
-                    {"first_level", counts(histogram.starts)},
-                    {"last_level", counts(histogram.ends)}});
+    nlohmann::json row = {{"geometry", g},
+                          {"levels", levels},
+                          {"instances", instances[g]},
+                          {"builds", builds[g]},
+                          {"built_triangles", triangles[g]}};
+    if (detail.sharing().config().measure) {
+      const LevelHistogram& histogram = detail.current().histograms[g];
+      const auto counts = [&](const auto& by_level) {
+        return std::vector<uint32_t>(by_level.begin(), by_level.begin() + static_cast<std::ptrdiff_t>(levels));
+      };
+      row["first_level"] = counts(histogram.starts);
+      row["last_level"] = counts(histogram.ends);
+    }
+    rows.push_back(std::move(row));
   }
   return rows;
 }
 
-nlohmann::json trees_json(const ChosenDetail& detail, const RayTracer& tracer) {
+nlohmann::json trees_json(const DetailPlanner& detail, const RayTracer& tracer) {
   const std::vector<TreeBytes> trees = tracer.tree_bytes();
   const TreeMemory memory(
-      trees, [&](uint32_t blas) { return blas == kNoGeometry ? kNoGeometry : detail.source->base_geometry(blas); });
+      trees, [&](uint32_t blas) { return blas == kNoGeometry ? kNoGeometry : detail.source().base_geometry(blas); });
   nlohmann::json rows = nlohmann::json::array();
   for (const auto& [geometry, bytes] : memory.by_geometry)
     rows.push_back({{"geometry", geometry == kNoGeometry ? nlohmann::json() : nlohmann::json(geometry)},
@@ -173,17 +163,22 @@ void add_lod_options(CLI::App& verb, LodOptions& options) {
       ->group(kGroup);
 }
 
-void validate(const LodOptions& options) {
+DetailConfig detail_config(const LodOptions& options, bool measure) {
   if (!options.error_px && (options.scheme || options.traced_ratio || options.culled_scale || options.tolerance ||
                             options.rays || options.cull))
     throw Error(ErrorKind::kUsage, "the other --lod options require --lod-error");
-  if (options.error_px && !(*options.error_px > 0.0 && *options.error_px <= 1e9))
-    throw Error(ErrorKind::kUsage,
-                fmt::format("--lod-error {}: must be a number of pixels above 0", *options.error_px));
-  if (options.cull == "visible" && !options.only_occlusion())
-    throw Error(ErrorKind::kUsage, "--lod-cull visible requires --lod-rays occlusion, where camera rays are "
-                                   "traced before the levels are chosen");
-  sharing_config(options);
+  DetailConfig config;
+  config.error_px = options.error_px;
+  config.only_occlusion = options.rays == "occlusion";
+  config.cull_invisible = options.cull == "visible";
+  SharingConfig& sharing = config.sharing;
+  if (options.scheme) sharing.scheme = scheme_of(*options.scheme);
+  if (options.traced_ratio) sharing.traced_ratio = *options.traced_ratio;
+  if (options.culled_scale) sharing.culled_error_scale = *options.culled_scale;
+  if (options.tolerance) sharing.tolerant_levels = *options.tolerance;
+  sharing.measure = measure;
+  config.validate();
+  return config;
 }
 
 void require_levels(const std::string& input, const LoadedScene& loaded) {
@@ -195,56 +190,30 @@ void require_levels(const std::string& input, const LoadedScene& loaded) {
         input + ": --lod-error: the file has no levels of detail; bake it with --lod, which says if none can be made");
 }
 
-ChosenDetail choose_detail(const LoadedScene& loaded, const Camera& camera, const RenderConfig& config,
-                           const LodOptions& options, const GBuffer* seen) {
-  const BakedFile& file = *loaded.baked;
-  const auto& source = dynamic_cast<const PackedSource&>(*loaded.source);
-  const PrimaryCamera view(camera, {config.size.width * config.supersample, config.size.height * config.supersample});
-  ChosenDetail detail;
-  detail.error_px = *options.error_px;
-  const Stopwatch loading;
-  detail.geometries = std::make_unique<const std::vector<LodGeometry>>(lod_geometries(file));
-  detail.instances = lod_instances(source);
-  detail.sharing = std::make_unique<LodSharing>(*detail.geometries, detail.instances, sharing_config(options));
-  detail.load_s = loading.seconds();
-
-  const DetailView from = detail_view(view, file.world_bounds(), detail.error_px);
-  const std::vector<uint8_t> culled = options.cull == "visible"
-                                          ? not_in_image(*seen, detail.instances.size())
-                                          : outside_view(view, *detail.geometries, detail.instances);
-  detail.culled = static_cast<size_t>(std::ranges::count(culled, 1));
-  const Stopwatch planning;
-  detail.sharing->plan(from, culled, detail.plan);
-  detail.plan_s = planning.seconds();
-  const Stopwatch listing;
-  detail.source = std::make_unique<LodSource>(file, source, *detail.sharing, detail.plan);
-  detail.source_s = listing.seconds();
-  return detail;
-}
-
-nlohmann::json detail_json(const ChosenDetail& detail, const RayTracer& tracer) {
-  const LodPlan& plan = detail.plan;
+nlohmann::json detail_json(const DetailPlanner& detail, const RayTracer& tracer) {
+  const LodPlan& plan = detail.current();
   const auto& counts = plan.category_counts;
   nlohmann::json result = {
-      {"scheme", name_of(detail.sharing->config().scheme)},
-      {"error_px", detail.error_px},
-      {"instances", detail.instances.size()},
-      {"instances_culled", detail.culled},
+      {"scheme", name_of(detail.sharing().config().scheme)},
+      {"error_px", detail.error_px()},
+      {"instances", detail.instances().size()},
+      {"instances_culled", detail.culled()},
       {"builds", plan.builds},
-      {"references_saved", static_cast<int64_t>(plan.own.builds) - static_cast<int64_t>(plan.builds)},
       {"built_triangles", plan.built_triangles},
       {"built_clusters", plan.built_clusters},
       {"traced_triangles", plan.traced_triangles},
-      {"own_cuts",
-       {{"builds", plan.own.builds},
-        {"built_triangles", plan.own.built_triangles},
-        {"traced_triangles", plan.own.traced_triangles}}},
-      {"traced_ratio",
-       ratio(static_cast<double>(plan.traced_triangles), static_cast<double>(plan.own.traced_triangles))},
       {"categories", {{"lowest", counts[0]}, {"provider", counts[1]}, {"shares", counts[2]}, {"own", counts[3]}}},
-      {"seconds", {{"load", detail.load_s}, {"plan", detail.plan_s}, {"clusters", detail.source_s}}},
+      {"seconds", {{"load", detail.load_s()}, {"plan", detail.plan_s()}, {"clusters", detail.source_s()}}},
       {"geometries", geometries_json(detail)},
   };
+  if (detail.sharing().config().measure) {
+    result["references_saved"] = static_cast<int64_t>(plan.own.builds) - static_cast<int64_t>(plan.builds);
+    result["own_cuts"] = {{"builds", plan.own.builds},
+                          {"built_triangles", plan.own.built_triangles},
+                          {"traced_triangles", plan.own.traced_triangles}};
+    result["traced_ratio"] =
+        ratio(static_cast<double>(plan.traced_triangles), static_cast<double>(plan.own.traced_triangles));
+  }
   result["trees"] = trees_json(detail, tracer);
   if (const auto* packed = dynamic_cast<const PackedTracer*>(&tracer)) {
     result["seconds"]["cluster_nodes"] = packed->lod_trees().clusters_s;
@@ -256,16 +225,22 @@ nlohmann::json detail_json(const ChosenDetail& detail, const RayTracer& tracer) 
 std::string detail_text(const nlohmann::json& r) {
   const auto count = [](const nlohmann::json& value) { return value.get<uint64_t>(); };
   const auto ms = [&](const char* name) { return 1e3 * r.at("seconds").at(name).get<double>(); };
-  const auto& own = r.at("own_cuts");
   const auto& categories = r.at("categories");
-  const uint64_t builds = count(r.at("builds")), alone = count(own.at("builds"));
-  std::string text = fmt::format(
-      grouped(), "  lod       {} px, {}: {:L} BLASes for {:L} instances ({:+.1f} % vs. {:L} without sharing)\n",
-      r.at("error_px").get<double>(), r.at("scheme").get<std::string>(), builds, count(r.at("instances")),
-      alone > 0 ? 100.0 * (static_cast<double>(builds) / static_cast<double>(alone) - 1.0) : 0.0, alone);
-  text +=
-      fmt::format(grouped(), "            {:L} triangles built, {:L} traced ({:.3f} times those of separate cuts)\n",
-                  count(r.at("built_triangles")), count(r.at("traced_triangles")), r.at("traced_ratio").get<double>());
+  const uint64_t builds = count(r.at("builds"));
+  std::string text =
+      fmt::format(grouped(), "  lod       {} px, {}: {:L} BLASes for {:L} instances", r.at("error_px").get<double>(),
+                  r.at("scheme").get<std::string>(), builds, count(r.at("instances")));
+  const bool measured = r.contains("own_cuts");
+  if (measured) {
+    const uint64_t alone = count(r.at("own_cuts").at("builds"));
+    text += fmt::format(
+        grouped(), " ({:+.1f} % vs. {:L} without sharing)",
+        alone > 0 ? 100.0 * (static_cast<double>(builds) / static_cast<double>(alone) - 1.0) : 0.0, alone);
+  }
+  text += fmt::format(grouped(), "\n            {:L} triangles built, {:L} traced", count(r.at("built_triangles")),
+                      count(r.at("traced_triangles")));
+  if (measured) text += fmt::format(" ({:.3f} times those of separate cuts)", r.at("traced_ratio").get<double>());
+  text += "\n";
   text +=
       fmt::format(grouped(),
                   "            instances: {:L} use the coarsest cut, {:L} the first of a shared BLAS, {:L} more share "

@@ -7,7 +7,8 @@
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kGroundTruthSpp = 1024;
+// Many frames: camera rays are jittered from frame to frame.
+constexpr uint32_t kGroundTruthFrames = 64, kGroundTruthSpp = 16;
 
 /// Options for the pictures to write.
 void add_picture_options(CLI::App& verb, RenderOptions& options) {
@@ -39,8 +40,8 @@ void add_picture_options(CLI::App& verb, RenderOptions& options) {
   verb.add_flag("--no-legend", options.no_legend,
                 "Do not add the colour scale below .png files of depth, lod and lod-error");
   verb.add_option("--supersample", options.supersample,
-                  "Trace at N times the width and height and filter down, for smooth edges, 1..8 (default 1). Time and "
-                  "memory grow with N squared")
+                  "Trace at N times the width and height and filter down, 1..8 (default 1), for smooth edges in few frames. "
+                  "Time and memory grow with N squared")
       ->type_name("N");
 }
 
@@ -53,8 +54,11 @@ void add_sampling_options(CLI::App& verb, RenderOptions& options) {
   verb.add_option("--spp", options.spp, "Ambient occlusion rays per pixel and frame, 1..65536 (default 1)")
       ->type_name("N");
   verb.add_flag("--ground-truth", options.ground_truth,
-                "Render a reference image without denoiser, in 1 frame of 1024 spp unless --frames or --spp are given. "
+                "Render a reference image without denoiser, in 64 frames of 16 spp unless --frames or --spp are given. "
                 "Takes minutes");
+  verb.add_flag("--no-jitter", options.no_jitter,
+                "Trace camera rays through pixel centres only. By default each frame shifts them within their pixels, "
+                "so that edges become smooth");
   verb.add_flag("--no-denoise", options.no_denoise, "Average the frames without denoising");
   verb.add_option("--ao-resolution", options.ao_resolution,
                   "Pixels for which ambient occlusion is traced. quarter traces one of 2 x 2 pixels, a quarter of the "
@@ -120,27 +124,30 @@ void add_render_options(CLI::App& verb, RenderOptions& options) {
               "and space. -v prints the chosen camera, radius, backend and grid with the reasons.\n"
               "Examples:\n"
               "  packtrace render house.ptk -o house.png\n"
-              "  packtrace render house.ptk -o house.png,house.exr --aov all --supersample 2\n"
+              "  packtrace render house.ptk -o house.png,house.exr --aov all --frames 256\n"
               "  packtrace render house.ptk -o - --background transparent | display\n"
               "  packtrace render forest.ptk -o forest.png --lod-error 1 --aov ao,lod\n"
               "  packtrace render scene.pbrt -o truth.exr --ground-truth --spp 1024");
 }
 
-RenderConfig make_config(const SceneSource& source, const Camera& camera, const RenderOptions& options) {
-  RenderConfig config;
+StillConfig make_config(const SceneSource& source, const Camera& camera, const RenderOptions& options,
+                        bool measure_detail) {
+  StillConfig config;
   config.size = options.size.empty() ? ImageSize{camera.width_px, camera.height_px} : parse_size(options.size);
   config.supersample = options.supersample;
   config.denoise = !options.no_denoise && !options.ground_truth;
   if (options.ao_resolution == "quarter") config.ao_resolution = AoResolution::kQuarter;
   if (options.ground_truth && config.ao_resolution != AoResolution::kFull)
     throw Error(ErrorKind::kUsage, "--ground-truth needs all pixels; it does not go with --ao-resolution quarter");
-  config.frames = options.frames.value_or(options.ground_truth ? 1 : 32);
+  config.jitter = !options.no_jitter;
+  config.detail = detail_config(options.lod, measure_detail);
+  config.frames = options.frames.value_or(options.ground_truth ? kGroundTruthFrames : 32);
   config.ao.spp = options.spp.value_or(options.ground_truth ? kGroundTruthSpp : 1);
   config.ao.radius = options.ao_radius.value_or(default_ao_radius(source.world_bounds()));
   config.ao.falloff = !options.ao_falloff_off;
   config.ao.interreflection = options.ao_interreflection;
   config.ao.seed = options.seed;
-  validate(config);
+  config.validate();
   validate(config.ao);
   return config;
 }
@@ -158,7 +165,6 @@ PreviewStyle preview_style(const RenderOptions& options) {
   PreviewStyle style;
   if (options.background) style.background = parse_background(*options.background);
   style.legend = !options.no_legend;
-  style.max_lod_error_px = options.lod.error_px.value_or(0.0);
   return style;
 }
 

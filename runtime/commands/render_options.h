@@ -10,7 +10,7 @@
 #include "runtime/commands/layer_previews.h"
 #include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/lod_render.h"
-#include "runtime/render/renderer.h"
+#include "runtime/frame/still.h"
 #include "runtime/trace/make_tracer.h"
 
 namespace packtrace {
@@ -26,7 +26,7 @@ struct RenderOptions {
   bool private_copy = false;
   uint32_t supersample = 1;
   std::optional<uint32_t> spp, frames;
-  bool ground_truth = false, no_denoise = false, fast_edges = false;
+  bool ground_truth = false, no_denoise = false, no_jitter = false, fast_edges = false;
   std::string ao_resolution = "full";
   SceneOptions scene;
   std::optional<float> ao_radius;
@@ -42,7 +42,9 @@ struct RenderOptions {
 void add_render_options(CLI::App& verb, RenderOptions& options);
 
 /// What to render with the camera. Throws Error(kUsage) for values out of range.
-RenderConfig make_config(const SceneSource& source, const Camera& camera, const RenderOptions& options);
+/// @param measure_detail as in detail_config()
+StillConfig make_config(const SceneSource& source, const Camera& camera, const RenderOptions& options,
+                        bool measure_detail);
 
 /// @param baked whether the input is a .ptk file
 /// Throws Error(kUsage) for contradictory options.

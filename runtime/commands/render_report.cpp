@@ -112,14 +112,14 @@ std::string grid_text(const LoadedScene& loaded) {
 
 } // namespace
 
-nlohmann::json render_json(const RenderOptions& options, const RenderConfig& config, const RenderedImage& image,
-                           const SceneSource& source, std::span<const RayTracer* const> tracers,
-                           const ChosenCamera& camera, const std::optional<ChosenDetail>& detail,
+nlohmann::json render_json(const RenderOptions& options, const StillConfig& config, const RenderedImage& image,
+                           const StillReport& report, const FrameLoop& loop, const ChosenCamera& camera,
                            const std::vector<std::string>& files, const FileTimings& timings) {
+  const std::vector<const RayTracer*> tracers = loop.tracers();
   const RayTracer& tracer = *tracers.back();
   const auto hits =
       std::count_if(image.instance.begin(), image.instance.end(), [](uint32_t i) { return i != kNoInstance; });
-  const RenderTimings& t = image.timings;
+  const PassTimes& t = report.times;
   const nlohmann::json parts = resident_parts(tracers);
   nlohmann::json result = {
       {"verb", "render"},
@@ -138,21 +138,23 @@ nlohmann::json render_json(const RenderOptions& options, const RenderConfig& con
       {"spp", config.ao.spp},
       {"ao_resolution", options.ao_resolution},
       {"denoise", config.denoise},
+      {"jitter", config.jitters() && config.frames > 1},
       {"ao_radius", config.ao.radius},
       {"ao_falloff", config.ao.falloff},
       {"seed", config.ao.seed},
       {"hit_pixels", hits},
       {"mean_ao", mean_of_valid(image.ao)},
-      {"rays", {{"primary", image.primary_rays}, {"ao", image.ao_rays}}},
-      {"mrays_per_s", {{"primary", rate_m(image.primary_rays, t.primary_s)}, {"ao", rate_m(image.ao_rays, t.ao_s)}}},
+      {"rays", {{"primary", report.primary_rays}, {"ao", report.ao_rays}}},
+      {"mrays_per_s", {{"primary", rate_m(report.primary_rays, t.primary_s)}, {"ao", rate_m(report.ao_rays, t.ao_s)}}},
       {"seconds",
        {{"bvh", t.build_s},
         {"primary", t.primary_s},
         {"ao", t.ao_s},
         {"denoise", t.denoise_s},
-        {"upsample", t.upsample_s}}},
+        {"upsample", t.upsample_s},
+        {"resolve", t.resolve_s}}},
       {"resident_bytes",
-       {{"source", source.resident_bytes()},
+       {{"source", loop.traced_source().resident_bytes()},
         {"tracing", sum_of(parts)},
         {"bvh", parts.value("bvh", uint64_t{0})},
         {"parts", parts}}},
@@ -160,7 +162,7 @@ nlohmann::json render_json(const RenderOptions& options, const RenderConfig& con
   };
   result["seconds"]["load"] = timings.load_s;
   result["seconds"]["write"] = timings.write_s;
-  if (detail) result["lod"] = detail_json(*detail, tracer);
+  if (loop.detail() != nullptr) result["lod"] = detail_json(*loop.detail(), tracer);
   return result;
 }
 
@@ -190,7 +192,7 @@ void print_render(std::FILE* stream, const nlohmann::json& r) {
 }
 
 std::string choices_text(const RenderOptions& options, const GlobalOptions& globals, const ChosenCamera& camera,
-                         const RenderConfig& config, const LoadedScene& loaded, const RayTracer& tracer,
+                         const StillConfig& config, const LoadedScene& loaded, const RayTracer& tracer,
                          const FileTimings& timings) {
   const Reasons reasons = reasons_of(*loaded.source, camera, options, loaded.baked.has_value(), globals);
   std::string text;

@@ -24,8 +24,8 @@ std::vector<double> nearest_depths(const RenderedImage& image, size_t instances)
 }
 
 /// Error bound per instance: distance of the traced LOD cut from level 0, world units.
-std::vector<double> instance_errors(const ChosenDetail& detail) {
-  const LodSource& source = *detail.source;
+std::vector<double> instance_errors(const DetailPlanner& detail) {
+  const LodSource& source = detail.source();
   std::vector<double> of_blas(source.geometry_count());
   for (uint32_t blas = 0; blas < of_blas.size(); ++blas)
     for (const BlasCluster& cluster : source.clusters(blas))
@@ -37,10 +37,10 @@ std::vector<double> instance_errors(const ChosenDetail& detail) {
 }
 
 /// Screen-space error bound of the LOD cuts in pixels; infinite if the options give no bound.
-double lod_error_bound_px(const ChosenDetail& detail) {
-  const SharingConfig& config = detail.sharing->config();
+double lod_error_bound_px(const DetailPlanner& detail) {
+  const SharingConfig& config = detail.sharing().config();
   if (config.tolerant_levels > 0) return std::numeric_limits<double>::infinity();
-  return detail.error_px * std::max(1.0, config.culled_error_scale);
+  return detail.error_px() * std::max(1.0, config.culled_error_scale);
 }
 
 } // namespace
@@ -58,7 +58,7 @@ std::string seams_text(const SeamSummary& seams) {
 }
 
 nlohmann::json visible_seams_json(const InstanceSeams& seams, const RenderedImage& image, const PrimaryCamera& camera,
-                                  const ChosenDetail* detail) {
+                                  const DetailPlanner* detail) {
   const std::vector<double> nearest = nearest_depths(image, seams.instance_count());
   const bool orthographic = camera.projection() == Projection::kOrthographic;
   std::vector<double> errors(nearest.size()), beside(seams.touching().size());

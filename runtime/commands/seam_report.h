@@ -6,8 +6,8 @@
 
 #include "compress/bake/grid/seam_gaps.h"
 #include "pbrt_import/scene/camera_rays.h"
-#include "runtime/commands/lod_render.h"
-#include "runtime/render/renderer.h"
+#include "runtime/frame/detail.h"
+#include "runtime/frame/rendered_image.h"
 
 namespace packtrace {
 
@@ -23,7 +23,7 @@ std::string seams_text(const SeamSummary& seams);
 /// @param camera camera with the traced image size, including supersampling
 /// @param detail LOD cuts that camera rays used; null: level 0
 nlohmann::json visible_seams_json(const InstanceSeams& seams, const RenderedImage& image, const PrimaryCamera& camera,
-                                  const ChosenDetail* detail);
+                                  const DetailPlanner* detail);
 
 /// Human-readable form of visible_seams_json(); empty if no seam can be wider than half a pixel.
 std::string visible_seams_text(const nlohmann::json& seams);

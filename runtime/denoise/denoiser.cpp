@@ -48,11 +48,14 @@ struct AoDenoiser::State {
 
   void resize(ImageSize size);
   void update_history(const GBuffer& gbuffer);
+  void compare_neighbours();
   void blur();
   void write(DenoisedAo& out) const;
 
   DenoiserConfig config;
   bool has_frame = false;
+  bool edges_outdated = false;     ///< `edges` do not belong to the guides
+  bool statistics_pending = false; ///< correct_history() has not run for the last frame
   FrameHistory now, before; // `before` is only used while a frame is denoised
   DepthDerivatives derivatives;
   std::vector<EdgeWeights> edges = {EdgeWeights(1), EdgeWeights(2), EdgeWeights(4)};
@@ -79,11 +82,16 @@ void AoDenoiser::State::update_history(const GBuffer& gbuffer) {
   if (has_frame && now.guides.still_matches(gbuffer)) return;
   std::swap(now, before);
   now.guides.load(gbuffer);
-  derivatives.compute(now.guides);
-  for (EdgeWeights& weights : edges) weights.compute(now.guides, derivatives, config);
+  compare_neighbours();
   if (!has_frame) before.history.resize(gbuffer.size);
   reproject(before, now.guides, derivatives, gbuffer.motion_px, config, now.history);
   has_frame = true;
+}
+
+void AoDenoiser::State::compare_neighbours() {
+  derivatives.compute(now.guides);
+  for (EdgeWeights& weights : edges) weights.compute(now.guides, derivatives, config);
+  edges_outdated = false;
 }
 
 void AoDenoiser::State::blur() {
@@ -116,14 +124,38 @@ AoDenoiser::~AoDenoiser() = default;
 AoDenoiser::AoDenoiser(AoDenoiser&&) noexcept = default;
 AoDenoiser& AoDenoiser::operator=(AoDenoiser&&) noexcept = default;
 
-const DenoisedAo& AoDenoiser::next_frame(const GBuffer& gbuffer, const AoFrame& ao) {
+void AoDenoiser::add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source) {
   require_sizes(gbuffer, ao);
   State& state = *state_;
   if (gbuffer.size != state.result.size) state.resize(gbuffer.size);
-  if (gbuffer.size.pixels() == 0) return state.result;
-  state.update_history(gbuffer);
-  accumulate(ao.ao, state.now.guides, state.config, state.now.history, state.samples);
-  correct_history(state.samples, state.now.guides, state.config, state.now.history, state.result.variance, state.image);
+  if (gbuffer.size.pixels() == 0) return;
+  const bool same_pixels = source == HistorySource::kPixel && state.has_frame;
+  if (same_pixels) {
+    state.now.guides.load(gbuffer);
+    state.edges_outdated = true;
+  } else {
+    state.update_history(gbuffer);
+  }
+  DenoiserConfig config = state.config;
+  if (same_pixels) config.max_tspp = std::numeric_limits<uint32_t>::max(); // the plain mean of all samples
+  accumulate(ao.ao, state.now.guides, config, state.now.history, state.samples);
+  state.statistics_pending = same_pixels;
+  if (!same_pixels)
+    correct_history(state.samples, state.now.guides, state.config, state.now.history, state.result.variance,
+                    state.image);
+}
+
+const DenoisedAo& AoDenoiser::denoise() {
+  State& state = *state_;
+  if (!state.has_frame) return state.result;
+  if (state.edges_outdated) state.compare_neighbours();
+  if (state.statistics_pending) {
+    DenoiserConfig config = state.config;
+    // Nothing moves: where jitter makes the histories differ, nothing has changed.
+    config.change_tolerance = std::numeric_limits<float>::infinity();
+    correct_history(state.samples, state.now.guides, config, state.now.history, state.result.variance, state.image);
+    state.statistics_pending = false;
+  }
   state.blur();
   state.write(state.result);
   return state.result;

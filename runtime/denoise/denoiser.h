@@ -16,6 +16,14 @@ struct DenoisedAo {
   std::vector<float> tspp;     ///< temporal samples per pixel: frames of accumulated history; 0 without history
 };
 
+/// Where a pixel's history comes from.
+enum class HistorySource : uint8_t {
+  kMotion, ///< from where the previous frame saw the same surface point (GBuffer::motion_px)
+  /// From the same pixel, whatever its camera ray hits now. For frames of a still view whose camera rays are jittered
+  /// within their pixels: the history then converges to the mean over the pixel's area.
+  kPixel,
+};
+
 /// Spatio-temporal denoiser for ambient occlusion (docs/denoiser.md). It accumulates samples along surface motion and
 /// removes the remaining noise with edge-aware blurs. The accumulated history itself is never blurred, so a still image
 /// converges to the mean of its samples.
@@ -34,7 +42,20 @@ public:
   /// a pixel with a non-finite normal gets no history and no blur. Other pixels are not affected. Throws Error (kUsage)
   /// if the two sizes differ or an array does not have one entry per pixel.
   /// @return the result, valid until the next call
-  const DenoisedAo& next_frame(const GBuffer& gbuffer, const AoFrame& ao);
+  const DenoisedAo& next_frame(const GBuffer& gbuffer, const AoFrame& ao) {
+    add_frame(gbuffer, ao);
+    return denoise();
+  }
+
+  /// The first half of next_frame(): adds a frame to the history. A still view of which only the last frame is shown
+  /// needs denoise() only once.
+  /// @param gbuffer with kPixel: the mean surface of each pixel in all frames so far
+  /// @param ao samples at the surfaces that this frame's camera rays hit
+  void add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source = HistorySource::kMotion);
+
+  /// The second half of next_frame(): blurs a copy of the history. Without a frame, all pixels are misses.
+  /// @return the result, valid until the next call
+  const DenoisedAo& denoise();
 
   /// Discards all history. Call it at camera cuts.
   void reset();

@@ -64,7 +64,12 @@ set(packtrace_public_headers
   runtime/lod/lod_sharing.h
   runtime/lod/sharing_balance.h
   runtime/lod/sharing_config.h
-  runtime/render/renderer.h
+  runtime/frame/detail.h
+  runtime/frame/frame_config.h
+  runtime/frame/frame_loop.h
+  runtime/frame/mean_layers.h
+  runtime/frame/rendered_image.h
+  runtime/frame/still.h
   runtime/trace/embree/embree_tracer.h
   runtime/trace/make_tracer.h
   runtime/trace/ray_tracer.h

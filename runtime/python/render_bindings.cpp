@@ -12,9 +12,8 @@
 
 #include "compress/format/file/baked_file.h"
 #include "pbrt_import/base/error.h"
+#include "runtime/frame/still.h"
 #include "runtime/python/bindings.h"
-#include "runtime/render/renderer.h"
-#include "runtime/trace/make_tracer.h"
 #include "runtime/trace/source/packed_source.h"
 
 namespace py = pybind11;
@@ -59,20 +58,19 @@ py::dict render(const std::shared_ptr<BakedFile>& file, std::optional<std::pair<
     constexpr ImageSize kDefaultSize{1280, 720};
     const ImageSize wanted = size ? ImageSize{size->first, size->second} : kDefaultSize;
     const Camera camera = chosen_camera(source, camera_index, wanted);
-    RenderConfig config;
+    StillConfig config;
     config.size = size ? wanted : ImageSize{camera.width_px, camera.height_px};
     config.frames = frames;
     config.denoise = denoise;
     config.ao.spp = spp;
     config.ao.seed = seed;
     config.ao.radius = ao_radius.value_or(default_ao_radius(source.world_bounds()));
-    validate(config);
-    validate(config.ao);
+    config.validate();
     TracerConfig tracing;
     tracing.backend = chosen_backend(backend);
-    const auto tracer = make_tracer(source, file.get(), tracing);
+    FrameLoop loop({&source, file.get(), tracing}, config);
     Progress progress;
-    image = render_view(source, *tracer, camera, config, progress);
+    render_still(loop, camera, config.frames, false, image, progress);
   }
   const ImageSize shape = image.size;
   py::dict result;

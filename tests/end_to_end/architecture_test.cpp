@@ -89,9 +89,9 @@ const std::vector<Room> kRooms = {
      {"pbrt_import/base", "pbrt_import/scene", "runtime/lod", "runtime/trace/source", "runtime/trace"}},
     {"runtime/ao", {"pbrt_import/base", "pbrt_import/scene", "runtime/trace", "runtime/camera"}},
     {"runtime/denoise", {"pbrt_import/base", "runtime/camera"}},
-    {"runtime/render",
-     {"pbrt_import/base", "pbrt_import/scene", "runtime/trace/source", "runtime/trace", "runtime/camera", "runtime/ao",
-      "runtime/denoise", "runtime"}},
+    {"runtime/frame",
+     {"pbrt_import/base", "pbrt_import/scene", "runtime/lod", "runtime/trace/source", "runtime/trace", "runtime/camera",
+      "runtime/ao", "runtime/denoise", "runtime"}},
     {"runtime/image", {"pbrt_import/base", "pbrt_import/scene", "runtime/camera"}},
     {"runtime", {}},
     {"runtime/measure",
@@ -101,11 +101,11 @@ const std::vector<Room> kRooms = {
     {"runtime/commands",
      {"pbrt_import/base", "pbrt_import/scene", "pbrt_import/text", "pbrt_import", "compress/format/file",
       "compress/bake/grid", "compress/bake", "compress/exchange/gltf", "compress/exchange/vertex16", "runtime/lod",
-      "runtime/trace/source", "runtime/trace/packed/scene", "runtime/trace", "runtime/camera", "runtime/render",
+      "runtime/trace/source", "runtime/trace/packed/scene", "runtime/trace", "runtime/camera", "runtime/frame",
       "runtime/image", "runtime/measure", "runtime"}},
     {"runtime/python",
      {"pbrt_import/base", "pbrt_import", "compress/format/file", "compress/bake", "runtime/trace/source",
-      "runtime/trace", "runtime/render", "runtime/commands"}},
+      "runtime/trace", "runtime/frame", "runtime/commands"}},
 };
 
 const Room* room_of(const std::string& path) {

@@ -1,0 +1,42 @@
+#include "runtime/frame/frame_config.h"
+
+#include <string>
+
+#include "pbrt_import/base/error.h"
+
+namespace packtrace {
+namespace {
+
+constexpr uint32_t kMaxSupersample = 8;
+constexpr uint32_t kMaxTracedSide = 1u << 16;
+constexpr size_t kMaxTracedPixels = size_t{1} << 28;
+
+void require_setting(bool condition, const std::string& message) {
+  if (!condition) throw Error(ErrorKind::kUsage, message);
+}
+
+} // namespace
+
+void DetailConfig::validate() const {
+  if (error_px) {
+    std::string text = std::to_string(*error_px);
+    require_setting(*error_px > 0.0 && *error_px <= 1e9,
+                    text.insert(0, "--lod-error ").append(": must be a number of pixels above 0"));
+  }
+  require_setting(!cull_invisible || only_occlusion,
+                  "--lod-cull visible requires --lod-rays occlusion, where camera rays are traced before the levels "
+                  "are chosen");
+  sharing.validate();
+}
+
+void FrameConfig::validate() const {
+  require_setting(size.width >= 1 && size.height >= 1, "image size must be at least 1x1");
+  require_setting(supersample >= 1 && supersample <= kMaxSupersample, "supersample must be in [1, 8]");
+  const uint64_t width = uint64_t{size.width} * supersample;
+  const uint64_t height = uint64_t{size.height} * supersample;
+  require_setting(width <= kMaxTracedSide && height <= kMaxTracedSide && width * height <= kMaxTracedPixels,
+                  "image size times supersample exceeds 65536 per side or 2^28 pixels");
+  detail.validate();
+}
+
+} // namespace packtrace

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "pbrt_import/scene/image_size.h"
+#include "runtime/ao/ao_integrator.h"
+#include "runtime/denoise/denoiser_config.h"
+#include "runtime/lod/sharing_config.h"
+
+namespace packtrace {
+
+/// Pixels for which occlusion rays are traced.
+enum class AoResolution : uint8_t {
+  kFull,
+  kQuarter, ///< one of 2 x 2 pixels; the denoised result is upsampled (runtime/ao/half_resolution.h)
+};
+
+/// Which levels of detail the rays of a frame meet (docs/lod_runtime.md).
+struct DetailConfig {
+  /// Maximum screen-space error in traced pixels, in (0, 1e9]. Unset: level 0 everywhere.
+  std::optional<double> error_px;
+  /// Camera rays meet level 0, and only occlusion rays meet coarser levels.
+  bool only_occlusion = false;
+  /// SharingConfig::culled_error_scale applies to the instances that no pixel shows, not to those outside the view.
+  /// Requires only_occlusion, because the camera rays must be traced before the levels are chosen.
+  bool cull_invisible = false;
+  SharingConfig sharing;
+
+  bool camera_uses_levels() const { return error_px && !only_occlusion; }
+  /// Throws Error(kUsage) naming the option that is out of range.
+  void validate() const;
+};
+
+/// Settings of a FrameLoop.
+struct FrameConfig {
+  ImageSize size;           ///< size of the result in pixels
+  uint32_t supersample = 1; ///< [1, 8]: factor per axis at which the view is traced and denoised, then box-filtered
+  bool denoise = true;      ///< false: raw frames are averaged while nothing moves
+  /// Shifts the camera rays of each frame within their pixels while nothing moves, so that the image converges to an
+  /// antialiased one. Has no effect with AoResolution::kQuarter.
+  bool jitter = true;
+  AoResolution ao_resolution = AoResolution::kFull;
+  bool lod_layers = false; ///< fill the LOD layers of RenderedImage
+  AoConfig ao;
+  DenoiserConfig denoiser;
+  DetailConfig detail;
+
+  bool jitters() const { return jitter && ao_resolution == AoResolution::kFull; }
+  /// Size at which rays are traced.
+  ImageSize traced_size() const { return {size.width * supersample, size.height * supersample}; }
+  /// Throws Error(kUsage) naming the option that is out of range.
+  void validate() const;
+};
+
+} // namespace packtrace

@@ -1,0 +1,244 @@
+#include "runtime/frame/frame_loop.h"
+
+#include <algorithm>
+
+#include "pbrt_import/base/error.h"
+#include "runtime/camera/lod_view.h"
+#include "runtime/camera/origin_lift.h"
+#include "runtime/camera/primary_visibility.h"
+#include "runtime/stopwatch.h"
+
+namespace packtrace {
+namespace {
+
+/// Frames of a still view that share an offset of the camera rays. With 32 frames, 2 give as good images as 1 and half
+/// as many camera rays; 4 lose 0.5 to 1 dB (docs/denoiser.md).
+constexpr uint32_t kFramesPerOffset = 2;
+
+uint64_t count_hits(const GBuffer& g) {
+  return static_cast<uint64_t>(
+      std::count_if(g.instance.begin(), g.instance.end(), [](uint32_t id) { return id != kNoInstance; }));
+}
+
+bool same_camera(const Camera& a, const Camera& b) {
+  return a.projection == b.projection && a.world_from_camera == b.world_from_camera && a.fov_degrees == b.fov_degrees &&
+         a.screen_window == b.screen_window && a.width_px == b.width_px && a.height_px == b.height_px;
+}
+
+} // namespace
+
+glm::dvec2 jitter_offset(uint32_t frame) {
+  const auto offset = [&](uint32_t base) {
+    double inverse = 0.0, digit = 1.0;
+    for (uint32_t n = frame; n > 0; n /= base) inverse += (digit /= base) * (n % base);
+    return inverse < 0.5 ? inverse : inverse - 1.0;
+  };
+  return {offset(3), offset(5)};
+}
+
+PassTimes& PassTimes::operator+=(const PassTimes& other) {
+  plan_s += other.plan_s, build_s += other.build_s, primary_s += other.primary_s, ao_s += other.ao_s;
+  denoise_s += other.denoise_s, upsample_s += other.upsample_s, resolve_s += other.resolve_s;
+  return *this;
+}
+
+/// Mean of raw AO over frames, for renders without the denoiser. Pixels may miss in some frames.
+class FrameLoop::RawMean {
+public:
+  void clear() { sum_.clear(); }
+  void add(const AoFrame& frame) {
+    if (sum_.empty()) sum_.assign(frame.ao.size(), 0.0), count_.assign(frame.ao.size(), 0);
+    for (size_t i = 0; i < sum_.size(); ++i)
+      if (frame.ao[i] >= 0.0f) sum_[i] += static_cast<double>(frame.ao[i]), ++count_[i];
+  }
+  std::vector<float> result() const {
+    std::vector<float> mean(sum_.size(), kInvalidAo);
+    for (size_t i = 0; i < mean.size(); ++i)
+      if (count_[i] > 0) mean[i] = static_cast<float>(sum_[i] / static_cast<double>(count_[i]));
+    return mean;
+  }
+
+private:
+  std::vector<double> sum_;
+  std::vector<uint32_t> count_;
+};
+
+FrameLoop::FrameLoop(const FrameScene& scene, const FrameConfig& config)
+    : scene_(scene), config_(config), denoiser_(config.denoiser), raw_mean_(std::make_unique<RawMean>()) {
+  config_.validate();
+  packtrace::validate(config_.ao);
+  if (!config_.detail.error_px) return;
+  const auto* packed = dynamic_cast<const PackedSource*>(scene_.source);
+  if (scene_.file == nullptr || packed == nullptr)
+    throw Error(ErrorKind::kUsage, "levels of detail require a baked file");
+  planner_ = std::make_unique<DetailPlanner>(*scene_.file, *packed, config_.detail);
+}
+
+FrameLoop::~FrameLoop() = default;
+
+void FrameLoop::reset() {
+  camera_.reset();
+  view_.reset();
+  next_number_ = 0;
+  denoiser_.reset();
+}
+
+uint64_t FrameLoop::frame_pixels() const {
+  const ImageSize size = config_.traced_size();
+  if (config_.ao_resolution == AoResolution::kFull) return size.pixels();
+  return uint64_t{(size.width + 1) / 2} * ((size.height + 1) / 2);
+}
+
+const SceneSource& FrameLoop::traced_source() const {
+  return level_tracer_ ? static_cast<const SceneSource&>(planner_->source()) : *scene_.source;
+}
+
+std::vector<const RayTracer*> FrameLoop::tracers() const {
+  std::vector<const RayTracer*> all;
+  if (!config_.detail.camera_uses_levels()) all.push_back(scene_.tracer != nullptr ? scene_.tracer : level_0_.get());
+  if (level_tracer_) all.push_back(level_tracer_.get());
+  return all;
+}
+
+void FrameLoop::build_level_0() {
+  if (scene_.tracer != nullptr || level_0_) return;
+  const Stopwatch building;
+  level_0_ = make_tracer(*scene_.source, scene_.file, scene_.backend);
+  report_.times.build_s += building.seconds();
+}
+
+void FrameLoop::choose_detail(const PrimaryCamera& view, const GBuffer* seen) {
+  report_.rebuilt = planner_->plan(view, seen);
+  report_.times.plan_s += planner_->plan_s() + planner_->source_s();
+  if (!report_.rebuilt) return;
+  const Stopwatch building;
+  level_tracer_.reset(); // frees the memory of the old trees first
+  level_tracer_ = make_tracer(planner_->source(), *scene_.file, scene_.backend);
+  report_.times.build_s += building.seconds();
+}
+
+/// Traces the camera rays into gbuffer_.
+void FrameLoop::trace_camera_rays(const PrimaryCamera& view, const PrimaryCamera& previous) {
+  const bool levels = config_.detail.camera_uses_levels();
+  if (levels && report_.moved) choose_detail(view, nullptr);
+  if (!levels) build_level_0();
+  const SceneSource& source = levels ? static_cast<const SceneSource&>(planner_->source()) : *scene_.source;
+  const RayTracer& tracer = *tracers().front();
+  Progress unseen;
+  const Stopwatch tracing;
+  trace_primary(source, tracer, view, previous, gbuffer_, unseen);
+  report_.times.primary_s = tracing.seconds();
+  report_.primary_rays = gbuffer_.size.pixels();
+  report_.hit_pixels = count_hits(gbuffer_);
+  if (config_.detail.only_occlusion && planner_) {
+    if (report_.moved) choose_detail(view, &gbuffer_);
+    const Stopwatch lifting;
+    lift_origins(*level_tracer_, view, *config_.detail.error_px, gbuffer_, unseen);
+    report_.times.ao_s += lifting.seconds();
+  }
+  if (config_.ao_resolution == AoResolution::kQuarter) {
+    const Stopwatch halving;
+    half_ = halve(gbuffer_);
+    report_.times.upsample_s += halving.seconds();
+  }
+}
+
+/// Adds the level, cluster and screen-space error of the camera rays' hits.
+void FrameLoop::add_lod_layers(const PrimaryCamera& view) {
+  RenderedImage& image = lod_layers_;
+  const SceneSource& source = traced_source();
+  const size_t n = config_.size.pixels();
+  if (still_frames_ == 0) image.lod.assign(n, 0), image.cluster.assign(n, 0), image.lod_error.assign(n, 0.0f);
+  const GBuffer& g = gbuffer_;
+  const uint32_t factor = config_.supersample;
+  for (uint32_t y = 0; y < g.size.height; ++y)
+    for (uint32_t x = 0; x < g.size.width; ++x) {
+      const size_t in = static_cast<size_t>(y) * g.size.width + x;
+      if (g.instance[in] == kNoInstance) continue;
+      const size_t out = static_cast<size_t>(y / factor) * config_.size.width + x / factor;
+      const SurfaceDetail detail = source.detail_of(g.instance[in], g.triangle[in]);
+      const double error_px = error_in_pixels(view, DVec3(g.position[in]), static_cast<double>(detail.error_world));
+      image.lod_error[out] = std::max(image.lod_error[out], static_cast<float>(error_px));
+      image.lod[out] = detail.level, image.cluster[out] = detail.cluster;
+    }
+}
+
+const FrameReport& FrameLoop::next_frame(const Camera& camera, Progress& progress) {
+  const bool first = !view_;
+  const bool moved = first || !same_camera(camera, *camera_);
+  FrameReport report;
+  report.number = next_number_;
+  report.moved = moved;
+  report.hit_pixels = report_.hit_pixels;
+  report_ = report;
+  still_frames_ = moved ? 0 : still_frames_ + 1;
+
+  const bool still_jitter = config_.jitters() && !moved;
+  const bool trace = moved || (still_jitter && still_frames_ % kFramesPerOffset == 0);
+  const PrimaryCamera view(camera, config_.traced_size(),
+                           still_jitter ? jitter_offset(still_frames_ / kFramesPerOffset) : glm::dvec2(0.0));
+  if (trace)
+    trace_camera_rays(view, first || !moved ? view : *view_);
+  else if (still_frames_ == 1)
+    gbuffer_.motion_px.assign(gbuffer_.motion_px.size(), Vec2(0));
+  camera_ = camera;
+  view_.emplace(camera, config_.traced_size());
+  report_.seen = report_.hit_pixels > 0;
+
+  const bool quarter = config_.ao_resolution == AoResolution::kQuarter;
+  if (quarter && still_frames_ == 1) half_.gbuffer.motion_px.assign(half_.gbuffer.motion_px.size(), Vec2(0));
+  const GBuffer& shaded = quarter ? half_.gbuffer : gbuffer_;
+  const Stopwatch tracing;
+  trace_ao(traced_source(), *tracers().back(), shaded, config_.ao, static_cast<uint32_t>(next_number_), raw_, progress);
+  report_.times.ao_s += tracing.seconds();
+  report_.ao_rays = (quarter ? count_hits(shaded) : report_.hit_pixels) * config_.ao.spp;
+
+  const Stopwatch layering;
+  if (moved) layers_.clear();
+  if (trace) layers_.add(gbuffer_, scene_.source->materials());
+  if (trace && config_.lod_layers) add_lod_layers(view);
+  report_.times.resolve_s += layering.seconds();
+
+  const Stopwatch accumulating;
+  if (!config_.denoise) {
+    if (moved) raw_mean_->clear();
+    raw_mean_->add(raw_);
+  } else if (still_jitter) {
+    layers_.write_guides(guides_);
+    denoiser_.add_frame(guides_, raw_, HistorySource::kPixel);
+  } else {
+    denoiser_.add_frame(shaded, raw_);
+  }
+  report_.times.denoise_s += accumulating.seconds();
+  ++next_number_;
+  return report_;
+}
+
+/// The denoised AO, or the mean of the raw AO, of all traced pixels.
+std::vector<float> FrameLoop::accumulated_ao(PassTimes& times) {
+  const Stopwatch denoising;
+  std::vector<float> ao = config_.denoise ? denoiser_.denoise().ao : raw_mean_->result();
+  times.denoise_s += denoising.seconds();
+  return ao;
+}
+
+void FrameLoop::resolve(RenderedImage& image, PassTimes& times) {
+  std::vector<float> ao = accumulated_ao(times);
+  if (config_.ao_resolution == AoResolution::kQuarter) {
+    const Stopwatch upsampling;
+    ao = upsample_ao(gbuffer_, half_, ao);
+    const std::vector<float> raw = upsample_ao(gbuffer_, half_, raw_.ao);
+    times.upsample_s += upsampling.seconds();
+    const Stopwatch filtering;
+    layers_.resolve(config_, ao, raw, image);
+    times.resolve_s += filtering.seconds();
+  } else {
+    const Stopwatch filtering;
+    layers_.resolve(config_, ao, raw_.ao, image);
+    times.resolve_s += filtering.seconds();
+  }
+  image.max_lod_error_px = config_.detail.error_px.value_or(0.0);
+  image.lod = lod_layers_.lod, image.cluster = lod_layers_.cluster, image.lod_error = lod_layers_.lod_error;
+}
+
+} // namespace packtrace

@@ -1,0 +1,122 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "pbrt_import/base/progress.h"
+#include "pbrt_import/scene/camera_rays.h"
+#include "runtime/ao/half_resolution.h"
+#include "runtime/denoise/denoiser.h"
+#include "runtime/frame/detail.h"
+#include "runtime/frame/frame_config.h"
+#include "runtime/frame/mean_layers.h"
+#include "runtime/frame/rendered_image.h"
+#include "runtime/trace/make_tracer.h"
+
+namespace packtrace {
+
+/// What a FrameLoop traces. Everything referenced must outlive it.
+struct FrameScene {
+  const SceneSource* source = nullptr;
+  const BakedFile* file = nullptr; ///< the file that `source` reads; null for an imported scene
+  TracerConfig backend;
+  /// Traces `source` at level 0; null: the frame loop builds one when it needs it.
+  const RayTracer* tracer = nullptr;
+};
+
+/// Wall times of a frame's passes in seconds.
+struct PassTimes {
+  double plan_s = 0;    ///< choice of LOD cuts and their clusters
+  double build_s = 0;   ///< decoding and BVH construction
+  double primary_s = 0; ///< camera rays
+  double ao_s = 0;      ///< occlusion rays
+  double denoise_s = 0; ///< reprojection, accumulation and blurs
+  double upsample_s = 0; ///< of AO traced at a lower resolution, and selecting its pixels
+  double resolve_s = 0; ///< layers of the image
+
+  PassTimes& operator+=(const PassTimes& other);
+  double total_s() const { return plan_s + build_s + primary_s + ao_s + denoise_s + upsample_s + resolve_s; }
+};
+
+/// What happened in a frame.
+struct FrameReport {
+  uint64_t number = 0; ///< from 0
+  bool moved = true;   ///< false: camera and scene are those of the previous frame
+  bool seen = true;    ///< false: all camera rays miss
+  PassTimes times;
+  uint64_t primary_rays = 0, ao_rays = 0;
+  uint64_t hit_pixels = 0; ///< traced pixels whose camera ray hits
+  bool rebuilt = false;    ///< the LOD plan needed other trees
+};
+
+/// Renders a scene frame by frame: detail, camera rays, occlusion rays, denoising. It keeps what the next frame needs
+/// of the previous ones: history, trees, and, while nothing moves, the sums that antialias the image.
+///
+/// Everything that a window, a sequence or a still picture shows comes from this class. Frames depend on the settings,
+/// on the states of all frames since reset(), and on nothing else, in particular not on the number of threads.
+class FrameLoop {
+public:
+  /// Throws Error(kUsage) for settings out of range, or a detail without a file.
+  FrameLoop(const FrameScene& scene, const FrameConfig& config);
+  ~FrameLoop();
+
+  /// Renders the next frame.
+  /// @param progress advances by frame_pixels(); the caller begins the phase
+  /// Throws Error(kInput) for a camera without rays, Error(kCancelled), and what building trees throws.
+  const FrameReport& next_frame(const Camera& camera, Progress& progress);
+
+  /// Writes the layers of the frames so far.
+  /// @param times the denoiser's and the resolve's times are added
+  void resolve(RenderedImage& image, PassTimes& times);
+
+  /// Number of occlusion pixels per frame.
+  uint64_t frame_pixels() const;
+
+  /// Forgets all frames: the next one is number 0.
+  void reset();
+
+  const FrameConfig& config() const { return config_; }
+  /// The source and the tracers in use: the camera's, and with only_occlusion also the occlusion rays'.
+  const SceneSource& traced_source() const;
+  std::vector<const RayTracer*> tracers() const;
+  const DetailPlanner* detail() const { return planner_.get(); }
+
+private:
+  class RawMean;
+
+  void choose_detail(const PrimaryCamera& view, const GBuffer* seen);
+  void trace_camera_rays(const PrimaryCamera& view, const PrimaryCamera& previous);
+  void build_level_0();
+  void add_lod_layers(const PrimaryCamera& view);
+  std::vector<float> accumulated_ao(PassTimes& times);
+
+  FrameScene scene_;
+  FrameConfig config_;
+  std::unique_ptr<DetailPlanner> planner_;
+  std::unique_ptr<RayTracer> level_0_;      ///< null if scene_.tracer or only levels are traced
+  std::unique_ptr<RayTracer> level_tracer_; ///< traces planner_->source()
+
+  std::optional<Camera> camera_; ///< of the previous frame
+  std::optional<PrimaryCamera> view_;
+  uint64_t next_number_ = 0;
+  uint32_t still_frames_ = 0; ///< frames since something moved, without the first
+  GBuffer gbuffer_, guides_;
+  HalfGBuffer half_;
+  AoFrame raw_;
+  AoDenoiser denoiser_;
+  std::unique_ptr<RawMean> raw_mean_;
+  MeanLayers layers_;
+  RenderedImage lod_layers_; ///< only its LOD layers
+  FrameReport report_;
+};
+
+/// Offset of the camera rays of a still view's frame from pixel centres, in pixels within [-0.5, 0.5): points of the
+/// Halton sequence in the bases 3 and 5, whose first is 0. The sampler of occlusion rays uses base 2, so that the frames
+/// whose camera rays hit one side of an edge have well-distributed occlusion rays, too. (Points of the R2 sequence
+/// repeat almost every 4 frames and leave noise at edges.)
+/// Source: J. H. Halton, "On the efficiency of certain quasi-random sequences of points", 1960.
+glm::dvec2 jitter_offset(uint32_t frame);
+
+} // namespace packtrace

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "pbrt_import/scene/image_size.h"
+#include "pbrt_import/scene/math.h"
+
+namespace packtrace {
+
+/// Layers of a rendered view, rows top to bottom, one entry per pixel. They are means over the camera rays of a pixel
+/// that hit, unless stated otherwise: those of all sub-pixels (FrameConfig::supersample) in all frames since something
+/// moved (FrameConfig::jitter). Where all camera rays of a pixel miss, ao and ao_raw are kInvalidAo, instance is
+/// kNoInstance and all other layers are 0.
+struct RenderedImage {
+  ImageSize size;
+  std::vector<float> ao;     ///< denoised; without the denoiser the mean over all frames
+  std::vector<float> ao_raw; ///< AO of the last frame alone, not denoised; kInvalidAo where its camera rays miss
+  std::vector<float> depth;  ///< camera-space z, world units
+  std::vector<float> coverage;    ///< fraction of the camera rays that hit, [0, 1]
+  std::vector<Vec3> normal;       ///< world space
+  std::vector<Vec3> albedo;       ///< linear sRGB
+  std::vector<Vec3> shaded;       ///< albedo times ao, as under a uniform white sky; emitters are white; linear sRGB
+  std::vector<uint32_t> instance; ///< of the first camera ray that hits
+  // The LOD layers are empty unless FrameConfig::lod_layers is set.
+  std::vector<uint32_t> lod;     ///< LOD level at the last camera ray that hits
+  std::vector<uint32_t> cluster; ///< cluster number at the last camera ray that hits
+  std::vector<float> lod_error;  ///< largest error bound (distance from level 0), in traced pixels
+  double max_lod_error_px = 0.0; ///< DetailConfig::error_px; 0 without levels
+};
+
+} // namespace packtrace
