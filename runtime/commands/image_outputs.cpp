@@ -17,24 +17,6 @@ constexpr std::array kBaseLayers{"ao", "ao_raw", "depth", "normal", "instance", 
 /// Layers that need LOD levels.
 constexpr std::array kLodLayers{"lod", "lod-error"};
 
-std::vector<std::string> chosen(const std::vector<std::string>& aovs, const std::string& otherwise, bool detail) {
-  std::vector<std::string> names = aovs.empty() ? std::vector{otherwise} : aovs;
-  if (std::find(names.begin(), names.end(), "all") != names.end()) {
-    if (detail) return aov_names();
-    return {kBaseLayers.begin(), kBaseLayers.end()};
-  }
-  for (const std::string& name : names) {
-    if (std::find(aov_names().begin(), aov_names().end(), name) != aov_names().end()) continue;
-    std::string known = "all";
-    for (const std::string& aov : aov_names()) known += ", " + aov;
-    throw Error(ErrorKind::kUsage, "--aov " + name + ": no such layer; layers are " + known);
-  }
-  std::vector<std::string> unique;
-  for (const std::string& name : names)
-    if (std::find(unique.begin(), unique.end(), name) == unique.end()) unique.push_back(name);
-  return unique;
-}
-
 std::span<const float> floats_of(const std::vector<Vec3>& vectors) {
   static_assert(sizeof(Vec3) == 3 * sizeof(float));
   return {vectors.empty() ? nullptr : &vectors[0].x, vectors.size() * 3};
@@ -53,9 +35,33 @@ Layer exr_layer(const RenderedImage& image, const std::string& aov) {
   return {aov, rgb, floats_of(image.shaded), true};
 }
 
-/// Splits words such as "x.png,x.exr" at commas. A word is split only if every part ends in .png or .exr, so that file
-/// names may contain commas.
-std::vector<std::string> separate_files(const std::vector<std::string>& words) {
+} // namespace
+
+std::vector<std::string> chosen_layers(const std::vector<std::string>& aovs, const std::string& otherwise,
+                                       bool detail) {
+  std::vector<std::string> names = aovs.empty() ? std::vector{otherwise} : aovs;
+  if (std::find(names.begin(), names.end(), "all") != names.end()) {
+    if (detail) return aov_names();
+    return {kBaseLayers.begin(), kBaseLayers.end()};
+  }
+  for (const std::string& name : names) {
+    if (std::find(aov_names().begin(), aov_names().end(), name) != aov_names().end()) continue;
+    std::string known = "all";
+    for (const std::string& aov : aov_names()) known += ", " + aov;
+    throw Error(ErrorKind::kUsage, "--aov " + name + ": no such layer; layers are " + known);
+  }
+  std::vector<std::string> unique;
+  for (const std::string& name : names)
+    if (std::find(unique.begin(), unique.end(), name) == unique.end()) unique.push_back(name);
+  return unique;
+}
+
+bool has_lod_layer(const std::vector<std::string>& layers) {
+  return std::ranges::any_of(
+      layers, [](const std::string& layer) { return std::ranges::find(kLodLayers, layer) != kLodLayers.end(); });
+}
+
+std::vector<std::string> separate_image_files(const std::vector<std::string>& words) {
   std::vector<std::string> files;
   for (const std::string& word : words) {
     std::vector<std::string> parts;
@@ -74,8 +80,6 @@ std::vector<std::string> separate_files(const std::vector<std::string>& words) {
   return files;
 }
 
-} // namespace
-
 const std::vector<std::string>& aov_names() {
   static const std::vector<std::string> kNames = [] {
     std::vector<std::string> names(kBaseLayers.begin(), kBaseLayers.end());
@@ -92,14 +96,14 @@ void ImageOutputs::add(const std::filesystem::path& target, bool force, bool exr
 ImageOutputs::ImageOutputs(const std::vector<std::string>& files, const std::vector<std::string>& aovs, bool detail,
                            bool force, const PreviewStyle& style)
     : style_(style) {
-  for (const std::string& name : separate_files(files)) {
+  for (const std::string& name : separate_image_files(files)) {
     const std::filesystem::path path(name);
     if (name == "-") {
-      add_standard_output(chosen(aovs, "ao", detail));
+      add_standard_output(chosen_layers(aovs, "ao", detail));
     } else if (ending_of(path) == ".exr") {
-      add(path, force, true, chosen(aovs, "all", detail));
+      add(path, force, true, chosen_layers(aovs, "all", detail));
     } else if (ending_of(path) == ".png") {
-      const std::vector<std::string> layers = chosen(aovs, "ao", detail);
+      const std::vector<std::string> layers = chosen_layers(aovs, "ao", detail);
       for (const std::string& aov : layers) {
         std::filesystem::path target = path;
         if (layers.size() > 1) target.replace_extension("." + aov + path.extension().string());
@@ -139,11 +143,7 @@ void ImageOutputs::write(const RenderedImage& image, const ExrAttributes& attrib
 }
 
 bool ImageOutputs::has_lod_layers() const {
-  return std::ranges::any_of(entries_, [](const Entry& entry) {
-    return std::ranges::any_of(entry.aovs, [](const std::string& aov) {
-      return std::find(kLodLayers.begin(), kLodLayers.end(), aov) != kLodLayers.end();
-    });
-  });
+  return std::ranges::any_of(entries_, [](const Entry& entry) { return has_lod_layer(entry.aovs); });
 }
 
 std::vector<std::string> ImageOutputs::targets() const {

@@ -16,6 +16,19 @@ namespace packtrace {
 /// Names of the layers that a render can write.
 const std::vector<std::string>& aov_names();
 
+/// Returns the layers to write, without repetitions. Throws Error(kUsage) for unknown layers.
+/// @param aovs layers from aov_names(), or "all"
+/// @param otherwise what is written if `aovs` is empty
+/// @param detail as in ImageOutputs
+std::vector<std::string> chosen_layers(const std::vector<std::string>& aovs, const std::string& otherwise, bool detail);
+
+/// Whether one of the layers needs LOD levels.
+bool has_lod_layer(const std::vector<std::string>& layers);
+
+/// Splits words such as "x.png,x.exr" at commas. A word is split only if every part ends in .png or .exr, so that file
+/// names may contain commas.
+std::vector<std::string> separate_image_files(const std::vector<std::string>& words);
+
 /// The image files of one render. Construct it before the work starts, so that unwritable targets are reported at once.
 /// No file appears under its final name before write() has written all of them.
 class ImageOutputs {

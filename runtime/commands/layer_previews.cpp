@@ -64,8 +64,7 @@ Image layer_preview(const RenderedImage& image, const std::string& aov, const Pr
   const bool picture = aov == "albedo" || aov == "shaded";
   const Background usual =
       picture ? Background{Background::Kind::kSky, Vec3(0)} : Background{Background::Kind::kColor, kDefaultBackground};
-  Image preview = over_background(plain_preview(image, aov), image.coverage,
-                                  style.background.value_or(usual));
+  Image preview = over_background(plain_preview(image, aov), image.coverage, style.background.value_or(usual));
   if (!style.legend) return preview;
   if (aov == "depth") return with_legend(preview, depth_legend(image));
   if (aov == "lod") return with_legend(preview, level_legend(image));

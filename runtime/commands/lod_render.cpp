@@ -233,9 +233,9 @@ std::string detail_text(const nlohmann::json& r) {
   const bool measured = r.contains("own_cuts");
   if (measured) {
     const uint64_t alone = count(r.at("own_cuts").at("builds"));
-    text += fmt::format(
-        grouped(), " ({:+.1f} % vs. {:L} without sharing)",
-        alone > 0 ? 100.0 * (static_cast<double>(builds) / static_cast<double>(alone) - 1.0) : 0.0, alone);
+    text +=
+        fmt::format(grouped(), " ({:+.1f} % vs. {:L} without sharing)",
+                    alone > 0 ? 100.0 * (static_cast<double>(builds) / static_cast<double>(alone) - 1.0) : 0.0, alone);
   }
   text += fmt::format(grouped(), "\n            {:L} triangles built, {:L} traced", count(r.at("built_triangles")),
                       count(r.at("traced_triangles")));

@@ -18,33 +18,21 @@
 #include "runtime/commands/render_camera.h"
 #include "runtime/commands/render_options.h"
 #include "runtime/commands/render_report.h"
+#include "runtime/commands/render_setup.h"
 #include "runtime/commands/seam_report.h"
+#include "runtime/commands/sequence_render.h"
 #include "runtime/stopwatch.h"
 
 namespace packtrace {
 namespace {
 
-/// Reserves the approximate memory of the G-buffer, the denoiser and the layers of a view. The image size may come from
-/// the scene file, so it is not trusted.
-MemoryReservation reserve_picture(const RenderOptions& options, const FrameConfig& config,
-                                  const MemoryBudget& budget) {
-  const double pixel_bytes = config.jitters() ? 400.0 : 320.0;
-  constexpr double kMax = 0x1p62;
-  const double side = config.supersample;
-  const double bytes = pixel_bytes * side * side * static_cast<double>(config.size.width) * config.size.height;
-  return with_file(options.input, [&] {
-    return MemoryReservation(budget, static_cast<uint64_t>(std::min(kMax, bytes)),
-                             fmt::format("a picture of {} x {} pixels", config.size.width, config.size.height));
-  });
-}
-
 /// Renders the camera, or the whole scene if the scene's own camera sees nothing of it.
-StillReport render_chosen(const RenderOptions& options, const GlobalOptions& globals, const LoadedScene& loaded,
-                          FrameLoop& loop, const StillConfig& config, ChosenCamera& camera, RenderedImage& image,
-                          Progress& progress) {
+PictureReport render_chosen(const RenderOptions& options, const GlobalOptions& globals, const LoadedScene& loaded,
+                            FrameLoop& loop, const StillConfig& config, ChosenCamera& camera, RenderedImage& image,
+                            Progress& progress) {
   return with_file(options.input, [&] {
     const bool may_replace = !options.camera && camera.index;
-    StillReport report = render_still(loop, camera.camera, config.frames, may_replace, image, progress);
+    PictureReport report = render_still(loop, camera.camera, config.frames, may_replace, image, progress);
     if (report.seen || !may_replace) return report;
     camera = frame_whole_scene(camera, *loaded.source, config.size, options, globals);
     loop.reset();
@@ -75,6 +63,8 @@ void check_targets(const ImageOutputs& outputs, const JsonOutput& json, const De
 }
 
 int run(const RenderOptions& options, const GlobalOptions& globals) {
+  validate(options.sequence);
+  if (options.sequence.path) return render_sequence(options, globals);
   if (options.outputs.empty()) fail_without_output("render", options.input, ".png");
   tracer_config(options, globals, false); // reports wrong options before any work
   if (!options.size.empty()) parse_size(options.size);
@@ -86,19 +76,15 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   check_targets(outputs, json, detail);
   ProgressDisplay display(globals);
   Progress progress(display.observer());
+  const RenderSetup setup(options, globals, outputs.has_lod_layers(), measure_detail, progress, display);
+  const LoadedScene& loaded = setup.loaded;
+  const StillConfig& config = setup.config;
+  FrameLoop& loop = *setup.loop;
+  ChosenCamera camera = setup.camera;
   FileTimings timings;
-  const Stopwatch loading;
-  const LoadedScene loaded = load_scene(options.input, options.scene, globals, progress, display, options.private_copy);
-  timings.load_s = loading.seconds();
-  if (detail.error_px) require_levels(options.input, loaded);
-  ChosenCamera camera = choose_camera(*loaded.source, options, globals);
-  StillConfig config = make_config(*loaded.source, camera.camera, options, measure_detail);
-  config.lod_layers = outputs.has_lod_layers();
-  const MemoryReservation pixels = reserve_picture(options, config, globals.memory);
-  const BakedFile* const file = loaded.baked ? &*loaded.baked : nullptr;
-  FrameLoop loop({loaded.source.get(), file, tracer_config(options, globals, file != nullptr)}, config);
+  timings.load_s = setup.load_s;
   RenderedImage image;
-  const StillReport report = render_chosen(options, globals, loaded, loop, config, camera, image, progress);
+  const PictureReport report = render_chosen(options, globals, loaded, loop, config, camera, image, progress);
   display.finish();
 
   const Stopwatch writing;
@@ -109,9 +95,9 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   timings.write_s = writing.seconds();
   const RayTracer& first_tracer = *loop.tracers().front();
   nlohmann::json result = render_json(options, config, image, report, loop, camera, outputs.targets(), timings);
-  if (file != nullptr) {
+  if (loaded.baked) {
     const PrimaryCamera traced_pixels(camera.camera, config.traced_size());
-    result["seams"] = visible_seams_json(InstanceSeams(*file), image, traced_pixels,
+    result["seams"] = visible_seams_json(InstanceSeams(*loaded.baked), image, traced_pixels,
                                          detail.camera_uses_levels() ? loop.detail() : nullptr);
   }
   if (!report.seen && !globals.quiet)

@@ -1,5 +1,7 @@
 #include "runtime/commands/render_options.h"
 
+#include <algorithm>
+
 #include "pbrt_import/base/error.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/commands/render_camera.h"
@@ -39,9 +41,10 @@ void add_picture_options(CLI::App& verb, RenderOptions& options) {
       ->type_name("COLOR");
   verb.add_flag("--no-legend", options.no_legend,
                 "Do not add the colour scale below .png files of depth, lod and lod-error");
-  verb.add_option("--supersample", options.supersample,
-                  "Trace at N times the width and height and filter down, 1..8 (default 1), for smooth edges in few frames. "
-                  "Time and memory grow with N squared")
+  verb.add_option(
+          "--supersample", options.supersample,
+          "Trace at N times the width and height and filter down, 1..8 (default 1), for smooth edges in few frames. "
+          "Time and memory grow with N squared")
       ->type_name("N");
 }
 
@@ -49,7 +52,7 @@ void add_picture_options(CLI::App& verb, RenderOptions& options) {
 void add_sampling_options(CLI::App& verb, RenderOptions& options) {
   verb.add_option("--frames", options.frames,
                   "Number of frames to accumulate and denoise, 1..65536 (default 32). More frames give "
-                  "less noise and take longer")
+                  "less noise and take longer. With --path, the number of pictures")
       ->type_name("N");
   verb.add_option("--spp", options.spp, "Ambient occlusion rays per pixel and frame, 1..65536 (default 1)")
       ->type_name("N");
@@ -119,6 +122,7 @@ void add_render_options(CLI::App& verb, RenderOptions& options) {
   add_sampling_options(verb, options);
   add_tracer_options(verb, options);
   add_lod_options(verb, options.lod);
+  add_sequence_options(verb, options.sequence);
   add_scene_options(verb, options.scene);
   verb.footer("The image is the mean of --frames frames of --spp rays per pixel, denoised over time\n"
               "and space. -v prints the chosen camera, radius, backend and grid with the reasons.\n"
@@ -127,7 +131,9 @@ void add_render_options(CLI::App& verb, RenderOptions& options) {
               "  packtrace render house.ptk -o house.png,house.exr --aov all --frames 256\n"
               "  packtrace render house.ptk -o - --background transparent | display\n"
               "  packtrace render forest.ptk -o forest.png --lod-error 1 --aov ao,lod\n"
-              "  packtrace render scene.pbrt -o truth.exr --ground-truth --spp 1024");
+              "  packtrace render scene.pbrt -o truth.exr --ground-truth --frames 256\n"
+              "  packtrace render house.ptk --path orbit:90 --frames 96 -o 'frame_%04d.png'\n"
+              "  packtrace render house.ptk --path turntable -o - --stream y4m | ffmpeg -i - turn.mp4");
 }
 
 StillConfig make_config(const SceneSource& source, const Camera& camera, const RenderOptions& options,
@@ -141,7 +147,9 @@ StillConfig make_config(const SceneSource& source, const Camera& camera, const R
     throw Error(ErrorKind::kUsage, "--ground-truth needs all pixels; it does not go with --ao-resolution quarter");
   config.jitter = !options.no_jitter;
   config.detail = detail_config(options.lod, measure_detail);
-  config.frames = options.frames.value_or(options.ground_truth ? kGroundTruthFrames : 32);
+  // A sequence has its own numbers of pictures and frames.
+  const uint64_t frames = options.frames.value_or(options.ground_truth ? kGroundTruthFrames : 32);
+  config.frames = options.sequence.path ? 1 : static_cast<uint32_t>(std::min<uint64_t>(frames, ~0u));
   config.ao.spp = options.spp.value_or(options.ground_truth ? kGroundTruthSpp : 1);
   config.ao.radius = options.ao_radius.value_or(default_ao_radius(source.world_bounds()));
   config.ao.falloff = !options.ao_falloff_off;

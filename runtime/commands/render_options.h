@@ -10,6 +10,7 @@
 #include "runtime/commands/layer_previews.h"
 #include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/lod_render.h"
+#include "runtime/commands/sequence_options.h"
 #include "runtime/frame/still.h"
 #include "runtime/trace/make_tracer.h"
 
@@ -25,7 +26,8 @@ struct RenderOptions {
   bool no_legend = false;
   bool private_copy = false;
   uint32_t supersample = 1;
-  std::optional<uint32_t> spp, frames;
+  std::optional<uint32_t> spp;
+  std::optional<uint64_t> frames; ///< of a still; with --path the number of pictures
   bool ground_truth = false, no_denoise = false, no_jitter = false, fast_edges = false;
   std::string ao_resolution = "full";
   SceneOptions scene;
@@ -36,6 +38,7 @@ struct RenderOptions {
   std::optional<std::string> backend; ///< if not set, the input decides
   std::optional<std::string> bvh;
   LodOptions lod;
+  SequenceOptions sequence;
 };
 
 /// Adds all options of `render` to the verb. `options` must outlive it.

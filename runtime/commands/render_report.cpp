@@ -113,7 +113,7 @@ std::string grid_text(const LoadedScene& loaded) {
 } // namespace
 
 nlohmann::json render_json(const RenderOptions& options, const StillConfig& config, const RenderedImage& image,
-                           const StillReport& report, const FrameLoop& loop, const ChosenCamera& camera,
+                           const PictureReport& report, const FrameLoop& loop, const ChosenCamera& camera,
                            const std::vector<std::string>& files, const FileTimings& timings) {
   const std::vector<const RayTracer*> tracers = loop.tracers();
   const RayTracer& tracer = *tracers.back();

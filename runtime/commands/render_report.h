@@ -22,7 +22,7 @@ struct FileTimings {
 /// @param loop after its last frame
 /// @param files the files written
 nlohmann::json render_json(const RenderOptions& options, const StillConfig& config, const RenderedImage& image,
-                           const StillReport& report, const FrameLoop& loop, const ChosenCamera& camera,
+                           const PictureReport& report, const FrameLoop& loop, const ChosenCamera& camera,
                            const std::vector<std::string>& files, const FileTimings& timings);
 
 /// Prints the human-readable form of render_json().

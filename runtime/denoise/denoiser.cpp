@@ -47,6 +47,14 @@ struct AoDenoiser::State {
   explicit State(const DenoiserConfig& checked) : config(checked) {}
 
   void resize(ImageSize size);
+  /// Calls work(plane) for everything that the next frame needs of this one; all elements have 4 bytes.
+  template <typename Work>
+  void for_each_saved_plane(const Work& work) {
+    Guides& g = now.guides;
+    History& h = now.history;
+    work(g.disparity), work(g.normal_x), work(g.normal_y), work(g.normal_z), work(g.instance);
+    work(h.mean), work(h.square), work(h.fast), work(h.samples);
+  }
   void update_history(const GBuffer& gbuffer);
   void compare_neighbours();
   void blur();
@@ -56,7 +64,7 @@ struct AoDenoiser::State {
   bool has_frame = false;
   bool edges_outdated = false;     ///< `edges` do not belong to the guides
   bool statistics_pending = false; ///< correct_history() has not run for the last frame
-  FrameHistory now, before; // `before` is only used while a frame is denoised
+  FrameHistory now, before;        // `before` is only used while a frame is denoised
   DepthDerivatives derivatives;
   std::vector<EdgeWeights> edges = {EdgeWeights(1), EdgeWeights(2), EdgeWeights(4)};
   FrameSamples samples;
@@ -159,6 +167,39 @@ const DenoisedAo& AoDenoiser::denoise() {
   state.blur();
   state.write(state.result);
   return state.result;
+}
+
+std::vector<std::byte> AoDenoiser::save() const {
+  std::vector<std::byte> bytes;
+  if (!state_->has_frame) return bytes;
+  const ImageSize size = state_->now.guides.size;
+  state_->for_each_saved_plane([&](auto& plane) {
+    for (int y = 0; y < static_cast<int>(size.height); ++y) {
+      const auto row = std::as_bytes(std::span(plane.row(y), size.width));
+      bytes.insert(bytes.end(), row.begin(), row.end());
+    }
+  });
+  return bytes;
+}
+
+void AoDenoiser::restore(ImageSize size, std::span<const std::byte> bytes) {
+  State& state = *state_;
+  state.resize(size);
+  if (bytes.empty()) return;
+  size_t planes = 0;
+  state.for_each_saved_plane([&](auto&) { ++planes; });
+  if (bytes.size() != planes * sizeof(float) * size.pixels())
+    throw Error(ErrorKind::kInput, "denoiser: the saved history has another size");
+  state.now.guides.size = size;
+  state.for_each_saved_plane([&](auto& plane) {
+    for (int y = 0; y < static_cast<int>(size.height); ++y) {
+      const auto row = std::as_writable_bytes(std::span(plane.row(y), size.width));
+      std::copy_n(bytes.begin(), row.size(), row.begin());
+      bytes = bytes.subspan(row.size());
+    }
+  });
+  state.has_frame = true;
+  state.edges_outdated = true;
 }
 
 void AoDenoiser::reset() { state_->has_frame = false; }

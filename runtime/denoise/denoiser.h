@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "runtime/camera/gbuffer.h"
@@ -56,6 +58,12 @@ public:
   /// The second half of next_frame(): blurs a copy of the history. Without a frame, all pixels are misses.
   /// @return the result, valid until the next call
   const DenoisedAo& denoise();
+
+  /// Returns the history and its guides as bytes, for restore(); empty without history.
+  std::vector<std::byte> save() const;
+  /// Continues where an object with the same configuration was saved. Throws Error (kInput) if the bytes do not belong
+  /// to images of this size.
+  void restore(ImageSize size, std::span<const std::byte> bytes);
 
   /// Discards all history. Call it at camera cuts.
   void reset();

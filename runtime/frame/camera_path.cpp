@@ -1,0 +1,116 @@
+#include "runtime/frame/camera_path.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "pbrt_import/base/error.h"
+
+namespace packtrace {
+namespace {
+
+bool finite_vector(DVec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+/// Below this sine of the angle between the view and up, the image's roll is undefined.
+constexpr double kMinSine = 1e-6;
+
+bool has_view(const CameraKey& key) {
+  const DVec3 view = key.look - key.position;
+  const double size = glm::length(view) * glm::length(key.up);
+  return size > 0.0 && std::isfinite(size) && glm::length(glm::cross(view, key.up)) > kMinSine * size;
+}
+
+void check_key(const std::vector<CameraKey>& keys, size_t i) {
+  const CameraKey& key = keys[i];
+  const auto fail = [&](const char* what) {
+    throw Error(ErrorKind::kUsage, std::string("key ").append(std::to_string(i)).append(": ").append(what));
+  };
+  if (!std::isfinite(key.time_s) || !finite_vector(key.position) || !finite_vector(key.look) || !finite_vector(key.up))
+    fail("all numbers must be finite");
+  if (i > 0 && !(key.time_s > keys[i - 1].time_s)) fail("its time is not after that of the key before");
+  if (!(key.fov_degrees > 0.0 && key.fov_degrees < 180.0)) fail("fov must be between 0 and 180 degrees");
+  if (glm::length(key.look - key.position) == 0.0) fail("it looks at its own position");
+  if (!has_view(key)) fail("up is parallel to the view, or zero");
+}
+
+/// A cubic Hermite spline over one span of keys.
+struct HermiteSpan {
+  double before_s, begin_s, end_s, after_s, t; ///< t in [0, 1]
+
+  /// @param p the values at the four times; an end of the path repeats its key
+  template <typename Value>
+  Value operator()(const Value& p0, const Value& p1, const Value& p2, const Value& p3) const {
+    const double length = end_s - begin_s;
+    const Value m1 = (p2 - p0) * (length / (end_s - before_s)), m2 = (p3 - p1) * (length / (after_s - begin_s));
+    const double t2 = t * t, t3 = t2 * t;
+    return p1 * (2 * t3 - 3 * t2 + 1) + m1 * (t3 - 2 * t2 + t) + p2 * (3 * t2 - 2 * t3) + m2 * (t3 - t2);
+  }
+};
+
+} // namespace
+
+CameraPath::CameraPath(std::vector<CameraKey> keys, const Camera& base) : keys_(std::move(keys)), base_(base) {
+  if (keys_.size() < 2) throw Error(ErrorKind::kUsage, "a camera path needs at least two keys");
+  for (size_t i = 0; i < keys_.size(); ++i) check_key(keys_, i);
+  base_.animation = kNotAnimated;
+}
+
+CameraKey CameraPath::interpolated(double time_s) const {
+  if (!(time_s > begin_s())) return keys_.front();
+  if (time_s >= end_s()) return keys_.back();
+  const auto next = std::ranges::upper_bound(keys_, time_s, {}, &CameraKey::time_s);
+  const CameraKey &p1 = next[-1], &p2 = *next;
+  const CameraKey& p0 = next - 1 == keys_.begin() ? p1 : next[-2];
+  const CameraKey& p3 = next + 1 == keys_.end() ? p2 : next[1];
+  const HermiteSpan span{p0.time_s, p1.time_s, p2.time_s, p3.time_s, (time_s - p1.time_s) / (p2.time_s - p1.time_s)};
+  CameraKey key;
+  key.time_s = time_s;
+  key.position = span(p0.position, p1.position, p2.position, p3.position);
+  key.look = span(p0.look, p1.look, p2.look, p3.look);
+  key.up = span(p0.up, p1.up, p2.up, p3.up);
+  const double widest = std::max(p1.fov_degrees, p2.fov_degrees), narrowest = std::min(p1.fov_degrees, p2.fov_degrees);
+  key.fov_degrees = std::clamp(span(p0.fov_degrees, p1.fov_degrees, p2.fov_degrees, p3.fov_degrees), narrowest, widest);
+  if (has_view(key)) return key;
+  const CameraKey& nearest = span.t < 0.5 ? p1 : p2;
+  key.look = key.position + (nearest.look - nearest.position);
+  key.up = nearest.up;
+  return key;
+}
+
+Camera CameraPath::camera_of(const CameraKey& key) const {
+  Camera camera = base_;
+  const DVec3 forward = glm::normalize(key.look - key.position);
+  DVec3 right = glm::normalize(glm::cross(key.up, forward));
+  const DVec3 up = glm::cross(forward, right);
+  if (glm::determinant(glm::dmat3(base_.world_from_camera)) < 0.0) right = -right;
+  camera.world_from_camera = DAffine(right, up, forward, key.position);
+  camera.fov_degrees = key.fov_degrees;
+  return camera;
+}
+
+Camera CameraPath::at(double time_s) const { return camera_of(interpolated(time_s)); }
+
+DVec3 nearest_up_axis(const Camera& camera) {
+  const DVec3 up(camera.world_from_camera[1]);
+  int axis = 0;
+  for (int i = 1; i < 3; ++i)
+    if (std::abs(up[i]) > std::abs(up[axis])) axis = i;
+  DVec3 result(0.0);
+  result[axis] = up[axis] < 0.0 ? -1.0 : 1.0;
+  return result;
+}
+
+Camera orbited(const Camera& camera, DVec3 pivot, DVec3 up, double degrees) {
+  Camera turned = camera;
+  if (degrees == 0.0) return turned;
+  // In pbrt's left-handed space, a camera that looks at the pivot moves to its right for negative angles about up.
+  const glm::dmat3 rotation(glm::rotate(glm::dmat4(1.0), glm::radians(-degrees), up));
+  for (int column = 0; column < 3; ++column)
+    turned.world_from_camera[column] = rotation * DVec3(camera.world_from_camera[column]);
+  turned.world_from_camera[3] = pivot + rotation * (DVec3(camera.world_from_camera[3]) - pivot);
+  return turned;
+}
+
+} // namespace packtrace

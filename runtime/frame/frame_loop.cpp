@@ -1,6 +1,7 @@
 #include "runtime/frame/frame_loop.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "pbrt_import/base/error.h"
 #include "runtime/camera/lod_view.h"
@@ -42,6 +43,25 @@ PassTimes& PassTimes::operator+=(const PassTimes& other) {
   return *this;
 }
 
+void PictureReport::add(const FrameReport& frame) {
+  ++frames;
+  times += frame.times;
+  primary_rays += frame.primary_rays, ao_rays += frame.ao_rays;
+  seen |= frame.seen, rebuilt |= frame.rebuilt;
+}
+
+namespace {
+
+/// The bytes of FrameLoop::save() before the denoiser's.
+struct SavedLoop {
+  uint64_t next_number;
+  uint32_t still_frames;
+  uint32_t reserved;
+  uint64_t mean_bytes; ///< of RawMean
+};
+
+} // namespace
+
 /// Mean of raw AO over frames, for renders without the denoiser. Pixels may miss in some frames.
 class FrameLoop::RawMean {
 public:
@@ -50,6 +70,22 @@ public:
     if (sum_.empty()) sum_.assign(frame.ao.size(), 0.0), count_.assign(frame.ao.size(), 0);
     for (size_t i = 0; i < sum_.size(); ++i)
       if (frame.ao[i] >= 0.0f) sum_[i] += static_cast<double>(frame.ao[i]), ++count_[i];
+  }
+  std::vector<std::byte> save() const {
+    const auto sums = std::as_bytes(std::span(sum_)), counts = std::as_bytes(std::span(count_));
+    std::vector<std::byte> bytes(sums.size() + counts.size());
+    std::ranges::copy(counts, std::ranges::copy(sums, bytes.begin()).out);
+    return bytes;
+  }
+  /// @return whether the bytes fit the number of pixels
+  bool restore(size_t pixels, std::span<const std::byte> bytes) {
+    clear();
+    if (bytes.empty()) return true;
+    if (bytes.size() != pixels * (sizeof(double) + sizeof(uint32_t))) return false;
+    sum_.resize(pixels), count_.resize(pixels);
+    std::memcpy(sum_.data(), bytes.data(), pixels * sizeof(double));
+    std::memcpy(count_.data(), bytes.data() + pixels * sizeof(double), pixels * sizeof(uint32_t));
+    return true;
   }
   std::vector<float> result() const {
     std::vector<float> mean(sum_.size(), kInvalidAo);
@@ -81,6 +117,47 @@ void FrameLoop::reset() {
   view_.reset();
   next_number_ = 0;
   denoiser_.reset();
+}
+
+std::vector<std::byte> FrameLoop::save() const {
+  const std::vector<std::byte> mean = raw_mean_->save(), history = denoiser_.save();
+  const SavedLoop saved{next_number_, still_frames_, 0, mean.size()};
+  std::vector<std::byte> bytes(sizeof(saved) + mean.size() + history.size());
+  std::memcpy(bytes.data(), &saved, sizeof(saved));
+  std::ranges::copy(history, std::ranges::copy(mean, bytes.begin() + sizeof(saved)).out);
+  return bytes;
+}
+
+void FrameLoop::restore(const Camera& camera, std::span<const std::byte> bytes) {
+  SavedLoop saved{};
+  const auto fail = [] { throw Error(ErrorKind::kInput, "the saved state does not belong to these settings"); };
+  if (bytes.size() < sizeof(saved)) fail();
+  std::memcpy(&saved, bytes.data(), sizeof(saved));
+  bytes = bytes.subspan(sizeof(saved));
+  if (saved.mean_bytes > bytes.size() || saved.next_number <= saved.still_frames) fail();
+  const ImageSize shaded =
+      config_.ao_resolution == AoResolution::kFull
+          ? config_.traced_size()
+          : ImageSize{(config_.traced_size().width + 1) / 2, (config_.traced_size().height + 1) / 2};
+  reset();
+  if (!raw_mean_->restore(shaded.pixels(), bytes.first(saved.mean_bytes))) fail();
+  denoiser_.restore(shaded, bytes.subspan(saved.mean_bytes));
+  // Camera rays are traced again: they depend on the camera alone.
+  layers_.clear();
+  for (still_frames_ = 0;; ++still_frames_) {
+    report_ = {};
+    report_.moved = still_frames_ == 0;
+    if (traces(still_frames_)) {
+      const PrimaryCamera view = view_of(camera, still_frames_);
+      trace_camera_rays(view, view);
+      layers_.add(gbuffer_, scene_.source->materials());
+      if (config_.lod_layers) add_lod_layers(view);
+    }
+    if (still_frames_ == saved.still_frames) break;
+  }
+  camera_ = camera;
+  view_.emplace(camera, config_.traced_size());
+  next_number_ = saved.next_number;
 }
 
 uint64_t FrameLoop::frame_pixels() const {
@@ -163,6 +240,16 @@ void FrameLoop::add_lod_layers(const PrimaryCamera& view) {
     }
 }
 
+/// Whether camera rays are traced in a frame, counted from the last that moved.
+bool FrameLoop::traces(uint32_t still_frame) const {
+  return still_frame == 0 || (config_.jitters() && still_frame % kFramesPerOffset == 0);
+}
+
+PrimaryCamera FrameLoop::view_of(const Camera& camera, uint32_t still_frame) const {
+  const glm::dvec2 offset = config_.jitters() ? jitter_offset(still_frame / kFramesPerOffset) : glm::dvec2(0.0);
+  return {camera, config_.traced_size(), offset};
+}
+
 const FrameReport& FrameLoop::next_frame(const Camera& camera, Progress& progress) {
   const bool first = !view_;
   const bool moved = first || !same_camera(camera, *camera_);
@@ -174,9 +261,8 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, Progress& progres
   still_frames_ = moved ? 0 : still_frames_ + 1;
 
   const bool still_jitter = config_.jitters() && !moved;
-  const bool trace = moved || (still_jitter && still_frames_ % kFramesPerOffset == 0);
-  const PrimaryCamera view(camera, config_.traced_size(),
-                           still_jitter ? jitter_offset(still_frames_ / kFramesPerOffset) : glm::dvec2(0.0));
+  const bool trace = traces(still_frames_);
+  const PrimaryCamera view = view_of(camera, still_frames_);
   if (trace)
     trace_camera_rays(view, first || !moved ? view : *view_);
   else if (still_frames_ == 1)
@@ -215,15 +301,22 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, Progress& progres
 }
 
 /// The denoised AO, or the mean of the raw AO, of all traced pixels.
-std::vector<float> FrameLoop::accumulated_ao(PassTimes& times) {
+std::vector<float> FrameLoop::accumulated_ao(PictureReport& report) {
   const Stopwatch denoising;
-  std::vector<float> ao = config_.denoise ? denoiser_.denoise().ao : raw_mean_->result();
-  times.denoise_s += denoising.seconds();
-  return ao;
+  if (!config_.denoise) return raw_mean_->result();
+  const DenoisedAo& denoised = denoiser_.denoise();
+  report.times.denoise_s += denoising.seconds();
+  double sum = 0.0;
+  uint64_t count = 0;
+  for (size_t i = 0; i < denoised.ao.size(); ++i)
+    if (denoised.ao[i] >= 0.0f) sum += static_cast<double>(denoised.tspp[i]), ++count;
+  report.mean_history = count > 0 ? sum / static_cast<double>(count) : 0.0;
+  return denoised.ao;
 }
 
-void FrameLoop::resolve(RenderedImage& image, PassTimes& times) {
-  std::vector<float> ao = accumulated_ao(times);
+void FrameLoop::resolve(RenderedImage& image, PictureReport& report) {
+  PassTimes& times = report.times;
+  std::vector<float> ao = accumulated_ao(report);
   if (config_.ao_resolution == AoResolution::kQuarter) {
     const Stopwatch upsampling;
     ao = upsample_ao(gbuffer_, half_, ao);

@@ -28,13 +28,13 @@ struct FrameScene {
 
 /// Wall times of a frame's passes in seconds.
 struct PassTimes {
-  double plan_s = 0;    ///< choice of LOD cuts and their clusters
-  double build_s = 0;   ///< decoding and BVH construction
-  double primary_s = 0; ///< camera rays
-  double ao_s = 0;      ///< occlusion rays
-  double denoise_s = 0; ///< reprojection, accumulation and blurs
+  double plan_s = 0;     ///< choice of LOD cuts and their clusters
+  double build_s = 0;    ///< decoding and BVH construction
+  double primary_s = 0;  ///< camera rays
+  double ao_s = 0;       ///< occlusion rays
+  double denoise_s = 0;  ///< reprojection, accumulation and blurs
   double upsample_s = 0; ///< of AO traced at a lower resolution, and selecting its pixels
-  double resolve_s = 0; ///< layers of the image
+  double resolve_s = 0;  ///< layers of the image
 
   PassTimes& operator+=(const PassTimes& other);
   double total_s() const { return plan_s + build_s + primary_s + ao_s + denoise_s + upsample_s + resolve_s; }
@@ -49,6 +49,18 @@ struct FrameReport {
   uint64_t primary_rays = 0, ao_rays = 0;
   uint64_t hit_pixels = 0; ///< traced pixels whose camera ray hits
   bool rebuilt = false;    ///< the LOD plan needed other trees
+};
+
+/// Sums over the frames of a picture.
+struct PictureReport {
+  PassTimes times;
+  uint32_t frames = 0;
+  uint64_t primary_rays = 0, ao_rays = 0;
+  bool seen = false;         ///< some camera ray hit
+  bool rebuilt = false;      ///< as in FrameReport, in some frame
+  double mean_history = 0.0; ///< mean over hit pixels of the frames of history behind them (DenoisedAo::tspp)
+
+  void add(const FrameReport& frame);
 };
 
 /// Renders a scene frame by frame: detail, camera rays, occlusion rays, denoising. It keeps what the next frame needs
@@ -68,8 +80,15 @@ public:
   const FrameReport& next_frame(const Camera& camera, Progress& progress);
 
   /// Writes the layers of the frames so far.
-  /// @param times the denoiser's and the resolve's times are added
-  void resolve(RenderedImage& image, PassTimes& times);
+  /// @param report mean_history is set, and the denoiser's and the resolve's times are added
+  void resolve(RenderedImage& image, PictureReport& report);
+
+  /// Returns what the next frame needs of the previous ones, for restore().
+  std::vector<std::byte> save() const;
+  /// Continues where a frame loop with the same scene and configuration was saved.
+  /// @param camera that of the last frame
+  /// Throws Error(kInput) for bytes that save() did not write, and as next_frame() does.
+  void restore(const Camera& camera, std::span<const std::byte> bytes);
 
   /// Number of occlusion pixels per frame.
   uint64_t frame_pixels() const;
@@ -82,15 +101,19 @@ public:
   const SceneSource& traced_source() const;
   std::vector<const RayTracer*> tracers() const;
   const DetailPlanner* detail() const { return planner_.get(); }
+  /// Camera rays of the last frame that traced any.
+  const GBuffer& gbuffer() const { return gbuffer_; }
 
 private:
   class RawMean;
 
   void choose_detail(const PrimaryCamera& view, const GBuffer* seen);
   void trace_camera_rays(const PrimaryCamera& view, const PrimaryCamera& previous);
+  PrimaryCamera view_of(const Camera& camera, uint32_t still_frame) const;
+  bool traces(uint32_t still_frame) const;
   void build_level_0();
   void add_lod_layers(const PrimaryCamera& view);
-  std::vector<float> accumulated_ao(PassTimes& times);
+  std::vector<float> accumulated_ao(PictureReport& report);
 
   FrameScene scene_;
   FrameConfig config_;
@@ -113,10 +136,10 @@ private:
 };
 
 /// Offset of the camera rays of a still view's frame from pixel centres, in pixels within [-0.5, 0.5): points of the
-/// Halton sequence in the bases 3 and 5, whose first is 0. The sampler of occlusion rays uses base 2, so that the frames
-/// whose camera rays hit one side of an edge have well-distributed occlusion rays, too. (Points of the R2 sequence
-/// repeat almost every 4 frames and leave noise at edges.)
-/// Source: J. H. Halton, "On the efficiency of certain quasi-random sequences of points", 1960.
+/// Halton sequence in the bases 3 and 5, whose first is 0. The sampler of occlusion rays uses base 2, so that the
+/// frames whose camera rays hit one side of an edge have well-distributed occlusion rays, too. (Points of the R2
+/// sequence repeat almost every 4 frames and leave noise at edges.) Source: J. H. Halton, "On the efficiency of certain
+/// quasi-random sequences of points", 1960.
 glm::dvec2 jitter_offset(uint32_t frame);
 
 } // namespace packtrace

@@ -84,8 +84,8 @@ void MeanLayers::resolve(const FrameConfig& config, std::span<const float> ao, s
       hits += hits_[in], ao_sum += hits_[in] * ao[in], depth += depth_[in];
       if (raw[in] >= 0.0f) raw_hits += 1.0f, raw_sum += raw[in];
       normal += normal_[in], albedo += albedo_[in];
-      shaded += emitters_.empty() ? albedo_[in] * ao[in]
-                                  : Vec3(emitters_[in]) + (albedo_[in] - emitter_albedo_[in]) * ao[in];
+      shaded +=
+          emitters_.empty() ? albedo_[in] * ao[in] : Vec3(emitters_[in]) + (albedo_[in] - emitter_albedo_[in]) * ao[in];
     }
     if (hits == 0.0f) return;
     const float scale = 1.0f / hits;

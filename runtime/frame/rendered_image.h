@@ -14,9 +14,9 @@ namespace packtrace {
 /// kNoInstance and all other layers are 0.
 struct RenderedImage {
   ImageSize size;
-  std::vector<float> ao;     ///< denoised; without the denoiser the mean over all frames
-  std::vector<float> ao_raw; ///< AO of the last frame alone, not denoised; kInvalidAo where its camera rays miss
-  std::vector<float> depth;  ///< camera-space z, world units
+  std::vector<float> ao;          ///< denoised; without the denoiser the mean over all frames
+  std::vector<float> ao_raw;      ///< AO of the last frame alone, not denoised; kInvalidAo where its camera rays miss
+  std::vector<float> depth;       ///< camera-space z, world units
   std::vector<float> coverage;    ///< fraction of the camera rays that hit, [0, 1]
   std::vector<Vec3> normal;       ///< world space
   std::vector<Vec3> albedo;       ///< linear sRGB

@@ -10,20 +10,23 @@ void StillConfig::validate() const {
   if (frames < 1 || frames > kMaxFrames) throw Error(ErrorKind::kUsage, "frames must be in [1, 65536]");
 }
 
-StillReport render_still(FrameLoop& loop, const Camera& camera, uint32_t frames, bool stop_if_nothing_visible,
-                         RenderedImage& image, Progress& progress) {
-  StillReport sums;
+PictureReport render_picture(FrameLoop& loop, const Camera& camera, uint32_t frames, RenderedImage& image,
+                             Progress& progress) {
+  PictureReport report;
+  for (uint32_t i = 0; i < frames; ++i) report.add(loop.next_frame(camera, progress));
+  loop.resolve(image, report);
+  return report;
+}
+
+PictureReport render_still(FrameLoop& loop, const Camera& camera, uint32_t frames, bool stop_if_nothing_visible,
+                           RenderedImage& image, Progress& progress) {
   progress.begin("ambient occlusion", frames * loop.frame_pixels());
-  for (uint32_t i = 0; i < frames; ++i) {
-    const FrameReport& frame = loop.next_frame(camera, progress);
-    sums.times += frame.times;
-    sums.primary_rays += frame.primary_rays, sums.ao_rays += frame.ao_rays;
-    if (i == 0) sums.seen = frame.seen;
-    sums.seen |= frame.seen;
-    if (!sums.seen && stop_if_nothing_visible) return sums;
-  }
-  loop.resolve(image, sums.times);
-  return sums;
+  PictureReport report;
+  report.add(loop.next_frame(camera, progress));
+  if (!report.seen && stop_if_nothing_visible) return report;
+  for (uint32_t i = 1; i < frames; ++i) report.add(loop.next_frame(camera, progress));
+  loop.resolve(image, report);
+  return report;
 }
 
 } // namespace packtrace

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+
+#include "runtime/commands/render_camera.h"
+#include "runtime/commands/render_options.h"
+#include "runtime/frame/frame_loop.h"
+#include "runtime/stopwatch.h"
+
+namespace packtrace {
+
+/// What `render` needs for stills and sequences: the scene, the camera, the settings and a frame loop.
+struct RenderSetup {
+  /// Loads the scene and prepares the frame loop.
+  /// @param lod_layers FrameConfig::lod_layers
+  /// @param measure_detail as in detail_config()
+  /// Throws like load_scene(), choose_camera(), make_config() and FrameLoop, and MemoryError for large pictures.
+  RenderSetup(const RenderOptions& options, const GlobalOptions& globals, bool lod_layers, bool measure_detail,
+              Progress& progress, ProgressDisplay& display);
+  RenderSetup(const RenderSetup&) = delete;
+  RenderSetup& operator=(const RenderSetup&) = delete;
+
+  Stopwatch loading;  ///< begins with the constructor
+  LoadedScene loaded; ///< not movable: its source refers to it
+  double load_s = 0.0;
+  ChosenCamera camera;
+  StillConfig config;
+  MemoryReservation pixels;
+  std::unique_ptr<FrameLoop> loop;
+};
+
+} // namespace packtrace
