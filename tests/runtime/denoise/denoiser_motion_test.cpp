@@ -34,7 +34,7 @@ TEST(Reprojection, IntegerPansFetchTheSameBits) {
   History out;
   out.resize(size);
   for (int y = 0; y < 21; ++y) std::fill_n(out.mean.row(y), 33, 0.5f); // a rejection must overwrite these values
-  reproject(previous, previous.guides, derivatives, g.motion_px, DenoiserConfig{}, out);
+  reproject(previous, previous.guides, derivatives, g.motion_px, {}, DenoiserConfig{}, out);
   for (int y = 0; y < 21; ++y)
     for (int x = 0; x < 33; ++x) {
       const bool seen = x >= 3 && y + 2 < 21;
