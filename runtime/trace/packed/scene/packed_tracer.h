@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "compress/format/file/baked_file.h"
+#include "runtime/trace/movers.h"
 #include "runtime/trace/packed/kernels/isa.h"
 #include "runtime/trace/packed/scene/traced_trees.h"
 #include "runtime/trace/ray_tracer.h"
@@ -16,18 +17,19 @@ public:
   /// Keeps references: both must outlive the tracer.
   /// @param source a source of the same file; provides instances and alpha masks
   /// Throws Error(kUnsupported) for an instruction set that this machine lacks, Error(kInput) for transforms that are
-  /// not finite.
-  PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa = chosen_isa());
+  /// not finite, Error(kUsage) for movers that do not exist or whose geometry shares the tree of the world space.
+  PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa = chosen_isa(),
+               const Movers& movers = {});
   /// Does the same at the detail of a plan: builds one tree per BLAS, except that all world-space geometries, which
   /// have one instance each, share one tree.
-  PackedTracer(const BakedFile& file, const LodSource& source, PackedIsa isa = chosen_isa());
+  PackedTracer(const BakedFile& file, const LodSource& source, PackedIsa isa = chosen_isa(), const Movers& movers = {});
   ~PackedTracer() override;
   PackedTracer(const PackedTracer&) = delete;
   PackedTracer& operator=(const PackedTracer&) = delete;
 
   std::string_view name() const override { return "packed"; }
   std::string_view isa() const override { return kernels_.isa; }
-  const UnitSpace& space() const override { return space_; }
+  const UnitSpace& space() const override;
   uint32_t preferred_rays_per_call() const override;
 
   void closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
@@ -35,10 +37,13 @@ public:
   void any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
                 std::span<uint8_t> occluded) const override;
   HitSurface resolve(const RayHit& hit) const override;
+  void place_instances(std::span<const uint32_t> instances, std::span<const Affine> world_from_object) override;
+  std::span<const Affine> world_from_object() const override;
+  std::array<DVec3, 3> object_vertices(const RayHit& hit, const HitSurface& surface) const override;
   std::vector<ResidentPart> resident() const override;
   std::vector<TreeBytes> tree_bytes() const override { return lod_trees_.trees; }
 
-  std::span<const uint32_t> flat_instances() const override { return flat_instances_; }
+  std::span<const uint32_t> flat_instances() const override;
 
   /// Build times and sizes of the trees; empty unless the source is a LodSource.
   const LodTrees& lod_trees() const { return lod_trees_; }
@@ -58,21 +63,19 @@ public:
 private:
   struct Tables;
 
-  PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod, PackedIsa isa);
+  PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod, PackedIsa isa,
+               const Movers& movers);
+  void set_callbacks();
   void find_first_instances();
   Bounds bounds_of(uint32_t geometry) const;
   uint32_t triangle_of(uint32_t cluster, uint32_t instance, uint32_t triangle) const;
   uint32_t instance_of(uint32_t placement, uint32_t cluster) const;
-  void place();
-  void add_placement(uint32_t tree, uint32_t instance, const DAffine& unit_from_grid);
   uint32_t geometry_of_cluster(uint32_t cluster) const;
 
   const BakedFile& file_;
   const SceneSource& source_;
   const LodSource* const lod_; ///< source_ if it is a LodSource, else null
   const packed::Kernels& kernels_;
-  UnitSpace space_;
-  std::vector<uint32_t> flat_instances_;
   LodTrees lod_trees_;
   std::unique_ptr<Tables> tables_;
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "compress/format/cluster/position_grid.h"
 #include "runtime/stopwatch.h"
 #include "runtime/trace/packed/scene/trace_cluster.h"
 
@@ -77,6 +78,14 @@ void add_trees(TracedTrees& t) {
 }
 
 } // namespace
+
+DAffine TracedTrees::object_from_grid(uint32_t tree) const {
+  const baked::TreeRecord& record = records[tree];
+  const double step = PositionGrid{record.step_mantissa, record.step_exponent}.step();
+  const DVec3 origin(static_cast<double>(record.origin[0]), static_cast<double>(record.origin[1]),
+                     static_cast<double>(record.origin[2]));
+  return DAffine(DVec3(step, 0, 0), DVec3(0, step, 0), DVec3(0, 0, step), origin * step);
+}
 
 TracedTrees whole_trees(const BakedFile& file) {
   TracedTrees t = make_room(file, file.base_geometry_count());

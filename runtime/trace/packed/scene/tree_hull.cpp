@@ -7,6 +7,8 @@
 namespace packtrace {
 namespace {
 
+using Double2 = double __attribute__((vector_size(16)));
+
 struct Child {
   DVec3 lo, hi;
   uint32_t node; ///< number of the node; 0 for a leaf
@@ -67,14 +69,16 @@ TreeBox TreeHull::placed(const DAffine& unit_from_grid, double pad, size_t begin
   TreeBox box;
   for (int axis = 0; axis < 3; ++axis) {
     const DVec3 row(unit_from_grid[0][axis], unit_from_grid[1][axis], unit_from_grid[2][axis]), size = glm::abs(row);
-    double lo[2], hi[2]; // of even and odd boxes: two independent dependency chains
-    std::fill_n(lo, 2, std::numeric_limits<double>::infinity());
-    std::fill_n(hi, 2, -std::numeric_limits<double>::infinity());
-    for (size_t i = begin; i < end; ++i) {
-      const double middle = row.x * centre_[0][i] + row.y * centre_[1][i] + row.z * centre_[2][i];
-      const double reach = size.x * half_[0][i] + size.y * half_[1][i] + size.z * half_[2][i];
-      lo[i & 1] = std::min(lo[i & 1], middle - reach);
-      hi[i & 1] = std::max(hi[i & 1], middle + reach);
+    constexpr double kInf = std::numeric_limits<double>::infinity();
+    Double2 lo{kInf, kInf}, hi{-kInf, -kInf};
+    for (size_t i = begin; i < end; i += 2) {
+      const size_t j = std::min(i + 1, end - 1); // the last of an odd number counts twice
+      const auto both = [&](const std::vector<double>& of) { return Double2{of[i], of[j]}; };
+      const Double2 middle = row.x * both(centre_[0]) + row.y * both(centre_[1]) + row.z * both(centre_[2]);
+      const Double2 reach = size.x * both(half_[0]) + size.y * both(half_[1]) + size.z * both(half_[2]);
+      const Double2 low = middle - reach, high = middle + reach;
+      lo = low < lo ? low : lo;
+      hi = high > hi ? high : hi;
     }
     const double offset = unit_from_grid[3][axis], beyond = pad * (size.x + size.y + size.z);
     box.lo[static_cast<size_t>(axis)] =
