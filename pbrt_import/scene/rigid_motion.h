@@ -11,7 +11,7 @@ namespace packtrace {
 
 enum class KeyInterpolation : uint32_t {
   kLinear = 0,    ///< translation and scale linear, rotation spherical (slerp), as in pbrt
-  kCatmullRom = 1 ///< cubic through all keys; rotation by slerps with the tangents of its neighbours
+  kCatmullRom = 1 ///< cubic Hermite curve through all keys, tangents from the neighbours; quaternions are normalised
 };
 
 /// A transform at a time: translation * rotation * scale.
@@ -19,13 +19,13 @@ struct MotionKey {
   double time_s = 0.0;
   DVec3 translation{0.0};
   glm::dquat rotation{1.0, 0.0, 0.0, 0.0}; ///< unit length; its sign selects the arc to its neighbours
-  glm::dmat3 scale{1.0};                   ///< symmetric
+  glm::dmat3 scale{1.0};                   ///< any linear map; symmetric if it is of pbrt's keys
 };
 
 /// A transform over time, constant before the first key and after the last one, or repeated.
 struct MotionTrack {
   KeyInterpolation interpolation = KeyInterpolation::kLinear;
-  bool loop = false; ///< repeats with the period last time - first time
+  bool loop = false;           ///< repeats with the period last time - first time
   std::vector<MotionKey> keys; ///< at least one; times ascend strictly; a single key is a constant
 };
 

@@ -143,7 +143,8 @@ uint64_t bytes_of(const Mesh& mesh);
 uint64_t unique_triangle_count(const Scene& scene);
 /// Number of triangles with all instances counted.
 uint64_t placed_triangle_count(const Scene& scene);
-/// World-space bounds of all shapes and instances, computed from transformed boxes; not always tight for rotated ones.
+/// World-space bounds of all shapes and instances at all times, computed from transformed boxes; not always tight for
+/// rotated ones.
 Bounds world_bounds(const Scene& scene);
 
 } // namespace packtrace

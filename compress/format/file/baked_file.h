@@ -93,6 +93,7 @@ public:
   TextureView texture(uint32_t index) const;
   std::vector<Material> materials() const;
   std::vector<Camera> cameras() const;
+  /// World-space bounds of all instances at all times, relative to origin().
   Bounds world_bounds() const;
   /// World coordinates of the point that all positions, instances and cameras of the file are relative to. It is 0
   /// unless the world lies far from its zero.

@@ -183,6 +183,7 @@ FileSummary summarize(const BakedFile& file) {
     summary.textures.push_back({std::string(s.text(t.name)), t.width, t.height, static_cast<TextureCodec>(t.codec),
                                 texture_bytes(static_cast<TextureCodec>(t.codec), t.width, t.height), t.psnr_db});
   summary.lod = summarize_lod(file);
+  summary.motion = summarize_motion(file);
   summary.instances = s.instances.size();
   summary.materials = s.materials.size();
   summary.masks = s.masks.size();

@@ -6,6 +6,7 @@
 
 #include "compress/format/file/baked_file.h"
 #include "compress/format/file/lod_summary.h"
+#include "compress/format/motion/motion_summary.h"
 
 namespace packtrace {
 
@@ -80,6 +81,7 @@ struct FileSummary {
   std::vector<TextureUse> textures;
   std::vector<UvUse> uvs; ///< ordered by encoding
   LodSummary lod;
+  MotionSummary motion;
   uint64_t trees = 0, nodes = 0;   ///< of all levels
   uint32_t tree_depth = 0;         ///< levels of nodes in the deepest tree
   double max_position_error = 0.0; ///< measured, largest axis, object units, maximum over all geometries
