@@ -19,12 +19,14 @@
 #include "compress/bake/plan/material_runs.h"
 #include "compress/bake/write/file_sections.h"
 #include "compress/bake/write/lod_store.h"
+#include "compress/bake/write/motion_packer.h"
 #include "compress/bake/write/requirement_table.h"
 #include "compress/format/file/baked_image.h"
 #include "compress/format/pages/page_encoder.h"
 #include "pbrt_import/base/brief.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/output_file.h"
+#include "pbrt_import/scene/motion_pose.h"
 
 namespace packtrace {
 namespace {
@@ -103,6 +105,7 @@ private:
       packed_[i].lod = {};
     }
     sections.set_instances(plan_.instances);
+    pack_motion(sections);
     sections.set_material_slots(plan_.material_slots);
     sections.set_requirements(requirements.rows());
     if (config_.trees) {
@@ -112,6 +115,34 @@ private:
     report_.resumed_geometries = packer_->resumed();
     add_up(scene_, plan_, packed_, report_, diagnostics_);
     return sections.assemble(summary(sections));
+  }
+
+  /// Packs the motion of instances and cameras. Bounds of the file are those of what the packed motion does.
+  void pack_motion(FileSections& sections) {
+    if (scene_.motion.empty()) return;
+    std::vector<MovingBox> boxes;
+    for (const InstanceMotion& moving : scene_.motion.instances) {
+      const baked::InstanceRecord& record = plan_.instances[moving.instance];
+      const baked::GeometryRecord& g = sections.geometries()[record.geometry];
+      boxes.push_back({Affine(placement_of(record)), box_of(g), g.position_error_bound});
+      const Bounds swept = swept_bounds(scene_.motion, moving, boxes.back().placement, boxes.back().box);
+      if (constexpr double kFar = 0x1p100; // poses and products of poses stay in the range of floats
+          !swept.empty() && !(glm::length(swept.lo) < kFar && glm::length(swept.hi) < kFar))
+        throw Error(ErrorKind::kInput, "the motion of " + plan_.geometries[record.geometry].name +
+                                           " leaves the float range; bake with --motion off, or move it less");
+    }
+    PackedMotion packed = packtrace::pack_motion(scene_.motion, boxes, progress_);
+    for (size_t i = 0; i < packed.motion.instances.size(); ++i)
+      motion_bounds_.extend(swept_bounds(packed.motion, packed.motion.instances[i], boxes[i].placement, boxes[i].box));
+    sections.set_rigid_motion(std::move(packed.bytes));
+  }
+
+  static Bounds box_of(const baked::GeometryRecord& g) {
+    Bounds box;
+    if (g.cluster_count == 0) return box;
+    box.lo = DVec3(g.bounds_lo[0], g.bounds_lo[1], g.bounds_lo[2]);
+    box.hi = DVec3(g.bounds_hi[0], g.bounds_hi[1], g.bounds_hi[2]);
+    return box;
   }
 
   /// Removes slots without triangles from the plan; the packed geometries do not have them.
@@ -299,17 +330,11 @@ private:
     return wanted;
   }
 
-  /// World-space bounds of all instances, from the bounds of their geometries.
+  /// World-space bounds of all instances at all times, from the bounds of their geometries.
   Bounds placed_bounds(const FileSections& sections) const {
-    Bounds bounds;
-    for (const baked::InstanceRecord& instance : plan_.instances) {
-      const baked::GeometryRecord& g = sections.geometries()[instance.geometry];
-      if (g.cluster_count == 0) continue;
-      Bounds box;
-      box.lo = DVec3(g.bounds_lo[0], g.bounds_lo[1], g.bounds_lo[2]);
-      box.hi = DVec3(g.bounds_hi[0], g.bounds_hi[1], g.bounds_hi[2]);
-      bounds.extend(placed_box(instance, box));
-    }
+    Bounds bounds = motion_bounds_;
+    for (const baked::InstanceRecord& instance : plan_.instances)
+      bounds.extend(placed_box(instance, box_of(sections.geometries()[instance.geometry])));
     return bounds;
   }
 
@@ -356,6 +381,7 @@ private:
   SharedBorders shared_borders_;
   MemoryReservation memory_{config_.memory};
   std::optional<GeometryPacker> packer_;
+  Bounds motion_bounds_;                 // of moving instances at all times
   std::vector<EncodedTexture> textures_; // in the scene's order; empty if textures are not stored
   BakeReport report_;
 };

@@ -1,5 +1,7 @@
 #include "pbrt_import/scene/scene.h"
 
+#include "pbrt_import/scene/motion_pose.h"
+
 namespace packtrace {
 namespace {
 
@@ -52,6 +54,15 @@ Bounds world_bounds(const Scene& scene) {
   for (const Object& object : scene.objects) object_bounds.push_back(shapes_bounds(object.shapes));
   for (const Instance& instance : scene.instances)
     result.extend(transform_bounds(DAffine(instance.world_from_object), object_bounds[instance.object]));
+  for (const InstanceMotion& moving : scene.motion.instances) {
+    if (moving.instance < scene.shapes.size()) {
+      const Shape& shape = scene.shapes[moving.instance];
+      result.extend(swept_bounds(scene.motion, moving, Affine(shape.parent_from_mesh), mesh_bounds[shape.mesh]));
+    } else {
+      const Instance& instance = scene.instances[moving.instance - scene.shapes.size()];
+      result.extend(swept_bounds(scene.motion, moving, instance.world_from_object, object_bounds[instance.object]));
+    }
+  }
   return result;
 }
 

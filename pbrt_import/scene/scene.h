@@ -12,6 +12,7 @@
 #include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/scene/material_flags.h"
 #include "pbrt_import/scene/math.h"
+#include "pbrt_import/scene/rigid_motion.h"
 
 namespace packtrace {
 
@@ -131,6 +132,7 @@ struct Scene {
   double time = 0.0;                                ///< time at which all transforms are evaluated
   std::vector<AnimatedTransform> animations;        ///< empty if nothing moves
   std::vector<AnimatedInstance> animated_instances; ///< sorted by instance
+  RigidMotion motion; ///< empty before separate_motion(), which makes it of the animations
 
   uint64_t dropped_triangles = 0; ///< repeated or out-of-range index, or non-finite vertex; see the diagnostics
 };
@@ -141,7 +143,8 @@ uint64_t bytes_of(const Mesh& mesh);
 uint64_t unique_triangle_count(const Scene& scene);
 /// Number of triangles with all instances counted.
 uint64_t placed_triangle_count(const Scene& scene);
-/// World-space bounds of all shapes and instances, computed from transformed boxes; not always tight for rotated ones.
+/// World-space bounds of all shapes and instances at all times, computed from transformed boxes; not always tight for
+/// rotated ones.
 Bounds world_bounds(const Scene& scene);
 
 } // namespace packtrace

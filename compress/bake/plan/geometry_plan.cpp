@@ -14,6 +14,7 @@
 #include "compress/bake/plan/equal_meshes.h"
 #include "pbrt_import/base/brief.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/scene/motion_pose.h"
 
 namespace packtrace {
 namespace {
@@ -52,6 +53,7 @@ public:
   ScenePlan run() {
     check();
     equal_mesh_ = first_equal_meshes(scene_);
+    find_moving();
     find_mesh_boxes();
     find_used_objects();
     plan_world_shapes();
@@ -104,6 +106,19 @@ private:
     return draft.users++;
   }
 
+  void find_moving() {
+    moving_.resize(scene_.shapes.size() + scene_.instances.size(), nullptr);
+    for (const InstanceMotion& moving : scene_.motion.instances) {
+      const auto track_ok = [&](uint32_t track) {
+        return track < scene_.motion.tracks.size() && !scene_.motion.tracks[track].keys.empty();
+      };
+      require(moving.instance < moving_.size(), "an instance that moves does not exist");
+      require(track_ok(moving.track) && (moving.inner_track == kNoTrack || track_ok(moving.inner_track)),
+              "the keys of an instance that moves do not exist");
+      moving_[moving.instance] = &moving;
+    }
+  }
+
   void find_mesh_boxes() {
     mesh_boxes_.resize(scene_.meshes.size());
     tbb::parallel_for(size_t{0}, mesh_boxes_.size(),
@@ -130,6 +145,7 @@ private:
   }
 
   void add_instance(uint32_t geometry, uint32_t user, const Affine& world_from_object) {
+    const InstanceMotion* const moving = moving_[plan_.instances.size()];
     for (int column = 0; column < 4; ++column)
       if (!is_finite(world_from_object[column]))
         return leave_out("an instance of " + plan_.geometries[geometry].name +
@@ -138,6 +154,8 @@ private:
     user_of_.push_back(user);
     GeometryPlan& plan = plan_.geometries[geometry];
     plan.max_stretch = std::max(plan.max_stretch, stretch(plan_.instances.back().world_from_object));
+    if (moving != nullptr)
+      plan.max_stretch = std::max(plan.max_stretch, largest_stretch(scene_.motion, *moving, world_from_object));
   }
 
   /// World shapes, and objects that consist of one shape at the identity, with equal content, material class and
@@ -168,8 +186,9 @@ private:
       mesh_seen[shape.mesh] = 1;
       return group;
     };
-    for (const Shape& shape : scene_.shapes) {
-      if (beyond_range(shape)) continue;
+    for (size_t i = 0; i < scene_.shapes.size(); ++i) {
+      const Shape& shape = scene_.shapes[i];
+      if (moving_[i] != nullptr || beyond_range(shape)) continue;
       Group& group = add(shape);
       if (group.shapes++ == 0)
         group.transform = shape.parent_from_mesh;
@@ -191,6 +210,10 @@ private:
         leave_out(beyond_float_range(scene_.meshes[shape.mesh].name, *box));
         continue;
       }
+      if (moving_[plan_.instances.size()] != nullptr) {
+        place_moving_shape(shape);
+        continue;
+      }
       Group& group = groups[key_of(shape)];
       const bool instanced = group.instanced(scene_.meshes[shape.mesh].triangles.size());
       const bool share = instanced || (group.shapes > 1 && group.one_transform);
@@ -209,6 +232,18 @@ private:
       add_instance(geometry, add_user(geometry, {&placed, 1}),
                    instanced ? Affine(shape.parent_from_mesh) : Affine(1.0f));
     }
+  }
+
+  /// Gives a shape that moves a geometry on a grid of its own, like an object's.
+  void place_moving_shape(Shape shape) {
+    const Affine placement(shape.parent_from_mesh);
+    shape.parent_from_mesh = DAffine(1.0);
+    const auto next = static_cast<uint32_t>(plan_.geometries.size());
+    const auto [found, inserted] = geometry_with_.try_emplace(content_key({&shape, 1}), next);
+    if (inserted) add_geometry(plan_of(scene_.meshes[shape.mesh].name, {&shape, 1}));
+    plan_.shared_shapes += !inserted;
+    ++plan_.instanced_shapes;
+    add_instance(found->second, add_user(found->second, {&shape, 1}), placement);
   }
 
   static GeometryPlan plan_of(const std::string& name, std::span<const Shape> shapes) {
@@ -316,6 +351,7 @@ private:
   std::vector<uint32_t> equal_mesh_;
   std::vector<Bounds> mesh_boxes_;
   std::vector<uint8_t> used_;                      // per object
+  std::vector<const InstanceMotion*> moving_;      // per instance; null: it does not move
   std::vector<Draft> drafts_;                      // per geometry
   std::vector<uint32_t> user_of_;                  // per instance
   std::map<std::string, uint32_t> geometry_with_;  // by content_key(): geometries that are not in world space

@@ -63,6 +63,7 @@ std::string beyond_float_range(const std::string& name, const Bounds& box);
 /// World shapes with different transforms share a geometry if they use the same mesh index, or if their meshes are
 /// equal and have at least kMinSharedTriangles triangles. Every shape has an instance record anyway, so sharing saves
 /// all copies of the geometry but the first.
+/// World shapes that move (Scene::motion) have a geometry in the space of their mesh, never in world space.
 /// Throws Error(kInput) if an index of the scene is out of range or a transform is not finite.
 ScenePlan plan_scene(const Scene& scene);
 

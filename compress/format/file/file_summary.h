@@ -6,6 +6,7 @@
 
 #include "compress/format/file/baked_file.h"
 #include "compress/format/file/lod_summary.h"
+#include "compress/format/motion/motion_summary.h"
 
 namespace packtrace {
 
@@ -17,7 +18,8 @@ struct StreamBytes {
   uint64_t masks = 0, textures = 0, cameras = 0, strings = 0, requirement_records = 0;
   /// Level, group and link records. The other members count the records and streams of all levels.
   uint64_t lod_records = 0;
-  uint64_t trees = 0;                ///< tree records and nodes
+  uint64_t trees = 0; ///< tree records and nodes
+  uint64_t rigid_motion = 0, deformation = 0;
   uint64_t header_and_alignment = 0; ///< includes the summary record
   uint64_t total = 0;                ///< of the file
 };
@@ -79,6 +81,7 @@ struct FileSummary {
   std::vector<TextureUse> textures;
   std::vector<UvUse> uvs; ///< ordered by encoding
   LodSummary lod;
+  MotionSummary motion;
   uint64_t trees = 0, nodes = 0;   ///< of all levels
   uint32_t tree_depth = 0;         ///< levels of nodes in the deepest tree
   double max_position_error = 0.0; ///< measured, largest axis, object units, maximum over all geometries

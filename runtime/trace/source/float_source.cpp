@@ -11,6 +11,13 @@
 namespace packtrace {
 namespace {
 
+bool moves(const Scene& scene, uint32_t instance) {
+  const std::vector<InstanceMotion>& moving = scene.motion.instances;
+  const auto found = std::lower_bound(moving.begin(), moving.end(), instance,
+                                      [](const InstanceMotion& one, uint32_t number) { return one.instance < number; });
+  return found != moving.end() && found->instance == instance;
+}
+
 void require(bool condition, const std::string& message) {
   if (!condition) throw Error(ErrorKind::kInput, message);
 }
@@ -22,7 +29,12 @@ FloatSource::FloatSource(const Scene& scene) : scene_(scene) {
   instances_.reserve(scene.shapes.size() + scene.instances.size());
   for (const Shape& shape : scene.shapes) {
     instances_.push_back({geometry_count(), Affine(1.0f)});
-    add_geometry({&shape, 1});
+    Shape placed = shape;
+    if (moves(scene, static_cast<uint32_t>(instances_.size() - 1))) {
+      instances_.back().world_from_object = Affine(shape.parent_from_mesh);
+      placed.parent_from_mesh = DAffine(1.0);
+    }
+    add_geometry({&placed, 1});
   }
   const uint32_t first_object = geometry_count();
   for (const Object& object : scene.objects) add_geometry(object.shapes);

@@ -6,11 +6,11 @@
 
 namespace packtrace {
 
-/// An unpacked Scene as a SceneSource. Its geometries are each shape outside objects, transformed to world space, then
-/// each object with its shapes transformed to object space. Keeps a reference: the scene must outlive it. Transforms
-/// are applied in double and rounded to float once. Triangles whose transform mirrors, or whose shape reverses its
-/// orientation, are listed with their last two vertices swapped, so cross(p1 - p0, p2 - p0) of decoded positions is the
-/// geometric normal that pbrt defines.
+/// An unpacked Scene as a SceneSource. Its geometries are each shape outside objects, transformed to world space unless
+/// it moves (Scene::motion), then each object with its shapes transformed to object space. Keeps a reference: the scene
+/// must outlive it. Transforms are applied in double and rounded to float once. Triangles whose transform mirrors, or
+/// whose shape reverses its orientation, are listed with their last two vertices swapped, so cross(p1 - p0, p2 - p0) of
+/// decoded positions is the geometric normal that pbrt defines.
 class FloatSource final : public SceneSource {
 public:
   /// Throws Error(kLimitExceeded) if an object has 2^32 or more vertices or triangles, Error(kInput) for references
