@@ -187,8 +187,8 @@ private:
     warn_of_coarse_floats();
   }
 
-  /// Positions that are hit are floats in world space, for every backend, and so are those of meshes in their own
-  /// space.
+  /// Hit positions are world-space floats in every backend, and mesh positions are floats in mesh space; both lose
+  /// accuracy far from zero.
   void warn_of_coarse_floats() {
     constexpr double kMaxSpacing = 1.0 / 512.0; // of the scene's diagonal; pictures are right to 0.002 AO at half of it
     const Bounds world = world_bounds(scene_);

@@ -110,7 +110,7 @@ private:
   NameTable object_names_;
   std::vector<uint32_t> objects_by_name_; ///< index into Scene::objects, by number in object_names_
   std::vector<Place> object_places_;
-  std::vector<Affine> instance_rests_; ///< by instance: what rounding its transform to floats took away
+  std::vector<Affine> instance_residuals_; ///< by instance: rounding error of its transform, see move_far_world()
   uint32_t current_object_ = kNone;
   uint32_t nested_objects_ = 0;  ///< rejected nested ObjectBegins whose ObjectEnd is still to come
   uint64_t ignored_blocks_ = 0;  ///< open blocks beyond the nesting limit

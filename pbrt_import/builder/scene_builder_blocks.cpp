@@ -120,8 +120,8 @@ void SceneBuilder::add_instance(const Directive& directive) {
   if (placement.animation != kNotAnimated)
     scene_.animated_instances.push_back({static_cast<uint32_t>(scene_.instances.size()), placement.animation});
   scene_.instances.push_back({objects_by_name_[*found], world_from_object});
-  reserve_one_more(instance_rests_);
-  instance_rests_.emplace_back(placement.map - DAffine(world_from_object));
+  reserve_one_more(instance_residuals_);
+  instance_residuals_.emplace_back(placement.map - DAffine(world_from_object));
 }
 
 SceneBuilder::Placement SceneBuilder::place(const Directive& directive, std::string_view thing) {

@@ -212,7 +212,7 @@ void SceneBuilder::report_and_drop_unused_objects() {
   uint64_t count = 0;
   uint32_t first = 0;
   std::string name; // copied before the objects are renumbered
-  drop_unused_objects(scene_, instance_rests_, [&](uint32_t object) {
+  drop_unused_objects(scene_, instance_residuals_, [&](uint32_t object) {
     if (count++ > 0) return;
     first = object;
     name = in_quotes(scene_.objects[object].name);
@@ -253,9 +253,9 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
                                     : std::to_string(absent) + " shapes are left out: their alpha is 0 everywhere");
   scene_.cameras = cameras_.finish();
   statistics_.cameras_left_out = cameras_.left_out();
-  drop_unused_objects(scene_, instance_rests_, [](uint32_t) {});
-  move_far_world(scene_, instance_rests_);
-  instance_rests_ = {};
+  drop_unused_objects(scene_, instance_residuals_, [](uint32_t) {});
+  move_far_world(scene_, instance_residuals_);
+  instance_residuals_ = {};
   drop_unused_parts(scene_);
   if (scene_.cameras.size() > 1)
     reporter_.note(end,

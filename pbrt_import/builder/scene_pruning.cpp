@@ -42,7 +42,8 @@ void drop_unused_animations(Scene& scene) {
 
 } // namespace
 
-void drop_unused_objects(Scene& scene, std::vector<Affine>& rests, const std::function<void(uint32_t object)>& unused) {
+void drop_unused_objects(Scene& scene, std::vector<Affine>& residuals,
+                         const std::function<void(uint32_t object)>& unused) {
   std::vector<uint8_t> shown(scene.objects.size(), 0);
   for (const Instance& instance : scene.instances) shown[instance.object] = 1;
   for (uint32_t i = 0; i < scene.objects.size(); ++i) {
@@ -52,7 +53,7 @@ void drop_unused_objects(Scene& scene, std::vector<Affine>& rests, const std::fu
   std::vector<uint8_t> kept(scene.instances.size());
   for (size_t i = 0; i < kept.size(); ++i) kept[i] = shown[scene.instances[i].object];
   const std::vector<uint32_t> instance_numbers = keep_used(scene.instances, kept);
-  keep_used(rests, kept);
+  keep_used(residuals, kept);
   std::erase_if(scene.animated_instances, [&](const AnimatedInstance& animated) { return !kept[animated.instance]; });
   for (AnimatedInstance& animated : scene.animated_instances) animated.instance = instance_numbers[animated.instance];
   const std::vector<uint32_t> numbers = keep_used(scene.objects, shown);

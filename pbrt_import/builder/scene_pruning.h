@@ -16,9 +16,10 @@ void for_each_shape(Scene& scene, Function function) {
 }
 
 /// Drops objects without instances, and objects without shapes together with their instances. The rest keeps its order.
-/// @param rests of the instances, see move_far_world(); those of dropped instances are dropped as well
+/// @param residuals by instance: rounding error of its transform, as in move_far_world(); updated with the instances
 /// @param unused called with the index of each object that has shapes but no instance
-void drop_unused_objects(Scene& scene, std::vector<Affine>& rests, const std::function<void(uint32_t object)>& unused);
+void drop_unused_objects(Scene& scene, std::vector<Affine>& residuals,
+                         const std::function<void(uint32_t object)>& unused);
 
 /// Drops meshes and materials that no shape uses, then masks and textures that no material uses, then unused
 /// animations.

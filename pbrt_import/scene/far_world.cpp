@@ -7,27 +7,25 @@
 #include <utility>
 #include <vector>
 
+#include "pbrt_import/scene/shape_bounds.h"
+
 namespace packtrace {
 namespace {
 
-/// Distances from zero, in diagonals of the box, beyond which the world and objects are moved. Half a float ulp is up
-/// to 2^-16 diagonals of the world there, and 2^-12 of an object, which is small in the picture.
+/// Distances from zero, in diagonals of the bounds, beyond which the world and objects are moved. At these distances,
+/// half the spacing of floats is up to 2^-16 diagonals of the world, and 2^-12 of an object, which is small in the
+/// picture.
 constexpr double kFarWorld = 256.0, kFarObject = 4096.0;
 
-Bounds bounds_of_shapes(const std::vector<Shape>& shapes, const std::vector<Bounds>& meshes) {
-  Bounds result;
-  for (const Shape& shape : shapes) result.extend(transform_bounds(shape.parent_from_mesh, meshes[shape.mesh]));
-  return result;
-}
-
-/// Returns by how much to move a box towards zero: the point near its centre that becomes zero. 0 if it is not farther
-/// than `limit` diagonals.
+/// Returns the point near a box's centre that becomes the new zero; 0 if the box lies within `limit` of its diagonals
+/// from zero.
 DVec3 new_zero(const Bounds& box, double limit) {
   if (box.empty()) return DVec3(0.0);
   const DVec3 far = glm::max(glm::abs(box.lo), glm::abs(box.hi));
   const double distance = std::max({far.x, far.y, far.z}), diagonal = box.diagonal();
   if (!std::isfinite(distance) || !(distance > limit * diagonal)) return DVec3(0.0);
-  // Multiples of a power of two have few bits, so that subtracting one is exact. A box without extent gets its centre.
+  // A multiple of a power of two has few bits, so subtracting it is exact. Without an extent, the zero is the box's
+  // centre.
   const double unit = diagonal > 0.0 ? std::ldexp(1.0, std::ilogb(diagonal)) : 0.0;
   if (!(unit > distance * 0x1p-50)) return box.centre();
   return glm::round(box.centre() / unit) * unit;
@@ -40,12 +38,12 @@ DAffine moved(DAffine map, DVec3 by) {
 
 class Mover {
 public:
-  Mover(Scene& scene, std::span<const Affine> rests) : scene_(scene) {
+  Mover(Scene& scene, std::span<const Affine> residuals) : scene_(scene) {
     for (const Mesh& mesh : scene.meshes) meshes_.push_back(bounds_of(mesh.positions));
     maps_.reserve(scene.instances.size());
     for (size_t i = 0; i < scene.instances.size(); ++i) {
       DAffine map(scene.instances[i].world_from_object);
-      if (!rests.empty()) map += DAffine(rests[i]);
+      if (!residuals.empty()) map += DAffine(residuals[i]);
       maps_.push_back(map);
     }
   }
@@ -101,7 +99,7 @@ private:
     }
   }
 
-  /// Replaces an animation by one that is moved: others may use it as it is.
+  /// Points to a moved copy of the animation, because others may share the original.
   void move_animation(uint32_t& animation, DVec3 zero) {
     if (animation == kNotAnimated) return;
     const auto key = std::pair(animation, std::array{zero.x, zero.y, zero.z});
@@ -123,6 +121,6 @@ private:
 
 } // namespace
 
-void move_far_world(Scene& scene, std::span<const Affine> rests) { Mover(scene, rests).run(); }
+void move_far_world(Scene& scene, std::span<const Affine> residuals) { Mover(scene, residuals).run(); }
 
 } // namespace packtrace

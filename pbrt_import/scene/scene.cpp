@@ -1,6 +1,7 @@
 #include "pbrt_import/scene/scene.h"
 
 #include "pbrt_import/scene/motion_pose.h"
+#include "pbrt_import/scene/shape_bounds.h"
 
 namespace packtrace {
 namespace {
@@ -41,17 +42,18 @@ uint64_t placed_triangle_count(const Scene& scene) {
   return total;
 }
 
+Bounds bounds_of_shapes(std::span<const Shape> shapes, std::span<const Bounds> meshes) {
+  Bounds result;
+  for (const Shape& shape : shapes) result.extend(transform_bounds(shape.parent_from_mesh, meshes[shape.mesh]));
+  return result;
+}
+
 Bounds world_bounds(const Scene& scene) {
   std::vector<Bounds> mesh_bounds;
   for (const Mesh& mesh : scene.meshes) mesh_bounds.push_back(bounds_of(mesh.positions));
-  const auto shapes_bounds = [&](const std::vector<Shape>& shapes) {
-    Bounds result;
-    for (const Shape& shape : shapes) result.extend(transform_bounds(shape.parent_from_mesh, mesh_bounds[shape.mesh]));
-    return result;
-  };
-  Bounds result = shapes_bounds(scene.shapes);
+  Bounds result = bounds_of_shapes(scene.shapes, mesh_bounds);
   std::vector<Bounds> object_bounds;
-  for (const Object& object : scene.objects) object_bounds.push_back(shapes_bounds(object.shapes));
+  for (const Object& object : scene.objects) object_bounds.push_back(bounds_of_shapes(object.shapes, mesh_bounds));
   for (const Instance& instance : scene.instances)
     result.extend(transform_bounds(DAffine(instance.world_from_object), object_bounds[instance.object]));
   for (const InstanceMotion& moving : scene.motion.instances) {

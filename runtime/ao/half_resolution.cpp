@@ -10,13 +10,13 @@
 namespace packtrace {
 namespace {
 
-constexpr double kMaxSlope = 0.3;    ///< sine of the angle between line and surface from which the weight is 0
-constexpr float kNormalSlack = 1.1f; ///< normals up to acos(1 / 1.1) = 25 degrees apart count as equal
-constexpr int kNormalSquarings = 6;  ///< cosine to the power of 64
-constexpr float kEnough = 0.1f;      ///< weight from which a mean stands for the pixel
-constexpr float kEnoughFar = 0.01f;  ///< the same for the wider neighbourhood
-constexpr float kWell = 0.99f;       ///< likeness that is not improved on
-constexpr float kMuchWorse = 0.25f;  ///< difference of likeness that moves a block's sample
+constexpr double kMaxSlope = 0.3;      ///< sine of the angle between line and surface from which the weight is 0
+constexpr float kNormalSlack = 1.1f;   ///< normals up to acos(1 / 1.1) = 25 degrees apart count as equal
+constexpr int kNormalSquarings = 6;    ///< cosine to the power of 64
+constexpr float kMinWeight = 0.1f;     ///< smallest total weight with which a mean is used
+constexpr float kMinWeightFar = 0.01f; ///< the same for the 5 x 5 nearest blocks
+constexpr float kSimilar = 0.99f;      ///< similarity at which the search for a more similar block stops
+constexpr float kMuchLower = 0.25f;    ///< difference of similarity from which another pixel of a block is chosen
 
 /// How two surface points relate.
 struct Relation {
@@ -34,7 +34,7 @@ Relation relate(const GBuffer& g, size_t a, size_t b) {
 }
 
 /// 1 for points of one plane, 0 for points of different surfaces.
-float likeness(Relation r) {
+float similarity(Relation r) {
   float aligned = std::min(1.0f, kNormalSlack * r.cosine);
   const float flat = 1.0f - r.slope2 / static_cast<float>(kMaxSlope * kMaxSlope);
   if (!(aligned > 0.0f) || !(flat > 0.0f)) return 0.0f; // also for NaN
@@ -42,9 +42,9 @@ float likeness(Relation r) {
   return aligned * flat * flat;
 }
 
-float likeness(const GBuffer& g, size_t a, size_t b) {
+float similarity(const GBuffer& g, size_t a, size_t b) {
   if (!(glm::dot(g.normal[a], g.normal[b]) > 0.0f)) return 0.0f; // spares reading positions
-  return likeness(relate(g, a, b));
+  return similarity(relate(g, a, b));
 }
 
 bool is_hit(const GBuffer& g, size_t pixel) { return g.instance[pixel] != kNoInstance; }
@@ -78,7 +78,7 @@ void for_neighbours(ImageSize half, uint32_t bx, uint32_t by, uint32_t reach, co
     for (uint32_t x = x0; x <= x1; ++x) body(size_t{y} * half.width + x);
 }
 
-/// The first pixel of each block that hits.
+/// The first pixel that shows a surface, per block.
 std::vector<uint32_t> first_hits(const GBuffer& full, ImageSize half) {
   std::vector<uint32_t> pixel(half.pixels());
   for_each_row(half.height, [&](uint32_t by) {
@@ -92,26 +92,26 @@ std::vector<uint32_t> first_hits(const GBuffer& full, ImageSize half) {
   return pixel;
 }
 
-/// The pixel of a block that the neighbouring blocks describe worst.
-uint32_t least_described(const GBuffer& full, ImageSize half, const std::vector<uint32_t>& first, uint32_t bx,
-                         uint32_t by) {
+/// The pixel of a block that is least similar to the first hits of the neighbouring blocks.
+uint32_t least_similar(const GBuffer& full, ImageSize half, const std::vector<uint32_t>& first, uint32_t bx,
+                       uint32_t by) {
   const size_t own = size_t{by} * half.width + bx;
-  const auto described = [&](uint32_t p) {
+  const auto best_similarity = [&](uint32_t p) {
     float best = 0.0f;
     for_neighbours(half, bx, by, 1, [&](size_t other) {
-      if (other != own && best < kWell && is_hit(full, first[other]))
-        best = std::max(best, likeness(full, p, first[other]));
+      if (other != own && best < kSimilar && is_hit(full, first[other]))
+        best = std::max(best, similarity(full, p, first[other]));
     });
     return best;
   };
   uint32_t chosen = first[own];
   if (!is_hit(full, chosen)) return chosen;
-  float least = described(chosen) - kMuchWorse;
+  float least = best_similarity(chosen) - kMuchLower;
   const Block block(full.size, bx, by);
   for (uint32_t i = 0; i < block.count && least > 0.0f; ++i) {
     const uint32_t p = block.pixels[i];
     if (p == first[own] || !is_hit(full, p)) continue;
-    if (const float value = described(p); value < least) least = value, chosen = p;
+    if (const float value = best_similarity(p); value < least) least = value, chosen = p;
   }
   return chosen;
 }
@@ -148,19 +148,19 @@ public:
     for_neighbours(size, bx, by, 1, [&](size_t i) {
       if (!usable(i)) return;
       const auto [dx, dy] = offset(x, y, i);
-      if (dx < 2 && dy < 2) near.add((2 - dx) * (2 - dy) * 0.25f * likeness(full_, pixel, half_.pixel[i]), ao_[i]);
+      if (dx < 2 && dy < 2) near.add((2 - dx) * (2 - dy) * 0.25f * similarity(full_, pixel, half_.pixel[i]), ao_[i]);
     });
-    if (near.weight >= kEnough) return near.value();
+    if (near.weight >= kMinWeight) return near.value();
     for_neighbours(size, bx, by, 2, [&](size_t i) {
       if (!usable(i)) return;
       const auto [dx, dy] = offset(x, y, i);
       const float closeness = 1.0f / (1.0f + dx * dx + dy * dy);
       const Relation r = relate(full_, pixel, half_.pixel[i]);
-      far.add(closeness * likeness(r), ao_[i]);
-      const float alike = (1.0f + r.cosine) * (1.0f - r.slope2);
-      unlike.add(alike > 0.0f ? closeness * (alike * alike + 1e-6f) : closeness * 1e-6f, ao_[i]);
+      far.add(closeness * similarity(r), ao_[i]);
+      const float similar = (1.0f + r.cosine) * (1.0f - r.slope2);
+      unlike.add(similar > 0.0f ? closeness * (similar * similar + 1e-6f) : closeness * 1e-6f, ao_[i]);
     });
-    return (far.weight >= kEnoughFar ? far : unlike).value(); // the own block has a sample
+    return (far.weight >= kMinWeightFar ? far : unlike).value(); // the own block has a sample
   }
 
 private:
@@ -196,7 +196,7 @@ HalfGBuffer halve(const GBuffer& full) {
   half.pixel.resize(size.pixels());
   for_each_row(size.height, [&](uint32_t by) {
     for (uint32_t bx = 0; bx < size.width; ++bx)
-      half.pixel[size_t{by} * size.width + bx] = least_described(full, size, first, bx, by);
+      half.pixel[size_t{by} * size.width + bx] = least_similar(full, size, first, bx, by);
   });
   half.gbuffer = pixels_of(full, size, half.pixel);
   return half;

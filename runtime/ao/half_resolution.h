@@ -8,9 +8,10 @@
 
 namespace packtrace {
 
-/// A G-buffer of half the width and height, rounded up. Each of its pixels is one pixel of a block of 2 x 2 full
-/// pixels: the top left one, unless the neighbouring blocks' pixels describe another one much worse. So a surface one
-/// pixel wide gets samples of its own, and the surface behind it has those of the neighbouring blocks.
+/// A G-buffer of half the width and height, rounded up. Each of its pixels is a copy of one pixel of a block of 2 x 2
+/// full pixels, preferably the top left one. Another pixel is chosen if its similarity to the pixels of the
+/// neighbouring blocks is much lower. So a surface one pixel wide gets samples of its own, while the surface behind it
+/// is sampled in the neighbouring blocks.
 struct HalfGBuffer {
   GBuffer gbuffer;
   std::vector<uint32_t> pixel; ///< full pixel of each half pixel
@@ -22,9 +23,9 @@ HalfGBuffer halve(const GBuffer& full);
 /// Joint bilateral upsampling: each pixel is the weighted mean of the nearest half pixels. The weight falls with the
 /// distance in the picture (a tent two pixels wide), with the angle between the shading normals, and with the angle
 /// between the line that connects the two points and their surfaces, which is 0 within a plane whatever the slope, and
-/// near 90 degrees across a step in depth. Both angles do not depend on the camera or the scene's scale. Pixels that no
-/// half pixel of the 5 x 5 nearest blocks describes get the mean of those that are least unlike them.
-/// Source: Kopf, Cohen, Lischinski, Uyttendaele, "Joint bilateral upsampling" (2007).
+/// near 90 degrees across a step in depth. Neither angle depends on the camera or the scene's scale. A pixel that is
+/// not similar to any half pixel of the 5 x 5 nearest blocks gets a mean of them all, weighted towards the least
+/// different. Source: Kopf, Cohen, Lischinski, Uyttendaele, "Joint bilateral upsampling" (2007).
 /// @param full the G-buffer that `half` was made from
 /// @param ao one value per half pixel; valid where a surface is
 /// @return one value per full pixel, within the range of the values; kInvalidAo where no surface is

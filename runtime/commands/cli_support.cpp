@@ -1,7 +1,6 @@
 #include "runtime/commands/cli_support.h"
 
 #include <algorithm>
-#include <charconv>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -26,6 +25,7 @@
 #include "runtime/commands/command_line.h"
 #include "runtime/commands/json_output.h"
 #include "runtime/commands/option_checks.h"
+#include "runtime/commands/whole_number.h"
 
 namespace packtrace {
 
@@ -211,12 +211,11 @@ uint32_t thread_limit(const GlobalOptions& globals) {
   const char* variable = std::getenv(kThreadsVariable);
   const std::string_view text = variable ? variable : "";
   if (text.empty()) return 0;
-  uint32_t threads = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), threads);
-  if (error != std::errc() || end != text.data() + text.size() || threads < 1 || threads > kMaxThreads)
+  const std::optional<uint32_t> threads = whole_number(text);
+  if (!threads || *threads < 1 || *threads > kMaxThreads)
     throw Error(ErrorKind::kUsage, fmt::format("{} is '{}'; set it to a number of threads from 1 to {}, or unset it",
                                                kThreadsVariable, text, kMaxThreads));
-  return threads;
+  return *threads;
 }
 
 namespace {

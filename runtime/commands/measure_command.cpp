@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <memory>
@@ -24,6 +23,7 @@
 #include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/commands/progress_display.h"
+#include "runtime/commands/whole_number.h"
 #include "runtime/measure/measure.h"
 #include "runtime/trace/source/float_source.h"
 
@@ -41,14 +41,12 @@ struct MeasureOptions {
   MatrixMode mode() const { return quick ? MatrixMode::kQuick : full ? MatrixMode::kFull : MatrixMode::kDefault; }
 };
 
-/// Size of the pictures: the camera's shape, or 16:9 if the whole scene is framed, with a longer side of the given
-/// length.
+/// Size of the pictures: the aspect ratio of the camera, or 16:9 if the whole scene is framed.
+/// @param longer length of the longer side, pixels
 ImageSize picture_size(const Scene& scene, const std::optional<std::string>& camera, uint32_t longer) {
-  uint32_t index = 0;
-  const std::string name = camera.value_or("0");
-  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), index);
-  const bool known = error == std::errc() && end == name.data() + name.size() && index < scene.cameras.size();
-  const double w = known ? scene.cameras[index].width_px : 16.0, h = known ? scene.cameras[index].height_px : 9.0;
+  const std::optional<uint32_t> index = whole_number(camera.value_or("0"));
+  const bool known = index && *index < scene.cameras.size();
+  const double w = known ? scene.cameras[*index].width_px : 16.0, h = known ? scene.cameras[*index].height_px : 9.0;
   const auto side = [&](double length) {
     return std::max(1u, static_cast<uint32_t>(std::lround(longer * length / std::max(w, h))));
   };

@@ -66,7 +66,7 @@ struct Points {
   }
 };
 
-/// What to say before the answers if the pictures cannot show errors of occlusion.
+/// A warning for pictures without occlusion, whose error means nothing; otherwise empty. Precedes the answers.
 std::string caution(const Json& report) {
   if (at(report.at("reference").at("noise_floor"), "mae") > 0.0) return {};
   return "The pictures show no occlusion, so its error says nothing; choose another --camera. ";

@@ -103,7 +103,8 @@ nlohmann::json run_measure(const MeasureConfig& config, Progress& progress) {
   const std::vector<uint32_t> frames = convergence_frames(config.mode);
   PointRunner runner(config.runner, folder);
   const auto unmeasured = std::ranges::count_if(matrix, [&](const MeasurePoint& p) { return !runner.is_measured(p); });
-  progress.begin("measuring", static_cast<uint64_t>(unmeasured) + 3); // so that the time left is right in later runs
+  // Points of earlier runs take no time, so the estimate of the time left excludes them.
+  progress.begin("measuring", static_cast<uint64_t>(unmeasured) + 3);
   Json report{{"schema", "packtrace-measure"},
               {"schema_version", 1},
               {"program", {{"name", "packtrace"}, {"version", config.version}}},

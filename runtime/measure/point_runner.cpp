@@ -189,7 +189,7 @@ void PointRunner::bake(const BakeKnobs& knobs) {
   bake_report_ = run("bake", Words{"bake", config_.scene, "-o", file} + words_of(knobs) + config_.bake_options +
                                  config_.scene_options);
   baked_ = knobs;
-  BakeKnobs surfaces = knobs; // codecs, trees and levels leave level 0 as it is
+  BakeKnobs surfaces = knobs; // codec, trees and levels do not change level 0, so comparisons are shared
   surfaces.codec = BakeKnobs{}.codec, surfaces.trees = BakeKnobs{}.trees, surfaces.lod = BakeKnobs{}.lod;
   const auto known = std::ranges::find(comparisons_, surfaces, &std::pair<BakeKnobs, Json>::first);
   if (known != comparisons_.end()) {
@@ -317,14 +317,24 @@ nlohmann::json PointRunner::measure(const MeasurePoint& what) {
   return point;
 }
 
-nlohmann::json PointRunner::convergence(const BakeKnobs& bake_knobs, const std::vector<uint32_t>& frames) {
-  Json curve = Json::array();
-  const std::string name =
-      "convergence-" + key({"", "", "", bake_knobs, {}}) + fmt::format("-{}-{}", config_.spp, frames.size());
+nlohmann::json PointRunner::load_or_fill(const std::string& kind, const BakeKnobs& knobs, size_t entries,
+                                         const std::function<void(nlohmann::json& array)>& fill) {
+  const std::string name = kind + "-" + key({"", "", "", knobs, {}}) + fmt::format("-{}-{}", config_.spp, entries);
   if (std::optional<Json> known = folder_.load(name)) return *known;
-  const fs::path image = folder_ / "work/frames.exr";
+  Json array = Json::array();
   try {
-    bake(bake_knobs);
+    bake(knobs);
+    fill(array);
+  } catch (const StageFailure&) {
+    return Json::array();
+  }
+  folder_.save(name, array);
+  return array;
+}
+
+nlohmann::json PointRunner::convergence(const BakeKnobs& bake_knobs, const std::vector<uint32_t>& frames) {
+  const fs::path image = folder_ / "work/frames.exr";
+  return load_or_fill("convergence", bake_knobs, frames.size(), [&](Json& curve) {
     for (const uint32_t count : frames) {
       Json entry{{"frames", count}, {"spp", 1}};
       for (const bool denoise : {false, true}) {
@@ -341,18 +351,10 @@ nlohmann::json PointRunner::convergence(const BakeKnobs& bake_knobs, const std::
       }
       curve.push_back(entry);
     }
-  } catch (const StageFailure&) {
-    return Json::array();
-  }
-  folder_.save(name, curve);
-  return curve;
+  });
 }
 
 nlohmann::json PointRunner::resolution(const BakeKnobs& bake_knobs, const std::vector<uint32_t>& samples) {
-  Json table = Json::array();
-  const std::string name =
-      "resolution-" + key({"", "", "", bake_knobs, {}}) + fmt::format("-{}-{}", config_.spp, samples.size());
-  if (std::optional<Json> known = folder_.load(name)) return *known;
   const fs::path image = folder_ / "work/resolution.exr";
   std::set<std::pair<std::string, uint32_t>> what;
   for (const uint32_t spp : samples) {
@@ -360,8 +362,7 @@ nlohmann::json PointRunner::resolution(const BakeKnobs& bake_knobs, const std::v
     what.emplace("quarter", spp);
     what.emplace("quarter", 4 * spp);
   }
-  try {
-    bake(bake_knobs);
+  return load_or_fill("resolution", bake_knobs, samples.size(), [&](Json& table) {
     for (const auto& [resolution, spp] : what) {
       RenderKnobs knobs;
       knobs.spp = spp, knobs.ao_resolution = resolution;
@@ -377,11 +378,7 @@ nlohmann::json PointRunner::resolution(const BakeKnobs& bake_knobs, const std::v
                         {{"ao", r.at("/seconds/ao"_json_pointer).get<double>() * 1e3},
                          {"upsample", r.at("/seconds/upsample"_json_pointer).get<double>() * 1e3}}}});
     }
-  } catch (const StageFailure&) {
-    return Json::array();
-  }
-  folder_.save(name, table);
-  return table;
+  });
 }
 
 } // namespace packtrace

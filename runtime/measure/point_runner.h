@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -83,6 +84,11 @@ private:
   nlohmann::json render(const std::string& stage, const std::string& input, const std::filesystem::path& output,
                         uint64_t seed, const Words& options);
   void bake(const BakeKnobs& knobs);
+  /// Loads an array from the folder. If it is not there, bakes a file, fills the array and saves it.
+  /// @param entries number of settings to measure, part of the array's name
+  /// @return the array; an empty one, not saved, if a process fails
+  nlohmann::json load_or_fill(const std::string& kind, const BakeKnobs& knobs, size_t entries,
+                              const std::function<void(nlohmann::json& array)>& fill);
   void add_file_values(nlohmann::json& point) const;
   void add_render_values(nlohmann::json& point, const MeasurePoint& what);
   void add_noise_ratio(nlohmann::json& ao) const;

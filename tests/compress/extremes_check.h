@@ -23,9 +23,10 @@ struct Source {
 Source source_of(const Mesh& mesh, const DAffine& transform = DAffine(1.0));
 
 /// Checks a geometry against its source: the stated error bound is half a step plus float rounding, every decoded
-/// vertex lies within the bound of a source vertex, and triangles connect the same vertices, as far as positions
-/// distinguish them. Triangles may be missing if they are so thin that they have no area on the lattice.
-/// @param flushed by how much more a position may be off, because subnormals became 0
+/// vertex lies within the bound of a source vertex, and triangles connect the same vertices, unless some source
+/// vertices are too close to be told apart. Triangles may be missing if they are so thin that they have no area on the
+/// lattice.
+/// @param flushed additional position error from subnormals flushed to 0
 void expect_holds(const BakedFile& file, uint32_t g, const Source& source, double flushed = 0.0);
 
 } // namespace packtrace::test

@@ -25,7 +25,7 @@ std::string world_at(double distance) {
          at(distance, 0.3, 0.7, 1.9) + triangle + "ObjectInstance \"lost\" Rotate 30 1 2 3 ObjectInstance \"own\"" +
          "ActiveTransform EndTime Translate 0.1 0 0 ObjectInstance \"own\"" + triangle + "AttributeEnd " +
          "AttributeBegin Translate" + at(distance, -1.7, 0.9, 0.1) + "ObjectInstance \"own\" AttributeEnd " +
-         // An object whose shapes lie far away, shown where they are and turned around its own zero.
+         // An object whose shapes lie far from its zero; the instance has the identity transform.
          "ObjectBegin \"there\" Translate" + at(distance, 0.6, 1.1, -0.4) + triangle +
          "Identity ObjectEnd ObjectInstance \"there\" WorldEnd";
 }
@@ -42,7 +42,7 @@ void expect_near(const DAffine& actual, const DAffine& expected, DVec3 by, doubl
           << what << ", column " << column << " row " << row;
 }
 
-/// Map of a shape of an object, in the world.
+/// world_from_mesh of the first shape of an instance's object.
 DAffine placed(const Scene& scene, size_t instance) {
   const Instance& i = scene.instances[instance];
   return compose(DAffine(i.world_from_object), scene.objects[i.object].shapes[0].parent_from_mesh);
@@ -53,7 +53,7 @@ void expect_moved(double distance) {
   EXPECT_EQ(near.origin, DVec3(0.0));
   const DVec3 away = DVec3(kAway[0], kAway[1], kAway[2]) * distance;
   EXPECT_LT(glm::length(far.origin - away), 10.0);
-  // The text's own rounding, and that of floats near zero.
+  // Rounding errors of the numbers in the text, and of floats near zero.
   const double rounding = 4.0 * 0x1p-52 * distance, floats = rounding + 4e-6;
   const DVec3 by = away - far.origin;
   ASSERT_EQ(far.shapes.size(), near.shapes.size());

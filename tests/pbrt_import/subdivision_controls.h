@@ -14,7 +14,7 @@
 
 #include "pbrt_import/shapes/subdivision.h"
 
-/// Control meshes, and what holds for all subdivided meshes.
+/// Control meshes, and checks that hold for every subdivided mesh.
 namespace packtrace::subdivision_test {
 
 struct Control {

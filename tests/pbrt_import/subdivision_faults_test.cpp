@@ -1,4 +1,4 @@
-// Tests control meshes that are no manifolds, and limits.
+// Tests the subdivision of non-manifold control meshes, and its limits.
 
 #include <algorithm>
 #include <array>

@@ -112,7 +112,7 @@ public:
 private:
   static constexpr size_t kMax = 3 * kMaxClusterTriangles + 2; ///< each triangle adds up to three
 
-  /// Prefers triangles that add no vertex or have no free neighbour; left behind, the latter would become isolated
+  /// Prefers triangles that add no vertex, and those without a free neighbour, which would otherwise become isolated
   /// pieces of other clusters.
   void weigh(uint32_t place) {
     weight_[place] = (1.0 + added_[place]) * (added_[place] == 0 || open_[place] == 0 ? 0.125 : 1.0);

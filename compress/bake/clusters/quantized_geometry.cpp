@@ -180,9 +180,9 @@ private:
     return count;
   }
 
-  /// Largest angle between a source normal and the decoded normal of another vertex that replaces it. Grids coarser
-  /// than the default have a larger limit of their own choice; there the encoding's error must not use up the angle
-  /// that lets vertices share a normal.
+  /// Largest angle between a source normal and the decoded normal of another vertex that replaces it. Where
+  /// normal_limits() allows larger errors because the grid is coarse, the encoding's own error is added, so that it
+  /// does not reduce the angle within which vertices share a normal.
   double weld_limit() const {
     const bool chosen = !config_.normals && !config_.normal_error_degrees;
     if (!chosen || limits_.error_degrees <= kDefaultNormalError) return limits_.error_degrees;
@@ -199,8 +199,8 @@ private:
   }
 
   /// Welds a vertex at a position where several source points merged. It reuses a vertex with the same UV whose normal
-  /// is within weld_limit(): coarse lattices would otherwise store many normals per position that differ by less
-  /// than the faces tilt.
+  /// is within weld_limit(): otherwise, coarse lattices would store many normals per position that differ by less than
+  /// the lattice tilts the faces.
   uint32_t weld_smooth_vertex(QuantizedVertex v, DVec3 normal) {
     constexpr uint32_t kUnset = ~0u;
     if (smooth_at_.empty()) smooth_at_.assign(surface_.positions.size(), kUnset);

@@ -41,8 +41,8 @@ struct GeometryMeasure {
   double median_edge = 0.0;
 
   double max_abs() const; ///< largest |coordinate|; 0 if empty
-  /// At least half the spacing of floats, and less than one spacing, at the largest coordinate along the axis where
-  /// that coordinate is smallest but not 0. On a lattice of this step, the largest float coordinates decode unchanged.
+  /// At least 0.5 and less than 1 times the spacing of floats at m, where m is the smallest, over the axes, of the
+  /// nonzero largest |coordinate| along the axis. On a lattice of this step, float coordinates near m decode unchanged.
   /// 0 if empty or if all coordinates are 0.
   double float_step() const;
 };

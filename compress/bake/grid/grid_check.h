@@ -5,7 +5,7 @@
 
 namespace packtrace {
 
-/// Effect of a lattice on the sample of a geometry, weighted by the pixels that the sample covers.
+/// Effect of a lattice on the sample triangles of a geometry, weighted by the pixels that they cover.
 struct GridCheck {
   double collapsed = 0.0;         ///< fraction of the image covered by triangles that lose their area
   double mean_tilt_degrees = 0.0; ///< angle between source and decoded facets that keep an area

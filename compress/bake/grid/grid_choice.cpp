@@ -13,9 +13,9 @@ namespace packtrace {
 namespace {
 
 constexpr int kMaxRefinements = 3;
-constexpr int kMaxEdgeRefinements = 5;
-constexpr double kEdgeMargin = 0.6;       // of the allowed number of changed pixels, to aim at
-constexpr double kMaxPixelSteps = 1024.0; // no step becomes finer than this fraction of a pixel for its edges
+constexpr int kMaxChangeRefinements = 5;
+constexpr double kChangeMargin = 0.6;     // fraction of the allowed change (VisibleChanges) to aim at
+constexpr double kMaxPixelSteps = 1024.0; // steps per pixel from which visible changes refine no further
 
 // Limits of the check.
 constexpr double kMaxCollapsed = 0.001; // fraction of the image
@@ -46,11 +46,11 @@ public:
       for (size_t g = 0; g < wanted.size(); ++g) refine_to(g, wanted[g].step);
     share_and_check();
     for (int i = 0; may_refine() && i < kMaxRefinements && refine_failing(); ++i) share_and_check();
-    const VisibleChanges edges(scene_, plan_, measure_, cameras, progress_);
-    changes_ = compare(edges);
-    for (int i = 0; may_refine() && i < kMaxEdgeRefinements && refine_moved(); ++i) {
+    const VisibleChanges visible(scene_, plan_, measure_, cameras, progress_);
+    changes_ = compare(visible);
+    for (int i = 0; may_refine() && i < kMaxChangeRefinements && refine_changed(); ++i) {
       share_and_check();
-      changes_ = compare(edges);
+      changes_ = compare(visible);
     }
     for (size_t g = 0; g < first.size(); ++g) out_.finer_geometries += out_.grids[g].grid.step() < first[g];
     report(wanted);
@@ -138,8 +138,7 @@ private:
     return std::min(0.75 * view.outline_share * step / view.best.height, 1.0);
   }
 
-  /// Flags geometries whose outlines move too far. Flags none as long as the outlines of the whole scene move little
-  /// enough.
+  /// Flags geometries whose outlines move too far; none if the outlines of the whole scene together move little enough.
   std::vector<uint8_t> find_moved_outlines() const {
     std::vector<uint8_t> moved(views_.size());
     double covered = 0.0, passed = 0.0;
@@ -152,7 +151,8 @@ private:
     return moved;
   }
 
-  /// Halves the step of each geometry that fails the check, and of coarser geometries that it shares positions with.
+  /// Halves the step of each geometry that fails the check, and of geometries on coarser grids that share positions
+  /// with it.
   bool refine_failing() {
     std::vector<uint8_t> failing = find_moved_outlines();
     bool shared = false, refined = false;
@@ -166,16 +166,16 @@ private:
     return refined;
   }
 
-  std::vector<VisibleChanges::Change> compare(const VisibleChanges& edges) const {
+  std::vector<VisibleChanges::Change> compare(const VisibleChanges& visible) const {
     for (size_t g = 0; g < out_.grids.size(); ++g) // as in share_and_check()
       if (!fits_lattice(measure_.geometries[g].max_abs(), out_.grids[g].grid.step()))
         return std::vector<VisibleChanges::Change>(out_.grids.size());
-    return edges.compare(out_.grids);
+    return visible.compare(out_.grids);
   }
 
-  /// Refines the steps of geometries whose edges move too far, and of coarser geometries that share positions with
-  /// them.
-  bool refine_moved() {
+  /// Refines the steps of geometries whose visible changes are too large, and of geometries on coarser grids that share
+  /// positions with them.
+  bool refine_changed() {
     std::vector<uint8_t> failing(changes_.size());
     bool shared = false, refined = false;
     for (size_t g = 0; g < failing.size(); ++g) {
@@ -185,15 +185,15 @@ private:
     if (shared) spread_to_sharing(failing);
     for (size_t g = 0; g < failing.size(); ++g) {
       if (failing[g] == 0) continue;
-      const double step = out_.grids[g].grid.step(), wanted = changes_[g].excess() > 1.0 ? edge_step(g) : step / 2.0;
+      const double step = out_.grids[g].grid.step(), wanted = changes_[g].excess() > 1.0 ? changed_step(g) : step / 2.0;
       const double finest = views_[g].pixel / world_scale(plan_.geometries[g]) / kMaxPixelSteps;
       if (step > finest) refined |= refine_to(g, std::max(wanted, finest));
     }
     return refined;
   }
 
-  /// The step at which the edges of a geometry that fails move little enough.
-  double edge_step(size_t g) const { return out_.grids[g].grid.step() * kEdgeMargin / changes_[g].excess(); }
+  /// The step at which a failing geometry is expected to change little enough. Changes are proportional to the step.
+  double changed_step(size_t g) const { return out_.grids[g].grid.step() * kChangeMargin / changes_[g].excess(); }
 
   /// Adds geometries on coarser grids that share positions with a failing geometry.
   void spread_to_sharing(std::vector<uint8_t>& failing) const {
@@ -214,8 +214,8 @@ private:
     });
   }
 
-  /// Positions that lie on or near the lattice move less than half a step; this is twice the distance that they do
-  /// move.
+  /// Twice the largest distance by which a position moves, at most the step. Positions on or near the lattice move less
+  /// than half a step.
   double effective_step(size_t g) const { return std::min(out_.grids[g].grid.step(), 2.0 * checks_[g].moved); }
 
   void report(std::span<const WantedStep> wanted) {
@@ -233,7 +233,7 @@ private:
         shortfall.wanted = std::min(wanted[g].step, shortfall.step * kMaxPassedPixels / passed_pixel_fraction(g));
       } else if (changes_[g].excess() > 1.0) {
         shortfall.bound = changes_[g].edges > 1.0 ? PictureBound::kOutline : PictureBound::kGap;
-        shortfall.wanted = std::min(wanted[g].step, edge_step(g));
+        shortfall.wanted = std::min(wanted[g].step, changed_step(g));
       } else if (views_[g].best.coverage() >= kSeen && step > kBoundSlack * wanted[g].limit) {
         shortfall.bound = wanted[g].bound;
         shortfall.wanted = wanted[g].step;

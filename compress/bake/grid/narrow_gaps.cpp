@@ -9,7 +9,7 @@
 #include <tbb/parallel_for.h>
 
 #include "compress/bake/grid/nearest_triangles.h"
-#include "pbrt_import/scene/bounds.h"
+#include "compress/bake/grid/touching_boxes.h"
 
 namespace packtrace {
 namespace {
@@ -22,9 +22,9 @@ constexpr double kMaxTests = 0x1p24;        // boxes and triangles tested per im
 constexpr size_t kMinPoints = 512;
 constexpr size_t kLeafPoints = 4;
 constexpr size_t kBlockTriangles = 64;
-constexpr size_t kProbes = 1024; // triangles that estimate the number of tests
+constexpr size_t kSampledTriangles = 1024; // about as many triangles estimate the number of tests
 
-/// The part of a surface's normal in which a gap may end.
+/// A segment along a surface normal, on which the facing surface is searched.
 struct Probe {
   DVec3 origin, direction;
   double reach;
@@ -43,12 +43,12 @@ public:
 
   std::span<const Probe> probes() const { return probes_; }
 
-  /// The smallest subtree with all probes whose boxes overlap a box; nullopt if there are none.
+  /// The smallest subtree that contains all probes that may overlap a box; nullopt if there are none.
   std::optional<uint32_t> subtree_of(const Bounds& box) const {
-    if (nodes_.empty() || !overlaps(nodes_[0].box, box)) return std::nullopt;
+    if (nodes_.empty() || !overlap(nodes_[0].box, box)) return std::nullopt;
     uint32_t node = 0;
     while (nodes_[node].right != 0) {
-      const bool left = overlaps(nodes_[node + 1].box, box), right = overlaps(nodes_[nodes_[node].right].box, box);
+      const bool left = overlap(nodes_[node + 1].box, box), right = overlap(nodes_[nodes_[node].right].box, box);
       if (!left && !right) return std::nullopt;
       if (left && right) break;
       node = left ? node + 1 : nodes_[node].right;
@@ -56,7 +56,8 @@ public:
     return node;
   }
 
-  /// Calls visit(index of a probe) for the probes of a subtree in boxes that overlap a triangle's box and plane.
+  /// Calls visit(index of a probe) for probes of a subtree, leaving out nodes whose box misses the triangle's box or
+  /// plane.
   /// @return the number of tested boxes and probes
   template <typename Visit>
   size_t visit(uint32_t subtree, const std::array<DVec3, 3>& t, DVec3 normal, const Visit& visit) const {
@@ -68,7 +69,7 @@ public:
     while (size > 0) {
       const Node& node = nodes_[stack[--size]];
       ++tests;
-      if (!overlaps(node.box, box)) continue;
+      if (!overlap(node.box, box)) continue;
       const DVec3 half = 0.5 * (node.box.hi - node.box.lo);
       if (std::abs(glm::dot(normal, node.box.lo + half - t[0])) > glm::dot(glm::abs(normal), half) * kPad) continue;
       if (node.right != 0) {
@@ -90,10 +91,6 @@ private:
     uint32_t right = 0; // the left child follows the node; 0 for leaves
     uint32_t first = 0, count = 0;
   };
-
-  static bool overlaps(const Bounds& a, const Bounds& b) {
-    return glm::all(glm::lessThanEqual(a.lo, b.hi)) && glm::all(glm::lessThanEqual(b.lo, a.hi));
-  }
 
   uint32_t add_node(size_t begin, size_t end) {
     const auto index = static_cast<uint32_t>(nodes_.size());
@@ -187,7 +184,7 @@ private:
   double expected_tests(const ProbeTree& tree) const {
     if (tree.probes().empty()) return 0.0;
     const uint32_t count = parts_.triangle_count();
-    const auto stride = static_cast<uint32_t>(count / kProbes + 1);
+    const auto stride = static_cast<uint32_t>(count / kSampledTriangles + 1);
     std::vector<size_t> tests(count / stride + 1);
     tbb::parallel_for(size_t{0}, tests.size(), [&](size_t i) {
       if (const auto number = static_cast<uint32_t>(i * stride); number < count) {

@@ -10,8 +10,8 @@
 namespace packtrace {
 namespace {
 
-constexpr double kMaxStepRatio = 16.0; // a step this many times above the wanted one is visible, too
-constexpr double kFloatStep = 0x1p-23; // finer steps than floats have at the same coordinate are useless
+constexpr double kMaxStepRatio = 16.0; // a larger ratio of a step and the wanted step is visible, too
+constexpr double kFloatStep = 0x1p-23; // relative to coordinates: finer steps than the spacing of floats are useless
 constexpr double kMaxHalvings = 60.0;  // keeps shifts of lattice coordinates valid
 constexpr double kMaxSteps = 0x1p50;   // keeps coordinates well inside the lattice
 

@@ -16,7 +16,7 @@ namespace {
 
 constexpr size_t kMaxSample = 8192;                 // triangles sampled per geometry
 constexpr size_t kMinSample = 64;                   // lower limit in scenes with many geometries
-constexpr size_t kMaxSampleLooks = size_t{1} << 20; // sample triangles of all geometries, times cameras
+constexpr size_t kMaxSampleLooks = size_t{1} << 20; // limit of (sample triangles of all geometries) x cameras
 
 constexpr double kLarge = 0.01;                // fraction of the image from which a geometry's facets must not tilt
 constexpr double kMinTotalTiltCoverage = 0.05; // the same for all smaller geometries together

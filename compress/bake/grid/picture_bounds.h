@@ -15,7 +15,7 @@ namespace packtrace {
 /// The reason that limits a geometry's step, so that images of it do not change visibly (docs/accuracy.md).
 enum class PictureBound : uint32_t {
   kNone,
-  kHeight,  ///< facets tilt or lose their area
+  kHeight,  ///< facets tilt or collapse
   kPixel,   ///< outlines and contacts move in the image
   kContact, ///< objects sink into their support or hover above it
   kOutline, ///< outlines of many thin pieces move past pixel centres

@@ -35,7 +35,7 @@ public:
   std::span<const PlacedPart> parts() const { return parts_; }
   uint32_t triangle_count() const { return triangles_; }
   const Mesh& mesh_of(const PlacedPart& placed) const { return scene_.meshes[placed.part->mesh]; }
-  /// The part of a triangle, given by its number.
+  /// Returns the part that contains a triangle. `triangle` is its number among all placed triangles.
   const PlacedPart& part_of(uint32_t triangle) const;
 
   /// World position of a vertex, rounded to a float in geometry space.

@@ -23,10 +23,9 @@ struct SampleTriangle {
   double weight = 1; ///< number of triangles that it represents
 };
 
-/// Returns all triangles of a geometry that have area, or a weighted sample of about max_count of them. Half of the
-/// selection goes by area and half by number, so larger triangles are more likely to be chosen. Weights make sums over
-/// the sample estimate sums over the geometry.
-/// Looks at 2^20 triangles at most. Depends on its arguments only.
+/// Returns all triangles of a geometry that have area, or a weighted sample of about max_count of them. The probability
+/// of a triangle is the mean of a constant and of its share of the area. The sum of weight * f over the sample
+/// estimates the sum of f over the geometry. Looks at 2^20 triangles at most. Depends on its arguments only.
 std::vector<SampleTriangle> sample_surface(const Scene& scene, const GeometryPlan& plan, size_t max_count);
 
 } // namespace packtrace

@@ -10,12 +10,6 @@ namespace {
 
 constexpr size_t kLeafBoxes = 4;
 
-bool overlap(const Bounds& a, const Bounds& b) {
-  for (int axis = 0; axis < 3; ++axis)
-    if (!(a.lo[axis] <= b.hi[axis] && b.lo[axis] <= a.hi[axis])) return false;
-  return true;
-}
-
 /// A binary tree over boxes, split at the median along the widest axis of their centres. Nodes are in depth-first
 /// order: the left child of node n is n + 1.
 class BoxTree {
@@ -43,7 +37,7 @@ private:
     double smallest = std::numeric_limits<double>::infinity(); ///< smallest size of its boxes
   };
 
-  /// A box while the tree is built. Copies of centres are faster to partition than numbers of boxes.
+  /// A box during the build. Centres are copied because partitioning them is faster than following indices.
   struct Item {
     DVec3 twice_centre;
     uint32_t box;

@@ -17,10 +17,10 @@ constexpr uint64_t kMaxDrawnTriangles = uint64_t{1} << 31;
 constexpr double kMaxMoved = 0.0055;    // fraction of pixels that may show another surface, weighted by contrast
 constexpr double kMaxMissed = 0.001;    // fraction of the image in which hit and miss may differ
 constexpr double kMaxGapChange = 0.012; // mean of measure_gap_changes() over all covered pixels
-constexpr double kMinMissedShare = 0.1; // of all such pixels; geometries with fewer are not to blame
-constexpr double kMinPixels = 576.0;    // 1 % of the image; with fewer pixels, one counts too much
+constexpr double kMinMissedShare = 0.1; // of all such pixels; geometries with a smaller share are not refined
+constexpr double kMinPixels = 576.0;    // 1 % of the image; sums are divided by at least this many pixels
 
-/// Returns the instances that a camera sees, the largest of them if they have more than max_triangles triangles.
+/// Returns the instances that a camera sees; only the largest if all have more than max_triangles triangles together.
 std::vector<uint32_t> choose_drawn(const PrimaryCamera& camera, const Scene& scene, const ScenePlan& plan,
                                    const SceneMeasure& measure, uint64_t max_triangles, uint64_t& drawn) {
   struct Seen {
@@ -53,7 +53,7 @@ std::vector<uint32_t> choose_drawn(const PrimaryCamera& camera, const Scene& sce
 }
 
 /// Expected contrast of ambient occlusion between two surfaces that are seen through one pixel centre, 0..1: 1 if one
-/// lies behind the other, otherwise by the angle between them.
+/// lies behind the other, otherwise proportional to the angle between them.
 /// @param step the most that one surface moves away from its plane, world units
 double contrast(const VisiblePoint& a, const VisiblePoint& b, double step) {
   if (a.triangle == b.triangle) return 0.0;
@@ -64,12 +64,13 @@ double contrast(const VisiblePoint& a, const VisiblePoint& b, double step) {
   return std::min(degrees, 180.0 - degrees) / 180.0;
 }
 
-/// Moved pixels over the limit. The standard deviation of their number is added, because few pixels may be lucky ones.
+/// Moved pixels relative to the limit. The standard deviation of their number is added, because a small number may be
+/// low by chance.
 double moved_excess(double moved, double seen) {
   return (moved + std::sqrt(moved)) / (kMaxMoved * std::max(seen, kMinPixels));
 }
 
-/// Changes of gaps over the limit.
+/// Changes of gaps relative to the limit.
 double gap_excess(double changes, double probed) { return changes / (kMaxGapChange * std::max(probed, kMinPixels)); }
 
 /// Perspective images that show what a camera sees: the camera itself, or the faces of a cube around an environment
@@ -105,10 +106,13 @@ VisibleChanges::VisibleChanges(const Scene& scene, const ScenePlan& plan, const 
   }
 }
 
-/// What an image shows of a geometry, in pixels.
+/// Sums over the pixels of a view that show a geometry.
 struct VisibleChanges::Sums {
-  double seen = 0.0, moved = 0.0, missed = 0.0;
-  double probed = 0.0, gaps = 0.0; // points whose gap is known, and the sum of its relative changes
+  double seen = 0.0;   // pixels
+  double moved = 0.0;  // pixels that show another surface, weighted by contrast
+  double missed = 0.0; // pixels that change between hit and miss
+  double probed = 0.0; // pixels whose gap was measured
+  double gaps = 0.0;   // sum of measure_gap_changes() over them
 };
 
 std::vector<VisibleChanges::Change> VisibleChanges::compare(std::span<const GeometryGrid> grids) const {

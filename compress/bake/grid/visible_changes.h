@@ -15,7 +15,7 @@ namespace packtrace {
 /// Compares what the cameras see of the source and of the scene on lattices, at the centres of pixels.
 /// - Edges that move past a pixel's centre put another surface there: the side of a plate, or the gap behind it.
 /// - Gaps that change their width change in brightness.
-/// This sees gaps and plates within one mesh, however their triangles lie, and ignores everything that is hidden.
+/// Gaps and plates count within one mesh as well as between meshes; hidden surfaces do not count.
 class VisibleChanges {
 public:
   /// Chooses what to draw: of many cameras and instances, the first cameras and the largest instances, about 4 times
@@ -24,11 +24,11 @@ public:
   VisibleChanges(const Scene& scene, const ScenePlan& plan, const SceneMeasure& measure,
                  std::span<const PrimaryCamera> cameras, Progress& progress);
 
-  /// Changes over those that the promise allows. Above 1, the lattice is too coarse. Proportional to the step. 0 as
-  /// long as the image as a whole is within the limit.
+  /// Changes relative to what the promise allows: above 1, the lattice is too coarse. Proportional to the step; 0 if
+  /// the image as a whole is within the limit.
   struct Change {
-    double edges = 0.0; ///< pixels that show another surface
-    double gaps = 0.0;  ///< mean relative change of the gap in front of a visible surface
+    double edges = 0.0; ///< of the number of pixels that show another surface
+    double gaps = 0.0;  ///< of the width of gaps in front of visible surfaces, on average
     double excess() const { return std::max(edges, gaps); }
   };
 

@@ -14,8 +14,8 @@ namespace packtrace {
 namespace {
 
 constexpr size_t kBlockTriangles = 4096;
-constexpr double kMaxTests = 0x1p28;      // pixels tested per image, shared out by number of triangles
-constexpr double kMinBlockTests = 0x1p20; // least share of a block
+constexpr double kMaxTests = 0x1p28;      // pixels tested per image; a block's share is proportional to its triangles
+constexpr double kMinBlockTests = 0x1p20; // smallest share of a block
 
 /// A projected vertex.
 struct ImagePoint {

@@ -24,9 +24,10 @@ struct VisiblePoints {
 };
 
 /// Finds the nearest surface per pixel by scan conversion into a depth buffer.
-/// Camera-invisible materials are left out; alpha masks count as opaque. Takes linear time: about 2^28 pixels are
-/// tested at most, which drops triangles only where thousands of large ones overlap. Depends on its arguments only, not
-/// on the thread count. Source: Olano, Greer, "Triangle scan conversion using 2D homogeneous coordinates" (1997).
+/// Camera-invisible materials are left out; alpha masks count as opaque. Takes linear time, because at most about 2^28
+/// pixels are tested. Triangles beyond this limit, which only thousands of overlapping large triangles exceed, are left
+/// out. Depends on its arguments only, not on the thread count. Source: Olano, Greer, "Triangle scan conversion using
+/// 2D homogeneous coordinates" (1997).
 /// @param camera perspective or orthographic
 VisiblePoints find_visible_points(const PrimaryCamera& camera, const PlacedParts& parts);
 

@@ -16,6 +16,7 @@
 #include "pbrt_import/base/output_file.h"
 #include "pbrt_import/base/progress.h"
 #include "runtime/commands/option_checks.h"
+#include "runtime/commands/whole_number.h"
 #include "tests/temporary_folder.h"
 
 namespace packtrace {
@@ -182,6 +183,13 @@ TEST(CliSupport, FilesAreNoTerminals) {
   EXPECT_FALSE(is_terminal(file));
   EXPECT_FALSE(wants_color(file));
   std::fclose(file);
+}
+
+TEST(WholeNumber, IsDigitsAlone) {
+  EXPECT_EQ(whole_number("0"), 0u);
+  EXPECT_EQ(whole_number("4294967295"), 4294967295u);
+  for (const char* text : {"", "auto", "-1", "+1", " 1", "1 ", "1.5", "0x1", "4294967296"})
+    EXPECT_EQ(whole_number(text), std::nullopt) << text;
 }
 
 TEST(NumberIn, IncludesBothEnds) {

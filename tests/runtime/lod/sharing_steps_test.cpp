@@ -1,4 +1,4 @@
-// Tests which steps of detail instances share, and who gets a cut of its own.
+// Tests the steps scheme: which BLASes instances share, and which instances get an own cut.
 
 #include <algorithm>
 #include <limits>

@@ -144,7 +144,7 @@ TEST(ExtremeScenes, ThingsWithoutAnExtentLieBesideOthers) {
   expect_usual_hits(spheres(), scene, about(6.0), kRays / 4);
 }
 
-/// What rays in the box about(size) do on average.
+/// Mean number of placements entered and triangles tested per ray.
 struct Work {
   double placements = 0.0, triangles = 0.0;
 };

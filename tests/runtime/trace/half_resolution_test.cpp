@@ -39,7 +39,7 @@ Picture picture_of(ImageSize size, const View& view, double scale = 1.0) {
   return picture;
 }
 
-/// What a picture of all pixels becomes at quarter resolution.
+/// The picture's ambient occlusion, sampled at quarter resolution and upsampled again.
 std::vector<float> at_quarter_resolution(const Picture& picture) {
   const HalfGBuffer half = halve(picture.surfaces);
   std::vector<float> ao;

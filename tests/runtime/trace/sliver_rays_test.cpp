@@ -100,7 +100,7 @@ Counts trace_rays(const RayTracer& tracer, const SceneSource& source, double thi
         const double a = uniform(random, 0, 1), b = uniform(random, 0, 1 - a);
         const DVec3 target = p[0] + (p[1] - p[0]) * a + (p[2] - p[0]) * b;
         const std::optional<Place> place = place_on(tracer, target, target + normal * (4.0 * thickness));
-        // Rays that pass an edge within rounding may see the inside of the triangle behind it.
+        // A ray that meets an edge, up to rounding errors, may hit the inner side of the triangle behind it.
         if (!place || place->triangle != t) continue;
         ++counts.places;
         for (int k = 0; k < 8; ++k) {

@@ -59,7 +59,8 @@ std::vector<Corners> world_triangles_of(const SceneSource& source) {
   return result;
 }
 
-/// A direction above a surface: anywhere, or close to that of an edge, along which needles are longest.
+/// A random direction above a surface. Half of the directions are nearly parallel to an edge, where a ray stays near a
+/// needle for longest.
 DVec3 direction_above(DVec3 normal, DVec3 edge, Random& random) {
   for (;;) {
     DVec3 direction = random_direction(random);
@@ -90,7 +91,7 @@ HitsAgain trace_rays(const RayTracer& tracer, const SceneSource& source, Random&
       const double a = std::pow(uniform(random, 0, 1), 3.0), b = (1.0 - a) * std::pow(10.0, -uniform(random, 0, 4));
       const DVec3 target = p[0] + (p[1] - p[0]) * a + (p[2] - p[0]) * b;
       const std::optional<Place> place = place_on(tracer, target, target + normal * (8.0 * std::abs(depth)));
-      // Rays that pass an edge within rounding may see the inside of the triangle behind it.
+      // A ray that meets an edge, up to rounding errors, may hit the inner side of the triangle behind it.
       if (!place || place->triangle != t) continue;
       for (int k = 0; k < 16; ++k)
         rays.push_back(start_at(*place, direction_above(place->normal, p[1] - p[0], random), 1e9, tracer.space()));
@@ -106,7 +107,7 @@ TEST_P(StretchedBodies, AreNotHitByRaysThatStartOnThem) {
   std::map<std::string, HitsAgain> found;
   for (uint32_t seed = 1; seed <= 10; ++seed) {
     Random random(seed);
-    BakeConfig config; // resolves the thickness
+    BakeConfig config; // with a step of 1/64 of the smallest scale, so that thin bodies keep their thickness
     config.precision_kind = PrecisionKind::kAbsolute;
     config.precision = std::min({std::abs(stretch.scale.x), std::abs(stretch.scale.y), std::abs(stretch.scale.z)}) / 64;
     const BakedScene baked(scene_of(stretch, random), config);

@@ -35,7 +35,7 @@ public:
   bool overlay(const std::array<DVec3, 3>& triangle, DVec3 direction, std::span<const uint32_t> candidates,
                std::vector<OverlayPiece>& pieces);
 
-  /// The maximum distance of a piece of the last lay() to nearest points; at most the distance along the direction.
+  /// The maximum distance of a piece of the last overlay() to nearest points; at most the distance along the direction.
   double nearest_distance(const OverlayPiece& piece) const;
 
 private:

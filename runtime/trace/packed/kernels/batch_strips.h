@@ -68,7 +68,7 @@ inline void lead_corners(const TraceCluster& cluster, uint32_t triangle, uint32_
   const auto first = static_cast<uint32_t>(last_one(bits, 0, triangle + 1, 0)); // first triangle of the strip
   const bool left = read_bits(bits, left_bit + triangle, 1) != 0;
   // One of the two corners is the previous entry. The other one was last replaced at the strip's last turn to the other
-  // side, by the entry before that turn's. Without such a turn it is one of the strip's first two corners.
+  // side, by the entry just before that turn's entry. Without such a turn it is one of the strip's first two corners.
   const int32_t turn = last_one(bits, left_bit + first + 1, triangle - first, left ? ~uint64_t{0} : 0);
   const uint32_t first_corner = corner - (triangle - first); // entry of the newest vertex of the strip's first triangle
   const uint32_t kept = turn >= 0 ? first_corner + static_cast<uint32_t>(turn) : first_corner - (left ? 2u : 1u);

@@ -13,10 +13,10 @@ namespace {
 /// and 10 u M of the triangle test.
 constexpr float kBeamPad = 28.0f * 0x1p-24f;
 
-/// Enlarges a node's boxes by what kBoxPad and kBeamPad cover, for M the largest coordinate of the node; the pads of
-/// rays then cover their own origins only. Everything below a node lies within its coordinates, so pads shrink towards
-/// the leaves: in a tree of small triangles around the grid's zero with a few huge ones, a pad that the huge ones
-/// determine would make rays pass many boxes that they miss by far.
+/// Enlarges a node's boxes by kBeamPad times the largest coordinate of the node. This covers the rounding errors of
+/// boxes and triangles, so the pads of rays cover only those of the rays' own origins. A child's coordinates are at
+/// most its parent's, so pads shrink towards the leaves. With a single pad for the whole tree, a few huge triangles
+/// would enlarge the boxes of all small ones, and many rays would hit boxes that they miss by far.
 template <typename Boxes>
 inline void enlarge_boxes(const baked::PackedNode& node, uint32_t octant, Boxes& boxes) {
   float most = 0.0f;
@@ -101,7 +101,7 @@ inline bool make_beam(RayGroup& group, float pad_coordinate, uint64_t rays, Beam
   return true;
 }
 
-/// Returns the boxes of a node that some ray of the beam may pass, as a bit mask, and a lower bound of the t at which
+/// Returns the boxes of a node that some ray of the beam may hit, as a bit mask, and a lower bound of the t at which
 /// the beam enters each.
 template <typename Lanes>
 inline uint32_t pass_beam(const GroupBoxes<Lanes>& boxes, const Beam& beam, float (&t)[baked::kNodeWidth]) {

@@ -3,7 +3,7 @@
 #include "runtime/trace/packed/kernels/group_boxes.h"
 
 /// The bounds of a ray group are the bounding box of all points at which its rays may hit something. No ray of the
-/// group passes a box outside them, so one test of a node's eight boxes culls boxes for the whole group. Where many
+/// group hits a box outside them, so one test of a node's eight boxes culls boxes for the whole group. Where many
 /// rays visit a node, few of its boxes remain, and each of them is tested against a register of rays.
 ///
 /// The bounds hold the origins and ends of the rays and are padded by kGroupPad, because the triangle test may accept

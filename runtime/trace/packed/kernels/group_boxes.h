@@ -68,8 +68,8 @@ struct GroupBoxes {
 /// Ray/box tests with one child box per lane.
 template <typename Lanes>
 struct ChildRays {
-  /// @param out by child: the rays of the bit mask `rays` that pass its box
-  /// @return the children that any ray passes, as a bit mask
+  /// @param out output, per child: mask of those of `rays` that hit its box
+  /// @return mask of the children that any ray hits
   [[gnu::always_inline]] static uint32_t pass(const GroupBoxes<Lanes>& boxes, const BoxRays& group, uint64_t rays,
                                               uint64_t (&out)[baked::kNodeWidth]) {
     typename Lanes::Masks masks;

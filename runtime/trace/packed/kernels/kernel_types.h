@@ -66,8 +66,8 @@ struct TraceTree {
   const baked::PackedNode* nodes; ///< root first
   /// Largest absolute coordinate of the root's box, and so of the vertices in it; at least 1.
   float max_coordinate;
-  /// 1: a node's boxes are enlarged by rounding errors at the node's own coordinates (enlarge_boxes()); 0: the pads of
-  /// rays cover those at max_coordinate.
+  /// How box tests allow for rounding errors. 1: each node's boxes are enlarged in proportion to the node's own largest
+  /// coordinate (enlarge_boxes()). 0: rays have a pad in proportion to max_coordinate, the same at all nodes.
   uint32_t graded;
 };
 
@@ -142,11 +142,11 @@ struct KernelScene {
   /// Largest absolute coordinate, in unit space, of the boxes in top_nodes and of the grids of aligned placements.
   float top_max_coordinate;
   /// M of kBoxPad for the tree over placements. With more than eight placements it is kMinTopPad times the largest
-  /// coordinate, and the boxes themselves are enlarged by 2^-20 of their planes' coordinates, which covers the planes'
-  /// share of the roundings. Otherwise a single placement far away would make every ray near the origin enter all other
-  /// placements.
+  /// coordinate. Each plane of the boxes is then moved outwards by 2^-20 of its coordinate, which covers the plane's
+  /// rounding errors. With a pad in proportion to the largest coordinate, a single placement far away would make every
+  /// ray near the origin enter all other placements.
   float top_pad_coordinate;
-  /// Decodes triangles of a kWide cluster; returns their number.
+  /// Decodes triangles of a cluster that is flagged kNeedsWideDecode; returns their number.
   uint32_t (*decode_wide)(const void* owner, uint32_t cluster, uint32_t first, uint32_t count, DecodedBatch& out);
   /// Whether the alpha mask of a masked triangle keeps the surface at (u, v).
   bool (*present)(const void* owner, uint32_t placement, uint32_t cluster, uint32_t triangle, float u, float v,

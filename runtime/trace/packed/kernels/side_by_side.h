@@ -36,8 +36,8 @@ inline void read_planes(const GroupBoxes<Lanes>& boxes, BoxPlanes& planes) {
   }
 }
 
-/// Tests the children of the bit mask `slots`. Returns the children that any ray passes, as a bit mask.
-/// @param out by child: the rays of the bit mask `rays` that pass its box; 0 for children not in `slots`
+/// Tests the children of the bit mask `slots`. Returns the mask of the children that any ray hits.
+/// @param out output, per child: mask of those of `rays` that hit its box; 0 for children not in `slots`
 template <typename WideLanes>
 [[gnu::always_inline]] inline uint32_t test_boxes_side_by_side(const BoxPlanes& planes, const SideBySideRays& group,
                                                                uint64_t rays, uint32_t slots,

@@ -51,7 +51,7 @@ inline double exact_difference(double a, double b, double c, double d) {
 /// move it along the ray by the corners' rounding errors. For rays nearly parallel to the plane, t is clamped to the
 /// range of the corners.
 /// @param lanes bit mask of the lanes to test
-/// @param corners (lane): the ShearedCorners of a lane
+/// @param corners function of a lane that returns its ShearedCorners
 /// @param sz Woop's Sz
 /// @param along the ray meets the plane at z = depth / along
 template <typename Lanes, typename Corners>
@@ -166,7 +166,8 @@ inline auto stored_corners(const typename Lanes::F (&x)[3], const typename Lanes
   };
 }
 
-/// Does the same in doubles. As in floats, a sheared corner depends on the corner and the ray only.
+/// Returns a function of the lane that computes its ShearedCorners in doubles. As in floats, a sheared corner depends
+/// on the corner and the ray only.
 /// @param vertex, origin, normal, rest as in test_lanes()
 template <typename Lanes, bool kUseResidual, typename Vertex, typename Origin, typename Normal, typename Rest>
 inline auto shear_exactly(Vertex vertex, Origin origin, Normal normal, Rest rest, const RayLanes<Lanes>& rays,
@@ -195,7 +196,7 @@ inline auto shear_exactly(Vertex vertex, Origin origin, Normal normal, Rest rest
   };
 }
 
-/// Returns a bound of the change of edge functions p x q that rounding the sheared corners to floats makes. Each
+/// Returns a bound of the error of edge functions p x q that comes from rounding the sheared corners to floats. Each
 /// coordinate has an error of at most 4.1 u R, where u = 2^-24 and R is the largest coordinate of a corner relative to
 /// the origin; sheared coordinates are at most X. So p x q changes by at most 16.4 u R X + 34 u^2 R^2.
 /// @param relative as in test_lanes()
@@ -223,10 +224,10 @@ inline uint32_t starts_near_plane(Relative relative, Normal normal, typename Lan
 /// Returns the lanes in which a ray hits a triangle, as a bit mask. Avoids unpredictable branches until a lane hits.
 /// @tparam kWeights whether hits are filled in; otherwise only the lanes are computed
 /// @tparam kUseResidual whether t counts from the origin before it was rounded to floats
-/// @param vertex (k, corner): the corner's coordinate along Woop's axis k
-/// @param origin (k): the origin's coordinate along Woop's axis k
-/// @param normal (k): the plane normal along Woop's axis k
-/// @param rest (k): the origin's rounding error (exact minus rounded) along Woop's axis k
+/// @param vertex function of (k, corner) that returns the corner's coordinate along Woop's axis k
+/// @param origin function of k that returns the origin's coordinate along Woop's axis k
+/// @param normal function of k that returns the plane normal's component along Woop's axis k
+/// @param rest function of k that returns the origin's rounding error (exact minus rounded) along Woop's axis k
 /// @tparam Fine FineGrid<true> if the tree's grid is so fine that sheared corners need doubles near edges, else
 /// FineGrid<false>
 /// @param wanted bit mask of the lanes to test

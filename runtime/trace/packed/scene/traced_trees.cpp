@@ -16,8 +16,8 @@ uint8_t ray_classes(uint32_t material_class) {
                               ((material_class & baked::kMaskedClass) != 0 ? baked::kMaskedLeaves : 0));
 }
 
-/// Whether the pads of rays would be so large, compared with the boxes of leaf nodes, that rays would pass boxes which
-/// they miss: decided by the median of a sample of leaf nodes.
+/// Whether a common pad for all boxes would be so large, compared with leaf nodes, that rays would often hit boxes that
+/// they miss. Decided by the median size of a sample of leaf nodes.
 bool needs_graded_pads(std::span<const baked::PackedNode> nodes, float max_coordinate) {
   constexpr size_t kSample = 256;
   constexpr float kVisiblePad = 0x1p-24f * 24.0f * 32.0f; // 32 times kBoxPad

@@ -19,8 +19,8 @@ struct Pending {
 /// Tests the rays of a group against the boxes of a node's children.
 template <typename Lanes, bool kAny>
 struct ChildTests {
-  /// Tests rays against the children in the bit mask `slots`. Returns the children that any ray passes, as a bit mask.
-  /// @param by_child by child: the rays that pass its box
+  /// Tests rays against the children in the bit mask `slots`. Returns the mask of the children that any ray hits.
+  /// @param by_child output, per child: mask of the rays that hit its box
   /// @param t for nearest hits: where the first ray enters each child; for a beam, a lower bound over its rays
   template <typename Group>
   static uint32_t pass(const typename Lanes::Boxes& boxes, const Group& group, uint64_t rays, uint32_t slots,
@@ -63,7 +63,7 @@ struct ChildTests {
     return test_boxes_side_by_side<typename Lanes::WideLanes>(planes, group, rays, slots, by_child);
   }
 
-  /// Pushes the children of a node that rays pass. For nearest hits the child that the first ray enters first ends on
+  /// Pushes the children of a node that rays hit. For nearest hits the child that the first ray enters first ends on
   /// top of the stack; for any hits, the first child in the tree's order.
   template <typename Group, typename Number>
   static void push_children(const typename Lanes::Boxes& boxes, const Group& group, uint64_t rays, uint32_t slots,

@@ -10,7 +10,7 @@
 #include "runtime/trace/packed/traversal/outside_search.h"
 
 /// Traces groups of rays through the tree over placements and through placed trees. A group visits a node together, as
-/// a 64-bit mask of rays, and the node test yields a mask per child of the rays that pass its box. A node is read and
+/// a 64-bit mask of rays, and the node test yields a mask per child of the rays that hit its box. A node is read and
 /// unpacked once per group, and no ray's test waits for the result of another. Source of the idea: Barringer,
 /// Akenine-Moeller, "Dynamic ray stream traversal" (2014).
 namespace packtrace::packed {
@@ -131,7 +131,7 @@ private:
     }
   }
 
-  /// Returns the rays that pass the box of a part of the placement, or all rays if the scene has no parts.
+  /// Returns the rays that hit the box of a part of the placement, or all rays if the scene has no parts.
   uint64_t reach_parts(uint32_t placement, const SideBySideRays& group, uint64_t rays, uint32_t octant) const {
     if (scene_.parts == nullptr) return rays;
     const TopNode& parts = scene_.parts[placement];
@@ -194,8 +194,7 @@ private:
     }
   }
 
-  /// Prefetches all children of a node before it is known which of them rays pass: the first child is read right after
-  /// the boxes have been tested.
+  /// Prefetches all children of a node before their boxes are tested, because the first child is read right after that.
   static void prefetch_siblings(const baked::PackedNode* first) {
     const auto begin = reinterpret_cast<uintptr_t>(first), end = begin + baked::kNodeWidth * sizeof *first;
     for (uintptr_t line = begin; line < end; line += 64) __builtin_prefetch(reinterpret_cast<const void*>(line));

@@ -75,8 +75,8 @@ private:
     float distance; ///< squared distance of the box from the first ray's origin
   };
 
-  /// Pushes the children that rays pass; the child nearest to the first ray's origin ends on top. Rays that start at
-  /// one place and end nearby need not look farther, whatever their direction.
+  /// Pushes the children that rays hit. The child nearest to the first ray's origin ends on top, because rays that
+  /// start at one place mostly hit something near it, whatever their direction.
   void visit_node(const Visit& at, Visit* stack, uint32_t& size) {
     const TopNode& node = scene_.top_nodes[at.node];
     StreamPart* parts[baked::kNodeWidth];
