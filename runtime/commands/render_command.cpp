@@ -28,15 +28,16 @@ namespace {
 
 /// Renders the camera, or the whole scene if the scene's own camera sees nothing of it.
 PictureReport render_chosen(const RenderOptions& options, const GlobalOptions& globals, const LoadedScene& loaded,
-                            FrameLoop& loop, const StillConfig& config, ChosenCamera& camera, RenderedImage& image,
+                            FrameLoop& loop, const StillConfig& config, double time_s, ChosenCamera& camera,
+                            RenderedImage& image,
                             Progress& progress) {
   return with_file(options.input, [&] {
     const bool may_replace = !options.camera && camera.index;
-    PictureReport report = render_still(loop, camera.camera, config.frames, may_replace, image, progress);
+    PictureReport report = render_still(loop, camera.camera, time_s, config.frames, may_replace, image, progress);
     if (report.seen || !may_replace) return report;
     camera = frame_whole_scene(camera, *loaded.source, config.size, options, globals);
     loop.reset();
-    return render_still(loop, camera.camera, config.frames, false, image, progress);
+    return render_still(loop, camera.camera, time_s, config.frames, false, image, progress);
   });
 }
 
@@ -84,7 +85,7 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   FileTimings timings;
   timings.load_s = setup.load_s;
   RenderedImage image;
-  const PictureReport report = render_chosen(options, globals, loaded, loop, config, camera, image, progress);
+  const PictureReport report = render_chosen(options, globals, loaded, loop, config, setup.time_s, camera, image, progress);
   display.finish();
 
   const Stopwatch writing;

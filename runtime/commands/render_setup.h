@@ -25,6 +25,8 @@ struct RenderSetup {
   double load_s = 0.0;
   ChosenCamera camera;
   StillConfig config;
+  SceneMotion motion;
+  double time_s = 0.0; ///< time of a still
   MemoryReservation pixels;
   std::unique_ptr<FrameLoop> loop;
 };

@@ -21,9 +21,9 @@ constexpr double kDefaultSeconds = 4.0;
 
 /// Distance along the view at which a camera sees most of what is in the middle of its picture: the median depth of the
 /// middle quarter. Where it sees nothing, the distance of the scene's centre.
-double view_distance(const Camera& camera, const SceneSource& source, FrameLoop& loop) {
+double view_distance(const Camera& camera, double time_s, const SceneSource& source, FrameLoop& loop) {
   Progress unseen;
-  loop.next_frame(camera, unseen);
+  loop.next_frame(camera, time_s, unseen);
   const GBuffer& g = loop.gbuffer();
   std::vector<float> depths;
   for (uint32_t y = g.size.height / 4; y < g.size.height - g.size.height / 4; ++y)
@@ -79,11 +79,15 @@ void add_sequence_options(CLI::App& verb, SequenceOptions& options) {
                   "camera rays; more give smoother edges and less noise")
       ->type_name("N")
       ->group(kGroup);
-  verb.add_option("--start-time", options.start_time, "Time of the first picture in seconds (default 0)")
+  verb.add_option("--start-time", options.start_time, "Time of the first picture in seconds (default: the first key of the path, else of the scene's motion)")
       ->type_name("S")
       ->group(kGroup);
   verb.add_flag("--resume", options.resume,
                 "Continue an interrupted sequence of numbered files: the result is the same as without interruption")
+      ->group(kGroup);
+  verb.add_option("--checkpoint", options.checkpoint,
+                  "Save the state for --resume after as many seconds, 0 for every picture (default 10)")
+      ->type_name("S")
       ->group(kGroup);
   verb.add_option("--stream", options.stream,
                   "Format of -o - : y4m is uncompressed video for an encoder; png writes one PNG after another "
@@ -98,7 +102,9 @@ void add_sequence_options(CLI::App& verb, SequenceOptions& options) {
 void validate(const SequenceOptions& options) {
   if (!options.path &&
       (options.fps || options.subframes || options.start_time || options.resume || options.stream || options.csv))
-    throw Error(ErrorKind::kUsage, "--fps, --subframes, --start-time, --resume, --stream and --csv require --path");
+    throw Error(ErrorKind::kUsage, "--fps, --subframes, --start-time, --resume, --checkpoint, --stream and --csv require --path");
+  if (options.checkpoint && !(*options.checkpoint >= 0.0))
+    throw Error(ErrorKind::kUsage, "--checkpoint: must be a number of seconds, 0 or more");
   if (options.fps && !(*options.fps > 0.0 && *options.fps <= 1000.0))
     throw Error(ErrorKind::kUsage, fmt::format("--fps {}: must be above 0 and at most 1000", *options.fps));
   if (options.subframes && (*options.subframes < 1 || *options.subframes > kMaxSubframes))
@@ -108,18 +114,24 @@ void validate(const SequenceOptions& options) {
 }
 
 Sequence make_sequence(const SequenceOptions& options, std::optional<uint64_t> pictures, const SceneSource& source,
-                       const Camera& camera, FrameLoop& loop) {
+                       const Camera& camera, std::optional<uint32_t> index, FrameLoop& loop) {
   Sequence sequence;
   sequence.fps = options.fps.value_or(sequence.fps);
   sequence.subframes = options.subframes.value_or(sequence.subframes);
-  sequence.start_s = options.start_time.value_or(0.0);
+  const SceneMotion* const motion = loop.scene().motion;
+  sequence.start_s = options.start_time.value_or(motion != nullptr ? motion->begin_s() : 0.0);
   if (pictures && (*pictures < 1 || *pictures > kMaxPictures))
     throw Error(ErrorKind::kUsage,
                 fmt::format("--frames {}: a sequence has 1 to {} pictures", *pictures, kMaxPictures));
   sequence.pictures = pictures.value_or(default_pictures(kDefaultSeconds, sequence.fps));
   const std::string& path = *options.path;
   if (path == "scene") {
-    sequence.camera = [camera](uint64_t) { return camera; };
+    const double start_s = sequence.start_s, fps = sequence.fps;
+    sequence.camera = [=](uint64_t i) {
+      const double time_s = start_s + static_cast<double>(i) / fps;
+      const auto moving = motion != nullptr && index ? motion->camera(*index, time_s) : std::nullopt;
+      return moving.value_or(camera);
+    };
   } else if (path == "turntable") {
     const Camera framing = framing_camera(source.world_bounds(), loop.config().size);
     sequence.camera =
@@ -127,7 +139,7 @@ Sequence make_sequence(const SequenceOptions& options, std::optional<uint64_t> p
   } else if (path == "orbit" || path.starts_with("orbit:")) {
     const double degrees = orbit_degrees(path);
     const DVec3 forward = glm::normalize(DVec3(camera.world_from_camera[2]));
-    const DVec3 pivot = DVec3(camera.world_from_camera[3]) + forward * view_distance(camera, source, loop);
+    const DVec3 pivot = DVec3(camera.world_from_camera[3]) + forward * view_distance(camera, sequence.start_s, source, loop);
     sequence.camera = turning(camera, pivot, nearest_up_axis(camera), degrees, sequence.pictures);
   } else {
     if (ending_of(path) != ".json")

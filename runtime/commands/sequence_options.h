@@ -18,6 +18,7 @@ struct SequenceOptions {
   std::optional<uint32_t> subframes;
   std::optional<double> start_time;
   bool resume = false;
+  std::optional<double> checkpoint; ///< seconds
   std::optional<std::string> stream; ///< format on standard output
   std::optional<std::string> csv;
 };
@@ -41,10 +42,11 @@ struct Sequence {
 
 /// Returns the sequence that the options describe.
 /// @param pictures number of pictures; if not set, the length of the path's file, or 4 s
-/// @param camera the still camera
+/// @param camera the camera at rest
+/// @param index its number in the scene; none if it frames the whole scene
 /// @param loop a frame loop of the scene; renders a frame to find what an orbit turns about, and is reset
 /// Throws Error(kUsage) for options out of range, and like read_camera_path().
 Sequence make_sequence(const SequenceOptions& options, std::optional<uint64_t> pictures, const SceneSource& source,
-                       const Camera& camera, FrameLoop& loop);
+                       const Camera& camera, std::optional<uint32_t> index, FrameLoop& loop);
 
 } // namespace packtrace

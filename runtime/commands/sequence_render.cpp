@@ -23,7 +23,7 @@
 namespace packtrace {
 namespace {
 
-/// Seconds between two checkpoints. Work after the last one is repeated.
+/// Seconds between two checkpoints unless --checkpoint says another. Work after the last one is repeated.
 constexpr double kCheckpointInterval = 10.0;
 
 /// The table of --csv, written line by line.
@@ -98,7 +98,7 @@ uint64_t resume_sequence(const SequenceCheckpoint& checkpoint, const Sequence& s
   const std::optional<SequenceState> state = checkpoint.load();
   if (!state || state->pictures == 0) return 0;
   if (state->pictures > sequence.pictures) throw Error(ErrorKind::kInput, checkpoint.file() + ": damaged");
-  loop.restore(sequence.camera(state->pictures - 1), state->frame);
+  loop.restore(sequence.camera(state->pictures - 1), sequence.time_s(state->pictures - 1), state->frame);
   return state->pictures;
 }
 
@@ -116,14 +116,14 @@ std::vector<PictureRow> render_pictures(const Sequence& sequence, uint64_t first
   Stopwatch since_checkpoint;
   progress.begin("pictures", (sequence.pictures - first) * sequence.subframes * loop.frame_pixels());
   for (uint64_t picture = first; picture < sequence.pictures; ++picture) {
-    const PictureReport report = render_picture(loop, sequence.camera(picture), sequence.subframes, image, progress);
+    const PictureReport report = render_picture(loop, sequence.camera(picture), sequence.time_s(picture), sequence.subframes, image, progress);
     const Stopwatch writing;
     outputs.write(picture, sequence.fps, image, attributes);
     PictureRow row(picture, sequence.time_s(picture), report, loop.detail());
     row.write_s = writing.seconds();
     csv.write(csv_line(row));
     rows.push_back(row);
-    if (checkpoint == nullptr || since_checkpoint.seconds() < kCheckpointInterval) continue;
+    if (checkpoint == nullptr || since_checkpoint.seconds() < checkpoint_s) continue;
     checkpoint->save({picture + 1, loop.save()});
     since_checkpoint = Stopwatch();
   }
@@ -154,7 +154,8 @@ int render_sequence(const RenderOptions& options, const GlobalOptions& globals) 
   Progress progress(display.observer());
   RenderSetup setup(options, globals, outputs.has_lod_layers(), false, progress, display);
   const Sequence sequence = with_file(options.input, [&] {
-    return make_sequence(options.sequence, options.frames, *setup.loaded.source, setup.camera.camera, *setup.loop);
+    return make_sequence(options.sequence, options.frames, *setup.loaded.source, setup.camera.camera,
+                         setup.camera.index, *setup.loop);
   });
   outputs.check(sequence.pictures);
   std::optional<SequenceCheckpoint> checkpoint;
@@ -162,7 +163,8 @@ int render_sequence(const RenderOptions& options, const GlobalOptions& globals) 
   const uint64_t first =
       options.sequence.resume && checkpoint ? resume_sequence(*checkpoint, sequence, *setup.loop) : 0;
   const std::vector<PictureRow> rows =
-      render_pictures(sequence, first, setup, outputs, csv, checkpoint ? &*checkpoint : nullptr, progress);
+      render_pictures(sequence, first, setup, outputs, csv, checkpoint ? &*checkpoint : nullptr,
+                      options.sequence.checkpoint.value_or(kCheckpointInterval), progress);
   outputs.commit();
   csv.commit();
   if (checkpoint) checkpoint->remove();

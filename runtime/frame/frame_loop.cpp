@@ -21,6 +21,12 @@ uint64_t count_hits(const GBuffer& g) {
       std::count_if(g.instance.begin(), g.instance.end(), [](uint32_t id) { return id != kNoInstance; }));
 }
 
+/// Marks that nothing has moved since the G-buffer was traced.
+void forget_motion(GBuffer& gbuffer) {
+  gbuffer.motion_px.assign(gbuffer.motion_px.size(), Vec2(0));
+  gbuffer.previous_z.clear();
+}
+
 bool same_camera(const Camera& a, const Camera& b) {
   return a.projection == b.projection && a.world_from_camera == b.world_from_camera && a.fov_degrees == b.fov_degrees &&
          a.screen_window == b.screen_window && a.width_px == b.width_px && a.height_px == b.height_px;
@@ -38,7 +44,7 @@ glm::dvec2 jitter_offset(uint32_t frame) {
 }
 
 PassTimes& PassTimes::operator+=(const PassTimes& other) {
-  plan_s += other.plan_s, build_s += other.build_s, primary_s += other.primary_s, ao_s += other.ao_s;
+  update_s += other.update_s, plan_s += other.plan_s, build_s += other.build_s, primary_s += other.primary_s, ao_s += other.ao_s;
   denoise_s += other.denoise_s, upsample_s += other.upsample_s, resolve_s += other.resolve_s;
   return *this;
 }
@@ -103,6 +109,12 @@ FrameLoop::FrameLoop(const FrameScene& scene, const FrameConfig& config)
     : scene_(scene), config_(config), denoiser_(config.denoiser), raw_mean_(std::make_unique<RawMean>()) {
   config_.validate();
   packtrace::validate(config_.ao);
+  if (scene_.motion != nullptr && scene_.motion->moves()) {
+    const std::span<const uint32_t> moving = scene_.motion->moving_instances();
+    scene_.backend.movers = {{moving.begin(), moving.end()}, scene_.motion->moving_bounds()};
+    for (const PlacedGeometry& instance : scene_.source->instances()) last_world_.push_back(instance.world_from_object);
+    pose_.resize(moving.size()), last_pose_.resize(moving.size());
+  }
   if (!config_.detail.error_px) return;
   const auto* packed = dynamic_cast<const PackedSource*>(scene_.source);
   if (scene_.file == nullptr || packed == nullptr)
@@ -128,7 +140,7 @@ std::vector<std::byte> FrameLoop::save() const {
   return bytes;
 }
 
-void FrameLoop::restore(const Camera& camera, std::span<const std::byte> bytes) {
+void FrameLoop::restore(const Camera& camera, double time_s, std::span<const std::byte> bytes) {
   SavedLoop saved{};
   const auto fail = [] { throw Error(ErrorKind::kInput, "the saved state does not belong to these settings"); };
   if (bytes.size() < sizeof(saved)) fail();
@@ -144,12 +156,13 @@ void FrameLoop::restore(const Camera& camera, std::span<const std::byte> bytes) 
   denoiser_.restore(shaded, bytes.subspan(saved.mean_bytes));
   // Camera rays are traced again: they depend on the camera alone.
   layers_.clear();
+  pose_instances(time_s);
   for (still_frames_ = 0;; ++still_frames_) {
     report_ = {};
     report_.moved = still_frames_ == 0;
     if (traces(still_frames_)) {
       const PrimaryCamera view = view_of(camera, still_frames_);
-      trace_camera_rays(view, view);
+      trace_camera_rays(view);
       layers_.add(gbuffer_, scene_.source->materials());
       if (config_.lod_layers) add_lod_layers(view);
     }
@@ -172,15 +185,40 @@ const SceneSource& FrameLoop::traced_source() const {
 
 std::vector<const RayTracer*> FrameLoop::tracers() const {
   std::vector<const RayTracer*> all;
-  if (!config_.detail.camera_uses_levels()) all.push_back(scene_.tracer != nullptr ? scene_.tracer : level_0_.get());
+  if (!config_.detail.camera_uses_levels()) all.push_back(level_0_.get());
   if (level_tracer_) all.push_back(level_tracer_.get());
   return all;
 }
 
+/// Moves the instances to their places at a time. Returns whether one moved since the last call.
+bool FrameLoop::pose_instances(double time_s) {
+  if (pose_.empty()) return false;
+  const Stopwatch updating;
+  const std::span<const uint32_t> moving = scene_.motion->moving_instances();
+  std::swap(pose_, last_pose_);
+  scene_.motion->pose(time_s, pose_);
+  if (view_)
+    for (size_t i = 0; i < moving.size(); ++i) last_world_[moving[i]] = last_pose_[i];
+  const bool moved = pose_ != last_pose_;
+  if (moved || !view_) {
+    for (size_t i = 0; planner_ && i < moving.size(); ++i) planner_->move_instance(moving[i], pose_[i]);
+    for (RayTracer* tracer : {level_0_.get(), level_tracer_.get()})
+      if (tracer != nullptr) tracer->place_instances(moving, pose_);
+  }
+  report_.times.update_s += updating.seconds();
+  return moved;
+}
+
+/// Moves the instances of a new tracer to their current places.
+std::unique_ptr<RayTracer> FrameLoop::posed(std::unique_ptr<RayTracer> tracer) const {
+  if (!pose_.empty()) tracer->place_instances(scene_.motion->moving_instances(), pose_);
+  return tracer;
+}
+
 void FrameLoop::build_level_0() {
-  if (scene_.tracer != nullptr || level_0_) return;
+  if (level_0_) return;
   const Stopwatch building;
-  level_0_ = make_tracer(*scene_.source, scene_.file, scene_.backend);
+  level_0_ = posed(make_tracer(*scene_.source, scene_.file, scene_.backend));
   report_.times.build_s += building.seconds();
 }
 
@@ -190,12 +228,12 @@ void FrameLoop::choose_detail(const PrimaryCamera& view, const GBuffer* seen) {
   if (!report_.rebuilt) return;
   const Stopwatch building;
   level_tracer_.reset(); // frees the memory of the old trees first
-  level_tracer_ = make_tracer(planner_->source(), *scene_.file, scene_.backend);
+  level_tracer_ = posed(make_tracer(planner_->source(), *scene_.file, scene_.backend));
   report_.times.build_s += building.seconds();
 }
 
 /// Traces the camera rays into gbuffer_.
-void FrameLoop::trace_camera_rays(const PrimaryCamera& view, const PrimaryCamera& previous) {
+void FrameLoop::trace_camera_rays(const PrimaryCamera& view) {
   const bool levels = config_.detail.camera_uses_levels();
   if (levels && report_.moved) choose_detail(view, nullptr);
   if (!levels) build_level_0();
@@ -203,7 +241,9 @@ void FrameLoop::trace_camera_rays(const PrimaryCamera& view, const PrimaryCamera
   const RayTracer& tracer = *tracers().front();
   Progress unseen;
   const Stopwatch tracing;
-  trace_primary(source, tracer, view, previous, gbuffer_, unseen);
+  const bool moved_on = report_.moved && view_; // not the first frame
+  const PreviousFrame before{moved_on ? *view_ : view, moved_on ? std::span<const Affine>(last_world_) : std::span<const Affine>()};
+  trace_primary(source, tracer, view, before, gbuffer_, unseen);
   report_.times.primary_s = tracing.seconds();
   report_.primary_rays = gbuffer_.size.pixels();
   report_.hit_pixels = count_hits(gbuffer_);
@@ -250,29 +290,25 @@ PrimaryCamera FrameLoop::view_of(const Camera& camera, uint32_t still_frame) con
   return {camera, config_.traced_size(), offset};
 }
 
-const FrameReport& FrameLoop::next_frame(const Camera& camera, Progress& progress) {
-  const bool first = !view_;
-  const bool moved = first || !same_camera(camera, *camera_);
-  FrameReport report;
-  report.number = next_number_;
-  report.moved = moved;
-  report.hit_pixels = report_.hit_pixels;
-  report_ = report;
+const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Progress& progress) {
+  report_ = {.number = next_number_, .hit_pixels = report_.hit_pixels};
+  const bool posed = pose_instances(time_s);
+  const bool moved = report_.moved = !view_ || posed || !same_camera(camera, *camera_);
   still_frames_ = moved ? 0 : still_frames_ + 1;
 
   const bool still_jitter = config_.jitters() && !moved;
   const bool trace = traces(still_frames_);
   const PrimaryCamera view = view_of(camera, still_frames_);
   if (trace)
-    trace_camera_rays(view, first || !moved ? view : *view_);
+    trace_camera_rays(view);
   else if (still_frames_ == 1)
-    gbuffer_.motion_px.assign(gbuffer_.motion_px.size(), Vec2(0));
+    forget_motion(gbuffer_);
   camera_ = camera;
   view_.emplace(camera, config_.traced_size());
   report_.seen = report_.hit_pixels > 0;
 
   const bool quarter = config_.ao_resolution == AoResolution::kQuarter;
-  if (quarter && still_frames_ == 1) half_.gbuffer.motion_px.assign(half_.gbuffer.motion_px.size(), Vec2(0));
+  if (quarter && still_frames_ == 1) forget_motion(half_.gbuffer);
   const GBuffer& shaded = quarter ? half_.gbuffer : gbuffer_;
   const Stopwatch tracing;
   trace_ao(traced_source(), *tracers().back(), shaded, config_.ao, static_cast<uint32_t>(next_number_), raw_, progress);

@@ -13,6 +13,7 @@
 #include "runtime/frame/frame_config.h"
 #include "runtime/frame/mean_layers.h"
 #include "runtime/frame/rendered_image.h"
+#include "runtime/motion/scene_motion.h"
 #include "runtime/trace/make_tracer.h"
 
 namespace packtrace {
@@ -22,12 +23,12 @@ struct FrameScene {
   const SceneSource* source = nullptr;
   const BakedFile* file = nullptr; ///< the file that `source` reads; null for an imported scene
   TracerConfig backend;
-  /// Traces `source` at level 0; null: the frame loop builds one when it needs it.
-  const RayTracer* tracer = nullptr;
+  const SceneMotion* motion = nullptr; ///< of the instances; null: none moves
 };
 
 /// Wall times of a frame's passes in seconds.
 struct PassTimes {
+  double update_s = 0;  ///< transforms of moving instances, and the tree over placements
   double plan_s = 0;     ///< choice of LOD cuts and their clusters
   double build_s = 0;    ///< decoding and BVH construction
   double primary_s = 0;  ///< camera rays
@@ -37,7 +38,7 @@ struct PassTimes {
   double resolve_s = 0;  ///< layers of the image
 
   PassTimes& operator+=(const PassTimes& other);
-  double total_s() const { return plan_s + build_s + primary_s + ao_s + denoise_s + upsample_s + resolve_s; }
+  double total_s() const { return update_s + plan_s + build_s + primary_s + ao_s + denoise_s + upsample_s + resolve_s; }
 };
 
 /// What happened in a frame.
@@ -75,9 +76,10 @@ public:
   ~FrameLoop();
 
   /// Renders the next frame.
+  /// @param time_s time of FrameScene::motion in seconds
   /// @param progress advances by frame_pixels(); the caller begins the phase
   /// Throws Error(kInput) for a camera without rays, Error(kCancelled), and what building trees throws.
-  const FrameReport& next_frame(const Camera& camera, Progress& progress);
+  const FrameReport& next_frame(const Camera& camera, double time_s, Progress& progress);
 
   /// Writes the layers of the frames so far.
   /// @param report mean_history is set, and the denoiser's and the resolve's times are added
@@ -86,9 +88,9 @@ public:
   /// Returns what the next frame needs of the previous ones, for restore().
   std::vector<std::byte> save() const;
   /// Continues where a frame loop with the same scene and configuration was saved.
-  /// @param camera that of the last frame
+  /// @param camera, time_s those of the last frame
   /// Throws Error(kInput) for bytes that save() did not write, and as next_frame() does.
-  void restore(const Camera& camera, std::span<const std::byte> bytes);
+  void restore(const Camera& camera, double time_s, std::span<const std::byte> bytes);
 
   /// Number of occlusion pixels per frame.
   uint64_t frame_pixels() const;
@@ -97,6 +99,7 @@ public:
   void reset();
 
   const FrameConfig& config() const { return config_; }
+  const FrameScene& scene() const { return scene_; }
   /// The source and the tracers in use: the camera's, and with only_occlusion also the occlusion rays'.
   const SceneSource& traced_source() const;
   std::vector<const RayTracer*> tracers() const;
@@ -107,8 +110,10 @@ public:
 private:
   class RawMean;
 
+  bool pose_instances(double time_s);
+  std::unique_ptr<RayTracer> posed(std::unique_ptr<RayTracer> tracer) const;
   void choose_detail(const PrimaryCamera& view, const GBuffer* seen);
-  void trace_camera_rays(const PrimaryCamera& view, const PrimaryCamera& previous);
+  void trace_camera_rays(const PrimaryCamera& view);
   PrimaryCamera view_of(const Camera& camera, uint32_t still_frame) const;
   bool traces(uint32_t still_frame) const;
   void build_level_0();
@@ -118,10 +123,12 @@ private:
   FrameScene scene_;
   FrameConfig config_;
   std::unique_ptr<DetailPlanner> planner_;
-  std::unique_ptr<RayTracer> level_0_;      ///< null if scene_.tracer or only levels are traced
+  std::unique_ptr<RayTracer> level_0_;      ///< null if only levels are traced
   std::unique_ptr<RayTracer> level_tracer_; ///< traces planner_->source()
 
-  std::optional<Camera> camera_; ///< of the previous frame
+  std::vector<Affine> pose_, last_pose_; ///< by SceneMotion::moving_instances(): of this frame and the previous one
+  std::vector<Affine> last_world_;       ///< world_from_object of all instances in the previous frame; empty: none moves
+  std::optional<Camera> camera_;         ///< of the previous frame
   std::optional<PrimaryCamera> view_;
   uint64_t next_number_ = 0;
   uint32_t still_frames_ = 0; ///< frames since something moved, without the first

@@ -70,7 +70,7 @@ py::dict render(const std::shared_ptr<BakedFile>& file, std::optional<std::pair<
     tracing.backend = chosen_backend(backend);
     FrameLoop loop({&source, file.get(), tracing}, config);
     Progress progress;
-    render_still(loop, camera, config.frames, false, image, progress);
+    render_still(loop, camera, 0.0, config.frames, false, image, progress);
   }
   const ImageSize shape = image.size;
   py::dict result;
