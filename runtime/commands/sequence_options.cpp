@@ -101,7 +101,8 @@ void add_sequence_options(CLI::App& verb, SequenceOptions& options) {
 
 void validate(const SequenceOptions& options) {
   if (!options.path &&
-      (options.fps || options.subframes || options.start_time || options.resume || options.stream || options.csv))
+      (options.fps || options.subframes || options.start_time || options.resume || options.checkpoint ||
+       options.stream || options.csv))
     throw Error(ErrorKind::kUsage, "--fps, --subframes, --start-time, --resume, --checkpoint, --stream and --csv require --path");
   if (options.checkpoint && !(*options.checkpoint >= 0.0))
     throw Error(ErrorKind::kUsage, "--checkpoint: must be a number of seconds, 0 or more");

@@ -104,8 +104,7 @@ uint64_t resume_sequence(const SequenceCheckpoint& checkpoint, const Sequence& s
 
 /// Renders and writes the pictures from `first` on. Returns their reports.
 std::vector<PictureRow> render_pictures(const Sequence& sequence, uint64_t first, RenderSetup& setup,
-                                        SequenceOutputs& outputs, CsvOutput& csv, const SequenceCheckpoint* checkpoint,
-                                        Progress& progress) {
+                                        SequenceOutputs& outputs, CsvOutput& csv, const SequenceCheckpoint* checkpoint, double checkpoint_s, Progress& progress) {
   FrameLoop& loop = *setup.loop;
   const ExrAttributes attributes{{"comments", std::string("packtrace render")},
                                  {"aoRadius", static_cast<double>(setup.config.ao.radius)},
