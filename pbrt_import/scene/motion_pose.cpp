@@ -150,6 +150,16 @@ Bounds swept(const MotionTrack& track, std::span<const DVec3> points) {
   return padded(extent.translation, extent.scale_norm * largest_length(points));
 }
 
+/// Relative motion of an instance, from the pose of its track.
+DAffine about_pivot(const DAffine& map, const InstanceMotion& instance, const Affine& placement) {
+  const DVec3 pivot(instance.pivot);
+  DAffine rest(placement);
+  rest[3] -= pivot;
+  DAffine moved = compose(map, rest);
+  moved[3] += pivot;
+  return moved;
+}
+
 std::array<DVec3, 8> corners_of(const Bounds& box) {
   std::array<DVec3, 8> corners;
   for (size_t i = 0; i < 8; ++i)
@@ -179,17 +189,16 @@ DAffine pose(const MotionTrack& track, double time_s) {
 }
 
 DAffine pose(const RigidMotion& motion, const InstanceMotion& instance, const Affine& placement, double time_s) {
-  DAffine map = pose(motion.tracks[instance.track], time_s);
-  if (instance.relative) {
-    const DVec3 pivot(instance.pivot);
-    DAffine rest(placement);
-    rest[3] -= pivot;
-    map = compose(map, rest);
-    map[3] += pivot;
-  } else if (instance.inner_track != kNoTrack) {
-    map = compose(map, pose(motion.tracks[instance.inner_track], time_s));
-  }
-  return map;
+  const DAffine map = pose(motion.tracks[instance.track], time_s);
+  if (instance.relative) return about_pivot(map, instance, placement);
+  if (instance.inner_track == kNoTrack) return map;
+  return compose(map, pose(motion.tracks[instance.inner_track], time_s));
+}
+
+DAffine pose_from_tracks(const InstanceMotion& instance, const Affine& placement, std::span<const DAffine> tracks) {
+  const DAffine& map = tracks[instance.track];
+  if (instance.relative) return about_pivot(map, instance, placement);
+  return instance.inner_track == kNoTrack ? map : compose(map, tracks[instance.inner_track]);
 }
 
 TrackExtent extent_of(const MotionTrack& track) {

@@ -19,6 +19,10 @@ DAffine pose(const MotionTrack& track, double time_s);
 /// @param placement world_from_object of the instance at rest; used by relative motion only
 DAffine pose(const RigidMotion& motion, const InstanceMotion& instance, const Affine& placement, double time_s);
 
+/// The same, from the poses of all tracks at a time.
+/// @param tracks one per track of the motion
+DAffine pose_from_tracks(const InstanceMotion& instance, const Affine& placement, std::span<const DAffine> tracks);
+
 /// Bounds of a moving box at all times. Conservative, also for poses rounded to float.
 Bounds swept_bounds(const RigidMotion& motion, const InstanceMotion& instance, const Affine& placement,
                     const Bounds& box);

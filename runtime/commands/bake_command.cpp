@@ -12,6 +12,7 @@
 #include "compress/bake/bake_scene.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/with_file.h"
+#include "pbrt_import/scene/separate_motion.h"
 #include "runtime/commands/bake_options.h"
 #include "runtime/commands/bake_report.h"
 #include "runtime/commands/bake_target.h"
@@ -22,6 +23,7 @@
 #include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/commands/progress_display.h"
+#include "runtime/motion/motion_keys.h"
 #include "runtime/stopwatch.h"
 
 namespace packtrace {
@@ -56,6 +58,14 @@ void print_results(BinaryOutput* output, const BakeReport& baked, const ImportRe
   std::fflush(text);
 }
 
+/// Adds what moves: the scene's own motion and that of the keys.
+void add_motion_of(const BakeOptions& options, const GlobalOptions& globals, Scene& scene) {
+  if (options.motion != "off") separate_motion(scene);
+  if (options.keys.empty()) return;
+  refuse_to_replace({options.keys}, options.output);
+  add_motion(scene.motion, read_motion_keys(options.keys, motion_targets(scene), globals.memory));
+}
+
 int run(const BakeOptions& given, const GlobalOptions& globals) {
   BakeOptions options = given;
   apply_preset(options);
@@ -75,11 +85,11 @@ int run(const BakeOptions& given, const GlobalOptions& globals) {
   Progress progress(display.observer());
 
   const Stopwatch importing;
-  const ImportResult imported =
-      import_for_command(options.input, options.scene, globals, progress, display, config.textures);
+  ImportResult imported = import_for_command(options.input, options.scene, globals, progress, display, config.textures);
   BakeTimings timings;
   timings.import_s = importing.seconds();
   refuse_to_replace(imported.files, options.output);
+  add_motion_of(options, globals, imported.scene);
 
   Diagnostics diagnostics;
   const Stopwatch baking;

@@ -148,6 +148,20 @@ void add_choice_options(CLI::App& verb, BakeOptions& options) {
       ->group("Choosing by result");
 }
 
+void add_motion_options(CLI::App& verb, BakeOptions& options) {
+  verb.add_option("--motion", options.motion,
+                  "Store the rigid motion of shapes, instances and cameras (keep), or leave everything as it stands at "
+                  "--time (off) (default keep)")
+      ->check(one_of({"keep", "off"}))
+      ->default_str("keep")
+      ->group("Motion");
+  verb.add_option("--keys", options.keys,
+                  "JSON file of keys that move instances; stored in the file. They replace the scene's motion of these "
+                  "instances")
+      ->type_name("FILE")
+      ->group("Motion");
+}
+
 } // namespace
 
 void add_bake_options(CLI::App& verb, BakeOptions& options) {
@@ -171,6 +185,7 @@ void add_bake_options(CLI::App& verb, BakeOptions& options) {
       ->check(one_of({std::string(name_of(PageCodec::kNone)), std::string(name_of(PageCodec::kFast)),
                       std::string(name_of(PageCodec::kSmall))}))
       ->default_str(std::string(name_of(PageCodec::kNone)));
+  add_motion_options(verb, options);
   add_choice_options(verb, options);
   verb.add_flag("--dry-run", options.dry_run, "Import and bake without writing a file, to see sizes and errors");
   add_scene_options(verb, options.scene);

@@ -29,7 +29,9 @@ struct BakeOptions {
   std::string lod = "off";
   std::optional<uint32_t> lod_min_triangles, lod_levels;
   std::string resume;
-  std::optional<std::string> codec; ///< none unless set
+  std::optional<std::string> codec;  ///< none unless set
+  std::optional<std::string> motion; ///< keep unless set
+  std::string keys;                  ///< file of keys; empty: none
   SceneOptions scene;
   bool dry_run = false;
   std::string preset;                ///< empty, or one of kPresets

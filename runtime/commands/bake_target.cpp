@@ -49,6 +49,8 @@ Words further_options(const BakeOptions& options) {
   if (options.texture_psnr) add("--texture-psnr", number_text(*options.texture_psnr));
   if (options.lod_min_triangles) add("--lod-min-triangles", std::to_string(*options.lod_min_triangles));
   if (options.lod_levels) add("--lod-levels", std::to_string(*options.lod_levels));
+  if (options.motion) add("--motion", *options.motion);
+  if (!options.keys.empty()) add("--keys", options.keys);
   return words;
 }
 

@@ -1,5 +1,6 @@
 #include "runtime/commands/file_report.h"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -102,6 +103,22 @@ nlohmann::json textures_json(const FileSummary& s) {
   return textures;
 }
 
+nlohmann::json motion_json(const MotionSummary& motion) {
+  nlohmann::json geometries = nlohmann::json::array();
+  for (const MovingGeometry& moving : motion.geometries)
+    geometries.push_back({{"name", moving.name}, {"instances", moving.instances}});
+  const bool moves = motion.time.begin_s <= motion.time.end_s;
+  return {{"instances", motion.instances},
+          {"cameras", motion.cameras},
+          {"tracks", motion.tracks},
+          {"keys", motion.keys},
+          {"begin_s", moves ? nlohmann::json(motion.time.begin_s) : nullptr},
+          {"end_s", moves ? nlohmann::json(motion.time.end_s) : nullptr},
+          {"max_error", motion.max_error_world},
+          {"max_camera_error", motion.max_camera_error},
+          {"geometries", geometries}};
+}
+
 std::array<double, 3> array_of(DVec3 v) { return {v.x, v.y, v.z}; }
 
 } // namespace
@@ -155,6 +172,7 @@ nlohmann::json to_json(const FileSummary& s, bool by_geometry) {
       {"requirements", requirements_json(s, by_geometry)},
       {"lod", lod_json(s, by_geometry)},
       {"trees", {{"trees", s.trees}, {"nodes", s.nodes}, {"depth", s.tree_depth}}},
+      {"motion", motion_json(s.motion)},
   };
 }
 
@@ -182,6 +200,22 @@ std::string collapsed_text(const FileSummary& s) {
       s.bake.collapsed_triangles, 100.0 * share, s.bake.coinciding_triangles);
 }
 
+std::string motion_text(const MotionSummary& motion) {
+  constexpr size_t kMaxNames = 4;
+  if (motion.instances + motion.cameras == 0) return {};
+  std::string text =
+      fmt::format(grouped(),
+                  "moving   instances {:L}   cameras {:L}   from {:g} s to {:g} s   ({:L} tracks, {:L} keys, "
+                  "error at most {:.3g})\n",
+                  motion.instances, motion.cameras, motion.time.begin_s, motion.time.end_s, motion.tracks, motion.keys,
+                  motion.max_error_world);
+  for (size_t i = 0; i < std::min(motion.geometries.size(), kMaxNames); ++i)
+    text += fmt::format(grouped(), "  {} ({:L})\n", motion.geometries[i].name, motion.geometries[i].instances);
+  if (motion.geometries.size() > kMaxNames)
+    text += fmt::format("  and {} more geometries; --json lists them\n", motion.geometries.size() - kMaxNames);
+  return text;
+}
+
 std::string disk_text(const FileSummary& s) {
   if (s.disk.codec == PageCodec::kNone) return {};
   return fmt::format(grouped(), "on disk with codec {}: {:L} bytes, {:.3f} per triangle, in {:L} pages\n",
@@ -204,7 +238,7 @@ std::string to_text(const FileSummary& s, bool by_geometry) {
     text += fmt::format("   grid step {:.4g}{}{}", s.grids.front().grid.step(),
                         s.grids.front().world_space ? " (world)" : "",
                         s.grids.size() > 1 ? fmt::format(" and {} more", s.grids.size() - 1) : std::string());
-  text += "\n" + collapsed_text(s);
+  text += "\n" + collapsed_text(s) + motion_text(s.motion);
   text += fmt::format("measured error: position {:.4g} (bound {:.4g})   normal {:.4f} degrees\n\n",
                       s.max_position_error, s.max_position_error_bound, s.max_normal_error_degrees);
   for (const NormalUse& use : s.normals)

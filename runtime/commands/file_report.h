@@ -22,6 +22,9 @@ std::string size_text(const FileSummary& summary);
 /// One line about the compressed size on disk; empty for files with codec none.
 std::string disk_text(const FileSummary& summary);
 
+/// What moves, over what time, and with what error; empty if nothing does.
+std::string motion_text(const MotionSummary& motion);
+
 /// One line about the triangles that bake dropped because the grid is too coarse for them; empty if there are none.
 std::string collapsed_text(const FileSummary& summary);
 

@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/scene/motion_pose.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/file_report.h"
 #include "runtime/commands/json_output.h"
@@ -22,6 +23,17 @@
 
 namespace packtrace {
 namespace {
+
+/// The time over which things of a scene are animated; empty if nothing is.
+TimeSpan animated_time(const Scene& scene) {
+  TimeSpan span;
+  for (const AnimatedTransform& animation : scene.animations) {
+    const bool first = &animation == &scene.animations.front();
+    span = {first ? animation.start_time : std::min(span.begin_s, animation.start_time),
+            first ? animation.end_time : std::max(span.end_s, animation.end_time)};
+  }
+  return span;
+}
 
 struct InfoOptions {
   std::vector<std::string> inputs;
@@ -57,6 +69,7 @@ nlohmann::json to_json(const ImportResult& imported, uint32_t world) {
   const ImportStatistics& statistics = imported.statistics;
   Bounds bounds = world_bounds(scene);
   bounds.lo += scene.origin, bounds.hi += scene.origin;
+  const TimeSpan time = animated_time(scene);
   nlohmann::json cameras = nlohmann::json::array();
   for (const Camera& camera : scene.cameras) cameras.push_back(to_json(camera));
   return {
@@ -85,7 +98,9 @@ nlohmann::json to_json(const ImportResult& imported, uint32_t world) {
       {"animated",
        {{"shapes", statistics.animated_shapes},
         {"instances", statistics.animated_instances},
-        {"cameras", statistics.animated_cameras}}},
+        {"cameras", statistics.animated_cameras},
+        {"begin_s", scene.animations.empty() ? nlohmann::json() : nlohmann::json(time.begin_s)},
+        {"end_s", scene.animations.empty() ? nlohmann::json() : nlohmann::json(time.end_s)}}},
       {"ignored", statistics.ignored},
       {"problems", problems_json(statistics)},
       {"directives", statistics.directives},
@@ -125,9 +140,12 @@ std::string to_text(const ImportResult& imported, uint32_t world) {
                         camera.film_name, camera.animation == kNotAnimated ? "" : "   animated");
   text += left_out_cameras_text(imported);
   if (s.worlds > 1) text += fmt::format("world {} of {}\n", world, s.worlds);
-  if (s.animated_shapes + s.animated_instances + s.animated_cameras > 0)
-    text += fmt::format(grouped(), "animated   shapes {:L}   instances {:L}   cameras {:L}   (evaluated at time {})\n",
-                        s.animated_shapes, s.animated_instances, s.animated_cameras, scene.time);
+  if (s.animated_shapes + s.animated_instances + s.animated_cameras > 0) {
+    const TimeSpan time = animated_time(scene);
+    text += fmt::format(
+        grouped(), "animated   shapes {:L}   instances {:L}   cameras {:L}   from time {} to {} (shown at {})\n",
+        s.animated_shapes, s.animated_instances, s.animated_cameras, time.begin_s, time.end_s, scene.time);
+  }
   if (!s.ignored.empty()) text += row_of("ignored", s.ignored) + "\n";
   return text;
 }

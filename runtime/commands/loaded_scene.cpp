@@ -16,6 +16,7 @@
 #include "pbrt_import/base/output_file.h"
 #include "pbrt_import/base/regular_file.h"
 #include "pbrt_import/base/with_file.h"
+#include "pbrt_import/scene/separate_motion.h"
 #include "pbrt_import/text/input_file.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/trace/source/float_source.h"
@@ -155,6 +156,7 @@ LoadedScene load_scene(const std::filesystem::path& file, const SceneOptions& sc
   } else {
     ImportResult imported = import_for_command(file, scene_options, globals, progress, display, true);
     loaded.imported = std::make_unique<Scene>(std::move(imported.scene));
+    separate_motion(*loaded.imported); // as bake does, so that instances have the same numbers
     loaded.memory = std::move(imported.memory);
     loaded.source = std::make_unique<FloatSource>(*loaded.imported);
   }

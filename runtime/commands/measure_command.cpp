@@ -16,6 +16,7 @@
 
 #include "compress/bake/grid/scene_measure.h"
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/scene/separate_motion.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/commands.h"
 #include "runtime/commands/geometry_compare.h"
@@ -213,7 +214,8 @@ int run(const MeasureOptions& options, const GlobalOptions& globals, const std::
   Progress progress(display.observer());
   MeasureConfig config;
   {
-    const ImportResult imported = import_for_command(options.input, options.scene, globals, progress, display);
+    ImportResult imported = import_for_command(options.input, options.scene, globals, progress, display);
+    separate_motion(imported.scene); // as bake does, so that instances have the same numbers
     config = config_of(options, globals, version, imported);
   } // measured processes get the memory
   display.finish();

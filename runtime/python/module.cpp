@@ -15,6 +15,7 @@
 #include "compress/bake/bake_scene.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/import_scene.h"
+#include "pbrt_import/scene/separate_motion.h"
 #include "runtime/commands/file_report.h"
 #include "runtime/python/bindings.h"
 
@@ -97,7 +98,8 @@ py::object bake(const std::filesystem::path& scene, const std::filesystem::path&
     options.strict = strict;
     options.keep_textures = config.textures;
     options.memory = config.memory;
-    const ImportResult imported = import_scene(scene, options, diagnostics, progress);
+    ImportResult imported = import_scene(scene, options, diagnostics, progress);
+    separate_motion(imported.scene);
     const BakeReport baked = bake_scene(imported.scene, config, output, force, diagnostics, progress);
     report = to_json(baked.file, false).dump();
     for (const Diagnostic& problem : diagnostics.entries()) problems.push_back(to_string(problem));

@@ -1,0 +1,88 @@
+#include "runtime/motion/motion_targets.h"
+
+#include <utility>
+
+#include "compress/format/file/baked_file.h"
+
+namespace packtrace {
+namespace {
+
+/// Merges two lists that ascend; of two motions of the same thing, the added one stays.
+template <typename Motion, typename Number>
+std::vector<Motion> merged(const std::vector<Motion>& old, std::vector<Motion> added, uint32_t first_track,
+                           const Number& number) {
+  for (Motion& one : added) {
+    one.track += first_track;
+    if constexpr (requires { one.inner_track; })
+      if (one.inner_track != kNoTrack) one.inner_track += first_track;
+  }
+  std::vector<Motion> result;
+  auto at = old.begin();
+  for (const Motion& one : added) {
+    for (; at != old.end() && number(*at) < number(one); ++at) result.push_back(*at);
+    if (at != old.end() && number(*at) == number(one)) ++at;
+    result.push_back(one);
+  }
+  result.insert(result.end(), at, old.end());
+  return result;
+}
+
+/// Tracks that no one uses any more would lengthen the time span.
+void drop_unused_tracks(RigidMotion& motion) {
+  std::vector<uint32_t> numbers(motion.tracks.size(), kNoTrack);
+  std::vector<MotionTrack> kept;
+  const auto keep = [&](uint32_t& track) {
+    if (track == kNoTrack) return;
+    if (numbers[track] == kNoTrack) {
+      numbers[track] = static_cast<uint32_t>(kept.size());
+      kept.push_back(std::move(motion.tracks[track]));
+    }
+    track = numbers[track];
+  };
+  for (InstanceMotion& one : motion.instances) keep(one.track), keep(one.inner_track);
+  for (CameraMotion& one : motion.cameras) keep(one.track);
+  motion.tracks = std::move(kept);
+}
+
+} // namespace
+
+MotionTargets motion_targets(const BakedFile& file) {
+  MotionTargets targets;
+  targets.origin = file.origin();
+  for (uint32_t i = 0; i < file.instances().size(); ++i) {
+    const baked::GeometryRecord& g = file.geometries()[file.instances()[i].geometry];
+    targets.instances.push_back({std::string(file.text(g.name)), file.world_from_object(i), object_bounds(g),
+                                 (g.flags & baked::kWorldSpace) != 0});
+  }
+  return targets;
+}
+
+MotionTargets motion_targets(const Scene& scene) {
+  std::vector<Bounds> meshes, objects;
+  for (const Mesh& mesh : scene.meshes) meshes.push_back(bounds_of(mesh.positions));
+  for (const Object& object : scene.objects) {
+    objects.emplace_back();
+    for (const Shape& shape : object.shapes)
+      objects.back().extend(transform_bounds(shape.parent_from_mesh, meshes[shape.mesh]));
+  }
+  MotionTargets targets;
+  targets.origin = scene.origin;
+  for (const Shape& shape : scene.shapes)
+    targets.instances.push_back(
+        {scene.meshes[shape.mesh].name, Affine(shape.parent_from_mesh), meshes[shape.mesh], false});
+  for (const Instance& instance : scene.instances)
+    targets.instances.push_back(
+        {scene.objects[instance.object].name, instance.world_from_object, objects[instance.object], false});
+  return targets;
+}
+
+void add_motion(RigidMotion& motion, const RigidMotion& added) {
+  const auto first = static_cast<uint32_t>(motion.tracks.size());
+  motion.tracks.insert(motion.tracks.end(), added.tracks.begin(), added.tracks.end());
+  motion.instances =
+      merged(motion.instances, added.instances, first, [](const InstanceMotion& one) { return one.instance; });
+  motion.cameras = merged(motion.cameras, added.cameras, first, [](const CameraMotion& one) { return one.camera; });
+  drop_unused_tracks(motion);
+}
+
+} // namespace packtrace
