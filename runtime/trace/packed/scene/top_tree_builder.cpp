@@ -13,7 +13,9 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kBins = 16, kFewBins = 8;
-constexpr uint32_t kFewBoxes = 32;       // runs up to this size have kFewBins
+constexpr uint32_t kFewBoxes = 32; // runs up to this size have kFewBins
+/// Axes along which the centres are closer together than this share of the largest extent are not considered.
+constexpr float kLeastExtent = 0.25f;
 constexpr uint32_t kParallelCount = 512; // smaller subtrees are built serially
 
 using Float4 = float __attribute__((vector_size(16)));
@@ -30,7 +32,7 @@ float half_area(Float4 lo, Float4 hi) {
 
 /// Maps doubled centres to bins.
 struct BinScale {
-  Float4 low, scale; ///< scale is 0 along axes on which all centres are equal
+  Float4 low, scale; ///< scale is 0 along axes that are not considered
   int32_t last;      ///< the last bin
 
   int32_t operator()(float centre, uint32_t axis) const {
@@ -55,9 +57,13 @@ struct TopTreeBuilder::Bins {
     const Run none = Run::empty(0);
     for (uint32_t axis = 0; axis < 3; ++axis)
       for (uint32_t b = 0; b < bins; ++b) lo[axis][b] = none.lo, hi[axis][b] = none.hi, counts[axis][b] = 0;
+    uint32_t axes[3], axis_count = 0;
+    for (uint32_t axis = 0; axis < 3; ++axis)
+      if (bin_of.scale[axis] > 0.0f) axes[axis_count++] = axis;
     for (const Box& box : boxes) {
       const Int4 bin = __builtin_convertvector((box.lo + box.hi - bin_of.low) * bin_of.scale, Int4);
-      for (uint32_t axis = 0; axis < 3; ++axis) {
+      for (uint32_t i = 0; i < axis_count; ++i) {
+        const uint32_t axis = axes[i];
         const int32_t b = std::min(bin[axis], bin_of.last);
         lo[axis][b] = smaller(lo[axis][b], box.lo), hi[axis][b] = larger(hi[axis][b], box.hi);
         ++counts[axis][b];
@@ -179,9 +185,11 @@ bool TopTreeBuilder::split_by_area(const Run& run, Run& left, Run& right) {
   Run centres = Run::empty(0);
   for (const Box& box : boxes) centres.extend(box.lo + box.hi, box.lo + box.hi);
   BinScale bin_of{centres.lo, Float4{}, static_cast<int32_t>(run.count <= kFewBoxes ? kFewBins : kBins) - 1};
+  const Float4 extents = centres.hi - centres.lo;
+  const float least = kLeastExtent * std::max({extents[0], extents[1], extents[2]});
   for (uint32_t axis = 0; axis < 3; ++axis) {
-    const float extent = centres.hi[axis] - centres.lo[axis];
-    const float scale = extent > 0.0f ? static_cast<float>(bin_of.last + 1) / extent : 0.0f;
+    const float extent = extents[axis];
+    const float scale = extent > 0.0f && extent >= least ? static_cast<float>(bin_of.last + 1) / extent : 0.0f;
     bin_of.scale[axis] = scale <= std::numeric_limits<float>::max() ? scale : 0.0f;
   }
   const Bins bins(boxes, bin_of);
