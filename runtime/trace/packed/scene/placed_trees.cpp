@@ -62,7 +62,8 @@ void PlacedTrees::place(const TracedTrees& trees, const SceneSource& source, std
     if (!movable_.empty() && movable_[i] != 0 && trees.records[tree].geometry == baked::kWorldTree)
       throw Error(ErrorKind::kUsage, "instance " + std::to_string(i) +
                                          " cannot move: it shares a tree with all other geometry in world space");
-    flat_[i] = set_surface(i, instances[i].world_from_object) ? 0 : 1;
+    flat_[i] =
+        set_surface(i, instances[i].world_from_object, unit_from_grid(tree, instances[i].world_from_object)) ? 0 : 1;
   }
   list_placements();
   build_top();
@@ -73,9 +74,8 @@ DAffine PlacedTrees::unit_from_grid(uint32_t tree, const Affine& world_from_obje
 }
 
 /// Returns false if the instance is flat.
-bool PlacedTrees::set_surface(uint32_t instance, const Affine& world_from_object) {
-  const std::optional<DAffine> placed =
-      invertible_placement(unit_from_grid(tree_of_instance_[instance], world_from_object));
+bool PlacedTrees::set_surface(uint32_t instance, const Affine& world_from_object, const DAffine& unit_from_grid) {
+  const std::optional<DAffine> placed = invertible_placement(unit_from_grid);
   if (placed) surfaces_[instance] = exactly_instanced_placement(instance, DAffine(world_from_object), *placed);
   return placed.has_value();
 }
@@ -136,14 +136,14 @@ void PlacedTrees::update_placement(uint32_t number, const DAffine& unit_from_gri
 void PlacedTrees::move(std::span<const uint32_t> instances, std::span<const Affine> world_from_object) {
   check_moves(movable_, instances, world_from_object);
   if (instances.empty()) return;
-  check_space(instances, world_from_object);
+  prepare_moves(instances, world_from_object);
   std::atomic<bool> relist{false};
   const bool enlarged = placements_.size() > kMaxPlacementsWithParts;
   for_moves(instances.size(), [&](size_t m) {
     const uint32_t i = instances[m];
     world_from_object_[i] = world_from_object[m];
     if (tree_of_instance_[i] == baked::kNone) return;
-    const uint8_t flat = set_surface(i, world_from_object[m]) ? 0 : 1;
+    const uint8_t flat = set_surface(i, world_from_object[m], moved_unit_from_grid_[m]) ? 0 : 1;
     if (flat != flat_[i]) relist.store(true, std::memory_order_relaxed);
     flat_[i] = flat;
     const uint32_t placement = placement_of_[i];
@@ -155,14 +155,16 @@ void PlacedTrees::move(std::span<const uint32_t> instances, std::span<const Affi
   build_top();
 }
 
-/// Throws Error(kUsage) for the first instance that would leave the traced space.
-void PlacedTrees::check_space(std::span<const uint32_t> instances, std::span<const Affine> world_from_object) const {
+/// Computes moved_unit_from_grid_. Throws Error(kUsage) for the first instance that would leave the traced space.
+void PlacedTrees::prepare_moves(std::span<const uint32_t> instances, std::span<const Affine> world_from_object) {
+  moved_unit_from_grid_.resize(instances.size());
   std::atomic<size_t> outside{instances.size()};
   for_moves(instances.size(), [&](size_t m) {
     const uint32_t tree = tree_of_instance_[instances[m]];
-    if (tree == baked::kNone || !trees_->hulls[tree]) return;
-    const TreeHull& hull = *trees_->hulls[tree];
-    if (within_traced_space(unit_from_grid(tree, world_from_object[m]), hull.lo(), hull.hi())) return;
+    if (tree == baked::kNone) return;
+    moved_unit_from_grid_[m] = unit_from_grid(tree, world_from_object[m]);
+    const std::optional<TreeHull>& hull = trees_->hulls[tree];
+    if (!hull || within_traced_space(moved_unit_from_grid_[m], hull->lo(), hull->hi())) return;
     size_t first = outside.load();
     while (m < first && !outside.compare_exchange_weak(first, m)) {
     }
@@ -223,7 +225,8 @@ uint64_t PlacedTrees::bytes() const {
   return placements_.size() * (sizeof(packed::TracePlacement) + sizeof(TreeBox) + 2 * sizeof(uint32_t)) +
          surfaces_.size() * (sizeof(Placement) + sizeof(uint32_t) + sizeof(uint8_t)) +
          (top_.size() + parts_.size()) * sizeof(packed::TopNode) + movable_.size() * sizeof(uint8_t) +
-         world_from_object_.size() * sizeof(Affine) + placement_of_.size() * sizeof(uint32_t) + builder_.bytes();
+         world_from_object_.size() * sizeof(Affine) + placement_of_.size() * sizeof(uint32_t) +
+         moved_unit_from_grid_.capacity() * sizeof(DAffine) + builder_.bytes();
 }
 
 } // namespace packtrace

@@ -40,11 +40,11 @@ public:
   uint64_t bytes() const;
 
 private:
-  bool set_surface(uint32_t instance, const Affine& world_from_object);
+  bool set_surface(uint32_t instance, const Affine& world_from_object, const DAffine& unit_from_grid);
   void list_placements();
   void add_placement(uint32_t instance, uint32_t example);
   void update_placement(uint32_t number, const DAffine& unit_from_grid);
-  void check_space(std::span<const uint32_t> instances, std::span<const Affine> world_from_object) const;
+  void prepare_moves(std::span<const uint32_t> instances, std::span<const Affine> world_from_object);
   DAffine unit_from_grid(uint32_t tree, const Affine& world_from_object) const;
   void build_top();
   void describe_top();
@@ -67,9 +67,10 @@ private:
   uint32_t stream_depth_ = 0;
 
   // Empty without movers.
-  std::vector<uint8_t> movable_;          ///< by instance
-  std::vector<Affine> world_from_object_; ///< by instance
-  std::vector<uint32_t> placement_of_;    ///< by instance; baked::kNone for flat ones
+  std::vector<uint8_t> movable_;              ///< by instance
+  std::vector<Affine> world_from_object_;     ///< by instance
+  std::vector<uint32_t> placement_of_;        ///< by instance; baked::kNone for flat ones
+  std::vector<DAffine> moved_unit_from_grid_; ///< by moved instance of the last move
   TopTreeBuilder builder_;
 };
 

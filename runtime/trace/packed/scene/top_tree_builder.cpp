@@ -13,7 +13,9 @@ namespace packtrace {
 namespace {
 
 constexpr uint32_t kBins = 16, kFewBins = 8;
-constexpr uint32_t kFewBoxes = 32;       // runs up to this size have kFewBins
+constexpr uint32_t kFewBoxes = 32; // runs up to this size have kFewBins
+/// Axes along which the centres are closer together than this share of the largest extent are not considered.
+constexpr float kLeastExtent = 0.25f;
 constexpr uint32_t kParallelCount = 512; // smaller subtrees are built serially
 
 using Float4 = float __attribute__((vector_size(16)));
@@ -24,12 +26,13 @@ Float4 larger(Float4 a, Float4 b) { return a > b ? a : b; }
 
 float half_area(Float4 lo, Float4 hi) {
   const Float4 size = hi - lo;
-  return size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
+  const Float4 faces = size * __builtin_shuffle(size, Int4{1, 2, 0, 3});
+  return faces[0] + faces[1] + faces[2];
 }
 
 /// Maps doubled centres to bins.
 struct BinScale {
-  Float4 low, scale; ///< scale is 0 along axes on which all centres are equal
+  Float4 low, scale; ///< scale is 0 along axes that are not considered
   int32_t last;      ///< the last bin
 
   int32_t operator()(float centre, uint32_t axis) const {
@@ -51,48 +54,60 @@ void TopTreeBuilder::Run::finish() { area = half_area(lo, hi); }
 /// Bounds and counts of the boxes in each bin of each axis.
 struct TopTreeBuilder::Bins {
   Bins(std::span<const Box> boxes, const BinScale& bin_of) : bins(static_cast<uint32_t>(bin_of.last) + 1) {
+    const Run none = Run::empty(0);
     for (uint32_t axis = 0; axis < 3; ++axis)
-      for (uint32_t b = 0; b < bins; ++b) of[axis][b] = Run::empty(0);
+      for (uint32_t b = 0; b < bins; ++b) lo[axis][b] = none.lo, hi[axis][b] = none.hi, counts[axis][b] = 0;
+    uint32_t axes[3], axis_count = 0;
+    for (uint32_t axis = 0; axis < 3; ++axis)
+      if (bin_of.scale[axis] > 0.0f) axes[axis_count++] = axis;
     for (const Box& box : boxes) {
       const Int4 bin = __builtin_convertvector((box.lo + box.hi - bin_of.low) * bin_of.scale, Int4);
-      for (uint32_t axis = 0; axis < 3; ++axis) {
-        Run& run = of[axis][std::min(bin[axis], bin_of.last)];
-        run.extend(box.lo, box.hi);
-        ++run.count;
+      for (uint32_t i = 0; i < axis_count; ++i) {
+        const uint32_t axis = axes[i];
+        const int32_t b = std::min(bin[axis], bin_of.last);
+        lo[axis][b] = smaller(lo[axis][b], box.lo), hi[axis][b] = larger(hi[axis][b], box.hi);
+        ++counts[axis][b];
       }
     }
   }
 
-  /// Improves the split at `cost`: its axis, the first bin on the right, and the runs of both sides. Returns false if
-  /// no split of the axis is better.
-  bool improve(uint32_t axis, float& cost, uint32_t& first_right, Run& left, Run& right) const {
-    std::array<Run, kBins> above; // of bins b and above
+  /// Improves the split at `cost`: the first bin on the right. Returns false if no split of the axis is better.
+  bool improve(uint32_t axis, float& cost, uint32_t& first_right) const {
+    std::array<float, kBins> above; // cost of bins b and above; negative if they are empty
     Run run = Run::empty(0);
     for (uint32_t b = bins; b-- > 1;) {
-      add(run, of[axis][b]);
-      above[b] = run;
+      add(run, axis, b);
+      above[b] = run.count > 0 ? half_area(run.lo, run.hi) * static_cast<float>(run.count) : -1.0f;
     }
     bool better = false;
     run = Run::empty(0);
     for (uint32_t b = 1; b < bins; ++b) {
-      add(run, of[axis][b - 1]);
-      if (run.count == 0 || above[b].count == 0) continue;
-      const float sum = run.area * static_cast<float>(run.count) + above[b].area * static_cast<float>(above[b].count);
-      if (sum < cost) cost = sum, first_right = b, left = run, right = above[b], better = true;
+      add(run, axis, b - 1);
+      if (run.count == 0 || above[b] < 0.0f) continue;
+      const float sum = half_area(run.lo, run.hi) * static_cast<float>(run.count) + above[b];
+      if (sum < cost) cost = sum, first_right = b, better = true;
     }
     return better;
   }
 
+  /// Returns the bounds and the count of the boxes in bins [begin, end).
+  Run merged(uint32_t axis, uint32_t begin, uint32_t end) const {
+    Run run = Run::empty(0);
+    for (uint32_t b = begin; b < end; ++b) add(run, axis, b);
+    run.finish();
+    return run;
+  }
+
   const uint32_t bins;
-  std::array<std::array<Run, kBins>, 3> of;
 
 private:
-  static void add(Run& run, const Run& bin) {
-    if (bin.count == 0) return;
-    run.extend(bin.lo, bin.hi);
-    run.count += bin.count;
-    run.finish();
+  void add(Run& run, uint32_t axis, uint32_t b) const {
+    run.extend(lo[axis][b], hi[axis][b]);
+    run.count += counts[axis][b];
   }
+
+  Float4 lo[3][kBins], hi[3][kBins];
+  uint32_t counts[3][kBins];
 };
 
 uint32_t TopTreeBuilder::build(std::span<const TreeBox> boxes, std::vector<packed::TopNode>& nodes) {
@@ -170,17 +185,20 @@ bool TopTreeBuilder::split_by_area(const Run& run, Run& left, Run& right) {
   Run centres = Run::empty(0);
   for (const Box& box : boxes) centres.extend(box.lo + box.hi, box.lo + box.hi);
   BinScale bin_of{centres.lo, Float4{}, static_cast<int32_t>(run.count <= kFewBoxes ? kFewBins : kBins) - 1};
+  const Float4 extents = centres.hi - centres.lo;
+  const float least = kLeastExtent * std::max({extents[0], extents[1], extents[2]});
   for (uint32_t axis = 0; axis < 3; ++axis) {
-    const float extent = centres.hi[axis] - centres.lo[axis];
-    const float scale = extent > 0.0f ? static_cast<float>(bin_of.last + 1) / extent : 0.0f;
+    const float extent = extents[axis];
+    const float scale = extent > 0.0f && extent >= least ? static_cast<float>(bin_of.last + 1) / extent : 0.0f;
     bin_of.scale[axis] = scale <= std::numeric_limits<float>::max() ? scale : 0.0f;
   }
   const Bins bins(boxes, bin_of);
   float cost = std::numeric_limits<float>::infinity();
   uint32_t axis = 0, first_right = 0;
   for (uint32_t a = 0; a < 3; ++a)
-    if (bin_of.scale[a] > 0.0f && bins.improve(a, cost, first_right, left, right)) axis = a;
+    if (bin_of.scale[a] > 0.0f && bins.improve(a, cost, first_right)) axis = a;
   if (first_right == 0) return false;
+  left = bins.merged(axis, 0, first_right), right = bins.merged(axis, first_right, bins.bins);
   std::partition(boxes.begin(), boxes.end(), [&](const Box& box) {
     return bin_of(box.lo[axis] + box.hi[axis], axis) < static_cast<int32_t>(first_right);
   });
