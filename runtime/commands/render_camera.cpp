@@ -1,32 +1,28 @@
 #include "runtime/commands/render_camera.h"
 
-#include <charconv>
 #include <span>
 #include <string_view>
 
 #include <fmt/format.h>
 
 #include "pbrt_import/base/error.h"
+#include "runtime/commands/whole_number.h"
 
 namespace packtrace {
 namespace {
 
 constexpr ImageSize kDefaultSize{1280, 720};
 
-bool parse_number(std::string_view digits, uint32_t& value) {
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  return error == std::errc() && end == digits.data() + digits.size();
-}
-
 } // namespace
 
 ImageSize parse_size(const std::string& text) {
-  ImageSize size;
   const size_t cross = text.find_first_of("xX,");
-  if (cross == std::string::npos || !parse_number(std::string_view(text).substr(0, cross), size.width) ||
-      !parse_number(std::string_view(text).substr(cross + 1), size.height))
+  const std::string_view view(text);
+  const auto width = cross == std::string::npos ? std::nullopt : whole_number(view.substr(0, cross));
+  const auto height = width ? whole_number(view.substr(cross + 1)) : std::nullopt;
+  if (!height)
     throw Error(ErrorKind::kUsage, "--size " + text + ": write WIDTHxHEIGHT, for example 1280x720");
-  return size;
+  return {*width, *height};
 }
 
 ChosenCamera choose_camera(const SceneSource& source, const RenderOptions& options, const GlobalOptions& globals) {
@@ -34,9 +30,9 @@ ChosenCamera choose_camera(const SceneSource& source, const RenderOptions& optio
   const ImageSize size = options.size.empty() ? kDefaultSize : parse_size(options.size);
   const std::string name = options.camera.value_or("0");
   if (name == "auto") return {framing_camera(source.world_bounds(), size), std::nullopt, {}};
-  uint32_t index = 0;
-  if (!parse_number(name, index))
-    throw Error(ErrorKind::kUsage, "--camera " + name + ": must be a camera number, from 0, or auto");
+  const std::optional<uint32_t> number = whole_number(name);
+  if (!number) throw Error(ErrorKind::kUsage, "--camera " + name + ": must be a camera number, from 0, or auto");
+  const uint32_t index = *number;
   if (index < cameras.size()) return {cameras[index], index, {}};
   if (index > 0)
     throw Error(ErrorKind::kUsage, fmt::format("--camera {}: the scene has {} camera{}", index, cameras.size(),

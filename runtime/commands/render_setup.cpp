@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "pbrt_import/base/with_file.h"
+#include "runtime/motion/motion_keys.h"
 
 namespace packtrace {
 namespace {
@@ -30,12 +31,27 @@ RenderSetup::RenderSetup(const RenderOptions& options, const GlobalOptions& glob
       load_s(loading.seconds()) {
   if (options.lod.error_px) require_levels(options.input, loaded);
   camera = choose_camera(*loaded.source, options, globals);
+  prepare_motion(options, globals);
   config = make_config(*loaded.source, camera.camera, options, measure_detail);
   config.lod_layers = lod_layers;
   pixels = reserve_picture(options, config, globals.memory);
   const BakedFile* const file = loaded.baked ? &*loaded.baked : nullptr;
-  const FrameScene scene{loaded.source.get(), file, tracer_config(options, globals, file != nullptr)};
+  const FrameScene scene{loaded.source.get(), file, tracer_config(options, globals, file != nullptr),
+                         motion.moves() ? &motion : nullptr};
   loop = std::make_unique<FrameLoop>(scene, config);
+}
+
+/// Reads the motion of the scene if a sequence or a time other than that of the scene at rest is wanted.
+void RenderSetup::prepare_motion(const RenderOptions& options, const GlobalOptions& globals) {
+  const SequenceOptions& sequence = options.sequence;
+  if (!sequence.path && !sequence.keys && !sequence.start_time) return;
+  motion = loaded.baked ? SceneMotion::of(*loaded.baked) : SceneMotion::of(*loaded.imported);
+  if (sequence.keys) {
+    const MotionTargets targets = loaded.baked ? motion_targets(*loaded.baked) : motion_targets(*loaded.imported);
+    motion.add(read_motion_keys(*sequence.keys, targets, globals.memory), targets);
+  }
+  time_s = sequence.start_time.value_or(motion.begin_s());
+  if (camera.index) camera.camera = motion.camera(*camera.index, time_s).value_or(camera.camera);
 }
 
 } // namespace packtrace

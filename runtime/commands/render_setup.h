@@ -25,10 +25,13 @@ struct RenderSetup {
   double load_s = 0.0;
   ChosenCamera camera;
   StillConfig config;
-  SceneMotion motion;
-  double time_s = 0.0; ///< time of a still
+  SceneMotion motion;  ///< nothing moves if the scene is shown at rest
+  double time_s = 0.0; ///< of a still, or of the first picture unless the path begins at another time
   MemoryReservation pixels;
   std::unique_ptr<FrameLoop> loop;
+
+private:
+  void prepare_motion(const RenderOptions& options, const GlobalOptions& globals);
 };
 
 } // namespace packtrace

@@ -79,7 +79,12 @@ void add_sequence_options(CLI::App& verb, SequenceOptions& options) {
                   "camera rays; more give smoother edges and less noise")
       ->type_name("N")
       ->group(kGroup);
-  verb.add_option("--start-time", options.start_time, "Time of the first picture in seconds (default: the first key of the path, else of the scene's motion)")
+  verb.add_option("--keys", options.keys,
+                  "Move instances by the keys of a JSON file (docs/motion.md), in addition to the scene's own motion")
+      ->type_name("FILE")
+      ->group(kGroup);
+  verb.add_option("--start-time", options.start_time, "Time of the still or of the first picture in seconds (default: the first key of the path, else of the scene's motion). A still without it shows "
+                  "the scene at rest")
       ->type_name("S")
       ->group(kGroup);
   verb.add_flag("--resume", options.resume,
@@ -101,9 +106,9 @@ void add_sequence_options(CLI::App& verb, SequenceOptions& options) {
 
 void validate(const SequenceOptions& options) {
   if (!options.path &&
-      (options.fps || options.subframes || options.start_time || options.resume || options.checkpoint ||
+      (options.fps || options.subframes || options.resume || options.checkpoint ||
        options.stream || options.csv))
-    throw Error(ErrorKind::kUsage, "--fps, --subframes, --start-time, --resume, --checkpoint, --stream and --csv require --path");
+    throw Error(ErrorKind::kUsage, "--fps, --subframes, --resume, --checkpoint, --stream and --csv require --path");
   if (options.checkpoint && !(*options.checkpoint >= 0.0))
     throw Error(ErrorKind::kUsage, "--checkpoint: must be a number of seconds, 0 or more");
   if (options.fps && !(*options.fps > 0.0 && *options.fps <= 1000.0))

@@ -17,6 +17,7 @@ struct SequenceOptions {
   std::optional<double> fps;
   std::optional<uint32_t> subframes;
   std::optional<double> start_time;
+  std::optional<std::string> keys; ///< file of motion keys
   bool resume = false;
   std::optional<double> checkpoint; ///< seconds
   std::optional<std::string> stream; ///< format on standard output

@@ -15,6 +15,9 @@ set(packtrace_public_headers
   pbrt_import/scene/image_size.h
   pbrt_import/scene/material_flags.h
   pbrt_import/scene/math.h
+  pbrt_import/scene/motion_pose.h
+  pbrt_import/scene/rigid_motion.h
+  pbrt_import/scene/separate_motion.h
   pbrt_import/scene/scene.h
   # packtrace::format: baked files and their decoders
   compress/format/cluster/cluster_codec.h
@@ -64,14 +67,19 @@ set(packtrace_public_headers
   runtime/lod/lod_sharing.h
   runtime/lod/sharing_balance.h
   runtime/lod/sharing_config.h
+  runtime/camera/surface_motion.h
+  runtime/frame/camera_path.h
   runtime/frame/detail.h
   runtime/frame/frame_config.h
   runtime/frame/frame_loop.h
   runtime/frame/mean_layers.h
   runtime/frame/rendered_image.h
   runtime/frame/still.h
+  runtime/motion/motion_targets.h
+  runtime/motion/scene_motion.h
   runtime/trace/embree/embree_tracer.h
   runtime/trace/make_tracer.h
+  runtime/trace/movers.h
   runtime/trace/movers.h
   runtime/trace/ray_tracer.h
   runtime/trace/source/float_source.h
