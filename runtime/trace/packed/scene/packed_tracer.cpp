@@ -8,6 +8,7 @@
 #include "compress/format/trees/box_tree.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/scene/bounds.h"
+#include "runtime/trace/packed/scene/deformed_trees.h"
 #include "runtime/trace/packed/scene/thread_memory.h"
 #include "runtime/trace/packed/scene/top_tree.h"
 #include "runtime/trace/packed/scene/trace_cluster.h"
@@ -80,16 +81,15 @@ void place_top(std::span<const TreeBox> boxes, float max_coordinate, packed::Ker
 } // namespace
 
 struct PackedTracer::Tables : TracedTrees {
+  DeformedTrees deformed;
   std::vector<packed::TracePlacement> placements;
-  std::vector<TreeBox> boxes;           ///< by placement: its box in unit space
+  std::vector<TreeBox> boxes;           ///< by placement: its box in unit space, not grown()
   std::vector<uint32_t> instance_of;    ///< by placement; baked::kNone for the world tree
   std::vector<uint32_t> first_instance; ///< by the file's geometry; a LOD level has that of its base geometry
   std::vector<Placement> surfaces;      ///< by instance
   std::vector<packed::TopNode> top;
   std::vector<packed::TopNode> parts; ///< by placement; used if there are at most kMaxPlacementsWithParts
   packed::KernelScene scene{};
-  /// Largest coordinate, in unit space, of the grids of aligned placements.
-  float aligned_max_coordinate = 0.0f;
   uint32_t stream_depth = 0; ///< depth of top if rays traverse it as streams, else 0
   ThreadMemoryOwner memory;
 
@@ -97,15 +97,21 @@ struct PackedTracer::Tables : TracedTrees {
 };
 
 PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa)
-    : PackedTracer(file, source, nullptr, isa) {}
+    : PackedTracer(file, source, nullptr, {}, {}, isa) {}
 
 PackedTracer::PackedTracer(const BakedFile& file, const LodSource& source, PackedIsa isa)
-    : PackedTracer(file, source, &source, isa) {}
+    : PackedTracer(file, source, &source, {}, {}, isa) {}
 
-PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod, PackedIsa isa)
+PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source,
+                           std::span<const DeformingGeometry> deforming, const DeformConfig& config, PackedIsa isa)
+    : PackedTracer(file, source, nullptr, deforming, config, isa) {}
+
+PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod,
+                           std::span<const DeformingGeometry> deforming, const DeformConfig& config, PackedIsa isa)
     : file_(file), source_(source), lod_(lod), kernels_(kernels_of(isa)), tables_(std::make_unique<Tables>()) {
   Tables& t = *tables_;
   static_cast<TracedTrees&>(t) = lod != nullptr ? chosen_trees(file, *lod, lod_trees_) : whole_trees(file);
+  t.deformed = DeformedTrees(file, deforming, config, t);
   find_first_instances();
   place();
   t.hulls = {};
@@ -113,14 +119,7 @@ PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, con
   t.scene.trees = t.trees.data();
   t.scene.placements = t.placements.data();
   t.scene.placement_count = static_cast<uint32_t>(t.placements.size());
-  if (t.placements.size() > 1) {
-    if (t.placements.size() > kMaxPlacementsWithParts) std::ranges::transform(t.boxes, t.boxes.begin(), grown);
-    t.top = build_top_tree(t.boxes);
-    t.scene.top_nodes = t.top.data();
-    if (t.top.size() > 1) t.stream_depth = top_tree_depth(t.top);
-    if (t.placements.size() <= kMaxPlacementsWithParts) t.scene.parts = t.parts.data();
-    place_top(t.boxes, t.aligned_max_coordinate, t.scene);
-  }
+  build_top();
   t.scene.owner = this;
   t.scene.decode_wide = [](const void* owner, uint32_t cluster, uint32_t first, uint32_t count,
                            packed::DecodedBatch& out) {
@@ -142,6 +141,27 @@ PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, con
 
 PackedTracer::~PackedTracer() = default;
 
+/// Builds the tree over placements from their boxes.
+void PackedTracer::build_top() {
+  Tables& t = *tables_;
+  if (t.placements.size() < 2) return;
+  float aligned_max_coordinate = 0.0f; // in unit space, of the grids of aligned placements
+  for (const packed::TracePlacement& placement : t.placements)
+    if (placement.aligned != 0)
+      for (size_t axis = 0; axis < 3; ++axis)
+        aligned_max_coordinate =
+            std::max(aligned_max_coordinate, static_cast<float>(t.trees[placement.tree].max_coordinate /
+                                                                std::abs(placement.grid_from_unit[3 * axis + axis])));
+  const bool parts = t.placements.size() <= kMaxPlacementsWithParts;
+  std::vector<TreeBox> boxes = t.boxes;
+  if (!parts) std::ranges::transform(boxes, boxes.begin(), grown);
+  t.top = build_top_tree(boxes);
+  t.scene.top_nodes = t.top.data();
+  t.stream_depth = t.top.size() > 1 ? top_tree_depth(t.top) : 0;
+  if (parts) t.scene.parts = t.parts.data();
+  place_top(boxes, aligned_max_coordinate, t.scene);
+}
+
 void PackedTracer::find_first_instances() {
   Tables& t = *tables_;
   const std::span<const baked::InstanceRecord> instances = file_.instances();
@@ -154,6 +174,7 @@ void PackedTracer::find_first_instances() {
 /// Bounds of a geometry in object space; empty if it has no triangles.
 Bounds PackedTracer::bounds_of(uint32_t geometry) const {
   if (lod_ != nullptr) return lod_->bounds(geometry);
+  if (const DeformedTree* tree = tables_->deformed.find(geometry)) return tree->object_bounds();
   return object_bounds(file_.geometries()[geometry]);
 }
 
@@ -207,22 +228,46 @@ void PackedTracer::add_placement(uint32_t tree, uint32_t instance, const DAffine
   packed::TracePlacement placement{};
   for (int column = 0; column < 4; ++column)
     for (int axis = 0; axis < 3; ++axis) placement.grid_from_unit[3 * column + axis] = grid_from_unit[column][axis];
-  const TreeHull& hull = *t.hulls[tree];
-  for (int axis = 0; axis < 3; ++axis)
-    placement.box_lo[axis] = hull.lo()[axis], placement.box_hi[axis] = hull.hi()[axis];
   placement.tree = tree;
   placement.aligned = is_aligned(grid_from_unit) ? 1 : 0;
-  if (placement.aligned != 0)
-    for (int axis = 0; axis < 3; ++axis)
-      t.aligned_max_coordinate =
-          std::max(t.aligned_max_coordinate,
-                   static_cast<float>(t.trees[tree].max_coordinate * std::abs(unit_from_grid[axis][axis])));
   placement.ray_classes = t.trees[tree].nodes[0].ray_classes;
-  t.boxes.push_back(hull.placed(unit_from_grid));
-  if (t.parts.size() < kMaxPlacementsWithParts)
-    t.parts.push_back(top_node(hull.placed_parts(unit_from_grid, placement.aligned != 0)));
+  t.boxes.emplace_back();
+  if (t.parts.size() < kMaxPlacementsWithParts) t.parts.emplace_back();
   t.placements.push_back(placement);
   t.instance_of.push_back(instance);
+  fit_placement(t.placements.size() - 1, *t.hulls[tree], unit_from_grid);
+}
+
+/// Sets the boxes of a placement.
+void PackedTracer::fit_placement(size_t number, const TreeHull& hull, const DAffine& unit_from_grid) {
+  Tables& t = *tables_;
+  packed::TracePlacement& placement = t.placements[number];
+  for (int axis = 0; axis < 3; ++axis)
+    placement.box_lo[axis] = hull.lo()[axis], placement.box_hi[axis] = hull.hi()[axis];
+  t.boxes[number] = hull.placed(unit_from_grid);
+  if (number < t.parts.size()) t.parts[number] = top_node(hull.placed_parts(unit_from_grid, placement.aligned != 0));
+}
+
+void PackedTracer::deform(std::span<const DeformedFrame> frames, std::span<DeformStep> steps) {
+  assert(steps.size() == frames.size());
+  Tables& t = *tables_;
+  for (size_t i = 0; i < frames.size(); ++i) {
+    steps[i] = t.deformed.update(frames[i], t);
+    const uint32_t tree = t.tree_of[frames[i].geometry];
+    if (t.records[tree].node_count == 0) continue;
+    const TreeHull hull(t.trees[tree].nodes);
+    for (size_t p = 0; p < t.placements.size(); ++p)
+      if (t.placements[p].tree == tree) fit_placement(p, hull, t.surfaces[t.instance_of[p]].unit_from_surface);
+  }
+  build_top();
+  t.memory.forget_batches();
+}
+
+DeformStep PackedTracer::deform(uint32_t geometry, const FrameVertices& frame) {
+  const DeformedFrame one{geometry, &frame};
+  DeformStep step;
+  deform({&one, 1}, {&step, 1});
+  return step;
 }
 
 uint32_t PackedTracer::geometry_of_cluster(uint32_t cluster) const {
@@ -288,10 +333,23 @@ HitSurface PackedTracer::resolve(const RayHit& hit) const {
   return surface;
 }
 
+void PackedTracer::previous_vertices(const RayHit& hit, Vec3 (&vertices)[3]) const {
+  const Tables& t = *tables_;
+  const uint32_t geometry = geometry_of_cluster(hit.part);
+  if (const DeformedTree* tree = t.deformed.find(geometry)) {
+    const auto first = static_cast<uint32_t>(file_.geometries()[geometry].first_cluster);
+    decode_vertices(tree->previous_clusters()[hit.part - first], hit.triangle, vertices);
+    return;
+  }
+  const HitSurface surface = resolve(hit);
+  std::copy(std::begin(surface.vertices), std::end(surface.vertices), std::begin(vertices));
+}
+
 std::vector<ResidentPart> PackedTracer::resident() const {
   const Tables& t = *tables_;
   return {{"file", file_.file_bytes(), true},
           {"nodes built", t.built.nodes.size() * sizeof(baked::PackedNode)},
+          {"deforming geometry", t.deformed.bytes()},
           {"cluster table", t.clusters.size() * sizeof(packed::TraceCluster)},
           {"placements", t.placements.size() * (sizeof(packed::TracePlacement) + sizeof(TreeBox) + sizeof(uint32_t)) +
                              t.surfaces.size() * sizeof(Placement) +

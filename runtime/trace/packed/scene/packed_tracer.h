@@ -4,6 +4,7 @@
 
 #include "compress/format/file/baked_file.h"
 #include "runtime/trace/packed/kernels/isa.h"
+#include "runtime/trace/packed/scene/deformed_trees.h"
 #include "runtime/trace/packed/scene/traced_trees.h"
 #include "runtime/trace/ray_tracer.h"
 
@@ -21,6 +22,12 @@ public:
   /// Does the same at the detail of a plan: builds one tree per BLAS, except that all world-space geometries, which
   /// have one instance each, share one tree.
   PackedTracer(const BakedFile& file, const LodSource& source, PackedIsa isa = chosen_isa());
+  /// Traces geometries whose vertices move: each has clusters and nodes of its own, which deform() changes. They begin
+  /// with the vertices of the file.
+  /// @param deforming distinct geometries with clusters that have trees of their own (none in the world's tree)
+  /// Also throws Error(kInput) for other geometries, and as DeformedTree's constructor does.
+  PackedTracer(const BakedFile& file, const SceneSource& source, std::span<const DeformingGeometry> deforming,
+               const DeformConfig& config = {}, PackedIsa isa = chosen_isa());
   ~PackedTracer() override;
   PackedTracer(const PackedTracer&) = delete;
   PackedTracer& operator=(const PackedTracer&) = delete;
@@ -40,6 +47,18 @@ public:
 
   std::span<const uint32_t> flat_instances() const override { return flat_instances_; }
 
+  /// Moves the vertices of a deforming geometry, in all its instances, to a new frame. space() stays: it holds the
+  /// ranges of all deforming geometries. Not while other threads trace.
+  /// @param geometry was given to the constructor
+  /// Throws as DeformedTree::update() does.
+  DeformStep deform(uint32_t geometry, const FrameVertices& frame);
+  /// Like deform() for several geometries; the tree over placements is updated once.
+  void deform(std::span<const DeformedFrame> frames, std::span<DeformStep> steps);
+
+  /// The vertices of the triangle of a hit in the frame before, in the surface's coordinates; those of resolve() if its
+  /// geometry does not deform or has had one frame only.
+  void previous_vertices(const RayHit& hit, Vec3 (&vertices)[3]) const;
+
   /// Build times and sizes of the trees; empty unless the source is a LodSource.
   const LodTrees& lod_trees() const { return lod_trees_; }
 
@@ -58,7 +77,10 @@ public:
 private:
   struct Tables;
 
-  PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod, PackedIsa isa);
+  PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod,
+               std::span<const DeformingGeometry> deforming, const DeformConfig& config, PackedIsa isa);
+  void fit_placement(size_t number, const TreeHull& hull, const DAffine& unit_from_grid);
+  void build_top();
   void find_first_instances();
   Bounds bounds_of(uint32_t geometry) const;
   uint32_t triangle_of(uint32_t cluster, uint32_t instance, uint32_t triangle) const;
