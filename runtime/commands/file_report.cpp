@@ -14,7 +14,7 @@ namespace {
 
 using Row = std::pair<const char*, uint64_t>;
 
-std::array<Row, 18> stream_rows(const StreamBytes& bytes) {
+std::array<Row, 20> stream_rows(const StreamBytes& bytes) {
   return {{{"indices", bytes.indices},
            {"positions", bytes.positions},
            {"normals", bytes.normals},
@@ -31,6 +31,8 @@ std::array<Row, 18> stream_rows(const StreamBytes& bytes) {
            {"requirement_records", bytes.requirement_records},
            {"lod_records", bytes.lod_records},
            {"trees", bytes.trees},
+           {"rigid_motion", bytes.rigid_motion},
+           {"deformation", bytes.deformation},
            {"header_and_alignment", bytes.header_and_alignment},
            {"total", bytes.total}}};
 }

@@ -75,7 +75,8 @@ py::dict streams(const py::object& self) {
   add("mask_words", s.mask_words), add("textures", s.textures), add("texture_bytes", s.texture_bytes);
   add("cameras", s.cameras), add("strings", strings), add("summary", s.summary);
   add("material_slots", s.material_slots), add("requirements", s.requirements), add("lod_levels", s.lod_levels);
-  add("lod_groups", s.lod_groups), add("lod_links", s.lod_links), add("trees", s.trees), add("nodes", s.nodes);
+  add("lod_groups", s.lod_groups), add("lod_links", s.lod_links), add("trees", s.trees);
+  add("rigid_motion", s.rigid_motion), add("deformation", s.deformation), add("nodes", s.nodes);
   return result;
 }
 

@@ -32,7 +32,8 @@ inline void rehash_pages(std::span<std::byte> bytes) {
   std::memcpy(&header, bytes.data(), sizeof header);
   const uint64_t limit = bytes.size(), table_bytes = uint64_t{header.page_count} * sizeof(baked::PageRecord);
   uint64_t data = sizeof header + table_bytes; // start of the pages
-  for (const uint64_t part : {header.head_disk_bytes, header.tail_disk_bytes, header.node_disk_bytes})
+  for (const uint64_t part :
+       {header.head_disk_bytes, header.tail_disk_bytes, header.motion_bytes, header.node_disk_bytes})
     data += std::min(part, limit + 1);
   if (data <= limit) {
     std::byte* const table = bytes.data() + sizeof header;

@@ -32,6 +32,7 @@ public:
   void set_instances(std::vector<baked::InstanceRecord> instances) { instances_ = std::move(instances); }
 
   void set_material_slots(std::vector<uint32_t> slots) { material_slots_ = std::move(slots); }
+  void set_rigid_motion(std::vector<uint8_t> bytes) { rigid_motion_ = std::move(bytes); }
   void set_requirements(std::vector<baked::RequirementRecord> rows) { requirements_ = std::move(rows); }
 
   /// Records of all geometries added so far, including LOD levels.
@@ -74,6 +75,7 @@ private:
   std::vector<baked::LodGroupRecord> lod_groups_;
   std::vector<baked::LodLinkRecord> lod_links_;
   PackedTrees trees_;
+  std::vector<uint8_t> rigid_motion_, deformation_;
   ClusterView::StreamBits stream_bits_;
 };
 

@@ -38,6 +38,8 @@ struct BakedSections {
   std::span<const baked::LodGroupRecord> lod_groups;
   std::span<const baked::LodLinkRecord> lod_links;
   std::span<const baked::TreeRecord> trees; ///< empty if the file stores no trees; build_packed_trees() makes them
+  std::span<const uint8_t> rigid_motion;    ///< read_rigid_motion() decodes it
+  std::span<const uint8_t> deformation;
   std::span<const baked::PackedNode> nodes;
 
   std::string_view text(baked::StringRef ref) const { return {strings.data() + ref.offset, ref.bytes}; }

@@ -17,6 +17,7 @@ std::vector<std::byte> assemble_baked_file(const BakedSections& sections) {
       std::as_bytes(sections.material_slots), std::as_bytes(sections.requirements),
       std::as_bytes(sections.lod_levels),     std::as_bytes(sections.lod_groups),
       std::as_bytes(sections.lod_links),      std::as_bytes(sections.trees),
+      std::as_bytes(sections.rigid_motion),   std::as_bytes(sections.deformation),
       std::as_bytes(sections.nodes)};
   baked::FileHeader header{};
   header.magic = baked::kMagic;

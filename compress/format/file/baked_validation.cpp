@@ -10,6 +10,8 @@
 #include "compress/format/file/baked_file.h"
 #include "compress/format/file/lod_validation.h"
 #include "compress/format/layout/bit_stream.h"
+#include "compress/format/motion/deformation_validation.h"
+#include "compress/format/motion/rigid_motion_validation.h"
 #include "compress/format/trees/tree_validation.h"
 #include "pbrt_import/base/file_error.h"
 
@@ -36,6 +38,7 @@ public:
     if (const auto fault = find_lod_group_fault(sections_)) fail(fault->section, fault->record, fault->what);
     if (const auto fault = find_tree_fault(sections_)) fail(fault->section, fault->record, fault->what);
     check_cameras();
+    check_motion();
     check_requirements();
     check_summary();
     return sections_;
@@ -68,7 +71,7 @@ private:
     if (header_.file_bytes != bytes_.size())
       fail("it has " + std::to_string(bytes_.size()) + " bytes, its header says " + std::to_string(header_.file_bytes));
     if (header_.section_count != baked::kSectionCount) fail("section count");
-    if (header_.reserved != 0) fail("reserved header fields");
+    if (header_.reserved != 0 || header_.padding != decltype(header_.padding){}) fail("reserved header fields");
     const XXH128_hash_t hash = XXH3_128bits(bytes_.data() + sizeof header_, bytes_.size() - sizeof header_);
     if (hash.low64 != header_.content_hash[0] || hash.high64 != header_.content_hash[1])
       fail("content hash does not match");
@@ -109,6 +112,8 @@ private:
                  section<baked::LodGroupRecord>(baked::kLodGroups),
                  section<baked::LodLinkRecord>(baked::kLodLinks),
                  section<baked::TreeRecord>(baked::kTrees),
+                 section<uint8_t>(baked::kRigidMotion),
+                 section<uint8_t>(baked::kDeformation),
                  section<baked::PackedNode>(baked::kNodes)};
     if (sections_.payload.size() < kReadSlackBytes) fail("payload section without its final zero bytes");
     if (sections_.summary.size() != 1) fail("summary section must hold one record");
@@ -313,6 +318,11 @@ private:
         fail("camera", i, "projection or film");
       if (!text_ok(c.film_name)) fail("camera", i, "film name");
     }
+  }
+
+  void check_motion() {
+    if (const auto fault = validate_rigid_motion(sections_)) fail("rigid motion", fault->record, fault->what);
+    if (const auto fault = validate_deformation(sections_)) fail("deformation", fault->record, fault->what);
   }
 
   void check_requirements() {

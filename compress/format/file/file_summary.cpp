@@ -22,6 +22,7 @@ StreamBytes stream_bytes(const BakedFile& file) {
   bytes.requirement_records = s.requirements.size_bytes();
   bytes.lod_records = s.lod_levels.size_bytes() + s.lod_groups.size_bytes() + s.lod_links.size_bytes();
   bytes.trees = s.trees.size_bytes() + s.nodes.size_bytes();
+  bytes.rigid_motion = s.rigid_motion.size(), bytes.deformation = s.deformation.size();
   bytes.material_records = s.materials.size_bytes() + s.material_slots.size_bytes();
   bytes.masks = s.masks.size_bytes() + s.mask_words.size_bytes();
   bytes.textures = s.textures.size_bytes() + s.texture_bytes.size();
@@ -31,7 +32,7 @@ StreamBytes stream_bytes(const BakedFile& file) {
   bytes.header_and_alignment = bytes.total - s.payload.size() - bytes.cluster_records - bytes.geometry_records -
                                bytes.instance_records - bytes.material_records - bytes.masks - bytes.textures -
                                bytes.cameras - bytes.strings - bytes.requirement_records - bytes.lod_records -
-                               bytes.trees;
+                               bytes.trees - bytes.rigid_motion - bytes.deformation;
   return bytes;
 }
 

@@ -17,7 +17,8 @@ struct StreamBytes {
   uint64_t masks = 0, textures = 0, cameras = 0, strings = 0, requirement_records = 0;
   /// Level, group and link records. The other members count the records and streams of all levels.
   uint64_t lod_records = 0;
-  uint64_t trees = 0;                ///< tree records and nodes
+  uint64_t trees = 0; ///< tree records and nodes
+  uint64_t rigid_motion = 0, deformation = 0;
   uint64_t header_and_alignment = 0; ///< includes the summary record
   uint64_t total = 0;                ///< of the file
 };

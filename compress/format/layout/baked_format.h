@@ -9,12 +9,12 @@
 #include "compress/format/layout/packed_node.h"
 #include "pbrt_import/scene/material_flags.h"
 
-/// Records of a .ptk file, version 7; docs/baked_format.md describes them. All values are little-endian. Every section
+/// Records of a .ptk file, version 8; docs/baked_format.md describes them. All values are little-endian. Every section
 /// starts at a multiple of 64 bytes. Bytes that belong to no field and no section are zero.
 namespace packtrace::baked {
 
 inline constexpr std::array<uint8_t, 8> kMagic = {'P', 'T', 'K', 0x89, '\r', '\n', 0x1a, 0};
-inline constexpr uint32_t kVersion = 7;
+inline constexpr uint32_t kVersion = 8;
 inline constexpr size_t kSectionAlignment = 64;
 inline constexpr uint32_t kNone = ~0u;
 
@@ -34,11 +34,13 @@ enum Section : uint32_t {
   kSummary,       ///< one record
   kMaterialSlots, ///< uint32_t: material numbers; each instance uses a run of them
   kRequirements,
-  kLodLevels, ///< LodLevelRecord, lod_format.h
-  kLodGroups, ///< LodGroupRecord
-  kLodLinks,  ///< LodLinkRecord
-  kTrees,     ///< TreeRecord, packed_node.h
-  kNodes,     ///< PackedNode of all trees; the last section, because the disk forms store it apart from the others
+  kLodLevels,   ///< LodLevelRecord, lod_format.h
+  kLodGroups,   ///< LodGroupRecord
+  kLodLinks,    ///< LodLinkRecord
+  kTrees,       ///< TreeRecord, packed_node.h
+  kRigidMotion, ///< bytes: keys of moving instances and cameras, motion_codec.h; empty if none moves
+  kDeformation, ///< bytes: meshes whose vertices move; empty if there are none
+  kNodes,       ///< PackedNode of all trees; the last section, because the disk forms store it apart from the others
   kSectionCount
 };
 
@@ -58,7 +60,8 @@ struct FileHeader {
   uint32_t section_count;
   uint32_t reserved;
   std::array<SectionRecord, kSectionCount> sections;
-  uint64_t header_hash; ///< XXH3-64 of the header before this field
+  std::array<uint64_t, 2> padding; ///< zero
+  uint64_t header_hash;            ///< XXH3-64 of the header before this field
 };
 
 struct StringRef {
@@ -240,9 +243,9 @@ struct SummaryRecord {
 template <typename T>
 inline constexpr bool kIsPod = std::is_trivially_copyable_v<T> && std::is_standard_layout_v<T>;
 
-static_assert(kIsPod<FileHeader> && sizeof(SectionRecord) == 24 && sizeof(FileHeader) == 512);
+static_assert(kIsPod<FileHeader> && sizeof(SectionRecord) == 24 && sizeof(FileHeader) == 576);
 static_assert(offsetof(FileHeader, content_hash) == 24 && offsetof(FileHeader, sections) == 48 &&
-              offsetof(FileHeader, header_hash) == 504);
+              offsetof(FileHeader, header_hash) == 568);
 static_assert(kIsPod<GeometryRecord> && sizeof(GeometryRecord) == 192 && alignof(GeometryRecord) == 8);
 static_assert(offsetof(GeometryRecord, origin) == 24 && offsetof(GeometryRecord, cluster_count) == 64 &&
               offsetof(GeometryRecord, bounds_lo) == 96 && offsetof(GeometryRecord, flags) == 132 &&
@@ -283,6 +286,8 @@ inline constexpr std::array<uint32_t, kSectionCount> kRecordBytes = {sizeof(Geom
                                                                      sizeof(LodGroupRecord),
                                                                      sizeof(LodLinkRecord),
                                                                      sizeof(TreeRecord),
+                                                                     1,
+                                                                     1,
                                                                      sizeof(PackedNode)};
 
 inline constexpr uint32_t kMaskedClass = 4; ///< bit of a material class: rays must look up a mask

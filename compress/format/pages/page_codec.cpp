@@ -39,6 +39,7 @@ public:
     resident_.resize(static_cast<size_t>(header_.resident_bytes));
     unzip(head_, 0, header_.head_bytes, "head");
     unzip(tail_, tail_begin_, header_.tail_bytes, "tail");
+    std::copy(motion_.begin(), motion_.end(), resident_.begin() + static_cast<std::ptrdiff_t>(motion_begin_));
     check_head();
     decode_pages();
     set_first_triangles_and_vertices();
@@ -46,7 +47,7 @@ public:
     form = {static_cast<PageCodec>(header_.codec),
             bytes_.size(),
             header_.page_count,
-            sizeof header_ + table_bytes() + head_.size() + tail_.size(),
+            sizeof header_ + table_bytes() + head_.size() + tail_.size() + motion_.size(),
             nodes_.size(),
             header_.stream_bytes,
             clusters_checked_};
@@ -81,11 +82,11 @@ private:
     if (header_.reserved != 0 || header_.padding != decltype(header_.padding){}) fail("reserved header fields");
   }
 
-  /// Reads the page records, and finds head, tail, nodes and pages.
+  /// Reads the page records, and finds head, tail, motion, nodes and pages.
   void read_table() {
     uint64_t left = bytes_.size() - sizeof header_;
-    for (const uint64_t part :
-         {table_bytes(), header_.head_disk_bytes, header_.tail_disk_bytes, header_.node_disk_bytes}) {
+    for (const uint64_t part : {table_bytes(), header_.head_disk_bytes, header_.tail_disk_bytes, header_.motion_bytes,
+                                header_.node_disk_bytes}) {
       if (part > left) fail("page table extent");
       left -= part;
     }
@@ -97,7 +98,8 @@ private:
     if (!pages_.empty()) std::memcpy(pages_.data(), at, static_cast<size_t>(table_bytes()));
     head_ = {at + table_bytes(), static_cast<size_t>(header_.head_disk_bytes)};
     tail_ = {head_.data() + head_.size(), static_cast<size_t>(header_.tail_disk_bytes)};
-    nodes_ = {tail_.data() + tail_.size(), static_cast<size_t>(header_.node_disk_bytes)};
+    motion_ = {tail_.data() + tail_.size(), static_cast<size_t>(header_.motion_bytes)};
+    nodes_ = {motion_.data() + motion_.size(), static_cast<size_t>(header_.node_disk_bytes)};
     places_.reserve(pages_.size());
     uint64_t offset = end;
     for (size_t i = 0; i < pages_.size(); ++i) {
@@ -121,11 +123,13 @@ private:
       fail("head or tail size");
     payload_begin_ = align_up(header_.head_bytes + cluster_count_ * sizeof(baked::ClusterRecord));
     tail_begin_ = align_up(payload_begin_ + payload_bytes_ + kReadSlackBytes);
-    nodes_begin_ = tail_begin_ + header_.tail_bytes;
+    motion_begin_ = tail_begin_ + header_.tail_bytes;
+    nodes_begin_ = motion_begin_ + header_.motion_bytes;
     constexpr uint64_t kMaxNodes = uint64_t{1} << 40;
-    if (header_.tail_bytes % baked::kSectionAlignment != 0 || header_.node_count > kMaxNodes ||
-        (header_.node_count == 0) != nodes_.empty() || !ratio_ok(node_bytes(), nodes_.size()))
-      fail("tail or node size");
+    if (header_.tail_bytes % baked::kSectionAlignment != 0 || header_.motion_bytes % baked::kSectionAlignment != 0 ||
+        header_.node_count > kMaxNodes || (header_.node_count == 0) != nodes_.empty() ||
+        !ratio_ok(node_bytes(), nodes_.size()))
+      fail("tail, motion or node size");
     if (header_.resident_bytes != align_up(nodes_begin_ + node_bytes())) fail("resident size");
   }
 
@@ -252,8 +256,9 @@ private:
   baked::PagedHeader header_{};
   std::vector<baked::PageRecord> pages_;
   std::vector<Place> places_;
-  std::span<const std::byte> head_, tail_, nodes_;
-  uint64_t cluster_count_ = 0, payload_bytes_ = 0, payload_begin_ = 0, tail_begin_ = 0, nodes_begin_ = 0;
+  std::span<const std::byte> head_, tail_, motion_, nodes_;
+  uint64_t cluster_count_ = 0, payload_bytes_ = 0, payload_begin_ = 0, tail_begin_ = 0, motion_begin_ = 0,
+           nodes_begin_ = 0;
   bool clusters_checked_ = false;
   std::vector<std::byte> resident_;
   std::span<const baked::GeometryRecord> geometries_;

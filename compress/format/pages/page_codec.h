@@ -33,8 +33,8 @@ enum NodeForm : uint32_t {
 };
 
 /// Header of a file with codec fast or small. magic, version and header_bytes have the same places as in FileHeader,
-/// but header_bytes has another value. Behind the header follow, without gaps: the page records, head, tail, nodes, and
-/// the pages.
+/// but header_bytes has another value. Behind the header follow, without gaps: the page records, head, tail, motion,
+/// nodes, and the pages.
 struct PagedHeader {
   std::array<uint8_t, 8> magic;
   uint32_t version;
@@ -45,7 +45,7 @@ struct PagedHeader {
   uint64_t resident_bytes;  ///< size of the resident file (codec none)
   uint64_t head_bytes;      ///< size of the part of that file before its cluster section
   uint64_t head_disk_bytes; ///< as one zstd frame
-  /// Size of the part of that file behind its payload section, up to its nodes.
+  /// Size of the part of that file behind its payload section, up to its motion.
   uint64_t tail_bytes;
   uint64_t tail_disk_bytes;                        ///< as one zstd frame
   std::array<uint64_t, kPageStreams> stream_bytes; ///< sums over all pages, for reports
@@ -53,14 +53,15 @@ struct PagedHeader {
   uint64_t node_disk_bytes;                        ///< as one zstd frame; 0 without nodes
   uint32_t node_form;                              ///< NodeForm
   uint32_t reserved;
-  std::array<uint64_t, 5> padding;
-  uint64_t table_hash;  ///< XXH3-64 of the page records, head, tail and nodes
+  uint64_t motion_bytes; ///< size of the part of that file from its motion sections to its nodes; as it is, on disk too
+  std::array<uint64_t, 4> padding;
+  uint64_t table_hash;  ///< XXH3-64 of the page records, head, tail, motion and nodes
   uint64_t header_hash; ///< XXH3-64 of the header before this field
 };
 static_assert(std::is_trivially_copyable_v<PagedHeader> && sizeof(PagedHeader) == 192);
 static_assert(offsetof(PagedHeader, codec) == 24 && offsetof(PagedHeader, resident_bytes) == 32 &&
               offsetof(PagedHeader, stream_bytes) == 72 && offsetof(PagedHeader, node_count) == 112 &&
-              offsetof(PagedHeader, table_hash) == 176);
+              offsetof(PagedHeader, motion_bytes) == 136 && offsetof(PagedHeader, table_hash) == 176);
 
 /// Consecutive clusters with their payload. The clusters of one page may belong to several geometries.
 struct PageRecord {
@@ -85,7 +86,7 @@ struct DiskForm {
   PageCodec codec = PageCodec::kNone;
   uint64_t file_bytes = 0;
   uint32_t page_count = 0;
-  uint64_t table_bytes = 0; ///< header, page records, head and tail
+  uint64_t table_bytes = 0; ///< header, page records, head, tail and motion
   uint64_t node_bytes = 0;  ///< nodes of all trees
   std::array<uint64_t, kPageStreams> stream_bytes{};
   /// True if nodes were restored from the clusters, which requires that find_cluster_fault() accepted every cluster.

@@ -220,7 +220,7 @@ std::vector<std::byte> encode_paged_file(const BakedFile& file, PageCodec codec)
   const size_t tail_begin = offset_of(sections.materials.data());
   const ZstdEncoder zstd = make_zstd_encoder();
   Bytes head = zip(zstd.get(), {resident, head_end});
-  const size_t tail_end = offset_of(sections.nodes.data());
+  const size_t tail_end = offset_of(sections.rigid_motion.data()), motion_end = offset_of(sections.nodes.data());
   Bytes tail = zip(zstd.get(), {resident + tail_begin, tail_end - tail_begin});
 
   Bytes table;
@@ -233,6 +233,7 @@ std::vector<std::byte> encode_paged_file(const BakedFile& file, PageCodec codec)
   const auto [nodes, node_form] = encode_nodes(zstd.get(), sections);
   append(table, head);
   append(table, tail);
+  append(table, {resident + tail_end, motion_end - tail_end});
   append(table, nodes);
   header.magic = baked::kMagic;
   header.version = baked::kVersion;
@@ -243,6 +244,7 @@ std::vector<std::byte> encode_paged_file(const BakedFile& file, PageCodec codec)
   header.resident_bytes = bytes.size();
   header.head_bytes = head_end, header.head_disk_bytes = head.size();
   header.tail_bytes = tail_end - tail_begin, header.tail_disk_bytes = tail.size();
+  header.motion_bytes = motion_end - tail_end;
   header.node_count = sections.nodes.size(), header.node_disk_bytes = nodes.size(), header.node_form = node_form;
   header.table_hash = XXH3_64bits(table.data(), table.size());
   header.header_hash = XXH3_64bits(&header, offsetof(baked::PagedHeader, header_hash));

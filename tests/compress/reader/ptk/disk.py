@@ -11,7 +11,7 @@ from ptk.zstd import GROWTH, decompress
 HEADER = Record(
     ("magic", "8s"), ("version", "I"), ("header_bytes", "I"), ("file_bytes", "Q"), ("codec", "I"), ("page_count", "I"),
     ("resident_bytes", "Q"), ("head", "2Q"), ("tail", "2Q"), ("stream_bytes", "5Q"), ("nodes", "2Q"),
-    ("node_form", "I"), ("reserved", "I"), ("zeros", "40s"), ("table_hash", "Q"), ("header_hash", "Q"))
+    ("node_form", "I"), ("reserved", "I"), ("motion_bytes", "Q"), ("zeros", "32s"), ("table_hash", "Q"), ("header_hash", "Q"))
 PAGE = Record(("hash", "Q"), ("disk_bytes", "I"), ("payload_bytes", "I"), ("clusters", "I"), ("form", "I"))
 PAGE_DECODERS = {1: fast.decode_page, 2: small.decode_page}
 SECTION_NAMES = [name for name, _ in SECTIONS]
@@ -68,6 +68,7 @@ def expand(data):
     pages = PAGE.read_all(parts.take(header["page_count"] * PAGE.layout.size))
     head = decompress(parts.take(header["head"][1]), header["head"][0])
     tail = decompress(parts.take(header["tail"][1]), header["tail"][0])
+    motion = parts.take(header["motion_bytes"])
     nodes = parts.take(header["nodes"][1])
 
     offset, size = section_place(head, "geometries")
@@ -91,7 +92,7 @@ def expand(data):
         offset, _ = section_place(head, name)
         out[offset : offset + len(content)] = content
     offset, _ = section_place(head, "materials")
-    out[offset : offset + len(tail)] = tail
+    out[offset : offset + len(tail) + len(motion)] = tail + motion
     if len(out) != header["resident_bytes"]:
         raise BadFile("parts do not lie in the resident file")
     offset, size = section_place(head, "nodes")

@@ -2,9 +2,9 @@
 
 import struct
 
-VERSION = 7
+VERSION = 8
 MAGIC = b"PTK\x89\r\n\x1a\0"
-HEADER_BYTES = 512
+HEADER_BYTES = 576
 NONE = 0xFFFFFFFF
 
 WORLD_SPACE, LOD_LEVEL = 1, 2  # geometry flags
@@ -114,7 +114,8 @@ SECTIONS = (
     ("instances", INSTANCE), ("masks", MASK), ("mask_words", Record(("word", "I"))), ("textures", TEXTURE),
     ("texture_bytes", None), ("cameras", CAMERA), ("strings", None), ("summary", SUMMARY),
     ("material_slots", Record(("material", "I"))), ("requirements", REQUIREMENT),
-    ("lod_levels", LOD_LEVEL_RECORD), ("lod_groups", LOD_GROUP), ("lod_links", LOD_LINK), ("trees", TREE), ("nodes", NODE))
+    ("lod_levels", LOD_LEVEL_RECORD), ("lod_groups", LOD_GROUP), ("lod_links", LOD_LINK), ("trees", TREE),
+    ("rigid_motion", None), ("deformation", None), ("nodes", NODE))
 
 
 def index_bits(count):

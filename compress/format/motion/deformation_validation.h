@@ -1,0 +1,13 @@
+#pragma once
+
+#include <optional>
+
+#include "compress/format/file/baked_file.h"
+#include "compress/format/motion/motion_fault.h"
+
+namespace packtrace {
+
+/// Checks the section of meshes whose vertices move. The section must be empty.
+std::optional<MotionFault> validate_deformation(const BakedSections& sections);
+
+} // namespace packtrace
