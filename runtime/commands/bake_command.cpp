@@ -12,6 +12,7 @@
 #include "compress/bake/bake_scene.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/with_file.h"
+#include "pbrt_import/files/ply_sequence.h"
 #include "runtime/commands/bake_options.h"
 #include "runtime/commands/bake_report.h"
 #include "runtime/commands/bake_target.h"
@@ -80,6 +81,10 @@ int run(const BakeOptions& given, const GlobalOptions& globals) {
   BakeTimings timings;
   timings.import_s = importing.seconds();
   refuse_to_replace(imported.files, options.output);
+
+  for (const std::string& pattern : options.sequences)
+    config.sequences.push_back(find_mesh_sequence(imported.scene, imported.files, options.input, pattern,
+                                                  options.sequence_start, options.sequence_fps.value_or(24.0)));
 
   Diagnostics diagnostics;
   const Stopwatch baking;

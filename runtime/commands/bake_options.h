@@ -29,7 +29,11 @@ struct BakeOptions {
   std::string lod = "off";
   std::optional<uint32_t> lod_min_triangles, lod_levels;
   std::string resume;
-  std::optional<std::string> codec; ///< none unless set
+  std::optional<std::string> codec;   ///< none unless set
+  std::vector<std::string> sequences; ///< patterns of PLY files, see FramePattern
+  std::optional<double> sequence_fps;
+  std::optional<int64_t> sequence_start;
+  std::optional<uint32_t> sequence_group;
   SceneOptions scene;
   bool dry_run = false;
   std::string preset;                ///< empty, or one of kPresets

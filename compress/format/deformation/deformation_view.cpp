@@ -13,7 +13,7 @@
 namespace packtrace {
 namespace {
 
-using Fault = std::optional<std::string_view>;
+using Fault = std::optional<const char*>;
 
 /// Bytes of an animation's tables. Does not overflow: at most 2^20 groups of 2^32 clusters.
 uint64_t table_bytes(uint64_t groups, uint64_t clusters) {
@@ -23,8 +23,7 @@ uint64_t table_bytes(uint64_t groups, uint64_t clusters) {
 bool frames_fit_lattice(const baked::DeformationRecord& record, const baked::GeometryRecord& geometry) {
   const double step = PositionGrid{geometry.step_mantissa, geometry.step_exponent}.step();
   for (size_t axis = 0; axis < 3; ++axis) {
-    if (record.extent[axis] > kMaxFrameExtent) return false;
-    if (record.lo[axis] < -kMaxLattice || record.lo[axis] > kMaxLattice - kMaxFrameExtent) return false;
+    if (!tree_origin_of_frames(record.lo[axis], record.extent[axis])) return false;
     if (!std::isfinite(from_lattice(record.lo[axis], step))) return false;
     if (!std::isfinite(from_lattice(record.lo[axis] + record.extent[axis], step))) return false;
   }
@@ -99,35 +98,35 @@ std::span<const baked::DeformationRecord> deformation_records(std::span<const ui
   return {reinterpret_cast<const baked::DeformationRecord*>(header + 1), header->animation_count};
 }
 
-std::optional<DeformationFault> find_deformation_fault(std::span<const uint8_t> section,
-                                                       std::span<const baked::GeometryRecord> geometries,
-                                                       std::span<const baked::ClusterRecord> clusters,
-                                                       uint32_t base_geometries) {
+std::optional<MotionFault> find_deformation_fault(std::span<const uint8_t> section,
+                                                  std::span<const baked::GeometryRecord> geometries,
+                                                  std::span<const baked::ClusterRecord> clusters,
+                                                  uint32_t base_geometries) {
   if (section.empty()) return std::nullopt;
-  if (section.size() < sizeof(baked::DeformationHeader) + kReadSlackBytes) return DeformationFault{0, "section size"};
+  if (section.size() < sizeof(baked::DeformationHeader) + kReadSlackBytes) return MotionFault{0, "section size"};
   const uint64_t end = section.size() - kReadSlackBytes;
   const auto* header = reinterpret_cast<const baked::DeformationHeader*>(section.data());
   if (header->animation_count == 0 || header->reserved != 0 ||
       header->animation_count > (end - sizeof *header) / sizeof(baked::DeformationRecord))
-    return DeformationFault{0, "number of animations"};
+    return MotionFault{0, "number of animations"};
   const std::span<const baked::DeformationRecord> records = deformation_records(section);
   uint64_t at = sizeof *header + records.size_bytes(); // tables and data follow in order, at multiples of 8 bytes
   for (size_t i = 0; i < records.size(); ++i) {
     const baked::DeformationRecord& record = records[i];
     if (record.geometry >= base_geometries || (i > 0 && record.geometry <= records[i - 1].geometry))
-      return DeformationFault{i, "geometry"};
+      return MotionFault{i, "geometry"};
     const baked::GeometryRecord& geometry = geometries[record.geometry];
-    if (const Fault fault = find_record_fault(record, geometry)) return DeformationFault{i, *fault};
+    if (const Fault fault = find_record_fault(record, geometry)) return MotionFault{i, *fault};
     const uint64_t table = table_bytes(deformation_groups(record), geometry.cluster_count);
-    if (record.table_offset != at || table > end - at) return DeformationFault{i, "place of its tables"};
+    if (record.table_offset != at || table > end - at) return MotionFault{i, "place of its tables"};
     if (record.data_offset != at + table || record.data_bytes > end - record.data_offset)
-      return DeformationFault{i, "place of its blocks"};
+      return MotionFault{i, "place of its blocks"};
     at = (record.data_offset + record.data_bytes + 7) / 8 * 8;
-    if (at > end) return DeformationFault{i, "place of its blocks"};
+    if (at > end) return MotionFault{i, "place of its blocks"};
     const auto own = clusters.subspan(static_cast<size_t>(geometry.first_cluster), geometry.cluster_count);
-    if (const Fault fault = find_blocks_fault(section, record, own)) return DeformationFault{i, *fault};
+    if (const Fault fault = find_blocks_fault(section, record, own)) return MotionFault{i, *fault};
   }
-  if (at != end) return DeformationFault{records.size() - 1, "bytes behind it"};
+  if (at != end) return MotionFault{records.size() - 1, "bytes behind it"};
   return std::nullopt;
 }
 

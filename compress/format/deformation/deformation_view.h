@@ -3,11 +3,10 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <string_view>
-#include <vector>
 
 #include "compress/format/deformation/deformation_format.h"
 #include "compress/format/layout/baked_format.h"
+#include "compress/format/motion/motion_fault.h"
 
 namespace packtrace {
 
@@ -42,20 +41,14 @@ inline uint32_t deformation_groups(const baked::DeformationRecord& record) {
 /// Records of a section; none if it is empty.
 std::span<const baked::DeformationRecord> deformation_records(std::span<const uint8_t> section);
 
-/// A fault in a deformation section.
-struct DeformationFault {
-  uint64_t record = 0; ///< number of the animation
-  std::string_view what;
-};
-
 /// Checks a section: all that DeformationView and decode_frame() rely on. Reads the sizes of all fields but not the
 /// fields: vertices of a damaged file may lie outside the record's box (DeformedTree::update() rejects them).
 /// @param section 8-byte aligned
 /// @param geometries,clusters of the file, already checked
 /// @param base_geometries number of geometries that are not LOD levels
-std::optional<DeformationFault> find_deformation_fault(std::span<const uint8_t> section,
-                                                       std::span<const baked::GeometryRecord> geometries,
-                                                       std::span<const baked::ClusterRecord> clusters,
-                                                       uint32_t base_geometries);
+std::optional<MotionFault> find_deformation_fault(std::span<const uint8_t> section,
+                                                  std::span<const baked::GeometryRecord> geometries,
+                                                  std::span<const baked::ClusterRecord> clusters,
+                                                  uint32_t base_geometries);
 
 } // namespace packtrace

@@ -90,16 +90,14 @@ DeformedTree::Grid DeformedTree::find_grid(const BakedFile& file, const Deformin
   grid.record.step_exponent = record.step_exponent;
   for (size_t axis = 0; axis < 3; ++axis) {
     const int64_t lo = geometry.range.lo[axis], hi = geometry.range.hi[axis];
-    // As in TreeRecord: an origin only where it makes every coordinate smaller.
-    const bool movable = (lo > 0 && hi <= 2 * lo) || (hi < 0 && lo >= 2 * hi);
-    const int64_t origin = movable ? lo + (hi - lo) / 2 : 0;
-    constexpr int64_t kMost = baked::kMaxTreeCoordinate;
-    if (lo > hi || hi - lo > kMaxFrameExtent || lo - origin < -kMost || hi - origin > kMost)
+    const std::optional<int64_t> origin =
+        lo <= hi ? tree_origin_of_frames(lo, static_cast<uint64_t>(hi) - static_cast<uint64_t>(lo)) : std::nullopt;
+    if (!origin)
       throw Error(ErrorKind::kLimitExceeded,
                   "the frames of " + std::string(file.text(record.name)) +
                       " span more steps of its position grid than a tree can hold; choose a coarser precision");
-    grid.record.origin[axis] = origin;
-    grid.low[axis] = static_cast<int32_t>(lo - origin);
+    grid.record.origin[axis] = *origin;
+    grid.low[axis] = static_cast<int32_t>(lo - *origin);
     grid.extent[axis] = static_cast<int32_t>(hi - lo);
   }
   return grid;
