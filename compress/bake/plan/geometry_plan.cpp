@@ -205,7 +205,7 @@ private:
       const bool instanced = deforms_[shape.mesh] != 0 || group.instanced(scene_.meshes[shape.mesh].triangles.size());
       const bool share = instanced || (group.shapes > 1 && group.one_transform);
       plan_.shared_shapes += share && group.geometry;
-      plan_.instanced_shapes += instanced;
+      plan_.instanced_shapes += instanced && deforms_[shape.mesh] == 0;
       Shape placed = shape;
       if (instanced) placed.parent_from_mesh = DAffine(1.0);
       uint32_t geometry = group.geometry.value_or(0);
