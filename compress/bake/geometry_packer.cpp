@@ -26,6 +26,14 @@ baked::GeometryRecord record_of(const GeometryPlan& plan, const QuantizedGeometr
   return record;
 }
 
+/// The normals of frame 0 would be wrong in all others, so the faces' own are used. Normals on request stay, of all
+/// triangles: those that are flat in frame 0 may bend later.
+void leave_out_normals(GeometryNeeds& needs) {
+  needs.infer_normals = false;
+  for (PartNeeds& part : needs.parts)
+    if (part.normals == baked::kForShading) part.normals = baked::kUnused;
+}
+
 } // namespace
 
 double mean_normal_error(const QuantizeStats& stats) {
@@ -40,8 +48,7 @@ GeometryPacker::GeometryPacker(const Scene& scene, const ScenePlan& plan, const 
 
 PackedGeometry GeometryPacker::pack(size_t index, const SharedBorders* borders) {
   GeometryNeeds needs = analyse_requirements(scene_, plan_, plan_.geometries[index], config_);
-  // Triangles that are flat in frame 0 may bend later.
-  if (plan_.geometries[index].deforms) needs.infer_normals = false;
+  if (plan_.geometries[index].deforms) leave_out_normals(needs);
   Draft draft = pack_with(index, needs);
   // Flat triangles need clusters of their own. If only some triangles are flat, those clusters may cost more than the
   // normals they save, so try both.

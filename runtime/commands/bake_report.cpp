@@ -99,7 +99,8 @@ std::string bake_text(const BakeReport& baked) {
                      baked.file.normals.empty()
                          ? std::string("no normals stored")
                          : fmt::format("maximum normal error {:.4f} degrees", baked.max_normal_error_degrees)) +
-         collapsed_text(baked.file) + notable_text(baked) + dropped_streams_text(baked.file);
+         collapsed_text(baked.file) + notable_text(baked) + sequences_text(baked.file) +
+         dropped_streams_text(baked.file);
 }
 
 std::string precision_warning(const BakeReport& baked, bool chosen) {
