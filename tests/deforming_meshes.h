@@ -3,8 +3,10 @@
 #include <cmath>
 #include <cstdint>
 #include <random>
+#include <string>
 #include <vector>
 
+#include "pbrt_import/scene/mesh_sequence.h"
 #include "pbrt_import/scene/scene.h"
 
 /// Meshes of one topology that move, for tests and benchmarks of deforming geometry.
@@ -100,5 +102,24 @@ private:
   };
   std::vector<Blade> blades_;
 };
+
+/// Frames in memory.
+class GivenFrames final : public MeshFrames {
+public:
+  explicit GivenFrames(std::vector<std::vector<Vec3>> frames) : frames_(std::move(frames)) {}
+  uint32_t count() const override { return static_cast<uint32_t>(frames_.size()); }
+  std::vector<Vec3> positions(uint32_t frame) const override { return frames_[frame]; }
+  std::string name(uint32_t frame) const override { return "frame " + std::to_string(frame); }
+
+private:
+  std::vector<std::vector<Vec3>> frames_;
+};
+
+/// Frames of a mesh at 24 per second.
+inline std::vector<std::vector<Vec3>> sampled(const DeformingMesh& mesh, uint32_t count) {
+  std::vector<std::vector<Vec3>> frames;
+  for (uint32_t i = 0; i < count; ++i) frames.push_back(mesh.positions(i / 24.0));
+  return frames;
+}
 
 } // namespace packtrace::test

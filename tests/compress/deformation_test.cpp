@@ -17,29 +17,15 @@
 namespace packtrace {
 namespace {
 
-/// Frames in memory.
-class GivenFrames final : public MeshFrames {
-public:
-  explicit GivenFrames(std::vector<std::vector<Vec3>> frames) : frames_(std::move(frames)) {}
-  uint32_t count() const override { return static_cast<uint32_t>(frames_.size()); }
-  std::vector<Vec3> positions(uint32_t frame) const override { return frames_[frame]; }
-  std::string name(uint32_t frame) const override { return "frame " + std::to_string(frame); }
-
-private:
-  std::vector<std::vector<Vec3>> frames_;
-};
+using test::GivenFrames;
 
 /// A scene of one mesh that moves, and how it is baked.
 struct MovingScene {
-  MovingScene(const test::DeformingMesh& mesh, uint32_t frames) : MovingScene(mesh.mesh(0.0), sampled(mesh, frames)) {}
+  MovingScene(const test::DeformingMesh& mesh, uint32_t frames)
+      : MovingScene(mesh.mesh(0.0), test::sampled(mesh, frames)) {}
   MovingScene(const Mesh& mesh, std::vector<std::vector<Vec3>> given) : scene(test::scene_of(mesh)), frames(given) {
     config.precision_kind = PrecisionKind::kAbsolute, config.precision = 1e-4;
     config.sequences.push_back({0, std::make_shared<GivenFrames>(std::move(given)), 24.0, 0});
-  }
-  static std::vector<std::vector<Vec3>> sampled(const test::DeformingMesh& mesh, uint32_t count) {
-    std::vector<std::vector<Vec3>> frames;
-    for (uint32_t i = 0; i < count; ++i) frames.push_back(mesh.positions(i / 24.0));
-    return frames;
   }
   BakedFile bake() const { return BakedFile::from_bytes(test::bake(scene, config).bytes); }
 
@@ -256,7 +242,7 @@ TEST(Deformation, RejectsSequencesThatDoNotFit) {
       EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
     }
   };
-  const std::vector<std::vector<Vec3>> good = MovingScene::sampled(cloth, 3);
+  const std::vector<std::vector<Vec3>> good = test::sampled(cloth, 3);
   auto frames = good;
   frames[2][5].y = std::numeric_limits<float>::infinity();
   refused({cloth.mesh(0), frames}, ErrorKind::kInput, "frame 2: a vertex position is not finite");
