@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "compress/format/deformation/deformation_format.h"
 #include "pbrt_import/base/error.h"
 
 namespace packtrace {
@@ -48,6 +49,10 @@ void BakeConfig::validate() const {
     throw Error(ErrorKind::kUsage, "textures are for shading; for ambient occlusion nothing looks at them");
   require(min_texture_psnr_db >= 10.0 && min_texture_psnr_db <= 100.0, "texture PSNR", "dB must be 10 .. 100");
   require(lod_levels >= 1 && lod_levels < baked::kMaxLodLevels, "levels of detail", "1 .. 31");
+  require(sequence_group >= 1 && sequence_group <= baked::kMaxGroupFrames, "frames per group", "1 .. 64");
+  for (const MeshSequence& sequence : sequences)
+    require(sequence.frames_per_second > 0.0 && std::isfinite(sequence.frames_per_second), "frames per second",
+            "a positive number");
 }
 
 NormalLimits BakeConfig::normal_limits(double step_per_edge) const {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "compress/format/cluster/normal_codec.h"
 #include "compress/format/cluster/uv_codec.h"
@@ -10,6 +11,7 @@
 #include "compress/format/pages/page_codec.h"
 #include "compress/format/textures/texture_codec.h"
 #include "pbrt_import/base/memory_budget.h"
+#include "pbrt_import/scene/mesh_sequence.h"
 
 namespace packtrace {
 
@@ -97,6 +99,12 @@ struct BakeConfig {
   LodUse lod = LodUse::kOff;
   uint32_t lod_min_triangles = 128; ///< geometries with fewer triangles get no LOD levels
   uint32_t lod_levels = 31;         ///< most LOD levels besides the source level; 1..31
+
+  /// Meshes of the scene that move, each at most once. Geometries with such a mesh get no LOD levels.
+  std::vector<MeshSequence> sequences;
+  /// Frames per group of a sequence, 1..64. A frame is decoded from the begin of its group on: more frames per group
+  /// take fewer bytes, but longer to reach.
+  uint32_t sequence_group = 8;
 
   /// Folder for finished LOD levels, so that an interrupted bake can reuse them when it is started again. bake_scene()
   /// removes them when it is done. Empty: no levels are kept. Does not change the file.

@@ -17,6 +17,7 @@
 #include "compress/bake/lod/shared_borders.h"
 #include "compress/bake/plan/geometry_plan.h"
 #include "compress/bake/plan/material_runs.h"
+#include "compress/bake/sequence/sequence_baker.h"
 #include "compress/bake/write/file_sections.h"
 #include "compress/bake/write/lod_store.h"
 #include "compress/bake/write/motion_packer.h"
@@ -63,8 +64,9 @@ double largest_mesh_spacing(const Scene& scene) {
 class Baker {
 public:
   Baker(const Scene& scene, const BakeConfig& config, Diagnostics& diagnostics, Progress& progress)
-      : scene_(scene), config_(config), diagnostics_(diagnostics), progress_(progress), plan_(plan_scene(scene)),
-        grids_(plan_.geometries.size()), packed_(plan_.geometries.size()) {}
+      : scene_(scene), config_(config), diagnostics_(diagnostics), progress_(progress), sequences_(scene, config),
+        plan_(plan_scene(scene, sequences_.meshes())), grids_(plan_.geometries.size()),
+        packed_(plan_.geometries.size()) {}
 
   BakedScene run() {
     measure();
@@ -108,6 +110,7 @@ private:
     pack_motion(sections);
     sections.set_material_slots(plan_.material_slots);
     sections.set_requirements(requirements.rows());
+    sections.set_deformation(write_deformations(deformations_));
     if (config_.trees) {
       progress_.begin("building trees", 0);
       sections.build_trees();
@@ -155,6 +158,7 @@ private:
   void measure() {
     progress_.begin("measuring geometry", plan_.geometries.size());
     measure_ = measure_scene(scene_, plan_, progress_);
+    sequences_.measure(plan_, measure_, progress_);
   }
 
   void choose_grids() {
@@ -273,6 +277,7 @@ private:
       packed_[i] = packer_->pack(i, lod_wanted_[i] != 0 ? &shared_borders_ : nullptr);
       progress_.advance(triangles_of(i));
     });
+    deformations_ = sequences_.pack(plan_, grids_, packed_, progress_);
   }
 
   /// Finds the borders where world-space geometries touch. All LOD levels must keep these borders unchanged.
@@ -372,6 +377,7 @@ private:
   const BakeConfig& config_;
   Diagnostics& diagnostics_;
   Progress& progress_;
+  SequenceBaker sequences_;
   ScenePlan plan_;
   SceneMeasure measure_;
   PositionGrid world_grid_;
@@ -382,6 +388,7 @@ private:
   MemoryReservation memory_{config_.memory};
   std::optional<GeometryPacker> packer_;
   Bounds motion_bounds_;                 // of moving instances at all times
+  std::vector<EncodedDeformation> deformations_;
   std::vector<EncodedTexture> textures_; // in the scene's order; empty if textures are not stored
   BakeReport report_;
 };

@@ -39,6 +39,21 @@ void add_up_areas(const ScenePlan& plan, std::span<const PackedGeometry> packed,
          report, diagnostics);
 }
 
+/// Moving geometry has the normals of its faces.
+void warn_of_dropped_normals(const Scene& scene, const ScenePlan& plan, std::span<const PackedGeometry> packed,
+                             BakeReport& report, Diagnostics& diagnostics) {
+  uint64_t count = 0;
+  for (size_t g = 0; g < plan.geometries.size(); ++g) {
+    if (!plan.geometries[g].deforms || packed[g].stats.normal_count > 0) continue;
+    count += std::ranges::any_of(plan.geometries[g].parts,
+                                 [&](const GeometryPart& part) { return !scene.meshes[part.mesh].normals.empty(); });
+  }
+  if (count > 0)
+    warn("the vertex normals of " + std::to_string(count) +
+             " geometries that deform are not stored: they are shaded with the normals of their faces",
+         report, diagnostics);
+}
+
 } // namespace
 
 void warn(std::string message, BakeReport& report, Diagnostics& diagnostics) {
@@ -90,6 +105,7 @@ void add_up(const Scene& scene, const ScenePlan& plan, std::span<const PackedGeo
              brief(report.max_uv_error_texels) + " texels off; without an encoding of your own they stay within 1/32",
          report, diagnostics);
   add_up_areas(plan, packed, report, diagnostics);
+  warn_of_dropped_normals(scene, plan, packed, report, diagnostics);
   if (plan.unused_objects > 0)
     warn(std::to_string(plan.unused_objects) + " objects with " + std::to_string(plan.unused_triangles) +
              " triangles are never instanced and not stored",

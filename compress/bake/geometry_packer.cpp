@@ -26,6 +26,14 @@ baked::GeometryRecord record_of(const GeometryPlan& plan, const QuantizedGeometr
   return record;
 }
 
+/// The normals of frame 0 would be wrong in all others, so the faces' own are used. Normals on request stay, of all
+/// triangles: those that are flat in frame 0 may bend later.
+void leave_out_normals(GeometryNeeds& needs) {
+  needs.infer_normals = false;
+  for (PartNeeds& part : needs.parts)
+    if (part.normals == baked::kForShading) part.normals = baked::kUnused;
+}
+
 } // namespace
 
 double mean_normal_error(const QuantizeStats& stats) {
@@ -40,6 +48,7 @@ GeometryPacker::GeometryPacker(const Scene& scene, const ScenePlan& plan, const 
 
 PackedGeometry GeometryPacker::pack(size_t index, const SharedBorders* borders) {
   GeometryNeeds needs = analyse_requirements(scene_, plan_, plan_.geometries[index], config_);
+  if (plan_.geometries[index].deforms) leave_out_normals(needs);
   Draft draft = pack_with(index, needs);
   // Flat triangles need clusters of their own. If only some triangles are flat, those clusters may cost more than the
   // normals they save, so try both.
@@ -47,7 +56,8 @@ PackedGeometry GeometryPacker::pack(size_t index, const SharedBorders* borders) 
   needs.infer_normals = false;
   if (mixed)
     if (Draft other = pack_with(index, needs); other.packed.bytes() < draft.packed.bytes()) draft = std::move(other);
-  if (borders != nullptr && draft.quantized.triangles.size() >= config_.lod_min_triangles) {
+  if (borders != nullptr && !plan_.geometries[index].deforms &&
+      draft.quantized.triangles.size() >= config_.lod_min_triangles) {
     LodLimits limits{config_.lod_levels + 1, {}};
     if (plan_.geometries[index].world_space) limits.locked = borders->locks(draft.quantized);
     draft.packed.lod = find_or_build_lod(draft, limits);
@@ -94,7 +104,8 @@ GeometryPacker::Draft GeometryPacker::pack_with(size_t index, const GeometryNeed
                   q.stats,
                   q.slots,
                   needs,
-                  {}};
+                  {},
+                  measure.bounds};
   return draft;
 }
 

@@ -17,6 +17,7 @@
 #include "compress/bake/plan/requirements.h"
 #include "compress/bake/write/lod_store.h"
 #include "pbrt_import/base/progress.h"
+#include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/scene/scene.h"
 
 namespace packtrace {
@@ -33,6 +34,7 @@ struct PackedGeometry {
   std::vector<uint32_t> slots; ///< slots of the plan that still have triangles
   GeometryNeeds needs;
   EncodedLod lod;
+  Bounds frames{}; ///< of all frames, geometry space, if the geometry deforms
 
   size_t bytes() const { return encoded.payload.size() + encoded.clusters.size() * sizeof(baked::ClusterRecord); }
 };

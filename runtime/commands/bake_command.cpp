@@ -12,6 +12,7 @@
 #include "compress/bake/bake_scene.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/with_file.h"
+#include "pbrt_import/files/ply_sequence.h"
 #include "pbrt_import/scene/separate_motion.h"
 #include "runtime/commands/bake_options.h"
 #include "runtime/commands/bake_report.h"
@@ -90,6 +91,10 @@ int run(const BakeOptions& given, const GlobalOptions& globals) {
   timings.import_s = importing.seconds();
   refuse_to_replace(imported.files, options.output);
   add_motion_of(options, globals, imported.scene);
+
+  for (const std::string& pattern : options.sequences)
+    config.sequences.push_back(find_mesh_sequence(imported.scene, imported.files, options.input, pattern,
+                                                  options.sequence_start, options.sequence_fps.value_or(24.0)));
 
   Diagnostics diagnostics;
   const Stopwatch baking;

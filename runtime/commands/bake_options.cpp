@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "pbrt_import/base/error.h"
 #include "runtime/commands/cli_support.h"
@@ -162,6 +163,31 @@ void add_motion_options(CLI::App& verb, BakeOptions& options) {
       ->group("Motion");
 }
 
+void add_sequence_options(CLI::App& verb, BakeOptions& options) {
+  constexpr const char* kGroup = "Meshes that move";
+  verb.add_option("--sequence", options.sequences,
+                  "PLY files of one topology that move a mesh of the scene, such as 'grass_%04d.ply' with one %d or "
+                  "%0Nd for the frame's number; relative to the working directory or the scene. The first frame is "
+                  "the file that the scene refers to, the last the one before the first missing number. Repeat it for "
+                  "several meshes. Their geometries get no LOD levels")
+      ->type_name("PATTERN")
+      ->allow_extra_args(false)
+      ->take_all()
+      ->group(kGroup);
+  verb.add_option("--sequence-fps", options.sequence_fps, "Frames per second of all sequences (default 24)")
+      ->type_name("F")
+      ->group(kGroup);
+  verb.add_option("--sequence-start", options.sequence_start,
+                  "Number of the first frame of all sequences (default: the smallest in the scene)")
+      ->type_name("N")
+      ->group(kGroup);
+  verb.add_option("--sequence-group", options.sequence_group,
+                  "Frames per group, 1..64 (default 8). A frame is decoded from the begin of its group on; larger "
+                  "groups take fewer bytes, but longer to reach")
+      ->type_name("N")
+      ->group(kGroup);
+}
+
 } // namespace
 
 void add_bake_options(CLI::App& verb, BakeOptions& options) {
@@ -186,6 +212,7 @@ void add_bake_options(CLI::App& verb, BakeOptions& options) {
                       std::string(name_of(PageCodec::kSmall))}))
       ->default_str(std::string(name_of(PageCodec::kNone)));
   add_motion_options(verb, options);
+  add_sequence_options(verb, options);
   add_choice_options(verb, options);
   verb.add_flag("--dry-run", options.dry_run, "Import and bake without writing a file, to see sizes and errors");
   add_scene_options(verb, options.scene);
@@ -199,6 +226,7 @@ void add_bake_options(CLI::App& verb, BakeOptions& options) {
               "Examples:\n"
               "  packtrace bake house.pbrt -o house.ptk\n"
               "  packtrace bake forest.pbrt -o forest.ptk --lod --codec small\n"
+              "  packtrace bake meadow.pbrt -o meadow.ptk --sequence 'grass_%04d.ply' --sequence-fps 30\n"
               "  packtrace bake house.pbrt -o - | ssh host 'cat > house.ptk'\n"
               "  packtrace bake house.pbrt -o small.ptk --grid-step 1e-4 --json report.json\n"
               "  packtrace bake house.pbrt -o small.ptk --target ao-error=0.002");
@@ -245,6 +273,13 @@ BakeConfig make_config(const BakeOptions& options) {
   config.lod_levels = options.lod_levels.value_or(config.lod_levels);
   if (options.camera && options.targets.empty())
     throw Error(ErrorKind::kUsage, "--camera only applies to --target; a file is for all cameras");
+  if (options.sequences.empty() && (options.sequence_fps || options.sequence_start || options.sequence_group))
+    throw Error(ErrorKind::kUsage, "--sequence-fps, --sequence-start and --sequence-group require --sequence");
+  if (!options.sequences.empty() && !options.targets.empty())
+    throw Error(ErrorKind::kUsage, "--target measures still scenes: it cannot be combined with --sequence");
+  if (options.sequence_fps && !(*options.sequence_fps > 0.0 && std::isfinite(*options.sequence_fps)))
+    throw Error(ErrorKind::kUsage, "--sequence-fps must be a positive number");
+  config.sequence_group = options.sequence_group.value_or(config.sequence_group);
   config.resume = options.resume;
   config.trees = options.trees.value_or("on") == "on";
   config.codec = find_page_codec(options.codec.value_or(std::string(name_of(PageCodec::kNone))))

@@ -121,6 +121,21 @@ nlohmann::json motion_json(const MotionSummary& motion) {
 
 std::array<double, 3> array_of(DVec3 v) { return {v.x, v.y, v.z}; }
 
+nlohmann::json sequences_json(const FileSummary& s) {
+  nlohmann::json json = nlohmann::json::array();
+  for (const SequenceUse& use : s.sequences)
+    json.push_back({{"name", use.name},
+                    {"frames", use.frames},
+                    {"group_frames", use.group_frames},
+                    {"frames_per_second", use.frames_per_second},
+                    {"first_number", use.first_number},
+                    {"source_vertices", use.source_vertices},
+                    {"bytes", use.bytes},
+                    {"bytes_per_vertex", use.bytes_per_vertex()},
+                    {"max_position_error", use.max_position_error}});
+  return json;
+}
+
 } // namespace
 
 const std::locale& grouped() {
@@ -171,9 +186,21 @@ nlohmann::json to_json(const FileSummary& s, bool by_geometry) {
       {"merged_vertices", s.bake.merged_vertices},
       {"requirements", requirements_json(s, by_geometry)},
       {"lod", lod_json(s, by_geometry)},
+      {"sequences", sequences_json(s)},
       {"trees", {{"trees", s.trees}, {"nodes", s.nodes}, {"depth", s.tree_depth}}},
       {"motion", motion_json(s.motion)},
   };
+}
+
+std::string sequences_text(const FileSummary& s) {
+  std::string text;
+  for (const SequenceUse& use : s.sequences)
+    text += fmt::format(grouped(),
+                        "{} deforms: {:L} frames from number {} at {:g} per second, {:L} vertices, {:L} bytes ({:.3f} "
+                        "per vertex and frame), position error {:.3g}\n",
+                        use.name, use.frames, use.first_number, use.frames_per_second, use.source_vertices, use.bytes,
+                        use.bytes_per_vertex(), use.max_position_error);
+  return text;
 }
 
 std::string size_text(const FileSummary& s) {
@@ -273,6 +300,7 @@ std::string to_text(const FileSummary& s, bool by_geometry) {
   if (s.placed_triangles != s.triangles)
     text +=
         fmt::format(grouped(), "{:<22}{:>14L}{:>16.3f}\n", "total, placed", s.bytes.total, s.bytes_per_placed_triangle);
+  text += sequences_text(s);
   return text + "\n" + lod_text(s, by_geometry) + requirements_text(s, by_geometry);
 }
 

@@ -16,6 +16,9 @@ nlohmann::json to_json(const FileSummary& summary, bool by_geometry);
 /// Locale for fmt's {:L} that prints 1234567 as 1,234,567, independent of the user's locale.
 const std::locale& grouped();
 
+/// Lines about the geometries that deform; empty if none does.
+std::string sequences_text(const FileSummary& summary);
+
 /// One line with the number of triangles, the file size and the memory resident for tracing, in total and per triangle.
 std::string size_text(const FileSummary& summary);
 

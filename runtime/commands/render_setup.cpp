@@ -23,6 +23,11 @@ MemoryReservation reserve_picture(const RenderOptions& options, const FrameConfi
   });
 }
 
+/// Whether the scene is shown at a time, not at rest.
+bool shows_motion(const RenderOptions& options) {
+  return options.sequence.path || options.sequence.keys || options.sequence.start_time;
+}
+
 } // namespace
 
 RenderSetup::RenderSetup(const RenderOptions& options, const GlobalOptions& globals, bool lod_layers,
@@ -37,14 +42,14 @@ RenderSetup::RenderSetup(const RenderOptions& options, const GlobalOptions& glob
   pixels = reserve_picture(options, config, globals.memory);
   const BakedFile* const file = loaded.baked ? &*loaded.baked : nullptr;
   const FrameScene scene{loaded.source.get(), file, tracer_config(options, globals, file != nullptr),
-                         motion.moves() ? &motion : nullptr};
+                         motion.moves() ? &motion : nullptr, shows_motion(options)};
   loop = std::make_unique<FrameLoop>(scene, config);
 }
 
 /// Reads the motion of the scene if a sequence or a time other than that of the scene at rest is wanted.
 void RenderSetup::prepare_motion(const RenderOptions& options, const GlobalOptions& globals) {
   const SequenceOptions& sequence = options.sequence;
-  if (!sequence.path && !sequence.keys && !sequence.start_time) return;
+  if (!shows_motion(options)) return;
   motion = loaded.baked ? SceneMotion::of(*loaded.baked) : SceneMotion::of(*loaded.imported);
   if (sequence.keys) {
     const MotionTargets targets = loaded.baked ? motion_targets(*loaded.baked) : motion_targets(*loaded.imported);

@@ -21,6 +21,22 @@ uint64_t count_hits(const GBuffer& g) {
       std::count_if(g.instance.begin(), g.instance.end(), [](uint32_t id) { return id != kNoInstance; }));
 }
 
+/// Previous vertices of the deforming meshes of a tracer.
+class DeformedSurfaces final : public SurfaceHistory {
+public:
+  DeformedSurfaces(const SceneSource& source, const PackedTracer& tracer) : source_(source), tracer_(tracer) {}
+  std::optional<DVec3> previous_position(uint32_t instance, uint32_t triangle,
+                                         glm::dvec2 barycentrics) const override {
+    const auto v = tracer_.previous_object_vertices(source_.instances()[instance].geometry, triangle);
+    if (!v) return std::nullopt;
+    return (*v)[0] + ((*v)[1] - (*v)[0]) * barycentrics.x + ((*v)[2] - (*v)[0]) * barycentrics.y;
+  }
+
+private:
+  const SceneSource& source_;
+  const PackedTracer& tracer_;
+};
+
 /// Marks that nothing has moved since the G-buffer was traced.
 void forget_motion(GBuffer& gbuffer) {
   gbuffer.motion_px.assign(gbuffer.motion_px.size(), Vec2(0));
@@ -115,6 +131,12 @@ FrameLoop::FrameLoop(const FrameScene& scene, const FrameConfig& config)
     for (const PlacedGeometry& instance : scene_.source->instances()) last_world_.push_back(instance.world_from_object);
     pose_.resize(moving.size()), last_pose_.resize(moving.size());
   }
+  if (scene_.deforms && scene_.file != nullptr) meshes_ = std::make_unique<MeshMotion>(*scene_.file);
+  if (meshes_ && meshes_->empty()) meshes_.reset();
+  if (meshes_ && scene_.backend.backend != Backend::kPacked)
+    throw Error(ErrorKind::kUnsupported, "deforming meshes require backend packed");
+  if (meshes_ && config_.detail.error_px)
+    throw Error(ErrorKind::kUnsupported, "levels of detail cannot be combined with deforming meshes yet");
   if (!config_.detail.error_px) return;
   const auto* packed = dynamic_cast<const PackedSource*>(scene_.source);
   if (scene_.file == nullptr || packed == nullptr)
@@ -157,6 +179,7 @@ void FrameLoop::restore(const Camera& camera, double time_s, std::span<const std
   // Camera rays are traced again: they depend on the camera alone.
   layers_.clear();
   pose_instances(time_s);
+  deform_meshes(time_s);
   for (still_frames_ = 0;; ++still_frames_) {
     report_ = {};
     report_.moved = still_frames_ == 0;
@@ -209,6 +232,17 @@ bool FrameLoop::pose_instances(double time_s) {
   return moved;
 }
 
+/// Moves the vertices of deforming meshes to a time. Returns whether some moved.
+bool FrameLoop::deform_meshes(double time_s) {
+  if (!meshes_) return false;
+  build_level_0();
+  const Stopwatch updating;
+  const MeshMotion::Update update = meshes_->set_time(time_s, true, static_cast<PackedTracer&>(*level_0_));
+  report_.rebuilt_trees = update.rebuilt_trees;
+  report_.times.update_s += updating.seconds();
+  return update.moved;
+}
+
 /// Moves the instances of a new tracer to their current places.
 std::unique_ptr<RayTracer> FrameLoop::posed(std::unique_ptr<RayTracer> tracer) const {
   if (!pose_.empty()) tracer->place_instances(scene_.motion->moving_instances(), pose_);
@@ -218,7 +252,12 @@ std::unique_ptr<RayTracer> FrameLoop::posed(std::unique_ptr<RayTracer> tracer) c
 void FrameLoop::build_level_0() {
   if (level_0_) return;
   const Stopwatch building;
-  level_0_ = posed(make_tracer(*scene_.source, scene_.file, scene_.backend));
+  if (meshes_)
+    level_0_ = std::make_unique<PackedTracer>(*scene_.file, *scene_.source, meshes_->geometries(), DeformConfig{},
+                                              chosen_isa(), scene_.backend.movers);
+  else
+    level_0_ = make_tracer(*scene_.source, scene_.file, scene_.backend);
+  level_0_ = posed(std::move(level_0_));
   report_.times.build_s += building.seconds();
 }
 
@@ -242,7 +281,10 @@ void FrameLoop::trace_camera_rays(const PrimaryCamera& view) {
   Progress unseen;
   const Stopwatch tracing;
   const bool moved_on = report_.moved && view_; // not the first frame
-  const PreviousFrame before{moved_on ? *view_ : view, moved_on ? std::span<const Affine>(last_world_) : std::span<const Affine>()};
+  std::optional<DeformedSurfaces> surfaces;
+  if (moved_on && meshes_) surfaces.emplace(source, static_cast<const PackedTracer&>(tracer));
+  const PreviousFrame before{moved_on ? *view_ : view, moved_on ? std::span<const Affine>(last_world_) : std::span<const Affine>(),
+                             surfaces ? &*surfaces : nullptr};
   trace_primary(source, tracer, view, before, gbuffer_, unseen);
   report_.times.primary_s = tracing.seconds();
   report_.primary_rays = gbuffer_.size.pixels();
@@ -292,8 +334,8 @@ PrimaryCamera FrameLoop::view_of(const Camera& camera, uint32_t still_frame) con
 
 const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Progress& progress) {
   report_ = {.number = next_number_, .hit_pixels = report_.hit_pixels};
-  const bool posed = pose_instances(time_s);
-  const bool moved = report_.moved = !view_ || posed || !same_camera(camera, *camera_);
+  const bool posed = pose_instances(time_s), deformed = deform_meshes(time_s);
+  const bool moved = report_.moved = !view_ || posed || deformed || !same_camera(camera, *camera_);
   still_frames_ = moved ? 0 : still_frames_ + 1;
 
   const bool still_jitter = config_.jitters() && !moved;

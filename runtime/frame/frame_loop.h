@@ -15,6 +15,7 @@
 #include "runtime/frame/rendered_image.h"
 #include "runtime/motion/scene_motion.h"
 #include "runtime/trace/make_tracer.h"
+#include "runtime/trace/packed/scene/mesh_motion.h"
 
 namespace packtrace {
 
@@ -24,6 +25,7 @@ struct FrameScene {
   const BakedFile* file = nullptr; ///< the file that `source` reads; null for an imported scene
   TracerConfig backend;
   const SceneMotion* motion = nullptr; ///< of the instances; null: none moves
+  bool deforms = false;                ///< plays the deforming meshes of `file`, again and again; backend packed only
 };
 
 /// Wall times of a frame's passes in seconds.
@@ -48,6 +50,7 @@ struct FrameReport {
   bool seen = true;    ///< false: all camera rays miss
   PassTimes times;
   uint64_t primary_rays = 0, ao_rays = 0;
+  uint32_t rebuilt_trees = 0; ///< trees of deforming meshes that were rebuilt instead of refitted
   uint64_t hit_pixels = 0; ///< traced pixels whose camera ray hits
   bool rebuilt = false;    ///< the LOD plan needed other trees
 };
@@ -111,6 +114,7 @@ private:
   class RawMean;
 
   bool pose_instances(double time_s);
+  bool deform_meshes(double time_s);
   std::unique_ptr<RayTracer> posed(std::unique_ptr<RayTracer> tracer) const;
   void choose_detail(const PrimaryCamera& view, const GBuffer* seen);
   void trace_camera_rays(const PrimaryCamera& view);
@@ -126,6 +130,7 @@ private:
   std::unique_ptr<RayTracer> level_0_;      ///< null if only levels are traced
   std::unique_ptr<RayTracer> level_tracer_; ///< traces planner_->source()
 
+  std::unique_ptr<MeshMotion> meshes_; ///< null if no mesh deforms
   std::vector<Affine> pose_, last_pose_; ///< by SceneMotion::moving_instances(): of this frame and the previous one
   std::vector<Affine> last_world_;       ///< world_from_object of all instances in the previous frame; empty: none moves
   std::optional<Camera> camera_;         ///< of the previous frame

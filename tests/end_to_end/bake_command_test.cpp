@@ -50,6 +50,43 @@ WorldEnd
   EXPECT_EQ(run_packtrace({"bake", bench.scene(), "--dry-run", "--keep", "uv,colours"}).exit_code, 2);
 }
 
+TEST(CommandLine, SequencesArePackedAndReported) {
+  const Workbench bench;
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+      "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  for (const char* frame : {"1", "2", "3"})
+    write_text(bench / ("leaf_0" + std::string(frame) + ".ply"), header + "0 0 0\n1 0 0\n0 1 " + frame + "\n3 0 1 2\n");
+  write_text(bench / "leaf.pbrt", "WorldBegin\nShape \"plymesh\" \"string filename\" \"leaf_01.ply\"\nWorldEnd\n");
+  const std::string file = bench / "leaf.ptk";
+  const std::vector<std::string> bake{"bake",    bench / "leaf.pbrt", "-o",           file,
+                                      "--force", "--sequence",        "leaf_%02d.ply"};
+  const CommandResult baked = run_packtrace(bake);
+  ASSERT_EQ(baked.exit_code, 0) << baked.err;
+  EXPECT_NE(baked.out.find("leaf_01.ply deforms: 3 frames from number 1 at 24 per second, 3 vertices"),
+            std::string::npos)
+      << baked.out;
+  const auto info = nlohmann::json::parse(run_packtrace({"info", file, "--json", "-"}).out);
+  EXPECT_EQ(info.at("sequences").at(0).at("frames"), 3);
+  EXPECT_GT(info.at("bytes").at("deformation"), 0);
+  EXPECT_EQ(run_packtrace({"render", file, "-o", bench / "leaf.png", "--size", "16x16", "--frames", "1"}).exit_code, 0);
+
+  const auto fails = [&](std::vector<std::string> more, int code, const char* part) {
+    std::vector<std::string> all = bake;
+    all.insert(all.end(), more.begin(), more.end());
+    const CommandResult result = run_packtrace(all);
+    EXPECT_EQ(result.exit_code, code);
+    EXPECT_NE(result.err.find(part), std::string::npos) << result.err;
+  };
+  fails({"--sequence-start", "2"}, 3, "did you mean leaf_01.ply?");
+  fails({"--sequence-fps", "0"}, 2, "--sequence-fps");
+  fails({"--sequence-group", "65"}, 2, "frames per group");
+  fails({"--target", "size=3MB"}, 2, "--target");
+  fails({"--sequence", "leaf_%02d.ply"}, 2, "two sequences");
+  fails({"--sequence", "leaf.ply"}, 2, "it has no number");
+  EXPECT_EQ(run_packtrace({"bake", bench / "leaf.pbrt", "--dry-run", "--sequence-fps", "30"}).exit_code, 2);
+}
+
 TEST(CommandLine, LevelsOfDetailAreReported) {
   const Workbench bench;
   write_text(bench / "ball.pbrt", "WorldBegin\nObjectBegin \"ball\"\nShape \"sphere\"\nObjectEnd\n"

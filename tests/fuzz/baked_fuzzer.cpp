@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "compress/format/deformation/deformation_player.h"
 #include "compress/format/file/baked_file.h"
 #include "compress/format/file/file_summary.h"
 #include "tests/fuzz/baked_input.h"
@@ -114,6 +115,26 @@ void read_trees(const BakedFile& file) {
   }
 }
 
+/// Every frame is decoded to the same vertices from the begin of its group and after others.
+void read_frames(const BakedFile& file) {
+  const auto records = deformation_records(file.sections().deformation);
+  for (uint32_t i = 0; i < records.size(); ++i) {
+    DeformationPlayer player(file, i);
+    for (const uint32_t frame : {records[i].frame_count - 1, 1u, 0u}) {
+      player.seek(frame);
+      for (uint32_t c = 0; c < file.clusters(records[i].geometry).size(); ++c) {
+        std::vector<FramePoint> now(file.clusters(records[i].geometry)[c].vertex_count);
+        std::vector<FrameVertex> alone(now.size());
+        player.read(c, now);
+        player.decode(frame, c, alone);
+        for (size_t v = 0; v < now.size() && frame + 1 < records[i].frame_count; ++v)
+          for (size_t axis = 0; axis < 3; ++axis)
+            require(static_cast<uint32_t>(now[v][axis]) == alone[v][axis], "vertex of a frame");
+      }
+    }
+  }
+}
+
 void read_rest(const BakedFile& file) {
   for (uint32_t i = 0; i < file.instances().size(); ++i) {
     const Affine map = file.world_from_object(i);
@@ -138,6 +159,7 @@ void read_rest(const BakedFile& file) {
   }
   require(file.cameras().size() == file.sections().cameras.size(), "number of cameras");
   (void)file.world_bounds();
+  read_frames(file);
   require(summarize(file).bytes.total == file.file_bytes(), "summary of the file");
 }
 

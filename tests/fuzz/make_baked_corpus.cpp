@@ -29,6 +29,22 @@ Scene read_scene(const std::filesystem::path& input) {
   return import_scene(files.write(text), options, diagnostics, progress).scene;
 }
 
+/// Five frames of a mesh that is sheared.
+class SwayingFrames final : public MeshFrames {
+public:
+  explicit SwayingFrames(const Mesh& mesh) : mesh_(mesh) {}
+  uint32_t count() const override { return 5; }
+  std::vector<Vec3> positions(uint32_t frame) const override {
+    std::vector<Vec3> moved = mesh_.positions;
+    for (Vec3& p : moved) p.x += 0.1f * static_cast<float>(frame * frame) * p.y;
+    return moved;
+  }
+  std::string name(uint32_t frame) const override { return "frame " + std::to_string(frame); }
+
+private:
+  const Mesh& mesh_;
+};
+
 /// Writes FOLDER/NAME.ending files of one scene.
 class CorpusWriter {
 public:
@@ -49,6 +65,7 @@ public:
     BakeConfig config = config_;
     config.trees = false;
     write(config, "treeless");
+    write_sequence();
     if (!scene_.textures.empty()) write_texture_codecs();
     if (has_normals()) write_normal_encodings();
   }
@@ -58,6 +75,15 @@ private:
     Diagnostics diagnostics;
     Progress progress;
     write_file_bytes(stem_.string() + "." + ending, bake_to_bytes(scene_, config, diagnostics, progress).bytes);
+  }
+
+  /// Moves the first mesh of the scene.
+  void write_sequence() const {
+    if (scene_.meshes.empty()) return;
+    BakeConfig config = config_;
+    config.sequence_group = 2; // several groups in few bytes
+    config.sequences.push_back({0, std::make_shared<SwayingFrames>(scene_.meshes[0]), 24.0, 0});
+    write(config, "sequence");
   }
 
   void write_texture_codecs() const {

@@ -17,6 +17,7 @@ struct EncodedChunk {
   /// payload_offset is relative to the chunk; first triangles and vertices are not set
   std::vector<baked::ClusterRecord> clusters;
   std::vector<uint8_t> payload;
+  std::vector<SourceVertex> sources;
   Vec3 lo{std::numeric_limits<float>::infinity()}, hi{-std::numeric_limits<float>::infinity()};
   ClusterView::StreamBits bits;
 };
@@ -63,6 +64,9 @@ public:
     out_.payload.resize(out_.payload.size() + kReadSlackBytes);
     for (size_t i = 0; i < clusters.size(); ++i) inspect(out_.clusters[i], geometry_.kinds[clusters[i].kind]);
     out_.payload.resize(out_.payload.size() - kReadSlackBytes);
+    if (!geometry_.sources.empty())
+      for (const uint32_t vertex : expected_vertices_)
+        out_.sources.push_back(geometry_.sources[geometry_.vertices[vertex].position]);
     return std::move(out_);
   }
 
@@ -174,6 +178,7 @@ EncodedGeometry encode_geometry(const QuantizedGeometry& geometry, const Geometr
       out.clusters.push_back(record);
     }
     out.payload.insert(out.payload.end(), chunk.payload.begin(), chunk.payload.end());
+    out.sources.insert(out.sources.end(), chunk.sources.begin(), chunk.sources.end());
     out.bounds_lo = glm::min(out.bounds_lo, chunk.lo);
     out.bounds_hi = glm::max(out.bounds_hi, chunk.hi);
     add(out.stream_bits, chunk.bits);

@@ -56,6 +56,7 @@ public:
       parts[i] = {};
     }
     out_.positions = std::move(surface_.positions);
+    out_.sources = std::move(surface_.sources);
     remove_empty_slots();
     out_.stats.collapsed_triangles = surface_.collapsed_count;
     out_.stats.source_area = surface_.source_area;

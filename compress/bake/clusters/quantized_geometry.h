@@ -63,6 +63,7 @@ struct QuantizedGeometry {
   LatticePoint origin{};     ///< lower bound of the lattice coordinates
   uint32_t anchor_shift = 0; ///< smallest shift for which extents >> anchor_shift fit int32_t
   std::vector<LatticePoint> positions;
+  std::vector<SourceVertex> sources; ///< per position; empty unless the geometry deforms
   std::vector<QuantizedVertex> vertices;
   std::vector<Triangle> triangles;  ///< indices into vertices
   std::vector<TriangleKind> kinds;  ///< distinct kinds

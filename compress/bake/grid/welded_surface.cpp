@@ -18,13 +18,13 @@ constexpr size_t kGrain = 4096; // fixed, so that sums are grouped equally for a
 class SurfaceWelder {
 public:
   SurfaceWelder(const Scene& scene, const GeometryPlan& plan, std::span<const LatticePart> parts)
-      : source_(scene, plan), parts_(parts), table_(count(parts, &LatticePart::points)) {
+      : plan_(plan), source_(scene, plan), parts_(parts), table_(count(parts, &LatticePart::points)) {
     out_.corners.reserve(count(parts, &LatticePart::triangles));
   }
 
   WeldedSurface run() {
     for (size_t part = 0; part < parts_.size(); ++part) weld_part(part);
-    out_.collapsed = find_collapsed(out_.positions, out_.corners);
+    out_.collapsed = plan_.deforms ? find_repeated() : find_collapsed(out_.positions, out_.corners);
     out_.left.resize(parts_.size());
     for (size_t part = 0, first = 0; part < parts_.size(); first += parts_[part++].triangles.size()) {
       add_areas(part, first);
@@ -32,15 +32,11 @@ public:
       out_.collapsed_count += parts_[part].triangles.size() - out_.left[part];
     }
     if (out_.collapsed_count > 0) drop_positions();
+    if (!plan_.deforms) out_.sources = {};
     return std::move(out_);
   }
 
 private:
-  /// A vertex of the source.
-  struct Vertex {
-    uint32_t part, number;
-  };
-
   template <typename Member>
   static size_t count(std::span<const LatticePart> parts, Member member) {
     size_t total = 0;
@@ -53,26 +49,41 @@ private:
     for (const Triangle& t : parts_[part].triangles) {
       Triangle corners{};
       for (int i = 0; i < 3; ++i) {
-        uint32_t& number = number_of[t[i]];
-        if (number == kUnset) number = weld(parts_[part].points[t[i]], {static_cast<uint32_t>(part), t[i]});
+        const std::vector<uint32_t>* const paths = plan_.parts[part].same_path;
+        const uint32_t vertex = paths != nullptr ? (*paths)[t[i]] : t[i];
+        uint32_t& number = number_of[vertex];
+        if (number == kUnset) number = weld(parts_[part].points[vertex], {static_cast<uint32_t>(part), vertex});
         corners[i] = number;
       }
       out_.corners.push_back(corners);
     }
   }
 
-  uint32_t weld(const LatticePoint& p, Vertex vertex) {
+  uint32_t weld(const LatticePoint& p, SourceVertex vertex) {
+    if (plan_.deforms) return add(p, vertex);
     const uint64_t hash =
         mix_words(static_cast<uint64_t>(p[0]), static_cast<uint64_t>(p[1]), static_cast<uint64_t>(p[2]));
     const auto next = static_cast<uint32_t>(out_.positions.size());
     const uint32_t number = table_.find_or_add(hash, next, [&](uint32_t other) { return out_.positions[other] == p; });
     if (number == next) {
-      out_.positions.push_back(p), out_.merged.push_back(0), first_vertex_.push_back(vertex);
+      add(p, vertex);
     } else if (out_.merged[number] == 0) {
-      const Vertex& first = first_vertex_[number];
-      out_.merged[number] = !source_.same(first.part, first.number, vertex.part, vertex.number);
+      const SourceVertex& first = out_.sources[number];
+      out_.merged[number] = !source_.same(first.part, first.vertex, vertex.part, vertex.vertex);
     }
     return number;
+  }
+
+  uint32_t add(const LatticePoint& p, SourceVertex vertex) {
+    out_.positions.push_back(p), out_.merged.push_back(0), out_.sources.push_back(vertex);
+    return static_cast<uint32_t>(out_.positions.size() - 1);
+  }
+
+  /// Per triangle: whether two corners are the same position.
+  std::vector<uint8_t> find_repeated() const {
+    std::vector<uint8_t> repeated;
+    for (const Triangle& t : out_.corners) repeated.push_back(t.x == t.y || t.y == t.z || t.z == t.x ? 1 : 0);
+    return repeated;
   }
 
   void add_areas(size_t part, size_t first) {
@@ -99,6 +110,7 @@ private:
     std::vector<uint32_t> number_of(out_.positions.size(), kUnset);
     std::vector<LatticePoint> positions;
     std::vector<uint8_t> merged;
+    std::vector<SourceVertex> sources;
     for (size_t i = 0; i < out_.corners.size(); ++i)
       for (int k = 0; k < 3 && out_.collapsed[i] == 0; ++k) {
         uint32_t& corner = out_.corners[i][k];
@@ -106,16 +118,18 @@ private:
         if (number == kUnset) {
           number = static_cast<uint32_t>(positions.size());
           positions.push_back(out_.positions[corner]), merged.push_back(out_.merged[corner]);
+          sources.push_back(out_.sources[corner]);
         }
         corner = number;
       }
     out_.positions = std::move(positions), out_.merged = std::move(merged);
+    out_.sources = std::move(sources);
   }
 
+  const GeometryPlan& plan_;
   const SourcePoints source_;
   const std::span<const LatticePart> parts_;
   WeldTable table_;
-  std::vector<Vertex> first_vertex_; // per position: the first vertex there
   WeldedSurface out_;
 };
 

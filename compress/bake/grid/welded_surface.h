@@ -41,6 +41,7 @@ struct LatticePart {
 /// The triangles of a geometry over distinct positions.
 struct WeldedSurface {
   std::vector<LatticePoint> positions; ///< distinct positions of the triangles that remain, in order of first use
+  std::vector<SourceVertex> sources;   ///< per position: a vertex there; empty unless the geometry deforms
   std::vector<uint8_t> merged;         ///< per position: whether distinct source points were rounded to it
   std::vector<Triangle> corners; ///< per triangle of all parts in order: indices into positions; undefined if collapsed
   std::vector<uint8_t> collapsed; ///< per triangle: it has no area and is removed (find_collapsed())
@@ -50,7 +51,9 @@ struct WeldedSurface {
   double collapsed_area = 0.0; ///< source area of the removed triangles
 };
 
-/// Welds positions and finds triangles without area. Depends on the input only, not on the thread count.
+/// Welds positions and finds triangles without area. In a geometry that deforms, only vertices on the same path are
+/// welded, and only triangles with two corners on the same path have no area. Depends on the input only, not on the
+/// thread count.
 WeldedSurface weld_surface(const Scene& scene, const GeometryPlan& plan, std::span<const LatticePart> parts);
 
 } // namespace packtrace

@@ -48,11 +48,14 @@ struct Draft {
 
 class Planner {
 public:
-  explicit Planner(const Scene& scene) : scene_(scene) {}
+  Planner(const Scene& scene, std::span<const uint32_t> deforming) : scene_(scene), deforms_(scene.meshes.size(), 0) {
+    for (const uint32_t mesh : deforming) deforms_[mesh] = 1;
+  }
 
   ScenePlan run() {
     check();
     equal_mesh_ = first_equal_meshes(scene_);
+    separate_deforming_meshes();
     find_moving();
     find_mesh_boxes();
     find_used_objects();
@@ -104,6 +107,13 @@ private:
     Draft& draft = drafts_[geometry];
     for (const Shape& shape : shapes) draft.part_materials.push_back(shape.material);
     return draft.users++;
+  }
+
+  /// A mesh that moves is equal to no other; of those equal to it, the first that stays stands for the others.
+  void separate_deforming_meshes() {
+    std::map<uint32_t, uint32_t> first_still;
+    for (uint32_t i = 0; i < equal_mesh_.size(); ++i)
+      equal_mesh_[i] = deforms_[i] != 0 ? i : first_still.try_emplace(equal_mesh_[i], i).first->second;
   }
 
   void find_moving() {
@@ -215,10 +225,10 @@ private:
         continue;
       }
       Group& group = groups[key_of(shape)];
-      const bool instanced = group.instanced(scene_.meshes[shape.mesh].triangles.size());
+      const bool instanced = deforms_[shape.mesh] != 0 || group.instanced(scene_.meshes[shape.mesh].triangles.size());
       const bool share = instanced || (group.shapes > 1 && group.one_transform);
       plan_.shared_shapes += share && group.geometry;
-      plan_.instanced_shapes += instanced;
+      plan_.instanced_shapes += instanced && deforms_[shape.mesh] == 0;
       Shape placed = shape;
       if (instanced) placed.parent_from_mesh = DAffine(1.0);
       uint32_t geometry = group.geometry.value_or(0);
@@ -246,13 +256,14 @@ private:
     add_instance(found->second, add_user(found->second, {&shape, 1}), placement);
   }
 
-  static GeometryPlan plan_of(const std::string& name, std::span<const Shape> shapes) {
+  GeometryPlan plan_of(const std::string& name, std::span<const Shape> shapes) const {
     GeometryPlan plan;
     plan.name = name;
     plan.max_stretch = 0.0;
     for (const Shape& shape : shapes)
       plan.parts.push_back({shape.mesh, 0, shape.reverse_orientation != swaps_handedness(shape.parent_from_mesh),
                             shape.parent_from_mesh});
+    for (const Shape& shape : shapes) plan.deforms |= deforms_[shape.mesh] != 0;
     return plan;
   }
 
@@ -348,6 +359,7 @@ private:
   }
 
   const Scene& scene_;
+  std::vector<uint8_t> deforms_; // per mesh
   std::vector<uint32_t> equal_mesh_;
   std::vector<Bounds> mesh_boxes_;
   std::vector<uint8_t> used_;                      // per object
@@ -373,6 +385,8 @@ std::string beyond_float_range(const std::string& name, const Bounds& box) {
   return name + " leaves the float range: its coordinates reach " + brief(std::max({largest.x, largest.y, largest.z}));
 }
 
-ScenePlan plan_scene(const Scene& scene) { return Planner(scene).run(); }
+ScenePlan plan_scene(const Scene& scene, std::span<const uint32_t> deforming) {
+  return Planner(scene, deforming).run();
+}
 
 } // namespace packtrace

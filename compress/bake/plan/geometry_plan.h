@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,13 @@ struct GeometryPart {
   uint32_t slot = 0; ///< index of the material slot within the geometry
   bool flip = false; ///< reverse the winding, so that it agrees with the stored geometric normal
   DAffine geometry_from_mesh{1.0};
+  /// SequenceMeasure::same_path of a mesh that moves; null for others.
+  const std::vector<uint32_t>* same_path = nullptr;
+};
+
+/// A vertex of the source: a part of the plan and a vertex of its mesh.
+struct SourceVertex {
+  uint32_t part = 0, vertex = 0;
 };
 
 /// Plan of one geometry of the file.
@@ -28,6 +36,7 @@ struct GeometryPlan {
   bool world_space = false; ///< on the scene's grid; otherwise on a grid of its own
   /// Largest factor by which an instance scales an error per object axis to an error per world axis.
   double max_stretch = 1.0;
+  bool deforms = false; ///< some part's mesh moves; never in world space
 };
 
 /// Plan of all geometries and instances of a file.
@@ -64,7 +73,8 @@ std::string beyond_float_range(const std::string& name, const Bounds& box);
 /// equal and have at least kMinSharedTriangles triangles. Every shape has an instance record anyway, so sharing saves
 /// all copies of the geometry but the first.
 /// World shapes that move (Scene::motion) have a geometry in the space of their mesh, never in world space.
+/// @param deforming meshes that move: they share a geometry with no equal mesh, and are not in world space
 /// Throws Error(kInput) if an index of the scene is out of range or a transform is not finite.
-ScenePlan plan_scene(const Scene& scene);
+ScenePlan plan_scene(const Scene& scene, std::span<const uint32_t> deforming = {});
 
 } // namespace packtrace

@@ -33,6 +33,7 @@ public:
 
   void set_material_slots(std::vector<uint32_t> slots) { material_slots_ = std::move(slots); }
   void set_rigid_motion(std::vector<uint8_t> bytes) { rigid_motion_ = std::move(bytes); }
+  void set_deformation(std::vector<uint8_t> bytes) { deformation_ = std::move(bytes); }
   void set_requirements(std::vector<baked::RequirementRecord> rows) { requirements_ = std::move(rows); }
 
   /// Records of all geometries added so far, including LOD levels.

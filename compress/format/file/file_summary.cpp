@@ -4,6 +4,8 @@
 #include <cmath>
 #include <tuple>
 
+#include "compress/format/deformation/deformation_view.h"
+
 namespace packtrace {
 namespace {
 
@@ -182,6 +184,10 @@ FileSummary summarize(const BakedFile& file) {
   for (const baked::TextureRecord& t : s.textures)
     summary.textures.push_back({std::string(s.text(t.name)), t.width, t.height, static_cast<TextureCodec>(t.codec),
                                 texture_bytes(static_cast<TextureCodec>(t.codec), t.width, t.height), t.psnr_db});
+  for (const baked::DeformationRecord& d : deformation_records(s.deformation))
+    summary.sequences.push_back({std::string(s.text(s.geometries[d.geometry].name)), d.frame_count, d.group_frames,
+                                 d.frames_per_second, d.first_number, d.source_vertices, d.data_bytes,
+                                 d.max_position_error});
   summary.lod = summarize_lod(file);
   summary.motion = summarize_motion(file);
   summary.instances = s.instances.size();

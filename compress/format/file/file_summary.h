@@ -66,6 +66,21 @@ struct TextureUse {
   float psnr_db = 0; ///< infinite if lossless
 };
 
+/// The frames of a geometry that deforms.
+struct SequenceUse {
+  std::string name; ///< of the geometry
+  uint32_t frames = 0, group_frames = 0;
+  double frames_per_second = 0.0;
+  int64_t first_number = 0;
+  uint64_t source_vertices = 0; ///< per frame
+  uint64_t bytes = 0;           ///< of all frames, without tables
+  double max_position_error = 0.0;
+
+  double bytes_per_vertex() const { ///< and frame
+    return static_cast<double>(bytes) / (static_cast<double>(source_vertices) * frames);
+  }
+};
+
 /// Report of `info` about a baked file. Counts of geometries, triangles and so on are those of level 0; bytes include
 /// all levels.
 struct FileSummary {
@@ -80,6 +95,7 @@ struct FileSummary {
   std::vector<NormalUse> normals; ///< ordered by encoding
   std::vector<TextureUse> textures;
   std::vector<UvUse> uvs; ///< ordered by encoding
+  std::vector<SequenceUse> sequences;
   LodSummary lod;
   MotionSummary motion;
   uint64_t trees = 0, nodes = 0;   ///< of all levels

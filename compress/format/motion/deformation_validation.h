@@ -7,7 +7,7 @@
 
 namespace packtrace {
 
-/// Checks the section of meshes whose vertices move. The section must be empty.
+/// Checks the section of meshes whose vertices move (find_deformation_fault()).
 std::optional<MotionFault> validate_deformation(const BakedSections& sections);
 
 } // namespace packtrace

@@ -8,13 +8,17 @@
 #include "compress/format/trees/node_writer.h"
 
 namespace packtrace {
+
 void LeafRestorer::begin(const baked::GeometryRecord& geometry, const baked::TreeRecord& tree,
                          const ClusterView& cluster) {
-  const IndexLayout& layout = cluster.layout();
   place_vertices(geometry, tree, cluster);
-  read_strips(cluster.bits(), layout);
-  kernels_.number_corners({cluster.bits(), layout.fresh_bit(), layout.explicit_bit(), layout.corner_count(),
-                           layout.vertex_count, layout.index_bits()},
+  begin_placed(cluster.bits(), cluster.layout());
+}
+
+void LeafRestorer::begin_placed(const uint8_t* bits, const IndexLayout& layout) {
+  read_strips(bits, layout);
+  kernels_.number_corners({bits, layout.fresh_bit(), layout.explicit_bit(), layout.corner_count(), layout.vertex_count,
+                           layout.index_bits()},
                           vertices_.data());
 }
 

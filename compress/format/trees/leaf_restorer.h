@@ -22,6 +22,12 @@ public:
   /// Begins the cluster that the next nodes belong to. It must be valid and lie within the tree's coordinates.
   void begin(const baked::GeometryRecord& geometry, const baked::TreeRecord& tree, const ClusterView& cluster);
 
+  /// Boxes of a cluster's vertices, to be set before begin_placed().
+  std::span<node_kernels::Box> vertex_boxes() { return boxes_; }
+  /// Begins a cluster whose vertices are in vertex_boxes().
+  /// @param bits begins with valid strips; 8 bytes behind them are readable
+  void begin_placed(const uint8_t* bits, const IndexLayout& layout);
+
   /// Writes a leaf node and returns the box of all its leaves.
   /// @param leaves runs of triangles that exist in the cluster
   node_kernels::Box write(const LeafNode& leaves, uint32_t cluster, uint8_t ray_classes, baked::PackedNode& node);

@@ -9,12 +9,11 @@
 
 #include <tbb/parallel_for.h>
 
+#include "compress/format/trees/node_tree.h"
 #include "compress/format/trees/node_writer.h"
 #include "compress/format/trees/stored_nodes.h"
 #include "compress/format/trees/tree_grid.h"
 #include "compress/format/trees/tree_validation.h"
-#include "compress/format/trees/wide_tree.h"
-#include "pbrt_import/base/error.h"
 
 namespace packtrace {
 namespace {
@@ -26,12 +25,6 @@ struct TreeCluster {
   uint32_t number = 0; ///< in the cluster section
   uint32_t geometry = 0;
   uint8_t ray_classes = 0;
-};
-
-/// Leaf nodes and, for each, the box of all its leaves.
-struct LeafNodes {
-  std::vector<baked::PackedNode> nodes;
-  std::vector<TreeGridBox> boxes;
 };
 
 /// Trees over chosen clusters live only as long as one view, so reinsertion is limited: moving all subtrees would take
@@ -211,28 +204,9 @@ public:
   }
 
   static void build_nodes(const LeafNodes& leaves, const ReinsertionConfig& moves, Tree& tree) {
-    if (leaves.nodes.size() > uint64_t{1} << 30)
-      throw Error(ErrorKind::kLimitExceeded, "a tree has more than 2^30 nodes with leaves");
-    std::vector<TreeBox> boxes;
-    boxes.reserve(leaves.boxes.size());
-    for (const TreeGridBox& box : leaves.boxes) {
-      TreeBox& out = boxes.emplace_back();
-      for (size_t axis = 0; axis < 3; ++axis)
-        out.lo[axis] = static_cast<float>(box.lo[axis]), out.hi[axis] = static_cast<float>(box.hi[axis]);
-    }
-    const WideTree built = build_wide_tree(boxes, baked::kMaxTreeDepth, moves);
-    const std::vector<WideNode>& wide = built.nodes;
-    tree.nodes.resize(wide.size());
-    std::vector<TreeGridBox> whole(wide.size());
-    for (size_t i = wide.size(); i-- > 0;) {
-      if (wide[i].child_count == 0) {
-        const uint32_t leaf = built.binary.order[built.binary.nodes[wide[i].source].first];
-        tree.nodes[i] = leaves.nodes[leaf], whole[i] = leaves.boxes[leaf];
-      } else {
-        whole[i] = write_inner_node(wide[i].first_child, wide[i].child_count, tree.nodes, whole, tree.nodes[i]);
-      }
-    }
-    tree.record.node_count = static_cast<uint32_t>(wide.size());
+    NodeTree built = build_node_tree(leaves, moves);
+    tree.nodes = std::move(built.nodes);
+    tree.record.node_count = static_cast<uint32_t>(tree.nodes.size());
     tree.record.depth = built.depth;
   }
 

@@ -4,6 +4,7 @@
 #include <cassert>
 
 #include "pbrt_import/scene/bounds.h"
+#include "runtime/trace/packed/scene/deformed_trees.h"
 #include "runtime/trace/packed/scene/placed_trees.h"
 #include "runtime/trace/packed/scene/thread_memory.h"
 #include "runtime/trace/packed/scene/trace_cluster.h"
@@ -33,6 +34,7 @@ packed::KernelHit* kernel_hits(std::span<RayHit> hits) { return reinterpret_cast
 
 struct PackedTracer::Tables : TracedTrees {
   PlacedTrees placed;
+  DeformedTrees deformed;
   std::vector<uint32_t> first_instance; ///< by the file's geometry; a LOD level has that of its base geometry
   packed::KernelScene scene{};
   ThreadMemoryOwner memory;
@@ -41,21 +43,28 @@ struct PackedTracer::Tables : TracedTrees {
 };
 
 PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa, const Movers& movers)
-    : PackedTracer(file, source, nullptr, isa, movers) {}
+    : PackedTracer(file, source, nullptr, {}, {}, isa, movers) {}
 
 PackedTracer::PackedTracer(const BakedFile& file, const LodSource& source, PackedIsa isa, const Movers& movers)
-    : PackedTracer(file, source, &source, isa, movers) {}
+    : PackedTracer(file, source, &source, {}, {}, isa, movers) {}
 
-PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod, PackedIsa isa,
+PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source,
+                           std::span<const DeformingGeometry> deforming, const DeformConfig& config, PackedIsa isa,
+                           const Movers& movers)
+    : PackedTracer(file, source, nullptr, deforming, config, isa, movers) {}
+
+PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod,
+                           std::span<const DeformingGeometry> deforming, const DeformConfig& config, PackedIsa isa,
                            const Movers& movers)
     : file_(file), source_(source), lod_(lod), kernels_(kernels_of(isa)), tables_(std::make_unique<Tables>()) {
   Tables& t = *tables_;
   static_cast<TracedTrees&>(t) = lod != nullptr ? chosen_trees(file, *lod, lod_trees_) : whole_trees(file);
+  t.deformed = DeformedTrees(file, deforming, config, t);
   find_first_instances();
   std::vector<Bounds> bounds;
   for (uint32_t g = 0; g < source.geometry_count(); ++g) bounds.push_back(bounds_of(g));
   t.placed.place(t, source, bounds, movers);
-  if (movers.instances.empty()) t.hulls = {};
+  if (movers.instances.empty() && deforming.empty()) t.hulls = {};
   t.scene.clusters = t.clusters.data();
   t.scene.trees = t.trees.data();
   t.placed.fill_in(t.scene);
@@ -97,6 +106,7 @@ void PackedTracer::find_first_instances() {
 /// Bounds of a geometry in object space; empty if it has no triangles.
 Bounds PackedTracer::bounds_of(uint32_t geometry) const {
   if (lod_ != nullptr) return lod_->bounds(geometry);
+  if (const DeformedTree* tree = tables_->deformed.find(geometry)) return tree->object_bounds();
   return object_bounds(file_.geometries()[geometry]);
 }
 
@@ -129,6 +139,46 @@ std::array<DVec3, 3> PackedTracer::object_vertices(const RayHit&, const HitSurfa
   std::array<DVec3, 3> vertices;
   for (size_t i = 0; i < 3; ++i) vertices[i] = transform_point(object_from_grid, DVec3(surface.vertices[i]));
   return vertices;
+}
+
+void PackedTracer::deform(std::span<const DeformedFrame> frames, std::span<DeformStep> steps) {
+  assert(steps.size() == frames.size());
+  Tables& t = *tables_;
+  std::vector<uint8_t> changed(t.trees.size(), 0);
+  for (size_t i = 0; i < frames.size(); ++i) {
+    steps[i] = t.deformed.update(frames[i], t);
+    const uint32_t tree = t.tree_of[frames[i].geometry];
+    if (t.records[tree].node_count == 0) continue;
+    t.hulls[tree].emplace(t.trees[tree].nodes);
+    changed[tree] = 1;
+  }
+  t.placed.refit(changed);
+  t.placed.fill_in(t.scene);
+  t.memory.forget_batches();
+}
+
+std::optional<std::array<DVec3, 3>> PackedTracer::previous_object_vertices(uint32_t geometry, uint32_t triangle) const {
+  const Tables& t = *tables_;
+  const DeformedTree* const deformed = lod_ == nullptr ? t.deformed.find(geometry) : nullptr;
+  if (deformed == nullptr) return std::nullopt;
+  const baked::GeometryRecord& record = file_.geometries()[geometry];
+  const std::span<const baked::ClusterRecord> clusters =
+      file_.sections().clusters.subspan(record.first_cluster, record.cluster_count);
+  const auto next = std::ranges::upper_bound(clusters, triangle, {}, &baked::ClusterRecord::first_triangle);
+  const auto cluster = static_cast<size_t>(next - clusters.begin() - 1);
+  Vec3 in_grid[3];
+  decode_vertices(deformed->previous_clusters()[cluster], triangle - clusters[cluster].first_triangle, in_grid);
+  const DAffine object_from_grid = t.object_from_grid(t.tree_of[geometry]);
+  std::array<DVec3, 3> vertices;
+  for (size_t i = 0; i < 3; ++i) vertices[i] = transform_point(object_from_grid, DVec3(in_grid[i]));
+  return vertices;
+}
+
+DeformStep PackedTracer::deform(uint32_t geometry, const FrameVertices& frame) {
+  const DeformedFrame one{geometry, &frame};
+  DeformStep step;
+  deform({&one, 1}, {&step, 1});
+  return step;
 }
 
 uint32_t PackedTracer::geometry_of_cluster(uint32_t cluster) const {
@@ -194,12 +244,25 @@ HitSurface PackedTracer::resolve(const RayHit& hit) const {
   return surface;
 }
 
+void PackedTracer::previous_vertices(const RayHit& hit, Vec3 (&vertices)[3]) const {
+  const Tables& t = *tables_;
+  const uint32_t geometry = geometry_of_cluster(hit.part);
+  if (const DeformedTree* tree = t.deformed.find(geometry)) {
+    const auto first = static_cast<uint32_t>(file_.geometries()[geometry].first_cluster);
+    decode_vertices(tree->previous_clusters()[hit.part - first], hit.triangle, vertices);
+    return;
+  }
+  const HitSurface surface = resolve(hit);
+  std::copy(std::begin(surface.vertices), std::end(surface.vertices), std::begin(vertices));
+}
+
 std::vector<ResidentPart> PackedTracer::resident() const {
   const Tables& t = *tables_;
   uint64_t hull_bytes = 0;
   for (const std::optional<TreeHull>& hull : t.hulls) hull_bytes += hull ? hull->bytes() : 0;
   return {{"file", file_.file_bytes(), true},
           {"nodes built", t.built.nodes.size() * sizeof(baked::PackedNode)},
+          {"deforming geometry", t.deformed.bytes()},
           {"cluster table", t.clusters.size() * sizeof(packed::TraceCluster)},
           {"placements", t.placed.bytes() + hull_bytes +
                              (t.tree_of.size() + t.grid_of.size() + t.first_instance.size()) * sizeof(uint32_t)},

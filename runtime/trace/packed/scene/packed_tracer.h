@@ -1,10 +1,13 @@
 #pragma once
 
+#include <array>
 #include <memory>
+#include <optional>
 
 #include "compress/format/file/baked_file.h"
 #include "runtime/trace/movers.h"
 #include "runtime/trace/packed/kernels/isa.h"
+#include "runtime/trace/packed/scene/deformed_trees.h"
 #include "runtime/trace/packed/scene/traced_trees.h"
 #include "runtime/trace/ray_tracer.h"
 
@@ -23,6 +26,12 @@ public:
   /// Does the same at the detail of a plan: builds one tree per BLAS, except that all world-space geometries, which
   /// have one instance each, share one tree.
   PackedTracer(const BakedFile& file, const LodSource& source, PackedIsa isa = chosen_isa(), const Movers& movers = {});
+  /// Traces geometries whose vertices move: each has clusters and nodes of its own, which deform() changes. They begin
+  /// with the vertices of the file.
+  /// @param deforming distinct geometries with clusters that have trees of their own (none in the world's tree)
+  /// Also throws Error(kInput) for other geometries, and as DeformedTree's constructor does.
+  PackedTracer(const BakedFile& file, const SceneSource& source, std::span<const DeformingGeometry> deforming,
+               const DeformConfig& config = {}, PackedIsa isa = chosen_isa(), const Movers& movers = {});
   ~PackedTracer() override;
   PackedTracer(const PackedTracer&) = delete;
   PackedTracer& operator=(const PackedTracer&) = delete;
@@ -45,6 +54,20 @@ public:
 
   std::span<const uint32_t> flat_instances() const override;
 
+  /// Moves the vertices of a deforming geometry, in all its instances, to a new frame. space() stays: it holds the
+  /// ranges of all deforming geometries. Not while other threads trace.
+  /// @param geometry was given to the constructor
+  /// Throws as DeformedTree::update() does.
+  DeformStep deform(uint32_t geometry, const FrameVertices& frame);
+  /// Like deform() for several geometries; the tree over placements is updated once.
+  void deform(std::span<const DeformedFrame> frames, std::span<DeformStep> steps);
+
+  /// The vertices of the triangle of a hit in the frame before, in the surface's coordinates; those of resolve() if its
+  /// geometry does not deform or has had one frame only.
+  void previous_vertices(const RayHit& hit, Vec3 (&vertices)[3]) const;
+  /// The object-space vertices of a triangle in the frame before; none if its geometry does not deform.
+  std::optional<std::array<DVec3, 3>> previous_object_vertices(uint32_t geometry, uint32_t triangle) const;
+
   /// Build times and sizes of the trees; empty unless the source is a LodSource.
   const LodTrees& lod_trees() const { return lod_trees_; }
 
@@ -63,7 +86,8 @@ public:
 private:
   struct Tables;
 
-  PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod, PackedIsa isa,
+  PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod,
+               std::span<const DeformingGeometry> deforming, const DeformConfig& config, PackedIsa isa,
                const Movers& movers);
   void set_callbacks();
   void find_first_instances();

@@ -55,6 +55,8 @@ packed::ThreadMemory& ThreadMemoryOwner::of_this_thread(uint32_t top_depth) cons
   return memory.view;
 }
 
+void ThreadMemoryOwner::forget_batches() { number_ = next_owner++; }
+
 uint64_t ThreadMemoryOwner::bytes_of_all_threads() { return all_bytes; }
 
 } // namespace packtrace

@@ -20,6 +20,9 @@ public:
   /// streams
   packed::ThreadMemory& of_this_thread(uint32_t top_depth) const;
 
+  /// Forgets all cached batches: the clusters that they were decoded from have changed. Not while kernels run.
+  void forget_batches();
+
   /// Bytes that all live threads keep, for any owner.
   static uint64_t bytes_of_all_threads();
 

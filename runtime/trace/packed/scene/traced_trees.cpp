@@ -40,15 +40,9 @@ bool needs_graded_pads(std::span<const baked::PackedNode> nodes, float max_coord
 
 void add_tree(TracedTrees& t, uint32_t number) {
   const baked::TreeRecord& record = t.records[number];
-  packed::TraceTree tree{t.nodes.data() + record.first_node, 1.0f, 0};
-  if (record.node_count > 0) {
-    t.hulls[number].emplace(tree.nodes);
-    const DVec3 far = glm::max(glm::abs(t.hulls[number]->lo()), glm::abs(t.hulls[number]->hi()));
-    tree.max_coordinate =
-        std::max({1.0f, static_cast<float>(far.x), static_cast<float>(far.y), static_cast<float>(far.z)});
-    tree.graded = needs_graded_pads({tree.nodes, record.node_count}, tree.max_coordinate) ? 1 : 0;
-  }
-  t.trees.push_back(tree);
+  const auto nodes = t.nodes.subspan(static_cast<size_t>(record.first_node), record.node_count);
+  if (!nodes.empty()) t.hulls[number].emplace(nodes.data());
+  t.trees.push_back(nodes.empty() ? packed::TraceTree{nodes.data(), 1.0f, 0} : trace_tree(nodes, *t.hulls[number]));
 }
 
 /// Fills in the clusters of geometry g.
@@ -85,6 +79,15 @@ DAffine TracedTrees::object_from_grid(uint32_t tree) const {
   const DVec3 origin(static_cast<double>(record.origin[0]), static_cast<double>(record.origin[1]),
                      static_cast<double>(record.origin[2]));
   return DAffine(DVec3(step, 0, 0), DVec3(0, step, 0), DVec3(0, 0, step), origin * step);
+}
+
+packed::TraceTree trace_tree(std::span<const baked::PackedNode> nodes, const TreeHull& hull) {
+  const DVec3 far = glm::max(glm::abs(hull.lo()), glm::abs(hull.hi()));
+  packed::TraceTree tree{nodes.data(), 1.0f, 0};
+  tree.max_coordinate =
+      std::max({1.0f, static_cast<float>(far.x), static_cast<float>(far.y), static_cast<float>(far.z)});
+  tree.graded = needs_graded_pads(nodes, tree.max_coordinate) ? 1 : 0;
+  return tree;
 }
 
 TracedTrees whole_trees(const BakedFile& file) {

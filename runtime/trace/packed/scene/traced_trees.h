@@ -36,6 +36,11 @@ struct LodTrees {
   std::vector<TreeBytes> trees; ///< worst cases are known before the trees are built
 };
 
+/// Returns a tree as kernels read it.
+/// @param nodes of one tree, root first; not empty
+/// @param hull of these nodes
+packed::TraceTree trace_tree(std::span<const baked::PackedNode> nodes, const TreeHull& hull);
+
 /// Returns the trees over LOD level 0: the file's trees, or trees built here if it holds none.
 /// @param file must outlive the result
 TracedTrees whole_trees(const BakedFile& file);
