@@ -30,8 +30,8 @@ struct BakeOptions {
   std::optional<uint32_t> lod_min_triangles, lod_levels;
   std::string resume;
   std::optional<std::string> codec;   ///< none unless set
-  std::optional<std::string> motion; ///< keep unless set
-  std::string keys;                  ///< file of keys; empty: none
+  std::optional<std::string> motion;  ///< keep unless set
+  std::string keys;                   ///< file of keys; empty: none
   std::vector<std::string> sequences; ///< patterns of PLY files, see FramePattern
   std::optional<double> sequence_fps;
   std::optional<int64_t> sequence_start;

@@ -100,7 +100,7 @@ std::string bake_text(const BakeReport& baked) {
                          ? std::string("no normals stored")
                          : fmt::format("maximum normal error {:.4f} degrees", baked.max_normal_error_degrees)) +
          motion_text(baked.file.motion) + collapsed_text(baked.file) + notable_text(baked) +
-         sequences_text(baked.file) +          dropped_streams_text(baked.file);
+         sequences_text(baked.file) + dropped_streams_text(baked.file);
 }
 
 std::string precision_warning(const BakeReport& baked, bool chosen) {

@@ -20,8 +20,7 @@ ImageSize parse_size(const std::string& text) {
   const std::string_view view(text);
   const auto width = cross == std::string::npos ? std::nullopt : whole_number(view.substr(0, cross));
   const auto height = width ? whole_number(view.substr(cross + 1)) : std::nullopt;
-  if (!height)
-    throw Error(ErrorKind::kUsage, "--size " + text + ": write WIDTHxHEIGHT, for example 1280x720");
+  if (!height) throw Error(ErrorKind::kUsage, "--size " + text + ": write WIDTHxHEIGHT, for example 1280x720");
   return {*width, *height};
 }
 

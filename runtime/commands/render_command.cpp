@@ -29,8 +29,7 @@ namespace {
 /// Renders the camera, or the whole scene if the scene's own camera sees nothing of it.
 PictureReport render_chosen(const RenderOptions& options, const GlobalOptions& globals, const LoadedScene& loaded,
                             FrameLoop& loop, const StillConfig& config, double time_s, ChosenCamera& camera,
-                            RenderedImage& image,
-                            Progress& progress) {
+                            RenderedImage& image, Progress& progress) {
   return with_file(options.input, [&] {
     const bool may_replace = !options.camera && camera.index;
     PictureReport report = render_still(loop, camera.camera, time_s, config.frames, may_replace, image, progress);
@@ -85,7 +84,8 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   FileTimings timings;
   timings.load_s = setup.load_s;
   RenderedImage image;
-  const PictureReport report = render_chosen(options, globals, loaded, loop, config, setup.time_s, camera, image, progress);
+  const PictureReport report =
+      render_chosen(options, globals, loaded, loop, config, setup.time_s, camera, image, progress);
   display.finish();
 
   const Stopwatch writing;

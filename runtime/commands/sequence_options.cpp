@@ -83,7 +83,9 @@ void add_sequence_options(CLI::App& verb, SequenceOptions& options) {
                   "Move instances by the keys of a JSON file (docs/motion.md), in addition to the scene's own motion")
       ->type_name("FILE")
       ->group(kGroup);
-  verb.add_option("--start-time", options.start_time, "Time of the still or of the first picture in seconds (default: the first key of the path, else of the scene's motion). A still without it shows "
+  verb.add_option("--start-time", options.start_time,
+                  "Time of the still or of the first picture in seconds (default: the first key of the path, else of "
+                  "the scene's motion). A still without it shows "
                   "the scene at rest")
       ->type_name("S")
       ->group(kGroup);
@@ -106,8 +108,7 @@ void add_sequence_options(CLI::App& verb, SequenceOptions& options) {
 
 void validate(const SequenceOptions& options) {
   if (!options.path &&
-      (options.fps || options.subframes || options.resume || options.checkpoint ||
-       options.stream || options.csv))
+      (options.fps || options.subframes || options.resume || options.checkpoint || options.stream || options.csv))
     throw Error(ErrorKind::kUsage, "--fps, --subframes, --resume, --checkpoint, --stream and --csv require --path");
   if (options.checkpoint && !(*options.checkpoint >= 0.0))
     throw Error(ErrorKind::kUsage, "--checkpoint: must be a number of seconds, 0 or more");
@@ -120,7 +121,8 @@ void validate(const SequenceOptions& options) {
 }
 
 Sequence make_sequence(const SequenceOptions& options, std::optional<uint64_t> pictures, const SceneSource& source,
-                       const Camera& camera, std::optional<uint32_t> index, FrameLoop& loop) {
+                       const Camera& camera, std::optional<uint32_t> index, FrameLoop& loop,
+                       const MemoryBudget& memory) {
   Sequence sequence;
   sequence.fps = options.fps.value_or(sequence.fps);
   sequence.subframes = options.subframes.value_or(sequence.subframes);
@@ -145,14 +147,15 @@ Sequence make_sequence(const SequenceOptions& options, std::optional<uint64_t> p
   } else if (path == "orbit" || path.starts_with("orbit:")) {
     const double degrees = orbit_degrees(path);
     const DVec3 forward = glm::normalize(DVec3(camera.world_from_camera[2]));
-    const DVec3 pivot = DVec3(camera.world_from_camera[3]) + forward * view_distance(camera, sequence.start_s, source, loop);
+    const DVec3 pivot =
+        DVec3(camera.world_from_camera[3]) + forward * view_distance(camera, sequence.start_s, source, loop);
     sequence.camera = turning(camera, pivot, nearest_up_axis(camera), degrees, sequence.pictures);
   } else {
     if (ending_of(path) != ".json")
       throw Error(ErrorKind::kUsage, fmt::format("--path {}: must be orbit, orbit:DEGREES, turntable, scene or a .json "
                                                  "file of camera keys",
                                                  path));
-    const CameraPath keys = read_camera_path(path, camera, source.origin());
+    const CameraPath keys = read_camera_path(path, camera, source.origin(), memory);
     if (!options.start_time) sequence.start_s = keys.begin_s();
     if (!pictures) sequence.pictures = default_pictures(keys.end_s() - sequence.start_s, sequence.fps);
     const double start_s = sequence.start_s, fps = sequence.fps;

@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "pbrt_import/base/memory_budget.h"
 #include "runtime/frame/frame_loop.h"
 
 namespace packtrace {
@@ -19,7 +20,7 @@ struct SequenceOptions {
   std::optional<double> start_time;
   std::optional<std::string> keys; ///< file of motion keys
   bool resume = false;
-  std::optional<double> checkpoint; ///< seconds
+  std::optional<double> checkpoint;  ///< seconds
   std::optional<std::string> stream; ///< format on standard output
   std::optional<std::string> csv;
 };
@@ -48,6 +49,7 @@ struct Sequence {
 /// @param loop a frame loop of the scene; renders a frame to find what an orbit turns about, and is reset
 /// Throws Error(kUsage) for options out of range, and like read_camera_path().
 Sequence make_sequence(const SequenceOptions& options, std::optional<uint64_t> pictures, const SceneSource& source,
-                       const Camera& camera, std::optional<uint32_t> index, FrameLoop& loop);
+                       const Camera& camera, std::optional<uint32_t> index, FrameLoop& loop,
+                       const MemoryBudget& memory);
 
 } // namespace packtrace

@@ -104,7 +104,8 @@ uint64_t resume_sequence(const SequenceCheckpoint& checkpoint, const Sequence& s
 
 /// Renders and writes the pictures from `first` on. Returns their reports.
 std::vector<PictureRow> render_pictures(const Sequence& sequence, uint64_t first, RenderSetup& setup,
-                                        SequenceOutputs& outputs, CsvOutput& csv, const SequenceCheckpoint* checkpoint, double checkpoint_s, Progress& progress) {
+                                        SequenceOutputs& outputs, CsvOutput& csv, const SequenceCheckpoint* checkpoint,
+                                        double checkpoint_s, Progress& progress) {
   FrameLoop& loop = *setup.loop;
   const ExrAttributes attributes{{"comments", std::string("packtrace render")},
                                  {"aoRadius", static_cast<double>(setup.config.ao.radius)},
@@ -115,7 +116,8 @@ std::vector<PictureRow> render_pictures(const Sequence& sequence, uint64_t first
   Stopwatch since_checkpoint;
   progress.begin("pictures", (sequence.pictures - first) * sequence.subframes * loop.frame_pixels());
   for (uint64_t picture = first; picture < sequence.pictures; ++picture) {
-    const PictureReport report = render_picture(loop, sequence.camera(picture), sequence.time_s(picture), sequence.subframes, image, progress);
+    const PictureReport report =
+        render_picture(loop, sequence.camera(picture), sequence.time_s(picture), sequence.subframes, image, progress);
     const Stopwatch writing;
     outputs.write(picture, sequence.fps, image, attributes);
     PictureRow row(picture, sequence.time_s(picture), report, loop.detail());
@@ -154,7 +156,7 @@ int render_sequence(const RenderOptions& options, const GlobalOptions& globals) 
   RenderSetup setup(options, globals, outputs.has_lod_layers(), false, progress, display);
   const Sequence sequence = with_file(options.input, [&] {
     return make_sequence(options.sequence, options.frames, *setup.loaded.source, setup.camera.camera,
-                         setup.camera.index, *setup.loop);
+                         setup.camera.index, *setup.loop, globals.memory);
   });
   outputs.check(sequence.pictures);
   std::optional<SequenceCheckpoint> checkpoint;

@@ -22,19 +22,6 @@ bool has_view(const CameraKey& key) {
   return size > 0.0 && std::isfinite(size) && glm::length(glm::cross(view, key.up)) > kMinSine * size;
 }
 
-void check_key(const std::vector<CameraKey>& keys, size_t i) {
-  const CameraKey& key = keys[i];
-  const auto fail = [&](const char* what) {
-    throw Error(ErrorKind::kUsage, std::string("key ").append(std::to_string(i)).append(": ").append(what));
-  };
-  if (!std::isfinite(key.time_s) || !finite_vector(key.position) || !finite_vector(key.look) || !finite_vector(key.up))
-    fail("all numbers must be finite");
-  if (i > 0 && !(key.time_s > keys[i - 1].time_s)) fail("its time is not after that of the key before");
-  if (!(key.fov_degrees > 0.0 && key.fov_degrees < 180.0)) fail("fov must be between 0 and 180 degrees");
-  if (glm::length(key.look - key.position) == 0.0) fail("it looks at its own position");
-  if (!has_view(key)) fail("up is parallel to the view, or zero");
-}
-
 /// A cubic Hermite spline over one span of keys.
 struct HermiteSpan {
   double before_s, begin_s, end_s, after_s, t; ///< t in [0, 1]
@@ -51,9 +38,22 @@ struct HermiteSpan {
 
 } // namespace
 
+std::string camera_key_problem(std::span<const CameraKey> keys, size_t index) {
+  const CameraKey& key = keys[index];
+  if (!std::isfinite(key.time_s) || !finite_vector(key.position) || !finite_vector(key.look) || !finite_vector(key.up))
+    return "all numbers must be finite";
+  if (index > 0 && !(key.time_s > keys[index - 1].time_s)) return "its time is not after that of the key before";
+  if (!(key.fov_degrees > 0.0 && key.fov_degrees < 180.0)) return "fov must be between 0 and 180 degrees";
+  if (glm::length(key.look - key.position) == 0.0) return "it looks at its own position";
+  if (!has_view(key)) return "up is parallel to the view, or zero";
+  return {};
+}
+
 CameraPath::CameraPath(std::vector<CameraKey> keys, const Camera& base) : keys_(std::move(keys)), base_(base) {
   if (keys_.size() < 2) throw Error(ErrorKind::kUsage, "a camera path needs at least two keys");
-  for (size_t i = 0; i < keys_.size(); ++i) check_key(keys_, i);
+  for (size_t i = 0; i < keys_.size(); ++i)
+    if (const std::string problem = camera_key_problem(keys_, i); !problem.empty())
+      throw Error(ErrorKind::kUsage, std::string("key ").append(std::to_string(i)).append(": ").append(problem));
   base_.animation = kNotAnimated;
 }
 

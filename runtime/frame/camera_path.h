@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+#include <string>
 #include <vector>
 
 #include "pbrt_import/scene/scene.h"
@@ -15,6 +17,10 @@ struct CameraKey {
   double fov_degrees = 60.0; ///< perspective cameras: across the shorter image axis
 };
 
+/// Returns what is wrong with a key and its predecessor: non-finite values, a time that does not ascend, a look at the
+/// position, an up along the view, a field of view outside (0, 180). Empty if nothing is.
+std::string camera_key_problem(std::span<const CameraKey> keys, size_t index);
+
 /// A camera that moves through keys. Positions, looks, ups and fields of view are interpolated by cubic Hermite splines
 /// with Catmull-Rom tangents for keys at any times, so that the camera passes every key and its velocity is continuous.
 /// Before the first and after the last key the camera stands still.
@@ -23,8 +29,7 @@ class CameraPath {
 public:
   /// @param keys at least two, at ascending times
   /// @param base projection, screen window and film; its handedness is kept
-  /// Throws Error(kUsage) that names the key, from 0: non-finite values, times that do not ascend, a look at the
-  /// position, an up along the view, a field of view outside (0, 180).
+  /// Throws Error(kUsage) for a camera_key_problem(), with the number of the key, from 0.
   CameraPath(std::vector<CameraKey> keys, const Camera& base);
 
   double begin_s() const { return keys_.front().time_s; }

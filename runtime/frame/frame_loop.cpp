@@ -25,8 +25,7 @@ uint64_t count_hits(const GBuffer& g) {
 class DeformedSurfaces final : public SurfaceHistory {
 public:
   DeformedSurfaces(const SceneSource& source, const PackedTracer& tracer) : source_(source), tracer_(tracer) {}
-  std::optional<DVec3> previous_position(uint32_t instance, uint32_t triangle,
-                                         glm::dvec2 barycentrics) const override {
+  std::optional<DVec3> previous_position(uint32_t instance, uint32_t triangle, glm::dvec2 barycentrics) const override {
     const auto v = tracer_.previous_object_vertices(source_.instances()[instance].geometry, triangle);
     if (!v) return std::nullopt;
     return (*v)[0] + ((*v)[1] - (*v)[0]) * barycentrics.x + ((*v)[2] - (*v)[0]) * barycentrics.y;
@@ -60,7 +59,8 @@ glm::dvec2 jitter_offset(uint32_t frame) {
 }
 
 PassTimes& PassTimes::operator+=(const PassTimes& other) {
-  update_s += other.update_s, plan_s += other.plan_s, build_s += other.build_s, primary_s += other.primary_s, ao_s += other.ao_s;
+  update_s += other.update_s, plan_s += other.plan_s, build_s += other.build_s, primary_s += other.primary_s,
+      ao_s += other.ao_s;
   denoise_s += other.denoise_s, upsample_s += other.upsample_s, resolve_s += other.resolve_s;
   return *this;
 }
@@ -283,7 +283,8 @@ void FrameLoop::trace_camera_rays(const PrimaryCamera& view) {
   const bool moved_on = report_.moved && view_; // not the first frame
   std::optional<DeformedSurfaces> surfaces;
   if (moved_on && meshes_) surfaces.emplace(source, static_cast<const PackedTracer&>(tracer));
-  const PreviousFrame before{moved_on ? *view_ : view, moved_on ? std::span<const Affine>(last_world_) : std::span<const Affine>(),
+  const PreviousFrame before{moved_on ? *view_ : view,
+                             moved_on ? std::span<const Affine>(last_world_) : std::span<const Affine>(),
                              surfaces ? &*surfaces : nullptr};
   trace_primary(source, tracer, view, before, gbuffer_, unseen);
   report_.times.primary_s = tracing.seconds();
@@ -333,7 +334,9 @@ PrimaryCamera FrameLoop::view_of(const Camera& camera, uint32_t still_frame) con
 }
 
 const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Progress& progress) {
-  report_ = {.number = next_number_, .hit_pixels = report_.hit_pixels};
+  const uint64_t last_hits = report_.hit_pixels; // stays unless camera rays are traced
+  report_ = {};
+  report_.number = next_number_, report_.hit_pixels = last_hits;
   const bool posed = pose_instances(time_s), deformed = deform_meshes(time_s);
   const bool moved = report_.moved = !view_ || posed || deformed || !same_camera(camera, *camera_);
   still_frames_ = moved ? 0 : still_frames_ + 1;

@@ -30,7 +30,7 @@ struct FrameScene {
 
 /// Wall times of a frame's passes in seconds.
 struct PassTimes {
-  double update_s = 0;  ///< transforms of moving instances, and the tree over placements
+  double update_s = 0;   ///< transforms of moving instances, and the tree over placements
   double plan_s = 0;     ///< choice of LOD cuts and their clusters
   double build_s = 0;    ///< decoding and BVH construction
   double primary_s = 0;  ///< camera rays
@@ -51,8 +51,8 @@ struct FrameReport {
   PassTimes times;
   uint64_t primary_rays = 0, ao_rays = 0;
   uint32_t rebuilt_trees = 0; ///< trees of deforming meshes that were rebuilt instead of refitted
-  uint64_t hit_pixels = 0; ///< traced pixels whose camera ray hits
-  bool rebuilt = false;    ///< the LOD plan needed other trees
+  uint64_t hit_pixels = 0;    ///< traced pixels whose camera ray hits
+  bool rebuilt = false;       ///< the LOD plan needed other trees
 };
 
 /// Sums over the frames of a picture.
@@ -130,10 +130,10 @@ private:
   std::unique_ptr<RayTracer> level_0_;      ///< null if only levels are traced
   std::unique_ptr<RayTracer> level_tracer_; ///< traces planner_->source()
 
-  std::unique_ptr<MeshMotion> meshes_; ///< null if no mesh deforms
+  std::unique_ptr<MeshMotion> meshes_;   ///< null if no mesh deforms
   std::vector<Affine> pose_, last_pose_; ///< by SceneMotion::moving_instances(): of this frame and the previous one
-  std::vector<Affine> last_world_;       ///< world_from_object of all instances in the previous frame; empty: none moves
-  std::optional<Camera> camera_;         ///< of the previous frame
+  std::vector<Affine> last_world_; ///< world_from_object of all instances in the previous frame; empty: none moves
+  std::optional<Camera> camera_;   ///< of the previous frame
   std::optional<PrimaryCamera> view_;
   uint64_t next_number_ = 0;
   uint32_t still_frames_ = 0; ///< frames since something moved, without the first

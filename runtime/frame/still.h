@@ -22,7 +22,7 @@ PictureReport render_picture(FrameLoop& loop, const Camera& camera, double time_
 /// depend on the number of threads.
 /// @param stop_if_nothing_visible return after a first frame whose camera rays all miss; the image is then empty
 /// Throws as FrameLoop::next_frame() does.
-PictureReport render_still(FrameLoop& loop, const Camera& camera, double time_s, uint32_t frames, bool stop_if_nothing_visible,
-                           RenderedImage& image, Progress& progress);
+PictureReport render_still(FrameLoop& loop, const Camera& camera, double time_s, uint32_t frames,
+                           bool stop_if_nothing_visible, RenderedImage& image, Progress& progress);
 
 } // namespace packtrace

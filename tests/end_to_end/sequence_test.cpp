@@ -46,9 +46,9 @@ TEST(Sequences, PathsGiveNumberedPictures) {
   const SequenceBench bench;
   const std::string path = bench.write_path(keys_text(kSecondKey));
   for (const std::string name : {"orbit:30", "turntable", "scene", path.c_str()}) {
-    const CommandResult result = bench.render({"--path", name, "--frames", "3", "--subframes", "2", "-o",
-                                               bench / "a_%03d.png", "--force", "--csv", bench / "a.csv", "--json",
-                                               bench / "a.json"});
+    const CommandResult result =
+        bench.render({"--path", name, "--frames", "3", "--subframes", "2", "-o", bench / "a_%03d.png", "--force",
+                      "--csv", bench / "a.csv", "--json", bench / "a.json"});
     ASSERT_EQ(result.exit_code, 0) << result.err;
     for (const char* file : {"a_000.png", "a_001.png", "a_002.png"})
       EXPECT_GT(std::filesystem::file_size(bench / file), 100u);
@@ -76,8 +76,9 @@ TEST(Sequences, BytesDoNotDependOnTheNumberOfThreads) {
   const SequenceBench bench;
   for (const char* threads : {"1", "3"}) {
     const std::string pattern = bench / (std::string("t") + threads + "_%d.png");
-    ASSERT_EQ(bench.render({"--path", "orbit:20", "--frames", "4", "--subframes", "3", "-o", pattern, "--threads",
-                            threads, "-q"})
+    ASSERT_EQ(bench
+                  .render({"--path", "orbit:20", "--frames", "4", "--subframes", "3", "-o", pattern, "--threads",
+                           threads, "-q"})
                   .exit_code,
               0);
   }
@@ -87,9 +88,9 @@ TEST(Sequences, BytesDoNotDependOnTheNumberOfThreads) {
 TEST(Sequences, ResumedOnesHaveTheSameBytes) {
   const SequenceBench bench;
   const auto render = [&](const std::string& pattern, const std::vector<std::string>& more) {
-    std::vector<std::string> arguments{"render", bench.baked(), "--size",  "48x32",       "--path", "orbit:20",
-                                       "--frames", "6",         "--subframes", "3",       "-o",     bench / pattern,
-                                       "-q"};
+    std::vector<std::string> arguments{"render",   bench.baked(),   "--size", "48x32",       "--path",
+                                       "orbit:20", "--frames",      "6",      "--subframes", "3",
+                                       "-o",       bench / pattern, "-q"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run_packtrace(arguments);
   };
@@ -120,7 +121,8 @@ TEST(Sequences, ResumedOnesHaveTheSameBytes) {
 
 TEST(Sequences, VideoHasAFrameForEachPicture) {
   const SequenceBench bench;
-  const std::vector<std::string> common{"--path", "orbit:20", "--frames", "3", "--subframes", "1", "--fps", "29.97002997"};
+  const std::vector<std::string> common{"--path",      "orbit:20", "--frames", "3",
+                                        "--subframes", "1",        "--fps",    "29.97002997"};
   std::vector<std::string> file = common, stream = common, images = common;
   file.insert(file.end(), {"-o", bench / "v.y4m", "-q"});
   ASSERT_EQ(bench.render(file).exit_code, 0);

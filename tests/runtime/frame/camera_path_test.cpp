@@ -39,7 +39,7 @@ TEST(CameraPath, PassesItsKeys) {
     const std::optional<ProjectedPoint> looked_at = view.project(key.look);
     ASSERT_TRUE(looked_at);
     EXPECT_LT(glm::distance(looked_at->pixel, glm::dvec2(32, 24)), 1e-9); // in the middle of the image
-    EXPECT_LT(view.project(key.look + DVec3(0, 0.1, 0))->pixel.y, 24.0); // up is up
+    EXPECT_LT(view.project(key.look + DVec3(0, 0.1, 0))->pixel.y, 24.0);  // up is up
   }
 }
 
@@ -61,9 +61,9 @@ TEST(CameraPath, VelocityIsContinuousAtKeys) {
 }
 
 TEST(CameraPath, EqualStepsOnALineMoveEvenly) {
-  const CameraPath path({key_at(0, DVec3(0, 1, -5)), key_at(1, DVec3(1, 1, -5)), key_at(3, DVec3(3, 1, -5)),
-                         key_at(4, DVec3(4, 1, -5))},
-                        Camera());
+  const CameraPath path(
+      {key_at(0, DVec3(0, 1, -5)), key_at(1, DVec3(1, 1, -5)), key_at(3, DVec3(3, 1, -5)), key_at(4, DVec3(4, 1, -5))},
+      Camera());
   for (double t = 0.0; t <= 4.0; t += 0.25) EXPECT_NEAR(eye_of(path.at(t)).x, t, 1e-12) << t;
 }
 
