@@ -17,9 +17,11 @@ namespace {
 struct TextPlace {
   uint32_t line = 1, column = 1;             // of the next character
   uint32_t token_line = 1, token_column = 1; // begin of the last value, name or bracket that opens
+  uint32_t last_line = 1, last_column = 1;   // of the last character
   bool in_string = false, escaped = false, in_token = false;
 
   void take(char c) {
+    last_line = line, last_column = column;
     if (in_string) {
       if (escaped)
         escaped = false;
@@ -112,7 +114,9 @@ public:
     if (const size_t end = what.find("] "); end != std::string::npos) what.erase(0, end + 2);
     if (const size_t end = what.find(": "); what.starts_with("parse error at") && end != std::string::npos)
       what.erase(0, end + 2);
-    fail_here(what);
+    constexpr int kOutOfRange = 406; // a number, whose place is its begin
+    if (error.id == kOutOfRange) fail_here(what);
+    fail_at(place_.last_line, place_.last_column, what);
   }
 
 private:
@@ -122,8 +126,12 @@ private:
   };
 
   [[noreturn]] void fail_here(const std::string& problem) const {
+    fail_at(place_.token_line, place_.token_column, problem);
+  }
+
+  [[noreturn]] void fail_at(uint32_t line, uint32_t column, const std::string& problem) const {
     JsonValue here;
-    here.line = place_.token_line, here.column = place_.token_column;
+    here.line = line, here.column = column;
     tree_.fail(here, problem);
   }
 

@@ -52,7 +52,8 @@ TEST_F(SceneOptions, InfoTellsOfTheFirstWorldAtItsStart) {
   EXPECT_EQ(info["bounds"]["hi"][0], 1.0);
   EXPECT_EQ(info["shapes"], nlohmann::json({{"trianglemesh", 1}}));
   EXPECT_EQ(info["materials_by_kind"], nlohmann::json({{"glass", 1}}));
-  EXPECT_EQ(info["animated"], nlohmann::json({{"shapes", 1}, {"instances", 0}, {"cameras", 0}}));
+  EXPECT_EQ(info["animated"],
+            nlohmann::json({{"shapes", 1}, {"instances", 0}, {"cameras", 0}, {"begin_s", 2.0}, {"end_s", 4.0}}));
   EXPECT_EQ(info["ignored"], nlohmann::json({{"light_sources", 1}}));
   ASSERT_EQ(info["camera_list"].size(), 1u);
   EXPECT_EQ(info["camera_list"][0]["projection"], "perspective");
@@ -64,10 +65,10 @@ TEST_F(SceneOptions, InfoTellsOfTheFirstWorldAtItsStart) {
 TEST_F(SceneOptions, InfoSaysTheSameInText) {
   const CommandResult result = run_packtrace({"info", scene_, "--time", "3"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  for (const char* part :
-       {"shapes   trianglemesh 1   (0 skipped, 0 absent)", "materials by kind   glass 1\n",
-        "camera   perspective 10x3 \"a.exr\"\n", "world 1 of 2\n",
-        "animated   shapes 1   instances 0   cameras 0   (evaluated at time 3)\n", "ignored   light sources 1\n"})
+  for (const char* part : {"shapes   trianglemesh 1   (0 skipped, 0 absent)", "materials by kind   glass 1\n",
+                           "camera   perspective 10x3 \"a.exr\"\n", "world 1 of 2\n",
+                           "animated   shapes 1   instances 0   cameras 0   from time 2 to 4 (shown at 3)\n",
+                           "ignored   light sources 1\n"})
     EXPECT_NE(result.out.find(part), std::string::npos) << part << "\nis not in\n" << result.out;
 }
 

@@ -11,6 +11,8 @@
 #include "compress/format/deformation/deformation_player.h"
 #include "compress/format/file/baked_file.h"
 #include "compress/format/file/file_summary.h"
+#include "compress/format/motion/motion_stream.h"
+#include "pbrt_import/scene/motion_pose.h"
 #include "tests/fuzz/baked_input.h"
 
 namespace packtrace::fuzz {
@@ -135,6 +137,19 @@ void read_frames(const BakedFile& file) {
   }
 }
 
+void read_motion(const BakedFile& file) {
+  RigidMotion motion;
+  require(!unpack_rigid_motion(file.sections().rigid_motion, motion), "motion");
+  const TimeSpan span = time_span(motion);
+  for (const InstanceMotion& moving : motion.instances) {
+    require(moving.instance < file.instances().size(), "number of a moving instance");
+    for (const double time : {span.begin_s, 0.5 * span.begin_s + 0.5 * span.end_s, span.end_s}) {
+      const Affine map(pose(motion, moving, file.world_from_object(moving.instance), time));
+      for (int column = 0; column < 4; ++column) require(is_finite(map[column]), "pose");
+    }
+  }
+}
+
 void read_rest(const BakedFile& file) {
   for (uint32_t i = 0; i < file.instances().size(); ++i) {
     const Affine map = file.world_from_object(i);
@@ -160,6 +175,7 @@ void read_rest(const BakedFile& file) {
   require(file.cameras().size() == file.sections().cameras.size(), "number of cameras");
   (void)file.world_bounds();
   read_frames(file);
+  read_motion(file);
   require(summarize(file).bytes.total == file.file_bytes(), "summary of the file");
 }
 

@@ -11,6 +11,7 @@
 #include "compress/bake/bake_scene.h"
 #include "pbrt_import/base/file_bytes.h"
 #include "pbrt_import/import_scene.h"
+#include "pbrt_import/scene/separate_motion.h"
 #include "tests/fuzz/scene_files.h"
 
 namespace {
@@ -26,7 +27,9 @@ Scene read_scene(const std::filesystem::path& input) {
   options.tessellation_tolerance = 0.1; // coarse tessellation: in small files, small changes matter more
   Diagnostics diagnostics;
   Progress progress;
-  return import_scene(files.write(text), options, diagnostics, progress).scene;
+  Scene scene = import_scene(files.write(text), options, diagnostics, progress).scene;
+  separate_motion(scene);
+  return scene;
 }
 
 /// Five frames of a mesh that is sheared.

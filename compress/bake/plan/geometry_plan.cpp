@@ -252,7 +252,6 @@ private:
     const auto [found, inserted] = geometry_with_.try_emplace(content_key({&shape, 1}), next);
     if (inserted) add_geometry(plan_of(scene_.meshes[shape.mesh].name, {&shape, 1}));
     plan_.shared_shapes += !inserted;
-    ++plan_.instanced_shapes;
     add_instance(found->second, add_user(found->second, {&shape, 1}), placement);
   }
 

@@ -106,7 +106,9 @@ glm::dquat read_rotation(MotionReader& in, uint32_t bits) {
   double squares = 0.0;
   for (int i = 0; i < 4; ++i) {
     if (i == largest) continue;
-    q[static_cast<size_t>(i)] = rotation_component(in.field(bits), bits);
+    const uint64_t field = in.field(bits);
+    if (field > 2 * rotation_middle(bits)) throw Damaged{"rotation"};
+    q[static_cast<size_t>(i)] = rotation_component(field, bits);
     squares += q[static_cast<size_t>(i)] * q[static_cast<size_t>(i)];
   }
   const double rest = std::sqrt(std::max(1.0 - squares, 0.0));

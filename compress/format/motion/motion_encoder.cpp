@@ -129,11 +129,11 @@ void put_rotation(BitWriter& out, const glm::dquat& rotation, uint32_t bits) {
     if (std::abs(q[i]) > std::abs(q[largest])) largest = i;
   out.put(largest, 2);
   out.put(q[largest] < 0.0 ? 1 : 0, 1);
-  const auto steps = static_cast<double>((uint64_t{1} << bits) - 1);
+  const auto middle = static_cast<double>(rotation_middle(bits));
   for (size_t i = 0; i < 4; ++i) {
     if (i == largest) continue;
-    const double field = std::nearbyint((q[i] * 1.41421356237309504880 + 1.0) * 0.5 * steps);
-    out.put(static_cast<uint64_t>(std::clamp(field, 0.0, steps)), bits);
+    const double field = std::nearbyint((q[i] * 1.41421356237309504880 + 1.0) * middle);
+    out.put(static_cast<uint64_t>(std::clamp(field, 0.0, 2.0 * middle)), bits);
   }
 }
 

@@ -42,11 +42,12 @@ inline constexpr std::array<ScaleEntries, 5> kScaleEntries{{
     {9, {{{0, 0}, {0, 1}, {0, 2}, {1, 0}, {1, 1}, {1, 2}, {2, 0}, {2, 1}, {2, 2}}}},
 }};
 
-/// Steps of a keyed rotation: the three smaller components c of a quaternion are stored as
-/// round((c sqrt(2) + 1) / 2 (2^bits - 1)).
+/// The field of 0 in a keyed rotation; fields reach from 0 to twice that. The three smaller components c of a
+/// quaternion are stored as round((c sqrt(2) + 1) middle), so that 0 is exact.
+constexpr uint64_t rotation_middle(uint32_t bits) { return (uint64_t{1} << (bits - 1)) - 1; }
+
 inline double rotation_component(uint64_t field, uint32_t bits) {
-  const auto steps = static_cast<double>((uint64_t{1} << bits) - 1);
-  return (2.0 * static_cast<double>(field) / steps - 1.0) * 0.70710678118654752440;
+  return (static_cast<double>(field) / static_cast<double>(rotation_middle(bits)) - 1.0) * 0.70710678118654752440;
 }
 
 } // namespace packtrace

@@ -22,6 +22,7 @@ sys.dont_write_bytecode = True  # keep the source folder clean
 from ptk.checks import TreeCheck, check_levels
 from ptk.disk import expand, is_disk_form
 from ptk.dump import Differs, Dump, compare, flat
+from ptk.motion import read_motion
 from ptk.records import SECTIONS, BadFile
 from ptk.resident import BakedFile
 
@@ -33,6 +34,11 @@ NOT_A_FILE = (BadFile, OSError, ArithmeticError, LookupError, StopIteration, Typ
 def describe(baked, meshes):
     counts = {name: len(baked.sections[name]) for name, record in SECTIONS if record is not None}
     print(", ".join(f"{count} {name}" for name, count in counts.items()))
+    tracks, instances, cameras = read_motion(baked.sections["rigid_motion"])
+    if tracks:
+        print(f"motion: {len(tracks)} tracks, {len(instances)} instances, {len(cameras)} cameras")
+        for flags, keys in tracks:
+            print(f"track {flags}: {keys}")
     for geometry, mesh in zip(baked.sections["geometries"], meshes):
         numbers = array.array("f", flat(mesh.positions)).tobytes() + array.array("I", flat(mesh.triangles)).tobytes()
         box = [tuple(pick(axis) for axis in zip(*mesh.positions)) for pick in (min, max)] if mesh.positions else "empty"

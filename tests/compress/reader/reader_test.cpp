@@ -10,9 +10,11 @@
 #include <sys/wait.h>
 
 #include "compress/format/file/baked_file.h"
+#include "compress/format/motion/motion_stream.h"
 #include "compress/format/pages/page_codec.h"
 #include "compress/format/pages/page_encoder.h"
 #include "pbrt_import/base/file_bytes.h"
+#include "pbrt_import/scene/separate_motion.h"
 #include "tests/compress/file_hashes.h"
 #include "tests/compress/test_scenes.h"
 #include "tests/pbrt_import/scene_folder.h"
@@ -60,6 +62,33 @@ void put_cut(Dump& out, const BakedFile& file, uint32_t geometry) {
   out.put(cut);
 }
 
+void put_motion(Dump& out, const BakedFile& file) {
+  RigidMotion motion;
+  ASSERT_FALSE(unpack_rigid_motion(file.sections().rigid_motion, motion));
+  for (const size_t count : {motion.tracks.size(), motion.instances.size(), motion.cameras.size()})
+    out.put_number(static_cast<uint32_t>(count));
+  for (const MotionTrack& track : motion.tracks) {
+    out.put_number(static_cast<uint32_t>(track.interpolation) | (track.loop ? 2u : 0u));
+    out.put_number(static_cast<uint32_t>(track.keys.size()));
+    for (const MotionKey& key : track.keys) {
+      std::vector<double> numbers{key.time_s};
+      for (int axis = 0; axis < 3; ++axis) numbers.push_back(key.translation[axis]);
+      for (const double part : {key.rotation.w, key.rotation.x, key.rotation.y, key.rotation.z})
+        numbers.push_back(part);
+      for (int i = 0; i < 9; ++i) numbers.push_back(key.scale[i / 3][i % 3]);
+      out.put(std::vector<float>(numbers.begin(), numbers.end()));
+    }
+  }
+  for (const InstanceMotion& moving : motion.instances) {
+    for (const uint32_t number : {moving.instance, moving.track, moving.inner_track}) out.put_number(number);
+    out.put(std::vector<float>{moving.pivot.x, moving.pivot.y, moving.pivot.z, static_cast<float>(moving.error_world)});
+  }
+  for (const CameraMotion& moving : motion.cameras) {
+    out.put_number(moving.camera), out.put_number(moving.track);
+    out.put(std::vector<float>{static_cast<float>(moving.error_world)});
+  }
+}
+
 std::vector<std::byte> dump(const BakedFile& file) {
   Dump out;
   out.put_number(static_cast<uint32_t>(file.geometries().size()));
@@ -89,6 +118,7 @@ std::vector<std::byte> dump(const BakedFile& file) {
       for (uint32_t x = 0; x < texture.width; ++x) out.put(std::span<const uint8_t>(texture.texel(x, y)));
   }
   for (uint32_t g = 0; g < file.base_geometry_count(); ++g) put_cut(out, file, g);
+  put_motion(out, file);
   return out.bytes();
 }
 
@@ -148,6 +178,25 @@ private:
 };
 
 class IndependentReaderOfAssets : public IndependentReader, public testing::WithParamInterface<const char*> {};
+
+TEST_F(IndependentReader, DecodesMotion) {
+  Diagnostics diagnostics;
+  Progress progress;
+  const fs::path file = fs::path(PACKTRACE_SOURCE_DIR) / "tests/fuzz/corpus/import/bake_motion";
+  Scene scene = import_scene(file, {}, diagnostics, progress).scene;
+  separate_motion(scene);
+  MotionTrack track = scene.motion.tracks[scene.motion.instances[0].track];
+  track.interpolation = KeyInterpolation::kCatmullRom, track.loop = true;
+  track.keys.insert(track.keys.begin() + 1, track.keys[0]);
+  track.keys[1].time_s += 0.3, track.keys[1].translation += DVec3(1, 2, 3), track.keys[1].scale[1][0] = 0.5;
+  scene.motion.tracks.push_back(track);
+  InstanceMotion& first = scene.motion.instances[0];
+  first.track = static_cast<uint32_t>(scene.motion.tracks.size() - 1), first.relative = true,
+  first.pivot = Vec3(1, 2, 3);
+  write(scene);
+  EXPECT_GT(BakedFile::from_bytes(baked()).sections().rigid_motion.size(), 200u);
+  expect_reads_every_codec();
+}
 
 TEST_P(IndependentReaderOfAssets, DecodesTheSame) {
   const fs::path file = fs::path(PACKTRACE_SOURCE_DIR) / "assets" / GetParam();

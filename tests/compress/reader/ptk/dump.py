@@ -3,7 +3,8 @@
 import array
 import sys
 
-from ptk.records import LOD_LEVEL
+from ptk.motion import read_motion
+from ptk.records import LOD_LEVEL, NONE, to_float32
 from ptk.textures import read_texels
 
 
@@ -50,6 +51,9 @@ def compare(baked, meshes, dump):
     - the texels of all textures (3 u8 each)
     - per geometry that is not a LOD level, the number of its levels (u32); if there are any, an error threshold (float)
       and the cut for it: the number of clusters (u32), and per cluster its geometry and its index there (u32)
+    - the numbers of tracks, moving instances and moving cameras (u32); per track its flags and the number of keys (u32),
+      per key time, translation, rotation (w, x, y, z) and scale (17 floats); per moving instance its number, track and
+      inner track (u32), pivot and error (4 floats); per moving camera its number and track (u32) and error (float)
     Raises Differs."""
     require_equal("geometries", [len(meshes)], dump.take("I", 1))
     for number, mesh in enumerate(meshes):
@@ -82,5 +86,18 @@ def compare(baked, meshes, dump):
         chosen = baked.cut(number, threshold)
         require_equal(f"geometry {number}: cut", [len(chosen)], dump.take("I", 1))
         require_equal(f"geometry {number}: cut", flat(chosen), dump.take("I", 2 * len(chosen)))
+    tracks, moving, cameras = read_motion(baked.sections["rigid_motion"])
+    require_equal("motion", [len(tracks), len(moving), len(cameras)], dump.take("I", 3))
+    for number, (flags, keys) in enumerate(tracks):
+        require_equal(f"track {number}", [flags, len(keys)], dump.take("I", 2))
+        for key in keys:
+            numbers = [key[0], *key[1], *key[2], *flat(key[3])]
+            require_equal(f"track {number}: key", [to_float32(n) for n in numbers], dump.take("f", len(numbers)))
+    for instance, track, inner, pivot, error in moving:
+        require_equal("moving instance", [instance, track, NONE if inner is None else inner], dump.take("I", 3))
+        require_equal("moving instance", [*(pivot or (0.0, 0.0, 0.0)), error], dump.take("f", 4))
+    for camera, track, error in cameras:
+        require_equal("moving camera", [camera, track], dump.take("I", 2))
+        require_equal("moving camera", [error], dump.take("f", 1))
     if dump.at != len(dump.data):
         raise Differs("the dump holds more than the file")
