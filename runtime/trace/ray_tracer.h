@@ -113,7 +113,7 @@ public:
   /// with these transforms, the same movers and the same space(). No query may run at the same time.
   /// @param instances numbers of some of the tracer's movers (Movers::instances), strictly ascending
   /// @param world_from_object by element of `instances`; a transform may be flat
-  /// Throws Error(kUsage) for instances that may not move or that leave Movers::world by more than half its size,
+  /// Throws Error(kUsage) for instances that may not move or that leave the traced space (within_traced_space()),
   /// Error(kInput) for transforms that are not finite; then nothing has moved.
   virtual void place_instances(std::span<const uint32_t> instances, std::span<const Affine> world_from_object);
 
