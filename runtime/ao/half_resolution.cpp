@@ -119,6 +119,7 @@ uint32_t least_described(const GBuffer& full, ImageSize half, const std::vector<
 GBuffer pixels_of(const GBuffer& full, ImageSize half, const std::vector<uint32_t>& pixel) {
   GBuffer g;
   g.resize(half);
+  g.previous_z.resize(full.previous_z.empty() ? 0 : half.pixels());
   for_each_row(half.height, [&](uint32_t by) {
     for (size_t i = size_t{by} * half.width; i < size_t{by + 1} * half.width; ++i) {
       const uint32_t p = pixel[i];
@@ -126,6 +127,7 @@ GBuffer pixels_of(const GBuffer& full, ImageSize half, const std::vector<uint32_
       g.geometric_normal[i] = full.geometric_normal[p], g.albedo[i] = full.albedo[p];
       g.instance[i] = full.instance[p], g.triangle[i] = full.triangle[p], g.material[i] = full.material[p];
       g.back_face[i] = full.back_face[p], g.offset[i] = full.offset[p], g.motion_px[i] = full.motion_px[p] * 0.5f;
+      if (!g.previous_z.empty()) g.previous_z[i] = full.previous_z[p];
     }
   });
   return g;

@@ -16,7 +16,7 @@ inline constexpr uint32_t kNoInstance = ~0u;
 inline constexpr float kInvalidAo = -1.0f;
 
 /// Primary visibility of one frame. Every array has one entry per pixel, rows top to bottom.
-/// Pixels whose camera ray misses hold instance kNoInstance and 0 in all other arrays.
+/// Pixels whose camera ray misses hold instance kNoInstance and 0 in all other arrays. previous_z may be empty.
 struct GBuffer {
   ImageSize size;
   std::vector<float> view_z;          ///< camera-space z in world units (distance for environment cameras); 0 = miss
@@ -29,9 +29,12 @@ struct GBuffer {
   std::vector<uint32_t> material;     ///< SceneSource::materials() index
   std::vector<uint8_t> back_face;     ///< 1 where the camera sees the triangle's back (its winding normal points away)
   std::vector<float> offset;          ///< ray-origin offset along the geometric normal, world units (docs/accuracy.md)
-  /// Screen-space motion since the previous frame in pixels (x right, y down): this pixel's centre minus the motion is
-  /// where the previous frame saw the same surface point.
+  /// Screen-space motion since the previous frame in pixels (x right, y down), between the two pixel grids, without the
+  /// cameras' shifts: this pixel's centre minus the motion is where the previous frame saw the same surface point.
   std::vector<Vec2> motion_px;
+  /// view_z that the surface point had in the previous frame, 0 where the previous camera cannot project it. Empty if
+  /// neither the camera nor the scene moved: the same as view_z.
+  std::vector<float> previous_z;
 
   void resize(ImageSize new_size) {
     size = new_size;
@@ -40,6 +43,7 @@ struct GBuffer {
     normal.assign(n, Vec3(0)), albedo.assign(n, Vec3(0)), instance.assign(n, kNoInstance);
     triangle.assign(n, 0), material.assign(n, 0), back_face.assign(n, 0), offset.assign(n, 0.0f),
         motion_px.assign(n, Vec2(0));
+    previous_z.clear();
   }
 };
 

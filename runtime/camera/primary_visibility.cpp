@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <limits>
+#include <tuple>
 
+#include "runtime/camera/surface_motion.h"
 #include "runtime/camera/tiles.h"
 #include "runtime/trace/ray_offset.h"
 #include "runtime/trace/source/albedo_lookup.h"
@@ -31,9 +33,11 @@ struct RayBatch {
 class PrimaryTracer {
 public:
   PrimaryTracer(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
-                const PrimaryCamera& previous, GBuffer& out)
-      : source_(source), tracer_(tracer), space_(tracer.space()), now_(now), previous_(previous),
-        moving_(!(now == previous)), out_(out) {}
+                const PreviousFrame& previous, GBuffer& out)
+      : source_(source), tracer_(tracer), space_(tracer.space()), now_(now), motion_(source, tracer, now, previous),
+        out_(out) {}
+
+  bool sees_motion() const { return motion_.any(); }
 
   void trace_tile(const Tile& tile) const {
     for (uint32_t y = tile.y0; y < tile.y1; y += kBlock) trace_row(y, tile);
@@ -99,6 +103,7 @@ private:
     out_.back_face[pixel] = 0;
     out_.offset[pixel] = 0.0f;
     out_.motion_px[pixel] = Vec2(0);
+    if (motion_.any()) out_.previous_z[pixel] = 0.0f;
   }
 
   void write_hit(uint32_t h, const RayBatch& batch) const {
@@ -133,7 +138,14 @@ private:
     constexpr double kLeastOffset = 4.0 * double{std::numeric_limits<float>::denorm_min()};
     out_.offset[pixel] = static_cast<float>(
         std::max(ray_offset(hit, space_, unit_position, facing) * space_.inverse_scale(), kLeastOffset));
-    out_.motion_px[pixel] = motion(position, glm::dvec2(batch.x[i], batch.y[i]) + 0.5);
+    if (!motion_.any()) {
+      out_.motion_px[pixel] = Vec2(0);
+      return;
+    }
+    const SurfacePoint point{
+        batch.hits[i],     hit, position, unit_position - from_barycentrics, glm::dvec2(batch.x[i], batch.y[i]) + 0.5,
+        out_.view_z[pixel]};
+    std::tie(out_.motion_px[pixel], out_.previous_z[pixel]) = motion_.of(point);
   }
 
   /// Returns the intersection of the ray with the surface's plane. Barycentrics are floats: on a large triangle the
@@ -164,30 +176,28 @@ private:
     return Vec3(normal * ((glm::dot(normal, geometric) < 0.0 ? -1.0 : 1.0) / length));
   }
 
-  Vec2 motion(DVec3 position, glm::dvec2 centre_px) const {
-    if (!moving_) return Vec2(0);
-    const std::optional<ProjectedPoint> before = previous_.project(position);
-    if (!before) return Vec2(kNoMotionPx);
-    return Vec2(glm::clamp(centre_px - before->pixel, -double(kNoMotionPx), double(kNoMotionPx)));
-  }
-
   const SceneSource& source_;
   const RayTracer& tracer_;
   const UnitSpace space_;
   const PrimaryCamera& now_;
-  const PrimaryCamera& previous_;
-  const bool moving_;
+  const SurfaceMotion motion_;
   GBuffer& out_;
 };
 
 } // namespace
 
 void trace_primary(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
-                   const PrimaryCamera& previous, GBuffer& gbuffer, Progress& progress) {
+                   const PreviousFrame& previous, GBuffer& gbuffer, Progress& progress) {
   if (gbuffer.size != now.size() || gbuffer.view_z.size() != now.size().pixels()) gbuffer.resize(now.size());
   const PrimaryTracer primary(source, tracer, now, previous, gbuffer);
+  gbuffer.previous_z.resize(primary.sees_motion() ? now.size().pixels() : 0);
   progress.begin("primary rays", now.size().pixels());
   for_each_tile(now.size(), progress, [&](const Tile& tile) { primary.trace_tile(tile); });
+}
+
+void trace_primary(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
+                   const PrimaryCamera& previous, GBuffer& gbuffer, Progress& progress) {
+  trace_primary(source, tracer, now, PreviousFrame{previous}, gbuffer, progress);
 }
 
 } // namespace packtrace

@@ -33,7 +33,8 @@ void require_sizes(const GBuffer& gbuffer, const AoFrame& ao) {
   const size_t pixels = gbuffer.size.pixels();
   if (ao.size != gbuffer.size) throw Error(ErrorKind::kUsage, "denoiser: the AO frame and the G-buffer differ in size");
   if (gbuffer.view_z.size() != pixels || gbuffer.normal.size() != pixels || gbuffer.instance.size() != pixels ||
-      gbuffer.motion_px.size() != pixels || ao.ao.size() != pixels)
+      gbuffer.motion_px.size() != pixels || ao.ao.size() != pixels ||
+      (!gbuffer.previous_z.empty() && gbuffer.previous_z.size() != pixels))
     throw Error(ErrorKind::kUsage, "denoiser: an array does not have one entry per pixel");
   constexpr uint32_t kLargestSide = 1u << 20;
   if (gbuffer.size.width > kLargestSide || gbuffer.size.height > kLargestSide)
@@ -82,7 +83,7 @@ void AoDenoiser::State::update_history(const GBuffer& gbuffer) {
   derivatives.compute(now.guides);
   for (EdgeWeights& weights : edges) weights.compute(now.guides, derivatives, config);
   if (!has_frame) before.history.resize(gbuffer.size);
-  reproject(before, now.guides, derivatives, gbuffer.motion_px, config, now.history);
+  reproject(before, now.guides, derivatives, gbuffer.motion_px, gbuffer.previous_z, config, now.history);
   has_frame = true;
 }
 

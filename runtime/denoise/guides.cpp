@@ -2,17 +2,11 @@
 
 #include <atomic>
 #include <cmath>
-#include <limits>
 
 #include "runtime/denoise/simd.h"
 
 namespace packtrace {
 namespace {
-
-constexpr float kLargest = std::numeric_limits<float>::max();
-
-/// Returns 1 / z, or 0 if z is not a positive normal finite number.
-inline float disparity_of(float z) { return z >= std::numeric_limits<float>::min() && z <= kLargest ? 1.0f / z : 0.0f; }
 
 /// Whether c can be a component of a unit vector, with some room for rounding. False for NaN.
 inline bool is_component(float c) { return c >= -2.0f && c <= 2.0f; }

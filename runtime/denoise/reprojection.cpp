@@ -21,9 +21,9 @@ struct Tests {
   bool instance;
 };
 
-/// The surface at the current pixel, which history must match.
+/// The surface at the current pixel, as history must match it.
 struct Surface {
-  float disparity, tolerance;
+  float disparity, tolerance; ///< where the surface was in the previous frame
   Vec3 normal;
   uint32_t instance;
 };
@@ -111,12 +111,13 @@ public:
                config.reprojection_instance_test},
         width_(static_cast<float>(guides.size.width)), height_(static_cast<float>(guides.size.height)) {}
 
-  Gathered gather(int x, int y, Vec2 motion) const {
+  /// @param disparity of the pixel's surface in the previous frame, positive
+  Gathered gather(int x, int y, Vec2 motion, float disparity) const {
     Gathered sum;
     const float from_x = static_cast<float>(x) - motion.x, from_y = static_cast<float>(y) - motion.y;
     // Rejects NaN, too, and ensures that the conversion to int below cannot overflow.
     if (!(from_x > -1.0f && from_x < width_ && from_y > -1.0f && from_y < height_)) return sum;
-    const Surface surface = surface_at(x, y);
+    const Surface surface = surface_at(x, y, disparity);
     const float floor_x = std::floor(from_x), floor_y = std::floor(from_y);
     const float fx = from_x - floor_x, fy = from_y - floor_y;
     const ptrdiff_t at = static_cast<int>(floor_y) * previous_.stride + static_cast<int>(floor_x);
@@ -135,9 +136,10 @@ public:
   }
 
 private:
-  Surface surface_at(int x, int y) const {
-    const float disparity = guides_.disparity.row(y)[x];
-    const float slope = std::abs(derivatives_.x.row(y)[x]) + std::abs(derivatives_.y.row(y)[x]);
+  Surface surface_at(int x, int y, float disparity) const {
+    const float now = guides_.disparity.row(y)[x];
+    float slope = std::abs(derivatives_.x.row(y)[x]) + std::abs(derivatives_.y.row(y)[x]);
+    if (disparity != now) slope *= disparity / now;
     return {disparity, tests_.depth * disparity + tests_.slope * slope + std::numeric_limits<float>::min(),
             Vec3(guides_.normal_x.row(y)[x], guides_.normal_y.row(y)[x], guides_.normal_z.row(y)[x]),
             guides_.instance.row(y)[x]};
@@ -164,17 +166,22 @@ void store(const Gathered& sum, float longest, History& history, int x, int y) {
 } // namespace
 
 void reproject(const FrameHistory& previous, const Guides& guides, const DepthDerivatives& derivatives,
-               std::span<const Vec2> motion_px, const DenoiserConfig& config, History& reprojected) {
+               std::span<const Vec2> motion_px, std::span<const float> previous_z, const DenoiserConfig& config,
+               History& reprojected) {
   const Reprojection reprojection(previous, guides, derivatives, config);
   const float longest_still = static_cast<float>(config.max_tspp);
   const float longest_moving = static_cast<float>(std::min(config.max_tspp, config.max_tspp_moving));
   for_row_blocks(guides.size.height, [&](int first, int last) {
     for (int y = first; y < last; ++y) {
-      const Vec2* motion = &motion_px[static_cast<size_t>(y) * guides.size.width];
+      const size_t begin = static_cast<size_t>(y) * guides.size.width;
+      const Vec2* motion = &motion_px[begin];
+      const float* z = previous_z.empty() ? nullptr : &previous_z[begin];
       for (int x = 0; x < static_cast<int>(guides.size.width); ++x) {
         const bool still = std::abs(motion[x].x) <= kStillMotion && std::abs(motion[x].y) <= kStillMotion;
         Gathered sum;
-        if (guides.disparity.row(y)[x] > 0.0f) sum = reprojection.gather(x, y, still ? Vec2(0) : motion[x]);
+        const float now = guides.disparity.row(y)[x];
+        const float before = z != nullptr && now > 0.0f ? disparity_of(z[x]) : now;
+        if (before > 0.0f) sum = reprojection.gather(x, y, still ? Vec2(0) : motion[x], before);
         store(sum, still ? longest_still : longest_moving, reprojected, x, y);
       }
     }

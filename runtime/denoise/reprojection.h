@@ -22,8 +22,12 @@ struct FrameHistory {
 /// that camera pans do not blur it.
 /// All pixels of `reprojected` are written: 0 where history is rejected. The sample count is scaled by the sum of the
 /// weights, so partial agreement shortens the history.
+/// Depth is compared where the surface was: tolerances are those of its disparity in the previous frame, with the
+/// change of disparity per pixel scaled in proportion.
 /// @param motion_px GBuffer::motion_px; pixels with non-finite motion get no history
+/// @param previous_z GBuffer::previous_z; pixels whose previous depth is not positive and finite get no history
 void reproject(const FrameHistory& previous, const Guides& guides, const DepthDerivatives& derivatives,
-               std::span<const Vec2> motion_px, const DenoiserConfig& config, History& reprojected);
+               std::span<const Vec2> motion_px, std::span<const float> previous_z, const DenoiserConfig& config,
+               History& reprojected);
 
 } // namespace packtrace

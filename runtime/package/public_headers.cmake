@@ -67,6 +67,7 @@ set(packtrace_public_headers
   runtime/render/renderer.h
   runtime/trace/embree/embree_tracer.h
   runtime/trace/make_tracer.h
+  runtime/trace/movers.h
   runtime/trace/ray_tracer.h
   runtime/trace/source/float_source.h
   runtime/trace/source/lod_source.h

@@ -6,15 +6,15 @@
 namespace packtrace {
 
 std::unique_ptr<RayTracer> make_tracer(const SceneSource& source, const BakedFile* file, const TracerConfig& config) {
-  if (config.backend == Backend::kEmbree) return std::make_unique<EmbreeTracer>(source, config.embree);
+  if (config.backend == Backend::kEmbree) return std::make_unique<EmbreeTracer>(source, config.embree, config.movers);
   if (file == nullptr)
     throw Error(ErrorKind::kUnsupported, "backend packed traces baked files only; bake the scene, or use embree");
-  return std::make_unique<PackedTracer>(*file, source);
+  return std::make_unique<PackedTracer>(*file, source, chosen_isa(), config.movers);
 }
 
 std::unique_ptr<RayTracer> make_tracer(const LodSource& source, const BakedFile& file, const TracerConfig& config) {
-  if (config.backend == Backend::kEmbree) return std::make_unique<EmbreeTracer>(source, config.embree);
-  return std::make_unique<PackedTracer>(file, source);
+  if (config.backend == Backend::kEmbree) return std::make_unique<EmbreeTracer>(source, config.embree, config.movers);
+  return std::make_unique<PackedTracer>(file, source, chosen_isa(), config.movers);
 }
 
 uint64_t resident_bytes(const RayTracer& tracer) {

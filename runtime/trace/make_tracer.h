@@ -18,6 +18,7 @@ enum class Backend : uint8_t {
 struct TracerConfig {
   Backend backend = Backend::kEmbree;
   EmbreeConfig embree;
+  Movers movers = {}; ///< instances that RayTracer::place_instances() may move
 };
 
 /// Creates a tracer; the only function that knows both backends. Keeps references: source and file must outlive the

@@ -30,6 +30,19 @@ DVec3 perpendicular(DVec3 a, DVec3 b, DVec3 c) {
   return length > 0.0 ? best / length : best;
 }
 
+/// Stretches what lies along the direction that a transform flattens most, by a fraction of its largest stretch.
+DAffine thickened(const DAffine& to_from, double thickness) {
+  const glm::dmat3 linear(to_from), transposed = glm::transpose(linear);
+  const double size = norm(linear);
+  // Normalised, so that products of two neither overflow nor underflow.
+  const glm::dmat3 columns = linear / size, rows = transposed / size;
+  const DVec3 plane_normal = perpendicular(columns[0], columns[1], columns[2]);
+  const DVec3 lost_direction = perpendicular(rows[0], rows[1], rows[2]);
+  const double side = glm::dot(plane_normal, linear * lost_direction) < 0.0 ? -1.0 : 1.0;
+  const glm::dmat3 thick = linear + glm::outerProduct(plane_normal * (side * thickness * size), lost_direction);
+  return DAffine(thick[0], thick[1], thick[2], to_from[3]);
+}
+
 glm::dmat3 absolute(const glm::dmat3& m) { return {glm::abs(m[0]), glm::abs(m[1]), glm::abs(m[2])}; }
 
 } // namespace
@@ -41,11 +54,17 @@ Placement direct_placement(uint32_t instance, const DAffine& world_from_object) 
   return placement;
 }
 
-Placement instanced_placement(uint32_t instance, const DAffine& world_from_object, const DAffine& unit_from_surface) {
+Placement exactly_instanced_placement(uint32_t instance, const DAffine& world_from_object,
+                                      const DAffine& unit_from_surface) {
   Placement placement = direct_placement(instance, world_from_object);
   placement.instanced = true;
   placement.unit_from_surface = unit_from_surface;
   placement.surface_normal = normal_matrix(unit_from_surface);
+  return placement;
+}
+
+Placement instanced_placement(uint32_t instance, const DAffine& world_from_object, const DAffine& unit_from_surface) {
+  Placement placement = exactly_instanced_placement(instance, world_from_object, unit_from_surface);
   const DAffine surface_from_unit = inverse(unit_from_surface);
   const glm::dmat3 inverted(surface_from_unit);
   const glm::dmat3 growth = absolute(inverted) * absolute(glm::dmat3(unit_from_surface));
@@ -65,16 +84,16 @@ bool traceable_as_instance(const DAffine& unit_from_surface) {
 std::optional<DAffine> invertible_placement(const DAffine& to_from) {
   constexpr double kThickness = 1e-8;
   if (is_invertible(to_from)) return to_from;
-  const glm::dmat3 linear(to_from), transposed = glm::transpose(linear);
-  const double size = norm(linear);
-  // Normalised, so that products of two neither overflow nor underflow.
-  const glm::dmat3 columns = linear / size, rows = transposed / size;
-  const DVec3 plane_normal = perpendicular(columns[0], columns[1], columns[2]);
-  const DVec3 lost_direction = perpendicular(rows[0], rows[1], rows[2]);
-  const double side = glm::dot(plane_normal, linear * lost_direction) < 0.0 ? -1.0 : 1.0;
-  const glm::dmat3 thick = linear + glm::outerProduct(plane_normal * (side * kThickness * size), lost_direction);
-  const DAffine result(thick[0], thick[1], thick[2], to_from[3]);
+  const DAffine result = thickened(to_from, kThickness);
   if (!is_invertible(result)) return std::nullopt;
+  return result;
+}
+
+std::optional<DAffine> traceable_placement(const DAffine& unit_from_surface) {
+  constexpr double kThickness = 0x1p-15;
+  if (traceable_as_instance(unit_from_surface)) return unit_from_surface;
+  const DAffine result = thickened(unit_from_surface, kThickness);
+  if (!traceable_as_instance(result)) return std::nullopt;
   return result;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -80,7 +81,8 @@ struct TreeBytes {
   uint64_t built = 0;
 };
 
-/// A scene prepared for ray queries: a tracing backend. All functions are const and may run on several threads.
+/// A scene prepared for ray queries: a tracing backend. All functions but place_instances() are const and may run on
+/// several threads.
 class RayTracer {
 public:
   virtual ~RayTracer() = default;
@@ -106,6 +108,21 @@ public:
   /// Returns the surface that was hit.
   /// @param hit a valid hit of this tracer
   virtual HitSurface resolve(const RayHit& hit) const = 0;
+
+  /// Moves instances; the others stay where they are. The results of queries are then those of a tracer that is made
+  /// with these transforms, the same movers and the same space(). No query may run at the same time.
+  /// @param instances numbers of some of the tracer's movers (Movers::instances), strictly ascending
+  /// @param world_from_object by element of `instances`; a transform may be flat
+  /// Throws Error(kUsage) for instances that may not move or that leave Movers::world by more than half its size,
+  /// Error(kInput) for transforms that are not finite; then nothing has moved.
+  virtual void place_instances(std::span<const uint32_t> instances, std::span<const Affine> world_from_object);
+
+  /// The transforms of all instances as they are placed; empty if none may move: they are those of the source then.
+  virtual std::span<const Affine> world_from_object() const { return {}; }
+
+  /// Returns the object-space vertices of a triangle that was hit. Only for tracers with movers.
+  /// @param surface resolve(hit)
+  virtual std::array<DVec3, 3> object_vertices(const RayHit& hit, const HitSurface& surface) const;
 
   /// All memory that tracing keeps, including geometry if the tracer reads it.
   virtual std::vector<ResidentPart> resident() const = 0;

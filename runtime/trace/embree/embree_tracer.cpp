@@ -12,20 +12,11 @@
 #include "pbrt_import/base/cpu.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/progress.h"
-#include "runtime/trace/embree/embree_device.h"
+#include "runtime/trace/embree/embree_parts.h"
 #include "runtime/trace/placement.h"
-#include "runtime/trace/source/alpha_filter.h"
 
 namespace packtrace {
 namespace {
-
-constexpr size_t kPaddingVertices = 2;
-
-// A class is a combination of camera_visible, occludes, needs_mask and is_sliver(); the first two bits are also the
-// Embree geometry mask.
-constexpr uint32_t kMaskedClass = 1u << 2;
-constexpr uint32_t kSliverClass = 1u << 3;
-constexpr uint32_t kClassCount = 16;
 
 uint32_t material_class(MaterialFlags flags) {
   return (camera_visible(flags) ? kCameraRays : 0u) | (occludes(flags) ? kOcclusionRays : 0u) |
@@ -50,143 +41,13 @@ void stop_if_cancelled() { Progress().check_cancelled(); }
 
 std::string geometry_label(uint32_t geometry) { return "geometry " + std::to_string(geometry); }
 
-} // namespace
-
-/// The triangles of one surface that have the same class; the user data of one RTCGeometry.
-struct EmbreeTracer::Part {
-  const EmbreeTracer* tracer = nullptr;
-  uint32_t surface = 0;
-  uint32_t material_class = 0;
-  std::vector<Triangle> triangles;
-  std::vector<uint32_t> source_triangles; ///< by triangle: its number in the geometry; empty if that is the same
-
-  uint32_t source_triangle(uint32_t i) const { return source_triangles.empty() ? i : source_triangles[i]; }
-
-  /// Whether a ray hits the plane of a triangle in double precision where its interval begins or later. Occlusion rays
-  /// must hit the triangle itself, too: rounding must not let a ray hit the face beyond the edge that it starts beside.
-  /// For camera rays Embree decides, so that none slips between a sliver and its neighbours.
-  bool is_hit_ahead(const RTCFilterFunctionNArguments* args, uint32_t i) const {
-    const std::vector<Vec3>& positions = tracer->surfaces_[surface].positions;
-    const Triangle& t = triangles[RTCHitN_primID(args->hit, args->N, i)];
-    const DVec3 a(positions[t.x]), b(positions[t.y]), c(positions[t.z]);
-    const DVec3 origin(RTCRayN_org_x(args->ray, args->N, i), RTCRayN_org_y(args->ray, args->N, i),
-                       RTCRayN_org_z(args->ray, args->N, i));
-    const DVec3 direction(RTCRayN_dir_x(args->ray, args->N, i), RTCRayN_dir_y(args->ray, args->N, i),
-                          RTCRayN_dir_z(args->ray, args->N, i));
-    const DVec3 to_a = a - origin, to_b = b - origin, to_c = c - origin;
-    const DVec3 normal = glm::cross(b - a, c - a);
-    const double distance = glm::dot(normal, to_a) / glm::dot(normal, direction); // NaN for a ray in the plane
-    if (!(distance >= static_cast<double>(RTCRayN_tnear(args->ray, args->N, i)))) return false;
-    if ((RTCRayN_mask(args->ray, args->N, i) & kOcclusionRays) == 0) return true;
-    const double u = glm::dot(direction, glm::cross(to_b, to_c)), v = glm::dot(direction, glm::cross(to_c, to_a)),
-                 w = glm::dot(direction, glm::cross(to_a, to_b));
-    return (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
-  }
-
-  /// Embree filter function: rejects hits where an alpha mask removes the surface, and hits of slivers that
-  /// is_hit_ahead() rejects.
-  static void filter(const RTCFilterFunctionNArguments* args) {
-    const auto& part = *static_cast<const Part*>(args->geometryUserPtr);
-    for (uint32_t i = 0; i < args->N; ++i) {
-      if (args->valid[i] != -1) continue;
-      if ((part.material_class & kSliverClass) != 0 && !part.is_hit_ahead(args, i)) args->valid[i] = 0;
-      if ((part.material_class & kMaskedClass) == 0 || args->valid[i] != -1) continue;
-      const uint32_t triangle = part.source_triangle(RTCHitN_primID(args->hit, args->N, i));
-      const Vec2 barycentrics(RTCHitN_u(args->hit, args->N, i), RTCHitN_v(args->hit, args->N, i));
-      const bool occlusion = (RTCRayN_mask(args->ray, args->N, i) & kOcclusionRays) != 0;
-      const Attachment& attachment =
-          part.tracer->attachment_of(RTCHitN_instID(args->hit, args->N, i, 0), RTCHitN_geomID(args->hit, args->N, i));
-      const uint32_t instance = part.tracer->placements_[attachment.placement].instance;
-      if (!surface_present(part.tracer->source_, instance, triangle, barycentrics, occlusion)) args->valid[i] = 0;
-    }
-  }
-};
-
-/// The Embree objects. The order matters: members are destroyed in reverse.
-struct EmbreeTracer::Device {
-  explicit Device(const EmbreeConfig& config) : embree(config.memory) {}
-
-  EmbreeDevice embree;
-  std::vector<RtcPtr<RTCSceneTy>> surface_scenes; ///< by surface; null unless the surface is instanced
-  RtcPtr<RTCSceneTy> top;
-
-  RtcPtr<RTCSceneTy> new_scene(const EmbreeConfig& config) {
-    RtcPtr<RTCSceneTy> scene(rtcNewScene(embree.get()));
-    embree.check();
-    const bool high = config.quality == BvhQuality::kHigh;
-    rtcSetSceneBuildQuality(scene.get(), high ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
-    const int flags =
-        (config.robust ? RTC_SCENE_FLAG_ROBUST : 0) | (config.compact ? RTC_SCENE_FLAG_COMPACT : RTC_SCENE_FLAG_NONE);
-    rtcSetSceneFlags(scene.get(), static_cast<RTCSceneFlags>(flags));
-    rtcSetSceneProgressMonitorFunction(scene.get(), [](void*, double) { return !Progress::cancelled(); }, nullptr);
-    return scene;
-  }
-
-  uint32_t attach(RTCScene scene, RtcPtr<RTCGeometryTy> geometry) {
-    rtcCommitGeometry(geometry.get());
-    const uint32_t id = rtcAttachGeometry(scene, geometry.get());
-    embree.check();
-    return id;
-  }
-
-  uint32_t attach_part(RTCScene scene, Part& part, const Surface& surface) {
-    RtcPtr<RTCGeometryTy> geometry(rtcNewGeometry(embree.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
-    embree.check();
-    rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, surface.positions.data(),
-                               0, sizeof(Vec3), surface.positions.size() - kPaddingVertices);
-    rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, part.triangles.data(), 0,
-                               sizeof(Triangle), part.triangles.size());
-    rtcSetGeometryMask(geometry.get(), part.material_class & (kCameraRays | kOcclusionRays));
-    rtcSetGeometryUserData(geometry.get(), &part);
-    if ((part.material_class & (kMaskedClass | kSliverClass)) != 0) {
-      rtcSetGeometryIntersectFilterFunction(geometry.get(), Part::filter);
-      rtcSetGeometryOccludedFilterFunction(geometry.get(), Part::filter);
-    }
-    return attach(scene, std::move(geometry));
-  }
-
-  uint32_t attach_instance(RTCScene instanced, const Affine& unit_from_surface, uint32_t ray_mask) {
-    RtcPtr<RTCGeometryTy> geometry(rtcNewGeometry(embree.get(), RTC_GEOMETRY_TYPE_INSTANCE));
-    embree.check();
-    rtcSetGeometryInstancedScene(geometry.get(), instanced);
-    rtcSetGeometryTransform(geometry.get(), 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, &unit_from_surface[0][0]);
-    rtcSetGeometryMask(geometry.get(), ray_mask);
-    return attach(top.get(), std::move(geometry));
-  }
-};
-
-/// A geometry as decoded by the source.
-struct EmbreeTracer::Decoded {
-  std::vector<Vec3> positions;
-  std::vector<Triangle> triangles;
-  Bounds bounds;
-  uint32_t uses = 0;
-
-  /// Fills and checks positions, triangles and bounds. Throws Error(kInput) for positions that are not finite or
-  /// indices out of range.
-  void read(const SceneSource& source, uint32_t geometry) {
-    const GeometryCounts counts = source.counts(geometry);
-    positions.resize(counts.vertices);
-    triangles.resize(counts.triangles);
-    source.decode(geometry, positions, triangles);
-    bounds = bounds_of(positions);
-    if (!positions.empty() && !std::all_of(positions.begin(), positions.end(), [](Vec3 p) { return is_finite(p); }))
-      throw Error(ErrorKind::kInput, geometry_label(geometry) + " has positions beyond the range of float");
-    const auto in_range = [&](const Triangle& t) { return std::max({t.x, t.y, t.z}) < counts.vertices; };
-    if (!std::all_of(triangles.begin(), triangles.end(), in_range))
-      throw Error(ErrorKind::kInput, geometry_label(geometry) + " has a triangle with a vertex out of range");
-  }
-};
-
-namespace {
-
 uint64_t surface_bytes(const GeometryCounts& counts) {
   return uint64_t{counts.vertices} * sizeof(Vec3) + uint64_t{counts.triangles} * (sizeof(Triangle) + sizeof(uint32_t));
 }
 
 } // namespace
 
-EmbreeTracer::EmbreeTracer(const SceneSource& source, EmbreeConfig config)
+EmbreeTracer::EmbreeTracer(const SceneSource& source, EmbreeConfig config, const Movers& movers)
     : source_(source), config_(config), device_(std::make_unique<Device>(config)) {
   if (config.memory) memory_ = MemoryReservation(*config.memory);
   std::vector<Decoded> decoded(source.geometry_count());
@@ -203,7 +64,7 @@ EmbreeTracer::EmbreeTracer(const SceneSource& source, EmbreeConfig config)
     stop_if_cancelled();
     if (decoded[g].uses > 0 && source.counts(g).triangles > 0) decoded[g].read(source, g);
   });
-  place(decoded);
+  place(decoded, movers);
   stop_if_cancelled();
   attach();
 }
@@ -211,11 +72,16 @@ EmbreeTracer::EmbreeTracer(const SceneSource& source, EmbreeConfig config)
 EmbreeTracer::~EmbreeTracer() = default;
 
 /// Chooses the unit spaces and creates surfaces, their parts and placements.
-void EmbreeTracer::place(std::vector<Decoded>& decoded) {
+void EmbreeTracer::place(std::vector<Decoded>& decoded, const Movers& movers) {
   const std::span<const PlacedGeometry> instances = source_.instances();
   std::vector<Bounds> bounds;
   for (const Decoded& geometry : decoded) bounds.push_back(geometry.bounds);
-  space_ = UnitSpace(placed_bounds(source_, bounds));
+  movable_ = movable_instances(movers, instances.size());
+  space_ = UnitSpace(bounds_of_motion(source_, bounds, movers));
+  if (!movable_.empty()) {
+    for (const PlacedGeometry& placed : instances) world_from_object_.push_back(placed.world_from_object);
+    placement_of_.assign(instances.size(), kNoHit);
+  }
 
   constexpr uint32_t kNone = ~0u;
   std::vector<uint32_t> instanced_surface(decoded.size(), kNone);
@@ -226,15 +92,21 @@ void EmbreeTracer::place(std::vector<Decoded>& decoded) {
     const DAffine unit_from_object = compose(space_.unit_from_outer(), world_from_object);
     const UnitSpace own(decoded[g].bounds);
     const DAffine unit_from_own = compose(unit_from_object, own.outer_from_unit());
+    const bool moves = !movable_.empty() && movable_[i] != 0;
     const bool direct = decoded[g].uses == 1 && is_identity(instances[i].world_from_object);
-    if (direct || !traceable_as_instance(unit_from_own)) {
+    if (!moves && (direct || !traceable_as_instance(unit_from_own))) {
       placements_.push_back(direct_placement(i, world_from_object));
       surface_of_placement_.push_back(add_surface(i, decoded[g], unit_from_object));
     } else {
-      if (instanced_surface[g] == kNone) instanced_surface[g] = add_surface(i, decoded[g], own.unit_from_outer());
+      if (instanced_surface[g] == kNone) {
+        instanced_surface[g] = add_surface(i, decoded[g], own.unit_from_outer());
+        surfaces_.back().own = own;
+        surfaces_.back().bounds = {own.to_unit(decoded[g].bounds.lo), own.to_unit(decoded[g].bounds.hi)};
+      }
       placements_.push_back(instanced_placement(i, world_from_object, unit_from_own));
       surface_of_placement_.push_back(instanced_surface[g]);
     }
+    if (moves) placement_of_[i] = static_cast<uint32_t>(placements_.size()) - 1;
     if (decoded[g].uses == 1) decoded[g] = Decoded{};
   }
 }
@@ -292,6 +164,14 @@ void EmbreeTracer::attach() {
   device.top = device.new_scene(config_);
   device.surface_scenes.resize(surfaces_.size());
   for (uint32_t p = 0; p < placements_.size(); ++p) attach_surface(p, surface_of_placement_[p]);
+  if (!movable_.empty()) {
+    attachment_of_.assign(placements_.size(), kNoHit);
+    hidden_.assign(placements_.size(), 0);
+    for (uint32_t id = 0; id < attachments_.size(); ++id) attachment_of_[attachments_[id].placement] = id;
+    for (uint32_t i = 0; i < movable_.size(); ++i)
+      if (movable_[i] != 0) update_mover(i, DAffine(world_from_object_[i]));
+    list_flat_instances();
+  }
   commit(device.top.get(), kNoGeometry);
 }
 
@@ -356,7 +236,9 @@ std::vector<ResidentPart> EmbreeTracer::resident() const {
   uint64_t vertices = 0, indices = 0;
   uint64_t tables = placements_.size() * (sizeof(Placement) + sizeof(uint32_t)) +
                     attachments_.size() * sizeof(Attachment) + parts_.size() * sizeof(Part) +
-                    surfaces_.size() * sizeof(Surface);
+                    surfaces_.size() * sizeof(Surface) + movable_.size() * (sizeof(uint8_t) + sizeof(uint32_t)) +
+                    world_from_object_.size() * sizeof(Affine) +
+                    attachment_of_.size() * (sizeof(uint32_t) + sizeof(uint8_t));
   for (const Surface& surface : surfaces_) vertices += surface.positions.size() * sizeof(Vec3);
   for (const Part& part : parts_) {
     indices += part.triangles.size() * sizeof(Triangle);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pbrt_import/base/memory_budget.h"
+#include "runtime/trace/movers.h"
 #include "runtime/trace/ray_tracer.h"
 
 struct RTCSceneTy;
@@ -38,7 +39,8 @@ struct EmbreeConfig {
 /// Rays are given in a unit space (space()), which differs from world space by a power-of-two scale and a translation,
 /// so scenes of any scale between 1e-30 and 1e30 work. Geometries that are placed once and untransformed lie in this
 /// space. All others have a unit space of their own and become Embree instances. Placements that float arithmetic
-/// cannot invert (flattening, or vastly smaller than the scene) are traced as transformed copies instead.
+/// cannot invert (flattening, or vastly smaller than the scene) are traced as transformed copies instead. Movers are
+/// always Embree instances; while they are flat, they have a thickness (traceable_placement()).
 /// Each geometry has one RTCGeometry per combination of camera_visible, occludes and needs_mask: ray masks decide about
 /// visibility, and only masked triangles need a filter function.
 class EmbreeTracer final : public RayTracer {
@@ -46,8 +48,9 @@ public:
   /// Keeps a reference: the source must outlive the tracer.
   /// Throws Error(kInput) for positions or transforms that are not finite or indices out of range, MemoryError where
   /// the budget does not suffice, Error(kLimitExceeded) where the system runs out of memory, Error(kUnsupported) for an
-  /// Embree built without the needed features, Error(kCancelled) after Progress::cancel().
-  EmbreeTracer(const SceneSource& source, EmbreeConfig config);
+  /// Embree built without the needed features, Error(kCancelled) after Progress::cancel(), Error(kUsage) for movers
+  /// that do not exist.
+  EmbreeTracer(const SceneSource& source, EmbreeConfig config, const Movers& movers = {});
   ~EmbreeTracer() override;
   EmbreeTracer(const EmbreeTracer&) = delete;
   EmbreeTracer& operator=(const EmbreeTracer&) = delete;
@@ -61,6 +64,12 @@ public:
   void any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
                 std::span<uint8_t> occluded) const override;
   HitSurface resolve(const RayHit& hit) const override;
+
+  void place_instances(std::span<const uint32_t> instances, std::span<const Affine> world_from_object) override;
+  std::span<const Affine> world_from_object() const override { return world_from_object_; }
+  std::array<DVec3, 3> object_vertices(const RayHit& hit, const HitSurface& surface) const override;
+
+  std::span<const uint32_t> flat_instances() const override { return flat_instances_; }
 
   /// "bvh" (memory of Embree's trees), "vertices" and "indices" (buffers that Embree reads), and "tables".
   std::vector<ResidentPart> resident() const override;
@@ -88,6 +97,8 @@ private:
     std::vector<Vec3> positions; ///< plus two padding entries: Embree reads 16 bytes at a time
     uint32_t first_part = 0;
     uint32_t part_count = 0;
+    UnitSpace own; ///< its space, if it is instanced
+    Bounds bounds; ///< in that space
   };
   /// The placement and part that a geometry of the top scene stands for.
   struct Attachment {
@@ -95,7 +106,10 @@ private:
     uint32_t part = 0; ///< for an Embree instance: its first part
   };
 
-  void place(std::vector<Decoded>& decoded);
+  void place(std::vector<Decoded>& decoded, const Movers& movers);
+  DAffine unit_from_own(const UnitSpace& own, const Affine& world_from_object) const;
+  void update_mover(uint32_t instance, const DAffine& world_from_object);
+  void list_flat_instances();
   uint32_t add_surface(uint32_t instance, const Decoded& decoded, const DAffine& surface_from_object);
   void split_parts(uint32_t surface, const std::vector<Triangle>& triangles, uint32_t instance);
   void attach();
@@ -114,6 +128,13 @@ private:
   std::vector<Placement> placements_;
   std::vector<uint32_t> surface_of_placement_;
   std::vector<TreeBytes> tree_bytes_;
+  // Of movers; empty without.
+  std::vector<uint8_t> movable_;          ///< by instance
+  std::vector<Affine> world_from_object_; ///< by instance
+  std::vector<uint32_t> placement_of_;    ///< by instance; kNoHit without triangles
+  std::vector<uint32_t> attachment_of_;   ///< by placement: geometry id in the top scene
+  std::vector<uint8_t> hidden_;           ///< by placement: 1 if the mover is flat
+  std::vector<uint32_t> flat_instances_;
   std::vector<Attachment> attachments_; ///< by geometry id in the top scene
   std::unique_ptr<Device> device_;      ///< declared last: destroyed before the buffers above
 };

@@ -34,7 +34,7 @@ TEST(Reprojection, IntegerPansFetchTheSameBits) {
   History out;
   out.resize(size);
   for (int y = 0; y < 21; ++y) std::fill_n(out.mean.row(y), 33, 0.5f); // a rejection must overwrite these values
-  reproject(previous, previous.guides, derivatives, g.motion_px, DenoiserConfig{}, out);
+  reproject(previous, previous.guides, derivatives, g.motion_px, {}, DenoiserConfig{}, out);
   for (int y = 0; y < 21; ++y)
     for (int x = 0; x < 33; ++x) {
       const bool seen = x >= 3 && y + 2 < 21;
@@ -61,6 +61,60 @@ TEST(Reprojection, AnotherDepthNormalOrInstanceIsAnotherSurface) {
   EXPECT_FALSE(keeps_history([](GBuffer& g, size_t i) { g.normal[i] = Vec3(0.8f, 0, -0.6f); }));
   EXPECT_FALSE(keeps_history([](GBuffer& g, size_t i) { g.instance[i] = 1; }));
   EXPECT_FALSE(keeps_history([](GBuffer& g, size_t i) { g.motion_px[i] = Vec2(1e30f, 0); }));
+}
+
+TEST(Reprojection, ComparesDepthWhereTheSurfaceWas) {
+  const auto from = [](float z_before) {
+    return [=](GBuffer& g, size_t i) {
+      g.previous_z.resize(kSize.pixels());
+      g.view_z[i] *= 1.1f, g.previous_z[i] = z_before;
+    };
+  };
+  EXPECT_TRUE(keeps_history(from(10.0f))); // the wall was at 10 and moved away by 10 %
+  EXPECT_FALSE(keeps_history(from(11.0f)));
+  EXPECT_FALSE(keeps_history(from(9.0f)));
+  EXPECT_FALSE(keeps_history(from(0.0f))); // behind the previous camera
+  EXPECT_FALSE(keeps_history(from(-10.0f)));
+  EXPECT_FALSE(keeps_history(from(std::nanf(""))));
+}
+
+TEST(AoDenoiser, SurfacesThatComeNearerKeepTheirHistory) {
+  AoDenoiser denoiser;
+  float z = 50.0f;
+  for (uint32_t f = 0; f < 20; ++f) {
+    GBuffer g = wall(kSize, z); // the centre of the image grows by 10 % a frame: motion away from it
+    g.previous_z.assign(kSize.pixels(), f == 0 ? z : z / 0.9f);
+    for (uint32_t y = 0; y < kSize.height; ++y)
+      for (uint32_t x = 0; x < kSize.width; ++x)
+        g.motion_px[y * kSize.width + x] =
+            0.1f * Vec2(static_cast<float>(x) + 0.5f - 80.0f, static_cast<float>(y) + 0.5f - 48.0f);
+    const DenoisedAo& result = denoiser.next_frame(g, noise(kSize, 0.5f, f));
+    EXPECT_GT(mean_of(result.tspp, kSize, {20, 20, 140, 76}), 0.9 * (f + 1));
+    z *= 0.9f;
+  }
+}
+
+TEST(AoDenoiser, MovingInstancesKeepHistoryAndWhatTheyUncoverHasNone) {
+  AoDenoiser denoiser;
+  for (uint32_t f = 0; f < 24; ++f) { // a card that moves right by 3 pixels and nearer by 5 % a frame
+    GBuffer g = wall(kSize);
+    g.previous_z = g.view_z;
+    const auto z_at = [](uint32_t frame) { return 8.0f * std::pow(0.95f, static_cast<float>(frame)); };
+    for (uint32_t i = 0; i < kSize.pixels(); ++i) {
+      const uint32_t x = i % kSize.width, y = i / kSize.width, left = 20 + 3 * f;
+      if (x < left || x >= left + 30 || y < 20 || y >= 76) continue;
+      g.view_z[i] = z_at(f), g.previous_z[i] = f == 0 ? z_at(f) : z_at(f - 1);
+      g.instance[i] = 1;
+      if (f > 0) g.motion_px[i] = Vec2(3, 0);
+    }
+    const DenoisedAo& result = denoiser.next_frame(g, noise(kSize, 0.5f, f));
+    if (f == 0) continue;
+    const uint32_t left = 20 + 3 * f;
+    const float length = static_cast<float>(f + 1);
+    EXPECT_GT(mean_of(result.tspp, kSize, {left + 3, 24, left + 27, 72}), 0.8f * length) << "on the card, frame " << f;
+    EXPECT_EQ(mean_of(result.tspp, kSize, {left - 3, 20, left, 76}), 1.0) << "uncovered, frame " << f;
+    EXPECT_GT(mean_of(result.tspp, kSize, {0, 80, kSize.width, 96}), 0.8f * length) << "still, frame " << f;
+  }
 }
 
 /// PSNR after 64 frames of a wall with smooth occlusion that moves by `pan` pixels per frame.

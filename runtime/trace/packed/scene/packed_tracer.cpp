@@ -2,17 +2,12 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 
-#include "compress/format/cluster/position_grid.h"
-#include "compress/format/trees/box_tree.h"
-#include "pbrt_import/base/error.h"
 #include "pbrt_import/scene/bounds.h"
 #include "runtime/trace/packed/scene/deformed_trees.h"
+#include "runtime/trace/packed/scene/placed_trees.h"
 #include "runtime/trace/packed/scene/thread_memory.h"
-#include "runtime/trace/packed/scene/top_tree.h"
 #include "runtime/trace/packed/scene/trace_cluster.h"
-#include "runtime/trace/placement.h"
 #include "runtime/trace/source/alpha_filter.h"
 
 namespace packtrace {
@@ -35,91 +30,49 @@ const packed::KernelRay* kernel_rays(std::span<const Ray> rays) {
 }
 packed::KernelHit* kernel_hits(std::span<RayHit> hits) { return reinterpret_cast<packed::KernelHit*>(hits.data()); }
 
-DAffine outer_from_grid(const baked::TreeRecord& tree) {
-  const double step = PositionGrid{tree.step_mantissa, tree.step_exponent}.step();
-  const DVec3 origin(static_cast<double>(tree.origin[0]), static_cast<double>(tree.origin[1]),
-                     static_cast<double>(tree.origin[2]));
-  return DAffine(DVec3(step, 0, 0), DVec3(0, step, 0), DVec3(0, 0, step), origin * step);
-}
-
-/// Whether the transform only scales along the axes and translates.
-bool is_aligned(const DAffine& m) {
-  return m[0].y == 0.0 && m[0].z == 0.0 && m[1].x == 0.0 && m[1].z == 0.0 && m[2].x == 0.0 && m[2].y == 0.0;
-}
-
-/// Maximum number of placements for which rays are tested against the boxes of parts (KernelScene::parts).
-constexpr size_t kMaxPlacementsWithParts = baked::kNodeWidth;
-
-/// Enlarges a box of the tree over many placements by the rounding errors of its planes: see
-/// packed::KernelScene::top_pad_coordinate.
-TreeBox grown(TreeBox box) {
-  constexpr float kGrowth = 0x1p-20f;
-  for (size_t axis = 0; axis < 3; ++axis) {
-    box.lo[axis] = std::nextafter(box.lo[axis] - kGrowth * std::abs(box.lo[axis]), -INFINITY);
-    box.hi[axis] = std::nextafter(box.hi[axis] + kGrowth * std::abs(box.hi[axis]), INFINITY);
-  }
-  return box;
-}
-
-/// Describes the tree over placements as a tree placed in unit space.
-/// @param max_coordinate largest coordinate, in unit space, of the grids of aligned placements
-void place_top(std::span<const TreeBox> boxes, float max_coordinate, packed::KernelScene& scene) {
-  TreeBox all = boxes[0];
-  for (const TreeBox& box : boxes) all.extend(box);
-  scene.top = {};
-  scene.top.aligned = 1;
-  const bool parts = boxes.size() <= kMaxPlacementsWithParts; // boxes are not enlarged then
-  scene.top_max_coordinate = max_coordinate;
-  for (size_t axis = 0; axis < 3; ++axis) {
-    scene.top.grid_from_unit[3 * axis + axis] = 1.0;
-    scene.top.box_lo[axis] = all.lo[axis], scene.top.box_hi[axis] = all.hi[axis];
-    scene.top_max_coordinate = std::max({scene.top_max_coordinate, std::abs(all.lo[axis]), std::abs(all.hi[axis])});
-  }
-  scene.top_pad_coordinate = (parts ? 1.0f : packed::kMinTopPad) * scene.top_max_coordinate;
-}
-
 } // namespace
 
 struct PackedTracer::Tables : TracedTrees {
   DeformedTrees deformed;
-  std::vector<packed::TracePlacement> placements;
-  std::vector<TreeBox> boxes;           ///< by placement: its box in unit space, not grown()
-  std::vector<uint32_t> instance_of;    ///< by placement; baked::kNone for the world tree
+  PlacedTrees placed;
   std::vector<uint32_t> first_instance; ///< by the file's geometry; a LOD level has that of its base geometry
-  std::vector<Placement> surfaces;      ///< by instance
-  std::vector<packed::TopNode> top;
-  std::vector<packed::TopNode> parts; ///< by placement; used if there are at most kMaxPlacementsWithParts
   packed::KernelScene scene{};
-  uint32_t stream_depth = 0; ///< depth of top if rays traverse it as streams, else 0
   ThreadMemoryOwner memory;
 
-  packed::ThreadMemory& of_this_thread() const { return memory.of_this_thread(stream_depth); }
+  packed::ThreadMemory& of_this_thread() const { return memory.of_this_thread(placed.stream_depth()); }
 };
 
-PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa)
-    : PackedTracer(file, source, nullptr, {}, {}, isa) {}
+PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa, const Movers& movers)
+    : PackedTracer(file, source, nullptr, isa, movers, {}, {}) {}
 
-PackedTracer::PackedTracer(const BakedFile& file, const LodSource& source, PackedIsa isa)
-    : PackedTracer(file, source, &source, {}, {}, isa) {}
+PackedTracer::PackedTracer(const BakedFile& file, const LodSource& source, PackedIsa isa, const Movers& movers)
+    : PackedTracer(file, source, &source, isa, movers, {}, {}) {}
 
 PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source,
-                           std::span<const DeformingGeometry> deforming, const DeformConfig& config, PackedIsa isa)
-    : PackedTracer(file, source, nullptr, deforming, config, isa) {}
+                           std::span<const DeformingGeometry> deforming, const DeformConfig& config, PackedIsa isa,
+                           const Movers& movers)
+    : PackedTracer(file, source, nullptr, isa, movers, deforming, config) {}
 
-PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod,
-                           std::span<const DeformingGeometry> deforming, const DeformConfig& config, PackedIsa isa)
+PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod, PackedIsa isa,
+                           const Movers& movers, std::span<const DeformingGeometry> deforming,
+                           const DeformConfig& config)
     : file_(file), source_(source), lod_(lod), kernels_(kernels_of(isa)), tables_(std::make_unique<Tables>()) {
   Tables& t = *tables_;
   static_cast<TracedTrees&>(t) = lod != nullptr ? chosen_trees(file, *lod, lod_trees_) : whole_trees(file);
   t.deformed = DeformedTrees(file, deforming, config, t);
   find_first_instances();
-  place();
-  t.hulls = {};
+  std::vector<Bounds> bounds;
+  for (uint32_t g = 0; g < source.geometry_count(); ++g) bounds.push_back(bounds_of(g));
+  t.placed.place(t, source, bounds, movers);
+  if (movers.instances.empty() && deforming.empty()) t.hulls = {};
   t.scene.clusters = t.clusters.data();
   t.scene.trees = t.trees.data();
-  t.scene.placements = t.placements.data();
-  t.scene.placement_count = static_cast<uint32_t>(t.placements.size());
-  build_top();
+  t.placed.fill_in(t.scene);
+  set_callbacks();
+}
+
+void PackedTracer::set_callbacks() {
+  Tables& t = *tables_;
   t.scene.owner = this;
   t.scene.decode_wide = [](const void* owner, uint32_t cluster, uint32_t first, uint32_t count,
                            packed::DecodedBatch& out) {
@@ -141,27 +94,6 @@ PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, con
 
 PackedTracer::~PackedTracer() = default;
 
-/// Builds the tree over placements from their boxes.
-void PackedTracer::build_top() {
-  Tables& t = *tables_;
-  if (t.placements.size() < 2) return;
-  float aligned_max_coordinate = 0.0f; // in unit space, of the grids of aligned placements
-  for (const packed::TracePlacement& placement : t.placements)
-    if (placement.aligned != 0)
-      for (size_t axis = 0; axis < 3; ++axis)
-        aligned_max_coordinate =
-            std::max(aligned_max_coordinate, static_cast<float>(t.trees[placement.tree].max_coordinate /
-                                                                std::abs(placement.grid_from_unit[3 * axis + axis])));
-  const bool parts = t.placements.size() <= kMaxPlacementsWithParts;
-  std::vector<TreeBox> boxes = t.boxes;
-  if (!parts) std::ranges::transform(boxes, boxes.begin(), grown);
-  t.top = build_top_tree(boxes);
-  t.scene.top_nodes = t.top.data();
-  t.stream_depth = t.top.size() > 1 ? top_tree_depth(t.top) : 0;
-  if (parts) t.scene.parts = t.parts.data();
-  place_top(boxes, aligned_max_coordinate, t.scene);
-}
-
 void PackedTracer::find_first_instances() {
   Tables& t = *tables_;
   const std::span<const baked::InstanceRecord> instances = file_.instances();
@@ -180,7 +112,7 @@ Bounds PackedTracer::bounds_of(uint32_t geometry) const {
 
 /// The instance that a cluster of a placement belongs to.
 uint32_t PackedTracer::instance_of(uint32_t placement, uint32_t cluster) const {
-  const uint32_t placed = tables_->instance_of[placement];
+  const uint32_t placed = tables_->placed.instance_of(placement);
   return placed != baked::kNone ? placed : tables_->first_instance[geometry_of_cluster(cluster)];
 }
 
@@ -190,84 +122,23 @@ uint32_t PackedTracer::triangle_of(uint32_t cluster, uint32_t instance, uint32_t
   return file_.sections().clusters[cluster].first_triangle + triangle;
 }
 
-void PackedTracer::place() {
-  Tables& t = *tables_;
-  const std::span<const PlacedGeometry> instances = source_.instances();
-  std::vector<Bounds> bounds;
-  for (uint32_t g = 0; g < source_.geometry_count(); ++g) bounds.push_back(bounds_of(g));
-  space_ = UnitSpace(placed_bounds(source_, bounds));
-
-  t.surfaces.resize(instances.size());
-  bool world_placed = false;
-  for (uint32_t i = 0; i < instances.size(); ++i) {
-    const uint32_t tree = t.tree_of[instances[i].geometry];
-    if (tree == baked::kNone) continue;
-    const DAffine world_from_object(instances[i].world_from_object);
-    const std::optional<DAffine> unit_from_grid = invertible_placement(
-        compose(compose(space_.unit_from_outer(), world_from_object), outer_from_grid(t.records[tree])));
-    if (!unit_from_grid) {
-      flat_instances_.push_back(i);
-      continue;
-    }
-    t.surfaces[i] = instanced_placement(i, world_from_object, *unit_from_grid);
-    // Rays are transformed in doubles and rounded once, in the grid.
-    t.surfaces[i].moved_linear = glm::dmat3(0.0);
-    t.surfaces[i].moved_offset = DVec3(0.0);
-    const bool in_world = t.records[tree].geometry == baked::kWorldTree;
-    if (in_world && world_placed) continue;
-    world_placed |= in_world;
-    add_placement(tree, in_world ? baked::kNone : i, *unit_from_grid);
-  }
+void PackedTracer::place_instances(std::span<const uint32_t> instances, std::span<const Affine> world_from_object) {
+  tables_->placed.move(instances, world_from_object);
+  tables_->placed.fill_in(tables_->scene);
 }
 
-/// @param instance baked::kNone for the world tree
-void PackedTracer::add_placement(uint32_t tree, uint32_t instance, const DAffine& unit_from_grid) {
-  Tables& t = *tables_;
-  if (t.records[tree].node_count == 0) return;
-  const DAffine grid_from_unit = inverse(unit_from_grid);
-  packed::TracePlacement placement{};
-  for (int column = 0; column < 4; ++column)
-    for (int axis = 0; axis < 3; ++axis) placement.grid_from_unit[3 * column + axis] = grid_from_unit[column][axis];
-  placement.tree = tree;
-  placement.aligned = is_aligned(grid_from_unit) ? 1 : 0;
-  placement.ray_classes = t.trees[tree].nodes[0].ray_classes;
-  t.boxes.emplace_back();
-  if (t.parts.size() < kMaxPlacementsWithParts) t.parts.emplace_back();
-  t.placements.push_back(placement);
-  t.instance_of.push_back(instance);
-  fit_placement(t.placements.size() - 1, *t.hulls[tree], unit_from_grid);
-}
+const UnitSpace& PackedTracer::space() const { return tables_->placed.space(); }
 
-/// Sets the boxes of a placement.
-void PackedTracer::fit_placement(size_t number, const TreeHull& hull, const DAffine& unit_from_grid) {
-  Tables& t = *tables_;
-  packed::TracePlacement& placement = t.placements[number];
-  for (int axis = 0; axis < 3; ++axis)
-    placement.box_lo[axis] = hull.lo()[axis], placement.box_hi[axis] = hull.hi()[axis];
-  t.boxes[number] = hull.placed(unit_from_grid);
-  if (number < t.parts.size()) t.parts[number] = top_node(hull.placed_parts(unit_from_grid, placement.aligned != 0));
-}
+std::span<const Affine> PackedTracer::world_from_object() const { return tables_->placed.world_from_object(); }
 
-void PackedTracer::deform(std::span<const DeformedFrame> frames, std::span<DeformStep> steps) {
-  assert(steps.size() == frames.size());
-  Tables& t = *tables_;
-  for (size_t i = 0; i < frames.size(); ++i) {
-    steps[i] = t.deformed.update(frames[i], t);
-    const uint32_t tree = t.tree_of[frames[i].geometry];
-    if (t.records[tree].node_count == 0) continue;
-    const TreeHull hull(t.trees[tree].nodes);
-    for (size_t p = 0; p < t.placements.size(); ++p)
-      if (t.placements[p].tree == tree) fit_placement(p, hull, t.surfaces[t.instance_of[p]].unit_from_surface);
-  }
-  build_top();
-  t.memory.forget_batches();
-}
+std::span<const uint32_t> PackedTracer::flat_instances() const { return tables_->placed.flat_instances(); }
 
-DeformStep PackedTracer::deform(uint32_t geometry, const FrameVertices& frame) {
-  const DeformedFrame one{geometry, &frame};
-  DeformStep step;
-  deform({&one, 1}, {&step, 1});
-  return step;
+std::array<DVec3, 3> PackedTracer::object_vertices(const RayHit&, const HitSurface& surface) const {
+  const uint32_t tree = tables_->tree_of[surface.geometry];
+  const DAffine object_from_grid = tables_->object_from_grid(tree);
+  std::array<DVec3, 3> vertices;
+  for (size_t i = 0; i < 3; ++i) vertices[i] = transform_point(object_from_grid, DVec3(surface.vertices[i]));
+  return vertices;
 }
 
 uint32_t PackedTracer::geometry_of_cluster(uint32_t cluster) const {
@@ -278,7 +149,7 @@ uint32_t PackedTracer::geometry_of_cluster(uint32_t cluster) const {
 }
 
 uint32_t PackedTracer::preferred_rays_per_call() const {
-  return tables_->stream_depth > 0 ? packed::kStreamRays : RayTracer::preferred_rays_per_call();
+  return tables_->placed.stream_depth() > 0 ? packed::kStreamRays : RayTracer::preferred_rays_per_call();
 }
 
 void PackedTracer::closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder, std::span<RayHit> hits) const {
@@ -319,7 +190,7 @@ HitSurface PackedTracer::resolve(const RayHit& hit) const {
   const Tables& t = *tables_;
   HitSurface surface;
   const uint32_t instance = instance_of(hit.placement, hit.part);
-  surface.placement = &t.surfaces[instance];
+  surface.placement = &t.placed.surface(instance);
   surface.geometry = source_.instances()[instance].geometry;
   surface.triangle = triangle_of(hit.part, instance, hit.triangle);
   if (const packed::TraceCluster& cluster = t.clusters[hit.part]; (cluster.flags & packed::kNeedsWideDecode) == 0) {
@@ -331,6 +202,25 @@ HitSurface PackedTracer::resolve(const RayHit& hit) const {
   for (int corner = 0; corner < 3; ++corner)
     for (int axis = 0; axis < 3; ++axis) surface.vertices[corner][axis] = batch.vertex[axis][corner][0];
   return surface;
+}
+
+void PackedTracer::deform(std::span<const DeformedFrame> frames, std::span<DeformStep> steps) {
+  assert(steps.size() == frames.size());
+  Tables& t = *tables_;
+  for (size_t i = 0; i < frames.size(); ++i) {
+    steps[i] = t.deformed.update(frames[i], t);
+    t.placed.refit(t.tree_of[frames[i].geometry]);
+  }
+  t.placed.rebuild_top();
+  t.placed.fill_in(t.scene);
+  t.memory.forget_batches();
+}
+
+DeformStep PackedTracer::deform(uint32_t geometry, const FrameVertices& frame) {
+  const DeformedFrame one{geometry, &frame};
+  DeformStep step;
+  deform({&one, 1}, {&step, 1});
+  return step;
 }
 
 void PackedTracer::previous_vertices(const RayHit& hit, Vec3 (&vertices)[3]) const {
@@ -345,15 +235,28 @@ void PackedTracer::previous_vertices(const RayHit& hit, Vec3 (&vertices)[3]) con
   std::copy(std::begin(surface.vertices), std::end(surface.vertices), std::begin(vertices));
 }
 
+std::optional<DVec3> PackedTracer::previous_position(uint32_t instance, uint32_t triangle,
+                                                     glm::dvec2 barycentrics) const {
+  const Tables& t = *tables_;
+  const uint32_t geometry = source_.instances()[instance].geometry;
+  const DeformedTree* tree = t.deformed.find(geometry);
+  if (tree == nullptr) return std::nullopt;
+  const uint32_t cluster = file_.cluster_of_triangle(geometry, triangle);
+  Vec3 v[3];
+  decode_vertices(tree->previous_clusters()[cluster], triangle - file_.clusters(geometry)[cluster].first_triangle, v);
+  const DVec3 a(v[0]), point = a + (DVec3(v[1]) - a) * barycentrics.x + (DVec3(v[2]) - a) * barycentrics.y;
+  return transform_point(t.object_from_grid(t.tree_of[geometry]), point);
+}
+
 std::vector<ResidentPart> PackedTracer::resident() const {
   const Tables& t = *tables_;
+  uint64_t hull_bytes = 0;
+  for (const std::optional<TreeHull>& hull : t.hulls) hull_bytes += hull ? hull->bytes() : 0;
   return {{"file", file_.file_bytes(), true},
           {"nodes built", t.built.nodes.size() * sizeof(baked::PackedNode)},
           {"deforming geometry", t.deformed.bytes()},
           {"cluster table", t.clusters.size() * sizeof(packed::TraceCluster)},
-          {"placements", t.placements.size() * (sizeof(packed::TracePlacement) + sizeof(TreeBox) + sizeof(uint32_t)) +
-                             t.surfaces.size() * sizeof(Placement) +
-                             (t.top.size() + t.parts.size()) * sizeof(packed::TopNode) +
+          {"placements", t.placed.bytes() + hull_bytes +
                              (t.tree_of.size() + t.grid_of.size() + t.first_instance.size()) * sizeof(uint32_t)},
           {"thread memory", ThreadMemoryOwner::bytes_of_all_threads(), true}};
 }

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "compress/format/file/baked_file.h"
+#include "runtime/trace/movers.h"
 #include "runtime/trace/packed/kernels/isa.h"
 #include "runtime/trace/packed/scene/deformed_trees.h"
 #include "runtime/trace/packed/scene/traced_trees.h"
@@ -17,24 +18,25 @@ public:
   /// Keeps references: both must outlive the tracer.
   /// @param source a source of the same file; provides instances and alpha masks
   /// Throws Error(kUnsupported) for an instruction set that this machine lacks, Error(kInput) for transforms that are
-  /// not finite.
-  PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa = chosen_isa());
+  /// not finite, Error(kUsage) for movers that do not exist or whose geometry shares the tree of the world space.
+  PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa = chosen_isa(),
+               const Movers& movers = {});
   /// Does the same at the detail of a plan: builds one tree per BLAS, except that all world-space geometries, which
   /// have one instance each, share one tree.
-  PackedTracer(const BakedFile& file, const LodSource& source, PackedIsa isa = chosen_isa());
+  PackedTracer(const BakedFile& file, const LodSource& source, PackedIsa isa = chosen_isa(), const Movers& movers = {});
   /// Traces geometries whose vertices move: each has clusters and nodes of its own, which deform() changes. They begin
   /// with the vertices of the file.
   /// @param deforming distinct geometries with clusters that have trees of their own (none in the world's tree)
   /// Also throws Error(kInput) for other geometries, and as DeformedTree's constructor does.
   PackedTracer(const BakedFile& file, const SceneSource& source, std::span<const DeformingGeometry> deforming,
-               const DeformConfig& config = {}, PackedIsa isa = chosen_isa());
+               const DeformConfig& config = {}, PackedIsa isa = chosen_isa(), const Movers& movers = {});
   ~PackedTracer() override;
   PackedTracer(const PackedTracer&) = delete;
   PackedTracer& operator=(const PackedTracer&) = delete;
 
   std::string_view name() const override { return "packed"; }
   std::string_view isa() const override { return kernels_.isa; }
-  const UnitSpace& space() const override { return space_; }
+  const UnitSpace& space() const override;
   uint32_t preferred_rays_per_call() const override;
 
   void closest_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
@@ -42,10 +44,13 @@ public:
   void any_hits(std::span<const Ray> rays, uint32_t ray_class, RayOrder order,
                 std::span<uint8_t> occluded) const override;
   HitSurface resolve(const RayHit& hit) const override;
+  void place_instances(std::span<const uint32_t> instances, std::span<const Affine> world_from_object) override;
+  std::span<const Affine> world_from_object() const override;
+  std::array<DVec3, 3> object_vertices(const RayHit& hit, const HitSurface& surface) const override;
   std::vector<ResidentPart> resident() const override;
   std::vector<TreeBytes> tree_bytes() const override { return lod_trees_.trees; }
 
-  std::span<const uint32_t> flat_instances() const override { return flat_instances_; }
+  std::span<const uint32_t> flat_instances() const override;
 
   /// Moves the vertices of a deforming geometry, in all its instances, to a new frame. space() stays: it holds the
   /// ranges of all deforming geometries. Not while other threads trace.
@@ -53,11 +58,16 @@ public:
   /// Throws as DeformedTree::update() does.
   DeformStep deform(uint32_t geometry, const FrameVertices& frame);
   /// Like deform() for several geometries; the tree over placements is updated once.
+  /// @param steps as many elements as frames
   void deform(std::span<const DeformedFrame> frames, std::span<DeformStep> steps);
 
   /// The vertices of the triangle of a hit in the frame before, in the surface's coordinates; those of resolve() if its
   /// geometry does not deform or has had one frame only.
   void previous_vertices(const RayHit& hit, Vec3 (&vertices)[3]) const;
+  /// Where a point of a deforming geometry was in the frame before, in object space; none for other geometries.
+  /// @param triangle number in the instance's geometry
+  /// @param barycentrics weights of its second and third vertex
+  std::optional<DVec3> previous_position(uint32_t instance, uint32_t triangle, glm::dvec2 barycentrics) const;
 
   /// Build times and sizes of the trees; empty unless the source is a LodSource.
   const LodTrees& lod_trees() const { return lod_trees_; }
@@ -77,24 +87,19 @@ public:
 private:
   struct Tables;
 
-  PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod,
-               std::span<const DeformingGeometry> deforming, const DeformConfig& config, PackedIsa isa);
-  void fit_placement(size_t number, const TreeHull& hull, const DAffine& unit_from_grid);
-  void build_top();
+  PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod, PackedIsa isa,
+               const Movers& movers, std::span<const DeformingGeometry> deforming, const DeformConfig& config);
+  void set_callbacks();
   void find_first_instances();
   Bounds bounds_of(uint32_t geometry) const;
   uint32_t triangle_of(uint32_t cluster, uint32_t instance, uint32_t triangle) const;
   uint32_t instance_of(uint32_t placement, uint32_t cluster) const;
-  void place();
-  void add_placement(uint32_t tree, uint32_t instance, const DAffine& unit_from_grid);
   uint32_t geometry_of_cluster(uint32_t cluster) const;
 
   const BakedFile& file_;
   const SceneSource& source_;
   const LodSource* const lod_; ///< source_ if it is a LodSource, else null
   const packed::Kernels& kernels_;
-  UnitSpace space_;
-  std::vector<uint32_t> flat_instances_;
   LodTrees lod_trees_;
   std::unique_ptr<Tables> tables_;
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "compress/format/cluster/position_grid.h"
 #include "runtime/stopwatch.h"
 #include "runtime/trace/packed/scene/trace_cluster.h"
 
@@ -79,6 +80,14 @@ packed::TraceTree trace_tree(std::span<const baked::PackedNode> nodes, const Tre
       std::max({1.0f, static_cast<float>(far.x), static_cast<float>(far.y), static_cast<float>(far.z)});
   tree.graded = needs_graded_pads(nodes, tree.max_coordinate) ? 1 : 0;
   return tree;
+}
+
+DAffine TracedTrees::object_from_grid(uint32_t tree) const {
+  const baked::TreeRecord& record = records[tree];
+  const double step = PositionGrid{record.step_mantissa, record.step_exponent}.step();
+  const DVec3 origin(static_cast<double>(record.origin[0]), static_cast<double>(record.origin[1]),
+                     static_cast<double>(record.origin[2]));
+  return DAffine(DVec3(step, 0, 0), DVec3(0, step, 0), DVec3(0, 0, step), origin * step);
 }
 
 TracedTrees whole_trees(const BakedFile& file) {

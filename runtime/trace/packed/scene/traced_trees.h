@@ -19,11 +19,14 @@ struct TracedTrees {
   std::span<const baked::TreeRecord> records;
   std::span<const baked::PackedNode> nodes;
   std::vector<packed::TraceTree> trees;
-  /// By tree, none for trees without nodes; kept until all trees are placed.
+  /// By tree, none for trees without nodes; kept while placements may change.
   std::vector<std::optional<TreeHull>> hulls;
   std::vector<packed::TraceCluster> clusters; ///< by number in the cluster section
   std::vector<uint32_t> tree_of;              ///< by the source's geometry: number of its tree, or baked::kNone
   std::vector<uint32_t> grid_of;              ///< by the file's geometry: tree in whose grid its clusters are decoded
+
+  /// The transform from a tree's grid to object space, or to world space for the world tree.
+  DAffine object_from_grid(uint32_t tree) const;
 };
 
 /// Time and memory of building the trees of a LodSource.

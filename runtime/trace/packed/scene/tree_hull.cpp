@@ -2,10 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 namespace packtrace {
 namespace {
+
+using Double2 = double __attribute__((vector_size(16)));
+
+Double2 load(const double* values) {
+  Double2 result;
+  std::memcpy(&result, values, sizeof(result));
+  return result;
+}
 
 struct Child {
   DVec3 lo, hi;
@@ -64,23 +73,32 @@ std::vector<TreeBox> TreeHull::placed_parts(const DAffine& unit_from_grid, bool 
 }
 
 TreeBox TreeHull::placed(const DAffine& unit_from_grid, double pad, size_t begin, size_t end) const {
+  constexpr double kInf = std::numeric_limits<double>::infinity();
+  Double2 lo[3], hi[3]; // by axis, of every other box each
+  std::fill_n(lo, 3, Double2{kInf, kInf});
+  std::fill_n(hi, 3, Double2{-kInf, -kInf});
+  const glm::dmat3 linear(unit_from_grid), size(glm::abs(linear[0]), glm::abs(linear[1]), glm::abs(linear[2]));
+  for (size_t i = begin; i < end; i += 2) {
+    const auto two = [&](const std::vector<double>& of) { // the last of an odd number counts twice
+      return i + 1 < end ? load(&of[i]) : Double2{of[i], of[i]};
+    };
+    const Double2 centre[3] = {two(centre_[0]), two(centre_[1]), two(centre_[2])};
+    const Double2 half[3] = {two(half_[0]), two(half_[1]), two(half_[2])};
+    for (int axis = 0; axis < 3; ++axis) {
+      const Double2 middle = linear[0][axis] * centre[0] + linear[1][axis] * centre[1] + linear[2][axis] * centre[2];
+      const Double2 reach = size[0][axis] * half[0] + size[1][axis] * half[1] + size[2][axis] * half[2];
+      const Double2 low = middle - reach, high = middle + reach;
+      lo[axis] = low < lo[axis] ? low : lo[axis];
+      hi[axis] = high > hi[axis] ? high : hi[axis];
+    }
+  }
   TreeBox box;
   for (int axis = 0; axis < 3; ++axis) {
-    const DVec3 row(unit_from_grid[0][axis], unit_from_grid[1][axis], unit_from_grid[2][axis]), size = glm::abs(row);
-    double lo[2], hi[2]; // of even and odd boxes: two independent dependency chains
-    std::fill_n(lo, 2, std::numeric_limits<double>::infinity());
-    std::fill_n(hi, 2, -std::numeric_limits<double>::infinity());
-    for (size_t i = begin; i < end; ++i) {
-      const double middle = row.x * centre_[0][i] + row.y * centre_[1][i] + row.z * centre_[2][i];
-      const double reach = size.x * half_[0][i] + size.y * half_[1][i] + size.z * half_[2][i];
-      lo[i & 1] = std::min(lo[i & 1], middle - reach);
-      hi[i & 1] = std::max(hi[i & 1], middle + reach);
-    }
-    const double offset = unit_from_grid[3][axis], beyond = pad * (size.x + size.y + size.z);
+    const double offset = unit_from_grid[3][axis], beyond = pad * (size[0][axis] + size[1][axis] + size[2][axis]);
     box.lo[static_cast<size_t>(axis)] =
-        std::nextafter(static_cast<float>(offset + std::min(lo[0], lo[1]) - beyond), -INFINITY);
+        std::nextafter(static_cast<float>(offset + std::min(lo[axis][0], lo[axis][1]) - beyond), -INFINITY);
     box.hi[static_cast<size_t>(axis)] =
-        std::nextafter(static_cast<float>(offset + std::max(hi[0], hi[1]) + beyond), INFINITY);
+        std::nextafter(static_cast<float>(offset + std::max(hi[axis][0], hi[axis][1]) + beyond), INFINITY);
   }
   return box;
 }

@@ -25,6 +25,10 @@ public:
   /// space: rays are then tested against these bounds as they are against the tree's own boxes.
   std::vector<TreeBox> placed_parts(const DAffine& unit_from_grid, bool aligned) const;
 
+  uint64_t bytes() const {
+    return sizeof(TreeHull) + 6 * centre_[0].size() * sizeof(double) + ends_.size() * sizeof(size_t);
+  }
+
 private:
   TreeBox placed(const DAffine& unit_from_grid, double pad, size_t begin, size_t end) const;
   /// Maximum rounding error of rays, in the tree's grid.

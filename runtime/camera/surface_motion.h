@@ -1,0 +1,44 @@
+#pragma once
+
+#include <utility>
+
+#include "runtime/camera/primary_visibility.h"
+
+namespace packtrace {
+
+/// A point that a camera ray hit.
+struct SurfacePoint {
+  const RayHit& hit;
+  const HitSurface& surface;
+  DVec3 position; ///< world space
+  DVec3 from_hit; ///< unit space: the point minus the one that the barycentrics of `hit` yield
+  glm::dvec2 pixel_centre;
+  float view_z;
+};
+
+/// Motion of surface points since the previous frame.
+class SurfaceMotion {
+public:
+  /// Throws Error(kUsage) for previous transforms that are not one per instance.
+  SurfaceMotion(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
+                const PreviousFrame& previous);
+
+  /// False if nothing moved: motion is zero everywhere.
+  bool any() const { return any_; }
+
+  /// Returns GBuffer::motion_px and GBuffer::previous_z.
+  std::pair<Vec2, float> of(const SurfacePoint& point) const;
+
+private:
+  std::optional<DVec3> previous_position(const SurfacePoint& point) const;
+  glm::dvec2 exact_barycentrics(const SurfacePoint& point) const;
+  const Affine& world_from_object(uint32_t instance) const;
+
+  const SceneSource& source_;
+  const RayTracer& tracer_;
+  const PreviousFrame previous_;
+  const std::span<const Affine> placed_; ///< by instance; empty: as in the source
+  bool camera_moved_, any_;
+};
+
+} // namespace packtrace
