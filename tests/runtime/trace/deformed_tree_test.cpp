@@ -15,10 +15,10 @@ namespace {
 using test::any;
 using test::BakedScene;
 using test::closest;
+using test::DeformedSource;
 using test::isas;
 using test::kMovingSphere;
 using test::Motion;
-using test::MovedSource;
 using test::MovedVertices;
 using test::moving_scene;
 using test::random_rays;
@@ -36,7 +36,7 @@ std::vector<Motion> waves(int count) {
 /// Compares with Embree over the decoded vertices of the frame.
 void expect_embree_agrees(const BakedScene& scene, const PackedTracer& tracer, const MovedVertices& frame,
                           uint32_t seed) {
-  const MovedSource source(scene, {nullptr, &frame});
+  const DeformedSource source(scene, {nullptr, &frame});
   const EmbreeTracer embree(source, {});
   const std::vector<Ray> rays = random_rays(20000, kNear, tracer.space(), seed);
   const std::vector<Ray> same = random_rays(20000, kNear, embree.space(), seed);
@@ -177,7 +177,7 @@ TEST(DeformedTree, AFrameIsHitLikeAFileBakedFromItsPositions) {
   tracer.deform(0, frame);
 
   Scene frozen = living;
-  const MovedSource source(scene, {&frame});
+  const DeformedSource source(scene, {&frame});
   Mesh mesh;
   mesh.positions.resize(source.counts(0).vertices);
   mesh.triangles.resize(source.counts(0).triangles);
@@ -211,7 +211,7 @@ TEST(DeformedTree, PreviousVerticesAreThoseOfTheFrameBefore) {
   const MovedVertices before(scene.file, moving, frames[2]), now(scene.file, moving, frames[3]);
   tracer.deform(kMovingSphere, before);
   tracer.deform(kMovingSphere, now);
-  const MovedSource old_source(scene, {nullptr, &before});
+  const DeformedSource old_source(scene, {nullptr, &before});
   std::vector<Vec3> positions(old_source.counts(kMovingSphere).vertices);
   std::vector<Triangle> triangles(old_source.counts(kMovingSphere).triangles);
   old_source.decode(kMovingSphere, positions, triangles);

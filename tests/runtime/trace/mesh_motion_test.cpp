@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "runtime/camera/deformed_past.h"
 #include "tests/deforming_meshes.h"
 #include "tests/runtime/trace/packed_scenes.h"
 
@@ -92,6 +93,63 @@ TEST(MeshMotion, VerticesThatStayHaveNoMotion) {
   EXPECT_GT(largest_step(tracer), 0.0);
   EXPECT_TRUE(motion.set_time(1e9, false, tracer).moved); // the last frame stays
   EXPECT_FALSE(motion.set_time(2e9, false, tracer).moved);
+}
+
+TEST(MeshMotion, MotionVectorsPointToWhereTheSurfaceWas) {
+  const test::Cloth cloth(30);
+  const BakedScene moving(cloth_scene(cloth, 0.0), moving_config(cloth));
+  MeshMotion motion(moving.file);
+  PackedTracer tracer(moving.file, moving.source, motion.geometries());
+  motion.set_time(2.0 / 24.0, false, tracer);
+  motion.set_time(3.0 / 24.0, false, tracer);
+  const PrimaryCamera camera(test::camera_at({0.5, 0.5, -2}, {0.5, 0.5, 0}), {64, 64});
+  const DeformedPast past(tracer);
+  PreviousFrame previous{camera};
+  previous.surfaces = &past;
+  GBuffer now;
+  Progress progress;
+  trace_primary(moving.source, tracer, camera, previous, now, progress);
+
+  // Vertex by vertex, from the source's frames: the point's barycentrics in the current frame, used in the one before.
+  const baked::DeformationRecord& record = deformation_records(moving.file.sections().deformation)[0];
+  const DeformationPlayer player(moving.file, 0);
+  const baked::GeometryRecord& geometry = moving.file.geometries()[record.geometry];
+  const double step = PositionGrid{geometry.step_mantissa, geometry.step_exponent}.step();
+  const auto corners_in = [&](uint32_t frame, uint32_t triangle, DVec3(&out)[3]) {
+    const uint32_t c = moving.file.cluster_of_triangle(record.geometry, triangle);
+    const ClusterView view = moving.file.cluster(record.geometry, c);
+    std::vector<FrameVertex> vertices(view.vertex_count());
+    player.decode(frame, c, vertices);
+    const Triangle t = view.triangle(triangle - view.record().first_triangle);
+    for (int k = 0; k < 3; ++k)
+      for (size_t axis = 0; axis < 3; ++axis)
+        out[k][static_cast<int>(axis)] = static_cast<double>(record.lo[axis] + vertices[t[k]][axis]) * step;
+  };
+  size_t moved = 0, still = 0;
+  for (size_t i = 0; i < now.instance.size(); ++i) {
+    if (now.instance[i] == kNoInstance) continue;
+    const PlacedGeometry& placed = moving.source.instances()[now.instance[i]];
+    if (placed.geometry != record.geometry) {
+      EXPECT_EQ(now.motion_px[i], Vec2(0));
+      ++still;
+      continue;
+    }
+    const DAffine world_from_object(placed.world_from_object);
+    DVec3 a[3], b[3];
+    corners_in(3, now.triangle[i], a), corners_in(2, now.triangle[i], b);
+    const DVec3 p = transform_point(inverse(world_from_object), DVec3(now.position[i])), e = a[1] - a[0],
+                f = a[2] - a[0], n = glm::cross(e, f);
+    const double u = glm::dot(glm::cross(p - a[0], f), n) / glm::dot(n, n),
+                 v = glm::dot(glm::cross(e, p - a[0]), n) / glm::dot(n, n);
+    const DVec3 before = transform_point(world_from_object, b[0] + (b[1] - b[0]) * u + (b[2] - b[0]) * v);
+    const std::optional<ProjectedPoint> seen = camera.project(before);
+    ASSERT_TRUE(seen);
+    const glm::dvec2 centre(static_cast<double>(i % 64) + 0.5, static_cast<double>(i / 64) + 0.5);
+    EXPECT_LT(glm::distance(glm::dvec2(now.motion_px[i]), centre - seen->pixel), 0.05);
+    moved += glm::length(now.motion_px[i]) > 0.1f;
+  }
+  EXPECT_GT(moved, 100u);
+  EXPECT_GT(still, 20u);
 }
 
 TEST(MeshMotion, FilesWithoutFramesHaveNone) {

@@ -79,9 +79,9 @@ private:
 };
 
 /// A source whose deforming geometries are decoded in one frame.
-class MovedSource final : public SceneSource {
+class DeformedSource final : public SceneSource {
 public:
-  MovedSource(const BakedScene& scene, std::vector<const MovedVertices*> moved)
+  DeformedSource(const BakedScene& scene, std::vector<const MovedVertices*> moved)
       : file_(scene.file), still_(scene.source), moved_(std::move(moved)) {}
 
   uint32_t geometry_count() const override { return still_.geometry_count(); }

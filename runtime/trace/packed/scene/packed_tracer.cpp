@@ -244,6 +244,25 @@ HitSurface PackedTracer::resolve(const RayHit& hit) const {
   return surface;
 }
 
+void PackedTracer::deform(std::span<const DeformedFrame> frames, std::span<DeformStep> steps) {
+  assert(steps.size() == frames.size());
+  Tables& t = *tables_;
+  for (size_t i = 0; i < frames.size(); ++i) {
+    steps[i] = t.deformed.update(frames[i], t);
+    t.placed.refit(t.tree_of[frames[i].geometry]);
+  }
+  t.placed.rebuild_top();
+  t.placed.fill_in(t.scene);
+  t.memory.forget_batches();
+}
+
+DeformStep PackedTracer::deform(uint32_t geometry, const FrameVertices& frame) {
+  const DeformedFrame one{geometry, &frame};
+  DeformStep step;
+  deform({&one, 1}, {&step, 1});
+  return step;
+}
+
 void PackedTracer::previous_vertices(const RayHit& hit, Vec3 (&vertices)[3]) const {
   const Tables& t = *tables_;
   const uint32_t geometry = geometry_of_cluster(hit.part);
@@ -254,6 +273,19 @@ void PackedTracer::previous_vertices(const RayHit& hit, Vec3 (&vertices)[3]) con
   }
   const HitSurface surface = resolve(hit);
   std::copy(std::begin(surface.vertices), std::end(surface.vertices), std::begin(vertices));
+}
+
+std::optional<DVec3> PackedTracer::previous_position(uint32_t instance, uint32_t triangle,
+                                                     glm::dvec2 barycentrics) const {
+  const Tables& t = *tables_;
+  const uint32_t geometry = source_.instances()[instance].geometry;
+  const DeformedTree* tree = t.deformed.find(geometry);
+  if (tree == nullptr) return std::nullopt;
+  const uint32_t cluster = file_.cluster_of_triangle(geometry, triangle);
+  Vec3 v[3];
+  decode_vertices(tree->previous_clusters()[cluster], triangle - file_.clusters(geometry)[cluster].first_triangle, v);
+  const DVec3 a(v[0]), point = a + (DVec3(v[1]) - a) * barycentrics.x + (DVec3(v[2]) - a) * barycentrics.y;
+  return transform_point(t.object_from_grid(t.tree_of[geometry]), point);
 }
 
 std::vector<ResidentPart> PackedTracer::resident() const {

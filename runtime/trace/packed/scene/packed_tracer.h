@@ -60,6 +60,7 @@ public:
   /// Throws as DeformedTree::update() does.
   DeformStep deform(uint32_t geometry, const FrameVertices& frame);
   /// Like deform() for several geometries; the tree over placements is updated once.
+  /// @param steps as many elements as frames
   void deform(std::span<const DeformedFrame> frames, std::span<DeformStep> steps);
 
   /// The vertices of the triangle of a hit in the frame before, in the surface's coordinates; those of resolve() if its

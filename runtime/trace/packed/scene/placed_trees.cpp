@@ -151,6 +151,18 @@ void PlacedTrees::update_placement(uint32_t number, const DAffine& unit_from_gri
   if (number < parts_.size()) parts_[number] = top_node(hull.placed_parts(unit_from_grid, placement.aligned != 0));
 }
 
+void PlacedTrees::refit(uint32_t tree) {
+  const bool enlarged = placements_.size() > kMaxPlacementsWithParts;
+  for (uint32_t p = 0; p < placements_.size(); ++p) {
+    if (placements_[p].tree != tree) continue;
+    const TreeHull& hull = *trees_->hulls[tree];
+    for (int axis = 0; axis < 3; ++axis)
+      placements_[p].box_lo[axis] = hull.lo()[axis], placements_[p].box_hi[axis] = hull.hi()[axis];
+    update_placement(p, surfaces_[example_of_[p]].unit_from_surface);
+    if (enlarged) boxes_[p] = grown(boxes_[p]);
+  }
+}
+
 void PlacedTrees::move(std::span<const uint32_t> instances, std::span<const Affine> world_from_object) {
   check_moves(movable_, instances, world_from_object);
   if (instances.empty()) return;
