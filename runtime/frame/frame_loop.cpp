@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "pbrt_import/base/error.h"
+#include "runtime/camera/deformed_past.h"
 #include "runtime/camera/lod_view.h"
 #include "runtime/camera/origin_lift.h"
 #include "runtime/camera/primary_visibility.h"
@@ -20,21 +21,6 @@ uint64_t count_hits(const GBuffer& g) {
   return static_cast<uint64_t>(
       std::count_if(g.instance.begin(), g.instance.end(), [](uint32_t id) { return id != kNoInstance; }));
 }
-
-/// Previous vertices of the deforming meshes of a tracer.
-class DeformedSurfaces final : public SurfaceHistory {
-public:
-  DeformedSurfaces(const SceneSource& source, const PackedTracer& tracer) : source_(source), tracer_(tracer) {}
-  std::optional<DVec3> previous_position(uint32_t instance, uint32_t triangle, glm::dvec2 barycentrics) const override {
-    const auto v = tracer_.previous_object_vertices(source_.instances()[instance].geometry, triangle);
-    if (!v) return std::nullopt;
-    return (*v)[0] + ((*v)[1] - (*v)[0]) * barycentrics.x + ((*v)[2] - (*v)[0]) * barycentrics.y;
-  }
-
-private:
-  const SceneSource& source_;
-  const PackedTracer& tracer_;
-};
 
 /// Marks that nothing has moved since the G-buffer was traced.
 void forget_motion(GBuffer& gbuffer) {
@@ -281,8 +267,8 @@ void FrameLoop::trace_camera_rays(const PrimaryCamera& view) {
   Progress unseen;
   const Stopwatch tracing;
   const bool moved_on = report_.moved && view_; // not the first frame
-  std::optional<DeformedSurfaces> surfaces;
-  if (moved_on && meshes_) surfaces.emplace(source, static_cast<const PackedTracer&>(tracer));
+  std::optional<DeformedPast> surfaces;
+  if (moved_on && meshes_) surfaces.emplace(static_cast<const PackedTracer&>(tracer));
   const PreviousFrame before{moved_on ? *view_ : view,
                              moved_on ? std::span<const Affine>(last_world_) : std::span<const Affine>(),
                              surfaces ? &*surfaces : nullptr};

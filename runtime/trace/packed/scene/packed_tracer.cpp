@@ -33,8 +33,8 @@ packed::KernelHit* kernel_hits(std::span<RayHit> hits) { return reinterpret_cast
 } // namespace
 
 struct PackedTracer::Tables : TracedTrees {
-  PlacedTrees placed;
   DeformedTrees deformed;
+  PlacedTrees placed;
   std::vector<uint32_t> first_instance; ///< by the file's geometry; a LOD level has that of its base geometry
   packed::KernelScene scene{};
   ThreadMemoryOwner memory;
@@ -43,19 +43,19 @@ struct PackedTracer::Tables : TracedTrees {
 };
 
 PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa, const Movers& movers)
-    : PackedTracer(file, source, nullptr, {}, {}, isa, movers) {}
+    : PackedTracer(file, source, nullptr, isa, movers, {}, {}) {}
 
 PackedTracer::PackedTracer(const BakedFile& file, const LodSource& source, PackedIsa isa, const Movers& movers)
-    : PackedTracer(file, source, &source, {}, {}, isa, movers) {}
+    : PackedTracer(file, source, &source, isa, movers, {}, {}) {}
 
 PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source,
                            std::span<const DeformingGeometry> deforming, const DeformConfig& config, PackedIsa isa,
                            const Movers& movers)
-    : PackedTracer(file, source, nullptr, deforming, config, isa, movers) {}
+    : PackedTracer(file, source, nullptr, isa, movers, deforming, config) {}
 
-PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod,
-                           std::span<const DeformingGeometry> deforming, const DeformConfig& config, PackedIsa isa,
-                           const Movers& movers)
+PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod, PackedIsa isa,
+                           const Movers& movers, std::span<const DeformingGeometry> deforming,
+                           const DeformConfig& config)
     : file_(file), source_(source), lod_(lod), kernels_(kernels_of(isa)), tables_(std::make_unique<Tables>()) {
   Tables& t = *tables_;
   static_cast<TracedTrees&>(t) = lod != nullptr ? chosen_trees(file, *lod, lod_trees_) : whole_trees(file);
@@ -139,46 +139,6 @@ std::array<DVec3, 3> PackedTracer::object_vertices(const RayHit&, const HitSurfa
   std::array<DVec3, 3> vertices;
   for (size_t i = 0; i < 3; ++i) vertices[i] = transform_point(object_from_grid, DVec3(surface.vertices[i]));
   return vertices;
-}
-
-void PackedTracer::deform(std::span<const DeformedFrame> frames, std::span<DeformStep> steps) {
-  assert(steps.size() == frames.size());
-  Tables& t = *tables_;
-  std::vector<uint8_t> changed(t.trees.size(), 0);
-  for (size_t i = 0; i < frames.size(); ++i) {
-    steps[i] = t.deformed.update(frames[i], t);
-    const uint32_t tree = t.tree_of[frames[i].geometry];
-    if (t.records[tree].node_count == 0) continue;
-    t.hulls[tree].emplace(t.trees[tree].nodes);
-    changed[tree] = 1;
-  }
-  t.placed.refit(changed);
-  t.placed.fill_in(t.scene);
-  t.memory.forget_batches();
-}
-
-std::optional<std::array<DVec3, 3>> PackedTracer::previous_object_vertices(uint32_t geometry, uint32_t triangle) const {
-  const Tables& t = *tables_;
-  const DeformedTree* const deformed = lod_ == nullptr ? t.deformed.find(geometry) : nullptr;
-  if (deformed == nullptr) return std::nullopt;
-  const baked::GeometryRecord& record = file_.geometries()[geometry];
-  const std::span<const baked::ClusterRecord> clusters =
-      file_.sections().clusters.subspan(record.first_cluster, record.cluster_count);
-  const auto next = std::ranges::upper_bound(clusters, triangle, {}, &baked::ClusterRecord::first_triangle);
-  const auto cluster = static_cast<size_t>(next - clusters.begin() - 1);
-  Vec3 in_grid[3];
-  decode_vertices(deformed->previous_clusters()[cluster], triangle - clusters[cluster].first_triangle, in_grid);
-  const DAffine object_from_grid = t.object_from_grid(t.tree_of[geometry]);
-  std::array<DVec3, 3> vertices;
-  for (size_t i = 0; i < 3; ++i) vertices[i] = transform_point(object_from_grid, DVec3(in_grid[i]));
-  return vertices;
-}
-
-DeformStep PackedTracer::deform(uint32_t geometry, const FrameVertices& frame) {
-  const DeformedFrame one{geometry, &frame};
-  DeformStep step;
-  deform({&one, 1}, {&step, 1});
-  return step;
 }
 
 uint32_t PackedTracer::geometry_of_cluster(uint32_t cluster) const {

@@ -1,8 +1,6 @@
 #pragma once
 
-#include <array>
 #include <memory>
-#include <optional>
 
 #include "compress/format/file/baked_file.h"
 #include "runtime/trace/movers.h"
@@ -66,8 +64,10 @@ public:
   /// The vertices of the triangle of a hit in the frame before, in the surface's coordinates; those of resolve() if its
   /// geometry does not deform or has had one frame only.
   void previous_vertices(const RayHit& hit, Vec3 (&vertices)[3]) const;
-  /// The object-space vertices of a triangle in the frame before; none if its geometry does not deform.
-  std::optional<std::array<DVec3, 3>> previous_object_vertices(uint32_t geometry, uint32_t triangle) const;
+  /// Where a point of a deforming geometry was in the frame before, in object space; none for other geometries.
+  /// @param triangle number in the instance's geometry
+  /// @param barycentrics weights of its second and third vertex
+  std::optional<DVec3> previous_position(uint32_t instance, uint32_t triangle, glm::dvec2 barycentrics) const;
 
   /// Build times and sizes of the trees; empty unless the source is a LodSource.
   const LodTrees& lod_trees() const { return lod_trees_; }
@@ -87,9 +87,8 @@ public:
 private:
   struct Tables;
 
-  PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod,
-               std::span<const DeformingGeometry> deforming, const DeformConfig& config, PackedIsa isa,
-               const Movers& movers);
+  PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod, PackedIsa isa,
+               const Movers& movers, std::span<const DeformingGeometry> deforming, const DeformConfig& config);
   void set_callbacks();
   void find_first_instances();
   Bounds bounds_of(uint32_t geometry) const;

@@ -106,6 +106,9 @@ void PlacedTrees::list_placements() {
 void PlacedTrees::add_placement(uint32_t instance, uint32_t example) {
   const uint32_t tree = tree_of_instance_[example];
   packed::TracePlacement placement{};
+  const TreeHull& hull = *trees_->hulls[tree];
+  for (int axis = 0; axis < 3; ++axis)
+    placement.box_lo[axis] = hull.lo()[axis], placement.box_hi[axis] = hull.hi()[axis];
   placement.tree = tree;
   placement.ray_classes = trees_->trees[tree].nodes[0].ray_classes;
   const auto number = static_cast<uint32_t>(placements_.size());
@@ -115,28 +118,7 @@ void PlacedTrees::add_placement(uint32_t instance, uint32_t example) {
   boxes_.emplace_back();
   if (parts_.size() < kMaxPlacementsWithParts) parts_.emplace_back();
   if (!movable_.empty()) placement_of_[example] = number;
-  set_box(number);
   update_placement(number, surfaces_[example].unit_from_surface);
-}
-
-/// Copies the bounds of a placement's tree.
-void PlacedTrees::set_box(uint32_t number) {
-  packed::TracePlacement& placement = placements_[number];
-  const TreeHull& hull = *trees_->hulls[placement.tree];
-  for (int axis = 0; axis < 3; ++axis)
-    placement.box_lo[axis] = hull.lo()[axis], placement.box_hi[axis] = hull.hi()[axis];
-}
-
-void PlacedTrees::refit(std::span<const uint8_t> changed) {
-  const bool enlarged = placements_.size() > kMaxPlacementsWithParts;
-  for_moves(placements_.size(), [&](size_t p) {
-    const auto number = static_cast<uint32_t>(p);
-    if (changed[placements_[number].tree] == 0) return;
-    set_box(number);
-    update_placement(number, surfaces_[example_of_[number]].unit_from_surface);
-    if (enlarged) boxes_[number] = grown(boxes_[number]);
-  });
-  build_top();
 }
 
 /// Computes what depends on a placement's transform. Its box is not enlarged.

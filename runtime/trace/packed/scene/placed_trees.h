@@ -16,7 +16,8 @@ namespace packtrace {
 class PlacedTrees {
 public:
   /// Places all instances of a source.
-  /// @param trees needed during this call only, unless there are movers or trees that change: then they must outlive this object
+  /// @param trees needed during this call only, unless there are movers or trees that change: then they must outlive
+  /// this object
   /// @param bounds object-space bounds, by geometry of the source
   /// Throws Error(kInput) for transforms that are not finite, Error(kUsage) for movers that do not exist or whose
   /// geometry is part of the world tree.
@@ -25,9 +26,10 @@ public:
   /// As RayTracer::place_instances().
   void move(std::span<const uint32_t> instances, std::span<const Affine> world_from_object);
 
-  /// Updates the boxes of placements after nodes of their trees have changed. TracedTrees::hulls holds the new hulls.
-  /// @param changed one byte per tree: 1 if its nodes changed
-  void refit(std::span<const uint8_t> changed);
+  /// Fits the boxes of a tree's placements to its current hull. Call rebuild_top() and fill_in() after all trees that
+  /// changed.
+  void refit(uint32_t tree);
+  void rebuild_top() { build_top(); }
 
   /// Points a scene to the placements and to the tree over them.
   void fill_in(packed::KernelScene& scene) const;
@@ -47,7 +49,6 @@ private:
   bool set_surface(uint32_t instance, const Affine& world_from_object, const DAffine& unit_from_grid);
   void list_placements();
   void add_placement(uint32_t instance, uint32_t example);
-  void set_box(uint32_t number);
   void update_placement(uint32_t number, const DAffine& unit_from_grid);
   void prepare_moves(std::span<const uint32_t> instances, std::span<const Affine> world_from_object);
   DAffine unit_from_grid(uint32_t tree, const Affine& world_from_object) const;
