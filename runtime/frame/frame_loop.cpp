@@ -160,7 +160,8 @@ void FrameLoop::restore(const Camera& camera, double time_s, std::span<const std
           ? config_.traced_size()
           : ImageSize{(config_.traced_size().width + 1) / 2, (config_.traced_size().height + 1) / 2};
   reset();
-  if (!raw_mean_->restore(shaded.pixels(), bytes.first(saved.mean_bytes))) fail();
+  const bool has_history = config_.denoise ? bytes.size() > saved.mean_bytes : saved.mean_bytes > 0;
+  if (!has_history || !raw_mean_->restore(shaded.pixels(), bytes.first(saved.mean_bytes))) fail();
   denoiser_.restore(shaded, bytes.subspan(saved.mean_bytes));
   // Camera rays are traced again: they depend on the camera alone.
   layers_.clear();
