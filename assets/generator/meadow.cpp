@@ -26,16 +26,29 @@
 namespace packtrace::scenegen {
 namespace {
 
-constexpr const char* kComment =
-    "# A meadow in the wind: instances of a patch of grass at five levels of detail, a lane, a fence and a windmill.\n"
-    "# To be seen: gusts that travel over the grass, dark between the blades; poppies, daisies and cornflowers.\n"
-    "# geometry/grass_N_%04d.ply are the frames of level N; the mill's sails and the birds move too.\n"
-    "# Made by packtrace_scenegen meadow; pbrt-v3 renders its first frame as it stands.\n\n";
-
 constexpr double kCell = MeadowTerrain::kCell;
 constexpr DVec3 kEye(-3.4, 1.55, -3.0); ///< y above the ground
 constexpr DVec3 kTarget(6.5, 0.0, 60.0);
-constexpr const char* kTones[] = {"grass_lush", "grass_meadow", "grass_dry"};
+/// Materials are "grass_TONE", textures grass_TONE.png, objects "grass_LOD_TONE".
+constexpr const char* kTones[] = {"lush", "meadow", "dry"};
+
+std::string comment_of(const MeadowConfig& config) {
+  std::string text =
+      "# A meadow in the wind: instances of a patch of grass at five levels of detail, a lane, a fence and a "
+      "windmill.\n"
+      "# To be seen: gusts that travel over the grass, dark between the blades; poppies, daisies and cornflowers.\n"
+      "# Made by packtrace_scenegen meadow; pbrt-v3 renders its first frame as it stands.\n";
+  if (config.frames == 1) return text + "\n";
+  text +=
+      "# geometry/grass_N_%04d.ply are the frames of level N; the mill's sails and the birds move too:\n#   packtrace "
+      "bake meadow.pbrt -o meadow.ptk";
+  text += fmt::format(" --sequence-fps {}", config.frames_per_second);
+  const char* patch = config.tile == 1 ? "" : "_P";
+  for (uint32_t lod = 0; lod + 1 < kGrassLods; ++lod)
+    text += fmt::format(" \\\n#     --sequence 'geometry/grass_{}{}_%04d.ply'", lod, patch);
+  if (config.tile > 1) text += fmt::format("\n# for each patch P of the tile, 0 to {}", config.tile * config.tile - 1);
+  return text + "\n\n";
+}
 
 ViewConfig meadow_view(const MeadowConfig& config) {
   const MeadowTerrain terrain(config.seed);
@@ -129,9 +142,9 @@ void MeadowBuilder::write_materials() {
   for (const auto& [name, albedo] : paints) writer_.material(name, albedo);
   constexpr double kStraw[] = {0.06, 0.22, 0.55};
   for (size_t i = 0; i < std::size(kTones); ++i) {
-    const std::string file = std::string(kTones[i]) + ".png";
+    const std::string material = fmt::format("grass_{}", kTones[i]), file = material + ".png";
     write_grass_texture(file, kStraw[i], output_);
-    writer_.textured_material(kTones[i], file);
+    writer_.textured_material(material, file);
   }
 }
 
@@ -173,17 +186,17 @@ void MeadowBuilder::build_grass() {
     const std::string name = grass_name(grass, variant);
     if (written.insert(variant).second) {
       const std::string file = write_grass_frames(grass_, variant, config_.frames, output_);
-      writer_.ply_model(name, file, kTones[1], uint64_t{kBladeTriangles} * grass_blade_count(grass, variant.lod));
-      for (const char* tone : kTones) writer_.object(name + tone, name, {{kTones[1], tone}});
+      writer_.ply_model(name, file, "grass", uint64_t{kBladeTriangles} * grass_blade_count(grass, variant.lod));
+      for (const std::string tone : kTones) writer_.object(name + "_" + tone, name, {{"grass", "grass_" + tone}});
     }
     const double x = static_cast<double>(cell.column) * kCell, z = static_cast<double>(cell.row) * kCell;
     const double dry =
-        fractal_noise({x * 0.035, 0.0, z * 0.035}, config_.seed + 31, 2) + smooth_step(6.0, 60.0, cell.distance);
+        fractal_noise({x * 0.035, 0.0, z * 0.035}, config_.seed + 31, 2) + 0.5 * smooth_step(6.0, 60.0, cell.distance);
     const double tone = 0.55 + 1.5 * dry + random_.uniform(-0.5, 0.5);
     const double tall = fractal_noise({x * 0.06, 0.0, z * 0.06}, config_.seed + 32, 2);
     const double scale = 0.9 + 0.4 * tall + random_.uniform(-0.07, 0.07);
     const auto chosen = static_cast<size_t>(std::clamp(tone, 0.0, 2.9));
-    writer_.instance(name + kTones[chosen], terrain_.shear_to_ground(x, z, kCell, kCell, scale));
+    writer_.instance(fmt::format("{}_{}", name, kTones[chosen]), terrain_.shear_to_ground(x, z, kCell, kCell, scale));
   }
 }
 
@@ -295,7 +308,7 @@ GrassConfig meadow_grass(const MeadowConfig& config) {
 
 SceneTotals generate_meadow(const MeadowConfig& config, const OutputConfig& output) {
   make_grass_field(meadow_grass(config)); // rejects bad parameters before anything is written
-  SceneWriter writer(output, "meadow", kComment, meadow_view(config));
+  SceneWriter writer(output, "meadow", comment_of(config), meadow_view(config));
   MeadowBuilder(config, output, writer).build();
   return writer.finish();
 }
