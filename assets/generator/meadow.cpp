@@ -272,7 +272,7 @@ void MeadowBuilder::build_movers() {
   writer_.moving_instance("sails", compose(axle, rotation_z(0.25)), compose(axle, rotation_z(0.25 + turn)));
   const double seconds = config_.frames / config_.frames_per_second;
   for (int i = 0; i < 9; ++i) {
-    const DVec3 at(random_.uniform(-12.0, 26.0), 11.0 + random_.uniform(-2.0, 4.0), random_.uniform(38.0, 58.0));
+    const DVec3 at(random_.uniform(-12.0, 26.0), 15.5 + random_.uniform(-1.5, 4.5), random_.uniform(38.0, 58.0));
     const double heading = radians(70) + random_.uniform(-0.25, 0.25), size = random_.uniform(0.8, 1.1);
     const auto [s, c] = sin_cos(heading);
     const DVec3 end = at + DVec3(s, 0.06, c) * (4.5 * seconds);

@@ -9,7 +9,7 @@ namespace packtrace::scenegen {
 
 /// Parameters of a wind field. Lengths are in units of the scene.
 struct WindConfig {
-  double strength = 0.42;     ///< bend that a mean wind causes, as in GrassConfig::droop; [0, 4]
+  double strength = 0.5;      ///< bend that a mean wind causes, as in GrassConfig::droop; [0, 4]
   double direction_rad = 0.3; ///< towards which it blows, from +x towards +z; [-2 pi, 2 pi]
   double gustiness = 0.8;     ///< the strength varies by this fraction, up and down; [0, 1]
   double gust_length = 3.0;   ///< wavelength of the longest gusts; [tile / 64, tile]
