@@ -318,8 +318,9 @@ Model make_lighthouse(Random& random) {
   return model;
 }
 
-Model make_windmill(Random& random) {
-  Model model;
+namespace {
+
+void add_windmill_tower(Model& model) {
   static constexpr glm::dvec2 kTower[] = {{2.7, -1.5}, {2.5, 0.0}, {2.1, 6.4}};
   static constexpr glm::dvec2 kCap[] = {{2.45, 6.3}, {2.2, 6.8}, {1.4, 8.0}, {0.0, 8.9}};
   add_lathe(model.smooth("wall"), kHere, kTower, 24);
@@ -327,14 +328,37 @@ Model make_windmill(Random& random) {
   add_rod(model.smooth("wood"), {0, 6.9, 0}, {0, 6.9, -3.2}, 0.14, 8);
   add_box(model.flat("door"), kHere, {-0.5, 0, -2.62}, {0.5, 2.0, -2.0});
   add_box(model.flat("glass"), kHere, {-0.3, 3.4, -2.4}, {0.3, 4.3, -2.0});
-  const double phase = random.uniform(0.2, 0.5);
+}
+
+void add_windmill_sails(Model& model, DVec3 axle, double phase_rad) {
   for (int sail = 0; sail < 8; ++sail) {
-    const DAffine f = compose(translation({0, 6.9, -3.0}), rotation_z(phase + kPi / 4 * sail));
+    const DAffine f = compose(translation(axle), rotation_z(phase_rad + kPi / 4 * sail));
     add_box(model.flat("wood"), f, {-0.05, 0.0, -0.05}, {0.05, 4.6, 0.05});
     add_triangle(model.flat("white"), transform_point(f, {0.07, 1.2, 0.0}), transform_point(f, {0.07, 4.5, 0.0}),
                  transform_point(f, {1.5, 2.6, -0.35}));
   }
+}
+
+} // namespace
+
+Model make_windmill(Random& random) {
+  Model model;
+  add_windmill_tower(model);
+  add_windmill_sails(model, kSailAxle, random.uniform(0.2, 0.5));
   model.finish();
+  return model;
+}
+
+Model make_windmill_tower() {
+  Model model;
+  add_windmill_tower(model);
+  model.finish();
+  return model;
+}
+
+Model make_windmill_sails() {
+  Model model;
+  add_windmill_sails(model, DVec3(0.0), 0.0);
   return model;
 }
 

@@ -37,5 +37,8 @@ House make_house(const HouseConfig& config, Random& random);
 Model make_church(Random& random);     ///< nave and bell tower, about 24 m tall, 11 m x 20 m
 Model make_lighthouse(Random& random); ///< about 17 m
 Model make_windmill(Random& random);   ///< about 10 m, sails towards -z
+Model make_windmill_tower();           ///< without sails
+Model make_windmill_sails();           ///< turn about the z axis through kSailAxle of the tower; 8 alike
+inline constexpr DVec3 kSailAxle{0.0, 6.9, -3.0};
 
 } // namespace packtrace::scenegen

@@ -3,22 +3,13 @@
 #include <cmath>
 #include <vector>
 
-#define STB_IMAGE_WRITE_IMPLEMENTATION
-#define STB_IMAGE_WRITE_STATIC
-#define STBI_WRITE_NO_STDIO
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wconversion"
-#pragma GCC diagnostic ignored "-Wunused-function"
-#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
-#include <stb/stb_image_write.h>
-#pragma GCC diagnostic pop
-
 #include "assets/generator/placement.h"
+#include "assets/generator/png_output.h"
 
 namespace packtrace::scenegen {
 namespace {
 
-constexpr int kWidth = 96, kHeight = 128;
+constexpr uint32_t kWidth = 96, kHeight = 128;
 
 /// Whether a point is inside the leaf; x across in [-1,1], y from 0 at the stalk to 1 at the tip.
 bool inside(double x, double y) {
@@ -37,18 +28,15 @@ bool inside(double x, double y) {
 } // namespace
 
 void generate_leaf_mask(const OutputConfig& output) {
-  std::vector<unsigned char> texels;
-  for (int row = 0; row < kHeight; ++row) {
-    for (int column = 0; column < kWidth; ++column) {
+  std::vector<uint8_t> texels;
+  for (uint32_t row = 0; row < kHeight; ++row) {
+    for (uint32_t column = 0; column < kWidth; ++column) {
       const double x = (column + 0.5) / kWidth * 2.0 - 1.0, y = 1.0 - (row + 0.5) / kHeight;
       texels.push_back(inside(x, y) ? 255 : 0);
     }
   }
   BufferedFile file(output.folder / "leaf.png", output.overwrite);
-  const auto sink = [](void* context, void* bytes, int size) {
-    static_cast<BufferedFile*>(context)->write({static_cast<const char*>(bytes), static_cast<size_t>(size)});
-  };
-  stbi_write_png_to_func(sink, &file, kWidth, kHeight, 1, texels.data(), kWidth);
+  write_png(file, kWidth, kHeight, 1, texels);
   file.close();
 }
 

@@ -10,6 +10,7 @@
 #include "assets/generator/extreme.h"
 #include "assets/generator/forest.h"
 #include "assets/generator/leaf_mask.h"
+#include "assets/generator/meadow.h"
 #include "assets/generator/town.h"
 #include "pbrt_import/base/error.h"
 
@@ -25,6 +26,7 @@ int run(int argc, char** argv) {
   AsteroidsConfig asteroids;
   DisplacedMeshConfig mesh;
   ExtremeConfig extreme;
+  MeadowConfig meadow;
   std::function<SceneTotals()> generate;
   const auto add_verb = [&](const char* name, const char* about, std::function<SceneTotals()> make) {
     CLI::App* verb = app.add_subcommand(name, about);
@@ -62,6 +64,18 @@ int run(int argc, char** argv) {
 
   verb = add_verb("extreme", "sizes from 1e-6 to 1e6 side by side", [&] { return generate_extreme(extreme, output); });
   add_seed(verb, extreme.seed);
+
+  verb = add_verb("meadow", "grass that moves in the wind, one PLY file a frame",
+                  [&] { return generate_meadow(meadow, output); });
+  add_seed(verb, meadow.seed);
+  verb->add_option("--patches", meadow.patches, "placed, nearest first [1, 5000]")->capture_default_str();
+  verb->add_option("--blades", meadow.blades, "of the finest patch, a square number [1, 1000000]")
+      ->capture_default_str();
+  verb->add_option("--tile", meadow.tile, "patches per axis until blades and wind repeat [1, 8]")
+      ->capture_default_str();
+  verb->add_option("--frames", meadow.frames, "after which all motion repeats [1, 10000]")->capture_default_str();
+  verb->add_option("--fps", meadow.frames_per_second, "frames per second [1, 240]")->capture_default_str();
+  verb->add_option("--wind", meadow.wind, "strength; 1 is a breeze [0, 4]")->capture_default_str();
 
   add_verb("leaf", "the alpha mask of assets/room's plant", [&] {
     generate_leaf_mask(output);

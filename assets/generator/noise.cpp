@@ -40,4 +40,14 @@ double fractal_noise(DVec3 point, uint64_t seed, uint32_t octaves) {
   return total > 0.0 ? sum / total : 0.0;
 }
 
+double tiling_noise(glm::dvec2 point, int64_t period, uint64_t seed) {
+  const glm::dvec2 cell = glm::floor(point), f = point - cell;
+  const auto wrap = [period](double i) { return (static_cast<int64_t>(i) % period + period) % period; };
+  const int64_t x0 = wrap(cell.x), x1 = wrap(cell.x + 1.0), y0 = wrap(cell.y), y1 = wrap(cell.y + 1.0);
+  const double u = fade(f.x);
+  const double low = glm::mix(lattice_value(x0, y0, 0, seed), lattice_value(x1, y0, 0, seed), u);
+  const double high = glm::mix(lattice_value(x0, y1, 0, seed), lattice_value(x1, y1, 0, seed), u);
+  return glm::mix(low, high, fade(f.y));
+}
+
 } // namespace packtrace::scenegen

@@ -7,15 +7,27 @@
 #include "assets/generator/ply_output.h"
 
 namespace packtrace::scenegen {
+namespace {
+
+/// Four significant digits move the far end of a 20 m object by a millimetre; positions need more.
+std::string transform_text(const DAffine& m) {
+  return fmt::format("Transform [{:.4g} {:.4g} {:.4g} 0 {:.4g} {:.4g} {:.4g} 0 {:.4g} {:.4g} {:.4g} 0 "
+                     "{:.6g} {:.6g} {:.6g} 1]",
+                     m[0].x, m[0].y, m[0].z, m[1].x, m[1].y, m[1].z, m[2].x, m[2].y, m[2].z, m[3].x, m[3].y, m[3].z);
+}
+
+} // namespace
 
 SceneWriter::SceneWriter(const OutputConfig& config, std::string name, std::string_view comment, const ViewConfig& view)
     : config_(config), name_(std::move(name)), main_(config.folder / (name_ + ".pbrt"), config.overwrite),
       objects_(config.folder / (name_ + "_objects.pbrt"), config.overwrite),
       instances_(config.folder / (name_ + "_instances.pbrt"), config.overwrite) {
   main_.write(comment);
+  if (view.end_time_s > 0.0) main_.write(fmt::format("TransformTimes 0 {}\n", view.end_time_s));
   main_.write(fmt::format("LookAt {} {} {}  {} {} {}  0 1 0\n", view.eye.x, view.eye.y, view.eye.z, view.target.x,
                           view.target.y, view.target.z));
-  main_.write(fmt::format("Camera \"perspective\" \"float fov\" [ {} ]\n", view.fov_degrees));
+  main_.write(fmt::format("Camera \"perspective\" \"float fov\" [ {} ]{}\n", view.fov_degrees,
+                          view.end_time_s > 0.0 ? " \"float shutteropen\" [ 0 ] \"float shutterclose\" [ 0 ]" : ""));
   main_.write(fmt::format("Film \"image\" \"integer xresolution\" [ {} ] \"integer yresolution\" [ {} ] "
                           "\"string filename\" [ \"{}.exr\" ]\n",
                           view.width_px, view.height_px, name_));
@@ -27,6 +39,19 @@ SceneWriter::SceneWriter(const OutputConfig& config, std::string name, std::stri
 void SceneWriter::material(std::string_view name, Vec3 albedo) {
   main_.write(fmt::format("MakeNamedMaterial \"{}\" \"string type\" \"matte\" \"rgb Kd\" [ {} {} {} ]\n", name,
                           albedo.x, albedo.y, albedo.z));
+}
+
+void SceneWriter::textured_material(std::string_view name, std::string_view file) {
+  main_.write(fmt::format("Texture \"{0}\" \"spectrum\" \"imagemap\" \"string filename\" \"{1}\"\n"
+                          "MakeNamedMaterial \"{0}\" \"string type\" \"matte\" \"texture Kd\" \"{0}\"\n",
+                          name, file));
+}
+
+void SceneWriter::ply_model(std::string_view model_name, std::string_view file, std::string_view material,
+                            uint64_t triangle_count) {
+  models_.insert_or_assign(std::string(model_name),
+                           StoredModel{Model(), {{std::string(file), std::string(material)}}, triangle_count, true});
+  totals_.unique_triangles += triangle_count;
 }
 
 void SceneWriter::model(std::string_view model_name, Model model) {
@@ -70,7 +95,7 @@ void SceneWriter::write_shapes(const std::vector<PlyPart>& parts, const Material
   }
 }
 
-void SceneWriter::instance(std::string_view object_name, const DAffine& m) {
+void SceneWriter::count_instance(std::string_view object_name) {
   const auto found = object_names_.find(object_name);
   assert(found != object_names_.end());
   StoredObject& object = found->second;
@@ -81,13 +106,24 @@ void SceneWriter::instance(std::string_view object_name, const DAffine& m) {
     objects_.write("ObjectEnd\n");
     object.written = true;
   }
-  // Four significant digits move the far end of a 20 m object by a millimetre; positions need more.
-  instances_.write(fmt::format("Transform [{:.4g} {:.4g} {:.4g} 0 {:.4g} {:.4g} {:.4g} 0 {:.4g} {:.4g} {:.4g} 0 "
-                               "{:.6g} {:.6g} {:.6g} 1]ObjectInstance \"{}\"\n",
-                               m[0].x, m[0].y, m[0].z, m[1].x, m[1].y, m[1].z, m[2].x, m[2].y, m[2].z, m[3].x, m[3].y,
-                               m[3].z, object_name));
   ++totals_.instances;
   totals_.placed_triangles += model.triangle_count;
+}
+
+void SceneWriter::instance(std::string_view object_name, const DAffine& world_from_object) {
+  count_instance(object_name);
+  instances_.write(transform_text(world_from_object));
+  instances_.write(fmt::format("ObjectInstance \"{}\"\n", object_name));
+}
+
+void SceneWriter::moving_instance(std::string_view object_name, const DAffine& world_from_object_begin,
+                                  const DAffine& world_from_object_end) {
+  count_instance(object_name);
+  instances_.write("AttributeBegin ActiveTransform StartTime ");
+  instances_.write(transform_text(world_from_object_begin));
+  instances_.write("\n  ActiveTransform EndTime ");
+  instances_.write(transform_text(world_from_object_end));
+  instances_.write(fmt::format("\n  ActiveTransform All ObjectInstance \"{}\" AttributeEnd\n", object_name));
 }
 
 void SceneWriter::world_shape(std::string_view model_name) {

@@ -26,6 +26,7 @@ struct ViewConfig {
   double fov_degrees = 40.0; ///< along the shorter image axis
   uint32_t width_px = 1280;
   uint32_t height_px = 720;
+  double end_time_s = 0.0; ///< of moving instances, which begin at 0, the camera's time; 0 if nothing moves
 };
 
 /// Material replacements, from the model's name to the object's: {"wall", "wall_rose"}.
@@ -48,8 +49,14 @@ public:
   /// Adds a diffuse material; albedo in linear sRGB, [0,1].
   void material(std::string_view name, Vec3 albedo);
 
+  /// Adds a diffuse material with an image over the texture coordinates; `file` is relative to the folder.
+  void textured_material(std::string_view name, std::string_view file);
+
   /// Stores a finished model under a name. Its meshes are written when it is first used.
   void model(std::string_view model_name, Model model);
+  /// Stores a model of one PLY file that the caller writes; `file` is relative to the folder.
+  void ply_model(std::string_view model_name, std::string_view file, std::string_view material,
+                 uint64_t triangle_count);
   /// Declares an object that uses a model, optionally with other materials. ObjectBegin is written with its first
   /// instance.
   void object(std::string_view object_name, std::string_view model_name, const MaterialChoice& choice = {});
@@ -57,6 +64,9 @@ public:
   void object(std::string_view object_name, Model model);
   /// Writes an instance of an object, and the object before its first instance.
   void instance(std::string_view object_name, const DAffine& world_from_object);
+  /// Writes an instance that moves from one transform at time 0 to another at ViewConfig::end_time_s.
+  void moving_instance(std::string_view object_name, const DAffine& world_from_object_begin,
+                       const DAffine& world_from_object_end);
   /// Places a stored model once in the world, without a transform.
   void world_shape(std::string_view model_name);
   /// Places a PLY file that the caller wrote once in the world; `file` is relative to the folder.
@@ -81,6 +91,7 @@ private:
     bool written = false;
   };
   const StoredModel& written_model(std::string_view name);
+  void count_instance(std::string_view object_name);
   void write_shapes(const std::vector<PlyPart>& parts, const MaterialChoice& choice);
 
   OutputConfig config_;

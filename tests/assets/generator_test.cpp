@@ -11,6 +11,7 @@
 #include "assets/generator/extreme.h"
 #include "assets/generator/forest.h"
 #include "assets/generator/leaf_mask.h"
+#include "assets/generator/meadow.h"
 #include "assets/generator/placement.h"
 #include "assets/generator/town.h"
 #include "pbrt_import/base/error.h"
@@ -38,6 +39,7 @@ std::map<std::string, std::string> generate_all(const std::filesystem::path& fol
   generate_displaced_mesh({seed, 40'000}, {folder / "mesh", false});
   generate_extreme({seed}, {folder / "extreme", false});
   generate_asteroids({seed, 5, 300}, {folder / "asteroids", false});
+  generate_meadow({.seed = seed, .patches = 400, .blades = 100, .tile = 2, .frames = 3}, {folder / "meadow", false});
   generate_leaf_mask({folder / "leaf", false});
   return files_under(folder);
 }
@@ -51,7 +53,8 @@ TEST(Generators, AnotherSeedGivesAnotherScene) {
   const TemporaryFolder folder;
   const auto a = generate_all(folder / "a", 42), b = generate_all(folder / "b", 43);
   for (const char* name : {"town/town_instances.pbrt", "forest/forest_instances.pbrt", "mesh/geometry/ring.ply",
-                           "extreme/extreme_instances.pbrt", "asteroids/asteroids_instances.pbrt"}) {
+                           "extreme/extreme_instances.pbrt", "asteroids/asteroids_instances.pbrt",
+                           "meadow/meadow_instances.pbrt", "meadow/geometry/grass_0_0_0000.ply"}) {
     EXPECT_NE(a.at(name), b.at(name)) << name;
   }
 }
@@ -69,10 +72,19 @@ TEST(CommittedScenes, AreWhatTheGeneratorWritesToday) {
   const TemporaryFolder folder;
   generate_town({}, {folder / "town", false});
   generate_extreme({}, {folder / "extreme", false});
+  generate_meadow({}, {folder / "meadow", false});
   generate_leaf_mask({folder / "leaf", false});
+  EXPECT_TRUE(same_files(files_under(kAssets / "meadow"), files_under(folder / "meadow")));
   EXPECT_TRUE(same_files(files_under(kAssets / "town"), files_under(folder / "town")));
   EXPECT_TRUE(same_files(files_under(kAssets / "extreme"), files_under(folder / "extreme")));
   EXPECT_EQ(files_under(kAssets / "room").at("leaf.png"), files_under(folder / "leaf").at("leaf.png"));
+}
+
+TEST(CommittedScenes, MeadowIsSmall) {
+  uint64_t bytes = 0;
+  for (const auto& [name, content] : files_under(kAssets / "meadow")) bytes += content.size();
+  EXPECT_GT(bytes, 1u << 20);
+  EXPECT_LE(bytes, 4u << 20);
 }
 
 TEST(CommittedScenes, TownIsSmallAndFull) {
@@ -124,6 +136,14 @@ TEST(Generators, OptionsOutOfRangeAreRejectedBeforeAnythingIsWritten) {
   EXPECT_EQ(kind_of_error([&] { generate_asteroids({1, 0, 10}, output); }), ErrorKind::kUsage);
   EXPECT_EQ(kind_of_error([&] { generate_asteroids({1, 11, 10}, output); }), ErrorKind::kUsage);
   EXPECT_EQ(kind_of_error([&] { generate_asteroids({1, 5'001, 10'000}, output); }), ErrorKind::kUsage);
+  for (const MeadowConfig& config :
+       {MeadowConfig{.patches = 0}, MeadowConfig{.patches = 5001}, MeadowConfig{.blades = 0},
+        MeadowConfig{.blades = 1001}, MeadowConfig{.blades = 1'002'001}, MeadowConfig{.tile = 0},
+        MeadowConfig{.tile = 9}, MeadowConfig{.frames = 0}, MeadowConfig{.frames_per_second = 0.5},
+        MeadowConfig{.frames = 4000, .frames_per_second = 1.0}, MeadowConfig{.wind = 4.1},
+        MeadowConfig{.wind = std::nan("")}}) {
+    EXPECT_EQ(kind_of_error([&] { generate_meadow(config, output); }), ErrorKind::kUsage);
+  }
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));
 }
 
