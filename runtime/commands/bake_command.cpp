@@ -12,7 +12,7 @@
 #include "compress/bake/bake_scene.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/with_file.h"
-#include "pbrt_import/files/ply_sequence.h"
+#include "pbrt_import/ply_sequence.h"
 #include "pbrt_import/scene/separate_motion.h"
 #include "runtime/commands/bake_options.h"
 #include "runtime/commands/bake_report.h"

@@ -1,4 +1,4 @@
-#include "pbrt_import/files/ply_sequence.h"
+#include "pbrt_import/ply_sequence.h"
 
 #include <algorithm>
 #include <limits>
