@@ -15,7 +15,10 @@ set(packtrace_public_headers
   pbrt_import/scene/image_size.h
   pbrt_import/scene/material_flags.h
   pbrt_import/scene/math.h
+  pbrt_import/scene/motion_pose.h
+  pbrt_import/scene/rigid_motion.h
   pbrt_import/scene/scene.h
+  pbrt_import/scene/separate_motion.h
   # packtrace::format: baked files and their decoders
   compress/format/cluster/cluster_codec.h
   compress/format/cluster/index_codec.h
@@ -30,6 +33,7 @@ set(packtrace_public_headers
   compress/format/layout/bit_stream.h
   compress/format/layout/lod_format.h
   compress/format/layout/packed_node.h
+  compress/format/motion/motion_summary.h
   compress/format/pages/page_codec.h
   compress/format/pages/page_contexts.h
   compress/format/textures/texture_codec.h
@@ -64,6 +68,8 @@ set(packtrace_public_headers
   runtime/lod/lod_sharing.h
   runtime/lod/sharing_balance.h
   runtime/lod/sharing_config.h
+  runtime/motion/motion_targets.h
+  runtime/motion/scene_motion.h
   runtime/render/renderer.h
   runtime/trace/embree/embree_tracer.h
   runtime/trace/make_tracer.h
