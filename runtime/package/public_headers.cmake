@@ -19,6 +19,7 @@ set(packtrace_public_headers
   pbrt_import/scene/rigid_motion.h
   pbrt_import/scene/separate_motion.h
   pbrt_import/scene/scene.h
+  pbrt_import/scene/separate_motion.h
   # packtrace::format: baked files and their decoders
   compress/format/cluster/cluster_codec.h
   compress/format/cluster/index_codec.h
@@ -33,6 +34,7 @@ set(packtrace_public_headers
   compress/format/layout/bit_stream.h
   compress/format/layout/lod_format.h
   compress/format/layout/packed_node.h
+  compress/format/motion/motion_summary.h
   compress/format/pages/page_codec.h
   compress/format/pages/page_contexts.h
   compress/format/textures/texture_codec.h
