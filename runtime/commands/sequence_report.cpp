@@ -11,7 +11,8 @@ namespace packtrace {
 namespace {
 
 using Pass = std::pair<const char*, double PassTimes::*>;
-constexpr std::array<Pass, 7> kPasses{{{"plan", &PassTimes::plan_s},
+constexpr std::array<Pass, 8> kPasses{{{"update", &PassTimes::update_s},
+                                       {"plan", &PassTimes::plan_s},
                                        {"build", &PassTimes::build_s},
                                        {"primary", &PassTimes::primary_s},
                                        {"ao", &PassTimes::ao_s},
