@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "compress/format/cluster/position_grid.h"
+#include "compress/format/deformation/deformation_view.h"
 #include "compress/format/file/baked_file.h"
 
 namespace packtrace {
@@ -44,6 +46,18 @@ void drop_unused_tracks(RigidMotion& motion) {
   motion.tracks = std::move(kept);
 }
 
+/// Object-space box of all frames of a geometry that deforms.
+Bounds bounds_of_frames(const baked::GeometryRecord& geometry, const baked::DeformationRecord& frames) {
+  const double step = PositionGrid{geometry.step_mantissa, geometry.step_exponent}.step();
+  Bounds bounds;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int64_t lo = frames.lo[static_cast<size_t>(axis)];
+    bounds.lo[axis] = static_cast<double>(from_lattice(lo, step));
+    bounds.hi[axis] = static_cast<double>(from_lattice(lo + frames.extent[static_cast<size_t>(axis)], step));
+  }
+  return bounds;
+}
+
 } // namespace
 
 MotionTargets motion_targets(const BakedFile& file) {
@@ -54,6 +68,10 @@ MotionTargets motion_targets(const BakedFile& file) {
     targets.instances.push_back({std::string(file.text(g.name)), file.world_from_object(i), object_bounds(g),
                                  (g.flags & baked::kWorldSpace) != 0});
   }
+  for (const baked::DeformationRecord& frames : deformation_records(file.sections().deformation))
+    for (uint32_t i = 0; i < file.instances().size(); ++i)
+      if (file.instances()[i].geometry == frames.geometry)
+        targets.instances[i].box = bounds_of_frames(file.geometries()[frames.geometry], frames);
   return targets;
 }
 

@@ -13,7 +13,7 @@ class BakedFile;
 struct MotionTarget {
   std::string name; ///< of its geometry: the object, or the mesh of a shape outside objects; shared by many instances
   Affine placement{1.0f}; ///< world_from_object at rest
-  Bounds box;             ///< of its geometry in object space
+  Bounds box;             ///< of its geometry in object space; of all frames if it deforms
   bool fixed = false;     ///< part of the world's own tree, so it cannot move
 };
 
