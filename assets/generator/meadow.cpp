@@ -287,7 +287,7 @@ void MeadowBuilder::build_movers() {
 GrassConfig meadow_grass(const MeadowConfig& config) {
   check_parameter("--patches", config.patches, 1u, 5000u);
   check_parameter("--blades", config.blades, 1u, 1'000'000u);
-  check_parameter("--tile", config.tile, 1u, 8u);
+  check_parameter("--tile", config.tile, 1u, 16u);
   check_parameter("--frames", config.frames, 1u, 10'000u);
   check_parameter("--fps", config.frames_per_second, 1.0, 240.0);
   check_parameter("--wind", config.wind, 0.0, 4.0);
