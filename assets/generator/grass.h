@@ -34,7 +34,7 @@ struct GrassConfig {
   std::array<double, kGrassLods> lod_wind{1.0, 1.0, 0.75, 0.4, 0.0};     ///< scale of the motion; [0, 1], not ascending
 };
 
-/// A blade at rest and how the wind moves it: 116 bytes that do not change over time.
+/// A blade at rest and how the wind moves it: 88 bytes that do not change over time.
 struct GrassBlade {
   Vec3 root;                          ///< patch space: x and z in [0, patch_size), y = 0
   float length;                       ///< of the centre line
@@ -45,6 +45,8 @@ struct GrassBlade {
   Vec2 own_phase;                     ///< cosine and sine
   std::array<Vec2, kWindWaves> gusts; ///< bends along the wind, factors of WindMoment::waves
 };
+
+static_assert(sizeof(GrassBlade) == 88);
 
 /// A field of grass: the parameters, checked, and the wind.
 struct GrassField {

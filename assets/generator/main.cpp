@@ -71,7 +71,7 @@ int run(int argc, char** argv) {
   verb->add_option("--patches", meadow.patches, "placed, nearest first [1, 5000]")->capture_default_str();
   verb->add_option("--blades", meadow.blades, "of the finest patch, a square number [1, 1000000]")
       ->capture_default_str();
-  verb->add_option("--tile", meadow.tile, "patches per axis until blades and wind repeat [1, 8]")
+  verb->add_option("--tile", meadow.tile, "patches per axis until blades and wind repeat [1, 16]")
       ->capture_default_str();
   verb->add_option("--frames", meadow.frames, "after which all motion repeats [1, 10000]")->capture_default_str();
   verb->add_option("--fps", meadow.frames_per_second, "frames per second [1, 240]")->capture_default_str();

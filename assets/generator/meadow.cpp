@@ -140,7 +140,7 @@ void MeadowBuilder::write_materials() {
       {"bird", {0.05f, 0.05f, 0.07f}},         {"cloud", {0.93f, 0.94f, 0.96f}},
       {"mountain_a", {0.38f, 0.50f, 0.56f}},   {"mountain_b", {0.56f, 0.67f, 0.78f}}};
   for (const auto& [name, albedo] : paints) writer_.material(name, albedo);
-  constexpr double kStraw[] = {0.06, 0.22, 0.55};
+  constexpr double kStraw[] = {0.05, 0.14, 0.34};
   for (size_t i = 0; i < std::size(kTones); ++i) {
     const std::string material = fmt::format("grass_{}", kTones[i]), file = material + ".png";
     write_grass_texture(file, kStraw[i], output_);
@@ -287,7 +287,7 @@ void MeadowBuilder::build_movers() {
 GrassConfig meadow_grass(const MeadowConfig& config) {
   check_parameter("--patches", config.patches, 1u, 5000u);
   check_parameter("--blades", config.blades, 1u, 1'000'000u);
-  check_parameter("--tile", config.tile, 1u, 8u);
+  check_parameter("--tile", config.tile, 1u, 16u);
   check_parameter("--frames", config.frames, 1u, 10'000u);
   check_parameter("--fps", config.frames_per_second, 1.0, 240.0);
   check_parameter("--wind", config.wind, 0.0, 4.0);

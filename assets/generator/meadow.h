@@ -11,7 +11,7 @@ struct MeadowConfig {
   uint64_t seed = 5;
   uint32_t patches = 3200;         ///< placed, nearest first; [1, 5000]
   uint32_t blades = 1444;          ///< of a patch at LOD 0, a square number; [1, 1000000]
-  uint32_t tile = 1;               ///< patches per axis until blades and wind repeat; [1, 8]
+  uint32_t tile = 1;               ///< patches per axis until blades and wind repeat; [1, 16]
   uint32_t frames = 12;            ///< after which all motion repeats; [1, 10000]
   double frames_per_second = 12.0; ///< [1, 240]
   double wind = 1.0;               ///< scale of the wind's strength; [0, 4]

@@ -56,7 +56,7 @@ struct WindMoment {
   Vec2 direction; ///< unit vector (x, z) towards which the wind blows
 };
 
-/// @param phase fraction of the period, finite; phases that differ by whole numbers give equal results
+/// @param phase fraction of the period, finite; whole periods do not count
 WindMoment wind_moment(const WindField& field, double phase);
 
 } // namespace packtrace::scenegen

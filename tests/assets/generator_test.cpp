@@ -139,7 +139,7 @@ TEST(Generators, OptionsOutOfRangeAreRejectedBeforeAnythingIsWritten) {
   for (const MeadowConfig& config :
        {MeadowConfig{.patches = 0}, MeadowConfig{.patches = 5001}, MeadowConfig{.blades = 0},
         MeadowConfig{.blades = 1001}, MeadowConfig{.blades = 1'002'001}, MeadowConfig{.tile = 0},
-        MeadowConfig{.tile = 9}, MeadowConfig{.frames = 0}, MeadowConfig{.frames_per_second = 0.5},
+        MeadowConfig{.tile = 17}, MeadowConfig{.frames = 0}, MeadowConfig{.frames_per_second = 0.5},
         MeadowConfig{.frames = 4000, .frames_per_second = 1.0}, MeadowConfig{.wind = 4.1},
         MeadowConfig{.wind = std::nan("")}}) {
     EXPECT_EQ(kind_of_error([&] { generate_meadow(config, output); }), ErrorKind::kUsage);

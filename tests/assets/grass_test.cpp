@@ -158,6 +158,28 @@ TEST(Grass, WindIsOneFieldOverAllPatches) {
   }
 }
 
+TEST(Grass, GustsTravelDownwindAtTheirSpeedAndLength) {
+  WindConfig config;
+  config.period_s = 20.0;
+  constexpr double kTile = 48.0;
+  for (const double direction : {-2.5, -1.0, 0.0, 0.9, 3.0}) {
+    config.direction_rad = direction;
+    const WindField field = make_wind_field(config, kTile, 1);
+    double amplitudes = 0.0;
+    for (const WindWave& wave : field.waves) {
+      const glm::dvec2 per_unit(static_cast<double>(wave.cycles_x) / kTile, static_cast<double>(wave.cycles_z) / kTile);
+      const double frequency = glm::length(per_unit);
+      EXPECT_GT(glm::dot(per_unit, glm::dvec2(std::cos(direction), std::sin(direction))), 0.6 * frequency);
+      EXPECT_NEAR(static_cast<double>(wave.cycles_t) / config.period_s / frequency, config.speed, 0.05 * config.speed);
+      EXPECT_LE(1.0 / frequency, 1.05 * config.gust_length);
+      amplitudes += wave.amplitude;
+    }
+    EXPECT_NEAR(amplitudes, 1.0, 1e-12);
+    const double x = static_cast<double>(field.waves[0].cycles_x), z = static_cast<double>(field.waves[0].cycles_z);
+    EXPECT_NEAR(kTile / std::sqrt(x * x + z * z), config.gust_length, 0.05 * config.gust_length);
+  }
+}
+
 /// Bends of blades that differ in nothing but their places show the wind at these places, in every patch: so the wind
 /// is the same on both sides of a seam.
 TEST(Grass, BladesOfAllPatchesBendAsTheWindAtTheirPlacesSays) {

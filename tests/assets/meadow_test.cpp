@@ -116,6 +116,9 @@ TEST(Meadow, SixtyFourPatchesOfTenThousandBladesHaveThreePointTwoMillionTriangle
   const SceneTotals few = generate_meadow({.patches = 64, .blades = 1, .frames = 1}, {folder / "few", false});
   const SceneTotals many = generate_meadow({.patches = 64, .blades = 10'000, .frames = 1}, {folder / "many", false});
   EXPECT_EQ(many.placed_triangles - few.placed_triangles, 64u * 9'999u * kBladeTriangles);
+  const SceneTotals apart =
+      generate_meadow({.patches = 64, .blades = 1, .tile = 16, .frames = 1}, {folder / "c", false});
+  EXPECT_EQ(apart.unique_triangles - few.unique_triangles, 63u * kBladeTriangles) << "no two patches are equal";
 }
 
 } // namespace
