@@ -359,7 +359,7 @@ private:
   SharedBorders shared_borders_;
   MemoryReservation memory_{config_.memory};
   std::optional<GeometryPacker> packer_;
-  Bounds motion_bounds_;                 // of moving instances at all times
+  Bounds motion_bounds_; // of moving instances at all times
   std::vector<EncodedDeformation> deformations_;
   std::vector<EncodedTexture> textures_; // in the scene's order; empty if textures are not stored
   BakeReport report_;

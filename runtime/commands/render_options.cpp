@@ -10,7 +10,7 @@ namespace packtrace {
 namespace {
 
 // Many frames: camera rays are jittered from frame to frame.
-constexpr uint32_t kGroundTruthFrames = 64, kGroundTruthSpp = 16;
+constexpr uint32_t kGroundTruthFrames = 256, kGroundTruthSpp = 4;
 
 /// Options for the pictures to write.
 void add_picture_options(CLI::App& verb, RenderOptions& options) {
@@ -57,7 +57,7 @@ void add_sampling_options(CLI::App& verb, RenderOptions& options) {
   verb.add_option("--spp", options.spp, "Ambient occlusion rays per pixel and frame, 1..65536 (default 1)")
       ->type_name("N");
   verb.add_flag("--ground-truth", options.ground_truth,
-                "Render a reference image without denoiser, in 64 frames of 16 spp unless --frames or --spp are given. "
+                "Render a reference image without denoiser, in 256 frames of 4 spp unless --frames or --spp are given. "
                 "Takes minutes");
   verb.add_flag("--no-jitter", options.no_jitter,
                 "Trace camera rays through pixel centres only. By default each frame shifts them within their pixels, "

@@ -18,7 +18,7 @@ struct EncodedGeometry {
   std::array<uint32_t, 8> class_clusters{};
   uint32_t triangle_count = 0, vertex_count = 0;
   std::vector<SourceVertex> sources; ///< by vertex, cluster after cluster; empty unless the geometry deforms
-  Vec3 bounds_lo{}, bounds_hi{}; ///< of decoded positions; lo > hi if empty
+  Vec3 bounds_lo{}, bounds_hi{};     ///< of decoded positions; lo > hi if empty
   ClusterView::StreamBits stream_bits;
 };
 
