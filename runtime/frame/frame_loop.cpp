@@ -9,6 +9,8 @@
 #include "runtime/camera/origin_lift.h"
 #include "runtime/camera/primary_visibility.h"
 #include "runtime/stopwatch.h"
+#include "runtime/trace/packed/scene/mesh_motion.h"
+#include "runtime/trace/packed/scene/packed_tracer.h"
 
 namespace packtrace {
 namespace {

@@ -15,9 +15,10 @@
 #include "runtime/frame/rendered_image.h"
 #include "runtime/motion/scene_motion.h"
 #include "runtime/trace/make_tracer.h"
-#include "runtime/trace/packed/scene/mesh_motion.h"
 
 namespace packtrace {
+
+class MeshMotion;
 
 /// What a FrameLoop traces. Everything referenced must outlive it.
 struct FrameScene {

@@ -15,6 +15,7 @@ set(packtrace_public_headers
   pbrt_import/scene/image_size.h
   pbrt_import/scene/material_flags.h
   pbrt_import/scene/math.h
+  pbrt_import/scene/mesh_sequence.h
   pbrt_import/scene/motion_pose.h
   pbrt_import/scene/rigid_motion.h
   pbrt_import/scene/separate_motion.h
@@ -50,6 +51,7 @@ set(packtrace_public_headers
   compress/exchange/vertex16/vertex16_format.h
   # packtrace::runtime: tracing, ambient occlusion, denoising, levels of detail, images
   runtime/ao/ao_integrator.h
+  runtime/ao/half_resolution.h
   runtime/ao/sampler.h
   runtime/camera/gbuffer.h
   runtime/camera/lod_view.h
@@ -81,7 +83,6 @@ set(packtrace_public_headers
   runtime/motion/scene_motion.h
   runtime/trace/embree/embree_tracer.h
   runtime/trace/make_tracer.h
-  runtime/trace/movers.h
   runtime/trace/movers.h
   runtime/trace/ray_tracer.h
   runtime/trace/source/float_source.h

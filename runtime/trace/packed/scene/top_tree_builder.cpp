@@ -26,7 +26,7 @@ Float4 larger(Float4 a, Float4 b) { return a > b ? a : b; }
 
 float half_area(Float4 lo, Float4 hi) {
   const Float4 size = hi - lo;
-  const Float4 faces = size * __builtin_shuffle(size, Int4{1, 2, 0, 3});
+  const Float4 faces = size * Float4{size[1], size[2], size[0], size[3]};
   return faces[0] + faces[1] + faces[2];
 }
 
