@@ -29,7 +29,7 @@ mkdir -p "$out"
 echo "== 3/4 Bake $scene"
 run "$packtrace" bake "$scene" -o "$out/scene.ptk" --force --json "$out/bake.json"
 echo "== 4/4 Trace and denoise"
-run "$packtrace" render "$out/scene.ptk" -o "$out/picture.png" -o "$out/layers.exr" --aov all --supersample 2 --frames 32 \
+run "$packtrace" render "$out/scene.ptk" -o "$out/picture.png" -o "$out/layers.exr" --aov all --frames 64 \
   --force --json "$out/render.json"
 echo
 run "$packtrace" info "$out/scene.ptk"

@@ -72,45 +72,8 @@ struct SavedLoop {
 
 } // namespace
 
-/// Mean of raw AO over frames, for renders without the denoiser. Pixels may miss in some frames.
-class FrameLoop::RawMean {
-public:
-  void clear() { sum_.clear(); }
-  void add(const AoFrame& frame) {
-    if (sum_.empty()) sum_.assign(frame.ao.size(), 0.0), count_.assign(frame.ao.size(), 0);
-    for (size_t i = 0; i < sum_.size(); ++i)
-      if (frame.ao[i] >= 0.0f) sum_[i] += static_cast<double>(frame.ao[i]), ++count_[i];
-  }
-  std::vector<std::byte> save() const {
-    const auto sums = std::as_bytes(std::span(sum_)), counts = std::as_bytes(std::span(count_));
-    std::vector<std::byte> bytes(sums.size() + counts.size());
-    std::ranges::copy(counts, std::ranges::copy(sums, bytes.begin()).out);
-    return bytes;
-  }
-  /// @return whether the bytes fit the number of pixels
-  bool restore(size_t pixels, std::span<const std::byte> bytes) {
-    clear();
-    if (bytes.empty()) return true;
-    if (bytes.size() != pixels * (sizeof(double) + sizeof(uint32_t))) return false;
-    sum_.resize(pixels), count_.resize(pixels);
-    std::memcpy(sum_.data(), bytes.data(), pixels * sizeof(double));
-    std::memcpy(count_.data(), bytes.data() + pixels * sizeof(double), pixels * sizeof(uint32_t));
-    return true;
-  }
-  std::vector<float> result() const {
-    std::vector<float> mean(sum_.size(), kInvalidAo);
-    for (size_t i = 0; i < mean.size(); ++i)
-      if (count_[i] > 0) mean[i] = static_cast<float>(sum_[i] / static_cast<double>(count_[i]));
-    return mean;
-  }
-
-private:
-  std::vector<double> sum_;
-  std::vector<uint32_t> count_;
-};
-
 FrameLoop::FrameLoop(const FrameScene& scene, const FrameConfig& config)
-    : scene_(scene), config_(config), denoiser_(config.denoiser), raw_mean_(std::make_unique<RawMean>()) {
+    : scene_(scene), config_(config), denoiser_(config.denoiser) {
   config_.validate();
   packtrace::validate(config_.ao);
   if (scene_.motion != nullptr && scene_.motion->moves()) {
@@ -142,7 +105,7 @@ void FrameLoop::reset() {
 }
 
 std::vector<std::byte> FrameLoop::save() const {
-  const std::vector<std::byte> mean = raw_mean_->save(), history = denoiser_.save();
+  const std::vector<std::byte> mean = raw_mean_.save(), history = denoiser_.save();
   const SavedLoop saved{next_number_, still_frames_, 0, mean.size()};
   std::vector<std::byte> bytes(sizeof(saved) + mean.size() + history.size());
   std::memcpy(bytes.data(), &saved, sizeof(saved));
@@ -163,7 +126,7 @@ void FrameLoop::restore(const Camera& camera, double time_s, std::span<const std
           : ImageSize{(config_.traced_size().width + 1) / 2, (config_.traced_size().height + 1) / 2};
   reset();
   const bool has_history = config_.denoise ? bytes.size() > saved.mean_bytes : saved.mean_bytes > 0;
-  if (!has_history || !raw_mean_->restore(shaded.pixels(), bytes.first(saved.mean_bytes))) fail();
+  if (!has_history || !raw_mean_.restore(shaded.pixels(), bytes.first(saved.mean_bytes))) fail();
   denoiser_.restore(shaded, bytes.subspan(saved.mean_bytes));
   // Camera rays are traced again: they depend on the camera alone.
   layers_.clear();
@@ -357,8 +320,8 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
 
   const Stopwatch accumulating;
   if (!config_.denoise) {
-    if (moved) raw_mean_->clear();
-    raw_mean_->add(raw_);
+    if (moved) raw_mean_.clear();
+    raw_mean_.add(raw_);
   } else if (still_jitter) {
     layers_.write_guides(guides_);
     denoiser_.add_frame(guides_, raw_, HistorySource::kPixel);
@@ -373,7 +336,7 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
 /// The denoised AO, or the mean of the raw AO, of all traced pixels.
 std::vector<float> FrameLoop::accumulated_ao(PictureReport& report) {
   const Stopwatch denoising;
-  if (!config_.denoise) return raw_mean_->result();
+  if (!config_.denoise) return raw_mean_.result();
   const DenoisedAo& denoised = denoiser_.denoise();
   report.times.denoise_s += denoising.seconds();
   double sum = 0.0;

@@ -12,6 +12,7 @@
 #include "runtime/frame/detail.h"
 #include "runtime/frame/frame_config.h"
 #include "runtime/frame/mean_layers.h"
+#include "runtime/frame/raw_mean.h"
 #include "runtime/frame/rendered_image.h"
 #include "runtime/motion/scene_motion.h"
 #include "runtime/trace/make_tracer.h"
@@ -112,8 +113,6 @@ public:
   const GBuffer& gbuffer() const { return gbuffer_; }
 
 private:
-  class RawMean;
-
   bool pose_instances(double time_s);
   bool deform_meshes(double time_s);
   std::unique_ptr<RayTracer> posed(std::unique_ptr<RayTracer> tracer) const;
@@ -142,7 +141,7 @@ private:
   HalfGBuffer half_;
   AoFrame raw_;
   AoDenoiser denoiser_;
-  std::unique_ptr<RawMean> raw_mean_;
+  RawMean raw_mean_;
   MeanLayers layers_;
   RenderedImage lod_layers_; ///< only its LOD layers
   FrameReport report_;

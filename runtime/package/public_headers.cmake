@@ -77,6 +77,7 @@ set(packtrace_public_headers
   runtime/frame/frame_config.h
   runtime/frame/frame_loop.h
   runtime/frame/mean_layers.h
+  runtime/frame/raw_mean.h
   runtime/frame/rendered_image.h
   runtime/frame/still.h
   runtime/motion/motion_targets.h

@@ -119,6 +119,45 @@ TEST(Sequences, ResumedOnesHaveTheSameBytes) {
   EXPECT_EQ(bench.pictures("part", 6), bench.pictures("whole", 6));
 }
 
+/// A quad that bends, in three frames, above another.
+std::string bent_quad(double height) {
+  return "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+         "element face 2\nproperty list uchar int vertex_indices\nend_header\n-1 0 0\n1 0 0\n1 0 2\n-1 " +
+         std::to_string(height) + " 2\n3 0 1 2\n3 0 2 3\n";
+}
+
+TEST(Sequences, DeformingMeshesArePlayed) {
+  const SequenceBench bench;
+  for (int i = 0; i < 3; ++i) write_text(bench / ("bend_" + std::to_string(i) + ".ply"), bent_quad(0.5 * i));
+  write_text(bench / "bend.pbrt",
+             "LookAt 0 2 -3  0 0 1  0 1 0\nCamera \"perspective\"\nFilm \"image\" \"integer xresolution\" 48 "
+             "\"integer yresolution\" 32\nWorldBegin\nShape \"plymesh\" \"string filename\" \"bend_0.ply\"\n"
+             "Translate 0 -0.5 0\nScale 3 1 3\nShape \"plymesh\" \"string filename\" \"bend_0.ply\"\nWorldEnd\n");
+  const std::string file = bench / "bend.ptk";
+  const CommandResult baked = run_packtrace(
+      {"bake", bench / "bend.pbrt", "-o", file, "-q", "--sequence", bench / "bend_%d.ply", "--sequence-fps", "2"});
+  ASSERT_EQ(baked.exit_code, 0) << baked.err;
+  const auto render = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"render",   file, "--path",      "scene", "--fps", "2",
+                                       "--frames", "3",  "--subframes", "2",     "-q",    "--force"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_packtrace(arguments);
+  };
+  ASSERT_EQ(render({"-o", bench / "b%d.png"}).exit_code, 0);
+  const std::vector<std::string> pictures = bench.pictures("b", 3);
+  EXPECT_NE(pictures[0], pictures[1]);
+  EXPECT_NE(pictures[1], pictures[2]);
+  // The same after an interruption.
+  std::filesystem::create_directory(bench / "r1.png");
+  EXPECT_EQ(render({"-o", bench / "r%d.png", "--checkpoint", "0"}).exit_code, 6);
+  std::filesystem::remove(bench / "r1.png");
+  ASSERT_EQ(render({"-o", bench / "r%d.png", "--resume"}).exit_code, 0);
+  EXPECT_EQ(bench.pictures("r", 3), pictures);
+  const CommandResult embree = render({"-o", bench / "e%d.png", "--backend", "embree"});
+  EXPECT_EQ(embree.exit_code, 4);
+  EXPECT_NE(embree.err.find("backend packed"), std::string::npos) << embree.err;
+}
+
 TEST(Sequences, VideoHasAFrameForEachPicture) {
   const SequenceBench bench;
   const std::vector<std::string> common{"--path",      "orbit:20", "--frames", "3",

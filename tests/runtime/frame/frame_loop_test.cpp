@@ -150,6 +150,61 @@ TEST(FrameLoop, ContinuesFromASavedState) {
     }
 }
 
+/// A box above a floor, at its place at rest or where its motion puts it at a time.
+Scene scene_with_box(std::optional<double> placed_at_s) {
+  Scene scene;
+  test::add_shape(scene, test::quad(Vec3(-4, 0, -4), Vec3(0, 0, 8), Vec3(8, 0, 0)));
+  const uint32_t shape = test::add_shape(scene, test::box(Vec3(-0.5f), Vec3(0.5f)));
+  const double x = placed_at_s ? 2.0 * *placed_at_s - 1.0 : -1.0;
+  scene.shapes[shape].parent_from_mesh = DAffine(DVec3(1, 0, 0), DVec3(0, 1, 0), DVec3(0, 0, 1), DVec3(x, 1, 0));
+  return scene;
+}
+
+/// The box moves from x = -1 to 1 within a second.
+RigidMotion motion_of_box() {
+  RigidMotion motion;
+  MotionTrack track;
+  track.keys.resize(2);
+  track.keys[0].translation = DVec3(-1, 1, 0);
+  track.keys[1].time_s = 1.0, track.keys[1].translation = DVec3(1, 1, 0);
+  motion.tracks.push_back(track);
+  motion.instances.push_back({.instance = 1, .track = 0});
+  return motion;
+}
+
+TEST(FrameLoop, InstancesMoveWithTime) {
+  Scene moving = scene_with_box({});
+  moving.motion = motion_of_box();
+  const FloatSource source(moving);
+  const SceneMotion motion = SceneMotion::of(moving);
+  FrameConfig config = FrameBench().config_;
+  config.jitter = false;
+  FrameLoop loop({&source, nullptr, {}, &motion}, config);
+  Progress progress;
+  for (const double time_s : {0.0, 0.25, 0.25, 0.75}) {
+    RenderedImage image, expected;
+    render_picture(loop, FrameBench::camera(), time_s, 1, image, progress);
+    const Scene still = scene_with_box(time_s);
+    const FloatSource still_source(still);
+    FrameLoop still_loop({&still_source, nullptr, {}}, config);
+    render_picture(still_loop, FrameBench::camera(), 0.0, 1, expected, progress);
+    ASSERT_EQ(image.depth.size(), expected.depth.size());
+    size_t different = 0;
+    for (size_t i = 0; i < image.depth.size(); ++i)
+      different += std::abs(image.depth[i] - expected.depth[i]) > 1e-4f * expected.depth[i] ? 1 : 0;
+    EXPECT_LE(different, 3u) << time_s; // rays that graze an edge
+  }
+  EXPECT_FALSE(loop.next_frame(FrameBench::camera(), 0.75, progress).moved);
+  EXPECT_TRUE(loop.next_frame(FrameBench::camera(), 0.5, progress).moved);
+  float largest = 0.0f;
+  for (size_t i = 0; i < loop.gbuffer().motion_px.size(); ++i) {
+    const float x = std::abs(loop.gbuffer().motion_px[i].x);
+    if (loop.gbuffer().instance[i] == 0) EXPECT_EQ(x, 0.0f); // the floor stands still
+    if (loop.gbuffer().instance[i] == 1) largest = std::max(largest, x);
+  }
+  EXPECT_GT(largest, 2.0f); // pixels
+}
+
 TEST(FrameLoop, DamagedStatesAreRejected) {
   const FrameBench bench;
   FrameLoop loop(bench.frame_scene(), bench.config_);
