@@ -17,7 +17,7 @@ constexpr size_t kMaxDigits = 18; // any such number fits int64_t
   throw Error(ErrorKind::kUsage, message);
 }
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
+bool is_decimal(char c) { return c >= '0' && c <= '9'; }
 
 } // namespace
 
@@ -46,7 +46,7 @@ FramePattern::FramePattern(const std::string& pattern) : text_(pattern) {
       continue;
     }
     size_t end = i;
-    while (end < name.size() && is_digit(name[end])) ++end;
+    while (end < name.size() && is_decimal(name[end])) ++end;
     const std::string width = name.substr(i, end - i);
     if (end >= name.size() || name[end] != 'd' || (!width.empty() && (width.size() < 2 || width[0] != '0')))
       fail_pattern(text_, "the directive at character " + std::to_string(i) + " of the file name is not %d or %0Nd");

@@ -12,7 +12,7 @@
 namespace packtrace {
 namespace {
 
-enum Shape : uint8_t { kArea, kEqualCorners, kSliver };
+enum TriangleShape : uint8_t { kArea, kEqualCorners, kSliver };
 
 /// An edge as its lower and its higher point.
 using Edge = std::pair<uint32_t, uint32_t>;

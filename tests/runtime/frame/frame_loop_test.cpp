@@ -199,7 +199,9 @@ TEST(FrameLoop, InstancesMoveWithTime) {
   float largest = 0.0f;
   for (size_t i = 0; i < loop.gbuffer().motion_px.size(); ++i) {
     const float x = std::abs(loop.gbuffer().motion_px[i].x);
-    if (loop.gbuffer().instance[i] == 0) EXPECT_EQ(x, 0.0f); // the floor stands still
+    if (loop.gbuffer().instance[i] == 0) {
+      EXPECT_EQ(x, 0.0f); // the floor stands still
+    }
     if (loop.gbuffer().instance[i] == 1) largest = std::max(largest, x);
   }
   EXPECT_GT(largest, 2.0f); // pixels
