@@ -74,7 +74,7 @@ std::optional<int64_t> FramePattern::number_of(const std::string& file_name) con
       !file_name.ends_with(after_))
     return std::nullopt;
   const std::string digits = file_name.substr(before_.size(), file_name.size() - before_.size() - after_.size());
-  if (digits.size() > kMaxDigits || !std::ranges::all_of(digits, is_digit)) return std::nullopt;
+  if (digits.size() > kMaxDigits || !std::ranges::all_of(digits, is_decimal)) return std::nullopt;
   int64_t number = 0;
   std::from_chars(digits.data(), digits.data() + digits.size(), number);
   if (file(number).filename().string() != file_name) return std::nullopt; // other leading zeros
