@@ -175,7 +175,7 @@ EncodedDeformation SequenceBaker::pack_geometry(const GeometryPlan& plan, uint32
   FramePlacer placer(scene_, plan, grid, sequences, record);
   std::optional<DeformationEncoder> encoder;
   std::vector<FrameVertex> vertices(packed.encoded.sources.size());
-  progress.begin("encoding frames of " + plan.name, first->frames->count());
+  progress.begin("encoding frames", first->frames->count());
   for (uint32_t frame = 0; frame < first->frames->count(); ++frame) {
     progress.check_cancelled();
     placer.read(frame);
