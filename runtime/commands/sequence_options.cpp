@@ -134,6 +134,8 @@ Sequence make_sequence(const SequenceOptions& options, std::optional<uint64_t> p
   sequence.pictures = pictures.value_or(default_pictures(kDefaultSeconds, sequence.fps));
   const std::string& path = *options.path;
   if (path == "scene") {
+    if (!pictures && motion != nullptr && motion->end_s() > sequence.start_s)
+      sequence.pictures = default_pictures(motion->end_s() - sequence.start_s, sequence.fps);
     const double start_s = sequence.start_s, fps = sequence.fps;
     sequence.camera = [=](uint64_t i) {
       const double time_s = start_s + static_cast<double>(i) / fps;

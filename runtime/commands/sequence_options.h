@@ -43,7 +43,7 @@ struct Sequence {
 };
 
 /// Returns the sequence that the options describe.
-/// @param pictures number of pictures; if not set, the length of the path's file, or 4 s
+/// @param pictures number of pictures; if not set, the length of the path's file or of the scene's motion, or 4 s
 /// @param camera the camera at rest
 /// @param index its number in the scene; none if it frames the whole scene
 /// @param loop a frame loop of the scene; renders a frame to find what an orbit turns about, and is reset
