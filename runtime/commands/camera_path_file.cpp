@@ -70,10 +70,8 @@ CameraPath read_camera_path(const std::filesystem::path& file, const Camera& bas
     json.fail(list != nullptr ? *list : json.root(), "\"keys\" must be an array of keys");
   const CameraKeyReader reader(json, base, origin);
   std::vector<CameraKey> keys;
-  std::vector<const JsonValue*> places;
   json.for_each(*list, [&](const JsonValue& value) {
     keys.push_back(reader.read(value));
-    places.push_back(&value);
     if (const std::string problem = camera_key_problem(keys, keys.size() - 1); !problem.empty())
       json.fail(value, problem);
   });

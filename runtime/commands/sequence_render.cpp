@@ -57,6 +57,13 @@ private:
   std::FILE* stream_ = nullptr;
 };
 
+/// Describes the content of a file by its size and the time of its last change.
+nlohmann::json version_of(const std::string& file) {
+  std::error_code error; // of a file that vanished meanwhile
+  const uintmax_t bytes = std::filesystem::file_size(file, error);
+  return {file, bytes, std::filesystem::last_write_time(file, error).time_since_epoch().count()};
+}
+
 /// Describes everything on which the pictures depend, for SequenceCheckpoint.
 std::string settings_text(const RenderOptions& options, const RenderSetup& setup, const Sequence& sequence) {
   const StillConfig& c = setup.config;
@@ -79,10 +86,13 @@ std::string settings_text(const RenderOptions& options, const RenderSetup& setup
       {"lod",
        {lod.error_px.value_or(0.0), lod.scheme.value_or(""), lod.traced_ratio.value_or(-1.0),
         lod.culled_scale.value_or(0.0), lod.tolerance.value_or(0), lod.rays.value_or(""), lod.cull.value_or("")}},
-      {"input", options.input}};
-  std::error_code error; // of an input that vanished meanwhile
-  text["input_bytes"] = std::filesystem::file_size(options.input, error);
-  text["input_changed"] = std::filesystem::last_write_time(options.input, error).time_since_epoch().count();
+      {"layers", options.aovs},
+      {"background", options.background.value_or("")},
+      {"legend", !options.no_legend},
+      {"world", options.scene.world.value_or(1)},
+      {"input", version_of(options.input)}};
+  if (options.scene.time) text["time"] = *options.scene.time;
+  if (options.sequence.keys) text["keys"] = version_of(*options.sequence.keys);
   std::string first_and_last;
   for (const uint64_t picture : {uint64_t{0}, sequence.pictures / 2, sequence.pictures - 1}) {
     const DAffine& world = sequence.camera(picture).world_from_camera;

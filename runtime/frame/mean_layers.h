@@ -28,8 +28,6 @@ public:
   void resolve(const FrameConfig& config, std::span<const float> ao, std::span<const float> raw,
                RenderedImage& image) const;
 
-  uint32_t frames() const { return frames_; }
-
 private:
   void clear_sums(ImageSize size, bool emitters);
 

@@ -106,6 +106,7 @@ TEST(Sequences, ResumedOnesHaveTheSameBytes) {
   const CommandResult other = render("part%d.png", {"--resume", "--spp", "2"});
   EXPECT_EQ(other.exit_code, 2);
   EXPECT_NE(other.err.find("other options"), std::string::npos) << other.err;
+  EXPECT_EQ(render("part%d.png", {"--resume", "--aov", "depth"}).exit_code, 2);
   const CommandResult rest = render("part%d.png", {"--resume", "--json", bench / "rest.json"});
   ASSERT_EQ(rest.exit_code, 0) << rest.err;
   EXPECT_EQ(nlohmann::json::parse(read_text(bench / "rest.json")).at("sequence").at("rendered"), 4);
