@@ -15,8 +15,7 @@ BinaryOutput::BinaryOutput(const std::string& target, bool force, const JsonOutp
     file_.emplace(target, force);
     return;
   }
-  if (json.to_stdout())
-    throw Error(ErrorKind::kUsage, "-o - and --json - would both write to standard output; use a file for one of them");
+  refuse_shared_stdout(true, json);
   refuse_terminal("a binary file");
 }
 
@@ -27,6 +26,11 @@ void BinaryOutput::write(std::span<const std::byte> bytes) {
   } else {
     write_standard_output(bytes);
   }
+}
+
+void refuse_shared_stdout(bool output_to_stdout, const JsonOutput& json) {
+  if (output_to_stdout && json.to_stdout())
+    throw Error(ErrorKind::kUsage, "-o - and --json - would both write to standard output; use a file for one of them");
 }
 
 void write_standard_output(std::span<const std::byte> bytes) {

@@ -29,6 +29,9 @@ private:
   std::optional<OutputFile> file_;
 };
 
+/// Throws Error(kUsage) if -o - and --json - would both write to standard output.
+void refuse_shared_stdout(bool output_to_stdout, const JsonOutput& json);
+
 /// Writes all bytes to standard output. Throws Error(kIo) if that fails.
 void write_standard_output(std::span<const std::byte> bytes);
 

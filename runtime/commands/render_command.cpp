@@ -52,8 +52,7 @@ void warn_of_flat_instances(const std::string& input, size_t count) {
 
 /// Throws Error(kUsage) for two outputs to standard output, and for LOD layers of a render that has none.
 void check_targets(const ImageOutputs& outputs, const JsonOutput& json, const DetailConfig& detail) {
-  if (outputs.to_stdout() && json.to_stdout())
-    throw Error(ErrorKind::kUsage, "-o - and --json - would both write to standard output; use a file for one of them");
+  refuse_shared_stdout(outputs.to_stdout(), json);
   if (outputs.has_lod_layers() && !detail.error_px)
     throw Error(ErrorKind::kUsage, "the layers lod and lod-error require --lod-error");
   if (outputs.has_lod_layers() && detail.only_occlusion)
@@ -69,14 +68,13 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   tracer_config(options, globals, false); // reports wrong options before any work
   if (!options.size.empty()) parse_size(options.size);
   JsonOutput json(globals.json, globals.force);
-  const bool measure_detail = json.wanted() || globals.verbosity > 0;
-  const DetailConfig detail = detail_config(options.lod, measure_detail);
+  const DetailConfig detail = detail_config(options.lod, json.wanted() || globals.verbosity > 0);
   ImageOutputs outputs(options.outputs, options.aovs, detail.camera_uses_levels(), globals.force,
                        preview_style(options)); // reports unwritable files before any work
   check_targets(outputs, json, detail);
   ProgressDisplay display(globals);
   Progress progress(display.observer());
-  const RenderSetup setup(options, globals, outputs.has_lod_layers(), measure_detail, progress, display);
+  const RenderSetup setup(options, globals, detail, outputs.has_lod_layers(), progress, display);
   const LoadedScene& loaded = setup.loaded;
   const StillConfig& config = setup.config;
   FrameLoop& loop = *setup.loop;

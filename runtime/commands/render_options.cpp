@@ -137,7 +137,7 @@ void add_render_options(CLI::App& verb, RenderOptions& options) {
 }
 
 StillConfig make_config(const SceneSource& source, const Camera& camera, const RenderOptions& options,
-                        bool measure_detail) {
+                        const DetailConfig& detail) {
   StillConfig config;
   config.size = options.size.empty() ? ImageSize{camera.width_px, camera.height_px} : parse_size(options.size);
   config.supersample = options.supersample;
@@ -146,7 +146,7 @@ StillConfig make_config(const SceneSource& source, const Camera& camera, const R
   if (options.ground_truth && config.ao_resolution != AoResolution::kFull)
     throw Error(ErrorKind::kUsage, "--ground-truth needs all pixels; it does not go with --ao-resolution quarter");
   config.jitter = !options.no_jitter;
-  config.detail = detail_config(options.lod, measure_detail);
+  config.detail = detail;
   // A sequence has its own numbers of pictures and frames.
   const uint64_t frames = options.frames.value_or(options.ground_truth ? kGroundTruthFrames : 32);
   config.frames = options.sequence.path ? 1 : static_cast<uint32_t>(std::min<uint64_t>(frames, ~0u));

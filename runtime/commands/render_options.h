@@ -45,9 +45,9 @@ struct RenderOptions {
 void add_render_options(CLI::App& verb, RenderOptions& options);
 
 /// What to render with the camera. Throws Error(kUsage) for values out of range.
-/// @param measure_detail as in detail_config()
+/// @param detail detail_config()
 StillConfig make_config(const SceneSource& source, const Camera& camera, const RenderOptions& options,
-                        bool measure_detail);
+                        const DetailConfig& detail);
 
 /// @param baked whether the input is a .ptk file
 /// Throws Error(kUsage) for contradictory options.

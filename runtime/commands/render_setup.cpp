@@ -30,14 +30,14 @@ bool shows_motion(const RenderOptions& options) {
 
 } // namespace
 
-RenderSetup::RenderSetup(const RenderOptions& options, const GlobalOptions& globals, bool lod_layers,
-                         bool measure_detail, Progress& progress, ProgressDisplay& display)
+RenderSetup::RenderSetup(const RenderOptions& options, const GlobalOptions& globals, const DetailConfig& detail,
+                         bool lod_layers, Progress& progress, ProgressDisplay& display)
     : loaded(load_scene(options.input, options.scene, globals, progress, display, options.private_copy)),
       load_s(loading.seconds()) {
-  if (options.lod.error_px) require_levels(options.input, loaded);
+  if (detail.error_px) require_levels(options.input, loaded);
   camera = choose_camera(*loaded.source, options, globals);
   prepare_motion(options, globals);
-  config = make_config(*loaded.source, camera.camera, options, measure_detail);
+  config = make_config(*loaded.source, camera.camera, options, detail);
   config.lod_layers = lod_layers;
   pixels = reserve_picture(options, config, globals.memory);
   const BakedFile* const file = loaded.baked ? &*loaded.baked : nullptr;

@@ -12,10 +12,9 @@ namespace packtrace {
 /// What `render` needs for stills and sequences: the scene, the camera, the settings and a frame loop.
 struct RenderSetup {
   /// Loads the scene and prepares the frame loop.
-  /// @param lod_layers FrameConfig::lod_layers
-  /// @param measure_detail as in detail_config()
+  /// @param detail, lod_layers as in FrameConfig
   /// Throws like load_scene(), choose_camera(), make_config() and FrameLoop, and MemoryError for large pictures.
-  RenderSetup(const RenderOptions& options, const GlobalOptions& globals, bool lod_layers, bool measure_detail,
+  RenderSetup(const RenderOptions& options, const GlobalOptions& globals, const DetailConfig& detail, bool lod_layers,
               Progress& progress, ProgressDisplay& display);
   RenderSetup(const RenderSetup&) = delete;
   RenderSetup& operator=(const RenderSetup&) = delete;

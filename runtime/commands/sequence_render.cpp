@@ -144,8 +144,7 @@ std::vector<PictureRow> render_pictures(const Sequence& sequence, uint64_t first
 void check_sequence(const RenderOptions& options, const SequenceOutputs& outputs, const JsonOutput& json,
                     const DetailConfig& detail) {
   if (options.ground_truth) throw Error(ErrorKind::kUsage, "--ground-truth renders stills; it does not go with --path");
-  if (outputs.to_stdout() && json.to_stdout())
-    throw Error(ErrorKind::kUsage, "-o - and --json - would both write to standard output; use a file for one of them");
+  refuse_shared_stdout(outputs.to_stdout(), json);
   if (outputs.has_lod_layers() && !detail.camera_uses_levels())
     throw Error(ErrorKind::kUsage, "the layers lod and lod-error require --lod-error and --lod-rays all");
 }
@@ -163,7 +162,7 @@ int render_sequence(const RenderOptions& options, const GlobalOptions& globals) 
   CsvOutput csv(options.sequence.csv, globals.force);
   ProgressDisplay display(globals);
   Progress progress(display.observer());
-  RenderSetup setup(options, globals, outputs.has_lod_layers(), false, progress, display);
+  RenderSetup setup(options, globals, detail, outputs.has_lod_layers(), progress, display);
   const Sequence sequence = with_file(options.input, [&] {
     return make_sequence(options.sequence, options.frames, *setup.loaded.source, setup.camera.camera,
                          setup.camera.index, *setup.loop, globals.memory);
