@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "pbrt_import/base/error.h"
+#include "runtime/commands/denoiser_options.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/commands/render_camera.h"
 
@@ -62,7 +63,7 @@ void add_sampling_options(CLI::App& verb, RenderOptions& options) {
   verb.add_flag("--no-jitter", options.no_jitter,
                 "Trace camera rays through pixel centres only. By default each frame shifts them within their pixels, "
                 "so that edges become smooth");
-  verb.add_flag("--no-denoise", options.no_denoise, "Average the frames without denoising");
+  add_denoiser_options(verb, options.denoiser, options.denoiser_settings);
   verb.add_option("--ao-resolution", options.ao_resolution,
                   "Pixels for which ambient occlusion is traced. quarter traces one of 2 x 2 pixels, a quarter of the "
                   "rays, and interpolates the others along surfaces; about four times as fast, with softer contact "
@@ -141,7 +142,8 @@ StillConfig make_config(const SceneSource& source, const Camera& camera, const R
   StillConfig config;
   config.size = options.size.empty() ? ImageSize{camera.width_px, camera.height_px} : parse_size(options.size);
   config.supersample = options.supersample;
-  config.denoise = !options.no_denoise && !options.ground_truth;
+  config.denoise = !options.ground_truth && options.denoiser != "off";
+  config.denoiser = denoiser_config(options.denoiser, options.denoiser_settings);
   if (options.ao_resolution == "quarter") config.ao_resolution = AoResolution::kQuarter;
   if (options.ground_truth && config.ao_resolution != AoResolution::kFull)
     throw Error(ErrorKind::kUsage, "--ground-truth needs all pixels; it does not go with --ao-resolution quarter");

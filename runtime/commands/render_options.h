@@ -28,7 +28,9 @@ struct RenderOptions {
   uint32_t supersample = 1;
   std::optional<uint32_t> spp;
   std::optional<uint64_t> frames; ///< of a still; with --path the number of pictures
-  bool ground_truth = false, no_denoise = false, no_jitter = false, fast_edges = false;
+  bool ground_truth = false, no_jitter = false, fast_edges = false;
+  std::string denoiser = "ours";
+  std::vector<std::string> denoiser_settings; ///< NAME=VALUE
   std::string ao_resolution = "full";
   SceneOptions scene;
   std::optional<float> ao_radius;

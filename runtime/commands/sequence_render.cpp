@@ -75,7 +75,7 @@ std::string settings_text(const RenderOptions& options, const RenderSetup& setup
       {"subframes", sequence.subframes},
       {"start", sequence.start_s},
       {"size", {c.size.width, c.size.height, c.supersample}},
-      {"denoise", c.denoise},
+      {"denoiser", {options.denoiser, options.denoiser_settings}},
       {"jitter", c.jitter},
       {"resolution", options.ao_resolution},
       {"ao", {c.ao.radius, c.ao.spp, c.ao.falloff, c.ao.interreflection, c.ao.seed}},

@@ -1,33 +1,13 @@
 #include "runtime/denoise/denoiser.h"
 
-#include <limits>
 #include <string>
-#include <utility>
 
 #include "pbrt_import/base/error.h"
-#include "runtime/denoise/depth_derivatives.h"
-#include "runtime/denoise/disocclusion_blur.h"
-#include "runtime/denoise/edge_blur.h"
-#include "runtime/denoise/edge_weights.h"
-#include "runtime/denoise/guides.h"
-#include "runtime/denoise/reprojection.h"
-#include "runtime/denoise/simd.h"
-#include "runtime/denoise/temporal_blend.h"
+#include "runtime/denoise/flux_pipeline.h"
+#include "runtime/denoise/reference/reference_pipeline.h"
 
 namespace packtrace {
 namespace {
-
-/// Number of blur passes applied to all surfaces (tap distances 1 and 2). The remaining passes are for disoccluded
-/// surfaces.
-constexpr size_t kBlurPasses = 2;
-
-PACKTRACE_AVX2_CLONES
-void write_row(int width, const float* __restrict value, const float* __restrict disparity, float* __restrict ao) {
-  for (int x = 0; x < width; ++x) {
-    const float clamped = smaller(larger(value[x], 0.0f), 1.0f);
-    ao[x] = disparity[x] > 0.0f ? clamped : kInvalidAo;
-  }
-}
 
 void require_sizes(const GBuffer& gbuffer, const AoFrame& ao) {
   const size_t pixels = gbuffer.size.pixels();
@@ -42,167 +22,30 @@ void require_sizes(const GBuffer& gbuffer, const AoFrame& ao) {
                 "denoiser: the image is more than " + std::to_string(kLargestSide) + " pixels wide or high");
 }
 
+std::unique_ptr<DenoisePipeline> make_pipeline(const DenoiserConfig& config) {
+  return config.kind == DenoiserKind::kReference ? make_reference_pipeline(config.reference)
+                                                 : make_flux_pipeline(config.ours);
+}
+
 } // namespace
 
-struct AoDenoiser::State {
-  explicit State(const DenoiserConfig& checked) : config(checked) {}
-
-  void resize(ImageSize size);
-  /// Calls work(plane) for everything that the next frame needs of this one; all elements have 4 bytes.
-  template <typename Work>
-  void for_each_saved_plane(const Work& work) {
-    Guides& g = now.guides;
-    History& h = now.history;
-    work(g.disparity), work(g.normal_x), work(g.normal_y), work(g.normal_z), work(g.instance);
-    work(h.mean), work(h.square), work(h.fast), work(h.samples);
-  }
-  void update_history(const GBuffer& gbuffer);
-  void compare_neighbours();
-  void blur();
-  void write(DenoisedAo& out) const;
-
-  DenoiserConfig config;
-  bool has_frame = false;
-  bool edges_outdated = false;     ///< `edges` do not belong to the guides
-  bool statistics_pending = false; ///< correct_history() has not run for the last frame
-  FrameHistory now, before;        // `before` is only used while a frame is denoised
-  DepthDerivatives derivatives;
-  std::vector<EdgeWeights> edges = {EdgeWeights(1), EdgeWeights(2), EdgeWeights(4)};
-  FrameSamples samples;
-  NoisyImage image;
-  BlurScratch scratch;
-  DenoisedAo result;
-};
-
-void AoDenoiser::State::resize(ImageSize size) {
-  for (FrameHistory* frame : {&now, &before}) frame->guides.resize(size), frame->history.resize(size);
-  derivatives.resize(size);
-  for (EdgeWeights& weights : edges) weights.resize(size);
-  samples.resize(size), image.resize(size), scratch.resize(size);
-  result.size = size;
-  result.ao.assign(size.pixels(), kInvalidAo);
-  result.variance.assign(size.pixels(), 0.0f);
-  result.tspp.assign(size.pixels(), 0.0f);
-  has_frame = false;
-}
-
-/// Loads this frame's guides and reprojects the history. Does nothing if no pixel moves and no guide changes.
-void AoDenoiser::State::update_history(const GBuffer& gbuffer) {
-  if (has_frame && now.guides.still_matches(gbuffer)) return;
-  std::swap(now, before);
-  now.guides.load(gbuffer);
-  compare_neighbours();
-  if (!has_frame) before.history.resize(gbuffer.size);
-  reproject(before, now.guides, derivatives, gbuffer.motion_px, gbuffer.previous_z, config, now.history);
-  has_frame = true;
-}
-
-void AoDenoiser::State::compare_neighbours() {
-  derivatives.compute(now.guides);
-  for (EdgeWeights& weights : edges) weights.compute(now.guides, derivatives, config);
-  edges_outdated = false;
-}
-
-void AoDenoiser::State::blur() {
-  const ImageSize size = now.guides.size;
-  const Plane<float>& tspp = now.history.samples;
-  fill_unsampled(now.guides, tspp, edges, image);
-  const Fade fade{static_cast<float>(config.blur_fade_begin), static_cast<float>(config.blur_fade_end)};
-  const float limit = config.blur_limit;
-  for (size_t i = 0; i < kBlurPasses; ++i) edge_blur(edges[i], tspp, fade, limit, size, image, scratch);
-  disocclusion_blur(tspp, std::span(edges).subspan(kBlurPasses), static_cast<float>(config.disocclusion_frames), limit,
-                    size, image, scratch);
-}
-
-void AoDenoiser::State::write(DenoisedAo& out) const {
-  const ImageSize size = now.guides.size;
-  for_row_blocks(size.height, [&](int first, int last) {
-    for (int y = first; y < last; ++y) {
-      const size_t begin = static_cast<size_t>(y) * size.width;
-      write_row(static_cast<int>(size.width), image.value.row(y), now.guides.disparity.row(y), &out.ao[begin]);
-      std::copy_n(now.history.samples.row(y), size.width, &out.tspp[begin]);
-    }
-  });
-}
-
-AoDenoiser::AoDenoiser(const DenoiserConfig& config) {
-  config.validate();
-  state_ = std::make_unique<State>(config);
-}
-AoDenoiser::~AoDenoiser() = default;
-AoDenoiser::AoDenoiser(AoDenoiser&&) noexcept = default;
-AoDenoiser& AoDenoiser::operator=(AoDenoiser&&) noexcept = default;
+AoDenoiser::AoDenoiser(const DenoiserConfig& config) : pipeline_(make_pipeline(config)) {}
 
 void AoDenoiser::add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source) {
   require_sizes(gbuffer, ao);
-  State& state = *state_;
-  if (gbuffer.size != state.result.size) state.resize(gbuffer.size);
-  if (gbuffer.size.pixels() == 0) return;
-  const bool same_pixels = source == HistorySource::kPixel && state.has_frame;
-  if (same_pixels) {
-    state.now.guides.load(gbuffer);
-    state.edges_outdated = true;
-  } else {
-    state.update_history(gbuffer);
-  }
-  DenoiserConfig config = state.config;
-  if (same_pixels) config.max_tspp = std::numeric_limits<uint32_t>::max(); // the plain mean of all samples
-  accumulate(ao.ao, state.now.guides, config, state.now.history, state.samples);
-  state.statistics_pending = same_pixels;
-  if (!same_pixels)
-    correct_history(state.samples, state.now.guides, state.config, state.now.history, state.result.variance,
-                    state.image);
+  if (gbuffer.size != size_) pipeline_->resize(size_ = gbuffer.size);
+  if (size_.pixels() > 0) pipeline_->add_frame(gbuffer, ao, source);
 }
 
-const DenoisedAo& AoDenoiser::denoise() {
-  State& state = *state_;
-  if (!state.has_frame) return state.result;
-  if (state.edges_outdated) state.compare_neighbours();
-  if (state.statistics_pending) {
-    DenoiserConfig config = state.config;
-    // Nothing moves: where jitter makes the histories differ, nothing has changed.
-    config.change_tolerance = std::numeric_limits<float>::infinity();
-    correct_history(state.samples, state.now.guides, config, state.now.history, state.result.variance, state.image);
-    state.statistics_pending = false;
-  }
-  state.blur();
-  state.write(state.result);
-  return state.result;
-}
+const DenoisedAo& AoDenoiser::denoise() { return pipeline_->denoise(); }
 
-std::vector<std::byte> AoDenoiser::save() const {
-  std::vector<std::byte> bytes;
-  if (!state_->has_frame) return bytes;
-  const ImageSize size = state_->now.guides.size;
-  state_->for_each_saved_plane([&](auto& plane) {
-    for (int y = 0; y < static_cast<int>(size.height); ++y) {
-      const auto row = std::as_bytes(std::span(plane.row(y), size.width));
-      bytes.insert(bytes.end(), row.begin(), row.end());
-    }
-  });
-  return bytes;
-}
+std::vector<std::byte> AoDenoiser::save() const { return pipeline_->save(); }
 
 void AoDenoiser::restore(ImageSize size, std::span<const std::byte> bytes) {
-  State& state = *state_;
-  state.resize(size);
-  if (bytes.empty()) return;
-  size_t planes = 0;
-  state.for_each_saved_plane([&](auto&) { ++planes; });
-  if (bytes.size() != planes * sizeof(float) * size.pixels())
-    throw Error(ErrorKind::kInput, "denoiser: the saved history has another size");
-  state.now.guides.size = size;
-  state.for_each_saved_plane([&](auto& plane) {
-    for (int y = 0; y < static_cast<int>(size.height); ++y) {
-      const auto row = std::as_writable_bytes(std::span(plane.row(y), size.width));
-      std::copy_n(bytes.begin(), row.size(), row.begin());
-      bytes = bytes.subspan(row.size());
-    }
-  });
-  state.has_frame = true;
-  state.edges_outdated = true;
+  size_ = size;
+  pipeline_->restore(size, bytes);
 }
 
-void AoDenoiser::reset() { state_->has_frame = false; }
+void AoDenoiser::reset() { pipeline_->reset(); }
 
 } // namespace packtrace

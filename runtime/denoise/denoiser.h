@@ -6,25 +6,10 @@
 #include <vector>
 
 #include "runtime/camera/gbuffer.h"
+#include "runtime/denoise/denoise_pipeline.h"
 #include "runtime/denoise/denoiser_config.h"
 
 namespace packtrace {
-
-/// Result of one frame, rows top to bottom, one entry per pixel in every array.
-struct DenoisedAo {
-  ImageSize size;
-  std::vector<float> ao;       ///< [0,1], or kInvalidAo at pixels whose camera ray missed
-  std::vector<float> variance; ///< variance of the pixel's temporal mean before any blur, AO squared; 0 without history
-  std::vector<float> tspp;     ///< temporal samples per pixel: frames of accumulated history; 0 without history
-};
-
-/// Where a pixel's history comes from.
-enum class HistorySource : uint8_t {
-  kMotion, ///< from where the previous frame saw the same surface point (GBuffer::motion_px)
-  /// From the same pixel, whatever its camera ray hits now. For frames of a still view whose camera rays are jittered
-  /// within their pixels: the history then converges to the mean over the pixel's area.
-  kPixel,
-};
 
 /// Spatio-temporal denoiser for ambient occlusion (docs/denoiser.md). It accumulates samples along surface motion and
 /// removes the remaining noise with edge-aware blurs. The accumulated history itself is never blurred, so a still image
@@ -35,9 +20,6 @@ class AoDenoiser {
 public:
   /// Throws Error (kUsage) if the configuration is out of range.
   explicit AoDenoiser(const DenoiserConfig& config = {});
-  ~AoDenoiser();
-  AoDenoiser(AoDenoiser&&) noexcept;
-  AoDenoiser& operator=(AoDenoiser&&) noexcept;
 
   /// Denoises the next frame. A change of the image size discards the history, as reset() does. Negative and non-finite
   /// values of `ao` mean that the pixel has no sample in this frame. A pixel with a non-finite depth counts as a miss;
@@ -69,8 +51,8 @@ public:
   void reset();
 
 private:
-  struct State;
-  std::unique_ptr<State> state_;
+  std::unique_ptr<DenoisePipeline> pipeline_;
+  ImageSize size_; ///< of the pipeline
 };
 
 } // namespace packtrace

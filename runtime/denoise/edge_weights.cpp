@@ -55,7 +55,7 @@ void EdgeWeights::resize(ImageSize size) {
   for (Plane<uint8_t>& plane : weights_) plane.resize(size);
 }
 
-void EdgeWeights::compute(const Guides& guides, const DepthDerivatives& derivatives, const DenoiserConfig& config) {
+void EdgeWeights::compute(const Guides& guides, const DepthDerivatives& derivatives, const FluxConfig& config) {
   const int width = static_cast<int>(guides.size.width);
   const Tolerance tolerance{config.blur_depth, config.blur_slope, std::countr_zero(config.blur_normal_power)};
   for_row_blocks(guides.size.height, [&](int first, int last) {

@@ -3,8 +3,8 @@
 #include <array>
 #include <cstdint>
 
-#include "runtime/denoise/denoiser_config.h"
 #include "runtime/denoise/depth_derivatives.h"
+#include "runtime/denoise/flux_config.h"
 #include "runtime/denoise/guides.h"
 
 namespace packtrace {
@@ -26,7 +26,7 @@ public:
   explicit EdgeWeights(int step) : step_(step) {}
 
   void resize(ImageSize size);
-  void compute(const Guides& guides, const DepthDerivatives& derivatives, const DenoiserConfig& config);
+  void compute(const Guides& guides, const DepthDerivatives& derivatives, const FluxConfig& config);
 
   int step() const { return step_; }
 

@@ -105,7 +105,7 @@ struct Gathered {
 class Reprojection {
 public:
   Reprojection(const FrameHistory& previous, const Guides& guides, const DepthDerivatives& derivatives,
-               const DenoiserConfig& config)
+               const FluxConfig& config)
       : previous_(previous), guides_(guides), derivatives_(derivatives),
         tests_{config.reprojection_depth, config.reprojection_slope, std::countr_zero(config.reprojection_normal_power),
                config.reprojection_instance_test},
@@ -166,7 +166,7 @@ void store(const Gathered& sum, float longest, History& history, int x, int y) {
 } // namespace
 
 void reproject(const FrameHistory& previous, const Guides& guides, const DepthDerivatives& derivatives,
-               std::span<const Vec2> motion_px, std::span<const float> previous_z, const DenoiserConfig& config,
+               std::span<const Vec2> motion_px, std::span<const float> previous_z, const FluxConfig& config,
                History& reprojected) {
   const Reprojection reprojection(previous, guides, derivatives, config);
   const float longest_still = static_cast<float>(config.max_tspp);

@@ -2,8 +2,8 @@
 
 #include <span>
 
-#include "runtime/denoise/denoiser_config.h"
 #include "runtime/denoise/depth_derivatives.h"
+#include "runtime/denoise/flux_config.h"
 #include "runtime/denoise/guides.h"
 #include "runtime/denoise/history.h"
 
@@ -27,7 +27,7 @@ struct FrameHistory {
 /// @param motion_px GBuffer::motion_px; pixels with non-finite motion get no history
 /// @param previous_z GBuffer::previous_z; pixels whose previous depth is not positive and finite get no history
 void reproject(const FrameHistory& previous, const Guides& guides, const DepthDerivatives& derivatives,
-               std::span<const Vec2> motion_px, std::span<const float> previous_z, const DenoiserConfig& config,
+               std::span<const Vec2> motion_px, std::span<const float> previous_z, const FluxConfig& config,
                History& reprojected);
 
 } // namespace packtrace

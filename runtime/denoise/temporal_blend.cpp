@@ -95,7 +95,7 @@ float correct_row(int width, const CorrectRow& rows, CorrectScales s) {
 
 } // namespace
 
-void accumulate(std::span<const float> ao, const Guides& guides, const DenoiserConfig& config, History& history,
+void accumulate(std::span<const float> ao, const Guides& guides, const FluxConfig& config, History& history,
                 FrameSamples& samples) {
   const float longest = static_cast<float>(config.max_tspp), fast_frames = static_cast<float>(config.fast_frames);
   for_row_blocks(guides.size.height, [&](int first, int last) {
@@ -114,7 +114,7 @@ void accumulate(std::span<const float> ao, const Guides& guides, const DenoiserC
   });
 }
 
-void correct_history(const FrameSamples& samples, const Guides& guides, const DenoiserConfig& config, History& history,
+void correct_history(const FrameSamples& samples, const Guides& guides, const FluxConfig& config, History& history,
                      std::span<float> value_variance, NoisyImage& image) {
   const float share = 1.0f / static_cast<float>(config.fast_frames);
   const CorrectScales scales{share / (2.0f - share),

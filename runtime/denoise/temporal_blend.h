@@ -2,8 +2,8 @@
 
 #include <span>
 
-#include "runtime/denoise/denoiser_config.h"
 #include "runtime/denoise/edge_blur.h"
+#include "runtime/denoise/flux_config.h"
 #include "runtime/denoise/guides.h"
 #include "runtime/denoise/history.h"
 #include "runtime/denoise/local_statistics.h"
@@ -15,7 +15,7 @@ namespace packtrace {
 /// non-finite samples are ignored, and the pixel keeps its history. Samples above 1 are clamped to 1.
 /// @param ao one value per pixel, rows top to bottom
 /// @param samples out: the input of the local statistics
-void accumulate(std::span<const float> ao, const Guides& guides, const DenoiserConfig& config, History& history,
+void accumulate(std::span<const float> ao, const Guides& guides, const FluxConfig& config, History& history,
                 FrameSamples& samples);
 
 /// Corrects the slow history where the fast history shows that the scene has changed, and estimates the noise.
@@ -33,7 +33,7 @@ void accumulate(std::span<const float> ao, const Guides& guides, const DenoiserC
 /// @param image out: history.mean and the precision for the blurs. A short history has a skewed distribution and a
 ///        poor variance estimate, so differences between young pixels are weak evidence of an edge. The variance used
 ///        for the precision is therefore multiplied by 1 + (blur_trust_frames / tspp)^2.
-void correct_history(const FrameSamples& samples, const Guides& guides, const DenoiserConfig& config, History& history,
+void correct_history(const FrameSamples& samples, const Guides& guides, const FluxConfig& config, History& history,
                      std::span<float> value_variance, NoisyImage& image);
 
 } // namespace packtrace

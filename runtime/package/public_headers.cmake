@@ -7,6 +7,7 @@ set(packtrace_public_headers
   pbrt_import/base/file_error.h
   pbrt_import/base/memory_budget.h
   pbrt_import/base/progress.h
+  pbrt_import/base/setting.h
   pbrt_import/import_scene.h
   pbrt_import/scene/albedo_texture.h
   pbrt_import/scene/alpha_mask.h
@@ -57,7 +58,10 @@ set(packtrace_public_headers
   runtime/camera/lod_view.h
   runtime/camera/primary_visibility.h
   runtime/denoise/denoiser.h
+  runtime/denoise/denoise_pipeline.h
   runtime/denoise/denoiser_config.h
+  runtime/denoise/flux_config.h
+  runtime/denoise/reference/reference_config.h
   runtime/image/background.h
   runtime/image/exr.h
   runtime/image/false_color.h

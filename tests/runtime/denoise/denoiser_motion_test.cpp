@@ -34,7 +34,7 @@ TEST(Reprojection, IntegerPansFetchTheSameBits) {
   History out;
   out.resize(size);
   for (int y = 0; y < 21; ++y) std::fill_n(out.mean.row(y), 33, 0.5f); // a rejection must overwrite these values
-  reproject(previous, previous.guides, derivatives, g.motion_px, {}, DenoiserConfig{}, out);
+  reproject(previous, previous.guides, derivatives, g.motion_px, {}, FluxConfig{}, out);
   for (int y = 0; y < 21; ++y)
     for (int x = 0; x < 33; ++x) {
       const bool seen = x >= 3 && y + 2 < 21;
@@ -120,7 +120,7 @@ TEST(AoDenoiser, MovingInstancesKeepHistoryAndWhatTheyUncoverHasNone) {
 /// PSNR after 64 frames of a wall with smooth occlusion that moves by `pan` pixels per frame.
 double psnr_of_pan(Vec2 pan) {
   DenoiserConfig config;
-  config.max_tspp = config.max_tspp_moving; // equal history lengths for still and moving images
+  config.ours.max_tspp = config.ours.max_tspp_moving; // equal history lengths for still and moving images
   AoDenoiser denoiser(config);
   const auto p_at = [](float x, float y) { return 0.5f + 0.3f * std::sin(x * 0.15f) * std::cos(y * 0.2f); };
   double rmse = 0;
@@ -218,7 +218,7 @@ TEST(AoDenoiser, GhostOfAThinOccluderFades) {
 
 TEST(AoDenoiser, WithoutCorrectionGhostsStay) { // shows that the tests above can fail
   DenoiserConfig config;
-  config.change_tolerance = 1.0f;
+  config.ours.change_tolerance = 1.0f;
   EXPECT_GT(ghost(0.9f, 0.1f, {40, 20, 110, 76}, config)[3], 0.5);
 }
 

@@ -93,8 +93,8 @@ TEST(AoDenoiser, StillNoiseResetsNoHistory) {
 TEST(AoDenoiser, TsppCountsValidFramesUpToTheCap) {
   const ImageSize size{40, 24};
   DenoiserConfig config;
-  config.max_tspp = 10;
-  config.change_gamma = 10.0f; // disables the history correction in practice
+  config.ours.max_tspp = 10;
+  config.ours.change_gamma = 10.0f; // disables the history correction in practice
   AoDenoiser denoiser(config);
   for (uint32_t f = 1; f <= 14; ++f) {
     const AoFrame frame = samples(size, [&](uint32_t x, uint32_t y) {
@@ -135,8 +135,8 @@ TEST(AoDenoiser, VarianceIsThatOfTheTemporalMean) {
 TEST(AoDenoiser, LongStillHistoryIsThePlainMeanOfItsSamples) {
   const ImageSize size{48, 32};
   DenoiserConfig config;
-  config.blur_fade_begin = 8, config.blur_fade_end = 32;
-  config.change_gamma = 10.0f;
+  config.ours.blur_fade_begin = 8, config.ours.blur_fade_end = 32;
+  config.ours.change_gamma = 10.0f;
   AoDenoiser denoiser(config);
   std::vector<double> sum(size.pixels());
   const DenoisedAo* result = nullptr;

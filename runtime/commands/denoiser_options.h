@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "runtime/denoise/denoiser_config.h"
+
+namespace packtrace {
+
+/// Adds --denoiser, --denoiser-set and --no-denoise. The strings must outlive the verb.
+/// @param denoiser in: the default; out: "ours", "reference" or "off"
+/// @param settings out: words of the form NAME=VALUE
+void add_denoiser_options(CLI::App& verb, std::string& denoiser, std::vector<std::string>& settings);
+
+/// The configuration that the two options ask for; the default one with "off". Throws Error(kUsage) for unknown names,
+/// values that are not allowed, and settings of a denoiser that is off.
+DenoiserConfig denoiser_config(const std::string& denoiser, const std::vector<std::string>& settings);
+
+} // namespace packtrace

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/camera/gbuffer.h"
+
+namespace packtrace {
+
+/// Result of one frame, rows top to bottom, one entry per pixel in every array.
+struct DenoisedAo {
+  ImageSize size;
+  std::vector<float> ao;       ///< [0,1], or kInvalidAo at pixels whose camera ray missed
+  std::vector<float> variance; ///< variance of the pixel's temporal mean before any blur, AO squared; 0 without history
+  std::vector<float> tspp;     ///< temporal samples per pixel: frames of accumulated history; 0 without history
+};
+
+/// Where a pixel's history comes from.
+enum class HistorySource : uint8_t {
+  kMotion, ///< from where the previous frame saw the same surface point (GBuffer::motion_px)
+  /// From the same pixel, whatever its camera ray hits now. For frames of a still view whose camera rays are jittered
+  /// within their pixels: the history then converges to the mean over the pixel's area.
+  kPixel,
+};
+
+/// One of the denoisers behind AoDenoiser, which checks the arguments and describes the functions.
+class DenoisePipeline {
+public:
+  virtual ~DenoisePipeline() = default;
+  /// Called before the first frame and where the size changes. Discards the history.
+  virtual void resize(ImageSize size) = 0;
+  /// Sizes are those of the last resize(), and not empty.
+  virtual void add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source) = 0;
+  virtual const DenoisedAo& denoise() = 0;
+  virtual std::vector<std::byte> save() const = 0;
+  virtual void restore(ImageSize size, std::span<const std::byte> bytes) = 0;
+  virtual void reset() = 0;
+};
+
+} // namespace packtrace
