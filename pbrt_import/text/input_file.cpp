@@ -153,7 +153,8 @@ uint64_t InputFile::claimed_bytes() const {
   if (!compressed() || stored < last.size() ||
       ::pread(state_->file.descriptor.get(), last.data(), last.size(), static_cast<off_t>(stored - last.size())) != 4)
     return 0;
-  const uint64_t claimed = last[0] | (last[1] << 8) | (last[2] << 16) | (uint64_t{last[3]} << 24);
+  const uint64_t claimed =
+      uint64_t{last[0]} | (uint64_t{last[1]} << 8) | (uint64_t{last[2]} << 16) | (uint64_t{last[3]} << 24);
   return claimed / kMaxInflationRatio <= stored ? claimed : 0;
 }
 

@@ -3,7 +3,7 @@
 /// Compiles a function for AVX2 and for the baseline instruction set; the loader picks one at program start. Both give
 /// the same bits, because the compiler neither reassociates nor fuses multiply-adds. The loader's choice runs before
 /// sanitizers are initialised and would crash them, so sanitizer builds have the baseline version only.
-#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if defined(__x86_64__) && !defined(PACKTRACE_SANITIZED)
 #define PACKTRACE_AVX2_CLONES __attribute__((target_clones("avx2", "default")))
 #else
 #define PACKTRACE_AVX2_CLONES

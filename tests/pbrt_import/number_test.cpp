@@ -16,7 +16,7 @@
 namespace packtrace {
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef PACKTRACE_SANITIZED
 constexpr uint64_t kShare = 50; // sanitizers slow each value down by more than ten times
 #else
 constexpr uint64_t kShare = 1;

@@ -138,9 +138,10 @@ public:
   explicit Numbers(uint32_t seed) : random_(seed) {}
   float operator()() {
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
-    constexpr float kSpecial[] = {0.0f,       -0.0f,  1.0f,  -1.0f,  0.5f,      2.0f,         1e-45f,
-                                  1e-38f,     1e-30f, 1e30f, -1e30f, 3.4e38f,   -3.4e38f,     0.99999994f,
-                                  1.0000001f, 360.0f, 90.0f, 1e-6f,  kInfinity, std::nanf("")};
+    constexpr float kSpecial[] = {0.0f,   -0.0f,   1.0f,     -1.0f,       0.5f,
+                                  2.0f,   1e-45f,  1e-38f,   1e-30f,      1e30f,
+                                  -1e30f, 3.4e38f, -3.4e38f, 0.99999994f, 1.0000001f,
+                                  360.0f, 90.0f,   1e-6f,    kInfinity,   std::numeric_limits<float>::quiet_NaN()};
     if (random_() % 3 == 0) return kSpecial[random_() % std::size(kSpecial)];
     return static_cast<float>(static_cast<int>(random_() % 4001) - 2000) / 1000.0f;
   }

@@ -29,7 +29,7 @@ constexpr const char* kGroup = "shared";
 constexpr const char* kGroup = "assets";
 #endif
 
-#ifdef __SANITIZE_ADDRESS__
+#ifdef PACKTRACE_SANITIZED
 constexpr bool kSanitized = true;
 #else
 constexpr bool kSanitized = false;

@@ -18,7 +18,7 @@ struct BorderEnds {
   std::array<uint32_t, 2> points{kNoPagePoint, kNoPagePoint};
 
   uint32_t operator[](size_t i) const { return points[i]; }
-  bool has(uint32_t point) const { return (points[0] == point) | (points[1] == point); }
+  bool has(uint32_t point) const { return (int{points[0] == point} | int{points[1] == point}) != 0; }
   /// Adds an edge and drops the older of two.
   void push(uint32_t point) { points = {point, points[0]}; }
   void erase(size_t at) { points = {at == 0 ? points[1] : points[0], kNoPagePoint}; }

@@ -16,7 +16,7 @@ using test::BakedScene;
 using test::closest;
 
 // Rays are slow under sanitizers. Rare leaks are found by builds without them.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef PACKTRACE_SANITIZED
 constexpr size_t kManyRays = 100'000;
 #else
 constexpr size_t kManyRays = 1'000'000;
