@@ -135,9 +135,9 @@ private:
     out_.material[pixel] = attributes.material;
     out_.back_face[pixel] = glm::dot(own_normal, facing) < 0.0;
     // Positions are rounded to multiples of the least denormal float, and so are sums of position and offset.
-    constexpr double kLeastOffset = 4.0 * double{std::numeric_limits<float>::denorm_min()};
+    constexpr double kMinOffset = 4.0 * double{std::numeric_limits<float>::denorm_min()};
     out_.offset[pixel] = static_cast<float>(
-        std::max(ray_offset(hit, space_, unit_position, facing) * space_.inverse_scale(), kLeastOffset));
+        std::max(ray_offset(hit, space_, unit_position, facing) * space_.inverse_scale(), kMinOffset));
     if (!motion_.any()) {
       out_.motion_px[pixel] = Vec2(0);
       return;

@@ -15,7 +15,7 @@ namespace {
 constexpr uint32_t kBins = 16, kFewBins = 8;
 constexpr uint32_t kFewBoxes = 32; // runs up to this size have kFewBins
 /// Axes along which the centres are closer together than this share of the largest extent are not considered.
-constexpr float kLeastExtent = 0.25f;
+constexpr float kMinExtent = 0.25f;
 constexpr uint32_t kParallelCount = 512; // smaller subtrees are built serially
 
 using Float4 = float __attribute__((vector_size(16)));
@@ -186,7 +186,7 @@ bool TopTreeBuilder::split_by_area(const Run& run, Run& left, Run& right) {
   for (const Box& box : boxes) centres.extend(box.lo + box.hi, box.lo + box.hi);
   BinScale bin_of{centres.lo, Float4{}, static_cast<int32_t>(run.count <= kFewBoxes ? kFewBins : kBins) - 1};
   const Float4 extents = centres.hi - centres.lo;
-  const float least = kLeastExtent * std::max({extents[0], extents[1], extents[2]});
+  const float least = kMinExtent * std::max({extents[0], extents[1], extents[2]});
   for (uint32_t axis = 0; axis < 3; ++axis) {
     const float extent = extents[axis];
     const float scale = extent > 0.0f && extent >= least ? static_cast<float>(bin_of.last + 1) / extent : 0.0f;
