@@ -25,8 +25,9 @@ int main(int argc, char** argv) try {
   const auto tracer = make_tracer(source, &file, tracing);
 
   const packtrace::ImageSize size{320, 180};
-  const packtrace::Camera camera =
-      source.cameras().empty() ? framing_camera(source.world_bounds(), size) : source.cameras().front();
+  const packtrace::Camera camera = source.cameras().empty()
+                                       ? framing_camera(source.world_bounds(), size, source.cameras())
+                                       : source.cameras().front();
   packtrace::AoConfig ao;
   ao.radius = packtrace::default_ao_radius(source.world_bounds());
 

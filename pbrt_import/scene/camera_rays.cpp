@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/scene/world_view.h"
 
 namespace packtrace {
 namespace {
@@ -116,13 +117,16 @@ std::optional<ProjectedPoint> PrimaryCamera::project(DVec3 world) const {
   return ProjectedPoint{uv * glm::dvec2(size_.width, size_.height) - offset_px_, view_z(world)};
 }
 
-Camera framing_camera(const Bounds& bounds, ImageSize size) {
+Camera framing_camera(const Bounds& bounds, ImageSize size, std::span<const Camera> cameras) {
+  const WorldView world = estimate_world_view(cameras);
   Camera camera;
   camera.width_px = size.width;
   camera.height_px = size.height;
   camera.fov_degrees = 40.0;
   const DVec3 centre = bounds.empty() ? DVec3(0.0) : bounds.centre();
-  camera.world_from_camera = *look_at(DVec3(0.6, 0.5, -1.0), DVec3(0.0), DVec3(0.0, 1.0, 0.0));
+  const DVec3 front = world.up.z == 0.0 ? DVec3(0, 0, -1) : DVec3(0, -1, 0), side = glm::cross(front, world.up);
+  camera.world_from_camera = *look_at(0.6 * side + 0.5 * world.up + front, DVec3(0.0), world.up);
+  if (world.mirrored) camera.world_from_camera[0] = -camera.world_from_camera[0];
 
   // The smallest distance at which every corner of the box lies inside the frustum, plus a margin.
   const glm::dvec4 window = default_window(size);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 
 #include "pbrt_import/scene/bounds.h"
 #include "pbrt_import/scene/image_size.h"
@@ -70,8 +71,9 @@ private:
   double depth_scale_; ///< world units per camera unit along camera z
 };
 
-/// A perspective camera that sees the whole box from the front, above and to the right (world +y up), for scenes
-/// without a camera. Works at any scale; for an empty or point-like box, the distance is 1.
-Camera framing_camera(const Bounds& bounds, ImageSize size);
+/// A perspective camera that sees the whole box obliquely from above, for scenes without a camera. Works at any scale;
+/// for an empty or point-like box, the distance is 1.
+/// @param cameras those of the scene; they tell which way is up and whether images are mirrored (world_view.h)
+Camera framing_camera(const Bounds& bounds, ImageSize size, std::span<const Camera> cameras);
 
 } // namespace packtrace

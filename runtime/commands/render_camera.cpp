@@ -28,7 +28,7 @@ ChosenCamera choose_camera(const SceneSource& source, const RenderOptions& optio
   const std::span<const Camera> cameras = source.cameras();
   const ImageSize size = options.size.empty() ? kDefaultSize : parse_size(options.size);
   const std::string name = options.camera.value_or("0");
-  if (name == "auto") return {framing_camera(source.world_bounds(), size), std::nullopt, {}};
+  if (name == "auto") return {framing_camera(source.world_bounds(), size, source.cameras()), std::nullopt, {}};
   const std::optional<uint32_t> number = whole_number(name);
   if (!number) throw Error(ErrorKind::kUsage, "--camera " + name + ": must be a camera number, from 0, or auto");
   const uint32_t index = *number;
@@ -38,12 +38,12 @@ ChosenCamera choose_camera(const SceneSource& source, const RenderOptions& optio
                                                cameras.size() == 1 ? "" : "s"));
   if (!globals.quiet)
     print_printable(options.input + ": warning: the scene has no camera; showing the whole scene\n", stderr);
-  return {framing_camera(source.world_bounds(), size), std::nullopt, "the scene has no camera"};
+  return {framing_camera(source.world_bounds(), size, source.cameras()), std::nullopt, "the scene has no camera"};
 }
 
 ChosenCamera frame_whole_scene(const ChosenCamera& blind, const SceneSource& source, ImageSize size,
                                const RenderOptions& options, const GlobalOptions& globals) {
-  ChosenCamera framing{framing_camera(source.world_bounds(), size), std::nullopt,
+  ChosenCamera framing{framing_camera(source.world_bounds(), size, source.cameras()), std::nullopt,
                        fmt::format("camera {} sees nothing", blind.index.value())};
   if (!globals.quiet)
     print_printable(

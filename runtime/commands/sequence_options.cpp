@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/scene/world_view.h"
 #include "runtime/commands/camera_path_file.h"
 #include "runtime/commands/option_checks.h"
 
@@ -133,6 +134,7 @@ Sequence make_sequence(const SequenceOptions& options, std::optional<uint64_t> p
                 fmt::format("--frames {}: a sequence has 1 to {} pictures", *pictures, kMaxPictures));
   sequence.pictures = pictures.value_or(default_pictures(kDefaultSeconds, sequence.fps));
   const std::string& path = *options.path;
+  const DVec3 up = estimate_world_view(source.cameras()).up;
   if (path == "scene") {
     if (!pictures && motion != nullptr && motion->end_s() > sequence.start_s)
       sequence.pictures = default_pictures(motion->end_s() - sequence.start_s, sequence.fps);
@@ -143,15 +145,14 @@ Sequence make_sequence(const SequenceOptions& options, std::optional<uint64_t> p
       return moving.value_or(camera);
     };
   } else if (path == "turntable") {
-    const Camera framing = framing_camera(source.world_bounds(), loop.config().size);
-    sequence.camera =
-        turning(framing, source.world_bounds().centre(), nearest_up_axis(framing), 360.0, sequence.pictures);
+    const Camera framing = framing_camera(source.world_bounds(), loop.config().size, source.cameras());
+    sequence.camera = turning(framing, source.world_bounds().centre(), up, 360.0, sequence.pictures);
   } else if (path == "orbit" || path.starts_with("orbit:")) {
     const double degrees = orbit_degrees(path);
     const DVec3 forward = glm::normalize(DVec3(camera.world_from_camera[2]));
     const DVec3 pivot =
         DVec3(camera.world_from_camera[3]) + forward * view_distance(camera, sequence.start_s, source, loop);
-    sequence.camera = turning(camera, pivot, nearest_up_axis(camera), degrees, sequence.pictures);
+    sequence.camera = turning(camera, pivot, up, degrees, sequence.pictures);
   } else {
     if (ending_of(path) != ".json")
       throw Error(ErrorKind::kUsage, fmt::format("--path {}: must be orbit, orbit:DEGREES, turntable, scene or a .json "

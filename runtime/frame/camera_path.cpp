@@ -92,21 +92,12 @@ Camera CameraPath::camera_of(const CameraKey& key) const {
 
 Camera CameraPath::at(double time_s) const { return camera_of(interpolated(time_s)); }
 
-DVec3 nearest_up_axis(const Camera& camera) {
-  const DVec3 up(camera.world_from_camera[1]);
-  int axis = 0;
-  for (int i = 1; i < 3; ++i)
-    if (std::abs(up[i]) > std::abs(up[axis])) axis = i;
-  DVec3 result(0.0);
-  result[axis] = up[axis] < 0.0 ? -1.0 : 1.0;
-  return result;
-}
-
 Camera orbited(const Camera& camera, DVec3 pivot, DVec3 up, double degrees) {
   Camera turned = camera;
   if (degrees == 0.0) return turned;
   // In pbrt's left-handed space, a camera that looks at the pivot moves to its right for negative angles about up.
-  const glm::dmat3 rotation(glm::rotate(glm::dmat4(1.0), glm::radians(-degrees), up));
+  const double to_right = glm::determinant(glm::dmat3(camera.world_from_camera)) < 0.0 ? degrees : -degrees;
+  const glm::dmat3 rotation(glm::rotate(glm::dmat4(1.0), glm::radians(to_right), up));
   for (int column = 0; column < 3; ++column)
     turned.world_from_camera[column] = rotation * DVec3(camera.world_from_camera[column]);
   turned.world_from_camera[3] = pivot + rotation * (DVec3(camera.world_from_camera[3]) - pivot);

@@ -47,9 +47,6 @@ private:
   Camera base_;
 };
 
-/// Returns the axis of the scene's coordinates nearest to the camera's up direction, as a unit vector.
-DVec3 nearest_up_axis(const Camera& camera);
-
 /// Turns a camera about a vertical line. Positive angles move the camera to its right.
 /// @param up unit vector along the line
 /// @param pivot a point on the line

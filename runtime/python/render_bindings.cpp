@@ -36,7 +36,7 @@ py::array pixels(std::vector<T>&& values, ImageSize size) {
 
 Camera chosen_camera(const SceneSource& source, std::optional<int64_t> index, ImageSize size) {
   const auto count = static_cast<int64_t>(source.cameras().size());
-  if (!index || (*index == 0 && count == 0)) return framing_camera(source.world_bounds(), size);
+  if (!index || (*index == 0 && count == 0)) return framing_camera(source.world_bounds(), size, source.cameras());
   if (*index < 0 || *index >= count)
     throw Error(ErrorKind::kUsage, "camera=" + std::to_string(*index) + ": the file has " + std::to_string(count));
   return source.cameras()[static_cast<size_t>(*index)];

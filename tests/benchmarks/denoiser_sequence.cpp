@@ -26,8 +26,9 @@ public:
   SequenceTracer(const TraceInput& input, const SequenceOptions& options)
       : input_(input), options_(options), tracer_(input.file, input.source) {
     const SceneSource& source = input.source;
-    camera_ = options.framed || source.cameras().empty() ? framing_camera(source.world_bounds(), options.size)
-                                                         : source.cameras()[0];
+    camera_ = options.framed || source.cameras().empty()
+                  ? framing_camera(source.world_bounds(), options.size, source.cameras())
+                  : source.cameras()[0];
     ao_.radius = default_ao_radius(source.world_bounds());
   }
 

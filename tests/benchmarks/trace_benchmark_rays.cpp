@@ -72,7 +72,7 @@ bool differ(const Ray& ray, const RayHit& a, const RayHit& b, double t_scale) {
 
 Camera choose_camera(const SceneSource& source, const std::string& camera, ImageSize size) {
   if (camera == "auto" || (camera == "0" && source.cameras().empty()))
-    return framing_camera(source.world_bounds(), size);
+    return framing_camera(source.world_bounds(), size, source.cameras());
   uint32_t index = 0;
   const char* const end = camera.data() + camera.size();
   if (std::from_chars(camera.data(), end, index).ptr != end || index >= source.cameras().size())
@@ -111,7 +111,7 @@ RecordedFrame record_frame(const SceneSource& source, const RayTracer& tracer, c
       PrimaryCamera(choose_camera(source, camera, size), size), default_ao_radius(source.world_bounds()), {}};
   frame.phases = record_phases(source, tracer, frame.camera, frame.ao_radius);
   if (frame.phases[1].count() == 0 && camera == "0") { // the camera looks past the scene
-    frame.camera = PrimaryCamera(framing_camera(source.world_bounds(), size), size);
+    frame.camera = PrimaryCamera(framing_camera(source.world_bounds(), size, source.cameras()), size);
     frame.phases = record_phases(source, tracer, frame.camera, frame.ao_radius);
   }
   if (frame.phases[1].count() == 0) throw Error(ErrorKind::kInput, "the camera sees nothing");

@@ -55,7 +55,8 @@ private:
     return {static_cast<uint32_t>(settings.width), static_cast<uint32_t>(settings.height)};
   }
   static Camera camera_of(const SceneSource& source, ImageSize size, bool framed) {
-    return framed || source.cameras().empty() ? framing_camera(source.world_bounds(), size) : source.cameras()[0];
+    return framed || source.cameras().empty() ? framing_camera(source.world_bounds(), size, source.cameras())
+                                              : source.cameras()[0];
   }
 
   PrimaryCamera camera_;

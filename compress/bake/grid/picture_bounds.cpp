@@ -211,7 +211,7 @@ std::vector<PrimaryCamera> promised_cameras(const Scene& scene, const ScenePlan&
     }
   };
   for (const Camera& camera : scene.cameras) add(camera);
-  if (const Bounds box = scene_box(plan, measure); !box.empty()) add(framing_camera(box, kPromisedSize));
+  if (const Bounds box = scene_box(plan, measure); !box.empty()) add(framing_camera(box, kPromisedSize, scene.cameras));
   return cameras;
 }
 

@@ -1,11 +1,13 @@
 #include "pbrt_import/scene/camera_rays.h"
 
+#include <array>
 #include <cmath>
 #include <numbers>
 
 #include <gtest/gtest.h>
 
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/scene/world_view.h"
 
 namespace packtrace {
 namespace {
@@ -180,7 +182,7 @@ TEST(FramingCamera, SeesTheWholeBoxAtAnyScale) {
       Bounds bounds;
       bounds.extend(DVec3(-1, 2, 3) * scale);
       bounds.extend(DVec3(9, 4, 8) * scale);
-      const PrimaryCamera camera(framing_camera(bounds, size), size);
+      const PrimaryCamera camera(framing_camera(bounds, size, {}), size);
       double widest = 0.0;
       for (int i = 0; i < 8; ++i) {
         const auto p = camera.project(
@@ -195,11 +197,73 @@ TEST(FramingCamera, SeesTheWholeBoxAtAnyScale) {
 }
 
 TEST(FramingCamera, WorksForEmptyAndPointBounds) {
-  EXPECT_NO_THROW(PrimaryCamera(framing_camera(Bounds{}, {8, 8}), {8, 8}));
+  EXPECT_NO_THROW(PrimaryCamera(framing_camera(Bounds{}, {8, 8}, {}), {8, 8}));
   Bounds point;
   point.extend(DVec3(5, 5, 5));
-  const PrimaryCamera camera(framing_camera(point, {8, 8}), {8, 8});
+  const PrimaryCamera camera(framing_camera(point, {8, 8}, {}), {8, 8});
   EXPECT_NEAR(camera.project({5, 5, 5})->pixel.x, 4.0, 1e-9);
+}
+
+Camera looking(DVec3 eye, DVec3 target, DVec3 up) {
+  Camera camera;
+  camera.world_from_camera = *look_at(eye, target, up);
+  return camera;
+}
+
+TEST(FramingCamera, LooksFromAboveWhateverAxisIsUp) {
+  Bounds bounds;
+  bounds.extend(DVec3(-1, 2, 3));
+  bounds.extend(DVec3(9, 4, 8));
+  for (const DVec3 up : {DVec3(0, 1, 0), DVec3(0, 0, 1), DVec3(1, 0, 0), DVec3(0, -1, 0), DVec3(0, 0, -1)})
+    for (const double mirror : {1.0, -1.0}) {
+      std::array<Camera, 1> cameras{looking(DVec3(3, 4, 5) + 4.0 * up, DVec3(0.0), up)};
+      cameras[0].world_from_camera[0] *= mirror;
+      const Camera framing = framing_camera(bounds, {100, 80}, cameras);
+      EXPECT_GT(glm::dot(up, framing.world_from_camera[3] - bounds.centre()), 1.0);
+      const PrimaryCamera camera(framing, {100, 80});
+      const glm::dvec2 top = camera.project(bounds.centre() + up).value().pixel;
+      EXPECT_NEAR(top.x, 50.0, 1e-9);
+      EXPECT_LT(top.y, 40.0);
+      EXPECT_EQ(glm::determinant(glm::dmat3(framing.world_from_camera)) < 0.0, mirror < 0.0);
+    }
+}
+
+TEST(WorldView, UpIsTheAxisWhoseImageIsVertical) {
+  EXPECT_EQ(estimate_world_view({}).up, DVec3(0, 1, 0));
+  // From steeply above, the camera's own up is nearer to a horizontal axis.
+  for (const DVec3 up : {DVec3(0, 1, 0), DVec3(0, 0, 1), DVec3(1, 0, 0), DVec3(0, 0, -1)})
+    for (const double elevation : {-0.9, -0.5, 0.0, 0.2, 0.6}) {
+      const DVec3 sideways = glm::cross(up, glm::normalize(DVec3(1, 2, 4)));
+      const std::array<Camera, 1> cameras{looking(DVec3(0.0), glm::normalize(sideways) + up * elevation * 1.5, up)};
+      EXPECT_EQ(estimate_world_view(cameras).up, up) << elevation;
+    }
+}
+
+TEST(WorldView, CamerasAlongAnAxisLookDownRatherThanUp) {
+  const auto up_of = [](DVec3 eye, DVec3 up) {
+    const std::array<Camera, 1> cameras{looking(eye, DVec3(0.0), up)};
+    return estimate_world_view(cameras).up;
+  };
+  EXPECT_EQ(up_of({0, 3, -2}, {0, 1, 0}), DVec3(0, 1, 0)); // 56 degrees down
+  EXPECT_EQ(up_of({0, -2, 3}, {0, 0, 1}), DVec3(0, 0, 1));
+  EXPECT_EQ(up_of({0, -0.5, -3}, {0, 1, 0}), DVec3(0, 1, 0)); // 10 degrees up
+}
+
+TEST(WorldView, OtherCamerasDecideForOnesThatLookStraightDown) {
+  const std::array<Camera, 2> cameras{looking({0, 2, -7}, {0, 1, 0}, {0, 1, 0}),
+                                      looking({0, 8, -0.01}, {0, 0, 0}, {0, 1, 0})};
+  EXPECT_EQ(estimate_world_view(cameras).up, DVec3(0, 1, 0));
+  // Rolled cameras: the nearest axis.
+  const std::array<Camera, 1> rolled{looking({400, 20, 30}, {0, 63, -110}, {0.1, 0.2, 1.0})};
+  EXPECT_EQ(estimate_world_view(rolled).up, DVec3(0, 0, 1));
+}
+
+TEST(WorldView, IgnoresCamerasWithoutRays) {
+  std::array<Camera, 2> cameras{Camera{}, looking({0, -5, 1}, {0, 0, 0}, {0, 0, 1})};
+  cameras[0].world_from_camera[1] = DVec3(0.0);
+  EXPECT_EQ(estimate_world_view(cameras).up, DVec3(0, 0, 1));
+  cameras[0].world_from_camera[1] = DVec3(std::nan(""));
+  EXPECT_EQ(estimate_world_view(cameras).up, DVec3(0, 0, 1));
 }
 
 } // namespace
