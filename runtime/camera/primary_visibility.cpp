@@ -40,12 +40,13 @@ public:
   bool sees_motion() const { return motion_.any(); }
 
   void trace_tile(const Tile& tile) const {
-    for (uint32_t y = tile.y0; y < tile.y1; y += kBlock) trace_row(y, tile);
+    RayBatch batch;
+    for (uint32_t y = tile.y0; y < tile.y1; y += kBlock) trace_row(y, tile, batch);
   }
 
 private:
-  void trace_row(uint32_t y0, const Tile& tile) const {
-    RayBatch batch;
+  void trace_row(uint32_t y0, const Tile& tile, RayBatch& batch) const {
+    batch.count = batch.hit_count = 0;
     for (uint32_t x = tile.x0; x < tile.x1; x += kBlock)
       for (uint32_t i = 0; i < kBlock * kBlock; ++i) add_ray(x + i % kBlock, y0 + i / kBlock, tile, batch);
     tracer_.closest_hits({batch.rays, batch.count}, kCameraRays, RayOrder::kCoherent, {batch.hits, batch.count});

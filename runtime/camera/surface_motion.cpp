@@ -32,6 +32,7 @@ std::pair<Vec2, float> SurfaceMotion::of(const SurfacePoint& point) const {
 
 /// Returns where the point was, in world space; none if it did not move.
 std::optional<DVec3> SurfaceMotion::previous_position(const SurfacePoint& point) const {
+  if (previous_.world_from_object.empty() && previous_.surfaces == nullptr) return std::nullopt;
   const uint32_t instance = point.surface.placement->instance;
   const Affine& now = world_from_object(instance);
   const Affine& before = previous_.world_from_object.empty() ? now : previous_.world_from_object[instance];

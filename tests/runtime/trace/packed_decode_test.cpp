@@ -28,8 +28,8 @@ size_t wrong_batches(const BakedFile& file, const packed::Kernels& kernels, size
           const uint32_t got = kernels.decode(cluster, first, count, decoded);
           decode_batch_exactly(tree, geometry, view, first, got, expected);
           bool same = got >= 1 && got <= std::min(count, packed::kBatch) && decoded.count == got;
-          Vec3 vertices[3];
-          decode_vertices(cluster, first, vertices);
+          float vertices[3][3];
+          kernels.triangle(cluster, first, vertices);
           for (int axis = 0; axis < 3; ++axis)
             for (int corner = 0; corner < 3; ++corner)
               same &= vertices[corner][axis] == expected.vertex[axis][corner][0];

@@ -36,6 +36,25 @@ private:
   float scale_;
 };
 
+/// Decodes the vertices of one triangle, in the tree's grid.
+inline void decode_triangle(const TraceCluster& cluster, uint32_t triangle, float (&vertex)[3][3]) {
+  BatchStrips batch;
+  read_strips(cluster, triangle, 1, batch);
+  uint32_t fresh = batch.first_fresh, explicit_bit = batch.explicit_bit;
+  const uint32_t width = index_bits(cluster);
+  const VertexReader read_vertex(cluster);
+  for (uint32_t corner = 0; corner < 3; ++corner) { // the batch's corner list is the triangle's corners
+    uint32_t number = 0;
+    if (corner < batch.lead_count)
+      number = batch.lead[corner];
+    else if (((batch.fresh >> corner) & 1u) != 0)
+      number = fresh++;
+    else
+      number = static_cast<uint32_t>(read_bits(cluster.bits, explicit_bit, width)), explicit_bit += width;
+    read_vertex(number, vertex[corner]);
+  }
+}
+
 /// Decodes triangles from `first` on, as many of `count` as fit into a batch; returns their number. Portable code.
 inline uint32_t decode_batch_scalar(const TraceCluster& cluster, uint32_t first, uint32_t count, DecodedBatch& out) {
   BatchStrips batch;

@@ -174,6 +174,9 @@ struct Kernels {
                   uint32_t ray_class, KernelHit* hits, KernelCounters* counters);
   void (*any)(const KernelScene& scene, ThreadMemory& memory, const KernelRay* rays, size_t count, uint32_t ray_class,
               uint8_t* occluded, KernelCounters* counters);
+  /// Decodes the vertices of a triangle of a cluster that is not flagged kNeedsWideDecode.
+  /// @param vertex corner, then axis; in the tree's grid
+  void (*triangle)(const TraceCluster& cluster, uint32_t triangle, float (&vertex)[3][3]);
   /// For tests: decodes up to kBatch triangles and returns their number.
   uint32_t (*decode)(const TraceCluster& cluster, uint32_t first, uint32_t count, DecodedBatch& out);
 };

@@ -96,6 +96,9 @@ constexpr Kernels kernels_of(const char* isa) {
              uint8_t* occluded, KernelCounters* counters) {
             trace<Lanes, true>(scene, memory, rays, count, ray_class, occluded, nullptr, counters);
           },
+          [](const TraceCluster& cluster, uint32_t triangle, float(&vertex)[3][3]) {
+            decode_triangle(cluster, triangle, vertex);
+          },
           [](const TraceCluster& cluster, uint32_t first, uint32_t count, DecodedBatch& out) {
             return out.count = Lanes::decode(cluster, first, count, out);
           }};
