@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "assets/generator/placement.h"
 #include "assets/generator/ply_output.h"
@@ -36,6 +37,17 @@ std::string write_grass_frames(const GrassField& field, const GrassVariant& vari
     mesh.uvs.clear();
   }
   return stem + "_0000.ply";
+}
+
+void write_grass_levels(std::string_view name, const GrassConfig& config,
+                        std::span<const std::array<std::string, kGrassLods>> chains, const OutputConfig& output) {
+  std::string text = "{\"chains\": [";
+  for (size_t i = 0; i < chains.size(); ++i)
+    text += fmt::format("{}\n  {{\"objects\": [\"{}\"], \"distances\": [{}]}}", i > 0 ? "," : "",
+                        fmt::join(chains[i], "\", \""), fmt::join(config.lod_distances, ", "));
+  BufferedFile file(output.folder / name, output.overwrite);
+  file.write(text + "\n]}\n");
+  file.close();
 }
 
 void write_grass_texture(std::string_view name, double straw, const OutputConfig& output) {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -25,6 +27,11 @@ std::string grass_name(const GrassConfig& config, const GrassVariant& variant);
 /// Returns the first file's name, relative to the folder. Throws Error(kIo) if writing fails.
 std::string write_grass_frames(const GrassField& field, const GrassVariant& variant, uint32_t frames,
                                const OutputConfig& output);
+
+/// Writes the file of `bake --distance-levels` for GrassConfig::lod_distances.
+/// @param chains names of objects, kGrassLods each
+void write_grass_levels(std::string_view file, const GrassConfig& config,
+                        std::span<const std::array<std::string, kGrassLods>> chains, const OutputConfig& output);
 
 /// Writes a picture of grass blades over their texture coordinates: from dark to light green to straw along u, with
 /// fractions of the latter as given, and from root to tip along v.

@@ -1,7 +1,9 @@
 #include "assets/generator/meadow.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <set>
 #include <string>
 #include <tuple>
@@ -46,6 +48,7 @@ std::string comment_of(const MeadowConfig& config) {
   const char* patch = config.tile == 1 ? "" : "_P";
   for (uint32_t lod = 0; lod + 1 < kGrassLods; ++lod)
     text += fmt::format(" \\\n#     --sequence 'geometry/grass_{}{}_%04d.ply'", lod, patch);
+  text += " \\\n#     --distance-levels meadow_levels.json";
   if (config.tile > 1) text += fmt::format("\n# for each patch P of the tile, 0 to {}", config.tile * config.tile - 1);
   return text + "\n\n";
 }
@@ -107,7 +110,9 @@ public:
 private:
   void write_materials();
   void write_models();
+  std::string declare_grass(const GrassVariant& variant);
   void build_grass();
+  void complete_levels();
   void build_flowers();
   void build_lane();
   void build_trees();
@@ -121,6 +126,7 @@ private:
   SceneWriter& writer_;
   MeadowTerrain terrain_;
   GrassField grass_;
+  std::map<GrassVariant, std::string> grass_objects_; ///< by variant that is written: an object that shows it
   Random random_{config_.seed, 300};
 };
 
@@ -172,23 +178,27 @@ void MeadowBuilder::write_models() {
   add("mountains", TownTerrain(config_.seed).make_mountains());
 }
 
+/// Writes the meshes of a patch and declares its objects. Returns its name.
+std::string MeadowBuilder::declare_grass(const GrassVariant& variant) {
+  std::string name = grass_name(grass_.config, variant);
+  const std::string file = write_grass_frames(grass_, variant, config_.frames, output_);
+  writer_.ply_model(name, file, "grass", uint64_t{kBladeTriangles} * grass_blade_count(grass_.config, variant.lod));
+  for (const std::string tone : kTones) writer_.object(name + "_" + tone, name, {{"grass", "grass_" + tone}});
+  return name;
+}
+
 void MeadowBuilder::build_grass() {
   std::vector<GrassCell> cells = cells_in_view();
   if (cells.size() < config_.patches) throw Error(ErrorKind::kUsage, "--patches: the meadow is too small for them");
   cells.resize(config_.patches);
   const GrassConfig& grass = grass_.config;
-  std::set<GrassVariant> written;
   for (const GrassCell& cell : cells) {
     const auto wrap = [&](int64_t i) {
       return static_cast<uint32_t>(((i % grass.tile_patches) + grass.tile_patches) % grass.tile_patches);
     };
     const GrassVariant variant{grass_lod(grass, cell.distance), wrap(cell.column), wrap(cell.row)};
-    const std::string name = grass_name(grass, variant);
-    if (written.insert(variant).second) {
-      const std::string file = write_grass_frames(grass_, variant, config_.frames, output_);
-      writer_.ply_model(name, file, "grass", uint64_t{kBladeTriangles} * grass_blade_count(grass, variant.lod));
-      for (const std::string tone : kTones) writer_.object(name + "_" + tone, name, {{"grass", "grass_" + tone}});
-    }
+    const bool first = !grass_objects_.contains(variant);
+    const std::string name = first ? declare_grass(variant) : grass_name(grass, variant);
     const double x = static_cast<double>(cell.column) * kCell, z = static_cast<double>(cell.row) * kCell;
     const double dry =
         fractal_noise({x * 0.035, 0.0, z * 0.035}, config_.seed + 31, 2) + 0.5 * smooth_step(6.0, 60.0, cell.distance);
@@ -196,8 +206,31 @@ void MeadowBuilder::build_grass() {
     const double tall = fractal_noise({x * 0.06, 0.0, z * 0.06}, config_.seed + 32, 2);
     const double scale = 0.9 + 0.4 * tall + random_.uniform(-0.07, 0.07);
     const auto chosen = static_cast<size_t>(std::clamp(tone, 0.0, 2.9));
-    writer_.instance(fmt::format("{}_{}", name, kTones[chosen]), terrain_.shear_to_ground(x, z, kCell, kCell, scale));
+    const std::string object = fmt::format("{}_{}", name, kTones[chosen]);
+    if (first) grass_objects_[variant] = object;
+    writer_.instance(object, terrain_.shear_to_ground(x, z, kCell, kCell, scale));
   }
+  complete_levels();
+}
+
+/// Writes all levels of the patches in use, and the file that chains them.
+void MeadowBuilder::complete_levels() {
+  std::set<std::pair<uint32_t, uint32_t>> patches;
+  for (const auto& [variant, object] : grass_objects_) patches.emplace(variant.row, variant.column);
+  std::vector<std::array<std::string, kGrassLods>> chains;
+  for (const auto& [row, column] : patches) {
+    auto& chain = chains.emplace_back();
+    for (uint32_t lod = 0; lod < kGrassLods; ++lod) {
+      const GrassVariant variant{lod, column, row};
+      if (const auto found = grass_objects_.find(variant); found != grass_objects_.end()) {
+        chain[lod] = found->second;
+        continue;
+      }
+      chain[lod] = fmt::format("{}_{}", declare_grass(variant), kTones[1]);
+      writer_.write_object(chain[lod]);
+    }
+  }
+  write_grass_levels("meadow_levels.json", grass_.config, chains, output_);
 }
 
 /// Drifts of flowers beside the lane, denser near the eye.

@@ -95,7 +95,7 @@ void SceneWriter::write_shapes(const std::vector<PlyPart>& parts, const Material
   }
 }
 
-void SceneWriter::count_instance(std::string_view object_name) {
+const SceneWriter::StoredModel& SceneWriter::written_object(std::string_view object_name) {
   const auto found = object_names_.find(object_name);
   assert(found != object_names_.end());
   StoredObject& object = found->second;
@@ -106,6 +106,13 @@ void SceneWriter::count_instance(std::string_view object_name) {
     objects_.write("ObjectEnd\n");
     object.written = true;
   }
+  return model;
+}
+
+void SceneWriter::write_object(std::string_view object_name) { written_object(object_name); }
+
+void SceneWriter::count_instance(std::string_view object_name) {
+  const StoredModel& model = written_object(object_name);
   ++totals_.instances;
   totals_.placed_triangles += model.triangle_count;
 }

@@ -60,6 +60,8 @@ public:
   /// Declares an object that uses a model, optionally with other materials. ObjectBegin is written with its first
   /// instance.
   void object(std::string_view object_name, std::string_view model_name, const MaterialChoice& choice = {});
+  /// Writes an object although nothing instances it yet.
+  void write_object(std::string_view object_name);
   /// Combines model() and object() under one name.
   void object(std::string_view object_name, Model model);
   /// Writes an instance of an object, and the object before its first instance.
@@ -91,6 +93,7 @@ private:
     bool written = false;
   };
   const StoredModel& written_model(std::string_view name);
+  const StoredModel& written_object(std::string_view object_name);
   void count_instance(std::string_view object_name);
   void write_shapes(const std::vector<PlyPart>& parts, const MaterialChoice& choice);
 

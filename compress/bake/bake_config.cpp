@@ -53,6 +53,16 @@ void BakeConfig::validate() const {
   for (const MeshSequence& sequence : sequences)
     require(sequence.frames_per_second > 0.0 && std::isfinite(sequence.frames_per_second), "frames per second",
             "a positive number");
+  for (const LevelChain& chain : level_chains) {
+    require(chain.objects.size() >= 2 && chain.objects.size() <= baked::kMaxChainLevels, "levels by distance",
+            "2 .. 8 objects");
+    require(chain.distances.size() + 1 == chain.objects.size(), "levels by distance", "one distance less than objects");
+    double nearer = 0.0;
+    for (const double distance : chain.distances) {
+      require(distance > nearer && std::isfinite(distance), "levels by distance", "ascending positive distances");
+      nearer = distance;
+    }
+  }
 }
 
 NormalLimits BakeConfig::normal_limits(double step_per_edge) const {

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "compress/bake/level_chain.h"
 #include "compress/format/cluster/normal_codec.h"
 #include "compress/format/cluster/uv_codec.h"
 #include "compress/format/layout/baked_format.h"
@@ -105,6 +106,10 @@ struct BakeConfig {
   /// Frames per group of a sequence, 1..64. A frame is decoded from the begin of its group on: more frames per group
   /// take fewer bytes, but longer to reach.
   uint32_t sequence_group = 8;
+
+  /// Objects that stand for each other at different distances; an object belongs to one chain at most. Geometries of
+  /// chains are stored even if no instance uses them.
+  std::vector<LevelChain> level_chains;
 
   /// Folder for finished LOD levels, so that an interrupted bake can reuse them when it is started again. bake_scene()
   /// removes them when it is done. Empty: no levels are kept. Does not change the file.

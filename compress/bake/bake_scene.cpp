@@ -37,7 +37,7 @@ class Baker {
 public:
   Baker(const Scene& scene, const BakeConfig& config, Diagnostics& diagnostics, Progress& progress)
       : scene_(scene), config_(config), diagnostics_(diagnostics), progress_(progress), sequences_(scene, config),
-        plan_(plan_scene(scene, sequences_.meshes())), grids_(plan_.geometries.size()),
+        plan_(plan_scene(scene, sequences_.meshes(), config.level_chains)), grids_(plan_.geometries.size()),
         packed_(plan_.geometries.size()) {}
 
   BakedScene run() {
@@ -64,6 +64,7 @@ private:
   std::vector<std::byte> assemble() {
     progress_.begin("assembling the file", 0);
     remove_empty_slots();
+    check_level_chains();
     FileSections sections(scene_, textures_);
     RequirementTable requirements;
     for (size_t i = 0; i < packed_.size(); ++i) {
@@ -82,7 +83,7 @@ private:
     pack_motion(sections);
     sections.set_material_slots(plan_.material_slots);
     sections.set_requirements(requirements.rows());
-    sections.set_deformation(write_deformations(deformations_));
+    sections.set_deformation(write_deformations(deformations_, plan_.chains));
     if (config_.trees) {
       progress_.begin("building trees", 0);
       sections.build_trees();
@@ -125,6 +126,18 @@ private:
     std::vector<std::vector<uint32_t>> left;
     for (PackedGeometry& packed : packed_) left.push_back(std::move(packed.slots));
     remove_material_slots(plan_, left);
+  }
+
+  /// All levels of a chain keep triangles of the same materials.
+  void check_level_chains() const {
+    for (const baked::LevelChainRecord& chain : plan_.chains)
+      for (uint32_t level = 0; level < chain.level_count; ++level) {
+        const GeometryPlan& plan = plan_.geometries[chain.geometry[level]];
+        if (plan.slot_class.empty() || plan.slot_class != plan_.geometries[chain.geometry[0]].slot_class)
+          throw Error(ErrorKind::kInput, "levels by distance: " + plan.name +
+                                             " has lost all triangles of a material on its position grid; choose a "
+                                             "finer precision");
+      }
   }
 
   void measure() {
@@ -189,6 +202,8 @@ private:
       }
       ++uses[geometry];
     }
+    for (const baked::LevelChainRecord& chain : plan_.chains)
+      for (uint32_t level = 0; level < chain.level_count; ++level) ++uses[chain.geometry[level]];
     report_left_out(uses);
   }
 

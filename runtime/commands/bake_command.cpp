@@ -21,6 +21,7 @@
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/file_report.h"
 #include "runtime/commands/json_output.h"
+#include "runtime/commands/level_chain_file.h"
 #include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/commands/progress_display.h"
@@ -95,6 +96,11 @@ int run(const BakeOptions& given, const GlobalOptions& globals) {
   for (const std::string& pattern : options.sequences)
     config.sequences.push_back(find_mesh_sequence(imported.scene, imported.files, options.input, pattern,
                                                   options.sequence_start, options.sequence_fps.value_or(24.0)));
+
+  if (!options.distance_levels.empty()) {
+    refuse_to_replace({options.distance_levels}, options.output);
+    config.level_chains = read_level_chains(options.distance_levels, imported.scene, globals.memory);
+  }
 
   Diagnostics diagnostics;
   const Stopwatch baking;

@@ -163,6 +163,14 @@ void add_motion_options(CLI::App& verb, BakeOptions& options) {
       ->group("Motion");
 }
 
+void add_distance_level_option(CLI::App& verb, BakeOptions& options) {
+  verb.add_option("--distance-levels", options.distance_levels,
+                  "JSON file that chains objects which stand for each other at different distances from the eye; "
+                  "frames choose one for each instance. Stored in the file")
+      ->type_name("FILE")
+      ->group("Levels of detail");
+}
+
 void add_sequence_options(CLI::App& verb, BakeOptions& options) {
   constexpr const char* kGroup = "Meshes that move";
   verb.add_option("--sequence", options.sequences,
@@ -212,6 +220,7 @@ void add_bake_options(CLI::App& verb, BakeOptions& options) {
                       std::string(name_of(PageCodec::kSmall))}))
       ->default_str(std::string(name_of(PageCodec::kNone)));
   add_motion_options(verb, options);
+  add_distance_level_option(verb, options);
   add_sequence_options(verb, options);
   add_choice_options(verb, options);
   verb.add_flag("--dry-run", options.dry_run, "Import and bake without writing a file, to see sizes and errors");

@@ -32,6 +32,7 @@ struct BakeOptions {
   std::optional<std::string> codec;   ///< none unless set
   std::optional<std::string> motion;  ///< keep unless set
   std::string keys;                   ///< file of keys; empty: none
+  std::string distance_levels;        ///< file of level chains; empty: none
   std::vector<std::string> sequences; ///< patterns of PLY files, see FramePattern
   std::optional<double> sequence_fps;
   std::optional<int64_t> sequence_start;

@@ -121,6 +121,13 @@ nlohmann::json motion_json(const MotionSummary& motion) {
 
 std::array<double, 3> array_of(DVec3 v) { return {v.x, v.y, v.z}; }
 
+nlohmann::json level_chains_json(const FileSummary& s) {
+  nlohmann::json chains = nlohmann::json::array();
+  for (const LevelChainUse& use : s.level_chains)
+    chains.push_back({{"geometries", use.names}, {"distances", use.distances}, {"instances", use.instances}});
+  return chains;
+}
+
 nlohmann::json sequences_json(const FileSummary& s) {
   nlohmann::json json = nlohmann::json::array();
   for (const SequenceUse& use : s.sequences)
@@ -187,6 +194,7 @@ nlohmann::json to_json(const FileSummary& s, bool by_geometry) {
       {"requirements", requirements_json(s, by_geometry)},
       {"lod", lod_json(s, by_geometry)},
       {"sequences", sequences_json(s)},
+      {"distance_levels", level_chains_json(s)},
       {"trees", {{"trees", s.trees}, {"nodes", s.nodes}, {"depth", s.tree_depth}}},
       {"motion", motion_json(s.motion)},
   };
@@ -200,6 +208,9 @@ std::string sequences_text(const FileSummary& s) {
                         "per vertex and frame), position error {:.3g}\n",
                         use.name, use.frames, use.first_number, use.frames_per_second, use.source_vertices, use.bytes,
                         use.bytes_per_vertex(), use.max_position_error);
+  for (const LevelChainUse& use : s.level_chains)
+    text += fmt::format(grouped(), "{:L} instances show {} from distances 0, {:g} on\n", use.instances,
+                        fmt::join(use.names, ", "), fmt::join(use.distances, ", "));
   return text;
 }
 

@@ -35,6 +35,8 @@ bool DetailPlanner::plan(const PrimaryCamera& view, const GBuffer* seen) {
       config_.cull_invisible ? not_in_image(*seen, instances_.size()) : outside_view(view, geometries_, instances_);
   culled_ = static_cast<size_t>(std::ranges::count(culled, 1));
   const Stopwatch planning;
+  if (regrouped_) sharing_ = std::make_unique<LodSharing>(geometries_, instances_, config_.sharing);
+  regrouped_ = false;
   sharing_->plan(from, culled, next_);
   plan_s_ = planning.seconds();
   std::swap(plan_, next_);
@@ -44,6 +46,11 @@ bool DetailPlanner::plan(const PrimaryCamera& view, const GBuffer* seen) {
   source_ = std::make_unique<LodSource>(file_, packed_, *sharing_, plan_);
   source_s_ = listing.seconds();
   return true;
+}
+
+void DetailPlanner::set_geometry(uint32_t instance, uint32_t geometry) {
+  instances_[instance].geometry = geometry;
+  regrouped_ = true;
 }
 
 void DetailPlanner::move_instance(uint32_t instance, const Affine& world_from_object) {

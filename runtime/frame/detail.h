@@ -29,6 +29,9 @@ public:
   /// Moves an instance before the next plan. Throws as LodSharing::set_transform() does.
   void move_instance(uint32_t instance, const Affine& world_from_object);
 
+  /// Lets an instance show another geometry from the next plan on.
+  void set_geometry(uint32_t instance, uint32_t geometry);
+
   /// The clusters to trace, after the first plan().
   const LodSource& source() const { return *source_; }
   const LodPlan& current() const { return plan_; }
@@ -52,6 +55,7 @@ private:
   std::unique_ptr<LodSharing> sharing_;
   LodPlan plan_, next_;
   std::unique_ptr<LodSource> source_;
+  bool regrouped_ = false; ///< instances_ have other geometries than sharing_
   size_t culled_ = 0;
   double load_s_ = 0.0, plan_s_ = 0.0, source_s_ = 0.0;
 };

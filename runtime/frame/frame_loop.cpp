@@ -9,8 +9,6 @@
 #include "runtime/camera/origin_lift.h"
 #include "runtime/camera/primary_visibility.h"
 #include "runtime/stopwatch.h"
-#include "runtime/trace/packed/scene/mesh_motion.h"
-#include "runtime/trace/packed/scene/packed_tracer.h"
 
 namespace packtrace {
 namespace {
@@ -30,6 +28,12 @@ void forget_motion(GBuffer& gbuffer) {
   gbuffer.previous_z.clear();
 }
 
+const FrameConfig& validated(const FrameConfig& config) {
+  config.validate();
+  packtrace::validate(config.ao);
+  return config;
+}
+
 bool same_camera(const Camera& a, const Camera& b) {
   return a.projection == b.projection && a.world_from_camera == b.world_from_camera && a.fov_degrees == b.fov_degrees &&
          a.screen_window == b.screen_window && a.width_px == b.width_px && a.height_px == b.height_px;
@@ -46,54 +50,20 @@ glm::dvec2 jitter_offset(uint32_t frame) {
   return {offset(3), offset(5)};
 }
 
-PassTimes& PassTimes::operator+=(const PassTimes& other) {
-  update_s += other.update_s, plan_s += other.plan_s, build_s += other.build_s, primary_s += other.primary_s,
-      ao_s += other.ao_s;
-  denoise_s += other.denoise_s, upsample_s += other.upsample_s, resolve_s += other.resolve_s;
-  return *this;
-}
-
-void PictureReport::add(const FrameReport& frame) {
-  ++frames;
-  times += frame.times;
-  primary_rays += frame.primary_rays, ao_rays += frame.ao_rays;
-  seen |= frame.seen, rebuilt |= frame.rebuilt;
-}
-
 namespace {
 
 /// The bytes of FrameLoop::save() before the denoiser's.
 struct SavedLoop {
   uint64_t next_number;
   uint32_t still_frames;
-  uint32_t reserved;
-  uint64_t mean_bytes; ///< of RawMean
+  uint32_t state_bytes; ///< of SceneState
+  uint64_t mean_bytes;  ///< of RawMean
 };
 
 } // namespace
 
 FrameLoop::FrameLoop(const FrameScene& scene, const FrameConfig& config)
-    : scene_(scene), config_(config), denoiser_(config.denoiser) {
-  config_.validate();
-  packtrace::validate(config_.ao);
-  if (scene_.motion != nullptr && scene_.motion->moves()) {
-    const std::span<const uint32_t> moving = scene_.motion->moving_instances();
-    scene_.backend.movers = {{moving.begin(), moving.end()}, scene_.motion->moving_bounds()};
-    for (const PlacedGeometry& instance : scene_.source->instances()) last_world_.push_back(instance.world_from_object);
-    pose_.resize(moving.size()), last_pose_.resize(moving.size());
-  }
-  if (scene_.deforms && scene_.file != nullptr) meshes_ = std::make_unique<MeshMotion>(*scene_.file);
-  if (meshes_ && meshes_->empty()) meshes_.reset();
-  if (meshes_ && scene_.backend.backend != Backend::kPacked)
-    throw Error(ErrorKind::kUnsupported, "deforming meshes require backend packed");
-  if (meshes_ && config_.detail.error_px)
-    throw Error(ErrorKind::kUnsupported, "levels of detail cannot be combined with deforming meshes yet");
-  if (!config_.detail.error_px) return;
-  const auto* packed = dynamic_cast<const PackedSource*>(scene_.source);
-  if (scene_.file == nullptr || packed == nullptr)
-    throw Error(ErrorKind::kUsage, "levels of detail require a baked file");
-  planner_ = std::make_unique<DetailPlanner>(*scene_.file, *packed, config_.detail);
-}
+    : config_(validated(config)), state_(scene, config.detail), denoiser_(config.denoiser) {}
 
 FrameLoop::~FrameLoop() = default;
 
@@ -101,15 +71,18 @@ void FrameLoop::reset() {
   camera_.reset();
   view_.reset();
   next_number_ = 0;
+  state_.reset();
   denoiser_.reset();
 }
 
 std::vector<std::byte> FrameLoop::save() const {
   const std::vector<std::byte> mean = raw_mean_.save(), history = denoiser_.save();
-  const SavedLoop saved{next_number_, still_frames_, 0, mean.size()};
-  std::vector<std::byte> bytes(sizeof(saved) + mean.size() + history.size());
+  const std::vector<uint8_t> state = state_.save();
+  const SavedLoop saved{next_number_, still_frames_, static_cast<uint32_t>(state.size()), mean.size()};
+  std::vector<std::byte> bytes(sizeof(saved) + state.size() + mean.size() + history.size());
   std::memcpy(bytes.data(), &saved, sizeof(saved));
-  std::ranges::copy(history, std::ranges::copy(mean, bytes.begin() + sizeof(saved)).out);
+  const auto after_state = std::ranges::copy(std::as_bytes(std::span(state)), bytes.begin() + sizeof(saved)).out;
+  std::ranges::copy(history, std::ranges::copy(mean, after_state).out);
   return bytes;
 }
 
@@ -119,6 +92,9 @@ void FrameLoop::restore(const Camera& camera, double time_s, std::span<const std
   if (bytes.size() < sizeof(saved)) fail();
   std::memcpy(&saved, bytes.data(), sizeof(saved));
   bytes = bytes.subspan(sizeof(saved));
+  if (saved.state_bytes > bytes.size()) fail();
+  const std::span<const std::byte> state = bytes.first(saved.state_bytes);
+  bytes = bytes.subspan(state.size());
   if (saved.mean_bytes > bytes.size() || saved.next_number <= saved.still_frames) fail();
   const ImageSize shaded =
       config_.ao_resolution == AoResolution::kFull
@@ -130,15 +106,14 @@ void FrameLoop::restore(const Camera& camera, double time_s, std::span<const std
   denoiser_.restore(shaded, bytes.subspan(saved.mean_bytes));
   // Camera rays are traced again: they depend on the camera alone.
   layers_.clear();
-  pose_instances(time_s);
-  deform_meshes(time_s);
+  if (!state_.restore(time_s, {reinterpret_cast<const uint8_t*>(state.data()), state.size()}, report_)) fail();
   for (still_frames_ = 0;; ++still_frames_) {
     report_ = {};
     report_.moved = still_frames_ == 0;
     if (traces(still_frames_)) {
       const PrimaryCamera view = view_of(camera, still_frames_);
       trace_camera_rays(view);
-      layers_.add(gbuffer_, scene_.source->materials());
+      layers_.add(gbuffer_, scene().source->materials());
       if (config_.lod_layers) add_lod_layers(view);
     }
     if (still_frames_ == saved.still_frames) break;
@@ -154,98 +129,29 @@ uint64_t FrameLoop::frame_pixels() const {
   return uint64_t{(size.width + 1) / 2} * ((size.height + 1) / 2);
 }
 
-const SceneSource& FrameLoop::traced_source() const {
-  return level_tracer_ ? static_cast<const SceneSource&>(planner_->source()) : *scene_.source;
-}
-
-std::vector<const RayTracer*> FrameLoop::tracers() const {
-  std::vector<const RayTracer*> all;
-  if (!config_.detail.camera_uses_levels()) all.push_back(level_0_.get());
-  if (level_tracer_) all.push_back(level_tracer_.get());
-  return all;
-}
-
-/// Moves the instances to their places at a time. Returns whether one moved since the last call.
-bool FrameLoop::pose_instances(double time_s) {
-  if (pose_.empty()) return false;
-  const Stopwatch updating;
-  const std::span<const uint32_t> moving = scene_.motion->moving_instances();
-  std::swap(pose_, last_pose_);
-  scene_.motion->pose(time_s, pose_);
-  if (view_)
-    for (size_t i = 0; i < moving.size(); ++i) last_world_[moving[i]] = last_pose_[i];
-  const bool moved = pose_ != last_pose_;
-  if (moved || !view_) {
-    for (size_t i = 0; planner_ && i < moving.size(); ++i) planner_->move_instance(moving[i], pose_[i]);
-    for (RayTracer* tracer : {level_0_.get(), level_tracer_.get()})
-      if (tracer != nullptr) tracer->place_instances(moving, pose_);
-  }
-  report_.times.update_s += updating.seconds();
-  return moved;
-}
-
-/// Moves the vertices of deforming meshes to a time. Returns whether some moved.
-bool FrameLoop::deform_meshes(double time_s) {
-  if (!meshes_) return false;
-  build_level_0();
-  const Stopwatch updating;
-  const MeshMotion::Update update = meshes_->set_time(time_s, true, static_cast<PackedTracer&>(*level_0_));
-  report_.rebuilt_trees = update.rebuilt_trees;
-  report_.times.update_s += updating.seconds();
-  return update.moved;
-}
-
-/// Moves the instances of a new tracer to their current places.
-std::unique_ptr<RayTracer> FrameLoop::posed(std::unique_ptr<RayTracer> tracer) const {
-  if (!pose_.empty()) tracer->place_instances(scene_.motion->moving_instances(), pose_);
-  return tracer;
-}
-
-void FrameLoop::build_level_0() {
-  if (level_0_) return;
-  const Stopwatch building;
-  if (meshes_)
-    level_0_ = std::make_unique<PackedTracer>(*scene_.file, *scene_.source, meshes_->geometries(), DeformConfig{},
-                                              chosen_isa(), scene_.backend.movers);
-  else
-    level_0_ = make_tracer(*scene_.source, scene_.file, scene_.backend);
-  level_0_ = posed(std::move(level_0_));
-  report_.times.build_s += building.seconds();
-}
-
-void FrameLoop::choose_detail(const PrimaryCamera& view, const GBuffer* seen) {
-  report_.rebuilt = planner_->plan(view, seen);
-  report_.times.plan_s += planner_->plan_s() + planner_->source_s();
-  if (!report_.rebuilt) return;
-  const Stopwatch building;
-  level_tracer_.reset(); // frees the memory of the old trees first
-  level_tracer_ = posed(make_tracer(planner_->source(), *scene_.file, scene_.backend));
-  report_.times.build_s += building.seconds();
-}
-
 /// Traces the camera rays into gbuffer_.
 void FrameLoop::trace_camera_rays(const PrimaryCamera& view) {
   const bool levels = config_.detail.camera_uses_levels();
-  if (levels && report_.moved) choose_detail(view, nullptr);
-  if (!levels) build_level_0();
-  const SceneSource& source = levels ? static_cast<const SceneSource&>(planner_->source()) : *scene_.source;
+  if (levels && report_.moved) state_.choose_detail(view, nullptr, report_);
+  if (!levels) state_.build_level_0(report_);
   const RayTracer& tracer = *tracers().front();
   Progress unseen;
   const Stopwatch tracing;
   const bool moved_on = report_.moved && view_; // not the first frame
   std::optional<DeformedPast> surfaces;
-  if (moved_on && meshes_) surfaces.emplace(static_cast<const PackedTracer&>(tracer));
+  if (const PackedTracer* deforming = state_.deforming_tracer(); moved_on && deforming != nullptr)
+    surfaces.emplace(*deforming);
   const PreviousFrame before{moved_on ? *view_ : view,
-                             moved_on ? std::span<const Affine>(last_world_) : std::span<const Affine>(),
+                             moved_on ? state_.previous_transforms() : std::span<const Affine>(),
                              surfaces ? &*surfaces : nullptr};
-  trace_primary(source, tracer, view, before, gbuffer_, unseen);
+  trace_primary(state_.camera_source(), tracer, view, before, gbuffer_, unseen);
   report_.times.primary_s = tracing.seconds();
   report_.primary_rays = gbuffer_.size.pixels();
   report_.hit_pixels = count_hits(gbuffer_);
-  if (config_.detail.only_occlusion && planner_) {
-    if (report_.moved) choose_detail(view, &gbuffer_);
+  if (config_.detail.only_occlusion && detail() != nullptr) {
+    if (report_.moved) state_.choose_detail(view, &gbuffer_, report_);
     const Stopwatch lifting;
-    lift_origins(*level_tracer_, view, *config_.detail.error_px, gbuffer_, unseen);
+    lift_origins(*tracers().back(), view, *config_.detail.error_px, gbuffer_, unseen);
     report_.times.ao_s += lifting.seconds();
   }
   if (config_.ao_resolution == AoResolution::kQuarter) {
@@ -289,8 +195,8 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
   const uint64_t last_hits = report_.hit_pixels; // stays unless camera rays are traced
   report_ = {};
   report_.number = next_number_, report_.hit_pixels = last_hits;
-  const bool posed = pose_instances(time_s), deformed = deform_meshes(time_s);
-  const bool moved = report_.moved = !view_ || posed || deformed || !same_camera(camera, *camera_);
+  const bool changed = state_.advance(DVec3(camera.world_from_camera[3]), time_s, report_);
+  const bool moved = report_.moved = !view_ || changed || !same_camera(camera, *camera_);
   still_frames_ = moved ? 0 : still_frames_ + 1;
 
   const bool still_jitter = config_.jitters() && !moved;
@@ -314,7 +220,7 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
 
   const Stopwatch layering;
   if (moved) layers_.clear();
-  if (trace) layers_.add(gbuffer_, scene_.source->materials());
+  if (trace) layers_.add(gbuffer_, scene().source->materials());
   if (trace && config_.lod_layers) add_lod_layers(view);
   report_.times.resolve_s += layering.seconds();
 

@@ -9,65 +9,14 @@
 #include "pbrt_import/scene/camera_rays.h"
 #include "runtime/ao/half_resolution.h"
 #include "runtime/denoise/denoiser.h"
-#include "runtime/frame/detail.h"
 #include "runtime/frame/frame_config.h"
+#include "runtime/frame/frame_report.h"
 #include "runtime/frame/mean_layers.h"
 #include "runtime/frame/raw_mean.h"
 #include "runtime/frame/rendered_image.h"
-#include "runtime/motion/scene_motion.h"
-#include "runtime/trace/make_tracer.h"
+#include "runtime/frame/scene_state.h"
 
 namespace packtrace {
-
-class MeshMotion;
-
-/// What a FrameLoop traces. Everything referenced must outlive it.
-struct FrameScene {
-  const SceneSource* source = nullptr;
-  const BakedFile* file = nullptr; ///< the file that `source` reads; null for an imported scene
-  TracerConfig backend;
-  const SceneMotion* motion = nullptr; ///< of the instances; null: none moves
-  bool deforms = false;                ///< plays the deforming meshes of `file`, again and again; backend packed only
-};
-
-/// Wall times of a frame's passes in seconds.
-struct PassTimes {
-  double update_s = 0;   ///< transforms of moving instances, and the tree over placements
-  double plan_s = 0;     ///< choice of LOD cuts and their clusters
-  double build_s = 0;    ///< decoding and BVH construction
-  double primary_s = 0;  ///< camera rays
-  double ao_s = 0;       ///< occlusion rays
-  double denoise_s = 0;  ///< reprojection, accumulation and blurs
-  double upsample_s = 0; ///< of AO traced at a lower resolution, and selecting its pixels
-  double resolve_s = 0;  ///< layers of the image
-
-  PassTimes& operator+=(const PassTimes& other);
-  double total_s() const { return update_s + plan_s + build_s + primary_s + ao_s + denoise_s + upsample_s + resolve_s; }
-};
-
-/// What happened in a frame.
-struct FrameReport {
-  uint64_t number = 0; ///< from 0
-  bool moved = true;   ///< false: camera and scene are those of the previous frame
-  bool seen = true;    ///< false: all camera rays miss
-  PassTimes times;
-  uint64_t primary_rays = 0, ao_rays = 0;
-  uint32_t rebuilt_trees = 0; ///< trees of deforming meshes that were rebuilt instead of refitted
-  uint64_t hit_pixels = 0;    ///< traced pixels whose camera ray hits
-  bool rebuilt = false;       ///< the LOD plan needed other trees
-};
-
-/// Sums over the frames of a picture.
-struct PictureReport {
-  PassTimes times;
-  uint32_t frames = 0;
-  uint64_t primary_rays = 0, ao_rays = 0;
-  bool seen = false;         ///< some camera ray hit
-  bool rebuilt = false;      ///< as in FrameReport, in some frame
-  double mean_history = 0.0; ///< mean over hit pixels of the frames of history behind them (DenoisedAo::tspp)
-
-  void add(const FrameReport& frame);
-};
 
 /// Renders a scene frame by frame: detail, camera rays, occlusion rays, denoising. It keeps what the next frame needs
 /// of the previous ones: history, trees, and, while nothing moves, the sums that antialias the image.
@@ -104,36 +53,24 @@ public:
   void reset();
 
   const FrameConfig& config() const { return config_; }
-  const FrameScene& scene() const { return scene_; }
+  const FrameScene& scene() const { return state_.scene(); }
   /// The source and the tracers in use: the camera's, and with only_occlusion also the occlusion rays'.
-  const SceneSource& traced_source() const;
-  std::vector<const RayTracer*> tracers() const;
-  const DetailPlanner* detail() const { return planner_.get(); }
+  const SceneSource& traced_source() const { return state_.traced_source(); }
+  std::vector<const RayTracer*> tracers() const { return state_.tracers(); }
+  const DetailPlanner* detail() const { return state_.planner(); }
   /// Camera rays of the last frame that traced any.
   const GBuffer& gbuffer() const { return gbuffer_; }
 
 private:
-  bool pose_instances(double time_s);
-  bool deform_meshes(double time_s);
-  std::unique_ptr<RayTracer> posed(std::unique_ptr<RayTracer> tracer) const;
-  void choose_detail(const PrimaryCamera& view, const GBuffer* seen);
   void trace_camera_rays(const PrimaryCamera& view);
   PrimaryCamera view_of(const Camera& camera, uint32_t still_frame) const;
   bool traces(uint32_t still_frame) const;
-  void build_level_0();
   void add_lod_layers(const PrimaryCamera& view);
   std::vector<float> accumulated_ao(PictureReport& report);
 
-  FrameScene scene_;
   FrameConfig config_;
-  std::unique_ptr<DetailPlanner> planner_;
-  std::unique_ptr<RayTracer> level_0_;      ///< null if only levels are traced
-  std::unique_ptr<RayTracer> level_tracer_; ///< traces planner_->source()
-
-  std::unique_ptr<MeshMotion> meshes_;   ///< null if no mesh deforms
-  std::vector<Affine> pose_, last_pose_; ///< by SceneMotion::moving_instances(): of this frame and the previous one
-  std::vector<Affine> last_world_; ///< world_from_object of all instances in the previous frame; empty: none moves
-  std::optional<Camera> camera_;   ///< of the previous frame
+  SceneState state_;
+  std::optional<Camera> camera_; ///< of the previous frame
   std::optional<PrimaryCamera> view_;
   uint64_t next_number_ = 0;
   uint32_t still_frames_ = 0; ///< frames since something moved, without the first

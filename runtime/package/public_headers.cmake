@@ -80,9 +80,11 @@ set(packtrace_public_headers
   runtime/frame/detail.h
   runtime/frame/frame_config.h
   runtime/frame/frame_loop.h
+  runtime/frame/frame_report.h
   runtime/frame/mean_layers.h
   runtime/frame/raw_mean.h
   runtime/frame/rendered_image.h
+  runtime/frame/scene_state.h
   runtime/frame/still.h
   runtime/motion/motion_targets.h
   runtime/motion/scene_motion.h

@@ -87,6 +87,42 @@ TEST(CommandLine, SequencesArePackedAndReported) {
   EXPECT_EQ(run_packtrace({"bake", bench / "leaf.pbrt", "--dry-run", "--sequence-fps", "30"}).exit_code, 2);
 }
 
+TEST(CommandLine, LevelsByDistanceAreStoredAndReported) {
+  const Workbench bench;
+  write_text(bench / "balls.pbrt", "WorldBegin\nObjectBegin \"ball\"\nShape \"sphere\"\nObjectEnd\n"
+                                   "ObjectBegin \"pot\"\nShape \"cylinder\"\nObjectEnd\n"
+                                   "ObjectInstance \"ball\"\nTranslate 3 0 0\nObjectInstance \"ball\"\nWorldEnd\n");
+  const std::string file = bench / "balls.ptk", levels = bench / "levels.json";
+  const std::vector<std::string> bake{"bake", bench / "balls.pbrt", "-o", file, "--force", "--distance-levels", levels};
+  write_text(levels, R"({"chains": [{"objects": ["ball", "pot"], "distances": [4.5]}]})");
+  const CommandResult baked = run_packtrace(bake);
+  ASSERT_EQ(baked.exit_code, 0) << baked.err;
+  EXPECT_NE(baked.out.find("2 instances show ball, pot from distances 0, 4.5 on"), std::string::npos) << baked.out;
+  const auto info = nlohmann::json::parse(run_packtrace({"info", file, "--json", "-"}).out);
+  EXPECT_EQ(info.at("distance_levels").at(0).at("geometries"), nlohmann::json({"ball", "pot"}));
+  EXPECT_EQ(info.at("distance_levels").at(0).at("distances"), nlohmann::json({4.5}));
+  EXPECT_EQ(info.at("distance_levels").at(0).at("instances"), 2);
+  EXPECT_EQ(run_packtrace({"render", file, "--path", "turntable", "--frames", "2", "--subframes", "1", "-o",
+                           bench / "b_%d.png", "--size", "16x16"})
+                .exit_code,
+            0);
+
+  const auto fails = [&](const std::string& text, int code, const char* part) {
+    write_text(levels, text);
+    const CommandResult result = run_packtrace(bake);
+    EXPECT_EQ(result.exit_code, code) << text;
+    EXPECT_NE(result.err.find(part), std::string::npos) << result.err;
+  };
+  fails(R"({"chains": [{"objects": ["ball", "pott"], "distances": [4]}]})", 3, "did you mean \"pot\"?");
+  fails(R"({"chains": [{"objects": ["ball", "ball"], "distances": [4]}]})", 3, "is given already, in line 1");
+  fails(R"({"chains": [{"objects": ["ball"], "distances": []}]})", 3, "2 to 8 objects, not 1");
+  fails(R"({"chains": [{"objects": ["ball", "pot"], "distances": [4, 5]}]})", 3, "2 objects need 1 distances, not 2");
+  fails(R"({"chains": [{"objects": ["ball", "pot"], "distances": [-4]}]})", 3, "levels.json:1:");
+  fails(R"({"chains": [{"objects": ["ball", "pot"]}]})", 3, "\"distances\" is missing");
+  fails(R"({"chains": [{"objects": ["ball", "pot"], "distances": [4], "far": 1}]})", 3, "far");
+  fails(R"({"chains": []})", 3, "no chains");
+}
+
 TEST(CommandLine, LevelsOfDetailAreReported) {
   const Workbench bench;
   write_text(bench / "ball.pbrt", "WorldBegin\nObjectBegin \"ball\"\nShape \"sphere\"\nObjectEnd\n"

@@ -48,7 +48,8 @@ struct Draft {
 
 class Planner {
 public:
-  Planner(const Scene& scene, std::span<const uint32_t> deforming) : scene_(scene), deforms_(scene.meshes.size(), 0) {
+  Planner(const Scene& scene, std::span<const uint32_t> deforming, std::span<const LevelChain> chains)
+      : scene_(scene), chains_(chains), deforms_(scene.meshes.size(), 0) {
     for (const uint32_t mesh : deforming) deforms_[mesh] = 1;
   }
 
@@ -67,6 +68,7 @@ public:
       if (instance.geometry == baked::kNone) continue;
       instance.first_slot = drafts_[instance.geometry].first_slot[user_of_[i]];
     }
+    plan_chains();
     return std::move(plan_);
   }
 
@@ -282,13 +284,16 @@ private:
   void find_used_objects() {
     used_.resize(scene_.objects.size());
     for (const Instance& instance : scene_.instances) used_[instance.object] = 1;
+    for (const LevelChain& chain : chains_)
+      for (const uint32_t object : chain.objects) {
+        require(object < used_.size(), "an object of a level chain does not exist");
+        used_[object] = 1;
+      }
   }
 
   void plan_objects() {
-    struct Use {
-      uint32_t geometry = 0, user = 0;
-    };
-    std::vector<Use> use_of(scene_.objects.size());
+    std::vector<Use>& use_of = use_of_object_;
+    use_of.resize(scene_.objects.size());
     for (size_t i = 0; i < scene_.objects.size(); ++i) {
       Object object = scene_.objects[i];
       if (used_[i] == 0) {
@@ -312,6 +317,35 @@ private:
     }
     for (const Instance& instance : scene_.instances)
       add_instance(use_of[instance.object].geometry, use_of[instance.object].user, instance.world_from_object);
+  }
+
+  void plan_chains() {
+    std::vector<uint32_t> object_of(plan_.geometries.size(), baked::kNone); // of geometries in chains
+    for (const LevelChain& chain : chains_) {
+      baked::LevelChainRecord record{};
+      record.level_count = static_cast<uint32_t>(chain.objects.size());
+      double stretch = 0.0;
+      for (size_t level = 0; level < chain.objects.size(); ++level) {
+        const uint32_t g = record.geometry[level] = use_of_object_[chain.objects[level]].geometry;
+        if (object_of[g] != baked::kNone) fail_chain(chain.objects[level], "is equal to " + name_of(object_of[g]));
+        object_of[g] = chain.objects[level];
+        if (plan_.geometries[g].slot_class.empty()) fail_chain(chain.objects[level], "has no triangles");
+        if (plan_.geometries[g].slot_class != plan_.geometries[record.geometry[0]].slot_class)
+          fail_chain(chain.objects[level], "has other materials than " + name_of(chain.objects[0]));
+        stretch = std::max(stretch, plan_.geometries[g].max_stretch);
+      }
+      if (stretch == 0.0) fail_chain(chain.objects[0], "and the other levels of its chain have no instance");
+      for (const uint32_t object : chain.objects)
+        plan_.geometries[use_of_object_[object].geometry].max_stretch = stretch;
+      std::ranges::copy(chain.distances, record.distance.begin());
+      plan_.chains.push_back(record);
+    }
+  }
+
+  std::string name_of(uint32_t object) const { return "\"" + scene_.objects[object].name + "\""; }
+
+  [[noreturn]] void fail_chain(uint32_t object, const std::string& problem) const {
+    throw Error(ErrorKind::kUsage, "levels by distance: object " + name_of(object) + " " + problem);
   }
 
   /// Merges parts into a slot if every user assigns them the same material. Slots are ordered by class, then by
@@ -357,11 +391,17 @@ private:
     return end;
   }
 
+  struct Use {
+    uint32_t geometry = 0, user = 0;
+  };
+
   const Scene& scene_;
+  const std::span<const LevelChain> chains_;
   std::vector<uint8_t> deforms_; // per mesh
   std::vector<uint32_t> equal_mesh_;
   std::vector<Bounds> mesh_boxes_;
-  std::vector<uint8_t> used_;                      // per object
+  std::vector<uint8_t> used_; // per object: it is instanced, or a level of a chain
+  std::vector<Use> use_of_object_;
   std::vector<const InstanceMotion*> moving_;      // per instance; null: it does not move
   std::vector<Draft> drafts_;                      // per geometry
   std::vector<uint32_t> user_of_;                  // per instance
@@ -384,8 +424,8 @@ std::string beyond_float_range(const std::string& name, const Bounds& box) {
   return name + " leaves the float range: its coordinates reach " + brief(std::max({largest.x, largest.y, largest.z}));
 }
 
-ScenePlan plan_scene(const Scene& scene, std::span<const uint32_t> deforming) {
-  return Planner(scene, deforming).run();
+ScenePlan plan_scene(const Scene& scene, std::span<const uint32_t> deforming, std::span<const LevelChain> chains) {
+  return Planner(scene, deforming, chains).run();
 }
 
 } // namespace packtrace

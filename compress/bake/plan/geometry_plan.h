@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "compress/bake/level_chain.h"
+#include "compress/format/deformation/deformation_format.h"
 #include "compress/format/layout/baked_format.h"
 #include "pbrt_import/scene/scene.h"
 
@@ -46,11 +48,12 @@ struct ScenePlan {
   /// shapes and instances that are left out.
   std::vector<baked::InstanceRecord> instances;
   std::vector<uint32_t> material_slots; ///< material numbers; instances refer to runs of them
-  uint64_t shared_shapes = 0;           ///< world shapes that reuse another shape's geometry
-  uint64_t instanced_shapes = 0;        ///< world shapes on a grid of their geometry's own, because they share it
-  uint64_t shared_objects = 0;          ///< objects that reuse another object's geometry
-  uint64_t unused_objects = 0;          ///< never instanced, so not stored
-  uint64_t unused_triangles = 0;        ///< triangles of the unused objects
+  std::vector<baked::LevelChainRecord> chains;
+  uint64_t shared_shapes = 0;    ///< world shapes that reuse another shape's geometry
+  uint64_t instanced_shapes = 0; ///< world shapes on a grid of their geometry's own, because they share it
+  uint64_t shared_objects = 0;   ///< objects that reuse another object's geometry
+  uint64_t unused_objects = 0;   ///< never instanced, so not stored
+  uint64_t unused_triangles = 0; ///< triangles of the unused objects
   /// Messages about shapes and instances that exceed the float range where they are placed, and by how much.
   std::vector<std::string> left_out;
 };
@@ -74,7 +77,10 @@ std::string beyond_float_range(const std::string& name, const Bounds& box);
 /// all copies of the geometry but the first.
 /// World shapes that move (Scene::motion) have a geometry in the space of their mesh, never in world space.
 /// @param deforming meshes that move: they share a geometry with no equal mesh, and are not in world space
-/// Throws Error(kInput) if an index of the scene is out of range or a transform is not finite.
-ScenePlan plan_scene(const Scene& scene, std::span<const uint32_t> deforming = {});
+/// @param chains their objects are kept even if nothing instances them; instances scale errors of all levels
+/// Throws Error(kInput) if an index of the scene is out of range or a transform is not finite, and Error(kUsage) for
+/// chains that cannot be: two objects with one geometry, other material slots, a chain without instances.
+ScenePlan plan_scene(const Scene& scene, std::span<const uint32_t> deforming = {},
+                     std::span<const LevelChain> chains = {});
 
 } // namespace packtrace

@@ -65,9 +65,11 @@ EncodedDeformation DeformationEncoder::finish() {
   return std::move(out_);
 }
 
-std::vector<uint8_t> write_deformations(std::span<const EncodedDeformation> animations) {
-  if (animations.empty()) return {};
-  uint64_t at = sizeof(baked::DeformationHeader) + animations.size() * sizeof(baked::DeformationRecord);
+std::vector<uint8_t> write_deformations(std::span<const EncodedDeformation> animations,
+                                        std::span<const baked::LevelChainRecord> chains) {
+  if (animations.empty() && chains.empty()) return {};
+  const uint64_t chains_at = sizeof(baked::DeformationHeader) + animations.size() * sizeof(baked::DeformationRecord);
+  uint64_t at = chains_at + chains.size_bytes();
   std::vector<baked::DeformationRecord> records;
   for (const EncodedDeformation& one : animations) {
     baked::DeformationRecord record = one.record;
@@ -77,9 +79,10 @@ std::vector<uint8_t> write_deformations(std::span<const EncodedDeformation> anim
     records.push_back(record);
   }
   std::vector<uint8_t> bytes(at + kReadSlackBytes, 0);
-  const baked::DeformationHeader header{static_cast<uint32_t>(animations.size()), 0};
+  const baked::DeformationHeader header{static_cast<uint32_t>(animations.size()), static_cast<uint32_t>(chains.size())};
   std::memcpy(bytes.data(), &header, sizeof header);
-  std::memcpy(bytes.data() + sizeof header, records.data(), records.size() * sizeof records[0]);
+  if (!records.empty()) std::memcpy(bytes.data() + sizeof header, records.data(), records.size() * sizeof records[0]);
+  if (!chains.empty()) std::memcpy(bytes.data() + chains_at, chains.data(), chains.size_bytes());
   for (size_t i = 0; i < records.size(); ++i) {
     const EncodedDeformation& one = animations[i];
     uint8_t* out = bytes.data() + records[i].table_offset;

@@ -44,7 +44,8 @@ private:
   uint32_t in_group_ = 0;         ///< frames of the current group so far
 };
 
-/// Returns the bytes of the deformation section. Animations ascend by geometry; empty without animations.
-std::vector<uint8_t> write_deformations(std::span<const EncodedDeformation> animations);
+/// Returns the bytes of the deformation section. Animations ascend by geometry; empty without animations and chains.
+std::vector<uint8_t> write_deformations(std::span<const EncodedDeformation> animations,
+                                        std::span<const baked::LevelChainRecord> chains = {});
 
 } // namespace packtrace

@@ -6,9 +6,10 @@
 #include <type_traits>
 
 /// Layout of the deformation section of a .ptk file; docs/baked_format.md describes it. The section is empty if no
-/// geometry deforms, else it holds
+/// geometry deforms or changes with the distance, else it holds
 ///   DeformationHeader
 ///   DeformationRecord[animation_count], by ascending geometry
+///   LevelChainRecord[chain_count]
 ///   per animation, at table_offset: uint64_t[groups + 1], where the blocks of each group of frames begin, from
 ///     data_offset; then uint32_t[groups][clusters + 1], where the block of each cluster begins, from its group's begin
 ///   per animation, at data_offset: the blocks
@@ -17,7 +18,7 @@ namespace packtrace::baked {
 
 struct DeformationHeader {
   uint32_t animation_count;
-  uint32_t reserved;
+  uint32_t chain_count;
 };
 
 /// All frames of one geometry. Its clusters hold frame 0.
@@ -38,10 +39,23 @@ struct DeformationRecord {
   uint64_t source_vertices; ///< per frame
 };
 
+inline constexpr uint32_t kMaxChainLevels = 8;
+
+/// Geometries that stand for each other at different distances, fine to coarse. All instances of each of them take
+/// part. A geometry belongs to one chain at most.
+struct LevelChainRecord {
+  uint32_t level_count; ///< 2..kMaxChainLevels
+  uint32_t reserved;
+  std::array<uint32_t, kMaxChainLevels> geometry;   ///< with as many material slots of the same classes; unused ones 0
+  std::array<double, kMaxChainLevels - 1> distance; ///< world units, ascending: where the next level begins; unused 0
+};
+
 inline constexpr uint32_t kMaxFrames = 1u << 20;
 inline constexpr uint32_t kMaxGroupFrames = 64;
 
 static_assert(sizeof(DeformationHeader) == 8 && std::is_trivially_copyable_v<DeformationHeader>);
+static_assert(sizeof(LevelChainRecord) == 96 && std::is_trivially_copyable_v<LevelChainRecord> &&
+              offsetof(LevelChainRecord, distance) == 40);
 static_assert(sizeof(DeformationRecord) == 112 && std::is_trivially_copyable_v<DeformationRecord> &&
               offsetof(DeformationRecord, lo) == 16 && offsetof(DeformationRecord, frames_per_second) == 56 &&
               offsetof(DeformationRecord, table_offset) == 80);

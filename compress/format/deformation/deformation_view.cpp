@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include <tbb/parallel_for.h>
 
@@ -77,6 +78,31 @@ Fault find_blocks_fault(std::span<const uint8_t> section, const baked::Deformati
   return good ? std::nullopt : Fault("block of a cluster");
 }
 
+/// @param used by geometry that is no LOD level: whether it belongs to a chain; marks those of this one
+Fault find_level_fault(const baked::LevelChainRecord& chain, std::span<const baked::GeometryRecord> geometries,
+                       std::span<uint8_t> used) {
+  if (chain.level_count < 2 || chain.level_count > baked::kMaxChainLevels) return "number of levels";
+  if (chain.reserved != 0) return "reserved field";
+  double nearer = 0.0;
+  for (uint32_t level = 0; level < baked::kMaxChainLevels; ++level) {
+    const uint32_t geometry = chain.geometry[level];
+    const double distance = level + 1 < baked::kMaxChainLevels ? chain.distance[level] : 0.0;
+    if (level + 1 >= chain.level_count && distance != 0.0) return "distances";
+    if (level >= chain.level_count) {
+      if (geometry != 0) return "geometry of a level";
+      continue;
+    }
+    if (geometry >= used.size() || used[geometry] != 0) return "geometry of a level";
+    used[geometry] = 1;
+    if (geometries[geometry].cluster_count == 0 || (geometries[geometry].flags & baked::kWorldSpace) != 0)
+      return "geometry of a level";
+    if (level + 1 == chain.level_count) continue;
+    if (!(distance > nearer) || !std::isfinite(distance)) return "distances";
+    nearer = distance;
+  }
+  return std::nullopt;
+}
+
 } // namespace
 
 DeformationView::DeformationView(std::span<const uint8_t> section, const baked::DeformationRecord& record,
@@ -98,19 +124,41 @@ std::span<const baked::DeformationRecord> deformation_records(std::span<const ui
   return {reinterpret_cast<const baked::DeformationRecord*>(header + 1), header->animation_count};
 }
 
+std::span<const baked::LevelChainRecord> level_chains(std::span<const uint8_t> section) {
+  if (section.empty()) return {};
+  const auto* header = reinterpret_cast<const baked::DeformationHeader*>(section.data());
+  const std::span<const baked::DeformationRecord> records = deformation_records(section);
+  return {reinterpret_cast<const baked::LevelChainRecord*>(records.data() + records.size()), header->chain_count};
+}
+
+std::optional<MotionFault> find_chain_fault(std::span<const uint8_t> section,
+                                            std::span<const baked::GeometryRecord> geometries,
+                                            uint32_t base_geometries) {
+  if (section.empty()) return std::nullopt;
+  if (section.size() < sizeof(baked::DeformationHeader) + kReadSlackBytes) return MotionFault{0, "section size"};
+  const auto* header = reinterpret_cast<const baked::DeformationHeader*>(section.data());
+  const uint64_t room = section.size() - kReadSlackBytes - sizeof *header;
+  if (header->animation_count == 0 && header->chain_count == 0) return MotionFault{0, "number of animations"};
+  if (header->animation_count > room / sizeof(baked::DeformationRecord)) return MotionFault{0, "number of animations"};
+  const uint64_t left = room - header->animation_count * sizeof(baked::DeformationRecord);
+  if (header->chain_count > left / sizeof(baked::LevelChainRecord)) return MotionFault{0, "number of level chains"};
+  std::vector<uint8_t> used(base_geometries, 0);
+  const std::span<const baked::LevelChainRecord> chains = level_chains(section);
+  for (size_t i = 0; i < chains.size(); ++i)
+    if (const Fault fault = find_level_fault(chains[i], geometries, used)) return MotionFault{i, *fault};
+  return std::nullopt;
+}
+
 std::optional<MotionFault> find_deformation_fault(std::span<const uint8_t> section,
                                                   std::span<const baked::GeometryRecord> geometries,
                                                   std::span<const baked::ClusterRecord> clusters,
                                                   uint32_t base_geometries) {
   if (section.empty()) return std::nullopt;
-  if (section.size() < sizeof(baked::DeformationHeader) + kReadSlackBytes) return MotionFault{0, "section size"};
+  if (const auto fault = find_chain_fault(section, geometries, base_geometries)) return fault;
   const uint64_t end = section.size() - kReadSlackBytes;
-  const auto* header = reinterpret_cast<const baked::DeformationHeader*>(section.data());
-  if (header->animation_count == 0 || header->reserved != 0 ||
-      header->animation_count > (end - sizeof *header) / sizeof(baked::DeformationRecord))
-    return MotionFault{0, "number of animations"};
   const std::span<const baked::DeformationRecord> records = deformation_records(section);
-  uint64_t at = sizeof *header + records.size_bytes(); // tables and data follow in order, at multiples of 8 bytes
+  // Tables and data follow in order, at multiples of 8 bytes.
+  uint64_t at = sizeof(baked::DeformationHeader) + records.size_bytes() + level_chains(section).size_bytes();
   for (size_t i = 0; i < records.size(); ++i) {
     const baked::DeformationRecord& record = records[i];
     if (record.geometry >= base_geometries || (i > 0 && record.geometry <= records[i - 1].geometry))
@@ -126,7 +174,7 @@ std::optional<MotionFault> find_deformation_fault(std::span<const uint8_t> secti
     const auto own = clusters.subspan(static_cast<size_t>(geometry.first_cluster), geometry.cluster_count);
     if (const Fault fault = find_blocks_fault(section, record, own)) return MotionFault{i, *fault};
   }
-  if (at != end) return MotionFault{records.size() - 1, "bytes behind it"};
+  if (at != end) return MotionFault{records.empty() ? 0 : records.size() - 1, "bytes behind it"};
   return std::nullopt;
 }
 

@@ -41,6 +41,15 @@ inline uint32_t deformation_groups(const baked::DeformationRecord& record) {
 /// Records of a section; none if it is empty.
 std::span<const baked::DeformationRecord> deformation_records(std::span<const uint8_t> section);
 
+/// Level chains of a section; none if it is empty.
+std::span<const baked::LevelChainRecord> level_chains(std::span<const uint8_t> section);
+
+/// Checks header and level chains, but not the material slots of their geometries.
+/// @param section,geometries,base_geometries as below
+std::optional<MotionFault> find_chain_fault(std::span<const uint8_t> section,
+                                            std::span<const baked::GeometryRecord> geometries,
+                                            uint32_t base_geometries);
+
 /// Checks a section: all that DeformationView and decode_frame() rely on. Reads the sizes of all fields but not the
 /// fields: vertices of a damaged file may lie outside the record's box (DeformedTree::update() rejects them).
 /// @param section 8-byte aligned

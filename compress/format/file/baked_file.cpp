@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 
+#include "compress/format/deformation/deformation_view.h"
 #include "compress/format/file/mapped_file.h"
 
 namespace packtrace {
@@ -107,6 +108,12 @@ std::vector<std::vector<uint32_t>> material_runs(const BakedSections& sections) 
   std::vector<std::vector<uint32_t>> runs(sections.geometries.size());
   for (const baked::InstanceRecord& instance : sections.instances)
     runs[instance.geometry].push_back(instance.first_slot);
+  for (const baked::LevelChainRecord& chain : level_chains(sections.deformation)) {
+    std::vector<uint32_t> all;
+    const std::span<const uint32_t> geometries = std::span(chain.geometry).first(chain.level_count);
+    for (const uint32_t g : geometries) all.insert(all.end(), runs[g].begin(), runs[g].end());
+    for (const uint32_t g : geometries) runs[g] = all;
+  }
   for (std::vector<uint32_t>& of_geometry : runs) {
     std::sort(of_geometry.begin(), of_geometry.end());
     of_geometry.erase(std::unique(of_geometry.begin(), of_geometry.end()), of_geometry.end());

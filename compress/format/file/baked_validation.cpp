@@ -7,6 +7,7 @@
 #include <xxhash.h>
 
 #include "compress/format/cluster/cluster_validation.h"
+#include "compress/format/deformation/deformation_view.h"
 #include "compress/format/file/baked_file.h"
 #include "compress/format/file/lod_validation.h"
 #include "compress/format/layout/bit_stream.h"
@@ -33,6 +34,7 @@ public:
     check_materials_and_masks();
     check_textures();
     check_instances();
+    check_level_chains();
     check_lod_levels();
     check_geometries();
     if (const auto fault = find_lod_group_fault(sections_)) fail(fault->section, fault->record, fault->what);
@@ -290,6 +292,28 @@ private:
     if (const auto fault = find_lod_level_fault(sections_)) fail(fault->section, fault->record, fault->what);
     for (const baked::LodLevelRecord& level : sections_.lod_levels)
       first_slots_[level.geometry] = first_slots_[level.base];
+  }
+
+  /// Instances of a level chain show any of its geometries, so all of these have as many slots of the same classes. At
+  /// least one of them has an instance.
+  void check_level_chains() {
+    const auto levels = std::ranges::partition_point(
+        sections_.geometries, [](const baked::GeometryRecord& g) { return (g.flags & baked::kLodLevel) == 0; });
+    const auto base_geometries = static_cast<uint32_t>(levels - sections_.geometries.begin());
+    if (const auto fault = find_chain_fault(sections_.deformation, sections_.geometries, base_geometries))
+      fail("level chain", fault->record, fault->what);
+    const std::span<const baked::LevelChainRecord> chains = level_chains(sections_.deformation);
+    for (size_t i = 0; i < chains.size(); ++i) {
+      const std::span<const uint32_t> geometries = std::span(chains[i].geometry).first(chains[i].level_count);
+      const auto placed = std::ranges::find_if(geometries, [&](uint32_t g) { return first_slots_[g] != baked::kNone; });
+      if (placed == geometries.end()) fail("level chain", i, "no instance places it");
+      const uint32_t first = first_slots_[*placed], count = sections_.geometries[*placed].slot_count;
+      for (const uint32_t g : geometries) {
+        if (sections_.geometries[g].slot_count != count) fail("level chain", i, "material slots");
+        if (first_slots_[g] == baked::kNone) first_slots_[g] = first;
+        if (!same_classes(first, first_slots_[g], count)) fail("level chain", i, "material classes");
+      }
+    }
   }
 
   /// The runs of slots of one geometry must be equal or disjoint, so that visiting all distinct runs takes time linear

@@ -188,6 +188,14 @@ FileSummary summarize(const BakedFile& file) {
     summary.sequences.push_back({std::string(s.text(s.geometries[d.geometry].name)), d.frame_count, d.group_frames,
                                  d.frames_per_second, d.first_number, d.source_vertices, d.data_bytes,
                                  d.max_position_error});
+  for (const baked::LevelChainRecord& chain : level_chains(s.deformation)) {
+    LevelChainUse& use = summary.level_chains.emplace_back();
+    use.distances.assign(chain.distance.begin(), chain.distance.begin() + chain.level_count - 1);
+    for (const uint32_t g : std::span(chain.geometry).first(chain.level_count)) {
+      use.names.emplace_back(s.text(s.geometries[g].name));
+      use.instances += uses[g];
+    }
+  }
   summary.lod = summarize_lod(file);
   summary.motion = summarize_motion(file);
   summary.instances = s.instances.size();

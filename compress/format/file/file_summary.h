@@ -81,6 +81,13 @@ struct SequenceUse {
   }
 };
 
+/// Geometries that stand for each other at different distances.
+struct LevelChainUse {
+  std::vector<std::string> names; ///< of the geometries, fine to coarse
+  std::vector<double> distances;  ///< world units, one less
+  uint64_t instances = 0;
+};
+
 /// Report of `info` about a baked file. Counts of geometries, triangles and so on are those of level 0; bytes include
 /// all levels.
 struct FileSummary {
@@ -96,6 +103,7 @@ struct FileSummary {
   std::vector<TextureUse> textures;
   std::vector<UvUse> uvs; ///< ordered by encoding
   std::vector<SequenceUse> sequences;
+  std::vector<LevelChainUse> level_chains;
   LodSummary lod;
   MotionSummary motion;
   uint64_t trees = 0, nodes = 0;   ///< of all levels

@@ -40,6 +40,9 @@ public:
   Bounds world_bounds() const override { return world_bounds_; }
   DVec3 origin() const override;
 
+  /// Lets an instance refer to another geometry with the same material slots (baked::LevelChainRecord).
+  void set_geometry(uint32_t instance, uint32_t geometry) { instances_[instance].geometry = geometry; }
+
   /// Bytes of the whole mapped file and of the tables.
   uint64_t resident_bytes() const override;
 

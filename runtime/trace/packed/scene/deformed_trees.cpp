@@ -8,54 +8,37 @@
 namespace packtrace {
 
 DeformedTrees::DeformedTrees(const BakedFile& file, std::span<const DeformingGeometry> deforming,
-                             const DeformConfig& config, TracedTrees& traced)
-    : file_(&file) {
+                             const DeformConfig& config, const TracedTrees& traced) {
   config.validate();
   if (deforming.empty()) return;
-  records_.assign(traced.records.begin(), traced.records.end());
-  trees_.resize(traced.tree_of.size());
+  trees_.resize(traced.tree_of.size()), updates_.resize(trees_.size());
   for (const DeformingGeometry& one : deforming) {
     if (one.geometry >= trees_.size() || trees_[one.geometry] != nullptr)
       throw Error(ErrorKind::kInput,
                   "deforming geometry " + std::to_string(one.geometry) + " does not exist, or is given twice");
     const uint32_t number = traced.tree_of[one.geometry];
-    if (number == baked::kNone || records_[number].geometry != one.geometry)
+    if (number == baked::kNone || traced.records[number].geometry != one.geometry)
       throw Error(ErrorKind::kInput, "deforming geometry " + std::to_string(one.geometry) +
                                          " has no tree of its own: it is empty, or fixed in the world");
     const baked::GeometryRecord& geometry = file.geometries()[one.geometry];
-    const baked::TreeRecord& record = records_[number];
+    const baked::TreeRecord& record = traced.records[number];
+    geometries_.push_back(one.geometry);
     trees_[one.geometry] = std::make_unique<DeformedTree>(
         file, one, record, traced.nodes.subspan(static_cast<size_t>(record.first_node), record.node_count),
         std::span(traced.clusters).subspan(static_cast<size_t>(geometry.first_cluster), geometry.cluster_count),
         config);
-    show(one.geometry, *trees_[one.geometry], traced);
   }
-  traced.records = records_;
 }
 
 const DeformedTree* DeformedTrees::find(uint32_t geometry) const {
   return geometry < trees_.size() ? trees_[geometry].get() : nullptr;
 }
 
-DeformStep DeformedTrees::update(const DeformedFrame& frame, TracedTrees& traced) {
+DeformStep DeformedTrees::update(const DeformedFrame& frame) {
   if (find(frame.geometry) == nullptr)
     throw Error(ErrorKind::kInput, "geometry " + std::to_string(frame.geometry) + " does not deform");
-  DeformedTree& tree = *trees_[frame.geometry];
-  const DeformStep step = tree.update(*frame.vertices);
-  show(frame.geometry, tree, traced);
-  return step;
-}
-
-void DeformedTrees::show(uint32_t geometry, const DeformedTree& tree, TracedTrees& traced) {
-  const uint32_t number = traced.tree_of[geometry];
-  records_[number] = tree.record();
-  if (!tree.nodes().empty()) {
-    const TreeHull hull(tree.nodes().data());
-    traced.trees[number] = trace_tree(tree.nodes(), hull);
-    if (number < traced.hulls.size()) traced.hulls[number] = hull;
-  }
-  std::ranges::copy(tree.clusters(),
-                    traced.clusters.begin() + static_cast<ptrdiff_t>(file_->geometries()[geometry].first_cluster));
+  ++updates_[frame.geometry];
+  return trees_[frame.geometry]->update(*frame.vertices);
 }
 
 uint64_t DeformedTrees::bytes() const {
@@ -63,6 +46,17 @@ uint64_t DeformedTrees::bytes() const {
   for (const auto& tree : trees_)
     if (tree != nullptr) bytes += tree->bytes();
   return bytes;
+}
+
+void show_deformed(const DeformedTree& tree, uint32_t number, size_t first_cluster,
+                   std::span<baked::TreeRecord> records, TracedTrees& traced) {
+  records[number] = tree.record();
+  if (!tree.nodes().empty()) {
+    const TreeHull hull(tree.nodes().data());
+    traced.trees[number] = trace_tree(tree.nodes(), hull);
+    if (number < traced.hulls.size()) traced.hulls[number] = hull;
+  }
+  std::ranges::copy(tree.clusters(), traced.clusters.begin() + static_cast<ptrdiff_t>(first_cluster));
 }
 
 } // namespace packtrace

@@ -15,30 +15,41 @@ struct DeformedFrame {
   const FrameVertices* vertices = nullptr;
 };
 
-/// The deforming geometries of a tracer. Puts their trees and clusters in the place of the file's.
+/// The deforming geometries of a file and their current trees, which several tracers may show.
 class DeformedTrees {
 public:
   DeformedTrees() = default;
-  /// @param traced trees over LOD level 0; its records, trees, hulls and clusters are replaced
+  /// @param traced trees over LOD level 0
   /// Throws Error(kInput) if a geometry does not exist, occurs twice or has no tree of its own.
   DeformedTrees(const BakedFile& file, std::span<const DeformingGeometry> deforming, const DeformConfig& config,
-                TracedTrees& traced);
+                const TracedTrees& traced);
+
+  /// The geometries that deform, in the order in which they were given.
+  std::span<const uint32_t> geometries() const { return geometries_; }
 
   /// The tree of a geometry of the file; null if it does not deform.
   const DeformedTree* find(uint32_t geometry) const;
 
-  /// Moves a geometry's vertices and replaces its tree and clusters.
+  /// Number of updates of a geometry that deforms so far.
+  uint64_t updates(uint32_t geometry) const { return updates_[geometry]; }
+
+  /// Moves a geometry's vertices.
   /// Throws Error(kInput) if the geometry does not deform, and as DeformedTree::update() does.
-  DeformStep update(const DeformedFrame& frame, TracedTrees& traced);
+  DeformStep update(const DeformedFrame& frame);
 
   uint64_t bytes() const;
 
 private:
-  void show(uint32_t geometry, const DeformedTree& tree, TracedTrees& traced);
-
-  const BakedFile* file_ = nullptr;
-  std::vector<baked::TreeRecord> records_;           ///< of all trees, with the grids of the deforming ones
+  std::vector<uint32_t> geometries_;
   std::vector<std::unique_ptr<DeformedTree>> trees_; ///< by geometry; empty if none deforms
+  std::vector<uint64_t> updates_;                    ///< by geometry
 };
+
+/// Puts a deforming geometry's tree and clusters in the place of those that the file has of it.
+/// @param number of its tree
+/// @param first_cluster number of the geometry's first cluster in the cluster section
+/// @param records what traced.records refers to
+void show_deformed(const DeformedTree& tree, uint32_t number, size_t first_cluster,
+                   std::span<baked::TreeRecord> records, TracedTrees& traced);
 
 } // namespace packtrace

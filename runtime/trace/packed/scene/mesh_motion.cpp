@@ -17,36 +17,56 @@ MeshMotion::MeshMotion(const BakedFile& file) {
     players_.push_back(std::make_unique<DeformationPlayer>(file, i));
     duration_ = std::max(duration_, (record.frame_count - 1) / record.frames_per_second);
   }
-  frames_.assign(players_.size(), 0.0);
+  shown_.resize(players_.size());
+  last_.assign(players_.size(), 0.0);
 }
 
-MeshMotion::Update MeshMotion::set_time(double seconds, bool repeat, PackedTracer& tracer) {
-  Update update;
+/// By player: its frame at a time.
+std::vector<double> MeshMotion::frames_at(double seconds, bool repeat) const {
   std::vector<double> frames;
   for (const auto& player : players_) {
     const double last = player->record().frame_count - 1, frame = player->frame_at(seconds, repeat);
     frames.push_back(frame > 0.0 ? std::min(frame, last) : 0.0);
   }
-  update.moved = frames != frames_;
-  if (!update.moved && still_) return update;
+  return frames;
+}
+
+MeshMotion::Update MeshMotion::set_time(double seconds, bool repeat, PackedTracer& tracer,
+                                        std::span<const uint8_t> used) {
+  Update update;
+  const std::vector<double> frames = frames_at(seconds, repeat);
+  std::vector<size_t> late, moved; // players that must reach the frame before first; all that change
+  for (size_t i = 0; i < players_.size(); ++i) {
+    if (!used.empty() && used[geometries_[i].geometry] == 0) continue;
+    update.moved |= frames[i] != last_[i];
+    if (shown_[i] == Frames{frames[i], last_[i]}) continue;
+    moved.push_back(i);
+    if (shown_[i].now != last_[i]) late.push_back(i);
+  }
+  if (!late.empty()) deform(late, last_, tracer, update);
+  if (!moved.empty()) deform(moved, frames, tracer, update);
+  last_ = frames;
+  return update;
+}
+
+/// Moves some geometries to a frame.
+/// @param frames by player
+void MeshMotion::deform(std::span<const size_t> players, std::span<const double> frames, PackedTracer& tracer,
+                        Update& update) {
   const Stopwatch decoding;
   std::vector<DeformedFrame> moved;
-  for (size_t i = 0; i < players_.size(); ++i) {
+  for (const size_t i : players) {
     players_[i]->seek(frames[i]);
     moved.push_back({geometries_[i].geometry, players_[i].get()});
+    shown_[i] = {frames[i], shown_[i].now};
+    update.triangles += triangles_[i];
   }
-  update.decode_s = decoding.seconds();
+  update.decode_s += decoding.seconds();
   const Stopwatch fitting;
   std::vector<DeformStep> steps(moved.size());
   tracer.deform(moved, steps);
-  update.refit_s = fitting.seconds();
-  for (size_t i = 0; i < steps.size(); ++i) {
-    update.rebuilt_trees += steps[i].rebuilt;
-    update.triangles += triangles_[i];
-  }
-  frames_ = std::move(frames);
-  still_ = !update.moved;
-  return update;
+  update.refit_s += fitting.seconds();
+  for (const DeformStep& step : steps) update.rebuilt_trees += step.rebuilt;
 }
 
 uint64_t MeshMotion::bytes() const {

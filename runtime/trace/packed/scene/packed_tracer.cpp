@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cassert>
+#include <utility>
 
+#include "compress/format/deformation/deformation_view.h"
 #include "pbrt_import/scene/bounds.h"
 #include "runtime/trace/packed/scene/deformed_trees.h"
 #include "runtime/trace/packed/scene/placed_trees.h"
@@ -28,12 +30,36 @@ static_assert(baked::kVisibleToCamera == kCameraRays && baked::kVisibleToOcclusi
 const packed::KernelRay* kernel_rays(std::span<const Ray> rays) {
   return reinterpret_cast<const packed::KernelRay*>(rays.data());
 }
+void decode_triangle(const packed::Kernels& kernels, const packed::TraceCluster& cluster, uint32_t triangle,
+                     Vec3 (&vertices)[3]) {
+  float decoded[3][3];
+  kernels.triangle(cluster, triangle, decoded);
+  for (size_t corner = 0; corner < 3; ++corner)
+    vertices[corner] = {decoded[corner][0], decoded[corner][1], decoded[corner][2]};
+}
+
 packed::KernelHit* kernel_hits(std::span<RayHit> hits) { return reinterpret_cast<packed::KernelHit*>(hits.data()); }
 
 } // namespace
 
+/// What deforms: geometries of this tracer's own, or those of another tracer.
+struct PackedTracer::Deformation {
+  std::span<const DeformingGeometry> geometries;
+  DeformConfig config;
+  std::shared_ptr<DeformedTrees> shared;
+
+  bool any() const { return !geometries.empty() || (shared && !shared->geometries().empty()); }
+};
+
 struct PackedTracer::Tables : TracedTrees {
-  DeformedTrees deformed;
+  std::shared_ptr<DeformedTrees> deformed;
+  bool follows = false; ///< `deformed` is another tracer's
+  std::vector<baked::TreeRecord> records_shown; ///< of all trees, with the grids of the deforming ones
+  struct DeformingTree {
+    uint32_t geometry, tree; ///< geometry of the file
+    uint64_t updates;        ///< DeformedTrees::updates() of what is shown
+  };
+  std::vector<DeformingTree> deforming; ///< those that have an instance
   PlacedTrees placed;
   std::vector<uint32_t> first_instance; ///< by the file's geometry; a LOD level has that of its base geometry
   packed::KernelScene scene{};
@@ -43,32 +69,75 @@ struct PackedTracer::Tables : TracedTrees {
 };
 
 PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, PackedIsa isa, const Movers& movers)
-    : PackedTracer(file, source, nullptr, isa, movers, {}, {}) {}
+    : PackedTracer(file, source, nullptr, isa, movers, {}) {}
 
 PackedTracer::PackedTracer(const BakedFile& file, const LodSource& source, PackedIsa isa, const Movers& movers)
-    : PackedTracer(file, source, &source, isa, movers, {}, {}) {}
+    : PackedTracer(file, source, &source, isa, movers, {}) {}
 
 PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source,
                            std::span<const DeformingGeometry> deforming, const DeformConfig& config, PackedIsa isa,
                            const Movers& movers)
-    : PackedTracer(file, source, nullptr, isa, movers, deforming, config) {}
+    : PackedTracer(file, source, nullptr, isa, movers, {deforming, config, nullptr}) {}
+
+PackedTracer::PackedTracer(const BakedFile& file, const LodSource& source, const PackedTracer& leader, PackedIsa isa,
+                           const Movers& movers)
+    : PackedTracer(file, source, &source, isa, movers, {{}, {}, leader.tables_->deformed}) {}
 
 PackedTracer::PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod, PackedIsa isa,
-                           const Movers& movers, std::span<const DeformingGeometry> deforming,
-                           const DeformConfig& config)
+                           const Movers& movers, const Deformation& deformation)
     : file_(file), source_(source), lod_(lod), kernels_(kernels_of(isa)), tables_(std::make_unique<Tables>()) {
   Tables& t = *tables_;
-  static_cast<TracedTrees&>(t) = lod != nullptr ? chosen_trees(file, *lod, lod_trees_) : whole_trees(file);
-  t.deformed = DeformedTrees(file, deforming, config, t);
+  t.deformed = deformation.shared, t.follows = t.deformed != nullptr;
+  const std::span<const uint32_t> shown = t.deformed ? t.deformed->geometries() : std::span<const uint32_t>();
+  static_cast<TracedTrees&>(t) = lod != nullptr ? chosen_trees(file, *lod, shown, lod_trees_) : whole_trees(file);
+  if (!t.deformed) t.deformed = std::make_shared<DeformedTrees>(file, deformation.geometries, deformation.config, t);
+  if (deformation.any()) find_deforming();
   find_first_instances();
-  std::vector<Bounds> bounds;
-  for (uint32_t g = 0; g < source.geometry_count(); ++g) bounds.push_back(bounds_of(g));
-  t.placed.place(t, source, bounds, movers);
-  if (movers.instances.empty() && deforming.empty()) t.hulls = {};
+  place_all(movers);
+  if (movers.instances.empty() && !deformation.any() && level_chains(file.sections().deformation).empty()) t.hulls = {};
   t.scene.clusters = t.clusters.data();
   t.scene.trees = t.trees.data();
-  t.placed.fill_in(t.scene);
   set_callbacks();
+}
+
+void PackedTracer::place_all(const Movers& movers) {
+  std::vector<Bounds> bounds;
+  for (uint32_t g = 0; g < source_.geometry_count(); ++g) bounds.push_back(bounds_of(g));
+  if (lod_ == nullptr)
+    for (const baked::LevelChainRecord& chain : level_chains(file_.sections().deformation)) {
+      const std::span<const uint32_t> geometries = std::span(chain.geometry).first(chain.level_count);
+      Bounds all;
+      for (const uint32_t g : geometries) all.extend(bounds[g]);
+      for (const uint32_t g : geometries) bounds[g] = all;
+    }
+  tables_->placed = {};
+  tables_->placed.place(*tables_, source_, bounds, movers);
+  tables_->placed.fill_in(tables_->scene);
+}
+
+void PackedTracer::replace_instances(const Movers& movers) { place_all(movers); }
+
+/// Lists the trees of deforming geometries and shows them.
+void PackedTracer::find_deforming() {
+  Tables& t = *tables_;
+  t.records_shown.assign(t.records.begin(), t.records.end());
+  t.records = t.records_shown;
+  for (uint32_t g = 0; g < source_.geometry_count(); ++g) {
+    const uint32_t geometry = file_geometry(g);
+    if (t.tree_of[g] == baked::kNone || t.deformed->find(geometry) == nullptr) continue;
+    t.deforming.push_back({geometry, t.tree_of[g], t.deformed->updates(geometry)});
+    show_deforming(geometry, t.tree_of[g]);
+  }
+}
+
+void PackedTracer::show_deforming(uint32_t geometry, uint32_t tree) {
+  const auto first = static_cast<size_t>(file_.geometries()[geometry].first_cluster);
+  show_deformed(*tables_->deformed->find(geometry), tree, first, tables_->records_shown, *tables_);
+}
+
+/// The file's number of a geometry of the source.
+uint32_t PackedTracer::file_geometry(uint32_t geometry) const {
+  return lod_ != nullptr ? lod_->base_geometry(geometry) : geometry;
 }
 
 void PackedTracer::set_callbacks() {
@@ -105,8 +174,8 @@ void PackedTracer::find_first_instances() {
 
 /// Bounds of a geometry in object space; empty if it has no triangles.
 Bounds PackedTracer::bounds_of(uint32_t geometry) const {
+  if (const DeformedTree* tree = tables_->deformed->find(file_geometry(geometry))) return tree->object_bounds();
   if (lod_ != nullptr) return lod_->bounds(geometry);
-  if (const DeformedTree* tree = tables_->deformed.find(geometry)) return tree->object_bounds();
   return object_bounds(file_.geometries()[geometry]);
 }
 
@@ -194,7 +263,7 @@ HitSurface PackedTracer::resolve(const RayHit& hit) const {
   surface.geometry = source_.instances()[instance].geometry;
   surface.triangle = triangle_of(hit.part, instance, hit.triangle);
   if (const packed::TraceCluster& cluster = t.clusters[hit.part]; (cluster.flags & packed::kNeedsWideDecode) == 0) {
-    decode_vertices(cluster, hit.triangle, surface.vertices);
+    decode_triangle(kernels_, cluster, hit.triangle, surface.vertices);
     return surface;
   }
   packed::DecodedBatch batch;
@@ -206,11 +275,21 @@ HitSurface PackedTracer::resolve(const RayHit& hit) const {
 
 void PackedTracer::deform(std::span<const DeformedFrame> frames, std::span<DeformStep> steps) {
   assert(steps.size() == frames.size());
+  for (size_t i = 0; i < frames.size(); ++i) steps[i] = tables_->deformed->update(frames[i]);
+  follow();
+}
+
+void PackedTracer::follow() {
   Tables& t = *tables_;
-  for (size_t i = 0; i < frames.size(); ++i) {
-    steps[i] = t.deformed.update(frames[i], t);
-    t.placed.refit(t.tree_of[frames[i].geometry]);
+  bool changed = false;
+  for (Tables::DeformingTree& one : t.deforming) {
+    const uint64_t updates = t.deformed->updates(one.geometry);
+    if (std::exchange(one.updates, updates) == updates) continue;
+    show_deforming(one.geometry, one.tree);
+    t.placed.refit(one.tree);
+    changed = true;
   }
+  if (!changed) return;
   t.placed.rebuild_top();
   t.placed.fill_in(t.scene);
   t.memory.forget_batches();
@@ -226,9 +305,9 @@ DeformStep PackedTracer::deform(uint32_t geometry, const FrameVertices& frame) {
 void PackedTracer::previous_vertices(const RayHit& hit, Vec3 (&vertices)[3]) const {
   const Tables& t = *tables_;
   const uint32_t geometry = geometry_of_cluster(hit.part);
-  if (const DeformedTree* tree = t.deformed.find(geometry)) {
+  if (const DeformedTree* tree = t.deformed->find(geometry)) {
     const auto first = static_cast<uint32_t>(file_.geometries()[geometry].first_cluster);
-    decode_vertices(tree->previous_clusters()[hit.part - first], hit.triangle, vertices);
+    decode_triangle(kernels_, tree->previous_clusters()[hit.part - first], hit.triangle, vertices);
     return;
   }
   const HitSurface surface = resolve(hit);
@@ -238,14 +317,15 @@ void PackedTracer::previous_vertices(const RayHit& hit, Vec3 (&vertices)[3]) con
 std::optional<DVec3> PackedTracer::previous_position(uint32_t instance, uint32_t triangle,
                                                      glm::dvec2 barycentrics) const {
   const Tables& t = *tables_;
-  const uint32_t geometry = source_.instances()[instance].geometry;
-  const DeformedTree* tree = t.deformed.find(geometry);
+  const uint32_t number = source_.instances()[instance].geometry, geometry = file_geometry(number);
+  const DeformedTree* tree = t.deformed->find(geometry);
   if (tree == nullptr) return std::nullopt;
   const uint32_t cluster = file_.cluster_of_triangle(geometry, triangle);
   Vec3 v[3];
-  decode_vertices(tree->previous_clusters()[cluster], triangle - file_.clusters(geometry)[cluster].first_triangle, v);
+  decode_triangle(kernels_, tree->previous_clusters()[cluster],
+                  triangle - file_.clusters(geometry)[cluster].first_triangle, v);
   const DVec3 a(v[0]), point = a + (DVec3(v[1]) - a) * barycentrics.x + (DVec3(v[2]) - a) * barycentrics.y;
-  return transform_point(t.object_from_grid(t.tree_of[geometry]), point);
+  return transform_point(t.object_from_grid(t.tree_of[number]), point);
 }
 
 std::vector<ResidentPart> PackedTracer::resident() const {
@@ -254,7 +334,7 @@ std::vector<ResidentPart> PackedTracer::resident() const {
   for (const std::optional<TreeHull>& hull : t.hulls) hull_bytes += hull ? hull->bytes() : 0;
   return {{"file", file_.file_bytes(), true},
           {"nodes built", t.built.nodes.size() * sizeof(baked::PackedNode)},
-          {"deforming geometry", t.deformed.bytes()},
+          {"deforming geometry", t.follows ? 0 : t.deformed->bytes()},
           {"cluster table", t.clusters.size() * sizeof(packed::TraceCluster)},
           {"placements", t.placed.bytes() + hull_bytes +
                              (t.tree_of.size() + t.grid_of.size() + t.first_instance.size()) * sizeof(uint32_t)},

@@ -30,6 +30,11 @@ public:
   /// Also throws Error(kInput) for other geometries, and as DeformedTree's constructor does.
   PackedTracer(const BakedFile& file, const SceneSource& source, std::span<const DeformingGeometry> deforming,
                const DeformConfig& config = {}, PackedIsa isa = chosen_isa(), const Movers& movers = {});
+  /// Does the same at the detail of a plan. Shows the deforming geometries of another tracer, at level 0: after that
+  /// tracer's deform(), call follow().
+  /// @param leader tracer of the same file at LOD level 0; needed during this call only
+  PackedTracer(const BakedFile& file, const LodSource& source, const PackedTracer& leader, PackedIsa isa = chosen_isa(),
+               const Movers& movers = {});
   ~PackedTracer() override;
   PackedTracer(const PackedTracer&) = delete;
   PackedTracer& operator=(const PackedTracer&) = delete;
@@ -61,6 +66,13 @@ public:
   /// @param steps as many elements as frames
   void deform(std::span<const DeformedFrame> frames, std::span<DeformStep> steps);
 
+  /// Places all instances again, at the source's transforms, after some refer to other geometries of their level chain
+  /// (PackedSource::set_geometry()). space() holds all levels, so it stays. Not while other threads trace.
+  void replace_instances(const Movers& movers = {});
+
+  /// Shows the current vertices of the deforming geometries that the leader given to the constructor has moved.
+  void follow();
+
   /// The vertices of the triangle of a hit in the frame before, in the surface's coordinates; those of resolve() if its
   /// geometry does not deform or has had one frame only.
   void previous_vertices(const RayHit& hit, Vec3 (&vertices)[3]) const;
@@ -87,10 +99,16 @@ public:
 private:
   struct Tables;
 
+  struct Deformation;
+
   PackedTracer(const BakedFile& file, const SceneSource& source, const LodSource* lod, PackedIsa isa,
-               const Movers& movers, std::span<const DeformingGeometry> deforming, const DeformConfig& config);
+               const Movers& movers, const Deformation& deformation);
+  void find_deforming();
+  void show_deforming(uint32_t geometry, uint32_t tree);
+  uint32_t file_geometry(uint32_t geometry) const;
   void set_callbacks();
   void find_first_instances();
+  void place_all(const Movers& movers);
   Bounds bounds_of(uint32_t geometry) const;
   uint32_t triangle_of(uint32_t cluster, uint32_t instance, uint32_t triangle) const;
   uint32_t instance_of(uint32_t placement, uint32_t cluster) const;

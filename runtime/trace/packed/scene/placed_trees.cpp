@@ -9,7 +9,6 @@
 #include <tbb/parallel_for.h>
 
 #include "pbrt_import/base/error.h"
-#include "runtime/trace/packed/scene/top_tree.h"
 #include "runtime/trace/placement.h"
 
 namespace packtrace {
@@ -67,6 +66,7 @@ void PlacedTrees::place(const TracedTrees& trees, const SceneSource& source, std
   }
   list_placements();
   build_top();
+  if (movable_.empty()) builder_ = {}; // its memory is needed again only if trees change
 }
 
 DAffine PlacedTrees::unit_from_grid(uint32_t tree, const Affine& world_from_object) const {
@@ -188,14 +188,8 @@ void PlacedTrees::build_top() {
   top_.clear();
   stream_depth_ = 0;
   if (placements_.size() < 2) return;
-  if (movable_.empty())
-    top_ = build_top_tree(boxes_);
-  else
-    stream_depth_ = builder_.build(boxes_, top_);
-  if (top_.size() == 1)
-    stream_depth_ = 0;
-  else if (movable_.empty())
-    stream_depth_ = top_tree_depth(top_);
+  stream_depth_ = builder_.build(boxes_, top_);
+  if (top_.size() == 1) stream_depth_ = 0;
   describe_top();
 }
 

@@ -110,6 +110,17 @@ private:
   uint32_t counts[3][kBins];
 };
 
+packed::TopNode top_node(std::span<const TreeBox> boxes) {
+  packed::TopNode node{};
+  for (uint32_t slot = 0; slot < boxes.size(); ++slot) {
+    for (size_t axis = 0; axis < 3; ++axis)
+      node.lo[axis][slot] = boxes[slot].lo[axis], node.hi[axis][slot] = boxes[slot].hi[axis];
+    node.child[slot] = packed::kTopLeaf + slot;
+    node.slots |= 1u << slot;
+  }
+  return node;
+}
+
 uint32_t TopTreeBuilder::build(std::span<const TreeBox> boxes, std::vector<packed::TopNode>& nodes) {
   assert(boxes.size() >= 2 && boxes.size() < uint64_t{1} << 31);
   const auto count = static_cast<uint32_t>(boxes.size());

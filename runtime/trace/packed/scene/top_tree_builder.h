@@ -9,14 +9,17 @@
 
 namespace packtrace {
 
-/// Builds trees over placements that move: several times as fast as build_top_tree(), for trees that rays traverse
-/// about as fast. Boxes are split by the surface area heuristic over 16 bins; a node's widest children are split until
-/// it has eight. Keeps its memory from build to build. Runs on all threads; the result depends only on the boxes.
-/// Source: Wald, "On fast construction of SAH-based bounding volume hierarchies" (2007); Wald, Benthin, Boulos,
-/// "Getting rid of packets" (2008), section 3.
+/// Returns a single node over up to eight boxes; child i is kTopLeaf + i.
+packed::TopNode top_node(std::span<const TreeBox> boxes);
+
+/// Builds eight-wide trees over placements, fast enough to do so in every frame. Boxes are split by the surface area
+/// heuristic over 16 bins; a node's widest children are split until it has eight. Keeps its memory from build to build.
+/// Runs on all threads; the result depends only on the boxes. Source: Wald, "On fast construction of SAH-based bounding
+/// volume hierarchies" (2007); Wald, Benthin, Boulos, "Getting rid of packets" (2008), section 3.
 class TopTreeBuilder {
 public:
-  /// Replaces `nodes` by a tree over the boxes, laid out as by build_top_tree(). Returns its levels of nodes.
+  /// Replaces `nodes` by a tree over the boxes, root first. A leaf child is kTopLeaf + the number of its box. Returns
+  /// its levels of nodes, at most kMaxTopDepth.
   /// @param boxes 2 .. 2^31 - 1 boxes
   uint32_t build(std::span<const TreeBox> boxes, std::vector<packed::TopNode>& nodes);
 

@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "compress/format/layout/bit_fields.h"
-#include "runtime/trace/packed/kernels/batch_decode.h"
 
 namespace packtrace {
 namespace {
@@ -91,26 +90,6 @@ uint32_t decode_batch_exactly(const baked::TreeRecord& tree, const baked::Geomet
   for (auto& axis : out.vertex)
     for (auto& lanes : axis) std::fill(lanes + count, lanes + packed::kBatch, lanes[0]);
   return count;
-}
-
-void decode_vertices(const packed::TraceCluster& cluster, uint32_t triangle, Vec3 (&vertices)[3]) {
-  packed::BatchStrips batch;
-  packed::read_strips(cluster, triangle, 1, batch);
-  uint32_t fresh = batch.first_fresh, explicit_bit = batch.explicit_bit;
-  const uint32_t width = packed::index_bits(cluster);
-  const packed::VertexReader read_vertex(cluster);
-  for (uint32_t corner = 0; corner < 3; ++corner) { // the batch's corner list is the triangle's corners
-    uint32_t vertex = 0;
-    if (corner < batch.lead_count)
-      vertex = batch.lead[corner];
-    else if (((batch.fresh >> corner) & 1u) != 0)
-      vertex = fresh++;
-    else
-      vertex = static_cast<uint32_t>(read_bits(cluster.bits, explicit_bit, width)), explicit_bit += width;
-    float point[3];
-    read_vertex(vertex, point);
-    vertices[corner] = {point[0], point[1], point[2]};
-  }
 }
 
 } // namespace packtrace

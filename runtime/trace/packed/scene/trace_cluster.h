@@ -14,10 +14,6 @@ namespace packtrace {
 packed::TraceCluster trace_cluster(const baked::TreeRecord& tree, const baked::GeometryRecord& geometry,
                                    const ClusterView& cluster, uint8_t ray_classes);
 
-/// Decodes the vertices of one triangle into the tree's grid, to the same bits as kernels do.
-/// @param cluster must not be flagged packed::kNeedsWideDecode
-void decode_vertices(const packed::TraceCluster& cluster, uint32_t triangle, Vec3 (&vertices)[3]);
-
 /// Decodes up to packed::kBatch triangles of any cluster, each coordinate rounded once; returns their number.
 uint32_t decode_batch_exactly(const baked::TreeRecord& tree, const baked::GeometryRecord& geometry,
                               const ClusterView& cluster, uint32_t first, uint32_t count, packed::DecodedBatch& out);

@@ -118,7 +118,8 @@ TracedTrees whole_trees(const BakedFile& file) {
   return t;
 }
 
-TracedTrees chosen_trees(const BakedFile& file, const LodSource& source, LodTrees& cost) {
+TracedTrees chosen_trees(const BakedFile& file, const LodSource& source, std::span<const uint32_t> without,
+                         LodTrees& cost) {
   TracedTrees t = make_room(file, source.geometry_count());
   const BakedSections& sections = file.sections();
   const std::vector<uint8_t> joins = ChosenTreeBuilder::joins_world(sections);
@@ -136,6 +137,7 @@ TracedTrees chosen_trees(const BakedFile& file, const LodSource& source, LodTree
     if (joins[base] != 0 && world == baked::kNone) world = next_tree(baked::kWorldTree, kNoGeometry);
     const uint32_t tree = joins[base] != 0 ? world : next_tree(base, b);
     t.tree_of[b] = tree;
+    if (std::ranges::find(without, base) != without.end()) continue;
     for (const BlasCluster& c : source.clusters(b))
       chosen[tree].clusters.push_back(static_cast<uint32_t>(file.geometries()[c.geometry].first_cluster + c.cluster));
   }

@@ -47,6 +47,8 @@ TracedTrees whole_trees(const BakedFile& file);
 
 /// Builds the trees over the clusters of a plan's BLASes: one per BLAS, and a single one for all world-space geometry.
 /// @param file must outlive the result
-TracedTrees chosen_trees(const BakedFile& file, const LodSource& source, LodTrees& cost);
+/// @param without geometries of the file whose trees stay empty
+TracedTrees chosen_trees(const BakedFile& file, const LodSource& source, std::span<const uint32_t> without,
+                         LodTrees& cost);
 
 } // namespace packtrace

@@ -1,0 +1,87 @@
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "runtime/frame/detail.h"
+#include "runtime/frame/frame_report.h"
+#include "runtime/motion/scene_motion.h"
+#include "runtime/trace/make_tracer.h"
+
+namespace packtrace {
+
+class InstanceLevels;
+class MeshMotion;
+class PackedTracer;
+
+/// What a FrameLoop traces. Everything referenced must outlive it.
+struct FrameScene {
+  const SceneSource* source = nullptr;
+  const BakedFile* file = nullptr; ///< the file that `source` reads; null for an imported scene
+  TracerConfig backend;
+  const SceneMotion* motion = nullptr; ///< of the instances; null: none moves
+  bool deforms = false;                ///< plays the deforming meshes of `file`, again and again; backend packed only
+};
+
+/// A scene at the time of a frame, ready to be traced: places of instances, vertices of deforming meshes, levels by
+/// distance, levels of detail, and the tracers. Keeps what motion vectors need of the frame before.
+class SceneState {
+public:
+  /// Throws Error(kUsage) for levels of detail without a file, Error(kUnsupported) for deforming meshes with another
+  /// backend than packed.
+  SceneState(const FrameScene& scene, const DetailConfig& detail);
+  ~SceneState();
+
+  /// Goes on to the next frame. Returns whether something moved or changed since the one before.
+  /// @param eye chooses the levels by distance
+  /// @param report receives times and rebuilt trees
+  bool advance(DVec3 eye, double time_s, FrameReport& report);
+
+  /// Chooses the levels of detail for a view, and builds their trees if they changed. Needs a detail with an error.
+  /// @param seen as in DetailPlanner::plan()
+  void choose_detail(const PrimaryCamera& view, const GBuffer* seen, FrameReport& report);
+  /// Makes the tracer of level 0 if there is none.
+  void build_level_0(FrameReport& report);
+
+  /// Forgets the frame before.
+  void reset();
+  /// Returns what advance() depends on besides its arguments, for restore().
+  std::vector<uint8_t> save() const;
+  /// Goes to a frame whose state was saved. Returns false if it was the state of another scene.
+  bool restore(double time_s, std::span<const uint8_t> saved, FrameReport& report);
+
+  const FrameScene& scene() const { return scene_; }
+  const DetailPlanner* planner() const { return planner_.get(); }
+  /// The source of the tracer of occlusion rays.
+  const SceneSource& traced_source() const;
+  /// The source of the tracer of camera rays.
+  const SceneSource& camera_source() const;
+  /// The tracers in use: the camera's, and with DetailConfig::only_occlusion also the occlusion rays'.
+  std::vector<const RayTracer*> tracers() const;
+
+  /// Transforms of all instances in the frame before; empty if none moves.
+  std::span<const Affine> previous_transforms() const { return last_world_; }
+  /// The tracer of camera rays if it shows deforming meshes, else null.
+  const PackedTracer* deforming_tracer() const;
+
+private:
+  bool pose_instances(double time_s, FrameReport& report);
+  bool apply_levels(FrameReport& report);
+  bool deform_meshes(double time_s, FrameReport& report);
+  std::unique_ptr<RayTracer> posed(std::unique_ptr<RayTracer> tracer) const;
+
+  FrameScene scene_;
+  DetailConfig detail_;
+  std::unique_ptr<PackedSource> leveled_source_; ///< scene_.source if there are levels by distance
+  std::unique_ptr<InstanceLevels> levels_;       ///< null if there are none
+  std::unique_ptr<DetailPlanner> planner_;
+  std::unique_ptr<RayTracer> level_0_;      ///< null if only levels are traced and nothing deforms
+  std::unique_ptr<RayTracer> level_tracer_; ///< traces planner_->source()
+  std::unique_ptr<MeshMotion> meshes_;      ///< null if no mesh deforms
+  bool started_ = false;                    ///< there is a frame before
+  std::vector<Affine> pose_, last_pose_;    ///< by SceneMotion::moving_instances(): of this frame and the previous one
+  std::vector<Affine> last_world_;          ///< world_from_object of all instances in the previous frame
+};
+
+} // namespace packtrace
