@@ -216,6 +216,7 @@ void trace_ao(const SceneSource& source, const RayTracer& tracer, const GBuffer&
               uint32_t frame_index, AoFrame& ao, Progress& progress) {
   validate(config);
   if (ao.size != gbuffer.size || ao.ao.size() != gbuffer.size.pixels()) ao.resize(gbuffer.size);
+  ao.ray_length = config.radius;
   const AoTracer ao_tracer(source, tracer, gbuffer, config, frame_index, ao);
   const bool closest = config.falloff || config.interreflection > 0.0f;
   for_each_tile(gbuffer.size, progress, [&](const Tile& tile) {

@@ -120,6 +120,7 @@ GBuffer pixels_of(const GBuffer& full, ImageSize half, const std::vector<uint32_
   GBuffer g;
   g.resize(half);
   g.previous_z.resize(full.previous_z.empty() ? 0 : half.pixels());
+  g.pixel_spread = 2.0f * full.pixel_spread;
   for_each_row(half.height, [&](uint32_t by) {
     for (size_t i = size_t{by} * half.width; i < size_t{by + 1} * half.width; ++i) {
       const uint32_t p = pixel[i];

@@ -35,6 +35,8 @@ struct GBuffer {
   /// view_z that the surface point had in the previous frame, 0 where the previous camera cannot project it. Empty if
   /// neither the camera nor the scene moved: the same as view_z.
   std::vector<float> previous_z;
+  /// World-space length of a pixel at view z 1 (PrimaryCamera::pixel_spread()); 0 if unknown.
+  float pixel_spread = 0.0f;
 
   void resize(ImageSize new_size) {
     size = new_size;
@@ -51,7 +53,8 @@ struct GBuffer {
 struct AoFrame {
   ImageSize size;
   std::vector<float> ao;           ///< 1 = open, 0 = fully occluded, kInvalidAo = no value
-  std::vector<float> hit_distance; ///< mean hit distance of the samples, world units; a miss counts as the AO radius
+  std::vector<float> hit_distance; ///< mean hit distance of the samples, world units; a miss counts as ray_length
+  float ray_length = 0.0f;         ///< the AO radius, world units; 0 if unknown
 
   void resize(ImageSize new_size) {
     size = new_size;

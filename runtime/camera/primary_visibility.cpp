@@ -190,6 +190,7 @@ private:
 void trace_primary(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
                    const PreviousFrame& previous, GBuffer& gbuffer, Progress& progress) {
   if (gbuffer.size != now.size() || gbuffer.view_z.size() != now.size().pixels()) gbuffer.resize(now.size());
+  gbuffer.pixel_spread = static_cast<float>(now.pixel_spread());
   const PrimaryTracer primary(source, tracer, now, previous, gbuffer);
   gbuffer.previous_z.resize(primary.sees_motion() ? now.size().pixels() : 0);
   progress.begin("primary rays", now.size().pixels());

@@ -14,6 +14,7 @@ void require_sizes(const GBuffer& gbuffer, const AoFrame& ao) {
   if (ao.size != gbuffer.size) throw Error(ErrorKind::kUsage, "denoiser: the AO frame and the G-buffer differ in size");
   if (gbuffer.view_z.size() != pixels || gbuffer.normal.size() != pixels || gbuffer.instance.size() != pixels ||
       gbuffer.motion_px.size() != pixels || ao.ao.size() != pixels ||
+      (!ao.hit_distance.empty() && ao.hit_distance.size() != pixels) ||
       (!gbuffer.previous_z.empty() && gbuffer.previous_z.size() != pixels))
     throw Error(ErrorKind::kUsage, "denoiser: an array does not have one entry per pixel");
   constexpr uint32_t kLargestSide = 1u << 20;

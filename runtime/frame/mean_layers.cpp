@@ -33,6 +33,7 @@ void MeanLayers::clear_sums(ImageSize size, bool emitters) {
 void MeanLayers::add(const GBuffer& g, std::span<const Material> materials) {
   if (frames_ == 0) clear_sums(g.size, std::ranges::any_of(materials, emits));
   ++frames_;
+  pixel_spread_ = g.pixel_spread;
   for_each_image_row(g.size.height, [&](uint32_t y) {
     const size_t begin = static_cast<size_t>(y) * g.size.width, end = begin + g.size.width;
     for (size_t i = begin; i < end; ++i) {
@@ -48,6 +49,7 @@ void MeanLayers::add(const GBuffer& g, std::span<const Material> materials) {
 
 void MeanLayers::write_guides(GBuffer& guides) const {
   guides.size = size_;
+  guides.pixel_spread = pixel_spread_;
   const size_t n = size_.pixels();
   guides.view_z.resize(n), guides.normal.resize(n);
   guides.instance = instance_;

@@ -33,6 +33,7 @@ private:
 
   ImageSize size_;
   uint32_t frames_ = 0;
+  float pixel_spread_ = 0.0f; ///< of the frames
   std::vector<float> hits_;  ///< number of frames in which the pixel's camera ray hit
   std::vector<float> depth_; ///< sums over hits
   std::vector<Vec3> normal_, albedo_;
