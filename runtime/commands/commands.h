@@ -20,6 +20,9 @@ void add_info_command(CLI::App& app, GlobalOptions& globals);
 /// with uncompressed float positions.
 void add_render_command(CLI::App& app, GlobalOptions& globals);
 
+/// Adds `packtrace denoise FILE... -o OUT`, which denoises ambient occlusion in EXR pictures of any renderer.
+void add_denoise_command(CLI::App& app, GlobalOptions& globals);
+
 /// Adds `packtrace compare TEST REFERENCE`, which computes image metrics. Exit code 5 if a limit is exceeded.
 void add_compare_command(CLI::App& app, GlobalOptions& globals);
 

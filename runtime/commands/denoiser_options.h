@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 #include "runtime/denoise/denoiser_config.h"
 
@@ -17,5 +18,11 @@ void add_denoiser_options(CLI::App& verb, std::string& denoiser, std::vector<std
 /// The configuration that the two options ask for; the default one with "off". Throws Error(kUsage) for unknown names,
 /// values that are not allowed, and settings of a denoiser that is off.
 DenoiserConfig denoiser_config(const std::string& denoiser, const std::vector<std::string>& settings);
+
+/// Lists the settings of all denoisers with ranges and defaults, for the end of a help text.
+std::string denoiser_settings_help();
+
+/// The "denoiser" value of reports: the preset, and the settings that differ from their defaults.
+nlohmann::json denoiser_json(bool denoise, const DenoiserConfig& config);
 
 } // namespace packtrace

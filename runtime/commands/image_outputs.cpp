@@ -8,6 +8,7 @@
 #include "pbrt_import/base/error.h"
 #include "runtime/commands/binary_output.h"
 #include "runtime/commands/option_checks.h"
+#include "runtime/frame/view_layers.h"
 #include "runtime/image/png.h"
 
 namespace packtrace {
@@ -17,10 +18,26 @@ constexpr std::array kBaseLayers{"ao", "ao_raw", "depth", "normal", "instance", 
 /// Layers that need LOD levels.
 constexpr std::array kLodLayers{"lod", "lod-error"};
 
+bool contains(const auto& names, const std::string& name) { return std::ranges::find(names, name) != names.end(); }
+
+/// The layers of the result itself.
+std::vector<std::string> result_layers(AvailableLayers available) {
+  std::vector<std::string> names(kBaseLayers.begin(), kBaseLayers.end());
+  if (available.levels) names.insert(names.end(), kLodLayers.begin(), kLodLayers.end());
+  return names;
+}
+
+std::span<const float> motion_floats(const std::vector<Vec2>& vectors) {
+  static_assert(sizeof(Vec2) == 2 * sizeof(float));
+  return {vectors.empty() ? nullptr : &vectors[0].x, vectors.size() * 2};
+}
+
 std::span<const float> floats_of(const std::vector<Vec3>& vectors) {
   static_assert(sizeof(Vec3) == 3 * sizeof(float));
   return {vectors.empty() ? nullptr : &vectors[0].x, vectors.size() * 3};
 }
+
+} // namespace
 
 Layer exr_layer(const RenderedImage& image, const std::string& aov) {
   const std::vector<std::string> xyz{"X", "Y", "Z"}, rgb{"R", "G", "B"};
@@ -31,34 +48,47 @@ Layer exr_layer(const RenderedImage& image, const std::string& aov) {
   if (aov == "instance") return {aov, {""}, std::span<const uint32_t>(image.instance)};
   if (aov == "lod") return {aov, {""}, std::span<const uint32_t>(image.lod)};
   if (aov == "lod-error") return {aov, {""}, std::span<const float>(image.lod_error)};
+  if (aov == "motion") return {aov, {"X", "Y"}, motion_floats(image.motion)};
+  if (const std::vector<float>* view = view_of(image, aov)) return {aov, {""}, std::span<const float>(*view)};
   if (aov == "albedo") return {aov, rgb, floats_of(image.albedo), true};
   return {aov, rgb, floats_of(image.shaded), true};
 }
 
-} // namespace
-
-std::vector<std::string> chosen_layers(const std::vector<std::string>& aovs, const std::string& otherwise,
-                                       bool detail) {
-  std::vector<std::string> names = aovs.empty() ? std::vector{otherwise} : aovs;
-  if (std::find(names.begin(), names.end(), "all") != names.end()) {
-    if (detail) return aov_names();
-    return {kBaseLayers.begin(), kBaseLayers.end()};
-  }
-  for (const std::string& name : names) {
-    if (std::find(aov_names().begin(), aov_names().end(), name) != aov_names().end()) continue;
-    std::string known = "all";
-    for (const std::string& aov : aov_names()) known += ", " + aov;
-    throw Error(ErrorKind::kUsage, "--aov " + name + ": no such layer; layers are " + known);
+std::vector<std::string> chosen_layers(const std::vector<std::string>& aovs, AvailableLayers available) {
+  if (aovs.empty()) return {"ao"};
+  if (contains(aovs, "all")) {
+    std::vector<std::string> names = result_layers(available);
+    if (available.views) names.insert(names.end(), kTracedViews.begin(), kTracedViews.end());
+    if (available.denoiser) names.insert(names.end(), kDenoiserViews.begin(), kDenoiserViews.end());
+    return names;
   }
   std::vector<std::string> unique;
-  for (const std::string& name : names)
-    if (std::find(unique.begin(), unique.end(), name) == unique.end()) unique.push_back(name);
+  for (const std::string& name : aovs) {
+    if (!contains(aov_names(), name)) {
+      std::string known = "all";
+      for (const std::string& aov : aov_names()) known += ", " + aov;
+      throw Error(ErrorKind::kUsage, "--aov " + name + ": no such layer; layers are " + known);
+    }
+    if (!contains(unique, name)) unique.push_back(name);
+  }
   return unique;
 }
 
+std::vector<std::string> chosen_exr_layers(const std::vector<std::string>& aovs, AvailableLayers available) {
+  return aovs.empty() ? result_layers(available) : chosen_layers(aovs, available);
+}
+
+bool has_denoiser_layer(const std::vector<std::string>& layers) {
+  return std::ranges::any_of(layers, [](const std::string& layer) { return contains(kDenoiserViews, layer); });
+}
+
+bool has_view_layer(const std::vector<std::string>& layers) {
+  return has_denoiser_layer(layers) ||
+         std::ranges::any_of(layers, [](const std::string& layer) { return contains(kTracedViews, layer); });
+}
+
 bool has_lod_layer(const std::vector<std::string>& layers) {
-  return std::ranges::any_of(
-      layers, [](const std::string& layer) { return std::ranges::find(kLodLayers, layer) != kLodLayers.end(); });
+  return std::ranges::any_of(layers, [](const std::string& layer) { return contains(kLodLayers, layer); });
 }
 
 std::vector<std::string> separate_image_files(const std::vector<std::string>& words) {
@@ -83,6 +113,8 @@ std::vector<std::string> separate_image_files(const std::vector<std::string>& wo
 const std::vector<std::string>& aov_names() {
   static const std::vector<std::string> kNames = [] {
     std::vector<std::string> names(kBaseLayers.begin(), kBaseLayers.end());
+    names.insert(names.end(), kTracedViews.begin(), kTracedViews.end());
+    names.insert(names.end(), kDenoiserViews.begin(), kDenoiserViews.end());
     names.insert(names.end(), kLodLayers.begin(), kLodLayers.end());
     return names;
   }();
@@ -93,17 +125,17 @@ void ImageOutputs::add(const std::filesystem::path& target, bool force, bool exr
   entries_.push_back({target == "-" ? nullptr : std::make_unique<OutputFile>(target, force), exr, std::move(aovs)});
 }
 
-ImageOutputs::ImageOutputs(const std::vector<std::string>& files, const std::vector<std::string>& aovs, bool detail,
-                           bool force, const PreviewStyle& style)
+ImageOutputs::ImageOutputs(const std::vector<std::string>& files, const std::vector<std::string>& aovs,
+                           AvailableLayers available, bool force, const PreviewStyle& style)
     : style_(style) {
   for (const std::string& name : separate_image_files(files)) {
     const std::filesystem::path path(name);
     if (name == "-") {
-      add_standard_output(chosen_layers(aovs, "ao", detail));
+      add_standard_output(chosen_layers(aovs, available));
     } else if (ending_of(path) == ".exr") {
-      add(path, force, true, chosen_layers(aovs, "all", detail));
+      add(path, force, true, chosen_exr_layers(aovs, available));
     } else if (ending_of(path) == ".png") {
-      const std::vector<std::string> layers = chosen_layers(aovs, "ao", detail);
+      const std::vector<std::string> layers = chosen_layers(aovs, available);
       for (const std::string& aov : layers) {
         std::filesystem::path target = path;
         if (layers.size() > 1) target.replace_extension("." + aov + path.extension().string());
@@ -142,8 +174,10 @@ void ImageOutputs::write(const RenderedImage& image, const ExrAttributes& attrib
     if (entry.file) entry.file->commit();
 }
 
-bool ImageOutputs::has_lod_layers() const {
-  return std::ranges::any_of(entries_, [](const Entry& entry) { return has_lod_layer(entry.aovs); });
+std::vector<std::string> ImageOutputs::layers() const {
+  std::vector<std::string> names;
+  for (const Entry& entry : entries_) names.insert(names.end(), entry.aovs.begin(), entry.aovs.end());
+  return names;
 }
 
 std::vector<std::string> ImageOutputs::targets() const {

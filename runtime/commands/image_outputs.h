@@ -13,14 +13,31 @@
 
 namespace packtrace {
 
+/// Which layers an image has besides the usual ones.
+struct AvailableLayers {
+  bool levels = false;   ///< camera rays use LOD levels
+  bool denoiser = false; ///< it is denoised, by a frame loop
+  bool views = true;     ///< it is rendered, not read from a file
+};
+
 /// Names of the layers that a render can write.
 const std::vector<std::string>& aov_names();
 
 /// Returns the layers to write, without repetitions. Throws Error(kUsage) for unknown layers.
-/// @param aovs layers from aov_names(), or "all"
-/// @param otherwise what is written if `aovs` is empty
-/// @param detail as in ImageOutputs
-std::vector<std::string> chosen_layers(const std::vector<std::string>& aovs, const std::string& otherwise, bool detail);
+/// @param aovs layers from aov_names(), or "all"; empty: "ao"
+std::vector<std::string> chosen_layers(const std::vector<std::string>& aovs, AvailableLayers available);
+
+/// Same for an .exr file: without `aovs` the layers of the result, without views of intermediate ones.
+std::vector<std::string> chosen_exr_layers(const std::vector<std::string>& aovs, AvailableLayers available);
+
+/// Whether one of the layers is a view of intermediate results (runtime/frame/view_layers.h), and whether one needs the
+/// denoiser.
+bool has_view_layer(const std::vector<std::string>& layers);
+bool has_denoiser_layer(const std::vector<std::string>& layers);
+
+/// A layer of an .exr file, which refers to the image.
+/// @param aov one of aov_names()
+Layer exr_layer(const RenderedImage& image, const std::string& aov);
 
 /// Whether one of the layers needs LOD levels.
 bool has_lod_layer(const std::vector<std::string>& layers);
@@ -36,18 +53,18 @@ public:
   /// @param files names ending in .exr (one file with all chosen layers) or .png (one file per layer: NAME.png for a
   ///   single layer, NAME.LAYER.png for several); case is ignored. A string may hold several names separated by commas.
   ///   "-" writes a PNG with a single layer to standard output, which must not be a terminal.
-  /// @param aovs layers from aov_names(), or "all"; empty: all for .exr and "ao" for .png
-  /// @param detail whether camera rays use LOD levels; if so, "all" includes the LOD layers
+  /// @param aovs layers from aov_names(), or "all"; empty: chosen_exr_layers() for .exr and "ao" for .png
+  /// @param available the layers that "all" means
   /// Throws Error(kUsage) for other extensions, for unknown layers, and if two outputs have the same name; otherwise
   /// throws like OutputFile.
-  ImageOutputs(const std::vector<std::string>& files, const std::vector<std::string>& aovs, bool detail, bool force,
-               const PreviewStyle& style);
+  ImageOutputs(const std::vector<std::string>& files, const std::vector<std::string>& aovs, AvailableLayers available,
+               bool force, const PreviewStyle& style);
 
   /// Writes all files. Throws Error(kIo).
   void write(const RenderedImage& image, const ExrAttributes& attributes);
 
-  /// Whether a LOD layer was requested.
-  bool has_lod_layers() const;
+  /// Names of all layers that are written.
+  std::vector<std::string> layers() const;
 
   /// Whether an image goes to standard output, so that human-readable text must go elsewhere.
   bool to_stdout() const { return to_stdout_; }

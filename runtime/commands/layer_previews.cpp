@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <utility>
 
 #include <fmt/format.h>
@@ -21,6 +22,13 @@ Image display_picture(ImageSize size, const std::vector<Vec3>& linear) {
   return picture;
 }
 
+float longest_motion(const RenderedImage& image) {
+  std::vector<float> lengths;
+  lengths.reserve(image.motion.size());
+  for (const Vec2& motion : image.motion) lengths.push_back(glm::length(motion));
+  return scale_end(lengths);
+}
+
 /// Returns the picture of a layer without background.
 Image plain_preview(const RenderedImage& image, const std::string& aov) {
   if (aov == "ao") return ao_preview(image.size, image.ao);
@@ -30,6 +38,8 @@ Image plain_preview(const RenderedImage& image, const std::string& aov) {
   if (aov == "instance") return id_preview(image.size, image.instance);
   if (aov == "lod") return level_preview(image.size, image.lod, image.cluster, image.ao);
   if (aov == "lod-error") return heat_map(image.size, image.lod_error, static_cast<float>(image.max_lod_error_px));
+  if (aov == "motion") return vector_preview(image.size, image.motion, longest_motion(image));
+  if (const std::vector<float>* view = view_of(image, aov)) return scalar_preview(image.size, *view, scale_end(*view));
   return display_picture(image.size, aov == "albedo" ? image.albedo : image.shaded);
 }
 
@@ -58,7 +68,35 @@ Legend error_legend(double max_error_px) {
           even_ticks([&](float t) { return max_error_px * static_cast<double>(t); })};
 }
 
+Legend motion_legend(const RenderedImage& image) {
+  return {fmt::format("direction of the motion; full colour from {:.3g} pixels on", longest_motion(image)),
+          direction_color,
+          {{0.0f, "right"}, {0.25f, "down"}, {0.5f, "left"}, {0.75f, "up"}, {1.0f, "right"}}};
+}
+
+/// The legend of a view that is one number per pixel.
+Legend view_legend(const std::string& aov, const std::vector<float>& values) {
+  static const std::map<std::string, const char*> kTitles{
+      {"hit_distance", "mean distance of hits, scene units"},
+      {"previous_depth", "depth in the previous picture, scene units"},
+      {"local_variance", "variance of the samples in 7 x 7 pixels"},
+      {"variance", "variance of the mean occlusion"},
+      {"history", "history, frames"},
+      {"disocclusion", "1: the history began with the last movement"}};
+  const auto end = static_cast<double>(scale_end(values));
+  return {kTitles.at(aov), scalar_color, even_ticks([end](float t) { return end * static_cast<double>(t); })};
+}
+
 } // namespace
+
+const std::vector<float>* view_of(const RenderedImage& image, const std::string& aov) {
+  if (aov == "hit_distance") return &image.hit_distance;
+  if (aov == "previous_depth") return &image.previous_depth;
+  if (aov == "local_variance") return &image.local_variance;
+  if (aov == "variance") return &image.variance;
+  if (aov == "history") return &image.history;
+  return aov == "disocclusion" ? &image.disocclusion : nullptr;
+}
 
 Image layer_preview(const RenderedImage& image, const std::string& aov, const PreviewStyle& style) {
   const bool picture = aov == "albedo" || aov == "shaded";
@@ -69,6 +107,8 @@ Image layer_preview(const RenderedImage& image, const std::string& aov, const Pr
   if (aov == "depth") return with_legend(preview, depth_legend(image));
   if (aov == "lod") return with_legend(preview, level_legend(image));
   if (aov == "lod-error") return with_legend(preview, error_legend(image.max_lod_error_px));
+  if (aov == "motion") return with_legend(preview, motion_legend(image));
+  if (const std::vector<float>* view = view_of(image, aov)) return with_legend(preview, view_legend(aov, *view));
   return preview;
 }
 

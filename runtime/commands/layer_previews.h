@@ -12,8 +12,11 @@ namespace packtrace {
 /// How layers are displayed in .png files.
 struct PreviewStyle {
   std::optional<Background> background; ///< if not set: sky for albedo and shaded, kDefaultBackground for other layers
-  bool legend = true;                   ///< add a colour scale below depth, lod and lod-error
+  bool legend = true;                   ///< add a colour scale below layers in false colours
 };
+
+/// A view that is one number per pixel: "history" and the like; null for other names.
+const std::vector<float>* view_of(const RenderedImage& image, const std::string& aov);
 
 /// Returns a picture of a layer in display values: three channels, or four with a transparent background.
 /// @param aov one of aov_names()

@@ -42,6 +42,7 @@ int main(int argc, char** argv) {
   packtrace::add_bake_command(app, globals);
   packtrace::add_info_command(app, globals);
   packtrace::add_render_command(app, globals);
+  packtrace::add_denoise_command(app, globals);
   packtrace::add_compare_command(app, globals);
   packtrace::add_export_command(app, globals);
   packtrace::add_measure_command(app, globals, PACKTRACE_VERSION);

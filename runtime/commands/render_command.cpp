@@ -21,6 +21,7 @@
 #include "runtime/commands/render_setup.h"
 #include "runtime/commands/seam_report.h"
 #include "runtime/commands/sequence_render.h"
+#include "runtime/layered/layered_picture.h"
 #include "runtime/stopwatch.h"
 
 namespace packtrace {
@@ -51,11 +52,12 @@ void warn_of_flat_instances(const std::string& input, size_t count) {
 }
 
 /// Throws Error(kUsage) for two outputs to standard output, and for LOD layers of a render that has none.
-void check_targets(const ImageOutputs& outputs, const JsonOutput& json, const DetailConfig& detail) {
+void check_targets(const ImageOutputs& outputs, const JsonOutput& json, const DetailConfig& detail, bool denoise) {
   refuse_shared_stdout(outputs.to_stdout(), json);
-  if (outputs.has_lod_layers() && !detail.error_px)
-    throw Error(ErrorKind::kUsage, "the layers lod and lod-error require --lod-error");
-  if (outputs.has_lod_layers() && detail.only_occlusion)
+  require_denoiser_for(outputs.layers(), denoise);
+  const bool levels = has_lod_layer(outputs.layers());
+  if (levels && !detail.error_px) throw Error(ErrorKind::kUsage, "the layers lod and lod-error require --lod-error");
+  if (levels && detail.only_occlusion)
     throw Error(ErrorKind::kUsage,
                 "the layers lod and lod-error do not work with --lod-rays occlusion, where the camera sees "
                 "level 0");
@@ -69,12 +71,12 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   if (!options.size.empty()) parse_size(options.size);
   JsonOutput json(globals.json, globals.force);
   const DetailConfig detail = detail_config(options.lod, json.wanted() || globals.verbosity > 0);
-  ImageOutputs outputs(options.outputs, options.aovs, detail.camera_uses_levels(), globals.force,
+  ImageOutputs outputs(options.outputs, options.aovs, {detail.camera_uses_levels(), denoises(options)}, globals.force,
                        preview_style(options)); // reports unwritable files before any work
-  check_targets(outputs, json, detail);
+  check_targets(outputs, json, detail, denoises(options));
   ProgressDisplay display(globals);
   Progress progress(display.observer());
-  const RenderSetup setup(options, globals, detail, outputs.has_lod_layers(), progress, display);
+  const RenderSetup setup(options, globals, detail, outputs.layers(), progress, display);
   const LoadedScene& loaded = setup.loaded;
   const StillConfig& config = setup.config;
   FrameLoop& loop = *setup.loop;
@@ -90,7 +92,8 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   outputs.write(image, {{"comments", std::string("packtrace render")},
                         {"aoRadius", static_cast<double>(config.ao.radius)},
                         {"aoSpp", static_cast<int>(config.ao.spp)},
-                        {"frames", static_cast<int>(config.frames)}});
+                        {"frames", static_cast<int>(config.frames)},
+                        {kDenoisedAttribute, config.denoise ? 1 : 0}});
   timings.write_s = writing.seconds();
   const RayTracer& first_tracer = *loop.tracers().front();
   nlohmann::json result = render_json(options, config, image, report, loop, camera, outputs.targets(), timings);

@@ -4,6 +4,7 @@
 
 #include "pbrt_import/base/error.h"
 #include "runtime/commands/denoiser_options.h"
+#include "runtime/commands/image_outputs.h"
 #include "runtime/commands/option_checks.h"
 #include "runtime/commands/render_camera.h"
 
@@ -23,8 +24,10 @@ void add_picture_options(CLI::App& verb, RenderOptions& options) {
   verb.add_option(
           "--aov", options.aovs,
           "Layers to write, separated by commas. ao is denoised, ao_raw is the last frame before denoising, shaded is "
-          "albedo times ao; others are depth, normal, instance, albedo, with --lod-error lod and lod-error, and all "
-          "(default: all in .exr, ao in .png). Several layers in .png become NAME.LAYER.png")
+          "albedo times ao; others are depth, normal, instance, albedo (default: these in .exr, ao in .png), the views "
+          "hit_distance, motion, previous_depth, local_variance, variance, history and disocclusion "
+          "(docs/command_line.md), with --lod-error lod and lod-error, and all. Several layers in .png become "
+          "NAME.LAYER.png")
       ->delimiter(',')
       ->type_name("LAYERS");
   verb.add_option("--camera", options.camera,
@@ -41,7 +44,7 @@ void add_picture_options(CLI::App& verb, RenderOptions& options) {
                   "transparent or sky (default: light grey; sky for albedo and shaded). It does not affect .exr files")
       ->type_name("COLOR");
   verb.add_flag("--no-legend", options.no_legend,
-                "Do not add the colour scale below .png files of depth, lod and lod-error");
+                "Do not add the colour scale below .png files of layers in false colours");
   verb.add_option(
           "--supersample", options.supersample,
           "Trace at N times the width and height and filter down, 1..8 (default 1), for smooth edges in few frames. "
@@ -137,12 +140,19 @@ void add_render_options(CLI::App& verb, RenderOptions& options) {
               "  packtrace render house.ptk --path turntable -o - --stream y4m | ffmpeg -i - turn.mp4");
 }
 
+bool denoises(const RenderOptions& options) { return !options.ground_truth && options.denoiser != "off"; }
+
+void require_denoiser_for(const std::vector<std::string>& layers, bool denoise) {
+  if (!denoise && has_denoiser_layer(layers))
+    throw Error(ErrorKind::kUsage, "the layers variance, history and disocclusion require a denoiser");
+}
+
 StillConfig make_config(const SceneSource& source, const Camera& camera, const RenderOptions& options,
                         const DetailConfig& detail) {
   StillConfig config;
   config.size = options.size.empty() ? ImageSize{camera.width_px, camera.height_px} : parse_size(options.size);
   config.supersample = options.supersample;
-  config.denoise = !options.ground_truth && options.denoiser != "off";
+  config.denoise = denoises(options);
   config.denoiser = denoiser_config(options.denoiser, options.denoiser_settings);
   if (options.ao_resolution == "quarter") config.ao_resolution = AoResolution::kQuarter;
   if (options.ground_truth && config.ao_resolution != AoResolution::kFull)

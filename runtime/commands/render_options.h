@@ -55,6 +55,12 @@ StillConfig make_config(const SceneSource& source, const Camera& camera, const R
 /// Throws Error(kUsage) for contradictory options.
 TracerConfig tracer_config(const RenderOptions& options, const GlobalOptions& globals, bool baked);
 
+/// Whether the result is denoised.
+bool denoises(const RenderOptions& options);
+
+/// Throws Error(kUsage) for layers of the denoiser without one.
+void require_denoiser_for(const std::vector<std::string>& layers, bool denoise);
+
 PreviewStyle preview_style(const RenderOptions& options);
 
 } // namespace packtrace

@@ -8,19 +8,12 @@
 #include <tbb/global_control.h>
 
 #include "compress/format/file/file_summary.h"
+#include "runtime/commands/denoiser_options.h"
 #include "runtime/commands/file_report.h"
 #include "runtime/commands/seam_report.h"
 
 namespace packtrace {
 namespace {
-
-double mean_of_valid(const std::vector<float>& ao) {
-  double sum = 0;
-  uint64_t count = 0;
-  for (const float value : ao)
-    if (value >= 0) sum += static_cast<double>(value), ++count;
-  return count ? sum / static_cast<double>(count) : 0;
-}
 
 double rate_m(uint64_t rays, double seconds) { return seconds > 0 ? static_cast<double>(rays) / seconds * 1e-6 : 0; }
 
@@ -112,6 +105,14 @@ std::string grid_text(const LoadedScene& loaded) {
 
 } // namespace
 
+double mean_of_valid(const std::vector<float>& ao) {
+  double sum = 0;
+  uint64_t count = 0;
+  for (const float value : ao)
+    if (value >= 0) sum += static_cast<double>(value), ++count;
+  return count ? sum / static_cast<double>(count) : 0;
+}
+
 nlohmann::json render_json(const RenderOptions& options, const StillConfig& config, const RenderedImage& image,
                            const PictureReport& report, const FrameLoop& loop, const ChosenCamera& camera,
                            const std::vector<std::string>& files, const FileTimings& timings) {
@@ -138,6 +139,7 @@ nlohmann::json render_json(const RenderOptions& options, const StillConfig& conf
       {"spp", config.ao.spp},
       {"ao_resolution", options.ao_resolution},
       {"denoise", config.denoise},
+      {"denoiser", denoiser_json(config.denoise, config.denoiser)},
       {"jitter", config.jitters() && config.frames > 1},
       {"ao_radius", config.ao.radius},
       {"ao_falloff", config.ao.falloff},

@@ -18,6 +18,9 @@ struct FileTimings {
   double load_s = 0.0, write_s = 0.0;
 };
 
+/// Mean of the pixels that have a value, 0 if none has.
+double mean_of_valid(const std::vector<float>& ao);
+
 /// The report of `render --json` (docs/json_output.md), without the seams between instances.
 /// @param loop after its last frame
 /// @param files the files written

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "pbrt_import/base/with_file.h"
+#include "runtime/commands/image_outputs.h"
 #include "runtime/motion/motion_keys.h"
 
 namespace packtrace {
@@ -13,7 +14,7 @@ namespace {
 /// Reserves the approximate memory of the G-buffer, the denoiser and the layers of a view. The image size may come from
 /// the scene file, so it is not trusted.
 MemoryReservation reserve_picture(const RenderOptions& options, const FrameConfig& config, const MemoryBudget& budget) {
-  const double pixel_bytes = config.jitters() ? 400.0 : 320.0;
+  const double pixel_bytes = (config.jitters() ? 400.0 : 320.0) + (config.view_layers ? 60.0 : 0.0);
   constexpr double kMax = 0x1p62;
   const double side = config.supersample;
   const double bytes = pixel_bytes * side * side * static_cast<double>(config.size.width) * config.size.height;
@@ -31,14 +32,15 @@ bool shows_motion(const RenderOptions& options) {
 } // namespace
 
 RenderSetup::RenderSetup(const RenderOptions& options, const GlobalOptions& globals, const DetailConfig& detail,
-                         bool lod_layers, Progress& progress, ProgressDisplay& display)
+                         const std::vector<std::string>& layers, Progress& progress, ProgressDisplay& display)
     : loaded(load_scene(options.input, options.scene, globals, progress, display, options.private_copy)),
       load_s(loading.seconds()) {
   if (detail.error_px) require_levels(options.input, loaded);
   camera = choose_camera(*loaded.source, options, globals);
   prepare_motion(options, globals);
   config = make_config(*loaded.source, camera.camera, options, detail);
-  config.lod_layers = lod_layers;
+  config.lod_layers = has_lod_layer(layers);
+  config.view_layers = has_view_layer(layers);
   pixels = reserve_picture(options, config, globals.memory);
   const BakedFile* const file = loaded.baked ? &*loaded.baked : nullptr;
   const FrameScene scene{loaded.source.get(), file, tracer_config(options, globals, file != nullptr),

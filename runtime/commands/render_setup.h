@@ -12,10 +12,11 @@ namespace packtrace {
 /// What `render` needs for stills and sequences: the scene, the camera, the settings and a frame loop.
 struct RenderSetup {
   /// Loads the scene and prepares the frame loop.
-  /// @param detail, lod_layers as in FrameConfig
+  /// @param detail as in FrameConfig
+  /// @param layers names of all layers that are written
   /// Throws like load_scene(), choose_camera(), make_config() and FrameLoop, and MemoryError for large pictures.
-  RenderSetup(const RenderOptions& options, const GlobalOptions& globals, const DetailConfig& detail, bool lod_layers,
-              Progress& progress, ProgressDisplay& display);
+  RenderSetup(const RenderOptions& options, const GlobalOptions& globals, const DetailConfig& detail,
+              const std::vector<std::string>& layers, Progress& progress, ProgressDisplay& display);
   RenderSetup(const RenderSetup&) = delete;
   RenderSetup& operator=(const RenderSetup&) = delete;
 

@@ -1,5 +1,6 @@
 #include "runtime/commands/sequence_names.h"
 
+#include <charconv>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -44,6 +45,15 @@ std::string NumberedName::at(uint64_t number) const {
   std::string name = before_;
   name.append(fmt::format("{:0{}}", number, digits_)).append(after_);
   return name;
+}
+
+std::optional<uint64_t> NumberedName::number_of(const std::string& name) const {
+  if (name.size() <= before_.size() + after_.size() || !name.starts_with(before_) || !name.ends_with(after_)) return {};
+  uint64_t number = 0;
+  const char* const end = name.data() + name.size() - after_.size();
+  const auto [stop, error] = std::from_chars(name.data() + before_.size(), end, number);
+  if (error != std::errc() || stop != end || at(number) != name) return {};
+  return number;
 }
 
 std::optional<uint64_t> NumberedName::largest() const {

@@ -15,6 +15,9 @@ public:
 
   std::string at(uint64_t number) const;
 
+  /// The number for which at() returns this name; none if there is no such number.
+  std::optional<uint64_t> number_of(const std::string& name) const;
+
   /// Largest number that does not need more digits than the others; unset for %d.
   std::optional<uint64_t> largest() const;
   const std::string& pattern() const { return pattern_; }

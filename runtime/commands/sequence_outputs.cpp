@@ -29,9 +29,10 @@ std::pair<uint32_t, uint32_t> fraction_of(double fps) {
 } // namespace
 
 SequenceOutputs::SequenceOutputs(const std::vector<std::string>& files, const std::vector<std::string>& aovs,
-                                 bool detail, bool force, const PreviewStyle& style, const SequenceOptions& options)
-    : aovs_(aovs), detail_(detail), force_(force), resume_(options.resume), style_(style) {
-  chosen_layers(aovs, "ao", detail); // reports unknown layers
+                                 AvailableLayers available, bool force, const PreviewStyle& style,
+                                 const SequenceOptions& options)
+    : aovs_(aovs), available_(available), force_(force), resume_(options.resume), style_(style) {
+  chosen_layers(aovs, available); // reports unknown layers
   for (const std::string& name : separate_image_files(files)) {
     if (name == "-" || ending_of(name) == ".y4m") {
       if (resume_)
@@ -93,7 +94,7 @@ void SequenceOutputs::write_video(const std::vector<std::byte>& bytes) {
 void SequenceOutputs::write(uint64_t picture, double fps, const RenderedImage& image, const ExrAttributes& attributes) {
   std::vector<std::string> names = numbered(picture);
   if (png_stream_) names.push_back("-");
-  if (!names.empty()) ImageOutputs(names, aovs_, detail_, force_ || resume_, style_).write(image, attributes);
+  if (!names.empty()) ImageOutputs(names, aovs_, available_, force_ || resume_, style_).write(image, attributes);
   if (video_streams_.empty() && !video_to_stdout_) return;
   PreviewStyle style = style_;
   style.legend = false; // its scale would change from picture to picture
@@ -114,9 +115,9 @@ void SequenceOutputs::commit() {
   }
 }
 
-bool SequenceOutputs::has_lod_layers() const {
+std::vector<std::string> SequenceOutputs::layers() const {
   const bool exr = std::ranges::any_of(names_, [](const NumberedName& n) { return ending_of(n.pattern()) == ".exr"; });
-  return has_lod_layer(chosen_layers(aovs_, exr ? "all" : "ao", detail_));
+  return exr ? chosen_exr_layers(aovs_, available_) : chosen_layers(aovs_, available_);
 }
 
 std::vector<std::string> SequenceOutputs::targets() const {

@@ -18,11 +18,11 @@ namespace packtrace {
 class SequenceOutputs {
 public:
   /// @param files as in ImageOutputs, but .png and .exr names are NumberedNames, and names may end in .y4m
-  /// @param aovs, detail, style as in ImageOutputs; a .y4m file holds one layer
+  /// @param aovs, available, style as in ImageOutputs; a .y4m file holds one layer
   /// Throws Error(kUsage) for names without a number, other extensions, unknown layers, two outputs to standard output,
   /// and with --resume for anything but numbered files; otherwise like OutputFile.
-  SequenceOutputs(const std::vector<std::string>& files, const std::vector<std::string>& aovs, bool detail, bool force,
-                  const PreviewStyle& style, const SequenceOptions& options);
+  SequenceOutputs(const std::vector<std::string>& files, const std::vector<std::string>& aovs,
+                  AvailableLayers available, bool force, const PreviewStyle& style, const SequenceOptions& options);
 
   /// Throws Error(kUsage) if a name has too few digits for the number of pictures, Error(kIo) if a numbered file exists
   /// and neither `force` nor --resume was given.
@@ -34,7 +34,8 @@ public:
   /// Completes the .y4m files.
   void commit();
 
-  bool has_lod_layers() const;
+  /// Names of all layers that are written.
+  std::vector<std::string> layers() const;
   bool to_stdout() const { return to_stdout_; }
   /// Patterns of the numbered files and names of the others.
   std::vector<std::string> targets() const;
@@ -54,7 +55,8 @@ private:
   std::vector<std::unique_ptr<std::FILE, CloseStream>> video_streams_; ///< of video_files_
   std::vector<std::string> aovs_;
   std::string video_layer_;
-  bool detail_ = false, force_ = false, resume_ = false;
+  AvailableLayers available_;
+  bool force_ = false, resume_ = false;
   bool to_stdout_ = false, png_stream_ = false, video_to_stdout_ = false;
   bool video_began_ = false;
   PreviewStyle style_;

@@ -14,10 +14,12 @@
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/with_file.h"
 #include "runtime/commands/binary_output.h"
+#include "runtime/commands/denoiser_options.h"
 #include "runtime/commands/render_setup.h"
 #include "runtime/commands/sequence_checkpoint.h"
 #include "runtime/commands/sequence_outputs.h"
 #include "runtime/commands/sequence_report.h"
+#include "runtime/layered/layered_picture.h"
 #include "runtime/stopwatch.h"
 
 namespace packtrace {
@@ -120,7 +122,8 @@ std::vector<PictureRow> render_pictures(const Sequence& sequence, uint64_t first
   const ExrAttributes attributes{{"comments", std::string("packtrace render")},
                                  {"aoRadius", static_cast<double>(setup.config.ao.radius)},
                                  {"aoSpp", static_cast<int>(setup.config.ao.spp)},
-                                 {"frames", static_cast<int>(sequence.subframes)}};
+                                 {"frames", static_cast<int>(sequence.subframes)},
+                                 {kDenoisedAttribute, setup.config.denoise ? 1 : 0}};
   std::vector<PictureRow> rows;
   RenderedImage image;
   Stopwatch since_checkpoint;
@@ -145,7 +148,8 @@ void check_sequence(const RenderOptions& options, const SequenceOutputs& outputs
                     const DetailConfig& detail) {
   if (options.ground_truth) throw Error(ErrorKind::kUsage, "--ground-truth renders stills; it does not go with --path");
   refuse_shared_stdout(outputs.to_stdout(), json);
-  if (outputs.has_lod_layers() && !detail.camera_uses_levels())
+  require_denoiser_for(outputs.layers(), denoises(options));
+  if (has_lod_layer(outputs.layers()) && !detail.camera_uses_levels())
     throw Error(ErrorKind::kUsage, "the layers lod and lod-error require --lod-error and --lod-rays all");
 }
 
@@ -156,13 +160,13 @@ int render_sequence(const RenderOptions& options, const GlobalOptions& globals) 
   tracer_config(options, globals, false); // reports wrong options before any work
   JsonOutput json(globals.json, globals.force);
   const DetailConfig detail = detail_config(options.lod, false);
-  SequenceOutputs outputs(options.outputs, options.aovs, detail.camera_uses_levels(), globals.force,
-                          preview_style(options), options.sequence);
+  SequenceOutputs outputs(options.outputs, options.aovs, {detail.camera_uses_levels(), denoises(options)},
+                          globals.force, preview_style(options), options.sequence);
   check_sequence(options, outputs, json, detail);
   CsvOutput csv(options.sequence.csv, globals.force);
   ProgressDisplay display(globals);
   Progress progress(display.observer());
-  RenderSetup setup(options, globals, detail, outputs.has_lod_layers(), progress, display);
+  RenderSetup setup(options, globals, detail, outputs.layers(), progress, display);
   const Sequence sequence = with_file(options.input, [&] {
     return make_sequence(options.sequence, options.frames, *setup.loaded.source, setup.camera.camera,
                          setup.camera.index, *setup.loop, globals.memory);
@@ -185,6 +189,7 @@ int render_sequence(const RenderOptions& options, const GlobalOptions& globals) 
                                  {"files", outputs.targets()},
                                  {"width", setup.config.size.width},
                                  {"height", setup.config.size.height},
+                                 {"denoiser", denoiser_json(setup.config.denoise, setup.config.denoiser)},
                                  {"load_s", setup.load_s},
                                  {"peak_rss_bytes", peak_rss_bytes()},
                                  {"sequence", sequence_json(sequence, rows)}};

@@ -41,7 +41,8 @@ struct FrameConfig {
   /// antialiased one. Has no effect with AoResolution::kQuarter.
   bool jitter = true;
   AoResolution ao_resolution = AoResolution::kFull;
-  bool lod_layers = false; ///< fill the LOD layers of RenderedImage
+  bool lod_layers = false;  ///< fill the LOD layers of RenderedImage
+  bool view_layers = false; ///< fill its views of intermediate results
   AoConfig ao;
   DenoiserConfig denoiser;
   DetailConfig detail;

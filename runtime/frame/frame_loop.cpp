@@ -222,6 +222,7 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
   if (moved) layers_.clear();
   if (trace) layers_.add(gbuffer_, scene().source->materials());
   if (trace && config_.lod_layers) add_lod_layers(view);
+  if (moved && config_.view_layers) views_.keep_motion(gbuffer_);
   report_.times.resolve_s += layering.seconds();
 
   const Stopwatch accumulating;
@@ -244,6 +245,7 @@ std::vector<float> FrameLoop::accumulated_ao(PictureReport& report) {
   const Stopwatch denoising;
   if (!config_.denoise) return raw_mean_.result();
   const DenoisedAo& denoised = denoiser_.denoise();
+  denoised_ = &denoised;
   report.times.denoise_s += denoising.seconds();
   double sum = 0.0;
   uint64_t count = 0;
@@ -251,6 +253,12 @@ std::vector<float> FrameLoop::accumulated_ao(PictureReport& report) {
     if (denoised.ao[i] >= 0.0f) sum += static_cast<double>(denoised.tspp[i]), ++count;
   report.mean_history = count > 0 ? sum / static_cast<double>(count) : 0.0;
   return denoised.ao;
+}
+
+/// Writes the views of the last frame; motion is that since the last image.
+void FrameLoop::resolve_views(RenderedImage& image) {
+  views_.resolve(config_, gbuffer_, raw_, denoised_, still_frames_ + 1, image);
+  views_.clear();
 }
 
 void FrameLoop::resolve(RenderedImage& image, PictureReport& report) {
@@ -269,6 +277,7 @@ void FrameLoop::resolve(RenderedImage& image, PictureReport& report) {
     layers_.resolve(config_, ao, raw_.ao, image);
     times.resolve_s += filtering.seconds();
   }
+  if (config_.view_layers) resolve_views(image);
   image.max_lod_error_px = config_.detail.error_px.value_or(0.0);
   image.lod = lod_layers_.lod, image.cluster = lod_layers_.cluster, image.lod_error = lod_layers_.lod_error;
 }

@@ -15,6 +15,7 @@
 #include "runtime/frame/raw_mean.h"
 #include "runtime/frame/rendered_image.h"
 #include "runtime/frame/scene_state.h"
+#include "runtime/frame/view_layers.h"
 
 namespace packtrace {
 
@@ -67,6 +68,7 @@ private:
   bool traces(uint32_t still_frame) const;
   void add_lod_layers(const PrimaryCamera& view);
   std::vector<float> accumulated_ao(PictureReport& report);
+  void resolve_views(RenderedImage& image);
 
   FrameConfig config_;
   SceneState state_;
@@ -81,6 +83,8 @@ private:
   RawMean raw_mean_;
   MeanLayers layers_;
   RenderedImage lod_layers_; ///< only its LOD layers
+  ViewLayers views_;
+  const DenoisedAo* denoised_ = nullptr; ///< of the denoiser's last denoise(); null without denoiser
   FrameReport report_;
 };
 

@@ -22,6 +22,16 @@ struct RenderedImage {
   std::vector<Vec3> albedo;       ///< linear sRGB
   std::vector<Vec3> shaded;       ///< albedo times ao, as under a uniform white sky; emitters are white; linear sRGB
   std::vector<uint32_t> instance; ///< of the first camera ray that hits
+  // The views (runtime/frame/view_layers.h) are empty unless FrameConfig::view_layers is set; the last three also
+  // without the denoiser. They are those of the last frame, and 0 where its camera rays miss.
+  std::vector<float>
+      hit_distance;         ///< mean distance of the occlusion rays' hits, world units; a miss counts as the radius
+  std::vector<Vec2> motion; ///< pixels from where the previous image shows the surface, x right, y down
+  std::vector<float> previous_depth; ///< depth of the surface in the previous image; 0 where its camera cannot see it
+  std::vector<float> local_variance; ///< of the samples in 7 x 7 pixels
+  std::vector<float> variance;       ///< of the mean that is denoised (DenoisedAo::variance)
+  std::vector<float> history;        ///< frames of history (DenoisedAo::tspp)
+  std::vector<float> disocclusion;   ///< 1 where the history began after the last movement
   // The LOD layers are empty unless FrameConfig::lod_layers is set.
   std::vector<uint32_t> lod;     ///< LOD level at the last camera ray that hits
   std::vector<uint32_t> cluster; ///< cluster number at the last camera ray that hits

@@ -16,8 +16,8 @@
 
 #include "pbrt_import/base/exr_header.h"
 #include "pbrt_import/base/file_bytes.h"
-#include "pbrt_import/base/file_error.h"
 #include "runtime/image/exr.h"
+#include "runtime/image/exr_streams.h"
 
 namespace packtrace {
 
@@ -31,81 +31,24 @@ constexpr uint32_t kMaxTileSide = 8192, kMinTileSide = 8;
 constexpr uint64_t kMaxRatio = 2048;
 constexpr uint64_t kAlwaysAcceptedBytes = uint64_t{64} << 20;
 
-[[noreturn]] void fail(std::string_view name, const std::string& what, ErrorKind kind = ErrorKind::kInput) {
-  throw FileError(kind, std::string(name), what);
-}
-
-class MemoryReader : public Imf::IStream {
-public:
-  MemoryReader(std::span<const std::byte> bytes, const std::string& name) : IStream(name.c_str()), bytes_(bytes) {}
-  bool read(char target[], int count) override {
-    const size_t n = static_cast<size_t>(count);
-    if (count < 0 || position_ > bytes_.size() || n > bytes_.size() - position_)
-      throw std::runtime_error("the file ends too early");
-    if (n > 0) std::memcpy(target, bytes_.data() + position_, n);
-    position_ += n;
-    return position_ < bytes_.size();
-  }
-  uint64_t tellg() override { return position_; }
-  void seekg(uint64_t position) override { position_ = position; }
-
-private:
-  std::span<const std::byte> bytes_;
-  uint64_t position_ = 0;
-};
-
 /// Returns the data window's size. Throws unless the size is plausible for the file's length.
 ImageSize checked_size(const ExrHeader& header, uint64_t file_bytes, std::string_view name) {
   const uint64_t width = header.width(), height = header.height(), pixel_bytes = header.pixel_bytes();
-  if (width < 1 || height < 1) fail(name, "damaged EXR file: it has no pixels");
+  if (width < 1 || height < 1) fail_exr(name, "damaged EXR file: it has no pixels");
   if (header.channels.empty() || header.channels.size() > kMaxChannels)
-    fail(name, "EXR file without channels or with too many");
+    fail_exr(name, "EXR file without channels or with too many");
   if (header.tile_width > 0) {
     const auto [narrow, wide] = std::minmax(header.tile_width, header.tile_height);
     if (wide > kMaxTileSide || narrow < kMinTileSide)
-      fail(name, "EXR tile size is not supported", ErrorKind::kUnsupported);
+      fail_exr(name, "EXR tile size is not supported", ErrorKind::kUnsupported);
   }
   if (width > kMaxImageSide || height > kMaxImageSide ||
       std::max(width * height * pixel_bytes, header.block_bytes()) >
           std::max(kAlwaysAcceptedBytes, kMaxRatio * file_bytes))
-    fail(name, "image of " + std::to_string(width) + " x " + std::to_string(height) + " pixels and " +
-                   std::to_string(header.channels.size()) + " channels is too large for a file of " +
-                   std::to_string(file_bytes) + " bytes");
+    fail_exr(name, "image of " + std::to_string(width) + " x " + std::to_string(height) + " pixels and " +
+                       std::to_string(header.channels.size()) + " channels is too large for a file of " +
+                       std::to_string(file_bytes) + " bytes");
   return {static_cast<uint32_t>(width), static_cast<uint32_t>(height)};
-}
-
-/// A header that was checked before OpenEXR parsed it, and the size of its data window.
-struct CheckedHeader {
-  Imf::Header header;
-  ImageSize size;
-};
-
-CheckedHeader read_header(std::span<const std::byte> bytes, std::string_view name) {
-  if (const std::string_view why = unsupported_exr_kind(bytes); !why.empty())
-    fail(name, std::string(why), ErrorKind::kUnsupported);
-  const ExrHeader found = scan_exr_header(bytes, std::string(name) + ": damaged EXR file: ");
-  CheckedHeader checked{{}, checked_size(found, bytes.size(), name)};
-  MemoryReader reader(bytes, std::string(name));
-  reader.seekg(4);
-  int version = 0;
-  Imf::Xdr::read<Imf::StreamIO>(reader, version);
-  checked.header.readFrom(reader, version);
-  checked.header.sanityCheck(found.tile_width > 0);
-  return checked;
-}
-
-/// Runs a function that calls OpenEXR, and turns OpenEXR's exceptions into an Error about this file.
-template <class Function>
-auto guarded(std::string_view name, Function function) -> decltype(function()) {
-  try {
-    return function();
-  } catch (const Error&) {
-    throw;
-  } catch (const std::bad_alloc&) {
-    fail(name, "EXR file needs more memory than there is");
-  } catch (const std::exception& error) {
-    fail(name, std::string("damaged EXR file: ") + error.what());
-  }
 }
 
 /// Sort key of channels: R, G, B, A first, all others by name.
@@ -153,15 +96,11 @@ template <class Sample>
 std::vector<Sample> read_pixels(std::span<const std::byte> bytes, std::string_view name, const Imf::Header& header,
                                 ImageSize size, const ExrLayer& layer) {
   const uint64_t channels = layer.channels.size();
-  if (uint64_t{size.width} * size.height * channels > kMaxImageSamples) fail(name, "EXR layer is too large");
-  for (const ExrChannel& channel : layer.channels) {
-    const Imf::Channel* stored = header.channels().findChannel(channel.name);
-    if (!stored || stored->xSampling != 1 || stored->ySampling != 1)
-      fail(name, "subsampled EXR channel " + channel.name + " is not supported", ErrorKind::kUnsupported);
-  }
-  MemoryReader reader(bytes, std::string(name));
+  if (uint64_t{size.width} * size.height * channels > kMaxImageSamples) fail_exr(name, "EXR layer is too large");
+  for (const ExrChannel& channel : layer.channels) require_full_sampling(header, channel.name, name);
+  ExrMemoryReader reader(bytes, std::string(name));
   Imf::InputFile file(reader, 0);
-  if (!file.isComplete()) fail(name, "damaged EXR file: pixels are missing");
+  if (!file.isComplete()) fail_exr(name, "damaged EXR file: pixels are missing");
 
   std::vector<Sample> samples(size.pixels() * channels);
   Imf::FrameBuffer frame;
@@ -177,9 +116,29 @@ std::vector<Sample> read_pixels(std::span<const std::byte> bytes, std::string_vi
 
 } // namespace
 
+CheckedExrHeader read_exr_header(std::span<const std::byte> bytes, std::string_view name) {
+  if (const std::string_view why = unsupported_exr_kind(bytes); !why.empty())
+    fail_exr(name, std::string(why), ErrorKind::kUnsupported);
+  const ExrHeader found = scan_exr_header(bytes, std::string(name) + ": damaged EXR file: ");
+  CheckedExrHeader checked{{}, checked_size(found, bytes.size(), name)};
+  ExrMemoryReader reader(bytes, std::string(name));
+  reader.seekg(4);
+  int version = 0;
+  Imf::Xdr::read<Imf::StreamIO>(reader, version);
+  checked.header.readFrom(reader, version);
+  checked.header.sanityCheck(found.tile_width > 0);
+  return checked;
+}
+
+void require_full_sampling(const Imf::Header& header, const std::string& channel, std::string_view name) {
+  const Imf::Channel* stored = header.channels().findChannel(channel);
+  if (!stored || stored->xSampling != 1 || stored->ySampling != 1)
+    fail_exr(name, "subsampled EXR channel " + channel + " is not supported", ErrorKind::kUnsupported);
+}
+
 ExrInfo exr_info(std::span<const std::byte> bytes, std::string_view name) {
-  return guarded(name, [&] {
-    const auto [header, size] = read_header(bytes, name);
+  return guarded_exr(name, [&] {
+    const auto [header, size] = read_exr_header(bytes, name);
     return info_of(header, size);
   });
 }
@@ -197,13 +156,13 @@ const ExrLayer& choose_layer(const ExrInfo& info, std::string_view layer, std::s
   std::string list;
   for (const ExrLayer& candidate : info.layers)
     list.append(list.empty() ? "" : ", ").append(candidate.name.empty() ? "(colours)" : candidate.name);
-  if (layer.empty()) fail(name, "it has several layers, name one: " + list);
-  fail(name, "it has no layer \"" + std::string(layer) + "\", but " + list);
+  if (layer.empty()) fail_exr(name, "it has several layers, name one: " + list);
+  fail_exr(name, "it has no layer \"" + std::string(layer) + "\", but " + list);
 }
 
 Image decode_exr(std::span<const std::byte> bytes, std::string_view name, std::string_view layer) {
-  return guarded(name, [&] {
-    const auto [header, size] = read_header(bytes, name);
+  return guarded_exr(name, [&] {
+    const auto [header, size] = read_exr_header(bytes, name);
     const ExrInfo info = info_of(header, size);
     const ExrLayer& chosen = choose_layer(info, layer, name);
     Image image;
@@ -215,12 +174,12 @@ Image decode_exr(std::span<const std::byte> bytes, std::string_view name, std::s
 }
 
 std::vector<uint32_t> decode_exr_uint(std::span<const std::byte> bytes, std::string_view name, std::string_view layer) {
-  return guarded(name, [&] {
-    const auto [header, size] = read_header(bytes, name);
+  return guarded_exr(name, [&] {
+    const auto [header, size] = read_exr_header(bytes, name);
     const ExrInfo info = info_of(header, size);
     const ExrLayer& chosen = choose_layer(info, layer, name);
     if (chosen.channels.size() != 1 || chosen.channels[0].type != ExrType::kUint)
-      fail(name, "EXR layer \"" + std::string(layer) + "\" is not one integer channel");
+      fail_exr(name, "EXR layer \"" + std::string(layer) + "\" is not one integer channel");
     return read_pixels<uint32_t>(bytes, name, header, info.size, chosen);
   });
 }

@@ -16,39 +16,24 @@
 
 #include "pbrt_import/base/error.h"
 #include "runtime/image/exr.h"
+#include "runtime/image/exr_streams.h"
 
 namespace packtrace {
 
 namespace {
-
-/// Collects the file in memory. Writing it in one call afterwards reports a full disk reliably.
-class MemoryWriter : public Imf::OStream {
-public:
-  MemoryWriter() : OStream("memory") {}
-  void write(const char bytes[], int count) override {
-    const size_t n = static_cast<size_t>(count);
-    if (position_ + n > bytes_.size()) bytes_.resize(position_ + n);
-    std::memcpy(bytes_.data() + position_, bytes, n);
-    position_ += n;
-  }
-  uint64_t tellp() override { return position_; }
-  void seekp(uint64_t position) override { position_ = position; }
-  std::vector<std::byte> take() { return std::move(bytes_); }
-
-private:
-  std::vector<std::byte> bytes_;
-  size_t position_ = 0;
-};
 
 std::string full_name(const std::string& layer, const std::string& channel) {
   if (layer.empty()) return channel;
   return channel.empty() ? layer : layer + "." + channel;
 }
 
-void check_layers(ImageSize size, std::span<const Layer> layers) {
+void require_image_size(ImageSize size) {
   if (size.width < 1 || size.height < 1 || size.width > kMaxImageSide || size.height > kMaxImageSide)
     throw Error(ErrorKind::kUsage, "an image of " + std::to_string(size.width) + " x " + std::to_string(size.height) +
                                        " pixels cannot be written as EXR");
+}
+
+void check_layers(ImageSize size, std::span<const Layer> layers) {
   std::set<std::string> names;
   for (const Layer& layer : layers) {
     const size_t samples = std::visit([](auto span) { return span.size(); }, layer.data);
@@ -61,7 +46,6 @@ void check_layers(ImageSize size, std::span<const Layer> layers) {
         throw Error(ErrorKind::kUsage, "EXR channel name \"" + name + "\" is empty, too long or used twice");
     }
   }
-  if (names.empty()) throw Error(ErrorKind::kUsage, "an EXR file needs at least one layer");
 }
 
 void add_attributes(Imf::Header& header, const ExrAttributes& attributes) {
@@ -84,42 +68,33 @@ std::vector<half> to_half(std::span<const float> samples) {
 }
 
 template <class Sample>
-void add_slices(Imf::FrameBuffer& frame, Imf::PixelType type, const Layer& layer, ImageSize size,
+void add_slices(Imf::Header& header, Imf::FrameBuffer& frame, Imf::PixelType type, const Layer& layer, ImageSize size,
                 const Sample* samples) {
   const size_t stride = sizeof(Sample) * layer.channels.size();
   for (size_t c = 0; c < layer.channels.size(); ++c) {
-    // OpenEXR uses the same non-const slices for reading and writing. Writing does not modify the samples.
-    char* base = reinterpret_cast<char*>(const_cast<Sample*>(samples + c));
-    frame.insert(full_name(layer.name, layer.channels[c]), Imf::Slice(type, base, stride, stride * size.width));
+    const std::string name = full_name(layer.name, layer.channels[c]);
+    header.channels().insert(name, Imf::Channel(type));
+    frame.insert(name, Imf::Slice::Make(type, samples + c, header.dataWindow(), stride, stride * size.width));
   }
 }
 
 } // namespace
 
-std::vector<std::byte> encode_exr(ImageSize size, std::span<const Layer> layers, const ExrAttributes& attributes) {
+ExrSlices::ExrSlices(ImageSize size, std::span<const Layer> layers, Imf::Header& header, Imf::FrameBuffer& frame) {
   check_layers(size, layers);
-  Imf::Header header(static_cast<int>(size.width), static_cast<int>(size.height));
-  header.compression() = Imf::ZIP_COMPRESSION;
-  add_attributes(header, attributes);
-
-  Imf::FrameBuffer frame;
-  std::vector<std::vector<half>> halves; // must live until the pixels are written
+  halves_.reserve(layers.size());
   for (const Layer& layer : layers) {
-    Imf::PixelType type = Imf::UINT;
-    if (const auto* integers = std::get_if<std::span<const uint32_t>>(&layer.data)) {
-      add_slices(frame, type, layer, size, integers->data());
-    } else if (const auto floats = std::get<std::span<const float>>(layer.data); layer.half) {
-      type = Imf::HALF;
-      add_slices(frame, type, layer, size, halves.emplace_back(to_half(floats)).data());
-    } else {
-      type = Imf::FLOAT;
-      add_slices(frame, type, layer, size, floats.data());
-    }
-    for (const std::string& channel : layer.channels)
-      header.channels().insert(full_name(layer.name, channel), Imf::Channel(type));
+    if (const auto* integers = std::get_if<std::span<const uint32_t>>(&layer.data))
+      add_slices(header, frame, Imf::UINT, layer, size, integers->data());
+    else if (const auto floats = std::get<std::span<const float>>(layer.data); layer.half)
+      add_slices(header, frame, Imf::HALF, layer, size, halves_.emplace_back(to_half(floats)).data());
+    else
+      add_slices(header, frame, Imf::FLOAT, layer, size, floats.data());
   }
+}
 
-  MemoryWriter writer;
+std::vector<std::byte> write_exr(const Imf::Header& header, const Imf::FrameBuffer& frame, ImageSize size) {
+  ExrMemoryWriter writer;
   try {
     Imf::OutputFile file(writer, header);
     file.setFrameBuffer(frame);
@@ -130,6 +105,17 @@ std::vector<std::byte> encode_exr(ImageSize size, std::span<const Layer> layers,
     throw Error(ErrorKind::kIo, std::string("cannot encode EXR: ") + error.what());
   }
   return writer.take();
+}
+
+std::vector<std::byte> encode_exr(ImageSize size, std::span<const Layer> layers, const ExrAttributes& attributes) {
+  if (layers.empty()) throw Error(ErrorKind::kUsage, "an EXR file needs at least one layer");
+  require_image_size(size);
+  Imf::Header header(static_cast<int>(size.width), static_cast<int>(size.height));
+  header.compression() = Imf::ZIP_COMPRESSION;
+  add_attributes(header, attributes);
+  Imf::FrameBuffer frame;
+  const ExrSlices slices(size, layers, header, frame);
+  return write_exr(header, frame, size);
 }
 
 } // namespace packtrace

@@ -127,6 +127,40 @@ Image level_preview(ImageSize size, std::span<const uint32_t> levels, std::span<
   });
 }
 
+Vec3 scalar_color(float t) { return depth_color(0.06f + 0.86f * std::clamp(t, 0.0f, 1.0f)); }
+
+Vec3 direction_color(float turns) {
+  const Vec3 linear = linear_rgb_from_oklch(0.75f, 0.12f, 2.0f * std::numbers::pi_v<float> * turns);
+  Vec3 display;
+  for (int k = 0; k < 3; ++k) display[k] = srgb_from_linear(std::clamp(linear[k], 0.0f, 1.0f));
+  return display;
+}
+
+float scale_end(std::span<const float> values) {
+  std::vector<float> sorted;
+  std::copy_if(values.begin(), values.end(), std::back_inserter(sorted), has_depth);
+  if (sorted.empty()) return 1.0f;
+  const auto nth = sorted.begin() + static_cast<ptrdiff_t>((sorted.size() - 1) * 99 / 100);
+  std::nth_element(sorted.begin(), nth, sorted.end());
+  return *nth;
+}
+
+Image scalar_preview(ImageSize size, std::span<const float> values, float bright) {
+  assert(bright > 0.0f);
+  return paint(size, values.size(),
+               [&](size_t i) { return scalar_color(values[i] > 0.0f ? values[i] / bright : 0.0f); });
+}
+
+Image vector_preview(ImageSize size, std::span<const Vec2> vectors, float bright) {
+  assert(bright > 0.0f);
+  return paint(size, vectors.size(), [&](size_t i) {
+    const float length = std::min(glm::length(vectors[i]) / bright, 1.0f);
+    if (!(length > 0.0f)) return Vec3(0.1f); // also for NaN
+    const float angle = std::atan2(vectors[i].y, vectors[i].x) / (2.0f * std::numbers::pi_v<float>);
+    return glm::mix(Vec3(0.1f), direction_color(angle < 0.0f ? angle + 1.0f : angle), length);
+  });
+}
+
 Image heat_map(ImageSize size, std::span<const float> errors, float white) {
   assert(white > 0.0f);
   return paint(size, errors.size(), [&](size_t i) { return heat_color(errors[i] / white); });

@@ -47,6 +47,22 @@ Image level_preview(ImageSize size, std::span<const uint32_t> levels, std::span<
 /// @param white error shown as white, in (0, infinity)
 Image heat_map(ImageSize size, std::span<const float> errors, float white = 1.0f);
 
+/// Magnitudes from dark (0) to bright (at or above `bright`), in the colours of scalar_color().
+/// @param bright in (0, infinity)
+Image scalar_preview(ImageSize size, std::span<const float> values, float bright);
+
+/// Vectors in the image plane (x right, y down): the hue is their direction (direction_color()), and they are brightest
+/// from the length `bright` on. Vectors that are not finite count as 0.
+Image vector_preview(ImageSize size, std::span<const Vec2> vectors, float bright);
+
+/// The 99th percentile of the positive finite values, as the upper end of a scale; 1 if there are none.
+float scale_end(std::span<const float> values);
+
+/// Display colour of a magnitude in [0,1], with monotone lightness.
+Vec3 scalar_color(float t);
+/// Display colour of a direction: turns clockwise from the right, in [0,1].
+Vec3 direction_color(float turns);
+
 /// Display colour of a value in [0,1] for depth pictures and heat maps.
 Vec3 depth_color(float t);
 Vec3 heat_color(float t);

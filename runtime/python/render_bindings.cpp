@@ -1,5 +1,7 @@
 // Rendering to numpy arrays.
 
+#include <algorithm>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,6 +15,7 @@
 #include "compress/format/file/baked_file.h"
 #include "pbrt_import/base/error.h"
 #include "runtime/frame/still.h"
+#include "runtime/frame/view_layers.h"
 #include "runtime/python/bindings.h"
 #include "runtime/trace/source/packed_source.h"
 
@@ -24,9 +27,10 @@ namespace {
 /// An array of height x width pixels that takes over the values.
 template <typename T>
 py::array pixels(std::vector<T>&& values, ImageSize size) {
-  using Number = std::conditional_t<std::is_same_v<T, Vec3>, float, T>;
+  constexpr bool kVector = std::is_same_v<T, Vec3> || std::is_same_v<T, Vec2>;
+  using Number = std::conditional_t<kVector, float, T>;
   std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(size.height), static_cast<py::ssize_t>(size.width)};
-  if (std::is_same_v<T, Vec3>) shape.push_back(3);
+  if (kVector) shape.push_back(sizeof(T) / sizeof(float));
   auto kept = std::make_unique<std::vector<T>>(std::move(values));
   const auto* data = reinterpret_cast<const Number*>(kept->data());
   const py::capsule owner(kept.get(), [](void* vector) { delete static_cast<std::vector<T>*>(vector); });
@@ -48,9 +52,67 @@ Backend chosen_backend(const std::string& name) {
   throw Error(ErrorKind::kUsage, "backend=\"" + name + "\": choose one of packed, embree");
 }
 
+/// What render() is told of the denoiser.
+struct DenoiserChoice {
+  bool denoise = true;
+  std::string preset;
+  std::map<std::string, double> settings;
+};
+
+void set_denoiser(StillConfig& config, const DenoiserChoice& choice) {
+  if (choice.preset != "ours" && choice.preset != "reference" && choice.preset != "off")
+    throw Error(ErrorKind::kUsage, "denoiser=\"" + choice.preset + "\": choose one of ours, reference, off");
+  config.denoise = choice.denoise && choice.preset != "off";
+  if (!config.denoise && !choice.settings.empty())
+    throw Error(ErrorKind::kUsage, "denoiser_settings change nothing without the denoiser");
+  if (choice.preset == "reference") config.denoiser.kind = DenoiserKind::kReference;
+  for (const auto& [name, value] : choice.settings) config.denoiser.set(name + "=" + setting_text(value));
+  config.denoiser.validate();
+}
+
+/// Whether a layer is one of those that FrameConfig::view_layers fills.
+bool is_view(const std::string& layer) {
+  return std::ranges::find(kTracedViews, layer) != kTracedViews.end() ||
+         std::ranges::find(kDenoiserViews, layer) != kDenoiserViews.end();
+}
+
+/// The layers of an image by name, those of the denoiser's views only if they are filled.
+py::dict arrays_of(RenderedImage&& image) {
+  const ImageSize size = image.size;
+  py::dict all;
+  all["ao"] = pixels(std::move(image.ao), size);
+  all["ao_raw"] = pixels(std::move(image.ao_raw), size);
+  all["depth"] = pixels(std::move(image.depth), size);
+  all["coverage"] = pixels(std::move(image.coverage), size);
+  all["normal"] = pixels(std::move(image.normal), size);
+  all["albedo"] = pixels(std::move(image.albedo), size);
+  all["shaded"] = pixels(std::move(image.shaded), size);
+  all["instance"] = pixels(std::move(image.instance), size);
+  const auto add_view = [&](const char* name, auto& values) {
+    if (!values.empty()) all[name] = pixels(std::move(values), size);
+  };
+  add_view("hit_distance", image.hit_distance), add_view("motion", image.motion);
+  add_view("previous_depth", image.previous_depth), add_view("local_variance", image.local_variance);
+  add_view("variance", image.variance), add_view("history", image.history);
+  add_view("disocclusion", image.disocclusion);
+  return all;
+}
+
+/// Keeps the wanted layers.
+py::dict chosen_arrays(const py::dict& all, const std::vector<std::string>& layers) {
+  py::dict chosen;
+  for (const std::string& layer : layers) {
+    if (!all.contains(layer)) throw Error(ErrorKind::kUsage, "layers: there is no layer \"" + layer + "\"");
+    chosen[layer.c_str()] = all[layer.c_str()];
+  }
+  return chosen;
+}
+
 py::dict render(const std::shared_ptr<BakedFile>& file, std::optional<std::pair<uint32_t, uint32_t>> size,
                 std::optional<int64_t> camera_index, uint32_t frames, uint32_t spp, bool denoise,
-                std::optional<float> ao_radius, const std::string& backend, uint64_t seed) {
+                const std::string& denoiser, const std::map<std::string, double>& denoiser_settings,
+                const std::optional<std::vector<std::string>>& layers, std::optional<float> ao_radius,
+                const std::string& backend, uint64_t seed) {
   RenderedImage image;
   {
     const py::gil_scoped_release release;
@@ -61,7 +123,8 @@ py::dict render(const std::shared_ptr<BakedFile>& file, std::optional<std::pair<
     StillConfig config;
     config.size = size ? wanted : ImageSize{camera.width_px, camera.height_px};
     config.frames = frames;
-    config.denoise = denoise;
+    config.view_layers = layers && std::ranges::any_of(*layers, is_view);
+    set_denoiser(config, {denoise, denoiser, denoiser_settings});
     config.ao.spp = spp;
     config.ao.seed = seed;
     config.ao.radius = ao_radius.value_or(default_ao_radius(source.world_bounds()));
@@ -72,17 +135,8 @@ py::dict render(const std::shared_ptr<BakedFile>& file, std::optional<std::pair<
     Progress progress;
     render_still(loop, camera, 0.0, config.frames, false, image, progress);
   }
-  const ImageSize shape = image.size;
-  py::dict result;
-  result["ao"] = pixels(std::move(image.ao), shape);
-  result["ao_raw"] = pixels(std::move(image.ao_raw), shape);
-  result["depth"] = pixels(std::move(image.depth), shape);
-  result["coverage"] = pixels(std::move(image.coverage), shape);
-  result["normal"] = pixels(std::move(image.normal), shape);
-  result["albedo"] = pixels(std::move(image.albedo), shape);
-  result["shaded"] = pixels(std::move(image.shaded), shape);
-  result["instance"] = pixels(std::move(image.instance), shape);
-  return result;
+  const py::dict all = arrays_of(std::move(image));
+  return layers ? chosen_arrays(all, *layers) : all;
 }
 
 } // namespace
@@ -90,7 +144,9 @@ py::dict render(const std::shared_ptr<BakedFile>& file, std::optional<std::pair<
 void bind_rendering(py::module_& module) {
   module.def("render", &render, py::arg("file").none(false), py::kw_only(), py::arg("size") = py::none(),
              py::arg("camera") = 0, py::arg("frames") = 32, py::arg("spp") = 1, py::arg("denoise") = true,
-             py::arg("ao_radius") = py::none(), py::arg("backend") = "packed", py::arg("seed") = 0);
+             py::arg("denoiser") = "ours", py::arg("denoiser_settings") = std::map<std::string, double>(),
+             py::arg("layers") = py::none(), py::arg("ao_radius") = py::none(), py::arg("backend") = "packed",
+             py::arg("seed") = 0);
 }
 
 } // namespace packtrace

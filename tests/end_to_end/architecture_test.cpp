@@ -112,6 +112,9 @@ const std::vector<Room> kRooms = {
       "runtime/trace/source", "runtime/trace/packed/scene", "runtime/trace", "runtime/camera", "runtime/ao",
       "runtime/denoise", "runtime/motion", "runtime"}},
     {"runtime/image", {"pbrt_import/base", "pbrt_import/scene", "runtime/camera"}},
+    {"runtime/layered",
+     {"pbrt_import/base", "pbrt_import/scene", "runtime/camera", "runtime/denoise", "runtime/frame", "runtime/image",
+      "runtime"}},
     {"runtime", {}},
     {"runtime/measure",
      {"pbrt_import/base", "pbrt_import/scene", "compress/bake", "compress/format/file", "runtime/trace/source",
@@ -137,11 +140,12 @@ const std::vector<Room> kRooms = {
       "runtime/denoise",
       "runtime/frame",
       "runtime/image",
+      "runtime/layered",
       "runtime/measure",
       "runtime"}},
     {"runtime/python",
      {"pbrt_import/base", "pbrt_import/scene", "pbrt_import", "compress/format/file", "compress/bake",
-      "runtime/trace/source", "runtime/trace", "runtime/frame", "runtime/commands"}},
+      "runtime/trace/source", "runtime/trace", "runtime/denoise", "runtime/frame", "runtime/commands"}},
 };
 
 const Room* room_of(const std::string& path) {

@@ -13,7 +13,7 @@
 namespace packtrace::test {
 namespace {
 
-const std::vector<std::string> kVerbs{"bake", "info",    "render",     "compare", "export",
+const std::vector<std::string> kVerbs{"bake", "info",    "render",     "denoise", "compare", "export",
                                       "help", "version", "completion", "man"};
 
 /// Short and long options that a verb's help lists at the start of its lines.

@@ -1,7 +1,7 @@
 """Bakes pbrt-v3 scenes to .ptk files, reads them as numpy arrays, and renders ambient occlusion."""
 
 from os import PathLike
-from typing import Any, Literal, Optional, Tuple, Union
+from typing import Any, Literal, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy
 from numpy.typing import NDArray
@@ -75,6 +75,9 @@ def render(
     frames: int = ...,
     spp: int = ...,
     denoise: bool = ...,
+    denoiser: Literal["ours", "reference", "off"] = ...,
+    denoiser_settings: Mapping[str, float] = ...,
+    layers: Optional[Sequence[str]] = ...,
     ao_radius: Optional[float] = ...,
     backend: Literal["packed", "embree"] = ...,
     seed: int = ...,
@@ -83,6 +86,10 @@ def render(
 
     ao (denoised; -1 where nothing is hit), ao_raw (last frame), depth, coverage: float32;
     normal, albedo, shaded: float32 with 3 channels, linear colours; instance: uint32, 0xffffffff where nothing is hit.
+
+    layers chooses among these and hit_distance, previous_depth, local_variance, variance, history, disocclusion (float32)
+    and motion (float32 with 2 channels), as docs/command_line.md describes them. denoiser_settings are those of
+    `packtrace help denoise`; denoise=False is denoiser="off", without variance, history and disocclusion.
 
     size is (width, height), by default the camera's. camera counts from 0; None frames the whole scene, as for files
     without cameras. ao_radius is in world units, by default a tenth of the scene's diagonal. Raises Error.

@@ -92,6 +92,30 @@ TEST(FalseColor, HeatGrowsFromBlackToWhite) {
   EXPECT_EQ(color_at(map, 2), Vec3(1));
 }
 
+TEST(FalseColor, MagnitudesGrowBrighter) {
+  for (float t = 0.0f; t < 0.99f; t += 0.01f)
+    EXPECT_LT(lightness(scalar_color(t)), lightness(scalar_color(t + 0.01f))) << t;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const Image picture = scalar_preview({4, 1}, std::vector<float>{0.0f, 4.0f, 9.0f, nan}, 8.0f);
+  EXPECT_EQ(color_at(picture, 0), scalar_color(0.0f));
+  EXPECT_EQ(color_at(picture, 1), scalar_color(0.5f));
+  EXPECT_EQ(color_at(picture, 2), scalar_color(1.0f));
+  EXPECT_EQ(color_at(picture, 3), scalar_color(0.0f));
+  EXPECT_EQ(scale_end(std::vector<float>{0.0f, nan}), 1.0f);
+  EXPECT_EQ(scale_end(std::vector<float>(100, 3.0f)), 3.0f);
+}
+
+TEST(FalseColor, DirectionsHaveTheirHues) {
+  const float inf = std::numeric_limits<float>::infinity();
+  const std::vector<Vec2> vectors{{2, 0}, {0, 1}, {-1, 0}, {0, -1}, {0, 0}, {inf - inf, 0}};
+  const Image picture = vector_preview({6, 1}, vectors, 1.0f);
+  for (uint32_t x = 0; x < 4; ++x)
+    EXPECT_LT(glm::length(color_at(picture, x) - direction_color(0.25f * static_cast<float>(x))), 1e-3f) << x;
+  EXPECT_EQ(color_at(picture, 4), color_at(picture, 5));
+  for (uint32_t a = 0; a < 5; ++a)
+    for (uint32_t b = 0; b < a; ++b) EXPECT_GT(glm::length(color_at(picture, a) - color_at(picture, b)), 0.2f);
+}
+
 TEST(LevelPreview, ShowsLevelsByHueAndClustersByLightness) {
   for (uint32_t a = 0; a < 9; ++a)
     for (uint32_t b = 0; b < a; ++b) EXPECT_GT(glm::length(level_color(a) - level_color(b)), 0.15f) << a << ' ' << b;

@@ -102,6 +102,25 @@ class Module(unittest.TestCase):
         other = packtrace.render(file, size=(64, 36), frames=2, backend="embree", denoise=False, camera=None)
         self.assertFalse(np.array_equal(image["depth"], other["depth"]))
 
+    def test_denoiser_and_layers_can_be_chosen(self):
+        file = packtrace.open(self.path)
+
+        def view(**options):
+            return packtrace.render(file, size=(64, 36), frames=2, **options)
+
+        chosen = view(denoiser_settings={"max_tspp": 8}, layers=["ao", "history"])
+        self.assertEqual(sorted(chosen), ["ao", "history"])
+        self.assertEqual(chosen["history"].max(), 2)
+        layers = view(layers=["motion", "hit_distance", "variance", "local_variance", "disocclusion"])
+        self.assertEqual(layers["motion"].shape, (36, 64, 2))
+        self.assertGreater(layers["hit_distance"].max(), 0)
+        np.testing.assert_array_equal(view(denoiser="off")["ao"], view(denoise=False)["ao"])
+        for option in ({"denoiser": "x"}, {"denoiser_settings": {"x": 1}}, {"layers": ["x"]},
+                       {"denoiser": "off", "layers": ["history"]}):
+            with self.assertRaises(packtrace.Error) as caught:
+                view(**option)
+            self.assertEqual(caught.exception.kind, "usage", option)
+
     def test_other_threads_run_meanwhile(self):
         file = packtrace.open(self.path)
         turns, done = 0, threading.Event()
