@@ -28,8 +28,7 @@ int main(int argc, char** argv) try {
   const packtrace::Camera camera = source.cameras().empty()
                                        ? framing_camera(source.world_bounds(), size, source.cameras())
                                        : source.cameras().front();
-  packtrace::AoConfig ao;
-  ao.radius = packtrace::default_ao_radius(source.world_bounds());
+  const packtrace::AoConfig ao;
 
   packtrace::Progress progress;
   packtrace::GBuffer gbuffer;

@@ -1,152 +1,164 @@
 #include "runtime/ao/ao_integrator.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
-#include <string>
+#include <limits>
+#include <vector>
 
-#include "pbrt_import/base/error.h"
+#include <tbb/enumerable_thread_specific.h>
+
+#include "runtime/ao/ray_sorter.h"
+#include "runtime/ao/shading_points.h"
+#include "runtime/ao/visibility_curve.h"
 #include "runtime/camera/tiles.h"
 
 namespace packtrace {
 namespace {
 
-constexpr uint32_t kTilePixels = kTileSize * kTileSize;
 constexpr uint32_t kMaxSamplesPerCall = 4; ///< maximum samples per pixel that one tracer call gets for a tile
+constexpr ImageSize kSortedTile{64, 128};
+constexpr float kMissed = std::numeric_limits<float>::infinity(); ///< distance of a miss
 
-/// Visibility of a sample as a function of its hit distance; see AoConfig.
-class Coefficient {
-public:
-  explicit Coefficient(const AoConfig& config)
-      : lambda_(config.falloff ? config.lambda : 0.0), darkening_(1.0 - config.min_visibility),
-        rho_(config.interreflection) {
-    if (!config.falloff) return;
-    if (config.lambda > 0.0f && config.cutoff > 0.0f)
-      end_ = std::min(1.0, std::sqrt(-std::log(double(config.cutoff)) / config.lambda));
-    floor_ = config.continuous ? std::exp(-lambda_ * end_ * end_) : 0.0;
-    linear_ = config.continuous && 1.0 - floor_ < 1e-6; // the limit for lambda -> 0
-  }
-
-  /// Length of the rays (x_end), in radii.
-  double end() const { return end_; }
-
-  /// @param x hit distance in radii, [0, end]
-  /// @param luminance luminance of the hit surface's albedo; used only if rho > 0
-  double visibility(double x, double luminance) const {
-    x = std::min(x, end_);
-    const double occlusion = linear_         ? 1.0 - (x / end_) * (x / end_)
-                             : lambda_ > 0.0 ? (std::exp(-lambda_ * x * x) - floor_) / (1.0 - floor_)
-                                             : 1.0;
-    const double k = 1.0 - darkening_ * std::clamp(occlusion, 0.0, 1.0);
-    return rho_ > 0.0 && k > 0.0 ? k / (1.0 - rho_ * luminance * (1.0 - k)) : k;
-  }
-
-private:
-  double lambda_, darkening_, rho_;
-  double end_ = 1.0;
-  double floor_ = 0.0;
-  bool linear_ = false;
+/// Memory for the rays of a tile, kept from tile to tile.
+struct TileMemory {
+  struct Chosen {
+    uint32_t x, y, pixel, count;
+  };
+  std::vector<Chosen> chosen; ///< pixels that get samples
+  ShadingPoints points;
+  std::vector<uint32_t> next; ///< number of the next sample of each point
+  std::vector<Ray> rays;
+  std::vector<RayHit> hits, sorted_hits;
+  std::vector<uint8_t> occluded, sorted_occluded;
+  std::vector<float> distances, luminances; ///< of the samples of a pass
+  std::vector<double> visibility, distance; ///< sums over the samples of each point
+  RaySorter sorter;
 };
 
-/// Completes the unit vector n to an orthonormal basis. Source: Duff et al., "Building an orthonormal basis, revisited"
-/// (2017). The paper switches formulas at z = 0; this version switches at z = -0.4. Vertical walls have z = +0, -0 or a
-/// rounding error, so a switch at 0 would rotate their sample pattern from pixel to pixel.
-void make_basis(Vec3 n, Vec3& tangent, Vec3& bitangent) {
-  constexpr float kSwitch = -0.4f; // keeps |sign + z| >= 0.6
-  const float sign = n.z < kSwitch ? -1.0f : 1.0f;
-  const float a = -1.0f / (sign + n.z), b = n.x * n.y * a;
-  tangent = {1.0f + sign * n.x * n.x * a, sign * b, -sign * n.x};
-  bitangent = {b, sign + n.y * n.y * a, -n.y};
+/// Adds the samples of a pass to the sums of their points.
+/// @param distances hit distances in radii, kMissed for a miss
+PACKTRACE_AVX2_CLONES
+void add_samples(size_t count, VisibilityCurve curve, const float* distances, const float* luminances,
+                 double* visibility, double* distance) {
+#pragma GCC ivdep
+  for (size_t i = 0; i < count; ++i) {
+    const float x = distances[i], k = curve.visibility(x, luminances[i]);
+    visibility[i] += static_cast<double>(x < kMissed ? k : 1.0f);
+    distance[i] += static_cast<double>(smaller(x, 1.0f));
+  }
 }
-
-/// A pixel whose camera ray hit a surface, prepared for casting occlusion rays.
-struct ShadingPoint {
-  size_t pixel;
-  PixelSampler::Pixel sampler;
-  Vec3 geometric;
-  Vec3 normal, tangent, bitangent;
-};
 
 class AoTracer {
 public:
   AoTracer(const SceneSource& source, const RayTracer& tracer, const GBuffer& gbuffer, const AoConfig& config,
-           uint32_t frame_index, AoFrame& out)
-      : source_(source), tracer_(tracer), gbuffer_(gbuffer), config_(config), coefficient_(config),
-        sampler_(config.sampler, config.seed), first_sample_(static_cast<uint64_t>(frame_index) * config.spp),
-        unit_radius_(config.radius * tracer.space().scale()),
-        ray_length_(static_cast<float>(unit_radius_ * coefficient_.end())), out_(out) {}
+           const SamplePlan& plan, AoFrame& out)
+      : source_(source), tracer_(tracer), gbuffer_(gbuffer), config_(config), plan_(plan), curve_(config),
+        sampler_(config.sampler, config.seed, config.sampler_block), radius_(ao_radius(config, source.world_bounds())),
+        inverse_radius_(static_cast<float>(1.0 / (double{radius_} * tracer.space().scale()))),
+        ray_length_(static_cast<float>(double{radius_} * tracer.space().scale() * double{curve_.end()})), out_(out) {}
 
   /// @tparam Result RayHit for nearest-hit queries, which return distances; uint8_t for any-hit queries
+  /// @return the number of rays
   template <typename Result>
-  void trace_tile(const Tile& tile, const Progress& progress) const {
+  uint64_t trace_tile(const Tile& tile, TileMemory& m, const Progress& progress) const {
+    choose_pixels(tile, m);
+    const auto count = static_cast<uint32_t>(m.chosen.size());
+    if (count == 0) return 0;
+    m.points.load(gbuffer_, sampler_, tracer_.space(), config_.offset_scale);
+    m.visibility.assign(count, 0.0), m.distance.assign(count, 0.0);
+    const uint32_t passes = m.chosen.front().count;
     const uint32_t together =
-        std::clamp(tracer_.preferred_rays_per_call() / kTilePixels, 1u, std::min(config_.spp, kMaxSamplesPerCall));
-    if (together == 1)
-      trace_samples<Result, 1>(tile, together, progress);
-    else
-      trace_samples<Result, kMaxSamplesPerCall>(tile, together, progress);
+        std::clamp(tracer_.preferred_rays_per_call() / count, 1u, std::min(passes, kMaxSamplesPerCall));
+    uint64_t rays = 0;
+    for (uint32_t pass = 0; pass < passes; pass += together) {
+      progress.check_cancelled(); // a tile of 65,536 samples takes minutes
+      rays += trace_passes<Result>(pass, std::min(pass + together, passes), m);
+    }
+    for (uint32_t i = 0; i < count; ++i) {
+      const TileMemory::Chosen& c = m.chosen[i];
+      const double per_sample = 1.0 / c.count;
+      out_.ao[c.pixel] = static_cast<float>(m.visibility[i] * per_sample);
+      out_.hit_distance[c.pixel] = static_cast<float>(m.distance[i] * per_sample * double{radius_});
+    }
+    return rays;
   }
 
 private:
-  /// @param together samples per pixel in one tracer call, at most kRoom
-  template <typename Result, uint32_t kRoom>
-  void trace_samples(const Tile& tile, uint32_t together, const Progress& progress) const {
-    ShadingPoint points[kTilePixels];
-    alignas(64) Ray rays[kRoom * kTilePixels];
-    const uint32_t count = gather(tile, points, rays);
-    if (count == 0) return;
-    for (uint32_t s = 1; s < together; ++s) std::copy_n(rays, count, rays + s * count);
-    Result results[kRoom * kTilePixels];
-    double visibility[kTilePixels] = {}, distance[kTilePixels] = {};
-    for (uint32_t first = 0; first < config_.spp; first += together) {
-      progress.check_cancelled(); // a tile of 65,536 samples takes minutes
-      const uint32_t samples = std::min(together, config_.spp - first);
-      for (uint32_t s = 0; s < samples; ++s) {
-        const PixelSampler::Number number = sampler_.number(first_sample_ + first + s);
-        for (uint32_t i = 0; i < count; ++i) rays[s * count + i].direction = direction(points[i], number);
-      }
-      query(std::span(rays, samples * count), std::span(results, samples * count));
-      for (uint32_t s = 0; s < samples; ++s)
-        for (uint32_t i = 0; i < count; ++i) accumulate(results[s * count + i], visibility[i], distance[i]);
-    }
-    const double per_sample = 1.0 / config_.spp;
-    for (uint32_t i = 0; i < count; ++i) {
-      out_.ao[points[i].pixel] = static_cast<float>(visibility[i] * per_sample);
-      out_.hit_distance[points[i].pixel] = static_cast<float>(distance[i] * per_sample * config_.radius);
+  /// Selects the pixels of a tile that get samples, in Morton order, so that consecutive rays share cache lines of the
+  /// BVH, those with more samples first. Writes kInvalidAo to the others.
+  void choose_pixels(const Tile& tile, TileMemory& m) const {
+    m.chosen.clear(), m.points.clear(), m.next.clear();
+    for (uint32_t y0 = tile.y0; y0 < tile.y1; y0 += kTileSize)
+      for (uint32_t x0 = tile.x0; x0 < tile.x1; x0 += kTileSize)
+        for (uint32_t code = 0; code < kTileSize * kTileSize; ++code) {
+          const uint32_t x = x0 + morton_even_bits(code), y = y0 + morton_even_bits(code >> 1);
+          if (x >= tile.x1 || y >= tile.y1) continue;
+          const uint32_t pixel = y * gbuffer_.size.width + x, count = samples_of(x, y, pixel);
+          if (count > 0) {
+            m.chosen.push_back({x, y, pixel, count});
+          } else {
+            out_.ao[pixel] = kInvalidAo;
+            out_.hit_distance[pixel] = 0.0f;
+          }
+        }
+    if (!plan_.pixel_count.empty()) std::ranges::stable_sort(m.chosen, std::greater(), &TileMemory::Chosen::count);
+    for (const TileMemory::Chosen& c : m.chosen) {
+      m.points.add(c.x, c.y, c.pixel);
+      m.next.push_back(plan_.pixel_first.empty() ? plan_.first : plan_.pixel_first[c.pixel]);
     }
   }
 
-  /// Collects the tile's hit pixels in Morton order, so that consecutive rays share cache lines of the BVH, and writes
-  /// kInvalidAo to the others. Returns the number of hit pixels.
-  uint32_t gather(const Tile& tile, ShadingPoint* points, Ray* rays) const {
-    uint32_t count = 0;
-    for (uint32_t code = 0; code < kTilePixels; ++code) {
-      const uint32_t x = tile.x0 + morton_even_bits(code), y = tile.y0 + morton_even_bits(code >> 1);
-      if (x >= tile.x1 || y >= tile.y1) continue;
-      const size_t pixel = static_cast<size_t>(y) * gbuffer_.size.width + x;
-      if (gbuffer_.instance[pixel] == kNoInstance) {
-        out_.ao[pixel] = kInvalidAo;
-        out_.hit_distance[pixel] = 0.0f;
-        continue;
-      }
-      ShadingPoint& point = points[count];
-      point.pixel = pixel;
-      point.sampler = sampler_.pixel(x, y);
-      point.geometric = gbuffer_.geometric_normal[pixel];
-      point.normal = gbuffer_.normal[pixel];
-      make_basis(point.normal, point.tangent, point.bitangent);
-      const DVec3 origin = DVec3(gbuffer_.position[pixel]) + DVec3(point.geometric) * double(gbuffer_.offset[pixel]);
-      rays[count].origin = Vec3(tracer_.space().to_unit(origin));
-      rays[count++].tfar = ray_length_;
-    }
-    return count;
+  uint32_t samples_of(uint32_t x, uint32_t y, uint32_t pixel) const {
+    if (gbuffer_.instance[pixel] == kNoInstance || (plan_.colour && ((x + y) & 1u) != *plan_.colour)) return 0;
+    return plan_.pixel_count.empty() ? plan_.count : plan_.pixel_count[pixel];
   }
 
-  Vec3 direction(const ShadingPoint& point, const PixelSampler::Number& number) const {
-    const Vec3 local = cosine_direction(PixelSampler::point(point.sampler, number));
-    const Vec3 direction = point.tangent * local.x + point.bitangent * local.y + point.normal * local.z;
-    const float height = glm::dot(direction, point.geometric);
-    return height < 0.0f ? direction - 2.0f * height * point.geometric : direction;
+  /// Number of points that have more than `pass` samples.
+  static uint32_t active(uint32_t pass, const TileMemory& m) {
+    if (m.chosen.back().count > pass) return static_cast<uint32_t>(m.chosen.size());
+    const auto end = std::ranges::partition_point(m.chosen, [&](const auto& c) { return c.count > pass; });
+    return static_cast<uint32_t>(end - m.chosen.begin());
   }
+
+  /// Traces some samples of each point together. Returns the number of rays.
+  template <typename Result>
+  uint64_t trace_passes(uint32_t begin, uint32_t end, TileMemory& m) const {
+    m.rays.clear();
+    for (uint32_t pass = begin; pass < end; ++pass) {
+      const uint32_t n = active(pass, m);
+      m.rays.resize(m.rays.size() + n);
+      m.points.write_rays(sampler_, m.next, ray_length_, std::span(m.rays).last(n));
+      for (uint32_t i = 0; i < n; ++i) ++m.next[i];
+    }
+    std::span<const Result> results = traced<Result>(m);
+    for (uint32_t pass = begin; pass < end; ++pass) {
+      const uint32_t n = active(pass, m);
+      accumulate(results.first(n), m);
+      results = results.subspan(n);
+    }
+    return m.rays.size();
+  }
+
+  template <typename Result>
+  std::span<const Result> traced(TileMemory& m) const {
+    auto& results = results_of(m, Result{});
+    results.resize(m.rays.size());
+    if (!config_.sort_rays) {
+      query(m.rays, results);
+      return results;
+    }
+    auto& sorted = sorted_of(m, Result{});
+    sorted.resize(m.rays.size());
+    query(m.sorter.sort(m.rays), sorted);
+    for (size_t i = 0; i < sorted.size(); ++i) results[m.sorter.order()[i]] = sorted[i];
+    return results;
+  }
+
+  static std::vector<RayHit>& results_of(TileMemory& m, RayHit) { return m.hits; }
+  static std::vector<uint8_t>& results_of(TileMemory& m, uint8_t) { return m.occluded; }
+  static std::vector<RayHit>& sorted_of(TileMemory& m, RayHit) { return m.sorted_hits; }
+  static std::vector<uint8_t>& sorted_of(TileMemory& m, uint8_t) { return m.sorted_occluded; }
 
   void query(std::span<const Ray> rays, std::span<RayHit> hits) const {
     tracer_.closest_hits(rays, kOcclusionRays, RayOrder::kIncoherent, hits);
@@ -155,73 +167,60 @@ private:
     tracer_.any_hits(rays, kOcclusionRays, RayOrder::kIncoherent, occluded);
   }
 
-  void accumulate(uint8_t occluded, double& visibility, double& distance) const {
-    visibility += occluded ? coefficient_.visibility(0.0, 0.0) : 1.0;
-    distance += occluded ? 0.5 : 1.0;
+  void accumulate(std::span<const uint8_t> occluded, TileMemory& m) const {
+    const double dark = double{curve_.visibility(0.0f, 0.0f)};
+    for (size_t i = 0; i < occluded.size(); ++i) {
+      m.visibility[i] += occluded[i] != 0 ? dark : 1.0;
+      m.distance[i] += occluded[i] != 0 ? 0.5 : 1.0;
+    }
   }
 
-  void accumulate(const RayHit& hit, double& visibility, double& distance) const {
-    if (!hit.valid()) {
-      visibility += 1.0;
-      distance += 1.0;
-      return;
-    }
-    const double x = hit.t / unit_radius_;
-    visibility += coefficient_.visibility(x, config_.interreflection > 0.0f ? luminance(hit) : 0.0);
-    distance += std::min(x, 1.0);
+  void accumulate(std::span<const RayHit> hits, TileMemory& m) const {
+    m.distances.resize(hits.size()), m.luminances.resize(hits.size(), 0.0f);
+    for (size_t i = 0; i < hits.size(); ++i) m.distances[i] = hits[i].valid() ? hits[i].t * inverse_radius_ : kMissed;
+    if (config_.interreflection > 0.0f)
+      for (size_t i = 0; i < hits.size(); ++i) m.luminances[i] = hits[i].valid() ? luminance(hits[i]) : 0.0f;
+    add_samples(hits.size(), curve_, m.distances.data(), m.luminances.data(), m.visibility.data(), m.distance.data());
   }
 
   /// Luminance of the hit surface's albedo, with Rec. 709 weights.
-  double luminance(const RayHit& hit) const {
+  float luminance(const RayHit& hit) const {
     const HitSurface surface = tracer_.resolve(hit);
     const uint32_t material = source_.material_of(surface.placement->instance, surface.triangle);
     const Vec3 albedo = source_.materials()[material].albedo;
-    return std::clamp(0.2126 * albedo.x + 0.7152 * albedo.y + 0.0722 * albedo.z, 0.0, 1.0);
+    return std::clamp(0.2126f * albedo.x + 0.7152f * albedo.y + 0.0722f * albedo.z, 0.0f, 1.0f);
   }
 
   const SceneSource& source_;
   const RayTracer& tracer_;
   const GBuffer& gbuffer_;
   const AoConfig& config_;
-  const Coefficient coefficient_;
+  const SamplePlan& plan_;
+  const VisibilityCurve curve_;
   const PixelSampler sampler_;
-  const uint64_t first_sample_;
-  const double unit_radius_;
+  const float radius_;         ///< world units
+  const float inverse_radius_; ///< radii per length of the tracer's space
   const float ray_length_;
   AoFrame& out_;
 };
 
-void require(bool condition, const char* message) {
-  if (!condition) throw Error(ErrorKind::kUsage, std::string("ambient occlusion: ") + message);
-}
-
 } // namespace
 
-float default_ao_radius(const Bounds& bounds) {
-  const double radius = 0.1 * bounds.diagonal();
-  return radius > 0.0 && std::isfinite(radius) ? static_cast<float>(radius) : 1.0f;
-}
-
-void validate(const AoConfig& config) {
-  const auto within = [](float value, float lo, float hi) { return value >= lo && value <= hi; }; // false for NaN
-  require(config.radius > 0.0f && std::isfinite(config.radius), "the radius must be positive and finite");
-  require(config.spp >= 1 && config.spp <= 65536, "samples per pixel must be 1 to 65536");
-  require(within(config.lambda, 0.0f, 20.0f), "lambda must be 0 to 20");
-  require(config.cutoff >= 0.0f && config.cutoff < 1.0f, "the cutoff must be at least 0 and less than 1");
-  require(within(config.min_visibility, 0.0f, 1.0f), "the minimum visibility must be 0 to 1");
-  require(within(config.interreflection, 0.0f, 1.0f), "interreflection must be 0 to 1");
-}
-
-void trace_ao(const SceneSource& source, const RayTracer& tracer, const GBuffer& gbuffer, const AoConfig& config,
-              uint32_t frame_index, AoFrame& ao, Progress& progress) {
+uint64_t trace_ao(const SceneSource& source, const RayTracer& tracer, const GBuffer& gbuffer, const AoConfig& config,
+                  const SamplePlan& plan, AoFrame& ao, Progress& progress) {
   validate(config);
   if (ao.size != gbuffer.size || ao.ao.size() != gbuffer.size.pixels()) ao.resize(gbuffer.size);
   ao.ray_length = config.radius;
-  const AoTracer ao_tracer(source, tracer, gbuffer, config, frame_index, ao);
+  const AoTracer ao_tracer(source, tracer, gbuffer, config, plan, ao);
   const bool closest = config.falloff || config.interreflection > 0.0f;
-  for_each_tile(gbuffer.size, progress, [&](const Tile& tile) {
-    closest ? ao_tracer.trace_tile<RayHit>(tile, progress) : ao_tracer.trace_tile<uint8_t>(tile, progress);
+  tbb::enumerable_thread_specific<TileMemory> memory;
+  std::atomic<uint64_t> rays = 0;
+  const ImageSize tile_size = config.sort_rays ? kSortedTile : ImageSize{kTileSize, kTileSize};
+  for_each_tile(gbuffer.size, tile_size, progress, [&](const Tile& tile) {
+    rays += closest ? ao_tracer.trace_tile<RayHit>(tile, memory.local(), progress)
+                    : ao_tracer.trace_tile<uint8_t>(tile, memory.local(), progress);
   });
+  return rays;
 }
 
 } // namespace packtrace

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -69,13 +70,13 @@ void for_each_row(uint32_t rows, const Body& body) {
   });
 }
 
-/// Calls body(index) for the blocks within `reach` of a block, itself included.
+/// Calls body(index, column, row) for the blocks within `reach` of a block, itself included.
 template <class Body>
 void for_neighbours(ImageSize half, uint32_t bx, uint32_t by, uint32_t reach, const Body& body) {
   const uint32_t x0 = bx > reach ? bx - reach : 0, y0 = by > reach ? by - reach : 0;
   const uint32_t x1 = std::min(half.width - 1, bx + reach), y1 = std::min(half.height - 1, by + reach);
   for (uint32_t y = y0; y <= y1; ++y)
-    for (uint32_t x = x0; x <= x1; ++x) body(size_t{y} * half.width + x);
+    for (uint32_t x = x0; x <= x1; ++x) body(size_t{y} * half.width + x, x, y);
 }
 
 /// The first pixel that shows a surface, per block.
@@ -98,7 +99,7 @@ uint32_t least_similar(const GBuffer& full, ImageSize half, const std::vector<ui
   const size_t own = size_t{by} * half.width + bx;
   const auto best_similarity = [&](uint32_t p) {
     float best = 0.0f;
-    for_neighbours(half, bx, by, 1, [&](size_t other) {
+    for_neighbours(half, bx, by, 1, [&](size_t other, uint32_t, uint32_t) {
       if (other != own && best < kSimilar && is_hit(full, first[other]))
         best = std::max(best, similarity(full, p, first[other]));
     });
@@ -134,58 +135,96 @@ GBuffer pixels_of(const GBuffer& full, ImageSize half, const std::vector<uint32_
   return g;
 }
 
+/// Values of the layers of a pixel.
+using Layers = std::array<float, kUpsampledLayers>;
+
 class Upsampler {
 public:
-  Upsampler(const GBuffer& full, const HalfGBuffer& half, std::span<const float> ao)
+  Upsampler(const GBuffer& full, const HalfGBuffer& half,
+            const std::array<std::span<const float>, kUpsampledLayers>& ao)
       : full_(full), half_(half), ao_(ao) {}
 
-  float value(uint32_t x, uint32_t y) const {
+  Layers values(uint32_t x, uint32_t y) const {
     const size_t pixel = size_t{y} * full_.size.width + x;
-    if (!is_hit(full_, pixel)) return kInvalidAo;
+    if (!is_hit(full_, pixel)) return no_values();
     const ImageSize size = half_.gbuffer.size;
     const uint32_t bx = x / 2, by = y / 2;
-    if (const size_t own = size_t{by} * size.width + bx; half_.pixel[own] == pixel) return ao_[own];
-    Mean near, far, unlike;
-    for_neighbours(size, bx, by, 1, [&](size_t i) {
-      if (!usable(i)) return;
-      const auto [dx, dy] = offset(x, y, i);
-      if (dx < 2 && dy < 2) near.add((2 - dx) * (2 - dy) * 0.25f * similarity(full_, pixel, half_.pixel[i]), ao_[i]);
+    if (const size_t own = size_t{by} * size.width + bx; half_.pixel[own] == pixel) return at(own);
+    Means near;
+    for_neighbours(size, bx, by, 1, [&](size_t i, uint32_t nx, uint32_t ny) {
+      const auto [dx, dy] = distances(x, y, i, nx, ny);
+      if (dx < 2 && dy < 2 && is_hit(half_.gbuffer, i))
+        near.add((2 - dx) * (2 - dy) * 0.25f * similarity(full_, pixel, half_.pixel[i]), at(i));
     });
-    if (near.weight >= kMinWeight) return near.value();
-    for_neighbours(size, bx, by, 2, [&](size_t i) {
-      if (!usable(i)) return;
-      const auto [dx, dy] = offset(x, y, i);
-      const float closeness = 1.0f / (1.0f + dx * dx + dy * dy);
-      const Relation r = relate(full_, pixel, half_.pixel[i]);
-      far.add(closeness * similarity(r), ao_[i]);
-      const float similar = (1.0f + r.cosine) * (1.0f - r.slope2);
-      unlike.add(similar > 0.0f ? closeness * (similar * similar + 1e-6f) : closeness * 1e-6f, ao_[i]);
-    });
-    return (far.weight >= kMinWeightFar ? far : unlike).value(); // the own block has a sample
+    Layers values = near.values(kMinWeight);
+    if (std::ranges::all_of(values, [](float v) { return v >= 0.0f; })) return values;
+    const Layers others = values_around(x, y, pixel);
+    for (size_t layer = 0; layer < kUpsampledLayers; ++layer)
+      if (values[layer] < 0.0f) values[layer] = others[layer];
+    return values;
   }
 
 private:
-  struct Mean {
-    float weight = 0.0f, sum = 0.0f, lo = INFINITY, hi = -INFINITY;
-    void add(float w, float v) {
+  /// Weighted means of the valid values of each layer.
+  struct Means {
+    Layers weight{}, sum{}, lo, hi;
+    Means() { lo.fill(INFINITY), hi.fill(-INFINITY); }
+    void add(float w, const Layers& v) {
       if (!(w > 0.0f)) return;
-      weight += w, sum += w * v, lo = std::min(lo, v), hi = std::max(hi, v);
+      for (size_t i = 0; i < kUpsampledLayers; ++i)
+        if (v[i] >= 0.0f)
+          weight[i] += w, sum[i] += w * v[i], lo[i] = std::min(lo[i], v[i]), hi[i] = std::max(hi[i], v[i]);
     }
-    float value() const { return std::clamp(sum / weight, lo, hi); } // rounding leaves the range otherwise
+    /// kInvalidAo where the total weight is less than `least`.
+    Layers values(float least) const {
+      Layers v = no_values();
+      for (size_t i = 0; i < kUpsampledLayers; ++i)
+        if (weight[i] >= least) v[i] = std::clamp(sum[i] / weight[i], lo[i], hi[i]); // rounding leaves the range
+      return v;
+    }
   };
 
-  bool usable(size_t i) const { return is_hit(half_.gbuffer, i) && ao_[i] >= 0.0f; }
+  static Layers no_values() {
+    Layers none;
+    none.fill(kInvalidAo);
+    return none;
+  }
+  Layers at(size_t i) const {
+    Layers v;
+    for (size_t layer = 0; layer < kUpsampledLayers; ++layer) v[layer] = ao_[layer][i];
+    return v;
+  }
 
-  /// Distances along both axes, in full pixels.
-  std::array<float, 2> offset(uint32_t x, uint32_t y, size_t i) const {
-    const uint32_t p = half_.pixel[i], width = full_.size.width;
-    return {std::abs(static_cast<float>(p % width) - static_cast<float>(x)),
-            std::abs(static_cast<float>(p / width) - static_cast<float>(y))};
+  /// Means over the 5 x 5 nearest blocks.
+  Layers values_around(uint32_t x, uint32_t y, size_t pixel) const {
+    Means far, unlike;
+    for_neighbours(half_.gbuffer.size, x / 2, y / 2, 2, [&](size_t i, uint32_t nx, uint32_t ny) {
+      if (!is_hit(half_.gbuffer, i)) return;
+      const auto [dx, dy] = distances(x, y, i, nx, ny);
+      const float closeness = 1.0f / (1.0f + dx * dx + dy * dy);
+      const Relation r = relate(full_, pixel, half_.pixel[i]);
+      far.add(closeness * similarity(r), at(i));
+      const float similar = (1.0f + r.cosine) * (1.0f - r.slope2);
+      unlike.add(similar > 0.0f ? closeness * (similar * similar + 1e-6f) : closeness * 1e-6f, at(i));
+    });
+    Layers values = far.values(kMinWeightFar);
+    const Layers others = unlike.values(std::numeric_limits<float>::min());
+    for (size_t layer = 0; layer < kUpsampledLayers; ++layer)
+      if (values[layer] < 0.0f) values[layer] = others[layer];
+    return values;
+  }
+
+  /// Distances of a half pixel along both axes, in full pixels.
+  std::array<float, 2> distances(uint32_t x, uint32_t y, size_t i, uint32_t bx, uint32_t by) const {
+    const uint32_t width = full_.size.width, in_block = half_.pixel[i] - (2 * by * width + 2 * bx);
+    const uint32_t row = in_block >= width ? 1 : 0;
+    return {std::abs(static_cast<float>(2 * bx + in_block - row * width) - static_cast<float>(x)),
+            std::abs(static_cast<float>(2 * by + row) - static_cast<float>(y))};
   }
 
   const GBuffer& full_;
   const HalfGBuffer& half_;
-  const std::span<const float> ao_;
+  const std::array<std::span<const float>, kUpsampledLayers> ao_;
 };
 
 } // namespace
@@ -203,11 +242,17 @@ HalfGBuffer halve(const GBuffer& full) {
   return half;
 }
 
-std::vector<float> upsample_ao(const GBuffer& full, const HalfGBuffer& half, std::span<const float> ao) {
-  const Upsampler upsampler(full, half, ao);
-  std::vector<float> result(full.size.pixels());
+std::array<std::vector<float>, kUpsampledLayers>
+upsample_ao(const GBuffer& full, const HalfGBuffer& half,
+            const std::array<std::span<const float>, kUpsampledLayers>& layers) {
+  const Upsampler upsampler(full, half, layers);
+  std::array<std::vector<float>, kUpsampledLayers> result;
+  for (std::vector<float>& layer : result) layer.resize(full.size.pixels());
   for_each_row(full.size.height, [&](uint32_t y) {
-    for (uint32_t x = 0; x < full.size.width; ++x) result[size_t{y} * full.size.width + x] = upsampler.value(x, y);
+    for (uint32_t x = 0; x < full.size.width; ++x) {
+      const Layers values = upsampler.values(x, y);
+      for (size_t i = 0; i < kUpsampledLayers; ++i) result[i][size_t{y} * full.size.width + x] = values[i];
+    }
   });
   return result;
 }

@@ -10,15 +10,22 @@ namespace packtrace {
 
 inline constexpr uint32_t kTileSize = 32; ///< pixels per axis
 
-/// Half-open pixel rectangle, at most kTileSize on each axis.
+/// Half-open pixel rectangle.
 struct Tile {
   uint32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 };
 
 /// Calls `work` for every tile of an image on all cores, in Morton order so that neighbouring tiles are close in time.
+/// Tiles at the right and lower edge may be smaller.
 /// The tiles are the same for any number of threads. Each finished tile advances progress by its pixels. Throws what
 /// `work` throws, and Error(kCancelled).
-void for_each_tile(ImageSize size, Progress& progress, const std::function<void(const Tile&)>& work);
+void for_each_tile(ImageSize size, ImageSize tile_size, Progress& progress,
+                   const std::function<void(const Tile&)>& work);
+
+/// The same with tiles of kTileSize x kTileSize pixels.
+inline void for_each_tile(ImageSize size, Progress& progress, const std::function<void(const Tile&)>& work) {
+  for_each_tile(size, {kTileSize, kTileSize}, progress, work);
+}
 
 /// Extracts the even bits of a Morton code: bit 2i of code becomes bit i.
 constexpr uint32_t morton_even_bits(uint32_t code) {

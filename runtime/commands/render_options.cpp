@@ -67,23 +67,7 @@ void add_sampling_options(CLI::App& verb, RenderOptions& options) {
                 "Trace camera rays through pixel centres only. By default each frame shifts them within their pixels, "
                 "so that edges become smooth");
   add_denoiser_options(verb, options.denoiser, options.denoiser_settings);
-  verb.add_option("--ao-resolution", options.ao_resolution,
-                  "Pixels for which ambient occlusion is traced. quarter traces one of 2 x 2 pixels, a quarter of the "
-                  "rays, and interpolates the others along surfaces; about four times as fast, with softer contact "
-                  "shadows (default full)")
-      ->check(one_of({"full", "quarter"}))
-      ->default_str(options.ao_resolution);
-  verb.add_option(
-          "--ao-radius", options.ao_radius,
-          "Distance up to which surfaces occlude, in world units (default: 10 % of the scene's diagonal). Small "
-          "radii darken creases only, large ones whole rooms")
-      ->type_name("R");
-  verb.add_flag("--ao-no-falloff", options.ao_falloff_off,
-                "Let every hit within the radius occlude fully, instead of fading with its distance");
-  verb.add_option("--ao-interreflection", options.ao_interreflection,
-                  "Fraction of light that occluding surfaces reflect, 0..1 (default 0, off). Brightens creases between "
-                  "light surfaces")
-      ->type_name("RHO");
+  add_ao_options(verb, options.ao);
   verb.add_flag("--private-copy", options.private_copy,
                 "Read a .ptk file into memory instead of mapping it, so that it may be changed or deleted meanwhile");
   verb.add_option("--seed", options.seed, "Seed of the sample pattern (default 0). Another seed gives other noise")
@@ -154,21 +138,20 @@ StillConfig make_config(const SceneSource& source, const Camera& camera, const R
   config.supersample = options.supersample;
   config.denoise = denoises(options);
   config.denoiser = denoiser_config(options.denoiser, options.denoiser_settings);
-  if (options.ao_resolution == "quarter") config.ao_resolution = AoResolution::kQuarter;
-  if (options.ground_truth && config.ao_resolution != AoResolution::kFull)
-    throw Error(ErrorKind::kUsage, "--ground-truth needs all pixels; it does not go with --ao-resolution quarter");
+  config.ao.spp = options.spp.value_or(options.ground_truth ? kGroundTruthSpp : 1);
+  apply(options.ao, config);
+  if (options.ground_truth && (config.ao_resolution != AoResolution::kFull || config.ao_rate != AoRate::kFull))
+    throw Error(ErrorKind::kUsage,
+                "--ground-truth needs all pixels; it does not go with --ao-resolution quarter or --ao-rate");
   config.jitter = !options.no_jitter;
   config.detail = detail;
   // A sequence has its own numbers of pictures and frames.
   const uint64_t frames = options.frames.value_or(options.ground_truth ? kGroundTruthFrames : 32);
   config.frames = options.sequence.path ? 1 : static_cast<uint32_t>(std::min<uint64_t>(frames, ~0u));
-  config.ao.spp = options.spp.value_or(options.ground_truth ? kGroundTruthSpp : 1);
-  config.ao.radius = options.ao_radius.value_or(default_ao_radius(source.world_bounds()));
-  config.ao.falloff = !options.ao_falloff_off;
-  config.ao.interreflection = options.ao_interreflection;
   config.ao.seed = options.seed;
   config.validate();
   validate(config.ao);
+  config.ao.radius = ao_radius(config.ao, source.world_bounds());
   return config;
 }
 

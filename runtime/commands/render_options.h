@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "runtime/commands/ao_options.h"
 #include "runtime/commands/cli_support.h"
 #include "runtime/commands/layer_previews.h"
 #include "runtime/commands/loaded_scene.h"
@@ -31,11 +32,8 @@ struct RenderOptions {
   bool ground_truth = false, no_jitter = false, fast_edges = false;
   std::string denoiser = "ours";
   std::vector<std::string> denoiser_settings; ///< NAME=VALUE
-  std::string ao_resolution = "full";
+  AoOptions ao;
   SceneOptions scene;
-  std::optional<float> ao_radius;
-  bool ao_falloff_off = false;
-  float ao_interreflection = 0.0f;
   uint64_t seed = 0;
   std::optional<std::string> backend; ///< if not set, the input decides
   std::optional<std::string> bvh;

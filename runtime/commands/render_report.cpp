@@ -50,8 +50,8 @@ struct Reasons {
   std::string camera, size, radius, backend, threads;
 };
 
-Reasons reasons_of(const SceneSource& source, const ChosenCamera& camera, const RenderOptions& options, bool baked,
-                   const GlobalOptions& globals) {
+Reasons reasons_of(const SceneSource& source, const ChosenCamera& camera, const RenderOptions& options,
+                   const StillConfig& config, bool baked, const GlobalOptions& globals) {
   const size_t cameras = source.cameras().size();
   Reasons reasons;
   reasons.camera = options.camera == "auto" ? "--camera auto, which shows the whole scene"
@@ -60,9 +60,11 @@ Reasons reasons_of(const SceneSource& source, const ChosenCamera& camera, const 
                        : fmt::format("number {} of {}, counted from 0{}", camera.index.value_or(0), cameras,
                                      camera.index == 0u && cameras > 1 ? "; --camera selects another" : "");
   reasons.size = options.size.empty() ? (camera.index ? "the camera's film" : "the default") : "--size";
-  reasons.radius = options.ao_radius ? "--ao-radius"
-                                     : fmt::format("10 % of the scene's diagonal, {:.5g}",
-                                                   glm::length(source.world_bounds().extent()));
+  reasons.radius =
+      options.ao.radius ? "--ao-radius"
+      : config.ao.radius == ao_radius({}, source.world_bounds())
+          ? fmt::format("10 % of the scene's diagonal, {:.5g}", glm::length(source.world_bounds().extent()))
+          : "--ao-set";
   reasons.backend = options.backend                     ? "--backend"
                     : !baked                            ? "default for .pbrt scenes, which are traced as floats"
                     : options.bvh || options.fast_edges ? "--bvh and --fast-edges select Embree"
@@ -137,7 +139,9 @@ nlohmann::json render_json(const RenderOptions& options, const StillConfig& conf
       {"supersample", config.supersample},
       {"frames", config.frames},
       {"spp", config.ao.spp},
-      {"ao_resolution", options.ao_resolution},
+      {"ao_resolution", options.ao.resolution},
+      {"ao_rate", options.ao.rate},
+      {"ao_sampler", options.ao.sampler},
       {"denoise", config.denoise},
       {"denoiser", denoiser_json(config.denoise, config.denoiser)},
       {"jitter", config.jitters() && config.frames > 1},
@@ -196,7 +200,7 @@ void print_render(std::FILE* stream, const nlohmann::json& r) {
 std::string choices_text(const RenderOptions& options, const GlobalOptions& globals, const ChosenCamera& camera,
                          const StillConfig& config, const LoadedScene& loaded, const RayTracer& tracer,
                          const FileTimings& timings) {
-  const Reasons reasons = reasons_of(*loaded.source, camera, options, loaded.baked.has_value(), globals);
+  const Reasons reasons = reasons_of(*loaded.source, camera, options, config, loaded.baked.has_value(), globals);
   std::string text;
   const auto line = [&](const char* name, const std::string& what, const std::string& reason) {
     text += fmt::format("  {:<10}{}{}\n", name, what, reason.empty() ? "" : ": " + reason);

@@ -66,6 +66,13 @@ nlohmann::json version_of(const std::string& file) {
   return {file, bytes, std::filesystem::last_write_time(file, error).time_since_epoch().count()};
 }
 
+/// All values of a configuration, by name.
+nlohmann::json ao_values(const AoConfig& config) {
+  nlohmann::json values = {{"seed", config.seed}, {"sampler", static_cast<int>(config.sampler)}};
+  for (const Setting<AoConfig>& setting : ao_settings()) values[std::string(setting.info.name)] = setting.get(config);
+  return values;
+}
+
 /// Describes everything on which the pictures depend, for SequenceCheckpoint.
 std::string settings_text(const RenderOptions& options, const RenderSetup& setup, const Sequence& sequence) {
   const StillConfig& c = setup.config;
@@ -79,8 +86,8 @@ std::string settings_text(const RenderOptions& options, const RenderSetup& setup
       {"size", {c.size.width, c.size.height, c.supersample}},
       {"denoiser", {options.denoiser, options.denoiser_settings}},
       {"jitter", c.jitter},
-      {"resolution", options.ao_resolution},
-      {"ao", {c.ao.radius, c.ao.spp, c.ao.falloff, c.ao.interreflection, c.ao.seed}},
+      {"resolution", {options.ao.resolution, options.ao.rate}},
+      {"ao", ao_values(c.ao)},
       {"camera", options.camera.value_or("")},
       {"backend", options.backend.value_or("")},
       {"bvh", options.bvh.value_or("")},

@@ -16,6 +16,13 @@ enum class AoResolution : uint8_t {
   kQuarter, ///< one of 2 x 2 pixels; the denoised result is upsampled (runtime/ao/half_resolution.h)
 };
 
+/// Pixels that get samples in a frame.
+enum class AoRate : uint8_t {
+  kFull,
+  kCheckerboard, ///< every other pixel, alternating from frame to frame
+  kAdaptive,     ///< more for surfaces that came into view lately, fewer for others (runtime/ao/adaptive_rate.h)
+};
+
 /// Which levels of detail the rays of a frame meet (docs/lod_runtime.md).
 struct DetailConfig {
   /// Maximum screen-space error in traced pixels, in (0, 1e9]. Unset: level 0 everywhere.
@@ -41,6 +48,7 @@ struct FrameConfig {
   /// antialiased one. Has no effect with AoResolution::kQuarter.
   bool jitter = true;
   AoResolution ao_resolution = AoResolution::kFull;
+  AoRate ao_rate = AoRate::kFull;
   bool lod_layers = false;  ///< fill the LOD layers of RenderedImage
   bool view_layers = false; ///< fill its views of intermediate results
   AoConfig ao;

@@ -58,6 +58,7 @@ struct SavedLoop {
   uint32_t still_frames;
   uint32_t state_bytes; ///< of SceneState
   uint64_t mean_bytes;  ///< of RawMean
+  uint64_t rate_bytes;  ///< of AdaptiveRate
 };
 
 } // namespace
@@ -73,16 +74,18 @@ void FrameLoop::reset() {
   next_number_ = 0;
   state_.reset();
   denoiser_.reset();
+  adaptive_.clear();
 }
 
 std::vector<std::byte> FrameLoop::save() const {
-  const std::vector<std::byte> mean = raw_mean_.save(), history = denoiser_.save();
+  const std::vector<std::byte> mean = raw_mean_.save(), rate = adaptive_.save(), history = denoiser_.save();
   const std::vector<uint8_t> state = state_.save();
-  const SavedLoop saved{next_number_, still_frames_, static_cast<uint32_t>(state.size()), mean.size()};
-  std::vector<std::byte> bytes(sizeof(saved) + state.size() + mean.size() + history.size());
+  const SavedLoop saved{next_number_, still_frames_, static_cast<uint32_t>(state.size()), mean.size(), rate.size()};
+  std::vector<std::byte> bytes(sizeof(saved));
   std::memcpy(bytes.data(), &saved, sizeof(saved));
-  const auto after_state = std::ranges::copy(std::as_bytes(std::span(state)), bytes.begin() + sizeof(saved)).out;
-  std::ranges::copy(history, std::ranges::copy(mean, after_state).out);
+  for (const std::span<const std::byte> part : {std::as_bytes(std::span(state)), std::span<const std::byte>(mean),
+                                                std::span<const std::byte>(rate), std::span<const std::byte>(history)})
+    bytes.insert(bytes.end(), part.begin(), part.end());
   return bytes;
 }
 
@@ -95,15 +98,18 @@ void FrameLoop::restore(const Camera& camera, double time_s, std::span<const std
   if (saved.state_bytes > bytes.size()) fail();
   const std::span<const std::byte> state = bytes.first(saved.state_bytes);
   bytes = bytes.subspan(state.size());
-  if (saved.mean_bytes > bytes.size() || saved.next_number <= saved.still_frames) fail();
+  if (saved.mean_bytes > bytes.size() || saved.rate_bytes > bytes.size() - saved.mean_bytes) fail();
+  if (saved.next_number <= saved.still_frames) fail();
   const ImageSize shaded =
       config_.ao_resolution == AoResolution::kFull
           ? config_.traced_size()
           : ImageSize{(config_.traced_size().width + 1) / 2, (config_.traced_size().height + 1) / 2};
   reset();
-  const bool has_history = config_.denoise ? bytes.size() > saved.mean_bytes : saved.mean_bytes > 0;
-  if (!has_history || !raw_mean_.restore(shaded.pixels(), bytes.first(saved.mean_bytes))) fail();
-  denoiser_.restore(shaded, bytes.subspan(saved.mean_bytes));
+  const auto mean = bytes.first(saved.mean_bytes), rate = bytes.subspan(mean.size(), saved.rate_bytes);
+  const auto history = bytes.subspan(mean.size() + rate.size());
+  if ((config_.denoise ? history : mean).empty() || (config_.ao_rate == AoRate::kAdaptive) == rate.empty()) fail();
+  if (!raw_mean_.restore(shaded.pixels(), mean) || !adaptive_.restore(shaded, rate)) fail();
+  denoiser_.restore(shaded, history);
   // Camera rays are traced again: they depend on the camera alone.
   layers_.clear();
   if (!state_.restore(time_s, {reinterpret_cast<const uint8_t*>(state.data()), state.size()}, report_)) fail();
@@ -191,6 +197,20 @@ PrimaryCamera FrameLoop::view_of(const Camera& camera, uint32_t still_frame) con
   return {camera, config_.traced_size(), offset};
 }
 
+/// The samples of the next frame.
+SamplePlan FrameLoop::sample_plan(const GBuffer& shaded) {
+  if (config_.ao_rate == AoRate::kAdaptive) return adaptive_.next_frame(shaded, !report_.moved, config_.ao.spp);
+  SamplePlan plan;
+  plan.count = config_.ao.spp;
+  const auto frame = static_cast<uint32_t>(next_number_);
+  plan.first = frame * plan.count;
+  if (config_.ao_rate == AoRate::kCheckerboard) {
+    plan.colour = frame % 2;
+    plan.first = frame / 2 * plan.count; // each pixel takes the samples of its sequence one after another
+  }
+  return plan;
+}
+
 const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Progress& progress) {
   const uint64_t last_hits = report_.hit_pixels; // stays unless camera rays are traced
   report_ = {};
@@ -214,9 +234,9 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
   if (quarter && still_frames_ == 1) forget_motion(half_.gbuffer);
   const GBuffer& shaded = quarter ? half_.gbuffer : gbuffer_;
   const Stopwatch tracing;
-  trace_ao(traced_source(), *tracers().back(), shaded, config_.ao, static_cast<uint32_t>(next_number_), raw_, progress);
+  report_.ao_rays =
+      trace_ao(traced_source(), *tracers().back(), shaded, config_.ao, sample_plan(shaded), raw_, progress);
   report_.times.ao_s += tracing.seconds();
-  report_.ao_rays = (quarter ? count_hits(shaded) : report_.hit_pixels) * config_.ao.spp;
 
   const Stopwatch layering;
   if (moved) layers_.clear();
@@ -263,14 +283,13 @@ void FrameLoop::resolve_views(RenderedImage& image) {
 
 void FrameLoop::resolve(RenderedImage& image, PictureReport& report) {
   PassTimes& times = report.times;
-  std::vector<float> ao = accumulated_ao(report);
+  const std::vector<float> ao = accumulated_ao(report);
   if (config_.ao_resolution == AoResolution::kQuarter) {
     const Stopwatch upsampling;
-    ao = upsample_ao(gbuffer_, half_, ao);
-    const std::vector<float> raw = upsample_ao(gbuffer_, half_, raw_.ao);
+    const auto [full_ao, raw] = upsample_ao(gbuffer_, half_, {ao, raw_.ao});
     times.upsample_s += upsampling.seconds();
     const Stopwatch filtering;
-    layers_.resolve(config_, ao, raw, image);
+    layers_.resolve(config_, full_ao, raw, image);
     times.resolve_s += filtering.seconds();
   } else {
     const Stopwatch filtering;

@@ -7,6 +7,7 @@
 
 #include "pbrt_import/base/progress.h"
 #include "pbrt_import/scene/camera_rays.h"
+#include "runtime/ao/adaptive_rate.h"
 #include "runtime/ao/half_resolution.h"
 #include "runtime/denoise/denoiser.h"
 #include "runtime/frame/frame_config.h"
@@ -66,6 +67,7 @@ private:
   void trace_camera_rays(const PrimaryCamera& view);
   PrimaryCamera view_of(const Camera& camera, uint32_t still_frame) const;
   bool traces(uint32_t still_frame) const;
+  SamplePlan sample_plan(const GBuffer& shaded);
   void add_lod_layers(const PrimaryCamera& view);
   std::vector<float> accumulated_ao(PictureReport& report);
   void resolve_views(RenderedImage& image);
@@ -80,6 +82,7 @@ private:
   HalfGBuffer half_;
   AoFrame raw_;
   AoDenoiser denoiser_;
+  AdaptiveRate adaptive_;
   RawMean raw_mean_;
   MeanLayers layers_;
   RenderedImage lod_layers_; ///< only its LOD layers

@@ -76,22 +76,25 @@ void MeanLayers::resolve(const FrameConfig& config, std::span<const float> ao, s
   const float rays = static_cast<float>(frames_) * static_cast<float>(factor * factor);
   const auto resolve_pixel = [&](uint32_t x, uint32_t y) {
     const size_t out = static_cast<size_t>(y) * image.size.width + x;
-    float hits = 0, raw_hits = 0, ao_sum = 0, raw_sum = 0, depth = 0;
+    float hits = 0, ao_hits = 0, raw_hits = 0, ao_sum = 0, raw_sum = 0, depth = 0;
     Vec3 normal(0), albedo(0), shaded(0);
     for (uint32_t sub = 0; sub < factor * factor; ++sub) {
       const size_t in = (static_cast<size_t>(y) * factor + sub / factor) * size_.width +
                         static_cast<size_t>(x) * factor + sub % factor;
       if (hits_[in] == 0.0f) continue;
       if (hits == 0.0f) image.instance[out] = instance_[in];
-      hits += hits_[in], ao_sum += hits_[in] * ao[in], depth += depth_[in];
+      hits += hits_[in], depth += depth_[in];
+      if (ao[in] >= 0.0f) ao_hits += hits_[in], ao_sum += hits_[in] * ao[in];
       if (raw[in] >= 0.0f) raw_hits += 1.0f, raw_sum += raw[in];
       normal += normal_[in], albedo += albedo_[in];
+      const float light = std::max(ao[in], 0.0f);
       shaded +=
-          emitters_.empty() ? albedo_[in] * ao[in] : Vec3(emitters_[in]) + (albedo_[in] - emitter_albedo_[in]) * ao[in];
+          emitters_.empty() ? albedo_[in] * light : Vec3(emitters_[in]) + (albedo_[in] - emitter_albedo_[in]) * light;
     }
     if (hits == 0.0f) return;
     const float scale = 1.0f / hits;
-    image.ao[out] = ao_sum * scale, image.depth[out] = depth * scale;
+    if (ao_hits > 0.0f) image.ao[out] = ao_sum * (1.0f / ao_hits);
+    image.depth[out] = depth * scale;
     if (raw_hits > 0.0f) image.ao_raw[out] = raw_sum * (1.0f / raw_hits);
     image.coverage[out] = hits / rays;
     const float length = glm::length(normal);

@@ -24,7 +24,7 @@ public:
   void write_guides(GBuffer& guides) const;
 
   /// Box-filters the layers into an image. LOD layers stay as they are.
-  /// @param ao, raw one value per traced pixel; negative: none
+  /// @param ao, raw one value per traced pixel; negative: none, which is black in RenderedImage::shaded
   void resolve(const FrameConfig& config, std::span<const float> ao, std::span<const float> raw,
                RenderedImage& image) const;
 

@@ -51,6 +51,8 @@ set(packtrace_public_headers
   compress/exchange/vertex16/vertex16_file.h
   compress/exchange/vertex16/vertex16_format.h
   # packtrace::runtime: tracing, ambient occlusion, denoising, levels of detail, images
+  runtime/ao/adaptive_rate.h
+  runtime/ao/ao_config.h
   runtime/ao/ao_integrator.h
   runtime/ao/half_resolution.h
   runtime/ao/sampler.h

@@ -127,7 +127,7 @@ py::dict render(const std::shared_ptr<BakedFile>& file, std::optional<std::pair<
     set_denoiser(config, {denoise, denoiser, denoiser_settings});
     config.ao.spp = spp;
     config.ao.seed = seed;
-    config.ao.radius = ao_radius.value_or(default_ao_radius(source.world_bounds()));
+    config.ao.radius = ao_radius.value_or(0.0f);
     config.validate();
     TracerConfig tracing;
     tracing.backend = chosen_backend(backend);

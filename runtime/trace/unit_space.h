@@ -37,6 +37,8 @@ public:
   DVec3 to_unit(DVec3 p) const { return (p - centre_) * scale_; }
   DVec3 from_unit(DVec3 p) const { return p * inverse_scale_ + centre_; } // The scale is exact: a power of two.
 
+  /// Outer coordinates of the origin.
+  DVec3 centre() const { return centre_; }
   /// Unit-space lengths per outer length; a power of two.
   double scale() const { return scale_; }
   /// Outer lengths per unit-space length.

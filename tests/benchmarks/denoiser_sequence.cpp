@@ -29,7 +29,7 @@ public:
     camera_ = options.framed || source.cameras().empty()
                   ? framing_camera(source.world_bounds(), options.size, source.cameras())
                   : source.cameras()[0];
-    ao_.radius = default_ao_radius(source.world_bounds());
+    ao_.radius = ao_radius({}, source.world_bounds());
   }
 
   DenoiserSequence still() {

@@ -108,7 +108,7 @@ uint64_t RecordedRays::count() const {
 RecordedFrame record_frame(const SceneSource& source, const RayTracer& tracer, const std::string& camera,
                            ImageSize size) {
   RecordedFrame frame{
-      PrimaryCamera(choose_camera(source, camera, size), size), default_ao_radius(source.world_bounds()), {}};
+      PrimaryCamera(choose_camera(source, camera, size), size), ao_radius({}, source.world_bounds()), {}};
   frame.phases = record_phases(source, tracer, frame.camera, frame.ao_radius);
   if (frame.phases[1].count() == 0 && camera == "0") { // the camera looks past the scene
     frame.camera = PrimaryCamera(framing_camera(source.world_bounds(), size, source.cameras()), size);

@@ -323,5 +323,33 @@ TEST(RenderCommand, QuarterResolutionTracesAQuarterOfTheRays) {
   EXPECT_EQ(render("quarter", {"--ground-truth"}).exit_code, 2);
 }
 
+TEST(RenderCommand, RatesAndSettingsOfOcclusionRaysAreChosen) {
+  const Workbench bench;
+  bench.bake();
+  const auto render = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"render", bench.baked(), "-o", bench / "a.exr", "--force", "--size", "64x40", "--frames",
+                               "4", "--no-jitter", "--json", "-"});
+    return run_packtrace(more);
+  };
+  const nlohmann::json full = nlohmann::json::parse(render({}).out);
+  const nlohmann::json half = nlohmann::json::parse(render({"--ao-rate", "checkerboard"}).out);
+  EXPECT_EQ(half["rays"]["ao"].get<uint64_t>() * 2, full["rays"]["ao"].get<uint64_t>());
+  EXPECT_NEAR(half["mean_ao"].get<double>(), full["mean_ao"].get<double>(), 0.01);
+  const nlohmann::json sorted = nlohmann::json::parse(render({"--ao-set", "sort_rays=on"}).out);
+  EXPECT_EQ(sorted["mean_ao"], full["mean_ao"]);
+  const nlohmann::json dark = nlohmann::json::parse(render({"--ao-set", "falloff=off", "--ao-set=radius=9"}).out);
+  EXPECT_EQ(dark["ao_radius"], 9.0);
+  EXPECT_LT(dark["mean_ao"].get<double>(), full["mean_ao"].get<double>());
+  for (const char* sampler : {"sobol", "jitter", "lattice", "independent"})
+    EXPECT_NEAR(nlohmann::json::parse(render({"--ao-sampler", sampler, "--spp", "16"}).out)["mean_ao"].get<double>(),
+                full["mean_ao"].get<double>(), 0.01);
+  EXPECT_NE(render({"--ao-set", "lambda=21"}).err.find("lambda is 21, not in [0..20]"), std::string::npos);
+  EXPECT_NE(render({"--ao-set", "lamda=2"}).err.find("did you mean lambda?"), std::string::npos);
+  EXPECT_NE(render({"--ao-radius", "0"}).err.find("--ao-radius 0: must be a positive number"), std::string::npos);
+  for (const std::vector<std::string>& wrong :
+       {std::vector<std::string>{"--ao-rate", "half"}, {"--ao-rate", "checkerboard", "--ground-truth"}})
+    EXPECT_EQ(render(wrong).exit_code, 2);
+}
+
 } // namespace
 } // namespace packtrace::test

@@ -90,7 +90,7 @@ TEST(Sequences, ResumedOnesHaveTheSameBytes) {
   const auto render = [&](const std::string& pattern, const std::vector<std::string>& more) {
     std::vector<std::string> arguments{"render",   bench.baked(),   "--size", "48x32",       "--path",
                                        "orbit:20", "--frames",      "6",      "--subframes", "3",
-                                       "-o",       bench / pattern, "-q"};
+                                       "-o",       bench / pattern, "-q",     "--ao-rate",   "adaptive"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run_packtrace(arguments);
   };
@@ -107,6 +107,7 @@ TEST(Sequences, ResumedOnesHaveTheSameBytes) {
   EXPECT_EQ(other.exit_code, 2);
   EXPECT_NE(other.err.find("other options"), std::string::npos) << other.err;
   EXPECT_EQ(render("part%d.png", {"--resume", "--aov", "depth"}).exit_code, 2);
+  EXPECT_EQ(render("part%d.png", {"--resume", "--ao-set", "lambda=3"}).exit_code, 2);
   const CommandResult rest = render("part%d.png", {"--resume", "--json", bench / "rest.json"});
   ASSERT_EQ(rest.exit_code, 0) << rest.err;
   EXPECT_EQ(nlohmann::json::parse(read_text(bench / "rest.json")).at("sequence").at("rendered"), 4);

@@ -38,7 +38,7 @@ public:
   /// @param framed use a camera that frames the whole scene instead of the scene's own
   View(const SceneSource& source, const PictureSettings& settings, bool framed)
       : camera_(camera_of(source, size_of(settings), framed), size_of(settings)) {
-    ao_.radius = default_ao_radius(source.world_bounds());
+    ao_.radius = ao_radius({}, source.world_bounds());
     ao_.spp = static_cast<uint32_t>(settings.spp);
   }
 
@@ -89,7 +89,7 @@ void add_quarter_resolution(Metrics& metrics, const Picture& picture) {
   const HalfGBuffer half = halve(picture.surfaces);
   std::vector<float> quarter;
   for (const uint32_t pixel : half.pixel) quarter.push_back(picture.ao.ao[pixel]);
-  const std::vector<float> upsampled = upsample_ao(picture.surfaces, half, quarter);
+  const std::vector<float> upsampled = upsample_ao(picture.surfaces, half, {quarter, quarter})[0];
   std::vector<double> errors;
   for (size_t i = 0; i < upsampled.size(); ++i)
     if (picture.surfaces.instance[i] != kNoInstance)

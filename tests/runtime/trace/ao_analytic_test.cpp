@@ -1,4 +1,6 @@
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 
 #include <gtest/gtest.h>
 
@@ -117,6 +119,15 @@ TEST(AoAnalytic, ContinuousFalloffHasNoStepAtItsEnd) {
   EXPECT_GT(continuous, 0.9999);
 }
 
+TEST(AoAnalytic, ACutoffOfOneLeavesNoOcclusion) {
+  Scene scene;
+  add_shape(scene, horizontal(0));
+  add_shape(scene, horizontal(2));
+  AoConfig config = visibility(8);
+  config.falloff = true, config.cutoff = 1;
+  EXPECT_EQ(ao_at(scene, {0, 0, 0}, {0, 1, 0}, config), 1.0);
+}
+
 TEST(AoAnalytic, LambdaZeroIsTheLimitOfSmallLambda) {
   Scene scene;
   add_shape(scene, horizontal(0));
@@ -177,6 +188,43 @@ TEST(AoAnalytic, InterreflectionBrightensByTheSurfaceLuminance) {
   EXPECT_NEAR(ao_at(scene, {0, 0, 0}, {0, 1, 0}, config), 0.2, 1e-3);
 }
 
+TEST(AoConfig, RadiusIsAFractionOfTheDiagonalUnlessItIsGiven) {
+  const Bounds bounds{DVec3(0.0), DVec3(2.0, 3.0, 6.0)};
+  AoConfig config;
+  EXPECT_FLOAT_EQ(ao_radius(config, bounds), 0.7f);
+  config.relative_radius = 0.5f;
+  EXPECT_FLOAT_EQ(ao_radius(config, bounds), 3.5f);
+  config.radius = 2.0f;
+  EXPECT_EQ(ao_radius(config, bounds), 2.0f);
+  EXPECT_EQ(ao_radius({}, Bounds{}), 1.0f);
+}
+
+TEST(AoConfig, SettingsAreAssignedByName) {
+  AoConfig config;
+  for (const char* text : {"lambda=3", "continuous=off", "sampler_block=4", "offset_scale=2.5"})
+    assign_setting(ao_settings(), text, config, "ambient occlusion");
+  EXPECT_EQ(config.lambda, 3.0f);
+  EXPECT_FALSE(config.continuous);
+  EXPECT_EQ(config.sampler_block, 4u);
+  EXPECT_EQ(config.offset_scale, 2.5f);
+  try {
+    assign_setting(ao_settings(), "lambda=30", config, "ambient occlusion");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(), "ambient occlusion: lambda is 30, not in [0..20]");
+  }
+}
+
+TEST(AoConfig, EverySettingIsDocumented) {
+  std::ifstream in(std::filesystem::path(PACKTRACE_SOURCE_DIR) / "docs/ambient_occlusion.md");
+  const std::string text(std::istreambuf_iterator<char>(in), {});
+  for (const Setting<AoConfig>& setting : ao_settings()) {
+    const std::string row = "| `" + std::string(setting.info.name) + "` | " + setting_range(setting.info) + " | " +
+                            setting_text(setting.default_value()) + " |";
+    EXPECT_NE(text.find(row), std::string::npos) << row;
+  }
+}
+
 TEST(AoConfig, RejectsEveryParameterOutOfRange) {
   EXPECT_NO_THROW(validate(AoConfig{}));
   const auto rejects = [](auto change) {
@@ -184,17 +232,20 @@ TEST(AoConfig, RejectsEveryParameterOutOfRange) {
     change(config);
     EXPECT_THROW(validate(config), Error);
   };
-  rejects([](AoConfig& c) { c.radius = 0; });
+  rejects([](AoConfig& c) { c.radius = -1; });
   rejects([](AoConfig& c) { c.radius = INFINITY; });
   rejects([](AoConfig& c) { c.radius = NAN; });
   rejects([](AoConfig& c) { c.spp = 0; });
   rejects([](AoConfig& c) { c.spp = 65537; });
   rejects([](AoConfig& c) { c.lambda = -1; });
   rejects([](AoConfig& c) { c.lambda = 21; });
-  rejects([](AoConfig& c) { c.cutoff = 1; });
+  rejects([](AoConfig& c) { c.cutoff = 1.5f; });
   rejects([](AoConfig& c) { c.cutoff = NAN; });
   rejects([](AoConfig& c) { c.min_visibility = 1.5f; });
   rejects([](AoConfig& c) { c.interreflection = -0.1f; });
+  rejects([](AoConfig& c) { c.relative_radius = 0; });
+  rejects([](AoConfig& c) { c.offset_scale = -1; });
+  rejects([](AoConfig& c) { c.sampler_block = 9; });
 }
 
 } // namespace

@@ -2,12 +2,16 @@
 
 #include <set>
 
+#include "runtime/ao/hemisphere.h"
+#include "runtime/ao/multi_jitter.h"
+
 #include <gtest/gtest.h>
 
 namespace packtrace {
 namespace {
 
-const SamplerKind kKinds[] = {SamplerKind::kSpaceTimeNet, SamplerKind::kPixelSobol, SamplerKind::kIndependent};
+const SamplerKind kKinds[] = {SamplerKind::kSpaceTimeNet, SamplerKind::kPixelSobol, SamplerKind::kMultiJitter,
+                              SamplerKind::kLattice, SamplerKind::kIndependent};
 
 /// True if every elementary box of a (0, k, 2)-net in base 2 holds exactly one of the 2^k points.
 bool is_net(const std::vector<Vec2>& points) {
@@ -29,7 +33,7 @@ std::vector<Vec2> block_points(const PixelSampler& sampler, uint32_t x0, uint32_
   for (uint64_t n = first; n < first + count; ++n)
     for (uint32_t y = y0; y < y0 + size; ++y)
       for (uint32_t x = x0; x < x0 + size; ++x)
-        points.push_back(PixelSampler::point(sampler.pixel(x, y), sampler.number(n)));
+        points.push_back(sampler.point(sampler.pixel(x, y), static_cast<uint32_t>(n)));
   return points;
 }
 
@@ -79,25 +83,80 @@ TEST(PixelSampler, SeedsPixelsAndSamplesAllMatter) {
     const PixelSampler a(kind, 1), b(kind, 2), c(kind, uint64_t{1} << 32);
     std::set<std::pair<float, float>> distinct;
     const auto add = [&](Vec2 p) { distinct.insert({p.x, p.y}); };
-    add(PixelSampler::point(a.pixel(1, 2), a.number(0)));
-    add(PixelSampler::point(b.pixel(1, 2), b.number(0)));
-    add(PixelSampler::point(c.pixel(1, 2), c.number(0)));
-    add(PixelSampler::point(a.pixel(2, 1), a.number(0)));
-    add(PixelSampler::point(a.pixel(1, 2), a.number(1)));
-    add(PixelSampler::point(a.pixel(1, 2), a.number(65536)));
+    add(a.point(a.pixel(1, 2), 0));
+    add(b.point(b.pixel(1, 2), 0));
+    add(c.point(c.pixel(1, 2), 0));
+    add(a.point(a.pixel(2, 1), 0));
+    add(a.point(a.pixel(1, 2), 1));
+    add(a.point(a.pixel(1, 2), 65536));
     EXPECT_EQ(distinct.size(), 6u);
   }
 }
 
 TEST(PixelSampler, BlocksAreDecorrelated) {
-  const PixelSampler sampler(SamplerKind::kSpaceTimeNet, 0);
-  std::set<std::pair<uint32_t, uint32_t>> seeds;
-  for (uint32_t y = 0; y < 135; ++y)
-    for (uint32_t x = 0; x < 240; ++x) {
-      const PixelSampler::Pixel pixel = sampler.pixel(8 * x, 8 * y);
-      seeds.insert({pixel.seed_x, pixel.seed_y});
-    }
-  EXPECT_EQ(seeds.size(), 240u * 135u);
+  for (const SamplerKind kind : {SamplerKind::kSpaceTimeNet, SamplerKind::kMultiJitter}) {
+    const PixelSampler sampler(kind, 0);
+    std::set<std::pair<uint32_t, uint32_t>> seeds;
+    for (uint32_t y = 0; y < 135; ++y)
+      for (uint32_t x = 0; x < 240; ++x) {
+        const PixelSampler::Pixel pixel = sampler.pixel(8 * x, 8 * y);
+        seeds.insert({pixel.seed_x, pixel.seed_y});
+      }
+    EXPECT_GE(seeds.size(), 240u * 135u * 99 / 100);
+  }
+}
+
+TEST(PixelSampler, ArraysHoldThePointsOfTheirPixels) {
+  constexpr uint32_t kCount = 37;
+  std::vector<uint32_t> x, y, samples;
+  for (uint32_t i = 0; i < kCount; ++i) x.push_back(11 * i), y.push_back(i * i), samples.push_back(70001 * i);
+  for (const SamplerKind kind : kKinds) {
+    const PixelSampler sampler(kind, 5);
+    PixelSampler::Pixels pixels;
+    pixels.resize(kCount);
+    sampler.pixels(x.data(), y.data(), kCount, pixels);
+    std::vector<float> u(kCount), v(kCount);
+    sampler.points(pixels, samples.data(), kCount, u.data(), v.data());
+    for (uint32_t i = 0; i < kCount; ++i)
+      EXPECT_EQ(Vec2(u[i], v[i]), sampler.point(sampler.pixel(x[i], y[i]), samples[i]));
+  }
+}
+
+/// Numbers of points in the cells of a grid of columns x rows.
+std::vector<uint32_t> cell_counts(const std::vector<Vec2>& points, uint32_t columns, uint32_t rows) {
+  std::vector<uint32_t> counts(size_t{columns} * rows);
+  for (const Vec2 p : points)
+    ++counts[static_cast<uint32_t>(p.y * float(rows)) * columns + static_cast<uint32_t>(p.x * float(columns))];
+  return counts;
+}
+
+TEST(MultiJitter, EachSetHasOnePointPerCellRowAndColumn) {
+  for (const MultiJitterSet& set : multi_jitter_sets()) {
+    const std::vector<Vec2> points(set.begin(), set.end());
+    for (const auto& [columns, rows] : {std::pair{8u, 8u}, {64u, 1u}, {1u, 64u}})
+      for (const uint32_t count : cell_counts(points, columns, rows)) EXPECT_EQ(count, 1u);
+  }
+}
+
+TEST(MultiJitter, BlocksOfPixelsShareASet) {
+  const PixelSampler sampler(SamplerKind::kMultiJitter, 3);
+  for (const uint64_t frame : {0u, 1u, 100u})
+    for (const uint32_t count : cell_counts(block_points(sampler, 16, 8, 8, frame, 1), 8, 8)) EXPECT_EQ(count, 1u);
+  for (const uint32_t side : {1u, 2u, 4u}) { // smaller blocks use a set up in several samples
+    const PixelSampler small(SamplerKind::kMultiJitter, 3, side);
+    const uint64_t per_set = kSetPoints / (side * side);
+    for (const uint32_t count : cell_counts(block_points(small, 8, 16, side, 5 * per_set, per_set), 8, 8))
+      EXPECT_EQ(count, 1u) << side;
+  }
+}
+
+TEST(MultiJitter, HeightsHaveTheMeanOfACosine) {
+  for (uint32_t side = 1; side <= 8; ++side) {
+    const PixelSampler sampler(SamplerKind::kMultiJitter, 1, side);
+    double sum = 0.0;
+    for (const Vec2 p : block_points(sampler, 0, 0, 56, 2, 2)) sum += cosine_direction(p).z;
+    EXPECT_NEAR(sum / (56 * 56 * 2), 2.0 / 3.0, 0.01) << side;
+  }
 }
 
 TEST(CosineDirection, IsUnitAndCosineWeighted) {
@@ -106,7 +165,7 @@ TEST(CosineDirection, IsUnitAndCosineWeighted) {
   double z_squared = 0;
   constexpr uint32_t kCount = 16384;
   for (uint32_t n = 0; n < kCount; ++n) {
-    const Vec3 d = cosine_direction(PixelSampler::point(sampler.pixel(0, 0), sampler.number(n)));
+    const Vec3 d = cosine_direction(sampler.point(sampler.pixel(0, 0), n));
     ASSERT_NEAR(glm::length(d), 1.0f, 1e-6f);
     ASSERT_GE(d.z, 0.0f);
     sum += d;

@@ -1,0 +1,119 @@
+#include "runtime/ao/adaptive_rate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+namespace packtrace {
+namespace {
+
+constexpr float kSameDepth = 0.02f; ///< relative difference up to which a depth is that of the same surface
+
+template <typename Work>
+void for_pixels(size_t count, const Work& work) {
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, count, 1u << 14), [&](const tbb::blocked_range<size_t>& range) {
+    for (size_t i = range.begin(); i < range.end(); ++i) work(i);
+  });
+}
+
+/// Threshold in [0, 1) of a pixel in a frame: evenly distributed over 4 x 4 pixels, and over the frames of a pixel.
+float threshold(uint32_t x, uint32_t y, uint32_t frame) {
+  constexpr std::array<uint8_t, 16> kOrder{0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5}; // Bayer
+  constexpr uint32_t kGolden = 0x9e3779b9u;
+  const uint32_t fixed = (uint32_t{kOrder[y % 4 * 4 + x % 4]} << 28) + frame * kGolden;
+  return static_cast<float>(fixed >> 8) * 0x1p-24f;
+}
+
+} // namespace
+
+void AdaptiveRate::resize(ImageSize size) {
+  size_ = size, frame_ = 0;
+  pixels_.assign(size.pixels(), {});
+  age_.assign(size.pixels(), 0), next_age_.resize(size.pixels());
+  first_.resize(size.pixels()), count_.resize(size.pixels());
+}
+
+/// Moves ages to where their surfaces are now; 0 for surfaces that were not seen.
+void AdaptiveRate::follow_surfaces(const GBuffer& g) {
+  const auto width = static_cast<float>(size_.width), height = static_cast<float>(size_.height);
+  for_pixels(size_.pixels(), [&](size_t i) {
+    next_age_[i] = 0;
+    if (g.instance[i] == kNoInstance) return;
+    const float x = std::floor(static_cast<float>(i % size_.width) + 0.5f - g.motion_px[i].x);
+    const float y = std::floor(static_cast<float>(i / size_.width) + 0.5f - g.motion_px[i].y);
+    if (!(x >= 0.0f && x < width && y >= 0.0f && y < height)) return;
+    const size_t from = static_cast<size_t>(y) * size_.width + static_cast<size_t>(x);
+    const float z = g.previous_z.empty() ? g.view_z[i] : g.previous_z[i];
+    const Pixel& before = pixels_[from];
+    if (before.instance == g.instance[i] && std::abs(before.view_z - z) <= kSameDepth * z) next_age_[i] = age_[from];
+  });
+  std::swap(age_, next_age_);
+}
+
+/// Returns the rate of old pixels that the budget leaves, in units of spp, and lowers the rates of young ones if it
+/// leaves too little.
+double AdaptiveRate::old_rate(const GBuffer& g, std::array<double, 3>& young) const {
+  std::array<uint64_t, 4> pixels{};
+  for (size_t i = 0; i < age_.size(); ++i)
+    if (g.instance[i] != kNoInstance)
+      ++pixels[static_cast<size_t>(std::ranges::count_if(kAges, [&](uint8_t age) { return age_[i] >= age; }))];
+  double all = 0.0;
+  for (const uint64_t count : pixels) all += static_cast<double>(count);
+  const auto old = static_cast<double>(pixels[3]);
+  for (;;) {
+    double left = all;
+    for (size_t c = 0; c < young.size(); ++c) left -= young[c] * static_cast<double>(pixels[c]);
+    if (left >= kMinRate * old) return old > 0.0 ? std::min(1.0, left / old) : 1.0;
+    for (double& rate : young) rate = std::max(1.0, rate - 0.5);
+  }
+}
+
+SamplePlan AdaptiveRate::next_frame(const GBuffer& g, bool same_pixels, uint32_t spp) {
+  if (g.size != size_ || age_.empty())
+    resize(g.size);
+  else if (!same_pixels)
+    follow_surfaces(g);
+  std::array<double, 3> young{};
+  std::ranges::copy(kMaxRates, young.begin());
+  const double old = old_rate(g, young);
+  for_pixels(size_.pixels(), [&](size_t i) {
+    Pixel& pixel = pixels_[i];
+    first_[i] = pixel.samples, count_[i] = 0;
+    pixel.instance = g.instance[i], pixel.view_z = g.view_z[i];
+    if (pixel.instance == kNoInstance) return;
+    const auto age_class = static_cast<size_t>(std::ranges::count_if(kAges, [&](uint8_t a) { return age_[i] >= a; }));
+    const double rate = age_class < young.size() ? young[age_class] : old;
+    const float dither =
+        threshold(static_cast<uint32_t>(i % size_.width), static_cast<uint32_t>(i / size_.width), frame_);
+    count_[i] = static_cast<uint16_t>(std::min(65535.0, std::floor(rate * spp + double{dither})));
+    pixel.samples += count_[i];
+    if (count_[i] > 0 && age_[i] < 255) ++age_[i];
+  });
+  ++frame_;
+  return {0, spp, {}, first_, count_};
+}
+
+std::vector<std::byte> AdaptiveRate::save() const {
+  if (age_.empty()) return {};
+  std::vector<std::byte> bytes(sizeof(frame_) + pixels_.size() * (sizeof(Pixel) + 1));
+  std::memcpy(bytes.data(), &frame_, sizeof(frame_));
+  std::memcpy(bytes.data() + sizeof(frame_), pixels_.data(), pixels_.size() * sizeof(Pixel));
+  std::memcpy(bytes.data() + sizeof(frame_) + pixels_.size() * sizeof(Pixel), age_.data(), age_.size());
+  return bytes;
+}
+
+bool AdaptiveRate::restore(ImageSize size, std::span<const std::byte> bytes) {
+  clear();
+  if (bytes.empty()) return true;
+  if (bytes.size() != sizeof(frame_) + size.pixels() * (sizeof(Pixel) + 1)) return false;
+  resize(size);
+  std::memcpy(&frame_, bytes.data(), sizeof(frame_));
+  std::memcpy(pixels_.data(), bytes.data() + sizeof(frame_), pixels_.size() * sizeof(Pixel));
+  std::memcpy(age_.data(), bytes.data() + sizeof(frame_) + pixels_.size() * sizeof(Pixel), age_.size());
+  return true;
+}
+
+} // namespace packtrace

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "runtime/frame/frame_config.h"
+
+namespace packtrace {
+
+/// The options of ambient occlusion.
+struct AoOptions {
+  std::string resolution = "full", rate = "full", sampler = "net";
+  std::optional<float> radius;
+  bool no_falloff = false;
+  std::optional<float> interreflection;
+  std::vector<std::string> settings; ///< NAME=VALUE
+};
+
+/// Adds the options whose names begin with --ao. `options` must outlive the verb.
+void add_ao_options(CLI::App& verb, AoOptions& options);
+
+/// Sets what the options ask for. Throws Error(kUsage) for unknown names and values that are not allowed.
+void apply(const AoOptions& options, FrameConfig& config);
+
+} // namespace packtrace
