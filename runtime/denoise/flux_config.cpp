@@ -9,7 +9,7 @@ namespace {
 
 using F = FluxConfig;
 
-constexpr Setting<FluxConfig> kSettings[] = {
+constexpr Setting<FluxConfig> kFluxSettings[] = {
     {{"max_tspp", "Maximum length of the history of still pixels, in frames", 1, 65535}, &F::max_tspp},
     {{"max_tspp_moving", "Maximum length of the history of moving pixels, in frames", 1, 65535}, &F::max_tspp_moving},
     {{"fast_frames", "Length in frames of the fast history, which detects changes of the scene", 1, 64},
@@ -45,7 +45,7 @@ constexpr Setting<FluxConfig> kSettings[] = {
 
 } // namespace
 
-std::span<const Setting<FluxConfig>> flux_settings() { return kSettings; }
+std::span<const Setting<FluxConfig>> flux_settings() { return kFluxSettings; }
 
 void FluxConfig::validate() const {
   check_settings(flux_settings(), *this, "denoiser");

@@ -26,7 +26,7 @@ struct MappedTriangle {
   TriangleImages::Image image;
 };
 
-/// The error bound of laid_[index], which a tighter measurement may lower.
+/// The error bound of mapped_triangles_[index], which a tighter measurement may lower.
 struct Claim {
   double stated;
   uint32_t index;
