@@ -25,6 +25,7 @@ struct ImportOptions {
   double tessellation_tolerance = 1e-3;         ///< relative to the radius of the curved shape, within [1e-6, 0.5]
   bool allow_files_outside_scene_folder = true; ///< exporters write "../textures/x.png"
   bool keep_textures = false;                   ///< fill Scene::textures; otherwise materials have average colours only
+  bool keep_unused_objects = false;             ///< otherwise objects without instances are left out, with a warning
   /// Number of the world (WorldBegin ... WorldEnd with its options) to read, from 1. Unset: the first, with a warning
   /// if there are more.
   std::optional<uint32_t> world;

@@ -212,7 +212,7 @@ void SceneBuilder::report_and_drop_unused_objects() {
   uint64_t count = 0;
   uint32_t first = 0;
   std::string name; // copied before the objects are renumbered
-  drop_unused_objects(scene_, instance_residuals_, [&](uint32_t object) {
+  drop_unused_objects(scene_, instance_residuals_, false, [&](uint32_t object) {
     if (count++ > 0) return;
     first = object;
     name = in_quotes(scene_.objects[object].name);
@@ -236,7 +236,7 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
   take_queued_meshes();
   reporter_.set_sequence(last_sequence);
   // Drops unused objects first, so that files that only they need are not read.
-  report_and_drop_unused_objects();
+  if (!options_.keep_unused_objects) report_and_drop_unused_objects();
   for_each_shape(scene_, [&](const Shape& shape) { loader_.require(shape.mesh); });
   materials_.require_images(options_.keep_textures);
   loader_.load(scene_.meshes, graph_.images(), progress, statistics_, scene_.dropped_triangles);
@@ -253,7 +253,7 @@ ImportResult SceneBuilder::finish(const Place& end, Progress& progress) {
                                     : std::to_string(absent) + " shapes are left out: their alpha is 0 everywhere");
   scene_.cameras = cameras_.finish();
   statistics_.cameras_left_out = cameras_.left_out();
-  drop_unused_objects(scene_, instance_residuals_, [](uint32_t) {});
+  drop_unused_objects(scene_, instance_residuals_, options_.keep_unused_objects, [](uint32_t) {});
   move_far_world(scene_, instance_residuals_);
   instance_residuals_ = {};
   drop_unused_parts(scene_);

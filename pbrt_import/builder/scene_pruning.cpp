@@ -42,9 +42,9 @@ void drop_unused_animations(Scene& scene) {
 
 } // namespace
 
-void drop_unused_objects(Scene& scene, std::vector<Affine>& residuals,
+void drop_unused_objects(Scene& scene, std::vector<Affine>& residuals, bool keep_unplaced,
                          const std::function<void(uint32_t object)>& unused) {
-  std::vector<uint8_t> shown(scene.objects.size(), 0);
+  std::vector<uint8_t> shown(scene.objects.size(), keep_unplaced ? 1 : 0);
   for (const Instance& instance : scene.instances) shown[instance.object] = 1;
   for (uint32_t i = 0; i < scene.objects.size(); ++i) {
     if (!shown[i] && !scene.objects[i].shapes.empty()) unused(i);

@@ -17,8 +17,9 @@ void for_each_shape(Scene& scene, Function function) {
 
 /// Drops objects without instances, and objects without shapes together with their instances. The rest keeps its order.
 /// @param residuals by instance: rounding error of its transform, as in move_far_world(); updated with the instances
+/// @param keep_unplaced keep objects that have shapes but no instance
 /// @param unused called with the index of each object that has shapes but no instance
-void drop_unused_objects(Scene& scene, std::vector<Affine>& residuals,
+void drop_unused_objects(Scene& scene, std::vector<Affine>& residuals, bool keep_unplaced,
                          const std::function<void(uint32_t object)>& unused);
 
 /// Drops meshes and materials that no shape uses, then masks and textures that no material uses, then unused

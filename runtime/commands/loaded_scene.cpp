@@ -114,6 +114,7 @@ ImportResult import_for_command(const std::filesystem::path& file, const SceneOp
   options.world = scene_options.world;
   options.time = scene_options.time;
   options.keep_textures = keep_textures;
+  options.keep_unused_objects = scene_options.keep_unused_objects;
   options.memory = globals.memory;
   ImportResult result;
   try {

@@ -28,6 +28,7 @@ struct SceneOptions {
   bool strict = false;
   std::optional<uint32_t> world;
   std::optional<double> time;
+  bool keep_unused_objects = false; ///< as in ImportOptions; no option of its own
 };
 
 /// Adds --strict, --world and --time to a verb. `options` must outlive the verb.

@@ -36,6 +36,7 @@ Scene import_meadow(const std::filesystem::path& file, bool textures) {
   Progress progress;
   ImportOptions options;
   options.keep_textures = textures;
+  options.keep_unused_objects = true; // levels that no patch shows at first
   Scene scene = import_scene(file, options, diagnostics, progress).scene;
   for (const Diagnostic& d : diagnostics.entries()) EXPECT_EQ(d.severity, Severity::kNote) << to_string(d);
   return scene;
