@@ -19,11 +19,13 @@ void for_pixels(size_t count, const Work& work) {
   });
 }
 
-/// Threshold in [0, 1) of a pixel in a frame: evenly distributed over 4 x 4 pixels, and over the frames of a pixel.
+/// Threshold in [0, 1) of a pixel in a frame: evenly distributed over 16 x 16 pixels and aligned parts of them, which
+/// is Bayer's order, and over the frames of a pixel.
 float threshold(uint32_t x, uint32_t y, uint32_t frame) {
-  constexpr std::array<uint8_t, 16> kOrder{0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5}; // Bayer
   constexpr uint32_t kGolden = 0x9e3779b9u;
-  const uint32_t fixed = (uint32_t{kOrder[y % 4 * 4 + x % 4]} << 28) + frame * kGolden;
+  uint32_t order = 0; // the digits of x ^ y and y, the lowest in front
+  for (uint32_t bit = 0; bit < 4; ++bit) order = order << 2 | ((x ^ y) >> bit & 1u) << 1 | (y >> bit & 1u);
+  const uint32_t fixed = (order << 24) + frame * kGolden;
   return static_cast<float>(fixed >> 8) * 0x1p-24f;
 }
 

@@ -8,7 +8,7 @@ namespace {
 using A = AoConfig;
 
 constexpr Setting<AoConfig> kSettings[] = {
-    {{"radius", "Distance up to which surfaces occlude, in world units; 0 takes relative_radius", 0, 1e30}, &A::radius},
+    {{"radius", "Distance up to which surfaces occlude, in world units; 0 takes relative_radius", 0, 3e38}, &A::radius},
     {{"relative_radius", "The same as a fraction of the diagonal of the scene's bounds", 1e-6, 100},
      &A::relative_radius},
     {{"spp", "Samples per pixel and frame", 1, 65536}, &A::spp},

@@ -85,12 +85,26 @@ inline Vec2 lattice_point(uint32_t x, uint32_t y, uint32_t sample) {
   return {unit_float(x + sample * kLatticeSample[0]), unit_float(y + sample * kLatticeSample[1])};
 }
 
+/// A permutation of 0..63 for each seed.
+uint32_t permuted(uint32_t index, uint32_t seed) {
+  static_assert(kSetPoints == 64);
+  for (uint32_t round = 0; round < 4; ++round) { // each step is a bijection modulo 64
+    index ^= seed;
+    index *= seed >> 6 | 1u;
+    index = index % kSetPoints ^ index % kSetPoints >> 3;
+    seed = hash32(seed);
+  }
+  return index;
+}
+
+/// Neighbouring pixels and samples take unrelated cells of a set: cells of one row in one row of pixels would leave
+/// pixels whose windows overlap several blocks with larger errors than independent points.
 /// @param number of the pixel in its block of `block` pixels
 Vec2 multi_jitter_point(uint32_t number, uint32_t block, uint32_t seed, uint32_t sample) {
   const uint32_t per_set = kSetPoints / block; // samples for which a set lasts
   const uint32_t hash = hash_combine(seed, sample / per_set);
-  const uint32_t index = ((sample % per_set) * block + number) ^ (hash % kSetPoints);
-  return multi_jitter_sets()[(hash >> 6) % kSetCount][index];
+  const uint32_t index = permuted(sample % per_set * block + number, hash_combine(hash, 1));
+  return multi_jitter_sets()[hash % kSetCount][index];
 }
 
 PACKTRACE_AVX2_CLONES

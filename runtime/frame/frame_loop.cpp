@@ -263,7 +263,10 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
 /// The denoised AO, or the mean of the raw AO, of all traced pixels.
 std::vector<float> FrameLoop::accumulated_ao(PictureReport& report) {
   const Stopwatch denoising;
-  if (!config_.denoise) return raw_mean_.result();
+  if (!config_.denoise) {
+    const bool quarter = config_.ao_resolution == AoResolution::kQuarter;
+    return raw_mean_.result(raw_.size, quarter ? half_.gbuffer.instance : layers_.instances());
+  }
   const DenoisedAo& denoised = denoiser_.denoise();
   denoised_ = &denoised;
   report.times.denoise_s += denoising.seconds();

@@ -23,6 +23,9 @@ public:
   /// of the G-buffer are left empty, except motion_px, which is 0.
   void write_guides(GBuffer& guides) const;
 
+  /// Instance of each traced pixel's first hit; kNoInstance where all frames miss.
+  std::span<const uint32_t> instances() const { return instance_; }
+
   /// Box-filters the layers into an image. LOD layers stay as they are.
   /// @param ao, raw one value per traced pixel; negative: none, which is black in RenderedImage::shaded
   void resolve(const FrameConfig& config, std::span<const float> ao, std::span<const float> raw,
@@ -34,8 +37,8 @@ private:
   ImageSize size_;
   uint32_t frames_ = 0;
   float pixel_spread_ = 0.0f; ///< of the frames
-  std::vector<float> hits_;  ///< number of frames in which the pixel's camera ray hit
-  std::vector<float> depth_; ///< sums over hits
+  std::vector<float> hits_;   ///< number of frames in which the pixel's camera ray hit
+  std::vector<float> depth_;  ///< sums over hits
   std::vector<Vec3> normal_, albedo_;
   std::vector<uint32_t> instance_; ///< of the first hit
   // Empty if no material emits light.

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <numbers>
 #include <numeric>
 
 #include <gtest/gtest.h>
@@ -66,10 +67,13 @@ TEST(RaySorter, PermutesRaysWithInactiveOnesLast) {
 }
 
 TEST(RaySorter, KeysSeparateDirections) {
+  constexpr uint32_t kMean = 100;
   std::vector<uint32_t> counts(RaySorter::kKeys);
-  for (const Ray& ray : rays_in_many_directions(25600)) ++counts[direction_key(ray.direction)];
-  EXPECT_GT(std::ranges::min(counts), 40u);
-  EXPECT_LT(std::ranges::max(counts), 260u);
+  for (const Ray& ray : rays_in_many_directions(kMean * RaySorter::kKeys)) ++counts[direction_key(ray.direction)];
+  // A point of the octahedron at the distance r from the centre, 3^-1/2 to 1, has the density r^-3 of solid angle per
+  // area of the map, whose mean is 4 pi / 4.
+  EXPECT_GE(std::ranges::min(counts), static_cast<uint32_t>(kMean / std::numbers::pi));
+  EXPECT_LE(std::ranges::max(counts), static_cast<uint32_t>(std::ceil(kMean * std::pow(3.0, 1.5) / std::numbers::pi)));
 }
 
 TEST(AoRates, SortedRaysGiveTheSameBytes) {
