@@ -97,8 +97,8 @@ uint32_t permuted(uint32_t index, uint32_t seed) {
   return index;
 }
 
-/// Neighbouring pixels and samples take unrelated cells of a set: cells of one row in one row of pixels would leave
-/// pixels whose windows overlap several blocks with larger errors than independent points.
+/// Neighbouring pixels and samples take unrelated cells of a set. In the order of the cells, the points of a window of
+/// pixels that takes a part of a block would lie in one part of the square.
 /// @param number of the pixel in its block of `block` pixels
 Vec2 multi_jitter_point(uint32_t number, uint32_t block, uint32_t seed, uint32_t sample) {
   const uint32_t per_set = kSetPoints / block; // samples for which a set lasts

@@ -1,3 +1,5 @@
+#include <set>
+
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
@@ -70,6 +72,45 @@ TEST(FrameRates, CheckerboardsTraceHalfTheRays) {
     bench.still(config, 4, &half);
     EXPECT_EQ(2 * half.ao_rays, full.ao_rays);
   }
+}
+
+TEST(FrameRates, CheckerboardsTraceBothColoursOfEachOffsetOfTheCameraRays) {
+  const RateBench bench;
+  FrameConfig config = bench.config_;
+  config.ao_rate = AoRate::kCheckerboard;
+  FrameLoop loop({bench.source_.get(), nullptr, {}}, config);
+  Progress progress;
+  for (int round = 0; round < 2; ++round) { // the view comes to rest at frame 1 and at frame 10
+    loop.next_frame(RateBench::camera(0.1), 0.0, progress);
+    std::set<uint64_t> hit_counts;
+    for (int pair = 0; pair < 4; ++pair) {
+      const uint64_t rays = loop.next_frame(RateBench::camera(), 0.0, progress).ao_rays;
+      const FrameReport& second = loop.next_frame(RateBench::camera(), 0.0, progress);
+      EXPECT_EQ(rays + second.ao_rays, second.hit_pixels) << pair;
+      hit_counts.insert(second.hit_pixels);
+    }
+    EXPECT_GT(hit_counts.size(), 1u) << "the offsets show the same pixels";
+  }
+}
+
+TEST(RawMean, PixelsWithoutSamplesGetTheMeanOfTheNearestOnes) {
+  constexpr float kNone = kInvalidAo;
+  AoFrame frame;
+  frame.resize({5, 3});
+  frame.ao = {0.2f,  kNone, 0.6f,  kNone, kNone, //
+              kNone, kNone, 0.4f,  kNone, kNone, //
+              kNone, kNone, kNone, kNone, kNone};
+  std::vector<uint32_t> instances(15, 0);
+  instances[13] = kNoInstance;
+  RawMean mean;
+  mean.add(frame);
+  const std::vector<float> filled = mean.result(frame.size, instances);
+  EXPECT_FLOAT_EQ(filled[0], 0.2f);
+  EXPECT_FLOAT_EQ(filled[1], 0.4f);  // left and right
+  EXPECT_FLOAT_EQ(filled[3], 0.6f);  // left, not the diagonal
+  EXPECT_FLOAT_EQ(filled[11], 0.4f); // a diagonal, as none else has a value
+  EXPECT_FLOAT_EQ(filled[9], 0.4f);  // two pixels away, in its row
+  EXPECT_EQ(filled[13], kInvalidAo);
 }
 
 TEST(FrameRates, CheckerboardsConvergeToTheSameMean) {
