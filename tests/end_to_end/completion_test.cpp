@@ -13,8 +13,8 @@
 namespace packtrace::test {
 namespace {
 
-const std::vector<std::string> kVerbs{"bake", "info",    "render",     "denoise", "compare", "export",
-                                      "help", "version", "completion", "man"};
+const std::vector<std::string> kVerbs{"bake",   "info", "render",  "denoise",    "compare",
+                                      "export", "help", "version", "completion", "man"};
 
 /// Short and long options that a verb's help lists at the start of its lines.
 std::set<std::string> options_of(const std::string& verb) {

@@ -53,7 +53,7 @@ struct PackedTracer::Deformation {
 
 struct PackedTracer::Tables : TracedTrees {
   std::shared_ptr<DeformedTrees> deformed;
-  bool follows = false; ///< `deformed` is another tracer's
+  bool follows = false;                         ///< `deformed` is another tracer's
   std::vector<baked::TreeRecord> records_shown; ///< of all trees, with the grids of the deforming ones
   struct DeformingTree {
     uint32_t geometry, tree; ///< geometry of the file
