@@ -33,7 +33,9 @@ int main(int argc, char** argv) try {
   packtrace::Progress progress;
   packtrace::GBuffer gbuffer;
   packtrace::AoFrame noisy;
-  packtrace::AoDenoiser denoiser;
+  packtrace::DenoiserConfig denoising;
+  denoising.ours.stratified = is_stratified(ao.sampler);
+  packtrace::AoDenoiser denoiser(denoising);
   const packtrace::DenoisedAo* denoised = nullptr;
   for (uint32_t frame = 0; frame < 8; ++frame) {
     // A camera that moves passes the previous frame's view as well.

@@ -19,6 +19,9 @@ enum class SamplerKind : uint8_t {
 /// Number of multi-jittered sets and of points in each.
 inline constexpr uint32_t kSetCount = 83, kSetPoints = 64;
 
+/// Whether the samples of a pixel are stratified, so that their mean errs less than that of independent samples.
+constexpr bool is_stratified(SamplerKind kind) { return kind != SamplerKind::kIndependent; }
+
 /// Generates sample points in the unit square per pixel and sample number. The sampler has no state: sample n of a
 /// pixel does not depend on how samples are split into frames, so 32 frames of 1 sample equal one frame of 32 samples.
 /// docs/ambient_occlusion.md compares the kinds.

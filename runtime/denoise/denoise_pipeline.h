@@ -12,9 +12,10 @@ namespace packtrace {
 /// Result of one frame, rows top to bottom, one entry per pixel in every array.
 struct DenoisedAo {
   ImageSize size;
-  std::vector<float> ao;       ///< [0,1], or kInvalidAo at pixels whose camera ray missed
-  std::vector<float> variance; ///< variance of the pixel's temporal mean before any blur, AO squared; 0 without history
-  std::vector<float> tspp;     ///< temporal samples per pixel: frames of accumulated history; 0 without history
+  std::vector<float> ao; ///< [0,1], or kInvalidAo at pixels whose camera ray missed
+  std::vector<float>
+      variance;            ///< variance of the pixel's temporal mean before the filter, AO squared; 0 without history
+  std::vector<float> tspp; ///< temporal samples per pixel: frames of accumulated history; 0 without history
 };
 
 /// Where a pixel's history comes from.

@@ -12,8 +12,8 @@
 namespace packtrace {
 
 /// Spatio-temporal denoiser for ambient occlusion (docs/denoiser.md). It accumulates samples along surface motion and
-/// removes the remaining noise with edge-aware blurs. The accumulated history itself is never blurred, so a still image
-/// converges to the mean of its samples.
+/// removes the remaining noise by flows between similar pixels. The accumulated history itself is never blurred, so a
+/// still image converges to the mean of its samples.
 ///
 /// Results are bit-identical for any number of threads. Use one object per view, from one thread at a time.
 class AoDenoiser {
@@ -23,8 +23,8 @@ public:
 
   /// Denoises the next frame. A change of the image size discards the history, as reset() does. Negative and non-finite
   /// values of `ao` mean that the pixel has no sample in this frame. A pixel with a non-finite depth counts as a miss;
-  /// a pixel with a non-finite normal gets no history and no blur. Other pixels are not affected. Throws Error (kUsage)
-  /// if the two sizes differ or an array does not have one entry per pixel.
+  /// a pixel with a non-finite normal gets no history and hardly any filter. Other pixels are not affected. Throws
+  /// Error (kUsage) if the two sizes differ or an array does not have one entry per pixel.
   /// @return the result, valid until the next call
   const DenoisedAo& next_frame(const GBuffer& gbuffer, const AoFrame& ao) {
     add_frame(gbuffer, ao);
@@ -37,7 +37,7 @@ public:
   /// @param ao samples at the surfaces that this frame's camera rays hit
   void add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source = HistorySource::kMotion);
 
-  /// The second half of next_frame(): blurs a copy of the history. Without a frame, all pixels are misses.
+  /// The second half of next_frame(): filters a copy of the history. Without a frame, all pixels are misses.
   /// @return the result, valid until the next call
   const DenoisedAo& denoise();
 

@@ -1,9 +1,5 @@
 #include "runtime/denoise/flux_config.h"
 
-#include <string>
-
-#include "pbrt_import/base/error.h"
-
 namespace packtrace {
 namespace {
 
@@ -28,30 +24,23 @@ constexpr Setting<FluxConfig> kFluxSettings[] = {
       SettingRule::kPowerOfTwo},
      &F::reprojection_normal_power},
     {{"reprojection_instance_test", "Reject history of another instance", 0, 1}, &F::reprojection_instance_test},
-    {{"blur_normal_power", "Exponent of the cosine between the normals of two pixels that are blurred", 1, 1024,
-      SettingRule::kPowerOfTwo},
-     &F::blur_normal_power},
-    {{"blur_depth", "Relative distance from the other's tangent plane at which two pixels are not blurred", 0, 1},
-     &F::blur_depth},
-    {{"blur_slope", "The same in units of the disparity's change along the tap offset", 0, 10}, &F::blur_slope},
-    {{"blur_limit", "Squared difference of two patches in units of the noise at which they are not blurred", 1.25, 100},
-     &F::blur_limit},
-    {{"blur_trust_frames", "Histories not much longer than this many frames hardly count as edges", 0, 1000},
-     &F::blur_trust_frames},
-    {{"blur_fade_begin", "Frames of history at which the blur begins to fade", 0, 65535}, &F::blur_fade_begin},
-    {{"blur_fade_end", "Frames of history at which the blur ends; above blur_fade_begin", 0, 65535}, &F::blur_fade_end},
-    {{"disocclusion_frames", "Frames of history at which the wide blur ends", 1, 65535}, &F::disocclusion_frames},
+    {{"passes", "Number of filter passes: the first ones of the steps 1, 2, 4 and 1 pixels", 0, 4}, &F::passes},
+    {{"guide_depth", "Relative distance from the other's tangent plane at which two pixels hardly mix", 0, 1},
+     &F::guide_depth},
+    {{"guide_slope", "The same in units of the disparity's change along the offset", 0, 10}, &F::guide_slope},
+    {{"noise_tolerance", "Differences of patches count as noise up to this many times its variance", 0.1, 100},
+     &F::noise_tolerance},
+    {{"patch_limit", "Mean distance of patches at which pixels do not mix", 0.1, 100}, &F::patch_limit},
+    {{"variance_prior", "Weight of the variance around a pixel against its own, in frames", 0.1, 1000},
+     &F::variance_prior},
+    {{"variance_distrust", "The variance of n frames is multiplied by 1 + this / n^2", 0, 1000}, &F::variance_distrust},
+    {{"stratified", "Samples of a pixel are stratified over frames; render finds out by itself", 0, 1}, &F::stratified},
 };
 
 } // namespace
 
 std::span<const Setting<FluxConfig>> flux_settings() { return kFluxSettings; }
 
-void FluxConfig::validate() const {
-  check_settings(flux_settings(), *this, "denoiser");
-  if (blur_fade_begin >= blur_fade_end)
-    throw Error(ErrorKind::kUsage, "denoiser: blur_fade_begin is " + std::to_string(blur_fade_begin) +
-                                       ", not below blur_fade_end, " + std::to_string(blur_fade_end));
-}
+void FluxConfig::validate() const { check_settings(flux_settings(), *this, "denoiser"); }
 
 } // namespace packtrace

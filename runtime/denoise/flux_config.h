@@ -14,7 +14,7 @@ struct FluxConfig {
 
   /// Maximum history length in frames for moving pixels, whose history gets slightly blurrier with every frame's
   /// resampling. [1..65535]
-  uint32_t max_tspp_moving = 33;
+  uint32_t max_tspp_moving = 8;
 
   /// Length in frames of the fast history, which detects that the scene has changed. [1..64]
   uint32_t fast_frames = 4;
@@ -47,31 +47,31 @@ struct FluxConfig {
   /// Reject history from another instance.
   bool reprojection_instance_test = true;
 
-  /// Blur weight: exponent of the cosine between the two normals. Power of two. [1..1024]
-  uint32_t blur_normal_power = 16;
+  /// Number of filter passes: the first ones of the steps 1, 2, 4 and 1 pixels. [0..4]
+  uint32_t passes = 4;
 
-  /// Blur weight: it falls to zero where a point's distance from the other's tangent plane, in disparity, reaches
-  /// blur_depth * disparity ... [0..1]
-  float blur_depth = 0.005f;
+  /// Guide weight: it falls to its least value where a point's distance from the other's tangent plane, in disparity,
+  /// reaches guide_depth * disparity ... [0..1]
+  float guide_depth = 0.01f;
 
-  /// ... + blur_slope * disparity change along the tap offset. [0..10]
-  float blur_slope = 0.5f;
+  /// ... + guide_slope * disparity change along the offset. [0..10]
+  float guide_slope = 0.5f;
 
-  /// Blur weight: it falls to zero where the mean squared difference of two patches reaches this multiple of the value
-  /// expected from noise alone. [1.25..100]
-  float blur_limit = 3.2f;
+  /// Differences of patches count as noise up to this many times its variance. [0.1..100]
+  float noise_tolerance = 1.96f;
 
-  /// For histories not much longer than this many frames, the estimated noise variance is raised, so that value
-  /// differences hardly count as edges. [0..1000]
-  float blur_trust_frames = 4.0f;
+  /// Mean distance of patches at which pixels exchange nothing. [0.1..100]
+  float patch_limit = 4.0f;
 
-  /// The blur has full strength up to blur_fade_begin frames of history and fades linearly to zero at blur_fade_end.
-  /// [0..65535], begin < end.
-  uint32_t blur_fade_begin = 64;
-  uint32_t blur_fade_end = 256;
+  /// Weight of the variance around a pixel against its own, in frames. [0.1..1000]
+  float variance_prior = 6.0f;
 
-  /// The wide blur of disoccluded surfaces fades linearly to zero at this many frames of history. [1..65535]
-  uint32_t disocclusion_frames = 28;
+  /// The variance of n frames is multiplied by 1 + variance_distrust / n^2. [0..1000]
+  float variance_distrust = 4.0f;
+
+  /// The samples of a pixel are stratified over frames (see is_stratified()), so that their mean errs less than that of
+  /// independent samples with the same variance. FrameLoop turns this on. With independent samples it leaves noise.
+  bool stratified = false;
 
   /// Throws Error (kUsage) naming the first field that is out of range.
   void validate() const;

@@ -6,9 +6,7 @@
 
 #include "pbrt_import/base/error.h"
 #include "runtime/denoise/depth_derivatives.h"
-#include "runtime/denoise/disocclusion_blur.h"
-#include "runtime/denoise/edge_blur.h"
-#include "runtime/denoise/edge_weights.h"
+#include "runtime/denoise/filter.h"
 #include "runtime/denoise/guides.h"
 #include "runtime/denoise/reprojection.h"
 #include "runtime/denoise/simd.h"
@@ -17,21 +15,9 @@
 namespace packtrace {
 namespace {
 
-/// Number of blur passes applied to all surfaces (tap distances 1 and 2). The remaining passes are for disoccluded
-/// surfaces.
-constexpr size_t kBlurPasses = 2;
-
-PACKTRACE_AVX2_CLONES
-void write_row(int width, const float* __restrict value, const float* __restrict disparity, float* __restrict ao) {
-  for (int x = 0; x < width; ++x) {
-    const float clamped = smaller(larger(value[x], 0.0f), 1.0f);
-    ao[x] = disparity[x] > 0.0f ? clamped : kInvalidAo;
-  }
-}
-
 class FluxPipeline final : public DenoisePipeline {
 public:
-  explicit FluxPipeline(const FluxConfig& checked) : config_(checked) {}
+  explicit FluxPipeline(const FluxConfig& checked) : config_(checked), filter_(checked, chosen_isa()) {}
 
   void resize(ImageSize size) override;
   void add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source) override;
@@ -50,28 +36,23 @@ private:
     work(h.mean), work(h.square), work(h.fast), work(h.samples);
   }
   void update_history(const GBuffer& gbuffer);
-  void compare_neighbours();
-  void blur();
-  void write(DenoisedAo& out) const;
+  void differentiate();
 
   FluxConfig config_;
   bool has_frame_ = false;
-  bool edges_outdated_ = false;     ///< `edges_` do not belong to the guides
-  bool statistics_pending_ = false; ///< correct_history() has not run for the last frame
-  FrameHistory now_, before_;       // `before_` is only used while a frame is denoised
+  bool derivatives_outdated_ = false; ///< they do not belong to the guides
+  FrameHistory now_, before_;         // `before_` is only used while a frame is denoised
   DepthDerivatives derivatives_;
-  std::vector<EdgeWeights> edges_ = {EdgeWeights(1), EdgeWeights(2), EdgeWeights(4)};
+  AoFilter filter_;
+  bool moving_ = false; ///< something moved in the last frame
   FrameSamples samples_;
-  NoisyImage image_;
-  BlurScratch scratch_;
   DenoisedAo result_;
 };
 
 void FluxPipeline::resize(ImageSize size) {
   for (FrameHistory* frame : {&now_, &before_}) frame->guides.resize(size), frame->history.resize(size);
   derivatives_.resize(size);
-  for (EdgeWeights& weights : edges_) weights.resize(size);
-  samples_.resize(size), image_.resize(size), scratch_.resize(size);
+  samples_.resize(size);
   result_.size = size;
   result_.ao.assign(size.pixels(), kInvalidAo);
   result_.variance.assign(size.pixels(), 0.0f);
@@ -81,70 +62,40 @@ void FluxPipeline::resize(ImageSize size) {
 
 /// Loads this frame's guides and reprojects the history. Does nothing if no pixel moves and no guide changes.
 void FluxPipeline::update_history(const GBuffer& gbuffer) {
-  if (has_frame_ && now_.guides.still_matches(gbuffer)) return;
+  moving_ = has_frame_ && !now_.guides.still_matches(gbuffer);
+  if (has_frame_ && !moving_) return;
   std::swap(now_, before_);
   now_.guides.load(gbuffer);
-  compare_neighbours();
+  differentiate();
   if (!has_frame_) before_.history.resize(gbuffer.size);
   reproject(before_, now_.guides, derivatives_, gbuffer.motion_px, gbuffer.previous_z, config_, now_.history);
   has_frame_ = true;
 }
 
-void FluxPipeline::compare_neighbours() {
+void FluxPipeline::differentiate() {
   derivatives_.compute(now_.guides);
-  for (EdgeWeights& weights : edges_) weights.compute(now_.guides, derivatives_, config_);
-  edges_outdated_ = false;
-}
-
-void FluxPipeline::blur() {
-  const ImageSize size = now_.guides.size;
-  const Plane<float>& tspp = now_.history.samples;
-  fill_unsampled(now_.guides, tspp, edges_, image_);
-  const Fade fade{static_cast<float>(config_.blur_fade_begin), static_cast<float>(config_.blur_fade_end)};
-  const float limit = config_.blur_limit;
-  for (size_t i = 0; i < kBlurPasses; ++i) edge_blur(edges_[i], tspp, fade, limit, size, image_, scratch_);
-  disocclusion_blur(tspp, std::span(edges_).subspan(kBlurPasses), static_cast<float>(config_.disocclusion_frames),
-                    limit, size, image_, scratch_);
-}
-
-void FluxPipeline::write(DenoisedAo& out) const {
-  const ImageSize size = now_.guides.size;
-  for_row_blocks(size.height, [&](int first, int last) {
-    for (int y = first; y < last; ++y) {
-      const size_t begin = static_cast<size_t>(y) * size.width;
-      write_row(static_cast<int>(size.width), image_.value.row(y), now_.guides.disparity.row(y), &out.ao[begin]);
-      std::copy_n(now_.history.samples.row(y), size.width, &out.tspp[begin]);
-    }
-  });
+  derivatives_outdated_ = false;
 }
 
 void FluxPipeline::add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source) {
   const bool same_pixels = source == HistorySource::kPixel && has_frame_;
   if (same_pixels) {
     now_.guides.load(gbuffer);
-    edges_outdated_ = true;
+    derivatives_outdated_ = true;
+    moving_ = false;
   } else {
     update_history(gbuffer);
   }
   FluxConfig config = config_;
   if (same_pixels) config.max_tspp = std::numeric_limits<uint32_t>::max(); // the plain mean of all samples_
   accumulate(ao.ao, now_.guides, config, now_.history, samples_);
-  statistics_pending_ = same_pixels;
-  if (!same_pixels) correct_history(samples_, now_.guides, config_, now_.history, result_.variance, image_);
+  if (!same_pixels) correct_history(samples_, now_.guides, config_, now_.history);
 }
 
 const DenoisedAo& FluxPipeline::denoise() {
   if (!has_frame_) return result_;
-  if (edges_outdated_) compare_neighbours();
-  if (statistics_pending_) {
-    FluxConfig config = config_;
-    // Nothing moves: where jitter makes the histories differ, nothing has changed.
-    config.change_tolerance = std::numeric_limits<float>::infinity();
-    correct_history(samples_, now_.guides, config, now_.history, result_.variance, image_);
-    statistics_pending_ = false;
-  }
-  blur();
-  write(result_);
+  if (derivatives_outdated_) differentiate();
+  filter_.run({now_.guides, derivatives_, now_.history, moving_}, {result_.ao, result_.variance, result_.tspp});
   return result_;
 }
 
@@ -177,7 +128,7 @@ void FluxPipeline::restore(ImageSize size, std::span<const std::byte> bytes) {
     }
   });
   has_frame_ = true;
-  edges_outdated_ = true;
+  derivatives_outdated_ = true;
 }
 
 } // namespace

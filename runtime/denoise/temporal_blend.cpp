@@ -1,6 +1,5 @@
 #include "runtime/denoise/temporal_blend.h"
 
-#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -10,12 +9,6 @@
 
 namespace packtrace {
 namespace {
-
-/// Weight of the window's variance relative to the history's own, in frames.
-constexpr float kVariancePrior = 4.0f;
-
-/// Added to the variance so that the precision stays finite. Far below the square of an 8-bit quantisation step.
-constexpr float kVarianceFloor = 1e-8f;
 
 struct AccumulateRow {
   const float *ao, *disparity;
@@ -48,20 +41,18 @@ void accumulate_row(int width, const AccumulateRow& rows, float longest, float f
 inline float excess(float change, float limit) { return std::copysign(larger(std::abs(change) - limit, 0.0f), change); }
 
 struct CorrectRow {
-  const float *count, *local_variance, *change, *narrow_count, *narrow_change, *disparity;
-  float *mean, *square, *samples, *variance, *value, *inverse_variance;
+  const float *count, *local_variance, *change, *narrow_count, *narrow_change;
+  float *mean, *square, *samples;
 };
 
 struct CorrectScales {
   float fast_share; ///< variance of the fast history divided by the variance of a sample
-  float gamma, tolerance, response, fast_frames, trust_frames;
+  float gamma, tolerance, response, fast_frames;
 };
 
-/// Returns the smallest sample count of the row's hit pixels.
 PACKTRACE_AVX2_CLONES
-float correct_row(int width, const CorrectRow& rows, CorrectScales s) {
+void correct_row(int width, const CorrectRow& rows, CorrectScales s) {
   const CorrectRow r = rows;
-  int32_t min_tspp = std::numeric_limits<int32_t>::max(); // non-negative floats sort like their bits as integers
 #pragma GCC ivdep
   for (int x = 0; x < width; ++x) {
     const float noise = r.local_variance[x] * s.fast_share;
@@ -69,28 +60,16 @@ float correct_row(int width, const CorrectRow& rows, CorrectScales s) {
     const float narrow =
         excess(r.narrow_change[x], s.gamma * std::sqrt(noise / larger(r.narrow_count[x], 1.0f)) + s.tolerance);
     const float wanted = std::abs(narrow) > std::abs(wide) ? narrow : wide;
-    const bool seen = r.samples[x] > 0.0f;
     const float old_mean = r.mean[x];
-    const float new_mean = seen ? smaller(larger(old_mean + wanted, 0.0f), 1.0f) : old_mean;
+    const float new_mean = r.samples[x] > 0.0f ? smaller(larger(old_mean + wanted, 0.0f), 1.0f) : old_mean;
     const float shift = new_mean - old_mean;
     const float kept = 1.0f - smaller(s.response * std::abs(shift), 1.0f);
     const float n = smaller(r.samples[x], larger(r.samples[x] * kept, s.fast_frames));
     const float moment = larger(r.square[x] - old_mean * old_mean, 0.0f); // a shift keeps the variance
-    const float sample_variance =
-        (kVariancePrior * r.local_variance[x] + n * moment) / (kVariancePrior + larger(n, 1.0f) - 1.0f);
-    const float variance = seen ? sample_variance / larger(n, 1.0f) : 0.0f;
-    const float distrust = s.trust_frames / larger(n, 1.0f);
-    const float hit_samples = r.disparity[x] > 0.0f ? n : std::numeric_limits<float>::max();
-    const int32_t bits = std::bit_cast<int32_t>(hit_samples);
-    min_tspp = bits < min_tspp ? bits : min_tspp;
     r.mean[x] = new_mean;
     r.square[x] = moment + new_mean * new_mean;
     r.samples[x] = n;
-    r.variance[x] = variance;
-    r.value[x] = new_mean;
-    r.inverse_variance[x] = 1.0f / (variance * (1.0f + distrust * distrust) + kVarianceFloor);
   }
-  return std::bit_cast<float>(min_tspp);
 }
 
 } // namespace
@@ -114,28 +93,20 @@ void accumulate(std::span<const float> ao, const Guides& guides, const FluxConfi
   });
 }
 
-void correct_history(const FrameSamples& samples, const Guides& guides, const FluxConfig& config, History& history,
-                     std::span<float> value_variance, NoisyImage& image) {
+void correct_history(const FrameSamples& samples, const Guides& guides, const FluxConfig& config, History& history) {
   const float share = 1.0f / static_cast<float>(config.fast_frames);
-  const CorrectScales scales{share / (2.0f - share),
-                             config.change_gamma,
-                             config.change_tolerance,
-                             config.change_response,
-                             static_cast<float>(config.fast_frames),
-                             config.blur_trust_frames};
+  const CorrectScales scales{share / (2.0f - share), config.change_gamma, config.change_tolerance,
+                             config.change_response, static_cast<float>(config.fast_frames)};
   tbb::enumerable_thread_specific<LocalStatisticsRows> statistics(guides.size.width, config.window);
   for_row_blocks(guides.size.height, [&](int first, int last) {
     LocalStatisticsRows& rows = statistics.local();
     rows.begin(samples, first);
     for (int y = first; y < last; ++y) {
       const LocalStatistics& local = rows.at(samples, y);
-      const CorrectRow row{local.count.data(),         local.variance.data(),
-                           local.change.data(),        local.narrow_count.data(),
-                           local.narrow_change.data(), guides.disparity.row(y),
-                           history.mean.row(y),        history.square.row(y),
-                           history.samples.row(y),     &value_variance[static_cast<size_t>(y) * guides.size.width],
-                           image.value.row(y),         image.inverse_variance.row(y)};
-      image.min_tspp[static_cast<size_t>(y)] = correct_row(static_cast<int>(guides.size.width), row, scales);
+      const CorrectRow row{local.count.data(),        local.variance.data(),      local.change.data(),
+                           local.narrow_count.data(), local.narrow_change.data(), history.mean.row(y),
+                           history.square.row(y),     history.samples.row(y)};
+      correct_row(static_cast<int>(guides.size.width), row, scales);
     }
   });
 }

@@ -2,7 +2,6 @@
 
 #include <span>
 
-#include "runtime/denoise/edge_blur.h"
 #include "runtime/denoise/flux_config.h"
 #include "runtime/denoise/guides.h"
 #include "runtime/denoise/history.h"
@@ -18,7 +17,7 @@ namespace packtrace {
 void accumulate(std::span<const float> ao, const Guides& guides, const FluxConfig& config, History& history,
                 FrameSamples& samples);
 
-/// Corrects the slow history where the fast history shows that the scene has changed, and estimates the noise.
+/// Corrects the slow history where the fast history shows that the scene has changed.
 ///
 /// The change at a pixel is the mean over its window of the fast minus the slow history. Both histories contain the
 /// same spatial edges, so the expected change is 0 while the scene stands still, however much AO varies in space.
@@ -26,14 +25,6 @@ void accumulate(std::span<const float> ao, const Guides& guides, const FluxConfi
 /// standard errors + change_tolerance, the excess is added to the mean and the sample count is reduced, so that detail
 /// recovers within a few frames. A 3 x 3 window is tested in the same way to find changes in areas too small for the
 /// wide window; the larger of the two corrections is applied.
-///
-/// @param value_variance out, one entry per pixel: variance of history.mean, AO squared; 0 without history. It is the
-///        sample variance divided by tspp. The sample variance blends the history's own variance with the window's
-///        variance, which dominates while the history is short.
-/// @param image out: history.mean and the precision for the blurs. A short history has a skewed distribution and a
-///        poor variance estimate, so differences between young pixels are weak evidence of an edge. The variance used
-///        for the precision is therefore multiplied by 1 + (blur_trust_frames / tspp)^2.
-void correct_history(const FrameSamples& samples, const Guides& guides, const FluxConfig& config, History& history,
-                     std::span<float> value_variance, NoisyImage& image);
+void correct_history(const FrameSamples& samples, const Guides& guides, const FluxConfig& config, History& history);
 
 } // namespace packtrace

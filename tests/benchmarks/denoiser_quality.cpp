@@ -63,8 +63,7 @@ private:
 
 /// The settings without filter.
 DenoiserConfig unfiltered(DenoiserConfig config) {
-  config.kind = DenoiserKind::kOurs;
-  config.ours.blur_fade_begin = 0, config.ours.blur_fade_end = 1, config.ours.disocclusion_frames = 1;
+  config.kind = DenoiserKind::kOurs, config.ours.passes = 0;
   return config;
 }
 
@@ -121,6 +120,7 @@ int run(int argc, char** argv) {
   app.add_option("--json", json_file, "Also write the figures to this file");
   if (const auto exit_code = parse_arguments(app, argc, argv)) return *exit_code;
   DenoiserConfig config;
+  config.ours.stratified = true; // as the samples of make_sequence() are
   if (denoiser == "reference") config.kind = DenoiserKind::kReference;
   for (const std::string& setting : settings) config.set(setting);
   config.validate();

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/scene/world_view.h"
 #include "runtime/ao/ao_integrator.h"
 #include "runtime/camera/primary_visibility.h"
 #include "runtime/frame/camera_path.h"
@@ -73,7 +74,8 @@ public:
     const DVec3 forward = glm::normalize(DVec3(camera_.world_from_camera[2]));
     const DVec3 pivot = DVec3(camera_.world_from_camera[3]) + forward * double{depths[depths.size() / 2]};
     const auto at = [&](uint32_t frame) {
-      return view(orbited(camera_, pivot, nearest_up_axis(camera_), options_.degrees_per_frame * frame));
+      return view(
+          orbited(camera_, pivot, estimate_world_view(input_.source.cameras()).up, options_.degrees_per_frame * frame));
     };
     for (uint32_t f = 0; f < options_.frames; ++f) {
       camera_rays(at(f), at(f > 0 ? f - 1 : 0), g);

@@ -48,34 +48,27 @@ TEST(DenoiserConfig, EndsOfEveryRangeAreAcceptedAndWhatLiesBeyondIsRejected) {
   expect_range<uint32_t>(&FluxConfig::fast_frames, 1, 64, 0, 65);
   expect_range<uint32_t>(&FluxConfig::window, 3, 9, 2, 10);
   expect_range<uint32_t>(&FluxConfig::reprojection_normal_power, 1, 1024, 0, 2048);
-  expect_range<uint32_t>(&FluxConfig::blur_normal_power, 1, 1024, 0, 2048);
-  expect_range<uint32_t>(&FluxConfig::disocclusion_frames, 1, 65535, 0, 65536);
+  expect_range<uint32_t>(&FluxConfig::passes, 0, 4, 5, 6);
   expect_float_range(&FluxConfig::change_gamma, 0.1f, 10.0f);
   expect_float_range(&FluxConfig::change_tolerance, 0.0f, 1.0f);
   expect_float_range(&FluxConfig::change_response, 0.0f, 100.0f);
   expect_float_range(&FluxConfig::reprojection_depth, 0.0f, 1.0f);
   expect_float_range(&FluxConfig::reprojection_slope, 0.0f, 10.0f);
-  expect_float_range(&FluxConfig::blur_depth, 0.0f, 1.0f);
-  expect_float_range(&FluxConfig::blur_slope, 0.0f, 10.0f);
-  expect_float_range(&FluxConfig::blur_limit, 1.25f, 100.0f);
-  expect_float_range(&FluxConfig::blur_trust_frames, 0.0f, 1000.0f);
+  expect_float_range(&FluxConfig::guide_depth, 0.0f, 1.0f);
+  expect_float_range(&FluxConfig::guide_slope, 0.0f, 10.0f);
+  expect_float_range(&FluxConfig::patch_limit, 0.1f, 100.0f);
+  expect_float_range(&FluxConfig::variance_distrust, 0.0f, 1000.0f);
 }
 
-TEST(DenoiserConfig, EvenWindowsPowersThatAreNoneAndEmptyFadesAreRejected) {
+TEST(DenoiserConfig, EvenWindowsAndPowersThatAreNoneAreRejected) {
   DenoiserConfig config;
   config.ours.window = 4;
   expect_rejected(config);
   config = {};
-  config.ours.blur_normal_power = 48;
+  config.ours.reprojection_normal_power = 48;
   expect_rejected(config);
   config = {};
   config.ours.reprojection_normal_power = 3;
-  expect_rejected(config);
-  config = {};
-  config.ours.blur_fade_begin = config.ours.blur_fade_end;
-  expect_rejected(config);
-  config = {};
-  config.ours.blur_fade_end = 65536;
   expect_rejected(config);
 }
 

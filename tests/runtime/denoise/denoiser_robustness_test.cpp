@@ -1,13 +1,16 @@
 #include "runtime/denoise/denoiser.h"
 
 #include <cmath>
+#include <cstdlib>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
 #include "pbrt_import/base/error.h"
+#include "pbrt_import/base/isa.h"
 #include "tests/runtime/denoise/synthetic.h"
 
 namespace packtrace {
@@ -85,11 +88,12 @@ TEST(AoDenoiser, GarbageEverywhereGivesSoundImages) {
   }
 }
 
-std::vector<float> run_sequence(size_t threads) {
+std::vector<float> run_sequence(size_t threads, const char* isa = nullptr) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+  if (isa != nullptr) setenv("PACKTRACE_ISA", isa, 1);
   AoDenoiser denoiser;
   std::vector<float> all_results;
-  const ImageSize size{131, 117};
+  const ImageSize size{131, 237}; // more than one strip of the filter
   for (uint32_t f = 0; f < 12; ++f) {
     GBuffer g = wall(size);
     for (uint32_t i = 0; i < size.pixels(); ++i) {
@@ -112,8 +116,21 @@ TEST(AoDenoiser, ThreadsAndRepeatsDoNotChangeABit) {
   EXPECT_EQ(one, run_sequence(7));
 }
 
+TEST(AoDenoiser, InstructionSetsDoNotChangeABit) {
+  const char* before = std::getenv("PACKTRACE_ISA");
+  const std::string restored = before != nullptr ? before : "";
+  const std::vector<float> scalar = run_sequence(2, "scalar");
+  if (isa_supported(Isa::kAvx2)) {
+    EXPECT_EQ(scalar, run_sequence(2, "avx2"));
+  }
+  if (isa_supported(Isa::kAvx512)) {
+    EXPECT_EQ(scalar, run_sequence(2, "avx512"));
+  }
+  before != nullptr ? setenv("PACKTRACE_ISA", restored.c_str(), 1) : unsetenv("PACKTRACE_ISA");
+}
+
 TEST(AoDenoiser, CheckerboardsAreFilledAtOnceAndStayClose) {
-  const ImageSize size{96, 64};
+  const ImageSize size{288, 192}; // some 300 times as large as the filter, so that RMSEs are good to 5 %
   const auto truth = [](uint32_t, uint32_t) { return expected(0.5f); };
   AoDenoiser full, half;
   for (uint32_t f = 0; f < 32; ++f) {

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "pbrt_import/base/isa.h"
+
+namespace packtrace {
+
+/// Offsets (x, y) of the pairs of pixels that a filter pass compares, in units of its step. The other four neighbours
+/// are the same pairs from their other ends.
+inline constexpr std::array<std::array<int, 2>, 4> kPairOffsets = {{{1, 0}, {0, 1}, {1, 1}, {-1, 1}}};
+
+/// Pixels before and after each row that kernels may read.
+inline constexpr int kRowPadding = 16;
+
+/// What guide weights compare, for one row of pixels.
+struct SurfaceRow {
+  const float *disparity, *dx, *dy; ///< dx, dy: change of the disparity per pixel
+  const float *nx, *ny, *nz;
+};
+
+/// Least guide weight, of 255, of two pixels that both hit something.
+inline constexpr uint8_t kMinGuide = 3;
+
+struct GuideTerms {
+  float depth, slope, offset_x, offset_y;
+};
+
+/// Weights of the pairs that begin in one row, by kPairOffsets.
+using PairRow = std::array<const uint8_t*, 4>;
+
+/// Values of a pass at the row of a pixel and at the rows of its neighbours, one step above and below.
+struct PassRows {
+  const float *value, *value_above, *value_below;
+  const float *variance, *variance_above, *variance_below;
+  const float *scale, *scale_above, *scale_below; ///< 1 / D
+  PairRow here, above;                            ///< pairs that begin in the row, and in the row one step above
+};
+
+/// Moments of the pixels of one row, or of windows; all 0 for pixels without history.
+struct MomentRows {
+  float *seen, *value, *square; ///< 1, a, a^2
+  float *spread_seen, *spread;  ///< 1 and s2, of pixels with at least two samples
+};
+
+struct VarianceTerms {
+  float prior; ///< weight of the window's variance in frames
+  float still_factor, still_power, moving_base, moving_gain, longest_moving, distrust;
+  float young; ///< the filter is told 1 + young / n + distrust / n^2 times the variance of n frames
+  bool moving;
+};
+
+/// Functions on rows of pixels; docs/denoiser.md has the formulas. Rows are readable up to kRowPadding pixels outside
+/// [0, width), unless stated otherwise.
+struct FilterKernels {
+  /// Guide weights of the pairs (p, q): kMinGuide to 255 where both pixels hit, and 0 where one does not.
+  void (*guide)(int width, const SurfaceRow& p, const SurfaceRow& q, const GuideTerms& terms, uint8_t* weights);
+  /// Distances d of the pairs (p, q): 0 for noise, from -1 / tolerance on; 0 where the guide weight is 0.
+  void (*compare)(int width, const float* p, const float* p_variance, const float* q, const float* q_variance,
+                  const uint8_t* guide, float tolerance, float* distance);
+  /// Weights of pairs from the distances of three rows.
+  /// @param column scratch
+  void (*weigh)(int width, const std::array<const float*, 3>& distance, const uint8_t* guide, float limit,
+                float* column, uint8_t* weights);
+  /// 1 / D. @param samples frames of history, for the pass in which lone samples give way; else null
+  void (*normalise)(int width, int step, const PairRow& here, const PairRow& above, const float* samples, float* scale);
+  /// Moves AO between the pixels of pairs.
+  void (*exchange)(int width, int step, const PassRows& rows, float* value, float* variance);
+  /// Moments of single pixels.
+  void (*moments)(int width, const float* mean, const float* square, const float* samples, const MomentRows& out);
+  /// Sums of 2 radius + 1 pixels along x.
+  void (*sum_along_row)(int width, int radius, const float* in, float* out);
+  /// Adds rows.
+  void (*add)(int width, const float* in, float* sum);
+  /// Variance of the mean of each pixel.
+  /// @param window sums over the pixel's window
+  /// @param estimate the expected variance; 0 without history
+  /// @param variance what the filter is told: larger while there are few frames, and the maximum without history
+  void (*variance)(int width, const float* mean, const float* square, const float* samples, const MomentRows& window,
+                   const VarianceTerms& terms, float* estimate, float* variance);
+};
+
+/// Returns the kernels of an instruction set, which must be supported. All give the same bits.
+const FilterKernels& filter_kernels(Isa isa);
+
+} // namespace packtrace
