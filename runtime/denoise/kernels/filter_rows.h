@@ -82,7 +82,8 @@ struct FilterKernels {
                    const VarianceTerms& terms, float* estimate, float* variance);
 };
 
-/// Returns the kernels of an instruction set, which must be supported. All give the same bits.
+/// Returns the kernels of an instruction set. All give the same bits. Throws Error(kUnsupported) if this machine lacks
+/// it.
 const FilterKernels& filter_kernels(Isa isa);
 
 } // namespace packtrace
