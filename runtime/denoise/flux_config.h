@@ -58,7 +58,7 @@ struct FluxConfig {
   float guide_slope = 0.5f;
 
   /// Differences of patches count as noise up to this many times its variance. [0.1..100]
-  float noise_tolerance = 1.96f;
+  float noise_tolerance = 4.0f;
 
   /// Mean distance of patches at which pixels exchange nothing. [0.1..100]
   float patch_limit = 4.0f;
