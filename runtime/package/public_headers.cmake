@@ -42,6 +42,7 @@ set(packtrace_public_headers
   compress/format/textures/texture_codec.h
   # packtrace::bake: a Scene to a baked file
   compress/bake/bake_config.h
+  compress/bake/level_chain.h
   compress/bake/bake_scene.h
   compress/bake/grid/seam_gaps.h
   # packtrace::vertex16: a baked file to vertex and index buffers
@@ -88,6 +89,7 @@ set(packtrace_public_headers
   runtime/frame/rendered_image.h
   runtime/frame/scene_state.h
   runtime/frame/still.h
+  runtime/frame/view_layers.h
   runtime/motion/motion_targets.h
   runtime/motion/scene_motion.h
   runtime/trace/embree/embree_tracer.h
