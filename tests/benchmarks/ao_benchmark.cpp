@@ -51,10 +51,12 @@ public:
   Bench(const std::string& name, const Options& options)
       : options_(options), file_(BakedFile::open(name)), source_(file_) {
     const ImageSize size{options.width, options.height};
-    camera_ = source_.cameras().empty() ? framing_camera(source_.world_bounds(), size, source_.cameras()) : source_.cameras().front();
+    camera_ = source_.cameras().empty() ? framing_camera(source_.world_bounds(), size, source_.cameras())
+                                        : source_.cameras().front();
     FrameLoop probe(scene(), config(kModes.front()));
     Progress unseen;
-    if (!probe.next_frame(camera_, 0.0, unseen).seen) camera_ = framing_camera(source_.world_bounds(), size, source_.cameras());
+    if (!probe.next_frame(camera_, 0.0, unseen).seen)
+      camera_ = framing_camera(source_.world_bounds(), size, source_.cameras());
     probe.next_frame(camera_, 0.0, unseen);
     std::vector<float> depths;
     for (const float z : probe.gbuffer().view_z)
