@@ -26,21 +26,21 @@ nlohmann::json channels_json(const PictureChannels& channels) {
 
 nlohmann::json row_json(const DenoisedRow& row) {
   const LayerCounts& c = row.counts;
-  return {
-      {"picture", row.input.number},
-      {"input", row.input.file},
-      {"width", row.size.width},
-      {"height", row.size.height},
-      {"surfaces", c.surfaces},
-      {"without_sample", c.without_sample},
-      {"not_finite", {{"ao", c.not_finite_ao}, {"depth", c.not_finite_depth}, {"motion", c.not_finite_motion}}},
-      {"without_normal", c.without_normal},
-      {"above_1", c.clamped_ao},
-      {"history_start", row.start == HistoryStart::kNone ? nlohmann::json() : kStarts[static_cast<size_t>(row.start)]},
-      {"shared", row.shared ? nlohmann::json(*row.shared) : nlohmann::json()},
-      {"history", row.mean_history},
-      {"mean_ao", row.mean_ao},
-      {"seconds", {{"read", row.read_s}, {"denoise", row.denoise_s}, {"write", row.write_s}}}};
+  return {{"picture", row.input.number},
+          {"input", row.input.file},
+          {"width", row.size.width},
+          {"height", row.size.height},
+          {"surfaces", c.surfaces},
+          {"without_sample", c.without_sample},
+          {"not_finite", {{"ao", c.not_finite_ao}, {"depth", c.not_finite_depth}, {"motion", c.not_finite_motion}}},
+          {"without_normal", c.without_normal},
+          {"above_1", c.clamped_ao},
+          {"history_start",
+           row.start == HistoryStart::kContinued ? nlohmann::json() : kStarts[static_cast<size_t>(row.start)]},
+          {"shared", row.shared ? nlohmann::json(*row.shared) : nlohmann::json()},
+          {"history", row.mean_history},
+          {"mean_ao", row.mean_ao},
+          {"seconds", {{"read", row.read_s}, {"denoise", row.denoise_s}, {"write", row.write_s}}}};
 }
 
 } // namespace
@@ -58,7 +58,7 @@ nlohmann::json denoise_json(const std::vector<DenoisedRow>& rows, const LayeredC
   for (const DenoisedRow& row : rows) {
     if (list.size() < kMaxListed) list.push_back(row_json(row));
     read_s += row.read_s, denoise_s += row.denoise_s, write_s += row.write_s;
-    starts += row.start != HistoryStart::kNone;
+    starts += row.start != HistoryStart::kContinued;
   }
   const DenoisedRow& last = rows.back();
   return {{"verb", "denoise"},

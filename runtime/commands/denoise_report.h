@@ -17,7 +17,7 @@ struct DenoisedRow {
   ImageSize size;
   PictureChannels channels;
   LayerCounts counts;
-  HistoryStart start = HistoryStart::kNone;
+  HistoryStart start = HistoryStart::kContinued;
   std::optional<double> shared;
   double mean_history = 0.0, mean_ao = 0.0;
   double read_s = 0.0, denoise_s = 0.0, write_s = 0.0;

@@ -36,7 +36,7 @@ const LayeredResult& LayeredDenoiser::next(const std::filesystem::path& file, bo
   result_->read_s = reading.seconds();
   const Stopwatch denoising;
   result_->start = history_start(cut);
-  if (result_->start != HistoryStart::kNone) denoiser_.reset(), means_.clear();
+  if (result_->start != HistoryStart::kContinued) denoiser_.reset(), means_.clear();
   add_to_history();
   write_image();
   const GBuffer& g = result_->picture.gbuffer;
@@ -52,7 +52,7 @@ HistoryStart LayeredDenoiser::history_start(bool cut) {
   if (cut) return HistoryStart::kCut;
   result_->shared = shared_surfaces(*previous_, g);
   return *result_->shared < kLeastShared && result_->picture.counts.surfaces > 0 ? HistoryStart::kNewScene
-                                                                                 : HistoryStart::kNone;
+                                                                                 : HistoryStart::kContinued;
 }
 
 void LayeredDenoiser::add_to_history() {
@@ -67,7 +67,7 @@ void LayeredDenoiser::add_to_history() {
   g.previous_z.clear();
   if (g.albedo.empty()) g.albedo.assign(g.size.pixels(), Vec3(0)); // MeanLayers adds it up
   means_.add(g, {});
-  if (result_->start != HistoryStart::kNone) {
+  if (result_->start != HistoryStart::kContinued) {
     denoiser_.add_frame(g, picture.ao);
     return;
   }

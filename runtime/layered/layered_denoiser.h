@@ -28,11 +28,11 @@ struct LayeredConfig {
 
 /// Why a picture has no history of the pictures before it.
 enum class HistoryStart : uint8_t {
-  kNone,     ///< it continues the history
-  kFirst,    ///< there is no picture before it
-  kCut,      ///< the caller said so
-  kNewSize,  ///< the picture before it has another size
-  kNewScene, ///< less than a tenth of its surfaces are in the picture before it (shared_surfaces())
+  kContinued, ///< it has one
+  kFirst,     ///< there is no picture before it
+  kCut,       ///< the caller said so
+  kNewSize,   ///< the picture before it has another size
+  kNewScene,  ///< less than a tenth of its surfaces are in the picture before it (shared_surfaces())
 };
 
 /// A denoised picture.
@@ -41,7 +41,7 @@ struct LayeredResult {
 
   LayeredPicture picture;
   RenderedImage image; ///< albedo and shaded are empty without a layer for albedo; LOD layers are empty
-  HistoryStart start = HistoryStart::kNone;
+  HistoryStart start = HistoryStart::kContinued;
   std::optional<double> shared; ///< shared_surfaces(), where the history could continue
   double mean_history = 0.0;    ///< mean over surfaces of the pictures of history behind them
   double read_s = 0.0, denoise_s = 0.0;

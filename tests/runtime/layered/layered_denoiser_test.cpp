@@ -46,7 +46,7 @@ TEST(LayeredDenoiser, GivesTheSameAsTheDenoiserItself) {
     const DenoisedAo& expected =
         direct.next_frame(synthetic::wall(kSceneSize), synthetic::noise(kSceneSize, 0.5f, frame));
     EXPECT_EQ(result.image.ao, expected.ao) << frame;
-    EXPECT_EQ(result.start, frame == 0 ? HistoryStart::kFirst : HistoryStart::kNone);
+    EXPECT_EQ(result.start, frame == 0 ? HistoryStart::kFirst : HistoryStart::kContinued);
     EXPECT_NEAR(result.mean_history, frame + 1, 1e-6);
     EXPECT_EQ(result.shared.value_or(1.0), 1.0);
   }
@@ -76,7 +76,7 @@ TEST(LayeredDenoiser, HistoryEndsAtCutsNewSizesAndOtherScenes) {
   denoiser.next(pictures.write(0), false);
   EXPECT_EQ(denoiser.next(pictures.write(1), true).start, HistoryStart::kCut);
   EXPECT_EQ(denoiser.next(pictures.write(2, far), false).start, HistoryStart::kNewScene);
-  EXPECT_EQ(denoiser.next(pictures.write(3, far), false).start, HistoryStart::kNone);
+  EXPECT_EQ(denoiser.next(pictures.write(3, far), false).start, HistoryStart::kContinued);
   const LayeredResult& smaller = denoiser.next(pictures.write(4, far, {32, 16}), false);
   EXPECT_EQ(smaller.start, HistoryStart::kNewSize);
   EXPECT_EQ(smaller.image.ao.size(), 32u * 16u);
