@@ -38,6 +38,7 @@ public:
   virtual std::vector<std::byte> save() const = 0;
   virtual void restore(ImageSize size, std::span<const std::byte> bytes) = 0;
   virtual void reset() = 0;
+  virtual size_t state_bytes() const = 0;
 };
 
 } // namespace packtrace

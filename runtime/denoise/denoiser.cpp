@@ -49,4 +49,6 @@ void AoDenoiser::restore(ImageSize size, std::span<const std::byte> bytes) {
 
 void AoDenoiser::reset() { pipeline_->reset(); }
 
+size_t AoDenoiser::state_bytes() const { return pipeline_->state_bytes(); }
+
 } // namespace packtrace

@@ -50,6 +50,9 @@ public:
   /// Discards all history. Call it at camera cuts.
   void reset();
 
+  /// Bytes of memory that are held between frames, without the result and without each thread's rows.
+  size_t state_bytes() const;
+
 private:
   std::unique_ptr<DenoisePipeline> pipeline_;
   ImageSize size_; ///< of the pipeline

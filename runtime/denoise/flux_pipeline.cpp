@@ -25,6 +25,7 @@ public:
   std::vector<std::byte> save() const override;
   void restore(ImageSize size, std::span<const std::byte> bytes) override;
   void reset() override { has_frame_ = false; }
+  size_t state_bytes() const override;
 
 private:
   /// Calls work(plane) for everything that the next frame needs of this one; all elements have 4 bytes.
@@ -97,6 +98,14 @@ const DenoisedAo& FluxPipeline::denoise() {
   if (derivatives_outdated_) differentiate();
   filter_.run({now_.guides, derivatives_, now_.history, moving_}, {result_.ao, result_.variance, result_.tspp});
   return result_;
+}
+
+size_t FluxPipeline::state_bytes() const {
+  size_t bytes = 0;
+  for (const FrameHistory* frame : {&now_, &before_}) bytes += frame->guides.bytes() + frame->history.bytes();
+  for (const Plane<float>* plane : {&derivatives_.x, &derivatives_.y, &samples_.ao, &samples_.valid, &samples_.change})
+    bytes += plane->bytes();
+  return bytes;
 }
 
 std::vector<std::byte> FluxPipeline::save() const {

@@ -27,6 +27,9 @@ struct Guides {
   Plane<uint32_t> instance;
 
   void resize(ImageSize new_size);
+  size_t bytes() const {
+    return disparity.bytes() + normal_x.bytes() + normal_y.bytes() + normal_z.bytes() + instance.bytes();
+  }
 
   /// Copies the guides of a G-buffer of the same size.
   void load(const GBuffer& gbuffer);

@@ -12,6 +12,7 @@ struct History {
   Plane<float> samples; ///< length of the slow history in frames (tspp); fractional after a correction or resampling
 
   void resize(ImageSize size) { mean.resize(size), square.resize(size), fast.resize(size), samples.resize(size); }
+  size_t bytes() const { return mean.bytes() + square.bytes() + fast.bytes() + samples.bytes(); }
 };
 
 } // namespace packtrace

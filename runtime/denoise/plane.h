@@ -31,6 +31,8 @@ public:
   T* row(int y) { return data_.data() + offset(y); }
   const T* row(int y) const { return data_.data() + offset(y); }
 
+  size_t bytes() const { return data_.size() * sizeof(T); }
+
   /// Distance between rows in pixels; the same for all planes of one size.
   ptrdiff_t stride() const { return static_cast<ptrdiff_t>(stride_); }
 

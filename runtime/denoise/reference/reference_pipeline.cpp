@@ -36,6 +36,7 @@ public:
   std::vector<std::byte> save() const override;
   void restore(ImageSize size, std::span<const std::byte> bytes) override;
   void reset() override { frames_ = 0; }
+  size_t state_bytes() const override;
 
 private:
   /// Calls work(plane) for everything that the next frame needs of this one, besides frames_.
@@ -111,6 +112,19 @@ const DenoisedAo& ReferencePipeline::denoise() {
     }
   });
   return result_;
+}
+
+size_t ReferencePipeline::state_bytes() const {
+  size_t bytes = no_distances_.size() * sizeof(float);
+  const auto add = [&](const auto& plane) { bytes += plane.bytes(); };
+  for (const reference::Frame* frame : {&now_, &before_}) {
+    const reference::Surfaces& s = frame->surfaces;
+    const reference::History& h = frame->history;
+    add(s.z), add(s.normal_x), add(s.normal_y), add(s.normal_z);
+    add(h.value), add(h.mean), add(h.square), add(h.distance), add(h.tspp);
+  }
+  add(derivatives_.x), add(derivatives_.y), add(blended_), add(deviation_), add(passes_[0]), add(passes_[1]);
+  return bytes;
 }
 
 std::vector<std::byte> ReferencePipeline::save() const {
