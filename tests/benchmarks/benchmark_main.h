@@ -15,24 +15,35 @@
 
 namespace packtrace {
 
-/// Output file of `--json`. The figures are written completely or not at all, and replace an existing file.
-class FiguresFile {
+/// An optional output file. It is written completely or not at all, and replaces an existing file.
+class TextFile {
 public:
   /// @param file empty: no output
   /// @throws Error like OutputFile; at construction, so that a bad path fails before minutes of measuring
-  explicit FiguresFile(const std::filesystem::path& file) {
+  explicit TextFile(const std::filesystem::path& file) {
     if (!file.empty()) file_.emplace(file, true);
   }
-  template <class Json>
-  void write(const Json& figures) {
+  void write(const std::string& text) {
     if (!file_) return;
-    const std::string text = figures.dump(2) + "\n";
     write_file_bytes(file_->path(), std::as_bytes(std::span(text)));
     file_->commit();
   }
 
 private:
   std::optional<OutputFile> file_;
+};
+
+/// Output file of `--json`.
+class FiguresFile {
+public:
+  explicit FiguresFile(const std::filesystem::path& file) : file_(file) {}
+  template <class Json>
+  void write(const Json& figures) {
+    file_.write(figures.dump(2) + "\n");
+  }
+
+private:
+  TextFile file_;
 };
 
 /// Parses the command line. Returns the exit code if the program ends here: it only prints help, or an option is wrong.

@@ -14,6 +14,7 @@
 #include "runtime/frame/frame_loop.h"
 #include "runtime/frame/mean_layers.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
+#include "tests/benchmarks/denoiser_occluder.h"
 
 namespace packtrace {
 namespace {
@@ -24,13 +25,11 @@ constexpr uint32_t kTruthShifts = 64;
 
 class SequenceTracer {
 public:
-  SequenceTracer(const TraceInput& input, const SequenceOptions& options)
-      : input_(input), options_(options), tracer_(input.file, input.source) {
-    const SceneSource& source = input.source;
-    camera_ = options.framed || source.cameras().empty()
-                  ? framing_camera(source.world_bounds(), options.size, source.cameras())
-                  : source.cameras()[0];
-    ao_.radius = ao_radius({}, source.world_bounds());
+  /// @param movers of tracer and scene
+  SequenceTracer(const TraceInput& input, const SequenceOptions& options, const Movers& movers = {})
+      : input_(input), options_(options), tracer_(input.file, input.source, chosen_isa(), movers),
+        camera_(first_camera(input.source, options.size, options.framed)) {
+    ao_.radius = ao_radius({}, input.source.world_bounds());
   }
 
   DenoiserSequence still() {
@@ -86,6 +85,32 @@ public:
     return sequence;
   }
 
+  /// The box moves, and is gone after half of the frames.
+  DenoiserSequence occluder(const Occluder& box) {
+    DenoiserSequence sequence;
+    GBuffer g;
+    const PrimaryCamera camera = view(camera_);
+    std::vector<Affine> before;
+    for (const PlacedGeometry& placed : input_.source.instances()) before.push_back(placed.world_from_object);
+    const uint32_t gone = options_.frames / 2;
+    for (uint32_t f = 0; f < options_.frames; ++f) {
+      if (f > gone) {
+        sequence.gbuffers.emplace_back();
+      } else {
+        const Affine now = f < gone ? box.at(f, gone) : box.gone;
+        if (f == 0) before[box.instance] = now;
+        tracer_.place_instances(std::span(&box.instance, 1), std::span(&now, 1));
+        trace_primary(input_.source, tracer_, camera, {camera, before}, g, progress_);
+        before[box.instance] = now;
+        sequence.gbuffers.push_back(guides_of(g));
+      }
+      sequence.ao.push_back(occlusion(g, f));
+      if (f < gone ? std::ranges::count(kComparedFrames, f + 1) > 0 : f == gone)
+        sequence.truth[f < gone ? f + 1 : options_.frames] = truth(g);
+    }
+    return sequence;
+  }
+
 private:
   PrimaryCamera view(const Camera& camera) const { return {camera, options_.size}; }
 
@@ -103,7 +128,7 @@ private:
     GBuffer guides;
     guides.size = g.size;
     guides.view_z = g.view_z, guides.normal = g.normal, guides.instance = g.instance;
-    guides.motion_px = g.motion_px, guides.previous_z = g.previous_z;
+    guides.motion_px = g.motion_px, guides.previous_z = g.previous_z, guides.pixel_spread = g.pixel_spread;
     return guides;
   }
 
@@ -136,10 +161,23 @@ private:
   const TraceInput& input_;
   const SequenceOptions options_;
   PackedTracer tracer_;
-  Camera camera_;
+  const Camera camera_;
   AoConfig ao_;
   Progress progress_;
 };
+
+DenoiserSequence trace_sequence(const std::string& scene, const TraceInputOptions& inputs, SequenceKind kind,
+                                const SequenceOptions& options) {
+  if (kind == SequenceKind::kOccluder) {
+    const SceneWithOccluder input(scene, inputs, options.size, options.framed);
+    return SequenceTracer(*input.traced, options, input.movers).occluder(input.box);
+  }
+  const auto input = load_trace_input(scene, inputs);
+  SequenceTracer tracer(*input, options);
+  return kind == SequenceKind::kStill      ? tracer.still()
+         : kind == SequenceKind::kJittered ? tracer.jittered()
+                                           : tracer.orbit();
+}
 
 /// Reads or writes all values of a sequence, in one order.
 class SequenceFile {
@@ -153,8 +191,9 @@ public:
     value(s.source), value(frames), value(truths);
     s.gbuffers.resize(frames), s.ao.resize(frames);
     for (GBuffer& g : s.gbuffers)
-      value(g.size), values(g.view_z), values(g.normal), values(g.instance), values(g.motion_px), values(g.previous_z);
-    for (AoFrame& a : s.ao) value(a.size), values(a.ao), a.hit_distance.resize(a.ao.size());
+      value(g.size), value(g.pixel_spread), values(g.view_z), values(g.normal), values(g.instance), values(g.motion_px),
+          values(g.previous_z);
+    for (AoFrame& a : s.ao) value(a.size), value(a.ray_length), values(a.ao), values(a.hit_distance);
     auto next = s.truth.begin();
     for (uint64_t i = 0; i < truths; ++i) {
       uint32_t frame = write_ ? next->first : 0;
@@ -191,23 +230,19 @@ private:
 
 } // namespace
 
-DenoiserSequence make_sequence(const std::string& scene, const std::function<const TraceInput&()>& input,
-                               SequenceKind kind, const SequenceOptions& options) {
-  const std::string motion = kind == SequenceKind::kStill      ? "still"
-                             : kind == SequenceKind::kJittered ? "jittered"
-                                                               : fmt::format("orbit {:g}", options.degrees_per_frame);
+DenoiserSequence make_sequence(const std::string& scene, const TraceInputOptions& inputs, SequenceKind kind,
+                               const SequenceOptions& options) {
+  std::string motion = kSequenceKindNames[static_cast<size_t>(kind)];
+  if (kind == SequenceKind::kOrbit) motion += fmt::format(" {:g}", options.degrees_per_frame);
   DenoiserSequence sequence;
+  const std::string stem = std::filesystem::path(scene).stem().string();
   const auto file =
-      options.cache / fmt::format("{}_{}{}_{}x{}_{}_{}.sequence", std::filesystem::path(scene).stem().string(), motion,
-                                  options.framed ? "_framed" : "", options.size.width, options.size.height,
-                                  options.frames, options.truth_spp);
+      options.cache / fmt::format("{}_{}{}_{}x{}_{}_{}.sequence2", stem, motion, options.framed ? "_framed" : "",
+                                  options.size.width, options.size.height, options.frames, options.truth_spp);
   if (!options.cache.empty() && std::filesystem::exists(file)) {
     if (!SequenceFile(file, false).all(sequence)) throw Error(ErrorKind::kInput, file.string() + ": is incomplete");
   } else {
-    SequenceTracer tracer(input(), options);
-    sequence = kind == SequenceKind::kStill      ? tracer.still()
-               : kind == SequenceKind::kJittered ? tracer.jittered()
-                                                 : tracer.orbit();
+    sequence = trace_sequence(scene, inputs, kind, options);
     if (!options.cache.empty()) {
       const std::filesystem::path unfinished = file.string() + ".tmp";
       if (!SequenceFile(unfinished, true).all(sequence))
@@ -215,7 +250,7 @@ DenoiserSequence make_sequence(const std::string& scene, const std::function<con
       std::filesystem::rename(unfinished, file);
     }
   }
-  sequence.scene = std::filesystem::path(scene).stem().string(), sequence.motion = motion;
+  sequence.scene = stem, sequence.motion = motion, sequence.kind = kind;
   return sequence;
 }
 

@@ -18,11 +18,18 @@ enum class SequenceKind : uint8_t {
   kStill,    ///< nothing; all camera rays pass through pixel centres
   kJittered, ///< nothing; camera rays are shifted within their pixels, as FrameLoop does
   kOrbit,    ///< the camera
+  /// A box that moves through the middle of a still view by about a pixel per frame, and after half of the frames
+  /// is gone.
+  kOccluder,
 };
+
+/// The names of the kinds, as on the command line.
+inline constexpr const char* kSequenceKindNames[] = {"still", "jittered", "orbit", "occluder"};
 
 /// Frames of raw ambient occlusion with their G-buffers, and the ambient occlusion they are to approach.
 struct DenoiserSequence {
   std::string scene, motion;
+  SequenceKind kind = SequenceKind::kStill;
   HistorySource source = HistorySource::kMotion;
   /// What the denoiser is given; only the arrays that it reads. Frames without a G-buffer of their own (of size 0) have
   /// that of the frame before, without motion.
@@ -30,8 +37,10 @@ struct DenoiserSequence {
   std::vector<AoFrame> ao;
   std::map<uint32_t, std::vector<float>> truth; ///< by number of frames so far, ascending; kInvalidAo at misses
 
-  bool moves() const { return motion != "still" && motion != "jittered"; }
-  /// The truth after that many frames: of still views it is one picture.
+  bool moves() const { return kind == SequenceKind::kOrbit || kind == SequenceKind::kOccluder; }
+  /// Frames before the occluder is gone.
+  uint32_t occluded_frames() const { return static_cast<uint32_t>(ao.size()) / 2; }
+  /// The truth after that many frames: of still views, and once an occluder is gone, it is one picture.
   const std::vector<float>& truth_after(uint32_t frames) const { return truth.lower_bound(frames)->second; }
 };
 
@@ -48,10 +57,11 @@ struct SequenceOptions {
 inline constexpr uint32_t kComparedFrames[] = {1, 2, 4, 8, 16, 32, 64};
 
 /// Traces a sequence with one sample per pixel and frame, or reads it from the cache.
-/// @param input is called only if the sequence is not in the cache
-/// Throws Error as trace_primary() and trace_ao() do, and for files that cannot be read or written.
-DenoiserSequence make_sequence(const std::string& scene, const std::function<const TraceInput&()>& input,
-                               SequenceKind kind, const SequenceOptions& options);
+/// @param inputs used only if the sequence is not in the cache
+/// Throws Error(kUsage) for occluders in .ptk files, Error as trace_primary() and trace_ao() do, and for files that
+/// cannot be read or written.
+DenoiserSequence make_sequence(const std::string& scene, const TraceInputOptions& inputs, SequenceKind kind,
+                               const SequenceOptions& options);
 
 /// Calls use(gbuffer, ao, frame) for all frames; the G-buffer is the one to give to the denoiser.
 void play(const DenoiserSequence& sequence,

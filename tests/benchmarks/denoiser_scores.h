@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "runtime/denoise/denoiser.h"
+#include "tests/benchmarks/denoiser_sequence.h"
+
+namespace packtrace {
+
+/// An image against the truth, over the pixels that have one.
+struct ImageScore {
+  double psnr = 0, ssim = 0, flip = 0;
+  double bias = 0; ///< mean difference
+};
+
+/// What a denoiser made of a sequence.
+struct SequenceScore {
+  std::string scene, motion, denoiser;
+  std::map<uint32_t, ImageScore> images; ///< by number of frames
+  /// Of occluders: the part of the difference between the truths before and after the occluder is gone that the image
+  /// still has, by number of frames since. Over surfaces that were seen before; noise does not change it.
+  std::map<uint32_t, double> ghosts;
+  /// Mean change of a pixel's value since the frame before, following its motion, over the second half of the frames
+  /// that move, or of all. Only pixels that show the same surface, and of which the truth stays the same.
+  double flicker = 0;
+  double add_frame_ms = 0, denoise_ms = 0; ///< a frame
+};
+
+/// Frame counts since an occluder is gone for which ghosts are measured.
+inline constexpr uint32_t kGhostFrames[] = {4, 8, 16, 32};
+
+/// Runs a denoiser over a sequence. Names: ours; history, which is ours without filter; reference; off, the mean of the
+/// samples since something moved, as without a denoiser.
+/// @param config settings of ours and reference
+SequenceScore score(const DenoiserSequence& sequence, const std::string& denoiser, const DenoiserConfig& config);
+
+/// One line per image, ghost and flicker, with a header: scene, motion, denoiser, quantity, frames, value.
+std::string csv_of(const std::vector<SequenceScore>& scores);
+/// A table for documentation: one line per sequence and denoiser.
+std::string markdown_of(const std::vector<SequenceScore>& scores);
+
+} // namespace packtrace
