@@ -15,23 +15,15 @@ inline float smaller_difference(float before, float centre, float after) {
   return centre > 0.0f ? chosen : 0.0f;
 }
 
+} // namespace
+
 PACKTRACE_AVX2_CLONES
-void derive_row(int width, const float* above, const float* here, const float* below, float* __restrict dx,
-                float* __restrict dy) {
+void derive_row(int width, const float* above, const float* here, const float* below, float* dx, float* dy) {
+#pragma GCC ivdep
   for (int i = 0; i < width; ++i) {
     dx[i] = smaller_difference(here[i - 1], here[i], here[i + 1]);
     dy[i] = smaller_difference(above[i], here[i], below[i]);
   }
-}
-
-} // namespace
-
-void DepthDerivatives::compute(const Guides& guides) {
-  for_row_blocks(guides.size.height, [&](int first, int last) {
-    for (int row = first; row < last; ++row)
-      derive_row(static_cast<int>(guides.size.width), guides.disparity.row(row - 1), guides.disparity.row(row),
-                 guides.disparity.row(row + 1), x.row(row), y.row(row));
-  });
 }
 
 } // namespace packtrace

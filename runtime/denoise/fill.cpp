@@ -8,18 +8,17 @@ struct WeightedMean {
   void add(float w, float value) { weight += w, sum += w * value; }
 };
 
-/// Pixels of the same surface that are `step` pixels away.
-WeightedMean mean_of_neighbours(const FilterInput& input, const FilterKernels& kernels, const FluxConfig& config, int x,
-                                int y, int step) {
+/// Pixels of the same surface that are PairGuides::kSteps[step] pixels away.
+WeightedMean mean_of_neighbours(const FilterInput& input, size_t step, int x, int y) {
   const History& h = input.history;
+  const int apart = PairGuides::kSteps[step];
   WeightedMean mean;
-  for (const auto& offset : kPairOffsets)
-    for (const int side : {step, -step}) {
-      const int dx = side * offset[0], dy = side * offset[1];
+  for (size_t d = 0; d < kPairOffsets.size(); ++d)
+    for (const int side : {apart, -apart}) {
+      const int dx = side * kPairOffsets[d][0], dy = side * kPairOffsets[d][1];
       if (!(h.samples.row(y + dy)[x + dx] > 0.0f)) continue;
-      uint8_t weight = 0;
-      kernels.guide(1, surface_at(input, x, y), surface_at(input, x + dx, y + dy), guide_terms(config, dx, dy),
-                    &weight);
+      const uint8_t weight =
+          side > 0 ? *input.pair_guides.row(step, x, y)[d] : *input.pair_guides.row(step, x + dx, y + dy)[d];
       if (weight > kMinGuide) mean.add(static_cast<float>(weight), h.mean.row(y + dy)[x + dx]);
     }
   return mean;
@@ -35,10 +34,10 @@ WeightedMean mean_of_window(const History& h, int x, int y) {
 
 } // namespace
 
-float filled_value(const FilterInput& input, const FilterKernels& kernels, const FluxConfig& config, int x, int y) {
+float filled_value(const FilterInput& input, int x, int y) {
   WeightedMean mean;
-  for (int step = 1; step <= 4 && mean.weight == 0.0f; step *= 2)
-    mean = mean_of_neighbours(input, kernels, config, x, y, step);
+  for (size_t step = 0; step < PairGuides::kSteps.size() && mean.weight == 0.0f; ++step)
+    mean = mean_of_neighbours(input, step, x, y);
   if (mean.weight == 0.0f) mean = mean_of_window(input.history, x, y);
   return mean.weight > 0.0f ? mean.sum / mean.weight : 1.0f;
 }

@@ -1,7 +1,6 @@
 #pragma once
 
 #include "runtime/denoise/filter.h"
-#include "runtime/denoise/kernels/filter_rows.h"
 
 namespace packtrace {
 
@@ -10,6 +9,6 @@ namespace packtrace {
 ///    smallest distance at which there are any;
 ///  - the mean of all pixels with history within kPlaneBorder pixels;
 ///  - 1 (open).
-float filled_value(const FilterInput& input, const FilterKernels& kernels, const FluxConfig& config, int x, int y);
+float filled_value(const FilterInput& input, int x, int y);
 
 } // namespace packtrace

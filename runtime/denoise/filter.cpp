@@ -14,8 +14,14 @@ namespace {
 /// pixels are rather too large, so that they are filtered more.
 constexpr float kIndependentYoung = 12.0f;
 
-/// Some rows of an image, in turn; the others share one row of zeros. Columns [-kRowPadding, width + kRowPadding)
-/// exist, and those outside the image are zero.
+/// Part of the rows of an image that is filtered by itself, so that what belongs to it stays in the cache.
+struct Tile {
+  int x, width; ///< columns, with a margin where other tiles adjoin
+  int height;   ///< of the image
+};
+
+/// Some rows of a tile, in turn; the others share one row of zeros. Columns [-kRowPadding, width + kRowPadding)
+/// exist, and those outside the tile are zero.
 template <typename T>
 class RowRing {
 public:
@@ -33,12 +39,12 @@ private:
   std::vector<T> data_;
 };
 
-/// Rows of an image of AO with variances, computed in ascending order.
+/// Rows of a tile of AO with variances, computed in ascending order.
 class RowSource {
 public:
-  RowSource(ImageSize size, int kept)
-      : width_(static_cast<int>(size.width)), height_(static_cast<int>(size.height)), value_(width_, kept),
-        variance_(width_, kept) {}
+  /// @param kept number of rows that can be read at the same time, a power of two
+  RowSource(const Tile& tile, int kept)
+      : x_(tile.x), width_(tile.width), height_(tile.height), value_(width_, kept), variance_(width_, kept) {}
   virtual ~RowSource() = default;
 
   /// Starts anew: rows from `first` on will be required.
@@ -54,7 +60,7 @@ protected:
   virtual void produce(int y) = 0;
   bool inside(int y) const { return y >= 0 && y < height_; }
 
-  int width_, height_;
+  int x_, width_, height_;
   int next_ = 0;
   RowRing<float> value_, variance_;
 };
@@ -65,9 +71,9 @@ public:
   static constexpr int kRadius = 2;
   static constexpr size_t kMoments = 5;
 
-  HistoryRows(ImageSize size, const FilterKernels& kernels, const FluxConfig& config)
-      : RowSource(size, 8), kernels_(kernels), config_(config), estimate_(width_, 1),
-        sums_(kMoments, RowRing<float>(width_, 8)), scratch_(kMoments, RowRing<float>(width_, 1)) {
+  HistoryRows(const Tile& tile, int kept, const FilterKernels& kernels, const FluxConfig& config)
+      : RowSource(tile, kept), kernels_(kernels), estimate_(width_, 1), sums_(kMoments, RowRing<float>(width_, 8)),
+        scratch_(kMoments, RowRing<float>(width_, 1)) {
     terms_ = {config.variance_prior,    0.75f, 0.45f, 0.55f, 0.02f, static_cast<float>(config.max_tspp_moving),
               config.variance_distrust, 0.0f,  false};
     if (!config.stratified)
@@ -75,9 +81,9 @@ public:
       terms_.moving_base = 1.0f, terms_.moving_gain = 0.0f;
   }
 
-  /// Rows [first, end) of the variance of the means go to `variance`.
-  void write_variance(std::span<float> variance, int first, int end) {
-    written_ = variance, first_written_ = first, end_written_ = end;
+  /// The estimated variance of the means of pixels [begin, end) of the tile's rows [first, last) goes to `variance`.
+  void write_variance(std::span<float> variance, int begin, int end, int first, int last) {
+    written_ = variance, begin_written_ = begin, end_written_ = end, first_written_ = first, last_written_ = last;
   }
 
   void begin(const FilterInput& input, int first) override {
@@ -97,20 +103,23 @@ private:
       for (int r = 1 - kRadius; r <= kRadius; ++r) kernels_.add(width_, sums_[i].row(y + r), window[i]);
     }
     const History& h = input_->history;
-    kernels_.variance(width_, h.mean.row(y), h.square.row(y), h.samples.row(y),
+    kernels_.variance(width_, h.mean.row(y) + x_, h.square.row(y) + x_, h.samples.row(y) + x_,
                       {window[0], window[1], window[2], window[3], window[4]}, terms_, estimate_.row(0),
                       variance_.row(y));
-    std::copy_n(h.mean.row(y), width_, value_.row(y));
+    std::copy_n(h.mean.row(y) + x_, width_, value_.row(y));
     fill(y);
-    if (y >= first_written_ && y < end_written_)
-      std::copy_n(estimate_.row(0), width_, &written_[static_cast<size_t>(y) * static_cast<size_t>(width_)]);
+    if (y >= first_written_ && y < last_written_)
+      std::copy(
+          estimate_.row(0) + begin_written_, estimate_.row(0) + end_written_,
+          &written_[static_cast<size_t>(y) * input_->guides.size.width + static_cast<size_t>(x_ + begin_written_)]);
   }
 
   void fill(int y) {
-    const float *disparity = input_->guides.disparity.row(y), *samples = input_->history.samples.row(y);
+    const float *disparity = input_->guides.disparity.row(y) + x_, *samples = input_->history.samples.row(y) + x_;
+    if (!kernels_.any_to_fill(width_, disparity, samples)) return;
     float* value = value_.row(y);
     for (int x = 0; x < width_; ++x)
-      if (disparity[x] > 0.0f && !(samples[x] > 0.0f)) value[x] = filled_value(*input_, kernels_, config_, x, y);
+      if (disparity[x] > 0.0f && !(samples[x] > 0.0f)) value[x] = filled_value(*input_, x_ + x, y);
   }
 
   void sum(int y) {
@@ -120,17 +129,16 @@ private:
       return;
     }
     kernels_.moments(
-        width_, h.mean.row(y), h.square.row(y), h.samples.row(y),
+        width_, h.mean.row(y) + x_, h.square.row(y) + x_, h.samples.row(y) + x_,
         {scratch_[0].row(0), scratch_[1].row(0), scratch_[2].row(0), scratch_[3].row(0), scratch_[4].row(0)});
     for (size_t i = 0; i < kMoments; ++i) kernels_.sum_along_row(width_, kRadius, scratch_[i].row(0), sums_[i].row(y));
   }
 
   const FilterKernels& kernels_;
-  const FluxConfig& config_;
   VarianceTerms terms_;
   const FilterInput* input_ = nullptr;
   std::span<float> written_;
-  int first_written_ = 0, end_written_ = 0;
+  int begin_written_ = 0, end_written_ = 0, first_written_ = 0, last_written_ = 0;
   RowRing<float> estimate_;
   std::vector<RowRing<float>> sums_, scratch_;
   int next_sum_ = 0;
@@ -139,13 +147,14 @@ private:
 /// One pass of the filter.
 class PassRowsSource final : public RowSource {
 public:
+  /// @param step index of PairGuides::kSteps
   /// @param lone lone samples give way, in the first pass
-  PassRowsSource(ImageSize size, RowSource& source, int step, bool lone, const FilterKernels& kernels,
+  PassRowsSource(const Tile& tile, int kept, RowSource& source, size_t step, bool lone, const FilterKernels& kernels,
                  const FluxConfig& config)
-      : RowSource(size, 16), kernels_(kernels), config_(config), source_(source), step_(step), lone_(lone),
-        scale_(width_, 16), column_(width_, 1), distance_(kPairOffsets.size(), RowRing<float>(width_, 4)),
-        guide_(kPairOffsets.size(), RowRing<uint8_t>(width_, 4)),
-        weights_(kPairOffsets.size(), RowRing<uint8_t>(width_, 16)) {}
+      : RowSource(tile, kept), kernels_(kernels), config_(config), source_(source), step_index_(step),
+        step_(PairGuides::kSteps[step]), lone_(lone), scale_(width_, 4 * step_), column_(width_, 1),
+        distance_(kPairOffsets.size(), RowRing<float>(width_, 4)),
+        weights_(kPairOffsets.size(), RowRing<uint8_t>(width_, 4 * step_)) {}
 
   void begin(const FilterInput& input, int first) override {
     input_ = &input;
@@ -177,23 +186,21 @@ private:
   void weigh(int y) {
     source_.require(y + 1 + step_);
     for (; next_distance_ <= std::min(y + 1, height_ - 1); ++next_distance_) compare(next_distance_);
+    const PairRow guides = input_->pair_guides.row(step_index_, x_, y);
     for (size_t d = 0; d < kPairOffsets.size(); ++d) {
       const auto distance = [&](int row) { return inside(row) ? distance_[d].row(row) : distance_[d].zeros(); };
-      kernels_.weigh(width_, {distance(y - 1), distance(y), distance(y + 1)}, guide_[d].row(y), config_.patch_limit,
+      kernels_.weigh(width_, {distance(y - 1), distance(y), distance(y + 1)}, guides[d], config_.patch_limit,
                      column_.row(0), weights_[d].row(y));
     }
-    kernels_.normalise(width_, step_, pairs(y), pairs(y - step_), lone_ ? input_->history.samples.row(y) : nullptr,
+    kernels_.normalise(width_, step_, pairs(y), pairs(y - step_), lone_ ? input_->history.samples.row(y) + x_ : nullptr,
                        scale_.row(y));
   }
 
   void compare(int y) {
-    for (size_t d = 0; d < kPairOffsets.size(); ++d) {
-      const int dx = step_ * kPairOffsets[d][0], dy = step_ * kPairOffsets[d][1];
-      kernels_.guide(width_, surface_at(*input_, 0, y), surface_at(*input_, dx, y + dy), guide_terms(config_, dx, dy),
-                     guide_[d].row(y));
-      kernels_.compare(width_, source_.value(y), source_.variance(y), source_.value(y + dy) + dx,
-                       source_.variance(y + dy) + dx, guide_[d].row(y), config_.noise_tolerance, distance_[d].row(y));
-    }
+    kernels_.compare(width_, step_, {source_.value(y), source_.variance(y)},
+                     {source_.value(y + step_), source_.variance(y + step_)},
+                     input_->pair_guides.row(step_index_, x_, y), config_.noise_tolerance,
+                     {distance_[0].row(y), distance_[1].row(y), distance_[2].row(y), distance_[3].row(y)});
   }
 
   PairRow pairs(int y) {
@@ -206,69 +213,82 @@ private:
   const FilterKernels& kernels_;
   const FluxConfig& config_;
   RowSource& source_;
+  const size_t step_index_;
   const int step_;
   const bool lone_;
   const FilterInput* input_ = nullptr;
   RowRing<float> scale_, column_;
   std::vector<RowRing<float>> distance_;
-  std::vector<RowRing<uint8_t>> guide_, weights_;
+  std::vector<RowRing<uint8_t>> weights_;
   int next_weights_ = 0, next_distance_ = 0, first_weights_ = 0;
 };
 
-/// All passes, as one thread runs them.
+/// The passes, as indices of PairGuides::kSteps.
+constexpr size_t kPasses[] = {0, 1, 2, 0};
+
+/// Rows that a pass reads at the same time, from one step above to two steps and a row below; as a power of two.
+constexpr int kept_for(size_t step) { return PairGuides::kSteps[step] == 4 ? 16 : 8; }
+
+/// All passes over one tile, as one thread runs them.
 class FilterChain {
 public:
-  FilterChain(ImageSize size, const FilterKernels& kernels, const FluxConfig& config)
-      : history_(size, kernels, config) {
+  FilterChain(const Tile& tile, const FilterKernels& kernels, const FluxConfig& config)
+      : tile_(tile), kernels_(kernels), history_(tile, kept_for(kPasses[0]), kernels, config) {
     RowSource* source = &history_;
-    constexpr int kSteps[] = {1, 2, 4, 1};
     for (uint32_t i = 0; i < config.passes; ++i) {
-      passes_.push_back(std::make_unique<PassRowsSource>(size, *source, kSteps[i], i == 0, kernels, config));
+      const int kept = i + 1 < config.passes ? kept_for(kPasses[i + 1]) : 1;
+      passes_.push_back(std::make_unique<PassRowsSource>(tile, kept, *source, kPasses[i], i == 0, kernels, config));
       source = passes_.back().get();
     }
     result_ = source;
   }
 
-  void run(const FilterInput& input, const FilterOutput& output, int first, int last) {
-    const size_t width = input.guides.size.width;
+  /// Filters pixels [begin, end) of rows [first, last) of the image.
+  void run(const FilterInput& input, const FilterOutput& output, int begin, int end, int first, int last) {
     result_->begin(input, first);
-    history_.write_variance(output.variance, first, last);
+    history_.write_variance(output.variance, begin - tile_.x, end - tile_.x, first, last);
     for (int y = first; y < last; ++y) {
       result_->require(y);
-      const size_t begin = static_cast<size_t>(y) * width;
-      const float* value = result_->value(y);
-      const float *disparity = input.guides.disparity.row(y), *samples = input.history.samples.row(y);
-      for (size_t x = 0; x < width; ++x) {
-        output.ao[begin + x] = disparity[x] > 0.0f ? std::clamp(value[x], 0.0f, 1.0f) : kInvalidAo;
-        output.tspp[begin + x] = samples[x];
-      }
+      const size_t at = static_cast<size_t>(y) * input.guides.size.width + static_cast<size_t>(begin);
+      kernels_.finish(end - begin, result_->value(y) + (begin - tile_.x), input.guides.disparity.row(y) + begin,
+                      input.history.samples.row(y) + begin, &output.ao[at], &output.tspp[at]);
     }
   }
 
 private:
+  Tile tile_;
+  const FilterKernels& kernels_;
   HistoryRows history_;
   std::vector<std::unique_ptr<PassRowsSource>> passes_;
   RowSource* result_;
 };
 
+/// How an image is divided into tiles, whatever the number of threads.
+struct Tiling {
+  explicit Tiling(ImageSize size) : width(static_cast<int>(size.width)), height(static_cast<int>(size.height)) {
+    constexpr int kColumns = 560, kRows = 192; // per tile, about
+    columns = std::max(1, (width + kColumns / 2) / kColumns);
+    rows = std::max(1, (height + kRows / 2) / kRows);
+  }
+  int begin_x(int column) const { return static_cast<int>(int64_t{width} * column / columns); }
+  int begin_y(int row) const { return static_cast<int>(int64_t{height} * row / rows); }
+  Tile tile(int column) const {
+    // Farther than the passes reach: 2 steps and a pixel each, and 2 pixels for the variance.
+    constexpr int kMargin = 32;
+    const int begin = std::max(begin_x(column) - kMargin, 0);
+    return {begin, std::min(begin_x(column + 1) + kMargin, width) - begin, height};
+  }
+
+  int width, height, columns, rows;
+};
+
 } // namespace
-
-SurfaceRow surface_at(const FilterInput& input, int x, int y) {
-  const Guides& g = input.guides;
-  const DepthDerivatives& d = input.derivatives;
-  return {g.disparity.row(y) + x, d.x.row(y) + x,        d.y.row(y) + x,
-          g.normal_x.row(y) + x,  g.normal_y.row(y) + x, g.normal_z.row(y) + x};
-}
-
-GuideTerms guide_terms(const FluxConfig& config, int dx, int dy) {
-  return {config.guide_depth, config.guide_slope, static_cast<float>(dx), static_cast<float>(dy)};
-}
 
 struct AoFilter::State {
   FluxConfig config;
   const FilterKernels& kernels;
   ImageSize size;
-  tbb::enumerable_thread_specific<std::unique_ptr<FilterChain>> chains;
+  tbb::enumerable_thread_specific<std::vector<std::unique_ptr<FilterChain>>> chains; ///< one per column of tiles
 };
 
 AoFilter::AoFilter(const FluxConfig& config, Isa isa) : state_(new State{config, filter_kernels(isa), {}, {}}) {}
@@ -280,15 +300,19 @@ void AoFilter::run(const FilterInput& input, const FilterOutput& output) {
   State& s = *state_;
   const ImageSize size = input.guides.size;
   if (s.size != size) s.chains.clear(), s.size = size;
-  constexpr int kRowsPerStrip = 128;
-  const int height = static_cast<int>(size.height), strips = std::max(1, (height + kRowsPerStrip / 2) / kRowsPerStrip);
+  const Tiling tiling(size);
   tbb::parallel_for(
-      tbb::blocked_range<int>(0, strips, 1),
+      tbb::blocked_range<int>(0, tiling.columns * tiling.rows, 1),
       [&](const tbb::blocked_range<int>& range) {
-        std::unique_ptr<FilterChain>& chain = s.chains.local();
-        if (!chain) chain = std::make_unique<FilterChain>(size, s.kernels, s.config);
-        for (int i = range.begin(); i != range.end(); ++i)
-          chain->run(input, output, height * i / strips, height * (i + 1) / strips);
+        auto& chains = s.chains.local();
+        chains.resize(static_cast<size_t>(tiling.columns));
+        for (int i = range.begin(); i != range.end(); ++i) {
+          const int column = i % tiling.columns, row = i / tiling.columns;
+          std::unique_ptr<FilterChain>& chain = chains[static_cast<size_t>(column)];
+          if (!chain) chain = std::make_unique<FilterChain>(tiling.tile(column), s.kernels, s.config);
+          chain->run(input, output, tiling.begin_x(column), tiling.begin_x(column + 1), tiling.begin_y(row),
+                     tiling.begin_y(row + 1));
+        }
       },
       tbb::simple_partitioner());
 }

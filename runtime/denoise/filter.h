@@ -4,18 +4,17 @@
 #include <span>
 
 #include "pbrt_import/base/isa.h"
-#include "runtime/denoise/depth_derivatives.h"
 #include "runtime/denoise/flux_config.h"
 #include "runtime/denoise/guides.h"
 #include "runtime/denoise/history.h"
-#include "runtime/denoise/kernels/filter_rows.h"
+#include "runtime/denoise/pair_guides.h"
 
 namespace packtrace {
 
 /// What the filter reads of a frame.
 struct FilterInput {
   const Guides& guides;
-  const DepthDerivatives& derivatives;
+  const PairGuides& pair_guides;
   const History& history;
   bool moving; ///< history was resampled, so that samples are not as well stratified as in a still view
 };
@@ -24,11 +23,6 @@ struct FilterInput {
 struct FilterOutput {
   std::span<float> ao, variance, tspp;
 };
-
-/// The guides of the pixels from (x, y) on.
-SurfaceRow surface_at(const FilterInput& input, int x, int y);
-/// What the guide weights of pairs (dx, dy) pixels apart tolerate.
-GuideTerms guide_terms(const FluxConfig& config, int dx, int dy);
 
 /// Removes noise from a copy of the history: passes of 3 x 3 taps that move AO between pairs of pixels whose surfaces
 /// and surroundings agree (docs/denoiser.md). All passes run together over strips of rows, so that intermediate rows

@@ -5,19 +5,19 @@
 #include <utility>
 
 #include "pbrt_import/base/error.h"
-#include "runtime/denoise/depth_derivatives.h"
 #include "runtime/denoise/filter.h"
 #include "runtime/denoise/guides.h"
+#include "runtime/denoise/history_update.h"
 #include "runtime/denoise/reprojection.h"
 #include "runtime/denoise/simd.h"
-#include "runtime/denoise/temporal_blend.h"
 
 namespace packtrace {
 namespace {
 
 class FluxPipeline final : public DenoisePipeline {
 public:
-  explicit FluxPipeline(const FluxConfig& checked) : config_(checked), filter_(checked, chosen_isa()) {}
+  explicit FluxPipeline(const FluxConfig& checked)
+      : config_(checked), update_(checked, chosen_isa()), filter_(checked, chosen_isa()) {}
 
   void resize(ImageSize size) override;
   void add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source) override;
@@ -36,24 +36,22 @@ private:
     work(g.disparity), work(g.normal_x), work(g.normal_y), work(g.normal_z), work(g.instance);
     work(h.mean), work(h.square), work(h.fast), work(h.samples);
   }
-  void update_history(const GBuffer& gbuffer);
-  void differentiate();
+  bool load_guides(const GBuffer& gbuffer);
 
   FluxConfig config_;
   bool has_frame_ = false;
-  bool derivatives_outdated_ = false; ///< they do not belong to the guides
+  bool pair_guides_outdated_ = false; ///< they do not belong to the guides
   FrameHistory now_, before_;         // `before_` is only used while a frame is denoised
-  DepthDerivatives derivatives_;
+  PairGuides pair_guides_;
+  HistoryUpdate update_;
   AoFilter filter_;
   bool moving_ = false; ///< something moved in the last frame
-  FrameSamples samples_;
   DenoisedAo result_;
 };
 
 void FluxPipeline::resize(ImageSize size) {
   for (FrameHistory* frame : {&now_, &before_}) frame->guides.resize(size), frame->history.resize(size);
-  derivatives_.resize(size);
-  samples_.resize(size);
+  pair_guides_.resize(size);
   result_.size = size;
   result_.ao.assign(size.pixels(), kInvalidAo);
   result_.variance.assign(size.pixels(), 0.0f);
@@ -61,50 +59,45 @@ void FluxPipeline::resize(ImageSize size) {
   has_frame_ = false;
 }
 
-/// Loads this frame's guides and reprojects the history. Does nothing if no pixel moves and no guide changes.
-void FluxPipeline::update_history(const GBuffer& gbuffer) {
-  moving_ = has_frame_ && !now_.guides.still_matches(gbuffer);
-  if (has_frame_ && !moving_) return;
+/// Loads this frame's guides. Returns false, and does nothing, if no pixel moves and no guide changes.
+bool FluxPipeline::load_guides(const GBuffer& gbuffer) {
+  if (has_frame_ && now_.guides.still_matches(gbuffer)) return false;
   std::swap(now_, before_);
   now_.guides.load(gbuffer);
-  differentiate();
   if (!has_frame_) before_.history.resize(gbuffer.size);
-  reproject(before_, now_.guides, derivatives_, gbuffer.motion_px, gbuffer.previous_z, config_, now_.history);
-  has_frame_ = true;
-}
-
-void FluxPipeline::differentiate() {
-  derivatives_.compute(now_.guides);
-  derivatives_outdated_ = false;
+  pair_guides_outdated_ = true;
+  return true;
 }
 
 void FluxPipeline::add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source) {
   const bool same_pixels = source == HistorySource::kPixel && has_frame_;
+  bool resample = false;
   if (same_pixels) {
     now_.guides.load(gbuffer);
-    derivatives_outdated_ = true;
-    moving_ = false;
+    pair_guides_outdated_ = true;
   } else {
-    update_history(gbuffer);
+    resample = load_guides(gbuffer);
   }
-  FluxConfig config = config_;
-  if (same_pixels) config.max_tspp = std::numeric_limits<uint32_t>::max(); // the plain mean of all samples_
-  accumulate(ao.ao, now_.guides, config, now_.history, samples_);
-  if (!same_pixels) correct_history(samples_, now_.guides, config_, now_.history);
+  moving_ = resample && has_frame_;
+  has_frame_ = true;
+  const MotionFrame motion{before_, now_.guides, gbuffer.motion_px, gbuffer.previous_z};
+  // Histories of jittered pixels are the plain means of all samples.
+  const uint32_t longest = same_pixels ? std::numeric_limits<uint32_t>::max() : config_.max_tspp;
+  update_.run({now_.guides, ao.ao, resample ? &motion : nullptr, !same_pixels, static_cast<float>(longest)},
+              now_.history);
 }
 
 const DenoisedAo& FluxPipeline::denoise() {
   if (!has_frame_) return result_;
-  if (derivatives_outdated_) differentiate();
-  filter_.run({now_.guides, derivatives_, now_.history, moving_}, {result_.ao, result_.variance, result_.tspp});
+  if (pair_guides_outdated_) pair_guides_.compute(now_.guides, config_, filter_kernels(chosen_isa()));
+  pair_guides_outdated_ = false;
+  filter_.run({now_.guides, pair_guides_, now_.history, moving_}, {result_.ao, result_.variance, result_.tspp});
   return result_;
 }
 
 size_t FluxPipeline::state_bytes() const {
-  size_t bytes = 0;
+  size_t bytes = pair_guides_.bytes();
   for (const FrameHistory* frame : {&now_, &before_}) bytes += frame->guides.bytes() + frame->history.bytes();
-  for (const Plane<float>* plane : {&derivatives_.x, &derivatives_.y, &samples_.ao, &samples_.valid, &samples_.change})
-    bytes += plane->bytes();
   return bytes;
 }
 
@@ -137,7 +130,7 @@ void FluxPipeline::restore(ImageSize size, std::span<const std::byte> bytes) {
     }
   });
   has_frame_ = true;
-  derivatives_outdated_ = true;
+  pair_guides_outdated_ = true;
 }
 
 } // namespace

@@ -1,11 +1,12 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
-#include "runtime/denoise/depth_derivatives.h"
 #include "runtime/denoise/flux_config.h"
 #include "runtime/denoise/guides.h"
 #include "runtime/denoise/history.h"
+#include "runtime/denoise/kernels/history_rows.h"
 
 namespace packtrace {
 
@@ -15,19 +16,41 @@ struct FrameHistory {
   History history;
 };
 
+/// What is known of the motion from one frame to the next.
+struct MotionFrame {
+  const FrameHistory& previous;
+  const Guides& guides;            ///< of the new frame
+  std::span<const Vec2> motion_px; ///< GBuffer::motion_px; pixels with non-finite motion get no history
+  /// GBuffer::previous_z; pixels whose previous depth is not positive and finite get no history.
+  std::span<const float> previous_z;
+};
+
 /// Resamples the previous frame's history at the surface points of the current frame. The history of a pixel is the
 /// weighted mean of the 2 x 2 previous pixels around its previous position. Weights are bilinear, times the agreement
 /// of depth and normal; previous pixels of another instance have weight 0.
 /// Where the neighbourhood lies on one surface, the AO mean is interpolated with bicubic precision along each axis, so
 /// that camera pans do not blur it.
-/// All pixels of `reprojected` are written: 0 where history is rejected. The sample count is scaled by the sum of the
-/// weights, so partial agreement shortens the history.
+/// The sample count is scaled by the sum of the weights, so partial agreement shortens the history.
 /// Depth is compared where the surface was: tolerances are those of its disparity in the previous frame, with the
 /// change of disparity per pixel scaled in proportion.
-/// @param motion_px GBuffer::motion_px; pixels with non-finite motion get no history
-/// @param previous_z GBuffer::previous_z; pixels whose previous depth is not positive and finite get no history
-void reproject(const FrameHistory& previous, const Guides& guides, const DepthDerivatives& derivatives,
-               std::span<const Vec2> motion_px, std::span<const float> previous_z, const FluxConfig& config,
-               History& reprojected);
+///
+/// Neighbouring pixels mostly move by the same whole number of pixels; each run of such pixels reads consecutive
+/// pixels of the previous frame. Use one object per thread.
+class ReprojectionRows {
+public:
+  ReprojectionRows(ImageSize size, const FluxConfig& config, const HistoryKernels& kernels);
+
+  /// Returns row y of the history, 0 where it is rejected, valid until the next call.
+  HistoryRow at(const MotionFrame& frame, int y);
+
+private:
+  const FluxConfig& config_;
+  const HistoryKernels& kernels_;
+  int width_;
+  std::vector<int32_t> offset_;
+  std::vector<float> rows_; // of the located and of the resampled pixels
+  LocatedRow located_;
+  HistoryRow result_;
+};
 
 } // namespace packtrace

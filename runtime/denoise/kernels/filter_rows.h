@@ -25,11 +25,16 @@ struct SurfaceRow {
 inline constexpr uint8_t kMinGuide = 3;
 
 struct GuideTerms {
-  float depth, slope, offset_x, offset_y;
+  float depth, slope;
 };
 
 /// Weights of the pairs that begin in one row, by kPairOffsets.
 using PairRow = std::array<const uint8_t*, 4>;
+
+/// Values of a pass in one row, with their variances.
+struct NoisyRow {
+  const float *value, *variance;
+};
 
 /// Values of a pass at the row of a pixel and at the rows of its neighbours, one step above and below.
 struct PassRows {
@@ -55,11 +60,14 @@ struct VarianceTerms {
 /// Functions on rows of pixels; docs/denoiser.md has the formulas. Rows are readable up to kRowPadding pixels outside
 /// [0, width), unless stated otherwise.
 struct FilterKernels {
-  /// Guide weights of the pairs (p, q): kMinGuide to 255 where both pixels hit, and 0 where one does not.
-  void (*guide)(int width, const SurfaceRow& p, const SurfaceRow& q, const GuideTerms& terms, uint8_t* weights);
-  /// Distances d of the pairs (p, q): 0 for noise, from -1 / tolerance on; 0 where the guide weight is 0.
-  void (*compare)(int width, const float* p, const float* p_variance, const float* q, const float* q_variance,
-                  const uint8_t* guide, float tolerance, float* distance);
+  /// Guide weights of the pairs that begin in a row: kMinGuide to 255 where both pixels hit, 0 where one does not.
+  /// @param below the row one step below
+  void (*guide)(int width, int step, const SurfaceRow& here, const SurfaceRow& below, const GuideTerms& terms,
+                const std::array<uint8_t*, 4>& weights);
+  /// Distances d of the pairs that begin in a row: 0 for noise, from -1 / tolerance on; 0 where the guide weight is 0.
+  /// @param below the row one step below
+  void (*compare)(int width, int step, const NoisyRow& here, const NoisyRow& below, const PairRow& guide,
+                  float tolerance, const std::array<float*, 4>& distance);
   /// Weights of pairs from the distances of three rows.
   /// @param column scratch
   void (*weigh)(int width, const std::array<const float*, 3>& distance, const uint8_t* guide, float limit,
@@ -80,6 +88,10 @@ struct FilterKernels {
   /// @param variance what the filter is told: larger while there are few frames, and the maximum without history
   void (*variance)(int width, const float* mean, const float* square, const float* samples, const MomentRows& window,
                    const VarianceTerms& terms, float* estimate, float* variance);
+  /// Whether a pixel that hit something has no history.
+  bool (*any_to_fill)(int width, const float* disparity, const float* samples);
+  /// Writes a row of the result: AO, or kInvalidAo for misses, and the lengths of histories.
+  void (*finish)(int width, const float* value, const float* disparity, const float* samples, float* ao, float* tspp);
 };
 
 /// Returns the kernels of an instruction set. All give the same bits. Throws Error(kUnsupported) if this machine lacks

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "runtime/denoise/kernels/filter_rows.h"
+#include "runtime/denoise/kernels/row_math.h"
 
 namespace packtrace {
 namespace {
@@ -14,41 +15,59 @@ constexpr float kStraight = 0.707f / 255.0f, kDiagonal = 0.499f / 255.0f;
 constexpr float kLoneBase = 0.7f, kLoneYoung = 0.3f;
 constexpr float kMaxVariance = 0.25f; // of values in [0, 1]
 
-inline float lesser(float a, float b) { return b < a ? b : a; }
-inline float greater(float a, float b) { return a < b ? b : a; }
 inline float of_byte(uint8_t b) { return static_cast<float>(static_cast<int>(b)); }
 
-void guide_row(int width, const SurfaceRow& p, const SurfaceRow& q, const GuideTerms& terms,
-               uint8_t* __restrict weights) {
-  const SurfaceRow a = p, b = q;
+/// Guide weight of the surfaces at two pixels of rows, q being at an offset from p.
+inline uint8_t guide_weight(const SurfaceRow& p, int at_p, const SurfaceRow& q, int at_q, float offset_x,
+                            float offset_y, const GuideTerms& t) {
+  const float difference = q.disparity[at_q] - p.disparity[at_p];
+  const float rise_p = p.dx[at_p] * offset_x + p.dy[at_p] * offset_y;
+  const float rise_q = q.dx[at_q] * offset_x + q.dy[at_q] * offset_y;
+  const float distance = greater(std::abs(difference - rise_p), std::abs(difference - rise_q));
+  // The flatter of the two slopes, since one of them may be meaninglessly steep at a silhouette.
+  const float allowed = t.depth * lesser(p.disparity[at_p], q.disparity[at_q]) +
+                        t.slope * lesser(std::abs(rise_p), std::abs(rise_q)) + 1e-37f;
+  const float depth = greater(0.0f, 1.0f - distance / allowed);
+  float cosine = p.nx[at_p] * q.nx[at_q] + p.ny[at_p] * q.ny[at_q] + p.nz[at_p] * q.nz[at_q];
+  cosine = lesser(greater(cosine, 0.0f), 1.0f);
+  cosine *= cosine, cosine *= cosine, cosine *= cosine;
+  const float weight = greater(depth * depth * cosine * 255.0f + 0.5f, float{kMinGuide});
+  const bool both = (p.disparity[at_p] > 0.0f) & (q.disparity[at_q] > 0.0f);
+  return static_cast<uint8_t>(static_cast<int>(both ? weight : 0.0f));
+}
+
+void guide_row(int width, int step, const SurfaceRow& here, const SurfaceRow& below, const GuideTerms& terms,
+               const std::array<uint8_t*, 4>& weights) {
+  const SurfaceRow p = here, q = below;
   const GuideTerms t = terms;
+  const float apart = static_cast<float>(step);
+  uint8_t *right = weights[0], *down = weights[1], *down_right = weights[2], *down_left = weights[3];
 #pragma GCC ivdep
   for (int x = 0; x < width; ++x) {
-    const float difference = b.disparity[x] - a.disparity[x];
-    const float rise_a = a.dx[x] * t.offset_x + a.dy[x] * t.offset_y;
-    const float rise_b = b.dx[x] * t.offset_x + b.dy[x] * t.offset_y;
-    const float distance = greater(std::abs(difference - rise_a), std::abs(difference - rise_b));
-    // The flatter of the two slopes, since one of them may be meaninglessly steep at a silhouette.
-    const float allowed = t.depth * lesser(a.disparity[x], b.disparity[x]) +
-                          t.slope * lesser(std::abs(rise_a), std::abs(rise_b)) + 1e-37f;
-    const float depth = greater(0.0f, 1.0f - distance / allowed);
-    float cosine = a.nx[x] * b.nx[x] + a.ny[x] * b.ny[x] + a.nz[x] * b.nz[x];
-    cosine = lesser(greater(cosine, 0.0f), 1.0f);
-    cosine *= cosine, cosine *= cosine, cosine *= cosine;
-    const float weight = greater(depth * depth * cosine * 255.0f + 0.5f, float{kMinGuide});
-    const bool both = (a.disparity[x] > 0.0f) & (b.disparity[x] > 0.0f);
-    weights[x] = static_cast<uint8_t>(static_cast<int>(both ? weight : 0.0f));
+    right[x] = guide_weight(p, x, p, x + step, apart, 0.0f, t);
+    down[x] = guide_weight(p, x, q, x, 0.0f, apart, t);
+    down_right[x] = guide_weight(p, x, q, x + step, apart, apart, t);
+    down_left[x] = guide_weight(p, x, q, x - step, -apart, apart, t);
   }
 }
 
-void compare_row(int width, const float* p, const float* p_variance, const float* q, const float* q_variance,
-                 const uint8_t* guide, float tolerance, float* __restrict distance) {
+void compare_row(int width, int step, const NoisyRow& here, const NoisyRow& below, const PairRow& guide,
+                 float tolerance, const std::array<float*, 4>& distance) {
+  const NoisyRow p = here, q = below;
+  const PairRow g = guide;
+  float *right = distance[0], *down = distance[1], *down_right = distance[2], *down_left = distance[3];
 #pragma GCC ivdep
   for (int x = 0; x < width; ++x) {
-    const float difference = q[x] - p[x];
-    const float noise = p_variance[x] + q_variance[x];
-    const float d = (difference * difference - noise) / (tolerance * noise + 1e-6f);
-    distance[x] = guide[x] != 0 ? d : 0.0f;
+    const auto pair = [&](const NoisyRow& other, int at, uint8_t weight) {
+      const float difference = other.value[at] - p.value[x];
+      const float noise = p.variance[x] + other.variance[at];
+      const float d = (difference * difference - noise) / (tolerance * noise + 1e-6f);
+      return weight != 0 ? d : 0.0f;
+    };
+    right[x] = pair(p, x + step, g[0][x]);
+    down[x] = pair(q, x, g[1][x]);
+    down_right[x] = pair(q, x + step, g[2][x]);
+    down_left[x] = pair(q, x - step, g[3][x]);
   }
 }
 
@@ -174,6 +193,7 @@ void variance_row(int width, const float* mean, const float* square, const float
                   const VarianceTerms& terms, float* __restrict estimate, float* __restrict variance) {
   const MomentRows w = window;
   const VarianceTerms t = terms;
+  const float young_moving = t.moving ? 4.0f : 0.0f, longest_moving = t.moving ? t.longest_moving : 0.0f;
 #pragma GCC ivdep
   for (int x = 0; x < width; ++x) {
     const float a = mean[x], n = greater(samples[x], 1.0f);
@@ -183,10 +203,10 @@ void variance_row(int width, const float* mean, const float* square, const float
     const float own = greater(square[x] - a * a, 0.0f) * n; // (n - 1) s2
     float spread = (t.prior * around + own) / (t.prior + n - 1.0f);
     spread = n < 2.0f ? space : spread;
-    spread = (t.moving & (n < 4.0f)) ? greater(spread, 0.5f * space) : spread;
+    spread = n < young_moving ? greater(spread, 0.5f * space) : spread;
     const float still = t.still_factor * exp2_of(-t.still_power * log2_of(n));
     const float moving = t.moving_base + t.moving_gain * n;
-    const float ratio = lesser((t.moving & (n <= t.longest_moving)) ? moving : still, 1.0f);
+    const float ratio = lesser(n <= longest_moving ? moving : still, 1.0f);
     const float v = spread * (n < 2.0f ? 1.0f : ratio) / n;
     const bool seen = samples[x] > 0.0f;
     estimate[x] = seen ? v : 0.0f;
@@ -194,8 +214,23 @@ void variance_row(int width, const float* mean, const float* square, const float
   }
 }
 
-constexpr FilterKernels kKernels = {guide_row,   compare_row,   weigh_row, normalise_row, exchange_row,
-                                    moments_row, sum_along_row, add_row,   variance_row};
+bool any_to_fill(int width, const float* disparity, const float* samples) {
+  int found = 0;
+  for (int x = 0; x < width; ++x) found |= ((disparity[x] > 0.0f) & !(samples[x] > 0.0f)) ? 1 : 0;
+  return found != 0;
+}
+
+void finish_row(int width, const float* value, const float* disparity, const float* samples, float* __restrict ao,
+                float* __restrict tspp) {
+  constexpr float kMiss = -1.0f; // kInvalidAo
+  for (int x = 0; x < width; ++x) {
+    ao[x] = disparity[x] > 0.0f ? lesser(greater(value[x], 0.0f), 1.0f) : kMiss;
+    tspp[x] = samples[x];
+  }
+}
+
+constexpr FilterKernels kKernels = {guide_row,     compare_row, weigh_row,    normalise_row, exchange_row, moments_row,
+                                    sum_along_row, add_row,     variance_row, any_to_fill,   finish_row};
 
 } // namespace
 } // namespace packtrace

@@ -28,22 +28,19 @@ TEST(Reprojection, IntegerPansFetchTheSameBits) {
       previous.history.mean.row(y)[x] = random(0), previous.history.square.row(y)[x] = random(1);
       previous.history.fast.row(y)[x] = random(2), previous.history.samples.row(y)[x] = 7.0f;
     }
-  DepthDerivatives derivatives;
-  derivatives.resize(size);
-  derivatives.compute(previous.guides);
   for (Vec2& motion : g.motion_px) motion = Vec2(3, -2);
-  History out;
-  out.resize(size);
-  for (int y = 0; y < 21; ++y) std::fill_n(out.mean.row(y), 33, 0.5f); // a rejection must overwrite these values
-  reproject(previous, previous.guides, derivatives, g.motion_px, {}, FluxConfig{}, out);
-  for (int y = 0; y < 21; ++y)
+  const FluxConfig config;
+  ReprojectionRows rows(size, config, history_kernels(chosen_isa()));
+  for (int y = 0; y < 21; ++y) { // the rows are the same memory, so a rejection must overwrite an earlier row's values
+    const HistoryRow out = rows.at({previous, previous.guides, g.motion_px, {}}, y);
     for (int x = 0; x < 33; ++x) {
       const bool seen = x >= 3 && y + 2 < 21;
-      ASSERT_EQ(out.samples.row(y)[x], seen ? 7.0f : 0.0f);
-      ASSERT_EQ(out.mean.row(y)[x], seen ? previous.history.mean.row(y + 2)[x - 3] : 0.0f);
-      ASSERT_EQ(out.square.row(y)[x], seen ? previous.history.square.row(y + 2)[x - 3] : 0.0f);
-      ASSERT_EQ(out.fast.row(y)[x], seen ? previous.history.fast.row(y + 2)[x - 3] : 0.0f);
+      ASSERT_EQ(out.samples[x], seen ? 7.0f : 0.0f);
+      ASSERT_EQ(out.mean[x], seen ? previous.history.mean.row(y + 2)[x - 3] : 0.0f);
+      ASSERT_EQ(out.square[x], seen ? previous.history.square.row(y + 2)[x - 3] : 0.0f);
+      ASSERT_EQ(out.fast[x], seen ? previous.history.fast.row(y + 2)[x - 3] : 0.0f);
     }
+  }
 }
 
 /// Denoises two frames with a change of the guides in between. Returns whether the pixels keep their history.

@@ -9,6 +9,11 @@ namespace {
 
 using synthetic::uniform;
 
+struct FrameSamples {
+  Plane<float> ao, valid, change;
+  void resize(ImageSize size) { ao.resize(size), valid.resize(size), change.resize(size); }
+};
+
 /// Reference implementation: plain sums over the window.
 struct Reference {
   double count = 0, sum = 0, squares = 0, change = 0;
@@ -35,22 +40,27 @@ TEST(LocalStatistics, AreThoseOfTheSamplesInTheWindow) {
       samples.change.row(static_cast<int>(y))[x] = uniform(x, y, 2) - 0.5f;
     }
   for (const uint32_t window : {3u, 5u, 7u, 9u}) {
-    LocalStatisticsRows rows(size.width, window);
+    LocalStatisticsRows rows(size.width, window, history_kernels(chosen_isa()));
     for (const int first : {0, 17}) {
-      rows.begin(samples, first);
-      for (int y = first; y < static_cast<int>(size.height); ++y) {
-        const LocalStatistics& local = rows.at(samples, y);
+      const int height = static_cast<int>(size.height), radius = rows.radius();
+      ASSERT_EQ(radius, static_cast<int>(window / 2));
+      for (int added = first - radius; added < height + radius; ++added) {
+        if (added < 0 || added >= height)
+          rows.add_nothing();
+        else
+          rows.add({samples.ao.row(added), samples.valid.row(added), samples.change.row(added)});
+        const int y = added - radius;
+        if (y < first) continue;
+        const LocalRow local = rows.finish();
         for (int x = 0; x < static_cast<int>(size.width); ++x) {
-          const size_t i = static_cast<size_t>(x);
           const Reference wide(samples, x, y, static_cast<int>(window / 2)), narrow(samples, x, y, 1);
-          ASSERT_EQ(local.count[i], wide.count);
-          ASSERT_EQ(local.narrow_count[i], narrow.count);
+          ASSERT_EQ(local.count[x], wide.count);
+          ASSERT_EQ(local.narrow_count[x], narrow.count);
           const double n = std::max(wide.count, 1.0), mean = wide.sum / n;
-          ASSERT_NEAR(local.mean[i], mean, 1e-5);
-          ASSERT_NEAR(local.change[i], wide.change / n, 1e-5);
-          ASSERT_NEAR(local.narrow_change[i], narrow.change / std::max(narrow.count, 1.0), 1e-5);
+          ASSERT_NEAR(local.change[x], wide.change / n, 1e-5);
+          ASSERT_NEAR(local.narrow_change[x], narrow.change / std::max(narrow.count, 1.0), 1e-5);
           const double variance = wide.count > 1 ? (wide.squares - wide.sum * mean) / (wide.count - 1) : 0.0;
-          ASSERT_NEAR(local.variance[i], variance, 1e-5) << x << ' ' << y << " window " << window;
+          ASSERT_NEAR(local.variance[x], variance, 1e-5) << x << ' ' << y << " window " << window;
         }
       }
     }

@@ -1,0 +1,152 @@
+#include "runtime/denoise/history_update.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include <tbb/enumerable_thread_specific.h>
+
+#include "runtime/denoise/local_statistics.h"
+
+namespace packtrace {
+namespace {
+
+/// Rows of samples with their borders, which stay 0.
+class SampleRows {
+public:
+  SampleRows(ImageSize size, int rows)
+      : stride_(static_cast<size_t>(size.width) + 2 * kPlaneBorder), data_(3 * static_cast<size_t>(rows) * stride_) {}
+  SampleRow row(int y) {
+    float* first = data_.data() + 3 * static_cast<size_t>(y) * stride_ + kPlaneBorder;
+    return {first, first + stride_, first + 2 * stride_};
+  }
+
+private:
+  size_t stride_;
+  std::vector<float> data_;
+};
+
+/// What one thread needs to update strips of rows.
+class HistoryStrip {
+public:
+  HistoryStrip(ImageSize size, const HistoryKernels& kernels, const FluxConfig& config)
+      : kernels_(kernels), config_(config), width_(static_cast<int>(size.width)), reprojection_(size, config, kernels),
+        statistics_(size.width, config.window, kernels), samples_(size, 1), discarded_(4 * size_t{size.width}) {
+    const float share = 1.0f / static_cast<float>(config.fast_frames);
+    terms_ = {share / (2.0f - share), config.change_gamma, config.change_tolerance, config.change_response,
+              static_cast<float>(config.fast_frames)};
+  }
+
+  /// The samples of row y, without changing the history.
+  void look(const HistoryInput& input, const History& history, int y, const SampleRow& samples) {
+    float* row = discarded_.data();
+    accumulate(input, history, y, {row, row + width_, row + 2 * width_, row + 3 * width_}, samples);
+  }
+
+  /// Adds row y's samples to the history.
+  void add(const HistoryInput& input, History& history, int y) {
+    accumulate(input, history, y, row_of(history, y), samples_.row(0));
+  }
+
+  /// Updates rows [first, last). @param neighbour returns the samples of rows of other strips
+  template <typename Neighbour>
+  void update(const HistoryInput& input, History& history, int first, int last, const Neighbour& neighbour) {
+    const int radius = statistics_.radius(), height = static_cast<int>(input.guides.size.height);
+    for (int y = first - radius; y < last + radius; ++y) {
+      if (y < 0 || y >= height) {
+        statistics_.add_nothing();
+      } else if (y < first || y >= last) {
+        statistics_.add(neighbour(y));
+      } else {
+        add(input, history, y);
+        statistics_.add(samples_.row(0));
+      }
+      if (y - radius >= first) kernels_.correct(width_, statistics_.finish(), terms_, row_of(history, y - radius));
+    }
+  }
+
+private:
+  static HistoryRow row_of(History& h, int y) {
+    return {h.mean.row(y), h.square.row(y), h.fast.row(y), h.samples.row(y)};
+  }
+
+  void accumulate(const HistoryInput& input, const History& history, int y, const HistoryRow& out,
+                  const SampleRow& samples) {
+    const HistoryRow old = input.motion != nullptr ? reprojection_.at(*input.motion, y) : HistoryRow{};
+    const PastRow past = input.motion != nullptr ? PastRow{old.mean, old.square, old.fast, old.samples}
+                                                 : PastRow{history.mean.row(y), history.square.row(y),
+                                                           history.fast.row(y), history.samples.row(y)};
+    kernels_.accumulate(width_, &input.ao[static_cast<size_t>(y) * static_cast<size_t>(width_)],
+                        input.guides.disparity.row(y), {input.longest, terms_.fast_frames}, past, out, samples);
+  }
+
+  const HistoryKernels& kernels_;
+  const FluxConfig& config_;
+  int width_;
+  ReprojectionRows reprojection_;
+  LocalStatisticsRows statistics_;
+  CorrectTerms terms_;
+  SampleRows samples_;
+  std::vector<float> discarded_;
+};
+
+/// Rows of strip i begin here.
+int begin_of_strip(int height, int strips, int i) { return static_cast<int>(int64_t{height} * i / strips); }
+
+} // namespace
+
+struct HistoryUpdate::State {
+  FluxConfig config;
+  const HistoryKernels& kernels;
+  ImageSize size;
+  tbb::enumerable_thread_specific<std::unique_ptr<HistoryStrip>> strips;
+  std::vector<SampleRows> seams; ///< samples of the rows on both sides of the strips' ends, from before the update
+
+  HistoryStrip& strip() {
+    std::unique_ptr<HistoryStrip>& local = strips.local();
+    if (!local) local = std::make_unique<HistoryStrip>(size, kernels, config);
+    return *local;
+  }
+};
+
+HistoryUpdate::HistoryUpdate(const FluxConfig& config, Isa isa)
+    : state_(new State{config, history_kernels(isa), {}, {}, {}}) {}
+HistoryUpdate::~HistoryUpdate() = default;
+
+void HistoryUpdate::run(const HistoryInput& input, History& history) {
+  State& s = *state_;
+  constexpr int kRowsPerStrip = 96;
+  const int height = static_cast<int>(input.guides.size.height), strips = std::max(1, height / kRowsPerStrip);
+  const int radius = static_cast<int>(s.config.window / 2);
+  if (s.size != input.guides.size) {
+    s.strips.clear(), s.seams.clear(), s.size = input.guides.size;
+    for (int i = 1; i < strips; ++i) s.seams.emplace_back(s.size, 2 * radius);
+  }
+  const auto begin_of = [&](int strip) { return begin_of_strip(height, strips, strip); };
+  const auto seam_row = [&](int seam, int y) {
+    return s.seams[static_cast<size_t>(seam - 1)].row(y - begin_of(seam) + radius);
+  };
+  const auto for_each = [](int first, int last, const auto& work) {
+    tbb::parallel_for(
+        tbb::blocked_range<int>(first, last, 1),
+        [&](const tbb::blocked_range<int>& range) {
+          for (int i = range.begin(); i != range.end(); ++i) work(i);
+        },
+        tbb::simple_partitioner());
+  };
+  if (!input.correct) {
+    for_each(0, strips, [&](int i) {
+      for (int y = begin_of(i); y < begin_of(i + 1); ++y) s.strip().add(input, history, y);
+    });
+    return;
+  }
+  for_each(1, strips, [&](int i) {
+    for (int y = begin_of(i) - radius; y < begin_of(i) + radius; ++y) s.strip().look(input, history, y, seam_row(i, y));
+  });
+  for_each(0, strips, [&](int i) {
+    s.strip().update(input, history, begin_of(i), begin_of(i + 1),
+                     [&](int y) { return seam_row(y < begin_of(i) ? i : i + 1, y); });
+  });
+}
+
+} // namespace packtrace

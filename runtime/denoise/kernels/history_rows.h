@@ -1,0 +1,125 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "pbrt_import/base/isa.h"
+
+namespace packtrace {
+
+/// Pixels after each row of scratch that kernels may write.
+inline constexpr int kRunPadding = 16;
+
+/// Offset of a pixel without history, in LocatedRow.
+inline constexpr int32_t kNoOffset = INT32_MIN;
+
+/// One row of a frame, as reprojection reads it.
+struct MovingRow {
+  const float *above, *here, *below; ///< disparity of three rows
+  const float* motion;               ///< x and y of each pixel's motion in pixels
+  const float* previous_z;           ///< null: as now
+};
+
+struct LocateTerms {
+  float depth, slope; ///< of the tolerance of disparities
+  float y, width, height;
+  ptrdiff_t stride; ///< between rows of the previous frame
+  float longest_still, longest_moving;
+};
+
+/// Where the pixels of a row were in the previous frame.
+struct LocatedRow {
+  int32_t* offset;                ///< of the first of the 2 x 2 pixels around it from the pixel itself; or kNoOffset
+  float *fraction_x, *fraction_y; ///< in [0, 1)
+  float *disparity, *tolerance;   ///< of the surface, in the previous frame; disparity 0: no history
+  float* longest;                 ///< longest history in frames
+};
+
+/// The planes of the previous frame, at a pixel.
+struct PreviousPixels {
+  const float *disparity, *normal_x, *normal_y, *normal_z;
+  const uint32_t* instance;
+  const float *mean, *square, *fast, *samples;
+  ptrdiff_t stride;
+};
+
+/// The surfaces that history must match.
+struct WantedRow {
+  LocatedRow at;
+  const float *normal_x, *normal_y, *normal_z;
+  const uint32_t* instance;
+};
+
+/// One row of the history.
+struct HistoryRow {
+  float *mean, *square, *fast, *samples;
+};
+
+/// The same, to read.
+struct PastRow {
+  const float *mean, *square, *fast, *samples;
+};
+
+/// Longest histories in frames.
+struct HistoryLengths {
+  float slow, fast;
+};
+
+/// One row of a frame's samples. Pixels without a sample and those outside the image are 0.
+struct SampleRow {
+  float* ao;     ///< clamped to [0,1]
+  float* valid;  ///< 1 where the pixel has a sample
+  float* change; ///< fast minus slow history, both including this sample
+};
+
+/// Sums along x over the window, or over 3 pixels (narrow).
+struct WindowSums {
+  float *count, *sum, *squares, *change, *narrow_count, *narrow_change;
+};
+
+/// Statistics of the windows around the pixels of one row.
+struct LocalRow {
+  float* count;         ///< number of samples in the window
+  float* variance;      ///< variance of the samples, Bessel-corrected; 0 for fewer than two samples
+  float* change;        ///< mean of SampleRow::change
+  float* narrow_count;  ///< number of samples in the 3 x 3 window
+  float* narrow_change; ///< mean of SampleRow::change in the 3 x 3 window
+};
+
+struct CorrectTerms {
+  float fast_share; ///< variance of the fast history divided by the variance of a sample
+  float gamma, tolerance, response, fast_frames;
+};
+
+inline constexpr int kMaxWindowRadius = 4;
+inline constexpr int kMaxNormalSquarings = 10;
+
+/// Functions on rows of pixels that update the history; docs/denoiser.md describes the passes.
+struct HistoryKernels {
+  /// Finds the previous positions of the pixels of a row.
+  void (*locate)(int width, const MovingRow& row, const LocateTerms& terms, const LocatedRow& located);
+  /// Resamples the history of `width` pixels that moved by the same offset, by the number of squarings that raise
+  /// cosines to their power. Writes up to kRunPadding pixels more.
+  /// @param from the previous frame at the first pixel plus its offset
+  std::array<void (*)(int width, const PreviousPixels& from, const WantedRow& wanted, bool test_instances,
+                      const HistoryRow& out),
+             kMaxNormalSquarings + 1>
+      resample;
+  /// Adds samples to a row of the history, perhaps in place.
+  void (*accumulate)(int width, const float* ao, const float* disparity, const HistoryLengths& longest,
+                     const PastRow& past, const HistoryRow& history, const SampleRow& samples);
+  /// Sums along x, by the window's radius. Samples are read up to the radius outside the row.
+  std::array<void (*)(int width, const SampleRow& samples, const WindowSums& sums), kMaxWindowRadius + 1> sum;
+  /// Statistics of windows, by their radius.
+  /// @param rows sums of the window's rows, from top to bottom
+  std::array<void (*)(int width, const WindowSums* rows, const LocalRow& local), kMaxWindowRadius + 1> finish;
+  /// Corrects a row of the history in place.
+  void (*correct)(int width, const LocalRow& local, const CorrectTerms& terms, const HistoryRow& history);
+};
+
+/// Returns the kernels of an instruction set. All give the same bits. Throws Error(kUnsupported) if this machine lacks
+/// it.
+const HistoryKernels& history_kernels(Isa isa);
+
+} // namespace packtrace

@@ -1,0 +1,256 @@
+#pragma once
+
+// Compiled once per instruction set. Everything is local to the file that includes it, so that no function of a wider
+// instruction set replaces another file's.
+
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "runtime/denoise/kernels/history_rows.h"
+#include "runtime/denoise/kernels/row_math.h"
+
+namespace packtrace {
+namespace {
+
+constexpr float kLargest = std::numeric_limits<float>::max(), kSmallest = std::numeric_limits<float>::min();
+constexpr float kIgnoredMotion = 1e-3f; // kStillMotion
+
+/// History with a smaller total weight is rejected: the tests' soft weights let hardly any of the surface through.
+constexpr float kMinHistoryWeight = 1e-3f;
+
+/// Footprints with a smaller total weight cross an edge, where sharpening would overshoot.
+constexpr float kMinSharpenWeight = 0.9f;
+
+/// Magnitude of the smaller one-sided difference (DepthDerivatives).
+inline float smaller_step(float before, float centre, float after) {
+  const float backward = std::abs(centre - before), forward = std::abs(after - centre);
+  const float b = before > 0.0f ? backward : kLargest, f = after > 0.0f ? forward : kLargest;
+  const float least = lesser(b, f);
+  return ((before > 0.0f) | (after > 0.0f)) & (centre > 0.0f) ? least : 0.0f;
+}
+
+template <bool kMovedInDepth>
+void locate_pixels(int width, const MovingRow& row, const LocateTerms& terms, const LocatedRow& located) {
+  const MovingRow r = row;
+  const LocateTerms t = terms;
+  const LocatedRow o = located;
+  const float *above = r.above, *here = r.here, *below = r.below;
+  const int stride = static_cast<int>(t.stride), row_y = static_cast<int>(t.y);
+#pragma GCC ivdep
+  for (int x = 0; x < width; ++x) {
+    const float mx = r.motion[2 * x], my = r.motion[2 * x + 1];
+    const bool still = (std::abs(mx) <= kIgnoredMotion) & (std::abs(my) <= kIgnoredMotion);
+    const float from_x = static_cast<float>(x) - (still ? 0.0f : mx), from_y = t.y - (still ? 0.0f : my);
+    const float now = here[x];
+    float before = now;
+    if constexpr (kMovedInDepth) {
+      const float z = r.previous_z[x];
+      const bool good = (z >= kSmallest) & (z <= kLargest) & (now > 0.0f);
+      before = good ? 1.0f / z : 0.0f;
+    }
+    // False for NaN, too. The conversions to integers below cannot overflow.
+    const bool inside =
+        (from_x > -1.0f) & (from_x < t.width) & (from_y > -1.0f) & (from_y < t.height) & (before > 0.0f);
+    const float at_x = inside ? from_x : 0.0f, at_y = inside ? from_y : 0.0f;
+    int column = static_cast<int>(at_x), line = static_cast<int>(at_y);
+    column -= static_cast<float>(column) > at_x ? 1 : 0; // towards minus infinity
+    line -= static_cast<float>(line) > at_y ? 1 : 0;
+    float slope = smaller_step(here[x - 1], now, here[x + 1]) + smaller_step(above[x], now, below[x]);
+    if constexpr (kMovedInDepth) slope = before != now ? slope * (before / now) : slope;
+    o.offset[x] = inside ? (line - row_y) * stride + (column - x) : kNoOffset;
+    o.fraction_x[x] = at_x - static_cast<float>(column);
+    o.fraction_y[x] = at_y - static_cast<float>(line);
+    o.disparity[x] = inside ? before : 0.0f;
+    o.tolerance[x] = t.depth * before + t.slope * slope + kSmallest;
+    o.longest[x] = still ? t.longest_still : t.longest_moving;
+  }
+}
+
+void locate_row(int width, const MovingRow& row, const LocateTerms& terms, const LocatedRow& located) {
+  (row.previous_z != nullptr ? locate_pixels<true> : locate_pixels<false>)(width, row, terms, located);
+}
+
+/// The difference between Catmull-Rom and linear interpolation between a and b, where before and after are the outer
+/// neighbours: -t (1 - t) / 2 times the linearly interpolated second differences at a and b.
+/// Source: R. Keys, "Cubic convolution interpolation for digital image processing", 1981, a = -1/2.
+inline float sharpening(float before, float a, float b, float after, float t) {
+  return -0.5f * t * (1.0f - t) * ((1.0f - t) * (before - 2.0f * a + b) + t * (a - 2.0f * b + after));
+}
+
+template <int kSquarings>
+void resample_run(int width, const PreviousPixels& from, const WantedRow& wanted, bool test_instances,
+                  const HistoryRow& out) {
+  const PreviousPixels p = from;
+  const WantedRow w = wanted;
+  const HistoryRow o = out;
+  const ptrdiff_t s = p.stride;
+  const uint32_t ignored = test_instances ? 0u : ~0u; // bits in which instances may differ
+  const int rounded = (width + kRunPadding - 1) / kRunPadding * kRunPadding;
+#pragma GCC ivdep
+  for (int x = 0; x < rounded; ++x) {
+    const float disparity = w.at.disparity[x], tolerance = w.at.tolerance[x];
+    const float fx = w.at.fraction_x[x], fy = w.at.fraction_y[x];
+    const float nx = w.normal_x[x], ny = w.normal_y[x], nz = w.normal_z[x];
+    const uint32_t instance = w.instance[x];
+    float weight = 0.0f, mean = 0.0f, square = 0.0f, fast = 0.0f, samples = 0.0f;
+    // Weighted by similarity: 0 for another surface, up to 1 for a perfect match.
+    const auto corner = [&](ptrdiff_t at, float bilinear) {
+      const float there = p.disparity[at], count = p.samples[at];
+      const float distance = std::abs(there - disparity);
+      const float dot = p.normal_x[at] * nx + p.normal_y[at] * ny + p.normal_z[at] * nz;
+      float cosine = lesser(greater(1.1f * dot, 0.0f), 1.0f);
+      for (int i = 0; i < kSquarings; ++i) cosine *= cosine;
+      const float agreement = tolerance / greater(distance, tolerance) * cosine;
+      const uint32_t differs = (p.instance[at] ^ instance) & ~ignored;
+      const bool same = (there > 0.0f) & (count > 0.0f) & (distance <= 2.0f * tolerance) & (differs == 0u);
+      const float part = same ? bilinear * agreement : 0.0f;
+      weight += part;
+      mean += part * p.mean[at];
+      square += part * p.square[at];
+      fast += part * p.fast[at];
+      samples += part * count;
+    };
+    corner(x, (1.0f - fx) * (1.0f - fy));
+    corner(x + 1, fx * (1.0f - fy));
+    corner(x + s, (1.0f - fx) * fy);
+    corner(x + s + 1, fx * fy);
+    // The footprint and its eight edge-adjacent neighbours must lie on one surface: a hard test without normals.
+    int same = 1;
+    const auto tap = [&](ptrdiff_t at) {
+      const bool alike =
+          (p.instance[at] == instance) & (p.samples[at] > 0.0f) & (std::abs(p.disparity[at] - disparity) <= tolerance);
+      same &= alike ? 1 : 0;
+      return p.mean[at];
+    };
+    const float m00 = tap(x), m10 = tap(x + 1), m01 = tap(x + s), m11 = tap(x + s + 1);
+    const float along_x = (1.0f - fy) * sharpening(tap(x - 1), m00, m10, tap(x + 2), fx) +
+                          fy * sharpening(tap(x + s - 1), m01, m11, tap(x + s + 2), fx);
+    const float along_y = (1.0f - fx) * sharpening(tap(x - s), m00, m01, tap(x + 2 * s), fy) +
+                          fx * sharpening(tap(x - s + 1), m10, m11, tap(x + 2 * s + 1), fy);
+    const bool found = (weight > kMinHistoryWeight) & (disparity > 0.0f);
+    const bool sharpen = (same != 0) & (weight > kMinSharpenWeight);
+    const float scale = found ? 1.0f / weight : 0.0f;
+    const float linear = mean * scale;
+    const float sharp = lesser(greater(linear + (sharpen ? along_x + along_y : 0.0f), 0.0f), 1.0f);
+    o.mean[x] = found ? sharp : 0.0f;
+    o.square[x] = found ? square * scale + (sharp - linear) * (sharp + linear) : 0.0f; // keeps the variance
+    o.fast[x] = found ? fast * scale : 0.0f;
+    o.samples[x] = found ? lesser(samples, w.at.longest[x]) : 0.0f;
+  }
+}
+
+void accumulate_row(int width, const float* ao, const float* disparity, const HistoryLengths& longest,
+                    const PastRow& past, const HistoryRow& history, const SampleRow& samples) {
+  const PastRow p = past;
+  const HistoryRow h = history;
+  const HistoryLengths most = longest;
+  const SampleRow o = samples;
+#pragma GCC ivdep
+  for (int x = 0; x < width; ++x) {
+    const bool valid = (ao[x] >= 0.0f) & (ao[x] <= kLargest) & (disparity[x] > 0.0f);
+    const float value = valid ? lesser(ao[x], 1.0f) : 0.0f;
+    const float count = lesser(p.samples[x] + 1.0f, most.slow);
+    const float share = valid ? 1.0f / count : 0.0f;
+    const float fast_share = valid ? 1.0f / lesser(count, most.fast) : 0.0f;
+    const float mean = p.mean[x] + (value - p.mean[x]) * share;
+    const float fast = p.fast[x] + (value - p.fast[x]) * fast_share;
+    h.mean[x] = mean;
+    h.square[x] = p.square[x] + (value * value - p.square[x]) * share;
+    h.fast[x] = fast;
+    h.samples[x] = valid ? count : lesser(p.samples[x], most.slow);
+    o.ao[x] = value;
+    o.valid[x] = valid ? 1.0f : 0.0f;
+    o.change[x] = valid ? fast - mean : 0.0f;
+  }
+}
+
+template <int kRadius>
+void sum_windows(int width, const SampleRow& samples, const WindowSums& sums) {
+  const SampleRow s = samples;
+  const WindowSums o = sums;
+#pragma GCC ivdep
+  for (int x = 0; x < width; ++x) {
+    float count = s.valid[x - 1] + s.valid[x] + s.valid[x + 1];
+    float change = s.change[x - 1] + s.change[x] + s.change[x + 1];
+    float sum = s.ao[x], squares = s.ao[x] * s.ao[x];
+    o.narrow_count[x] = count;
+    o.narrow_change[x] = change;
+    for (int r = 1; r <= kRadius; ++r) {
+      if (r > 1) count += s.valid[x - r] + s.valid[x + r], change += s.change[x - r] + s.change[x + r];
+      sum += s.ao[x - r] + s.ao[x + r];
+      squares += s.ao[x - r] * s.ao[x - r] + s.ao[x + r] * s.ao[x + r];
+    }
+    o.count[x] = count;
+    o.sum[x] = sum;
+    o.squares[x] = squares;
+    o.change[x] = change;
+  }
+}
+
+template <int kRadius>
+void finish_windows(int width, const WindowSums* rows, const LocalRow& local) {
+  std::array<WindowSums, 2 * kRadius + 1> r;
+  for (size_t i = 0; i < r.size(); ++i) r[i] = rows[i];
+  const LocalRow o = local;
+#pragma GCC ivdep
+  for (int x = 0; x < width; ++x) {
+    float count = 0.0f, sum = 0.0f, squares = 0.0f, change = 0.0f, narrow_count = 0.0f, narrow_change = 0.0f;
+    for (int i = 0; i <= 2 * kRadius; ++i) {
+      const WindowSums& row = r[static_cast<size_t>(i)];
+      count += row.count[x], sum += row.sum[x], squares += row.squares[x], change += row.change[x];
+      if (i >= kRadius - 1 && i <= kRadius + 1)
+        narrow_count += row.narrow_count[x], narrow_change += row.narrow_change[x];
+    }
+    const float n = greater(count, 1.0f);
+    const float spread = squares - sum * (sum / n);
+    o.count[x] = count;
+    o.variance[x] = count > 1.0f ? greater(spread, 0.0f) / greater(n - 1.0f, 1.0f) : 0.0f;
+    o.change[x] = change / n;
+    o.narrow_count[x] = narrow_count;
+    o.narrow_change[x] = narrow_change / greater(narrow_count, 1.0f);
+  }
+}
+
+/// Reduces the magnitude of `change` by `limit`, at most to 0 (soft threshold).
+inline float excess(float change, float limit) {
+  return std::copysign(greater(std::abs(change) - limit, 0.0f), change);
+}
+
+void correct_row(int width, const LocalRow& local, const CorrectTerms& terms, const HistoryRow& history) {
+  const LocalRow l = local;
+  const CorrectTerms t = terms;
+  const HistoryRow h = history;
+#pragma GCC ivdep
+  for (int x = 0; x < width; ++x) {
+    const float noise = l.variance[x] * t.fast_share;
+    const float wide = excess(l.change[x], t.gamma * std::sqrt(noise / greater(l.count[x], 1.0f)) + t.tolerance);
+    const float narrow =
+        excess(l.narrow_change[x], t.gamma * std::sqrt(noise / greater(l.narrow_count[x], 1.0f)) + t.tolerance);
+    const float wanted = std::abs(narrow) > std::abs(wide) ? narrow : wide;
+    const float old_mean = h.mean[x];
+    const float new_mean = h.samples[x] > 0.0f ? lesser(greater(old_mean + wanted, 0.0f), 1.0f) : old_mean;
+    const float shift = new_mean - old_mean;
+    const float kept = 1.0f - lesser(t.response * std::abs(shift), 1.0f);
+    const float n = lesser(h.samples[x], greater(h.samples[x] * kept, t.fast_frames));
+    const float moment = greater(h.square[x] - old_mean * old_mean, 0.0f); // a shift keeps the variance
+    h.mean[x] = new_mean;
+    h.square[x] = moment + new_mean * new_mean;
+    h.samples[x] = n;
+  }
+}
+
+template <int... kPowers>
+constexpr HistoryKernels history_table(std::integer_sequence<int, kPowers...>) {
+  return {locate_row,
+          {resample_run<kPowers>...},
+          accumulate_row,
+          {nullptr, sum_windows<1>, sum_windows<2>, sum_windows<3>, sum_windows<4>},
+          {nullptr, finish_windows<1>, finish_windows<2>, finish_windows<3>, finish_windows<4>},
+          correct_row};
+}
+
+constexpr HistoryKernels kHistoryRows = history_table(std::make_integer_sequence<int, kMaxNormalSquarings + 1>());
+
+} // namespace
+} // namespace packtrace

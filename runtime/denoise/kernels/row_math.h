@@ -1,0 +1,12 @@
+#pragma once
+
+/// Replacements for std::min and std::max, which take references and thereby keep GCC from vectorising loops. Local to
+/// each file, because every instruction set compiles them.
+namespace packtrace {
+namespace {
+
+inline float lesser(float a, float b) { return b < a ? b : a; }
+inline float greater(float a, float b) { return a < b ? b : a; }
+
+} // namespace
+} // namespace packtrace
