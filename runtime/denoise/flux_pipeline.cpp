@@ -28,7 +28,7 @@ public:
   size_t state_bytes() const override;
 
 private:
-  /// Calls work(plane) for everything that the next frame needs of this one; all elements have 4 bytes.
+  /// Calls work(plane) for everything that the next frame needs of this one.
   template <typename Self, typename Work>
   static void for_each_saved_plane(Self& self, const Work& work) {
     auto& g = self.now_.guides;
@@ -117,10 +117,9 @@ std::vector<std::byte> FluxPipeline::save() const {
 void FluxPipeline::restore(ImageSize size, std::span<const std::byte> bytes) {
   resize(size);
   if (bytes.empty()) return;
-  size_t planes = 0;
-  for_each_saved_plane(*this, [&](auto&) { ++planes; });
-  if (bytes.size() != planes * sizeof(float) * size.pixels())
-    throw Error(ErrorKind::kInput, "denoiser: the saved history has another size");
+  size_t expected = 0;
+  for_each_saved_plane(*this, [&](auto& plane) { expected += sizeof(*plane.row(0)) * size.pixels(); });
+  if (bytes.size() != expected) throw Error(ErrorKind::kInput, "denoiser: the saved history has another size");
   now_.guides.size = size;
   for_each_saved_plane(*this, [&](auto& plane) {
     for (int y = 0; y < static_cast<int>(size.height); ++y) {

@@ -11,16 +11,22 @@ namespace {
 /// Whether c can be a component of a unit vector, with some room for rounding. False for NaN.
 inline bool is_component(float c) { return c >= -2.0f && c <= 2.0f; }
 
+/// In kNormalUnit, rounded to nearest; 0 if the normal is not `good`.
+inline int16_t component(bool good, float c) {
+  const float bounded = smaller(larger(good ? c : 0.0f, -1.0f), 1.0f);
+  return static_cast<int16_t>(static_cast<int>(bounded * (1.0f / kNormalUnit) + 16384.5f) - 16384);
+}
+
 PACKTRACE_AVX2_CLONES
 void load_row(int width, const float* __restrict z, const float* __restrict normal, float* __restrict disparity,
-              float* __restrict nx, float* __restrict ny, float* __restrict nz) {
+              int16_t* __restrict nx, int16_t* __restrict ny, int16_t* __restrict nz) {
   for (int x = 0; x < width; ++x) {
     const float cx = normal[3 * x], cy = normal[3 * x + 1], cz = normal[3 * x + 2];
     const bool good = is_component(cx) & is_component(cy) & is_component(cz);
     disparity[x] = disparity_of(z[x]);
-    nx[x] = good ? cx : 0.0f;
-    ny[x] = good ? cy : 0.0f;
-    nz[x] = good ? cz : 0.0f;
+    nx[x] = component(good, cx);
+    ny[x] = component(good, cy);
+    nz[x] = component(good, cz);
   }
 }
 
@@ -28,14 +34,15 @@ void load_row(int width, const float* __restrict z, const float* __restrict norm
 PACKTRACE_AVX2_CLONES
 int count_changes(int width, const float* __restrict z, const float* __restrict normal,
                   const uint32_t* __restrict instance, const float* __restrict motion,
-                  const float* __restrict disparity, const float* __restrict nx, const float* __restrict ny,
-                  const float* __restrict nz, const uint32_t* __restrict old_instance) {
+                  const float* __restrict disparity, const int16_t* __restrict nx, const int16_t* __restrict ny,
+                  const int16_t* __restrict nz, const uint32_t* __restrict old_instance) {
   int changes = 0;
   for (int x = 0; x < width; ++x) {
     const float cx = normal[3 * x], cy = normal[3 * x + 1], cz = normal[3 * x + 2];
     const bool good = is_component(cx) & is_component(cy) & is_component(cz);
-    const bool same = (disparity_of(z[x]) == disparity[x]) & ((good ? cx : 0.0f) == nx[x]) &
-                      ((good ? cy : 0.0f) == ny[x]) & ((good ? cz : 0.0f) == nz[x]) & (instance[x] == old_instance[x]);
+    const bool same = (disparity_of(z[x]) == disparity[x]) & (component(good, cx) == nx[x]) &
+                      (component(good, cy) == ny[x]) & (component(good, cz) == nz[x]) &
+                      (instance[x] == old_instance[x]);
     changes += same ? 0 : 1;
   }
   for (int i = 0; i < 2 * width; ++i) changes += std::abs(motion[i]) <= kStillMotion ? 0 : 1; // NaN counts as motion

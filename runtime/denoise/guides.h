@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <limits>
 
 #include "runtime/denoise/plane.h"
@@ -15,15 +16,18 @@ inline float disparity_of(float z) {
   return z >= std::numeric_limits<float>::min() && z <= std::numeric_limits<float>::max() ? 1.0f / z : 0.0f;
 }
 
+/// Guides store components of normals in these units.
+inline constexpr float kNormalUnit = 1.0f / 16384.0f;
+
 /// The G-buffer channels that the filters use, as planes. A depth that is not positive and finite is stored as
-/// disparity 0, which means a miss. A normal that is not finite is stored as a zero vector, which gets weight 0 in
-/// blurs and in reprojection.
+/// disparity 0, which means a miss. A normal that is not finite, or far from a unit vector, is stored as a zero vector,
+/// which gets weight 0 in blurs and in reprojection.
 struct Guides {
   ImageSize size;
   /// 1 / view_z, or 0 where the camera ray missed. In a perspective view it is a linear function of pixel coordinates
   /// on every planar surface.
   Plane<float> disparity;
-  Plane<float> normal_x, normal_y, normal_z;
+  Plane<int16_t> normal_x, normal_y, normal_z; ///< in kNormalUnit, from -1 to 1
   Plane<uint32_t> instance;
 
   void resize(ImageSize new_size);

@@ -18,7 +18,7 @@ inline constexpr int kRowPadding = 16;
 /// What guide weights compare, for one row of pixels.
 struct SurfaceRow {
   const float *disparity, *dx, *dy; ///< dx, dy: change of the disparity per pixel
-  const float *nx, *ny, *nz;
+  const int16_t *nx, *ny, *nz;      ///< in kNormalUnit
 };
 
 /// Least guide weight, of 255, of two pixels that both hit something.

@@ -38,7 +38,8 @@ struct LocatedRow {
 
 /// The planes of the previous frame, at a pixel.
 struct PreviousPixels {
-  const float *disparity, *normal_x, *normal_y, *normal_z;
+  const float* disparity;
+  const int16_t *normal_x, *normal_y, *normal_z; ///< in kNormalUnit
   const uint32_t* instance;
   const float *mean, *square, *fast, *samples;
   ptrdiff_t stride;
@@ -47,7 +48,7 @@ struct PreviousPixels {
 /// The surfaces that history must match.
 struct WantedRow {
   LocatedRow at;
-  const float *normal_x, *normal_y, *normal_z;
+  const int16_t *normal_x, *normal_y, *normal_z;
   const uint32_t* instance;
 };
 

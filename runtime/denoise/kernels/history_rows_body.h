@@ -91,15 +91,15 @@ void resample_run(int width, const PreviousPixels& from, const WantedRow& wanted
   for (int x = 0; x < rounded; ++x) {
     const float disparity = w.at.disparity[x], tolerance = w.at.tolerance[x];
     const float fx = w.at.fraction_x[x], fy = w.at.fraction_y[x];
-    const float nx = w.normal_x[x], ny = w.normal_y[x], nz = w.normal_z[x];
+    const int nx = w.normal_x[x], ny = w.normal_y[x], nz = w.normal_z[x];
     const uint32_t instance = w.instance[x];
     float weight = 0.0f, mean = 0.0f, square = 0.0f, fast = 0.0f, samples = 0.0f;
     // Weighted by similarity: 0 for another surface, up to 1 for a perfect match.
     const auto corner = [&](ptrdiff_t at, float bilinear) {
       const float there = p.disparity[at], count = p.samples[at];
       const float distance = std::abs(there - disparity);
-      const float dot = p.normal_x[at] * nx + p.normal_y[at] * ny + p.normal_z[at] * nz;
-      float cosine = lesser(greater(1.1f * dot, 0.0f), 1.0f);
+      const float dot = static_cast<float>(p.normal_x[at] * nx + p.normal_y[at] * ny + p.normal_z[at] * nz);
+      float cosine = lesser(greater(1.1f * kSquaredNormalUnit * dot, 0.0f), 1.0f);
       for (int i = 0; i < kSquarings; ++i) cosine *= cosine;
       const float agreement = tolerance / greater(distance, tolerance) * cosine;
       const uint32_t differs = (p.instance[at] ^ instance) & ~ignored;

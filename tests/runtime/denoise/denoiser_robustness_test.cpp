@@ -93,14 +93,14 @@ std::vector<float> run_sequence(size_t threads, const char* isa = nullptr) {
   if (isa != nullptr) setenv("PACKTRACE_ISA", isa, 1);
   AoDenoiser denoiser;
   std::vector<float> all_results;
-  const ImageSize size{131, 237}; // more than one strip of the filter
+  const ImageSize size{131, 311}; // more than one strip of the filter
   for (uint32_t f = 0; f < 12; ++f) {
     GBuffer g = wall(size);
     for (uint32_t i = 0; i < size.pixels(); ++i) {
       const float x = static_cast<float>(i % size.width), y = static_cast<float>(i / size.width);
       g.view_z[i] = uniform(i, 0, 0) < 0.02f ? 0.0f : 10.0f + std::sin(x * 0.2f) * std::cos(y * 0.1f);
       g.instance[i] = i / 4000;
-      if (f > 2 && f < 8) g.motion_px[i] = Vec2(0.3f, -0.7f);
+      if (f > 2 && f < 8) g.motion_px[i] = Vec2(i % 23 < 3 ? -4.6f : 0.3f, -0.7f); // runs of 3 and 20 pixels
     }
     const DenoisedAo& result = denoiser.next_frame(g, noise(size, 0.5f, f));
     for (const auto* plane : {&result.ao, &result.variance, &result.tspp})
