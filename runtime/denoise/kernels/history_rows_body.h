@@ -44,20 +44,20 @@ void locate_pixels(int width, const MovingRow& row, const LocateTerms& terms, co
     const float from_x = static_cast<float>(x) - (still ? 0.0f : mx), from_y = t.y - (still ? 0.0f : my);
     const float now = here[x];
     float before = now;
+    bool seen = now > 0.0f;
     if constexpr (kMovedInDepth) {
       const float z = r.previous_z[x];
-      const bool good = (z >= kSmallest) & (z <= kLargest) & (now > 0.0f);
-      before = good ? 1.0f / z : 0.0f;
+      seen &= (z >= kSmallest) & (z <= kLargest);
+      before = 1.0f / lesser(greater(z, kSmallest), kLargest);
     }
     // False for NaN, too. The conversions to integers below cannot overflow.
-    const bool inside =
-        (from_x > -1.0f) & (from_x < t.width) & (from_y > -1.0f) & (from_y < t.height) & (before > 0.0f);
+    const bool inside = (from_x > -1.0f) & (from_x < t.width) & (from_y > -1.0f) & (from_y < t.height) & seen;
     const float at_x = inside ? from_x : 0.0f, at_y = inside ? from_y : 0.0f;
     int column = static_cast<int>(at_x), line = static_cast<int>(at_y);
     column -= static_cast<float>(column) > at_x ? 1 : 0; // towards minus infinity
     line -= static_cast<float>(line) > at_y ? 1 : 0;
     float slope = smaller_step(here[x - 1], now, here[x + 1]) + smaller_step(above[x], now, below[x]);
-    if constexpr (kMovedInDepth) slope = before != now ? slope * (before / now) : slope;
+    if constexpr (kMovedInDepth) slope *= before / greater(now, kSmallest);
     o.offset[x] = inside ? (line - row_y) * stride + (column - x) : kNoOffset;
     o.fraction_x[x] = at_x - static_cast<float>(column);
     o.fraction_y[x] = at_y - static_cast<float>(line);
