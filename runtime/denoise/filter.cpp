@@ -68,7 +68,7 @@ protected:
 /// The history with the variance of its means, and with values for pixels without one.
 class HistoryRows final : public RowSource {
 public:
-  static constexpr int kRadius = 2;
+  static constexpr int kRadius = kMomentWindow / 2;
   static constexpr size_t kMoments = 5;
 
   HistoryRows(const Tile& tile, int kept, const FilterKernels& kernels, const FluxConfig& config)
@@ -96,16 +96,11 @@ public:
 private:
   void produce(int y) override {
     for (; next_sum_ <= y + kRadius; ++next_sum_) sum(next_sum_);
-    std::array<float*, kMoments> window;
-    for (size_t i = 0; i < kMoments; ++i) {
-      window[i] = scratch_[i].row(0);
-      std::copy_n(sums_[i].row(y - kRadius), width_, window[i]);
-      for (int r = 1 - kRadius; r <= kRadius; ++r) kernels_.add(width_, sums_[i].row(y + r), window[i]);
-    }
+    MomentWindow window;
+    for (int r = -kRadius; r <= kRadius; ++r) window[static_cast<size_t>(r + kRadius)] = moments(sums_, y + r);
     const History& h = input_->history;
-    kernels_.variance(width_, h.mean.row(y) + x_, h.square.row(y) + x_, h.samples.row(y) + x_,
-                      {window[0], window[1], window[2], window[3], window[4]}, terms_, estimate_.row(0),
-                      variance_.row(y));
+    kernels_.variance(width_, h.mean.row(y) + x_, h.square.row(y) + x_, h.samples.row(y) + x_, window, terms_,
+                      estimate_.row(0), variance_.row(y));
     std::copy_n(h.mean.row(y) + x_, width_, value_.row(y));
     fill(y);
     if (y >= first_written_ && y < last_written_)
@@ -122,16 +117,18 @@ private:
       if (disparity[x] > 0.0f && !(samples[x] > 0.0f)) value[x] = filled_value(*input_, x_ + x, y);
   }
 
+  static MomentRows moments(std::vector<RowRing<float>>& rings, int y) {
+    return {rings[0].row(y), rings[1].row(y), rings[2].row(y), rings[3].row(y), rings[4].row(y)};
+  }
+
   void sum(int y) {
     const History& h = input_->history;
     if (!inside(y)) {
       for (auto& ring : sums_) std::fill_n(ring.row(y), width_, 0.0f);
       return;
     }
-    kernels_.moments(
-        width_, h.mean.row(y) + x_, h.square.row(y) + x_, h.samples.row(y) + x_,
-        {scratch_[0].row(0), scratch_[1].row(0), scratch_[2].row(0), scratch_[3].row(0), scratch_[4].row(0)});
-    for (size_t i = 0; i < kMoments; ++i) kernels_.sum_along_row(width_, kRadius, scratch_[i].row(0), sums_[i].row(y));
+    kernels_.moments(width_, h.mean.row(y) + x_, h.square.row(y) + x_, h.samples.row(y) + x_, moments(scratch_, 0));
+    for (size_t i = 0; i < kMoments; ++i) kernels_.sum_along_row(width_, scratch_[i].row(0), sums_[i].row(y));
   }
 
   const FilterKernels& kernels_;
@@ -266,7 +263,7 @@ private:
 /// How an image is divided into tiles, whatever the number of threads.
 struct Tiling {
   explicit Tiling(ImageSize size) : width(static_cast<int>(size.width)), height(static_cast<int>(size.height)) {
-    constexpr int kColumns = 560, kRows = 192; // per tile, about
+    constexpr int kColumns = 1000, kRows = 256; // per tile, about
     columns = std::max(1, (width + kColumns / 2) / kColumns);
     rows = std::max(1, (height + kRows / 2) / kRows);
   }

@@ -50,6 +50,10 @@ struct MomentRows {
   float *spread_seen, *spread;  ///< 1 and s2, of pixels with at least two samples
 };
 
+/// Side in pixels of the window for the variance.
+inline constexpr int kMomentWindow = 5;
+using MomentWindow = std::array<MomentRows, kMomentWindow>;
+
 struct VarianceTerms {
   float prior; ///< weight of the window's variance in frames
   float still_factor, still_power, moving_base, moving_gain, longest_moving, distrust;
@@ -78,15 +82,13 @@ struct FilterKernels {
   void (*exchange)(int width, int step, const PassRows& rows, float* value, float* variance);
   /// Moments of single pixels.
   void (*moments)(int width, const float* mean, const float* square, const float* samples, const MomentRows& out);
-  /// Sums of 2 radius + 1 pixels along x.
-  void (*sum_along_row)(int width, int radius, const float* in, float* out);
-  /// Adds rows.
-  void (*add)(int width, const float* in, float* sum);
+  /// Sums of kMomentWindow pixels along x.
+  void (*sum_along_row)(int width, const float* in, float* out);
   /// Variance of the mean of each pixel.
-  /// @param window sums over the pixel's window
+  /// @param window sums along x of the rows of the pixel's window
   /// @param estimate the expected variance; 0 without history
   /// @param variance what the filter is told: larger while there are few frames, and the maximum without history
-  void (*variance)(int width, const float* mean, const float* square, const float* samples, const MomentRows& window,
+  void (*variance)(int width, const float* mean, const float* square, const float* samples, const MomentWindow& window,
                    const VarianceTerms& terms, float* estimate, float* variance);
   /// Whether a pixel that hit something has no history.
   bool (*any_to_fill)(int width, const float* disparity, const float* samples);

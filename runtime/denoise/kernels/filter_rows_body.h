@@ -168,18 +168,9 @@ void moments_row(int width, const float* mean, const float* square, const float*
   }
 }
 
-void sum_along_row(int width, int radius, const float* in, float* __restrict out) {
-  if (radius == 2) {
-    for (int x = 0; x < width; ++x) out[x] = ((in[x - 2] + in[x - 1]) + (in[x] + in[x + 1])) + in[x + 2];
-    return;
-  }
-  for (int x = 0; x < width; ++x) out[x] = (in[x - 1] + in[x]) + in[x + 1];
-  for (int r = 2; r <= radius; ++r)
-    for (int x = 0; x < width; ++x) out[x] += in[x - r] + in[x + r];
-}
-
-void add_row(int width, const float* in, float* __restrict sum) {
-  for (int x = 0; x < width; ++x) sum[x] += in[x];
+void sum_along_row(int width, const float* in, float* __restrict out) {
+  static_assert(kMomentWindow == 5);
+  for (int x = 0; x < width; ++x) out[x] = ((in[x - 2] + in[x - 1]) + (in[x] + in[x + 1])) + in[x + 2];
 }
 
 /// log2 and exp2 of positive normal numbers, without library calls, so that all instruction sets give the same bits.
@@ -197,17 +188,22 @@ inline float exp2_of(float x) { // of x in [-100, 0]
   return m * __builtin_bit_cast(float, (static_cast<int32_t>(whole) + 127) << 23);
 }
 
-void variance_row(int width, const float* mean, const float* square, const float* samples, const MomentRows& window,
+void variance_row(int width, const float* mean, const float* square, const float* samples, const MomentWindow& window,
                   const VarianceTerms& terms, float* __restrict estimate, float* __restrict variance) {
-  const MomentRows w = window;
+  const MomentWindow rows = window;
   const VarianceTerms t = terms;
   const float young_moving = t.moving ? 4.0f : 0.0f, longest_moving = t.moving ? t.longest_moving : 0.0f;
 #pragma GCC ivdep
   for (int x = 0; x < width; ++x) {
     const float a = mean[x], n = greater(samples[x], 1.0f);
-    const float count = greater(w.seen[x], 1.0f);
-    const float space = greater(w.square[x] - w.value[x] * w.value[x] / count, 0.0f) / greater(count - 1.0f, 1.0f);
-    const float around = w.spread_seen[x] > 0.0f ? w.spread[x] / greater(w.spread_seen[x], 1.0f) : space;
+    float seen_around = 0.0f, value = 0.0f, squares = 0.0f, spread_seen = 0.0f, spread_around = 0.0f;
+    for (const MomentRows& r : rows) {
+      seen_around += r.seen[x], value += r.value[x], squares += r.square[x];
+      spread_seen += r.spread_seen[x], spread_around += r.spread[x];
+    }
+    const float count = greater(seen_around, 1.0f);
+    const float space = greater(squares - value * value / count, 0.0f) / greater(count - 1.0f, 1.0f);
+    const float around = spread_seen > 0.0f ? spread_around / greater(spread_seen, 1.0f) : space;
     const float own = greater(square[x] - a * a, 0.0f) * n; // (n - 1) s2
     float spread = (t.prior * around + own) / (t.prior + n - 1.0f);
     spread = n < 2.0f ? space : spread;
@@ -237,8 +233,8 @@ void finish_row(int width, const float* value, const float* disparity, const flo
   }
 }
 
-constexpr FilterKernels kKernels = {guide_row,     compare_row, weigh_row,    normalise_row, exchange_row, moments_row,
-                                    sum_along_row, add_row,     variance_row, any_to_fill,   finish_row};
+constexpr FilterKernels kKernels = {guide_row,   compare_row,   weigh_row,    normalise_row, exchange_row,
+                                    moments_row, sum_along_row, variance_row, any_to_fill,   finish_row};
 
 } // namespace
 } // namespace packtrace

@@ -93,7 +93,7 @@ std::vector<float> run_sequence(size_t threads, const char* isa = nullptr) {
   if (isa != nullptr) setenv("PACKTRACE_ISA", isa, 1);
   AoDenoiser denoiser;
   std::vector<float> all_results;
-  const ImageSize size{131, 311}; // more than one strip of the filter
+  const ImageSize size{131, 400}; // more than one strip of the filter
   for (uint32_t f = 0; f < 12; ++f) {
     GBuffer g = wall(size);
     for (uint32_t i = 0; i < size.pixels(); ++i) {

@@ -10,9 +10,9 @@ namespace {
 using namespace synthetic;
 
 /// Wide enough for two columns of the filter's tiles, and high enough for two rows of them and four strips of history.
-constexpr ImageSize kImage{1300, 420};
+constexpr ImageSize kImage{1600, 420};
 /// A part of the image around the corner of four tiles; by itself it is one tile.
-constexpr Rect kPart{350, 90, 950, 300};
+constexpr Rect kPart{500, 90, 1100, 300};
 
 /// Bumps with some holes, in motion by a quarter of a pixel, which is exact at all columns.
 GBuffer bumps(ImageSize size, Rect part) {
