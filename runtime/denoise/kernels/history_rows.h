@@ -8,8 +8,8 @@
 
 namespace packtrace {
 
-/// Pixels after each row of scratch that kernels may write.
-inline constexpr int kRunPadding = 16;
+/// Pixels after each row of scratch that kernels may write: as many as fill a vector of the narrowest type.
+inline constexpr int kRunPadding = 32;
 
 /// Offset of a pixel without history, in LocatedRow.
 inline constexpr int32_t kNoOffset = INT32_MIN;
