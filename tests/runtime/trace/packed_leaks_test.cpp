@@ -17,9 +17,9 @@ using test::closest;
 
 // Rays are slow under sanitizers. Rare leaks are found by builds without them.
 #ifdef PACKTRACE_SANITIZED
-constexpr size_t kManyRays = 100'000;
+constexpr size_t kManyRays = 100'000, kRaysPerPrecision = 10'000;
 #else
-constexpr size_t kManyRays = 1'000'000;
+constexpr size_t kManyRays = 1'000'000, kRaysPerPrecision = 100'000;
 #endif
 
 /// Rays from inside a closed mesh to its vertices, to points on its edges and elsewhere, and along the axes. All must
@@ -302,7 +302,7 @@ TEST(PackedLeaks, NoneAtAnyNumberOfPositionBits) {
     config.precision_kind = PrecisionKind::kPositionBits;
     config.precision = bits;
     for (const PackedIsa isa : test::isas())
-      EXPECT_EQ(leaks(scene, {0.1, 0.2, -0.05}, 100000, isa, config), 0u) << bits;
+      EXPECT_EQ(leaks(scene, {0.1, 0.2, -0.05}, kRaysPerPrecision, isa, config), 0u) << bits;
   }
 }
 
