@@ -4,12 +4,10 @@
 #include <cmath>
 
 #include "runtime/denoise/simd.h"
+#include "runtime/denoise/unit_component.h"
 
 namespace packtrace {
 namespace {
-
-/// Whether c can be a component of a unit vector, with some room for rounding. False for NaN.
-inline bool is_component(float c) { return c >= -2.0f && c <= 2.0f; }
 
 /// In kNormalUnit, rounded to nearest; 0 if the normal is not `good`.
 inline int16_t component(bool good, float c) {
@@ -22,7 +20,7 @@ void load_row(int width, const float* __restrict z, const float* __restrict norm
               int16_t* __restrict nx, int16_t* __restrict ny, int16_t* __restrict nz) {
   for (int x = 0; x < width; ++x) {
     const float cx = normal[3 * x], cy = normal[3 * x + 1], cz = normal[3 * x + 2];
-    const bool good = is_component(cx) & is_component(cy) & is_component(cz);
+    const bool good = is_unit_component(cx) & is_unit_component(cy) & is_unit_component(cz);
     disparity[x] = disparity_of(z[x]);
     nx[x] = component(good, cx);
     ny[x] = component(good, cy);
@@ -39,7 +37,7 @@ int count_changes(int width, const float* __restrict z, const float* __restrict 
   int changes = 0;
   for (int x = 0; x < width; ++x) {
     const float cx = normal[3 * x], cy = normal[3 * x + 1], cz = normal[3 * x + 2];
-    const bool good = is_component(cx) & is_component(cy) & is_component(cz);
+    const bool good = is_unit_component(cx) & is_unit_component(cy) & is_unit_component(cz);
     const bool same = (disparity_of(z[x]) == disparity[x]) & (component(good, cx) == nx[x]) &
                       (component(good, cy) == ny[x]) & (component(good, cz) == nz[x]) &
                       (instance[x] == old_instance[x]);

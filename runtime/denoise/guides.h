@@ -3,21 +3,15 @@
 #include <cstdint>
 #include <limits>
 
+#include "runtime/denoise/kernels/units.h"
 #include "runtime/denoise/plane.h"
 
 namespace packtrace {
-
-/// Motion up to this many pixels per frame is ignored. Over the longest default history (256 frames) it adds up to a
-/// quarter of a pixel.
-inline constexpr float kStillMotion = 1e-3f;
 
 /// Returns 1 / z, or 0 if z is not a positive normal finite number.
 inline float disparity_of(float z) {
   return z >= std::numeric_limits<float>::min() && z <= std::numeric_limits<float>::max() ? 1.0f / z : 0.0f;
 }
-
-/// Guides store components of normals in these units.
-inline constexpr float kNormalUnit = 1.0f / 16384.0f;
 
 /// The G-buffer channels that the filters use, as planes. A depth that is not positive and finite is stored as
 /// disparity 0, which means a miss. A normal that is not finite, or far from a unit vector, is stored as a zero vector,

@@ -14,7 +14,6 @@ namespace packtrace {
 namespace {
 
 constexpr float kLargest = std::numeric_limits<float>::max(), kSmallest = std::numeric_limits<float>::min();
-constexpr float kIgnoredMotion = 1e-3f; // kStillMotion
 
 /// History with a smaller total weight is rejected: the tests' soft weights let hardly any of the surface through.
 constexpr float kMinHistoryWeight = 1e-3f;
@@ -40,7 +39,7 @@ void locate_pixels(int width, const MovingRow& row, const LocateTerms& terms, co
 #pragma GCC ivdep
   for (int x = 0; x < width; ++x) {
     const float mx = r.motion[2 * x], my = r.motion[2 * x + 1];
-    const bool still = (std::abs(mx) <= kIgnoredMotion) & (std::abs(my) <= kIgnoredMotion);
+    const bool still = (std::abs(mx) <= kStillMotion) & (std::abs(my) <= kStillMotion);
     const float from_x = static_cast<float>(x) - (still ? 0.0f : mx), from_y = t.y - (still ? 0.0f : my);
     const float now = here[x];
     float before = now;

@@ -1,10 +1,12 @@
 #pragma once
 
+#include "runtime/denoise/kernels/units.h"
+
 /// What the kernels of all passes use. Local to each file, because every instruction set compiles them.
 namespace packtrace {
 namespace {
 
-constexpr float kSquaredNormalUnit = 1.0f / (16384.0f * 16384.0f); // of kNormalUnit
+constexpr float kSquaredNormalUnit = kNormalUnit * kNormalUnit;
 
 /// Replacements for std::min and std::max, which take references and thereby keep GCC from vectorising loops.
 inline float lesser(float a, float b) { return b < a ? b : a; }

@@ -3,12 +3,10 @@
 #include <limits>
 
 #include "runtime/denoise/simd.h"
+#include "runtime/denoise/unit_component.h"
 
 namespace packtrace::reference {
 namespace {
-
-/// Whether c can be a component of a unit vector, with some room for rounding. False for NaN.
-inline bool is_unit_component(float c) { return (c >= -2.0f) & (c <= 2.0f); }
 
 PACKTRACE_AVX2_CLONES
 void load_surface_row(int width, const float* __restrict z, const float* __restrict normal, float* __restrict out_z,
