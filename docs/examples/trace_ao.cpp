@@ -33,9 +33,7 @@ int main(int argc, char** argv) try {
   packtrace::Progress progress;
   packtrace::GBuffer gbuffer;
   packtrace::AoFrame noisy;
-  packtrace::DenoiserConfig denoising;
-  denoising.ours.stratified = is_stratified(ao.sampler);
-  packtrace::AoDenoiser denoiser(denoising);
+  packtrace::AoDenoiser denoiser;
   const packtrace::DenoisedAo* denoised = nullptr;
   for (uint32_t frame = 0; frame < 8; ++frame) {
     // A camera that moves passes the previous frame's view as well.

@@ -211,6 +211,7 @@ uint64_t trace_ao(const SceneSource& source, const RayTracer& tracer, const GBuf
   validate(config);
   if (ao.size != gbuffer.size || ao.ao.size() != gbuffer.size.pixels()) ao.resize(gbuffer.size);
   ao.ray_length = config.radius;
+  ao.stratified = is_stratified(config.sampler);
   const AoTracer ao_tracer(source, tracer, gbuffer, config, plan, ao);
   const bool closest = config.falloff || config.interreflection > 0.0f;
   tbb::enumerable_thread_specific<TileMemory> memory;

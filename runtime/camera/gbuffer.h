@@ -55,6 +55,9 @@ struct AoFrame {
   std::vector<float> ao;           ///< 1 = open, 0 = fully occluded, kInvalidAo = no value
   std::vector<float> hit_distance; ///< mean hit distance of the samples, world units; a miss counts as ray_length
   float ray_length = 0.0f;         ///< the AO radius, world units; 0 if unknown
+  /// A pixel's samples of successive frames are stratified (is_stratified()): their mean errs less than that of
+  /// independent samples with the same variance.
+  bool stratified = false;
 
   void resize(ImageSize new_size) {
     size = new_size;

@@ -66,6 +66,10 @@ void add_sequence_input_options(CLI::App& verb, DenoiseOptions& options) {
                 "All pictures show the same view, with camera rays jittered within their pixels: histories stay in "
                 "their pixels. An output name without a number gets the last picture")
       ->group(kSequenceGroup);
+  verb.add_flag("--stratified", options.stratified,
+                "The samples of a pixel are stratified over the pictures, as those of render are, not independent. "
+                "With the wrong choice detail is lost, or noise stays")
+      ->group(kSequenceGroup);
 }
 
 Vec2 parse_scale(const std::string& text) {
@@ -116,6 +120,7 @@ LayeredConfig layered_config(const DenoiseOptions& options) {
   config.denoise = options.denoiser != "off";
   config.denoiser = denoiser_config(options.denoiser, options.denoiser_settings);
   config.still = options.still;
+  config.stratified = options.stratified;
   LayeredReading& reading = config.reading;
   reading.layers = options.layers;
   reading.raw_ao = options.still;

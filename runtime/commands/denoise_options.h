@@ -20,7 +20,7 @@ struct DenoiseOptions {
   std::string depth_kind = "z";
   std::optional<double> fov;
   std::optional<float> far_depth;
-  bool inverted_ao = false, unsigned_normals = false, still = false, no_legend = false;
+  bool inverted_ao = false, unsigned_normals = false, still = false, stratified = false, no_legend = false;
   std::optional<std::string> motion_scale, background;
   std::optional<uint64_t> frames, start;
   std::vector<uint64_t> cuts; ///< numbers of pictures that begin a shot

@@ -69,6 +69,7 @@ nlohmann::json denoise_json(const std::vector<DenoisedRow>& rows, const LayeredC
           {"height", last.size.height},
           {"denoiser", denoiser_json(config.denoise, config.denoiser)},
           {"still", config.still},
+          {"stratified", config.stratified},
           {"channels", channels_json(last.channels)},
           {"shots", starts},
           {"history", last.mean_history},

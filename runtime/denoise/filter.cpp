@@ -6,6 +6,7 @@
 #include <tbb/enumerable_thread_specific.h>
 
 #include "runtime/denoise/fill.h"
+#include "runtime/denoise/trend.h"
 
 namespace packtrace {
 namespace {
@@ -65,21 +66,27 @@ protected:
   RowRing<float> value_, variance_;
 };
 
+VarianceTerms variance_terms(const FluxConfig& config, const FilterInput& input) {
+  VarianceTerms t;
+  t.prior = config.variance_prior, t.distrust = config.variance_distrust, t.ratio_prior = config.ratio_prior;
+  t.longest_moving = static_cast<float>(config.max_tspp_moving), t.moving = input.moving;
+  t.stratified = input.stratified;
+  if (t.stratified)
+    t.still_factor = 0.75f, t.still_power = kStratifiedPower - 1.0f, t.moving_base = 0.55f, t.moving_gain = 0.02f;
+  else
+    t.young = kIndependentYoung;
+  return t;
+}
+
 /// The history with the variance of its means, and with values for pixels without one.
 class HistoryRows final : public RowSource {
 public:
   static constexpr int kRadius = kMomentWindow / 2;
-  static constexpr size_t kMoments = 5;
+  static constexpr size_t kMoments = 7;
 
   HistoryRows(const Tile& tile, int kept, const FilterKernels& kernels, const FluxConfig& config)
-      : RowSource(tile, kept), kernels_(kernels), estimate_(width_, 1), sums_(kMoments, RowRing<float>(width_, 8)),
-        scratch_(kMoments, RowRing<float>(width_, 1)) {
-    terms_ = {config.variance_prior,    0.75f, 0.45f, 0.55f, 0.02f, static_cast<float>(config.max_tspp_moving),
-              config.variance_distrust, 0.0f,  false};
-    if (!config.stratified)
-      terms_.young = kIndependentYoung, terms_.still_factor = 1.0f, terms_.still_power = 0.0f,
-      terms_.moving_base = 1.0f, terms_.moving_gain = 0.0f;
-  }
+      : RowSource(tile, kept), kernels_(kernels), config_(config), estimate_(width_, 1),
+        sums_(kMoments, RowRing<float>(width_, 8)), scratch_(kMoments, RowRing<float>(width_, 1)) {}
 
   /// The estimated variance of the means of pixels [begin, end) of the tile's rows [first, last) goes to `variance`.
   void write_variance(std::span<float> variance, int begin, int end, int first, int last) {
@@ -88,7 +95,7 @@ public:
 
   void begin(const FilterInput& input, int first) override {
     input_ = &input;
-    terms_.moving = input.moving;
+    terms_ = variance_terms(config_, input);
     next_ = std::max(first, 0);
     next_sum_ = next_ - kRadius;
   }
@@ -118,7 +125,8 @@ private:
   }
 
   static MomentRows moments(std::vector<RowRing<float>>& rings, int y) {
-    return {rings[0].row(y), rings[1].row(y), rings[2].row(y), rings[3].row(y), rings[4].row(y)};
+    return {rings[0].row(y), rings[1].row(y), rings[2].row(y), rings[3].row(y),
+            rings[4].row(y), rings[5].row(y), rings[6].row(y)};
   }
 
   void sum(int y) {
@@ -127,11 +135,13 @@ private:
       for (auto& ring : sums_) std::fill_n(ring.row(y), width_, 0.0f);
       return;
     }
-    kernels_.moments(width_, h.mean.row(y) + x_, h.square.row(y) + x_, h.samples.row(y) + x_, moments(scratch_, 0));
+    kernels_.moments(width_, h.mean.row(y) + x_, h.square.row(y) + x_, h.samples.row(y) + x_, h.trend.row(y) + x_,
+                     moments(scratch_, 0));
     for (size_t i = 0; i < kMoments; ++i) kernels_.sum_along_row(width_, scratch_[i].row(0), sums_[i].row(y));
   }
 
   const FilterKernels& kernels_;
+  const FluxConfig& config_;
   VarianceTerms terms_;
   const FilterInput* input_ = nullptr;
   std::span<float> written_;

@@ -16,7 +16,8 @@ struct FilterInput {
   const Guides& guides;
   const PairGuides& pair_guides;
   const History& history;
-  bool moving; ///< history was resampled, so that samples are not as well stratified as in a still view
+  bool moving;     ///< history was resampled, so that samples are not as well stratified as in a still view
+  bool stratified; ///< AoFrame::stratified
 };
 
 /// Where the filter writes; one entry per pixel, as in DenoisedAo.

@@ -34,7 +34,9 @@ constexpr Setting<FluxConfig> kFluxSettings[] = {
     {{"variance_prior", "Weight of the variance around a pixel against its own, in frames", 0.1, 1000},
      &F::variance_prior},
     {{"variance_distrust", "The variance of n frames is multiplied by 1 + this / n^2", 0, 1000}, &F::variance_distrust},
-    {{"stratified", "Samples of a pixel are stratified over frames; render finds out by itself", 0, 1}, &F::stratified},
+    {{"ratio_prior", "Weight of the average error of stratified samples against that of the image, in pixels", 0.01,
+      1e6},
+     &F::ratio_prior},
 };
 
 } // namespace

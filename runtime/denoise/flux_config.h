@@ -58,7 +58,7 @@ struct FluxConfig {
   float guide_slope = 0.5f;
 
   /// Differences of patches count as noise up to this many times its variance. [0.1..100]
-  float noise_tolerance = 4.0f;
+  float noise_tolerance = 2.0f;
 
   /// Mean distance of patches at which pixels exchange nothing. [0.1..100]
   float patch_limit = 4.0f;
@@ -69,9 +69,9 @@ struct FluxConfig {
   /// The variance of n frames is multiplied by 1 + variance_distrust / n^2. [0..1000]
   float variance_distrust = 4.0f;
 
-  /// The samples of a pixel are stratified over frames (see is_stratified()), so that their mean errs less than that of
-  /// independent samples with the same variance. FrameLoop turns this on. With independent samples it leaves noise.
-  bool stratified = false;
+  /// Weight of the average sampler's error against the errors that histories of stratified samples show, in pixels.
+  /// [0.01..1000000]
+  float ratio_prior = 1.0f;
 
   /// Throws Error (kUsage) naming the first field that is out of range.
   void validate() const;

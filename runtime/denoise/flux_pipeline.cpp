@@ -34,7 +34,7 @@ private:
     auto& g = self.now_.guides;
     auto& h = self.now_.history;
     work(g.disparity), work(g.normal_x), work(g.normal_y), work(g.normal_z), work(g.instance);
-    work(h.mean), work(h.square), work(h.fast), work(h.samples);
+    work(h.mean), work(h.square), work(h.fast), work(h.samples), work(h.trend);
   }
   bool load_guides(const GBuffer& gbuffer);
 
@@ -45,7 +45,8 @@ private:
   PairGuides pair_guides_;
   HistoryUpdate update_;
   AoFilter filter_;
-  bool moving_ = false; ///< something moved in the last frame
+  bool moving_ = false;     ///< something moved in the last frame
+  bool stratified_ = false; ///< AoFrame::stratified of the last frame
   DenoisedAo result_;
 };
 
@@ -70,6 +71,7 @@ bool FluxPipeline::load_guides(const GBuffer& gbuffer) {
 }
 
 void FluxPipeline::add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistorySource source) {
+  stratified_ = ao.stratified;
   const bool same_pixels = source == HistorySource::kPixel && has_frame_;
   bool resample = false;
   if (same_pixels) {
@@ -91,7 +93,8 @@ const DenoisedAo& FluxPipeline::denoise() {
   if (!has_frame_) return result_;
   if (pair_guides_outdated_) pair_guides_.compute(now_.guides, config_, filter_kernels(chosen_isa()));
   pair_guides_outdated_ = false;
-  filter_.run({now_.guides, pair_guides_, now_.history, moving_}, {result_.ao, result_.variance, result_.tspp});
+  filter_.run({now_.guides, pair_guides_, now_.history, moving_, stratified_},
+              {result_.ao, result_.variance, result_.tspp});
   return result_;
 }
 

@@ -1,12 +1,14 @@
 #include "runtime/denoise/history_update.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
 #include <tbb/enumerable_thread_specific.h>
 
 #include "runtime/denoise/local_statistics.h"
+#include "runtime/denoise/trend.h"
 
 namespace packtrace {
 namespace {
@@ -46,6 +48,9 @@ public:
   /// Adds row y's samples to the history.
   void add(const HistoryInput& input, History& history, int y) {
     accumulate(input, history, y, row_of(history, y), samples_.row(0));
+    if (input.motion != nullptr) keep_trends(*input.motion, history, y);
+    update_trends(samples_.row(0).valid, history.mean.row(y), history.samples.row(y), input.longest,
+                  history.trend.row(y));
   }
 
   /// Updates rows [first, last). @param neighbour returns the samples of rows of other strips
@@ -61,7 +66,9 @@ public:
         add(input, history, y);
         statistics_.add(samples_.row(0));
       }
-      if (y - radius >= first) kernels_.correct(width_, statistics_.finish(), terms_, row_of(history, y - radius));
+      if (y - radius >= first)
+        kernels_.correct(width_, statistics_.finish(), terms_, row_of(history, y - radius),
+                         history.trend.row(y - radius));
     }
   }
 
@@ -78,6 +85,29 @@ private:
                                                            history.fast.row(y), history.samples.row(y)};
     kernels_.accumulate(width_, &input.ao[static_cast<size_t>(y) * static_cast<size_t>(width_)],
                         input.guides.disparity.row(y), {input.longest, terms_.fast_frames}, past, out, samples);
+  }
+
+  /// Pixels that did not move keep their trends.
+  void keep_trends(const MotionFrame& frame, History& history, int y) const {
+    const Vec2* motion = &frame.motion_px[static_cast<size_t>(y) * static_cast<size_t>(width_)];
+    const uint32_t* before = frame.previous.history.trend.row(y);
+    const float* samples = history.samples.row(y);
+    uint32_t* trend = history.trend.row(y);
+    for (int x = 0; x < width_; ++x) {
+      const bool still = (std::abs(motion[x].x) <= kStillMotion) & (std::abs(motion[x].y) <= kStillMotion);
+      trend[x] = still & (samples[x] > 1.0f) ? before[x] : 0u; // a first sample has no history
+    }
+  }
+
+  void update_trends(const float* valid, const float* mean, const float* samples, float longest,
+                     uint32_t* trend) const {
+    int crossings = 0;
+    for (int x = 0; x < width_; ++x)
+      crossings += (valid[x] > 0.0f) & (samples[x] < longest) & crosses_power_of_two(samples[x]) ? 1 : 0;
+    if (crossings == 0) return;
+    for (int x = 0; x < width_; ++x)
+      if (valid[x] > 0.0f && samples[x] < longest && crosses_power_of_two(samples[x]))
+        trend[x] = next_trend(trend[x], mean[x], samples[x]);
   }
 
   const HistoryKernels& kernels_;

@@ -34,12 +34,6 @@ const FrameConfig& validated(const FrameConfig& config) {
   return config;
 }
 
-DenoiserConfig denoiser_of(const FrameConfig& config) {
-  DenoiserConfig denoiser = config.denoiser;
-  denoiser.ours.stratified |= is_stratified(config.ao.sampler);
-  return denoiser;
-}
-
 bool same_camera(const Camera& a, const Camera& b) {
   return a.projection == b.projection && a.world_from_camera == b.world_from_camera && a.fov_degrees == b.fov_degrees &&
          a.screen_window == b.screen_window && a.width_px == b.width_px && a.height_px == b.height_px;
@@ -70,7 +64,7 @@ struct SavedLoop {
 } // namespace
 
 FrameLoop::FrameLoop(const FrameScene& scene, const FrameConfig& config)
-    : config_(validated(config)), state_(scene, config.detail), denoiser_(denoiser_of(config)) {}
+    : config_(validated(config)), state_(scene, config.detail), denoiser_(config.denoiser) {}
 
 FrameLoop::~FrameLoop() = default;
 

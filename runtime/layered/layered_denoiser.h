@@ -23,6 +23,7 @@ struct LayeredConfig {
   /// All pictures show one view whose camera rays are jittered within their pixels: histories stay in their pixels
   /// (HistorySource::kPixel).
   bool still = false;
+  bool stratified = false;  ///< AoFrame::stratified of all pictures
   bool view_layers = false; ///< fill the views of RenderedImage
 };
 

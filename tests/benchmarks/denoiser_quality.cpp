@@ -73,7 +73,6 @@ int run(int argc, char** argv) {
   app.add_option("--markdown", markdown_file, "Also write a table to this file");
   if (const auto exit_code = parse_arguments(app, argc, argv)) return *exit_code;
   DenoiserConfig config;
-  config.ours.stratified = true; // as the samples of make_sequence() are
   if (std::ranges::none_of(denoisers, [](const std::string& d) { return d == "ours" || d == "history"; }))
     config.kind = DenoiserKind::kReference;
   for (const std::string& setting : settings) config.set(setting);

@@ -250,6 +250,7 @@ DenoiserSequence make_sequence(const std::string& scene, const TraceInputOptions
       std::filesystem::rename(unfinished, file);
     }
   }
+  for (AoFrame& ao : sequence.ao) ao.stratified = is_stratified(AoConfig{}.sampler);
   sequence.scene = stem, sequence.motion = motion, sequence.kind = kind;
   return sequence;
 }

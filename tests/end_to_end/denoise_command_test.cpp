@@ -59,8 +59,8 @@ TEST(Denoise, OneFrameIsWhatRenderDenoises) {
   const DenoiseBench bench;
   bench.render(bench / "in.exr", {"--frames", "1", "--denoiser", "off"});
   bench.render(bench / "truth.exr", {"--frames", "1"});
-  const CommandResult result = bench.denoise(
-      {bench / "in.exr", "-o", bench / "out.exr", "--json", bench / "a.json", "--denoiser-set", "stratified=on"});
+  const CommandResult result =
+      bench.denoise({bench / "in.exr", "-o", bench / "out.exr", "--json", bench / "a.json", "--stratified"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const std::vector<float> in = bench.layer("in.exr", "ao"), out = bench.layer("out.exr", "ao");
   const std::vector<float> truth = bench.layer("truth.exr", "ao");
@@ -124,8 +124,8 @@ TEST(Denoise, PicturesOfAStillViewMakeOnePicture) {
   const DenoiseBench bench;
   bench.render(bench / "in_%02d.exr", {"--path", "scene", "--frames", "8", "--subframes", "1", "--denoiser", "off"});
   bench.render(bench / "truth.exr", {"--frames", "8"});
-  const CommandResult result = bench.denoise({bench / "in_%02d.exr", "-o", bench / "out.exr", "--still", "--json",
-                                              bench / "a.json", "--denoiser-set", "stratified=on"});
+  const CommandResult result = bench.denoise(
+      {bench / "in_%02d.exr", "-o", bench / "out.exr", "--still", "--json", bench / "a.json", "--stratified"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(Json::parse(read_text(bench / "a.json")).at("channels").at("ao"), Json({"ao_raw"}));
   const std::vector<float> out = bench.layer("out.exr", "ao_raw"), truth = bench.layer("truth.exr", "ao");

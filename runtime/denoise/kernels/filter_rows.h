@@ -48,6 +48,7 @@ struct PassRows {
 struct MomentRows {
   float *seen, *value, *square; ///< 1, a, a^2
   float *spread_seen, *spread;  ///< 1 and s2, of pixels with at least two samples
+  float *decay_seen, *decay;    ///< 1 and Trend::decay, of pixels that have one
 };
 
 /// Side in pixels of the window for the variance.
@@ -55,10 +56,13 @@ inline constexpr int kMomentWindow = 5;
 using MomentWindow = std::array<MomentRows, kMomentWindow>;
 
 struct VarianceTerms {
-  float prior; ///< weight of the window's variance in frames
-  float still_factor, still_power, moving_base, moving_gain, longest_moving, distrust;
-  float young; ///< the filter is told 1 + young / n + distrust / n^2 times the variance of n frames
-  bool moving;
+  float prior = 0; ///< weight of the window's variance in frames
+  /// Variance of a mean times n / s2: still_factor n^-still_power if still, moving_base + moving_gain n if moving.
+  float still_factor = 1, still_power = 0, moving_base = 1, moving_gain = 0, longest_moving = 0;
+  float ratio_prior = 1; ///< weight of still_factor against the window's trends, in pixels
+  float young = 0;       ///< the filter is told 1 + young / n + distrust / n^2 times the variance of n frames
+  float distrust = 0;
+  bool moving = false, stratified = false;
 };
 
 /// Functions on rows of pixels; docs/denoiser.md has the formulas. Rows are readable up to kRowPadding pixels outside
@@ -81,7 +85,8 @@ struct FilterKernels {
   /// Moves AO between the pixels of pairs.
   void (*exchange)(int width, int step, const PassRows& rows, float* value, float* variance);
   /// Moments of single pixels.
-  void (*moments)(int width, const float* mean, const float* square, const float* samples, const MomentRows& out);
+  void (*moments)(int width, const float* mean, const float* square, const float* samples, const uint32_t* trend,
+                  const MomentRows& out);
   /// Sums of kMomentWindow pixels along x.
   void (*sum_along_row)(int width, const float* in, float* out);
   /// Variance of the mean of each pixel.

@@ -153,7 +153,8 @@ void exchange_row(int width, int step, const PassRows& rows, float* __restrict v
   }
 }
 
-void moments_row(int width, const float* mean, const float* square, const float* samples, const MomentRows& out) {
+void moments_row(int width, const float* mean, const float* square, const float* samples, const uint32_t* trend,
+                 const MomentRows& out) {
   const MomentRows o = out;
 #pragma GCC ivdep
   for (int x = 0; x < width; ++x) {
@@ -165,6 +166,9 @@ void moments_row(int width, const float* mean, const float* square, const float*
     o.square[x] = a * a * seen;
     o.spread_seen[x] = spread_seen;
     o.spread[x] = spread * spread_seen;
+    const float decay = __builtin_bit_cast(float, trend[x] & 0xffff0000u); // Trend::decay
+    o.decay_seen[x] = (n > 0.0f) & (decay > 0.0f) ? 1.0f : 0.0f;
+    o.decay[x] = n > 0.0f ? decay : 0.0f;
   }
 }
 
@@ -197,9 +201,11 @@ void variance_row(int width, const float* mean, const float* square, const float
   for (int x = 0; x < width; ++x) {
     const float a = mean[x], n = greater(samples[x], 1.0f);
     float seen_around = 0.0f, value = 0.0f, squares = 0.0f, spread_seen = 0.0f, spread_around = 0.0f;
+    float decay_seen = 0.0f, decay = 0.0f;
     for (const MomentRows& r : rows) {
       seen_around += r.seen[x], value += r.value[x], squares += r.square[x];
       spread_seen += r.spread_seen[x], spread_around += r.spread[x];
+      decay_seen += r.decay_seen[x], decay += r.decay[x];
     }
     const float count = greater(seen_around, 1.0f);
     const float space = greater(squares - value * value / count, 0.0f) / greater(count - 1.0f, 1.0f);
@@ -208,7 +214,9 @@ void variance_row(int width, const float* mean, const float* square, const float
     float spread = (t.prior * around + own) / (t.prior + n - 1.0f);
     spread = n < 2.0f ? space : spread;
     spread = n < young_moving ? greater(spread, 0.5f * space) : spread;
-    const float still = t.still_factor * exp2_of(-t.still_power * log2_of(n));
+    const float measured = (t.ratio_prior * t.still_factor * spread + decay) / (t.ratio_prior + decay_seen);
+    const float factor = t.stratified & (spread > 0.0f) ? measured / spread : t.still_factor;
+    const float still = factor * exp2_of(-t.still_power * log2_of(n));
     const float moving = t.moving_base + t.moving_gain * n;
     const float ratio = lesser(n <= longest_moving ? moving : still, 1.0f);
     const float v = spread * (n < 2.0f ? 1.0f : ratio) / n;

@@ -115,8 +115,9 @@ struct HistoryKernels {
   /// Statistics of windows, by their radius.
   /// @param rows sums of the window's rows, from top to bottom
   std::array<void (*)(int width, const WindowSums* rows, const LocalRow& local), kMaxWindowRadius + 1> finish;
-  /// Corrects a row of the history in place.
-  void (*correct)(int width, const LocalRow& local, const CorrectTerms& terms, const HistoryRow& history);
+  /// Corrects a row of the history in place. Trends of corrected pixels become unknown.
+  void (*correct)(int width, const LocalRow& local, const CorrectTerms& terms, const HistoryRow& history,
+                  uint32_t* trend);
 };
 
 /// Returns the kernels of an instruction set. All give the same bits. Throws Error(kUnsupported) if this machine lacks

@@ -216,7 +216,8 @@ inline float excess(float change, float limit) {
   return std::copysign(greater(std::abs(change) - limit, 0.0f), change);
 }
 
-void correct_row(int width, const LocalRow& local, const CorrectTerms& terms, const HistoryRow& history) {
+void correct_row(int width, const LocalRow& local, const CorrectTerms& terms, const HistoryRow& history,
+                 uint32_t* trend) {
   const LocalRow l = local;
   const CorrectTerms t = terms;
   const HistoryRow h = history;
@@ -236,6 +237,7 @@ void correct_row(int width, const LocalRow& local, const CorrectTerms& terms, co
     h.mean[x] = new_mean;
     h.square[x] = moment + new_mean * new_mean;
     h.samples[x] = n;
+    trend[x] = shift == 0.0f ? trend[x] : 0u;
   }
 }
 
