@@ -11,9 +11,9 @@ namespace packtrace {
 inline constexpr float kStratifiedPower = 1.45f;
 
 /// How fast a pixel's mean converges. Where a history's length n crosses a power of two, the mean differs from that of
-/// its first half. The square of this is 1.73 times the variance that is left, on average: of the scenes house,
-/// spaceship, killeroo, bunny, room and town the factor is 1.5 to 2.05 for n from 4 to 64. By the law above it is
-/// 2^kStratifiedPower - 1, since the correlation of the two halves follows from it.
+/// its first half. The square of this difference is on average 1.73 times the variance that is left: five scenes have
+/// factors of 1.5 to 2.3 for n from 4 to 64. By the law above it is 2^kStratifiedPower - 1, since the correlation of
+/// the two halves follows from it.
 struct Trend {
   static constexpr float kFactor = 1.73f;
   /// Mean of the first half in steps of 1 / kSteps, plus 1; 0: unknown, because the history did not grow frame by
