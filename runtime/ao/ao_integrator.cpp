@@ -210,6 +210,7 @@ uint64_t trace_ao(const SceneSource& source, const RayTracer& tracer, const GBuf
                   const SamplePlan& plan, AoFrame& ao, Progress& progress) {
   validate(config);
   if (ao.size != gbuffer.size || ao.ao.size() != gbuffer.size.pixels()) ao.resize(gbuffer.size);
+  ao.max_history.clear();
   ao.ray_length = config.radius;
   ao.stratified = is_stratified(config.sampler);
   const AoTracer ao_tracer(source, tracer, gbuffer, config, plan, ao);

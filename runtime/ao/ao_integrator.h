@@ -32,7 +32,7 @@ struct SamplePlan {
 /// AO lies in [min_visibility, 1]; pixels whose camera ray missed and pixels without a sample get kInvalidAo and
 /// distance 0. The result does not depend on the number of threads.
 /// @param gbuffer traced with the same source and tracer, or with a finer version of the same instances
-/// @param ao resized to the G-buffer
+/// @param ao resized to the G-buffer; without limits of the history
 /// @param progress advances by the number of pixels, tile by tile. The caller begins the phase, which may span several
 ///        frames.
 /// @return the number of rays

@@ -58,11 +58,15 @@ struct AoFrame {
   /// A pixel's samples of successive frames are stratified (is_stratified()): their mean errs less than that of
   /// independent samples with the same variance.
   bool stratified = false;
+  /// Longest history in frames, not negative, that a pixel may keep from the frames before, as limit_history() finds it
+  /// where something moved. Empty: no limits.
+  std::vector<float> max_history;
 
   void resize(ImageSize new_size) {
     size = new_size;
     ao.assign(new_size.pixels(), kInvalidAo);
     hit_distance.assign(new_size.pixels(), 0.0f);
+    max_history.clear();
   }
 };
 

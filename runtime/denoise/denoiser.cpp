@@ -15,6 +15,7 @@ void require_sizes(const GBuffer& gbuffer, const AoFrame& ao) {
   if (gbuffer.view_z.size() != pixels || gbuffer.normal.size() != pixels || gbuffer.instance.size() != pixels ||
       gbuffer.motion_px.size() != pixels || ao.ao.size() != pixels ||
       (!ao.hit_distance.empty() && ao.hit_distance.size() != pixels) ||
+      (!ao.max_history.empty() && ao.max_history.size() != pixels) ||
       (!gbuffer.previous_z.empty() && gbuffer.previous_z.size() != pixels))
     throw Error(ErrorKind::kUsage, "denoiser: an array does not have one entry per pixel");
   constexpr uint32_t kLargestSide = 1u << 20;

@@ -85,8 +85,9 @@ void FluxPipeline::add_frame(const GBuffer& gbuffer, const AoFrame& ao, HistoryS
   const MotionFrame motion{before_, now_.guides, gbuffer.motion_px, gbuffer.previous_z};
   // Histories of jittered pixels are the plain means of all samples.
   const uint32_t longest = same_pixels ? std::numeric_limits<uint32_t>::max() : config_.max_tspp;
-  update_.run({now_.guides, ao.ao, resample ? &motion : nullptr, !same_pixels, static_cast<float>(longest)},
-              now_.history);
+  update_.run(
+      {now_.guides, ao.ao, ao.max_history, resample ? &motion : nullptr, !same_pixels, static_cast<float>(longest)},
+      now_.history);
 }
 
 const DenoisedAo& FluxPipeline::denoise() {

@@ -33,7 +33,8 @@ class HistoryStrip {
 public:
   HistoryStrip(ImageSize size, const HistoryKernels& kernels, const FluxConfig& config)
       : kernels_(kernels), config_(config), width_(static_cast<int>(size.width)), reprojection_(size, config, kernels),
-        statistics_(size.width, config.window, kernels), samples_(size, 1), discarded_(4 * size_t{size.width}) {
+        statistics_(size.width, config.window, kernels), samples_(size, 1), discarded_(4 * size_t{size.width}),
+        limited_(size.width) {
     const float share = 1.0f / static_cast<float>(config.fast_frames);
     terms_ = {share / (2.0f - share), config.change_gamma, config.change_tolerance, config.change_response,
               static_cast<float>(config.fast_frames)};
@@ -80,9 +81,14 @@ private:
   void accumulate(const HistoryInput& input, const History& history, int y, const HistoryRow& out,
                   const SampleRow& samples) {
     const HistoryRow old = input.motion != nullptr ? reprojection_.at(*input.motion, y) : HistoryRow{};
-    const PastRow past = input.motion != nullptr ? PastRow{old.mean, old.square, old.fast, old.samples}
-                                                 : PastRow{history.mean.row(y), history.square.row(y),
-                                                           history.fast.row(y), history.samples.row(y)};
+    PastRow past = input.motion != nullptr ? PastRow{old.mean, old.square, old.fast, old.samples}
+                                           : PastRow{history.mean.row(y), history.square.row(y), history.fast.row(y),
+                                                     history.samples.row(y)};
+    if (!input.max_history.empty()) {
+      const float* limit = &input.max_history[static_cast<size_t>(y) * static_cast<size_t>(width_)];
+      for (size_t x = 0; x < limited_.size(); ++x) limited_[x] = std::min(past.samples[x], limit[x]);
+      past.samples = limited_.data();
+    }
     kernels_.accumulate(width_, &input.ao[static_cast<size_t>(y) * static_cast<size_t>(width_)],
                         input.guides.disparity.row(y), {input.longest, terms_.fast_frames}, past, out, samples);
   }
@@ -117,7 +123,7 @@ private:
   LocalStatisticsRows statistics_;
   CorrectTerms terms_;
   SampleRows samples_;
-  std::vector<float> discarded_;
+  std::vector<float> discarded_, limited_;
 };
 
 /// Rows of strip i begin here.

@@ -13,10 +13,11 @@ namespace packtrace {
 /// What a frame adds to the history.
 struct HistoryInput {
   const Guides& guides;
-  std::span<const float> ao; ///< one value per pixel, rows top to bottom
-  const MotionFrame* motion; ///< null: the history stays in its pixels
-  bool correct;              ///< corrects the slow history where the fast one shows a change
-  float longest;             ///< of the slow history, in frames
+  std::span<const float> ao;          ///< one value per pixel, rows top to bottom
+  std::span<const float> max_history; ///< AoFrame::max_history
+  const MotionFrame* motion;          ///< null: the history stays in its pixels
+  bool correct;                       ///< corrects the slow history where the fast one shows a change
+  float longest;                      ///< of the slow history, in frames
 };
 
 /// Updates the history by a frame's samples, with all steps together over strips of rows, so that intermediate rows

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "pbrt_import/base/error.h"
+#include "runtime/ao/moved_occluders.h"
 #include "runtime/camera/deformed_past.h"
 #include "runtime/camera/lod_view.h"
 #include "runtime/camera/origin_lift.h"
@@ -246,6 +247,9 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
   report_.times.resolve_s += layering.seconds();
 
   const Stopwatch accumulating;
+  if (moved && config_.denoise)
+    limit_history(state_.moved_boxes(), shaded, config_.ao, ao_radius(config_.ao, traced_source().world_bounds()),
+                  raw_);
   if (!config_.denoise) {
     if (moved) raw_mean_.clear();
     raw_mean_.add(raw_);

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "pbrt_import/base/error.h"
+#include "runtime/frame/instance_boxes.h"
 #include "runtime/frame/instance_levels.h"
 #include "runtime/stopwatch.h"
 #include "runtime/trace/packed/scene/mesh_motion.h"
@@ -30,6 +31,7 @@ SceneState::SceneState(const FrameScene& scene, const DetailConfig& detail) : sc
     leveled_source_ = std::make_unique<PackedSource>(*scene_.file);
     scene_.source = packed = leveled_source_.get();
   }
+  if (!pose_.empty() || meshes_) boxes_ = std::make_unique<InstanceBoxes>(scene_);
   if (!detail_.error_px) return;
   if (scene_.file == nullptr || packed == nullptr)
     throw Error(ErrorKind::kUsage, "levels of detail require a baked file");
@@ -41,6 +43,7 @@ SceneState::~SceneState() = default;
 void SceneState::reset() {
   started_ = false;
   if (levels_) levels_->reset();
+  if (boxes_) boxes_->reset();
 }
 
 std::vector<uint8_t> SceneState::save() const { return levels_ ? levels_->levels() : std::vector<uint8_t>(); }
@@ -51,6 +54,7 @@ bool SceneState::restore(double time_s, std::span<const uint8_t> saved, FrameRep
   if (levels_ ? !levels_->set_levels(saved) : !saved.empty()) return false;
   apply_levels(report);
   deform_meshes(time_s, report);
+  follow_boxes();
   started_ = true;
   return true;
 }
@@ -59,8 +63,20 @@ bool SceneState::advance(DVec3 eye, double time_s, FrameReport& report) {
   const bool posed = pose_instances(time_s, report);
   if (levels_) levels_->choose(eye);
   const bool changed = apply_levels(report), deformed = deform_meshes(time_s, report);
+  follow_boxes();
   started_ = true;
   return posed || changed || deformed;
+}
+
+void SceneState::follow_boxes() {
+  if (!boxes_) return;
+  const std::span<const uint32_t> moving =
+      pose_.empty() ? std::span<const uint32_t>() : scene_.motion->moving_instances();
+  boxes_->follow(*scene_.source, moving, pose_, meshes_ ? static_cast<const PackedTracer*>(level_0_.get()) : nullptr);
+}
+
+std::span<const MovedBox> SceneState::moved_boxes() const {
+  return boxes_ ? boxes_->moved() : std::span<const MovedBox>();
 }
 
 const SceneSource& SceneState::traced_source() const {

@@ -11,9 +11,11 @@
 
 namespace packtrace {
 
+class InstanceBoxes;
 class InstanceLevels;
 class MeshMotion;
 class PackedTracer;
+struct MovedBox;
 
 /// What a FrameLoop traces. Everything referenced must outlive it.
 struct FrameScene {
@@ -62,6 +64,8 @@ public:
 
   /// Transforms of all instances in the frame before; empty if none moves.
   std::span<const Affine> previous_transforms() const { return last_world_; }
+  /// The boxes that advance() has moved since the frame before.
+  std::span<const MovedBox> moved_boxes() const;
   /// The tracer of camera rays if it shows deforming meshes, else null.
   const PackedTracer* deforming_tracer() const;
 
@@ -69,6 +73,7 @@ private:
   bool pose_instances(double time_s, FrameReport& report);
   bool apply_levels(FrameReport& report);
   bool deform_meshes(double time_s, FrameReport& report);
+  void follow_boxes();
   std::unique_ptr<RayTracer> posed(std::unique_ptr<RayTracer> tracer) const;
 
   FrameScene scene_;
@@ -79,6 +84,7 @@ private:
   std::unique_ptr<RayTracer> level_0_;      ///< null if only levels are traced and nothing deforms
   std::unique_ptr<RayTracer> level_tracer_; ///< traces planner_->source()
   std::unique_ptr<MeshMotion> meshes_;      ///< null if no mesh deforms
+  std::unique_ptr<InstanceBoxes> boxes_;    ///< null if nothing moves
   bool started_ = false;                    ///< there is a frame before
   std::vector<Affine> pose_, last_pose_;    ///< by SceneMotion::moving_instances(): of this frame and the previous one
   std::vector<Affine> last_world_;          ///< world_from_object of all instances in the previous frame

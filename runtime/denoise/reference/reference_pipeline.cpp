@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "pbrt_import/base/error.h"
+#include "runtime/denoise/limit_frames.h"
 #include "runtime/denoise/reference/depth_derivatives.h"
 #include "runtime/denoise/reference/disocclusion_blur.h"
 #include "runtime/denoise/reference/edge_stopping_blur.h"
@@ -91,6 +92,7 @@ void ReferencePipeline::add_frame(const GBuffer& gbuffer, const AoFrame& ao, His
     now_.surfaces.load(gbuffer);
     derive_depth(now_.surfaces, derivatives_);
   }
+  if (!ao.max_history.empty()) limit_frames(ao.max_history, gbuffer.size, now_.history.tspp);
   const reference::BlurScale scale = blur_scale(gbuffer, ao);
   if (ao.hit_distance.empty()) no_distances_.resize(gbuffer.size.pixels());
   blend(ao.ao, ao.hit_distance.empty() ? no_distances_ : ao.hit_distance, scale.ray_length, now_.surfaces, config_,

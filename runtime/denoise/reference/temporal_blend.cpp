@@ -37,7 +37,7 @@ void blend_row(int width, const BlendRow& rows, BlendScales s) {
     const float kept = clamps & known ? smaller(1.0f, larger(0.0f, bounded)) : old;
     const float trust = 1.0f - smaller(1.0f, s.response * std::abs(kept - old));
 
-    const float before = known ? larger(1.0f, r.tspp[x]) : 0.0f;
+    const float before = known ? r.tspp[x] : 0.0f;
     const float counted = smaller(s.max_tspp, before + (sampled ? 1.0f : 0.0f)) * trust;
     const float tspp = known ? larger(1.0f, counted) : counted;
     const float share = larger(s.min_blend, 1.0f / larger(1.0f, tspp));

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "pbrt_import/base/error.h"
+#include "runtime/ao/moved_occluders.h"
 #include "runtime/frame/frame_loop.h"
 #include "runtime/frame/instance_levels.h"
 #include "runtime/frame/still.h"
@@ -125,6 +126,33 @@ TEST(FrameLoop, ShowsTheLevelsOfTheDistance) {
   EXPECT_TRUE(loop.next_frame(LevelBench::camera(-40.0), 0.0, progress).moved);
   EXPECT_LT(largest_triangle(loop.gbuffer(), 2), 56u); // of 4 * 8 * 2 - 16
   EXPECT_EQ(loop.next_frame(LevelBench::camera(-40.0), 0.0, progress).level_changes, 0u);
+}
+
+TEST(SceneState, NamesTheBoxesThatMoved) {
+  const LevelBench bench;
+  SceneState state(bench.frame_scene(), {});
+  FrameReport report;
+  const DVec3 eye(0.5, 2, -6);
+  state.advance(eye, 0.0, report);
+  EXPECT_TRUE(state.moved_boxes().empty()); // the first frame
+  state.advance(eye, 0.0, report);
+  EXPECT_TRUE(state.moved_boxes().empty());
+  state.advance(eye, 1.0 / kFps, report);
+  ASSERT_EQ(state.moved_boxes().size(), 6u); // spheres, but not the floor
+  for (const MovedBox& box : state.moved_boxes()) {
+    EXPECT_GE(box.instance, 2u);
+    EXPECT_NEAR(glm::length(box.after.centre() - box.before.centre() - kDrift), 0.0, 3e-4);
+    EXPECT_NEAR(double(box.moved), glm::length(kDrift) / std::sqrt(3.0), 1e-3); // of boxes of side 2
+  }
+  const std::vector<uint8_t> saved = state.save();
+  SceneState resumed(bench.frame_scene(), {});
+  ASSERT_TRUE(resumed.restore(1.0 / kFps, saved, report));
+  for (SceneState* one : {&state, &resumed}) one->advance(eye, 2.0 / kFps, report);
+  ASSERT_EQ(resumed.moved_boxes().size(), 6u);
+  for (size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(resumed.moved_boxes()[i].before.lo, state.moved_boxes()[i].before.lo);
+    EXPECT_EQ(resumed.moved_boxes()[i].after.hi, state.moved_boxes()[i].after.hi);
+  }
 }
 
 /// Fraction of the pixels of drifting instances whose motion is wrong by more than 0.05 pixels.

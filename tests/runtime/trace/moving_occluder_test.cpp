@@ -1,8 +1,11 @@
+#include <bit>
 #include <cstdio>
+#include <limits>
 
 #include <gtest/gtest.h>
 
 #include "runtime/ao/ao_integrator.h"
+#include "runtime/ao/moved_occluders.h"
 #include "runtime/camera/primary_visibility.h"
 #include "runtime/denoise/denoiser.h"
 #include "tests/runtime/trace/moving_scenes.h"
@@ -34,69 +37,178 @@ protected:
   void place(DVec3 at) { tracer_.place_instances(std::vector<uint32_t>{kBox}, std::vector{Affine(test::placed(at))}); }
 
   /// Traces one frame; the camera looks down and sees the floor around the box, and later below it.
-  void trace(uint32_t frame, uint32_t spp, const std::vector<Affine>& before, GBuffer& g, AoFrame& ao) {
+  void trace(uint32_t frame, uint32_t spp, DVec3 before, DVec3 now, GBuffer& g, AoFrame& ao) {
     Progress progress;
     const PrimaryCamera camera(test::camera_at({0, 3, -9}, {0, 0, 0}, 50), kImage);
-    trace_primary(baked_.source, tracer_, camera, {camera, before}, g, progress);
+    const std::vector<Affine> last{Affine(1.0f), Affine(1.0f), Affine(test::placed(before))};
+    place(now);
+    trace_primary(baked_.source, tracer_, camera, {camera, last}, g, progress);
     ao_.spp = spp;
     trace_ao(baked_.source, tracer_, g, ao_, frame, ao, progress);
+  }
+
+  /// Limits the history as the frame loop does.
+  void limit(DVec3 before, DVec3 now, const GBuffer& g, AoFrame& ao) const {
+    if (before == now) return;
+    const Bounds box{{-1.5, -0.5, -1.5}, {1.5, 0.5, 1.5}};
+    const MovedBox moved = moved_box(kBox, box, DAffine(test::placed(before)), box, DAffine(test::placed(now)));
+    limit_history({&moved, 1}, g, ao_, ao_.radius, ao);
   }
 
   static constexpr uint32_t kBox = 2; ///< instance
   static inline const DVec3 kLow{0, 0.8, 0}, kHigh{0, 9, 0};
   const test::BakedScene baked_{scene()};
-  const Movers movers_{{kBox}, {{-3, -1, -3}, {3, 12, 3}}};
+  const Movers movers_{{kBox}, {{-6, -1, -3}, {6, 12, 3}}};
   PackedTracer tracer_{baked_.file, baked_.source, chosen_isa(), movers_};
   AoConfig ao_;
 };
 
-/// Mean difference from the truth over the pixels of floor and wall whose truth changed by more than 0.1 and that were
-/// seen before: what remains of the occluder is its signed mean.
+/// Mean difference from the truth over some pixels; what remains of the occluder is its signed mean.
 struct Ghost {
   double signed_mean = 0.0, absolute_mean = 0.0;
 };
 
+Ghost ghost_of(const DenoisedAo& result, const AoFrame& truth, const std::vector<size_t>& pixels) {
+  Ghost sum;
+  for (const size_t i : pixels) {
+    const double error = double{result.ao[i]} - double{truth.ao[i]};
+    sum.signed_mean += error, sum.absolute_mean += std::abs(error);
+  }
+  const auto count = static_cast<double>(pixels.size());
+  return {sum.signed_mean / count, sum.absolute_mean / count};
+}
+
+/// The pixels of floor and wall.
+std::vector<size_t> still_pixels(const GBuffer& g, uint32_t box) {
+  std::vector<size_t> pixels;
+  for (size_t i = 0; i < g.instance.size(); ++i)
+    if (g.instance[i] < box) pixels.push_back(i);
+  return pixels;
+}
+
 TEST_F(OccluderTest, LeavesLittleOcclusionBehind) {
   GBuffer g;
-  AoFrame truth_before, truth_after, noisy;
-  const std::vector<Affine> low{Affine(1.0f), Affine(1.0f), Affine(test::placed(kLow))},
-      high{Affine(1.0f), Affine(1.0f), Affine(test::placed(kHigh))};
-  trace(1000, 256, low, g, truth_before);
+  AoFrame truth_before, truth, noisy;
+  trace(1000, 256, kLow, kLow, g, truth_before);
   const std::vector<uint32_t> seen_before = g.instance;
-  AoDenoiser denoiser, reset;
-  for (uint32_t f = 0; f < kBefore; ++f) {
-    trace(f, 1, low, g, noisy);
-    denoiser.next_frame(g, noisy);
+  DenoiserConfig reference;
+  reference.kind = DenoiserKind::kReference;
+  for (const DenoiserConfig& config : {DenoiserConfig(), reference}) {
+    AoDenoiser unlimited(config), limited(config), reset(config);
+    for (uint32_t f = 0; f < kBefore; ++f) {
+      trace(f, 1, kLow, kLow, g, noisy);
+      unlimited.next_frame(g, noisy), limited.next_frame(g, noisy);
+    }
+    trace(2000, 256, kHigh, kHigh, g, truth);
+    std::vector<size_t> changed; // seen before
+    for (const size_t i : still_pixels(g, kBox))
+      if (seen_before[i] == g.instance[i] && std::abs(truth_before.ao[i] - truth.ao[i]) >= 0.1f) changed.push_back(i);
+    ASSERT_GT(changed.size(), 1000u);
+    for (uint32_t f = 0; f < kAfter; ++f) {
+      const DVec3 last = f == 0 ? kLow : kHigh;
+      trace(kBefore + f, 1, last, kHigh, g, noisy);
+      const double free = ghost_of(unlimited.next_frame(g, noisy), truth, changed).absolute_mean;
+      const double anew = ghost_of(reset.next_frame(g, noisy), truth, changed).absolute_mean;
+      limit(last, kHigh, g, noisy);
+      const Ghost kept = ghost_of(limited.next_frame(g, noisy), truth, changed);
+      if (!std::has_single_bit(f + 1)) continue;
+      std::printf("%s, %2u frames after: error %.4f (mean %+.4f), without limits %.4f, reset %.4f\n",
+                  config.kind == DenoiserKind::kReference ? "reference" : "ours", f + 1, kept.absolute_mean,
+                  kept.signed_mean, free, anew);
+      EXPECT_LT(kept.absolute_mean, anew + 0.006) << f;
+      if (f == 0) {
+        EXPECT_LT(kept.absolute_mean, free / 4);
+      }
+      if (f + 1 == kAfter) {
+        EXPECT_LT(std::abs(kept.signed_mean), config.kind == DenoiserKind::kReference ? 0.02 : 0.003);
+      }
+    }
   }
-  place(kHigh);
-  trace(2000, 256, high, g, truth_after);
-  const auto ghost = [&](const DenoisedAo& result) {
-    Ghost sum;
-    size_t count = 0;
-    for (size_t i = 0; i < kImage.pixels(); ++i) {
-      if (g.instance[i] >= kBox || seen_before[i] != g.instance[i] ||
-          std::abs(truth_before.ao[i] - truth_after.ao[i]) < 0.1f)
-        continue;
-      const double error = double{result.ao[i]} - double{truth_after.ao[i]};
-      sum.signed_mean += error, sum.absolute_mean += std::abs(error), ++count;
+}
+
+/// Mean errors of the last frames while the box slides.
+struct SlidingErrors {
+  double unlimited = 0.0, limited = 0.0, reset = 0.0;
+};
+
+TEST_F(OccluderTest, MovesOnWithItsOcclusion) {
+  GBuffer g;
+  AoFrame truth, noisy;
+  constexpr uint32_t kStart = 24, kFirst = 40, kEnd = 48;
+  for (const double step : {0.01, 0.1}) {
+    AoDenoiser unlimited, limited;
+    SlidingErrors errors;
+    DVec3 last = kLow;
+    for (uint32_t f = 0; f < kEnd; ++f) {
+      const DVec3 now = kLow + DVec3(step * (f > kStart ? f - kStart : 0), 0, 0);
+      if (f >= kFirst) trace(5000, 64, now, now, g, truth);
+      trace(f, 1, last, now, g, noisy);
+      AoDenoiser reset;
+      const DenoisedAo &free = unlimited.next_frame(g, noisy), &anew = reset.next_frame(g, noisy);
+      limit(last, now, g, noisy);
+      const DenoisedAo& kept = limited.next_frame(g, noisy);
+      last = now;
+      if (f < kFirst) continue;
+      const std::vector<size_t> pixels = still_pixels(g, kBox);
+      errors.unlimited += ghost_of(free, truth, pixels).absolute_mean / (kEnd - kFirst);
+      errors.limited += ghost_of(kept, truth, pixels).absolute_mean / (kEnd - kFirst);
+      errors.reset += ghost_of(anew, truth, pixels).absolute_mean / (kEnd - kFirst);
     }
-    EXPECT_GT(count, 1000u);
-    return Ghost{sum.signed_mean / static_cast<double>(count), sum.absolute_mean / static_cast<double>(count)};
-  };
-  for (uint32_t f = 0; f < kAfter; ++f) {
-    trace(kBefore + f, 1, f == 0 ? low : high, g, noisy);
-    const Ghost kept = ghost(denoiser.next_frame(g, noisy)), anew = ghost(reset.next_frame(g, noisy));
-    const uint32_t frames = f + 1;
-    if (frames == 1 || frames == 2 || frames == 4 || frames == 8 || frames == 16)
-      std::printf("%2u frames after: error %.4f (mean %+.4f), of a reset denoiser %.4f (mean %+.4f)\n", frames,
-                  kept.absolute_mean, kept.signed_mean, anew.absolute_mean, anew.signed_mean);
-    if (frames == 4) {
-      EXPECT_LT(std::abs(kept.signed_mean), 0.2);
-    }
-    if (frames == 16) {
-      EXPECT_LT(std::abs(kept.signed_mean), 0.05);
+    std::printf("%.2f a frame: error %.4f, without limits %.4f, reset %.4f\n", step, errors.limited, errors.unlimited,
+                errors.reset);
+    EXPECT_LT(errors.limited, errors.unlimited * (step < 0.05 ? 1.03 : 0.75)); // slow: as good as without limits
+    if (step < 0.05) {
+      EXPECT_LT(errors.limited, 0.8 * errors.reset);
     }
   }
+}
+
+/// One pixel that shows a point of a floor.
+class HistoryLimit : public testing::Test {
+protected:
+  HistoryLimit() {
+    g_.resize({1, 1});
+    g_.normal[0] = g_.geometric_normal[0] = Vec3(0, 1, 0);
+    g_.instance[0] = 0;
+  }
+
+  float limit(DVec3 before, DVec3 now, uint32_t instance = 7) {
+    const Bounds box{DVec3(-0.5), DVec3(0.5)};
+    const MovedBox moved = moved_box(instance, box, DAffine(test::placed(before)), box, DAffine(test::placed(now)));
+    AoConfig config;
+    config.falloff = false;
+    AoFrame ao;
+    limit_history({&moved, 1}, g_, config, 4.0f, ao);
+    return ao.max_history.at(0);
+  }
+
+  static constexpr float kNone = std::numeric_limits<float>::max();
+  GBuffer g_;
+};
+
+TEST_F(HistoryLimit, IsShortWhereABoxCoversMuchMoreOrLess) {
+  const float gone = limit({0, 1, 0}, {0, 90, 0});
+  EXPECT_LT(gone, 0.05f);
+  EXPECT_FLOAT_EQ(limit({0, 90, 0}, {0, 1, 0}), gone);
+  EXPECT_GT(limit({0, 3, 0}, {0, 90, 0}), 5.0f * gone); // covers a tenth of the area
+  EXPECT_GT(limit({0, 1, 0}, {0, 1.05, 0}), 10.0f * gone);
+}
+
+TEST_F(HistoryLimit, IsNoneForBoxesThatOccludeNothing) {
+  EXPECT_EQ(limit({0, 4.6, 0}, {0, 5, 0}), kNone);      // beyond the radius
+  EXPECT_EQ(limit({0, -0.6, 0}, {0, -9, 0}), kNone);    // below the surface
+  EXPECT_EQ(limit({1, 0.5, 0}, {2, 0.5, 0}, 0), kNone); // the surface's own
+  EXPECT_EQ(limit({3, 0.5, 0}, {3, 0.5001, 0}), kNone); // hardly moved
+  g_.instance[0] = kNoInstance;
+  EXPECT_EQ(limit({0, 1, 0}, {0, 90, 0}), kNone);
+}
+
+TEST_F(HistoryLimit, DoesNotExistWithoutMovement) {
+  AoFrame ao;
+  ao.resize({1, 1});
+  ao.max_history = {1.0f};
+  limit_history({}, g_, AoConfig(), 1.0f, ao);
+  EXPECT_TRUE(ao.max_history.empty());
 }
 
 } // namespace

@@ -317,16 +317,28 @@ void DeformedTree::rebuild() {
   area_ = built_area_ = area_of(boxes_);
 }
 
-Bounds DeformedTree::object_bounds() const {
+/// Object-space bounds of a box in tree coordinates.
+Bounds DeformedTree::bounds_between(const FramePoint& lo, const FramePoint& hi) const {
   const double step = PositionGrid{grid_.record.step_mantissa, grid_.record.step_exponent}.step();
   Bounds bounds;
   for (size_t axis = 0; axis < 3; ++axis) {
-    const int64_t lo = grid_.record.origin[axis] + grid_.low[axis];
     const auto at = static_cast<int>(axis);
-    bounds.lo[at] = static_cast<double>(from_lattice(lo, step));
-    bounds.hi[at] = static_cast<double>(from_lattice(lo + grid_.extent[axis], step));
+    bounds.lo[at] = static_cast<double>(from_lattice(grid_.record.origin[axis] + lo[axis], step));
+    bounds.hi[at] = static_cast<double>(from_lattice(grid_.record.origin[axis] + hi[axis], step));
   }
   return bounds;
+}
+
+Bounds DeformedTree::object_bounds() const {
+  FramePoint high = grid_.low;
+  for (size_t axis = 0; axis < 3; ++axis) high[axis] += grid_.extent[axis];
+  return bounds_between(grid_.low, high);
+}
+
+Bounds DeformedTree::current_bounds() const {
+  const node_kernels::Box& root = boxes_[0];
+  return bounds_between({root.lo[0], root.lo[1], root.lo[2]},
+                        {-root.minus_hi[0], -root.minus_hi[1], -root.minus_hi[2]});
 }
 
 uint64_t DeformedTree::bytes() const {

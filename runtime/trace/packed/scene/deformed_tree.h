@@ -70,6 +70,8 @@ public:
 
   /// Object-space bounds of all frames.
   Bounds object_bounds() const;
+  /// Object-space bounds of the current frame.
+  Bounds current_bounds() const;
 
   uint64_t bytes() const;
 
@@ -82,6 +84,7 @@ private:
   class ClusterWriter;
 
   static Grid find_grid(const BakedFile& file, const DeformingGeometry& geometry, const baked::TreeRecord& tree);
+  Bounds bounds_between(const FramePoint& lo, const FramePoint& hi) const;
   void index_leaf_nodes();
   void write_clusters(const FrameVertices& frame);
   void refit();

@@ -179,6 +179,11 @@ Bounds PackedTracer::bounds_of(uint32_t geometry) const {
   return object_bounds(file_.geometries()[geometry]);
 }
 
+Bounds PackedTracer::current_bounds(uint32_t geometry) const {
+  if (const DeformedTree* tree = tables_->deformed->find(geometry)) return tree->current_bounds();
+  return object_bounds(file_.geometries()[geometry]);
+}
+
 /// The instance that a cluster of a placement belongs to.
 uint32_t PackedTracer::instance_of(uint32_t placement, uint32_t cluster) const {
   const uint32_t placed = tables_->placed.instance_of(placement);

@@ -70,6 +70,9 @@ public:
   /// (PackedSource::set_geometry()). space() holds all levels, so it stays. Not while other threads trace.
   void replace_instances(const Movers& movers = {});
 
+  /// Object-space bounds of a geometry of the file in the current frame, if it deforms, else at rest.
+  Bounds current_bounds(uint32_t geometry) const;
+
   /// Shows the current vertices of the deforming geometries that the leader given to the constructor has moved.
   void follow();
 
