@@ -1,9 +1,11 @@
 #include "runtime/ao/moved_occluders.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include <tbb/blocked_range2d.h>
@@ -21,10 +23,12 @@ namespace {
 constexpr float kKept = 0.01f;
 constexpr float kSwept = 0.5f; ///< change where a box covers other directions than before, relative to its form factor
 
-/// Boxes that may change less than this are left out: they would leave 300 frames.
-constexpr float kLeastChange = 1e-3f;
+/// Boxes that may change less than this are left out: they would leave 40 frames.
+constexpr float kMinChange = 4e-3f;
 
-constexpr uint32_t kTile = 64, kSubtile = 8; ///< pixels
+/// Sides of blocks of pixels: boxes are selected for tiles, and then for subtiles. Pixels of a cell that show the same
+/// instance share a limit, since estimates from boxes are coarse.
+constexpr uint32_t kTile = 64, kSubtile = 8, kCell = 4;
 constexpr float kNoLimit = std::numeric_limits<float>::max();
 constexpr float kPi = std::numbers::pi_v<float>;
 
@@ -64,8 +68,9 @@ public:
         const uint32_t xe = std::min(x + kSubtile, x1), ye = std::min(y + kSubtile, y1);
         select(bounds_of_points(x, y, xe, ye), near, nearer);
         if (nearer.empty()) continue;
-        for (uint32_t py = y; py < ye; ++py)
-          for (uint32_t px = x; px < xe; ++px) limit_pixel(size_t{py} * g_.size.width + px, nearer);
+        for (uint32_t cy = y; cy < ye; cy += kCell)
+          for (uint32_t cx = x; cx < xe; cx += kCell)
+            limit_cell(cx, cy, std::min(cx + kCell, xe), std::min(cy + kCell, ye), nearer);
       }
   }
 
@@ -98,7 +103,7 @@ private:
     for (const MovedOccluder* occluder : from)
       if (std::max(bound(points, occluder->before), bound(points, occluder->after)) *
               std::min(1.0f, 4.0f * occluder->moved) >
-          kLeastChange)
+          kMinChange)
         chosen.push_back(occluder);
   }
 
@@ -125,8 +130,21 @@ private:
     return occlusion(d) * cosine * share;
   }
 
-  void limit_pixel(size_t i, const std::vector<const MovedOccluder*>& occluders) const {
-    if (g_.instance[i] == kNoInstance) return;
+  void limit_cell(uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1,
+                  const std::vector<const MovedOccluder*>& occluders) const {
+    std::array<std::pair<uint32_t, float>, kCell * kCell> known; // instances and their limits
+    size_t count = 0;
+    for (uint32_t y = y0; y < y1; ++y)
+      for (size_t i = size_t{y} * g_.size.width + x0; i < size_t{y} * g_.size.width + x1; ++i) {
+        if (g_.instance[i] == kNoInstance) continue;
+        size_t at = 0;
+        while (at < count && known[at].first != g_.instance[i]) ++at;
+        if (at == count) known[count++] = {g_.instance[i], limit(i, occluders)};
+        ao_.max_history[i] = known[at].second;
+      }
+  }
+
+  float limit(size_t i, const std::vector<const MovedOccluder*>& occluders) const {
     float squares = 0.0f;
     for (const MovedOccluder* occluder : occluders) {
       if (occluder->instance == g_.instance[i]) continue;
@@ -135,7 +153,7 @@ private:
       const float change = std::abs(after - before) + kSwept * occluder->moved * larger(before, after);
       squares += change * change;
     }
-    if (squares > 0.0f) ao_.max_history[i] = kKept / std::sqrt(squares * std::sqrt(squares));
+    return squares > 0.0f ? kKept / std::sqrt(squares * std::sqrt(squares)) : kNoLimit;
   }
 
   const GBuffer& g_;
