@@ -29,7 +29,7 @@ void forget_motion(GBuffer& gbuffer) {
   gbuffer.previous_z.clear();
 }
 
-const FrameConfig& validated(const FrameConfig& config) {
+FrameConfig validated(const FrameConfig& config) {
   config.validate();
   packtrace::validate(config.ao);
   return config;
