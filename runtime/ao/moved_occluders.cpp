@@ -21,7 +21,9 @@ namespace {
 /// every frame, n^3 = v / (2 k b^2). The exponent lies between these. Exponent and factor were chosen so that a town
 /// with 500 moving instances loses 0.2 dB, and a box that leaves a floor 0.01 (docs/denoiser.md).
 constexpr float kKept = 0.01f;
-constexpr float kSwept = 0.5f; ///< change where a box covers other directions than before, relative to its form factor
+/// Estimated change, relative to the form factor, where a box moves by half its diagonal or more and keeps its form
+/// factor: it covers other directions than before.
+constexpr float kSwept = 0.5f;
 
 /// Boxes that may change less than this are left out: they would leave 40 frames.
 constexpr float kMinChange = 4e-3f;

@@ -20,8 +20,8 @@ struct ImageScore {
 struct SequenceScore {
   std::string scene, motion, denoiser;
   std::map<uint32_t, ImageScore> images; ///< by number of frames
-  /// Of occluders: the part of the difference between the truths before and after the occluder is gone that the image
-  /// still has, by number of frames since. Over surfaces that were seen before; noise does not change it.
+  /// Ghosts by number of frames since the occluder is gone: the fraction that remains of the difference between the
+  /// truths with and without it. Over surfaces that were visible before; noise does not change it.
   std::map<uint32_t, double> ghosts;
   /// Mean change of a pixel's value since the frame before, following its motion, over the second half of the frames
   /// that move, or of all. Only pixels that show the same surface, and of which the truth stays the same.
