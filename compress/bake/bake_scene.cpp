@@ -331,30 +331,9 @@ private:
   }
 
   baked::SummaryRecord summary(const FileSections& sections) const {
-    baked::SummaryRecord s{};
-    s.source_triangles = report_.source_triangles;
-    s.dropped_triangles = scene_.dropped_triangles;
-    s.unused_triangles = report_.unused_triangles;
-    s.source_vertices = report_.source_vertices;
-    s.merged_vertices = report_.merged_vertices;
-    s.collapsed_triangles = report_.collapsed_triangles;
-    const Bounds bounds = placed_bounds(sections);
-    s.origin = {scene_.origin.x, scene_.origin.y, scene_.origin.z};
-    s.bounds_lo = {bounds.lo.x, bounds.lo.y, bounds.lo.z};
-    s.bounds_hi = {bounds.hi.x, bounds.hi.y, bounds.hi.z};
-    const PrecisionKind kind = config_.precision_kind;
-    s.precision_kind = static_cast<uint32_t>(kind == PrecisionKind::kPicture ? PrecisionKind::kEdgeFraction : kind);
-    s.precision_value = config_.precision;
-    s.purpose = config_.purpose | (uint32_t{config_.keep_normals} << (baked::kKeepShift + baked::kNormals)) |
-                (uint32_t{config_.keep_uvs} << (baked::kKeepShift + baked::kUvs));
+    baked::SummaryRecord s = summary_of(scene_, config_, report_, placed_bounds(sections), sections.stream_bits());
     if (report_.world_step > 0.0)
       s.world_step_mantissa = world_grid_.mantissa, s.world_step_exponent = world_grid_.exponent;
-    const ClusterView::StreamBits& bits = sections.stream_bits();
-    s.left_out = report_.left_out;
-    s.coinciding_triangles = report_.coinciding_triangles;
-    s.source_area = report_.source_area;
-    s.collapsed_area = report_.collapsed_area;
-    s.stream_bits = {bits.indices, bits.positions, bits.normals, bits.uvs};
     return s;
   }
 

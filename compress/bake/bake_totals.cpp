@@ -112,4 +112,29 @@ void add_up(const Scene& scene, const ScenePlan& plan, std::span<const PackedGeo
          report, diagnostics);
 }
 
+baked::SummaryRecord summary_of(const Scene& scene, const BakeConfig& config, const BakeReport& report,
+                                const Bounds& bounds, const ClusterView::StreamBits& bits) {
+  baked::SummaryRecord s{};
+  s.source_triangles = report.source_triangles;
+  s.dropped_triangles = scene.dropped_triangles;
+  s.unused_triangles = report.unused_triangles;
+  s.source_vertices = report.source_vertices;
+  s.merged_vertices = report.merged_vertices;
+  s.collapsed_triangles = report.collapsed_triangles;
+  s.origin = {scene.origin.x, scene.origin.y, scene.origin.z};
+  s.bounds_lo = {bounds.lo.x, bounds.lo.y, bounds.lo.z};
+  s.bounds_hi = {bounds.hi.x, bounds.hi.y, bounds.hi.z};
+  const PrecisionKind kind = config.precision_kind;
+  s.precision_kind = static_cast<uint32_t>(kind == PrecisionKind::kPicture ? PrecisionKind::kEdgeFraction : kind);
+  s.precision_value = config.precision;
+  s.purpose = config.purpose | (uint32_t{config.keep_normals} << (baked::kKeepShift + baked::kNormals)) |
+              (uint32_t{config.keep_uvs} << (baked::kKeepShift + baked::kUvs));
+  s.left_out = report.left_out;
+  s.coinciding_triangles = report.coinciding_triangles;
+  s.source_area = report.source_area;
+  s.collapsed_area = report.collapsed_area;
+  s.stream_bits = {bits.indices, bits.positions, bits.normals, bits.uvs};
+  return s;
+}
+
 } // namespace packtrace

@@ -19,4 +19,11 @@ void warn(std::string message, BakeReport& report, Diagnostics& diagnostics);
 void add_up(const Scene& scene, const ScenePlan& plan, std::span<const PackedGeometry> packed, BakeReport& report,
             Diagnostics& diagnostics);
 
+/// Returns the file's summary without the step of the world's grid.
+/// @param report with its totals
+/// @param bounds world-space bounds of all instances at all times
+/// @param bits sizes of all clusters' streams in bits
+baked::SummaryRecord summary_of(const Scene& scene, const BakeConfig& config, const BakeReport& report,
+                                const Bounds& bounds, const ClusterView::StreamBits& bits);
+
 } // namespace packtrace

@@ -24,6 +24,7 @@
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/base/exr_header.h"
 #include "pbrt_import/base/png_chunks.h"
+#include "pbrt_import/files/image_summarizer.h"
 #include "pbrt_import/files/radiance.h"
 #include "pbrt_import/files/tga.h"
 #include "pbrt_import/scene/albedo_texture.h"
@@ -37,129 +38,8 @@ namespace {
 constexpr const char* kDamaged = "damaged image: ";
 constexpr const char* kTruncated = "damaged image: the file is truncated";
 
-// An upper bound for all formats: PNG reaches 8256; DWAB compression of EXR stores chunks in as few as 96 bytes.
-constexpr uint64_t kMaxPixelsPerByte = 1u << 16;
-
 constexpr const char *kNotInPalette = "has a colour that the palette lacks; it counts as black",
                      *kNotInPaletteMany = "have colours that the palette lacks; they count as black";
-
-/// Adds a problem that affects `pixels` pixels; none if the count is 0.
-void add_problem(ImageSummary& summary, uint64_t pixels, std::string_view of_one, std::string_view of_more) {
-  if (pixels == 0) return;
-  const std::string subject = pixels == 1 ? "1 pixel " : std::to_string(pixels) + " pixels ";
-  summary.problems.push_back(subject + std::string(pixels == 1 ? of_one : of_more));
-}
-
-/// Accumulates an ImageSummary from pixels that are added in row order, from the top.
-class Summarizer {
-public:
-  Summarizer(uint32_t width, uint32_t height, ImageWants wants)
-      : width_(width), want_mask_(wants.mask), want_colours_(wants.colours) {
-    summary_.width = width;
-    summary_.height = height;
-    want_colours_ = want_colours_ && uint64_t{width} * height <= kMaxTextureTexels;
-    if (want_colours_) summary_.rgb.assign(static_cast<size_t>(width) * height * 3, 0);
-    if (want_mask_) summary_.nonzero.assign(static_cast<size_t>(AlphaMask::row_words(width)) * height, 0);
-  }
-
-  void add(uint32_t x, uint32_t y, Vec3 pixel) {
-    if (!is_finite(pixel)) {
-      ++not_finite_pixels_;
-      return;
-    }
-    const bool nonzero = pixel.x != 0.0f || pixel.y != 0.0f || pixel.z != 0.0f;
-    if (pixel.x < 0.0f || pixel.y < 0.0f || pixel.z < 0.0f) {
-      ++negative_pixels_;
-      pixel = glm::max(pixel, Vec3(0.0f));
-    }
-    row_ += DVec3(pixel);
-    if (want_colours_)
-      for (size_t c = 0; c < 3; ++c)
-        summary_.rgb[(static_cast<size_t>(y) * width_ + x) * 3 + c] = srgb8_of_linear(pixel[static_cast<int>(c)]);
-    if (want_mask_ && nonzero)
-      summary_.nonzero[static_cast<size_t>(y) * AlphaMask::row_words(width_) + x / 32] |= 1u << (x % 32);
-  }
-
-  /// Adds a whole row of 8-bit pixels, as add() and end_row() would.
-  /// @tparam kChannels 3, or 1 for grey pixels
-  /// @param linear linear value of each sample value, not negative
-  template <uint32_t kChannels>
-  void add_row(uint32_t y, const uint8_t* pixels, const std::array<float, 256>& linear) {
-    double sums[kChannels] = {};
-    const uint8_t* sample = pixels;
-    for (uint32_t x = 0; x < width_; ++x)
-      for (double& sum : sums) sum += double{linear[*sample++]};
-    row_ += DVec3(sums[0], sums[kChannels / 2], sums[kChannels - 1]);
-    if (want_mask_) set_mask_row<kChannels>(y, pixels, linear);
-    if (want_colours_) {
-      uint8_t* to = summary_.rgb.data() + static_cast<size_t>(y) * width_ * 3;
-      for (uint32_t x = 0; x < width_; ++x)
-        for (uint32_t c = 0; c < 3; ++c)
-          *to++ = srgb8_of_linear(linear[pixels[x * kChannels + (kChannels == 1 ? 0 : c)]]);
-    }
-    end_row();
-  }
-
-  /// Summing per row keeps the rounding error of the total small.
-  void end_row() {
-    total_ += row_;
-    row_ = DVec3(0.0);
-  }
-
-  ImageSummary finish() {
-    summary_.average = Vec3(total_ / (static_cast<double>(summary_.width) * summary_.height));
-    add_problem(summary_, not_finite_pixels_, "is not finite; it counts as black",
-                "are not finite; they count as black");
-    add_problem(summary_, negative_pixels_, "has a negative value, which counts as 0",
-                "have negative values, which count as 0");
-    return std::move(summary_);
-  }
-
-private:
-  template <uint32_t kChannels>
-  void set_mask_row(uint32_t y, const uint8_t* pixels, const std::array<float, 256>& linear) {
-    const uint32_t words = AlphaMask::row_words(width_);
-    uint32_t* const row = summary_.nonzero.data() + static_cast<size_t>(y) * words;
-    for (uint32_t w = 0; w < words; ++w) {
-      const uint32_t count = std::min(32u, width_ - 32 * w);
-      uint32_t bits = 0;
-      for (uint32_t i = 0; i < count; ++i) {
-        bool nonzero = false;
-        for (uint32_t c = 0; c < kChannels; ++c) nonzero |= linear[*pixels++] != 0.0f;
-        bits |= (nonzero ? 1u : 0u) << i;
-      }
-      row[w] = bits;
-    }
-  }
-
-  ImageSummary summary_;
-  uint64_t not_finite_pixels_ = 0, negative_pixels_ = 0;
-  uint32_t width_;
-  bool want_mask_, want_colours_;
-  DVec3 row_{0.0}, total_{0.0};
-};
-
-/// Image size as claimed by a file header, checked before memory is allocated.
-struct ClaimedSize {
-  uint64_t width = 0, height = 0;
-  uint64_t pixels_per_byte = kMaxPixelsPerByte; ///< upper bound of the format's compression
-
-  std::string text() const { return std::to_string(width) + " x " + std::to_string(height); }
-
-  /// @param working_bytes memory that decoding takes in addition to the kept data
-  void check(uint64_t stored_bytes, uint64_t working_bytes, ImageWants wants, MemoryReservation& memory) const {
-    if (width == 0 || height == 0) fail("the image has no pixels");
-    constexpr uint64_t kMaxSide = 1u << 24;
-    if (width > kMaxSide || height > kMaxSide) fail("an image of " + text() + " pixels is not read");
-    const uint64_t pixels = width * height;
-    if (pixels / pixels_per_byte > stored_bytes)
-      fail("damaged image: its " + std::to_string(stored_bytes) + " bytes cannot hold the " + text() +
-           " pixels it claims");
-    const uint64_t kept = (wants.colours && pixels <= kMaxTextureTexels ? 3 * pixels : 0) +
-                          (wants.mask ? AlphaMask::row_words(static_cast<uint32_t>(width)) * height * 4 : 0);
-    memory.cover(working_bytes + kept, "decoding its " + text() + " pixels");
-  }
-};
 
 /// Linear value of an sRGB-encoded value. Source: IEC 61966-2-1.
 float linear_from_srgb(float v) {
@@ -174,7 +54,7 @@ struct StbFree {
 template <uint32_t kChannels>
 ImageSummary summarize_bytes(const uint8_t* pixels, uint32_t width, uint32_t height, ImageWants wants,
                              const std::array<float, 256>& linear) {
-  Summarizer summarizer(width, height, wants);
+  ImageSummarizer summarizer(width, height, wants);
   for (uint32_t y = 0; y < height; ++y)
     summarizer.add_row<kChannels>(y, pixels + static_cast<size_t>(y) * width * kChannels, linear);
   return summarizer.finish();
@@ -183,7 +63,7 @@ ImageSummary summarize_bytes(const uint8_t* pixels, uint32_t width, uint32_t hei
 template <class T, class ToLinear>
 ImageSummary summarize(const T* pixels, int width, int height, ImageWants wants, ToLinear to_linear) {
   const auto w = static_cast<uint32_t>(width), h = static_cast<uint32_t>(height);
-  Summarizer summarizer(w, h, wants);
+  ImageSummarizer summarizer(w, h, wants);
   for (uint32_t y = 0; y < h; ++y) {
     for (uint32_t x = 0; x < w; ++x, pixels += 3)
       summarizer.add(x, y, {to_linear(pixels[0]), to_linear(pixels[1]), to_linear(pixels[2])});
@@ -229,7 +109,7 @@ ImageSummary read_palette_png(std::span<const std::byte> bytes, const PngHeader&
   const PngPalette palette = png_palette(bytes, kDamaged);
   const auto grey = decode_png(palette.indices_as_grey, 1, stbi_load_from_memory);
   const std::array<float, 256> linear = linear_of_bytes(decode_srgb);
-  Summarizer summarizer(header.width, header.height, wants);
+  ImageSummarizer summarizer(header.width, header.height, wants);
   uint64_t out_of_range = 0;
   const stbi_uc* pixel = grey.get();
   std::vector<uint8_t> row(size_t{header.width} * 3);
@@ -252,7 +132,7 @@ ImageSummary read_png(std::span<const std::byte> bytes, bool decode_srgb, ImageW
   if (bytes.size() > static_cast<size_t>(INT32_MAX)) fail("the image file exceeds 2 GiB");
   const PngHeader header = check_png_chunks(bytes, PngChecksums::kCount, kDamaged);
   // stb_image holds at most two copies of at most four channels.
-  const ClaimedSize size{header.width, header.height};
+  const ClaimedImageSize size{header.width, header.height};
   size.check(bytes.size(), size.width * size.height * (header.bits_per_sample > 8 ? 16 : 8), wants, memory);
   ImageSummary summary;
   if (header.palette) {
@@ -282,7 +162,7 @@ ImageSummary read_tga(std::span<const std::byte> bytes, bool decode_srgb, ImageW
   const std::optional<TgaHeader> header = parse_tga_header(bytes);
   if (!header) fail("not an image in a known format (PNG, TGA, EXR, PFM, HDR)");
   constexpr uint64_t kPixelsPerByte = 64; // a run of up to 128 pixels takes at least two bytes
-  const ClaimedSize size{header->width, header->height, kPixelsPerByte};
+  const ClaimedImageSize size{header->width, header->height, kPixelsPerByte};
   size.check(bytes.size(), size.width * size.height * 3, wants, memory);
   const TgaPixels pixels = decode_tga(bytes, *header);
   ImageSummary summary =
@@ -295,9 +175,9 @@ ImageSummary read_tga(std::span<const std::byte> bytes, bool decode_srgb, ImageW
 
 ImageSummary read_hdr(std::span<const std::byte> bytes, ImageWants wants, MemoryReservation& memory) {
   RadianceReader reader(bytes);
-  const ClaimedSize size{reader.width(), reader.height()};
+  const ClaimedImageSize size{reader.width(), reader.height()};
   size.check(bytes.size(), size.width * 2 * sizeof(Vec3), wants, memory); // working memory: one row
-  Summarizer summarizer(reader.width(), reader.height(), wants);
+  ImageSummarizer summarizer(reader.width(), reader.height(), wants);
   for (uint32_t y = 0; y < reader.height(); ++y) {
     const std::span<const Vec3> row = reader.read_row();
     for (uint32_t x = 0; x < reader.width(); ++x) summarizer.add(x, y, row[x]);
@@ -339,7 +219,7 @@ void check_exr(std::span<const std::byte> bytes, ImageWants wants, MemoryReserva
   if (block > kAlwaysAcceptedBytes && block / kMaxPixelsPerByte > bytes.size())
     fail("damaged image: its " + std::to_string(bytes.size()) + " bytes cannot hold the blocks it claims");
   const uint64_t blocks = block > UINT64_MAX / (2 * kBlockCopies) ? UINT64_MAX / 2 : block * kBlockCopies;
-  const ClaimedSize size{header.width(), header.height()};
+  const ClaimedImageSize size{header.width(), header.height()};
   size.check(bytes.size(), blocks + size.width * kRows * sizeof(Imf::Rgba), wants, memory);
 }
 
@@ -353,7 +233,7 @@ ImageSummary read_exr(std::span<const std::byte> bytes, ImageWants wants, Memory
     if ((file.channels() & (Imf::WRITE_RGB | Imf::WRITE_YC)) == 0)
       fail("the EXR image has none of the channels R, G, B and Y");
     const auto w = static_cast<uint32_t>(width);
-    Summarizer summarizer(w, static_cast<uint32_t>(height), wants);
+    ImageSummarizer summarizer(w, static_cast<uint32_t>(height), wants);
     constexpr int64_t kBlock = 64; // a multiple of the block height of every compression except DWAB (256 rows)
     const auto block = static_cast<int>(std::min(height, kBlock));
     std::vector<Imf::Rgba> rows(static_cast<size_t>(w) * static_cast<size_t>(block));
@@ -400,11 +280,11 @@ ImageSummary read_pfm(std::span<const std::byte> bytes, ImageWants wants, Memory
     fail("damaged PFM header: width and height must be whole numbers from 1 to 16777216");
   if (!std::isfinite(header[2]) || header[2] == 0.0) fail("damaged PFM header: the scale must be finite and not 0");
   const auto width = static_cast<uint32_t>(header[0]), height = static_cast<uint32_t>(header[1]);
-  ClaimedSize{width, height, 1}.check(bytes.size(), 0, wants, memory);
+  ClaimedImageSize{width, height, 1}.check(bytes.size(), 0, wants, memory);
   const size_t row_bytes = static_cast<size_t>(width) * channels * 4;
   if (text.size() / row_bytes < height) fail(kTruncated);
   const bool swap = header[2] > 0.0;
-  Summarizer summarizer(width, height, wants);
+  ImageSummarizer summarizer(width, height, wants);
   for (uint32_t y = 0; y < height; ++y) {
     const char* row = text.data() + (height - 1 - y) * row_bytes;
     for (uint32_t x = 0; x < width; ++x) {

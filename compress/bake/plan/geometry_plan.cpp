@@ -12,6 +12,7 @@
 #include <tbb/parallel_for.h>
 
 #include "compress/bake/plan/equal_meshes.h"
+#include "compress/bake/plan/material_runs.h"
 #include "pbrt_import/base/brief.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/scene/motion_pose.h"
@@ -39,13 +40,6 @@ baked::InstanceRecord instance_of(uint32_t geometry, const Affine& world_from_ob
   return record;
 }
 
-/// A geometry under construction. Each user (a world shape or an object) assigns one material to each part.
-struct Draft {
-  std::vector<uint32_t> part_materials; ///< materials of all parts, user by user
-  uint32_t users = 0;
-  std::vector<uint32_t> first_slot; ///< per user
-};
-
 class Planner {
 public:
   Planner(const Scene& scene, std::span<const uint32_t> deforming, std::span<const LevelChain> chains)
@@ -62,11 +56,12 @@ public:
     find_used_objects();
     plan_world_shapes();
     plan_objects();
-    for (uint32_t g = 0; g < drafts_.size(); ++g) assign_slots(g);
+    MaterialRuns runs(plan_);
+    for (uint32_t g = 0; g < users_.size(); ++g) runs.assign_slots(scene_, g, users_[g]);
     for (size_t i = 0; i < plan_.instances.size(); ++i) {
       baked::InstanceRecord& instance = plan_.instances[i];
       if (instance.geometry == baked::kNone) continue;
-      instance.first_slot = drafts_[instance.geometry].first_slot[user_of_[i]];
+      instance.first_slot = users_[instance.geometry].first_slot[user_of_[i]];
     }
     plan_chains();
     return std::move(plan_);
@@ -100,15 +95,15 @@ private:
 
   uint32_t add_geometry(GeometryPlan plan) {
     plan_.geometries.push_back(std::move(plan));
-    drafts_.emplace_back();
+    users_.emplace_back();
     return static_cast<uint32_t>(plan_.geometries.size() - 1);
   }
 
   /// @return the number of the new user
   uint32_t add_user(uint32_t geometry, std::span<const Shape> shapes) {
-    Draft& draft = drafts_[geometry];
-    for (const Shape& shape : shapes) draft.part_materials.push_back(shape.material);
-    return draft.users++;
+    GeometryUsers& users = users_[geometry];
+    for (const Shape& shape : shapes) users.part_materials.push_back(shape.material);
+    return users.count++;
   }
 
   /// A mesh that moves is equal to no other; of those equal to it, the first that stays stands for the others.
@@ -348,49 +343,6 @@ private:
     throw Error(ErrorKind::kUsage, "levels by distance: object " + name_of(object) + " " + problem);
   }
 
-  /// Merges parts into a slot if every user assigns them the same material. Slots are ordered by class, then by
-  /// materials.
-  void assign_slots(uint32_t geometry) {
-    Draft& draft = drafts_[geometry];
-    GeometryPlan& plan = plan_.geometries[geometry];
-    const size_t parts = plan.parts.size();
-    using Column = std::pair<uint32_t, std::vector<uint32_t>>; // class, and one material per user
-    std::map<Column, std::vector<size_t>> parts_of;
-    for (size_t p = 0; p < parts; ++p) {
-      if (scene_.meshes[plan.parts[p].mesh].triangles.empty()) continue; // its slot would have no clusters
-      Column column;
-      for (uint32_t u = 0; u < draft.users; ++u) column.second.push_back(draft.part_materials[u * parts + p]);
-      column.first = baked::material_class(scene_.materials[column.second.front()].flags);
-      parts_of[std::move(column)].push_back(p);
-    }
-    for (const auto& [column, members] : parts_of) {
-      for (const size_t p : members) plan.parts[p].slot = static_cast<uint32_t>(plan.slot_class.size());
-      plan.slot_class.push_back(column.first);
-    }
-    draft.first_slot.resize(draft.users);
-    std::vector<uint32_t> run(parts_of.size());
-    for (uint32_t u = 0; u < draft.users; ++u) {
-      std::transform(parts_of.begin(), parts_of.end(), run.begin(),
-                     [u](const auto& slot) { return slot.first.second[u]; });
-      draft.first_slot[u] = place_run(run);
-      plan.material_runs.push_back(draft.first_slot[u]);
-    }
-    std::sort(plan.material_runs.begin(), plan.material_runs.end());
-    plan.material_runs.erase(std::unique(plan.material_runs.begin(), plan.material_runs.end()),
-                             plan.material_runs.end());
-    draft.part_materials = {};
-  }
-
-  uint32_t place_run(const std::vector<uint32_t>& run) {
-    const auto end = static_cast<uint32_t>(plan_.material_slots.size());
-    const auto [found, inserted] = runs_.try_emplace(run, end);
-    if (!inserted) return found->second;
-    if (run.size() >= baked::kNone - end)
-      throw Error(ErrorKind::kLimitExceeded, "the materials of all geometries take more than 2^32 slots");
-    plan_.material_slots.insert(plan_.material_slots.end(), run.begin(), run.end());
-    return end;
-  }
-
   struct Use {
     uint32_t geometry = 0, user = 0;
   };
@@ -402,11 +354,10 @@ private:
   std::vector<Bounds> mesh_boxes_;
   std::vector<uint8_t> used_; // per object: it is instanced, or a level of a chain
   std::vector<Use> use_of_object_;
-  std::vector<const InstanceMotion*> moving_;      // per instance; null: it does not move
-  std::vector<Draft> drafts_;                      // per geometry
-  std::vector<uint32_t> user_of_;                  // per instance
-  std::map<std::string, uint32_t> geometry_with_;  // by content_key(): geometries that are not in world space
-  std::map<std::vector<uint32_t>, uint32_t> runs_; // runs of materials and their first slots
+  std::vector<const InstanceMotion*> moving_;     // per instance; null: it does not move
+  std::vector<GeometryUsers> users_;              // per geometry
+  std::vector<uint32_t> user_of_;                 // per instance
+  std::map<std::string, uint32_t> geometry_with_; // by content_key(): geometries that are not in world space
   ScenePlan plan_;
 };
 

@@ -4,7 +4,48 @@
 #include <map>
 #include <utility>
 
+#include "pbrt_import/base/error.h"
+
 namespace packtrace {
+
+void MaterialRuns::assign_slots(const Scene& scene, uint32_t geometry, GeometryUsers& users) {
+  GeometryPlan& plan = plan_.geometries[geometry];
+  const size_t parts = plan.parts.size();
+  using Column = std::pair<uint32_t, std::vector<uint32_t>>; // class, and one material per user
+  std::map<Column, std::vector<size_t>> parts_of;
+  for (size_t p = 0; p < parts; ++p) {
+    if (scene.meshes[plan.parts[p].mesh].triangles.empty()) continue; // its slot would have no clusters
+    Column column;
+    for (uint32_t u = 0; u < users.count; ++u) column.second.push_back(users.part_materials[u * parts + p]);
+    column.first = baked::material_class(scene.materials[column.second.front()].flags);
+    parts_of[std::move(column)].push_back(p);
+  }
+  for (const auto& [column, members] : parts_of) {
+    for (const size_t p : members) plan.parts[p].slot = static_cast<uint32_t>(plan.slot_class.size());
+    plan.slot_class.push_back(column.first);
+  }
+  users.first_slot.resize(users.count);
+  std::vector<uint32_t> run(parts_of.size());
+  for (uint32_t u = 0; u < users.count; ++u) {
+    std::transform(parts_of.begin(), parts_of.end(), run.begin(),
+                   [u](const auto& slot) { return slot.first.second[u]; });
+    users.first_slot[u] = place(run);
+    plan.material_runs.push_back(users.first_slot[u]);
+  }
+  std::sort(plan.material_runs.begin(), plan.material_runs.end());
+  plan.material_runs.erase(std::unique(plan.material_runs.begin(), plan.material_runs.end()), plan.material_runs.end());
+  users.part_materials = {};
+}
+
+uint32_t MaterialRuns::place(const std::vector<uint32_t>& run) {
+  const auto end = static_cast<uint32_t>(plan_.material_slots.size());
+  const auto [found, inserted] = first_of_.try_emplace(run, end);
+  if (!inserted) return found->second;
+  if (run.size() >= baked::kNone - end)
+    throw Error(ErrorKind::kLimitExceeded, "the materials of all geometries take more than 2^32 slots");
+  plan_.material_slots.insert(plan_.material_slots.end(), run.begin(), run.end());
+  return end;
+}
 
 void remove_material_slots(ScenePlan& plan, std::span<const std::vector<uint32_t>> kept_slots) {
   bool all = true;
