@@ -68,16 +68,12 @@ PrimaryCamera::PrimaryCamera(const Camera& camera, ImageSize size, glm::dvec2 of
 }
 
 CameraRay PrimaryCamera::ray(uint32_t x, uint32_t y) const {
-  const double u = (x + 0.5 + offset_px_.x) / size_.width, v = (y + 0.5 + offset_px_.y) / size_.height;
-  DVec3 origin(0.0), direction(0.0, 0.0, 1.0);
-  if (projection_ == Projection::kEnvironment) {
-    const double theta = kPi * v, phi = 2 * kPi * u;
-    direction = DVec3(std::sin(theta) * std::cos(phi), std::cos(theta), std::sin(theta) * std::sin(phi));
-  } else {
-    const DVec3 film(window_.x + u * (window_.y - window_.x), window_.w + v * (window_.z - window_.w), 0.0);
-    (projection_ == Projection::kPerspective ? direction : origin) += film;
-  }
-  return {transform_point(world_from_camera_, origin), glm::normalize(transform_vector(world_from_camera_, direction))};
+  if (projection_ != Projection::kEnvironment) return linear_ray(x, y);
+  const double theta = kPi * ((y + 0.5 + offset_px_.y) / size_.height);
+  const double phi = 2 * kPi * ((x + 0.5 + offset_px_.x) / size_.width);
+  const DVec3 direction(std::sin(theta) * std::cos(phi), std::cos(theta), std::sin(theta) * std::sin(phi));
+  return {transform_point(world_from_camera_, DVec3(0.0)),
+          glm::normalize(transform_vector(world_from_camera_, direction))};
 }
 
 double PrimaryCamera::pixel_spread() const {
@@ -91,7 +87,7 @@ double PrimaryCamera::pixel_spread() const {
 
 double PrimaryCamera::view_z(DVec3 world) const {
   if (projection_ == Projection::kEnvironment) return glm::length(world - world_from_camera_[3]);
-  return transform_point(camera_from_world_, world).z * depth_scale_;
+  return linear_view_z(world);
 }
 
 DVec3 PrimaryCamera::homogeneous_pixel(DVec3 world) const {
@@ -102,18 +98,17 @@ DVec3 PrimaryCamera::homogeneous_pixel(DVec3 world) const {
 }
 
 std::optional<ProjectedPoint> PrimaryCamera::project(DVec3 world) const {
-  const DVec3 c = transform_point(camera_from_world_, world);
-  glm::dvec2 uv;
-  if (projection_ == Projection::kEnvironment) {
-    const double distance = glm::length(c);
-    if (!(distance > 0.0)) return std::nullopt;
-    const double phi = std::atan2(c.z, c.x);
-    uv = {(phi < 0 ? phi + 2 * kPi : phi) / (2 * kPi), std::acos(std::clamp(c.y / distance, -1.0, 1.0)) / kPi};
-  } else {
-    if (projection_ == Projection::kPerspective && !(c.z > 0.0)) return std::nullopt;
-    const glm::dvec2 film = projection_ == Projection::kPerspective ? glm::dvec2(c) / c.z : glm::dvec2(c);
-    uv = {(film.x - window_.x) / (window_.y - window_.x), (film.y - window_.w) / (window_.z - window_.w)};
+  if (projection_ != Projection::kEnvironment) {
+    const ProjectedPoint point = linear_projection(world);
+    if (projection_ == Projection::kPerspective && !(point.view_z > 0.0)) return std::nullopt;
+    return point;
   }
+  const DVec3 c = transform_point(camera_from_world_, world);
+  const double distance = glm::length(c);
+  if (!(distance > 0.0)) return std::nullopt;
+  const double phi = std::atan2(c.z, c.x);
+  const glm::dvec2 uv((phi < 0 ? phi + 2 * kPi : phi) / (2 * kPi),
+                      std::acos(std::clamp(c.y / distance, -1.0, 1.0)) / kPi);
   return ProjectedPoint{uv * glm::dvec2(size_.width, size_.height) - offset_px_, view_z(world)};
 }
 

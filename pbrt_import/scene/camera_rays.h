@@ -39,11 +39,16 @@ public:
 
   /// The ray through the (shifted) centre of pixel (x, y).
   CameraRay ray(uint32_t x, uint32_t y) const;
+  /// Does the same for other than environment cameras; inline, so that loops over pixels can be vectorised.
+  CameraRay linear_ray(uint32_t x, uint32_t y) const;
 
   /// Projects a world point; the inverse of ray(), including its shift. Returns nullopt for points that no ray can
   /// reach (behind a perspective camera or in its plane, or at the eye). Points outside the image are projected as
   /// well.
   std::optional<ProjectedPoint> project(DVec3 world) const;
+  /// Does the same for other than environment cameras, inline. If the point's view_z is not positive, a perspective
+  /// camera's project() would return nullopt, and the pixel has no meaning.
+  ProjectedPoint linear_projection(DVec3 world) const;
 
   /// Homogeneous pixel coordinates (x w, y w, w) of a world point. They are linear in the point, so that frustum planes
   /// can be tested by signs, even behind the camera, where w <= 0. Orthographic: w = 1. Not for environment cameras.
@@ -51,6 +56,8 @@ public:
 
   /// Depth of a world point, as in ProjectedPoint::view_z; negative behind the camera.
   double view_z(DVec3 world) const;
+  /// Does the same for other than environment cameras, inline.
+  double linear_view_z(DVec3 world) const { return transform_point(camera_from_world_, world).z * depth_scale_; }
 
   Projection projection() const { return projection_; }
   /// Origin of the rays in world space; for orthographic cameras, the origin of camera space.
@@ -70,6 +77,22 @@ private:
   DAffine camera_from_world_;
   double depth_scale_; ///< world units per camera unit along camera z
 };
+
+inline CameraRay PrimaryCamera::linear_ray(uint32_t x, uint32_t y) const {
+  const double u = (x + 0.5 + offset_px_.x) / size_.width, v = (y + 0.5 + offset_px_.y) / size_.height;
+  const DVec3 film(window_.x + u * (window_.y - window_.x), window_.w + v * (window_.z - window_.w), 0.0);
+  const bool perspective = projection_ == Projection::kPerspective;
+  const DVec3 origin = perspective ? DVec3(0.0) : film;
+  const DVec3 direction = perspective ? DVec3(film.x, film.y, 1.0) : DVec3(0.0, 0.0, 1.0);
+  return {transform_point(world_from_camera_, origin), glm::normalize(transform_vector(world_from_camera_, direction))};
+}
+
+inline ProjectedPoint PrimaryCamera::linear_projection(DVec3 world) const {
+  const DVec3 c = transform_point(camera_from_world_, world);
+  const glm::dvec2 film = projection_ == Projection::kPerspective ? glm::dvec2(c) / c.z : glm::dvec2(c);
+  const glm::dvec2 uv((film.x - window_.x) / (window_.y - window_.x), (film.y - window_.w) / (window_.z - window_.w));
+  return {uv * glm::dvec2(size_.width, size_.height) - offset_px_, c.z * depth_scale_};
+}
 
 /// A perspective camera that sees the whole box obliquely from above, for scenes without a camera. Works at any scale;
 /// for an empty or point-like box, the distance is 1.

@@ -29,8 +29,8 @@ struct GBuffer {
   std::vector<uint32_t> material;     ///< SceneSource::materials() index
   std::vector<uint8_t> back_face;     ///< 1 where the camera sees the triangle's back (its winding normal points away)
   std::vector<float> offset;          ///< ray-origin offset along the geometric normal, world units (docs/accuracy.md)
-  /// Screen-space motion since the previous frame in pixels (x right, y down), between the two pixel grids, without the
-  /// cameras' shifts: this pixel's centre minus the motion is where the previous frame saw the same surface point.
+  /// Screen-space motion since the previous frame in pixels (x right, y down): this pixel's centre minus the motion is
+  /// where the previous frame saw the same surface point.
   std::vector<Vec2> motion_px;
   /// view_z that the surface point had in the previous frame, 0 where the previous camera cannot project it. Empty if
   /// neither the camera nor the scene moved: the same as view_z.
@@ -58,8 +58,8 @@ struct AoFrame {
   /// A pixel's samples of successive frames are stratified (is_stratified()): their mean errs less than that of
   /// independent samples with the same variance.
   bool stratified = false;
-  /// Longest history in frames, not negative, that a pixel may keep from the frames before, as limit_history() finds it
-  /// where something moved. Empty: no limits.
+  /// Longest history in frames, not negative, that a pixel may keep from the frames before, as history_limits() finds
+  /// it where something moved. Empty: no limits.
   std::vector<float> max_history;
 
   void resize(ImageSize new_size) {

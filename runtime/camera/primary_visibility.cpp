@@ -4,6 +4,7 @@
 #include <limits>
 #include <tuple>
 
+#include "runtime/camera/ray_columns.h"
 #include "runtime/camera/surface_motion.h"
 #include "runtime/camera/tiles.h"
 #include "runtime/trace/ray_offset.h"
@@ -14,18 +15,17 @@ namespace {
 
 constexpr uint32_t kBlock = 4;                  ///< pixels per axis of a block of coherent rays
 constexpr uint32_t kBatch = kTileSize * kBlock; ///< rays per query: a row of blocks, small enough for the level-1 cache
-static_assert(kTileSize % kBlock == 0);
+static_assert(kTileSize % kBlock == 0 && kBatch <= kMaxColumnRays);
 
 /// The rays of a row of blocks. Pixels of a block outside the image get rays that hit nothing (tfar < tnear).
 struct RayBatch {
   uint32_t count = 0;
+  RayColumns columns;
   Ray rays[kBatch];
-  CameraRay exact[kBatch]; ///< the same rays in unit space, in double
-  uint32_t x[kBatch], y[kBatch];
   RayHit hits[kBatch];
+  HitSurface surfaces[kBatch];
   uint32_t hit_count = 0;
-  uint32_t hit_rays[kBatch];   ///< by hit: index of its ray
-  HitSurface surfaces[kBatch]; ///< by hit, as the arrays below
+  uint32_t hit_rays[kBatch]; ///< by hit: index of its ray
   SurfaceQuery places[kBatch];
   SurfaceAttributes attributes[kBatch];
 };
@@ -46,39 +46,95 @@ public:
 
 private:
   void trace_row(uint32_t y0, const Tile& tile, RayBatch& batch) const {
-    batch.count = batch.hit_count = 0;
-    for (uint32_t x = tile.x0; x < tile.x1; x += kBlock)
-      for (uint32_t i = 0; i < kBlock * kBlock; ++i) add_ray(x + i % kBlock, y0 + i / kBlock, tile, batch);
+    make_rays(y0, tile, batch);
     tracer_.closest_hits({batch.rays, batch.count}, kCameraRays, RayOrder::kCoherent, {batch.hits, batch.count});
+    batch.hit_count = 0;
     for (uint32_t i = 0; i < batch.count; ++i) {
-      if (batch.x[i] >= tile.x1 || batch.y[i] >= tile.y1) continue;
-      batch.hits[i].valid() ? add_hit(i, batch) : write_miss(pixel_of(i, batch));
+      if (batch.hits[i].valid())
+        add_hit(i, batch);
+      else
+        fill_in(i, batch.columns);
     }
     source_.look_up({batch.places, batch.hit_count}, {batch.attributes, batch.hit_count});
+    place_hits(batch);
+    for (uint32_t i = 0; i < batch.count; ++i)
+      if (!batch.hits[i].valid() && batch.columns.x[i] < tile.x1 && batch.columns.y[i] < tile.y1)
+        write_miss(pixel_of(i, batch));
     for (uint32_t h = 0; h < batch.hit_count; ++h) write_hit(h, batch);
   }
 
-  /// @param x, y pixel; may lie outside the tile
-  void add_ray(uint32_t x, uint32_t y, const Tile& tile, RayBatch& batch) const {
-    const uint32_t i = batch.count++;
-    batch.x[i] = x, batch.y[i] = y;
-    CameraRay& ray = batch.exact[i] = now_.ray(std::min(x, tile.x1 - 1), std::min(y, tile.y1 - 1));
-    ray.origin = space_.to_unit(ray.origin);
-    const bool traced = approach(ray) && x < tile.x1 && y < tile.y1;
-    batch.rays[i] = {Vec3(ray.origin), 0.0f, Vec3(ray.direction),
-                     traced ? std::numeric_limits<float>::infinity() : -1.0f};
+  void make_rays(uint32_t y0, const Tile& tile, RayBatch& batch) const {
+    RayColumns& c = batch.columns;
+    batch.count = 0;
+    for (uint32_t x = tile.x0; x < tile.x1; x += kBlock)
+      for (uint32_t i = 0; i < kBlock * kBlock; ++i, ++batch.count)
+        c.x[batch.count] = x + i % kBlock, c.y[batch.count] = y0 + i / kBlock;
+    write_rays(now_, space_, batch.count, c);
+    for (uint32_t i = 0; i < batch.count; ++i) {
+      CameraRay ray{c.origin.at(i), c.direction.at(i)};
+      const bool traced = approach(ray) && c.x[i] < tile.x1 && c.y[i] < tile.y1;
+      c.origin.set(i, ray.origin);
+      batch.rays[i] = {Vec3(ray.origin), 0.0f, Vec3(ray.direction),
+                       traced ? std::numeric_limits<float>::infinity() : -1.0f};
+    }
   }
 
   size_t pixel_of(uint32_t i, const RayBatch& batch) const {
-    return static_cast<size_t>(batch.y[i]) * out_.size.width + batch.x[i];
+    return static_cast<size_t>(batch.columns.y[i]) * out_.size.width + batch.columns.x[i];
   }
 
   void add_hit(uint32_t i, RayBatch& batch) const {
+    RayColumns& c = batch.columns;
     const uint32_t h = batch.hit_count++;
     batch.hit_rays[h] = i;
-    batch.surfaces[h] = tracer_.resolve(batch.hits[i]);
-    batch.places[h] = {batch.surfaces[h].placement->instance, batch.surfaces[h].triangle,
-                       Vec2(batch.hits[i].u, batch.hits[i].v)};
+    const HitSurface& hit = batch.surfaces[i] = surface_of(i, h, batch);
+    batch.places[h] = {hit.placement->instance, hit.triangle, Vec2(batch.hits[i].u, batch.hits[i].v)};
+    for (int corner = 0; corner < 3; ++corner)
+      for (int axis = 0; axis < 3; ++axis) c.vertex[corner][axis][i] = hit.vertices[corner][axis];
+    c.u[i] = batch.hits[i].u, c.v[i] = batch.hits[i].v;
+    c.instanced[i] = hit.placement->instanced;
+    c.surface_offset[i] = 0.0;
+  }
+
+  /// Decodes the surface that a ray hit, unless the hit before was on the same triangle.
+  /// @param h number of hits before
+  HitSurface surface_of(uint32_t i, uint32_t h, const RayBatch& batch) const {
+    const RayHit& hit = batch.hits[i];
+    if (h > 0) {
+      const uint32_t last = batch.hit_rays[h - 1];
+      const RayHit& before = batch.hits[last];
+      if (hit.triangle == before.triangle && hit.part == before.part && hit.placement == before.placement)
+        return batch.surfaces[last];
+    }
+    return tracer_.resolve(hit);
+  }
+
+  /// Sets what vectorised loops read of a ray that missed.
+  static void fill_in(uint32_t i, RayColumns& c) {
+    for (int corner = 0; corner < 3; ++corner)
+      for (int axis = 0; axis < 3; ++axis) c.vertex[corner][axis][i] = 0.0f;
+    c.u[i] = c.v[i] = 0.0f;
+    c.instanced[i] = 0;
+    c.surface_offset[i] = 0.0;
+  }
+
+  /// Computes the surface points of all hits.
+  void place_hits(RayBatch& batch) const {
+    RayColumns& c = batch.columns;
+    span_triangles(batch.count, c);
+    for (uint32_t h = 0; h < batch.hit_count; ++h) {
+      const uint32_t i = batch.hit_rays[h];
+      if (c.instanced[i] == 0) continue;
+      const Placement& placement = *batch.surfaces[i].placement;
+      c.own_normal.set(i, placement.surface_normal * c.own_normal.at(i));
+      c.from_barycentrics.set(i, transform_point(placement.unit_from_surface, c.from_barycentrics.at(i)));
+    }
+    meet_planes(batch.count, c);
+    for (uint32_t h = 0; h < batch.hit_count; ++h)
+      if (const uint32_t i = batch.hit_rays[h]; c.instanced[i] != 0)
+        c.surface_offset[i] = surface_offset(batch.surfaces[i], c.point.at(i), c.normal.at(i));
+    place_points(now_, space_, batch.count, c);
+    if (motion_.any()) motion_.move_with_camera(batch.count, c);
   }
 
   /// Moves the origin of a ray that starts far away to just before the scene: floats resolve the scene there, and
@@ -109,64 +165,27 @@ private:
 
   void write_hit(uint32_t h, const RayBatch& batch) const {
     const uint32_t i = batch.hit_rays[h];
-    const CameraRay& ray = batch.exact[i];
-    const HitSurface& hit = batch.surfaces[h];
+    const RayColumns& c = batch.columns;
+    const HitSurface& hit = batch.surfaces[i];
     const SurfaceAttributes& attributes = batch.attributes[h];
-    const Placement& placement = *hit.placement;
-    const Vec2 barycentrics(batch.hits[i].u, batch.hits[i].v);
     const size_t pixel = pixel_of(i, batch);
-    const DVec3 v0(hit.vertices[0]), e1 = DVec3(hit.vertices[1]) - v0, e2 = DVec3(hit.vertices[2]) - v0;
-    const DVec3 cross = glm::cross(e1, e2);
+    const DVec3 facing = c.normal.at(i);
+    const float view_z = std::max(static_cast<float>(c.view_z[i]), std::numeric_limits<float>::denorm_min());
 
-    const bool placed = placement.instanced;
-    const DVec3 own_normal = placed ? placement.surface_normal * cross : cross;
-    const DVec3 facing = facing_normal(own_normal, ray.direction);
-    const DVec3 interpolated = v0 + e1 * double(barycentrics.x) + e2 * double(barycentrics.y);
-    const DVec3 from_barycentrics = placed ? transform_point(placement.unit_from_surface, interpolated) : interpolated;
-    const DVec3 unit_position = on_ray(ray, from_barycentrics, facing);
-    const DVec3 position = space_.from_unit(unit_position);
-
-    out_.view_z[pixel] = std::max(static_cast<float>(now_.view_z(position)), std::numeric_limits<float>::denorm_min());
-    out_.position[pixel] = Vec3(position);
+    out_.view_z[pixel] = view_z;
+    out_.position[pixel] = Vec3(c.position.at(i));
     out_.geometric_normal[pixel] = Vec3(facing);
-    out_.normal[pixel] = shading_normal(attributes, placement, facing);
-    out_.albedo[pixel] = surface_albedo(source_, hit.geometry, hit.triangle, attributes.material, barycentrics);
-    out_.instance[pixel] = placement.instance;
+    out_.normal[pixel] = shading_normal(attributes, *hit.placement, facing);
+    out_.albedo[pixel] = surface_albedo(source_, hit.geometry, hit.triangle, attributes.material, Vec2(c.u[i], c.v[i]));
+    out_.instance[pixel] = hit.placement->instance;
     out_.triangle[pixel] = hit.triangle;
     out_.material[pixel] = attributes.material;
-    out_.back_face[pixel] = glm::dot(own_normal, facing) < 0.0;
-    // Positions are rounded to multiples of the least denormal float, and so are sums of position and offset.
-    constexpr double kMinOffset = 4.0 * double{std::numeric_limits<float>::denorm_min()};
-    out_.offset[pixel] = static_cast<float>(
-        std::max(ray_offset(hit, space_, unit_position, facing) * space_.inverse_scale(), kMinOffset));
-    if (!motion_.any()) {
+    out_.back_face[pixel] = glm::dot(c.own_normal.at(i), facing) < 0.0;
+    out_.offset[pixel] = static_cast<float>(c.offset[i]);
+    if (motion_.any())
+      std::tie(out_.motion_px[pixel], out_.previous_z[pixel]) = motion_.of({batch.hits[i], hit, view_z, i, c});
+    else
       out_.motion_px[pixel] = Vec2(0);
-      return;
-    }
-    const SurfacePoint point{
-        batch.hits[i],     hit, position, unit_position - from_barycentrics, glm::dvec2(batch.x[i], batch.y[i]) + 0.5,
-        out_.view_z[pixel]};
-    std::tie(out_.motion_px[pixel], out_.previous_z[pixel]) = motion_.of(point);
-  }
-
-  /// Returns the intersection of the ray with the surface's plane. Barycentrics are floats: on a large triangle the
-  /// point that they yield is on the plane but off the pixel's ray. Where the ray grazes the plane, or the intersection
-  /// is far from that point, that point is used.
-  static DVec3 on_ray(const CameraRay& ray, DVec3 from_barycentrics, DVec3 normal) {
-    constexpr double kMinCosine = 1e-3, kMaxMove = 0x1p-20 * UnitSpace::kHalfSize;
-    const double cosine = glm::dot(normal, ray.direction);
-    if (!(cosine < -kMinCosine)) return from_barycentrics;
-    const double t = glm::dot(normal, from_barycentrics - ray.origin) / cosine;
-    const DVec3 point = ray.origin + ray.direction * t;
-    const DVec3 move = point - from_barycentrics;
-    return glm::dot(move, move) <= kMaxMove * kMaxMove ? point : from_barycentrics;
-  }
-
-  /// Returns the unit normal that faces the ray's origin; the reversed ray direction if the triangle has no area.
-  static DVec3 facing_normal(DVec3 normal, DVec3 direction) {
-    const double length = glm::length(normal);
-    if (!(length > 0.0)) return -direction;
-    return normal * ((glm::dot(normal, direction) > 0.0 ? -1.0 : 1.0) / length);
   }
 
   static Vec3 shading_normal(const SurfaceAttributes& attributes, const Placement& placement, DVec3 geometric) {

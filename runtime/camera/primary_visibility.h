@@ -28,23 +28,19 @@ public:
 
 /// What motion is measured against. Everything referred to must live until trace_primary() returns.
 struct PreviousFrame {
-  /// The previous frame's camera. If frames are jittered: without its shift, and `now_unshifted` is set.
-  const PrimaryCamera& camera;
+  const PrimaryCamera& camera; ///< the previous frame's
   /// The previous frame's transforms, by instance; empty: no instance moved.
   std::span<const Affine> world_from_object = {};
   const SurfaceHistory* surfaces = nullptr; ///< null: no surface deforms
-  /// The current camera without the shift of its sample positions, so that motion has no part of the shift; null: the
-  /// shifts of both cameras are equal, or the difference is to be part of the motion.
-  const PrimaryCamera* now_unshifted = nullptr;
 };
 
 /// Traces one ray per pixel of now's image and fills every field of the G-buffer, which is resized if needed. Positions
 /// are computed in double from the decoded vertices of the triangle that is hit, so they lie on its plane to within
 /// half an ulp per axis. A surface without vertex normals gets the geometric normal as its shading normal. Motion is
-/// the pixel's centre, or the point's projection by `now_unshifted`, minus the projection by the previous camera of the
-/// place where the same point of the surface was. It is exactly zero for surfaces that did not move under equal
-/// cameras. ray_offset.h describes offset. The result is the same for any number of threads. Throws Error(kCancelled),
-/// and Error(kUsage) for previous transforms that are not one per instance.
+/// the pixel's centre minus the projection by the previous camera of the place where the same point of the surface was.
+/// It is exactly zero for surfaces that did not move under equal cameras. ray_offset.h describes offset. The result is
+/// the same for any number of threads. Throws Error(kCancelled), and Error(kUsage) for previous transforms that are not
+/// one per instance.
 void trace_primary(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
                    const PreviousFrame& previous, GBuffer& gbuffer, Progress& progress);
 

@@ -9,7 +9,7 @@ namespace packtrace {
 SurfaceMotion::SurfaceMotion(const SceneSource& source, const RayTracer& tracer, const PrimaryCamera& now,
                              const PreviousFrame& previous)
     : source_(source), tracer_(tracer), previous_(previous), placed_(tracer.world_from_object()),
-      camera_moved_(!((previous.now_unshifted != nullptr ? *previous.now_unshifted : now) == previous.camera)),
+      camera_moved_(!(now == previous.camera)),
       any_(camera_moved_ || !previous.world_from_object.empty() || previous.surfaces != nullptr) {
   const size_t given = previous.world_from_object.size(), instances = source.instances().size();
   if (given != 0 && given != instances)
@@ -18,14 +18,14 @@ SurfaceMotion::SurfaceMotion(const SceneSource& source, const RayTracer& tracer,
 }
 
 std::pair<Vec2, float> SurfaceMotion::of(const SurfacePoint& point) const {
+  const RayColumns& c = point.columns;
   const std::optional<DVec3> elsewhere = previous_position(point);
   if (!elsewhere && !camera_moved_) return {Vec2(0), point.view_z};
-  const std::optional<ProjectedPoint> before = previous_.camera.project(elsewhere.value_or(point.position));
+  if (!elsewhere)
+    return {Vec2(c.motion_x[point.ray], c.motion_y[point.ray]), static_cast<float>(c.previous_z[point.ray])};
+  const std::optional<ProjectedPoint> before = previous_.camera.project(*elsewhere);
   if (!before) return {Vec2(kNoMotionPx), 0.0f};
-  glm::dvec2 now = point.pixel_centre;
-  if (previous_.now_unshifted != nullptr)
-    if (const std::optional<ProjectedPoint> unshifted = previous_.now_unshifted->project(point.position))
-      now = unshifted->pixel;
+  const glm::dvec2 now = glm::dvec2(c.x[point.ray], c.y[point.ray]) + 0.5;
   return {Vec2(glm::clamp(now - before->pixel, -double(kNoMotionPx), double(kNoMotionPx))),
           static_cast<float>(before->view_z)};
 }
@@ -60,7 +60,8 @@ glm::dvec2 SurfaceMotion::exact_barycentrics(const SurfacePoint& point) const {
     e2 = transform_vector(surface.placement->unit_from_surface, e2);
   }
   const double a = glm::dot(e1, e1), b = glm::dot(e1, e2), c = glm::dot(e2, e2), determinant = a * c - b * b;
-  const double x = glm::dot(e1, point.from_hit), y = glm::dot(e2, point.from_hit);
+  const DVec3 from_hit = point.columns.point.at(point.ray) - point.columns.from_barycentrics.at(point.ray);
+  const double x = glm::dot(e1, from_hit), y = glm::dot(e2, from_hit);
   // For a sliver the correction is as uncertain as the barycentrics.
   constexpr double kMinSine2 = 1e-12;
   if (!(determinant > kMinSine2 * a * c)) return rounded;

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "runtime/camera/primary_visibility.h"
+#include "runtime/camera/ray_columns.h"
 
 namespace packtrace {
 
@@ -10,10 +11,9 @@ namespace packtrace {
 struct SurfacePoint {
   const RayHit& hit;
   const HitSurface& surface;
-  DVec3 position; ///< world space
-  DVec3 from_hit; ///< unit space: the point minus the one that the barycentrics of `hit` yield
-  glm::dvec2 pixel_centre;
   float view_z;
+  uint32_t ray;              ///< in the columns
+  const RayColumns& columns; ///< after SurfaceMotion::move_with_camera()
 };
 
 /// Motion of surface points since the previous frame.
@@ -25,6 +25,11 @@ public:
 
   /// False if nothing moved: motion is zero everywhere.
   bool any() const { return any_; }
+
+  /// Writes the motion of all points as if only the camera had moved.
+  void move_with_camera(uint32_t count, RayColumns& columns) const {
+    if (camera_moved_) packtrace::move_with_camera(previous_.camera, double{kNoMotionPx}, count, columns);
+  }
 
   /// Returns GBuffer::motion_px and GBuffer::previous_z.
   std::pair<Vec2, float> of(const SurfacePoint& point) const;

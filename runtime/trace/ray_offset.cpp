@@ -1,12 +1,7 @@
 #include "runtime/trace/ray_offset.h"
 
-#include <algorithm>
-
 namespace packtrace {
 namespace {
-
-constexpr double kEpsilon = 0x1p-23;
-constexpr double kUlps = 4.0;
 
 DVec3 largest_vertex(const HitSurface& hit) {
   return glm::max(glm::max(glm::abs(DVec3(hit.vertices[0])), glm::abs(DVec3(hit.vertices[1]))),
@@ -15,22 +10,18 @@ DVec3 largest_vertex(const HitSurface& hit) {
 
 } // namespace
 
+double surface_offset(const HitSurface& hit, DVec3 position, DVec3 normal) {
+  const Placement& placement = *hit.placement;
+  const DVec3 moved = placement.moved_linear * glm::abs(position) + placement.moved_offset;
+  const DVec3 in_surface = glm::max(moved, largest_vertex(hit));
+  // An error e in surface coordinates is L e in unit space, and n . L e along the normal. In GLM, normal * L is L^T n.
+  return glm::dot(glm::abs(normal * glm::dmat3(placement.unit_from_surface)), in_surface);
+}
+
 double ray_offset(const HitSurface& hit, const UnitSpace& space, DVec3 position, DVec3 normal) {
-  const DVec3 in_world = glm::abs(space.from_unit(position)) * space.scale();
-  DVec3 magnitude = glm::max(glm::abs(position), in_world);
-  double distance = 0.0;
-  if (!hit.placement->instanced) {
-    magnitude = glm::max(magnitude, largest_vertex(hit));
-  } else {
-    const Placement& placement = *hit.placement;
-    const DVec3 moved = placement.moved_linear * glm::abs(position) + placement.moved_offset;
-    const DVec3 in_surface = glm::max(moved, largest_vertex(hit));
-    // An error e in surface coordinates is L e in unit space, and n . L e along the normal. In GLM, normal * L is L^T
-    // n.
-    distance = glm::dot(glm::abs(normal * glm::dmat3(placement.unit_from_surface)), in_surface);
-  }
-  distance += glm::dot(glm::abs(normal), magnitude);
-  return kEpsilon * (kUlps * distance + std::max({in_world.x, in_world.y, in_world.z}));
+  if (hit.placement->instanced)
+    return ray_offset(DVec3(0.0), surface_offset(hit, position, normal), space, position, normal);
+  return ray_offset(largest_vertex(hit), 0.0, space, position, normal);
 }
 
 } // namespace packtrace

@@ -20,4 +20,18 @@ namespace packtrace {
 /// @param normal unit length, in unit space
 double ray_offset(const HitSurface& hit, const UnitSpace& space, DVec3 position, DVec3 normal);
 
+/// d_surface of a hit on an instanced placement, in unit-space lengths.
+double surface_offset(const HitSurface& hit, DVec3 position, DVec3 normal);
+
+/// The offset from its parts; inline, so that loops over hits can be vectorised.
+/// @param vertices largest absolute coordinates of the triangle's vertices; 0 for instanced placements
+/// @param surface surface_offset(); 0 for other placements
+inline double ray_offset(DVec3 vertices, double surface, const UnitSpace& space, DVec3 position, DVec3 normal) {
+  constexpr double kEpsilon = 0x1p-23, kUlps = 4.0;
+  const DVec3 in_world = glm::abs(space.from_unit(position)) * space.scale();
+  const DVec3 magnitude = glm::max(glm::max(glm::abs(position), in_world), vertices);
+  const double distance = surface + glm::dot(glm::abs(normal), magnitude);
+  return kEpsilon * (kUlps * distance + glm::max(glm::max(in_world.x, in_world.y), in_world.z));
+}
+
 } // namespace packtrace

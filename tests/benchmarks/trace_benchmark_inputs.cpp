@@ -5,6 +5,8 @@
 #include "compress/bake/bake_scene.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/import_scene.h"
+#include "pbrt_import/ply_sequence.h"
+#include "pbrt_import/scene/separate_motion.h"
 #include "tests/temporary_folder.h"
 
 namespace packtrace {
@@ -18,10 +20,25 @@ Scene import(const fs::path& scene_file) {
   return import_scene(scene_file, {}, diagnostics, progress).scene;
 }
 
+const fs::path kMeadow = fs::path(PACKTRACE_SOURCE_DIR) / "assets/meadow/meadow.pbrt";
+
+BakedFile bake_moving_meadow() {
+  Diagnostics diagnostics;
+  Progress progress;
+  ImportResult imported = import_scene(kMeadow, {}, diagnostics, progress);
+  separate_motion(imported.scene);
+  BakeConfig config;
+  for (const char* const level : {"0", "1", "2", "3"})
+    config.sequences.push_back(find_mesh_sequence(imported.scene, imported.files, kMeadow,
+                                                  std::string("geometry/grass_") + level + "_%04d.ply", {}, 12.0));
+  return BakedFile::from_bytes(bake_to_bytes(imported.scene, config, diagnostics, progress).bytes, "meadow");
+}
+
 } // namespace
 
 Scene load_trace_scene(const std::string& name, const TraceInputOptions& options) {
   if (name == "town") return import(fs::path(PACKTRACE_SOURCE_DIR) / "assets/town/town.pbrt");
+  if (name == "meadow") return import(kMeadow);
   if (name == "killeroo") return import(options.scenes / name / "killeroo-simple.pbrt");
   if (name == "house" || name == "spaceship" || name == "bunny") return import(options.scenes / name / "scene.pbrt");
   const TemporaryFolder folder;
@@ -63,6 +80,7 @@ uint64_t TraceInput::placed_triangles() const {
 std::unique_ptr<TraceInput> load_trace_input(const std::string& name, const TraceInputOptions& options) {
   const fs::path path(name);
   const std::string shown = path.has_extension() ? path.stem().string() : name;
+  if (name == "meadow") return std::make_unique<TraceInput>(name, bake_moving_meadow());
   return std::make_unique<TraceInput>(shown, path.extension() == ".ptk"
                                                  ? BakedFile::open(path)
                                                  : bake_trace_scene(load_trace_scene(name, options), name));

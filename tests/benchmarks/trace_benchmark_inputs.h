@@ -38,9 +38,9 @@ Scene load_trace_scene(const std::string& name, const TraceInputOptions& options
 /// Bakes with default options. Throws like bake_to_bytes().
 BakedFile bake_trace_scene(const Scene& scene, const std::string& name);
 
-/// Loads an input by name: house, spaceship, bunny, killeroo, town (in assets), mesh (generated, with mesh_triangles
-/// unique triangles), forest (generated, with forest_instances instances). Any other name is the path of a .ptk or
-/// .pbrt file. Scenes are baked with default options.
+/// Loads an input by name: house, spaceship, bunny, killeroo, town and meadow (in assets; the meadow with all that
+/// moves), mesh (generated, with mesh_triangles unique triangles), forest (generated, with forest_instances instances).
+/// Any other name is the path of a .ptk or .pbrt file. Scenes are baked with default options.
 /// Throws like import_scene(), bake_to_bytes() and BakedFile::open().
 std::unique_ptr<TraceInput> load_trace_input(const std::string& name, const TraceInputOptions& options);
 

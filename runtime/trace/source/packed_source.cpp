@@ -10,14 +10,22 @@
 
 namespace packtrace {
 
-std::optional<Vec3> interpolated_normal(const ClusterView& cluster, uint32_t triangle, Vec2 barycentrics) {
-  if (!cluster.has_normals()) return std::nullopt;
+TriangleNormals::TriangleNormals(const ClusterView& cluster, uint32_t triangle) {
   const Triangle v = cluster.triangle(triangle);
-  const Vec3 n = cluster.normal(v.x) * (1.0f - barycentrics.x - barycentrics.y) + cluster.normal(v.y) * barycentrics.x +
-                 cluster.normal(v.z) * barycentrics.y;
+  for (int corner = 0; corner < 3; ++corner) corners[corner] = cluster.normal(v[corner]);
+}
+
+std::optional<Vec3> TriangleNormals::at(Vec2 barycentrics) const {
+  const Vec3 n =
+      corners[0] * (1.0f - barycentrics.x - barycentrics.y) + corners[1] * barycentrics.x + corners[2] * barycentrics.y;
   const float length = glm::length(n);
   if (!(length > 0.0f)) return std::nullopt; // Opposite vertex normals cancel.
   return n / length;
+}
+
+std::optional<Vec3> interpolated_normal(const ClusterView& cluster, uint32_t triangle, Vec2 barycentrics) {
+  if (!cluster.has_normals()) return std::nullopt;
+  return TriangleNormals(cluster, triangle).at(barycentrics);
 }
 
 Vec2 interpolated_uv(const ClusterView& cluster, uint32_t triangle, Vec2 barycentrics) {

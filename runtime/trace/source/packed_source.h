@@ -9,9 +9,20 @@ namespace packtrace {
 class BakedFile;
 class ClusterView;
 
+/// The decoded vertex normals of a triangle.
+struct TriangleNormals {
+  /// @param triangle number in the cluster, which has normals
+  TriangleNormals(const ClusterView& cluster, uint32_t triangle);
+
+  /// Returns the interpolated normal, unit length; none if the vertex normals cancel.
+  /// @param barycentrics weights of the triangle's second and third vertex
+  std::optional<Vec3> at(Vec2 barycentrics) const;
+
+  Vec3 corners[3];
+};
+
 /// Returns the interpolated vertex normal, unit length; none if the cluster has no normals or they cancel.
-/// @param triangle number in the cluster
-/// @param barycentrics weights of its second and third vertex
+/// @param triangle, barycentrics as in TriangleNormals
 std::optional<Vec3> interpolated_normal(const ClusterView& cluster, uint32_t triangle, Vec2 barycentrics);
 
 /// Returns interpolated texture coordinates; (0,0) if the cluster has none.

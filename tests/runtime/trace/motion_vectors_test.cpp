@@ -216,30 +216,6 @@ TEST(MotionVectors, AreZeroWhereNothingMoves) {
   EXPECT_EQ(unmoved.previous_z, unmoved.view_z);
 }
 
-TEST(MotionVectors, LeaveOutTheShiftOfTheCameras) {
-  const Stage stage;
-  const PrimaryCamera grid(stage.view, kImage), shifted(stage.view, kImage, {0.3, -0.4});
-  const GBuffer g = stage.trace(shifted, {grid, stage.before, nullptr, &grid});
-  for (size_t i = 0; i < kImage.pixels(); ++i)
-    if (g.instance[i] == 0) {
-      EXPECT_EQ(g.motion_px[i], Vec2(0));
-    }
-  // The motion of a surface point does not depend on the shift of the sample that hit it.
-  const Camera other = camera_at({0.4, 5, -12}, {0, 1, 0});
-  const PrimaryCamera before(other, kImage);
-  const GBuffer plain = stage.trace(grid, {before, stage.before});
-  const GBuffer jittered = stage.trace(shifted, {before, stage.before, nullptr, &grid});
-  size_t compared = 0;
-  for (size_t i = 0; i < kImage.pixels(); ++i) {
-    if (plain.instance[i] != jittered.instance[i] || plain.triangle[i] != jittered.triangle[i] ||
-        plain.instance[i] != 0)
-      continue;
-    EXPECT_NEAR(glm::distance(plain.motion_px[i], jittered.motion_px[i]), 0.0f, 0.1f);
-    ++compared;
-  }
-  EXPECT_GT(compared, 5000u);
-}
-
 /// Vertices that all were higher by one in the previous frame.
 class Fallen final : public SurfaceHistory {
 public:

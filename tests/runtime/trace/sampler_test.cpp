@@ -150,6 +150,16 @@ TEST(MultiJitter, BlocksOfPixelsShareASet) {
   }
 }
 
+TEST(PixelSampler, HeightsHaveTheMeanOfACosineInEveryFrame) {
+  for (const SamplerKind kind : kKinds)
+    for (const uint64_t frame : {0u, 3u, 1000u}) {
+      const PixelSampler sampler(kind, 2);
+      double sum = 0.0;
+      for (const Vec2 p : block_points(sampler, 0, 0, 64, frame, 1)) sum += double{cosine_direction(p).z};
+      EXPECT_NEAR(sum / (64 * 64), 2.0 / 3.0, 0.01) << static_cast<int>(kind) << ", frame " << frame;
+    }
+}
+
 TEST(MultiJitter, HeightsHaveTheMeanOfACosine) {
   for (uint32_t side = 1; side <= 8; ++side) {
     const PixelSampler sampler(SamplerKind::kMultiJitter, 1, side);
