@@ -44,8 +44,9 @@ void AdaptiveRate::follow_surfaces(const GBuffer& g) {
   for_pixels(size_.pixels(), [&](size_t i) {
     next_age_[i] = 0;
     if (g.instance[i] == kNoInstance) return;
-    const float x = std::floor(static_cast<float>(i % size_.width) + 0.5f - g.motion_px[i].x);
-    const float y = std::floor(static_cast<float>(i / size_.width) + 0.5f - g.motion_px[i].y);
+    const size_t column = i % size_.width, row = i / size_.width;
+    const float x = std::floor(static_cast<float>(column) + 0.5f - g.motion_px[i].x);
+    const float y = std::floor(static_cast<float>(row) + 0.5f - g.motion_px[i].y);
     if (!(x >= 0.0f && x < width && y >= 0.0f && y < height)) return;
     const size_t from = static_cast<size_t>(y) * size_.width + static_cast<size_t>(x);
     const float z = g.previous_z.empty() ? g.view_z[i] : g.previous_z[i];
@@ -73,11 +74,14 @@ double AdaptiveRate::old_rate(const GBuffer& g, std::array<double, 3>& young) co
   }
 }
 
-SamplePlan AdaptiveRate::next_frame(const GBuffer& g, bool same_pixels, uint32_t spp) {
+SamplePlan AdaptiveRate::next_frame(const GBuffer& g, bool same_pixels, uint32_t spp,
+                                    std::span<const float> max_history) {
   if (g.size != size_ || age_.empty())
     resize(g.size);
   else if (!same_pixels)
     follow_surfaces(g);
+  for (size_t i = 0; i < max_history.size(); ++i)
+    if (max_history[i] < static_cast<float>(age_[i])) age_[i] = static_cast<uint8_t>(max_history[i]);
   std::array<double, 3> young{};
   std::ranges::copy(kMaxRates, young.begin());
   const double old = old_rate(g, young);

@@ -11,7 +11,8 @@
 
 namespace packtrace {
 
-/// Gives more samples to pixels whose surfaces came into view lately, and fewer to the others, so that a frame has as
+/// Gives more samples to pixels whose surfaces came into view or whose occlusion changed lately, and fewer to the
+/// others, so that a frame has as
 /// many rays as with the same number of samples for all pixels. The history of a pixel is that of the nearest pixel of
 /// the previous frame that shows the same instance at the depth where the surface was.
 class AdaptiveRate {
@@ -28,8 +29,10 @@ public:
   /// @param same_pixels each pixel keeps its history, whatever its camera ray hits now: nothing has moved
   /// @param spp mean number of samples per pixel that shows a surface; an upper bound of the frame's mean but for the
   ///        rounding of a dither pattern
+  /// @param max_history AoFrame::max_history: surfaces whose occlusion changes count as younger; empty: none does
   /// @return valid until the next call
-  SamplePlan next_frame(const GBuffer& gbuffer, bool same_pixels, uint32_t spp);
+  SamplePlan next_frame(const GBuffer& gbuffer, bool same_pixels, uint32_t spp,
+                        std::span<const float> max_history = {});
 
   /// Number of frames in which each pixel's surface got samples, up to 255; 0 at misses.
   std::span<const uint8_t> ages() const { return age_; }

@@ -51,8 +51,9 @@ struct MovedOccluder {
 
 class HistoryLimiter {
 public:
-  HistoryLimiter(std::span<const MovedBox> boxes, const GBuffer& g, const AoConfig& config, float radius, AoFrame& ao)
-      : g_(g), curve_(config), radius_(radius), reach_(radius * curve_.end()), ao_(ao) {
+  HistoryLimiter(std::span<const MovedBox> boxes, const GBuffer& g, const AoConfig& config, float radius,
+                 std::vector<float>& limits)
+      : g_(g), curve_(config), radius_(radius), reach_(radius * curve_.end()), limits_(limits) {
     for (const MovedBox& box : boxes)
       if (!box.before.empty() && !box.after.empty())
         occluders_.push_back({Occluder(box.before), Occluder(box.after), box.moved, box.instance});
@@ -142,7 +143,7 @@ private:
         size_t at = 0;
         while (at < count && known[at].first != g_.instance[i]) ++at;
         if (at == count) known[count++] = {g_.instance[i], limit(i, occluders)};
-        ao_.max_history[i] = known[at].second;
+        limits_[i] = known[at].second;
       }
   }
 
@@ -162,7 +163,7 @@ private:
   const VisibilityCurve curve_;
   const float radius_, reach_;
   std::vector<MovedOccluder> occluders_;
-  AoFrame& ao_;
+  std::vector<float>& limits_;
 };
 
 } // namespace
@@ -184,12 +185,11 @@ MovedBox moved_box(uint32_t instance, const Bounds& object_before, const DAffine
   return box;
 }
 
-void limit_history(std::span<const MovedBox> boxes, const GBuffer& gbuffer, const AoConfig& config, float radius,
-                   AoFrame& ao) {
-  ao.max_history.clear();
-  if (boxes.empty()) return;
-  ao.max_history.assign(gbuffer.size.pixels(), kNoLimit);
-  const HistoryLimiter limiter(boxes, gbuffer, config, radius, ao);
+std::vector<float> history_limits(std::span<const MovedBox> boxes, const GBuffer& gbuffer, const AoConfig& config,
+                                  float radius) {
+  if (boxes.empty()) return {};
+  std::vector<float> limits(gbuffer.size.pixels(), kNoLimit);
+  const HistoryLimiter limiter(boxes, gbuffer, config, radius, limits);
   const uint32_t columns = (gbuffer.size.width + kTile - 1) / kTile, rows = (gbuffer.size.height + kTile - 1) / kTile;
   tbb::parallel_for(tbb::blocked_range2d<uint32_t>(0, rows, 1, 0, columns, 1),
                     [&](const tbb::blocked_range2d<uint32_t>& range) {
@@ -197,6 +197,7 @@ void limit_history(std::span<const MovedBox> boxes, const GBuffer& gbuffer, cons
                         for (uint32_t x = range.cols().begin(); x < range.cols().end(); ++x)
                           limiter.limit_tile(x * kTile, y * kTile);
                     });
+  return limits;
 }
 
 } // namespace packtrace

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "pbrt_import/scene/bounds.h"
 #include "runtime/ao/ao_config.h"
@@ -19,7 +20,7 @@ struct MovedBox {
 MovedBox moved_box(uint32_t instance, const Bounds& object_before, const DAffine& world_before,
                    const Bounds& object_after, const DAffine& world_after);
 
-/// Sets AoFrame::max_history where occlusion may have changed because something moved.
+/// Finds AoFrame::max_history: limits where occlusion may have changed because something moved.
 ///
 /// A box is seen from a surface point with about the form factor F of a disc of its projected area,
 ///   F = occlusion(d) cos A / (A + pi d^2),
@@ -30,8 +31,8 @@ MovedBox moved_box(uint32_t instance, const Bounds& object_before, const DAffine
 /// is a hundredth. What walls hide from a point counts, too. The surfaces of what moved are not limited by their own
 /// box.
 /// @param radius the AO radius in world units: ao_radius()
-/// @param ao max_history gets one entry per pixel, or none if there are no boxes
-void limit_history(std::span<const MovedBox> boxes, const GBuffer& gbuffer, const AoConfig& config, float radius,
-                   AoFrame& ao);
+/// @return one entry per pixel, or none if there are no boxes
+std::vector<float> history_limits(std::span<const MovedBox> boxes, const GBuffer& gbuffer, const AoConfig& config,
+                                  float radius);
 
 } // namespace packtrace

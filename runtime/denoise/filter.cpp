@@ -1,8 +1,11 @@
 #include "runtime/denoise/filter.h"
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
 #include <vector>
 
+#include <tbb/cache_aligned_allocator.h>
 #include <tbb/enumerable_thread_specific.h>
 
 #include "runtime/denoise/fill.h"
@@ -21,31 +24,37 @@ struct Tile {
   int height;   ///< of the image
 };
 
-/// Some rows of a tile, in turn; the others share one row of zeros. Columns [-kRowPadding, width + kRowPadding)
-/// exist, and those outside the tile are zero.
+/// Some rows of a tile, in turn, and one for what is outside the image. Columns [-kRowPadding, width + kRowPadding)
+/// exist; those outside the tile keep the value of the outside.
 template <typename T>
 class RowRing {
 public:
   /// @param rows number of rows to keep, a power of two
-  RowRing(int width, int rows)
-      : mask_(rows - 1), stride_(static_cast<size_t>(width) + 2 * kRowPadding),
-        data_(static_cast<size_t>(rows + 1) * stride_) {}
+  RowRing(int width, int rows, T outside = T{})
+      : mask_(rows - 1), stride_(stride_of(static_cast<size_t>(width) + 2 * kRowPadding)),
+        data_(static_cast<size_t>(rows + 1) * stride_, outside) {}
 
   T* row(int y) { return data_.data() + static_cast<size_t>(y & mask_) * stride_ + kRowPadding; }
-  const T* zeros() const { return data_.data() + static_cast<size_t>(mask_ + 1) * stride_ + kRowPadding; }
+  const T* outside() const { return data_.data() + static_cast<size_t>(mask_ + 1) * stride_ + kRowPadding; }
 
 private:
+  /// An odd number of cache lines, so that the same pixels of many rows do not compete for the same places of a cache.
+  static size_t stride_of(size_t entries) {
+    constexpr size_t kLine = 64 / sizeof(T);
+    return ((entries + kLine - 1) / kLine | 1) * kLine;
+  }
+
   int mask_;
   size_t stride_;
-  std::vector<T> data_;
+  std::vector<T, tbb::cache_aligned_allocator<T>> data_;
 };
 
-/// Rows of a tile of AO with variances, computed in ascending order.
+/// Rows of a tile of AO with precisions, computed in ascending order.
 class RowSource {
 public:
   /// @param kept number of rows that can be read at the same time, a power of two
   RowSource(const Tile& tile, int kept)
-      : x_(tile.x), width_(tile.width), height_(tile.height), value_(width_, kept), variance_(width_, kept) {}
+      : x_(tile.x), width_(tile.width), height_(tile.height), value_(width_, kept), precision_(width_, kept) {}
   virtual ~RowSource() = default;
 
   /// Starts anew: rows from `first` on will be required.
@@ -54,8 +63,8 @@ public:
   void require(int y) {
     for (; next_ <= std::min(y, height_ - 1); ++next_) produce(next_);
   }
-  const float* value(int y) { return inside(y) ? value_.row(y) : value_.zeros(); }
-  const float* variance(int y) { return inside(y) ? variance_.row(y) : variance_.zeros(); }
+  const int16_t* value(int y) { return inside(y) ? value_.row(y) : value_.outside(); }
+  const uint16_t* precision(int y) { return inside(y) ? precision_.row(y) : precision_.outside(); }
 
 protected:
   virtual void produce(int y) = 0;
@@ -63,12 +72,24 @@ protected:
 
   int x_, width_, height_;
   int next_ = 0;
-  RowRing<float> value_, variance_;
+  RowRing<int16_t> value_;
+  RowRing<uint16_t> precision_;
 };
+
+PatchTerms patch_terms(const FluxConfig& config) {
+  const double limit = 9.0 * config.patch_limit * kDistanceUnits;
+  PatchTerms t;
+  t.no_distance = static_cast<uint16_t>(std::lround(kDistanceUnits / config.noise_tolerance));
+  t.shift = std::countl_zero(static_cast<uint16_t>(limit));
+  t.limit = static_cast<uint16_t>(std::ldexp(limit, t.shift));
+  t.stretch = static_cast<uint16_t>(65536.0 * (65535.0 / t.limit - 1.0));
+  return t;
+}
 
 VarianceTerms variance_terms(const FluxConfig& config, const FilterInput& input) {
   VarianceTerms t;
-  t.prior = config.variance_prior, t.distrust = config.variance_distrust, t.ratio_prior = config.ratio_prior;
+  t.tolerance = config.noise_tolerance, t.prior = config.variance_prior, t.distrust = config.variance_distrust,
+  t.ratio_prior = config.ratio_prior;
   t.longest_moving = static_cast<float>(config.max_tspp_moving), t.moving = input.moving;
   t.stratified = input.stratified;
   if (t.stratified)
@@ -82,15 +103,16 @@ VarianceTerms variance_terms(const FluxConfig& config, const FilterInput& input)
 class HistoryRows final : public RowSource {
 public:
   static constexpr int kRadius = kMomentWindow / 2;
-  static constexpr size_t kMoments = 7;
+  static constexpr size_t kMoments = 5;
 
   HistoryRows(const Tile& tile, int kept, const FilterKernels& kernels, const FluxConfig& config)
-      : RowSource(tile, kept), kernels_(kernels), config_(config), estimate_(width_, 1),
+      : RowSource(tile, kept), kernels_(kernels), config_(config), lone_(width_, kept), estimate_(width_, 1),
         sums_(kMoments, RowRing<float>(width_, 8)), scratch_(kMoments, RowRing<float>(width_, 1)) {}
 
-  /// The estimated variance of the means of pixels [begin, end) of the tile's rows [first, last) goes to `variance`.
-  void write_variance(std::span<float> variance, int begin, int end, int first, int last) {
-    written_ = variance, begin_written_ = begin, end_written_ = end, first_written_ = first, last_written_ = last;
+  /// Pixels [begin, end) of the tile's rows [first, last) write the estimated variance of their means to `output`, and,
+  /// if they have no sample, their AO.
+  void write(const FilterOutput& output, int begin, int end, int first, int last) {
+    output_ = &output, begin_written_ = begin, end_written_ = end, first_written_ = first, last_written_ = last;
   }
 
   void begin(const FilterInput& input, int first) override {
@@ -100,33 +122,43 @@ public:
     next_sum_ = next_ - kRadius;
   }
 
+  /// FirstRow::lone of a row inside the tile.
+  const uint16_t* lone(int y) { return lone_.row(y); }
+
 private:
   void produce(int y) override {
     for (; next_sum_ <= y + kRadius; ++next_sum_) sum(next_sum_);
     MomentWindow window;
     for (int r = -kRadius; r <= kRadius; ++r) window[static_cast<size_t>(r + kRadius)] = moments(sums_, y + r);
     const History& h = input_->history;
-    kernels_.variance(width_, h.mean.row(y) + x_, h.square.row(y) + x_, h.samples.row(y) + x_, window, terms_,
-                      estimate_.row(0), variance_.row(y));
-    std::copy_n(h.mean.row(y) + x_, width_, value_.row(y));
+    kernels_.variance(
+        width_, {h.mean.row(y) + x_, h.square.row(y) + x_, h.samples.row(y) + x_, input_->guides.disparity.row(y) + x_},
+        window, terms_, estimate_.row(0), {value_.row(y), precision_.row(y), lone_.row(y)});
     fill(y);
     if (y >= first_written_ && y < last_written_)
-      std::copy(
-          estimate_.row(0) + begin_written_, estimate_.row(0) + end_written_,
-          &written_[static_cast<size_t>(y) * input_->guides.size.width + static_cast<size_t>(x_ + begin_written_)]);
+      std::copy(estimate_.row(0) + begin_written_, estimate_.row(0) + end_written_,
+                &output_->variance[output_index(begin_written_, y)]);
+  }
+
+  size_t output_index(int x, int y) const {
+    return static_cast<size_t>(y) * input_->guides.size.width + static_cast<size_t>(x_ + x);
   }
 
   void fill(int y) {
     const float *disparity = input_->guides.disparity.row(y) + x_, *samples = input_->history.samples.row(y) + x_;
     if (!kernels_.any_to_fill(width_, disparity, samples)) return;
-    float* value = value_.row(y);
-    for (int x = 0; x < width_; ++x)
-      if (disparity[x] > 0.0f && !(samples[x] > 0.0f)) value[x] = filled_value(*input_, x_ + x, y);
+    int16_t* value = value_.row(y);
+    const bool written = y >= first_written_ && y < last_written_;
+    for (int x = 0; x < width_; ++x) {
+      if (!(disparity[x] > 0.0f) || samples[x] > 0.0f) continue;
+      const float filled = filled_value(*input_, x_ + x, y);
+      value[x] = in_ao_units(filled);
+      if (written && x >= begin_written_ && x < end_written_) output_->ao[output_index(x, y)] = filled;
+    }
   }
 
   static MomentRows moments(std::vector<RowRing<float>>& rings, int y) {
-    return {rings[0].row(y), rings[1].row(y), rings[2].row(y), rings[3].row(y),
-            rings[4].row(y), rings[5].row(y), rings[6].row(y)};
+    return {rings[0].row(y), rings[1].row(y), rings[2].row(y), rings[3].row(y), rings[4].row(y)};
   }
 
   void sum(int y) {
@@ -144,8 +176,9 @@ private:
   const FluxConfig& config_;
   VarianceTerms terms_;
   const FilterInput* input_ = nullptr;
-  std::span<float> written_;
+  const FilterOutput* output_ = nullptr;
   int begin_written_ = 0, end_written_ = 0, first_written_ = 0, last_written_ = 0;
+  RowRing<uint16_t> lone_;
   RowRing<float> estimate_;
   std::vector<RowRing<float>> sums_, scratch_;
   int next_sum_ = 0;
@@ -155,13 +188,14 @@ private:
 class PassRowsSource final : public RowSource {
 public:
   /// @param step index of PairGuides::kSteps
-  /// @param lone lone samples give way, in the first pass
-  PassRowsSource(const Tile& tile, int kept, RowSource& source, size_t step, bool lone, const FilterKernels& kernels,
-                 const FluxConfig& config)
-      : RowSource(tile, kept), kernels_(kernels), config_(config), source_(source), step_index_(step),
-        step_(PairGuides::kSteps[step]), lone_(lone), scale_(width_, 4 * step_), column_(width_, 1),
-        distance_(kPairOffsets.size(), RowRing<float>(width_, 4)),
-        weights_(kPairOffsets.size(), RowRing<uint8_t>(width_, 4 * step_)) {}
+  /// @param first of the first pass, in which lone samples give way: the source; else null
+  PassRowsSource(const Tile& tile, int kept, RowSource& source, size_t step, HistoryRows* first,
+                 const FilterKernels& kernels, const FluxConfig& config)
+      : RowSource(tile, kept), kernels_(kernels), terms_(patch_terms(config)), source_(source), first_(first),
+        step_index_(step), step_(PairGuides::kSteps[step]), scale_(width_, 4 * step_),
+        columns_(kPairOffsets.size(), RowRing<uint16_t>(width_, 1)),
+        distance_(kPairOffsets.size(), RowRing<uint16_t>(width_, 4, terms_.no_distance)),
+        weights_(kPairOffsets.size(), RowRing<uint16_t>(width_, 4 * step_)) {}
 
   void begin(const FilterInput& input, int first) override {
     input_ = &input;
@@ -175,58 +209,55 @@ public:
 private:
   void produce(int y) override {
     for (; next_weights_ <= std::min(y + step_, height_ - 1); ++next_weights_) weigh(next_weights_);
-    const auto scale = [&](int row) { return inside(row) ? scale_.row(row) : scale_.zeros(); };
-    const PassRows rows{source_.value(y),
-                        source_.value(y - step_),
-                        source_.value(y + step_),
-                        source_.variance(y),
-                        source_.variance(y - step_),
-                        source_.variance(y + step_),
-                        scale(y),
-                        scale(y - step_),
-                        scale(y + step_),
-                        pairs(y),
+    const auto scale = [&](int row) { return inside(row) ? scale_.row(row) : scale_.outside(); };
+    const PassRows rows{source_.value(y), source_.value(y - step_), source_.value(y + step_), source_.precision(y),
+                        scale(y),         scale(y - step_),         scale(y + step_),         pairs(y),
                         pairs(y - step_)};
-    kernels_.exchange(width_, step_, rows, value_.row(y), variance_.row(y));
+    (first_ != nullptr ? kernels_.exchange_first : kernels_.exchange)(width_, step_, rows, value_.row(y),
+                                                                      precision_.row(y));
   }
 
   void weigh(int y) {
     source_.require(y + 1 + step_);
     for (; next_distance_ <= std::min(y + 1, height_ - 1); ++next_distance_) compare(next_distance_);
     const PairRow guides = input_->pair_guides.row(step_index_, x_, y);
-    for (size_t d = 0; d < kPairOffsets.size(); ++d) {
-      const auto distance = [&](int row) { return inside(row) ? distance_[d].row(row) : distance_[d].zeros(); };
-      kernels_.weigh(width_, {distance(y - 1), distance(y), distance(y + 1)}, guides[d], config_.patch_limit,
-                     column_.row(0), weights_[d].row(y));
-    }
-    kernels_.normalise(width_, step_, pairs(y), pairs(y - step_), lone_ ? input_->history.samples.row(y) + x_ : nullptr,
-                       scale_.row(y));
+    const auto distance = [&](size_t d, int row) {
+      return inside(row) ? distance_[d].row(row) : distance_[d].outside();
+    };
+    std::array<DistanceRows, 4> distances;
+    std::array<uint16_t*, 4> columns, weights;
+    for (size_t d = 0; d < distances.size(); ++d)
+      distances[d] = {distance(d, y - 1), distance(d, y), distance(d, y + 1)}, columns[d] = columns_[d].row(0),
+      weights[d] = weights_[d].row(y);
+    kernels_.weigh(width_, distances, guides, input_->pair_guides.stride(), terms_, columns, weights);
+    if (first_ != nullptr)
+      kernels_.normalise_first(width_, step_, pairs(y), pairs(y - step_), first_->lone(y), scale_.row(y));
+    else
+      kernels_.normalise(width_, step_, pairs(y), pairs(y - step_), scale_.row(y));
   }
 
   void compare(int y) {
-    kernels_.compare(width_, step_, {source_.value(y), source_.variance(y)},
-                     {source_.value(y + step_), source_.variance(y + step_)},
-                     input_->pair_guides.row(step_index_, x_, y), config_.noise_tolerance,
+    kernels_.compare(width_, step_, {source_.value(y), source_.precision(y)},
+                     {source_.value(y + step_), source_.precision(y + step_)}, terms_.no_distance,
                      {distance_[0].row(y), distance_[1].row(y), distance_[2].row(y), distance_[3].row(y)});
   }
 
-  PairRow pairs(int y) {
-    PairRow rows;
+  WeightRow pairs(int y) {
+    WeightRow rows;
     for (size_t d = 0; d < rows.size(); ++d)
-      rows[d] = y >= first_weights_ && inside(y) ? weights_[d].row(y) : weights_[d].zeros();
+      rows[d] = y >= first_weights_ && inside(y) ? weights_[d].row(y) : weights_[d].outside();
     return rows;
   }
 
   const FilterKernels& kernels_;
-  const FluxConfig& config_;
+  const PatchTerms terms_;
   RowSource& source_;
+  HistoryRows* const first_;
   const size_t step_index_;
   const int step_;
-  const bool lone_;
   const FilterInput* input_ = nullptr;
-  RowRing<float> scale_, column_;
-  std::vector<RowRing<float>> distance_;
-  std::vector<RowRing<uint8_t>> weights_;
+  RowRing<uint16_t> scale_;
+  std::vector<RowRing<uint16_t>> columns_, distance_, weights_;
   int next_weights_ = 0, next_distance_ = 0, first_weights_ = 0;
 };
 
@@ -244,7 +275,8 @@ public:
     RowSource* source = &history_;
     for (uint32_t i = 0; i < config.passes; ++i) {
       const int kept = i + 1 < config.passes ? kept_for(kPasses[i + 1]) : 1;
-      passes_.push_back(std::make_unique<PassRowsSource>(tile, kept, *source, kPasses[i], i == 0, kernels, config));
+      passes_.push_back(std::make_unique<PassRowsSource>(tile, kept, *source, kPasses[i], i == 0 ? &history_ : nullptr,
+                                                         kernels, config));
       source = passes_.back().get();
     }
     result_ = source;
@@ -253,12 +285,13 @@ public:
   /// Filters pixels [begin, end) of rows [first, last) of the image.
   void run(const FilterInput& input, const FilterOutput& output, int begin, int end, int first, int last) {
     result_->begin(input, first);
-    history_.write_variance(output.variance, begin - tile_.x, end - tile_.x, first, last);
+    history_.write(output, begin - tile_.x, end - tile_.x, first, last);
     for (int y = first; y < last; ++y) {
       result_->require(y);
       const size_t at = static_cast<size_t>(y) * input.guides.size.width + static_cast<size_t>(begin);
-      kernels_.finish(end - begin, result_->value(y) + (begin - tile_.x), input.guides.disparity.row(y) + begin,
-                      input.history.samples.row(y) + begin, &output.ao[at], &output.tspp[at]);
+      kernels_.finish(end - begin, result_->value(y) + (begin - tile_.x), input.history.mean.row(y) + begin,
+                      input.guides.disparity.row(y) + begin, input.history.samples.row(y) + begin, &output.ao[at],
+                      &output.tspp[at]);
     }
   }
 

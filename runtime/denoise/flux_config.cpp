@@ -30,7 +30,7 @@ constexpr Setting<FluxConfig> kFluxSettings[] = {
     {{"guide_slope", "The same in units of the disparity's change along the offset", 0, 10}, &F::guide_slope},
     {{"noise_tolerance", "Differences of patches count as noise up to this many times its variance", 0.1, 100},
      &F::noise_tolerance},
-    {{"patch_limit", "Mean distance of patches at which pixels do not mix", 0.1, 100}, &F::patch_limit},
+    {{"patch_limit", "Mean distance of patches at which pixels do not mix", 0.1, 25}, &F::patch_limit},
     {{"variance_prior", "Weight of the variance around a pixel against its own, in frames", 0.1, 1000},
      &F::variance_prior},
     {{"variance_distrust", "The variance of n frames is multiplied by 1 + this / n^2", 0, 1000}, &F::variance_distrust},

@@ -34,15 +34,15 @@ struct FluxConfig {
   float change_response = 10.0f;
 
   /// Reprojection rejects history whose disparity (1 / depth) differs by more than twice the tolerance
-  /// reprojection_depth * disparity ... [0..1]
-  float reprojection_depth = 0.02f;
+  /// reprojection_depth * disparity, four times that where GBuffer::previous_z is unknown ... [0..1]
+  float reprojection_depth = 0.005f;
 
   /// ... + reprojection_slope * disparity change per pixel. [0..10]
   float reprojection_slope = 1.0f;
 
   /// Reprojection weight: exponent of saturate(1.1 cos a), where a is the angle between the current and the previous
   /// normal. Power of two. [1..1024]
-  uint32_t reprojection_normal_power = 32;
+  uint32_t reprojection_normal_power = 4;
 
   /// Reject history from another instance.
   bool reprojection_instance_test = true;
@@ -60,7 +60,7 @@ struct FluxConfig {
   /// Differences of patches count as noise up to this many times its variance. [0.1..100]
   float noise_tolerance = 2.0f;
 
-  /// Mean distance of patches at which pixels exchange nothing. [0.1..100]
+  /// Mean distance of patches at which pixels exchange nothing. Distances of pixels count up to about 25. [0.1..25]
   float patch_limit = 4.0f;
 
   /// Weight of the variance around a pixel against its own, in frames. [0.1..1000]

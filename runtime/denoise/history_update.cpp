@@ -1,7 +1,6 @@
 #include "runtime/denoise/history_update.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -32,7 +31,7 @@ private:
 class HistoryStrip {
 public:
   HistoryStrip(ImageSize size, const HistoryKernels& kernels, const FluxConfig& config)
-      : kernels_(kernels), config_(config), width_(static_cast<int>(size.width)), reprojection_(size, config, kernels),
+      : kernels_(kernels), width_(static_cast<int>(size.width)), reprojection_(size, config, kernels),
         statistics_(size.width, config.window, kernels), samples_(size, 1), discarded_(4 * size_t{size.width}),
         limited_(size.width) {
     const float share = 1.0f / static_cast<float>(config.fast_frames);
@@ -49,7 +48,9 @@ public:
   /// Adds row y's samples to the history.
   void add(const HistoryInput& input, History& history, int y) {
     accumulate(input, history, y, row_of(history, y), samples_.row(0));
-    if (input.motion != nullptr) keep_trends(*input.motion, history, y);
+    if (input.motion != nullptr)
+      kernels_.keep_trends(width_, &input.motion->motion_px[static_cast<size_t>(y) * static_cast<size_t>(width_)].x,
+                           history.samples.row(y), input.motion->previous.history.trend.row(y), history.trend.row(y));
     update_trends(samples_.row(0).valid, history.mean.row(y), history.samples.row(y), input.longest,
                   history.trend.row(y));
   }
@@ -93,31 +94,15 @@ private:
                         input.guides.disparity.row(y), {input.longest, terms_.fast_frames}, past, out, samples);
   }
 
-  /// Pixels that did not move keep their trends.
-  void keep_trends(const MotionFrame& frame, History& history, int y) const {
-    const Vec2* motion = &frame.motion_px[static_cast<size_t>(y) * static_cast<size_t>(width_)];
-    const uint32_t* before = frame.previous.history.trend.row(y);
-    const float* samples = history.samples.row(y);
-    uint32_t* trend = history.trend.row(y);
-    for (int x = 0; x < width_; ++x) {
-      const bool still = (std::abs(motion[x].x) <= kStillMotion) & (std::abs(motion[x].y) <= kStillMotion);
-      trend[x] = still & (samples[x] > 1.0f) ? before[x] : 0u; // a first sample has no history
-    }
-  }
-
   void update_trends(const float* valid, const float* mean, const float* samples, float longest,
                      uint32_t* trend) const {
-    int crossings = 0;
-    for (int x = 0; x < width_; ++x)
-      crossings += (valid[x] > 0.0f) & (samples[x] < longest) & crosses_power_of_two(samples[x]) ? 1 : 0;
-    if (crossings == 0) return;
+    if (!kernels_.any_crosses(width_, valid, samples, longest)) return;
     for (int x = 0; x < width_; ++x)
       if (valid[x] > 0.0f && samples[x] < longest && crosses_power_of_two(samples[x]))
         trend[x] = next_trend(trend[x], mean[x], samples[x]);
   }
 
   const HistoryKernels& kernels_;
-  const FluxConfig& config_;
   int width_;
   ReprojectionRows reprojection_;
   LocalStatisticsRows statistics_;

@@ -22,6 +22,8 @@ public:
     const Step& s = steps_[step];
     return {s[0].row(y) + x, s[1].row(y) + x, s[2].row(y) + x, s[3].row(y) + x};
   }
+  /// From a row to the next one.
+  ptrdiff_t stride() const { return steps_[0][0].stride(); }
   size_t bytes() const { return kSteps.size() * kPairOffsets.size() * steps_[0][0].bytes(); }
 
 private:

@@ -4,6 +4,13 @@
 #include <bit>
 
 namespace packtrace {
+namespace {
+
+/// Factor of reprojection_depth where the depths of the surfaces in the previous frame are unknown: the camera or the
+/// surfaces may have come nearer.
+constexpr float kUnknownDepthFactor = 4.0f;
+
+} // namespace
 
 ReprojectionRows::ReprojectionRows(ImageSize size, const FluxConfig& config, const HistoryKernels& kernels)
     : config_(config), kernels_(kernels), width_(static_cast<int>(size.width)) {
@@ -20,7 +27,7 @@ HistoryRow ReprojectionRows::at(const MotionFrame& frame, int y) {
   const Guides &now = frame.guides, &then = frame.previous.guides;
   const History& history = frame.previous.history;
   const size_t begin = static_cast<size_t>(y) * static_cast<size_t>(width_);
-  const LocateTerms terms{config_.reprojection_depth,
+  const LocateTerms terms{config_.reprojection_depth * (frame.previous_z.empty() ? kUnknownDepthFactor : 1.0f),
                           config_.reprojection_slope,
                           static_cast<float>(y),
                           static_cast<float>(width_),

@@ -8,7 +8,6 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
-#include <tbb/global_control.h>
 
 #include "pbrt_import/scene/world_view.h"
 #include "runtime/frame/camera_path.h"
@@ -141,30 +140,18 @@ std::string moving_errors(const Bench& bench, const Mode& mode, double degrees, 
                      rays / hits);
 }
 
-/// Medians of the CPU time of a frame's occlusion rays, of all modes in turn.
+/// Medians of the CPU time of a frame's occlusion rays in milliseconds, of all modes in turn.
 std::vector<double> times(const Bench& bench, const std::vector<Mode>& modes, uint32_t repeats) {
-  const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
-  std::vector<std::vector<double>> samples(modes.size());
   std::vector<std::unique_ptr<FrameLoop>> loops;
+  std::vector<std::function<void()>> frames;
+  Progress unseen;
   for (const Mode& mode : modes) {
     FrameConfig config = bench.config(mode);
     config.denoise = false; // so that a still frame is little but occlusion rays
-    loops.push_back(std::make_unique<FrameLoop>(bench.scene(), config));
+    FrameLoop& loop = *loops.emplace_back(std::make_unique<FrameLoop>(bench.scene(), config));
+    frames.emplace_back([&bench, &loop, &unseen] { loop.next_frame(bench.camera(0, 0.0), 0.0, unseen); });
   }
-  Progress unseen;
-  for (uint32_t repeat = 0; repeat < repeats + 2; ++repeat)
-    for (size_t i = 0; i < modes.size(); ++i) {
-      const double before = thread_cpu_seconds();
-      loops[i]->next_frame(bench.camera(0, 0.0), 0.0, unseen);
-      if (repeat >= 2) samples[i].push_back((thread_cpu_seconds() - before) * 1e3);
-    }
-  std::vector<double> medians;
-  for (std::vector<double>& s : samples) {
-    const auto middle = s.begin() + static_cast<ptrdiff_t>(s.size() / 2);
-    std::nth_element(s.begin(), middle, s.end());
-    medians.push_back(*middle);
-  }
-  return medians;
+  return median_cpu_ms(frames, repeats);
 }
 
 void compare(const std::string& file, const Options& options) {

@@ -2,6 +2,7 @@
 // what remains of an occluder that is gone, and flicker.
 
 #include <algorithm>
+#include <cstdio>
 #include <optional>
 
 #include <CLI/CLI.hpp>
@@ -9,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/benchmarks/benchmark_main.h"
+#include "tests/benchmarks/denoiser_cost.h"
 #include "tests/benchmarks/denoiser_scores.h"
 #include "tests/benchmarks/denoiser_sequence.h"
 
@@ -38,25 +40,47 @@ void print(const SequenceScore& s, const SequenceScore& first) {
              s.flicker, s.add_frame_ms, s.denoise_ms);
 }
 
+/// Sizes as WIDTHxHEIGHT.
+std::vector<ImageSize> sizes_of(const std::vector<std::string>& texts) {
+  std::vector<ImageSize> sizes;
+  for (const std::string& text : texts) {
+    ImageSize size;
+    char end = 0;
+    if (std::sscanf(text.c_str(), "%ux%u%c", &size.width, &size.height, &end) != 2 || size.pixels() == 0)
+      throw Error(ErrorKind::kUsage, "--cost " + text + ": must be WIDTHxHEIGHT");
+    sizes.push_back(size);
+  }
+  return sizes;
+}
+
+/// The costs of those denoisers that are one.
+std::string costs(const std::vector<std::string>& denoisers, const DenoiserConfig& config,
+                  const std::vector<ImageSize>& sizes) {
+  std::vector<std::pair<std::string, DenoiserConfig>> presets;
+  for (const std::string& name : denoisers)
+    if (const auto preset = preset_of(name, config)) presets.emplace_back(name, *preset);
+  return sizes.empty() ? "" : cost_table(presets, sizes);
+}
+
 SequenceKind kind_of(const std::string& name) {
   const auto* const found = std::ranges::find(kSequenceKindNames, name);
   if (found == std::end(kSequenceKindNames))
-    throw Error(ErrorKind::kUsage, "--motion " + name + ": must be still, jittered, orbit or occluder");
+    throw Error(ErrorKind::kUsage, "--motion " + name + ": must be still, jittered, orbit, occluder or animated");
   return static_cast<SequenceKind>(found - std::begin(kSequenceKindNames));
 }
 
 int run(int argc, char** argv) {
   std::vector<std::string> scenes{"house"}, motions{"still", "jittered", "orbit"}, framed, settings;
-  std::vector<std::string> denoisers{"off", "history", "ours"};
+  std::vector<std::string> denoisers{"off", "history", "ours"}, cost_sizes;
   std::filesystem::path json_file, csv_file, markdown_file;
   TraceInputOptions inputs;
   SequenceOptions options;
   CLI::App app("Quality of denoisers against the ground truth");
-  app.add_option("scenes", scenes, "house, spaceship, killeroo, bunny, town, or .ptk and .pbrt files")
+  app.add_option("scenes", scenes, "house, spaceship, killeroo, bunny, town, meadow, or .ptk and .pbrt files")
       ->capture_default_str();
   app.add_option("--scenes", inputs.scenes, "Folder of house, spaceship, killeroo and bunny")
       ->envname("PACKTRACE_SCENES");
-  app.add_option("--motion", motions, "still, jittered, orbit and occluder")->capture_default_str();
+  app.add_option("--motion", motions, "still, jittered, orbit, occluder and animated")->capture_default_str();
   app.add_option("--framed", framed, "Scenes of which the whole is shown instead of the view of their first camera");
   app.add_option("--frames", options.frames, "Frames of a sequence")->capture_default_str();
   app.add_option("--width", options.size.width)->capture_default_str();
@@ -68,6 +92,8 @@ int run(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--denoiser-set", settings, "Change settings of ours, or of reference without ours and history")
       ->type_name("NAME=VALUE");
+  app.add_option("--cost", cost_sizes, "Also time the denoisers on a synthetic room of these sizes")
+      ->type_name("WIDTHxHEIGHT");
   app.add_option("--json", json_file, "Also write the figures to this file");
   app.add_option("--csv", csv_file, "Also write the figures to this file, one a line");
   app.add_option("--markdown", markdown_file, "Also write a table to this file");
@@ -77,6 +103,7 @@ int run(int argc, char** argv) {
     config.kind = DenoiserKind::kReference;
   for (const std::string& setting : settings) config.set(setting);
   config.validate();
+  const std::vector<ImageSize> sizes = sizes_of(cost_sizes);
   FiguresFile figures(json_file);
   TextFile csv(csv_file), markdown(markdown_file);
   std::vector<SequenceScore> scores;
@@ -95,7 +122,9 @@ int run(int argc, char** argv) {
     }
   }
   figures.write(all);
-  csv.write(csv_of(scores)), markdown.write(markdown_of(scores));
+  const std::string cost = costs(denoisers, config, sizes);
+  fmt::print("{}", cost);
+  csv.write(csv_of(scores)), markdown.write(markdown_of(scores) + (cost.empty() ? "" : "\n" + cost));
   return 0;
 }
 

@@ -36,13 +36,8 @@ ImageScore compare(ImageSize size, const std::vector<float>& ao, const std::vect
 /// A denoiser, or the mean of the samples without one.
 class Candidate {
 public:
-  Candidate(const std::string& name, DenoiserConfig config) {
-    if (name == "off") return;
-    if (name != "ours" && name != "history" && name != "reference")
-      throw Error(ErrorKind::kUsage, "--denoiser " + name + ": must be ours, history, reference or off");
-    config.kind = name == "reference" ? DenoiserKind::kReference : DenoiserKind::kOurs;
-    if (name == "history") config.ours.passes = 0;
-    denoiser_.emplace(config);
+  Candidate(const std::string& name, const DenoiserConfig& config) {
+    if (const auto preset = preset_of(name, config)) denoiser_.emplace(*preset);
   }
 
   void add(const GBuffer& g, const AoFrame& ao, HistorySource source, bool moved) {
@@ -146,6 +141,15 @@ private:
 };
 
 } // namespace
+
+std::optional<DenoiserConfig> preset_of(const std::string& name, DenoiserConfig config) {
+  if (name == "off") return {};
+  if (name != "ours" && name != "history" && name != "reference")
+    throw Error(ErrorKind::kUsage, "--denoiser " + name + ": must be ours, history, reference or off");
+  config.kind = name == "reference" ? DenoiserKind::kReference : DenoiserKind::kOurs;
+  if (name == "history") config.ours.passes = 0;
+  return config;
+}
 
 SequenceScore score(const DenoiserSequence& sequence, const std::string& name, const DenoiserConfig& config) {
   SequenceScore result{sequence.scene, sequence.motion, name, {}, {}};

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,9 +33,13 @@ struct SequenceScore {
 /// Frame counts since an occluder is gone for which ghosts are measured.
 inline constexpr uint32_t kGhostFrames[] = {4, 8, 16, 32};
 
-/// Runs a denoiser over a sequence. Names: ours; history, which is ours without filter; reference; off, the mean of the
-/// samples since something moved, as without a denoiser.
+/// The denoiser of a name: ours; history, which is ours without filter; reference; none for off, the mean of the
+/// samples since something moved.
 /// @param config settings of ours and reference
+/// Throws Error(kUsage) for other names.
+std::optional<DenoiserConfig> preset_of(const std::string& name, DenoiserConfig config);
+
+/// Runs the denoiser of a name over a sequence.
 SequenceScore score(const DenoiserSequence& sequence, const std::string& denoiser, const DenoiserConfig& config);
 
 /// One line per image, ghost and flicker, with a header: scene, motion, denoiser, quantity, frames, value.

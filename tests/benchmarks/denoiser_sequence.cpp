@@ -6,13 +6,17 @@
 
 #include <fmt/format.h>
 
+#include "compress/format/deformation/deformation_view.h"
 #include "pbrt_import/base/error.h"
 #include "pbrt_import/scene/world_view.h"
 #include "runtime/ao/ao_integrator.h"
+#include "runtime/ao/moved_occluders.h"
+#include "runtime/camera/deformed_past.h"
 #include "runtime/camera/primary_visibility.h"
 #include "runtime/frame/camera_path.h"
 #include "runtime/frame/frame_loop.h"
 #include "runtime/frame/mean_layers.h"
+#include "runtime/frame/scene_state.h"
 #include "runtime/trace/packed/scene/packed_tracer.h"
 #include "tests/benchmarks/denoiser_occluder.h"
 
@@ -22,6 +26,7 @@ namespace {
 /// Frames that share a shift of the camera rays, as in FrameLoop.
 constexpr uint32_t kFramesPerShift = 2;
 constexpr uint32_t kTruthShifts = 64;
+constexpr double kAnimatedFps = 24.0;
 
 class SequenceTracer {
 public:
@@ -93,7 +98,9 @@ public:
     std::vector<Affine> before;
     for (const PlacedGeometry& placed : input_.source.instances()) before.push_back(placed.world_from_object);
     const uint32_t gone = options_.frames / 2;
+    const Bounds object = object_bounds(input_.file.geometries()[input_.source.instances()[box.instance].geometry]);
     for (uint32_t f = 0; f < options_.frames; ++f) {
+      std::optional<MovedBox> moved;
       if (f > gone) {
         sequence.gbuffers.emplace_back();
       } else {
@@ -101,12 +108,44 @@ public:
         if (f == 0) before[box.instance] = now;
         tracer_.place_instances(std::span(&box.instance, 1), std::span(&now, 1));
         trace_primary(input_.source, tracer_, camera, {camera, before}, g, progress_);
+        if (f > 0) moved = moved_box(box.instance, object, DAffine(before[box.instance]), object, DAffine(now));
         before[box.instance] = now;
         sequence.gbuffers.push_back(guides_of(g));
       }
       sequence.ao.push_back(occlusion(g, f));
+      if (moved) sequence.ao.back().max_history = history_limits(std::span(&*moved, 1), g, ao_, ao_.radius);
       if (f < gone ? std::ranges::count(kComparedFrames, f + 1) > 0 : f == gone)
         sequence.truth[f < gone ? f + 1 : options_.frames] = truth(g);
+    }
+    return sequence;
+  }
+
+  /// As FrameLoop traces what moves.
+  DenoiserSequence animated() {
+    const SceneMotion motion = SceneMotion::of(input_.file);
+    const bool deforms = !deformation_records(input_.file.sections().deformation).empty();
+    if (!motion.moves() && !deforms) throw Error(ErrorKind::kUsage, "--motion animated: nothing moves in the scene");
+    TracerConfig packed;
+    packed.backend = Backend::kPacked;
+    SceneState state({&input_.source, &input_.file, packed, &motion, deforms}, {});
+    DenoiserSequence sequence;
+    const PrimaryCamera camera = view(camera_);
+    GBuffer g;
+    for (uint32_t f = 0; f < options_.frames; ++f) {
+      FrameReport report;
+      state.advance(DVec3(camera_.world_from_camera[3]), f / kAnimatedFps, report);
+      state.build_level_0(report);
+      const RayTracer& tracer = *state.tracers().front();
+      std::optional<DeformedPast> surfaces;
+      if (f > 0 && state.deforming_tracer() != nullptr) surfaces.emplace(*state.deforming_tracer());
+      const PreviousFrame before{camera, f > 0 ? state.previous_transforms() : std::span<const Affine>(),
+                                 surfaces ? &*surfaces : nullptr};
+      trace_primary(state.camera_source(), tracer, camera, before, g, progress_);
+      sequence.gbuffers.push_back(guides_of(g));
+      sequence.ao.push_back(occlusion(tracer, g, f));
+      sequence.ao.back().max_history = history_limits(state.moved_boxes(), g, ao_, ao_.radius);
+      if (std::ranges::count(kComparedFrames, f + 1) > 0)
+        sequence.truth[f + 1] = occlusion(tracer, g, 0, options_.truth_spp, 1).ao;
     }
     return sequence;
   }
@@ -133,10 +172,13 @@ private:
   }
 
   AoFrame occlusion(const GBuffer& g, uint32_t frame, uint32_t spp = 1, uint64_t seed = 0) {
+    return occlusion(tracer_, g, frame, spp, seed);
+  }
+  AoFrame occlusion(const RayTracer& tracer, const GBuffer& g, uint32_t frame, uint32_t spp = 1, uint64_t seed = 0) {
     AoConfig config = ao_;
     config.spp = spp, config.seed = seed;
     AoFrame frame_ao;
-    trace_ao(input_.source, tracer_, g, config, frame, frame_ao, progress_);
+    trace_ao(input_.source, tracer, g, config, frame, frame_ao, progress_);
     return frame_ao;
   }
 
@@ -176,6 +218,7 @@ DenoiserSequence trace_sequence(const std::string& scene, const TraceInputOption
   SequenceTracer tracer(*input, options);
   return kind == SequenceKind::kStill      ? tracer.still()
          : kind == SequenceKind::kJittered ? tracer.jittered()
+         : kind == SequenceKind::kAnimated ? tracer.animated()
                                            : tracer.orbit();
 }
 
@@ -193,7 +236,8 @@ public:
     for (GBuffer& g : s.gbuffers)
       value(g.size), value(g.pixel_spread), values(g.view_z), values(g.normal), values(g.instance), values(g.motion_px),
           values(g.previous_z);
-    for (AoFrame& a : s.ao) value(a.size), value(a.ray_length), values(a.ao), values(a.hit_distance);
+    for (AoFrame& a : s.ao)
+      value(a.size), value(a.ray_length), values(a.ao), values(a.hit_distance), values(a.max_history);
     auto next = s.truth.begin();
     for (uint64_t i = 0; i < truths; ++i) {
       uint32_t frame = write_ ? next->first : 0;
@@ -237,7 +281,7 @@ DenoiserSequence make_sequence(const std::string& scene, const TraceInputOptions
   DenoiserSequence sequence;
   const std::string stem = std::filesystem::path(scene).stem().string();
   const auto file =
-      options.cache / fmt::format("{}_{}{}_{}x{}_{}_{}.sequence2", stem, motion, options.framed ? "_framed" : "",
+      options.cache / fmt::format("{}_{}{}_{}x{}_{}_{}.sequence3", stem, motion, options.framed ? "_framed" : "",
                                   options.size.width, options.size.height, options.frames, options.truth_spp);
   if (!options.cache.empty() && std::filesystem::exists(file)) {
     if (!SequenceFile(file, false).all(sequence)) throw Error(ErrorKind::kInput, file.string() + ": is incomplete");

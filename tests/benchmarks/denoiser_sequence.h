@@ -21,10 +21,11 @@ enum class SequenceKind : uint8_t {
   /// A box that moves through the middle of a still view by about a pixel per frame, and after half of the frames
   /// is gone.
   kOccluder,
+  kAnimated, ///< what moves in the scene itself, by 1/24 s a frame
 };
 
 /// The names of the kinds, as on the command line.
-inline constexpr const char* kSequenceKindNames[] = {"still", "jittered", "orbit", "occluder"};
+inline constexpr const char* kSequenceKindNames[] = {"still", "jittered", "orbit", "occluder", "animated"};
 
 /// Frames of raw ambient occlusion with their G-buffers, and the ambient occlusion they are to approach.
 struct DenoiserSequence {
@@ -37,7 +38,7 @@ struct DenoiserSequence {
   std::vector<AoFrame> ao;
   std::map<uint32_t, std::vector<float>> truth; ///< by number of frames so far, ascending; kInvalidAo at misses
 
-  bool moves() const { return kind == SequenceKind::kOrbit || kind == SequenceKind::kOccluder; }
+  bool moves() const { return kind != SequenceKind::kStill && kind != SequenceKind::kJittered; }
   /// Frames before the occluder is gone.
   uint32_t occluded_frames() const { return static_cast<uint32_t>(ao.size()) / 2; }
   /// The truth after that many frames: of still views, and once an occluder is gone, it is one picture.
@@ -58,8 +59,8 @@ inline constexpr uint32_t kComparedFrames[] = {1, 2, 4, 8, 16, 32, 64};
 
 /// Traces a sequence with one sample per pixel and frame, or reads it from the cache.
 /// @param inputs used only if the sequence is not in the cache
-/// Throws Error(kUsage) for occluders in .ptk files, Error as trace_primary() and trace_ao() do, and for files that
-/// cannot be read or written.
+/// Throws Error(kUsage) for occluders in .ptk files and animations of scenes in which nothing moves, Error as
+/// trace_primary() and trace_ao() do, and for files that cannot be read or written.
 DenoiserSequence make_sequence(const std::string& scene, const TraceInputOptions& inputs, SequenceKind kind,
                                const SequenceOptions& options);
 

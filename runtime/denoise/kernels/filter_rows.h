@@ -12,8 +12,19 @@ namespace packtrace {
 /// are the same pairs from their other ends.
 inline constexpr std::array<std::array<int, 2>, 4> kPairOffsets = {{{1, 0}, {0, 1}, {1, 1}, {-1, 1}}};
 
-/// Pixels before and after each row that kernels may read.
-inline constexpr int kRowPadding = 16;
+/// Pixels before and after each row of 16-bit values that kernels may read, and after which they may write.
+inline constexpr int kRowPadding = 64;
+
+/// The passes compute in integers of 16 bits, so that a vector holds twice as many pixels as with floats. AO is stored
+/// in units of 1 / kAoUnits; eight roundings still fit.
+inline constexpr int kAoUnits = 32700;
+inline int16_t in_ao_units(float ao) {
+  const float bounded = ao > 0.0f ? (ao < 1.0f ? ao : 1.0f) : 0.0f;
+  return static_cast<int16_t>(static_cast<int>(bounded * float{kAoUnits} + 0.5f));
+}
+/// Precisions, 1 / sqrt(2 noise_tolerance v + 1e-6) for a variance of v, are stored in units of 1 / kPrecisionUnits;
+/// those of pixels that hit something are at least 1 unit, and 0 means a miss. 1.375 times the largest one fits.
+inline constexpr float kPrecisionUnits = 47.0f;
 
 /// What guide weights compare, for one row of pixels.
 struct SurfaceRow {
@@ -28,35 +39,67 @@ struct GuideTerms {
   float depth, slope;
 };
 
-/// Weights of the pairs that begin in one row, by kPairOffsets.
+/// Guide weights of the pairs that begin in one row, in units of 1/255.
 using PairRow = std::array<const uint8_t*, 4>;
 
-/// Values of a pass in one row, with their variances.
+/// Weights w of the pairs that begin in one row, in units of 2^-16.
+using WeightRow = std::array<const uint16_t*, 4>;
+
+/// Distances of pairs of one of kPairOffsets in three rows.
+using DistanceRows = std::array<const uint16_t*, 3>;
+
+/// Values of a pass in one row, with their precisions.
 struct NoisyRow {
-  const float *value, *variance;
+  const int16_t* value;
+  const uint16_t* precision;
 };
 
 /// Values of a pass at the row of a pixel and at the rows of its neighbours, one step above and below.
 struct PassRows {
-  const float *value, *value_above, *value_below;
-  const float *variance, *variance_above, *variance_below;
-  const float *scale, *scale_above, *scale_below; ///< 1 / D
-  PairRow here, above;                            ///< pairs that begin in the row, and in the row one step above
+  const int16_t *value, *value_above, *value_below;
+  const uint16_t* precision;
+  const uint16_t *scale, *scale_above, *scale_below; ///< 1 / D
+  WeightRow here, above;                             ///< pairs that begin in the row, and in the row one step above
+};
+
+/// Squared deviations are stored in this many units.
+inline constexpr float kDistanceUnits = kPrecisionUnits * kPrecisionUnits / 8.0f;
+
+/// What weighs patches.
+struct PatchTerms {
+  uint16_t no_distance; ///< distance 0 in the units of compare()
+  int shift;            ///< distances of patches, times 2^shift, have their limit at
+  uint16_t limit;       ///< this, between 2^15 and 2^16
+  uint16_t stretch;     ///< 2^16 (2^16 - 1) / limit - 2^16
 };
 
 /// Moments of the pixels of one row, or of windows; all 0 for pixels without history.
 struct MomentRows {
-  float *seen, *value, *square; ///< 1, a, a^2
-  float *spread_seen, *spread;  ///< 1 and s2, of pixels with at least two samples
-  float *decay_seen, *decay;    ///< 1 and Trend::decay, of pixels that have one
+  /// Numbers of pixels: of all, 32 times of those with at least two samples, and 1024 times of those with Trend::decay.
+  float* counts;
+  float *value, *square; ///< a, a^2
+  float *spread, *decay; ///< s2 of at least two samples, Trend::decay
 };
 
 /// Side in pixels of the window for the variance.
 inline constexpr int kMomentWindow = 5;
 using MomentWindow = std::array<MomentRows, kMomentWindow>;
 
+/// The history of a row, and where its camera rays hit something.
+struct HistoryOfRow {
+  const float *mean, *square, *samples, *disparity;
+};
+
+/// Input of the first pass.
+struct FirstRow {
+  int16_t* value;
+  uint16_t* precision; ///< lower while there are few frames, and the lowest without history
+  uint16_t* lone;      ///< how much a sample unlike all its neighbours gives way, in units of 2^-13
+};
+
 struct VarianceTerms {
-  float prior = 0; ///< weight of the window's variance in frames
+  float tolerance = 2; ///< noise_tolerance
+  float prior = 0;     ///< weight of the window's variance in frames
   /// Variance of a mean times n / s2: still_factor n^-still_power if still, moving_base + moving_gain n if moving.
   float still_factor = 1, still_power = 0, moving_base = 1, moving_gain = 0, longest_moving = 0;
   float ratio_prior = 1; ///< weight of still_factor against the window's trends, in pixels
@@ -72,18 +115,25 @@ struct FilterKernels {
   /// @param below the row one step below
   void (*guide)(int width, int step, const SurfaceRow& here, const SurfaceRow& below, const GuideTerms& terms,
                 const std::array<uint8_t*, 4>& weights);
-  /// Distances d of the pairs that begin in a row: 0 for noise, from -1 / tolerance on; 0 where the guide weight is 0.
+  /// Distances d of the pairs that begin in a row, plus 1 / noise_tolerance; kNoDistance where a pixel missed.
   /// @param below the row one step below
-  void (*compare)(int width, int step, const NoisyRow& here, const NoisyRow& below, const PairRow& guide,
-                  float tolerance, const std::array<float*, 4>& distance);
+  /// @param no_distance PatchTerms::no_distance
+  void (*compare)(int width, int step, const NoisyRow& here, const NoisyRow& below, uint16_t no_distance,
+                  const std::array<uint16_t*, 4>& distance);
   /// Weights of pairs from the distances of three rows.
-  /// @param column scratch
-  void (*weigh)(int width, const std::array<const float*, 3>& distance, const uint8_t* guide, float limit,
-                float* column, uint8_t* weights);
-  /// 1 / D. @param samples frames of history, for the pass in which lone samples give way; else null
-  void (*normalise)(int width, int step, const PairRow& here, const PairRow& above, const float* samples, float* scale);
+  /// @param guide_stride from a guide to that of the next row, which is fetched into the cache
+  /// @param columns scratch
+  void (*weigh)(int width, const std::array<DistanceRows, 4>& distance, const PairRow& guide, ptrdiff_t guide_stride,
+                const PatchTerms& terms, const std::array<uint16_t*, 4>& columns,
+                const std::array<uint16_t*, 4>& weights);
+  /// 1 / D in units of 2^-15. The first pass, in which lone samples give way, has units of 2^-13.
+  /// @param lone k of the pixels in units of 2^-13
+  void (*normalise)(int width, int step, const WeightRow& here, const WeightRow& above, uint16_t* scale);
+  void (*normalise_first)(int width, int step, const WeightRow& here, const WeightRow& above, const uint16_t* lone,
+                          uint16_t* scale);
   /// Moves AO between the pixels of pairs.
-  void (*exchange)(int width, int step, const PassRows& rows, float* value, float* variance);
+  using Exchange = void(int width, int step, const PassRows& rows, int16_t* value, uint16_t* precision);
+  Exchange *exchange, *exchange_first;
   /// Moments of single pixels.
   void (*moments)(int width, const float* mean, const float* square, const float* samples, const uint32_t* trend,
                   const MomentRows& out);
@@ -92,13 +142,15 @@ struct FilterKernels {
   /// Variance of the mean of each pixel.
   /// @param window sums along x of the rows of the pixel's window
   /// @param estimate the expected variance; 0 without history
-  /// @param variance what the filter is told: larger while there are few frames, and the maximum without history
-  void (*variance)(int width, const float* mean, const float* square, const float* samples, const MomentWindow& window,
-                   const VarianceTerms& terms, float* estimate, float* variance);
+  void (*variance)(int width, const HistoryOfRow& history, const MomentWindow& window, const VarianceTerms& terms,
+                   float* estimate, const FirstRow& first);
   /// Whether a pixel that hit something has no history.
   bool (*any_to_fill)(int width, const float* disparity, const float* samples);
   /// Writes a row of the result: AO, or kInvalidAo for misses, and the lengths of histories.
-  void (*finish)(int width, const float* value, const float* disparity, const float* samples, float* ao, float* tspp);
+  /// @param mean of the history; AO differs from it by what the passes moved
+  /// @param ao contains the AO that pixels without history started from
+  void (*finish)(int width, const int16_t* value, const float* mean, const float* disparity, const float* samples,
+                 float* ao, float* tspp);
 };
 
 /// Returns the kernels of an instruction set. All give the same bits. Throws Error(kUnsupported) if this machine lacks

@@ -6,24 +6,24 @@
 #include <cmath>
 
 #include "runtime/denoise/kernels/filter_rows.h"
+#include "runtime/denoise/kernels/lanes.h"
 #include "runtime/denoise/kernels/row_math.h"
 
 namespace packtrace {
 namespace {
 
-constexpr float kStraight = 0.707f / 255.0f, kDiagonal = 0.499f / 255.0f;
+/// 0.707 and 0.499 in units of 2^-16, per unit of a guide weight.
+constexpr uint16_t kStraight = 182, kDiagonal = 128;
 constexpr float kLoneBase = 0.7f, kLoneYoung = 0.3f;
 constexpr float kMaxVariance = 0.25f; // of values in [0, 1]
+constexpr float kMostPrecision = 1000.0f * kPrecisionUnits;
+constexpr uint16_t kMostDeviations = 240; // in units of 1 / kPrecisionUnits; the sum of nine squares fits
 
-/// 1 / x for x in [1e-37, 1e37], with a relative error below 1e-5, without a division: the exponent's negative with two
-/// steps of Newton's method. All instruction sets give the same bits.
-inline float reciprocal(float x) {
-  float r = __builtin_bit_cast(float, 0x7ef311c7 - __builtin_bit_cast(int32_t, x));
-  r *= 2.0f - x * r;
-  r *= 2.0f - x * r;
-  return r;
+/// 1 / sqrt(x) with a relative error below 0.2 %: minus half the exponent and a step of Newton's method.
+inline float reciprocal_root(float x) {
+  const float r = __builtin_bit_cast(float, 0x5f375a86 - (__builtin_bit_cast(int32_t, x) >> 1));
+  return r * (1.5f - 0.5f * x * r * r);
 }
-inline float of_byte(uint8_t b) { return static_cast<float>(static_cast<int>(b)); }
 
 /// Guide weight of the surfaces at two pixels of rows, q being at an offset from p.
 inline uint8_t guide_weight(const SurfaceRow& p, int at_p, const SurfaceRow& q, int at_q, float offset_x,
@@ -59,99 +59,149 @@ void guide_row(int width, int step, const SurfaceRow& here, const SurfaceRow& be
   }
 }
 
-void compare_row(int width, int step, const NoisyRow& here, const NoisyRow& below, const PairRow& guide,
-                 float tolerance, const std::array<float*, 4>& distance) {
+/// 1 / sqrt(v_p + v_q) from 1 / sqrt(2 v) of both: an approximation to within 5 % without a division.
+inline U16 precision_of_pair(U16 p, U16 q) {
+  const U16 least = lesser(p, q), most = greater(p, q);
+  return lesser(average(least, average(least, most)), least + (least >> 2) + (least >> 3));
+}
+
+void compare_row(int width, int step, const NoisyRow& here, const NoisyRow& below, uint16_t no_distance,
+                 const std::array<uint16_t*, 4>& distance) {
   const NoisyRow p = here, q = below;
-  const PairRow g = guide;
-  float *right = distance[0], *down = distance[1], *down_right = distance[2], *down_left = distance[3];
-#pragma GCC ivdep
-  for (int x = 0; x < width; ++x) {
-    const auto pair = [&](const NoisyRow& other, int at, uint8_t weight) {
-      const float difference = other.value[at] - p.value[x];
-      const float noise = p.variance[x] + other.variance[at];
-      const float d = (difference * difference - noise) * reciprocal(tolerance * noise + 1e-6f);
-      return d * lesser(of_byte(weight), 1.0f); // 0 without a weight
+  uint16_t *right = distance[0], *down = distance[1], *down_right = distance[2], *down_left = distance[3];
+  const U16 nothing = all(no_distance), most = all(kMostDeviations);
+  for (int x = 0; x < width; x += kLanes) {
+    const I16 value = load(p.value + x);
+    const U16 own_precision = load(p.precision + x);
+    const auto pair = [&](const NoisyRow& other, int at) {
+      const U16 difference = magnitude(load(other.value + at) - value);
+      const U16 precision = precision_of_pair(own_precision, load(other.precision + at));
+      const U16 deviations = lesser(product(difference << 1, precision), most);
+      const U16 squared = (deviations * (deviations + 1)) >> 3; // n (n + 1) is about the mean square from n to n + 1
+      return precision == 0 ? nothing : squared;
     };
-    right[x] = pair(p, x + step, g[0][x]);
-    down[x] = pair(q, x, g[1][x]);
-    down_right[x] = pair(q, x + step, g[2][x]);
-    down_left[x] = pair(q, x - step, g[3][x]);
+    store(right + x, pair(p, x + step));
+    store(down + x, pair(q, x));
+    store(down_right + x, pair(q, x + step));
+    store(down_left + x, pair(q, x - step));
   }
 }
 
-void weigh_row(int width, const std::array<const float*, 3>& distance, const uint8_t* guide, float limit,
-               float* __restrict column, uint8_t* __restrict weights) {
-  const float *d0 = distance[0], *d1 = distance[1], *d2 = distance[2];
-  for (int x = -1; x <= width; ++x) column[x] = d0[x] + d1[x] + d2[x];
-  const float slope = -1.0f / (9.0f * limit);
-  for (int x = 0; x < width; ++x) {
-    const float sum = column[x - 1] + column[x] + column[x + 1];
-    float keep = lesser(greater(1.0f + sum * slope, 0.0f), 1.0f);
-    keep *= keep, keep *= keep;
-    weights[x] = static_cast<uint8_t>(static_cast<int>(of_byte(guide[x]) * keep + 0.5f));
+void weigh_row(int width, const std::array<DistanceRows, 4>& distance, const PairRow& guide, ptrdiff_t guide_stride,
+               const PatchTerms& terms, const std::array<uint16_t*, 4>& columns,
+               const std::array<uint16_t*, 4>& weights) {
+  // Loads that overlap two recent stores wait for them, so all columns are stored before they are read.
+  for (size_t d = 0; d < distance.size(); ++d)
+    for (int x = -kLanes; x <= width; x += kLanes)
+      store(columns[d] + x, load(distance[d][0] + x) + load(distance[d][1] + x) + load(distance[d][2] + x));
+  const U16 nothing = all(static_cast<uint16_t>(9 * terms.no_distance)), limit = all(terms.limit);
+  const U16 most = limit >> terms.shift, stretch = all(terms.stretch);
+  for (size_t d = 0; d < distance.size(); ++d) {
+    const uint16_t gain = d < 2 ? kStraight : kDiagonal; // kPairOffsets
+    for (int x = 0; x < width; x += kLanes) {
+      __builtin_prefetch(guide[d] + x + guide_stride);
+      const U16 sum = load(columns[d] + x - 1) + load(columns[d] + x) + load(columns[d] + x + 1);
+      const U16 excess = lesser(greater(sum, nothing) - nothing, most);
+      const U16 left = limit - (excess << terms.shift);
+      const U16 kept = left + product(left, stretch), square = product(kept, kept);
+      store(weights[d] + x, product(product(square, square), load_bytes(guide[d] + x) * gain));
+    }
   }
 }
 
-void normalise_row(int width, int step, const PairRow& here, const PairRow& above, const float* samples,
-                   float* __restrict scale) {
-  const uint8_t *right = here[0], *down = here[1], *down_right = here[2], *down_left = here[3];
-  const uint8_t *up = above[1], *up_left = above[2], *up_right = above[3];
-  const auto straight = [&](int x) {
-    return static_cast<int>(right[x]) + static_cast<int>(right[x - step]) + static_cast<int>(down[x]) +
-           static_cast<int>(up[x]);
-  };
-  const auto diagonal = [&](int x) {
-    return static_cast<int>(down_right[x]) + static_cast<int>(up_left[x - step]) + static_cast<int>(down_left[x]) +
-           static_cast<int>(up_right[x + step]);
-  };
-  if (samples == nullptr) {
+/// Weights of the eight pairs of some pixels. Those across an edge of the image are 0.
+struct Neighbours {
+  U16 right, left, down, up, down_right, up_left, down_left, up_right;
+
+  Neighbours(const WeightRow& here, const WeightRow& above, int x, int step)
+      : right(load(here[0] + x)), left(load(here[0] + x - step)), down(load(here[1] + x)), up(load(above[1] + x)),
+        down_right(load(here[2] + x)), up_left(load(above[2] + x - step)), down_left(load(here[3] + x)),
+        up_right(load(above[3] + x + step)) {}
+
+  /// The mean in units of 2^-16, which is the sum in units of 2^-13.
+  U16 mean() const {
+    return average(average(average(right, left), average(down, up)),
+                   average(average(down_right, up_left), average(down_left, up_right)));
+  }
+  /// The largest of the weights in units of their gains, to within 0.4 %.
+  U16 largest() const {
+    constexpr uint16_t kStretch = 65536 * (65535 - 255 * kStraight) / (255 * kStraight);
+    const U16 straight = greater(greater(right, left), greater(down, up));
+    const U16 diagonal = greater(greater(down_right, up_left), greater(down_left, up_right));
+    return greater(straight + product(straight, all(kStretch)), diagonal << 1);
+  }
+};
+
+/// Kernels of 16-bit values write this many. Pixels outside the image have a precision of 0, hence no distance and no
+/// weight, and remain so.
+inline int whole_vectors(int width) { return (width + kLanes - 1) / kLanes * kLanes; }
+
+/// Replaces each value x by numerator / x.
+void invert_row(int width, float numerator, uint16_t* row) {
+  for (int x = 0; x < whole_vectors(width); ++x)
+    row[x] = static_cast<uint16_t>(static_cast<int>(numerator / static_cast<float>(static_cast<int>(row[x]))));
+}
+
+void normalise_row(int width, int step, const WeightRow& here, const WeightRow& above, uint16_t* scale) {
+  for (int x = 0; x < width; x += kLanes) store(scale + x, Neighbours(here, above, x, step).mean() + 8192);
+  invert_row(width, 8192.0f * 32768.0f, scale);
+}
+
+void normalise_first_row(int width, int step, const WeightRow& here, const WeightRow& above, const uint16_t* lone,
+                         uint16_t* scale) {
+  constexpr uint16_t kLeast = 1025; // so that the result has 16 bits
+  for (int x = 0; x < width; x += kLanes) {
+    const Neighbours weights(here, above, x, step);
+    const U16 own = 8192 - product(65535 - weights.largest(), load(lone + x));
+    store(scale + x, greater(own + weights.mean(), all(kLeast)));
+  }
+  invert_row(width, 8192.0f * 8192.0f, scale);
+}
+
+/// @param variance what is left of the variance, in units of 2^-14
+void raise_precisions(int width, const uint16_t* variance, const uint16_t* before, uint16_t* precision) {
 #pragma GCC ivdep
-    for (int x = 0; x < width; ++x)
-      scale[x] =
-          1.0f / (1.0f + (kStraight * static_cast<float>(straight(x)) + kDiagonal * static_cast<float>(diagonal(x))));
-    return;
-  }
-  const auto larger_byte = [](uint8_t a, uint8_t b) { return a < b ? b : a; };
-#pragma GCC ivdep
-  for (int x = 0; x < width; ++x) {
-    const uint8_t most = larger_byte(
-        larger_byte(larger_byte(right[x], right[x - step]), larger_byte(down[x], up[x])),
-        larger_byte(larger_byte(down_right[x], up_left[x - step]), larger_byte(down_left[x], up_right[x + step])));
-    const float lone = kLoneBase + kLoneYoung / greater(samples[x], 1.0f);
-    const float own = 1.0f - lone * (1.0f - of_byte(most) * (1.0f / 255.0f));
-    const float sum = kStraight * static_cast<float>(straight(x)) + kDiagonal * static_cast<float>(diagonal(x));
-    scale[x] = 1.0f / greater(own + sum, 1e-3f);
+  for (int x = 0; x < whole_vectors(width); ++x) {
+    const float left = static_cast<float>(static_cast<int>(variance[x])) * (1.0f / 16384.0f);
+    const float p = static_cast<float>(static_cast<int>(before[x])) * greater(reciprocal_root(left), 1.0f);
+    precision[x] = static_cast<uint16_t>(static_cast<int>(lesser(p + 0.5f, kMostPrecision)));
   }
 }
 
-void exchange_row(int width, int step, const PassRows& rows, float* __restrict value, float* __restrict variance) {
+/// @tparam kFirst the scale is in units of 2^-13, not 2^-15
+template <bool kFirst>
+void exchange_row(int width, int step, const PassRows& rows, int16_t* value, uint16_t* precision) {
   const PassRows r = rows;
-  const uint8_t *right = r.here[0], *down = r.here[1], *down_right = r.here[2], *down_left = r.here[3];
-  const uint8_t *up = r.above[1], *up_left = r.above[2], *up_right = r.above[3];
-#pragma GCC ivdep
-  for (int x = 0; x < width; ++x) {
-    const float a = r.value[x], s = r.scale[x];
-    float flux = 0.0f, taken = 0.0f, noise = 0.0f;
-    const auto pair = [&](uint8_t weight, float gain, const float* q, const float* q_variance, const float* q_scale,
-                          int at) {
-      const float u = of_byte(weight) * gain * lesser(s, q_scale[at]);
-      flux += u * (q[at] - a);
+  for (int x = 0; x < width; x += kLanes) {
+    const Neighbours weights(r.here, r.above, x, step);
+    const I16 own = load(r.value + x);
+    const U16 scale = load(r.scale + x);
+    I16 flux{};
+    U16 taken{}, squares{}; // in units of 2^-15 and 2^-14
+    const auto pair = [&](U16 weight, const int16_t* q, const uint16_t* q_scale) {
+      U16 u = product(weight, lesser(scale, load(q_scale)));
+      if (kFirst) u <<= 2;
+      flux += part_of(u, load(q) - own);
       taken += u;
-      noise += u * u * q_variance[at];
+      squares += product(u, u);
     };
-    pair(right[x], kStraight, r.value, r.variance, r.scale, x + step);
-    pair(right[x - step], kStraight, r.value, r.variance, r.scale, x - step);
-    pair(down[x], kStraight, r.value_below, r.variance_below, r.scale_below, x);
-    pair(up[x], kStraight, r.value_above, r.variance_above, r.scale_above, x);
-    pair(down_right[x], kDiagonal, r.value_below, r.variance_below, r.scale_below, x + step);
-    pair(up_left[x - step], kDiagonal, r.value_above, r.variance_above, r.scale_above, x - step);
-    pair(down_left[x], kDiagonal, r.value_below, r.variance_below, r.scale_below, x - step);
-    pair(up_right[x + step], kDiagonal, r.value_above, r.variance_above, r.scale_above, x + step);
-    const float kept = 1.0f - taken;
-    value[x] = a + flux;
-    variance[x] = lesser(kept * kept * r.variance[x] + noise, r.variance[x]);
+    pair(weights.right, r.value + x + step, r.scale + x + step);
+    pair(weights.left, r.value + x - step, r.scale + x - step);
+    pair(weights.down, r.value_below + x, r.scale_below + x);
+    pair(weights.up, r.value_above + x, r.scale_above + x);
+    pair(weights.down_right, r.value_below + x + step, r.scale_below + x + step);
+    pair(weights.up_left, r.value_above + x - step, r.scale_above + x - step);
+    pair(weights.down_left, r.value_below + x - step, r.scale_below + x - step);
+    pair(weights.up_right, r.value_above + x + step, r.scale_above + x + step);
+    store(value + x, own + flux);
+    const U16 kept = 32768 - taken;
+    store(precision + x, product(kept, kept) + squares);
   }
+  raise_precisions(width, precision, r.precision, precision);
 }
+
+/// MomentRows::counts; windows have fewer than 32 pixels.
+constexpr float kSecondCount = 32.0f, kThirdCount = 1024.0f;
 
 void moments_row(int width, const float* mean, const float* square, const float* samples, const uint32_t* trend,
                  const MomentRows& out) {
@@ -161,14 +211,13 @@ void moments_row(int width, const float* mean, const float* square, const float*
     const float a = mean[x], n = samples[x];
     const float seen = n > 0.0f ? 1.0f : 0.0f, spread_seen = n >= 2.0f ? 1.0f : 0.0f;
     const float spread = greater(square[x] - a * a, 0.0f) * n / greater(n - 1.0f, 1.0f);
-    o.seen[x] = seen;
+    const float decay = __builtin_bit_cast(float, trend[x] & 0xffff0000u); // Trend::decay
+    const float decay_seen = (n > 0.0f) & (decay > 0.0f) ? 1.0f : 0.0f;
+    o.counts[x] = seen + kSecondCount * spread_seen + kThirdCount * decay_seen;
     o.value[x] = a * seen;
     o.square[x] = a * a * seen;
-    o.spread_seen[x] = spread_seen;
     o.spread[x] = spread * spread_seen;
-    const float decay = __builtin_bit_cast(float, trend[x] & 0xffff0000u); // Trend::decay
-    o.decay_seen[x] = (n > 0.0f) & (decay > 0.0f) ? 1.0f : 0.0f;
-    o.decay[x] = n > 0.0f ? decay : 0.0f;
+    o.decay[x] = decay * decay_seen;
   }
 }
 
@@ -192,37 +241,44 @@ inline float exp2_of(float x) { // of x in [-100, 0]
   return m * __builtin_bit_cast(float, (static_cast<int32_t>(whole) + 127) << 23);
 }
 
-void variance_row(int width, const float* mean, const float* square, const float* samples, const MomentWindow& window,
-                  const VarianceTerms& terms, float* __restrict estimate, float* __restrict variance) {
+void variance_row(int width, const HistoryOfRow& history, const MomentWindow& window, const VarianceTerms& terms,
+                  float* __restrict estimate, const FirstRow& first) {
+  const HistoryOfRow h = history;
   const MomentWindow rows = window;
   const VarianceTerms t = terms;
+  const FirstRow o = first;
   const float young_moving = t.moving ? 4.0f : 0.0f, longest_moving = t.moving ? t.longest_moving : 0.0f;
 #pragma GCC ivdep
   for (int x = 0; x < width; ++x) {
-    const float a = mean[x], n = greater(samples[x], 1.0f);
-    float seen_around = 0.0f, value = 0.0f, squares = 0.0f, spread_seen = 0.0f, spread_around = 0.0f;
-    float decay_seen = 0.0f, decay = 0.0f;
-    for (const MomentRows& r : rows) {
-      seen_around += r.seen[x], value += r.value[x], squares += r.square[x];
-      spread_seen += r.spread_seen[x], spread_around += r.spread[x];
-      decay_seen += r.decay_seen[x], decay += r.decay[x];
-    }
-    const float count = greater(seen_around, 1.0f);
-    const float space = greater(squares - value * value / count, 0.0f) / greater(count - 1.0f, 1.0f);
-    const float around = spread_seen > 0.0f ? spread_around / greater(spread_seen, 1.0f) : space;
-    const float own = greater(square[x] - a * a, 0.0f) * n; // (n - 1) s2
-    float spread = (t.prior * around + own) / (t.prior + n - 1.0f);
+    const float a = h.mean[x], n = greater(h.samples[x], 1.0f);
+    float counts = 0.0f, value = 0.0f, squares = 0.0f, spreads = 0.0f, decay = 0.0f;
+    for (const MomentRows& r : rows)
+      counts += r.counts[x], value += r.value[x], squares += r.square[x], spreads += r.spread[x], decay += r.decay[x];
+    const int packed = static_cast<int>(counts);
+    const float count = greater(static_cast<float>(packed & 31), 1.0f);
+    const float spread_seen = static_cast<float>((packed >> 5) & 31), decay_seen = static_cast<float>(packed >> 10);
+    const float space = greater(squares * count - value * value, 0.0f) / (count * greater(count - 1.0f, 1.0f));
+    const float own = greater(h.square[x] - a * a, 0.0f) * n; // (n - 1) s2
+    // The mean of the variance around, with weight prior, and the pixel's own.
+    const float around = spread_seen > 0.0f ? spreads : space, divisor = greater(spread_seen, 1.0f);
+    float spread = (t.prior * around + own * divisor) / ((t.prior + n - 1.0f) * divisor);
     spread = n < 2.0f ? space : spread;
     spread = n < young_moving ? greater(spread, 0.5f * space) : spread;
-    const float measured = (t.ratio_prior * t.still_factor * spread + decay) / (t.ratio_prior + decay_seen);
-    const float factor = t.stratified & (spread > 0.0f) ? measured / spread : t.still_factor;
+    const float measured = t.ratio_prior * t.still_factor * spread + decay;
+    const float factor =
+        t.stratified & (spread > 0.0f) ? measured / ((t.ratio_prior + decay_seen) * spread) : t.still_factor;
     const float still = factor * exp2_of(-t.still_power * log2_of(n));
     const float moving = t.moving_base + t.moving_gain * n;
     const float ratio = lesser(n <= longest_moving ? moving : still, 1.0f);
-    const float v = spread * (n < 2.0f ? 1.0f : ratio) / n;
-    const bool seen = samples[x] > 0.0f;
+    const float share = 1.0f / n, v = spread * (n < 2.0f ? 1.0f : ratio) * share;
+    const bool seen = h.samples[x] > 0.0f;
     estimate[x] = seen ? v : 0.0f;
-    variance[x] = seen ? v * (1.0f + t.young / n + t.distrust / (n * n)) : kMaxVariance * (1.0f + t.distrust);
+    const float told = seen ? v * (1.0f + share * (t.young + t.distrust * share)) : kMaxVariance * (1.0f + t.distrust);
+    const float root = reciprocal_root(2.0f * t.tolerance * told + 1e-6f);
+    const float precision = lesser(greater(kPrecisionUnits * root + 0.5f, 1.0f), kMostPrecision);
+    o.value[x] = in_ao_units(a);
+    o.precision[x] = static_cast<uint16_t>(static_cast<int>(h.disparity[x] > 0.0f ? precision : 0.0f));
+    o.lone[x] = static_cast<uint16_t>(static_cast<int>(8192.0f * (kLoneBase + kLoneYoung * share)));
   }
 }
 
@@ -232,17 +288,20 @@ bool any_to_fill(int width, const float* disparity, const float* samples) {
   return found != 0;
 }
 
-void finish_row(int width, const float* value, const float* disparity, const float* samples, float* __restrict ao,
-                float* __restrict tspp) {
+void finish_row(int width, const int16_t* value, const float* mean, const float* disparity, const float* samples,
+                float* __restrict ao, float* __restrict tspp) {
   constexpr float kMiss = -1.0f; // kInvalidAo
   for (int x = 0; x < width; ++x) {
-    ao[x] = disparity[x] > 0.0f ? lesser(greater(value[x], 0.0f), 1.0f) : kMiss;
+    const float before = samples[x] > 0.0f ? mean[x] : ao[x];
+    const float moved = static_cast<float>(value[x] - in_ao_units(before)) * (1.0f / float{kAoUnits});
+    ao[x] = disparity[x] > 0.0f ? lesser(greater(before + moved, 0.0f), 1.0f) : kMiss;
     tspp[x] = samples[x];
   }
 }
 
-constexpr FilterKernels kKernels = {guide_row,   compare_row,   weigh_row,    normalise_row, exchange_row,
-                                    moments_row, sum_along_row, variance_row, any_to_fill,   finish_row};
+constexpr FilterKernels kKernels = {guide_row,           compare_row,         weigh_row,          normalise_row,
+                                    normalise_first_row, exchange_row<false>, exchange_row<true>, moments_row,
+                                    sum_along_row,       variance_row,        any_to_fill,        finish_row};
 
 } // namespace
 } // namespace packtrace

@@ -110,6 +110,11 @@ struct HistoryKernels {
   /// Adds samples to a row of the history, perhaps in place.
   void (*accumulate)(int width, const float* ao, const float* disparity, const HistoryLengths& longest,
                      const PastRow& past, const HistoryRow& history, const SampleRow& samples);
+  /// Trends of a resampled row: pixels that did not move keep theirs, unless this is their first sample.
+  /// @param motion x and y of each pixel's motion in pixels
+  void (*keep_trends)(int width, const float* motion, const float* samples, const uint32_t* before, uint32_t* trend);
+  /// Whether a pixel's sample made its history, shorter than `longest`, reach or cross a power of two.
+  bool (*any_crosses)(int width, const float* valid, const float* samples, float longest);
   /// Sums along x, by the window's radius. Samples are read up to the radius outside the row.
   std::array<void (*)(int width, const SampleRow& samples, const WindowSums& sums), kMaxWindowRadius + 1> sum;
   /// Statistics of windows, by their radius.

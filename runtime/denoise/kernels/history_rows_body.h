@@ -164,6 +164,25 @@ void accumulate_row(int width, const float* ao, const float* disparity, const Hi
   }
 }
 
+void keep_trends_row(int width, const float* motion, const float* samples, const uint32_t* before,
+                     uint32_t* __restrict trend) {
+  for (int x = 0; x < width; ++x) {
+    const bool still = (std::abs(motion[2 * x]) <= kStillMotion) & (std::abs(motion[2 * x + 1]) <= kStillMotion);
+    const uint32_t kept = before[x];
+    trend[x] = still & (samples[x] > 1.0f) ? kept : 0u;
+  }
+}
+
+bool any_crosses(int width, const float* valid, const float* samples, float longest) {
+  int crossings = 0;
+  for (int x = 0; x < width; ++x) {
+    const uint32_t bits = __builtin_bit_cast(uint32_t, samples[x]);
+    const bool crosses = samples[x] - __builtin_bit_cast(float, bits & 0x7f800000u) < 1.0f; // crosses_power_of_two()
+    crossings |= (valid[x] > 0.0f) & (samples[x] < longest) & crosses ? 1 : 0;
+  }
+  return crossings != 0;
+}
+
 template <int kRadius>
 void sum_windows(int width, const SampleRow& samples, const WindowSums& sums) {
   const SampleRow s = samples;
@@ -246,6 +265,8 @@ constexpr HistoryKernels history_table(std::integer_sequence<int, kPowers...>) {
   return {locate_row,
           {resample_run<kPowers>...},
           accumulate_row,
+          keep_trends_row,
+          any_crosses,
           {nullptr, sum_windows<1>, sum_windows<2>, sum_windows<3>, sum_windows<4>},
           {nullptr, finish_windows<1>, finish_windows<2>, finish_windows<3>, finish_windows<4>},
           correct_row};

@@ -9,6 +9,7 @@
 #include "pbrt_import/base/error.h"
 #include "runtime/ao/adaptive_rate.h"
 #include "runtime/ao/ray_sorter.h"
+#include "runtime/camera/primary_visibility.h"
 #include "runtime/trace/source/float_source.h"
 #include "tests/runtime/trace/packed_scenes.h"
 #include "tests/runtime/trace/test_scenes.h"
@@ -177,6 +178,18 @@ TEST(AdaptiveRate, ForgetsSurfacesOfAnotherDepthOrInstance) {
   const SamplePlan plan = rate.next_frame(other, false, 1);
   for (const size_t i : {100u, 200u}) EXPECT_EQ(plan.pixel_count[i], 8u);
   EXPECT_EQ(rate.ages()[100], 1u);
+  EXPECT_EQ(rate.ages()[101], 13u);
+}
+
+TEST(AdaptiveRate, SurfacesWhoseOcclusionChangesGetMoreSamples) {
+  AdaptiveRate rate;
+  for (int frame = 0; frame < 12; ++frame) rate.next_frame(moved_plane(0), false, 1);
+  std::vector<float> limits(64 * 32, 1e30f);
+  limits[100] = 0.3f, limits[200] = 3.9f;
+  const SamplePlan plan = rate.next_frame(moved_plane(0), false, 1, limits);
+  EXPECT_EQ(plan.pixel_count[100], 8u);
+  EXPECT_EQ(plan.pixel_count[200], 4u);
+  EXPECT_EQ(rate.ages()[200], 4u);
   EXPECT_EQ(rate.ages()[101], 13u);
 }
 

@@ -52,7 +52,7 @@ protected:
     if (before == now) return;
     const Bounds box{{-1.5, -0.5, -1.5}, {1.5, 0.5, 1.5}};
     const MovedBox moved = moved_box(kBox, box, DAffine(test::placed(before)), box, DAffine(test::placed(now)));
-    limit_history({&moved, 1}, g, ao_, ao_.radius, ao);
+    ao.max_history = history_limits({&moved, 1}, g, ao_, ao_.radius);
   }
 
   static constexpr uint32_t kBox = 2; ///< instance
@@ -177,9 +177,7 @@ protected:
     const MovedBox moved = moved_box(instance, box, DAffine(test::placed(before)), box, DAffine(test::placed(now)));
     AoConfig config;
     config.falloff = false;
-    AoFrame ao;
-    limit_history({&moved, 1}, g_, config, 4.0f, ao);
-    return ao.max_history.at(0);
+    return history_limits({&moved, 1}, g_, config, 4.0f).at(0);
   }
 
   static constexpr float kNone = std::numeric_limits<float>::max();
@@ -203,13 +201,7 @@ TEST_F(HistoryLimit, IsNoneForBoxesThatOccludeNothing) {
   EXPECT_EQ(limit({0, 1, 0}, {0, 90, 0}), kNone);
 }
 
-TEST_F(HistoryLimit, DoesNotExistWithoutMovement) {
-  AoFrame ao;
-  ao.resize({1, 1});
-  ao.max_history = {1.0f};
-  limit_history({}, g_, AoConfig(), 1.0f, ao);
-  EXPECT_TRUE(ao.max_history.empty());
-}
+TEST_F(HistoryLimit, DoesNotExistWithoutMovement) { EXPECT_TRUE(history_limits({}, g_, AoConfig(), 1.0f).empty()); }
 
 } // namespace
 } // namespace packtrace

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+#if defined(__AVX2__)
+#include <immintrin.h>
+#endif
+
+/// Vectors of 16-bit integers, as wide as those of the instruction set that the including file is compiled for. (GCC 12
+/// vectorises plain loops of such products with 32 bits.) Local to each file, because every instruction set compiles
+/// them.
+namespace packtrace {
+namespace {
+
+#if defined(__AVX512BW__)
+constexpr int kLanes = 32;
+#elif defined(__AVX2__)
+constexpr int kLanes = 16;
+#else
+constexpr int kLanes = 8;
+#endif
+
+using U16 __attribute__((vector_size(2 * kLanes))) = uint16_t;
+using I16 __attribute__((vector_size(2 * kLanes))) = int16_t;
+
+inline U16 all(uint16_t value) { return U16{} + value; }
+
+inline U16 load(const uint16_t* from) {
+  U16 v;
+  std::memcpy(&v, from, sizeof(v));
+  return v;
+}
+inline I16 load(const int16_t* from) {
+  I16 v;
+  std::memcpy(&v, from, sizeof(v));
+  return v;
+}
+inline void store(uint16_t* to, U16 v) { std::memcpy(to, &v, sizeof(v)); }
+inline void store(int16_t* to, I16 v) { std::memcpy(to, &v, sizeof(v)); }
+
+// lesser, greater; average: of two lanes, rounded up; product: the upper half, which is the product of fractions in
+// units of 2^-16; part_of: the product of a fraction in units of 2^-15 and a value, rounded to nearest.
+#if defined(__AVX512BW__)
+inline U16 lesser(U16 a, U16 b) { return (U16)_mm512_min_epu16((__m512i)a, (__m512i)b); }
+inline U16 greater(U16 a, U16 b) { return (U16)_mm512_max_epu16((__m512i)a, (__m512i)b); }
+inline U16 average(U16 a, U16 b) { return (U16)_mm512_avg_epu16((__m512i)a, (__m512i)b); }
+inline U16 product(U16 a, U16 b) { return (U16)_mm512_mulhi_epu16((__m512i)a, (__m512i)b); }
+inline I16 part_of(U16 a, I16 b) { return (I16)_mm512_mulhrs_epi16((__m512i)a, (__m512i)b); }
+inline U16 magnitude(I16 a) { return (U16)_mm512_abs_epi16((__m512i)a); }
+inline U16 load_bytes(const uint8_t* from) {
+  return (U16)_mm512_cvtepu8_epi16(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)));
+}
+#elif defined(__AVX2__)
+inline U16 lesser(U16 a, U16 b) { return (U16)_mm256_min_epu16((__m256i)a, (__m256i)b); }
+inline U16 greater(U16 a, U16 b) { return (U16)_mm256_max_epu16((__m256i)a, (__m256i)b); }
+inline U16 average(U16 a, U16 b) { return (U16)_mm256_avg_epu16((__m256i)a, (__m256i)b); }
+inline U16 product(U16 a, U16 b) { return (U16)_mm256_mulhi_epu16((__m256i)a, (__m256i)b); }
+inline I16 part_of(U16 a, I16 b) { return (I16)_mm256_mulhrs_epi16((__m256i)a, (__m256i)b); }
+inline U16 magnitude(I16 a) { return (U16)_mm256_abs_epi16((__m256i)a); }
+inline U16 load_bytes(const uint8_t* from) {
+  return (U16)_mm256_cvtepu8_epi16(_mm_loadu_si128(reinterpret_cast<const __m128i*>(from)));
+}
+#else
+template <typename F>
+U16 by_lane(U16 a, U16 b, const F& f) {
+  U16 r{};
+  for (int i = 0; i < kLanes; ++i) r[i] = static_cast<uint16_t>(f(uint32_t{a[i]}, uint32_t{b[i]}));
+  return r;
+}
+inline U16 lesser(U16 a, U16 b) { return a < b ? a : b; }
+inline U16 greater(U16 a, U16 b) { return a < b ? b : a; }
+inline U16 average(U16 a, U16 b) {
+  return by_lane(a, b, [](uint32_t x, uint32_t y) { return (x + y + 1) >> 1; });
+}
+inline U16 product(U16 a, U16 b) {
+  return by_lane(a, b, [](uint32_t x, uint32_t y) { return (x * y) >> 16; });
+}
+inline I16 part_of(U16 a, I16 b) {
+  const auto rounded = [](uint32_t x, uint32_t y) {
+    return (static_cast<int16_t>(x) * static_cast<int16_t>(y) + 0x4000) >> 15;
+  };
+  return (I16)by_lane(a, (U16)b, rounded);
+}
+inline U16 magnitude(I16 a) { return (U16)(a < 0 ? -a : a); }
+inline U16 load_bytes(const uint8_t* from) {
+  U16 v{};
+  for (int i = 0; i < kLanes; ++i) v[i] = from[i];
+  return v;
+}
+#endif
+
+} // namespace
+} // namespace packtrace
