@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Runs one fuzz target for some time, starting from the kept corpus and the inputs that earlier runs found.
-# Usage: tests/fuzz/run.sh TARGET SECONDS [LIBFUZZER OPTION...]      TARGET: tokenizer import ply image baked trace
+# Usage: tests/fuzz/run.sh TARGET SECONDS [LIBFUZZER OPTION...]      TARGET: tokenizer import ply image picture baked trace
 # Prints libFuzzer's counts: executions, executions per second, coverage (edges and features) and corpus size.
 # Exit code 1: there is a finding; its input is in build/fuzz/findings/TARGET. BUILD selects another build folder.
 set -euo pipefail
