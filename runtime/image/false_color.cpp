@@ -55,10 +55,10 @@ Vec3 heat_color(float t) {
 }
 
 Vec3 level_color(uint32_t level) {
-  constexpr Vec3 kColors[] = {{0.72f, 0.72f, 0.72f}, {0.90f, 0.25f, 0.20f}, {0.95f, 0.55f, 0.15f},
-                              {0.95f, 0.85f, 0.25f}, {0.35f, 0.75f, 0.30f}, {0.15f, 0.70f, 0.65f},
-                              {0.25f, 0.45f, 0.90f}, {0.55f, 0.35f, 0.85f}, {0.90f, 0.45f, 0.75f}};
-  return kColors[std::min<size_t>(level, std::size(kColors) - 1)];
+  constexpr Vec3 kLevelColors[] = {{0.72f, 0.72f, 0.72f}, {0.90f, 0.25f, 0.20f}, {0.95f, 0.55f, 0.15f},
+                                   {0.95f, 0.85f, 0.25f}, {0.35f, 0.75f, 0.30f}, {0.15f, 0.70f, 0.65f},
+                                   {0.25f, 0.45f, 0.90f}, {0.55f, 0.35f, 0.85f}, {0.90f, 0.45f, 0.75f}};
+  return kLevelColors[std::min<size_t>(level, std::size(kLevelColors) - 1)];
 }
 
 Vec3 id_color(uint32_t id) {

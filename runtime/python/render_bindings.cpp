@@ -14,6 +14,7 @@
 
 #include "compress/format/file/baked_file.h"
 #include "pbrt_import/base/error.h"
+#include "runtime/frame/ao_names.h"
 #include "runtime/frame/still.h"
 #include "runtime/frame/view_layers.h"
 #include "runtime/python/bindings.h"
@@ -70,6 +71,22 @@ void set_denoiser(StillConfig& config, const DenoiserChoice& choice) {
   config.denoiser.validate();
 }
 
+/// How occlusion rays are spent; settings by name, as `packtrace render --ao-set`.
+struct AoChoice {
+  std::optional<float> radius;
+  std::string resolution, rate, sampler;
+  std::map<std::string, double> settings;
+};
+
+void set_ao(StillConfig& config, const AoChoice& choice) {
+  if (choice.radius) config.ao.radius = *choice.radius;
+  config.ao_resolution = value_of(kAoResolutionNames, choice.resolution, "ao_resolution");
+  config.ao_rate = value_of(kAoRateNames, choice.rate, "ao_rate");
+  config.ao.sampler = value_of(kAoSamplerNames, choice.sampler, "ao_sampler");
+  for (const auto& [name, value] : choice.settings)
+    assign_setting(ao_settings(), name + "=" + setting_text(value), config.ao, "ambient occlusion");
+}
+
 /// Whether a layer is one of those that FrameConfig::view_layers fills.
 bool is_view(const std::string& layer) {
   return std::ranges::find(kTracedViews, layer) != kTracedViews.end() ||
@@ -112,7 +129,8 @@ py::dict render(const std::shared_ptr<BakedFile>& file, std::optional<std::pair<
                 std::optional<int64_t> camera_index, uint32_t frames, uint32_t spp, bool denoise,
                 const std::string& denoiser, const std::map<std::string, double>& denoiser_settings,
                 const std::optional<std::vector<std::string>>& layers, std::optional<float> ao_radius,
-                const std::string& backend, uint64_t seed) {
+                const std::string& ao_resolution, const std::string& ao_rate, const std::string& ao_sampler,
+                const std::map<std::string, double>& ao_settings, const std::string& backend, uint64_t seed) {
   RenderedImage image;
   {
     const py::gil_scoped_release release;
@@ -127,7 +145,7 @@ py::dict render(const std::shared_ptr<BakedFile>& file, std::optional<std::pair<
     set_denoiser(config, {denoise, denoiser, denoiser_settings});
     config.ao.spp = spp;
     config.ao.seed = seed;
-    config.ao.radius = ao_radius.value_or(0.0f);
+    set_ao(config, {ao_radius, ao_resolution, ao_rate, ao_sampler, ao_settings});
     config.validate();
     TracerConfig tracing;
     tracing.backend = chosen_backend(backend);
@@ -145,7 +163,9 @@ void bind_rendering(py::module_& module) {
   module.def("render", &render, py::arg("file").none(false), py::kw_only(), py::arg("size") = py::none(),
              py::arg("camera") = 0, py::arg("frames") = 32, py::arg("spp") = 1, py::arg("denoise") = true,
              py::arg("denoiser") = "ours", py::arg("denoiser_settings") = std::map<std::string, double>(),
-             py::arg("layers") = py::none(), py::arg("ao_radius") = py::none(), py::arg("backend") = "packed",
+             py::arg("layers") = py::none(), py::arg("ao_radius") = py::none(), py::arg("ao_resolution") = "full",
+             py::arg("ao_rate") = "full", py::arg("ao_sampler") = "net",
+             py::arg("ao_settings") = std::map<std::string, double>(), py::arg("backend") = "packed",
              py::arg("seed") = 0);
 }
 

@@ -79,6 +79,10 @@ def render(
     denoiser_settings: Mapping[str, float] = ...,
     layers: Optional[Sequence[str]] = ...,
     ao_radius: Optional[float] = ...,
+    ao_resolution: Literal["full", "quarter"] = ...,
+    ao_rate: Literal["full", "checkerboard", "adaptive"] = ...,
+    ao_sampler: Literal["net", "sobol", "jitter", "lattice", "independent"] = ...,
+    ao_settings: Mapping[str, float] = ...,
     backend: Literal["packed", "embree"] = ...,
     seed: int = ...,
 ) -> dict[str, NDArray[Any]]:
@@ -92,5 +96,6 @@ def render(
     `packtrace help denoise`; denoise=False is denoiser="off", without variance, history and disocclusion.
 
     size is (width, height), by default the camera's. camera counts from 0; None frames the whole scene, as for files
-    without cameras. ao_radius is in world units, by default a tenth of the scene's diagonal. Raises Error.
+    without cameras. ao_radius is in world units, by default a tenth of the scene's diagonal. ao_resolution, ao_rate and
+    ao_sampler are those of `packtrace help render`, ao_settings those of docs/ambient_occlusion.md. Raises Error.
     """

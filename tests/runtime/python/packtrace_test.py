@@ -121,6 +121,25 @@ class Module(unittest.TestCase):
                 view(**option)
             self.assertEqual(caught.exception.kind, "usage", option)
 
+    def test_occlusion_can_be_chosen(self):
+        file = packtrace.open(self.path)
+
+        def view(**options):
+            return packtrace.render(file, size=(64, 36), frames=2, denoise=False, **options)["ao"]
+
+        plain = view()
+        for option in ({"ao_resolution": "quarter"}, {"ao_rate": "checkerboard"}, {"ao_sampler": "sobol"},
+                       {"ao_settings": {"falloff": 0}}):
+            self.assertFalse(np.array_equal(plain, view(**option)), option)
+        np.testing.assert_array_equal(plain, view(ao_settings={"sort_rays": 1}))
+        np.testing.assert_array_equal(plain, view(ao_rate="adaptive"))  # all surfaces are equally new
+        np.testing.assert_array_equal(view(ao_radius=0.5), view(ao_settings={"radius": 0.5}))
+        for option in ({"ao_resolution": "x"}, {"ao_rate": "x"}, {"ao_sampler": "x"}, {"ao_settings": {"x": 1}},
+                       {"ao_settings": {"lambda": 99}}):
+            with self.assertRaises(packtrace.Error) as caught:
+                view(**option)
+            self.assertEqual(caught.exception.kind, "usage", option)
+
     def test_other_threads_run_meanwhile(self):
         file = packtrace.open(self.path)
         turns, done = 0, threading.Event()
