@@ -4,38 +4,50 @@
 #        ./check.sh tidy (clang-tidy on all sources; otherwise it checks those that changed since main)
 set -euo pipefail
 cd "$(dirname "$0")"
-started=$SECONDS
 presets=("$@")
 [ ${#presets[@]} -gt 0 ] || presets=(release asan)
+
+# begin_stage NAME ends the stage before and prints the name of the next.
+stage="" lines=()
+begin_stage() {
+  local fields cpu
+  read -ra fields </proc/$$/stat # 15 and 16: user and system time of waited-for children, in ticks
+  cpu=$(((fields[15] + fields[16]) / $(getconf CLK_TCK)))
+  [ -z "$stage" ] || lines+=("$(printf '%7d %7d  %s' $((SECONDS - stage_start)) $((cpu - stage_cpu)) "$stage")")
+  stage=$1 stage_start=$SECONDS stage_cpu=$cpu
+  echo "== $stage"
+}
 
 if [ -z "${PACKTRACE_SCENES:-}" ] && [ -d ../shared/scenes ]; then
   PACKTRACE_SCENES=$(cd ../shared/scenes && pwd)
   export PACKTRACE_SCENES
 fi
-echo "== Debian packages"
+begin_stage "Debian packages"
 # Some tests need these: clang compiles the fuzz preset's kernels, shells and man tools check the generated files, and
 # Chromium opens the HTML report.
-bash .ci/install_packages.sh tests benchmarks python clang-19 clang-format-19 clang-tidy-19 zsh fish mandoc groff-base chromium
+bash .ci/install_packages.sh window tests benchmarks python clang-19 clang-format-19 clang-tidy-19 zsh fish mandoc groff-base chromium
 export CTEST_PARALLEL_LEVEL=${CTEST_PARALLEL_LEVEL:-$(nproc)}
-echo "== Format"
+begin_stage "Format"
 find pbrt_import compress runtime tests assets docs \( -name '*.h' -o -name '*.cpp' \) -print0 |
   xargs -0 clang-format-19 --dry-run -Werror
 if [ "${presets[*]}" = tidy ]; then
-  echo "== clang-tidy (all sources)"
+  begin_stage "clang-tidy (all sources)"
   exec .ci/clang_tidy.sh all
 fi
 for preset in "${presets[@]}"; do
-  echo "== Build ($preset)"
-  options=(-DPACKTRACE_WERROR=ON)
-  # The Python module is tested with Debian's interpreter, whichever comes first in the PATH.
-  [ "$preset" != release ] ||
-    options+=(-DPACKTRACE_BUILD_PYTHON=ON -DPython_EXECUTABLE=/usr/bin/python3 -DPACKTRACE_UNITY=tools)
+  begin_stage "Configure ($preset)"
+  # Scripts and the Python module are tested with Debian's interpreter, whichever comes first in the PATH.
+  options=(-DPACKTRACE_WERROR=ON -DPython_EXECUTABLE=/usr/bin/python3)
+  [ "$preset" != release ] || options+=(-DPACKTRACE_BUILD_PYTHON=ON -DPACKTRACE_UNITY=all)
   cmake --preset "$preset" "${options[@]}" >/dev/null
-  [ "$preset" != release ] || { echo "== clang-tidy" && .ci/clang_tidy.sh; }
+  [ "$preset" != release ] || { begin_stage "clang-tidy" && .ci/clang_tidy.sh; }
+  begin_stage "Build ($preset)"
   cmake --build --preset "$preset"
-  echo "== Test ($preset)"
+  begin_stage "Test ($preset)"
   exclude=()
   [ "$preset" = release ] || exclude=(--label-exclude scenes) # whole scenes take too long with -O1 and sanitizers
   ctest --preset "$preset" --output-on-failure "${exclude[@]}"
 done
-echo "All checks passed in $((SECONDS - started)) s."
+begin_stage "Time"
+printf '%7s %7s\n' wall/s CPU/s
+printf '%s\n' "${lines[@]}" "All checks passed in $SECONDS s."
