@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs Debian 12 packages: those that packtrace itself needs, those of the groups named, and further ones by name.
 # Does nothing if all are installed.
-# Usage: .ci/install_packages.sh [tests | benchmarks | python | PACKAGE ...]
+# Usage: .ci/install_packages.sh [window | tests | benchmarks | python | PACKAGE ...]
 set -euo pipefail
 
 packages=(
@@ -12,6 +12,7 @@ packages=(
 )
 for argument in "$@"; do
   case $argument in
+    window) packages+=(libglfw3-dev libimgui-dev libopengl-dev libtomlplusplus-dev) ;; # of packtrace view
     tests)
       packages+=(
         ccache libgtest-dev libopenmesh-dev python3

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -18,6 +19,10 @@ struct AoOptions {
   std::optional<float> interreflection;
   std::vector<std::string> settings; ///< NAME=VALUE
 };
+
+/// Adds the option of a word_setting() with its help, words and default. `value` must outlive the verb.
+/// @param value in: the default
+CLI::Option* add_word_option(CLI::App& verb, std::string_view name, std::string& value);
 
 /// Adds the options whose names begin with --ao. `options` must outlive the verb.
 void add_ao_options(CLI::App& verb, AoOptions& options);

@@ -34,6 +34,9 @@ void add_export_command(CLI::App& app, GlobalOptions& globals);
 /// @param version the program's, for the report
 void add_measure_command(CLI::App& app, GlobalOptions& globals, const std::string& version);
 
+/// Adds `packtrace view FILE...`, which shows baked files and pbrt scenes live, or by a script without a window.
+void add_view_command(CLI::App& app, GlobalOptions& globals);
+
 /// Adds the verbs help, version, completion and man. They describe all verbs that `app` has when they are run.
 void add_help_commands(CLI::App& app, GlobalOptions& globals, const std::string& version);
 

@@ -8,8 +8,8 @@
 
 #include <CLI/CLI.hpp>
 
-#include "runtime/commands/layer_previews.h"
 #include "runtime/layered/layered_denoiser.h"
+#include "runtime/view/layer_previews.h"
 
 namespace packtrace {
 

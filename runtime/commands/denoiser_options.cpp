@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pbrt_import/base/error.h"
-#include "runtime/commands/option_checks.h"
+#include "runtime/commands/ao_options.h"
 
 namespace packtrace {
 namespace {
@@ -14,11 +14,7 @@ const char* preset_name(DenoiserKind kind) { return kind == DenoiserKind::kOurs 
 } // namespace
 
 void add_denoiser_options(CLI::App& verb, std::string& denoiser, std::vector<std::string>& settings) {
-  CLI::Option* kind = verb.add_option("--denoiser", denoiser,
-                                      "Denoiser of ambient occlusion. ours is the default; reference is the pipeline "
-                                      "of a public real-time sample, for comparison; off averages the frames")
-                          ->check(one_of({"ours", "reference", "off"}))
-                          ->default_str(denoiser);
+  CLI::Option* kind = add_word_option(verb, "denoiser", denoiser);
   verb.add_flag_callback(
           "--no-denoise", [&denoiser] { denoiser = "off"; }, "The same as --denoiser off")
       ->excludes(kind);

@@ -1,46 +1,23 @@
 #pragma once
 
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "pbrt_import/base/output_file.h"
-#include "runtime/commands/layer_previews.h"
+#include "runtime/frame/frame_config.h"
 #include "runtime/frame/rendered_image.h"
 #include "runtime/image/exr.h"
+#include "runtime/view/layer_previews.h"
+#include "runtime/view/layers.h"
 
 namespace packtrace {
 
-/// Which layers an image has besides the usual ones.
-struct AvailableLayers {
-  bool levels = false;   ///< camera rays use LOD levels
-  bool denoiser = false; ///< it is denoised, by a frame loop
-  bool views = true;     ///< it is rendered, not read from a file
-};
-
-/// Names of the layers that a render can write.
-const std::vector<std::string>& aov_names();
-
-/// Returns the layers to write, without repetitions. Throws Error(kUsage) for unknown layers.
-/// @param aovs layers from aov_names(), or "all"; empty: "ao"
-std::vector<std::string> chosen_layers(const std::vector<std::string>& aovs, AvailableLayers available);
-
-/// Same for an .exr file: without `aovs` the layers of the result, without views of intermediate ones.
-std::vector<std::string> chosen_exr_layers(const std::vector<std::string>& aovs, AvailableLayers available);
-
-/// Whether one of the layers is a view of intermediate results (runtime/frame/view_layers.h), and whether one needs the
-/// denoiser.
-bool has_view_layer(const std::vector<std::string>& layers);
-bool has_denoiser_layer(const std::vector<std::string>& layers);
-
-/// A layer of an .exr file, which refers to the image.
-/// @param aov one of aov_names()
-Layer exr_layer(const RenderedImage& image, const std::string& aov);
-
-/// Whether one of the layers needs LOD levels.
-bool has_lod_layer(const std::vector<std::string>& layers);
+/// The attributes of .exr files of a render.
+/// @param config with a positive AO radius
+/// @param frames of the picture
+ExrAttributes render_attributes(const FrameConfig& config, uint32_t frames);
 
 /// Splits words such as "x.png,x.exr" at commas. A word is split only if every part ends in .png or .exr, so that file
 /// names may contain commas.

@@ -21,7 +21,6 @@
 #include "runtime/commands/render_setup.h"
 #include "runtime/commands/seam_report.h"
 #include "runtime/commands/sequence_render.h"
-#include "runtime/layered/layered_picture.h"
 #include "runtime/stopwatch.h"
 
 namespace packtrace {
@@ -89,11 +88,7 @@ int run(const RenderOptions& options, const GlobalOptions& globals) {
   display.finish();
 
   const Stopwatch writing;
-  outputs.write(image, {{"comments", std::string("packtrace render")},
-                        {"aoRadius", static_cast<double>(config.ao.radius)},
-                        {"aoSpp", static_cast<int>(config.ao.spp)},
-                        {"frames", static_cast<int>(config.frames)},
-                        {kDenoisedAttribute, config.denoise ? 1 : 0}});
+  outputs.write(image, render_attributes(config, config.frames));
   timings.write_s = writing.seconds();
   const RayTracer& first_tracer = *loop.tracers().front();
   nlohmann::json result = render_json(options, config, image, report, loop, camera, outputs.targets(), timings);

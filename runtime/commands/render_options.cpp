@@ -30,21 +30,48 @@ void add_picture_options(CLI::App& verb, RenderOptions& options) {
           "NAME.LAYER.png")
       ->delimiter(',')
       ->type_name("LAYERS");
-  verb.add_option("--camera", options.camera,
-                  "Camera number in the scene, from 0, or auto for a view of the whole scene (default 0, or auto if "
-                  "there is no "
-                  "camera or camera 0 sees nothing)")
-      ->type_name("I|auto");
-  verb.add_option("--size", options.size,
-                  "Image size in pixels, for example 640x360 (default: the size of the scene's film, or 1280x720 with "
-                  "--camera auto)")
-      ->type_name("WxH");
   verb.add_option("--background", options.background,
                   "Background of .png files, where no surface is hit. A colour name, rrggbb in hexadecimal digits, "
                   "transparent or sky (default: light grey; sky for albedo and shaded). It does not affect .exr files")
       ->type_name("COLOR");
   verb.add_flag("--no-legend", options.no_legend,
                 "Do not add the colour scale below .png files of layers in false colours");
+}
+
+/// Options for the number of rays.
+void add_frame_options(CLI::App& verb, RenderOptions& options) {
+  verb.add_option("--frames", options.frames,
+                  "Number of frames to accumulate and denoise, 1..65536 (default 32). More frames give "
+                  "less noise and take longer. With --path, the number of pictures")
+      ->type_name("N");
+  verb.add_flag("--ground-truth", options.ground_truth,
+                "Render a reference image without denoiser, in 256 frames of 4 spp unless --frames or --spp are given. "
+                "Takes minutes");
+}
+
+/// @param baked whether the input is a .ptk file
+Backend choose_backend(const RenderOptions& options, bool baked) {
+  const bool needs_embree = options.bvh || options.fast_edges;
+  if (!options.backend) return baked && !needs_embree ? Backend::kPacked : Backend::kEmbree;
+  const std::string& name = *options.backend; // the option's check accepts only known names
+  if (name == "embree") return Backend::kEmbree;
+  if (needs_embree) throw Error(ErrorKind::kUsage, "--bvh and --fast-edges require --backend embree");
+  return Backend::kPacked;
+}
+
+} // namespace
+
+void add_view_options(CLI::App& verb, RenderOptions& options) {
+  verb.add_option(
+          "--camera", options.camera,
+          "Camera number in the scene, from 0, auto for a view of the whole scene, or "
+          "[I:]lookat:PX,PY,PZ,LX,LY,LZ[,UX,UY,UZ[,FOV]], which moves camera I, or 0, to a position and lets it "
+          "look at a point (default 0, or auto if there is no camera or camera 0 sees nothing)")
+      ->type_name("CAMERA");
+  verb.add_option("--size", options.size,
+                  "Image size in pixels, for example 640x360 (default: the size of the scene's film, or 1280x720 with "
+                  "--camera auto)")
+      ->type_name("WxH");
   verb.add_option(
           "--supersample", options.supersample,
           "Trace at N times the width and height and filter down, 1..8 (default 1), for smooth edges in few frames. "
@@ -52,17 +79,9 @@ void add_picture_options(CLI::App& verb, RenderOptions& options) {
       ->type_name("N");
 }
 
-/// Options for rays, samples and the denoiser.
-void add_sampling_options(CLI::App& verb, RenderOptions& options) {
-  verb.add_option("--frames", options.frames,
-                  "Number of frames to accumulate and denoise, 1..65536 (default 32). More frames give "
-                  "less noise and take longer. With --path, the number of pictures")
-      ->type_name("N");
+void add_quality_options(CLI::App& verb, RenderOptions& options) {
   verb.add_option("--spp", options.spp, "Ambient occlusion rays per pixel and frame, 1..65536 (default 1)")
       ->type_name("N");
-  verb.add_flag("--ground-truth", options.ground_truth,
-                "Render a reference image without denoiser, in 256 frames of 4 spp unless --frames or --spp are given. "
-                "Takes minutes");
   verb.add_flag("--no-jitter", options.no_jitter,
                 "Trace camera rays through pixel centres only. By default each frame shifts them within their pixels, "
                 "so that edges become smooth");
@@ -91,23 +110,13 @@ void add_tracer_options(CLI::App& verb, RenderOptions& options) {
       "but a few rays slip through between adjacent triangles");
 }
 
-/// @param baked whether the input is a .ptk file
-Backend choose_backend(const RenderOptions& options, bool baked) {
-  const bool needs_embree = options.bvh || options.fast_edges;
-  if (!options.backend) return baked && !needs_embree ? Backend::kPacked : Backend::kEmbree;
-  const std::string& name = *options.backend; // the option's check accepts only known names
-  if (name == "embree") return Backend::kEmbree;
-  if (needs_embree) throw Error(ErrorKind::kUsage, "--bvh and --fast-edges require --backend embree");
-  return Backend::kPacked;
-}
-
-} // namespace
-
 void add_render_options(CLI::App& verb, RenderOptions& options) {
   verb.add_option("FILE", options.input, ".ptk file, or .pbrt scene, which is traced as floats without compression")
       ->required();
   add_picture_options(verb, options);
-  add_sampling_options(verb, options);
+  add_view_options(verb, options);
+  add_frame_options(verb, options);
+  add_quality_options(verb, options);
   add_tracer_options(verb, options);
   add_lod_options(verb, options.lod);
   add_sequence_options(verb, options.sequence);
@@ -131,10 +140,8 @@ void require_denoiser_for(const std::vector<std::string>& layers, bool denoise) 
     throw Error(ErrorKind::kUsage, "the layers variance, history and disocclusion require a denoiser");
 }
 
-StillConfig make_config(const SceneSource& source, const Camera& camera, const RenderOptions& options,
-                        const DetailConfig& detail) {
-  StillConfig config;
-  config.size = options.size.empty() ? ImageSize{camera.width_px, camera.height_px} : parse_size(options.size);
+FrameConfig frame_config(const RenderOptions& options, const DetailConfig& detail) {
+  FrameConfig config;
   config.supersample = options.supersample;
   config.denoise = denoises(options);
   config.denoiser = denoiser_config(options.denoiser, options.denoiser_settings);
@@ -145,12 +152,20 @@ StillConfig make_config(const SceneSource& source, const Camera& camera, const R
                 "--ground-truth needs all pixels; it does not go with --ao-resolution quarter or --ao-rate");
   config.jitter = !options.no_jitter;
   config.detail = detail;
+  config.ao.seed = options.seed;
+  validate(config.ao);
+  return config;
+}
+
+StillConfig make_config(const SceneSource& source, const Camera& camera, const RenderOptions& options,
+                        const DetailConfig& detail) {
+  StillConfig config;
+  static_cast<FrameConfig&>(config) = frame_config(options, detail);
+  config.size = options.size.empty() ? ImageSize{camera.width_px, camera.height_px} : parse_size(options.size);
   // A sequence has its own numbers of pictures and frames.
   const uint64_t frames = options.frames.value_or(options.ground_truth ? kGroundTruthFrames : 32);
   config.frames = options.sequence.path ? 1 : static_cast<uint32_t>(std::min<uint64_t>(frames, ~0u));
-  config.ao.seed = options.seed;
   config.validate();
-  validate(config.ao);
   config.ao.radius = ao_radius(config.ao, source.world_bounds());
   return config;
 }

@@ -8,12 +8,12 @@
 
 #include "runtime/commands/ao_options.h"
 #include "runtime/commands/cli_support.h"
-#include "runtime/commands/layer_previews.h"
 #include "runtime/commands/loaded_scene.h"
 #include "runtime/commands/lod_render.h"
 #include "runtime/commands/sequence_options.h"
 #include "runtime/frame/still.h"
 #include "runtime/trace/make_tracer.h"
+#include "runtime/view/layer_previews.h"
 
 namespace packtrace {
 
@@ -43,6 +43,16 @@ struct RenderOptions {
 
 /// Adds all options of `render` to the verb. `options` must outlive it.
 void add_render_options(CLI::App& verb, RenderOptions& options);
+
+/// Parts of add_render_options() that other verbs have too: where the view is from and its size; rays, samples and the
+/// denoiser; the tracer.
+void add_view_options(CLI::App& verb, RenderOptions& options);
+void add_quality_options(CLI::App& verb, RenderOptions& options);
+void add_tracer_options(CLI::App& verb, RenderOptions& options);
+
+/// The settings of frames, without a size, and with a radius of 0 unless one is given. Throws Error(kUsage) for values
+/// out of range.
+FrameConfig frame_config(const RenderOptions& options, const DetailConfig& detail);
 
 /// What to render with the camera. Throws Error(kUsage) for values out of range.
 /// @param detail detail_config()

@@ -11,15 +11,11 @@
 namespace packtrace {
 namespace {
 
-/// Reserves the approximate memory of the G-buffer, the denoiser and the layers of a view. The image size may come from
+/// Reserves picture_bytes(). The image size may come from
 /// the scene file, so it is not trusted.
 MemoryReservation reserve_picture(const RenderOptions& options, const FrameConfig& config, const MemoryBudget& budget) {
-  const double pixel_bytes = (config.jitters() ? 400.0 : 320.0) + (config.view_layers ? 60.0 : 0.0);
-  constexpr double kMax = 0x1p62;
-  const double side = config.supersample;
-  const double bytes = pixel_bytes * side * side * static_cast<double>(config.size.width) * config.size.height;
   return with_file(options.input, [&] {
-    return MemoryReservation(budget, static_cast<uint64_t>(std::min(kMax, bytes)),
+    return MemoryReservation(budget, picture_bytes(config),
                              fmt::format("a picture of {} x {} pixels", config.size.width, config.size.height));
   });
 }

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "pbrt_import/scene/material_flag_names.h"
 #include "runtime/commands/file_report.h"
 
 namespace packtrace {
@@ -14,10 +15,6 @@ namespace {
 
 constexpr std::array<std::string_view, baked::kStreamCount> kStreamNames{"normals", "uv", "tangents"};
 constexpr std::array<std::string_view, baked::kPurposeCount> kPurposeNames{"ao", "shading"};
-constexpr std::array<std::string_view, 12> kFlagNames{"alpha mask", "shadow alpha mask", "transmissive", "mirror",
-                                                      "emissive",   "emits both sides",  "invisible",    "absent",
-                                                      "no shadow",  "albedo texture",    "normal map",   "metal"};
-static_assert(kAllMaterialFlags == (1u << kFlagNames.size()) - 1);
 
 uint32_t purpose_of(const FileSummary& s) { return s.bake.purpose & ((1u << baked::kKeepShift) - 1); }
 
@@ -72,13 +69,6 @@ std::string sentence(const baked::RequirementRecord& r, uint32_t purpose) {
   return text + fmt::format(grouped(), ", {:L} source bytes stored as {:L}", r.source_bytes, (r.stored_bits + 7) / 8);
 }
 
-std::string flag_list(MaterialFlags flags) {
-  std::string list;
-  for (size_t i = 0; i < kFlagNames.size(); ++i)
-    if ((flags >> i & 1u) != 0) list.append(list.empty() ? "" : ", ").append(kFlagNames[i]);
-  return list.empty() ? "none" : list;
-}
-
 int bits_for(uint32_t count) { return count > 0 ? std::bit_width(count - 1) : 0; }
 
 std::string materials_sentence(const FileSummary& s) {
@@ -87,8 +77,9 @@ std::string materials_sentence(const FileSummary& s) {
                      "materials: {:L} of {:L} in use, at most {:L} per geometry ({} bits); flags in use: {} ({} of {} "
                      "bits); flags that "
                      "{} uses: {}",
-                     s.materials_in_use, s.materials, s.max_slots, bits_for(s.max_slots), flag_list(s.material_flags),
-                     std::popcount(s.material_flags), kFlagNames.size(), kPurposeNames[purpose_of(s)], flag_list(read));
+                     s.materials_in_use, s.materials, s.max_slots, bits_for(s.max_slots),
+                     material_flag_words(s.material_flags), std::popcount(s.material_flags), kMaterialFlagNames.size(),
+                     kPurposeNames[purpose_of(s)], material_flag_words(read));
 }
 
 std::string sentence(const GeometryUse& use, uint32_t purpose) {
@@ -166,8 +157,8 @@ nlohmann::json requirements_json(const FileSummary& s, bool by_geometry) {
                                {"source_bytes", row.source_bytes},
                                {"stored_bytes", (row.stored_bits + 7) / 8}});
   nlohmann::json flags = nlohmann::json::array();
-  for (size_t i = 0; i < kFlagNames.size(); ++i)
-    if ((s.material_flags >> i & 1u) != 0) flags.push_back(kFlagNames[i]);
+  for (size_t i = 0; i < kMaterialFlagNames.size(); ++i)
+    if ((s.material_flags >> i & 1u) != 0) flags.push_back(kMaterialFlagNames[i]);
   json["materials"] = {{"in_use", s.materials_in_use}, {"most_in_a_geometry", s.max_slots}, {"flags", flags}};
   if (!by_geometry) return json;
   json["geometries"] = nlohmann::json::array();

@@ -19,7 +19,6 @@
 #include "runtime/commands/sequence_checkpoint.h"
 #include "runtime/commands/sequence_outputs.h"
 #include "runtime/commands/sequence_report.h"
-#include "runtime/layered/layered_picture.h"
 #include "runtime/stopwatch.h"
 
 namespace packtrace {
@@ -126,11 +125,7 @@ std::vector<PictureRow> render_pictures(const Sequence& sequence, uint64_t first
                                         SequenceOutputs& outputs, CsvOutput& csv, const SequenceCheckpoint* checkpoint,
                                         double checkpoint_s, Progress& progress) {
   FrameLoop& loop = *setup.loop;
-  const ExrAttributes attributes{{"comments", std::string("packtrace render")},
-                                 {"aoRadius", static_cast<double>(setup.config.ao.radius)},
-                                 {"aoSpp", static_cast<int>(setup.config.ao.spp)},
-                                 {"frames", static_cast<int>(sequence.subframes)},
-                                 {kDenoisedAttribute, setup.config.denoise ? 1 : 0}};
+  const ExrAttributes attributes = render_attributes(setup.config, sequence.subframes);
   std::vector<PictureRow> rows;
   RenderedImage image;
   Stopwatch since_checkpoint;

@@ -1,24 +1,12 @@
 #include "runtime/commands/sequence_report.h"
 
 #include <algorithm>
-#include <array>
-#include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 namespace packtrace {
 namespace {
-
-using Pass = std::pair<const char*, double PassTimes::*>;
-constexpr std::array<Pass, 8> kPasses{{{"update", &PassTimes::update_s},
-                                       {"plan", &PassTimes::plan_s},
-                                       {"build", &PassTimes::build_s},
-                                       {"primary", &PassTimes::primary_s},
-                                       {"ao", &PassTimes::ao_s},
-                                       {"denoise", &PassTimes::denoise_s},
-                                       {"upsample", &PassTimes::upsample_s},
-                                       {"resolve", &PassTimes::resolve_s}}};
 
 /// Value of a sorted list at a fraction of its length, rounded up.
 double at_fraction(const std::vector<double>& sorted, double fraction) {

@@ -54,7 +54,6 @@ CameraPath::CameraPath(std::vector<CameraKey> keys, const Camera& base) : keys_(
   for (size_t i = 0; i < keys_.size(); ++i)
     if (const std::string problem = camera_key_problem(keys_, i); !problem.empty())
       throw Error(ErrorKind::kUsage, std::string("key ").append(std::to_string(i)).append(": ").append(problem));
-  base_.animation = kNotAnimated;
 }
 
 CameraKey CameraPath::interpolated(double time_s) const {
@@ -79,18 +78,19 @@ CameraKey CameraPath::interpolated(double time_s) const {
   return key;
 }
 
-Camera CameraPath::camera_of(const CameraKey& key) const {
-  Camera camera = base_;
+Camera camera_of_key(const CameraKey& key, const Camera& base) {
+  Camera camera = base;
+  camera.animation = kNotAnimated;
   const DVec3 forward = glm::normalize(key.look - key.position);
   DVec3 right = glm::normalize(glm::cross(key.up, forward));
   const DVec3 up = glm::cross(forward, right);
-  if (glm::determinant(glm::dmat3(base_.world_from_camera)) < 0.0) right = -right;
+  if (glm::determinant(glm::dmat3(base.world_from_camera)) < 0.0) right = -right;
   camera.world_from_camera = DAffine(right, up, forward, key.position);
   camera.fov_degrees = key.fov_degrees;
   return camera;
 }
 
-Camera CameraPath::at(double time_s) const { return camera_of(interpolated(time_s)); }
+Camera CameraPath::at(double time_s) const { return camera_of_key(interpolated(time_s), base_); }
 
 Camera orbited(const Camera& camera, DVec3 pivot, DVec3 up, double degrees) {
   Camera turned = camera;

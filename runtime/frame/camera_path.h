@@ -17,6 +17,11 @@ struct CameraKey {
   double fov_degrees = 60.0; ///< perspective cameras: across the shorter image axis
 };
 
+/// The camera of a key alone.
+/// @param key without a camera_key_problem()
+/// @param base projection, screen window and film; its handedness is kept
+Camera camera_of_key(const CameraKey& key, const Camera& base);
+
 /// Returns what is wrong with a key and its predecessor: non-finite values, a time that does not ascend, a look at the
 /// position, an up along the view, a field of view outside (0, 180). Empty if nothing is.
 std::string camera_key_problem(std::span<const CameraKey> keys, size_t index);
@@ -40,7 +45,6 @@ public:
   Camera at(double time_s) const;
 
 private:
-  Camera camera_of(const CameraKey& key) const;
   CameraKey interpolated(double time_s) const;
 
   std::vector<CameraKey> keys_;

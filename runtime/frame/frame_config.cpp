@@ -1,5 +1,6 @@
 #include "runtime/frame/frame_config.h"
 
+#include <algorithm>
 #include <string>
 
 #include "pbrt_import/base/error.h"
@@ -37,6 +38,14 @@ void FrameConfig::validate() const {
   require_setting(width <= kMaxTracedSide && height <= kMaxTracedSide && width * height <= kMaxTracedPixels,
                   "image size times supersample exceeds 65536 per side or 2^28 pixels");
   detail.validate();
+}
+
+uint64_t picture_bytes(const FrameConfig& config) {
+  const double pixel_bytes = (config.jitters() ? 400.0 : 320.0) + (config.view_layers ? 60.0 : 0.0);
+  constexpr double kMax = 0x1p62;
+  const double side = config.supersample;
+  const double bytes = pixel_bytes * side * side * static_cast<double>(config.size.width) * config.size.height;
+  return static_cast<uint64_t>(std::min(kMax, bytes));
 }
 
 } // namespace packtrace

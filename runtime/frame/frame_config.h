@@ -62,4 +62,7 @@ struct FrameConfig {
   void validate() const;
 };
 
+/// Approximate memory of the G-buffer, the denoiser and the layers of a view.
+uint64_t picture_bytes(const FrameConfig& config);
+
 } // namespace packtrace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <string_view>
 
 #include "pbrt_import/base/error.h"
 #include "runtime/ao/moved_occluders.h"
@@ -78,6 +79,16 @@ void FrameLoop::reset() {
   adaptive_.clear();
 }
 
+void FrameLoop::configure(const FrameConfig& config) {
+  const DetailConfig detail = config_.detail;
+  config_ = validated(config);
+  config_.detail = detail;
+  denoiser_ = AoDenoiser(config_.denoiser);
+  denoised_ = nullptr;
+  views_.clear();
+  reset();
+}
+
 std::vector<std::byte> FrameLoop::save() const {
   const std::vector<std::byte> mean = raw_mean_.save(), rate = adaptive_.save(), history = denoiser_.save();
   const std::vector<uint8_t> state = state_.save();
@@ -113,13 +124,14 @@ void FrameLoop::restore(const Camera& camera, double time_s, std::span<const std
   denoiser_.restore(shaded, history);
   // Camera rays are traced again: they depend on the camera alone.
   layers_.clear();
+  Progress unseen;
   if (!state_.restore(time_s, {reinterpret_cast<const uint8_t*>(state.data()), state.size()}, report_)) fail();
   for (still_frames_ = 0;; ++still_frames_) {
     report_ = {};
     report_.moved = still_frames_ == 0;
     if (traces(still_frames_)) {
       const PrimaryCamera view = view_of(camera, still_frames_);
-      trace_camera_rays(view);
+      trace_camera_rays(view, unseen);
       layers_.add(gbuffer_, scene().source->materials());
       if (config_.lod_layers) add_lod_layers(view);
     }
@@ -136,13 +148,13 @@ uint64_t FrameLoop::frame_pixels() const {
   return uint64_t{(size.width + 1) / 2} * ((size.height + 1) / 2);
 }
 
-/// Traces the camera rays into gbuffer_.
-void FrameLoop::trace_camera_rays(const PrimaryCamera& view) {
+/// Traces the camera rays into gbuffer_. Their tiles do not count in the progress, but it can cancel them.
+void FrameLoop::trace_camera_rays(const PrimaryCamera& view, Progress& progress) {
   const bool levels = config_.detail.camera_uses_levels();
   if (levels && report_.moved) state_.choose_detail(view, nullptr, report_);
   if (!levels) state_.build_level_0(report_);
   const RayTracer& tracer = *tracers().front();
-  Progress unseen;
+  Progress unseen([&progress](std::string_view, uint64_t, uint64_t) { progress.advance(0); });
   const Stopwatch tracing;
   const bool moved_on = report_.moved && view_; // not the first frame
   std::optional<DeformedPast> surfaces;
@@ -199,8 +211,8 @@ PrimaryCamera FrameLoop::view_of(const Camera& camera, uint32_t still_frame) con
 }
 
 /// The samples of the next frame.
-SamplePlan FrameLoop::sample_plan(const GBuffer& shaded) {
-  if (config_.ao_rate == AoRate::kAdaptive) return adaptive_.next_frame(shaded, !report_.moved, config_.ao.spp);
+SamplePlan FrameLoop::sample_plan(const GBuffer& shaded, std::span<const float> limits) {
+  if (config_.ao_rate == AoRate::kAdaptive) return adaptive_.next_frame(shaded, !report_.moved, config_.ao.spp, limits);
   SamplePlan plan;
   plan.count = config_.ao.spp;
   const auto frame = static_cast<uint32_t>(next_number_);
@@ -224,19 +236,24 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
   const bool trace = traces(still_frames_);
   const PrimaryCamera view = view_of(camera, still_frames_);
   if (trace)
-    trace_camera_rays(view);
+    trace_camera_rays(view, progress);
   else if (still_frames_ == 1)
     forget_motion(gbuffer_);
-  camera_ = camera;
-  view_.emplace(camera, config_.traced_size());
   report_.seen = report_.hit_pixels > 0;
 
   const bool quarter = config_.ao_resolution == AoResolution::kQuarter;
   if (quarter && still_frames_ == 1) forget_motion(half_.gbuffer);
   const GBuffer& shaded = quarter ? half_.gbuffer : gbuffer_;
+  const Stopwatch limiting;
+  std::vector<float> limits;
+  if (moved && config_.denoise)
+    limits =
+        history_limits(state_.moved_boxes(), shaded, config_.ao, ao_radius(config_.ao, traced_source().world_bounds()));
+  report_.times.denoise_s += limiting.seconds();
   const Stopwatch tracing;
-  report_.ao_rays =
-      trace_ao(traced_source(), *tracers().back(), shaded, config_.ao, sample_plan(shaded), raw_, progress);
+  const SamplePlan plan = sample_plan(shaded, limits);
+  report_.ao_rays = trace_ao(traced_source(), *tracers().back(), shaded, config_.ao, plan, raw_, progress);
+  raw_.max_history = std::move(limits);
   report_.times.ao_s += tracing.seconds();
 
   const Stopwatch layering;
@@ -247,9 +264,6 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
   report_.times.resolve_s += layering.seconds();
 
   const Stopwatch accumulating;
-  if (moved && config_.denoise)
-    limit_history(state_.moved_boxes(), shaded, config_.ao, ao_radius(config_.ao, traced_source().world_bounds()),
-                  raw_);
   if (!config_.denoise) {
     if (moved) raw_mean_.clear();
     raw_mean_.add(raw_);
@@ -260,6 +274,8 @@ const FrameReport& FrameLoop::next_frame(const Camera& camera, double time_s, Pr
     denoiser_.add_frame(shaded, raw_);
   }
   report_.times.denoise_s += accumulating.seconds();
+  camera_ = camera;
+  view_.emplace(camera, config_.traced_size());
   ++next_number_;
   return report_;
 }

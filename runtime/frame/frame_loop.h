@@ -34,7 +34,9 @@ public:
   /// Renders the next frame.
   /// @param time_s time of FrameScene::motion in seconds
   /// @param progress advances by frame_pixels(); the caller begins the phase
-  /// Throws Error(kInput) for a camera without rays, Error(kCancelled), and what building trees throws.
+  /// Throws Error(kInput) for a camera without rays, Error(kCancelled), and what building trees throws. A frame that
+  /// was cancelled leaves no trace in the history, but call reset() if the scene moves, or before a still view
+  /// continues.
   const FrameReport& next_frame(const Camera& camera, double time_s, Progress& progress);
 
   /// Writes the layers of the frames so far.
@@ -47,6 +49,12 @@ public:
   /// @param camera, time_s those of the last frame
   /// Throws Error(kInput) for bytes that save() did not write, and as next_frame() does.
   void restore(const Camera& camera, double time_s, std::span<const std::byte> bytes);
+
+  /// Goes on with other settings, whose `detail` is not read: levels of detail stay as they are. All frames are
+  /// forgotten; trees are kept. Throws Error(kUsage) for settings out of range.
+  void configure(const FrameConfig& config);
+  /// Sets FrameConfig::view_layers, from the next frame on. Forgets nothing.
+  void show_views(bool shown) { config_.view_layers = shown; }
 
   /// Number of occlusion pixels per frame.
   uint64_t frame_pixels() const;
@@ -64,10 +72,10 @@ public:
   const GBuffer& gbuffer() const { return gbuffer_; }
 
 private:
-  void trace_camera_rays(const PrimaryCamera& view);
+  void trace_camera_rays(const PrimaryCamera& view, Progress& progress);
   PrimaryCamera view_of(const Camera& camera, uint32_t still_frame) const;
   bool traces(uint32_t still_frame) const;
-  SamplePlan sample_plan(const GBuffer& shaded);
+  SamplePlan sample_plan(const GBuffer& shaded, std::span<const float> limits);
   void add_lod_layers(const PrimaryCamera& view);
   std::vector<float> accumulated_ao(PictureReport& report);
   void resolve_views(RenderedImage& image);

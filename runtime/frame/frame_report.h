@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <utility>
 
 namespace packtrace {
 
@@ -18,6 +20,17 @@ struct PassTimes {
   PassTimes& operator+=(const PassTimes& other);
   double total_s() const { return update_s + plan_s + build_s + primary_s + ao_s + denoise_s + upsample_s + resolve_s; }
 };
+
+/// The passes with their names in reports, in their order.
+inline constexpr std::array<std::pair<const char*, double PassTimes::*>, 8> kPasses{
+    {{"update", &PassTimes::update_s},
+     {"plan", &PassTimes::plan_s},
+     {"build", &PassTimes::build_s},
+     {"primary", &PassTimes::primary_s},
+     {"ao", &PassTimes::ao_s},
+     {"denoise", &PassTimes::denoise_s},
+     {"upsample", &PassTimes::upsample_s},
+     {"resolve", &PassTimes::resolve_s}}};
 
 /// What happened in a frame.
 struct FrameReport {

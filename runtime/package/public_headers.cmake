@@ -78,7 +78,6 @@ set(packtrace_public_headers
   runtime/lod/lod_sharing.h
   runtime/lod/sharing_balance.h
   runtime/lod/sharing_config.h
-  runtime/camera/surface_motion.h
   runtime/frame/camera_path.h
   runtime/frame/detail.h
   runtime/frame/frame_config.h

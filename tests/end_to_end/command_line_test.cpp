@@ -55,12 +55,6 @@ TEST(CommandLine, OtherFilesThanScenesAreNamedForWhatTheyAre) {
   }
 }
 
-TEST(CommandLine, PlannedVerbSaysThatItIsNotThereYet) {
-  const CommandResult result = run_packtrace({"view"});
-  EXPECT_EQ(result.exit_code, 4);
-  EXPECT_NE(result.err.find("view"), std::string::npos) << result.err;
-}
-
 TEST(CommandLine, OptionOutOfRangeIsAUsageErrorAndWritesNothing) {
   const Workbench bench;
   for (const auto& [option, value] :

@@ -10,9 +10,9 @@ namespace packtrace::test {
 namespace {
 
 /// Runs with --json - and returns the "error" object.
-nlohmann::json error_of(std::vector<std::string> words) {
+nlohmann::json error_of(std::vector<std::string> words, const std::vector<std::string>& environment = {}) {
   words.insert(words.end(), {"--json", "-"});
-  const CommandResult result = run_packtrace(words);
+  const CommandResult result = run_packtrace(words, environment);
   const auto document = nlohmann::json::parse(result.out, nullptr, false);
   if (document.is_discarded() || !document.contains("error")) {
     ADD_FAILURE() << words[0] << ": " << result.out;
@@ -31,7 +31,7 @@ TEST(FailureJson, EveryKindOfFailureIsWritten) {
   EXPECT_EQ(error_of({"info", bench / "none.ptk"}).at("kind"), "input");
   EXPECT_EQ(error_of({"bake", bench.scene(), "-o", bench.baked()}).at("kind"), "io");
   EXPECT_EQ(error_of({"render", bench.baked(), "-o", bench / "a.png", "--camera", "9"}).at("kind"), "usage");
-  EXPECT_EQ(error_of({"view"}).at("kind"), "unsupported");
+  EXPECT_EQ(error_of({"view", bench.baked()}, {"DISPLAY="}).at("kind"), "unsupported");
 }
 
 TEST(FailureJson, UsageErrorsAreWrittenToo) {

@@ -1,4 +1,4 @@
-#include "runtime/commands/layer_previews.h"
+#include "runtime/view/layer_previews.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "pbrt_import/base/memory_budget.h"
+#include "pbrt_import/base/progress.h"
+#include "runtime/frame/frame_loop.h"
+#include "runtime/view/view_file.h"
+
+namespace packtrace {
+
+/// What one half of a view shows.
+struct PaneState {
+  size_t file = 0;          ///< number of the ViewFile
+  std::string layer = "ao"; ///< a layer of view_layer_names()
+  FrameConfig config;       ///< settings; its size and layers follow from the view, an AO radius of 0 from the scene
+
+  bool ground_truth() const { return layer == kGroundTruth; }
+  /// The layer of the image: "ao" for the ground truth.
+  std::string image_layer() const { return ground_truth() ? "ao" : layer; }
+  /// The settings with which the layer is rendered: those of `render --ground-truth` for the ground truth.
+  FrameConfig rendered_config() const;
+
+  static constexpr const char* kGroundTruth = "ground_truth";
+};
+
+/// Renders the frames of a pane: a frame loop, which is kept while the scene stays, and its last image.
+class PaneRenderer {
+public:
+  /// @param file must outlive this object's use
+  /// @param played the scene moves
+  /// Throws like FrameLoop, and MemoryError.
+  PaneRenderer(const ViewFile& file, bool played, const FrameConfig& config, const MemoryBudget& budget);
+
+  /// Whether the frame loop renders this scene.
+  bool fits(const ViewFile& file, bool played) const;
+  /// Goes on with other settings. Returns whether the frames so far were forgotten.
+  bool configure(const FrameConfig& config);
+  /// Forgets all frames, as if none had been rendered.
+  void restart();
+
+  /// Renders a frame. Throws like FrameLoop::next_frame().
+  void next_frame(const Camera& camera, double time_s, Progress& progress);
+  /// Writes image() from the frames so far.
+  void resolve();
+
+  const RenderedImage& image() const { return image_; }
+  const FrameLoop& loop() const { return *loop_; }
+  /// Of the last frame and resolve().
+  const PictureReport& report() const { return report_; }
+
+private:
+  const void* owner_; ///< tells files apart
+  bool played_;
+  MemoryReservation memory_;
+  std::unique_ptr<FrameLoop> loop_;
+  RenderedImage image_;
+  PictureReport report_;
+};
+
+} // namespace packtrace

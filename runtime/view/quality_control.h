@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+
+#include "runtime/frame/frame_config.h"
+
+namespace packtrace {
+
+/// Steps by which the frames of a moving view become cheaper: the resolution falls by eighths per axis to a half, then
+/// occlusion is traced for every other pixel, then for one of 2 x 2.
+inline constexpr uint32_t kCheapestStep = 6;
+
+/// The settings of a frame at a step; step 0 changes nothing. Sides are at least 1 pixel.
+FrameConfig at_quality_step(const FrameConfig& config, uint32_t step);
+
+/// Chooses the step from the times of the frames before, towards a time per frame. Two frames in a row that take more
+/// than 1.1 times the target go a step down, or several if one cannot suffice; 12 in a row that take less than 0.7
+/// times as long go a step up. A step loses the history, so steps are rare.
+class QualityControl {
+public:
+  /// @param target_ms positive; 0: always step 0
+  explicit QualityControl(double target_ms = 0.0) : target_ms_(target_ms) {}
+
+  uint32_t step() const { return step_; }
+  double target_ms() const { return target_ms_; }
+  /// Adds the time of a moving frame at step().
+  void add(double frame_ms);
+
+private:
+  double target_ms_;
+  uint32_t step_ = 0, slow_ = 0, fast_ = 0; ///< consecutive frames above and below the target
+};
+
+} // namespace packtrace

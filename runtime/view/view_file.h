@@ -1,0 +1,28 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "runtime/frame/scene_state.h"
+
+namespace packtrace {
+
+/// A file that is shown.
+struct ViewFile {
+  std::string name;                  ///< as it was given
+  std::shared_ptr<const void> owner; ///< of everything below
+  FrameScene at_rest;                ///< nothing moves
+  FrameScene moving;                 ///< with the scene's motion; like at_rest if it has none
+  double begin_s = 0.0, end_s = 0.0; ///< of the motion
+  /// Names of the instances, by number. Called when the first is needed.
+  std::function<const std::vector<std::string>&()> instance_names;
+  std::vector<std::string> material_names; ///< by number
+  std::vector<std::string> words;          ///< options of `render` that load the file so, such as --world 2
+  std::string base_camera = "0";           ///< `render --camera` that gives the camera to start from
+
+  bool moves() const { return moving.motion != nullptr || moving.deforms; }
+};
+
+} // namespace packtrace

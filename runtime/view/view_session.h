@@ -1,0 +1,159 @@
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "runtime/image/image.h"
+#include "runtime/view/pane.h"
+#include "runtime/view/pick.h"
+#include "runtime/view/quality_control.h"
+#include "runtime/view/view_camera.h"
+#include "runtime/view/view_difference.h"
+
+namespace packtrace {
+
+/// How a view shows its two panes.
+enum class SplitMode : uint8_t {
+  kOff,        ///< the first pane alone
+  kDivider,    ///< the first left of the divider, the second right of it
+  kDifference, ///< their difference
+};
+
+/// What happened in a frame of a view.
+struct ViewFrame {
+  bool moving = false;
+  uint32_t still_frames = 0; ///< frames of the still picture, 0 while something moves
+  uint32_t quality_step = 0; ///< at_quality_step()
+  double time_s = 0.0;       ///< of the scene's motion
+  ImageSize traced;          ///< pixels that were traced, of the first pane
+  PictureReport report;      ///< sums over the panes
+};
+
+/// The layers that a pane can show: those of `render --aov`, and "ground_truth".
+std::vector<std::string> view_layer_names();
+
+/// What a viewer shows, without a window: files, two panes, a camera, and a frame after another. While something moves,
+/// each frame continues the history of the one before, at a lower quality if QualityControl asks for it. Once nothing
+/// moves, a still picture begins: its N-th frame has the bytes that `render --frames N` writes for command().
+///
+/// Frames depend on the calls and nothing else, in particular not on the number of threads. Use it from one thread at a
+/// time.
+class ViewSession {
+public:
+  struct Config {
+    ImageSize size;
+    FrameConfig frame; ///< AoConfig::radius is 0 unless one was chosen
+    double target_ms = 0.0;
+    MemoryBudget memory;
+  };
+
+  /// @param files at least one; the first one's camera and up axis control the view
+  /// @param camera of the first file
+  ViewSession(std::vector<ViewFile> files, ViewCamera camera, const Config& config);
+
+  // What is shown. Functions that change it restart the still picture if they change what is rendered; they throw
+  // Error(kUsage) for what is not possible, and then change nothing.
+  const std::vector<ViewFile>& files() const { return files_; }
+  /// Replaces a file, for example by its new content; camera and settings stay.
+  void replace_file(size_t index, ViewFile file);
+  void add_file(ViewFile file) { files_.push_back(std::move(file)); }
+  void resize(ImageSize size);
+  ImageSize size() const { return size_; }
+  void set_split(SplitMode mode);
+  SplitMode split() const { return split_; }
+  /// @param fraction of the picture's width, clamped to [0, 1]
+  void set_divider(double fraction);
+  double divider() const { return divider_; }
+  /// @param gain in (0, 1000]
+  void set_gain(double gain);
+  double gain() const { return gain_; }
+  const PaneState& pane(size_t index) const { return panes_[index]; }
+  void set_layer(size_t pane, const std::string& layer);
+  void set_file(size_t pane, size_t file);
+  void set_setting(size_t pane, std::string_view name, std::string_view value);
+  /// @param target_ms in [0, 1e6]; 0: frames take the time that they need
+  void set_target_ms(double target_ms);
+  double target_ms() const { return quality_.target_ms(); }
+  /// Fixes the step of moving frames; none: QualityControl chooses.
+  void fix_quality(std::optional<uint32_t> step);
+  /// Begins the still picture again with the next frame.
+  void restart() { restart_ = true; }
+  /// Whether images have the denoiser's and tracer's views even if no pane shows one.
+  void keep_views(bool kept) { keep_views_ = kept; }
+
+  // The camera and the scene's time.
+  const ViewCamera& camera() const { return camera_; }
+  /// Moves the camera, for the next frame: change(ViewCamera&).
+  template <typename Change>
+  void move_camera(const Change& change) {
+    change(camera_);
+    moved_ = true;
+  }
+  /// Shows the scene at a time of its motion, or at rest.
+  void set_time(std::optional<double> time_s);
+  std::optional<double> time() const { return time_; }
+  /// Points the pivot at the surface in a pixel of the first pane. Returns false if there is none.
+  bool set_pivot(uint32_t x, uint32_t y);
+  /// Makes the first pane's bounds fill the view.
+  void frame_scene();
+
+  /// Renders the next frame of all panes that are shown. Returns false if the observer of the progress ended it by
+  /// Error(kCancelled); the still picture then begins again. Throws like FrameLoop::next_frame(), and MemoryError.
+  bool step(Progress& progress);
+  const ViewFrame& last() const { return last_; }
+  /// Whether the next frame begins anew: something moved or was changed since the last one.
+  bool changed() const { return moved_ || restart_ || changed_; }
+  /// Reports how long the last moving frame took, for QualityControl.
+  void add_frame_time(double ms) {
+    if (last_.moving) quality_.add(ms);
+  }
+
+  // The result of the frames so far; needs a step() before.
+  /// The image of a pane; of the first one for a pane that is not shown.
+  const RenderedImage& image(size_t pane);
+  /// The settings with which it was rendered.
+  const FrameConfig& rendered_config(size_t pane) const;
+  /// The picture on the screen, as three channels of display values, without legends.
+  Image picture();
+  DifferenceMetrics metrics();
+  /// @param x, y pixel of the picture of size()
+  Pick pick(size_t pane, uint32_t x, uint32_t y);
+  /// The pane at a column of the picture.
+  size_t pane_at(uint32_t x) const;
+  /// The words of the command whose picture of this layer has the same bytes as the pane's, without outputs; empty
+  /// while something moves.
+  std::vector<std::string> command(size_t pane) const;
+
+private:
+  size_t shown_panes() const { return split_ == SplitMode::kOff ? 1 : 2; }
+  void prepare(uint32_t quality);
+  FrameConfig frame_config(const PaneState& pane, uint32_t quality) const;
+  void require_layer(const PaneState& pane) const;
+  void change_pane(size_t index, const PaneState& changed);
+  void resolve();
+
+  std::vector<ViewFile> files_;
+  ViewCamera camera_;
+  ImageSize size_;
+  MemoryBudget memory_;
+  QualityControl quality_;
+  std::optional<uint32_t> fixed_quality_;
+  std::array<PaneState, 2> panes_;
+  std::array<std::shared_ptr<PaneRenderer>, 2> renderers_; ///< the same if both panes are rendered alike
+  SplitMode split_ = SplitMode::kOff;
+  double divider_ = 0.5, gain_ = 8.0;
+  std::optional<double> time_;
+  bool keep_views_ = false;
+  bool moved_ = false; ///< since the last frame
+  uint32_t still_frames_ = 0;
+  bool restart_ = true;   ///< the next still frame is the first
+  bool changed_ = false;  ///< panes, settings or the size, since the last frame
+  bool resolved_ = false; ///< the images are those of the last frame
+  ViewFrame last_;
+};
+
+} // namespace packtrace

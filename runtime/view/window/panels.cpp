@@ -1,0 +1,267 @@
+#include "runtime/view/window/panels.h"
+
+#include <algorithm>
+#include <cstdlib>
+
+#include <fmt/format.h>
+#include <imgui.h>
+
+namespace packtrace {
+namespace {
+
+constexpr size_t kGraphFrames = 120;
+constexpr float kPanelWidth = 300.0f, kMargin = 8.0f;
+
+void text_line(const std::string& text) { ImGui::TextUnformatted(text.c_str(), text.c_str() + text.size()); }
+
+void tooltip(const std::string& text) {
+  if (!ImGui::IsItemHovered()) return;
+  ImGui::BeginTooltip();
+  ImGui::PushTextWrapPos(ImGui::GetFontSize() * 28.0f);
+  text_line(text);
+  ImGui::PopTextWrapPos();
+  ImGui::EndTooltip();
+}
+
+/// A list to choose a word from. Returns whether another was chosen.
+bool choose(const char* label, const std::vector<std::string>& words, std::string& word) {
+  bool changed = false;
+  if (!ImGui::BeginCombo(label, word.c_str())) return false;
+  for (const std::string& candidate : words)
+    if (ImGui::Selectable(candidate.c_str(), candidate == word)) word = candidate, changed = true;
+  ImGui::EndCombo();
+  return changed;
+}
+
+/// A slider or a field for a number. Returns whether the value was changed.
+bool edit_number(const ViewSetting& s, const char* label, std::string& value) {
+  const double number = std::strtod(value.c_str(), nullptr);
+  const bool wide = s.high - s.low > 1000.0;
+  bool changed = false;
+  if (s.is_integer) {
+    int whole = static_cast<int>(std::clamp(number, -2e9, 2e9));
+    changed = wide ? ImGui::InputInt(label, &whole)
+                   : ImGui::SliderInt(label, &whole, static_cast<int>(s.low), static_cast<int>(s.high), "%d",
+                                      ImGuiSliderFlags_AlwaysClamp);
+    if (s.rule == SettingRule::kOdd) whole |= 1;
+    value = std::to_string(whole);
+  } else {
+    auto real = static_cast<float>(number);
+    changed = wide ? ImGui::InputFloat(label, &real, 0.0f, 0.0f, "%.4g", ImGuiInputTextFlags_EnterReturnsTrue)
+                   : ImGui::SliderFloat(label, &real, static_cast<float>(s.low), static_cast<float>(s.high), "%.4g",
+                                        ImGuiSliderFlags_AlwaysClamp);
+    value = setting_text(double{real});
+  }
+  return changed;
+}
+
+/// The widget of a setting. A double click on its name goes back to the default.
+bool edit_setting(const ViewSetting& s, std::string& value) {
+  value = s.value;
+  const std::string label = "##" + s.name;
+  bool changed = false;
+  ImGui::SetNextItemWidth(120.0f);
+  if (!s.words.empty()) {
+    changed = choose(label.c_str(), s.words, value);
+  } else if (s.is_switch) {
+    bool on = value == "on";
+    changed = ImGui::Checkbox(label.c_str(), &on);
+    value = on ? "on" : "off";
+  } else {
+    changed = edit_number(s, label.c_str(), value);
+  }
+  ImGui::SameLine();
+  const std::string shown = s.name.substr(s.name.find('.') == std::string::npos ? 0 : s.name.find('.') + 1);
+  if (s.value == s.default_value)
+    ImGui::TextDisabled("%s", shown.c_str());
+  else
+    text_line(shown);
+  const bool reset = ImGui::IsItemHovered() && ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left);
+  const std::string range = s.words.empty() && !s.is_switch ? fmt::format("{:.6g} to {:.6g}, ", s.low, s.high) : "";
+  tooltip(fmt::format("{}\n{}default {}", s.help, range, s.default_value));
+  if (reset) value = s.default_value;
+  return changed || reset;
+}
+
+void draw_settings(const std::vector<ViewSetting>& settings, size_t pane, FrameThread& frames) {
+  static constexpr std::array<std::pair<const char*, const char*>, 3> kGroups{
+      {{"frames", "Frames"}, {"ao", "Ambient occlusion"}, {"denoiser", "Denoiser"}}};
+  for (const auto& [group, title] : kGroups) {
+    if (!ImGui::CollapsingHeader(title)) continue;
+    for (const ViewSetting& setting : settings) {
+      std::string value;
+      if (setting.group != group || !edit_setting(setting, value)) continue;
+      frames.post([pane, name = setting.name, value](ViewSession& session, ViewControls&) {
+        session.set_setting(pane, name, value);
+      });
+    }
+  }
+}
+
+/// Chooses the file and the view of a pane.
+void draw_pane(size_t pane, const ViewSnapshot& shown, FrameThread& frames) {
+  ImGui::PushID(static_cast<int>(pane));
+  std::string layer = shown.layers[pane];
+  ImGui::SetNextItemWidth(150.0f);
+  if (choose(pane == 0 ? "view" : "second view", view_layer_names(), layer))
+    frames.post([pane, layer](ViewSession& session, ViewControls&) { session.set_layer(pane, layer); });
+  if (shown.files.size() > 1) {
+    ImGui::SetNextItemWidth(150.0f);
+    if (ImGui::BeginCombo("file", shown.files[shown.pane_files[pane]].c_str())) {
+      for (size_t i = 0; i < shown.files.size(); ++i)
+        if (ImGui::Selectable(shown.files[i].c_str(), i == shown.pane_files[pane]))
+          frames.post([pane, i](ViewSession& session, ViewControls&) { session.set_file(pane, i); });
+      ImGui::EndCombo();
+    }
+  }
+  ImGui::PopID();
+}
+
+void draw_split(const ViewSnapshot& shown, FrameThread& frames) {
+  int mode = static_cast<int>(shown.split);
+  bool changed = ImGui::RadioButton("one view", &mode, 0);
+  ImGui::SameLine();
+  changed = ImGui::RadioButton("split", &mode, 1) || changed;
+  ImGui::SameLine();
+  changed = ImGui::RadioButton("difference", &mode, 2) || changed;
+  if (changed)
+    frames.post([mode](ViewSession& session, ViewControls&) { session.set_split(static_cast<SplitMode>(mode)); });
+  if (shown.split != SplitMode::kDifference) return;
+  auto gain = static_cast<float>(shown.gain);
+  ImGui::SetNextItemWidth(150.0f);
+  if (ImGui::SliderFloat("gain", &gain, 1.0f, 100.0f, "%.3g", ImGuiSliderFlags_Logarithmic))
+    frames.post([gain](ViewSession& session, ViewControls&) { session.set_gain(double{gain}); });
+  if (shown.metrics)
+    text_line(fmt::format("RMSE {:.4f}, PSNR {:.2f} dB, FLIP {:.4f}", shown.metrics->rmse, shown.metrics->psnr,
+                          shown.metrics->flip));
+}
+
+void draw_help(bool& shown) {
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({screen.x / 2.0f, screen.y / 2.0f}, ImGuiCond_Appearing, {0.5f, 0.5f});
+  if (ImGui::Begin("Keys and mouse", &shown, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings)) {
+    std::string_view group;
+    for (const KeyHelp& key : key_help()) {
+      if (key.group != group) ImGui::TextDisabled("%s", std::string(group = key.group).c_str());
+      text_line(fmt::format("  {:<16} {}", key.keys, key.text));
+    }
+  }
+  ImGui::End();
+}
+
+void draw_pick(const Pick& pick, float bottom) {
+  ImGui::SetNextWindowPos({2.0f * kMargin + kPanelWidth, bottom}, ImGuiCond_Always, {0.0f, 1.0f});
+  ImGui::SetNextWindowBgAlpha(0.75f);
+  if (ImGui::Begin("Under the mouse", nullptr,
+                   ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoInputs |
+                       ImGuiWindowFlags_NoFocusOnAppearing))
+    for (const std::string& line : pick_lines(pick)) text_line(line);
+  ImGui::End();
+}
+
+/// The message, or the command that makes the picture. Returns the top of the line.
+float draw_message(const ViewSnapshot& shown) {
+  const std::string& text = shown.message.empty() ? shown.command : shown.message;
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  if (text.empty()) return screen.y - kMargin;
+  ImGui::SetNextWindowPos({kMargin, screen.y - kMargin}, ImGuiCond_Always, {0.0f, 1.0f});
+  ImGui::SetNextWindowSize({screen.x - 2 * kMargin, 0.0f});
+  ImGui::SetNextWindowBgAlpha(0.75f);
+  float top = screen.y - kMargin;
+  if (ImGui::Begin("##message", nullptr,
+                   ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoInputs |
+                       ImGuiWindowFlags_NoFocusOnAppearing)) {
+    ImGui::PushTextWrapPos(0.0f);
+    text_line(text);
+    ImGui::PopTextWrapPos();
+    top -= ImGui::GetWindowHeight();
+  }
+  ImGui::End();
+  return top - kMargin;
+}
+
+} // namespace
+
+void Panels::add_frame(const ViewSnapshot& snapshot) {
+  if (snapshot.frame_ms <= 0.0) return;
+  ms_.push_back(static_cast<float>(snapshot.frame_ms));
+  if (ms_.size() > kGraphFrames) ms_.erase(ms_.begin());
+}
+
+double Panels::fps() const {
+  if (ms_.empty()) return 0.0;
+  std::vector<float> sorted(ms_.end() - static_cast<ptrdiff_t>(std::min<size_t>(ms_.size(), 60)), ms_.end());
+  std::ranges::sort(sorted);
+  return 1e3 / double{std::max(sorted[sorted.size() / 2], 0.01f)};
+}
+
+void Panels::draw_times(const ViewSnapshot& snapshot) const {
+  if (ms_.empty()) return;
+  std::vector<float> sorted = ms_;
+  std::ranges::sort(sorted);
+  const double median = double{sorted[sorted.size() / 2]}, p99 = double{sorted[(sorted.size() * 99) / 100]};
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({screen.x - kMargin, kMargin}, ImGuiCond_Always, {1.0f, 0.0f});
+  ImGui::SetNextWindowBgAlpha(0.75f);
+  if (ImGui::Begin("Times", nullptr, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings)) {
+    ImGui::PlotLines("##ms", ms_.data(), static_cast<int>(ms_.size()), 0, nullptr, 0.0f, 1.2f * sorted.back(),
+                     {220.0f, 48.0f});
+    text_line(fmt::format("median {:.1f} ms, 99 % below {:.1f} ms", median, p99));
+    for (const auto& [name, member] : kPasses)
+      if (const double s = snapshot.frame.report.times.*member; s > 0.0)
+        text_line(fmt::format("{:<9}{:7.1f} ms", name, 1e3 * s));
+    const PictureReport& r = snapshot.frame.report;
+    text_line(fmt::format("{:.2f} M camera rays, {:.2f} M occlusion rays", 1e-6 * static_cast<double>(r.primary_rays),
+                          1e-6 * static_cast<double>(r.ao_rays)));
+    text_line(fmt::format("history {:.1f} frames, {} x {} traced", r.mean_history, snapshot.frame.traced.width,
+                          snapshot.frame.traced.height));
+  }
+  ImGui::End();
+}
+
+void Panels::draw_views(const ViewSnapshot& shown, FrameThread& frames, const WindowActions& actions) {
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({kMargin, kMargin}, ImGuiCond_Always);
+  ImGui::SetNextWindowSizeConstraints({kPanelWidth, 0.0f}, {kPanelWidth, screen.y * 0.8f});
+  ImGui::SetNextWindowBgAlpha(0.75f);
+  if (ImGui::Begin("View", nullptr, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoSavedSettings)) {
+    draw_pane(0, shown, frames);
+    draw_split(shown, frames);
+    if (shown.split != SplitMode::kOff) draw_pane(1, shown, frames);
+    if (shown.split != SplitMode::kOff) {
+      int pane = static_cast<int>(settings_pane_);
+      ImGui::RadioButton("settings of the first", &pane, 0);
+      ImGui::SameLine();
+      ImGui::RadioButton("second", &pane, 1);
+      settings_pane_ = static_cast<size_t>(pane);
+    } else {
+      settings_pane_ = 0;
+    }
+    draw_settings(shown.settings[settings_pane_], settings_pane_, frames);
+    auto target = static_cast<float>(shown.target_ms);
+    ImGui::SetNextItemWidth(120.0f);
+    if (ImGui::SliderFloat("target, ms", &target, 0.0f, 200.0f, "%.0f", ImGuiSliderFlags_AlwaysClamp))
+      frames.post([target](ViewSession& session, ViewControls&) { session.set_target_ms(double{target}); });
+    tooltip("Milliseconds that a frame may take while something moves: above, its resolution falls. 0: no limit");
+    if (ImGui::Button("Screenshot (P)")) frames.post(actions.screenshot);
+    ImGui::SameLine();
+    if (ImGui::Button("Save settings")) frames.post(actions.save_settings);
+    ImGui::SameLine();
+    if (ImGui::Button("Help (H)")) help = !help;
+    text_line(fmt::format("speed {:.3g} per second{}{}{}", shown.speed, shown.orbits ? ", orbit" : "",
+                          shown.plays ? ", plays" : "", shown.paused ? ", paused" : ""));
+    if (shown.recording) ImGui::TextColored({1.0f, 0.4f, 0.3f, 1.0f}, "recording the camera");
+  }
+  ImGui::End();
+}
+
+void Panels::draw(const ViewSnapshot& snapshot, FrameThread& frames, const WindowActions& actions) {
+  if (help) draw_help(help);
+  if (!shown) return;
+  draw_views(snapshot, frames, actions);
+  draw_times(snapshot);
+  const float bottom = draw_message(snapshot);
+  if (snapshot.pick) draw_pick(*snapshot.pick, bottom);
+}
+
+} // namespace packtrace

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "runtime/view/frame_thread.h"
+
+namespace packtrace {
+
+/// What a window asks of the program. The first three run in the frame thread.
+struct WindowActions {
+  FrameThread::Task screenshot, record, profile, save_settings;
+  std::function<void(const Pick& pick)> picked;         ///< a click
+  std::function<void(const std::string& file)> dropped; ///< a file was dropped on the window
+};
+
+/// A window for the frames of a FrameThread, with keys, mouse and panels. One per process, from the main thread.
+class ViewerWindow {
+public:
+  /// Opens the window. Throws Error(kUnsupported) without a display or OpenGL 3.3, saying what to do.
+  /// @param device words for the title: the instruction set
+  ViewerWindow(ImageSize size, std::string device);
+  ~ViewerWindow();
+  ViewerWindow(const ViewerWindow&) = delete;
+  ViewerWindow& operator=(const ViewerWindow&) = delete;
+
+  /// Shows frames until the window is closed. Rethrows what ended the frame thread.
+  void run(FrameThread& frames, const WindowActions& actions);
+
+  struct State; ///< of window.cpp
+
+private:
+  std::unique_ptr<State> state_;
+};
+
+} // namespace packtrace
